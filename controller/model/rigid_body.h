@@ -1,0 +1,53 @@
+#pragma once
+
+// Mass properties of a link: given, or from its shapes by closed form.
+
+#include <variant>
+#include <vector>
+
+#include "controller/common/types.h"
+
+namespace dexcheck {
+
+/// Mass, centre of mass and rotational inertia of a rigid body.
+struct MassProperties {
+  double mass = 0.0;                       ///< kg
+  Vector3d com = Vector3d::Zero();         ///< Centre of mass in the body's frame, m.
+  Matrix3d inertia = Matrix3d::Zero();     ///< About the centre of mass, in the body's axes, kg m^2.
+};
+
+/// Solid of revolution or box with uniform density. Its own frame has the origin at the centre of mass.
+struct Sphere {
+  double radius;  ///< m
+};
+struct Cylinder {
+  double radius;  ///< m
+  double length;  ///< Along the shape's z axis, m.
+};
+struct Capsule {
+  double radius;  ///< m
+  double length;  ///< Of the cylindrical part, along the shape's z axis, m.
+};
+struct Box {
+  Vector3d size;  ///< Full edge lengths, m.
+};
+struct Torus {
+  double ring_radius;  ///< Centre to the middle of the tube, m. The ring lies in the shape's x-y plane.
+  double tube_radius;  ///< m
+};
+using Shape = std::variant<Sphere, Cylinder, Capsule, Box, Torus>;
+
+/// Rotational inertia of a uniform solid about its centre of mass, in its own axes, kg m^2.
+Matrix3d CalcUniformInertia(const Shape& shape, double mass);
+
+/// Mass properties of a uniform solid whose frame stands at X_BS in the body's frame B.
+MassProperties CalcMassProperties(const Shape& shape, double mass, const Pose& X_BS);
+
+/// Mass properties of several bodies that move as one, all given in one frame.
+MassProperties Combine(const std::vector<MassProperties>& parts);
+
+/// Empty when the properties can belong to a real body: mass >= 0, finite, inertia symmetric with principal
+/// moments that are not negative and satisfy the triangle inequality; otherwise what is wrong, with the value.
+std::string FindPhysicalInconsistency(const MassProperties& body);
+
+}  // namespace dexcheck

@@ -1,0 +1,155 @@
+#pragma once
+
+// The robot as the analytic model sees it: a base and a tree of MDH joints. Immutable once built.
+
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "controller/common/types.h"
+#include "controller/model/mdh.h"
+#include "controller/model/rigid_body.h"
+
+namespace dexcheck {
+
+enum class BaseType {
+  kFixed,              ///< No coordinates.
+  kPlanar,             ///< q_v = [x, y, phi], v = q_v_dot.
+  kDifferentialDrive,  ///< q_v = [x_c, y_c, phi] with the constraint (1); v has two entries (12).
+};
+
+/// The two choices of v in (12) for a differential drive.
+enum class DriveVelocity {
+  kTwist,       ///< v = [v_c, w_c]: forward speed of the axle's midpoint, m/s; yaw rate, rad/s.
+  kWheelRates,  ///< v = [thetadot_r, thetadot_l]: wheel rates, rad/s, positive rolls forward.
+};
+
+/// One of the two driving wheels; both are alike.
+struct WheelProperties {
+  double mass = 0.0;                ///< kg, centred on the axle at +-b/2.
+  double spin_inertia = 0.0;        ///< About the axle, kg m^2.
+  double transverse_inertia = 0.0;  ///< About any diameter, kg m^2.
+  double armature = 0.0;            ///< Reflected rotor inertia, kg m^2.
+  double damping = 0.0;             ///< Viscous, N m s/rad.
+};
+
+/// The link that carries the tree. Its frame Sigma_0 has z up; for a differential drive the origin is the
+/// midpoint of the wheel axle and x points forward.
+struct Base {
+  BaseType type = BaseType::kFixed;
+  std::string link = "base";
+  MassProperties body;              ///< Without the wheels, in Sigma_0. Ignored for a fixed base.
+  Pose X_B0 = Pose::Identity();     ///< Sigma_0 in the world frame Sigma_B at q_v = 0.
+
+  // Differential drive only.
+  DriveVelocity velocity = DriveVelocity::kTwist;
+  double wheel_radius = 0.0;         ///< r, m.
+  double wheel_distance = 0.0;       ///< b, m.
+  WheelProperties wheel;
+  std::string wheel_joint_right;
+  std::string wheel_joint_left;
+};
+
+enum class JointType { kRevolute, kPrismatic };
+
+/// A joint and the link that it moves. Frame i of the link follows from its parent's by
+/// X_PB (usually identity), then the MDH row with q_i added to theta (revolute) or to d (prismatic).
+struct Joint {
+  std::string name;
+  std::string link;
+  int parent = -1;                      ///< Index of the joint that moves the parent link; -1 is the base.
+  JointType type = JointType::kRevolute;
+  Pose X_PB = Pose::Identity();         ///< Where the MDH row starts, in the parent link's frame.
+  MdhRow mdh;
+  double lower = 0.0;                   ///< Range of q_i, rad or m.
+  double upper = 0.0;
+  double damping = 0.0;                 ///< Viscous friction, N m s/rad or N s/m.
+  double armature = 0.0;                ///< Reflected rotor inertia, kg m^2 or kg.
+  MassProperties body;                  ///< Of the link, in frame i.
+};
+
+/// A frame fixed to a link; a fingertip when it carries a sphere.
+struct Frame {
+  std::string name;
+  int link = -1;                        ///< Index of the joint that moves the link; -1 is the base.
+  Pose X_LF = Pose::Identity();
+  std::optional<double> sphere_radius;  ///< Of the fingertip's sphere, centred at the frame's origin, m.
+};
+
+/// The manipulated object (section 3.3), a free rigid body. Its frame Sigma_o stands at its centre of mass.
+struct ObjectModel {
+  std::string name;
+  Shape shape;
+  MassProperties body;                  ///< com is zero.
+  double friction = 0.0;                ///< mu of (21) between fingertip and object.
+};
+
+/// What a parameter file describes. Build with RobotModel(spec), which checks it.
+struct RobotSpec {
+  std::string name;
+  std::string source;                   ///< File, for messages.
+  Vector3d gravity{0.0, 0.0, -9.81};    ///< In the world frame, m/s^2.
+  Base base;
+  std::vector<Joint> joints;            ///< Parents before children; this is the order of q and xi.
+  std::vector<Frame> frames;
+  std::optional<ObjectModel> object;
+};
+
+/// Immutable model: the specification, checked, with the tree's derived structure.
+class RobotModel {
+ public:
+  /// @throws InputError when the specification cannot be a robot (names, order, masses, ranges).
+  explicit RobotModel(RobotSpec spec);
+
+  [[nodiscard]] const RobotSpec& spec() const { return spec_; }
+  [[nodiscard]] const std::string& name() const { return spec_.name; }
+  [[nodiscard]] const Vector3d& gravity() const { return spec_.gravity; }
+  [[nodiscard]] const Base& base() const { return spec_.base; }
+  [[nodiscard]] const std::vector<Joint>& joints() const { return spec_.joints; }
+  [[nodiscard]] const std::vector<Frame>& frames() const { return spec_.frames; }
+  [[nodiscard]] const std::optional<ObjectModel>& object() const { return spec_.object; }
+
+  /// Number of joints of the tree (without the base and the wheels).
+  [[nodiscard]] int num_joints() const { return static_cast<int>(spec_.joints.size()); }
+  /// Entries of q_v: 0 or 3.
+  [[nodiscard]] int num_base_positions() const { return spec_.base.type == BaseType::kFixed ? 0 : 3; }
+  /// Entries of v: 0, 3, or 2.
+  [[nodiscard]] int num_base_velocities() const;
+  /// p', entries of q': 51 for the paper's robot.
+  [[nodiscard]] int num_positions() const { return num_base_positions() + num_joints(); }
+  /// p' - r, entries of xi: 50 for the paper's robot.
+  [[nodiscard]] int num_velocities() const { return num_base_velocities() + num_joints(); }
+
+  /// Index of a joint by name; -1 when there is none.
+  [[nodiscard]] int FindJoint(std::string_view name) const;
+  /// Index of the joint that moves a link, by the link's name; -1 for the base's link.
+  /// @throws std::invalid_argument when there is no such link.
+  [[nodiscard]] int FindLink(std::string_view name) const;
+  /// Index of a frame by name. @throws std::invalid_argument when there is none.
+  [[nodiscard]] int FindFrame(std::string_view name) const;
+  /// Indices of the fingertip frames, in the file's order (R1..R4, L1..L4 for the paper's robot).
+  [[nodiscard]] const std::vector<int>& fingertips() const { return fingertips_; }
+  /// Name of a link by the index of its joint; -1 is the base's link.
+  [[nodiscard]] const std::string& link_name(int joint) const;
+
+  /// Joints in depth-first order, so that at each joint the chain to the base is the last `depth` visited.
+  [[nodiscard]] std::span<const int> depth_first() const { return depth_first_; }
+  /// Number of joints from the base to this one, itself included.
+  [[nodiscard]] int depth(int joint) const { return depth_[static_cast<size_t>(joint)]; }
+  [[nodiscard]] int max_depth() const { return max_depth_; }
+
+  /// The base's link with the wheels as part of it (their mass at +-b/2 on the axle), in Sigma_0.
+  [[nodiscard]] const MassProperties& base_with_wheels() const { return base_with_wheels_; }
+
+ private:
+  RobotSpec spec_;
+  std::vector<int> fingertips_;
+  std::vector<int> depth_first_;
+  std::vector<int> depth_;
+  int max_depth_ = 0;
+  MassProperties base_with_wheels_;
+};
+
+}  // namespace dexcheck
