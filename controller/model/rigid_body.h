@@ -2,6 +2,7 @@
 
 // Mass properties of a link: given, or from its shapes by closed form.
 
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -11,9 +12,9 @@ namespace dexcheck {
 
 /// Mass, centre of mass and rotational inertia of a rigid body.
 struct MassProperties {
-  double mass = 0.0;                       ///< kg
-  Vector3d com = Vector3d::Zero();         ///< Centre of mass in the body's frame, m.
-  Matrix3d inertia = Matrix3d::Zero();     ///< About the centre of mass, in the body's axes, kg m^2.
+  double mass = 0.0;                    ///< kg
+  Vector3d com = Vector3d::Zero();      ///< Centre of mass in the body's frame, m.
+  Matrix3d inertia = Matrix3d::Zero();  ///< About the centre of mass, in the body's axes, kg m^2.
 };
 
 /// Solid of revolution or box with uniform density. Its own frame has the origin at the centre of mass.
@@ -47,7 +48,8 @@ MassProperties CalcMassProperties(const Shape& shape, double mass, const Pose& X
 MassProperties Combine(const std::vector<MassProperties>& parts);
 
 /// Empty when the properties can belong to a real body: mass >= 0, finite, inertia symmetric with principal
-/// moments that are not negative and satisfy the triangle inequality; otherwise what is wrong, with the value.
+/// moments that are not negative and satisfy the triangle inequality; otherwise what is wrong, with the
+/// value.
 std::string FindPhysicalInconsistency(const MassProperties& body);
 
 }  // namespace dexcheck

@@ -40,13 +40,13 @@ struct WheelProperties {
 struct Base {
   BaseType type = BaseType::kFixed;
   std::string link = "base";
-  MassProperties body;              ///< Without the wheels, in Sigma_0. Ignored for a fixed base.
-  Pose X_B0 = Pose::Identity();     ///< Sigma_0 in the world frame Sigma_B at q_v = 0.
+  MassProperties body;           ///< Without the wheels, in Sigma_0. Ignored for a fixed base.
+  Pose X_B0 = Pose::Identity();  ///< Sigma_0 in the world frame Sigma_B at q_v = 0.
 
   // Differential drive only.
   DriveVelocity velocity = DriveVelocity::kTwist;
-  double wheel_radius = 0.0;         ///< r, m.
-  double wheel_distance = 0.0;       ///< b, m.
+  double wheel_radius = 0.0;    ///< r, m.
+  double wheel_distance = 0.0;  ///< b, m.
   WheelProperties wheel;
   std::string wheel_joint_right;
   std::string wheel_joint_left;
@@ -59,21 +59,21 @@ enum class JointType { kRevolute, kPrismatic };
 struct Joint {
   std::string name;
   std::string link;
-  int parent = -1;                      ///< Index of the joint that moves the parent link; -1 is the base.
+  int parent = -1;  ///< Index of the joint that moves the parent link; -1 is the base.
   JointType type = JointType::kRevolute;
-  Pose X_PB = Pose::Identity();         ///< Where the MDH row starts, in the parent link's frame.
+  Pose X_PB = Pose::Identity();  ///< Where the MDH row starts, in the parent link's frame.
   MdhRow mdh;
-  double lower = 0.0;                   ///< Range of q_i, rad or m.
+  double lower = 0.0;  ///< Range of q_i, rad or m.
   double upper = 0.0;
-  double damping = 0.0;                 ///< Viscous friction, N m s/rad or N s/m.
-  double armature = 0.0;                ///< Reflected rotor inertia, kg m^2 or kg.
-  MassProperties body;                  ///< Of the link, in frame i.
+  double damping = 0.0;   ///< Viscous friction, N m s/rad or N s/m.
+  double armature = 0.0;  ///< Reflected rotor inertia, kg m^2 or kg.
+  MassProperties body;    ///< Of the link, in frame i.
 };
 
 /// A frame fixed to a link; a fingertip when it carries a sphere.
 struct Frame {
   std::string name;
-  int link = -1;                        ///< Index of the joint that moves the link; -1 is the base.
+  int link = -1;  ///< Index of the joint that moves the link; -1 is the base.
   Pose X_LF = Pose::Identity();
   std::optional<double> sphere_radius;  ///< Of the fingertip's sphere, centred at the frame's origin, m.
 };
@@ -82,17 +82,17 @@ struct Frame {
 struct ObjectModel {
   std::string name;
   Shape shape;
-  MassProperties body;                  ///< com is zero.
-  double friction = 0.0;                ///< mu of (21) between fingertip and object.
+  MassProperties body;    ///< com is zero.
+  double friction = 0.0;  ///< mu of (21) between fingertip and object.
 };
 
 /// What a parameter file describes. Build with RobotModel(spec), which checks it.
 struct RobotSpec {
   std::string name;
-  std::string source;                   ///< File, for messages.
-  Vector3d gravity{0.0, 0.0, -9.81};    ///< In the world frame, m/s^2.
+  std::string source;                 ///< File, for messages.
+  Vector3d gravity{0.0, 0.0, -9.81};  ///< In the world frame, m/s^2.
   Base base;
-  std::vector<Joint> joints;            ///< Parents before children; this is the order of q and xi.
+  std::vector<Joint> joints;  ///< Parents before children; this is the order of q and xi.
   std::vector<Frame> frames;
   std::optional<ObjectModel> object;
 };
@@ -134,7 +134,8 @@ class RobotModel {
   /// Name of a link by the index of its joint; -1 is the base's link.
   [[nodiscard]] const std::string& link_name(int joint) const;
 
-  /// Joints in depth-first order, so that at each joint the chain to the base is the last `depth` visited.
+  /// Joints in depth-first order, children in declared order. Writing each joint to entry depth - 1 of an
+  /// array keeps its whole chain to the base in the entries before it.
   [[nodiscard]] std::span<const int> depth_first() const { return depth_first_; }
   /// Number of joints from the base to this one, itself included.
   [[nodiscard]] int depth(int joint) const { return depth_[static_cast<size_t>(joint)]; }

@@ -1,0 +1,112 @@
+#include "controller/model/rigid_body.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+
+#include "controller/common/text.h"
+
+namespace dexcheck {
+namespace {
+
+Matrix3d Diagonal(double Ixx, double Iyy, double Izz) { return Vector3d(Ixx, Iyy, Izz).asDiagonal(); }
+
+double Square(double x) { return x * x; }
+
+Matrix3d CalcInertia(const Sphere& sphere, double m) {
+  // I = 2/5 m r^2
+  return Matrix3d::Identity() * (0.4 * m * Square(sphere.radius));
+}
+
+Matrix3d CalcInertia(const Cylinder& cylinder, double m) {
+  // I_x = m (r^2 / 4 + l^2 / 12),  I_z = m r^2 / 2
+  const double r2 = Square(cylinder.radius);
+  const double Ix = m * (r2 / 4.0 + Square(cylinder.length) / 12.0);
+  return Diagonal(Ix, Ix, m * r2 / 2.0);
+}
+
+Matrix3d CalcInertia(const Capsule& capsule, double m) {
+  // A cylinder and two half spheres share the mass as l : 4/3 r. Each half sphere, of mass m_s / 2, has its
+  // centre of mass 3/8 r beyond the cylinder's end, so by the parallel-axis theorem
+  //   I_x = m_c (r^2 / 4 + l^2 / 12) + m_s (2/5 r^2 + l^2 / 4 + 3/8 l r),  I_z = m_c r^2 / 2 + m_s 2/5 r^2
+  const double r = capsule.radius;
+  const double l = capsule.length;
+  const double m_c = m * l / (l + 4.0 / 3.0 * r);
+  const double m_s = m - m_c;
+  const double Ix = m_c * (r * r / 4.0 + l * l / 12.0) + m_s * (0.4 * r * r + l * l / 4.0 + 0.375 * l * r);
+  return Diagonal(Ix, Ix, (0.5 * m_c + 0.4 * m_s) * r * r);
+}
+
+Matrix3d CalcInertia(const Box& box, double m) {
+  // I_x = m (s_y^2 + s_z^2) / 12 and cyclic
+  const Vector3d s2 = box.size.array().square();
+  return Diagonal(s2.y() + s2.z(), s2.z() + s2.x(), s2.x() + s2.y()) * (m / 12.0);
+}
+
+Matrix3d CalcInertia(const Torus& torus, double m) {
+  // I_x = m (R^2 / 2 + 5/8 r^2),  I_z = m (R^2 + 3/4 r^2)
+  const double R2 = Square(torus.ring_radius);
+  const double r2 = Square(torus.tube_radius);
+  const double Ix = m * (0.5 * R2 + 0.625 * r2);
+  return Diagonal(Ix, Ix, m * (R2 + 0.75 * r2));
+}
+
+}  // namespace
+
+Matrix3d CalcUniformInertia(const Shape& shape, double mass) {
+  return std::visit([mass](const auto& solid) { return CalcInertia(solid, mass); }, shape);
+}
+
+MassProperties CalcMassProperties(const Shape& shape, double mass, const Pose& X_BS) {
+  // I_B = R_BS I_S R_BS^T
+  const Matrix3d R_BS = X_BS.linear();
+  return {mass, X_BS.translation(), R_BS * CalcUniformInertia(shape, mass) * R_BS.transpose()};
+}
+
+MassProperties Combine(const std::vector<MassProperties>& parts) {
+  MassProperties whole;
+  for (const MassProperties& part : parts) {
+    whole.mass += part.mass;
+    whole.com += part.mass * part.com;
+  }
+  if (whole.mass > 0.0) whole.com /= whole.mass;
+  // I = sum I_i - m_i [d_i]x [d_i]x,  d_i = com_i - com
+  for (const MassProperties& part : parts) {
+    const Matrix3d d = Skew(part.com - whole.com);
+    whole.inertia += part.inertia - part.mass * d * d;
+  }
+  return whole;
+}
+
+std::string FindPhysicalInconsistency(const MassProperties& body) {
+  if (!std::isfinite(body.mass) || body.mass < 0.0) {
+    return "mass must be finite and not negative, got " + FormatNumber(body.mass);
+  }
+  if (!body.com.allFinite()) {
+    return "centre of mass must be finite, got " + FormatNumbers(body.com);
+  }
+  if (!body.inertia.allFinite()) {
+    return "inertia must be finite, got " + FormatNumbers(body.inertia.reshaped<Eigen::RowMajor>());
+  }
+  if (body.mass == 0.0 && !body.inertia.isZero(0.0)) {
+    return "a massless body has no inertia, got " + FormatNumbers(body.inertia.diagonal());
+  }
+
+  // Rods and plates meet the inequalities with equality. Their entries, rounded when written down, rotated
+  // and summed (some ten roundings each), and the eigenvalues computed from them are off by a few eps |I|.
+  const double allowance = 64.0 * std::numeric_limits<double>::epsilon() * body.inertia.norm();
+  if ((body.inertia - body.inertia.transpose()).norm() > allowance) {
+    return "inertia must be symmetric, got " + FormatNumbers(body.inertia.reshaped<Eigen::RowMajor>());
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(body.inertia, Eigen::EigenvaluesOnly);
+  const Vector3d moments = solver.eigenvalues();  // Ascending.
+  if (moments[0] < -allowance) {
+    return "principal moments of inertia must not be negative, got " + FormatNumbers(moments);
+  }
+  if (moments[0] + moments[1] < moments[2] - allowance) {
+    return "principal moments of inertia must satisfy the triangle inequality, got " + FormatNumbers(moments);
+  }
+  return {};
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,220 @@
+#include "controller/model/robot_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+
+namespace dexcheck {
+namespace {
+
+/// One wheel at the given place on the axle (y of Sigma_0, m), in Sigma_0.
+MassProperties CalcWheel(const WheelProperties& wheel, double y) {
+  // The wheel spins about the axle, y_0; about any diameter its inertia is the same.
+  const Vector3d moments(wheel.transverse_inertia, wheel.spin_inertia, wheel.transverse_inertia);
+  return {wheel.mass, Vector3d(0.0, y, 0.0), moments.asDiagonal()};
+}
+
+MassProperties CalcBaseWithWheels(const Base& base) {
+  if (base.type != BaseType::kDifferentialDrive) return base.body;
+  const double half = 0.5 * base.wheel_distance;
+  return Combine({base.body, CalcWheel(base.wheel, half), CalcWheel(base.wheel, -half)});
+}
+
+/// Checks a specification entry by entry; every failure is an InputError "FILE: KEY: what, got VALUE".
+class SpecChecker {
+ public:
+  explicit SpecChecker(const RobotSpec& spec) : spec_(spec) {}
+
+  void CheckAll() {
+    for (const double g : spec_.gravity) CheckFinite("gravity", g);
+    CheckBase(spec_.base);
+    for (size_t i = 0; i < spec_.joints.size(); ++i) CheckJoint(spec_.joints[i], static_cast<int>(i));
+    for (const Frame& frame : spec_.frames) CheckFrame(frame);
+    if (spec_.object) CheckObject(*spec_.object);
+  }
+
+ private:
+  [[noreturn]] void Fail(const std::string& key, const std::string& problem) const {
+    throw InputError(spec_.source + ": " + key + ": " + problem);
+  }
+
+  void Check(bool condition, const std::string& key, const std::string& requirement, double value) const {
+    if (!condition) Fail(key, requirement + ", got " + FormatNumber(value));
+  }
+  void CheckFinite(const std::string& key, double value) const {
+    Check(std::isfinite(value), key, "must be finite", value);
+  }
+  void CheckPositive(const std::string& key, double value) const {
+    Check(std::isfinite(value) && value > 0.0, key, "must be finite and positive", value);
+  }
+  void CheckNotNegative(const std::string& key, double value) const {
+    Check(std::isfinite(value) && value >= 0.0, key, "must be finite and not negative", value);
+  }
+
+  void CheckPose(const std::string& key, const Pose& X) const {
+    for (const double entry : X.matrix().reshaped()) CheckFinite(key, entry);
+    // A product of a few rotations is orthonormal to a few eps.
+    constexpr double kAllowance = 64.0 * std::numeric_limits<double>::epsilon();
+    const double residual = (X.linear().transpose() * X.linear() - Matrix3d::Identity()).norm();
+    Check(residual <= kAllowance, key, "must be a rotation, |R^T R - I| = 0", residual);
+    Check(X.linear().determinant() > 0.0, key, "must be a right-handed rotation, det R = 1",
+          X.linear().determinant());
+  }
+
+  void CheckBody(const std::string& key, const MassProperties& body) const {
+    const std::string problem = FindPhysicalInconsistency(body);
+    if (!problem.empty()) Fail(key, problem);
+  }
+
+  void CheckUnique(std::set<std::string>& names, const std::string& key, const std::string& name) const {
+    if (name.empty()) Fail(key, "must not be empty, got \"\"");
+    if (!names.insert(name).second) Fail(key, "must be unique, got " + Quote(name) + " again");
+  }
+
+  void CheckBase(const Base& base) {
+    CheckUnique(link_names_, "base.link", base.link);
+    CheckPose("base.pose", base.X_B0);
+    if (base.type != BaseType::kFixed) CheckBody("base", base.body);
+    if (base.type != BaseType::kDifferentialDrive) return;
+    CheckPositive("base.wheel_radius", base.wheel_radius);
+    CheckPositive("base.wheel_distance", base.wheel_distance);
+    CheckNotNegative("base.wheels.mass", base.wheel.mass);
+    CheckNotNegative("base.wheels.spin_inertia", base.wheel.spin_inertia);
+    CheckNotNegative("base.wheels.transverse_inertia", base.wheel.transverse_inertia);
+    CheckNotNegative("base.wheels.armature", base.wheel.armature);
+    CheckNotNegative("base.wheels.damping", base.wheel.damping);
+    CheckBody("base.wheels", CalcWheel(base.wheel, 0.0));
+    CheckUnique(joint_names_, "base.wheels.right", base.wheel_joint_right);
+    CheckUnique(joint_names_, "base.wheels.left", base.wheel_joint_left);
+  }
+
+  void CheckJoint(const Joint& joint, int index) {
+    CheckUnique(joint_names_, "joint " + Quote(joint.name) + ": name", joint.name);
+    const std::string key = "joint " + Quote(joint.name) + ": ";
+    CheckUnique(link_names_, key + "link", joint.link);
+    Check(-1 <= joint.parent && joint.parent < index, key + "parent",
+          "must be -1 (the base) or an earlier joint than " + std::to_string(index), joint.parent);
+    CheckPose(key + "pose", joint.X_PB);
+    CheckFinite(key + "alpha", joint.mdh.alpha);
+    CheckFinite(key + "a", joint.mdh.a);
+    CheckFinite(key + "q", joint.mdh.q);
+    CheckFinite(key + "d", joint.mdh.d);
+    CheckFinite(key + "range", joint.lower);
+    CheckFinite(key + "range", joint.upper);
+    Check(joint.lower <= joint.upper, key + "range",
+          "lower limit must not exceed upper limit " + FormatNumber(joint.upper), joint.lower);
+    CheckNotNegative(key + "damping", joint.damping);
+    CheckNotNegative(key + "armature", joint.armature);
+    CheckBody("link " + Quote(joint.link), joint.body);
+  }
+
+  void CheckFrame(const Frame& frame) {
+    CheckUnique(frame_names_, "frame " + Quote(frame.name) + ": name", frame.name);
+    const std::string key = "frame " + Quote(frame.name) + ": ";
+    Check(-1 <= frame.link && frame.link < static_cast<int>(spec_.joints.size()), key + "link",
+          "must be -1 (the base) or the index of a joint", frame.link);
+    CheckPose(key + "pose", frame.X_LF);
+    if (frame.sphere_radius) CheckPositive(key + "sphere_radius", *frame.sphere_radius);
+  }
+
+  void CheckObject(const ObjectModel& object) const {
+    CheckBody("object", object.body);
+    CheckPositive("object.mass", object.body.mass);
+    Check(object.body.com.isZero(0.0), "object.com", "must be the origin of the object's frame, distance 0",
+          object.body.com.norm());
+    CheckPositive("object.friction", object.friction);
+  }
+
+  const RobotSpec& spec_;
+  std::set<std::string> joint_names_;
+  std::set<std::string> link_names_;
+  std::set<std::string> frame_names_;
+};
+
+/// Children of each joint in declared order, preceded by those of the base: entry i + 1 belongs to joint i.
+std::vector<std::vector<int>> ListChildren(const std::vector<Joint>& joints) {
+  std::vector<std::vector<int>> children(joints.size() + 1);
+  for (size_t i = 0; i < joints.size(); ++i) {
+    children[static_cast<size_t>(joints[i].parent + 1)].push_back(static_cast<int>(i));
+  }
+  return children;
+}
+
+std::vector<int> SortDepthFirst(const std::vector<Joint>& joints) {
+  const std::vector<std::vector<int>> children = ListChildren(joints);
+  std::vector<int> order;
+  order.reserve(joints.size());
+  std::vector<int> open(children[0].rbegin(), children[0].rend());
+  while (!open.empty()) {
+    const int joint = open.back();
+    open.pop_back();
+    order.push_back(joint);
+    const std::vector<int>& next = children[static_cast<size_t>(joint + 1)];
+    open.insert(open.end(), next.rbegin(), next.rend());
+  }
+  return order;
+}
+
+/// Index of the first entry whose `member` is `name`; -1 when there is none.
+template <typename T>
+int FindByName(const std::vector<T>& entries, std::string T::*member, std::string_view name) {
+  const auto found =
+      std::find_if(entries.begin(), entries.end(), [&](const T& entry) { return entry.*member == name; });
+  return found == entries.end() ? -1 : static_cast<int>(found - entries.begin());
+}
+
+}  // namespace
+
+RobotModel::RobotModel(RobotSpec spec) : spec_(std::move(spec)) {
+  SpecChecker(spec_).CheckAll();
+  depth_first_ = SortDepthFirst(spec_.joints);
+  for (const Joint& joint : spec_.joints) {
+    depth_.push_back(joint.parent < 0 ? 1 : depth(joint.parent) + 1);
+    max_depth_ = std::max(max_depth_, depth_.back());
+  }
+  for (size_t i = 0; i < spec_.frames.size(); ++i) {
+    if (spec_.frames[i].sphere_radius) fingertips_.push_back(static_cast<int>(i));
+  }
+  base_with_wheels_ = CalcBaseWithWheels(spec_.base);
+}
+
+int RobotModel::num_base_velocities() const {
+  switch (spec_.base.type) {
+    case BaseType::kPlanar:
+      return 3;
+    case BaseType::kDifferentialDrive:
+      return 2;
+    case BaseType::kFixed:
+      break;
+  }
+  return 0;
+}
+
+int RobotModel::FindJoint(std::string_view name) const {
+  return FindByName(spec_.joints, &Joint::name, name);
+}
+
+int RobotModel::FindLink(std::string_view name) const {
+  if (name == spec_.base.link) return -1;
+  const int joint = FindByName(spec_.joints, &Joint::link, name);
+  if (joint < 0) throw std::invalid_argument("link: must exist in " + spec_.source + ", got " + Quote(name));
+  return joint;
+}
+
+int RobotModel::FindFrame(std::string_view name) const {
+  const int frame = FindByName(spec_.frames, &Frame::name, name);
+  if (frame < 0) throw std::invalid_argument("frame: must exist in " + spec_.source + ", got " + Quote(name));
+  return frame;
+}
+
+const std::string& RobotModel::link_name(int joint) const {
+  return joint < 0 ? spec_.base.link : spec_.joints.at(static_cast<size_t>(joint)).link;
+}
+
+}  // namespace dexcheck
