@@ -1,0 +1,225 @@
+// Dynamics: M, C and F by integrals over each joint's subtree (section 3).
+
+#include <cmath>
+
+#include "controller/dynamics/model_terms.h"
+
+namespace dexcheck {
+namespace {
+
+/// S_i . (I S_j) and its kin for all columns i of the path at once. `column` and `row` are the forces of
+/// FillRowAndColumn; arrays are rows of path_ (w, v, w_dot, v_dot).
+void ProjectOnPath(int length, const double* __restrict path, Eigen::Index stride,
+                   const Vector6d& inertia_force, const Vector6d& column_force, const Vector3d& row_force,
+                   double* __restrict M, double* __restrict C_column, double* __restrict C_row) {
+  const double* __restrict w0 = path;
+  const double* __restrict w1 = path + stride;
+  const double* __restrict w2 = path + 2 * stride;
+  const double* __restrict v0 = path + 3 * stride;
+  const double* __restrict v1 = path + 4 * stride;
+  const double* __restrict v2 = path + 5 * stride;
+  const double* __restrict dw0 = path + 6 * stride;
+  const double* __restrict dw1 = path + 7 * stride;
+  const double* __restrict dw2 = path + 8 * stride;
+  const double* __restrict dv0 = path + 9 * stride;
+  const double* __restrict dv1 = path + 10 * stride;
+  const double* __restrict dv2 = path + 11 * stride;
+  const double f0 = inertia_force[0], f1 = inertia_force[1], f2 = inertia_force[2];
+  const double f3 = inertia_force[3], f4 = inertia_force[4], f5 = inertia_force[5];
+  const double g0 = column_force[0], g1 = column_force[1], g2 = column_force[2];
+  const double g3 = column_force[3], g4 = column_force[4], g5 = column_force[5];
+  const double h0 = row_force[0], h1 = row_force[1], h2 = row_force[2];
+  for (int k = 0; k < length; ++k) {
+    M[k] = w0[k] * f0 + w1[k] * f1 + w2[k] * f2 + v0[k] * f3 + v1[k] * f4 + v2[k] * f5;
+    C_column[k] = w0[k] * g0 + w1[k] * g1 + w2[k] * g2 + v0[k] * g3 + v1[k] * g4 + v2[k] * g5;
+    C_row[k] = dw0[k] * f0 + dw1[k] * f1 + dw2[k] * f2 + dv0[k] * f3 + dv1[k] * f4 + dv2[k] * f5 +
+               w0[k] * h0 + w1[k] * h1 + w2[k] * h2;
+  }
+}
+
+}  // namespace
+
+ModelTerms::MassIntegrals& ModelTerms::MassIntegrals::operator+=(const MassIntegrals& other) {
+  m += other.m;
+  for (int i = 0; i < 3; ++i) mp[i] += other.mp[i];
+  for (int i = 0; i < 6; ++i) P[i] += other.P[i];
+  for (int i = 0; i < 3; ++i) h[i] += other.h[i];
+  for (int i = 0; i < 9; ++i) Q[i] += other.Q[i];
+  return *this;
+}
+
+ModelTerms::MassIntegrals ModelTerms::CalcLinkIntegrals(const LinkMass& mass, const LinkState& state) {
+  const Matrix3d& R = state.R;
+  const Vector3d& p = state.p;
+  const Vector3d& w = state.w;
+  const Vector3d& v = state.v;
+  MassIntegrals sum;
+  sum.m = mass.m;
+  const Vector3d R_mc = R * mass.mc;
+  const Vector3d mp = mass.m * p + R_mc;
+  // P = integral (p + R x)(p + R x)^T = R P_link R^T + p (R m c)^T + (m p + R m c) p^T
+  Matrix3d P_link;
+  P_link << mass.P[0], mass.P[1], mass.P[2], mass.P[1], mass.P[3], mass.P[4], mass.P[2], mass.P[4], mass.P[5];
+  const Matrix3d RP = R * P_link;
+  Matrix3d P;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = i; j < 3; ++j) {
+      P(i, j) = P(j, i) = RP.row(i).dot(R.row(j)) + p[i] * R_mc[j] + mp[i] * p[j];
+    }
+  }
+  // h = integral p_dot,  Q = integral p_dot p^T,  with p_dot = v + w x p
+  const Vector3d h = mass.m * v + w.cross(mp);
+  Matrix3d Q = v * mp.transpose();
+  for (int j = 0; j < 3; ++j) Q.col(j) += w.cross(Vector3d(P.col(j)));
+
+  for (int i = 0; i < 3; ++i) {
+    sum.mp[i] = mp[i];
+    sum.h[i] = h[i];
+    for (int j = 0; j < 3; ++j) sum.Q[3 * i + j] = Q(i, j);
+  }
+  const double P_entries[6] = {P(0, 0), P(0, 1), P(0, 2), P(1, 1), P(1, 2), P(2, 2)};
+  for (int i = 0; i < 6; ++i) sum.P[i] = P_entries[i];
+  return sum;
+}
+
+void ModelTerms::PushColumn(int depth, const Column& column, int dof) {
+  for (int i = 0; i < 3; ++i) {
+    path_(i, depth) = column.w[i];
+    path_(3 + i, depth) = column.v[i];
+    path_(6 + i, depth) = column.w_dot[i];
+    path_(9 + i, depth) = column.v_dot[i];
+  }
+  path_dofs_[static_cast<size_t>(depth)] = dof;
+}
+
+void ModelTerms::FillRowAndColumn(int depth, int dof, const Column& column, const MassIntegrals& subtree) {
+  const Eigen::Map<const Vector3d> mp(subtree.mp);
+  const Eigen::Map<const Vector3d> h(subtree.h);
+  const double* P = subtree.P;
+  const double* Q = subtree.Q;
+  const double trace_P = P[0] + P[3] + P[5];
+  const double trace_Q = Q[0] + Q[4] + Q[8];
+
+  // I S = [integral p x (v + w x p); integral (v + w x p)],  with integral p x (w x p) = (tr P) w - P w
+  const auto apply_inertia = [&](const Vector3d& w, const Vector3d& v) {
+    Vector6d force;
+    force[0] = trace_P * w[0] - (P[0] * w[0] + P[1] * w[1] + P[2] * w[2]);
+    force[1] = trace_P * w[1] - (P[1] * w[0] + P[3] * w[1] + P[4] * w[2]);
+    force[2] = trace_P * w[2] - (P[2] * w[0] + P[4] * w[1] + P[5] * w[2]);
+    force.head<3>() += mp.cross(v);
+    force.tail<3>() = subtree.m * v + w.cross(Vector3d(mp));
+    return force;
+  };
+  const Vector6d inertia_force = apply_inertia(column.w, column.v);
+
+  // I S_dot + integral [p x (w x p_dot); w x p_dot],  with p x (w x p_dot) = ((tr Q) 1 - Q) w
+  Vector6d column_force = apply_inertia(column.w_dot, column.v_dot);
+  const Vector3d& w = column.w;
+  column_force[0] += trace_Q * w[0] - (Q[0] * w[0] + Q[1] * w[1] + Q[2] * w[2]);
+  column_force[1] += trace_Q * w[1] - (Q[3] * w[0] + Q[4] * w[1] + Q[5] * w[2]);
+  column_force[2] += trace_Q * w[2] - (Q[6] * w[0] + Q[7] * w[1] + Q[8] * w[2]);
+  column_force.tail<3>() += w.cross(Vector3d(h));
+
+  // The same operator transposed: ((tr Q) 1 - Q^T) w + h x v
+  Vector3d row_force = Vector3d(h).cross(column.v);
+  row_force[0] += trace_Q * w[0] - (Q[0] * w[0] + Q[3] * w[1] + Q[6] * w[2]);
+  row_force[1] += trace_Q * w[1] - (Q[1] * w[0] + Q[4] * w[1] + Q[7] * w[2]);
+  row_force[2] += trace_Q * w[2] - (Q[2] * w[0] + Q[5] * w[1] + Q[8] * w[2]);
+
+  const int padded = (depth + 8) / 8 * 8;
+  ProjectOnPath(padded, path_.data(), path_.cols(), inertia_force, column_force, row_force, path_M_.data(),
+                path_C_column_.data(), path_C_row_.data());
+  double* const M = M_.data();
+  double* const C = C_.data();
+  for (int k = 0; k <= depth; ++k) {
+    const int other = path_dofs_[static_cast<size_t>(k)];
+    M[dof * size_ + other] = path_M_[k];
+    M[other * size_ + dof] = path_M_[k];
+    C[dof * size_ + other] = path_C_column_[k];
+    C[other * size_ + dof] = path_C_row_[k];
+  }
+}
+
+void ModelTerms::CalcDynamics() {
+  const int joints = model_->num_joints();
+  for (int i = 0; i <= joints; ++i) {
+    subtrees_[static_cast<size_t>(i)] =
+        CalcLinkIntegrals(masses_[static_cast<size_t>(i)], links_[static_cast<size_t>(i)]);
+  }
+  for (int i = joints - 1; i >= 0; --i) {
+    subtrees_[static_cast<size_t>(places_[static_cast<size_t>(i)].parent + 1)] +=
+        subtrees_[static_cast<size_t>(i + 1)];
+  }
+
+  // Gravity's generalised force on column i: -(w_i . integral p x g + v_i . integral g)
+  const Vector3d g = base_R_.transpose() * model_->gravity();
+  const auto fill = [&](int depth, int dof, const MassIntegrals& subtree) {
+    const Column& column = columns_[static_cast<size_t>(dof)];
+    PushColumn(depth, column, dof);
+    FillRowAndColumn(depth, dof, column, subtree);
+    const Eigen::Map<const Vector3d> mp(subtree.mp);
+    gravity_[dof] = -(column.w.dot(mp.cross(g)) + subtree.m * column.v.dot(g));
+  };
+  for (int i = 0; i < base_size_; ++i) fill(i, i, subtrees_[0]);
+  for (const int joint : model_->depth_first()) {
+    fill(base_size_ + model_->depth(joint) - 1, base_size_ + joint,
+         subtrees_[static_cast<size_t>(joint + 1)]);
+  }
+  AddWheelsAndRotors();
+}
+
+void ModelTerms::AddWheelsAndRotors() {
+  for (int i = 0; i < model_->num_joints(); ++i) {
+    const Joint& joint = model_->joints()[static_cast<size_t>(i)];
+    const int dof = base_size_ + i;
+    M_(dof, dof) += joint.armature;
+    friction_[dof] = joint.damping * velocity_[dof];
+  }
+  const Base& base = model_->base();
+  if (base.type != BaseType::kDifferentialDrive) {
+    friction_.head(base_size_).setZero();
+    return;
+  }
+  // Rolling ties the wheel rates to the base's motion: thetadot = K v with constant K in reduced coordinates,
+  // or the wheel_map along the heading in unreduced ones. M += K^T I K, F += K^T D K v.
+  const double spin = base.wheel.spin_inertia + base.wheel.armature;
+  Eigen::Matrix<double, 2, 3> K = Eigen::Matrix<double, 2, 3>::Zero();
+  for (int i = 0; i < base_size_; ++i) {
+    const Column& column = columns_[static_cast<size_t>(i)];
+    K.col(i) = wheel_map_ * Vector3d(column.v.x(), column.v.y(), column.w.z());
+  }
+  const Matrix3d K_spin_K = spin * K.transpose() * K;
+  M_.topLeftCorner(base_size_, base_size_) += K_spin_K.topLeftCorner(base_size_, base_size_);
+  friction_.head(base_size_) = (base.wheel.damping * K.transpose() * wheel_rates_).head(base_size_);
+  if (base_size_ != 3) return;
+
+  // In q_v_dot the spin part is M_w = k u u^T on (x, y), u = [cos phi, sin phi], k = 2 I / r^2; its
+  // Christoffel matrix, with D = d(u u^T)/d phi:  C_xy = k D phi_dot / 2,  C_x,phi = k D q_dot / 2 =
+  // -C_phi,x^T.
+  const double k = 2.0 * spin / (base.wheel_radius * base.wheel_radius);
+  Eigen::Matrix2d D;
+  D << -std::sin(2.0 * phi_), std::cos(2.0 * phi_), std::cos(2.0 * phi_), std::sin(2.0 * phi_);
+  const Eigen::Vector2d cross = 0.5 * k * D * velocity_.head<2>();
+  C_.topLeftCorner<2, 2>() += 0.5 * k * velocity_[2] * D;
+  C_.block<2, 1>(0, 2) += cross;
+  C_.block<1, 2>(2, 0) -= cross.transpose();
+}
+
+EnergyAndMomentum ModelTerms::CalcEnergyAndMomentum() const {
+  const MassIntegrals& all = subtrees_[0];
+  const Eigen::Map<const Vector3d> mp(all.mp);
+  const Eigen::Map<const Vector3d> h(all.h);
+  EnergyAndMomentum result;
+  const Vector3d com = mp / all.m;
+  result.com = base_position_ + base_R_ * com;
+  result.kinetic = 0.5 * velocity_.dot(M_ * velocity_);
+  result.potential = -all.m * model_->gravity().dot(result.com);
+  result.linear_momentum = base_R_ * h;
+  // integral p x p_dot = [Q_zy - Q_yz; Q_xz - Q_zx; Q_yx - Q_xy]; then the wheels' spin about the axle.
+  Vector3d angular(all.Q[7] - all.Q[5], all.Q[2] - all.Q[6], all.Q[3] - all.Q[1]);
+  angular.y() += model_->base().wheel.spin_inertia * wheel_rates_.sum();
+  result.angular_momentum = base_R_ * (angular - com.cross(Vector3d(h)));
+  return result;
+}
+
+}  // namespace dexcheck

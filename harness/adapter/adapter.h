@@ -1,0 +1,97 @@
+#pragma once
+
+// Between the two worlds: which joint, body and site of the engine's model is which of the analytic model,
+// and how coordinates and velocities translate.
+
+#include <mujoco/mujoco.h>
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "controller/common/types.h"
+#include "controller/model/robot_model.h"
+
+namespace dexcheck {
+
+/// A driving wheel as the MJCF has it: everything is read from the engine's model, nothing from the
+/// parameters.
+struct EngineWheel {
+  int joint = -1;
+  int dof = -1;
+  double radius = 0.0;       ///< Of the wheel's round geoms, m.
+  Vector3d center{0, 0, 0};  ///< In Sigma_0 at the reference pose, m.
+  Vector3d axis{0, 1, 0};    ///< Hinge axis in Sigma_0; +y makes positive rates roll forward.
+};
+
+/// Matches the analytic model with an engine's model by joint and body names and maps q', xi to qpos, qvel.
+///
+/// q_i is the engine's position of the joint of the same name. The base's q_v = 0 is the pose that the MJCF
+/// gives to the base's body. The base may move by a free joint, or by two slides and a hinge; a differential
+/// drive has a hinge per wheel besides. qvel = T velocity, where T has dense base columns and one entry per
+/// joint.
+class Adapter {
+ public:
+  /// @throws InputError that lists every joint or body that the other side lacks, or whose kind differs.
+  Adapter(const RobotModel& model, const mjModel& engine, const std::string& engine_source);
+
+  [[nodiscard]] const RobotModel& model() const { return *model_; }
+  [[nodiscard]] const mjModel& engine() const { return *engine_; }
+
+  /// Engine's joint id of each joint of the model.
+  [[nodiscard]] const std::vector<int>& joint_ids() const { return joint_ids_; }
+  /// Engine's dof address of each joint of the model.
+  [[nodiscard]] const std::vector<int>& joint_dofs() const { return joint_dofs_; }
+  /// Engine's body id of each link: base first, then by joint.
+  [[nodiscard]] const std::vector<int>& link_bodies() const { return link_bodies_; }
+  /// All engine bodies that move as one with a link (welded to it), by the link's index + 1.
+  [[nodiscard]] const std::vector<std::vector<int>>& welded_bodies() const { return welded_bodies_; }
+  /// Engine's site of each frame of the model; -1 when the MJCF has none of that name.
+  [[nodiscard]] const std::vector<int>& frame_sites() const { return frame_sites_; }
+  /// Engine's body of the object; -1 without one.
+  [[nodiscard]] int object_body() const { return object_body_; }
+  /// Right and left wheel; empty unless the base is a differential drive.
+  [[nodiscard]] const std::vector<EngineWheel>& wheels() const { return wheels_; }
+
+  /// Engine's joints that move the base: none, a free joint, or slide, slide, hinge.
+  [[nodiscard]] const std::vector<int>& base_joints() const { return base_joints_; }
+  /// Rates of those joints' dofs when the base yaws and its anchor (the point whose velocity the joints have:
+  /// origin of the free body, or the hinge's axis) moves; also what accelerations become. `rates` has 0, 6 or
+  /// 3 entries.
+  void CalcBaseRates(const Vector3d& anchor_velocity, double yaw_rate, Eigen::Ref<VectorXd> rates) const;
+  /// The anchor in Sigma_0, m.
+  [[nodiscard]] const Vector3d anchor() const { return X_0b_.translation(); }
+
+  /// Robot's part of qpos for q' (rolling leaves no mark on the wheels' angles, which are set to zero).
+  void SetPositions(const Eigen::Ref<const VectorXd>& q, mjtNum* qpos) const;
+
+  /// q' from the engine's qpos: yaw and midpoint of the base; tilt is dropped.
+  void GetPositions(const mjtNum* qpos, Eigen::Ref<VectorXd> q) const;
+
+ private:
+  void MatchJoints(const std::string& engine_source);
+  void MatchFrames();
+  void MatchBase(const std::string& engine_source);
+  void MatchWheels(const mjData& reference, const std::string& engine_source);
+  [[nodiscard]] Pose CalcBasePose(const Eigen::Ref<const VectorXd>& q) const;
+
+  const RobotModel* model_;
+  const mjModel* engine_;
+  std::vector<int> joint_ids_;
+  std::vector<int> joint_dofs_;
+  std::vector<int> joint_qpos_;
+  std::vector<int> link_bodies_;
+  std::vector<std::vector<int>> welded_bodies_;
+  std::vector<int> frame_sites_;
+  std::vector<EngineWheel> wheels_;
+  int object_body_ = -1;
+
+  std::vector<int> base_joints_;
+  bool base_is_free_ = false;
+  Pose X_0b_ = Pose::Identity();                  // body of the free joint, or the hinge's anchor
+  Vector3d reference_anchor_ = Vector3d::Zero();  // the hinge's anchor in the world at the reference pose
+  std::array<Vector3d, 2> slide_axes_ = {Vector3d::UnitX(), Vector3d::UnitY()};
+  double hinge_sign_ = 1.0;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,195 @@
+#include "tests/common/random_robot.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+
+namespace dexcheck::testing {
+namespace {
+
+double Draw(std::mt19937* random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(*random);
+}
+
+Vector3d DrawVector(std::mt19937* random, double size) {
+  return {Draw(random, -size, size), Draw(random, -size, size), Draw(random, -size, size)};
+}
+
+Matrix3d DrawRotation(std::mt19937* random) {
+  Eigen::Quaterniond rotation(Draw(random, -1, 1), Draw(random, -1, 1), Draw(random, -1, 1),
+                              Draw(random, -1, 1));
+  return rotation.normalized().toRotationMatrix();
+}
+
+MassProperties DrawBody(std::mt19937* random) {
+  // Second moments d >= 0 give principal moments (d2 + d3, ...) that obey the triangle inequality.
+  const Vector3d d(Draw(random, 0.001, 0.02), Draw(random, 0.001, 0.02), Draw(random, 0.001, 0.02));
+  const Vector3d moments(d[1] + d[2], d[2] + d[0], d[0] + d[1]);
+  const Matrix3d R = DrawRotation(random);
+  const Matrix3d inertia = R * moments.asDiagonal() * R.transpose();
+  return {Draw(random, 0.3, 3.0), DrawVector(random, 0.2), 0.5 * (inertia + inertia.transpose())};
+}
+
+std::string WritePose(const Pose& X) {
+  const Eigen::Quaterniond q(X.linear());
+  const Vector3d p = X.translation();
+  return fmt::format("pos=\"{:.17g} {:.17g} {:.17g}\" quat=\"{:.17g} {:.17g} {:.17g} {:.17g}\"", p.x(), p.y(),
+                     p.z(), q.w(), q.x(), q.y(), q.z());
+}
+
+// Principal moments and axes: the engine diagonalises a "fullinertia" itself, but only to eight digits.
+std::string WriteInertial(const MassProperties& body) {
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(body.inertia);
+  Matrix3d axes = principal.eigenvectors();
+  if (axes.determinant() < 0.0) axes.col(0) = -axes.col(0);
+  Pose X = Pose::Identity();
+  X.linear() = axes;
+  X.translation() = body.com;
+  const Vector3d moments = principal.eigenvalues();
+  return fmt::format("<inertial {} mass=\"{:.17g}\" diaginertia=\"{:.17g} {:.17g} {:.17g}\"/>\n",
+                     WritePose(X), body.mass, moments[0], moments[1], moments[2]);
+}
+
+void WriteLinkContent(const RobotSpec& spec, int link, std::string* text);
+
+void WriteJoint(const RobotSpec& spec, int index, std::string* text) {
+  const Joint& joint = spec.joints[static_cast<size_t>(index)];
+  const Pose X = joint.X_PB * Eigen::AngleAxisd(joint.mdh.alpha, Vector3d::UnitX()) *
+                 Eigen::Translation3d(joint.mdh.a, 0.0, 0.0) *
+                 Eigen::AngleAxisd(joint.mdh.q, Vector3d::UnitZ()) *
+                 Eigen::Translation3d(0.0, 0.0, joint.mdh.d);
+  *text += fmt::format("<body name=\"{}\" {}>\n", joint.link, WritePose(X));
+  *text += fmt::format(
+      "<joint name=\"{}\" type=\"{}\" axis=\"0 0 1\" damping=\"{:.17g}\" armature=\"{:.17g}\" "
+      "limited=\"true\" range=\"{:.17g} {:.17g}\"/>\n",
+      joint.name, joint.type == JointType::kRevolute ? "hinge" : "slide", joint.damping, joint.armature,
+      joint.lower, joint.upper);
+  *text += WriteInertial(joint.body);
+  WriteLinkContent(spec, index, text);
+  *text += "</body>\n";
+}
+
+void WriteLinkContent(const RobotSpec& spec, int link, std::string* text) {
+  for (const Frame& frame : spec.frames) {
+    if (frame.link == link)
+      *text += fmt::format("<site name=\"{}\" {}/>\n", frame.name, WritePose(frame.X_LF));
+  }
+  for (size_t i = 0; i < spec.joints.size(); ++i) {
+    if (spec.joints[i].parent == link) WriteJoint(spec, static_cast<int>(i), text);
+  }
+}
+
+void WriteWheel(const Base& base, const std::string& name, double y, std::string* text) {
+  *text += fmt::format(
+      "<body name=\"{0}_body\" pos=\"0 {1:.17g} 0\">\n<joint name=\"{0}\" axis=\"0 1 0\" "
+      "damping=\"{2:.17g}\" armature=\"{3:.17g}\"/>\n",
+      name, y, base.wheel.damping, base.wheel.armature);
+  const Vector3d moments(base.wheel.transverse_inertia, base.wheel.spin_inertia,
+                         base.wheel.transverse_inertia);
+  *text += WriteInertial({base.wheel.mass, Vector3d::Zero(), moments.asDiagonal()});
+  *text += fmt::format("<geom type=\"sphere\" size=\"{:.17g}\" contype=\"0\" conaffinity=\"0\"/>\n</body>\n",
+                       base.wheel_radius);
+}
+
+}  // namespace
+
+RobotSpec MakeRandomRobot(const RandomRobotOptions& options, std::mt19937* random) {
+  RobotSpec spec;
+  spec.name = "random";
+  spec.source = "random robot";
+  Base& base = spec.base;
+  base.type = options.base;
+  base.velocity = options.velocity;
+  base.body = DrawBody(random);
+  base.body.mass *= 10.0;
+  base.body.inertia *= 10.0;
+  if (base.type == BaseType::kFixed) {
+    base.X_B0.linear() = DrawRotation(random);
+    base.X_B0.translation() = DrawVector(random, 0.5);
+  } else {
+    base.X_B0.translation().z() = 0.12;
+    spec.gravity = Vector3d(0.3, -0.4, -9.7);
+  }
+  if (base.type == BaseType::kDifferentialDrive) {
+    base.wheel_radius = 0.12;
+    base.wheel_distance = 0.43;
+    base.wheel = {1.3, 0.011, 0.007, 0.004, 0.03};
+    base.wheel_joint_right = "wheel_right";
+    base.wheel_joint_left = "wheel_left";
+  }
+  std::vector<bool> is_leaf;
+  for (int i = 0; i < options.joints; ++i) {
+    Joint joint;
+    joint.name = fmt::format("joint_{}", i);
+    joint.link = fmt::format("link_{}", i);
+    joint.parent = i - 1;
+    if (i > 0 && Draw(random, 0.0, 1.0) < options.branching) {
+      joint.parent = std::uniform_int_distribution<int>(-1, i - 1)(*random);
+    }
+    if (Draw(random, 0.0, 1.0) < options.prismatic) joint.type = JointType::kPrismatic;
+    if (Draw(random, 0.0, 1.0) < options.offset) {
+      joint.X_PB.linear() = DrawRotation(random);
+      joint.X_PB.translation() = DrawVector(random, 0.1);
+    }
+    joint.mdh = {Draw(random, -kPi, kPi), Draw(random, -0.2, 0.2), Draw(random, -kPi, kPi),
+                 Draw(random, -0.2, 0.2)};
+    const double half_range = joint.type == JointType::kRevolute ? 2.5 : 0.2;
+    joint.lower = -half_range;
+    joint.upper = half_range;
+    joint.damping = Draw(random, 0.01, 0.5);
+    joint.armature = Draw(random, 0.001, 0.05);
+    joint.body = DrawBody(random);
+    if (joint.parent >= 0) is_leaf[static_cast<size_t>(joint.parent)] = false;
+    is_leaf.push_back(true);
+    spec.joints.push_back(joint);
+  }
+  for (size_t i = 0; i < is_leaf.size(); ++i) {
+    if (!is_leaf[i]) continue;
+    Frame frame;
+    frame.name = fmt::format("tip_{}", i);
+    frame.link = static_cast<int>(i);
+    frame.X_LF.linear() = DrawRotation(random);
+    frame.X_LF.translation() = DrawVector(random, 0.1);
+    spec.frames.push_back(frame);
+  }
+  return spec;
+}
+
+std::string WriteMjcf(const RobotSpec& spec, bool planar_by_free_joint) {
+  std::string text = fmt::format(
+      "<mujoco>\n<compiler angle=\"radian\" balanceinertia=\"false\"/>\n"
+      "<option gravity=\"{:.17g} {:.17g} {:.17g}\"/>\n<worldbody>\n<body name=\"{}\" {}>\n",
+      spec.gravity.x(), spec.gravity.y(), spec.gravity.z(), spec.base.link, WritePose(spec.base.X_B0));
+  if (spec.base.type != BaseType::kFixed) {
+    text += planar_by_free_joint
+                ? "<freejoint/>\n"
+                : "<joint type=\"slide\" axis=\"1 0 0\"/>\n<joint type=\"slide\" axis=\"0 1 0\"/>\n"
+                  "<joint axis=\"0 0 1\"/>\n";
+    text += WriteInertial(spec.base.body);
+  }
+  if (spec.base.type == BaseType::kDifferentialDrive) {
+    WriteWheel(spec.base, spec.base.wheel_joint_right, -0.5 * spec.base.wheel_distance, &text);
+    WriteWheel(spec.base, spec.base.wheel_joint_left, 0.5 * spec.base.wheel_distance, &text);
+  }
+  WriteLinkContent(spec, -1, &text);
+  return text + "</body>\n</worldbody>\n</mujoco>\n";
+}
+
+VectorXd DrawPositions(const RobotModel& model, std::mt19937* random) {
+  VectorXd q(model.num_positions());
+  const int offset = model.num_base_positions();
+  if (offset == 3) q.head<3>() << Draw(random, -2, 2), Draw(random, -2, 2), Draw(random, -kPi, kPi);
+  for (int i = 0; i < model.num_joints(); ++i) {
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    q[offset + i] = Draw(random, joint.lower, joint.upper);
+  }
+  return q;
+}
+
+VectorXd DrawVelocities(int size, std::mt19937* random) {
+  VectorXd velocity(size);
+  for (double& rate : velocity) rate = Draw(random, -2.0, 2.0);
+  return velocity;
+}
+
+}  // namespace dexcheck::testing
