@@ -47,8 +47,8 @@ PlatformConstraint CalcPlatformConstraint(const Base& base, const Vector3d& q_v,
   Eigen::Matrix<double, 3, 2> S_twist_dot;
   S_twist_dot << -s, 0.0, c, 0.0, 0.0, 0.0;
   platform.S_v_dot = phi_dot * S_twist_dot * T;
-  // tau^T thetadot = (E_v tau)^T q_v_dot with thetadot = (cos(phi) x_c_dot + sin(phi) y_c_dot +- phi_dot b/2)
-  // / r
+  // tau^T thetadot = (E_v tau)^T q_v_dot,  r thetadot_r,l = cos(phi) x_c_dot + sin(phi) y_c_dot +- phi_dot
+  // b/2
   platform.E_v << c / r, c / r, s / r, s / r, b / (2 * r), -b / (2 * r);
   platform.S_v_T_E_v = platform.S_v.transpose() * platform.E_v;
   return platform;
