@@ -1,0 +1,320 @@
+#include "harness/checks/model_check.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dexcheck {
+namespace {
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+// Rounding errors of one joint's step outward, in eps of the coordinates' size: a rotation of three products and sums
+// per entry on either side, and the engine's normalised quaternion. Errors of successive joints add up.
+constexpr double kErrorsPerJoint = 16.0;
+
+/// Relative rounding bound of a term whose formation chains `factors` such geometric quantities.
+double RoundingBound(int depth, double factors) { return factors * kErrorsPerJoint * (depth + 1) * kEpsilon; }
+
+double RowReach(const Joint& joint) {
+  const double slide = joint.type == JointType::kPrismatic ? std::max(std::abs(joint.lower), std::abs(joint.upper)) : 0.0;
+  return joint.X_PB.translation().norm() + std::abs(joint.mdh.a) + std::abs(joint.mdh.d) + slide;
+}
+
+/// Farthest that a point of the robot (centres of mass, frames) can be from Sigma_0's origin, over all postures.
+double CalcReach(const RobotModel& model) {
+  std::vector<double> reach(static_cast<size_t>(model.num_joints()) + 1, 0.0);
+  double farthest = model.base_with_wheels().com.norm() + 0.5 * model.base().wheel_distance;
+  for (int i = 0; i < model.num_joints(); ++i) {
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    double& mine = reach[static_cast<size_t>(i + 1)];
+    mine = reach[static_cast<size_t>(joint.parent + 1)] + RowReach(joint);
+    farthest = std::max(farthest, mine + joint.body.com.norm());
+  }
+  for (const Frame& frame : model.frames()) {
+    farthest = std::max(farthest, reach[static_cast<size_t>(frame.link + 1)] + frame.X_LF.translation().norm());
+  }
+  return farthest;
+}
+
+/// A scale of zero (a model without mass, a state at rest) leaves an absolute comparison.
+double Positive(double scale) { return scale > 0.0 ? scale : 1.0; }
+
+}  // namespace
+
+ModelCheck::ModelCheck(const Adapter& adapter)
+    : terms_(adapter.model(), Coordinates::kReduced),
+      terms_at_w_(adapter.model(), Coordinates::kReduced),
+      unreduced_(adapter.model(), Coordinates::kUnreduced),
+      engine_(adapter, Coordinates::kReduced),
+      engine_unreduced_(adapter, Coordinates::kUnreduced) {
+  const RobotModel& model = adapter.model();
+  const int depth = model.max_depth();
+  records_.resize(kTermCount);
+  const auto define = [&](Term term, const char* name, double factors) {
+    records_[term].name = name;
+    records_[term].bound = RoundingBound(depth, factors);
+  };
+  define(kJointAxis, "joint_axis", 1.0);
+  define(kLinkCom, "link_com", 1.0);
+  define(kLinkInertia, "link_inertia", 2.0);
+  define(kFramePose, "frame_pose", 1.0);
+  define(kJ, "J", 1.0);
+  define(kJDotXi, "J_dot_xi", 3.0);
+  define(kMassMatrix, "M", 2.0);
+  define(kReducedMassMatrix, "M_bar", 2.0);
+  define(kCoriolisForce, "C_bar_xi", 4.0);
+  define(kCoriolisMatrix, "C_bar", 4.0);
+  define(kGravity, "gravity", 1.0);
+  define(kFriction, "friction", 2.0);
+  define(kKineticEnergy, "kinetic_energy", 2.0);
+  define(kPotentialEnergy, "potential_energy", 1.0);
+  define(kLinearMomentum, "linear_momentum", 1.0);
+  define(kAngularMomentum, "angular_momentum", 2.0);
+
+  reach_ = CalcReach(model);
+  subtree_mass_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
+  subtree_mass_[0] = model.base().type == BaseType::kFixed ? 0.0 : model.base_with_wheels().mass;
+  for (int i = model.num_joints() - 1; i >= 0; --i) {
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    subtree_mass_[static_cast<size_t>(i + 1)] += joint.body.mass;
+    subtree_mass_[static_cast<size_t>(joint.parent + 1)] += subtree_mass_[static_cast<size_t>(i + 1)];
+  }
+
+  const int n = terms_.size();
+  unreduced_velocity_.setZero(unreduced_.size());
+  J_.setZero(6, n);
+  J_dot_.setZero(6, n);
+  J_engine_.setZero(6, n);
+  force_.setZero(n);
+  force_engine_.setZero(n);
+  probe_.setZero(n);
+  probe_engine_.setZero(n);
+}
+
+void ModelCheck::Compare(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi,
+                         const Eigen::Ref<const VectorXd>& w, long sample) {
+  sample_ = sample;
+  terms_.SetState(q, xi);
+  terms_.CalcDynamics();
+  engine_.SetState(q, xi);
+  CalcScales(q, xi);
+  CompareGeometry();
+  CompareFrames(xi);
+  unreduced_.SetState(q, unreduced_velocity_);
+  unreduced_.CalcDynamics();
+  engine_unreduced_.SetState(q, unreduced_velocity_);
+  CompareMassMatrices();
+  CompareEnergies();
+  CompareForces(xi, w, q);
+}
+
+void ModelCheck::CalcScales(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi) {
+  const RobotModel& model = terms_.model();
+  const int base = base_velocities();
+  scales_ = RoundingScales{};
+  scales_.length = reach_ + model.base().X_B0.translation().norm();
+  if (model.num_base_positions() == 3) scales_.length += q.head<2>().norm();
+  double base_linear = 0.0;
+  double base_angular = 0.0;
+  for (int i = 0; i < base; ++i) {
+    const double rate = std::abs(xi[i]);
+    if (base == 3) {
+      (i < 2 ? base_linear : base_angular) += rate;
+    } else if (model.base().velocity == DriveVelocity::kTwist) {
+      (i == 0 ? base_linear : base_angular) += rate;
+    } else {
+      base_linear += 0.5 * model.base().wheel_radius * rate;
+      base_angular += model.base().wheel_radius / model.base().wheel_distance * rate;
+    }
+  }
+  scales_.angular_rate = base_angular;
+  scales_.linear_rate = base_linear;
+  for (int i = 0; i < model.num_joints(); ++i) {
+    const double rate = std::abs(xi[base + i]);
+    const bool revolute = model.joints()[static_cast<size_t>(i)].type == JointType::kRevolute;
+    (revolute ? scales_.angular_rate : scales_.linear_rate) += rate / model.num_joints() * model.max_depth();
+  }
+  scales_.linear_rate += scales_.angular_rate * scales_.length;
+}
+
+double ModelCheck::VelocityScale(int coordinate) const {
+  const RobotModel& model = terms_.model();
+  const int base = base_velocities();
+  if (coordinate >= base) {
+    const bool revolute = model.joints()[static_cast<size_t>(coordinate - base)].type == JointType::kRevolute;
+    return revolute ? scales_.length : 1.0;
+  }
+  if (base == 3) return coordinate < 2 ? 1.0 : scales_.length;
+  if (model.base().velocity == DriveVelocity::kTwist) return coordinate == 0 ? 1.0 : scales_.length;
+  return 0.5 * model.base().wheel_radius + model.base().wheel_radius / model.base().wheel_distance * scales_.length;
+}
+
+double ModelCheck::SubtreeMass(int coordinate) const {
+  return subtree_mass_[static_cast<size_t>(std::max(coordinate - base_velocities() + 1, 0))];
+}
+
+void ModelCheck::CompareGeometry() {
+  const RobotModel& model = terms_.model();
+  const double length = scales_.length;
+  // From the base outward, so that the first failure is the one that the others follow from.
+  for (int i = -1; i < model.num_joints(); ++i) {
+    const Pose X = terms_.CalcLinkPose(i);
+    if (i >= 0) {
+      const Location at_joint{Location::Kind::kJoint, i, -1};
+      const Vector3d axis = X.linear().col(2);
+      const Vector3d axis_engine = engine_.JointAxis(i);
+      for (int k = 0; k < 3; ++k) record(kJointAxis).Add(axis[k], axis_engine[k], 1.0, at_joint, sample_);
+      if (model.joints()[static_cast<size_t>(i)].type == JointType::kRevolute) {
+        // Where along the axis the anchor stands is a choice of frames: compare the foot of the perpendicular.
+        const Vector3d anchor = engine_.JointAnchor(i);
+        const Vector3d foot = X.translation() + axis.dot(anchor - X.translation()) * axis;
+        for (int k = 0; k < 3; ++k) record(kJointAxis).Add(foot[k], anchor[k], length, at_joint, sample_);
+      }
+    } else if (model.base().type == BaseType::kFixed) {
+      continue;  // the world carries no mass
+    }
+    const MassProperties& body = i < 0 ? model.base_with_wheels() : model.joints()[static_cast<size_t>(i)].body;
+    const LinkInWorld& link = engine_.links()[static_cast<size_t>(i + 1)];
+    const Location at_link{Location::Kind::kLink, i, -1};
+    if (body.mass > 0.0 || link.mass > 0.0) {
+      const Vector3d com = X * body.com;
+      for (int k = 0; k < 3; ++k) record(kLinkCom).Add(com[k], link.com[k], length, at_link, sample_);
+    }
+    const Matrix3d inertia = X.linear() * body.inertia * X.linear().transpose();
+    const double scale = Positive(std::max(inertia.trace(), link.inertia.trace()));
+    for (int k = 0; k < 9; ++k) {
+      record(kLinkInertia).Add(inertia.data()[k], link.inertia.data()[k], scale, at_link, sample_);
+    }
+  }
+}
+
+void ModelCheck::CompareFrames(const Eigen::Ref<const VectorXd>& xi) {
+  const int frames = static_cast<int>(terms_.model().frames().size());
+  const int n = terms_.size();
+  const double acceleration = Positive(scales_.linear_rate * scales_.angular_rate);
+  const double angular_acceleration = Positive(scales_.angular_rate * scales_.angular_rate);
+  for (int frame = 0; frame < frames; ++frame) {
+    const Location where{Location::Kind::kFrame, frame, -1};
+    const Pose X = terms_.CalcFramePose(frame);
+    const Pose X_engine = engine_.FramePose(frame);
+    for (int row = 0; row < 3; ++row) {
+      record(kFramePose).Add(X.translation()[row], X_engine.translation()[row], scales_.length, where, sample_);
+      for (int col = 0; col < 3; ++col) {
+        record(kFramePose).Add(X.linear()(row, col), X_engine.linear()(row, col), 1.0, where, sample_);
+      }
+    }
+    terms_.CalcFrameJacobian(frame, J_, J_dot_);
+    engine_.CalcFrameJacobian(frame, J_engine_);
+    Vector6d bias = Vector6d::Zero();
+    const Vector6d bias_engine = engine_.CalcFrameBiasAcceleration(frame);
+    Vector3d omega = Vector3d::Zero();
+    Vector3d velocity = Vector3d::Zero();
+    for (int col = 0; col < n; ++col) {
+      // The body Jacobian turned to world axes; rows of the angular part are pure numbers.
+      const Vector3d linear = X.linear() * J_.col(col).head<3>();
+      const Vector3d angular = X.linear() * J_.col(col).tail<3>();
+      const double scale = VelocityScale(col);
+      for (int k = 0; k < 3; ++k) {
+        record(kJ).Add(linear[k], J_engine_(k, col), scale, where, sample_);
+        record(kJ).Add(angular[k], J_engine_(3 + k, col), Positive(scale / scales_.length), where, sample_);
+      }
+      omega += angular * xi[col];
+      velocity += linear * xi[col];
+      bias.head<3>() += X.linear() * (J_dot_.col(col).head<3>() * xi[col]);
+      bias.tail<3>() += X.linear() * (J_dot_.col(col).tail<3>() * xi[col]);
+    }
+    // In world axes d/dt (R V) = R V_dot + omega x R V; the angular part has omega x omega = 0.
+    bias.head<3>() += omega.cross(velocity);
+    for (int k = 0; k < 3; ++k) {
+      record(kJDotXi).Add(bias[k], bias_engine[k], acceleration, where, sample_);
+      record(kJDotXi).Add(bias[3 + k], bias_engine[3 + k], angular_acceleration, where, sample_);
+    }
+  }
+}
+
+void ModelCheck::CompareMassMatrices() {
+  const int n = terms_.size();
+  const RobotModel& model = terms_.model();
+  const auto scale_of = [&](int row, int col) {
+    return Positive(std::min(SubtreeMass(row), SubtreeMass(col)) * VelocityScale(row) * VelocityScale(col));
+  };
+  for (int col = 0; col < n; ++col) {
+    for (int row = 0; row < n; ++row) {
+      record(kReducedMassMatrix)
+          .Add(terms_.M()(row, col), engine_.M()(row, col), scale_of(row, col),
+               {Location::Kind::kVelocityPair, row, col}, sample_);
+    }
+  }
+  // M of (16): its first three rows are along the world's x, y and about z; the others are M_bar's.
+  const int shift = unreduced_.size() - n;
+  const int base = model.num_base_positions();
+  const double mass = Positive(subtree_mass_[0]);
+  for (int col = 0; col < unreduced_.size(); ++col) {
+    for (int row = 0; row < unreduced_.size(); ++row) {
+      const double row_scale = row < base ? (row < 2 ? 1.0 : scales_.length) : VelocityScale(row - shift);
+      const double col_scale = col < base ? (col < 2 ? 1.0 : scales_.length) : VelocityScale(col - shift);
+      const double row_mass = row < base ? mass : SubtreeMass(row - shift);
+      const double col_mass = col < base ? mass : SubtreeMass(col - shift);
+      record(kMassMatrix)
+          .Add(unreduced_.M()(row, col), engine_unreduced_.M()(row, col),
+               Positive(std::min(row_mass, col_mass) * row_scale * col_scale),
+               {Location::Kind::kVelocityPair, std::max(row - shift, 0), std::max(col - shift, 0)}, sample_);
+    }
+  }
+}
+
+void ModelCheck::CompareForces(const Eigen::Ref<const VectorXd>& xi, const Eigen::Ref<const VectorXd>& w,
+                               const Eigen::Ref<const VectorXd>& q) {
+  const int n = terms_.size();
+  const double g = terms_.model().gravity().norm();
+  const double acceleration = scales_.linear_rate * scales_.angular_rate;
+  force_.noalias() = terms_.C() * xi;
+  for (int i = 0; i < n; ++i) {
+    const Location where{Location::Kind::kVelocity, i, -1};
+    const double inertial = SubtreeMass(i) * VelocityScale(i);
+    record(kCoriolisForce).Add(force_[i], engine_.coriolis()[i], Positive(inertial * acceleration), where, sample_);
+    record(kGravity).Add(terms_.gravity()[i], engine_.gravity()[i], Positive(inertial * g), where, sample_);
+    const double friction = std::max(std::abs(terms_.friction()[i]), std::abs(engine_.friction()[i]));
+    record(kFriction).Add(terms_.friction()[i], engine_.friction()[i], Positive(friction), where, sample_);
+  }
+
+  // C_bar(xi) w + C_bar(w) xi against the engine's force at xi + w and xi - w.
+  probe_.noalias() = terms_.C() * w;
+  terms_at_w_.SetState(q, w);
+  terms_at_w_.CalcDynamics();
+  probe_.noalias() += terms_at_w_.C() * xi;
+  force_ = xi + w;
+  engine_.CalcCoriolis(force_, probe_engine_);
+  force_ = xi - w;
+  engine_.CalcCoriolis(force_, force_engine_);
+  probe_engine_ = 0.5 * (probe_engine_ - force_engine_);
+  // Rates of xi and w together are about twice as large, so the forces summed up are four times as large.
+  constexpr double kProbe = 4.0;
+  for (int i = 0; i < n; ++i) {
+    record(kCoriolisMatrix)
+        .Add(probe_[i], probe_engine_[i], Positive(kProbe * SubtreeMass(i) * VelocityScale(i) * acceleration),
+             {Location::Kind::kVelocity, i, -1}, sample_);
+  }
+}
+
+void ModelCheck::CompareEnergies() {
+  const Location whole;
+  const EnergyAndMomentum& engine = engine_.energy_and_momentum();
+  const EnergyAndMomentum model = terms_.CalcEnergyAndMomentum();
+  const double mass = subtree_mass_[0];
+  const double momentum = mass * scales_.linear_rate;
+  record(kKineticEnergy)
+      .Add(model.kinetic, engine.kinetic, Positive(momentum * scales_.linear_rate), whole, sample_);
+  record(kPotentialEnergy)
+      .Add(model.potential, engine.potential, Positive(mass * terms_.model().gravity().norm() * scales_.length), whole,
+           sample_);
+  for (int k = 0; k < 3; ++k) {
+    record(kLinearMomentum)
+        .Add(model.linear_momentum[k], engine.linear_momentum[k], Positive(momentum), whole, sample_);
+    record(kAngularMomentum)
+        .Add(model.angular_momentum[k], engine.angular_momentum[k], Positive(momentum * scales_.length), whole,
+             sample_);
+  }
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,84 @@
+#pragma once
+
+// The first of the harness's questions: at one state, are the model's terms the engine's?
+
+#include <vector>
+
+#include "controller/dynamics/model_terms.h"
+#include "harness/checks/check_record.h"
+#include "harness/engine/engine_terms.h"
+
+namespace dexcheck {
+
+/// Sizes of the state and the robot that rounding errors are relative to. An error of a term is divided by the
+/// magnitude of what is summed up to form it, so that one bound holds for every entry, large or small.
+struct RoundingScales {
+  double length = 0.0;        ///< World coordinates of the robot's points, at most, m.
+  double angular_rate = 0.0;  ///< Of a link, at most, rad/s.
+  double linear_rate = 0.0;   ///< Of a point, at most, m/s.
+};
+
+/// Compares all robot terms at a state, and remembers the worst. Nothing allocates after construction but when a
+/// new worst case is stored.
+class ModelCheck {
+ public:
+  explicit ModelCheck(const Adapter& adapter);
+
+  /// @param q q'. @param xi reduced velocity.
+  /// @param w a second velocity, which probes the matrix C_bar' beyond its product with xi:
+  ///   C_bar(xi) w + C_bar(w) xi = (c(xi + w) - c(xi - w)) / 2 with c(xi) = C_bar(xi) xi from the engine.
+  void Compare(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi,
+               const Eigen::Ref<const VectorXd>& w, long sample);
+
+  [[nodiscard]] const std::vector<CheckRecord>& records() const { return records_; }
+  [[nodiscard]] int base_velocities() const { return terms_.model().num_base_velocities(); }
+
+ private:
+  enum Term {
+    kJointAxis,
+    kLinkCom,
+    kLinkInertia,
+    kFramePose,
+    kJ,
+    kJDotXi,
+    kMassMatrix,
+    kReducedMassMatrix,
+    kCoriolisForce,
+    kCoriolisMatrix,
+    kGravity,
+    kFriction,
+    kKineticEnergy,
+    kPotentialEnergy,
+    kLinearMomentum,
+    kAngularMomentum,
+    kTermCount
+  };
+  CheckRecord& record(Term term) { return records_[term]; }
+  void CalcScales(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi);
+  [[nodiscard]] double VelocityScale(int coordinate) const;
+  [[nodiscard]] double SubtreeMass(int coordinate) const;
+
+  void CompareGeometry();
+  void CompareFrames(const Eigen::Ref<const VectorXd>& xi);
+  void CompareMassMatrices();
+  void CompareForces(const Eigen::Ref<const VectorXd>& xi, const Eigen::Ref<const VectorXd>& w,
+                     const Eigen::Ref<const VectorXd>& q);
+  void CompareEnergies();
+
+  ModelTerms terms_;
+  ModelTerms terms_at_w_;
+  ModelTerms unreduced_;
+  EngineTerms engine_;
+  EngineTerms engine_unreduced_;
+  std::vector<CheckRecord> records_;
+  std::vector<double> subtree_mass_;  // base first
+  double reach_ = 0.0;
+  RoundingScales scales_;
+  long sample_ = -1;
+
+  VectorXd unreduced_velocity_;
+  Matrix6Xd J_, J_dot_, J_engine_;
+  VectorXd force_, force_engine_, probe_, probe_engine_;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,321 @@
+#include "controller/object/so3.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <array>
+#include <cmath>
+#include <random>
+#include <stdexcept>
+
+#include "tests/common/matrix_near.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::MatrixNear;
+using testing::TolScale;
+
+// Entries up to pi, about ten operations each: 20 eps.
+constexpr double kRounding = 5e-15;
+// Products of Jacobians with their inverses: entries up to pi/2, and a difference that loses one digit.
+constexpr double kJacobianRounding = 2e-14;
+// Central differences with kStep: truncation kStep^2 times third derivatives (< 10 here), rounding eps /
+// kStep.
+constexpr double kStep = 1e-5;
+constexpr double kDifference = 1e-9;
+// What a mutated model must exceed.
+constexpr double kVisible = 1e-3;
+
+// Around the switch to series at 0.1 rad, and up to pi.
+constexpr std::array kAngles = {0.0,       1e-300, 1e-12, 1e-8,       1e-4,       0.0999999,
+                                0.1000001, 1.0,    2.5,   kPi - 1e-4, kPi - 1e-8, kPi - 1e-12};
+
+class Random {
+ public:
+  explicit Random(unsigned seed) : generator_(seed) {}
+  Vector3d Vector(double size) {
+    return {size * uniform_(generator_), size * uniform_(generator_), size * uniform_(generator_)};
+  }
+  Vector3d Axis() { return Vector(1.0).normalized(); }
+
+ private:
+  std::mt19937 generator_;
+  std::uniform_real_distribution<double> uniform_{-1.0, 1.0};
+};
+
+Matrix3d RotationByEigen(const Vector3d& phi) {
+  const double theta = phi.norm();
+  if (theta == 0.0) return Matrix3d::Identity();
+  return Eigen::AngleAxisd(theta, phi / theta).toRotationMatrix();
+}
+
+TEST(So3, ByHand) {
+  Matrix3d quarter_turn;
+  quarter_turn << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  EXPECT_TRUE(MatrixNear(ExpSo3({0, 0, kPi / 2}), quarter_turn, kRounding));
+  EXPECT_TRUE(MatrixNear(LogSo3(quarter_turn), Vector3d(0, 0, kPi / 2), kRounding));
+  // A third of a turn about (1, 1, 1) sends x to y, y to z, z to x.
+  Matrix3d cycle;
+  cycle << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+  const Vector3d third = Vector3d::Constant(2 * kPi / 3 / std::sqrt(3.0));
+  EXPECT_TRUE(MatrixNear(ExpSo3(third), cycle, kRounding));
+  EXPECT_TRUE(MatrixNear(LogSo3(cycle), third, kRounding));
+  // At theta = pi about z: a = 2/pi^2, b = 1/pi^2, so J_l = [0, -2/pi, 0; 2/pi, 0, 0; 0, 0, 1].
+  Matrix3d J_l;
+  J_l << 0, -2 / kPi, 0, 2 / kPi, 0, 0, 0, 0, 1;
+  EXPECT_TRUE(MatrixNear(CalcLeftJacobian({0, 0, kPi}), J_l, kRounding));
+}
+
+TEST(So3, ExpAgreesWithAngleAxis) {
+  Random random(3101);
+  for (const double angle : kAngles) {
+    const Vector3d phi = angle * random.Axis();
+    EXPECT_TRUE(MatrixNear(ExpSo3(phi), RotationByEigen(phi), kRounding)) << "angle " << angle;
+  }
+}
+
+TEST(So3, LogInvertsExpFromZeroToPi) {
+  Random random(3102);
+  for (const double angle : kAngles) {
+    for (int i = 0; i < 10; ++i) {
+      const Vector3d phi = angle * random.Axis();
+      EXPECT_TRUE(MatrixNear(LogSo3(ExpSo3(phi)), phi, kRounding)) << "angle " << angle;
+    }
+  }
+}
+
+TEST(So3, LogKeepsTheRelativeAccuracyOfSmallAngles) {
+  const Vector3d phi(3e-9, -2e-9, 1e-9);
+  EXPECT_TRUE(MatrixNear(1e9 * LogSo3(ExpSo3(phi)), 1e9 * phi, kRounding));
+}
+
+TEST(So3, TheTextbookLogLosesItsDigitsNearPi) {
+  // log = theta / (2 sin(theta)) (R - R^T): the reason for going through the quaternion.
+  const Vector3d phi = (kPi - 1e-6) * Vector3d(1, 2, -2) / 3.0;
+  const Matrix3d R = ExpSo3(phi);
+  const double theta = std::acos((R.trace() - 1.0) / 2.0);
+  const Matrix3d log_x = theta / (2 * std::sin(theta)) * (R - R.transpose());
+  EXPECT_GT((Vector3d(log_x(2, 1), log_x(0, 2), log_x(1, 0)) - phi).norm(), 1e3 * kRounding);
+}
+
+TEST(So3, LogOfAHalfTurnPicksOneSign) {
+  Random random(3103);
+  for (int i = 0; i < 20; ++i) {
+    Vector3d axis = random.Axis();
+    Eigen::Index largest = 0;
+    axis.cwiseAbs().maxCoeff(&largest);
+    if (axis[largest] < 0.0) axis = -axis;
+    const Matrix3d half_turn = 2.0 * axis * axis.transpose() - Matrix3d::Identity();
+    EXPECT_TRUE(MatrixNear(LogSo3(half_turn), kPi * axis, kRounding));
+  }
+}
+
+TEST(So3, LeftJacobianIsTheMeanRotation) {
+  // J_l(phi) = integral of exp(s phi) over s in [0, 1], here by Simpson's rule; its error is (theta/n)^4 /
+  // 180.
+  constexpr int kPanels = 2000;
+  constexpr double kQuadrature = 1e-13;
+  Random random(3104);
+  for (const double angle : kAngles) {
+    const Vector3d phi = angle * random.Axis();
+    Matrix3d sum = Matrix3d::Identity() + RotationByEigen(phi);
+    for (int i = 1; i < kPanels; ++i) sum += (i % 2 == 1 ? 4.0 : 2.0) * RotationByEigen(phi * i / kPanels);
+    EXPECT_TRUE(MatrixNear(CalcLeftJacobian(phi), sum / (3.0 * kPanels), kQuadrature)) << "angle " << angle;
+  }
+}
+
+TEST(So3, JacobianIdentities) {
+  Random random(3105);
+  for (const double angle : kAngles) {
+    const Vector3d phi = angle * random.Axis();
+    const Matrix3d J_l = CalcLeftJacobian(phi);
+    EXPECT_TRUE(MatrixNear(J_l * CalcLeftJacobianInverse(phi), Matrix3d::Identity(), kJacobianRounding));
+    EXPECT_TRUE(MatrixNear(J_l, ExpSo3(phi) * J_l.transpose(), kJacobianRounding));
+    EXPECT_TRUE(MatrixNear(CalcLeftJacobian(-phi), J_l.transpose(), kRounding));
+    EXPECT_TRUE(MatrixNear(J_l * phi, phi, kRounding));
+  }
+}
+
+TEST(So3, JacobianMapsRatesToAngularVelocity) {
+  Random random(3106);
+  for (const double angle : {1e-3, 0.5, 1.7, 3.0}) {
+    const Vector3d phi = angle * random.Axis();
+    const Vector3d phi_dot = random.Vector(1.0);
+    const Matrix3d R_dot = (ExpSo3(phi + kStep * phi_dot) - ExpSo3(phi - kStep * phi_dot)) / (2 * kStep);
+    const Matrix3d omega_x = R_dot * ExpSo3(phi).transpose();
+    EXPECT_TRUE(MatrixNear(Skew(CalcLeftJacobian(phi) * phi_dot), omega_x, kDifference));
+  }
+  // The right Jacobian in its place is seen.
+  const Vector3d phi(0.4, -0.9, 0.7);
+  const Vector3d phi_dot(0.5, 0.8, -0.3);
+  EXPECT_GT((CalcLeftJacobian(-phi) * phi_dot - CalcLeftJacobian(phi) * phi_dot).norm(), kVisible);
+}
+
+TEST(So3, JacobianDotIsTheDerivativeOfTheJacobian) {
+  Random random(3107);
+  for (const double angle : {0.0, 1e-6, 0.05, 0.0999, 0.1001, 0.5, 1.7, 3.0}) {
+    const Vector3d phi = angle * random.Axis();
+    const Vector3d phi_dot = random.Vector(1.0);
+    const Matrix3d J_l_dot = CalcLeftJacobianDot(phi, phi_dot);
+    const Matrix3d difference =
+        (CalcLeftJacobian(phi + kStep * phi_dot) - CalcLeftJacobian(phi - kStep * phi_dot)) / (2 * kStep);
+    ASSERT_GT(J_l_dot.norm(), kVisible);
+    EXPECT_TRUE(MatrixNear(J_l_dot, difference, kDifference)) << "angle " << angle;
+  }
+}
+
+TEST(So3, SeriesAndClosedFormsMeet) {
+  // Both sides of the switch; the functions move by about 1e-12 between the two angles.
+  const Vector3d axis = Vector3d(2, -1, 2) / 3.0;
+  const Vector3d phi_dot(0.5, 0.8, -0.3);
+  constexpr double kGap = 1e-12;
+  const Vector3d below = (0.1 - kGap) * axis;
+  const Vector3d above = (0.1 + kGap) * axis;
+  constexpr double kMeet = 3 * kGap;
+  EXPECT_TRUE(MatrixNear(ExpSo3(below), ExpSo3(above), kMeet));
+  EXPECT_TRUE(MatrixNear(CalcLeftJacobian(below), CalcLeftJacobian(above), kMeet));
+  EXPECT_TRUE(MatrixNear(CalcLeftJacobianInverse(below), CalcLeftJacobianInverse(above), kMeet));
+  EXPECT_TRUE(MatrixNear(CalcLeftJacobianDot(below, phi_dot), CalcLeftJacobianDot(above, phi_dot), kMeet));
+}
+
+TEST(So3, RejectsWhatIsNoRotation) {
+  Matrix3d mirror = Matrix3d::Identity();
+  mirror(2, 2) = -1.0;
+  EXPECT_THROW(LogSo3(mirror), std::invalid_argument);
+  EXPECT_THROW(LogSo3(1.001 * Matrix3d::Identity()), std::invalid_argument);
+  EXPECT_THROW(LogSo3(Matrix3d::Constant(std::nan(""))), std::invalid_argument);
+  EXPECT_THROW(CalcLeftJacobianInverse({0.0, 0.0, 2 * kPi}), std::invalid_argument);
+  EXPECT_NO_THROW(LogSo3(ExpSo3({1, 2, 3}).cast<float>().cast<double>()));
+}
+
+TEST(OrientationError, ByHand) {
+  // The desired frame stands 0.3 rad ahead about z and turns at 1 rad/s, the object at 0.4 rad/s.
+  const OrientationError error =
+      CalcOrientationError(Matrix3d::Identity(), {0, 0, 0.4}, ExpSo3({0, 0, 0.3}), {0, 0, 1.0});
+  EXPECT_TRUE(MatrixNear(error.e_R, Vector3d(0, 0, 0.3), kRounding));
+  EXPECT_TRUE(MatrixNear(error.omega_od, Vector3d(0, 0, 0.6), kRounding));
+  EXPECT_TRUE(MatrixNear(error.e_R_dot, Vector3d(0, 0, 0.6), kRounding));
+  // About one axis omega_o_dot = omega_d_dot - e_R_ddot.
+  EXPECT_TRUE(MatrixNear(CalcAngularAcceleration(error, {0, 0, 1.0}, {0, 0, 0.5}, {0, 0, -2.0}),
+                         Vector3d(0, 0, 2.5), kRounding));
+}
+
+TEST(OrientationError, DoesNotDependOnTheWorldFrame) {
+  Random random(3108);
+  for (int i = 0; i < 20; ++i) {
+    const Matrix3d R_Bo = ExpSo3(random.Vector(2.0));
+    const Matrix3d R_Bd = ExpSo3(random.Vector(2.0));
+    const Matrix3d R_WB = ExpSo3(random.Vector(2.0));
+    const Vector3d omega_o = random.Vector(1.0);
+    const Vector3d omega_d = random.Vector(1.0);
+    const OrientationError error = CalcOrientationError(R_Bo, omega_o, R_Bd, omega_d);
+    const OrientationError moved = CalcOrientationError(R_WB * R_Bo, omega_o, R_WB * R_Bd, omega_d);
+    ASSERT_GT(error.e_R.norm(), kVisible);
+    EXPECT_TRUE(MatrixNear(moved.e_R, error.e_R, kJacobianRounding));
+    EXPECT_TRUE(MatrixNear(moved.e_R_dot, error.e_R_dot, kJacobianRounding));
+    // Applied to the object in its own axes, the error leads to the desired frame.
+    EXPECT_TRUE(MatrixNear(R_Bo * ExpSo3(error.e_R), R_Bd, kRounding));
+  }
+}
+
+TEST(OrientationError, RateIsTheDerivativeOfTheError) {
+  Random random(3109);
+  for (int i = 0; i < 20; ++i) {
+    const Matrix3d R_Bo = ExpSo3(random.Vector(1.0));
+    const Matrix3d R_Bd = ExpSo3(random.Vector(1.0));
+    const Vector3d omega_o = random.Vector(1.0);
+    const Vector3d omega_d = random.Vector(1.0);
+    const auto error_at = [&](double t) {
+      return CalcOrientationError(R_Bo * ExpSo3(t * omega_o), omega_o, R_Bd * ExpSo3(t * omega_d), omega_d);
+    };
+    const Vector3d difference = (error_at(kStep).e_R - error_at(-kStep).e_R) / (2 * kStep);
+    const OrientationError error = error_at(0.0);
+    EXPECT_TRUE(MatrixNear(error.e_R_dot, difference, kDifference));
+    // Mutations: the difference of angular velocities in its own axes, and the Jacobian left out.
+    EXPECT_GT((omega_d - omega_o - difference).norm(), kVisible);
+    EXPECT_GT((error.omega_od - difference).norm(), kVisible);
+  }
+}
+
+// A tracking experiment: the object starts almost half a turn away from a frame that turns with a varying
+// angular velocity, and its angular acceleration is chosen so that e_R_ddot = -2 w e_R_dot - w^2 e_R.
+class TrackingExperiment {
+ public:
+  static constexpr double kW = 3.0;  // rad/s
+
+  struct State {
+    Matrix3d R_Bo, R_Bd;
+    Vector3d omega_o;
+  };
+
+  static Vector3d OmegaD(double t) { return {0.8 * std::cos(t), 0.5, -0.6 * std::sin(2 * t)}; }
+  static Vector3d OmegaDDot(double t) { return {-0.8 * std::sin(t), 0.0, -1.2 * std::cos(2 * t)}; }
+
+  explicit TrackingExperiment(bool with_jacobian_dot) : with_jacobian_dot_(with_jacobian_dot) {}
+
+  /// Largest deviation of e_R from (e_0 + (e_0_dot + w e_0) t) exp(-w t) over one second, rad.
+  [[nodiscard]] double Run(int steps) const {
+    State state{Matrix3d::Identity(), ExpSo3(Vector3d(2.4, -1.2, 1.2)), {0.3, 0.2, -0.5}};
+    const OrientationError start = CalcOrientationError(state.R_Bo, state.omega_o, state.R_Bd, OmegaD(0.0));
+    const double dt = 1.0 / steps;
+    double worst = 0.0;
+    for (int i = 0; i < steps; ++i) {
+      state = StepRungeKutta(state, i * dt, dt);
+      const double t = (i + 1) * dt;
+      const Vector3d e_R = CalcOrientationError(state.R_Bo, state.omega_o, state.R_Bd, OmegaD(t)).e_R;
+      const Vector3d expected = (start.e_R + (start.e_R_dot + kW * start.e_R) * t) * std::exp(-kW * t);
+      worst = std::max(worst, (e_R - expected).norm());
+    }
+    return worst;
+  }
+
+ private:
+  [[nodiscard]] State CalcRate(const State& x, double t) const {
+    const OrientationError error = CalcOrientationError(x.R_Bo, x.omega_o, x.R_Bd, OmegaD(t));
+    const Vector3d e_R_ddot = -2 * kW * error.e_R_dot - kW * kW * error.e_R;
+    Vector3d omega_o_dot = CalcAngularAcceleration(error, OmegaD(t), OmegaDDot(t), e_R_ddot);
+    if (!with_jacobian_dot_) omega_o_dot += CalcLeftJacobianDot(error.e_R, error.e_R_dot) * error.e_R_dot;
+    return {x.R_Bo * Skew(x.omega_o), x.R_Bd * Skew(OmegaD(t)), omega_o_dot};
+  }
+
+  static State Add(const State& x, const State& rate, double dt) {
+    return {x.R_Bo + dt * rate.R_Bo, x.R_Bd + dt * rate.R_Bd, x.omega_o + dt * rate.omega_o};
+  }
+
+  // The inner stages leave SO(3) by dt^2; they are put back on it.
+  static State Project(State x) {
+    x.R_Bo = Eigen::Quaterniond(x.R_Bo).normalized().toRotationMatrix();
+    x.R_Bd = Eigen::Quaterniond(x.R_Bd).normalized().toRotationMatrix();
+    return x;
+  }
+
+  [[nodiscard]] State StepRungeKutta(const State& x, double t, double dt) const {
+    const State k1 = CalcRate(x, t);
+    const State k2 = CalcRate(Project(Add(x, k1, dt / 2)), t + dt / 2);
+    const State k3 = CalcRate(Project(Add(x, k2, dt / 2)), t + dt / 2);
+    const State k4 = CalcRate(Project(Add(x, k3, dt)), t + dt);
+    State next = Add(x, k1, dt / 6);
+    next = Add(next, k2, dt / 3);
+    next = Add(next, k3, dt / 3);
+    return Project(Add(next, k4, dt / 6));
+  }
+
+  bool with_jacobian_dot_;
+};
+
+TEST(OrientationError, ClosedLoopFollowsTheLinearSolution) {
+  // Runge-Kutta of order 4 with 5 ms; measured 4.2e-9 rad.
+  constexpr double kIntegration = 2e-8;
+  const TrackingExperiment experiment(true);
+  const double coarse = experiment.Run(100);
+  const double fine = experiment.Run(200);
+  EXPECT_LE(fine, kIntegration * TolScale());
+  // All that is left is the integrator's: half the step, a sixteenth of the error.
+  EXPECT_NEAR(coarse / fine, 16.0, 1.0);
+  // Without J_l_dot the closed loop is not linear.
+  EXPECT_GT(TrackingExperiment(false).Run(200), kVisible);
+}
+
+}  // namespace
+}  // namespace dexcheck
