@@ -13,6 +13,13 @@ namespace {
 constexpr size_t kMaxNameLength = 64;
 constexpr std::string_view kNameLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
 
+constexpr std::string_view kNameRule = "a name of 1 to 64 letters, digits, and _ - .";
+
+bool IsName(std::string_view text) {
+  return !text.empty() && text.size() <= kMaxNameLength &&
+         text.find_first_not_of(kNameLetters) == std::string_view::npos;
+}
+
 std::string Format(const toml::node& node);
 
 std::string FormatList(const toml::array& list) {
@@ -92,10 +99,7 @@ std::string TomlValue::AsText() const {
 
 std::string TomlValue::AsName() const {
   const std::string name = AsText();
-  if (name.empty() || name.size() > kMaxNameLength ||
-      name.find_first_not_of(kNameLetters) != std::string::npos) {
-    Fail("must be a name of 1 to 64 letters, digits, and _ - .");
-  }
+  if (!IsName(name)) Fail("must be " + std::string(kNameRule));
   return name;
 }
 
@@ -154,7 +158,10 @@ std::vector<std::pair<std::string, TomlValue>> TomlTable::ListInFileOrder() cons
 
 std::vector<std::pair<std::string, TomlValue>> TomlTable::GetEntries() {
   std::vector<std::pair<std::string, TomlValue>> entries = ListInFileOrder();
-  for (const auto& [key, value] : entries) asked_.insert(key);
+  for (const auto& [key, value] : entries) {
+    if (!IsName(key)) value.Reject("must have " + std::string(kNameRule));
+    asked_.insert(key);
+  }
   return entries;
 }
 

@@ -115,13 +115,16 @@ class TreeReader {
     chains_.push_back(std::move(chain));
   }
 
+  static void CheckCount(const TomlValue& value, const std::string& what, size_t count) {
+    if (count <= kMaxJoints) return;
+    value.Reject("must leave the number of " + what + " within " + std::to_string(kMaxJoints) + ", got " +
+                 std::to_string(count));
+  }
+
   void RegisterNames(Chain& chain) {
     const size_t joints_before = chain_of_link_.size();
     for (const Segment* segment : chain.segments()) {
-      if (chain_of_link_.size() + segment->rows.size() > kMaxJoints) {
-        chain.value.Reject("must not exceed " + std::to_string(kMaxJoints) + " joints in all, got " +
-                           std::to_string(chain_of_link_.size() + segment->rows.size()));
-      }
+      CheckCount(chain.value, "joints", chain_of_link_.size() + segment->rows.size());
       for (const SegmentRow& row : segment->rows) {
         joint_names_.Add(chain.prefix + row.joint, chain.value);
         link_names_.Add(chain.prefix + row.link, chain.value);
@@ -222,6 +225,7 @@ class TreeReader {
     const std::string name = prefix + frame.name.AsName();
     const std::string link = prefix + frame.link.AsText();
     frame_names_.Add(name, owner);
+    CheckCount(owner, "frames", spec_.frames.size() + 1);
     int joint = -1;
     if (link != spec_.base.link) {
       const auto found = joint_of_link_.find(link);

@@ -5,8 +5,8 @@
 
 namespace dexcheck {
 
-/// Most joints that a file may describe (a template is small to write and large to repeat).
-inline constexpr int kMaxJoints = 1000;
+/// Most joints, and most frames, that a file may describe: templates make it easy to ask for millions.
+inline constexpr size_t kMaxJoints = 1000;
 
 /// Reads the keys `chain`, `template` and `frame` of a parameter file into the specification's joints and
 /// frames. Its base must have been read. @throws InputError.
