@@ -2,19 +2,14 @@
 
 // Text for messages.
 
-#include <array>
-#include <charconv>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace dexcheck {
 
 /// Shortest decimal text that reads back as the same number.
-inline std::string FormatNumber(double value) {
-  std::array<char, 32> buffer{};
-  const std::to_chars_result result = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
-  return {buffer.data(), result.ptr};
-}
+std::string FormatNumber(double value);
 
 /// "[a, b, c]" of any range of numbers.
 template <typename Range>
@@ -27,7 +22,14 @@ std::string FormatNumbers(const Range& values) {
   return text + "]";
 }
 
-/// The text in double quotes.
-inline std::string Quote(std::string_view text) { return '"' + std::string(text) + '"'; }
+/// The text on one line of bounded length: control characters become '?', a long text ends in "...".
+std::string Abbreviate(std::string_view text);
+
+/// The abbreviated text in double quotes.
+std::string Quote(std::string_view text);
+
+/// The candidate closest to a misspelt word by edit distance; empty when none is close (a third of the
+/// letters).
+std::string FindNearest(std::string_view word, const std::vector<std::string>& candidates);
 
 }  // namespace dexcheck

@@ -94,8 +94,8 @@ std::string FindPhysicalInconsistency(const MassProperties& body) {
 
   // Rods and plates meet the inequalities with equality. Their entries, rounded when written down, rotated
   // and summed (some ten roundings each), and the eigenvalues computed from them are off by a few eps |I|.
-  const double allowance = 64.0 * std::numeric_limits<double>::epsilon() * body.inertia.norm();
-  if ((body.inertia - body.inertia.transpose()).norm() > allowance) {
+  const double allowance = 64.0 * std::numeric_limits<double>::epsilon() * body.inertia.cwiseAbs().maxCoeff();
+  if ((body.inertia - body.inertia.transpose()).cwiseAbs().maxCoeff() > allowance) {
     return "inertia must be symmetric, got " + FormatNumbers(body.inertia.reshaped<Eigen::RowMajor>());
   }
   const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(body.inertia, Eigen::EigenvaluesOnly);

@@ -90,6 +90,7 @@ class SpecChecker {
     CheckNotNegative("base.wheels.armature", base.wheel.armature);
     CheckNotNegative("base.wheels.damping", base.wheel.damping);
     CheckBody("base.wheels", CalcWheel(base.wheel, 0.0));
+    CheckBody("base with wheels", CalcBaseWithWheels(base));
     CheckUnique(joint_names_, "base.wheels.right", base.wheel_joint_right);
     CheckUnique(joint_names_, "base.wheels.left", base.wheel_joint_left);
   }

@@ -1,0 +1,65 @@
+#include "controller/common/text.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <numeric>
+
+namespace dexcheck {
+namespace {
+
+constexpr size_t kMaxShown = 120;
+
+/// Levenshtein's distance: fewest insertions, deletions and replacements of letters that turn a into b.
+size_t CalcEditDistance(std::string_view a, std::string_view b) {
+  std::vector<size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), size_t{0});
+  for (size_t i = 0; i < a.size(); ++i) {
+    size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (size_t j = 0; j < b.size(); ++j) {
+      const size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({row[j] + 1, row[j + 1] + 1, replaced});
+    }
+  }
+  return row[b.size()];
+}
+
+}  // namespace
+
+std::string FormatNumber(double value) {
+  std::array<char, 32> buffer{};
+  const std::to_chars_result result = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
+  return {buffer.data(), result.ptr};
+}
+
+std::string Abbreviate(std::string_view text) {
+  size_t end = std::min(text.size(), kMaxShown);
+  const auto continues = [&](size_t i) { return (static_cast<unsigned char>(text[i]) & 0xc0U) == 0x80U; };
+  while (end < text.size() && end > 0 && continues(end)) --end;  // Never inside a UTF-8 sequence.
+  std::string shown(text.substr(0, end));
+  std::replace_if(
+      shown.begin(), shown.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  return end < text.size() ? shown + "..." : shown;
+}
+
+std::string Quote(std::string_view text) { return '"' + Abbreviate(text) + '"'; }
+
+std::string FindNearest(std::string_view word, const std::vector<std::string>& candidates) {
+  std::string nearest;
+  size_t smallest = word.size() + 1;
+  for (const std::string& candidate : candidates) {
+    const auto [shorter, longer] = std::minmax(word.size(), candidate.size());
+    const size_t close = longer / 3;
+    if (longer - shorter > close) continue;
+    const size_t distance = CalcEditDistance(word, candidate);
+    if (distance <= close && distance < smallest) {
+      smallest = distance;
+      nearest = candidate;
+    }
+  }
+  return nearest;
+}
+
+}  // namespace dexcheck

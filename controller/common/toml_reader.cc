@@ -1,0 +1,210 @@
+#include "controller/common/toml_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr size_t kMaxNameLength = 64;
+constexpr std::string_view kNameLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
+
+constexpr std::string_view kNameRule = "a name of 1 to 64 letters, digits, and _ - .";
+
+bool IsName(std::string_view text) {
+  return !text.empty() && text.size() <= kMaxNameLength &&
+         text.find_first_not_of(kNameLetters) == std::string_view::npos;
+}
+
+std::string Format(const toml::node& node);
+
+std::string FormatList(const toml::array& list) {
+  std::string text = "[";
+  for (const toml::node& entry : list) {
+    if (text.size() > 1) text += ", ";
+    text += Format(entry);
+    if (Abbreviate(text) != text) break;
+  }
+  return text + "]";
+}
+
+/// The value as it might stand in the file, on one line.
+std::string Format(const toml::node& node) {
+  if (const auto text = node.value_exact<std::string_view>()) return Quote(*text);
+  if (const auto integer = node.value_exact<int64_t>()) return std::to_string(*integer);
+  if (const auto number = node.value_exact<double>()) return FormatNumber(*number);
+  if (const auto flag = node.value_exact<bool>()) return *flag ? "true" : "false";
+  if (const toml::array* list = node.as_array()) return FormatList(*list);
+  return node.is_table() ? "a table" : "a date or time";
+}
+
+}  // namespace
+
+TomlValue::TomlValue(const TomlContext& context, const toml::node& node, std::string path)
+    : context_(&context), node_(&node), path_(std::move(path)) {}
+
+int TomlValue::line() const { return static_cast<int>(node_->source().begin.line); }
+
+bool TomlValue::IsBefore(const TomlValue& other) const {
+  const toml::source_position a = node_->source().begin;
+  const toml::source_position b = other.node_->source().begin;
+  return std::pair(a.line, a.column) < std::pair(b.line, b.column);
+}
+
+void TomlValue::Fail(std::string_view requirement) const {
+  Reject(std::string(requirement) + ", got " + Abbreviate(Format(*node_)));
+}
+
+void TomlValue::Reject(std::string_view problem) const {
+  const std::string key = path_.empty() ? "" : Abbreviate(path_) + ": ";
+  throw InputError(context_->source + ":" + std::to_string(line()) + ": " + key + std::string(problem));
+}
+
+double TomlValue::AsNumber() const {
+  if (!node_->is_number() && !node_->is_string()) Fail("must be a number");
+  if (node_->is_number()) {
+    const double value = node_->value<double>().value();
+    if (!std::isfinite(value)) Fail("must be finite");
+    return value;
+  }
+  try {
+    const double value = EvaluateExpression(AsText(), context_->symbols);
+    if (!std::isfinite(value)) Fail("must be finite, is " + FormatNumber(value));
+    return value;
+  } catch (const std::invalid_argument& error) {
+    Fail(std::string("must be a number or arithmetic, ") + error.what());
+  }
+}
+
+double TomlValue::AsPositive() const {
+  const double value = AsNumber();
+  if (value <= 0.0) Fail("must be positive");
+  return value;
+}
+
+double TomlValue::AsNotNegative() const {
+  const double value = AsNumber();
+  if (value < 0.0) Fail("must not be negative");
+  return value;
+}
+
+std::string TomlValue::AsText() const {
+  if (!IsText()) Fail("must be text");
+  return **node_->as_string();
+}
+
+std::string TomlValue::AsName() const {
+  const std::string name = AsText();
+  if (!IsName(name)) Fail("must be " + std::string(kNameRule));
+  return name;
+}
+
+std::vector<TomlValue> TomlValue::AsList() const {
+  const toml::array* list = node_->as_array();
+  if (list == nullptr) Fail("must be a list");
+  std::vector<TomlValue> entries;
+  for (const toml::node& entry : *list) {
+    entries.emplace_back(*context_, entry, path_ + "[" + std::to_string(entries.size()) + "]");
+  }
+  return entries;
+}
+
+TomlTable TomlValue::AsTable() const {
+  const toml::table* table = node_->as_table();
+  if (table == nullptr) Fail("must be a table");
+  return {*context_, *this, *table};
+}
+
+void TomlValue::CopyNumbers(double* target, int count) const {
+  const std::vector<TomlValue> entries = AsList();
+  if (entries.size() != static_cast<size_t>(count)) {
+    Fail("must be a list of " + std::to_string(count) + " numbers");
+  }
+  for (const TomlValue& entry : entries) *target++ = entry.AsNumber();
+}
+
+TomlTable::TomlTable(const TomlContext& context, TomlValue self, const toml::table& table)
+    : context_(&context), self_(std::move(self)), table_(&table) {}
+
+TomlValue TomlTable::MakeValue(std::string_view key, const toml::node& node) const {
+  const std::string prefix = self_.path().empty() ? "" : self_.path() + ".";
+  return {*context_, node, prefix + std::string(key)};
+}
+
+std::optional<TomlValue> TomlTable::Find(std::string_view key) {
+  asked_.emplace(key);
+  const toml::node* node = table_->get(key);
+  if (node == nullptr) return std::nullopt;
+  return MakeValue(key, *node);
+}
+
+TomlValue TomlTable::Get(std::string_view key) {
+  std::optional<TomlValue> value = Find(key);
+  if (!value) FailMissing(key);
+  return *std::move(value);
+}
+
+std::vector<std::pair<std::string, TomlValue>> TomlTable::ListInFileOrder() const {
+  std::vector<std::pair<std::string, TomlValue>> entries;
+  for (const auto& [key, node] : *table_) entries.emplace_back(key.str(), MakeValue(key.str(), node));
+  std::sort(entries.begin(), entries.end(),
+            [](const auto& a, const auto& b) { return a.second.IsBefore(b.second); });
+  return entries;
+}
+
+std::vector<std::pair<std::string, TomlValue>> TomlTable::GetEntries() {
+  std::vector<std::pair<std::string, TomlValue>> entries = ListInFileOrder();
+  for (const auto& [key, value] : entries) {
+    if (!IsName(key)) value.Reject("must have " + std::string(kNameRule));
+    asked_.insert(key);
+  }
+  return entries;
+}
+
+std::pair<std::optional<TomlValue>, double> TomlTable::FindWithAngleUnit(const std::string& key) {
+  RejectTogether(key, {key + "_deg"});
+  if (std::optional<TomlValue> degrees = Find(key + "_deg")) return {std::move(degrees), DegToRad(1.0)};
+  return {Find(key), 1.0};
+}
+
+double TomlTable::GetAngle(const std::string& key) {
+  const auto [value, unit] = FindWithAngleUnit(key);
+  if (!value) FailMissing(key + "_deg");
+  return unit * value->AsNumber();
+}
+
+void TomlTable::RejectUnknown(const TomlValue& value, const std::string& nearest) const {
+  if (!nearest.empty()) value.Reject("unknown key, did you mean " + Quote(nearest) + "?");
+  std::string known;
+  for (const std::string& key : asked_) known += (known.empty() ? "" : ", ") + key;
+  value.Reject("unknown key, known here are " + known);
+}
+
+void TomlTable::RejectTogether(std::string_view key, std::initializer_list<std::string_view> others) const {
+  if (!table_->contains(key)) return;
+  for (const std::string_view other : others) {
+    if (const toml::node* node = table_->get(other)) {
+      MakeValue(other, *node).Reject("must not stand beside " + Quote(key));
+    }
+  }
+}
+
+void TomlTable::RejectUnused() const {
+  for (const auto& [key, value] : ListInFileOrder()) {
+    if (!asked_.contains(key)) RejectUnknown(value, FindNearest(key, {asked_.begin(), asked_.end()}));
+  }
+}
+
+void TomlTable::FailMissing(std::string_view key) const {
+  const std::string missing(key);
+  for (const auto& [unused, value] : ListInFileOrder()) {
+    if (!asked_.contains(unused) && !FindNearest(unused, {missing}).empty()) RejectUnknown(value, missing);
+  }
+  self_.Reject("missing key " + Quote(missing));
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,159 @@
+#pragma once
+
+// Typed access to TOML files, with errors that name file, line, key and value.
+//
+//   TomlDocument document(text, "robot.toml");
+//   TomlTable root = document.Open();
+//   const double radius = root.Get("radius").AsPositive();
+//   root.RejectUnused();  // A key that nobody asked for is misspelt.
+
+#include <toml++/toml.h>
+
+#include <initializer_list>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "controller/common/expression.h"
+#include "controller/common/types.h"
+
+namespace dexcheck {
+
+/// What all values of one file share.
+struct TomlContext {
+  std::string source;   ///< The file, for messages.
+  SymbolTable symbols;  ///< For quoted arithmetic.
+};
+
+class TomlTable;
+
+/// One value of a file and the dotted path that leads to it. Lives as long as its document.
+/// Every function that cannot deliver throws InputError, one line "FILE:LINE: PATH: what, got VALUE".
+class TomlValue {
+ public:
+  TomlValue(const TomlContext& context, const toml::node& node, std::string path);
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] int line() const;
+
+  /// Number, or quoted arithmetic over the document's symbols; finite.
+  [[nodiscard]] double AsNumber() const;
+  [[nodiscard]] double AsPositive() const;
+  [[nodiscard]] double AsNotNegative() const;
+  [[nodiscard]] bool IsText() const { return node_->is_string(); }
+  [[nodiscard]] std::string AsText() const;
+  /// Text that can name a thing: 1 to 64 of the letters A-Z, a-z, digits, and _ - .
+  [[nodiscard]] std::string AsName() const;
+  [[nodiscard]] std::vector<TomlValue> AsList() const;
+  [[nodiscard]] TomlTable AsTable() const;
+
+  /// List of exactly N numbers.
+  template <int N>
+  [[nodiscard]] Eigen::Matrix<double, N, 1> AsVector() const {
+    Eigen::Matrix<double, N, 1> vector;
+    CopyNumbers(vector.data(), N);
+    return vector;
+  }
+
+  /// What stands beside the text in the list of choices.
+  template <typename T>
+  [[nodiscard]] T AsChoice(std::initializer_list<std::pair<std::string_view, T>> choices) const {
+    const std::string text = AsText();
+    std::string known;
+    for (const auto& [name, choice] : choices) {
+      if (name == text) return choice;
+      known += (known.empty() ? "" : ", ") + ('"' + std::string(name) + '"');
+    }
+    Fail("must be one of " + known);
+  }
+
+  /// Whether this stands before the other in the file.
+  [[nodiscard]] bool IsBefore(const TomlValue& other) const;
+
+  /// Throws "FILE:LINE: PATH: requirement, got VALUE".
+  [[noreturn]] void Fail(std::string_view requirement) const;
+  /// Throws "FILE:LINE: PATH: problem".
+  [[noreturn]] void Reject(std::string_view problem) const;
+
+ private:
+  void CopyNumbers(double* target, int count) const;
+
+  const TomlContext* context_;
+  const toml::node* node_;
+  std::string path_;
+};
+
+/// A table that keeps track of the keys that were asked for.
+class TomlTable {
+ public:
+  TomlTable(const TomlContext& context, TomlValue self, const toml::table& table);
+
+  /// The table itself as a value, for messages about the whole of it.
+  [[nodiscard]] const TomlValue& self() const { return self_; }
+
+  /// The value under a key that must be there.
+  TomlValue Get(std::string_view key);
+  /// The value under a key that may be missing.
+  std::optional<TomlValue> Find(std::string_view key);
+  [[nodiscard]] bool Contains(std::string_view key) const { return table_->contains(key); }
+  /// All keys and values in the file's order, for a table whose keys are names of the user's choice.
+  std::vector<std::pair<std::string, TomlValue>> GetEntries();
+
+  /// The angle under `key` in rad, or under `key`_deg in degrees. @return rad.
+  double GetAngle(const std::string& key);
+  /// The list of N angles under `key` in rad, or under `key`_deg in degrees. @return rad.
+  template <int N>
+  std::optional<Eigen::Matrix<double, N, 1>> FindAngles(const std::string& key) {
+    const auto [value, unit] = FindWithAngleUnit(key);
+    if (!value) return std::nullopt;
+    return unit * value->template AsVector<N>();
+  }
+  /// The value under `key` or `key`_deg, not both, and its unit in rad.
+  std::pair<std::optional<TomlValue>, double> FindWithAngleUnit(const std::string& key);
+
+  /// Throws when a key stands in the table together with one of those that would say the same in another way.
+  void RejectTogether(std::string_view key, std::initializer_list<std::string_view> others) const;
+  /// Throws at the first key that was never asked for, with the nearest that was.
+  void RejectUnused() const;
+  /// Throws that a key is missing, unless an unused key looks like a misspelling of it.
+  [[noreturn]] void FailMissing(std::string_view key) const;
+
+ private:
+  [[nodiscard]] TomlValue MakeValue(std::string_view key, const toml::node& node) const;
+  [[nodiscard]] std::vector<std::pair<std::string, TomlValue>> ListInFileOrder() const;
+  [[noreturn]] void RejectUnknown(const TomlValue& value, const std::string& nearest) const;
+
+  const TomlContext* context_;
+  TomlValue self_;
+  const toml::table* table_;
+  std::set<std::string, std::less<>> asked_;
+};
+
+/// A parsed file.
+class TomlDocument {
+ public:
+  /// Largest file accepted, bytes.
+  static constexpr size_t kMaxSize = size_t{1} << 20U;
+
+  /// @param source the file's name, for messages.
+  /// @throws InputError for text that is not TOML, is too long, or is nested too deeply.
+  TomlDocument(std::string_view text, std::string_view source);
+
+  [[nodiscard]] TomlTable Open() const;
+  /// Adds a symbol to those that quoted arithmetic may use from now on.
+  void Define(const std::string& symbol, double value) { context_->symbols[symbol] = value; }
+
+ private:
+  // Behind pointers, so that values stay valid when the document moves.
+  std::unique_ptr<TomlContext> context_;
+  std::unique_ptr<toml::table> root_;
+};
+
+/// The text of a file. @throws InputError when it cannot be read or is longer than TomlDocument::kMaxSize.
+std::string ReadTextFile(const std::string& path);
+
+}  // namespace dexcheck

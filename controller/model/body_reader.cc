@@ -1,0 +1,147 @@
+#include "controller/model/body_reader.h"
+
+#include <cmath>
+
+namespace dexcheck {
+namespace {
+
+// Axes are unit vectors to about the digits that people write: 0.7071.
+constexpr double kUnitVectorAllowance = 1e-4;
+
+/// A rotation that turns z into the given direction; which one does not matter to a body of revolution.
+Matrix3d MakeRotationFromZ(const Vector3d& z) {
+  int least = 0;
+  z.cwiseAbs().minCoeff(&least);
+  const Vector3d x = Vector3d::Unit(least).cross(z).normalized();
+  Matrix3d R;
+  R << x, z.cross(x), z;
+  return R;
+}
+
+Vector3d ReadAxis(const TomlValue& value) {
+  if (value.IsText()) {
+    return Vector3d::Unit(value.AsChoice<Eigen::Index>({{"x", 0}, {"y", 1}, {"z", 2}}));
+  }
+  const Vector3d axis = value.AsVector<3>();
+  if (!(std::abs(axis.stableNorm() - 1.0) <= kUnitVectorAllowance)) value.Fail("must be a unit vector");
+  return axis.normalized();
+}
+
+Matrix3d ReadRotation(TomlTable& table) {
+  const Vector3d rpy = table.FindAngles<3>("rpy").value_or(Vector3d::Zero());
+  return (Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
+          Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
+Vector3d ReadPoint(TomlTable& table, std::string_view key) {
+  const std::optional<TomlValue> point = table.Find(key);
+  return point ? point->AsVector<3>() : Vector3d::Zero();
+}
+
+/// Where a link's shape stands: `center`, and `axis` for a body of revolution or `rpy`.
+Pose ReadShapePose(TomlTable& table, const Shape& shape) {
+  Pose X_BS = Pose::Identity();
+  X_BS.translation() = ReadPoint(table, "center");
+  if (std::holds_alternative<Sphere>(shape)) return X_BS;
+  table.RejectTogether("axis", {"rpy", "rpy_deg"});
+  const std::optional<TomlValue> axis =
+      std::holds_alternative<Box>(shape) ? std::nullopt : table.Find("axis");
+  X_BS.linear() = axis ? MakeRotationFromZ(ReadAxis(*axis)) : ReadRotation(table);
+  return X_BS;
+}
+
+MassProperties ReadSolid(const TomlValue& value) {
+  TomlTable table = value.AsTable();
+  const Shape shape = ReadShape(table);
+  const double mass = table.Get("mass").AsNotNegative();
+  const MassProperties solid = CalcMassProperties(shape, mass, ReadShapePose(table, shape));
+  table.RejectUnused();
+  return solid;
+}
+
+Torus ReadTorus(TomlTable& table) {
+  const Torus torus{table.Get("ring_radius").AsPositive(), table.Get("tube_radius").AsPositive()};
+  if (torus.tube_radius >= torus.ring_radius) {
+    table.Get("tube_radius").Fail("must be less than ring_radius");
+  }
+  return torus;
+}
+
+Box ReadBox(TomlTable& table) {
+  const TomlValue size = table.Get("size");
+  const Box box{size.AsVector<3>()};
+  if (box.size.minCoeff() <= 0.0) size.Fail("must be positive");
+  return box;
+}
+
+}  // namespace
+
+Pose ReadPose(TomlTable& table) {
+  Pose X = Pose::Identity();
+  X.translation() = ReadPoint(table, "xyz");
+  X.linear() = ReadRotation(table);
+  return X;
+}
+
+Pose ReadPose(const TomlValue& value) {
+  TomlTable table = value.AsTable();
+  const Pose X = ReadPose(table);
+  table.RejectUnused();
+  return X;
+}
+
+Shape ReadShape(TomlTable& table) {
+  enum class Kind { kSphere, kCylinder, kCapsule, kBox, kTorus };
+  switch (table.Get("shape").AsChoice<Kind>({{"sphere", Kind::kSphere},
+                                             {"cylinder", Kind::kCylinder},
+                                             {"capsule", Kind::kCapsule},
+                                             {"box", Kind::kBox},
+                                             {"torus", Kind::kTorus}})) {
+    case Kind::kCylinder:
+      return Cylinder{table.Get("radius").AsPositive(), table.Get("length").AsPositive()};
+    case Kind::kCapsule:
+      return Capsule{table.Get("radius").AsPositive(), table.Get("length").AsPositive()};
+    case Kind::kBox:
+      return ReadBox(table);
+    case Kind::kTorus:
+      return ReadTorus(table);
+    case Kind::kSphere:
+      break;
+  }
+  return Sphere{table.Get("radius").AsPositive()};
+}
+
+Matrix3d ReadInertia(const TomlValue& value) {
+  const Vector6d I = value.AsVector<6>();
+  Matrix3d inertia;
+  // clang-format off
+  inertia << I[0], I[3], I[4],
+             I[3], I[1], I[5],
+             I[4], I[5], I[2];
+  // clang-format on
+  return inertia;
+}
+
+MassProperties ReadBody(TomlTable& table) {
+  table.RejectTogether("shapes", {"mass", "com", "inertia"});
+  if (const std::optional<TomlValue> shapes = table.Find("shapes")) {
+    std::vector<MassProperties> parts;
+    for (const TomlValue& shape : shapes->AsList()) parts.push_back(ReadSolid(shape));
+    const MassProperties body = Combine(parts);
+    CheckBody(*shapes, body);
+    return body;
+  }
+  const TomlValue inertia = table.Get("inertia");
+  const MassProperties body{table.Get("mass").AsNotNegative(), table.Get("com").AsVector<3>(),
+                            ReadInertia(inertia)};
+  CheckBody(inertia, body);
+  return body;
+}
+
+void CheckBody(const TomlValue& value, const MassProperties& body) {
+  const std::string problem = FindPhysicalInconsistency(body);
+  if (!problem.empty()) value.Reject(problem);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,114 @@
+#include "controller/model/parameter_reader.h"
+
+#include <utility>
+
+#include "controller/common/text.h"
+#include "controller/common/toml_reader.h"
+#include "controller/model/body_reader.h"
+#include "controller/model/tree_reader.h"
+
+namespace dexcheck {
+namespace {
+
+/// Reads [lengths]; each may use those before it.
+void DefineLengths(TomlTable& root, TomlDocument& document) {
+  const std::optional<TomlValue> lengths = root.Find("lengths");
+  if (!lengths) return;
+  for (const auto& [name, value] : lengths->AsTable().GetEntries()) {
+    if (!IsSymbolName(name))
+      value.Reject("must be named by letters, digits and _, other than pi, got " + Quote(name));
+    document.Define(name, value.AsNumber());
+  }
+}
+
+/// The wheels as cylinders of the given radius, or with their moments of inertia given.
+void ReadWheels(const TomlValue& value, Base& base) {
+  TomlTable table = value.AsTable();
+  base.wheel_joint_right = table.Get("right").AsName();
+  base.wheel_joint_left = table.Get("left").AsName();
+  if (base.wheel_joint_left == base.wheel_joint_right) table.Get("left").Fail("must differ from right");
+  WheelProperties& wheel = base.wheel;
+  wheel.mass = table.Get("mass").AsNotNegative();
+  wheel.damping = table.Get("damping").AsNotNegative();
+  wheel.armature = table.Get("armature").AsNotNegative();
+
+  table.RejectTogether("width", {"spin_inertia", "transverse_inertia"});
+  if (const std::optional<TomlValue> width = table.Find("width")) {
+    const Matrix3d inertia = CalcUniformInertia(Cylinder{base.wheel_radius, width->AsPositive()}, wheel.mass);
+    wheel.spin_inertia = inertia(2, 2);
+    wheel.transverse_inertia = inertia(0, 0);
+  } else {
+    wheel.spin_inertia = table.Get("spin_inertia").AsNotNegative();
+    wheel.transverse_inertia = table.Get("transverse_inertia").AsNotNegative();
+  }
+  const Vector3d moments(wheel.transverse_inertia, wheel.spin_inertia, wheel.transverse_inertia);
+  CheckBody(value, {wheel.mass, Vector3d::Zero(), moments.asDiagonal()});
+  table.RejectUnused();
+}
+
+void ReadDrive(TomlTable& table, Base& base) {
+  base.velocity = table.Get("velocity")
+                      .AsChoice<DriveVelocity>(
+                          {{"twist", DriveVelocity::kTwist}, {"wheel_rates", DriveVelocity::kWheelRates}});
+  base.wheel_radius = table.Get("wheel_radius").AsPositive();
+  base.wheel_distance = table.Get("wheel_distance").AsPositive();
+  ReadWheels(table.Get("wheels"), base);
+  // Sigma_0 stands on the axle, and the wheels on the floor.
+  base.X_B0.translation().z() = base.wheel_radius;
+}
+
+Base ReadBase(const TomlValue& value) {
+  TomlTable table = value.AsTable();
+  Base base;
+  base.type = table.Get("type").AsChoice<BaseType>({{"fixed", BaseType::kFixed},
+                                                    {"planar", BaseType::kPlanar},
+                                                    {"differential_drive", BaseType::kDifferentialDrive}});
+  base.link = table.Get("link").AsName();
+  if (base.type == BaseType::kDifferentialDrive) {
+    ReadDrive(table, base);
+  } else if (const std::optional<TomlValue> pose = table.Find("pose")) {
+    base.X_B0 = ReadPose(*pose);
+  }
+  if (base.type != BaseType::kFixed) base.body = ReadBody(table);
+  table.RejectUnused();
+  return base;
+}
+
+/// The object's shape with its uniform inertia, or with the inertia given.
+ObjectModel ReadObject(const TomlValue& value) {
+  TomlTable table = value.AsTable();
+  ObjectModel object;
+  object.name = table.Get("body").AsName();
+  object.shape = ReadShape(table);
+  object.body.mass = table.Get("mass").AsPositive();
+  const std::optional<TomlValue> inertia = table.Find("inertia");
+  object.body.inertia = inertia ? ReadInertia(*inertia) : CalcUniformInertia(object.shape, object.body.mass);
+  CheckBody(inertia.value_or(value), object.body);
+  object.friction = table.Get("friction").AsPositive();
+  table.RejectUnused();
+  return object;
+}
+
+}  // namespace
+
+RobotModel ParseRobotModel(std::string_view text, std::string_view source) {
+  TomlDocument document(text, source);
+  TomlTable root = document.Open();
+  DefineLengths(root, document);
+
+  RobotSpec spec;
+  spec.source = source;
+  spec.name = root.Get("name").AsText();
+  spec.gravity = root.Get("gravity").AsVector<3>();
+  spec.base = ReadBase(root.Get("base"));
+  ReadTree(root, spec);
+  if (const std::optional<TomlValue> object = root.Find("object")) spec.object = ReadObject(*object);
+  root.RejectUnused();
+  return RobotModel(std::move(spec));
+}
+
+RobotModel ReadRobotModel(const std::filesystem::path& path) {
+  return ParseRobotModel(ReadTextFile(path.string()), path.string());
+}
+
+}  // namespace dexcheck

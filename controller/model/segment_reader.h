@@ -1,0 +1,65 @@
+#pragma once
+
+// A run of joints as it stands in a parameter file, in a chain or in a template: names without prefix.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/common/toml_reader.h"
+#include "controller/model/robot_model.h"
+
+namespace dexcheck {
+
+/// A row of an MDH table, with the names of the joint and of the link that it moves.
+struct SegmentRow {
+  TomlValue value;
+  std::string joint;
+  std::string link;
+  JointType type;
+  MdhRow mdh;
+};
+
+/// An entry of `joints`.
+struct JointEntry {
+  TomlValue value;
+  TomlValue range;
+  bool range_is_angle;  ///< Given in degrees, so the joint must be revolute.
+  double lower;         ///< rad or m
+  double upper;         ///< rad or m
+  double damping;       ///< N m s/rad or N s/m
+  double armature;      ///< kg m^2 or kg
+  bool used = false;    ///< A row of this name was found.
+};
+
+/// An entry of `links`.
+struct LinkEntry {
+  TomlValue value;
+  MassProperties body;
+  bool used = false;  ///< A row with a link of this name was found.
+};
+
+/// An entry of `frames`, or of the file's `frame`.
+struct FrameEntry {
+  TomlValue value;
+  TomlValue name;
+  TomlValue link;
+  Pose X_LF;
+  std::optional<double> sphere_radius;
+};
+
+struct Segment {
+  std::vector<SegmentRow> rows;
+  std::map<std::string, JointEntry> joints;
+  std::map<std::string, LinkEntry> links;
+  std::vector<FrameEntry> frames;
+};
+
+/// Reads `rows`, `joints`, `links` and `frames`, each of which may be missing. @throws InputError.
+Segment ReadSegment(TomlTable& table);
+
+/// Reads a frame. @throws InputError.
+FrameEntry ReadFrameEntry(const TomlValue& value);
+
+}  // namespace dexcheck

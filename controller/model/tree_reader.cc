@@ -1,0 +1,269 @@
+#include "controller/model/tree_reader.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "controller/common/text.h"
+#include "controller/model/body_reader.h"
+#include "controller/model/segment_reader.h"
+
+namespace dexcheck {
+namespace {
+
+struct Template {
+  TomlValue value;
+  Segment segment;
+  bool used = false;
+};
+
+/// An unbranched run of joints: its own rows, then its template's.
+struct Chain {
+  TomlValue value;
+  TomlValue parent;
+  std::string prefix;
+  Pose X_PB;  ///< Where the first row starts, in the parent link's frame.
+  Segment own;
+  Template* common = nullptr;
+
+  [[nodiscard]] std::vector<Segment*> segments() {
+    if (common == nullptr) return {&own};
+    return {&own, &common->segment};
+  }
+};
+
+template <typename Map>
+std::vector<std::string> ListKeys(const Map& map) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : map) keys.push_back(key);
+  return keys;
+}
+
+/// " (did you mean ...?)" for a misspelt word, if any candidate is near.
+std::string Suggest(const std::string& word, const std::vector<std::string>& candidates) {
+  const std::string nearest = FindNearest(word, candidates);
+  return nearest.empty() ? "" : " (did you mean " + Quote(nearest) + "?)";
+}
+
+/// Names that must be unique, and who took them.
+class NameRegistry {
+ public:
+  explicit NameRegistry(std::string kind) : kind_(std::move(kind)) {}
+
+  void Reserve(const std::string& name, const std::string& owner) { owners_[name] = owner; }
+
+  void Add(const std::string& name, const TomlValue& value) {
+    const auto [entry, is_new] =
+        owners_.emplace(name, value.path() + " on line " + std::to_string(value.line()));
+    if (!is_new) {
+      value.Reject(kind_ + " names must be unique, got " + Quote(name) + ", taken by " + entry->second);
+    }
+  }
+
+ private:
+  std::string kind_;
+  std::map<std::string, std::string> owners_;
+};
+
+class TreeReader {
+ public:
+  explicit TreeReader(RobotSpec& spec) : spec_(spec) {
+    link_names_.Reserve(spec.base.link, "the base");
+    for (const std::string& wheel : {spec.base.wheel_joint_right, spec.base.wheel_joint_left}) {
+      joint_names_.Reserve(wheel, "a wheel");
+    }
+  }
+
+  void Read(TomlTable& root) {
+    if (const std::optional<TomlValue> templates = root.Find("template")) ReadTemplates(*templates);
+    for (const TomlValue& value : root.Get("chain").AsList()) ReadChain(value);
+    for (size_t i = 0; i < chains_.size(); ++i) BuildChain(i);
+    if (const std::optional<TomlValue> frames = root.Find("frame")) {
+      for (const TomlValue& value : frames->AsList()) BuildFrame(ReadFrameEntry(value), value, "");
+    }
+    RejectUnused();
+  }
+
+ private:
+  void ReadTemplates(const TomlValue& value) {
+    for (const auto& [name, entry] : value.AsTable().GetEntries()) {
+      TomlTable table = entry.AsTable();
+      templates_.emplace(name, Template{entry, ReadSegment(table)});
+      table.RejectUnused();
+    }
+  }
+
+  Template* FindTemplate(const TomlValue& value) {
+    const std::string name = value.AsText();
+    const auto found = templates_.find(name);
+    if (found == templates_.end()) value.Fail("must be a template" + Suggest(name, ListKeys(templates_)));
+    found->second.used = true;
+    return &found->second;
+  }
+
+  void ReadChain(const TomlValue& value) {
+    TomlTable table = value.AsTable();
+    Chain chain{value, table.Get("parent"), "", Pose::Identity(), ReadSegment(table)};
+    if (const std::optional<TomlValue> prefix = table.Find("prefix")) chain.prefix = prefix->AsName();
+    if (const std::optional<TomlValue> pose = table.Find("pose")) chain.X_PB = ReadPose(*pose);
+    if (const std::optional<TomlValue> name = table.Find("template")) chain.common = FindTemplate(*name);
+    table.RejectUnused();
+    RegisterNames(chain);
+    chains_.push_back(std::move(chain));
+  }
+
+  static void CheckCount(const TomlValue& value, const std::string& what, size_t count) {
+    if (count <= kMaxJoints) return;
+    value.Reject("must leave the number of " + what + " within " + std::to_string(kMaxJoints) + ", got " +
+                 std::to_string(count));
+  }
+
+  void RegisterNames(Chain& chain) {
+    const size_t joints_before = chain_of_link_.size();
+    for (const Segment* segment : chain.segments()) {
+      CheckCount(chain.value, "joints", chain_of_link_.size() + segment->rows.size());
+      for (const SegmentRow& row : segment->rows) {
+        joint_names_.Add(chain.prefix + row.joint, chain.value);
+        link_names_.Add(chain.prefix + row.link, chain.value);
+        chain_of_link_[chain.prefix + row.link] = chains_.size();
+      }
+    }
+    if (chain_of_link_.size() == joints_before) chain.value.Reject("must have rows, its own or a template's");
+  }
+
+  /// The joint that moves a chain's parent link; it must belong to the base or to an earlier chain.
+  int FindParent(size_t index) const {
+    const TomlValue& parent = chains_[index].parent;
+    const std::string name = parent.AsText();
+    if (name == spec_.base.link) return -1;
+    const auto found = chain_of_link_.find(name);
+    if (found == chain_of_link_.end()) parent.Fail("must be a link" + SuggestLink(name));
+    if (found->second < index) return joint_of_link_.at(name);
+    const std::string cycle = DescribeCycle(index);
+    if (!cycle.empty()) parent.Fail("must not be cyclic, " + cycle);
+    parent.Fail("must be declared before its children, move " + Describe(found->second) + " before " +
+                Describe(index));
+  }
+
+  [[nodiscard]] std::string Describe(size_t chain) const {
+    const TomlValue& value = chains_[chain].value;
+    return value.path() + " (line " + std::to_string(value.line()) + ")";
+  }
+
+  /// "chain[0] -> chain[1] -> chain[0]" if following the parents never reaches the base; otherwise empty.
+  [[nodiscard]] std::string DescribeCycle(size_t chain) const {
+    std::string text = chains_[chain].value.path();
+    std::set<size_t> visited;
+    while (visited.insert(chain).second) {
+      const auto next = chain_of_link_.find(chains_[chain].parent.AsText());
+      if (next == chain_of_link_.end()) return {};
+      chain = next->second;
+      text += " -> " + chains_[chain].value.path();
+    }
+    return Abbreviate(text);
+  }
+
+  [[nodiscard]] std::string SuggestLink(const std::string& name) const {
+    std::vector<std::string> links = ListKeys(chain_of_link_);
+    links.push_back(spec_.base.link);
+    return Suggest(name, links);
+  }
+
+  void BuildChain(size_t index) {
+    Chain& chain = chains_[index];
+    int parent = FindParent(index);
+    Pose X_PB = chain.X_PB;
+    for (const Segment* segment : chain.segments()) {
+      for (const SegmentRow& row : segment->rows) {
+        parent = BuildJoint(chain, row, parent, X_PB);
+        X_PB = Pose::Identity();
+      }
+    }
+    for (const Segment* segment : chain.segments()) {
+      for (const FrameEntry& frame : segment->frames) BuildFrame(frame, chain.value, chain.prefix);
+    }
+  }
+
+  /// @return the joint's index.
+  int BuildJoint(Chain& chain, const SegmentRow& row, int parent, const Pose& X_PB) {
+    const JointEntry& entry = FindEntry(chain, &Segment::joints, "joints", row.joint, row.value);
+    const LinkEntry& link = FindEntry(chain, &Segment::links, "links", row.link, row.value);
+    if (row.type == JointType::kPrismatic && entry.range_is_angle) {
+      entry.range.Fail("must be in m for a prismatic joint, not in degrees");
+    }
+    const int index = static_cast<int>(spec_.joints.size());
+    spec_.joints.push_back({chain.prefix + row.joint, chain.prefix + row.link, parent, row.type, X_PB,
+                            row.mdh, entry.lower, entry.upper, entry.damping, entry.armature, link.body});
+    joint_of_link_[chain.prefix + row.link] = index;
+    return index;
+  }
+
+  /// The chain's own entry of that name, or else its template's.
+  template <typename Entry>
+  const Entry& FindEntry(Chain& chain, std::map<std::string, Entry> Segment::*entries,
+                         const std::string& kind, const std::string& name, const TomlValue& row) {
+    const Entry* found = nullptr;
+    std::vector<std::string> names;
+    for (Segment* segment : chain.segments()) {
+      const auto entry = (segment->*entries).find(name);
+      if (entry != (segment->*entries).end()) {
+        entry->second.used = true;
+        if (found == nullptr) found = &entry->second;
+      }
+    }
+    if (found != nullptr) return *found;
+    for (Segment* segment : chain.segments()) {
+      for (const std::string& key : ListKeys(segment->*entries)) names.push_back(key);
+    }
+    row.Reject("has no entry in " + kind + Suggest(name, names) + ", got " + Quote(name));
+  }
+
+  void BuildFrame(const FrameEntry& frame, const TomlValue& owner, const std::string& prefix) {
+    const std::string name = prefix + frame.name.AsName();
+    const std::string link = prefix + frame.link.AsText();
+    frame_names_.Add(name, owner);
+    CheckCount(owner, "frames", spec_.frames.size() + 1);
+    int joint = -1;
+    if (link != spec_.base.link) {
+      const auto found = joint_of_link_.find(link);
+      if (found == joint_of_link_.end()) frame.link.Fail("must be a link" + SuggestLink(link));
+      joint = found->second;
+    }
+    spec_.frames.push_back({name, joint, frame.X_LF, frame.sphere_radius});
+  }
+
+  void RejectUnused() const {
+    for (const Chain& chain : chains_) RejectUnused(chain.own);
+    for (const auto& [name, common] : templates_) {
+      if (!common.used) common.value.Reject("must be used by a chain");
+      RejectUnused(common.segment);
+    }
+  }
+
+  static void RejectUnused(const Segment& segment) {
+    for (const auto& [name, entry] : segment.joints) {
+      if (!entry.used) entry.value.Reject("no row has this joint");
+    }
+    for (const auto& [name, entry] : segment.links) {
+      if (!entry.used) entry.value.Reject("no row has this link");
+    }
+  }
+
+  RobotSpec& spec_;
+  std::map<std::string, Template> templates_;
+  std::vector<Chain> chains_;
+  NameRegistry joint_names_{"joint"};
+  NameRegistry link_names_{"link"};
+  NameRegistry frame_names_{"frame"};
+  std::map<std::string, size_t> chain_of_link_;
+  std::map<std::string, int> joint_of_link_;
+};
+
+}  // namespace
+
+void ReadTree(TomlTable& root, RobotSpec& spec) { TreeReader(spec).Read(root); }
+
+}  // namespace dexcheck

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "controller/common/toml_reader.h"
+#include "controller/model/robot_model.h"
+
+namespace dexcheck {
+
+/// Most joints, and most frames, that a file may describe: templates make it easy to ask for millions.
+inline constexpr size_t kMaxJoints = 1000;
+
+/// Reads the keys `chain`, `template` and `frame` of a parameter file into the specification's joints and
+/// frames. Its base must have been read. @throws InputError.
+void ReadTree(TomlTable& root, RobotSpec& spec);
+
+}  // namespace dexcheck
