@@ -1,6 +1,7 @@
 #include "controller/contact/grasp_map.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -58,12 +59,13 @@ void RequireFullGrasp(const Eigen::Ref<const Matrix6Xd>& G) {
   Require(G.cols() >= 6, "number of contact forces", "must be at least 6 for a full grasp",
           static_cast<double>(G.cols()));
   const double arm = G.bottomRows<3>().colwise().norm().maxCoeff();
-  Matrix6d GGT = G.lazyProduct(G.transpose());
+  Matrix6d gram = G.lazyProduct(G.transpose());
   if (arm > 0.0) {
-    GGT.bottomRows<3>() /= arm;
-    GGT.rightCols<3>() /= arm;
+    gram.bottomRows<3>() /= arm;
+    gram.rightCols<3>() /= arm;
   }
-  const Vector6d squares = Eigen::SelfAdjointEigenSolver<Matrix6d>(GGT, Eigen::EigenvaluesOnly).eigenvalues();
+  const Vector6d squares =
+      Eigen::SelfAdjointEigenSolver<Matrix6d>(gram, Eigen::EigenvaluesOnly).eigenvalues();
   const double ratio = std::sqrt(std::max(squares(0), 0.0) / squares(5));
   if (ratio > kMinSingularValueRatio) return;
   throw SingularityError(

@@ -196,9 +196,11 @@ TEST_F(ContactJacobianTest, AControlStepDoesNotAllocate) {
   }
   CalcGraspMap(contacts, G);
   CalcGraspMapDot(contacts, G);
-  for (int i = 0; i < 4; ++i) {
-    CalcContactJacobian(contacts[static_cast<std::size_t>(i)], J_f, J_B.middleRows(3 * i, 3));
-    CalcContactJacobianDot(contacts[static_cast<std::size_t>(i)], J_f, J_f, J_B.middleRows(3 * i, 3));
+  Eigen::Index row = 0;
+  for (const Contact& contact : contacts) {
+    CalcContactJacobian(contact, J_f, J_B.middleRows(row, 3));
+    CalcContactJacobianDot(contact, J_f, J_f, J_B.middleRows(row, 3));
+    row += 3;
   }
   EXPECT_EQ(testing::CountAllocations(), before);
 }

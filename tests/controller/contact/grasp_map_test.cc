@@ -42,6 +42,7 @@ std::vector<Contact> MakeTorusGrasp(const std::vector<double>& angles, ContactTy
   const Sphere tip(0.009);
   const Torus torus(0.035, 0.011);
   std::vector<Contact> contacts;
+  contacts.reserve(angles.size());
   for (const double angle : angles) {
     contacts.push_back(MakeContact(tip, torus, {{0.2, -0.3, 0}, {DegToRad(angle), 0.0, 0}, 0.7}, type));
   }
