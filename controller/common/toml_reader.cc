@@ -199,6 +199,11 @@ void TomlTable::RejectUnused() const {
   }
 }
 
+void TomlTable::RejectOthersThan(std::initializer_list<std::string_view> keys) {
+  asked_.insert(keys.begin(), keys.end());
+  RejectUnused();
+}
+
 void TomlTable::FailMissing(std::string_view key) const {
   const std::string missing(key);
   for (const auto& [unused, value] : ListInFileOrder()) {

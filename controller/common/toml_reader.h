@@ -119,6 +119,8 @@ class TomlTable {
   void RejectTogether(std::string_view key, std::initializer_list<std::string_view> others) const;
   /// Throws at the first key that was never asked for, with the nearest that was.
   void RejectUnused() const;
+  /// Throws at the first key that is not one of these.
+  void RejectOthersThan(std::initializer_list<std::string_view> keys);
   /// Throws that a key is missing, unless an unused key looks like a misspelling of it.
   [[noreturn]] void FailMissing(std::string_view key) const;
 
