@@ -52,7 +52,7 @@ std::string FindNearest(std::string_view word, const std::vector<std::string>& c
   std::string nearest;
   size_t smallest = word.size() + 1;
   for (const std::string& candidate : candidates) {
-    const auto [shorter, longer] = std::minmax(word.size(), candidate.size());
+    const auto [shorter, longer] = std::minmax({word.size(), candidate.size()});
     const size_t close = longer / 3;
     if (longer - shorter > close) continue;
     const size_t distance = CalcEditDistance(word, candidate);

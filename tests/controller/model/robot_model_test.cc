@@ -109,7 +109,8 @@ TEST(RobotModel, AddsTheWheelsToTheBase) {
   //   wheels I_xx = 2 (0.006 + 2 0.0625), I_yy = 2 0.01, I_zz = I_xx
   // and then to the centre of mass: I - m (c^2 1 - c c^T).
   const double kRounding = 1e-14;  // Some twenty roundings of numbers of order 1.
-  const MassProperties& body = RobotModel(MakeTree()).base_with_wheels();
+  const RobotModel model(MakeTree());
+  const MassProperties& body = model.base_with_wheels();
   const Vector3d c(1.0 / 14.0, 0.0, 2.0 / 14.0);
   Matrix3d I;
   I << 1.4 + 0.262, 0.0, -0.2, 0.0, 2.0 + 0.02, 0.0, -0.2, 0.0, 2.1 + 0.262;
