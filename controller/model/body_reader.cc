@@ -55,7 +55,7 @@ MassProperties ReadSolid(const TomlValue& value) {
   TomlTable table = value.AsTable();
   const Shape shape = ReadShape(table);
   const double mass = table.Get("mass").AsNotNegative();
-  const MassProperties solid = CalcMassProperties(shape, mass, ReadShapePose(table, shape));
+  MassProperties solid = CalcMassProperties(shape, mass, ReadShapePose(table, shape));
   table.RejectUnused();
   return solid;
 }
@@ -70,7 +70,7 @@ Torus ReadTorus(TomlTable& table) {
 
 Box ReadBox(TomlTable& table) {
   const TomlValue size = table.Get("size");
-  const Box box{size.AsVector<3>()};
+  Box box{size.AsVector<3>()};
   if (box.size.minCoeff() <= 0.0) size.Fail("must be positive");
   return box;
 }
@@ -86,7 +86,7 @@ Pose ReadPose(TomlTable& table) {
 
 Pose ReadPose(const TomlValue& value) {
   TomlTable table = value.AsTable();
-  const Pose X = ReadPose(table);
+  Pose X = ReadPose(table);
   table.RejectUnused();
   return X;
 }
@@ -128,13 +128,13 @@ MassProperties ReadBody(TomlTable& table) {
   if (const std::optional<TomlValue> shapes = table.Find("shapes")) {
     std::vector<MassProperties> parts;
     for (const TomlValue& shape : shapes->AsList()) parts.push_back(ReadSolid(shape));
-    const MassProperties body = Combine(parts);
+    MassProperties body = Combine(parts);
     CheckBody(*shapes, body);
     return body;
   }
   const TomlValue inertia = table.Get("inertia");
-  const MassProperties body{table.Get("mass").AsNotNegative(), table.Get("com").AsVector<3>(),
-                            ReadInertia(inertia)};
+  MassProperties body{table.Get("mass").AsNotNegative(), table.Get("com").AsVector<3>(),
+                      ReadInertia(inertia)};
   CheckBody(inertia, body);
   return body;
 }

@@ -144,6 +144,8 @@ INSTANTIATE_TEST_SUITE_P(
         {"Text", R"(parent = "platform")", "parent = 1", "chain[0].parent: must be text, got 1"},
         {"Name", R"(joint = "waist_yaw",)", R"(joint = "waist yaw",)",
          R"(chain[0].rows[0].joint: must be a name of 1 to 64 letters, digits, and _ - ., got "waist yaw")"},
+        {"EntryName", kElbow, "\"left elbow\" = 1\n" + kElbow,
+         "template.arm.joints.left elbow: must have a name of 1 to 64 letters, digits, and _ - ."},
         {"EmptyName", R"(link = "platform"
 velocity)",
          R"(link = ""
