@@ -18,9 +18,9 @@ using dexcheck::testing::MatrixNear;
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 // Some ten roundings of numbers that are at most 1.
 constexpr double kRounding = 32.0 * kEps;
-// Simpson's rule on 2000 intervals errs by (b - a) h^4 / 180 max|f''''| < 1e-12 for these profiles of unit
-// size.
-constexpr double kQuadrature = 1e-11;
+// Simpson's rule on 2000 intervals errs by about h^4 / 60 times the fourth derivative, some 1e-12 for these
+// profiles of unit size; measured 2.3e-13.
+constexpr double kQuadrature = 2e-12;
 
 /// A piece of a solid of revolution as a stack of rings: ring t lies at height z, between two radii.
 struct Ring {
