@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <numeric>
 
 namespace dexcheck {
@@ -29,6 +30,7 @@ size_t CalcEditDistance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string FormatNumber(double value) {
+  if (std::isnan(value)) return "nan";  // Of either sign.
   std::array<char, 32> buffer{};
   const std::to_chars_result result = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
   return {buffer.data(), result.ptr};
@@ -50,7 +52,7 @@ std::string FindNearest(std::string_view word, const std::vector<std::string>& c
   std::string nearest;
   size_t smallest = word.size() + 1;
   for (const std::string& candidate : candidates) {
-    const auto [shorter, longer] = std::minmax(word.size(), candidate.size());
+    const auto [shorter, longer] = std::minmax({word.size(), candidate.size()});
     const size_t close = longer / 3;
     if (longer - shorter > close) continue;
     const size_t distance = CalcEditDistance(word, candidate);

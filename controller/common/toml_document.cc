@@ -11,8 +11,8 @@
 namespace dexcheck {
 namespace {
 
-/// Measures how deeply TOML text is nested, before the parser builds (and later destroys) the tree by
-/// recursion.
+/// Measures how deeply TOML text is nested. The parser builds and destroys its tree by recursion; it allows
+/// more nested brackets than a small stack can take, and any number of dots in a key.
 class NestingScanner {
  public:
   static constexpr int kMaxBrackets = 32;

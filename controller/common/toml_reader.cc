@@ -12,7 +12,6 @@ namespace {
 
 constexpr size_t kMaxNameLength = 64;
 constexpr std::string_view kNameLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
-
 constexpr std::string_view kNameRule = "a name of 1 to 64 letters, digits, and _ - .";
 
 bool IsName(std::string_view text) {
@@ -98,7 +97,7 @@ std::string TomlValue::AsText() const {
 }
 
 std::string TomlValue::AsName() const {
-  const std::string name = AsText();
+  std::string name = AsText();
   if (!IsName(name)) Fail("must be " + std::string(kNameRule));
   return name;
 }
@@ -197,6 +196,11 @@ void TomlTable::RejectUnused() const {
   for (const auto& [key, value] : ListInFileOrder()) {
     if (!asked_.contains(key)) RejectUnknown(value, FindNearest(key, {asked_.begin(), asked_.end()}));
   }
+}
+
+void TomlTable::RejectOthersThan(std::initializer_list<std::string_view> keys) {
+  asked_.insert(keys.begin(), keys.end());
+  RejectUnused();
 }
 
 void TomlTable::FailMissing(std::string_view key) const {

@@ -92,14 +92,10 @@ class TomlTable {
  public:
   TomlTable(const TomlContext& context, TomlValue self, const toml::table& table);
 
-  /// The table itself as a value, for messages about the whole of it.
-  [[nodiscard]] const TomlValue& self() const { return self_; }
-
   /// The value under a key that must be there.
   TomlValue Get(std::string_view key);
   /// The value under a key that may be missing.
   std::optional<TomlValue> Find(std::string_view key);
-  [[nodiscard]] bool Contains(std::string_view key) const { return table_->contains(key); }
   /// All keys and values in the file's order, for a table whose keys are names of the user's choice.
   std::vector<std::pair<std::string, TomlValue>> GetEntries();
 
@@ -119,6 +115,8 @@ class TomlTable {
   void RejectTogether(std::string_view key, std::initializer_list<std::string_view> others) const;
   /// Throws at the first key that was never asked for, with the nearest that was.
   void RejectUnused() const;
+  /// Throws at the first key that is not one of these.
+  void RejectOthersThan(std::initializer_list<std::string_view> keys);
   /// Throws that a key is missing, unless an unused key looks like a misspelling of it.
   [[noreturn]] void FailMissing(std::string_view key) const;
 

@@ -43,10 +43,10 @@ Vector3d ReadPoint(TomlTable& table, std::string_view key) {
 Pose ReadShapePose(TomlTable& table, const Shape& shape) {
   Pose X_BS = Pose::Identity();
   X_BS.translation() = ReadPoint(table, "center");
-  if (std::holds_alternative<Sphere>(shape)) return X_BS;
+  if (std::holds_alternative<SolidSphere>(shape)) return X_BS;
   table.RejectTogether("axis", {"rpy", "rpy_deg"});
   const std::optional<TomlValue> axis =
-      std::holds_alternative<Box>(shape) ? std::nullopt : table.Find("axis");
+      std::holds_alternative<SolidBox>(shape) ? std::nullopt : table.Find("axis");
   X_BS.linear() = axis ? MakeRotationFromZ(ReadAxis(*axis)) : ReadRotation(table);
   return X_BS;
 }
@@ -55,22 +55,22 @@ MassProperties ReadSolid(const TomlValue& value) {
   TomlTable table = value.AsTable();
   const Shape shape = ReadShape(table);
   const double mass = table.Get("mass").AsNotNegative();
-  const MassProperties solid = CalcMassProperties(shape, mass, ReadShapePose(table, shape));
+  MassProperties solid = CalcMassProperties(shape, mass, ReadShapePose(table, shape));
   table.RejectUnused();
   return solid;
 }
 
-Torus ReadTorus(TomlTable& table) {
-  const Torus torus{table.Get("ring_radius").AsPositive(), table.Get("tube_radius").AsPositive()};
+SolidTorus ReadTorus(TomlTable& table) {
+  const SolidTorus torus{table.Get("ring_radius").AsPositive(), table.Get("tube_radius").AsPositive()};
   if (torus.tube_radius >= torus.ring_radius) {
     table.Get("tube_radius").Fail("must be less than ring_radius");
   }
   return torus;
 }
 
-Box ReadBox(TomlTable& table) {
+SolidBox ReadBox(TomlTable& table) {
   const TomlValue size = table.Get("size");
-  const Box box{size.AsVector<3>()};
+  SolidBox box{size.AsVector<3>()};
   if (box.size.minCoeff() <= 0.0) size.Fail("must be positive");
   return box;
 }
@@ -86,7 +86,7 @@ Pose ReadPose(TomlTable& table) {
 
 Pose ReadPose(const TomlValue& value) {
   TomlTable table = value.AsTable();
-  const Pose X = ReadPose(table);
+  Pose X = ReadPose(table);
   table.RejectUnused();
   return X;
 }
@@ -99,9 +99,9 @@ Shape ReadShape(TomlTable& table) {
                                              {"box", Kind::kBox},
                                              {"torus", Kind::kTorus}})) {
     case Kind::kCylinder:
-      return Cylinder{table.Get("radius").AsPositive(), table.Get("length").AsPositive()};
+      return SolidCylinder{table.Get("radius").AsPositive(), table.Get("length").AsPositive()};
     case Kind::kCapsule:
-      return Capsule{table.Get("radius").AsPositive(), table.Get("length").AsPositive()};
+      return SolidCapsule{table.Get("radius").AsPositive(), table.Get("length").AsPositive()};
     case Kind::kBox:
       return ReadBox(table);
     case Kind::kTorus:
@@ -109,7 +109,7 @@ Shape ReadShape(TomlTable& table) {
     case Kind::kSphere:
       break;
   }
-  return Sphere{table.Get("radius").AsPositive()};
+  return SolidSphere{table.Get("radius").AsPositive()};
 }
 
 Matrix3d ReadInertia(const TomlValue& value) {
@@ -128,13 +128,13 @@ MassProperties ReadBody(TomlTable& table) {
   if (const std::optional<TomlValue> shapes = table.Find("shapes")) {
     std::vector<MassProperties> parts;
     for (const TomlValue& shape : shapes->AsList()) parts.push_back(ReadSolid(shape));
-    const MassProperties body = Combine(parts);
+    MassProperties body = Combine(parts);
     CheckBody(*shapes, body);
     return body;
   }
   const TomlValue inertia = table.Get("inertia");
-  const MassProperties body{table.Get("mass").AsNotNegative(), table.Get("com").AsVector<3>(),
-                            ReadInertia(inertia)};
+  MassProperties body{table.Get("mass").AsNotNegative(), table.Get("com").AsVector<3>(),
+                      ReadInertia(inertia)};
   CheckBody(inertia, body);
   return body;
 }

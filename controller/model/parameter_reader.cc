@@ -15,8 +15,9 @@ void DefineLengths(TomlTable& root, TomlDocument& document) {
   const std::optional<TomlValue> lengths = root.Find("lengths");
   if (!lengths) return;
   for (const auto& [name, value] : lengths->AsTable().GetEntries()) {
-    if (!IsSymbolName(name))
+    if (!IsSymbolName(name)) {
       value.Reject("must be named by letters, digits and _, other than pi, got " + Quote(name));
+    }
     document.Define(name, value.AsNumber());
   }
 }
@@ -34,7 +35,8 @@ void ReadWheels(const TomlValue& value, Base& base) {
 
   table.RejectTogether("width", {"spin_inertia", "transverse_inertia"});
   if (const std::optional<TomlValue> width = table.Find("width")) {
-    const Matrix3d inertia = CalcUniformInertia(Cylinder{base.wheel_radius, width->AsPositive()}, wheel.mass);
+    const Matrix3d inertia =
+        CalcUniformInertia(SolidCylinder{base.wheel_radius, width->AsPositive()}, wheel.mass);
     wheel.spin_inertia = inertia(2, 2);
     wheel.transverse_inertia = inertia(0, 0);
   } else {
@@ -94,6 +96,8 @@ ObjectModel ReadObject(const TomlValue& value) {
 RobotModel ParseRobotModel(std::string_view text, std::string_view source) {
   TomlDocument document(text, source);
   TomlTable root = document.Open();
+  // First of all, since a misspelt section makes others look wrong.
+  root.RejectOthersThan({"name", "gravity", "lengths", "base", "chain", "template", "frame", "object"});
   DefineLengths(root, document);
 
   RobotSpec spec;
@@ -103,7 +107,6 @@ RobotModel ParseRobotModel(std::string_view text, std::string_view source) {
   spec.base = ReadBase(root.Get("base"));
   ReadTree(root, spec);
   if (const std::optional<TomlValue> object = root.Find("object")) spec.object = ReadObject(*object);
-  root.RejectUnused();
   return RobotModel(std::move(spec));
 }
 

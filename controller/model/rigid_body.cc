@@ -11,21 +11,20 @@ namespace {
 
 Matrix3d Diagonal(double Ixx, double Iyy, double Izz) { return Vector3d(Ixx, Iyy, Izz).asDiagonal(); }
 
-double Square(double x) { return x * x; }
-
-Matrix3d CalcInertia(const Sphere& sphere, double m) {
+Matrix3d CalcInertia(const SolidSphere& sphere, double m) {
   // I = 2/5 m r^2
-  return Matrix3d::Identity() * (0.4 * m * Square(sphere.radius));
+  return Matrix3d::Identity() * (0.4 * m * sphere.radius * sphere.radius);
 }
 
-Matrix3d CalcInertia(const Cylinder& cylinder, double m) {
+Matrix3d CalcInertia(const SolidCylinder& cylinder, double m) {
   // I_x = m (r^2 / 4 + l^2 / 12),  I_z = m r^2 / 2
-  const double r2 = Square(cylinder.radius);
-  const double Ix = m * (r2 / 4.0 + Square(cylinder.length) / 12.0);
-  return Diagonal(Ix, Ix, m * r2 / 2.0);
+  const double r = cylinder.radius;
+  const double l = cylinder.length;
+  const double Ix = m * (r * r / 4.0 + l * l / 12.0);
+  return Diagonal(Ix, Ix, m * r * r / 2.0);
 }
 
-Matrix3d CalcInertia(const Capsule& capsule, double m) {
+Matrix3d CalcInertia(const SolidCapsule& capsule, double m) {
   // A cylinder and two half spheres share the mass as l : 4/3 r. Each half sphere, of mass m_s / 2, has its
   // centre of mass 3/8 r beyond the cylinder's end, so by the parallel-axis theorem
   //   I_x = m_c (r^2 / 4 + l^2 / 12) + m_s (2/5 r^2 + l^2 / 4 + 3/8 l r),  I_z = m_c r^2 / 2 + m_s 2/5 r^2
@@ -37,18 +36,18 @@ Matrix3d CalcInertia(const Capsule& capsule, double m) {
   return Diagonal(Ix, Ix, (0.5 * m_c + 0.4 * m_s) * r * r);
 }
 
-Matrix3d CalcInertia(const Box& box, double m) {
+Matrix3d CalcInertia(const SolidBox& box, double m) {
   // I_x = m (s_y^2 + s_z^2) / 12 and cyclic
   const Vector3d s2 = box.size.array().square();
   return Diagonal(s2.y() + s2.z(), s2.z() + s2.x(), s2.x() + s2.y()) * (m / 12.0);
 }
 
-Matrix3d CalcInertia(const Torus& torus, double m) {
+Matrix3d CalcInertia(const SolidTorus& torus, double m) {
   // I_x = m (R^2 / 2 + 5/8 r^2),  I_z = m (R^2 + 3/4 r^2)
-  const double R2 = Square(torus.ring_radius);
-  const double r2 = Square(torus.tube_radius);
-  const double Ix = m * (0.5 * R2 + 0.625 * r2);
-  return Diagonal(Ix, Ix, m * (R2 + 0.75 * r2));
+  const double R = torus.ring_radius;
+  const double r = torus.tube_radius;
+  const double Ix = m * (0.5 * R * R + 0.625 * r * r);
+  return Diagonal(Ix, Ix, m * (R * R + 0.75 * r * r));
 }
 
 }  // namespace
@@ -99,7 +98,7 @@ std::string FindPhysicalInconsistency(const MassProperties& body) {
     return "inertia must be symmetric, got " + FormatNumbers(body.inertia.reshaped<Eigen::RowMajor>());
   }
   const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(body.inertia, Eigen::EigenvaluesOnly);
-  const Vector3d moments = solver.eigenvalues();  // Ascending.
+  const Vector3d& moments = solver.eigenvalues();  // Ascending.
   if (moments[0] < -allowance) {
     return "principal moments of inertia must not be negative, got " + FormatNumbers(moments);
   }

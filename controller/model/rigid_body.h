@@ -18,25 +18,25 @@ struct MassProperties {
 };
 
 /// Solid of revolution or box with uniform density. Its own frame has the origin at the centre of mass.
-struct Sphere {
+struct SolidSphere {
   double radius;  ///< m
 };
-struct Cylinder {
+struct SolidCylinder {
   double radius;  ///< m
   double length;  ///< Along the shape's z axis, m.
 };
-struct Capsule {
+struct SolidCapsule {
   double radius;  ///< m
   double length;  ///< Of the cylindrical part, along the shape's z axis, m.
 };
-struct Box {
+struct SolidBox {
   Vector3d size;  ///< Full edge lengths, m.
 };
-struct Torus {
+struct SolidTorus {
   double ring_radius;  ///< Centre to the middle of the tube, m. The ring lies in the shape's x-y plane.
   double tube_radius;  ///< m
 };
-using Shape = std::variant<Sphere, Cylinder, Capsule, Box, Torus>;
+using Shape = std::variant<SolidSphere, SolidCylinder, SolidCapsule, SolidBox, SolidTorus>;
 
 /// Rotational inertia of a uniform solid about its centre of mass, in its own axes, kg m^2.
 Matrix3d CalcUniformInertia(const Shape& shape, double mass);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -138,26 +139,17 @@ class SpecChecker {
   std::set<std::string> frame_names_;
 };
 
-/// Children of each joint in declared order, preceded by those of the base: entry i + 1 belongs to joint i.
-std::vector<std::vector<int>> ListChildren(const std::vector<Joint>& joints) {
-  std::vector<std::vector<int>> children(joints.size() + 1);
-  for (size_t i = 0; i < joints.size(); ++i) {
-    children[static_cast<size_t>(joints[i].parent + 1)].push_back(static_cast<int>(i));
-  }
-  return children;
-}
-
 std::vector<int> SortDepthFirst(const std::vector<Joint>& joints) {
-  const std::vector<std::vector<int>> children = ListChildren(joints);
+  std::map<int, std::vector<int>> children;  // By parent, in declared order.
+  for (size_t i = 0; i < joints.size(); ++i) children[joints[i].parent].push_back(static_cast<int>(i));
+
   std::vector<int> order;
-  order.reserve(joints.size());
-  std::vector<int> open(children[0].rbegin(), children[0].rend());
+  std::vector<int> open(children[-1].rbegin(), children[-1].rend());
   while (!open.empty()) {
     const int joint = open.back();
     open.pop_back();
     order.push_back(joint);
-    const std::vector<int>& next = children[static_cast<size_t>(joint + 1)];
-    open.insert(open.end(), next.rbegin(), next.rend());
+    open.insert(open.end(), children[joint].rbegin(), children[joint].rend());
   }
   return order;
 }

@@ -1,6 +1,5 @@
 #include "controller/model/tree_reader.h"
 
-#include <algorithm>
 #include <map>
 #include <set>
 #include <string>
@@ -166,9 +165,13 @@ class TreeReader {
     return Abbreviate(text);
   }
 
-  [[nodiscard]] std::string SuggestLink(const std::string& name) const {
-    std::vector<std::string> links = ListKeys(chain_of_link_);
-    links.push_back(spec_.base.link);
+  /// Suggests a link whose name, put behind the prefix, exists.
+  [[nodiscard]] std::string SuggestLink(const std::string& name, const std::string& prefix = "") const {
+    std::vector<std::string> links;
+    for (const auto& [link, chain] : chain_of_link_) {
+      if (link.starts_with(prefix)) links.push_back(link.substr(prefix.size()));
+    }
+    if (prefix.empty()) links.push_back(spec_.base.link);
     return Suggest(name, links);
   }
 
@@ -206,7 +209,6 @@ class TreeReader {
   const Entry& FindEntry(Chain& chain, std::map<std::string, Entry> Segment::*entries,
                          const std::string& kind, const std::string& name, const TomlValue& row) {
     const Entry* found = nullptr;
-    std::vector<std::string> names;
     for (Segment* segment : chain.segments()) {
       const auto entry = (segment->*entries).find(name);
       if (entry != (segment->*entries).end()) {
@@ -215,6 +217,7 @@ class TreeReader {
       }
     }
     if (found != nullptr) return *found;
+    std::vector<std::string> names;
     for (Segment* segment : chain.segments()) {
       for (const std::string& key : ListKeys(segment->*entries)) names.push_back(key);
     }
@@ -223,13 +226,14 @@ class TreeReader {
 
   void BuildFrame(const FrameEntry& frame, const TomlValue& owner, const std::string& prefix) {
     const std::string name = prefix + frame.name.AsName();
-    const std::string link = prefix + frame.link.AsText();
+    const std::string own_link = frame.link.AsText();
+    const std::string link = prefix + own_link;
     frame_names_.Add(name, owner);
     CheckCount(owner, "frames", spec_.frames.size() + 1);
     int joint = -1;
     if (link != spec_.base.link) {
       const auto found = joint_of_link_.find(link);
-      if (found == joint_of_link_.end()) frame.link.Fail("must be a link" + SuggestLink(link));
+      if (found == joint_of_link_.end()) frame.link.Fail("must be a link" + SuggestLink(own_link, prefix));
       joint = found->second;
     }
     spec_.frames.push_back({name, joint, frame.X_LF, frame.sphere_radius});

@@ -178,7 +178,7 @@ class StaticGate {
                 object.body.inertia.trace());
       }
     }
-    if (const Torus* torus = std::get_if<Torus>(&object.shape)) {
+    if (const SolidTorus* torus = std::get_if<SolidTorus>(&object.shape)) {
       double ring_radius = kMissing;
       double tube_radius = kMissing;
       for (int geom = 0; geom < engine_.ngeom; ++geom) {
