@@ -1,0 +1,11 @@
+#!/usr/bin/env bash
+# Installs what is missing, builds dexcheck and runs its consistency check; arguments go to the check.
+#   harness/quickstart.sh [--robot FILE.toml --mjcf FILE.xml] [--seed N] ...
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+export CMAKE_BUILD_PARALLEL_LEVEL=${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)}
+
+"$root/harness/install-packages.sh"
+(cd "$root" && cmake --preset release && cmake --build --preset release --target dexcheck)
+exec "$root/build/release/harness/dexcheck" consistency --samples 10000 "$@"
