@@ -7,8 +7,8 @@ packages=(
   cmake ninja-build clang
   # the controller's side
   libeigen3-dev libtomlplusplus-dev
-  # the engine; its CMake file names qhull's headers
-  libmujoco-dev libqhull-dev
+  # the engine; its CMake files ask for OpenGL and for qhull's headers
+  libmujoco-dev libgl-dev libqhull-dev
   # the command line
   libcli11-dev libfmt-dev nlohmann-json3-dev
   # tests and benchmarks, and the programs they take as oracles
