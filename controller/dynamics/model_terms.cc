@@ -206,6 +206,14 @@ Pose ModelTerms::CalcLinkPose(int joint) const {
   return X;
 }
 
+Vector6d ModelTerms::CalcLinkVelocity(int joint) const {
+  const LinkState& state = link(joint);
+  Vector6d velocity;
+  velocity.head<3>() = base_R_ * (state.v + state.w.cross(state.p));
+  velocity.tail<3>() = base_R_ * state.w;
+  return velocity;
+}
+
 Pose ModelTerms::CalcFramePose(int frame) const {
   const Frame& f = model_->frames().at(static_cast<size_t>(frame));
   return CalcLinkPose(f.link) * f.X_LF;

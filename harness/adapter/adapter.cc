@@ -68,7 +68,6 @@ Adapter::Adapter(const RobotModel& model, const mjModel& engine, const std::stri
     : model_(&model), engine_(&engine) {
   MatchJoints(engine_source);
   MatchBase(engine_source);
-  MatchFrames();
 }
 
 void Adapter::MatchJoints(const std::string& engine_source) {
@@ -93,6 +92,7 @@ void Adapter::MatchJoints(const std::string& engine_source) {
     link_bodies_.push_back(need(mjOBJ_BODY, "body", joint.link));
     known.insert(joint_ids_.back());
   }
+  for (const Frame& frame : model_->frames()) frame_sites_.push_back(need(mjOBJ_SITE, "site", frame.name));
   if (model_->object()) object_body_ = need(mjOBJ_BODY, "body", model_->object()->name);
   std::vector<std::string> only_in_engine;
   for (int id = 0; id < engine.njnt; ++id) {
@@ -202,12 +202,6 @@ void Adapter::MatchWheels(const mjData& reference, const std::string& engine_sou
       if (MovingBody(*engine_, b) == body) welded_bodies_[0].push_back(b);
     }
     wheels_.push_back(wheel);
-  }
-}
-
-void Adapter::MatchFrames() {
-  for (const Frame& frame : model_->frames()) {
-    frame_sites_.push_back(mj_name2id(engine_, mjOBJ_SITE, frame.name.c_str()));
   }
 }
 

@@ -32,7 +32,8 @@ struct EngineWheel {
 /// joint.
 class Adapter {
  public:
-  /// @throws InputError that lists every joint or body that the other side lacks, or whose kind differs.
+  /// @throws InputError that lists every joint, body or site that the other side lacks, or names one whose
+  /// kind differs.
   Adapter(const RobotModel& model, const mjModel& engine, const std::string& engine_source);
 
   [[nodiscard]] const RobotModel& model() const { return *model_; }
@@ -46,7 +47,7 @@ class Adapter {
   [[nodiscard]] const std::vector<int>& link_bodies() const { return link_bodies_; }
   /// All engine bodies that move as one with a link (welded to it), by the link's index + 1.
   [[nodiscard]] const std::vector<std::vector<int>>& welded_bodies() const { return welded_bodies_; }
-  /// Engine's site of each frame of the model; -1 when the MJCF has none of that name.
+  /// Engine's site of each frame of the model.
   [[nodiscard]] const std::vector<int>& frame_sites() const { return frame_sites_; }
   /// Engine's body of the object; -1 without one.
   [[nodiscard]] int object_body() const { return object_body_; }
@@ -70,7 +71,6 @@ class Adapter {
 
  private:
   void MatchJoints(const std::string& engine_source);
-  void MatchFrames();
   void MatchBase(const std::string& engine_source);
   void MatchWheels(const mjData& reference, const std::string& engine_source);
   [[nodiscard]] Pose CalcBasePose(const Eigen::Ref<const VectorXd>& q) const;

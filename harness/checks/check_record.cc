@@ -4,7 +4,8 @@ namespace dexcheck {
 namespace {
 
 std::string DescribeVelocity(int coordinate, const RobotModel& model, int base_velocities) {
-  if (coordinate >= base_velocities) return model.joints()[static_cast<size_t>(coordinate - base_velocities)].name;
+  if (coordinate >= base_velocities)
+    return model.joints()[static_cast<size_t>(coordinate - base_velocities)].name;
   static constexpr const char* kUnreduced[] = {"x_dot", "y_dot", "phi_dot"};
   static constexpr const char* kTwist[] = {"v_c", "w_c"};
   static constexpr const char* kWheelRates[] = {"thetadot_r", "thetadot_l"};
@@ -31,6 +32,8 @@ std::string Describe(const Location& where, const RobotModel& model, int base_ve
     case Location::Kind::kVelocityPair:
       return "(" + DescribeVelocity(where.first, model, base_velocities) + ", " +
              DescribeVelocity(where.second, model, base_velocities) + ")";
+    case Location::Kind::kWheel:
+      return "joint " + (where.first == 0 ? model.base().wheel_joint_right : model.base().wheel_joint_left);
     case Location::Kind::kObject:
       return "object " + (model.object() ? model.object()->name : std::string());
     case Location::Kind::kWhole:

@@ -16,9 +16,10 @@ enum class CheckKind { kModel, kBalance, kPrediction, kAssumption };
 
 /// The part of the robot that a compared number belongs to.
 struct Location {
-  enum class Kind { kWhole, kJoint, kLink, kFrame, kVelocity, kVelocityPair, kObject };
+  enum class Kind { kWhole, kJoint, kLink, kFrame, kVelocity, kVelocityPair, kWheel, kObject };
   Kind kind = Kind::kWhole;
-  int first = -1;   ///< Joint, link (by its joint; -1 the base), frame or velocity coordinate.
+  int first =
+      -1;  ///< Joint, link (by its joint; -1 the base), frame, velocity coordinate, or wheel (0 right).
   int second = -1;  ///< The other velocity coordinate of a matrix entry.
 };
 
@@ -28,11 +29,12 @@ std::string Describe(const Location& where, const RobotModel& model, int base_ve
 
 /// The largest relative error of a term over all that was compared, and where it first left its bound.
 struct CheckRecord {
-  std::string name;   ///< As in NOTATION.md.
+  std::string name;  ///< As in NOTATION.md.
   CheckKind kind = CheckKind::kModel;
   double bound = 0.0;  ///< On the error relative to the term's scale.
 
-  double worst = 0.0;  ///< Largest error relative to the term's scale; infinity when something was not a number.
+  double worst =
+      0.0;  ///< Largest error relative to the term's scale; infinity when something was not a number.
   double model_value = 0.0;
   double engine_value = 0.0;
   Location where;

@@ -8,19 +8,22 @@ namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
-// Rounding errors of one joint's step outward, in eps of the coordinates' size: a rotation of three products and sums
-// per entry on either side, and the engine's normalised quaternion. Errors of successive joints add up.
+// Rounding errors of one joint's step outward, in eps of the coordinates' size: a rotation of three products
+// and sums per entry on either side, and the engine's normalised quaternion. Errors of successive joints add
+// up.
 constexpr double kErrorsPerJoint = 16.0;
 
 /// Relative rounding bound of a term whose formation chains `factors` such geometric quantities.
 double RoundingBound(int depth, double factors) { return factors * kErrorsPerJoint * (depth + 1) * kEpsilon; }
 
 double RowReach(const Joint& joint) {
-  const double slide = joint.type == JointType::kPrismatic ? std::max(std::abs(joint.lower), std::abs(joint.upper)) : 0.0;
+  const double slide =
+      joint.type == JointType::kPrismatic ? std::max(std::abs(joint.lower), std::abs(joint.upper)) : 0.0;
   return joint.X_PB.translation().norm() + std::abs(joint.mdh.a) + std::abs(joint.mdh.d) + slide;
 }
 
-/// Farthest that a point of the robot (centres of mass, frames) can be from Sigma_0's origin, over all postures.
+/// Farthest that a point of the robot (centres of mass, frames) can be from Sigma_0's origin, over all
+/// postures.
 double CalcReach(const RobotModel& model) {
   std::vector<double> reach(static_cast<size_t>(model.num_joints()) + 1, 0.0);
   double farthest = model.base_with_wheels().com.norm() + 0.5 * model.base().wheel_distance;
@@ -31,7 +34,8 @@ double CalcReach(const RobotModel& model) {
     farthest = std::max(farthest, mine + joint.body.com.norm());
   }
   for (const Frame& frame : model.frames()) {
-    farthest = std::max(farthest, reach[static_cast<size_t>(frame.link + 1)] + frame.X_LF.translation().norm());
+    farthest =
+        std::max(farthest, reach[static_cast<size_t>(frame.link + 1)] + frame.X_LF.translation().norm());
   }
   return farthest;
 }
@@ -72,6 +76,7 @@ ModelCheck::ModelCheck(const Adapter& adapter)
   define(kAngularMomentum, "angular_momentum", 2.0);
 
   reach_ = CalcReach(model);
+  squared_rate_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
   subtree_mass_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
   subtree_mass_[0] = model.base().type == BaseType::kFixed ? 0.0 : model.base_with_wheels().mass;
   for (int i = model.num_joints() - 1; i >= 0; --i) {
@@ -111,30 +116,24 @@ void ModelCheck::Compare(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<c
 void ModelCheck::CalcScales(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi) {
   const RobotModel& model = terms_.model();
   const int base = base_velocities();
-  scales_ = RoundingScales{};
-  scales_.length = reach_ + model.base().X_B0.translation().norm();
-  if (model.num_base_positions() == 3) scales_.length += q.head<2>().norm();
-  double base_linear = 0.0;
-  double base_angular = 0.0;
-  for (int i = 0; i < base; ++i) {
-    const double rate = std::abs(xi[i]);
-    if (base == 3) {
-      (i < 2 ? base_linear : base_angular) += rate;
-    } else if (model.base().velocity == DriveVelocity::kTwist) {
-      (i == 0 ? base_linear : base_angular) += rate;
-    } else {
-      base_linear += 0.5 * model.base().wheel_radius * rate;
-      base_angular += model.base().wheel_radius / model.base().wheel_distance * rate;
-    }
-  }
-  scales_.angular_rate = base_angular;
-  scales_.linear_rate = base_linear;
+  scales_.length = reach_;
+  scales_.world_length = reach_ + model.base().X_B0.translation().norm();
+  if (model.num_base_positions() == 3) scales_.world_length += q.head<2>().norm();
+
+  const Vector6d velocity = terms_.CalcLinkVelocity(-1);
+  double sliding = velocity.head<3>().squaredNorm();
+  squared_rate_[0] = velocity.tail<3>().squaredNorm();
+  double fastest = squared_rate_[0];
   for (int i = 0; i < model.num_joints(); ++i) {
-    const double rate = std::abs(xi[base + i]);
-    const bool revolute = model.joints()[static_cast<size_t>(i)].type == JointType::kRevolute;
-    (revolute ? scales_.angular_rate : scales_.linear_rate) += rate / model.num_joints() * model.max_depth();
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    const double squared = xi[base + i] * xi[base + i];
+    double& rate = squared_rate_[static_cast<size_t>(i + 1)];
+    rate = squared_rate_[static_cast<size_t>(joint.parent + 1)];
+    (joint.type == JointType::kRevolute ? rate : sliding) += squared;
+    fastest = std::max(fastest, rate);
   }
-  scales_.linear_rate += scales_.angular_rate * scales_.length;
+  scales_.angular_rate = std::sqrt(fastest);
+  scales_.linear_rate = std::sqrt(sliding) + scales_.angular_rate * scales_.length;
 }
 
 double ModelCheck::VelocityScale(int coordinate) const {
@@ -146,16 +145,32 @@ double ModelCheck::VelocityScale(int coordinate) const {
   }
   if (base == 3) return coordinate < 2 ? 1.0 : scales_.length;
   if (model.base().velocity == DriveVelocity::kTwist) return coordinate == 0 ? 1.0 : scales_.length;
-  return 0.5 * model.base().wheel_radius + model.base().wheel_radius / model.base().wheel_distance * scales_.length;
+  return 0.5 * model.base().wheel_radius +
+         model.base().wheel_radius / model.base().wheel_distance * scales_.length;
 }
 
 double ModelCheck::SubtreeMass(int coordinate) const {
   return subtree_mass_[static_cast<size_t>(std::max(coordinate - base_velocities() + 1, 0))];
 }
 
+double ModelCheck::FrictionScale(int coordinate, const Eigen::Ref<const VectorXd>& xi) const {
+  const RobotModel& model = terms_.model();
+  const int base = base_velocities();
+  if (coordinate >= base) {
+    return model.joints()[static_cast<size_t>(coordinate - base)].damping * std::abs(xi[coordinate]);
+  }
+  if (model.base().type != BaseType::kDifferentialDrive) return 0.0;
+  // K^T D K v with K of size VelocityScale / r: the two wheels' parts may cancel.
+  const Vector6d velocity = terms_.CalcLinkVelocity(-1);
+  const double r = model.base().wheel_radius;
+  const double arm = 0.5 * model.base().wheel_distance;
+  const double wheel_rate = (velocity.head<3>().norm() + arm * velocity.tail<3>().norm()) / r;
+  return 2.0 * model.base().wheel.damping * wheel_rate * VelocityScale(coordinate) / r;
+}
+
 void ModelCheck::CompareGeometry() {
   const RobotModel& model = terms_.model();
-  const double length = scales_.length;
+  const double length = scales_.world_length;
   // From the base outward, so that the first failure is the one that the others follow from.
   for (int i = -1; i < model.num_joints(); ++i) {
     const Pose X = terms_.CalcLinkPose(i);
@@ -165,7 +180,8 @@ void ModelCheck::CompareGeometry() {
       const Vector3d axis_engine = engine_.JointAxis(i);
       for (int k = 0; k < 3; ++k) record(kJointAxis).Add(axis[k], axis_engine[k], 1.0, at_joint, sample_);
       if (model.joints()[static_cast<size_t>(i)].type == JointType::kRevolute) {
-        // Where along the axis the anchor stands is a choice of frames: compare the foot of the perpendicular.
+        // Where along the axis the anchor stands is a choice of frames: compare the foot of the
+        // perpendicular.
         const Vector3d anchor = engine_.JointAnchor(i);
         const Vector3d foot = X.translation() + axis.dot(anchor - X.translation()) * axis;
         for (int k = 0; k < 3; ++k) record(kJointAxis).Add(foot[k], anchor[k], length, at_joint, sample_);
@@ -173,7 +189,8 @@ void ModelCheck::CompareGeometry() {
     } else if (model.base().type == BaseType::kFixed) {
       continue;  // the world carries no mass
     }
-    const MassProperties& body = i < 0 ? model.base_with_wheels() : model.joints()[static_cast<size_t>(i)].body;
+    const MassProperties& body =
+        i < 0 ? model.base_with_wheels() : model.joints()[static_cast<size_t>(i)].body;
     const LinkInWorld& link = engine_.links()[static_cast<size_t>(i + 1)];
     const Location at_link{Location::Kind::kLink, i, -1};
     if (body.mass > 0.0 || link.mass > 0.0) {
@@ -198,7 +215,8 @@ void ModelCheck::CompareFrames(const Eigen::Ref<const VectorXd>& xi) {
     const Pose X = terms_.CalcFramePose(frame);
     const Pose X_engine = engine_.FramePose(frame);
     for (int row = 0; row < 3; ++row) {
-      record(kFramePose).Add(X.translation()[row], X_engine.translation()[row], scales_.length, where, sample_);
+      record(kFramePose)
+          .Add(X.translation()[row], X_engine.translation()[row], scales_.world_length, where, sample_);
       for (int col = 0; col < 3; ++col) {
         record(kFramePose).Add(X.linear()(row, col), X_engine.linear()(row, col), 1.0, where, sample_);
       }
@@ -236,7 +254,11 @@ void ModelCheck::CompareMassMatrices() {
   const int n = terms_.size();
   const RobotModel& model = terms_.model();
   const auto scale_of = [&](int row, int col) {
-    return Positive(std::min(SubtreeMass(row), SubtreeMass(col)) * VelocityScale(row) * VelocityScale(col));
+    const double mass = std::min(SubtreeMass(row), SubtreeMass(col));
+    const double armature = row == col && row >= base_velocities()
+                                ? model.joints()[static_cast<size_t>(row - base_velocities())].armature
+                                : 0.0;
+    return Positive(mass * VelocityScale(row) * VelocityScale(col) + armature);
   };
   for (int col = 0; col < n; ++col) {
     for (int row = 0; row < n; ++row) {
@@ -272,10 +294,11 @@ void ModelCheck::CompareForces(const Eigen::Ref<const VectorXd>& xi, const Eigen
   for (int i = 0; i < n; ++i) {
     const Location where{Location::Kind::kVelocity, i, -1};
     const double inertial = SubtreeMass(i) * VelocityScale(i);
-    record(kCoriolisForce).Add(force_[i], engine_.coriolis()[i], Positive(inertial * acceleration), where, sample_);
+    record(kCoriolisForce)
+        .Add(force_[i], engine_.coriolis()[i], Positive(inertial * acceleration), where, sample_);
     record(kGravity).Add(terms_.gravity()[i], engine_.gravity()[i], Positive(inertial * g), where, sample_);
-    const double friction = std::max(std::abs(terms_.friction()[i]), std::abs(engine_.friction()[i]));
-    record(kFriction).Add(terms_.friction()[i], engine_.friction()[i], Positive(friction), where, sample_);
+    record(kFriction).Add(terms_.friction()[i], engine_.friction()[i], Positive(FrictionScale(i, xi)), where,
+                          sample_);
   }
 
   // C_bar(xi) w + C_bar(w) xi against the engine's force at xi + w and xi - w.
@@ -303,17 +326,20 @@ void ModelCheck::CompareEnergies() {
   const EnergyAndMomentum model = terms_.CalcEnergyAndMomentum();
   const double mass = subtree_mass_[0];
   const double momentum = mass * scales_.linear_rate;
-  record(kKineticEnergy)
-      .Add(model.kinetic, engine.kinetic, Positive(momentum * scales_.linear_rate), whole, sample_);
+  double rotors = 0.0;
+  for (const Joint& joint : terms_.model().joints()) rotors += joint.armature;
+  const double kinetic =
+      momentum * scales_.linear_rate + rotors * scales_.angular_rate * scales_.angular_rate;
+  record(kKineticEnergy).Add(model.kinetic, engine.kinetic, Positive(kinetic), whole, sample_);
   record(kPotentialEnergy)
-      .Add(model.potential, engine.potential, Positive(mass * terms_.model().gravity().norm() * scales_.length), whole,
-           sample_);
+      .Add(model.potential, engine.potential,
+           Positive(mass * terms_.model().gravity().norm() * scales_.world_length), whole, sample_);
   for (int k = 0; k < 3; ++k) {
     record(kLinearMomentum)
         .Add(model.linear_momentum[k], engine.linear_momentum[k], Positive(momentum), whole, sample_);
     record(kAngularMomentum)
-        .Add(model.angular_momentum[k], engine.angular_momentum[k], Positive(momentum * scales_.length), whole,
-             sample_);
+        .Add(model.angular_momentum[k], engine.angular_momentum[k], Positive(momentum * scales_.length),
+             whole, sample_);
   }
 }
 

@@ -10,16 +10,17 @@
 
 namespace dexcheck {
 
-/// Sizes of the state and the robot that rounding errors are relative to. An error of a term is divided by the
-/// magnitude of what is summed up to form it, so that one bound holds for every entry, large or small.
+/// Sizes of the state and the robot that rounding errors are relative to. An error of a term is divided by
+/// the size of what is summed up to form it, so that one bound holds for every entry, large or small.
 struct RoundingScales {
-  double length = 0.0;        ///< World coordinates of the robot's points, at most, m.
-  double angular_rate = 0.0;  ///< Of a link, at most, rad/s.
-  double linear_rate = 0.0;   ///< Of a point, at most, m/s.
+  double world_length = 0.0;  ///< Of the world coordinates of the robot's points, m.
+  double length = 0.0;        ///< Of their distances from the base, m.
+  double angular_rate = 0.0;  ///< Of a link, rad/s: root of the summed squares along the fastest chain.
+  double linear_rate = 0.0;   ///< Of a point, m/s.
 };
 
-/// Compares all robot terms at a state, and remembers the worst. Nothing allocates after construction but when a
-/// new worst case is stored.
+/// Compares all robot terms at a state, and remembers the worst. Nothing allocates after construction but
+/// when a new worst case is stored.
 class ModelCheck {
  public:
   explicit ModelCheck(const Adapter& adapter);
@@ -57,6 +58,7 @@ class ModelCheck {
   void CalcScales(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi);
   [[nodiscard]] double VelocityScale(int coordinate) const;
   [[nodiscard]] double SubtreeMass(int coordinate) const;
+  [[nodiscard]] double FrictionScale(int coordinate, const Eigen::Ref<const VectorXd>& xi) const;
 
   void CompareGeometry();
   void CompareFrames(const Eigen::Ref<const VectorXd>& xi);
@@ -72,6 +74,7 @@ class ModelCheck {
   EngineTerms engine_unreduced_;
   std::vector<CheckRecord> records_;
   std::vector<double> subtree_mass_;  // base first
+  std::vector<double> squared_rate_;  // scratch of CalcScales, base first
   double reach_ = 0.0;
   RoundingScales scales_;
   long sample_ = -1;

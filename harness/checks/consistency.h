@@ -1,0 +1,36 @@
+#pragma once
+
+// Random states, model against engine, no stepping.
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "harness/adapter/adapter.h"
+#include "harness/checks/check_record.h"
+#include "harness/checks/static_gate.h"
+
+namespace dexcheck {
+
+struct ConsistencyOptions {
+  long samples = 10000;
+  std::uint64_t seed = 1;
+  double joint_speed = 5.0;   ///< Revolute joints and yaw, at most, rad/s.
+  double linear_speed = 2.0;  ///< Base and prismatic joints, at most, m/s.
+  double area = 5.0;          ///< The base stands within +-area of the origin, m.
+};
+
+struct ConsistencyResult {
+  GateResult gate;
+  std::vector<CheckRecord> terms;
+  double seconds = 0.0;
+
+  [[nodiscard]] bool Agrees() const;
+};
+
+/// The static gate, then all terms of robot and object at random states over the joint ranges.
+/// @param progress called with the number of samples done, about every hundred samples; stops early on false.
+ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOptions& options,
+                                   const std::function<bool(long)>& progress);
+
+}  // namespace dexcheck

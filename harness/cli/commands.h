@@ -1,0 +1,33 @@
+#pragma once
+
+// The commands of the program dexcheck. Each adds itself to the command line and returns the exit code when
+// run.
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+#include <string>
+
+namespace dexcheck::cli {
+
+/// 0 all good, 1 the check found a disagreement, 2 usage or input error, 3 the run could not be completed.
+enum ExitCode { kSuccess = 0, kDisagreement = 1, kInputError = 2, kFailure = 3 };
+
+/// The two files that describe one robot; the shipped pair by default.
+struct RobotFiles {
+  std::filesystem::path robot;
+  std::filesystem::path mjcf;
+};
+
+/// Adds --robot and --mjcf.
+void AddRobotOptions(CLI::App* command, RobotFiles* files);
+
+/// Each adds its command to `app`; the callback stores what running it returns in `exit_code`.
+void AddConsistencyCommand(CLI::App* app, int* exit_code);
+void AddEvalCommand(CLI::App* app, int* exit_code);
+
+/// Writes `text` to a file that either appears whole or not at all; "-" is standard output.
+/// @throws InputError when the file cannot be written; what stood there before is untouched.
+void WriteFile(const std::filesystem::path& path, const std::string& text);
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,146 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "controller/model/parameter_reader.h"
+#include "harness/checks/consistency.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/engine/engine.h"
+
+namespace dexcheck::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Request {
+  RobotFiles files;
+  ConsistencyOptions options;
+  std::string json_file;
+  bool quiet = false;
+};
+
+std::string FileName(const std::filesystem::path& path) { return path.filename().string(); }
+
+/// Large results first fail, then where to look: what a person reads.
+void PrintTable(const Request& request, const RobotModel& model, const ConsistencyResult& result,
+                long samples) {
+  const int base = model.num_base_velocities();
+  fmt::print("{}: {} against {}, MuJoCo {}\n{} random states (seed {}), {:.1f} s\n\n", model.name(),
+             FileName(request.files.robot), FileName(request.files.mjcf), mj_versionString(), samples,
+             request.options.seed, result.seconds);
+
+  fmt::print("{:<24}{:>9}  {:>12}  {:>9}\n", "constant", "compared", "worst error", "bound");
+  for (const CheckRecord& record : result.gate.records) {
+    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {}\n", record.name, record.comparisons, record.worst,
+               record.bound, record.failed ? "DIFFERS" : "ok");
+  }
+  fmt::print("\n{:<24}{:>9}  {:>12}  {:>9}           {}\n", "term", "compared", "worst error", "bound",
+             "where it is worst");
+  for (const CheckRecord& record : result.terms) {
+    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:<7}  {}, sample {}\n", record.name, record.comparisons,
+               record.worst, record.bound, record.failed ? "DIFFERS" : "ok",
+               Describe(record.where, model, base), record.sample);
+  }
+  fmt::print("\nErrors are relative to each term's own scale; bounds follow from rounding (README.md).\n");
+}
+
+void PrintVerdict(const Request& request, const RobotModel& model, const ConsistencyResult& result) {
+  const int base = model.num_base_velocities();
+  if (result.Agrees()) {
+    fmt::print("AGREE: the analytic model and MuJoCo agree to rounding in all {} terms.\n",
+               result.terms.size());
+    return;
+  }
+  fmt::print("DISAGREE:\n");
+  for (const GateFinding& finding : result.gate.findings) {
+    fmt::print("  {}: {}: {:.12g} in {}, {:.12g} in {}\n", finding.check, finding.where, finding.model,
+               FileName(request.files.robot), finding.engine, FileName(request.files.mjcf));
+  }
+  for (const CheckRecord& record : result.terms) {
+    if (!record.failed) continue;
+    fmt::print("  {}: nearest the base: {}; worst: {}: {:.12g} in the model, {:.12g} in MuJoCo (sample {})\n",
+               record.name, Describe(record.first_failure, model, base), Describe(record.where, model, base),
+               record.model_value, record.engine_value, record.sample);
+  }
+}
+
+Json ToJson(const CheckRecord& record, const RobotModel& model) {
+  const int base = model.num_base_velocities();
+  Json json = {{"kind", "model"},
+               {"max", record.worst},
+               {"bound", record.bound},
+               {"pass", !record.failed},
+               {"compared", record.comparisons},
+               {"where", Describe(record.where, model, base)},
+               {"sample", record.sample},
+               {"model", record.model_value},
+               {"engine", record.engine_value}};
+  if (record.failed) json["first_failure"] = Describe(record.first_failure, model, base);
+  return json;
+}
+
+std::string WriteJson(const Request& request, const RobotModel& model, const ConsistencyResult& result,
+                      long samples) {
+  Json json = {{"robot", request.files.robot.string()},
+               {"mjcf", request.files.mjcf.string()},
+               {"mujoco", mj_versionString()},
+               {"samples", samples},
+               {"seed", request.options.seed},
+               {"seconds", result.seconds},
+               {"verdict", result.Agrees() ? "pass" : "disagreement"}};
+  json["checks"] = Json::object();
+  for (const CheckRecord& record : result.gate.records) json["checks"][record.name] = ToJson(record, model);
+  for (const CheckRecord& record : result.terms) json["checks"][record.name] = ToJson(record, model);
+  json["findings"] = Json::array();
+  for (const GateFinding& finding : result.gate.findings) {
+    json["findings"].push_back({{"check", finding.check},
+                                {"where", finding.where},
+                                {"model", finding.model},
+                                {"engine", finding.engine}});
+  }
+  return json.dump(2) + "\n";
+}
+
+int Run(const Request& request) {
+  const RobotModel model = ReadRobotModel(request.files.robot);
+  const MjModelPtr engine = LoadMjcf(request.files.mjcf);
+  const Adapter adapter(model, *engine, request.files.mjcf.string());
+  CatchInterrupts();
+  long done = 0;
+  ProgressBar bar("comparing", request.options.samples, request.quiet);
+  const ConsistencyResult result = CheckConsistency(adapter, request.options, [&](long samples) {
+    done = samples;
+    bar.Update(samples);
+    return !IsInterrupted();
+  });
+  bar.Finish();
+  const bool complete = !IsInterrupted();
+  if (complete) done = request.options.samples;
+  if (!request.quiet) PrintTable(request, model, result, done);
+  if (!complete) fmt::print("interrupted after {} of {} samples\n", done, request.options.samples);
+  PrintVerdict(request, model, result);
+  if (!request.json_file.empty()) WriteFile(request.json_file, WriteJson(request, model, result, done));
+  if (!result.Agrees()) return kDisagreement;
+  return complete ? kSuccess : kFailure;
+}
+
+}  // namespace
+
+void AddConsistencyCommand(CLI::App* app, int* exit_code) {
+  const auto request = std::make_shared<Request>();
+  CLI::App* command =
+      app->add_subcommand("consistency", "Compare every term of model and engine at random states");
+  AddRobotOptions(command, &request->files);
+  command->add_option("--samples", request->options.samples, "Number of random states")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_option("--seed", request->options.seed, "Of the random states")->capture_default_str();
+  command->add_option("--json", request->json_file, "Write the results to this file (- for standard output)");
+  command->add_flag("--quiet", request->quiet, "Print the verdict only");
+  command->callback([=] { *exit_code = Run(*request); });
+}
+
+}  // namespace dexcheck::cli

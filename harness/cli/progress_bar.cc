@@ -1,0 +1,56 @@
+#include "harness/cli/progress_bar.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <utility>
+
+namespace dexcheck::cli {
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+}  // namespace
+
+ProgressBar::ProgressBar(std::string label, long total, bool quiet)
+    : label_(std::move(label)), total_(total), visible_(!quiet && ::isatty(STDERR_FILENO) != 0) {}
+
+void ProgressBar::Update(long done) {
+  if (!visible_) return;
+  constexpr std::chrono::milliseconds kRedrawEvery(100);
+  const auto now = std::chrono::steady_clock::now();
+  if (drawn_ && now - last_drawn_ < kRedrawEvery) return;
+  last_drawn_ = now;
+  drawn_ = true;
+  constexpr int kWidth = 40;
+  const double fraction = total_ > 0 ? static_cast<double>(done) / static_cast<double>(total_) : 1.0;
+  const int filled = static_cast<int>(fraction * kWidth);
+  const double elapsed = std::chrono::duration<double>(now - start_).count();
+  const double left = fraction > 0.0 ? elapsed * (1.0 - fraction) / fraction : 0.0;
+  fmt::print(stderr, "\r{} [{}{}] {:3.0f} % ({} of {}), {:.0f} s left ", label_,
+             std::string(static_cast<size_t>(filled), '#'),
+             std::string(static_cast<size_t>(kWidth - filled), '.'), 100.0 * fraction, done, total_, left);
+  std::fflush(stderr);
+}
+
+void ProgressBar::Finish() {
+  if (!drawn_) return;
+  drawn_ = false;
+  std::fputs("\r\033[K", stderr);
+  std::fflush(stderr);
+}
+
+void CatchInterrupts() {
+  const auto raise_flag = [](int signal) {
+    interrupted = 1;
+    std::signal(signal, SIG_DFL);
+  };
+  std::signal(SIGINT, raise_flag);
+  std::signal(SIGTERM, raise_flag);
+}
+
+bool IsInterrupted() { return interrupted != 0; }
+
+}  // namespace dexcheck::cli
