@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds dexcheck and runs its consistency check; arguments go to the check.
+# Installs what is missing, builds dexcheck and compares model and engine at 10000 random states; arguments go to
+# `dexcheck consistency`:
 #   harness/quickstart.sh [--robot FILE.toml --mjcf FILE.xml] [--seed N] ...
 set -euo pipefail
 
@@ -8,4 +9,4 @@ export CMAKE_BUILD_PARALLEL_LEVEL=${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)}
 
 "$root/harness/install-packages.sh"
 (cd "$root" && cmake --preset release && cmake --build --preset release --target dexcheck)
-exec "$root/build/release/harness/dexcheck" consistency --samples 10000 "$@"
+exec "$root/build/release/bin/dexcheck" consistency "$@"
