@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "harness/engine/engine.h"
+#include "harness/engine/torus_collision.h"
 
 namespace dexcheck {
 namespace {
@@ -176,6 +177,15 @@ class StaticGate {
         Compare("object_inertia", where, object.body.inertia(row, col), inertia(row, col),
                 object.body.inertia.trace());
       }
+    }
+    if (const Torus* torus = std::get_if<Torus>(&object.shape)) {
+      double ring_radius = kMissing;
+      double tube_radius = kMissing;
+      for (int geom = 0; geom < engine_.ngeom; ++geom) {
+        if (engine_.geom_bodyid[geom] == body) GetTorusRadii(engine_, geom, &ring_radius, &tube_radius);
+      }
+      Compare("object_shape", where, torus->ring_radius, ring_radius);
+      Compare("object_shape", where, torus->tube_radius, tube_radius);
     }
     // Sliding friction of the explicit contact pairs between fingertips and object.
     for (int pair = 0; pair < engine_.npair; ++pair) {

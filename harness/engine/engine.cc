@@ -8,6 +8,7 @@
 #include <new>
 
 #include "controller/common/errors.h"
+#include "harness/engine/torus_collision.h"
 
 namespace dexcheck {
 namespace {
@@ -33,6 +34,12 @@ void CheckVersion() {
                    std::to_string(mj_version()));
 }
 
+void PrepareEngine() {
+  InstallMessageHandlers();
+  CheckVersion();
+  InstallTorusCollision();
+}
+
 std::string OneLine(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   while (!text.empty() && text.back() == ' ') text.pop_back();
@@ -51,8 +58,7 @@ MjModelPtr Load(const std::string& path, const mjVFS* vfs, const std::string& so
 }  // namespace
 
 MjModelPtr LoadMjcf(const std::filesystem::path& path) {
-  InstallMessageHandlers();
-  CheckVersion();
+  PrepareEngine();
   if (!std::filesystem::is_regular_file(path) || !std::ifstream(path)) {
     throw InputError(path.string() + ": cannot be read");
   }
@@ -60,8 +66,7 @@ MjModelPtr LoadMjcf(const std::filesystem::path& path) {
 }
 
 MjModelPtr LoadMjcfText(const std::string& text, const std::string& source) {
-  InstallMessageHandlers();
-  CheckVersion();
+  PrepareEngine();
   const auto vfs = std::make_unique<mjVFS>();
   mj_defaultVFS(vfs.get());
   constexpr const char* kName = "model.xml";

@@ -1,0 +1,70 @@
+#include "controller/contact/contact_jacobian.h"
+
+#include "controller/common/errors.h"
+#include "controller/contact/adjoint.h"
+
+namespace dexcheck {
+namespace {
+
+// B_c^T A (m x 6), at most 4 x 6: no heap.
+using TransmittedRows = Eigen::Matrix<double, Eigen::Dynamic, 6, 0, 4, 6>;
+
+TransmittedRows SelectTransmittedRows(ContactType type, const Matrix6d& A) {
+  TransmittedRows selected(CountForces(type), 6);
+  Eigen::Index index = 0;
+  for (const int row : ListTransmittedRows(type)) selected.row(index++) = A.row(row);
+  return selected;
+}
+
+void RequireRowsShape(const Contact& contact, Eigen::Index columns, Eigen::Ref<MatrixXd> rows) {
+  Require(rows.rows() == CountForces(contact.type), "rows of the contact Jacobian",
+          "must equal the contact's force count", static_cast<double>(rows.rows()));
+  Require(rows.cols() == columns, "columns of the contact Jacobian",
+          "must equal those of the fingertip Jacobian", static_cast<double>(rows.cols()));
+}
+
+}  // namespace
+
+void CalcContactJacobian(const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
+                         Eigen::Ref<MatrixXd> rows) {
+  RequireRowsShape(contact, J_f.cols(), rows);
+  // B_c^T Ad_{g_cf_f} J_f
+  rows = SelectTransmittedRows(contact.type, CalcAdjointInverse(contact.geometry.g_f_cf)).lazyProduct(J_f);
+}
+
+void CalcContactJacobianDot(const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
+                            const Eigen::Ref<const Matrix6Xd>& J_f_dot, Eigen::Ref<MatrixXd> rows_dot) {
+  RequireRowsShape(contact, J_f.cols(), rows_dot);
+  Require(J_f_dot.cols() == J_f.cols(), "columns of J_f_dot", "must equal those of J_f",
+          static_cast<double>(J_f_dot.cols()));
+  // d/dt (Ad_{g_cf_f} J_f) = Ad_{g_cf_f} J_f_dot - ad_V Ad_{g_cf_f} J_f with V = V_f_cf^cf
+  const Matrix6d Ad = CalcAdjointInverse(contact.geometry.g_f_cf);
+  const Matrix6d Ad_dot =
+      -CalcTwistCross(CalcFrameTwistOnFingertip(contact.geometry, contact.kappa_dot)) * Ad;
+  rows_dot = SelectTransmittedRows(contact.type, Ad).lazyProduct(J_f_dot);
+  rows_dot += SelectTransmittedRows(contact.type, Ad_dot).lazyProduct(J_f);
+}
+
+void CalcHandJacobian(std::span<const Contact> contacts, std::span<const Matrix6Xd> J_f,
+                      Eigen::Ref<MatrixXd> J_h) {
+  Require(!contacts.empty(), "number of contacts", "must be positive", 0.0);
+  Require(J_f.size() == contacts.size(), "number of fingertip Jacobians", "must equal the number of contacts",
+          static_cast<double>(J_f.size()));
+  Eigen::Index joints = 0;
+  for (const Matrix6Xd& J : J_f) joints += J.cols();
+  Require(J_h.rows() == CountForces(contacts), "rows of J_h", "must equal the number of contact forces",
+          static_cast<double>(J_h.rows()));
+  Require(J_h.cols() == joints, "columns of J_h", "must equal the number of finger joints",
+          static_cast<double>(J_h.cols()));
+  J_h.setZero();
+  Eigen::Index row = 0;
+  Eigen::Index column = 0;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const int forces = CountForces(contacts[i].type);
+    CalcContactJacobian(contacts[i], J_f[i], J_h.block(row, column, forces, J_f[i].cols()));
+    row += forces;
+    column += J_f[i].cols();
+  }
+}
+
+}  // namespace dexcheck

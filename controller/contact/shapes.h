@@ -1,0 +1,90 @@
+#pragma once
+
+// The surfaces that a fingertip or an object can have. Lengths in m, angles in rad, body frame; outward
+// normals.
+
+#include "controller/contact/surface.h"
+
+namespace dexcheck {
+
+/// Half space z <= 0: c(u, v) = (u, v, 0), normal +z.
+class Plane final : public Surface {
+ public:
+  [[nodiscard]] SurfaceProjection Project(const Vector3d& p) const override;
+
+ private:
+  [[nodiscard]] SurfaceJet DoCalcJet(const SurfacePoint& alpha) const override;
+  [[nodiscard]] SurfacePoint DoToChart(const SurfacePoint& alpha, int chart) const override;
+};
+
+/// Lateral surface of an unbounded cylinder about z: c(u, v) = (rho cos u, rho sin u, v).
+class Cylinder final : public Surface {
+ public:
+  /// Throws std::invalid_argument unless radius (m) is positive.
+  explicit Cylinder(double radius);
+  [[nodiscard]] double radius() const { return radius_; }
+  [[nodiscard]] SurfaceProjection Project(const Vector3d& p) const override;
+
+ private:
+  [[nodiscard]] SurfaceJet DoCalcJet(const SurfacePoint& alpha) const override;
+  [[nodiscard]] SurfacePoint DoToChart(const SurfacePoint& alpha, int chart) const override;
+
+  double radius_;
+};
+
+/// Sphere about the origin, u longitude and v latitude. Chart 0 has its poles on z,
+/// c(u, v) = rho (cos v cos u, cos v sin u, sin v); chart 1 has them on x, the axes exchanged cyclically.
+class Sphere final : public Surface {
+ public:
+  /// Throws std::invalid_argument unless radius (m) is positive.
+  explicit Sphere(double radius);
+  [[nodiscard]] double radius() const { return radius_; }
+  [[nodiscard]] int num_charts() const override { return 2; }
+  [[nodiscard]] SurfaceProjection Project(const Vector3d& p) const override;
+
+ private:
+  [[nodiscard]] SurfaceJet DoCalcJet(const SurfacePoint& alpha) const override;
+  [[nodiscard]] SurfacePoint DoToChart(const SurfacePoint& alpha, int chart) const override;
+  [[nodiscard]] bool DoHasMargin(const SurfacePoint& alpha) const override;
+
+  double radius_;
+};
+
+/// Ellipsoid with three free semi-axes along x, y, z; the sphere's charts, each coordinate scaled by its
+/// semi-axis: c(u, v) = (a cos v cos u, b cos v sin u, c sin v). Not orthogonal unless a = b.
+class Ellipsoid final : public Surface {
+ public:
+  /// Throws std::invalid_argument unless all semi-axes (3x1, m) are positive.
+  explicit Ellipsoid(const Vector3d& semi_axes);
+  [[nodiscard]] const Vector3d& semi_axes() const { return semi_axes_; }
+  [[nodiscard]] int num_charts() const override { return 2; }
+  [[nodiscard]] SurfaceProjection Project(const Vector3d& p) const override;
+
+ private:
+  [[nodiscard]] SurfaceJet DoCalcJet(const SurfacePoint& alpha) const override;
+  [[nodiscard]] SurfacePoint DoToChart(const SurfacePoint& alpha, int chart) const override;
+  [[nodiscard]] bool DoHasMargin(const SurfacePoint& alpha) const override;
+
+  Vector3d semi_axes_;
+};
+
+/// Torus about z: c(u, v) = ((R + r cos v) cos u, (R + r cos v) sin u, r sin v), u along the ring and v
+/// around the tube, v = 0 on the outer equator. The chart is regular everywhere; both coordinates are
+/// periodic.
+class Torus final : public Surface {
+ public:
+  /// Throws std::invalid_argument unless 0 < tube_radius < ring_radius (m).
+  Torus(double ring_radius, double tube_radius);
+  [[nodiscard]] double ring_radius() const { return ring_radius_; }
+  [[nodiscard]] double tube_radius() const { return tube_radius_; }
+  [[nodiscard]] SurfaceProjection Project(const Vector3d& p) const override;
+
+ private:
+  [[nodiscard]] SurfaceJet DoCalcJet(const SurfacePoint& alpha) const override;
+  [[nodiscard]] SurfacePoint DoToChart(const SurfacePoint& alpha, int chart) const override;
+
+  double ring_radius_;
+  double tube_radius_;
+};
+
+}  // namespace dexcheck

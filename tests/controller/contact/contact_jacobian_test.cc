@@ -1,0 +1,209 @@
+#include "controller/contact/contact_jacobian.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <vector>
+
+#include "controller/contact/adjoint.h"
+#include "tests/common/allocation_counter.h"
+#include "tests/common/matrix_near.h"
+#include "tests/common/throws.h"
+#include "tests/controller/contact/test_finger.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::Differentiate;
+using testing::DrawVector;
+using testing::MatrixNear;
+using testing::RollingFinger;
+using testing::Throws;
+
+// Rounding of a few dozen operations on numbers of order one.
+constexpr double kRounding = 1e-14;
+// Five-point differences of motions of order 1 rad/s; measured 1.6e-11.
+constexpr double kDifference = 1e-10;
+
+// A fingertip and an object that roll on each other; every test visits sphere and ellipsoid on torus.
+class ContactJacobianTest : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::vector<RollingFinger> MakeMotions() {
+    std::vector<RollingFinger> motions;
+    for (const double v : {0.3, 2.0, 3.0}) {
+      motions.emplace_back(tip_, torus_, random_, ContactCoordinates{{0.4, 0.5, 0}, {0.8, v, 0}, 0.6});
+      motions.emplace_back(blunt_tip_, torus_, random_,
+                           ContactCoordinates{{-0.7, 0.5, 1}, {2.8, v, 0}, -1.6});
+    }
+    return motions;
+  }
+
+  static MatrixXd CalcRows(const RollingFinger& motion, double t, ContactType type) {
+    const Contact contact = motion.CalcContact(t, type);
+    MatrixXd rows(CountForces(type), 4);
+    CalcContactJacobian(contact, motion.CalcBodyJacobian(t), rows);
+    return rows;
+  }
+
+  std::mt19937 random_{61};
+  Sphere tip_{0.009};
+  Ellipsoid blunt_tip_{{0.008, 0.007, 0.010}};
+  Torus torus_{0.035, 0.011};
+};
+
+// f_c . (J_h qdot) is the power of the contact force at the fingertip's material point, and f_c . (G^T V_o)
+// that at the object's; both from velocities of points in the world, by differences.
+TEST_F(ContactJacobianTest, DualToVirtualWork) {
+  for (const RollingFinger& motion : MakeMotions()) {
+    const ContactType type = ContactType::kSoftFinger;
+    const Contact contact = motion.CalcContact(0.0, type);
+    const VectorXd f_c = DrawVector(random_, 4);
+    const Matrix3d R_Bc = motion.CalcFingertipPose(0.0).linear() * contact.geometry.g_f_cf.linear();
+    const Vector3d force = R_Bc * f_c.head<3>();
+    const Vector3d moment = R_Bc.col(2) * f_c(3);
+    const auto calc_power = [&](const auto& pose, const Vector3d& point) {
+      const Vector3d velocity = Differentiate([&](double t) { return MatrixXd(pose(t) * point); });
+      const Vector6d V = testing::DifferentiatePose(pose);
+      return force.dot(velocity) + moment.dot(pose(0.0).linear() * V.tail<3>());
+    };
+    const double on_finger = calc_power([&](double t) { return motion.CalcFingertipPose(t); },
+                                        contact.geometry.g_f_cf.translation());
+    const double on_object =
+        calc_power([&](double t) { return motion.CalcObjectPose(t); }, contact.geometry.g_o_cf.translation());
+    ASSERT_GT(std::abs(on_finger), 1e-3);
+    EXPECT_NEAR(f_c.dot(CalcRows(motion, 0.0, type) * motion.q_dot()), on_finger, kDifference);
+    Matrix6Xd G(6, 4);
+    CalcGraspMap({&contact, 1}, G);
+    EXPECT_NEAR(f_c.dot(G.transpose() * motion.V_o()), on_object, kDifference);
+  }
+}
+
+// Rolling satisfies the grasp constraint (33) by (29); a transposed or inverted adjoint does not.
+TEST_F(ContactJacobianTest, RollingSatisfiesTheGraspConstraint) {
+  for (const RollingFinger& motion : MakeMotions()) {
+    const Contact contact = motion.CalcContact(0.0, ContactType::kHardFinger);
+    Matrix6Xd G(6, 3);
+    CalcGraspMap({&contact, 1}, G);
+    const Vector3d object_side = G.transpose() * motion.V_o();
+    ASSERT_GT(object_side.norm(), 1e-3);
+    EXPECT_TRUE(MatrixNear(CalcRows(motion, 0.0, contact.type) * motion.q_dot(), object_side, kRounding));
+
+    const Vector6d V_f = motion.CalcBodyJacobian(0.0) * motion.q_dot();
+    const Matrix6d Ad = CalcAdjointInverse(contact.geometry.g_f_cf);
+    for (const Matrix6d& wrong : {Matrix6d(Ad.transpose()), Matrix6d(Ad.inverse())}) {
+      EXPECT_GT(((wrong * V_f).head<3>() - object_side).norm(), 1e-3);
+    }
+  }
+}
+
+TEST_F(ContactJacobianTest, RateMatchesDifferencesWhileTheFingerRolls) {
+  double without_rolling = 0.0;
+  for (const RollingFinger& motion : MakeMotions()) {
+    for (const ContactType type :
+         {ContactType::kFrictionless, ContactType::kHardFinger, ContactType::kSoftFinger}) {
+      Contact contact = motion.CalcContact(0.0, type);
+      const Matrix6Xd J_f = motion.CalcBodyJacobian(0.0);
+      const Matrix6Xd J_f_dot = Differentiate([&](double t) { return MatrixXd(motion.CalcBodyJacobian(t)); });
+      MatrixXd rows_dot(CountForces(type), 4);
+      CalcContactJacobianDot(contact, J_f, J_f_dot, rows_dot);
+      const MatrixXd expected = Differentiate([&](double t) { return CalcRows(motion, t, type); });
+      ASSERT_GT(expected.norm(), 1e-2);
+      EXPECT_TRUE(MatrixNear(rows_dot, expected, kDifference));
+      // A contact point taken as fixed on the fingertip.
+      contact.kappa_dot.setZero();
+      CalcContactJacobianDot(contact, J_f, J_f_dot, rows_dot);
+      without_rolling = std::max(without_rolling, (rows_dot - expected).norm());
+    }
+  }
+  EXPECT_GT(without_rolling, 1e6 * kDifference);
+}
+
+TEST_F(ContactJacobianTest, HandJacobianIsBlockDiagonal) {
+  const std::vector<RollingFinger> motions = MakeMotions();
+  const std::array<ContactType, 3> types = {ContactType::kSoftFinger, ContactType::kFrictionless,
+                                            ContactType::kHardFinger};
+  std::vector<Contact> contacts;
+  std::vector<Matrix6Xd> J_f;
+  MatrixXd expected = MatrixXd::Zero(8, 12);
+  Eigen::Index row = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    contacts.push_back(motions[i].CalcContact(0.0, types[i]));
+    J_f.push_back(motions[i].CalcBodyJacobian(0.0));
+    const Matrix6d Ad = CalcAdjoint(contacts[i].geometry.g_f_cf.inverse());
+    const MatrixXd block = CalcWrenchBasis(types[i]).transpose() * Ad * J_f[i];
+    expected.block(row, 4 * static_cast<Eigen::Index>(i), block.rows(), 4) = block;
+    row += block.rows();
+  }
+  MatrixXd J_h(8, 12);
+  CalcHandJacobian(contacts, J_f, J_h);
+  EXPECT_TRUE(MatrixNear(J_h, expected, kRounding));
+
+  const auto calc = [&](Eigen::Index rows, Eigen::Index columns, std::size_t fingers) {
+    return [&, rows, columns, fingers] {
+      MatrixXd J(rows, columns);
+      CalcHandJacobian(std::span(contacts).first(fingers), J_f, J);
+      return 0;
+    };
+  };
+  using Invalid = std::invalid_argument;
+  EXPECT_TRUE(Throws<Invalid>(calc(9, 12, 3), "rows of J_h"));
+  EXPECT_TRUE(Throws<Invalid>(calc(8, 11, 3), "columns of J_h"));
+  EXPECT_TRUE(Throws<Invalid>(calc(8, 12, 2), "number of fingertip Jacobians"));
+  EXPECT_TRUE(Throws<Invalid>(calc(8, 12, 0), "number of contacts"));
+}
+
+TEST_F(ContactJacobianTest, WrongSizesAreAClearError) {
+  const std::vector<RollingFinger> motions = MakeMotions();
+  const Contact contact = motions[0].CalcContact(0.0, ContactType::kHardFinger);
+  const Matrix6Xd J_f = motions[0].CalcBodyJacobian(0.0);
+  const auto calc = [&](Eigen::Index rows, Eigen::Index columns, Eigen::Index rate_columns) {
+    return [&, rows, columns, rate_columns] {
+      MatrixXd out(rows, columns);
+      CalcContactJacobianDot(contact, J_f, J_f.leftCols(rate_columns), out);
+      return 0;
+    };
+  };
+  using Invalid = std::invalid_argument;
+  EXPECT_TRUE(Throws<Invalid>(calc(4, 4, 4), "rows of the contact Jacobian"));
+  EXPECT_TRUE(Throws<Invalid>(calc(3, 5, 4), "columns of the contact Jacobian"));
+  EXPECT_TRUE(Throws<Invalid>(calc(3, 4, 3), "columns of J_f_dot"));
+}
+
+// One control step's worth of contact terms for four fingers and 50 coordinates.
+TEST_F(ContactJacobianTest, AControlStepDoesNotAllocate) {
+  if (!testing::CanCountAllocations()) GTEST_SKIP() << "a sanitizer owns the allocator";
+  const std::vector<RollingFinger> motions = MakeMotions();
+  const Pose X_OF = motions[1].CalcObjectPose(0.0).inverse() * motions[1].CalcFingertipPose(0.0);
+  const Matrix6Xd J_f = Matrix6Xd::Ones(6, 50);
+  std::array<Contact, 4> contacts;
+  Matrix6Xd G(6, 12);
+  MatrixXd J_B(12, 50);
+
+  const long without_probe = testing::CountAllocations();
+  const VectorXd probe = DrawVector(random_, 7);
+  ASSERT_GT(probe.norm(), 0.0);
+  ASSERT_GT(testing::CountAllocations(), without_probe) << "the counter must work";
+
+  const long before = testing::CountAllocations();
+  ContactCoordinates kappa = FindContact(blunt_tip_, torus_, X_OF).kappa;
+  for (Contact& contact : contacts) {
+    const auto twist = [](double, const ContactGeometry& geometry) {
+      return CalcRelativeTwist(geometry, Vector6d::Ones(), Vector6d::Zero());
+    };
+    kappa = IntegrateKappa(blunt_tip_, torus_, kappa, 0.0, 1e-3, twist);
+    contact.geometry = CalcContactGeometry(blunt_tip_, torus_, kappa);
+    contact.kappa_dot = CalcKappaDot(contact.geometry, twist(0.0, contact.geometry));
+  }
+  CalcGraspMap(contacts, G);
+  CalcGraspMapDot(contacts, G);
+  Eigen::Index row = 0;
+  for (const Contact& contact : contacts) {
+    CalcContactJacobian(contact, J_f, J_B.middleRows(row, 3));
+    CalcContactJacobianDot(contact, J_f, J_f, J_B.middleRows(row, 3));
+    row += 3;
+  }
+  EXPECT_EQ(testing::CountAllocations(), before);
+}
+
+}  // namespace
+}  // namespace dexcheck

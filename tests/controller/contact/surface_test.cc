@@ -1,0 +1,288 @@
+#include "controller/contact/surface.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "controller/common/errors.h"
+#include "controller/contact/shapes.h"
+#include "tests/common/matrix_near.h"
+#include "tests/common/throws.h"
+#include "tests/controller/contact/contact_fixtures.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::Differentiate;
+using testing::DrawPoint;
+using testing::DrawVector;
+using testing::MakeAllSurfaces;
+using testing::MatrixNear;
+using testing::NamedSurface;
+using testing::Throws;
+
+constexpr int kSamples = 100;
+
+// Rounding of a few dozen operations on numbers of order one.
+constexpr double kRounding = 1e-14;
+// Five-point differences, error h^4 f^(5) / 30 with h = 1e-3; measured 8.3e-11, near a latitude chart's pole.
+constexpr double kDifference = 5e-10;
+
+Vector3d CalcGradient(const std::function<double(const Vector3d&)>& F, const Vector3d& p, double length) {
+  Vector3d gradient;
+  for (int i = 0; i < 3; ++i) {
+    const auto along = [&](double s) {
+      return Eigen::Matrix<double, 1, 1>(F(p + s * length * Vector3d::Unit(i)));
+    };
+    gradient(i) = Differentiate(along)(0, 0) / length;
+  }
+  return gradient;
+}
+
+// Gauss frame, M, K, T by differences of the chart's points and axes only, scaled to order one by `length`.
+struct DifferencedGeometry {
+  Matrix3d R;
+  Matrix2d M;
+  Matrix2d K;
+  Eigen::RowVector2d T;
+};
+
+DifferencedGeometry DifferenceGeometry(const Surface& surface, const SurfacePoint& alpha, double u_step,
+                                       double v_step) {
+  const auto at = [&](double du, double dv) {
+    return surface.Evaluate({alpha.u + du, alpha.v + dv, alpha.chart});
+  };
+  const auto differentiate = [&](const auto& get) {
+    Eigen::Matrix<double, 3, 2> d;
+    d << Differentiate([&](double s) { return MatrixXd(get(at(s * u_step, 0.0))); }) / u_step,
+        Differentiate([&](double s) { return MatrixXd(get(at(0.0, s * v_step))); }) / v_step;
+    return d;
+  };
+  const Eigen::Matrix<double, 3, 2> c_uv = differentiate([](const SurfaceGeometry& g) { return g.p; });
+  const Eigen::Matrix<double, 3, 2> n_uv =
+      differentiate([](const SurfaceGeometry& g) -> Vector3d { return g.R.col(2); });
+  const Eigen::Matrix<double, 3, 2> x_uv =
+      differentiate([](const SurfaceGeometry& g) -> Vector3d { return g.R.col(0); });
+
+  DifferencedGeometry result;
+  const Vector3d x = c_uv.col(0).normalized();
+  const Vector3d z = c_uv.col(0).cross(c_uv.col(1)).normalized();
+  result.R << x, z.cross(x), z;
+  result.M = result.R.leftCols<2>().transpose() * c_uv;
+  result.K = result.R.leftCols<2>().transpose() * n_uv * result.M.inverse();
+  result.T = result.R.col(1).transpose() * x_uv * result.M.inverse();
+  return result;
+}
+
+TEST(SurfaceTest, FrameAndParametersMatchFiniteDifferencesInEveryChart) {
+  std::mt19937 random(1);
+  double largest_curvature = 0.0;
+  double largest_torsion = 0.0;
+  for (const NamedSurface& named : MakeAllSurfaces()) {
+    for (int chart = 0; chart < named.surface->num_charts(); ++chart) {
+      for (int sample = 0; sample < kSamples; ++sample) {
+        const SurfacePoint alpha = DrawPoint(random, named, chart);
+        SCOPED_TRACE(named.name + " chart " + std::to_string(chart) + " u " + std::to_string(alpha.u) +
+                     " v " + std::to_string(alpha.v));
+        const double u_step = named.name == "plane" ? named.length : 1.0;
+        const double v_step = named.name == "plane" || named.name == "cylinder" ? named.length : 1.0;
+        const SurfaceGeometry geometry = named.surface->Evaluate(alpha);
+        const DifferencedGeometry expected = DifferenceGeometry(*named.surface, alpha, u_step, v_step);
+        const double L = named.length;
+        EXPECT_TRUE(MatrixNear(geometry.R, expected.R, kDifference));
+        EXPECT_TRUE(MatrixNear(geometry.M, expected.M, kDifference));
+        EXPECT_TRUE(MatrixNear(L * geometry.K, L * expected.K, kDifference));
+        EXPECT_TRUE(MatrixNear(L * geometry.T, L * expected.T, kDifference));
+        largest_curvature = std::max(largest_curvature, L * geometry.K.norm());
+        largest_torsion = std::max(largest_torsion, L * geometry.T.norm());
+      }
+    }
+  }
+  EXPECT_GT(largest_curvature, 1.0);
+  EXPECT_GT(largest_torsion, 1.0);
+}
+
+// The normal must point out of the body; the criterion is the implicit function, which knows no chart.
+bool PointsOutward(const SurfaceGeometry& geometry, const NamedSurface& named) {
+  return named.F(geometry.p + 1e-3 * named.length * geometry.R.col(2)) > 0.0 &&
+         named.F(geometry.p - 1e-3 * named.length * geometry.R.col(2)) < 0.0;
+}
+
+TEST(SurfaceTest, PointsLieOnTheBodyAndNormalsPointOut) {
+  std::mt19937 random(2);
+  for (const NamedSurface& named : MakeAllSurfaces()) {
+    for (int sample = 0; sample < kSamples; ++sample) {
+      SCOPED_TRACE(named.name);
+      const int chart = sample % named.surface->num_charts();
+      const SurfaceGeometry geometry = named.surface->Evaluate(DrawPoint(random, named, chart));
+      EXPECT_NEAR(named.F(geometry.p) / named.length, 0.0, kRounding);
+      EXPECT_TRUE(PointsOutward(geometry, named));
+      const Vector3d n = CalcGradient(named.F, geometry.p, named.length).normalized();
+      EXPECT_TRUE(MatrixNear(geometry.R.col(2), n, kDifference));
+      EXPECT_TRUE(MatrixNear(geometry.R.transpose() * geometry.R, Matrix3d::Identity(), kRounding));
+      EXPECT_NEAR(geometry.R.determinant(), 1.0, kRounding);
+    }
+  }
+}
+
+// A sphere's chart in the usual order (latitude, longitude): the mistake that the checks above must catch.
+TEST(SurfaceTest, ExchangedChartOrderTurnsTheNormalInward) {
+  constexpr double kU = 0.3;
+  constexpr double kV = 0.4;
+  const NamedSurface named = testing::MakeSphere(1.0);
+  const SurfaceJet swapped = {
+      .c = {std::cos(kU) * std::cos(kV), std::cos(kU) * std::sin(kV), std::sin(kU)},
+      .c_u = {-std::sin(kU) * std::cos(kV), -std::sin(kU) * std::sin(kV), std::cos(kU)},
+      .c_v = {-std::cos(kU) * std::sin(kV), std::cos(kU) * std::cos(kV), 0.0},
+      .c_uu = {-std::cos(kU) * std::cos(kV), -std::cos(kU) * std::sin(kV), -std::sin(kU)},
+      .c_uv = {std::sin(kU) * std::sin(kV), -std::sin(kU) * std::cos(kV), 0.0},
+      .c_vv = {-std::cos(kU) * std::cos(kV), -std::cos(kU) * std::sin(kV), 0.0}};
+  const SurfaceGeometry geometry = CalcSurfaceGeometry(swapped);
+  EXPECT_FALSE(PointsOutward(geometry, named));
+  EXPECT_TRUE(MatrixNear(geometry.K, -Matrix2d::Identity(), kRounding));
+}
+
+TEST(SurfaceTest, SphereByHand) {
+  constexpr double kRadius = 0.5;
+  const SurfaceGeometry geometry = Sphere(kRadius).Evaluate({0.0, kPi / 6.0, 0});
+  const double c = std::sqrt(3.0) / 2.0;
+  EXPECT_TRUE(MatrixNear(geometry.p, Vector3d(0.5 * c, 0.0, 0.25), kRounding));
+  Matrix3d R;
+  R << 0.0, -0.5, c, 1.0, 0.0, 0.0, 0.0, c, 0.5;
+  EXPECT_TRUE(MatrixNear(geometry.R, R, kRounding));
+  EXPECT_TRUE(MatrixNear(geometry.M, Vector2d(kRadius * c, kRadius).asDiagonal().toDenseMatrix(), kRounding));
+  EXPECT_TRUE(MatrixNear(geometry.K, 2.0 * Matrix2d::Identity(), kRounding));
+  // tan(v) / rho
+  EXPECT_TRUE(MatrixNear(geometry.T, Eigen::RowVector2d(2.0 / std::sqrt(3.0), 0.0), kRounding));
+}
+
+TEST(SurfaceTest, TorusByHand) {
+  const Torus torus(0.3, 0.1);
+  const SurfaceGeometry outer = torus.Evaluate({0.0, 0.0, 0});
+  EXPECT_TRUE(MatrixNear(outer.p, Vector3d(0.4, 0.0, 0.0), kRounding));
+  EXPECT_TRUE(MatrixNear(outer.R.col(2), Vector3d::UnitX(), kRounding));
+  EXPECT_TRUE(MatrixNear(outer.K, Vector2d(2.5, 10.0).asDiagonal().toDenseMatrix(), 10.0 * kRounding));
+  const SurfaceGeometry inner = torus.Evaluate({0.0, kPi, 0});
+  EXPECT_TRUE(MatrixNear(inner.p, Vector3d(0.2, 0.0, 0.0), kRounding));
+  EXPECT_TRUE(MatrixNear(inner.R.col(2), -Vector3d::UnitX(), kRounding));
+  // The hole is hollow along the ring: curvature -1 / (R - r).
+  EXPECT_TRUE(MatrixNear(inner.K, Vector2d(-5.0, 10.0).asDiagonal().toDenseMatrix(), 10.0 * kRounding));
+  const SurfaceGeometry top = torus.Evaluate({0.0, kPi / 2.0, 0});
+  EXPECT_TRUE(MatrixNear(top.M, Vector2d(0.3, 0.1).asDiagonal().toDenseMatrix(), kRounding));
+  // sin(v) / (R + r cos v)
+  EXPECT_TRUE(MatrixNear(top.T, Eigen::RowVector2d(1.0 / 0.3, 0.0), 10.0 * kRounding));
+}
+
+TEST(SurfaceTest, EllipsoidHasItsKnownGaussianCurvature) {
+  const Vector3d axes(0.05, 0.03, 0.02);
+  const Ellipsoid ellipsoid(axes);
+  std::mt19937 random(3);
+  double largest_skew = 0.0;
+  for (int sample = 0; sample < kSamples; ++sample) {
+    const SurfacePoint alpha = DrawPoint(random, testing::MakeEllipsoid(axes), sample % 2);
+    const SurfaceGeometry geometry = ellipsoid.Evaluate(alpha);
+    // 1 / (a b c sum p_i^2 / a_i^4)^2
+    const double h = geometry.p.cwiseQuotient(axes.cwiseAbs2()).squaredNorm();
+    const double expected = std::pow(1.0 / (axes.prod() * h), 2);
+    EXPECT_NEAR(geometry.K.determinant() / expected, 1.0, 100.0 * kRounding);
+    EXPECT_NEAR(geometry.K(0, 1), geometry.K(1, 0), kRounding * geometry.K.norm());
+    largest_skew = std::max(largest_skew, std::abs(geometry.M(0, 1)) / geometry.M.norm());
+  }
+  EXPECT_GT(largest_skew, 0.1) << "the chart should not be orthogonal";
+}
+
+// Integral of the Gaussian curvature over the chart u in [-pi, pi], |v| <= v_max by the midpoint rule.
+double IntegrateCurvature(const Surface& surface, double v_max, int nodes) {
+  double sum = 0.0;
+  const double du = 2.0 * kPi / nodes;
+  const double dv = 2.0 * v_max / nodes;
+  for (int i = 0; i < nodes; ++i) {
+    for (int j = 0; j < nodes; ++j) {
+      const SurfaceGeometry geometry = surface.Evaluate({-kPi + (i + 0.5) * du, -v_max + (j + 0.5) * dv, 0});
+      sum += geometry.K.determinant() * geometry.M.determinant() * du * dv;
+    }
+  }
+  return sum;
+}
+
+TEST(SurfaceTest, GaussBonnet) {
+  // Midpoint rule, second order in 1 / nodes; measured with 200 nodes 1.3e-4 (sphere), 3.4e-5 (ellipsoid).
+  constexpr double kMidpoint = 5e-4;
+  EXPECT_NEAR(IntegrateCurvature(Sphere(0.02), kPi / 2.0, 200), 4.0 * kPi, kMidpoint);
+  EXPECT_NEAR(IntegrateCurvature(Ellipsoid({0.05, 0.03, 0.02}), kPi / 2.0, 200), 4.0 * kPi, kMidpoint);
+  // The midpoint rule is exact for the torus, a trigonometric polynomial: rounding of a sum of 4e4 terms.
+  EXPECT_NEAR(IntegrateCurvature(Torus(0.035, 0.011), kPi, 200), 0.0, 4e4 * 1e-16);
+}
+
+TEST(SurfaceTest, ChartsAgreeOnThePointAndItsCurvatures) {
+  std::mt19937 random(4);
+  for (const NamedSurface& named : {testing::MakeSphere(), testing::MakeEllipsoid()}) {
+    for (int sample = 0; sample < kSamples; ++sample) {
+      SCOPED_TRACE(named.name);
+      const Vector3d direction = DrawVector(random, 3);
+      if (std::abs(direction.normalized().x()) > 0.99 || std::abs(direction.normalized().z()) > 0.99)
+        continue;
+      const SurfacePoint alpha_0 = named.surface->ToChart(named.surface->Project(direction).alpha, 0);
+      const SurfacePoint alpha_1 = named.surface->ToChart(alpha_0, 1);
+      const SurfaceGeometry g_0 = named.surface->Evaluate(alpha_0);
+      const SurfaceGeometry g_1 = named.surface->Evaluate(alpha_1);
+      EXPECT_EQ(alpha_1.chart, 1);
+      EXPECT_TRUE(MatrixNear(g_0.p, g_1.p, kRounding));
+      EXPECT_TRUE(MatrixNear(g_0.R.col(2), g_1.R.col(2), 10.0 * kRounding));
+      // K is a tensor: it turns with the frame.
+      const Matrix2d turn = g_0.R.leftCols<2>().transpose() * g_1.R.leftCols<2>();
+      EXPECT_TRUE(MatrixNear(named.length * turn.transpose() * g_0.K * turn, named.length * g_1.K,
+                             100.0 * kRounding));
+      const SurfacePoint back = named.surface->ToChart(alpha_1, 0);
+      EXPECT_NEAR(back.u, alpha_0.u, 10.0 * kRounding);
+      EXPECT_NEAR(back.v, alpha_0.v, 10.0 * kRounding);
+    }
+  }
+}
+
+TEST(SurfaceTest, NormalizeKeepsThePointAndLeavesTheEdgeOfAChart) {
+  std::mt19937 random(5);
+  int changes = 0;
+  for (const NamedSurface& named : MakeAllSurfaces()) {
+    for (int sample = 0; sample < kSamples; ++sample) {
+      SCOPED_TRACE(named.name);
+      SurfacePoint alpha = DrawPoint(random, named, sample % named.surface->num_charts());
+      const SurfacePoint normalized = named.surface->Normalize(alpha);
+      changes += normalized.chart != alpha.chart ? 1 : 0;
+      EXPECT_TRUE(
+          MatrixNear(named.surface->Evaluate(normalized).p, named.surface->Evaluate(alpha).p, kRounding));
+      if (named.surface->num_charts() > 1) EXPECT_LE(std::abs(normalized.v), 1.1);
+    }
+  }
+  EXPECT_GT(changes, 10);
+  // Coordinates carried over the pole (latitude above a right angle) and past the seam of a period.
+  const Sphere sphere(1.0);
+  const SurfacePoint over_pole = sphere.Normalize({0.2, kPi / 2.0 + 0.1, 0});
+  EXPECT_TRUE(MatrixNear(
+      sphere.Evaluate(over_pole).p,
+      Vector3d(-std::sin(0.1) * std::cos(0.2), -std::sin(0.1) * std::sin(0.2), std::cos(0.1)), kRounding));
+  const SurfacePoint wrapped = Torus(2.0, 1.0).Normalize({kPi + 0.1, -kPi - 0.2, 0});
+  EXPECT_NEAR(wrapped.u, -kPi + 0.1, kRounding);
+  EXPECT_NEAR(wrapped.v, kPi - 0.2, kRounding);
+}
+
+TEST(SurfaceTest, BadInputIsAClearError) {
+  using Invalid = std::invalid_argument;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(Throws<Invalid>([] { return Sphere(0.0).radius(); }, "sphere radius"));
+  EXPECT_TRUE(Throws<Invalid>([] { return Cylinder(-1.0).radius(); }, "cylinder radius"));
+  EXPECT_TRUE(Throws<Invalid>([&] { return Ellipsoid({1.0, nan, 1.0}).num_charts(); }, "semi-axis"));
+  EXPECT_TRUE(Throws<Invalid>([] { return Torus(0.01, 0.02).num_charts(); }, "ring radius"));
+  EXPECT_TRUE(Throws<Invalid>([] { return Torus(0.01, 0.0).num_charts(); }, "tube radius"));
+  const Sphere sphere(0.02);
+  EXPECT_TRUE(Throws<Invalid>([&] { return sphere.Evaluate({0.0, 0.0, 2}); }, "chart"));
+  EXPECT_TRUE(Throws<Invalid>([&] { return sphere.Evaluate({nan, 0.0, 0}); }, "u: must be finite"));
+  EXPECT_TRUE(Throws<Invalid>([&] { return sphere.Evaluate({0.0, nan, 0}); }, "v: must be finite"));
+  EXPECT_TRUE(Throws<SingularityError>([&] { return sphere.Evaluate({0.0, kPi / 2.0, 0}); }, "pole"));
+  EXPECT_TRUE(Throws<Invalid>([&] { return sphere.ToChart({0.0, 0.0, 0}, -1); }, "chart"));
+  EXPECT_TRUE(Throws<Invalid>([&] { return sphere.Locate({0.0, 0.0, 0.021}, 1e-4); }, "distance"));
+  EXPECT_EQ(sphere.Locate({0.0, 0.0, 0.02001}, 1e-4).chart, 1);
+}
+
+}  // namespace
+}  // namespace dexcheck
