@@ -1,0 +1,59 @@
+#!/usr/bin/env bash
+# Installs the Debian 12 packages that building, running and testing dexcheck needs, and nothing when all are there.
+set -euo pipefail
+
+packages=(
+  # tools
+  cmake ninja-build clang
+  # the controller's side
+  libeigen3-dev libtomlplusplus-dev
+  # the engine; its CMake files ask for OpenGL and for qhull's headers
+  libmujoco-dev libgl-dev libqhull-dev
+  # the command line
+  libcli11-dev libfmt-dev nlohmann-json3-dev
+  # tests and benchmarks, and the programs they take as oracles
+  libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp
+)
+
+Fail() {
+  echo "install-packages: $*" >&2
+  exit 1
+}
+
+if ! command -v apt-get >/dev/null; then
+  Fail "this is not Debian; install the equivalents of: ${packages[*]}"
+fi
+
+# Fails for packages that dpkg has never heard of, but still prints the others.
+known=$(dpkg-query --show --showformat '${Package} ${db:Status-Status}\n' "${packages[@]}" 2>/dev/null) || true
+missing=()
+for package in "${packages[@]}"; do
+  grep -qx "$package installed" <<<"$known" || missing+=("$package")
+done
+[[ ${#missing[@]} -gt 0 ]] || exit 0
+
+as_root=()
+if [[ $(id -u) -ne 0 ]]; then
+  by_hand="run as root: apt-get install --no-install-recommends ${missing[*]}"
+  command -v sudo >/dev/null || Fail "neither root nor sudo here; $by_hand"
+  as_root=(sudo)
+  [[ -t 0 ]] || as_root+=(--non-interactive)
+  "${as_root[@]}" true || Fail "sudo refused; $by_hand"
+fi
+
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+# Apt ARGUMENTS...: apt-get that asks nothing and waits for another apt to finish.
+Apt() {
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 \
+    apt-get --quiet=2 --option DPkg::Lock::Timeout=300 "$@" </dev/null >>"$log" 2>&1
+}
+
+echo "Installing ${missing[*]}${as_root[*]:+ (as root, with sudo)}; this takes a few minutes."
+# An unreachable source need not matter: whether the packages can be had is decided by the next line.
+Apt update || true
+if ! Apt install --no-install-recommends "${missing[@]}"; then
+  tail -n 20 "$log" >&2
+  Fail "apt-get could not install the packages (they are in Debian 12's main); its last lines are above"
+fi
