@@ -25,17 +25,16 @@ constexpr double kRounding = 1e-15;
 
 /// A torus mesh (with or without the mark that makes it exact) and a ball, each with a free joint.
 MjModelPtr LoadBallAndTorus(double ball_radius, bool exact, bool torus_fixed = false) {
-  return LoadMjcfText(
-      fmt::format(R"(<mujoco><size nuser_geom="2"/><compiler meshdir="{}/mjcf/assets"/>
+  return LoadMjcfText(fmt::format(R"(<mujoco><size nuser_geom="2"/><compiler meshdir="{}/mjcf/assets"/>
         <option timestep="0.001"/>
         <asset><mesh name="torus" file="torus.msh"/></asset><worldbody>
         <body name="torus">{}<inertial pos="0 0 0" mass="0.2" diaginertia="1e-4 1e-4 2e-4"/>
           <geom name="torus" type="mesh" mesh="torus" mass="0" {}/></body>
         <body name="ball" pos="0 0 1"><freejoint/><geom name="ball" type="sphere" size="{}" mass="0.01"/></body>
         </worldbody></mujoco>)",
-                  DEXCHECK_SOURCE_DIR, torus_fixed ? "" : "<freejoint/>", exact ? "user=\"0.035 0.011\"" : "",
-                  ball_radius),
-      "ball and torus");
+                                  DEXCHECK_SOURCE_DIR, torus_fixed ? "" : "<freejoint/>",
+                                  exact ? "user=\"0.035 0.011\"" : "", ball_radius),
+                      "ball and torus");
 }
 
 TEST(CollideSphereTorus, AgreesWithTheSurfacesClosestPoint) {
@@ -56,7 +55,8 @@ TEST(CollideSphereTorus, AgreesWithTheSurfacesClosestPoint) {
     EXPECT_NEAR(contacts[0].distance, distance, kRounding);
     // Inside the tube the normal still points from the ball to the ring's circle.
     EXPECT_TRUE(MatrixNear(contacts[0].normal, -surface.R.col(2), 1e-12));
-    EXPECT_TRUE(MatrixNear(contacts[0].position, surface.p + 0.5 * distance * surface.R.col(2), 10.0 * kRounding));
+    EXPECT_TRUE(
+        MatrixNear(contacts[0].position, surface.p + 0.5 * distance * surface.R.col(2), 10.0 * kRounding));
   }
   EXPECT_GT(touching, 200);
 }
@@ -104,19 +104,22 @@ TEST(TorusCollision, EngineContactIsTheClosedForm) {
   EXPECT_GT(touching, 50);
 }
 
-/// Distance of the deepest contact between the ball at `center` and a ring of capsules inscribed in the torus's circle.
+/// Distance of the deepest contact between the ball at `center` and a ring of capsules inscribed in the
+/// torus's circle.
 double CapsuleRingDistance(int capsules, const Vector3d& center) {
   std::string geoms;
   for (int k = 0; k < capsules; ++k) {
     const double a = 2.0 * kPi * k / capsules;
     const double b = 2.0 * kPi * (k + 1) / capsules;
-    geoms += fmt::format("<geom type=\"capsule\" size=\"{}\" fromto=\"{:.17g} {:.17g} 0 {:.17g} {:.17g} 0\"/>", kTube,
-                         kRing * std::cos(a), kRing * std::sin(a), kRing * std::cos(b), kRing * std::sin(b));
+    geoms += fmt::format(
+        "<geom type=\"capsule\" size=\"{}\" fromto=\"{:.17g} {:.17g} 0 {:.17g} {:.17g} 0\"/>", kTube,
+        kRing * std::cos(a), kRing * std::sin(a), kRing * std::cos(b), kRing * std::sin(b));
   }
   const MjModelPtr model = LoadMjcfText(
-      fmt::format("<mujoco><size nconmax=\"500\"/><worldbody><body>{}</body><body pos=\"{:.17g} {:.17g} {:.17g}\">"
-                  "<freejoint/><geom type=\"sphere\" size=\"{}\"/></body></worldbody></mujoco>",
-                  geoms, center.x(), center.y(), center.z(), kBall),
+      fmt::format(
+          "<mujoco><size nconmax=\"500\"/><worldbody><body>{}</body><body pos=\"{:.17g} {:.17g} {:.17g}\">"
+          "<freejoint/><geom type=\"sphere\" size=\"{}\"/></body></worldbody></mujoco>",
+          geoms, center.x(), center.y(), center.z(), kBall),
       "capsule ring");
   const MjDataPtr data = MakeData(*model);
   mj_fwdPosition(model.get(), data.get());

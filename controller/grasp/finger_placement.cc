@@ -1,0 +1,93 @@
+#include "controller/grasp/finger_placement.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <stdexcept>
+
+#include "controller/dynamics/model_terms.h"
+
+namespace dexcheck {
+namespace {
+
+/// For each fingertip the joints that move it and no other one.
+std::vector<std::vector<int>> ListOwnJoints(const RobotModel& model, std::span<const int> fingertips) {
+  std::vector<int> users(static_cast<size_t>(model.num_joints()), 0);
+  const auto for_chain = [&](int frame, const auto& visit) {
+    int joint = model.frames()[static_cast<size_t>(frame)].link;
+    for (; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent) visit(joint);
+  };
+  for (const int frame : fingertips)
+    for_chain(frame, [&](int joint) { ++users[static_cast<size_t>(joint)]; });
+  std::vector<std::vector<int>> own(fingertips.size());
+  for (size_t i = 0; i < fingertips.size(); ++i) {
+    for_chain(fingertips[i], [&](int joint) {
+      if (users[static_cast<size_t>(joint)] == 1) own[i].push_back(joint);
+    });
+    if (own[i].empty()) throw std::invalid_argument("fingertips: a finger has no joints of its own");
+  }
+  return own;
+}
+
+}  // namespace
+
+FingerPlacement SolveFingerPlacement(const RobotModel& model, std::span<const int> fingertips,
+                                     const Surface& object, const Pose& X_Bo,
+                                     std::span<const SurfacePoint> targets,
+                                     const Eigen::Ref<const VectorXd>& q,
+                                     const FingerPlacementOptions& options) {
+  if (targets.size() != fingertips.size())
+    throw std::invalid_argument("targets: one for each fingertip expected");
+  const std::vector<std::vector<int>> own_joints = ListOwnJoints(model, fingertips);
+  std::vector<Vector3d> places;
+  for (size_t i = 0; i < fingertips.size(); ++i) {
+    const Frame& frame = model.frames().at(static_cast<size_t>(fingertips[i]));
+    if (!frame.sphere_radius) throw std::invalid_argument("fingertips: " + frame.name + " carries no sphere");
+    const SurfaceGeometry surface = object.Evaluate(targets[i]);
+    places.push_back(X_Bo *
+                     Vector3d(surface.p + (*frame.sphere_radius - options.penetration) * surface.R.col(2)));
+  }
+
+  FingerPlacement result;
+  result.q = q;
+  ModelTerms terms(model);
+  const VectorXd at_rest = VectorXd::Zero(terms.size());
+  Matrix6Xd J(6, terms.size());
+  Matrix6Xd J_dot(6, terms.size());
+  const int q_offset = model.num_base_positions();
+  const int dof_offset = model.num_base_velocities();
+  for (int iteration = 0; iteration <= options.max_iterations; ++iteration) {
+    terms.SetState(result.q, at_rest);
+    result.residual = 0.0;
+    for (size_t i = 0; i < fingertips.size(); ++i) {
+      const Pose X = terms.CalcFramePose(fingertips[i]);
+      const Vector3d error = places[i] - X.translation();
+      result.residual = std::max(result.residual, error.norm());
+      if (iteration == options.max_iterations) continue;
+      // Levenberg-Marquardt: dq = J^T (J J^T + lambda)^-1 error, lambda vanishing with the error.
+      terms.CalcFrameJacobian(fingertips[i], J, J_dot);
+      MatrixXd J_own(3, static_cast<Eigen::Index>(own_joints[i].size()));
+      for (size_t k = 0; k < own_joints[i].size(); ++k) {
+        J_own.col(static_cast<Eigen::Index>(k)) = X.linear() * J.col(dof_offset + own_joints[i][k]).head<3>();
+      }
+      constexpr double kDamping = 1e-2;
+      const double lambda = kDamping * error.squaredNorm();
+      const Matrix3d normal = J_own * J_own.transpose() + lambda * Matrix3d::Identity();
+      const VectorXd step = J_own.transpose() * normal.ldlt().solve(error);
+      constexpr double kLargestStep = 0.2;  // rad
+      const double shrink = std::min(1.0, kLargestStep / std::max(step.cwiseAbs().maxCoeff(), 1e-300));
+      for (size_t k = 0; k < own_joints[i].size(); ++k) {
+        const Joint& joint = model.joints()[static_cast<size_t>(own_joints[i][k])];
+        double& position = result.q[q_offset + own_joints[i][k]];
+        position =
+            std::clamp(position + shrink * step[static_cast<Eigen::Index>(k)], joint.lower, joint.upper);
+      }
+    }
+    if (result.residual <= options.tolerance) break;
+  }
+  // Rounding of world coordinates may keep the residual a little above a very small tolerance.
+  const double rounding = 8.0 * std::numeric_limits<double>::epsilon() * (1.0 + X_Bo.translation().norm());
+  result.reached = result.residual <= std::max(options.tolerance, rounding);
+  return result;
+}
+
+}  // namespace dexcheck
