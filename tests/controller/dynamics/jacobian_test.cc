@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "controller/common/errors.h"
 #include "controller/dynamics/model_terms.h"
 #include "tests/common/finite_difference.h"
 #include "tests/common/matrix_near.h"
@@ -228,6 +229,23 @@ TEST_P(Jacobian, WrongSizesAreRejected) {
   EXPECT_THROW(terms_.CalcFrameJacobian(frames_, J, J), std::out_of_range);
   EXPECT_THROW(terms_.SetState(q_.head(q_.size() - 1), velocity_), std::invalid_argument);
   EXPECT_THROW(terms_.SetState(q_, velocity_.head(velocity_.size() - 1)), std::invalid_argument);
+}
+
+// A mobile base is placed by q_v; a rotation that its poses would not show must not be accepted silently.
+TEST(BasePose, OfAMobileBaseIsNotTurned) {
+  std::mt19937 random(3);
+  for (const BaseType type : {BaseType::kPlanar, BaseType::kDifferentialDrive}) {
+    testing::RandomRobotOptions options;
+    options.base = type;
+    RobotSpec spec = testing::MakeRandomRobot(options, &random);
+    spec.base.X_B0.translation() = Vector3d(0.5, -0.4, 0.3);
+    const RobotModel model(spec);
+    ModelTerms terms(model);
+    terms.SetState(VectorXd::Zero(model.num_positions()), VectorXd::Zero(terms.size()));
+    EXPECT_TRUE(MatrixNear(terms.CalcLinkPose(-1).matrix(), spec.base.X_B0.matrix(), kRounding));
+    spec.base.X_B0.rotate(Eigen::AngleAxisd(0.5, Vector3d::UnitZ()));
+    EXPECT_THROW(RobotModel{spec}, InputError);
+  }
 }
 
 }  // namespace
