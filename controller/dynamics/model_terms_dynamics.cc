@@ -212,7 +212,8 @@ EnergyAndMomentum ModelTerms::CalcEnergyAndMomentum() const {
   EnergyAndMomentum result;
   const Vector3d com = mp / all.m;
   result.com = base_position_ + base_R_ * com;
-  result.kinetic = 0.5 * velocity_.dot(M_ * velocity_);
+  // T = 1/2 velocity^T M velocity, column by column: a product M velocity would allocate.
+  for (int i = 0; i < size_; ++i) result.kinetic += 0.5 * velocity_[i] * M_.col(i).dot(velocity_);
   result.potential = -all.m * model_->gravity().dot(result.com);
   result.linear_momentum = base_R_ * h;
   // integral p x p_dot = [Q_zy - Q_yz; Q_xz - Q_zx; Q_yx - Q_xy]; then the wheels' spin about the axle.

@@ -81,7 +81,13 @@ class SpecChecker {
   void CheckBase(const Base& base) {
     CheckUnique(link_names_, "base.link", base.link);
     CheckPose("base.pose", base.X_B0);
-    if (base.type != BaseType::kFixed) CheckBody("base", base.body);
+    if (base.type != BaseType::kFixed) {
+      // Its heading is q_v's third entry, and its z axis stays vertical.
+      Check(base.X_B0.linear().isIdentity(0.0), "base.pose",
+            "must not be turned unless the base is fixed, angle 0",
+            Eigen::AngleAxisd(base.X_B0.linear()).angle());
+      CheckBody("base", base.body);
+    }
     if (base.type != BaseType::kDifferentialDrive) return;
     CheckPositive("base.wheel_radius", base.wheel_radius);
     CheckPositive("base.wheel_distance", base.wheel_distance);

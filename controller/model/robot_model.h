@@ -41,7 +41,7 @@ struct Base {
   BaseType type = BaseType::kFixed;
   std::string link = "base";
   MassProperties body;           ///< Without the wheels, in Sigma_0. Ignored for a fixed base.
-  Pose X_B0 = Pose::Identity();  ///< Sigma_0 in the world frame Sigma_B at q_v = 0.
+  Pose X_B0 = Pose::Identity();  ///< Sigma_0 in the world frame Sigma_B at q_v = 0; turned only when fixed.
 
   // Differential drive only.
   DriveVelocity velocity = DriveVelocity::kTwist;

@@ -1,39 +1,78 @@
 #include "tests/common/allocation_counter.h"
 
-#include <atomic>
+#include <cerrno>
 #include <cstddef>
-
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer)
-#define DEXCHECK_SANITIZED
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__)
-#define DEXCHECK_SANITIZED
-#endif
 
 namespace {
 
-std::atomic<long> allocation_count{0};
+// The allocator has no argument through which a counter could be passed.
+thread_local std::int64_t allocations = 0;
 
 }  // namespace
 
-#if defined(__GLIBC__) && !defined(DEXCHECK_SANITIZED)
+#if defined(__SANITIZE_ADDRESS__)
+#define DEXCHECK_ADDRESS_SANITIZER
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define DEXCHECK_ADDRESS_SANITIZER
+#endif
+#endif
 
-// Eigen calls malloc, not operator new, so malloc itself is counted.
-extern "C" void* __libc_malloc(std::size_t size);  // NOLINT(bugprone-reserved-identifier)
+extern "C" {
 
-extern "C" void* malloc(std::size_t size) {
-  ++allocation_count;
-  return __libc_malloc(size);
-}
+#ifdef DEXCHECK_ADDRESS_SANITIZER
 
-bool dexcheck::testing::CanCountAllocations() { return true; }
+// The sanitizer has its own allocator, which calls these.
+void __sanitizer_malloc_hook(const volatile void* /*pointer*/, size_t /*size*/) { ++allocations; }
+void __sanitizer_free_hook(const volatile void* /*pointer*/) {}
 
 #else
 
-bool dexcheck::testing::CanCountAllocations() { return false; }
+// The program's definitions take precedence over those of the C library, whose own names remain.
+void* __libc_malloc(size_t size);
+void* __libc_calloc(size_t count, size_t size);
+void* __libc_realloc(void* pointer, size_t size);
+void* __libc_memalign(size_t alignment, size_t size);
+
+void* malloc(size_t size) {
+  ++allocations;
+  return __libc_malloc(size);
+}
+
+void* calloc(size_t count, size_t size) {
+  ++allocations;
+  return __libc_calloc(count, size);
+}
+
+void* realloc(void* pointer, size_t size) {
+  ++allocations;
+  return __libc_realloc(pointer, size);
+}
+
+void* memalign(size_t alignment, size_t size) {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+
+void* aligned_alloc(size_t alignment, size_t size) {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+
+int posix_memalign(void** pointer, size_t alignment, size_t size) {
+  ++allocations;
+  *pointer = __libc_memalign(alignment, size);
+  return *pointer == nullptr ? ENOMEM : 0;
+}
 
 #endif
 
-long dexcheck::testing::CountAllocations() { return allocation_count; }
+}  // extern "C"
+
+namespace dexcheck::testing {
+
+AllocationCounter::AllocationCounter() : start_(allocations) {}
+
+std::int64_t AllocationCounter::count() const { return allocations - start_; }
+
+}  // namespace dexcheck::testing

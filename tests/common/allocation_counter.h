@@ -1,11 +1,20 @@
 #pragma once
 
+// Counts calls of malloc and its kin, whoever makes them: operator new, Eigen, the C library. Link
+// dexcheck_allocation_counter; nothing else in the program needs to be prepared.
+
+#include <cstdint>
+
 namespace dexcheck::testing {
 
-/// False where the counter cannot work, because a sanitizer replaces the allocator.
-bool CanCountAllocations();
+/// Allocations by this thread since construction.
+class AllocationCounter {
+ public:
+  AllocationCounter();
+  [[nodiscard]] std::int64_t count() const;
 
-/// Number of heap allocations of this process so far.
-long CountAllocations();
+ private:
+  std::int64_t start_;
+};
 
 }  // namespace dexcheck::testing

@@ -216,13 +216,14 @@ b = "a / 2"
 [base]
 type = "planar"
 link = "cart"
-pose = { xyz = [0, 0, "b"], rpy_deg = [90, 0, 90] }
+pose = { xyz = [0, 0, "b"] }
 mass = 2
 com = [0, 0, "b"]
 inertia = [2.0, 3.0, 4.0, 0.1, 0.2, 0.3]
 [[chain]]
 parent = "cart"
 template = "slide"
+pose = { rpy_deg = [90, 0, 90] }
 rows = [{ joint = "turn", link = "arm", alpha = "pi / 2", a = 0, q = 0.25, d = "-b" }]
 [chain.joints]
 turn = { range_deg = [-90, 180], damping = 0, armature = 0 }
@@ -255,7 +256,7 @@ TEST(OtherForms, AreRead) {
   // R = Rz(90 deg) Rx(90 deg): x to y, y to z, z to x.
   Matrix3d R;
   R << 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0;
-  EXPECT_TRUE(MatrixNear(model.base().X_B0.linear(), R, kRounding));
+  EXPECT_TRUE(MatrixNear(model.joints().front().X_PB.linear(), R, kRounding));
   EXPECT_EQ(model.base().X_B0.translation(), Vector3d(0.0, 0.0, 0.25));
   Matrix3d I;
   I << 2.0, 0.1, 0.2, 0.1, 3.0, 0.3, 0.2, 0.3, 4.0;

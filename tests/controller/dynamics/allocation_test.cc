@@ -1,0 +1,148 @@
+// Nothing allocates once a ModelTerms is built.
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "controller/dynamics/model_terms.h"
+#include "tests/common/allocation_counter.h"
+#include "tests/common/paper_robot.h"
+#include "tests/common/random_robot.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::AllocationCounter;
+
+// Keeps the compiler from leaving out an allocation that nobody uses.
+void Use(const volatile void* pointer) {
+  static const volatile void* volatile sink = nullptr;
+  sink = pointer;
+  static_cast<void>(sink);
+}
+
+TEST(AllocationCounter, CountsEveryKind) {
+  const auto count = [](const auto& allocate) {
+    const AllocationCounter counter;
+    allocate();
+    return counter.count();
+  };
+  EXPECT_EQ(count([] {}), 0);
+  EXPECT_EQ(count([] { Use(std::make_unique<double>(1.0).get()); }), 1);
+  EXPECT_EQ(count([] { Use(std::vector<double>(100).data()); }), 1);
+  EXPECT_EQ(count([] { Use(VectorXd(100).data()); }), 1);
+  EXPECT_EQ(count([] { Use(MatrixXd::Zero(10, 10).eval().data()); }), 1);
+  EXPECT_EQ(count([] {
+              void* const p = std::malloc(8);
+              Use(p);
+              std::free(p);
+            }),
+            1);
+  EXPECT_EQ(count([] {
+              void* const p = std::calloc(8, 8);
+              Use(p);
+              std::free(p);
+            }),
+            1);
+  EXPECT_EQ(count([] {
+              void* const p = std::aligned_alloc(64, 640);
+              Use(p);
+              std::free(p);
+            }),
+            1);
+  struct alignas(64) Aligned {
+    double entries[8];
+  };
+  EXPECT_EQ(count([] { Use(std::make_unique<Aligned>().get()); }), 1);
+}
+
+struct Case {
+  std::string name;
+  RobotModel model;
+  Coordinates coordinates;
+};
+
+void PrintTo(const Case& robot, std::ostream* out) { *out << robot.name; }
+
+std::vector<Case> MakeCases() {
+  std::vector<Case> cases;
+  std::mt19937 random(200);
+  for (const BaseType base : {BaseType::kFixed, BaseType::kPlanar, BaseType::kDifferentialDrive}) {
+    testing::RandomRobotOptions options;
+    options.base = base;
+    options.joints = 200;
+    const RobotModel tree(testing::MakeRandomRobot(options, &random));
+    const std::string name = "Tree" + std::to_string(static_cast<int>(base));
+    cases.push_back({name + "Reduced", tree, Coordinates::kReduced});
+    cases.push_back({name + "Unreduced", tree, Coordinates::kUnreduced});
+  }
+  cases.push_back({"PaperTwist", testing::ReadPaperRobot(), Coordinates::kReduced});
+  cases.push_back({"PaperUnreduced", testing::ReadPaperRobot(), Coordinates::kUnreduced});
+  cases.push_back(
+      {"PaperWheelRates", testing::ReadPaperRobot(DriveVelocity::kWheelRates), Coordinates::kReduced});
+  cases.push_back({"Panda", testing::ReadPanda(), Coordinates::kReduced});
+  return cases;
+}
+
+class Allocation : public ::testing::TestWithParam<Case> {
+ protected:
+  /// Allocations while `call` runs.
+  template <typename Call>
+  static std::int64_t Count(const Call& call) {
+    const AllocationCounter counter;
+    call();
+    return counter.count();
+  }
+
+  const RobotModel& model_ = GetParam().model;
+  std::mt19937 random_{12};
+  ModelTerms terms_{model_, GetParam().coordinates};
+  const VectorXd q_ = testing::DrawPositions(model_, &random_);
+  const VectorXd velocity_ = testing::DrawVelocities(terms_.size(), &random_);
+};
+
+INSTANTIATE_TEST_SUITE_P(Robots, Allocation, ::testing::ValuesIn(MakeCases()),
+                         [](const auto& info) { return info.param.name; });
+
+// The first call counts, too: the workspace is complete when the constructor returns.
+TEST_P(Allocation, NoneAfterConstruction) {
+  Matrix6Xd J = Matrix6Xd::Zero(6, terms_.size());
+  Matrix6Xd J_dot = Matrix6Xd::Zero(6, terms_.size());
+  Vector6d velocity;
+  Vector6d bias;
+  EnergyAndMomentum energy;
+  double turning = 0.0;
+  double acceleration = 0.0;
+  double path = 0.0;
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    EXPECT_EQ(Count([&] { terms_.SetState(q_, velocity_); }), 0) << "SetState";
+    EXPECT_EQ(Count([&] { terms_.CalcDynamics(); }), 0) << "CalcDynamics";
+    EXPECT_EQ(Count([&] { energy = terms_.CalcEnergyAndMomentum(); }), 0) << "CalcEnergyAndMomentum";
+    for (int frame = 0; frame < static_cast<int>(model_.frames().size()); ++frame) {
+      EXPECT_EQ(Count([&] { terms_.CalcFrameJacobian(frame, J, J_dot); }), 0) << "CalcFrameJacobian";
+      EXPECT_EQ(Count([&] { terms_.CalcFrameMotion(frame, &velocity, &bias); }), 0) << "CalcFrameMotion";
+      turning += J_dot.norm();
+      acceleration += bias.norm();
+      EXPECT_EQ(Count([&] { path += terms_.CalcFramePose(frame).translation().norm(); }), 0)
+          << "CalcFramePose";
+    }
+  }
+  // The calls did their work.
+  EXPECT_GT(energy.kinetic, 0.0);
+  EXPECT_GT(turning, 0.0);
+  EXPECT_GT(acceleration, 0.0);
+  EXPECT_GT(path, 0.0);
+}
+
+// The counter sees what the library does: the constructor, and a temporary made for an argument.
+TEST_P(Allocation, AllocationsInTheLibraryAreSeen) {
+  EXPECT_GT(Count([&] { ModelTerms(model_, GetParam().coordinates); }), 10);
+  EXPECT_EQ(Count([&] { terms_.SetState(2.0 * q_, velocity_); }), 1);
+}
+
+}  // namespace
+}  // namespace dexcheck

@@ -1,0 +1,206 @@
+// M, C and F of (16) from the energies of the single bodies: C by Christoffel symbols of a naive M, gravity
+// by the gradient of the potential energy, friction by that of the dissipation; derivatives by dual numbers.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "controller/dynamics/model_terms.h"
+#include "tests/common/dual.h"
+#include "tests/common/mass_scaling.h"
+#include "tests/common/matrix_near.h"
+#include "tests/common/naive_dynamics.h"
+#include "tests/common/paper_robot.h"
+#include "tests/common/random_robot.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::DrawPositions;
+using testing::DrawVelocities;
+using testing::Dual;
+using testing::DualVector;
+using testing::MatrixNear;
+using testing::NaiveDynamics;
+using testing::ScaleByMass;
+using testing::ScaleForceByMass;
+
+// Rounding of sums over 12 joints, on entries scaled to 1 in M and 30 in C; measured 2e-14.
+constexpr double kRounding = 2e-13;
+// A phalanx's 1e-5 kg m^2 is a difference of moments about the platform's origin, some 1e3 times as large, so
+// that much more is lost; measured 1.4e-12.
+constexpr double kFingerRounding = 1e-11;
+// Energies and momenta add up to some 400 J, kg m/s, kg m^2/s; measured 3e-13.
+constexpr double kSumRounding = 2e-12;
+// A mutated model must miss by far more.
+constexpr double kVisible = 1e-4;
+
+struct Case {
+  std::string name;
+  RobotModel model;
+  double tolerance;
+};
+
+void PrintTo(const Case& robot, std::ostream* out) { *out << robot.name; }
+
+std::vector<Case> MakeCases() {
+  std::vector<Case> cases;
+  std::mt19937 random(316);
+  const auto add = [&](const char* name, BaseType base, double branching, double prismatic) {
+    testing::RandomRobotOptions options;
+    options.base = base;
+    options.joints = 12;
+    options.branching = branching;
+    options.prismatic = prismatic;
+    cases.push_back({name, RobotModel(testing::MakeRandomRobot(options, &random)), kRounding});
+  };
+  add("FixedChain", BaseType::kFixed, 0.0, 0.0);
+  add("FixedTree", BaseType::kFixed, 0.4, 0.3);
+  add("PlanarChain", BaseType::kPlanar, 0.0, 0.3);
+  add("PlanarTree", BaseType::kPlanar, 0.4, 0.3);
+  add("DriveChain", BaseType::kDifferentialDrive, 0.0, 0.0);
+  add("DriveTree", BaseType::kDifferentialDrive, 0.4, 0.3);
+  cases.push_back({"PaperRobot", testing::ReadPaperRobot(), kFingerRounding});
+  return cases;
+}
+
+/// M and C_ij = 1/2 sum_k (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) q_dot_k of the naive model.
+struct LagrangeTerms {
+  MatrixXd M;
+  MatrixXd C;
+  VectorXd gravity;
+  VectorXd friction;
+};
+
+LagrangeTerms CalcLagrangeTerms(const RobotModel& model, const VectorXd& q, const VectorXd& q_dot) {
+  const Eigen::Index n = q.size();
+  const NaiveDynamics<double> naive(model, q);
+  LagrangeTerms terms{naive.CalcMassMatrix(), MatrixXd::Zero(n, n), VectorXd::Zero(n), VectorXd::Zero(n)};
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const NaiveDynamics<Dual> along_k(model, testing::MakeDual(q, VectorXd::Unit(n, k)));
+    const MatrixXd dM = testing::GetRates(along_k.CalcMassMatrix());
+    const VectorXd dM_q_dot = dM * q_dot;
+    terms.C += 0.5 * q_dot[k] * dM;
+    terms.C.col(k) += 0.5 * dM_q_dot;
+    terms.C.row(k) -= 0.5 * dM_q_dot.transpose();
+    terms.gravity[k] = along_k.CalcPotentialEnergy().rate;
+    terms.friction[k] = naive.CalcDissipation(testing::MakeDual(q_dot, VectorXd::Unit(n, k))).rate;
+  }
+  return terms;
+}
+
+class Christoffel : public ::testing::TestWithParam<Case> {
+ protected:
+  static constexpr int kStates = 3;
+  const RobotModel& model_ = GetParam().model;
+  const double tolerance_ = GetParam().tolerance;
+  std::mt19937 random_{1905};
+};
+
+INSTANTIATE_TEST_SUITE_P(Robots, Christoffel, ::testing::ValuesIn(MakeCases()),
+                         [](const auto& info) { return info.param.name; });
+
+TEST_P(Christoffel, TermsAreThoseOfLagrange) {
+  ModelTerms terms(model_, Coordinates::kUnreduced);
+  for (int state = 0; state < kStates; ++state) {
+    const VectorXd q = DrawPositions(model_, &random_);
+    const VectorXd q_dot = DrawVelocities(terms.size(), &random_);
+    terms.SetState(q, q_dot);
+    terms.CalcDynamics();
+    const LagrangeTerms expected = CalcLagrangeTerms(model_, q, q_dot);
+    const MatrixXd& M = expected.M;
+    const MatrixXd C = ScaleByMass(expected.C, M);
+    const VectorXd gravity = ScaleForceByMass(expected.gravity, M);
+    const VectorXd friction = ScaleForceByMass(expected.friction, M);
+    ASSERT_GT((M - MatrixXd(M.diagonal().asDiagonal())).norm(), 0.1);
+    ASSERT_GT(C.cwiseAbs().maxCoeff(), 0.1);
+    ASSERT_GT(gravity.cwiseAbs().maxCoeff(), 1.0);
+    ASSERT_GT(friction.cwiseAbs().maxCoeff(), 0.01);
+    EXPECT_TRUE(MatrixNear(ScaleByMass(terms.M(), M), ScaleByMass(M, M), tolerance_)) << "M";
+    EXPECT_TRUE(MatrixNear(ScaleByMass(terms.C(), M), C, tolerance_)) << "C";
+    EXPECT_TRUE(MatrixNear(ScaleForceByMass(terms.gravity(), M), gravity, tolerance_)) << "gravity";
+    EXPECT_TRUE(MatrixNear(ScaleForceByMass(terms.friction(), M), friction, tolerance_)) << "friction";
+  }
+}
+
+TEST_P(Christoffel, EnergyAndMomentumAreSumsOverBodies) {
+  ModelTerms terms(model_, Coordinates::kUnreduced);
+  for (int state = 0; state < kStates; ++state) {
+    const VectorXd q = DrawPositions(model_, &random_);
+    const VectorXd q_dot = DrawVelocities(terms.size(), &random_);
+    terms.SetState(q, q_dot);
+    terms.CalcDynamics();
+    const EnergyAndMomentum result = terms.CalcEnergyAndMomentum();
+
+    const NaiveDynamics<double> naive(model_, q);
+    double mass = 0.0;
+    Vector3d moment = Vector3d::Zero();
+    Vector3d linear = Vector3d::Zero();
+    for (const auto& body : naive.bodies()) {
+      mass += body.mass;
+      moment += body.mass * body.p;
+      linear += body.mass * (body.J_p * q_dot);
+    }
+    const Vector3d com = moment / mass;
+    Vector3d angular = Vector3d::Zero();
+    for (const auto& body : naive.bodies()) {
+      angular += (body.p - com).cross(body.mass * (body.J_p * q_dot)) + body.inertia * (body.J_w * q_dot);
+    }
+    const double kinetic = 0.5 * q_dot.dot(naive.CalcMassMatrix() * q_dot);
+    const double potential = naive.CalcPotentialEnergy();
+    ASSERT_GT(linear.norm(), 0.1);
+    ASSERT_GT(angular.norm(), 0.1);
+    ASSERT_GT(std::abs(potential), 0.1);
+    EXPECT_NEAR(result.kinetic, kinetic, kSumRounding * testing::TolScale());
+    EXPECT_NEAR(result.potential, potential, kSumRounding * testing::TolScale());
+    EXPECT_TRUE(MatrixNear(result.com, com, kSumRounding)) << "com";
+    EXPECT_TRUE(MatrixNear(result.linear_momentum, linear, kSumRounding)) << "linear momentum";
+    EXPECT_TRUE(MatrixNear(result.angular_momentum, angular, kSumRounding)) << "angular momentum";
+  }
+}
+
+TEST_P(Christoffel, MutatedModelsAndWrongSymbolsAreSeen) {
+  ModelTerms terms(model_, Coordinates::kUnreduced);
+  const VectorXd q = DrawPositions(model_, &random_);
+  const VectorXd q_dot = DrawVelocities(terms.size(), &random_);
+  terms.SetState(q, q_dot);
+  terms.CalcDynamics();
+  const MatrixXd M = terms.M();
+  const auto differ = [&](const MatrixXd& A, const MatrixXd& B) {
+    return ScaleByMass(A - B, M).cwiseAbs().maxCoeff();
+  };
+
+  // The last link's centre of mass a millimetre away.
+  RobotSpec shifted = model_.spec();
+  shifted.joints.back().body.com.x() += 1e-3;
+  const LagrangeTerms other = CalcLagrangeTerms(RobotModel(shifted), q, q_dot);
+  EXPECT_GT(differ(M, other.M), kVisible);
+  EXPECT_GT(differ(terms.C(), other.C), kVisible);
+  EXPECT_GT(ScaleForceByMass(terms.gravity() - other.gravity, M).cwiseAbs().maxCoeff(), kVisible);
+
+  // Spin of the wheels, and the heading along which they roll.
+  if (model_.base().type == BaseType::kDifferentialDrive) {
+    RobotSpec still = model_.spec();
+    still.base.wheel.armature += 0.01;
+    const LagrangeTerms heavier = CalcLagrangeTerms(RobotModel(still), q, q_dot);
+    EXPECT_GT(differ(M, heavier.M), kVisible);
+    EXPECT_GT(differ(terms.C(), heavier.C), kVisible);
+  }
+
+  // C without its part skew in i and j has the same power, its transpose the same symmetric part, and a C
+  // that adds u (q_dot turned by a right angle)^T gives the same C q_dot: none is the Christoffel choice.
+  const MatrixXd C = terms.C();
+  EXPECT_GT(differ(C, 0.5 * (C + C.transpose())), kVisible);
+  EXPECT_GT(differ(C, C.transpose()), kVisible);
+  VectorXd normal = VectorXd::Zero(q.size());
+  normal[0] = q_dot[1];
+  normal[1] = -q_dot[0];
+  const MatrixXd same_force = C + M.col(0) * normal.transpose();
+  ASSERT_LT((same_force * q_dot - C * q_dot).norm(), 1e-10);
+  EXPECT_GT(differ(C, same_force), kVisible);
+}
+
+}  // namespace
+}  // namespace dexcheck

@@ -1,0 +1,252 @@
+// Jacobians and their derivatives (6), (7) against differences of poses on SE(3), for a frame on every link.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <ostream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/dynamics/model_terms.h"
+#include "tests/common/finite_difference.h"
+#include "tests/common/matrix_near.h"
+#include "tests/common/paper_robot.h"
+#include "tests/common/random_robot.h"
+#include "tests/common/reduction_map.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::CalcReductionMap;
+using testing::Differentiate;
+using testing::DrawPositions;
+using testing::DrawVelocities;
+using testing::MatrixNear;
+
+// Five-point differences at unit rates: truncation h^4 / 30 = 3e-14 per metre, rounding eps |p| / h = 1e-12.
+// Measured 9e-13.
+constexpr double kPoseStep = 1e-3;
+constexpr double kPoseDifference = 5e-12;
+// Along q_dot, whose rates add up to 20 rad/s and more: truncation h^4 20^5 / 30 = 1e-11, rounding eps |J| /
+// h = 1e-11; measured 1e-11.
+constexpr double kStateStep = 1e-4;
+constexpr double kStateDifference = 1e-10;
+// Two formulas for one quantity of up to 30 (in SI units); measured 1e-15 of it.
+constexpr double kRounding = 1e-14;
+// A wrong formula must miss by far more.
+constexpr double kVisible = 1e-3;
+
+struct Case {
+  std::string name;
+  RobotModel model;
+  Coordinates coordinates;
+};
+
+void PrintTo(const Case& robot, std::ostream* out) { *out << robot.name; }
+
+/// The model with a frame at a generic place on every link, the base's included.
+RobotModel AddFrames(const RobotModel& model) {
+  RobotSpec spec = model.spec();
+  for (int link = -1; link < model.num_joints(); ++link) {
+    Frame frame;
+    frame.name = "on_link_" + std::to_string(link);
+    frame.link = link;
+    frame.X_LF = Eigen::Translation3d(0.03, -0.05, 0.02) * Eigen::AngleAxisd(0.8, Vector3d(0.6, 0.0, 0.8));
+    spec.frames.push_back(frame);
+  }
+  return RobotModel(spec);
+}
+
+std::vector<Case> MakeCases() {
+  std::vector<Case> cases;
+  std::mt19937 random(607);
+  const auto add = [&](const std::string& name, const RobotModel& model) {
+    cases.push_back({name + "Reduced", AddFrames(model), Coordinates::kReduced});
+    cases.push_back({name + "Unreduced", AddFrames(model), Coordinates::kUnreduced});
+  };
+  const auto add_tree = [&](const char* name, BaseType base, DriveVelocity velocity) {
+    testing::RandomRobotOptions options;
+    options.base = base;
+    options.velocity = velocity;
+    add(name, RobotModel(testing::MakeRandomRobot(options, &random)));
+  };
+  add_tree("Fixed", BaseType::kFixed, DriveVelocity::kTwist);
+  add_tree("Planar", BaseType::kPlanar, DriveVelocity::kTwist);
+  add_tree("DriveTwist", BaseType::kDifferentialDrive, DriveVelocity::kTwist);
+  add_tree("DriveWheelRates", BaseType::kDifferentialDrive, DriveVelocity::kWheelRates);
+  add("PaperTwist", testing::ReadPaperRobot(DriveVelocity::kTwist));
+  add("PaperWheelRates", testing::ReadPaperRobot(DriveVelocity::kWheelRates));
+  return cases;
+}
+
+/// A pose's rate as a body velocity: X^-1 X_dot = [[w]x, v; 0, 0], returned as [v; w].
+Vector6d CalcBodyVelocity(const Pose& X, const Eigen::Matrix4d& X_dot) {
+  const Matrix3d W = X.linear().transpose() * X_dot.topLeftCorner<3, 3>();
+  Vector6d V;
+  V << X.linear().transpose() * X_dot.topRightCorner<3, 1>(), 0.5 * (W(2, 1) - W(1, 2)),
+      0.5 * (W(0, 2) - W(2, 0)), 0.5 * (W(1, 0) - W(0, 1));
+  return V;
+}
+
+class Jacobian : public ::testing::TestWithParam<Case> {
+ protected:
+  /// Positions' rates from velocity coordinates: S', or 1.
+  [[nodiscard]] MatrixXd CalcRateMap(const VectorXd& q, const VectorXd& velocity) const {
+    if (GetParam().coordinates == Coordinates::kUnreduced) return MatrixXd::Identity(q.size(), q.size());
+    return CalcReductionMap(model_, q, velocity).S;
+  }
+  Pose CalcPose(int frame, const VectorXd& q) {
+    moving_.SetState(q, velocity_);
+    return moving_.CalcFramePose(frame);
+  }
+  Matrix6Xd CalcJacobian(int frame, const VectorXd& q) {
+    moving_.SetState(q, velocity_);
+    Matrix6Xd J(6, moving_.size());
+    Matrix6Xd J_dot(6, moving_.size());
+    moving_.CalcFrameJacobian(frame, J, J_dot);
+    return J;
+  }
+  Vector6d CalcVelocity(int frame, const VectorXd& q) {
+    moving_.SetState(q, velocity_);
+    Vector6d velocity;
+    Vector6d bias;
+    moving_.CalcFrameMotion(frame, &velocity, &bias);
+    return velocity;
+  }
+
+  const RobotModel& model_ = GetParam().model;
+  const int frames_ = static_cast<int>(model_.frames().size());
+  std::mt19937 random_{67};
+  ModelTerms terms_{model_, GetParam().coordinates};
+  ModelTerms moving_{model_, GetParam().coordinates};
+  const VectorXd q_ = DrawPositions(model_, &random_);
+  const VectorXd velocity_ = DrawVelocities(terms_.size(), &random_);
+  const MatrixXd rate_map_ = CalcRateMap(q_, velocity_);
+  const VectorXd q_dot_ = rate_map_ * velocity_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Robots, Jacobian, ::testing::ValuesIn(MakeCases()),
+                         [](const auto& info) { return info.param.name; });
+
+TEST_P(Jacobian, IsTheDerivativeOfThePose) {
+  terms_.SetState(q_, velocity_);
+  // Whatever stood in the caller's matrices is overwritten.
+  Matrix6Xd J = Matrix6Xd::Constant(6, terms_.size(), 7.0);
+  Matrix6Xd J_dot = J;
+  Matrix6Xd by_difference(6, terms_.size());
+  for (int frame = 0; frame < frames_; ++frame) {
+    const Pose X = terms_.CalcFramePose(frame);
+    terms_.CalcFrameJacobian(frame, J, J_dot);
+    for (int i = 0; i < terms_.size(); ++i) {
+      const VectorXd direction = rate_map_.col(i);
+      const Eigen::Matrix4d X_dot = Differentiate(
+          [&](double t) -> Eigen::Matrix4d { return CalcPose(frame, q_ + t * direction).matrix(); },
+          kPoseStep);
+      by_difference.col(i) = CalcBodyVelocity(X, X_dot);
+    }
+    const bool moves =
+        model_.base().type != BaseType::kFixed || model_.frames()[static_cast<size_t>(frame)].link >= 0;
+    if (moves) ASSERT_GT(J.norm(), 0.01);
+    EXPECT_TRUE(MatrixNear(J, by_difference, kPoseDifference))
+        << model_.frames()[static_cast<size_t>(frame)].name;
+  }
+}
+
+TEST_P(Jacobian, RateIsTheDerivativeAlongTheMotion) {
+  terms_.SetState(q_, velocity_);
+  Matrix6Xd J(6, terms_.size());
+  Matrix6Xd J_dot(6, terms_.size());
+  double largest = 0.0;
+  for (int frame = 0; frame < frames_; ++frame) {
+    terms_.CalcFrameJacobian(frame, J, J_dot);
+    const Matrix6Xd by_difference = Differentiate(
+        [&](double t) -> Matrix6Xd { return CalcJacobian(frame, q_ + t * q_dot_); }, kStateStep);
+    EXPECT_TRUE(MatrixNear(J_dot, by_difference, kStateDifference))
+        << model_.frames()[static_cast<size_t>(frame)].name;
+    largest = std::max(largest, J_dot.norm());
+  }
+  ASSERT_GT(largest, 1.0);
+}
+
+// velocity = R J xi;  bias = R J_dot xi + [w x v; 0], since J is in axes that turn with w.
+TEST_P(Jacobian, FrameMotionIsThatOfTheJacobian) {
+  terms_.SetState(q_, velocity_);
+  Matrix6Xd J(6, terms_.size());
+  Matrix6Xd J_dot(6, terms_.size());
+  double largest_without_turning = 0.0;
+  for (int frame = 0; frame < frames_; ++frame) {
+    terms_.CalcFrameJacobian(frame, J, J_dot);
+    Vector6d velocity;
+    Vector6d bias;
+    terms_.CalcFrameMotion(frame, &velocity, &bias);
+    Matrix6d R = Matrix6d::Zero();
+    R.topLeftCorner<3, 3>() = terms_.CalcFramePose(frame).linear();
+    R.bottomRightCorner<3, 3>() = R.topLeftCorner<3, 3>();
+    const Vector6d V = R * (J * velocity_);
+    Vector6d A = R * (J_dot * velocity_);
+    largest_without_turning = std::max(largest_without_turning, (A - bias).norm());
+    A.head<3>() += V.tail<3>().cross(V.head<3>());
+    EXPECT_TRUE(MatrixNear(velocity, V, kRounding * (1.0 + V.norm())));
+    EXPECT_TRUE(MatrixNear(bias, A, kRounding * (1.0 + A.norm())));
+
+    // The same from the velocity's own change when the velocity coordinates stay.
+    const Vector6d by_difference =
+        Differentiate([&](double t) -> Vector6d { return CalcVelocity(frame, q_ + t * q_dot_); }, kStateStep);
+    EXPECT_TRUE(MatrixNear(bias, by_difference, kStateDifference * (1.0 + A.norm())));
+  }
+  EXPECT_GT(largest_without_turning, kVisible);
+}
+
+// A joint's axis displaced by a milliradian, and rates taken along another motion, are seen.
+TEST_P(Jacobian, MutationsAreSeen) {
+  RobotSpec spec = model_.spec();
+  spec.joints.back().mdh.alpha += 1e-3;
+  const RobotModel bent(spec);
+  ModelTerms other(bent, GetParam().coordinates);
+  terms_.SetState(q_, velocity_);
+  other.SetState(q_, velocity_);
+  Matrix6Xd J(6, terms_.size());
+  Matrix6Xd J_dot(6, terms_.size());
+  Matrix6Xd J_bent(6, terms_.size());
+  Matrix6Xd J_dot_bent(6, terms_.size());
+  const int last = frames_ - 1;
+  terms_.CalcFrameJacobian(last, J, J_dot);
+  other.CalcFrameJacobian(last, J_bent, J_dot_bent);
+  EXPECT_GT((J - J_bent).cwiseAbs().maxCoeff(), 1e-5);
+  const Matrix6Xd wrong_motion =
+      Differentiate([&](double t) -> Matrix6Xd { return CalcJacobian(last, q_ - t * q_dot_); }, kStateStep);
+  EXPECT_GT((J_dot - wrong_motion).cwiseAbs().maxCoeff(), kVisible);
+}
+
+TEST_P(Jacobian, WrongSizesAreRejected) {
+  Matrix6Xd J(6, terms_.size());
+  Matrix6Xd narrow(6, terms_.size() - 1);
+  terms_.SetState(q_, velocity_);
+  EXPECT_THROW(terms_.CalcFrameJacobian(0, J, narrow), std::invalid_argument);
+  EXPECT_THROW(terms_.CalcFrameJacobian(0, narrow, J), std::invalid_argument);
+  EXPECT_THROW(terms_.CalcFrameJacobian(frames_, J, J), std::out_of_range);
+  EXPECT_THROW(terms_.SetState(q_.head(q_.size() - 1), velocity_), std::invalid_argument);
+  EXPECT_THROW(terms_.SetState(q_, velocity_.head(velocity_.size() - 1)), std::invalid_argument);
+}
+
+// A mobile base is placed by q_v; a rotation that its poses would not show must not be accepted silently.
+TEST(BasePose, OfAMobileBaseIsNotTurned) {
+  std::mt19937 random(3);
+  for (const BaseType type : {BaseType::kPlanar, BaseType::kDifferentialDrive}) {
+    testing::RandomRobotOptions options;
+    options.base = type;
+    RobotSpec spec = testing::MakeRandomRobot(options, &random);
+    spec.base.X_B0.translation() = Vector3d(0.5, -0.4, 0.3);
+    const RobotModel model(spec);
+    ModelTerms terms(model);
+    terms.SetState(VectorXd::Zero(model.num_positions()), VectorXd::Zero(terms.size()));
+    EXPECT_TRUE(MatrixNear(terms.CalcLinkPose(-1).matrix(), spec.base.X_B0.matrix(), kRounding));
+    spec.base.X_B0.rotate(Eigen::AngleAxisd(0.5, Vector3d::UnitZ()));
+    EXPECT_THROW(RobotModel{spec}, InputError);
+  }
+}
+
+}  // namespace
+}  // namespace dexcheck
