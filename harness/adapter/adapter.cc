@@ -24,9 +24,12 @@ Pose BodyPose(const mjData& data, int body) {
 /// The body that carries the joints which move `body`: itself, or the one it is welded to.
 int MovingBody(const mjModel& engine, int body) { return engine.body_weldid[body]; }
 
+/// "a, b, c": the first few of them, and how many more.
 std::string JoinNames(const std::vector<std::string>& names) {
+  constexpr size_t kMaxShown = 8;
   std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  for (size_t i = 0; i < std::min(names.size(), kMaxShown); ++i) text += (i == 0 ? "" : ", ") + names[i];
+  if (names.size() > kMaxShown) text += " and " + std::to_string(names.size() - kMaxShown) + " more";
   return text;
 }
 
@@ -74,7 +77,7 @@ void Adapter::MatchJoints(const std::string& engine_source) {
   const mjModel& engine = *engine_;
   const auto fail = [&](const std::string& problem) { throw InputError(engine_source + ": " + problem); };
 
-  // First what is missing on either side, all of it in one line.
+  // First what is missing on either side, in one line.
   std::vector<std::string> only_in_model;
   std::set<int> known = ListBaseJoints(*model_, engine);
   const auto need = [&](mjtObj type, const std::string& kind, const std::string& name) {

@@ -32,8 +32,8 @@ struct EngineWheel {
 /// joint.
 class Adapter {
  public:
-  /// @throws InputError that lists every joint, body or site that the other side lacks, or names one whose
-  /// kind differs.
+  /// @throws InputError that lists the joints, bodies and sites that the other side lacks (the first few of
+  /// many), or names one whose kind differs.
   Adapter(const RobotModel& model, const mjModel& engine, const std::string& engine_source);
 
   [[nodiscard]] const RobotModel& model() const { return *model_; }
