@@ -19,7 +19,7 @@ namespace dexcheck {
 struct EngineWheel {
   int joint = -1;
   int dof = -1;
-  double radius = 0.0;       ///< Of the wheel's round geoms, m.
+  double radius = 0.0;       ///< Of the round geom that touches the floor, m.
   Vector3d center{0, 0, 0};  ///< In Sigma_0 at the reference pose, m.
   Vector3d axis{0, 1, 0};    ///< Hinge axis in Sigma_0; +y makes positive rates roll forward.
 };

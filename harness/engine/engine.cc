@@ -114,4 +114,11 @@ std::string NameOf(const mjModel& model, mjtObj type, int id) {
   return name == nullptr || *name == '\0' ? "#" + std::to_string(id) : name;
 }
 
+bool CanTouch(const mjModel& model, int geom) {
+  for (int pair = 0; pair < model.npair; ++pair) {
+    if (model.pair_geom1[pair] == geom || model.pair_geom2[pair] == geom) return true;
+  }
+  return model.geom_contype[geom] != 0 || model.geom_conaffinity[geom] != 0;
+}
+
 }  // namespace dexcheck
