@@ -24,23 +24,31 @@ Pose BodyPose(const mjData& data, int body) {
 /// The body that carries the joints which move `body`: itself, or the one it is welded to.
 int MovingBody(const mjModel& engine, int body) { return engine.body_weldid[body]; }
 
+/// "a, b, c": the first few of them, and how many more.
 std::string JoinNames(const std::vector<std::string>& names) {
+  constexpr size_t kMaxShown = 8;
   std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  for (size_t i = 0; i < std::min(names.size(), kMaxShown); ++i) text += (i == 0 ? "" : ", ") + names[i];
+  if (names.size() > kMaxShown) text += " and " + std::to_string(names.size() - kMaxShown) + " more";
   return text;
 }
 
-double RoundRadius(const mjModel& engine, int body) {
-  double radius = 0.0;
-  for (int geom = engine.body_geomadr[body];
-       geom >= 0 && geom < engine.body_geomadr[body] + engine.body_geomnum[body]; ++geom) {
-    const int type = engine.geom_type[geom];
-    if (type == mjGEOM_SPHERE || type == mjGEOM_CYLINDER || type == mjGEOM_CAPSULE ||
-        type == mjGEOM_ELLIPSOID) {
-      radius = std::max(radius, engine.geom_size[3 * geom]);
-    }
+bool IsRound(int geom_type) {
+  return geom_type == mjGEOM_SPHERE || geom_type == mjGEOM_CYLINDER || geom_type == mjGEOM_CAPSULE ||
+         geom_type == mjGEOM_ELLIPSOID;
+}
+
+/// Radius that a body rolls on: of its round geoms that can touch something, or of all when none can.
+double CalcRollingRadius(const mjModel& engine, int body) {
+  double touching = 0.0;
+  double any = 0.0;
+  for (int geom = 0; geom < engine.ngeom; ++geom) {
+    if (engine.geom_bodyid[geom] != body || !IsRound(engine.geom_type[geom])) continue;
+    const double radius = engine.geom_size[3 * geom];
+    any = std::max(any, radius);
+    if (CanTouch(engine, geom)) touching = std::max(touching, radius);
   }
-  return radius;
+  return touching > 0.0 ? touching : any;
 }
 
 /// The wheels' and base's joints of an MJCF are known by name or place; everything else must be in the
@@ -74,7 +82,7 @@ void Adapter::MatchJoints(const std::string& engine_source) {
   const mjModel& engine = *engine_;
   const auto fail = [&](const std::string& problem) { throw InputError(engine_source + ": " + problem); };
 
-  // First what is missing on either side, all of it in one line.
+  // First what is missing on either side, in one line.
   std::vector<std::string> only_in_model;
   std::set<int> known = ListBaseJoints(*model_, engine);
   const auto need = [&](mjtObj type, const std::string& kind, const std::string& name) {
@@ -194,7 +202,7 @@ void Adapter::MatchWheels(const mjData& reference, const std::string& engine_sou
       throw InputError(key + "must be a hinge on body " + Quote(model_->base().link));
     }
     wheel.dof = engine_->jnt_dofadr[wheel.joint];
-    wheel.radius = RoundRadius(*engine_, body);
+    wheel.radius = CalcRollingRadius(*engine_, body);
     if (wheel.radius <= 0.0) throw InputError(key + "its body needs a round geom");
     wheel.center = model_->base().X_B0.inverse() * MapVector(reference.xanchor + 3 * wheel.joint);
     wheel.axis = MapVector(reference.xaxis + 3 * wheel.joint);

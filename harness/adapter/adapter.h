@@ -19,7 +19,7 @@ namespace dexcheck {
 struct EngineWheel {
   int joint = -1;
   int dof = -1;
-  double radius = 0.0;       ///< Of the wheel's round geoms, m.
+  double radius = 0.0;       ///< Of the round geom that touches the floor, m.
   Vector3d center{0, 0, 0};  ///< In Sigma_0 at the reference pose, m.
   Vector3d axis{0, 1, 0};    ///< Hinge axis in Sigma_0; +y makes positive rates roll forward.
 };
@@ -32,8 +32,8 @@ struct EngineWheel {
 /// joint.
 class Adapter {
  public:
-  /// @throws InputError that lists every joint, body or site that the other side lacks, or names one whose
-  /// kind differs.
+  /// @throws InputError that lists the joints, bodies and sites that the other side lacks (the first few of
+  /// many), or names one whose kind differs.
   Adapter(const RobotModel& model, const mjModel& engine, const std::string& engine_source);
 
   [[nodiscard]] const RobotModel& model() const { return *model_; }

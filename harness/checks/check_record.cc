@@ -15,6 +15,20 @@ std::string DescribeVelocity(int coordinate, const RobotModel& model, int base_v
 
 }  // namespace
 
+const char* NameOf(CheckKind kind) {
+  switch (kind) {
+    case CheckKind::kBalance:
+      return "balance";
+    case CheckKind::kPrediction:
+      return "prediction";
+    case CheckKind::kAssumption:
+      return "assumption";
+    case CheckKind::kModel:
+      break;
+  }
+  return "model";
+}
+
 std::string Describe(const Location& where, const RobotModel& model, int base_velocities) {
   switch (where.kind) {
     case Location::Kind::kJoint: {

@@ -14,6 +14,9 @@ namespace dexcheck {
 /// Which of the harness's four questions a check answers.
 enum class CheckKind { kModel, kBalance, kPrediction, kAssumption };
 
+/// "model", "balance", "prediction" or "assumption".
+const char* NameOf(CheckKind kind);
+
 /// The part of the robot that a compared number belongs to.
 struct Location {
   enum class Kind { kWhole, kJoint, kLink, kFrame, kVelocity, kVelocityPair, kWheel, kObject };

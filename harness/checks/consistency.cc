@@ -92,8 +92,9 @@ ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOpti
   VectorXd w = VectorXd::Zero(model.num_velocities());
   Vector6d X_o = Vector6d::Zero();
   Vector6d X_o_dot = Vector6d::Zero();
-  constexpr long kProgressEvery = 100;
-  for (long sample = 0; sample < options.samples; ++sample) {
+  bool go_on = true;
+  while (go_on && result.samples < options.samples) {
+    const long sample = result.samples++;
     DrawPositions(model, options, &source, &q);
     DrawVelocity(model, options, &source, &xi);
     DrawVelocity(model, options, &source, &w);
@@ -102,7 +103,7 @@ ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOpti
       DrawObject(options, &source, &X_o, &X_o_dot);
       object_check->Compare(X_o, X_o_dot, sample);
     }
-    if ((sample + 1) % kProgressEvery == 0 && !progress(sample + 1)) break;
+    go_on = progress(result.samples);
   }
   result.terms = check.records();
   if (object_check) {

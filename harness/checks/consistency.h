@@ -23,13 +23,14 @@ struct ConsistencyOptions {
 struct ConsistencyResult {
   GateResult gate;
   std::vector<CheckRecord> terms;
+  long samples = 0;  ///< Compared: fewer than asked for when `progress` said stop.
   double seconds = 0.0;
 
   [[nodiscard]] bool Agrees() const;
 };
 
 /// The static gate, then all terms of robot and object at random states over the joint ranges.
-/// @param progress called with the number of samples done, about every hundred samples; stops early on false.
+/// @param progress called after each sample with the number done; its false ends the work early.
 ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOptions& options,
                                    const std::function<bool(long)>& progress);
 

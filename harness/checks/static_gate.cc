@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "harness/engine/engine.h"
 #include "harness/engine/torus_collision.h"
@@ -121,7 +123,7 @@ class StaticGate {
       Compare("wheel_mass", where, base.wheel.mass, engine_.body_mass[engine_.jnt_bodyid[wheel.joint]]);
     });
     each([&](const EngineWheel& wheel, const Location& where, double) {
-      // Of the wheel's body in its principal axes: about the hinge axis, and its trace.
+      // Of the wheel's body, about the hinge axis.
       const int body = engine_.jnt_bodyid[wheel.joint];
       mjtNum axis[3];
       mjtNum inverse[4];
@@ -139,16 +141,19 @@ class StaticGate {
     });
   }
 
-  /// Radius of the sphere whose centre is the frame's site; not a number when there is none.
+  /// The sphere at a frame's site, the one that can touch when there are several; -1 when there is none.
   [[nodiscard]] int FindTipGeom(int site) const {
     constexpr double kSamePlace = 1e-9;  // m; two decimal numbers for one point
-    const int body = engine_.site_bodyid[site];
+    int found = -1;
     for (int geom = 0; geom < engine_.ngeom; ++geom) {
-      if (engine_.geom_bodyid[geom] != body || engine_.geom_type[geom] != mjGEOM_SPHERE) continue;
+      if (engine_.geom_bodyid[geom] != engine_.site_bodyid[site]) continue;
+      if (engine_.geom_type[geom] != mjGEOM_SPHERE) continue;
       const Vector3d apart = MapVector(engine_.geom_pos + 3 * geom) - MapVector(engine_.site_pos + 3 * site);
-      if (apart.norm() < kSamePlace) return geom;
+      if (apart.norm() >= kSamePlace) continue;
+      if (CanTouch(engine_, geom)) return geom;
+      if (found < 0) found = geom;
     }
-    return -1;
+    return found;
   }
 
   void CompareFingertips() {
@@ -187,32 +192,55 @@ class StaticGate {
       Compare("object_shape", where, torus->ring_radius, ring_radius);
       Compare("object_shape", where, torus->tube_radius, tube_radius);
     }
-    // Sliding friction of the explicit contact pairs between fingertips and object.
+    for (const int frame : model_.fingertips()) CompareFriction(object, frame);
+  }
+
+  /// Sliding friction of the explicit contact pairs between a fingertip and the object. Without a pair the
+  /// two touch by their contype and conaffinity, or not at all.
+  void CompareFriction(const ObjectModel& object, int frame) {
+    const Location where{Location::Kind::kFrame, frame, -1};
+    const int tip = FindTipGeom(adapter_.frame_sites()[static_cast<size_t>(frame)]);
+    if (tip < 0) return;  // a finding of its own
+    bool touches = false;
     for (int pair = 0; pair < engine_.npair; ++pair) {
-      for (const int frame : model_.fingertips()) {
-        const int tip = FindTipGeom(adapter_.frame_sites()[static_cast<size_t>(frame)]);
-        const int geom1 = engine_.pair_geom1[pair];
-        const int geom2 = engine_.pair_geom2[pair];
-        const bool touches = (geom1 == tip && engine_.geom_bodyid[geom2] == body) ||
-                             (geom2 == tip && engine_.geom_bodyid[geom1] == body);
-        if (!touches) continue;
-        for (int k = 0; k < 2; ++k) {
-          Compare("contact_friction", {Location::Kind::kFrame, frame, -1}, object.friction,
-                  engine_.pair_friction[5 * pair + k]);
-        }
+      const int geom1 = engine_.pair_geom1[pair];
+      const int geom2 = engine_.pair_geom2[pair];
+      if (!(geom1 == tip && IsObject(geom2)) && !(geom2 == tip && IsObject(geom1))) continue;
+      touches = true;
+      for (int k = 0; k < 2; ++k) {
+        Compare("contact_friction", where, object.friction, engine_.pair_friction[5 * pair + k]);
       }
     }
+    if (touches) return;
+    // The engine takes the larger friction of two geoms of one priority.
+    double friction = kMissing;
+    for (int geom = 0; geom < engine_.ngeom; ++geom) {
+      const bool by_type = (engine_.geom_contype[tip] & engine_.geom_conaffinity[geom]) != 0 ||
+                           (engine_.geom_contype[geom] & engine_.geom_conaffinity[tip]) != 0;
+      if (IsObject(geom) && by_type) {
+        friction = std::max(engine_.geom_friction[3 * tip], engine_.geom_friction[3 * geom]);
+      }
+    }
+    Compare("contact_friction", where, object.friction, friction);
   }
+
+  [[nodiscard]] bool IsObject(int geom) const { return engine_.geom_bodyid[geom] == adapter_.object_body(); }
 
   /// Forces of the engine on the robot's joints that have no counterpart in the analytic model.
   void FindUnmodelledForces() {
-    for (int i = 0; i < model_.num_joints(); ++i) {
-      Compare("joint_spring", AtJoint(i), 0.0,
-              engine_.jnt_stiffness[adapter_.joint_ids()[static_cast<size_t>(i)]]);
+    std::vector<std::pair<int, Location>> joints;
+    for (const int joint : adapter_.base_joints()) joints.emplace_back(joint, AtLink(-1));
+    for (size_t k = 0; k < adapter_.wheels().size(); ++k) {
+      joints.emplace_back(adapter_.wheels()[k].joint,
+                          Location{Location::Kind::kWheel, static_cast<int>(k), -1});
     }
     for (int i = 0; i < model_.num_joints(); ++i) {
-      Compare("joint_dry_friction", AtJoint(i), 0.0,
-              engine_.dof_frictionloss[adapter_.joint_dofs()[static_cast<size_t>(i)]]);
+      joints.emplace_back(adapter_.joint_ids()[static_cast<size_t>(i)], AtJoint(i));
+    }
+    for (const auto& [joint, where] : joints)
+      Compare("joint_spring", where, 0.0, engine_.jnt_stiffness[joint]);
+    for (const auto& [joint, where] : joints) {
+      Compare("joint_dry_friction", where, 0.0, engine_.dof_frictionloss[engine_.jnt_dofadr[joint]]);
     }
     Compare("fluid", {}, 0.0, engine_.opt.density);
     Compare("fluid", {}, 0.0, engine_.opt.viscosity);

@@ -1,18 +1,17 @@
 #include "harness/cli/commands.h"
 
-#include <unistd.h>
+#include <charconv>
+#include <string>
+#include <system_error>
 
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
-
-#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/cli/shipped_files.h"
 
 namespace dexcheck::cli {
 
 void AddRobotOptions(CLI::App* command, RobotFiles* files) {
-  files->robot = DEXCHECK_DATA_DIR "/controller/parameters/assistant_robot.toml";
-  files->mjcf = DEXCHECK_DATA_DIR "/mjcf/scene.xml";
+  files->robot = FindShippedFile("controller/parameters/assistant_robot.toml");
+  files->mjcf = FindShippedFile("mjcf/scene.xml");
   CLI::Option* robot =
       command->add_option("--robot", files->robot, "Parameter file (TOML) of the analytic model")
           ->type_name("FILE.toml");
@@ -22,25 +21,16 @@ void AddRobotOptions(CLI::App* command, RobotFiles* files) {
   mjcf->needs(robot);
 }
 
-void WriteFile(const std::filesystem::path& path, const std::string& text) {
-  if (path == "-") {
-    std::fwrite(text.data(), 1, text.size(), stdout);
-    return;
-  }
-  const auto fail = [&] { throw InputError(path.string() + ": cannot be written: " + std::strerror(errno)); };
-  const std::filesystem::path partial = path.string() + ".partial-" + std::to_string(::getpid());
-  std::FILE* file = std::fopen(partial.c_str(), "wb");
-  if (file == nullptr) fail();
-  const bool written = std::fwrite(text.data(), 1, text.size(), file) == text.size() &&
-                       std::fflush(file) == 0 && ::fsync(::fileno(file)) == 0;
-  const int write_error = errno;
-  std::fclose(file);
-  if (!written || std::rename(partial.c_str(), path.c_str()) != 0) {
-    const int reason = written ? errno : write_error;
-    std::remove(partial.c_str());
-    errno = reason;
-    fail();
-  }
+CLI::Validator WholeNumber(std::uint64_t least, std::uint64_t most) {
+  const auto check = [least, most](const std::string& text) -> std::string {
+    std::uint64_t value = 0;
+    const char* const end = text.data() + text.size();
+    const std::from_chars_result result = std::from_chars(text.data(), end, value);
+    if (result.ec == std::errc() && result.ptr == end && least <= value && value <= most) return {};
+    return "must be a whole number from " + std::to_string(least) + " to " + std::to_string(most) + ", got " +
+           Quote(text);
+  };
+  return {check, ""};
 }
 
 }  // namespace dexcheck::cli

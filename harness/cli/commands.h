@@ -4,9 +4,8 @@
 // run.
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <filesystem>
-#include <functional>
-#include <string>
 
 namespace dexcheck::cli {
 
@@ -19,15 +18,14 @@ struct RobotFiles {
   std::filesystem::path mjcf;
 };
 
-/// Adds --robot and --mjcf.
+/// Adds --robot and --mjcf, both or neither.
 void AddRobotOptions(CLI::App* command, RobotFiles* files);
+
+/// Accepts decimal whole numbers from `least` to `most`.
+CLI::Validator WholeNumber(std::uint64_t least, std::uint64_t most);
 
 /// Each adds its command to `app`; the callback stores what running it returns in `exit_code`.
 void AddConsistencyCommand(CLI::App* app, int* exit_code);
 void AddEvalCommand(CLI::App* app, int* exit_code);
-
-/// Writes `text` to a file that either appears whole or not at all; "-" is standard output.
-/// @throws InputError when the file cannot be written; what stood there before is untouched.
-void WriteFile(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace dexcheck::cli

@@ -1,12 +1,16 @@
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
 
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/engine/engine.h"
 
@@ -20,16 +24,18 @@ struct Request {
   ConsistencyOptions options;
   std::string json_file;
   bool quiet = false;
+
+  /// The results themselves take standard output: a table would spoil them.
+  [[nodiscard]] bool PrintsJson() const { return json_file == "-"; }
 };
 
 std::string FileName(const std::filesystem::path& path) { return path.filename().string(); }
 
 /// Large results first fail, then where to look: what a person reads.
-void PrintTable(const Request& request, const RobotModel& model, const ConsistencyResult& result,
-                long samples) {
+void PrintTable(const Request& request, const RobotModel& model, const ConsistencyResult& result) {
   const int base = model.num_base_velocities();
   fmt::print("{}: {} against {}, MuJoCo {}\n{} random states (seed {}), {:.1f} s\n\n", model.name(),
-             FileName(request.files.robot), FileName(request.files.mjcf), mj_versionString(), samples,
+             FileName(request.files.robot), FileName(request.files.mjcf), mj_versionString(), result.samples,
              request.options.seed, result.seconds);
 
   fmt::print("{:<24}{:>9}  {:>12}  {:>9}\n", "constant", "compared", "worst error", "bound");
@@ -49,6 +55,9 @@ void PrintTable(const Request& request, const RobotModel& model, const Consisten
 
 void PrintVerdict(const Request& request, const RobotModel& model, const ConsistencyResult& result) {
   const int base = model.num_base_velocities();
+  if (result.samples < request.options.samples) {
+    fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
+  }
   if (result.Agrees()) {
     fmt::print("AGREE: the analytic model and MuJoCo agree to rounding in all {} terms.\n",
                result.terms.size());
@@ -69,28 +78,30 @@ void PrintVerdict(const Request& request, const RobotModel& model, const Consist
 
 Json ToJson(const CheckRecord& record, const RobotModel& model) {
   const int base = model.num_base_velocities();
-  Json json = {{"kind", "model"},
-               {"max", record.worst},
-               {"bound", record.bound},
-               {"pass", !record.failed},
-               {"compared", record.comparisons},
-               {"where", Describe(record.where, model, base)},
-               {"sample", record.sample},
-               {"model", record.model_value},
+  Json json = {{"kind", NameOf(record.kind)},    {"max", record.worst},
+               {"bound", record.bound},          {"pass", !record.failed},
+               {"compared", record.comparisons}, {"where", Describe(record.where, model, base)},
+               {"sample", record.sample},        {"model", record.model_value},
                {"engine", record.engine_value}};
   if (record.failed) json["first_failure"] = Describe(record.first_failure, model, base);
   return json;
 }
 
-std::string WriteJson(const Request& request, const RobotModel& model, const ConsistencyResult& result,
-                      long samples) {
+const char* Judge(ExitCode code) {
+  if (code == kSuccess) return "pass";
+  return code == kDisagreement ? "disagreement" : "failed";
+}
+
+std::string ToText(const Request& request, const RobotModel& model, const ConsistencyResult& result,
+                   ExitCode code) {
   Json json = {{"robot", request.files.robot.string()},
                {"mjcf", request.files.mjcf.string()},
                {"mujoco", mj_versionString()},
-               {"samples", samples},
+               {"samples", result.samples},
+               {"samples_requested", request.options.samples},
                {"seed", request.options.seed},
                {"seconds", result.seconds},
-               {"verdict", result.Agrees() ? "pass" : "disagreement"}};
+               {"verdict", Judge(code)}};
   json["checks"] = Json::object();
   for (const CheckRecord& record : result.gate.records) json["checks"][record.name] = ToJson(record, model);
   for (const CheckRecord& record : result.terms) json["checks"][record.name] = ToJson(record, model);
@@ -109,36 +120,44 @@ int Run(const Request& request) {
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
   const Adapter adapter(model, *engine, request.files.mjcf.string());
   CatchInterrupts();
-  long done = 0;
+  std::optional<OutputFile> json;
+  if (!request.json_file.empty()) json.emplace(request.json_file);
   ProgressBar bar("comparing", request.options.samples, request.quiet);
   const ConsistencyResult result = CheckConsistency(adapter, request.options, [&](long samples) {
-    done = samples;
     bar.Update(samples);
     return !IsInterrupted();
   });
   bar.Finish();
-  const bool complete = !IsInterrupted();
-  if (complete) done = request.options.samples;
-  if (!request.quiet) PrintTable(request, model, result, done);
-  if (!complete) fmt::print("interrupted after {} of {} samples\n", done, request.options.samples);
-  PrintVerdict(request, model, result);
-  if (!request.json_file.empty()) WriteFile(request.json_file, WriteJson(request, model, result, done));
-  if (!result.Agrees()) return kDisagreement;
-  return complete ? kSuccess : kFailure;
+  ExitCode code = result.samples < request.options.samples ? kFailure : kSuccess;
+  if (!result.Agrees()) code = kDisagreement;
+  if (json) json->Write(ToText(request, model, result, code));
+  if (!request.PrintsJson()) {
+    if (!request.quiet) PrintTable(request, model, result);
+    PrintVerdict(request, model, result);
+  }
+  return code;
 }
 
 }  // namespace
 
 void AddConsistencyCommand(CLI::App* app, int* exit_code) {
+  constexpr long kMaxSamples = 1000000000;
   const auto request = std::make_shared<Request>();
   CLI::App* command =
       app->add_subcommand("consistency", "Compare every term of model and engine at random states");
   AddRobotOptions(command, &request->files);
   command->add_option("--samples", request->options.samples, "Number of random states")
-      ->check(CLI::PositiveNumber)
+      ->type_name("N")
+      ->check(WholeNumber(1, kMaxSamples))
       ->capture_default_str();
-  command->add_option("--seed", request->options.seed, "Of the random states")->capture_default_str();
-  command->add_option("--json", request->json_file, "Write the results to this file (- for standard output)");
+  command->add_option("--seed", request->options.seed, "Of the random states")
+      ->type_name("N")
+      ->check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
+      ->capture_default_str();
+  command
+      ->add_option("--json", request->json_file,
+                   "Write the results to this file (- for standard output, then without the table)")
+      ->type_name("FILE.json");
   command->add_flag("--quiet", request->quiet, "Print the verdict only");
   command->callback([=] { *exit_code = Run(*request); });
 }

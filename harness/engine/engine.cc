@@ -1,13 +1,16 @@
 #include "harness/engine/engine.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <new>
+#include <system_error>
 
 #include "controller/common/errors.h"
+#include "harness/engine/finite_check.h"
 #include "harness/engine/torus_collision.h"
 
 namespace dexcheck {
@@ -20,6 +23,8 @@ constexpr int kEngineFailureExitCode = 3;
 // Without these the engine writes MUJOCO_LOG.TXT into the working directory.
 void InstallMessageHandlers() {
   mju_user_warning = [](const char* message) {
+    // Without the place; CheckFinite names it.
+    if (std::strstr(message, "XML contains a 'NaN'") != nullptr) return;
     std::fprintf(stderr, "dexcheck: MuJoCo warning: %s\n", message);
   };
   mju_user_error = [](const char* message) {
@@ -28,10 +33,26 @@ void InstallMessageHandlers() {
   };
 }
 
+/// "2.2.2" of 222.
+std::string FormatVersion(int version) {
+  return std::to_string(version / 100) + "." + std::to_string(version / 10 % 10) + "." +
+         std::to_string(version % 10);
+}
+
 void CheckVersion() {
   if (mj_version() == mjVERSION_HEADER) return;
-  throw InputError("libmujoco: version " + std::to_string(mjVERSION_HEADER) + " needed (as built), found " +
-                   std::to_string(mj_version()));
+  throw InputError("libmujoco: version must be " + FormatVersion(mjVERSION_HEADER) + ", got " +
+                   FormatVersion(mj_version()));
+}
+
+void CheckReadable(const std::filesystem::path& path) {
+  const auto fail = [&](const std::string& why) {
+    throw InputError(path.string() + ": cannot be read: " + why);
+  };
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) fail("is a directory");
+  errno = 0;
+  if (!std::ifstream(path)) fail(std::strerror(errno));
 }
 
 void PrepareEngine() {
@@ -50,8 +71,10 @@ MjModelPtr Load(const std::string& path, const mjVFS* vfs, const std::string& so
   char message[1024] = "";
   MjModelPtr model(mj_loadXML(path.c_str(), vfs, message, sizeof(message)));
   if (!model) throw InputError(source + ": not a valid MJCF model: " + OneLine(message));
-  if (message[0] != '\0')
+  CheckFinite(*model, source);
+  if (message[0] != '\0') {
     std::fprintf(stderr, "dexcheck: %s: %s\n", source.c_str(), OneLine(message).c_str());
+  }
   return model;
 }
 
@@ -59,9 +82,7 @@ MjModelPtr Load(const std::string& path, const mjVFS* vfs, const std::string& so
 
 MjModelPtr LoadMjcf(const std::filesystem::path& path) {
   PrepareEngine();
-  if (!std::filesystem::is_regular_file(path) || !std::ifstream(path)) {
-    throw InputError(path.string() + ": cannot be read");
-  }
+  CheckReadable(path);
   return Load(path.string(), nullptr, path.string());
 }
 
@@ -91,6 +112,13 @@ MjDataPtr MakeData(const mjModel& model) {
 std::string NameOf(const mjModel& model, mjtObj type, int id) {
   const char* name = mj_id2name(&model, type, id);
   return name == nullptr || *name == '\0' ? "#" + std::to_string(id) : name;
+}
+
+bool CanTouch(const mjModel& model, int geom) {
+  for (int pair = 0; pair < model.npair; ++pair) {
+    if (model.pair_geom1[pair] == geom || model.pair_geom2[pair] == geom) return true;
+  }
+  return model.geom_contype[geom] != 0 || model.geom_conaffinity[geom] != 0;
 }
 
 }  // namespace dexcheck

@@ -34,4 +34,7 @@ MjDataPtr MakeData(const mjModel& model);
 /// Name of an element, or "#ID" when it has none.
 std::string NameOf(const mjModel& model, mjtObj type, int id);
 
+/// Whether a geom takes part in contacts at all: by an explicit pair, or by its contype or conaffinity.
+bool CanTouch(const mjModel& model, int geom);
+
 }  // namespace dexcheck

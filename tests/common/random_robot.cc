@@ -155,24 +155,26 @@ RobotSpec MakeRandomRobot(const RandomRobotOptions& options, std::mt19937* rando
   return spec;
 }
 
-std::string WriteMjcf(const RobotSpec& spec, bool planar_by_free_joint) {
+std::string WriteMjcf(const RobotSpec& spec, bool planar_by_free_joint, const Pose& X_0b) {
   std::string text = fmt::format(
       "<mujoco>\n<compiler angle=\"radian\" balanceinertia=\"false\"/>\n"
       "<option gravity=\"{:.17g} {:.17g} {:.17g}\"/>\n<worldbody>\n<body name=\"{}\" {}>\n",
-      spec.gravity.x(), spec.gravity.y(), spec.gravity.z(), spec.base.link, WritePose(spec.base.X_B0));
+      spec.gravity.x(), spec.gravity.y(), spec.gravity.z(), spec.base.link, WritePose(spec.base.X_B0 * X_0b));
   if (spec.base.type != BaseType::kFixed) {
     text += planar_by_free_joint
                 ? "<freejoint/>\n"
                 : "<joint type=\"slide\" axis=\"1 0 0\"/>\n<joint type=\"slide\" axis=\"0 1 0\"/>\n"
                   "<joint axis=\"0 0 1\"/>\n";
-    text += WriteInertial(spec.base.body);
   }
+  // Everything stands in Sigma_0, which is welded to the base's body.
+  text += fmt::format("<body {}>\n", WritePose(X_0b.inverse()));
+  if (spec.base.type != BaseType::kFixed) text += WriteInertial(spec.base.body);
   if (spec.base.type == BaseType::kDifferentialDrive) {
     WriteWheel(spec.base, spec.base.wheel_joint_right, -0.5 * spec.base.wheel_distance, &text);
     WriteWheel(spec.base, spec.base.wheel_joint_left, 0.5 * spec.base.wheel_distance, &text);
   }
   WriteLinkContent(spec, -1, &text);
-  return text + "</body>\n</worldbody>\n</mujoco>\n";
+  return text + "</body>\n</body>\n</worldbody>\n</mujoco>\n";
 }
 
 VectorXd DrawPositions(const RobotModel& model, std::mt19937* random) {

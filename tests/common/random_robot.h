@@ -25,7 +25,9 @@ struct RandomRobotOptions {
 RobotSpec MakeRandomRobot(const RandomRobotOptions& options, std::mt19937* random);
 
 /// The same robot in MJCF: bodies with explicit inertias, joints about z, one site per frame.
-std::string WriteMjcf(const RobotSpec& spec, bool planar_by_free_joint = true);
+/// @param X_0b frame of the base's body in Sigma_0.
+std::string WriteMjcf(const RobotSpec& spec, bool planar_by_free_joint = true,
+                      const Pose& X_0b = Pose::Identity());
 
 /// q' inside the joint ranges, the base within 2 m and any heading; velocities up to 5 rad/s and 2 m/s.
 VectorXd DrawPositions(const RobotModel& model, std::mt19937* random);

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdio>
+#include <filesystem>
+#include <string>
+
+namespace dexcheck::cli {
+
+/// A file that appears whole or not at all. Make it before long work starts, so that a bad path is known at
+/// once. Devices and pipes, which cannot be replaced, are written to in place; "-" is standard output.
+class OutputFile {
+ public:
+  /// @throws InputError "PATH: cannot be written: reason".
+  explicit OutputFile(const std::filesystem::path& path);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+
+  /// Writes the whole content, once.
+  /// @throws InputError like the constructor; what stood under the path before is then untouched.
+  void Write(const std::string& text);
+
+  [[nodiscard]] bool is_stdout() const { return file_ == stdout; }
+
+ private:
+  [[noreturn]] void Fail(int error) const;
+
+  std::filesystem::path path_;     // as given, for messages
+  std::filesystem::path target_;   // links followed
+  std::filesystem::path partial_;  // empty when written in place
+  std::FILE* file_ = nullptr;
+};
+
+}  // namespace dexcheck::cli

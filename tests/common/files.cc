@@ -1,0 +1,49 @@
+#include "tests/common/files.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <system_error>
+
+namespace dexcheck::testing {
+
+TempFolder::TempFolder() {
+  std::string name = (std::filesystem::temp_directory_path() / "dexcheck-XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make a folder like " + name);
+  path_ = name;
+}
+
+TempFolder::~TempFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+std::string ReadText(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  EXPECT_TRUE(file.good()) << path;
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+void WriteText(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  EXPECT_TRUE(file.good()) << path;
+}
+
+std::string ReplaceOnce(std::string text, const std::string& from, const std::string& to) {
+  const size_t at = text.find(from);
+  if (at == std::string::npos) {
+    ADD_FAILURE() << "not there: " << from;
+    return text;
+  }
+  EXPECT_EQ(text.find(from, at + 1), std::string::npos) << "not unique: " << from;
+  return text.replace(at, from.size(), to);
+}
+
+}  // namespace dexcheck::testing

@@ -1,0 +1,30 @@
+#pragma once
+
+// Files for tests that need real ones.
+
+#include <filesystem>
+#include <string>
+
+namespace dexcheck::testing {
+
+/// A new empty folder, removed with all that is in it at the end.
+class TempFolder {
+ public:
+  TempFolder();
+  ~TempFolder();
+  TempFolder(const TempFolder&) = delete;
+  TempFolder& operator=(const TempFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+std::string ReadText(const std::filesystem::path& path);
+void WriteText(const std::filesystem::path& path, const std::string& text);
+
+/// The text with its only occurrence of `from` replaced; anything but one occurrence fails the test.
+std::string ReplaceOnce(std::string text, const std::string& from, const std::string& to);
+
+}  // namespace dexcheck::testing

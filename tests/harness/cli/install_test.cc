@@ -1,0 +1,42 @@
+// An installed program finds its shipped files, also after its folder was moved.
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/harness/cli/dexcheck_program.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::ProgramResult;
+using testing::ReadText;
+using testing::ReplaceOnce;
+using testing::RunProgram;
+using testing::WriteText;
+
+TEST(InstalledProgram, UsesTheFilesBesideIt) {
+  const testing::TempFolder folder;
+  const std::filesystem::path first = folder.path() / "first";
+  const ProgramResult install =
+      RunProgram({DEXCHECK_CMAKE, "--install", DEXCHECK_BUILD_DIR, "--prefix", first.string()});
+  ASSERT_EQ(install.exit_code, 0) << install.out << install.err;
+  const std::filesystem::path prefix = folder.path() / "moved here";
+  std::filesystem::rename(first, prefix);
+
+  const std::vector<std::string> command = {prefix / "bin/dexcheck", "consistency", "--samples", "10"};
+  const ProgramResult result = RunProgram({command[0], command[1], command[2], command[3], "--json", "-"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json results = nlohmann::json::parse(result.out);
+  const std::filesystem::path share = std::filesystem::canonical(prefix) / "share/dexcheck";
+  EXPECT_EQ(results.at("robot"), (share / "controller/parameters/assistant_robot.toml").string());
+  EXPECT_EQ(results.at("mjcf"), (share / "mjcf/scene.xml").string());
+
+  // These files and no others: a change in them is noticed.
+  const std::filesystem::path robot = share / "controller/parameters/assistant_robot.toml";
+  WriteText(robot, ReplaceOnce(ReadText(robot), "L_7 = 0.25 ", "L_7 = 0.26 "));
+  EXPECT_EQ(RunProgram(command).exit_code, 1);
+}
+
+}  // namespace
+}  // namespace dexcheck

@@ -1,0 +1,150 @@
+// The command line itself: usage errors, help, and outputs that cannot be written.
+
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+
+#include "tests/harness/cli/dexcheck_program.h"
+
+namespace dexcheck {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::IsRefused;
+using testing::ReadText;
+using testing::RunDexcheck;
+using testing::TempFolder;
+using testing::WriteText;
+
+TEST(Usage, UnknownWordsAreNamed) {
+  EXPECT_TRUE(IsRefused(RunDexcheck({}), {"A subcommand is required"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"simulate"}), {"unknown command \"simulate\""}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"consistancy"}), {"\"consistancy\"", "did you mean \"consistency\"?"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"consistency", "--sample", "3"}),
+                        {"unknown option \"--sample\"", "did you mean \"--samples\"?"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"consistency", "panda.toml"}), {"unknown argument \"panda.toml\""}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"consistency", "--quiet=maybe"}), {"quiet", "maybe"}));
+}
+
+TEST(Usage, NumbersOfSamplesAreWholeAndPositive) {
+  for (const char* samples : {"0", "-3", "abc", "", "2.5", "1e3", "0x10", " 7", "99999999999999999999"}) {
+    EXPECT_TRUE(IsRefused(
+        RunDexcheck({"consistency", "--samples", samples}),
+        {"--samples: must be a whole number from 1 to 1000000000, got \"" + std::string(samples) + "\""}));
+  }
+  for (const char* seed : {"-1", "abc", "18446744073709551616"}) {
+    EXPECT_TRUE(IsRefused(RunDexcheck({"consistency", "--seed", seed}),
+                          {"--seed: must be a whole number", "got \"" + std::string(seed) + "\""}));
+  }
+  EXPECT_TRUE(IsRefused(RunDexcheck({"consistency", "--samples"}), {"--samples"}));
+}
+
+TEST(Usage, RobotAndMjcfBelongTogether) {
+  const std::string robot = testing::kParameters + "panda.toml";
+  const std::string mjcf = testing::kMjcf + "panda.xml";
+  EXPECT_TRUE(IsRefused(RunDexcheck({"consistency", "--robot", robot}), {"--robot requires --mjcf"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"consistency", "--mjcf", mjcf}), {"--mjcf requires --robot"}));
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck({"eval", "--state", "s.json", "--mjcf", mjcf}), {"--mjcf requires --robot"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"eval"}), {"--state is required"}));
+}
+
+TEST(Usage, HelpMentionsEveryCommandAndOption) {
+  const auto help = [](const std::vector<std::string>& arguments) {
+    const testing::ProgramResult result = RunDexcheck(arguments);
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_EQ(result.err, "");
+    return result.out;
+  };
+  for (const char* word : {"consistency", "eval", "--help", "--version"}) {
+    EXPECT_THAT(help({"--help"}), HasSubstr(word));
+  }
+  for (const char* word : {"--robot FILE.toml", "--mjcf FILE.xml", "--samples N=10000", "--seed N=1",
+                           "--json FILE.json", "--quiet"}) {
+    EXPECT_THAT(help({"consistency", "--help"}), HasSubstr(word));
+  }
+  for (const char* word :
+       {"--robot FILE.toml", "--mjcf FILE.xml", "--state STATE.json REQUIRED", "--out FILE.json=-"}) {
+    EXPECT_THAT(help({"eval", "--help"}), HasSubstr(word));
+  }
+  EXPECT_THAT(help({"--version"}), ::testing::MatchesRegex("[0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+/// The same checks for the two commands that write a file.
+class Outputs : public ::testing::TestWithParam<std::vector<std::string>> {
+ protected:
+  Outputs() {
+    WriteText(folder_.path() / "state.json", R"({"q": [0.1, 0.2], "xi": [0.3, 0.4]})");
+    WriteText(folder_.path() / "robot.toml", testing::kTwoLinksToml);
+    WriteText(folder_.path() / "robot.xml", testing::kTwoLinksMjcf);
+  }
+
+  /// Runs the command with its output meant for `file`.
+  testing::ProgramResult Run(const std::string& file, testing::ProgramOptions options = {}) {
+    std::vector<std::string> arguments = GetParam();
+    arguments.push_back(file);
+    options.folder = folder_.path();
+    return RunDexcheck(arguments, options);
+  }
+
+  [[nodiscard]] long CountFiles() const {
+    const auto files = std::filesystem::directory_iterator(folder_.path());
+    return std::distance(begin(files), end(files));
+  }
+
+  TempFolder folder_;
+};
+
+TEST_P(Outputs, ReplaceWhatWasThere) {
+  WriteText(folder_.path() / "out.json", "before");
+  std::filesystem::create_symlink("out.json", folder_.path() / "link.json");
+  EXPECT_EQ(Run("link.json").exit_code, 0);
+  EXPECT_THAT(ReadText(folder_.path() / "out.json"), ::testing::StartsWith("{\n"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_.path() / "link.json"));
+  EXPECT_EQ(CountFiles(), 5);
+}
+
+TEST_P(Outputs, ThatCannotBeWrittenAreNamed) {
+  EXPECT_TRUE(IsRefused(Run("no/folder.json"), {"no/folder.json: cannot be written: No such file"}));
+  EXPECT_TRUE(IsRefused(Run("."), {".: cannot be written: Is a directory"}));
+  EXPECT_EQ(CountFiles(), 3);
+}
+
+TEST_P(Outputs, StayWholeOnAFullDisk) {
+  WriteText(folder_.path() / "out.json", "before");
+  testing::ProgramOptions options;
+  options.largest_file = 1000;
+  EXPECT_TRUE(IsRefused(Run("out.json", options), {"out.json: cannot be written: File too large"}));
+  EXPECT_EQ(ReadText(folder_.path() / "out.json"), "before");
+  EXPECT_EQ(CountFiles(), 4);
+}
+
+bool IsDevice(const char* path) {
+  struct stat status {};
+  return ::stat(path, &status) == 0 && S_ISCHR(status.st_mode);
+}
+
+// By a link in the temporary folder, so that a program that replaces devices by files would replace the link
+// only.
+TEST_P(Outputs, DevicesAreWrittenToInPlace) {
+  if (!IsDevice("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  std::filesystem::create_symlink("/dev/full", folder_.path() / "full.json");
+  EXPECT_TRUE(IsRefused(Run("full.json"), {"full.json: cannot be written: No space left on device"}));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_.path() / "full.json"));
+  EXPECT_TRUE(IsDevice("/dev/full"));
+  EXPECT_EQ(CountFiles(), 4);
+
+  testing::ProgramOptions options;
+  options.out = "/dev/full";
+  EXPECT_TRUE(IsRefused(Run("-", options), {"standard output: cannot be written: No space left on device"}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Commands, Outputs,
+                         ::testing::Values(std::vector<std::string>{"consistency", "--samples", "2",
+                                                                    "--robot", "robot.toml", "--mjcf",
+                                                                    "robot.xml", "--json"},
+                                           std::vector<std::string>{"eval", "--robot", "robot.toml",
+                                                                    "--state", "state.json", "--out"}),
+                         [](const auto& info) { return info.param.front(); });
+
+}  // namespace
+}  // namespace dexcheck
