@@ -9,11 +9,6 @@
 namespace dexcheck {
 namespace {
 
-// Columns of the path are processed in blocks of this many; the rows of path_ are padded to a multiple.
-constexpr int kPathBlock = 8;
-
-int PaddedPathLength(int length) { return (length + kPathBlock - 1) / kPathBlock * kPathBlock; }
-
 void CheckSize(const char* name, Eigen::Index expected, Eigen::Index actual) {
   if (expected == actual) return;
   throw std::invalid_argument(std::string(name) + ": " + std::to_string(expected) +

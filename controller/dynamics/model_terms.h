@@ -35,7 +35,9 @@ struct EnergyAndMomentum {
 /// columns of a nonholonomic base (12) it is S^T C S + S^T M S_dot of (14).
 class ModelTerms {
  public:
+  /// The model must outlive the workspace.
   explicit ModelTerms(const RobotModel& model, Coordinates coordinates = Coordinates::kReduced);
+  explicit ModelTerms(RobotModel&&, Coordinates = Coordinates::kReduced) = delete;
 
   /// Poses and velocities of all links; the other calls read what this one stores.
   /// @param q q', num_positions entries, rad and m.
@@ -124,6 +126,10 @@ class ModelTerms {
     Matrix3d offset_R;
     Vector3d offset_p;
   };
+
+  // Columns of the path are processed in blocks of this many; the rows of path_ are padded to a multiple.
+  static constexpr int kPathBlock = 8;
+  static int PaddedPathLength(int length) { return (length + kPathBlock - 1) / kPathBlock * kPathBlock; }
 
   void SetBaseState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity);
   void SetBaseColumns(const Vector3d& base_linear_velocity);

@@ -126,7 +126,7 @@ void ModelTerms::FillRowAndColumn(int depth, int dof, const Column& column, cons
   row_force[1] += trace_Q * w[1] - (Q[1] * w[0] + Q[4] * w[1] + Q[7] * w[2]);
   row_force[2] += trace_Q * w[2] - (Q[2] * w[0] + Q[5] * w[1] + Q[8] * w[2]);
 
-  const int padded = (depth + 8) / 8 * 8;
+  const int padded = PaddedPathLength(depth + 1);
   ProjectOnPath(padded, path_.data(), path_.cols(), inertia_force, column_force, row_force, path_M_.data(),
                 path_C_column_.data(), path_C_row_.data());
   double* const M = M_.data();
