@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "controller/common/text.h"
+
 namespace dexcheck {
 
 /// Base of the project's own errors.
@@ -37,7 +39,7 @@ class SingularityError : public Error {
 inline void Require(bool condition, std::string_view name, std::string_view requirement, double value) {
   if (condition) return;
   throw std::invalid_argument(std::string(name) + ": " + std::string(requirement) + ", got " +
-                              std::to_string(value));
+                              FormatNumber(value));
 }
 
 }  // namespace dexcheck

@@ -27,8 +27,8 @@ int Run(const Request& request) {
               {"xi", std::vector<double>(state.xi.begin(), state.xi.end())}};
   try {
     AddModelTerms(model, state, &out);
-  } catch (const SingularityError& error) {
-    throw InputError(request.state_file + ": object.X_o: " + error.what());
+  } catch (const InputError& error) {
+    throw InputError(request.state_file + ": " + error.what());
   }
   if (!request.mjcf.empty()) {
     const MjModelPtr engine = LoadMjcf(request.mjcf);
@@ -52,7 +52,9 @@ void AddEvalCommand(CLI::App* app, int* exit_code) {
                    "The same robot for the engine: adds the engine's values of the terms as \"engine\"")
       ->type_name("FILE.xml")
       ->needs(robot);
-  command->add_option("--state", request->state_file, "JSON with q, xi, and optionally object and kappa")
+  command
+      ->add_option("--state", request->state_file,
+                   "JSON with q, xi; optionally object, kappa or contact_points, fingers, mu")
       ->type_name("STATE.json")
       ->required();
   command->add_option("--out", request->out, "File to write (- for standard output)")

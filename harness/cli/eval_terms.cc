@@ -1,29 +1,18 @@
 #include "harness/cli/eval_terms.h"
 
+#include <string>
+
+#include "controller/common/errors.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/platform.h"
 #include "controller/object/euler_zyz.h"
 #include "controller/object/object_dynamics.h"
+#include "harness/cli/eval_contacts.h"
+#include "harness/cli/json_matrix.h"
 #include "harness/engine/engine_terms.h"
 
 namespace dexcheck::cli {
 namespace {
-
-Json ToRows(const Eigen::Ref<const MatrixXd>& matrix) {
-  Json rows = Json::array();
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-    Json row = Json::array();
-    for (Eigen::Index j = 0; j < matrix.cols(); ++j) row.push_back(matrix(i, j));
-    rows.push_back(row);
-  }
-  return rows;
-}
-
-Json ToList(const Eigen::Ref<const VectorXd>& vector) {
-  Json list = Json::array();
-  for (const double value : vector) list.push_back(value);
-  return list;
-}
 
 /// What model and engine have alike.
 struct Forces {
@@ -120,7 +109,12 @@ void AddModelTerms(const RobotModel& model, const State& state, Json* out) {
   terms.CalcDynamics();
   AddReducedTerms(terms, state.xi, out);
   AddUnreducedTerms(model, state, out);
-  if (state.object) AddObjectTerms(model, *state.object, out);
+  try {
+    if (state.object) AddObjectTerms(model, *state.object, out);
+  } catch (const SingularityError& error) {
+    throw InputError(std::string("object.X_o: ") + error.what());
+  }
+  if (state.contacts) AddContactTerms(terms, state, out);
 }
 
 Json EvaluateEngineTerms(const Adapter& adapter, const State& state) {

@@ -3,17 +3,16 @@
 // Terms of model and engine at one state, as JSON by their names in controller/NOTATION.md; matrices are
 // lists of rows.
 
-#include <nlohmann/json.hpp>
-
 #include "harness/adapter/adapter.h"
+#include "harness/cli/json_matrix.h"
 #include "harness/cli/state_file.h"
 
 namespace dexcheck::cli {
 
-using Json = nlohmann::ordered_json;
-
-/// Adds every term of the robot, and those of the object when the state has one.
-/// @throws SingularityError where the object's ZYZ angles are singular.
+/// Adds every term of the robot, those of the object when the state has one, and those of the contacts when
+/// it has them.
+/// @throws SingularityError where the object's ZYZ angles are singular, or where contacts cannot be
+/// evaluated.
 void AddModelTerms(const RobotModel& model, const State& state, Json* out);
 
 /// The engine's values of the model's terms of the same names: M_bar, C_bar_xi, gravity, friction, F_bar,

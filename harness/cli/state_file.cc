@@ -1,6 +1,6 @@
 #include "harness/cli/state_file.h"
 
-#include <cmath>
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -14,6 +14,9 @@ namespace {
 
 using Json = nlohmann::json;
 
+// Three hard fingers are the fewest that can balance every wrench.
+constexpr size_t kFewestContacts = 3;
+
 /// Reads the keys that it knows and refuses all others. A key is named by its path, such as "object.X_o".
 class StateReader {
  public:
@@ -21,7 +24,7 @@ class StateReader {
 
   State Read(const RobotModel& model) {
     const Json json = Parse();
-    CheckKeys(json, "", {"q", "xi", "object", "kappa"});
+    CheckKeys(json, "", {"q", "xi", "object", "kappa", "contact_points", "fingers", "mu"});
     State state;
     state.q = ReadVector(Get(json, "", "q"), "q", model.num_positions());
     state.xi = ReadVector(Get(json, "", "xi"), "xi", model.num_velocities());
@@ -29,7 +32,11 @@ class StateReader {
       if (!model.object()) Fail("object", "the robot of " + model.spec().source + " has no [object]");
       state.object = ReadObject(json.at("object"));
     }
-    if (json.contains("kappa")) state.kappa = ReadKappa(json.at("kappa"));
+    const bool has_contacts = json.contains("kappa") || json.contains("contact_points");
+    for (const char* key : {"fingers", "mu"}) {
+      if (json.contains(key) && !has_contacts) Fail(key, "needs kappa or contact_points");
+    }
+    if (has_contacts) state.contacts = ReadContacts(json, model);
     return state;
   }
 
@@ -89,13 +96,60 @@ class StateReader {
             ReadVector(Get(object, "object.", "X_o_dot"), "object.X_o_dot", 6)};
   }
 
-  [[nodiscard]] Eigen::Matrix<double, 4, 5> ReadKappa(const Json& rows) const {
-    CheckList(rows, "kappa", 4, "lists");
-    Eigen::Matrix<double, 4, 5> kappa;
-    for (int i = 0; i < 4; ++i) {
-      kappa.row(i) = ReadVector(rows[static_cast<size_t>(i)], "kappa[" + std::to_string(i) + "]", 5);
+  [[nodiscard]] ContactState ReadContacts(const Json& json, const RobotModel& model) const {
+    if (!model.object()) Fail("kappa", "the robot of " + model.spec().source + " has no [object] to touch");
+    ContactState contacts;
+    if (json.contains("kappa") && json.contains("contact_points"))
+      Fail("kappa", "give kappa or contact_points, not both");
+    const std::string key = json.contains("kappa") ? "kappa" : "contact_points";
+    if (key == "contact_points" && !json.contains("object")) Fail(key, "needs object");
+    const Json& rows = json.at(key);
+    const auto most = model.fingertips().size();
+    if (!rows.is_array() || rows.size() < kFewestContacts || rows.size() > most) {
+      Fail(key, "must be a list of " + std::to_string(kFewestContacts) + " to " + std::to_string(most) +
+                    " lists, one for each contact, got " +
+                    Abbreviate(rows.is_array() ? std::to_string(rows.size()) : rows.dump()));
     }
-    return kappa;
+    const auto count = static_cast<Eigen::Index>(rows.size());
+    if (key == "kappa") contacts.kappa.resize(count, 5);
+    if (key == "contact_points") contacts.points.resize(count, 3);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const std::string entry = key + "[" + std::to_string(i) + "]";
+      const Json& row = rows[static_cast<size_t>(i)];
+      if (key == "kappa") {
+        contacts.kappa.row(i) = ReadVector(row, entry, 5);
+      } else {
+        contacts.points.row(i) = ReadVector(row, entry, 3);
+      }
+    }
+    contacts.fingertips.assign(model.fingertips().begin(), model.fingertips().begin() + count);
+    if (json.contains("fingers")) ReadFingers(json.at("fingers"), model, &contacts.fingertips);
+    contacts.friction = model.object()->friction;
+    if (json.contains("mu")) {
+      const Json& mu = json.at("mu");
+      if (!mu.is_number() || !(mu.get<double>() > 0.0))
+        Fail("mu", "must be a positive number, got " + Abbreviate(mu.dump()));
+      contacts.friction = mu.get<double>();
+    }
+    return contacts;
+  }
+
+  void ReadFingers(const Json& names, const RobotModel& model, std::vector<int>* fingertips) const {
+    CheckList(names, "fingers", static_cast<int>(fingertips->size()), "names");
+    for (size_t i = 0; i < names.size(); ++i) {
+      const std::string entry = "fingers[" + std::to_string(i) + "]";
+      const auto is_named = [&](int frame) {
+        return names[i] == model.frames()[static_cast<size_t>(frame)].name;
+      };
+      const auto found = std::find_if(model.fingertips().begin(), model.fingertips().end(), is_named);
+      if (found == model.fingertips().end())
+        Fail(entry, "must name a fingertip, got " + Abbreviate(names[i].dump()));
+      if (std::find(fingertips->begin(), fingertips->begin() + static_cast<long>(i), *found) !=
+          fingertips->begin() + static_cast<long>(i)) {
+        Fail(entry, "names a fingertip again, got " + Abbreviate(names[i].dump()));
+      }
+      (*fingertips)[i] = *found;
+    }
   }
 
   std::string file_;
