@@ -151,7 +151,7 @@ std::string NameCase(const ::testing::TestParamInfo<ClosedLoopTest::ParamType>& 
 }
 
 INSTANTIATE_TEST_SUITE_P(HandsAndGains, ClosedLoopTest,
-                         ::testing::Combine(::testing::Values(Hands::kRight, Hands::kLeft),
+                         ::testing::Combine(::testing::Values(Hands::kRight, Hands::kLeft, Hands::kBoth),
                                             ::testing::Values(0.4, 1.0, 1.5)),
                          NameCase);
 

@@ -232,7 +232,7 @@ std::string NameCase(const ::testing::TestParamInfo<LawTest::ParamType>& info) {
 }
 
 INSTANTIATE_TEST_SUITE_P(HandsAndWeights, LawTest,
-                         ::testing::Combine(::testing::Values(Hands::kRight, Hands::kLeft),
+                         ::testing::Combine(::testing::Values(Hands::kRight, Hands::kLeft, Hands::kBoth),
                                             ::testing::Values(RedundancyWeight::Kind::kIdentity,
                                                               RedundancyWeight::Kind::kDiagonal,
                                                               RedundancyWeight::Kind::kMass)),

@@ -90,9 +90,11 @@ TEST_P(PredictionTest, IsTheSolutionOfTheWholeSystem) {
   const VectorXd x = A.fullPivLu().solve(b);
   ConstrainedDynamics dynamics(scene.model, g.num_contacts());
   const Prediction& p = dynamics.Predict(scene.robot, g, force);
-  EXPECT_TRUE(MatrixNear(p.xi_dot, x.head(n), kAccelerationRounding));
-  EXPECT_TRUE(MatrixNear(p.V_Bo_dot, x.segment<6>(n), kAccelerationRounding));
-  EXPECT_TRUE(MatrixNear(p.f_c, x.tail(k), kForceRounding));
+  // The whole matrix mixes kg with 1e-5 kg m^2 and loses more digits; measured 5.4e-10 of 6000
+  // rad/s^2, 2.7e-12 N.
+  EXPECT_TRUE(MatrixNear(p.xi_dot, x.head(n), 5e-9));
+  EXPECT_TRUE(MatrixNear(p.V_Bo_dot, x.segment<6>(n), 5e-9));
+  EXPECT_TRUE(MatrixNear(p.f_c, x.tail(k), 3e-11));
 }
 
 TEST_P(PredictionTest, ContactForcesDoNoWork) {
@@ -163,7 +165,8 @@ std::string NameHands(const ::testing::TestParamInfo<Hands>& info) {
   return info.param == Hands::kRight ? "RightHand" : info.param == Hands::kLeft ? "LeftHand" : "BothHands";
 }
 
-INSTANTIATE_TEST_SUITE_P(Hands, PredictionTest, ::testing::Values(Hands::kRight, Hands::kLeft), NameHands);
+INSTANTIATE_TEST_SUITE_P(Hands, PredictionTest, ::testing::Values(Hands::kRight, Hands::kLeft, Hands::kBoth),
+                         NameHands);
 
 // Three slides along y, z, x carry a fingertip of mass m_1 against a ball of mass m_2, line of centres x:
 // both move at a = F / (m_1 + m_2), and m_2 a passes between them.

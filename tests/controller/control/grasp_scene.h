@@ -2,9 +2,13 @@
 
 // A torus held by the paper's robot, with velocities that satisfy (45).
 
+#include <algorithm>
+#include <cmath>
 #include <random>
 #include <span>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "controller/contact/find_contact.h"
@@ -24,7 +28,7 @@ class GraspScene {
  public:
   explicit GraspScene(Hands hands = Hands::kRight, DriveVelocity velocity = DriveVelocity::kTwist)
       : model(ReadPaperRobot(velocity)),
-        surface(hands == Hands::kBoth ? Torus(0.16, 0.025) : Torus(0.035, 0.011)),
+        surface(hands == Hands::kBoth ? Torus(0.25, 0.04) : Torus(0.035, 0.011)),
         object(hands == Hands::kBoth ? MakeLargeTorus() : model.object()->body),
         fingertips(ListFingertips(hands)),
         robot(model),
@@ -107,7 +111,7 @@ class GraspScene {
 
  private:
   static MassProperties MakeLargeTorus() {
-    return CalcMassProperties(SolidTorus{0.16, 0.025}, 1.0, Pose::Identity());
+    return CalcMassProperties(SolidTorus{0.25, 0.04}, 1.0, Pose::Identity());
   }
 
   std::vector<int> ListFingertips(Hands hands) const {
@@ -144,7 +148,42 @@ class GraspScene {
     Close(robot.CalcFramePose(model.FindFrame(prefix + "palm_frame")) * X_po, targets);
   }
 
-  void PlaceBothHands() { throw std::runtime_error("not yet"); }
+  /// Both palms before the body, the torus between fingers (one side of the tube) and thumbs (the other).
+  void PlaceBothHands() {
+    for (const auto& [prefix, sign] : {std::pair("r_", 1.0), std::pair("l_", -1.0)}) {
+      const std::string arm = prefix;
+      SetJoint(arm + "shoulder_pitch", 14.0);
+      SetJoint(arm + "elbow", 69.0);
+      SetJoint(arm + "shoulder_roll", 13.0 * sign);
+      SetJoint(arm + "upper_arm_yaw", -20.0 * sign);
+      SetJoint(arm + "wrist_deviation", -14.0 * sign);
+      SetJoint(arm + "wrist_flexion", -11.0);
+    }
+    for (int joint = 16; joint < model.num_joints(); ++joint) q[3 + joint] = 0.3;
+    robot.SetState(q, VectorXd::Zero(robot.size()));
+    const Pose X_Br = robot.CalcFramePose(model.FindFrame("r_palm_frame"));
+    const Pose X_Bl = robot.CalcFramePose(model.FindFrame("l_palm_frame"));
+    // The tube's middle passes 0.12 m before both palms; the ring's plane holds their common x axis.
+    const Vector3d right = X_Br * Vector3d(0.0, 0.0, 0.12);
+    const Vector3d left = X_Bl * Vector3d(0.0, 0.0, 0.12);
+    const Vector3d y = (left - right).normalized();
+    const Vector3d down = X_Br.linear().col(1) + X_Bl.linear().col(1);
+    const Vector3d z = -(down - down.dot(y) * y).normalized();
+    const double half = (left - right).norm() / 2.0;
+    const double distance = std::sqrt(surface.ring_radius() * surface.ring_radius() - half * half);
+    Pose X_Bo = Pose::Identity();
+    X_Bo.linear() << y.cross(z), y, z;
+    X_Bo.translation() = (left + right) / 2.0 + distance * X_Bo.linear().col(0);
+    std::vector<SurfacePoint> targets;
+    for (const Pose& X_palm : {X_Br, X_Bl}) {
+      for (const double x : {-0.028, 0.0, 0.028, 0.0}) {
+        const Vector3d p = X_Bo.inverse() * (X_palm * Vector3d(x, 0.0, 0.12));
+        const bool is_thumb = targets.size() % 4 == 3;
+        targets.push_back({std::atan2(p.y(), p.x()), is_thumb ? kPi / 2.0 : -kPi / 2.0, 0});
+      }
+    }
+    Close(X_Bo, targets);
+  }
 };
 
 }  // namespace dexcheck::testing
