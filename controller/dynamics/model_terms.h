@@ -51,6 +51,8 @@ class ModelTerms {
   [[nodiscard]] const RobotModel& model() const { return *model_; }
   /// Number of velocity coordinates: 50 (reduced) or 51 (unreduced) for the paper's robot.
   [[nodiscard]] int size() const { return size_; }
+  /// xi or q_dot' as set before.
+  [[nodiscard]] const VectorXd& velocity() const { return velocity_; }
 
   // What CalcDynamics computed, each size x size or size.
   /// M of (16), or M_bar' of (18); symmetric positive definite; kg m^2, kg m, kg.

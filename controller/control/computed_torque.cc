@@ -1,0 +1,85 @@
+#include "controller/control/computed_torque.h"
+
+#include <utility>
+
+#include "controller/common/errors.h"
+
+namespace dexcheck {
+
+ComputedTorque::ComputedTorque(const RobotModel& model, int num_contacts, RedundancyWeight weight)
+    : weight_(std::move(weight)),
+      actuation_(model),
+      J_B_pinv_("J_B'", 3 * num_contacts, model.num_velocities()),
+      G_pinv_("G", 6, 3 * num_contacts) {
+  const Eigen::Index n = model.num_velocities();
+  const Eigen::Index k = 3 * num_contacts;
+  if (weight_.kind == RedundancyWeight::Kind::kDiagonal) {
+    Require(weight_.w.size() == n, "length of w", "must be that of xi",
+            static_cast<double>(weight_.w.size()));
+  }
+  xi_c_.setZero(n);
+  xi_dot_d_.setZero(n);
+  tau_0_.setZero(n);
+  tau_.setZero(n);
+  work_.setZero(n);
+  f_c_.setZero(k);
+  rates_.setZero(k);
+}
+
+void ComputedTorque::FactorJacobian(const ModelTerms& robot, const GraspTerms& grasp) {
+  switch (weight_.kind) {
+    case RedundancyWeight::Kind::kIdentity:
+      return J_B_pinv_.Factor(grasp.J_B());
+    case RedundancyWeight::Kind::kDiagonal:
+      return J_B_pinv_.FactorDiagonal(grasp.J_B(), weight_.w);
+    case RedundancyWeight::Kind::kMass:
+      return J_B_pinv_.FactorWeighted(grasp.J_B(), robot.M());
+  }
+}
+
+void ComputedTorque::SetDemand(const ModelTerms& robot, const GraspTerms& grasp, const Vector6d& V_Bo_dot,
+                               const Eigen::Ref<const VectorXd>& sigma_prime) {
+  Require(robot.size() == xi_c_.size(), "entries of xi", "must be those of the law's model", robot.size());
+  Require(sigma_prime.size() == xi_c_.size(), "length of sigma'", "must be that of xi",
+          static_cast<double>(sigma_prime.size()));
+  Require(grasp.num_forces() == f_c_.size(), "number of contact forces", "must be as constructed",
+          grasp.num_forces());
+  FactorJacobian(robot, grasp);
+  G_pinv_.Factor(grasp.G());
+
+  // xi_c = J^+ G^T V + N xi = xi - J^+ (J xi - G^T V)
+  J_B_pinv_.Apply(grasp.slip(), work_);
+  xi_c_ = robot.velocity() - work_;
+
+  // xi_dot_d = J^+ (G_dot^T V + G^T V_dot - J_dot xi_c) + N sigma'
+  rates_.noalias() = grasp.G().transpose() * V_Bo_dot;
+  rates_.noalias() += grasp.G_dot().transpose() * grasp.V_Bo();
+  rates_.noalias() -= grasp.J_B_dot() * xi_c_;
+  J_B_pinv_.Apply(rates_, xi_dot_d_);
+  work_ = sigma_prime;
+  J_B_pinv_.Project(work_);
+  xi_dot_d_ += work_;
+
+  // F_o = M_hat V_dot + C_hat V + N_o
+  F_o_ = grasp.body().M_hat * V_Bo_dot + grasp.body().C_hat * grasp.V_Bo() + grasp.body().N_o;
+
+  // E_bar' tau_0 = M_bar' xi_dot_d + C_bar' xi_c + F_bar'
+  tau_0_ = robot.gravity() + robot.friction();
+  tau_0_.noalias() += robot.M() * xi_dot_d_;
+  tau_0_.noalias() += robot.C() * xi_c_;
+  actuation_.CalcTorque(tau_0_, tau_0_);
+}
+
+const VectorXd& ComputedTorque::CalcTorque(const GraspTerms& grasp, const Eigen::Ref<const VectorXd>& F_N) {
+  Require(F_N.size() == f_c_.size(), "length of F_N", "must be that of f_c", static_cast<double>(F_N.size()));
+  // f_c = G^+ F_o + F_N
+  G_pinv_.Apply(F_o_, f_c_);
+  f_c_ += F_N;
+  // tau' = tau_0 + E_bar'^-1 J_B'^T f_c
+  work_.noalias() = grasp.J_B().transpose() * f_c_;
+  actuation_.CalcTorque(work_, work_);
+  tau_ = tau_0_ + work_;
+  return tau_;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,77 @@
+#pragma once
+
+// The control law (55), in two stages with the choice of F_N between them:
+//
+//   SetDemand     motion that is wanted -> F_o, torques without contact forces
+//   (the caller)  F_o -> F_N, by the grasp-force problem
+//   CalcTorque    F_N -> f_c (49), tau' (55)
+//
+// In terms of body velocities, V = P^-1 X_o_dot and V_dot = P^-1 X_o_ddot + d/dt(P^-1) X_o_dot, (55) reads
+//   xi_c     = J^+ G^T V + N xi
+//   xi_dot_d = J^+ (G_dot^T V + G^T V_dot - J_dot xi_c) + N sigma'
+//   f_c      = G^+ (M_hat V_dot + C_hat V + N_o) + F_N
+//   E_bar' tau' = M_bar' xi_dot_d + C_bar' xi_c + F_bar' + J_B'^T f_c
+// and is computed with vectors: no n x n matrix is formed.
+
+#include "controller/common/types.h"
+#include "controller/control/actuation.h"
+#include "controller/control/grasp_terms.h"
+#include "controller/control/pseudoinverse.h"
+#include "controller/dynamics/model_terms.h"
+
+namespace dexcheck {
+
+/// W of the pseudoinverse of J_B' in (47).
+struct RedundancyWeight {
+  enum class Kind { kIdentity, kDiagonal, kMass };
+  Kind kind = Kind::kIdentity;
+  VectorXd w;  ///< n, positive; kDiagonal only.
+};
+
+/// The law's workspace. Sized by the constructor; nothing else allocates.
+class ComputedTorque {
+ public:
+  /// @throws std::invalid_argument when the weight does not fit the model, or the contacts give fewer than
+  /// six forces.
+  ComputedTorque(const RobotModel& model, int num_contacts, RedundancyWeight weight = {});
+
+  /// First stage. sigma of (47) is the measured xi: xi_c is the velocity nearest to it, in W, that satisfies
+  /// (45).
+  /// @param robot with CalcDynamics done, reduced. @param V_Bo_dot demanded of the object
+  /// (CalcTrackingAcceleration). @param sigma_prime (n) null-space acceleration (PostureTask).
+  /// @throws SingularityError, with the condition number, when J_B' or G has not full row rank;
+  /// std::invalid_argument when sizes differ.
+  void SetDemand(const ModelTerms& robot, const GraspTerms& grasp, const Vector6d& V_Bo_dot,
+                 const Eigen::Ref<const VectorXd>& sigma_prime);
+
+  /// xi_c (n) and xi_dot_d (n), (47).
+  [[nodiscard]] const VectorXd& xi_c() const { return xi_c_; }
+  [[nodiscard]] const VectorXd& xi_dot_d() const { return xi_dot_d_; }
+  /// F_o (Sigma_o) that the demand takes, (19).
+  [[nodiscard]] const Vector6d& F_o() const { return F_o_; }
+  /// tau_0 (n), N m: tau' without contact forces. tau' = tau_0 + E_bar'^-1 J_B'^T f_c.
+  [[nodiscard]] const VectorXd& tau_0() const { return tau_0_; }
+
+  /// Second stage.
+  /// @param F_N (k) internal force, G F_N = 0, N.
+  /// @return tau' (n), N m: [tau_r; tau_l] of the wheels, then joints.
+  const VectorXd& CalcTorque(const GraspTerms& grasp, const Eigen::Ref<const VectorXd>& F_N);
+
+  /// f_c (k) of (49) that belongs to the torques.
+  [[nodiscard]] const VectorXd& f_c() const { return f_c_; }
+
+ private:
+  void FactorJacobian(const ModelTerms& robot, const GraspTerms& grasp);
+
+  RedundancyWeight weight_;
+  ActuationMap actuation_;
+  Pseudoinverse J_B_pinv_;
+  Pseudoinverse G_pinv_;
+  Vector6d F_o_ = Vector6d::Zero();
+  VectorXd xi_c_, xi_dot_d_, tau_0_, tau_;  // n
+  VectorXd f_c_;                            // k
+  VectorXd work_;                           // n
+  VectorXd rates_;                          // k
+};
+
+}  // namespace dexcheck

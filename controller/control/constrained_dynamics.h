@@ -1,0 +1,70 @@
+#pragma once
+
+// Dynamics of robot and object as one constrained system (section 4.4). n entries of xi, k of f_c.
+
+#include <Eigen/Cholesky>
+
+#include "controller/common/types.h"
+#include "controller/control/grasp_terms.h"
+#include "controller/control/pseudoinverse.h"
+#include "controller/dynamics/model_terms.h"
+
+namespace dexcheck {
+
+/// Motion and contact forces of the rigid constrained system.
+struct Prediction {
+  VectorXd xi_dot;                       ///< n, m/s^2, rad/s^2.
+  Vector6d V_Bo_dot = Vector6d::Zero();  ///< Of the object's body velocity, Sigma_o.
+  VectorXd f_c;                          ///< k, N, of finger on object, each in its Sigma_cf.
+};
+
+/// X_o_ddot = P (V_Bo_dot - d/dt(P^-1) X_o_dot).
+/// @throws SingularityError when abs(sin beta) < kMinSinBeta; std::logic_error unless the grasp's state was
+/// set by X_o.
+Vector6d CalcCoordinateAcceleration(const GraspTerms& grasp, const Vector6d& V_Bo_dot);
+
+/// Solves (19), (46) and (48) for accelerations and contact forces, as if bodies, contacts and wheels were
+/// rigid and nothing slipped. Sized by the constructor; nothing else allocates.
+class ConstrainedDynamics {
+ public:
+  /// @throws std::invalid_argument unless num_contacts > 0.
+  ConstrainedDynamics(const RobotModel& model, int num_contacts);
+
+  /// One solve of the saddle-point system
+  ///   [ M_bar'   0      J_B'^T ] [ xi_dot   ]   [ force - C_bar' xi - F_bar'  ]
+  ///   [ 0        M_hat  -G     ] [ V_Bo_dot ] = [ -C_hat V_Bo - N_o           ]
+  ///   [ J_B'     -G^T   0      ] [ f_c      ]   [ -J_B_dot' xi + G_dot^T V_Bo ]
+  /// by its Schur complement in f_c.
+  /// @param robot with CalcDynamics done, reduced. @param force E_bar' tau' (n), N, N m.
+  /// @throws SingularityError when the contacts' constraints depend on each other; std::invalid_argument when
+  /// sizes differ.
+  const Prediction& Predict(const ModelTerms& robot, const GraspTerms& grasp,
+                            const Eigen::Ref<const VectorXd>& force);
+
+ private:
+  Eigen::LLT<MatrixXd> M_llt_;
+  MatrixXd half_;  // n + 6 x k, [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G]
+  MatrixXd schur_;
+  Eigen::LLT<MatrixXd> schur_llt_;
+  VectorXd half_force_;  // n + 6
+  Prediction prediction_;
+};
+
+/// M_tilde X_o_ddot + C_tilde X_o_dot + N_tilde = G J_B'^+T E_bar' tau', (52): what the object feels through
+/// the grasp.
+struct ObjectSpaceTerms {
+  Matrix6d M_tilde;
+  Matrix6d C_tilde;
+  Vector6d N_tilde;
+  Matrix6Xd G_J_T;  ///< G J_B'^+T (6 x n), (50).
+};
+
+/// Terms of (52) with the null-space motions sigma and sigma' (n) of (47). Departure: N' sigma'' is left out,
+/// because N' = 0 for J_B' of full row rank. For analysis: it forms n x n matrices and allocates.
+/// @param J_B_pinv with grasp.J_B() factored, by the weight of choice.
+/// @throws std::logic_error unless the grasp's state was set by X_o.
+ObjectSpaceTerms CalcObjectSpaceTerms(const ModelTerms& robot, const GraspTerms& grasp,
+                                      const Pseudoinverse& J_B_pinv, const Eigen::Ref<const VectorXd>& sigma,
+                                      const Eigen::Ref<const VectorXd>& sigma_prime);
+
+}  // namespace dexcheck

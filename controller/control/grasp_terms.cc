@@ -1,0 +1,100 @@
+#include "controller/control/grasp_terms.h"
+
+#include <stdexcept>
+
+#include "controller/common/errors.h"
+#include "controller/contact/contact_jacobian.h"
+#include "controller/contact/rolling.h"
+#include "controller/object/euler_zyz.h"
+
+namespace dexcheck {
+
+GraspTerms::GraspTerms(const RobotModel& model, std::span<const int> fingertips, const MassProperties& object,
+                       const Surface& surface)
+    : fingertips_(fingertips.begin(), fingertips.end()),
+      object_(object),
+      gravity_(model.gravity()),
+      surface_(&surface) {
+  Require(!fingertips_.empty(), "number of fingertips", "must be positive", 0.0);
+  for (const int frame : fingertips_) {
+    const Frame& tip = model.frames().at(static_cast<size_t>(frame));
+    if (!tip.sphere_radius) throw std::invalid_argument("fingertips: " + tip.name + " carries no sphere");
+    tips_.emplace_back(*tip.sphere_radius);
+  }
+  const int n = model.num_velocities();
+  const int k = num_forces();
+  contacts_.resize(fingertips_.size());
+  G_.setZero(6, k);
+  G_dot_.setZero(6, k);
+  J_B_.setZero(k, n);
+  J_B_dot_.setZero(k, n);
+  J_f_.setZero(6, n);
+  J_f_dot_.setZero(6, n);
+  slip_.setZero(k);
+  slip_bias_.setZero(k);
+}
+
+void GraspTerms::SetState(const ModelTerms& robot, const Vector6d& X_o, const Vector6d& X_o_dot,
+                          std::span<const ContactCoordinates> kappa) {
+  has_coordinates_ = true;
+  X_o_ = X_o;
+  X_o_dot_ = X_o_dot;
+  coordinates_ = CalcObjectTerms(object_, gravity_, X_o, X_o_dot);
+  X_Bo_ = CalcObjectPose(X_o);
+  V_Bo_ = coordinates_.V_Bo;
+  body_ = coordinates_.body;
+  SetContacts(robot, kappa);
+}
+
+void GraspTerms::SetPose(const ModelTerms& robot, const Pose& X_Bo, const Vector6d& V_Bo,
+                         std::span<const ContactCoordinates> kappa) {
+  has_coordinates_ = false;
+  X_Bo_ = X_Bo;
+  V_Bo_ = V_Bo;
+  body_ = CalcObjectBodyTerms(object_, gravity_, X_Bo.linear(), V_Bo);
+  SetContacts(robot, kappa);
+}
+
+void GraspTerms::SetContacts(const ModelTerms& robot, std::span<const ContactCoordinates> kappa) {
+  Require(kappa.size() == fingertips_.size(), "number of kappa", "must be that of the fingertips",
+          static_cast<double>(kappa.size()));
+  Require(robot.size() == J_B_.cols(), "entries of xi", "must be those of the grasp's model", robot.size());
+  for (size_t i = 0; i < fingertips_.size(); ++i) {
+    const Eigen::Index row = 3 * static_cast<Eigen::Index>(i);
+    Contact& contact = contacts_[i];
+    robot.CalcFrameJacobian(fingertips_[i], J_f_, J_f_dot_);
+    contact.geometry = CalcContactGeometry(tips_[i], *surface_, kappa[i]);
+    const Vector6d V_f = J_f_ * robot.velocity();
+    contact.kappa_dot = CalcKappaDot(contact.geometry, CalcRelativeTwist(contact.geometry, V_f, V_Bo_));
+    CalcContactJacobian(contact, J_f_, J_B_.middleRows(row, 3));
+    CalcContactJacobianDot(contact, J_f_, J_f_dot_, J_B_dot_.middleRows(row, 3));
+  }
+  CalcGraspMap(contacts_, G_);
+  CalcGraspMapDot(contacts_, G_dot_);
+  // (45), (46)
+  slip_.noalias() = J_B_ * robot.velocity();
+  slip_.noalias() -= G_.transpose() * V_Bo_;
+  slip_bias_.noalias() = J_B_dot_ * robot.velocity();
+  slip_bias_.noalias() -= G_dot_.transpose() * V_Bo_;
+}
+
+void GraspTerms::RequireCoordinates() const {
+  if (!has_coordinates_) throw std::logic_error("X_o: the grasp's state was set by a pose");
+}
+
+const Vector6d& GraspTerms::X_o() const {
+  RequireCoordinates();
+  return X_o_;
+}
+
+const Vector6d& GraspTerms::X_o_dot() const {
+  RequireCoordinates();
+  return X_o_dot_;
+}
+
+const ObjectTerms& GraspTerms::coordinates() const {
+  RequireCoordinates();
+  return coordinates_;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,84 @@
+#include "controller/control/trajectory_reader.h"
+
+namespace dexcheck {
+namespace {
+
+enum class Type { kLine, kPointToPoint, kOscillation, kWeave, kCircle, kWayPoints };
+
+// [linear under one key; angles under another, rad or degrees], 0 where a key is missing.
+Vector6d ReadCoordinates(TomlTable& table, std::string_view linear, const std::string& angular) {
+  Vector6d X = Vector6d::Zero();
+  if (const auto value = table.Find(linear)) X.head<3>() = value->AsVector<3>();
+  if (const auto angles = table.FindAngles<3>(angular)) X.tail<3>() = *angles;
+  return X;
+}
+
+double ReadRampTime(TomlTable& table) {
+  const auto value = table.Find("ramp_time");
+  return value ? value->AsNotNegative() : 0.0;
+}
+
+double ReadHeading(TomlTable& table) {
+  const auto [value, unit] = table.FindWithAngleUnit("heading");
+  return value ? unit * value->AsNumber() : 0.0;
+}
+
+std::vector<WayPoint> ReadWayPoints(TomlTable& table) {
+  std::vector<WayPoint> points;
+  const TomlValue list = table.Get("points");
+  for (const TomlValue& entry : list.AsList()) {
+    TomlTable point = entry.AsTable();
+    const TomlValue time = point.Get("time");
+    if (time.AsPositive() <= (points.empty() ? 0.0 : points.back().time)) {
+      time.Fail("must be greater than the time before");
+    }
+    points.push_back({time.AsPositive(), ReadCoordinates(point, "xyz", "zyz")});
+    point.RejectUnused();
+  }
+  if (points.empty()) list.Reject("needs at least one point");
+  return points;
+}
+
+std::unique_ptr<Trajectory> ReadByType(TomlTable& table, const Vector6d& X_start) {
+  const Type type = table.Get("type").AsChoice<Type>({{"line", Type::kLine},
+                                                      {"point_to_point", Type::kPointToPoint},
+                                                      {"oscillation", Type::kOscillation},
+                                                      {"weave", Type::kWeave},
+                                                      {"circle", Type::kCircle},
+                                                      {"way_points", Type::kWayPoints}});
+  switch (type) {
+    case Type::kLine:
+      return std::make_unique<LineTrajectory>(X_start, ReadCoordinates(table, "velocity", "turning"),
+                                              ReadRampTime(table));
+    case Type::kPointToPoint:
+      return std::make_unique<PointToPointTrajectory>(X_start, ReadCoordinates(table, "xyz", "zyz"),
+                                                      table.Get("duration").AsPositive());
+    case Type::kOscillation:
+      return std::make_unique<OscillationTrajectory>(X_start, ReadCoordinates(table, "xyz", "zyz"),
+                                                     table.Get("frequency").AsPositive(),
+                                                     ReadRampTime(table));
+    case Type::kWeave:
+      return std::make_unique<WeaveTrajectory>(X_start, ReadHeading(table), table.Get("speed").AsNumber(),
+                                               ReadRampTime(table), table.Get("amplitude").AsNumber(),
+                                               table.Get("wavelength").AsPositive());
+    case Type::kCircle: {
+      const TomlValue radius = table.Get("radius");
+      if (radius.AsNumber() == 0.0) radius.Fail("must not be zero");
+      return std::make_unique<CircleTrajectory>(X_start, ReadHeading(table), table.Get("speed").AsNumber(),
+                                                ReadRampTime(table), radius.AsNumber());
+    }
+    case Type::kWayPoints:
+      return std::make_unique<WayPointTrajectory>(X_start, ReadWayPoints(table));
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+std::unique_ptr<Trajectory> ReadTrajectory(TomlTable& table, const Vector6d& X_start) {
+  std::unique_ptr<Trajectory> trajectory = ReadByType(table, X_start);
+  table.RejectUnused();
+  return trajectory;
+}
+
+}  // namespace dexcheck

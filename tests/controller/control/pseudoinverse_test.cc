@@ -1,0 +1,220 @@
+// J^+ and N of (47): worked example, Moore-Penrose properties, least W-norm, errors, no allocation.
+
+#include "controller/control/pseudoinverse.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/QR>
+#include <random>
+
+#include "controller/common/errors.h"
+#include "tests/common/allocation_counter.h"
+#include "tests/common/matrix_near.h"
+#include "tests/common/throws.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::AllocationCounter;
+using testing::MatrixNear;
+using testing::Throws;
+
+constexpr Eigen::Index kRows = 12;
+constexpr Eigen::Index kColumns = 50;
+
+// Random matrices have condition numbers of a few units, random W of up to 1e3: eps times their product, with
+// room.
+constexpr double kRounding = 1e-12;
+
+MatrixXd DrawMatrix(Eigen::Index rows, Eigen::Index columns, std::mt19937* random) {
+  std::normal_distribution<double> normal;
+  MatrixXd A(rows, columns);
+  for (double& entry : A.reshaped()) entry = normal(*random);
+  return A;
+}
+
+/// J, one of the three kinds of W, and the pseudoinverse factored.
+struct Case {
+  Case(int kind, std::mt19937* random)
+      : J(DrawMatrix(kRows, kColumns, random)), J_pinv("J", kRows, kColumns) {
+    const MatrixXd A = DrawMatrix(kColumns, kColumns, random);
+    switch (kind) {
+      case 0:
+        W = MatrixXd::Identity(kColumns, kColumns);
+        J_pinv.Factor(J);
+        break;
+      case 1: {
+        const VectorXd w = A.col(0).cwiseAbs() + VectorXd::Constant(kColumns, 0.1);
+        W = w.asDiagonal();
+        J_pinv.FactorDiagonal(J, w);
+        break;
+      }
+      default:
+        W = A * A.transpose() / kColumns + 0.1 * MatrixXd::Identity(kColumns, kColumns);
+        J_pinv.FactorWeighted(J, W);
+    }
+  }
+  MatrixXd J;
+  MatrixXd W;
+  Pseudoinverse J_pinv;
+};
+
+TEST(Pseudoinverse, ByHand) {
+  // J = [1 1], W = diag(1, 3): J W^-1 J^T = 4/3, J^+ = [3/4; 1/4].
+  const Eigen::RowVector2d J(1.0, 1.0);
+  Pseudoinverse pinv("J", 1, 2);
+  pinv.FactorDiagonal(J, Vector2d(1.0, 3.0));
+  EXPECT_TRUE(MatrixNear(pinv.CalcMatrix(), Vector2d(0.75, 0.25), 1e-15));
+  pinv.Factor(J);
+  EXPECT_TRUE(MatrixNear(pinv.CalcMatrix(), Vector2d(0.5, 0.5), 1e-15));
+  EXPECT_NEAR(pinv.condition_number(), 1.0, 1e-15);
+  VectorXd x = Vector2d(1.0, 0.0);
+  pinv.Project(x);
+  EXPECT_TRUE(MatrixNear(x, Vector2d(0.5, -0.5), 1e-15));
+}
+
+TEST(Pseudoinverse, IsARightInverseWithANullSpaceProjector) {
+  std::mt19937 random(1);
+  for (int kind = 0; kind < 3; ++kind) {
+    Case c(kind, &random);
+    const MatrixXd J_plus = c.J_pinv.CalcMatrix();
+    const MatrixXd N = c.J_pinv.CalcProjector();
+    ASSERT_GT(N.norm(), 1.0);
+    EXPECT_TRUE(MatrixNear(c.J * J_plus, MatrixXd::Identity(kRows, kRows), kRounding));
+    EXPECT_TRUE(MatrixNear(N * J_plus, MatrixXd::Zero(kColumns, kRows), kRounding));
+    EXPECT_TRUE(MatrixNear(c.J * N, MatrixXd::Zero(kRows, kColumns), kRounding));
+    EXPECT_TRUE(MatrixNear(N * N, N, kRounding));
+    // N is the projector that is orthogonal in W.
+    EXPECT_TRUE(MatrixNear(c.W * N, N.transpose() * c.W, kRounding));
+  }
+}
+
+TEST(Pseudoinverse, FunctionsApplyTheMatrices) {
+  std::mt19937 random(2);
+  for (int kind = 0; kind < 3; ++kind) {
+    Case c(kind, &random);
+    const VectorXd y = DrawMatrix(kRows, 1, &random);
+    const VectorXd z = DrawMatrix(kColumns, 1, &random);
+    VectorXd x(kColumns);
+    c.J_pinv.Apply(y, x);
+    EXPECT_TRUE(MatrixNear(x, c.J_pinv.CalcMatrix() * y, kRounding));
+    VectorXd f(kRows);
+    c.J_pinv.ApplyTransposed(z, f);
+    EXPECT_TRUE(MatrixNear(f, c.J_pinv.CalcMatrix().transpose() * z, kRounding));
+    VectorXd projected = z;
+    c.J_pinv.Project(projected);
+    EXPECT_TRUE(MatrixNear(projected, c.J_pinv.CalcProjector() * z, kRounding));
+  }
+}
+
+TEST(Pseudoinverse, UnweightedIsTheMoorePenroseInverse) {
+  std::mt19937 random(3);
+  Case c(0, &random);
+  const MatrixXd expected = c.J.completeOrthogonalDecomposition().pseudoInverse();
+  EXPECT_TRUE(MatrixNear(c.J_pinv.CalcMatrix(), expected, kRounding));
+}
+
+TEST(Pseudoinverse, HasTheLeastWeightedNorm) {
+  std::mt19937 random(4);
+  for (int kind = 0; kind < 3; ++kind) {
+    Case c(kind, &random);
+    const VectorXd y = DrawMatrix(kRows, 1, &random);
+    VectorXd x(kColumns);
+    c.J_pinv.Apply(y, x);
+    const double least = x.dot(c.W * x);
+    for (int trial = 0; trial < 20; ++trial) {
+      VectorXd change = DrawMatrix(kColumns, 1, &random);
+      c.J_pinv.Project(change);
+      const VectorXd other = x + change;
+      ASSERT_TRUE(MatrixNear(c.J * other, y, kRounding));
+      // The change is orthogonal to x in W: the squares add.
+      EXPECT_NEAR(other.dot(c.W * other), least + change.dot(c.W * change), 1e3 * kRounding);
+      EXPECT_GT(other.dot(c.W * other), least);
+    }
+  }
+}
+
+TEST(Pseudoinverse, AnotherWeightGivesAnotherInverse) {
+  std::mt19937 random(5);
+  Case c(2, &random);
+  Pseudoinverse unweighted("J", kRows, kColumns);
+  unweighted.Factor(c.J);
+  EXPECT_GT((unweighted.CalcMatrix() - c.J_pinv.CalcMatrix()).norm(), 1e-2);
+}
+
+TEST(Pseudoinverse, ConditionNumberIsABound) {
+  std::mt19937 random(6);
+  for (int kind = 0; kind < 3; ++kind) {
+    Case c(kind, &random);
+    const Eigen::LLT<MatrixXd> W_llt(c.W);
+    const MatrixXd half = W_llt.matrixL().solve(c.J.transpose());
+    const VectorXd sigma = half.jacobiSvd().singularValues();
+    const double exact = sigma[0] / sigma[kRows - 1];
+    EXPECT_GE(c.J_pinv.condition_number(), exact);
+    EXPECT_LE(c.J_pinv.condition_number(), kRows * exact);
+  }
+}
+
+TEST(Pseudoinverse, RejectsRankDeficientMatrices) {
+  std::mt19937 random(7);
+  MatrixXd J = DrawMatrix(kRows, kColumns, &random);
+  Pseudoinverse pinv("J_B'", kRows, kColumns);
+  EXPECT_NO_THROW(pinv.Factor(J));
+  J.row(3) = J.row(5) + 1e-4 * J.row(7);
+  EXPECT_NO_THROW(pinv.Factor(J + 1e-4 * DrawMatrix(kRows, kColumns, &random)));
+  J.row(3) = J.row(5) + 2.0 * J.row(7);
+  const auto factor = [&] {
+    pinv.Factor(J);
+    return 0;
+  };
+  EXPECT_TRUE(Throws<SingularityError>(factor, "J_B' has not full row rank, condition number"));
+  J.row(3).setZero();
+  EXPECT_TRUE(Throws<SingularityError>(factor, "condition number inf"));
+  J.setConstant(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_TRUE(Throws<SingularityError>(factor, "condition number"));
+}
+
+TEST(Pseudoinverse, RejectsWrongArguments) {
+  EXPECT_TRUE(Throws<std::invalid_argument>([] { return Pseudoinverse("J", 3, 2); }, "rows of J"));
+  EXPECT_TRUE(Throws<std::invalid_argument>([] { return Pseudoinverse("J", 0, 2); }, "rows of J"));
+  Pseudoinverse pinv("J", 2, 3);
+  const MatrixXd J = MatrixXd::Identity(2, 3);
+  const auto diagonal = [&](const VectorXd& w) {
+    return [&, w] {
+      pinv.FactorDiagonal(J, w);
+      return 0;
+    };
+  };
+  EXPECT_TRUE(Throws<std::invalid_argument>(diagonal(Vector3d(1.0, 0.0, 1.0)), "entry of w"));
+  EXPECT_TRUE(Throws<std::invalid_argument>(diagonal(Vector2d(1.0, 1.0)), "length of w"));
+  const auto transposed = [&] {
+    pinv.Factor(J.transpose());
+    return 0;
+  };
+  EXPECT_TRUE(Throws<std::invalid_argument>(transposed, "rows of J"));
+  const auto indefinite = [&] {
+    pinv.FactorWeighted(J, -Matrix3d::Identity());
+    return 0;
+  };
+  EXPECT_TRUE(Throws<std::invalid_argument>(indefinite, "W: must be positive definite"));
+}
+
+TEST(Pseudoinverse, DoesNotAllocate) {
+  std::mt19937 random(8);
+  Case c(2, &random);
+  const VectorXd w = VectorXd::Constant(kColumns, 2.0);
+  const VectorXd y = VectorXd::Ones(kRows);
+  VectorXd x(kColumns);
+  VectorXd f(kRows);
+  const AllocationCounter counter;
+  c.J_pinv.Factor(c.J);
+  c.J_pinv.FactorDiagonal(c.J, w);
+  c.J_pinv.FactorWeighted(c.J, c.W);
+  c.J_pinv.Apply(y, x);
+  c.J_pinv.Project(x);
+  c.J_pinv.ApplyTransposed(x, f);
+  EXPECT_EQ(counter.count(), 0);
+}
+
+}  // namespace
+}  // namespace dexcheck

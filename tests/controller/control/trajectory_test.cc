@@ -1,0 +1,307 @@
+// X_d(t): derivatives, boundary conditions, continuity, known values, the reader.
+
+#include "controller/control/trajectory.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <string>
+
+#include "controller/common/errors.h"
+#include "controller/control/trajectory_reader.h"
+#include "controller/object/euler_zyz.h"
+#include "tests/common/allocation_counter.h"
+#include "tests/common/finite_difference.h"
+#include "tests/common/matrix_near.h"
+#include "tests/common/throws.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::AllocationCounter;
+using testing::Differentiate;
+using testing::MatrixNear;
+using testing::Throws;
+
+constexpr double kRounding = 1e-14;  // values of up to a few m and rad
+
+Vector6d MakeStart() {
+  Vector6d X;
+  X << 0.6, -0.2, 0.9, 0.3, 1.4, -0.5;
+  return X;
+}
+
+Vector6d MakeDirection() {
+  Vector6d X;
+  X << 0.3, -0.1, 0.05, 0.4, 0.2, -0.3;
+  return X;
+}
+
+std::vector<WayPoint> MakeWayPoints() {
+  std::vector<WayPoint> points;
+  for (const double time : {0.7, 1.5, 1.9, 3.0}) {
+    Vector6d displacement;
+    for (int i = 0; i < 6; ++i) displacement[i] = std::sin(2.0 * time + i);
+    points.push_back({time, displacement});
+  }
+  return points;
+}
+
+std::map<std::string, std::unique_ptr<Trajectory>> MakeAll() {
+  std::map<std::string, std::unique_ptr<Trajectory>> all;
+  const Vector6d X = MakeStart();
+  const Vector6d d = MakeDirection();
+  all["line"] = std::make_unique<LineTrajectory>(X, d, 0.0);
+  all["ramp"] = std::make_unique<LineTrajectory>(X, d, 1.3);
+  all["point_to_point"] = std::make_unique<PointToPointTrajectory>(X, d, 1.7);
+  all["oscillation"] = std::make_unique<OscillationTrajectory>(X, d, 0.8, 1.1);
+  all["weave"] = std::make_unique<WeaveTrajectory>(X, 0.7, 1.0, 1.2, 0.15, 1.6);
+  all["circle"] = std::make_unique<CircleTrajectory>(X, -0.4, 0.9, 1.2, 0.8);
+  all["right_circle"] = std::make_unique<CircleTrajectory>(X, -0.4, 0.9, 0.0, -0.8);
+  all["way_points"] = std::make_unique<WayPointTrajectory>(X, MakeWayPoints());
+  return all;
+}
+
+TEST(Trajectory, DerivativesAreThoseOfThePosition) {
+  // h^4 times fifth derivatives of up to 1e4, eps / h.
+  constexpr double kStep = 1e-3;
+  constexpr double kTolerance = 1e-8;
+  for (const auto& [name, trajectory] : MakeAll()) {
+    const Trajectory& path = *trajectory;
+    for (double t = 0.0573; t < 3.2; t += 0.0973) {  // no knot within two steps
+      const DesiredMotion motion = trajectory->Evaluate(t);
+      const auto X = [&](double h) { return path.Evaluate(t + h).X_d; };
+      const auto X_dot = [&](double h) { return path.Evaluate(t + h).X_d_dot; };
+      EXPECT_TRUE(MatrixNear(Differentiate(X, kStep), motion.X_d_dot, kTolerance)) << name << " at " << t;
+      EXPECT_TRUE(MatrixNear(Differentiate(X_dot, kStep), motion.X_d_ddot, kTolerance))
+          << name << " at " << t;
+    }
+  }
+}
+
+TEST(Trajectory, StartsWhereTheObjectIs) {
+  for (const auto& [name, trajectory] : MakeAll()) {
+    const DesiredMotion motion = trajectory->Evaluate(0.0);
+    EXPECT_TRUE(MatrixNear(motion.X_d, MakeStart(), kRounding)) << name;
+    if (name == "line" || name == "right_circle") {
+      EXPECT_GT(motion.X_d_dot.norm(), 0.1) << name;
+    } else {
+      EXPECT_TRUE(MatrixNear(motion.X_d_dot, Vector6d::Zero(), kRounding)) << name;
+      EXPECT_TRUE(MatrixNear(motion.X_d_ddot, Vector6d::Zero(), kRounding)) << name;
+    }
+  }
+}
+
+// Across every time at which a formula changes, X_d_ddot moves by no more than its slope allows.
+TEST(Trajectory, AccelerationIsContinuous) {
+  constexpr double kStep = 1e-7;
+  for (const auto& [name, trajectory] : MakeAll()) {
+    if (name == "line" || name == "right_circle") continue;
+    double largest = 0.0;
+    for (const double t : {0.0, 0.7, 1.1, 1.2, 1.3, 1.5, 1.7, 1.9, 3.0}) {
+      const DesiredMotion before = trajectory->Evaluate(t - kStep);
+      const DesiredMotion after = trajectory->Evaluate(t + kStep);
+      largest = std::max(largest, after.X_d_ddot.norm());
+      // Jerks of up to 500 per s^3.
+      EXPECT_TRUE(MatrixNear(before.X_d, after.X_d, 1e3 * kStep)) << name << " at " << t;
+      EXPECT_TRUE(MatrixNear(before.X_d_dot, after.X_d_dot, 1e3 * kStep)) << name << " at " << t;
+      EXPECT_TRUE(MatrixNear(before.X_d_ddot, after.X_d_ddot, 1e3 * kStep)) << name << " at " << t;
+    }
+    EXPECT_GT(largest, 1e-4) << name;
+  }
+}
+
+TEST(Trajectory, LineIsThatOfSection6) {
+  Vector6d velocity = Vector6d::Zero();
+  velocity[0] = 1.0;
+  const LineTrajectory line(MakeStart(), velocity, 0.0);
+  const DesiredMotion motion = line.Evaluate(2.5);
+  Vector6d expected = MakeStart();
+  expected[0] += 2.5;
+  EXPECT_TRUE(MatrixNear(motion.X_d, expected, kRounding));
+  EXPECT_TRUE(MatrixNear(motion.X_d_dot, velocity, 0.0));
+  EXPECT_TRUE(MatrixNear(motion.X_d_ddot, Vector6d::Zero(), 0.0));
+  // With a ramp half of the ramp's time is lost.
+  const LineTrajectory ramp(MakeStart(), velocity, 2.0);
+  expected[0] = MakeStart()[0] + 1.5;
+  EXPECT_TRUE(MatrixNear(ramp.Evaluate(2.5).X_d, expected, kRounding));
+  EXPECT_TRUE(MatrixNear(ramp.Evaluate(2.5).X_d_dot, velocity, 0.0));
+  EXPECT_NEAR(ramp.Evaluate(1.0).X_d_dot[0], 0.5, kRounding);
+  EXPECT_NEAR(ramp.Evaluate(1.0).X_d_ddot[0], 30.0 / 16.0 / 2.0, kRounding);
+}
+
+TEST(Trajectory, MinJerkByHand) {
+  // u = 1/2: s = 1/2, s_dot = 15/8 / T, s_ddot = 0; ends at rest.
+  const PointToPointTrajectory move(MakeStart(), MakeDirection(), 2.0);
+  const DesiredMotion middle = move.Evaluate(1.0);
+  EXPECT_TRUE(MatrixNear(middle.X_d, MakeStart() + 0.5 * MakeDirection(), kRounding));
+  EXPECT_TRUE(MatrixNear(middle.X_d_dot, 15.0 / 16.0 * MakeDirection(), kRounding));
+  EXPECT_TRUE(MatrixNear(middle.X_d_ddot, Vector6d::Zero(), kRounding));
+  for (const double t : {2.0, 3.0}) {
+    const DesiredMotion end = move.Evaluate(t);
+    EXPECT_TRUE(MatrixNear(end.X_d, MakeStart() + MakeDirection(), kRounding));
+    EXPECT_TRUE(MatrixNear(end.X_d_dot, Vector6d::Zero(), 0.0));
+    EXPECT_TRUE(MatrixNear(end.X_d_ddot, Vector6d::Zero(), 0.0));
+  }
+}
+
+TEST(Trajectory, OscillationByHand) {
+  const OscillationTrajectory swing(MakeStart(), MakeDirection(), 0.25, 0.0);
+  const DesiredMotion peak = swing.Evaluate(1.0);
+  EXPECT_TRUE(MatrixNear(peak.X_d, MakeStart() + MakeDirection(), kRounding));
+  EXPECT_TRUE(MatrixNear(peak.X_d_dot, Vector6d::Zero(), kRounding));
+  EXPECT_TRUE(MatrixNear(peak.X_d_ddot, -kPi * kPi / 4.0 * MakeDirection(), kRounding));
+}
+
+TEST(Trajectory, CircleByHand) {
+  // A quarter to the left from heading +x: at (r, r), turned by 90 degrees, accelerating to the centre.
+  const double radius = 0.8;
+  const CircleTrajectory circle(Vector6d::Zero(), 0.0, 0.4, 0.0, radius);
+  const DesiredMotion quarter = circle.Evaluate(kPi / 2.0 * radius / 0.4);
+  Vector6d X, X_dot, X_ddot;
+  X << radius, radius, 0.0, kPi / 2.0, 0.0, 0.0;
+  X_dot << 0.0, 0.4, 0.0, 0.4 / radius, 0.0, 0.0;
+  X_ddot << -0.4 * 0.4 / radius, 0.0, 0.0, 0.0, 0.0, 0.0;
+  EXPECT_TRUE(MatrixNear(quarter.X_d, X, kRounding));
+  EXPECT_TRUE(MatrixNear(quarter.X_d_dot, X_dot, kRounding));
+  EXPECT_TRUE(MatrixNear(quarter.X_d_ddot, X_ddot, kRounding));
+}
+
+// The object turns about the world's vertical like the path's tangent.
+TEST(Trajectory, PlanarPathsKeepTheObjectsHeading) {
+  const auto all = MakeAll();
+  for (const std::string name : {"weave", "circle", "right_circle"}) {
+    const double heading = name == "weave" ? 0.7 : -0.4;
+    const Matrix3d R_start = CalcRotationZyz(MakeStart().tail<3>());
+    double turned = 0.0;
+    for (double t = 0.2; t < 4.0; t += 0.13) {
+      const DesiredMotion motion = all.at(name)->Evaluate(t);
+      const double tangent = std::atan2(motion.X_d_dot[1], motion.X_d_dot[0]);
+      const double turn = std::remainder(motion.X_d[3] - MakeStart()[3] + heading - tangent, 2.0 * kPi);
+      EXPECT_NEAR(turn, 0.0, 1e-13) << name;
+      const double about_z = motion.X_d[3] - MakeStart()[3];
+      turned = std::max(turned, std::abs(about_z));
+      EXPECT_TRUE(MatrixNear(CalcRotationZyz(motion.X_d.tail<3>()),
+                             Eigen::AngleAxisd(about_z, Vector3d::UnitZ()) * R_start, kRounding));
+    }
+    EXPECT_GT(turned, 0.3);
+  }
+}
+
+TEST(Trajectory, WeaveByHand) {
+  // Half a wave on: on the far side, heading as at the start.
+  const WeaveTrajectory weave(Vector6d::Zero(), kPi / 2.0, 1.0, 0.0, 0.2, 2.0);
+  const DesiredMotion far = weave.Evaluate(1.0);
+  Vector6d X, X_dot;
+  X << -0.4, 1.0, 0.0, 0.0, 0.0, 0.0;
+  X_dot << 0.0, 1.0, 0.0, -0.2 * kPi * kPi, 0.0, 0.0;
+  EXPECT_TRUE(MatrixNear(far.X_d, X, kRounding));
+  EXPECT_TRUE(MatrixNear(far.X_d_dot, X_dot, kRounding));
+}
+
+TEST(Trajectory, GoesThroughItsWayPoints) {
+  const WayPointTrajectory path(MakeStart(), MakeWayPoints());
+  for (const WayPoint& point : MakeWayPoints()) {
+    EXPECT_TRUE(MatrixNear(path.Evaluate(point.time).X_d, MakeStart() + point.displacement, kRounding));
+  }
+  for (const double t : {-1.0, 0.0, 3.0, 4.0}) {
+    EXPECT_TRUE(MatrixNear(path.Evaluate(t).X_d_dot, Vector6d::Zero(), kRounding));
+    EXPECT_TRUE(MatrixNear(path.Evaluate(t).X_d_ddot, Vector6d::Zero(), kRounding));
+  }
+}
+
+// One way-point is a least-jerk move. Of three knots at t = 0, 1, 2 the spline's velocity in the middle is
+// 3/4 (X_2 - X_0) and its acceleration 3 X_2 - 6 X_1 + 3 X_0.
+TEST(Trajectory, WayPointsByHand) {
+  const Vector6d d = MakeDirection();
+  const WayPointTrajectory move(MakeStart(), {{2.0, d}});
+  const PointToPointTrajectory expected(MakeStart(), d, 2.0);
+  for (double t = 0.1; t < 2.0; t += 0.3) {
+    EXPECT_TRUE(MatrixNear(move.Evaluate(t).X_d, expected.Evaluate(t).X_d, kRounding));
+    EXPECT_TRUE(MatrixNear(move.Evaluate(t).X_d_ddot, expected.Evaluate(t).X_d_ddot, 10.0 * kRounding));
+  }
+  const WayPointTrajectory two(MakeStart(), {{1.0, 5.0 * d}, {2.0, 2.0 * d}});
+  EXPECT_TRUE(MatrixNear(two.Evaluate(1.0).X_d_dot, 0.75 * 2.0 * d, kRounding));
+  EXPECT_TRUE(MatrixNear(two.Evaluate(1.0).X_d_ddot, (3.0 * 2.0 - 6.0 * 5.0) * d, 10.0 * kRounding));
+}
+
+TEST(Trajectory, RejectsWrongNumbers) {
+  const Vector6d X = MakeStart();
+  const auto rejects = [](const auto& make, const std::string& text) {
+    return Throws<std::invalid_argument>(
+        [&] {
+          make();
+          return 0;
+        },
+        text);
+  };
+  EXPECT_TRUE(rejects([&] { LineTrajectory(X, X, -1.0); }, "ramp_time"));
+  EXPECT_TRUE(rejects([&] { PointToPointTrajectory(X, X, 0.0); }, "duration"));
+  EXPECT_TRUE(rejects([&] { OscillationTrajectory(X, X, 0.0, 1.0); }, "frequency"));
+  EXPECT_TRUE(rejects([&] { WeaveTrajectory(X, 0.0, 1.0, 1.0, 0.1, 0.0); }, "wavelength"));
+  EXPECT_TRUE(rejects([&] { CircleTrajectory(X, 0.0, 1.0, 1.0, 0.0); }, "radius"));
+  EXPECT_TRUE(rejects([&] { WayPointTrajectory(X, {}); }, "number of way-points"));
+  EXPECT_TRUE(rejects([&] { WayPointTrajectory(X, {{1.0, X}, {1.0, X}}); }, "time of way-point"));
+}
+
+TEST(Trajectory, EvaluationDoesNotAllocate) {
+  for (const auto& [name, trajectory] : MakeAll()) {
+    const AllocationCounter counter;
+    const DesiredMotion motion = trajectory->Evaluate(1.0);
+    EXPECT_EQ(counter.count(), 0) << name;
+    EXPECT_GT(motion.X_d.norm(), 0.1);
+  }
+}
+
+std::unique_ptr<Trajectory> Parse(const std::string& text) {
+  const TomlDocument document(text, "scenario.toml");
+  TomlTable table = document.Open();
+  return ReadTrajectory(table, MakeStart());
+}
+
+TEST(TrajectoryReader, ReadsEveryType) {
+  const auto all = MakeAll();
+  const auto expect_same = [&](const std::string& name, const std::string& text) {
+    const std::unique_ptr<Trajectory> read = Parse(text);
+    for (const double t : {0.3, 1.0, 2.7}) {
+      EXPECT_TRUE(MatrixNear(read->Evaluate(t).X_d, all.at(name)->Evaluate(t).X_d, kRounding)) << name;
+      EXPECT_TRUE(MatrixNear(read->Evaluate(t).X_d_dot, all.at(name)->Evaluate(t).X_d_dot, kRounding))
+          << name;
+    }
+  };
+  const std::string direction = "velocity = [0.3, -0.1, 0.05]\nturning = [0.4, 0.2, -0.3]\n";
+  const std::string displacement = "xyz = [0.3, -0.1, 0.05]\nzyz = [0.4, 0.2, -0.3]\n";
+  expect_same("line", "type = 'line'\n" + direction);
+  expect_same("ramp", "type = 'line'\nramp_time = 1.3\n" + direction);
+  expect_same("point_to_point", "type = 'point_to_point'\nduration = 1.7\n" + displacement);
+  expect_same("oscillation", "type = 'oscillation'\nfrequency = 0.8\nramp_time = 1.1\n" + displacement);
+  expect_same(
+      "weave",
+      "type = 'weave'\nheading = 0.7\nspeed = 1.0\nramp_time = 1.2\namplitude = 0.15\nwavelength = 1.6\n");
+  expect_same("circle", "type = 'circle'\nheading = -0.4\nspeed = 0.9\nramp_time = 1.2\nradius = 0.8\n");
+  const std::unique_ptr<Trajectory> points = Parse(
+      "type = 'way_points'\npoints = [{ time = 1.0, xyz = [0.1, 0, 0] }, { time = 2, zyz_deg = [90, 0, 0] "
+      "}]\n");
+  EXPECT_NEAR(points->Evaluate(1.0).X_d[0], MakeStart()[0] + 0.1, kRounding);
+  EXPECT_NEAR(points->Evaluate(2.0).X_d[0], MakeStart()[0], kRounding);
+  EXPECT_NEAR(points->Evaluate(2.0).X_d[3], MakeStart()[3] + kPi / 2.0, kRounding);
+}
+
+TEST(TrajectoryReader, RejectsWhatIsWrong) {
+  const auto rejects = [](const std::string& text, const std::string& message) {
+    return Throws<InputError>([&] { return Parse(text); }, message);
+  };
+  EXPECT_TRUE(rejects("type = 'spiral'", "type"));
+  EXPECT_TRUE(rejects("type = 'line'\nspeed = 3", "speed"));
+  EXPECT_TRUE(rejects("type = 'point_to_point'", "duration"));
+  EXPECT_TRUE(rejects("type = 'point_to_point'\nduration = -1", "scenario.toml:2: duration"));
+  EXPECT_TRUE(rejects("type = 'circle'\nspeed = 1\nradius = 0", "radius: must not be zero"));
+  EXPECT_TRUE(rejects("type = 'way_points'\npoints = []", "needs at least one point"));
+  EXPECT_TRUE(rejects("type = 'way_points'\npoints = [{ time = 2 }, { time = 1 }]",
+                      "must be greater than the time before"));
+  EXPECT_TRUE(rejects("type = 'way_points'\npoints = [{ time = 2, abc = 1 }]", "abc"));
+}
+
+}  // namespace
+}  // namespace dexcheck
