@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/SVD>
+#include <cmath>
 #include <random>
 
 #include "controller/common/errors.h"
@@ -253,6 +254,53 @@ TEST(ComputedTorque, PlansWithTheNearestVelocityThatDoesNotSlip) {
   const VectorXd slip = scene.grasp.J_B() * law.xi_c() - scene.grasp.G().transpose() * scene.grasp.V_Bo();
   EXPECT_TRUE(MatrixNear(slip, VectorXd::Zero(scene.num_forces()), 1e-14));
   EXPECT_LE((law.xi_c() - scene.xi).norm(), (consistent - scene.xi).norm());
+}
+
+// With W = M_bar' the law does not depend on the coordinates of xi: both choices of v in (12) give one tau'.
+TEST(ComputedTorque, BothChoicesOfVGiveTheSameTorques) {
+  VectorXd tau[2];
+  for (const DriveVelocity velocity : {DriveVelocity::kTwist, DriveVelocity::kWheelRates}) {
+    GraspScene scene(Hands::kRight, velocity);
+    scene.xi.head<2>() = CalcDriveVelocity(scene.model.base(), Vector2d(6.0, -4.0));
+    for (int i = 2; i < scene.robot.size(); ++i) scene.xi[i] = 0.5 * std::sin(i);
+    scene.SetState();
+    ComputedTorque law(scene.model, 4, {RedundancyWeight::Kind::kMass, {}});
+    law.SetDemand(scene.robot, scene.grasp, Vector6d::Ones(), VectorXd::Zero(scene.robot.size()));
+    tau[velocity == DriveVelocity::kTwist ? 0 : 1] =
+        law.CalcTorque(scene.grasp, scene.CalcInternalForce(2.0));
+  }
+  ASSERT_GT(tau[0].head<2>().norm(), 0.1);
+  EXPECT_TRUE(MatrixNear(tau[1], tau[0], kForceRounding));
+}
+
+// Hanging arm: the torus's axis is vertical, sin(beta) = 0. The law by pose works there.
+TEST(ComputedTorque, WorksWhereTheAnglesAreSingular) {
+  GraspScene scene;
+  for (const char* joint : {"r_shoulder_pitch", "r_elbow"}) scene.q[3 + scene.model.FindJoint(joint)] = 0.0;
+  scene.robot.SetState(scene.q, scene.xi);
+  scene.robot.CalcDynamics();
+  Pose X_po = Pose::Identity();
+  X_po.translation() = Vector3d(0.0, 0.0, 0.12);
+  const Pose X_Bo = scene.robot.CalcFramePose(scene.model.FindFrame("r_palm_frame")) * X_po;
+  EXPECT_THROW(CalcObjectCoordinates(X_Bo, Vector6d::Zero()), SingularityError);
+  scene.grasp.SetPose(scene.robot, X_Bo, Vector6d::Zero(), scene.kappa);
+
+  DesiredPose desired;
+  desired.p_Bd = X_Bo.translation() + Vector3d(0.01, -0.02, 0.03);
+  desired.p_Bd_dot = Vector3d(0.1, 0.2, -0.1);
+  desired.p_Bd_ddot = Vector3d(1.0, -1.0, 0.5);
+  desired.R_Bd = X_Bo.linear() * ExpSo3(Vector3d(0.1, 0.2, -0.1));
+  desired.omega_d = Vector3d(0.3, -0.2, 0.1);
+  desired.omega_d_dot = Vector3d(-1.0, 0.5, 0.2);
+  const Vector6d demanded = CalcTrackingAcceleration(MakeGains(), X_Bo, Vector6d::Zero(), desired);
+  ASSERT_GT(demanded.norm(), 1.0);
+  ComputedTorque law(scene.model, 4);
+  law.SetDemand(scene.robot, scene.grasp, demanded, VectorXd::Zero(scene.robot.size()));
+  VectorXd force(scene.robot.size());
+  ActuationMap(scene.model).CalcForce(law.CalcTorque(scene.grasp, scene.CalcInternalForce(3.0)), force);
+  ConstrainedDynamics dynamics(scene.model, 4);
+  const Prediction& p = dynamics.Predict(scene.robot, scene.grasp, force);
+  EXPECT_TRUE(MatrixNear(p.V_Bo_dot, demanded, kAccelerationRounding));
 }
 
 // tau_0 is what the torques would be without contact forces.
