@@ -105,6 +105,10 @@ class StateReader {
     if (key == "contact_points" && !json.contains("object")) Fail(key, "needs object");
     const Json& rows = json.at(key);
     const auto most = model.fingertips().size();
+    if (most < kFewestContacts) {
+      Fail(key, "the robot of " + model.spec().source + " has " + std::to_string(most) +
+                    " fingertips, needed are " + std::to_string(kFewestContacts));
+    }
     if (!rows.is_array() || rows.size() < kFewestContacts || rows.size() > most) {
       Fail(key, "must be a list of " + std::to_string(kFewestContacts) + " to " + std::to_string(most) +
                     " lists, one for each contact, got " +

@@ -221,7 +221,7 @@ TEST_P(PlatformTest, RejectsWhatIsNotADifferentialDrive) {
     CalcDriveVelocity(base, Vector2d::Zero());
     FAIL() << "a negative wheel distance was accepted";
   } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "wheel_distance: must be positive, got -0.400000");
+    EXPECT_STREQ(error.what(), "wheel_distance: must be positive, got -0.4");
   }
 }
 

@@ -350,7 +350,7 @@ TEST(ObjectDynamics, RejectsABodyThatIsNotAnObject) {
     FAIL() << "an object off its centre of mass was accepted";
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(),
-                 "object com: must be zero (Sigma_o stands at the centre of mass), got 0.010000");
+                 "object com: must be zero (Sigma_o stands at the centre of mass), got 0.01");
   }
 }
 

@@ -278,12 +278,9 @@ INSTANTIATE_TEST_SUITE_P(
         {"Singular",
          kGoodStart + R"("object": {"X_o": [0, 0, 0, 0, 0, 0], "X_o_dot": [0, 0, 0, 0, 0, 0]}})",
          {"object.X_o: ", "singular", "beta = 0 rad"}},
-        {"KappaRows",
+        {"KappaWithoutFingertips",
          kGoodStart + R"("kappa": [[0, 0, 0, 0, 0]]})",
-         {"kappa: must be a list of 3 to 8 lists, one for each contact, got 1"}},
-        {"KappaEntry",
-         kGoodStart + R"("kappa": [[0, 0, 0, 0, 0], [0, 0, 0, 0], [], []]})",
-         {"kappa[1]: must be a list of 5 numbers, got 4"}},
+         {"has 0 fingertips, needed are 3"}},
     }),
     [](const auto& info) { return info.param.name; });
 

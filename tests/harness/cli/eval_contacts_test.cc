@@ -134,6 +134,12 @@ TEST_F(EvalContacts, RefusesImpossibleContacts) {
                  "contact_points[3]: distance of the contact point from the surface [m]");
   expect_refused({{"contact_points", {{0.046, 0, 0}, {0, 0.046, 0}}}},
                  "contact_points: must be a list of 3 to 8 lists");
+  const Json row = {0.1, 0.2, 0.3, 0.4, 0.5};
+  expect_refused({{"contact_points", nullptr}, {"kappa", {row, row}}},
+                 "kappa: must be a list of 3 to 8 lists, one for each");
+  expect_refused({{"contact_points", nullptr}, {"kappa", {row, {0.1, 0.2, 0.3, 0.4}, row}}},
+                 "kappa[1]: must be a list of 5 numbers, got 4");
+  expect_refused({{"kappa", {row, row, row}}}, "kappa: give kappa or contact_points, not both");
   expect_refused({{"mu", 0}}, "mu: must be a positive number, got 0");
   expect_refused({{"mu", -0.5}}, "mu: must be a positive number, got -0.5");
   expect_refused({{"fingers", {"rf1_tip", "rf1_tip", "rf2_tip", "rf3_tip"}}},
