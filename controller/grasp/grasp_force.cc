@@ -70,6 +70,7 @@ void RequireValid(const GraspForceOptions& options) {
   Require(options.barrier_weight > 0.0 && std::isfinite(options.barrier_weight), "barrier_weight",
           "must be positive and finite", options.barrier_weight);
   Require(options.gap_tolerance > 0.0, "gap_tolerance", "must be positive", options.gap_tolerance);
+  Require(options.slack_tolerance > 0.0, "slack_tolerance", "must be positive", options.slack_tolerance);
   Require(options.residual_tolerance > 0.0, "residual_tolerance", "must be positive",
           options.residual_tolerance);
   Require(options.max_iterations > 0, "max_iterations", "must be positive", options.max_iterations);

@@ -66,8 +66,9 @@ enum class GraspForceObjective {
 
 struct GraspForceOptions {
   GraspForceObjective objective = GraspForceObjective::kBarrier;
-  double barrier_weight = 0.1;        ///< rho, N. The larger, the farther from the cones' boundaries.
-  double gap_tolerance = 1e-7;        ///< Duality gap at which to stop, relative to max(1 N, objective).
+  double barrier_weight = 0.1;  ///< rho, N. The larger, the farther from the cones' boundaries.
+  double gap_tolerance = 1e-7;  ///< kMinimum: duality gap at which to stop, relative to max(1 N, objective).
+  double slack_tolerance = 1e-5;      ///< kBarrier: relative error of the slacks at which to stop.
   double residual_tolerance = 1e-10;  ///< Largest |G f_c - F_o| (N, N m), relative to max(1, |F_o|).
   int max_iterations = 60;
   bool warm_start = true;  ///< Start from the last solution. A warm start that fails is repeated cold.
@@ -117,7 +118,7 @@ VectorXd CalcInternalForce(const Eigen::Ref<const Matrix6Xd>& G, const Eigen::Re
 double CalcConeMargin(const Eigen::Ref<const VectorXd>& f_c, const Eigen::Ref<const VectorXd>& mu);
 
 namespace grasp_internal {
-class GraspForceKernelBase;
+class GraspForceKernel;
 }
 
 /// Solves grasp-force problems of one size, one after the other, by a primal-dual interior-point method.
@@ -143,7 +144,7 @@ class GraspForceSolver {
  private:
   GraspForceOptions options_;
   GraspForceResult result_;
-  std::unique_ptr<grasp_internal::GraspForceKernelBase> kernel_;
+  std::unique_ptr<grasp_internal::GraspForceKernel> kernel_;
 };
 
 }  // namespace dexcheck

@@ -1,6 +1,6 @@
 #pragma once
 
-// The interior-point method behind GraspForceSolver, specialised by size. Internal to controller/grasp.
+// The interior-point method behind GraspForceSolver, for problems of one size. Internal to controller/grasp.
 
 #include <memory>
 
@@ -9,9 +9,9 @@
 namespace dexcheck::grasp_internal {
 
 /// A solver for problems of one size.
-class GraspForceKernelBase {
+class GraspForceKernel {
  public:
-  virtual ~GraspForceKernelBase() = default;
+  virtual ~GraspForceKernel() = default;
   /// Solves a valid problem of the right size into `result`, whose vectors have the right size.
   virtual void Solve(const GraspForceProblem& problem, const GraspForceOptions& options,
                      GraspForceResult& result) = 0;
@@ -20,6 +20,6 @@ class GraspForceKernelBase {
 };
 
 /// The kernel for `num_contacts` contacts and `num_limits` limited functions of their forces.
-std::unique_ptr<GraspForceKernelBase> MakeGraspForceKernel(int num_contacts, int num_limits);
+std::unique_ptr<GraspForceKernel> MakeGraspForceKernel(int num_contacts, int num_limits);
 
 }  // namespace dexcheck::grasp_internal

@@ -2,9 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <string>
-
-#include "controller/common/errors.h"
+#include <utility>
 
 namespace dexcheck::grasp_internal {
 namespace {
@@ -114,7 +112,6 @@ bool GrowingPolytope::Add(const Vector6d& point) {
     }
   }
   free_.insert(free_.end(), visible.begin(), visible.end());
-  std::vector<int> removed(visible);
   for (const auto& [vertices, beyond] : cone) {
     const int index = AddFacet(vertices);
     Facet& facet = facets_[static_cast<std::size_t>(index)];

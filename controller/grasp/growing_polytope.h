@@ -25,7 +25,7 @@ class GrowingPolytope {
     bool alive = true;
   };
 
-  /// Starts from a simplex of seven points. Throws SingularityError if they do not span R^6.
+  /// Starts from a simplex: seven points that span R^6.
   explicit GrowingPolytope(const std::array<Vector6d, kDimension + 1>& simplex);
 
   /// The facet whose plane is closest to the origin, or the farthest beyond it (most negative offset).

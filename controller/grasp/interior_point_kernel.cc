@@ -1,40 +1,11 @@
-#include "controller/grasp/grasp_force_kernel.h"
+#include "controller/grasp/interior_point_kernel.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
 #include <limits>
-#include <vector>
+#include <string>
 
 #include "controller/common/errors.h"
-#include "controller/grasp/box_bounds.h"
-#include "controller/grasp/contact_pack.h"
-#include "controller/grasp/lanes.h"
-#include "controller/grasp/normal_equations.h"
-
-// In the coordinates x_i = (mu_i f_i3, f_i1, f_i2) each friction cone (21) is K = {x0 >= |(x1, x2)|}, and the
-// problem is
-//
-//   minimise  sum_i w_i x_i0   subject to   sum_i A_i x_i - [0; t] = b = [F_o; 0]   (multipliers y),
-//                                           x_i in K,  lower_i <= x_i0 <= upper_i,  lower_j <= t_j <=
-//                                           upper_j,
-//
-// with one t_j for each limited function of the contact forces. With s_i in K and z >= 0 the multipliers of
-// cones and bounds, a point of the central path solves, e = (1, 0, 0),
-//
-//   A_i^T y + s_i + (z_lower - z_upper)_i e = w_i e,     y_j = (z_lower - z_upper)_j,
-//   x_i o s_i = 2 rho e,   slack z = rho   for every bound,
-//
-// which is the optimum for the barrier objective with weight rho, and tends to that of the linear one with
-// rho to 0. The Newton step on these equations is taken in Nesterov and Todd's scaling W s = W^-1 x = lambda;
-// one 6 x 6 (or larger, with limits) system is left to factor. Far from the target each step is corrected to
-// second order as Mehrotra's. Because bounded forces are a compact set, every y gives a bound on the
-// objective in closed form, and proves infeasibility if it does at all: a problem without solution drives y
-// there.
-//
-// Y. Nesterov, M. Todd: Primal-dual interior-point methods for self-scaled cones, 1998.
-// S. Mehrotra: On the implementation of a primal-dual interior point method, 1992.
 
 namespace dexcheck::grasp_internal {
 namespace {
@@ -43,91 +14,23 @@ namespace {
 constexpr double kStepFraction = 0.99;
 // Least share of the present complementarity that a corrected step aims at.
 constexpr double kLeastCentering = 0.03;
-// A barrier problem takes plain Newton steps once its complementarity is within this factor of the target.
-constexpr double kNewtonRange = 3.0;
-// Relative duality gap of the iterate that is kept for a warm start of the linear objective: later ones lie
-// too close to the boundary to follow a moving problem.
-constexpr double kSavedGap = 1e-2;
+// A barrier problem aims at its target directly once its complementarity is within this factor of it.
+constexpr double kNearFactor = 3.0;
+// Relative duality gap of the iterate that is kept for a warm start of the linear objective. Later iterates
+// lie too close to the boundary to follow a moving problem.
+constexpr double kSavedGap = 3e-3;
 // Multiple of the residual tolerance from which x alone is moved to the equality constraints.
 constexpr double kPolishRange = 1e4;
 // Smallest separation per unit of |y|_1, in N or N m, that counts as a proof of infeasibility: above
 // rounding.
 constexpr double kProof = 1e-9;
-// Squared sine of the angle between a row of the scaled G and the rows before it, below which G has no full
-// rank.
+// Squared sine of the angle between a row of the scaled G and the rows before it, below which G is singular.
 constexpr double kRankTolerance = 1e-13;
 
-/// kPacks packs of four contacts and kRows = 6 + M equality rows, both known at compile time or both
-/// kAnySize.
-template <int kPacks, int kRows>
-class GraspForceKernel final : public GraspForceKernelBase {
- public:
-  GraspForceKernel(int num_contacts, int num_limits);
-  void Solve(const GraspForceProblem& problem, const GraspForceOptions& options,
-             GraspForceResult& result) override;
-  void Reset() override { has_last_ = false; }
-
- private:
-  static constexpr int kEntries = kPacks == kAnySize ? kAnySize : kPacks * kRows;
-
-  std::size_t num_packs() const { return packs_.size(); }
-  std::size_t num_rows() const { return y_.size(); }
-  std::size_t num_limits() const { return limits_.size(); }
-  /// Number of complementarity pairs, the barrier's parameter: two for each cone, two for each pair of
-  /// bounds.
-  double CalcDegree() const { return static_cast<double>(4 * kLanes * num_packs() + 2 * num_limits()); }
-  const Lanes3& A(std::size_t pack, std::size_t row) const { return A_[pack * num_rows() + row]; }
-  const Lanes3& M(std::size_t pack, std::size_t row) const { return M_[pack * num_rows() + row]; }
-  /// g += factor rows^T y, for the rows of one pack.
-  void AddCombination(const Lanes3* rows, const Buffer<double, kRows>& y, double factor, Lanes3& g) const {
-    for (std::size_t k = 0; k < num_rows(); ++k) {
-      for (std::size_t j = 0; j < 3; ++j) g[j] += rows[k][j] * (factor * y[k]);
-    }
-  }
-
-  void Load(const GraspForceProblem& problem);
-  void StartCold(double barrier_weight);
-  bool StartWarm();
-  void Save();
-  void Restore();
-  GraspForceStatus Iterate(const GraspForceOptions& options, bool warm, int& iterations);
-  void CalcResiduals();
-  double CalcBound(bool with_cost) const;
-  double CalcGap(const GraspForceOptions& options) const;
-  bool ProvesInfeasibility() const;
-  void RequireFullRank() const;
-  void Factor();
-  void Aim(double target);
-  void AimCorrected(double target);
-  double CalcDirection();
-  void Advance(double step);
-  bool RestoreFeasibility();
-  void Report(const GraspForceProblem& problem, const GraspForceOptions& options,
-              GraspForceResult& result) const;
-
-  Buffer<ContactPack, kPacks> packs_;
-  Buffer<Lanes3, kEntries> A_, M_;  // the rows of A_i and of M_i = A_i W_i R_i
-  Buffer<Lanes3, kPacks> h_;        // R_i^-1 dx_scaled for dy = 0
-  Buffer<double, kRows> b_, y_, dy_, saved_y_, residual_;
-  NormalEquations<kRows> equations_;
-
-  // A limited linear function t of the contact forces.
-  struct Limit {
-    double lower, upper;
-    double t;
-    BoxBounds<double> bounds;
-    double dual_residual, dt;
-    // dt for dy = 0.
-    double CalcFreeStep() const { return (bounds.CalcPull() - dual_residual) / bounds.curvature(); }
-  };
-  std::vector<Limit> limits_, saved_limits_;
-
-  double gap_, objective_, max_residual_, max_dual_residual_;
-  bool has_last_ = false;
-};
+}  // namespace
 
 template <int kPacks, int kRows>
-GraspForceKernel<kPacks, kRows>::GraspForceKernel(int num_contacts, int num_limits)
+InteriorPointKernel<kPacks, kRows>::InteriorPointKernel(int num_contacts, int num_limits)
     : equations_(static_cast<std::size_t>(6 + num_limits)) {
   const std::size_t packs = static_cast<std::size_t>((num_contacts + kLanes - 1) / kLanes);
   const std::size_t rows = static_cast<std::size_t>(6 + num_limits);
@@ -141,7 +44,7 @@ GraspForceKernel<kPacks, kRows>::GraspForceKernel(int num_contacts, int num_limi
 }
 
 template <int kPacks, int kRows>
-void GraspForceKernel<kPacks, kRows>::Load(const GraspForceProblem& problem) {
+void InteriorPointKernel<kPacks, kRows>::Load(const GraspForceProblem& problem) {
   for (Eigen::Index i = 0; i < problem.num_contacts(); ++i) {
     const std::size_t p = static_cast<std::size_t>(i) / kLanes;
     const Eigen::Index lane = i % kLanes;
@@ -172,10 +75,11 @@ void GraspForceKernel<kPacks, kRows>::Load(const GraspForceProblem& problem) {
 
 // y = 0, every contact at the centre for a target that suits the costliest of them.
 template <int kPacks, int kRows>
-void GraspForceKernel<kPacks, kRows>::StartCold(double barrier_weight) {
+void InteriorPointKernel<kPacks, kRows>::StartCold(double barrier_weight) {
   double target = barrier_weight;
-  for (const ContactPack& c : packs_)
+  for (const ContactPack& c : packs_) {
     target = std::max(target, (0.25 * c.w * (c.lower + c.upper)).maxCoeff());
+  }
   for (ContactPack& c : packs_) c.SetCenter(target);
   for (Limit& l : limits_) {
     l.t = 0.5 * (l.lower + l.upper);
@@ -186,14 +90,14 @@ void GraspForceKernel<kPacks, kRows>::StartCold(double barrier_weight) {
 }
 
 template <int kPacks, int kRows>
-void GraspForceKernel<kPacks, kRows>::Save() {
+void InteriorPointKernel<kPacks, kRows>::Save() {
   for (ContactPack& c : packs_) c.saved = c.at;
   saved_limits_ = limits_;
   saved_y_ = y_;
 }
 
 template <int kPacks, int kRows>
-void GraspForceKernel<kPacks, kRows>::Restore() {
+void InteriorPointKernel<kPacks, kRows>::Restore() {
   for (ContactPack& c : packs_) c.at = c.saved;
   for (std::size_t j = 0; j < num_limits(); ++j) {
     limits_[j].t = saved_limits_[j].t;
@@ -204,7 +108,7 @@ void GraspForceKernel<kPacks, kRows>::Restore() {
 
 // Measures the last iterate against the present bounds; false if it lies outside.
 template <int kPacks, int kRows>
-bool GraspForceKernel<kPacks, kRows>::StartWarm() {
+bool InteriorPointKernel<kPacks, kRows>::StartWarm() {
   bool inside = true;
   for (ContactPack& c : packs_) {
     c.at.bounds.SetValue(c.at.x[0], c.lower, c.upper);
@@ -218,7 +122,7 @@ bool GraspForceKernel<kPacks, kRows>::StartWarm() {
 }
 
 template <int kPacks, int kRows>
-void GraspForceKernel<kPacks, kRows>::CalcResiduals() {
+void InteriorPointKernel<kPacks, kRows>::CalcResiduals() {
   residual_ = b_;
   gap_ = 0.0;
   objective_ = 0.0;
@@ -247,10 +151,10 @@ void GraspForceKernel<kPacks, kRows>::CalcResiduals() {
 }
 
 // The Lagrangian's minimum over all cones and bounds, a lower bound on the linear objective:
-//   b^T y - sum_i max_{x in C_i} (A_i^T y - w_i e)^T x + sum_j min(lower_j y_j, upper_j y_j),  C_i = {x in K,
-//   lower <= x0 <= upper}.
+//   b^T y - sum_i max_{x in C_i} (A_i^T y - w_i e)^T x + sum_j min(lower_j y_j, upper_j y_j)
+// with C_i = {x in K, lower <= x0 <= upper}.
 template <int kPacks, int kRows>
-double GraspForceKernel<kPacks, kRows>::CalcBound(bool with_cost) const {
+double InteriorPointKernel<kPacks, kRows>::CalcBound(bool with_cost) const {
   double bound = 0.0;
   for (std::size_t k = 0; k < num_rows(); ++k) bound += b_[k] * y_[k];
   for (std::size_t p = 0; p < num_packs(); ++p) {
@@ -268,7 +172,7 @@ double GraspForceKernel<kPacks, kRows>::CalcBound(bool with_cost) const {
 
 // S = sum_i M_i M_i^T with M_i = A_i W_i R_i, and the limits' part.
 template <int kPacks, int kRows>
-void GraspForceKernel<kPacks, kRows>::Factor() {
+void InteriorPointKernel<kPacks, kRows>::Factor() {
   equations_.SetZero();
   for (std::size_t p = 0; p < num_packs(); ++p) {
     ContactPack& c = packs_[p];
@@ -288,20 +192,20 @@ void GraspForceKernel<kPacks, kRows>::Factor() {
 }
 
 template <int kPacks, int kRows>
-void GraspForceKernel<kPacks, kRows>::Aim(double target) {
+void InteriorPointKernel<kPacks, kRows>::Aim(double target) {
   for (ContactPack& c : packs_) c.Aim(target);
   for (Limit& l : limits_) l.bounds.Aim(target);
 }
 
 template <int kPacks, int kRows>
-void GraspForceKernel<kPacks, kRows>::AimCorrected(double target) {
+void InteriorPointKernel<kPacks, kRows>::AimCorrected(double target) {
   for (ContactPack& c : packs_) c.AimCorrected(target);
   for (Limit& l : limits_) l.bounds.AimCorrected(target, l.dt);
 }
 
 // Solves the Newton equations for the present aim; returns the longest step that stays inside.
 template <int kPacks, int kRows>
-double GraspForceKernel<kPacks, kRows>::CalcDirection() {
+double InteriorPointKernel<kPacks, kRows>::CalcDirection() {
   // S dy = residual - sum_i M_i h_i,  h_i the direction for dy = 0.
   dy_ = residual_;
   for (std::size_t p = 0; p < num_packs(); ++p) {
@@ -329,10 +233,9 @@ double GraspForceKernel<kPacks, kRows>::CalcDirection() {
 }
 
 template <int kPacks, int kRows>
-void GraspForceKernel<kPacks, kRows>::Advance(double step) {
+void InteriorPointKernel<kPacks, kRows>::Advance(double step) {
   for (std::size_t p = 0; p < num_packs(); ++p) {
-    // ds = dual_residual - A^T dy - (dz_lower - dz_upper) e: unlike W^-1 ds_scaled it keeps the dual equation
-    // to rounding.
+    // ds = dual_residual - A^T dy - (dz_lower - dz_upper) e keeps the dual equation; W^-1 ds_scaled drifts.
     ContactPack& c = packs_[p];
     Lanes3 ds = c.dual_residual;
     ds[0] -= c.at.bounds.CalcMultiplierStep();
@@ -348,11 +251,10 @@ void GraspForceKernel<kPacks, kRows>::Advance(double step) {
   for (std::size_t k = 0; k < num_rows(); ++k) y_[k] += step * dy_[k];
 }
 
-// The smallest step, in the last scaling, from x alone to the equality constraints; false if it would leave
-// the interior. Rounding in the last Newton steps of the linear objective, whose scaling is extreme, makes it
-// necessary.
+// Moves x alone, by the smallest step in the last scaling, to the equality constraints; false if that would
+// leave the interior. The last Newton steps of the linear objective, whose scaling is extreme, need it.
 template <int kPacks, int kRows>
-bool GraspForceKernel<kPacks, kRows>::RestoreFeasibility() {
+bool InteriorPointKernel<kPacks, kRows>::RestoreFeasibility() {
   dy_ = residual_;
   equations_.Solve(dy_);
   Lanes inverse_step = Lanes::Zero();
@@ -381,7 +283,7 @@ bool GraspForceKernel<kPacks, kRows>::RestoreFeasibility() {
 
 // Upper bound on the distance of the chosen objective from its optimum.
 template <int kPacks, int kRows>
-double GraspForceKernel<kPacks, kRows>::CalcGap(const GraspForceOptions& options) const {
+double InteriorPointKernel<kPacks, kRows>::CalcGap(const GraspForceOptions& options) const {
   if (options.objective == GraspForceObjective::kMinimum) return objective_ - CalcBound(true);
   double gap = 0.0;
   for (const ContactPack& c : packs_) gap += c.CalcBarrierGap(options.barrier_weight).sum();
@@ -390,27 +292,28 @@ double GraspForceKernel<kPacks, kRows>::CalcGap(const GraspForceOptions& options
 }
 
 template <int kPacks, int kRows>
-void GraspForceKernel<kPacks, kRows>::RequireFullRank() const {
+void InteriorPointKernel<kPacks, kRows>::RequireFullRank() const {
   const double ratio = equations_.CalcSmallestPivotRatio(6);
   if (ratio > kRankTolerance) return;
   throw SingularityError("G: must have full row rank, got pivot ratio " + std::to_string(ratio), ratio);
 }
 
 template <int kPacks, int kRows>
-bool GraspForceKernel<kPacks, kRows>::ProvesInfeasibility() const {
+bool InteriorPointKernel<kPacks, kRows>::ProvesInfeasibility() const {
   double size = 0.0;
   for (const double y : y_) size += std::abs(y);
   return CalcBound(false) > kProof * size;
 }
 
 template <int kPacks, int kRows>
-GraspForceStatus GraspForceKernel<kPacks, kRows>::Iterate(const GraspForceOptions& options, bool warm,
-                                                          int& iterations) {
+GraspForceStatus InteriorPointKernel<kPacks, kRows>::Iterate(const GraspForceOptions& options, bool warm,
+                                                             int& iterations) {
   const bool barrier = options.objective == GraspForceObjective::kBarrier;
   const double rho = barrier ? options.barrier_weight : 0.0;
   double size = 1.0;
   for (const double b : b_) size = std::max(size, std::abs(b));
   const double tolerance = options.residual_tolerance * size;
+  const double barrier_gap = 0.5 * rho * options.slack_tolerance * options.slack_tolerance;
   bool saved = false;
   double step = 1.0;
   for (int i = 0;; ++i, ++iterations) {
@@ -419,12 +322,13 @@ GraspForceStatus GraspForceKernel<kPacks, kRows>::Iterate(const GraspForceOption
     const bool feasible =
         max_residual_ <= tolerance && (!barrier || max_dual_residual_ <= options.residual_tolerance);
     const bool nearly_feasible = feasible || (!barrier && max_residual_ <= kPolishRange * tolerance);
-    const bool closed = nearly_feasible && CalcGap(options) <= options.gap_tolerance * scale;
+    const bool closed =
+        nearly_feasible && CalcGap(options) <= (barrier ? barrier_gap : options.gap_tolerance * scale);
     if (feasible && closed) return GraspForceStatus::kOptimal;
     if (!feasible && i > 0 && ProvesInfeasibility()) return GraspForceStatus::kInfeasible;
     if (i == options.max_iterations || !std::isfinite(gap_)) return GraspForceStatus::kNotConverged;
     if (closed && i > 0 && RestoreFeasibility()) continue;
-    if (!barrier && !saved && gap_ <= kSavedGap * scale) {
+    if (!barrier && !saved && (warm ? i > 0 : gap_ <= kSavedGap * scale)) {
       Save();
       saved = true;
     }
@@ -433,12 +337,17 @@ GraspForceStatus GraspForceKernel<kPacks, kRows>::Iterate(const GraspForceOption
     if (!warm && i == 0) RequireFullRank();
 
     const double mu = gap_ / CalcDegree();
-    if (barrier && step == 1.0 && mu < kNewtonRange * rho && mu > rho / kNewtonRange) {
-      Aim(rho);
+    if (!barrier && warm && i == 0) {
+      // Follow the problem to the same place on the central path, whence the next warm start.
+      Aim(kSavedGap * scale / CalcDegree());
     } else {
-      Aim(0.0);
+      // A predictor aims at rho if near, else as far as it gets; the corrector allows for its second-order
+      // error.
+      const bool near = barrier && step == 1.0 && mu < kNearFactor * rho && mu > rho / kNearFactor;
+      Aim(near ? rho : 0.0);
       const double shortfall = 1.0 - std::min(1.0, CalcDirection());
-      AimCorrected(std::max(rho, mu * std::max(kLeastCentering, shortfall * shortfall * shortfall)));
+      const double reachable = mu * std::max(kLeastCentering, shortfall * shortfall * shortfall);
+      AimCorrected(near ? rho : std::max(rho, reachable));
     }
     step = std::min(1.0, kStepFraction * CalcDirection());
     Advance(step);
@@ -446,12 +355,13 @@ GraspForceStatus GraspForceKernel<kPacks, kRows>::Iterate(const GraspForceOption
 }
 
 template <int kPacks, int kRows>
-void GraspForceKernel<kPacks, kRows>::Solve(const GraspForceProblem& problem,
-                                            const GraspForceOptions& options, GraspForceResult& result) {
+void InteriorPointKernel<kPacks, kRows>::Solve(const GraspForceProblem& problem,
+                                               const GraspForceOptions& options, GraspForceResult& result) {
   Load(problem);
   result.iterations = 0;
   result.status = GraspForceStatus::kNotConverged;
   result.warm_started = options.warm_start && has_last_;
+  has_last_ = false;
   if (result.warm_started) {
     if (options.objective == GraspForceObjective::kMinimum) Restore();
     result.warm_started = StartWarm();
@@ -467,14 +377,14 @@ void GraspForceKernel<kPacks, kRows>::Solve(const GraspForceProblem& problem,
 }
 
 template <int kPacks, int kRows>
-void GraspForceKernel<kPacks, kRows>::Report(const GraspForceProblem& problem,
-                                             const GraspForceOptions& options,
-                                             GraspForceResult& result) const {
+void InteriorPointKernel<kPacks, kRows>::Report(const GraspForceProblem& problem,
+                                                const GraspForceOptions& options,
+                                                GraspForceResult& result) const {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const bool optimal = result.status == GraspForceStatus::kOptimal;
   const bool infeasible = result.status == GraspForceStatus::kInfeasible;
   result.residual = max_residual_;
-  result.objective = objective_;
+  result.objective = optimal ? objective_ : 0.0;
   result.lower_bound = optimal ? CalcBound(true) : -kInfinity;
   result.duality_gap = optimal ? CalcGap(options) : kInfinity;
   double y_scale = 1.0;
@@ -499,14 +409,14 @@ void GraspForceKernel<kPacks, kRows>::Report(const GraspForceProblem& problem,
   }
 }
 
-}  // namespace
-
-std::unique_ptr<GraspForceKernelBase> MakeGraspForceKernel(int num_contacts, int num_limits) {
-  if (num_limits == 0 && num_contacts <= kLanes)
-    return std::make_unique<GraspForceKernel<1, 6>>(num_contacts, 0);
-  if (num_limits == 0 && num_contacts <= 2 * kLanes)
-    return std::make_unique<GraspForceKernel<2, 6>>(num_contacts, 0);
-  return std::make_unique<GraspForceKernel<kAnySize, kAnySize>>(num_contacts, num_limits);
+std::unique_ptr<GraspForceKernel> MakeGraspForceKernel(int num_contacts, int num_limits) {
+  if (num_limits == 0 && num_contacts <= kLanes) {
+    return std::make_unique<InteriorPointKernel<1, 6>>(num_contacts, 0);
+  }
+  if (num_limits == 0 && num_contacts <= 2 * kLanes) {
+    return std::make_unique<InteriorPointKernel<2, 6>>(num_contacts, 0);
+  }
+  return std::make_unique<InteriorPointKernel<kAnySize, kAnySize>>(num_contacts, num_limits);
 }
 
 }  // namespace dexcheck::grasp_internal
