@@ -75,9 +75,12 @@ struct GraspForceOptions {
 };
 
 enum class GraspForceStatus {
-  kOptimal,       ///< f_c is feasible, and optimal within the stated duality gap.
-  kInfeasible,    ///< No admissible f_c exists; y proves it.
-  kNotConverged,  ///< Neither was shown within the iteration limit.
+  kOptimal,     ///< f_c is feasible, and optimal within the stated duality gap.
+  kInfeasible,  ///< No admissible f_c exists; y proves it.
+  /// Neither was shown within the iteration limit. With kBarrier also where admissible f_c exist but none
+  /// lies strictly inside its cones and bounds, so that there is no optimum (for example F_o = 0, f_min = 0,
+  /// no force closure: f_c = 0).
+  kNotConverged,
 };
 
 struct GraspForceResult {

@@ -12,6 +12,10 @@ namespace {
 
 // Share of the way to the boundary that a step may go.
 constexpr double kStepFraction = 0.99;
+// The same once a barrier problem has taken kPatience iterations: corrected steps can cycle where the
+// admissible forces are few; uncorrected, shorter ones do not.
+constexpr double kCautiousFraction = 0.7;
+constexpr int kPatience = 30;
 // Least share of the present complementarity that a corrected step aims at.
 constexpr double kLeastCentering = 0.03;
 // A barrier problem aims at its target directly once its complementarity is within this factor of it.
@@ -337,9 +341,12 @@ GraspForceStatus InteriorPointKernel<kPacks, kRows>::Iterate(const GraspForceOpt
     if (!warm && i == 0) RequireFullRank();
 
     const double mu = gap_ / CalcDegree();
+    const bool cautious = barrier && i >= kPatience;
     if (!barrier && warm && i == 0) {
       // Follow the problem to the same place on the central path, whence the next warm start.
       Aim(kSavedGap * scale / CalcDegree());
+    } else if (cautious) {
+      Aim(std::max(rho, 0.2 * mu));
     } else {
       // A predictor aims at rho if near, else as far as it gets; the corrector allows for its second-order
       // error.
@@ -349,7 +356,7 @@ GraspForceStatus InteriorPointKernel<kPacks, kRows>::Iterate(const GraspForceOpt
       const double reachable = mu * std::max(kLeastCentering, shortfall * shortfall * shortfall);
       AimCorrected(near ? rho : std::max(rho, reachable));
     }
-    step = std::min(1.0, kStepFraction * CalcDirection());
+    step = std::min(1.0, (cautious ? kCautiousFraction : kStepFraction) * CalcDirection());
     Advance(step);
   }
 }

@@ -99,6 +99,29 @@ TEST_P(RandomGrasps, EveryAnswerIsProved) {
 INSTANTIATE_TEST_SUITE_P(Contacts, RandomGrasps, ::testing::Values(4, 8),
                          ::testing::PrintToStringParamName());
 
+TEST(RandomGraspsOfThree, SqueezeOrProveThatTheyCannot) {
+  // Three contacts and no wrench leave few admissible forces, if any: the hardest problems for the barrier
+  // objective.
+  std::mt19937_64 random(22);
+  GraspForceOptions options;
+  options.warm_start = false;
+  GraspForceSolver solver(3, 0, options);
+  int feasible = 0;
+  int slow = 0;
+  for (int sample = 0; sample < 5 * kSamples; ++sample) {
+    GraspForceProblem problem = MakeRandomGraspForceProblem(random, 3);
+    problem.F_o.setZero();
+    const GraspForceResult& result = solver.Solve(problem);
+    ASSERT_NE(result.status, GraspForceStatus::kNotConverged) << sample;
+    if (result.status != GraspForceStatus::kOptimal) continue;
+    ++feasible;
+    if (result.iterations > 30) ++slow;
+    ExpectAdmissible(problem, result.f_c);
+  }
+  EXPECT_GT(feasible, kSamples / 10);
+  EXPECT_GT(slow, 0) << "none of them was hard";
+}
+
 TEST(RandomGraspsOracle, NoSampledForceGivesMore) {
   // CalcMostAlong itself, against admissible forces drawn at random: never exceeded, and nearly reached.
   std::mt19937_64 random(21);
