@@ -11,6 +11,7 @@
 #include "controller/contact/object_surface.h"
 #include "controller/contact/rolling.h"
 #include "controller/contact/shapes.h"
+#include "controller/grasp/force_closure.h"
 #include "controller/object/euler_zyz.h"
 #include "harness/cli/json_matrix.h"
 
@@ -57,6 +58,23 @@ Json DescribeContact(const Contact& contact, const ContactCoordinates& kappa, co
           {"R_psi", ToRows(geometry.R_psi)},
           {"g_f_cf", ToRows(geometry.g_f_cf.matrix())},
           {"g_o_cf", ToRows(geometry.g_o_cf.matrix())}};
+}
+
+/// Whether the grasp can resist every wrench (26), and how large a wrench in its weakest direction.
+void AddForceClosure(const Matrix6Xd& G, double friction, Json* out) {
+  const VectorXd mu = VectorXd::Constant(G.cols() / 3, friction);
+  const ForceClosureOptions options;
+  const ForceClosureResult result = CalcForceClosure(G, mu, options);
+  const bool closed = result.status == ForceClosureStatus::kForceClosure;
+  const bool open = result.status == ForceClosureStatus::kNotForceClosure;
+  (*out)["force_closure"] = {{"mu", friction},
+                             {"closed", closed ? Json(true)
+                                        : open ? Json(false)
+                                               : Json(nullptr)},
+                             {"margin", result.margin},
+                             {"margin_lower", result.margin_lower},
+                             {"weakest_wrench", ToList(result.direction)},
+                             {"length", options.length}};
 }
 
 }  // namespace
@@ -126,6 +144,7 @@ void AddContactTerms(const ModelTerms& terms, const State& state, Json* out) {
   (*out)["J_B"] = ToRows(J_B);
   (*out)["J_B_dot"] = ToRows(J_B_dot);
   (*out)["contacts"] = list;
+  AddForceClosure(G, contacts.friction, out);
 }
 
 }  // namespace dexcheck::cli

@@ -123,6 +123,23 @@ TEST_F(EvalContacts, CoordinatesGiveTheSameTermsAsPoints) {
   }
 }
 
+TEST_F(EvalContacts, ForceClosureNeedsFriction) {
+  Json state = MakeState();
+  state["contact_points"] = EquatorPoints();
+  state["mu"] = 0.8;
+  const Json closed = Evaluate(state).at("force_closure");
+  EXPECT_EQ(closed.at("closed"), true);
+  EXPECT_GT(closed.at("margin_lower"), 0.01);
+  EXPECT_GE(closed.at("margin"), closed.at("margin_lower"));
+  // All four contacts on one half of the ring: nothing pulls the torus back.
+  const double s = 0.046 * std::sqrt(0.5);
+  state["contact_points"] = {{0.046, 0.0, 0.0}, {s, s, 0.0}, {s, -s, 0.0}, {0.035, 0.0, 0.011}};
+  state["mu"] = 0.2;
+  const Json open = Evaluate(state).at("force_closure");
+  EXPECT_EQ(open.at("closed"), false);
+  EXPECT_EQ(open.at("weakest_wrench").size(), 6U);
+}
+
 TEST_F(EvalContacts, RefusesImpossibleContacts) {
   const auto expect_refused = [&](const Json& change, const std::string& message) {
     Json state = MakeState();

@@ -1,0 +1,188 @@
+#pragma once
+
+// Four contacts in the interior-point method: what concerns each contact alone. Internal to controller/grasp.
+
+#include <array>
+#include <cstddef>
+
+#include "controller/grasp/box_bounds.h"
+#include "controller/grasp/lanes.h"
+
+namespace dexcheck::grasp_internal {
+
+/// Problem data, iterate, scaling and search direction of four contacts in the coordinates x = (mu f3, f1,
+/// f2), in which the friction cone (21) is K = {x0 >= |(x1, x2)|}; s in K is the multiplier of the cone, e =
+/// (1, 0, 0). A lane without a contact has no column in the equality constraints and no cost, and stays at
+/// the centre of its own box.
+///
+/// W is the Nesterov-Todd scaling: symmetric, with W s = W^-1 x = lambda. With d the curvature of the bounds
+/// on x0, the Newton equations of one contact are (I + d u u^T) dx_scaled = aim + pull u + W (A^T dy -
+/// dual_residual) and ds_scaled = aim - dx_scaled, with u = W e and dx = W dx_scaled. R = (I + d u
+/// u^T)^(-1/2).
+class ContactPack {
+ public:
+  // The problem.
+  Lanes mu = Lanes::Ones();
+  Lanes w = Lanes::Zero();  // cost of x0
+  Lanes lower = Lanes::Zero();
+  Lanes upper = Lanes::Ones();
+
+  // The iterate.
+  struct Iterate {
+    Lanes3 x, s;
+    BoxBounds<Lanes> bounds;  // of x0
+  };
+  Iterate at;
+  Iterate saved;
+  Lanes3 dual_residual;  // w e - A^T y - s - (z_lower - z_upper) e
+
+  // The scaling and the direction, for the constraint rows.
+  std::array<Lanes3, 3> K;  // W R, by rows
+  Lanes3 dx;
+
+  void SetCenter(double target);
+  void CalcScaling();
+  void Aim(double target);
+  void AimCorrected(double target);
+  Lanes3 CalcFreeDirection() const;
+  Lanes SetDirection(const Lanes3& g);
+  Lanes SetPrimalDirection(const Lanes3& g);
+  Lanes CalcBarrierGap(double rho) const;
+  Lanes CalcSupport(const Lanes3& g) const;
+
+ private:
+  Lanes3 lambda_;
+  Lanes inv_det_lambda_;
+  Lanes3 u_;       // W e
+  Lanes eta_;      // (det x / det s)^(1/4)
+  Lanes v1_, v2_;  // W = [u0, u1, u2; u1, eta + u1 v1, u1 v2; u2, u2 v1, eta + u2 v2]
+  Lanes r_;        // R = I + r u u^T
+  Lanes3 aim_;     // dx_scaled + ds_scaled
+  Lanes3 dx_scaled_, ds_scaled_;
+};
+
+/// The cone's axis at the middle of the bounds, with multipliers that satisfy the dual equation for y = 0: x
+/// o s = 2 target e, slack_lower z_lower = target, and slack_upper z_upper >= target if 4 target >= w (lower
+/// + upper).
+inline void ContactPack::SetCenter(double target) {
+  const Lanes mid = 0.5 * (lower + upper);
+  at.x = {mid, Lanes::Zero(), Lanes::Zero()};
+  at.s = {2.0 * target / mid, Lanes::Zero(), Lanes::Zero()};
+  at.bounds.SetValue(mid, lower, upper);
+  at.bounds.z_lower = target / at.bounds.slack_lower;
+  at.bounds.z_upper = at.s[0] + at.bounds.z_lower - w;
+}
+
+/// W, R and K = W R at the present iterate.
+inline void ContactPack::CalcScaling() {
+  // u = W e = (x + eta^2 J s) / sqrt(2 (k + x^T s)),  k = sqrt(det x det s) = det lambda,  eta^2 = det x / k.
+  const Lanes3& x = at.x;
+  const Lanes3& s = at.s;
+  const Lanes det_x = CalcDotJ(x, x);
+  const Lanes det_lambda = (det_x * CalcDotJ(s, s)).sqrt();
+  inv_det_lambda_ = det_lambda.inverse();
+  const Lanes eta_squared = det_x * inv_det_lambda_;
+  eta_ = eta_squared.sqrt();
+  const Lanes sum = det_lambda + CalcDot(x, s);
+  const Lanes root = (2.0 * sum).sqrt().inverse();
+  u_ = {(x[0] + eta_squared * s[0]) * root, (x[1] - eta_squared * s[1]) * root,
+        (x[2] - eta_squared * s[2]) * root};
+
+  // W = [u0, ut^T; ut, eta I + ut v^T],  v = ut / (eta + u0),  lambda = W s.
+  const Lanes inv_v = (eta_ + u_[0]).inverse();
+  v1_ = u_[1] * inv_v;
+  v2_ = u_[2] * inv_v;
+  const Lanes v_s = s[0] + v1_ * s[1] + v2_ * s[2];
+  lambda_ = {sum * root, eta_ * s[1] + u_[1] * v_s, eta_ * s[2] + u_[2] * v_s};
+
+  // R = I + r u u^T,  r = -d / (q (1 + q)),  q = sqrt(1 + d |u|^2),  R u = u / q.
+  at.bounds.CalcScaling();
+  const Lanes d = at.bounds.curvature();
+  const Lanes q = (1.0 + d * CalcDot(u_, u_)).sqrt();
+  const Lanes inv_q_1q = (q * (1.0 + q)).inverse();
+  r_ = -d * inv_q_1q;
+
+  // K = W + r (W u) u^T with W u = (|u|^2, 2 u0 ut); its first row is (R u)^T.
+  const Lanes inv_q = (1.0 + q) * inv_q_1q;
+  const Lanes twice = 2.0 * u_[0] * r_;
+  const Lanes t1 = twice * u_[1];
+  const Lanes t2 = twice * u_[2];
+  const Lanes K12 = u_[1] * (v2_ + t2);
+  K[0] = {u_[0] * inv_q, u_[1] * inv_q, u_[2] * inv_q};
+  K[1] = {u_[1] + t1 * u_[0], eta_ + u_[1] * (v1_ + t1), K12};
+  K[2] = {u_[2] + t2 * u_[0], K12, eta_ + u_[2] * (v2_ + t2)};
+}
+
+/// Aims the Newton step at x o s = 2 target e and slack z = target.
+inline void ContactPack::Aim(double target) {
+  // aim = lambda \ (2 target e - lambda o lambda) = 2 target J lambda / det lambda - lambda.
+  const Lanes ratio = 2.0 * target * inv_det_lambda_;
+  aim_ = {(ratio - 1.0) * lambda_[0], -(ratio + 1.0) * lambda_[1], -(ratio + 1.0) * lambda_[2]};
+  at.bounds.Aim(target);
+}
+
+/// The same with Mehrotra's second-order correction from the direction last set.
+inline void ContactPack::AimCorrected(double target) {
+  // aim = lambda \ (2 target e - dx_scaled o ds_scaled) - lambda.
+  const Lanes3& dx_s = dx_scaled_;
+  const Lanes3& ds_s = ds_scaled_;
+  const Lanes3 rhs = {2.0 * target - CalcDot(dx_s, ds_s), -(dx_s[0] * ds_s[1] + ds_s[0] * dx_s[1]),
+                      -(dx_s[0] * ds_s[2] + ds_s[0] * dx_s[2])};
+  const Lanes first = CalcDotJ(lambda_, rhs) * inv_det_lambda_;
+  const Lanes inv_lambda0 = lambda_[0].inverse();
+  aim_ = {first - lambda_[0], (rhs[1] - first * lambda_[1]) * inv_lambda0 - lambda_[1],
+          (rhs[2] - first * lambda_[2]) * inv_lambda0 - lambda_[2]};
+  at.bounds.AimCorrected(target, dx[0]);
+}
+
+/// R^-1 dx_scaled for dy = 0.
+inline Lanes3 ContactPack::CalcFreeDirection() const {
+  // R (aim + pull u - W dual_residual), with R u = K^T e taken whole: pull u is large and R all but cancels
+  // it.
+  const Lanes3& g = dual_residual;
+  const Lanes v_g = g[0] + v1_ * g[1] + v2_ * g[2];
+  Lanes3 h = {aim_[0] - CalcDot(u_, g), aim_[1] - v_g * u_[1] - eta_ * g[1],
+              aim_[2] - v_g * u_[2] - eta_ * g[2]};
+  const Lanes along = r_ * CalcDot(u_, h);
+  const Lanes pull = at.bounds.CalcPull();
+  for (std::size_t j = 0; j < 3; ++j) h[j] += along * u_[j] + pull * K[0][j];
+  return h;
+}
+
+/// Sets the direction from g = R^-1 dx_scaled; returns the inverse of the longest step that stays inside.
+inline Lanes ContactPack::SetDirection(const Lanes3& g) {
+  const Lanes along = r_ * CalcDot(u_, g);
+  for (std::size_t j = 0; j < 3; ++j) {
+    dx[j] = CalcDot(K[j], g);
+    dx_scaled_[j] = g[j] + along * u_[j];
+    ds_scaled_[j] = aim_[j] - dx_scaled_[j];
+  }
+  at.bounds.SetDirection(dx[0]);
+  return at.bounds.CalcInverseStep(dx[0])
+      .max(CalcInverseConeStep(lambda_, inv_det_lambda_, dx_scaled_))
+      .max(CalcInverseConeStep(lambda_, inv_det_lambda_, ds_scaled_));
+}
+
+/// Sets dx alone; returns the inverse of the longest step for which x stays inside.
+inline Lanes ContactPack::SetPrimalDirection(const Lanes3& g) {
+  for (std::size_t j = 0; j < 3; ++j) dx[j] = CalcDot(K[j], g);
+  return at.bounds.CalcInversePrimalStep(dx[0]).max(
+      CalcInverseConeStep(at.x, CalcDotJ(at.x, at.x).inverse(), dx));
+}
+
+/// What the contact adds, at most, to the distance of the barrier objective from its optimum. With t1, t2 the
+/// eigenvalues of x o s / (2 rho), t1 + t2 = x^T s / rho and t1 t2 = det x det s / (2 rho)^2, that is rho sum
+/// (t - 1 - log t), and t - 1 - log t <= (t - 1)^2 / t.
+inline Lanes ContactPack::CalcBarrierGap(double rho) const {
+  const Lanes sum = CalcDot(at.x, at.s) / rho;
+  const Lanes product = CalcDotJ(at.x, at.x) * CalcDotJ(at.s, at.s) / (4.0 * rho * rho);
+  return rho * (sum - 4.0 + sum / product) + at.bounds.CalcBarrierGap(rho);
+}
+
+/// max g^T x over {x in K, lower <= x0 <= upper} = max(lower h, upper h), h = g0 + |(g1, g2)|.
+inline Lanes ContactPack::CalcSupport(const Lanes3& g) const {
+  const Lanes h = g[0] + (g[1] * g[1] + g[2] * g[2]).sqrt();
+  return (lower * h).max(upper * h);
+}
+
+}  // namespace dexcheck::grasp_internal

@@ -1,0 +1,151 @@
+#include "controller/grasp/force_closure.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "controller/common/errors.h"
+#include "controller/grasp/growing_polytope.h"
+
+namespace dexcheck {
+namespace {
+
+using grasp_internal::GrowingPolytope;
+
+// Smallest ratio of singular values of the scaled G that counts as full rank.
+constexpr double kRankTolerance = 1e-9;
+
+// The set W of scaled wrenches [force; moment / length] that normalised contact forces can give.
+class WrenchSet {
+ public:
+  WrenchSet(const Eigen::Ref<const Matrix6Xd>& G, const Eigen::Ref<const VectorXd>& mu,
+            const ForceClosureOptions& options)
+      : G_(G), mu_(mu), normalization_(options.normalization) {
+    G_.bottomRows<3>() /= options.length;
+  }
+
+  const Matrix6Xd& G() const { return G_; }
+
+  // The point of W farthest along n. A contact gives most with its force on the cone's boundary, along the
+  // tangential part of g = G_i^T n: h_i = g3 + mu |(g1, g2)|, per newton of normal force.
+  Vector6d FindFarthest(const Vector6d& n) const {
+    Vector6d sum = Vector6d::Zero();
+    Vector6d best = Vector6d::Zero();
+    double best_h = 0.0;
+    for (Eigen::Index i = 0; i < mu_.size(); ++i) {
+      const Vector3d g = G_.middleCols<3>(3 * i).transpose() * n;
+      const double tangential = std::hypot(g.x(), g.y());
+      const double h = g.z() + mu_[i] * tangential;
+      if (h <= 0.0) continue;
+      const double scale = tangential > 0.0 ? mu_[i] / tangential : 0.0;
+      const Vector6d wrench = G_.middleCols<3>(3 * i) * Vector3d(scale * g.x(), scale * g.y(), 1.0);
+      sum += wrench;
+      if (h > best_h) {
+        best_h = h;
+        best = wrench;
+      }
+    }
+    return normalization_ == ForceNormalization::kTotalNormal ? best : sum;
+  }
+
+ private:
+  Matrix6Xd G_;
+  VectorXd mu_;
+  ForceNormalization normalization_;
+};
+
+void RequireValid(const Eigen::Ref<const Matrix6Xd>& G, const Eigen::Ref<const VectorXd>& mu,
+                  const ForceClosureOptions& options) {
+  Require(mu.size() > 0, "mu", "must not be empty", 0.0);
+  Require(G.cols() == 3 * mu.size(), "G", "must have three columns for each mu",
+          static_cast<double>(G.cols()));
+  Require(G.allFinite(), "G", "must be finite", std::numeric_limits<double>::quiet_NaN());
+  for (Eigen::Index i = 0; i < mu.size(); ++i) {
+    Require(std::isfinite(mu[i]) && mu[i] > 0.0, "mu", "must be positive and finite", mu[i]);
+  }
+  Require(std::isfinite(options.length) && options.length > 0.0, "length", "must be positive",
+          options.length);
+  Require(options.tolerance > 0.0 && options.tolerance < 1.0, "tolerance", "must be in (0, 1)",
+          options.tolerance);
+  Require(options.zero >= 0.0, "zero", "must not be negative", options.zero);
+  Require(options.max_vertices >= 7, "max_vertices", "must be at least 7", options.max_vertices);
+}
+
+// Seven points of W that span R^6: the first anywhere, each next one farthest from the plane of those before.
+std::array<Vector6d, 7> FindSimplex(const WrenchSet& W) {
+  std::array<Vector6d, 7> points;
+  points[0] = W.FindFarthest(Vector6d::Ones());
+  Eigen::Matrix<double, 6, 6> edges = Matrix6d::Zero();
+  for (Eigen::Index k = 0; k < 6; ++k) {
+    Vector6d n = Vector6d::Unit(k);
+    if (k > 0) {
+      const Matrix6d Q = edges.leftCols(k).householderQr().householderQ();
+      n = Q.col(k);
+    }
+    const Vector6d plus = W.FindFarthest(n);
+    const Vector6d minus = W.FindFarthest(-n);
+    const double distance_plus = std::abs(n.dot(plus - points[0]));
+    const double distance_minus = std::abs(n.dot(minus - points[0]));
+    points[static_cast<std::size_t>(k) + 1] = distance_plus >= distance_minus ? plus : minus;
+    edges.col(k) = points[static_cast<std::size_t>(k) + 1] - points[0];
+  }
+  return points;
+}
+
+}  // namespace
+
+ForceClosureResult CalcForceClosure(const Eigen::Ref<const Matrix6Xd>& G,
+                                    const Eigen::Ref<const VectorXd>& mu,
+                                    const ForceClosureOptions& options) {
+  RequireValid(G, mu, options);
+  const WrenchSet W(G, mu, options);
+  ForceClosureResult result;
+  Vector6d weakest;
+
+  const Matrix6d GGt = W.G() * W.G().transpose();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(GGt);
+  if (eigen.eigenvalues()[0] <= kRankTolerance * kRankTolerance * eigen.eigenvalues()[5]) {
+    weakest = eigen.eigenvectors().col(0);
+    result.status = ForceClosureStatus::kNotForceClosure;
+  } else {
+    GrowingPolytope polytope(FindSimplex(W));
+    result.margin = std::numeric_limits<double>::infinity();
+    for (;;) {
+      const GrowingPolytope::Facet& facet = polytope.FindNearestFacet();
+      const Vector6d point = W.FindFarthest(facet.normal);
+      const double support = facet.normal.dot(point);
+      result.margin_lower = facet.offset;
+      if (support < result.margin) {
+        result.margin = support;
+        weakest = facet.normal;
+      }
+      const bool closed = result.margin - result.margin_lower <= options.tolerance * result.margin;
+      if (result.margin <= options.zero) {
+        result.status = ForceClosureStatus::kNotForceClosure;
+        break;
+      }
+      if (closed || static_cast<int>(polytope.num_vertices()) >= options.max_vertices ||
+          !polytope.Add(point)) {
+        if (result.margin_lower > 0.0) result.status = ForceClosureStatus::kForceClosure;
+        break;
+      }
+    }
+    result.num_vertices = static_cast<int>(polytope.num_vertices());
+  }
+  if (result.status == ForceClosureStatus::kNotForceClosure) result.margin_lower = 0.0;
+  result.direction = weakest;
+  result.direction.tail<3>() *= options.length;
+  return result;
+}
+
+double CalcWrenchSupport(const Eigen::Ref<const Matrix6Xd>& G, const Eigen::Ref<const VectorXd>& mu,
+                         const Vector6d& n, const ForceClosureOptions& options) {
+  RequireValid(G, mu, options);
+  return n.dot(WrenchSet(G, mu, options).FindFarthest(n));
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,448 @@
+#include "controller/grasp/grasp_force.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <string>
+
+#include "controller/common/errors.h"
+#include "tests/common/matrix_near.h"
+#include "tests/controller/grasp/random_grasp.h"
+
+namespace dexcheck {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::MakeEquatorGraspForceProblem;
+using testing::MakeRandomGraspForceProblem;
+using testing::MatrixNear;
+using testing::MoveGrasp;
+using ::testing::ThrowsMessage;
+using testing::TolScale;
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+
+// A cone or bound may be violated by the rounding of f_c alone: forces of at most 100 N.
+constexpr double kConeTolerance = 100.0 * kEps;
+
+GraspForceOptions MakeOptions(GraspForceObjective objective) {
+  GraspForceOptions options;
+  options.objective = objective;
+  return options;
+}
+
+GraspForceResult SolveCold(const GraspForceProblem& problem, const GraspForceOptions& options) {
+  GraspForceSolver solver(problem.num_contacts(), problem.num_limits(), options);
+  return solver.Solve(problem);
+}
+
+GraspForceResult SolveCold(const GraspForceProblem& problem, GraspForceObjective objective) {
+  return SolveCold(problem, MakeOptions(objective));
+}
+
+// A feasible random problem.
+GraspForceProblem MakeFeasibleProblem(std::mt19937_64& random, int num_contacts) {
+  for (;;) {
+    GraspForceProblem problem = MakeRandomGraspForceProblem(random, num_contacts);
+    const GraspForceStatus status = SolveCold(problem, GraspForceObjective::kBarrier).status;
+    if (status == GraspForceStatus::kOptimal) return problem;
+  }
+}
+
+// Value of the barrier objective; infinite outside cones and bounds.
+double CalcBarrierObjective(const GraspForceProblem& problem, double rho, const VectorXd& f_c) {
+  double sum = 0.0;
+  for (Eigen::Index i = 0; i < problem.num_contacts(); ++i) {
+    const Vector3d f = f_c.segment<3>(3 * i);
+    const double mu_f3 = problem.mu[i] * f.z();
+    Matrix2d P;
+    P << mu_f3 + f.x(), f.y(), f.y(), mu_f3 - f.x();
+    const double slacks = (f.z() - problem.f_min[i]) * (problem.f_max[i] - f.z());
+    if (mu_f3 <= 0.0 || P.determinant() <= 0.0 || slacks <= 0.0)
+      return std::numeric_limits<double>::infinity();
+    sum += problem.weight[i] * f.z() - rho * (std::log(P.determinant()) + std::log(slacks));
+  }
+  return sum;
+}
+
+// Minimum of the barrier objective from a feasible interior point, by damped Newton steps in null(G) (27)
+// with derivatives of log det written out: shares nothing with the solver.
+VectorXd MinimiseBarrier(const GraspForceProblem& problem, double rho, VectorXd f_c) {
+  const MatrixXd Q = MatrixXd(problem.G.transpose()).householderQr().householderQ();
+  const MatrixXd Z = Q.rightCols(Q.cols() - 6);
+  for (int iteration = 0; iteration < 100; ++iteration) {
+    VectorXd gradient = VectorXd::Zero(f_c.size());
+    MatrixXd hessian = MatrixXd::Zero(f_c.size(), f_c.size());
+    for (Eigen::Index i = 0; i < problem.num_contacts(); ++i) {
+      const Vector3d f = f_c.segment<3>(3 * i);
+      const Vector3d J(-1.0, -1.0, problem.mu[i] * problem.mu[i]);
+      const double det = f.dot(J.cwiseProduct(f));
+      const Vector3d d_det = 2.0 * J.cwiseProduct(f);
+      const double lower = f.z() - problem.f_min[i];
+      const double upper = problem.f_max[i] - f.z();
+      Matrix3d H = d_det * d_det.transpose() / (det * det);
+      H.diagonal() -= 2.0 * J / det;
+      H(2, 2) += 1.0 / (lower * lower) + 1.0 / (upper * upper);
+      gradient.segment<3>(3 * i) = -rho * d_det / det;
+      gradient[3 * i + 2] += problem.weight[i] - rho * (1.0 / lower - 1.0 / upper);
+      hessian.block<3, 3>(3 * i, 3 * i) = rho * H;
+    }
+    const VectorXd step = -Z * (Z.transpose() * hessian * Z).ldlt().solve(Z.transpose() * gradient);
+    const double value = CalcBarrierObjective(problem, rho, f_c);
+    double length = 1.0;
+    while (CalcBarrierObjective(problem, rho, f_c + length * step) > value && length > kEps) length *= 0.5;
+    f_c += length * step;
+  }
+  return f_c;
+}
+
+TEST(GraspForceHandWorked, ThreeContactsCarryAWeightAtTheConesEdge) {
+  // Three contacts every 120 degrees on the equator carry the weight F along z. sum f_i3 >= sum |f_it| / mu
+  // >= F / mu, with equality only for equal vertical tangential forces F / 3: f_i3 = F / (3 mu).
+  constexpr double kWeight = 1.962;
+  constexpr double kMu = 0.5;
+  GraspForceProblem problem = MakeEquatorGraspForceProblem(3, kMu);
+  problem.F_o[2] = kWeight;
+  const GraspForceResult result = SolveCold(problem, GraspForceObjective::kMinimum);
+  ASSERT_EQ(result.status, GraspForceStatus::kOptimal);
+  VectorXd expected(9);
+  for (Eigen::Index i = 0; i < 3; ++i)
+    expected.segment<3>(3 * i) << 0.0, -kWeight / 3.0, kWeight / (3.0 * kMu);
+  // The objective is within its gap of 1e-7 N; f_c measured 2e-9 N.
+  EXPECT_NEAR(result.objective, kWeight / kMu, 1e-7 * TolScale());
+  EXPECT_TRUE(MatrixNear(result.f_c, expected, 2e-8));
+}
+
+TEST(GraspForceHandWorked, BarrierBalancesWeightAgainstDistance) {
+  // By symmetry each contact minimises f3 - rho [log((mu f3)^2 - t^2) + log f3 + log(f_max - f3)], t = F / 3.
+  constexpr double kWeight = 1.962;
+  constexpr double kMu = 0.5;
+  GraspForceProblem problem = MakeEquatorGraspForceProblem(3, kMu);
+  problem.F_o[2] = kWeight;
+  const GraspForceOptions options = MakeOptions(GraspForceObjective::kBarrier);
+  const GraspForceResult result = SolveCold(problem, options);
+  ASSERT_EQ(result.status, GraspForceStatus::kOptimal);
+  const double t = kWeight / 3.0;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const double f3 = result.f_c[3 * i + 2];
+    EXPECT_GT(kMu * f3, t);
+    const double derivative =
+        1.0 - options.barrier_weight * (2.0 * kMu * kMu * f3 / (kMu * kMu * f3 * f3 - t * t) + 1.0 / f3 -
+                                        1.0 / (problem.f_max[i] - f3));
+    // Measured 4e-15: the last Newton step, far smaller than slack_tolerance asks for, left rounding only.
+    EXPECT_NEAR(derivative, 0.0, 4e-14 * TolScale());
+    EXPECT_NEAR(result.f_c[3 * i], 0.0, 10.0 * kEps * TolScale());
+    EXPECT_NEAR(result.f_c[3 * i + 1], -t, 10.0 * kEps * TolScale());
+  }
+}
+
+TEST(GraspForceHandWorked, LimitOfTheFingersIsCertified) {
+  // Three fingers of 10 N and mu = 0.5 lift 15 N and not a gram more.
+  GraspForceProblem problem = MakeEquatorGraspForceProblem(3, 0.5);
+  problem.f_max.setConstant(10.0);
+  problem.F_o[2] = 14.999;
+  EXPECT_EQ(SolveCold(problem, GraspForceObjective::kBarrier).status, GraspForceStatus::kOptimal);
+  problem.F_o[2] = 15.001;
+  const GraspForceResult result = SolveCold(problem, GraspForceObjective::kBarrier);
+  ASSERT_EQ(result.status, GraspForceStatus::kInfeasible);
+  EXPECT_EQ(result.f_c, VectorXd::Zero(9));
+  EXPECT_GT(result.infeasibility, 0.0);
+  EXPECT_LE(result.infeasibility, 0.001 + kConeTolerance);
+  EXPECT_NEAR(result.infeasibility, CalcInfeasibility(problem, result.y), kConeTolerance * TolScale());
+  EXPECT_LT(CalcInfeasibility(problem, -result.y), 0.0) << "the opposite direction proves nothing";
+}
+
+TEST(GraspForceBarrier, AgreesWithNewtonInTheNullSpace) {
+  std::mt19937_64 random(1);
+  for (const int num_contacts : {3, 4, 5, 8, 11}) {
+    for (int sample = 0; sample < 10; ++sample) {
+      const GraspForceProblem problem = MakeFeasibleProblem(random, num_contacts);
+      GraspForceOptions options;
+      const GraspForceResult result = SolveCold(problem, options);
+      ASSERT_EQ(result.status, GraspForceStatus::kOptimal);
+      // Another interior point to start from: the optimum for a rho ten times as large.
+      options.barrier_weight = 1.0;
+      const GraspForceResult start = SolveCold(problem, options);
+      ASSERT_EQ(start.status, GraspForceStatus::kOptimal);
+      ASSERT_GT((start.f_c - result.f_c).norm(), 1e-3);
+      const VectorXd expected = MinimiseBarrier(problem, 0.1, start.f_c);
+      // slack_tolerance of 1e-5 relative to slacks of a few newtons: measured 2.6e-6 N.
+      EXPECT_TRUE(MatrixNear(result.f_c, expected, 2.6e-5));
+      EXPECT_NEAR(CalcBarrierObjective(problem, 0.1, result.f_c),
+                  CalcBarrierObjective(problem, 0.1, expected),
+                  result.duality_gap + 1e-10 * result.objective);
+    }
+  }
+}
+
+TEST(GraspForceBarrier, ExceedsTheMinimumByAtMostItsParameter) {
+  std::mt19937_64 random(2);
+  for (int sample = 0; sample < 30; ++sample) {
+    const GraspForceProblem problem = MakeFeasibleProblem(random, 4);
+    const double minimum = SolveCold(problem, GraspForceObjective::kMinimum).objective;
+    double previous = std::numeric_limits<double>::infinity();
+    for (const double rho : {1.0, 0.1, 0.01}) {
+      GraspForceOptions options;
+      options.barrier_weight = rho;
+      const GraspForceResult result = SolveCold(problem, options);
+      ASSERT_EQ(result.status, GraspForceStatus::kOptimal);
+      // rho (4 N + 2 M), up to the gaps of both solutions.
+      EXPECT_LE(result.objective, minimum + 16.0 * rho + 1e-6 * minimum);
+      EXPECT_GE(result.objective, minimum - 1e-6 * minimum);
+      EXPECT_LT(result.objective, previous);
+      EXPECT_GT(result.cone_margin, 0.0);
+      previous = result.objective;
+    }
+  }
+}
+
+TEST(GraspForceBarrier, IsASmoothFunctionOfTheWrench) {
+  // Second differences of f_c fall with the square of the step; at a kink they would fall with the step.
+  std::mt19937_64 random(3);
+  GraspForceOptions options;
+  options.slack_tolerance = 1e-7;
+  for (int sample = 0; sample < 10; ++sample) {
+    GraspForceProblem problem = MakeFeasibleProblem(random, 4);
+    const Vector6d F_o = problem.F_o;
+    const VectorXd f_c = SolveCold(problem, options).f_c;
+    const auto CalcSecondDifference = [&](double h) {
+      problem.F_o = F_o + h * Vector6d::Ones();
+      const VectorXd plus = SolveCold(problem, options).f_c;
+      problem.F_o = F_o - h * Vector6d::Ones();
+      return (plus + SolveCold(problem, options).f_c - 2.0 * f_c).norm();
+    };
+    const double coarse = CalcSecondDifference(2e-3);
+    const double fine = CalcSecondDifference(1e-3);
+    ASSERT_GT(fine, 1e-9) << "no signal";
+    EXPECT_NEAR(coarse / fine, 4.0, 0.2);
+  }
+}
+
+class GraspForceObjectives : public ::testing::TestWithParam<GraspForceObjective> {};
+
+TEST_P(GraspForceObjectives, DoesNotDependOnTheFramesChosen) {
+  std::mt19937_64 random(4);
+  for (int sample = 0; sample < 20; ++sample) {
+    const GraspForceProblem problem = MakeFeasibleProblem(random, 4);
+    const GraspForceResult result = SolveCold(problem, GetParam());
+    ASSERT_GT(result.f_c.norm(), 1.0);
+
+    // Another object frame: wrenches transform by the inverse transpose of the adjoint.
+    GraspForceProblem moved = problem;
+    const Matrix3d R = Eigen::AngleAxisd(0.7, Vector3d(1.0, 2.0, -1.0).normalized()).toRotationMatrix();
+    Matrix6d X = Matrix6d::Zero();
+    X << R, Matrix3d::Zero(), Skew(Vector3d(0.02, -0.01, 0.03)) * R, R;
+    moved.G = X * problem.G;
+    moved.F_o = X * problem.F_o;
+    // Other tangential axes in each contact.
+    Matrix3d spin = Matrix3d::Identity();
+    spin.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(1.1).toRotationMatrix();
+    for (Eigen::Index i = 0; i < 4; ++i) {
+      moved.G.middleCols<3>(3 * i) = (moved.G.middleCols<3>(3 * i) * spin).eval();
+    }
+    const GraspForceResult other = SolveCold(moved, GetParam());
+    ASSERT_EQ(other.status, GraspForceStatus::kOptimal);
+    EXPECT_NEAR(other.objective, result.objective, 2e-7 * TolScale() * result.objective);
+    if (GetParam() != GraspForceObjective::kBarrier) continue;  // the linear optimum need not be unique
+    VectorXd f_c(12);
+    for (Eigen::Index i = 0; i < 4; ++i) f_c.segment<3>(3 * i) = spin * other.f_c.segment<3>(3 * i);
+    // Both within slack_tolerance of one optimum, as above; measured 1e-13, when they take equal steps.
+    EXPECT_TRUE(MatrixNear(f_c, result.f_c, 2.6e-5));
+  }
+}
+
+TEST_P(GraspForceObjectives, NumberOfContactsOnlyChoosesTheCode) {
+  // The same problems on the code for any size, which a limit that never binds calls for.
+  std::mt19937_64 random(5);
+  for (int num_contacts = 3; num_contacts <= 9; ++num_contacts) {
+    const GraspForceProblem problem = MakeFeasibleProblem(random, num_contacts);
+    GraspForceProblem limited(num_contacts, 1);
+    limited.G = problem.G;
+    limited.F_o = problem.F_o;
+    limited.mu = problem.mu;
+    limited.f_min = problem.f_min;
+    limited.A.setConstant(0.01);
+    limited.a_min.setConstant(-1e7);
+    limited.a_max.setConstant(1e7);
+    const GraspForceResult expected = SolveCold(problem, GetParam());
+    const GraspForceResult result = SolveCold(limited, GetParam());
+    ASSERT_EQ(result.status, GraspForceStatus::kOptimal);
+    EXPECT_NEAR(result.objective, expected.objective, 1e-6 * TolScale() * expected.objective) << num_contacts;
+  }
+}
+
+TEST_P(GraspForceObjectives, FollowsAMovingGraspAsIfStartedAnew) {
+  std::mt19937_64 random(6);
+  for (const int num_contacts : {4, 8, 10}) {
+    GraspForceProblem problem = MakeFeasibleProblem(random, num_contacts);
+    GraspForceSolver solver(num_contacts, 0, MakeOptions(GetParam()));
+    int cold_iterations = 0;
+    int warm_iterations = 0;
+    for (int step = 0; step < 200; ++step) {
+      const GraspForceResult expected = SolveCold(problem, GetParam());
+      const GraspForceResult& result = solver.Solve(problem);
+      ASSERT_EQ(result.status, expected.status);
+      if (expected.status != GraspForceStatus::kOptimal) break;
+      EXPECT_EQ(result.warm_started, step > 0);
+      // Both within their gaps.
+      EXPECT_NEAR(result.objective, expected.objective, 2e-6 * TolScale() * expected.objective);
+      if (step > 0) {
+        cold_iterations += expected.iterations;
+        warm_iterations += result.iterations;
+      }
+      MoveGrasp(random, problem);
+    }
+    EXPECT_GT(warm_iterations, 0);
+    EXPECT_LT(warm_iterations, (GetParam() == GraspForceObjective::kBarrier ? 0.3 : 0.7) * cold_iterations);
+  }
+}
+
+TEST_P(GraspForceObjectives, RecoversAfterAnInfeasibleProblem) {
+  std::mt19937_64 random(7);
+  GraspForceProblem problem = MakeFeasibleProblem(random, 4);
+  GraspForceSolver solver(4, 0, MakeOptions(GetParam()));
+  const VectorXd f_c = solver.Solve(problem).f_c;
+  GraspForceProblem impossible = problem;
+  impossible.F_o[2] = 1000.0;
+  EXPECT_EQ(solver.Solve(impossible).status, GraspForceStatus::kInfeasible);
+  const GraspForceResult& again = solver.Solve(problem);
+  EXPECT_FALSE(again.warm_started);
+  EXPECT_EQ(again.f_c, f_c);
+  solver.Solve(problem);
+  EXPECT_TRUE(again.warm_started);
+  solver.Reset();
+  solver.Solve(problem);
+  EXPECT_FALSE(again.warm_started);
+  EXPECT_EQ(again.f_c, f_c);
+}
+
+TEST_P(GraspForceObjectives, TorqueLimitsBind) {
+  // A finger whose one joint feels f_i3 with the lever 2 cm: a limit of 0.1 N m is a limit of 5 N.
+  std::mt19937_64 random(8);
+  int bound = 0;
+  for (int sample = 0; sample < 60; ++sample) {
+    GraspForceProblem problem = MakeFeasibleProblem(random, 4);
+    GraspForceProblem limited(4, 1);
+    limited.G = problem.G;
+    limited.F_o = problem.F_o;
+    limited.mu = problem.mu;
+    limited.f_min = problem.f_min;
+    MatrixXd J = MatrixXd::Zero(12, 1);
+    J(2, 0) = 0.02;
+    limited.SetTorqueLimits(J, VectorXd::Constant(1, 0.03), VectorXd::Constant(1, -1e4),
+                            VectorXd::Constant(1, 0.13));
+    problem.f_max[0] = 5.0;
+    const GraspForceResult expected = SolveCold(problem, GraspForceObjective::kMinimum);
+    const GraspForceResult result = SolveCold(limited, GetParam());
+    ASSERT_EQ(result.status, expected.status);
+    if (result.status != GraspForceStatus::kOptimal) continue;
+    if (expected.f_c[2] > 4.999) ++bound;
+    const double tau = 0.03 + J.col(0).dot(result.f_c);
+    EXPECT_LE(tau, 0.13 + 1e-9);
+    if (GetParam() == GraspForceObjective::kMinimum) {
+      EXPECT_NEAR(result.objective, expected.objective, 1e-6 * TolScale() * expected.objective);
+    } else {
+      EXPECT_GE(result.objective, expected.objective);
+    }
+    EXPECT_LE(CalcGraspForceBound(limited, result.y), result.objective + 1e-9);
+    EXPECT_NEAR(CalcGraspForceBound(limited, result.y), result.lower_bound,
+                100.0 * kConeTolerance * TolScale());
+  }
+  EXPECT_GT(bound, 3) << "the limit never mattered";
+}
+
+INSTANTIATE_TEST_SUITE_P(Both, GraspForceObjectives,
+                         ::testing::Values(GraspForceObjective::kMinimum, GraspForceObjective::kBarrier),
+                         [](const auto& info) {
+                           return info.param == GraspForceObjective::kMinimum ? "Minimum" : "Barrier";
+                         });
+
+TEST(GraspForceBound, HoldsForAnyMultipliers) {
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal;
+  for (int sample = 0; sample < 20; ++sample) {
+    const GraspForceProblem problem = MakeFeasibleProblem(random, 4);
+    const GraspForceResult result = SolveCold(problem, GraspForceObjective::kMinimum);
+    for (int trial = 0; trial < 50; ++trial) {
+      VectorXd y = result.y;
+      for (double& entry : y) entry += normal(random);
+      EXPECT_LE(CalcGraspForceBound(problem, y), result.objective);
+      EXPECT_LT(CalcInfeasibility(problem, y), 0.0);
+    }
+  }
+}
+
+TEST(CalcInternalForce, IsWhatTheWrenchDoesNotNeed) {
+  std::mt19937_64 random(10);
+  const GraspForceProblem problem = MakeFeasibleProblem(random, 4);
+  const VectorXd f_c = SolveCold(problem, GraspForceObjective::kBarrier).f_c;
+  const VectorXd F_N = CalcInternalForce(problem.G, problem.F_o, f_c);
+  ASSERT_GT(F_N.norm(), 1.0);
+  // (27), to the residual tolerance of 1e-10 relative to |F_o| <= 20 N; (49) with the Moore-Penrose inverse
+  // of an independent factorisation.
+  EXPECT_TRUE(MatrixNear(problem.G * F_N, Vector6d::Zero(), 2e-9));
+  const VectorXd least = problem.G.completeOrthogonalDecomposition().solve(problem.F_o);
+  EXPECT_TRUE(MatrixNear(F_N + least, f_c, 10.0 * kConeTolerance));
+  EXPECT_GT((f_c - least).norm(), 1.0) << "with no internal force there would be nothing to compute";
+}
+
+TEST(GraspForceErrors, NameTheValue) {
+  EXPECT_THAT([] { GraspForceSolver solver(2); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("num_contacts")));
+  GraspForceOptions options;
+  options.barrier_weight = 0.0;
+  EXPECT_THAT([&] { GraspForceSolver solver(4, 0, options); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("barrier_weight")));
+
+  GraspForceSolver solver(4);
+  const auto ExpectError = [&](const std::string& text, auto change) {
+    GraspForceProblem problem = MakeEquatorGraspForceProblem(4, 0.5);
+    change(problem);
+    EXPECT_THAT([&] { solver.Solve(problem); }, ThrowsMessage<std::invalid_argument>(HasSubstr(text)));
+  };
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  ExpectError("mu[2]: must be positive, got 0", [](GraspForceProblem& p) { p.mu[2] = 0.0; });
+  ExpectError("mu[0]: must be positive, got -0.5", [](GraspForceProblem& p) { p.mu[0] = -0.5; });
+  ExpectError("G(4, 7): must be finite", [](GraspForceProblem& p) { p.G(4, 7) = kNan; });
+  ExpectError("F_o(5, 0): must be finite", [](GraspForceProblem& p) { p.F_o[5] = -kInfinity; });
+  ExpectError("f_max(1, 0): must be finite", [](GraspForceProblem& p) { p.f_max[1] = kInfinity; });
+  ExpectError("f_max[3]: must be above f_min", [](GraspForceProblem& p) { p.f_max[3] = p.f_min[3]; });
+  ExpectError("f_min[1]: must not be negative", [](GraspForceProblem& p) { p.f_min[1] = -1.0; });
+  ExpectError("weight[1]: must not be negative", [](GraspForceProblem& p) { p.weight[1] = -1.0; });
+  ExpectError("problem", [](GraspForceProblem& p) { p = MakeEquatorGraspForceProblem(5, 0.5); });
+
+  GraspForceProblem limited(4, 2);
+  EXPECT_THAT(
+      [&] {
+        limited.SetTorqueLimits(MatrixXd::Zero(11, 2), Vector2d::Zero(), Vector2d::Zero(), Vector2d::Ones());
+      },
+      ThrowsMessage<std::invalid_argument>(HasSubstr("J rows")));
+  limited.G = MakeEquatorGraspForceProblem(4, 0.5).G;
+  GraspForceSolver limited_solver(4, 2);
+  EXPECT_THAT([&] { limited_solver.Solve(limited); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("a_max[0]: must be above a_min")));
+}
+
+TEST(GraspForceErrors, ContactsOnOneLineAreSingular) {
+  // No moment about the line can be given, whatever the forces.
+  GraspForceProblem problem(3);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    Pose X_OC = Pose::Identity();
+    X_OC.translation().x() = 0.02 * static_cast<double>(i);
+    problem.G.middleCols<3>(3 * i) = testing::CalcContactColumns(X_OC);
+  }
+  GraspForceSolver solver(3);
+  EXPECT_THROW(solver.Solve(problem), SingularityError);
+  EXPECT_THROW(CalcInternalForce(problem.G, problem.F_o, VectorXd::Zero(9)), SingularityError);
+  problem.G = MakeEquatorGraspForceProblem(3, 0.5).G;
+  EXPECT_EQ(solver.Solve(problem).status, GraspForceStatus::kOptimal);
+}
+
+}  // namespace
+}  // namespace dexcheck

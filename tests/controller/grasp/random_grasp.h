@@ -1,0 +1,33 @@
+#pragma once
+
+// Random grasps of a torus, for tests and benchmarks.
+
+#include <random>
+
+#include "controller/common/types.h"
+#include "controller/grasp/grasp_force.h"
+
+namespace dexcheck::testing {
+
+inline constexpr double kTorusRadius = 0.035;  // of the centre circle, m
+inline constexpr double kTubeRadius = 0.011;   // m
+
+/// Grasp map columns (23) of a hard-finger contact (20) with pose X_OC in the object frame: [R; [p]x R].
+Eigen::Matrix<double, 6, 3> CalcContactColumns(const Pose& X_OC);
+
+/// Contact frame on the torus around z, at angle `around` on the centre circle and `tube` on the tube (0
+/// outside, pi inside), z into the torus, turned by `spin` about z; rad.
+Pose CalcTorusContact(double around, double tube, double spin);
+
+/// N contacts anywhere on the torus, one mu in [0.2, 1] for all, a force up to 20 N and a moment up to 1 N m
+/// in any direction, normal forces in [0.2, 100] N.
+GraspForceProblem MakeRandomGraspForceProblem(std::mt19937_64& random, int num_contacts);
+
+/// N contacts evenly spaced on the torus's outer equator, spin 0: tangential x along the equator, y along -z
+/// of the object.
+GraspForceProblem MakeEquatorGraspForceProblem(int num_contacts, double mu);
+
+/// One millisecond of motion: the wrench changes by about 5 mN and 0.2 mN m, contacts roll by about 0.5 mrad.
+void MoveGrasp(std::mt19937_64& random, GraspForceProblem& problem);
+
+}  // namespace dexcheck::testing

@@ -1,0 +1,110 @@
+#include "tests/controller/grasp/sdp_oracle.h"
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <cstdlib>
+#include <fstream>
+#include <iomanip>
+#include <string>
+
+namespace dexcheck::testing {
+namespace {
+
+// f_c = offset + basis x for all x.
+struct ForceSpace {
+  VectorXd offset;
+  MatrixXd basis;
+};
+
+ForceSpace CalcForceSpace(const GraspForceProblem& problem) {
+  ForceSpace space;
+  space.offset = problem.G.completeOrthogonalDecomposition().solve(problem.F_o);
+  const MatrixXd Q = MatrixXd(problem.G.transpose()).householderQr().householderQ();
+  space.basis = Q.rightCols(Q.cols() - 6);
+  return space;
+}
+
+// One line "matrix block row column value" for each matrix F_0 (negated constant) and F_k of the affine entry
+// constant + coefficients^T f_c.
+void WriteEntry(std::ostream& out, const ForceSpace& space, int block, int row, int col, double constant,
+                const VectorXd& coefficients) {
+  out << "0 " << block << ' ' << row << ' ' << col << ' ' << -(constant + coefficients.dot(space.offset))
+      << '\n';
+  const VectorXd reduced = space.basis.transpose() * coefficients;
+  for (Eigen::Index k = 0; k < reduced.size(); ++k) {
+    out << k + 1 << ' ' << block << ' ' << row << ' ' << col << ' ' << reduced[k] << '\n';
+  }
+}
+
+VectorXd CalcCost(const GraspForceProblem& problem) {
+  VectorXd cost = VectorXd::Zero(problem.G.cols());
+  for (Eigen::Index i = 0; i < problem.num_contacts(); ++i) cost[3 * i + 2] = problem.weight[i];
+  return cost;
+}
+
+}  // namespace
+
+void WriteSdp(const GraspForceProblem& problem, const std::filesystem::path& file) {
+  const ForceSpace space = CalcForceSpace(problem);
+  const int n = problem.num_contacts();
+  const int m = problem.num_limits();
+  std::ofstream out(file);
+  out << std::setprecision(17) << space.basis.cols() << '\n' << n + 1 << '\n';
+  for (int i = 0; i < n; ++i) out << "2 ";
+  out << -2 * (n + m) << '\n' << (space.basis.transpose() * CalcCost(problem)).transpose() << '\n';
+
+  for (int i = 0; i < n; ++i) {
+    const VectorXd f1 = VectorXd::Unit(3 * n, 3 * i);
+    const VectorXd f2 = VectorXd::Unit(3 * n, 3 * i + 1);
+    const VectorXd f3 = VectorXd::Unit(3 * n, 3 * i + 2);
+    WriteEntry(out, space, i + 1, 1, 1, 0.0, problem.mu[i] * f3 + f1);
+    WriteEntry(out, space, i + 1, 1, 2, 0.0, f2);
+    WriteEntry(out, space, i + 1, 2, 2, 0.0, problem.mu[i] * f3 - f1);
+    WriteEntry(out, space, n + 1, 2 * i + 1, 2 * i + 1, -problem.f_min[i], f3);
+    WriteEntry(out, space, n + 1, 2 * i + 2, 2 * i + 2, problem.f_max[i], -f3);
+  }
+  for (int j = 0; j < m; ++j) {
+    const VectorXd a = problem.A.row(j);
+    WriteEntry(out, space, n + 1, 2 * (n + j) + 1, 2 * (n + j) + 1, -problem.a_min[j], a);
+    WriteEntry(out, space, n + 1, 2 * (n + j) + 2, 2 * (n + j) + 2, problem.a_max[j], -a);
+  }
+}
+
+int RunCsdp(const std::filesystem::path& file) {
+  // csdp reads its parameters from param.csdp: tighter than its defaults, and no perturbation of the
+  // objective.
+  std::ofstream(file.parent_path() / "param.csdp")
+      << "axtol=1.0e-9\natytol=1.0e-9\nobjtol=1.0e-9\npinftol=1.0e8\ndinftol=1.0e8\nmaxiter=100\n"
+         "minstepfrac=0.90\nmaxstepfrac=0.97\nminstepp=1.0e-8\nminstepd=1.0e-8\nusexzgap=1\ntweakgap=0\n"
+         "affine=0\nprintlevel=0\nperturbobj=0\nfastmode=0\n";
+  const std::string command = "cd '" + file.parent_path().string() +
+                              "' && OMP_NUM_THREADS=1 " DEXCHECK_CSDP " '" + file.string() + "' '" +
+                              file.string() + ".sol' > /dev/null 2>&1";
+  const int status = std::system(command.c_str());
+  return status == -1 ? -1 : WEXITSTATUS(status);
+}
+
+SdpSolution SolveSdp(const GraspForceProblem& problem, const std::filesystem::path& folder) {
+  // csdp's exit codes: 0 solved, 1 primal infeasible, 2 dual infeasible (its dual is this format's primal), 3
+  // solved to less than full accuracy.
+  constexpr int kSolved = 0;
+  constexpr int kDualInfeasible = 2;
+  const std::filesystem::path file = folder / "grasp.dat-s";
+  WriteSdp(problem, file);
+  SdpSolution solution;
+  const int code = RunCsdp(file);
+  if (code == kDualInfeasible) solution.status = SdpStatus::kInfeasible;
+  if (code != kSolved) return solution;
+
+  const ForceSpace space = CalcForceSpace(problem);
+  std::ifstream in(file.string() + ".sol");
+  VectorXd x(space.basis.cols());
+  for (double& value : x) in >> value;
+  if (!in) return solution;
+  solution.status = SdpStatus::kOptimal;
+  solution.f_c = space.offset + space.basis * x;
+  solution.objective = CalcCost(problem).dot(solution.f_c);
+  return solution;
+}
+
+}  // namespace dexcheck::testing
