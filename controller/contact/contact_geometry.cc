@@ -33,11 +33,15 @@ Matrix2d CalcContactRotation(double psi) {
 }
 
 ContactGeometry CalcContactGeometry(const Surface& fingertip, const Surface& object,
-                                    const ContactCoordinates& kappa) {
+                                    const ContactCoordinates& kappa, double overlap) {
   Require(std::isfinite(kappa.psi), "psi", "must be finite", kappa.psi);
   ContactGeometry contact;
   contact.fingertip = fingertip.Evaluate(kappa.alpha_f);
   contact.object = object.Evaluate(kappa.alpha_o);
+  if (overlap != 0.0) {
+    contact.fingertip = CalcParallelSurface(contact.fingertip, -0.5 * overlap);
+    contact.object = CalcParallelSurface(contact.object, -0.5 * overlap);
+  }
   contact.R_psi = CalcContactRotation(kappa.psi);
   contact.g_f_cf = contact.fingertip.CalcPose();
   // g_o_cf = g_o_co g_co_cf, the inverse of (31)

@@ -40,8 +40,10 @@ Matrix2d CalcContactRotation(double psi);
 
 /// Contact frames and surface parameters at kappa (31), (35)-(38). Throws what Surface::Evaluate throws, and
 /// std::invalid_argument when psi is not finite.
+/// @param overlap of the two bodies along the normal, m. Rigid bodies have none; where compliant ones are
+/// pressed into each other, the contact is taken midway, between the parallel surfaces that meet there.
 ContactGeometry CalcContactGeometry(const Surface& fingertip, const Surface& object,
-                                    const ContactCoordinates& kappa);
+                                    const ContactCoordinates& kappa, double overlap = 0.0);
 
 /// Twist V_co_cf^cf = [v; omega] (6x1, in Sigma_cf) of the fingertip relative to the object at the contact
 /// point (30), from the body twists V_f of the fingertip (fingertip frame) and V_o of the object (object

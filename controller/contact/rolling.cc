@@ -54,8 +54,7 @@ Vector5d CalcKappaDot(const ContactGeometry& contact, const Vector6d& V) {
 
   // psidot = w_z + T_f M_f alphadot_f + T_o M_o alphadot_o
   Vector5d kappa_dot;
-  kappa_dot << f.M.triangularView<Eigen::Upper>().solve(s_f), o.M.triangularView<Eigen::Upper>().solve(s_o),
-      V(5) + f.T.dot(s_f) + o.T.dot(s_o);
+  kappa_dot << f.M.inverse() * s_f, o.M.inverse() * s_o, V(5) + f.T.dot(s_f) + o.T.dot(s_o);
   return kappa_dot;
 }
 

@@ -1,5 +1,6 @@
 #include "controller/contact/surface.h"
 
+#include <Eigen/LU>
 #include <cmath>
 
 #include "controller/common/errors.h"
@@ -40,6 +41,18 @@ SurfaceGeometry CalcSurfaceGeometry(const SurfaceJet& jet) {
   // T = y^T [x_u x_v] M^-1 with y.x_u = y.c_uu / |c_u|, y.x_v = y.c_uv / |c_u|
   geometry.T = Eigen::RowVector2d(y.dot(jet.c_uu), y.dot(jet.c_uv)) / c_u_norm * M_inverse;
   return geometry;
+}
+
+SurfaceGeometry CalcParallelSurface(const SurfaceGeometry& surface, double distance) {
+  // c' = c + distance n:  [x y] M' = [x y] (I + distance K) M, the normal's and the frame's turn unchanged
+  const Matrix2d stretch = Matrix2d::Identity() + distance * surface.K;
+  const Matrix2d stretch_inverse = stretch.inverse();
+  SurfaceGeometry parallel = surface;
+  parallel.p += distance * surface.R.col(2);
+  parallel.M = stretch * surface.M;
+  parallel.K = surface.K * stretch_inverse;
+  parallel.T = surface.T * stretch_inverse;
+  return parallel;
 }
 
 SurfaceGeometry Surface::Evaluate(const SurfacePoint& alpha) const {

@@ -36,7 +36,7 @@ struct SurfaceJet {
 struct SurfaceGeometry {
   Vector3d p;            ///< c(u, v), m
   Matrix3d R;            ///< Gauss frame [x y z], columns in the body frame, z the outward normal
-  Matrix2d M;            ///< metric, upper triangular
+  Matrix2d M;            ///< metric, upper triangular but on a parallel surface
   Matrix2d K;            ///< curvature in (x, y), 1/m, positive where the body is convex
   Eigen::RowVector2d T;  ///< torsion, 1/m
 
@@ -47,6 +47,10 @@ struct SurfaceGeometry {
 /// Gauss frame and geometric parameters (37), (38) from a chart's derivatives, orthogonal or not.
 /// c_u and c_v must be linearly independent.
 SurfaceGeometry CalcSurfaceGeometry(const SurfaceJet& jet);
+
+/// Geometry of the parallel surface at a signed distance (m) along the outward normal, in the same
+/// coordinates and with the same Gauss frame. Distances stay below the smallest radius of curvature.
+SurfaceGeometry CalcParallelSurface(const SurfaceGeometry& surface, double distance);
 
 /// Closest surface point to a point in space.
 struct SurfaceProjection {

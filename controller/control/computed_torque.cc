@@ -70,6 +70,11 @@ void ComputedTorque::SetDemand(const ModelTerms& robot, const GraspTerms& grasp,
   actuation_.CalcTorque(tau_0_, tau_0_);
 }
 
+void ComputedTorque::CalcInternalForce(const Eigen::Ref<const VectorXd>& f_c, Eigen::Ref<VectorXd> F_N) {
+  G_pinv_.Apply(F_o_, f_c_);
+  F_N = f_c - f_c_;
+}
+
 const VectorXd& ComputedTorque::CalcTorque(const GraspTerms& grasp, const Eigen::Ref<const VectorXd>& F_N) {
   Require(F_N.size() == f_c_.size(), "length of F_N", "must be that of f_c", static_cast<double>(F_N.size()));
   // f_c = G^+ F_o + F_N

@@ -52,6 +52,9 @@ class ComputedTorque {
   /// tau_0 (n), N m: tau' without contact forces. tau' = tau_0 + E_bar'^-1 J_B'^T f_c.
   [[nodiscard]] const VectorXd& tau_0() const { return tau_0_; }
 
+  /// F_N (k) = f_c - G^+ F_o of contact forces f_c (k) that give F_o.
+  void CalcInternalForce(const Eigen::Ref<const VectorXd>& f_c, Eigen::Ref<VectorXd> F_N);
+
   /// Second stage.
   /// @param F_N (k) internal force, G F_N = 0, N.
   /// @return tau' (n), N m: [tau_r; tau_l] of the wheels, then joints.

@@ -1,5 +1,6 @@
 #include "controller/control/grasp_terms.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "controller/common/errors.h"
@@ -24,6 +25,7 @@ GraspTerms::GraspTerms(const RobotModel& model, std::span<const int> fingertips,
   const int n = model.num_velocities();
   const int k = num_forces();
   contacts_.resize(fingertips_.size());
+  overlaps_.assign(fingertips_.size(), 0.0);
   G_.setZero(6, k);
   G_dot_.setZero(6, k);
   J_B_.setZero(k, n);
@@ -32,6 +34,12 @@ GraspTerms::GraspTerms(const RobotModel& model, std::span<const int> fingertips,
   J_f_dot_.setZero(6, n);
   slip_.setZero(k);
   slip_bias_.setZero(k);
+}
+
+void GraspTerms::SetOverlaps(std::span<const double> overlaps) {
+  Require(overlaps.size() == overlaps_.size(), "number of overlaps", "must be that of the fingertips",
+          static_cast<double>(overlaps.size()));
+  std::copy(overlaps.begin(), overlaps.end(), overlaps_.begin());
 }
 
 void GraspTerms::SetState(const ModelTerms& robot, const Vector6d& X_o, const Vector6d& X_o_dot,
@@ -63,7 +71,7 @@ void GraspTerms::SetContacts(const ModelTerms& robot, std::span<const ContactCoo
     const Eigen::Index row = 3 * static_cast<Eigen::Index>(i);
     Contact& contact = contacts_[i];
     robot.CalcFrameJacobian(fingertips_[i], J_f_, J_f_dot_);
-    contact.geometry = CalcContactGeometry(tips_[i], *surface_, kappa[i]);
+    contact.geometry = CalcContactGeometry(tips_[i], *surface_, kappa[i], overlaps_[i]);
     const Vector6d V_f = J_f_ * robot.velocity();
     contact.kappa_dot = CalcKappaDot(contact.geometry, CalcRelativeTwist(contact.geometry, V_f, V_Bo_));
     CalcContactJacobian(contact, J_f_, J_B_.middleRows(row, 3));

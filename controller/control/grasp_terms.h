@@ -35,6 +35,11 @@ class GraspTerms {
   void SetPose(const ModelTerms& robot, const Pose& X_Bo, const Vector6d& V_Bo,
                std::span<const ContactCoordinates> kappa);
 
+  /// How deep the bodies at each contact overlap (m) in the states to come, where contacts are not rigid: see
+  /// CalcContactGeometry. Zero until set. @throws std::invalid_argument unless there is one for each
+  /// fingertip.
+  void SetOverlaps(std::span<const double> overlaps);
+
   [[nodiscard]] int num_contacts() const { return static_cast<int>(fingertips_.size()); }
   /// k, entries of f_c.
   [[nodiscard]] int num_forces() const { return 3 * num_contacts(); }
@@ -80,6 +85,7 @@ class GraspTerms {
   Vector3d gravity_;
   const Surface* surface_;
 
+  std::vector<double> overlaps_;
   std::vector<Contact> contacts_;
   Matrix6Xd G_, G_dot_;
   MatrixXd J_B_, J_B_dot_;

@@ -259,30 +259,57 @@ void Adapter::SetPositions(const Eigen::Ref<const VectorXd>& q, mjtNum* qpos) co
   for (const EngineWheel& wheel : wheels_) qpos[engine_->jnt_qposadr[wheel.joint]] = 0.0;
 }
 
-void Adapter::GetPositions(const mjtNum* qpos, Eigen::Ref<VectorXd> q) const {
-  const int offset = model_->num_base_positions();
-  for (size_t i = 0; i < joint_qpos_.size(); ++i) q[offset + static_cast<int>(i)] = qpos[joint_qpos_[i]];
-  if (base_joints_.empty()) return;
-
+Pose Adapter::GetBasePose(const mjtNum* qpos) const {
   if (base_is_free_) {
     const mjtNum* const pose = qpos + engine_->jnt_qposadr[base_joints_[0]];
     Pose X_WA = Pose::Identity();
     X_WA.linear() = Eigen::Quaterniond(pose[3], pose[4], pose[5], pose[6]).normalized().toRotationMatrix();
     X_WA.translation() = MapVector(pose);
-    const Pose X_W0 = X_WA * X_0b_.inverse();
-    q.head<2>() = (X_W0.translation() - model_->base().X_B0.translation()).head<2>();
-    q[2] = std::atan2(X_W0.linear()(1, 0), X_W0.linear()(0, 0));
+    return X_WA * X_0b_.inverse();
+  }
+  Pose X_W0 = model_->base().X_B0;
+  if (base_joints_.empty()) return X_W0;
+  Vector3d anchor = reference_anchor_;
+  for (size_t k = 0; k < 2; ++k) {
+    const int address = engine_->jnt_qposadr[base_joints_[k]];
+    anchor += (qpos[address] - engine_->qpos0[address]) * slide_axes_[k];
+  }
+  X_W0.linear() = Eigen::AngleAxisd(GetHingeYaw(qpos), Vector3d::UnitZ()).toRotationMatrix();
+  X_W0.translation() = anchor - X_W0.linear() * X_0b_.translation();
+  return X_W0;
+}
+
+void Adapter::GetPositions(const mjtNum* qpos, Eigen::Ref<VectorXd> q) const {
+  const int offset = model_->num_base_positions();
+  for (size_t i = 0; i < joint_qpos_.size(); ++i) q[offset + static_cast<int>(i)] = qpos[joint_qpos_[i]];
+  if (base_joints_.empty()) return;
+
+  const Pose X_W0 = GetBasePose(qpos);
+  q.head<2>() = (X_W0.translation() - model_->base().X_B0.translation()).head<2>();
+  q[2] = base_is_free_ ? std::atan2(X_W0.linear()(1, 0), X_W0.linear()(0, 0)) : GetHingeYaw(qpos);
+}
+
+double Adapter::GetHingeYaw(const mjtNum* qpos) const {
+  const int address = engine_->jnt_qposadr[base_joints_[2]];
+  return hinge_sign_ * (qpos[address] - engine_->qpos0[address]);
+}
+
+void Adapter::GetBaseMotion(const mjtNum* qpos, const mjtNum* rates, Vector3d* linear,
+                            Vector3d* angular) const {
+  linear->setZero();
+  angular->setZero();
+  if (base_joints_.empty()) return;
+  const mjtNum* const own = rates + engine_->jnt_dofadr[base_joints_[0]];
+  if (base_is_free_) {
+    // The free joint's angular velocity is in the body's own axes.
+    const mjtNum* const pose = qpos + engine_->jnt_qposadr[base_joints_[0]];
+    const Eigen::Quaterniond rotation(pose[3], pose[4], pose[5], pose[6]);
+    *linear = MapVector(own);
+    *angular = rotation.normalized() * MapVector(own + 3);
     return;
   }
-  double rates[3];
-  for (size_t k = 0; k < 3; ++k) {
-    const int address = engine_->jnt_qposadr[base_joints_[k]];
-    rates[k] = qpos[address] - engine_->qpos0[address];
-  }
-  q[2] = hinge_sign_ * rates[2];
-  const Vector3d anchor = reference_anchor_ + rates[0] * slide_axes_[0] + rates[1] * slide_axes_[1];
-  const Vector3d arm = Eigen::AngleAxisd(q[2], Vector3d::UnitZ()) * X_0b_.translation();
-  q.head<2>() = (anchor - arm - model_->base().X_B0.translation()).head<2>();
+  *linear = own[0] * slide_axes_[0] + own[1] * slide_axes_[1];
+  angular->z() = hinge_sign_ * own[2];
 }
 
 }  // namespace dexcheck

@@ -68,12 +68,18 @@ class Adapter {
 
   /// q' from the engine's qpos: yaw and midpoint of the base; tilt is dropped.
   void GetPositions(const mjtNum* qpos, Eigen::Ref<VectorXd> q) const;
+  /// Pose of Sigma_0 in the world, tilt and height included.
+  [[nodiscard]] Pose GetBasePose(const mjtNum* qpos) const;
+  /// Motion of the base's anchor in world axes, from the rates of its joints: linear and angular velocity
+  /// from qvel, or linear and angular acceleration from qacc.
+  void GetBaseMotion(const mjtNum* qpos, const mjtNum* rates, Vector3d* linear, Vector3d* angular) const;
 
  private:
   void MatchJoints(const std::string& engine_source);
   void MatchBase(const std::string& engine_source);
   void MatchWheels(const mjData& reference, const std::string& engine_source);
   [[nodiscard]] Pose CalcBasePose(const Eigen::Ref<const VectorXd>& q) const;
+  [[nodiscard]] double GetHingeYaw(const mjtNum* qpos) const;
 
   const RobotModel* model_;
   const mjModel* engine_;

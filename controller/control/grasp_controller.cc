@@ -1,0 +1,54 @@
+#include "controller/control/grasp_controller.h"
+
+#include "controller/object/euler_zyz.h"
+
+namespace dexcheck {
+
+GraspController::GraspController(const RobotModel& model, std::span<const int> fingertips,
+                                 const MassProperties& object, const Surface& surface,
+                                 const GraspControllerOptions& options)
+    : options_(options),
+      robot_(model, Coordinates::kReduced),
+      grasp_(model, fingertips, object, surface),
+      law_(model, static_cast<int>(fingertips.size()), options.weight),
+      problem_(static_cast<int>(fingertips.size())),
+      solver_(static_cast<int>(fingertips.size()), 0, options.force) {
+  problem_.mu.setConstant(options.mu);
+  problem_.f_min.setConstant(options.f_min);
+  problem_.f_max.setConstant(options.f_max);
+  sigma_prime_.setZero(model.num_velocities());
+  F_N_.setZero(grasp_.num_forces());
+}
+
+void GraspController::SetState(const MeasuredState& state) {
+  robot_.SetState(state.q, state.xi);
+  robot_.CalcDynamics();
+  grasp_.SetOverlaps(state.overlap);
+  if (options_.orientation == OrientationFeedback::kAngles) {
+    X_o_ = CalcObjectCoordinates(state.X_Bo, has_X_o_ ? X_o_ : options_.X_o_start);
+    has_X_o_ = true;
+    grasp_.SetState(robot_, X_o_, CalcP(X_o_) * state.V_Bo, state.kappa);
+  } else {
+    grasp_.SetPose(robot_, state.X_Bo, state.V_Bo, state.kappa);
+  }
+  options_.posture.CalcAcceleration(state.q, state.xi, sigma_prime_);
+}
+
+const VectorXd& GraspController::CalcTorque(const DesiredMotion& desired) {
+  const Vector6d V_Bo_dot = CalcTrackingAcceleration(options_.gains, options_.orientation, grasp_, desired);
+  law_.SetDemand(robot_, grasp_, V_Bo_dot, sigma_prime_);
+
+  problem_.G = grasp_.G();
+  problem_.F_o = law_.F_o();
+  force_ = &solver_.Solve(problem_);
+  if (force_->status != GraspForceStatus::kOptimal) {
+    throw GraspForceError(force_->status == GraspForceStatus::kInfeasible
+                              ? "no contact forces inside the friction cones hold the object"
+                              : "the grasp-force problem did not converge");
+  }
+  // F_N = f_c - G^+ F_o, so that (49) gives f_c back
+  law_.CalcInternalForce(force_->f_c, F_N_);
+  return law_.CalcTorque(grasp_, F_N_);
+}
+
+}  // namespace dexcheck

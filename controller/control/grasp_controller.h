@@ -1,0 +1,87 @@
+#pragma once
+
+// The whole law of section 5 as one step: measured state in, torques out.
+
+#include <span>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/control/computed_torque.h"
+#include "controller/control/grasp_terms.h"
+#include "controller/control/object_tracking.h"
+#include "controller/control/posture_task.h"
+#include "controller/dynamics/model_terms.h"
+#include "controller/grasp/grasp_force.h"
+
+namespace dexcheck {
+
+/// No contact forces inside the friction cones give the wrench that the motion takes.
+class GraspForceError : public Error {
+ public:
+  using Error::Error;
+};
+
+/// What the controller may choose.
+struct GraspControllerOptions {
+  explicit GraspControllerOptions(const RobotModel& model) : posture(model) {}
+
+  ObjectGains gains;
+  OrientationFeedback orientation = OrientationFeedback::kAngles;
+  RedundancyWeight weight;
+  PostureTask posture;
+  Vector6d X_o_start = Vector6d::Zero();  ///< The angles' branch is the one nearest to this at first.
+  double mu = 0.5;                        ///< Friction coefficient that the grasp force counts on.
+  double f_min = 0.0;                     ///< Least normal force of each finger, N.
+  double f_max = 100.0;                   ///< Largest, N.
+  GraspForceOptions force;
+};
+
+/// What the controller is told of the world at one instant.
+struct MeasuredState {
+  VectorXd q;   ///< q' (p').
+  VectorXd xi;  ///< n.
+  Pose X_Bo = Pose::Identity();
+  Vector6d V_Bo = Vector6d::Zero();       ///< Body velocity, Sigma_o.
+  std::vector<ContactCoordinates> kappa;  ///< One for each fingertip of the grasp.
+  std::vector<double> overlap;            ///< Likewise, m; see CalcContactGeometry.
+};
+
+/// Computed torque (55) with the grasp force from the friction cones. Owns every term that one step needs.
+/// Nothing allocates in Step.
+class GraspController {
+ public:
+  /// @param fingertips frames that hold the object. @param object, surface in Sigma_o; surface outlives this.
+  /// @throws what GraspTerms, ComputedTorque and GraspForceSolver throw.
+  GraspController(const RobotModel& model, std::span<const int> fingertips, const MassProperties& object,
+                  const Surface& surface, const GraspControllerOptions& options);
+
+  /// Evaluates the model at a state: M_bar', C_bar', F_bar', G, J_B' and their rates.
+  void SetState(const MeasuredState& state);
+
+  /// tau' (n), N m, for the state set and the desired motion at that instant.
+  /// @throws SingularityError as ComputedTorque; GraspForceError when no contact force inside the friction
+  /// cones holds the object.
+  const VectorXd& CalcTorque(const DesiredMotion& desired);
+
+  [[nodiscard]] const ModelTerms& robot() const { return robot_; }
+  [[nodiscard]] const GraspTerms& grasp() const { return grasp_; }
+  [[nodiscard]] const ComputedTorque& law() const { return law_; }
+  [[nodiscard]] const GraspForceResult& force() const { return *force_; }
+  [[nodiscard]] GraspControllerOptions& options() { return options_; }
+  [[nodiscard]] const GraspControllerOptions& options() const { return options_; }
+
+ private:
+  GraspControllerOptions options_;
+  ModelTerms robot_;
+  GraspTerms grasp_;
+  ComputedTorque law_;
+  GraspForceProblem problem_;
+  GraspForceSolver solver_;
+  const GraspForceResult* force_ = nullptr;
+  Vector6d X_o_ = Vector6d::Zero();  // of the last step, to stay on one branch of the angles
+  bool has_X_o_ = false;
+  VectorXd sigma_prime_;  // n
+  VectorXd F_N_;          // k
+};
+
+}  // namespace dexcheck

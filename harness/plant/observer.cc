@@ -1,0 +1,158 @@
+#include "harness/plant/observer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "controller/common/text.h"
+#include "controller/contact/find_contact.h"
+
+namespace dexcheck {
+namespace {
+
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
+
+/// The geom on the fingertip's body that can touch, by its site: the sphere at the site's place.
+int FindTipGeom(const mjModel& model, int site, const std::string& name) {
+  const int body = model.site_bodyid[site];
+  for (int g = 0; g < model.ngeom; ++g) {
+    if (model.geom_bodyid[g] == body && model.geom_type[g] == mjGEOM_SPHERE && CanTouch(model, g)) return g;
+  }
+  throw InputError("MJCF: fingertip " + Quote(name) + ": its body needs a sphere that can touch");
+}
+
+}  // namespace
+
+Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, const Surface& surface)
+    : adapter_(&adapter),
+      fingertips_(fingertips.begin(), fingertips.end()),
+      surface_(&surface),
+      kinematics_(adapter.model(), Coordinates::kReduced) {
+  for (const int frame : fingertips_) {
+    const Frame& tip = adapter.model().frames()[static_cast<size_t>(frame)];
+    tips_.emplace_back(tip.sphere_radius.value());
+    tip_geoms_.push_back(
+        FindTipGeom(adapter.engine(), adapter.frame_sites()[static_cast<size_t>(frame)], tip.name));
+  }
+  contacts_.resize(fingertips_.size());
+}
+
+Observer::BaseRates Observer::ReadBaseRates(const mjData& data) const {
+  BaseRates rates;
+  adapter_->GetBaseMotion(data.qpos, data.qvel, &rates.velocity, &rates.omega);
+  // v_0 = v_A - omega x p_0A
+  rates.velocity -= rates.omega.cross(R_B0_ * adapter_->anchor());
+  return rates;
+}
+
+void Observer::Read(const Plant& plant, MeasuredState* state) {
+  const mjData& data = plant.data();
+  const RobotModel& model = adapter_->model();
+  state->q.resize(model.num_positions());
+  state->xi.resize(model.num_velocities());
+  adapter_->GetPositions(data.qpos, state->q);
+
+  const Pose X_W0 = adapter_->GetBasePose(data.qpos);
+  R_B0_ = X_W0.linear();
+  departure_.tilt = std::atan2(R_B0_.col(2).head<2>().norm(), R_B0_(2, 2));
+  departure_.height = X_W0.translation().z() - model.base().X_B0.translation().z();
+  rates_ = ReadBaseRates(data);
+  const int base = model.num_base_velocities();
+  if (base == 3) {
+    state->xi.head<3>() << rates_.velocity.x(), rates_.velocity.y(), rates_.omega.z();
+  } else if (base == 2) {
+    const Vector3d heading(std::cos(state->q[2]), std::sin(state->q[2]), 0.0);
+    state->xi.head<2>() = CalcDriveVelocity(heading.dot(rates_.velocity), rates_.omega.z());
+  }
+  const std::vector<int>& dofs = adapter_->joint_dofs();
+  for (size_t i = 0; i < dofs.size(); ++i) state->xi[base + static_cast<int>(i)] = data.qvel[dofs[i]];
+
+  const int body = adapter_->object_body();
+  const int joint = plant.model().body_jntadr[body];
+  const mjtNum* const pose = data.qpos + plant.model().jnt_qposadr[joint];
+  const mjtNum* const rate = data.qvel + plant.model().jnt_dofadr[joint];
+  state->X_Bo.linear() =
+      Eigen::Quaterniond(pose[3], pose[4], pose[5], pose[6]).normalized().toRotationMatrix();
+  state->X_Bo.translation() = MapVector(pose);
+  state->V_Bo << state->X_Bo.linear().transpose() * MapVector(rate), MapVector(rate + 3);
+
+  // Contacts where the fingertips are, on the base as it really stands.
+  kinematics_.SetState(state->q, state->xi);
+  const Pose X_oB = state->X_Bo.inverse() * X_W0 * kinematics_.CalcLinkPose(-1).inverse();
+  const bool guess = has_guess_ && state->kappa.size() == fingertips_.size();
+  state->kappa.resize(fingertips_.size());
+  state->overlap.resize(fingertips_.size());
+  for (size_t i = 0; i < fingertips_.size(); ++i) {
+    const Pose X_of = X_oB * kinematics_.CalcFramePose(fingertips_[i]);
+    const FoundContact found = guess ? FindContact(tips_[i], *surface_, X_of, state->kappa[i])
+                                     : FindContact(tips_[i], *surface_, X_of);
+    state->kappa[i] = found.kappa;
+    state->overlap[i] = -found.gap;
+  }
+  has_guess_ = true;
+}
+
+Vector2d Observer::CalcDriveVelocity(double forward, double yaw_rate) const {
+  const Base& base = adapter_->model().base();
+  if (base.velocity == DriveVelocity::kTwist) return {forward, yaw_rate};
+  const double turn = 0.5 * base.wheel_distance * yaw_rate;
+  return Vector2d(forward + turn, forward - turn) / base.wheel_radius;
+}
+
+void Observer::ReadAccelerations(const Plant& plant, const MeasuredState& state, Eigen::Ref<VectorXd> xi_dot,
+                                 Vector6d* V_Bo_dot) const {
+  const mjData& data = plant.data();
+  const RobotModel& model = adapter_->model();
+  const int base = model.num_base_velocities();
+  Vector3d linear, angular;
+  adapter_->GetBaseMotion(plant.step_qpos().data(), data.qacc, &linear, &angular);
+  const Vector3d arm = R_B0_ * adapter_->anchor();
+  // d/dt (v_A - omega x p_0A)
+  linear -= angular.cross(arm) + rates_.omega.cross(rates_.omega.cross(arm));
+  if (base == 3) {
+    xi_dot.head<3>() << linear.x(), linear.y(), angular.z();
+  } else if (base == 2) {
+    const Vector3d heading(std::cos(state.q[2]), std::sin(state.q[2]), 0.0);
+    const Vector3d left(-heading.y(), heading.x(), 0.0);
+    const double forward = heading.dot(linear) + rates_.omega.z() * left.dot(rates_.velocity);
+    xi_dot.head<2>() = CalcDriveVelocity(forward, angular.z());
+  }
+  const std::vector<int>& dofs = adapter_->joint_dofs();
+  for (size_t i = 0; i < dofs.size(); ++i) xi_dot[base + static_cast<int>(i)] = data.qacc[dofs[i]];
+
+  const int joint = plant.model().body_jntadr[adapter_->object_body()];
+  const mjtNum* const rate = data.qacc + plant.model().jnt_dofadr[joint];
+  // v = R^T p_dot, hence v_dot = R^T p_ddot - omega x v
+  const Vector3d v = state.V_Bo.head<3>();
+  const Vector3d omega = state.V_Bo.tail<3>();
+  *V_Bo_dot << state.X_Bo.linear().transpose() * MapVector(rate) - omega.cross(v), MapVector(rate + 3);
+}
+
+std::span<const EngineContact> Observer::ReadContacts(const Plant& plant) {
+  const mjModel& m = plant.model();
+  const mjData& d = plant.data();
+  for (size_t i = 0; i < fingertips_.size(); ++i) {
+    EngineContact& contact = contacts_[i];
+    contact = EngineContact{};
+    for (int k = 0; k < d.ncon; ++k) {
+      const mjContact& c = d.contact[k];
+      const bool first = c.geom1 == tip_geoms_[i] && m.geom_bodyid[c.geom2] == adapter_->object_body();
+      const bool second = c.geom2 == tip_geoms_[i] && m.geom_bodyid[c.geom1] == adapter_->object_body();
+      if (!first && !second) continue;
+      if (contact.touching && c.dist >= contact.distance) continue;
+      const Eigen::Map<const RowMatrix3d> frame(c.frame);
+      const double sign = first ? 1.0 : -1.0;
+      mjtNum force[6];  // on geom2, in the contact's frame
+      mj_contactForce(&m, &d, k, force);
+      contact.touching = true;
+      contact.distance = c.dist;
+      contact.position = MapVector(c.pos);
+      contact.normal = sign * frame.row(0).transpose();
+      contact.force = sign * (frame.transpose() * MapVector(force));
+    }
+  }
+  return contacts_;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,102 @@
+#include "harness/plant/plant.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "controller/common/text.h"
+
+namespace dexcheck {
+namespace {
+
+int FindMotor(const mjModel& model, int joint) {
+  int found = -1;
+  for (int i = 0; i < model.nu; ++i) {
+    if (model.actuator_trntype[i] != mjTRN_JOINT || model.actuator_trnid[2 * i] != joint) continue;
+    if (found >= 0) {
+      throw InputError("MJCF: joint " + Quote(NameOf(model, mjOBJ_JOINT, joint)) +
+                       ": must have one motor, got several");
+    }
+    found = i;
+  }
+  if (found < 0) {
+    throw InputError("MJCF: joint " + Quote(NameOf(model, mjOBJ_JOINT, joint)) +
+                     ": must have one motor, got none");
+  }
+  return found;
+}
+
+VectorXd Copy(const mjtNum* values, int count) { return Eigen::Map<const VectorXd>(values, count); }
+
+}  // namespace
+
+Plant::Plant(const Adapter& adapter)
+    : adapter_(&adapter), model_(&adapter.engine()), data_(MakeData(*model_)) {
+  for (const EngineWheel& wheel : adapter.wheels()) motors_.push_back(FindMotor(*model_, wheel.joint));
+  for (const int joint : adapter.joint_ids()) motors_.push_back(FindMotor(*model_, joint));
+  for (const int motor : motors_) {
+    const double gear = std::abs(model_->actuator_gear[6 * motor]);
+    const mjtNum* range = model_->actuator_ctrlrange + 2 * motor;
+    limits_.push_back(model_->actuator_ctrllimited[motor] != 0 ? gear * std::min(-range[0], range[1])
+                                                               : std::numeric_limits<double>::infinity());
+  }
+}
+
+void Plant::BeginStep() {
+  mj_step1(model_, data_.get());
+  step_qpos_ = Eigen::Map<const VectorXd>(data_->qpos, model_->nq);
+}
+
+void Plant::SetTorques(const Eigen::Ref<const VectorXd>& tau) {
+  Require(tau.size() == static_cast<Eigen::Index>(motors_.size()), "length of tau'", "must be that of xi",
+          static_cast<double>(tau.size()));
+  for (size_t i = 0; i < motors_.size(); ++i) {
+    data_->ctrl[motors_[i]] = tau[static_cast<Eigen::Index>(i)] / model_->actuator_gear[6 * motors_[i]];
+  }
+}
+
+double Plant::CalcEffort(const Eigen::Ref<const VectorXd>& tau, int* worst) const {
+  double largest = 0.0;
+  for (size_t i = 0; i < limits_.size(); ++i) {
+    const double effort = std::abs(tau[static_cast<Eigen::Index>(i)]) / limits_[i];
+    if (effort <= largest) continue;
+    largest = effort;
+    *worst = static_cast<int>(i);
+  }
+  return largest;
+}
+
+void Plant::EndStep() {
+  const double expected_time = data_->time + time_step();
+  mj_step2(model_, data_.get());
+  CheckHealth(expected_time);
+}
+
+void Plant::CheckHealth(double expected_time) const {
+  // After a bad position, velocity or acceleration the engine warns and starts over, at time zero.
+  for (int i = 0; i < mjNWARNING; ++i) {
+    if (data_->warning[i].number == 0) continue;
+    throw DivergenceError("MuJoCo at t = " + FormatNumber(data_->time) +
+                          " s: " + mju_warningText(i, data_->warning[i].lastinfo));
+  }
+  const bool finite = Copy(data_->qpos, model_->nq).allFinite() && Copy(data_->qvel, model_->nv).allFinite();
+  if (finite && std::abs(data_->time - expected_time) < 0.5 * time_step()) return;
+  throw DivergenceError(
+      "the simulation's state is not finite after t = " + FormatNumber(expected_time - time_step()) + " s");
+}
+
+EngineState Plant::GetState() const {
+  return {Copy(data_->qpos, model_->nq), Copy(data_->qvel, model_->nv), Copy(data_->act, model_->na),
+          Copy(data_->qacc_warmstart, model_->nv), data_->time};
+}
+
+void Plant::SetState(const EngineState& state) {
+  mj_resetData(model_, data_.get());
+  std::copy_n(state.qpos.data(), model_->nq, data_->qpos);
+  std::copy_n(state.qvel.data(), model_->nv, data_->qvel);
+  std::copy_n(state.act.data(), model_->na, data_->act);
+  std::copy_n(state.qacc_warmstart.data(), model_->nv, data_->qacc_warmstart);
+  data_->time = state.time;
+}
+
+}  // namespace dexcheck
