@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -94,6 +95,61 @@ TomlDocument::TomlDocument(std::string_view text, std::string_view source)
 }
 
 TomlTable TomlDocument::Open() const { return {*context_, TomlValue(*context_, *root_, ""), *root_}; }
+
+void TomlDocument::Override(std::string_view assignment) {
+  const std::string label = "--set " + std::string(assignment);
+  const auto fail = [&](const std::string& why) { throw InputError(Abbreviate(label) + ": " + why); };
+  CheckSize(label.size(), "--set");
+  const size_t equals = assignment.find('=');
+  if (equals == std::string_view::npos) fail("must be PATH=VALUE");
+  const std::string_view path = assignment.substr(0, equals);
+  const std::string_view value = assignment.substr(equals + 1);
+  if (NestingScanner(value).FindTooDeep() > 0 || NestingScanner(path).FindTooDeep() > 0) {
+    fail("nested too deeply");
+  }
+  toml::table parsed;
+  const std::string text(value);
+  for (const std::string& form : {"value = " + text, "value = '''" + text + "'''"}) {
+    try {
+      parsed = toml::parse(form, label);
+    } catch (const toml::parse_error&) {
+      continue;
+    }
+    if (parsed.size() == 1) break;  // more keys mean that the value had a line break in it
+  }
+  if (parsed.size() != 1) fail("is not a value");
+
+  toml::node* at = root_.get();
+  size_t begin = 0;
+  while (true) {
+    const size_t dot = path.find('.', begin);
+    const std::string_view key = path.substr(begin, dot - begin);
+    const bool is_last = dot == std::string_view::npos;
+    if (key.empty()) fail("its path has an empty part");
+    if (toml::array* const list = at->as_array()) {
+      size_t index = 0;
+      const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), index);
+      if (error != std::errc() || end != key.data() + key.size() || index >= list->size()) {
+        fail(Quote(key) + " is no entry of a list of " + std::to_string(list->size()));
+      }
+      if (is_last) {
+        list->replace(list->cbegin() + static_cast<std::ptrdiff_t>(index), *parsed.get("value"));
+        return;
+      }
+      at = list->get(index);
+    } else if (toml::table* const table = at->as_table()) {
+      if (is_last) {
+        table->insert_or_assign(key, *parsed.get("value"));
+        return;
+      }
+      if (!table->contains(key)) table->insert(key, toml::table{});
+      at = table->get(key);
+    } else {
+      fail(Quote(path.substr(0, begin - 1)) + " is no table or list");
+    }
+    begin = dot + 1;
+  }
+}
 
 std::string ReadTextFile(const std::string& path) {
   const auto fail = [&](const std::string& why) { throw InputError(path + ": cannot be read: " + why); };

@@ -60,7 +60,10 @@ void TomlValue::Fail(std::string_view requirement) const {
 
 void TomlValue::Reject(std::string_view problem) const {
   const std::string key = path_.empty() ? "" : Abbreviate(path_) + ": ";
-  throw InputError(context_->source + ":" + std::to_string(line()) + ": " + key + std::string(problem));
+  // A value that was overridden has its own source, which says where it comes from better than a line does.
+  const toml::source_path_ptr& own_source = node_->source().path;
+  const std::string where = own_source ? *own_source : context_->source + ":" + std::to_string(line());
+  throw InputError(where + ": " + key + std::string(problem));
 }
 
 double TomlValue::AsNumber() const {
@@ -89,6 +92,20 @@ double TomlValue::AsNotNegative() const {
   const double value = AsNumber();
   if (value < 0.0) Fail("must not be negative");
   return value;
+}
+
+long TomlValue::AsWhole(long least, long most) const {
+  const auto value = node_->value_exact<int64_t>();
+  if (!value || *value < least || *value > most) {
+    Fail("must be a whole number from " + std::to_string(least) + " to " + std::to_string(most));
+  }
+  return *value;
+}
+
+bool TomlValue::AsFlag() const {
+  const auto value = node_->value_exact<bool>();
+  if (!value) Fail("must be true or false");
+  return *value;
 }
 
 std::string TomlValue::AsText() const {

@@ -44,6 +44,10 @@ class TomlValue {
   [[nodiscard]] double AsNumber() const;
   [[nodiscard]] double AsPositive() const;
   [[nodiscard]] double AsNotNegative() const;
+  /// Whole number from `least` to `most`.
+  [[nodiscard]] long AsWhole(long least, long most) const;
+  /// true or false.
+  [[nodiscard]] bool AsFlag() const;
   [[nodiscard]] bool IsText() const { return node_->is_string(); }
   [[nodiscard]] std::string AsText() const;
   /// Text that can name a thing: 1 to 64 of the letters A-Z, a-z, digits, and _ - .
@@ -57,6 +61,13 @@ class TomlValue {
     Eigen::Matrix<double, N, 1> vector;
     CopyNumbers(vector.data(), N);
     return vector;
+  }
+
+  /// List of exactly N numbers, or one number for all of them.
+  template <int N>
+  [[nodiscard]] Eigen::Matrix<double, N, 1> AsVectorOrNumber() const {
+    if (!node_->is_array()) return Eigen::Matrix<double, N, 1>::Constant(AsNumber());
+    return AsVector<N>();
   }
 
   /// What stands beside the text in the list of choices.
@@ -142,6 +153,10 @@ class TomlDocument {
   TomlDocument(std::string_view text, std::string_view source);
 
   [[nodiscard]] TomlTable Open() const;
+  /// Sets a value in place of the file's by an assignment "PATH=VALUE"; tables on the way are made. Whole
+  /// numbers in the path count the entries of lists, from 0. A value that is not TOML is taken as text.
+  /// @throws InputError when this is no assignment, or its path leads through what is no table or list.
+  void Override(std::string_view assignment);
   /// Adds a symbol to those that quoted arithmetic may use from now on.
   void Define(const std::string& symbol, double value) { context_->symbols[symbol] = value; }
 

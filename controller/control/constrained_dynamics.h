@@ -41,6 +41,9 @@ class ConstrainedDynamics {
   const Prediction& Predict(const ModelTerms& robot, const GraspTerms& grasp,
                             const Eigen::Ref<const VectorXd>& force);
 
+  /// M_bar' = L L^T of the last Predict.
+  [[nodiscard]] const Eigen::LLT<MatrixXd>& mass_factor() const { return M_llt_; }
+
  private:
   Eigen::LLT<MatrixXd> M_llt_;
   MatrixXd half_;  // n + 6 x k, [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G]

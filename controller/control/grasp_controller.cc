@@ -1,5 +1,7 @@
 #include "controller/control/grasp_controller.h"
 
+#include <chrono>
+
 #include "controller/object/euler_zyz.h"
 
 namespace dexcheck {
@@ -40,7 +42,9 @@ const VectorXd& GraspController::CalcTorque(const DesiredMotion& desired) {
 
   problem_.G = grasp_.G();
   problem_.F_o = law_.F_o();
+  const auto begin = std::chrono::steady_clock::now();
   force_ = &solver_.Solve(problem_);
+  force_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   if (force_->status != GraspForceStatus::kOptimal) {
     throw GraspForceError(force_->status == GraspForceStatus::kInfeasible
                               ? "no contact forces inside the friction cones hold the object"

@@ -67,6 +67,8 @@ class GraspController {
   [[nodiscard]] const GraspTerms& grasp() const { return grasp_; }
   [[nodiscard]] const ComputedTorque& law() const { return law_; }
   [[nodiscard]] const GraspForceResult& force() const { return *force_; }
+  /// Time that the last grasp-force problem took, s.
+  [[nodiscard]] double force_seconds() const { return force_seconds_; }
   [[nodiscard]] GraspControllerOptions& options() { return options_; }
   [[nodiscard]] const GraspControllerOptions& options() const { return options_; }
 
@@ -78,6 +80,7 @@ class GraspController {
   GraspForceProblem problem_;
   GraspForceSolver solver_;
   const GraspForceResult* force_ = nullptr;
+  double force_seconds_ = 0.0;
   Vector6d X_o_ = Vector6d::Zero();  // of the last step, to stay on one branch of the angles
   bool has_X_o_ = false;
   VectorXd sigma_prime_;  // n

@@ -93,8 +93,10 @@ ObjectModel ReadObject(const TomlValue& value) {
 
 }  // namespace
 
-RobotModel ParseRobotModel(std::string_view text, std::string_view source) {
+RobotModel ParseRobotModel(std::string_view text, std::string_view source,
+                           std::span<const std::string> overrides) {
   TomlDocument document(text, source);
+  for (const std::string& assignment : overrides) document.Override(assignment);
   TomlTable root = document.Open();
   // First of all, since a misspelt section makes others look wrong.
   root.RejectOthersThan({"name", "gravity", "lengths", "base", "chain", "template", "frame", "object"});

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
+#include <string>
 #include <string_view>
 
 #include "controller/model/robot_model.h"
@@ -13,6 +15,8 @@ namespace dexcheck {
 RobotModel ReadRobotModel(const std::filesystem::path& path);
 
 /// The same for a text; `source` stands for the file in messages.
-RobotModel ParseRobotModel(std::string_view text, std::string_view source);
+/// @param overrides "PATH=VALUE" each, set in place of the file's values (TomlDocument::Override).
+RobotModel ParseRobotModel(std::string_view text, std::string_view source,
+                           std::span<const std::string> overrides = {});
 
 }  // namespace dexcheck

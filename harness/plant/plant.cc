@@ -30,8 +30,16 @@ VectorXd Copy(const mjtNum* values, int count) { return Eigen::Map<const VectorX
 
 }  // namespace
 
-Plant::Plant(const Adapter& adapter)
-    : adapter_(&adapter), model_(&adapter.engine()), data_(MakeData(*model_)) {
+Plant::Plant(const Adapter& adapter, bool implicit_damping)
+    : adapter_(&adapter),
+      model_(mj_copyModel(nullptr, &adapter.engine())),
+      data_(MakeData(*model_)),
+      damping_(VectorXd::Zero(model_->nv)) {
+  if (!implicit_damping) {
+    Eigen::Map<VectorXd> damping(model_->dof_damping, model_->nv);
+    damping_ = damping;
+    damping.setZero();
+  }
   for (const EngineWheel& wheel : adapter.wheels()) motors_.push_back(FindMotor(*model_, wheel.joint));
   for (const int joint : adapter.joint_ids()) motors_.push_back(FindMotor(*model_, joint));
   for (const int motor : motors_) {
@@ -43,7 +51,7 @@ Plant::Plant(const Adapter& adapter)
 }
 
 void Plant::BeginStep() {
-  mj_step1(model_, data_.get());
+  mj_step1(model_.get(), data_.get());
   step_qpos_ = Eigen::Map<const VectorXd>(data_->qpos, model_->nq);
 }
 
@@ -53,6 +61,11 @@ void Plant::SetTorques(const Eigen::Ref<const VectorXd>& tau) {
   for (size_t i = 0; i < motors_.size(); ++i) {
     data_->ctrl[motors_[i]] = tau[static_cast<Eigen::Index>(i)] / model_->actuator_gear[6 * motors_[i]];
   }
+}
+
+std::string Plant::motor_name(int entry) const {
+  const int joint = model_->actuator_trnid[2 * motors_[static_cast<size_t>(entry)]];
+  return NameOf(*model_, mjOBJ_JOINT, joint);
 }
 
 double Plant::CalcEffort(const Eigen::Ref<const VectorXd>& tau, int* worst) const {
@@ -68,7 +81,9 @@ double Plant::CalcEffort(const Eigen::Ref<const VectorXd>& tau, int* worst) cons
 
 void Plant::EndStep() {
   const double expected_time = data_->time + time_step();
-  mj_step2(model_, data_.get());
+  Eigen::Map<VectorXd>(data_->qfrc_applied, model_->nv) =
+      -damping_.cwiseProduct(Eigen::Map<const VectorXd>(data_->qvel, model_->nv));
+  mj_step2(model_.get(), data_.get());
   CheckHealth(expected_time);
 }
 
@@ -91,7 +106,7 @@ EngineState Plant::GetState() const {
 }
 
 void Plant::SetState(const EngineState& state) {
-  mj_resetData(model_, data_.get());
+  mj_resetData(model_.get(), data_.get());
   std::copy_n(state.qpos.data(), model_->nq, data_->qpos);
   std::copy_n(state.qvel.data(), model_->nv, data_->qvel);
   std::copy_n(state.act.data(), model_->na, data_->act);

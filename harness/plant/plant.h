@@ -34,8 +34,10 @@ struct EngineState {
 /// After EndStep, data() still has accelerations, contacts and forces of the step, at the state before it.
 class Plant {
  public:
-  /// @throws InputError when a velocity of xi has no motor or several.
-  explicit Plant(const Adapter& adapter);
+  /// @param implicit_damping integrate joint damping as the engine's Euler does, which changes velocities by
+  /// other than dt qacc; otherwise it acts as an explicit force, as in (48).
+  /// @throws InputError when a joint or wheel has no motor or several.
+  Plant(const Adapter& adapter, bool implicit_damping);
 
   [[nodiscard]] const Adapter& adapter() const { return *adapter_; }
   [[nodiscard]] const mjModel& model() const { return *model_; }
@@ -51,6 +53,8 @@ class Plant {
   void SetTorques(const Eigen::Ref<const VectorXd>& tau);
   /// Largest |tau'| / limit over the motors, and the motor; more than 1 is cut off by the engine.
   [[nodiscard]] double CalcEffort(const Eigen::Ref<const VectorXd>& tau, int* worst) const;
+  /// Name of the joint of a motor by its entry of tau'.
+  [[nodiscard]] std::string motor_name(int entry) const;
   /// Limit of |tau'| of a motor by its entry of tau', N m; infinity without.
   [[nodiscard]] double torque_limit(int entry) const { return limits_[static_cast<size_t>(entry)]; }
   /// @throws DivergenceError when the engine warned or the state is not finite.
@@ -63,8 +67,9 @@ class Plant {
   void CheckHealth(double expected_time) const;
 
   const Adapter* adapter_;
-  const mjModel* model_;
+  MjModelPtr model_;  // the adapter's, but for the damping
   MjDataPtr data_;
+  VectorXd damping_;  // nv, N m s/rad; what is not integrated implicitly
   VectorXd step_qpos_;
   std::vector<int> motors_;     // by entry of tau'
   std::vector<double> limits_;  // likewise

@@ -1,0 +1,246 @@
+#include "harness/checks/step_checks.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "controller/common/text.h"
+#include "controller/contact/rolling.h"
+
+namespace dexcheck {
+namespace {
+
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+/// Velocity, normal force and cone use of the engine's contact of two bodies; the deepest when there are
+/// several.
+struct BodyContact {
+  bool touching = false;
+  double distance = 0.0;
+  Vector3d slip = Vector3d::Zero();  // of `body` against the other, tangential, world
+  double cone_use = 0.0;
+};
+
+BodyContact ReadContact(const mjModel& m, const mjData& d, int body, int other) {
+  BodyContact result;
+  for (int i = 0; i < d.ncon; ++i) {
+    const mjContact& c = d.contact[i];
+    const int body1 = m.geom_bodyid[c.geom1];
+    const int body2 = m.geom_bodyid[c.geom2];
+    const bool first = body1 == body && body2 == other;
+    const bool second = body2 == body && body1 == other;
+    if ((!first && !second) || c.efc_address < 0 || c.dim < 3) continue;
+    if (result.touching && c.dist >= result.distance) continue;
+    result.touching = true;
+    result.distance = c.dist;
+    // Velocity of the second geom against the first, along the contact's tangents.
+    const Eigen::Map<const RowMatrix3d> frame(c.frame);
+    const mjtNum* const velocity = d.efc_vel + c.efc_address;
+    result.slip = (velocity[1] * frame.row(1) + velocity[2] * frame.row(2)).transpose();
+    if (first) result.slip = -result.slip;
+    mjtNum force[6];
+    mj_contactForce(&m, &d, i, force);
+    const double tangential = std::hypot(force[1] / c.friction[0], force[2] / c.friction[1]);
+    result.cone_use = force[0] > 0.0 ? tangential / force[0] : 0.0;
+  }
+  return result;
+}
+
+}  // namespace
+
+StepChecks::StepChecks(const Setup& setup)
+    : setup_(&setup),
+      checks_(kCheckCount),
+      dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())),
+      actuation_(setup.model()) {
+  const RobotModel& model = setup.model();
+  const mjModel& engine = setup.engine();
+  using enum CheckKind;
+  Define(
+      kBalanceRobot, "balance_robot", kBalance, "1", 1e-5,
+      "what is left of (48) with the engine's accelerations and contact forces, against the forces balanced");
+  Define(kBalanceObject, "balance_object", kBalance, "1", 1e-9,
+         "what is left of (19) with the engine's acceleration and contact forces, against its weight");
+  Define(kReducedAcceleration, "reduced_acceleration", kPrediction, "1", 1e-5,
+         "xi_dot of the rigid constrained system (46), (48) against the engine's");
+  Define(kContactForce, "contact_force", kPrediction, "1", 1e-6,
+         "f_c of the rigid constrained system against the engine's, relative to |f_c|");
+  Define(kFingertipSlip, "fingertip_slip", kAssumption, "m", 2e-4,
+         "how far a fingertip has slipped on the object since t = 0");
+  Define(kWheelSlip, "wheel_slip", kAssumption, "m", 1e-3,
+         "how far a wheel has slipped on the floor since t = 0, (1)");
+  Define(kConeUse, "cone_use", kAssumption, "1", 0.99,
+         "tangential force over mu times normal force at a fingertip; 1 slides, (21)");
+  Define(kContactsLost, "contacts_lost", kAssumption, "1", 0.0, "fingertips that do not touch the object");
+  Define(kPenetration, "penetration", kAssumption, "m", 2e-5, "overlap of fingertip and object");
+  Define(kKappa, "kappa", kAssumption, "m", 2e-5,
+         "contact point on the object: kappa integrated by (40) against the engine's");
+  Define(kBaseTilt, "base_tilt", kAssumption, "rad", 1e-5, "angle of the platform against the vertical");
+  Define(kIdleJoints, "idle_joints", kAssumption, "rad", 1e-5,
+         "movement since t = 0 of joints that do not carry the object");
+  Define(kActuators, "actuator_effort", kAssumption, "1", 1.0, "|tau'| over the motor's limit");
+  for (const auto& [name, bound] : setup.scenario().bounds) {
+    const auto found = std::find_if(checks_.begin(), checks_.end(),
+                                    [&, &key = name](const RunCheck& check) { return check.name == key; });
+    if (found == checks_.end()) {
+      throw InputError(setup.scenario().source + ": bounds." + name + ": no check has this name");
+    }
+    found->bound = bound;
+  }
+
+  fingertip_slip_.resize(setup.fingertips().size());
+  wheel_slip_.resize(setup.adapter().wheels().size());
+  for (const int tip : setup.fingertips()) {
+    tip_bodies_.push_back(engine.site_bodyid[setup.adapter().frame_sites()[static_cast<size_t>(tip)]]);
+  }
+  for (const EngineWheel& wheel : setup.adapter().wheels()) {
+    wheel_bodies_.push_back(engine.jnt_bodyid[wheel.joint]);
+  }
+  const int n = model.num_velocities();
+  engine_.xi_dot.setZero(n);
+  engine_.f_c.setZero(3 * static_cast<Eigen::Index>(setup.fingertips().size()));
+  force_.setZero(n);
+  bias_.setZero(n);
+  residual_.setZero(n);
+  work_.setZero(n);
+  idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
+  kappa_.resize(setup.fingertips().size());
+}
+
+void StepChecks::Define(Check check, const char* name, CheckKind kind, const char* unit, double bound,
+                        const char* description) {
+  RunCheck& c = checks_[check];
+  c.name = name;
+  c.kind = kind;
+  c.unit = unit;
+  c.bound = bound;
+  c.description = description;
+}
+
+const RunCheck& StepChecks::Find(std::string_view name) const {
+  for (const RunCheck& check : checks_) {
+    if (check.name == name) return check;
+  }
+  throw std::invalid_argument("no check " + Quote(name));
+}
+
+void StepChecks::Compare(const Plant& plant, const GraspController& controller, const MeasuredState& state,
+                         const Eigen::Ref<const VectorXd>& tau, Observer* observer, double time) {
+  time_ = time;
+  observer->ReadAccelerations(plant, state, engine_.xi_dot, &engine_.V_Bo_dot);
+  contacts_ = observer->ReadContacts(plant);
+  int lost = 0;
+  double penetration = 0.0;
+  for (size_t i = 0; i < contacts_.size(); ++i) {
+    const Matrix3d R_B_cf = state.X_Bo.linear() * controller.grasp().contacts()[i].geometry.g_o_cf.linear();
+    engine_.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) = R_B_cf.transpose() * contacts_[i].force;
+    if (!contacts_[i].touching) ++lost;
+    penetration = std::max(penetration, -contacts_[i].distance);
+  }
+  if (lost > 0) ++steps_without_contact_;
+  Add(kContactsLost, lost);
+  Add(kPenetration, penetration);
+  CompareDynamics(controller, state, tau);
+  ReadSlip(plant, state);
+  CompareKappa(controller, state, plant.time_step());
+
+  Add(kBaseTilt, observer->departure().tilt);
+  double idle = 0.0;
+  const std::vector<int>& joints = setup_->idle_joints();
+  const int offset = setup_->model().num_base_positions();
+  for (size_t i = 0; i < joints.size(); ++i) {
+    const double q = state.q[offset + joints[i]];
+    double& start = idle_start_[static_cast<Eigen::Index>(i)];
+    if (steps_ == 0) start = q;
+    idle = std::max(idle, std::abs(q - start));
+  }
+  Add(kIdleJoints, idle);
+  int worst = -1;
+  Add(kActuators, plant.CalcEffort(tau, &worst));
+  ++steps_;
+}
+
+void StepChecks::CompareDynamics(const GraspController& controller, const MeasuredState& state,
+                                 const Eigen::Ref<const VectorXd>& tau) {
+  const ModelTerms& robot = controller.robot();
+  const GraspTerms& grasp = controller.grasp();
+  actuation_.CalcForce(tau, force_);
+  prediction_ = &dynamics_.Predict(robot, grasp, force_);
+
+  // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
+  bias_ = robot.gravity() + robot.friction();
+  bias_.noalias() += robot.C() * state.xi;
+  residual_ = bias_ - force_;
+  residual_.noalias() += robot.M() * engine_.xi_dot;
+  residual_.noalias() += grasp.J_B().transpose() * engine_.f_c;
+  const auto norm = [&](const VectorXd& f) {
+    work_ = f;
+    dynamics_.mass_factor().matrixL().solveInPlace(work_);
+    return work_.norm();
+  };
+  const double scale = std::max(norm(bias_), std::numeric_limits<double>::min());
+  Add(kBalanceRobot, norm(residual_) / scale);
+
+  // |a|_M = |L^T a|
+  residual_ = prediction_->xi_dot - engine_.xi_dot;
+  work_.noalias() = dynamics_.mass_factor().matrixL().transpose() * residual_;
+  Add(kReducedAcceleration, work_.norm() / scale);
+  const double force_scale = std::max(engine_.f_c.norm(), std::numeric_limits<double>::min());
+  Add(kContactForce, (prediction_->f_c - engine_.f_c).norm() / force_scale);
+
+  // (19), as forces at the contacts' arm
+  const ObjectBodyTerms& body = grasp.body();
+  const Vector6d left =
+      body.M_hat * engine_.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o - grasp.G() * engine_.f_c;
+  const double arm = grasp.contacts()[0].geometry.g_o_cf.translation().norm();
+  const double weight = grasp.object().mass * std::max(grasp.gravity().norm(), 1.0);
+  Add(kBalanceObject, std::max(left.head<3>().norm(), left.tail<3>().norm() / arm) / weight);
+}
+
+void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
+  const double dt = plant.time_step();
+  double slipped = 0.0;
+  double cone_use = 0.0;
+  const auto update = [&](SlipState* slip, const BodyContact& contact, const Matrix3d& R) {
+    slip->touching = contact.touching;
+    slip->cone_use = contact.cone_use;
+    slip->velocity = R.transpose() * contact.slip;
+    slip->distance += dt * slip->velocity;
+    slipped = std::max(slipped, slip->distance.norm());
+    cone_use = std::max(cone_use, contact.cone_use);
+  };
+  const int object = setup_->adapter().object_body();
+  for (size_t i = 0; i < tip_bodies_.size(); ++i) {
+    update(&fingertip_slip_[i], ReadContact(plant.model(), plant.data(), tip_bodies_[i], object),
+           state.X_Bo.linear());
+  }
+  Add(kFingertipSlip, slipped);
+  Add(kConeUse, cone_use);
+  slipped = 0.0;
+  const double phi = setup_->model().num_base_positions() == 3 ? state.q[2] : 0.0;
+  const Matrix3d R_B0 = Eigen::AngleAxisd(phi, Vector3d::UnitZ()).toRotationMatrix();
+  for (size_t i = 0; i < wheel_bodies_.size(); ++i) {
+    update(&wheel_slip_[i], ReadContact(plant.model(), plant.data(), wheel_bodies_[i], 0), R_B0);
+  }
+  Add(kWheelSlip, slipped);
+}
+
+void StepChecks::CompareKappa(const GraspController& controller, const MeasuredState& state, double dt) {
+  const GraspTerms& grasp = controller.grasp();
+  double apart = 0.0;
+  for (size_t i = 0; i < kappa_.size(); ++i) {
+    if (steps_ == 0) {
+      kappa_[i] = state.kappa[i];
+      continue;
+    }
+    // The velocity at hand led from the last state to this one.
+    const Vector5d change = dt * grasp.contacts()[i].kappa_dot;
+    kappa_[i] =
+        NormalizeContact(grasp.tip(static_cast<int>(i)), grasp.surface(), Displace(kappa_[i], change));
+    const Vector3d integrated = grasp.surface().Evaluate(kappa_[i].alpha_o).p;
+    const Vector3d measured = grasp.surface().Evaluate(state.kappa[i].alpha_o).p;
+    apart = std::max(apart, (integrated - measured).norm());
+  }
+  Add(kKappa, apart);
+}
+
+}  // namespace dexcheck

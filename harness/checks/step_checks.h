@@ -1,0 +1,101 @@
+#pragma once
+
+// Questions two to four of the cross-check, at every step of a run.
+//
+// Errors of forces and accelerations of the robot are measured in the metric of its own inertia, in which
+// metres and radians, arms and phalanges weigh what they weigh: |a|_M = sqrt(a^T M_bar' a), |f|_M^-1 =
+// sqrt(f^T M_bar'^-1 f), relative to |C_bar' xi + F_bar'|_M^-1, the force that the motors have to balance.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "controller/control/actuation.h"
+#include "controller/control/constrained_dynamics.h"
+#include "controller/control/grasp_controller.h"
+#include "harness/checks/run_check.h"
+#include "harness/plant/observer.h"
+#include "harness/plant/plant.h"
+#include "harness/simulation/setup.h"
+
+namespace dexcheck {
+
+/// What the engine did in one step, in the model's terms.
+struct EngineMotion {
+  VectorXd xi_dot;                       ///< n.
+  Vector6d V_Bo_dot = Vector6d::Zero();  ///< Sigma_o.
+  VectorXd f_c;                          ///< k, N, in each Sigma_cf.
+};
+
+/// Slip of one contact, from the engine's own velocities.
+struct SlipState {
+  bool touching = false;
+  Vector3d velocity = Vector3d::Zero();  ///< Tangential, in the frame of the body that is slipped on, m/s.
+  Vector3d distance = Vector3d::Zero();  ///< Its integral, m.
+  double cone_use = 0.0;                 ///< |tangential force| / (mu normal force); 1 slides.
+};
+
+/// Balance, prediction and assumptions. Nothing allocates after construction.
+class StepChecks {
+ public:
+  explicit StepChecks(const Setup& setup);
+
+  /// Compares one step, after the plant's EndStep.
+  /// @param state what the observer read before the step. @param tau that was applied (n).
+  /// @param time at the beginning of the step, s.
+  void Compare(const Plant& plant, const GraspController& controller, const MeasuredState& state,
+               const Eigen::Ref<const VectorXd>& tau, Observer* observer, double time);
+
+  [[nodiscard]] const std::vector<RunCheck>& checks() const { return checks_; }
+  [[nodiscard]] const RunCheck& Find(std::string_view name) const;
+  [[nodiscard]] const EngineMotion& engine() const { return engine_; }
+  [[nodiscard]] const Prediction& prediction() const { return *prediction_; }
+  [[nodiscard]] std::span<const EngineContact> contacts() const { return contacts_; }
+  [[nodiscard]] const std::vector<SlipState>& fingertip_slip() const { return fingertip_slip_; }
+  [[nodiscard]] const std::vector<SlipState>& wheel_slip() const { return wheel_slip_; }
+  /// Steps so far at which some fingertip did not touch.
+  [[nodiscard]] long steps_without_contact() const { return steps_without_contact_; }
+
+ private:
+  enum Check {
+    kBalanceRobot,
+    kBalanceObject,
+    kReducedAcceleration,
+    kContactForce,
+    kFingertipSlip,
+    kWheelSlip,
+    kConeUse,
+    kContactsLost,
+    kPenetration,
+    kKappa,
+    kBaseTilt,
+    kIdleJoints,
+    kActuators,
+    kCheckCount
+  };
+  void Define(Check check, const char* name, CheckKind kind, const char* unit, double bound,
+              const char* description);
+  void Add(Check check, double value) { checks_[check].Add(value, time_); }
+  void CompareDynamics(const GraspController& controller, const MeasuredState& state,
+                       const Eigen::Ref<const VectorXd>& tau);
+  void ReadSlip(const Plant& plant, const MeasuredState& state);
+  void CompareKappa(const GraspController& controller, const MeasuredState& state, double dt);
+
+  const Setup* setup_;
+  std::vector<RunCheck> checks_;
+  ConstrainedDynamics dynamics_;
+  ActuationMap actuation_;
+  EngineMotion engine_;
+  const Prediction* prediction_ = nullptr;
+  std::span<const EngineContact> contacts_;
+  std::vector<SlipState> fingertip_slip_, wheel_slip_;
+  std::vector<int> wheel_bodies_, tip_bodies_;
+  std::vector<ContactCoordinates> kappa_;  // integrated from (40)
+  VectorXd idle_start_;
+  long steps_ = 0;
+  long steps_without_contact_ = 0;
+  double time_ = 0.0;
+  VectorXd force_, bias_, residual_, work_;  // n
+};
+
+}  // namespace dexcheck

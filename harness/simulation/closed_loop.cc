@@ -1,0 +1,182 @@
+#include "harness/simulation/closed_loop.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "controller/common/text.h"
+#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
+#include "harness/adapter/velocity_map.h"
+
+namespace dexcheck {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double Seconds(Clock::time_point from, Clock::time_point to) {
+  return std::chrono::duration<double>(to - from).count();
+}
+
+constexpr double kSettleMoving = 0.5;   // s
+constexpr double kLargestTilt = 0.2;    // rad, of a robot that still stands
+constexpr double kLargestSink = 0.02;   // m, likewise
+constexpr double kGraspTimeout = 0.02;  // s without all fingertips on the object: lost
+
+}  // namespace
+
+ClosedLoop::ClosedLoop(const Setup& setup, bool check)
+    : setup_(&setup),
+      check_(check),
+      plant_(setup.adapter(), setup.scenario().plant.implicit_damping),
+      observer_(setup.adapter(), setup.fingertips(), setup.surface()),
+      controller_(setup.model(), setup.fingertips(), setup.object().body, setup.surface(),
+                  setup.MakeControllerOptions()),
+      checks_(setup) {
+  const Scenario& scenario = setup.scenario();
+  num_steps_ = std::lround(scenario.duration / scenario.plant.time_step);
+  control_interval_ = std::max(1L, std::lround(scenario.plant.control_step / scenario.plant.time_step));
+  tau_.setZero(setup.model().num_velocities());
+  qvel_.setZero(setup.engine().nv);
+  PlaceRobot();
+  trajectory_ = MakeTrajectory(scenario, setup.X_start() + scenario.start_error);
+  Settle();
+  times_ = LoopTimes{};
+}
+
+void ClosedLoop::PlaceRobot() {
+  const mjModel& m = setup_->engine();
+  EngineState state = plant_.GetState();
+  setup_->adapter().SetPositions(setup_->q_start(), state.qpos.data());
+  const Pose& X_Bo = setup_->X_Bo_start();
+  const Eigen::Quaterniond rotation(X_Bo.linear());
+  const int joint = m.body_jntadr[setup_->adapter().object_body()];
+  state.qpos.segment<7>(m.jnt_qposadr[joint]) << X_Bo.translation(), rotation.w(), rotation.x(), rotation.y(),
+      rotation.z();
+  plant_.SetState(state);
+}
+
+void ClosedLoop::Settle() {
+  const double dt = plant_.time_step();
+  const LineTrajectory rest(setup_->X_start(), Vector6d::Zero(), 0.0);
+  const long count = std::lround(setup_->scenario().settle / dt);
+  for (long i = 0; i < count; ++i) ControlStep(EvaluateDesired(rest, static_cast<double>(i) * dt), i);
+  if (setup_->scenario().start == Start::kMoving) StartMoving(trajectory_->Evaluate(0.0));
+}
+
+void ClosedLoop::StartMoving(const DesiredMotion& at_start) {
+  const RobotModel& model = setup_->model();
+  const Vector3d v = at_start.X_d_dot.head<3>();
+  const Vector3d heading(std::cos(state_.q[2]), std::sin(state_.q[2]), 0.0);
+  const bool along = (v - v.dot(heading) * heading).norm() <= 1e-6 * v.norm();
+  if (model.base().type != BaseType::kDifferentialDrive || !along ||
+      at_start.X_d_dot.tail<3>().norm() > 0.0 || at_start.X_d_ddot.norm() > 0.0) {
+    throw InputError(setup_->scenario().source +
+                     ": start: \"moving\" needs a platform, and a trajectory that begins straight ahead at "
+                     "constant speed");
+  }
+  // All bodies get the same velocity, the wheels roll.
+  EngineState start = plant_.GetState();
+  const mjModel& m = setup_->engine();
+  VectorXd xi = VectorXd::Zero(model.num_velocities());
+  VelocityMap map(setup_->adapter(), Coordinates::kReduced);
+  xi.head<2>() = model.base().velocity == DriveVelocity::kTwist
+                     ? Vector2d(v.dot(heading), 0.0)
+                     : Vector2d::Constant(v.dot(heading) / model.base().wheel_radius);
+  map.SetState(state_.q, xi);
+  VectorXd boost = VectorXd::Zero(m.nv);
+  map.Expand(xi, boost.data());
+  const int object = m.jnt_dofadr[m.body_jntadr[setup_->adapter().object_body()]];
+  boost.segment<3>(object) = v;
+  start.qvel += boost;
+  plant_.SetState(start);
+
+  const double dt = plant_.time_step();
+  const long count = std::lround(kSettleMoving / dt);
+  Vector6d velocity = Vector6d::Zero();
+  velocity.head<3>() = v;
+  const LineTrajectory line(setup_->X_start(), velocity, 0.0);
+  for (long i = 0; i < count; ++i) ControlStep(EvaluateDesired(line, static_cast<double>(i) * dt), i);
+
+  // Back to where it began: on a level floor every place is alike.
+  EngineState moved = plant_.GetState();
+  const Vector3d way = static_cast<double>(count) * dt * v;
+  const int base = m.jnt_qposadr[setup_->adapter().base_joints()[0]];
+  const int body = m.jnt_qposadr[m.body_jntadr[setup_->adapter().object_body()]];
+  moved.qpos.segment<2>(base) -= way.head<2>();
+  moved.qpos.segment<3>(body) -= way;
+  plant_.SetState(moved);
+}
+
+DesiredMotion ClosedLoop::EvaluateDesired(const Trajectory& trajectory, double t) const {
+  // Semi-implicit Euler steps like a leapfrog: velocities belong to the middle of the step before.
+  DesiredMotion desired = trajectory.Evaluate(t);
+  desired.X_d_dot = trajectory.Evaluate(t - 0.5 * plant_.time_step()).X_d_dot;
+  return desired;
+}
+
+void ClosedLoop::ControlStep(const DesiredMotion& desired, long step) {
+  const auto begin = Clock::now();
+  plant_.BeginStep();
+  const auto read = Clock::now();
+  qvel_ = Eigen::Map<const VectorXd>(plant_.data().qvel, plant_.model().nv);
+  observer_.Read(plant_, &state_);
+  CheckRobot();
+  told_ = state_;
+  for (ContactCoordinates& kappa : told_.kappa) kappa.alpha_o.u += setup_->scenario().control.contact_error;
+  controller_.SetState(told_);
+  desired_ = desired;
+  if (step % control_interval_ == 0) tau_ = controller_.CalcTorque(desired);
+  CheckTorques();
+  const auto control = Clock::now();
+  plant_.SetTorques(tau_);
+  plant_.EndStep();
+  const auto end = Clock::now();
+  times_.plant += Seconds(begin, read) + Seconds(control, end);
+  times_.controller += Seconds(read, control);
+  times_.grasp_force += controller_.force_seconds();
+}
+
+void ClosedLoop::Step() {
+  step_time_ = time();
+  const DesiredMotion desired = EvaluateDesired(*trajectory_, step_time_);
+  ControlStep(desired, step_);
+  error_.position = desired_.X_d.head<3>() - state_.X_Bo.translation();
+  error_.orientation =
+      LogSo3(state_.X_Bo.linear().transpose() * CalcRotationZyz(desired_.X_d.tail<3>())).norm();
+  ++step_;
+  if (check_) {
+    const auto begin = Clock::now();
+    checks_.Compare(plant_, controller_, state_, tau_, &observer_, step_time_);
+    times_.cross_check += Seconds(begin, Clock::now());
+  }
+  CheckGrasp();
+}
+
+void ClosedLoop::CheckRobot() const {
+  const BaseDeparture& departure = observer_.departure();
+  if (departure.tilt < kLargestTilt && std::abs(departure.height) < kLargestSink) return;
+  throw RunFailure("the robot fell: tilt " + FormatNumber(departure.tilt) + " rad, height " +
+                   FormatNumber(departure.height) + " m off");
+}
+
+void ClosedLoop::CheckTorques() {
+  if (!tau_.allFinite()) throw RunFailure("a torque is not a number");
+  effort_ = plant_.CalcEffort(tau_, &busiest_motor_);
+  if (effort_ < 1.0) return;
+  throw RunFailure("motor " + Quote(plant_.motor_name(busiest_motor_)) + " is at its limit, " +
+                   FormatNumber(plant_.torque_limit(busiest_motor_)) + " N m");
+}
+
+void ClosedLoop::CheckGrasp() {
+  std::string missing;
+  const std::span<const EngineContact> contacts = observer_.ReadContacts(plant_);
+  for (size_t i = 0; i < contacts.size(); ++i) {
+    if (!contacts[i].touching) missing = setup_->scenario().grasp.fingertips[i];
+  }
+  steps_without_grasp_ = missing.empty() ? 0 : steps_without_grasp_ + 1;
+  if (static_cast<double>(steps_without_grasp_) * plant_.time_step() < kGraspTimeout) return;
+  throw RunFailure("the grasp is lost: fingertip " + Quote(missing) + " no longer touches the object");
+}
+
+}  // namespace dexcheck

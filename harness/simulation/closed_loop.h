@@ -1,0 +1,105 @@
+#pragma once
+
+// The loop of plant and controller, cross-checked at every step.
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "controller/control/grasp_controller.h"
+#include "controller/control/trajectory.h"
+#include "harness/checks/step_checks.h"
+#include "harness/plant/observer.h"
+#include "harness/plant/plant.h"
+#include "harness/simulation/setup.h"
+
+namespace dexcheck {
+
+/// The simulated robot failed: lost the object, fell, reached a motor's limit.
+class RunFailure : public Error {
+ public:
+  using Error::Error;
+};
+
+/// Distance of the object from its desired pose.
+struct TrackingError {
+  Vector3d position = Vector3d::Zero();  ///< X_d - X_o, world, m.
+  double orientation = 0.0;              ///< Angle between R_Bo and R_Bd, rad.
+};
+
+/// Time spent in each part, s.
+struct LoopTimes {
+  double plant = 0.0;
+  double controller = 0.0;   ///< Reading the plant included.
+  double grasp_force = 0.0;  ///< Part of controller.
+  double cross_check = 0.0;
+};
+
+/// One run. Made settled at t = 0; deterministic.
+class ClosedLoop {
+ public:
+  /// @param check whether to cross-check.
+  /// @throws InputError, RunFailure, DivergenceError, GraspForceError, SingularityError while settling.
+  ClosedLoop(const Setup& setup, bool check);
+
+  /// Number of steps of the scenario's duration.
+  [[nodiscard]] long num_steps() const { return num_steps_; }
+  /// Steps done, and the time that the next one begins at, s.
+  [[nodiscard]] long step() const { return step_; }
+  [[nodiscard]] double time() const { return static_cast<double>(step_) * plant_.time_step(); }
+
+  /// One step. @throws RunFailure, DivergenceError, GraspForceError, SingularityError. What the step saw up
+  /// to then can be read.
+  void Step();
+
+  // Of the last step, at its beginning.
+  [[nodiscard]] double step_time() const { return step_time_; }
+  [[nodiscard]] const MeasuredState& state() const { return state_; }
+  [[nodiscard]] const VectorXd& qpos() const { return plant_.step_qpos(); }
+  [[nodiscard]] const VectorXd& qvel() const { return qvel_; }
+  [[nodiscard]] const DesiredMotion& desired() const { return desired_; }
+  [[nodiscard]] const TrackingError& error() const { return error_; }
+  [[nodiscard]] const VectorXd& tau() const { return tau_; }
+  [[nodiscard]] const GraspController& controller() const { return controller_; }
+  [[nodiscard]] const Observer& observer() const { return observer_; }
+  [[nodiscard]] const Plant& plant() const { return plant_; }
+  [[nodiscard]] const StepChecks& checks() const { return checks_; }
+
+  /// Motor with the largest share of its limit at the last step, by its entry of tau', and that share.
+  [[nodiscard]] int busiest_motor() const { return busiest_motor_; }
+  [[nodiscard]] double effort() const { return effort_; }
+  [[nodiscard]] const LoopTimes& times() const { return times_; }
+
+ private:
+  void PlaceRobot();
+  void Settle();
+  void StartMoving(const DesiredMotion& at_start);
+  void ControlStep(const DesiredMotion& desired, long step);
+  [[nodiscard]] DesiredMotion EvaluateDesired(const Trajectory& trajectory, double t) const;
+  void CheckRobot() const;
+  void CheckTorques();
+  void CheckGrasp();
+
+  const Setup* setup_;
+  bool check_;
+  Plant plant_;
+  Observer observer_;
+  GraspController controller_;
+  StepChecks checks_;
+  std::unique_ptr<Trajectory> trajectory_;
+  long num_steps_ = 0;
+  long control_interval_ = 1;
+  long step_ = 0;
+  double step_time_ = 0.0;
+  MeasuredState state_;
+  MeasuredState told_;  // what the controller is told
+  DesiredMotion desired_;
+  TrackingError error_;
+  VectorXd tau_, qvel_;
+  int busiest_motor_ = 0;
+  double effort_ = 0.0;
+  long steps_without_grasp_ = 0;
+  LoopTimes times_;
+};
+
+}  // namespace dexcheck

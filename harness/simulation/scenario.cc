@@ -1,0 +1,192 @@
+#include "harness/simulation/scenario.h"
+
+#include <algorithm>
+#include <string_view>
+
+#include "controller/common/errors.h"
+#include "controller/control/trajectory_reader.h"
+#include "controller/object/euler_zyz.h"
+
+namespace dexcheck {
+namespace {
+
+/// A document with the overrides that are the scenario's own; the others go to `model_overrides`.
+TomlDocument OpenDocument(const std::string& text, const std::string& source,
+                          const std::vector<std::string>& overrides,
+                          std::vector<std::string>* model_overrides) {
+  constexpr std::string_view kModel = "model.";
+  TomlDocument document(text, source);
+  for (const std::string& assignment : overrides) {
+    const bool own = assignment.starts_with("model.file=") || assignment.starts_with("model.overrides");
+    if (assignment.starts_with(kModel) && !own) {
+      if (model_overrides != nullptr) model_overrides->push_back(assignment.substr(kModel.size()));
+    } else {
+      document.Override(assignment);
+    }
+  }
+  return document;
+}
+
+double ReadOr(TomlTable& table, std::string_view key, double otherwise,
+              double (TomlValue::*read)() const = &TomlValue::AsPositive) {
+  const auto value = table.Find(key);
+  return value ? ((*value).*read)() : otherwise;
+}
+
+std::string ReadPath(TomlTable& table, std::string_view key, const std::filesystem::path& folder) {
+  const auto value = table.Find(key);
+  return value ? (folder / value->AsText()).lexically_normal().string() : "";
+}
+
+void ReadModel(const TomlValue& value, const std::filesystem::path& folder, Scenario* scenario) {
+  TomlTable table = value.AsTable();
+  scenario->model_file = ReadPath(table, "file", folder);
+  if (const auto list = table.Find("overrides")) {
+    for (const TomlValue& entry : list->AsList()) scenario->model_overrides.push_back(entry.AsText());
+  }
+  table.RejectUnused();
+}
+
+void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scenario* scenario) {
+  constexpr long kMaxNoslipIterations = 1000;
+  TomlTable table = value.AsTable();
+  PlantOptions& plant = scenario->plant;
+  scenario->mjcf_file = ReadPath(table, "mjcf", folder);
+  plant.time_step = ReadOr(table, "time_step", plant.time_step);
+  plant.control_step = ReadOr(table, "control_step", 0.0, &TomlValue::AsNotNegative);
+  plant.contact_time_constant = ReadOr(table, "contact_time_constant", 0.0, &TomlValue::AsNotNegative);
+  plant.contact_impedance = ReadOr(table, "contact_impedance", plant.contact_impedance);
+  if (plant.contact_impedance >= 1.0) table.Get("contact_impedance").Fail("must be less than 1");
+  plant.impratio = ReadOr(table, "impratio", plant.impratio);
+  if (const auto count = table.Find("noslip_iterations")) {
+    plant.noslip_iterations = static_cast<int>(count->AsWhole(0, kMaxNoslipIterations));
+  }
+  if (const auto flag = table.Find("implicit_damping")) plant.implicit_damping = flag->AsFlag();
+  if (const auto mu = table.Find("floor_friction")) plant.floor_friction = mu->AsPositive();
+  if (const auto mu = table.Find("finger_friction")) plant.finger_friction = mu->AsPositive();
+  table.RejectUnused();
+}
+
+SurfacePoint ReadContact(const TomlValue& value) {
+  // On the torus: u around its axis, v around its tube.
+  const Vector2d degrees = value.AsVector<2>();
+  return {DegToRad(degrees[0]), DegToRad(degrees[1]), 0};
+}
+
+void ReadGrasp(const TomlValue& value, Scenario* scenario) {
+  TomlTable table = value.AsTable();
+  GraspOptions& grasp = scenario->grasp;
+  const TomlValue fingertips = table.Get("fingertips");
+  for (const TomlValue& entry : fingertips.AsList()) grasp.fingertips.push_back(entry.AsName());
+  const TomlValue contacts = table.Get("contacts_deg");
+  for (const TomlValue& entry : contacts.AsList()) grasp.contacts.push_back(ReadContact(entry));
+  if (grasp.fingertips.size() < 3) fingertips.Reject("needs at least three fingertips to hold an object");
+  if (grasp.contacts.size() != grasp.fingertips.size()) {
+    contacts.Reject("must have one contact for each of the " + std::to_string(grasp.fingertips.size()) +
+                    " fingertips");
+  }
+  grasp.frame = table.Get("frame").AsName();
+  if (const auto xyz = table.Find("xyz")) grasp.X_FO.translation() = xyz->AsVector<3>();
+  if (const auto zyz = table.FindAngles<3>("zyz")) grasp.X_FO.linear() = CalcRotationZyz(*zyz);
+  if (const auto joints = table.Find("joints_deg")) {
+    for (const auto& [name, angle] : joints->AsTable().GetEntries()) {
+      grasp.joints.emplace_back(name, DegToRad(angle.AsNumber()));
+    }
+  }
+  table.RejectUnused();
+}
+
+/// K_p and K_v, or natural frequency and damping ratio of (57).
+void ReadGains(TomlTable& table, ObjectGains* gains) {
+  table.RejectTogether("K_p", {"natural_frequency"});
+  table.RejectTogether("K_v", {"damping_ratio"});
+  if (const auto frequency = table.Find("natural_frequency")) {
+    const Vector6d omega = frequency->AsVectorOrNumber<6>();
+    const Vector6d zeta = table.Get("damping_ratio").AsVectorOrNumber<6>();
+    gains->K_p = omega.cwiseAbs2();
+    gains->K_v = 2.0 * zeta.cwiseProduct(omega);
+    if ((omega.array() < 0.0).any()) frequency->Fail("must not be negative");
+    return;
+  }
+  gains->K_p = table.Get("K_p").AsVectorOrNumber<6>();
+  gains->K_v = table.Get("K_v").AsVectorOrNumber<6>();
+}
+
+void ReadControl(const TomlValue& value, Scenario* scenario) {
+  TomlTable table = value.AsTable();
+  ControlOptions& control = scenario->control;
+  ReadGains(table, &control.gains);
+  if (const auto choice = table.Find("orientation")) {
+    control.orientation = choice->AsChoice<OrientationFeedback>(
+        {{"angles", OrientationFeedback::kAngles}, {"rotation", OrientationFeedback::kRotation}});
+  }
+  if (const auto choice = table.Find("weight")) {
+    control.weight = choice->AsChoice<RedundancyWeight::Kind>(
+        {{"identity", RedundancyWeight::Kind::kIdentity}, {"mass", RedundancyWeight::Kind::kMass}});
+  }
+  control.posture_frequency =
+      ReadOr(table, "posture_frequency", control.posture_frequency, &TomlValue::AsNotNegative);
+  control.f_min = ReadOr(table, "f_min", 0.0, &TomlValue::AsNotNegative);
+  control.f_max = table.Get("f_max").AsPositive();
+  if (control.f_max <= control.f_min) table.Get("f_max").Fail("must be greater than f_min");
+  control.mu = table.Get("mu").AsPositive();
+  if (const auto [error, unit] = table.FindWithAngleUnit("contact_error"); error) {
+    control.contact_error = unit * error->AsNumber();
+  }
+  table.RejectUnused();
+}
+
+}  // namespace
+
+Scenario ParseScenario(const std::string& text, const std::string& source,
+                       const std::filesystem::path& folder, const std::vector<std::string>& overrides) {
+  Scenario scenario;
+  scenario.text = text;
+  scenario.source = source;
+  scenario.overrides = overrides;
+  std::vector<std::string> model_overrides;
+  const TomlDocument document = OpenDocument(text, source, overrides, &model_overrides);
+  TomlTable root = document.Open();
+  root.RejectOthersThan({"name", "description", "duration", "settle", "start", "start_error", "model",
+                         "plant", "grasp", "trajectory", "control", "bounds"});
+  scenario.name = root.Get("name").AsName();
+  if (const auto description = root.Find("description")) scenario.description = description->AsText();
+  scenario.duration = root.Get("duration").AsPositive();
+  scenario.settle = ReadOr(root, "settle", 1.0);
+  scenario.start = root.Get("start").AsChoice<Start>({{"moving", Start::kMoving}, {"rest", Start::kRest}});
+  if (const auto error = root.Find("start_error")) {
+    TomlTable table = error->AsTable();
+    if (const auto xyz = table.Find("xyz")) scenario.start_error.head<3>() = xyz->AsVector<3>();
+    if (const auto zyz = table.FindAngles<3>("zyz")) scenario.start_error.tail<3>() = *zyz;
+    table.RejectUnused();
+  }
+  if (const auto model = root.Find("model")) ReadModel(*model, folder, &scenario);
+  scenario.model_overrides.insert(scenario.model_overrides.end(), model_overrides.begin(),
+                                  model_overrides.end());
+  if (const auto plant = root.Find("plant")) ReadPlant(*plant, folder, &scenario);
+  ReadGrasp(root.Get("grasp"), &scenario);
+  ReadControl(root.Get("control"), &scenario);
+  if (const auto bounds = root.Find("bounds")) {
+    for (const auto& [name, value] : bounds->AsTable().GetEntries()) {
+      scenario.bounds.emplace_back(name, value.AsNotNegative());
+    }
+  }
+  constexpr double kMaxSteps = 1e8;
+  if (scenario.duration / scenario.plant.time_step > kMaxSteps) {
+    root.Get("duration").Fail("must be at most 1e8 time steps");
+  }
+  // Once now, so that a mistake is found before anything is simulated.
+  MakeTrajectory(scenario, Vector6d::Zero());
+  return scenario;
+}
+
+std::unique_ptr<Trajectory> MakeTrajectory(const Scenario& scenario, const Vector6d& X_start) {
+  const TomlDocument document = OpenDocument(scenario.text, scenario.source, scenario.overrides, nullptr);
+  TomlTable root = document.Open();
+  TomlTable table = root.Get("trajectory").AsTable();
+  std::unique_ptr<Trajectory> trajectory = ReadTrajectory(table, X_start);
+  table.RejectUnused();
+  return trajectory;
+}
+
+}  // namespace dexcheck

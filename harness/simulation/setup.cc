@@ -1,0 +1,149 @@
+#include "harness/simulation/setup.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/contact/object_surface.h"
+#include "controller/grasp/finger_placement.h"
+#include "controller/model/parameter_reader.h"
+#include "controller/object/euler_zyz.h"
+
+namespace dexcheck {
+namespace {
+
+/// Deep enough that the engine sees a contact, less than any grasp force makes it, m.
+constexpr double kStartPenetration = 1e-6;
+
+RobotModel ReadModel(const Scenario& scenario, const std::filesystem::path& robot) {
+  return ParseRobotModel(ReadTextFile(robot.string()), robot.string(), scenario.model_overrides);
+}
+
+/// ZYZ angles also where they are singular, with alpha = 0 there.
+Vector3d CalcAnyZyzAngles(const Matrix3d& R) {
+  const double sin_beta = R.col(2).head<2>().norm();
+  if (sin_beta >= kMinSinBeta) return CalcZyzAngles(R);
+  const double beta = std::atan2(sin_beta, R(2, 2));
+  const double alpha = sin_beta > 0.0 ? std::atan2(R(1, 2), R(0, 2)) : 0.0;
+  const Matrix3d turned = CalcRotationZyz(Vector3d(alpha, beta, 0.0)).transpose() * R;
+  return {alpha, beta, std::atan2(turned(1, 0), turned(0, 0))};
+}
+
+[[noreturn]] void Fail(const Scenario& scenario, const std::string& key, const std::string& problem) {
+  throw InputError(scenario.source + ": " + key + ": " + problem);
+}
+
+}  // namespace
+
+Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf)
+    : scenario_(scenario), model_(ReadModel(scenario, robot)), engine_(LoadMjcf(mjcf)) {
+  if (!model_.object()) {
+    throw InputError(robot.string() + ": object: is missing, and the scenario holds one");
+  }
+  ApplyPlantOptions();
+  adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
+  try {
+    surface_ = MakeSurface(model_.object()->shape);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(robot.string() + ": " + error.what());
+  }
+  FindFingertips();
+  SolveGrasp();
+}
+
+void Setup::ApplyPlantOptions() {
+  const PlantOptions& plant = scenario_.plant;
+  mjModel& m = *engine_;
+  m.opt.timestep = plant.time_step;
+  m.opt.impratio = plant.impratio;
+  m.opt.noslip_iterations = plant.noslip_iterations;
+  const double time_constant =
+      plant.contact_time_constant > 0.0 ? plant.contact_time_constant : 2.0 * plant.time_step;
+  for (int pair = 0; pair < m.npair; ++pair) {
+    m.pair_solref[mjNREF * pair] = time_constant;
+    mjtNum* const solimp = m.pair_solimp + mjNIMP * pair;
+    solimp[0] = solimp[1] = plant.contact_impedance;
+    const bool has_floor =
+        m.geom_type[m.pair_geom1[pair]] == mjGEOM_PLANE || m.geom_type[m.pair_geom2[pair]] == mjGEOM_PLANE;
+    const std::optional<double>& mu = has_floor ? plant.floor_friction : plant.finger_friction;
+    if (mu) m.pair_friction[5 * pair] = m.pair_friction[5 * pair + 1] = *mu;
+  }
+}
+
+void Setup::FindFingertips() {
+  for (const std::string& name : scenario_.grasp.fingertips) {
+    int frame = -1;
+    for (const int tip : model_.fingertips()) {
+      if (model_.frames()[static_cast<size_t>(tip)].name == name) frame = tip;
+    }
+    if (frame < 0) Fail(scenario_, "grasp.fingertips", Quote(name) + " is no fingertip of the model");
+    if (std::find(fingertips_.begin(), fingertips_.end(), frame) != fingertips_.end()) {
+      Fail(scenario_, "grasp.fingertips", Quote(name) + " is named twice");
+    }
+    fingertips_.push_back(frame);
+  }
+  std::vector<bool> busy(static_cast<size_t>(model_.num_joints()), false);
+  for (const int tip : fingertips_) {
+    int joint = model_.frames()[static_cast<size_t>(tip)].link;
+    for (; joint >= 0; joint = model_.joints()[static_cast<size_t>(joint)].parent) {
+      busy[static_cast<size_t>(joint)] = true;
+    }
+  }
+  for (int i = 0; i < model_.num_joints(); ++i) {
+    if (!busy[static_cast<size_t>(i)]) idle_joints_.push_back(i);
+  }
+}
+
+void Setup::SolveGrasp() {
+  const GraspOptions& grasp = scenario_.grasp;
+  VectorXd q = VectorXd::Zero(model_.num_positions());
+  for (const auto& [name, angle] : grasp.joints) {
+    const int joint = model_.FindJoint(name);
+    if (joint < 0) Fail(scenario_, "grasp.joints_deg", Quote(name) + " is no joint of the model");
+    q[model_.num_base_positions() + joint] = angle;
+  }
+  ModelTerms kinematics(model_, Coordinates::kReduced);
+  kinematics.SetState(q, VectorXd::Zero(model_.num_velocities()));
+  int frame = -1;
+  try {
+    frame = model_.FindFrame(grasp.frame);
+  } catch (const std::invalid_argument&) {
+    Fail(scenario_, "grasp.frame", Quote(grasp.frame) + " is no frame of the model");
+  }
+  X_Bo_start_ = kinematics.CalcFramePose(frame) * grasp.X_FO;
+  const FingerPlacement placement = SolveFingerPlacement(
+      model_, fingertips_, *surface_, X_Bo_start_, grasp.contacts, q, {.penetration = kStartPenetration});
+  if (!placement.reached) {
+    Fail(scenario_, "grasp.contacts_deg",
+         "the fingertips do not reach their contacts within the joint ranges; the farthest stays " +
+             FormatNumber(placement.residual) + " m away");
+  }
+  q_start_ = placement.q;
+  X_start_ << X_Bo_start_.translation(), CalcAnyZyzAngles(X_Bo_start_.linear());
+  if (scenario_.control.orientation == OrientationFeedback::kAngles &&
+      std::abs(std::sin(X_start_[4])) < kMinSinBeta) {
+    Fail(scenario_, "control.orientation",
+         "\"angles\" are singular where the object starts, at beta = " + FormatNumber(X_start_[4]) +
+             " rad; take \"rotation\"");
+  }
+}
+
+GraspControllerOptions Setup::MakeControllerOptions() const {
+  const ControlOptions& control = scenario_.control;
+  GraspControllerOptions options(model_);
+  options.gains = control.gains;
+  options.orientation = control.orientation;
+  options.weight.kind = control.weight;
+  options.posture.q_posture = q_start_.tail(model_.num_joints());
+  options.posture.stiffness.setConstant(control.posture_frequency * control.posture_frequency);
+  // The platform has no posture; damped, it would hold the object back.
+  options.posture.damping.tail(model_.num_joints()).setConstant(2.0 * control.posture_frequency);
+  options.X_o_start = X_start_;
+  options.mu = control.mu;
+  options.f_min = control.f_min;
+  options.f_max = control.f_max;
+  return options;
+}
+
+}  // namespace dexcheck

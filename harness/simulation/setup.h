@@ -1,0 +1,65 @@
+#pragma once
+
+// A scenario made real: both models loaded, the grasp solved, the simulation settled.
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "controller/control/grasp_controller.h"
+#include "controller/control/trajectory.h"
+#include "controller/model/robot_model.h"
+#include "harness/adapter/adapter.h"
+#include "harness/plant/observer.h"
+#include "harness/plant/plant.h"
+#include "harness/simulation/scenario.h"
+
+namespace dexcheck {
+
+/// Everything of a run that does not change while it runs. Owns both models.
+class Setup {
+ public:
+  /// @param robot parameter file. @param mjcf scene.
+  /// @throws InputError when a file, a name or a value cannot be used.
+  Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf);
+  Setup(const Setup&) = delete;
+  Setup& operator=(const Setup&) = delete;
+
+  [[nodiscard]] const Scenario& scenario() const { return scenario_; }
+  [[nodiscard]] const RobotModel& model() const { return model_; }
+  /// With the scenario's changes.
+  [[nodiscard]] const mjModel& engine() const { return *engine_; }
+  [[nodiscard]] const Adapter& adapter() const { return *adapter_; }
+  [[nodiscard]] const ObjectModel& object() const { return *model_.object(); }
+  [[nodiscard]] const Surface& surface() const { return *surface_; }
+  /// Frames of the grasp.
+  [[nodiscard]] const std::vector<int>& fingertips() const { return fingertips_; }
+  /// Joints that lie on no chain from the base to a fingertip of the grasp: they should stay still.
+  [[nodiscard]] const std::vector<int>& idle_joints() const { return idle_joints_; }
+
+  /// The posture that holds the object, and where that puts the object; X_o on the branch with beta > 0.
+  [[nodiscard]] const VectorXd& q_start() const { return q_start_; }
+  [[nodiscard]] const Pose& X_Bo_start() const { return X_Bo_start_; }
+  [[nodiscard]] const Vector6d& X_start() const { return X_start_; }
+
+  /// Options of the law, with the posture and the angles' branch of the start.
+  [[nodiscard]] GraspControllerOptions MakeControllerOptions() const;
+
+ private:
+  void ApplyPlantOptions();
+  void FindFingertips();
+  void SolveGrasp();
+
+  Scenario scenario_;
+  RobotModel model_;
+  MjModelPtr engine_;
+  std::unique_ptr<Adapter> adapter_;
+  std::unique_ptr<Surface> surface_;
+  std::vector<int> fingertips_;
+  std::vector<int> idle_joints_;
+  VectorXd q_start_;
+  Pose X_Bo_start_ = Pose::Identity();
+  Vector6d X_start_ = Vector6d::Zero();
+};
+
+}  // namespace dexcheck
