@@ -72,7 +72,7 @@ StepChecks::StepChecks(const Setup& setup)
          "tangential force over mu times normal force at a fingertip; 1 slides, (21)");
   Define(kContactsLost, "contacts_lost", kAssumption, "1", 0.0, "fingertips that do not touch the object");
   Define(kPenetration, "penetration", kAssumption, "m", 2e-5, "overlap of fingertip and object");
-  Define(kKappa, "kappa", kAssumption, "m", 2e-5,
+  Define(kKappa, "kappa", kAssumption, "m", 2e-4,
          "contact point on the object: kappa integrated by (40) against the engine's");
   Define(kBaseTilt, "base_tilt", kAssumption, "rad", 1e-5, "angle of the platform against the vertical");
   Define(kIdleJoints, "idle_joints", kAssumption, "rad", 1e-5,

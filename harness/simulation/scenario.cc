@@ -112,6 +112,20 @@ void ReadGains(TomlTable& table, ObjectGains* gains) {
   gains->K_v = table.Get("K_v").AsVectorOrNumber<6>();
 }
 
+/// "identity", "mass", or { platform, arm }: a diagonal with 1 for all other joints.
+void ReadWeight(const TomlValue& value, ControlOptions* control) {
+  if (value.IsText()) {
+    control->weight = value.AsChoice<RedundancyWeight::Kind>(
+        {{"identity", RedundancyWeight::Kind::kIdentity}, {"mass", RedundancyWeight::Kind::kMass}});
+    return;
+  }
+  TomlTable table = value.AsTable();
+  control->weight = RedundancyWeight::Kind::kDiagonal;
+  control->platform_weight = ReadOr(table, "platform", 1.0);
+  control->arm_weight = ReadOr(table, "arm", 1.0);
+  table.RejectUnused();
+}
+
 void ReadControl(const TomlValue& value, Scenario* scenario) {
   TomlTable table = value.AsTable();
   ControlOptions& control = scenario->control;
@@ -120,10 +134,7 @@ void ReadControl(const TomlValue& value, Scenario* scenario) {
     control.orientation = choice->AsChoice<OrientationFeedback>(
         {{"angles", OrientationFeedback::kAngles}, {"rotation", OrientationFeedback::kRotation}});
   }
-  if (const auto choice = table.Find("weight")) {
-    control.weight = choice->AsChoice<RedundancyWeight::Kind>(
-        {{"identity", RedundancyWeight::Kind::kIdentity}, {"mass", RedundancyWeight::Kind::kMass}});
-  }
+  if (const auto weight = table.Find("weight")) ReadWeight(*weight, &control);
   control.posture_frequency =
       ReadOr(table, "posture_frequency", control.posture_frequency, &TomlValue::AsNotNegative);
   control.f_min = ReadOr(table, "f_min", 0.0, &TomlValue::AsNotNegative);

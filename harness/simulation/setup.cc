@@ -83,15 +83,16 @@ void Setup::FindFingertips() {
     }
     fingertips_.push_back(frame);
   }
-  std::vector<bool> busy(static_cast<size_t>(model_.num_joints()), false);
+  std::vector<int> users(static_cast<size_t>(model_.num_joints()), 0);
   for (const int tip : fingertips_) {
     int joint = model_.frames()[static_cast<size_t>(tip)].link;
     for (; joint >= 0; joint = model_.joints()[static_cast<size_t>(joint)].parent) {
-      busy[static_cast<size_t>(joint)] = true;
+      ++users[static_cast<size_t>(joint)];
     }
   }
   for (int i = 0; i < model_.num_joints(); ++i) {
-    if (!busy[static_cast<size_t>(i)]) idle_joints_.push_back(i);
+    if (users[static_cast<size_t>(i)] == 0) idle_joints_.push_back(i);
+    if (users[static_cast<size_t>(i)] > 1) arm_joints_.push_back(i);
   }
 }
 
@@ -135,6 +136,12 @@ GraspControllerOptions Setup::MakeControllerOptions() const {
   options.gains = control.gains;
   options.orientation = control.orientation;
   options.weight.kind = control.weight;
+  if (control.weight == RedundancyWeight::Kind::kDiagonal) {
+    const int base = model_.num_base_velocities();
+    options.weight.w.setOnes(model_.num_velocities());
+    options.weight.w.head(base).setConstant(control.platform_weight);
+    for (const int joint : arm_joints_) options.weight.w[base + joint] = control.arm_weight;
+  }
   options.posture.q_posture = q_start_.tail(model_.num_joints());
   options.posture.stiffness.setConstant(control.posture_frequency * control.posture_frequency);
   // The platform has no posture; damped, it would hold the object back.

@@ -56,6 +56,7 @@ class Setup {
   std::unique_ptr<Adapter> adapter_;
   std::unique_ptr<Surface> surface_;
   std::vector<int> fingertips_;
+  std::vector<int> arm_joints_;  // on the chains of several fingertips
   std::vector<int> idle_joints_;
   VectorXd q_start_;
   Pose X_Bo_start_ = Pose::Identity();
