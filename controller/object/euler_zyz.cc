@@ -92,6 +92,17 @@ Vector3d CalcZyzAngles(const Matrix3d& R_Bo, const Vector3d& previous) {
   return (upper - previous).squaredNorm() <= (lower - previous).squaredNorm() ? upper : lower;
 }
 
+Vector3d CalcAnyZyzAngles(const Matrix3d& R_Bo) {
+  const double sin_beta = R_Bo.col(2).head<2>().norm();
+  if (sin_beta >= kMinSinBeta) return CalcZyzAngles(R_Bo);
+  RequireRotation(R_Bo, "R_Bo");
+  // R = Rz(alpha) Ry(beta) Rz(gamma); gamma is what is left after the other two.
+  const double alpha = sin_beta > 0.0 ? std::atan2(R_Bo(1, 2), R_Bo(0, 2)) : 0.0;
+  const double beta = std::atan2(sin_beta, R_Bo(2, 2));
+  const Matrix3d rest = CalcRotationZyz(Vector3d(alpha, beta, 0.0)).transpose() * R_Bo;
+  return {alpha, beta, std::atan2(rest(1, 0), rest(0, 0))};
+}
+
 Pose CalcObjectPose(const Vector6d& X_o) {
   Pose X_Bo = Pose::Identity();
   X_Bo.translation() = X_o.head<3>();

@@ -40,6 +40,13 @@ struct RunCheck {
       failed_at = time;
     }
   }
+  /// Forgets all values.
+  void Reset() {
+    last = max = at_time = sum_of_squares = failed_at = 0.0;
+    count = 0;
+    failed = false;
+    where.clear();
+  }
   [[nodiscard]] double rms() const {
     return count > 0 ? std::sqrt(sum_of_squares / static_cast<double>(count)) : 0.0;
   }

@@ -18,6 +18,7 @@ struct BodyContact {
   double distance = 0.0;
   Vector3d slip = Vector3d::Zero();  // of `body` against the other, tangential, world
   double cone_use = 0.0;
+  double cone_margin = 0.0;
 };
 
 BodyContact ReadContact(const mjModel& m, const mjData& d, int body, int other) {
@@ -41,6 +42,7 @@ BodyContact ReadContact(const mjModel& m, const mjData& d, int body, int other) 
     mj_contactForce(&m, &d, i, force);
     const double tangential = std::hypot(force[1] / c.friction[0], force[2] / c.friction[1]);
     result.cone_use = force[0] > 0.0 ? tangential / force[0] : 0.0;
+    result.cone_margin = c.friction[0] * (force[0] - tangential);
   }
   return result;
 }
@@ -59,7 +61,7 @@ StepChecks::StepChecks(const Setup& setup)
       kBalanceRobot, "balance_robot", kBalance, "1", 1e-5,
       "what is left of (48) with the engine's accelerations and contact forces, against the forces balanced");
   Define(kBalanceObject, "balance_object", kBalance, "1", 1e-9,
-         "what is left of (19) with the engine's acceleration and contact forces, against its weight");
+         "what is left of (19) with the engine's acceleration and contact forces, against the contact forces");
   Define(kReducedAcceleration, "reduced_acceleration", kPrediction, "1", 1e-5,
          "xi_dot of the rigid constrained system (46), (48) against the engine's");
   Define(kContactForce, "contact_force", kPrediction, "1", 1e-6,
@@ -70,6 +72,8 @@ StepChecks::StepChecks(const Setup& setup)
          "how far a wheel has slipped on the floor since t = 0, (1)");
   Define(kConeUse, "cone_use", kAssumption, "1", 0.99,
          "tangential force over mu times normal force at a fingertip; 1 slides, (21)");
+  Define(kTractionUse, "traction_use", kAssumption, "1", 0.99,
+         "tangential force over mu times normal force at a wheel; 1 spins or skids");
   Define(kContactsLost, "contacts_lost", kAssumption, "1", 0.0, "fingertips that do not touch the object");
   Define(kPenetration, "penetration", kAssumption, "m", 2e-5, "overlap of fingertip and object");
   Define(kKappa, "kappa", kAssumption, "m", 2e-4,
@@ -116,6 +120,15 @@ void StepChecks::Define(Check check, const char* name, CheckKind kind, const cha
   c.description = description;
 }
 
+void StepChecks::Reset() {
+  for (RunCheck& check : checks_) check.Reset();
+  std::fill(fingertip_slip_.begin(), fingertip_slip_.end(), SlipState{});
+  std::fill(wheel_slip_.begin(), wheel_slip_.end(), SlipState{});
+  contacts_lost_ = 0;
+  least_cone_margin_ = std::numeric_limits<double>::infinity();
+  steps_ = 0;
+}
+
 const RunCheck& StepChecks::Find(std::string_view name) const {
   for (const RunCheck& check : checks_) {
     if (check.name == name) return check;
@@ -134,9 +147,9 @@ void StepChecks::Compare(const Plant& plant, const GraspController& controller, 
     const Matrix3d R_B_cf = state.X_Bo.linear() * controller.grasp().contacts()[i].geometry.g_o_cf.linear();
     engine_.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) = R_B_cf.transpose() * contacts_[i].force;
     if (!contacts_[i].touching) ++lost;
+    if (!contacts_[i].touching && fingertip_slip_[i].touching) ++contacts_lost_;
     penetration = std::max(penetration, -contacts_[i].distance);
   }
-  if (lost > 0) ++steps_without_contact_;
   Add(kContactsLost, lost);
   Add(kPenetration, penetration);
   CompareDynamics(controller, state, tau);
@@ -192,8 +205,9 @@ void StepChecks::CompareDynamics(const GraspController& controller, const Measur
   const Vector6d left =
       body.M_hat * engine_.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o - grasp.G() * engine_.f_c;
   const double arm = grasp.contacts()[0].geometry.g_o_cf.translation().norm();
-  const double weight = grasp.object().mass * std::max(grasp.gravity().norm(), 1.0);
-  Add(kBalanceObject, std::max(left.head<3>().norm(), left.tail<3>().norm() / arm) / weight);
+  const double weight = grasp.object().mass * grasp.gravity().norm();
+  Add(kBalanceObject,
+      std::max(left.head<3>().norm(), left.tail<3>().norm() / arm) / std::max(weight, force_scale));
 }
 
 void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
@@ -203,6 +217,7 @@ void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
   const auto update = [&](SlipState* slip, const BodyContact& contact, const Matrix3d& R) {
     slip->touching = contact.touching;
     slip->cone_use = contact.cone_use;
+    slip->cone_margin = contact.cone_margin;
     slip->velocity = R.transpose() * contact.slip;
     slip->distance += dt * slip->velocity;
     slipped = std::max(slipped, slip->distance.norm());
@@ -212,16 +227,21 @@ void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
   for (size_t i = 0; i < tip_bodies_.size(); ++i) {
     update(&fingertip_slip_[i], ReadContact(plant.model(), plant.data(), tip_bodies_[i], object),
            state.X_Bo.linear());
+    if (fingertip_slip_[i].touching) {
+      least_cone_margin_ = std::min(least_cone_margin_, fingertip_slip_[i].cone_margin);
+    }
   }
   Add(kFingertipSlip, slipped);
   Add(kConeUse, cone_use);
   slipped = 0.0;
+  cone_use = 0.0;
   const double phi = setup_->model().num_base_positions() == 3 ? state.q[2] : 0.0;
   const Matrix3d R_B0 = Eigen::AngleAxisd(phi, Vector3d::UnitZ()).toRotationMatrix();
   for (size_t i = 0; i < wheel_bodies_.size(); ++i) {
     update(&wheel_slip_[i], ReadContact(plant.model(), plant.data(), wheel_bodies_[i], 0), R_B0);
   }
   Add(kWheelSlip, slipped);
+  Add(kTractionUse, cone_use);
 }
 
 void StepChecks::CompareKappa(const GraspController& controller, const MeasuredState& state, double dt) {

@@ -32,7 +32,8 @@ struct SlipState {
   bool touching = false;
   Vector3d velocity = Vector3d::Zero();  ///< Tangential, in the frame of the body that is slipped on, m/s.
   Vector3d distance = Vector3d::Zero();  ///< Its integral, m.
-  double cone_use = 0.0;                 ///< |tangential force| / (mu normal force); 1 slides.
+  double cone_use = 0.0;     ///< |tangential force| / (mu normal force); 1 slides.
+  double cone_margin = 0.0;  ///< mu normal force - |tangential force|, N.
 };
 
 /// Balance, prediction and assumptions. Nothing allocates after construction.
@@ -46,6 +47,9 @@ class StepChecks {
   void Compare(const Plant& plant, const GraspController& controller, const MeasuredState& state,
                const Eigen::Ref<const VectorXd>& tau, Observer* observer, double time);
 
+  /// Forgets all steps so far: time begins anew.
+  void Reset();
+
   [[nodiscard]] const std::vector<RunCheck>& checks() const { return checks_; }
   [[nodiscard]] const RunCheck& Find(std::string_view name) const;
   [[nodiscard]] const EngineMotion& engine() const { return engine_; }
@@ -53,8 +57,10 @@ class StepChecks {
   [[nodiscard]] std::span<const EngineContact> contacts() const { return contacts_; }
   [[nodiscard]] const std::vector<SlipState>& fingertip_slip() const { return fingertip_slip_; }
   [[nodiscard]] const std::vector<SlipState>& wheel_slip() const { return wheel_slip_; }
-  /// Steps so far at which some fingertip did not touch.
-  [[nodiscard]] long steps_without_contact() const { return steps_without_contact_; }
+  /// Least mu f_n - |f_t| of a fingertip so far, N.
+  [[nodiscard]] double least_cone_margin() const { return least_cone_margin_; }
+  /// Contacts of fingertips that broke so far.
+  [[nodiscard]] long contacts_lost() const { return contacts_lost_; }
 
  private:
   enum Check {
@@ -65,6 +71,7 @@ class StepChecks {
     kFingertipSlip,
     kWheelSlip,
     kConeUse,
+    kTractionUse,
     kContactsLost,
     kPenetration,
     kKappa,
@@ -93,7 +100,8 @@ class StepChecks {
   std::vector<ContactCoordinates> kappa_;  // integrated from (40)
   VectorXd idle_start_;
   long steps_ = 0;
-  long steps_without_contact_ = 0;
+  long contacts_lost_ = 0;
+  double least_cone_margin_ = std::numeric_limits<double>::infinity();
   double time_ = 0.0;
   VectorXd force_, bias_, residual_, work_;  // n
 };

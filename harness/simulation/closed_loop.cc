@@ -18,6 +18,8 @@ double Seconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
+constexpr double kRoughTime = 0.3;     // s after the first contact
+constexpr double kLargestSkew = 1e-2;  // rad between the platform's heading and the way ahead
 constexpr double kSettleMoving = 0.5;   // s
 constexpr double kLargestTilt = 0.2;    // rad, of a robot that still stands
 constexpr double kLargestSink = 0.02;   // m, likewise
@@ -40,8 +42,6 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check)
   qvel_.setZero(setup.engine().nv);
   PlaceRobot();
   trajectory_ = MakeTrajectory(scenario, setup.X_start() + scenario.start_error);
-  Settle();
-  times_ = LoopTimes{};
 }
 
 void ClosedLoop::PlaceRobot() {
@@ -57,18 +57,30 @@ void ClosedLoop::PlaceRobot() {
 }
 
 void ClosedLoop::Settle() {
-  const double dt = plant_.time_step();
-  const LineTrajectory rest(setup_->X_start(), Vector6d::Zero(), 0.0);
-  const long count = std::lround(setup_->scenario().settle / dt);
-  for (long i = 0; i < count; ++i) ControlStep(EvaluateDesired(rest, static_cast<double>(i) * dt), i);
+  SettleOn(LineTrajectory(setup_->X_start(), Vector6d::Zero(), 0.0), setup_->scenario().settle);
   if (setup_->scenario().start == Start::kMoving) StartMoving(trajectory_->Evaluate(0.0));
+  times_ = LoopTimes{};
+  checks_.Reset();
+}
+
+void ClosedLoop::SettleOn(const Trajectory& trajectory, double duration) {
+  const double dt = plant_.time_step();
+  const long count = std::lround(duration / dt);
+  checks_.Reset();
+  for (long i = 0; i < count; ++i) {
+    const double t = static_cast<double>(i) * dt;
+    ControlStep(EvaluateDesired(trajectory, t), i);
+    // The first contact is rough; what goes wrong later has a cause that the checks should tell.
+    if (check_ && t >= kRoughTime) checks_.Compare(plant_, controller_, state_, tau_, &observer_, t - duration);
+    CheckGrasp();
+  }
 }
 
 void ClosedLoop::StartMoving(const DesiredMotion& at_start) {
   const RobotModel& model = setup_->model();
   const Vector3d v = at_start.X_d_dot.head<3>();
   const Vector3d heading(std::cos(state_.q[2]), std::sin(state_.q[2]), 0.0);
-  const bool along = (v - v.dot(heading) * heading).norm() <= 1e-6 * v.norm();
+  const bool along = (v - v.dot(heading) * heading).norm() <= kLargestSkew * v.norm();
   if (model.base().type != BaseType::kDifferentialDrive || !along ||
       at_start.X_d_dot.tail<3>().norm() > 0.0 || at_start.X_d_ddot.norm() > 0.0) {
     throw InputError(setup_->scenario().source +
@@ -91,16 +103,13 @@ void ClosedLoop::StartMoving(const DesiredMotion& at_start) {
   start.qvel += boost;
   plant_.SetState(start);
 
-  const double dt = plant_.time_step();
-  const long count = std::lround(kSettleMoving / dt);
   Vector6d velocity = Vector6d::Zero();
   velocity.head<3>() = v;
-  const LineTrajectory line(setup_->X_start(), velocity, 0.0);
-  for (long i = 0; i < count; ++i) ControlStep(EvaluateDesired(line, static_cast<double>(i) * dt), i);
+  SettleOn(LineTrajectory(setup_->X_start(), velocity, 0.0), kSettleMoving);
 
   // Back to where it began: on a level floor every place is alike.
   EngineState moved = plant_.GetState();
-  const Vector3d way = static_cast<double>(count) * dt * v;
+  const Vector3d way = static_cast<double>(std::lround(kSettleMoving / plant_.time_step())) * plant_.time_step() * v;
   const int base = m.jnt_qposadr[setup_->adapter().base_joints()[0]];
   const int body = m.jnt_qposadr[m.body_jntadr[setup_->adapter().object_body()]];
   moved.qpos.segment<2>(base) -= way.head<2>();
@@ -126,7 +135,11 @@ void ClosedLoop::ControlStep(const DesiredMotion& desired, long step) {
   for (ContactCoordinates& kappa : told_.kappa) kappa.alpha_o.u += setup_->scenario().control.contact_error;
   controller_.SetState(told_);
   desired_ = desired;
-  if (step % control_interval_ == 0) tau_ = controller_.CalcTorque(desired);
+  if (step % control_interval_ == 0) {
+    tau_ = controller_.CalcTorque(desired);
+    times_.grasp_force += controller_.force_seconds();
+    ++times_.solves;
+  }
   CheckTorques();
   const auto control = Clock::now();
   plant_.SetTorques(tau_);
@@ -134,7 +147,6 @@ void ClosedLoop::ControlStep(const DesiredMotion& desired, long step) {
   const auto end = Clock::now();
   times_.plant += Seconds(begin, read) + Seconds(control, end);
   times_.controller += Seconds(read, control);
-  times_.grasp_force += controller_.force_seconds();
 }
 
 void ClosedLoop::Step() {
@@ -151,6 +163,13 @@ void ClosedLoop::Step() {
     times_.cross_check += Seconds(begin, Clock::now());
   }
   CheckGrasp();
+}
+
+Vector6d ClosedLoop::X_o() const {
+  if (setup_->scenario().control.orientation == OrientationFeedback::kAngles) return controller_.grasp().X_o();
+  Vector6d X_o;
+  X_o << state_.X_Bo.translation(), CalcAnyZyzAngles(state_.X_Bo.linear());
+  return X_o;
 }
 
 void ClosedLoop::CheckRobot() const {

@@ -33,14 +33,19 @@ struct LoopTimes {
   double controller = 0.0;   ///< Reading the plant included.
   double grasp_force = 0.0;  ///< Part of controller.
   double cross_check = 0.0;
+  long solves = 0;  ///< Grasp-force problems.
 };
 
-/// One run. Made settled at t = 0; deterministic.
+/// One run. Deterministic.
 class ClosedLoop {
  public:
   /// @param check whether to cross-check.
-  /// @throws InputError, RunFailure, DivergenceError, GraspForceError, SingularityError while settling.
+  /// @throws InputError when the scenario asks for what cannot be.
   ClosedLoop(const Setup& setup, bool check);
+
+  /// Holds the object until all has come to rest (and then moves on, for a moving start): call once, before
+  /// the first Step, at t = 0. @throws as Step.
+  void Settle();
 
   /// Number of steps of the scenario's duration.
   [[nodiscard]] long num_steps() const { return num_steps_; }
@@ -63,7 +68,12 @@ class ClosedLoop {
   [[nodiscard]] const GraspController& controller() const { return controller_; }
   [[nodiscard]] const Observer& observer() const { return observer_; }
   [[nodiscard]] const Plant& plant() const { return plant_; }
+  [[nodiscard]] bool is_checking() const { return check_; }
   [[nodiscard]] const StepChecks& checks() const { return checks_; }
+  /// Checks of the first question, model against engine at the plant's state.
+  [[nodiscard]] std::span<const RunCheck> model_checks() const { return model_checks_; }
+  /// Pose of the object; its angles follow the controller's where it uses them.
+  [[nodiscard]] Vector6d X_o() const;
 
   /// Motor with the largest share of its limit at the last step, by its entry of tau', and that share.
   [[nodiscard]] int busiest_motor() const { return busiest_motor_; }
@@ -72,8 +82,8 @@ class ClosedLoop {
 
  private:
   void PlaceRobot();
-  void Settle();
   void StartMoving(const DesiredMotion& at_start);
+  void SettleOn(const Trajectory& trajectory, double duration);
   void ControlStep(const DesiredMotion& desired, long step);
   [[nodiscard]] DesiredMotion EvaluateDesired(const Trajectory& trajectory, double t) const;
   void CheckRobot() const;
@@ -86,6 +96,7 @@ class ClosedLoop {
   Observer observer_;
   GraspController controller_;
   StepChecks checks_;
+  std::vector<RunCheck> model_checks_;
   std::unique_ptr<Trajectory> trajectory_;
   long num_steps_ = 0;
   long control_interval_ = 1;

@@ -3,6 +3,7 @@
 // What a run is: plant, model, grasp, trajectory, controller, checks. Read from a TOML file; the shipped ones
 // are in harness/scenarios.
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -79,6 +80,7 @@ struct Scenario {
   GraspOptions grasp;
   ControlOptions control;
   std::vector<BoundOverride> bounds;
+  std::uint64_t seed = 0;  ///< Of random changes to posture and grasp; 0 for none.
 
   std::string text;                    ///< The file.
   std::string source;                  ///< Its name, for messages.

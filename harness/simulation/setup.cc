@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -16,18 +17,13 @@ namespace {
 /// Deep enough that the engine sees a contact, less than any grasp force makes it, m.
 constexpr double kStartPenetration = 1e-6;
 
+// How far a seed moves the grasp, either way.
+constexpr double kVariedJoint = DegToRad(2.0);    // rad
+constexpr double kVariedContact = DegToRad(3.0);  // rad
+constexpr double kVariedPlace = 2e-3;             // m
+
 RobotModel ReadModel(const Scenario& scenario, const std::filesystem::path& robot) {
   return ParseRobotModel(ReadTextFile(robot.string()), robot.string(), scenario.model_overrides);
-}
-
-/// ZYZ angles also where they are singular, with alpha = 0 there.
-Vector3d CalcAnyZyzAngles(const Matrix3d& R) {
-  const double sin_beta = R.col(2).head<2>().norm();
-  if (sin_beta >= kMinSinBeta) return CalcZyzAngles(R);
-  const double beta = std::atan2(sin_beta, R(2, 2));
-  const double alpha = sin_beta > 0.0 ? std::atan2(R(1, 2), R(0, 2)) : 0.0;
-  const Matrix3d turned = CalcRotationZyz(Vector3d(alpha, beta, 0.0)).transpose() * R;
-  return {alpha, beta, std::atan2(turned(1, 0), turned(0, 0))};
 }
 
 [[noreturn]] void Fail(const Scenario& scenario, const std::string& key, const std::string& problem) {
@@ -41,14 +37,16 @@ Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const
   if (!model_.object()) {
     throw InputError(robot.string() + ": object: is missing, and the scenario holds one");
   }
-  ApplyPlantOptions();
   adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
+  gate_ = RunStaticGate(*adapter_);
+  ApplyPlantOptions();
   try {
     surface_ = MakeSurface(model_.object()->shape);
   } catch (const std::invalid_argument& error) {
     throw InputError(robot.string() + ": " + error.what());
   }
   FindFingertips();
+  VaryGrasp();
   SolveGrasp();
 }
 
@@ -94,6 +92,21 @@ void Setup::FindFingertips() {
     if (users[static_cast<size_t>(i)] == 0) idle_joints_.push_back(i);
     if (users[static_cast<size_t>(i)] > 1) arm_joints_.push_back(i);
   }
+}
+
+void Setup::VaryGrasp() {
+  if (scenario_.seed == 0) return;
+  std::mt19937_64 random(scenario_.seed);
+  const auto draw = [&](double size) {
+    return size * (2.0 * static_cast<double>(random() >> 11) * 0x1p-53 - 1.0);
+  };
+  GraspOptions& grasp = scenario_.grasp;
+  for (auto& [name, angle] : grasp.joints) angle += draw(kVariedJoint);
+  for (SurfacePoint& contact : grasp.contacts) {
+    contact.u += draw(kVariedContact);
+    contact.v += draw(kVariedContact);
+  }
+  for (double& x : grasp.X_FO.translation()) x += draw(kVariedPlace);
 }
 
 void Setup::SolveGrasp() {

@@ -10,6 +10,7 @@
 #include "controller/control/trajectory.h"
 #include "controller/model/robot_model.h"
 #include "harness/adapter/adapter.h"
+#include "harness/checks/static_gate.h"
 #include "harness/plant/observer.h"
 #include "harness/plant/plant.h"
 #include "harness/simulation/scenario.h"
@@ -30,6 +31,8 @@ class Setup {
   /// With the scenario's changes.
   [[nodiscard]] const mjModel& engine() const { return *engine_; }
   [[nodiscard]] const Adapter& adapter() const { return *adapter_; }
+  /// What the two descriptions disagree on before anything moves, the scenario's changes to the plant aside.
+  [[nodiscard]] const GateResult& gate() const { return gate_; }
   [[nodiscard]] const ObjectModel& object() const { return *model_.object(); }
   [[nodiscard]] const Surface& surface() const { return *surface_; }
   /// Frames of the grasp.
@@ -48,12 +51,14 @@ class Setup {
  private:
   void ApplyPlantOptions();
   void FindFingertips();
+  void VaryGrasp();
   void SolveGrasp();
 
   Scenario scenario_;
   RobotModel model_;
   MjModelPtr engine_;
   std::unique_ptr<Adapter> adapter_;
+  GateResult gate_;
   std::unique_ptr<Surface> surface_;
   std::vector<int> fingertips_;
   std::vector<int> arm_joints_;  // on the chains of several fingertips

@@ -1,0 +1,48 @@
+#pragma once
+
+// Why a run's checks failed: the model, or which assumption about the plant.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "harness/checks/run_check.h"
+#include "harness/checks/static_gate.h"
+
+namespace dexcheck {
+
+/// What a disagreement of model and engine comes from.
+enum class Cause {
+  kNone,
+  kModel,            ///< The two descriptions differ: constants, kinematics, dynamics, contact geometry.
+  kActuatorLimit,    ///< A motor could not give its torque.
+  kFingertipSlip,    ///< A fingertip slides: its force is at the edge of the friction cone.
+  kWheelSlip,        ///< A wheel slides: assumption (1), rolling without slipping.
+  kContactSoftness,  ///< Contacts give or creep without sliding.
+  kTilt,             ///< The platform does not stay level.
+  kIntegrator,       ///< None of these: what time stepping leaves.
+};
+
+/// "model", "wheel slip", ...
+const char* NameOf(Cause cause);
+
+/// One failed check with its cause.
+struct Attribution {
+  std::string check;
+  Cause cause = Cause::kNone;
+};
+
+struct AttributionResult {
+  Cause cause = Cause::kNone;             ///< Of the run: the one that the others follow from.
+  std::string evidence;                   ///< In words: which check says so, with its value and time.
+  std::vector<Attribution> attributions;  ///< Of each failed check.
+};
+
+/// Attributes the failed checks of a run. Model checks compare both sides at one and the same state: when one
+/// fails, the model is the cause of everything else. Otherwise the cause is the assumption that broke first;
+/// sliding shows at the edge of the friction cone, and tells slip from contacts that merely give.
+/// @param model checks of the first question.
+AttributionResult Attribute(const GateResult& gate, std::span<const RunCheck> model,
+                            std::span<const RunCheck> steps);
+
+}  // namespace dexcheck

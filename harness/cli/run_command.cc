@@ -1,0 +1,196 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/common/text.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/output_file.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/cli/run_folder.h"
+#include "harness/cli/run_report.h"
+#include "harness/cli/shipped_files.h"
+#include "harness/record/run_recorder.h"
+#include "harness/simulation/closed_loop.h"
+#include "harness/simulation/run_summary.h"
+
+namespace dexcheck::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+struct Request {
+  std::string scenario;
+  std::string out;
+  std::vector<std::string> overrides;
+  std::uint64_t seed = 0;
+  bool no_check = false;
+  bool no_log = false;
+  bool quiet = false;
+  bool list = false;
+  std::string replay;
+  std::string command;  // as typed
+};
+
+/// A run in progress: steps until the end, a failure, or Ctrl-C.
+class Runner {
+ public:
+  Runner(const Setup& setup, bool check) : setup_(setup), loop_(setup, check) {}
+
+  [[nodiscard]] const ClosedLoop& loop() const { return loop_; }
+  [[nodiscard]] const RunResult& result() const { return result_; }
+
+  void Settle() {
+    Guard([&] { loop_.Settle(); }, " while settling");
+  }
+
+  /// `after_step` is called after each step, also after one that failed; its time counts as recording.
+  template <typename AfterStep>
+  void Run(const AfterStep& after_step, bool quiet) {
+    ProgressBar bar(setup_.scenario().name, loop_.num_steps(), quiet);
+    const Clock::time_point begin = Clock::now();
+    while (result_.failure.empty() && loop_.step() < loop_.num_steps()) {
+      if (IsInterrupted()) {
+        result_.interrupted = true;
+        result_.failure = "interrupted";
+        break;
+      }
+      Guard([&] { loop_.Step(); }, "");
+      result_.tracking.Add(loop_.error());
+      const Clock::time_point recording = Clock::now();
+      after_step();
+      result_.recording_seconds += SecondsSince(recording);
+      bar.Update(loop_.step());
+    }
+    result_.wall_seconds = SecondsSince(begin);
+  }
+
+  void Finish() { Judge(setup_, loop_, &result_); }
+
+ private:
+  template <typename Work>
+  void Guard(const Work& work, const std::string& when) {
+    try {
+      work();
+    } catch (const InputError&) {
+      throw;
+    } catch (const Error& error) {
+      result_.failure = error.what() + when;
+      if (when.empty()) result_.failure += " at t = " + FormatNumber(loop_.step_time()) + " s";
+    }
+  }
+
+  const Setup& setup_;
+  ClosedLoop loop_;
+  RunResult result_;
+};
+
+ExitCode ToExitCode(const RunResult& result) {
+  if (result.verdict == Verdict::kFailed) return kFailure;
+  return result.verdict == Verdict::kPass ? kSuccess : kDisagreement;
+}
+
+int RunScenario(const Request& request) {
+  const ScenarioFiles files = FindScenario(request.scenario, request.overrides, request.seed);
+  const Setup setup(files.scenario, files.robot, files.mjcf);
+  CatchInterrupts();
+  std::optional<RunFolder> folder;
+  if (!request.no_log) folder.emplace(request.out, setup.scenario().name);
+  Runner runner(setup, !request.no_check);
+  std::optional<RunRecorder> recorder;
+  if (folder) {
+    recorder.emplace(folder->path() / "log.h5", runner.loop(), setup,
+                     RunInputs{files.robot, files.mjcf, request.command});
+  }
+  runner.Settle();
+  runner.Run([&] { if (recorder) recorder->Record(); }, request.quiet);
+  runner.Finish();
+
+  const std::string summary = MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n";
+  if (recorder) recorder->Close(summary);
+  if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
+  PrintRunReport(setup, runner.loop(), runner.result(), folder ? folder->path().string() : "", request.quiet);
+  return ToExitCode(runner.result());
+}
+
+/// Repeats a recorded run from what its log keeps, and compares every number bit for bit.
+int ReplayRun(const Request& request) {
+  const RecordedRun recorded(request.replay);
+  const Setup setup(recorded.files().scenario, recorded.files().robot, recorded.files().mjcf);
+  CatchInterrupts();
+  Runner runner(setup, recorded.was_checked());
+  const TemporaryFolder scratch;
+  const std::filesystem::path log = scratch.path() / "log.h5";
+  RunRecorder recorder(log, runner.loop(), setup, RunInputs{recorded.files().robot, recorded.files().mjcf, ""});
+  runner.Settle();
+  long rows = 0;
+  runner.Run(
+      [&] {
+        if (rows++ < recorded.rows()) recorder.Record();
+      },
+      request.quiet);
+  recorder.Close("");
+  const ReplayDifference difference = recorded.Compare(log);
+  if (difference.signal.empty()) {
+    fmt::print("IDENTICAL: {} steps of {} signals, bit for bit.\n", difference.rows, difference.signals);
+    return kSuccess;
+  }
+  fmt::print("DIFFERENT: {} at t = {} s: {} in the log, {} now.\n", difference.signal,
+             FormatNumber(difference.time), FormatNumber(difference.recorded), FormatNumber(difference.now));
+  return kDisagreement;
+}
+
+int Run(const Request& request) {
+  if (request.list) {
+    for (const ShippedScenario& scenario : ListShippedScenarios()) {
+      fmt::print("{:<14} {}\n", scenario.name, scenario.description);
+    }
+    return kSuccess;
+  }
+  if (!request.replay.empty()) return ReplayRun(request);
+  return RunScenario(request);
+}
+
+}  // namespace
+
+void AddRunCommand(CLI::App* app, const std::string& command_line, int* exit_code) {
+  const auto request = std::make_shared<Request>();
+  request->command = command_line;
+  CLI::App* command = app->add_subcommand("run", "Simulate a scenario, cross-checked at every step");
+  CLI::Option* scenario =
+      command->add_option("SCENARIO", request->scenario, "Name of a shipped scenario (--list), or a TOML file");
+  CLI::Option* list = command->add_flag("--list", request->list, "List the shipped scenarios");
+  CLI::Option* replay =
+      command->add_option("--replay", request->replay,
+                          "Repeat a recorded run and compare every number bit for bit")->type_name("RUN_DIR");
+  command->add_option("--out", request->out, "Folder for the results, made by the run (runs/SCENARIO by default)")
+      ->type_name("DIR");
+  command->add_option("--set", request->overrides,
+                      "Set a key of the scenario, or with model. before it one of the parameter file")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  command->add_option("--seed", request->seed, "Vary posture and grasp at random; 0 does not")
+      ->type_name("N")
+      ->check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
+  command->add_flag("--no-check", request->no_check, "Simulate without cross-checks");
+  command->add_flag("--no-log", request->no_log, "Write no files");
+  command->add_flag("--quiet", request->quiet, "Print the verdict only");
+  scenario->excludes(list)->excludes(replay);
+  list->excludes(replay);
+  command->callback([=] {
+    if (request->scenario.empty() && !request->list && request->replay.empty()) {
+      throw CLI::RequiredError("SCENARIO (or --list, or --replay)");
+    }
+    *exit_code = Run(*request);
+  });
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,141 @@
+#include "harness/cli/run_folder.h"
+
+#include <stdlib.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <sstream>
+#include <system_error>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/common/toml_reader.h"
+#include "harness/cli/shipped_files.h"
+
+namespace dexcheck::cli {
+namespace {
+
+constexpr const char* kScenarioFolder = "harness/scenarios";
+
+std::filesystem::path OrShipped(const std::string& file, const char* shipped) {
+  return file.empty() ? FindShippedFile(shipped) : std::filesystem::path(file);
+}
+
+ScenarioFiles Open(const std::filesystem::path& path, const std::vector<std::string>& overrides,
+                   std::uint64_t seed) {
+  ScenarioFiles files;
+  files.scenario =
+      ParseScenario(ReadTextFile(path.string()), path.string(), path.parent_path(), overrides);
+  files.scenario.seed = seed;
+  files.robot = OrShipped(files.scenario.model_file, "controller/parameters/assistant_robot.toml");
+  files.mjcf = OrShipped(files.scenario.mjcf_file, "mjcf/scene.xml");
+  return files;
+}
+
+}  // namespace
+
+std::vector<ShippedScenario> ListShippedScenarios() {
+  std::vector<ShippedScenario> scenarios;
+  const std::filesystem::path folder = FindShippedFile(kScenarioFolder);
+  for (const std::filesystem::directory_entry& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() != ".toml") continue;
+    const Scenario scenario =
+        ParseScenario(ReadTextFile(entry.path().string()), entry.path().string(), folder, {});
+    scenarios.push_back({scenario.name, scenario.description});
+  }
+  std::sort(scenarios.begin(), scenarios.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+  return scenarios;
+}
+
+ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<std::string>& overrides,
+                           std::uint64_t seed) {
+  if (name_or_file.ends_with(".toml") || name_or_file.find('/') != std::string::npos) {
+    return Open(name_or_file, overrides, seed);
+  }
+  std::vector<std::string> known;
+  for (const ShippedScenario& scenario : ListShippedScenarios()) known.push_back(scenario.name);
+  if (std::find(known.begin(), known.end(), name_or_file) == known.end()) {
+    const std::string nearest = FindNearest(name_or_file, known);
+    throw InputError("scenario " + Quote(name_or_file) + ": is neither shipped (dexcheck run --list) nor a TOML file" +
+                     (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?"));
+  }
+  return Open(FindShippedFile(std::string(kScenarioFolder) + "/" + name_or_file + ".toml"), overrides, seed);
+}
+
+RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(path) {
+  if (path.empty()) {
+    path_ = std::filesystem::path("runs") / name;
+    for (int i = 2; std::filesystem::exists(path_); ++i) {
+      path_ = std::filesystem::path("runs") / (name + "-" + std::to_string(i));
+    }
+  }
+  std::error_code error;
+  std::filesystem::create_directories(path_, error);
+  if (error) throw InputError(path_.string() + ": cannot be made: " + error.message());
+  if (!std::filesystem::is_empty(path_, error) || error) {
+    throw InputError(path_.string() + ": already holds files; give a new folder with --out");
+  }
+}
+
+TemporaryFolder::TemporaryFolder() {
+  std::string pattern = (std::filesystem::temp_directory_path() / "dexcheck-XXXXXX").string();
+  if (::mkdtemp(pattern.data()) == nullptr) {
+    throw InputError(pattern + ": cannot be made: " + std::strerror(errno));
+  }
+  path_ = pattern;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+RecordedRun::RecordedRun(const std::filesystem::path& folder) : log_(folder / "log.h5") {
+  log_.ExtractFiles("inputs", unpacked_.path());
+  std::vector<std::string> overrides;
+  std::istringstream lines(log_.ReadText("overrides"));
+  for (std::string line; std::getline(lines, line);) {
+    // The files are those of the log, wherever they were.
+    const bool is_file = line.starts_with("model.file=") || line.starts_with("plant.mjcf=");
+    if (!is_file) overrides.push_back(line);
+  }
+  files_ = Open(unpacked_.path() / "scenario.toml", overrides, std::stoull(log_.ReadText("seed")));
+  files_.robot = unpacked_.path() / "robot" / log_.ReadText("robot");
+  files_.mjcf = unpacked_.path() / "mjcf" / log_.ReadText("mjcf");
+}
+
+bool RecordedRun::was_checked() const {
+  return std::any_of(log_.signals().begin(), log_.signals().end(),
+                     [](const SignalInfo& signal) { return signal.name.starts_with("check/"); });
+}
+
+ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) const {
+  const LogReader other(other_log);
+  const RowMatrixXd time = log_.ReadSignal("time");
+  ReplayDifference first;
+  first.rows = log_.rows();
+  first.signals = log_.signals().size();
+  long first_row = log_.rows();
+  for (const SignalInfo& signal : log_.signals()) {
+    const RowMatrixXd recorded = log_.ReadSignal(signal.name);
+    const RowMatrixXd now = other.ReadSignal(signal.name);
+    for (long row = 0; row < std::min<long>(first_row, recorded.rows()); ++row) {
+      for (Eigen::Index col = 0; col < recorded.cols(); ++col) {
+        const double value = row < now.rows() ? now(row, col) : std::numeric_limits<double>::quiet_NaN();
+        const double before = recorded(row, col);
+        if (std::bit_cast<std::uint64_t>(before) == std::bit_cast<std::uint64_t>(value)) continue;
+        if (row >= first_row) continue;
+        first_row = row;
+        first.signal = signal.name;
+        first.time = time(row, 0);
+        first.recorded = before;
+        first.now = value;
+      }
+    }
+  }
+  return first;
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,87 @@
+#pragma once
+
+// Folders and files of runs: which scenario is meant, where results go, what a recorded run was.
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "harness/record/log_reader.h"
+#include "harness/simulation/scenario.h"
+
+namespace dexcheck::cli {
+
+/// A scenario with the two descriptions that it runs.
+struct ScenarioFiles {
+  Scenario scenario;
+  std::filesystem::path robot;
+  std::filesystem::path mjcf;
+};
+
+/// A shipped scenario by name, or a TOML file. @throws InputError.
+ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<std::string>& overrides,
+                           std::uint64_t seed);
+
+struct ShippedScenario {
+  std::string name;
+  std::string description;
+};
+
+/// In alphabetic order.
+std::vector<ShippedScenario> ListShippedScenarios();
+
+/// A folder for the results of one run, made new.
+class RunFolder {
+ public:
+  /// @param path empty for runs/NAME, or runs/NAME-2 and so on when that is taken.
+  /// @throws InputError when the folder cannot be made, or has something in it.
+  RunFolder(const std::string& path, const std::string& name);
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// A folder that is removed at the end.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// The first number in which two logs differ; no signal when they do not.
+struct ReplayDifference {
+  std::string signal;
+  double time = 0.0;
+  double recorded = 0.0;
+  double now = 0.0;
+  long rows = 0;
+  size_t signals = 0;
+};
+
+/// A run as its log keeps it, unpacked.
+class RecordedRun {
+ public:
+  /// @throws InputError when the folder holds no log that can be repeated.
+  explicit RecordedRun(const std::filesystem::path& folder);
+  [[nodiscard]] const ScenarioFiles& files() const { return files_; }
+  [[nodiscard]] long rows() const { return log_.rows(); }
+  [[nodiscard]] bool was_checked() const;
+  [[nodiscard]] ReplayDifference Compare(const std::filesystem::path& other_log) const;
+  [[nodiscard]] const LogReader& log() const { return log_; }
+
+ private:
+  LogReader log_;
+  TemporaryFolder unpacked_;
+  ScenarioFiles files_;
+};
+
+}  // namespace dexcheck::cli

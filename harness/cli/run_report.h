@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+#include "harness/simulation/run_summary.h"
+
+namespace dexcheck::cli {
+
+/// Prints what a person wants to know of a run: verdict, tracking, checks, cause, speed, where the files are.
+/// @param folder empty when nothing was written. @param quiet the verdict only.
+void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result,
+                    const std::string& folder, bool quiet);
+
+}  // namespace dexcheck::cli

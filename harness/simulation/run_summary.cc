@@ -1,0 +1,107 @@
+#include "harness/simulation/run_summary.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dexcheck {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double Rms(double squares, long count) {
+  return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
+}
+
+Json ToJson(const RunCheck& check) {
+  Json json = {{"kind", NameOf(check.kind)}, {"max", check.max},
+               {"rms", check.rms()},         {"bound", check.bound},
+               {"unit", check.unit},         {"at_time_s", check.at_time},
+               {"pass", !check.failed}};
+  if (check.failed) json["failed_at_s"] = check.failed_at;
+  if (!check.where.empty()) json["where"] = check.where;
+  json["description"] = check.description;
+  return json;
+}
+
+Json ToJson(const CheckRecord& record) {
+  return {{"kind", NameOf(record.kind)}, {"max", record.worst}, {"bound", record.bound},
+          {"pass", !record.failed}};
+}
+
+}  // namespace
+
+const char* NameOf(Verdict verdict) {
+  if (verdict == Verdict::kPass) return "pass";
+  return verdict == Verdict::kDisagreement ? "disagreement" : "failed";
+}
+
+void TrackingStatistics::Add(const TrackingError& error) {
+  position_max_ = std::max(position_max_, error.position.norm());
+  position_squares_ += error.position.squaredNorm();
+  orientation_max_ = std::max(orientation_max_, error.orientation);
+  orientation_squares_ += error.orientation * error.orientation;
+  ++count_;
+}
+
+double TrackingStatistics::position_rms() const { return Rms(position_squares_, count_); }
+double TrackingStatistics::orientation_rms() const { return Rms(orientation_squares_, count_); }
+
+void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
+  if (loop.is_checking()) {
+    result->attribution = Attribute(setup.gate(), loop.model_checks(), loop.checks().checks());
+  }
+  const bool disagrees = result->attribution.cause != Cause::kNone;
+  result->verdict = disagrees ? Verdict::kDisagreement : Verdict::kPass;
+  if (!result->failure.empty()) result->verdict = Verdict::kFailed;
+}
+
+Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& result) {
+  const Scenario& scenario = setup.scenario();
+  Json json = {{"scenario", scenario.name},
+               {"description", scenario.description},
+               {"verdict", NameOf(result.verdict)},
+               {"failure", result.failure},
+               {"interrupted", result.interrupted},
+               {"seed", scenario.seed},
+               {"overrides", scenario.overrides},
+               {"duration_s", scenario.duration},
+               {"simulated_s", loop.time()},
+               {"time_step_s", scenario.plant.time_step}};
+  json["tracking"] = {{"position_error_max_m", result.tracking.position_max()},
+                      {"position_error_rms_m", result.tracking.position_rms()},
+                      {"orientation_error_max_rad", result.tracking.orientation_max()},
+                      {"orientation_error_rms_rad", result.tracking.orientation_rms()}};
+  json["attribution"] = {{"cause", NameOf(result.attribution.cause)},
+                         {"evidence", result.attribution.evidence},
+                         {"checks", Json::object()}};
+  for (const Attribution& one : result.attribution.attributions) {
+    json["attribution"]["checks"][one.check] = NameOf(one.cause);
+  }
+  json["checks"] = Json::object();
+  if (loop.is_checking()) {
+    for (const CheckRecord& record : setup.gate().records) json["checks"][record.name] = ToJson(record);
+    for (const RunCheck& check : loop.model_checks()) json["checks"][check.name] = ToJson(check);
+    for (const RunCheck& check : loop.checks().checks()) json["checks"][check.name] = ToJson(check);
+    const StepChecks& checks = loop.checks();
+    json["assumptions"] = {{"fingertip_slip_max_m", checks.Find("fingertip_slip").max},
+                           {"wheel_slip_max_m", checks.Find("wheel_slip").max},
+                           {"base_tilt_max_rad", checks.Find("base_tilt").max},
+                           {"cone_margin_min", checks.least_cone_margin()},
+                           {"contacts_lost", checks.contacts_lost()}};
+  }
+  const LoopTimes& times = loop.times();
+  const double steps = static_cast<double>(std::max(loop.step(), 1L));
+  const double microseconds = 1e6 / steps;
+  json["speed"] = {{"steps", loop.step()},
+                   {"real_time_factor", result.wall_seconds > 0.0 ? loop.time() / result.wall_seconds : 0.0},
+                   {"plant_us_per_step", microseconds * times.plant},
+                   {"controller_us_per_step", microseconds * times.controller},
+                   {"cross_check_us_per_step", microseconds * times.cross_check},
+                   {"grasp_force_us_per_solve",
+                    times.solves > 0 ? 1e6 * times.grasp_force / static_cast<double>(times.solves) : 0.0},
+                   {"recording_us_per_step", microseconds * result.recording_seconds}};
+  json["versions"] = {{"dexcheck", DEXCHECK_VERSION}, {"mujoco", mj_versionString()}};
+  return json;
+}
+
+}  // namespace dexcheck

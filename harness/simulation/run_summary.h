@@ -1,0 +1,53 @@
+#pragma once
+
+// What a run comes to: verdict, tracking, checks, attribution, speed.
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+
+#include "harness/checks/attribution.h"
+#include "harness/simulation/closed_loop.h"
+
+namespace dexcheck {
+
+enum class Verdict { kPass, kDisagreement, kFailed };
+
+/// "pass", "disagreement", "failed".
+const char* NameOf(Verdict verdict);
+
+/// Statistics of the object's tracking error.
+class TrackingStatistics {
+ public:
+  void Add(const TrackingError& error);
+  [[nodiscard]] double position_max() const { return position_max_; }
+  [[nodiscard]] double position_rms() const;
+  [[nodiscard]] double orientation_max() const { return orientation_max_; }
+  [[nodiscard]] double orientation_rms() const;
+
+ private:
+  double position_max_ = 0.0;
+  double position_squares_ = 0.0;
+  double orientation_max_ = 0.0;
+  double orientation_squares_ = 0.0;
+  long count_ = 0;
+};
+
+/// A finished run, or as far as it came.
+struct RunResult {
+  Verdict verdict = Verdict::kPass;
+  std::string failure;       ///< Why it ended early; empty when it did not.
+  bool interrupted = false;  ///< By the user.
+  TrackingStatistics tracking;
+  AttributionResult attribution;
+  double recording_seconds = 0.0;
+  double wall_seconds = 0.0;  ///< Of all steps, recording included.
+};
+
+/// The verdict and its attribution. Call when the last step is done.
+void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result);
+
+/// Keys as README.md lists them for summary.json; lengths m, angles rad.
+nlohmann::ordered_json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& result);
+
+}  // namespace dexcheck
