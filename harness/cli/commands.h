@@ -27,5 +27,6 @@ CLI::Validator WholeNumber(std::uint64_t least, std::uint64_t most);
 /// Each adds its command to `app`; the callback stores what running it returns in `exit_code`.
 void AddConsistencyCommand(CLI::App* app, int* exit_code);
 void AddEvalCommand(CLI::App* app, int* exit_code);
+void AddExportCommand(CLI::App* app, int* exit_code);
 
 }  // namespace dexcheck::cli

@@ -56,6 +56,7 @@ int Run(int argc, char** argv) {
   int exit_code = kSuccess;
   AddConsistencyCommand(&app, &exit_code);
   AddEvalCommand(&app, &exit_code);
+  AddExportCommand(&app, &exit_code);
   try {
     app.parse(argc, argv);
     if (std::fflush(stdout) == 0) return exit_code;
