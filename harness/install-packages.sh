@@ -9,10 +9,12 @@ packages=(
   libeigen3-dev libtomlplusplus-dev
   # the engine; its CMake files ask for OpenGL and for qhull's headers
   libmujoco-dev libgl-dev libqhull-dev
+  # the run's log
+  libhdf5-dev zlib1g-dev
   # the command line
   libcli11-dev libfmt-dev nlohmann-json3-dev
   # tests and benchmarks, and the programs they take as oracles
-  libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp
+  libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools
 )
 
 Fail() {

@@ -29,9 +29,9 @@ std::string FormatShort(double value) {
 }
 
 std::string Tell(const RunCheck& check) {
-  return check.name + " " + FormatShort(check.max) + (check.unit == "1" ? "" : " " + check.unit) + " (bound " +
-         FormatShort(check.bound) + "), first above it at t = " + FormatShort(check.failed_at) + " s" +
-         (check.where.empty() ? "" : ", " + check.where);
+  return check.name + " " + FormatShort(check.max) + (check.unit == "1" ? "" : " " + check.unit) +
+         " (bound " + FormatShort(check.bound) + "), first above it at t = " + FormatShort(check.failed_at) +
+         " s" + (check.where.empty() ? "" : ", " + check.where);
 }
 
 /// A check whose failure means its cause by itself.

@@ -60,8 +60,9 @@ StepChecks::StepChecks(const Setup& setup)
   Define(
       kBalanceRobot, "balance_robot", kBalance, "1", 1e-5,
       "what is left of (48) with the engine's accelerations and contact forces, against the forces balanced");
-  Define(kBalanceObject, "balance_object", kBalance, "1", 1e-9,
-         "what is left of (19) with the engine's acceleration and contact forces, against the contact forces");
+  Define(
+      kBalanceObject, "balance_object", kBalance, "1", 1e-9,
+      "what is left of (19) with the engine's acceleration and contact forces, against the contact forces");
   Define(kReducedAcceleration, "reduced_acceleration", kPrediction, "1", 1e-5,
          "xi_dot of the rigid constrained system (46), (48) against the engine's");
   Define(kContactForce, "contact_force", kPrediction, "1", 1e-6,

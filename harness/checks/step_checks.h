@@ -32,8 +32,8 @@ struct SlipState {
   bool touching = false;
   Vector3d velocity = Vector3d::Zero();  ///< Tangential, in the frame of the body that is slipped on, m/s.
   Vector3d distance = Vector3d::Zero();  ///< Its integral, m.
-  double cone_use = 0.0;     ///< |tangential force| / (mu normal force); 1 slides.
-  double cone_margin = 0.0;  ///< mu normal force - |tangential force|, N.
+  double cone_use = 0.0;                 ///< |tangential force| / (mu normal force); 1 slides.
+  double cone_margin = 0.0;              ///< mu normal force - |tangential force|, N.
 };
 
 /// Balance, prediction and assumptions. Nothing allocates after construction.

@@ -49,6 +49,17 @@ std::string Explain(const CLI::App& app, const CLI::ParseError& error) {
          (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?");
 }
 
+/// The command line as one could type it.
+std::string JoinArguments(int argc, char** argv) {
+  std::string text = "dexcheck";
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    const bool plain = argument.find_first_of(" \t\n\"'\\$*?;&|<>()[]{}") == std::string::npos;
+    text += plain ? " " + argument : " '" + argument + "'";
+  }
+  return text;
+}
+
 int Run(int argc, char** argv) {
   CLI::App app("Validates analytic robot models and controllers against MuJoCo.", "dexcheck");
   app.set_version_flag("--version", DEXCHECK_VERSION);
@@ -56,6 +67,8 @@ int Run(int argc, char** argv) {
   int exit_code = kSuccess;
   AddConsistencyCommand(&app, &exit_code);
   AddEvalCommand(&app, &exit_code);
+  AddRunCommand(&app, JoinArguments(argc, argv), &exit_code);
+  AddExportCommand(&app, &exit_code);
   try {
     app.parse(argc, argv);
     if (std::fflush(stdout) == 0) return exit_code;

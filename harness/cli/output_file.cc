@@ -40,7 +40,16 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::Write(const std::string& text) {
-  if (std::fwrite(text.data(), 1, text.size(), file_) != text.size() || std::fflush(file_) != 0) Fail(errno);
+  Append(text);
+  Finish();
+}
+
+void OutputFile::Append(const std::string& text) {
+  if (std::fwrite(text.data(), 1, text.size(), file_) != text.size()) Fail(errno);
+}
+
+void OutputFile::Finish() {
+  if (std::fflush(file_) != 0) Fail(errno);
   if (is_stdout()) return;
   if (!partial_.empty() && ::fsync(::fileno(file_)) != 0) Fail(errno);
   const int closed = std::fclose(std::exchange(file_, nullptr));

@@ -20,6 +20,10 @@ class OutputFile {
   /// @throws InputError like the constructor; what stood under the path before is then untouched.
   void Write(const std::string& text);
 
+  /// The same in pieces: Append any number of times, then Finish, without which no file appears.
+  void Append(const std::string& text);
+  void Finish();
+
   [[nodiscard]] bool is_stdout() const { return file_ == stdout; }
 
  private:

@@ -111,7 +111,11 @@ int RunScenario(const Request& request) {
                      RunInputs{files.robot, files.mjcf, request.command});
   }
   runner.Settle();
-  runner.Run([&] { if (recorder) recorder->Record(); }, request.quiet);
+  runner.Run(
+      [&] {
+        if (recorder) recorder->Record();
+      },
+      request.quiet);
   runner.Finish();
 
   const std::string summary = MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n";
@@ -129,7 +133,8 @@ int ReplayRun(const Request& request) {
   Runner runner(setup, recorded.was_checked());
   const TemporaryFolder scratch;
   const std::filesystem::path log = scratch.path() / "log.h5";
-  RunRecorder recorder(log, runner.loop(), setup, RunInputs{recorded.files().robot, recorded.files().mjcf, ""});
+  RunRecorder recorder(log, runner.loop(), setup,
+                       RunInputs{recorded.files().robot, recorded.files().mjcf, ""});
   runner.Settle();
   long rows = 0;
   runner.Run(
@@ -165,16 +170,20 @@ void AddRunCommand(CLI::App* app, const std::string& command_line, int* exit_cod
   const auto request = std::make_shared<Request>();
   request->command = command_line;
   CLI::App* command = app->add_subcommand("run", "Simulate a scenario, cross-checked at every step");
-  CLI::Option* scenario =
-      command->add_option("SCENARIO", request->scenario, "Name of a shipped scenario (--list), or a TOML file");
+  CLI::Option* scenario = command->add_option("SCENARIO", request->scenario,
+                                              "Name of a shipped scenario (--list), or a TOML file");
   CLI::Option* list = command->add_flag("--list", request->list, "List the shipped scenarios");
-  CLI::Option* replay =
-      command->add_option("--replay", request->replay,
-                          "Repeat a recorded run and compare every number bit for bit")->type_name("RUN_DIR");
-  command->add_option("--out", request->out, "Folder for the results, made by the run (runs/SCENARIO by default)")
+  CLI::Option* replay = command
+                            ->add_option("--replay", request->replay,
+                                         "Repeat a recorded run and compare every number bit for bit")
+                            ->type_name("RUN_DIR");
+  command
+      ->add_option("--out", request->out,
+                   "Folder for the results, made by the run (runs/SCENARIO by default)")
       ->type_name("DIR");
-  command->add_option("--set", request->overrides,
-                      "Set a key of the scenario, or with model. before it one of the parameter file")
+  command
+      ->add_option("--set", request->overrides,
+                   "Set a key of the scenario, or with model. before it one of the parameter file")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
   command->add_option("--seed", request->seed, "Vary posture and grasp at random; 0 does not")

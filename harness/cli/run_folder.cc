@@ -26,8 +26,7 @@ std::filesystem::path OrShipped(const std::string& file, const char* shipped) {
 ScenarioFiles Open(const std::filesystem::path& path, const std::vector<std::string>& overrides,
                    std::uint64_t seed) {
   ScenarioFiles files;
-  files.scenario =
-      ParseScenario(ReadTextFile(path.string()), path.string(), path.parent_path(), overrides);
+  files.scenario = ParseScenario(ReadTextFile(path.string()), path.string(), path.parent_path(), overrides);
   files.scenario.seed = seed;
   files.robot = OrShipped(files.scenario.model_file, "controller/parameters/assistant_robot.toml");
   files.mjcf = OrShipped(files.scenario.mjcf_file, "mjcf/scene.xml");
@@ -58,7 +57,8 @@ ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<st
   for (const ShippedScenario& scenario : ListShippedScenarios()) known.push_back(scenario.name);
   if (std::find(known.begin(), known.end(), name_or_file) == known.end()) {
     const std::string nearest = FindNearest(name_or_file, known);
-    throw InputError("scenario " + Quote(name_or_file) + ": is neither shipped (dexcheck run --list) nor a TOML file" +
+    throw InputError("scenario " + Quote(name_or_file) +
+                     ": is neither shipped (dexcheck run --list) nor a TOML file" +
                      (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?"));
   }
   return Open(FindShippedFile(std::string(kScenarioFolder) + "/" + name_or_file + ".toml"), overrides, seed);

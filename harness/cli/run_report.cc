@@ -17,7 +17,8 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop) {
   fmt::print("\n  {:<12}{:<24}{:>10}{:>10}\n", "question", "check", "worst", "bound");
   const auto& gate = setup.gate().records;
   const auto differs = std::count_if(gate.begin(), gate.end(), [](const CheckRecord& r) { return r.failed; });
-  fmt::print("  {:<12}{:<24}{:>10}{:>10}       {}\n", "model", "constants", differs, 0, differs > 0 ? "FAILS" : "ok");
+  fmt::print("  {:<12}{:<24}{:>10}{:>10}       {}\n", "model", "constants", differs, 0,
+             differs > 0 ? "FAILS" : "ok");
   for (const RunCheck& check : loop.model_checks()) PrintCheck(check);
   for (const RunCheck& check : loop.checks().checks()) PrintCheck(check);
 }
@@ -25,10 +26,11 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop) {
 void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
   const LoopTimes& times = loop.times();
   const double scale = 1e6 / static_cast<double>(std::max(loop.step(), 1L));
-  fmt::print("\n{:.1f} x real time. Microseconds a step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, "
-             "recording {:.0f}\n",
-             result.wall_seconds > 0.0 ? loop.time() / result.wall_seconds : 0.0, scale * times.plant,
-             scale * times.controller, scale * times.cross_check, scale * result.recording_seconds);
+  fmt::print(
+      "\n{:.1f} x real time. Microseconds a step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, "
+      "recording {:.0f}\n",
+      result.wall_seconds > 0.0 ? loop.time() / result.wall_seconds : 0.0, scale * times.plant,
+      scale * times.controller, scale * times.cross_check, scale * result.recording_seconds);
 }
 
 }  // namespace
@@ -38,8 +40,8 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
   const Scenario& scenario = setup.scenario();
   if (!quiet) {
     fmt::print("{}: {}\n", scenario.name, scenario.description);
-    fmt::print("{:.3f} of {:.3f} s simulated, {} steps of {} ms\n", loop.time(), scenario.duration, loop.step(),
-               1e3 * scenario.plant.time_step);
+    fmt::print("{:.3f} of {:.3f} s simulated, {} steps of {} ms\n", loop.time(), scenario.duration,
+               loop.step(), 1e3 * scenario.plant.time_step);
     fmt::print("object: position error {:.2e} m (rms {:.2e}), orientation error {:.2e} rad\n",
                result.tracking.position_max(), result.tracking.position_rms(),
                result.tracking.orientation_max());
@@ -50,8 +52,9 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
   }
   switch (result.verdict) {
     case Verdict::kPass:
-      fmt::print("PASS: {}\n", loop.is_checking() ? "model, balance, prediction and assumptions hold at every step."
-                                                  : "the run completed; nothing was checked.");
+      fmt::print("PASS: {}\n", loop.is_checking()
+                                   ? "model, balance, prediction and assumptions hold at every step."
+                                   : "the run completed; nothing was checked.");
       return;
     case Verdict::kFailed:
       fmt::print("FAILED: {}.\n", result.failure);

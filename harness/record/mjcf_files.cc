@@ -63,7 +63,8 @@ std::vector<std::string> ListMjcfFiles(const std::filesystem::path& mjcf) {
     }
   }
   for (const std::string& file : meshes) files.push_back((mesh_folder / file).lexically_normal().string());
-  for (const std::string& file : textures) files.push_back((texture_folder / file).lexically_normal().string());
+  for (const std::string& file : textures)
+    files.push_back((texture_folder / file).lexically_normal().string());
   for (const std::string& file : files) {
     if (!file.starts_with("..") && !file.starts_with("/")) continue;
     throw InputError(mjcf.string() + ": file " + Quote(file) +

@@ -134,8 +134,12 @@ void RunRecorder::AddContactSignals() {
   const int count = CountOf(tips);
   const double mu = setup_->object().friction;
   const std::vector<std::string> xyz = Expand(tips, {"x", "y", "z"});
-  Add({"contact/kappa", "rad", "contact coordinates (39)", 5 * count,
-       Expand(tips, {"u_f", "v_f", "u_o", "v_o", "psi"}), {}},
+  Add({"contact/kappa",
+       "rad",
+       "contact coordinates (39)",
+       5 * count,
+       Expand(tips, {"u_f", "v_f", "u_o", "v_o", "psi"}),
+       {}},
       [&loop](std::span<double> row) {
         for (size_t i = 0; i < loop.state().kappa.size(); ++i) {
           Copy(loop.state().kappa[i].CalcVector(), row.subspan(5 * i, 5));
@@ -159,20 +163,32 @@ void RunRecorder::AddContactSignals() {
       each(&EngineContact::normal));
   Add({"contact/force", "N", "forces of finger on object in the world", 3 * count, xyz, {{"mu", mu}}},
       each(&EngineContact::force));
-  Add({"contact/f_c", "N", "f_c of the engine, each in its contact frame, z into the object", 3 * count, xyz,
+  Add({"contact/f_c",
+       "N",
+       "f_c of the engine, each in its contact frame, z into the object",
+       3 * count,
+       xyz,
        {{"mu", mu}}},
       [&loop](std::span<double> row) { Copy(loop.checks().engine().f_c, row); });
   Add({"contact/f_c_model", "N", "f_c that (19), (46), (48) predict", 3 * count, xyz, {{"mu", mu}}},
       [&loop](std::span<double> row) { Copy(loop.checks().prediction().f_c, row); });
   const auto add_slip = [&](const std::string& group, const std::string& what,
                             const std::vector<std::string>& parts, const std::vector<SlipState>& states) {
-    Add({group + "/slip", "m", "slip of each " + what + " since t = 0", 3 * CountOf(parts),
-         Expand(parts, {"x", "y", "z"}), {}},
+    Add({group + "/slip",
+         "m",
+         "slip of each " + what + " since t = 0",
+         3 * CountOf(parts),
+         Expand(parts, {"x", "y", "z"}),
+         {}},
         [&states](std::span<double> row) {
           for (size_t i = 0; i < states.size(); ++i) Copy(states[i].distance, row.subspan(3 * i, 3));
         });
-    Add({group + "/cone_use", "1", "tangential force over mu times normal force of each " + what,
-         CountOf(parts), parts, {}},
+    Add({group + "/cone_use",
+         "1",
+         "tangential force over mu times normal force of each " + what,
+         CountOf(parts),
+         parts,
+         {}},
         [&states](std::span<double> row) {
           for (size_t i = 0; i < states.size(); ++i) row[i] = states[i].cone_use;
         });
@@ -190,7 +206,11 @@ void RunRecorder::AddCheckSignals() {
   for (const std::span<const RunCheck> checks :
        {loop_->model_checks(), std::span<const RunCheck>(loop_->checks().checks())}) {
     for (const RunCheck& check : checks) {
-      Add({"check/" + check.name, check.unit, check.description, 1, {},
+      Add({"check/" + check.name,
+           check.unit,
+           check.description,
+           1,
+           {},
            {{"bound", check.bound}, {"kind", static_cast<double>(check.kind)}}},
           [&check](std::span<double> row) { row[0] = check.last; });
     }

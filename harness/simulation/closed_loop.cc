@@ -18,8 +18,8 @@ double Seconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-constexpr double kRoughTime = 0.3;     // s after the first contact
-constexpr double kLargestSkew = 1e-2;  // rad between the platform's heading and the way ahead
+constexpr double kRoughTime = 0.3;      // s after the first contact
+constexpr double kLargestSkew = 1e-2;   // rad between the platform's heading and the way ahead
 constexpr double kSettleMoving = 0.5;   // s
 constexpr double kLargestTilt = 0.2;    // rad, of a robot that still stands
 constexpr double kLargestSink = 0.02;   // m, likewise
@@ -71,7 +71,8 @@ void ClosedLoop::SettleOn(const Trajectory& trajectory, double duration) {
     const double t = static_cast<double>(i) * dt;
     ControlStep(EvaluateDesired(trajectory, t), i);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
-    if (check_ && t >= kRoughTime) checks_.Compare(plant_, controller_, state_, tau_, &observer_, t - duration);
+    if (check_ && t >= kRoughTime)
+      checks_.Compare(plant_, controller_, state_, tau_, &observer_, t - duration);
     CheckGrasp();
   }
 }
@@ -109,7 +110,8 @@ void ClosedLoop::StartMoving(const DesiredMotion& at_start) {
 
   // Back to where it began: on a level floor every place is alike.
   EngineState moved = plant_.GetState();
-  const Vector3d way = static_cast<double>(std::lround(kSettleMoving / plant_.time_step())) * plant_.time_step() * v;
+  const Vector3d way =
+      static_cast<double>(std::lround(kSettleMoving / plant_.time_step())) * plant_.time_step() * v;
   const int base = m.jnt_qposadr[setup_->adapter().base_joints()[0]];
   const int body = m.jnt_qposadr[m.body_jntadr[setup_->adapter().object_body()]];
   moved.qpos.segment<2>(base) -= way.head<2>();
@@ -166,7 +168,8 @@ void ClosedLoop::Step() {
 }
 
 Vector6d ClosedLoop::X_o() const {
-  if (setup_->scenario().control.orientation == OrientationFeedback::kAngles) return controller_.grasp().X_o();
+  if (setup_->scenario().control.orientation == OrientationFeedback::kAngles)
+    return controller_.grasp().X_o();
   Vector6d X_o;
   X_o << state_.X_Bo.translation(), CalcAnyZyzAngles(state_.X_Bo.linear());
   return X_o;

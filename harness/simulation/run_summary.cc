@@ -13,9 +13,8 @@ double Rms(double squares, long count) {
 }
 
 Json ToJson(const RunCheck& check) {
-  Json json = {{"kind", NameOf(check.kind)}, {"max", check.max},
-               {"rms", check.rms()},         {"bound", check.bound},
-               {"unit", check.unit},         {"at_time_s", check.at_time},
+  Json json = {{"kind", NameOf(check.kind)}, {"max", check.max},   {"rms", check.rms()},
+               {"bound", check.bound},       {"unit", check.unit}, {"at_time_s", check.at_time},
                {"pass", !check.failed}};
   if (check.failed) json["failed_at_s"] = check.failed_at;
   if (!check.where.empty()) json["where"] = check.where;
@@ -24,7 +23,9 @@ Json ToJson(const RunCheck& check) {
 }
 
 Json ToJson(const CheckRecord& record) {
-  return {{"kind", NameOf(record.kind)}, {"max", record.worst}, {"bound", record.bound},
+  return {{"kind", NameOf(record.kind)},
+          {"max", record.worst},
+          {"bound", record.bound},
           {"pass", !record.failed}};
 }
 
@@ -57,16 +58,11 @@ void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
 
 Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& result) {
   const Scenario& scenario = setup.scenario();
-  Json json = {{"scenario", scenario.name},
-               {"description", scenario.description},
-               {"verdict", NameOf(result.verdict)},
-               {"failure", result.failure},
-               {"interrupted", result.interrupted},
-               {"seed", scenario.seed},
-               {"overrides", scenario.overrides},
-               {"duration_s", scenario.duration},
-               {"simulated_s", loop.time()},
-               {"time_step_s", scenario.plant.time_step}};
+  Json json = {{"scenario", scenario.name},         {"description", scenario.description},
+               {"verdict", NameOf(result.verdict)}, {"failure", result.failure},
+               {"interrupted", result.interrupted}, {"seed", scenario.seed},
+               {"overrides", scenario.overrides},   {"duration_s", scenario.duration},
+               {"simulated_s", loop.time()},        {"time_step_s", scenario.plant.time_step}};
   json["tracking"] = {{"position_error_max_m", result.tracking.position_max()},
                       {"position_error_rms_m", result.tracking.position_rms()},
                       {"orientation_error_max_rad", result.tracking.orientation_max()},

@@ -52,8 +52,8 @@ struct ControlOptions {
   ObjectGains gains;
   OrientationFeedback orientation = OrientationFeedback::kAngles;
   RedundancyWeight::Kind weight = RedundancyWeight::Kind::kIdentity;
-  double platform_weight = 1.0;        ///< W of the platform's velocities; kDiagonal.
-  double arm_weight = 1.0;             ///< Of joints that move several fingertips of the grasp; kDiagonal.
+  double platform_weight = 1.0;     ///< W of the platform's velocities; kDiagonal.
+  double arm_weight = 1.0;          ///< Of joints that move several fingertips of the grasp; kDiagonal.
   double posture_frequency = 10.0;  ///< Of the null-space posture task, rad/s, critically damped.
   double f_min = 0.0;               ///< Least normal force (squeeze), N.
   double f_max = 0.0;               ///< Largest, N.

@@ -55,7 +55,7 @@ TEST(Usage, HelpMentionsEveryCommandAndOption) {
     EXPECT_EQ(result.err, "");
     return result.out;
   };
-  for (const char* word : {"consistency", "eval", "--help", "--version"}) {
+  for (const char* word : {"consistency", "eval", "export", "--help", "--version"}) {
     EXPECT_THAT(help({"--help"}), HasSubstr(word));
   }
   for (const char* word : {"--robot FILE.toml", "--mjcf FILE.xml", "--samples N=10000", "--seed N=1",
@@ -65,6 +65,9 @@ TEST(Usage, HelpMentionsEveryCommandAndOption) {
   for (const char* word :
        {"--robot FILE.toml", "--mjcf FILE.xml", "--state STATE.json REQUIRED", "--out FILE.json=-"}) {
     EXPECT_THAT(help({"eval", "--help"}), HasSubstr(word));
+  }
+  for (const char* word : {"RUN_DIR", "--csv FILE.csv", "--signals A,B,...", "--every N=1", "--list"}) {
+    EXPECT_THAT(help({"export", "--help"}), HasSubstr(word));
   }
   EXPECT_THAT(help({"--version"}), ::testing::MatchesRegex("[0-9]+\\.[0-9]+\\.[0-9]+\n"));
 }

@@ -1,0 +1,42 @@
+#pragma once
+
+// What a log holds besides its rows: the signals, texts and files, as plain data.
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace dexcheck {
+
+/// One recorded quantity: a row of numbers at each step.
+struct SignalInfo {
+  std::string name;                          ///< Path in the log: "object/X_o", "check/M_bar".
+  std::string unit;                          ///< "m", "N m", "1"; a row may mix units: "m, rad".
+  std::string description;                   ///< One sentence.
+  int width = 1;                             ///< Numbers in a row.
+  std::vector<std::string> columns;          ///< Names of the columns: none, or one for each.
+  std::map<std::string, double> attributes;  ///< Further numbers, such as {"bound", 1e-10}.
+};
+
+/// A file kept in the log with all its bytes.
+struct EmbeddedFile {
+  std::string path;  ///< Group and relative name: "inputs/mjcf/assets/torus.msh".
+  std::string bytes;
+};
+
+/// A text whose place in the file is kept, so that it can be written and replaced late.
+struct ReservedText {
+  size_t capacity = 0;  ///< Bytes.
+  std::string text;
+};
+
+/// Everything but the rows.
+struct LogContent {
+  std::vector<SignalInfo> signals;  ///< The first is time.
+  std::map<std::string, std::string> texts;
+  std::map<std::string, ReservedText> reserved_texts;
+  std::vector<EmbeddedFile> files;
+};
+
+}  // namespace dexcheck
