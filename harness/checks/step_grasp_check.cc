@@ -157,7 +157,8 @@ void StepModelCheck::CompareContactRates(const Contact& contact, int finger, con
   const Vector3d omega_o = R_cf.transpose() * object.omega;
   const Vector6d over_tip = CalcFrameTwistOnFingertip(contact.geometry, contact.kappa_dot);
   const Vector3d u_f = over_tip.head<3>();
-  const Vector3d u_o = v_f + u_f - v_o;
+  Vector3d u_o = v_f + u_f - v_o;
+  u_o.z() = 0.0;  // kappa moves within the surfaces, also while the bodies approach
   const Vector3d omega = omega_f + over_tip.tail<3>();
   const Eigen::Index row = 3 * finger;
   // d/dt (R_cf^T v_f(p_c)), and the same of the object's velocity at p_c
