@@ -22,6 +22,11 @@ class VelocityMap {
   /// Number of velocity coordinates.
   [[nodiscard]] int size() const { return base_size_ + static_cast<int>(adapter_->joint_dofs().size()); }
 
+  /// The engine's dofs of the base's joints, then of the wheels.
+  [[nodiscard]] const std::vector<int>& base_dofs() const { return base_dofs_; }
+  /// Rows of T of those dofs in the base's columns; in its other columns they have zeros.
+  [[nodiscard]] const MatrixXd& base_columns() const { return T_base_; }
+
   /// Writes T velocity on the robot's dofs of an nv-vector; other dofs are left alone.
   void Expand(const Eigen::Ref<const VectorXd>& velocity, mjtNum* qvel) const;
   /// Writes T_dot velocity, at SetState's velocity, on the robot's dofs of an nv-vector.
@@ -45,7 +50,7 @@ class VelocityMap {
 
   const Adapter* adapter_;
   int base_size_;
-  std::vector<int> base_dofs_;  // of the base's joints, then of the wheels
+  std::vector<int> base_dofs_;
   MatrixXd T_base_;             // base_dofs x base_size
   VectorXd bias_;               // T_dot velocity on base_dofs
   MatrixXd M_T_;                // scratch of ProjectMatrix, nv x base_size

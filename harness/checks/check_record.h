@@ -50,9 +50,13 @@ struct CheckRecord {
 
   long comparisons = 0;
 
-  /// Adds one compared number. `scale` is positive; the error is |model - engine| / scale.
-  void Add(double model, double engine, double scale, const Location& location, long at_sample) {
-    double error = std::abs(model - engine) / scale;
+  /// Adds one compared number. `scale` is positive; the error is |model - engine| / scale, which is returned.
+  double Add(double model, double engine, double scale, const Location& location, long at_sample) {
+    return AddError(std::abs(model - engine) / scale, model, engine, location, at_sample);
+  }
+
+  /// The same with the relative error calculated before; returns infinity when it is not a number.
+  double AddError(double error, double model, double engine, const Location& location, long at_sample) {
     if (!(error < std::numeric_limits<double>::infinity())) error = std::numeric_limits<double>::infinity();
     ++comparisons;
     if (error > worst || comparisons == 1) {
@@ -67,6 +71,7 @@ struct CheckRecord {
       first_failure = location;
       first_failing_sample = at_sample;
     }
+    return error;
   }
 };
 

@@ -4,59 +4,20 @@
 #include <cmath>
 
 namespace dexcheck {
-namespace {
-
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-
-// Rounding errors of one joint's step outward, in eps of the coordinates' size: a rotation of three products
-// and sums per entry on either side, and the engine's normalised quaternion. Errors of successive joints add
-// up.
-constexpr double kErrorsPerJoint = 16.0;
-
-/// Relative rounding bound of a term whose formation chains `factors` such geometric quantities.
-double RoundingBound(int depth, double factors) { return factors * kErrorsPerJoint * (depth + 1) * kEpsilon; }
-
-double RowReach(const Joint& joint) {
-  const double slide =
-      joint.type == JointType::kPrismatic ? std::max(std::abs(joint.lower), std::abs(joint.upper)) : 0.0;
-  return joint.X_PB.translation().norm() + std::abs(joint.mdh.a) + std::abs(joint.mdh.d) + slide;
-}
-
-/// Farthest that a point of the robot (centres of mass, frames) can be from Sigma_0's origin, over all
-/// postures.
-double CalcReach(const RobotModel& model) {
-  std::vector<double> reach(static_cast<size_t>(model.num_joints()) + 1, 0.0);
-  double farthest = model.base_with_wheels().com.norm() + 0.5 * model.base().wheel_distance;
-  for (int i = 0; i < model.num_joints(); ++i) {
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
-    double& mine = reach[static_cast<size_t>(i + 1)];
-    mine = reach[static_cast<size_t>(joint.parent + 1)] + RowReach(joint);
-    farthest = std::max(farthest, mine + joint.body.com.norm());
-  }
-  for (const Frame& frame : model.frames()) {
-    farthest =
-        std::max(farthest, reach[static_cast<size_t>(frame.link + 1)] + frame.X_LF.translation().norm());
-  }
-  return farthest;
-}
-
-/// A scale of zero (a model without mass, a state at rest) leaves an absolute comparison.
-double Positive(double scale) { return scale > 0.0 ? scale : 1.0; }
-
-}  // namespace
 
 ModelCheck::ModelCheck(const Adapter& adapter)
     : terms_(adapter.model(), Coordinates::kReduced),
       terms_at_w_(adapter.model(), Coordinates::kReduced),
       unreduced_(adapter.model(), Coordinates::kUnreduced),
       engine_(adapter, Coordinates::kReduced),
-      engine_unreduced_(adapter, Coordinates::kUnreduced) {
+      engine_unreduced_(adapter, Coordinates::kUnreduced),
+      scales_(adapter.model()) {
   const RobotModel& model = adapter.model();
   const int depth = model.max_depth();
   records_.resize(kTermCount);
   const auto define = [&](Term term, const char* name, double factors) {
     records_[term].name = name;
-    records_[term].bound = RoundingBound(depth, factors);
+    records_[term].bound = CalcRoundingBound(depth, factors);
   };
   define(kJointAxis, "joint_axis", 1.0);
   define(kLinkCom, "link_com", 1.0);
@@ -75,16 +36,6 @@ ModelCheck::ModelCheck(const Adapter& adapter)
   define(kLinearMomentum, "linear_momentum", 1.0);
   define(kAngularMomentum, "angular_momentum", 2.0);
 
-  reach_ = CalcReach(model);
-  squared_rate_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
-  subtree_mass_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
-  subtree_mass_[0] = model.base().type == BaseType::kFixed ? 0.0 : model.base_with_wheels().mass;
-  for (int i = model.num_joints() - 1; i >= 0; --i) {
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
-    subtree_mass_[static_cast<size_t>(i + 1)] += joint.body.mass;
-    subtree_mass_[static_cast<size_t>(joint.parent + 1)] += subtree_mass_[static_cast<size_t>(i + 1)];
-  }
-
   const int n = terms_.size();
   unreduced_velocity_.setZero(unreduced_.size());
   J_.setZero(6, n);
@@ -102,7 +53,7 @@ void ModelCheck::Compare(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<c
   terms_.SetState(q, xi);
   terms_.CalcDynamics();
   engine_.SetState(q, xi);
-  CalcScales(q, xi);
+  scales_.SetState(terms_, q, xi);
   CompareGeometry();
   CompareFrames(xi);
   unreduced_.SetState(q, unreduced_velocity_);
@@ -113,64 +64,9 @@ void ModelCheck::Compare(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<c
   CompareForces(xi, w, q);
 }
 
-void ModelCheck::CalcScales(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi) {
-  const RobotModel& model = terms_.model();
-  const int base = base_velocities();
-  scales_.length = reach_;
-  scales_.world_length = reach_ + model.base().X_B0.translation().norm();
-  if (model.num_base_positions() == 3) scales_.world_length += q.head<2>().norm();
-
-  const Vector6d velocity = terms_.CalcLinkVelocity(-1);
-  double sliding = velocity.head<3>().squaredNorm();
-  squared_rate_[0] = velocity.tail<3>().squaredNorm();
-  double fastest = squared_rate_[0];
-  for (int i = 0; i < model.num_joints(); ++i) {
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
-    const double squared = xi[base + i] * xi[base + i];
-    double& rate = squared_rate_[static_cast<size_t>(i + 1)];
-    rate = squared_rate_[static_cast<size_t>(joint.parent + 1)];
-    (joint.type == JointType::kRevolute ? rate : sliding) += squared;
-    fastest = std::max(fastest, rate);
-  }
-  scales_.angular_rate = std::sqrt(fastest);
-  scales_.linear_rate = std::sqrt(sliding) + scales_.angular_rate * scales_.length;
-}
-
-double ModelCheck::VelocityScale(int coordinate) const {
-  const RobotModel& model = terms_.model();
-  const int base = base_velocities();
-  if (coordinate >= base) {
-    const bool revolute = model.joints()[static_cast<size_t>(coordinate - base)].type == JointType::kRevolute;
-    return revolute ? scales_.length : 1.0;
-  }
-  if (base == 3) return coordinate < 2 ? 1.0 : scales_.length;
-  if (model.base().velocity == DriveVelocity::kTwist) return coordinate == 0 ? 1.0 : scales_.length;
-  return 0.5 * model.base().wheel_radius +
-         model.base().wheel_radius / model.base().wheel_distance * scales_.length;
-}
-
-double ModelCheck::SubtreeMass(int coordinate) const {
-  return subtree_mass_[static_cast<size_t>(std::max(coordinate - base_velocities() + 1, 0))];
-}
-
-double ModelCheck::FrictionScale(int coordinate, const Eigen::Ref<const VectorXd>& xi) const {
-  const RobotModel& model = terms_.model();
-  const int base = base_velocities();
-  if (coordinate >= base) {
-    return model.joints()[static_cast<size_t>(coordinate - base)].damping * std::abs(xi[coordinate]);
-  }
-  if (model.base().type != BaseType::kDifferentialDrive) return 0.0;
-  // K^T D K v with K of size VelocityScale / r: the two wheels' parts may cancel.
-  const Vector6d velocity = terms_.CalcLinkVelocity(-1);
-  const double r = model.base().wheel_radius;
-  const double arm = 0.5 * model.base().wheel_distance;
-  const double wheel_rate = (velocity.head<3>().norm() + arm * velocity.tail<3>().norm()) / r;
-  return 2.0 * model.base().wheel.damping * wheel_rate * VelocityScale(coordinate) / r;
-}
-
 void ModelCheck::CompareGeometry() {
   const RobotModel& model = terms_.model();
-  const double length = scales_.world_length;
+  const double length = scales_.world_length();
   // From the base outward, so that the first failure is the one that the others follow from.
   for (int i = -1; i < model.num_joints(); ++i) {
     const Pose X = terms_.CalcLinkPose(i);
@@ -208,15 +104,15 @@ void ModelCheck::CompareGeometry() {
 void ModelCheck::CompareFrames(const Eigen::Ref<const VectorXd>& xi) {
   const int frames = static_cast<int>(terms_.model().frames().size());
   const int n = terms_.size();
-  const double acceleration = Positive(scales_.linear_rate * scales_.angular_rate);
-  const double angular_acceleration = Positive(scales_.angular_rate * scales_.angular_rate);
+  const double acceleration = Positive(scales_.acceleration());
+  const double angular_acceleration = Positive(scales_.angular_rate() * scales_.angular_rate());
   for (int frame = 0; frame < frames; ++frame) {
     const Location where{Location::Kind::kFrame, frame, -1};
     const Pose X = terms_.CalcFramePose(frame);
     const Pose X_engine = engine_.FramePose(frame);
     for (int row = 0; row < 3; ++row) {
       record(kFramePose)
-          .Add(X.translation()[row], X_engine.translation()[row], scales_.world_length, where, sample_);
+          .Add(X.translation()[row], X_engine.translation()[row], scales_.world_length(), where, sample_);
       for (int col = 0; col < 3; ++col) {
         record(kFramePose).Add(X.linear()(row, col), X_engine.linear()(row, col), 1.0, where, sample_);
       }
@@ -231,10 +127,10 @@ void ModelCheck::CompareFrames(const Eigen::Ref<const VectorXd>& xi) {
       // The body Jacobian turned to world axes; rows of the angular part are pure numbers.
       const Vector3d linear = X.linear() * J_.col(col).head<3>();
       const Vector3d angular = X.linear() * J_.col(col).tail<3>();
-      const double scale = VelocityScale(col);
+      const double scale = scales_.CalcVelocityScale(col);
       for (int k = 0; k < 3; ++k) {
         record(kJ).Add(linear[k], J_engine_(k, col), scale, where, sample_);
-        record(kJ).Add(angular[k], J_engine_(3 + k, col), Positive(scale / scales_.length), where, sample_);
+        record(kJ).Add(angular[k], J_engine_(3 + k, col), Positive(scale / scales_.length()), where, sample_);
       }
       omega += angular * xi[col];
       velocity += linear * xi[col];
@@ -252,31 +148,25 @@ void ModelCheck::CompareFrames(const Eigen::Ref<const VectorXd>& xi) {
 
 void ModelCheck::CompareMassMatrices() {
   const int n = terms_.size();
-  const RobotModel& model = terms_.model();
-  const auto scale_of = [&](int row, int col) {
-    const double mass = std::min(SubtreeMass(row), SubtreeMass(col));
-    const double armature = row == col && row >= base_velocities()
-                                ? model.joints()[static_cast<size_t>(row - base_velocities())].armature
-                                : 0.0;
-    return Positive(mass * VelocityScale(row) * VelocityScale(col) + armature);
-  };
   for (int col = 0; col < n; ++col) {
     for (int row = 0; row < n; ++row) {
       record(kReducedMassMatrix)
-          .Add(terms_.M()(row, col), engine_.M()(row, col), scale_of(row, col),
+          .Add(terms_.M()(row, col), engine_.M()(row, col), scales_.CalcMassScale(row, col),
                {Location::Kind::kVelocityPair, row, col}, sample_);
     }
   }
   // M of (16): its first three rows are along the world's x, y and about z; the others are M_bar's.
   const int shift = unreduced_.size() - n;
-  const int base = model.num_base_positions();
-  const double mass = Positive(subtree_mass_[0]);
+  const int base = terms_.model().num_base_positions();
+  const double mass = Positive(scales_.total_mass());
   for (int col = 0; col < unreduced_.size(); ++col) {
     for (int row = 0; row < unreduced_.size(); ++row) {
-      const double row_scale = row < base ? (row < 2 ? 1.0 : scales_.length) : VelocityScale(row - shift);
-      const double col_scale = col < base ? (col < 2 ? 1.0 : scales_.length) : VelocityScale(col - shift);
-      const double row_mass = row < base ? mass : SubtreeMass(row - shift);
-      const double col_mass = col < base ? mass : SubtreeMass(col - shift);
+      const double row_scale =
+          row < base ? (row < 2 ? 1.0 : scales_.length()) : scales_.CalcVelocityScale(row - shift);
+      const double col_scale =
+          col < base ? (col < 2 ? 1.0 : scales_.length()) : scales_.CalcVelocityScale(col - shift);
+      const double row_mass = row < base ? mass : scales_.GetSubtreeMass(row - shift);
+      const double col_mass = col < base ? mass : scales_.GetSubtreeMass(col - shift);
       record(kMassMatrix)
           .Add(unreduced_.M()(row, col), engine_unreduced_.M()(row, col),
                Positive(std::min(row_mass, col_mass) * row_scale * col_scale),
@@ -288,17 +178,15 @@ void ModelCheck::CompareMassMatrices() {
 void ModelCheck::CompareForces(const Eigen::Ref<const VectorXd>& xi, const Eigen::Ref<const VectorXd>& w,
                                const Eigen::Ref<const VectorXd>& q) {
   const int n = terms_.size();
-  const double g = terms_.model().gravity().norm();
-  const double acceleration = scales_.linear_rate * scales_.angular_rate;
   force_.noalias() = terms_.C() * xi;
   for (int i = 0; i < n; ++i) {
     const Location where{Location::Kind::kVelocity, i, -1};
-    const double inertial = SubtreeMass(i) * VelocityScale(i);
     record(kCoriolisForce)
-        .Add(force_[i], engine_.coriolis()[i], Positive(inertial * acceleration), where, sample_);
-    record(kGravity).Add(terms_.gravity()[i], engine_.gravity()[i], Positive(inertial * g), where, sample_);
-    record(kFriction).Add(terms_.friction()[i], engine_.friction()[i], Positive(FrictionScale(i, xi)), where,
-                          sample_);
+        .Add(force_[i], engine_.coriolis()[i], scales_.CalcCoriolisScale(i), where, sample_);
+    record(kGravity).Add(terms_.gravity()[i], engine_.gravity()[i], scales_.CalcGravityScale(i), where,
+                         sample_);
+    record(kFriction).Add(terms_.friction()[i], engine_.friction()[i], scales_.CalcFrictionScale(i, xi),
+                          where, sample_);
   }
 
   // C_bar(xi) w + C_bar(w) xi against the engine's force at xi + w and xi - w.
@@ -315,7 +203,7 @@ void ModelCheck::CompareForces(const Eigen::Ref<const VectorXd>& xi, const Eigen
   constexpr double kProbe = 4.0;
   for (int i = 0; i < n; ++i) {
     record(kCoriolisMatrix)
-        .Add(probe_[i], probe_engine_[i], Positive(kProbe * SubtreeMass(i) * VelocityScale(i) * acceleration),
+        .Add(probe_[i], probe_engine_[i], kProbe * scales_.CalcCoriolisScale(i),
              {Location::Kind::kVelocity, i, -1}, sample_);
   }
 }
@@ -324,21 +212,15 @@ void ModelCheck::CompareEnergies() {
   const Location whole;
   const EnergyAndMomentum& engine = engine_.energy_and_momentum();
   const EnergyAndMomentum model = terms_.CalcEnergyAndMomentum();
-  const double mass = subtree_mass_[0];
-  const double momentum = mass * scales_.linear_rate;
-  double rotors = 0.0;
-  for (const Joint& joint : terms_.model().joints()) rotors += joint.armature;
-  const double kinetic =
-      momentum * scales_.linear_rate + rotors * scales_.angular_rate * scales_.angular_rate;
-  record(kKineticEnergy).Add(model.kinetic, engine.kinetic, Positive(kinetic), whole, sample_);
+  const double momentum = scales_.CalcMomentumScale();
+  record(kKineticEnergy).Add(model.kinetic, engine.kinetic, scales_.CalcKineticEnergyScale(), whole, sample_);
   record(kPotentialEnergy)
-      .Add(model.potential, engine.potential,
-           Positive(mass * terms_.model().gravity().norm() * scales_.world_length), whole, sample_);
+      .Add(model.potential, engine.potential, scales_.CalcPotentialEnergyScale(), whole, sample_);
   for (int k = 0; k < 3; ++k) {
     record(kLinearMomentum)
         .Add(model.linear_momentum[k], engine.linear_momentum[k], Positive(momentum), whole, sample_);
     record(kAngularMomentum)
-        .Add(model.angular_momentum[k], engine.angular_momentum[k], Positive(momentum * scales_.length),
+        .Add(model.angular_momentum[k], engine.angular_momentum[k], Positive(momentum * scales_.length()),
              whole, sample_);
   }
 }

@@ -6,18 +6,10 @@
 
 #include "controller/dynamics/model_terms.h"
 #include "harness/checks/check_record.h"
+#include "harness/checks/rounding_scales.h"
 #include "harness/engine/engine_terms.h"
 
 namespace dexcheck {
-
-/// Sizes of the state and the robot that rounding errors are relative to. An error of a term is divided by
-/// the size of what is summed up to form it, so that one bound holds for every entry, large or small.
-struct RoundingScales {
-  double world_length = 0.0;  ///< Of the world coordinates of the robot's points, m.
-  double length = 0.0;        ///< Of their distances from the base, m.
-  double angular_rate = 0.0;  ///< Of a link, rad/s: root of the summed squares along the fastest chain.
-  double linear_rate = 0.0;   ///< Of a point, m/s.
-};
 
 /// Compares all robot terms at a state, and remembers the worst. Nothing allocates after construction but
 /// when a new worst case is stored.
@@ -55,10 +47,6 @@ class ModelCheck {
     kTermCount
   };
   CheckRecord& record(Term term) { return records_[term]; }
-  void CalcScales(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi);
-  [[nodiscard]] double VelocityScale(int coordinate) const;
-  [[nodiscard]] double SubtreeMass(int coordinate) const;
-  [[nodiscard]] double FrictionScale(int coordinate, const Eigen::Ref<const VectorXd>& xi) const;
 
   void CompareGeometry();
   void CompareFrames(const Eigen::Ref<const VectorXd>& xi);
@@ -73,9 +61,6 @@ class ModelCheck {
   EngineTerms engine_;
   EngineTerms engine_unreduced_;
   std::vector<CheckRecord> records_;
-  std::vector<double> subtree_mass_;  // base first
-  std::vector<double> squared_rate_;  // scratch of CalcScales, base first
-  double reach_ = 0.0;
   RoundingScales scales_;
   long sample_ = -1;
 

@@ -42,7 +42,7 @@ Observer::BaseRates Observer::ReadBaseRates(const mjData& data) const {
   BaseRates rates;
   adapter_->GetBaseMotion(data.qpos, data.qvel, &rates.velocity, &rates.omega);
   // v_0 = v_A - omega x p_0A
-  rates.velocity -= rates.omega.cross(R_B0_ * adapter_->anchor());
+  rates.velocity -= rates.omega.cross(X_W0_.linear() * adapter_->anchor());
   return rates;
 }
 
@@ -53,10 +53,10 @@ void Observer::Read(const Plant& plant, MeasuredState* state) {
   state->xi.resize(model.num_velocities());
   adapter_->GetPositions(data.qpos, state->q);
 
-  const Pose X_W0 = adapter_->GetBasePose(data.qpos);
-  R_B0_ = X_W0.linear();
-  departure_.tilt = std::atan2(R_B0_.col(2).head<2>().norm(), R_B0_(2, 2));
-  departure_.height = X_W0.translation().z() - model.base().X_B0.translation().z();
+  X_W0_ = adapter_->GetBasePose(data.qpos);
+  const Vector3d up = X_W0_.linear().col(2);
+  departure_.tilt = std::atan2(up.head<2>().norm(), up.z());
+  departure_.height = X_W0_.translation().z() - model.base().X_B0.translation().z();
   rates_ = ReadBaseRates(data);
   const int base = model.num_base_velocities();
   if (base == 3) {
@@ -79,7 +79,7 @@ void Observer::Read(const Plant& plant, MeasuredState* state) {
 
   // Contacts where the fingertips are, on the base as it really stands.
   kinematics_.SetState(state->q, state->xi);
-  const Pose X_oB = state->X_Bo.inverse() * X_W0 * kinematics_.CalcLinkPose(-1).inverse();
+  const Pose X_oB = state->X_Bo.inverse() * X_W0_ * kinematics_.CalcLinkPose(-1).inverse();
   const bool guess = has_guess_ && state->kappa.size() == fingertips_.size();
   state->kappa.resize(fingertips_.size());
   state->overlap.resize(fingertips_.size());
@@ -107,7 +107,7 @@ void Observer::ReadAccelerations(const Plant& plant, const MeasuredState& state,
   const int base = model.num_base_velocities();
   Vector3d linear, angular;
   adapter_->GetBaseMotion(plant.step_qpos().data(), data.qacc, &linear, &angular);
-  const Vector3d arm = R_B0_ * adapter_->anchor();
+  const Vector3d arm = X_W0_.linear() * adapter_->anchor();
   // d/dt (v_A - omega x p_0A)
   linear -= angular.cross(arm) + rates_.omega.cross(rates_.omega.cross(arm));
   if (base == 3) {

@@ -39,6 +39,8 @@ class Observer {
   /// puts them.
   void Read(const Plant& plant, MeasuredState* state);
   [[nodiscard]] const BaseDeparture& departure() const { return departure_; }
+  /// Pose of Sigma_0 in the world at the state read, tilt and height included.
+  [[nodiscard]] const Pose& X_W0() const { return X_W0_; }
 
   /// xi_dot (n) and V_Bo_dot from the engine's accelerations, after EndStep.
   /// @param state what Read gave before that step.
@@ -67,7 +69,7 @@ class Observer {
   std::vector<int> tip_geoms_;
   std::vector<EngineContact> contacts_;
   BaseDeparture departure_;
-  Matrix3d R_B0_ = Matrix3d::Identity();  // of the base at the state read
+  Pose X_W0_ = Pose::Identity();
   BaseRates rates_;
   bool has_guess_ = false;
 };

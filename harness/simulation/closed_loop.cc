@@ -40,6 +40,18 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check)
   control_interval_ = std::max(1L, std::lround(scenario.plant.control_step / scenario.plant.time_step));
   tau_.setZero(setup.model().num_velocities());
   qvel_.setZero(setup.engine().nv);
+  if (check) {
+    model_check_ = std::make_unique<StepModelCheck>(setup.adapter(), setup.fingertips(),
+                                                    scenario.control.orientation);
+    for (const CheckRecord& record : model_check_->records()) {
+      RunCheck run_check;
+      run_check.name = record.name;
+      run_check.kind = record.kind;
+      run_check.bound = record.bound;
+      run_check.description = "model against engine at the same state, relative to the term's scale";
+      model_checks_.push_back(run_check);
+    }
+  }
   PlaceRobot();
   trajectory_ = MakeTrajectory(scenario, setup.X_start() + scenario.start_error);
 }
@@ -161,10 +173,30 @@ void ClosedLoop::Step() {
   ++step_;
   if (check_) {
     const auto begin = Clock::now();
+    CompareModel();
     checks_.Compare(plant_, controller_, state_, tau_, &observer_, step_time_);
     times_.cross_check += Seconds(begin, Clock::now());
   }
   CheckGrasp();
+}
+
+void ClosedLoop::CompareModel() {
+  model_check_->Compare(controller_.robot(), controller_.grasp(), state_, observer_.X_W0(), step_);
+  const std::span<const double> errors = model_check_->step_errors();
+  bool newly_failed = false;
+  for (size_t i = 0; i < errors.size(); ++i) {
+    const bool failed_before = model_checks_[i].failed;
+    model_checks_[i].Add(errors[i], step_time_);
+    newly_failed = newly_failed || (model_checks_[i].failed && !failed_before);
+  }
+  if (!newly_failed) return;
+  const std::vector<CheckRecord> records = model_check_->records();
+  const RobotModel& model = setup_->model();
+  for (size_t i = 0; i < records.size(); ++i) {
+    if (records[i].failed) {
+      model_checks_[i].where = Describe(records[i].first_failure, model, model.num_base_velocities());
+    }
+  }
 }
 
 Vector6d ClosedLoop::X_o() const {

@@ -9,6 +9,7 @@
 #include "controller/control/grasp_controller.h"
 #include "controller/control/trajectory.h"
 #include "harness/checks/step_checks.h"
+#include "harness/checks/step_model_check.h"
 #include "harness/plant/observer.h"
 #include "harness/plant/plant.h"
 #include "harness/simulation/setup.h"
@@ -86,6 +87,7 @@ class ClosedLoop {
   void SettleOn(const Trajectory& trajectory, double duration);
   void ControlStep(const DesiredMotion& desired, long step);
   [[nodiscard]] DesiredMotion EvaluateDesired(const Trajectory& trajectory, double t) const;
+  void CompareModel();
   void CheckRobot() const;
   void CheckTorques();
   void CheckGrasp();
@@ -96,6 +98,7 @@ class ClosedLoop {
   Observer observer_;
   GraspController controller_;
   StepChecks checks_;
+  std::unique_ptr<StepModelCheck> model_check_;
   std::vector<RunCheck> model_checks_;
   std::unique_ptr<Trajectory> trajectory_;
   long num_steps_ = 0;

@@ -1,0 +1,132 @@
+#include "harness/checks/rounding_scales.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dexcheck {
+namespace {
+
+// Rounding errors of one joint's step outward, in eps of the coordinates' size: a rotation of three products
+// and sums per entry on either side, and the engine's normalised quaternion. Errors of successive joints add
+// up.
+constexpr double kErrorsPerJoint = 16.0;
+
+double RowReach(const Joint& joint) {
+  const double slide =
+      joint.type == JointType::kPrismatic ? std::max(std::abs(joint.lower), std::abs(joint.upper)) : 0.0;
+  return joint.X_PB.translation().norm() + std::abs(joint.mdh.a) + std::abs(joint.mdh.d) + slide;
+}
+
+/// Farthest that a point of the robot (centres of mass, frames) can be from Sigma_0's origin, over all
+/// postures.
+double CalcReach(const RobotModel& model) {
+  std::vector<double> reach(static_cast<size_t>(model.num_joints()) + 1, 0.0);
+  double farthest = model.base_with_wheels().com.norm() + 0.5 * model.base().wheel_distance;
+  for (int i = 0; i < model.num_joints(); ++i) {
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    double& mine = reach[static_cast<size_t>(i + 1)];
+    mine = reach[static_cast<size_t>(joint.parent + 1)] + RowReach(joint);
+    farthest = std::max(farthest, mine + joint.body.com.norm());
+  }
+  for (const Frame& frame : model.frames()) {
+    farthest =
+        std::max(farthest, reach[static_cast<size_t>(frame.link + 1)] + frame.X_LF.translation().norm());
+  }
+  return farthest;
+}
+
+}  // namespace
+
+double CalcRoundingBound(int depth, double factors) {
+  return factors * kErrorsPerJoint * (depth + 1) * std::numeric_limits<double>::epsilon();
+}
+
+RoundingScales::RoundingScales(const RobotModel& model)
+    : model_(&model), base_velocities_(model.num_base_velocities()), reach_(CalcReach(model)) {
+  squared_rate_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
+  subtree_mass_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
+  subtree_mass_[0] = model.base().type == BaseType::kFixed ? 0.0 : model.base_with_wheels().mass;
+  for (int i = model.num_joints() - 1; i >= 0; --i) {
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    subtree_mass_[static_cast<size_t>(i + 1)] += joint.body.mass;
+    subtree_mass_[static_cast<size_t>(joint.parent + 1)] += subtree_mass_[static_cast<size_t>(i + 1)];
+    rotors_ += joint.armature;
+  }
+}
+
+void RoundingScales::SetState(const ModelTerms& terms, const Eigen::Ref<const VectorXd>& q,
+                              const Eigen::Ref<const VectorXd>& xi) {
+  world_length_ = reach_ + model_->base().X_B0.translation().norm();
+  if (model_->num_base_positions() == 3) world_length_ += q.head<2>().norm();
+
+  base_velocity_ = terms.CalcLinkVelocity(-1);
+  double sliding = base_velocity_.head<3>().squaredNorm();
+  squared_rate_[0] = base_velocity_.tail<3>().squaredNorm();
+  double fastest = squared_rate_[0];
+  for (int i = 0; i < model_->num_joints(); ++i) {
+    const Joint& joint = model_->joints()[static_cast<size_t>(i)];
+    const double squared = xi[base_velocities_ + i] * xi[base_velocities_ + i];
+    double& rate = squared_rate_[static_cast<size_t>(i + 1)];
+    rate = squared_rate_[static_cast<size_t>(joint.parent + 1)];
+    (joint.type == JointType::kRevolute ? rate : sliding) += squared;
+    fastest = std::max(fastest, rate);
+  }
+  angular_rate_ = std::sqrt(fastest);
+  linear_rate_ = std::sqrt(sliding) + angular_rate_ * reach_;
+}
+
+double RoundingScales::CalcVelocityScale(int coordinate) const {
+  if (coordinate >= base_velocities_) {
+    const bool revolute =
+        model_->joints()[static_cast<size_t>(coordinate - base_velocities_)].type == JointType::kRevolute;
+    return revolute ? reach_ : 1.0;
+  }
+  if (base_velocities_ == 3) return coordinate < 2 ? 1.0 : reach_;
+  if (model_->base().velocity == DriveVelocity::kTwist) return coordinate == 0 ? 1.0 : reach_;
+  return 0.5 * model_->base().wheel_radius +
+         model_->base().wheel_radius / model_->base().wheel_distance * reach_;
+}
+
+double RoundingScales::GetSubtreeMass(int coordinate) const {
+  return subtree_mass_[static_cast<size_t>(std::max(coordinate - base_velocities_ + 1, 0))];
+}
+
+double RoundingScales::CalcMassScale(int row, int col) const {
+  const double mass = std::min(GetSubtreeMass(row), GetSubtreeMass(col));
+  const double armature = row == col && row >= base_velocities_
+                              ? model_->joints()[static_cast<size_t>(row - base_velocities_)].armature
+                              : 0.0;
+  return Positive(mass * CalcVelocityScale(row) * CalcVelocityScale(col) + armature);
+}
+
+double RoundingScales::CalcGravityScale(int coordinate) const {
+  return Positive(GetSubtreeMass(coordinate) * CalcVelocityScale(coordinate) * model_->gravity().norm());
+}
+
+double RoundingScales::CalcCoriolisScale(int coordinate) const {
+  return Positive(GetSubtreeMass(coordinate) * CalcVelocityScale(coordinate) * acceleration());
+}
+
+double RoundingScales::CalcFrictionScale(int coordinate, const Eigen::Ref<const VectorXd>& xi) const {
+  if (coordinate >= base_velocities_) {
+    return Positive(model_->joints()[static_cast<size_t>(coordinate - base_velocities_)].damping *
+                    std::abs(xi[coordinate]));
+  }
+  if (model_->base().type != BaseType::kDifferentialDrive) return 1.0;
+  // K^T D K v with K of size velocity / r: the two wheels' parts may cancel.
+  const double r = model_->base().wheel_radius;
+  const double arm = 0.5 * model_->base().wheel_distance;
+  const double wheel_rate = (base_velocity_.head<3>().norm() + arm * base_velocity_.tail<3>().norm()) / r;
+  return Positive(2.0 * model_->base().wheel.damping * wheel_rate * CalcVelocityScale(coordinate) / r);
+}
+
+double RoundingScales::CalcKineticEnergyScale() const {
+  return Positive(CalcMomentumScale() * linear_rate_ + rotors_ * angular_rate_ * angular_rate_);
+}
+
+double RoundingScales::CalcPotentialEnergyScale() const {
+  return Positive(total_mass() * model_->gravity().norm() * world_length_);
+}
+
+}  // namespace dexcheck

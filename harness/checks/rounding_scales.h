@@ -1,0 +1,69 @@
+#pragma once
+
+// What rounding can explain: bounds and scales of the robot's terms.
+
+#include <vector>
+
+#include "controller/dynamics/model_terms.h"
+
+namespace dexcheck {
+
+/// Relative rounding bound of a term whose formation chains `factors` geometric quantities (poses, Jacobians
+/// are one), on chains of `depth` joints.
+double CalcRoundingBound(int depth, double factors);
+
+/// A scale of zero (a model without mass, a state at rest) leaves an absolute comparison.
+inline double Positive(double scale) { return scale > 0.0 ? scale : 1.0; }
+
+/// Sizes of the state and the robot that rounding errors are relative to. An error of a term is divided by
+/// the size of what is summed up to form it, so that one bound holds for every entry, large or small.
+class RoundingScales {
+ public:
+  explicit RoundingScales(const RobotModel& model);
+
+  /// @param terms with its state set to q, xi; reduced coordinates.
+  void SetState(const ModelTerms& terms, const Eigen::Ref<const VectorXd>& q,
+                const Eigen::Ref<const VectorXd>& xi);
+
+  // At every state.
+  /// Of the robot's points' distances from the base, m.
+  [[nodiscard]] double length() const { return reach_; }
+  /// Length (or 1) by which a velocity coordinate moves points.
+  [[nodiscard]] double CalcVelocityScale(int coordinate) const;
+  /// Mass that a velocity coordinate moves, kg.
+  [[nodiscard]] double GetSubtreeMass(int coordinate) const;
+  [[nodiscard]] double total_mass() const { return subtree_mass_[0]; }
+  /// Of an entry of M_bar'.
+  [[nodiscard]] double CalcMassScale(int row, int col) const;
+  /// Of an entry of gravity.
+  [[nodiscard]] double CalcGravityScale(int coordinate) const;
+
+  // At the state set.
+  /// Of the world coordinates of the robot's points, m.
+  [[nodiscard]] double world_length() const { return world_length_; }
+  /// Of a link, rad/s: root of the summed squares along the fastest chain.
+  [[nodiscard]] double angular_rate() const { return angular_rate_; }
+  /// Of a point, m/s.
+  [[nodiscard]] double linear_rate() const { return linear_rate_; }
+  [[nodiscard]] double acceleration() const { return linear_rate_ * angular_rate_; }
+  /// Of an entry of C_bar' xi.
+  [[nodiscard]] double CalcCoriolisScale(int coordinate) const;
+  [[nodiscard]] double CalcFrictionScale(int coordinate, const Eigen::Ref<const VectorXd>& xi) const;
+  [[nodiscard]] double CalcKineticEnergyScale() const;
+  [[nodiscard]] double CalcPotentialEnergyScale() const;
+  [[nodiscard]] double CalcMomentumScale() const { return total_mass() * linear_rate_; }
+
+ private:
+  const RobotModel* model_;
+  int base_velocities_;
+  double reach_;
+  double rotors_ = 0.0;               // sum of the joints' armature, kg m^2
+  std::vector<double> subtree_mass_;  // base first
+  std::vector<double> squared_rate_;  // scratch of SetState, base first
+  Vector6d base_velocity_ = Vector6d::Zero();
+  double world_length_ = 0.0;
+  double angular_rate_ = 0.0;
+  double linear_rate_ = 0.0;
+};
+
+}  // namespace dexcheck

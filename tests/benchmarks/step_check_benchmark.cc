@@ -1,0 +1,89 @@
+// The cross-check of one step beside the plant's own step, in one run: compare the ratios, not the times.
+
+#include <benchmark/benchmark.h>
+
+#include <optional>
+
+#include "harness/plant/plant.h"
+#include "tests/harness/step_check_scene.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr int kStates = 16;
+
+/// States of one walk, each with its own controller's terms, so that caches see what a run sees.
+struct States {
+  States() {
+    testing::GraspWalk walk;
+    fingertips = walk.scene().fingertips;
+    const Torus torus(0.035, 0.011);
+    controller.emplace(walk.scene().model.spec(), torus, fingertips);
+    for (int i = 0; i < kStates; ++i) {
+      walk.Step(1.0);
+      q.push_back(walk.q);
+      xi.push_back(walk.xi);
+      X_Bo.push_back(walk.X_Bo);
+      V_Bo.push_back(walk.V_Bo);
+    }
+  }
+  std::vector<int> fingertips;
+  std::optional<testing::CheckedController> controller;
+  std::vector<VectorXd> q, xi;
+  std::vector<Pose> X_Bo;
+  std::vector<Vector6d> V_Bo;
+};
+
+States& SharedStates() {
+  static States states;
+  return states;
+}
+
+/// mj_step1 and mj_step2 of the scene, from the grasp of its keyframe.
+void PlantStep(benchmark::State& state) {
+  States& states = SharedStates();
+  Plant plant(states.controller->adapter);
+  const mjModel& model = plant.model();
+  mj_resetDataKeyframe(&model, &plant.data(), mj_name2id(&model, mjOBJ_KEY, "grasp_ready"));
+  const EngineState start = plant.GetState();
+  constexpr int kStepsBeforeItFalls = 20;
+  int step = 0;
+  for (auto _ : state) {
+    if (step++ % kStepsBeforeItFalls == 0) plant.SetState(start);
+    plant.BeginStep();
+    plant.EndStep();
+  }
+}
+BENCHMARK(PlantStep)->Unit(benchmark::kMicrosecond);
+
+/// The engine's side of the check alone.
+void EngineSide(benchmark::State& state) {
+  States& states = SharedStates();
+  EngineStep engine(states.controller->adapter, states.fingertips);
+  size_t k = 0;
+  for (auto _ : state) {
+    engine.SetState(states.q[k], states.xi[k], states.X_Bo[k], states.V_Bo[k]);
+    benchmark::ClobberMemory();
+    k = (k + 1) % kStates;
+  }
+}
+BENCHMARK(EngineSide)->Unit(benchmark::kMicrosecond);
+
+/// The whole check. The model's terms stay those of one state, as if they agreed: what is found costs nothing
+/// extra after the first step.
+void Compare(benchmark::State& state) {
+  States& states = SharedStates();
+  testing::CheckedController& controller = *states.controller;
+  controller.SetState(states.q[0], states.xi[0], states.X_Bo[0], states.V_Bo[0]);
+  long step = 0;
+  for (auto _ : state) {
+    controller.Compare(step++);
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(Compare)->Unit(benchmark::kMicrosecond);
+
+}  // namespace
+}  // namespace dexcheck
+
+BENCHMARK_MAIN();
