@@ -7,6 +7,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/grasp/grasp_force_kernel.h"
+#include "controller/grasp/grasp_rank.h"
 
 namespace dexcheck {
 namespace {
@@ -140,14 +141,9 @@ double CalcInfeasibility(const GraspForceProblem& problem, const Eigen::Ref<cons
 VectorXd CalcInternalForce(const Eigen::Ref<const Matrix6Xd>& G, const Eigen::Ref<const Vector6d>& F_o,
                            const Eigen::Ref<const VectorXd>& f_c) {
   RequireSize(f_c.size(), G.cols(), "f_c");
+  grasp_internal::RequireFullRank(G);
   const Matrix6d GGt = G * G.transpose();
-  const Eigen::LDLT<Matrix6d> factor(GGt);
-  constexpr double kRankTolerance = 1e-13;
-  const double ratio = factor.vectorD().minCoeff() / factor.vectorD().maxCoeff();
-  if (!(ratio > kRankTolerance)) {
-    throw SingularityError("G: must have full row rank, got pivot ratio " + std::to_string(ratio), ratio);
-  }
-  return f_c - G.transpose() * factor.solve(F_o);
+  return f_c - G.transpose() * Eigen::LDLT<Matrix6d>(GGt).solve(F_o);
 }
 
 double CalcLeastConeMargin(const Eigen::Ref<const VectorXd>& f_c, const Eigen::Ref<const VectorXd>& mu) {

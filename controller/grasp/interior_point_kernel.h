@@ -67,12 +67,11 @@ class InteriorPointKernel final : public GraspForceKernel {
   bool StartWarm();
   void Save();
   void Restore();
-  GraspForceStatus Iterate(const GraspForceOptions& options, bool warm, int& iterations);
+  GraspForceStatus Iterate(const Matrix6Xd& G, const GraspForceOptions& options, bool warm, int& iterations);
   void CalcResiduals();
   double CalcBound(bool with_cost) const;
   double CalcGap(const GraspForceOptions& options) const;
   bool ProvesInfeasibility() const;
-  void RequireFullRank() const;
   void Factor();
   void Aim(double target);
   void AimCorrected(double target);
