@@ -11,6 +11,13 @@ namespace {
 // plane.
 constexpr double kFlat = 1e-11;
 
+template <std::size_t kSize>
+Vector6d CalcMean(const std::array<Vector6d, kSize>& points) {
+  Vector6d sum = Vector6d::Zero();
+  for (const Vector6d& point : points) sum += point;
+  return sum / static_cast<double>(kSize);
+}
+
 }  // namespace
 
 std::size_t GrowingPolytope::RidgeHash::operator()(const Ridge& ridge) const {
@@ -20,9 +27,7 @@ std::size_t GrowingPolytope::RidgeHash::operator()(const Ridge& ridge) const {
 }
 
 GrowingPolytope::GrowingPolytope(const std::array<Vector6d, kDimension + 1>& simplex)
-    : points_(simplex.begin(), simplex.end()) {
-  inside_ = Vector6d::Zero();
-  for (const Vector6d& point : simplex) inside_ += point / static_cast<double>(simplex.size());
+    : points_(simplex.begin(), simplex.end()), inside_(CalcMean(simplex)) {
   for (std::size_t left_out = 0; left_out <= kDimension; ++left_out) {
     std::array<int, kDimension> vertices;
     for (std::size_t k = 0; k < kDimension; ++k) vertices[k] = static_cast<int>(k < left_out ? k : k + 1);

@@ -36,12 +36,12 @@ constexpr double kSuspiciousDeterminant = 1e-10;
 
 template <int kPacks, int kRows>
 InteriorPointKernel<kPacks, kRows>::InteriorPointKernel(int num_contacts, int num_limits)
-    : equations_(static_cast<std::size_t>(6 + num_limits)) {
-  const std::size_t packs = static_cast<std::size_t>((num_contacts + kLanes - 1) / kLanes);
+    : packs_(BufferOf<ContactPack, kPacks>::Make(
+          static_cast<std::size_t>((num_contacts + kLanes - 1) / kLanes))),
+      equations_(static_cast<std::size_t>(6 + num_limits)) {
   const std::size_t rows = static_cast<std::size_t>(6 + num_limits);
-  packs_ = BufferOf<ContactPack, kPacks>::Make(packs);
-  h_ = BufferOf<Lanes3, kPacks>::Make(packs);
-  A_ = M_ = BufferOf<Lanes3, kEntries>::Make(packs * rows);
+  h_ = BufferOf<Lanes3, kPacks>::Make(num_packs());
+  A_ = M_ = BufferOf<Lanes3, kEntries>::Make(num_packs() * rows);
   b_ = y_ = dy_ = saved_y_ = residual_ = BufferOf<double, kRows>::Make(rows);
   limits_.resize(rows - 6);
   saved_limits_.resize(rows - 6);

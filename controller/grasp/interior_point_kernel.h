@@ -98,7 +98,7 @@ class InteriorPointKernel final : public GraspForceKernel {
   };
   std::vector<Limit> limits_, saved_limits_;
 
-  double gap_, objective_, max_residual_, max_dual_residual_;
+  double gap_ = 0.0, objective_ = 0.0, max_residual_ = 0.0, max_dual_residual_ = 0.0;
   bool has_last_ = false;
 };
 
