@@ -11,6 +11,8 @@ packages=(
   libmujoco-dev libgl-dev libqhull-dev
   # the command line
   libcli11-dev libfmt-dev nlohmann-json3-dev
+  # the sanitizers and libFuzzer
+  libclang-rt-14-dev
   # tests and benchmarks, and the programs they take as oracles
   libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp
 )
