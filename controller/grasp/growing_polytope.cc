@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace dexcheck::grasp_internal {
@@ -85,11 +86,11 @@ void GrowingPolytope::Link(int index) {
 }
 
 const GrowingPolytope::Facet& GrowingPolytope::FindNearestFacet() const {
-  const Facet* nearest = nullptr;
-  for (const Facet& facet : facets_) {
-    if (facet.alive && (nearest == nullptr || facet.offset < nearest->offset)) nearest = &facet;
-  }
-  return *nearest;
+  const auto distance = [](const Facet& facet) {
+    return facet.alive ? facet.offset : std::numeric_limits<double>::infinity();
+  };
+  return *std::min_element(facets_.begin(), facets_.end(),
+                           [&](const Facet& a, const Facet& b) { return distance(a) < distance(b); });
 }
 
 bool GrowingPolytope::Add(const Vector6d& point) {

@@ -7,6 +7,7 @@ set -euo pipefail
 seconds=${1:-600}
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 cd "$root"
+harness/install-packages.sh development
 cmake --preset fuzz
 cmake --build --preset fuzz
 
