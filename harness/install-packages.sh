@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs the Debian 12 packages that building, running and testing dexcheck needs, and nothing when all are there.
+# Installs the Debian 12 packages that building, running and testing dexcheck needs, and nothing when all are there:
+# harness/install-packages.sh [development], with the tools for changing it too.
 set -euo pipefail
 
 packages=(
@@ -16,6 +17,10 @@ packages=(
   # tests and benchmarks, and the programs they take as oracles
   libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools
 )
+# with the argument "development": sanitizers and libFuzzer, coverage, static analysis
+if [[ ${1:-} == development ]]; then
+  packages+=(libclang-rt-14-dev llvm-14 clang-format-14 clang-tidy-14 cppcheck)
+fi
 
 Fail() {
   echo "install-packages: $*" >&2

@@ -5,6 +5,8 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 export CMAKE_BUILD_PARALLEL_LEVEL=${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)}
 
-"$root/harness/install-packages.sh"
+tools=()
+[[ ${1:-} != sanitize ]] || tools=(development)
+"$root/harness/install-packages.sh" "${tools[@]}"
 cd "$root"
 exec cmake --workflow --preset "${1:-release}"

@@ -3,7 +3,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "controller/common/errors.h"
 #include "controller/contact/adjoint.h"
@@ -69,8 +68,7 @@ void RequireFullGrasp(const Eigen::Ref<const Matrix6Xd>& G) {
   const double ratio = std::sqrt(std::max(squares(0), 0.0) / squares(5));
   if (ratio > kMinSingularValueRatio) return;
   throw SingularityError(
-      "grasp map has less than rank 6, ratio of its extreme singular values: " + std::to_string(ratio),
-      ratio);
+      "grasp map has less than rank 6, ratio of its extreme singular values: " + FormatNumber(ratio), ratio);
 }
 
 }  // namespace dexcheck

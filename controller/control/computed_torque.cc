@@ -9,10 +9,10 @@ namespace dexcheck {
 ComputedTorque::ComputedTorque(const RobotModel& model, int num_contacts, RedundancyWeight weight)
     : weight_(std::move(weight)),
       actuation_(model),
-      J_B_pinv_("J_B'", 3 * num_contacts, model.num_velocities()),
-      G_pinv_("G", 6, 3 * num_contacts) {
+      J_B_pinv_("J_B'", Eigen::Index{3} * num_contacts, model.num_velocities()),
+      G_pinv_("G", 6, Eigen::Index{3} * num_contacts) {
   const Eigen::Index n = model.num_velocities();
-  const Eigen::Index k = 3 * num_contacts;
+  const Eigen::Index k = Eigen::Index{3} * num_contacts;
   if (weight_.kind == RedundancyWeight::Kind::kDiagonal) {
     Require(weight_.w.size() == n, "length of w", "must be that of xi",
             static_cast<double>(weight_.w.size()));

@@ -37,7 +37,7 @@ Vector6d CalcCoordinateAcceleration(const GraspTerms& grasp, const Vector6d& V_B
 ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contacts) {
   Require(num_contacts > 0, "number of contacts", "must be positive", num_contacts);
   const Eigen::Index n = model.num_velocities();
-  const Eigen::Index k = 3 * num_contacts;
+  const Eigen::Index k = Eigen::Index{3} * num_contacts;
   M_llt_ = Eigen::LLT<MatrixXd>(n);
   half_.setZero(n + 6, k);
   schur_.setZero(k, k);

@@ -1,6 +1,5 @@
 #include "controller/grasp/force_closure.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <array>
@@ -9,15 +8,13 @@
 #include <string>
 
 #include "controller/common/errors.h"
+#include "controller/grasp/grasp_rank.h"
 #include "controller/grasp/growing_polytope.h"
 
 namespace dexcheck {
 namespace {
 
 using grasp_internal::GrowingPolytope;
-
-// Smallest ratio of singular values of the scaled G that counts as full rank.
-constexpr double kRankTolerance = 1e-9;
 
 // The set W of scaled wrenches [force; moment / length] that normalised contact forces can give.
 class WrenchSet {
@@ -28,7 +25,13 @@ class WrenchSet {
     G_.bottomRows<3>() /= options.length;
   }
 
-  const Matrix6Xd& G() const { return G_; }
+  // The direction in which W is thinnest: that of the wrenches of each contact's normal and friction forces.
+  // A coefficient above one makes W no thinner.
+  grasp_internal::WeakestDirection FindThinnest() const {
+    Matrix6Xd wrenches = G_;
+    for (Eigen::Index i = 0; i < mu_.size(); ++i) wrenches.middleCols<2>(3 * i) *= std::min(mu_[i], 1.0);
+    return grasp_internal::FindWeakestDirection(wrenches);
+  }
 
   // The point of W farthest along n. A contact gives most with its force on the cone's boundary, along the
   // tangential part of g = G_i^T n: h_i = g3 + mu |(g1, g2)|, per newton of normal force.
@@ -104,12 +107,9 @@ ForceClosureResult CalcForceClosure(const Eigen::Ref<const Matrix6Xd>& G,
   RequireValid(G, mu, options);
   const WrenchSet W(G, mu, options);
   ForceClosureResult result;
-  Vector6d weakest;
-
-  const Matrix6d GGt = W.G() * W.G().transpose();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(GGt);
-  if (eigen.eigenvalues()[0] <= kRankTolerance * kRankTolerance * eigen.eigenvalues()[5]) {
-    weakest = eigen.eigenvectors().col(0);
+  const grasp_internal::WeakestDirection thinnest = W.FindThinnest();
+  Vector6d weakest = thinnest.n;
+  if (!(thinnest.ratio > grasp_internal::kRankTolerance)) {
     result.status = ForceClosureStatus::kNotForceClosure;
   } else {
     GrowingPolytope polytope(FindSimplex(W));

@@ -7,6 +7,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/grasp/grasp_force_kernel.h"
+#include "controller/grasp/grasp_rank.h"
 
 namespace dexcheck {
 namespace {
@@ -104,13 +105,14 @@ GraspForceProblem::GraspForceProblem(int num_contacts, int num_limits) {
   Require(num_contacts >= kLeastContacts, "num_contacts", "at least 3 hard-finger contacts balance a wrench",
           num_contacts);
   Require(num_limits >= 0, "num_limits", "must not be negative", num_limits);
-  G = Matrix6Xd::Zero(6, 3 * num_contacts);
+  const Eigen::Index num_forces = Eigen::Index{3} * num_contacts;
+  G = Matrix6Xd::Zero(6, num_forces);
   F_o = Vector6d::Zero();
   mu = VectorXd::Constant(num_contacts, 0.5);
   f_min = VectorXd::Zero(num_contacts);
   f_max = VectorXd::Constant(num_contacts, 100.0);
   weight = VectorXd::Ones(num_contacts);
-  A = MatrixXd::Zero(num_limits, 3 * num_contacts);
+  A = MatrixXd::Zero(num_limits, num_forces);
   a_min = VectorXd::Zero(num_limits);
   a_max = VectorXd::Zero(num_limits);
 }
@@ -140,14 +142,9 @@ double CalcInfeasibility(const GraspForceProblem& problem, const Eigen::Ref<cons
 VectorXd CalcInternalForce(const Eigen::Ref<const Matrix6Xd>& G, const Eigen::Ref<const Vector6d>& F_o,
                            const Eigen::Ref<const VectorXd>& f_c) {
   RequireSize(f_c.size(), G.cols(), "f_c");
+  grasp_internal::RequireFullRank(G);
   const Matrix6d GGt = G * G.transpose();
-  const Eigen::LDLT<Matrix6d> factor(GGt);
-  constexpr double kRankTolerance = 1e-13;
-  const double ratio = factor.vectorD().minCoeff() / factor.vectorD().maxCoeff();
-  if (!(ratio > kRankTolerance)) {
-    throw SingularityError("G: must have full row rank, got pivot ratio " + std::to_string(ratio), ratio);
-  }
-  return f_c - G.transpose() * factor.solve(F_o);
+  return f_c - G.transpose() * Eigen::LDLT<Matrix6d>(GGt).solve(F_o);
 }
 
 double CalcLeastConeMargin(const Eigen::Ref<const VectorXd>& f_c, const Eigen::Ref<const VectorXd>& mu) {
@@ -173,7 +170,7 @@ GraspForceSolver::GraspForceSolver(GraspForceSolver&&) noexcept = default;
 GraspForceSolver& GraspForceSolver::operator=(GraspForceSolver&&) noexcept = default;
 
 const GraspForceResult& GraspForceSolver::Solve(const GraspForceProblem& problem) {
-  RequireSize(3 * problem.num_contacts(), result_.f_c.size(), "problem: 3 N");
+  RequireSize(3 * problem.mu.size(), result_.f_c.size(), "problem: 3 N");
   RequireSize(6 + problem.num_limits(), result_.y.size(), "problem: 6 + M");
   RequireValid(problem);
   kernel_->Solve(problem, options_, result_);

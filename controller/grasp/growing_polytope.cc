@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace dexcheck::grasp_internal {
@@ -10,6 +11,13 @@ namespace {
 // Height above a facet's plane, relative to the size of the coordinates, up to which a point counts as on the
 // plane.
 constexpr double kFlat = 1e-11;
+
+template <std::size_t kSize>
+Vector6d CalcMean(const std::array<Vector6d, kSize>& points) {
+  Vector6d sum = Vector6d::Zero();
+  for (const Vector6d& point : points) sum += point;
+  return sum / static_cast<double>(kSize);
+}
 
 }  // namespace
 
@@ -20,9 +28,7 @@ std::size_t GrowingPolytope::RidgeHash::operator()(const Ridge& ridge) const {
 }
 
 GrowingPolytope::GrowingPolytope(const std::array<Vector6d, kDimension + 1>& simplex)
-    : points_(simplex.begin(), simplex.end()) {
-  inside_ = Vector6d::Zero();
-  for (const Vector6d& point : simplex) inside_ += point / static_cast<double>(simplex.size());
+    : points_(simplex.begin(), simplex.end()), inside_(CalcMean(simplex)) {
   for (std::size_t left_out = 0; left_out <= kDimension; ++left_out) {
     std::array<int, kDimension> vertices;
     for (std::size_t k = 0; k < kDimension; ++k) vertices[k] = static_cast<int>(k < left_out ? k : k + 1);
@@ -80,11 +86,11 @@ void GrowingPolytope::Link(int index) {
 }
 
 const GrowingPolytope::Facet& GrowingPolytope::FindNearestFacet() const {
-  const Facet* nearest = nullptr;
-  for (const Facet& facet : facets_) {
-    if (facet.alive && (nearest == nullptr || facet.offset < nearest->offset)) nearest = &facet;
-  }
-  return *nearest;
+  const auto distance = [](const Facet& facet) {
+    return facet.alive ? facet.offset : std::numeric_limits<double>::infinity();
+  };
+  return *std::min_element(facets_.begin(), facets_.end(),
+                           [&](const Facet& a, const Facet& b) { return distance(a) < distance(b); });
 }
 
 bool GrowingPolytope::Add(const Vector6d& point) {

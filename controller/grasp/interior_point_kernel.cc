@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 
-#include "controller/common/errors.h"
+#include "controller/grasp/grasp_rank.h"
 
 namespace dexcheck::grasp_internal {
 namespace {
@@ -28,19 +27,21 @@ constexpr double kPolishRange = 1e4;
 // Smallest separation per unit of |y|_1, in N or N m, that counts as a proof of infeasibility: above
 // rounding.
 constexpr double kProof = 1e-9;
-// Squared sine of the angle between a row of the scaled G and the rows before it, below which G is singular.
-constexpr double kRankTolerance = 1e-13;
+// Determinant of the first normal equations, scaled to unit diagonal, up to which G may lack rank: above
+// rounding, which is 36 (3 N + 20) eps at most, because no cofactor of such a matrix exceeds one. It is also
+// small for bounds of very different sizes, so that G itself has to be looked at.
+constexpr double kSuspiciousDeterminant = 1e-10;
 
 }  // namespace
 
 template <int kPacks, int kRows>
 InteriorPointKernel<kPacks, kRows>::InteriorPointKernel(int num_contacts, int num_limits)
-    : equations_(static_cast<std::size_t>(6 + num_limits)) {
-  const std::size_t packs = static_cast<std::size_t>((num_contacts + kLanes - 1) / kLanes);
+    : packs_(BufferOf<ContactPack, kPacks>::Make(
+          static_cast<std::size_t>((num_contacts + kLanes - 1) / kLanes))),
+      equations_(static_cast<std::size_t>(6 + num_limits)) {
   const std::size_t rows = static_cast<std::size_t>(6 + num_limits);
-  packs_ = BufferOf<ContactPack, kPacks>::Make(packs);
-  h_ = BufferOf<Lanes3, kPacks>::Make(packs);
-  A_ = M_ = BufferOf<Lanes3, kEntries>::Make(packs * rows);
+  h_ = BufferOf<Lanes3, kPacks>::Make(num_packs());
+  A_ = M_ = BufferOf<Lanes3, kEntries>::Make(num_packs() * rows);
   b_ = y_ = dy_ = saved_y_ = residual_ = BufferOf<double, kRows>::Make(rows);
   limits_.resize(rows - 6);
   saved_limits_.resize(rows - 6);
@@ -296,13 +297,6 @@ double InteriorPointKernel<kPacks, kRows>::CalcGap(const GraspForceOptions& opti
 }
 
 template <int kPacks, int kRows>
-void InteriorPointKernel<kPacks, kRows>::RequireFullRank() const {
-  const double ratio = equations_.CalcSmallestPivotRatio(6);
-  if (ratio > kRankTolerance) return;
-  throw SingularityError("G: must have full row rank, got pivot ratio " + std::to_string(ratio), ratio);
-}
-
-template <int kPacks, int kRows>
 bool InteriorPointKernel<kPacks, kRows>::ProvesInfeasibility() const {
   double size = 0.0;
   for (const double y : y_) size += std::abs(y);
@@ -310,7 +304,8 @@ bool InteriorPointKernel<kPacks, kRows>::ProvesInfeasibility() const {
 }
 
 template <int kPacks, int kRows>
-GraspForceStatus InteriorPointKernel<kPacks, kRows>::Iterate(const GraspForceOptions& options, bool warm,
+GraspForceStatus InteriorPointKernel<kPacks, kRows>::Iterate(const Matrix6Xd& G,
+                                                             const GraspForceOptions& options, bool warm,
                                                              int& iterations) {
   const bool barrier = options.objective == GraspForceObjective::kBarrier;
   const double rho = barrier ? options.barrier_weight : 0.0;
@@ -338,7 +333,8 @@ GraspForceStatus InteriorPointKernel<kPacks, kRows>::Iterate(const GraspForceOpt
     }
 
     Factor();
-    if (!warm && i == 0) RequireFullRank();
+    if (!warm && i == 0 && !(equations_.CalcScaledDeterminant(6) > kSuspiciousDeterminant))
+      RequireFullRank(G);
 
     const double mu = gap_ / CalcDegree();
     const bool cautious = barrier && i >= kPatience;
@@ -373,11 +369,11 @@ void InteriorPointKernel<kPacks, kRows>::Solve(const GraspForceProblem& problem,
     if (options.objective == GraspForceObjective::kMinimum) Restore();
     result.warm_started = StartWarm();
   }
-  if (result.warm_started) result.status = Iterate(options, true, result.iterations);
+  if (result.warm_started) result.status = Iterate(problem.G, options, true, result.iterations);
   if (result.status == GraspForceStatus::kNotConverged) {
     result.warm_started = false;
     StartCold(options.barrier_weight);
-    result.status = Iterate(options, false, result.iterations);
+    result.status = Iterate(problem.G, options, false, result.iterations);
   }
   has_last_ = result.status == GraspForceStatus::kOptimal;
   Report(problem, options, result);

@@ -67,12 +67,11 @@ class InteriorPointKernel final : public GraspForceKernel {
   bool StartWarm();
   void Save();
   void Restore();
-  GraspForceStatus Iterate(const GraspForceOptions& options, bool warm, int& iterations);
+  GraspForceStatus Iterate(const Matrix6Xd& G, const GraspForceOptions& options, bool warm, int& iterations);
   void CalcResiduals();
   double CalcBound(bool with_cost) const;
   double CalcGap(const GraspForceOptions& options) const;
   bool ProvesInfeasibility() const;
-  void RequireFullRank() const;
   void Factor();
   void Aim(double target);
   void AimCorrected(double target);
@@ -99,7 +98,7 @@ class InteriorPointKernel final : public GraspForceKernel {
   };
   std::vector<Limit> limits_, saved_limits_;
 
-  double gap_, objective_, max_residual_, max_dual_residual_;
+  double gap_ = 0.0, objective_ = 0.0, max_residual_ = 0.0, max_dual_residual_ = 0.0;
   bool has_last_ = false;
 };
 

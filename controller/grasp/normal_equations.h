@@ -54,15 +54,12 @@ class NormalEquations {
     }
   }
 
-  /// Smallest ratio of a pivot to its diagonal entry among the first `count`: the least squared sine of the
-  /// angle between a row of the scaled constraint matrix and the rows before it. NaN counts as zero.
-  double CalcSmallestPivotRatio(std::size_t count) const {
-    double smallest = 1.0;
-    for (std::size_t j = 0; j < count; ++j) {
-      const double ratio = 1.0 / (inv_pivots_[j] * diagonal_[j]);
-      smallest = ratio > 0.0 ? std::min(smallest, ratio) : 0.0;
-    }
-    return smallest;
+  /// Determinant of the leading `count` rows and columns of S after scaling them to a unit diagonal: one for
+  /// rows of the constraint matrix at right angles, zero for dependent ones. Not finite if a pivot vanished.
+  double CalcScaledDeterminant(std::size_t count) const {
+    double determinant = 1.0;
+    for (std::size_t j = 0; j < count; ++j) determinant /= inv_pivots_[j] * diagonal_[j];
+    return determinant;
   }
 
   /// Replaces b by S^-1 b.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "controller/common/errors.h"
@@ -16,14 +17,16 @@ using Json = nlohmann::json;
 
 // Three hard fingers are the fewest that can balance every wrench.
 constexpr size_t kFewestContacts = 3;
+// Messages print values by recursion; a state has three brackets inside each other.
+constexpr int kMaxDepth = 32;
 
 /// Reads the keys that it knows and refuses all others. A key is named by its path, such as "object.X_o".
 class StateReader {
  public:
   explicit StateReader(const std::string& file) : file_(file) {}
 
-  State Read(const RobotModel& model) {
-    const Json json = Parse();
+  State Read(std::string_view text, const RobotModel& model) {
+    const Json json = Parse(text);
     CheckKeys(json, "", {"q", "xi", "object", "kappa", "contact_points", "fingers", "mu"});
     State state;
     state.q = ReadVector(Get(json, "", "q"), "q", model.num_positions());
@@ -45,9 +48,14 @@ class StateReader {
     throw InputError(file_ + ": " + key + (key.empty() ? "" : ": ") + problem);
   }
 
-  [[nodiscard]] Json Parse() const {
+  [[nodiscard]] Json Parse(std::string_view text) const {
+    const auto check = [this](int depth, Json::parse_event_t, const Json&) {
+      if (depth > kMaxDepth)
+        Fail("", "nested too deeply, more than " + std::to_string(kMaxDepth) + " brackets");
+      return true;
+    };
     try {
-      return Json::parse(ReadTextFile(file_));
+      return Json::parse(text, check);
     } catch (const Json::exception& error) {
       // The library's messages begin with "[json.exception.NAME.NUMBER] ".
       const std::string message = error.what();
@@ -161,6 +169,12 @@ class StateReader {
 
 }  // namespace
 
-State ReadState(const std::string& file, const RobotModel& model) { return StateReader(file).Read(model); }
+State ParseState(std::string_view text, const std::string& source, const RobotModel& model) {
+  return StateReader(source).Read(text, model);
+}
+
+State ReadState(const std::string& file, const RobotModel& model) {
+  return ParseState(ReadTextFile(file), file, model);
+}
 
 }  // namespace dexcheck::cli

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "controller/common/types.h"
@@ -40,5 +41,8 @@ struct State {
 /// @throws InputError, one line that names file, key and value: also for unknown keys, so that a misspelt one
 /// is never ignored.
 State ReadState(const std::string& file, const RobotModel& model);
+
+/// The same for a text; `source` stands for the file in messages.
+State ParseState(std::string_view text, const std::string& source, const RobotModel& model);
 
 }  // namespace dexcheck::cli

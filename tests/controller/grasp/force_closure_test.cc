@@ -191,6 +191,74 @@ TEST(ForceClosureHandWorked, FingersOnOneSideCannotPush) {
   EXPECT_GT(result.direction[2], 0.0);
 }
 
+// Three times the hand's size to three hundred times, and lengths in m, mm, km.
+constexpr double kOffsets[] = {0.0, 0.1, 1.0, 10.0};
+constexpr double kUnits[] = {1.0, 1e3, 1e-3};
+
+TEST(ForceClosureRank, ContactsOnOneLineNeverReachThePolytope) {
+  std::mt19937_64 random(3);
+  for (const double offset : kOffsets) {
+    for (const double unit : kUnits) {
+      for (int sample = 0; sample < 100; ++sample) {
+        const testing::LineGrasp grasp = testing::MakeRandomLineGrasp(random, 3 + sample % 4, offset, unit);
+        ForceClosureOptions options;
+        options.length *= unit;
+        const Matrix6Xd& G = grasp.problem.G;
+        const ForceClosureResult result = CalcForceClosure(G, grasp.problem.mu, options);
+        ASSERT_EQ(result.status, ForceClosureStatus::kNotForceClosure);
+        ASSERT_EQ(result.num_vertices, 0) << "offset " << offset << ", unit " << unit;
+        ASSERT_EQ(result.margin, 0.0);
+
+        // As a functional on [force; moment / length] the direction is, up to its sign, the moment about the
+        // line.
+        Matrix6Xd scaled = G;
+        scaled.bottomRows<3>() /= options.length;
+        Vector6d n = result.direction;
+        n.tail<3>() /= options.length;
+        ASSERT_NEAR(n.norm(), 1.0, 1e-12);
+        Vector6d expected = grasp.n;
+        expected.tail<3>() *= options.length;
+        expected.normalize();
+        // Rounding of wrenches: their products with n are sums of six.
+        const double rounding = 64.0 * std::numeric_limits<double>::epsilon() * scaled.norm();
+        ASSERT_LT((scaled.transpose() * expected).norm(), rounding) << "the grasp is not of rank 5";
+        ASSERT_LT((scaled.transpose() * n).norm(), rounding);
+      }
+    }
+  }
+}
+
+TEST(ForceClosureRank, ContactsNearlyOnOneLineReachIt) {
+  // The same grasps with one contact a micrometre off the line, as seen from the middle of the line or
+  // nearby.
+  std::mt19937_64 random(4);
+  for (const double unit : kUnits) {
+    for (int sample = 0; sample < 100; ++sample) {
+      testing::LineGrasp grasp = testing::MakeRandomLineGrasp(random, 3 + sample % 4, 0.1, unit);
+      Matrix6Xd& G = grasp.problem.G;
+      const Vector3d aside = 1e-6 * unit * grasp.n.tail<3>().unitOrthogonal();
+      G.block<3, 3>(3, 3) += Skew(aside) * G.block<3, 3>(0, 3);
+      ForceClosureOptions options;
+      options.length *= unit;
+      EXPECT_GE(CalcForceClosure(G, grasp.problem.mu, options).num_vertices, 7);
+    }
+  }
+}
+
+TEST(ForceClosureRank, FrictionThatIsAlmostNoneGivesNoRank) {
+  // Without friction four contacts on the equator give three wrenches; the full rank of G does not help.
+  const GraspForceProblem grasp = MakeEquatorGraspForceProblem(4, 1e-11);
+  const ForceClosureResult result = CalcForceClosure(grasp.G, grasp.mu);
+  EXPECT_EQ(result.status, ForceClosureStatus::kNotForceClosure);
+  EXPECT_EQ(result.num_vertices, 0);
+}
+
+TEST(ForceClosureRank, MuchFrictionTakesNone) {
+  // Normal forces count beside a friction of any size: what is far from singular with mu = 1 stays so.
+  const GraspForceProblem grasp = MakeEquatorGraspForceProblem(4, 1e11);
+  EXPECT_GE(CalcForceClosure(grasp.G, grasp.mu).num_vertices, 7);
+}
+
 TEST(ForceClosureErrors, NameTheValue) {
   const GraspForceProblem grasp = MakeEquatorGraspForceProblem(4, 0.5);
   const auto Call = [&](const Matrix6Xd& G, const VectorXd& mu, const ForceClosureOptions& options) {

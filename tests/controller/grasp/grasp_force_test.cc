@@ -7,6 +7,7 @@
 #include <Eigen/QR>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
 #include <string>
 
@@ -427,6 +428,36 @@ TEST(GraspForceErrors, NameTheValue) {
   GraspForceSolver limited_solver(4, 2);
   EXPECT_THAT([&] { limited_solver.Solve(limited); },
               ThrowsMessage<std::invalid_argument>(HasSubstr("a_max[0]: must be above a_min")));
+}
+
+TEST(GraspForceErrors, ContactsOnAnyLineAreSingular) {
+  // Random lines, seen from object frames near and far, in m, mm and km. F_o can be given, so that nothing
+  // else stops the solver.
+  std::mt19937_64 random(5);
+  std::map<int, GraspForceSolver> solvers;
+  for (int n = 3; n < 12; ++n) solvers.try_emplace(n, n);
+  for (const double offset : {0.0, 0.1, 1.0, 10.0}) {
+    for (const double unit : {1.0, 1e3, 1e-3}) {
+      for (int sample = 0; sample < 100; ++sample) {
+        const int n = 3 + sample % 9;
+        GraspForceProblem problem = testing::MakeRandomLineGrasp(random, n, offset, unit).problem;
+        problem.F_o = problem.G * VectorXd::Ones(3 * n);
+        GraspForceSolver& solver = solvers.at(n);
+        ASSERT_THROW(solver.Solve(problem), SingularityError) << "offset " << offset << ", unit " << unit;
+        ASSERT_THROW(CalcInternalForce(problem.G, problem.F_o, VectorXd::Zero(3 * n)), SingularityError)
+            << "offset " << offset << ", unit " << unit;
+      }
+    }
+  }
+}
+
+TEST(GraspForceErrors, BoundsOfVeryDifferentSizesAreNot) {
+  // Without the third contact the grasp has rank 5, and the third gives a ten-thousandth of what the others
+  // do. Its determinant looks singular; G is not.
+  GraspForceProblem problem = MakeEquatorGraspForceProblem(3, 0.5);
+  problem.f_max[2] = 1e-4;
+  GraspForceSolver solver(3);
+  EXPECT_EQ(solver.Solve(problem).status, GraspForceStatus::kOptimal);
 }
 
 TEST(GraspForceErrors, ContactsOnOneLineAreSingular) {

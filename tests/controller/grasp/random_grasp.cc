@@ -63,6 +63,22 @@ GraspForceProblem MakeEquatorGraspForceProblem(int num_contacts, double mu) {
   return problem;
 }
 
+LineGrasp MakeRandomLineGrasp(std::mt19937_64& random, int num_contacts, double offset, double unit) {
+  LineGrasp grasp{GraspForceProblem(num_contacts), Vector6d::Zero()};
+  const Vector3d along = DrawDirection(random);
+  const Vector3d middle = unit * offset * DrawDirection(random);
+  for (Eigen::Index i = 0; i < num_contacts; ++i) {
+    const double place = (static_cast<double>(i) + DrawUniform(random, -0.3, 0.3)) / (num_contacts - 1) - 0.5;
+    Pose X_OC = Pose::Identity();
+    X_OC.translation() = middle + 0.1 * unit * place * along;
+    X_OC.rotate(Eigen::AngleAxisd(DrawUniform(random, -kPi, kPi), DrawDirection(random)));
+    grasp.problem.G.middleCols<3>(3 * i) = CalcContactColumns(X_OC);
+    grasp.problem.mu[i] = DrawUniform(random, 0.2, 1.0);
+  }
+  grasp.n << middle.cross(along), along;
+  return grasp;
+}
+
 void MoveGrasp(std::mt19937_64& random, GraspForceProblem& problem) {
   problem.F_o.head<3>() += 5e-3 * DrawDirection(random);
   problem.F_o.tail<3>() += 2e-4 * DrawDirection(random);

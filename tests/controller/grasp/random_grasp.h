@@ -27,6 +27,15 @@ GraspForceProblem MakeRandomGraspForceProblem(std::mt19937_64& random, int num_c
 /// of the object.
 GraspForceProblem MakeEquatorGraspForceProblem(int num_contacts, double mu);
 
+/// N contacts with random frames on one line, evenly spaced over 0.1 m and shaken, whose middle is `offset` m
+/// from the object frame's origin; lengths and moments times `unit`. G has rank 5: no force gives `n`, the
+/// moment about the line, as a functional on [force; moment].
+struct LineGrasp {
+  GraspForceProblem problem;
+  Vector6d n;
+};
+LineGrasp MakeRandomLineGrasp(std::mt19937_64& random, int num_contacts, double offset, double unit);
+
 /// One millisecond of motion: the wrench changes by about 5 mN and 0.2 mN m, contacts roll by about 0.5 mrad.
 void MoveGrasp(std::mt19937_64& random, GraspForceProblem& problem);
 

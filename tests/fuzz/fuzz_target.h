@@ -1,0 +1,35 @@
+#pragma once
+
+// What the fuzz targets share. Each is one LLVMFuzzerTestOneInput: libFuzzer's main calls it with inputs of
+// its own making (preset fuzz), replay.cc's main with those of the corpus (every other build).
+
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+
+namespace dexcheck::fuzz {
+
+inline std::string_view AsText(const std::uint8_t* data, std::size_t size) {
+  return {reinterpret_cast<const char*>(data), size};
+}
+
+/// Ends the program, which is how a fuzz target reports a finding.
+inline void Expect(bool condition, const char* what, std::string_view detail = "") {
+  if (condition) return;
+  std::fprintf(stderr, "fuzz target: %s: %.*s\n", what, static_cast<int>(detail.size()), detail.data());
+  std::abort();
+}
+
+/// Messages of input errors are one line of bounded length that begins with the file.
+inline void ExpectGoodMessage(std::string_view message, std::string_view source) {
+  constexpr std::size_t kLongest = 2000;
+  Expect(message.starts_with(source), "the message does not name the file", message);
+  Expect(message.size() <= kLongest, "the message is too long", message);
+  for (const char c : message) Expect(static_cast<unsigned char>(c) >= 0x20, "a control character", message);
+}
+
+}  // namespace dexcheck::fuzz
