@@ -21,7 +21,7 @@
 namespace dexcheck {
 
 /// What the engine did in one step, in the model's terms.
-struct EngineMotion {
+struct PlantMotion {
   VectorXd xi_dot;                       ///< n.
   Vector6d V_Bo_dot = Vector6d::Zero();  ///< Sigma_o.
   VectorXd f_c;                          ///< k, N, in each Sigma_cf.
@@ -52,7 +52,7 @@ class StepChecks {
 
   [[nodiscard]] const std::vector<RunCheck>& checks() const { return checks_; }
   [[nodiscard]] const RunCheck& Find(std::string_view name) const;
-  [[nodiscard]] const EngineMotion& engine() const { return engine_; }
+  [[nodiscard]] const PlantMotion& engine() const { return engine_; }
   [[nodiscard]] const Prediction& prediction() const { return *prediction_; }
   [[nodiscard]] std::span<const EngineContact> contacts() const { return contacts_; }
   [[nodiscard]] const std::vector<SlipState>& fingertip_slip() const { return fingertip_slip_; }
@@ -92,7 +92,7 @@ class StepChecks {
   std::vector<RunCheck> checks_;
   ConstrainedDynamics dynamics_;
   ActuationMap actuation_;
-  EngineMotion engine_;
+  PlantMotion engine_;
   const Prediction* prediction_ = nullptr;
   std::span<const EngineContact> contacts_;
   std::vector<SlipState> fingertip_slip_, wheel_slip_;
