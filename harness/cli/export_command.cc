@@ -113,6 +113,7 @@ void AddNumber(double value, std::string* text) {
 void WriteCsv(const LogReader& log, const std::vector<SignalInfo>& signals, const Request& request) {
   OutputFile file(request.csv_file);
   std::vector<RowMatrixXd> values;
+  values.reserve(signals.size());
   for (const SignalInfo& signal : signals) values.push_back(log.ReadSignal(signal.name));
   std::string text = MakeHeader(signals);
   for (long row = 0; row < log.rows(); row += request.every) {

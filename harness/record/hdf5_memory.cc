@@ -12,6 +12,11 @@ namespace {
 constexpr herr_t kSuccess = 0;
 constexpr herr_t kFailure = -1;
 
+/// What the properties of a file to be opened hold.
+struct Target {
+  MemoryImage* image;
+};
+
 /// What HDF5 holds of a file: its own part first.
 struct MemoryFile {
   H5FD_t base;
@@ -25,7 +30,7 @@ H5FD_t* Open(const char* /*name*/, unsigned /*flags*/, hid_t access, haddr_t /*m
   if (info == nullptr) return nullptr;
   auto* const file = new (std::nothrow) MemoryFile{};
   if (file == nullptr) return nullptr;
-  file->image = *static_cast<MemoryImage* const*>(info);
+  file->image = static_cast<const Target*>(info)->image;
   return &file->base;
 }
 
@@ -62,7 +67,7 @@ H5FD_class_t MakeClass() {
   driver.name = "dexcheck_memory";
   driver.maxaddr = static_cast<haddr_t>(std::numeric_limits<std::int64_t>::max());
   driver.fc_degree = H5F_CLOSE_STRONG;
-  driver.fapl_size = sizeof(MemoryImage*);
+  driver.fapl_size = sizeof(Target);
   driver.open = Open;
   driver.close = Close;
   driver.get_eoa = GetSize;
@@ -111,7 +116,8 @@ Driver RegisterMemoryDriver() {
 }
 
 void UseMemory(const Driver& driver, const Properties& access, MemoryImage* image) {
-  Check(H5Pset_driver(access.id(), driver.id(), &image));
+  const Target target{image};
+  Check(H5Pset_driver(access.id(), driver.id(), &target));
 }
 
 }  // namespace dexcheck::hdf5

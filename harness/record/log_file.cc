@@ -106,6 +106,7 @@ class LogBuilder {
 
   void AddAttribute(hid_t object, const std::string& name, const std::vector<std::string>& texts) const {
     std::vector<const char*> values;
+    values.reserve(texts.size());
     for (const std::string& text : texts) values.push_back(text.c_str());
     AddAttribute(object, name, string_type_.id(), {values.size()}, values.data());
   }

@@ -39,6 +39,7 @@ std::vector<std::string> ReadStrings(hid_t object, const std::string& name) {
   std::vector<char*> values(count, nullptr);
   Check(H5Aread(attribute.id(), type.id(), values.data()));
   std::vector<std::string> texts;
+  texts.reserve(count);
   for (const char* value : values) texts.emplace_back(value == nullptr ? "" : value);
   Check(H5Dvlen_reclaim(type.id(), space.id(), H5P_DEFAULT, values.data()));
   return texts;

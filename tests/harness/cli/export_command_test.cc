@@ -14,7 +14,6 @@ namespace dexcheck {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using testing::IsRefused;
 using testing::ReadText;
 using testing::RunDexcheck;
