@@ -64,8 +64,8 @@ StepModelCheck::ContactScales StepModelCheck::CalcContactScales(const ContactGeo
   // A fingertip displaced by e over the object moves the contact by (K_f + Kt_o)^-1 K_f e on the object and
   // turns the normal by K_o times that.
   const Matrix2d sum = contact.fingertip.K + contact.R_psi * contact.object.K * contact.R_psi;
-  const double least =
-      0.5 * sum.trace() - std::hypot(0.5 * (sum(0, 0) - sum(1, 1)), 0.5 * (sum(0, 1) + sum(1, 0)));
+  const double half = 0.5 * (sum(0, 0) - sum(1, 1));
+  const double least = 0.5 * sum.trace() - std::sqrt(half * half + sum(0, 1) * sum(1, 0));
   const double moved = contact.fingertip.K.norm() / least;
   const double length = scales_.world_length();
   return {1.0 + contact.object.K.norm() * moved * length, (1.0 + moved) * length};
@@ -119,22 +119,22 @@ void StepModelCheck::CompareContacts(const GraspTerms& grasp, const MeasuredStat
       maps.weight.segment<3>(g + 6 * col + 3).setConstant(1.0 / moment);
     }
 
-    const Matrix3d R_cf_projected = shift.linear().transpose() * R_cf;
-    const Vector3d position = shift.inverse(Eigen::Isometry) * touch.position;
+    const ContactPlace place{R_cf, touch.position, shift.linear().transpose() * R_cf,
+                             shift.inverse(Eigen::Isometry) * touch.position, scales};
     const std::vector<int>& chain = engine_.chain(finger);
     const auto columns = static_cast<Eigen::Index>(chain.size());
-    engine_.CalcTipJacobian(finger, position, J_engine_.leftCols(columns));
-    const double row_scale = scales.normal + scales.position / scales_.length();
+    engine_.CalcTipJacobian(finger, place.p_projected, J_engine_.leftCols(columns));
+    const double row_weight = 1.0 / (scales.normal + scales.position / scales_.length());
     for (Eigen::Index col = 0; col < columns; ++col, k += 3) {
       const int coordinate = chain[static_cast<size_t>(col)];
       jacobian.model.segment<3>(k) = grasp.J_B().block<3, 1>(row, coordinate);
-      jacobian.engine.segment<3>(k) = R_cf_projected.transpose() * J_engine_.col(col).head<3>();
-      jacobian.weight.segment<3>(k).setConstant(1.0 / (scales_.CalcVelocityScale(coordinate) * row_scale));
+      jacobian.engine.segment<3>(k) = place.R_projected.transpose() * J_engine_.col(col).head<3>();
+      jacobian.weight.segment<3>(k).setConstant(velocity_weights_[coordinate] * row_weight);
     }
 
     term(kJBDotXi).model.segment<3>(row) = J_B_dot_xi_.segment<3>(row);
     term(kGDotV).model.segment<3>(row) = grasp.G_dot().middleCols<3>(row).transpose() * grasp.V_Bo();
-    CompareContactRates(contact, finger, R_cf, R_cf_projected, touch.position, position);
+    CompareContactRates(contact, finger, place);
   }
   const auto scale = [&](Eigen::Index, Eigen::Index col) {
     return scales_.CalcVelocityScale(static_cast<int>(col));
@@ -145,16 +145,14 @@ void StepModelCheck::CompareContacts(const GraspTerms& grasp, const MeasuredStat
   jacobian.CheckZeros(other_zeros_[1], grasp.J_B(), scale, where, step);
 }
 
-void StepModelCheck::CompareContactRates(const Contact& contact, int finger, const Matrix3d& R_cf,
-                                         const Matrix3d& R_cf_projected, const Vector3d& position,
-                                         const Vector3d& projected_position) {
+void StepModelCheck::CompareContactRates(const Contact& contact, int finger, const ContactPlace& place) {
   // Everything in Sigma_cf, which moves over the fingertip at u_f and turns at omega.
-  const EngineMotion tip = engine_.TipMotion(finger).MoveTo(projected_position);
-  const EngineMotion object = engine_.ObjectMotion().MoveTo(position);
-  const Vector3d v_f = R_cf_projected.transpose() * tip.v;
-  const Vector3d omega_f = R_cf_projected.transpose() * tip.omega;
-  const Vector3d v_o = R_cf.transpose() * object.v;
-  const Vector3d omega_o = R_cf.transpose() * object.omega;
+  const EngineMotion tip = engine_.TipMotion(finger).MoveTo(place.p_projected);
+  const EngineMotion object = engine_.ObjectMotion().MoveTo(place.p);
+  const Vector3d v_f = place.R_projected.transpose() * tip.v;
+  const Vector3d omega_f = place.R_projected.transpose() * tip.omega;
+  const Vector3d v_o = place.R.transpose() * object.v;
+  const Vector3d omega_o = place.R.transpose() * object.omega;
   const Vector6d over_tip = CalcFrameTwistOnFingertip(contact.geometry, contact.kappa_dot);
   const Vector3d u_f = over_tip.head<3>();
   Vector3d u_o = v_f + u_f - v_o;
@@ -164,10 +162,11 @@ void StepModelCheck::CompareContactRates(const Contact& contact, int finger, con
   // d/dt (R_cf^T v_f(p_c)), and the same of the object's velocity at p_c
   StepTerm& fingers = term(kJBDotXi);
   StepTerm& objects = term(kGDotV);
-  fingers.engine.segment<3>(row) = R_cf_projected.transpose() * tip.a + omega_f.cross(u_f) - omega.cross(v_f);
-  objects.engine.segment<3>(row) = R_cf.transpose() * object.a + omega_o.cross(u_o) - omega.cross(v_o);
+  fingers.engine.segment<3>(row) =
+      place.R_projected.transpose() * tip.a + omega_f.cross(u_f) - omega.cross(v_f);
+  objects.engine.segment<3>(row) = place.R.transpose() * object.a + omega_o.cross(u_o) - omega.cross(v_o);
 
-  const ContactScales scales = CalcContactScales(contact.geometry);
+  const ContactScales& scales = place.scales;
   const double turning = omega.norm();
   const double linear = scales_.linear_rate() + u_f.norm();
   const double angular = scales_.angular_rate() + turning;

@@ -66,6 +66,8 @@ void StepModelCheck::DefineRobotTerms() {
     may_differ(row, col) = may_differ(col, row) = true;
   }
   other_zeros_.emplace_back(may_differ);
+  velocity_weights_.setZero(n);
+  for (int i = 0; i < n; ++i) velocity_weights_[i] = 1.0 / scales_.CalcVelocityScale(i);
   for (int i = 0; i < n; ++i) velocities.push_back({Location::Kind::kVelocity, i, -1});
 
   define("frame_pose", 1.0, poses);

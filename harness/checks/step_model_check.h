@@ -71,6 +71,15 @@ class StepModelCheck {
     double position;  ///< m
   };
 
+  /// Sigma_cf by the engine, in the plant's world and where the projected robot has it.
+  struct ContactPlace {
+    Matrix3d R;
+    Vector3d p;
+    Matrix3d R_projected;
+    Vector3d p_projected;
+    ContactScales scales;
+  };
+
   StepTerm& term(Term term) { return terms_[term]; }
   void DefineRobotTerms();
   void DefineGraspTerms();
@@ -82,9 +91,7 @@ class StepModelCheck {
   void CompareForces(const ModelTerms& robot, const MeasuredState& state);
   void CompareEnergies(const ModelTerms& robot);
   void CompareContacts(const GraspTerms& grasp, const MeasuredState& state, const Pose& X_W0, long step);
-  void CompareContactRates(const Contact& contact, int finger, const Matrix3d& R_cf,
-                           const Matrix3d& R_cf_projected, const Vector3d& position,
-                           const Vector3d& projected_position);
+  void CompareContactRates(const Contact& contact, int finger, const ContactPlace& place);
   void CompareObject(const GraspTerms& grasp, const MeasuredState& state);
 
   const Adapter* adapter_;
@@ -98,6 +105,7 @@ class StepModelCheck {
   std::vector<Eigen::Index> mass_offsets_;  // in M_bar', of the engine's entries, then of their mirror images
   std::vector<ZeroPattern> J_zeros_;        // by fingertip
   std::vector<ZeroPattern> other_zeros_;    // of M_bar' and J_B'
+  Eigen::ArrayXd velocity_weights_;         // 1 / CalcVelocityScale
   Matrix6Xd J_, J_dot_, J_engine_;
   VectorXd force_, J_B_dot_xi_;
 };

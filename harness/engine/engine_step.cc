@@ -62,8 +62,8 @@ EngineStep::EngineStep(const Adapter& adapter, std::span<const int> fingertips)
 }
 
 void EngineStep::FindObject() {
-  const std::string key = "MJCF: body " + Quote(NameOf(*engine_, mjOBJ_BODY, object_body_)) + ": ";
   if (object_body_ < 0) throw InputError("parameters: a grasp needs an object");
+  const std::string key = "MJCF: body " + Quote(NameOf(*engine_, mjOBJ_BODY, object_body_)) + ": ";
   const int joint = engine_->body_jntadr[object_body_];
   if (engine_->body_jntnum[object_body_] != 1 || engine_->jnt_type[joint] != mjJNT_FREE) {
     throw InputError(key + "must move by a free joint");

@@ -129,9 +129,9 @@ EngineTouch EngineStep::CalcTouch(int finger, const Pose& shift) {
     const int second = tip_first ? geom : tip;
     const mjfCollision collide = mjCOLLISIONFUNC[m->geom_type[first]][m->geom_type[second]];
     if (collide == nullptr) continue;
+    // The margin is as large as can be: the nearest points are wanted also where the bodies are apart.
     mjContact contacts[mjMAXCONPAIR];
-    constexpr double kMargin = 1.0;  // m: the nearest points are wanted also where the bodies are apart
-    const int count = collide(m, d, contacts, first, second, kMargin);
+    const int count = collide(m, d, contacts, first, second, mjMAXVAL);
     for (int i = 0; i < count; ++i) {
       if (touch.found && contacts[i].dist >= touch.distance) continue;
       touch.found = true;
