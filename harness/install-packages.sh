@@ -14,8 +14,11 @@ packages=(
   libhdf5-dev zlib1g-dev
   # the command line
   libcli11-dev libfmt-dev nlohmann-json3-dev
+  # off-screen drawing and video
+  pkg-config libosmesa6-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libpng-dev libfreetype-dev
+  fonts-dejavu-core
   # tests and benchmarks, and the programs they take as oracles
-  libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools
+  libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools ffmpeg
 )
 # with the argument "development": sanitizers and libFuzzer, coverage, static analysis
 if [[ ${1:-} == development ]]; then

@@ -104,6 +104,11 @@ double RoundingScales::CalcGravityScale(int coordinate) const {
   return Positive(GetSubtreeMass(coordinate) * CalcVelocityScale(coordinate) * model_->gravity().norm());
 }
 
+double RoundingScales::acceleration() const {
+  const double straight = reach_ > 0.0 ? linear_rate_ / reach_ : 0.0;
+  return linear_rate_ * std::max(angular_rate_, straight);
+}
+
 double RoundingScales::CalcCoriolisScale(int coordinate) const {
   return Positive(GetSubtreeMass(coordinate) * CalcVelocityScale(coordinate) * acceleration());
 }

@@ -45,7 +45,8 @@ class RoundingScales {
   [[nodiscard]] double angular_rate() const { return angular_rate_; }
   /// Of a point, m/s.
   [[nodiscard]] double linear_rate() const { return linear_rate_; }
-  [[nodiscard]] double acceleration() const { return linear_rate_ * angular_rate_; }
+  /// Of a point, m/s^2. Straight motion counts: its v x m v cancels, but only to rounding.
+  [[nodiscard]] double acceleration() const;
   /// Of an entry of C_bar' xi.
   [[nodiscard]] double CalcCoriolisScale(int coordinate) const;
   [[nodiscard]] double CalcFrictionScale(int coordinate, const Eigen::Ref<const VectorXd>& xi) const;

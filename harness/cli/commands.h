@@ -30,5 +30,6 @@ void AddEvalCommand(CLI::App* app, int* exit_code);
 /// @param command_line as typed, to be kept in the log.
 void AddRunCommand(CLI::App* app, const std::string& command_line, int* exit_code);
 void AddExportCommand(CLI::App* app, int* exit_code);
+void AddRenderCommand(CLI::App* app, int* exit_code);
 
 }  // namespace dexcheck::cli

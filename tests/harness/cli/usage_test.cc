@@ -55,7 +55,7 @@ TEST(Usage, HelpMentionsEveryCommandAndOption) {
     EXPECT_EQ(result.err, "");
     return result.out;
   };
-  for (const char* word : {"consistency", "eval", "export", "--help", "--version"}) {
+  for (const char* word : {"consistency", "eval", "export", "render", "--help", "--version"}) {
     EXPECT_THAT(help({"--help"}), HasSubstr(word));
   }
   for (const char* word : {"--robot FILE.toml", "--mjcf FILE.xml", "--samples N=10000", "--seed N=1",
@@ -68,6 +68,11 @@ TEST(Usage, HelpMentionsEveryCommandAndOption) {
   }
   for (const char* word : {"RUN_DIR", "--csv FILE.csv", "--signals A,B,...", "--every N=1", "--list"}) {
     EXPECT_THAT(help({"export", "--help"}), HasSubstr(word));
+  }
+  for (const char* word : {"RUN_DIR REQUIRED", "--out FILE", "--still T", "--camera NAME=overview",
+                           "--inset NAME", "--beside RUN_DIR", "--size WxH=1280x720", "--fps N=30",
+                           "--threads N", "--forces", "--tracks", "--frames", "--no-panel", "--quiet"}) {
+    EXPECT_THAT(help({"render", "--help"}), HasSubstr(word));
   }
   EXPECT_THAT(help({"--version"}), ::testing::MatchesRegex("[0-9]+\\.[0-9]+\\.[0-9]+\n"));
 }

@@ -1,0 +1,154 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/cli/run_frames_reader.h"
+#include "renders/movie.h"
+#include "renders/png_file.h"
+
+namespace dexcheck::cli {
+namespace {
+
+struct Request {
+  std::filesystem::path run_folder;
+  std::string beside;
+  std::string size = "1280x720";
+  std::optional<double> still;
+  std::string out;
+  MovieOptions movie;
+  bool no_panel = false;
+  bool quiet = false;
+};
+
+/// "1280x720" into the options.
+void ReadSize(const std::string& text, MovieOptions* movie) {
+  const char* const end = text.data() + text.size();
+  const std::from_chars_result width = std::from_chars(text.data(), end, movie->width);
+  if (width.ec == std::errc() && width.ptr != end && *width.ptr == 'x') {
+    const std::from_chars_result height = std::from_chars(width.ptr + 1, end, movie->height);
+    const auto is_size = [](int value, int most) { return value >= 32 && value <= most && value % 2 == 0; };
+    if (height.ec == std::errc() && height.ptr == end && is_size(movie->width, 3840) &&
+        is_size(movie->height, 2160)) {
+      return;
+    }
+  }
+  throw InputError("--size: must be WIDTHxHEIGHT, even numbers from 32x32 to 3840x2160, got " + Quote(text));
+}
+
+double Duration(const RunFrames& run) { return run.times.back() - run.times.front(); }
+
+void WriteStill(const Request& request, const std::vector<RunView>& views, const std::string& out) {
+  double longest = 0.0;
+  for (const RunView& view : views) longest = std::max(longest, Duration(*view.frames));
+  if (!(*request.still >= 0.0 && *request.still <= longest)) {
+    throw InputError("--still: must be from 0 to " + FormatNumber(longest) + " s, got " +
+                     FormatNumber(*request.still));
+  }
+  WritePng(out, MoviePainter(views, request.movie).Paint(*request.still));
+  if (!request.quiet) {
+    fmt::print("{}: {:.2f} s of the run, {} x {}\n", out, *request.still, request.movie.width,
+               request.movie.height);
+  }
+}
+
+ExitCode WriteMovie(const Request& request, const std::vector<RunView>& views, const std::string& out) {
+  const auto start = std::chrono::steady_clock::now();
+  VideoOptions encoding;
+  encoding.width = request.movie.width;
+  encoding.height = request.movie.height;
+  encoding.fps = request.movie.fps;
+  const long frames = CountFrames(views, request.movie.fps);
+  VideoWriter video(out, encoding);
+  CatchInterrupts();
+  ProgressBar bar("drawing", frames, request.quiet);
+  const bool complete = RenderMovie(views, request.movie, &video, [&](long done, long) {
+    bar.Update(done);
+    return !IsInterrupted();
+  });
+  bar.Finish();
+  if (!complete) {
+    fmt::print(stderr, "dexcheck: stopped after {} of {} frames; {} was not written\n", video.frames(),
+               frames, out);
+    return kFailure;
+  }
+  video.Finish();
+  if (!request.quiet) {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    std::error_code ignored;
+    const double megabytes = static_cast<double>(std::filesystem::file_size(out, ignored)) / 1e6;
+    fmt::print("{}: {} frames, {:.1f} s, {} x {}, {:.1f} MB, drawn in {:.0f} s\n", out, frames,
+               static_cast<double>(frames) / request.movie.fps, request.movie.width, request.movie.height,
+               megabytes, seconds);
+  }
+  return kSuccess;
+}
+
+ExitCode Run(Request request) {
+  ReadSize(request.size, &request.movie);
+  request.movie.panel = !request.no_panel;
+  std::vector<RecordedFrames> runs;
+  runs.push_back(ReadRecordedFrames(request.run_folder));
+  if (!request.beside.empty()) runs.push_back(ReadRecordedFrames(request.beside));
+  std::vector<RunView> views;
+  for (const RecordedFrames& run : runs) views.push_back({run.model.get(), &run.frames});
+  std::string out = request.out;
+  if (out.empty()) out = (request.run_folder / (request.still ? "still.png" : "video.mp4")).string();
+  if (!request.still) return WriteMovie(request, views, out);
+  WriteStill(request, views, out);
+  return kSuccess;
+}
+
+}  // namespace
+
+void AddRenderCommand(CLI::App* app, int* exit_code) {
+  constexpr int kMostFramesPerSecond = 120;
+  constexpr int kMostThreads = 64;
+  const auto request = std::make_shared<Request>();
+  request->movie.workers = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8);
+  CLI::App* command = app->add_subcommand("render", "Draw a recorded run as a video, or one instant of it");
+  command->add_option("RUN_DIR", request->run_folder, "Folder of the run")->required()->type_name("");
+  command->add_option("--out", request->out, "Default: video.mp4 or still.png in RUN_DIR")->type_name("FILE");
+  command->add_option("--still", request->still, "One picture (PNG) at this time of the run, s")
+      ->type_name("T");
+  command
+      ->add_option("--camera", request->movie.camera,
+                   "overview, follow, grasp, top, or another of the MJCF's")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command->add_option("--inset", request->movie.inset, "A second camera in the lower right corner")
+      ->type_name("NAME");
+  command->add_option("--beside", request->beside, "Another run, shown at the right")->type_name("RUN_DIR");
+  command->add_option("--size", request->size, "Of the picture in pixels")
+      ->type_name("WxH")
+      ->capture_default_str();
+  command->add_option("--fps", request->movie.fps, "Frames a second")
+      ->type_name("N")
+      ->check(WholeNumber(1, kMostFramesPerSecond))
+      ->capture_default_str();
+  command
+      ->add_option("--threads", request->movie.workers,
+                   "That draw; default: one for each processor, at most 8")
+      ->type_name("N")
+      ->check(WholeNumber(1, kMostThreads));
+  command->add_flag("--forces", request->movie.forces, "Draw contact forces and friction cones");
+  command->add_flag("--tracks", request->movie.tracks, "Draw the contacts' tracks and the object's path");
+  command->add_flag("--frames", request->movie.frames, "Draw the object's axes");
+  command->add_flag("--no-panel", request->no_panel, "Leave out the panel with time, errors and checks");
+  command->add_flag("--quiet", request->quiet, "Print nothing");
+  command->callback([=] { *exit_code = Run(*request); });
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,116 @@
+#include "harness/cli/run_frames_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/cli/run_folder.h"
+#include "harness/record/log_reader.h"
+
+namespace dexcheck::cli {
+namespace {
+
+constexpr const char* kCheckPrefix = "check/";
+constexpr const char* kForces = "contact/force";
+
+class FramesReader {
+ public:
+  explicit FramesReader(const std::filesystem::path& path) : path_(path), log_(path) {}
+
+  MjModelPtr ReadModel() const {
+    const TemporaryFolder folder;
+    log_.ExtractFiles("inputs", folder.path());
+    const std::filesystem::path mjcf = folder.path() / "mjcf" / log_.ReadText("mjcf");
+    try {
+      return LoadMjcf(mjcf);
+    } catch (const InputError& error) {
+      throw InputError(path_.string() + ": " + error.what());
+    }
+  }
+
+  RunFrames ReadFrames() const {
+    RunFrames run;
+    run.source = path_.string();
+    run.title = log_.ReadText("scenario");
+    run.times = ReadSeries("time");
+    run.qpos = log_.ReadSignal("engine/qpos");
+    run.position_errors = ReadSeries("object/position_error");
+    run.orientation_errors = ReadSeries("object/orientation_error");
+    run.contact_positions = ReadMatrix("contact/position");
+    run.contact_forces = ReadMatrix(kForces);
+    run.contact_normals = ReadMatrix("contact/normal");
+    const RowMatrixXd desired = ReadMatrix("object/X_d");
+    if (desired.cols() >= 3) run.desired_positions = desired.leftCols<3>();
+    if (const SignalInfo* forces = Find(kForces)) {
+      const auto mu = forces->attributes.find("mu");
+      if (mu != forces->attributes.end()) run.friction = mu->second;
+    }
+    for (const SignalInfo& signal : log_.signals()) {
+      if (signal.name.starts_with(kCheckPrefix)) run.checks.push_back(ReadCheck(signal));
+    }
+    OpenForcelessContacts(&run);
+    return run;
+  }
+
+ private:
+  [[nodiscard]] const SignalInfo* Find(const std::string& name) const {
+    const auto signal = std::find_if(log_.signals().begin(), log_.signals().end(),
+                                     [&](const SignalInfo& info) { return info.name == name; });
+    return signal == log_.signals().end() ? nullptr : &*signal;
+  }
+
+  /// Empty when it was not recorded.
+  [[nodiscard]] RowMatrixXd ReadMatrix(const std::string& name) const {
+    return Find(name) == nullptr ? RowMatrixXd() : log_.ReadSignal(name);
+  }
+
+  [[nodiscard]] std::vector<double> ReadSeries(const std::string& name) const {
+    const RowMatrixXd matrix = ReadMatrix(name);
+    return {matrix.data(), matrix.data() + matrix.size()};
+  }
+
+  [[nodiscard]] CheckSeries ReadCheck(const SignalInfo& signal) const {
+    const auto attribute = [&](const char* name) {
+      const auto found = signal.attributes.find(name);
+      if (found != signal.attributes.end()) return found->second;
+      throw InputError(path_.string() + ": " + signal.name + ": has no attribute " + Quote(name));
+    };
+    const double kind = attribute("kind");
+    if (!(kind >= 0.0 && kind <= 3.0) || kind != std::floor(kind)) {
+      throw InputError(path_.string() + ": " + signal.name + ": kind must be 0, 1, 2 or 3, got " +
+                       FormatNumber(kind));
+    }
+    return {signal.name.substr(std::strlen(kCheckPrefix)), static_cast<CheckKind>(static_cast<int>(kind)),
+            attribute("bound"), ReadSeries(signal.name)};
+  }
+
+  /// Marks contacts that carry nothing as open.
+  static void OpenForcelessContacts(RunFrames* run) {
+    if (run->contact_forces.size() != run->contact_positions.size()) return;
+    for (long row = 0; row < run->contact_forces.rows(); ++row) {
+      for (long k = 0; k < run->contacts(); ++k) {
+        if (!run->contact_forces.block<1, 3>(row, 3 * k).isZero(0.0)) continue;
+        run->contact_positions.block<1, 3>(row, 3 * k).setConstant(std::numeric_limits<double>::quiet_NaN());
+      }
+    }
+  }
+
+  std::filesystem::path path_;
+  LogReader log_;
+};
+
+}  // namespace
+
+RecordedFrames ReadRecordedFrames(const std::filesystem::path& run_folder) {
+  const FramesReader reader(run_folder / "log.h5");
+  RecordedFrames recorded{reader.ReadModel(), reader.ReadFrames()};
+  CheckRunFrames(*recorded.model, recorded.frames);
+  return recorded;
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace dexcheck {
+
+/// RGB picture, 8 bits a channel, rows from top to bottom without padding.
+struct Image {
+  Image() = default;
+  /// Black. @throws std::invalid_argument unless both sizes are positive.
+  Image(int width, int height);
+
+  [[nodiscard]] std::uint8_t* Pixel(int x, int y) { return rgb.data() + Offset(x, y); }
+  [[nodiscard]] const std::uint8_t* Pixel(int x, int y) const { return rgb.data() + Offset(x, y); }
+
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> rgb;  ///< 3 * width * height.
+
+ private:
+  [[nodiscard]] std::size_t Offset(int x, int y) const {
+    return 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
+  }
+};
+
+/// Averages squares of `factor` x `factor` pixels; rows of `source` run from bottom to top, as OpenGL reads
+/// them.
+/// @param source 3 * (factor * width) * (factor * height) bytes.
+Image ReduceBottomUp(const std::uint8_t* source, int width, int height, int factor);
+
+}  // namespace dexcheck

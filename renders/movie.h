@@ -1,0 +1,68 @@
+#pragma once
+
+// A run as pictures.
+
+#include <mujoco/mujoco.h>
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "renders/image.h"
+#include "renders/run_frames.h"
+#include "renders/video_writer.h"
+
+namespace dexcheck {
+
+struct MovieOptions {
+  int width = 1280;
+  int height = 720;
+  int fps = 30;
+  std::string camera = "overview";
+  std::string inset;    ///< A second camera, shown in the lower right corner; none when empty.
+  bool forces = false;  ///< Contact forces with their friction cones.
+  bool tracks =
+      false;  ///< Where the contacts have been on the object, and the object's path beside the desired one.
+  bool frames = false;  ///< The object's axes.
+  bool panel = true;    ///< Scenario, time, errors and checks.
+  int workers = 2;      ///< Threads that draw, each a frame of its own.
+  int samples = 2;      ///< See RenderOptions.
+  int shadow_size = 2048;
+};
+
+/// A run and the model that it was run with; both must outlive what is made from them.
+struct RunView {
+  const mjModel* model;
+  const RunFrames* frames;
+};
+
+/// Draws the instants of one run, or of two side by side. For the thread that made it.
+class MoviePainter {
+ public:
+  /// @param runs one or two.
+  /// @throws InputError for an unknown camera or frames that CheckRunFrames refuses.
+  MoviePainter(std::span<const RunView> runs, const MovieOptions& options);
+  ~MoviePainter();
+  MoviePainter(const MoviePainter&) = delete;
+  MoviePainter& operator=(const MoviePainter&) = delete;
+
+  /// The picture `time` seconds after the runs' beginning; after its end a run stands still.
+  Image Paint(double time);
+
+ private:
+  class RunPainter;
+  std::vector<std::unique_ptr<RunPainter>> painters_;
+};
+
+/// How many frames show the longest of the runs: its duration times the frame rate, rounded, at least one.
+long CountFrames(std::span<const RunView> runs, int fps);
+
+/// Draws all frames and writes them to `video` in order, without finishing it.
+/// @param progress told after each frame how many of how many are written; false stops the work.
+/// @return whether all frames were written.
+bool RenderMovie(std::span<const RunView> runs, const MovieOptions& options, VideoWriter* video,
+                 const std::function<bool(long done, long total)>& progress = {});
+
+}  // namespace dexcheck

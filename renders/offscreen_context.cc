@@ -1,0 +1,41 @@
+#include "renders/offscreen_context.h"
+
+#include <GL/osmesa.h>
+
+#include <cstdlib>
+#include <mutex>
+
+#include "controller/common/errors.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr int kSurfaceSize = 16;
+constexpr int kDepthBits = 24;
+constexpr int kStencilBits = 8;
+
+// Each frame is drawn by one thread; movies draw several frames at once instead.
+void KeepToCallingThread() {
+  static std::once_flag once;
+  std::call_once(once, [] { ::setenv("LP_NUM_THREADS", "0", /*overwrite=*/0); });
+}
+
+}  // namespace
+
+OffscreenContext::OffscreenContext() : buffer_(4 * kSurfaceSize * kSurfaceSize) {
+  KeepToCallingThread();
+  context_ = OSMesaCreateContextExt(OSMESA_RGBA, kDepthBits, kStencilBits, 0, nullptr);
+  if (context_ == nullptr) throw Error("OSMesa: cannot make an OpenGL context");
+  MakeCurrent();
+}
+
+OffscreenContext::~OffscreenContext() { OSMesaDestroyContext(context_); }
+
+void OffscreenContext::MakeCurrent() {
+  if (OSMesaGetCurrentContext() == context_) return;
+  if (OSMesaMakeCurrent(context_, buffer_.data(), GL_UNSIGNED_BYTE, kSurfaceSize, kSurfaceSize) != GL_TRUE) {
+    throw Error("OSMesa: cannot make an OpenGL context current");
+  }
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,179 @@
+#include "renders/overlay.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace dexcheck {
+namespace {
+
+using Align = Canvas::Align;
+
+const Color kPanel = MakeColor(0x0e141c, 0.72F);
+const Color kRule = MakeColor(0xffffff, 0.14F);
+const Color kText = MakeColor(0xf2f5f8);
+const Color kFaint = MakeColor(0xa9b5c2);
+const Color kCurve = MakeColor(0xff9a3d);
+const Color kGood = MakeColor(0x3ddc84);
+const Color kBad = MakeColor(0xff5a52);
+const Color kUnknown = MakeColor(0x6b7785);
+
+// Sizes at 720 rows.
+constexpr double kMargin = 20.0;
+constexpr double kPadding = 16.0;
+constexpr double kWidth = 316.0;
+constexpr double kTitleSize = 19.0;
+constexpr double kTextSize = 14.5;
+constexpr double kSmallSize = 11.5;
+constexpr double kLine = 23.0;
+constexpr double kNarrow = 850.0;  // pictures narrower than this have a smaller panel
+constexpr double kPlotHeight = 58.0;
+
+/// The text, shortened with an ellipsis to fit.
+std::string Fit(std::string text, double width, double size, Font& font) {
+  if (font.Measure(text, size) <= width) return text;
+  while (!text.empty() && font.Measure(text + "\u2026", size) > width) {
+    do {
+      text.pop_back();
+    } while (!text.empty() && (static_cast<unsigned char>(text.back()) & 0xc0U) == 0x80U);
+  }
+  return text + "\u2026";
+}
+
+}  // namespace
+
+std::string FormatSi(double value, const std::string& unit) {
+  if (!std::isfinite(value)) return "not finite";
+  struct Prefix {
+    double factor;
+    const char* name;
+  };
+  static constexpr std::array<Prefix, 7> kPrefixes = {
+      {{1.0, ""}, {1e-3, "m"}, {1e-6, "\u00b5"}, {1e-9, "n"}, {1e-12, "p"}, {1e-15, "f"}, {1e-18, "a"}}};
+  const double size = std::abs(value);
+  if (size < 1e-18) return "0 " + unit;
+  // Compared with what rounds to 1.00 of the prefix.
+  const auto* prefix = std::find_if(kPrefixes.begin(), kPrefixes.end(),
+                                    [&](const Prefix& p) { return size >= 0.9995 * p.factor; });
+  if (prefix == kPrefixes.end()) prefix = &kPrefixes.back();
+  const double scaled = value / prefix->factor;
+  const int decimals = std::abs(scaled) < 9.995 ? 2 : std::abs(scaled) < 99.95 ? 1 : 0;
+  return fmt::format("{:.{}f} {}{}", scaled, decimals, prefix->name, unit);
+}
+
+Overlay::Overlay()
+    : regular_(Font::SystemFolder() / "DejaVuSans.ttf"),
+      bold_(Font::SystemFolder() / "DejaVuSans-Bold.ttf") {}
+
+void Overlay::DrawPlot(const OverlayState& state, const Vector2d& corner, const Vector2d& size, double s,
+                       Canvas* canvas) {
+  const double low = std::log10(state.error_low);
+  const double high = std::max(std::log10(state.error_high), low + 1.0);
+  const double label_width = 52.0 * s;
+  const double left = corner.x() + label_width;
+  const double width = size.x() - label_width;
+  const auto row = [&](double decade) {
+    return corner.y() + size.y() * (high - std::clamp(decade, low, high)) / (high - low);
+  };
+  const int decades = static_cast<int>(std::floor(high) - std::ceil(low)) + 1;
+  const int every = std::max(1, (decades + 2) / 3);
+  for (int decade = static_cast<int>(std::ceil(low)); decade <= std::floor(high); decade += every) {
+    const std::array<Vector2d, 2> line = {Vector2d(left, row(decade)), Vector2d(left + width, row(decade))};
+    canvas->StrokePath(line, 1.0 * s, kRule);
+    std::string label = FormatSi(std::pow(10.0, decade), "m");
+    label =
+        fmt::format("{:.0f} {}", std::pow(10.0, ((decade % 3) + 3) % 3), label.substr(label.find(' ') + 1));
+    canvas->DrawText(regular_, kSmallSize * s, {left - 7.0 * s, row(decade) + 4.0 * s}, label, kFaint,
+                     Align::kRight);
+  }
+  std::vector<Vector2d> path;
+  for (const Vector2d& sample : state.history) {
+    const double x = left + width * (1.0 + (sample.x() - state.time) / state.history_span);
+    const double error = std::isfinite(sample.y()) ? std::max(sample.y(), state.error_low) : state.error_high;
+    if (x >= left - 1e-9) path.emplace_back(x, row(std::log10(error)));
+  }
+  canvas->StrokePath(path, 1.8 * s, kCurve);
+  if (!path.empty()) canvas->FillCircle(path.back(), 3.2 * s, kCurve);
+}
+
+void Overlay::Draw(const OverlayState& state, Image* image) {
+  const double s = std::min(image->height / 720.0, image->width / kNarrow);
+  const bool has_plot = !state.history.empty();
+  const int errors = (state.position_error ? 1 : 0) + (state.orientation_error ? 1 : 0);
+  const auto rows = static_cast<double>(state.questions.size());
+  const auto keys = static_cast<double>(state.legend.size());
+  double height = 2.0 * kPadding + kLine;
+  if (errors > 0) height += 10.0 + errors * kLine;
+  if (has_plot) height += kPlotHeight + 22.0;
+  if (rows > 0) height += 14.0 + (rows + 0.8) * kLine;
+  if (keys > 0) height += 12.0 + keys * kLine;
+
+  Canvas canvas(image);
+  const Vector2d corner = s * Vector2d(kMargin, kMargin);
+  canvas.FillRoundedRectangle(corner, s * Vector2d(kWidth, height), 12.0 * s, kPanel);
+  const double left = corner.x() + kPadding * s;
+  const double right = corner.x() + (kWidth - kPadding) * s;
+  double y = corner.y() + (kPadding + 15.0) * s;
+
+  const auto draw_rule = [&] {
+    const std::array<Vector2d, 2> line = {Vector2d(left, y), Vector2d(right, y)};
+    canvas.StrokePath(line, s, kRule);
+  };
+  const auto draw_row = [&](double x, const std::string& name, const std::string& value) {
+    canvas.DrawText(regular_, kTextSize * s, {x, y}, name, kFaint);
+    canvas.DrawText(regular_, kTextSize * s, {right, y}, value, kText, Align::kRight);
+  };
+
+  const std::string time = fmt::format("{:.2f} s", state.time);
+  const double title_width = right - left - bold_.Measure(time, kTitleSize * s) - 12.0 * s;
+  canvas.DrawText(bold_, kTitleSize * s, {left, y}, Fit(state.title, title_width, kTitleSize * s, bold_),
+                  kText);
+  canvas.DrawText(bold_, kTitleSize * s, {right, y}, time, kText, Align::kRight);
+  y += 10.0 * s;
+
+  if (errors > 0) {
+    if (state.position_error) {
+      y += kLine * s;
+      draw_row(left, "position error", FormatSi(*state.position_error, "m"));
+    }
+    if (state.orientation_error) {
+      y += kLine * s;
+      draw_row(left, "orientation error", FormatSi(*state.orientation_error, "rad"));
+    }
+  }
+  if (has_plot) {
+    y += 18.0 * s;
+    DrawPlot(state, {left, y}, {right - left, kPlotHeight * s}, s, &canvas);
+    y += (kPlotHeight + 4.0) * s;
+  }
+  if (rows > 0) {
+    y += 12.0 * s;
+    draw_rule();
+    y += 0.8 * kLine * s;
+    canvas.DrawText(regular_, kSmallSize * s, {left, y}, "cross-check", kFaint);
+    canvas.DrawText(regular_, kSmallSize * s, {right, y}, "worst so far / bound", kFaint, Align::kRight);
+    for (const QuestionStatus& question : state.questions) {
+      y += kLine * s;
+      const Color& dot = !question.asked ? kUnknown : question.Passes() ? kGood : kBad;
+      canvas.FillCircle({left + 5.0 * s, y - 5.0 * s}, 5.0 * s, dot);
+      draw_row(
+          left + 19.0 * s, question.name,
+          question.asked ? fmt::format("{:.1e} / {:.0e}", question.worst, question.bound) : "not checked");
+    }
+  }
+  if (keys > 0) {
+    y += 12.0 * s;
+    draw_rule();
+    for (const LegendEntry& entry : state.legend) {
+      y += kLine * s;
+      const std::array<Vector2d, 2> mark = {Vector2d(left, y - 5.0 * s),
+                                            Vector2d(left + 14.0 * s, y - 5.0 * s)};
+      canvas.StrokePath(mark, 4.0 * s, entry.color);
+      canvas.DrawText(regular_, kTextSize * s, {left + 24.0 * s, y}, entry.text, kFaint);
+    }
+  }
+}
+
+}  // namespace dexcheck

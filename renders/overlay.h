@@ -1,0 +1,67 @@
+#pragma once
+
+// The panel that tells on each frame how the run stands: scenario, time, tracking error, and the four
+// questions of the cross-check.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/common/types.h"
+#include "renders/canvas.h"
+#include "renders/font.h"
+#include "renders/image.h"
+
+namespace dexcheck {
+
+/// Where one of the four questions stands.
+struct QuestionStatus {
+  std::string name;
+  std::string check;   ///< The check that came nearest to its bound, or farthest beyond.
+  double worst = 0.0;  ///< Its largest residual so far.
+  double bound = 0.0;
+  bool asked = false;  ///< False when the run has no check of this kind.
+
+  [[nodiscard]] bool Passes() const { return worst <= bound; }
+};
+
+/// A line of the key to what is drawn in the scene.
+struct LegendEntry {
+  std::string text;
+  Color color;
+};
+
+struct OverlayState {
+  std::string title;
+  double time = 0.0;                        ///< s.
+  std::optional<double> position_error;     ///< m.
+  std::optional<double> orientation_error;  ///< rad.
+  /// (time in s, position error in m) of the span that the plot shows, oldest first.
+  std::vector<Vector2d> history;
+  double history_span = 3.0;  ///< s; the plot ends now and began so long ago.
+  double error_low = 1e-9;    ///< m; range of the plot.
+  double error_high = 1e-3;   ///< m.
+  std::vector<QuestionStatus> questions;
+  std::vector<LegendEntry> legend;
+};
+
+/// A length, angle or other number with a prefix that keeps one to three digits before the point: "12.4 nm".
+std::string FormatSi(double value, const std::string& unit);
+
+class Overlay {
+ public:
+  /// Loads the fonts. @throws InputError when they are not installed.
+  Overlay();
+
+  /// Draws the panel into the upper left corner, as large as the picture's size asks for.
+  void Draw(const OverlayState& state, Image* image);
+
+ private:
+  void DrawPlot(const OverlayState& state, const Vector2d& corner, const Vector2d& size, double scale,
+                Canvas* canvas);
+
+  Font regular_;
+  Font bold_;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,174 @@
+#include "renders/renderer.h"
+
+#include <algorithm>
+#include <mutex>
+#include <optional>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/engine/engine.h"
+#include "renders/display_meshes.h"
+#include "renders/offscreen_context.h"
+#include "renders/scene_geoms.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr int kLargestWidth = 3840;
+constexpr int kLargestHeight = 2160;
+constexpr int kSmallest = 16;
+constexpr int kMostDecorations = 4000;
+
+// MuJoCo loads its OpenGL functions into globals whenever a context is made.
+std::mutex context_mutex;
+
+void CheckOptions(const RenderOptions& options) {
+  const auto check = [](const char* name, int value, int least, int most) {
+    Require(least <= value && value <= most, name,
+            "must be from " + std::to_string(least) + " to " + std::to_string(most), value);
+  };
+  check("width", options.width, kSmallest, kLargestWidth);
+  check("height", options.height, kSmallest, kLargestHeight);
+  check("samples", options.samples, 1, 4);
+  check("shadow_size", options.shadow_size, 16, 8192);
+  check("slices", options.slices, 3, 128);
+  check("stacks", options.stacks, 2, 64);
+}
+
+/// The camera's id. @throws InputError that lists the cameras.
+int FindCamera(const mjModel& model, const std::string& name) {
+  const int id = mj_name2id(&model, mjOBJ_CAMERA, name.c_str());
+  if (id >= 0) return id;
+  std::string known;
+  for (const std::string& camera : ListCameras(model)) known += (known.empty() ? "" : ", ") + camera;
+  throw InputError("camera: no " + Quote(name) + " in the model, which has " +
+                   (known.empty() ? "no cameras" : known));
+}
+
+int FindBody(const mjModel& model, const std::string& name) {
+  if (name.empty()) return -1;
+  const int id = mj_name2id(&model, mjOBJ_BODY, name.c_str());
+  if (id < 0) throw InputError("body: no " + Quote(name) + " in the model");
+  return id;
+}
+
+}  // namespace
+
+std::vector<std::string> ListCameras(const mjModel& model) {
+  std::vector<std::string> names;
+  for (int id = 0; id < model.ncam; ++id) names.push_back(NameOf(model, mjOBJ_CAMERA, id));
+  return names;
+}
+
+class Renderer::Impl {
+ public:
+  Impl(const mjModel& model, const RenderOptions& options)
+      : model_(model), options_(options), camera_(FindCamera(model, options.camera)) {
+    CheckOptions(options);
+    translucent_body_ = FindBody(model, options.translucent_body);
+    const std::lock_guard lock(context_mutex);
+    gl_.emplace();
+    mjv_defaultOption(&visible_);
+    mjv_defaultPerturb(&perturb_);
+    mjv_defaultScene(&scene_);
+    mjv_makeScene(&model, &scene_, model.ngeom + kMostDecorations);
+    mjr_defaultContext(&context_);
+    // The context takes its sizes from the model's visual section.
+    const MjModelPtr sized(mj_copyModel(nullptr, &model));
+    sized->vis.global.offwidth = options.samples * options.width;
+    sized->vis.global.offheight = options.samples * options.height;
+    sized->vis.quality.offsamples = 0;
+    sized->vis.quality.shadowsize = options.shadow_size;
+    sized->vis.quality.numslices = options.slices;
+    sized->vis.quality.numstacks = options.stacks;
+    mjr_makeContext(sized.get(), &context_, mjFONTSCALE_100);
+    mjr_setBuffer(mjFB_OFFSCREEN, &context_);
+    meshes_.emplace(context_);
+    scene_.flags[mjRND_SHADOW] = options.shadows ? 1 : 0;
+    scene_.flags[mjRND_REFLECTION] = options.reflections ? 1 : 0;
+    pixels_.resize(3 * static_cast<size_t>(options.samples * options.width) *
+                   static_cast<size_t>(options.samples * options.height));
+  }
+
+  ~Impl() {
+    gl_->MakeCurrent();
+    meshes_.reset();
+    mjr_freeContext(&context_);
+    mjv_freeScene(&scene_);
+  }
+
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  Image Render(mjData& data, int camera, int width, int height, double shift_right,
+               std::span<const Decoration> decorations) {
+    gl_->MakeCurrent();
+    mjvCamera view;
+    mjv_defaultCamera(&view);
+    view.type = mjCAMERA_FIXED;
+    view.fixedcamid = camera;
+    mjv_updateScene(&model_, &data, &visible_, &perturb_, &view, mjCAT_ALL, &scene_);
+    for (mjvGLCamera& eye : scene_.camera) {
+      const double visible = static_cast<double>(eye.frustum_top - eye.frustum_bottom) * width / height;
+      eye.frustum_center -= static_cast<float>(shift_right * visible);
+    }
+    FadeBody();
+    meshes_->ClearTubes();
+    AddDecorations(decorations, &*meshes_, &scene_);
+    const mjrRect viewport = {0, 0, options_.samples * width, options_.samples * height};
+    mjr_render(viewport, &scene_, &context_);
+    mjr_readPixels(pixels_.data(), nullptr, viewport, &context_);
+    return ReduceBottomUp(pixels_.data(), width, height, options_.samples);
+  }
+
+  Image Render(mjData& data, std::span<const Decoration> decorations) {
+    return Render(data, camera_, options_.width, options_.height, options_.shift_right, decorations);
+  }
+
+  Image Render(mjData& data, const std::string& camera, int width, int height,
+               std::span<const Decoration> decorations) {
+    Require(kSmallest <= width && width <= options_.width, "width", "must fit into the renderer's picture",
+            width);
+    Require(kSmallest <= height && height <= options_.height, "height",
+            "must fit into the renderer's picture", height);
+    return Render(data, FindCamera(model_, camera), width, height, 0.0, decorations);
+  }
+
+ private:
+  void FadeBody() {
+    if (translucent_body_ < 0) return;
+    for (int i = 0; i < scene_.ngeom; ++i) {
+      mjvGeom& geom = scene_.geoms[i];
+      if (geom.objtype != mjOBJ_GEOM || model_.geom_bodyid[geom.objid] != translucent_body_) continue;
+      geom.rgba[3] = std::min(geom.rgba[3], static_cast<float>(options_.translucent_opacity));
+    }
+  }
+
+  const mjModel& model_;
+  RenderOptions options_;
+  int camera_;
+  int translucent_body_ = -1;
+  std::optional<OffscreenContext> gl_;
+  mjvOption visible_;
+  mjvPerturb perturb_;
+  mjvScene scene_;
+  mjrContext context_;
+  std::optional<DisplayMeshes> meshes_;
+  std::vector<std::uint8_t> pixels_;
+};
+
+Renderer::Renderer(const mjModel& model, const RenderOptions& options)
+    : impl_(std::make_unique<Impl>(model, options)) {}
+
+Renderer::~Renderer() = default;
+
+Image Renderer::Render(mjData& data, std::span<const Decoration> decorations) {
+  return impl_->Render(data, decorations);
+}
+
+Image Renderer::Render(mjData& data, const std::string& camera, int width, int height,
+                       std::span<const Decoration> decorations) {
+  return impl_->Render(data, camera, width, height, decorations);
+}
+
+}  // namespace dexcheck

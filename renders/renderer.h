@@ -1,0 +1,62 @@
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "renders/decoration.h"
+#include "renders/image.h"
+
+namespace dexcheck {
+
+struct RenderOptions {
+  int width = 1280;
+  int height = 720;
+  std::string camera = "overview";  ///< A camera of the MJCF.
+  bool shadows = true;
+  int shadow_size = 2048;  ///< Pixels of the shadow map.
+  bool reflections = false;
+  /// Each pixel is the mean of samples x samples (1 to 4). Smooths edges of geoms, shadows and textures
+  /// alike, for the price that four-fold multisampling has in software, which leaves the shadows' edges
+  /// jagged.
+  int samples = 2;
+  /// Round geoms are drawn with so many sides, and so many rings of them.
+  int slices = 24;
+  int stacks = 8;
+  /// Moves what the camera sees to the right by this share of the picture's width, to make room for a panel.
+  double shift_right = 0.0;
+  std::string translucent_body;  ///< Its geoms are drawn with this opacity; none when empty.
+  double translucent_opacity = 0.35;
+};
+
+/// Names of the cameras of a model, in its order.
+std::vector<std::string> ListCameras(const mjModel& model);
+
+/// Draws states of one model, off screen. Frames depend on their state alone: the same state gives the same
+/// bytes. Use it in the thread that made it; several threads may each have one.
+class Renderer {
+ public:
+  /// @param model must outlive the renderer.
+  /// @throws InputError when the model has no such camera (the message lists those that exist) or body.
+  /// @throws std::invalid_argument for sizes that cannot be drawn.
+  Renderer(const mjModel& model, const RenderOptions& options);
+  ~Renderer();
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+
+  /// Draws the state in `data`, whose kinematics, cameras and lights must be computed.
+  Image Render(mjData& data, std::span<const Decoration> decorations = {});
+
+  /// The same from another camera, at most as large as the options' picture.
+  Image Render(mjData& data, const std::string& camera, int width, int height,
+               std::span<const Decoration> decorations = {});
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dexcheck

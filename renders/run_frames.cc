@@ -1,0 +1,90 @@
+#include "renders/run_frames.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+double PerBound(double residual, double bound) {
+  if (bound > 0.0) return residual / bound;
+  return residual > 0.0 ? kInfinity : 0.0;
+}
+
+}  // namespace
+
+long RunFrames::RowAt(double time) const {
+  const auto after = std::upper_bound(times.begin(), times.end(), time);
+  return std::max(0L, static_cast<long>(after - times.begin()) - 1);
+}
+
+void CheckRunFrames(const mjModel& model, const RunFrames& run) {
+  const auto fail = [&](const std::string& what) { throw InputError(run.source + ": " + what); };
+  const long n = run.rows();
+  if (n == 0) fail("time: the run has no recorded instants");
+  for (long i = 0; i < n; ++i) {
+    const double time = run.times[static_cast<size_t>(i)];
+    if (!std::isfinite(time)) fail("time: row " + std::to_string(i) + " is not finite");
+    if (i > 0 && !(time > run.times[static_cast<size_t>(i - 1)])) {
+      fail("time: must increase, got " + FormatNumber(time) + " in row " + std::to_string(i));
+    }
+  }
+  if (n == 1) fail("time: the run ends where it begins, at " + FormatNumber(run.times.front()) + " s");
+  const auto check_size = [&](const std::string& key, long rows, long columns, long columns_expected) {
+    if (rows == n && columns == columns_expected) return;
+    fail(key + ": must be " + std::to_string(n) + " x " + std::to_string(columns_expected) + ", got " +
+         std::to_string(rows) + " x " + std::to_string(columns));
+  };
+  const auto check_matrix = [&](const std::string& key, const RowMatrixXd& matrix, long columns) {
+    if (matrix.size() > 0) check_size(key, matrix.rows(), matrix.cols(), columns);
+  };
+  const auto check_series = [&](const std::string& key, const std::vector<double>& series) {
+    if (!series.empty()) check_size(key, static_cast<long>(series.size()), 1, 1);
+  };
+  check_size("qpos", run.qpos.rows(), run.qpos.cols(), model.nq);
+  if (!run.qpos.allFinite()) fail("qpos: is not finite");
+  check_series("position error", run.position_errors);
+  check_series("orientation error", run.orientation_errors);
+  for (const CheckSeries& check : run.checks) {
+    check_size("check " + check.name, static_cast<long>(check.residuals.size()), 1, 1);
+  }
+  const long contact_columns = 3 * run.contacts();
+  check_matrix("contact positions", run.contact_positions, contact_columns);
+  check_matrix("contact forces", run.contact_forces, contact_columns);
+  check_matrix("contact normals", run.contact_normals, contact_columns);
+  check_matrix("desired positions", run.desired_positions, 3);
+}
+
+CheckHistory::CheckHistory(const RunFrames& run) : run_(run) {
+  for (const CheckSeries& check : run.checks) {
+    std::vector<double>& worst = worst_.emplace_back();
+    worst.reserve(check.residuals.size());
+    double largest = 0.0;
+    for (const double residual : check.residuals) {
+      largest = std::max(largest, std::isnan(residual) ? kInfinity : std::abs(residual));
+      worst.push_back(largest);
+    }
+  }
+}
+
+CheckHistory::Standing CheckHistory::At(CheckKind kind, long row) const {
+  Standing standing;
+  for (size_t i = 0; i < worst_.size(); ++i) {
+    const CheckSeries& check = run_.checks[i];
+    if (check.kind != kind) continue;
+    const double worst = worst_[i][static_cast<size_t>(row)];
+    if (standing.check == nullptr ||
+        PerBound(worst, check.bound) > PerBound(standing.worst, standing.check->bound)) {
+      standing = {&check, worst};
+    }
+  }
+  return standing;
+}
+
+}  // namespace dexcheck

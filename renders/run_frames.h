@@ -1,0 +1,68 @@
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <string>
+#include <vector>
+
+#include "controller/common/types.h"
+#include "harness/checks/check_record.h"
+
+namespace dexcheck {
+
+/// One check over a run.
+struct CheckSeries {
+  std::string name;
+  CheckKind kind = CheckKind::kModel;
+  double bound = 0.0;
+  std::vector<double> residuals;  ///< One a row; what is not a number counts as infinite.
+};
+
+/// What a movie needs of a run: n rows, one a recorded instant. Everything but times and qpos may be empty.
+struct RunFrames {
+  std::string source;  ///< The run's folder or file, for messages.
+  std::string title;   ///< Name of the scenario.
+  std::string object_body = "torus";
+
+  std::vector<double> times;  ///< s, increasing; n.
+  RowMatrixXd qpos;           ///< n x nq.
+
+  std::vector<double> position_errors;     ///< Of the object, m; n.
+  std::vector<double> orientation_errors;  ///< rad; n.
+  std::vector<CheckSeries> checks;
+
+  RowMatrixXd contact_positions;  ///< n x 3N, m, world; NaN where a contact is open.
+  RowMatrixXd contact_forces;     ///< n x 3N, N, world, of the finger on the object.
+  RowMatrixXd contact_normals;    ///< n x 3N, world, into the object.
+  double friction = 0.0;          ///< Coefficient mu of the fingertips.
+
+  RowMatrixXd desired_positions;  ///< n x 3, m, world: where the object should be.
+
+  [[nodiscard]] long rows() const { return static_cast<long>(times.size()); }
+  [[nodiscard]] long contacts() const { return contact_positions.cols() / 3; }
+  /// The last row at or before a time in s; the first one when there is none.
+  [[nodiscard]] long RowAt(double time) const;
+};
+
+/// @throws InputError "SOURCE: key: what is wrong" unless all series have a row for each time, qpos fits the
+/// model and is finite, times increase, and the run lasts longer than an instant.
+void CheckRunFrames(const mjModel& model, const RunFrames& run);
+
+/// Worst residuals up to each row, so that a movie can tell at any time which check stands worst.
+class CheckHistory {
+ public:
+  explicit CheckHistory(const RunFrames& run);
+
+  struct Standing {
+    const CheckSeries* check = nullptr;  ///< Null when no check is of the kind.
+    double worst = 0.0;
+  };
+  /// The check of a kind with the largest residual per bound up to and including `row`.
+  [[nodiscard]] Standing At(CheckKind kind, long row) const;
+
+ private:
+  const RunFrames& run_;
+  std::vector<std::vector<double>> worst_;  // by check, by row
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,138 @@
+// What a movie costs beyond MuJoCo's own drawing: the same frames drawn by mjr_render and mjr_readPixels
+// alone, and as a movie with panel and encoding. Both with two threads. Processor time, because the wall
+// clock also counts others' work.
+//
+// render_benchmark [FRAMES]
+
+#include <fmt/format.h>
+#include <mujoco/mujoco.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <ctime>
+#include <latch>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "harness/engine/engine.h"
+#include "renders/movie.h"
+#include "renders/offscreen_context.h"
+#include "renders/renderer.h"
+#include "renders/run_decorations.h"
+#include "tests/common/files.h"
+#include "tests/renders/kinematic_run.h"
+
+namespace dexcheck {
+namespace {
+
+struct Times {
+  double wall;
+  double processor;
+};
+
+double ProcessorSeconds() {
+  std::timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+template <typename Function>
+Times Measure(const Function& function) {
+  const double processor = ProcessorSeconds();
+  const auto start = std::chrono::steady_clock::now();
+  function();
+  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return {wall, ProcessorSeconds() - processor};
+}
+
+/// Draws every n-th frame with the engine's functions and nothing else.
+void DrawBare(const mjModel& model, const RunFrames& run, const MovieOptions& options, long first,
+              long frames, std::latch* ready) {
+  static std::mutex mutex;
+  const int width = options.samples * options.width;
+  const int height = options.samples * options.height;
+  const MjDataPtr data = MakeData(model);
+  OffscreenContext gl;
+  mjvScene scene;
+  mjvOption visible;
+  mjvCamera camera;
+  mjrContext context;
+  {
+    const std::lock_guard lock(mutex);
+    const MjModelPtr sized(mj_copyModel(nullptr, &model));
+    sized->vis.global.offwidth = width;
+    sized->vis.global.offheight = height;
+    const RenderOptions defaults;
+    sized->vis.quality.offsamples = 0;
+    sized->vis.quality.shadowsize = options.shadow_size;
+    sized->vis.quality.numslices = defaults.slices;
+    sized->vis.quality.numstacks = defaults.stacks;
+    mjv_defaultScene(&scene);
+    mjv_makeScene(&model, &scene, 2000);
+    scene.flags[mjRND_REFLECTION] = 0;
+    mjv_defaultOption(&visible);
+    mjv_defaultCamera(&camera);
+    mjr_defaultContext(&context);
+    mjr_makeContext(sized.get(), &context, mjFONTSCALE_100);
+    mjr_setBuffer(mjFB_OFFSCREEN, &context);
+  }
+  ready->arrive_and_wait();
+  camera.type = mjCAMERA_FIXED;
+  camera.fixedcamid = mj_name2id(&model, mjOBJ_CAMERA, options.camera.c_str());
+  std::vector<unsigned char> pixels(3 * static_cast<size_t>(width) * static_cast<size_t>(height));
+  const mjrRect viewport = {0, 0, width, height};
+  for (long frame = first; frame < frames; frame += options.workers) {
+    SetRow(model, run, run.RowAt(static_cast<double>(frame) / options.fps), data.get());
+    mjv_updateScene(&model, data.get(), &visible, nullptr, &camera, mjCAT_ALL, &scene);
+    mjr_render(viewport, &scene, &context);
+    mjr_readPixels(pixels.data(), nullptr, viewport, &context);
+  }
+  mjr_freeContext(&context);
+  mjv_freeScene(&scene);
+}
+
+int Run(long frames) {
+  const MjModelPtr model = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  const MovieOptions options;
+  const RunFrames run = testing::MakeKinematicRun(*model, static_cast<double>(frames) / options.fps, 0.001);
+  const testing::TempFolder folder;
+  fmt::print("{} frames of {} x {}, {} samples a pixel, {} threads\n", frames, options.width, options.height,
+             options.samples * options.samples, options.workers);
+
+  const Times bare = Measure([&] {
+    std::vector<std::thread> threads;
+    std::latch ready(options.workers);
+    for (int k = 0; k < options.workers; ++k) {
+      threads.emplace_back([&, k] { DrawBare(*model, run, options, k, frames, &ready); });
+    }
+    for (std::thread& thread : threads) thread.join();
+  });
+  const Times movie = Measure([&] {
+    VideoOptions encoding;
+    encoding.width = options.width;
+    encoding.height = options.height;
+    encoding.fps = options.fps;
+    VideoWriter video(folder.path() / "movie.mp4", encoding);
+    const RunView view = {model.get(), &run};
+    RenderMovie({&view, 1}, options, &video);
+    video.Finish();
+  });
+  const auto per_frame = [&](double seconds) { return 1e3 * seconds / static_cast<double>(frames); };
+  fmt::print("{:<34}{:>10}{:>14}{:>12}\n", "", "wall", "processor", "a frame");
+  fmt::print("{:<34}{:>8.1f} s{:>12.1f} s{:>9.1f} ms\n", "mjr_render and mjr_readPixels", bare.wall,
+             bare.processor, per_frame(bare.processor));
+  fmt::print("{:<34}{:>8.1f} s{:>12.1f} s{:>9.1f} ms\n", "movie with panel, encoded", movie.wall,
+             movie.processor, per_frame(movie.processor));
+  fmt::print("overlay and encoding cost {:.1f} % more processor time ({:.1f} % by the wall clock)\n",
+             100.0 * (movie.processor / bare.processor - 1.0), 100.0 * (movie.wall / bare.wall - 1.0));
+  return 0;
+}
+
+}  // namespace
+}  // namespace dexcheck
+
+int main(int argc, char** argv) {
+  constexpr long kFrames = 300;
+  return dexcheck::Run(argc > 1 ? std::strtol(argv[1], nullptr, 10) : kFrames);
+}

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include "renders/run_frames.h"
+
+namespace dexcheck::testing {
+
+/// A run that no simulation made, for tests of drawing: the robot in keyframe grasp_ready slides along x at 1
+/// m/s with the torus in its hand. Contacts are where the fingertips touch the torus; errors and residuals
+/// are smooth inventions.
+/// @param model the shipped scene.
+RunFrames MakeKinematicRun(const mjModel& model, double duration, double step = 0.01);
+
+}  // namespace dexcheck::testing

@@ -1,0 +1,198 @@
+// A run as a film: what moved, moved; the same run gives the same film.
+
+#include "renders/movie.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "harness/engine/engine.h"
+#include "tests/common/files.h"
+#include "tests/common/run_program.h"
+#include "tests/common/throws.h"
+#include "tests/renders/kinematic_run.h"
+
+namespace dexcheck {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::TempFolder;
+using testing::Throws;
+
+constexpr int kWidth = 320;
+constexpr int kHeight = 180;
+
+class MovieTest : public ::testing::Test {
+ protected:
+  static MovieOptions MakeOptions() {
+    MovieOptions options;
+    options.width = kWidth;
+    options.height = kHeight;
+    options.fps = 10;
+    options.samples = 1;
+    options.shadow_size = 512;
+    return options;
+  }
+
+  bool Film(const fs::path& path, std::span<const RunView> runs, const MovieOptions& options,
+            const std::function<bool(long, long)>& progress = {}) {
+    VideoOptions encoding;
+    encoding.width = options.width;
+    encoding.height = options.height;
+    encoding.fps = options.fps;
+    VideoWriter video(path, encoding);
+    if (!RenderMovie(runs, options, &video, progress)) return false;
+    video.Finish();
+    return true;
+  }
+
+  MjModelPtr model_ = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  RunFrames run_ = testing::MakeKinematicRun(*model_, 0.5);
+  RunView view_ = {model_.get(), &run_};
+  TempFolder folder_;
+};
+
+/// Mean difference of two frames over a rectangle given in hundredths of the picture.
+double Difference(const char* a, const char* b, int left, int right, int top, int bottom) {
+  double sum = 0.0;
+  int count = 0;
+  for (int y = kHeight * top / 100; y < kHeight * bottom / 100; ++y) {
+    for (int x = kWidth * left / 100; x < kWidth * right / 100; ++x) {
+      for (int c = 0; c < 3; ++c, ++count) {
+        const int i = 3 * (y * kWidth + x) + c;
+        sum += std::abs(static_cast<unsigned char>(a[i]) - static_cast<unsigned char>(b[i]));
+      }
+    }
+  }
+  return sum / count;
+}
+
+TEST_F(MovieTest, DecodedFramesDifferWhereTheRobotMoved) {
+  // The robot stands; its right elbow stretches by a radian. "overview" sees the forearm left of the
+  // picture's middle.
+  const int elbow = model_->jnt_qposadr[mj_name2id(model_.get(), mjOBJ_JOINT, "r_elbow")];
+  for (long row = 0; row < run_.rows(); ++row) {
+    run_.qpos.row(row) = run_.qpos.row(0).eval();
+    run_.qpos(row, elbow) -= 2.0 * run_.times[static_cast<size_t>(row)];
+  }
+  MovieOptions options = MakeOptions();
+  options.panel = false;
+  ASSERT_TRUE(Film(folder_.path() / "a.mp4", {&view_, 1}, options));
+  const testing::ProgramResult decoded =
+      testing::RunProgram({DEXCHECK_FFMPEG, "-v", "error", "-i", folder_.path() / "a.mp4", "-f", "rawvideo",
+                           "-pix_fmt", "rgb24", "-"});
+  ASSERT_EQ(decoded.exit_code, 0) << decoded.err;
+  constexpr size_t kFrame = 3UL * kWidth * kHeight;
+  ASSERT_EQ(decoded.out.size(), 5 * kFrame);
+  const char* first = decoded.out.data();
+  const char* last = first + 4 * kFrame;
+  EXPECT_GT(Difference(first, last, 41, 57, 45, 65), 15.0) << "forearm and torus";
+  EXPECT_LT(Difference(first, last, 44, 56, 2, 30), 2.0) << "head";
+  EXPECT_LT(Difference(first, last, 75, 100, 0, 100), 2.0) << "floor and sky";
+}
+
+TEST_F(MovieTest, FilmDoesNotDependOnTheNumberOfThreads) {
+  MovieOptions options = MakeOptions();
+  options.forces = options.tracks = options.frames = true;
+  options.inset = "grasp";
+  options.workers = 1;
+  ASSERT_TRUE(Film(folder_.path() / "one.mp4", {&view_, 1}, options));
+  options.workers = 3;
+  ASSERT_TRUE(Film(folder_.path() / "three.mp4", {&view_, 1}, options));
+  EXPECT_EQ(testing::ReadText(folder_.path() / "one.mp4"), testing::ReadText(folder_.path() / "three.mp4"));
+}
+
+TEST_F(MovieTest, FramesAreTheStillsOfTheirTimes) {
+  MoviePainter painter({&view_, 1}, MakeOptions());
+  const Image start = painter.Paint(0.0);
+  EXPECT_NE(painter.Paint(0.3).rgb, start.rgb);
+  EXPECT_EQ(painter.Paint(0.0).rgb, start.rgb);
+  EXPECT_EQ(painter.Paint(9.0).rgb, painter.Paint(0.5).rgb) << "after its end a run stands still";
+}
+
+TEST_F(MovieTest, TwoRunsStandSideBySide) {
+  RunFrames other = run_;
+  const int elbow = model_->jnt_qposadr[mj_name2id(model_.get(), mjOBJ_JOINT, "r_elbow")];
+  other.qpos.col(elbow).array() -= 1.0;
+  other.title = "other";
+  const std::array<RunView, 2> both = {view_, {model_.get(), &other}};
+  const Image image = MoviePainter(both, MakeOptions()).Paint(0.2);
+  ASSERT_EQ(image.width, kWidth);
+  const std::array<RunView, 2> same = {view_, view_};
+  const Image twins = MoviePainter(same, MakeOptions()).Paint(0.2);
+  const auto half_differs = [&](int begin, int end) {
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = begin; x < end; ++x) {
+        if (!std::equal(image.Pixel(x, y), image.Pixel(x, y) + 3, twins.Pixel(x, y))) return true;
+      }
+    }
+    return false;
+  };
+  EXPECT_FALSE(half_differs(0, kWidth / 2));
+  EXPECT_TRUE(half_differs(kWidth / 2, kWidth));
+}
+
+TEST_F(MovieTest, LostContactsAreNotDrawn) {
+  MovieOptions options = MakeOptions();
+  options.panel = false;
+  options.camera = "grasp";
+  options.forces = options.tracks = true;
+  const Image all = MoviePainter({&view_, 1}, options).Paint(0.5);
+  run_.contact_positions.block(20, 0, 31, 3).setConstant(std::numeric_limits<double>::quiet_NaN());
+  const Image fewer = MoviePainter({&view_, 1}, options).Paint(0.5);
+  EXPECT_NE(all.rgb, fewer.rgb);
+  run_.contact_forces.setConstant(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_NO_THROW(MoviePainter({&view_, 1}, options).Paint(0.5));
+}
+
+TEST_F(MovieTest, TellsItsProgressAndStopsWhenTold) {
+  std::vector<long> told;
+  EXPECT_TRUE(Film(folder_.path() / "a.mp4", {&view_, 1}, MakeOptions(), [&](long done, long total) {
+    EXPECT_EQ(total, 5);
+    told.push_back(done);
+    return true;
+  }));
+  EXPECT_EQ(told, (std::vector<long>{1, 2, 3, 4, 5}));
+  EXPECT_FALSE(
+      Film(folder_.path() / "b.mp4", {&view_, 1}, MakeOptions(), [](long done, long) { return done < 2; }));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), {}), 1) << "nothing of the stopped film";
+}
+
+TEST_F(MovieTest, BadInputIsRefusedAndLeavesNothing) {
+  const auto film = [&](const MovieOptions& options) {
+    return [&, options] { return Film(folder_.path() / "a.mp4", {&view_, 1}, options); };
+  };
+  MovieOptions options = MakeOptions();
+  options.camera = "sideways";
+  EXPECT_TRUE(Throws<InputError>(film(options), "camera: no \"sideways\""));
+  options = MakeOptions();
+  options.inset = "sideways";
+  EXPECT_TRUE(Throws<InputError>(film(options), "camera: no \"sideways\""));
+  run_.object_body = "teapot";
+  options = MakeOptions();
+  options.tracks = true;
+  EXPECT_TRUE(Throws<InputError>(film(options), "kinematic run: object: no body \"teapot\" in the model"));
+  run_.times.clear();
+  EXPECT_TRUE(
+      Throws<InputError>(film(MakeOptions()), "kinematic run: time: the run has no recorded instants"));
+  EXPECT_TRUE(fs::is_empty(folder_.path()));
+}
+
+TEST_F(MovieTest, CountsTheFramesOfTheLongestRun) {
+  const RunFrames longer = testing::MakeKinematicRun(*model_, 2.0);
+  const std::array<RunView, 2> both = {view_, {model_.get(), &longer}};
+  EXPECT_EQ(CountFrames({&view_, 1}, 30), 15);
+  EXPECT_EQ(CountFrames(both, 30), 60);
+  EXPECT_EQ(CountFrames({&view_, 1}, 1), 1) << "at least one";
+}
+
+}  // namespace
+}  // namespace dexcheck

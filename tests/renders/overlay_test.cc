@@ -1,0 +1,135 @@
+#include "renders/overlay.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+namespace dexcheck {
+namespace {
+
+TEST(FormatSi, KeepsOneToThreeDigitsBeforeThePoint) {
+  EXPECT_EQ(FormatSi(1.24e-8, "m"), "12.4 nm");
+  EXPECT_EQ(FormatSi(-3.5e-6, "rad"), "-3.50 \u00b5rad");
+  EXPECT_EQ(FormatSi(0.25, "m"), "250 mm");
+  EXPECT_EQ(FormatSi(2.0, "m"), "2.00 m");
+  EXPECT_EQ(FormatSi(0.0, "m"), "0 m");
+  EXPECT_EQ(FormatSi(9.996e-9, "m"), "10.0 nm");
+  EXPECT_EQ(FormatSi(9.9996e-7, "m"), "1.00 \u00b5m");
+  EXPECT_EQ(FormatSi(std::numeric_limits<double>::quiet_NaN(), "m"), "not finite");
+}
+
+/// How many pixels have a saturated colour with this channel far above the others.
+int CountSaturated(const Image& image, int channel) {
+  int count = 0;
+  for (size_t i = 0; i < image.rgb.size(); i += 3) {
+    const int value = image.rgb[i + static_cast<size_t>(channel)];
+    int others = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      if (static_cast<int>(k) != channel) others = std::max<int>(others, image.rgb[i + k]);
+    }
+    if (value > others + 60) ++count;
+  }
+  return count;
+}
+
+OverlayState MakeState() {
+  OverlayState state;
+  state.title = "scenario";
+  state.time = 1.0;
+  state.questions = {{"model", "M_bar", 1e-13, 1e-12, true},
+                     {"balance", "", 0.0, 0.0, false},
+                     {"prediction", "force", 1e-7, 1e-6, true},
+                     {"assumption", "slip", 1e-7, 1e-6, true}};
+  return state;
+}
+
+TEST(Overlay, DotsShowTheChecksThatPassAndFail) {
+  Overlay overlay;
+  OverlayState state = MakeState();
+  Image good(900, 720);
+  overlay.Draw(state, &good);
+  // Three dots of radius 5.
+  EXPECT_NEAR(CountSaturated(good, 1), 3 * 78, 40);
+  EXPECT_EQ(CountSaturated(good, 0), 0);
+
+  state.questions[2].worst = 2e-6;
+  Image bad(900, 720);
+  overlay.Draw(state, &bad);
+  EXPECT_NEAR(CountSaturated(bad, 1), 2 * 78, 30);
+  EXPECT_NEAR(CountSaturated(bad, 0), 78, 15);
+
+  state.questions[2].worst = std::numeric_limits<double>::infinity();
+  Image infinite(900, 720);
+  overlay.Draw(state, &infinite);
+  EXPECT_NEAR(CountSaturated(infinite, 0), 78, 15);
+}
+
+TEST(Overlay, PlotRisesWithTheError) {
+  Overlay overlay;
+  OverlayState state = MakeState();
+  state.questions.clear();
+  state.error_low = 1e-9;
+  state.error_high = 1e-6;
+  const auto mean_row = [&](double error) {
+    state.history = {{-1.0, error}, {1.0, error}};
+    Image image(900, 720);
+    overlay.Draw(state, &image);
+    double sum = 0.0;
+    int count = 0;
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        const std::uint8_t* p = image.Pixel(x, y);
+        if (p[0] < 200 || p[2] > 120) continue;
+        sum += y;
+        ++count;
+      }
+    }
+    EXPECT_GT(count, 200);
+    return sum / count;
+  };
+  const double low = mean_row(1e-9);
+  const double middle = mean_row(1e-9 * std::pow(10.0, 1.5));
+  const double high = mean_row(1e-6);
+  EXPECT_GT(low, middle + 20.0);
+  EXPECT_NEAR(middle, 0.5 * (low + high), 1.0) << "the scale is logarithmic";
+  EXPECT_NEAR(mean_row(std::numeric_limits<double>::quiet_NaN()), high, 0.5) << "what is no number is worst";
+}
+
+TEST(Overlay, GrowsWithThePictureAndStaysInItsCorner) {
+  Overlay overlay;
+  const OverlayState state = MakeState();
+  for (const int height : {90, 360, 720, 1080}) {
+    Image image(height * 16 / 9, height);
+    std::fill(image.rgb.begin(), image.rgb.end(), std::uint8_t{255});
+    overlay.Draw(state, &image);
+    int right = 0;
+    int bottom = 0;
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        if (image.Pixel(x, y)[0] > 200) continue;
+        right = std::max(right, x);
+        bottom = std::max(bottom, y);
+      }
+    }
+    EXPECT_NEAR(right, (20.0 + 316.0) * height / 720.0, 2.0);
+    EXPECT_LT(bottom, height / 2);
+    EXPECT_GT(bottom, height / 8);
+  }
+}
+
+TEST(Overlay, ShortensATitleThatIsTooLong) {
+  Overlay overlay;
+  OverlayState state = MakeState();
+  state.title = std::string(500, 'W') + "\u00b5";
+  Image image(900, 720);
+  overlay.Draw(state, &image);
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 340; x < image.width; ++x) ASSERT_EQ(image.Pixel(x, y)[0], 0);
+  }
+}
+
+}  // namespace
+}  // namespace dexcheck

@@ -1,0 +1,210 @@
+// The files as ffprobe and ffmpeg see them.
+
+#include "renders/video_writer.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "tests/common/files.h"
+#include "tests/common/run_program.h"
+#include "tests/common/throws.h"
+
+namespace dexcheck {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::RunProgram;
+using testing::TempFolder;
+using testing::Throws;
+
+constexpr int kWidth = 128;
+constexpr int kHeight = 72;
+
+VideoOptions MakeOptions() {
+  VideoOptions options;
+  options.width = kWidth;
+  options.height = kHeight;
+  options.fps = 25;
+  return options;
+}
+
+/// Of one colour, which changes from frame to frame.
+Image MakeFrame(int number) {
+  Image image(kWidth, kHeight);
+  for (size_t i = 0; i < image.rgb.size(); i += 3) {
+    image.rgb[i] = static_cast<std::uint8_t>(20 + 8 * number);
+    image.rgb[i + 1] = 120;
+    image.rgb[i + 2] = static_cast<std::uint8_t>(220 - 8 * number);
+  }
+  return image;
+}
+
+void WriteVideo(const fs::path& path, int frames) {
+  VideoWriter video(path, MakeOptions());
+  for (int k = 0; k < frames; ++k) video.Write(MakeFrame(k));
+  EXPECT_FALSE(fs::exists(path)) << "the name appears when the file is complete";
+  video.Finish();
+  EXPECT_EQ(video.frames(), frames);
+}
+
+TEST(VideoWriter, IsWhatBrowsersPlay) {
+  const TempFolder folder;
+  const fs::path path = folder.path() / "a film.mp4";
+  WriteVideo(path, 20);
+  const testing::ProgramResult probe =
+      RunProgram({DEXCHECK_FFPROBE, "-v", "error", "-count_frames", "-show_streams", "-show_format", "-of",
+                  "json", path.string()});
+  ASSERT_EQ(probe.exit_code, 0) << probe.err;
+  EXPECT_EQ(probe.err, "");
+  const nlohmann::json json = nlohmann::json::parse(probe.out);
+  ASSERT_EQ(json["streams"].size(), 1);
+  const nlohmann::json& stream = json["streams"][0];
+  EXPECT_EQ(stream["codec_name"], "h264");
+  EXPECT_EQ(stream["pix_fmt"], "yuv420p");
+  EXPECT_EQ(stream["width"], kWidth);
+  EXPECT_EQ(stream["height"], kHeight);
+  EXPECT_EQ(stream["nb_read_frames"], "20");
+  EXPECT_EQ(stream["avg_frame_rate"], "25/1");
+  EXPECT_EQ(stream["color_space"], "bt709");
+  EXPECT_EQ(stream["color_range"], "tv");
+  EXPECT_NEAR(std::stod(json["format"]["duration"].get<std::string>()), 20.0 / 25.0, 1e-3);
+}
+
+TEST(VideoWriter, IndexStandsBeforeTheData) {
+  const TempFolder folder;
+  WriteVideo(folder.path() / "a.mp4", 5);
+  const std::string bytes = testing::ReadText(folder.path() / "a.mp4");
+  std::vector<std::string> boxes;
+  for (size_t at = 0; at + 8 <= bytes.size();) {
+    size_t size = 0;
+    for (size_t k = 0; k < 4; ++k) size = size << 8U | static_cast<unsigned char>(bytes[at + k]);
+    boxes.push_back(bytes.substr(at + 4, 4));
+    ASSERT_GE(size, 8);
+    at += size;
+  }
+  const auto place = [&](const char* name) {
+    return std::find(boxes.begin(), boxes.end(), name) - boxes.begin();
+  };
+  ASSERT_LT(place("mdat"), static_cast<long>(boxes.size()));
+  EXPECT_LT(place("moov"), place("mdat"));
+}
+
+TEST(VideoWriter, DecodesToTheFramesThatWereWritten) {
+  const TempFolder folder;
+  WriteVideo(folder.path() / "a.mp4", 20);
+  const testing::ProgramResult decoded =
+      RunProgram({DEXCHECK_FFMPEG, "-v", "error", "-i", folder.path() / "a.mp4", "-f", "rawvideo", "-pix_fmt",
+                  "rgb24", "-"});
+  ASSERT_EQ(decoded.exit_code, 0) << decoded.err;
+  constexpr size_t kFrame = 3UL * kWidth * kHeight;
+  ASSERT_EQ(decoded.out.size(), 20 * kFrame);
+  // Plain colours survive chroma subsampling; conversion to 8-bit YUV and quantisation cost a few levels.
+  // With the matrix of standard definition the green of these frames would be off by ten levels and more.
+  constexpr int kLevels = 6;
+  for (int k = 0; k < 20; ++k) {
+    const Image expected = MakeFrame(k);
+    for (const size_t i : {size_t{0}, kFrame / 2, kFrame - 3}) {
+      for (size_t c = 0; c < 3; ++c) {
+        const int value = static_cast<unsigned char>(decoded.out[static_cast<size_t>(k) * kFrame + i + c]);
+        EXPECT_NEAR(value, expected.rgb[i + c], kLevels) << "frame " << k << ", channel " << c;
+      }
+    }
+  }
+}
+
+TEST(VideoWriter, SameFramesGiveTheSameBytes) {
+  const TempFolder folder;
+  WriteVideo(folder.path() / "a.mp4", 7);
+  WriteVideo(folder.path() / "b.mp4", 7);
+  EXPECT_EQ(testing::ReadText(folder.path() / "a.mp4"), testing::ReadText(folder.path() / "b.mp4"));
+}
+
+TEST(VideoWriter, LeavesNothingUnlessFinished) {
+  const TempFolder folder;
+  testing::WriteText(folder.path() / "old.mp4", "old");
+  {
+    VideoWriter video(folder.path() / "old.mp4", MakeOptions());
+    for (int k = 0; k < 10; ++k) video.Write(MakeFrame(k));
+  }
+  EXPECT_EQ(testing::ReadText(folder.path() / "old.mp4"), "old");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(VideoWriter, RefusesAFilmWithoutFrames) {
+  const TempFolder folder;
+  {
+    VideoWriter video(folder.path() / "a.mp4", MakeOptions());
+    EXPECT_TRUE(Throws<InputError>([&] { video.Finish(); }, "a.mp4: cannot be written: there are no frames"));
+  }
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+TEST(VideoWriter, NamesThePathThatCannotBeWritten) {
+  const TempFolder folder;
+  const auto open = [](const fs::path& path) { return [path] { VideoWriter video(path, MakeOptions()); }; };
+  EXPECT_TRUE(Throws<InputError>(open(folder.path()), "cannot be written: Is a directory"));
+  EXPECT_TRUE(Throws<InputError>(open("/nowhere/a.mp4"), "/nowhere/a.mp4: cannot be written: No such file"));
+  EXPECT_TRUE(Throws<InputError>(open("/dev/full"), "/dev/full: cannot be written: not a regular file"));
+  EXPECT_TRUE(Throws<InputError>(open(""), "cannot be written: the name is empty"));
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+/// While it lives, no file of this process grows beyond a size.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit = {bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+  }
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = nullptr;
+};
+
+TEST(VideoWriter, AFullDiskLeavesNothing) {
+  const TempFolder folder;
+  {
+    const FileSizeLimit limit(1000);
+    EXPECT_TRUE(Throws<InputError>([&] { WriteVideo(folder.path() / "a.mp4", 60); },
+                                   "a.mp4: cannot be written: File too large"));
+  }
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+TEST(VideoWriter, RefusesWhatH264CannotTake) {
+  const TempFolder folder;
+  const auto expect = [&](void (*spoil)(VideoOptions*), const std::string& message) {
+    VideoOptions options = MakeOptions();
+    spoil(&options);
+    EXPECT_TRUE(
+        Throws<std::invalid_argument>([&] { VideoWriter video(folder.path() / "a.mp4", options); }, message));
+  };
+  expect([](VideoOptions* o) { o->width = 129; }, "video width: must be even and from 2 to 16384, got 129");
+  expect([](VideoOptions* o) { o->height = 0; }, "video height: must be even");
+  expect([](VideoOptions* o) { o->fps = 0; }, "frames a second: must be from 1 to 240, got 0");
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+  VideoWriter video(folder.path() / "a.mp4", MakeOptions());
+  EXPECT_TRUE(
+      Throws<std::invalid_argument>([&] { video.Write(Image(2, 2)); }, "frame width: must be the video's"));
+}
+
+}  // namespace
+}  // namespace dexcheck
