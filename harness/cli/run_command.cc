@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <chrono>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,17 +13,10 @@
 #include "harness/cli/run_report.h"
 #include "harness/cli/shipped_files.h"
 #include "harness/record/run_recorder.h"
-#include "harness/simulation/closed_loop.h"
-#include "harness/simulation/run_summary.h"
+#include "harness/simulation/runner.h"
 
 namespace dexcheck::cli {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double SecondsSince(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 struct Request {
   std::string scenario;
@@ -38,59 +29,6 @@ struct Request {
   bool list = false;
   std::string replay;
   std::string command;  // as typed
-};
-
-/// A run in progress: steps until the end, a failure, or Ctrl-C.
-class Runner {
- public:
-  Runner(const Setup& setup, bool check) : setup_(setup), loop_(setup, check) {}
-
-  [[nodiscard]] const ClosedLoop& loop() const { return loop_; }
-  [[nodiscard]] const RunResult& result() const { return result_; }
-
-  void Settle() {
-    Guard([&] { loop_.Settle(); }, " while settling");
-  }
-
-  /// `after_step` is called after each step, also after one that failed; its time counts as recording.
-  template <typename AfterStep>
-  void Run(const AfterStep& after_step, bool quiet) {
-    ProgressBar bar(setup_.scenario().name, loop_.num_steps(), quiet);
-    const Clock::time_point begin = Clock::now();
-    while (result_.failure.empty() && loop_.step() < loop_.num_steps()) {
-      if (IsInterrupted()) {
-        result_.interrupted = true;
-        result_.failure = "interrupted";
-        break;
-      }
-      Guard([&] { loop_.Step(); }, "");
-      result_.tracking.Add(loop_.error());
-      const Clock::time_point recording = Clock::now();
-      after_step();
-      result_.recording_seconds += SecondsSince(recording);
-      bar.Update(loop_.step());
-    }
-    result_.wall_seconds = SecondsSince(begin);
-  }
-
-  void Finish() { Judge(setup_, loop_, &result_); }
-
- private:
-  template <typename Work>
-  void Guard(const Work& work, const std::string& when) {
-    try {
-      work();
-    } catch (const InputError&) {
-      throw;
-    } catch (const Error& error) {
-      result_.failure = error.what() + when;
-      if (when.empty()) result_.failure += " at t = " + FormatNumber(loop_.step_time()) + " s";
-    }
-  }
-
-  const Setup& setup_;
-  ClosedLoop loop_;
-  RunResult result_;
 };
 
 ExitCode ToExitCode(const RunResult& result) {
@@ -110,13 +48,14 @@ int RunScenario(const Request& request) {
     recorder.emplace(folder->path() / "log.h5", runner.loop(), setup,
                      RunInputs{files.robot, files.mjcf, request.command});
   }
-  runner.Settle();
+  ProgressBar bar(setup.scenario().name, runner.loop().num_steps(), request.quiet);
   runner.Run(
       [&] {
         if (recorder) recorder->Record();
+        bar.Update(runner.loop().step());
       },
-      request.quiet);
-  runner.Finish();
+      IsInterrupted);
+  bar.Finish();
 
   const std::string summary = MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n";
   if (recorder) recorder->Close(summary);
@@ -135,13 +74,15 @@ int ReplayRun(const Request& request) {
   const std::filesystem::path log = scratch.path() / "log.h5";
   RunRecorder recorder(log, runner.loop(), setup,
                        RunInputs{recorded.files().robot, recorded.files().mjcf, ""});
-  runner.Settle();
+  ProgressBar bar("replaying", recorded.rows(), request.quiet);
   long rows = 0;
   runner.Run(
       [&] {
         if (rows++ < recorded.rows()) recorder.Record();
+        bar.Update(rows);
       },
-      request.quiet);
+      [&] { return IsInterrupted() || rows >= recorded.rows(); });
+  bar.Finish();
   recorder.Close("");
   const ReplayDifference difference = recorded.Compare(log);
   if (difference.signal.empty()) {

@@ -25,15 +25,12 @@ int FindTipGeom(const mjModel& model, int site, const std::string& name) {
 }  // namespace
 
 Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, const Surface& surface)
-    : adapter_(&adapter),
-      fingertips_(fingertips.begin(), fingertips.end()),
-      surface_(&surface),
-      kinematics_(adapter.model(), Coordinates::kReduced) {
+    : adapter_(&adapter), fingertips_(fingertips.begin(), fingertips.end()), surface_(&surface) {
   for (const int frame : fingertips_) {
     const Frame& tip = adapter.model().frames()[static_cast<size_t>(frame)];
     tips_.emplace_back(tip.sphere_radius.value());
-    tip_geoms_.push_back(
-        FindTipGeom(adapter.engine(), adapter.frame_sites()[static_cast<size_t>(frame)], tip.name));
+    tip_sites_.push_back(adapter.frame_sites()[static_cast<size_t>(frame)]);
+    tip_geoms_.push_back(FindTipGeom(adapter.engine(), tip_sites_.back(), tip.name));
   }
   contacts_.resize(fingertips_.size());
 }
@@ -77,14 +74,17 @@ void Observer::Read(const Plant& plant, MeasuredState* state) {
   state->X_Bo.translation() = MapVector(pose);
   state->V_Bo << state->X_Bo.linear().transpose() * MapVector(rate), MapVector(rate + 3);
 
-  // Contacts where the fingertips are, on the base as it really stands.
-  kinematics_.SetState(state->q, state->xi);
-  const Pose X_oB = state->X_Bo.inverse() * X_W0_ * kinematics_.CalcLinkPose(-1).inverse();
+  // Contacts where the plant's fingertips are.
+  const Pose X_oB = state->X_Bo.inverse();
   const bool guess = has_guess_ && state->kappa.size() == fingertips_.size();
   state->kappa.resize(fingertips_.size());
   state->overlap.resize(fingertips_.size());
   for (size_t i = 0; i < fingertips_.size(); ++i) {
-    const Pose X_of = X_oB * kinematics_.CalcFramePose(fingertips_[i]);
+    const int site = tip_sites_[i];
+    Pose X_Bf = Pose::Identity();
+    X_Bf.linear() = Eigen::Map<const RowMatrix3d>(data.site_xmat + 9 * site);
+    X_Bf.translation() = MapVector(data.site_xpos + 3 * site);
+    const Pose X_of = X_oB * X_Bf;
     const FoundContact found = guess ? FindContact(tips_[i], *surface_, X_of, state->kappa[i])
                                      : FindContact(tips_[i], *surface_, X_of);
     state->kappa[i] = found.kappa;

@@ -35,8 +35,8 @@ class Observer {
   Observer(const Adapter& adapter, std::span<const int> fingertips, const Surface& surface);
 
   /// q', xi, object, kappa and overlaps at the plant's state; between BeginStep and EndStep.
-  /// Tilt and height of the base, which q' does not have, are dropped: the model's fingertips stand where q'
-  /// puts them.
+  /// Tilt and height of the base, which q' does not have, are dropped; kappa is where the plant's fingertips
+  /// touch.
   void Read(const Plant& plant, MeasuredState* state);
   [[nodiscard]] const BaseDeparture& departure() const { return departure_; }
   /// Pose of Sigma_0 in the world at the state read, tilt and height included.
@@ -65,7 +65,7 @@ class Observer {
   std::vector<int> fingertips_;
   std::vector<Sphere> tips_;
   const Surface* surface_;
-  ModelTerms kinematics_;
+  std::vector<int> tip_sites_;
   std::vector<int> tip_geoms_;
   std::vector<EngineContact> contacts_;
   BaseDeparture departure_;

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "controller/common/text.h"
+#include "harness/simulation/run_summary.h"
+
+namespace dexcheck {
+
+/// One run from the first contact to its verdict. What goes wrong in the simulation ends the run and becomes
+/// part of the result; what is wrong with the input is thrown.
+class Runner {
+ public:
+  /// @throws InputError as ClosedLoop.
+  Runner(const Setup& setup, bool check) : setup_(&setup), loop_(setup, check) {}
+
+  [[nodiscard]] const ClosedLoop& loop() const { return loop_; }
+  [[nodiscard]] const RunResult& result() const { return result_; }
+
+  /// Settles, steps to the end or to a failure, and judges.
+  /// @param after_step called after each step, also after one that failed; its time counts as recording.
+  /// @param should_stop asked before each step; true ends the run as interrupted.
+  template <typename AfterStep, typename ShouldStop>
+  const RunResult& Run(const AfterStep& after_step, const ShouldStop& should_stop) {
+    Guard([&] { loop_.Settle(); }, /*settling=*/true);
+    const Clock::time_point begin = Clock::now();
+    while (result_.failure.empty() && loop_.step() < loop_.num_steps()) {
+      if (should_stop()) {
+        result_.interrupted = true;
+        result_.failure = "interrupted";
+        break;
+      }
+      Guard([&] { loop_.Step(); }, /*settling=*/false);
+      if (loop_.step() == 0) break;
+      result_.tracking.Add(loop_.error());
+      const Clock::time_point recording = Clock::now();
+      after_step();
+      result_.recording_seconds += SecondsSince(recording);
+    }
+    result_.wall_seconds = SecondsSince(begin);
+    Judge(*setup_, loop_, &result_);
+    return result_;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static double SecondsSince(Clock::time_point begin) {
+    return std::chrono::duration<double>(Clock::now() - begin).count();
+  }
+
+  template <typename Work>
+  void Guard(const Work& work, bool settling) {
+    try {
+      work();
+    } catch (const InputError&) {
+      throw;
+    } catch (const Error& error) {
+      result_.failure =
+          error.what() + (settling ? " while settling" : " at t = " + FormatNumber(loop_.step_time()) + " s");
+    }
+  }
+
+  const Setup* setup_;
+  ClosedLoop loop_;
+  RunResult result_;
+};
+
+}  // namespace dexcheck
