@@ -4,6 +4,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -133,13 +134,13 @@ void TomlDocument::Override(std::string_view assignment) {
         fail(Quote(key) + " is no entry of a list of " + std::to_string(list->size()));
       }
       if (is_last) {
-        list->replace(list->cbegin() + static_cast<std::ptrdiff_t>(index), *parsed.get("value"));
+        list->replace(list->cbegin() + static_cast<std::ptrdiff_t>(index), std::move(*parsed.get("value")));
         return;
       }
       at = list->get(index);
     } else if (toml::table* const table = at->as_table()) {
       if (is_last) {
-        table->insert_or_assign(key, *parsed.get("value"));
+        table->insert_or_assign(key, std::move(*parsed.get("value")));
         return;
       }
       if (!table->contains(key)) table->insert(key, toml::table{});

@@ -40,6 +40,9 @@ const VectorXd& GraspController::CalcTorque(const DesiredMotion& desired) {
   const Vector6d V_Bo_dot = CalcTrackingAcceleration(options_.gains, options_.orientation, grasp_, desired);
   law_.SetDemand(robot_, grasp_, V_Bo_dot, sigma_prime_);
 
+  if (!law_.F_o().allFinite() || !law_.tau_0().allFinite()) {
+    throw GraspForceError("the demanded forces are not finite");
+  }
   problem_.G = grasp_.G();
   problem_.F_o = law_.F_o();
   const auto begin = std::chrono::steady_clock::now();

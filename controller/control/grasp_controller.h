@@ -15,7 +15,7 @@
 
 namespace dexcheck {
 
-/// No contact forces inside the friction cones give the wrench that the motion takes.
+/// No contact forces inside the friction cones give the wrench that the motion takes, or it is not finite.
 class GraspForceError : public Error {
  public:
   using Error::Error;

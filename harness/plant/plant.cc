@@ -94,7 +94,8 @@ void Plant::CheckHealth(double expected_time) const {
     throw DivergenceError("MuJoCo at t = " + FormatNumber(data_->time) +
                           " s: " + mju_warningText(i, data_->warning[i].lastinfo));
   }
-  const bool finite = Copy(data_->qpos, model_->nq).allFinite() && Copy(data_->qvel, model_->nv).allFinite();
+  const bool finite = Eigen::Map<const VectorXd>(data_->qpos, model_->nq).allFinite() &&
+                      Eigen::Map<const VectorXd>(data_->qvel, model_->nv).allFinite();
   if (finite && std::abs(data_->time - expected_time) < 0.5 * time_step()) return;
   throw DivergenceError(
       "the simulation's state is not finite after t = " + FormatNumber(expected_time - time_step()) + " s");

@@ -126,6 +126,13 @@ void Setup::SolveGrasp() {
     Fail(scenario_, "grasp.frame", Quote(grasp.frame) + " is no frame of the model");
   }
   X_Bo_start_ = kinematics.CalcFramePose(frame) * grasp.X_FO;
+  X_start_ << X_Bo_start_.translation(), CalcAnyZyzAngles(X_Bo_start_.linear());
+  if (scenario_.control.orientation == OrientationFeedback::kAngles &&
+      std::abs(std::sin(X_start_[4])) < kMinSinBeta) {
+    Fail(scenario_, "control.orientation",
+         "\"angles\" are singular where the object starts, at beta = " + FormatNumber(X_start_[4]) +
+             " rad; take \"rotation\"");
+  }
   const FingerPlacement placement = SolveFingerPlacement(
       model_, fingertips_, *surface_, X_Bo_start_, grasp.contacts, q, {.penetration = kStartPenetration});
   if (!placement.reached) {
@@ -134,13 +141,6 @@ void Setup::SolveGrasp() {
              FormatNumber(placement.residual) + " m away");
   }
   q_start_ = placement.q;
-  X_start_ << X_Bo_start_.translation(), CalcAnyZyzAngles(X_Bo_start_.linear());
-  if (scenario_.control.orientation == OrientationFeedback::kAngles &&
-      std::abs(std::sin(X_start_[4])) < kMinSinBeta) {
-    Fail(scenario_, "control.orientation",
-         "\"angles\" are singular where the object starts, at beta = " + FormatNumber(X_start_[4]) +
-             " rad; take \"rotation\"");
-  }
 }
 
 GraspControllerOptions Setup::MakeControllerOptions() const {

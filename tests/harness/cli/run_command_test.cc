@@ -1,0 +1,168 @@
+// dexcheck run, as its users run it.
+
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "harness/record/log_reader.h"
+#include "tests/harness/cli/dexcheck_program.h"
+
+namespace dexcheck {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::IsRefused;
+using testing::Program;
+using testing::ProgramResult;
+using testing::ReadText;
+using testing::RunDexcheck;
+using testing::TempFolder;
+using testing::WriteText;
+
+nlohmann::json ReadSummary(const std::filesystem::path& folder) {
+  return nlohmann::json::parse(ReadText(folder / "summary.json"));
+}
+
+TEST(RunCommand, WritesAFolderThatTellsAll) {
+  const TempFolder folder;
+  const std::filesystem::path out = folder.path() / "run";
+  const ProgramResult result =
+      RunDexcheck({"run", "curve", "--set", "duration=0.2", "--out", out.string(), "--seed", "3"});
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_THAT(result.out, HasSubstr("PASS"));
+
+  const nlohmann::json summary = ReadSummary(out);
+  EXPECT_EQ(summary["scenario"], "curve");
+  EXPECT_EQ(summary["verdict"], "pass");
+  EXPECT_EQ(summary["seed"], 3);
+  EXPECT_LT(summary["tracking"]["position_error_max_m"].get<double>(), 1e-6);
+  EXPECT_GT(summary["tracking"]["position_error_rms_m"].get<double>(), 0.0);
+  EXPECT_TRUE(summary["tracking"].contains("orientation_error_max_rad"));
+  for (const char* check : {"M_bar", "balance_robot", "reduced_acceleration", "wheel_slip"}) {
+    const nlohmann::json& entry = summary["checks"][check];
+    for (const char* key : {"kind", "max", "rms", "bound", "at_time_s", "pass"}) {
+      EXPECT_TRUE(entry.contains(key)) << check << " " << key;
+    }
+    EXPECT_TRUE(entry["pass"].get<bool>());
+  }
+  EXPECT_EQ(summary["checks"]["M_bar"]["kind"], "model");
+  EXPECT_EQ(summary["checks"]["wheel_slip"]["kind"], "assumption");
+  for (const char* key : {"fingertip_slip_max_m", "wheel_slip_max_m", "base_tilt_max_rad", "cone_margin_min",
+                          "contacts_lost"}) {
+    EXPECT_TRUE(summary["assumptions"].contains(key)) << key;
+  }
+  EXPECT_EQ(summary["speed"]["steps"], 200);
+  for (const char* key : {"real_time_factor", "plant_us_per_step", "controller_us_per_step",
+                          "cross_check_us_per_step", "grasp_force_us_per_solve"}) {
+    EXPECT_GT(summary["speed"][key].get<double>(), 0.0) << key;
+  }
+
+  const LogReader log(out / "log.h5");
+  EXPECT_EQ(log.rows(), 200);
+  EXPECT_EQ(log.ReadText("seed"), "3");
+  EXPECT_THAT(log.ReadText("command"), HasSubstr("run curve --set duration=0.2"));
+  EXPECT_EQ(nlohmann::json::parse(log.ReadText("summary")), summary);
+  const RowMatrixXd qpos = log.ReadSignal("engine/qpos");
+  EXPECT_EQ(qpos.cols(), 66);
+  EXPECT_NE(qpos.row(0), qpos.row(199));
+
+  // The same again from the log alone.
+  const ProgramResult replay = RunDexcheck({"run", "--replay", out.string()});
+  EXPECT_EQ(replay.exit_code, 0) << replay.out << replay.err;
+  EXPECT_THAT(replay.out, HasSubstr("IDENTICAL: 200 steps"));
+
+  // Nothing that is there is overwritten.
+  const std::string before = ReadText(out / "summary.json");
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck({"run", "hold", "--out", out.string()}), {out.string(), "already holds files"}));
+  EXPECT_EQ(ReadText(out / "summary.json"), before);
+}
+
+TEST(RunCommand, DisagreementIsExitCodeOneAndNamesTheCause) {
+  const ProgramResult result = RunDexcheck({"run", "paper-rest", "--set", "duration=0.3", "--no-log"});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("DISAGREEMENT"));
+  EXPECT_THAT(result.out, HasSubstr("cause: wheel slip"));
+}
+
+TEST(RunCommand, FailureIsExitCodeThreeAndKeepsTheRecords) {
+  const TempFolder folder;
+  const std::filesystem::path out = folder.path() / "run";
+  const ProgramResult result = RunDexcheck({"run", "paper-ramp", "--set", "duration=2", "--set",
+                                            "plant.floor_friction=0.1", "--out", out.string()});
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("FAILED"));
+  const nlohmann::json summary = ReadSummary(out);
+  EXPECT_EQ(summary["verdict"], "failed");
+  EXPECT_FALSE(summary["failure"].get<std::string>().empty());
+  const LogReader log(out / "log.h5");
+  EXPECT_GT(log.rows(), 300);
+  EXPECT_LT(log.rows(), 2000);
+}
+
+TEST(RunCommand, CtrlCWritesWhatThereIs) {
+  const TempFolder folder;
+  const std::filesystem::path out = folder.path() / "run";
+  Program program(testing::DexcheckCommand({"run", "hold", "--set", "duration=1000", "--out", out.string()}),
+                  {});
+  for (int i = 0; i < 300 && !std::filesystem::exists(out / "log.h5"); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  program.Signal(SIGINT);
+  const ProgramResult result = program.Wait();
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  const nlohmann::json summary = ReadSummary(out);
+  EXPECT_TRUE(summary["interrupted"].get<bool>());
+  EXPECT_EQ(LogReader(out / "log.h5").rows(), summary["speed"]["steps"].get<long>());
+}
+
+TEST(RunCommand, AKilledRunLeavesAReadableLog) {
+  const TempFolder folder;
+  const std::filesystem::path out = folder.path() / "run";
+  {
+    Program program(
+        testing::DexcheckCommand({"run", "hold", "--set", "duration=1000", "--out", out.string()}), {});
+    for (int i = 0; i < 600; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      if (std::filesystem::exists(out / "log.h5") && LogReader(out / "log.h5").rows() >= 200) break;
+    }
+    program.Signal(SIGKILL);
+    program.Wait();
+  }
+  const LogReader log(out / "log.h5");
+  ASSERT_GE(log.rows(), 200);
+  EXPECT_TRUE(log.ReadSignal("engine/qpos").allFinite());
+  const ProgramResult csv =
+      RunDexcheck({"export", out.string(), "--csv", "-", "--signals", "time,object/X_o"});
+  EXPECT_EQ(csv.exit_code, 0) << csv.err;
+}
+
+TEST(RunCommand, ListsScenarios) {
+  const ProgramResult result = RunDexcheck({"run", "--list"});
+  EXPECT_EQ(result.exit_code, 0);
+  for (const char* name : {"paper ", "paper-ramp", "paper-rest", "curve", "reorient", "hold"}) {
+    EXPECT_THAT(result.out, HasSubstr(name));
+  }
+}
+
+TEST(RunCommand, RefusesBadInputInOneLine) {
+  const TempFolder folder;
+  EXPECT_TRUE(IsRefused(RunDexcheck({"run"}), {"SCENARIO"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"run", "papper"}), {"\"papper\"", "did you mean \"paper\"?"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"run", "missing.toml"}), {"missing.toml", "cannot be read"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"run", "paper", "--seed", "-1"}), {"-1"}));
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck({"run", "paper", "--set", "duration=x", "--out", (folder.path() / "a").string()}),
+                {"--set duration=x: duration: must be a number"}));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "a"));
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck({"run", "paper", "--out", "/proc/run"}), {"/proc/run", "cannot be made"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"run", "--replay", folder.path().string()}), {"log.h5"}));
+}
+
+}  // namespace
+}  // namespace dexcheck

@@ -1,0 +1,125 @@
+// The shipped scenarios, at the accuracy that they promise.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/harness/simulation/shipped_run.h"
+
+namespace dexcheck::testing {
+namespace {
+
+// Rounding: the terms' own bounds are a hundred times smaller.
+constexpr double kModelBound = 1e-10;
+
+void ExpectModelAgrees(const ClosedLoop& loop) {
+  ASSERT_GE(loop.model_checks().size(), 20U);
+  for (const RunCheck& check : loop.model_checks()) {
+    EXPECT_EQ(check.count, loop.step()) << check.name;
+    EXPECT_LE(check.max, kModelBound) << check.name;
+    EXPECT_FALSE(check.failed) << check.name << " " << check.max;
+  }
+}
+
+void ExpectPass(const ShippedRun& run, const RunResult& result) {
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  EXPECT_EQ(run.loop().step(), run.loop().num_steps());
+  EXPECT_EQ(run.loop().checks().contacts_lost(), 0);
+  EXPECT_GT(run.loop().checks().least_cone_margin(), 0.0);
+  ExpectModelAgrees(run.loop());
+  // The fingers do push.
+  EXPECT_GT(run.loop().checks().engine().f_c.cwiseAbs().maxCoeff(), 0.5);
+}
+
+TEST(ShippedScenarios, PaperFollowsTheLine) {
+  ShippedRun run("paper");
+  const RunResult& result = run.Run();
+  ExpectPass(run, result);
+  EXPECT_LE(result.tracking.position_max(), 1e-8);     // measured 8e-11
+  EXPECT_LE(result.tracking.orientation_max(), 1e-6);  // measured 6e-10
+  EXPECT_LE(run.Worst("reduced_acceleration"), 1e-5);
+  EXPECT_LE(run.Worst("contact_force"), 1e-6);
+  EXPECT_LE(run.Worst("idle_joints"), 1e-5);
+  const double way = run.loop().state().X_Bo.translation().x() - run.setup().X_start()[0];
+  EXPECT_NEAR(way, 10.0 - 1e-3, 1e-6);
+}
+
+TEST(ShippedScenarios, PaperRampFollowsTheLine) {
+  ShippedRun run("paper-ramp", {"duration=5"});
+  const RunResult& result = run.Run();
+  ExpectPass(run, result);
+  EXPECT_LE(result.tracking.position_max(), 1e-7);     // measured 7e-9
+  EXPECT_LE(result.tracking.orientation_max(), 1e-6);  // measured 4e-8
+  EXPECT_NEAR(run.loop().state().xi[0], 1.0, 1e-4);
+}
+
+TEST(ShippedScenarios, CurveTurnsWithItsPath) {
+  ShippedRun run("curve");
+  double largest_turn = 0.0;
+  const RunResult& result =
+      run.Run([&] { largest_turn = std::max(largest_turn, std::abs(run.loop().state().q[2])); });
+  ExpectPass(run, result);
+  EXPECT_GT(largest_turn, 0.1);
+  EXPECT_LE(result.tracking.position_max(), 1e-6);     // measured 3e-9
+  EXPECT_LE(result.tracking.orientation_max(), 1e-5);  // measured 3e-8
+  EXPECT_LE(run.Worst("reduced_acceleration"), 1e-5);
+  EXPECT_LE(run.Worst("contact_force"), 1e-6);
+  EXPECT_LE(run.Worst("fingertip_slip"), 2e-4);
+  EXPECT_LE(run.Worst("wheel_slip"), 1e-3);
+}
+
+TEST(ShippedScenarios, ReorientRollsTheObjectInPlace) {
+  ShippedRun run("reorient", {"duration=4"});
+  std::vector<Vector5d> first;
+  double rolled = 0.0;
+  double platform = 0.0;
+  const RunResult& result = run.Run([&] {
+    const MeasuredState& state = run.loop().state();
+    for (size_t i = 0; i < state.kappa.size(); ++i) {
+      if (first.size() <= i) first.push_back(state.kappa[i].CalcVector());
+      rolled = std::max(rolled, std::abs(state.kappa[i].alpha_o.u - first[i][2]));
+    }
+    platform = std::max(platform, state.q.head<3>().norm());
+  });
+  ExpectPass(run, result);
+  EXPECT_GT(rolled, 0.03);    // rad around the torus
+  EXPECT_LT(platform, 1e-4);  // measured 3e-6
+  EXPECT_LE(result.tracking.position_max(), 1e-6);
+}
+
+TEST(ShippedScenarios, PaperRestSpinsTheWheels) {
+  ShippedRun run("paper-rest", {"duration=4"});
+  const RunResult& result = run.Run();
+  EXPECT_EQ(result.verdict, Verdict::kDisagreement) << result.failure;
+  EXPECT_EQ(result.attribution.cause, Cause::kWheelSlip) << result.attribution.evidence;
+  EXPECT_GT(run.Worst("wheel_slip"), 5e-3);
+  ExpectModelAgrees(run.loop());
+}
+
+TEST(ShippedScenarios, OtherGraspsPassToo) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    ShippedRun run("curve", {"duration=1.5"}, seed);
+    const RunResult& result = run.Run();
+    EXPECT_EQ(result.verdict, Verdict::kPass)
+        << "seed " << seed << ": " << result.failure << result.attribution.evidence;
+    EXPECT_NE(run.setup().q_start(), ShippedRun("curve").setup().q_start());
+  }
+}
+
+TEST(ShippedScenarios, EitherOrientationErrorWorks) {
+  ShippedRun run("curve", {"duration=2", "control.orientation=rotation"});
+  const RunResult& result = run.Run();
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  EXPECT_LE(result.tracking.orientation_max(), 1e-5);
+}
+
+TEST(ShippedScenarios, WheelRatesServeAsWell) {
+  ShippedRun run("paper-ramp",
+                 {"duration=1", "model.base.velocity=wheel_rates", "control.weight={ platform = 0.005 }"});
+  const RunResult& result = run.Run();
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  EXPECT_LE(result.tracking.position_max(), 1e-7);
+}
+
+}  // namespace
+}  // namespace dexcheck::testing
