@@ -17,7 +17,7 @@ const Color kActual = MakeColor(0xff8a1f);
 const Color kDesired = MakeColor(0x18c8e8, 0.25F);
 
 // Sizes that suit a hand, m.
-constexpr double kLongestForce = 0.070;
+constexpr double kLongestForce = 0.042;
 constexpr double kConeHeight = 0.026;
 constexpr double kForceRadius = 0.0018;
 constexpr double kAxesLength = 0.08;
