@@ -16,9 +16,11 @@ git ls-files '*.cc' '*.h' | xargs clang-format-14 --dry-run --Werror || failed=1
 echo "cppcheck"
 # Suppressed, with reasons:
 # - missingReturn: cppcheck does not follow the [[noreturn]] of a member of another class; clang does (-Wreturn-type).
+# - legacyUninitvar: cppcheck takes `x = new (std::nothrow) T{}` for no initialisation; clang's analyzer looks for the
+#   real ones.
 # - missingInclude, missingIncludeSystem: the headers of libraries are not given.
 cppcheck --quiet --std=c++20 --language=c++ --enable=warning,performance,portability --error-exitcode=1 -I "$root" \
-  --suppress=missingReturn --suppress=missingInclude --suppress=missingIncludeSystem "${sources[@]}" || failed=1
+  --suppress=missingReturn --suppress=legacyUninitvar --suppress=missingInclude --suppress=missingIncludeSystem "${sources[@]}" || failed=1
 
 echo "clang-tidy"
 cmake --preset release >/dev/null

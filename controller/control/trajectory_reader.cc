@@ -1,5 +1,7 @@
 #include "controller/control/trajectory_reader.h"
 
+#include <cmath>
+
 namespace dexcheck {
 namespace {
 
@@ -21,6 +23,29 @@ double ReadRampTime(TomlTable& table) {
 double ReadHeading(TomlTable& table) {
   const auto [value, unit] = table.FindWithAngleUnit("heading");
   return value ? unit * value->AsNumber() : 0.0;
+}
+
+// The square of the rate 2 pi f must not overflow: the acceleration has it.
+double ReadFrequency(TomlTable& table) {
+  const TomlValue frequency = table.Get("frequency");
+  const double rate = 2.0 * kPi * frequency.AsPositive();
+  if (!std::isfinite(rate * rate)) frequency.Fail("must not be so large");
+  return frequency.AsPositive();
+}
+
+struct Wave {
+  double amplitude;
+  double wavelength;
+};
+
+// Nor must the curvature at the crests, amplitude k^2 with k = 2 pi / wavelength.
+Wave ReadWave(TomlTable& table) {
+  const TomlValue amplitude = table.Get("amplitude");
+  const TomlValue wavelength = table.Get("wavelength");
+  const double k = 2.0 * kPi / wavelength.AsPositive();
+  if (!std::isfinite(k * k)) wavelength.Fail("must not be so small");
+  if (!std::isfinite(amplitude.AsNumber() * k * k)) amplitude.Fail("must not be so large");
+  return {amplitude.AsNumber(), wavelength.AsPositive()};
 }
 
 std::vector<WayPoint> ReadWayPoints(TomlTable& table) {
@@ -55,12 +80,12 @@ std::unique_ptr<Trajectory> ReadByType(TomlTable& table, const Vector6d& X_start
                                                       table.Get("duration").AsPositive());
     case Type::kOscillation:
       return std::make_unique<OscillationTrajectory>(X_start, ReadCoordinates(table, "xyz", "zyz"),
-                                                     table.Get("frequency").AsPositive(),
-                                                     ReadRampTime(table));
-    case Type::kWeave:
+                                                     ReadFrequency(table), ReadRampTime(table));
+    case Type::kWeave: {
+      const Wave wave = ReadWave(table);
       return std::make_unique<WeaveTrajectory>(X_start, ReadHeading(table), table.Get("speed").AsNumber(),
-                                               ReadRampTime(table), table.Get("amplitude").AsNumber(),
-                                               table.Get("wavelength").AsPositive());
+                                               ReadRampTime(table), wave.amplitude, wave.wavelength);
+    }
     case Type::kCircle: {
       const TomlValue radius = table.Get("radius");
       if (radius.AsNumber() == 0.0) radius.Fail("must not be zero");

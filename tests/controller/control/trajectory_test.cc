@@ -297,6 +297,12 @@ TEST(TrajectoryReader, RejectsWhatIsWrong) {
   EXPECT_TRUE(rejects("type = 'point_to_point'", "duration"));
   EXPECT_TRUE(rejects("type = 'point_to_point'\nduration = -1", "scenario.toml:2: duration"));
   EXPECT_TRUE(rejects("type = 'circle'\nspeed = 1\nradius = 0", "radius: must not be zero"));
+  EXPECT_TRUE(
+      rejects("type = 'oscillation'\nfrequency = 1e308", "frequency: must not be so large, got 1e+308"));
+  EXPECT_TRUE(rejects("type = 'weave'\nspeed = 1\namplitude = 1e308\nwavelength = 0.1",
+                      "amplitude: must not be so large, got 1e+308"));
+  EXPECT_TRUE(rejects("type = 'weave'\nspeed = 1\namplitude = 1\nwavelength = 1e-320",
+                      "wavelength: must not be so small, got 1e-320"));
   EXPECT_TRUE(rejects("type = 'way_points'\npoints = []", "needs at least one point"));
   EXPECT_TRUE(rejects("type = 'way_points'\npoints = [{ time = 2 }, { time = 1 }]",
                       "must be greater than the time before"));
