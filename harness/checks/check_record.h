@@ -24,6 +24,8 @@ struct Location {
   int first =
       -1;  ///< Joint, link (by its joint; -1 the base), frame, velocity coordinate, or wheel (0 right).
   int second = -1;  ///< The other velocity coordinate of a matrix entry.
+
+  bool operator==(const Location&) const = default;
 };
 
 /// A location in words, by the model's names: "joint r_elbow on link r_upper_arm".

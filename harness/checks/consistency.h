@@ -8,6 +8,9 @@
 
 #include "harness/adapter/adapter.h"
 #include "harness/checks/check_record.h"
+#include "harness/checks/model_view.h"
+#include "harness/checks/object_check.h"
+#include "harness/checks/random_states.h"
 #include "harness/checks/static_gate.h"
 
 namespace dexcheck {
@@ -15,9 +18,9 @@ namespace dexcheck {
 struct ConsistencyOptions {
   long samples = 10000;
   std::uint64_t seed = 1;
-  double joint_speed = 5.0;   ///< Revolute joints and yaw, at most, rad/s.
-  double linear_speed = 2.0;  ///< Base and prismatic joints, at most, m/s.
-  double area = 5.0;          ///< The base stands within +-area of the origin, m.
+  StateRange range;
+  ModelViewFactory make_view = MakeModelView;  ///< What stands for the model.
+  ObjectFormulas object;                       ///< What stands for the object's equations.
 };
 
 struct ConsistencyResult {

@@ -5,10 +5,10 @@
 
 namespace dexcheck {
 
-ModelCheck::ModelCheck(const Adapter& adapter)
-    : terms_(adapter.model(), Coordinates::kReduced),
-      terms_at_w_(adapter.model(), Coordinates::kReduced),
-      unreduced_(adapter.model(), Coordinates::kUnreduced),
+ModelCheck::ModelCheck(const Adapter& adapter, const ModelViewFactory& make_view)
+    : terms_(make_view(adapter.model(), Coordinates::kReduced)),
+      terms_at_w_(make_view(adapter.model(), Coordinates::kReduced)),
+      unreduced_(make_view(adapter.model(), Coordinates::kUnreduced)),
       engine_(adapter, Coordinates::kReduced),
       engine_unreduced_(adapter, Coordinates::kUnreduced),
       scales_(adapter.model()) {
@@ -36,8 +36,8 @@ ModelCheck::ModelCheck(const Adapter& adapter)
   define(kLinearMomentum, "linear_momentum", 1.0);
   define(kAngularMomentum, "angular_momentum", 2.0);
 
-  const int n = terms_.size();
-  unreduced_velocity_.setZero(unreduced_.size());
+  const int n = terms_->size();
+  unreduced_velocity_.setZero(unreduced_->size());
   J_.setZero(6, n);
   J_dot_.setZero(6, n);
   J_engine_.setZero(6, n);
@@ -50,14 +50,12 @@ ModelCheck::ModelCheck(const Adapter& adapter)
 void ModelCheck::Compare(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi,
                          const Eigen::Ref<const VectorXd>& w, long sample) {
   sample_ = sample;
-  terms_.SetState(q, xi);
-  terms_.CalcDynamics();
+  terms_->SetState(q, xi);
   engine_.SetState(q, xi);
-  scales_.SetState(terms_, q, xi);
+  scales_.SetState(terms_->terms(), q, xi);
   CompareGeometry();
   CompareFrames(xi);
-  unreduced_.SetState(q, unreduced_velocity_);
-  unreduced_.CalcDynamics();
+  unreduced_->SetState(q, unreduced_velocity_);
   engine_unreduced_.SetState(q, unreduced_velocity_);
   CompareMassMatrices();
   CompareEnergies();
@@ -65,11 +63,11 @@ void ModelCheck::Compare(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<c
 }
 
 void ModelCheck::CompareGeometry() {
-  const RobotModel& model = terms_.model();
+  const RobotModel& model = terms_->model();
   const double length = scales_.world_length();
   // From the base outward, so that the first failure is the one that the others follow from.
   for (int i = -1; i < model.num_joints(); ++i) {
-    const Pose X = terms_.CalcLinkPose(i);
+    const Pose X = terms_->CalcLinkPose(i);
     if (i >= 0) {
       const Location at_joint{Location::Kind::kJoint, i, -1};
       const Vector3d axis = X.linear().col(2);
@@ -102,13 +100,13 @@ void ModelCheck::CompareGeometry() {
 }
 
 void ModelCheck::CompareFrames(const Eigen::Ref<const VectorXd>& xi) {
-  const int frames = static_cast<int>(terms_.model().frames().size());
-  const int n = terms_.size();
+  const int frames = static_cast<int>(terms_->model().frames().size());
+  const int n = terms_->size();
   const double acceleration = Positive(scales_.acceleration());
   const double angular_acceleration = Positive(scales_.angular_rate() * scales_.angular_rate());
   for (int frame = 0; frame < frames; ++frame) {
     const Location where{Location::Kind::kFrame, frame, -1};
-    const Pose X = terms_.CalcFramePose(frame);
+    const Pose X = terms_->CalcFramePose(frame);
     const Pose X_engine = engine_.FramePose(frame);
     for (int row = 0; row < 3; ++row) {
       record(kFramePose)
@@ -117,7 +115,7 @@ void ModelCheck::CompareFrames(const Eigen::Ref<const VectorXd>& xi) {
         record(kFramePose).Add(X.linear()(row, col), X_engine.linear()(row, col), 1.0, where, sample_);
       }
     }
-    terms_.CalcFrameJacobian(frame, J_, J_dot_);
+    terms_->CalcFrameJacobian(frame, J_, J_dot_);
     engine_.CalcFrameJacobian(frame, J_engine_);
     Vector6d bias = Vector6d::Zero();
     const Vector6d bias_engine = engine_.CalcFrameBiasAcceleration(frame);
@@ -147,20 +145,20 @@ void ModelCheck::CompareFrames(const Eigen::Ref<const VectorXd>& xi) {
 }
 
 void ModelCheck::CompareMassMatrices() {
-  const int n = terms_.size();
+  const int n = terms_->size();
   for (int col = 0; col < n; ++col) {
     for (int row = 0; row < n; ++row) {
       record(kReducedMassMatrix)
-          .Add(terms_.M()(row, col), engine_.M()(row, col), scales_.CalcMassScale(row, col),
+          .Add(terms_->M()(row, col), engine_.M()(row, col), scales_.CalcMassScale(row, col),
                {Location::Kind::kVelocityPair, row, col}, sample_);
     }
   }
   // M of (16): its first three rows are along the world's x, y and about z; the others are M_bar's.
-  const int shift = unreduced_.size() - n;
-  const int base = terms_.model().num_base_positions();
+  const int shift = unreduced_->size() - n;
+  const int base = terms_->model().num_base_positions();
   const double mass = Positive(scales_.total_mass());
-  for (int col = 0; col < unreduced_.size(); ++col) {
-    for (int row = 0; row < unreduced_.size(); ++row) {
+  for (int col = 0; col < unreduced_->size(); ++col) {
+    for (int row = 0; row < unreduced_->size(); ++row) {
       const double row_scale =
           row < base ? (row < 2 ? 1.0 : scales_.length()) : scales_.CalcVelocityScale(row - shift);
       const double col_scale =
@@ -168,7 +166,7 @@ void ModelCheck::CompareMassMatrices() {
       const double row_mass = row < base ? mass : scales_.GetSubtreeMass(row - shift);
       const double col_mass = col < base ? mass : scales_.GetSubtreeMass(col - shift);
       record(kMassMatrix)
-          .Add(unreduced_.M()(row, col), engine_unreduced_.M()(row, col),
+          .Add(unreduced_->M()(row, col), engine_unreduced_.M()(row, col),
                Positive(std::min(row_mass, col_mass) * row_scale * col_scale),
                {Location::Kind::kVelocityPair, std::max(row - shift, 0), std::max(col - shift, 0)}, sample_);
     }
@@ -177,23 +175,22 @@ void ModelCheck::CompareMassMatrices() {
 
 void ModelCheck::CompareForces(const Eigen::Ref<const VectorXd>& xi, const Eigen::Ref<const VectorXd>& w,
                                const Eigen::Ref<const VectorXd>& q) {
-  const int n = terms_.size();
-  force_.noalias() = terms_.C() * xi;
+  const int n = terms_->size();
+  force_.noalias() = terms_->C() * xi;
   for (int i = 0; i < n; ++i) {
     const Location where{Location::Kind::kVelocity, i, -1};
     record(kCoriolisForce)
         .Add(force_[i], engine_.coriolis()[i], scales_.CalcCoriolisScale(i), where, sample_);
-    record(kGravity).Add(terms_.gravity()[i], engine_.gravity()[i], scales_.CalcGravityScale(i), where,
+    record(kGravity).Add(terms_->gravity()[i], engine_.gravity()[i], scales_.CalcGravityScale(i), where,
                          sample_);
-    record(kFriction).Add(terms_.friction()[i], engine_.friction()[i], scales_.CalcFrictionScale(i, xi),
+    record(kFriction).Add(terms_->friction()[i], engine_.friction()[i], scales_.CalcFrictionScale(i, xi),
                           where, sample_);
   }
 
   // C_bar(xi) w + C_bar(w) xi against the engine's force at xi + w and xi - w.
-  probe_.noalias() = terms_.C() * w;
-  terms_at_w_.SetState(q, w);
-  terms_at_w_.CalcDynamics();
-  probe_.noalias() += terms_at_w_.C() * xi;
+  probe_.noalias() = terms_->C() * w;
+  terms_at_w_->SetState(q, w);
+  probe_.noalias() += terms_at_w_->C() * xi;
   force_ = xi + w;
   engine_.CalcCoriolis(force_, probe_engine_);
   force_ = xi - w;
@@ -211,7 +208,7 @@ void ModelCheck::CompareForces(const Eigen::Ref<const VectorXd>& xi, const Eigen
 void ModelCheck::CompareEnergies() {
   const Location whole;
   const EnergyAndMomentum& engine = engine_.energy_and_momentum();
-  const EnergyAndMomentum model = terms_.CalcEnergyAndMomentum();
+  const EnergyAndMomentum model = terms_->CalcEnergyAndMomentum();
   const double momentum = scales_.CalcMomentumScale();
   record(kKineticEnergy).Add(model.kinetic, engine.kinetic, scales_.CalcKineticEnergyScale(), whole, sample_);
   record(kPotentialEnergy)

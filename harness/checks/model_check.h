@@ -2,10 +2,11 @@
 
 // The first of the harness's questions: at one state, are the model's terms the engine's?
 
+#include <memory>
 #include <vector>
 
-#include "controller/dynamics/model_terms.h"
 #include "harness/checks/check_record.h"
+#include "harness/checks/model_view.h"
 #include "harness/checks/rounding_scales.h"
 #include "harness/engine/engine_terms.h"
 
@@ -15,7 +16,8 @@ namespace dexcheck {
 /// when a new worst case is stored.
 class ModelCheck {
  public:
-  explicit ModelCheck(const Adapter& adapter);
+  /// @param make_view what stands for the model; a test may put a wrong one there.
+  explicit ModelCheck(const Adapter& adapter, const ModelViewFactory& make_view = MakeModelView);
 
   /// @param q q'. @param xi reduced velocity.
   /// @param w a second velocity, which probes the matrix C_bar' beyond its product with xi:
@@ -24,7 +26,7 @@ class ModelCheck {
                const Eigen::Ref<const VectorXd>& w, long sample);
 
   [[nodiscard]] const std::vector<CheckRecord>& records() const { return records_; }
-  [[nodiscard]] int base_velocities() const { return terms_.model().num_base_velocities(); }
+  [[nodiscard]] int base_velocities() const { return terms_->model().num_base_velocities(); }
 
  private:
   enum Term {
@@ -55,9 +57,9 @@ class ModelCheck {
                      const Eigen::Ref<const VectorXd>& q);
   void CompareEnergies();
 
-  ModelTerms terms_;
-  ModelTerms terms_at_w_;
-  ModelTerms unreduced_;
+  std::unique_ptr<ModelView> terms_;
+  std::unique_ptr<ModelView> terms_at_w_;
+  std::unique_ptr<ModelView> unreduced_;
   EngineTerms engine_;
   EngineTerms engine_unreduced_;
   std::vector<CheckRecord> records_;

@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/object/euler_zyz.h"
-#include "controller/object/object_dynamics.h"
 
 namespace dexcheck {
 namespace {
@@ -17,8 +16,11 @@ constexpr double kRounding = 128.0 * std::numeric_limits<double>::epsilon();
 
 }  // namespace
 
-ObjectCheck::ObjectCheck(const Adapter& adapter)
-    : adapter_(&adapter), engine_(mj_copyModel(nullptr, &adapter.engine())), data_(MakeData(*engine_)) {
+ObjectCheck::ObjectCheck(const Adapter& adapter, ObjectFormulas formulas)
+    : adapter_(&adapter),
+      formulas_(std::move(formulas)),
+      engine_(mj_copyModel(nullptr, &adapter.engine())),
+      data_(MakeData(*engine_)) {
   const int body = adapter.object_body();
   const int joint = engine_->body_jntadr[body];
   if (engine_->body_jntnum[body] != 1 || engine_->jnt_type[joint] != mjJNT_FREE) {
@@ -72,8 +74,8 @@ void ObjectCheck::SetEngineState(const Vector6d& X_o, const Vector6d& X_o_dot) {
 void ObjectCheck::Compare(const Vector6d& X_o, const Vector6d& X_o_dot, long sample) {
   const MassProperties& body = adapter_->model().object()->body;
   const Vector3d gravity = adapter_->model().gravity();
-  const ObjectTerms terms = CalcObjectTerms(body, gravity, X_o, X_o_dot);
-  const Pose X = CalcObjectPose(X_o);
+  const ObjectTerms terms = formulas_.terms(body, gravity, X_o, X_o_dot);
+  const Pose X = formulas_.pose(X_o);
   SetEngineState(X_o, X_o_dot);
 
   const Location where{Location::Kind::kObject, -1, -1};

@@ -39,12 +39,15 @@ class StaticGate {
   /// Compares relative to the larger of the two, or to `scale` where zero is a proper value.
   void Compare(const std::string& check, const Location& where, double model, double engine,
                double scale = 0.0) {
-    if (result_.records.empty() || result_.records.back().name != check) {
+    const bool new_check = result_.records.empty() || result_.records.back().name != check;
+    if (new_check) {
       CheckRecord record;
       record.name = check;
       record.bound = kRounding;
       result_.records.push_back(record);
     }
+    entry_ = !new_check && where == last_location_ ? entry_ + 1 : 0;
+    last_location_ = where;
     const double size = std::max({std::abs(model), std::abs(engine), scale});
     CheckRecord one;
     one.bound = kRounding;
@@ -52,7 +55,7 @@ class StaticGate {
     result_.records.back().Add(model, engine, size > 0.0 ? size : 1.0, where, -1);
     if (one.failed) {
       result_.findings.push_back(
-          {check, Describe(where, model_, model_.num_base_velocities()), model, engine});
+          {check, Describe(where, model_, model_.num_base_velocities()), model, engine, where, entry_});
     }
   }
 
@@ -250,6 +253,8 @@ class StaticGate {
   const RobotModel& model_;
   const mjModel& engine_;
   GateResult result_;
+  Location last_location_;
+  int entry_ = 0;
 };
 
 }  // namespace

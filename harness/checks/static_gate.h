@@ -17,6 +17,9 @@ struct GateFinding {
   std::string where;  ///< Part of the robot, such as "link r_forearm".
   double model = 0.0;
   double engine = 0.0;
+  Location location;
+  int entry =
+      0;  ///< Which of the numbers that the check compares there: of a vector, of a range, of a 3x3 tensor.
 };
 
 struct GateResult {

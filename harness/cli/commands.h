@@ -26,6 +26,8 @@ CLI::Validator WholeNumber(std::uint64_t least, std::uint64_t most);
 
 /// Each adds its command to `app`; the callback stores what running it returns in `exit_code`.
 void AddConsistencyCommand(CLI::App* app, int* exit_code);
+void AddDiagnoseCommand(CLI::App* app, int* exit_code);
+void AddMutateCommand(CLI::App* app, int* exit_code);
 void AddEvalCommand(CLI::App* app, int* exit_code);
 /// @param command_line as typed, to be kept in the log.
 void AddRunCommand(CLI::App* app, const std::string& command_line, int* exit_code);

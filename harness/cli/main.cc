@@ -66,6 +66,8 @@ int Run(int argc, char** argv) {
   app.require_subcommand(1);
   int exit_code = kSuccess;
   AddConsistencyCommand(&app, &exit_code);
+  AddDiagnoseCommand(&app, &exit_code);
+  AddMutateCommand(&app, &exit_code);
   AddEvalCommand(&app, &exit_code);
   AddRunCommand(&app, JoinArguments(argc, argv), &exit_code);
   AddExportCommand(&app, &exit_code);

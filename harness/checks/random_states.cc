@@ -1,0 +1,55 @@
+#include "harness/checks/random_states.h"
+
+namespace dexcheck {
+
+StateSource::StateSource(const RobotModel& model, const StateRange& range, std::uint64_t seed)
+    : model_(&model), range_(range), bits_(seed) {}
+
+double StateSource::Draw(double low, double high) {
+  constexpr double kUnit = 0x1.0p-53;
+  return low + (high - low) * static_cast<double>(bits_() >> 11) * kUnit;
+}
+
+void StateSource::DrawPositions(VectorXd* q) {
+  const int offset = model_->num_base_positions();
+  if (offset == 3) {
+    for (int i = 0; i < 2; ++i) (*q)[i] = Draw(-range_.area, range_.area);
+    (*q)[2] = Draw(-kPi, kPi);
+  }
+  for (int i = 0; i < model_->num_joints(); ++i) {
+    const Joint& joint = model_->joints()[static_cast<size_t>(i)];
+    (*q)[offset + i] = Draw(joint.lower, joint.upper);
+  }
+}
+
+void StateSource::DrawVelocity(VectorXd* xi) {
+  const auto draw = [&](double limit) { return Draw(-limit, limit); };
+  const int base = model_->num_base_velocities();
+  for (int i = 0; i < base; ++i) {
+    const bool linear = base == 3 ? i < 2 : i == 0;
+    (*xi)[i] = draw(linear ? range_.linear_speed : range_.joint_speed);
+  }
+  if (base == 2 && model_->base().velocity == DriveVelocity::kWheelRates) {
+    const double forward = (*xi)[0] / model_->base().wheel_radius;
+    const double turn = 0.5 * model_->base().wheel_distance / model_->base().wheel_radius * (*xi)[1];
+    (*xi)[0] = forward + turn;
+    (*xi)[1] = forward - turn;
+  }
+  for (int i = 0; i < model_->num_joints(); ++i) {
+    const bool revolute = model_->joints()[static_cast<size_t>(i)].type == JointType::kRevolute;
+    (*xi)[base + i] = draw(revolute ? range_.joint_speed : range_.linear_speed);
+  }
+}
+
+void StateSource::DrawObject(Vector6d* X_o, Vector6d* X_o_dot) {
+  constexpr double kHeight = 2.0;
+  for (int i = 0; i < 2; ++i) (*X_o)[i] = Draw(-range_.area, range_.area);
+  (*X_o)[2] = Draw(0.0, kHeight);
+  for (int i = 3; i < 6; ++i) (*X_o)[i] = Draw(-kPi, kPi);
+  for (int i = 0; i < 6; ++i) {
+    const double limit = i < 3 ? range_.linear_speed : range_.joint_speed;
+    (*X_o_dot)[i] = Draw(-limit, limit);
+  }
+}
+
+}  // namespace dexcheck

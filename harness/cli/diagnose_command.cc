@@ -1,0 +1,159 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "controller/model/parameter_reader.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/json_matrix.h"
+#include "harness/cli/output_file.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/diagnosis/diagnose.h"
+#include "harness/engine/engine.h"
+
+namespace dexcheck::cli {
+namespace {
+
+struct Request {
+  RobotFiles files;
+  DiagnosisOptions options;
+  std::string json_file;
+  bool quiet = false;
+};
+
+std::string FileName(const std::filesystem::path& path) { return path.filename().string(); }
+
+bool IsRepairedWholly(const Diagnosis& diagnosis) {
+  return diagnosis.remaining_terms.empty() && diagnosis.remaining_constants.empty();
+}
+
+void PrintRemaining(const Request& request, const RobotModel& model, const Diagnosis& diagnosis) {
+  fmt::print("What remains after these repairs:\n");
+  for (const GateFinding& finding : diagnosis.remaining_constants) {
+    fmt::print("  {}: {}: {:.10g} in {}, {:.10g} in {}\n", finding.check, finding.where, finding.model,
+               FileName(request.files.robot), finding.engine, FileName(request.files.mjcf));
+  }
+  for (const CheckRecord& record : diagnosis.remaining_terms) {
+    fmt::print("  {}: nearest the base: {}; worst relative error {:.1e}\n", record.name,
+               Describe(record.first_failure, model, model.num_base_velocities()), record.worst);
+  }
+}
+
+void Print(const Request& request, const RobotModel& model, const Diagnosis& diagnosis) {
+  const std::string file = FileName(request.files.robot);
+  if (diagnosis.agrees) {
+    fmt::print("AGREE: nothing to explain: {} and {} agree to rounding at {} random states.\n", file,
+               FileName(request.files.mjcf), request.options.samples);
+    return;
+  }
+  fmt::print("DISAGREE: {} against {}.\n", file, FileName(request.files.mjcf));
+  if (diagnosis.causes.empty()) fmt::print("No change of single numbers explains it.\n");
+  int number = 0;
+  for (const Cause& cause : diagnosis.causes) {
+    fmt::print("{}. {}", ++number, Describe(cause, model.spec(), file));
+    if (cause.kind == CauseKind::kEngineOnly) {
+      fmt::print("\n");
+      continue;
+    }
+    fmt::print("; explains {:.4g} % of the residual\n", 100.0 * cause.explained);
+    for (const Cause& equal : cause.equivalents)
+      fmt::print("   or, just as well: {}\n", Describe(equal, model.spec(), file));
+  }
+  if (number > 1) fmt::print("Together: {:.4g} %.\n", 100.0 * diagnosis.explained);
+  if (!request.quiet && diagnosis.causes.size() > 1 && diagnosis.ranking.size() > 1) {
+    fmt::print("One number alone (masses, inertias, joint constants, gravity) would explain at most:\n");
+    for (const auto& [cause, share] : diagnosis.ranking)
+      fmt::print("  {:5.2g} %  {}\n", 100.0 * share, Describe(cause, model.spec(), file));
+  }
+  if (IsRepairedWholly(diagnosis)) {
+    fmt::print("With {} the two agree to rounding.\n", number == 1 ? "it repaired" : "these repaired");
+  } else {
+    PrintRemaining(request, model, diagnosis);
+  }
+}
+
+Json ToJson(const Cause& cause, const RobotSpec& spec, const std::string& file) {
+  Json json = {{"text", Describe(cause, spec, file)}, {"what", DescribeShort(cause, spec)}};
+  json["changes"] = Json::array();
+  for (size_t i = 0; i < cause.parameters.size(); ++i) {
+    const Parameter& parameter = cause.parameters[i];
+    json["changes"].push_back({{"part", DescribePart(spec, parameter)},
+                               {"quantity", DescribeQuantity(parameter)},
+                               {"unit", UnitOf(spec, parameter)},
+                               {"value", ToPrinted(spec, parameter, GetValue(spec, parameter))},
+                               {"repair", ToPrinted(spec, parameter, cause.values[i])}});
+  }
+  json["explained"] = cause.explained;
+  json["explained_of_forces"] = cause.explained_of_forces;
+  json["equivalents"] = Json::array();
+  for (const Cause& equal : cause.equivalents) json["equivalents"].push_back(ToJson(equal, spec, file));
+  return json;
+}
+
+std::string ToText(const Request& request, const RobotModel& model, const Diagnosis& diagnosis) {
+  const std::string file = FileName(request.files.robot);
+  Json json = {
+      {"robot", request.files.robot.string()}, {"mjcf", request.files.mjcf.string()},
+      {"mujoco", mj_versionString()},          {"samples", request.options.samples},
+      {"seed", request.options.seed},          {"verdict", diagnosis.agrees ? "pass" : "disagreement"},
+      {"explained", diagnosis.explained},      {"explained_of_forces", diagnosis.explained_of_forces}};
+  json["causes"] = Json::array();
+  for (const Cause& cause : diagnosis.causes) json["causes"].push_back(ToJson(cause, model.spec(), file));
+  json["remaining"] = Json::array();
+  for (const GateFinding& finding : diagnosis.remaining_constants) json["remaining"].push_back(finding.check);
+  for (const CheckRecord& record : diagnosis.remaining_terms) json["remaining"].push_back(record.name);
+  return json.dump(2) + "\n";
+}
+
+int Run(const Request& request) {
+  const RobotModel model = ReadRobotModel(request.files.robot);
+  const MjModelPtr engine = LoadMjcf(request.files.mjcf);
+  CatchInterrupts();
+  std::optional<OutputFile> json;
+  if (!request.json_file.empty()) json.emplace(request.json_file);
+  constexpr long kStages = 4;
+  long stage = 0;
+  ProgressBar bar("diagnosing", kStages, request.quiet);
+  const Diagnosis diagnosis =
+      Diagnose(model, *engine, request.files.mjcf.string(), request.options, [&](const char*) {
+        bar.Update(stage++);
+        return !IsInterrupted();
+      });
+  bar.Finish();
+  if (json) json->Write(ToText(request, model, diagnosis));
+  if (request.json_file != "-") {
+    if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");
+    Print(request, model, diagnosis);
+  }
+  return diagnosis.agrees ? kSuccess : kDisagreement;
+}
+
+}  // namespace
+
+void AddDiagnoseCommand(CLI::App* app, int* exit_code) {
+  constexpr std::uint64_t kMaxSamples = 1000;
+  const auto request = std::make_shared<Request>();
+  CLI::App* command =
+      app->add_subcommand("diagnose", "Say why model and engine disagree, and what would repair it");
+  AddRobotOptions(command, &request->files);
+  command->add_option("--samples", request->options.samples, "Number of random states")
+      ->type_name("N")
+      ->check(WholeNumber(1, kMaxSamples))
+      ->capture_default_str();
+  command->add_option("--seed", request->options.seed, "Of the random states")
+      ->type_name("N")
+      ->check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
+      ->capture_default_str();
+  command->add_flag("--by-motion", request->options.by_motion,
+                    "Use axes, frames and forces only, not the bodies' masses and inertias in the MJCF");
+  command->add_option("--json", request->json_file, "Write the results to this file (- for standard output)")
+      ->type_name("FILE.json");
+  command->add_flag("--quiet", request->quiet, "No progress, and causes only");
+  command->callback([=] { *exit_code = Run(*request); });
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,253 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/model/parameter_reader.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/json_matrix.h"
+#include "harness/cli/output_file.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/diagnosis/formula_mutants.h"
+#include "harness/engine/engine.h"
+
+namespace dexcheck::cli {
+namespace {
+
+struct Request {
+  RobotFiles files;
+  MutationOptions options;
+  bool no_diagnosis = false;
+  std::string json_file;
+  bool quiet = false;
+};
+
+struct Campaign {
+  std::vector<Mutant> mutants;
+  std::vector<FormulaMutant> formulas;
+  size_t done = 0;
+  size_t formulas_done = 0;
+
+  [[nodiscard]] bool IsComplete() const { return done == mutants.size() && formulas_done == formulas.size(); }
+};
+
+/// A line of the table.
+struct Row {
+  std::string kind;
+  int mutants = 0;
+  int killed = 0;
+  int refused = 0;
+  int no_effect = 0;
+  int survived = 0;
+  int named_first = 0;
+
+  void Add(MutantFate fate, bool named) {
+    ++mutants;
+    killed += fate == MutantFate::kKilled ? 1 : 0;
+    refused += fate == MutantFate::kRefused ? 1 : 0;
+    no_effect += fate == MutantFate::kNoEffect ? 1 : 0;
+    survived += fate == MutantFate::kSurvived ? 1 : 0;
+    named_first += named ? 1 : 0;
+  }
+};
+
+const char* NameOf(MutantFate fate) {
+  switch (fate) {
+    case MutantFate::kKilled:
+      return "killed";
+    case MutantFate::kRefused:
+      return "refused";
+    case MutantFate::kNoEffect:
+      return "no effect";
+    case MutantFate::kSurvived:
+      break;
+  }
+  return "survived";
+}
+
+std::vector<Row> SumUp(const Campaign& campaign) {
+  std::vector<Row> rows;
+  const auto add = [&](const std::string& kind, MutantFate fate, bool named) {
+    auto row = std::find_if(rows.begin(), rows.end(), [&](const Row& r) { return r.kind == kind; });
+    if (row == rows.end()) {
+      row = rows.insert(rows.end(), Row{});
+      row->kind = kind;
+    }
+    row->Add(fate, named);
+  };
+  for (size_t i = 0; i < campaign.done; ++i)
+    add(campaign.mutants[i].kind, campaign.mutants[i].fate, campaign.mutants[i].named_first);
+  for (size_t i = 0; i < campaign.formulas_done; ++i)
+    add("wrong equation", campaign.formulas[i].fate, campaign.formulas[i].localised);
+  return rows;
+}
+
+Row Total(const std::vector<Row>& rows) {
+  Row total;
+  total.kind = "all";
+  for (const Row& row : rows) {
+    total.mutants += row.mutants;
+    total.killed += row.killed;
+    total.refused += row.refused;
+    total.no_effect += row.no_effect;
+    total.survived += row.survived;
+    total.named_first += row.named_first;
+  }
+  return total;
+}
+
+void Print(const Request& request, const Campaign& campaign) {
+  const auto line = [](const Row& row) {
+    fmt::print("{:<34}{:>8}{:>8}{:>9}{:>11}{:>10}{:>13}\n", row.kind, row.mutants, row.killed, row.refused,
+               row.no_effect, row.survived, row.named_first);
+  };
+  const std::vector<Row> rows = SumUp(campaign);
+  const Row total = Total(rows);
+  if (!request.quiet) {
+    fmt::print("{:<34}{:>8}{:>8}{:>9}{:>11}{:>10}{:>13}\n", "what was changed", "mutants", "killed",
+               "refused", "no effect", "survived", "named first");
+    for (const Row& row : rows) line(row);
+    line(total);
+    for (size_t i = 0; i < campaign.done; ++i) {
+      const Mutant& mutant = campaign.mutants[i];
+      if (mutant.fate == MutantFate::kSurvived || mutant.fate == MutantFate::kNoEffect)
+        fmt::print("{}: {}\n", NameOf(mutant.fate), mutant.name);
+      if (request.options.diagnose && mutant.fate == MutantFate::kKilled && !mutant.named_first)
+        fmt::print("not named first: {} ({}); named: {}{}\n", mutant.name, mutant.kind,
+                   mutant.named.empty() ? "nothing" : mutant.named,
+                   mutant.named_equal ? ", which is listed as equal" : "");
+    }
+    for (size_t i = 0; i < campaign.formulas_done; ++i) {
+      const FormulaMutant& mutant = campaign.formulas[i];
+      if (mutant.fate != MutantFate::kKilled)
+        fmt::print("{}: {}\n", NameOf(mutant.fate), mutant.name);
+      else if (!mutant.localised)
+        fmt::print("not named: {}: expected {}, failed {}\n", mutant.name, mutant.first,
+                   mutant.failed_checks);
+    }
+    fmt::print("\n");
+  }
+  if (!campaign.IsComplete()) {
+    fmt::print("INTERRUPTED after {} of {} mutants. So far:\n", campaign.done + campaign.formulas_done,
+               campaign.mutants.size() + campaign.formulas.size());
+  }
+  const int effective = total.mutants - total.refused - total.no_effect;
+  fmt::print("{}: {} of {} mutants that are possible and have an effect were found",
+             total.survived == 0 ? "ALL KILLED" : "SURVIVORS", total.killed, effective);
+  if (request.options.diagnose) fmt::print("; {} named first", total.named_first);
+  fmt::print(".\n");
+}
+
+std::string ToText(const Request& request, const Campaign& campaign) {
+  Json json = {{"robot", request.files.robot.string()}, {"mjcf", request.files.mjcf.string()},
+               {"mujoco", mj_versionString()},          {"scale", request.options.scale},
+               {"samples", request.options.samples},    {"seed", request.options.seed},
+               {"complete", campaign.IsComplete()}};
+  json["kinds"] = Json::object();
+  for (const Row& row : SumUp(campaign)) {
+    json["kinds"][row.kind] = {{"mutants", row.mutants},   {"killed", row.killed},
+                               {"refused", row.refused},   {"no_effect", row.no_effect},
+                               {"survived", row.survived}, {"named_first", row.named_first}};
+  }
+  json["mutants"] = Json::array();
+  for (size_t i = 0; i < campaign.done; ++i) {
+    const Mutant& mutant = campaign.mutants[i];
+    json["mutants"].push_back({{"name", mutant.name},
+                               {"kind", mutant.kind},
+                               {"fate", NameOf(mutant.fate)},
+                               {"failed_checks", mutant.failed_checks},
+                               {"named", mutant.named},
+                               {"named_first", mutant.named_first},
+                               {"named_equal", mutant.named_equal},
+                               {"explained", mutant.explained}});
+  }
+  for (size_t i = 0; i < campaign.formulas_done; ++i) {
+    const FormulaMutant& mutant = campaign.formulas[i];
+    json["mutants"].push_back({{"name", mutant.name},
+                               {"kind", "wrong equation"},
+                               {"fate", NameOf(mutant.fate)},
+                               {"failed_checks", mutant.failed_checks},
+                               {"named_first", mutant.localised}});
+  }
+  return json.dump(2) + "\n";
+}
+
+/// Empty for a number that a mutant can be changed by; what is wrong otherwise.
+std::string CheckScale(const std::string& text) {
+  constexpr double kSmallest = 1e-9;
+  constexpr double kLargest = 0.5;
+  double scale = 0.0;
+  const char* const end = text.data() + text.size();
+  const std::from_chars_result result = std::from_chars(text.data(), end, scale);
+  if (result.ec == std::errc() && result.ptr == end && kSmallest <= scale && scale <= kLargest) return {};
+  return fmt::format("must be a number from {} to {}, got {}", kSmallest, kLargest, Quote(text));
+}
+
+int Run(Request request) {
+  request.options.diagnose = !request.no_diagnosis;
+  const RobotModel model = ReadRobotModel(request.files.robot);
+  const MjModelPtr engine = LoadMjcf(request.files.mjcf);
+  const std::string source = request.files.mjcf.string();
+  const Adapter adapter(model, *engine, source);
+  CatchInterrupts();
+  std::optional<OutputFile> json;
+  if (!request.json_file.empty()) json.emplace(request.json_file);
+  ConsistencyOptions unchanged;
+  unchanged.samples = request.options.samples;
+  unchanged.seed = request.options.seed;
+  if (!CheckConsistency(adapter, unchanged, [](long) { return true; }).Agrees()) {
+    throw InputError(request.files.robot.string() + ": must agree with " + source +
+                     " before it is changed on purpose (see dexcheck diagnose), got a disagreement");
+  }
+
+  Campaign campaign;
+  campaign.mutants = ListMutants(model.spec(), request.options.scale);
+  campaign.formulas = ListFormulaMutants(model);
+  const auto total = static_cast<long>(campaign.mutants.size() + campaign.formulas.size());
+  ProgressBar bar("changing", total, request.quiet);
+  while (campaign.formulas_done < campaign.formulas.size() && !IsInterrupted()) {
+    RunFormulaMutant(adapter, request.options.samples, &campaign.formulas[campaign.formulas_done++]);
+    bar.Update(static_cast<long>(campaign.formulas_done));
+  }
+  while (campaign.done < campaign.mutants.size() && !IsInterrupted()) {
+    RunMutant(model, *engine, source, request.options, &campaign.mutants[campaign.done++]);
+    bar.Update(static_cast<long>(campaign.formulas_done + campaign.done));
+  }
+  bar.Finish();
+  if (json) json->Write(ToText(request, campaign));
+  if (request.json_file != "-") Print(request, campaign);
+  if (Total(SumUp(campaign)).survived > 0) return kDisagreement;
+  return campaign.IsComplete() ? kSuccess : kFailure;
+}
+
+}  // namespace
+
+void AddMutateCommand(CLI::App* app, int* exit_code) {
+  const auto request = std::make_shared<Request>();
+  CLI::App* command = app->add_subcommand(
+      "mutate",
+      "Change every number and equation of the model on purpose: which mistakes are found and named?");
+  AddRobotOptions(command, &request->files);
+  command->add_option("--scale", request->options.scale, "Change of a number, relative to it")
+      ->type_name("X")
+      ->check(CLI::Validator(CheckScale, ""))
+      ->capture_default_str();
+  command->add_option("--samples", request->options.samples, "Random states per mutant")
+      ->type_name("N")
+      ->check(WholeNumber(1, 1000))
+      ->capture_default_str();
+  command->add_flag("--no-diagnosis", request->no_diagnosis, "Only whether each is found, not what is named");
+  command->add_option("--json", request->json_file, "Write the results to this file (- for standard output)")
+      ->type_name("FILE.json");
+  command->add_flag("--quiet", request->quiet, "Print the verdict only");
+  command->callback([=] { *exit_code = Run(*request); });
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,444 @@
+#include "harness/diagnosis/body_fit.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "controller/common/errors.h"
+
+namespace dexcheck {
+namespace {
+
+using Kind = ParameterKind;
+
+// Residuals are relative to their own sizes. Rounding leaves some 1e-12 of a finger's forces.
+constexpr double kRounding = 1e-10;
+constexpr int kMaxNumbers = 24;
+constexpr size_t kRanked = 5;
+
+size_t At(int link) { return static_cast<size_t>(link + 1); }
+
+double Positive(double size) { return size > 0.0 ? size : 1.0; }
+
+const MassProperties& BodyOf(const RobotSpec& spec, int link) {
+  return link < 0 ? spec.base.body : spec.joints[static_cast<size_t>(link)].body;
+}
+
+/// Step of the difference quotient: any for what the rows are linear in, small for centres of mass.
+double CalcColumnStep(const RobotSpec& spec, const Parameter& parameter) {
+  constexpr double kLinear = 1e-3;
+  constexpr double kQuadratic = 1e-6;  // m
+  if (parameter.kind == Kind::kCom) return kQuadratic;
+  if (parameter.kind == Kind::kInertia)
+    return kLinear * Positive(BodyOf(spec, parameter.index).inertia.trace());
+  return kLinear * GetScale(spec, parameter);
+}
+
+/// `spec` with the pads added to every link's principal moments, every armature and every damping.
+RobotSpec Add(RobotSpec spec, const BodyPads& pads) {
+  for (size_t i = 0; i < spec.joints.size(); ++i) {
+    Joint& joint = spec.joints[i];
+    joint.body.inertia += pads.inertia[i + 1] * Matrix3d::Identity();
+    joint.armature += pads.armature[i];
+    joint.damping += pads.damping[i];
+  }
+  spec.base.body.inertia += pads.inertia[0] * Matrix3d::Identity();
+  return spec;
+}
+
+std::optional<RobotModel> TryModel(const RobotSpec& spec) {
+  try {
+    return RobotModel(spec);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+/// Vectors and tensors whose entries are one thing to a reader.
+bool AreOneThing(const Parameter& a, const Parameter& b) { return a.kind == b.kind && a.index == b.index; }
+
+}  // namespace
+
+BodyFit::BodyFit(const RobotSpec& spec, const EngineEvidence& evidence, const mjModel& engine, bool bodies)
+    : spec_(spec), evidence_(&evidence), bodies_(bodies) {
+  SetTarget(engine);
+  candidates_ = ListCandidates();
+  MakePads();
+}
+
+std::vector<Parameter> BodyFit::ListCandidates() const {
+  std::vector<Parameter> candidates;
+  for (const Parameter& parameter : ListParameters(spec_)) {
+    switch (parameter.kind) {
+      case Kind::kCom:
+      case Kind::kInertia:
+        if (BodyOf(spec_, parameter.index).mass > 0.0) candidates.push_back(parameter);
+        break;
+      case Kind::kMass:
+      case Kind::kDamping:
+      case Kind::kArmature:
+      case Kind::kGravity:
+      case Kind::kWheelMass:
+      case Kind::kWheelSpinInertia:
+      case Kind::kWheelTransverseInertia:
+      case Kind::kWheelArmature:
+      case Kind::kWheelDamping:
+        candidates.push_back(parameter);
+        break;
+      default:
+        break;
+    }
+  }
+  return candidates;
+}
+
+void BodyFit::MakePads() {
+  const Snapshot& at = evidence_->snapshots().front();
+  const size_t joints = spec_.joints.size();
+  for (int link = -1; link < static_cast<int>(joints); ++link) {
+    const MassProperties& body = BodyOf(spec_, link);
+    pads_.inertia.push_back(body.mass > 0.0 ? body.inertia.trace() + at.links[At(link)].inertia.trace()
+                                            : 0.0);
+  }
+  for (const Joint& joint : spec_.joints) {
+    pads_.armature.push_back(joint.armature + joint.body.inertia.trace());
+    pads_.damping.push_back(joint.damping + 1.0);
+  }
+  pad_rows_ = CalcRows(RobotModel(Add(spec_, pads_))) - CalcRows(RobotModel(spec_));
+}
+
+void BodyFit::SetTarget(const mjModel& engine) {
+  const RobotModel model(spec_);
+  const int joints = model.num_joints();
+  const Snapshot& at = evidence_->snapshots().front();
+  const VectorXd forces = evidence_->CalcForces(model) + evidence_->CalcForceResidual(model);
+  target_ = forces;
+  if (!bodies_) return;
+
+  // Bodies in their links' frames, joint constants and gravity, each by its own size.
+  const Adapter adapter(model, engine, spec_.source);
+  ModelTerms terms(model);
+  terms.SetState(at.q, at.xi);
+  body_scales_.resize(At(joints));
+  joint_scales_.resize(2 * joints);
+  std::vector<double> rows;
+  for (int link = -1; link < joints; ++link) {
+    const MassProperties& body =
+        link < 0 ? model.base_with_wheels() : model.joints()[static_cast<size_t>(link)].body;
+    const LinkInWorld& there = at.links[At(link)];
+    BodyScale& scale = body_scales_[At(link)];
+    scale.mass = Positive(std::max(body.mass, there.mass));
+    scale.inertia = Positive(std::max(body.inertia.trace(), there.inertia.trace()));
+    scale.length = Positive(std::sqrt(scale.inertia / scale.mass));
+    if (link < 0 && model.base().type == BaseType::kFixed) continue;
+    const Pose X_inverse = terms.CalcLinkPose(link).inverse();
+    const Matrix3d inertia = X_inverse.linear() * there.inertia * X_inverse.linear().transpose();
+    const Vector3d com = there.mass > 0.0 ? Vector3d(X_inverse * there.com) : body.com;
+    rows.push_back(there.mass / scale.mass);
+    for (const double entry : com) rows.push_back(entry / scale.length);
+    for (const int entry : {0, 4, 8, 3, 6, 7}) rows.push_back(inertia.data()[entry] / scale.inertia);
+  }
+  for (int i = 0; i < joints; ++i) {
+    const int dof = adapter.joint_dofs()[static_cast<size_t>(i)];
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    joint_scales_[2 * i] = Positive(std::max(joint.damping, engine.dof_damping[dof]));
+    joint_scales_[2 * i + 1] = Positive(std::max(joint.armature, engine.dof_armature[dof]));
+    rows.push_back(engine.dof_damping[dof] / joint_scales_[2 * i]);
+    rows.push_back(engine.dof_armature[dof] / joint_scales_[2 * i + 1]);
+  }
+  const double g = Positive(model.gravity().norm());
+  for (int k = 0; k < 3; ++k) rows.push_back(engine.opt.gravity[k] / g);
+  joint_scales_.conservativeResize(2 * joints + 1);
+  joint_scales_[2 * joints] = g;
+  target_.conservativeResize(forces.size() + static_cast<Eigen::Index>(rows.size()));
+  target_.tail(static_cast<Eigen::Index>(rows.size())) =
+      Eigen::Map<const VectorXd>(rows.data(), static_cast<Eigen::Index>(rows.size()));
+}
+
+VectorXd BodyFit::CalcRows(const RobotModel& model) const {
+  const VectorXd forces = evidence_->CalcForces(model);
+  if (!bodies_) return forces;
+  VectorXd rows(target_.size());
+  rows.head(forces.size()) = forces;
+  Eigen::Index row = forces.size();
+  const int joints = model.num_joints();
+  for (int link = model.base().type == BaseType::kFixed ? 0 : -1; link < joints; ++link) {
+    const MassProperties& body =
+        link < 0 ? model.base_with_wheels() : model.joints()[static_cast<size_t>(link)].body;
+    const BodyScale& scale = body_scales_[At(link)];
+    rows[row++] = body.mass / scale.mass;
+    for (const double entry : body.com) rows[row++] = entry / scale.length;
+    for (const int entry : {0, 4, 8, 3, 6, 7}) rows[row++] = body.inertia.data()[entry] / scale.inertia;
+  }
+  for (int i = 0; i < joints; ++i) {
+    rows[row++] = model.joints()[static_cast<size_t>(i)].damping / joint_scales_[2 * i];
+    rows[row++] = model.joints()[static_cast<size_t>(i)].armature / joint_scales_[2 * i + 1];
+  }
+  for (const double entry : model.gravity()) rows[row++] = entry / joint_scales_[2 * joints];
+  return rows;
+}
+
+VectorXd BodyFit::CalcResidual(const RobotSpec& spec) const {
+  const std::optional<RobotModel> model = TryModel(Add(spec, pads_));
+  if (!model) return VectorXd::Constant(target_.size(), std::numeric_limits<double>::infinity());
+  return target_ - (CalcRows(*model) - pad_rows_);
+}
+
+MatrixXd BodyFit::CalcColumns(const RobotSpec& spec, const std::vector<Parameter>& parameters) const {
+  RobotSpec trial = Add(spec, pads_);
+  MatrixXd columns = MatrixXd::Zero(target_.size(), static_cast<Eigen::Index>(parameters.size()));
+  const std::optional<RobotModel> here = TryModel(trial);
+  if (!here) return columns;
+  const VectorXd rows = CalcRows(*here);
+  for (size_t i = 0; i < parameters.size(); ++i) {
+    const double value = GetValue(trial, parameters[i]);
+    const double step = CalcColumnStep(spec, parameters[i]);
+    SetValue(&trial, parameters[i], value + step);
+    const std::optional<RobotModel> there = TryModel(trial);
+    if (there) columns.col(static_cast<Eigen::Index>(i)) = (CalcRows(*there) - rows) / step;
+    SetValue(&trial, parameters[i], value);
+  }
+  return columns;
+}
+
+BodyFit::Solution BodyFit::Solve(const std::vector<Parameter>& parameters) const {
+  constexpr int kMaxIterations = 8;
+  constexpr double kConverged = 1e-13;
+  Solution solution;
+  solution.parameters = parameters;
+  solution.repaired = spec_;
+  VectorXd residual = residual_;
+  const auto count = static_cast<Eigen::Index>(parameters.size());
+  VectorXd scale(count);
+  for (Eigen::Index i = 0; i < count; ++i) scale[i] = GetScale(spec_, parameters[static_cast<size_t>(i)]);
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    const MatrixXd columns = CalcColumns(solution.repaired, parameters) * scale.asDiagonal();
+    const VectorXd step = columns.completeOrthogonalDecomposition().solve(residual);
+    RobotSpec next = solution.repaired;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Parameter& parameter = parameters[static_cast<size_t>(i)];
+      const double value = GetValue(next, parameter) + step[i] * scale[i];
+      constexpr double kNothing = 1e-9;  // what should be zero must not become a negative mass
+      SetValue(&next, parameter, std::abs(value) < kNothing * scale[i] ? 0.0 : value);
+    }
+    const VectorXd after = CalcResidual(next);
+    if (!(after.squaredNorm() <= residual.squaredNorm())) break;
+    solution.repaired = std::move(next);
+    residual = after;
+    if (step.cwiseAbs().maxCoeff() < kConverged) break;
+  }
+  solution.worst = residual.cwiseAbs().maxCoeff();
+  solution.squared = residual.squaredNorm();
+  return solution;
+}
+
+bool BodyFit::FindSolution(std::vector<Solution>* solutions) {
+  const auto count = static_cast<Eigen::Index>(candidates_.size());
+  const VectorXd norms = columns_.colwise().norm().transpose();
+  const auto keep_solved = [&](const std::vector<std::vector<Parameter>>& sets) {
+    for (const std::vector<Parameter>& set : sets) {
+      Solution solution = Solve(set);
+      DropUnchanged(&solution);
+      if (solution.worst <= kRounding) solutions->push_back(std::move(solution));
+    }
+    return !solutions->empty();
+  };
+  const auto best_of = [](VectorXd score, size_t wanted) {
+    std::vector<Eigen::Index> order(static_cast<size_t>(score.size()));
+    std::iota(order.begin(), order.end(), 0);
+    wanted = std::min(wanted, order.size());
+    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(wanted), order.end(),
+                      [&](Eigen::Index a, Eigen::Index b) { return score[a] > score[b]; });
+    order.resize(wanted);
+    return order;
+  };
+  /// Squared length that each column takes from a residual, after the part along `first` has been taken.
+  const auto gain = [&](const VectorXd& residual, const VectorXd* first) {
+    VectorXd products = columns_.transpose() * residual;
+    VectorXd squares = norms.cwiseAbs2();
+    if (first != nullptr) squares -= (columns_.transpose() * *first).cwiseAbs2();
+    for (Eigen::Index i = 0; i < count; ++i) {
+      constexpr double kDependent = 1e-10;
+      products[i] =
+          squares[i] > kDependent * norms[i] * norms[i] ? products[i] * products[i] / squares[i] : 0.0;
+    }
+    return products;
+  };
+
+  constexpr size_t kSingles = 8;
+  constexpr size_t kFirsts = 24;
+  constexpr size_t kPairs = 8;
+  const VectorXd single = gain(residual_, nullptr);
+  std::vector<std::vector<Parameter>> sets;
+  for (const Eigen::Index i : best_of(single, kSingles)) {
+    const Parameter& parameter = candidates_[static_cast<size_t>(i)];
+    sets.push_back({parameter});
+    if (ranking_.size() < kRanked && single[i] > 0.0) {
+      Cause cause;
+      cause.parameters = {parameter};
+      cause.values = {GetValue(spec_, parameter) +
+                      columns_.col(i).dot(residual_) / norms[i] / norms[i] * GetScale(spec_, parameter)};
+      ranking_.emplace_back(cause, single[i] / residual_.squaredNorm());
+    }
+  }
+  if (keep_solved(sets)) return true;
+
+  struct Pair {
+    Eigen::Index first, second;
+    double gain;
+  };
+  std::vector<Pair> pairs;
+  for (const Eigen::Index i : best_of(single, kFirsts)) {
+    if (!(norms[i] > 0.0)) continue;
+    const VectorXd direction = columns_.col(i) / norms[i];
+    const VectorXd rest = residual_ - direction.dot(residual_) * direction;
+    const VectorXd more = gain(rest, &direction);
+    for (const Eigen::Index j : best_of(more, 2)) pairs.push_back({i, j, single[i] + more[j]});
+  }
+  std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.gain > b.gain; });
+  sets.clear();
+  for (const Pair& pair : pairs) {
+    if (sets.size() == kPairs) break;
+    sets.push_back(
+        {candidates_[static_cast<size_t>(pair.first)], candidates_[static_cast<size_t>(pair.second)]});
+  }
+  if (keep_solved(sets)) return true;
+
+  // Whole vectors and tensors, then all that is one link's.
+  std::vector<std::pair<double, std::vector<Parameter>>> groups;
+  const auto add_group = [&](const auto& same) {
+    for (size_t i = 0; i < candidates_.size(); ++i) {
+      std::vector<Parameter> group;
+      std::vector<Eigen::Index> places;
+      for (size_t j = 0; j < candidates_.size(); ++j) {
+        if (!same(candidates_[i], candidates_[j])) continue;
+        group.push_back(candidates_[j]);
+        places.push_back(static_cast<Eigen::Index>(j));
+      }
+      if (group.size() < 2 || !(group.front() == candidates_[i])) continue;
+      const MatrixXd columns = columns_(Eigen::all, places);
+      const VectorXd fitted = columns * columns.colPivHouseholderQr().solve(residual_);
+      groups.emplace_back(fitted.squaredNorm(), group);
+    }
+    std::stable_sort(groups.begin(), groups.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    sets.clear();
+    for (size_t i = 0; i < std::min(groups.size(), size_t{3}); ++i) sets.push_back(groups[i].second);
+    groups.clear();
+    return keep_solved(sets);
+  };
+  return add_group(AreOneThing);
+}
+
+BodyFit::Solution BodyFit::Grow() const {
+  // Orthogonal matching pursuit, each step solved exactly.
+  Solution solution;
+  solution.repaired = spec_;
+  solution.worst = residual_.cwiseAbs().maxCoeff();
+  solution.squared = residual_.squaredNorm();
+  std::vector<Parameter> chosen;
+  while (chosen.size() < kMaxNumbers && solution.worst > kRounding) {
+    const VectorXd residual = CalcResidual(solution.repaired);
+    VectorXd gains = (columns_.transpose() * residual).cwiseAbs2();
+    for (Eigen::Index i = 0; i < gains.size(); ++i) {
+      const double square = columns_.col(i).squaredNorm();
+      const bool taken =
+          std::find(chosen.begin(), chosen.end(), candidates_[static_cast<size_t>(i)]) != chosen.end();
+      gains[i] = square > 0.0 && !taken ? gains[i] / square : 0.0;
+    }
+    Eigen::Index best = 0;
+    if (!(gains.maxCoeff(&best) > 0.0)) break;
+    // A vector or tensor at once: half a tensor repaired may be no tensor.
+    for (const Parameter& parameter : candidates_) {
+      if (AreOneThing(parameter, candidates_[static_cast<size_t>(best)])) chosen.push_back(parameter);
+    }
+    Solution next = Solve(chosen);
+    if (!(next.squared < solution.squared)) break;
+    solution = std::move(next);
+  }
+  DropUnchanged(&solution);
+  return solution;
+}
+
+void BodyFit::DropUnchanged(Solution* solution) const {
+  constexpr double kUnchanged = 1e-9;
+  std::erase_if(solution->parameters, [&](const Parameter& parameter) {
+    const double change = GetValue(solution->repaired, parameter) - GetValue(spec_, parameter);
+    const double size = parameter.kind == Kind::kInertia ? BodyOf(spec_, parameter.index).inertia.trace()
+                                                         : GetScale(spec_, parameter);
+    const bool unchanged = std::abs(change) <= kUnchanged * size;
+    if (unchanged) SetValue(&solution->repaired, parameter, GetValue(spec_, parameter));
+    return unchanged;
+  });
+}
+
+Cause BodyFit::ToCause(const Solution& solution) const {
+  Cause cause;
+  cause.parameters = solution.parameters;
+  for (const Parameter& parameter : solution.parameters)
+    cause.values.push_back(GetValue(solution.repaired, parameter));
+  return cause;
+}
+
+void BodyFit::MergeScaledBodies(std::vector<Cause>* causes) const {
+  constexpr double kSame = 1e-8;
+  for (size_t i = 0; i < causes->size(); ++i) {
+    const Parameter mass = (*causes)[i].parameters.front();
+    if (mass.kind != Kind::kMass || !(GetValue(spec_, mass) > 0.0)) continue;
+    const auto inertia = std::find_if(causes->begin(), causes->end(), [&](const Cause& cause) {
+      return cause.parameters.front().kind == Kind::kInertia && cause.parameters.front().index == mass.index;
+    });
+    if (inertia == causes->end()) continue;
+    const double ratio = (*causes)[i].values.front() / GetValue(spec_, mass);
+    RobotSpec scaled = spec_;
+    Apply(*inertia, &scaled);
+    const Matrix3d expected = ratio * BodyOf(spec_, mass.index).inertia;
+    if ((BodyOf(scaled, mass.index).inertia - expected).norm() > kSame * expected.norm()) continue;
+    Cause& whole = (*causes)[i];
+    whole.parameters.insert(whole.parameters.end(), inertia->parameters.begin(), inertia->parameters.end());
+    whole.values.insert(whole.values.end(), inertia->values.begin(), inertia->values.end());
+    const bool before = static_cast<size_t>(inertia - causes->begin()) < i;
+    causes->erase(inertia);
+    if (before) --i;
+  }
+}
+
+std::vector<Cause> BodyFit::Run() {
+  residual_ = CalcResidual(spec_);
+  if (!(residual_.cwiseAbs().maxCoeff() > kRounding)) return {};
+  columns_ = CalcColumns(spec_, candidates_);
+  for (size_t i = 0; i < candidates_.size(); ++i)
+    columns_.col(static_cast<Eigen::Index>(i)) *= GetScale(spec_, candidates_[i]);
+
+  std::vector<Solution> solutions;
+  if (!FindSolution(&solutions)) solutions = {Grow()};
+  std::vector<Cause> whole;
+  for (const Solution& solution : solutions) whole.push_back(ToCause(solution));
+  std::vector<size_t> order(whole.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return IsLikelier(whole[a], whole[b], spec_); });
+  const Solution& chosen = solutions[order.front()];
+
+  // One cause for each thing that is changed.
+  std::vector<Cause> causes;
+  for (size_t i = 0; i < chosen.parameters.size(); ++i) {
+    const Parameter& parameter = chosen.parameters[i];
+    const auto same = std::find_if(causes.begin(), causes.end(), [&](const Cause& cause) {
+      return AreOneThing(cause.parameters.front(), parameter);
+    });
+    Cause& cause = same == causes.end() ? causes.emplace_back() : *same;
+    cause.parameters.push_back(parameter);
+    cause.values.push_back(GetValue(chosen.repaired, parameter));
+  }
+  MergeScaledBodies(&causes);
+  if (causes.size() == 1) {
+    for (size_t i = 1; i < order.size(); ++i) causes.front().equivalents.push_back(whole[order[i]]);
+  }
+  spec_ = chosen.repaired;
+  return causes;
+}
+
+}  // namespace dexcheck

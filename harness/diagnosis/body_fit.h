@@ -1,0 +1,82 @@
+#pragma once
+
+// Errors of masses, centres of mass, inertias, armature, damping and gravity, solved for by linear
+// regression.
+
+#include <utility>
+#include <vector>
+
+#include "harness/diagnosis/cause.h"
+#include "harness/diagnosis/evidence.h"
+
+namespace dexcheck {
+
+/// Constants added to inertias, armatures and dampings, so that a trial is a possible robot even while it is
+/// solved for. The residuals are linear in them, so what the pads do can be taken off again.
+struct BodyPads {
+  std::vector<double> inertia;   ///< Base first; to all three moments, kg m^2.
+  std::vector<double> armature;  ///< By joint.
+  std::vector<double> damping;   ///< By joint.
+};
+
+/// Explains what the forces disagree in by the numbers that they are linear in (centres of mass: quadratic,
+/// solved by iteration). A single number that explains all is taken before two, two before a vector, a vector
+/// before many.
+class BodyFit {
+ public:
+  /// @param spec has the right geometry. @param evidence was taken with it and must outlive this.
+  /// @param bodies whether the engine's masses, centres of mass, inertias and joint constants may be read
+  /// besides the
+  ///   forces that follow from them. Without, what forces do not show stays unknown.
+  BodyFit(const RobotSpec& spec, const EngineEvidence& evidence, const mjModel& engine, bool bodies);
+
+  /// Causes, the one that explains most first.
+  std::vector<Cause> Run();
+  [[nodiscard]] const RobotSpec& repaired() const { return spec_; }
+  /// Single numbers by the share of the disagreement that each explains by itself, the first few, before any
+  /// repair.
+  [[nodiscard]] const std::vector<std::pair<Cause, double>>& ranking() const { return ranking_; }
+
+ private:
+  struct Solution {
+    std::vector<Parameter> parameters;
+    RobotSpec repaired;
+    double worst = 0.0;  ///< Largest entry of the residual that is left.
+    double squared = 0.0;
+  };
+  /// What a body's numbers are compared with: mass, trace of the inertia, radius of gyration.
+  struct BodyScale {
+    double mass = 1.0;
+    double inertia = 1.0;
+    double length = 1.0;
+  };
+  void SetTarget(const mjModel& engine);
+  void MakePads();
+  [[nodiscard]] VectorXd CalcRows(const RobotModel& model) const;
+  [[nodiscard]] VectorXd CalcResidual(const RobotSpec& spec) const;
+  [[nodiscard]] MatrixXd CalcColumns(const RobotSpec& spec, const std::vector<Parameter>& parameters) const;
+  [[nodiscard]] Solution Solve(const std::vector<Parameter>& parameters) const;
+  [[nodiscard]] std::vector<Parameter> ListCandidates() const;
+  [[nodiscard]] bool FindSolution(std::vector<Solution>* solutions);
+  [[nodiscard]] Solution Grow() const;
+  /// Takes numbers from a solution that it leaves as they were.
+  void DropUnchanged(Solution* solution) const;
+  /// Makes one cause of a mass and an inertia that grow alike: a solid of another mass.
+  void MergeScaledBodies(std::vector<Cause>* causes) const;
+  [[nodiscard]] Cause ToCause(const Solution& solution) const;
+
+  RobotSpec spec_;
+  const EngineEvidence* evidence_;
+  bool bodies_;
+  std::vector<BodyScale> body_scales_;  // base first
+  VectorXd joint_scales_;               // damping, armature of each joint; gravity
+  VectorXd target_;
+  BodyPads pads_;
+  VectorXd pad_rows_;
+  std::vector<Parameter> candidates_;
+  MatrixXd columns_;  // at spec_, of all candidates
+  VectorXd residual_;
+  std::vector<std::pair<Cause, double>> ranking_;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,189 @@
+#include "harness/diagnosis/cause.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+
+namespace dexcheck {
+namespace {
+
+constexpr int kManyDigits = 9;
+
+Joint& JointOf(RobotSpec* spec, int joint) { return spec->joints[static_cast<size_t>(joint)]; }
+
+/// A mass, and with it the inertia: the only causes of several kinds.
+bool IsBodyScaled(const Cause& cause) {
+  return cause.parameters.size() > 1 && cause.parameters[0].kind == ParameterKind::kMass;
+}
+
+void TurnBody(const Matrix3d& R, MassProperties* body) {
+  body->com = R * body->com;
+  body->inertia = R * body->inertia * R.transpose();
+}
+
+/// "1.9 kg", "-90 deg"; rounding errors of a solved value are not printed.
+std::string FormatValue(const RobotSpec& spec, const Parameter& parameter, double value) {
+  double printed = ToPrinted(spec, parameter, value);
+  if (std::abs(value) < 1e-12 * GetScale(spec, parameter)) printed = 0.0;
+  const std::string unit = UnitOf(spec, parameter);
+  return fmt::format("{:.{}g}{}{}", printed, kManyDigits + 1, unit.empty() ? "" : " ", unit);
+}
+
+std::string FormatValues(const RobotSpec& spec, const std::vector<Parameter>& parameters,
+                         const std::vector<double>& values) {
+  std::string text;
+  for (size_t i = 0; i < parameters.size(); ++i) {
+    text += (i == 0 ? "" : ", ") + (parameters.size() > 1 ? DescribeQuantity(parameters[i]) + " " : "") +
+            FormatValue(spec, parameters[i], values[i]);
+  }
+  return text;
+}
+
+std::string DescribeWhat(const Cause& cause) {
+  if (IsBodyScaled(cause)) return DescribeQuantity(cause.parameters[0]);
+  return cause.parameters.size() == 1 ? DescribeQuantity(cause.parameters[0])
+                                      : DescribeGroup(cause.parameters[0]);
+}
+
+}  // namespace
+
+void ReverseAxis(RobotSpec* spec, int joint) {
+  // With F a half turn about the row's x axis after Rot(x, alpha) and F^-1 F = 1 between joint and link:
+  //   Rot(z, q0 - q) Trans(z, d) F = F Rot(z, -q0 + q) Trans(z, -d)
+  const Matrix3d F = Vector3d(1.0, -1.0, -1.0).asDiagonal();
+  Joint& turned = JointOf(spec, joint);
+  turned.mdh.alpha += turned.mdh.alpha > 0.0 ? -kPi : kPi;
+  turned.mdh.q = -turned.mdh.q;
+  turned.mdh.d = -turned.mdh.d;
+  TurnBody(F, &turned.body);
+  const auto turn = [&](Pose* X) {
+    X->linear() = F * X->linear();
+    X->translation() = F * X->translation();
+  };
+  for (Joint& child : spec->joints) {
+    if (child.parent == joint) turn(&child.X_PB);
+  }
+  for (Frame& frame : spec->frames) {
+    if (frame.link == joint) turn(&frame.X_LF);
+  }
+}
+
+void SwapRows(RobotSpec* spec, int joint, int other) {
+  std::swap(JointOf(spec, joint).mdh, JointOf(spec, other).mdh);
+}
+
+void SwapPoses(RobotSpec* spec, int joint, int other) {
+  std::swap(JointOf(spec, joint).X_PB, JointOf(spec, other).X_PB);
+}
+
+void Apply(const Cause& cause, RobotSpec* spec) {
+  switch (cause.kind) {
+    case CauseKind::kParameters:
+      for (size_t i = 0; i < cause.parameters.size(); ++i)
+        SetValue(spec, cause.parameters[i], cause.values[i]);
+      return;
+    case CauseKind::kAxisReversed:
+      return ReverseAxis(spec, cause.joint);
+    case CauseKind::kRowsSwapped:
+      return SwapRows(spec, cause.joint, cause.other);
+    case CauseKind::kPosesSwapped:
+      return SwapPoses(spec, cause.joint, cause.other);
+    case CauseKind::kEngineOnly:
+      return;
+  }
+}
+
+std::string DescribeShort(const Cause& cause, const RobotSpec& spec) {
+  const auto name = [&](int joint) { return spec.joints[static_cast<size_t>(joint)].name; };
+  switch (cause.kind) {
+    case CauseKind::kParameters:
+      return DescribePart(spec, cause.parameters[0]) + ": " + DescribeWhat(cause);
+    case CauseKind::kAxisReversed:
+      return "joint " + name(cause.joint) + ": sign of the axis";
+    case CauseKind::kRowsSwapped:
+      return "joints " + name(cause.joint) + " and " + name(cause.other) + ": rows exchanged";
+    case CauseKind::kPosesSwapped:
+      return "joints " + name(cause.joint) + " and " + name(cause.other) + ": places exchanged";
+    case CauseKind::kEngineOnly:
+      break;
+  }
+  return cause.note;
+}
+
+std::string Describe(const Cause& cause, const RobotSpec& spec, const std::string& file) {
+  switch (cause.kind) {
+    case CauseKind::kParameters: {
+      if (IsBodyScaled(cause)) {
+        const Parameter& mass = cause.parameters[0];
+        return fmt::format("{} {} in {}, {} repairs it, with the inertia in proportion",
+                           DescribeShort(cause, spec), FormatValue(spec, mass, GetValue(spec, mass)), file,
+                           FormatValue(spec, mass, cause.values[0]));
+      }
+      std::vector<double> found;
+      for (const Parameter& parameter : cause.parameters) found.push_back(GetValue(spec, parameter));
+      return fmt::format("{} {} in {}, {} repairs it", DescribeShort(cause, spec),
+                         FormatValues(spec, cause.parameters, found), file,
+                         FormatValues(spec, cause.parameters, cause.values));
+    }
+    case CauseKind::kAxisReversed:
+      return fmt::format("{}: turns the other way in {}; its axis reversed repairs it",
+                         DescribeShort(cause, spec), file);
+    case CauseKind::kRowsSwapped:
+    case CauseKind::kPosesSwapped:
+      return fmt::format("{} in {}; exchanging them repairs it", DescribeShort(cause, spec), file);
+    case CauseKind::kEngineOnly:
+      break;
+  }
+  return cause.note;
+}
+
+namespace {
+
+/// The number with the fewest digits within what solving leaves open, and how many it has.
+std::pair<double, int> Round(double number) {
+  constexpr double kSolved = 1e-10;
+  for (int digits = 1; digits < kManyDigits; ++digits) {
+    const double rounded = std::stod(fmt::format("{:.{}e}", number, digits - 1));
+    if (std::abs(rounded - number) < kSolved * std::abs(number)) return {rounded, digits};
+  }
+  return {number, kManyDigits};
+}
+
+bool IsNothing(const RobotSpec& spec, const Parameter& parameter, double value) {
+  return std::abs(value) < 1e-11 * GetScale(spec, parameter);
+}
+
+}  // namespace
+
+int CountDigits(const RobotSpec& spec, const Parameter& parameter, double value) {
+  if (IsNothing(spec, parameter, value)) return 0;
+  return std::min(Round(value).second, Round(ToPrinted(spec, parameter, value)).second);
+}
+
+double RoundSolved(const RobotSpec& spec, const Parameter& parameter, double value) {
+  if (IsNothing(spec, parameter, value)) return 0.0;
+  const auto [rounded, digits] = Round(value);
+  if (!IsAngle(spec, parameter)) return rounded;
+  const auto [degrees, degree_digits] = Round(RadToDeg(value));
+  return degree_digits <= digits && degree_digits < kManyDigits ? DegToRad(degrees) : rounded;
+}
+
+bool IsLikelier(const Cause& a, const Cause& b, const RobotSpec& spec) {
+  const auto rank = [&](const Cause& cause) {
+    int digits = 0;
+    int zeros = 0;
+    int kind = -1;
+    for (size_t i = 0; i < cause.parameters.size(); ++i) {
+      digits += CountDigits(spec, cause.parameters[i], cause.values[i]);
+      zeros += GetValue(spec, cause.parameters[i]) == 0.0 ? 1 : 0;
+      kind = static_cast<int>(cause.parameters[i].kind);
+    }
+    return std::tuple(cause.parameters.size(), zeros, digits, kind);
+  };
+  return rank(a) < rank(b);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,58 @@
+#pragma once
+
+// A change of the analytic model that would make it agree with the engine.
+
+#include <string>
+#include <vector>
+
+#include "harness/diagnosis/parameters.h"
+
+namespace dexcheck {
+
+enum class CauseKind {
+  kParameters,    ///< One number, or several of one vector or tensor.
+  kAxisReversed,  ///< A joint turns (or slides) the other way.
+  kRowsSwapped,   ///< The MDH rows of two joints are exchanged.
+  kPosesSwapped,  ///< The places where two joints start on their parents are exchanged.
+  kEngineOnly,    ///< The MJCF has something that the analytic model cannot have.
+};
+
+struct Cause {
+  CauseKind kind = CauseKind::kParameters;
+  std::vector<Parameter>
+      parameters;  ///< kParameters: what to change (a mass first when its inertia scales with it),
+  std::vector<double> values;  ///< and the values that repair it.
+  int joint = -1;              ///< kAxisReversed and the swaps.
+  int other = -1;              ///< The swaps.
+  std::string note;            ///< kEngineOnly, in words.
+
+  double explained = 0.0;  ///< Share of all residuals that the repair removes, after the causes before it.
+  double explained_of_forces = 0.0;  ///< The same of the forces alone.
+  std::vector<Cause> equivalents;    ///< Other repairs that remove just as much.
+};
+
+/// The repair.
+void Apply(const Cause& cause, RobotSpec* spec);
+
+/// "link r_forearm: mass 1.9 kg in FILE, 1.998 kg repairs it". `spec` is the model as it is in the file.
+std::string Describe(const Cause& cause, const RobotSpec& spec, const std::string& file);
+/// "link r_forearm: mass".
+std::string DescribeShort(const Cause& cause, const RobotSpec& spec);
+
+/// The joint turns the other way: q_i becomes -q_i, and at q_i = 0 nothing moves.
+void ReverseAxis(RobotSpec* spec, int joint);
+void SwapRows(RobotSpec* spec, int joint, int other);
+void SwapPoses(RobotSpec* spec, int joint, int other);
+
+/// Decimal digits that the value needs, in the units of a parameter file; 0 for zero. People write few.
+int CountDigits(const RobotSpec& spec, const Parameter& parameter, double value);
+
+/// A solved value as a person would have written it, when that is within the accuracy of solving; else as it
+/// is.
+double RoundSolved(const RobotSpec& spec, const Parameter& parameter, double value);
+
+/// Of repairs that remove as much, the likelier: whose numbers are rounder, then whose numbers are not zero
+/// in the file, then the earlier kind.
+bool IsLikelier(const Cause& a, const Cause& b, const RobotSpec& spec);
+
+}  // namespace dexcheck

@@ -1,0 +1,42 @@
+#pragma once
+
+// Why model and engine disagree: the fewest changes of the analytic model after which they agree.
+
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "harness/checks/consistency.h"
+#include "harness/diagnosis/cause.h"
+
+namespace dexcheck {
+
+struct DiagnosisOptions {
+  int samples = 6;  ///< Random states; each gives some hundred residuals.
+  std::uint64_t seed = 1;
+  /// Use axes, frames and forces alone, not the engine's masses, centres of mass, inertias and joint
+  /// constants: what would be known of a robot that can only be moved.
+  bool by_motion = false;
+};
+
+struct Diagnosis {
+  bool agrees = true;
+  std::vector<Cause> causes;  ///< The one that explains most first.
+  double explained = 0.0;     ///< Share of all residuals, squared and scaled, that they explain together.
+  double explained_of_forces = 0.0;
+  std::vector<std::pair<Cause, double>>
+      ranking;  ///< Single numbers by the share of the bodies' residuals explained.
+  std::vector<GateFinding> remaining_constants;  ///< What disagrees after all repairs.
+  std::vector<CheckRecord> remaining_terms;      ///< Failed checks after all repairs.
+  RobotSpec repaired;
+};
+
+/// Compares, and explains what differs. Stages, each with what was found before repaired: what only the MJCF
+/// has; constants that no motion shows (ranges, radii, the object); geometry from the base outward; bodies,
+/// joint constants and gravity by regression. @throws InputError when model and engine do not match.
+/// @param progress called between stages with what follows; its false ends the work with what there is.
+Diagnosis Diagnose(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
+                   const DiagnosisOptions& options, const std::function<bool(const char*)>& progress);
+
+}  // namespace dexcheck

@@ -1,0 +1,57 @@
+#pragma once
+
+// What the engine says of the robot at a few random states, kept so that many variants of the analytic model
+// can be held against it.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "harness/engine/engine_terms.h"
+
+namespace dexcheck {
+
+/// The engine's robot at one state. Vectors of links begin with the base's.
+struct Snapshot {
+  VectorXd q;
+  VectorXd xi;
+  MatrixXd probes;                ///< Two accelerations, n x 2, of a size that moves each coordinate alike.
+  std::vector<Vector3d> axes;     ///< Direction of each joint's axis, world.
+  std::vector<Vector3d> anchors;  ///< A point on it, m, world.
+  std::vector<Pose> frames;       ///< Of each named frame, world.
+  std::vector<LinkInWorld> links;
+  VectorXd forces;  ///< As CalcForces, unscaled.
+};
+
+/// Snapshots at random states, and the analytic model's forces in the same order and scale.
+class EngineEvidence {
+ public:
+  /// @throws InputError when model and engine do not match.
+  EngineEvidence(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
+                 int samples, std::uint64_t seed);
+
+  [[nodiscard]] const std::vector<Snapshot>& snapshots() const { return snapshots_; }
+  /// Largest distance of a point of the robot from its base, m.
+  [[nodiscard]] double length() const { return length_; }
+
+  /// Forces that a variant of the model needs at the states: for each, M times the probes, C xi, gravity,
+  /// friction. Each is divided by the root of the engine's M_ii and by the block's size, friction by the
+  /// joint's own: of order 1 for finger and platform alike.
+  [[nodiscard]] VectorXd CalcForces(const RobotModel& variant) const;
+  /// The engine's forces in the same scale minus the variant's.
+  [[nodiscard]] VectorXd CalcForceResidual(const RobotModel& variant) const;
+
+ private:
+  static VectorXd CollectForces(const MatrixXd& M, const Snapshot& at, const VectorXd& coriolis,
+                                const VectorXd& gravity, const VectorXd& friction);
+  [[nodiscard]] VectorXd CalcRawForces(const RobotModel& variant) const;
+  void CalcScales(const RobotModel& model);
+
+  std::vector<Snapshot> snapshots_;
+  std::vector<VectorXd> mass_roots_;  // roots of the engine's M_ii at each snapshot
+  VectorXd engine_forces_;            // scaled
+  VectorXd scale_;                    // what CalcRawForces is multiplied by
+  double length_ = 0.0;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,34 @@
+#pragma once
+
+// Wrong equations made on purpose, which no parameter can express: put in the checks' way in place of the
+// model's.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "harness/checks/contact_check.h"
+#include "harness/diagnosis/mutation.h"
+
+namespace dexcheck {
+
+/// A wrong equation, and which checks found it.
+struct FormulaMutant {
+  std::string name;            ///< "Coriolis terms dropped".
+  std::string first;           ///< The check that a mistake of this kind should fail.
+  ConsistencyOptions options;  ///< With the mistake in make_view or object.
+  ContactFormulas contact;     ///< Or here,
+  bool of_contact = false;     ///< and then only the contact check is run.
+  bool of_model = false;       ///< The mistake is in make_view.
+  MutantFate fate = MutantFate::kSurvived;
+  std::string failed_checks;  ///< Names, separated by blanks.
+  bool localised = false;     ///< `first` is among them, or is the first of them in the table.
+};
+
+/// All that apply to the model: those of the object and of contacts need an object and fingertips.
+std::vector<FormulaMutant> ListFormulaMutants(const RobotModel& model);
+
+/// Runs the checks on the wrong equation.
+void RunFormulaMutant(const Adapter& adapter, int samples, FormulaMutant* mutant);
+
+}  // namespace dexcheck

@@ -1,0 +1,230 @@
+#include "harness/diagnosis/mutation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "controller/common/errors.h"
+#include "harness/diagnosis/placement.h"
+
+namespace dexcheck {
+namespace {
+
+using Kind = ParameterKind;
+
+Joint& JointOf(RobotSpec* spec, int joint) { return spec->joints[static_cast<size_t>(joint)]; }
+
+std::optional<RobotModel> TryModel(const RobotSpec& spec) {
+  try {
+    return RobotModel(spec);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+class MutantList {
+ public:
+  explicit MutantList(const RobotSpec& spec) : spec_(spec) {}
+
+  void AddParameters(double scale) {
+    for (const Parameter& parameter : ListParameters(spec_)) {
+      const double value = GetValue(spec_, parameter);
+      double change = scale * GetScale(spec_, parameter);
+      // An inertia at the edge of what is possible may be changed to one side only.
+      const auto changed_by = [&](double by) {
+        RobotSpec changed = spec_;
+        SetValue(&changed, parameter, value + by);
+        return changed;
+      };
+      if (!TryModel(changed_by(change)) && TryModel(changed_by(-change))) change = -change;
+      Mutant& mutant = Add(DescribeGroup(parameter), {parameter});
+      mutant.change = [parameter, value, change](RobotSpec* spec) {
+        SetValue(spec, parameter, value + change);
+      };
+    }
+  }
+
+  void AddStructure() {
+    const int joints = static_cast<int>(spec_.joints.size());
+    for (int i = 0; i < joints; ++i) {
+      const Joint& joint = spec_.joints[static_cast<size_t>(i)];
+      AddStructural("axis reversed", CauseKind::kAxisReversed, i, -1);
+      AddShift("alpha a quarter turn off", {Kind::kAlpha, i, 0}, 0.5 * kPi);
+      AddShift("home angle a quarter turn off", {Kind::kHomeAngle, i, 0}, 0.5 * kPi);
+      if (joint.parent >= 0) AddStructural("rows exchanged", CauseKind::kRowsSwapped, joint.parent, i);
+      for (int j = i + 1; j < joints; ++j) {
+        if (spec_.joints[static_cast<size_t>(j)].parent == joint.parent)
+          AddStructural("places exchanged", CauseKind::kPosesSwapped, i, j);
+      }
+      AddShift("armature missing", {Kind::kArmature, i, 0}, -joint.armature);
+      AddShift("damping missing", {Kind::kDamping, i, 0}, -joint.damping);
+      AddScaledBody(i);
+      AddBody("inertia about the frame's origin", i, [](MassProperties* body) {
+        const Matrix3d c = Skew(body->com);
+        body->inertia -= body->mass * c * c;
+      });
+      AddBody("products of inertia negated", i, [](MassProperties* body) {
+        const Matrix3d moments = body->inertia.diagonal().asDiagonal();
+        body->inertia = 2.0 * moments - body->inertia;
+      });
+      AddBody("inertia with x and z exchanged", i, [](MassProperties* body) {
+        Matrix3d exchange;
+        exchange << 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0;
+        body->inertia = exchange * body->inertia * exchange;
+      });
+    }
+    for (int k = 0; k < 3; ++k)
+      AddShift("gravity reversed", {Kind::kGravity, -1, k}, -2.0 * spec_.gravity[k]);
+  }
+
+  std::vector<Mutant> Take() { return std::move(mutants_); }
+
+ private:
+  Mutant& Add(const std::string& kind, const std::vector<Parameter>& parameters) {
+    Mutant& mutant = mutants_.emplace_back();
+    mutant.kind = kind;
+    mutant.expected.parameters = parameters;
+    mutant.name = DescribeShort(mutant.expected, spec_);
+    return mutant;
+  }
+
+  void AddShift(const std::string& kind, const Parameter& parameter, double shift) {
+    if (shift == 0.0) return;
+    const double value = GetValue(spec_, parameter) + shift;
+    Mutant& mutant = Add(kind, {parameter});
+    mutant.change = [parameter, value](RobotSpec* spec) { SetValue(spec, parameter, value); };
+  }
+
+  /// A solid taken for one of a tenth more mass.
+  void AddScaledBody(int link) {
+    if (!(spec_.joints[static_cast<size_t>(link)].body.mass > 0.0)) return;
+    std::vector<Parameter> numbers = {{Kind::kMass, link, 0}, {Kind::kInertia, link, 0}};
+    Add("solid of another mass", numbers).change = [link](RobotSpec* spec) {
+      constexpr double kRatio = 1.1;
+      JointOf(spec, link).body.mass *= kRatio;
+      JointOf(spec, link).body.inertia *= kRatio;
+    };
+  }
+
+  void AddBody(const std::string& kind, int link, void (*change)(MassProperties*)) {
+    MassProperties changed = spec_.joints[static_cast<size_t>(link)].body;
+    const Matrix3d before = changed.inertia;
+    change(&changed);
+    constexpr double kSame = 1e-9;  // of the trace: a tensor that the mistake leaves as it is
+    if ((changed.inertia - before).norm() <= kSame * before.trace()) return;
+    std::vector<Parameter> entries;
+    for (int k = 0; k < 6; ++k) entries.push_back({Kind::kInertia, link, k});
+    Mutant& mutant = Add(kind, entries);
+    mutant.change = [link, change](RobotSpec* spec) { change(&JointOf(spec, link).body); };
+  }
+
+  void AddStructural(const std::string& kind, CauseKind cause_kind, int joint, int other) {
+    Cause cause;
+    cause.kind = cause_kind;
+    cause.joint = joint;
+    cause.other = other;
+    RobotSpec changed = spec_;
+    Apply(cause, &changed);
+    if (IsSamePlacement(changed)) return;
+    Mutant& mutant = mutants_.emplace_back();
+    mutant.kind = kind;
+    mutant.expected = cause;
+    mutant.name = DescribeShort(cause, spec_);
+    mutant.change = [cause](RobotSpec* spec) { Apply(cause, spec); };
+  }
+
+  /// Whether two rows or places that were exchanged are alike.
+  [[nodiscard]] bool IsSamePlacement(const RobotSpec& changed) const {
+    for (size_t i = 0; i < spec_.joints.size(); ++i) {
+      const MdhRow& a = spec_.joints[i].mdh;
+      const MdhRow& b = changed.joints[i].mdh;
+      if (a.alpha != b.alpha || a.a != b.a || a.q != b.q || a.d != b.d) return false;
+      if (spec_.joints[i].X_PB.matrix() != changed.joints[i].X_PB.matrix()) return false;
+    }
+    return true;
+  }
+
+  const RobotSpec& spec_;
+  std::vector<Mutant> mutants_;
+};
+
+/// Whether anything that is compared differs between two models at the evidence's states.
+bool HasEffect(const RobotModel& model, const RobotModel& changed, const EngineEvidence& evidence) {
+  constexpr double kRounding = 1e-13;  // of each quantity's own size
+  if ((evidence.CalcForces(model) - evidence.CalcForces(changed)).cwiseAbs().maxCoeff() > kRounding)
+    return true;
+  const Placement a(model.spec(), evidence, true);
+  const Placement b(changed.spec(), evidence, true);
+  std::vector<double> rows_a;
+  std::vector<double> rows_b;
+  for (size_t item = 0; item < a.items().size(); ++item) {
+    a.AppendResidual(static_cast<int>(item), &rows_a);
+    b.AppendResidual(static_cast<int>(item), &rows_b);
+  }
+  for (size_t i = 0; i < rows_a.size(); ++i) {
+    if (std::abs(rows_a[i] - rows_b[i]) > kRounding) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<Mutant> ListMutants(const RobotSpec& spec, double scale) {
+  MutantList list(spec);
+  list.AddParameters(scale);
+  list.AddStructure();
+  return list.Take();
+}
+
+bool IsNamedBy(const Mutant& mutant, const Cause& cause) {
+  const Cause& expected = mutant.expected;
+  if (cause.kind != expected.kind) return false;
+  if (cause.kind != CauseKind::kParameters)
+    return cause.joint == expected.joint && cause.other == expected.other;
+  if (expected.parameters.size() == 1) return cause.parameters == expected.parameters;
+  const Parameter& named = cause.parameters.front();
+  const Parameter& changed = expected.parameters.front();
+  const bool several = changed.kind != expected.parameters.back().kind;
+  return named.kind == changed.kind && named.index == changed.index &&
+         (!several || cause.parameters.size() > 1);
+}
+
+void RunMutant(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
+               const MutationOptions& options, Mutant* mutant) {
+  RobotSpec spec = model.spec();
+  mutant->change(&spec);
+  const std::optional<RobotModel> changed = TryModel(spec);
+  if (!changed) {
+    mutant->fate = MutantFate::kRefused;
+    return;
+  }
+  ConsistencyOptions check;
+  check.samples = options.samples;
+  check.seed = options.seed;
+  const ConsistencyResult result =
+      CheckConsistency(Adapter(*changed, engine, engine_source), check, [](long) { return true; });
+  for (const std::vector<CheckRecord>* records : {&result.gate.records, &result.terms}) {
+    for (const CheckRecord& record : *records) {
+      if (record.failed) mutant->failed_checks += (mutant->failed_checks.empty() ? "" : " ") + record.name;
+    }
+  }
+  if (result.Agrees()) {
+    const EngineEvidence evidence(model, engine, engine_source, options.samples, options.seed);
+    mutant->fate = HasEffect(model, *changed, evidence) ? MutantFate::kSurvived : MutantFate::kNoEffect;
+    return;
+  }
+  mutant->fate = MutantFate::kKilled;
+  if (!options.diagnose) return;
+  const Diagnosis diagnosis = Diagnose(*changed, engine, engine_source, {}, [](const char*) { return true; });
+  mutant->causes = static_cast<int>(diagnosis.causes.size());
+  mutant->explained = diagnosis.explained;
+  if (diagnosis.causes.empty()) return;
+  const Cause& first = diagnosis.causes.front();
+  mutant->named = DescribeShort(first, spec);
+  mutant->named_first = IsNamedBy(*mutant, first);
+  mutant->named_equal = std::any_of(first.equivalents.begin(), first.equivalents.end(),
+                                    [&](const Cause& equal) { return IsNamedBy(*mutant, equal); });
+}
+
+}  // namespace dexcheck

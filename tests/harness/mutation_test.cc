@@ -1,0 +1,159 @@
+// Wrong equations and wrong numbers: all that have an effect are found, the others are shown to have none.
+
+#include "harness/diagnosis/mutation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "harness/diagnosis/formula_mutants.h"
+#include "harness/engine/engine.h"
+#include "tests/common/paper_robot.h"
+#include "tests/common/random_robot.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr int kSamples = 3;
+
+struct Files {
+  const char* name;
+  RobotModel (*read)();
+  const char* mjcf;
+  size_t formulas;
+};
+
+class WrongEquations : public ::testing::TestWithParam<Files> {};
+
+TEST_P(WrongEquations, AreAllFoundByTheCheckThatTheyBelongTo) {
+  const RobotModel model = GetParam().read();
+  const MjModelPtr engine = LoadMjcf(std::string(DEXCHECK_SOURCE_DIR) + GetParam().mjcf);
+  const Adapter adapter(model, *engine, "mjcf");
+  std::vector<FormulaMutant> mutants = ListFormulaMutants(model);
+  EXPECT_GE(mutants.size(), GetParam().formulas);
+  for (FormulaMutant& mutant : mutants) {
+    RunFormulaMutant(adapter, kSamples, &mutant);
+    EXPECT_EQ(mutant.fate, MutantFate::kKilled) << mutant.name;
+    EXPECT_TRUE(mutant.localised) << mutant.name << ": " << mutant.failed_checks;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Robots, WrongEquations,
+    ::testing::Values(Files{"Assistant", [] { return testing::ReadPaperRobot(); }, "/mjcf/scene.xml", 85},
+                      Files{"AssistantWheelRates",
+                            [] { return testing::ReadPaperRobot(DriveVelocity::kWheelRates); },
+                            "/mjcf/scene.xml", 85},
+                      Files{"Panda", [] { return testing::ReadPanda(); }, "/mjcf/panda.xml", 24}),
+    [](const auto& info) { return info.param.name; });
+
+TEST(ContactCheck, AgreesAtRandomContacts) {
+  const RobotModel model = testing::ReadPaperRobot();
+  const MjModelPtr engine = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  const Adapter adapter(model, *engine, "mjcf");
+  ContactCheck check(adapter);
+  StateSource source(model, {}, 3);
+  VectorXd q = VectorXd::Zero(model.num_positions());
+  VectorXd xi = VectorXd::Zero(model.num_velocities());
+  for (int sample = 0; sample < 400; ++sample) {
+    source.DrawPositions(&q);
+    source.DrawVelocity(&xi);
+    check.Compare(q, xi, &source, sample);
+  }
+  ASSERT_EQ(check.records().size(), 4U);
+  for (const CheckRecord& record : check.records()) {
+    EXPECT_FALSE(record.failed) << record.name << " " << record.worst;
+    EXPECT_GE(record.comparisons, 400 * 6) << record.name;
+    EXPECT_GT(record.worst, 1e-4 * record.bound) << record.name << ": a bound that no error comes near";
+    EXPECT_LT(record.bound, 1e-12);
+  }
+}
+
+TEST(Mutants, CoverEveryNumberOfTheModel) {
+  const RobotSpec spec = testing::ReadPaperRobot().spec();
+  const std::vector<Parameter> parameters = ListParameters(spec);
+  // 48 joints with 14 numbers of kinematics and motion and 10 of the link; 8 fingertips and 3 frames; the
+  // base's place and body, wheels, gravity and the torus.
+  EXPECT_EQ(parameters.size(), 48U * 24 + 11 * 6 + 8 + 3 + 10 + 7 + 3 + 10);
+  std::set<std::string> names;
+  for (const Parameter& parameter : parameters) {
+    const std::string name = DescribePart(spec, parameter) + ": " + DescribeQuantity(parameter);
+    names.insert(name);
+    constexpr double kChange = 1e-3;
+    constexpr double kRounding = 1e-12;
+    const auto difference = [](double x, double y) { return std::abs(std::remainder(x - y, 2.0 * kPi)); };
+    RobotSpec changed = spec;
+    const double value = GetValue(spec, parameter);
+    SetValue(&changed, parameter, value + kChange);
+    EXPECT_LT(difference(GetValue(changed, parameter), value + kChange), kRounding) << name;
+    int differing = 0;
+    for (const Parameter& other : parameters)
+      differing += difference(GetValue(changed, other), GetValue(spec, other)) > kRounding ? 1 : 0;
+    EXPECT_EQ(differing, 1) << name;
+  }
+  EXPECT_EQ(names.size(), parameters.size());
+}
+
+// A range that the MJCF does not limit only says where to look.
+TEST(Mutants, WithoutEffectAreShownToHaveNone) {
+  const RobotModel model = testing::ReadPanda();
+  const MjModelPtr engine = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/panda.xml");
+  const int joint = mj_name2id(engine.get(), mjOBJ_JOINT, "panda_joint2");
+  int limits = 0;
+  for (Mutant& mutant : ListMutants(model.spec(), 1e-3)) {
+    if (mutant.name != "joint panda_joint2: upper limit") continue;
+    ++limits;
+    RunMutant(model, *engine, "mjcf", {}, &mutant);
+    EXPECT_EQ(mutant.fate, MutantFate::kKilled);
+    EXPECT_EQ(mutant.failed_checks, "joint_range");
+    EXPECT_TRUE(mutant.named_first);
+    Mutant unlimited = mutant;
+    engine->jnt_limited[joint] = 0;
+    RunMutant(model, *engine, "mjcf", {}, &unlimited);
+    EXPECT_EQ(unlimited.fate, MutantFate::kNoEffect);
+    // A change that has an effect but is too small to be found is a survivor.
+    Mutant tiny = mutant;
+    tiny.change = [](RobotSpec* spec) { spec->joints[0].mdh.d *= 1.0 + 1e-13; };
+    RunMutant(model, *engine, "mjcf", {}, &tiny);
+    EXPECT_NE(tiny.fate, MutantFate::kKilled);
+  }
+  EXPECT_EQ(limits, 1);
+}
+
+TEST(Mutants, ThatAreNoRobotAreRefused) {
+  const RobotModel model = testing::ReadPanda();
+  const MjModelPtr engine = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/panda.xml");
+  Mutant mutant = ListMutants(model.spec(), 1e-3).front();
+  mutant.change = [](RobotSpec* spec) { spec->joints[1].body.mass = -1.0; };
+  RunMutant(model, *engine, "mjcf", {}, &mutant);
+  EXPECT_EQ(mutant.fate, MutantFate::kRefused);
+}
+
+TEST(Mutants, ReversedAxisTurnsTheOtherWay) {
+  std::mt19937 random(702);
+  testing::RandomRobotOptions options;
+  options.joints = 8;
+  for (int index = 0; index < 10; ++index) {
+    const RobotSpec spec = testing::MakeRandomRobot(options, &random);
+    const int joint = index % 8;
+    RobotSpec reversed = spec;
+    ReverseAxis(&reversed, joint);
+    const RobotModel a(spec);
+    const RobotModel b(reversed);
+    ModelTerms terms_a(a);
+    ModelTerms terms_b(b);
+    VectorXd q = testing::DrawPositions(a, &random);
+    const VectorXd xi = VectorXd::Zero(terms_a.size());
+    terms_a.SetState(q, xi);
+    q[3 + joint] = -q[3 + joint];
+    terms_b.SetState(q, xi);
+    for (size_t frame = 0; frame < spec.frames.size(); ++frame) {
+      const int i = static_cast<int>(frame);
+      EXPECT_LT((terms_a.CalcFramePose(i).matrix() - terms_b.CalcFramePose(i).matrix()).norm(), 1e-13);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dexcheck
