@@ -78,7 +78,8 @@ INSTANTIATE_TEST_SUITE_P(
                 "is at its limit"},
         Failure{"not_finite", {"duration=1", "start_error.xyz=[1e308, 0, 0]"}, "not finite"},
         Failure{"fall",
-                {"duration=4", "trajectory={ type = 'circle', speed = 2.5, radius = 1, ramp_time = 1 }"},
+                {"duration=5", "plant.floor_friction=3",
+                 "trajectory={ type = 'circle', speed = 3, radius = 1.5, ramp_time = 5 }"},
                 "the robot fell"},
         Failure{"no_forces", {"duration=1", "control.f_max=0.3", "control.f_min=0"}, "contact forces"}),
     [](const ::testing::TestParamInfo<Failure>& info) { return info.param.name; });
