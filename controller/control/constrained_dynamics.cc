@@ -34,15 +34,14 @@ Vector6d CalcCoordinateAcceleration(const GraspTerms& grasp, const Vector6d& V_B
   return CalcP(grasp.X_o()) * (V_Bo_dot - grasp.coordinates().P_inv_dot * grasp.X_o_dot());
 }
 
-ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contacts) {
+ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contacts) : factor_(model) {
   Require(num_contacts > 0, "number of contacts", "must be positive", num_contacts);
   const Eigen::Index n = model.num_velocities();
   const Eigen::Index k = Eigen::Index{3} * num_contacts;
-  M_llt_ = Eigen::LLT<MatrixXd>(n);
-  half_.setZero(n + 6, k);
+  half_.setZero(n + 6, k + 1);
   schur_.setZero(k, k);
   schur_llt_ = Eigen::LLT<MatrixXd>(k);
-  half_force_.setZero(n + 6);
+  motion_.setZero(n + 6);
   prediction_.xi_dot.setZero(n);
   prediction_.f_c.setZero(k);
 }
@@ -55,37 +54,36 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
   Require(grasp.num_forces() == schur_.rows(), "number of contact forces", "must be as constructed",
           grasp.num_forces());
   const ObjectBodyTerms& body = grasp.body();
-  M_llt_.compute(robot.M());
-  Require(M_llt_.info() == Eigen::Success, "M_bar'", "must be positive definite; trace", robot.M().trace());
+  factor_.Compute(robot.M());
   const Eigen::LLT<Matrix6d> M_hat_llt(body.M_hat);
 
-  // M = L L^T of both bodies; half = L^-1 [J_B'^T; -G], half_force = L^-1 [what the constraints leave alone]
-  half_.topRows(n) = grasp.J_B().transpose();
-  M_llt_.matrixL().solveInPlace(half_.topRows(n));
-  half_.bottomRows<6>() = -grasp.G();
+  // M = L^T L of the robot, L L^T of the object; half = M^-1/2 [J_B'^T; -G | what the constraints leave
+  // alone]
+  const Eigen::Index k = schur_.rows();
+  half_.topLeftCorner(n, k) = grasp.J_B().transpose();
+  half_.bottomLeftCorner(6, k) = -grasp.G();
+  motion_.head(n) = force - robot.gravity() - robot.friction();
+  motion_.head(n).noalias() -= robot.C() * robot.velocity();
+  motion_.tail<6>() = -body.C_hat * grasp.V_Bo() - body.N_o;
+  half_.col(k) = motion_;
+  factor_.SolveTransposed(half_.topRows(n));
   M_hat_llt.matrixL().solveInPlace(half_.bottomRows<6>());
-  half_force_.head(n) = force - robot.gravity() - robot.friction();
-  half_force_.head(n).noalias() -= robot.C() * robot.velocity();
-  M_llt_.matrixL().solveInPlace(half_force_.head(n));
-  half_force_.tail<6>() = -body.C_hat * grasp.V_Bo() - body.N_o;
-  M_hat_llt.matrixL().solveInPlace(half_force_.tail<6>());
 
   // (half^T half) f_c = half^T half_force + slip_bias
-  for (Eigen::Index j = 0; j < schur_.cols(); ++j) {
-    const Eigen::Index rest = schur_.rows() - j;
-    schur_.col(j).tail(rest).noalias() = half_.rightCols(rest).transpose() * half_.col(j);
-  }
+  const auto constraints = half_.leftCols(k);
+  schur_.noalias() = constraints.transpose() * constraints;
   schur_llt_.compute(schur_);
   RequireIndependentConstraints(schur_, schur_llt_);
   prediction_.f_c = grasp.slip_bias();
-  prediction_.f_c.noalias() += half_.transpose() * half_force_;
+  prediction_.f_c.noalias() += constraints.transpose() * half_.col(k);
   schur_llt_.solveInPlace(prediction_.f_c);
 
-  // [xi_dot; V_Bo_dot] = L^-T (half_force - half f_c)
-  half_force_.noalias() -= half_ * prediction_.f_c;
-  prediction_.xi_dot = half_force_.head(n);
-  M_llt_.matrixU().solveInPlace(prediction_.xi_dot);
-  prediction_.V_Bo_dot = half_force_.tail<6>();
+  // [xi_dot; V_Bo_dot] = M^-1/2 (half_force - half f_c)
+  motion_ = half_.col(k);
+  motion_.noalias() -= constraints * prediction_.f_c;
+  prediction_.xi_dot = motion_.head(n);
+  factor_.Solve(prediction_.xi_dot);
+  prediction_.V_Bo_dot = motion_.tail<6>();
   M_hat_llt.matrixU().solveInPlace(prediction_.V_Bo_dot);
   return prediction_;
 }

@@ -8,6 +8,7 @@
 #include "controller/control/grasp_terms.h"
 #include "controller/control/pseudoinverse.h"
 #include "controller/dynamics/model_terms.h"
+#include "controller/dynamics/tree_factor.h"
 
 namespace dexcheck {
 
@@ -41,15 +42,15 @@ class ConstrainedDynamics {
   const Prediction& Predict(const ModelTerms& robot, const GraspTerms& grasp,
                             const Eigen::Ref<const VectorXd>& force);
 
-  /// M_bar' = L L^T of the last Predict.
-  [[nodiscard]] const Eigen::LLT<MatrixXd>& mass_factor() const { return M_llt_; }
+  /// M_bar' = L^T L of the last Predict.
+  [[nodiscard]] const TreeFactor& mass_factor() const { return factor_; }
 
  private:
-  Eigen::LLT<MatrixXd> M_llt_;
-  MatrixXd half_;  // n + 6 x k, [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G]
+  TreeFactor factor_;
+  RowMatrixXd half_;  // n + 6 x k + 1, [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G | forces without contact]
   MatrixXd schur_;
   Eigen::LLT<MatrixXd> schur_llt_;
-  VectorXd half_force_;  // n + 6
+  VectorXd motion_;  // n + 6
   Prediction prediction_;
 };
 

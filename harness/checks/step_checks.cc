@@ -106,7 +106,7 @@ StepChecks::StepChecks(const Setup& setup)
   force_.setZero(n);
   bias_.setZero(n);
   residual_.setZero(n);
-  work_.setZero(n);
+  column_.setZero(n, 1);
   idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
   kappa_.resize(setup.fingertips().size());
 }
@@ -186,18 +186,19 @@ void StepChecks::CompareDynamics(const GraspController& controller, const Measur
   residual_ = bias_ - force_;
   residual_.noalias() += robot.M() * engine_.xi_dot;
   residual_.noalias() += grasp.J_B().transpose() * engine_.f_c;
+  // |f|_M^-1 = |L^-T f|
   const auto norm = [&](const VectorXd& f) {
-    work_ = f;
-    dynamics_.mass_factor().matrixL().solveInPlace(work_);
-    return work_.norm();
+    column_ = f;
+    dynamics_.mass_factor().SolveTransposed(column_);
+    return column_.norm();
   };
   const double scale = std::max(norm(bias_), std::numeric_limits<double>::min());
   Add(kBalanceRobot, norm(residual_) / scale);
 
-  // |a|_M = |L^T a|
+  // |a|_M = |L a|
   residual_ = prediction_->xi_dot - engine_.xi_dot;
-  work_.noalias() = dynamics_.mass_factor().matrixL().transpose() * residual_;
-  Add(kReducedAcceleration, work_.norm() / scale);
+  dynamics_.mass_factor().Multiply(residual_);
+  Add(kReducedAcceleration, residual_.norm() / scale);
   const double force_scale = std::max(engine_.f_c.norm(), std::numeric_limits<double>::min());
   Add(kContactForce, (prediction_->f_c - engine_.f_c).norm() / force_scale);
 

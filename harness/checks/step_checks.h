@@ -103,7 +103,8 @@ class StepChecks {
   long contacts_lost_ = 0;
   double least_cone_margin_ = std::numeric_limits<double>::infinity();
   double time_ = 0.0;
-  VectorXd force_, bias_, residual_, work_;  // n
+  VectorXd force_, bias_, residual_;  // n
+  RowMatrixXd column_;                // n x 1
 };
 
 }  // namespace dexcheck

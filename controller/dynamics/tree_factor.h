@@ -1,0 +1,38 @@
+#pragma once
+
+// Cholesky factor of a tree's mass matrix that keeps the zeros of the tree: M = L^T L, where row i of L has
+// entries only at coordinate i and those it hangs on. Robots with many short branches, such as fingers, have
+// few of them.
+//
+// R. Featherstone, Efficient factorization of the joint-space inertia matrix for branched kinematic trees,
+// International Journal of Robotics Research 24(6), 2005.
+
+#include <vector>
+
+#include "controller/common/types.h"
+#include "controller/model/robot_model.h"
+
+namespace dexcheck {
+
+/// Factor of M_bar' (n x n, reduced coordinates). Nothing allocates after construction.
+class TreeFactor {
+ public:
+  explicit TreeFactor(const RobotModel& model);
+
+  /// M = L^T L; the lower triangle of M (n x n) is read, at the tree's entries.
+  /// @throws std::invalid_argument when the size differs or M is not positive definite.
+  void Compute(const Eigen::Ref<const MatrixXd>& M);
+
+  /// x (n) becomes L x, with |L x| = sqrt(x^T M x).
+  void Multiply(Eigen::Ref<VectorXd> x) const;
+  /// x becomes L^-1 x.
+  void Solve(Eigen::Ref<VectorXd> x) const;
+  /// Each column of X (n x k, row-major) becomes L^-T times it: |L^-T x| = sqrt(x^T M^-1 x).
+  void SolveTransposed(Eigen::Ref<RowMatrixXd> X) const;
+
+ private:
+  std::vector<int> parent_;  // coordinate that a coordinate hangs on; -1 for none. Parents come first.
+  RowMatrixXd L_;            // n x n, lower triangle
+};
+
+}  // namespace dexcheck
