@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds dexcheck and compares model and engine at 10000 random states; arguments go to
-# `dexcheck consistency`:
-#   harness/quickstart.sh [--robot FILE.toml --mjcf FILE.xml] [--seed N] ...
+# Installs what is missing, builds dexcheck and simulates the paper's experiment; arguments go to `dexcheck run`:
+#   harness/quickstart.sh [SCENARIO [--set KEY=VALUE] ...]
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -9,4 +8,4 @@ export CMAKE_BUILD_PARALLEL_LEVEL=${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)}
 
 "$root/harness/install-packages.sh"
 (cd "$root" && cmake --preset release && cmake --build --preset release --target dexcheck)
-exec "$root/build/release/bin/dexcheck" consistency "$@"
+exec "$root/build/release/bin/dexcheck" run "${@:-paper}"
