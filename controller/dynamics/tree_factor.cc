@@ -58,10 +58,16 @@ void TreeFactor::Solve(Eigen::Ref<VectorXd> x) const {
 }
 
 void TreeFactor::SolveTransposed(Eigen::Ref<RowMatrixXd> X) const {
+  // Plain loops: rows are short, and there are hundreds of them.
+  const Eigen::Index width = X.cols();
   for (int i = static_cast<int>(parent_.size()) - 1; i >= 0; --i) {
-    X.row(i) *= 1.0 / L_(i, i);
+    double* const x_i = X.data() + i * X.outerStride();
+    const double inverse = 1.0 / L_(i, i);
+    for (Eigen::Index c = 0; c < width; ++c) x_i[c] *= inverse;
     for (int j = parent_[static_cast<size_t>(i)]; j >= 0; j = parent_[static_cast<size_t>(j)]) {
-      X.row(j).noalias() -= L_(i, j) * X.row(i);
+      double* const x_j = X.data() + j * X.outerStride();
+      const double factor = L_(i, j);
+      for (Eigen::Index c = 0; c < width; ++c) x_j[c] -= factor * x_i[c];
     }
   }
 }
