@@ -79,7 +79,7 @@ TEST(StepModelCheck, AgreesWithWhatTheControllerEvaluatesInThePlant) {
   const Adapter adapter(model, *engine, "scene.xml");
   const Torus torus(kRingRadius, kTubeRadius);
   const std::span<const int> fingertips = std::span(model.fingertips()).first(4);
-  Plant plant(adapter);
+  Plant plant(adapter, /*implicit_damping=*/false);
   mj_resetDataKeyframe(engine.get(), &plant.data(), mj_name2id(engine.get(), mjOBJ_KEY, "grasp_ready"));
   const mjtNum axis[3] = {0.6, 0.8, 0.0};
   constexpr double kTilt = 1e-3;  // rad, of the base as the plant starts
