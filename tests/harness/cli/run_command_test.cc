@@ -66,7 +66,7 @@ TEST(RunCommand, WritesAFolderThatTellsAll) {
   EXPECT_THAT(log.ReadText("command"), HasSubstr("run curve --set duration=0.2"));
   EXPECT_EQ(nlohmann::json::parse(log.ReadText("summary")), summary);
   const RowMatrixXd qpos = log.ReadSignal("engine/qpos");
-  EXPECT_EQ(qpos.cols(), 66);
+  EXPECT_EQ(qpos.cols(), 7 + 50 + 7);
   EXPECT_NE(qpos.row(0), qpos.row(199));
 
   // The same again from the log alone.

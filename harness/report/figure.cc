@@ -1,0 +1,196 @@
+#include "harness/report/figure.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <limits>
+
+#include "controller/common/errors.h"
+#include "harness/report/thinning.h"
+
+extern char** environ;
+
+namespace dexcheck {
+namespace {
+
+constexpr long kPointsPerCurve = 1200;  // two to a pixel
+constexpr int kWidth = 640;
+constexpr int kHeight = 330;
+constexpr int kKeyRowHeight = 19;
+constexpr int kKeyEntriesPerRow = 4;
+constexpr const char* kGreyColor = "#9aa3ad";
+
+/// A gnuplot string: single quotes, in which only the quote itself is special, and for its markup the
+/// escapes.
+std::string QuoteText(const std::string& text) {
+  std::string quoted = "'";
+  for (const char c : text) {
+    if (std::strchr("_^{}@&~\\", c) != nullptr && c != '\0') quoted += '\\';
+    if (c == '\'') quoted += '\'';
+    quoted += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
+  }
+  return quoted + "'";
+}
+
+/// Least and largest finite value, positive ones only for a logarithmic axis; least above largest when none.
+std::array<double, 2> FindRange(const Figure& figure, bool right_axis) {
+  std::array<double, 2> range = {std::numeric_limits<double>::infinity(),
+                                 -std::numeric_limits<double>::infinity()};
+  const auto include = [&](double value) {
+    if (!std::isfinite(value) || (figure.log && value <= 0.0)) return;
+    range = {std::min(range[0], value), std::max(range[1], value)};
+  };
+  for (const Curve& curve : figure.curves) {
+    if (curve.right_axis == right_axis) std::for_each(curve.values.begin(), curve.values.end(), include);
+  }
+  if (figure.bound && !right_axis) include(*figure.bound);
+  return range;
+}
+
+std::string SetRange(const Figure& figure, bool right_axis) {
+  const char* const axis = right_axis ? "y2" : "y";
+  std::array<double, 2> range = FindRange(figure, right_axis);
+  if (range[0] > range[1]) range = {1.0, 1.0};
+  if (figure.log) {
+    return fmt::format("set {}range [{:.3g}:{:.3g}]\n", axis,
+                       std::pow(10.0, std::floor(std::log10(range[0]))),
+                       std::pow(10.0, std::ceil(std::log10(range[1]) + 0.15)));
+  }
+  const double middle = 0.5 * (range[0] + range[1]);
+  const double half =
+      0.5 * std::max({range[1] - range[0], figure.least_span, 1e-9 * std::abs(middle), 1e-12});
+  return fmt::format("set {}range [{:.9g}:{:.9g}]\n", axis, middle - 1.08 * half, middle + 1.08 * half);
+}
+
+/// The data block $NAME: time, then each curve.
+void WriteData(const Figure& figure, const Thinning& thinning, std::ostream* script) {
+  std::vector<std::vector<double>> columns = {thinning.times()};
+  for (const Curve& curve : figure.curves) columns.push_back(thinning.Apply(curve.values));
+  *script << "$" << figure.name << " << END\n";
+  for (size_t row = 0; row < columns.front().size(); ++row) {
+    for (const std::vector<double>& column : columns) {
+      const bool gap =
+          !std::isfinite(column[row]) || (figure.log && &column != &columns[0] && column[row] <= 0);
+      *script << (gap ? std::string("NaN ") : fmt::format("{:.7g} ", column[row]));
+    }
+    *script << "\n";
+  }
+  *script << "END\n";
+}
+
+std::string PlotCurves(const Figure& figure) {
+  std::string plot = "plot ";
+  for (size_t i = 0; i < figure.curves.size(); ++i) {
+    const Curve& curve = figure.curves[i];
+    plot += fmt::format("{}${} using 1:{} axes x1{} with lines lc rgb '{}' lw {} dt ", i > 0 ? ", " : "",
+                        figure.name, i + 2, curve.right_axis ? "y2" : "y1", FindColor(curve.color),
+                        curve.color == kGrey ? "0.8" : "1.5");
+    const std::vector<int> dashes = FindDashes(curve.dash);
+    plot += dashes.empty() ? "1" : fmt::format("({})", fmt::join(dashes, ","));
+    plot += !curve.in_key ? " notitle" : " title " + QuoteText(curve.label);
+  }
+  if (figure.bound) {
+    plot += fmt::format(", {:.9g} with lines lc rgb '#c02020' lw 1.2 dt (8,5) title 'bound'", *figure.bound);
+  }
+  return plot + "\n";
+}
+
+void WriteScript(const Figure& figure, const VectorXd& time, const Thinning& thinning, std::ostream* script) {
+  WriteData(figure, thinning, script);
+  const auto named = std::count_if(figure.curves.begin(), figure.curves.end(),
+                                   [](const Curve& curve) { return curve.in_key; });
+  const int key_rows = static_cast<int>(named + kKeyEntriesPerRow) / kKeyEntriesPerRow;
+  const int height = kHeight + kKeyRowHeight * key_rows;
+  const double end = std::max(time[time.size() - 1], time[0] + 1e-6);
+  *script << fmt::format("set xrange [{:.9g}:{:.9g}]\n", time[0], end) << SetRange(figure, false)
+          << "set ylabel " << QuoteText(figure.label) << "\n";
+  if (figure.log) *script << "set logscale y\nset format y '10^{%T}'\n";
+  if (!figure.right_label.empty()) {
+    *script << SetRange(figure, true) << "set ytics nomirror\nset y2tics\nset y2label "
+            << QuoteText(figure.right_label) << "\n";
+  }
+  const std::string plot = PlotCurves(figure);
+  *script
+      << fmt::format("set terminal svg size {},{} font 'Helvetica,12' enhanced\nset output '{}.svg'\n",
+                     kWidth, height, figure.name)
+      << plot
+      << fmt::format(
+             "set terminal pngcairo size {},{} fontscale 2 linewidth 2 dashlength 2 font "
+             "'DejaVu Sans,11' enhanced\nset output '{}.png'\n",
+             2 * kWidth, 2 * height, figure.name)
+      << plot
+      << "unset output\nunset logscale\nset format y '% h'\nunset y2tics\nunset y2label\nset ytics mirror\n";
+}
+
+/// Runs gnuplot on FOLDER/figures.gnuplot, in the folder.
+void RunGnuplot(const std::filesystem::path& folder) {
+  const std::string errors = folder / "gnuplot.txt";
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, errors.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
+                                   0600);
+  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+  posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
+  std::array<std::string, 3> words = {"gnuplot", "--default-settings", "figures.gnuplot"};
+  std::array<char*, 4> arguments = {words[0].data(), words[1].data(), words[2].data(), nullptr};
+  pid_t process = -1;
+  const int error = ::posix_spawnp(&process, "gnuplot", &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error != 0) {
+    throw InputError(std::string("gnuplot: cannot be run: ") + std::strerror(error) +
+                     " (Debian's package gnuplot-nox has it)");
+  }
+  int status = 0;
+  while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  std::ifstream file(errors);
+  const std::string message((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  throw InputError("gnuplot: could not draw the figures: " + Abbreviate(message));
+}
+
+}  // namespace
+
+std::string FindColor(int color) {
+  static constexpr std::array<const char*, 8> kPalette = {"#1f6fc4", "#d9531e", "#0e8f6b", "#a341b0",
+                                                          "#d09a00", "#2fa7d8", "#7a5c3e", "#d6407f"};
+  return color == kGrey ? kGreyColor : kPalette[static_cast<size_t>(color) % kPalette.size()];
+}
+
+std::vector<int> FindDashes(int dash) {
+  static const std::array<std::vector<int>, 4> kDashes = {{{}, {7, 4}, {2, 3}, {9, 3, 2, 3}}};
+  return kDashes[static_cast<size_t>(dash) % kDashes.size()];
+}
+
+void DrawFigures(const std::vector<Figure>& figures, const VectorXd& time,
+                 const std::filesystem::path& folder) {
+  const Thinning thinning(time, kPointsPerCurve);
+  const std::filesystem::path path = folder / "figures.gnuplot";
+  std::ofstream script(path);
+  script << "set encoding utf8\nset grid lw 0.6 lc rgb '#d5dae0'\nset border 3 lw 0.8 lc rgb '#5b6570'\n"
+            "set tics nomirror scale 0.5 textcolor rgb '#30363d'\nset xlabel 't (s)'\nset samples 2\n"
+            "set key bmargin center horizontal samplen 2.4 spacing 1.1 width 1\nset lmargin 11\n";
+  for (const Figure& figure : figures) WriteScript(figure, time, thinning, &script);
+  script.close();
+  if (!script) throw InputError(path.string() + ": cannot be written: " + std::strerror(errno));
+  RunGnuplot(folder);
+  for (const Figure& figure : figures) {
+    for (const char* extension : {".svg", ".png"}) {
+      const std::filesystem::path picture = folder / (figure.name + extension);
+      std::error_code error;
+      if (std::filesystem::file_size(picture, error) == 0 || error) {
+        throw InputError(picture.string() + ": was not drawn by gnuplot");
+      }
+    }
+  }
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,53 @@
+#pragma once
+
+// Line plots over the time of a run.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/common/types.h"
+
+namespace dexcheck {
+
+/// One line of a figure.
+struct Curve {
+  std::string label;
+  VectorXd values;          ///< One for each row of the run; what is not finite is a gap.
+  int color = 0;            ///< Number in the palette; kGrey for what stays in the background.
+  int dash = 0;             ///< 0 solid; 1, 2, 3 dashes of their own.
+  bool right_axis = false;  ///< Belongs to the axis on the right.
+  bool in_key = true;       ///< Named in the picture's key.
+};
+
+inline constexpr int kGrey = -1;
+
+/// "#rrggbb" of a palette's color; numbers beyond its end begin anew.
+std::string FindColor(int color);
+
+/// Lengths of strokes and gaps in pixels; none for a solid line.
+std::vector<int> FindDashes(int dash);
+
+/// A plot of curves over time.
+struct Figure {
+  std::string name;   ///< Of its files: "fig12a".
+  std::string panel;  ///< Number in the paper, "12 (a)"; empty for figures that it lacks.
+  std::string title;
+  std::string label;            ///< Of the axis: "position (m)".
+  std::string right_label;      ///< Empty when no curve uses the right axis.
+  bool log = false;             ///< Values up to 0 are gaps.
+  double least_span = 0.0;      ///< Axes show at least this much, so that rounding errors don't fill them.
+  std::optional<double> bound;  ///< A dashed line at this value.
+  std::vector<Curve> curves;
+  std::string note;      ///< What the reader has to know; may be empty.
+  bool printed = false;  ///< Drawn as a picture, too.
+};
+
+/// Draws figures as FOLDER/NAME.svg and FOLDER/NAME.png, with gnuplot.
+/// @param time of the curves' values, s.
+/// @throws InputError when gnuplot cannot be run, or a file cannot be written.
+void DrawFigures(const std::vector<Figure>& figures, const VectorXd& time,
+                 const std::filesystem::path& folder);
+
+}  // namespace dexcheck

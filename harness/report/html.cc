@@ -1,0 +1,107 @@
+#include "harness/report/html.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <sstream>
+
+#include "controller/common/errors.h"
+
+namespace dexcheck {
+namespace {
+
+/// Removes everything from `from` to the end of the `to` that follows, wherever it is found.
+void RemoveAll(const std::string& from, const std::string& to, std::string* text) {
+  for (size_t begin = text->find(from); begin != std::string::npos; begin = text->find(from, begin)) {
+    const size_t end = text->find(to, begin + from.size());
+    if (end == std::string::npos) return;
+    text->erase(begin, end + to.size() - begin);
+  }
+}
+
+}  // namespace
+
+std::string EscapeHtml(std::string_view text) {
+  std::string escaped;
+  escaped.reserve(text.size());
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      case '\'':
+        escaped += "&#39;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string EncodeBase64(std::string_view bytes) {
+  static constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t group = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      group = group << 8U | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    }
+    for (size_t k = 0; k < 4; ++k) {
+      text += i + k > bytes.size() ? '=' : kDigits[group >> (18U - 6U * k) & 63U];
+    }
+  }
+  return text;
+}
+
+std::string FormatShort(double value) {
+  if (!std::isfinite(value)) return "infinite";
+  if (value == 0.0) return "0";
+  const double size = std::abs(value);
+  return size >= 0.01 && size < 1e4 ? fmt::format("{:.3g}", value) : fmt::format("{:.1e}", value);
+}
+
+std::string FormatShare(double share) {
+  if (!std::isfinite(share)) return "beyond any bound";
+  if (share == 0.0) return "0";
+  if (share > 10.0) return FormatShort(share) + " ×";
+  const double percent = 100.0 * share;
+  return percent < 0.01 ? "< 0.01 %" : fmt::format("{:.2g} %", percent);
+}
+
+std::string ReadBytes(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  if (!file) throw InputError(path.string() + ": cannot be read");
+  return bytes.str();
+}
+
+std::string MakeInlineSvg(std::string svg, const std::string& title) {
+  svg.erase(0, svg.find("<svg"));
+  RemoveAll("<defs>", "</defs>", &svg);
+  RemoveAll("<title>", "</title>", &svg);
+  RemoveAll("<desc>", "</desc>", &svg);
+  RemoveAll(" id=\"", "\"", &svg);
+  RemoveAll(" xmlns:xlink=\"", "\"", &svg);
+  const size_t tag_end = svg.find('>');
+  if (tag_end == std::string::npos) return "";
+  svg.insert(tag_end, " role=\"img\" aria-label=\"" + EscapeHtml(title) + "\"");
+  return svg;
+}
+
+}  // namespace dexcheck

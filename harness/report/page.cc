@@ -1,0 +1,356 @@
+#include "harness/report/page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <system_error>
+
+#include "harness/report/html.h"
+#include "harness/report/page_assets.h"
+#include "harness/report/page_plots.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr std::uintmax_t kLargestEmbeddedVideo = 20'000'000;  // bytes
+constexpr const char* kContentPolicy =
+    "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'; script-src "
+    "'unsafe-inline'";
+
+/// The verdict in the words of the page.
+struct Headline {
+  const char* tone;  ///< CSS class.
+  std::string word;
+  std::string sentence;
+};
+
+std::string FindString(const nlohmann::json& json, const char* group, const char* key) {
+  if (!json.contains(group) || !json[group].is_object()) return "";
+  const auto value = json[group].find(key);
+  return value != json[group].end() && value->is_string() ? value->get<std::string>() : "";
+}
+
+double FindNumber(const nlohmann::json& json, const char* group, const char* key) {
+  if (!json.contains(group) || !json[group].is_object()) return std::nan("");
+  const auto value = json[group].find(key);
+  return value != json[group].end() && value->is_number() ? value->get<double>() : std::nan("");
+}
+
+Headline FindHeadline(const RunData& run) {
+  const nlohmann::json& summary = run.summary();
+  if (summary.is_null()) {
+    return {"open", "NO VERDICT",
+            fmt::format("The run was cut off after {:.3f} s; what was recorded until then is below.",
+                        run.time()[run.time().size() - 1])};
+  }
+  const std::string verdict = summary.value("verdict", "");
+  if (verdict == "failed")
+    return {"fail", "FAILED", "The run could not be completed: " + summary.value("failure", "")};
+  if (verdict == "disagreement") return {"fail", "DISAGREEMENT", "Model and engine disagree."};
+  if (run.checks().empty()) return {"open", "NOT CHECKED", "The run completed; nothing was checked."};
+  return {"pass", "PASS", "Model, balance, prediction and assumptions hold at every step."};
+}
+
+class Page {
+ public:
+  Page(const RunData& run, const PageContent& content) : run_(run), content_(content) {}
+
+  std::string Make() {
+    AddHead();
+    AddVerdict();
+    AddNavigation();
+    html_ += "<main>\n";
+    AddChecks();
+    AddPlots();
+    AddVideo();
+    AddFigures();
+    AddInputs();
+    html_ += "</main>\n";
+    AddFooter();
+    return std::move(html_);
+  }
+
+ private:
+  template <typename... Arguments>
+  void Add(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
+    fmt::format_to(std::back_inserter(html_), format, std::forward<Arguments>(arguments)...);
+  }
+
+  std::string Text(const char* name) const { return EscapeHtml(run_.FindText(name)); }
+
+  void AddHead() {
+    Add("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n<title>{}: {} – dexcheck</title>\n"
+        "<link rel=\"icon\" href=\"data:,\">\n<style>\n{}\n{}</style>\n</head>\n<body>\n",
+        kContentPolicy, FindHeadline(run_).word, Text("scenario"), kDygraphCss, kPageCss);
+  }
+
+  void AddVerdict() {
+    const Headline headline = FindHeadline(run_);
+    const nlohmann::json& summary = run_.summary();
+    const std::string description = summary.is_null() ? "" : summary.value("description", "");
+    Add("<header>\n<h1><b>{}</b>{}{}</h1>\n<section class=\"verdict {}\" id=\"verdict\"><strong>{}</strong>"
+        "<p>{}</p>",
+        Text("scenario"), description.empty() ? "" : " – ", EscapeHtml(description), headline.tone,
+        headline.word, EscapeHtml(headline.sentence));
+    const std::string cause = FindString(summary, "attribution", "cause");
+    if (!cause.empty() && cause != "none") {
+      Add("<p>Cause: <b>{}</b>. Evidence: {}.</p>", EscapeHtml(cause),
+          EscapeHtml(FindString(summary, "attribution", "evidence")));
+    }
+    if (!summary.is_null() && summary.value("interrupted", false)) {
+      Add("<p>The run was stopped by hand after {:.3f} s.</p>", run_.time()[run_.time().size() - 1]);
+    }
+    html_ += "</section>\n";
+    AddQuestions();
+    AddTiles();
+    html_ += "</header>\n";
+  }
+
+  void AddQuestions() {
+    struct Question {
+      CheckKind kind;
+      const char* name;
+      const char* text;
+    };
+    static constexpr std::array<Question, 4> kQuestions = {
+        {{CheckKind::kModel, "Model", "same state, both descriptions"},
+         {CheckKind::kBalance, "Balance", "engine's motion in the model's equations"},
+         {CheckKind::kPrediction, "Prediction", "accelerations and contact forces"},
+         {CheckKind::kAssumption, "Assumptions", "no slip, level base, forces in cones"}}};
+    if (run_.checks().empty()) return;
+    html_ += "<div class=\"tiles\">\n";
+    for (const Question& question : kQuestions) {
+      long count = 0;
+      long failed = 0;
+      double share = 0.0;
+      for (const CheckLine& check : run_.checks()) {
+        if (check.kind != question.kind) continue;
+        ++count;
+        failed += check.pass ? 0 : 1;
+        share = std::max(share, check.share());
+      }
+      Add("<div class=\"card question {}\"><b>{}: {}</b><span>{}</span><span>{}, at most {} of a "
+          "bound</span></div>\n",
+          count == 0   ? "open"
+          : failed > 0 ? "fail"
+                       : "pass",
+          question.name,
+          count == 0   ? "not asked"
+          : failed > 0 ? fmt::format("{} of {} fail", failed, count)
+                       : std::string("holds"),
+          question.text, count == 1 ? "1 check" : fmt::format("{} checks", count), FormatShare(share));
+    }
+    html_ += "</div>\n";
+  }
+
+  void AddTile(const std::string& value, const char* label) {
+    Add("<div class=\"card\"><b>{}</b><span>{}</span></div>\n", value, label);
+  }
+
+  void AddTiles() {
+    const nlohmann::json& summary = run_.summary();
+    html_ += "<div class=\"tiles\">\n";
+    const auto tracking = [&](const char* key, const char* unit) {
+      const double value = FindNumber(summary, "tracking", key);
+      return std::isfinite(value) ? FormatShort(value) + unit : std::string("–");
+    };
+    AddTile(tracking("position_error_max_m", " m"), "largest position error of the object");
+    AddTile(tracking("orientation_error_max_rad", " rad"), "largest orientation error");
+    AddTile(fmt::format("{:.4g} s", run_.time()[run_.time().size() - 1]),
+            fmt::format("simulated, {} steps", run_.time().size()).c_str());
+    const double margin = FindNumber(summary, "assumptions", "cone_margin_min");
+    if (std::isfinite(margin))
+      AddTile(fmt::format("{:.3g} %", 100.0 * margin), "least distance to the friction cones");
+    const double factor = FindNumber(summary, "speed", "real_time_factor");
+    if (std::isfinite(factor)) AddTile(fmt::format("{:.2g} ×", factor), "real time");
+    html_ += "</div>\n";
+  }
+
+  void AddNavigation() {
+    html_ += "<nav><div><a href=\"#verdict\">Verdict</a>";
+    if (!run_.checks().empty()) html_ += "<a href=\"#checks\">Checks</a>";
+    html_ += "<a href=\"#plots\">Plots</a>";
+    if (!content_.video.empty()) html_ += "<a href=\"#video\">Video</a>";
+    html_ += "<a href=\"#figures\">Figures</a><a href=\"#inputs\">Inputs</a></div></nav>\n";
+  }
+
+  void AddCheckRow(const CheckLine& check) {
+    const double share = check.share();
+    std::string where = check.where;
+    if (!check.constant) {
+      const std::string time =
+          fmt::format("{} at {:.3f} s", where.empty() ? "worst" : "worst:", check.at_time);
+      where = where.empty() ? time : where + ", " + fmt::format("{:.3f} s", check.at_time);
+    }
+    const std::string unit = check.unit == "1" ? "" : " " + check.unit;
+    const std::string verdict = check.pass       ? "holds"
+                                : check.constant ? "differs"
+                                                 : fmt::format("fails from {:.3f} s", check.failed_at);
+    const std::string cause = [&]() -> std::string {
+      const nlohmann::json& summary = run_.summary();
+      if (check.pass || !summary.contains("attribution")) return "";
+      const nlohmann::json& causes = summary["attribution"];
+      return causes.contains("checks") ? causes["checks"].value(check.name, "") : "";
+    }();
+    Add("<tr class=\"{}\"><td><code>{}</code><small>{}</small></td><td><span class=\"badge\">{}</span>{}</td>"
+        "<td data-label=\"question\">{}</td><td class=\"value number\" data-label=\"worst\">{}{}</td>"
+        "<td class=\"value number\" data-label=\"bound\">{}{}</td>"
+        "<td data-label=\"of bound\"><span class=\"number\">{}</span><span class=\"meter\"><i "
+        "style=\"width:{:.1f}%\">"
+        "</i></span></td><td class=\"where\" data-label=\"\"><small>{}</small></td></tr>\n",
+        check.pass ? "pass" : "fail", EscapeHtml(check.name), EscapeHtml(check.description), verdict,
+        cause.empty() ? "" : "<small>cause: " + EscapeHtml(cause) + "</small>", NameOf(check.kind),
+        FormatShort(check.max), check.max == 0.0 ? "" : EscapeHtml(unit), FormatShort(check.bound),
+        check.bound == 0.0 ? "" : EscapeHtml(unit), FormatShare(share),
+        100.0 * std::clamp(std::isfinite(share) ? share : 1.0, 0.0, 1.0), EscapeHtml(where));
+  }
+
+  void AddCheckTable(const std::vector<const CheckLine*>& checks) {
+    html_ +=
+        "<table class=\"checks\"><thead><tr><th>check</th><th></th><th>question</th><th "
+        "class=\"value\">worst</th>"
+        "<th class=\"value\">bound</th><th>of bound</th><th>where, when</th></tr></thead><tbody>\n";
+    for (const CheckLine* check : checks) AddCheckRow(*check);
+    html_ += "</tbody></table>\n";
+  }
+
+  void AddChecks() {
+    if (run_.checks().empty()) return;
+    std::vector<const CheckLine*> shown;
+    std::vector<const CheckLine*> equal_constants;
+    for (const CheckLine& check : run_.checks()) {
+      (check.constant && check.pass ? equal_constants : shown).push_back(&check);
+    }
+    html_ +=
+        "<h2 id=\"checks\">Checks</h2>\n<p class=\"soft\">What failed first, then by share of the bound. A "
+        "bound is "
+        "what rounding, or the tolerance of the assumption, can explain.</p>\n<div class=\"card\">\n";
+    AddCheckTable(shown);
+    if (!equal_constants.empty()) {
+      Add("<details><summary>{} constants of both descriptions agree</summary>\n", equal_constants.size());
+      AddCheckTable(equal_constants);
+      html_ += "</details>\n";
+    }
+    html_ += "</div>\n";
+  }
+
+  void AddPlots() {
+    html_ +=
+        "<section id=\"plots\"><h2>Plots</h2>\n<div class=\"tools\"><button id=\"show-all\" "
+        "type=\"button\">Show the "
+        "whole run</button><span class=\"soft\">Drag to zoom (all plots follow), Shift-drag to move, "
+        "double-click "
+        "for the whole run; on a touch screen use two fingers. Names switch curves on and off.</span></div>\n"
+        "<div class=\"grid\">\n";
+    for (size_t i = 0; i < content_.figures.size(); ++i) {
+      const Figure& figure = content_.figures[i];
+      Add("<section class=\"card\" data-plot=\"{}\"><h3>{} {}<span class=\"soft number time\"></span></h3>"
+          "<div class=\"keys\"></div><div class=\"plot\"></div></section>\n",
+          i, EscapeHtml(figure.title),
+          figure.panel.empty() ? ""
+                               : "<span class=\"panel\">Figure " + EscapeHtml(figure.panel) + "</span> ");
+    }
+    html_ += "</div></section>\n";
+  }
+
+  void AddVideo() {
+    if (content_.video.empty()) return;
+    html_ += "<h2 id=\"video\">Video</h2>\n";
+    std::error_code error;
+    if (std::filesystem::file_size(content_.video, error) > kLargestEmbeddedVideo || error) {
+      Add("<p><a href=\"{}\">{}</a> (too large to be part of this page)</p>\n",
+          EscapeHtml(content_.video_link), EscapeHtml(content_.video.filename().string()));
+      return;
+    }
+    html_ += "<video controls playsinline preload=\"metadata\" src=\"data:video/mp4;base64,";
+    html_ += EncodeBase64(ReadBytes(content_.video));
+    html_ += "\"></video>\n";
+  }
+
+  void AddCaption(const std::string& panel, const std::string& title) {
+    Add("<figcaption>{}{}</figcaption>", panel.empty() ? "" : "<b>Figure " + EscapeHtml(panel) + "</b>",
+        EscapeHtml(title));
+  }
+
+  void AddFigures() {
+    html_ +=
+        "<h2 id=\"figures\">Figures</h2>\n<p class=\"soft\">Numbers are those of the paper's figures; SVG "
+        "and PNG "
+        "files lie in the run's folder <code>figures</code>.</p>\n<div class=\"grid\">\n";
+    for (const Picture& picture : content_.pictures) {
+      html_ += "<figure class=\"card\">";
+      AddCaption(picture.panel, picture.title);
+      Add("<img alt=\"{}\" src=\"data:image/png;base64,{}\"></figure>\n", EscapeHtml(picture.title),
+          EncodeBase64(ReadBytes(picture.file)));
+    }
+    for (const Figure& figure : content_.figures) {
+      if (!figure.printed) continue;
+      html_ += "<figure class=\"card\">";
+      AddCaption(figure.panel, figure.title);
+      html_ += MakeInlineSvg(ReadBytes(content_.drawings / (figure.name + ".svg")), figure.title);
+      if (!figure.note.empty()) Add("<p class=\"soft\"><small>{}</small></p>", EscapeHtml(figure.note));
+      html_ += "</figure>\n";
+    }
+    html_ += "</div>\n";
+  }
+
+  void AddFile(const std::string& name, const std::string& title, bool open) {
+    const std::vector<std::string> files = run_.log().ListFiles("inputs");
+    if (std::find(files.begin(), files.end(), name) == files.end()) return;
+    Add("<details{}><summary>{}</summary><pre>{}</pre></details>\n", open ? " open" : "", EscapeHtml(title),
+        EscapeHtml(run_.log().ReadFile("inputs", name)));
+  }
+
+  void AddInputs() {
+    html_ += "<h2 id=\"inputs\">Inputs</h2>\n<div class=\"card\">\n<dl>\n";
+    const auto add = [&](const char* term, const std::string& value) {
+      if (!value.empty()) Add("<dt>{}</dt><dd>{}</dd>\n", term, value);
+    };
+    const std::string command = Text("command");
+    add("Command", command.empty() ? "" : "<code>" + command + "</code>");
+    std::string overrides = Text("overrides");
+    while (overrides.ends_with('\n')) overrides.pop_back();
+    for (size_t at = overrides.find('\n'); at != std::string::npos; at = overrides.find('\n', at)) {
+      overrides.replace(at, 1, "<br>");
+    }
+    add("Overrides", overrides.empty() ? "none" : "<code>" + overrides + "</code>");
+    add("Seed", Text("seed"));
+    add("Model", Text("robot"));
+    add("MJCF", Text("mjcf"));
+    add("dexcheck", Text("dexcheck_version"));
+    add("MuJoCo", Text("mujoco_version"));
+    html_ += "</dl>\n";
+    AddFile("scenario.toml", "Scenario", true);
+    const std::string robot = run_.FindText("robot");
+    AddFile("robot/" + robot, "Parameters of the model: " + robot, false);
+    const std::string mjcf = run_.FindText("mjcf");
+    AddFile("mjcf/" + mjcf, "MJCF: " + mjcf, false);
+    html_ += "</div>\n";
+  }
+
+  void AddFooter() {
+    Add("<footer>Made by dexcheck {} from the run's log, which holds every number, and the inputs to repeat "
+        "the run bit "
+        "for bit: <code>dexcheck run --replay RUN_DIR</code>. Plots by dygraphs (MIT license).</footer>\n",
+        Text("dexcheck_version"));
+    const PlotData data = MakePlotData(content_.figures, run_.time());
+    html_ += "<script type=\"application/json\" id=\"run-plots\">" + data.json + "</script>\n";
+    html_ += "<script type=\"text/plain\" id=\"run-values\">" + data.values + "</script>\n";
+    html_ += std::string("<script>\n") + kDygraphJs + "\n</script>\n<script>\n" + kPageJs + "</script>\n";
+    html_ += "</body>\n</html>\n";
+  }
+
+  const RunData& run_;
+  const PageContent& content_;
+  std::string html_;
+};
+
+}  // namespace
+
+std::string MakePage(const RunData& run, const PageContent& content) { return Page(run, content).Make(); }
+
+}  // namespace dexcheck

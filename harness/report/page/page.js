@@ -1,0 +1,188 @@
+// The report's plots: zoomed together, drawn when they come into view.
+(() => {
+  'use strict';
+  const run = JSON.parse(document.getElementById('run-plots').textContent);
+  const bytes = Uint8Array.from(atob(document.getElementById('run-values').textContent), c => c.charCodeAt(0));
+  const numbers = new Float32Array(bytes.buffer);
+  const count = run.points;
+  const dark = matchMedia('(prefers-color-scheme: dark)');
+  const first = run.times[0];
+  const last = Math.max(run.times[count - 1], first + 1e-6);
+  const plots = [];
+  let shown = [first, last];
+
+  const format = value => {
+    if (!Number.isFinite(value)) return '–';
+    if (value === 0) return '0';
+    const size = Math.abs(value);
+    return size < 1e-3 || size >= 1e5 ? value.toExponential(2) : String(Number(value.toPrecision(5)));
+  };
+
+  /** Rows [t, series...] of a plot; what cannot be drawn is null. */
+  const makeRows = plot => {
+    const rows = new Array(count);
+    for (let i = 0; i < count; ++i) {
+      const row = [run.times[i]];
+      for (const curve of plot.curves) {
+        const value = numbers[curve.series * count + i];
+        row.push(Number.isFinite(value) && !(plot.log && value <= 0) ? value : null);
+      }
+      rows[i] = row;
+    }
+    return rows;
+  };
+
+  /** An axis that shows at least the plot's least span, so that rounding errors do not fill it. */
+  const findRange = (plot, rows, right) => {
+    let low = Infinity;
+    let high = -Infinity;
+    plot.curves.forEach((curve, k) => {
+      if (curve.right !== right) return;
+      for (const row of rows) {
+        if (row[k + 1] === null) continue;
+        low = Math.min(low, row[k + 1]);
+        high = Math.max(high, row[k + 1]);
+      }
+    });
+    if (!right && plot.bound !== null) {
+      low = Math.min(low, plot.bound);
+      high = Math.max(high, plot.bound);
+    }
+    if (low > high) return plot.log ? [0.1, 10] : [-1, 1];
+    if (plot.log) return [low / 2, high * 3];
+    const middle = (low + high) / 2;
+    const half = 0.54 * Math.max(high - low, plot.span, 1e-9 * Math.abs(middle), 1e-12);
+    return [middle - half, middle + half];
+  };
+
+  const showTogether = range => {
+    shown = range;
+    for (const plot of plots) {
+      const window = plot.xAxisRange();
+      if (window[0] !== range[0] || window[1] !== range[1]) plot.updateOptions({dateWindow: range});
+    }
+  };
+
+  const drawBound = plot => (context, area, graph) => {
+    if (plot.bound === null) return;
+    const y = graph.toDomYCoord(plot.bound);
+    if (!(y >= area.y && y <= area.y + area.h)) return;
+    context.save();
+    context.strokeStyle = dark.matches ? '#ff8f85' : '#c02020';
+    context.setLineDash([8, 5]);
+    context.beginPath();
+    context.moveTo(area.x, y);
+    context.lineTo(area.x + area.w, y);
+    context.stroke();
+    context.restore();
+  };
+
+  /** One finger scrolls the page; two fingers zoom the plot. */
+  const makeInteraction = () => {
+    const model = Object.assign({}, Dygraph.defaultInteractionModel);
+    const pinch = model.touchstart;
+    model.touchstart = (event, graph, context) => {
+      if (event.touches.length > 1) pinch(event, graph, context);
+    };
+    model.dblclick = () => showAll();
+    return model;
+  };
+
+  const makeKeys = (plot, box, getGraph) => plot.curves.map((curve, k) => {
+    const key = document.createElement('button');
+    const line = `<svg viewBox="0 0 22 8"><line x1="0" y1="4" x2="22" y2="4" stroke="${curve.color}" ` +
+        `stroke-width="2.5" stroke-dasharray="${curve.dashes.join(' ')}"/></svg>`;
+    key.innerHTML = line;
+    key.append(curve.label);
+    const value = document.createElement('span');
+    value.className = 'number';
+    key.append(value);
+    key.setAttribute('aria-pressed', 'true');
+    key.title = 'Show or hide';
+    key.addEventListener('click', () => {
+      const visible = !getGraph().visibility()[k];
+      getGraph().setVisibility(k, visible);
+      key.setAttribute('aria-pressed', String(visible));
+    });
+    box.append(key);
+    return value;
+  });
+
+  const draw = (box, plot) => {
+    const rows = makeRows(plot);
+    const series = {};
+    plot.curves.forEach(curve => {
+      series[curve.id] = {
+        axis: curve.right ? 'y2' : 'y',
+        color: curve.color,
+        strokePattern: curve.dashes.length > 0 ? curve.dashes : null,
+        strokeWidth: curve.background ? 0.8 : 1.5,
+      };
+    });
+    let graph = null;
+    const values = makeKeys(plot, box.querySelector('.keys'), () => graph);
+    const range = findRange(plot, rows, false);
+    const rightRange = findRange(plot, rows, true);
+    const formatAxis = value => format(Number(value.toPrecision(10)));
+    const axis = {axisLabelFormatter: formatAxis, axisLabelWidth: 62};
+    graph = new Dygraph(box.querySelector('.plot'), rows, {
+      labels: ['t'].concat(plot.curves.map(curve => curve.id)),
+      series,
+      axes: {
+        x: {axisLabelFormatter: formatAxis},
+        y: Object.assign({valueRange: range}, axis),
+        y2: Object.assign({valueRange: plot.right ? rightRange : null, independentTicks: false}, axis),
+      },
+      logscale: plot.log,
+      xlabel: 't (s)',
+      ylabel: plot.label,
+      y2label: plot.right || null,
+      dateWindow: shown,
+      legend: 'never',
+      gridLineColor: dark.matches ? '#313a43' : '#e3e7eb',
+      axisLineColor: dark.matches ? '#55616c' : '#9aa3ad',
+      interactionModel: makeInteraction(),
+      underlayCallback: drawBound(plot),
+      highlightCallback: (event, t, points, row) => {
+        values.forEach((value, k) => { value.textContent = format(rows[row][k + 1] ?? NaN); });
+        box.querySelector('.time').textContent = `t = ${t.toFixed(3)} s`;
+      },
+      unhighlightCallback: () => {
+        for (const value of values) value.textContent = '';
+        box.querySelector('.time').textContent = '';
+      },
+      drawCallback: (drawn, initial) => {
+        if (initial) return;
+        const window = drawn.xAxisRange();
+        if (window[0] !== shown[0] || window[1] !== shown[1]) showTogether(window);
+      },
+    });
+    box.graph = graph;
+    box.ranges = [range, plot.right ? rightRange : null];
+    plots.push(graph);
+  };
+
+  const showAll = () => {
+    showTogether([first, last]);
+    for (const box of boxes) {
+      if (!box.graph) continue;
+      box.graph.updateOptions({axes: {y: {valueRange: box.ranges[0]}, y2: {valueRange: box.ranges[1]}}});
+    }
+  };
+
+  const boxes = [...document.querySelectorAll('[data-plot]')];
+  const watcher = new IntersectionObserver(entries => {
+    for (const entry of entries) {
+      if (!entry.isIntersecting || entry.target.graph) continue;
+      watcher.unobserve(entry.target);
+      draw(entry.target, run.plots[Number(entry.target.dataset.plot)]);
+    }
+  }, {rootMargin: '400px'});
+  for (const box of boxes) watcher.observe(box);
+  document.getElementById('show-all')?.addEventListener('click', showAll);
+  dark.addEventListener('change', () => {
+    for (const plot of plots) {
+      plot.updateOptions({gridLineColor: dark.matches ? '#313a43' : '#e3e7eb'});
+    }
+  });
+})();

@@ -1,0 +1,12 @@
+#pragma once
+
+// Texts that are built into the program, for pages that need no other file.
+
+namespace dexcheck {
+
+extern const char* const kPageCss;
+extern const char* const kPageJs;
+extern const char* const kDygraphCss;
+extern const char* const kDygraphJs;
+
+}  // namespace dexcheck

@@ -1,0 +1,67 @@
+#include <string>
+#include <vector>
+
+#include "harness/report/run_figures.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr int kNamedCurves = 8;  // as many as there are colors
+
+const char* AskQuestion(CheckKind kind) {
+  switch (kind) {
+    case CheckKind::kModel:
+      return "Model: both descriptions at the same state";
+    case CheckKind::kBalance:
+      return "Balance: the engine's motion and forces in the model's equations";
+    case CheckKind::kPrediction:
+      return "Prediction: accelerations and contact forces against the engine's";
+    case CheckKind::kAssumption:
+      return "Assumptions: what the equations take for granted";
+  }
+  return "";
+}
+
+Figure MakeFigure(const RunData& run, CheckKind kind) {
+  Figure figure;
+  figure.name = std::string("residual_") + NameOf(kind);
+  figure.title = AskQuestion(kind);
+  figure.label = "value / bound";
+  figure.log = true;
+  figure.bound = 1.0;
+  figure.printed = true;
+  std::string unseen;
+  int named = 0;
+  for (const CheckLine& check : run.checks()) {
+    const std::string signal = "check/" + check.name;
+    if (check.kind != kind || check.constant || run.Find(signal) == nullptr) continue;
+    const VectorXd values = run.log().ReadSignal(signal).col(0);
+    if (!(check.bound > 0.0) || !(values.array() > 0.0).any()) {
+      unseen += (unseen.empty() ? "" : ", ") + check.name;
+      continue;
+    }
+    const bool is_named = named++ < kNamedCurves;
+    figure.curves.push_back(
+        {check.name, values / check.bound, is_named ? named - 1 : kGrey, 0, false, is_named});
+  }
+  if (named > kNamedCurves) {
+    figure.note =
+        "The " + std::to_string(kNamedCurves) + " nearest to their bounds are named, the others grey. ";
+  }
+  if (!unseen.empty()) figure.note += "Not drawn, zero throughout or with bound 0: " + unseen + ".";
+  return figure;
+}
+
+}  // namespace
+
+std::vector<Figure> MakeResidualFigures(const RunData& run) {
+  std::vector<Figure> figures;
+  for (const CheckKind kind :
+       {CheckKind::kModel, CheckKind::kBalance, CheckKind::kPrediction, CheckKind::kAssumption}) {
+    Figure figure = MakeFigure(run, kind);
+    if (!figure.curves.empty()) figures.push_back(std::move(figure));
+  }
+  return figures;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,138 @@
+#include "harness/report/write_report.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "controller/common/errors.h"
+#include "harness/report/run_figures.h"
+#include "renders/partial_file.h"
+
+namespace dexcheck {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A new folder for drawing, removed at the end.
+class DrawingFolder {
+ public:
+  DrawingFolder() {
+    std::string name = (fs::temp_directory_path() / "dexcheck-report-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) {
+      throw InputError(name + ": cannot be made: " + std::strerror(errno));
+    }
+    path_ = name;
+  }
+  ~DrawingFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  DrawingFolder(const DrawingFolder&) = delete;
+  DrawingFolder& operator=(const DrawingFolder&) = delete;
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+void WriteText(const std::string& text, const PartialFile& file) {
+  std::ofstream stream(file.partial(), std::ios::binary);
+  stream << text;
+  stream.close();
+  if (!stream) file.Fail(std::strerror(errno));
+}
+
+/// Copies pictures into a folder, which it makes when it is not there. Destroyed before Commit, it leaves
+/// nothing.
+class FigureFolder {
+ public:
+  explicit FigureFolder(fs::path folder) : folder_(std::move(folder)) {
+    std::error_code error;
+    made_ = fs::create_directory(folder_, error);
+    if (error || !fs::is_directory(folder_)) {
+      throw InputError(folder_.string() +
+                       ": cannot be made: " + (error ? error.message() : std::strerror(ENOTDIR)));
+    }
+  }
+  ~FigureFolder() {
+    files_.clear();
+    std::error_code ignored;
+    if (made_) fs::remove(folder_, ignored);
+  }
+  FigureFolder(const FigureFolder&) = delete;
+  FigureFolder& operator=(const FigureFolder&) = delete;
+
+  void Add(const fs::path& picture) {
+    files_.push_back(std::make_unique<PartialFile>(folder_ / picture.filename()));
+    std::error_code error;
+    fs::copy_file(picture, files_.back()->partial(), fs::copy_options::overwrite_existing, error);
+    if (error) files_.back()->Fail(error.message());
+  }
+
+  void Commit() {
+    for (const auto& file : files_) file->Commit();
+    made_ = false;
+  }
+
+ private:
+  fs::path folder_;
+  std::vector<std::unique_ptr<PartialFile>> files_;
+  bool made_ = false;
+};
+
+/// The video beside the log, and how the page can link to it.
+void AddVideo(const fs::path& run_dir, const fs::path& page, PageContent* content) {
+  const fs::path video = run_dir / "video.mp4";
+  std::error_code error;
+  if (!fs::is_regular_file(video, error)) return;
+  content->video = video;
+  const fs::path folder = fs::absolute(page).parent_path();
+  content->video_link = fs::proximate(fs::absolute(video), folder, error).generic_string();
+}
+
+}  // namespace
+
+ReportFiles MakeReportFiles(const fs::path& run_dir) {
+  return {run_dir / "report.html", run_dir / "figures"};
+}
+
+void WriteRunReport(const fs::path& run_dir, const ReportFiles& files, const PictureMaker& make_pictures) {
+  const RunData run(run_dir);
+  PartialFile page(files.page);
+  std::optional<FigureFolder> folder;
+  if (!files.figures.empty()) folder.emplace(files.figures);
+
+  const DrawingFolder drawings;
+  PageContent content;
+  content.drawings = drawings.path();
+  content.figures = MakeMotionFigures(run);
+  std::vector<Figure> residuals = MakeResidualFigures(run);
+  std::move(residuals.begin(), residuals.end(), std::back_inserter(content.figures));
+  std::vector<Figure> printed;
+  std::copy_if(content.figures.begin(), content.figures.end(), std::back_inserter(printed),
+               [](const Figure& figure) { return figure.printed; });
+  DrawFigures(printed, run.time(), drawings.path());
+  if (make_pictures) content.pictures = make_pictures(drawings.path());
+  AddVideo(run_dir, files.page, &content);
+  WriteText(MakePage(run, content), page);
+
+  if (folder) {
+    for (const Picture& picture : content.pictures) folder->Add(picture.file);
+    for (const Figure& figure : printed) {
+      folder->Add(drawings.path() / (figure.name + ".svg"));
+      folder->Add(drawings.path() / (figure.name + ".png"));
+    }
+    folder->Commit();
+  }
+  page.Commit();
+}
+
+}  // namespace dexcheck
