@@ -68,7 +68,7 @@ class MoviePainter::RunPainter {
     inset_height_ = static_cast<int>(std::lround(kInsetHeight * options.height));
     inset_width_ =
         static_cast<int>(std::lround(std::min(kInsetAspect * inset_height_, kWidestInset * width)));
-    if (!options.inset.empty()) PaintInset({});
+    if (!options.inset.empty()) CheckCamera(model_, options.inset);
   }
 
   Image Paint(double time) {
@@ -224,8 +224,10 @@ class FrameLine {
  private:
   void Work(long first, long stride) {
     try {
-      MoviePainter painter(runs_, options_);
       // Nobody draws while another is still making its context, which sets MuJoCo's OpenGL functions.
+      std::unique_lock making(making_);
+      MoviePainter painter(runs_, options_);
+      making.unlock();
       {
         std::unique_lock lock(mutex_);
         --not_ready_;
@@ -258,6 +260,7 @@ class FrameLine {
   std::span<const RunView> runs_;
   MovieOptions options_;
   long frames_;
+  std::mutex making_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<long, Image> done_;

@@ -60,6 +60,8 @@ std::vector<std::string> ListCameras(const mjModel& model) {
   return names;
 }
 
+void CheckCamera(const mjModel& model, const std::string& name) { FindCamera(model, name); }
+
 class Renderer::Impl {
  public:
   Impl(const mjModel& model, const RenderOptions& options)

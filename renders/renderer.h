@@ -35,6 +35,9 @@ struct RenderOptions {
 /// Names of the cameras of a model, in its order.
 std::vector<std::string> ListCameras(const mjModel& model);
 
+/// @throws InputError that lists the cameras, unless the model has this one.
+void CheckCamera(const mjModel& model, const std::string& name);
+
 /// Draws states of one model, off screen. Frames depend on their state alone: the same state gives the same
 /// bytes. Use it in the thread that made it; several threads may each have one.
 class Renderer {

@@ -67,6 +67,8 @@ class GeomAdder {
     Require(scene_.ngeom < scene_.maxgeom, "decorations", "must fit into the scene's number of geoms",
             scene_.maxgeom);
     mjvGeom& geom = scene_.geoms[scene_.ngeom++];
+    // mjv_initGeom leaves some members, such as what transparent geoms are sorted by, as they were.
+    geom = mjvGeom{};
     mjv_initGeom(&geom, type, nullptr, nullptr, nullptr, color.data());
     geom.category = mjCAT_DECOR;
     geom.emission = kGlow;

@@ -125,6 +125,8 @@ class VideoWriter::Impl {
     // MP4 keeps the stream's parameters in its header; the same frames give the same bytes.
     encoder_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER | AV_CODEC_FLAG_BITEXACT;
     Check(av_opt_set(encoder_->priv_data, "preset", options_.preset.c_str(), 0));
+    // Otherwise x264 picks code by processor, and its AVX-512 code gives varying bytes for the same frames.
+    Check(av_opt_set(encoder_->priv_data, "x264-params", "cpu-independent=1", 0));
     Check(av_opt_set_int(encoder_->priv_data, "crf", options_.quality, 0));
     Check(avcodec_open2(encoder_.get(), codec, nullptr));
   }

@@ -107,7 +107,8 @@ TEST_F(MovieTest, FilmDoesNotDependOnTheNumberOfThreads) {
   ASSERT_TRUE(Film(folder_.path() / "one.mp4", {&view_, 1}, options));
   options.workers = 3;
   ASSERT_TRUE(Film(folder_.path() / "three.mp4", {&view_, 1}, options));
-  EXPECT_EQ(testing::ReadText(folder_.path() / "one.mp4"), testing::ReadText(folder_.path() / "three.mp4"));
+  EXPECT_TRUE(testing::ReadText(folder_.path() / "one.mp4") ==
+              testing::ReadText(folder_.path() / "three.mp4"));
 }
 
 TEST_F(MovieTest, FramesAreTheStillsOfTheirTimes) {
