@@ -15,6 +15,7 @@ GraspController::GraspController(const RobotModel& model, std::span<const int> f
       law_(model, static_cast<int>(fingertips.size()), options.weight),
       problem_(static_cast<int>(fingertips.size())),
       solver_(static_cast<int>(fingertips.size()), 0, options.force) {
+  if (!options.bonds.empty()) grasp_.SetBonds(options.bonds);
   problem_.mu.setConstant(options.mu);
   problem_.f_min.setConstant(options.f_min);
   problem_.f_max.setConstant(options.f_max);

@@ -42,6 +42,38 @@ void GraspTerms::SetOverlaps(std::span<const double> overlaps) {
   std::copy(overlaps.begin(), overlaps.end(), overlaps_.begin());
 }
 
+void GraspTerms::SetBonds(std::span<const Bond> bonds) {
+  Require(bonds.size() == fingertips_.size(), "number of bonds", "must be that of the fingertips",
+          static_cast<double>(bonds.size()));
+  bonds_.assign(bonds.begin(), bonds.end());
+}
+
+void GraspTerms::SetBond(const Pose& X_Bf, const Vector6d& V_f, size_t finger) {
+  const Bond& bond = bonds_[finger];
+  Contact& contact = contacts_[finger];
+  contact.kappa_dot.setZero();
+  contact.geometry.g_o_cf = bond.g_o_cf;
+  const Matrix3d R_f_cf = X_Bf.linear().transpose() * X_Bo_.linear() * bond.g_o_cf.linear();
+  contact.geometry.g_f_cf.linear() = R_f_cf;
+  contact.geometry.g_f_cf.translation() = bond.p_f;
+
+  // Rows R_cf_f (v + omega x p_f) of V_f = [v; omega]; Sigma_cf turns with the object: R_dot_cf_f = R_cf_f
+  // [omega_f - omega_o]x, all in f.
+  const Vector3d turn = V_f.tail<3>() - X_Bf.linear().transpose() * X_Bo_.linear() * V_Bo_.tail<3>();
+  const Matrix3d R_cf_f = R_f_cf.transpose();
+  const Matrix3d R_dot = R_cf_f * Skew(turn);
+  const Matrix3d S = Skew(bond.p_f);
+  const Eigen::Index row = 3 * static_cast<Eigen::Index>(finger);
+  auto J = J_B_.middleRows<3>(row);
+  auto J_dot = J_B_dot_.middleRows<3>(row);
+  J.noalias() = R_cf_f * J_f_.topRows<3>();
+  J.noalias() -= (R_cf_f * S) * J_f_.bottomRows<3>();
+  J_dot.noalias() = R_dot * J_f_.topRows<3>();
+  J_dot.noalias() -= (R_dot * S) * J_f_.bottomRows<3>();
+  J_dot.noalias() += R_cf_f * J_f_dot_.topRows<3>();
+  J_dot.noalias() -= (R_cf_f * S) * J_f_dot_.bottomRows<3>();
+}
+
 void GraspTerms::SetState(const ModelTerms& robot, const Vector6d& X_o, const Vector6d& X_o_dot,
                           std::span<const ContactCoordinates> kappa) {
   has_coordinates_ = true;
@@ -72,6 +104,10 @@ void GraspTerms::SetContacts(const ModelTerms& robot, std::span<const ContactCoo
     Contact& contact = contacts_[i];
     robot.CalcFrameJacobian(fingertips_[i], J_f_, J_f_dot_);
     contact.geometry = CalcContactGeometry(tips_[i], *surface_, kappa[i], overlaps_[i]);
+    if (!bonds_.empty()) {
+      SetBond(robot.CalcFramePose(fingertips_[i]), J_f_ * robot.velocity(), i);
+      continue;
+    }
     const Vector6d V_f = J_f_ * robot.velocity();
     contact.kappa_dot = CalcKappaDot(contact.geometry, CalcRelativeTwist(contact.geometry, V_f, V_Bo_));
     CalcContactJacobian(contact, J_f_, J_B_.middleRows(row, 3));

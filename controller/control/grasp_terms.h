@@ -15,6 +15,13 @@
 
 namespace dexcheck {
 
+/// A contact point that is fixed on fingertip and object, as by a ball joint: the paper's contacts
+/// before 4.3, and a reference without rolling and slip.
+struct Bond {
+  Vector3d p_f = Vector3d::Zero();  ///< Of the point in the fingertip frame, m.
+  Pose g_o_cf = Pose::Identity();   ///< Sigma_cf, fixed in the object.
+};
+
 /// Workspace for the terms of one grasp at one state. Sized by the constructor; nothing else allocates.
 class GraspTerms {
  public:
@@ -39,6 +46,10 @@ class GraspTerms {
   /// CalcContactGeometry. Zero until set. @throws std::invalid_argument unless there is one for each
   /// fingertip.
   void SetOverlaps(std::span<const double> overlaps);
+
+  /// From now on the contacts are bonds; kappa is then kept but moves nothing, kappa_dot and G_dot are zero.
+  /// @throws std::invalid_argument unless there is one for each fingertip.
+  void SetBonds(std::span<const Bond> bonds);
 
   [[nodiscard]] int num_contacts() const { return static_cast<int>(fingertips_.size()); }
   /// k, entries of f_c.
@@ -77,6 +88,7 @@ class GraspTerms {
 
  private:
   void SetContacts(const ModelTerms& robot, std::span<const ContactCoordinates> kappa);
+  void SetBond(const Pose& X_Bf, const Vector6d& V_f, size_t finger);
   void RequireCoordinates() const;
 
   std::vector<int> fingertips_;
@@ -86,6 +98,7 @@ class GraspTerms {
   const Surface* surface_;
 
   std::vector<double> overlaps_;
+  std::vector<Bond> bonds_;  // none, or one for each finger
   std::vector<Contact> contacts_;
   Matrix6Xd G_, G_dot_;
   MatrixXd J_B_, J_B_dot_;

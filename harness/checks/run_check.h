@@ -17,6 +17,7 @@ struct RunCheck {
   std::string unit = "1";
   std::string description;
   double bound = 0.0;
+  bool applies = true;  ///< Whether this run asks it at all.
 
   double last = 0.0;  ///< At the last step.
   double max = 0.0;
@@ -28,6 +29,7 @@ struct RunCheck {
   std::string where;       ///< Part of the robot that was worst, when the check has parts.
 
   void Add(double value, double time) {
+    if (!applies) return;
     last = value;
     if (!(value <= max)) {
       max = std::isnan(value) ? std::numeric_limits<double>::infinity() : value;

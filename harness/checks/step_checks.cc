@@ -83,6 +83,11 @@ StepChecks::StepChecks(const Setup& setup)
   Define(kIdleJoints, "idle_joints", kAssumption, "rad", 1e-5,
          "movement since t = 0 of joints that do not carry the object");
   Define(kActuators, "actuator_effort", kAssumption, "1", 1.0, "|tau'| over the motor's limit");
+  // A bond neither slides nor rolls, nor does it care for friction.
+  if (!setup.bonds().empty()) {
+    checks_[kFingertipSlip].description = "distance of the joined points on fingertip and object";
+    for (const Check check : {kConeUse, kContactsLost, kPenetration, kKappa}) checks_[check].applies = false;
+  }
   for (const auto& [name, bound] : setup.scenario().bounds) {
     const auto found = std::find_if(checks_.begin(), checks_.end(),
                                     [&, &key = name](const RunCheck& check) { return check.name == key; });
@@ -232,6 +237,9 @@ void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
     if (fingertip_slip_[i].touching) {
       least_cone_margin_ = std::min(least_cone_margin_, fingertip_slip_[i].cone_margin);
     }
+  }
+  if (!setup_->bonds().empty()) {
+    for (const EngineContact& bond : contacts_) slipped = std::max(slipped, bond.distance);
   }
   Add(kFingertipSlip, slipped);
   Add(kConeUse, cone_use);

@@ -96,7 +96,7 @@ void StepModelCheck::Compare(const ModelTerms& robot, const GraspTerms& grasp, c
   CompareObject(grasp, state);
   CompareMass(robot, step);
   CompareJacobians(robot, step);
-  CompareContacts(grasp, state, X_W0, step);
+  if (with_contacts_) CompareContacts(grasp, state, X_W0, step);
   for (size_t i = 0; i < terms_.size(); ++i) {
     terms_[i].Finish(step);
     step_errors_[i] = terms_[i].step_error();

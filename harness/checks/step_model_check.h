@@ -24,6 +24,13 @@ class StepModelCheck {
   /// @throws InputError as EngineStep.
   StepModelCheck(const Adapter& adapter, std::span<const int> fingertips, OrientationFeedback orientation);
 
+  /// For bonds: the engine has no contact to compare with; their terms are left out of Compare.
+  void LeaveOutContacts() { with_contacts_ = false; }
+  /// Whether a record belongs to the contacts.
+  [[nodiscard]] static bool IsOfContacts(size_t record) {
+    return record >= kContactFrame && record <= kGDotV;
+  }
+
   /// @param robot, grasp evaluated at `state`, reduced coordinates, CalcDynamics included.
   /// @param X_W0 pose of Sigma_0 in the plant, tilt and height included: kappa was found there. Without a
   /// plant, robot.CalcLinkPose(-1).
@@ -97,6 +104,7 @@ class StepModelCheck {
   const Adapter* adapter_;
   std::vector<int> fingertips_;
   bool has_coordinates_;
+  bool with_contacts_ = true;
   EngineStep engine_;
   RoundingScales scales_;
   std::vector<StepTerm> terms_;

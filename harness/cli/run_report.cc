@@ -8,6 +8,7 @@ namespace dexcheck::cli {
 namespace {
 
 void PrintCheck(const RunCheck& check) {
+  if (!check.applies) return;
   fmt::print("  {:<12}{:<24}{:>10.2e}{:>10.1e}  {:<4} {}{}\n", NameOf(check.kind), check.name, check.max,
              check.bound, check.unit == "1" ? "" : check.unit, check.failed ? "FAILS" : "ok",
              check.failed ? fmt::format(" from t = {:.3f} s", check.failed_at) : "");

@@ -74,6 +74,11 @@ void Observer::Read(const Plant& plant, MeasuredState* state) {
   state->X_Bo.translation() = MapVector(pose);
   state->V_Bo << state->X_Bo.linear().transpose() * MapVector(rate), MapVector(rate + 3);
 
+  if (!bond_kappa_.empty()) {
+    state->kappa = bond_kappa_;
+    state->overlap.assign(fingertips_.size(), 0.0);
+    return;
+  }
   // Contacts where the plant's fingertips are.
   const Pose X_oB = state->X_Bo.inverse();
   const bool guess = has_guess_ && state->kappa.size() == fingertips_.size();
@@ -129,7 +134,38 @@ void Observer::ReadAccelerations(const Plant& plant, const MeasuredState& state,
   *V_Bo_dot << state.X_Bo.linear().transpose() * MapVector(rate) - omega.cross(v), MapVector(rate + 3);
 }
 
+void Observer::SetBonds(std::span<const ContactCoordinates> kappa, std::span<const int> constraints) {
+  bond_kappa_.assign(kappa.begin(), kappa.end());
+  bond_constraints_.assign(constraints.begin(), constraints.end());
+}
+
+void Observer::ReadBonds(const Plant& plant) {
+  const mjModel& m = plant.model();
+  const mjData& d = plant.data();
+  for (size_t i = 0; i < contacts_.size(); ++i) {
+    EngineContact& contact = contacts_[i];
+    contact = EngineContact{};
+    const int eq = bond_constraints_[i];
+    for (int row = 0; row + 2 < d.nefc; ++row) {
+      if (d.efc_type[row] != mjCNSTR_EQUALITY || d.efc_id[row] != eq) continue;
+      // Three rows along the world's axes: place of the first body's point against the second's, and the
+      // force on the first.
+      const int body = m.eq_obj2id[eq];
+      const Eigen::Map<const RowMatrix3d> R(d.xmat + 9 * body);
+      contact.touching = true;
+      contact.position = MapVector(d.xpos + 3 * body) + R * MapVector(m.eq_data + mjNEQDATA * eq + 3);
+      contact.distance = MapVector(d.efc_pos + row).norm();
+      contact.force = -MapVector(d.efc_force + row);
+      break;
+    }
+  }
+}
+
 std::span<const EngineContact> Observer::ReadContacts(const Plant& plant) {
+  if (!bond_constraints_.empty()) {
+    ReadBonds(plant);
+    return contacts_;
+  }
   const mjModel& m = plant.model();
   const mjData& d = plant.data();
   for (size_t i = 0; i < fingertips_.size(); ++i) {

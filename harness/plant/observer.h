@@ -34,6 +34,10 @@ class Observer {
   /// @throws InputError when a fingertip or the object has no geom that touches.
   Observer(const Adapter& adapter, std::span<const int> fingertips, const Surface& surface);
 
+  /// The contacts are bonds at these coordinates, made by these constraints of the engine, one for each
+  /// fingertip.
+  void SetBonds(std::span<const ContactCoordinates> kappa, std::span<const int> constraints);
+
   /// q', xi, object, kappa and overlaps at the plant's state; between BeginStep and EndStep.
   /// Tilt and height of the base, which q' does not have, are dropped; kappa is where the plant's fingertips
   /// touch.
@@ -58,6 +62,7 @@ class Observer {
     Vector3d velocity = Vector3d::Zero();  // of Sigma_0's origin, world
     Vector3d omega = Vector3d::Zero();     // world
   };
+  void ReadBonds(const Plant& plant);
   [[nodiscard]] BaseRates ReadBaseRates(const mjData& data) const;
   [[nodiscard]] Vector2d CalcDriveVelocity(double forward, double yaw_rate) const;
 
@@ -68,6 +73,8 @@ class Observer {
   std::vector<int> tip_sites_;
   std::vector<int> tip_geoms_;
   std::vector<EngineContact> contacts_;
+  std::vector<ContactCoordinates> bond_kappa_;
+  std::vector<int> bond_constraints_;
   BaseDeparture departure_;
   Pose X_W0_ = Pose::Identity();
   BaseRates rates_;

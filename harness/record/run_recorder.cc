@@ -206,6 +206,7 @@ void RunRecorder::AddCheckSignals() {
   for (const std::span<const RunCheck> checks :
        {loop_->model_checks(), std::span<const RunCheck>(loop_->checks().checks())}) {
     for (const RunCheck& check : checks) {
+      if (!check.applies) continue;
       Add({"check/" + check.name,
            check.unit,
            check.description,

@@ -76,8 +76,12 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
   json["checks"] = Json::object();
   if (loop.is_checking()) {
     for (const CheckRecord& record : setup.gate().records) json["checks"][record.name] = ToJson(record);
-    for (const RunCheck& check : loop.model_checks()) json["checks"][check.name] = ToJson(check);
-    for (const RunCheck& check : loop.checks().checks()) json["checks"][check.name] = ToJson(check);
+    for (const std::span<const RunCheck> checks :
+         {loop.model_checks(), std::span<const RunCheck>(loop.checks().checks())}) {
+      for (const RunCheck& check : checks) {
+        if (check.applies) json["checks"][check.name] = ToJson(check);
+      }
+    }
     const StepChecks& checks = loop.checks();
     json["assumptions"] = {{"fingertip_slip_max_m", checks.Find("fingertip_slip").max},
                            {"wheel_slip_max_m", checks.Find("wheel_slip").max},

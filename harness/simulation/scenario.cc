@@ -61,6 +61,7 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
   if (const auto count = table.Find("noslip_iterations")) {
     plant.noslip_iterations = static_cast<int>(count->AsWhole(0, kMaxNoslipIterations));
   }
+  if (const auto flag = table.Find("bonded")) plant.bonded = flag->AsFlag();
   if (const auto flag = table.Find("implicit_damping")) plant.implicit_damping = flag->AsFlag();
   if (const auto mu = table.Find("floor_friction")) plant.floor_friction = mu->AsPositive();
   if (const auto mu = table.Find("finger_friction")) plant.finger_friction = mu->AsPositive();

@@ -33,7 +33,8 @@ struct PlantOptions {
   double contact_impedance = 0.99;     ///< solimp, constant.
   double impratio = 100.0;
   int noslip_iterations = 0;
-  bool implicit_damping = false;          ///< The engine's own treatment of joint damping.
+  bool bonded = false;            ///< Fingertips hang on the object by ball joints instead of contacts.
+  bool implicit_damping = false;  ///< The engine's own treatment of joint damping.
   std::optional<double> floor_friction;   ///< mu of wheels on the floor.
   std::optional<double> finger_friction;  ///< mu of fingertips on the object.
 };

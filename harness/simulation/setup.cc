@@ -6,6 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/contact/find_contact.h"
 #include "controller/contact/object_surface.h"
 #include "controller/grasp/finger_placement.h"
 #include "controller/model/parameter_reader.h"
@@ -48,6 +49,7 @@ Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const
   FindFingertips();
   VaryGrasp();
   SolveGrasp();
+  if (scenario_.plant.bonded) MakeBonds();
 }
 
 void Setup::ApplyPlantOptions() {
@@ -133,14 +135,61 @@ void Setup::SolveGrasp() {
          "\"angles\" are singular where the object starts, at beta = " + FormatNumber(X_start_[4]) +
              " rad; take \"rotation\"");
   }
-  const FingerPlacement placement = SolveFingerPlacement(
-      model_, fingertips_, *surface_, X_Bo_start_, grasp.contacts, q, {.penetration = kStartPenetration});
+  const FingerPlacement placement =
+      SolveFingerPlacement(model_, fingertips_, *surface_, X_Bo_start_, grasp.contacts, q,
+                           {.penetration = scenario_.plant.bonded ? 0.0 : kStartPenetration});
   if (!placement.reached) {
     Fail(scenario_, "grasp.contacts_deg",
          "the fingertips do not reach their contacts within the joint ranges; the farthest stays " +
              FormatNumber(placement.residual) + " m away");
   }
   q_start_ = placement.q;
+}
+
+void Setup::MakeBonds() {
+  mjModel& m = *engine_;
+  const int object = adapter_->object_body();
+  const MjDataPtr data = MakeData(m);
+  adapter_->SetPositions(q_start_, data->qpos);
+  mj_kinematics(&m, data.get());
+  ModelTerms kinematics(model_, Coordinates::kReduced);
+  kinematics.SetState(q_start_, VectorXd::Zero(model_.num_velocities()));
+  for (const int tip : fingertips_) {
+    const Pose X_Bf = kinematics.CalcFramePose(tip);
+    const Sphere sphere(*model_.frames()[static_cast<size_t>(tip)].sphere_radius);
+    kappa_start_.push_back(FindContact(sphere, *surface_, X_Bo_start_.inverse() * X_Bf).kappa);
+    const ContactGeometry contact = CalcContactGeometry(sphere, *surface_, kappa_start_.back());
+    bonds_.push_back({contact.g_f_cf.translation(), contact.g_o_cf});
+
+    const int body = m.site_bodyid[adapter_->frame_sites()[static_cast<size_t>(tip)]];
+    int found = -1;
+    for (int eq = 0; eq < m.neq; ++eq) {
+      if (m.eq_type[eq] == mjEQ_CONNECT && m.eq_obj1id[eq] == body && m.eq_obj2id[eq] == object) found = eq;
+    }
+    if (found < 0) {
+      throw InputError("MJCF: plant.bonded: needs an equality connect from body " +
+                       Quote(NameOf(m, mjOBJ_BODY, body)) + " to body " +
+                       Quote(NameOf(m, mjOBJ_BODY, object)));
+    }
+    bond_constraints_.push_back(found);
+    m.eq_active[found] = 1;
+    m.eq_solref[mjNREF * found] = m.pair_solref[0];
+    mjtNum* const solimp = m.eq_solimp + mjNIMP * found;
+    solimp[0] = solimp[1] = scenario_.plant.contact_impedance;
+    // The same point in both bodies.
+    const Vector3d on_object = contact.g_o_cf.translation();
+    const Vector3d p_B = X_Bo_start_ * on_object;
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(data->xmat + 9 * body);
+    const Vector3d on_finger = R.transpose() * (p_B - Eigen::Map<const Vector3d>(data->xpos + 3 * body));
+    std::copy_n(on_finger.data(), 3, m.eq_data + mjNEQDATA * found);
+    std::copy_n(on_object.data(), 3, m.eq_data + mjNEQDATA * found + 3);
+  }
+  // A pair whose margin is below any distance never touches.
+  for (int pair = 0; pair < m.npair; ++pair) {
+    const bool has_object =
+        m.geom_bodyid[m.pair_geom1[pair]] == object || m.geom_bodyid[m.pair_geom2[pair]] == object;
+    if (has_object) m.pair_margin[pair] = -1.0;
+  }
 }
 
 GraspControllerOptions Setup::MakeControllerOptions() const {
@@ -160,6 +209,7 @@ GraspControllerOptions Setup::MakeControllerOptions() const {
   // The platform has no posture; damped, it would hold the object back.
   options.posture.damping.tail(model_.num_joints()).setConstant(2.0 * control.posture_frequency);
   options.X_o_start = X_start_;
+  options.bonds = bonds_;
   options.mu = control.mu;
   options.f_min = control.f_min;
   options.f_max = control.f_max;

@@ -45,6 +45,13 @@ class Setup {
   [[nodiscard]] const Pose& X_Bo_start() const { return X_Bo_start_; }
   [[nodiscard]] const Vector6d& X_start() const { return X_start_; }
 
+  /// Where fingertips and object are joined, in the bonded variant of the plant; none otherwise.
+  [[nodiscard]] const std::vector<Bond>& bonds() const { return bonds_; }
+  /// The engine's constraints that do it, by fingertip.
+  [[nodiscard]] const std::vector<int>& bond_constraints() const { return bond_constraints_; }
+  /// kappa at the start, by fingertip.
+  [[nodiscard]] const std::vector<ContactCoordinates>& kappa_start() const { return kappa_start_; }
+
   /// Options of the law, with the posture and the angles' branch of the start.
   [[nodiscard]] GraspControllerOptions MakeControllerOptions() const;
 
@@ -53,6 +60,7 @@ class Setup {
   void FindFingertips();
   void VaryGrasp();
   void SolveGrasp();
+  void MakeBonds();
 
   Scenario scenario_;
   RobotModel model_;
@@ -63,6 +71,9 @@ class Setup {
   std::vector<int> fingertips_;
   std::vector<int> arm_joints_;  // on the chains of several fingertips
   std::vector<int> idle_joints_;
+  std::vector<Bond> bonds_;
+  std::vector<int> bond_constraints_;
+  std::vector<ContactCoordinates> kappa_start_;
   VectorXd q_start_;
   Pose X_Bo_start_ = Pose::Identity();
   Vector6d X_start_ = Vector6d::Zero();
