@@ -20,7 +20,9 @@ namespace dexcheck {
 /// The model's contact equations. Checks of checks put wrong ones in their place.
 struct ContactFormulas {
   std::function<ContactGeometry(const Surface&, const Surface&, const ContactCoordinates&)> geometry =
-      CalcContactGeometry;
+      [](const Surface& fingertip, const Surface& object, const ContactCoordinates& kappa) {
+        return CalcContactGeometry(fingertip, object, kappa);
+      };
   std::function<void(const Contact&, Eigen::Ref<Matrix6Xd>)> grasp_map = [](const Contact& contact,
                                                                             Eigen::Ref<Matrix6Xd> G) {
     CalcGraspMap({&contact, 1}, G);
