@@ -12,6 +12,8 @@ packages=(
   libmujoco-dev libgl-dev libqhull-dev
   # the run's log
   libhdf5-dev zlib1g-dev
+  # studies' databases
+  libsqlite3-dev
   # the command line
   libcli11-dev libfmt-dev nlohmann-json3-dev
   # off-screen drawing and video

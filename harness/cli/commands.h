@@ -31,5 +31,6 @@ void AddEvalCommand(CLI::App* app, int* exit_code);
 void AddRunCommand(CLI::App* app, const std::string& command_line, int* exit_code);
 void AddExportCommand(CLI::App* app, int* exit_code);
 void AddRenderCommand(CLI::App* app, int* exit_code);
+void AddStudyCommand(CLI::App* app, int* exit_code);
 
 }  // namespace dexcheck::cli

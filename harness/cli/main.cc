@@ -70,6 +70,7 @@ int Run(int argc, char** argv) {
   AddRunCommand(&app, JoinArguments(argc, argv), &exit_code);
   AddExportCommand(&app, &exit_code);
   AddRenderCommand(&app, &exit_code);
+  AddStudyCommand(&app, &exit_code);
   try {
     app.parse(argc, argv);
     if (std::fflush(stdout) == 0) return exit_code;

@@ -41,8 +41,8 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check)
   tau_.setZero(setup.model().num_velocities());
   qvel_.setZero(setup.engine().nv);
   if (check) {
-    model_check_ = std::make_unique<StepModelCheck>(setup.adapter(), setup.fingertips(),
-                                                    scenario.control.orientation);
+    model_check_ =
+        std::make_unique<StepModelCheck>(setup.adapter(), setup.fingertips(), scenario.control.orientation);
     for (const CheckRecord& record : model_check_->records()) {
       RunCheck run_check;
       run_check.name = record.name;
@@ -230,7 +230,7 @@ void ClosedLoop::CheckGrasp() {
   }
   steps_without_grasp_ = missing.empty() ? 0 : steps_without_grasp_ + 1;
   if (static_cast<double>(steps_without_grasp_) * plant_.time_step() < kGraspTimeout) return;
-  throw RunFailure("the grasp is lost: fingertip " + Quote(missing) + " no longer touches the object");
+  throw GraspLost("the grasp is lost: fingertip " + Quote(missing) + " no longer touches the object");
 }
 
 }  // namespace dexcheck
