@@ -21,6 +21,7 @@ packages=(
   fonts-dejavu-core
   # tests and benchmarks, and the programs they take as oracles
   libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools ffmpeg
+  sqlite3 slurm-wlm munge
 )
 # with the argument "development": sanitizers and libFuzzer, coverage, static analysis
 if [[ ${1:-} == development ]]; then

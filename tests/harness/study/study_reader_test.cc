@@ -54,8 +54,8 @@ TEST(StudyReader, TrialsAreTheProductTheLastKeyFastest) {
   for (size_t i = 0; i < trials.size(); ++i) EXPECT_EQ(trials[i].number, static_cast<long>(i));
   EXPECT_EQ(trials[5].seed, 7u);
   EXPECT_EQ(trials[5].parameters, (std::vector<double>{10, 5}));
-  EXPECT_EQ(ListOverrides(study, trials[6]),
-            (std::vector<std::string>{"duration=0.1", "control.f_min=2", "control.K_p=10", "control.K_v=4.5"}));
+  EXPECT_EQ(ListOverrides(study, trials[6]), (std::vector<std::string>{"duration=0.1", "control.f_min=2",
+                                                                       "control.K_p=10", "control.K_v=4.5"}));
 }
 
 TEST(StudyReader, SamplesStayInTheirRanges) {
@@ -79,7 +79,8 @@ TEST(StudyReader, SamplesStayInTheirRanges) {
 
 TEST(StudyReader, MistakesAreNamed) {
   const auto fails = [](const std::string& from, const std::string& to, const std::string& message) {
-    return Throws<InputError>([&] { return ParseStudy(ReplaceOnce(kStudy, from, to), "study.toml"); }, message);
+    return Throws<InputError>([&] { return ParseStudy(ReplaceOnce(kStudy, from, to), "study.toml"); },
+                              message);
   };
   EXPECT_TRUE(fails("scenario =", "scenaro =", "study.toml:3: scenaro"));
   EXPECT_TRUE(fails("\"energy\"", "\"enrgy\"", "did you mean \"energy\"?"));
@@ -94,9 +95,10 @@ TEST(StudyReader, MistakesAreNamed) {
   EXPECT_TRUE(fails("seeds = [0, 7]", "seeds = [-1]", "seeds"));
   EXPECT_TRUE(Throws<InputError>(
       [] {
-        return ParseStudy("name = \"s\"\nscenario = \"hold\"\n[[vary]]\nkey = \"a\"\nfrom = 0\nto = 1\ncount = "
-                          "2000\n[[vary]]\nkey = \"b\"\nfrom = 0\nto = 1\ncount = 2000\n",
-                          "study.toml");
+        return ParseStudy(
+            "name = \"s\"\nscenario = \"hold\"\n[[vary]]\nkey = \"a\"\nfrom = 0\nto = 1\ncount = "
+            "2000\n[[vary]]\nkey = \"b\"\nfrom = 0\nto = 1\ncount = 2000\n",
+            "study.toml");
       },
       "makes 4000000 trials"));
 }

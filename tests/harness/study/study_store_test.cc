@@ -27,15 +27,9 @@ class StudyStoreTest : public ::testing::Test {
  protected:
   StudyStoreTest() {
     study_ = ParseStudy(kText, "study.toml");
-    identity_ = {{"layout", "1"},
-                 {"name", "s"},
-                 {"study", study_.text},
-                 {"scenario", "text"},
-                 {"robot", "text"},
-                 {"mjcf_hash", "0"},
-                 {"dexcheck_version", "1"},
-                 {"git_revision", ""},
-                 {"mujoco_version", "2"}};
+    identity_ = {{"layout", "1"},           {"name", "s"},        {"study", study_.text},
+                 {"scenario", "text"},      {"robot", "text"},    {"mjcf_hash", "0"},
+                 {"dexcheck_version", "1"}, {"git_revision", ""}, {"mujoco_version", "2"}};
   }
 
   [[nodiscard]] StudyStore Open() const {
