@@ -12,6 +12,8 @@ packages=(
   libmujoco-dev libgl-dev libqhull-dev
   # the run's log
   libhdf5-dev zlib1g-dev
+  # studies' databases
+  libsqlite3-dev
   # the command line
   libcli11-dev libfmt-dev nlohmann-json3-dev
   # off-screen drawing and video
@@ -19,6 +21,7 @@ packages=(
   fonts-dejavu-core
   # tests and benchmarks, and the programs they take as oracles
   libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools ffmpeg
+  sqlite3 slurm-wlm munge
 )
 # with the argument "development": sanitizers and libFuzzer, coverage, static analysis
 if [[ ${1:-} == development ]]; then

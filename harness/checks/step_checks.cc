@@ -5,50 +5,9 @@
 
 #include "controller/common/text.h"
 #include "controller/contact/rolling.h"
+#include "harness/plant/body_contact.h"
 
 namespace dexcheck {
-namespace {
-
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
-/// Velocity, normal force and cone use of the engine's contact of two bodies; the deepest when there are
-/// several.
-struct BodyContact {
-  bool touching = false;
-  double distance = 0.0;
-  Vector3d slip = Vector3d::Zero();  // of `body` against the other, tangential, world
-  double cone_use = 0.0;
-  double cone_margin = 0.0;
-};
-
-BodyContact ReadContact(const mjModel& m, const mjData& d, int body, int other) {
-  BodyContact result;
-  for (int i = 0; i < d.ncon; ++i) {
-    const mjContact& c = d.contact[i];
-    const int body1 = m.geom_bodyid[c.geom1];
-    const int body2 = m.geom_bodyid[c.geom2];
-    const bool first = body1 == body && body2 == other;
-    const bool second = body2 == body && body1 == other;
-    if ((!first && !second) || c.efc_address < 0 || c.dim < 3) continue;
-    if (result.touching && c.dist >= result.distance) continue;
-    result.touching = true;
-    result.distance = c.dist;
-    // Velocity of the second geom against the first, along the contact's tangents.
-    const Eigen::Map<const RowMatrix3d> frame(c.frame);
-    const mjtNum* const velocity = d.efc_vel + c.efc_address;
-    result.slip = (velocity[1] * frame.row(1) + velocity[2] * frame.row(2)).transpose();
-    if (first) result.slip = -result.slip;
-    mjtNum force[6];
-    mj_contactForce(&m, &d, i, force);
-    const double tangential = std::hypot(force[1] / c.friction[0], force[2] / c.friction[1]);
-    result.cone_use = force[0] > 0.0 ? tangential / force[0] : 0.0;
-    result.cone_margin = c.friction[0] * (force[0] - tangential);
-  }
-  return result;
-}
-
-}  // namespace
-
 StepChecks::StepChecks(const Setup& setup)
     : setup_(&setup),
       checks_(kCheckCount),
@@ -232,7 +191,7 @@ void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
   };
   const int object = setup_->adapter().object_body();
   for (size_t i = 0; i < tip_bodies_.size(); ++i) {
-    update(&fingertip_slip_[i], ReadContact(plant.model(), plant.data(), tip_bodies_[i], object),
+    update(&fingertip_slip_[i], ReadBodyContact(plant.model(), plant.data(), tip_bodies_[i], object),
            state.X_Bo.linear());
     if (fingertip_slip_[i].touching) {
       least_cone_margin_ = std::min(least_cone_margin_, fingertip_slip_[i].cone_margin);
@@ -248,7 +207,7 @@ void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
   const double phi = setup_->model().num_base_positions() == 3 ? state.q[2] : 0.0;
   const Matrix3d R_B0 = Eigen::AngleAxisd(phi, Vector3d::UnitZ()).toRotationMatrix();
   for (size_t i = 0; i < wheel_bodies_.size(); ++i) {
-    update(&wheel_slip_[i], ReadContact(plant.model(), plant.data(), wheel_bodies_[i], 0), R_B0);
+    update(&wheel_slip_[i], ReadBodyContact(plant.model(), plant.data(), wheel_bodies_[i], 0), R_B0);
   }
   Add(kWheelSlip, slipped);
   Add(kTractionUse, cone_use);

@@ -34,5 +34,6 @@ void AddRunCommand(CLI::App* app, const std::string& command_line, int* exit_cod
 void AddExportCommand(CLI::App* app, int* exit_code);
 void AddRenderCommand(CLI::App* app, int* exit_code);
 void AddReportCommand(CLI::App* app, int* exit_code);
+void AddStudyCommand(CLI::App* app, int* exit_code);
 
 }  // namespace dexcheck::cli

@@ -73,6 +73,7 @@ int Run(int argc, char** argv) {
   AddExportCommand(&app, &exit_code);
   AddRenderCommand(&app, &exit_code);
   AddReportCommand(&app, &exit_code);
+  AddStudyCommand(&app, &exit_code);
   try {
     app.parse(argc, argv);
     if (std::fflush(stdout) == 0) return exit_code;

@@ -235,7 +235,7 @@ void ClosedLoop::CheckGrasp() {
   }
   steps_without_grasp_ = missing.empty() ? 0 : steps_without_grasp_ + 1;
   if (static_cast<double>(steps_without_grasp_) * plant_.time_step() < kGraspTimeout) return;
-  throw RunFailure("the grasp is lost: fingertip " + Quote(missing) + " no longer touches the object");
+  throw GraspLost("the grasp is lost: fingertip " + Quote(missing) + " no longer touches the object");
 }
 
 }  // namespace dexcheck

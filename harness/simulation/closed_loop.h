@@ -16,10 +16,16 @@
 
 namespace dexcheck {
 
-/// The simulated robot failed: lost the object, fell, reached a motor's limit.
+/// The simulated robot failed: fell, or reached a motor's limit.
 class RunFailure : public Error {
  public:
   using Error::Error;
+};
+
+/// A fingertip left the object.
+class GraspLost : public RunFailure {
+ public:
+  using RunFailure::RunFailure;
 };
 
 /// Distance of the object from its desired pose.

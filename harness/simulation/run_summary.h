@@ -38,6 +38,7 @@ struct RunResult {
   Verdict verdict = Verdict::kPass;
   std::string failure;       ///< Why it ended early; empty when it did not.
   bool interrupted = false;  ///< By the user.
+  bool grasp_lost = false;   ///< It ended because a fingertip left the object.
   TrackingStatistics tracking;
   AttributionResult attribution;
   double recording_seconds = 0.0;

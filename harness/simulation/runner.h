@@ -56,6 +56,7 @@ class Runner {
     } catch (const InputError&) {
       throw;
     } catch (const Error& error) {
+      result_.grasp_lost = dynamic_cast<const GraspLost*>(&error) != nullptr;
       result_.failure =
           error.what() + (settling ? " while settling" : " at t = " + FormatNumber(loop_.step_time()) + " s");
     }

@@ -1,0 +1,185 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/common/toml_reader.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/output_file.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/cli/study_files.h"
+#include "harness/study/study_store.h"
+#include "harness/study/trial_pool.h"
+
+namespace dexcheck::cli {
+namespace {
+
+struct Request {
+  std::string study;
+  std::string database;
+  std::string shard;
+  std::uint64_t jobs = 0;
+  bool quiet = false;
+};
+
+/// The trials of one of N shards; "" is all.
+std::vector<Trial> SelectShard(const std::vector<Trial>& trials, const std::string& text) {
+  if (text.empty()) return trials;
+  long index = 0;
+  long count = 0;
+  const char* const end = text.data() + text.size();
+  const auto [slash, error] = std::from_chars(text.data(), end, index);
+  const bool good = error == std::errc() && slash != end && *slash == '/' &&
+                    std::from_chars(slash + 1, end, count).ptr == end && 1 <= index && index <= count;
+  if (!good) throw InputError("--shard: must be I/N with 1 <= I <= N, got " + Quote(text));
+  std::vector<Trial> shard;
+  for (const Trial& trial : trials) {
+    if (trial.number % count == index - 1) shard.push_back(trial);
+  }
+  return shard;
+}
+
+void PrintOutcomes(const std::vector<TrialRow>& rows) {
+  std::map<Outcome, long> counts;
+  for (const TrialRow& row : rows) ++counts[row.result.outcome];
+  for (const auto& [outcome, count] : counts) fmt::print("  {:<18}{:>7}\n", NameOf(outcome), count);
+}
+
+/// Makes the trials that are missing. @return how many of them are done.
+long RunMissing(const StudyInputs& inputs, const std::vector<Trial>& trials, const Request& request,
+                StudyStore* store) {
+  std::vector<bool> done(trials.empty() ? 0 : static_cast<size_t>(trials.back().number) + 1);
+  for (const TrialRow& row : store->ReadRows()) {
+    if (static_cast<size_t>(row.trial.number) < done.size()) {
+      done[static_cast<size_t>(row.trial.number)] = true;
+    }
+  }
+  std::vector<Trial> waiting;
+  for (const Trial& trial : trials) {
+    if (!done[static_cast<size_t>(trial.number)]) waiting.push_back(trial);
+  }
+  const long total = static_cast<long>(trials.size());
+  long finished = total - static_cast<long>(waiting.size());
+  std::reverse(waiting.begin(), waiting.end());
+  ProgressBar bar(inputs.study.name, total, request.quiet);
+  const auto jobs =
+      static_cast<int>(request.jobs > 0 ? request.jobs : std::max(std::thread::hardware_concurrency(), 1U));
+  TrialPool pool(jobs, [&](const Trial& trial) { return RunTrial(inputs, trial); });
+  const auto release = [&] {
+    for (const long trial : pool.ListRunning()) store->Release(trial);
+  };
+  try {
+    while (!IsInterrupted() && (!waiting.empty() || !pool.IsEmpty())) {
+      while (!pool.IsFull() && !waiting.empty()) {
+        const Trial trial = waiting.back();
+        waiting.pop_back();
+        if (store->Claim(trial.number)) pool.Start(trial);
+      }
+      if (const auto row = pool.Wait()) {
+        store->Add(*row);
+        bar.Update(++finished);
+      }
+    }
+  } catch (const InputError&) {
+    throw;  // the database takes no more; nothing can be released in it
+  } catch (const Error&) {
+    release();
+    throw;
+  }
+  release();
+  return finished;
+}
+
+int RunStudy(const Request& request) {
+  const StudyInputs inputs = FindStudy(request.study);
+  const std::vector<Trial> trials = SelectShard(ListTrials(inputs.study), request.shard);
+  CheckTrials(inputs);
+  StudyStore store = StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), inputs.study);
+  CatchInterrupts();
+  RunMissing(inputs, trials, request, &store);
+  const std::vector<TrialRow> rows = store.ReadRows();
+  const auto missing = std::count_if(trials.begin(), trials.end(),
+                                     [&](const Trial& trial) { return !store.Has(trial.number); });
+  if (missing > 0) {
+    throw Error(fmt::format("{}: {} of {} trials are missing ({}); the same command goes on with them",
+                            request.database, missing, trials.size(),
+                            IsInterrupted() ? "interrupted" : "another process has them"));
+  }
+  if (!request.quiet) {
+    fmt::print("{}: {} of {} trials in {}\n", inputs.study.name, rows.size(), ListTrials(inputs.study).size(),
+               request.database);
+    PrintOutcomes(rows);
+  }
+  return kSuccess;
+}
+
+int MergeStudies(const std::string& out, const std::vector<std::string>& databases, bool quiet) {
+  // All are looked at before anything is written.
+  std::vector<std::vector<TrialRow>> rows;
+  const StudyStore first = StudyStore::Open(databases.front());
+  for (const std::string& database : databases) {
+    const StudyStore store = StudyStore::Open(database);
+    store.RequireSame(first.identity());
+    rows.push_back(store.ReadRows());
+  }
+  StudyStore merged = StudyStore::OpenOrCreate(out, first.identity(), first.study());
+  for (size_t i = 0; i < databases.size(); ++i) merged.AddAll(rows[i], databases[i]);
+  const std::vector<TrialRow> all = merged.ReadRows();
+  if (!quiet) {
+    fmt::print("{}: {} of {} trials in {}\n", first.study().name, all.size(),
+               ListTrials(first.study()).size(), out);
+    PrintOutcomes(all);
+  }
+  return kSuccess;
+}
+
+}  // namespace
+
+void AddStudyCommand(CLI::App* app, int* exit_code) {
+  CLI::App* study = app->add_subcommand("study", "Vary a scenario's gains, models or plant over many runs");
+  study->require_subcommand(1);
+  const auto request = std::make_shared<Request>();
+  const auto databases = std::make_shared<std::vector<std::string>>();
+  const auto whole = WholeNumber(1, 1000000);
+  const auto add_quiet = [&](CLI::App* command) {
+    command->add_flag("--quiet", request->quiet, "Print nothing but errors");
+  };
+
+  CLI::App* run = study->add_subcommand("run", "Make the trials that are missing in the database");
+  run->add_option("STUDY", request->study, "Name of a shipped study, or a TOML file")->required();
+  run->add_option("--db", request->database, "The study's database (SQLite), made when there is none")
+      ->type_name("FILE.sqlite")
+      ->required();
+  run->add_option("--jobs", request->jobs, "Trials at a time (all processors by default)")
+      ->type_name("N")
+      ->check(whole);
+  run->add_option("--shard", request->shard, "Only the I-th of N parts of the study")->type_name("I/N");
+  add_quiet(run);
+  run->callback([=] { *exit_code = RunStudy(*request); });
+
+  CLI::App* merge = study->add_subcommand("merge", "Put the databases of one study together");
+  merge->add_option("OUT", request->database, "Database that gets all trials")->required();
+  merge->add_option("DB", *databases, "Databases of the same study")->required();
+  add_quiet(merge);
+  merge->callback([=] { *exit_code = MergeStudies(request->database, *databases, request->quiet); });
+
+  CLI::App* slurm = study->add_subcommand("slurm", "Print an array job for Slurm that makes the study");
+  slurm->add_option("STUDY", request->study, "Name of a shipped study, or a TOML file")->required();
+  slurm->add_option("--tasks", request->jobs, "Parts of the study, each a task")
+      ->type_name("N")
+      ->required()
+      ->check(whole);
+  slurm->callback([=] {
+    fmt::print("{}", MakeSlurmScript(FindStudy(request->study), request->study, request->jobs));
+    *exit_code = kSuccess;
+  });
+}
+
+}  // namespace dexcheck::cli

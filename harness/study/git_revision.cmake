@@ -1,0 +1,13 @@
+# Writes OUT, the source that defines kGitRevision, when it would change: cmake -DOUT=... -DSOURCE=... -P this
+find_program(git git)
+set(revision "")
+if(git AND EXISTS ${SOURCE}/.git)
+  execute_process(COMMAND ${git} -C ${SOURCE} describe --always --dirty --abbrev=12 --exclude=*
+    OUTPUT_VARIABLE revision OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+endif()
+file(CONFIGURE OUTPUT ${OUT} CONTENT [[#include "harness/study/git_revision.h"
+
+namespace dexcheck {
+const char* const kGitRevision = "@revision@";
+}  // namespace dexcheck
+]] @ONLY)

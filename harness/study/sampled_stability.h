@@ -1,0 +1,53 @@
+#pragma once
+
+// The error dynamics (57) as the plant steps them.
+//
+// On one axis the law commands the acceleration a = -K_v e_dot - K_p e, from the error at the beginning of a
+// step and its rate half a step before; torques, and with them a, are held for m steps of h, T = m h.
+// Semi-implicit Euler takes e_dot to e_dot + h a and then e to e + h e_dot, m times:
+//
+//   [e    ]      [1 - b K_p   T - b K_v] [e    ]            T^2 + h T
+//   [e_dot]  ->  [ -T K_p      1 - T K_v] [e_dot]       b = ---------
+//                                                               2
+// trace = 2 - T K_v - b K_p,  determinant = 1 - T K_v + (T^2 - b) K_p. By Jury's criterion both eigenvalues
+// lie inside the unit circle where
+//
+//   T (1 - h / T) K_p / 2  <  K_v  <  2 / T - h K_p / 2        and K_p > 0
+//
+// and they are equal, trace^2 = 4 determinant, at K_v = 2 sqrt(K_p) - b K_p / T. For h -> 0 these are the
+// continuous K_v > 0 and K_v = 2 sqrt(K_p).
+
+#include <vector>
+
+namespace dexcheck {
+
+/// When the law is evaluated.
+struct SampledLoop {
+  double time_step = 1e-3;  ///< h, s.
+  long hold = 1;            ///< m, steps that torques are held.
+  [[nodiscard]] double period() const { return static_cast<double>(hold) * time_step; }
+};
+
+/// Gains of one axis: K_v in 1/s, K_p in 1/s^2.
+struct AxisGains {
+  double K_p = 0.0;
+  double K_v = 0.0;
+};
+
+/// Open range of K_v that is stable at K_p > 0, 1/s; empty when least >= most.
+struct StableRange {
+  double least = 0.0;
+  double most = 0.0;
+};
+StableRange CalcStableRange(const SampledLoop& loop, double K_p);
+
+/// K_v of critical damping at K_p, 1/s; where it is not in the stable range there is none.
+double CalcCriticalDamping(const SampledLoop& loop, double K_p);
+
+/// Largest |eigenvalue| of one sample.
+double CalcSpectralRadius(const SampledLoop& loop, const AxisGains& gains);
+
+/// Errors at the beginning of each of `count` steps of h, from e = 1 and e_dot = 0.
+std::vector<double> CalcStepResponse(const SampledLoop& loop, const AxisGains& gains, long count);
+
+}  // namespace dexcheck

@@ -1,0 +1,113 @@
+#include "harness/study/sqlite.h"
+
+#include <cmath>
+#include <limits>
+
+#include "controller/common/errors.h"
+
+namespace dexcheck {
+namespace {
+
+/// Others hold the lock for one trial's row; on a slow disk or network that may take a while.
+constexpr int kBusyTimeout = 60000;  // ms
+
+int FlagsOf(Database::Mode mode) {
+  switch (mode) {
+    case Database::Mode::kReadOnly:
+      return SQLITE_OPEN_READONLY;
+    case Database::Mode::kReadWrite:
+      return SQLITE_OPEN_READWRITE;
+    case Database::Mode::kCreate:
+      return SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  }
+  return SQLITE_OPEN_READONLY;
+}
+
+std::string Explain(int code, const char* message) {
+  switch (code & 0xff) {
+    case SQLITE_NOTADB:
+    case SQLITE_CORRUPT:
+      return std::string("is not a usable database: ") + message;
+    case SQLITE_CANTOPEN:
+      return "cannot be opened";
+    case SQLITE_READONLY:
+      return "cannot be written: it is read-only";
+    case SQLITE_FULL:
+    case SQLITE_IOERR:
+      return std::string("cannot be written: ") + message;
+    case SQLITE_BUSY:
+      return "is locked by another program";
+    default:
+      return message;
+  }
+}
+
+}  // namespace
+
+Database::Database(const std::filesystem::path& path, Mode mode) : name_(path.string()) {
+  const int code = sqlite3_open_v2(name_.c_str(), &handle_, FlagsOf(mode), nullptr);
+  if (code != SQLITE_OK) {
+    const std::string why = Explain(code, sqlite3_errmsg(handle_));
+    sqlite3_close(handle_);
+    throw InputError(name_ + ": " + why);
+  }
+  sqlite3_busy_timeout(handle_, kBusyTimeout);
+}
+
+Database::~Database() { sqlite3_close(handle_); }
+
+void Database::Execute(const std::string& sql) {
+  const int code = sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr);
+  if (code != SQLITE_OK) Fail(code);
+}
+
+void Database::Fail(int code) const {
+  throw InputError(name_ + ": " + Explain(code, sqlite3_errmsg(handle_)));
+}
+
+Statement::Statement(Database* database, const std::string& sql) : database_(database) {
+  const int code = sqlite3_prepare_v2(database->handle(), sql.c_str(), -1, &handle_, nullptr);
+  if (code != SQLITE_OK) database->Fail(code);
+}
+
+Statement::~Statement() { sqlite3_finalize(handle_); }
+
+void Statement::Bind(int parameter, long long value) { sqlite3_bind_int64(handle_, parameter, value); }
+
+void Statement::Bind(int parameter, double value) { sqlite3_bind_double(handle_, parameter, value); }
+
+void Statement::Bind(int parameter, std::string_view text) {
+  sqlite3_bind_text(handle_, parameter, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT);
+}
+
+bool Statement::Step() {
+  const int code = sqlite3_step(handle_);
+  if (code == SQLITE_ROW) return true;
+  if (code != SQLITE_DONE) database_->Fail(code);
+  sqlite3_reset(handle_);
+  return false;
+}
+
+long long Statement::GetWhole(int column) const { return sqlite3_column_int64(handle_, column); }
+
+double Statement::GetNumber(int column) const {
+  if (sqlite3_column_type(handle_, column) == SQLITE_NULL) return std::numeric_limits<double>::quiet_NaN();
+  return sqlite3_column_double(handle_, column);
+}
+
+std::string Statement::GetText(int column) const {
+  const unsigned char* const text = sqlite3_column_text(handle_, column);
+  if (text == nullptr) return "";
+  return {reinterpret_cast<const char*>(text), static_cast<size_t>(sqlite3_column_bytes(handle_, column))};
+}
+
+Transaction::~Transaction() {
+  if (open_) sqlite3_exec(database_->handle(), "ROLLBACK", nullptr, nullptr, nullptr);
+}
+
+void Transaction::Commit() {
+  database_->Execute("COMMIT");
+  open_ = false;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,73 @@
+#pragma once
+
+// A study's database: table `study` says what the study is, table `trials` has a row for each finished trial.
+// Each row is one transaction, so that the file is whole whenever a process is killed.
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "harness/study/sqlite.h"
+#include "harness/study/study.h"
+#include "harness/study/trial.h"
+
+namespace dexcheck {
+
+/// What a study is, column by column. Rows of studies that differ in any of them do not belong together.
+using StudyIdentity = std::vector<std::pair<std::string, std::string>>;
+
+/// @throws InputError when a file cannot be read.
+StudyIdentity IdentifyStudy(const StudyInputs& inputs);
+
+/// A finished trial.
+struct TrialRow {
+  Trial trial;
+  TrialResult result;
+};
+
+class StudyStore {
+ public:
+  /// Opens a study's database, or makes it when there is none.
+  /// @throws InputError, also when the file holds another study.
+  static StudyStore OpenOrCreate(const std::filesystem::path& path, const StudyIdentity& identity,
+                                 const Study& study);
+  /// Opens one that exists, for reading only. @throws InputError.
+  static StudyStore Open(const std::filesystem::path& path);
+
+  [[nodiscard]] const StudyIdentity& identity() const { return identity_; }
+  [[nodiscard]] const std::string& Identify(const std::string& column) const;
+  /// As the file has it.
+  [[nodiscard]] const Study& study() const { return study_; }
+  /// Throws InputError that names the first column in which this study is another one.
+  void RequireSame(const StudyIdentity& other) const;
+
+  /// By trial number.
+  [[nodiscard]] std::vector<TrialRow> ReadRows() const;
+  [[nodiscard]] bool Has(long trial) const;
+
+  /// Takes a trial on for this process. False when it is done, or another living process of this machine has
+  /// it.
+  bool Claim(long trial);
+  /// Gives a claimed trial back undone.
+  void Release(long trial);
+  /// Stores a trial and ends its claim. A row that is already there stays.
+  void Add(const TrialRow& row);
+  /// All rows in one transaction; equal ones may be there already. @throws InputError when one differs.
+  void AddAll(const std::vector<TrialRow>& rows, const std::string& source);
+
+ private:
+  StudyStore(const std::filesystem::path& path, Database::Mode mode);
+  void Create(const StudyIdentity& identity, const Study& study);
+  void Load();
+  void Insert(const TrialRow& row);
+  [[nodiscard]] std::string ListColumns() const;
+
+  std::unique_ptr<Database> database_;
+  StudyIdentity identity_;
+  Study study_;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,84 @@
+#include "harness/study/trial.h"
+
+#include <limits>
+
+#include "controller/common/errors.h"
+#include "harness/simulation/runner.h"
+#include "harness/study/trial_monitor.h"
+
+namespace dexcheck {
+namespace {
+
+/// A run without a start error diverged when its error is above this, rms, m.
+constexpr double kLostTrack = 0.01;
+
+/// The message without the folders of this machine.
+std::string WithoutFolders(std::string message, const StudyInputs& inputs) {
+  for (const std::filesystem::path& file : {inputs.robot, inputs.mjcf}) {
+    const std::string folder = file.parent_path().string() + "/";
+    for (size_t at = message.find(folder); at != std::string::npos; at = message.find(folder)) {
+      message.erase(at, folder.size());
+    }
+  }
+  return message;
+}
+
+bool HasDiverged(const Setup& setup, const TrialResult& result) {
+  if (!result.failure.empty()) return true;
+  if (setup.scenario().start_error.norm() > 0.0) return !(result.metrics[kErrorGrowth] <= 1.0);
+  return !(result.metrics[kPositionErrorRms] <= kLostTrack);
+}
+
+Outcome Classify(const Setup& setup, const RunResult& run, const TrialResult& result) {
+  if (run.grasp_lost) return Outcome::kLostContact;
+  if (HasDiverged(setup, result)) return Outcome::kDiverged;
+  if (result.metrics[kWheelSlip] > kWheelSlipBound) return Outcome::kWheelsSpun;
+  if (result.metrics[kFingertipSlip] > kFingertipSlipBound) return Outcome::kSlipped;
+  if (run.attribution.cause == Cause::kModel) return Outcome::kChecksDisagreed;
+  return Outcome::kTracked;
+}
+
+}  // namespace
+
+Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial) {
+  Scenario scenario = ParseScenario(inputs.scenario_text, inputs.scenario_source, inputs.scenario_folder,
+                                    ListOverrides(inputs.study, trial));
+  scenario.seed = trial.seed;
+  return scenario;
+}
+
+TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
+  TrialResult result;
+  try {
+    const Scenario scenario = MakeTrialScenario(inputs, trial);
+    const Setup setup(scenario, inputs.robot, inputs.mjcf);
+    Runner runner(setup, inputs.study.check);
+    TrialMonitor monitor(setup, runner.loop());
+    const RunResult& run = runner.Run([&] { monitor.Record(); }, [] { return false; });
+    result.failure = run.failure;
+    result.metrics = monitor.CalcMetrics(run.tracking);
+    result.outcome = Classify(setup, run, result);
+  } catch (const InputError& error) {
+    result.metrics.fill(std::numeric_limits<double>::quiet_NaN());
+    result.outcome = Outcome::kRefused;
+    result.failure = WithoutFolders(error.what(), inputs);
+  }
+  return result;
+}
+
+void CheckTrials(const StudyInputs& inputs) {
+  const Study& study = inputs.study;
+  Trial trial = ListTrials(study).front();
+  const Scenario first = MakeTrialScenario(inputs, trial);
+  const Setup setup(first, inputs.robot, inputs.mjcf);
+  for (size_t i = 0; i < study.variations.size(); ++i) {
+    const double value = trial.parameters[i];
+    for (const double end : {study.variations[i].from, study.variations[i].to}) {
+      trial.parameters[i] = end;
+      MakeTrialScenario(inputs, trial);
+    }
+    trial.parameters[i] = value;
+  }
+}
+
+}  // namespace dexcheck

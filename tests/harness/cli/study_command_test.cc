@@ -1,0 +1,231 @@
+// dexcheck study: interrupted, concurrent, sharded, on full disks; the rows must come out the same.
+
+#include <gmock/gmock.h>
+#include <sqlite3.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <memory>
+#include <random>
+#include <thread>
+
+#include "harness/study/study_store.h"
+#include "tests/harness/cli/dexcheck_program.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::DexcheckCommand;
+using ::testing::HasSubstr;
+using testing::IsRefused;
+using testing::Program;
+using testing::ProgramOptions;
+using testing::ProgramResult;
+using testing::RunDexcheck;
+using testing::TempFolder;
+using testing::WriteText;
+
+// Six trials, one of which diverges.
+const std::string kStudy = R"(name = "tiny"
+scenario = "offset"
+set = ["duration=0.02", "settle=0.3", "start_error.xyz=[1e-6, 0, 0]"]
+[[vary]]
+key = "control.K_p"
+values = [100, 1e4]
+[[vary]]
+key = "control.K_v"
+values = [20, 200, 2100]
+)";
+constexpr size_t kNumTrials = 6;
+/// Where settling leaves the object, m; a twentieth of the start error, measured 5e-9.
+constexpr double kSettled = 5e-8;
+
+/// Every value of the tables that make up a study, with its type, row by row.
+std::string Dump(const std::filesystem::path& path) {
+  Database database(path, Database::Mode::kReadOnly);
+  std::string text;
+  for (const char* sql :
+       {"SELECT * FROM study", "SELECT * FROM trials ORDER BY trial", "PRAGMA integrity_check"}) {
+    sqlite3_stmt* statement = nullptr;
+    EXPECT_EQ(sqlite3_prepare_v2(database.handle(), sql, -1, &statement, nullptr), SQLITE_OK);
+    while (sqlite3_step(statement) == SQLITE_ROW) {
+      for (int i = 0; i < sqlite3_column_count(statement); ++i) {
+        const void* const bytes = sqlite3_column_type(statement, i) == SQLITE_FLOAT ? nullptr : "";
+        if (bytes == nullptr) {
+          char number[64];
+          std::snprintf(number, sizeof(number), "%a", sqlite3_column_double(statement, i));
+          text += number;
+        } else if (sqlite3_column_type(statement, i) != SQLITE_NULL) {
+          text += reinterpret_cast<const char*>(sqlite3_column_text(statement, i));
+        }
+        text += '|';
+      }
+      text += '\n';
+    }
+    sqlite3_finalize(statement);
+  }
+  return text;
+}
+
+class StudyCommand : public ::testing::Test {
+ protected:
+  StudyCommand() { WriteText(folder_.path() / "tiny.toml", kStudy); }
+
+  [[nodiscard]] std::vector<std::string> RunArguments(const std::string& database,
+                                                      std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments = {"study", "run", Path("tiny.toml"), "--db", Path(database)};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+  [[nodiscard]] std::string Path(const std::string& file) const { return folder_.path() / file; }
+
+  /// Rows of the uninterrupted study, made once.
+  const std::string& Reference() {
+    static const auto reference = std::make_unique<std::string>();
+    if (reference->empty()) {
+      const ProgramResult result = RunDexcheck(RunArguments("reference.sqlite"));
+      EXPECT_EQ(result.exit_code, 0) << result.err;
+      EXPECT_THAT(result.out, HasSubstr("tiny: 6 of 6 trials"));
+      *reference = Dump(Path("reference.sqlite"));
+    }
+    return *reference;
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(StudyCommand, ClassifiesItsTrials) {
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--quiet"})).exit_code, 0);
+  const std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  ASSERT_EQ(rows.size(), kNumTrials);
+  for (const TrialRow& row : rows) {
+    const bool stable = row.trial.parameters[1] < 2000.0;
+    EXPECT_EQ(row.result.outcome == Outcome::kTracked, stable) << row.trial.number;
+    EXPECT_EQ(row.result.failure.empty(), stable) << row.result.failure;
+    if (!stable) continue;
+    EXPECT_NEAR(row.result.metrics[kPositionErrorMax], 1e-6, kSettled) << "the start error is the largest";
+    EXPECT_LT(row.result.metrics[kPositionErrorRms], 1e-6);
+    EXPECT_GT(row.result.metrics[kPositionErrorRms], 0.0);
+    EXPECT_GT(row.result.metrics[kConeMargin], 0.0);
+    EXPECT_GT(row.result.metrics[kPeakEffort], 0.0);
+    EXPECT_LT(row.result.metrics[kPeakEffort], 1.0);
+    EXPECT_GT(row.result.metrics[kEnergy], 0.0);
+  }
+}
+
+TEST_F(StudyCommand, GivesTheSameRowsHoweverOftenItIsKilled) {
+  const std::string reference = Reference();
+  std::mt19937 random(5);
+  std::uniform_int_distribution<int> milliseconds(20, 900);
+  constexpr int kKills = 20;
+  for (int i = 0; i < kKills; ++i) {
+    Program program(DexcheckCommand(RunArguments("a.sqlite", {"--jobs", "2"})), {});
+    std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds(random)));
+    program.Signal(SIGKILL);
+    program.Wait();
+  }
+  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
+  EXPECT_EQ(Dump(Path("a.sqlite")), reference);
+}
+
+TEST_F(StudyCommand, TwoWritersLoseNothing) {
+  const std::string reference = Reference();
+  Program one(DexcheckCommand(RunArguments("a.sqlite", {"--jobs", "1"})), {});
+  Program other(DexcheckCommand(RunArguments("a.sqlite", {"--jobs", "1"})), {});
+  const ProgramResult first = one.Wait();
+  const ProgramResult second = other.Wait();
+  // The one that ends first may leave a last trial to the other.
+  EXPECT_TRUE(first.exit_code == 0 || second.exit_code == 0) << first.err << second.err;
+  for (const ProgramResult& result : {first, second}) {
+    if (result.exit_code != 0) EXPECT_THAT(result.err, HasSubstr("another process has them"));
+  }
+  EXPECT_EQ(Dump(Path("a.sqlite")), reference);
+}
+
+TEST_F(StudyCommand, MergedShardsAreTheStudy) {
+  const std::string reference = Reference();
+  for (const std::string shard : {"1", "2"}) {
+    ASSERT_EQ(RunDexcheck(RunArguments(shard + ".sqlite", {"--shard", shard + "/2"})).exit_code, 0);
+  }
+  EXPECT_NE(Dump(Path("1.sqlite")), reference);
+  const ProgramResult merged =
+      RunDexcheck({"study", "merge", Path("all.sqlite"), Path("1.sqlite"), Path("2.sqlite")});
+  EXPECT_EQ(merged.exit_code, 0) << merged.err;
+  EXPECT_THAT(merged.out, HasSubstr("tiny: 6 of 6 trials"));
+  EXPECT_EQ(Dump(Path("all.sqlite")), reference);
+
+  WriteText(folder_.path() / "tiny.toml", testing::ReplaceOnce(kStudy, "duration=0.02", "duration=0.03"));
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck(RunArguments("1.sqlite")), {"1.sqlite: is of another study: study differs"}));
+  ASSERT_EQ(RunDexcheck(RunArguments("other.sqlite", {"--shard", "1/6"})).exit_code, 0);
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck({"study", "merge", Path("none.sqlite"), Path("1.sqlite"), Path("other.sqlite")}),
+                {"other.sqlite: is of another study: study differs"}));
+  EXPECT_FALSE(std::filesystem::exists(Path("none.sqlite")));
+}
+
+TEST_F(StudyCommand, CtrlCEndsItInGoodOrder) {
+  Program program(DexcheckCommand(RunArguments("a.sqlite", {"--jobs", "1"})), {});
+  while (!std::filesystem::exists(Path("a.sqlite")))
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  program.Signal(SIGINT);
+  const ProgramResult result = program.Wait();
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("interrupted"));
+  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
+  EXPECT_EQ(Dump(Path("a.sqlite")), Reference());
+}
+
+TEST_F(StudyCommand, AFullDiskLosesNothing) {
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})).exit_code, 0);
+  const std::string before = Dump(Path("a.sqlite"));
+  ProgramOptions full;
+  full.largest_file = 4096;
+  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite"), full), {"a.sqlite: cannot be written"}));
+  EXPECT_EQ(Dump(Path("a.sqlite")), before);
+  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
+  EXPECT_EQ(Dump(Path("a.sqlite")), Reference());
+}
+
+TEST_F(StudyCommand, AReadOnlyDatabaseIsNamed) {
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})).exit_code, 0);
+  const std::string before = Dump(Path("a.sqlite"));
+  std::vector<std::string> command = DexcheckCommand(RunArguments("a.sqlite"));
+  ::chmod(Path("a.sqlite").c_str(), 0444);
+  if (::geteuid() == 0) {
+    // Root may write everything; nobody may not.
+    ::chmod(folder_.path().c_str(), 0755);
+    command.insert(command.begin(), {"setpriv", "--reuid=65534", "--clear-groups"});
+  }
+  EXPECT_TRUE(IsRefused(testing::RunProgram(command), {"a.sqlite: cannot be written: it is read-only"}));
+  EXPECT_EQ(Dump(Path("a.sqlite")), before);
+}
+
+TEST_F(StudyCommand, MistakesAreNamed) {
+  EXPECT_TRUE(IsRefused(RunDexcheck({"study", "run", "gain", "--db", Path("a.sqlite")}),
+                        {"study \"gain\"", "did you mean \"gains\"?"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("no/a.sqlite")), {"no/a.sqlite: cannot be opened"}));
+  for (const char* shard : {"0/2", "3/2", "1", "1/", "a/b", "1/2x"}) {
+    EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite", {"--shard", shard})),
+                          {"--shard: must be I/N with 1 <= I <= N, got \"" + std::string(shard) + "\""}));
+  }
+  WriteText(folder_.path() / "tiny.toml", testing::ReplaceOnce(kStudy, "control.K_v", "control.K_w"));
+  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite")), {"control.K_w", "did you mean \"K_v\"?"}));
+  EXPECT_FALSE(std::filesystem::exists(Path("a.sqlite"))) << "nothing was begun";
+}
+
+TEST_F(StudyCommand, TheBatchScriptIsReady) {
+  const ProgramResult result = RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "7"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, ::testing::StartsWith("#!/bin/bash\n"));
+  for (const char* part :
+       {"#SBATCH --array=1-7\n", "#SBATCH --requeue\n", "--shard \"$SLURM_ARRAY_TASK_ID/7\""}) {
+    EXPECT_THAT(result.out, HasSubstr(part));
+  }
+}
+
+}  // namespace
+}  // namespace dexcheck

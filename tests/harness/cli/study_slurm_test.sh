@@ -1,0 +1,111 @@
+#!/usr/bin/env bash
+# A study on a Slurm cluster of two nodes, both on this machine and only for this test: four tasks, one of them killed
+# and requeued, merged, must equal the study made by one process. Usage: study_slurm_test.sh DEXCHECK
+set -euo pipefail
+
+skip=77
+dexcheck=$1
+[[ $(id -u) -eq 0 ]] || { echo "skipped: slurmd needs root"; exit $skip; }
+for program in munged slurmctld slurmd sbatch squeue scontrol sqlite3; do
+  command -v $program >/dev/null || { echo "skipped: no $program here"; exit $skip; }
+done
+
+folder=$(mktemp -d /tmp/dexcheck-slurm-XXXXXX)
+daemons=()
+Finish() {
+  code=$?
+  if [[ $code -ne 0 ]]; then tail -n 15 "$folder"/*.log >&2 || true; fi
+  kill "${daemons[@]}" 2>/dev/null || true
+  wait "${daemons[@]}" 2>/dev/null || true
+  rm -rf "$folder"
+}
+trap Finish EXIT
+cd "$folder"
+chmod 755 .
+
+cat >study.toml <<'END'
+name = "tiny"
+scenario = "offset"
+set = ["duration=0.05", "settle=0.3"]
+[[vary]]
+key = "control.K_p"
+values = [100, 1000, 1e4, 1e6]
+[[vary]]
+key = "control.K_v"
+values = [20, 200, 2100]
+END
+
+# A cluster: its own munge key and socket, ports by the process id.
+host=$(hostname -s)
+port=$((20000 + $$ % 20000))
+export SLURM_CONF=$folder/slurm.conf
+cat >slurm.conf <<END
+ClusterName=test
+SlurmctldHost=$host(127.0.0.1)
+SlurmctldPort=$port
+SlurmUser=root
+SlurmdUser=root
+AuthType=auth/munge
+AuthInfo=socket=$folder/munge.socket,cred_expire=5
+CredType=cred/munge
+StateSaveLocation=$folder/state
+SlurmdSpoolDir=$folder/spool-%n
+SlurmctldPidFile=$folder/slurmctld.pid
+SlurmdPidFile=$folder/slurmd-%n.pid
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SchedulerParameters=sched_interval=2,batch_sched_delay=0
+MpiDefault=none
+JobAcctGatherType=jobacct_gather/none
+AccountingStorageType=accounting_storage/none
+ReturnToService=2
+SlurmdTimeout=300
+NodeName=n[1-2] NodeHostname=$host NodeAddr=127.0.0.1 Port=[$((port + 1))-$((port + 2))] CPUs=1 State=UNKNOWN
+PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
+END
+mkdir state spool-n1 spool-n2
+dd if=/dev/urandom of=munge.key bs=64 count=1 status=none
+chmod 400 munge.key
+# In the foreground of this shell, so that they end with it.
+munged --foreground --force --key-file="$folder/munge.key" --socket="$folder/munge.socket" \
+  --pid-file="$folder/munge.pid" --log-file="$folder/munge.log" --seed-file="$folder/munge.seed" &
+daemons+=($!)
+slurmctld -D -f slurm.conf >slurmctld.log 2>&1 &
+daemons+=($!)
+for node in n1 n2; do
+  slurmd -D -N $node -f slurm.conf >slurmd-$node.log 2>&1 &
+  daemons+=($!)
+done
+
+# WaitFor SECONDS COMMAND...: until the command succeeds.
+WaitFor() {
+  local end=$((SECONDS + $1))
+  shift
+  until "$@"; do
+    if ((SECONDS >= end)); then echo "waited in vain for: $*" >&2; return 1; fi
+    sleep 0.3
+  done
+}
+NodesAreIdle() { [[ $(sinfo --noheader --Node --format=%t 2>/dev/null | grep -c idle) -eq 2 ]]; }
+WaitFor 60 NodesAreIdle
+
+"$dexcheck" study slurm study.toml --tasks 4 >job.sh
+job=$(sbatch --parsable job.sh)
+HasRow() { [[ $(sqlite3 "file:tiny-2-of-4.sqlite?mode=ro" 'SELECT count(*) FROM trials' 2>/dev/null) -ge 1 ]]; }
+WaitFor 60 HasRow
+scontrol requeue "${job}_2"
+IsDone() { [[ -z $(squeue --noheader --jobs="$job" 2>/dev/null) ]]; }
+Requeued() { scontrol show job "${job}_2" | grep -q 'Restarts=1'; }
+WaitFor 30 Requeued
+WaitFor 180 IsDone
+nodes=$(scontrol show job "$job" | grep -oE ' NodeList=n[12]' | sort -u | wc -l)
+[[ $nodes -eq 2 ]] || { echo "tasks ran on $nodes nodes, not 2" >&2; exit 1; }
+scontrol show job "$job" | grep -E '^ *JobState=' | grep -qv COMPLETED && { scontrol show job "$job" >&2; exit 1; }
+
+"$dexcheck" study merge --quiet merged.sqlite tiny-*-of-4.sqlite
+"$dexcheck" study run study.toml --db single.sqlite --quiet
+Dump() { sqlite3 "$1" '.mode quote' 'SELECT * FROM study' 'SELECT * FROM trials ORDER BY trial'; }
+[[ $(sqlite3 single.sqlite 'SELECT count(*) FROM trials') -eq 12 ]]
+diff <(Dump merged.sqlite) <(Dump single.sqlite)
+echo "four tasks on two nodes, one requeued: 12 trials equal to those of one process"

@@ -1,0 +1,85 @@
+// Trials in processes of their own, whatever these do.
+
+#include "harness/study/trial_pool.h"
+
+#include <gtest/gtest.h>
+#include <mujoco/mujoco.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <map>
+#include <stdexcept>
+
+#include "controller/common/errors.h"
+#include "harness/engine/engine.h"
+#include "tests/common/throws.h"
+
+namespace dexcheck {
+namespace {
+
+TrialResult MakeResult(const Trial& trial) {
+  TrialResult result;
+  result.metrics.fill(0.5);
+  result.metrics[kEnergy] = trial.parameters[0];
+  return result;
+}
+
+std::map<long, TrialResult> RunAll(TrialPool* pool, long count) {
+  std::map<long, TrialResult> results;
+  long next = 0;
+  while (next < count || !pool->IsEmpty()) {
+    while (next < count && !pool->IsFull()) {
+      pool->Start({next, 0, {0.1 * static_cast<double>(next)}});
+      ++next;
+    }
+    if (const auto row = pool->Wait()) results[row->trial.number] = row->result;
+  }
+  return results;
+}
+
+TEST(TrialPool, ResultsComeBackWhole) {
+  const std::string failure(20000, 'x');  // more than a pipe takes at once
+  TrialPool pool(3, [&](const Trial& trial) {
+    TrialResult result = MakeResult(trial);
+    result.outcome = Outcome::kWheelsSpun;
+    result.failure = failure;
+    return result;
+  });
+  const auto results = RunAll(&pool, 10);
+  ASSERT_EQ(results.size(), 10u);
+  for (const auto& [trial, result] : results) {
+    EXPECT_EQ(result.outcome, Outcome::kWheelsSpun);
+    EXPECT_EQ(result.metrics[kEnergy], 0.1 * static_cast<double>(trial));
+    EXPECT_EQ(result.failure, failure);
+  }
+}
+
+TEST(TrialPool, ACrashCostsNoOtherTrial) {
+  const MjModelPtr engine = LoadMjcfText("<mujoco/>", "empty.xml");  // the handlers of engine errors
+  TrialPool pool(2, [](const Trial& trial) {
+    if (trial.number == 1) std::raise(SIGSEGV);
+    if (trial.number == 2) mju_error("no such thing");
+    if (trial.number == 3) throw std::runtime_error("thrown");
+    if (trial.number == 4) ::_exit(0);
+    return MakeResult(trial);
+  });
+  const auto results = RunAll(&pool, 6);
+  ASSERT_EQ(results.size(), 6u);
+  for (const long good : {0L, 5L}) EXPECT_EQ(results.at(good).outcome, Outcome::kTracked);
+  for (const long bad : {1L, 2L, 3L, 4L}) EXPECT_EQ(results.at(bad).outcome, Outcome::kCrashed) << bad;
+  EXPECT_NE(results.at(1).failure.find("Segmentation fault"), std::string::npos) << results.at(1).failure;
+  EXPECT_NE(results.at(2).failure.find("no such thing"), std::string::npos) << results.at(2).failure;
+  EXPECT_NE(results.at(3).failure.find("thrown"), std::string::npos) << results.at(3).failure;
+}
+
+TEST(TrialPool, WhatIsKilledFromOutsideIsNoResult) {
+  TrialPool pool(1, [](const Trial& trial) {
+    std::raise(SIGKILL);
+    return MakeResult(trial);
+  });
+  EXPECT_TRUE(Throws<Error>([&] { return RunAll(&pool, 1); }, "trial 0 was killed from outside"));
+}
+
+}  // namespace
+}  // namespace dexcheck
