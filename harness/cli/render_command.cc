@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -14,7 +13,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/progress_bar.h"
+#include "harness/cli/make_video.h"
 #include "harness/cli/run_frames_reader.h"
 #include "renders/movie.h"
 #include "renders/png_file.h"
@@ -64,38 +63,6 @@ void WriteStill(const Request& request, const std::vector<RunView>& views, const
   }
 }
 
-ExitCode WriteMovie(const Request& request, const std::vector<RunView>& views, const std::string& out) {
-  const auto start = std::chrono::steady_clock::now();
-  VideoOptions encoding;
-  encoding.width = request.movie.width;
-  encoding.height = request.movie.height;
-  encoding.fps = request.movie.fps;
-  const long frames = CountFrames(views, request.movie.fps);
-  VideoWriter video(out, encoding);
-  CatchInterrupts();
-  ProgressBar bar("drawing", frames, request.quiet);
-  const bool complete = RenderMovie(views, request.movie, &video, [&](long done, long) {
-    bar.Update(done);
-    return !IsInterrupted();
-  });
-  bar.Finish();
-  if (!complete) {
-    fmt::print(stderr, "dexcheck: stopped after {} of {} frames; {} was not written\n", video.frames(),
-               frames, out);
-    return kFailure;
-  }
-  video.Finish();
-  if (!request.quiet) {
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    std::error_code ignored;
-    const double megabytes = static_cast<double>(std::filesystem::file_size(out, ignored)) / 1e6;
-    fmt::print("{}: {} frames, {:.1f} s, {} x {}, {:.1f} MB, drawn in {:.0f} s\n", out, frames,
-               static_cast<double>(frames) / request.movie.fps, request.movie.width, request.movie.height,
-               megabytes, seconds);
-  }
-  return kSuccess;
-}
-
 ExitCode Run(Request request) {
   ReadSize(request.size, &request.movie);
   request.movie.panel = !request.no_panel;
@@ -106,7 +73,7 @@ ExitCode Run(Request request) {
   for (const RecordedFrames& run : runs) views.push_back({run.model.get(), &run.frames});
   std::string out = request.out;
   if (out.empty()) out = (request.run_folder / (request.still ? "still.png" : "video.mp4")).string();
-  if (!request.still) return WriteMovie(request, views, out);
+  if (!request.still) return WriteMovie(views, request.movie, out, request.quiet) ? kSuccess : kFailure;
   WriteStill(request, views, out);
   return kSuccess;
 }

@@ -7,6 +7,8 @@
 
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/make_report.h"
+#include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
@@ -25,6 +27,8 @@ struct Request {
   std::uint64_t seed = 0;
   bool no_check = false;
   bool no_log = false;
+  bool no_report = false;
+  bool video = false;
   bool quiet = false;
   bool list = false;
   std::string replay;
@@ -60,6 +64,10 @@ int RunScenario(const Request& request) {
   const std::string summary = MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n";
   if (recorder) recorder->Close(summary);
   if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
+  if (folder && runner.loop().step() > 0 && !IsInterrupted()) {
+    if (request.video) WriteRunMovie(folder->path(), (folder->path() / "video.mp4").string(), request.quiet);
+    if (!request.no_report) MakeReport(folder->path(), MakeReportFiles(folder->path()));
+  }
   PrintRunReport(setup, runner.loop(), runner.result(), folder ? folder->path().string() : "", request.quiet);
   return ToExitCode(runner.result());
 }
@@ -131,6 +139,8 @@ void AddRunCommand(CLI::App* app, const std::string& command_line, int* exit_cod
       ->type_name("N")
       ->check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
   command->add_flag("--no-check", request->no_check, "Simulate without cross-checks");
+  command->add_flag("--video", request->video, "Draw the run as a video, video.mp4");
+  command->add_flag("--no-report", request->no_report, "Write the log and the summary only");
   command->add_flag("--no-log", request->no_log, "Write no files");
   command->add_flag("--quiet", request->quiet, "Print the verdict only");
   scenario->excludes(list)->excludes(replay);

@@ -48,7 +48,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
                result.tracking.orientation_max());
     if (loop.is_checking()) PrintChecks(setup, loop);
     PrintSpeed(loop, result);
-    if (!folder.empty()) fmt::print("log and summary in {}\n", folder);
+    if (!folder.empty()) fmt::print("log, summary and report in {}\n", folder);
     fmt::print("\n");
   }
   switch (result.verdict) {

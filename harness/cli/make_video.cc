@@ -1,0 +1,55 @@
+#include "harness/cli/make_video.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <system_error>
+#include <thread>
+
+#include "harness/cli/progress_bar.h"
+#include "harness/cli/run_frames_reader.h"
+
+namespace dexcheck::cli {
+
+bool WriteMovie(const std::vector<RunView>& views, const MovieOptions& options, const std::string& out,
+                bool quiet) {
+  const auto start = std::chrono::steady_clock::now();
+  VideoOptions encoding;
+  encoding.width = options.width;
+  encoding.height = options.height;
+  encoding.fps = options.fps;
+  const long frames = CountFrames(views, options.fps);
+  VideoWriter video(out, encoding);
+  CatchInterrupts();
+  ProgressBar bar("drawing", frames, quiet);
+  const bool complete = RenderMovie(views, options, &video, [&](long done, long) {
+    bar.Update(done);
+    return !IsInterrupted();
+  });
+  bar.Finish();
+  if (!complete) {
+    fmt::print(stderr, "dexcheck: stopped after {} of {} frames; {} was not written\n", video.frames(),
+               frames, out);
+    return false;
+  }
+  video.Finish();
+  if (!quiet) {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    std::error_code ignored;
+    const double megabytes = static_cast<double>(std::filesystem::file_size(out, ignored)) / 1e6;
+    fmt::print("{}: {} frames, {:.1f} s, {} x {}, {:.1f} MB, drawn in {:.0f} s\n", out, frames,
+               static_cast<double>(frames) / options.fps, options.width, options.height, megabytes, seconds);
+  }
+  return true;
+}
+
+bool WriteRunMovie(const std::filesystem::path& run_folder, const std::string& out, bool quiet) {
+  const RecordedFrames run = ReadRecordedFrames(run_folder);
+  MovieOptions options;
+  options.forces = true;
+  options.workers = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8);
+  return WriteMovie({{run.model.get(), &run.frames}}, options, out, quiet);
+}
+
+}  // namespace dexcheck::cli

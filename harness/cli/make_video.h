@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "renders/movie.h"
+
+namespace dexcheck::cli {
+
+/// Draws runs into a film, with a progress bar. @return false when the user stopped it; nothing is then
+/// written.
+/// @throws InputError when a camera is unknown or the file cannot be written.
+bool WriteMovie(const std::vector<RunView>& views, const MovieOptions& options, const std::string& out,
+                bool quiet);
+
+/// The film of one run as `dexcheck run --video` makes it: with contact forces.
+bool WriteRunMovie(const std::filesystem::path& run_folder, const std::string& out, bool quiet);
+
+}  // namespace dexcheck::cli
