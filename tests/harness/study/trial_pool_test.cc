@@ -78,7 +78,7 @@ TEST(TrialPool, WhatIsKilledFromOutsideIsNoResult) {
     std::raise(SIGKILL);
     return MakeResult(trial);
   });
-  EXPECT_TRUE(Throws<Error>([&] { return RunAll(&pool, 1); }, "trial 0 was killed from outside"));
+  EXPECT_TRUE(testing::Throws<Error>([&] { return RunAll(&pool, 1); }, "trial 0 was killed from outside"));
 }
 
 }  // namespace
