@@ -15,6 +15,7 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/study_files.h"
+#include "harness/study/study_report.h"
 #include "harness/study/study_store.h"
 #include "harness/study/trial_pool.h"
 
@@ -169,6 +170,18 @@ void AddStudyCommand(CLI::App* app, int* exit_code) {
   merge->add_option("DB", *databases, "Databases of the same study")->required();
   add_quiet(merge);
   merge->callback([=] { *exit_code = MergeStudies(request->database, *databases, request->quiet); });
+
+  CLI::App* report = study->add_subcommand("report", "Write an HTML page of a study's results");
+  report->add_option("DB", request->database, "The study's database")->required();
+  const auto page = std::make_shared<std::string>();
+  report->add_option("--out", *page, "The page (DB.html by default); - for standard output")
+      ->type_name("FILE.html");
+  report->callback([=] {
+    const StudyStore store = StudyStore::Open(request->database);
+    OutputFile out(page->empty() ? request->database + ".html" : *page);
+    out.Write(MakeStudyReport(store));
+    *exit_code = kSuccess;
+  });
 
   CLI::App* slurm = study->add_subcommand("slurm", "Print an array job for Slurm that makes the study");
   slurm->add_option("STUDY", request->study, "Name of a shipped study, or a TOML file")->required();

@@ -1,0 +1,63 @@
+#pragma once
+
+// Charts of studies as inline SVG.
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace dexcheck {
+
+/// Text that may stand in HTML.
+std::string EscapeHtml(const std::string& text);
+
+struct Axis {
+  std::string label;
+  std::vector<double> values;  ///< Ascending; the cells' of a heat map, else the ends.
+  bool logarithmic = false;
+};
+
+struct HeatCell {
+  std::string color;  ///< Empty for no cell.
+  std::string title;  ///< Shown when pointed at.
+  std::string link;
+  bool held = true;  ///< Between held and other cells runs the measured boundary.
+};
+
+struct HeatMap {
+  std::string title;
+  Axis x, y;
+  std::vector<HeatCell> cells;  ///< Row by row of y, from the least.
+  bool with_boundary = false;
+  /// Dots in data coordinates, with a CSS colour each.
+  std::vector<std::pair<std::string, std::vector<std::pair<double, double>>>> overlays;
+};
+std::string DrawHeatMap(const HeatMap& map);
+
+struct ChartPoint {
+  double x = 0.0;
+  double y = 0.0;
+  std::string color;
+  std::string title;
+  std::string link;
+};
+
+struct ChartLine {
+  std::string label;
+  std::string color;
+  std::vector<std::pair<double, double>> points;
+};
+
+struct Chart {
+  std::string title;
+  Axis x, y;  ///< Ends of the axes are taken from points and lines.
+  std::vector<ChartPoint> points;
+  std::vector<ChartLine> lines;
+};
+std::string DrawChart(Chart chart);
+
+/// Colour of a value between the least and the most, by its logarithm where the range spans decades.
+std::string ColorOf(double value, double least, double most);
+
+}  // namespace dexcheck
