@@ -5,8 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/make_report.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
@@ -25,6 +27,7 @@ struct Request {
   std::uint64_t seed = 0;
   bool no_check = false;
   bool no_log = false;
+  bool no_report = false;
   bool quiet = false;
   bool list = false;
   std::string replay;
@@ -34,6 +37,15 @@ struct Request {
 ExitCode ToExitCode(const RunResult& result) {
   if (result.verdict == Verdict::kFailed) return kFailure;
   return result.verdict == Verdict::kPass ? kSuccess : kDisagreement;
+}
+
+/// The run and its verdict stand without a report: why there is none is only told.
+void TryToReport(const std::filesystem::path& folder) {
+  try {
+    MakeReport(folder, MakeReportFiles(folder));
+  } catch (const InputError& error) {
+    fmt::print(stderr, "dexcheck: no report: {}\n", error.what());
+  }
 }
 
 int RunScenario(const Request& request) {
@@ -60,6 +72,7 @@ int RunScenario(const Request& request) {
   const std::string summary = MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n";
   if (recorder) recorder->Close(summary);
   if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
+  if (folder && !request.no_report) TryToReport(folder->path());
   PrintRunReport(setup, runner.loop(), runner.result(), folder ? folder->path().string() : "", request.quiet);
   return ToExitCode(runner.result());
 }
@@ -132,6 +145,7 @@ void AddRunCommand(CLI::App* app, const std::string& command_line, int* exit_cod
       ->check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
   command->add_flag("--no-check", request->no_check, "Simulate without cross-checks");
   command->add_flag("--no-log", request->no_log, "Write no files");
+  command->add_flag("--no-report", request->no_report, "Write the log and the summary only");
   command->add_flag("--quiet", request->quiet, "Print the verdict only");
   scenario->excludes(list)->excludes(replay);
   list->excludes(replay);
