@@ -17,8 +17,18 @@ namespace {
 using Json = nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-constexpr unsigned kMaxSeconds = 300;
+constexpr int kMaxSeconds = 60;
 constexpr auto kPause = std::chrono::milliseconds(50);
+
+/// Whether an HTTP answer has as many bytes as it says.
+bool IsWhole(const std::string& answer) {
+  static const std::regex length("content-length: *([0-9]+)", std::regex::icase);
+  const size_t head = answer.find("\r\n\r\n");
+  std::smatch match;
+  if (head == std::string::npos) return false;
+  const std::string headers = answer.substr(0, head);
+  return std::regex_search(headers, match, length) && answer.size() >= head + 4 + std::stoul(match[1]);
+}
 
 /// Sends an HTTP request to this machine and returns the answer's body.
 std::string Exchange(int port, const std::string& request) {
@@ -27,6 +37,8 @@ std::string Exchange(int port, const std::string& request) {
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(port));
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const timeval patience = {kMaxSeconds, 0};
+  ::setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   std::string answer;
   if (::connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
     for (size_t sent = 0; sent < request.size();) {
@@ -35,7 +47,9 @@ std::string Exchange(int port, const std::string& request) {
       sent += static_cast<size_t>(count);
     }
     char buffer[65536];
-    for (ssize_t count = 0; (count = ::read(connection, buffer, sizeof buffer)) > 0;) {
+    while (!IsWhole(answer)) {
+      const ssize_t count = ::read(connection, buffer, sizeof buffer);
+      if (count <= 0) break;
       answer.append(buffer, static_cast<size_t>(count));
     }
   }
@@ -51,7 +65,7 @@ Browser::Browser() {
   const std::filesystem::path out = folder_.path() / "chromedriver.txt";
   ProgramOptions options;
   options.out = out;
-  options.seconds = kMaxSeconds;
+  options.seconds = 2 * kMaxSeconds;
   driver_ = std::make_unique<Program>(std::vector<std::string>{DEXCHECK_CHROMEDRIVER, "--port=0"}, options);
   const std::regex started("started successfully on port ([0-9]+)");
   const auto deadline = Clock::now() + std::chrono::seconds(30);
