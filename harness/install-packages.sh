@@ -19,9 +19,12 @@ packages=(
   # off-screen drawing and video
   pkg-config libosmesa6-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libpng-dev libfreetype-dev
   fonts-dejavu-core
+  # the report: its figures, its page's plots
+  gnuplot-nox libjs-dygraphs
   # tests and benchmarks, and the programs they take as oracles
   libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools ffmpeg
   sqlite3 slurm-wlm munge
+  chromium chromium-driver
 )
 # with the argument "development": sanitizers and libFuzzer, coverage, static analysis
 if [[ ${1:-} == development ]]; then

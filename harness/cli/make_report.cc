@@ -1,23 +1,31 @@
 #include "harness/cli/make_report.h"
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
 #include "harness/cli/run_frames_reader.h"
+#include "harness/record/log_reader.h"
 #include "renders/movie.h"
 #include "renders/png_file.h"
 
 namespace dexcheck::cli {
 namespace {
 
+/// None when the log has no positions to draw.
 std::vector<Picture> DrawConfigurations(const std::filesystem::path& run_folder,
                                         const std::filesystem::path& folder) {
+  const LogReader log(run_folder / "log.h5");
+  const bool has_positions =
+      std::any_of(log.signals().begin(), log.signals().end(),
+                  [](const SignalInfo& signal) { return signal.name == "engine/qpos"; });
+  if (!has_positions) return {};
   const RecordedFrames run = ReadRecordedFrames(run_folder);
   const std::array<RunView, 1> views = {{{run.model.get(), &run.frames}}};
   MovieOptions options;
   options.width = 960;
   options.height = 600;
-  options.panel = false;
+  options.tracks = true;
   MoviePainter painter(views, options);
   const std::array<Picture, 2> pictures = {
       {{folder / "fig11a.png", "11 (a)", "Robot and object at the beginning"},

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/make_report.h"
@@ -40,6 +41,15 @@ ExitCode ToExitCode(const RunResult& result) {
   return result.verdict == Verdict::kPass ? kSuccess : kDisagreement;
 }
 
+/// The run and its verdict stand without a report: why there is none is only told.
+void TryToReport(const std::filesystem::path& folder) {
+  try {
+    MakeReport(folder, MakeReportFiles(folder));
+  } catch (const InputError& error) {
+    fmt::print(stderr, "dexcheck: no report: {}\n", error.what());
+  }
+}
+
 int RunScenario(const Request& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides, request.seed);
   const Setup setup(files.scenario, files.robot, files.mjcf);
@@ -66,7 +76,7 @@ int RunScenario(const Request& request) {
   if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
   if (folder && runner.loop().step() > 0 && !IsInterrupted()) {
     if (request.video) WriteRunMovie(folder->path(), (folder->path() / "video.mp4").string(), request.quiet);
-    if (!request.no_report) MakeReport(folder->path(), MakeReportFiles(folder->path()));
+    if (!request.no_report) TryToReport(folder->path());
   }
   PrintRunReport(setup, runner.loop(), runner.result(), folder ? folder->path().string() : "", request.quiet);
   return ToExitCode(runner.result());

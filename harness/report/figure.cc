@@ -117,16 +117,14 @@ void WriteScript(const Figure& figure, const VectorXd& time, const Thinning& thi
             << QuoteText(figure.right_label) << "\n";
   }
   const std::string plot = PlotCurves(figure);
-  *script
-      << fmt::format("set terminal svg size {},{} font 'Helvetica,12' enhanced\nset output '{}.svg'\n",
-                     kWidth, height, figure.name)
-      << plot
-      << fmt::format(
-             "set terminal pngcairo size {},{} fontscale 2 linewidth 2 dashlength 2 font "
-             "'DejaVu Sans,11' enhanced\nset output '{}.png'\n",
-             2 * kWidth, 2 * height, figure.name)
-      << plot
-      << "unset output\nunset logscale\nset format y '% h'\nunset y2tics\nunset y2label\nset ytics mirror\n";
+  *script << fmt::format("set terminal svg size {},{} font 'Helvetica,12' enhanced\nset output '{}.svg'\n",
+                         kWidth, height, figure.name)
+          << plot
+          << fmt::format(
+                 "set terminal pngcairo size {},{} fontscale 2 linewidth 2 dashlength 2 font "
+                 "'DejaVu Sans,11' enhanced\nset output '{}.png'\n",
+                 2 * kWidth, 2 * height, figure.name)
+          << plot << "unset output\nunset logscale\nset format y '% h'\nunset y2tics\nunset y2label\n";
 }
 
 /// Runs gnuplot on FOLDER/figures.gnuplot, in the folder.

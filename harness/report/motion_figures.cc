@@ -168,7 +168,7 @@ class MotionFigures {
       figure.curves = {{"normal", normal, 0, 0, false},
                        {"tangential", forces.middleCols<2>(3 * i).rowwise().norm(), 1, 0, false}};
       if (mu != f_c->attributes.end()) {
-        figure.curves.push_back({"friction cone: μ × normal", mu->second * normal, kGrey, 1, false});
+        figure.curves.push_back({"friction cone: μ × normal", mu->second * normal, 2, 1, false});
       }
       Add(figure);
     }

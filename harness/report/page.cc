@@ -48,7 +48,12 @@ Headline FindHeadline(const RunData& run) {
   const std::string verdict = summary.value("verdict", "");
   if (verdict == "failed")
     return {"fail", "FAILED", "The run could not be completed: " + summary.value("failure", "")};
-  if (verdict == "disagreement") return {"fail", "DISAGREEMENT", "Model and engine disagree."};
+  if (verdict == "disagreement") {
+    const std::string cause = FindString(summary, "attribution", "cause");
+    return {"fail", "DISAGREEMENT",
+            cause == "model" ? "The two descriptions of the robot differ."
+                             : "The engine does not do what the equations say."};
+  }
   if (run.checks().empty()) return {"open", "NOT CHECKED", "The run completed; nothing was checked."};
   return {"pass", "PASS", "Model, balance, prediction and assumptions hold at every step."};
 }
@@ -160,11 +165,14 @@ class Page {
     };
     AddTile(tracking("position_error_max_m", " m"), "largest position error of the object");
     AddTile(tracking("orientation_error_max_rad", " rad"), "largest orientation error");
-    AddTile(fmt::format("{:.4g} s", run_.time()[run_.time().size() - 1]),
+    const double simulated =
+        summary.is_null() ? run_.time()[run_.time().size() - 1] : summary.value("simulated_s", 0.0);
+    AddTile(fmt::format("{:.4g} s", simulated),
             fmt::format("simulated, {} steps", run_.time().size()).c_str());
-    const double margin = FindNumber(summary, "assumptions", "cone_margin_min");
-    if (std::isfinite(margin))
-      AddTile(fmt::format("{:.3g} %", 100.0 * margin), "least distance to the friction cones");
+    for (const CheckLine& check : run_.checks()) {
+      if (check.name == "cone_use")
+        AddTile(FormatShare(check.max), "of the fingertips' friction used, at most");
+    }
     const double factor = FindNumber(summary, "speed", "real_time_factor");
     if (std::isfinite(factor)) AddTile(fmt::format("{:.2g} ×", factor), "real time");
     html_ += "</div>\n";
@@ -181,11 +189,7 @@ class Page {
   void AddCheckRow(const CheckLine& check) {
     const double share = check.share();
     std::string where = check.where;
-    if (!check.constant) {
-      const std::string time =
-          fmt::format("{} at {:.3f} s", where.empty() ? "worst" : "worst:", check.at_time);
-      where = where.empty() ? time : where + ", " + fmt::format("{:.3f} s", check.at_time);
-    }
+    if (!check.constant) where += fmt::format("{}{:.3f} s", where.empty() ? "" : ", ", check.at_time);
     const std::string unit = check.unit == "1" ? "" : " " + check.unit;
     const std::string verdict = check.pass       ? "holds"
                                 : check.constant ? "differs"

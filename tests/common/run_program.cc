@@ -12,7 +12,6 @@
 namespace dexcheck::testing {
 namespace {
 
-constexpr unsigned kMaxSeconds = 60;
 constexpr int kCannotStart = 127;
 
 void Redirect(int descriptor, const std::filesystem::path& path) {
@@ -35,7 +34,7 @@ void Redirect(int descriptor, const std::filesystem::path& path) {
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
-  ::alarm(kMaxSeconds);
+  ::alarm(options.seconds);
   ::execvp(arguments[0], arguments.data());
   ::_exit(kCannotStart);
 }

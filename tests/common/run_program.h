@@ -26,9 +26,10 @@ struct ProgramOptions {
   std::vector<std::pair<std::string, std::string>> environment = {};  ///< Added to this process's.
   std::optional<rlim_t> largest_file = {};        ///< Bytes; the program cannot write more into one file.
   std::optional<std::filesystem::path> out = {};  ///< Standard output goes into this file instead.
+  unsigned seconds = 60;                          ///< After these it is ended by force.
 };
 
-/// A running program; a minute later it is ended by force.
+/// A running program.
 class Program {
  public:
   /// @param command the program and its arguments; the program by path, or looked up in PATH.

@@ -77,6 +77,22 @@
     context.restore();
   };
 
+  /** Ticks of a logarithmic axis: powers of ten, at most one for each 28 pixels; below two decades, 2 and 5 too. */
+  const tickDecades = (low, high, pixels) => {
+    const from = Math.ceil(Math.log10(low) - 1e-9);
+    const to = Math.floor(Math.log10(high) + 1e-9);
+    const stride = Math.max(1, Math.ceil((to - from + 1) * 28 / pixels));
+    const ticks = [];
+    for (let decade = from - 1; decade <= to; ++decade) {
+      for (const digit of to - from < 2 ? [1, 2, 5] : [1]) {
+        const value = digit * 10 ** decade;
+        if (value < low || value > high || decade % stride !== 0) continue;
+        ticks.push({v: value, label: decade < -2 || decade > 3 ? `${digit}e${decade}` : format(value)});
+      }
+    }
+    return ticks;
+  };
+
   /** One finger scrolls the page; two fingers zoom the plot. */
   const makeInteraction = () => {
     const model = Object.assign({}, Dygraph.defaultInteractionModel);
@@ -123,15 +139,16 @@
     const values = makeKeys(plot, box.querySelector('.keys'), () => graph);
     const range = findRange(plot, rows, false);
     const rightRange = findRange(plot, rows, true);
-    const formatAxis = value => format(Number(value.toPrecision(10)));
+    const formatAxis = value => format(Number(value.toPrecision(4)));
     const axis = {axisLabelFormatter: formatAxis, axisLabelWidth: 62};
+    if (plot.log) axis.ticker = tickDecades;
     graph = new Dygraph(box.querySelector('.plot'), rows, {
       labels: ['t'].concat(plot.curves.map(curve => curve.id)),
       series,
       axes: {
         x: {axisLabelFormatter: formatAxis},
         y: Object.assign({valueRange: range}, axis),
-        y2: Object.assign({valueRange: plot.right ? rightRange : null, independentTicks: false}, axis),
+        y2: Object.assign({valueRange: plot.right ? rightRange : null, independentTicks: true, drawGrid: false}, axis),
       },
       logscale: plot.log,
       xlabel: 't (s)',

@@ -1,0 +1,173 @@
+#include "tests/common/browser.h"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <regex>
+#include <stdexcept>
+#include <thread>
+
+namespace dexcheck::testing {
+namespace {
+
+using Json = nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+constexpr int kMaxSeconds = 60;
+constexpr auto kPause = std::chrono::milliseconds(50);
+
+/// Whether an HTTP answer has as many bytes as it says.
+bool IsWhole(const std::string& answer) {
+  static const std::regex length("content-length: *([0-9]+)", std::regex::icase);
+  const size_t head = answer.find("\r\n\r\n");
+  std::smatch match;
+  if (head == std::string::npos) return false;
+  const std::string headers = answer.substr(0, head);
+  return std::regex_search(headers, match, length) && answer.size() >= head + 4 + std::stoul(match[1]);
+}
+
+/// Sends an HTTP request to this machine and returns the answer's body.
+std::string Exchange(int port, const std::string& request) {
+  const int connection = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const timeval patience = {kMaxSeconds, 0};
+  ::setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  std::string answer;
+  if (::connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
+    for (size_t sent = 0; sent < request.size();) {
+      const ssize_t count = ::send(connection, request.data() + sent, request.size() - sent, MSG_NOSIGNAL);
+      if (count <= 0) break;
+      sent += static_cast<size_t>(count);
+    }
+    char buffer[65536];
+    while (!IsWhole(answer)) {
+      const ssize_t count = ::read(connection, buffer, sizeof buffer);
+      if (count <= 0) break;
+      answer.append(buffer, static_cast<size_t>(count));
+    }
+  }
+  ::close(connection);
+  const size_t head = answer.find("\r\n\r\n");
+  if (head == std::string::npos) throw std::runtime_error("no answer from chromedriver");
+  return answer.substr(head + 4);
+}
+
+}  // namespace
+
+Browser::Browser() {
+  const std::filesystem::path out = folder_.path() / "chromedriver.txt";
+  ProgramOptions options;
+  options.out = out;
+  options.seconds = 2 * kMaxSeconds;
+  driver_ = std::make_unique<Program>(std::vector<std::string>{DEXCHECK_CHROMEDRIVER, "--port=0"}, options);
+  const std::regex started("started successfully on port ([0-9]+)");
+  const auto deadline = Clock::now() + std::chrono::seconds(30);
+  for (std::smatch match; port_ == 0; std::this_thread::sleep_for(kPause)) {
+    const std::string text = std::filesystem::exists(out) ? ReadText(out) : "";
+    if (std::regex_search(text, match, started)) port_ = std::stoi(match[1]);
+    if (Clock::now() > deadline) throw std::runtime_error("chromedriver did not start");
+  }
+  const Json chromium = {
+      {"args", {"--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"}}};
+  const Json wanted = {{"goog:chromeOptions", chromium}, {"goog:loggingPrefs", {{"browser", "ALL"}}}};
+  const Json session = Call("POST", "/session", {{"capabilities", {{"alwaysMatch", wanted}}}});
+  session_ = "/session/" + session.at("sessionId").get<std::string>();
+}
+
+Browser::~Browser() {
+  try {
+    Call("DELETE", session_, Json::object());
+  } catch (const std::exception&) {
+    driver_->Signal(SIGTERM);
+  }
+}
+
+void Browser::Open(const std::filesystem::path& page) const {
+  Call("POST", session_ + "/url", {{"url", "file://" + std::filesystem::absolute(page).string()}});
+}
+
+void Browser::SetViewport(int width, int height, bool mobile) const {
+  Command("Emulation.setDeviceMetricsOverride",
+          {{"width", width}, {"height", height}, {"deviceScaleFactor", 1}, {"mobile", mobile}});
+}
+
+void Browser::SetDark(bool dark) const {
+  const Json feature = {{"name", "prefers-color-scheme"}, {"value", dark ? "dark" : "light"}};
+  Command("Emulation.setEmulatedMedia", {{"features", Json::array({feature})}});
+}
+
+Json Browser::Run(const std::string& body) const {
+  return Call("POST", session_ + "/execute/sync", {{"script", body}, {"args", Json::array()}});
+}
+
+bool Browser::WaitFor(const std::string& body, double seconds) const {
+  const auto deadline = Clock::now() + std::chrono::duration<double>(seconds);
+  while (Run(body) != true) {
+    if (Clock::now() > deadline) return false;
+    std::this_thread::sleep_for(kPause);
+  }
+  return true;
+}
+
+void Browser::Drag(int from_x, int from_y, int to_x, int to_y) const {
+  const auto move = [](int x, int y) {
+    return Json{{"type", "pointerMove"}, {"duration", 50}, {"x", x}, {"y", y}};
+  };
+  const int middle_x = (from_x + to_x) / 2;
+  const int middle_y = (from_y + to_y) / 2;
+  Act(Json::array({move(from_x, from_y),
+                   {{"type", "pointerDown"}, {"button", 0}},
+                   move(middle_x, middle_y),
+                   move(to_x, to_y),
+                   {{"type", "pointerUp"}, {"button", 0}}}));
+}
+
+void Browser::DoubleClick(int x, int y) const {
+  const Json down = {{"type", "pointerDown"}, {"button", 0}};
+  const Json up = {{"type", "pointerUp"}, {"button", 0}};
+  Act(Json::array({{{"type", "pointerMove"}, {"duration", 0}, {"x", x}, {"y", y}}, down, up, down, up}));
+}
+
+std::vector<std::string> Browser::TakeConsole() const {
+  std::vector<std::string> messages;
+  for (const Json& entry : Call("POST", session_ + "/se/log", {{"type", "browser"}})) {
+    const std::string level = entry.at("level").get<std::string>();
+    if (level == "SEVERE" || level == "WARNING") messages.push_back(entry.at("message").get<std::string>());
+  }
+  return messages;
+}
+
+Json Browser::Call(const std::string& method, const std::string& path, const Json& body) const {
+  const std::string text = method == "DELETE" ? "" : body.dump();
+  const Json answer = Json::parse(Exchange(
+      port_, method + " " + path +
+                 " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Type: application/json\r\n"
+                 "Content-Length: " +
+                 std::to_string(text.size()) + "\r\n\r\n" + text));
+  const Json& value = answer.at("value");
+  if (value.is_object() && value.contains("error")) {
+    throw std::runtime_error(method + " " + path + ": " + value.value("message", ""));
+  }
+  return value;
+}
+
+void Browser::Command(const std::string& name, const Json& parameters) const {
+  Call("POST", session_ + "/goog/cdp/execute", {{"cmd", name}, {"params", parameters}});
+}
+
+void Browser::Act(const Json& pointer_actions) const {
+  const Json mouse = {{"type", "pointer"},
+                      {"id", "mouse"},
+                      {"parameters", {{"pointerType", "mouse"}}},
+                      {"actions", pointer_actions}};
+  Call("POST", session_ + "/actions", {{"actions", Json::array({mouse})}});
+}
+
+}  // namespace dexcheck::testing

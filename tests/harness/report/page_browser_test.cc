@@ -1,0 +1,148 @@
+// The report's page in a browser.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "harness/report/write_report.h"
+#include "tests/common/browser.h"
+#include "tests/common/files.h"
+#include "tests/harness/report/report_run.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::Browser;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+constexpr long kRows = 2001;
+constexpr double kEnd = 2.0;              // s
+constexpr double kPixelTolerance = 0.03;  // of the run: places in whole pixels of a plot some 450 wide
+constexpr double kFloatTolerance = 1e-6;  // values are 4-byte floats
+
+const char* const kAllDrawn =
+    "const boxes = [...document.querySelectorAll('[data-plot]')]; return boxes.length > 0 && boxes.every(b "
+    "=> b.graph);";
+
+/// [from, to] of the plot with this number.
+std::string AskRange(int plot) {
+  return "return document.querySelectorAll('[data-plot]')[" + std::to_string(plot) + "].graph.xAxisRange();";
+}
+
+class PageBrowserTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    testing::ReportRun run;
+    run.rows = kRows;
+    testing::WriteReportRun(folder_.path(), run);
+    WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()));
+  }
+
+  void ExpectVerdictInFirstView(int width, int height, bool mobile) {
+    browser_.SetViewport(width, height, mobile);
+    browser_.Open(folder_.path() / "report.html");
+    const nlohmann::json place = browser_.Run(
+        "const r = document.getElementById('verdict').getBoundingClientRect();"
+        "return {bottom: r.bottom, height: r.height, text: document.getElementById('verdict').innerText,"
+        "  scroll: scrollY, view: innerHeight, overflow: document.documentElement.scrollWidth - "
+        "innerWidth};");
+    EXPECT_EQ(place["scroll"], 0);
+    EXPECT_GT(place["height"], 50.0);
+    EXPECT_LT(place["bottom"], height) << width;
+    EXPECT_LE(place["overflow"], 0) << width;
+    EXPECT_THAT(place["text"].get<std::string>(), ::testing::HasSubstr("DISAGREEMENT"));
+    EXPECT_THAT(place["text"].get<std::string>(), ::testing::HasSubstr("wheel slip"));
+  }
+
+  /// A high window, so that all plots are in view and thus drawn.
+  void OpenWithAllPlots() {
+    browser_.SetViewport(1280, 9000);
+    browser_.Open(folder_.path() / "report.html");
+    ASSERT_TRUE(browser_.WaitFor(kAllDrawn));
+  }
+
+  void ExpectRange(int plot, double from, double to) const {
+    const nlohmann::json range = browser_.Run(AskRange(plot));
+    EXPECT_NEAR(range[0].get<double>(), from, kPixelTolerance * kEnd) << "plot " << plot;
+    EXPECT_NEAR(range[1].get<double>(), to, kPixelTolerance * kEnd) << "plot " << plot;
+  }
+
+  void ExpectZoomAndReset() {
+    const nlohmann::json area = browser_.Run(
+        "const g = document.querySelectorAll('[data-plot]')[0].graph, a = g.getArea(),"
+        "  r = g.graphDiv.getBoundingClientRect(); return [r.x + a.x, r.y + a.y, a.w, a.h].map(Math.round);");
+    const int x = area[0];
+    const int y = area[1].get<int>() + area[3].get<int>() / 2;
+    const int width = area[2];
+    ASSERT_GT(width, 200);
+    ExpectRange(0, 0.0, kEnd);
+    browser_.Drag(x + width / 4, y, x + width / 2, y);
+    ASSERT_TRUE(
+        browser_.WaitFor("const range = document.querySelectorAll('[data-plot]')[0].graph.xAxisRange();"
+                         "return range[1] - range[0] < 1;"));
+    for (const int plot : {0, 1, 5}) ExpectRange(plot, 0.25 * kEnd, 0.5 * kEnd);
+    browser_.DoubleClick(x + width / 2, y);
+    for (const int plot : {0, 1, 5}) ExpectRange(plot, 0.0, kEnd);
+  }
+
+  testing::TempFolder folder_;
+  Browser browser_;
+};
+
+TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
+  ExpectVerdictInFirstView(390, 844, true);
+  ExpectVerdictInFirstView(1280, 720, false);
+  OpenWithAllPlots();
+
+  // The plots have the log's numbers: x actual and desired, at t = 1 s.
+  const nlohmann::json values = browser_.Run(
+      "const g = document.querySelectorAll('[data-plot]')[0].graph;"
+      "return [g.numRows(), g.getValue(1000, 0), g.getValue(1000, 1), g.getValue(1000, 2)];");
+  EXPECT_EQ(values[0], kRows);
+  EXPECT_NEAR(values[1].get<double>(), 1.0, kFloatTolerance);
+  EXPECT_NEAR(values[2].get<double>(), testing::ReportObjectX(1.0), kFloatTolerance);
+  EXPECT_NEAR(values[3].get<double>(), testing::ReportObjectX(1.0) + 1e-3, kFloatTolerance);
+  // Something was painted.
+  EXPECT_GT(browser_
+                .Run("const c = document.querySelector('.plot canvas');"
+                     "return c.getContext('2d').getImageData(0, 0, c.width, c.height).data"
+                     "  .reduce((sum, value, i) => sum + (i % 4 === 3 && value > 0 ? 1 : 0), 0);")
+                .get<int>(),
+            500);
+  ExpectZoomAndReset();
+
+  // A name switches its curve off.
+  EXPECT_EQ(browser_.Run("const box = document.querySelectorAll('[data-plot]')[0];"
+                         "box.querySelector('.keys button').click(); return box.graph.visibility();"),
+            nlohmann::json({false, true}));
+  // Figures are in the page, no id stands twice, and nothing was loaded.
+  EXPECT_EQ(browser_.Run("return document.querySelectorAll('figure svg').length;"), 12);
+  EXPECT_EQ(browser_.Run("const ids = [...document.querySelectorAll('[id]')].map(e => e.id);"
+                         "return ids.length - new Set(ids).size;"),
+            0);
+  EXPECT_EQ(browser_.Run("return performance.getEntriesByType('resource')"
+                         "  .filter(e => !e.name.startsWith('data:')).length;"),
+            0);
+
+  const std::string ask_ground = "return getComputedStyle(document.body).backgroundColor;";
+  const nlohmann::json light = browser_.Run(ask_ground);
+  browser_.SetDark(true);
+  EXPECT_NE(browser_.Run(ask_ground), light);
+  EXPECT_THAT(browser_.TakeConsole(), IsEmpty());
+}
+
+TEST_F(PageBrowserTest, WouldNoticeErrors) {
+  std::string page = testing::ReadText(folder_.path() / "report.html");
+  const std::string end = "</body>";
+  page.insert(page.rfind(end),
+              "<script>noSuchFunction();</script><img src=\"https://example.invalid/x.png\">");
+  testing::WriteText(folder_.path() / "report.html", page);
+  browser_.Open(folder_.path() / "report.html");
+  EXPECT_THAT(browser_.TakeConsole(), ::testing::AllOf(Not(IsEmpty()), ::testing::SizeIs(2)));
+}
+
+}  // namespace
+}  // namespace dexcheck

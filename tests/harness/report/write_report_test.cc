@@ -1,0 +1,193 @@
+// What a report's files hold.
+
+#include "harness/report/write_report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <set>
+#include <string>
+
+#include "controller/common/errors.h"
+#include "harness/report/html.h"
+#include "harness/report/run_data.h"
+#include "harness/report/run_figures.h"
+#include "tests/common/files.h"
+#include "tests/common/throws.h"
+#include "tests/harness/report/report_run.h"
+
+namespace dexcheck {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::ReadText;
+using testing::ReportRun;
+using testing::TempFolder;
+using testing::WriteReportRun;
+
+class WriteReportTest : public ::testing::Test {
+ protected:
+  /// Writes a run and its report; returns the page.
+  std::string Report(const ReportRun& run = {}) {
+    WriteReportRun(run_dir(), run);
+    WriteRunReport(run_dir(), MakeReportFiles(run_dir()));
+    return ReadText(run_dir() / "report.html");
+  }
+  [[nodiscard]] fs::path run_dir() const { return folder_.path() / "run"; }
+  [[nodiscard]] std::set<std::string> ListFiles() const {
+    std::set<std::string> names;
+    for (const fs::directory_entry& entry : fs::directory_iterator(run_dir())) {
+      names.insert(entry.path().filename().string());
+    }
+    return names;
+  }
+
+ private:
+  TempFolder folder_;
+};
+
+TEST(EncodeBase64, HasTheVectorsOfRfc4648) {
+  EXPECT_EQ(EncodeBase64(""), "");
+  EXPECT_EQ(EncodeBase64("f"), "Zg==");
+  EXPECT_EQ(EncodeBase64("fo"), "Zm8=");
+  EXPECT_EQ(EncodeBase64("foo"), "Zm9v");
+  EXPECT_EQ(EncodeBase64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(EncodeBase64("\xff\xfe"), "//4=");
+}
+
+TEST_F(WriteReportTest, HasThePapersPanelsFromTheRightSignals) {
+  WriteReportRun(run_dir());
+  const RunData run(run_dir());
+  const std::vector<Figure> figures = MakeMotionFigures(run);
+  std::map<std::string, std::vector<std::string>> labels;
+  for (const Figure& figure : figures) {
+    for (const Curve& curve : figure.curves) labels[figure.name].push_back(curve.label);
+  }
+  EXPECT_THAT(labels["fig12a"], ElementsAre("x actual", "x desired"));
+  EXPECT_THAT(labels["fig12c"], ElementsAre("x_c (m)", "y_c (m)", "φ (rad)"));
+  EXPECT_THAT(labels["fig12d"], ElementsAre("rf1_1", "rf1_2"));
+  EXPECT_THAT(labels["fig12e"], ElementsAre("l_elbow"));
+  EXPECT_THAT(labels["fig12f"], ElementsAre("wheel_right", "waist_yaw", "r_elbow"));
+  EXPECT_THAT(labels["idle_finger_torques"], ElementsAre("lf1_1"));
+  EXPECT_THAT(labels["other_torques"], ElementsAre("tail"));
+  EXPECT_EQ(labels["fig12b"].size(), 10U);
+  for (const Figure& figure : figures) {
+    if (figure.name != "fig13a") continue;
+    EXPECT_EQ(figure.curves[0].values[3], 2.0);
+    EXPECT_DOUBLE_EQ(figure.curves[1].values[3], 0.5);  // hypot(0.3, 0.4)
+    EXPECT_EQ(figure.curves[2].values[3], 1.0);         // mu 0.5
+  }
+  EXPECT_EQ(labels["fig13a"].size(), 3U);
+}
+
+TEST_F(WriteReportTest, DrawsResidualsAsSharesOfTheirBounds) {
+  WriteReportRun(run_dir());
+  const std::vector<Figure> figures = MakeResidualFigures(RunData(run_dir()));
+  ASSERT_EQ(figures.size(), 4U);
+  EXPECT_EQ(figures[1].name, "residual_balance");
+  EXPECT_TRUE(figures[1].log);
+  EXPECT_EQ(figures[1].bound, 1.0);
+  EXPECT_DOUBLE_EQ(figures[1].curves.at(0).values[0], 0.5);
+  EXPECT_DOUBLE_EQ(figures[3].curves.at(0).values[399], 4.0);
+}
+
+TEST_F(WriteReportTest, PutsFailedChecksFirstThenTheNearestToTheirBounds) {
+  WriteReportRun(run_dir());
+  const RunData run(run_dir());
+  std::vector<std::string> names;
+  for (const CheckLine& check : run.checks()) names.push_back(check.name);
+  EXPECT_THAT(names, ElementsAre("wheel_slip", "balance_robot", "M_bar", "contact_force", "link_mass"));
+  EXPECT_FALSE(run.checks()[0].pass);
+  EXPECT_TRUE(run.checks()[4].constant);
+}
+
+TEST_F(WriteReportTest, WritesPageAndFiguresAndLeavesNothingElse) {
+  const std::string page = Report();
+  EXPECT_THAT(ListFiles(), ElementsAre("figures", "log.h5", "report.html"));
+  for (const char* name :
+       {"fig12a", "fig12b", "fig12c", "fig12d", "fig12e", "fig12f", "fig13a", "tracking_error",
+        "residual_model", "residual_balance", "residual_prediction", "residual_assumption"}) {
+    EXPECT_THAT(ReadText(run_dir() / "figures" / (std::string(name) + ".svg")), HasSubstr("</svg>")) << name;
+    EXPECT_THAT(ReadText(run_dir() / "figures" / (std::string(name) + ".png")),
+                ::testing::StartsWith("\x89PNG"))
+        << name;
+  }
+  EXPECT_THAT(ReadText(run_dir() / "figures/fig12d.svg"), HasSubstr("rf1_2"));
+  EXPECT_THAT(ReadText(run_dir() / "figures/residual_model.svg"), HasSubstr("bound"));
+}
+
+TEST_F(WriteReportTest, SaysVerdictCauseAndWhatWasRun) {
+  const std::string page = Report();
+  for (const char* text : {"<strong>DISAGREEMENT</strong>", "Cause: <b>wheel slip</b>",
+                           "wheel_slip 0.004 (bound 0.001)", "fails from 0.133 s", "what balance_robot is",
+                           "a=&lt;b&gt;", "duration=0.4<br>mu=0.5", "2.2.2", "0.0.1"}) {
+    EXPECT_THAT(page, HasSubstr(text));
+  }
+}
+
+TEST_F(WriteReportTest, EscapesWhatComesFromTheLog) {
+  ReportRun run;
+  run.scenario = "<i>'sample'</i>";
+  const std::string page = Report(run);
+  EXPECT_THAT(page, Not(HasSubstr("<script>alert")));
+  EXPECT_THAT(page, Not(HasSubstr("<i>'sample'")));
+  EXPECT_THAT(page, HasSubstr("&lt;script&gt;alert(1)"));
+  EXPECT_THAT(page, HasSubstr("made &lt;by&gt; hand &amp; &quot;quoted&quot;"));
+}
+
+TEST_F(WriteReportTest, IsTheSameWhenMadeAgain) {
+  const std::string page = Report();
+  WriteRunReport(run_dir(), MakeReportFiles(run_dir()));
+  EXPECT_TRUE(ReadText(run_dir() / "report.html") == page);
+}
+
+TEST_F(WriteReportTest, GivesNoVerdictForARunThatWasCutOff) {
+  ReportRun run;
+  run.has_summary = false;
+  const std::string page = Report(run);
+  EXPECT_THAT(page, HasSubstr("<strong>NO VERDICT</strong>"));
+  EXPECT_THAT(page, HasSubstr("fails from 0.133 s"));  // from the recorded values themselves
+  EXPECT_THAT(page, Not(HasSubstr("<strong>PASS")));
+}
+
+TEST_F(WriteReportTest, EmbedsASmallVideoAndLinksToALargeOne) {
+  WriteReportRun(run_dir());
+  testing::WriteText(run_dir() / "video.mp4", "foobar");
+  EXPECT_THAT(Report(), HasSubstr("src=\"data:video/mp4;base64,Zm9vYmFy\""));
+  fs::resize_file(run_dir() / "video.mp4", 20'000'001);
+  const std::string page = Report();
+  EXPECT_THAT(page, HasSubstr("<a href=\"video.mp4\">"));
+  EXPECT_LT(page.size(), 6'000'000U);
+}
+
+TEST_F(WriteReportTest, AddsPicturesFromElsewhere) {
+  WriteReportRun(run_dir());
+  WriteRunReport(run_dir(), MakeReportFiles(run_dir()), [](const fs::path& folder) {
+    testing::WriteText(folder / "fig11a.png", "foobar");
+    return std::vector<Picture>{{folder / "fig11a.png", "11 (a)", "Beginning"}};
+  });
+  EXPECT_THAT(ReadText(run_dir() / "report.html"), HasSubstr("src=\"data:image/png;base64,Zm9vYmFy\""));
+  EXPECT_EQ(ReadText(run_dir() / "figures/fig11a.png"), "foobar");
+}
+
+TEST_F(WriteReportTest, KeepsWhatWasThereWhenPicturesFail) {
+  WriteReportRun(run_dir());
+  testing::WriteText(run_dir() / "report.html", "old");
+  const PictureMaker fail = [](const fs::path&) -> std::vector<Picture> { throw InputError("no pictures"); };
+  EXPECT_THROW(WriteRunReport(run_dir(), MakeReportFiles(run_dir()), fail), InputError);
+  EXPECT_EQ(ReadText(run_dir() / "report.html"), "old");
+  EXPECT_THAT(ListFiles(), ElementsAre("log.h5", "report.html"));
+}
+
+TEST_F(WriteReportTest, StaysSmallForALongRun) {
+  ReportRun run;
+  run.rows = 60000;
+  EXPECT_LT(Report(run).size(), 6'000'000U);
+}
+
+}  // namespace
+}  // namespace dexcheck
