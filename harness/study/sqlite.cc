@@ -11,16 +11,9 @@ namespace {
 /// Others hold the lock for one trial's row; on a slow disk or network that may take a while.
 constexpr int kBusyTimeout = 60000;  // ms
 
+/// For reading too the file has to be written: what a killed process left half done must be undone.
 int FlagsOf(Database::Mode mode) {
-  switch (mode) {
-    case Database::Mode::kReadOnly:
-      return SQLITE_OPEN_READONLY;
-    case Database::Mode::kReadWrite:
-      return SQLITE_OPEN_READWRITE;
-    case Database::Mode::kCreate:
-      return SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
-  }
-  return SQLITE_OPEN_READONLY;
+  return SQLITE_OPEN_READWRITE | (mode == Database::Mode::kCreate ? SQLITE_OPEN_CREATE : 0);
 }
 
 std::string Explain(int code, const char* message) {

@@ -14,7 +14,7 @@ namespace dexcheck {
 /// An open database file. Everything that fails throws InputError "FILE: what: why".
 class Database {
  public:
-  enum class Mode { kReadOnly, kReadWrite, kCreate };
+  enum class Mode { kExisting, kCreate };
   Database(const std::filesystem::path& path, Mode mode);
   ~Database();
   Database(const Database&) = delete;

@@ -90,7 +90,7 @@ StudyStore StudyStore::OpenOrCreate(const std::filesystem::path& path, const Stu
 }
 
 StudyStore StudyStore::Open(const std::filesystem::path& path) {
-  StudyStore store(path, Database::Mode::kReadOnly);
+  StudyStore store(path, Database::Mode::kExisting);
   store.Load();
   return store;
 }

@@ -34,7 +34,7 @@ class StudyStore {
   /// @throws InputError, also when the file holds another study.
   static StudyStore OpenOrCreate(const std::filesystem::path& path, const StudyIdentity& identity,
                                  const Study& study);
-  /// Opens one that exists, for reading only. @throws InputError.
+  /// Opens one that exists. @throws InputError.
   static StudyStore Open(const std::filesystem::path& path);
 
   [[nodiscard]] const StudyIdentity& identity() const { return identity_; }

@@ -84,7 +84,7 @@ TEST(StudyReader, MistakesAreNamed) {
   };
   EXPECT_TRUE(fails("scenario =", "scenaro =", "study.toml:3: scenaro"));
   EXPECT_TRUE(fails("\"energy\"", "\"enrgy\"", "did you mean \"energy\"?"));
-  EXPECT_TRUE(fails("to = 100", "to = 1", "study.toml:12: vary.0.to: must be greater than from, got 1"));
+  EXPECT_TRUE(fails("to = 100", "to = 1", "study.toml:12: vary[0].to: must be greater than from, got 1"));
   EXPECT_TRUE(fails("from = 1", "from = 0", "from: must be positive, got 0"));
   EXPECT_TRUE(fails("count = 3", "count = 1", "count"));
   EXPECT_TRUE(fails("count = 3", "count = 3\nvalues = [1]", "values"));
@@ -100,7 +100,7 @@ TEST(StudyReader, MistakesAreNamed) {
             "2000\n[[vary]]\nkey = \"b\"\nfrom = 0\nto = 1\ncount = 2000\n",
             "study.toml");
       },
-      "makes 4000000 trials"));
+      "vary: makes 4e+06 trials; at most 1000000"));
 }
 
 }  // namespace
