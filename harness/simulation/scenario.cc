@@ -184,6 +184,8 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
     }
   }
   constexpr double kMaxSteps = 1e8;
+  if (scenario.duration < scenario.plant.time_step)
+    root.Get("duration").Fail("must be at least one time step");
   if (scenario.duration / scenario.plant.time_step > kMaxSteps) {
     root.Get("duration").Fail("must be at most 1e8 time steps");
   }

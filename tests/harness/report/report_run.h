@@ -2,6 +2,7 @@
 
 // A small run whose every number follows from its place, with a verdict of one's choice.
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -63,7 +64,7 @@ inline std::string MakeReportSummary(const ReportRun& run) {
 /// Writes FOLDER/log.h5, and the folder when it is not there.
 inline void WriteReportRun(const std::filesystem::path& folder, const ReportRun& run = {}) {
   std::filesystem::create_directories(folder);
-  LogWriter log(folder / "log.h5", run.rows);
+  LogWriter log(folder / "log.h5", std::max(run.rows, 1L));
   log.SetText("scenario", run.scenario);
   log.SetText("command", "dexcheck run sample --set 'a=<b>'");
   log.SetText("overrides", "duration=0.4\nmu=0.5\n");
