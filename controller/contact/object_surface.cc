@@ -20,7 +20,8 @@ struct SurfaceMaker {
   std::unique_ptr<Surface> operator()(const SolidBox&) const { throw std::invalid_argument(kNotSmooth); }
   std::unique_ptr<Surface> operator()(const SolidCapsule&) const { throw std::invalid_argument(kNotSmooth); }
 
-  static constexpr const char* kNotSmooth = "object shape: must be a sphere, a cylinder or a torus for contact terms";
+  static constexpr const char* kNotSmooth =
+      "object shape: must be a sphere, a cylinder or a torus for contact terms";
 };
 
 }  // namespace

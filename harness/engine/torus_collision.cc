@@ -14,7 +14,8 @@ mjfCollision original_sphere_mesh = nullptr;
 int CollideSphereMesh(const mjModel* m, const mjData* d, mjContact* con, int g1, int g2, mjtNum margin) {
   double ring_radius = 0.0;
   double tube_radius = 0.0;
-  if (!GetTorusRadii(*m, g2, &ring_radius, &tube_radius)) return original_sphere_mesh(m, d, con, g1, g2, margin);
+  if (!GetTorusRadii(*m, g2, &ring_radius, &tube_radius))
+    return original_sphere_mesh(m, d, con, g1, g2, margin);
 
   // The frame is the body's: the engine turns a mesh geom's own frame to the mesh's principal axes.
   const int body = m->geom_bodyid[g2];
@@ -23,7 +24,8 @@ int CollideSphereMesh(const mjModel* m, const mjData* d, mjContact* con, int g1,
   const Eigen::Map<const Vector3d> sphere(d->geom_xpos + 3 * g1);
   const Vector3d center = R.transpose() * (sphere - origin);
   SphereTorusContact contacts[2];
-  const int count = CollideSphereTorus(center, m->geom_size[3 * g1], ring_radius, tube_radius, margin, contacts);
+  const int count =
+      CollideSphereTorus(center, m->geom_size[3 * g1], ring_radius, tube_radius, margin, contacts);
   for (int i = 0; i < count; ++i) {
     con[i].dist = contacts[i].distance;
     Eigen::Map<Vector3d>(con[i].pos) = origin + R * contacts[i].position;
@@ -45,7 +47,8 @@ bool GetTorusRadii(const mjModel& model, int geom, double* ring_radius, double* 
 
 int CollideSphereTorus(const Vector3d& center, double sphere_radius, double ring_radius, double tube_radius,
                        double margin, SphereTorusContact contacts[2]) {
-  // The ring's point nearest to the sphere lies in the half plane of the sphere's centre, the other one opposite.
+  // The ring's point nearest to the sphere lies in the half plane of the sphere's centre, the other one
+  // opposite.
   const double rho = std::hypot(center.x(), center.y());
   const Vector3d outward = rho > 0.0 ? Vector3d(center.x() / rho, center.y() / rho, 0.0) : Vector3d::UnitX();
   int count = 0;

@@ -1,8 +1,8 @@
-// A ball driven around the tube of a torus in the engine, through the hole: (40) must follow the engine's contact.
-
-#include <gtest/gtest.h>
+// A ball driven around the tube of a torus in the engine, through the hole: (40) must follow the engine's
+// contact.
 
 #include <fmt/format.h>
+#include <gtest/gtest.h>
 
 #include "controller/contact/find_contact.h"
 #include "controller/contact/rolling.h"
@@ -19,14 +19,15 @@ constexpr double kBall = 0.009;
 constexpr double kDuration = 5.0;
 constexpr double kPress = 1.0;  // N, along the common normal
 
-/// A ball in weightlessness that forces at its centre press on a fixed torus and drag along a path; friction rolls it.
+/// A ball in weightlessness that forces at its centre press on a fixed torus and drag along a path; friction
+/// rolls it.
 class RollingBall {
  public:
   explicit RollingBall(double time_step)
       : torus_(kRing, kTube),
         ball_(kBall),
-        engine_(LoadMjcfText(
-            fmt::format(R"(<mujoco><size nuser_geom="2"/><compiler meshdir="{}/mjcf/assets"/>
+        engine_(
+            LoadMjcfText(fmt::format(R"(<mujoco><size nuser_geom="2"/><compiler meshdir="{}/mjcf/assets"/>
               <option timestep="{}" gravity="0 0 0" cone="elliptic" impratio="100" solver="Newton" tolerance="1e-14"/>
               <default><geom solref="{} 1" solimp="0.99 0.99 0.001 0.5 2" friction="1 0.005 0.0001" condim="3"/></default>
               <asset><mesh name="torus" file="torus.msh"/></asset><worldbody>
@@ -34,8 +35,8 @@ class RollingBall {
                 <geom type="mesh" mesh="torus" mass="0" user="{} {}"/></body>
               <body name="ball"><freejoint/><geom type="sphere" size="{}" mass="0.05"/></body>
               </worldbody></mujoco>)",
-                        DEXCHECK_SOURCE_DIR, time_step, 2.0 * time_step, kRing, kTube, kBall),
-            "rolling ball")),
+                                     DEXCHECK_SOURCE_DIR, time_step, 2.0 * time_step, kRing, kTube, kBall),
+                         "rolling ball")),
         data_(MakeData(*engine_)) {
     const SurfaceGeometry start = torus_.Evaluate(PathPoint(0.0));
     const Vector3d center = start.p + kBall * start.R.col(2);
@@ -88,8 +89,8 @@ class RollingBall {
   /// Distance of kappa's contact point from the engine's, on the ball (0) and on the torus (1), m.
   [[nodiscard]] double CalcError(int side) const {
     const Eigen::Map<const Vector3d> engine_point(data_->contact[0].pos);
-    const Vector3d point =
-        side == 0 ? Vector3d(BallPose() * ball_.Evaluate(kappa_.alpha_f).p) : torus_.Evaluate(kappa_.alpha_o).p;
+    const Vector3d point = side == 0 ? Vector3d(BallPose() * ball_.Evaluate(kappa_.alpha_f).p)
+                                     : torus_.Evaluate(kappa_.alpha_o).p;
     return (point - engine_point).norm();
   }
 
@@ -97,12 +98,15 @@ class RollingBall {
   [[nodiscard]] double time() const { return data_->time; }
   [[nodiscard]] const ContactCoordinates& kappa() const { return kappa_; }
   /// kappa by geometry: the projection back on the constraint.
-  [[nodiscard]] ContactCoordinates FindKappa() const { return FindContact(ball_, torus_, BallPose(), kappa_).kappa; }
+  [[nodiscard]] ContactCoordinates FindKappa() const {
+    return FindContact(ball_, torus_, BallPose(), kappa_).kappa;
+  }
   void set_kappa(const ContactCoordinates& kappa) { kappa_ = kappa; }
   [[nodiscard]] double CalcSlipSpeed() const {
     const Vector3d v = Eigen::Map<const Vector3d>(data_->qvel);
     const Vector3d omega = BallPose().linear() * Eigen::Map<const Vector3d>(data_->qvel + 3);
-    const Vector3d arm = Eigen::Map<const Vector3d>(data_->contact[0].pos) - Eigen::Map<const Vector3d>(data_->qpos);
+    const Vector3d arm =
+        Eigen::Map<const Vector3d>(data_->contact[0].pos) - Eigen::Map<const Vector3d>(data_->qpos);
     const Vector3d normal = Eigen::Map<const Vector3d>(data_->contact[0].frame);
     const Vector3d at_contact = v + omega.cross(arm);
     return (at_contact - normal.dot(at_contact) * normal).norm();
@@ -148,14 +152,15 @@ TEST(RollingBall, IntegratedContactFollowsTheEngineThroughTheHole) {
   EXPECT_LT(errors.least_cos_v, -0.99) << "the path goes through the inner, negatively curved side";
   EXPECT_LT(errors.on_ball, kContactPointBound);
   EXPECT_LT(errors.on_torus, kContactPointBound);
-  fmt::print("1 ms, integrated for {} s: ball {:.2e} m, torus {:.2e} m, slip {:.2e} m/s\n", kDuration, errors.on_ball,
-             errors.on_torus, errors.slip);
+  fmt::print("1 ms, integrated for {} s: ball {:.2e} m, torus {:.2e} m, slip {:.2e} m/s\n", kDuration,
+             errors.on_ball, errors.on_torus, errors.slip);
 }
 
 TEST(RollingBall, ProjectionRemovesTheDrift) {
   const Errors integrated = Roll(1e-3, false);
   const Errors projected = Roll(1e-3, true);
-  fmt::print("1 ms, projected every step: ball {:.2e} m, torus {:.2e} m\n", projected.on_ball, projected.on_torus);
+  fmt::print("1 ms, projected every step: ball {:.2e} m, torus {:.2e} m\n", projected.on_ball,
+             projected.on_torus);
   EXPECT_LT(projected.on_ball, integrated.on_ball);
   EXPECT_LT(projected.on_torus, integrated.on_torus);
 }

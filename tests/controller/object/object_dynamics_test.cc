@@ -349,8 +349,7 @@ TEST(ObjectDynamics, RejectsABodyThatIsNotAnObject) {
     CalcObjectBodyTerms(object, kGravity, Matrix3d::Identity(), Vector6d::Zero());
     FAIL() << "an object off its centre of mass was accepted";
   } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(),
-                 "object com: must be zero (Sigma_o stands at the centre of mass), got 0.01");
+    EXPECT_STREQ(error.what(), "object com: must be zero (Sigma_o stands at the centre of mass), got 0.01");
   }
 }
 
