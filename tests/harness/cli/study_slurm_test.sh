@@ -69,7 +69,7 @@ dd if=/dev/urandom of=munge.key bs=64 count=1 status=none
 chmod 400 munge.key
 # In the foreground of this shell, so that they end with it.
 munged --foreground --force --key-file="$folder/munge.key" --socket="$folder/munge.socket" \
-  --pid-file="$folder/munge.pid" --log-file="$folder/munge.log" --seed-file="$folder/munge.seed" &
+  --pid-file="$folder/munge.pid" --log-file="$folder/munge.log" --seed-file="$folder/munge.seed" >munged.log 2>&1 &
 daemons+=($!)
 slurmctld -D -f slurm.conf >slurmctld.log 2>&1 &
 daemons+=($!)
@@ -95,9 +95,12 @@ job=$(sbatch --parsable job.sh)
 HasRow() { [[ $(sqlite3 "file:tiny-2-of-4.sqlite?mode=ro" 'SELECT count(*) FROM trials' 2>/dev/null) -ge 1 ]]; }
 WaitFor 60 HasRow
 scontrol requeue "${job}_2"
-IsDone() { [[ -z $(squeue --noheader --jobs="$job" 2>/dev/null) ]]; }
+IsDone() { Hurry || true; [[ -z $(squeue --noheader --jobs="$job" 2>/dev/null) ]]; }
+# At once, not when the old task's credential has expired.
+Hurry() { scontrol update JobId="${job}_2" StartTime=now 2>/dev/null; }
 Requeued() { scontrol show job "${job}_2" | grep -q 'Restarts=1'; }
 WaitFor 30 Requeued
+WaitFor 30 Hurry
 WaitFor 180 IsDone
 nodes=$(scontrol show job "$job" | grep -oE ' NodeList=n[12]' | sort -u | wc -l)
 [[ $nodes -eq 2 ]] || { echo "tasks ran on $nodes nodes, not 2" >&2; exit 1; }
