@@ -54,9 +54,9 @@ int RunScenario(const Request& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides, request.seed);
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
+  Runner runner(setup, !request.no_check);
   std::optional<RunFolder> folder;
   if (!request.no_log) folder.emplace(request.out, setup.scenario().name);
-  Runner runner(setup, !request.no_check);
   std::optional<RunRecorder> recorder;
   if (folder) {
     recorder.emplace(folder->path() / "log.h5", runner.loop(), setup,

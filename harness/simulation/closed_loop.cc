@@ -59,6 +59,21 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check)
   }
   PlaceRobot();
   trajectory_ = MakeTrajectory(scenario, setup.X_start() + scenario.start_error);
+  if (scenario.start == Start::kMoving) CheckMovingStart();
+}
+
+void ClosedLoop::CheckMovingStart() const {
+  const DesiredMotion at_start = trajectory_->Evaluate(0.0);
+  const Vector3d v = at_start.X_d_dot.head<3>();
+  const bool is_drive = setup_->model().base().type == BaseType::kDifferentialDrive;
+  const double phi = is_drive ? setup_->q_start()[2] : 0.0;
+  const Vector3d heading(std::cos(phi), std::sin(phi), 0.0);
+  const bool along = (v - v.dot(heading) * heading).norm() <= kLargestSkew * v.norm();
+  if (is_drive && along && at_start.X_d_dot.tail<3>().norm() == 0.0 && at_start.X_d_ddot.norm() == 0.0)
+    return;
+  throw InputError(setup_->scenario().source +
+                   ": start: \"moving\" needs a platform, and a trajectory that begins straight ahead at "
+                   "constant speed");
 }
 
 void ClosedLoop::PlaceRobot() {
@@ -98,13 +113,6 @@ void ClosedLoop::StartMoving(const DesiredMotion& at_start) {
   const RobotModel& model = setup_->model();
   const Vector3d v = at_start.X_d_dot.head<3>();
   const Vector3d heading(std::cos(state_.q[2]), std::sin(state_.q[2]), 0.0);
-  const bool along = (v - v.dot(heading) * heading).norm() <= kLargestSkew * v.norm();
-  if (model.base().type != BaseType::kDifferentialDrive || !along ||
-      at_start.X_d_dot.tail<3>().norm() > 0.0 || at_start.X_d_ddot.norm() > 0.0) {
-    throw InputError(setup_->scenario().source +
-                     ": start: \"moving\" needs a platform, and a trajectory that begins straight ahead at "
-                     "constant speed");
-  }
   // All bodies get the same velocity, the wheels roll.
   EngineState start = plant_.GetState();
   const mjModel& m = setup_->engine();

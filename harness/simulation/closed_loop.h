@@ -89,6 +89,7 @@ class ClosedLoop {
 
  private:
   void PlaceRobot();
+  void CheckMovingStart() const;
   void StartMoving(const DesiredMotion& at_start);
   void SettleOn(const Trajectory& trajectory, double duration);
   void ControlStep(const DesiredMotion& desired, long step);

@@ -158,6 +158,12 @@ TEST(RunCommand, RefusesBadInputInOneLine) {
   EXPECT_TRUE(
       IsRefused(RunDexcheck({"run", "paper", "--set", "duration=x", "--out", (folder.path() / "a").string()}),
                 {"--set duration=x: duration: must be a number"}));
+  EXPECT_TRUE(IsRefused(
+      RunDexcheck({"run", "paper", "--set", "bounds.slip=1", "--out", (folder.path() / "a").string()}),
+      {"bounds.slip"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"run", "paper", "--set", "trajectory.velocity=[0, 1, 0]", "--out",
+                                     (folder.path() / "a").string()}),
+                        {"start", "straight ahead"}));
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "a"));
   EXPECT_TRUE(
       IsRefused(RunDexcheck({"run", "paper", "--out", "/proc/run"}), {"/proc/run", "cannot be made"}));

@@ -91,8 +91,8 @@ INSTANTIATE_TEST_SUITE_P(
     [](const ::testing::TestParamInfo<BadInput>& info) { return info.param.name; });
 
 TEST(ReadScenario, RefusesAMovingStartThatIsNoneBeforeItRuns) {
-  ShippedRun run("paper", {"trajectory.velocity=[0, 1, 0]", "settle=0.05"});
-  EXPECT_THROW(run.Run(), InputError);
+  EXPECT_THROW(ShippedRun("paper", {"trajectory.velocity=[0, 1, 0]"}), InputError);
+  EXPECT_THROW(ShippedRun("paper", {"trajectory.turning=[0.1, 0, 0]"}), InputError);
 }
 
 TEST(ListMjcfFiles, FollowsIncludesAndAssets) {
