@@ -18,12 +18,12 @@ double Seconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-constexpr double kRoughTime = 0.02;     // s after the first contact
-constexpr double kLargestSkew = 1e-2;   // rad between the platform's heading and the way ahead
-constexpr double kSettleMoving = 0.5;   // s
-constexpr double kLargestTilt = 0.2;    // rad, of a robot that still stands
-constexpr double kLargestSink = 0.02;   // m, likewise
-constexpr double kGraspTimeout = 0.02;  // s without all fingertips on the object: lost
+constexpr double kRoughTime = 0.02;      // s after the first contact
+constexpr double kLargestSkew = 1e-2;    // rad between the platform's heading and the way ahead
+constexpr double kSettleMoving = 0.5;    // s
+constexpr double kLargestTilt = 0.2;     // rad, of a robot that still stands
+constexpr double kLargestSink = 0.02;    // m, likewise
+constexpr double kGraspTimeout = 0.005;  // s without all fingertips on the object: lost
 
 }  // namespace
 

@@ -81,6 +81,9 @@ INSTANTIATE_TEST_SUITE_P(
                 {"duration=5", "plant.floor_friction=3",
                  "trajectory={ type = 'circle', speed = 3, radius = 1.5, ramp_time = 5 }"},
                 "the robot fell"},
+        Failure{"lost_grasp",
+                {"plant.finger_friction=0.15", "control.weight={ platform = 1e8, arm = 1e8 }"},
+                "the grasp is lost"},
         Failure{"no_forces", {"duration=1", "control.f_max=0.3", "control.f_min=0"}, "contact forces"}),
     [](const ::testing::TestParamInfo<Failure>& info) { return info.param.name; });
 
