@@ -51,9 +51,9 @@ class VelocityMap {
   const Adapter* adapter_;
   int base_size_;
   std::vector<int> base_dofs_;
-  MatrixXd T_base_;  // base_dofs x base_size
-  VectorXd bias_;    // T_dot velocity on base_dofs
-  MatrixXd M_T_;     // scratch of ProjectMatrix, nv x base_size
+  MatrixXd T_base_;             // base_dofs x base_size
+  VectorXd bias_;               // T_dot velocity on base_dofs
+  MatrixXd M_T_;                // scratch of ProjectMatrix, nv x base_size
 };
 
 }  // namespace dexcheck
