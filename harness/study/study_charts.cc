@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "harness/report/html.h"
+
 namespace dexcheck {
 namespace {
 
@@ -87,29 +89,6 @@ void Fit(Axis* axis, const std::vector<double>& values) {
 }
 
 }  // namespace
-
-std::string EscapeHtml(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
-}
 
 std::string ColorOf(double value, double least, double most) {
   if (!std::isfinite(value)) return "#e8e8e8";

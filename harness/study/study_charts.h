@@ -9,9 +9,6 @@
 
 namespace dexcheck {
 
-/// Text that may stand in HTML.
-std::string EscapeHtml(const std::string& text);
-
 struct Axis {
   std::string label;
   std::vector<double> values;  ///< Ascending; the cells' of a heat map, else the ends.

@@ -10,6 +10,7 @@
 #include <regex>
 
 #include "controller/common/text.h"
+#include "harness/report/html.h"
 #include "harness/study/study_charts.h"
 #include "harness/study/study_theory.h"
 

@@ -243,7 +243,13 @@ TEST_F(StudyCommand, TheReportsCommandsRepeatTheTrials) {
   // Of the command the run; the video is another program's test.
   const std::string mark = "<pre id=\"trial-4\"";
   const size_t begin = report.out.find("dexcheck run", report.out.find(mark));
-  const std::string command = report.out.substr(begin, report.out.find(';', begin) - begin);
+  // As a browser shows it.
+  std::string shown = report.out.substr(begin, report.out.find("</pre>", begin) - begin);
+  const std::string quote = "&#39;";
+  for (size_t at = shown.find(quote); at != std::string::npos; at = shown.find(quote)) {
+    shown.replace(at, quote.size(), "'");
+  }
+  const std::string command = shown.substr(0, shown.find(';'));
   EXPECT_THAT(command, HasSubstr("--set control.K_p=10000 --set control.K_v=200"));
   const std::filesystem::path program = DEXCHECK_PROGRAM;
   ProgramOptions options;
