@@ -1,5 +1,6 @@
 #include "controller/control/computed_torque.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "controller/common/errors.h"
@@ -10,7 +11,8 @@ ComputedTorque::ComputedTorque(const RobotModel& model, int num_contacts, Redund
     : weight_(std::move(weight)),
       actuation_(model),
       J_B_pinv_("J_B'", Eigen::Index{3} * num_contacts, model.num_velocities()),
-      G_pinv_("G", 6, Eigen::Index{3} * num_contacts) {
+      // One contact is too few for SetDemand, not for SetMotion.
+      G_pinv_("G", std::min(6, 3 * num_contacts), Eigen::Index{3} * num_contacts) {
   const Eigen::Index n = model.num_velocities();
   const Eigen::Index k = Eigen::Index{3} * num_contacts;
   if (weight_.kind == RedundancyWeight::Kind::kDiagonal) {
@@ -39,13 +41,20 @@ void ComputedTorque::FactorJacobian(const ModelTerms& robot, const GraspTerms& g
 
 void ComputedTorque::SetDemand(const ModelTerms& robot, const GraspTerms& grasp, const Vector6d& V_Bo_dot,
                                const Eigen::Ref<const VectorXd>& sigma_prime) {
+  SetMotion(robot, grasp, V_Bo_dot, sigma_prime);
+  G_pinv_.Factor(grasp.G());
+  // F_o = M_hat V_dot + C_hat V + N_o
+  F_o_ = grasp.body().M_hat * V_Bo_dot + grasp.body().C_hat * grasp.V_Bo() + grasp.body().N_o;
+}
+
+void ComputedTorque::SetMotion(const ModelTerms& robot, const GraspTerms& grasp, const Vector6d& V_Bo_dot,
+                               const Eigen::Ref<const VectorXd>& sigma_prime) {
   Require(robot.size() == xi_c_.size(), "entries of xi", "must be those of the law's model", robot.size());
   Require(sigma_prime.size() == xi_c_.size(), "length of sigma'", "must be that of xi",
           static_cast<double>(sigma_prime.size()));
   Require(grasp.num_forces() == f_c_.size(), "number of contact forces", "must be as constructed",
           grasp.num_forces());
   FactorJacobian(robot, grasp);
-  G_pinv_.Factor(grasp.G());
 
   // xi_c = J^+ G^T V + N xi = xi - J^+ (J xi - G^T V)
   J_B_pinv_.Apply(grasp.slip(), work_);
@@ -59,10 +68,21 @@ void ComputedTorque::SetDemand(const ModelTerms& robot, const GraspTerms& grasp,
   work_ = sigma_prime;
   J_B_pinv_.Project(work_);
   xi_dot_d_ += work_;
+  CalcFreeTorque(robot);
+}
 
-  // F_o = M_hat V_dot + C_hat V + N_o
-  F_o_ = grasp.body().M_hat * V_Bo_dot + grasp.body().C_hat * grasp.V_Bo() + grasp.body().N_o;
+void ComputedTorque::SetFreeMotion(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& sigma_prime) {
+  Require(robot.size() == xi_c_.size(), "entries of xi", "must be those of the law's model", robot.size());
+  Require(sigma_prime.size() == xi_c_.size(), "length of sigma'", "must be that of xi",
+          static_cast<double>(sigma_prime.size()));
+  xi_c_ = robot.velocity();
+  xi_dot_d_ = sigma_prime;
+  CalcFreeTorque(robot);
+  tau_ = tau_0_;
+  f_c_.setZero();
+}
 
+void ComputedTorque::CalcFreeTorque(const ModelTerms& robot) {
   // E_bar' tau_0 = M_bar' xi_dot_d + C_bar' xi_c + F_bar'
   tau_0_ = robot.gravity() + robot.friction();
   tau_0_.noalias() += robot.M() * xi_dot_d_;
@@ -80,6 +100,18 @@ const VectorXd& ComputedTorque::CalcTorque(const GraspTerms& grasp, const Eigen:
   // f_c = G^+ F_o + F_N
   G_pinv_.Apply(F_o_, f_c_);
   f_c_ += F_N;
+  return AddContactTorque(grasp);
+}
+
+const VectorXd& ComputedTorque::CalcTorqueWithForces(const GraspTerms& grasp,
+                                                     const Eigen::Ref<const VectorXd>& f_c) {
+  Require(f_c.size() == f_c_.size(), "length of f_c", "must be as constructed",
+          static_cast<double>(f_c.size()));
+  f_c_ = f_c;
+  return AddContactTorque(grasp);
+}
+
+const VectorXd& ComputedTorque::AddContactTorque(const GraspTerms& grasp) {
   // tau' = tau_0 + E_bar'^-1 J_B'^T f_c
   work_.noalias() = grasp.J_B().transpose() * f_c_;
   actuation_.CalcTorque(work_, work_);

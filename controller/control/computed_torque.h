@@ -31,8 +31,7 @@ struct RedundancyWeight {
 /// The law's workspace. Sized by the constructor; nothing else allocates.
 class ComputedTorque {
  public:
-  /// @throws std::invalid_argument when the weight does not fit the model, or the contacts give fewer than
-  /// six forces.
+  /// @throws std::invalid_argument when the weight does not fit the model, or there is no contact.
   ComputedTorque(const RobotModel& model, int num_contacts, RedundancyWeight weight = {});
 
   /// First stage. sigma of (47) is the measured xi: xi_c is the velocity nearest to it, in W, that satisfies
@@ -43,13 +42,19 @@ class ComputedTorque {
   /// std::invalid_argument when sizes differ.
   void SetDemand(const ModelTerms& robot, const GraspTerms& grasp, const Vector6d& V_Bo_dot,
                  const Eigen::Ref<const VectorXd>& sigma_prime);
+  /// The motion alone, (47) and tau_0, for contacts that need not hold the object: any number of them, F_o is
+  /// not formed. @throws as SetDemand, without G.
+  void SetMotion(const ModelTerms& robot, const GraspTerms& grasp, const Vector6d& V_Bo_dot,
+                 const Eigen::Ref<const VectorXd>& sigma_prime);
+  /// The same without any contact, (18): xi_dot_d is sigma'.
+  void SetFreeMotion(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& sigma_prime);
 
   /// xi_c (n) and xi_dot_d (n), (47).
   [[nodiscard]] const VectorXd& xi_c() const { return xi_c_; }
   [[nodiscard]] const VectorXd& xi_dot_d() const { return xi_dot_d_; }
   /// F_o (Sigma_o) that the demand takes, (19).
   [[nodiscard]] const Vector6d& F_o() const { return F_o_; }
-  /// tau_0 (n), N m: tau' without contact forces. tau' = tau_0 + E_bar'^-1 J_B'^T f_c.
+  /// tau_0 (n), N m: tau' without contact forces, all of it after SetFreeMotion. tau' = tau_0 + E_bar'^-1 J_B'^T f_c.
   [[nodiscard]] const VectorXd& tau_0() const { return tau_0_; }
 
   /// F_N (k) = f_c - G^+ F_o of contact forces f_c (k) that give F_o.
@@ -60,11 +65,16 @@ class ComputedTorque {
   /// @return tau' (n), N m: [tau_r; tau_l] of the wheels, then joints.
   const VectorXd& CalcTorque(const GraspTerms& grasp, const Eigen::Ref<const VectorXd>& F_N);
 
+  /// Second stage with contact forces f_c (k) that are given as a whole.
+  const VectorXd& CalcTorqueWithForces(const GraspTerms& grasp, const Eigen::Ref<const VectorXd>& f_c);
+
   /// f_c (k) of (49) that belongs to the torques.
   [[nodiscard]] const VectorXd& f_c() const { return f_c_; }
 
  private:
   void FactorJacobian(const ModelTerms& robot, const GraspTerms& grasp);
+  void CalcFreeTorque(const ModelTerms& robot);
+  const VectorXd& AddContactTorque(const GraspTerms& grasp);
 
   RedundancyWeight weight_;
   ActuationMap actuation_;

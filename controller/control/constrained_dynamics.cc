@@ -42,12 +42,14 @@ ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contac
   schur_.setZero(k, k);
   schur_llt_ = Eigen::LLT<MatrixXd>(k);
   motion_.setZero(n + 6);
+  free_.setZero(n, 1);
   prediction_.xi_dot.setZero(n);
   prediction_.f_c.setZero(k);
 }
 
 const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const GraspTerms& grasp,
-                                               const Eigen::Ref<const VectorXd>& force) {
+                                               const Eigen::Ref<const VectorXd>& force,
+                                               ObjectSupport object) {
   const Eigen::Index n = prediction_.xi_dot.size();
   Require(robot.size() == n && force.size() == n, "length of force", "must be that of xi",
           static_cast<double>(force.size()));
@@ -61,10 +63,14 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
   // alone]
   const Eigen::Index k = schur_.rows();
   half_.topLeftCorner(n, k) = grasp.J_B().transpose();
-  half_.bottomLeftCorner(6, k) = -grasp.G();
-  motion_.head(n) = force - robot.gravity() - robot.friction();
-  motion_.head(n).noalias() -= robot.C() * robot.velocity();
-  motion_.tail<6>() = -body.C_hat * grasp.V_Bo() - body.N_o;
+  CalcFreeForce(robot, force);
+  if (object == ObjectSupport::kHand) {
+    half_.bottomLeftCorner(6, k) = -grasp.G();
+    motion_.tail<6>() = -body.C_hat * grasp.V_Bo() - body.N_o;
+  } else {
+    half_.bottomLeftCorner(6, k).setZero();
+    motion_.tail<6>().setZero();
+  }
   half_.col(k) = motion_;
   factor_.SolveTransposed(half_.topRows(n));
   M_hat_llt.matrixL().solveInPlace(half_.bottomRows<6>());
@@ -86,6 +92,28 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
   prediction_.V_Bo_dot = motion_.tail<6>();
   M_hat_llt.matrixU().solveInPlace(prediction_.V_Bo_dot);
   return prediction_;
+}
+
+const Prediction& ConstrainedDynamics::PredictFree(const ModelTerms& robot,
+                                                   const Eigen::Ref<const VectorXd>& force) {
+  const Eigen::Index n = prediction_.xi_dot.size();
+  Require(robot.size() == n && force.size() == n, "length of force", "must be that of xi",
+          static_cast<double>(force.size()));
+  factor_.Compute(robot.M());
+  CalcFreeForce(robot, force);
+  free_ = motion_.head(n);
+  factor_.SolveTransposed(free_);
+  prediction_.xi_dot = free_.col(0);
+  factor_.Solve(prediction_.xi_dot);
+  prediction_.V_Bo_dot.setZero();
+  prediction_.f_c.setZero();
+  return prediction_;
+}
+
+void ConstrainedDynamics::CalcFreeForce(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force) {
+  auto free = motion_.head(prediction_.xi_dot.size());
+  free = force - robot.gravity() - robot.friction();
+  free.noalias() -= robot.C() * robot.velocity();
 }
 
 ObjectSpaceTerms CalcObjectSpaceTerms(const ModelTerms& robot, const GraspTerms& grasp,

@@ -24,6 +24,12 @@ struct Prediction {
 /// set by X_o.
 Vector6d CalcCoordinateAcceleration(const GraspTerms& grasp, const Vector6d& V_Bo_dot);
 
+/// What bears the object.
+enum class ObjectSupport {
+  kHand,    ///< The contacts alone.
+  kAtRest,  ///< Something that it lies on, so firmly that it does not move.
+};
+
 /// Solves (19), (46) and (48) for accelerations and contact forces, as if bodies, contacts and wheels were
 /// rigid and nothing slipped. Sized by the constructor; nothing else allocates.
 class ConstrainedDynamics {
@@ -37,20 +43,29 @@ class ConstrainedDynamics {
   ///   [ J_B'     -G^T   0      ] [ f_c      ]   [ -J_B_dot' xi + G_dot^T V_Bo ]
   /// by its Schur complement in f_c.
   /// @param robot with CalcDynamics done, reduced. @param force E_bar' tau' (n), N, N m.
+  /// @param object kAtRest: it does not move, whatever the contacts do; its rows are left out.
   /// @throws SingularityError when the contacts' constraints depend on each other; std::invalid_argument when
   /// sizes differ.
   const Prediction& Predict(const ModelTerms& robot, const GraspTerms& grasp,
-                            const Eigen::Ref<const VectorXd>& force);
+                            const Eigen::Ref<const VectorXd>& force,
+                            ObjectSupport object = ObjectSupport::kHand);
+
+  /// The robot without contacts, (18): xi_dot; V_Bo_dot and f_c are zero.
+  const Prediction& PredictFree(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force);
 
   /// M_bar' = L^T L of the last Predict.
   [[nodiscard]] const TreeFactor& mass_factor() const { return factor_; }
 
  private:
+  /// First n entries of motion_: the forces without contact.
+  void CalcFreeForce(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force);
+
   TreeFactor factor_;
   RowMatrixXd half_;  // n + 6 x k + 1, [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G | forces without contact]
   MatrixXd schur_;
   Eigen::LLT<MatrixXd> schur_llt_;
-  VectorXd motion_;  // n + 6
+  VectorXd motion_;   // n + 6
+  RowMatrixXd free_;  // n x 1
   Prediction prediction_;
 };
 

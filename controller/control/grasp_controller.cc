@@ -6,6 +6,13 @@
 
 namespace dexcheck {
 
+void RequireGraspForce(const GraspForceResult& result) {
+  if (result.status == GraspForceStatus::kOptimal) return;
+  throw GraspForceError(result.status == GraspForceStatus::kInfeasible
+                            ? "no contact forces inside the friction cones hold the object"
+                            : "the grasp-force problem did not converge");
+}
+
 GraspController::GraspController(const RobotModel& model, std::span<const int> fingertips,
                                  const MassProperties& object, const Surface& surface,
                                  const GraspControllerOptions& options)
@@ -49,11 +56,7 @@ const VectorXd& GraspController::CalcTorque(const DesiredMotion& desired) {
   const auto begin = std::chrono::steady_clock::now();
   force_ = &solver_.Solve(problem_);
   force_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  if (force_->status != GraspForceStatus::kOptimal) {
-    throw GraspForceError(force_->status == GraspForceStatus::kInfeasible
-                              ? "no contact forces inside the friction cones hold the object"
-                              : "the grasp-force problem did not converge");
-  }
+  RequireGraspForce(*force_);
   // F_N = f_c - G^+ F_o, so that (49) gives f_c back
   law_.CalcInternalForce(force_->f_c, F_N_);
   return law_.CalcTorque(grasp_, F_N_);

@@ -21,6 +21,9 @@ class GraspForceError : public Error {
   using Error::Error;
 };
 
+/// @throws GraspForceError that says why, unless there is a solution.
+void RequireGraspForce(const GraspForceResult& result);
+
 /// What the controller may choose.
 struct GraspControllerOptions {
   explicit GraspControllerOptions(const RobotModel& model) : posture(model) {}
@@ -67,6 +70,8 @@ class GraspController {
   [[nodiscard]] const ModelTerms& robot() const { return robot_; }
   [[nodiscard]] const GraspTerms& grasp() const { return grasp_; }
   [[nodiscard]] const ComputedTorque& law() const { return law_; }
+  /// sigma' (n) of the state set, from the posture task.
+  [[nodiscard]] const VectorXd& sigma_prime() const { return sigma_prime_; }
   [[nodiscard]] const GraspForceResult& force() const { return *force_; }
   /// Time that the last grasp-force problem took, s.
   [[nodiscard]] double force_seconds() const { return force_seconds_; }

@@ -8,7 +8,8 @@ PostureTask::PostureTask(const RobotModel& model)
     : q_posture(VectorXd::Zero(model.num_joints())),
       stiffness(VectorXd::Zero(model.num_joints())),
       damping(VectorXd::Zero(model.num_velocities())),
-      xi_reference(VectorXd::Zero(model.num_velocities())) {}
+      xi_reference(VectorXd::Zero(model.num_velocities())),
+      acceleration(VectorXd::Zero(model.num_velocities())) {}
 
 void PostureTask::CalcAcceleration(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi,
                                    Eigen::Ref<VectorXd> sigma_prime) const {
@@ -20,9 +21,11 @@ void PostureTask::CalcAcceleration(const Eigen::Ref<const VectorXd>& q, const Ei
           static_cast<double>(damping.size()));
   Require(xi_reference.size() == xi.size(), "length of xi_reference", "must be that of xi",
           static_cast<double>(xi_reference.size()));
+  Require(acceleration.size() == xi.size(), "length of acceleration", "must be that of xi",
+          static_cast<double>(acceleration.size()));
   Require(sigma_prime.size() == xi.size(), "length of sigma'", "must be that of xi",
           static_cast<double>(sigma_prime.size()));
-  sigma_prime = damping.cwiseProduct(xi_reference - xi);
+  sigma_prime = acceleration + damping.cwiseProduct(xi_reference - xi);
   sigma_prime.tail(joints) += stiffness.cwiseProduct(q_posture - q.tail(joints));
 }
 

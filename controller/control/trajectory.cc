@@ -28,6 +28,16 @@ ScalarMotion CalcMinJerk(double t, double duration) {
           60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (duration * duration)};
 }
 
+ScalarMotion CalcMinSnap(double t, double duration) {
+  if (t <= 0.0) return {};
+  if (t >= duration) return {1.0, 0.0, 0.0};
+  const double u = t / duration;
+  const double v = 1.0 - u;
+  return {u * u * u * u * (35.0 + u * (-84.0 + u * (70.0 - 20.0 * u))),
+          140.0 * u * u * u * v * v * v / duration,
+          420.0 * u * u * v * v * (1.0 - 2.0 * u) / (duration * duration)};
+}
+
 ScalarMotion CalcSpeedRamp(double t, double duration) {
   if (duration <= 0.0) return {t, 1.0, 0.0};
   if (t <= 0.0) return {};

@@ -7,9 +7,6 @@
 #include "controller/dynamics/model_terms.h"
 
 namespace dexcheck {
-namespace {
-
-/// For each fingertip the joints that move it and no other one.
 std::vector<std::vector<int>> ListOwnJoints(const RobotModel& model, std::span<const int> fingertips) {
   std::vector<int> users(static_cast<size_t>(model.num_joints()), 0);
   const auto for_chain = [&](int frame, const auto& visit) {
@@ -27,8 +24,6 @@ std::vector<std::vector<int>> ListOwnJoints(const RobotModel& model, std::span<c
   }
   return own;
 }
-
-}  // namespace
 
 FingerPlacement SolveFingerPlacement(const RobotModel& model, std::span<const int> fingertips,
                                      const Surface& object, const Pose& X_Bo,

@@ -8,6 +8,11 @@
 #include "harness/plant/body_contact.h"
 
 namespace dexcheck {
+
+StepChecks::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)
+    : grasp(setup.model(), setup.fingertips(), setup.object().body, setup.surface(), set),
+      dynamics(setup.model(), static_cast<int>(grasp.members().size())) {}
+
 StepChecks::StepChecks(const Setup& setup)
     : setup_(&setup),
       checks_(kCheckCount),
@@ -71,6 +76,9 @@ StepChecks::StepChecks(const Setup& setup)
   bias_.setZero(n);
   residual_.setZero(n);
   column_.setZero(n, 1);
+  part_prediction_.xi_dot.setZero(n);
+  part_prediction_.f_c = engine_.f_c;
+  prediction_ = &part_prediction_;
   idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
   kappa_.resize(setup.fingertips().size());
 }
@@ -92,6 +100,9 @@ void StepChecks::Reset() {
   contacts_lost_ = 0;
   least_cone_margin_ = std::numeric_limits<double>::infinity();
   steps_ = 0;
+  has_kappa_ = false;
+  transient_steps_ = 0;
+  changed_at_ = -std::numeric_limits<double>::infinity();
 }
 
 const RunCheck& StepChecks::Find(std::string_view name) const {
@@ -102,7 +113,8 @@ const RunCheck& StepChecks::Find(std::string_view name) const {
 }
 
 void StepChecks::Compare(const Plant& plant, const GraspController& controller, const MeasuredState& state,
-                         const Eigen::Ref<const VectorXd>& tau, Observer* observer, double time) {
+                         const Eigen::Ref<const VectorXd>& tau, Observer* observer, double time,
+                         const Handling& handling) {
   time_ = time;
   observer->ReadAccelerations(plant, state, engine_.xi_dot, &engine_.V_Bo_dot);
   contacts_ = observer->ReadContacts(plant);
@@ -112,14 +124,24 @@ void StepChecks::Compare(const Plant& plant, const GraspController& controller, 
     const Matrix3d R_B_cf = state.X_Bo.linear() * controller.grasp().contacts()[i].geometry.g_o_cf.linear();
     engine_.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) = R_B_cf.transpose() * contacts_[i].force;
     if (!contacts_[i].touching) ++lost;
-    if (!contacts_[i].touching && fingertip_slip_[i].touching) ++contacts_lost_;
+    if (handling.holding && !contacts_[i].touching && fingertip_slip_[i].touching) ++contacts_lost_;
     penetration = std::max(penetration, -contacts_[i].distance);
   }
-  Add(kContactsLost, lost);
+  Add(kContactsLost, handling.holding ? lost : 0);
   Add(kPenetration, penetration);
-  CompareDynamics(controller, state, tau);
+  support_ = observer->ReadSupportWrench(plant, state.X_Bo);
+  support_force_ = (state.X_Bo.linear() * support_.head<3>()).z();
+  FindContacts(handling);
+  if (handling.partial && time - changed_at_ < kTransient) {
+    ++transient_steps_;
+  } else {
+    CompareDynamics(controller, state, tau);
+    CompareObject(controller);
+  }
+  if (handling.holding && !was_holding_) ForgetSlip();
+  was_holding_ = handling.holding;
   ReadSlip(plant, state);
-  CompareKappa(controller, state, plant.time_step());
+  if (handling.holding) CompareKappa(controller, state, plant.time_step());
 
   Add(kBaseTilt, observer->departure().tilt);
   double idle = 0.0;
@@ -137,12 +159,58 @@ void StepChecks::Compare(const Plant& plant, const GraspController& controller, 
   ++steps_;
 }
 
+void StepChecks::FindContacts(const Handling& handling) {
+  if (handling.contacts != handling_.contacts) changed_at_ = time_;
+  handling_ = handling;
+  ContactSet touching = 0;
+  for (size_t i = 0; i < contacts_.size(); ++i) {
+    if (contacts_[i].touching) touching |= ContactSet{1} << i;
+  }
+  const bool supported = !support_.isZero(0.0);
+  if (touching != touching_ || supported != supported_) changed_at_ = time_;
+  touching_ = touching;
+  supported_ = supported;
+}
+
+void StepChecks::ForgetSlip() {
+  std::fill(fingertip_slip_.begin(), fingertip_slip_.end(), SlipState{});
+  has_kappa_ = false;
+}
+
+void StepChecks::Predict(const GraspController& controller, const MeasuredState& state) {
+  const bool whole = touching_ == AllContacts(static_cast<int>(contacts_.size()));
+  mass_factor_ = &dynamics_.mass_factor();
+  if (!handling_.partial || (whole && !supported_)) {
+    prediction_ = &dynamics_.Predict(controller.robot(), controller.grasp(), force_);
+  } else if (whole) {
+    prediction_ = &dynamics_.Predict(controller.robot(), controller.grasp(), force_, ObjectSupport::kAtRest);
+  } else if (touching_ == 0) {
+    prediction_ = &dynamics_.PredictFree(controller.robot(), force_);
+  } else {
+    PredictPart(controller, state);
+  }
+}
+
+void StepChecks::PredictPart(const GraspController& controller, const MeasuredState& state) {
+  std::unique_ptr<PartialDynamics>& part = parts_[touching_];
+  if (!part) part = std::make_unique<PartialDynamics>(*setup_, touching_);
+  part->grasp.SetState(controller.robot(), state);
+  const Prediction& prediction =
+      part->dynamics.Predict(controller.robot(), part->grasp.terms(), force_,
+                             supported_ ? ObjectSupport::kAtRest : ObjectSupport::kHand);
+  part_prediction_.xi_dot = prediction.xi_dot;
+  part_prediction_.V_Bo_dot = prediction.V_Bo_dot;
+  part->grasp.Scatter(prediction.f_c, part_prediction_.f_c);
+  prediction_ = &part_prediction_;
+  mass_factor_ = &part->dynamics.mass_factor();
+}
+
 void StepChecks::CompareDynamics(const GraspController& controller, const MeasuredState& state,
                                  const Eigen::Ref<const VectorXd>& tau) {
   const ModelTerms& robot = controller.robot();
   const GraspTerms& grasp = controller.grasp();
   actuation_.CalcForce(tau, force_);
-  prediction_ = &dynamics_.Predict(robot, grasp, force_);
+  Predict(controller, state);
 
   // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
   bias_ = robot.gravity() + robot.friction();
@@ -153,7 +221,7 @@ void StepChecks::CompareDynamics(const GraspController& controller, const Measur
   // |f|_M^-1 = |L^-T f|
   const auto norm = [&](const VectorXd& f) {
     column_ = f;
-    dynamics_.mass_factor().SolveTransposed(column_);
+    mass_factor_->SolveTransposed(column_);
     return column_.norm();
   };
   const double scale = std::max(norm(bias_), std::numeric_limits<double>::min());
@@ -161,19 +229,25 @@ void StepChecks::CompareDynamics(const GraspController& controller, const Measur
 
   // |a|_M = |L a|
   residual_ = prediction_->xi_dot - engine_.xi_dot;
-  dynamics_.mass_factor().Multiply(residual_);
+  mass_factor_->Multiply(residual_);
   Add(kReducedAcceleration, residual_.norm() / scale);
-  const double force_scale = std::max(engine_.f_c.norm(), std::numeric_limits<double>::min());
+  double force_scale = std::max(engine_.f_c.norm(), std::numeric_limits<double>::min());
+  // Fingertips that only touch push with less than what they will bear.
+  if (handling_.partial) force_scale = std::max(force_scale, Weight());
   Add(kContactForce, (prediction_->f_c - engine_.f_c).norm() / force_scale);
+}
 
+double StepChecks::Weight() const { return setup_->object().body.mass * setup_->model().gravity().norm(); }
+
+void StepChecks::CompareObject(const GraspController& controller) {
   // (19), as forces at the contacts' arm
+  const GraspTerms& grasp = controller.grasp();
   const ObjectBodyTerms& body = grasp.body();
-  const Vector6d left =
-      body.M_hat * engine_.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o - grasp.G() * engine_.f_c;
+  const Vector6d left = body.M_hat * engine_.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
+                        grasp.G() * engine_.f_c - support_;
   const double arm = grasp.contacts()[0].geometry.g_o_cf.translation().norm();
-  const double weight = grasp.object().mass * grasp.gravity().norm();
   Add(kBalanceObject,
-      std::max(left.head<3>().norm(), left.tail<3>().norm() / arm) / std::max(weight, force_scale));
+      std::max(left.head<3>().norm(), left.tail<3>().norm() / arm) / std::max(Weight(), engine_.f_c.norm()));
 }
 
 void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
@@ -193,15 +267,17 @@ void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
   for (size_t i = 0; i < tip_bodies_.size(); ++i) {
     update(&fingertip_slip_[i], ReadBodyContact(plant.model(), plant.data(), tip_bodies_[i], object),
            state.X_Bo.linear());
-    if (fingertip_slip_[i].touching) {
+    if (fingertip_slip_[i].touching && handling_.holding) {
       least_cone_margin_ = std::min(least_cone_margin_, fingertip_slip_[i].cone_margin);
     }
   }
   if (!setup_->bonds().empty()) {
     for (const EngineContact& bond : contacts_) slipped = std::max(slipped, bond.distance);
   }
-  Add(kFingertipSlip, slipped);
-  Add(kConeUse, cone_use);
+  if (handling_.holding) {
+    Add(kFingertipSlip, slipped);
+    Add(kConeUse, cone_use);
+  }
   slipped = 0.0;
   cone_use = 0.0;
   const double phi = setup_->model().num_base_positions() == 3 ? state.q[2] : 0.0;
@@ -217,7 +293,7 @@ void StepChecks::CompareKappa(const GraspController& controller, const MeasuredS
   const GraspTerms& grasp = controller.grasp();
   double apart = 0.0;
   for (size_t i = 0; i < kappa_.size(); ++i) {
-    if (steps_ == 0) {
+    if (!has_kappa_) {
       kappa_[i] = state.kappa[i];
       continue;
     }
@@ -229,6 +305,7 @@ void StepChecks::CompareKappa(const GraspController& controller, const MeasuredS
     const Vector3d measured = grasp.surface().Evaluate(state.kappa[i].alpha_o).p;
     apart = std::max(apart, (integrated - measured).norm());
   }
+  has_kappa_ = true;
   Add(kKappa, apart);
 }
 

@@ -6,6 +6,8 @@
 // metres and radians, arms and phalanges weigh what they weigh: |a|_M = sqrt(a^T M_bar' a), |f|_M^-1 =
 // sqrt(f^T M_bar'^-1 f), relative to |C_bar' xi + F_bar'|_M^-1, the force that the motors have to balance.
 
+#include <map>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,6 +15,7 @@
 #include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/grasp_controller.h"
+#include "controller/handling/partial_grasp.h"
 #include "harness/checks/run_check.h"
 #include "harness/plant/observer.h"
 #include "harness/plant/plant.h"
@@ -36,16 +39,32 @@ struct SlipState {
   double cone_margin = 0.0;              ///< mu normal force - |tangential force|, N.
 };
 
-/// Balance, prediction and assumptions. Nothing allocates after construction.
+/// What a step's contacts are meant to be.
+struct Handling {
+  bool partial = false;     ///< Contacts come and go, and the object may lie on something: a task.
+  bool holding = true;      ///< All fingertips should touch the object.
+  ContactSet contacts = 0;  ///< Of a task: fingertips that the law lets push.
+};
+
+/// Balance, prediction and assumptions. Nothing allocates after construction, except where a task's set of
+/// contacts comes up for the first time.
+///
+/// Of a task each step is predicted with the contacts that it has: (46) for the fingertips that touch, and an
+/// object that does not move while it lies on something. Soft contacts need some milliseconds to become what
+/// rigid ones are at once: for kTransient after a contact has come, gone or been let go, balance and
+/// prediction are not judged.
 class StepChecks {
  public:
+  static constexpr double kTransient = 0.05;  ///< s
+
   explicit StepChecks(const Setup& setup);
 
   /// Compares one step, after the plant's EndStep.
   /// @param state what the observer read before the step. @param tau that was applied (n).
   /// @param time at the beginning of the step, s.
   void Compare(const Plant& plant, const GraspController& controller, const MeasuredState& state,
-               const Eigen::Ref<const VectorXd>& tau, Observer* observer, double time);
+               const Eigen::Ref<const VectorXd>& tau, Observer* observer, double time,
+               const Handling& handling = {});
 
   /// Forgets all steps so far: time begins anew.
   void Reset();
@@ -53,7 +72,12 @@ class StepChecks {
   [[nodiscard]] const std::vector<RunCheck>& checks() const { return checks_; }
   [[nodiscard]] const RunCheck& Find(std::string_view name) const;
   [[nodiscard]] const PlantMotion& engine() const { return engine_; }
+  /// Of the last step that had one.
   [[nodiscard]] const Prediction& prediction() const { return *prediction_; }
+  /// Upward force on the object by what it lies on at the last step, N.
+  [[nodiscard]] double support_force() const { return support_force_; }
+  /// Steps whose balance and prediction were not judged, because contacts had just changed.
+  [[nodiscard]] long transient_steps() const { return transient_steps_; }
   [[nodiscard]] std::span<const EngineContact> contacts() const { return contacts_; }
   [[nodiscard]] const std::vector<SlipState>& fingertip_slip() const { return fingertip_slip_; }
   [[nodiscard]] const std::vector<SlipState>& wheel_slip() const { return wheel_slip_; }
@@ -83,9 +107,22 @@ class StepChecks {
   void Define(Check check, const char* name, CheckKind kind, const char* unit, double bound,
               const char* description);
   void Add(Check check, double value) { checks_[check].Add(value, time_); }
+  /// Contacts of a task, and how the rigid system behaves with them.
+  struct PartialDynamics {
+    PartialDynamics(const Setup& setup, ContactSet set);
+    PartialGrasp grasp;
+    ConstrainedDynamics dynamics;
+  };
+  void FindContacts(const Handling& handling);
+  void Predict(const GraspController& controller, const MeasuredState& state);
+  void PredictPart(const GraspController& controller, const MeasuredState& state);
   void CompareDynamics(const GraspController& controller, const MeasuredState& state,
                        const Eigen::Ref<const VectorXd>& tau);
+  void CompareObject(const GraspController& controller);
   void ReadSlip(const Plant& plant, const MeasuredState& state);
+  void ForgetSlip();
+  /// Of the object, N.
+  [[nodiscard]] double Weight() const;
   void CompareKappa(const GraspController& controller, const MeasuredState& state, double dt);
 
   const Setup* setup_;
@@ -94,11 +131,23 @@ class StepChecks {
   ActuationMap actuation_;
   PlantMotion engine_;
   const Prediction* prediction_ = nullptr;
+  const TreeFactor* mass_factor_ = nullptr;
+  std::map<ContactSet, std::unique_ptr<PartialDynamics>> parts_;
+  Prediction part_prediction_;  // of a part of the contacts, spread over all
+  Handling handling_;
+  ContactSet touching_ = 0;
+  bool supported_ = false;
+  bool was_holding_ = false;
+  double changed_at_ = -std::numeric_limits<double>::infinity();  // the contacts, s
+  Vector6d support_ = Vector6d::Zero();                           // wrench on the object, Sigma_o
+  double support_force_ = 0.0;
+  long transient_steps_ = 0;
   std::span<const EngineContact> contacts_;
   std::vector<SlipState> fingertip_slip_, wheel_slip_;
   std::vector<int> wheel_bodies_, tip_bodies_;
   std::vector<ContactCoordinates> kappa_;  // integrated from (40)
   VectorXd idle_start_;
+  bool has_kappa_ = false;
   long steps_ = 0;
   long contacts_lost_ = 0;
   double least_cone_margin_ = std::numeric_limits<double>::infinity();

@@ -98,6 +98,8 @@ void StepModelCheck::Compare(const ModelTerms& robot, const GraspTerms& grasp, c
   CompareJacobians(robot, step);
   if (with_contacts_) CompareContacts(grasp, state, X_W0, step);
   for (size_t i = 0; i < terms_.size(); ++i) {
+    step_errors_[i] = 0.0;
+    if (IsOfContacts(i) && !with_contacts_) continue;
     terms_[i].Finish(step);
     step_errors_[i] = terms_[i].step_error();
   }

@@ -24,8 +24,10 @@ class StepModelCheck {
   /// @throws InputError as EngineStep.
   StepModelCheck(const Adapter& adapter, std::span<const int> fingertips, OrientationFeedback orientation);
 
-  /// For bonds: the engine has no contact to compare with; their terms are left out of Compare.
-  void LeaveOutContacts() { with_contacts_ = false; }
+  /// Whether Compare includes the contacts' terms. Not for bonds, where the engine has no contact to compare
+  /// with, nor while a fingertip is far from the object.
+  void IncludeContacts(bool include) { with_contacts_ = include; }
+  [[nodiscard]] bool includes_contacts() const { return with_contacts_; }
   /// Whether a record belongs to the contacts.
   [[nodiscard]] static bool IsOfContacts(size_t record) {
     return record >= kContactFrame && record <= kGDotV;

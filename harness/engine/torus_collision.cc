@@ -10,6 +10,19 @@ namespace {
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 mjfCollision original_sphere_mesh = nullptr;
+mjfCollision original_box_mesh = nullptr;
+
+/// Tilt of a torus that lies flat, rad.
+constexpr double kFlat = 1e-3;
+
+/// Pose of the body, which is a torus's frame: the engine turns a mesh geom's own frame to the mesh's principal axes.
+Pose BodyPose(const mjModel& m, const mjData& d, int geom) {
+  const int body = m.geom_bodyid[geom];
+  Pose X = Pose::Identity();
+  X.linear() = Eigen::Map<const RowMatrix3d>(d.xmat + 9 * body);
+  X.translation() = Eigen::Map<const Vector3d>(d.xpos + 3 * body);
+  return X;
+}
 
 int CollideSphereMesh(const mjModel* m, const mjData* d, mjContact* con, int g1, int g2, mjtNum margin) {
   double ring_radius = 0.0;
@@ -17,22 +30,53 @@ int CollideSphereMesh(const mjModel* m, const mjData* d, mjContact* con, int g1,
   if (!GetTorusRadii(*m, g2, &ring_radius, &tube_radius))
     return original_sphere_mesh(m, d, con, g1, g2, margin);
 
-  // The frame is the body's: the engine turns a mesh geom's own frame to the mesh's principal axes.
-  const int body = m->geom_bodyid[g2];
-  const Eigen::Map<const RowMatrix3d> R(d->xmat + 9 * body);
-  const Eigen::Map<const Vector3d> origin(d->xpos + 3 * body);
+  const Pose X_BT = BodyPose(*m, *d, g2);
   const Eigen::Map<const Vector3d> sphere(d->geom_xpos + 3 * g1);
-  const Vector3d center = R.transpose() * (sphere - origin);
+  const Vector3d center = X_BT.linear().transpose() * (sphere - X_BT.translation());
   SphereTorusContact contacts[2];
   const int count =
       CollideSphereTorus(center, m->geom_size[3 * g1], ring_radius, tube_radius, margin, contacts);
   for (int i = 0; i < count; ++i) {
     con[i].dist = contacts[i].distance;
-    Eigen::Map<Vector3d>(con[i].pos) = origin + R * contacts[i].position;
-    Eigen::Map<Vector3d>(con[i].frame) = R * contacts[i].normal;
+    Eigen::Map<Vector3d>(con[i].pos) = X_BT * contacts[i].position;
+    Eigen::Map<Vector3d>(con[i].frame) = X_BT.linear() * contacts[i].normal;
     mju_zero3(con[i].frame + 3);
   }
   return count;
+}
+
+int CollideBoxMesh(const mjModel* m, const mjData* d, mjContact* con, int g1, int g2, mjtNum margin) {
+  double ring_radius = 0.0;
+  double tube_radius = 0.0;
+  if (!GetTorusRadii(*m, g2, &ring_radius, &tube_radius)) return original_box_mesh(m, d, con, g1, g2, margin);
+  Pose X_WB = Pose::Identity();
+  X_WB.linear() = Eigen::Map<const RowMatrix3d>(d->geom_xmat + 9 * g1);
+  X_WB.translation() = Eigen::Map<const Vector3d>(d->geom_xpos + 3 * g1);
+  const Eigen::Map<const Vector3d> half_size(m->geom_size + 3 * g1);
+  BoxTorusContact contacts[kRingPlaces];
+  const Pose X_BT = X_WB.inverse(Eigen::Isometry) * BodyPose(*m, *d, g2);
+  const int count = CollideBoxTorus(X_BT, ring_radius, tube_radius, half_size, margin, contacts);
+  for (int i = 0; i < count; ++i) {
+    con[i].dist = contacts[i].distance;
+    Eigen::Map<Vector3d>(con[i].pos) = X_WB * contacts[i].position;
+    Eigen::Map<Vector3d>(con[i].frame) = X_WB.linear() * contacts[i].normal;
+    mju_zero3(con[i].frame + 3);
+  }
+  return count;
+}
+
+/// Distance of a point from a box's surface, negative inside, and the outward normal there.
+double MeasureBox(const Vector3d& point, const Vector3d& half_size, Vector3d* normal) {
+  const Vector3d beyond = point - point.cwiseMax(-half_size).cwiseMin(half_size);
+  const double outside = beyond.norm();
+  if (outside > 0.0) {
+    *normal = beyond / outside;
+    return outside;
+  }
+  Eigen::Index axis = 0;
+  const double inside = (point.cwiseAbs() - half_size).maxCoeff(&axis);
+  *normal = (point[axis] < 0.0 ? -1.0 : 1.0) * Vector3d::Unit(axis);
+  return inside;
 }
 
 }  // namespace
@@ -67,11 +111,30 @@ int CollideSphereTorus(const Vector3d& center, double sphere_radius, double ring
   return count;
 }
 
+int CollideBoxTorus(const Pose& X_BT, double ring_radius, double tube_radius, const Vector3d& half_size,
+                    double margin, BoxTorusContact contacts[kRingPlaces]) {
+  Vector3d normal;
+  MeasureBox(X_BT.translation(), half_size, &normal);
+  const Vector3d down = -(X_BT.linear().transpose() * normal);
+  const double first = down.head<2>().norm() > kFlat ? std::atan2(down.y(), down.x()) : 0.0;
+  int count = 0;
+  for (int i = 0; i < kRingPlaces; ++i) {
+    const double u = first + 2.0 * kPi * i / kRingPlaces;
+    const Vector3d center = X_BT * Vector3d(ring_radius * std::cos(u), ring_radius * std::sin(u), 0.0);
+    const double distance = MeasureBox(center, half_size, &normal) - tube_radius;
+    if (distance > margin) continue;
+    contacts[count++] = {distance, normal, center - (tube_radius + 0.5 * distance) * normal};
+  }
+  return count;
+}
+
 void InstallTorusCollision() {
   static std::once_flag once;
   std::call_once(once, [] {
     original_sphere_mesh = mjCOLLISIONFUNC[mjGEOM_SPHERE][mjGEOM_MESH];
     mjCOLLISIONFUNC[mjGEOM_SPHERE][mjGEOM_MESH] = CollideSphereMesh;
+    original_box_mesh = mjCOLLISIONFUNC[mjGEOM_BOX][mjGEOM_MESH];
+    mjCOLLISIONFUNC[mjGEOM_BOX][mjGEOM_MESH] = CollideBoxMesh;
   });
 }
 

@@ -22,7 +22,26 @@ struct SphereTorusContact {
 int CollideSphereTorus(const Vector3d& center, double sphere_radius, double ring_radius, double tube_radius,
                        double margin, SphereTorusContact contacts[2]);
 
-/// Makes the engine collide spheres with tori exactly, in the whole process; other meshes keep the engine's own function.
+/// Torus against box at one place of its ring.
+struct BoxTorusContact {
+  double distance;   ///< m; negative when they overlap.
+  Vector3d normal;   ///< From the box to the torus, in the box's frame.
+  Vector3d position; ///< Midway between the surfaces, in the box's frame, m.
+};
+
+/// Places of the ring at which a torus is held against a box.
+inline constexpr int kRingPlaces = 8;
+
+/// Contacts nearer than `margin` between a torus and a box. A torus is a ball rolled around its ring: the ball is
+/// collided at kRingPlaces, evenly spread from the place that is deepest in the box, or from the torus's x axis when it
+/// lies so flat that there is none. Exact for a torus on a face; an edge or corner between two places is missed.
+/// @param X_BT the torus, about its z axis, in the box's frame. @param half_size of the box, m.
+/// @return how many of `contacts` were filled.
+int CollideBoxTorus(const Pose& X_BT, double ring_radius, double tube_radius, const Vector3d& half_size,
+                    double margin, BoxTorusContact contacts[kRingPlaces]);
+
+/// Makes the engine collide spheres and boxes with tori so, in the whole process; other meshes keep the engine's own
+/// functions.
 /// A mesh geom is a torus about its BODY's origin and z axis when the MJCF gives it user="RING_RADIUS TUBE_RADIUS"
 /// (with <size nuser_geom="2"/>). Safe to call more than once and from several threads.
 void InstallTorusCollision();

@@ -90,10 +90,11 @@ void Observer::Read(const Plant& plant, MeasuredState* state) {
     X_Bf.linear() = Eigen::Map<const RowMatrix3d>(data.site_xmat + 9 * site);
     X_Bf.translation() = MapVector(data.site_xpos + 3 * site);
     const Pose X_of = X_oB * X_Bf;
-    const FoundContact found = guess ? FindContact(tips_[i], *surface_, X_of, state->kappa[i])
-                                     : FindContact(tips_[i], *surface_, X_of);
+    const bool near = guess && state->overlap[i] > -kFar;
+    const FoundContact found = near ? FindContact(tips_[i], *surface_, X_of, state->kappa[i])
+                                    : FindContact(tips_[i], *surface_, X_of);
     state->kappa[i] = found.kappa;
-    state->overlap[i] = -found.gap;
+    state->overlap[i] = std::max(-found.gap, -kFar);
   }
   has_guess_ = true;
 }
@@ -159,6 +160,46 @@ void Observer::ReadBonds(const Plant& plant) {
       break;
     }
   }
+}
+
+int Observer::FindFingertip(int geom) const {
+  const auto found = std::find(tip_geoms_.begin(), tip_geoms_.end(), geom);
+  return found == tip_geoms_.end() ? -1 : static_cast<int>(found - tip_geoms_.begin());
+}
+
+ContactSet Observer::FindTouching(const Plant& plant) const {
+  const mjModel& m = plant.model();
+  const mjData& d = plant.data();
+  const int object = adapter_->object_body();
+  ContactSet touching = 0;
+  for (int k = 0; k < d.ncon; ++k) {
+    const mjContact& c = d.contact[k];
+    if (m.geom_bodyid[c.geom1] != object && m.geom_bodyid[c.geom2] != object) continue;
+    const int tip = FindFingertip(m.geom_bodyid[c.geom1] == object ? c.geom2 : c.geom1);
+    if (tip >= 0) touching |= ContactSet{1} << tip;
+  }
+  return touching;
+}
+
+Vector6d Observer::ReadSupportWrench(const Plant& plant, const Pose& X_Bo) const {
+  const mjModel& m = plant.model();
+  const mjData& d = plant.data();
+  const int object = adapter_->object_body();
+  Vector6d wrench = Vector6d::Zero();
+  for (int k = 0; k < d.ncon; ++k) {
+    const mjContact& c = d.contact[k];
+    const bool first = m.geom_bodyid[c.geom1] == object;
+    if (!first && m.geom_bodyid[c.geom2] != object) continue;
+    if (FindFingertip(first ? c.geom2 : c.geom1) >= 0) continue;
+    const Eigen::Map<const RowMatrix3d> frame(c.frame);
+    mjtNum contact_force[6];  // on geom2, in the contact's frame
+    mj_contactForce(&m, &d, k, contact_force);
+    const Vector3d force = (first ? -1.0 : 1.0) * (frame.transpose() * MapVector(contact_force));
+    const Vector3d arm = MapVector(c.pos) - X_Bo.translation();
+    wrench.head<3>() += X_Bo.linear().transpose() * force;
+    wrench.tail<3>() += X_Bo.linear().transpose() * arm.cross(force);
+  }
+  return wrench;
 }
 
 std::span<const EngineContact> Observer::ReadContacts(const Plant& plant) {

@@ -7,6 +7,7 @@
 
 #include "controller/contact/contact_geometry.h"
 #include "controller/control/grasp_controller.h"
+#include "controller/handling/partial_grasp.h"
 #include "harness/plant/plant.h"
 
 namespace dexcheck {
@@ -38,7 +39,11 @@ class Observer {
   /// fingertip.
   void SetBonds(std::span<const ContactCoordinates> kappa, std::span<const int> constraints);
 
-  /// q', xi, object, kappa and overlaps at the plant's state; between BeginStep and EndStep.
+  /// Gap between fingertip and object from which on they are just far apart, m.
+  static constexpr double kFar = 5e-3;
+
+  /// q', xi, object, kappa and overlaps at the plant's state; between BeginStep and EndStep. Of a fingertip
+  /// that is far from the object, kappa is the nearest place and the overlap -kFar.
   /// Tilt and height of the base, which q' does not have, are dropped; kappa is where the plant's fingertips
   /// touch.
   void Read(const Plant& plant, MeasuredState* state);
@@ -50,6 +55,11 @@ class Observer {
   /// @param state what Read gave before that step.
   void ReadAccelerations(const Plant& plant, const MeasuredState& state, Eigen::Ref<VectorXd> xi_dot,
                          Vector6d* V_Bo_dot) const;
+
+  /// Fingertips that touch the object; between BeginStep and EndStep.
+  [[nodiscard]] ContactSet FindTouching(const Plant& plant) const;
+  /// Wrench on the object by all else than fingertips, Sigma_o, N and N m, after EndStep.
+  [[nodiscard]] Vector6d ReadSupportWrench(const Plant& plant, const Pose& X_Bo) const;
 
   /// The engine's contacts of the fingertips with their forces, after EndStep.
   [[nodiscard]] std::span<const EngineContact> ReadContacts(const Plant& plant);
@@ -63,6 +73,7 @@ class Observer {
     Vector3d omega = Vector3d::Zero();     // world
   };
   void ReadBonds(const Plant& plant);
+  [[nodiscard]] int FindFingertip(int geom) const;
   [[nodiscard]] BaseRates ReadBaseRates(const mjData& data) const;
   [[nodiscard]] Vector2d CalcDriveVelocity(double forward, double yaw_rate) const;
 

@@ -46,7 +46,7 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check)
         std::make_unique<StepModelCheck>(setup.adapter(), setup.fingertips(), scenario.control.orientation);
     const std::vector<CheckRecord> records = model_check_->records();
     const bool bonded = !setup.bonds().empty();
-    if (bonded) model_check_->LeaveOutContacts();
+    model_check_->IncludeContacts(!bonded);
     for (size_t i = 0; i < records.size(); ++i) {
       RunCheck run_check;
       run_check.name = records[i].name;
@@ -58,6 +58,14 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check)
     }
   }
   PlaceRobot();
+  if (scenario.task) {
+    handling_ = std::make_unique<HandlingController>(setup.model(), setup.fingertips(), setup.object().body,
+                                                     setup.surface(), controller_);
+    task_ = std::make_unique<PickAndPlace>(setup.model(), setup.fingertips(), setup.palm(), setup.surface(),
+                                           setup.object().body, setup.q_start(),
+                                           scenario.task->pick_and_place, scenario.plant.time_step);
+    return;
+  }
   trajectory_ = MakeTrajectory(scenario, setup.X_start() + scenario.start_error);
   if (scenario.start == Start::kMoving) CheckMovingStart();
 }
@@ -91,6 +99,14 @@ void ClosedLoop::PlaceRobot() {
 void ClosedLoop::Settle() {
   SettleOn(LineTrajectory(setup_->X_start(), Vector6d::Zero(), 0.0), setup_->scenario().settle);
   if (setup_->scenario().start == Start::kMoving) StartMoving(trajectory_->Evaluate(0.0));
+  if (task_) {
+    try {
+      task_->Begin(0.0, state_.X_Bo);
+    } catch (const InputError& error) {
+      throw InputError(setup_->scenario().source + ": task: " + error.what());
+    }
+    task_begun_ = true;
+  }
   times_ = LoopTimes{};
   checks_.Reset();
 }
@@ -101,10 +117,10 @@ void ClosedLoop::SettleOn(const Trajectory& trajectory, double duration) {
   checks_.Reset();
   for (long i = 0; i < count; ++i) {
     const double t = static_cast<double>(i) * dt;
-    ControlStep(EvaluateDesired(trajectory, t), i);
+    ControlStep(EvaluateDesired(trajectory, t), i, t - duration);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
     if (check_ && t >= kRoughTime)
-      checks_.Compare(plant_, controller_, state_, tau_, &observer_, t - duration);
+      checks_.Compare(plant_, controller_, state_, tau_, &observer_, t - duration, DescribeHandling());
     CheckGrasp();
   }
 }
@@ -151,7 +167,36 @@ DesiredMotion ClosedLoop::EvaluateDesired(const Trajectory& trajectory, double t
   return desired;
 }
 
-void ClosedLoop::ControlStep(const DesiredMotion& desired, long step) {
+Handling ClosedLoop::DescribeHandling() const {
+  if (!task_) return {};
+  return {.partial = true,
+          .holding = task_begun_ && IsHolding(task_->phase()),
+          .contacts = task_->demand().contacts};
+}
+
+void ClosedLoop::CalcTaskTorque(double t) {
+  const ContactSet contacts_before = task_->demand().contacts;
+  const Phase phase_before = task_->phase();
+  if (task_begun_) {
+    touch_.fingertips = observer_.FindTouching(plant_);
+    task_->Update(t, told_, touch_, &controller_.options().posture);
+  }
+  controller_.SetState(told_);
+  tau_before_ = tau_;
+  try {
+    tau_ = handling_->CalcTorque(told_, task_->demand());
+  } catch (const GraspForceError& error) {
+    if (task_->phase() != Phase::kTakeOver) throw;
+    task_->Refuse(t, error.what());
+    tau_ = handling_->CalcTorque(told_, task_->demand());
+  }
+  const bool switched = task_->phase() != phase_before || task_->demand().contacts != contacts_before;
+  if (task_begun_ && switched) {
+    torque_jump_ = std::max(torque_jump_, (tau_ - tau_before_).cwiseAbs().maxCoeff());
+  }
+}
+
+void ClosedLoop::ControlStep(const DesiredMotion& desired, long step, double t) {
   const auto begin = Clock::now();
   plant_.BeginStep();
   const auto read = Clock::now();
@@ -160,12 +205,23 @@ void ClosedLoop::ControlStep(const DesiredMotion& desired, long step) {
   CheckRobot();
   told_ = state_;
   for (ContactCoordinates& kappa : told_.kappa) kappa.alpha_o.u += setup_->scenario().control.contact_error;
-  controller_.SetState(told_);
   desired_ = desired;
-  if (step % control_interval_ == 0) {
-    tau_ = controller_.CalcTorque(desired);
-    times_.grasp_force += controller_.force_seconds();
-    ++times_.solves;
+  if (task_) {
+    CalcTaskTorque(t);
+    times_.grasp_force += handling_->force_seconds();
+    if (task_->demand().grip > 0.0) ++times_.solves;
+    desired_ = task_->demand().desired;
+    if (!task_->demand().carried) {
+      desired_ = DesiredMotion{};
+      desired_.X_d = X_o();
+    }
+  } else {
+    controller_.SetState(told_);
+    if (step % control_interval_ == 0) {
+      tau_ = controller_.CalcTorque(desired);
+      times_.grasp_force += controller_.force_seconds();
+      ++times_.solves;
+    }
   }
   CheckTorques();
   const auto control = Clock::now();
@@ -178,8 +234,7 @@ void ClosedLoop::ControlStep(const DesiredMotion& desired, long step) {
 
 void ClosedLoop::Step() {
   step_time_ = time();
-  const DesiredMotion desired = EvaluateDesired(*trajectory_, step_time_);
-  ControlStep(desired, step_);
+  ControlStep(trajectory_ ? EvaluateDesired(*trajectory_, step_time_) : DesiredMotion{}, step_, step_time_);
   error_.position = desired_.X_d.head<3>() - state_.X_Bo.translation();
   error_.orientation =
       LogSo3(state_.X_Bo.linear().transpose() * CalcRotationZyz(desired_.X_d.tail<3>())).norm();
@@ -187,17 +242,33 @@ void ClosedLoop::Step() {
   if (check_) {
     const auto begin = Clock::now();
     CompareModel();
-    checks_.Compare(plant_, controller_, state_, tau_, &observer_, step_time_);
+    checks_.Compare(plant_, controller_, state_, tau_, &observer_, step_time_, DescribeHandling());
     times_.cross_check += Seconds(begin, Clock::now());
   }
   CheckGrasp();
+  if (task_) CheckTask();
+}
+
+void ClosedLoop::CheckTask() {
+  touch_.support_force =
+      (state_.X_Bo.linear() * observer_.ReadSupportWrench(plant_, state_.X_Bo).head<3>()).z();
+  if (task_->is_done() && !task_->failure().empty()) throw RunFailure(task_->failure());
+  if (!task_->is_done() && step_ >= num_steps_) {
+    throw RunFailure("the task was not done in time, it was in phase " + Quote(NameOf(task_->phase())));
+  }
 }
 
 void ClosedLoop::CompareModel() {
+  if (task_) {
+    const std::vector<double>& overlap = state_.overlap;
+    model_check_->IncludeContacts(
+        std::all_of(overlap.begin(), overlap.end(), [](double depth) { return depth > -Observer::kFar; }));
+  }
   model_check_->Compare(controller_.robot(), controller_.grasp(), state_, observer_.X_W0(), step_);
   const std::span<const double> errors = model_check_->step_errors();
   bool newly_failed = false;
   for (size_t i = 0; i < errors.size(); ++i) {
+    if (StepModelCheck::IsOfContacts(i) && !model_check_->includes_contacts()) continue;
     const bool failed_before = model_checks_[i].failed;
     model_checks_[i].Add(errors[i], step_time_);
     newly_failed = newly_failed || (model_checks_[i].failed && !failed_before);
@@ -236,6 +307,7 @@ void ClosedLoop::CheckTorques() {
 }
 
 void ClosedLoop::CheckGrasp() {
+  if (task_ && (!task_begun_ || !IsHolding(task_->phase()))) return;
   std::string missing;
   const std::span<const EngineContact> contacts = observer_.ReadContacts(plant_);
   for (size_t i = 0; i < contacts.size(); ++i) {

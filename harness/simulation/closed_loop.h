@@ -8,6 +8,8 @@
 
 #include "controller/control/grasp_controller.h"
 #include "controller/control/trajectory.h"
+#include "controller/handling/handling_controller.h"
+#include "controller/handling/pick_and_place.h"
 #include "harness/checks/step_checks.h"
 #include "harness/checks/step_model_check.h"
 #include "harness/plant/observer.h"
@@ -54,8 +56,10 @@ class ClosedLoop {
   /// the first Step, at t = 0. @throws as Step.
   void Settle();
 
-  /// Number of steps of the scenario's duration.
+  /// Number of steps of the scenario's duration, the most that a task may take.
   [[nodiscard]] long num_steps() const { return num_steps_; }
+  /// Whether there is nothing left to do.
+  [[nodiscard]] bool is_finished() const { return step_ >= num_steps_ || (task_ && task_->is_done()); }
   /// Steps done, and the time that the next one begins at, s.
   [[nodiscard]] long step() const { return step_; }
   [[nodiscard]] double time() const { return static_cast<double>(step_) * plant_.time_step(); }
@@ -79,6 +83,13 @@ class ClosedLoop {
   [[nodiscard]] const StepChecks& checks() const { return checks_; }
   /// Checks of the first question, model against engine at the plant's state.
   [[nodiscard]] std::span<const RunCheck> model_checks() const { return model_checks_; }
+  /// The sequence of phases; null unless the scenario is a task.
+  [[nodiscard]] const PickAndPlace* task() const { return task_.get(); }
+  /// Whether the object should follow a trajectory, so that its tracking error means something.
+  [[nodiscard]] bool is_tracking() const { return !task_ || task_->phase() == Phase::kCarry; }
+  /// Largest change of a torque from one step to the next where a task's phase or contacts changed, N m.
+  [[nodiscard]] double torque_jump() const { return torque_jump_; }
+
   /// Pose of the object; its angles follow the controller's where it uses them.
   [[nodiscard]] Vector6d X_o() const;
 
@@ -92,12 +103,15 @@ class ClosedLoop {
   void CheckMovingStart() const;
   void StartMoving(const DesiredMotion& at_start);
   void SettleOn(const Trajectory& trajectory, double duration);
-  void ControlStep(const DesiredMotion& desired, long step);
+  void ControlStep(const DesiredMotion& desired, long step, double t);
   [[nodiscard]] DesiredMotion EvaluateDesired(const Trajectory& trajectory, double t) const;
   void CompareModel();
   void CheckRobot() const;
   void CheckTorques();
   void CheckGrasp();
+  void CheckTask();
+  void CalcTaskTorque(double t);
+  [[nodiscard]] Handling DescribeHandling() const;
 
   const Setup* setup_;
   bool check_;
@@ -107,7 +121,12 @@ class ClosedLoop {
   StepChecks checks_;
   std::unique_ptr<StepModelCheck> model_check_;
   std::vector<RunCheck> model_checks_;
-  std::unique_ptr<Trajectory> trajectory_;
+  std::unique_ptr<Trajectory> trajectory_;        // null for a task
+  std::unique_ptr<HandlingController> handling_;  // null without a task
+  std::unique_ptr<PickAndPlace> task_;
+  bool task_begun_ = false;
+  Touch touch_;
+  double torque_jump_ = 0.0;
   long num_steps_ = 0;
   long control_interval_ = 1;
   long step_ = 0;
@@ -116,7 +135,7 @@ class ClosedLoop {
   MeasuredState told_;  // what the controller is told
   DesiredMotion desired_;
   TrackingError error_;
-  VectorXd tau_, qvel_;
+  VectorXd tau_, tau_before_, qvel_;
   int busiest_motor_ = 0;
   double effort_ = 0.0;
   long steps_without_grasp_ = 0;

@@ -25,7 +25,7 @@ class Runner {
   const RunResult& Run(const AfterStep& after_step, const ShouldStop& should_stop) {
     Guard([&] { loop_.Settle(); }, /*settling=*/true);
     const Clock::time_point begin = Clock::now();
-    while (result_.failure.empty() && loop_.step() < loop_.num_steps()) {
+    while (result_.failure.empty() && !loop_.is_finished()) {
       if (should_stop()) {
         result_.interrupted = true;
         result_.failure = "interrupted";
@@ -33,7 +33,7 @@ class Runner {
       }
       Guard([&] { loop_.Step(); }, /*settling=*/false);
       if (loop_.step() == 0) break;
-      result_.tracking.Add(loop_.error());
+      if (loop_.is_tracking()) result_.tracking.Add(loop_.error());
       const Clock::time_point recording = Clock::now();
       after_step();
       result_.recording_seconds += SecondsSince(recording);

@@ -74,27 +74,61 @@ SurfacePoint ReadContact(const TomlValue& value) {
   return {DegToRad(degrees[0]), DegToRad(degrees[1]), 0};
 }
 
-void ReadGrasp(const TomlValue& value, Scenario* scenario) {
+void ReadContacts(TomlTable& table, GraspOptions* grasp) {
+  const TomlValue contacts = table.Get("contacts_deg");
+  for (const TomlValue& entry : contacts.AsList()) grasp->contacts.push_back(ReadContact(entry));
+  if (grasp->contacts.size() != grasp->fingertips.size()) {
+    contacts.Reject("must have one contact for each of the " + std::to_string(grasp->fingertips.size()) +
+                    " fingertips");
+  }
+  if (const auto xyz = table.Find("xyz")) grasp->X_FO.translation() = xyz->AsVector<3>();
+  if (const auto zyz = table.FindAngles<3>("zyz")) grasp->X_FO.linear() = CalcRotationZyz(*zyz);
+}
+
+/// @param planned whether a task chooses the contacts.
+void ReadGrasp(const TomlValue& value, bool planned, Scenario* scenario) {
   TomlTable table = value.AsTable();
   GraspOptions& grasp = scenario->grasp;
   const TomlValue fingertips = table.Get("fingertips");
   for (const TomlValue& entry : fingertips.AsList()) grasp.fingertips.push_back(entry.AsName());
-  const TomlValue contacts = table.Get("contacts_deg");
-  for (const TomlValue& entry : contacts.AsList()) grasp.contacts.push_back(ReadContact(entry));
   if (grasp.fingertips.size() < 3) fingertips.Reject("needs at least three fingertips to hold an object");
-  if (grasp.contacts.size() != grasp.fingertips.size()) {
-    contacts.Reject("must have one contact for each of the " + std::to_string(grasp.fingertips.size()) +
-                    " fingertips");
-  }
+  if (!planned) ReadContacts(table, &grasp);
   grasp.frame = table.Get("frame").AsName();
-  if (const auto xyz = table.Find("xyz")) grasp.X_FO.translation() = xyz->AsVector<3>();
-  if (const auto zyz = table.FindAngles<3>("zyz")) grasp.X_FO.linear() = CalcRotationZyz(*zyz);
   if (const auto joints = table.Find("joints_deg")) {
     for (const auto& [name, angle] : joints->AsTable().GetEntries()) {
       grasp.joints.emplace_back(name, DegToRad(angle.AsNumber()));
     }
   }
   table.RejectUnused();
+}
+
+void ReadTask(const TomlValue& value, Scenario* scenario) {
+  TomlTable table = value.AsTable();
+  TaskOptions task;
+  PickAndPlaceOptions& pick = task.pick_and_place;
+  task.X_Bo.translation() = table.Get("xyz").AsVector<3>();
+  if (const auto zyz = table.FindAngles<3>("zyz")) task.X_Bo.linear() = CalcRotationZyz(*zyz);
+  pick.raise.z() = pick.plan.raise = table.Get("raise").AsPositive();
+  pick.transport = table.Get("transport").AsVector<3>();
+  pick.plan.support = table.Get("support_height").AsNumber();
+  pick.approach_time = ReadOr(table, "approach_time", pick.approach_time);
+  pick.lower_time = ReadOr(table, "lower_time", pick.lower_time);
+  pick.close_time = ReadOr(table, "close_time", pick.close_time);
+  pick.grip_time = ReadOr(table, "grip_time", pick.grip_time);
+  pick.take_over_time = ReadOr(table, "take_over_time", pick.take_over_time);
+  pick.raise_time = ReadOr(table, "raise_time", pick.raise_time);
+  pick.transport_time = ReadOr(table, "transport_time", pick.transport_time);
+  pick.search_speed = ReadOr(table, "search_speed", pick.search_speed);
+  pick.touch_force = ReadOr(table, "touch_force", pick.touch_force);
+  pick.overload = ReadOr(table, "overload", pick.overload);
+  pick.largest_push = ReadOr(table, "largest_push", pick.largest_push);
+  pick.plan.opening = ReadOr(table, "opening", pick.plan.opening);
+  constexpr long kMaxAttempts = 10;
+  if (const auto attempts = table.Find("attempts")) {
+    pick.attempts = static_cast<int>(attempts->AsWhole(1, kMaxAttempts));
+  }
+  table.RejectUnused();
+  scenario->task = task;
 }
 
 /// K_p and K_v, or natural frequency and damping ratio of (57).
@@ -160,7 +194,7 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   const TomlDocument document = OpenDocument(text, source, overrides, &model_overrides);
   TomlTable root = document.Open();
   root.RejectOthersThan({"name", "description", "duration", "settle", "start", "start_error", "model",
-                         "plant", "grasp", "trajectory", "control", "bounds"});
+                         "plant", "grasp", "task", "trajectory", "control", "bounds"});
   scenario.name = root.Get("name").AsName();
   if (const auto description = root.Find("description")) scenario.description = description->AsText();
   scenario.duration = root.Get("duration").AsPositive();
@@ -176,8 +210,19 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   scenario.model_overrides.insert(scenario.model_overrides.end(), model_overrides.begin(),
                                   model_overrides.end());
   if (const auto plant = root.Find("plant")) ReadPlant(*plant, folder, &scenario);
-  ReadGrasp(root.Get("grasp"), &scenario);
+  root.RejectTogether("task", {"trajectory", "start_error"});
+  if (const auto task = root.Find("task")) ReadTask(*task, &scenario);
+  ReadGrasp(root.Get("grasp"), scenario.task.has_value(), &scenario);
   ReadControl(root.Get("control"), &scenario);
+  if (scenario.task) {
+    if (scenario.start != Start::kRest) root.Get("start").Fail("must be \"rest\" for a task");
+    if (scenario.plant.bonded) root.Get("plant").Fail("bonded: a task needs contacts that open and close");
+    if (scenario.control.orientation != OrientationFeedback::kRotation) {
+      root.Get("control").Fail("orientation: must be \"rotation\" for a task");
+    }
+    scenario.task->pick_and_place.f_min = scenario.control.f_min;
+    scenario.task->pick_and_place.plan.mu = scenario.control.mu;
+  }
   if (const auto bounds = root.Find("bounds")) {
     for (const auto& [name, value] : bounds->AsTable().GetEntries()) {
       scenario.bounds.emplace_back(name, value.AsNotNegative());
@@ -195,6 +240,7 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
 }
 
 std::unique_ptr<Trajectory> MakeTrajectory(const Scenario& scenario, const Vector6d& X_start) {
+  if (scenario.task) return nullptr;
   const TomlDocument document = OpenDocument(scenario.text, scenario.source, scenario.overrides, nullptr);
   TomlTable root = document.Open();
   TomlTable table = root.Get("trajectory").AsTable();

@@ -16,6 +16,7 @@
 #include "controller/control/computed_torque.h"
 #include "controller/control/object_tracking.h"
 #include "controller/control/trajectory.h"
+#include "controller/handling/pick_and_place.h"
 
 namespace dexcheck {
 
@@ -41,10 +42,10 @@ struct PlantOptions {
 
 /// Where and how the object is held.
 struct GraspOptions {
-  std::vector<std::string> fingertips;                 ///< Frames.
-  std::vector<SurfacePoint> contacts;                  ///< Of the object, one for each fingertip.
-  std::string frame;                                   ///< Frame that the object is placed in.
-  Pose X_FO = Pose::Identity();                        ///< Object in it.
+  std::vector<std::string> fingertips;  ///< Frames.
+  std::vector<SurfacePoint> contacts;   ///< Of the object, one for each fingertip; none for a task.
+  std::string frame;                    ///< Frame that the object is placed in; of a task: the palm.
+  Pose X_FO = Pose::Identity();         ///< Object in it.
   std::vector<std::pair<std::string, double>> joints;  ///< Posture, rad; other joints are 0.
 };
 
@@ -60,6 +61,12 @@ struct ControlOptions {
   double f_max = 0.0;               ///< Largest, N.
   double mu = 0.0;                  ///< Friction that the grasp force counts on.
   double contact_error = 0.0;       ///< By how much kappa is told wrongly, rad: a fault to be found.
+};
+
+/// Take the object from a support, carry it, put it down.
+struct TaskOptions {
+  Pose X_Bo = Pose::Identity();  ///< Where the object lies.
+  PickAndPlaceOptions pick_and_place;
 };
 
 /// One bound that a scenario sets for a check by name.
@@ -79,6 +86,7 @@ struct Scenario {
   std::string mjcf_file;                     ///< Empty for the shipped one.
   PlantOptions plant;
   GraspOptions grasp;
+  std::optional<TaskOptions> task;  ///< Instead of a trajectory; the grasp's contacts are then planned.
   ControlOptions control;
   std::vector<BoundOverride> bounds;
   std::uint64_t seed = 0;  ///< Of random changes to posture and grasp; 0 for none.
@@ -94,7 +102,7 @@ struct Scenario {
 Scenario ParseScenario(const std::string& text, const std::string& source,
                        const std::filesystem::path& folder, const std::vector<std::string>& overrides);
 
-/// The scenario's trajectory from X_start. @throws InputError as ParseScenario.
+/// The scenario's trajectory from X_start; none for a task. @throws InputError as ParseScenario.
 std::unique_ptr<Trajectory> MakeTrajectory(const Scenario& scenario, const Vector6d& X_start);
 
 }  // namespace dexcheck

@@ -22,6 +22,7 @@ constexpr double kStartPenetration = 1e-6;
 constexpr double kVariedJoint = DegToRad(2.0);    // rad
 constexpr double kVariedContact = DegToRad(3.0);  // rad
 constexpr double kVariedPlace = 2e-3;             // m
+constexpr double kVariedLay = 0.05;               // m, of an object that lies on a support, either way
 
 RobotModel ReadModel(const Scenario& scenario, const std::filesystem::path& robot) {
   return ParseRobotModel(ReadTextFile(robot.string()), robot.string(), scenario.model_overrides);
@@ -48,7 +49,11 @@ Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const
   }
   FindFingertips();
   VaryGrasp();
-  SolveGrasp();
+  if (scenario_.task) {
+    PlaceTask();
+  } else {
+    SolveGrasp();
+  }
   if (scenario_.plant.bonded) MakeBonds();
 }
 
@@ -102,6 +107,13 @@ void Setup::VaryGrasp() {
   const auto draw = [&](double size) {
     return size * (2.0 * static_cast<double>(random() >> 11) * 0x1p-53 - 1.0);
   };
+  if (scenario_.task) {
+    Pose& X_Bo = scenario_.task->X_Bo;
+    X_Bo.translation().x() += draw(kVariedLay);
+    X_Bo.translation().y() += draw(kVariedLay);
+    X_Bo.prerotate(Eigen::AngleAxisd(draw(kPi), Vector3d::UnitZ()));
+    return;
+  }
   GraspOptions& grasp = scenario_.grasp;
   for (auto& [name, angle] : grasp.joints) angle += draw(kVariedJoint);
   for (SurfacePoint& contact : grasp.contacts) {
@@ -111,23 +123,37 @@ void Setup::VaryGrasp() {
   for (double& x : grasp.X_FO.translation()) x += draw(kVariedPlace);
 }
 
-void Setup::SolveGrasp() {
-  const GraspOptions& grasp = scenario_.grasp;
+VectorXd Setup::ReadPosture() const {
   VectorXd q = VectorXd::Zero(model_.num_positions());
-  for (const auto& [name, angle] : grasp.joints) {
+  for (const auto& [name, angle] : scenario_.grasp.joints) {
     const int joint = model_.FindJoint(name);
     if (joint < 0) Fail(scenario_, "grasp.joints_deg", Quote(name) + " is no joint of the model");
     q[model_.num_base_positions() + joint] = angle;
   }
+  return q;
+}
+
+int Setup::FindGraspFrame() const {
+  try {
+    return model_.FindFrame(scenario_.grasp.frame);
+  } catch (const std::invalid_argument&) {
+    Fail(scenario_, "grasp.frame", Quote(scenario_.grasp.frame) + " is no frame of the model");
+  }
+}
+
+void Setup::PlaceTask() {
+  palm_ = FindGraspFrame();
+  q_start_ = ReadPosture();
+  X_Bo_start_ = scenario_.task->X_Bo;
+  X_start_ << X_Bo_start_.translation(), CalcAnyZyzAngles(X_Bo_start_.linear());
+}
+
+void Setup::SolveGrasp() {
+  const GraspOptions& grasp = scenario_.grasp;
+  const VectorXd q = ReadPosture();
   ModelTerms kinematics(model_, Coordinates::kReduced);
   kinematics.SetState(q, VectorXd::Zero(model_.num_velocities()));
-  int frame = -1;
-  try {
-    frame = model_.FindFrame(grasp.frame);
-  } catch (const std::invalid_argument&) {
-    Fail(scenario_, "grasp.frame", Quote(grasp.frame) + " is no frame of the model");
-  }
-  X_Bo_start_ = kinematics.CalcFramePose(frame) * grasp.X_FO;
+  X_Bo_start_ = kinematics.CalcFramePose(FindGraspFrame()) * grasp.X_FO;
   X_start_ << X_Bo_start_.translation(), CalcAnyZyzAngles(X_Bo_start_.linear());
   if (scenario_.control.orientation == OrientationFeedback::kAngles &&
       std::abs(std::sin(X_start_[4])) < kMinSinBeta) {

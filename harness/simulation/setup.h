@@ -40,7 +40,10 @@ class Setup {
   /// Joints that lie on no chain from the base to a fingertip of the grasp: they should stay still.
   [[nodiscard]] const std::vector<int>& idle_joints() const { return idle_joints_; }
 
-  /// The posture that holds the object, and where that puts the object; X_o on the branch with beta > 0.
+  /// Frame of the palm; -1 unless the scenario is a task.
+  [[nodiscard]] int palm() const { return palm_; }
+
+  /// The posture that holds the object, or that a task begins in, and where the object is; X_o on the branch with beta > 0.
   [[nodiscard]] const VectorXd& q_start() const { return q_start_; }
   [[nodiscard]] const Pose& X_Bo_start() const { return X_Bo_start_; }
   [[nodiscard]] const Vector6d& X_start() const { return X_start_; }
@@ -60,6 +63,9 @@ class Setup {
   void FindFingertips();
   void VaryGrasp();
   void SolveGrasp();
+  void PlaceTask();
+  [[nodiscard]] VectorXd ReadPosture() const;
+  [[nodiscard]] int FindGraspFrame() const;
   void MakeBonds();
 
   Scenario scenario_;
@@ -69,6 +75,7 @@ class Setup {
   GateResult gate_;
   std::unique_ptr<Surface> surface_;
   std::vector<int> fingertips_;
+  int palm_ = -1;
   std::vector<int> arm_joints_;  // on the chains of several fingertips
   std::vector<int> idle_joints_;
   std::vector<Bond> bonds_;

@@ -1,0 +1,82 @@
+#include "controller/handling/handling_controller.h"
+
+#include <chrono>
+
+#include "controller/control/object_tracking.h"
+
+namespace dexcheck {
+
+HandlingController::HandlingController(const RobotModel& model, std::span<const int> fingertips,
+                                       const MassProperties& object, const Surface& surface,
+                                       const GraspController& grasp)
+    : model_(&model),
+      fingertips_(fingertips.begin(), fingertips.end()),
+      object_(object),
+      surface_(&surface),
+      grasp_(&grasp),
+      problem_(static_cast<int>(fingertips.size())),
+      solver_(static_cast<int>(fingertips.size()), 0, grasp.options().force) {
+  problem_.mu.setConstant(grasp.options().mu);
+  problem_.f_max.setConstant(grasp.options().f_max);
+  f_c_.setZero(3 * static_cast<Eigen::Index>(fingertips.size()));
+  f_grip_ = f_c_;
+  FindLaw(AllContacts(static_cast<int>(fingertips_.size())));
+}
+
+HandlingController::Law& HandlingController::FindLaw(ContactSet set) {
+  std::unique_ptr<Law>& law = laws_[set];
+  if (!law) {
+    law = std::make_unique<Law>(*model_, fingertips_, object_, *surface_, grasp_->options().weight, set);
+    law->f_c.setZero(law->grasp.terms().num_forces());
+  }
+  return *law;
+}
+
+const VectorXd& HandlingController::CalcTorque(const MeasuredState& state, const HandlingDemand& demand) {
+  force_seconds_ = 0.0;
+  const ContactSet all = AllContacts(static_cast<int>(fingertips_.size()));
+  if (demand.contacts == 0) {
+    f_c_.setZero();
+    ComputedTorque& law = FindLaw(all).torque;
+    law.SetFreeMotion(grasp_->robot(), grasp_->sigma_prime());
+    return law.tau_0();
+  }
+  Law& law = FindLaw(demand.contacts);
+  law.grasp.SetState(grasp_->robot(), state);
+  const GraspTerms& terms = law.grasp.terms();
+  Vector6d V_Bo_dot = Vector6d::Zero();
+  if (demand.carried) {
+    V_Bo_dot = CalcTrackingAcceleration(grasp_->options().gains, OrientationFeedback::kRotation, terms,
+                                        demand.desired);
+  }
+  law.torque.SetMotion(grasp_->robot(), terms, V_Bo_dot, grasp_->sigma_prime());
+
+  for (size_t i = 0; i < law.grasp.members().size(); ++i) {
+    law.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) =
+        (1.0 - demand.grip) * demand.touch_force.at(law.grasp.members()[i]) * Vector3d::UnitZ();
+  }
+  if (demand.grip > 0.0) {
+    Require(demand.contacts == all, "grip", "must be zero without all contacts", demand.grip);
+    CalcGripForce(terms, V_Bo_dot, demand);
+    law.f_c += demand.grip * f_grip_;
+  }
+  law.grasp.Scatter(law.f_c, f_c_);
+  return law.torque.CalcTorqueWithForces(terms, law.f_c);
+}
+
+void HandlingController::CalcGripForce(const GraspTerms& terms, const Vector6d& V_Bo_dot,
+                                       const HandlingDemand& demand) {
+  const ObjectBodyTerms& body = terms.body();
+  problem_.G = terms.G();
+  problem_.F_o =
+      demand.scale * (body.M_hat * V_Bo_dot + body.C_hat * terms.V_Bo()) + demand.weight * body.N_o;
+  problem_.f_min.setConstant(demand.f_min);
+  if (!problem_.F_o.allFinite()) throw GraspForceError("the demanded forces are not finite");
+  const auto begin = std::chrono::steady_clock::now();
+  const GraspForceResult& result = solver_.Solve(problem_);
+  force_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  RequireGraspForce(result);
+  f_grip_ = result.f_c;
+}
+
+}  // namespace dexcheck

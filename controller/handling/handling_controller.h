@@ -1,0 +1,83 @@
+#pragma once
+
+// The law of section 5 before, while and after the object is held: computed torque for any set of contacts,
+// with an object that lies on a support, hangs in the hand, or is between the two.
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "controller/control/computed_torque.h"
+#include "controller/control/grasp_controller.h"
+#include "controller/grasp/grasp_force.h"
+#include "controller/handling/partial_grasp.h"
+
+namespace dexcheck {
+
+/// What the hand is to do at one instant. Every force in it may be changed steadily, so that torques do not
+/// jump where one phase of a task follows another.
+struct HandlingDemand {
+  ContactSet contacts = 0;  ///< Fingertips that push; none: (18) alone.
+  /// Normal force of each fingertip of the grasp, N, while the object lies on its support.
+  std::vector<double> touch_force;
+  /// From the touch forces (0) to the grasp forces inside the friction cones (1). More than 0 needs all
+  /// contacts.
+  double grip = 0.0;
+  double f_min = 0.0;    ///< Least normal force of the grasp forces, N.
+  double weight = 0.0;   ///< Part of the object's stated weight that the hand bears.
+  double scale = 1.0;    ///< The object's mass over its stated one, once it has been weighed.
+  bool carried = false;  ///< The object follows `desired`; otherwise it is to stay where it lies.
+  DesiredMotion desired;
+};
+
+/// Computed torque for a HandlingDemand:
+///   xi_dot_d = J^+ (G_dot^T V + G^T V_dot - J_dot xi_c) + N sigma',   J, G of the contacts
+///   F_o      = scale (M_hat V_dot + C_hat V) + weight N_o
+///   f_c      = (1 - grip) f_touch + grip f(F_o),   f(F_o) in the friction cones, G f = F_o
+///   E_bar' tau' = M_bar' xi_dot_d + C_bar' xi_c + F_bar' + J^T f_c
+/// With all contacts, grip = weight = scale = 1 it is (55). Allocates when a set of contacts comes up for the
+/// first time, and never again.
+class HandlingController {
+ public:
+  /// @param grasp the controller whose state, gains, limits and posture are used; must outlive this, as must
+  /// all else.
+  HandlingController(const RobotModel& model, std::span<const int> fingertips, const MassProperties& object,
+                     const Surface& surface, const GraspController& grasp);
+
+  /// tau' (n), N m, after grasp.SetState(state).
+  /// @throws GraspForceError when no admissible forces give F_o; SingularityError as ComputedTorque;
+  /// std::invalid_argument when grip is positive without all contacts.
+  const VectorXd& CalcTorque(const MeasuredState& state, const HandlingDemand& demand);
+
+  /// f_c (3N) that belongs to the torques, zero without contact.
+  [[nodiscard]] const VectorXd& f_c() const { return f_c_; }
+  /// Time that the last grasp-force problem took, s.
+  [[nodiscard]] double force_seconds() const { return force_seconds_; }
+
+ private:
+  struct Law {
+    Law(const RobotModel& model, std::span<const int> fingertips, const MassProperties& object,
+        const Surface& surface, const RedundancyWeight& weight, ContactSet set)
+        : grasp(model, fingertips, object, surface, set),
+          torque(model, static_cast<int>(grasp.members().size()), weight) {}
+    PartialGrasp grasp;
+    ComputedTorque torque;
+    VectorXd f_c;
+  };
+  Law& FindLaw(ContactSet set);
+  void CalcGripForce(const GraspTerms& terms, const Vector6d& V_Bo_dot, const HandlingDemand& demand);
+
+  const RobotModel* model_;
+  std::vector<int> fingertips_;
+  MassProperties object_;
+  const Surface* surface_;
+  const GraspController* grasp_;
+  std::map<ContactSet, std::unique_ptr<Law>> laws_;
+  GraspForceProblem problem_;
+  GraspForceSolver solver_;
+  VectorXd f_c_;     // 3N
+  VectorXd f_grip_;  // 3N
+  double force_seconds_ = 0.0;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,365 @@
+#include "controller/handling/pick_and_place.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/grasp/finger_placement.h"
+#include "controller/object/euler_zyz.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr double kPlatformDamping = 20.0;  // 1/s, while the platform should stand
+constexpr double kFirstTouch = 0.2;        // of the touch force comes at once, so that no fingertip bounces
+constexpr double kFirstTouchTime = 0.03;   // s
+constexpr double kTouchTime = 0.4;         // s to build up or take back a touch force
+constexpr double kLastTouch = 0.05;        // of the touch force is left when the fingers open
+constexpr double kPause = 0.1;             // s between movements
+constexpr double kReleaseTime = 0.8;       // s
+constexpr double kOpenTime = 0.8;          // s
+constexpr double kSearchRamp = 0.1;        // s
+constexpr double kNominal = 0.01;          // of the weight: less counts as nothing
+constexpr double kWeighingRate = 0.2;      // of the stated weight, 1/s
+
+}  // namespace
+
+const char* NameOf(Phase phase) {
+  switch (phase) {
+    case Phase::kApproach:
+      return "approach";
+    case Phase::kClose:
+      return "close";
+    case Phase::kGrip:
+      return "grip";
+    case Phase::kTakeOver:
+      return "take over";
+    case Phase::kCarry:
+      return "carry";
+    case Phase::kHandOver:
+      return "hand over";
+    case Phase::kRelease:
+      return "release";
+    case Phase::kWithdraw:
+      return "withdraw";
+    case Phase::kDone:
+      return "done";
+  }
+  return "done";
+}
+
+PickAndPlace::PickAndPlace(const RobotModel& model, std::span<const int> fingertips, int palm,
+                           const Surface& surface, const MassProperties& object, const VectorXd& start,
+                           const PickAndPlaceOptions& options, double time_step)
+    : model_(&model),
+      fingertips_(fingertips.begin(), fingertips.end()),
+      palm_(palm),
+      surface_(&surface),
+      weight_(object.mass * model.gravity().norm()),
+      start_(start),
+      options_(options),
+      half_step_(0.5 * time_step),
+      own_joints_(ListOwnJoints(model, fingertips)),
+      touched_at_(fingertips.size()) {
+  demand_.touch_force.assign(fingertips.size(), 0.0);
+}
+
+void PickAndPlace::Begin(double t, const Pose& X_Bo) {
+  history_.clear();
+  attempt_ = 0;
+  StartMove(start_.tail(model_->num_joints()), start_.tail(model_->num_joints()), t, 0.0);
+  PlanAttempt(t, X_Bo);
+  if (!plan_.found) throw InputError(plan_.problem);
+}
+
+void PickAndPlace::PlanAttempt(double t, const Pose& X_Bo) {
+  ++attempt_;
+  VectorXd q = start_;
+  plan_ = MakePickPlan(*model_, fingertips_, palm_, *surface_, X_Bo, q, options_.plan);
+  lay_at_ = X_Bo.translation();
+  push_ = 0.0;
+  if (!plan_.found) return;
+  const VectorXd from = move_.to;
+  Enter(Phase::kApproach, t);
+  StartMove(from, plan_.q_above, t, options_.approach_time);
+}
+
+void PickAndPlace::Enter(Phase phase, double t) {
+  phase_ = phase;
+  stage_ = 0;
+  begin_ = stage_begin_ = t;
+  history_.push_back({phase, t, attempt_});
+}
+
+void PickAndPlace::StartMove(const VectorXd& from, const VectorXd& to, double t, double duration,
+                             bool steady) {
+  move_.from = from;
+  move_.to = to;
+  move_.begin = t;
+  move_.duration = duration;
+  move_.steady = steady;
+}
+
+void PickAndPlace::HoldPosture(const VectorXd& q_joints) { StartMove(q_joints, q_joints, begin_, 0.0); }
+
+VectorXd PickAndPlace::Joints(const MeasuredState& state) const { return state.q.tail(model_->num_joints()); }
+
+void PickAndPlace::FollowMove(double t, PostureTask* posture) {
+  const auto evaluate = [&](double time) {
+    if (move_.duration <= 0.0) return ScalarMotion{1.0, 0.0, 0.0};
+    if (!move_.steady) return CalcMinSnap(time - move_.begin, move_.duration);
+    // A ramp up to 1 / duration, and a stop at the end, which is only reached when nothing was found.
+    ScalarMotion motion = CalcSpeedRamp(std::max(0.0, time - move_.begin), kSearchRamp);
+    motion.s /= move_.duration;
+    motion.s_dot /= move_.duration;
+    motion.s_ddot /= move_.duration;
+    return motion.s < 1.0 ? motion : ScalarMotion{1.0, 0.0, 0.0};
+  };
+  const ScalarMotion now = evaluate(t);
+  const Eigen::Index base = model_->num_base_velocities();
+  const Eigen::Index joints = model_->num_joints();
+  posture->q_posture = move_.from + now.s * (move_.to - move_.from);
+  posture->xi_reference.tail(joints) = evaluate(t - half_step_).s_dot * (move_.to - move_.from);
+  posture->acceleration.tail(joints) = now.s_ddot * (move_.to - move_.from);
+  // The platform is free to follow the object, and comes to rest without a jolt.
+  double standing = phase_ == Phase::kCarry ? 0.0 : 1.0;
+  if (phase_ == Phase::kHandOver) standing = CalcMinSnap(t - begin_, options_.take_over_time).s;
+  posture->damping.head(base).setConstant(standing * kPlatformDamping);
+}
+
+void PickAndPlace::Update(double t, const MeasuredState& state, const Touch& touch, PostureTask* posture) {
+  if (phase_ == Phase::kClose || phase_ == Phase::kGrip) {
+    push_ = std::max(push_, (state.X_Bo.translation() - lay_at_).norm());
+  }
+  switch (phase_) {
+    case Phase::kApproach:
+      UpdateApproach(t);
+      break;
+    case Phase::kClose:
+      UpdateClose(t, state, touch);
+      break;
+    case Phase::kGrip:
+      UpdateGrip(t, state);
+      break;
+    case Phase::kTakeOver:
+      UpdateTakeOver(t, touch);
+      break;
+    case Phase::kCarry:
+      UpdateCarry(t);
+      break;
+    case Phase::kHandOver:
+      UpdateHandOver(t);
+      break;
+    case Phase::kRelease:
+      UpdateRelease(t, state);
+      break;
+    case Phase::kWithdraw:
+      UpdateWithdraw(t, state);
+      break;
+    case Phase::kDone:
+      break;
+  }
+  FollowMove(t, posture);
+}
+
+void PickAndPlace::UpdateApproach(double t) {
+  if (!MoveDone(t)) return;
+  if (stage_ == 0) {
+    stage_ = 1;
+    StartMove(plan_.q_above, plan_.q_open, t, options_.lower_time);
+  } else if (t >= move_.begin + move_.duration + kPause) {
+    Enter(Phase::kClose, t);
+    StartMove(plan_.q_open, plan_.q_near, t, options_.close_time);
+  }
+}
+
+void PickAndPlace::UpdateClose(double t, const MeasuredState& state, const Touch& touch) {
+  bool all = true;
+  bool settled = true;
+  std::string missing;
+  for (size_t i = 0; i < fingertips_.size(); ++i) {
+    if (!Contains(demand_.contacts, i) && Contains(touch.fingertips, i)) {
+      demand_.contacts |= ContactSet{1} << i;
+      touched_at_[i] = t;
+      for (const int joint : own_joints_[i]) {
+        move_.from[joint] = move_.to[joint] = state.q[model_->num_base_positions() + joint];
+      }
+    }
+    if (!Contains(demand_.contacts, i)) {
+      all = false;
+      missing = model_->frames()[static_cast<size_t>(fingertips_[i])].name;
+      continue;
+    }
+    const double since = t - touched_at_[i];
+    demand_.touch_force[i] = options_.touch_force * (kFirstTouch * CalcMinSnap(since, kFirstTouchTime).s +
+                                                     (1.0 - kFirstTouch) * CalcMinSnap(since, kTouchTime).s);
+    settled = settled && t - touched_at_[i] >= kTouchTime;
+  }
+  if (push_ > options_.largest_push) {
+    return GiveUp(t, state, "the closing hand pushed the object by " + FormatNumber(push_) + " m");
+  }
+  if (all && settled) {
+    Enter(Phase::kGrip, t);
+    return HoldPosture(Joints(state));
+  }
+  if (all || !MoveDone(t)) return;
+  if (stage_ == 0) {
+    stage_ = 1;
+    const double way = options_.plan.nearness + options_.plan.depth;
+    VectorXd to = plan_.q_deep;
+    for (size_t i = 0; i < fingertips_.size(); ++i) {
+      if (!Contains(demand_.contacts, i)) continue;
+      for (const int joint : own_joints_[i]) to[joint] = move_.to[joint];
+    }
+    StartMove(move_.to, to, t, way / options_.search_speed, /*steady=*/true);
+  } else {
+    GiveUp(t, state, "fingertip " + Quote(missing) + " found no object where it should be");
+  }
+}
+
+void PickAndPlace::UpdateGrip(double t, const MeasuredState& state) {
+  const double s = CalcMinSnap(t - begin_, options_.grip_time).s;
+  demand_.grip = s;
+  demand_.weight = 0.0;
+  demand_.f_min = options_.touch_force + s * (options_.f_min - options_.touch_force);
+  if (push_ > options_.largest_push) {
+    return GiveUp(t, state, "building up grasp forces pushed the object by " + FormatNumber(push_) + " m");
+  }
+  if (t - begin_ < options_.grip_time + kPause) return;
+  Enter(Phase::kTakeOver, t);
+  X_start_ << state.X_Bo.translation(), CalcAnyZyzAngles(state.X_Bo.linear());
+  demand_.carried = true;
+  demand_.desired = DesiredMotion{};
+  demand_.desired.X_d = X_start_;
+}
+
+void PickAndPlace::UpdateTakeOver(double t, const Touch& touch) {
+  const bool free = touch.support_force <= 0.0;
+  if (stage_ == 0) {
+    demand_.weight = CalcMinSnap(t - begin_, options_.take_over_time).s;
+    if (free && demand_.weight > 0.1 && demand_.weight < 1.0 - kNominal) {
+      demand_.scale = demand_.weight;
+      return Enter(Phase::kCarry, t);
+    }
+    if (t - begin_ < options_.take_over_time + kPause) return;
+    if (touch.support_force < kNominal * weight_) return Enter(Phase::kCarry, t);
+    stage_ = 1;
+    stage_begin_ = t;
+  }
+  // Heavier than stated.
+  demand_.weight = 1.0 + kWeighingRate * (t - stage_begin_);
+  if (free) {
+    demand_.scale = demand_.weight;
+    return Enter(Phase::kCarry, t);
+  }
+  if (demand_.weight > options_.overload) {
+    Refuse(t,
+           "the object weighs more than " + FormatNumber(options_.overload) + " times what the model states");
+  }
+}
+
+void PickAndPlace::Refuse(double t, const std::string& reason) {
+  if (refused_) throw GraspForceError(reason);
+  refused_ = true;
+  failure_ = "refused to lift: " + reason;
+  lowering_from_ = std::max(0.0, demand_.weight - kNominal);
+  demand_.weight = lowering_from_;
+  Enter(Phase::kHandOver, t);
+}
+
+DesiredMotion PickAndPlace::EvaluateCarry(double t) const {
+  DesiredMotion desired;
+  desired.X_d = X_start_;
+  const auto add = [&](const Vector3d& way, double from, double duration) {
+    const ScalarMotion now = CalcMinSnap(t - from, duration);
+    desired.X_d.head<3>() += now.s * way;
+    desired.X_d_dot.head<3>() += CalcMinSnap(t - half_step_ - from, duration).s_dot * way;
+    desired.X_d_ddot.head<3>() += now.s_ddot * way;
+  };
+  const double raised = begin_ + options_.raise_time;
+  const double there = raised + options_.transport_time;
+  add(options_.raise, begin_, options_.raise_time);
+  add(options_.transport, raised, options_.transport_time);
+  add(-options_.raise, there, options_.raise_time);
+  return desired;
+}
+
+void PickAndPlace::UpdateCarry(double t) {
+  demand_.weight = demand_.scale;
+  demand_.desired = EvaluateCarry(t);
+  // The arm bends as the plan has it, so that fingers need not.
+  const double lower = begin_ + options_.raise_time + options_.transport_time;
+  if (stage_ == 0 || (stage_ == 1 && t >= lower)) {
+    const VectorXd way = (stage_ == 0 ? 1.0 : -1.0) * (plan_.q_above - plan_.q_open);
+    StartMove(move_.to, move_.to + way, stage_ == 0 ? begin_ : lower, options_.raise_time);
+    ++stage_;
+  }
+  if (t < begin_ + 2.0 * options_.raise_time + options_.transport_time + kPause) return;
+  lowering_from_ = demand_.weight;
+  Enter(Phase::kHandOver, t);
+}
+
+void PickAndPlace::UpdateHandOver(double t) {
+  demand_.weight = lowering_from_ * (1.0 - CalcMinSnap(t - begin_, options_.take_over_time).s);
+  if (t < begin_ + options_.take_over_time + kPause) return;
+  demand_.carried = false;
+  Enter(Phase::kRelease, t);
+}
+
+void PickAndPlace::UpdateRelease(double t, const MeasuredState& state) {
+  const double since = t - stage_begin_;
+  if (stage_ == 0) {
+    const double s = CalcMinSnap(since, kReleaseTime).s;
+    demand_.grip = 1.0 - s;
+    demand_.f_min = options_.f_min + s * (options_.touch_force - options_.f_min);
+    if (since < kReleaseTime) return;
+    demand_.grip = 0.0;
+    stage_ = 1;
+    stage_begin_ = t;
+  } else if (stage_ == 1) {
+    const double s = CalcMinSnap(since, kTouchTime).s;
+    std::fill(demand_.touch_force.begin(), demand_.touch_force.end(),
+              (1.0 - s * (1.0 - kLastTouch)) * options_.touch_force);
+    if (since < kTouchTime) return;
+    demand_.contacts = 0;
+    stage_ = 2;
+    VectorXd to = Joints(state);
+    for (const std::vector<int>& joints : own_joints_) {
+      for (const int joint : joints) to[joint] = plan_.q_open[joint];
+    }
+    StartMove(Joints(state), to, t, kOpenTime);
+  } else if (t >= move_.begin + move_.duration + kPause) {
+    Enter(Phase::kWithdraw, t);
+    StartMove(move_.to, plan_.q_above, t, options_.lower_time);
+  }
+}
+
+void PickAndPlace::UpdateWithdraw(double t, const MeasuredState& state) {
+  if (!MoveDone(t)) return;
+  if (stage_ == 0 && retrying_) {
+    retrying_ = false;
+    PlanAttempt(t, state.X_Bo);
+    if (plan_.found) return;
+    failure_ = plan_.problem;
+  }
+  if (stage_ == 0) {
+    stage_ = 1;
+    StartMove(move_.to, start_.tail(model_->num_joints()), t, options_.approach_time);
+  } else if (t >= move_.begin + move_.duration + kPause) {
+    Enter(Phase::kDone, t);
+  }
+}
+
+void PickAndPlace::GiveUp(double t, const MeasuredState& state, const std::string& reason) {
+  retrying_ = attempt_ < options_.attempts;
+  if (retrying_ && first_failure_.empty()) first_failure_ = reason;
+  if (!retrying_)
+    failure_ = reason + ", attempt " + std::to_string(attempt_) + " of " + std::to_string(options_.attempts);
+  demand_.grip = 0.0;
+  HoldPosture(Joints(state));
+  Enter(Phase::kRelease, t);
+  stage_ = 1;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,153 @@
+#pragma once
+
+// The task "take the object from where it lies, carry it, put it down" as a sequence of phases. Which phase
+// comes next is decided by what the hand feels.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "controller/control/posture_task.h"
+#include "controller/control/trajectory.h"
+#include "controller/handling/handling_controller.h"
+#include "controller/handling/pick_plan.h"
+
+namespace dexcheck {
+
+enum class Phase {
+  kApproach,  ///< The hand moves over the object and down around it, in free space.
+  kClose,     ///< The fingers close until all fingertips touch.
+  kGrip,      ///< From touching to grasp forces, without pushing the object.
+  kTakeOver,  ///< The object's weight goes from the support to the hand: it is weighed.
+  kCarry,     ///< Up, along, down.
+  kHandOver,  ///< The weight goes to the support.
+  kRelease,   ///< From grasp forces to none; the fingers open.
+  kWithdraw,  ///< The hand moves up and back.
+  kDone,
+};
+/// "approach" and so on.
+const char* NameOf(Phase phase);
+/// Whether all fingertips should touch the object.
+constexpr bool IsHolding(Phase phase) { return phase >= Phase::kGrip && phase <= Phase::kHandOver; }
+
+struct PickAndPlaceOptions {
+  Vector3d raise = Vector3d(0.0, 0.0, 0.15);  ///< World, m.
+  Vector3d transport = Vector3d(1.0, 0.0, 0.0);
+  double approach_time = 2.0;   ///< To over the object, s; as long for the way back.
+  double lower_time = 1.2;      ///< From there to around it.
+  double close_time = 0.6;      ///< To just off the contacts.
+  double search_speed = 0.006;  ///< From there on, m/s.
+  double grip_time = 0.8;
+  double take_over_time = 1.0;
+  double raise_time = 2.5;
+  double transport_time = 3.5;
+  double touch_force = 0.3;    ///< N, while fingertips wait for the others.
+  double f_min = 1.0;          ///< N, of the grasp.
+  double overload = 1.5;       ///< Largest mass that is lifted, over the stated one.
+  double largest_push = 3e-3;  ///< How far the closing hand may move the object, m.
+  int attempts = 2;
+  PickPlanOptions plan;
+};
+
+/// What the hand feels, and the support.
+struct Touch {
+  ContactSet fingertips = 0;   ///< That touch the object.
+  double support_force = 0.0;  ///< Upward, on the object by what it lies on, N.
+};
+
+/// When a phase began.
+struct PhaseEntry {
+  Phase phase;
+  double time;  ///< s
+  int attempt;  ///< From 1.
+};
+
+/// The sequence. Plans when an attempt begins, which takes time and allocates; steps do neither.
+class PickAndPlace {
+ public:
+  /// @param palm frame of the hand. @param start posture (q') that the task begins and ends in.
+  /// @param time_step at the middle of which velocities are referred to (leapfrog), s; 0 for none.
+  PickAndPlace(const RobotModel& model, std::span<const int> fingertips, int palm, const Surface& surface,
+               const MassProperties& object, const VectorXd& start, const PickAndPlaceOptions& options,
+               double time_step);
+
+  /// Begins at time t with the object where it lies. @throws InputError when it is out of reach.
+  void Begin(double t, const Pose& X_Bo);
+
+  /// Decides what to do at time t (s): sets the posture and the demand.
+  void Update(double t, const MeasuredState& state, const Touch& touch, PostureTask* posture);
+  /// The demand's forces do not exist: bears less, and gives the object back.
+  void Refuse(double t, const std::string& reason);
+
+  [[nodiscard]] const HandlingDemand& demand() const { return demand_; }
+  [[nodiscard]] Phase phase() const { return phase_; }
+  [[nodiscard]] bool is_done() const { return phase_ == Phase::kDone; }
+  /// Why the object was not brought; empty when it was, or may yet be.
+  [[nodiscard]] const std::string& failure() const { return failure_; }
+  /// What went wrong in attempts that were followed by another.
+  [[nodiscard]] const std::string& first_failure() const { return first_failure_; }
+  [[nodiscard]] const std::vector<PhaseEntry>& history() const { return history_; }
+  [[nodiscard]] const PickPlan& plan() const { return plan_; }
+  /// Mass of the object over its stated one, as weighed; 1 before.
+  [[nodiscard]] double scale() const { return demand_.scale; }
+  /// How far the closing hand moved the object, m.
+  [[nodiscard]] double push() const { return push_; }
+
+ private:
+  /// From one posture to another with least jerk.
+  struct Move {
+    VectorXd from, to;
+    double begin = 0.0;
+    double duration = 0.0;
+    bool steady = false;  // at constant speed after a short ramp
+  };
+
+  void Enter(Phase phase, double t);
+  void StartMove(const VectorXd& from, const VectorXd& to, double t, double duration, bool steady = false);
+  [[nodiscard]] bool MoveDone(double t) const { return t >= move_.begin + move_.duration; }
+  void FollowMove(double t, PostureTask* posture);
+  void HoldPosture(const VectorXd& q_joints);
+  [[nodiscard]] VectorXd Joints(const MeasuredState& state) const;
+
+  void UpdateApproach(double t);
+  void UpdateClose(double t, const MeasuredState& state, const Touch& touch);
+  void UpdateGrip(double t, const MeasuredState& state);
+  void UpdateTakeOver(double t, const Touch& touch);
+  void UpdateCarry(double t);
+  void UpdateHandOver(double t);
+  void UpdateRelease(double t, const MeasuredState& state);
+  void UpdateWithdraw(double t, const MeasuredState& state);
+  void GiveUp(double t, const MeasuredState& state, const std::string& reason);
+  void PlanAttempt(double t, const Pose& X_Bo);
+  [[nodiscard]] DesiredMotion EvaluateCarry(double t) const;
+
+  const RobotModel* model_;
+  std::vector<int> fingertips_;
+  int palm_;
+  const Surface* surface_;
+  double weight_;  // stated, N
+  VectorXd start_;
+  PickAndPlaceOptions options_;
+  double half_step_;
+  std::vector<std::vector<int>> own_joints_;  // by fingertip
+
+  PickPlan plan_;
+  Phase phase_ = Phase::kApproach;
+  int stage_ = 0;       // within a phase
+  double begin_ = 0.0;  // of the phase, s
+  double stage_begin_ = 0.0;
+  int attempt_ = 0;
+  Move move_;
+  HandlingDemand demand_;
+  std::vector<double> touched_at_;  // by fingertip, s
+  Vector3d lay_at_ = Vector3d::Zero();
+  Vector6d X_start_ = Vector6d::Zero();
+  double push_ = 0.0;
+  double lowering_from_ = 1.0;  // weight at the beginning of the hand-over
+  bool refused_ = false;
+  bool retrying_ = false;
+  std::string failure_, first_failure_;
+  std::vector<PhaseEntry> history_;
+};
+
+}  // namespace dexcheck
