@@ -5,26 +5,9 @@
 #include <stdexcept>
 
 #include "controller/dynamics/model_terms.h"
+#include "controller/grasp/own_joints.h"
 
 namespace dexcheck {
-std::vector<std::vector<int>> ListOwnJoints(const RobotModel& model, std::span<const int> fingertips) {
-  std::vector<int> users(static_cast<size_t>(model.num_joints()), 0);
-  const auto for_chain = [&](int frame, const auto& visit) {
-    int joint = model.frames()[static_cast<size_t>(frame)].link;
-    for (; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent) visit(joint);
-  };
-  for (const int frame : fingertips)
-    for_chain(frame, [&](int joint) { ++users[static_cast<size_t>(joint)]; });
-  std::vector<std::vector<int>> own(fingertips.size());
-  for (size_t i = 0; i < fingertips.size(); ++i) {
-    for_chain(fingertips[i], [&](int joint) {
-      if (users[static_cast<size_t>(joint)] == 1) own[i].push_back(joint);
-    });
-    if (own[i].empty()) throw std::invalid_argument("fingertips: a finger has no joints of its own");
-  }
-  return own;
-}
-
 FingerPlacement SolveFingerPlacement(const RobotModel& model, std::span<const int> fingertips,
                                      const Surface& object, const Pose& X_Bo,
                                      std::span<const SurfacePoint> targets,
@@ -32,7 +15,7 @@ FingerPlacement SolveFingerPlacement(const RobotModel& model, std::span<const in
                                      const FingerPlacementOptions& options) {
   if (targets.size() != fingertips.size())
     throw std::invalid_argument("targets: one for each fingertip expected");
-  const std::vector<std::vector<int>> own_joints = ListOwnJoints(model, fingertips);
+  const std::vector<std::vector<int>> own_joints = grasp_internal::ListOwnJoints(model, fingertips);
   std::vector<Vector3d> places;
   for (size_t i = 0; i < fingertips.size(); ++i) {
     const Frame& frame = model.frames().at(static_cast<size_t>(fingertips[i]));

@@ -23,10 +23,6 @@ struct FingerPlacement {
   bool reached = false;   ///< Within the tolerance and the joint ranges.
 };
 
-/// For each fingertip the joints of the model that move it and no other one.
-/// @throws std::invalid_argument when a finger has none.
-std::vector<std::vector<int>> ListOwnJoints(const RobotModel& model, std::span<const int> fingertips);
-
 /// Moves each finger's own joints until its fingertip touches the object at its target. A finger's own joints
 /// are those that no other of the fingertips hangs on; there may be more of them than needed, then the least
 /// change is taken.

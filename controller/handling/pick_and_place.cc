@@ -5,7 +5,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/grasp/finger_placement.h"
+#include "controller/grasp/own_joints.h"
 #include "controller/object/euler_zyz.h"
 
 namespace dexcheck {
@@ -49,20 +49,19 @@ const char* NameOf(Phase phase) {
   return "done";
 }
 
-PickAndPlace::PickAndPlace(const RobotModel& model, std::span<const int> fingertips, int palm,
-                           const Surface& surface, const MassProperties& object, const VectorXd& start,
+PickAndPlace::PickAndPlace(const RobotModel& model, const Hand& hand, const Surface& surface,
+                           const MassProperties& object, const VectorXd& start,
                            const PickAndPlaceOptions& options, double time_step)
     : model_(&model),
-      fingertips_(fingertips.begin(), fingertips.end()),
-      palm_(palm),
+      hand_(hand),
       surface_(&surface),
       weight_(object.mass * model.gravity().norm()),
       start_(start),
       options_(options),
       half_step_(0.5 * time_step),
-      own_joints_(ListOwnJoints(model, fingertips)),
-      touched_at_(fingertips.size()) {
-  demand_.touch_force.assign(fingertips.size(), 0.0);
+      own_joints_(grasp_internal::ListOwnJoints(model, hand.fingertips)),
+      touched_at_(hand.fingertips.size()) {
+  demand_.touch_force.assign(hand.fingertips.size(), 0.0);
 }
 
 void PickAndPlace::Begin(double t, const Pose& X_Bo) {
@@ -75,8 +74,7 @@ void PickAndPlace::Begin(double t, const Pose& X_Bo) {
 
 void PickAndPlace::PlanAttempt(double t, const Pose& X_Bo) {
   ++attempt_;
-  VectorXd q = start_;
-  plan_ = MakePickPlan(*model_, fingertips_, palm_, *surface_, X_Bo, q, options_.plan);
+  plan_ = MakePickPlan(*model_, hand_, *surface_, X_Bo, start_, options_.plan);
   lay_at_ = X_Bo.translation();
   push_ = 0.0;
   if (!plan_.found) return;
@@ -178,7 +176,7 @@ void PickAndPlace::UpdateClose(double t, const MeasuredState& state, const Touch
   bool all = true;
   bool settled = true;
   std::string missing;
-  for (size_t i = 0; i < fingertips_.size(); ++i) {
+  for (size_t i = 0; i < hand_.fingertips.size(); ++i) {
     if (!Contains(demand_.contacts, i) && Contains(touch.fingertips, i)) {
       demand_.contacts |= ContactSet{1} << i;
       touched_at_[i] = t;
@@ -188,7 +186,7 @@ void PickAndPlace::UpdateClose(double t, const MeasuredState& state, const Touch
     }
     if (!Contains(demand_.contacts, i)) {
       all = false;
-      missing = model_->frames()[static_cast<size_t>(fingertips_[i])].name;
+      missing = model_->frames()[static_cast<size_t>(hand_.fingertips[i])].name;
       continue;
     }
     const double since = t - touched_at_[i];
@@ -208,7 +206,7 @@ void PickAndPlace::UpdateClose(double t, const MeasuredState& state, const Touch
     stage_ = 1;
     const double way = options_.plan.nearness + options_.plan.depth;
     VectorXd to = plan_.q_deep;
-    for (size_t i = 0; i < fingertips_.size(); ++i) {
+    for (size_t i = 0; i < hand_.fingertips.size(); ++i) {
       if (!Contains(demand_.contacts, i)) continue;
       for (const int joint : own_joints_[i]) to[joint] = move_.to[joint];
     }

@@ -65,9 +65,9 @@ struct PhaseEntry {
 /// The sequence. Plans when an attempt begins, which takes time and allocates; steps do neither.
 class PickAndPlace {
  public:
-  /// @param palm frame of the hand. @param start posture (q') that the task begins and ends in.
+  /// @param hand with its fingertips in the grasp's order. @param start posture (q') that the task begins and ends in.
   /// @param time_step at the middle of which velocities are referred to (leapfrog), s; 0 for none.
-  PickAndPlace(const RobotModel& model, std::span<const int> fingertips, int palm, const Surface& surface,
+  PickAndPlace(const RobotModel& model, const Hand& hand, const Surface& surface,
                const MassProperties& object, const VectorXd& start, const PickAndPlaceOptions& options,
                double time_step);
 
@@ -122,8 +122,7 @@ class PickAndPlace {
   [[nodiscard]] DesiredMotion EvaluateCarry(double t) const;
 
   const RobotModel* model_;
-  std::vector<int> fingertips_;
-  int palm_;
+  Hand hand_;
   const Surface* surface_;
   double weight_;  // stated, N
   VectorXd start_;

@@ -2,41 +2,36 @@
 
 // The postures of a grasp from above: over the object, around it, at its surface.
 
-#include <span>
 #include <string>
 #include <vector>
 
-#include "controller/contact/surface.h"
-#include "controller/model/robot_model.h"
+#include "controller/grasp/contact_plan.h"
 
 namespace dexcheck {
 
 struct PickPlanOptions {
-  double mu = 0.5;           ///< Friction that the choice of contacts counts on.
-  double raise = 0.15;       ///< How far the object is to be lifted; the hand arrives as far over it, m.
-  double opening = 0.015;    ///< Gap between fingertips and contacts before the hand closes, m.
-  double nearness = 0.002;   ///< Gap from which the fingertips go on slowly, m.
-  double depth = 0.004;      ///< How far beyond the surface they go when they find nothing, m.
-  double support = 0.0;      ///< Height of what the object lies on, m.
-  double clearance = 0.002;  ///< Of the fingertips over it, m.
+  double mu = 0.5;          ///< Friction that the choice of contacts counts on.
+  double raise = 0.15;      ///< How far the object is to be lifted; the hand arrives as far over it, m.
+  double opening = 0.015;   ///< Gap between fingertips and contacts before the hand closes, m.
+  double nearness = 0.002;  ///< Gap from which the fingertips go on slowly, m.
+  double depth = 0.004;     ///< How far beyond the surface they go when they find nothing, m.
+  double support = 0.0;     ///< Height of what the object lies on, m.
 };
 
 /// Joint positions (rad), in the model's order.
 struct PickPlan {
   bool found = false;
-  std::string problem;                 ///< Why there is none.
-  std::vector<SurfacePoint> contacts;  ///< Of the object, one for each fingertip.
-  double margin = 0.0;                 ///< Of force closure.
-  VectorXd q_above;                    ///< The hand is open, `raise` over the object.
-  VectorXd q_open;                     ///< Around the object.
-  VectorXd q_near;                     ///< Just off the contacts.
-  VectorXd q_deep;                     ///< Fingertips in the object.
+  std::string problem;   ///< Why there is none.
+  ContactPlan contacts;  ///< Where the fingertips go.
+  VectorXd q_above;      ///< The hand is open, `raise` over the object.
+  VectorXd q_open;       ///< Around the object.
+  VectorXd q_near;       ///< Just off the contacts.
+  VectorXd q_deep;       ///< Fingertips in the object.
 };
 
-/// @param palm frame of the hand; its z axis points out of the palm. @param X_Bo where the object lies.
-/// @param q q' to start from.
-PickPlan MakePickPlan(const RobotModel& model, std::span<const int> fingertips, int palm,
-                      const Surface& object, const Pose& X_Bo, const Eigen::Ref<const VectorXd>& q,
-                      const PickPlanOptions& options);
+/// @param X_Bo where the object lies. @param q q' to start from and to stay near to.
+/// @throws std::invalid_argument as PlanContacts.
+PickPlan MakePickPlan(const RobotModel& model, const Hand& hand, const Surface& object, const Pose& X_Bo,
+                      const Eigen::Ref<const VectorXd>& q, const PickPlanOptions& options);
 
 }  // namespace dexcheck

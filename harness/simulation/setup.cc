@@ -142,7 +142,9 @@ int Setup::FindGraspFrame() const {
 }
 
 void Setup::PlaceTask() {
-  palm_ = FindGraspFrame();
+  hand_.fingertips = fingertips_;
+  hand_.palm_frame = FindGraspFrame();
+  hand_.arm_joints = ListArmJoints(model_, fingertips_, hand_.palm_frame);
   q_start_ = ReadPosture();
   X_Bo_start_ = scenario_.task->X_Bo;
   X_start_ << X_Bo_start_.translation(), CalcAnyZyzAngles(X_Bo_start_.linear());

@@ -8,6 +8,7 @@
 
 #include "controller/control/grasp_controller.h"
 #include "controller/control/trajectory.h"
+#include "controller/grasp/contact_plan.h"
 #include "controller/model/robot_model.h"
 #include "harness/adapter/adapter.h"
 #include "harness/checks/static_gate.h"
@@ -40,8 +41,8 @@ class Setup {
   /// Joints that lie on no chain from the base to a fingertip of the grasp: they should stay still.
   [[nodiscard]] const std::vector<int>& idle_joints() const { return idle_joints_; }
 
-  /// Frame of the palm; -1 unless the scenario is a task.
-  [[nodiscard]] int palm() const { return palm_; }
+  /// The hand that does the task; palm_frame -1 when the scenario is none.
+  [[nodiscard]] const Hand& hand() const { return hand_; }
 
   /// The posture that holds the object, or that a task begins in, and where the object is; X_o on the branch with beta > 0.
   [[nodiscard]] const VectorXd& q_start() const { return q_start_; }
@@ -75,7 +76,7 @@ class Setup {
   GateResult gate_;
   std::unique_ptr<Surface> surface_;
   std::vector<int> fingertips_;
-  int palm_ = -1;
+  Hand hand_;
   std::vector<int> arm_joints_;  // on the chains of several fingertips
   std::vector<int> idle_joints_;
   std::vector<Bond> bonds_;

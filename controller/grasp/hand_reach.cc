@@ -1,0 +1,182 @@
+#include "controller/grasp/hand_reach.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "controller/common/errors.h"
+#include "controller/grasp/own_joints.h"
+#include "controller/grasp/spread_points.h"
+
+namespace dexcheck::grasp_internal {
+namespace {
+
+constexpr int kPostures = 1500;     // of each finger, to find out where it reaches
+constexpr double kBand = 0.008;     // m; a posture this near to touching is worth solving for
+constexpr double kSpacing = 0.008;  // m, between points along a finger
+
+/// Origins of the joints and the fingertip's centre, with points in between.
+std::vector<Vector3d> ListPoints(const SerialChain::Poses& poses) {
+  std::vector<Vector3d> points;
+  Vector3d from = poses.links.front().translation();
+  const auto add = [&](const Vector3d& to) {
+    const int pieces = std::max(1, static_cast<int>(std::ceil((to - from).norm() / kSpacing)));
+    for (int k = 0; k < pieces; ++k)
+      points.emplace_back(from + (to - from) * (static_cast<double>(k) / pieces));
+    from = to;
+  };
+  for (size_t k = 1; k < poses.links.size(); ++k) {
+    if ((poses.links[k].translation() - from).norm() > 0.0) add(poses.links[k].translation());
+  }
+  add(poses.frame.translation());
+  points.push_back(from);
+  return points;
+}
+
+}  // namespace
+
+HalfSpace HalfSpace::Transform(const Pose& X_FB) const {
+  const Vector3d turned = X_FB.linear() * normal;
+  return {turned, height + turned.dot(X_FB.translation())};
+}
+
+double CalcDistance(const Surface& object, const Vector3d& p) {
+  try {
+    return object.Project(p).distance;
+  } catch (const SingularityError&) {
+    constexpr double kNudge = 1e-7;  // m
+    return object.Project(p + kNudge * Vector3d(1.0, 2.0, 3.0)).distance;
+  }
+}
+
+HandReach::HandReach(const RobotModel& model, std::span<const int> fingertips, int palm_frame,
+                     const Eigen::Ref<const VectorXd>& q, double joint_margin) {
+  const std::vector<std::vector<int>> own = ListOwnJoints(model, fingertips);
+  const std::vector<int> palm_chain = ListChain(model, palm_frame);
+  const SerialChain palm(model, palm_frame, palm_chain, q);
+  SerialChain::Poses poses;
+  palm.CalcPoses(palm.Gather(q), &poses);
+  const Pose X_PB = poses.frame.inverse();
+  double farthest = 0.0;
+  for (size_t i = 0; i < fingertips.size(); ++i) {
+    const Frame& frame = model.frames()[static_cast<size_t>(fingertips[i])];
+    if (!frame.sphere_radius) throw std::invalid_argument("fingertips: " + frame.name + " carries no sphere");
+    for (const int joint : own[i]) {
+      if (std::find(palm_chain.begin(), palm_chain.end(), joint) == palm_chain.end()) continue;
+      throw std::invalid_argument("fingertips: " + frame.name + " does not hang on the palm with the others");
+    }
+    Finger finger{SerialChain(model, fingertips[i], own[i], q), *frame.sphere_radius, {}, {}, {}, {}, {}};
+    finger.chain.SetRoot(X_PB);
+    finger.lower = finger.chain.lower().array() + joint_margin;
+    finger.upper = finger.chain.upper().array() - joint_margin;
+    Require((finger.lower.array() <= finger.upper.array()).all(), "joint_margin",
+            "must leave each joint a range", joint_margin);
+    finger.middle = 0.5 * (finger.lower + finger.upper);
+    for (int k = 1; k <= kPostures; ++k) {
+      finger.postures.push_back(CalcSpreadPoint(k, finger.lower, finger.upper));
+      finger.chain.CalcPoses(finger.postures.back(), &poses);
+      finger.tips.push_back(poses.frame.translation());
+      farthest = std::max(farthest, poses.frame.translation().z());
+    }
+    bases_.push_back(poses.links.front().translation());
+    fingers_.push_back(std::move(finger));
+  }
+  Vector3d least = bases_.front();
+  Vector3d most = bases_.front();
+  for (const Vector3d& base : bases_) {
+    least = least.cwiseMin(base);
+    most = most.cwiseMax(base);
+  }
+  center_ = 0.5 * (least + most);
+  length_ = farthest - center_.z();
+}
+
+std::optional<Touch> HandReach::FindTouch(size_t finger_index, const Surface& object, const Pose& X_Po,
+                                          const HandClearance& clearance, const SurfacePoint& alpha,
+                                          const VectorXd& q_start) const {
+  constexpr double kNearlyAll = 0.999;
+  const Finger& finger = fingers_[finger_index];
+  const SurfaceGeometry surface = object.Evaluate(alpha);
+  const Vector3d n = surface.R.col(2);
+  if (clearance.above) {
+    const double slope = clearance.above->normal.dot(X_Po.linear() * n);
+    if (std::abs(slope) > std::sin(clearance.steepest)) return {};
+  }
+  // The fingertip must come from somewhere.
+  const double away = finger.radius + clearance.room;
+  if (CalcDistance(object, surface.p + away * n) < kNearlyAll * away) return {};
+
+  Pose X = Pose::Identity();
+  X.translation() = X_Po * Vector3d(surface.p + finger.radius * n);
+  const double rounding_free = 1e-10;  // m
+  const ChainSolution solution = SolveChain(finger.chain, {X, 0.0, rounding_free, 40}, finger.lower,
+                                            finger.upper, q_start, finger.middle);
+  if (!solution.reached) return {};
+
+  Touch touch;
+  SerialChain::Poses poses;
+  finger.chain.CalcPoses(solution.q, &poses);
+  touch.points = ListPoints(poses);
+  const Pose X_oP = X_Po.inverse();
+  const double thick = clearance.thickness * finger.radius;
+  for (size_t k = 0; k < touch.points.size(); ++k) {
+    const bool is_tip = k + 1 == touch.points.size();
+    const double radius = is_tip ? finger.radius : thick;
+    if (clearance.above && clearance.above->CalcHeight(touch.points[k]) < radius + clearance.support)
+      return {};
+    if (!is_tip && CalcDistance(object, X_oP * touch.points[k]) < thick) return {};
+  }
+  touch.alpha = alpha;
+  // Forces of the finger in a frame whose z points into the object (23).
+  Matrix3d R;
+  R << surface.R.col(0), -surface.R.col(1), -n;
+  touch.G << R, Skew(surface.p) * R;
+  touch.q = solution.q;
+  touch.joint_margin = CalcRangeMargin(solution.q, finger.chain.lower(), finger.chain.upper());
+  return touch;
+}
+
+std::vector<Touch> HandReach::ListTouches(size_t finger_index, const Surface& object, const Pose& X_Po,
+                                          const HandClearance& clearance, double grid) const {
+  const Finger& finger = fingers_[finger_index];
+  const Pose X_oP = X_Po.inverse();
+  std::vector<Touch> touches;
+  std::set<std::array<int, 3>> cells;
+  for (size_t k = 0; k < finger.tips.size(); ++k) {
+    const Vector3d p = X_oP * finger.tips[k];
+    SurfaceProjection projection;
+    try {
+      projection = object.Project(p);
+    } catch (const SingularityError&) {
+      continue;
+    }
+    if (std::abs(projection.distance - finger.radius) > kBand) continue;
+    const SurfacePoint alpha = object.Normalize(projection.alpha);
+    const Vector3d place = object.Evaluate(alpha).p / grid;
+    const std::array<int, 3> cell = {static_cast<int>(std::floor(place.x())),
+                                     static_cast<int>(std::floor(place.y())),
+                                     static_cast<int>(std::floor(place.z()))};
+    if (!cells.insert(cell).second) continue;
+    std::optional<Touch> touch = FindTouch(finger_index, object, X_Po, clearance, alpha, finger.postures[k]);
+    if (touch) touches.push_back(std::move(*touch));
+  }
+  return touches;
+}
+
+bool HandReach::AreApart(size_t finger_a, const Touch& a, size_t finger_b, const Touch& b,
+                         const HandClearance& clearance) const {
+  const double tips = fingers_[finger_a].radius + fingers_[finger_b].radius + clearance.spacing;
+  if ((a.points.back() - b.points.back()).squaredNorm() < tips * tips) return false;
+  const double tubes =
+      clearance.thickness * (fingers_[finger_a].radius + fingers_[finger_b].radius) + clearance.spacing;
+  for (const Vector3d& p : a.points) {
+    for (const Vector3d& q : b.points) {
+      if ((p - q).squaredNorm() < tubes * tubes) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace dexcheck::grasp_internal

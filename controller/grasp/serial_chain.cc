@@ -1,0 +1,261 @@
+#include "controller/grasp/serial_chain.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "controller/common/errors.h"
+#include "controller/grasp/own_joints.h"
+#include "controller/object/so3.h"
+
+namespace dexcheck::grasp_internal {
+namespace {
+
+Pose CalcBasePose(const RobotModel& model, const Eigen::Ref<const VectorXd>& q) {
+  Pose X_B0 = model.base().X_B0;
+  if (model.num_base_positions() == 0) return X_B0;
+  X_B0.translation() += Vector3d(q[0], q[1], 0.0);
+  X_B0.linear() = Eigen::AngleAxisd(q[2], Vector3d::UnitZ()).toRotationMatrix();
+  return X_B0;
+}
+
+}  // namespace
+
+SerialChain::SerialChain(const RobotModel& model, int frame, std::span<const int> joints,
+                         const Eigen::Ref<const VectorXd>& q)
+    : q_offset_(model.num_base_positions()) {
+  Require(q.size() == model.num_positions(), "q", "must have an entry for each position",
+          static_cast<double>(q.size()));
+  const std::vector<int> chain = ListChain(model, frame);
+  Pose held = CalcBasePose(model, q);
+  for (const int index : chain) {
+    const Joint& joint = model.joints()[static_cast<size_t>(index)];
+    const bool revolute = joint.type == JointType::kRevolute;
+    held = held * joint.X_PB;
+    if (std::find(joints.begin(), joints.end(), index) == joints.end()) {
+      const double position = q[q_offset_ + index];
+      held = held * CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q + (revolute ? position : 0.0),
+                                     joint.mdh.d + (revolute ? 0.0 : position));
+      continue;
+    }
+    joints_.push_back(index);
+    // What of the MDH row does not move stands before the joint: turns about and slides along z commute.
+    const MdhRow& mdh = joint.mdh;
+    held = held * CalcMdhTransform(mdh.alpha, mdh.a, revolute ? 0.0 : mdh.q, revolute ? mdh.d : 0.0);
+    segments_.push_back({held, revolute, revolute ? mdh.q : mdh.d});
+    held = Pose::Identity();
+  }
+  after_ = held * model.frames()[static_cast<size_t>(frame)].X_LF;
+  if (joints_.size() != joints.size() || joints.empty()) {
+    throw std::invalid_argument("joints: each must move frame " +
+                                model.frames()[static_cast<size_t>(frame)].name + ", once");
+  }
+  lower_.resize(size());
+  upper_.resize(size());
+  for (Eigen::Index k = 0; k < size(); ++k) {
+    const Joint& joint = model.joints()[static_cast<size_t>(joints_[static_cast<size_t>(k)])];
+    lower_[k] = joint.lower;
+    upper_[k] = joint.upper;
+  }
+}
+
+void SerialChain::CalcPoses(const Eigen::Ref<const VectorXd>& q, Poses* poses) const {
+  poses->links.resize(segments_.size());
+  Pose X = Pose::Identity();
+  for (size_t k = 0; k < segments_.size(); ++k) {
+    const Segment& segment = segments_[k];
+    X = X * segment.before;
+    const double position = segment.offset + q[static_cast<Eigen::Index>(k)];
+    if (segment.revolute) {
+      const double c = std::cos(position);
+      const double s = std::sin(position);
+      const Vector3d x = X.linear().col(0);
+      X.linear().col(0) = c * x + s * X.linear().col(1);
+      X.linear().col(1) = c * X.linear().col(1) - s * x;
+    } else {
+      X.translation() += position * X.linear().col(2);
+    }
+    poses->links[k] = X;
+  }
+  poses->frame = X * after_;
+}
+
+void SerialChain::CalcJacobian(const Poses& poses, Matrix6Xd* J) const {
+  J->resize(6, size());
+  for (Eigen::Index k = 0; k < size(); ++k) {
+    const Pose& X = poses.links[static_cast<size_t>(k)];
+    const Vector3d z = X.linear().col(2);
+    if (segments_[static_cast<size_t>(k)].revolute) {
+      J->col(k) << z.cross(poses.frame.translation() - X.translation()), z;
+    } else {
+      J->col(k) << z, Vector3d::Zero();
+    }
+  }
+}
+
+VectorXd SerialChain::Gather(const Eigen::Ref<const VectorXd>& q) const {
+  VectorXd own(size());
+  for (Eigen::Index k = 0; k < size(); ++k) own[k] = q[q_offset_ + joints_[static_cast<size_t>(k)]];
+  return own;
+}
+
+void SerialChain::Scatter(const Eigen::Ref<const VectorXd>& q_own, Eigen::Ref<VectorXd> q) const {
+  for (Eigen::Index k = 0; k < size(); ++k) q[q_offset_ + joints_[static_cast<size_t>(k)]] = q_own[k];
+}
+
+namespace {
+
+/// One chain on its way to one target of three or six equations.
+template <int kRows>
+class ChainSolver {
+ public:
+  ChainSolver(const SerialChain& chain, const ChainTarget& target, const VectorXd& lower,
+              const VectorXd& upper, const VectorXd& q_start)
+      : chain_(chain), target_(target), lower_(lower), upper_(upper) {
+    result_.q = q_start.cwiseMax(lower).cwiseMin(upper);
+    SetError();
+  }
+
+  [[nodiscard]] double error() const { return error_.norm(); }
+  [[nodiscard]] bool IsAtTarget() const {
+    return result_.position <= target_.tolerance && result_.orientation <= target_.tolerance;
+  }
+
+  /// Moves towards the target, and by `pull` of the way to q_nominal where the target does not care. Returns
+  /// the largest change of a joint.
+  double Step(const VectorXd* q_nominal, double pull) {
+    chain_.CalcJacobian(poses_, &J_);
+    if constexpr (kRows == 6) J_.bottomRows<3>() *= target_.length;
+    free_.assign(static_cast<size_t>(chain_.size()), true);
+    // A joint at the end of its range that wants to go on is held, and the others take over.
+    for (Eigen::Index held = 0; held <= chain_.size(); ++held) {
+      CalcStep(q_nominal, pull);
+      if (!HoldJointsAtEnds()) break;
+    }
+    constexpr double kLargestStep = 0.3;  // rad or m
+    const double largest = step_.cwiseAbs().maxCoeff();
+    if (largest > kLargestStep) step_ *= kLargestStep / largest;
+    const VectorXd before = result_.q;
+    result_.q = (result_.q + step_).cwiseMax(lower_).cwiseMin(upper_);
+    SetError();
+    return (result_.q - before).cwiseAbs().maxCoeff();
+  }
+
+  ChainSolution Finish() {
+    // Rounding of coordinates may keep the residual a little above a very small tolerance.
+    const double rounding =
+        32.0 * std::numeric_limits<double>::epsilon() * (1.0 + target_.X.translation().norm());
+    const double tolerance = std::max(target_.tolerance, rounding);
+    result_.reached = result_.position <= tolerance && result_.orientation <= tolerance;
+    return result_;
+  }
+
+ private:
+  using Rows = Eigen::Matrix<double, kRows, 1>;
+
+  void SetError() {
+    chain_.CalcPoses(result_.q, &poses_);
+    error_.template head<3>() = target_.X.translation() - poses_.frame.translation();
+    result_.position = error_.template head<3>().norm();
+    if constexpr (kRows == 6) {
+      const Vector3d turn = LogSo3(target_.X.linear() * poses_.frame.linear().transpose());
+      result_.orientation = turn.norm();
+      error_.template tail<3>() = target_.length * turn;
+    }
+  }
+
+  // step = J^T (J J^T + lambda)^-1 error + (1 - J^T (J J^T + lambda)^-1 J) pull (q_nominal - q)
+  void CalcStep(const VectorXd* q_nominal, double pull) {
+    constexpr double kDamping = 1e-2;
+    constexpr double kLeast = 1e-13;
+    step_.setZero(chain_.size());
+    if (q_nominal != nullptr) step_ = pull * (*q_nominal - result_.q);
+    Eigen::Matrix<double, kRows, kRows> normal = Eigen::Matrix<double, kRows, kRows>::Zero();
+    Rows rhs = error_;
+    for (Eigen::Index k = 0; k < chain_.size(); ++k) {
+      if (!free_[static_cast<size_t>(k)]) {
+        step_[k] = 0.0;
+        continue;
+      }
+      const Rows column = J_.col(k).template head<kRows>();
+      normal += column * column.transpose();
+      rhs -= column * step_[k];
+    }
+    normal.diagonal().array() += kDamping * error_.squaredNorm() + kLeast;
+    const Rows y = normal.ldlt().solve(rhs);
+    for (Eigen::Index k = 0; k < chain_.size(); ++k) {
+      if (free_[static_cast<size_t>(k)]) step_[k] += J_.col(k).template head<kRows>().dot(y);
+    }
+  }
+
+  bool HoldJointsAtEnds() {
+    bool held = false;
+    for (Eigen::Index k = 0; k < chain_.size(); ++k) {
+      const bool leaves =
+          (result_.q[k] <= lower_[k] && step_[k] < 0.0) || (result_.q[k] >= upper_[k] && step_[k] > 0.0);
+      if (!leaves || !free_[static_cast<size_t>(k)]) continue;
+      free_[static_cast<size_t>(k)] = false;
+      held = true;
+    }
+    return held;
+  }
+
+  const SerialChain& chain_;
+  const ChainTarget& target_;
+  const VectorXd& lower_;
+  const VectorXd& upper_;
+  ChainSolution result_;
+  SerialChain::Poses poses_;
+  Rows error_;
+  Matrix6Xd J_;
+  VectorXd step_;
+  std::vector<bool> free_;
+};
+
+template <int kRows>
+ChainSolution Solve(ChainSolver<kRows> solver, int max_iterations, const VectorXd& q_nominal) {
+  // First with the pull, until the posture settles; a chain that comes no nearer gives up.
+  constexpr double kPull = 0.7;
+  constexpr double kSettled = 3e-3;   // rad or m
+  constexpr double kNear = 1e-3;      // m
+  constexpr double kStagnant = 1e-5;  // rad or m
+  constexpr double kProgress = 0.98;
+  constexpr int kPatience = 10;
+  int iteration = 0;
+  double best = solver.error();
+  int since_best = 0;
+  for (; iteration < max_iterations; ++iteration) {
+    const double moved = solver.Step(&q_nominal, kPull);
+    if (solver.error() < kNear && moved < kSettled) break;
+    if (moved < kStagnant) break;
+    if (solver.error() < kProgress * best) {
+      best = solver.error();
+      since_best = 0;
+    } else if (solver.error() > kNear && ++since_best >= kPatience) {
+      break;
+    }
+  }
+  for (; iteration < max_iterations + kPatience; ++iteration) {
+    if (solver.IsAtTarget()) break;
+    if (solver.Step(nullptr, 0.0) < std::numeric_limits<double>::epsilon()) break;
+  }
+  return solver.Finish();
+}
+
+}  // namespace
+
+ChainSolution SolveChain(const SerialChain& chain, const ChainTarget& target, const VectorXd& lower,
+                         const VectorXd& upper, const VectorXd& q_start, const VectorXd& q_nominal) {
+  if (target.length > 0.0) {
+    return Solve(ChainSolver<6>(chain, target, lower, upper, q_start), target.max_iterations, q_nominal);
+  }
+  return Solve(ChainSolver<3>(chain, target, lower, upper, q_start), target.max_iterations, q_nominal);
+}
+
+double CalcRangeMargin(const VectorXd& q, const VectorXd& lower, const VectorXd& upper) {
+  return std::min((q - lower).minCoeff(), (upper - q).minCoeff());
+}
+
+}  // namespace dexcheck::grasp_internal

@@ -1,0 +1,86 @@
+#pragma once
+
+// Kinematics of a few joints between a fixed root and one frame, and their inverse. Internal to
+// controller/grasp: for searches that evaluate one chain thousands of times, where the whole robot's terms
+// would be wasted.
+
+#include <span>
+#include <vector>
+
+#include "controller/common/types.h"
+#include "controller/model/robot_model.h"
+
+namespace dexcheck::grasp_internal {
+
+/// The chain from the base to a frame with some of its joints free and all others held.
+class SerialChain {
+ public:
+  /// @param joints free ones, each on the chain to `frame`. @param q q', whose other entries are held.
+  /// @throws std::invalid_argument when a joint does not move the frame, is named twice, or q has a wrong
+  /// size.
+  SerialChain(const RobotModel& model, int frame, std::span<const int> joints,
+              const Eigen::Ref<const VectorXd>& q);
+
+  /// Free joints, the base's side first; the order of `q` below.
+  [[nodiscard]] const std::vector<int>& joints() const { return joints_; }
+  [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(joints_.size()); }
+  /// Ranges, rad or m.
+  [[nodiscard]] const VectorXd& lower() const { return lower_; }
+  [[nodiscard]] const VectorXd& upper() const { return upper_; }
+
+  /// Expresses all that follows in another frame than the world: X_RB places the world in it.
+  void SetRoot(const Pose& X_RB) { segments_.front().before = X_RB * segments_.front().before; }
+
+  /// Poses of the frame and of the free joints' links.
+  struct Poses {
+    std::vector<Pose> links;  ///< One for each free joint.
+    Pose frame;
+  };
+  void CalcPoses(const Eigen::Ref<const VectorXd>& q, Poses* poses) const;
+
+  /// Jacobian (6 x size) of the frame's origin and orientation, [linear; angular], both in the root's axes.
+  void CalcJacobian(const Poses& poses, Matrix6Xd* J) const;
+
+  /// Entries of q' that belong to the free joints.
+  [[nodiscard]] VectorXd Gather(const Eigen::Ref<const VectorXd>& q) const;
+  void Scatter(const Eigen::Ref<const VectorXd>& q_own, Eigen::Ref<VectorXd> q) const;
+
+ private:
+  struct Segment {
+    Pose before;  // from the link of the free joint before to where this joint turns or slides about z
+    bool revolute = true;
+    double offset = 0.0;  // added to q
+  };
+
+  std::vector<int> joints_;
+  std::vector<Segment> segments_;
+  Pose after_;  // the frame in the last free joint's link
+  int q_offset_;
+  VectorXd lower_;
+  VectorXd upper_;
+};
+
+/// Where a chain's frame should be.
+struct ChainTarget {
+  Pose X;                    ///< In the chain's root.
+  double length = 0.0;       ///< An error of one radian counts as this many m; 0: any orientation will do.
+  double tolerance = 1e-13;  ///< m; orientation in rad.
+  int max_iterations = 60;
+};
+
+struct ChainSolution {
+  VectorXd q;                ///< Free joints.
+  double position = 0.0;     ///< Residuals: m, rad.
+  double orientation = 0.0;  ///< 0 when any will do.
+  bool reached = false;
+};
+
+/// Damped least squares from `q_start` with joints kept in [lower, upper]; what the target leaves free is
+/// pulled towards `q_nominal`. Sizes are the chain's.
+ChainSolution SolveChain(const SerialChain& chain, const ChainTarget& target, const VectorXd& lower,
+                         const VectorXd& upper, const VectorXd& q_start, const VectorXd& q_nominal);
+
+/// Smallest distance of an entry from the ends of its range; negative outside.
+double CalcRangeMargin(const VectorXd& q, const VectorXd& lower, const VectorXd& upper);
+
+}  // namespace dexcheck::grasp_internal
