@@ -20,13 +20,18 @@ HandlingController::HandlingController(const RobotModel& model, std::span<const 
   problem_.f_max.setConstant(grasp.options().f_max);
   f_c_.setZero(3 * static_cast<Eigen::Index>(fingertips.size()));
   f_grip_ = f_c_;
-  FindLaw(AllContacts(static_cast<int>(fingertips_.size())));
+  const ContactSet all = AllContacts(static_cast<int>(fingertips_.size()));
+  FindLaw(all, false);
+  FindLaw(all, true);
 }
 
-HandlingController::Law& HandlingController::FindLaw(ContactSet set) {
-  std::unique_ptr<Law>& law = laws_[set];
+HandlingController::Law& HandlingController::FindLaw(ContactSet set, bool carried) {
+  std::unique_ptr<Law>& law = laws_[{set, carried}];
   if (!law) {
-    law = std::make_unique<Law>(*model_, fingertips_, object_, *surface_, grasp_->options().weight, set);
+    RedundancyWeight weight;
+    weight.kind = RedundancyWeight::Kind::kMass;
+    if (carried) weight = grasp_->options().weight;
+    law = std::make_unique<Law>(*model_, fingertips_, object_, *surface_, weight, set);
     law->f_c.setZero(law->grasp.terms().num_forces());
   }
   return *law;
@@ -37,11 +42,11 @@ const VectorXd& HandlingController::CalcTorque(const MeasuredState& state, const
   const ContactSet all = AllContacts(static_cast<int>(fingertips_.size()));
   if (demand.contacts == 0) {
     f_c_.setZero();
-    ComputedTorque& law = FindLaw(all).torque;
+    ComputedTorque& law = FindLaw(all, false).torque;
     law.SetFreeMotion(grasp_->robot(), grasp_->sigma_prime());
     return law.tau_0();
   }
-  Law& law = FindLaw(demand.contacts);
+  Law& law = FindLaw(demand.contacts, demand.carried);
   law.grasp.SetState(grasp_->robot(), state);
   const GraspTerms& terms = law.grasp.terms();
   Vector6d V_Bo_dot = Vector6d::Zero();

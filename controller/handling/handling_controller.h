@@ -5,6 +5,7 @@
 
 #include <map>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "controller/control/computed_torque.h"
@@ -35,8 +36,9 @@ struct HandlingDemand {
 ///   F_o      = scale (M_hat V_dot + C_hat V) + weight N_o
 ///   f_c      = (1 - grip) f_touch + grip f(F_o),   f(F_o) in the friction cones, G f = F_o
 ///   E_bar' tau' = M_bar' xi_dot_d + C_bar' xi_c + F_bar' + J^T f_c
-/// With all contacts, grip = weight = scale = 1 it is (55). Allocates when a set of contacts comes up for the
-/// first time, and never again.
+/// With all contacts, grip = weight = scale = 1 it is (55). While the object is not carried J^+ is weighted
+/// by M_bar': what a fingertip's contact stops is then stopped by the finger, not by the whole robot.
+/// Allocates when a set of contacts comes up for the first time, and never again.
 class HandlingController {
  public:
   /// @param grasp the controller whose state, gains, limits and posture are used; must outlive this, as must
@@ -64,7 +66,7 @@ class HandlingController {
     ComputedTorque torque;
     VectorXd f_c;
   };
-  Law& FindLaw(ContactSet set);
+  Law& FindLaw(ContactSet set, bool carried);
   void CalcGripForce(const GraspTerms& terms, const Vector6d& V_Bo_dot, const HandlingDemand& demand);
 
   const RobotModel* model_;
@@ -72,7 +74,7 @@ class HandlingController {
   MassProperties object_;
   const Surface* surface_;
   const GraspController* grasp_;
-  std::map<ContactSet, std::unique_ptr<Law>> laws_;
+  std::map<std::pair<ContactSet, bool>, std::unique_ptr<Law>> laws_;
   GraspForceProblem problem_;
   GraspForceSolver solver_;
   VectorXd f_c_;     // 3N

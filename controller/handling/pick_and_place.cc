@@ -12,12 +12,14 @@ namespace dexcheck {
 namespace {
 
 constexpr double kPlatformDamping = 20.0;  // 1/s, while the platform should stand
+constexpr double kArmShare = 0.2;          // of the posture's frequency, for arm and waist while carrying
 constexpr double kFirstTouch = 0.2;        // of the touch force comes at once, so that no fingertip bounces
 constexpr double kFirstTouchTime = 0.03;   // s
-constexpr double kTouchTime = 0.4;         // s to build up or take back a touch force
+constexpr double kTouchTime = 0.6;         // s to build up or take back a touch force
 constexpr double kLastTouch = 0.05;        // of the touch force is left when the fingers open
 constexpr double kPause = 0.1;             // s between movements
-constexpr double kReleaseTime = 0.8;       // s
+constexpr double kRest = 0.5;              // s until the arm is at rest
+constexpr double kReleaseTime = 1.2;       // s
 constexpr double kOpenTime = 0.8;          // s
 constexpr double kSearchRamp = 0.1;        // s
 constexpr double kNominal = 0.01;          // of the weight: less counts as nothing
@@ -115,15 +117,32 @@ void PickAndPlace::FollowMove(double t, PostureTask* posture) {
     return motion.s < 1.0 ? motion : ScalarMotion{1.0, 0.0, 0.0};
   };
   const ScalarMotion now = evaluate(t);
-  const Eigen::Index base = model_->num_base_velocities();
   const Eigen::Index joints = model_->num_joints();
   posture->q_posture = move_.from + now.s * (move_.to - move_.from);
   posture->xi_reference.tail(joints) = evaluate(t - half_step_).s_dot * (move_.to - move_.from);
   posture->acceleration.tail(joints) = now.s_ddot * (move_.to - move_.from);
-  // The platform is free to follow the object, and comes to rest without a jolt.
+  SetPostureGains(t, posture);
+}
+
+void PickAndPlace::SetPostureGains(double t, PostureTask* posture) {
+  // Platform and arm are free to follow the object, so that the fingers need not roll; they come to rest
+  // without a jolt.
   double standing = phase_ == Phase::kCarry ? 0.0 : 1.0;
-  if (phase_ == Phase::kHandOver) standing = CalcMinSnap(t - begin_, options_.take_over_time).s;
+  const double change = CalcMinSnap(t - begin_, options_.take_over_time).s;
+  if (phase_ == Phase::kTakeOver) standing = 1.0 - change;
+  if (phase_ == Phase::kHandOver) standing = change;
+  const double frequency = options_.posture_frequency;
+  const double arm = frequency * (kArmShare + standing * (1.0 - kArmShare));
+  const Eigen::Index base = model_->num_base_velocities();
+  posture->stiffness.setConstant(arm * arm);
   posture->damping.head(base).setConstant(standing * kPlatformDamping);
+  posture->damping.tail(posture->stiffness.size()).setConstant(2.0 * arm);
+  for (const std::vector<int>& joints : own_joints_) {
+    for (const int joint : joints) {
+      posture->stiffness[joint] = frequency * frequency;
+      posture->damping[base + joint] = 2.0 * frequency;
+    }
+  }
 }
 
 void PickAndPlace::Update(double t, const MeasuredState& state, const Touch& touch, PostureTask* posture) {
@@ -147,7 +166,7 @@ void PickAndPlace::Update(double t, const MeasuredState& state, const Touch& tou
       UpdateCarry(t);
       break;
     case Phase::kHandOver:
-      UpdateHandOver(t);
+      UpdateHandOver(t, state);
       break;
     case Phase::kRelease:
       UpdateRelease(t, state);
@@ -199,7 +218,7 @@ void PickAndPlace::UpdateClose(double t, const MeasuredState& state, const Touch
   }
   if (all && settled) {
     Enter(Phase::kGrip, t);
-    return HoldPosture(Joints(state));
+    return HoldPosture(move_.to);
   }
   if (all || !MoveDone(t)) return;
   if (stage_ == 0) {
@@ -226,6 +245,8 @@ void PickAndPlace::UpdateGrip(double t, const MeasuredState& state) {
   }
   if (t - begin_ < options_.grip_time + kPause) return;
   Enter(Phase::kTakeOver, t);
+  // At rest a posture error moves nothing; without one the change of weights cannot either.
+  HoldPosture(Joints(state));
   X_start_ << state.X_Bo.translation(), CalcAnyZyzAngles(state.X_Bo.linear());
   demand_.carried = true;
   demand_.desired = DesiredMotion{};
@@ -298,11 +319,12 @@ void PickAndPlace::UpdateCarry(double t) {
   Enter(Phase::kHandOver, t);
 }
 
-void PickAndPlace::UpdateHandOver(double t) {
+void PickAndPlace::UpdateHandOver(double t, const MeasuredState& state) {
   demand_.weight = lowering_from_ * (1.0 - CalcMinSnap(t - begin_, options_.take_over_time).s);
-  if (t < begin_ + options_.take_over_time + kPause) return;
+  if (t < begin_ + options_.take_over_time + kRest) return;
   demand_.carried = false;
   Enter(Phase::kRelease, t);
+  HoldPosture(Joints(state));
 }
 
 void PickAndPlace::UpdateRelease(double t, const MeasuredState& state) {

@@ -37,15 +37,16 @@ struct PickAndPlaceOptions {
   double lower_time = 1.2;      ///< From there to around it.
   double close_time = 0.6;      ///< To just off the contacts.
   double search_speed = 0.006;  ///< From there on, m/s.
-  double grip_time = 0.8;
-  double take_over_time = 1.0;
-  double raise_time = 2.5;
+  double grip_time = 1.2;
+  double take_over_time = 1.5;
+  double raise_time = 3.0;
   double transport_time = 3.5;
   double touch_force = 0.3;    ///< N, while fingertips wait for the others.
   double f_min = 1.0;          ///< N, of the grasp.
   double overload = 1.5;       ///< Largest mass that is lifted, over the stated one.
   double largest_push = 3e-3;  ///< How far the closing hand may move the object, m.
   int attempts = 2;
+  double posture_frequency = 20.0;  ///< Of all joints, rad/s, critically damped.
   PickPlanOptions plan;
 };
 
@@ -65,7 +66,8 @@ struct PhaseEntry {
 /// The sequence. Plans when an attempt begins, which takes time and allocates; steps do neither.
 class PickAndPlace {
  public:
-  /// @param hand with its fingertips in the grasp's order. @param start posture (q') that the task begins and ends in.
+  /// @param hand with its fingertips in the grasp's order. @param start posture (q') that the task begins and
+  /// ends in.
   /// @param time_step at the middle of which velocities are referred to (leapfrog), s; 0 for none.
   PickAndPlace(const RobotModel& model, const Hand& hand, const Surface& surface,
                const MassProperties& object, const VectorXd& start, const PickAndPlaceOptions& options,
@@ -106,6 +108,7 @@ class PickAndPlace {
   void StartMove(const VectorXd& from, const VectorXd& to, double t, double duration, bool steady = false);
   [[nodiscard]] bool MoveDone(double t) const { return t >= move_.begin + move_.duration; }
   void FollowMove(double t, PostureTask* posture);
+  void SetPostureGains(double t, PostureTask* posture);
   void HoldPosture(const VectorXd& q_joints);
   [[nodiscard]] VectorXd Joints(const MeasuredState& state) const;
 
@@ -114,7 +117,7 @@ class PickAndPlace {
   void UpdateGrip(double t, const MeasuredState& state);
   void UpdateTakeOver(double t, const Touch& touch);
   void UpdateCarry(double t);
-  void UpdateHandOver(double t);
+  void UpdateHandOver(double t, const MeasuredState& state);
   void UpdateRelease(double t, const MeasuredState& state);
   void UpdateWithdraw(double t, const MeasuredState& state);
   void GiveUp(double t, const MeasuredState& state, const std::string& reason);

@@ -2,11 +2,9 @@
 
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
-#include "controller/grasp/finger_placement.h"
 #include "controller/grasp/frame_placement.h"
 
 namespace dexcheck {
-
 PickPlan MakePickPlan(const RobotModel& model, const Hand& hand, const Surface& object, const Pose& X_Bo,
                       const Eigen::Ref<const VectorXd>& q, const PickPlanOptions& options) {
   const Vector3d raise(0.0, 0.0, options.raise);
@@ -22,16 +20,12 @@ PickPlan MakePickPlan(const RobotModel& model, const Hand& hand, const Surface& 
     return plan;
   }
   const Eigen::Index joints = model.num_joints();
-  const auto place = [&](double gap, VectorXd* posture) {
-    const FingerPlacement placement =
-        SolveFingerPlacement(model, hand.fingertips, object, X_Bo, plan.contacts.contacts,
-                             gap > 0.0 ? plan.contacts.q_open : plan.contacts.q, {.penetration = -gap});
-    *posture = placement.q.tail(joints);
-    if (!placement.reached) plan.problem = "the fingers cannot move by " + FormatNumber(gap) + " m at the contacts";
-  };
+  const VectorXd q_touch = plan.contacts.q.tail(joints);
   plan.q_open = plan.contacts.q_open.tail(joints);
-  place(options.nearness, &plan.q_near);
-  place(-options.depth, &plan.q_deep);
+  // Close to the contacts a straight way in joint space is one along their normals.
+  const VectorXd off = (plan.q_open - q_touch) / options.opening;
+  plan.q_near = q_touch + options.nearness * off;
+  plan.q_deep = q_touch - options.depth * off;
 
   ModelTerms kinematics(model, Coordinates::kReduced);
   kinematics.SetState(plan.contacts.q_open, VectorXd::Zero(model.num_velocities()));
@@ -41,7 +35,8 @@ PickPlan MakePickPlan(const RobotModel& model, const Hand& hand, const Surface& 
       SolveFramePlacement(model, hand.palm_frame, X_BP, hand.arm_joints, plan.contacts.q_open,
                           plan.contacts.q_open, {.joint_margin = contact_options.joint_margin});
   plan.q_above = above.q.tail(joints);
-  if (!above.reached) plan.problem = "the arm does not reach " + FormatNumber(options.raise) + " m over the object";
+  if (!above.reached)
+    plan.problem = "the arm does not reach " + FormatNumber(options.raise) + " m over the object";
   plan.found = plan.problem.empty();
   return plan;
 }

@@ -24,9 +24,9 @@ StepChecks::StepChecks(const Setup& setup)
   Define(
       kBalanceRobot, "balance_robot", kBalance, "1", 1e-5,
       "what is left of (48) with the engine's accelerations and contact forces, against the forces balanced");
-  Define(
-      kBalanceObject, "balance_object", kBalance, "1", 1e-9,
-      "what is left of (19) with the engine's acceleration and contact forces, against the contact forces");
+  Define(kBalanceObject, "balance_object", kBalance, "1", 1e-9,
+         "what is left of (19) with the engine's acceleration and contact forces, less what its solver left "
+         "over, against the contact forces");
   Define(kReducedAcceleration, "reduced_acceleration", kPrediction, "1", 1e-5,
          "xi_dot of the rigid constrained system (46), (48) against the engine's");
   Define(kContactForce, "contact_force", kPrediction, "1", 1e-6,
@@ -46,6 +46,8 @@ StepChecks::StepChecks(const Setup& setup)
   Define(kBaseTilt, "base_tilt", kAssumption, "rad", 1e-5, "angle of the platform against the vertical");
   Define(kIdleJoints, "idle_joints", kAssumption, "rad", 1e-5,
          "movement since t = 0 of joints that do not carry the object");
+  Define(kSolver, "solver", kAssumption, "1", 1e-5,
+         "what the engine's solver left over of its own equation of motion of the object, as balance_object");
   Define(kActuators, "actuator_effort", kAssumption, "1", 1.0, "|tau'| over the motor's limit");
   // A bond neither slides nor rolls, nor does it care for friction.
   if (!setup.bonds().empty()) {
@@ -130,6 +132,7 @@ void StepChecks::Compare(const Plant& plant, const GraspController& controller, 
   Add(kContactsLost, handling.holding ? lost : 0);
   Add(kPenetration, penetration);
   support_ = observer->ReadSupportWrench(plant, state.X_Bo);
+  solver_residual_ = observer->ReadSolverResidual(plant, state.X_Bo);
   support_force_ = (state.X_Bo.linear() * support_.head<3>()).z();
   FindContacts(handling);
   if (handling.partial && time - changed_at_ < kTransient) {
@@ -243,11 +246,14 @@ void StepChecks::CompareObject(const GraspController& controller) {
   // (19), as forces at the contacts' arm
   const GraspTerms& grasp = controller.grasp();
   const ObjectBodyTerms& body = grasp.body();
-  const Vector6d left = body.M_hat * engine_.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
-                        grasp.G() * engine_.f_c - support_;
   const double arm = grasp.contacts()[0].geometry.g_o_cf.translation().norm();
-  Add(kBalanceObject,
-      std::max(left.head<3>().norm(), left.tail<3>().norm() / arm) / std::max(Weight(), engine_.f_c.norm()));
+  const auto relative = [&](const Vector6d& wrench) {
+    return std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) /
+           std::max(Weight(), engine_.f_c.norm());
+  };
+  Add(kBalanceObject, relative(body.M_hat * engine_.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
+                               grasp.G() * engine_.f_c - support_ - solver_residual_));
+  Add(kSolver, relative(solver_residual_));
 }
 
 void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {

@@ -101,6 +101,7 @@ class StepChecks {
     kKappa,
     kBaseTilt,
     kIdleJoints,
+    kSolver,
     kActuators,
     kCheckCount
   };
@@ -140,6 +141,7 @@ class StepChecks {
   bool was_holding_ = false;
   double changed_at_ = -std::numeric_limits<double>::infinity();  // the contacts, s
   Vector6d support_ = Vector6d::Zero();                           // wrench on the object, Sigma_o
+  Vector6d solver_residual_ = Vector6d::Zero();                   // likewise
   double support_force_ = 0.0;
   long transient_steps_ = 0;
   std::span<const EngineContact> contacts_;

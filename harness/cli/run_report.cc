@@ -24,6 +24,20 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop) {
   for (const RunCheck& check : loop.checks().checks()) PrintCheck(check);
 }
 
+/// "approach 0.0, close 3.4, ..." with the time each began.
+void PrintTask(const ClosedLoop& loop) {
+  const PickAndPlace& task = *loop.task();
+  std::string line;
+  for (const PhaseEntry& entry : task.history()) {
+    line += fmt::format("{}{} {:.1f}", line.empty() ? "" : ", ", NameOf(entry.phase), entry.time);
+  }
+  fmt::print("phases, s: {}\n", line);
+  if (!task.first_failure().empty()) fmt::print("first attempt: {}\n", task.first_failure());
+  if (task.scale() != 1.0) fmt::print("weighed: {:.3f} of the stated mass\n", task.scale());
+  fmt::print("object pushed by {:.1e} m before it was held; largest step of a torque {:.1e} N m\n",
+             task.push(), loop.torque_jump());
+}
+
 void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
   const LoopTimes& times = loop.times();
   const double scale = 1e6 / static_cast<double>(std::max(loop.step(), 1L));
@@ -46,6 +60,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     fmt::print("object: position error {:.2e} m (rms {:.2e}), orientation error {:.2e} rad\n",
                result.tracking.position_max(), result.tracking.position_rms(),
                result.tracking.orientation_max());
+    if (loop.task() != nullptr) PrintTask(loop);
     if (loop.is_checking()) PrintChecks(setup, loop);
     PrintSpeed(loop, result);
     if (!folder.empty()) fmt::print("log, summary and report in {}\n", folder);

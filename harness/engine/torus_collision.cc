@@ -15,7 +15,8 @@ mjfCollision original_box_mesh = nullptr;
 /// Tilt of a torus that lies flat, rad.
 constexpr double kFlat = 1e-3;
 
-/// Pose of the body, which is a torus's frame: the engine turns a mesh geom's own frame to the mesh's principal axes.
+/// Pose of the body, which is a torus's frame: the engine turns a mesh geom's own frame to the mesh's
+/// principal axes.
 Pose BodyPose(const mjModel& m, const mjData& d, int geom) {
   const int body = m.geom_bodyid[geom];
   Pose X = Pose::Identity();

@@ -1,7 +1,7 @@
 #pragma once
 
-// Exact contact between spheres and tori. The engine collides a mesh as its convex hull, which fills a torus's hole;
-// this narrow phase replaces that for mesh geoms marked as tori.
+// Exact contact between spheres and tori. The engine collides a mesh as its convex hull, which fills a
+// torus's hole; this narrow phase replaces that for mesh geoms marked as tori.
 
 #include <mujoco/mujoco.h>
 
@@ -11,9 +11,9 @@ namespace dexcheck {
 
 /// Sphere against torus at one place. A sphere near the axis can touch the tube on both sides of the hole.
 struct SphereTorusContact {
-  double distance;   ///< Between the surfaces, m; negative when they overlap.
-  Vector3d normal;   ///< From the sphere to the tube, in the torus's frame.
-  Vector3d position; ///< Midway between the surfaces, in the torus's frame, m.
+  double distance;    ///< Between the surfaces, m; negative when they overlap.
+  Vector3d normal;    ///< From the sphere to the tube, in the torus's frame.
+  Vector3d position;  ///< Midway between the surfaces, in the torus's frame, m.
 };
 
 /// Contacts nearer than `margin` between a sphere and a torus about the z axis of its frame, nearest first.
@@ -24,26 +24,27 @@ int CollideSphereTorus(const Vector3d& center, double sphere_radius, double ring
 
 /// Torus against box at one place of its ring.
 struct BoxTorusContact {
-  double distance;   ///< m; negative when they overlap.
-  Vector3d normal;   ///< From the box to the torus, in the box's frame.
-  Vector3d position; ///< Midway between the surfaces, in the box's frame, m.
+  double distance;    ///< m; negative when they overlap.
+  Vector3d normal;    ///< From the box to the torus, in the box's frame.
+  Vector3d position;  ///< Midway between the surfaces, in the box's frame, m.
 };
 
 /// Places of the ring at which a torus is held against a box.
 inline constexpr int kRingPlaces = 8;
 
-/// Contacts nearer than `margin` between a torus and a box. A torus is a ball rolled around its ring: the ball is
-/// collided at kRingPlaces, evenly spread from the place that is deepest in the box, or from the torus's x axis when it
-/// lies so flat that there is none. Exact for a torus on a face; an edge or corner between two places is missed.
+/// Contacts nearer than `margin` between a torus and a box. A torus is a ball rolled around its ring: the
+/// ball is collided at kRingPlaces, evenly spread from the place that is deepest in the box, or from the
+/// torus's x axis when it lies so flat that there is none. Exact for a torus on a face; an edge or corner
+/// between two places is missed.
 /// @param X_BT the torus, about its z axis, in the box's frame. @param half_size of the box, m.
 /// @return how many of `contacts` were filled.
 int CollideBoxTorus(const Pose& X_BT, double ring_radius, double tube_radius, const Vector3d& half_size,
                     double margin, BoxTorusContact contacts[kRingPlaces]);
 
-/// Makes the engine collide spheres and boxes with tori so, in the whole process; other meshes keep the engine's own
-/// functions.
-/// A mesh geom is a torus about its BODY's origin and z axis when the MJCF gives it user="RING_RADIUS TUBE_RADIUS"
-/// (with <size nuser_geom="2"/>). Safe to call more than once and from several threads.
+/// Makes the engine collide spheres and boxes with tori so, in the whole process; other meshes keep the
+/// engine's own functions. A mesh geom is a torus about its BODY's origin and z axis when the MJCF gives it
+/// user="RING_RADIUS TUBE_RADIUS" (with <size nuser_geom="2"/>). Safe to call more than once and from several
+/// threads.
 void InstallTorusCollision();
 
 /// Ring and tube radius of a geom marked as a torus; false for all others.

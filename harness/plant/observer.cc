@@ -33,6 +33,8 @@ Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, cons
     tip_geoms_.push_back(FindTipGeom(adapter.engine(), tip_sites_.back(), tip.name));
   }
   contacts_.resize(fingertips_.size());
+  M_qacc_.setZero(adapter.engine().nv);
+  constraint_force_.setZero(adapter.engine().nv);
 }
 
 Observer::BaseRates Observer::ReadBaseRates(const mjData& data) const {
@@ -199,6 +201,23 @@ Vector6d Observer::ReadSupportWrench(const Plant& plant, const Pose& X_Bo) const
     wrench.head<3>() += X_Bo.linear().transpose() * force;
     wrench.tail<3>() += X_Bo.linear().transpose() * arm.cross(force);
   }
+  return wrench;
+}
+
+Vector6d Observer::ReadSolverResidual(const Plant& plant, const Pose& X_Bo) {
+  const mjModel& m = plant.model();
+  const mjData& d = plant.data();
+  mj_mulM(&m, &d, M_qacc_.data(), d.qacc);
+  // Not qfrc_constraint, which the engine makes fit. The call uses the data's scratch space alone.
+  mj_mulJacTVec(&m, const_cast<mjData*>(&d), constraint_force_.data(), d.efc_force);
+  const int dof = m.jnt_dofadr[m.body_jntadr[adapter_->object_body()]];
+  const auto residual = [&](int i) {
+    return M_qacc_[dof + i] - d.qfrc_smooth[dof + i] - constraint_force_[dof + i];
+  };
+  // The free joint's forces: in the world, then about the body's axes.
+  Vector6d wrench;
+  wrench << X_Bo.linear().transpose() * Vector3d(residual(0), residual(1), residual(2)), residual(3),
+      residual(4), residual(5);
   return wrench;
 }
 

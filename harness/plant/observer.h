@@ -61,6 +61,10 @@ class Observer {
   /// Wrench on the object by all else than fingertips, Sigma_o, N and N m, after EndStep.
   [[nodiscard]] Vector6d ReadSupportWrench(const Plant& plant, const Pose& X_Bo) const;
 
+  /// What the engine's solver left over of its own equation of motion of the object, as a wrench like the one
+  /// above, after EndStep.
+  [[nodiscard]] Vector6d ReadSolverResidual(const Plant& plant, const Pose& X_Bo);
+
   /// The engine's contacts of the fingertips with their forces, after EndStep.
   [[nodiscard]] std::span<const EngineContact> ReadContacts(const Plant& plant);
 
@@ -84,6 +88,7 @@ class Observer {
   std::vector<int> tip_sites_;
   std::vector<int> tip_geoms_;
   std::vector<EngineContact> contacts_;
+  VectorXd M_qacc_, constraint_force_;  // nv
   std::vector<ContactCoordinates> bond_kappa_;
   std::vector<int> bond_constraints_;
   BaseDeparture departure_;

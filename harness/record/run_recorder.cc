@@ -60,6 +60,7 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
   AddStateSignals();
   AddObjectSignals();
   AddContactSignals();
+  AddTaskSignals();
   AddCheckSignals();
   log_.StartRows();
 }
@@ -199,6 +200,24 @@ void RunRecorder::AddContactSignals() {
     wheels.push_back(NameOf(setup_->engine(), mjOBJ_JOINT, wheel.joint));
   }
   if (!wheels.empty()) add_slip("wheel", "wheel", wheels, loop.checks().wheel_slip());
+}
+
+void RunRecorder::AddTaskSignals() {
+  if (loop_->task() == nullptr) return;
+  const ClosedLoop& loop = *loop_;
+  std::string phases;
+  for (int i = 0; i <= static_cast<int>(Phase::kDone); ++i) {
+    phases += (i > 0 ? ", " : "") + std::to_string(i) + " " + NameOf(static_cast<Phase>(i));
+  }
+  Add({"task/phase", "1", "phase of the task: " + phases, 1, {}, {}},
+      [&loop](std::span<double> row) { row[0] = static_cast<double>(loop.task()->phase()); });
+  Add({"task/contacts", "1", "fingertips that the law lets push, bit by bit", 1, {}, {}},
+      [&loop](std::span<double> row) { row[0] = loop.task()->demand().contacts; });
+  Add({"task/weight", "1", "part of the object's stated weight that the hand bears", 1, {}, {}},
+      [&loop](std::span<double> row) { row[0] = loop.task()->demand().weight; });
+  if (!loop.is_checking()) return;
+  Add({"task/support_force", "N", "upward force on the object by what it lies on", 1, {}, {}},
+      [&loop](std::span<double> row) { row[0] = loop.checks().support_force(); });
 }
 
 void RunRecorder::AddCheckSignals() {

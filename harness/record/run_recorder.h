@@ -37,6 +37,7 @@ class RunRecorder {
   void AddStateSignals();
   void AddObjectSignals();
   void AddContactSignals();
+  void AddTaskSignals();
   void AddCheckSignals();
 
   const ClosedLoop* loop_;

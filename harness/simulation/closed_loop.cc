@@ -61,9 +61,9 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check)
   if (scenario.task) {
     handling_ = std::make_unique<HandlingController>(setup.model(), setup.fingertips(), setup.object().body,
                                                      setup.surface(), controller_);
-    task_ = std::make_unique<PickAndPlace>(setup.model(), setup.hand(), setup.surface(),
-                                           setup.object().body, setup.q_start(),
-                                           scenario.task->pick_and_place, scenario.plant.time_step);
+    task_ = std::make_unique<PickAndPlace>(setup.model(), setup.hand(), setup.surface(), setup.object().body,
+                                           setup.q_start(), scenario.task->pick_and_place,
+                                           scenario.plant.time_step);
     return;
   }
   trajectory_ = MakeTrajectory(scenario, setup.X_start() + scenario.start_error);

@@ -29,6 +29,23 @@ Json ToJson(const CheckRecord& record) {
           {"pass", !record.failed}};
 }
 
+Json ToJson(const PickAndPlace& task, const ClosedLoop& loop) {
+  Json json = {{"done", task.is_done()},
+               {"attempts", task.history().empty() ? 0 : task.history().back().attempt},
+               {"first_failure", task.first_failure()},
+               {"weighed", task.scale()},
+               {"push_m", task.push()},
+               {"torque_jump_max_N_m", loop.torque_jump()},
+               {"force_closure_margin", task.plan().contacts.margin},
+               {"unjudged_steps", loop.checks().transient_steps()},
+               {"phases", Json::array()}};
+  for (const PhaseEntry& entry : task.history()) {
+    json["phases"].push_back(
+        {{"phase", NameOf(entry.phase)}, {"begin_s", entry.time}, {"attempt", entry.attempt}});
+  }
+  return json;
+}
+
 }  // namespace
 
 const char* NameOf(Verdict verdict) {
@@ -67,6 +84,7 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
                       {"position_error_rms_m", result.tracking.position_rms()},
                       {"orientation_error_max_rad", result.tracking.orientation_max()},
                       {"orientation_error_rms_rad", result.tracking.orientation_rms()}};
+  if (loop.task() != nullptr) json["task"] = ToJson(*loop.task(), loop);
   json["attribution"] = {{"cause", NameOf(result.attribution.cause)},
                          {"evidence", result.attribution.evidence},
                          {"checks", Json::object()}};

@@ -221,6 +221,7 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
       root.Get("control").Fail("orientation: must be \"rotation\" for a task");
     }
     scenario.task->pick_and_place.f_min = scenario.control.f_min;
+    scenario.task->pick_and_place.posture_frequency = scenario.control.posture_frequency;
     scenario.task->pick_and_place.plan.mu = scenario.control.mu;
   }
   if (const auto bounds = root.Find("bounds")) {

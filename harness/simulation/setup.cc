@@ -111,7 +111,7 @@ void Setup::VaryGrasp() {
     Pose& X_Bo = scenario_.task->X_Bo;
     X_Bo.translation().x() += draw(kVariedLay);
     X_Bo.translation().y() += draw(kVariedLay);
-    X_Bo.prerotate(Eigen::AngleAxisd(draw(kPi), Vector3d::UnitZ()));
+    X_Bo.linear() = Eigen::AngleAxisd(draw(kPi), Vector3d::UnitZ()) * X_Bo.linear();
     return;
   }
   GraspOptions& grasp = scenario_.grasp;

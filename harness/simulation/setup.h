@@ -44,7 +44,8 @@ class Setup {
   /// The hand that does the task; palm_frame -1 when the scenario is none.
   [[nodiscard]] const Hand& hand() const { return hand_; }
 
-  /// The posture that holds the object, or that a task begins in, and where the object is; X_o on the branch with beta > 0.
+  /// The posture that holds the object, or that a task begins in, and where the object is; X_o on the branch
+  /// with beta > 0.
   [[nodiscard]] const VectorXd& q_start() const { return q_start_; }
   [[nodiscard]] const Pose& X_Bo_start() const { return X_Bo_start_; }
   [[nodiscard]] const Vector6d& X_start() const { return X_start_; }
