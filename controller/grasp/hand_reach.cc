@@ -63,8 +63,10 @@ HandReach::HandReach(const RobotModel& model, std::span<const int> fingertips, i
   for (size_t i = 0; i < fingertips.size(); ++i) {
     const Frame& frame = model.frames()[static_cast<size_t>(fingertips[i])];
     if (!frame.sphere_radius) throw std::invalid_argument("fingertips: " + frame.name + " carries no sphere");
-    for (const int joint : own[i]) {
-      if (std::find(palm_chain.begin(), palm_chain.end(), joint) == palm_chain.end()) continue;
+    const std::vector<int> chain = ListChain(model, fingertips[i]);
+    const bool on_palm = std::includes(chain.begin(), chain.end(), palm_chain.begin(), palm_chain.end());
+    const bool is_free = std::find(palm_chain.begin(), palm_chain.end(), own[i].back()) == palm_chain.end();
+    if (!on_palm || !is_free) {
       throw std::invalid_argument("fingertips: " + frame.name + " does not hang on the palm with the others");
     }
     Finger finger{SerialChain(model, fingertips[i], own[i], q), *frame.sphere_radius, {}, {}, {}, {}, {}};
