@@ -77,8 +77,13 @@ class Planner {
 
   ContactPlan Plan() {
     constexpr size_t kMostRefined = 6;
+    constexpr size_t kMostMapped = 80;
+    std::vector<PalmPose> palms = search_.List();
+    const auto by_margin = [](const PalmPose& a, const PalmPose& b) { return a.arm_margin > b.arm_margin; };
+    std::stable_sort(palms.begin(), palms.end(), by_margin);
+    if (palms.size() > kMostMapped) palms.resize(kMostMapped);
     std::vector<MappedPose> poses;
-    for (const PalmPose& palm : search_.List()) Map(palm, &poses);
+    for (const PalmPose& palm : palms) Map(palm, &poses);
     Sort(&poses);
     const size_t best = std::min(poses.size(), kMostRefined);
     for (size_t k = 0; k < best; ++k) {

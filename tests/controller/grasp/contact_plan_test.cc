@@ -164,8 +164,8 @@ TEST_F(ContactPlanTest, HoldsTheTorusOfThePaperBetterThanHandPickedContacts) {
       Check(hand, GetTorus(), X_Bo, nominal, options, plan);
       const ForceClosureResult by_hand = CalcMargin(GetTorus(), hand_picked, mu);
       ASSERT_EQ(by_hand.status, ForceClosureStatus::kForceClosure);
-      // Measured: 1.4 to 1.7 times as large.
-      EXPECT_GT(plan.margin, 1.2 * by_hand.margin) << "side " << side << ", mu " << mu;
+      // Measured: twice as large.
+      EXPECT_GT(plan.margin, 1.5 * by_hand.margin) << "side " << side << ", mu " << mu;
     }
   }
 }
