@@ -2,6 +2,7 @@
 
 // Where a hand should hold an object: contact points chosen by force closure and reach.
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -33,10 +34,13 @@ struct ContactPlanOptions {
   double joint_margin = 0.05;  ///< Distance that the joints keep from the ends of their ranges, rad or m.
   double comfort =
       0.1;  ///< Joint margin, rad or m, at which a force-closure margin counts half; 0: whole always.
+  double opening = 0.01;   ///< How far the fingers can open from their contacts along the normals, m.
   double room = 0.02;      ///< Free way of each fingertip out from the object along the normal, m.
   double spacing = 0.002;  ///< Between the fingers, m.
   /// Fingers count as tubes with this share of their fingertips' radius; the model has no other size of them.
   double finger_thickness = 0.8;
+  double half_length =
+      std::numeric_limits<double>::infinity();  ///< Contacts have |z| <= this in the object, m.
   std::optional<SupportPlane> support;
   /// With a support: largest angle between a contact's normal and the support plane, rad. A steeper contact
   /// would press the object down.
@@ -53,7 +57,7 @@ struct ContactPlan {
   std::string problem;                 ///< Why nothing was found.
   std::vector<SurfacePoint> contacts;  ///< On the object, one for each fingertip.
   VectorXd q;                          ///< q' with arm and fingers solved: all fingertips touch.
-  VectorXd q_open;                     ///< The same with the fingertips `room` away along the normals.
+  VectorXd q_open;                     ///< The same with the fingertips `opening` away along the normals.
   double margin = 0.0;                 ///< Of force closure per newton of normal force, a lower bound.
   double joint_margin = 0.0;     ///< Smallest distance of a moved joint from the ends of its range, rad or m.
   Pose X_oP = Pose::Identity();  ///< Palm frame in the object.
@@ -67,11 +71,12 @@ std::vector<int> ListArmJoints(const RobotModel& model, std::span<const int> fin
 ///
 /// The palm is tried with its z axis towards the object from directions all around, or from above a support,
 /// at several roll angles and distances, as far as the arm reaches. There each finger's joints give a map of
-/// the points that it can touch: fingertip on the surface, room to come from, the rest of the finger outside
+/// the points that it can touch: fingertip on the surface, room to come from and
+/// joints to open with, the rest of the finger outside
 /// the object and above the support, joints in their ranges. Of the maps the contacts with the largest margin
-/// of force closure are taken (coordinate ascent from many starts), and refined in ever smaller steps. Among
-/// plans whose margins differ by little the one with the largest joint margin wins. What is not tested: arm
-/// and palm against the object or the robot itself. Deterministic.
+/// of force closure, weighted by the joint margin, are taken (coordinate ascent from many starts), and
+/// refined in ever smaller steps. What is not tested: arm and palm against the object or the robot itself.
+/// Deterministic.
 ///
 /// @param X_Bo object in the world. @param q_nominal q': joints that are not moved, and the arm posture to
 /// stay near to. @throws std::invalid_argument for frames, joints or options that cannot be used.

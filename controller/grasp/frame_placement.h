@@ -12,7 +12,7 @@ namespace dexcheck {
 struct FramePlacementOptions {
   double tolerance = 1e-13;   ///< Largest distance, m, and largest angle, rad, from the pose.
   int max_iterations = 100;   ///< From each start.
-  int num_starts = 12;        ///< q itself, q_nominal, then postures spread over the ranges; at least 1.
+  int num_starts = 64;        ///< q itself, q_nominal, then postures spread over the ranges; at least 1.
   double joint_margin = 0.0;  ///< Distance that the joints keep from the ends of their ranges, rad or m.
   double length = 0.2;        ///< While searching, an error of one radian counts as this many m.
 };

@@ -63,8 +63,10 @@ HandReach::HandReach(const RobotModel& model, std::span<const int> fingertips, i
   for (size_t i = 0; i < fingertips.size(); ++i) {
     const Frame& frame = model.frames()[static_cast<size_t>(fingertips[i])];
     if (!frame.sphere_radius) throw std::invalid_argument("fingertips: " + frame.name + " carries no sphere");
-    for (const int joint : own[i]) {
-      if (std::find(palm_chain.begin(), palm_chain.end(), joint) == palm_chain.end()) continue;
+    const std::vector<int> chain = ListChain(model, fingertips[i]);
+    const bool on_palm = std::includes(chain.begin(), chain.end(), palm_chain.begin(), palm_chain.end());
+    const bool is_free = std::find(palm_chain.begin(), palm_chain.end(), own[i].back()) == palm_chain.end();
+    if (!on_palm || !is_free) {
       throw std::invalid_argument("fingertips: " + frame.name + " does not hang on the palm with the others");
     }
     Finger finger{SerialChain(model, fingertips[i], own[i], q), *frame.sphere_radius, {}, {}, {}, {}, {}};
@@ -100,20 +102,29 @@ std::optional<Touch> HandReach::FindTouch(size_t finger_index, const Surface& ob
   const Finger& finger = fingers_[finger_index];
   const SurfaceGeometry surface = object.Evaluate(alpha);
   const Vector3d n = surface.R.col(2);
+  if (std::abs(surface.p.z()) > clearance.half_length) return {};
+  // The fingertip must come from somewhere.
+  const double away = finger.radius + clearance.room;
   if (clearance.above) {
     const double slope = clearance.above->normal.dot(X_Po.linear() * n);
     if (std::abs(slope) > std::sin(clearance.steepest)) return {};
+    const double height = clearance.above->CalcHeight(X_Po * Vector3d(surface.p + away * n));
+    if (height < finger.radius + clearance.support) return {};
   }
-  // The fingertip must come from somewhere.
-  const double away = finger.radius + clearance.room;
   if (CalcDistance(object, surface.p + away * n) < kNearlyAll * away) return {};
 
-  Pose X = Pose::Identity();
-  X.translation() = X_Po * Vector3d(surface.p + finger.radius * n);
-  const double rounding_free = 1e-10;  // m
-  const ChainSolution solution = SolveChain(finger.chain, {X, 0.0, rounding_free, 40}, finger.lower,
-                                            finger.upper, q_start, finger.middle);
+  const auto solve = [&](double distance, const VectorXd& start) {
+    constexpr double kTolerance = 1e-10;  // m
+    constexpr int kMaxIterations = 40;
+    Pose X = Pose::Identity();
+    X.translation() = X_Po * Vector3d(surface.p + distance * n);
+    return SolveChain(finger.chain, {X, 0.0, kTolerance, kMaxIterations}, finger.lower, finger.upper, start,
+                      finger.middle);
+  };
+  const ChainSolution solution = solve(finger.radius, q_start);
   if (!solution.reached) return {};
+  const ChainSolution open = solve(finger.radius + clearance.opening, solution.q);
+  if (!open.reached) return {};
 
   Touch touch;
   SerialChain::Poses poses;
@@ -134,6 +145,7 @@ std::optional<Touch> HandReach::FindTouch(size_t finger_index, const Surface& ob
   R << surface.R.col(0), -surface.R.col(1), -n;
   touch.G << R, Skew(surface.p) * R;
   touch.q = solution.q;
+  touch.q_open = open.q;
   touch.joint_margin = CalcRangeMargin(solution.q, finger.chain.lower(), finger.chain.upper());
   return touch;
 }

@@ -2,6 +2,7 @@
 
 // Where the fingers of a hand can touch an object. Internal to controller/grasp.
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -25,11 +26,12 @@ struct HalfSpace {
 
 /// What the fingers keep clear of. Fingers count as tubes as thick as `thickness` times their fingertips.
 struct HandClearance {
-  double joint_margin = 0.0;  // rad or m, from the ends of ranges
   double thickness = 0.8;
-  double spacing = 0.0;            // m, between fingers
-  double room = 0.0;               // m, free way of a fingertip out from the object along its normal
-  double support = 0.0;            // m, between fingers and the support
+  double spacing = 0.0;  // m, between fingers
+  double room = 0.0;     // m, free way of a fingertip out from the object along its normal
+  double opening = 0.0;  // m, that a finger can open along the normal
+  double half_length = std::numeric_limits<double>::infinity();  // m, of contacts along the object's z
+  double support = 0.0;                                          // m, between fingers and the support
   double steepest = 0.0;           // rad, of contacts' normals above the support
   std::optional<HalfSpace> above;  // in the palm frame
 };
@@ -39,6 +41,7 @@ struct Touch {
   SurfacePoint alpha;
   Eigen::Matrix<double, 6, 3> G;  // its columns of the grasp map, object frame
   VectorXd q;                     // the finger's own joints
+  VectorXd q_open;                // with the fingertip moved out along the normal
   std::vector<Vector3d> points;   // along the finger in the palm frame, the fingertip's centre last
   double joint_margin = 0.0;      // smallest distance from the ends of ranges
   VectorXd supports;              // see TouchChooser

@@ -107,6 +107,8 @@ void SerialChain::Scatter(const Eigen::Ref<const VectorXd>& q_own, Eigen::Ref<Ve
 
 namespace {
 
+constexpr double kLargestStep = 0.3;  // rad or m
+
 /// One chain on its way to one target of three or six equations.
 template <int kRows>
 class ChainSolver {
@@ -134,7 +136,6 @@ class ChainSolver {
       CalcStep(q_nominal, pull);
       if (!HoldJointsAtEnds()) break;
     }
-    constexpr double kLargestStep = 0.3;  // rad or m
     const double largest = step_.cwiseAbs().maxCoeff();
     if (largest > kLargestStep) step_ *= kLargestStep / largest;
     const VectorXd before = result_.q;
@@ -218,22 +219,31 @@ template <int kRows>
 ChainSolution Solve(ChainSolver<kRows> solver, int max_iterations, const VectorXd& q_nominal) {
   // First with the pull, until the posture settles; a chain that comes no nearer gives up.
   constexpr double kPull = 0.7;
-  constexpr double kSettled = 3e-3;   // rad or m
+  constexpr double kLeastPull = 0.1;
+  constexpr double kSettled = 5e-3;   // rad or m, of the whole pull
   constexpr double kNear = 1e-3;      // m
+  constexpr double kFar = 0.03;       // m; less may come from a long way along the pull
   constexpr double kStagnant = 1e-5;  // rad or m
   constexpr double kProgress = 0.98;
+  constexpr double kContraction = 0.8;
+  constexpr double kSwing = 0.9 * kLargestStep;
   constexpr int kPatience = 10;
   int iteration = 0;
   double best = solver.error();
   int since_best = 0;
+  double pull = kPull;
+  double last_moved = std::numeric_limits<double>::infinity();
   for (; iteration < max_iterations; ++iteration) {
-    const double moved = solver.Step(&q_nominal, kPull);
-    if (solver.error() < kNear && moved < kSettled) break;
+    const double moved = solver.Step(&q_nominal, pull);
+    if (solver.error() < kNear && moved < kSettled * pull) break;
+    // Across a strongly curved set of solutions a full pull swings to and fro.
+    if (moved > kContraction * last_moved && moved < kSwing) pull = std::max(0.5 * pull, kLeastPull);
+    last_moved = moved;
     if (moved < kStagnant) break;
     if (solver.error() < kProgress * best) {
       best = solver.error();
       since_best = 0;
-    } else if (solver.error() > kNear && ++since_best >= kPatience) {
+    } else if (solver.error() > kFar && ++since_best >= kPatience) {
       break;
     }
   }

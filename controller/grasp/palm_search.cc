@@ -1,0 +1,160 @@
+#include "controller/grasp/palm_search.h"
+
+#include <algorithm>
+#include <array>
+
+#include "controller/common/errors.h"
+#include "controller/grasp/spread_points.h"
+
+namespace dexcheck::grasp_internal {
+namespace {
+
+constexpr int kRolls = 12;
+constexpr std::array<double, 5> kDistances = {0.7, 0.55, 0.62, 0.78, 0.86};  // of the fingers' length
+
+double CalcHeight(const SupportPlane& support, const Vector3d& p) {
+  return support.normal.dot(p) - support.height;
+}
+
+/// Where the palm's z axis may point: down on a support, with up to 50 degrees of tilt, or anywhere.
+std::vector<Vector3d> ListDirections(const Pose& X_Bo, const ContactPlanOptions& options) {
+  std::vector<Vector3d> directions;
+  if (options.support) {
+    constexpr std::array<double, 2> kTilts = {DegToRad(25.0), DegToRad(50.0)};
+    constexpr int kAzimuths = 8;
+    const Vector3d down = -options.support->normal;
+    const Vector3d side = down.unitOrthogonal();
+    directions.push_back(down);
+    for (const double tilt : kTilts) {
+      for (int k = 0; k < kAzimuths; ++k) {
+        const Vector3d axis = Eigen::AngleAxisd(2.0 * kPi * k / kAzimuths, down) * side;
+        directions.emplace_back(Eigen::AngleAxisd(tilt, axis) * down);
+      }
+    }
+    return directions;
+  }
+  // Along the object's axes and halfway between them.
+  for (int x = -1; x <= 1; ++x) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int z = -1; z <= 1; ++z) {
+        if (x == 0 && y == 0 && z == 0) continue;
+        directions.emplace_back(X_Bo.linear() * Vector3d(x, y, z).normalized());
+      }
+    }
+  }
+  return directions;
+}
+
+}  // namespace
+
+PalmSearch::PalmSearch(const RobotModel& model, const Hand& hand, const HandReach& reach,
+                       const Surface& object, const Pose& X_Bo, const Eigen::Ref<const VectorXd>& q_nominal,
+                       const ContactPlanOptions& options)
+    : reach_(reach),
+      object_(object),
+      options_(options),
+      X_Bo_(X_Bo),
+      arm_(model, hand.palm_frame, hand.arm_joints, q_nominal),
+      lower_(arm_.lower().array() + options.joint_margin),
+      upper_(arm_.upper().array() - options.joint_margin),
+      nominal_(arm_.Gather(q_nominal)) {
+  Require((lower_.array() <= upper_.array()).all(), "joint_margin", "must leave each joint a range",
+          options.joint_margin);
+}
+
+Pose PalmSearch::CalcPalmPose(const Vector3d& direction, double roll, double distance) const {
+  // From the nominal orientation by the shortest way to the direction, then about it.
+  SerialChain::Poses poses;
+  arm_.CalcPoses(nominal_, &poses);
+  const Matrix3d R_nominal = poses.frame.linear();
+  const Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(R_nominal.col(2), direction).toRotationMatrix();
+  Pose X_BP = Pose::Identity();
+  X_BP.linear() = Eigen::AngleAxisd(roll, direction) * turn * R_nominal;
+  const Vector3d& center = reach_.center();
+  const Vector3d p_Po(center.x(), center.y(), center.z() + distance * reach_.length());
+  X_BP.translation() = X_Bo_.translation() - X_BP.linear() * p_Po;
+  return X_BP;
+}
+
+bool PalmSearch::IsPalmClear(const Pose& X_BP) const {
+  const Pose X_oP = X_Bo_.inverse() * X_BP;
+  std::vector<Vector3d> points = reach_.bases();
+  points.push_back(reach_.center());
+  points.emplace_back(Vector3d::Zero());
+  return std::all_of(points.begin(), points.end(), [&](const Vector3d& p) {
+    return CalcDistance(object_, X_oP * p) >= reach_.radius(0) &&
+           (!options_.support ||
+            CalcHeight(*options_.support, X_BP * p) >= reach_.radius(0) + options_.clearance);
+  });
+}
+
+bool PalmSearch::IsArmClear(const VectorXd& q_arm) const {
+  if (!options_.support) return true;
+  SerialChain::Poses poses;
+  arm_.CalcPoses(q_arm, &poses);
+  return std::all_of(poses.links.begin(), poses.links.end(), [&](const Pose& link) {
+    return CalcHeight(*options_.support, link.translation()) >= options_.arm_clearance;
+  });
+}
+
+ChainSolution PalmSearch::SolveArm(const Pose& X_BP, const VectorXd& q_start) const {
+  constexpr double kLength = 0.2;       // m
+  constexpr double kTolerance = 1e-12;  // m, rad
+  constexpr int kMaxIterations = 60;
+  return SolveChain(arm_, {X_BP, kLength, kTolerance, kMaxIterations}, lower_, upper_, q_start, nominal_);
+}
+
+void PalmSearch::Try(const Pose& X_BP, const std::vector<VectorXd>& starts, std::vector<PalmPose>* poses) {
+  ++tally_.tried;
+  if (!IsPalmClear(X_BP)) {
+    ++tally_.blocked;
+    return;
+  }
+  bool reached = false;
+  for (const VectorXd& start : starts) {
+    const ChainSolution solution = SolveArm(X_BP, start);
+    tally_.nearest_miss = std::min(tally_.nearest_miss, solution.position);
+    if (!solution.reached) continue;
+    reached = true;
+    if (!IsArmClear(solution.q)) continue;
+    poses->push_back({X_BP, solution.q, CalcRangeMargin(solution.q, arm_.lower(), arm_.upper())});
+    return;
+  }
+  ++(reached ? tally_.arm_blocked : tally_.missed);
+}
+
+std::vector<PalmPose> PalmSearch::List() {
+  constexpr int kExtraStarts = 2;
+  std::vector<PalmPose> poses;
+  for (const Vector3d& direction : ListDirections(X_Bo_, options_)) {
+    for (int roll = 0; roll < kRolls; ++roll) {
+      std::vector<VectorXd> starts;
+      if (!poses.empty()) starts.push_back(poses.back().q_arm);
+      starts.push_back(nominal_);
+      for (int k = 1; k <= kExtraStarts; ++k) starts.push_back(CalcSpreadPoint(k, lower_, upper_));
+      Try(CalcPalmPose(direction, 2.0 * kPi * roll / kRolls, kDistances.front()), starts, &poses);
+    }
+  }
+  return poses;
+}
+
+std::vector<PalmPose> PalmSearch::ListOtherDistances(const PalmPose& pose) {
+  std::vector<PalmPose> poses;
+  for (size_t k = 1; k < kDistances.size(); ++k) {
+    Pose X_BP = pose.X_BP;
+    X_BP.translation() -= (kDistances[k] - kDistances.front()) * reach_.length() * X_BP.linear().col(2);
+    Try(X_BP, {pose.q_arm}, &poses);
+  }
+  return poses;
+}
+
+bool PalmSearch::ReachesBeyond(const PalmPose& pose) const {
+  return std::all_of(options_.reaches.begin(), options_.reaches.end(), [&](const Vector3d& displacement) {
+    Pose X_BP = pose.X_BP;
+    X_BP.translation() += displacement;
+    const ChainSolution solution = SolveArm(X_BP, pose.q_arm);
+    return solution.reached && IsArmClear(solution.q);
+  });
+}
+
+}  // namespace dexcheck::grasp_internal
