@@ -77,6 +77,7 @@ class StepChecks {
     kKappa,
     kBaseTilt,
     kIdleJoints,
+    kJointRange,
     kActuators,
     kCheckCount
   };
@@ -86,6 +87,7 @@ class StepChecks {
   void CompareDynamics(const GraspController& controller, const MeasuredState& state,
                        const Eigen::Ref<const VectorXd>& tau);
   void ReadSlip(const Plant& plant, const MeasuredState& state);
+  void CheckJointRanges(const MeasuredState& state);
   void CompareKappa(const GraspController& controller, const MeasuredState& state, double dt);
 
   const Setup* setup_;

@@ -145,8 +145,8 @@ TEST(ShippedScenarios, TwoHandsRaiseTiltAndTurn) {
   EXPECT_NEAR(CalcLean(end) - CalcLean(start), DegToRad(30.0), 1e-6);
   // Turn and tilt, both about axes that the tilt's does not leave the horizontal plane with.
   const double turn = run.loop().desired().X_d[3] - run.setup().X_start()[3];
-  EXPECT_GT(turn, 0.7);
-  EXPECT_GT(run.loop().state().q[2], 0.6);  // so does the platform
+  EXPECT_LT(turn, -0.7);
+  EXPECT_LT(run.loop().state().q[2], -0.6);  // so does the platform
   const Matrix3d R = end.linear() * start.linear().transpose();
   const Vector3d tilt = LogSo3(R * Eigen::AngleAxisd(-turn, Vector3d::UnitZ()).toRotationMatrix());
   EXPECT_NEAR(tilt.z(), 0.0, 1e-6);
