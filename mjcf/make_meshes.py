@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Writes assets/*.msh: the torus and the robot's fairings (standard library only).
+"""Writes assets/*.msh: the tori and the robot's fairings (standard library only).
 
-torus.msh is sampled from the torus that torus.xml describes; vertex (i, j), u = 2 pi i / N_U, v = 2 pi j / N_V, is
+torus.msh and ring.msh are sampled from the tori that torus.xml and ring.xml describe; vertex (i, j), u = 2 pi i / N_U,
+v = 2 pi j / N_V, is
 
-    p(u, v) = [(R + r cos v) cos u, (R + r cos v) sin u, r sin v],   R = 35 mm, r = 11 mm.
+    p(u, v) = [(R + r cos v) cos u, (R + r cos v) sin u, r sin v].
 
-Both counts are multiples of four, so that the outer and inner equators, the top and the bottom circle are hit exactly.
+The counts are multiples of four, so that the outer and inner equators, the top and the bottom circle are hit exactly.
 
 A fairing is a loft of superellipses |(x - c)/a|^n + |y/b|^n = 1 along z, with a, b, c Catmull-Rom curves through the
 stations below and flat ends. Fairings are looks: they have no mass and no contacts. All lengths are in metres.
@@ -18,9 +19,8 @@ import math
 import pathlib
 import struct
 
-TORUS_RING_RADIUS = 0.035
-TORUS_TUBE_RADIUS = 0.011
-TORUS_N_U, TORUS_N_V = 64, 24
+# name: (R, r, N_U, N_V)
+TORI = {"torus": (0.035, 0.011, 64, 24), "ring": (0.25, 0.04, 96, 32)}
 
 # name: (exponent n, points around, stations (z, a, b, c) from the lowest up); frame: the body that carries it.
 FAIRINGS = {
@@ -60,21 +60,21 @@ FAIRINGS = {
 POINTS_PER_SPAN = 3
 
 
-def torus_mesh():
+def torus_mesh(ring_radius, tube_radius, n_u, n_v):
     """Returns vertices and triangles (0-based, counter-clockwise seen from outside)."""
     vertices, faces = [], []
-    for i in range(TORUS_N_U):
-        u = 2 * math.pi * i / TORUS_N_U
-        for j in range(TORUS_N_V):
-            v = 2 * math.pi * j / TORUS_N_V
-            rho = TORUS_RING_RADIUS + TORUS_TUBE_RADIUS * math.cos(v)
-            vertices.append((rho * math.cos(u), rho * math.sin(u), TORUS_TUBE_RADIUS * math.sin(v)))
+    for i in range(n_u):
+        u = 2 * math.pi * i / n_u
+        for j in range(n_v):
+            v = 2 * math.pi * j / n_v
+            rho = ring_radius + tube_radius * math.cos(v)
+            vertices.append((rho * math.cos(u), rho * math.sin(u), tube_radius * math.sin(v)))
 
     def index(i, j):
-        return i % TORUS_N_U * TORUS_N_V + j % TORUS_N_V
+        return i % n_u * n_v + j % n_v
 
-    for i in range(TORUS_N_U):
-        for j in range(TORUS_N_V):
+    for i in range(n_u):
+        for j in range(n_v):
             a, b, c, d = index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)
             faces += [(a, b, c), (a, c, d)]
     return vertices, faces
@@ -127,7 +127,8 @@ def write_msh(path, vertices, faces):
 def main():
     folder = pathlib.Path(__file__).parent / "assets"
     folder.mkdir(exist_ok=True)
-    write_msh(folder / "torus.msh", *torus_mesh())
+    for name, numbers in TORI.items():
+        write_msh(folder / f"{name}.msh", *torus_mesh(*numbers))
     for name, (exponent, n_around, stations) in FAIRINGS.items():
         write_msh(folder / f"{name}.msh", *loft_mesh(exponent, n_around, stations))
 

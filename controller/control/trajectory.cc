@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "controller/common/errors.h"
 
@@ -201,6 +202,22 @@ DesiredMotion WayPointTrajectory::Evaluate(double t) const {
   motion.X_d_dot = (v0 + u * (a0 + u * (3.0 * c3 + u * (4.0 * c4 + u * (5.0 * c5))))) / h;
   motion.X_d_ddot = (a0 + u * (6.0 * c3 + u * (12.0 * c4 + u * (20.0 * c5)))) / (h * h);
   return motion;
+}
+
+SumTrajectory::SumTrajectory(const Vector6d& X_start, std::vector<std::unique_ptr<Trajectory>> parts)
+    : X_start_(X_start), parts_(std::move(parts)) {
+  Require(!parts_.empty(), "number of parts", "must be positive", 0.0);
+}
+
+DesiredMotion SumTrajectory::Evaluate(double t) const {
+  DesiredMotion sum{X_start_, Vector6d::Zero(), Vector6d::Zero()};
+  for (const std::unique_ptr<Trajectory>& part : parts_) {
+    const DesiredMotion motion = part->Evaluate(t);
+    sum.X_d += motion.X_d;
+    sum.X_d_dot += motion.X_d_dot;
+    sum.X_d_ddot += motion.X_d_ddot;
+  }
+  return sum;
 }
 
 }  // namespace dexcheck

@@ -154,4 +154,17 @@ class WayPointTrajectory final : public Trajectory {
   std::vector<Knot> knots_;
 };
 
+/// X_start + the displacements of all parts. Coordinates add: with a planar path a displacement of beta
+/// tilts the object about a horizontal axis that turns with the path.
+class SumTrajectory final : public Trajectory {
+ public:
+  /// @param parts each with X_start = 0. @throws std::invalid_argument without parts.
+  SumTrajectory(const Vector6d& X_start, std::vector<std::unique_ptr<Trajectory>> parts);
+  [[nodiscard]] DesiredMotion Evaluate(double t) const override;
+
+ private:
+  Vector6d X_start_;
+  std::vector<std::unique_ptr<Trajectory>> parts_;
+};
+
 }  // namespace dexcheck

@@ -5,7 +5,7 @@
 namespace dexcheck {
 namespace {
 
-enum class Type { kLine, kPointToPoint, kOscillation, kWeave, kCircle, kWayPoints };
+enum class Type { kLine, kPointToPoint, kOscillation, kWeave, kCircle, kWayPoints, kSum };
 
 // [linear under one key; angles under another, rad or degrees], 0 where a key is missing.
 Vector6d ReadCoordinates(TomlTable& table, std::string_view linear, const std::string& angular) {
@@ -64,13 +64,25 @@ std::vector<WayPoint> ReadWayPoints(TomlTable& table) {
   return points;
 }
 
+std::vector<std::unique_ptr<Trajectory>> ReadParts(TomlTable& table) {
+  std::vector<std::unique_ptr<Trajectory>> parts;
+  const TomlValue list = table.Get("parts");
+  for (const TomlValue& entry : list.AsList()) {
+    TomlTable part = entry.AsTable();
+    parts.push_back(ReadTrajectory(part, Vector6d::Zero()));
+  }
+  if (parts.empty()) list.Reject("needs at least one part");
+  return parts;
+}
+
 std::unique_ptr<Trajectory> ReadByType(TomlTable& table, const Vector6d& X_start) {
   const Type type = table.Get("type").AsChoice<Type>({{"line", Type::kLine},
                                                       {"point_to_point", Type::kPointToPoint},
                                                       {"oscillation", Type::kOscillation},
                                                       {"weave", Type::kWeave},
                                                       {"circle", Type::kCircle},
-                                                      {"way_points", Type::kWayPoints}});
+                                                      {"way_points", Type::kWayPoints},
+                                                      {"sum", Type::kSum}});
   switch (type) {
     case Type::kLine:
       return std::make_unique<LineTrajectory>(X_start, ReadCoordinates(table, "velocity", "turning"),
@@ -94,6 +106,8 @@ std::unique_ptr<Trajectory> ReadByType(TomlTable& table, const Vector6d& X_start
     }
     case Type::kWayPoints:
       return std::make_unique<WayPointTrajectory>(X_start, ReadWayPoints(table));
+    case Type::kSum:
+      return std::make_unique<SumTrajectory>(X_start, ReadParts(table));
   }
   return nullptr;
 }

@@ -15,6 +15,7 @@ namespace dexcheck {
 ///   weave           heading, speed, ramp_time, amplitude, wavelength
 ///   circle          heading, speed, ramp_time, radius
 ///   way_points      points = [{ time, xyz = [3], zyz = [3] }, ..]
+///   sum             parts = [{ type, .. }, ..], whose displacements add
 ///
 /// xyz and zyz are displacements or amplitudes against X_start. Optional: velocity, turning, xyz, zyz,
 /// heading and ramp_time, 0 unless given.

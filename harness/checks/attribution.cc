@@ -42,22 +42,28 @@ struct Evidence {
 
 // Sliding before giving before tilting: a tyre that spins also tilts the platform.
 constexpr Evidence kEvidence[] = {
-    {"actuator_effort", Cause::kActuatorLimit}, {"cone_use", Cause::kFingertipSlip},
-    {"traction_use", Cause::kWheelSlip},        {"contacts_lost", Cause::kFingertipSlip},
-    {"penetration", Cause::kContactSoftness},   {"fingertip_slip", Cause::kContactSoftness},
-    {"wheel_slip", Cause::kContactSoftness},    {"base_tilt", Cause::kTilt},
+    {"actuator_effort", Cause::kActuatorLimit},
+    {"joint_range", Cause::kJointStop},
+    {"cone_use", Cause::kFingertipSlip},
+    {"traction_use", Cause::kWheelSlip},
+    {"contacts_lost", Cause::kFingertipSlip},
+    {"penetration", Cause::kContactSoftness},
+    {"fingertip_slip", Cause::kContactSoftness},
+    {"wheel_slip", Cause::kContactSoftness},
+    {"base_tilt", Cause::kTilt},
 };
 
-constexpr bool IsSliding(Cause cause) {
-  return cause == Cause::kActuatorLimit || cause == Cause::kFingertipSlip || cause == Cause::kWheelSlip;
+constexpr bool IsDecisive(Cause cause) {
+  return cause == Cause::kActuatorLimit || cause == Cause::kJointStop || cause == Cause::kFingertipSlip ||
+         cause == Cause::kWheelSlip;
 }
 
 /// The evidence that came first among those of the strongest sort.
 const RunCheck* FindFirst(std::span<const RunCheck> steps, Cause* cause) {
   const RunCheck* first = nullptr;
-  for (const bool sliding : {true, false}) {
+  for (const bool decisive : {true, false}) {
     for (const Evidence& evidence : kEvidence) {
-      if (IsSliding(evidence.cause) != sliding) continue;
+      if (IsDecisive(evidence.cause) != decisive) continue;
       const RunCheck* check = Find(steps, evidence.check);
       if (check == nullptr || !check->failed) continue;
       if (first != nullptr && check->failed_at >= first->failed_at) continue;
@@ -73,6 +79,7 @@ const RunCheck* FindFirst(std::span<const RunCheck> steps, Cause* cause) {
 Cause AttributeOne(const RunCheck& check, Cause run, std::span<const RunCheck> steps) {
   if (check.kind == CheckKind::kModel || run == Cause::kModel) return Cause::kModel;
   if (check.name == "actuator_effort") return Cause::kActuatorLimit;
+  if (check.name == "joint_range") return Cause::kJointStop;
   if (check.name == "wheel_slip" || check.name == "traction_use") {
     return Failed(steps, "traction_use") ? Cause::kWheelSlip : Cause::kContactSoftness;
   }
@@ -93,6 +100,8 @@ const char* NameOf(Cause cause) {
       return "model";
     case Cause::kActuatorLimit:
       return "actuator limit";
+    case Cause::kJointStop:
+      return "joint stop";
     case Cause::kFingertipSlip:
       return "fingertip slip";
     case Cause::kWheelSlip:

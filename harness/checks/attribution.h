@@ -16,6 +16,7 @@ enum class Cause {
   kNone,
   kModel,            ///< The two descriptions differ: constants, kinematics, dynamics, contact geometry.
   kActuatorLimit,    ///< A motor could not give its torque.
+  kJointStop,        ///< A joint reached the end of its range.
   kFingertipSlip,    ///< A fingertip slides: its force is at the edge of the friction cone.
   kWheelSlip,        ///< A wheel slides: assumption (1), rolling without slipping.
   kContactSoftness,  ///< Contacts give or creep without sliding.

@@ -48,6 +48,8 @@ StepChecks::StepChecks(const Setup& setup)
          "movement since t = 0 of joints that do not carry the object");
   Define(kSolver, "solver", kAssumption, "1", 1e-5,
          "what the engine's solver left over of its own equation of motion of the object, as balance_object");
+  Define(kJointRange, "joint_range", kAssumption, "rad", 0.0,
+         "how far a joint is beyond its range, where a stop pushes that the model does not have");
   Define(kActuators, "actuator_effort", kAssumption, "1", 1.0, "|tau'| over the motor's limit");
   // A bond neither slides nor rolls, nor does it care for friction.
   if (!setup.bonds().empty()) {
@@ -157,6 +159,7 @@ void StepChecks::Compare(const Plant& plant, const GraspController& controller, 
     idle = std::max(idle, std::abs(q - start));
   }
   Add(kIdleJoints, idle);
+  CheckJointRanges(state);
   int worst = -1;
   Add(kActuators, plant.CalcEffort(tau, &worst));
   ++steps_;
@@ -293,6 +296,24 @@ void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
   }
   Add(kWheelSlip, slipped);
   Add(kTractionUse, cone_use);
+}
+
+void StepChecks::CheckJointRanges(const MeasuredState& state) {
+  const std::vector<Joint>& joints = setup_->model().joints();
+  const int offset = setup_->model().num_base_positions();
+  double beyond = 0.0;
+  size_t farthest = 0;
+  for (size_t i = 0; i < joints.size(); ++i) {
+    const double q = state.q[offset + static_cast<int>(i)];
+    const double over = std::max(q - joints[i].upper, joints[i].lower - q);
+    if (over <= beyond) continue;
+    beyond = over;
+    farthest = i;
+  }
+  if (beyond > 0.0 && !checks_[kJointRange].failed) {
+    checks_[kJointRange].where = "joint " + Quote(joints[farthest].name);
+  }
+  Add(kJointRange, beyond);
 }
 
 void StepChecks::CompareKappa(const GraspController& controller, const MeasuredState& state, double dt) {

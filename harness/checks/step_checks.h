@@ -102,6 +102,7 @@ class StepChecks {
     kBaseTilt,
     kIdleJoints,
     kSolver,
+    kJointRange,
     kActuators,
     kCheckCount
   };
@@ -124,6 +125,7 @@ class StepChecks {
   void ForgetSlip();
   /// Of the object, N.
   [[nodiscard]] double Weight() const;
+  void CheckJointRanges(const MeasuredState& state);
   void CompareKappa(const GraspController& controller, const MeasuredState& state, double dt);
 
   const Setup* setup_;

@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/contact/find_contact.h"
 #include "controller/contact/object_surface.h"
-#include "controller/grasp/finger_placement.h"
 #include "controller/model/parameter_reader.h"
 #include "controller/object/euler_zyz.h"
 
@@ -20,12 +18,19 @@ constexpr double kStartPenetration = 1e-6;
 
 // How far a seed moves the grasp, either way.
 constexpr double kVariedJoint = DegToRad(2.0);    // rad
-constexpr double kVariedContact = DegToRad(3.0);  // rad
+constexpr double kVariedContact = DegToRad(3.0);  // rad on the object,
+constexpr double kFarthestContact = 2.5e-3;       // but not farther than this along it, m
 constexpr double kVariedPlace = 2e-3;             // m
 constexpr double kVariedLay = 0.05;               // m, of an object that lies on a support, either way
+constexpr int kMostDraws = 100;                   // until the fingers reach
 
 RobotModel ReadModel(const Scenario& scenario, const std::filesystem::path& robot) {
   return ParseRobotModel(ReadTextFile(robot.string()), robot.string(), scenario.model_overrides);
+}
+
+/// From -1 to 1.
+double Draw(std::mt19937_64* random) {
+  return 2.0 * static_cast<double>((*random)() >> 11) * 0x1p-53 - 1.0;
 }
 
 [[noreturn]] void Fail(const Scenario& scenario, const std::string& key, const std::string& problem) {
@@ -48,12 +53,7 @@ Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const
     throw InputError(robot.string() + ": " + error.what());
   }
   FindFingertips();
-  VaryGrasp();
-  if (scenario_.task) {
-    PlaceTask();
-  } else {
-    SolveGrasp();
-  }
+  FindGrasp();
   if (scenario_.plant.bonded) MakeBonds();
 }
 
@@ -101,24 +101,32 @@ void Setup::FindFingertips() {
   }
 }
 
-void Setup::VaryGrasp() {
-  if (scenario_.seed == 0) return;
+void Setup::FindGrasp() {
   std::mt19937_64 random(scenario_.seed);
-  const auto draw = [&](double size) {
-    return size * (2.0 * static_cast<double>(random() >> 11) * 0x1p-53 - 1.0);
-  };
-  if (scenario_.task) {
-    Pose& X_Bo = scenario_.task->X_Bo;
-    X_Bo.translation().x() += draw(kVariedLay);
-    X_Bo.translation().y() += draw(kVariedLay);
-    X_Bo.linear() = Eigen::AngleAxisd(draw(kPi), Vector3d::UnitZ()) * X_Bo.linear();
-    return;
+  if (scenario_.task) return PlaceTask(&random);
+  const GraspOptions given = scenario_.grasp;
+  double residual = 0.0;
+  for (int i = 0; i < (scenario_.seed == 0 ? 1 : kMostDraws); ++i) {
+    scenario_.grasp = given;
+    if (scenario_.seed != 0) VaryGrasp(&random);
+    const FingerPlacement placement = SolveGrasp();
+    q_start_ = placement.q;
+    if (placement.reached) return;
+    residual = placement.residual;
   }
+  Fail(scenario_, "grasp.contacts_deg",
+       "the fingertips do not reach their contacts within the joint ranges; the farthest stays " +
+           FormatNumber(residual) + " m away");
+}
+
+void Setup::VaryGrasp(std::mt19937_64* random) {
+  const auto draw = [&](double size) { return size * Draw(random); };
   GraspOptions& grasp = scenario_.grasp;
   for (auto& [name, angle] : grasp.joints) angle += draw(kVariedJoint);
   for (SurfacePoint& contact : grasp.contacts) {
-    contact.u += draw(kVariedContact);
-    contact.v += draw(kVariedContact);
+    const Matrix2d M = surface_->Evaluate(contact).M;
+    contact.u += draw(std::min(kVariedContact, kFarthestContact / M.col(0).norm()));
+    contact.v += draw(std::min(kVariedContact, kFarthestContact / M.col(1).norm()));
   }
   for (double& x : grasp.X_FO.translation()) x += draw(kVariedPlace);
 }
@@ -141,7 +149,13 @@ int Setup::FindGraspFrame() const {
   }
 }
 
-void Setup::PlaceTask() {
+void Setup::PlaceTask(std::mt19937_64* random) {
+  if (scenario_.seed != 0) {
+    Pose& X_Bo = scenario_.task->X_Bo;
+    X_Bo.translation().x() += kVariedLay * Draw(random);
+    X_Bo.translation().y() += kVariedLay * Draw(random);
+    X_Bo.linear() = Eigen::AngleAxisd(kPi * Draw(random), Vector3d::UnitZ()) * X_Bo.linear();
+  }
   hand_.fingertips = fingertips_;
   hand_.palm_frame = FindGraspFrame();
   hand_.arm_joints = ListArmJoints(model_, fingertips_, hand_.palm_frame);
@@ -150,7 +164,7 @@ void Setup::PlaceTask() {
   X_start_ << X_Bo_start_.translation(), CalcAnyZyzAngles(X_Bo_start_.linear());
 }
 
-void Setup::SolveGrasp() {
+FingerPlacement Setup::SolveGrasp() {
   const GraspOptions& grasp = scenario_.grasp;
   const VectorXd q = ReadPosture();
   ModelTerms kinematics(model_, Coordinates::kReduced);
@@ -163,15 +177,8 @@ void Setup::SolveGrasp() {
          "\"angles\" are singular where the object starts, at beta = " + FormatNumber(X_start_[4]) +
              " rad; take \"rotation\"");
   }
-  const FingerPlacement placement =
-      SolveFingerPlacement(model_, fingertips_, *surface_, X_Bo_start_, grasp.contacts, q,
-                           {.penetration = scenario_.plant.bonded ? 0.0 : kStartPenetration});
-  if (!placement.reached) {
-    Fail(scenario_, "grasp.contacts_deg",
-         "the fingertips do not reach their contacts within the joint ranges; the farthest stays " +
-             FormatNumber(placement.residual) + " m away");
-  }
-  q_start_ = placement.q;
+  return SolveFingerPlacement(model_, fingertips_, *surface_, X_Bo_start_, grasp.contacts, q,
+                              {.penetration = scenario_.plant.bonded ? 0.0 : kStartPenetration});
 }
 
 void Setup::MakeBonds() {

@@ -4,11 +4,13 @@
 
 #include <filesystem>
 #include <memory>
+#include <random>
 #include <vector>
 
 #include "controller/control/grasp_controller.h"
 #include "controller/control/trajectory.h"
 #include "controller/grasp/contact_plan.h"
+#include "controller/grasp/finger_placement.h"
 #include "controller/model/robot_model.h"
 #include "harness/adapter/adapter.h"
 #include "harness/checks/static_gate.h"
@@ -63,11 +65,13 @@ class Setup {
  private:
   void ApplyPlantOptions();
   void FindFingertips();
-  void VaryGrasp();
-  void SolveGrasp();
-  void PlaceTask();
+  void PlaceTask(std::mt19937_64* random);
   [[nodiscard]] VectorXd ReadPosture() const;
   [[nodiscard]] int FindGraspFrame() const;
+  /// The grasp as given, or varied at random until the fingertips reach their contacts.
+  void FindGrasp();
+  void VaryGrasp(std::mt19937_64* random);
+  FingerPlacement SolveGrasp();
   void MakeBonds();
 
   Scenario scenario_;

@@ -8,9 +8,11 @@
 
 #include <algorithm>
 
+#include "controller/model/parameter_reader.h"
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"
 #include "tests/common/random_robot.h"
+#include "tests/harness/simulation/shipped_run.h"
 
 namespace dexcheck {
 namespace {
@@ -123,6 +125,23 @@ TEST(Consistency, FindsSmallErrorsOnRandomRobots) {
     EXPECT_FALSE(Compare(wrong, LoadMjcfText(testing::WriteMjcf(spec), "text"), 3).Agrees())
         << "robot " << index;
   }
+}
+
+// The shipped robot with the larger ring of its two-hand scenario.
+TEST(Consistency, HoldsOnTheRingScene) {
+  const Scenario scenario = testing::ReadShippedScenario("two-hands");
+  const std::string robot = DEXCHECK_SOURCE_DIR "/controller/parameters/assistant_robot.toml";
+  const RobotModel model = ParseRobotModel(testing::ReadText(robot), robot, scenario.model_overrides);
+  const MjModelPtr engine = LoadMjcf(scenario.mjcf_file);
+  ConsistencyOptions options;
+  options.samples = 100;
+  double share = 0.0;
+  const ConsistencyResult result =
+      CheckConsistency(Adapter(model, *engine, "ring_scene.xml"), options, kGoOn);
+  EXPECT_EQ(result.samples, 100);
+  EXPECT_EQ(ListFailures(result, &share), "");
+  EXPECT_TRUE(result.gate.findings.empty());
+  EXPECT_GT(share, 1e-3);
 }
 
 TEST(Consistency, StopsWhenToldTo) {

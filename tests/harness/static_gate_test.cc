@@ -11,6 +11,7 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"
+#include "tests/harness/simulation/shipped_run.h"
 
 namespace dexcheck {
 namespace {
@@ -132,10 +133,11 @@ INSTANTIATE_TEST_SUITE_P(
         {"FingertipPlace", "robot.xml", "<default class=\"tip\"> <geom size=\"0.009\" pos=\"0 0 -0.0185\"/>",
          "<default class=\"tip\"> <geom size=\"0.008\" pos=\"0 0 -0.0195\"/>", "contact_friction",
          kFingertip},
-        {"PairFriction", "scene.xml", "<default class=\"fingertip\"> <pair condim=\"3\" friction=\"0.8 0.8",
+        {"PairFriction", "contacts.xml",
+         "<default class=\"fingertip\"> <pair condim=\"3\" friction=\"0.8 0.8",
          "<default class=\"fingertip\"> <pair condim=\"3\" friction=\"0.8 0.7", "contact_friction",
          kFingertip},
-        {"PairMissing", "scene.xml",
+        {"PairMissing", "contacts.xml",
          "<pair name=\"rf3_torus\" class=\"fingertip\" geom1=\"rf3_tip_geom\" geom2=\"torus_geom\"/>", "",
          "contact_friction", kFingertip},
         {"ObjectMass", "torus.xml", "mass=\"0.2\"", "mass=\"0.21\"", "object_mass", "object torus"},
@@ -148,20 +150,36 @@ INSTANTIATE_TEST_SUITE_P(
     }),
     [](const auto& info) { return info.param.name; });
 
-TEST(StaticGate, RaisesNoFalseAlarm) {
-  for (const auto& [robot, mjcf] :
-       {std::pair("assistant_robot.toml", "scene.xml"), {"panda.toml", "panda.xml"}}) {
-    const RobotModel model = ReadRobotModel(kParameters + robot);
-    const MjModelPtr engine = LoadMjcf(kMjcf + mjcf);
-    const GateResult result = RunStaticGate(Adapter(model, *engine, mjcf));
-    EXPECT_TRUE(result.findings.empty())
-        << result.findings.front().check << " " << result.findings.front().where;
-    EXPECT_GE(result.records.size(), 7U);
-    for (const CheckRecord& record : result.records) {
-      EXPECT_FALSE(record.failed) << record.name;
-      EXPECT_GT(record.comparisons, 0) << record.name;
-    }
+void ExpectNoFindings(const RobotModel& model, const std::filesystem::path& mjcf) {
+  const MjModelPtr engine = LoadMjcf(mjcf);
+  const GateResult result = RunStaticGate(Adapter(model, *engine, mjcf));
+  EXPECT_TRUE(result.findings.empty())
+      << result.findings.front().check << " " << result.findings.front().where;
+  EXPECT_GE(result.records.size(), 7U);
+  for (const CheckRecord& record : result.records) {
+    EXPECT_FALSE(record.failed) << record.name;
+    EXPECT_GT(record.comparisons, 0) << record.name;
   }
+}
+
+TEST(StaticGate, RaisesNoFalseAlarm) {
+  ExpectNoFindings(ReadRobotModel(kParameters + "assistant_robot.toml"), kMjcf + "scene.xml");
+  ExpectNoFindings(ReadRobotModel(kParameters + "panda.toml"), kMjcf + "panda.xml");
+}
+
+// The larger ring agrees with what its scenario says of it, and not with the torus of the parameter file.
+TEST(StaticGate, TellsTheRingFromTheTorus) {
+  const Scenario scenario = testing::ReadShippedScenario("two-hands");
+  const std::string robot = kParameters + "assistant_robot.toml";
+  ExpectNoFindings(ParseRobotModel(ReadText(robot), robot, scenario.model_overrides), scenario.mjcf_file);
+
+  const RobotModel torus = ReadRobotModel(robot);
+  const MjModelPtr engine = LoadMjcf(scenario.mjcf_file);
+  std::vector<std::string> found;
+  for (const GateFinding& one : RunStaticGate(Adapter(torus, *engine, "ring_scene.xml")).findings) {
+    found.push_back(one.check);
+  }
+  EXPECT_THAT(found, ::testing::IsSupersetOf({"object_mass", "object_inertia", "object_shape"}));
 }
 
 }  // namespace

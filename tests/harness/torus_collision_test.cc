@@ -5,7 +5,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <random>
+#include <string>
 
 #include "controller/contact/shapes.h"
 #include "harness/engine/engine.h"
@@ -160,6 +163,33 @@ TEST(TorusCollision, BallFallsThroughTheHole) {
   EXPECT_NEAR(HeightAfterFall(true), 0.1 - 0.5 * 9.81 * 0.25, 0.005);
   // The same mesh without the mark is its convex hull: the ball stays on it.
   EXPECT_GT(HeightAfterFall(false), 0.0);
+}
+
+// What is seen of the shipped objects is what touches: the meshes' vertices lie on the surface that the mark
+// describes, in the body's frame.
+TEST(TorusCollision, ShippedMeshesShowTheSurface) {
+  constexpr double kFloats = 1e-6;  // coordinates of some 0.3 m as floats, and the engine's own rotation
+  for (const char* scene : {"scene.xml", "ring_scene.xml"}) {
+    const MjModelPtr model = LoadMjcf(std::string(DEXCHECK_SOURCE_DIR "/mjcf/") + scene);
+    const int geom = mj_name2id(model.get(), mjOBJ_GEOM, "torus_geom");
+    double ring_radius = 0.0;
+    double tube_radius = 0.0;
+    ASSERT_TRUE(GetTorusRadii(*model, geom, &ring_radius, &tube_radius)) << scene;
+    const Torus torus(ring_radius, tube_radius);
+    const mjtNum* const p = model->geom_pos + 3 * geom;
+    const mjtNum* const q = model->geom_quat + 4 * geom;
+    const Eigen::Quaterniond R(q[0], q[1], q[2], q[3]);
+    const int mesh = model->geom_dataid[geom];
+    const float* const vertices = model->mesh_vert + 3 * model->mesh_vertadr[mesh];
+    double worst = 0.0;
+    for (int i = 0; i < model->mesh_vertnum[mesh]; ++i) {
+      const Vector3d vertex = Eigen::Map<const Eigen::Vector3f>(vertices + 3 * i).cast<double>();
+      const Vector3d in_body = R * vertex + Vector3d(p[0], p[1], p[2]);
+      worst = std::max(worst, std::abs(torus.Project(in_body).distance));
+    }
+    EXPECT_GE(model->mesh_vertnum[mesh], 1000) << scene;
+    EXPECT_LE(worst, kFloats) << scene;
+  }
 }
 
 }  // namespace

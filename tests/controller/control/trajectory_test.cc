@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <string>
+#include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/control/trajectory_reader.h"
@@ -48,6 +49,13 @@ std::vector<WayPoint> MakeWayPoints() {
   return points;
 }
 
+std::unique_ptr<Trajectory> MakeSum() {
+  std::vector<std::unique_ptr<Trajectory>> parts;
+  parts.push_back(std::make_unique<CircleTrajectory>(Vector6d::Zero(), -0.4, 0.9, 1.2, 0.8));
+  parts.push_back(std::make_unique<PointToPointTrajectory>(Vector6d::Zero(), MakeDirection(), 1.7));
+  return std::make_unique<SumTrajectory>(MakeStart(), std::move(parts));
+}
+
 std::map<std::string, std::unique_ptr<Trajectory>> MakeAll() {
   std::map<std::string, std::unique_ptr<Trajectory>> all;
   const Vector6d X = MakeStart();
@@ -60,6 +68,7 @@ std::map<std::string, std::unique_ptr<Trajectory>> MakeAll() {
   all["circle"] = std::make_unique<CircleTrajectory>(X, -0.4, 0.9, 1.2, 0.8);
   all["right_circle"] = std::make_unique<CircleTrajectory>(X, -0.4, 0.9, 0.0, -0.8);
   all["way_points"] = std::make_unique<WayPointTrajectory>(X, MakeWayPoints());
+  all["sum"] = MakeSum();
   return all;
 }
 
@@ -226,6 +235,40 @@ TEST(Trajectory, WayPointsByHand) {
   EXPECT_TRUE(MatrixNear(two.Evaluate(1.0).X_d_ddot, (3.0 * 2.0 - 6.0 * 5.0) * d, 10.0 * kRounding));
 }
 
+TEST(Trajectory, SumAddsItsParts) {
+  const auto all = MakeAll();
+  const double t = 1.3;
+  const DesiredMotion sum = all.at("sum")->Evaluate(t);
+  const DesiredMotion circle = all.at("circle")->Evaluate(t);
+  const DesiredMotion move = all.at("point_to_point")->Evaluate(t);
+  EXPECT_GT((circle.X_d - MakeStart()).norm(), 0.1);
+  EXPECT_GT((move.X_d - MakeStart()).norm(), 0.1);
+  EXPECT_TRUE(MatrixNear(sum.X_d, circle.X_d + move.X_d - MakeStart(), kRounding));
+  EXPECT_TRUE(MatrixNear(sum.X_d_dot, circle.X_d_dot + move.X_d_dot, kRounding));
+  EXPECT_TRUE(MatrixNear(sum.X_d_ddot, circle.X_d_ddot + move.X_d_ddot, kRounding));
+}
+
+// beta is the angle of the object's axis against the vertical: added to a path it tilts the object about the
+// horizontal axis that follows the path.
+TEST(Trajectory, SumOfAPathAndATiltTiltsAboutAHorizontalAxis) {
+  const double tilt = DegToRad(30.0);
+  Vector6d rise = Vector6d::Zero();
+  rise[2] = 0.12;
+  rise[4] = tilt;
+  std::vector<std::unique_ptr<Trajectory>> parts;
+  parts.push_back(std::make_unique<CircleTrajectory>(Vector6d::Zero(), 0.0, 0.9, 1.2, 0.8));
+  parts.push_back(std::make_unique<PointToPointTrajectory>(Vector6d::Zero(), rise, 1.7));
+  const SumTrajectory sum(MakeStart(), std::move(parts));
+  const Vector6d end = sum.Evaluate(2.5).X_d;
+  const double turn = end[3] - MakeStart()[3];
+  EXPECT_GT(turn, 0.5);
+  EXPECT_NEAR(end[2] - MakeStart()[2], 0.12, kRounding);
+  const Vector3d axis(-std::sin(end[3]), std::cos(end[3]), 0.0);
+  const Matrix3d expected = Eigen::AngleAxisd(tilt, axis) * Eigen::AngleAxisd(turn, Vector3d::UnitZ()) *
+                            CalcRotationZyz(MakeStart().tail<3>());
+  EXPECT_TRUE(MatrixNear(CalcRotationZyz(end.tail<3>()), expected, kRounding));
+}
+
 TEST(Trajectory, RejectsWrongNumbers) {
   const Vector6d X = MakeStart();
   const auto rejects = [](const auto& make, const std::string& text) {
@@ -243,6 +286,7 @@ TEST(Trajectory, RejectsWrongNumbers) {
   EXPECT_TRUE(rejects([&] { CircleTrajectory(X, 0.0, 1.0, 1.0, 0.0); }, "radius"));
   EXPECT_TRUE(rejects([&] { WayPointTrajectory(X, {}); }, "number of way-points"));
   EXPECT_TRUE(rejects([&] { WayPointTrajectory(X, {{1.0, X}, {1.0, X}}); }, "time of way-point"));
+  EXPECT_TRUE(rejects([&] { SumTrajectory(X, {}); }, "number of parts"));
 }
 
 TEST(Trajectory, EvaluationDoesNotAllocate) {
@@ -280,6 +324,11 @@ TEST(TrajectoryReader, ReadsEveryType) {
       "weave",
       "type = 'weave'\nheading = 0.7\nspeed = 1.0\nramp_time = 1.2\namplitude = 0.15\nwavelength = 1.6\n");
   expect_same("circle", "type = 'circle'\nheading = -0.4\nspeed = 0.9\nramp_time = 1.2\nradius = 0.8\n");
+  expect_same(
+      "sum",
+      "type = 'sum'\nparts = [{ type = 'circle', heading = -0.4, speed = 0.9, ramp_time = 1.2, radius = "
+      "0.8 }, { type = 'point_to_point', duration = 1.7, xyz = [0.3, -0.1, 0.05], zyz = [0.4, 0.2, "
+      "-0.3] }]\n");
   const std::unique_ptr<Trajectory> points = Parse(
       "type = 'way_points'\npoints = [{ time = 1.0, xyz = [0.1, 0, 0] }, { time = 2, zyz_deg = [90, 0, 0] "
       "}]\n");
@@ -307,6 +356,9 @@ TEST(TrajectoryReader, RejectsWhatIsWrong) {
   EXPECT_TRUE(rejects("type = 'way_points'\npoints = [{ time = 2 }, { time = 1 }]",
                       "must be greater than the time before"));
   EXPECT_TRUE(rejects("type = 'way_points'\npoints = [{ time = 2, abc = 1 }]", "abc"));
+  EXPECT_TRUE(rejects("type = 'sum'\nparts = []", "parts: needs at least one part"));
+  EXPECT_TRUE(rejects("type = 'sum'\nparts = [{ type = 'line', radius = 1 }]", "radius: unknown key"));
+  EXPECT_TRUE(rejects("type = 'sum'\nparts = [3]", "parts"));
 }
 
 }  // namespace

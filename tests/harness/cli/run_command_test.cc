@@ -144,7 +144,7 @@ TEST(RunCommand, AKilledRunLeavesAReadableLog) {
 TEST(RunCommand, ListsScenarios) {
   const ProgramResult result = RunDexcheck({"run", "--list"});
   EXPECT_EQ(result.exit_code, 0);
-  for (const char* name : {"paper ", "paper-ramp", "paper-rest", "curve", "reorient", "hold"}) {
+  for (const char* name : {"paper ", "paper-ramp", "paper-rest", "curve", "reorient", "two-hands", "hold"}) {
     EXPECT_THAT(result.out, HasSubstr(name));
   }
 }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "controller/object/so3.h"
 #include "tests/harness/simulation/shipped_run.h"
 
 namespace dexcheck::testing {
@@ -121,6 +122,46 @@ TEST(ShippedScenarios, BondedFingertipsLetTheObjectTurn) {
       run.Run([&] { turned = std::max(turned, std::abs(run.loop().X_o()[5] - run.setup().X_start()[5])); });
   ExpectBondedPass(run, result);
   EXPECT_GT(turned, 0.1);
+}
+
+/// Angle of the object's axis against the vertical, rad.
+double CalcLean(const Pose& X_Bo) { return std::acos(X_Bo.linear()(2, 2)); }
+
+// Eight contacts: the ring is raised by 0.12 m, tilted by 30 degrees about a horizontal axis, and turns.
+TEST(ShippedScenarios, TwoHandsRaiseTiltAndTurn) {
+  ShippedRun run("two-hands");
+  const RunResult& result = run.Run();
+  ExpectPass(run, result);
+  const GraspTerms& grasp = run.loop().controller().grasp();
+  EXPECT_EQ(grasp.G().cols(), 24);
+  EXPECT_EQ(grasp.J_B().rows(), 24);
+  EXPECT_EQ(grasp.J_B().cols(), 50);
+  // All eight push.
+  for (Eigen::Index i = 2; i < 24; i += 3) EXPECT_GT(run.loop().checks().engine().f_c[i], 0.5) << i;
+
+  const Pose& start = run.setup().X_Bo_start();
+  const Pose& end = run.loop().state().X_Bo;
+  EXPECT_NEAR(end.translation().z() - start.translation().z(), 0.12, 1e-6);
+  EXPECT_NEAR(CalcLean(end) - CalcLean(start), DegToRad(30.0), 1e-6);
+  // Turn and tilt, both about axes that the tilt's does not leave the horizontal plane with.
+  const double turn = run.loop().desired().X_d[3] - run.setup().X_start()[3];
+  EXPECT_LT(turn, -0.7);
+  EXPECT_LT(run.loop().state().q[2], -0.6);  // so does the platform
+  const Matrix3d R = end.linear() * start.linear().transpose();
+  const Vector3d tilt = LogSo3(R * Eigen::AngleAxisd(-turn, Vector3d::UnitZ()).toRotationMatrix());
+  EXPECT_NEAR(tilt.z(), 0.0, 1e-6);
+  EXPECT_NEAR(tilt.norm(), DegToRad(30.0), 1e-6);
+  EXPECT_LE(result.tracking.position_max(), 1e-6);
+  EXPECT_LE(result.tracking.orientation_max(), 1e-5);
+}
+
+TEST(ShippedScenarios, TwoHandsHoldOtherGraspsToo) {
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U}) {
+    ShippedRun run("two-hands", {"duration=1"}, seed);
+    const RunResult& result = run.Run();
+    EXPECT_EQ(result.verdict, Verdict::kPass)
+        << "seed " << seed << ": " << result.failure << result.attribution.evidence;
+  }
 }
 
 TEST(ShippedScenarios, OtherGraspsPassToo) {

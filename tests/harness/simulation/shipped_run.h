@@ -23,9 +23,9 @@ class ShippedRun {
                       std::uint64_t seed = 0) {
     Scenario scenario = ReadShippedScenario(name, overrides);
     scenario.seed = seed;
-    setup_ =
-        std::make_unique<Setup>(scenario, DEXCHECK_SOURCE_DIR "/controller/parameters/assistant_robot.toml",
-                                DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+    setup_ = std::make_unique<Setup>(
+        scenario, DEXCHECK_SOURCE_DIR "/controller/parameters/assistant_robot.toml",
+        scenario.mjcf_file.empty() ? DEXCHECK_SOURCE_DIR "/mjcf/scene.xml" : scenario.mjcf_file);
     runner_ = std::make_unique<Runner>(*setup_, /*check=*/true);
   }
 
