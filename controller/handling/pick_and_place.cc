@@ -16,7 +16,7 @@ constexpr double kArmShare = 0.2;          // of the posture's frequency, for ar
 constexpr double kFirstTouch = 0.2;        // of the touch force comes at once, so that no fingertip bounces
 constexpr double kFirstTouchTime = 0.03;   // s
 constexpr double kTouchTime = 0.6;         // s to build up or take back a touch force
-constexpr double kLastTouch = 0.05;        // of the touch force is left when the fingers open
+constexpr double kLastTouch = 0.015;       // N, of the touch force is left when the fingers open
 constexpr double kPause = 0.1;             // s between movements
 constexpr double kRest = 0.5;              // s until the arm is at rest
 constexpr double kReleaseTime = 1.2;       // s
@@ -254,6 +254,7 @@ void PickAndPlace::UpdateGrip(double t, const MeasuredState& state) {
 }
 
 void PickAndPlace::UpdateTakeOver(double t, const Touch& touch) {
+  borne_ = demand_.weight;
   const bool free = touch.support_force <= 0.0;
   if (stage_ == 0) {
     demand_.weight = CalcMinSnap(t - begin_, options_.take_over_time).s;
@@ -282,8 +283,7 @@ void PickAndPlace::Refuse(double t, const std::string& reason) {
   if (refused_) throw GraspForceError(reason);
   refused_ = true;
   failure_ = "refused to lift: " + reason;
-  lowering_from_ = std::max(0.0, demand_.weight - kNominal);
-  demand_.weight = lowering_from_;
+  lowering_from_ = demand_.weight = borne_;
   Enter(Phase::kHandOver, t);
 }
 
@@ -339,8 +339,9 @@ void PickAndPlace::UpdateRelease(double t, const MeasuredState& state) {
     stage_begin_ = t;
   } else if (stage_ == 1) {
     const double s = CalcMinSnap(since, kTouchTime).s;
+    const double last = std::min(kLastTouch, options_.touch_force);
     std::fill(demand_.touch_force.begin(), demand_.touch_force.end(),
-              (1.0 - s * (1.0 - kLastTouch)) * options_.touch_force);
+              options_.touch_force + s * (last - options_.touch_force));
     if (since < kTouchTime) return;
     demand_.contacts = 0;
     stage_ = 2;

@@ -145,6 +145,7 @@ class PickAndPlace {
   Vector3d lay_at_ = Vector3d::Zero();
   Vector6d X_start_ = Vector6d::Zero();
   double push_ = 0.0;
+  double borne_ = 0.0;          // weight of the step before
   double lowering_from_ = 1.0;  // weight at the beginning of the hand-over
   bool refused_ = false;
   bool retrying_ = false;

@@ -131,6 +131,23 @@ void ReadTask(const TomlValue& value, Scenario* scenario) {
   scenario->task = task;
 }
 
+/// What a task takes from the rest of the scenario. @throws InputError when that does not fit a task.
+void FinishTask(Scenario* scenario) {
+  const auto require = [&](bool holds, const char* problem) {
+    if (!holds) throw InputError(scenario->source + ": " + problem);
+  };
+  require(scenario->start == Start::kRest, "start: must be \"rest\" for a task");
+  require(!scenario->plant.bonded, "plant.bonded: a task needs contacts that open and close");
+  require(scenario->plant.control_step <= scenario->plant.time_step,
+          "plant.control_step: a task decides at every time step");
+  require(scenario->control.orientation == OrientationFeedback::kRotation,
+          "control.orientation: must be \"rotation\" for a task");
+  PickAndPlaceOptions& pick = scenario->task->pick_and_place;
+  pick.f_min = scenario->control.f_min;
+  pick.posture_frequency = scenario->control.posture_frequency;
+  pick.plan.mu = scenario->control.mu;
+}
+
 /// K_p and K_v, or natural frequency and damping ratio of (57).
 void ReadGains(TomlTable& table, ObjectGains* gains) {
   table.RejectTogether("K_p", {"natural_frequency"});
@@ -214,16 +231,7 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   if (const auto task = root.Find("task")) ReadTask(*task, &scenario);
   ReadGrasp(root.Get("grasp"), scenario.task.has_value(), &scenario);
   ReadControl(root.Get("control"), &scenario);
-  if (scenario.task) {
-    if (scenario.start != Start::kRest) root.Get("start").Fail("must be \"rest\" for a task");
-    if (scenario.plant.bonded) root.Get("plant").Fail("bonded: a task needs contacts that open and close");
-    if (scenario.control.orientation != OrientationFeedback::kRotation) {
-      root.Get("control").Fail("orientation: must be \"rotation\" for a task");
-    }
-    scenario.task->pick_and_place.f_min = scenario.control.f_min;
-    scenario.task->pick_and_place.posture_frequency = scenario.control.posture_frequency;
-    scenario.task->pick_and_place.plan.mu = scenario.control.mu;
-  }
+  if (scenario.task) FinishTask(&scenario);
   if (const auto bounds = root.Find("bounds")) {
     for (const auto& [name, value] : bounds->AsTable().GetEntries()) {
       scenario.bounds.emplace_back(name, value.AsNotNegative());
