@@ -104,6 +104,7 @@ class MoviePainter::RunPainter {
     const auto at = static_cast<size_t>(row);
     OverlayState state;
     state.title = run_.title;
+    if (!run_.phases.empty()) state.title += ": " + run_.phases[static_cast<size_t>(row)];
     state.time = run_.times[at];
     if (!run_.position_errors.empty()) state.position_error = run_.position_errors[at];
     if (!run_.orientation_errors.empty()) state.orientation_error = run_.orientation_errors[at];

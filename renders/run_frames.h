@@ -27,6 +27,8 @@ struct RunFrames {
   std::vector<double> times;  ///< s, increasing; n.
   RowMatrixXd qpos;           ///< n x nq.
 
+  std::vector<std::string> phases;  ///< What a task is at; n.
+
   std::vector<double> position_errors;     ///< Of the object, m; n.
   std::vector<double> orientation_errors;  ///< rad; n.
   std::vector<CheckSeries> checks;

@@ -47,8 +47,8 @@ const VectorXd& HandlingController::CalcTorque(const MeasuredState& state, const
     return law.tau_0();
   }
   Law& law = FindLaw(demand.contacts, demand.carried);
-  law.grasp.SetState(grasp_->robot(), state);
-  const GraspTerms& terms = law.grasp.terms();
+  if (demand.contacts != all) law.grasp.SetState(grasp_->robot(), state);
+  const GraspTerms& terms = demand.contacts == all ? grasp_->grasp() : law.grasp.terms();
   Vector6d V_Bo_dot = Vector6d::Zero();
   if (demand.carried) {
     V_Bo_dot = CalcTrackingAcceleration(grasp_->options().gains, OrientationFeedback::kRotation, terms,

@@ -9,6 +9,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/handling/pick_and_place.h"
 #include "harness/cli/run_folder.h"
 #include "harness/record/log_reader.h"
 
@@ -39,6 +40,9 @@ class FramesReader {
     run.title = log_.ReadText("scenario");
     run.times = ReadSeries("time");
     run.qpos = log_.ReadSignal("engine/qpos");
+    for (const double phase : ReadSeries("task/phase")) {
+      run.phases.emplace_back(NameOf(static_cast<Phase>(static_cast<int>(phase))));
+    }
     run.position_errors = ReadSeries("object/position_error");
     run.orientation_errors = ReadSeries("object/orientation_error");
     run.contact_positions = ReadMatrix("contact/position");

@@ -192,5 +192,101 @@ TEST(TorusCollision, ShippedMeshesShowTheSurface) {
   }
 }
 
+/// Every ball of the ring against the box, far more of them than the contacts.
+double MeasureGap(const Pose& X_BT, const Vector3d& half_size) {
+  double gap = 1.0;
+  for (int i = 0; i < 7200; ++i) {
+    const double u = 2.0 * kPi * i / 7200;
+    const Vector3d p = X_BT * Vector3d(kRing * std::cos(u), kRing * std::sin(u), 0.0);
+    const Vector3d beyond = (p.cwiseAbs() - half_size).cwiseMax(0.0);
+    const double inside = std::min(0.0, (p.cwiseAbs() - half_size).maxCoeff());
+    gap = std::min(gap, beyond.norm() + inside - kTube);
+  }
+  return gap;
+}
+
+TEST(CollideBoxTorus, FindsTheLowestPlaceOfATorusOnAFace) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> draw(-1.0, 1.0);
+  const Vector3d half_size(0.5, 0.4, 0.02);
+  int touching = 0;
+  for (int i = 0; i < 500; ++i) {
+    Pose X_BT = Pose::Identity();
+    const Vector3d axis = Vector3d(draw(random), draw(random), draw(random)).normalized();
+    X_BT.linear() = Eigen::AngleAxisd(0.5 * draw(random), axis).toRotationMatrix();
+    X_BT.translation() = Vector3d(0.3 * draw(random), 0.2 * draw(random), 0.05 + 0.02 * draw(random));
+    BoxTorusContact contacts[kRingPlaces];
+    const int count = CollideBoxTorus(X_BT, kRing, kTube, half_size, 0.002, contacts);
+    const double gap = MeasureGap(X_BT, half_size);
+    ASSERT_EQ(count > 0, gap <= 0.002) << gap;
+    if (count == 0) continue;
+    ++touching;
+    double nearest = 1.0;
+    for (int k = 0; k < count; ++k) {
+      nearest = std::min(nearest, contacts[k].distance);
+      EXPECT_TRUE(MatrixNear(contacts[k].normal, Vector3d::UnitZ(), 0.0));
+      // Midway between the face and the tube.
+      EXPECT_NEAR(contacts[k].position.z(), half_size.z() + 0.5 * contacts[k].distance, 1e-15);
+    }
+    // The fine ring has a place within 5e-4 rad of the lowest.
+    EXPECT_NEAR(nearest, gap, kRing * 5e-4 * 5e-4);
+  }
+  EXPECT_GT(touching, 100);
+}
+
+TEST(CollideBoxTorus, SupportsAFlatTorusAllAround) {
+  Pose X_BT = Pose::Identity();
+  X_BT.translation().z() = 0.02 + kTube - 1e-6;
+  BoxTorusContact contacts[kRingPlaces];
+  ASSERT_EQ(CollideBoxTorus(X_BT, kRing, kTube, Vector3d(0.5, 0.4, 0.02), 0.0, contacts), kRingPlaces);
+  Vector3d middle = Vector3d::Zero();
+  for (const BoxTorusContact& contact : contacts) {
+    EXPECT_NEAR(contact.distance, -1e-6, 1e-15);
+    EXPECT_NEAR(contact.position.head<2>().norm(), kRing, 1e-15);
+    middle += contact.position / kRingPlaces;
+  }
+  EXPECT_NEAR(middle.head<2>().norm(), 0.0, 1e-15);
+}
+
+TEST(CollideBoxTorus, HangsOnAnEdgeAndFallsBesideTheBox) {
+  const Vector3d half_size(0.5, 0.4, 0.02);
+  BoxTorusContact contacts[kRingPlaces];
+  Pose X_BT = Pose::Identity();
+  // Half of the ring is over the box.
+  X_BT.translation() = Vector3d(0.5, 0.0, 0.02 + kTube);
+  const int count = CollideBoxTorus(X_BT, kRing, kTube, half_size, 1e-6, contacts);
+  EXPECT_GT(count, 2);
+  EXPECT_LT(count, kRingPlaces);
+  X_BT.translation().x() = 0.5 + kRing + kTube + 1e-3;
+  EXPECT_EQ(CollideBoxTorus(X_BT, kRing, kTube, half_size, 0.0, contacts), 0);
+}
+
+TEST(TorusInTheEngine, LiesStillOnABox) {
+  InstallTorusCollision();
+  const MjModelPtr model =
+      LoadMjcfText(fmt::format(R"(<mujoco><size nuser_geom="2"/><compiler meshdir="{}/mjcf/assets"/>
+        <option timestep="0.001" cone="elliptic"/>
+        <asset><mesh name="torus" file="torus.msh"/></asset><worldbody>
+        <geom name="top" type="box" size="0.5 0.4 0.02"/>
+        <body name="torus" pos="0.1 0.05 0.0312"><freejoint/>
+          <inertial pos="0 0 0" mass="0.2" diaginertia="0.000137625 0.000137625 0.00026315"/>
+          <geom name="torus" type="mesh" mesh="torus" mass="0" user="0.035 0.011"/></body>
+        </worldbody></mujoco>)",
+                               DEXCHECK_SOURCE_DIR),
+                   "torus on a box");
+  const MjDataPtr data = MakeData(*model);
+  for (int i = 0; i < 2000; ++i) mj_step(model.get(), data.get());
+  double weight = 0.0;
+  for (int i = 0; i < data->ncon; ++i) {
+    mjtNum force[6];
+    mj_contactForce(model.get(), data.get(), i, force);
+    weight += force[0];
+  }
+  EXPECT_EQ(data->ncon, kRingPlaces);
+  EXPECT_NEAR(weight, 0.2 * 9.81, 1e-6);
+  EXPECT_LT(Eigen::Map<const VectorXd>(data->qvel, 6).norm(), 1e-9);
+  EXPECT_NEAR(data->qpos[2], 0.02 + kTube, 1e-4);
+}
+
 }  // namespace
 }  // namespace dexcheck
