@@ -41,7 +41,8 @@ class FramesReader {
     run.times = ReadSeries("time");
     run.qpos = log_.ReadSignal("engine/qpos");
     for (const double phase : ReadSeries("task/phase")) {
-      run.phases.emplace_back(NameOf(static_cast<Phase>(static_cast<int>(phase))));
+      const bool known = phase >= 0.0 && phase <= static_cast<double>(Phase::kDone);
+      run.phases.emplace_back(known ? NameOf(static_cast<Phase>(static_cast<int>(phase))) : "");
     }
     run.position_errors = ReadSeries("object/position_error");
     run.orientation_errors = ReadSeries("object/orientation_error");

@@ -379,7 +379,7 @@ TEST(PostureTask, IdleArmGetsItsWholeTask) {
 
 TEST(ComputedTorque, Errors) {
   GraspScene scene;
-  EXPECT_TRUE(Throws<std::invalid_argument>([&] { return ComputedTorque(scene.model, 1); }, "rows of G"));
+  EXPECT_TRUE(Throws<std::invalid_argument>([&] { return ComputedTorque(scene.model, 0); }, "rows of J_B'"));
   const RedundancyWeight weight{RedundancyWeight::Kind::kDiagonal, VectorXd::Ones(3)};
   EXPECT_TRUE(
       Throws<std::invalid_argument>([&] { return ComputedTorque(scene.model, 4, weight); }, "length of w"));
