@@ -25,12 +25,11 @@ HandlingController::HandlingController(const RobotModel& model, std::span<const 
   FindLaw(all, true);
 }
 
-HandlingController::Law& HandlingController::FindLaw(ContactSet set, bool carried) {
-  std::unique_ptr<Law>& law = laws_[{set, carried}];
+HandlingController::Law& HandlingController::FindLaw(ContactSet set, bool by_inertia) {
+  std::unique_ptr<Law>& law = laws_[{set, by_inertia}];
   if (!law) {
-    RedundancyWeight weight;
-    weight.kind = RedundancyWeight::Kind::kMass;
-    if (carried) weight = grasp_->options().weight;
+    RedundancyWeight weight = grasp_->options().weight;
+    if (by_inertia) weight.kind = RedundancyWeight::Kind::kMass;
     law = std::make_unique<Law>(*model_, fingertips_, object_, *surface_, weight, set);
     law->f_c.setZero(law->grasp.terms().num_forces());
   }
@@ -46,7 +45,7 @@ const VectorXd& HandlingController::CalcTorque(const MeasuredState& state, const
     law.SetFreeMotion(grasp_->robot(), grasp_->sigma_prime());
     return law.tau_0();
   }
-  Law& law = FindLaw(demand.contacts, demand.carried);
+  Law& law = FindLaw(demand.contacts, demand.by_inertia);
   if (demand.contacts != all) law.grasp.SetState(grasp_->robot(), state);
   const GraspTerms& terms = demand.contacts == all ? grasp_->grasp() : law.grasp.terms();
   Vector6d V_Bo_dot = Vector6d::Zero();

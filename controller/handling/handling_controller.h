@@ -24,9 +24,12 @@ struct HandlingDemand {
   /// From the touch forces (0) to the grasp forces inside the friction cones (1). More than 0 needs all
   /// contacts.
   double grip = 0.0;
-  double f_min = 0.0;    ///< Least normal force of the grasp forces, N.
-  double weight = 0.0;   ///< Part of the object's stated weight that the hand bears.
-  double scale = 1.0;    ///< The object's mass over its stated one, once it has been weighed.
+  double f_min = 0.0;   ///< Least normal force of the grasp forces, N.
+  double weight = 0.0;  ///< Part of the object's stated weight that the hand bears.
+  double scale = 1.0;   ///< The object's mass over its stated one, once it has been weighed.
+  /// J^+ is weighted by M_bar': what a fingertip's contact stops is then stopped by the finger, not by the
+  /// whole robot. Otherwise by the controller's weight.
+  bool by_inertia = false;
   bool carried = false;  ///< The object follows `desired`; otherwise it is to stay where it lies.
   DesiredMotion desired;
 };
@@ -36,9 +39,8 @@ struct HandlingDemand {
 ///   F_o      = scale (M_hat V_dot + C_hat V) + weight N_o
 ///   f_c      = (1 - grip) f_touch + grip f(F_o),   f(F_o) in the friction cones, G f = F_o
 ///   E_bar' tau' = M_bar' xi_dot_d + C_bar' xi_c + F_bar' + J^T f_c
-/// With all contacts, grip = weight = scale = 1 it is (55). While the object is not carried J^+ is weighted
-/// by M_bar': what a fingertip's contact stops is then stopped by the finger, not by the whole robot.
-/// Allocates when a set of contacts comes up for the first time, and never again.
+/// With all contacts, grip = weight = scale = 1 it is (55). Allocates when a set of contacts comes up for the
+/// first time, and never again.
 class HandlingController {
  public:
   /// @param grasp the controller whose state, gains, limits and posture are used; must outlive this, as must
@@ -66,7 +68,7 @@ class HandlingController {
     ComputedTorque torque;
     VectorXd f_c;
   };
-  Law& FindLaw(ContactSet set, bool carried);
+  Law& FindLaw(ContactSet set, bool by_inertia);
   void CalcGripForce(const GraspTerms& terms, const Vector6d& V_Bo_dot, const HandlingDemand& demand);
 
   const RobotModel* model_;

@@ -166,7 +166,7 @@ void PickAndPlace::Update(double t, const MeasuredState& state, const Touch& tou
       UpdateCarry(t);
       break;
     case Phase::kHandOver:
-      UpdateHandOver(t, state);
+      UpdateHandOver(t);
       break;
     case Phase::kRelease:
       UpdateRelease(t, state);
@@ -187,6 +187,7 @@ void PickAndPlace::UpdateApproach(double t) {
     StartMove(plan_.q_above, plan_.q_open, t, options_.lower_time);
   } else if (t >= move_.begin + move_.duration + kPause) {
     Enter(Phase::kClose, t);
+    demand_.by_inertia = true;
     StartMove(plan_.q_open, plan_.q_near, t, options_.close_time);
   }
 }
@@ -248,6 +249,7 @@ void PickAndPlace::UpdateGrip(double t, const MeasuredState& state) {
   // At rest a posture error moves nothing; without one the change of weights cannot either.
   HoldPosture(Joints(state));
   X_start_ << state.X_Bo.translation(), CalcAnyZyzAngles(state.X_Bo.linear());
+  demand_.by_inertia = false;
   demand_.carried = true;
   demand_.desired = DesiredMotion{};
   demand_.desired.X_d = X_start_;
@@ -319,12 +321,11 @@ void PickAndPlace::UpdateCarry(double t) {
   Enter(Phase::kHandOver, t);
 }
 
-void PickAndPlace::UpdateHandOver(double t, const MeasuredState& state) {
+void PickAndPlace::UpdateHandOver(double t) {
   demand_.weight = lowering_from_ * (1.0 - CalcMinSnap(t - begin_, options_.take_over_time).s);
   if (t < begin_ + options_.take_over_time + kRest) return;
   demand_.carried = false;
   Enter(Phase::kRelease, t);
-  HoldPosture(Joints(state));
 }
 
 void PickAndPlace::UpdateRelease(double t, const MeasuredState& state) {

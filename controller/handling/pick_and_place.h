@@ -117,7 +117,7 @@ class PickAndPlace {
   void UpdateGrip(double t, const MeasuredState& state);
   void UpdateTakeOver(double t, const Touch& touch);
   void UpdateCarry(double t);
-  void UpdateHandOver(double t, const MeasuredState& state);
+  void UpdateHandOver(double t);
   void UpdateRelease(double t, const MeasuredState& state);
   void UpdateWithdraw(double t, const MeasuredState& state);
   void GiveUp(double t, const MeasuredState& state, const std::string& reason);
