@@ -3,16 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <condition_variable>
-#include <exception>
-#include <map>
-#include <mutex>
 #include <optional>
-#include <thread>
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
 #include "renders/compose.h"
+#include "renders/frame_line.h"
 #include "renders/overlay.h"
 #include "renders/renderer.h"
 #include "renders/run_decorations.h"
@@ -185,101 +181,18 @@ long CountFrames(std::span<const RunView> runs, int fps) {
   return std::max(1L, std::lround(longest * fps));
 }
 
-namespace {
-
-/// Several threads draw frames, each every n-th; one takes them in order.
-class FrameLine {
- public:
-  FrameLine(std::span<const RunView> runs, const MovieOptions& options, long frames)
-      : runs_(runs), options_(options), frames_(frames) {
-    const long workers = std::min<long>(options.workers, frames);
-    not_ready_ = workers;
-    for (long k = 0; k < workers; ++k) threads_.emplace_back([this, k, workers] { Work(k, workers); });
-  }
-
-  ~FrameLine() {
-    {
-      const std::lock_guard lock(mutex_);
-      stopped_ = true;
-    }
-    changed_.notify_all();
-    for (std::thread& thread : threads_) thread.join();
-  }
-
-  FrameLine(const FrameLine&) = delete;
-  FrameLine& operator=(const FrameLine&) = delete;
-
-  /// Frame number `frame`; each is taken once, in order. Throws what a worker threw.
-  Image Take(long frame) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return error_ != nullptr || done_.contains(frame); });
-    if (error_ != nullptr) std::rethrow_exception(error_);
-    Image image = std::move(done_.extract(frame).mapped());
-    taken_ = frame + 1;
-    lock.unlock();
-    changed_.notify_all();
-    return image;
-  }
-
- private:
-  void Work(long first, long stride) {
-    try {
-      // Nobody draws while another is still making its context, which sets MuJoCo's OpenGL functions.
-      std::unique_lock making(making_);
-      MoviePainter painter(runs_, options_);
-      making.unlock();
-      {
-        std::unique_lock lock(mutex_);
-        --not_ready_;
-        changed_.notify_all();
-        changed_.wait(lock, [&] { return not_ready_ == 0 || stopped_ || error_ != nullptr; });
-      }
-      for (long frame = first; frame < frames_; frame += stride) {
-        {
-          std::unique_lock lock(mutex_);
-          // As many frames wait as there are workers, twice.
-          changed_.wait(lock, [&] { return stopped_ || frame < taken_ + 2 * stride; });
-          if (stopped_ || error_ != nullptr) return;
-        }
-        Image image = painter.Paint(static_cast<double>(frame) / options_.fps);
-        {
-          const std::lock_guard lock(mutex_);
-          done_.emplace(frame, std::move(image));
-        }
-        changed_.notify_all();
-      }
-    } catch (...) {
-      {
-        const std::lock_guard lock(mutex_);
-        if (error_ == nullptr) error_ = std::current_exception();
-      }
-      changed_.notify_all();
-    }
-  }
-
-  std::span<const RunView> runs_;
-  MovieOptions options_;
-  long frames_;
-  std::mutex making_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::map<long, Image> done_;
-  long taken_ = 0;
-  long not_ready_ = 0;
-  bool stopped_ = false;
-  std::exception_ptr error_;
-  std::vector<std::thread> threads_;
-};
-
-}  // namespace
-
 bool RenderMovie(std::span<const RunView> runs, const MovieOptions& options, VideoWriter* video,
                  const std::function<bool(long done, long total)>& progress) {
   Require(options.workers >= 1, "workers", "must be positive", options.workers);
   const long frames = CountFrames(runs, options.fps);
-  FrameLine line(runs, options, frames);
+  const auto make_painter = [&]() -> FrameLine::Painter {
+    return [painter = std::make_shared<MoviePainter>(runs, options), fps = options.fps](long frame) {
+      return painter->Paint(static_cast<double>(frame) / fps);
+    };
+  };
+  FrameLine line(make_painter, frames, options.workers, options.width, options.height);
   for (long frame = 0; frame < frames; ++frame) {
-    video->Write(line.Take(frame));
+    video->Write(line.Take());
     if (progress && !progress(frame + 1, frames)) return false;
   }
   return true;

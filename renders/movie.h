@@ -27,7 +27,7 @@ struct MovieOptions {
       false;  ///< Where the contacts have been on the object, and the object's path beside the desired one.
   bool frames = false;  ///< The object's axes.
   bool panel = true;    ///< Scenario, time, errors and checks.
-  int workers = 2;      ///< Threads that draw, each a frame of its own.
+  int workers = 2;      ///< Processes that draw, each a frame of its own.
   int samples = 2;      ///< See RenderOptions.
   int shadow_size = 2048;
 };
@@ -59,7 +59,8 @@ class MoviePainter {
 /// How many frames show the longest of the runs: its duration times the frame rate, rounded, at least one.
 long CountFrames(std::span<const RunView> runs, int fps);
 
-/// Draws all frames and writes them to `video` in order, without finishing it.
+/// Draws all frames, in processes that options.workers counts (see FrameLine), and writes them to `video` in
+/// order, without finishing it. The frames do not depend on the number of processes.
 /// @param progress told after each frame how many of how many are written; false stops the work.
 /// @return whether all frames were written.
 bool RenderMovie(std::span<const RunView> runs, const MovieOptions& options, VideoWriter* video,

@@ -14,10 +14,11 @@ constexpr int kSurfaceSize = 16;
 constexpr int kDepthBits = 24;
 constexpr int kStencilBits = 8;
 
-// Each frame is drawn by one thread; movies draw several frames at once instead.
+// Each frame is drawn by one thread; movies draw several frames at once in processes instead, which would not
+// have their parent's threads.
 void KeepToCallingThread() {
   static std::once_flag once;
-  std::call_once(once, [] { ::setenv("LP_NUM_THREADS", "0", /*overwrite=*/0); });
+  std::call_once(once, [] { ::setenv("LP_NUM_THREADS", "0", /*overwrite=*/1); });
 }
 
 }  // namespace

@@ -12,8 +12,8 @@ namespace dexcheck {
 /// that makes it. The process must not link EGL: MuJoCo's OpenGL loader would prefer it.
 class OffscreenContext {
  public:
-  /// Makes the context and makes it current. Drawing happens in the calling thread, unless the environment
-  /// variable LP_NUM_THREADS says otherwise.
+  /// Makes the context and makes it current. Drawing happens in the calling thread, one picture of the
+  /// process at a time.
   /// @throws Error when the OpenGL library cannot make one.
   OffscreenContext();
   ~OffscreenContext();

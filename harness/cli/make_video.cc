@@ -12,6 +12,8 @@
 
 namespace dexcheck::cli {
 
+int CountDrawers() { return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8); }
+
 bool WriteMovie(const std::vector<RunView>& views, const MovieOptions& options, const std::string& out,
                 bool quiet) {
   const auto start = std::chrono::steady_clock::now();
@@ -48,7 +50,7 @@ bool WriteRunMovie(const std::filesystem::path& run_folder, const std::string& o
   const RecordedFrames run = ReadRecordedFrames(run_folder);
   MovieOptions options;
   options.forces = true;
-  options.workers = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8);
+  options.workers = CountDrawers();
   return WriteMovie({{run.model.get(), &run.frames}}, options, out, quiet);
 }
 

@@ -8,6 +8,9 @@
 
 namespace dexcheck::cli {
 
+/// Processes that draw unless told otherwise: one for each processor, at most 8.
+int CountDrawers();
+
 /// Draws runs into a film, with a progress bar. @return false when the user stopped it; nothing is then
 /// written.
 /// @throws InputError when a camera is unknown or the file cannot be written.

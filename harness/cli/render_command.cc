@@ -7,7 +7,6 @@
 #include <optional>
 #include <string>
 #include <system_error>
-#include <thread>
 #include <vector>
 
 #include "controller/common/errors.h"
@@ -82,9 +81,9 @@ ExitCode Run(Request request) {
 
 void AddRenderCommand(CLI::App* app, int* exit_code) {
   constexpr int kMostFramesPerSecond = 120;
-  constexpr int kMostThreads = 64;
+  constexpr int kMostJobs = 64;
   const auto request = std::make_shared<Request>();
-  request->movie.workers = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8);
+  request->movie.workers = CountDrawers();
   CLI::App* command = app->add_subcommand("render", "Draw a recorded run as a video, or one instant of it");
   command->add_option("RUN_DIR", request->run_folder, "Folder of the run")->required()->type_name("");
   command->add_option("--out", request->out, "Default: video.mp4 or still.png in RUN_DIR")->type_name("FILE");
@@ -106,10 +105,10 @@ void AddRenderCommand(CLI::App* app, int* exit_code) {
       ->check(WholeNumber(1, kMostFramesPerSecond))
       ->capture_default_str();
   command
-      ->add_option("--threads", request->movie.workers,
-                   "That draw; default: one for each processor, at most 8")
+      ->add_option("--jobs", request->movie.workers,
+                   "Processes that draw; default: one for each processor, at most 8")
       ->type_name("N")
-      ->check(WholeNumber(1, kMostThreads));
+      ->check(WholeNumber(1, kMostJobs));
   command->add_flag("--forces", request->movie.forces, "Draw contact forces and friction cones");
   command->add_flag("--tracks", request->movie.tracks, "Draw the contacts' tracks and the object's path");
   command->add_flag("--frames", request->movie.frames, "Draw the object's axes");

@@ -1,20 +1,20 @@
 // What a movie costs beyond MuJoCo's own drawing: the same frames drawn by mjr_render and mjr_readPixels
-// alone, and as a movie with panel and encoding. Both with two threads. Processor time, because the wall
+// alone, and as a movie with panel and encoding. Both with two processes. Processor time, because the wall
 // clock also counts others' work.
 //
 // render_benchmark [FRAMES]
 
 #include <fmt/format.h>
 #include <mujoco/mujoco.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cstdlib>
-#include <ctime>
-#include <latch>
-#include <mutex>
-#include <thread>
 #include <vector>
 
+#include "controller/common/errors.h"
 #include "harness/engine/engine.h"
 #include "renders/movie.h"
 #include "renders/offscreen_context.h"
@@ -31,10 +31,17 @@ struct Times {
   double processor;
 };
 
+/// Of this process and of its children that have ended.
 double ProcessorSeconds() {
-  std::timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  double seconds = 0.0;
+  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    ::getrusage(who, &usage);
+    for (const timeval& time : {usage.ru_utime, usage.ru_stime}) {
+      seconds += static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+    }
+  }
+  return seconds;
 }
 
 template <typename Function>
@@ -48,8 +55,7 @@ Times Measure(const Function& function) {
 
 /// Draws every n-th frame with the engine's functions and nothing else.
 void DrawBare(const mjModel& model, const RunFrames& run, const MovieOptions& options, long first,
-              long frames, std::latch* ready) {
-  static std::mutex mutex;
+              long frames) {
   const int width = options.samples * options.width;
   const int height = options.samples * options.height;
   const MjDataPtr data = MakeData(model);
@@ -58,26 +64,22 @@ void DrawBare(const mjModel& model, const RunFrames& run, const MovieOptions& op
   mjvOption visible;
   mjvCamera camera;
   mjrContext context;
-  {
-    const std::lock_guard lock(mutex);
-    const MjModelPtr sized(mj_copyModel(nullptr, &model));
-    sized->vis.global.offwidth = width;
-    sized->vis.global.offheight = height;
-    const RenderOptions defaults;
-    sized->vis.quality.offsamples = 0;
-    sized->vis.quality.shadowsize = options.shadow_size;
-    sized->vis.quality.numslices = defaults.slices;
-    sized->vis.quality.numstacks = defaults.stacks;
-    mjv_defaultScene(&scene);
-    mjv_makeScene(&model, &scene, 2000);
-    scene.flags[mjRND_REFLECTION] = 0;
-    mjv_defaultOption(&visible);
-    mjv_defaultCamera(&camera);
-    mjr_defaultContext(&context);
-    mjr_makeContext(sized.get(), &context, mjFONTSCALE_100);
-    mjr_setBuffer(mjFB_OFFSCREEN, &context);
-  }
-  ready->arrive_and_wait();
+  const MjModelPtr sized(mj_copyModel(nullptr, &model));
+  sized->vis.global.offwidth = width;
+  sized->vis.global.offheight = height;
+  const RenderOptions defaults;
+  sized->vis.quality.offsamples = 0;
+  sized->vis.quality.shadowsize = options.shadow_size;
+  sized->vis.quality.numslices = defaults.slices;
+  sized->vis.quality.numstacks = defaults.stacks;
+  mjv_defaultScene(&scene);
+  mjv_makeScene(&model, &scene, 2000);
+  scene.flags[mjRND_REFLECTION] = 0;
+  mjv_defaultOption(&visible);
+  mjv_defaultCamera(&camera);
+  mjr_defaultContext(&context);
+  mjr_makeContext(sized.get(), &context, mjFONTSCALE_100);
+  mjr_setBuffer(mjFB_OFFSCREEN, &context);
   camera.type = mjCAMERA_FIXED;
   camera.fixedcamid = mj_name2id(&model, mjOBJ_CAMERA, options.camera.c_str());
   std::vector<unsigned char> pixels(3 * static_cast<size_t>(width) * static_cast<size_t>(height));
@@ -97,16 +99,19 @@ int Run(long frames) {
   const MovieOptions options;
   const RunFrames run = testing::MakeKinematicRun(*model, static_cast<double>(frames) / options.fps, 0.001);
   const testing::TempFolder folder;
-  fmt::print("{} frames of {} x {}, {} samples a pixel, {} threads\n", frames, options.width, options.height,
-             options.samples * options.samples, options.workers);
+  fmt::print("{} frames of {} x {}, {} samples a pixel, {} processes\n", frames, options.width,
+             options.height, options.samples * options.samples, options.workers);
 
   const Times bare = Measure([&] {
-    std::vector<std::thread> threads;
-    std::latch ready(options.workers);
     for (int k = 0; k < options.workers; ++k) {
-      threads.emplace_back([&, k] { DrawBare(*model, run, options, k, frames, &ready); });
+      if (::fork() != 0) continue;
+      DrawBare(*model, run, options, k, frames);
+      ::_exit(EXIT_SUCCESS);
     }
-    for (std::thread& thread : threads) thread.join();
+    int status = 0;
+    while (::wait(&status) > 0) {
+      if (status != EXIT_SUCCESS) throw Error("a process that draws died");
+    }
   });
   const Times movie = Measure([&] {
     VideoOptions encoding;

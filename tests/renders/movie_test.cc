@@ -15,6 +15,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
+#include "renders/frame_line.h"
 #include "tests/common/files.h"
 #include "tests/common/run_program.h"
 #include "tests/common/throws.h"
@@ -99,7 +100,7 @@ TEST_F(MovieTest, DecodedFramesDifferWhereTheRobotMoved) {
   EXPECT_LT(Difference(first, last, 75, 100, 0, 100), 2.0) << "floor and sky";
 }
 
-TEST_F(MovieTest, FilmDoesNotDependOnTheNumberOfThreads) {
+TEST_F(MovieTest, FilmDoesNotDependOnTheNumberOfProcesses) {
   MovieOptions options = MakeOptions();
   options.forces = options.tracks = options.frames = true;
   options.inset = "grasp";
@@ -109,6 +110,30 @@ TEST_F(MovieTest, FilmDoesNotDependOnTheNumberOfThreads) {
   ASSERT_TRUE(Film(folder_.path() / "three.mp4", {&view_, 1}, options));
   EXPECT_TRUE(testing::ReadText(folder_.path() / "one.mp4") ==
               testing::ReadText(folder_.path() / "three.mp4"));
+}
+
+TEST_F(MovieTest, ProcessesDrawTheSameFramesByteForByte) {
+  MovieOptions options = MakeOptions();
+  options.forces = options.tracks = options.frames = true;
+  options.inset = "grasp";
+  constexpr long kFrames = 5;
+  std::vector<Image> own;
+  {
+    MoviePainter painter({&view_, 1}, options);
+    for (long frame = 0; frame < kFrames; ++frame)
+      own.push_back(painter.Paint(static_cast<double>(frame) / 10));
+  }
+  EXPECT_NE(own.front().rgb, own.back().rgb);
+  for (const int workers : {1, 2}) {
+    FrameLine line(
+        [&]() -> FrameLine::Painter {
+          return [painter = std::make_shared<MoviePainter>(std::span(&view_, 1), options)](long frame) {
+            return painter->Paint(static_cast<double>(frame) / 10);
+          };
+        },
+        kFrames, workers, kWidth, kHeight);
+    for (const Image& image : own) EXPECT_EQ(line.Take().rgb, image.rgb) << workers << " processes";
+  }
 }
 
 TEST_F(MovieTest, FramesAreTheStillsOfTheirTimes) {

@@ -110,10 +110,10 @@ TEST_F(RenderCommandTest, WritesAVideoIntoTheRunsFolder) {
   EXPECT_EQ(video.substr(4, 4), "ftyp");
   EXPECT_EQ(CountOutputs(), 1);
   EXPECT_EQ(RunDexcheck({"render", run_, "--size", "160x90", "--fps", "10", "--forces", "--tracks",
-                         "--frames", "--threads", "1", "--out", run_ + "/again.mp4", "--quiet"})
+                         "--frames", "--jobs", "1", "--out", run_ + "/again.mp4", "--quiet"})
                 .out,
             "");
-  EXPECT_EQ(testing::ReadText(run_ + "/again.mp4"), video) << "the number of threads does not matter";
+  EXPECT_EQ(testing::ReadText(run_ + "/again.mp4"), video) << "the number of processes does not matter";
 }
 
 TEST_F(RenderCommandTest, WritesAStillOfTwoRuns) {

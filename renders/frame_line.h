@@ -1,0 +1,63 @@
+#pragma once
+
+// Pictures drawn in processes of their own, several at a time.
+
+#include <sys/types.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "renders/image.h"
+
+namespace dexcheck {
+
+/// Processes that draw the frames of a film, each every n-th, and hand them over in order. Threads would wait
+/// for each other: OSMesa has one rasterizer for all contexts of a process and locks it for each picture. The
+/// processes end when this one does, however it ends.
+class FrameLine {
+ public:
+  /// Draws frame number `frame`.
+  using Painter = std::function<Image(long frame)>;
+
+  /// Begins to draw. Forks, so no other thread of this process may be drawing.
+  /// @param make_painter called once in each process.
+  /// @param frames how many, numbered from 0.
+  /// @param workers how many processes at most.
+  /// @param width, height of all pictures.
+  /// @throws Error when there is no memory for pictures or no process can be made.
+  FrameLine(const std::function<Painter()>& make_painter, long frames, int workers, int width, int height);
+  /// Ends the processes.
+  ~FrameLine();
+  FrameLine(const FrameLine&) = delete;
+  FrameLine& operator=(const FrameLine&) = delete;
+
+  /// The next frame, at most `frames` times. At most two frames of each process wait to be taken.
+  /// @throws what the frame's process threw: InputError and std::invalid_argument as such, everything else
+  /// as Error; also Error when the process died.
+  Image Take();
+
+ private:
+  struct Worker {
+    pid_t pid = -1;
+    int socket = -1;  // tells of drawn frames, and is told of those taken
+  };
+  void Start(const std::function<Painter()>& make_painter, long index);
+  [[noreturn]] void Work(const std::function<Painter()>& make_painter, long first, int socket) const;
+  void Draw(const std::function<Painter()>& make_painter, long first, int socket) const;
+  [[nodiscard]] std::uint8_t* FindSlot(long frame) const;
+  [[noreturn]] void Fail(Worker* worker, char told);
+  void Stop();
+
+  long frames_;
+  long num_workers_;
+  int width_;
+  int height_;
+  long taken_ = 0;
+  std::size_t size_ = 0;           // bytes of all slots
+  std::uint8_t* slots_ = nullptr;  // shared by all processes
+  std::vector<Worker> workers_;
+};
+
+}  // namespace dexcheck
