@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 
 #include "controller/common/errors.h"
 #include "controller/grasp/spread_points.h"
@@ -111,20 +112,25 @@ void PalmSearch::Try(const Pose& X_BP, const std::vector<VectorXd>& starts, std:
     return;
   }
   bool reached = false;
+  std::optional<PalmPose> best;
   for (const VectorXd& start : starts) {
     const ChainSolution solution = SolveArm(X_BP, start);
     tally_.nearest_miss = std::min(tally_.nearest_miss, solution.position);
     if (!solution.reached) continue;
     reached = true;
-    if (!IsArmClear(solution.q)) continue;
-    poses->push_back({X_BP, solution.q, CalcRangeMargin(solution.q, arm_.lower(), arm_.upper())});
-    return;
+    const double margin = CalcRangeMargin(solution.q, arm_.lower(), arm_.upper());
+    if (!IsArmClear(solution.q) || (best && margin <= best->arm_margin)) continue;
+    best = PalmPose{X_BP, solution.q, margin};
   }
-  ++(reached ? tally_.arm_blocked : tally_.missed);
+  if (best) {
+    poses->push_back(*best);
+  } else {
+    ++(reached ? tally_.arm_blocked : tally_.missed);
+  }
 }
 
 std::vector<PalmPose> PalmSearch::List() {
-  constexpr int kExtraStarts = 2;
+  constexpr int kExtraStarts = 4;
   std::vector<PalmPose> poses;
   for (const Vector3d& direction : ListDirections(X_Bo_, options_)) {
     for (int roll = 0; roll < kRolls; ++roll) {

@@ -52,6 +52,7 @@ class PalmSearch {
   [[nodiscard]] bool IsPalmClear(const Pose& X_BP) const;
   [[nodiscard]] bool IsArmClear(const VectorXd& q_arm) const;
   [[nodiscard]] ChainSolution SolveArm(const Pose& X_BP, const VectorXd& q_start) const;
+  /// Adds the pose with the arm posture that has the largest margin of those found from the starts, if any.
   void Try(const Pose& X_BP, const std::vector<VectorXd>& starts, std::vector<PalmPose>* poses);
 
   const HandReach& reach_;

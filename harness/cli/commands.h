@@ -29,6 +29,7 @@ void AddConsistencyCommand(CLI::App* app, int* exit_code);
 void AddDiagnoseCommand(CLI::App* app, int* exit_code);
 void AddMutateCommand(CLI::App* app, int* exit_code);
 void AddEvalCommand(CLI::App* app, int* exit_code);
+void AddPlanCommand(CLI::App* app, int* exit_code);
 /// @param command_line as typed, to be kept in the log.
 void AddRunCommand(CLI::App* app, const std::string& command_line, int* exit_code);
 void AddExportCommand(CLI::App* app, int* exit_code);

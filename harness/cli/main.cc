@@ -69,6 +69,7 @@ int Run(int argc, char** argv) {
   AddDiagnoseCommand(&app, &exit_code);
   AddMutateCommand(&app, &exit_code);
   AddEvalCommand(&app, &exit_code);
+  AddPlanCommand(&app, &exit_code);
   AddRunCommand(&app, JoinArguments(argc, argv), &exit_code);
   AddExportCommand(&app, &exit_code);
   AddRenderCommand(&app, &exit_code);

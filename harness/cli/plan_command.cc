@@ -1,0 +1,331 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/contact/contact_geometry.h"
+#include "controller/contact/grasp_map.h"
+#include "controller/contact/object_surface.h"
+#include "controller/contact/shapes.h"
+#include "controller/grasp/contact_plan.h"
+#include "controller/grasp/force_closure.h"
+#include "controller/model/parameter_reader.h"
+#include "controller/object/euler_zyz.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/json_matrix.h"
+#include "harness/cli/output_file.h"
+#include "harness/cli/shipped_files.h"
+
+namespace dexcheck::cli {
+namespace {
+
+struct Request {
+  std::filesystem::path robot = FindShippedFile("controller/parameters/assistant_robot.toml");
+  std::vector<double> xyz;  // m
+  std::vector<double> zyz_deg = {0, 0, 0};
+  std::string hand = "right";
+  std::string palm;                     // overrides `hand`
+  std::vector<std::string> joints_deg;  // NAME=VALUE
+  std::vector<std::string> arm_joints;
+  std::vector<double> lift;              // m
+  std::optional<double> support_height;  // m
+  ContactPlanOptions options;
+  std::string json_file;
+};
+
+[[noreturn]] void Fail(const std::string& option, const std::string& problem) {
+  throw InputError(option + ": " + problem);
+}
+
+int FindJoint(const RobotModel& model, const std::string& option, const std::string& name) {
+  const int joint = model.FindJoint(name);
+  if (joint < 0) Fail(option, Quote(name) + " is no joint of the model");
+  return joint;
+}
+
+/// The palm's frame and the fingertips that hang on its link.
+Hand FindHand(const RobotModel& model, const Request& request) {
+  const bool by_palm = !request.palm.empty();
+  const std::string name = by_palm ? request.palm : request.hand == "right" ? "r_palm_frame" : "l_palm_frame";
+  Hand hand;
+  try {
+    hand.palm_frame = model.FindFrame(name);
+  } catch (const std::invalid_argument&) {
+    Fail(by_palm ? "--palm" : "--hand", Quote(name) + " is no frame of the model");
+  }
+  const int palm = model.frames()[static_cast<size_t>(hand.palm_frame)].link;
+  for (const int tip : model.fingertips()) {
+    int joint = model.frames()[static_cast<size_t>(tip)].link;
+    while (joint >= 0 && joint != palm) joint = model.joints()[static_cast<size_t>(joint)].parent;
+    if (joint == palm) hand.fingertips.push_back(tip);
+  }
+  if (hand.fingertips.size() < 3) {
+    Fail(by_palm ? "--palm" : "--hand", "the link of " + Quote(name) + " carries " +
+                                            std::to_string(hand.fingertips.size()) +
+                                            " fingertips, at least three are needed");
+  }
+  hand.arm_joints = ListArmJoints(model, hand.fingertips, hand.palm_frame);
+  if (request.arm_joints.empty()) return hand;
+  hand.arm_joints.clear();
+  for (const std::string& joint : request.arm_joints) {
+    hand.arm_joints.push_back(FindJoint(model, "--arm-joints", joint));
+  }
+  return hand;
+}
+
+/// Arm joints in the middle of their ranges, all others 0, but for what the command line says.
+VectorXd MakeNominalPosture(const RobotModel& model, const Hand& hand, const Request& request) {
+  VectorXd q = VectorXd::Zero(model.num_positions());
+  for (const int index : hand.arm_joints) {
+    const Joint& joint = model.joints()[static_cast<size_t>(index)];
+    q[model.num_base_positions() + index] = 0.5 * (joint.lower + joint.upper);
+  }
+  for (const std::string& assignment : request.joints_deg) {
+    const size_t equals = assignment.find('=');
+    if (equals == std::string::npos) Fail("--joints-deg", "must be NAME=DEGREES, got " + Quote(assignment));
+    const char* const begin = assignment.data() + equals + 1;
+    const char* const end = assignment.data() + assignment.size();
+    double degrees = 0.0;
+    const std::from_chars_result result = std::from_chars(begin, end, degrees);
+    if (result.ec != std::errc() || result.ptr != end || !std::isfinite(degrees)) {
+      Fail("--joints-deg", "must be NAME=DEGREES, got " + Quote(assignment));
+    }
+    const int joint = FindJoint(model, "--joints-deg", assignment.substr(0, equals));
+    q[model.num_base_positions() + joint] = DegToRad(degrees);
+  }
+  return q;
+}
+
+/// Printed numbers: to a millionth of a degree or a micrometre.
+double Round(double value) { return std::round(value * 1e6) / 1e6; }
+
+std::string FormatRounded(const std::vector<double>& values) {
+  std::vector<double> rounded;
+  for (const double value : values) rounded.push_back(Round(value) + 0.0);
+  return FormatNumbers(rounded);
+}
+
+/// What a scenario's [grasp] says.
+struct GraspBlock {
+  std::vector<std::string> fingertips;
+  std::string frame;
+  std::vector<double> xyz;  // object in the palm frame, m
+  std::vector<double> zyz_deg;
+  std::vector<std::array<double, 2>> contacts_deg;
+  std::vector<std::pair<std::string, double>> joints_deg;  // those that are not 0
+};
+
+GraspBlock MakeGraspBlock(const RobotModel& model, const Hand& hand, const Surface& surface,
+                          const ContactPlan& plan) {
+  GraspBlock block;
+  for (const int tip : hand.fingertips) {
+    block.fingertips.push_back(model.frames()[static_cast<size_t>(tip)].name);
+  }
+  block.frame = model.frames()[static_cast<size_t>(hand.palm_frame)].name;
+  const Pose X_Po = plan.X_oP.inverse();
+  const Vector3d zyz = CalcAnyZyzAngles(X_Po.linear());
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    block.xyz.push_back(X_Po.translation()[i]);
+    block.zyz_deg.push_back(RadToDeg(zyz[i]));
+  }
+  for (const SurfacePoint& contact : plan.contacts) {
+    const SurfacePoint point = surface.ToChart(contact, 0);
+    block.contacts_deg.push_back({RadToDeg(point.u), RadToDeg(point.v)});
+  }
+  for (int joint = 0; joint < model.num_joints(); ++joint) {
+    const double position = plan.q[model.num_base_positions() + joint];
+    if (position != 0.0) {
+      block.joints_deg.emplace_back(model.joints()[static_cast<size_t>(joint)].name, RadToDeg(position));
+    }
+  }
+  return block;
+}
+
+/// The margin of the contacts that the shipped scenarios use: four fingertips on the torus's outer equator.
+std::optional<double> CalcHandPickedMargin(const Surface& surface, const Hand& hand, const Request& request) {
+  constexpr std::array<double, 4> kDegrees = {125.0, 90.0, 55.0, -90.0};
+  if (dynamic_cast<const Torus*>(&surface) == nullptr || hand.fingertips.size() != kDegrees.size()) return {};
+  const Sphere any_fingertip(1.0);  // m; forces on the object do not depend on it
+  std::vector<Contact> contacts;
+  for (const double degrees : kDegrees) {
+    const ContactCoordinates kappa{{0.0, 0.0, 0}, {DegToRad(degrees), 0.0, 0}, 0.0};
+    contacts.push_back({.geometry = CalcContactGeometry(any_fingertip, surface, kappa)});
+  }
+  Matrix6Xd G(6, CountForces(contacts));
+  CalcGraspMap(contacts, G);
+  ForceClosureOptions options;
+  options.length = request.options.length;
+  return CalcForceClosure(G, VectorXd::Constant(kDegrees.size(), request.options.mu), options).margin_lower;
+}
+
+void PrintText(const Request& request, const ContactPlan& plan, const GraspBlock& block,
+               const std::optional<double>& hand_picked, double seconds) {
+  fmt::print("# {} contacts for the object at {} m, {} degrees (ZYZ); {} palm poses tried in {:.2f} s\n",
+             block.contacts_deg.size(), FormatNumbers(request.xyz), FormatNumbers(request.zyz_deg),
+             plan.palm_poses, seconds);
+  fmt::print("# margin of force closure {:.3f} per newton of normal force, mu = {}", plan.margin,
+             FormatNumber(request.options.mu));
+  if (hand_picked) {
+    fmt::print("; contacts at 125, 90, 55, -90 degrees have {:.3f}", *hand_picked);
+  }
+  fmt::print("\n# every joint stays {:.3f} or more from the ends of its range\n", plan.joint_margin);
+  if (std::abs(std::sin(DegToRad(request.zyz_deg[1]))) < kMinSinBeta) {
+    fmt::print("# ZYZ angles are singular at this pose: in [control], orientation = \"rotation\"\n");
+  }
+  fmt::print("[grasp]\nfingertips = [");
+  const char* separator = "";
+  for (const std::string& name : block.fingertips) {
+    fmt::print("{}\"{}\"", separator, name);
+    separator = ", ";
+  }
+  fmt::print("]\nframe = \"{}\"\nxyz = {}\nzyz_deg = {}\ncontacts_deg = [", block.frame,
+             FormatRounded(block.xyz), FormatRounded(block.zyz_deg));
+  separator = "";
+  for (const std::array<double, 2>& contact : block.contacts_deg) {
+    fmt::print("{}{}", separator, FormatRounded({contact[0], contact[1]}));
+    separator = ", ";
+  }
+  fmt::print("]\njoints_deg = {{ ");
+  separator = "";
+  for (const auto& [name, degrees] : block.joints_deg) {
+    fmt::print("{}{} = {}", separator, name, FormatNumber(Round(degrees) + 0.0));
+    separator = ", ";
+  }
+  fmt::print(" }}\n");
+}
+
+std::string ToText(const Request& request, const ContactPlan& plan, const std::optional<GraspBlock>& block,
+                   const std::optional<double>& hand_picked, double seconds) {
+  Json json = {
+      {"found", plan.found},      {"object_xyz", request.xyz},     {"object_zyz_deg", request.zyz_deg},
+      {"mu", request.options.mu}, {"palm_poses", plan.palm_poses}, {"seconds", seconds}};
+  if (!plan.found) json["problem"] = plan.problem;
+  if (hand_picked) json["hand_picked_margin"] = *hand_picked;
+  if (block) {
+    json["margin"] = plan.margin;
+    json["joint_margin"] = plan.joint_margin;
+    json["q"] = ToList(plan.q);
+    json["q_open"] = ToList(plan.q_open);
+    json["grasp"] = {{"fingertips", block->fingertips},
+                     {"frame", block->frame},
+                     {"xyz", block->xyz},
+                     {"zyz_deg", block->zyz_deg},
+                     {"contacts_deg", block->contacts_deg},
+                     {"joints_deg", Json::object()}};
+    for (const auto& [name, degrees] : block->joints_deg) json["grasp"]["joints_deg"][name] = degrees;
+  }
+  return json.dump(2) + "\n";
+}
+
+int Run(Request request) {
+  const RobotModel model = ReadRobotModel(request.robot);
+  if (!model.object())
+    throw InputError(request.robot.string() + ": object: is missing, and a plan holds one");
+  std::unique_ptr<Surface> surface;
+  try {
+    surface = MakeSurface(model.object()->shape);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(request.robot.string() + ": " + error.what());
+  }
+  const Hand hand = FindHand(model, request);
+  const VectorXd nominal = MakeNominalPosture(model, hand, request);
+  const double tip_radius = *model.frames()[static_cast<size_t>(hand.fingertips.front())].sphere_radius;
+  if (const auto* cylinder = std::get_if<SolidCylinder>(&model.object()->shape)) {
+    request.options.half_length = std::max(0.5 * cylinder->length - tip_radius, 0.0);
+  }
+  if (request.support_height) {
+    request.options.support = SupportPlane{Vector3d::UnitZ(), *request.support_height};
+  }
+  if (!request.lift.empty()) {
+    request.options.reaches.emplace_back(request.lift[0], request.lift[1], request.lift[2]);
+  }
+  Vector6d X_o;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    X_o[i] = request.xyz[static_cast<size_t>(i)];
+    X_o[3 + i] = DegToRad(request.zyz_deg[static_cast<size_t>(i)]);
+  }
+  std::optional<OutputFile> json;
+  if (!request.json_file.empty()) json.emplace(request.json_file);
+
+  const auto start = std::chrono::steady_clock::now();
+  const ContactPlan plan = PlanContacts(model, hand, *surface, CalcObjectPose(X_o), nominal, request.options);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const std::optional<double> hand_picked = CalcHandPickedMargin(*surface, hand, request);
+  std::optional<GraspBlock> block;
+  if (plan.found) block = MakeGraspBlock(model, hand, *surface, plan);
+  if (json) json->Write(ToText(request, plan, block, hand_picked, seconds));
+  if (!plan.found) throw Error("no plan: " + plan.problem);
+  if (request.json_file != "-") PrintText(request, plan, *block, hand_picked, seconds);
+  return kSuccess;
+}
+
+}  // namespace
+
+void AddPlanCommand(CLI::App* app, int* exit_code) {
+  const auto request = std::make_shared<Request>();
+  CLI::App* command = app->add_subcommand("plan", "Choose where a hand should hold the object");
+  const auto contacts = std::make_shared<bool>(false);
+  command->add_flag("--contacts", *contacts, "Contact points, posture and margin, as a scenario's [grasp]")
+      ->required();
+  command->add_option("--object-xyz", request->xyz, "Object in the world, m")
+      ->type_name("X Y Z")
+      ->expected(3)
+      ->required();
+  command->add_option("--object-zyz-deg", request->zyz_deg, "Its orientation, ZYZ angles (default 0 0 0)")
+      ->type_name("A B C")
+      ->expected(3);
+  CLI::Option* hand = command->add_option("--hand", request->hand, "Of the assistant robot")
+                          ->type_name("right|left")
+                          ->check(CLI::IsMember({"right", "left"}))
+                          ->capture_default_str();
+  command
+      ->add_option("--palm", request->palm,
+                   "Frame of a palm, z along the fingers; the fingertips are those on its link")
+      ->type_name("FRAME")
+      ->excludes(hand);
+  command->add_option("--mu", request->options.mu, "Friction counted on")
+      ->type_name("MU")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--support-height", request->support_height,
+                   "Height of the table that the object lies on, m: the hand comes from above")
+      ->type_name("Z");
+  command
+      ->add_option("--lift", request->lift,
+                   "Displacement, m, that the arm must be able to make while holding")
+      ->type_name("X Y Z")
+      ->expected(3);
+  command->add_option("--joint-margin", request->options.joint_margin, "From the ends of ranges, rad or m")
+      ->type_name("MARGIN")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--joints-deg", request->joints_deg,
+          "Posture to stay near to; arm joints are otherwise in the middle of their ranges, others 0")
+      ->type_name("NAME=DEGREES");
+  command
+      ->add_option("--arm-joints", request->arm_joints,
+                   "Joints that may move the palm (default: those that move no other fingertips)")
+      ->type_name("NAME");
+  command->add_option("--robot", request->robot, "Parameter file (TOML) with fingertips and an object")
+      ->type_name("FILE.toml");
+  command
+      ->add_option("--json", request->json_file,
+                   "Write the plan to this file (- for standard output, then without the table)")
+      ->type_name("FILE.json");
+  command->callback([=] { *exit_code = Run(*request); });
+}
+
+}  // namespace dexcheck::cli
