@@ -9,7 +9,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/cli/run_folder.h"
+#include "harness/common/files.h"
 #include "harness/record/log_reader.h"
 
 namespace dexcheck::cli {

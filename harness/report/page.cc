@@ -7,6 +7,7 @@
 #include <cmath>
 #include <system_error>
 
+#include "harness/common/files.h"
 #include "harness/report/html.h"
 #include "harness/report/page_assets.h"
 #include "harness/report/page_plots.h"
