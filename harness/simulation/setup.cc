@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -34,7 +35,11 @@ RobotModel ReadModel(const Scenario& scenario, const std::filesystem::path& robo
 }  // namespace
 
 Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf)
-    : scenario_(scenario), model_(ReadModel(scenario, robot)), engine_(LoadMjcf(mjcf)) {
+    : Setup(scenario, robot, mjcf, LoadMjcf(mjcf)) {}
+
+Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
+             MjModelPtr engine)
+    : scenario_(scenario), model_(ReadModel(scenario, robot)), engine_(std::move(engine)) {
   if (!model_.object()) {
     throw InputError(robot.string() + ": object: is missing, and the scenario holds one");
   }
