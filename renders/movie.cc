@@ -8,6 +8,7 @@
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
 #include "renders/compose.h"
+#include "renders/course.h"
 #include "renders/frame_line.h"
 #include "renders/overlay.h"
 #include "renders/renderer.h"
@@ -22,7 +23,8 @@ constexpr double kInsetHeight = 0.36;  // of the picture's
 constexpr double kInsetAspect = 16.0 / 9.0;
 constexpr double kWidestInset = 0.45;  // of the picture's width
 
-constexpr double kNarrowShift = 0.15;  // of the picture's width
+constexpr double kNarrowShift = 0.15;   // of the picture's width
+constexpr double kCourseMargin = 0.03;  // likewise
 
 // A frame at k / fps belongs to the row recorded at that time even if the two quotients round differently.
 constexpr double kTimeRounding = 1e-9;
@@ -78,7 +80,7 @@ class MoviePainter::RunPainter {
   }
 
  private:
-  [[nodiscard]] RenderOptions MakeRenderOptions() const {
+  [[nodiscard]] RenderOptions MakeRenderOptions() {
     RenderOptions render;
     render.width = width_;
     render.height = options_.height;
@@ -89,7 +91,21 @@ class MoviePainter::RunPainter {
     if (options_.panel && width_ < options_.height * 5 / 4) render.shift_right = kNarrowShift;
     // Forces point into the object.
     if (options_.forces && run_.contacts() > 0) render.translucent_body = run_.object_body;
+    if (options_.camera == kCourseCamera || options_.inset == kCourseCamera) {
+      render.course = FindCourse(model_, run_, MakeEdges(), data_.get());
+    }
     return render;
+  }
+
+  /// What the whole run has to fit into: right of the panel, with a margin around.
+  [[nodiscard]] ViewEdges MakeEdges() const {
+    const double top = std::tan(0.5 * DegToRad(model_.vis.global.fovy));
+    const double side = top * width_ / options_.height;
+    const double margin = 2.0 * kCourseMargin * side;
+    const double covered = options_.panel && options_.camera == kCourseCamera
+                               ? Overlay::CalcCoveredWidth(width_, options_.height)
+                               : 0.0;
+    return {side * (1.0 - 2.0 * covered / width_) - margin, side - margin, top - margin, top - margin};
   }
 
   Image PaintInset(std::span<const Decoration> decorations) {

@@ -42,6 +42,8 @@ std::string Fit(std::string text, double width, double size, Font& font) {
   return text + "\u2026";
 }
 
+double CalcScale(int width, int height) { return std::min(height / 720.0, width / kNarrow); }
+
 }  // namespace
 
 std::string FormatSi(double value, const std::string& unit) {
@@ -98,8 +100,12 @@ void Overlay::DrawPlot(const OverlayState& state, const Vector2d& corner, const 
   if (!path.empty()) canvas->FillCircle(path.back(), 3.2 * s, kCurve);
 }
 
+double Overlay::CalcCoveredWidth(int width, int height) {
+  return (kMargin + kWidth) * CalcScale(width, height);
+}
+
 void Overlay::Draw(const OverlayState& state, Image* image) {
-  const double s = std::min(image->height / 720.0, image->width / kNarrow);
+  const double s = CalcScale(image->width, image->height);
   const bool has_plot = !state.history.empty();
   const int errors = (state.position_error ? 1 : 0) + (state.orientation_error ? 1 : 0);
   const auto rows = static_cast<double>(state.questions.size());

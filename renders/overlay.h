@@ -53,6 +53,9 @@ class Overlay {
   /// Loads the fonts. @throws InputError when they are not installed.
   Overlay();
 
+  /// How much of a picture of this size the panel may cover from the left, in pixels.
+  static double CalcCoveredWidth(int width, int height);
+
   /// Draws the panel into the upper left corner, as large as the picture's size asks for.
   void Draw(const OverlayState& state, Image* image);
 

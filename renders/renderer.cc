@@ -35,14 +35,17 @@ void CheckOptions(const RenderOptions& options) {
   check("stacks", options.stacks, 2, 64);
 }
 
-/// The camera's id. @throws InputError that lists the cameras.
+constexpr int kCourse = -1;
+
+/// The camera's id, or kCourse. @throws InputError that lists the cameras.
 int FindCamera(const mjModel& model, const std::string& name) {
   const int id = mj_name2id(&model, mjOBJ_CAMERA, name.c_str());
   if (id >= 0) return id;
+  if (name == kCourseCamera) return kCourse;
   std::string known;
   for (const std::string& camera : ListCameras(model)) known += (known.empty() ? "" : ", ") + camera;
   throw InputError("camera: no " + Quote(name) + " in the model, which has " +
-                   (known.empty() ? "no cameras" : known));
+                   (known.empty() ? "no cameras" : known) + "; besides there is " + kCourseCamera);
 }
 
 int FindBody(const mjModel& model, const std::string& name) {
@@ -105,11 +108,9 @@ class Renderer::Impl {
   Image Render(mjData& data, int camera, int width, int height, double shift_right,
                std::span<const Decoration> decorations) {
     gl_->MakeCurrent();
-    mjvCamera view;
-    mjv_defaultCamera(&view);
-    view.type = mjCAMERA_FIXED;
-    view.fixedcamid = camera;
+    mjvCamera view = MakeCamera(camera);
     mjv_updateScene(&model_, &data, &visible_, &perturb_, &view, mjCAT_ALL, &scene_);
+    if (camera == kCourse) shift_right = 0.0;
     for (mjvGLCamera& eye : scene_.camera) {
       const double visible = static_cast<double>(eye.frustum_top - eye.frustum_bottom) * width / height;
       eye.frustum_center -= static_cast<float>(shift_right * visible);
@@ -137,6 +138,18 @@ class Renderer::Impl {
   }
 
  private:
+  [[nodiscard]] mjvCamera MakeCamera(int camera) const {
+    mjvCamera view;
+    mjv_defaultCamera(&view);
+    view.type = camera == kCourse ? mjCAMERA_FREE : mjCAMERA_FIXED;
+    view.fixedcamid = camera;
+    std::copy_n(options_.course.look_at.data(), 3, view.lookat);
+    view.distance = options_.course.distance;
+    view.azimuth = RadToDeg(options_.course.azimuth);
+    view.elevation = RadToDeg(options_.course.elevation);
+    return view;
+  }
+
   void FadeBody() {
     if (translucent_body_ < 0) return;
     for (int i = 0; i < scene_.ngeom; ++i) {

@@ -9,13 +9,18 @@
 
 #include "renders/decoration.h"
 #include "renders/image.h"
+#include "renders/viewpoint.h"
 
 namespace dexcheck {
+
+/// A camera that stands still where RenderOptions::course says; an MJCF's camera of this name comes first.
+inline constexpr const char* kCourseCamera = "course";
 
 struct RenderOptions {
   int width = 1280;
   int height = 720;
-  std::string camera = "overview";  ///< A camera of the MJCF.
+  std::string camera = "overview";  ///< A camera of the MJCF, or kCourseCamera.
+  Viewpoint course;
   bool shadows = true;
   int shadow_size = 2048;  ///< Pixels of the shadow map.
   bool reflections = false;
@@ -26,7 +31,8 @@ struct RenderOptions {
   /// Round geoms are drawn with so many sides, and so many rings of them.
   int slices = 24;
   int stacks = 8;
-  /// Moves what the camera sees to the right by this share of the picture's width, to make room for a panel.
+  /// Moves what cameras of the MJCF see to the right by this share of the picture's width, to make room for a
+  /// panel.
   double shift_right = 0.0;
   std::string translucent_body;  ///< Its geoms are drawn with this opacity; none when empty.
   double translucent_opacity = 0.35;
@@ -35,7 +41,7 @@ struct RenderOptions {
 /// Names of the cameras of a model, in its order.
 std::vector<std::string> ListCameras(const mjModel& model);
 
-/// @throws InputError that lists the cameras, unless the model has this one.
+/// @throws InputError that lists the cameras, unless the model has this one or it is kCourseCamera.
 void CheckCamera(const mjModel& model, const std::string& name);
 
 /// Draws states of one model, off screen. Frames depend on their state alone: the same state gives the same

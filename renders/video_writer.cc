@@ -10,7 +10,7 @@ extern "C" {
 #include <cerrno>
 
 #include "controller/common/errors.h"
-#include "renders/partial_file.h"
+#include "harness/common/partial_file.h"
 
 namespace dexcheck {
 namespace {

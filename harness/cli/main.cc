@@ -14,6 +14,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
+#include "harness/common/shell.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -52,11 +53,7 @@ std::string Explain(const CLI::App& app, const CLI::ParseError& error) {
 /// The command line as one could type it.
 std::string JoinArguments(int argc, char** argv) {
   std::string text = "dexcheck";
-  for (int i = 1; i < argc; ++i) {
-    const std::string argument = argv[i];
-    const bool plain = argument.find_first_of(" \t\n\"'\\$*?;&|<>()[]{}") == std::string::npos;
-    text += plain ? " " + argument : " '" + argument + "'";
-  }
+  for (int i = 1; i < argc; ++i) text += " " + QuoteForShell(argv[i]);
   return text;
 }
 

@@ -8,6 +8,7 @@
 #include "harness/record/log_reader.h"
 #include "renders/movie.h"
 #include "renders/png_file.h"
+#include "renders/renderer.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -25,7 +26,9 @@ std::vector<Picture> DrawConfigurations(const std::filesystem::path& run_folder,
   MovieOptions options;
   options.width = 960;
   options.height = 600;
+  options.camera = kCourseCamera;  // so that one sees how far it came
   options.tracks = true;
+  options.panel = false;
   MoviePainter painter(views, options);
   const std::array<Picture, 2> pictures = {
       {{folder / "fig11a.png", "11 (a)", "Robot and object at the beginning"},

@@ -11,32 +11,21 @@
 
 namespace dexcheck::cli {
 
-OutputFile::OutputFile(const std::filesystem::path& path) : path_(path), target_(path) {
-  namespace fs = std::filesystem;
+OutputFile::OutputFile(const std::filesystem::path& path) : path_(path) {
   if (path == "-") {
     file_ = stdout;
     return;
   }
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  if (fs::is_directory(status)) Fail(EISDIR);
-  if (fs::exists(status)) {
-    if (::access(path.c_str(), W_OK) != 0) Fail(errno);
-    target_ = fs::canonical(path, error);
-    if (error) Fail(error.value());
-  }
-  const bool in_place = fs::exists(status) && !fs::is_regular_file(status);
-  if (!in_place) partial_ = target_.string() + ".partial-" + std::to_string(::getpid());
-  file_ = std::fopen(in_place ? target_.c_str() : partial_.c_str(), "wb");
-  if (file_ == nullptr) {
-    partial_.clear();
-    Fail(errno);
-  }
+  std::error_code ignored;
+  const std::filesystem::file_status status = std::filesystem::status(path, ignored);
+  const bool in_place = std::filesystem::is_other(status);
+  if (!in_place) partial_.emplace(path);
+  file_ = std::fopen(in_place ? path.c_str() : partial_->partial().c_str(), "wb");
+  if (file_ == nullptr) Fail(errno);
 }
 
 OutputFile::~OutputFile() {
   if (file_ != nullptr && !is_stdout()) std::fclose(file_);
-  if (!partial_.empty()) std::remove(partial_.c_str());
 }
 
 void OutputFile::Write(const std::string& text) {
@@ -51,12 +40,10 @@ void OutputFile::Append(const std::string& text) {
 void OutputFile::Finish() {
   if (std::fflush(file_) != 0) Fail(errno);
   if (is_stdout()) return;
-  if (!partial_.empty() && ::fsync(::fileno(file_)) != 0) Fail(errno);
+  if (partial_ && ::fsync(::fileno(file_)) != 0) Fail(errno);
   const int closed = std::fclose(std::exchange(file_, nullptr));
   if (closed != 0) Fail(errno);
-  if (partial_.empty()) return;
-  if (std::rename(partial_.c_str(), target_.c_str()) != 0) Fail(errno);
-  partial_.clear();
+  if (partial_) partial_->Commit();
 }
 
 void OutputFile::Fail(int error) const {

@@ -2,7 +2,10 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string>
+
+#include "harness/common/partial_file.h"
 
 namespace dexcheck::cli {
 
@@ -29,9 +32,8 @@ class OutputFile {
  private:
   [[noreturn]] void Fail(int error) const;
 
-  std::filesystem::path path_;     // as given, for messages
-  std::filesystem::path target_;   // links followed
-  std::filesystem::path partial_;  // empty when written in place
+  std::filesystem::path path_;          // as given, for messages
+  std::optional<PartialFile> partial_;  // none when written in place
   std::FILE* file_ = nullptr;
 };
 

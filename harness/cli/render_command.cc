@@ -48,10 +48,18 @@ void ReadSize(const std::string& text, MovieOptions* movie) {
 
 double Duration(const RunFrames& run) { return run.times.back() - run.times.front(); }
 
+/// Of the last step, whose end is no row of its own, s.
+double LastStep(const RunFrames& run) { return run.times.back() - run.times[run.times.size() - 2]; }
+
 void WriteStill(const Request& request, const std::vector<RunView>& views, const std::string& out) {
   double longest = 0.0;
-  for (const RunView& view : views) longest = std::max(longest, Duration(*view.frames));
-  if (!(*request.still >= 0.0 && *request.still <= longest)) {
+  double end = 0.0;
+  for (const RunView& view : views) {
+    longest = std::max(longest, Duration(*view.frames));
+    end = std::max(end, Duration(*view.frames) + LastStep(*view.frames));
+  }
+  constexpr double kTimeRounding = 1e-9;
+  if (!(*request.still >= 0.0 && *request.still <= end + kTimeRounding)) {
     throw InputError("--still: must be from 0 to " + FormatNumber(longest) + " s, got " +
                      FormatNumber(*request.still));
   }
@@ -91,7 +99,8 @@ void AddRenderCommand(CLI::App* app, int* exit_code) {
       ->type_name("T");
   command
       ->add_option("--camera", request->movie.camera,
-                   "overview, follow, grasp, top, or another of the MJCF's")
+                   "overview, follow, grasp, top, or another of the MJCF's; course stands still "
+                   "and sees the whole way")
       ->type_name("NAME")
       ->capture_default_str();
   command->add_option("--inset", request->movie.inset, "A second camera in the lower right corner")

@@ -1,11 +1,7 @@
 #include "harness/cli/run_folder.h"
 
-#include <stdlib.h>
-
 #include <algorithm>
 #include <bit>
-#include <cerrno>
-#include <cstring>
 #include <sstream>
 #include <system_error>
 
@@ -77,19 +73,6 @@ RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(p
   if (!std::filesystem::is_empty(path_, error) || error) {
     throw InputError(path_.string() + ": already holds files; give a new folder with --out");
   }
-}
-
-TemporaryFolder::TemporaryFolder() {
-  std::string pattern = (std::filesystem::temp_directory_path() / "dexcheck-XXXXXX").string();
-  if (::mkdtemp(pattern.data()) == nullptr) {
-    throw InputError(pattern + ": cannot be made: " + std::strerror(errno));
-  }
-  path_ = pattern;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
 }
 
 RecordedRun::RecordedRun(const std::filesystem::path& folder) : log_(folder / "log.h5") {

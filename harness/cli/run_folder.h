@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/common/files.h"
 #include "harness/record/log_reader.h"
 #include "harness/simulation/scenario.h"
 
@@ -38,19 +39,6 @@ class RunFolder {
   /// @param path empty for runs/NAME, or runs/NAME-2 and so on when that is taken.
   /// @throws InputError when the folder cannot be made, or has something in it.
   RunFolder(const std::string& path, const std::string& name);
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
-/// A folder that is removed at the end.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:

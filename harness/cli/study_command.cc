@@ -99,9 +99,9 @@ long RunMissing(const StudyInputs& inputs, const std::vector<Trial>& trials, con
 }
 
 int RunStudy(const Request& request) {
-  const StudyInputs inputs = FindStudy(request.study);
+  StudyInputs inputs = FindStudy(request.study);
   const std::vector<Trial> trials = SelectShard(ListTrials(inputs.study), request.shard);
-  CheckTrials(inputs);
+  CheckTrials(&inputs);
   StudyStore store = StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), inputs.study);
   CatchInterrupts();
   RunMissing(inputs, trials, request, &store);

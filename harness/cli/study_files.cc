@@ -11,6 +11,7 @@
 #include "controller/common/toml_reader.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/shipped_files.h"
+#include "harness/common/shell.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -35,13 +36,6 @@ std::filesystem::path FindStudyFile(const std::string& name) {
   const std::string nearest = FindNearest(name, known);
   throw InputError("study " + Quote(name) + ": is neither shipped (" + list + ") nor a TOML file" +
                    (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?"));
-}
-
-/// As one word of a shell.
-std::string QuoteForShell(const std::string& word) {
-  std::string quoted = "'";
-  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + "'";
 }
 
 }  // namespace

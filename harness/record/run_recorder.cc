@@ -1,10 +1,8 @@
 #include "harness/record/run_recorder.h"
 
 #include <algorithm>
-#include <fstream>
-#include <sstream>
 
-#include "controller/common/errors.h"
+#include "harness/common/files.h"
 #include "harness/record/mjcf_files.h"
 
 namespace dexcheck {
@@ -24,14 +22,6 @@ std::vector<std::string> Expand(const std::vector<std::string>& names,
     for (const char* part : parts) columns.push_back(name + "." + part);
   }
   return columns;
-}
-
-std::string ReadBytes(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  if (!file) throw InputError(path.string() + ": cannot be read");
-  return bytes.str();
 }
 
 int CountOf(const std::vector<std::string>& names) { return static_cast<int>(names.size()); }

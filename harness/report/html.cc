@@ -5,10 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
-#include <sstream>
-
-#include "controller/common/errors.h"
 
 namespace dexcheck {
 namespace {
@@ -81,14 +77,6 @@ std::string FormatShare(double share) {
   if (share > 10.0) return FormatShort(share) + " ×";
   const double percent = 100.0 * share;
   return percent < 0.01 ? "< 0.01 %" : fmt::format("{:.2g} %", percent);
-}
-
-std::string ReadBytes(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  if (!file) throw InputError(path.string() + ": cannot be read");
-  return bytes.str();
 }
 
 std::string MakeInlineSvg(std::string svg, const std::string& title) {

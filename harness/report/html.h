@@ -2,7 +2,6 @@
 
 // Pieces of HTML text.
 
-#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -18,9 +17,6 @@ std::string FormatShort(double value);
 
 /// "4.5 %", "0", "over 1000 x": a check's value as a share of its bound.
 std::string FormatShare(double share);
-
-/// @throws InputError "PATH: cannot be read".
-std::string ReadBytes(const std::filesystem::path& path);
 
 /// What gnuplot wrote as SVG, ready to stand in a page: without prolog, definitions and ids.
 std::string MakeInlineSvg(std::string svg, const std::string& title);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <system_error>
 
+#include "harness/common/files.h"
 #include "harness/report/html.h"
 #include "harness/report/page_assets.h"
 #include "harness/report/page_plots.h"
@@ -205,12 +206,13 @@ class Page {
         "<td class=\"value number\" data-label=\"bound\">{}{}</td>"
         "<td data-label=\"of bound\"><span class=\"number\">{}</span><span class=\"meter\"><i "
         "style=\"width:{:.1f}%\">"
-        "</i></span></td><td class=\"where\" data-label=\"\"><small>{}</small></td></tr>\n",
+        "</i></span></td><td class=\"where\" data-label=\"{}\"><small>{}</small></td></tr>\n",
         check.pass ? "pass" : "fail", EscapeHtml(check.name), EscapeHtml(check.description), verdict,
         cause.empty() ? "" : "<small>cause: " + EscapeHtml(cause) + "</small>", NameOf(check.kind),
         FormatShort(check.max), check.max == 0.0 ? "" : EscapeHtml(unit), FormatShort(check.bound),
         check.bound == 0.0 ? "" : EscapeHtml(unit), FormatShare(share),
-        100.0 * std::clamp(std::isfinite(share) ? share : 1.0, 0.0, 1.0), EscapeHtml(where));
+        100.0 * std::clamp(std::isfinite(share) ? share : 1.0, 0.0, 1.0), where.empty() ? "" : "at",
+        EscapeHtml(where));
   }
 
   void AddCheckTable(const std::vector<const CheckLine*>& checks) {

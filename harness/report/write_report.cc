@@ -1,7 +1,5 @@
 #include "harness/report/write_report.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
@@ -13,35 +11,14 @@
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "harness/common/files.h"
+#include "harness/common/partial_file.h"
 #include "harness/report/run_figures.h"
-#include "renders/partial_file.h"
 
 namespace dexcheck {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A new folder for drawing, removed at the end.
-class DrawingFolder {
- public:
-  DrawingFolder() {
-    std::string name = (fs::temp_directory_path() / "dexcheck-report-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) {
-      throw InputError(name + ": cannot be made: " + std::strerror(errno));
-    }
-    path_ = name;
-  }
-  ~DrawingFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  DrawingFolder(const DrawingFolder&) = delete;
-  DrawingFolder& operator=(const DrawingFolder&) = delete;
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 void WriteText(const std::string& text, const PartialFile& file) {
   std::ofstream stream(file.partial(), std::ios::binary);
@@ -110,7 +87,7 @@ void WriteRunReport(const fs::path& run_dir, const ReportFiles& files, const Pic
   std::optional<FigureFolder> folder;
   if (!files.figures.empty()) folder.emplace(files.figures);
 
-  const DrawingFolder drawings;
+  const TemporaryFolder drawings;
   PageContent content;
   content.drawings = drawings.path();
   content.figures = MakeMotionFigures(run);

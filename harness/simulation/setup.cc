@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -40,7 +41,11 @@ double Draw(std::mt19937_64* random) {
 }  // namespace
 
 Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf)
-    : scenario_(scenario), model_(ReadModel(scenario, robot)), engine_(LoadMjcf(mjcf)) {
+    : Setup(scenario, robot, mjcf, LoadMjcf(mjcf)) {}
+
+Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
+             MjModelPtr engine)
+    : scenario_(scenario), model_(ReadModel(scenario, robot)), engine_(std::move(engine)) {
   if (!model_.object()) {
     throw InputError(robot.string() + ": object: is missing, and the scenario holds one");
   }

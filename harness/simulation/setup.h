@@ -26,6 +26,9 @@ class Setup {
   /// @param robot parameter file. @param mjcf scene.
   /// @throws InputError when a file, a name or a value cannot be used.
   Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf);
+  /// The same with the scene compiled already, which is most of the work. @param mjcf names it in messages.
+  Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
+        MjModelPtr engine);
   Setup(const Setup&) = delete;
   Setup& operator=(const Setup&) = delete;
 

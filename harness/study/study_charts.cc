@@ -11,15 +11,20 @@
 namespace dexcheck {
 namespace {
 
-constexpr double kWidth = 560.0;
 constexpr double kHeight = 420.0;
+constexpr double kInnerWidth = 435.0;
 constexpr double kLeft = 70.0;
 constexpr double kRight = 15.0;
+constexpr double kScaleRoom = 60.0;  // for a scale of colours
 constexpr double kTop = 30.0;
 constexpr double kBottom = 50.0;
-constexpr double kInnerWidth = kWidth - kLeft - kRight;
+constexpr double kWidth = kLeft + kInnerWidth + kRight;
+constexpr double kKeyRow = 17.0;
 constexpr double kInnerHeight = kHeight - kTop - kBottom;
 constexpr double kDecades = 30.0;  // ratio from which a logarithm shows more
+
+/// Whether a logarithm shows more.
+bool IsWide(double least, double most) { return least > 0.0 && most / least > kDecades; }
 
 double Scale(double value, bool logarithmic) { return logarithmic ? std::log(value) : value; }
 
@@ -34,11 +39,12 @@ double FindPlace(const Axis& axis, double value) {
   return static_cast<double>(i) + (Scale(value, axis.logarithmic) - from) / (to - from);
 }
 
-std::string Open(const std::string& title) {
+std::string Open(const std::string& title, double width, double height) {
   return fmt::format(
-      "<figure><svg viewBox=\"0 0 {} {}\" width=\"{}\" height=\"{}\" role=\"img\">\n<title>{}</title>\n"
+      "<figure class=\"card\"><svg viewBox=\"0 0 {} {}\" width=\"{}\" height=\"{}\" "
+      "role=\"img\">\n<title>{}</title>\n"
       "<text x=\"{}\" y=\"18\" class=\"title\">{}</text>\n",
-      kWidth, kHeight, kWidth, kHeight, EscapeHtml(title), kLeft, EscapeHtml(title));
+      width, height, width, height, EscapeHtml(title), kLeft, EscapeHtml(title));
 }
 
 std::string DrawLabels(const Axis& x, const Axis& y) {
@@ -49,14 +55,52 @@ std::string DrawLabels(const Axis& x, const Axis& y) {
       EscapeHtml(y.label));
 }
 
-std::string DrawTick(bool horizontal, double at, double value) {
+constexpr int kRoundDigits = 6;  // enough for values that are round
+
+/// "0.02", "3e-7".
+std::string FormatTick(double value, int digits) {
+  if (value == 0.0) return "0";
+  std::string text = fmt::format("{:.{}g}", value, digits);
+  const size_t exponent = text.find('e');
+  if (exponent == std::string::npos) return text;
+  return fmt::format("{}e{}", text.substr(0, exponent), std::stoi(text.substr(exponent + 1)));
+}
+
+/// Round values between two ends, some four to eight.
+std::vector<double> ListRoundValues(double from, double to, bool logarithmic) {
+  std::vector<double> ticks;
+  if (logarithmic && to / from >= 10.0) {
+    const int first = static_cast<int>(std::floor(std::log10(from)));
+    const int last = static_cast<int>(std::ceil(std::log10(to)));
+    const int every = (last - first + 7) / 8;
+    for (int decade = first; decade <= last; decade += every) {
+      for (const double digit : {1.0, 2.0, 5.0}) {
+        const double value = digit * std::pow(10.0, decade);
+        if ((digit == 1.0 || last - first <= 2) && value >= from && value <= to) ticks.push_back(value);
+      }
+    }
+    return ticks;
+  }
+  const double rough = (to - from) / 5.0;
+  if (!(rough > 1e-12 * std::max(std::abs(from), std::abs(to)))) return {from};
+  const double decade = std::pow(10.0, std::floor(std::log10(rough)));
+  const double digit = rough / decade;
+  const double step = decade * (digit > 7.0 ? 10.0 : digit > 3.5 ? 5.0 : digit > 1.5 ? 2.0 : 1.0);
+  for (double k = std::ceil(from / step - 1e-9); k * step <= to + 1e-9 * step; ++k) ticks.push_back(k * step);
+  return ticks;
+}
+
+std::string DrawTick(bool horizontal, double at, const std::string& label) {
   if (horizontal) {
     return fmt::format(
-        "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\" class=\"tick\">{:.3g}</text>\n", at,
-        kTop + kInnerHeight + 16.0, value);
+        "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\" class=\"mark\"/>"
+        "<text x=\"{0:.1f}\" y=\"{3:.1f}\" text-anchor=\"middle\" class=\"tick\">{4}</text>\n",
+        at, kTop + kInnerHeight, kTop + kInnerHeight + 4.0, kTop + kInnerHeight + 17.0, label);
   }
-  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\" class=\"tick\">{:.3g}</text>\n",
-                     kLeft - 6.0, at + 4.0, value);
+  return fmt::format(
+      "<line x1=\"{0:.1f}\" x2=\"{1:.1f}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\" class=\"mark\"/>"
+      "<text x=\"{3:.1f}\" y=\"{4:.1f}\" text-anchor=\"end\" class=\"tick\">{5}</text>\n",
+      kLeft - 4.0, kLeft, at, kLeft - 7.0, at + 4.0, label);
 }
 
 std::string Link(const std::string& link, const std::string& title, const std::string& shape) {
@@ -80,7 +124,7 @@ void Fit(Axis* axis, const std::vector<double>& values) {
     most = std::max(most, value);
   }
   if (!(least <= most)) least = most = 1.0;
-  axis->logarithmic = least > 0.0 && most / least > kDecades;
+  axis->logarithmic = IsWide(least, most);
   const double from = Scale(least, axis->logarithmic);
   const double to = Scale(most, axis->logarithmic);
   const double room = to > from ? 0.04 * (to - from) : 0.5 * std::max(std::abs(from), 1e-300);
@@ -88,11 +132,58 @@ void Fit(Axis* axis, const std::vector<double>& values) {
   if (axis->logarithmic) axis->values = {std::exp(from - room), std::exp(to + room)};
 }
 
+/// All values of a few cells, round ones of many.
+std::vector<double> ListCellTicks(const Axis& axis) {
+  constexpr size_t kMostCells = 13;
+  if (axis.values.size() <= kMostCells) return axis.values;
+  return ListRoundValues(axis.values.front(), axis.values.back(), axis.logarithmic);
+}
+
+/// Colours from the least value to the most, right of the map.
+std::string DrawScale(double least, double most) {
+  constexpr int kSteps = 40;
+  constexpr double kLeftEdge = kLeft + kInnerWidth + 14.0;
+  constexpr double kBarWidth = 12.0;
+  const bool logarithmic = IsWide(least, most);
+  const double from = Scale(least, logarithmic);
+  const double to = Scale(most, logarithmic);
+  const auto place = [&](double value) {
+    return kTop + kInnerHeight * (to > from ? (to - Scale(value, logarithmic)) / (to - from) : 0.5);
+  };
+  std::string svg;
+  for (int i = 0; i < kSteps; ++i) {
+    const double at = from + (i + 0.5) / kSteps * (to - from);
+    const double height = kInnerHeight / kSteps;
+    svg += fmt::format("<rect x=\"{:.1f}\" y=\"{:.2f}\" width=\"{}\" height=\"{:.2f}\" fill=\"{}\"/>\n",
+                       kLeftEdge, kTop + kInnerHeight - (i + 1) * height, kBarWidth, height + 0.3,
+                       ColorOf(logarithmic ? std::exp(at) : at, least, most));
+  }
+  const auto label = [&](double value) {
+    return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" class=\"tick\">{}</text>\n",
+                       kLeftEdge + kBarWidth + 4.0, place(value) + 4.0, FormatTick(value, kRoundDigits));
+  };
+  if (!(to > from)) return svg + label(least);
+  for (const double value : ListRoundValues(least, most, logarithmic)) svg += label(value);
+  return svg;
+}
+
+constexpr int kKeyColumns = 2;
+
+/// Below the chart.
+std::string DrawKey(int number, const ChartLine& line) {
+  const double x = kLeft + kInnerWidth / kKeyColumns * (number % kKeyColumns);
+  const double y = kHeight + kKeyRow * (number / kKeyColumns) + 4.0;
+  return fmt::format(
+      "<line x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\" stroke-width=\"2.5\"/>"
+      "<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
+      x, x + 18.0, y, y, line.color, x + 24.0, y + 4.0, EscapeHtml(line.label));
+}
+
 }  // namespace
 
 std::string ColorOf(double value, double least, double most) {
   if (!std::isfinite(value)) return "#e8e8e8";
-  const bool logarithmic = least > 0.0 && most / least > kDecades;
+  const bool logarithmic = IsWide(least, most);
   const double from = Scale(least, logarithmic);
   const double to = Scale(most, logarithmic);
   const double share =
@@ -112,7 +203,7 @@ std::string DrawHeatMap(const HeatMap& map) {
   const double h = kInnerHeight / static_cast<double>(rows);
   const auto left = [&](double column) { return kLeft + w * column; };
   const auto top = [&](double row) { return kTop + kInnerHeight - h * (row + 1.0); };
-  std::string svg = Open(map.title);
+  std::string svg = Open(map.title, kWidth + (map.range ? kScaleRoom : 0.0), kHeight);
   std::string edges;
   for (size_t j = 0; j < rows; ++j) {
     for (size_t i = 0; i < columns; ++i) {
@@ -132,19 +223,17 @@ std::string DrawHeatMap(const HeatMap& map) {
     }
   }
   svg += edges;
-  for (const auto& [color, points] : map.overlays) {
-    for (const auto& [x, y] : points) {
-      svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2\" fill=\"{}\"/>\n",
-                         left(FindPlace(map.x, x) + 0.5), top(FindPlace(map.y, y) - 0.5), color);
+  for (const Dots& dots : map.overlays) {
+    for (const auto& [x, y] : dots.points) {
+      svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.2\" fill=\"{}\" class=\"dot\"/>\n",
+                         left(FindPlace(map.x, x) + 0.5), top(FindPlace(map.y, y) - 0.5), dots.color);
     }
   }
-  constexpr size_t kMostTicks = 8;
-  for (size_t i = 0; i < columns; i += (columns + kMostTicks - 1) / kMostTicks) {
-    svg += DrawTick(true, left(static_cast<double>(i) + 0.5), map.x.values[i]);
-  }
-  for (size_t j = 0; j < rows; j += (rows + kMostTicks - 1) / kMostTicks) {
-    svg += DrawTick(false, top(static_cast<double>(j) - 0.5), map.y.values[j]);
-  }
+  for (const double value : ListCellTicks(map.x))
+    svg += DrawTick(true, left(FindPlace(map.x, value) + 0.5), FormatTick(value, 3));
+  for (const double value : ListCellTicks(map.y))
+    svg += DrawTick(false, top(FindPlace(map.y, value) - 0.5), FormatTick(value, 3));
+  if (map.range) svg += DrawScale((*map.range)[0], (*map.range)[1]);
   return svg + DrawLabels(map.x, map.y) + "</svg></figure>\n";
 }
 
@@ -165,21 +254,19 @@ std::string DrawChart(Chart chart) {
   Fit(&chart.y, ys);
   const auto place_x = [&](double x) { return kLeft + kInnerWidth * FindPlace(chart.x, x); };
   const auto place_y = [&](double y) { return kTop + kInnerHeight * (1.0 - FindPlace(chart.y, y)); };
-  std::string svg = Open(chart.title);
+  const auto named = static_cast<int>(std::count_if(
+      chart.lines.begin(), chart.lines.end(), [](const ChartLine& line) { return !line.label.empty(); }));
+  std::string svg = Open(chart.title, kWidth, kHeight + kKeyRow * ((named + kKeyColumns - 1) / kKeyColumns));
   svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"frame\"/>\n", kLeft, kTop,
                      kInnerWidth, kInnerHeight);
-  constexpr int kTicks = 5;
-  const auto tick = [](const Axis& axis, double share) {
-    const double from = Scale(axis.values[0], axis.logarithmic);
-    const double at = from + share * (Scale(axis.values[1], axis.logarithmic) - from);
-    return axis.logarithmic ? std::exp(at) : at;
+  const auto list = [](const Axis& axis) {
+    return ListRoundValues(axis.values[0], axis.values[1], axis.logarithmic);
   };
-  for (int i = 0; i <= kTicks; ++i) {
-    const double share = static_cast<double>(i) / kTicks;
-    svg += DrawTick(true, kLeft + share * kInnerWidth, tick(chart.x, share));
-    svg += DrawTick(false, kTop + (1.0 - share) * kInnerHeight, tick(chart.y, share));
-  }
-  double legend = kTop + 14.0;
+  for (const double value : list(chart.x))
+    svg += DrawTick(true, place_x(value), FormatTick(value, kRoundDigits));
+  for (const double value : list(chart.y))
+    svg += DrawTick(false, place_y(value), FormatTick(value, kRoundDigits));
+  int key = 0;
   for (const ChartLine& line : chart.lines) {
     std::string points;
     for (const auto& [x, y] : line.points) {
@@ -187,10 +274,7 @@ std::string DrawChart(Chart chart) {
     }
     svg += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"/>\n", points,
                        line.color);
-    if (line.label.empty()) continue;
-    svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\" fill=\"{}\">{}</text>\n",
-                       kLeft + kInnerWidth - 6.0, legend, line.color, EscapeHtml(line.label));
-    legend += 15.0;
+    if (!line.label.empty()) svg += DrawKey(key++, line);
   }
   for (const ChartPoint& point : chart.points) {
     if (!std::isfinite(point.x) || !std::isfinite(point.y)) continue;

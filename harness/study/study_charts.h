@@ -2,6 +2,7 @@
 
 // Charts of studies as inline SVG.
 
+#include <array>
 #include <optional>
 #include <string>
 #include <utility>
@@ -22,13 +23,19 @@ struct HeatCell {
   bool held = true;  ///< Between held and other cells runs the measured boundary.
 };
 
+/// Dots in data coordinates.
+struct Dots {
+  std::string color;
+  std::vector<std::pair<double, double>> points;
+};
+
 struct HeatMap {
   std::string title;
   Axis x, y;
   std::vector<HeatCell> cells;  ///< Row by row of y, from the least.
   bool with_boundary = false;
-  /// Dots in data coordinates, with a CSS colour each.
-  std::vector<std::pair<std::string, std::vector<std::pair<double, double>>>> overlays;
+  std::optional<std::array<double, 2>> range;  ///< Of the values that colours stand for; none for no scale.
+  std::vector<Dots> overlays;
 };
 std::string DrawHeatMap(const HeatMap& map);
 

@@ -3,12 +3,11 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
+#include "harness/common/files.h"
 #include "harness/engine/engine.h"
 #include "harness/record/mjcf_files.h"
 #include "harness/study/git_revision.h"
@@ -28,12 +27,6 @@ std::string Hash(const std::string& text) {
   std::string digits;
   for (int shift = 60; shift >= 0; shift -= 4) digits += kDigits[(hash >> shift) & 15U];
   return digits;
-}
-
-std::string ReadBytes(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path.string() + ": cannot be read");
-  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 std::string HashMjcf(const std::filesystem::path& mjcf) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace dexcheck {
 namespace {
@@ -10,15 +11,23 @@ constexpr int kColumns = 60;
 constexpr int kRows = 40;
 constexpr int kBisections = 8;
 
-template <typename Test>
-bool TestAxes(const StudyInputs& inputs, const std::vector<double>& parameters, const Test& test) {
-  const Scenario scenario = MakeTrialScenario(inputs, {0, 0, parameters});
+SampledLoop MakeLoop(const Scenario& scenario) {
   SampledLoop loop;
   loop.time_step = scenario.plant.time_step;
   loop.hold = std::max(1L, std::lround(scenario.plant.control_step / scenario.plant.time_step));
+  return loop;
+}
+
+AxisGains GainsOf(const Scenario& scenario, int axis) {
+  return {scenario.control.gains.K_p[axis], scenario.control.gains.K_v[axis]};
+}
+
+template <typename Test>
+bool TestAxes(const StudyInputs& inputs, const std::vector<double>& parameters, const Test& test) {
+  const Scenario scenario = MakeTrialScenario(inputs, {0, 0, parameters});
+  const SampledLoop loop = MakeLoop(scenario);
   for (int axis = 0; axis < 6; ++axis) {
-    if (!test(loop, AxisGains{scenario.control.gains.K_p[axis], scenario.control.gains.K_v[axis]}))
-      return false;
+    if (!test(loop, GainsOf(scenario, axis))) return false;
   }
   return true;
 }
@@ -44,10 +53,24 @@ bool IsDampedInTheory(const StudyInputs& inputs, const std::vector<double>& para
   });
 }
 
+double CalcOvershootInTheory(const StudyInputs& inputs, const std::vector<double>& parameters) {
+  const Scenario scenario = MakeTrialScenario(inputs, {0, 0, parameters});
+  const SampledLoop loop = MakeLoop(scenario);
+  const long steps = std::lround(scenario.duration / loop.time_step);
+  double overshoot = 0.0;
+  for (int axis = 0; axis < 6; ++axis) {
+    if (scenario.start_error[axis] == 0.0) continue;
+    for (const double error : CalcStepResponse(loop, GainsOf(scenario, axis), steps)) {
+      if (!(std::abs(error) <= 1.0)) return std::numeric_limits<double>::infinity();
+      overshoot = std::max(overshoot, -error);
+    }
+  }
+  return overshoot;
+}
+
 std::vector<std::pair<double, double>> FindTurns(const StudyInputs& inputs,
                                                  const std::vector<double>& parameters,
-                                                 bool (*holds)(const StudyInputs&,
-                                                               const std::vector<double>&)) {
+                                                 const TheoryTest& holds) {
   const Variation& x = inputs.study.variations[0];
   const Variation& y = inputs.study.variations[1];
   std::vector<double> point = parameters;

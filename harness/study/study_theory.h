@@ -2,6 +2,7 @@
 
 // What the sampled error dynamics say of a study's trials.
 
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -17,11 +18,16 @@ bool IsStableInTheory(const StudyInputs& inputs, const std::vector<double>& para
 /// Whether it is damped at least critically on all axes.
 bool IsDampedInTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
 
+/// Overshoot of the step response to the start error within the run, relative to it; 0 when there is none.
+/// The largest of the axes on which the object starts beside its place.
+double CalcOvershootInTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
+
+using TheoryTest = std::function<bool(const StudyInputs&, const std::vector<double>&)>;
+
 /// Points (value of the first varied key, value of the second) at which `holds` turns over, the other keys at
 /// the parameters given; found along the second key.
 std::vector<std::pair<double, double>> FindTurns(const StudyInputs& inputs,
                                                  const std::vector<double>& parameters,
-                                                 bool (*holds)(const StudyInputs&,
-                                                               const std::vector<double>&));
+                                                 const TheoryTest& holds);
 
 }  // namespace dexcheck

@@ -1,16 +1,15 @@
 #include "harness/study/trial.h"
 
 #include <limits>
+#include <new>
 
 #include "controller/common/errors.h"
+#include "harness/engine/engine.h"
 #include "harness/simulation/runner.h"
 #include "harness/study/trial_monitor.h"
 
 namespace dexcheck {
 namespace {
-
-/// A run without a start error diverged when its error is above this, rms, m.
-constexpr double kLostTrack = 0.01;
 
 /// The message without the folders of this machine.
 std::string WithoutFolders(std::string message, const StudyInputs& inputs) {
@@ -21,6 +20,13 @@ std::string WithoutFolders(std::string message, const StudyInputs& inputs) {
     }
   }
   return message;
+}
+
+MjModelPtr MakeEngine(const StudyInputs& inputs) {
+  if (!inputs.engine) return LoadMjcf(inputs.mjcf);
+  MjModelPtr copy(mj_copyModel(nullptr, inputs.engine.get()));
+  if (!copy) throw std::bad_alloc();
+  return copy;
 }
 
 bool HasDiverged(const Setup& setup, const TrialResult& result) {
@@ -51,7 +57,7 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
   TrialResult result;
   try {
     const Scenario scenario = MakeTrialScenario(inputs, trial);
-    const Setup setup(scenario, inputs.robot, inputs.mjcf);
+    const Setup setup(scenario, inputs.robot, inputs.mjcf, MakeEngine(inputs));
     Runner runner(setup, inputs.study.check);
     TrialMonitor monitor(setup, runner.loop());
     const RunResult& run = runner.Run([&] { monitor.Record(); }, [] { return false; });
@@ -66,16 +72,17 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
   return result;
 }
 
-void CheckTrials(const StudyInputs& inputs) {
-  const Study& study = inputs.study;
+void CheckTrials(StudyInputs* inputs) {
+  const Study& study = inputs->study;
   Trial trial = ListTrials(study).front();
-  const Scenario first = MakeTrialScenario(inputs, trial);
-  const Setup setup(first, inputs.robot, inputs.mjcf);
+  const Scenario first = MakeTrialScenario(*inputs, trial);
+  inputs->engine = LoadMjcf(inputs->mjcf);
+  const Setup setup(first, inputs->robot, inputs->mjcf, MakeEngine(*inputs));
   for (size_t i = 0; i < study.variations.size(); ++i) {
     const double value = trial.parameters[i];
     for (const double end : {study.variations[i].from, study.variations[i].to}) {
       trial.parameters[i] = end;
-      MakeTrialScenario(inputs, trial);
+      MakeTrialScenario(*inputs, trial);
     }
     trial.parameters[i] = value;
   }

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 
+#include "harness/engine/engine.h"
 #include "harness/simulation/scenario.h"
 #include "harness/study/study.h"
 #include "harness/study/trial_result.h"
@@ -17,7 +19,11 @@ struct StudyInputs {
   std::filesystem::path scenario_folder;
   std::filesystem::path robot;
   std::filesystem::path mjcf;
+  std::shared_ptr<const mjModel> engine;  ///< The MJCF compiled, for all trials; none before CheckTrials.
 };
+
+/// A run without a start error diverged when its error is above this, rms, m.
+constexpr double kLostTrack = 0.01;
 
 /// The scenario of one trial. @throws InputError as ParseScenario.
 Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial);
@@ -26,7 +32,7 @@ Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial);
 TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial);
 
 /// Parses what the ends of all ranges make of the scenario, and sets up the first trial, so that a mistake is
-/// found before anything runs. @throws InputError.
-void CheckTrials(const StudyInputs& inputs);
+/// found before anything runs. Compiles the MJCF once, for all. @throws InputError.
+void CheckTrials(StudyInputs* inputs);
 
 }  // namespace dexcheck

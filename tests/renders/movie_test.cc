@@ -16,6 +16,7 @@
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
 #include "renders/frame_line.h"
+#include "renders/renderer.h"
 #include "tests/common/files.h"
 #include "tests/common/run_program.h"
 #include "tests/common/throws.h"
@@ -62,7 +63,8 @@ class MovieTest : public ::testing::Test {
 };
 
 /// Mean difference of two frames over a rectangle given in hundredths of the picture.
-double Difference(const char* a, const char* b, int left, int right, int top, int bottom) {
+template <typename Byte>
+double Difference(const Byte* a, const Byte* b, int left, int right, int top, int bottom) {
   double sum = 0.0;
   int count = 0;
   for (int y = kHeight * top / 100; y < kHeight * bottom / 100; ++y) {
@@ -98,6 +100,27 @@ TEST_F(MovieTest, DecodedFramesDifferWhereTheRobotMoved) {
   EXPECT_GT(Difference(first, last, 41, 57, 45, 65), 15.0) << "forearm and torus";
   EXPECT_LT(Difference(first, last, 44, 56, 2, 30), 2.0) << "head";
   EXPECT_LT(Difference(first, last, 75, 100, 0, 100), 2.0) << "floor and sky";
+}
+
+TEST_F(MovieTest, TheCourseCameraStandsStill) {
+  run_ = testing::MakeKinematicRun(*model_, 3.0);
+  MovieOptions options = MakeOptions();
+  options.panel = false;
+  const auto differences = [&](const char* camera) {
+    options.camera = camera;
+    MoviePainter painter({&view_, 1}, options);
+    const Image first = painter.Paint(0.0);
+    const Image last = painter.Paint(3.0);
+    // Where the robot is at either end, and the left border.
+    return std::array<double, 3>{Difference(first.rgb.data(), last.rgb.data(), 0, 50, 0, 100),
+                                 Difference(first.rgb.data(), last.rgb.data(), 50, 100, 0, 100),
+                                 Difference(first.rgb.data(), last.rgb.data(), 0, 4, 0, 100)};
+  };
+  const auto [left, right, border] = differences(kCourseCamera);
+  EXPECT_GT(left, 3.0) << "gone from here";
+  EXPECT_GT(right, 3.0) << "come here";
+  EXPECT_EQ(border, 0.0);
+  EXPECT_GT(differences("overview")[2], 0.0) << "a camera that moves along";
 }
 
 TEST_F(MovieTest, FilmDoesNotDependOnTheNumberOfProcesses) {

@@ -131,6 +131,19 @@ TEST_F(RenderCommandTest, WritesAStillOfTwoRuns) {
   EXPECT_EQ(image.height, 90);
 }
 
+TEST_F(RenderCommandTest, TheEndOfTheLastStepIsPartOfTheRun) {
+  WriteRun(run_, 0.1);
+  const auto draw = [&](const char* time, const char* out) {
+    EXPECT_EQ(RunDexcheck({"render", run_, "--still", time, "--out", run_ + out, "--size", "160x90",
+                           "--no-panel", "--camera", "course"})
+                  .exit_code,
+              0);
+    return testing::ReadText(run_ + out);
+  };
+  EXPECT_EQ(draw("0.11", "/a.png"), draw("0.1", "/b.png"));
+  EXPECT_NE(draw("0.05", "/c.png"), draw("0.1", "/b.png"));
+}
+
 TEST_F(RenderCommandTest, RefusesBadRequestsAndLeavesNothing) {
   WriteRun(run_, 0.1);
   const auto refused = [&](std::vector<std::string> arguments, const std::vector<std::string>& parts) {

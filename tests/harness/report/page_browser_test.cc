@@ -7,6 +7,7 @@
 #include <string>
 
 #include "harness/report/write_report.h"
+#include "renders/video_writer.h"
 #include "tests/common/browser.h"
 #include "tests/common/files.h"
 #include "tests/harness/report/report_run.h"
@@ -132,6 +133,61 @@ TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
   browser_.SetDark(true);
   EXPECT_NE(browser_.Run(ask_ground), light);
   EXPECT_THAT(browser_.TakeConsole(), IsEmpty());
+}
+
+// A film of one second, as `dexcheck run --video` encodes it: red, from the middle on blue.
+void WriteFilm(const std::filesystem::path& path) {
+  VideoOptions options;
+  options.width = 160;
+  options.height = 90;
+  VideoWriter video(path, options);
+  Image image(options.width, options.height);
+  for (int frame = 0; frame < options.fps; ++frame) {
+    for (size_t i = 0; i < image.rgb.size(); ++i) {
+      const bool lit = i % 3 == (frame < options.fps / 2 ? 0U : 2U);
+      image.rgb[i] = lit ? 200 : 20;
+    }
+    video.Write(image);
+  }
+  video.Finish();
+}
+
+TEST_F(PageBrowserTest, PlaysTheVideo) {
+  WriteFilm(folder_.path() / "video.mp4");
+  WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()));
+  browser_.SetViewport(1280, 720);
+  browser_.Open(folder_.path() / "report.html");
+  const std::string video = "const video = document.querySelector('video');";
+  ASSERT_TRUE(browser_.WaitFor(video + "return video.readyState >= HTMLMediaElement.HAVE_CURRENT_DATA;"))
+      << browser_.Run(video + "return [video.readyState, video.error && video.error.message];");
+  const nlohmann::json size =
+      browser_.Run(video + "return [video.videoWidth, video.videoHeight, video.duration];");
+  EXPECT_EQ(size[0], 160);
+  EXPECT_EQ(size[1], 90);
+  EXPECT_NEAR(size[2].get<double>(), 1.0, 0.01);
+  // Nothing is painted of a video that is out of view.
+  EXPECT_TRUE(browser_.Run(video + "video.scrollIntoView();").is_null());
+  // Red, green and blue of a pixel as it is painted.
+  const std::string paint =
+      video +
+      "const canvas = document.createElement('canvas'); canvas.width = 160; canvas.height = 90;"
+      "const context = canvas.getContext('2d'); context.drawImage(video, 0, 0);"
+      "const pixel = context.getImageData(80, 45, 1, 1).data;";
+  EXPECT_TRUE(browser_.WaitFor(paint + "return pixel[0] > 150 && pixel[2] < 80;"))
+      << "red at first, not " << browser_.Run(paint + "return [...pixel];");
+  EXPECT_TRUE(browser_.Run(video + "video.muted = true; video.play();").is_null());
+  EXPECT_TRUE(browser_.WaitFor(video + "return video.currentTime > 0.7;"));
+  EXPECT_TRUE(browser_.WaitFor(paint + "return pixel[0] < 80 && pixel[2] > 150;")) << "blue at the end";
+  EXPECT_THAT(browser_.TakeConsole(), IsEmpty());
+}
+
+TEST_F(PageBrowserTest, WouldNoticeAVideoThatCannotBePlayed) {
+  testing::WriteText(folder_.path() / "video.mp4", "no video");
+  WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()));
+  browser_.Open(folder_.path() / "report.html");
+  EXPECT_TRUE(
+      browser_.WaitFor("const video = document.querySelector('video');"
+                       "return video.error !== null && video.readyState === 0;"));
 }
 
 TEST_F(PageBrowserTest, WouldNoticeErrors) {

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "controller/common/text.h"
@@ -119,15 +120,20 @@ constexpr double kStep = 1e-4;  // m
 constexpr double kAtEveryStep = 5e-5;
 constexpr double kHeld = 1e-3;
 
-/// Largest difference of the measured response from that of a predicted sampling, relative to the start
-/// error.
-double MeasureDeparture(const SampledLoop& loop, const AxisGains& gains, const SampledLoop& predicted_loop) {
-  const StudyInputs inputs = MakeInputs(MakeOverrides(loop, gains.K_p, 0.1, kStep));
+/// The object's error along x at each step, relative to the start error.
+std::vector<double> MeasureResponse(const SampledLoop& loop, const AxisGains& gains, double duration) {
+  const StudyInputs inputs = MakeInputs(MakeOverrides(loop, gains.K_p, duration, kStep));
   const Setup setup(MakeTrialScenario(inputs, {0, 0, {gains.K_v}}), inputs.robot, inputs.mjcf);
   Runner runner(setup, /*check=*/false);
   std::vector<double> measured;
   runner.Run([&] { measured.push_back(runner.loop().error().position.x() / kStep); }, [] { return false; });
   EXPECT_EQ(runner.result().failure, "");
+  return measured;
+}
+
+/// Largest difference of the measured response from that of a predicted sampling.
+double MeasureDeparture(const SampledLoop& loop, const AxisGains& gains, const SampledLoop& predicted_loop) {
+  const std::vector<double> measured = MeasureResponse(loop, gains, 0.1);
   const std::vector<double> predicted =
       CalcStepResponse(predicted_loop, gains, static_cast<long>(measured.size()));
   EXPECT_GE(measured.size(), 100u);
@@ -148,6 +154,51 @@ TEST(SampledStability, TheRobotRespondsAsPredicted) {
   // Other samplings are told apart.
   EXPECT_GT(MeasureDeparture({1e-3, 1}, {1e4, 50}, {1e-3, 2}), 100.0 * kAtEveryStep);
   EXPECT_GT(MeasureDeparture({1e-3, 10}, {400, 40}, {1e-3, 9}), 3.0 * kHeld);
+}
+
+// Every kStride-th error follows e'' = trace e' - determinant e. A constant is left where settling leaves the
+// object.
+constexpr long kStride = 20;
+
+/// trace^2 / 4 - determinant of the recurrence that fits a response best: negative where it swings, zero at
+/// critical damping.
+double FitDiscriminant(const std::vector<double>& errors) {
+  const auto count = static_cast<Eigen::Index>(errors.size()) - 2 * kStride;
+  const auto at = [&](Eigen::Index first) {
+    return Eigen::Map<const Eigen::VectorXd>(&errors[0] + first, count);
+  };
+  Eigen::MatrixX3d A(count, 3);
+  A << at(kStride), -at(0), Eigen::VectorXd::Ones(count);
+  const Eigen::Vector3d fit = A.colPivHouseholderQr().solve(at(2 * kStride));
+  return 0.25 * fit[0] * fit[0] - fit[1];
+}
+
+// At most ten times what was measured, 1.0e-7 for torques at every step and 1.4e-6 for torques that are held.
+constexpr double kDiscriminantAtEveryStep = 1e-6;
+constexpr double kDiscriminantHeld = 1e-5;
+
+// The robot's response turns from swinging to creeping within 0.5 % of the predicted K_v.
+TEST(SampledStability, TheRobotIsDampedCriticallyWhereItIsPredicted) {
+  constexpr double kMargin = 0.005;
+  struct Case {
+    SampledLoop loop;
+    double K_p;
+    double tolerance;
+  };
+  for (const Case& one :
+       {Case{{1e-3, 1}, 400.0, kDiscriminantAtEveryStep}, Case{{1e-3, 1}, 2500.0, kDiscriminantAtEveryStep},
+        Case{{5e-4, 1}, 400.0, kDiscriminantAtEveryStep}, Case{{1e-3, 4}, 400.0, kDiscriminantHeld}}) {
+    const double critical = CalcCriticalDamping(one.loop, one.K_p);
+    for (const double share : {1.0 - kMargin, 1.0, 1.0 + kMargin}) {
+      const AxisGains gains{one.K_p, share * critical};
+      const double measured = FitDiscriminant(MeasureResponse(one.loop, gains, 0.25));
+      const double predicted = FitDiscriminant(CalcStepResponse(one.loop, gains, 250));
+      EXPECT_NEAR(measured, predicted, one.tolerance) << one.K_p << ", " << share;
+      if (share == 1.0) continue;
+      EXPECT_EQ(measured > 0.0, share > 1.0) << measured;
+      EXPECT_GT(std::abs(predicted), 10.0 * one.tolerance) << "too near to tell";
+    }
+  }
 }
 
 Outcome Try(const SampledLoop& loop, const AxisGains& gains) {

@@ -1,4 +1,4 @@
-#include "renders/partial_file.h"
+#include "harness/common/partial_file.h"
 
 #include <fcntl.h>
 #include <unistd.h>

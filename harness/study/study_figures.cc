@@ -1,0 +1,259 @@
+#include "harness/study/study_figures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "harness/report/figure.h"
+#include "harness/study/study_charts.h"
+#include "harness/study/study_theory.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr std::array<const char*, kNumOutcomes> kOutcomeColors = {"#7bb662", "#f2c14e", "#e4572e", "#f78154",
+                                                                  "#9b2226", "#577590", "#cccccc", "#000000"};
+constexpr const char* kStabilityColor = "#0b3c8c";
+constexpr const char* kDampingColor = "#ffffff";
+constexpr size_t kMostLines = 6;
+
+using IsWorse = std::function<bool(const TrialRow&, const TrialRow&)>;
+
+Axis AxisOf(const Variation& variation) {
+  Axis axis{variation.key, variation.values, false};
+  std::sort(axis.values.begin(), axis.values.end());
+  const double first = axis.values.front();
+  axis.logarithmic = first > 0.0 && axis.values.back() / first > 10.0;
+  return axis;
+}
+
+bool IsGrid(const Study& study) { return study.sampling == Sampling::kGrid && study.variations.size() >= 2; }
+
+/// A map over the first two keys of a grid.
+class Grid {
+ public:
+  explicit Grid(const StudyResults& results)
+      : results_(results), x_(AxisOf(results.study.variations[0])), y_(AxisOf(results.study.variations[1])) {}
+
+  [[nodiscard]] std::string DrawOutcomes() const {
+    const auto cells = WorstOfCells([](const TrialRow& a, const TrialRow& b) {
+      return IsHeld(a.result.outcome) < IsHeld(b.result.outcome) ||
+             (IsHeld(a.result.outcome) == IsHeld(b.result.outcome) && a.result.outcome > b.result.outcome);
+    });
+    HeatMap map = MakeMap("outcome");
+    map.with_boundary = true;
+    for (const TrialRow* row : cells) {
+      if (row == nullptr) {
+        map.cells.emplace_back();
+        continue;
+      }
+      const Outcome outcome = row->result.outcome;
+      map.cells.push_back(
+          {FindColor(outcome), Describe(results_.study, *row), LinkTo(*row), IsHeld(outcome)});
+    }
+    map.overlays = {FindBoundary(kStabilityColor, IsStableInTheory),
+                    FindBoundary(kDampingColor, IsDampedInTheory)};
+    return DrawHeatMap(map);
+  }
+
+  [[nodiscard]] std::string DrawMetric(Metric metric) const {
+    const double sign = metric == kConeMargin ? -1.0 : 1.0;  // a small margin is the worse
+    const auto cells = WorstOfCells([&](const TrialRow& a, const TrialRow& b) {
+      return !(sign * a.result.metrics[metric] <= sign * b.result.metrics[metric]);
+    });
+    const auto find_value = [&](const TrialRow* row) {
+      return row != nullptr && IsHeld(row->result.outcome) ? row->result.metrics[metric] : std::nan("");
+    };
+    double least = std::numeric_limits<double>::infinity();
+    double most = -least;
+    for (const TrialRow* row : cells) {
+      const double value = find_value(row);
+      if (!std::isfinite(value)) continue;
+      least = std::min(least, value);
+      most = std::max(most, value);
+    }
+    HeatMap map = MakeMap(LabelOf(metric));
+    if (least <= most) map.range = {least, most};
+    for (const TrialRow* row : cells) {
+      const double value = find_value(row);
+      map.cells.push_back(row == nullptr
+                              ? HeatCell{}
+                              : HeatCell{ColorOf(value, least, most),
+                                         fmt::format("{:.4g}; {}", value, Describe(results_.study, *row)),
+                                         LinkTo(*row), !(value > kVisibleOvershoot)});
+    }
+    if (metric == kOvershoot && least <= most) {
+      map.with_boundary = true;
+      map.overlays = {
+          FindBoundary(kDampingColor, [](const StudyInputs& inputs, const std::vector<double>& at) {
+            return CalcOvershootInTheory(inputs, at) <= kVisibleOvershoot;
+          })};
+    }
+    return DrawHeatMap(map);
+  }
+
+ private:
+  [[nodiscard]] HeatMap MakeMap(const std::string& title) const { return {title, x_, y_, {}, false, {}, {}}; }
+
+  [[nodiscard]] Dots FindBoundary(const char* color, const TheoryTest& test) const {
+    return {color, FindTurns(results_.inputs, results_.rows.front().trial.parameters, test)};
+  }
+
+  [[nodiscard]] std::vector<const TrialRow*> WorstOfCells(const IsWorse& is_worse) const {
+    std::vector<const TrialRow*> cells(x_.values.size() * y_.values.size(), nullptr);
+    const auto find = [](const Axis& axis, double value) {
+      return static_cast<size_t>(std::lower_bound(axis.values.begin(), axis.values.end(), value) -
+                                 axis.values.begin());
+    };
+    for (const TrialRow& row : results_.rows) {
+      const size_t cell =
+          find(y_, row.trial.parameters[1]) * x_.values.size() + find(x_, row.trial.parameters[0]);
+      if (cells[cell] == nullptr || is_worse(row, *cells[cell])) cells[cell] = &row;
+    }
+    return cells;
+  }
+
+  const StudyResults& results_;
+  Axis x_, y_;
+};
+
+Chart MakeChart(const std::string& title, const std::string& x, const std::string& y) {
+  return {title, {x, {}, false}, {y, {}, false}, {}, {}};
+}
+
+/// A few values of the second key, the ends among them; one that means nothing when there is no second key.
+std::vector<double> ChooseLines(const Study& study) {
+  if (study.variations.size() < 2) return {0.0};
+  const std::vector<double>& all = study.variations[1].values;
+  const size_t count = std::min(all.size(), kMostLines);
+  std::vector<double> chosen;
+  for (size_t i = 0; i < count; ++i)
+    chosen.push_back(all[count > 1 ? i * (all.size() - 1) / (count - 1) : 0]);
+  return chosen;
+}
+
+/// From the least error on, those that need less work than all before.
+std::vector<const TrialRow*> ListFront(const std::vector<const TrialRow*>& tracked) {
+  std::vector<const TrialRow*> front;
+  for (const TrialRow* row : tracked) {
+    if (front.empty() || row->result.metrics[kEnergy] < front.back()->result.metrics[kEnergy]) {
+      front.push_back(row);
+    }
+  }
+  return front;
+}
+
+}  // namespace
+
+StudyResults::StudyResults(const StudyStore& store) : study(store.study()), rows(store.ReadRows()) {
+  inputs.study = study;
+  inputs.scenario_text = store.Identify("scenario");
+  inputs.scenario_source = study.scenario;
+  for (const std::string& name : study.metrics) {
+    for (size_t i = 0; i < kMetrics.size(); ++i) {
+      if (kMetrics[i].name == name) metrics.push_back(static_cast<Metric>(i));
+    }
+  }
+  if (metrics.empty()) metrics = {kPositionErrorRms, kPeakEffort, kConeMargin};
+}
+
+std::vector<const TrialRow*> StudyResults::ListTracked() const {
+  std::vector<const TrialRow*> tracked;
+  for (const TrialRow& row : rows) {
+    if (row.result.outcome == Outcome::kTracked) tracked.push_back(&row);
+  }
+  std::stable_sort(tracked.begin(), tracked.end(), [](const TrialRow* a, const TrialRow* b) {
+    return a->result.metrics[kPositionErrorRms] < b->result.metrics[kPositionErrorRms];
+  });
+  return tracked;
+}
+
+bool IsHeld(Outcome outcome) {
+  return outcome == Outcome::kTracked || outcome == Outcome::kSlipped || outcome == Outcome::kWheelsSpun ||
+         outcome == Outcome::kChecksDisagreed;
+}
+
+const char* FindColor(Outcome outcome) { return kOutcomeColors[static_cast<size_t>(outcome)]; }
+
+std::string LabelOf(Metric metric) {
+  const std::string unit = kMetrics[metric].unit;
+  return kMetrics[metric].name + (unit == "1" ? "" : ", " + unit);
+}
+
+std::string LinkTo(const TrialRow& row) { return fmt::format("#trial-{}", row.trial.number); }
+
+std::string Describe(const Study& study, const TrialRow& row) {
+  std::string text = fmt::format("trial {}: ", row.trial.number);
+  for (size_t i = 0; i < study.variations.size(); ++i) {
+    text += fmt::format("{} = {:.6g}, ", study.variations[i].key, row.trial.parameters[i]);
+  }
+  text += NameOf(row.result.outcome);
+  if (!row.result.failure.empty()) text += ": " + row.result.failure;
+  return text;
+}
+
+std::string DrawOutcomes(const StudyResults& results) {
+  const Study& study = results.study;
+  if (study.variations.size() < 2) return "";
+  if (IsGrid(study)) return Grid(results).DrawOutcomes();
+  // Samples: where they lie.
+  Chart chart = MakeChart("outcome", study.variations[0].key, study.variations[1].key);
+  for (const TrialRow& row : results.rows) {
+    chart.points.push_back({row.trial.parameters[0], row.trial.parameters[1], FindColor(row.result.outcome),
+                            Describe(study, row), LinkTo(row)});
+  }
+  return DrawChart(chart);
+}
+
+std::string DrawMetrics(const StudyResults& results) {
+  if (!IsGrid(results.study)) return "";
+  std::string figures;
+  for (const Metric metric : results.metrics) figures += Grid(results).DrawMetric(metric);
+  return figures;
+}
+
+std::string DrawLines(const StudyResults& results) {
+  const Study& study = results.study;
+  if (study.sampling != Sampling::kGrid) return "";
+  const bool has_second = study.variations.size() > 1;
+  const std::vector<double> chosen = ChooseLines(study);
+  std::string figures;
+  for (const Metric metric : results.metrics) {
+    Chart chart = MakeChart(LabelOf(metric), study.variations[0].key, LabelOf(metric));
+    for (size_t i = 0; i < chosen.size(); ++i) {
+      ChartLine line;
+      line.color = FindColor(static_cast<int>(i));
+      if (has_second) line.label = fmt::format("{} = {:.3g}", study.variations[1].key, chosen[i]);
+      for (const TrialRow& row : results.rows) {
+        const bool mine = (!has_second || row.trial.parameters[1] == chosen[i]) &&
+                          IsHeld(row.result.outcome) && std::isfinite(row.result.metrics[metric]);
+        if (mine) line.points.emplace_back(row.trial.parameters[0], row.result.metrics[metric]);
+      }
+      std::sort(line.points.begin(), line.points.end());
+      if (!line.points.empty()) chart.lines.push_back(line);
+    }
+    if (!chart.lines.empty()) figures += DrawChart(chart);
+  }
+  return figures;
+}
+
+std::string DrawErrorAgainstEffort(const StudyResults& results) {
+  const std::vector<const TrialRow*> tracked = results.ListTracked();
+  if (tracked.empty()) return "";
+  Chart chart = MakeChart("error against effort", LabelOf(kEnergy), LabelOf(kPositionErrorRms));
+  ChartLine line{"Pareto front", "#9b2226", {}};
+  for (const TrialRow* row : ListFront(tracked)) {
+    line.points.emplace_back(row->result.metrics[kEnergy], row->result.metrics[kPositionErrorRms]);
+  }
+  for (const TrialRow* row : tracked) {
+    chart.points.push_back({row->result.metrics[kEnergy], row->result.metrics[kPositionErrorRms],
+                            FindColor(Outcome::kTracked), Describe(results.study, *row), LinkTo(*row)});
+  }
+  chart.lines.push_back(line);
+  return DrawChart(chart);
+}
+
+}  // namespace dexcheck

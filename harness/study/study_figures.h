@@ -1,0 +1,49 @@
+#pragma once
+
+// Figures of a study, as inline SVG that leads from points and cells to trials.
+
+#include <string>
+#include <vector>
+
+#include "harness/study/study_store.h"
+
+namespace dexcheck {
+
+/// A study and what came of it.
+struct StudyResults {
+  explicit StudyResults(const StudyStore& store);
+
+  Study study;
+  StudyInputs inputs;  ///< As far as the database keeps them: for scenarios of trials.
+  std::vector<TrialRow> rows;
+  std::vector<Metric> metrics;  ///< To be shown.
+
+  /// Trials that tracked, least rms position error first.
+  [[nodiscard]] std::vector<const TrialRow*> ListTracked() const;
+};
+
+/// Overshoot that can be seen, relative to the start error; larger than what settling leaves.
+constexpr double kVisibleOvershoot = 0.01;
+
+/// Whether a run came to its end with the object in the hand.
+bool IsHeld(Outcome outcome);
+/// "#rrggbb".
+const char* FindColor(Outcome outcome);
+/// "position_error_rms, m".
+std::string LabelOf(Metric metric);
+/// "#trial-7".
+std::string LinkTo(const TrialRow& row);
+/// "trial 7: KEY = VALUE, ..., tracked".
+std::string Describe(const Study& study, const TrialRow& row);
+
+/// Outcomes over the first two keys, with the measured and the theoretical boundary of stability.
+std::string DrawOutcomes(const StudyResults& results);
+/// A map for each metric over the first two keys of a grid; "" for other studies.
+std::string DrawMetrics(const StudyResults& results);
+/// Metrics along the first key of a grid, a line for each of a few values of the second; "" for other
+/// studies.
+std::string DrawLines(const StudyResults& results);
+/// Error against effort of all trials that tracked, with the Pareto front; "" when none did.
+std::string DrawErrorAgainstEffort(const StudyResults& results);
+
+}  // namespace dexcheck

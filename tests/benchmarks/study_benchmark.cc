@@ -1,0 +1,114 @@
+// What a study's trial costs beyond its closed loop: the same run as a bare loop in this process, its models
+// loaded before, and as a trial with all that belongs to it: process, models, metrics, database. In turns, so
+// that others' work falls on both alike.
+//
+// study_benchmark [REPETITIONS]
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <vector>
+
+#include "controller/common/toml_reader.h"
+#include "harness/simulation/closed_loop.h"
+#include "harness/study/study_store.h"
+#include "harness/study/trial_pool.h"
+#include "tests/common/files.h"
+
+namespace dexcheck {
+namespace {
+
+const std::string kSource = DEXCHECK_SOURCE_DIR;
+
+struct Times {
+  double wall = 0.0;
+  double processor = 0.0;  // of this process and of those that it waited for
+};
+
+double ProcessorSeconds() {
+  double seconds = 0.0;
+  for (const auto who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    ::getrusage(who, &usage);
+    for (const timeval& time : {usage.ru_utime, usage.ru_stime}) {
+      seconds += static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+    }
+  }
+  return seconds;
+}
+
+template <typename Function>
+Times Measure(const Function& function) {
+  const double processor = ProcessorSeconds();
+  const auto start = std::chrono::steady_clock::now();
+  function();
+  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return {wall, ProcessorSeconds() - processor};
+}
+
+double Median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+StudyInputs MakeInputs() {
+  StudyInputs inputs;
+  inputs.study = ParseStudy(
+      "name = \"s\"\nscenario = \"offset\"\nset = [\"duration=3\", \"start_error.xyz=[1e-5, 0, "
+      "0]\"]\n[[vary]]\nkey = "
+      "\"control.K_v\"\nfrom = 20\nto = 60\ncount = 1000\n",
+      "study.toml");
+  inputs.scenario_folder = kSource + "/harness/scenarios";
+  inputs.scenario_text = ReadTextFile(inputs.scenario_folder / "offset.toml");
+  inputs.scenario_source = "offset";
+  inputs.robot = kSource + "/controller/parameters/assistant_robot.toml";
+  inputs.mjcf = kSource + "/mjcf/scene.xml";
+  return inputs;
+}
+
+void Compare(int repetitions) {
+  StudyInputs inputs = MakeInputs();
+  const std::vector<Trial> trials = ListTrials(inputs.study);
+  CheckTrials(&inputs);
+  const testing::TempFolder folder;
+  StudyStore store =
+      StudyStore::OpenOrCreate(folder.path() / "study.sqlite", IdentifyStudy(inputs), inputs.study);
+  TrialPool pool(1, [&](const Trial& trial) { return RunTrial(inputs, trial); });
+  std::vector<double> wall;
+  std::vector<double> processor;
+  double bare_seconds = 0.0;
+  for (int i = 0; i < repetitions; ++i) {
+    const Trial& trial = trials[static_cast<size_t>(i)];
+    const Setup setup(MakeTrialScenario(inputs, trial), inputs.robot, inputs.mjcf);
+    const Times bare = Measure([&] {
+      ClosedLoop loop(setup, /*check=*/false);
+      loop.Settle();
+      while (loop.step() < loop.num_steps()) loop.Step();
+    });
+    const Times whole = Measure([&] {
+      store.Claim(trial.number);
+      pool.Start(trial);
+      while (!pool.IsEmpty()) {
+        if (const auto row = pool.Wait()) store.Add(*row);
+      }
+    });
+    wall.push_back(whole.wall / bare.wall);
+    processor.push_back(whole.processor / bare.processor);
+    bare_seconds += bare.processor / repetitions;
+  }
+  fmt::print("bare closed loop of 3 s: {:.0f} ms of processor time\n", 1e3 * bare_seconds);
+  fmt::print("trial / bare loop, medians of {}: {:.3f} of processor time, {:.3f} of wall time\n", repetitions,
+             Median(processor), Median(wall));
+}
+
+}  // namespace
+}  // namespace dexcheck
+
+int main(int argc, char** argv) {
+  dexcheck::Compare(argc > 1 ? std::max(1, std::atoi(argv[1])) : 15);
+  return 0;
+}

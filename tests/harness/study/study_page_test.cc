@@ -1,0 +1,115 @@
+// A study's page in a browser.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+
+#include "controller/common/toml_reader.h"
+#include "harness/study/study_report.h"
+#include "tests/common/browser.h"
+#include "tests/common/files.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::Browser;
+using ::testing::HasSubstr;
+
+const std::string kSource = DEXCHECK_SOURCE_DIR;
+constexpr double kLimit = 2000.0;  // 1/s: of K_v at steps of 1 ms
+
+class StudyPageTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    StudyInputs inputs;
+    inputs.study = ParseStudy(
+        "name = \"page\"\ndescription = \"a <small> study\"\nscenario = \"offset\"\nmetrics = "
+        "[\"overshoot\", "
+        "\"energy\"]\n[[vary]]\nkey = \"control.K_p\"\nvalues = [100, 1e3, 1e4]\n[[vary]]\nkey = "
+        "\"control.K_v\"\nvalues = [20, 200, 2100, 3000]\n",
+        "study.toml");
+    inputs.scenario_text = ReadTextFile(kSource + "/harness/scenarios/offset.toml");
+    inputs.scenario_source = "offset";
+    inputs.robot = kSource + "/controller/parameters/assistant_robot.toml";
+    inputs.mjcf = kSource + "/mjcf/scene.xml";
+    StudyStore store =
+        StudyStore::OpenOrCreate(folder_.path() / "page.sqlite", IdentifyStudy(inputs), inputs.study);
+    for (const Trial& trial : ListTrials(inputs.study)) store.Add(MakeRow(trial));
+    testing::WriteText(folder_.path() / "page.html", MakeStudyReport(store));
+  }
+
+  static TrialRow MakeRow(const Trial& trial) {
+    TrialRow row;
+    row.trial = trial;
+    row.result.metrics.fill(1.0 / static_cast<double>(trial.number + 1));
+    if (trial.parameters[1] > kLimit) {
+      row.result.outcome = Outcome::kDiverged;
+      row.result.failure = "motor \"wheel_left\" is at its limit, 30 N m at t = 0.01 s";
+    }
+    return row;
+  }
+
+  void Open(int width, int height, bool mobile) {
+    browser_.SetViewport(width, height, mobile);
+    browser_.Open(folder_.path() / "page.html");
+  }
+
+  testing::TempFolder folder_;
+  Browser browser_;
+};
+
+TEST_F(StudyPageTest, ACellShowsTheCommandThatRepeatsItsTrial) {
+  Open(1280, 900, false);
+  // A cell for each trial in each of the maps: the outcome and two metrics.
+  EXPECT_EQ(browser_.Run("return document.querySelectorAll('svg a rect').length;"), 3 * 12);
+  const nlohmann::json place = browser_.Run(
+      "document.getElementById('maps').scrollIntoView({behavior: 'instant'});"
+      "const r = document.querySelector('svg a[href=\"#trial-5\"] rect').getBoundingClientRect();"
+      "return {x: Math.round(r.x + r.width / 2), y: Math.round(r.y + r.height / 2), scroll: scrollY};");
+  ASSERT_GT(place["scroll"], 0);
+  const int x = place["x"];
+  const int y = place["y"];
+  browser_.Drag(x, y, x, y);
+  ASSERT_TRUE(browser_.WaitFor("return document.querySelector(':target') !== null;"));
+  const nlohmann::json shown = browser_.Run(
+      "const r = document.querySelector(':target').getBoundingClientRect();"
+      "return {id: document.querySelector(':target').id, text: document.querySelector(':target').innerText,"
+      "  inside: r.top >= 0 && r.bottom <= innerHeight, scroll: scrollY};");
+  EXPECT_EQ(shown["id"], "trial-5");
+  EXPECT_THAT(shown["text"].get<std::string>(),
+              HasSubstr("dexcheck run offset --set control.K_p=1000 --set control.K_v=200"));
+  EXPECT_EQ(shown["inside"], true);
+  EXPECT_EQ(shown["scroll"], place["scroll"]) << "the map stays in view";
+  EXPECT_TRUE(browser_.Run("document.querySelector(':target .close').click();").is_null());
+  EXPECT_TRUE(browser_.WaitFor("return document.querySelector(':target') === null;"));
+  EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty());
+}
+
+TEST_F(StudyPageTest, DrawsMeasuredAndTheoreticalBoundaries) {
+  Open(1280, 900, false);
+  const std::string map = "const map = document.querySelector('main figure');";
+  // Three columns, in each the measured boundary runs between 200 and 2100.
+  const nlohmann::json edges =
+      browser_.Run(map + "return [...map.querySelectorAll('.edge')].map(e => Number(e.getAttribute('y1')));");
+  ASSERT_EQ(edges.size(), 3U);
+  // In theory K_v < 2 / h - h K_p / 2: where the dots of stability lie, between the middles of these rows.
+  const nlohmann::json dots = browser_.Run(
+      map +
+      "return [...map.querySelectorAll('.dot[fill=\"#0b3c8c\"]')].map(e => Number(e.getAttribute('cy')));");
+  ASSERT_GT(dots.size(), 10U);
+  const double row = browser_.Run(map + "return map.querySelector('a rect').height.baseVal.value;");
+  for (const nlohmann::json& y : dots) EXPECT_NEAR(y.get<double>(), edges[0].get<double>(), 0.5 * row);
+  EXPECT_THAT(browser_.Run("return document.body.innerText;").get<std::string>(),
+              HasSubstr("tell 12 of 12 trials rightly"));
+}
+
+TEST_F(StudyPageTest, FitsAPhone) {
+  Open(390, 844, true);
+  EXPECT_LE(browser_.Run("return document.documentElement.scrollWidth - innerWidth;"), 0);
+  EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty());
+}
+
+}  // namespace
+}  // namespace dexcheck
