@@ -17,6 +17,7 @@ VelocityMap::VelocityMap(const Adapter& adapter, Coordinates coordinates)
   const auto rows = static_cast<Eigen::Index>(base_dofs_.size());
   T_base_.setZero(rows, base_size_);
   bias_.setZero(rows);
+  bracket_.setZero(rows);
   M_T_.setZero(engine.nv, base_size_);
 }
 
@@ -30,6 +31,17 @@ VelocityMap::BaseMotion VelocityMap::CalcColumnMotion(int column, const Vector3d
   // v_c = r/2 (thetadot_r + thetadot_l),  w_c = r/b (thetadot_r - thetadot_l)
   const double sign = column == 0 ? 1.0 : -1.0;
   return {0.5 * base.wheel_radius * heading, sign * base.wheel_radius / base.wheel_distance};
+}
+
+VelocityMap::BaseMotion VelocityMap::CalcBaseMotion(const Eigen::Ref<const VectorXd>& velocity,
+                                                    const Vector3d& heading) const {
+  BaseMotion motion;
+  for (int i = 0; i < base_size_; ++i) {
+    const BaseMotion column = CalcColumnMotion(i, heading);
+    motion.linear += velocity[i] * column.linear;
+    motion.yaw += velocity[i] * column.yaw;
+  }
+  return motion;
 }
 
 void VelocityMap::FillRates(const Vector3d& anchor_velocity, double yaw, double forward,
@@ -52,14 +64,12 @@ void VelocityMap::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref
   const Vector3d up = Vector3d::UnitZ();
   const Vector3d arm = adapter_->anchor().x() * heading + adapter_->anchor().y() * left;
 
-  BaseMotion motion;
   for (int i = 0; i < base_size_; ++i) {
     const BaseMotion column = CalcColumnMotion(i, heading);
     FillRates(column.linear + column.yaw * up.cross(arm), column.yaw, heading.dot(column.linear),
               T_base_.col(i));
-    motion.linear += velocity[i] * column.linear;
-    motion.yaw += velocity[i] * column.yaw;
   }
+  const BaseMotion motion = CalcBaseMotion(velocity, heading);
   // T_dot velocity: reduced columns turn with the heading, so Sigma_0's origin accelerates sideways; the
   // anchor feels its centripetal acceleration besides. The yaw rate does not change.
   const bool turns = base_size_ == 2;
@@ -81,6 +91,23 @@ void VelocityMap::Expand(const Eigen::Ref<const VectorXd>& velocity, mjtNum* qve
 void VelocityMap::ExpandBias(mjtNum* qacc) const {
   for (Eigen::Index row = 0; row < bias_.size(); ++row)
     qacc[base_dofs_[static_cast<size_t>(row)]] = bias_[row];
+  for (const int dof : adapter_->joint_dofs()) qacc[dof] = 0.0;
+}
+
+void VelocityMap::ExpandBracket(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& a,
+                                const Eigen::Ref<const VectorXd>& b, mjtNum* qacc) {
+  bracket_.setZero();
+  if (base_size_ == 2) {
+    // T_dot(a) turns b's forward velocity to the left; centripetal parts are the same both ways.
+    const Vector3d heading(std::cos(q[2]), std::sin(q[2]), 0.0);
+    const Vector3d left(-heading.y(), heading.x(), 0.0);
+    const BaseMotion at_a = CalcBaseMotion(a, heading);
+    const BaseMotion at_b = CalcBaseMotion(b, heading);
+    FillRates((at_a.yaw * heading.dot(at_b.linear) - at_b.yaw * heading.dot(at_a.linear)) * left, 0.0, 0.0,
+              bracket_);
+  }
+  for (Eigen::Index row = 0; row < bracket_.size(); ++row)
+    qacc[base_dofs_[static_cast<size_t>(row)]] = bracket_[row];
   for (const int dof : adapter_->joint_dofs()) qacc[dof] = 0.0;
 }
 

@@ -31,6 +31,10 @@ class VelocityMap {
   void Expand(const Eigen::Ref<const VectorXd>& velocity, mjtNum* qvel) const;
   /// Writes T_dot velocity, at SetState's velocity, on the robot's dofs of an nv-vector.
   void ExpandBias(mjtNum* qacc) const;
+  /// Writes T_dot(a) b - T_dot(b) a at q', T_dot(a) being T's rate at velocity a, on the robot's dofs of an nv-vector. It
+  /// is zero where velocities are rates of coordinates; reduced columns turn with the heading, and it points sideways.
+  void ExpandBracket(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& a,
+                     const Eigen::Ref<const VectorXd>& b, mjtNum* qacc);
   /// result = T^T force.
   void ProjectForce(const mjtNum* force, Eigen::Ref<VectorXd> result) const;
   /// result = T^T M T, for the engine's symmetric nv x nv matrix.
@@ -45,6 +49,8 @@ class VelocityMap {
     double yaw = 0.0;
   };
   [[nodiscard]] BaseMotion CalcColumnMotion(int column, const Vector3d& heading) const;
+  [[nodiscard]] BaseMotion CalcBaseMotion(const Eigen::Ref<const VectorXd>& velocity,
+                                          const Vector3d& heading) const;
   void FillRates(const Vector3d& anchor_velocity, double yaw, double forward,
                  Eigen::Ref<VectorXd> rates) const;
 
@@ -53,6 +59,7 @@ class VelocityMap {
   std::vector<int> base_dofs_;
   MatrixXd T_base_;             // base_dofs x base_size
   VectorXd bias_;               // T_dot velocity on base_dofs
+  VectorXd bracket_;            // scratch of ExpandBracket
   MatrixXd M_T_;                // scratch of ProjectMatrix, nv x base_size
 };
 

@@ -83,7 +83,8 @@ Cause AttributeOne(const RunCheck& check, Cause run, std::span<const RunCheck> s
   if (check.name == "wheel_slip" || check.name == "traction_use") {
     return Failed(steps, "traction_use") ? Cause::kWheelSlip : Cause::kContactSoftness;
   }
-  if (check.name == "fingertip_slip" || check.name == "cone_use" || check.name == "contacts_lost") {
+  if (check.name == "contacts_lost") return Cause::kFingertipSlip;
+  if (check.name == "fingertip_slip" || check.name == "cone_use") {
     return Failed(steps, "cone_use") ? Cause::kFingertipSlip : Cause::kContactSoftness;
   }
   if (check.name == "penetration") return Cause::kContactSoftness;

@@ -7,11 +7,12 @@ namespace dexcheck {
 
 ModelCheck::ModelCheck(const Adapter& adapter, const ModelViewFactory& make_view)
     : terms_(make_view(adapter.model(), Coordinates::kReduced)),
-      terms_at_w_(make_view(adapter.model(), Coordinates::kReduced)),
       unreduced_(make_view(adapter.model(), Coordinates::kUnreduced)),
       engine_(adapter, Coordinates::kReduced),
       engine_unreduced_(adapter, Coordinates::kUnreduced),
-      scales_(adapter.model()) {
+      scales_(adapter.model()),
+      terms_at_w_(adapter.model()),
+      scales_at_w_(adapter.model()) {
   const RobotModel& model = adapter.model();
   const int depth = model.max_depth();
   records_.resize(kTermCount);
@@ -43,8 +44,6 @@ ModelCheck::ModelCheck(const Adapter& adapter, const ModelViewFactory& make_view
   J_engine_.setZero(6, n);
   force_.setZero(n);
   force_engine_.setZero(n);
-  probe_.setZero(n);
-  probe_engine_.setZero(n);
 }
 
 void ModelCheck::Compare(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi,
@@ -187,20 +186,16 @@ void ModelCheck::CompareForces(const Eigen::Ref<const VectorXd>& xi, const Eigen
                           where, sample_);
   }
 
-  // C_bar(xi) w + C_bar(w) xi against the engine's force at xi + w and xi - w.
-  probe_.noalias() = terms_->C() * w;
-  terms_at_w_->SetState(q, w);
-  probe_.noalias() += terms_at_w_->C() * xi;
-  force_ = xi + w;
-  engine_.CalcCoriolis(force_, probe_engine_);
-  force_ = xi - w;
-  engine_.CalcCoriolis(force_, force_engine_);
-  probe_engine_ = 0.5 * (probe_engine_ - force_engine_);
-  // Rates of xi and w together are about twice as large, so the forces summed up are four times as large.
-  constexpr double kProbe = 4.0;
+  // Every entry of C_bar(xi) at once.
+  force_.noalias() = terms_->C() * w;
+  engine_.CalcCoriolisProduct(xi, w, force_engine_);
+  // The engine's quarters of the forces at xi + w and xi - w: |xi +- w|^2 / 4 is at most (|xi|^2 + |w|^2) /
+  // 2, twice.
+  terms_at_w_.SetState(q, w);
+  scales_at_w_.SetState(terms_at_w_, q, w);
   for (int i = 0; i < n; ++i) {
     record(kCoriolisMatrix)
-        .Add(probe_[i], probe_engine_[i], kProbe * scales_.CalcCoriolisScale(i),
+        .Add(force_[i], force_engine_[i], scales_.CalcCoriolisScale(i) + scales_at_w_.CalcCoriolisScale(i),
              {Location::Kind::kVelocity, i, -1}, sample_);
   }
 }

@@ -20,8 +20,7 @@ class ModelCheck {
   explicit ModelCheck(const Adapter& adapter, const ModelViewFactory& make_view = MakeModelView);
 
   /// @param q q'. @param xi reduced velocity.
-  /// @param w a second velocity, which probes the matrix C_bar' beyond its product with xi:
-  ///   C_bar(xi) w + C_bar(w) xi = (c(xi + w) - c(xi - w)) / 2 with c(xi) = C_bar(xi) xi from the engine.
+  /// @param w a second velocity, which probes the matrix C_bar' beyond its product with xi: C_bar(xi) w.
   void Compare(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi,
                const Eigen::Ref<const VectorXd>& w, long sample);
 
@@ -58,17 +57,18 @@ class ModelCheck {
   void CompareEnergies();
 
   std::unique_ptr<ModelView> terms_;
-  std::unique_ptr<ModelView> terms_at_w_;
   std::unique_ptr<ModelView> unreduced_;
   EngineTerms engine_;
   EngineTerms engine_unreduced_;
   std::vector<CheckRecord> records_;
   RoundingScales scales_;
+  ModelTerms terms_at_w_;  // for scales only
+  RoundingScales scales_at_w_;
   long sample_ = -1;
 
   VectorXd unreduced_velocity_;
   Matrix6Xd J_, J_dot_, J_engine_;
-  VectorXd force_, force_engine_, probe_, probe_engine_;
+  VectorXd force_, force_engine_;
 };
 
 }  // namespace dexcheck

@@ -3,6 +3,7 @@
 // A check that is made at every step of a run: what it was at worst, and when.
 
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -28,14 +29,16 @@ struct RunCheck {
   double failed_at = 0.0;  ///< First time above the bound, s.
   std::string where;       ///< Part of the robot that was worst, when the check has parts.
 
+  /// What is not a number counts as infinite, and fails whatever the bound is.
   void Add(double value, double time) {
     if (!applies) return;
     last = value;
-    if (!(value <= max)) {
-      max = std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
+    const double size = std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
+    if (size > max) {
+      max = size;
       at_time = time;
     }
-    sum_of_squares += value * value;
+    sum_of_squares += size * size;
     ++count;
     if (!(value <= bound) && !failed) {
       failed = true;

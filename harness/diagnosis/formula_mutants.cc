@@ -24,6 +24,7 @@ class MutantTable {
             Spoil([](Terms* t) { t->C.row(t->C.rows() / 2).setZero(); }));
     AddView("Coriolis matrix without coupling", "C_bar",
             Spoil([](Terms* t) { t->C = MatrixXd(t->C.diagonal().asDiagonal()); }));
+    AddFactorisations();
     AddView("gravity with the wrong sign", "gravity", Spoil([](Terms* t) { t->gravity *= -1.0; }));
     AddView("friction dropped", "friction", Spoil([](Terms* t) { t->friction.setZero(); }));
     AddView("friction with the wrong sign", "friction", Spoil([](Terms* t) { t->friction *= -1.0; }));
@@ -216,6 +217,24 @@ class MutantTable {
   std::vector<FormulaMutant> Take() { return std::move(mutants_); }
 
  private:
+  /// Other matrices with the same force: C + S with S xi = 0.
+  void AddFactorisations() {
+    using Terms = SpoiledView::Terms;
+    const int n = model_.num_velocities();
+    if (n >= 2) {
+      AddView("Coriolis matrix without Property 2", "C_bar", Spoil([](Terms* t) {
+                const Eigen::Index last = t->C.rows() - 1;
+                t->C(last, last - 1) += t->M(last, last) * t->velocity[last];
+                t->C(last, last) -= t->M(last, last) * t->velocity[last - 1];
+              }));
+    }
+    if (n >= 3) {
+      AddView("Coriolis matrix plus an antisymmetric part", "C_bar", Spoil([](Terms* t) {
+                const Eigen::Index last = t->C.rows() - 1;
+                t->C.bottomRightCorner<3, 3>() += t->M(last, last) * Skew(t->velocity.tail<3>());
+              }));
+    }
+  }
   [[nodiscard]] bool HasArmature() const {
     return std::any_of(model_.joints().begin(), model_.joints().end(),
                        [](const Joint& joint) { return joint.armature > 0.0; });

@@ -26,6 +26,8 @@ EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates)
   coriolis_.setZero(n);
   gravity_.setZero(n);
   friction_.setZero(n);
+  velocity_.setZero(n);
+  force_.setZero(n);
   J_nv_.setZero(6, nv);
   J_.setZero(6, n);
   links_.resize(adapter.link_bodies().size());
@@ -71,6 +73,19 @@ void EngineTerms::CalcCoriolis(const Eigen::Ref<const VectorXd>& velocity, Eigen
   mj_rne(m, d, 0, force_nv_.data());
   force_nv_.noalias() += M_nv_ * bias_nv_;
   map_.ProjectForce(force_nv_.data(), result);
+}
+
+void EngineTerms::CalcCoriolisProduct(const Eigen::Ref<const VectorXd>& velocity,
+                                      const Eigen::Ref<const VectorXd>& w, Eigen::Ref<VectorXd> result) {
+  velocity_ = velocity + w;
+  CalcCoriolis(velocity_, result);
+  velocity_ = velocity - w;
+  CalcCoriolis(velocity_, force_);
+  result -= force_;
+  map_.ExpandBracket(q_, velocity, w, bias_nv_.data());
+  force_nv_.noalias() = M_nv_ * bias_nv_;
+  map_.ProjectForce(force_nv_.data(), force_);
+  result = 0.25 * result + 0.5 * force_;
 }
 
 void EngineTerms::CalcEnergyAndMomentum() {

@@ -39,9 +39,12 @@ class EngineTerms {
   /// Links, base first.
   [[nodiscard]] const std::vector<LinkInWorld>& links() const { return links_; }
 
-  /// Coriolis force at another velocity, for the polarisation of C; changes the stored velocity-dependent
-  /// state.
-  void CalcCoriolis(const Eigen::Ref<const VectorXd>& velocity, Eigen::Ref<VectorXd> result);
+  /// C(velocity) w, which only C's matrix knows; both at the q' of SetState. With the forces c(x) = C(x) x,
+  ///   C(x) w = (c(x + w) - c(x - w)) / 4 + T^T M (T_dot(x) w - T_dot(w) x) / 2,
+  /// since without the second part, which is zero where velocities are rates of coordinates, the Christoffel
+  /// choice has C(x) w = C(w) x. Changes the stored velocity-dependent state.
+  void CalcCoriolisProduct(const Eigen::Ref<const VectorXd>& velocity, const Eigen::Ref<const VectorXd>& w,
+                           Eigen::Ref<VectorXd> result);
 
   /// Axis direction and a point on the axis of a joint, world frame.
   [[nodiscard]] Vector3d JointAxis(int joint) const;
@@ -56,6 +59,8 @@ class EngineTerms {
   [[nodiscard]] const Adapter& adapter() const { return *adapter_; }
 
  private:
+  /// Coriolis force at a velocity.
+  void CalcCoriolis(const Eigen::Ref<const VectorXd>& velocity, Eigen::Ref<VectorXd> result);
   void CalcEnergyAndMomentum();
 
   const Adapter* adapter_;
@@ -68,6 +73,7 @@ class EngineTerms {
   MatrixXd M_nv_;
   MatrixXd M_;
   VectorXd coriolis_, gravity_, friction_;
+  VectorXd velocity_, force_;  // scratch of CalcCoriolisProduct
   RowMatrixXd J_nv_;
   MatrixXd J_;
   std::vector<LinkInWorld> links_;

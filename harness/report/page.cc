@@ -7,6 +7,7 @@
 #include <cmath>
 #include <system_error>
 
+#include "controller/common/errors.h"
 #include "harness/common/files.h"
 #include "harness/report/html.h"
 #include "harness/report/page_assets.h"
@@ -357,6 +358,12 @@ class Page {
 
 }  // namespace
 
-std::string MakePage(const RunData& run, const PageContent& content) { return Page(run, content).Make(); }
+std::string MakePage(const RunData& run, const PageContent& content) {
+  try {
+    return Page(run, content).Make();
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(run.path().string() + ": summary: " + error.what());
+  }
+}
 
 }  // namespace dexcheck

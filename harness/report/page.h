@@ -29,6 +29,7 @@ struct PageContent {
 };
 
 /// A whole HTML document that loads nothing: verdict, evidence, checks, plots, video, figures, parameters.
+/// @throws InputError that names the log when its summary is none.
 std::string MakePage(const RunData& run, const PageContent& content);
 
 }  // namespace dexcheck

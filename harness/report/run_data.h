@@ -37,6 +37,8 @@ class RunData {
   explicit RunData(const std::filesystem::path& run_dir);
 
   [[nodiscard]] const LogReader& log() const { return log_; }
+  /// Of the log.
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   /// Of each row, s.
   [[nodiscard]] const VectorXd& time() const { return time_; }
   /// Null when it was not recorded.

@@ -15,8 +15,9 @@ constexpr long kMaxValues = 10000;
 constexpr long kMaxSeed = 1L << 53;  // whole numbers that a double holds
 
 double Interpolate(const Variation& variation, double share) {
-  if (!variation.logarithmic) return variation.from + share * (variation.to - variation.from);
-  return variation.from * std::pow(variation.to / variation.from, share);
+  const double value = variation.logarithmic ? variation.from * std::pow(variation.to / variation.from, share)
+                                             : variation.from + share * (variation.to - variation.from);
+  return std::clamp(value, variation.from, variation.to);
 }
 
 Variation ReadVariation(const TomlValue& value, Sampling sampling) {
@@ -44,6 +45,8 @@ Variation ReadVariation(const TomlValue& value, Sampling sampling) {
     variation.logarithmic = spacing->AsChoice<bool>({{"linear", false}, {"log", true}});
     if (variation.logarithmic) variation.from = table.Get("from").AsPositive();
   }
+  const double span = variation.logarithmic ? variation.to / variation.from : variation.to - variation.from;
+  if (!std::isfinite(span)) table.Get("to").Fail("must not be so far from from");
   if (sampling == Sampling::kGrid) {
     const long count = table.Get("count").AsWhole(2, kMaxValues);
     for (long i = 0; i < count; ++i) {

@@ -9,6 +9,8 @@
 #include <algorithm>
 
 #include "controller/model/parameter_reader.h"
+#include "harness/checks/model_check.h"
+#include "harness/checks/random_states.h"
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"
 #include "tests/common/random_robot.h"
@@ -109,6 +111,31 @@ TEST(Consistency, BoundsStaySmallOnLongChains) {
     double share = 0.0;
     EXPECT_EQ(ListFailures(Compare(spec, LoadLongChain(spec), 2), &share), "") << joints << " joints";
     EXPECT_GT(share, 1e-4);
+  }
+}
+
+// Of a few joints' random velocities one is now and then far smaller than the other.
+TEST(Consistency, HoldsForVelocitiesOfDifferentSize) {
+  std::mt19937 random(304);
+  for (int index = 0; index < 12; ++index) {
+    const RobotSpec spec = testing::MakeRandomRobot(MakeOptions(index), &random);
+    const RobotModel model(spec);
+    const MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "text");
+    const Adapter adapter(model, *engine, "text");
+    StateSource source(model, {}, 5);
+    VectorXd q = VectorXd::Zero(model.num_positions());
+    VectorXd xi = VectorXd::Zero(model.num_velocities());
+    VectorXd w = xi;
+    for (const double ratio : {1e-6, 1e-3, 1e3, 1e6}) {
+      ModelCheck check(adapter);
+      source.DrawPositions(&q);
+      source.DrawVelocity(&xi);
+      source.DrawVelocity(&w);
+      check.Compare(q, xi, ratio * w, 0);
+      for (const CheckRecord& record : check.records()) {
+        EXPECT_FALSE(record.failed) << record.name << " of robot " << index << ": " << record.worst;
+      }
+    }
   }
 }
 

@@ -199,6 +199,37 @@ TEST_P(Jacobian, FrameMotionIsThatOfTheJacobian) {
   EXPECT_GT(largest_without_turning, kVisible);
 }
 
+// A link's frame is where its frames are, less their lever arm.
+TEST_P(Jacobian, LinkVelocityIsTheDerivativeOfTheLinksPose) {
+  terms_.SetState(q_, velocity_);
+  double largest = 0.0;
+  for (int frame = 0; frame < frames_; ++frame) {
+    const int link = model_.frames()[static_cast<size_t>(frame)].link;
+    const Vector6d V = terms_.CalcLinkVelocity(link);
+    const Pose X = terms_.CalcLinkPose(link);
+    const Eigen::Matrix4d X_dot = Differentiate(
+        [&](double t) -> Eigen::Matrix4d {
+          moving_.SetState(q_ + t * q_dot_, velocity_);
+          return moving_.CalcLinkPose(link).matrix();
+        },
+        kStateStep);
+    const Vector6d in_link = CalcBodyVelocity(X, X_dot);
+    Vector6d by_difference;
+    by_difference << X.linear() * in_link.head<3>(), X.linear() * in_link.tail<3>();
+    EXPECT_TRUE(MatrixNear(V, by_difference, kStateDifference)) << "link " << link;
+
+    Vector6d at_frame;
+    Vector6d bias;
+    terms_.CalcFrameMotion(frame, &at_frame, &bias);
+    const Vector3d arm = terms_.CalcFramePose(frame).translation() - X.translation();
+    Vector6d expected = V;
+    expected.head<3>() += V.tail<3>().cross(arm);
+    EXPECT_TRUE(MatrixNear(at_frame, expected, kRounding * (1.0 + V.norm()))) << "link " << link;
+    largest = std::max(largest, V.tail<3>().cross(arm).norm());
+  }
+  EXPECT_GT(largest, kVisible);
+}
+
 // A joint's axis displaced by a milliradian, and rates taken along another motion, are seen.
 TEST_P(Jacobian, MutationsAreSeen) {
   RobotSpec spec = model_.spec();

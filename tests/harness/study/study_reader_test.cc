@@ -101,6 +101,17 @@ TEST(StudyReader, MistakesAreNamed) {
             "study.toml");
       },
       "vary: makes 4e+06 trials; at most 1000000"));
+  // Ranges whose width, or ratio, is no number.
+  for (const std::string range :
+       {"from = -1e308\nto = 1e308", "from = 1e-300\nto = 1e300\nspacing = \"log\""}) {
+    EXPECT_TRUE(Throws<InputError>(
+        [&] {
+          return ParseStudy(
+              "name = \"s\"\nscenario = \"hold\"\n[[vary]]\nkey = \"a\"\ncount = 3\n" + range + "\n",
+              "study.toml");
+        },
+        "to: must not be so far from from"));
+  }
 }
 
 }  // namespace

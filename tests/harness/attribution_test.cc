@@ -1,0 +1,203 @@
+// Which cause follows from which failed checks.
+
+#include "harness/checks/attribution.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+namespace dexcheck {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr const char* kSteps[] = {
+    "balance_object", "reduced_acceleration", "contact_force",  "actuator_effort", "cone_use", "traction_use",
+    "contacts_lost",  "penetration",          "fingertip_slip", "wheel_slip",      "base_tilt"};
+
+RunCheck MakeCheck(const std::string& name, CheckKind kind = CheckKind::kAssumption) {
+  RunCheck check;
+  check.name = name;
+  check.kind = kind;
+  check.bound = 1.0;
+  check.Add(0.5, 0.0);
+  return check;
+}
+
+/// Checks of a run, none of which failed yet.
+class FakeRun {
+ public:
+  FakeRun() {
+    for (const char* name : {"M_bar", "gravity"}) model_.push_back(MakeCheck(name, CheckKind::kModel));
+    for (const char* name : kSteps) steps_.push_back(MakeCheck(name));
+  }
+
+  FakeRun& Fail(const std::string& name, double time) {
+    for (std::vector<RunCheck>* checks : {&model_, &steps_}) {
+      for (RunCheck& check : *checks) {
+        if (check.name == name) check.Add(2.0, time);
+      }
+    }
+    return *this;
+  }
+  FakeRun& FailConstant(const std::string& name) {
+    gate_.findings.push_back({name, "link r_forearm", 1.5, 1.25, {}, 0});
+    return *this;
+  }
+  [[nodiscard]] AttributionResult Explain() const { return Attribute(gate_, model_, steps_); }
+  RunCheck& step(const std::string& name) {
+    return *std::find_if(steps_.begin(), steps_.end(),
+                         [&](const RunCheck& check) { return check.name == name; });
+  }
+
+ private:
+  GateResult gate_;
+  std::vector<RunCheck> model_, steps_;
+};
+
+/// The cause of one failed check; "" when it did not fail.
+std::string FindCause(const AttributionResult& result, const std::string& check) {
+  for (const Attribution& one : result.attributions) {
+    if (one.check == check) return NameOf(one.cause);
+  }
+  return "";
+}
+
+TEST(Attribute, FindsNothingWhereNothingFailed) {
+  const AttributionResult result = FakeRun().Explain();
+  EXPECT_EQ(result.cause, Cause::kNone);
+  EXPECT_EQ(result.evidence, "");
+  EXPECT_TRUE(result.attributions.empty());
+  EXPECT_EQ(Attribute({}, {}, {}).cause, Cause::kNone);
+}
+
+TEST(Attribute, BlamesConstantsBeforeAllElse) {
+  const AttributionResult result = FakeRun()
+                                       .FailConstant("link_mass")
+                                       .FailConstant("armature")
+                                       .Fail("M_bar", 0.1)
+                                       .Fail("cone_use", 0.0)
+                                       .Explain();
+  EXPECT_EQ(result.cause, Cause::kModel);
+  EXPECT_EQ(result.evidence, "link_mass: link r_forearm: 1.5 in the model, 1.25 in the MJCF");
+  EXPECT_EQ(FindCause(result, "M_bar"), "model");
+  EXPECT_EQ(FindCause(result, "cone_use"), "model");
+  EXPECT_EQ(result.attributions.size(), 2U);
+}
+
+TEST(Attribute, ConstantsAloneAreEnough) {
+  const AttributionResult result = FakeRun().FailConstant("link_mass").Explain();
+  EXPECT_EQ(result.cause, Cause::kModel);
+  EXPECT_TRUE(result.attributions.empty());
+}
+
+TEST(Attribute, TellsTheModelCheckThatFailedFirst) {
+  const AttributionResult result =
+      FakeRun().Fail("M_bar", 0.5).Fail("gravity", 0.25).Fail("traction_use", 0.0).Explain();
+  EXPECT_EQ(result.cause, Cause::kModel);
+  EXPECT_EQ(result.evidence, "gravity 2 (bound 1), first above it at t = 0.25 s");
+  EXPECT_EQ(FindCause(result, "traction_use"), "model");
+}
+
+TEST(Attribute, TheObjectsBalanceIsTheModels) {
+  const AttributionResult result = FakeRun().Fail("cone_use", 0.1).Fail("balance_object", 0.9).Explain();
+  EXPECT_EQ(result.cause, Cause::kModel);
+  EXPECT_THAT(result.evidence, StartsWith("balance_object"));
+}
+
+TEST(Attribute, SlidingOutweighsWhatGaveEarlier) {
+  const AttributionResult result = FakeRun()
+                                       .Fail("wheel_slip", 0.1)
+                                       .Fail("penetration", 0.2)
+                                       .Fail("base_tilt", 0.1)
+                                       .Fail("traction_use", 0.3)
+                                       .Explain();
+  EXPECT_EQ(result.cause, Cause::kWheelSlip);
+  EXPECT_THAT(result.evidence, StartsWith("traction_use"));
+  EXPECT_EQ(FindCause(result, "wheel_slip"), "wheel slip");
+  EXPECT_EQ(FindCause(result, "penetration"), "contact softness");
+  EXPECT_EQ(FindCause(result, "base_tilt"), "wheel slip");
+}
+
+TEST(Attribute, OfSeveralThatSlideTheFirstCounts) {
+  for (const bool wheels_first : {true, false}) {
+    const AttributionResult result = FakeRun()
+                                         .Fail("cone_use", wheels_first ? 0.2 : 0.1)
+                                         .Fail("traction_use", wheels_first ? 0.1 : 0.2)
+                                         .Explain();
+    EXPECT_EQ(result.cause, wheels_first ? Cause::kWheelSlip : Cause::kFingertipSlip);
+    EXPECT_EQ(FindCause(result, "cone_use"), "fingertip slip");
+    EXPECT_EQ(FindCause(result, "traction_use"), "wheel slip");
+  }
+  // At one time: the motor, which can make anything slide.
+  const AttributionResult result =
+      FakeRun().Fail("cone_use", 0.1).Fail("actuator_effort", 0.1).Fail("traction_use", 0.1).Explain();
+  EXPECT_EQ(result.cause, Cause::kActuatorLimit);
+}
+
+TEST(Attribute, SlipWithoutSlidingIsSoftness) {
+  for (const char* name : {"fingertip_slip", "wheel_slip", "penetration"}) {
+    const AttributionResult result = FakeRun().Fail(name, 0.1).Fail("reduced_acceleration", 0.05).Explain();
+    EXPECT_EQ(result.cause, Cause::kContactSoftness) << name;
+    EXPECT_THAT(result.evidence, StartsWith(name));
+    EXPECT_EQ(FindCause(result, "reduced_acceleration"), "contact softness");
+  }
+}
+
+TEST(Attribute, WithoutABrokenAssumptionTheIntegratorRemains) {
+  const AttributionResult result =
+      FakeRun().Fail("reduced_acceleration", 0.1).Fail("contact_force", 0.2).Explain();
+  EXPECT_EQ(result.cause, Cause::kIntegrator);
+  EXPECT_EQ(result.evidence, "no assumption broke");
+  EXPECT_EQ(FindCause(result, "contact_force"), "integrator");
+}
+
+TEST(Attribute, EvidenceHasUnitPlaceAndTime) {
+  FakeRun run;
+  run.Fail("fingertip_slip", 0.125);
+  run.step("fingertip_slip").unit = "m";
+  run.step("fingertip_slip").where = "rf2_tip";
+  EXPECT_EQ(run.Explain().evidence, "fingertip_slip 2 m (bound 1), first above it at t = 0.125 s, rf2_tip");
+}
+
+// Whichever checks fail, in whichever order: there is a cause, each failed check gets one, and the check that
+// the run's cause is taken from has the same.
+TEST(Attribute, NeverContradictsItself) {
+  constexpr unsigned kSets = 1U << std::size(kSteps);
+  for (unsigned set = 1; set < kSets; ++set) {
+    for (const bool forward : {true, false}) {
+      FakeRun run;
+      size_t failed = 0;
+      for (size_t i = 0; i < std::size(kSteps); ++i) {
+        if ((set >> i & 1U) == 0) continue;
+        run.Fail(kSteps[i], forward ? 0.1 * static_cast<double>(i) : 2.0 - 0.1 * static_cast<double>(i));
+        ++failed;
+      }
+      const AttributionResult result = run.Explain();
+      ASSERT_NE(result.cause, Cause::kNone) << set;
+      ASSERT_FALSE(result.evidence.empty()) << set;
+      ASSERT_EQ(result.attributions.size(), failed) << set;
+      for (const Attribution& one : result.attributions) ASSERT_NE(one.cause, Cause::kNone) << set;
+      const std::string evidence = result.evidence.substr(0, result.evidence.find(' '));
+      if (result.cause != Cause::kIntegrator) {
+        ASSERT_EQ(FindCause(result, evidence), NameOf(result.cause)) << set << " " << evidence;
+      }
+    }
+  }
+}
+
+TEST(NameOf, CausesHaveDifferentNames) {
+  std::vector<std::string> names;
+  for (const Cause cause : {Cause::kNone, Cause::kModel, Cause::kActuatorLimit, Cause::kFingertipSlip,
+                            Cause::kWheelSlip, Cause::kContactSoftness, Cause::kTilt, Cause::kIntegrator}) {
+    names.emplace_back(NameOf(cause));
+  }
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());
+}
+
+}  // namespace
+}  // namespace dexcheck
