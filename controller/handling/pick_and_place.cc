@@ -80,9 +80,12 @@ void PickAndPlace::PlanAttempt(double t, const Pose& X_Bo) {
   lay_at_ = X_Bo.translation();
   push_ = 0.0;
   if (!plan_.found) return;
+  const VectorXd above = plan_.rise.Evaluate(1.0);
+  raise_time_ =
+      std::max(options_.raise_time, (above - plan_.q_open).cwiseAbs().maxCoeff() / options_.arm_rate);
   const VectorXd from = move_.to;
   Enter(Phase::kApproach, t);
-  StartMove(from, plan_.q_above, t, options_.approach_time);
+  StartMove(from, above, t, options_.approach_time);
 }
 
 void PickAndPlace::Enter(Phase phase, double t) {
@@ -99,28 +102,54 @@ void PickAndPlace::StartMove(const VectorXd& from, const VectorXd& to, double t,
   move_.begin = t;
   move_.duration = duration;
   move_.steady = steady;
+  move_.way = Move::kStraight;
+}
+
+void PickAndPlace::StartRise(const VectorXd& from, bool up, double t, double duration) {
+  const VectorXd low = plan_.rise.Evaluate(0.0);
+  const VectorXd high = plan_.rise.Evaluate(1.0);
+  move_.offset = from - (up ? low : high);
+  StartMove(from, move_.offset + (up ? high : low), t, duration);
+  move_.way = up ? Move::kUp : Move::kDown;
 }
 
 void PickAndPlace::HoldPosture(const VectorXd& q_joints) { StartMove(q_joints, q_joints, begin_, 0.0); }
 
 VectorXd PickAndPlace::Joints(const MeasuredState& state) const { return state.q.tail(model_->num_joints()); }
 
+ScalarMotion PickAndPlace::EvaluateMove(double t) const {
+  if (move_.duration <= 0.0) return {1.0, 0.0, 0.0};
+  if (!move_.steady) return CalcMinSnap(t - move_.begin, move_.duration);
+  // A ramp up to 1 / duration, and a stop at the end, which is only reached when nothing was found.
+  ScalarMotion motion = CalcSpeedRamp(std::max(0.0, t - move_.begin), kSearchRamp);
+  motion.s /= move_.duration;
+  motion.s_dot /= move_.duration;
+  motion.s_ddot /= move_.duration;
+  return motion.s < 1.0 ? motion : ScalarMotion{1.0, 0.0, 0.0};
+}
+
+void PickAndPlace::EvaluateWay(double s) {
+  if (move_.way == Move::kStraight) {
+    way_s_ = move_.to - move_.from;
+    way_ = move_.from + s * way_s_;
+    way_ss_.setZero(way_.size());
+    return;
+  }
+  const bool up = move_.way == Move::kUp;
+  plan_.rise.Evaluate(up ? s : 1.0 - s, &way_, &way_s_, &way_ss_);
+  if (!up) way_s_ = -way_s_;
+  way_ += move_.offset;
+}
+
 void PickAndPlace::FollowMove(double t, PostureTask* posture) {
-  const auto evaluate = [&](double time) {
-    if (move_.duration <= 0.0) return ScalarMotion{1.0, 0.0, 0.0};
-    if (!move_.steady) return CalcMinSnap(time - move_.begin, move_.duration);
-    // A ramp up to 1 / duration, and a stop at the end, which is only reached when nothing was found.
-    ScalarMotion motion = CalcSpeedRamp(std::max(0.0, time - move_.begin), kSearchRamp);
-    motion.s /= move_.duration;
-    motion.s_dot /= move_.duration;
-    motion.s_ddot /= move_.duration;
-    return motion.s < 1.0 ? motion : ScalarMotion{1.0, 0.0, 0.0};
-  };
-  const ScalarMotion now = evaluate(t);
   const Eigen::Index joints = model_->num_joints();
-  posture->q_posture = move_.from + now.s * (move_.to - move_.from);
-  posture->xi_reference.tail(joints) = evaluate(t - half_step_).s_dot * (move_.to - move_.from);
-  posture->acceleration.tail(joints) = now.s_ddot * (move_.to - move_.from);
+  const ScalarMotion before = EvaluateMove(t - half_step_);
+  EvaluateWay(before.s);
+  posture->xi_reference.tail(joints) = before.s_dot * way_s_;
+  const ScalarMotion now = EvaluateMove(t);
+  EvaluateWay(now.s);
+  posture->q_posture = way_;
+  posture->acceleration.tail(joints) = now.s_ddot * way_s_ + now.s_dot * now.s_dot * way_ss_;
   SetPostureGains(t, posture);
 }
 
@@ -184,7 +213,7 @@ void PickAndPlace::UpdateApproach(double t) {
   if (!MoveDone(t)) return;
   if (stage_ == 0) {
     stage_ = 1;
-    StartMove(plan_.q_above, plan_.q_open, t, options_.lower_time);
+    StartRise(move_.to, /*up=*/false, t, options_.lower_time);
   } else if (t >= move_.begin + move_.duration + kPause) {
     Enter(Phase::kClose, t);
     demand_.by_inertia = true;
@@ -285,6 +314,12 @@ void PickAndPlace::Refuse(double t, const std::string& reason) {
   if (refused_) throw GraspForceError(reason);
   refused_ = true;
   failure_ = "refused to lift: " + reason;
+  if (phase_ == Phase::kGrip) {
+    demand_.grip = 0.0;
+    Enter(Phase::kRelease, t);
+    stage_ = 1;
+    return;
+  }
   lowering_from_ = demand_.weight = borne_;
   Enter(Phase::kHandOver, t);
 }
@@ -298,11 +333,11 @@ DesiredMotion PickAndPlace::EvaluateCarry(double t) const {
     desired.X_d_dot.head<3>() += CalcMinSnap(t - half_step_ - from, duration).s_dot * way;
     desired.X_d_ddot.head<3>() += now.s_ddot * way;
   };
-  const double raised = begin_ + options_.raise_time;
+  const double raised = begin_ + raise_time_;
   const double there = raised + options_.transport_time;
-  add(options_.raise, begin_, options_.raise_time);
+  add(options_.raise, begin_, raise_time_);
   add(options_.transport, raised, options_.transport_time);
-  add(-options_.raise, there, options_.raise_time);
+  add(-options_.raise, there, raise_time_);
   return desired;
 }
 
@@ -310,13 +345,12 @@ void PickAndPlace::UpdateCarry(double t) {
   demand_.weight = demand_.scale;
   demand_.desired = EvaluateCarry(t);
   // The arm bends as the plan has it, so that fingers need not.
-  const double lower = begin_ + options_.raise_time + options_.transport_time;
+  const double lower = begin_ + raise_time_ + options_.transport_time;
   if (stage_ == 0 || (stage_ == 1 && t >= lower)) {
-    const VectorXd way = (stage_ == 0 ? 1.0 : -1.0) * (plan_.q_above - plan_.q_open);
-    StartMove(move_.to, move_.to + way, stage_ == 0 ? begin_ : lower, options_.raise_time);
+    StartRise(move_.to, /*up=*/stage_ == 0, stage_ == 0 ? begin_ : lower, raise_time_);
     ++stage_;
   }
-  if (t < begin_ + 2.0 * options_.raise_time + options_.transport_time + kPause) return;
+  if (t < begin_ + 2.0 * raise_time_ + options_.transport_time + kPause) return;
   lowering_from_ = demand_.weight;
   Enter(Phase::kHandOver, t);
 }
@@ -353,7 +387,7 @@ void PickAndPlace::UpdateRelease(double t, const MeasuredState& state) {
     StartMove(Joints(state), to, t, kOpenTime);
   } else if (t >= move_.begin + move_.duration + kPause) {
     Enter(Phase::kWithdraw, t);
-    StartMove(move_.to, plan_.q_above, t, options_.lower_time);
+    StartRise(move_.to, /*up=*/true, t, options_.lower_time);
   }
 }
 

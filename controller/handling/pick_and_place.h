@@ -39,7 +39,8 @@ struct PickAndPlaceOptions {
   double search_speed = 0.006;  ///< From there on, m/s.
   double grip_time = 1.2;
   double take_over_time = 1.5;
-  double raise_time = 3.0;
+  double raise_time = 3.0;  ///< Up, and down; longer where the arm has to bend far:
+  double arm_rate = 0.2;    ///< its joints turn no faster than this on average, rad/s.
   double transport_time = 3.5;
   double touch_force = 0.3;    ///< N, while fingertips wait for the others.
   double f_min = 1.0;          ///< N, of the grasp.
@@ -96,17 +97,24 @@ class PickAndPlace {
   [[nodiscard]] double push() const { return push_; }
 
  private:
-  /// From one posture to another with least jerk.
+  /// From one posture to another with least snap.
   struct Move {
     VectorXd from, to;
     double begin = 0.0;
     double duration = 0.0;
-    bool steady = false;  // at constant speed after a short ramp
+    bool steady = false;                             // at constant speed after a short ramp
+    enum { kStraight, kUp, kDown } way = kStraight;  // or along the plan's rise,
+    VectorXd offset;                                 // this far from it
   };
 
   void Enter(Phase phase, double t);
   void StartMove(const VectorXd& from, const VectorXd& to, double t, double duration, bool steady = false);
+  /// Along the plan's rise, up or down.
+  void StartRise(const VectorXd& from, bool up, double t, double duration);
   [[nodiscard]] bool MoveDone(double t) const { return t >= move_.begin + move_.duration; }
+  [[nodiscard]] ScalarMotion EvaluateMove(double t) const;
+  /// Sets way_ and its derivatives.
+  void EvaluateWay(double s);
   void FollowMove(double t, PostureTask* posture);
   void SetPostureGains(double t, PostureTask* posture);
   void HoldPosture(const VectorXd& q_joints);
@@ -140,11 +148,13 @@ class PickAndPlace {
   double stage_begin_ = 0.0;
   int attempt_ = 0;
   Move move_;
+  VectorXd way_, way_s_, way_ss_;  // posture of the move and its derivatives by s
   HandlingDemand demand_;
   std::vector<double> touched_at_;  // by fingertip, s
   Vector3d lay_at_ = Vector3d::Zero();
   Vector6d X_start_ = Vector6d::Zero();
   double push_ = 0.0;
+  double raise_time_ = 0.0;     // s
   double borne_ = 0.0;          // weight of the step before
   double lowering_from_ = 1.0;  // weight at the beginning of the hand-over
   bool refused_ = false;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "controller/grasp/contact_plan.h"
+#include "controller/handling/posture_path.h"
 
 namespace dexcheck {
 
@@ -23,8 +24,8 @@ struct PickPlan {
   bool found = false;
   std::string problem;   ///< Why there is none.
   ContactPlan contacts;  ///< Where the fingertips go.
-  VectorXd q_above;      ///< The hand is open, `raise` over the object.
-  VectorXd q_open;       ///< Around the object.
+  VectorXd q_open;       ///< The hand is open around the object.
+  PosturePath rise;      ///< From there straight up by `raise`.
   VectorXd q_near;       ///< Just off the contacts.
   VectorXd q_deep;       ///< Fingertips in the object.
 };

@@ -186,7 +186,7 @@ void ClosedLoop::CalcTaskTorque(double t) {
   try {
     tau_ = handling_->CalcTorque(told_, task_->demand());
   } catch (const GraspForceError& error) {
-    if (task_->phase() != Phase::kTakeOver) throw;
+    if (task_->phase() != Phase::kGrip && task_->phase() != Phase::kTakeOver) throw;
     task_->Refuse(t, error.what());
     tau_ = handling_->CalcTorque(told_, task_->demand());
   }

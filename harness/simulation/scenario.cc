@@ -108,6 +108,9 @@ void ReadTask(const TomlValue& value, Scenario* scenario) {
   PickAndPlaceOptions& pick = task.pick_and_place;
   task.X_Bo.translation() = table.Get("xyz").AsVector<3>();
   if (const auto zyz = table.FindAngles<3>("zyz")) task.X_Bo.linear() = CalcRotationZyz(*zyz);
+  if (const auto joints = table.Find("arm_joints")) {
+    for (const TomlValue& entry : joints->AsList()) task.arm_joints.push_back(entry.AsName());
+  }
   pick.raise.z() = pick.plan.raise = table.Get("raise").AsPositive();
   pick.transport = table.Get("transport").AsVector<3>();
   pick.plan.support = table.Get("support_height").AsNumber();
@@ -117,6 +120,7 @@ void ReadTask(const TomlValue& value, Scenario* scenario) {
   pick.grip_time = ReadOr(table, "grip_time", pick.grip_time);
   pick.take_over_time = ReadOr(table, "take_over_time", pick.take_over_time);
   pick.raise_time = ReadOr(table, "raise_time", pick.raise_time);
+  pick.arm_rate = ReadOr(table, "arm_rate", pick.arm_rate);
   pick.transport_time = ReadOr(table, "transport_time", pick.transport_time);
   pick.search_speed = ReadOr(table, "search_speed", pick.search_speed);
   pick.touch_force = ReadOr(table, "touch_force", pick.touch_force);

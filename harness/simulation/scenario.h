@@ -66,6 +66,8 @@ struct ControlOptions {
 /// Take the object from a support, carry it, put it down.
 struct TaskOptions {
   Pose X_Bo = Pose::Identity();  ///< Where the object lies.
+  /// Joints that may place the palm; empty for those of the arm alone.
+  std::vector<std::string> arm_joints;
   PickAndPlaceOptions pick_and_place;
 };
 

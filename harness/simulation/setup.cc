@@ -163,7 +163,12 @@ void Setup::PlaceTask(std::mt19937_64* random) {
   }
   hand_.fingertips = fingertips_;
   hand_.palm_frame = FindGraspFrame();
-  hand_.arm_joints = ListArmJoints(model_, fingertips_, hand_.palm_frame);
+  for (const std::string& name : scenario_.task->arm_joints) {
+    const int joint = model_.FindJoint(name);
+    if (joint < 0) Fail(scenario_, "task.arm_joints", Quote(name) + " is no joint of the model");
+    hand_.arm_joints.push_back(joint);
+  }
+  if (hand_.arm_joints.empty()) hand_.arm_joints = ListArmJoints(model_, fingertips_, hand_.palm_frame);
   q_start_ = ReadPosture();
   X_Bo_start_ = scenario_.task->X_Bo;
   X_start_ << X_Bo_start_.translation(), CalcAnyZyzAngles(X_Bo_start_.linear());
