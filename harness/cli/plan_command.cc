@@ -114,12 +114,12 @@ VectorXd MakeNominalPosture(const RobotModel& model, const Hand& hand, const Req
   return q;
 }
 
-/// Printed numbers: to a millionth of a degree or a micrometre.
-double Round(double value) { return std::round(value * 1e6) / 1e6; }
+/// Printed numbers: to a millionth of a degree or a micrometre, and 0 without a sign.
+double Round(double value) { return std::round(value * 1e6) / 1e6 + 0.0; }
 
 std::string FormatRounded(const std::vector<double>& values) {
-  std::vector<double> rounded;
-  for (const double value : values) rounded.push_back(Round(value) + 0.0);
+  std::vector<double> rounded(values.size());
+  std::transform(values.begin(), values.end(), rounded.begin(), Round);
   return FormatNumbers(rounded);
 }
 
@@ -206,7 +206,7 @@ void PrintText(const Request& request, const ContactPlan& plan, const GraspBlock
   fmt::print("]\njoints_deg = {{ ");
   separator = "";
   for (const auto& [name, degrees] : block.joints_deg) {
-    fmt::print("{}{} = {}", separator, name, FormatNumber(Round(degrees) + 0.0));
+    fmt::print("{}{} = {}", separator, name, FormatNumber(Round(degrees)));
     separator = ", ";
   }
   fmt::print(" }}\n");
