@@ -282,6 +282,11 @@ void RequireUsable(const Hand& hand, const Pose& X_Bo, const ContactPlanOptions&
   require_not_negative(options.spacing, "spacing");
   require_not_negative(options.clearance, "clearance");
   require_not_negative(options.arm_clearance, "arm_clearance");
+  for (const Vector3d& displacement : options.reaches) {
+    for (const double value : displacement) {
+      Require(std::isfinite(value), "reaches", "must be finite", value);
+    }
+  }
   if (options.support) {
     constexpr double kUnit = 1e-9;
     Require(std::abs(options.support->normal.norm() - 1.0) < kUnit, "support", "must have a unit normal",

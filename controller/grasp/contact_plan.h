@@ -32,23 +32,25 @@ struct ContactPlanOptions {
   double length = 0.05;        ///< Of the margin, m: a moment counts as the force moment / length.
   double least_margin = 0.01;  ///< A smaller margin counts as no force closure.
   double joint_margin = 0.05;  ///< Distance that the joints keep from the ends of their ranges, rad or m.
-  double comfort =
-      0.1;  ///< Joint margin, rad or m, at which a force-closure margin counts half; 0: whole always.
+  /// Joint margin, rad or m, with which a margin of force closure counts half; 0 counts it whole always.
+  double comfort = 0.1;
   double opening = 0.01;   ///< How far the fingers can open from their contacts along the normals, m.
   double room = 0.02;      ///< Free way of each fingertip out from the object along the normal, m.
   double spacing = 0.002;  ///< Between the fingers, m.
   /// Fingers count as tubes with this share of their fingertips' radius; the model has no other size of them.
   double finger_thickness = 0.8;
-  double half_length =
-      std::numeric_limits<double>::infinity();  ///< Contacts have |z| <= this in the object, m.
+  /// Contacts have |z| up to this in the object, m: for cylinders, whose surface has no end.
+  double half_length = std::numeric_limits<double>::infinity();
+
   std::optional<SupportPlane> support;
   /// With a support: largest angle between a contact's normal and the support plane, rad. A steeper contact
   /// would press the object down.
   double steepest = DegToRad(30.0);
   double clearance = 0.003;     ///< Between fingers and support, m.
   double arm_clearance = 0.05;  ///< Between the origins of the arm's joints and the support, m.
-  std::vector<Vector3d>
-      reaches;  ///< Displacements in the world by which the arm can move the palm from the plan.
+
+  /// Displacements in the world, m, by which the arm can move the palm from the plan.
+  std::vector<Vector3d> reaches;
 };
 
 /// What was found.

@@ -8,6 +8,7 @@
 #include "controller/grasp/own_joints.h"
 
 namespace dexcheck {
+
 FingerPlacement SolveFingerPlacement(const RobotModel& model, std::span<const int> fingertips,
                                      const Surface& object, const Pose& X_Bo,
                                      std::span<const SurfacePoint> targets,

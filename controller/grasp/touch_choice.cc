@@ -108,7 +108,7 @@ ForceClosureResult TouchChooser::Measure(const std::vector<const Touch*>& touche
   for (Eigen::Index i = 0; i < n; ++i) G.middleCols<3>(3 * i) = touches[static_cast<size_t>(i)]->G;
   ForceClosureOptions options;
   options.length = length_;
-  const ForceClosureResult result = CalcForceClosure(G, VectorXd::Constant(n, mu_), options);
+  ForceClosureResult result = CalcForceClosure(G, VectorXd::Constant(n, mu_), options);
   Vector6d direction = result.direction;
   direction.tail<3>() /= length_;
   directions_.push_back(direction.normalized());

@@ -75,6 +75,7 @@ Hand FindHand(const RobotModel& model, const Request& request) {
                                             " fingertips, at least three are needed");
   }
   hand.arm_joints = ListArmJoints(model, hand.fingertips, hand.palm_frame);
+  if (hand.arm_joints.empty()) Fail("--palm", "no joint moves " + Quote(name) + " alone");
   if (request.arm_joints.empty()) return hand;
   hand.arm_joints.clear();
   for (const std::string& joint : request.arm_joints) {
@@ -100,18 +101,25 @@ VectorXd MakeNominalPosture(const RobotModel& model, const Hand& hand, const Req
     if (result.ec != std::errc() || result.ptr != end || !std::isfinite(degrees)) {
       Fail("--joints-deg", "must be NAME=DEGREES, got " + Quote(assignment));
     }
-    const int joint = FindJoint(model, "--joints-deg", assignment.substr(0, equals));
-    q[model.num_base_positions() + joint] = DegToRad(degrees);
+    const int index = FindJoint(model, "--joints-deg", assignment.substr(0, equals));
+    const Joint& joint = model.joints()[static_cast<size_t>(index)];
+    const double position = DegToRad(degrees);
+    if (position < joint.lower || position > joint.upper) {
+      Fail("--joints-deg", assignment + " is outside of the range from " +
+                               FormatNumber(RadToDeg(joint.lower)) + " to " +
+                               FormatNumber(RadToDeg(joint.upper)));
+    }
+    q[model.num_base_positions() + index] = position;
   }
   return q;
 }
 
-/// Printed numbers: to a millionth of a degree or a micrometre.
-double Round(double value) { return std::round(value * 1e6) / 1e6; }
+/// Printed numbers: to a millionth of a degree or a micrometre, and 0 without a sign.
+double Round(double value) { return std::round(value * 1e6) / 1e6 + 0.0; }
 
 std::string FormatRounded(const std::vector<double>& values) {
-  std::vector<double> rounded;
-  for (const double value : values) rounded.push_back(Round(value) + 0.0);
+  std::vector<double> rounded(values.size());
+  std::transform(values.begin(), values.end(), rounded.begin(), Round);
   return FormatNumbers(rounded);
 }
 
@@ -198,7 +206,7 @@ void PrintText(const Request& request, const ContactPlan& plan, const GraspBlock
   fmt::print("]\njoints_deg = {{ ");
   separator = "";
   for (const auto& [name, degrees] : block.joints_deg) {
-    fmt::print("{}{} = {}", separator, name, FormatNumber(Round(degrees) + 0.0));
+    fmt::print("{}{} = {}", separator, name, FormatNumber(Round(degrees)));
     separator = ", ";
   }
   fmt::print(" }}\n");
@@ -250,9 +258,13 @@ int Run(Request request) {
     request.options.reaches.emplace_back(request.lift[0], request.lift[1], request.lift[2]);
   }
   Vector6d X_o;
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    X_o[i] = request.xyz[static_cast<size_t>(i)];
-    X_o[3 + i] = DegToRad(request.zyz_deg[static_cast<size_t>(i)]);
+  for (size_t i = 0; i < 3; ++i) {
+    for (const double value : {request.xyz[i], request.zyz_deg[i]}) {
+      if (!std::isfinite(value))
+        Fail("--object-xyz, --object-zyz-deg", "must be finite, got " + FormatNumber(value));
+    }
+    X_o[static_cast<Eigen::Index>(i)] = request.xyz[i];
+    X_o[static_cast<Eigen::Index>(i) + 3] = DegToRad(request.zyz_deg[i]);
   }
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
@@ -295,7 +307,6 @@ void AddPlanCommand(CLI::App* app, int* exit_code) {
       ->excludes(hand);
   command->add_option("--mu", request->options.mu, "Friction counted on")
       ->type_name("MU")
-      ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command
       ->add_option("--support-height", request->support_height,
@@ -308,7 +319,6 @@ void AddPlanCommand(CLI::App* app, int* exit_code) {
       ->expected(3);
   command->add_option("--joint-margin", request->options.joint_margin, "From the ends of ranges, rad or m")
       ->type_name("MARGIN")
-      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
       ->add_option(
@@ -323,7 +333,7 @@ void AddPlanCommand(CLI::App* app, int* exit_code) {
       ->type_name("FILE.toml");
   command
       ->add_option("--json", request->json_file,
-                   "Write the plan to this file (- for standard output, then without the table)")
+                   "Write the plan to this file (- for standard output, then without the [grasp])")
       ->type_name("FILE.json");
   command->callback([=] { *exit_code = Run(*request); });
 }

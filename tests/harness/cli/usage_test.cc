@@ -66,6 +66,10 @@ TEST(Usage, HelpMentionsEveryCommandAndOption) {
        {"--robot FILE.toml", "--mjcf FILE.xml", "--state STATE.json REQUIRED", "--out FILE.json=-"}) {
     EXPECT_THAT(help({"eval", "--help"}), HasSubstr(word));
   }
+  for (const char* word : {"--contacts REQUIRED", "--object-xyz X Y Z x 3 REQUIRED", "--hand right|left",
+                           "--palm FRAME", "--support-height Z", "--mu MU=0.5", "--json FILE.json"}) {
+    EXPECT_THAT(help({"plan", "--help"}), HasSubstr(word));
+  }
   for (const char* word : {"RUN_DIR", "--csv FILE.csv", "--signals A,B,...", "--every N=1", "--list"}) {
     EXPECT_THAT(help({"export", "--help"}), HasSubstr(word));
   }
