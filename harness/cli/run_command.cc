@@ -77,6 +77,8 @@ int RunScenario(const Request& request) {
   if (folder && runner.loop().step() > 0 && !IsInterrupted()) {
     if (request.video) WriteRunMovie(folder->path(), (folder->path() / "video.mp4").string(), request.quiet);
     if (!request.no_report) TryToReport(folder->path());
+  } else if (folder && request.video && !IsInterrupted()) {
+    fmt::print(stderr, "dexcheck: no video: the run ended before its first step\n");
   }
   PrintRunReport(setup, runner.loop(), runner.result(), folder ? folder->path().string() : "", request.quiet);
   return ToExitCode(runner.result());

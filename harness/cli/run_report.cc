@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 namespace dexcheck::cli {
 namespace {
@@ -63,7 +64,10 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     if (loop.task() != nullptr) PrintTask(loop);
     if (loop.is_checking()) PrintChecks(setup, loop);
     PrintSpeed(loop, result);
-    if (!folder.empty()) fmt::print("log, summary and report in {}\n", folder);
+    if (!folder.empty()) {
+      const bool reported = std::filesystem::exists(std::filesystem::path(folder) / "report.html");
+      fmt::print("{} in {}\n", reported ? "log, summary and report" : "log and summary", folder);
+    }
     fmt::print("\n");
   }
   switch (result.verdict) {

@@ -172,7 +172,8 @@ constexpr int kKeyColumns = 2;
 /// Below the chart.
 std::string DrawKey(int number, const ChartLine& line) {
   const double x = kLeft + kInnerWidth / kKeyColumns * (number % kKeyColumns);
-  const double y = kHeight + kKeyRow * (number / kKeyColumns) + 4.0;
+  const int row = number / kKeyColumns;
+  const double y = kHeight + kKeyRow * row + 4.0;
   return fmt::format(
       "<line x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\" stroke-width=\"2.5\"/>"
       "<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
@@ -256,7 +257,8 @@ std::string DrawChart(Chart chart) {
   const auto place_y = [&](double y) { return kTop + kInnerHeight * (1.0 - FindPlace(chart.y, y)); };
   const auto named = static_cast<int>(std::count_if(
       chart.lines.begin(), chart.lines.end(), [](const ChartLine& line) { return !line.label.empty(); }));
-  std::string svg = Open(chart.title, kWidth, kHeight + kKeyRow * ((named + kKeyColumns - 1) / kKeyColumns));
+  const int key_rows = (named + kKeyColumns - 1) / kKeyColumns;
+  std::string svg = Open(chart.title, kWidth, kHeight + kKeyRow * key_rows);
   svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"frame\"/>\n", kLeft, kTop,
                      kInnerWidth, kInnerHeight);
   const auto list = [](const Axis& axis) {

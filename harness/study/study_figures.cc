@@ -176,7 +176,7 @@ bool IsHeld(Outcome outcome) {
          outcome == Outcome::kChecksDisagreed;
 }
 
-const char* FindColor(Outcome outcome) { return kOutcomeColors[static_cast<size_t>(outcome)]; }
+std::string FindColor(Outcome outcome) { return kOutcomeColors[static_cast<size_t>(outcome)]; }
 
 std::string LabelOf(Metric metric) {
   const std::string unit = kMetrics[metric].unit;

@@ -28,7 +28,7 @@ constexpr double kVisibleOvershoot = 0.01;
 /// Whether a run came to its end with the object in the hand.
 bool IsHeld(Outcome outcome);
 /// "#rrggbb".
-const char* FindColor(Outcome outcome);
+std::string FindColor(Outcome outcome);
 /// "position_error_rms, m".
 std::string LabelOf(Metric metric);
 /// "#trial-7".

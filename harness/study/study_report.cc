@@ -41,8 +41,7 @@ svg .dot { stroke: #333; stroke-width: .5; }
   box-shadow: 0 -6px 30px rgba(0, 0, 0, .35); max-height: 70vh; overflow-y: auto; }
 .trial:target .close { display: block; float: right; }
 @media print {
-  .trials { max-height: none; } .trial:target { position: static; transform: none; width: auto; box-shadow: none; }
-  .trial:target .close { display: none; }
+  #trials, #trials + p, .trials { display: none; }
   svg rect, svg circle, .key { -webkit-print-color-adjust: exact; print-color-adjust: exact; }
 }
 )";

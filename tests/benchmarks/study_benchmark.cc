@@ -1,6 +1,6 @@
 // What a study's trial costs beyond its closed loop: the same run as a bare loop in this process, its models
 // loaded before, and as a trial with all that belongs to it: process, models, metrics, database. In turns, so
-// that others' work falls on both alike.
+// that others' work falls on both alike. Then how much faster two at a time are than one after the other.
 //
 // study_benchmark [REPETITIONS]
 
@@ -77,7 +77,18 @@ void Compare(int repetitions) {
   const testing::TempFolder folder;
   StudyStore store =
       StudyStore::OpenOrCreate(folder.path() / "study.sqlite", IdentifyStudy(inputs), inputs.study);
-  TrialPool pool(1, [&](const Trial& trial) { return RunTrial(inputs, trial); });
+  // The trials from `first` on, so many at a time.
+  const auto run = [&](int jobs, size_t first, size_t count) {
+    TrialPool pool(jobs, [&](const Trial& trial) { return RunTrial(inputs, trial); });
+    size_t next = first;
+    while (next < first + count || !pool.IsEmpty()) {
+      while (!pool.IsFull() && next < first + count) {
+        store.Claim(trials[next].number);
+        pool.Start(trials[next++]);
+      }
+      if (const auto row = pool.Wait()) store.Add(*row);
+    }
+  };
   std::vector<double> wall;
   std::vector<double> processor;
   double bare_seconds = 0.0;
@@ -89,13 +100,7 @@ void Compare(int repetitions) {
       loop.Settle();
       while (loop.step() < loop.num_steps()) loop.Step();
     });
-    const Times whole = Measure([&] {
-      store.Claim(trial.number);
-      pool.Start(trial);
-      while (!pool.IsEmpty()) {
-        if (const auto row = pool.Wait()) store.Add(*row);
-      }
-    });
+    const Times whole = Measure([&] { run(1, static_cast<size_t>(i), 1); });
     wall.push_back(whole.wall / bare.wall);
     processor.push_back(whole.processor / bare.processor);
     bare_seconds += bare.processor / repetitions;
@@ -103,12 +108,21 @@ void Compare(int repetitions) {
   fmt::print("bare closed loop of 3 s: {:.0f} ms of processor time\n", 1e3 * bare_seconds);
   fmt::print("trial / bare loop, medians of {}: {:.3f} of processor time, {:.3f} of wall time\n", repetitions,
              Median(processor), Median(wall));
+  constexpr size_t kCount = 8;
+  std::vector<double> ratios;
+  auto next = static_cast<size_t>(repetitions);
+  for (int i = 0; i < repetitions / 3 + 1; ++i, next += 2 * kCount) {
+    const double one = Measure([&] { run(1, next, kCount); }).wall;
+    ratios.push_back(Measure([&] { run(2, next + kCount, kCount); }).wall / one);
+  }
+  fmt::print("two at a time / one at a time, {} trials, median of {}: {:.3f} of wall time\n", kCount,
+             ratios.size(), Median(ratios));
 }
 
 }  // namespace
 }  // namespace dexcheck
 
 int main(int argc, char** argv) {
-  dexcheck::Compare(argc > 1 ? std::max(1, std::atoi(argv[1])) : 15);
+  dexcheck::Compare(argc > 1 ? std::clamp(std::atoi(argv[1]), 1, 100) : 15);
   return 0;
 }

@@ -26,6 +26,20 @@ nlohmann::json ReadSummary(const std::filesystem::path& folder) {
   return nlohmann::json::parse(ReadText(folder / "summary.json"));
 }
 
+TEST(RunCommand, SaysThatARunWithoutStepsHasNoVideo) {
+  const TempFolder folder;
+  const std::filesystem::path out = folder.path() / "run";
+  const ProgramResult result =
+      RunDexcheck({"run", "offset", "--set", "control.K_p=1e7", "--set", "control.K_v=600", "--no-check",
+                   "--video", "--out", out.string()});
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.out, HasSubstr("while settling"));
+  EXPECT_THAT(result.out, HasSubstr("\nlog and summary in "));
+  EXPECT_EQ(result.err, "dexcheck: no video: the run ended before its first step\n");
+  EXPECT_FALSE(std::filesystem::exists(out / "video.mp4"));
+  EXPECT_FALSE(std::filesystem::exists(out / "report.html"));
+}
+
 TEST(RunCommand, WritesAFolderThatTellsAll) {
   const TempFolder folder;
   const std::filesystem::path out = folder.path() / "run";
