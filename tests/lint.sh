@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Checks format and code without changing anything: tests/lint.sh [SOURCE.cc...], by default all of controller/ and
-# harness/. clang-format looks at every source of the project, cppcheck and clang-tidy at those given.
+# Checks format and code without changing anything: tests/lint.sh [SOURCE.cc...], by default all of controller/,
+# harness/ and renders/. clang-format looks at every source of the project, cppcheck and clang-tidy at those given.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 harness/install-packages.sh development
 sources=("$@")
-[[ ${#sources[@]} -gt 0 ]] || mapfile -t sources < <(git ls-files 'controller/*.cc' 'harness/*.cc')
+[[ ${#sources[@]} -gt 0 ]] || mapfile -t sources < <(git ls-files 'controller/*.cc' 'harness/*.cc' 'renders/*.cc')
 failed=0
 
 echo "clang-format"

@@ -6,7 +6,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 export CMAKE_BUILD_PARALLEL_LEVEL=${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)}
 
 tools=()
-[[ ${1:-} != sanitize ]] || tools=(development)
+[[ ${1:-} != sanitize && ${1:-} != thread ]] || tools=(development)
 "$root/harness/install-packages.sh" "${tools[@]}"
 cd "$root"
 exec cmake --workflow --preset "${1:-release}"

@@ -98,9 +98,10 @@ TomlDocument::TomlDocument(std::string_view text, std::string_view source)
 TomlTable TomlDocument::Open() const { return {*context_, TomlValue(*context_, *root_, ""), *root_}; }
 
 void TomlDocument::Override(std::string_view assignment) {
-  const std::string label = "--set " + std::string(assignment);
-  const auto fail = [&](const std::string& why) { throw InputError(Abbreviate(label) + ": " + why); };
-  CheckSize(label.size(), "--set");
+  // As messages show it: of readable length, without control characters.
+  const std::string label = Abbreviate("--set " + std::string(assignment));
+  const auto fail = [&](const std::string& why) { throw InputError(label + ": " + why); };
+  CheckSize(assignment.size(), "--set");
   const size_t equals = assignment.find('=');
   if (equals == std::string_view::npos) fail("must be PATH=VALUE");
   const std::string_view path = assignment.substr(0, equals);

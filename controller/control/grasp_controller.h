@@ -33,7 +33,7 @@ struct GraspControllerOptions {
   RedundancyWeight weight;
   PostureTask posture;
   Vector6d X_o_start = Vector6d::Zero();  ///< The angles' branch is the one nearest to this at first.
-  std::vector<Bond> bonds;  ///< None, or one for each fingertip.
+  std::vector<Bond> bonds;                ///< None, or one for each fingertip.
   double mu = 0.5;                        ///< Friction coefficient that the grasp force counts on.
   double f_min = 0.0;                     ///< Least normal force of each finger, N.
   double f_max = 100.0;                   ///< Largest, N.

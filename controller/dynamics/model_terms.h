@@ -77,8 +77,8 @@ class ModelTerms {
   /// [linear; angular] of the frame's origin in world axes.
   void CalcFrameMotion(int frame, Vector6d* velocity, Vector6d* bias_acceleration) const;
 
-  /// Velocity of a link's frame, [linear; angular] of its origin in world axes, by the index of its joint; -1 is
-  /// Sigma_0.
+  /// Velocity of a link's frame, [linear; angular] of its origin in world axes, by the index of its joint; -1
+  /// is Sigma_0.
   [[nodiscard]] Vector6d CalcLinkVelocity(int joint) const;
 
   /// Energies and momenta at the state set before; needs CalcDynamics.

@@ -29,8 +29,8 @@ Vector3d CalcZyzAngles(const Matrix3d& R_Bo);
 /// or previous is not finite.
 Vector3d CalcZyzAngles(const Matrix3d& R_Bo, const Vector3d& previous);
 
-/// ZYZ angles of a rotation also where they are singular: alpha = 0 where it is not determined, rad. For display
-/// and for the start of a trajectory; rates there mean nothing.
+/// ZYZ angles of a rotation also where they are singular: alpha = 0 where it is not determined, rad. For
+/// display and for the start of a trajectory; rates there mean nothing.
 /// @throws std::invalid_argument when R_Bo is not a rotation.
 Vector3d CalcAnyZyzAngles(const Matrix3d& R_Bo);
 

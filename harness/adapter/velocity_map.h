@@ -31,8 +31,9 @@ class VelocityMap {
   void Expand(const Eigen::Ref<const VectorXd>& velocity, mjtNum* qvel) const;
   /// Writes T_dot velocity, at SetState's velocity, on the robot's dofs of an nv-vector.
   void ExpandBias(mjtNum* qacc) const;
-  /// Writes T_dot(a) b - T_dot(b) a at q', T_dot(a) being T's rate at velocity a, on the robot's dofs of an nv-vector. It
-  /// is zero where velocities are rates of coordinates; reduced columns turn with the heading, and it points sideways.
+  /// Writes T_dot(a) b - T_dot(b) a at q', T_dot(a) being T's rate at velocity a, on the robot's dofs of an
+  /// nv-vector. It is zero where velocities are rates of coordinates; reduced columns turn with the heading,
+  /// and it points sideways.
   void ExpandBracket(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& a,
                      const Eigen::Ref<const VectorXd>& b, mjtNum* qacc);
   /// result = T^T force.
@@ -57,10 +58,10 @@ class VelocityMap {
   const Adapter* adapter_;
   int base_size_;
   std::vector<int> base_dofs_;
-  MatrixXd T_base_;             // base_dofs x base_size
-  VectorXd bias_;               // T_dot velocity on base_dofs
-  VectorXd bracket_;            // scratch of ExpandBracket
-  MatrixXd M_T_;                // scratch of ProjectMatrix, nv x base_size
+  MatrixXd T_base_;   // base_dofs x base_size
+  VectorXd bias_;     // T_dot velocity on base_dofs
+  VectorXd bracket_;  // scratch of ExpandBracket
+  MatrixXd M_T_;      // scratch of ProjectMatrix, nv x base_size
 };
 
 }  // namespace dexcheck

@@ -39,12 +39,18 @@ std::string QuoteText(const std::string& text) {
   return quoted + "'";
 }
 
-/// Least and largest finite value, positive ones only for a logarithmic axis; least above largest when none.
+/// gnuplot's axes end long before the range of a double, which a run that explodes may use up.
+bool CanBeDrawn(const Figure& figure, double value) {
+  constexpr double kLargest = 1e100;
+  return figure.log ? value >= 1.0 / kLargest && value <= kLargest : std::abs(value) <= kLargest;
+}
+
+/// Least and largest value that can be drawn; least above largest when none.
 std::array<double, 2> FindRange(const Figure& figure, bool right_axis) {
   std::array<double, 2> range = {std::numeric_limits<double>::infinity(),
                                  -std::numeric_limits<double>::infinity()};
   const auto include = [&](double value) {
-    if (!std::isfinite(value) || (figure.log && value <= 0.0)) return;
+    if (!CanBeDrawn(figure, value)) return;
     range = {std::min(range[0], value), std::max(range[1], value)};
   };
   for (const Curve& curve : figure.curves) {
@@ -76,8 +82,7 @@ void WriteData(const Figure& figure, const Thinning& thinning, std::ostream* scr
   *script << "$" << figure.name << " << END\n";
   for (size_t row = 0; row < columns.front().size(); ++row) {
     for (const std::vector<double>& column : columns) {
-      const bool gap =
-          !std::isfinite(column[row]) || (figure.log && &column != &columns[0] && column[row] <= 0);
+      const bool gap = &column != &columns[0] && !CanBeDrawn(figure, column[row]);
       *script << (gap ? std::string("NaN ") : fmt::format("{:.7g} ", column[row]));
     }
     *script << "\n";

@@ -1,9 +1,11 @@
 #include "harness/report/run_data.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 
 namespace dexcheck {
 namespace {
@@ -35,6 +37,13 @@ double CheckLine::share() const {
 RunData::RunData(const std::filesystem::path& run_dir) : path_(run_dir / "log.h5"), log_(path_) {
   if (log_.rows() == 0) throw InputError(path_.string() + ": the run has no steps (rows: 0)");
   time_ = log_.ReadSignal("time").col(0);
+  for (Eigen::Index row = 0; row < time_.size(); ++row) {
+    const bool advances = row == 0 || time_[row] > time_[row - 1];
+    if (!advances || !std::isfinite(time_[row])) {
+      throw InputError(path_.string() + ": time: must be finite and increase, got " +
+                       FormatNumber(time_[row]) + " in row " + std::to_string(row));
+    }
+  }
   ReadSummary();
   if (summary_.is_null()) {
     ReadChecksOfSignals();

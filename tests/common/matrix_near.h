@@ -1,11 +1,11 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <Eigen/Core>
 #include <cmath>
 #include <cstdlib>
 #include <string>
-
-#include <gtest/gtest.h>
 
 namespace dexcheck::testing {
 
@@ -44,10 +44,10 @@ inline ::testing::AssertionResult MatrixNear(const Eigen::Ref<const Eigen::Matri
     }
   }
   if (worst <= bound && (TolScale() > 0.0 || worst < 0.0)) return ::testing::AssertionSuccess();
-  return ::testing::AssertionFailure() << "entry (" << worst_row << ", " << worst_col
-                                       << "): " << actual(worst_row, worst_col) << " against "
-                                       << expected(worst_row, worst_col) << ", difference " << worst
-                                       << ", tolerance " << bound;
+  return ::testing::AssertionFailure()
+         << "entry (" << worst_row << ", " << worst_col << "): " << actual(worst_row, worst_col)
+         << " against " << expected(worst_row, worst_col) << ", difference " << worst << ", tolerance "
+         << bound;
 }
 
 }  // namespace dexcheck::testing

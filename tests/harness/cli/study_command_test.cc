@@ -128,6 +128,13 @@ TEST_F(StudyCommand, ClassifiesItsTrials) {
   }
 }
 
+TEST_F(StudyCommand, TheNumberOfProcessesDoesNotMatter) {
+  for (const std::string jobs : {"1", "2", "6"}) {
+    ASSERT_EQ(RunDexcheck(RunArguments(jobs + ".sqlite", {"--jobs", jobs})).exit_code, 0);
+    EXPECT_EQ(Dump(Path(jobs + ".sqlite")), Reference()) << jobs;
+  }
+}
+
 TEST_F(StudyCommand, GivesTheSameRowsHoweverOftenItIsKilled) {
   const std::string reference = Reference();
   std::mt19937 random(5);

@@ -1,0 +1,91 @@
+// Same inputs, same bytes: again, and on one processor or all.
+
+#include <gmock/gmock.h>
+
+#include <bit>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "harness/record/log_reader.h"
+#include "tests/harness/cli/dexcheck_program.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::DexcheckCommand;
+using testing::ProgramResult;
+using testing::TempFolder;
+
+/// The program on the machine's first processor only.
+std::vector<std::string> OnOneProcessor(std::vector<std::string> command) {
+  command.insert(command.begin(), {"taskset", "--cpu-list", "0"});
+  return command;
+}
+
+/// Every number of every signal, bit by bit, and every text but the command and the summary, which has times
+/// of the clock.
+std::string ListLog(const std::filesystem::path& path) {
+  const LogReader log(path);
+  std::string all;
+  for (const SignalInfo& signal : log.signals()) {
+    const RowMatrixXd values = log.ReadSignal(signal.name);
+    all += signal.name + " " + signal.unit + " " + signal.description;
+    all.append(reinterpret_cast<const char*>(values.data()),
+               static_cast<size_t>(values.size()) * sizeof(double));
+  }
+  for (const std::string& text : log.ListTexts()) {
+    if (text != "command" && text != "summary") all += text + "=" + log.ReadText(text);
+  }
+  for (const std::string& file : log.ListFiles("inputs")) all += file + "=" + log.ReadFile("inputs", file);
+  return all;
+}
+
+nlohmann::json ReadWithoutClock(const std::string& text) {
+  nlohmann::json json = nlohmann::json::parse(text);
+  json.erase("seconds");
+  json.erase("speed");
+  return json;
+}
+
+TEST(Determinism, RunsGiveTheSameLog) {
+  const TempFolder folder;
+  const auto run = [&](const std::string& name, const std::string& seed, bool alone) {
+    std::vector<std::string> command =
+        DexcheckCommand({"run", "curve", "--set", "duration=0.3", "--seed", seed, "--no-report", "--out",
+                         (folder.path() / name).string()});
+    if (alone) command = OnOneProcessor(command);
+    const ProgramResult result = testing::RunProgram(command);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return ListLog(folder.path() / name / "log.h5");
+  };
+  const std::string first = run("first", "3", false);
+  ASSERT_GT(first.size(), 300U * 8 * 100);
+  EXPECT_TRUE(run("again", "3", false) == first);
+  EXPECT_TRUE(run("alone", "3", true) == first);
+  EXPECT_FALSE(run("other", "4", false) == first);
+  const auto summary = [&](const char* name) {
+    return ReadWithoutClock(testing::ReadText(folder.path() / name / "summary.json"));
+  };
+  EXPECT_EQ(summary("first"), summary("alone"));
+  EXPECT_NE(summary("first"), summary("other"));
+}
+
+TEST(Determinism, ComparisonsGiveTheSameNumbers) {
+  const auto compare = [](const std::string& seed, bool alone) {
+    std::vector<std::string> command =
+        DexcheckCommand({"consistency", "--samples", "50", "--seed", seed, "--json", "-"});
+    if (alone) command = OnOneProcessor(command);
+    const ProgramResult result = testing::RunProgram(command);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return ReadWithoutClock(result.out);
+  };
+  const nlohmann::json first = compare("5", false);
+  EXPECT_EQ(compare("5", false), first);
+  EXPECT_EQ(compare("5", true), first);
+  EXPECT_NE(compare("6", false), first);
+}
+
+}  // namespace
+}  // namespace dexcheck
