@@ -31,9 +31,10 @@ Image ReduceBottomUp(const std::uint8_t* source, int width, int height, int fact
     std::uint8_t* out = image.Pixel(0, y);
     const std::uint16_t* sums = column_sums.data();
     for (int x = 0; x < width; ++x, out += 3, sums += 3 * n) {
-      unsigned r = area / 2;
-      unsigned g = area / 2;
-      unsigned b = area / 2;
+      const unsigned half = area / 2;
+      unsigned r = half;
+      unsigned g = half;
+      unsigned b = half;
       for (std::size_t k = 0; k < n; ++k) {
         r += sums[3 * k];
         g += sums[3 * k + 1];

@@ -157,8 +157,8 @@ void ModelTerms::SetJointState(int joint, double q, double rate) {
   Matrix3d R_B = parent.R;
   Vector3d p_B = parent.p;
   if (place.has_offset) {
-    R_B = parent.R * place.offset_R;
-    p_B += parent.R * place.offset_p;
+    R_B = parent.R * place.R_offset;
+    p_B += parent.R * place.p_offset;
   }
   // ^{i-1}T_i of (4), column by column: the row's y and z axes after Rot(x, alpha), then Rot(z, theta).
   const double theta = place.revolute ? place.q + q : place.q;

@@ -125,8 +125,8 @@ class ModelTerms {
     bool revolute;
     bool has_offset;
     double cos_alpha, sin_alpha, a, q, d;
-    Matrix3d offset_R;
-    Vector3d offset_p;
+    Matrix3d R_offset;
+    Vector3d p_offset;
   };
 
   // Columns of the path are processed in blocks of this many; the rows of path_ are padded to a multiple.
