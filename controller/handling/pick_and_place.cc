@@ -18,6 +18,7 @@ constexpr double kFirstTouchTime = 0.03;   // s
 constexpr double kTouchTime = 0.6;         // s to build up or take back a touch force
 constexpr double kLastTouch = 0.015;       // N, of the touch force is left when the fingers open
 constexpr double kPause = 0.1;             // s between movements
+constexpr double kFreeRate = 0.4;          // rad/s that joints turn at most on average without the object
 constexpr double kRest = 0.5;              // s until the arm is at rest
 constexpr double kReleaseTime = 1.2;       // s
 constexpr double kOpenTime = 0.8;          // s
@@ -66,26 +67,33 @@ PickAndPlace::PickAndPlace(const RobotModel& model, const Hand& hand, const Surf
   demand_.touch_force.assign(hand.fingertips.size(), 0.0);
 }
 
-void PickAndPlace::Begin(double t, const Pose& X_Bo) {
+void PickAndPlace::Begin(double t, const MeasuredState& state) {
   history_.clear();
   attempt_ = 0;
   StartMove(start_.tail(model_->num_joints()), start_.tail(model_->num_joints()), t, 0.0);
-  PlanAttempt(t, X_Bo);
+  PlanAttempt(t, state);
   if (!plan_.found) throw InputError(plan_.problem);
 }
 
-void PickAndPlace::PlanAttempt(double t, const Pose& X_Bo) {
+void PickAndPlace::PlanAttempt(double t, const MeasuredState& state) {
   ++attempt_;
-  plan_ = MakePickPlan(*model_, hand_, *surface_, X_Bo, start_, options_.plan);
-  lay_at_ = X_Bo.translation();
+  // From the posture of the start, where the platform is now.
+  VectorXd q = start_;
+  q.head(model_->num_base_positions()) = state.q.head(model_->num_base_positions());
+  plan_ = MakePickPlan(*model_, hand_, *surface_, state.X_Bo, q, options_.plan);
+  lay_at_ = state.X_Bo.translation();
   push_ = 0.0;
   if (!plan_.found) return;
   const VectorXd above = plan_.rise.Evaluate(1.0);
-  raise_time_ =
-      std::max(options_.raise_time, (above - plan_.q_open).cwiseAbs().maxCoeff() / options_.arm_rate);
+  const auto last = [](double least, const VectorXd& from, const VectorXd& to, double rate) {
+    return std::max(least, (to - from).cwiseAbs().maxCoeff() / rate);
+  };
+  raise_time_ = last(options_.raise_time, plan_.q_open, above, options_.arm_rate);
+  lower_time_ = last(options_.lower_time, plan_.q_open, above, kFreeRate);
   const VectorXd from = move_.to;
+  approach_time_ = last(options_.approach_time, from, above, kFreeRate);
   Enter(Phase::kApproach, t);
-  StartMove(from, above, t, options_.approach_time);
+  StartMove(from, above, t, approach_time_);
 }
 
 void PickAndPlace::Enter(Phase phase, double t) {
@@ -213,7 +221,7 @@ void PickAndPlace::UpdateApproach(double t) {
   if (!MoveDone(t)) return;
   if (stage_ == 0) {
     stage_ = 1;
-    StartRise(move_.to, /*up=*/false, t, options_.lower_time);
+    StartRise(move_.to, /*up=*/false, t, lower_time_);
   } else if (t >= move_.begin + move_.duration + kPause) {
     Enter(Phase::kClose, t);
     demand_.by_inertia = true;
@@ -224,7 +232,7 @@ void PickAndPlace::UpdateApproach(double t) {
 void PickAndPlace::UpdateClose(double t, const MeasuredState& state, const Touch& touch) {
   bool all = true;
   bool settled = true;
-  std::string missing;
+  int missing = 0;
   for (size_t i = 0; i < hand_.fingertips.size(); ++i) {
     if (!Contains(demand_.contacts, i) && Contains(touch.fingertips, i)) {
       demand_.contacts |= ContactSet{1} << i;
@@ -235,7 +243,7 @@ void PickAndPlace::UpdateClose(double t, const MeasuredState& state, const Touch
     }
     if (!Contains(demand_.contacts, i)) {
       all = false;
-      missing = model_->frames()[static_cast<size_t>(hand_.fingertips[i])].name;
+      missing = hand_.fingertips[i];
       continue;
     }
     const double since = t - touched_at_[i];
@@ -261,7 +269,8 @@ void PickAndPlace::UpdateClose(double t, const MeasuredState& state, const Touch
     }
     StartMove(move_.to, to, t, way / options_.search_speed, /*steady=*/true);
   } else {
-    GiveUp(t, state, "fingertip " + Quote(missing) + " found no object where it should be");
+    const std::string& name = model_->frames()[static_cast<size_t>(missing)].name;
+    GiveUp(t, state, "fingertip " + Quote(name) + " found no object where it should be");
   }
 }
 
@@ -387,7 +396,7 @@ void PickAndPlace::UpdateRelease(double t, const MeasuredState& state) {
     StartMove(Joints(state), to, t, kOpenTime);
   } else if (t >= move_.begin + move_.duration + kPause) {
     Enter(Phase::kWithdraw, t);
-    StartRise(move_.to, /*up=*/true, t, options_.lower_time);
+    StartRise(move_.to, /*up=*/true, t, lower_time_);
   }
 }
 
@@ -395,13 +404,13 @@ void PickAndPlace::UpdateWithdraw(double t, const MeasuredState& state) {
   if (!MoveDone(t)) return;
   if (stage_ == 0 && retrying_) {
     retrying_ = false;
-    PlanAttempt(t, state.X_Bo);
+    PlanAttempt(t, state);
     if (plan_.found) return;
     failure_ = plan_.problem;
   }
   if (stage_ == 0) {
     stage_ = 1;
-    StartMove(move_.to, start_.tail(model_->num_joints()), t, options_.approach_time);
+    StartMove(move_.to, start_.tail(model_->num_joints()), t, approach_time_);
   } else if (t >= move_.begin + move_.duration + kPause) {
     Enter(Phase::kDone, t);
   }
@@ -410,8 +419,9 @@ void PickAndPlace::UpdateWithdraw(double t, const MeasuredState& state) {
 void PickAndPlace::GiveUp(double t, const MeasuredState& state, const std::string& reason) {
   retrying_ = attempt_ < options_.attempts;
   if (retrying_ && first_failure_.empty()) first_failure_ = reason;
-  if (!retrying_)
+  if (!retrying_) {
     failure_ = reason + ", attempt " + std::to_string(attempt_) + " of " + std::to_string(options_.attempts);
+  }
   demand_.grip = 0.0;
   HoldPosture(Joints(state));
   Enter(Phase::kRelease, t);

@@ -33,9 +33,10 @@ constexpr bool IsHolding(Phase phase) { return phase >= Phase::kGrip && phase <=
 struct PickAndPlaceOptions {
   Vector3d raise = Vector3d(0.0, 0.0, 0.15);  ///< World, m.
   Vector3d transport = Vector3d(1.0, 0.0, 0.0);
-  double approach_time = 2.0;   ///< To over the object, s; as long for the way back.
-  double lower_time = 1.2;      ///< From there to around it.
-  double close_time = 0.6;      ///< To just off the contacts.
+  double approach_time =
+      2.0;                  ///< To over the object, s, or longer where it is far; as long for the way back.
+  double lower_time = 1.5;  ///< From there to around it, likewise.
+  double close_time = 0.6;  ///< To just off the contacts.
   double search_speed = 0.006;  ///< From there on, m/s.
   double grip_time = 1.2;
   double take_over_time = 1.5;
@@ -74,8 +75,9 @@ class PickAndPlace {
                const MassProperties& object, const VectorXd& start, const PickAndPlaceOptions& options,
                double time_step);
 
-  /// Begins at time t with the object where it lies. @throws InputError when it is out of reach.
-  void Begin(double t, const Pose& X_Bo);
+  /// Begins at time t with robot and object where they are. @throws InputError when the object is out of
+  /// reach.
+  void Begin(double t, const MeasuredState& state);
 
   /// Decides what to do at time t (s): sets the posture and the demand.
   void Update(double t, const MeasuredState& state, const Touch& touch, PostureTask* posture);
@@ -129,7 +131,7 @@ class PickAndPlace {
   void UpdateRelease(double t, const MeasuredState& state);
   void UpdateWithdraw(double t, const MeasuredState& state);
   void GiveUp(double t, const MeasuredState& state, const std::string& reason);
-  void PlanAttempt(double t, const Pose& X_Bo);
+  void PlanAttempt(double t, const MeasuredState& state);
   [[nodiscard]] DesiredMotion EvaluateCarry(double t) const;
 
   const RobotModel* model_;
@@ -154,7 +156,9 @@ class PickAndPlace {
   Vector3d lay_at_ = Vector3d::Zero();
   Vector6d X_start_ = Vector6d::Zero();
   double push_ = 0.0;
-  double raise_time_ = 0.0;     // s
+  double approach_time_ = 0.0;  // s
+  double lower_time_ = 0.0;
+  double raise_time_ = 0.0;
   double borne_ = 0.0;          // weight of the step before
   double lowering_from_ = 1.0;  // weight at the beginning of the hand-over
   bool refused_ = false;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <stdexcept>
 
 #include "controller/common/text.h"
 #include "controller/object/euler_zyz.h"
@@ -100,10 +101,13 @@ void ClosedLoop::Settle() {
   SettleOn(LineTrajectory(setup_->X_start(), Vector6d::Zero(), 0.0), setup_->scenario().settle);
   if (setup_->scenario().start == Start::kMoving) StartMoving(trajectory_->Evaluate(0.0));
   if (task_) {
+    const std::string where = setup_->scenario().source + ": task: ";
     try {
-      task_->Begin(0.0, state_.X_Bo);
+      task_->Begin(0.0, state_);
     } catch (const InputError& error) {
-      throw InputError(setup_->scenario().source + ": task: " + error.what());
+      throw InputError(where + error.what());
+    } catch (const std::invalid_argument& error) {
+      throw InputError(where + error.what());
     }
     task_begun_ = true;
   }

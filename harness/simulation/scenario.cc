@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string_view>
+#include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/control/trajectory_reader.h"
@@ -114,18 +115,21 @@ void ReadTask(const TomlValue& value, Scenario* scenario) {
   pick.raise.z() = pick.plan.raise = table.Get("raise").AsPositive();
   pick.transport = table.Get("transport").AsVector<3>();
   pick.plan.support = table.Get("support_height").AsNumber();
-  pick.approach_time = ReadOr(table, "approach_time", pick.approach_time);
-  pick.lower_time = ReadOr(table, "lower_time", pick.lower_time);
-  pick.close_time = ReadOr(table, "close_time", pick.close_time);
-  pick.grip_time = ReadOr(table, "grip_time", pick.grip_time);
-  pick.take_over_time = ReadOr(table, "take_over_time", pick.take_over_time);
-  pick.raise_time = ReadOr(table, "raise_time", pick.raise_time);
-  pick.arm_rate = ReadOr(table, "arm_rate", pick.arm_rate);
-  pick.transport_time = ReadOr(table, "transport_time", pick.transport_time);
-  pick.search_speed = ReadOr(table, "search_speed", pick.search_speed);
-  pick.touch_force = ReadOr(table, "touch_force", pick.touch_force);
-  pick.overload = ReadOr(table, "overload", pick.overload);
-  pick.largest_push = ReadOr(table, "largest_push", pick.largest_push);
+  constexpr std::pair<const char*, double PickAndPlaceOptions::*> kNumbers[] = {
+      {"approach_time", &PickAndPlaceOptions::approach_time},
+      {"lower_time", &PickAndPlaceOptions::lower_time},
+      {"close_time", &PickAndPlaceOptions::close_time},
+      {"search_speed", &PickAndPlaceOptions::search_speed},
+      {"grip_time", &PickAndPlaceOptions::grip_time},
+      {"take_over_time", &PickAndPlaceOptions::take_over_time},
+      {"raise_time", &PickAndPlaceOptions::raise_time},
+      {"arm_rate", &PickAndPlaceOptions::arm_rate},
+      {"transport_time", &PickAndPlaceOptions::transport_time},
+      {"touch_force", &PickAndPlaceOptions::touch_force},
+      {"overload", &PickAndPlaceOptions::overload},
+      {"largest_push", &PickAndPlaceOptions::largest_push},
+  };
+  for (const auto& [key, member] : kNumbers) pick.*member = ReadOr(table, key, pick.*member);
   pick.plan.opening = ReadOr(table, "opening", pick.plan.opening);
   constexpr long kMaxAttempts = 10;
   if (const auto attempts = table.Find("attempts")) {

@@ -30,9 +30,7 @@ RobotModel ReadModel(const Scenario& scenario, const std::filesystem::path& robo
 }
 
 /// From -1 to 1.
-double Draw(std::mt19937_64* random) {
-  return 2.0 * static_cast<double>((*random)() >> 11) * 0x1p-53 - 1.0;
-}
+double Draw(std::mt19937_64* random) { return 2.0 * static_cast<double>((*random)() >> 11) * 0x1p-53 - 1.0; }
 
 [[noreturn]] void Fail(const Scenario& scenario, const std::string& key, const std::string& problem) {
   throw InputError(scenario.source + ": " + key + ": " + problem);
