@@ -54,7 +54,8 @@ class ComputedTorque {
   [[nodiscard]] const VectorXd& xi_dot_d() const { return xi_dot_d_; }
   /// F_o (Sigma_o) that the demand takes, (19).
   [[nodiscard]] const Vector6d& F_o() const { return F_o_; }
-  /// tau_0 (n), N m: tau' without contact forces, all of it after SetFreeMotion. tau' = tau_0 + E_bar'^-1 J_B'^T f_c.
+  /// tau_0 (n), N m: tau' without contact forces, all of it after SetFreeMotion. tau' = tau_0 + E_bar'^-1
+  /// J_B'^T f_c.
   [[nodiscard]] const VectorXd& tau_0() const { return tau_0_; }
 
   /// F_N (k) = f_c - G^+ F_o of contact forces f_c (k) that give F_o.

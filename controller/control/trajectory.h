@@ -22,8 +22,8 @@ struct ScalarMotion {
 /// outside.
 ScalarMotion CalcMinJerk(double t, double duration);
 
-/// The same with least snap: s = 35 u^4 - 84 u^5 + 70 u^6 - 20 u^7. Its jerk does not jump at the ends either,
-/// which soft contacts answer with vibration.
+/// The same with least snap: s = 35 u^4 - 84 u^5 + 70 u^6 - 20 u^7. Its jerk does not jump at the ends
+/// either, which soft contacts answer with vibration.
 ScalarMotion CalcMinSnap(double t, double duration);
 
 /// Motion whose speed rises from 0 to 1 in `duration` s like CalcMinJerk and stays there; s(0) = 0. Without
