@@ -78,8 +78,6 @@ void ComputedTorque::SetFreeMotion(const ModelTerms& robot, const Eigen::Ref<con
   xi_c_ = robot.velocity();
   xi_dot_d_ = sigma_prime;
   CalcFreeTorque(robot);
-  tau_ = tau_0_;
-  f_c_.setZero();
 }
 
 void ComputedTorque::CalcFreeTorque(const ModelTerms& robot) {

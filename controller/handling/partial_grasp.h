@@ -3,8 +3,6 @@
 // A grasp in the making: the terms of those of its fingertips that touch.
 
 #include <cstdint>
-#include <map>
-#include <memory>
 #include <span>
 #include <vector>
 

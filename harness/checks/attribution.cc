@@ -43,13 +43,16 @@ struct Evidence {
 // Sliding before giving before tilting: a tyre that spins also tilts the platform.
 constexpr Evidence kEvidence[] = {
     {"actuator_effort", Cause::kActuatorLimit},
-    {"joint_range", Cause::kJointStop},
+    {"joint_stop", Cause::kJointStop},
     {"cone_use", Cause::kFingertipSlip},
     {"traction_use", Cause::kWheelSlip},
     {"contacts_lost", Cause::kFingertipSlip},
     {"penetration", Cause::kContactSoftness},
     {"fingertip_slip", Cause::kContactSoftness},
     {"wheel_slip", Cause::kContactSoftness},
+    {"kappa", Cause::kContactSoftness},
+    {"unjudged", Cause::kContactSoftness},
+    {"solver", Cause::kSolver},
     {"base_tilt", Cause::kTilt},
 };
 
@@ -79,7 +82,8 @@ const RunCheck* FindFirst(std::span<const RunCheck> steps, Cause* cause) {
 Cause AttributeOne(const RunCheck& check, Cause run, std::span<const RunCheck> steps) {
   if (check.kind == CheckKind::kModel || run == Cause::kModel) return Cause::kModel;
   if (check.name == "actuator_effort") return Cause::kActuatorLimit;
-  if (check.name == "joint_range") return Cause::kJointStop;
+  if (check.name == "joint_stop") return Cause::kJointStop;
+  if (check.name == "solver") return Cause::kSolver;
   if (check.name == "wheel_slip" || check.name == "traction_use") {
     return Failed(steps, "traction_use") ? Cause::kWheelSlip : Cause::kContactSoftness;
   }
@@ -111,6 +115,8 @@ const char* NameOf(Cause cause) {
       return "contact softness";
     case Cause::kTilt:
       return "tilt";
+    case Cause::kSolver:
+      return "solver";
     case Cause::kIntegrator:
       return "integrator";
   }
@@ -145,7 +151,10 @@ AttributionResult Attribute(const GateResult& gate, std::span<const RunCheck> mo
       result.evidence = Tell(*first);
     } else {
       result.cause = Cause::kIntegrator;
-      result.evidence = "no assumption broke";
+      const auto assumption = std::find_if(steps.begin(), steps.end(), [](const RunCheck& check) {
+        return check.failed && check.kind == CheckKind::kAssumption;
+      });
+      result.evidence = assumption == steps.end() ? "no assumption broke" : Tell(*assumption);
     }
   }
   for (const std::span<const RunCheck> checks : {model, steps}) {

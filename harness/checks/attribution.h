@@ -21,6 +21,7 @@ enum class Cause {
   kWheelSlip,        ///< A wheel slides: assumption (1), rolling without slipping.
   kContactSoftness,  ///< Contacts give or creep without sliding.
   kTilt,             ///< The platform does not stay level.
+  kSolver,           ///< The engine's solver stopped before its forces fit its motion.
   kIntegrator,       ///< None of these: what time stepping leaves.
 };
 

@@ -46,10 +46,14 @@ StepChecks::StepChecks(const Setup& setup)
   Define(kBaseTilt, "base_tilt", kAssumption, "rad", 1e-5, "angle of the platform against the vertical");
   Define(kIdleJoints, "idle_joints", kAssumption, "rad", 1e-5,
          "movement since t = 0 of joints that do not carry the object");
+  // As small as the discrepancies that balance_robot and the prediction are judged by.
   Define(kSolver, "solver", kAssumption, "1", 1e-5,
          "what the engine's solver left over of its own equation of motion of the object, as balance_object");
-  Define(kJointRange, "joint_range", kAssumption, "rad", 0.0,
+  Define(kJointStop, "joint_stop", kAssumption, "rad", 0.0,
          "how far a joint is beyond its range, where a stop pushes that the model does not have");
+  // The fingers of one hand touch within some hundredths of a second, kTransient each at the most.
+  Define(kUnjudged, "unjudged", kAssumption, "s", 5.0 * kTransient,
+         "how long in one go contacts have come and gone, so that balance and prediction were not judged");
   Define(kActuators, "actuator_effort", kAssumption, "1", 1.0, "|tau'| over the motor's limit");
   // A bond neither slides nor rolls, nor does it care for friction.
   if (!setup.bonds().empty()) {
@@ -106,6 +110,7 @@ void StepChecks::Reset() {
   steps_ = 0;
   has_kappa_ = false;
   transient_steps_ = 0;
+  is_unjudged_ = false;
   changed_at_ = -std::numeric_limits<double>::infinity();
 }
 
@@ -137,7 +142,11 @@ void StepChecks::Compare(const Plant& plant, const GraspController& controller, 
   solver_residual_ = observer->ReadSolverResidual(plant, state.X_Bo);
   support_force_ = (state.X_Bo.linear() * support_.head<3>()).z();
   FindContacts(handling);
-  if (handling.partial && time - changed_at_ < kTransient) {
+  const bool unjudged = handling.partial && time - changed_at_ < kTransient;
+  if (unjudged && !is_unjudged_) unjudged_since_ = time;
+  is_unjudged_ = unjudged;
+  Add(kUnjudged, unjudged ? time - unjudged_since_ : 0.0);
+  if (unjudged) {
     ++transient_steps_;
   } else {
     CompareDynamics(controller, state, tau);
@@ -159,7 +168,7 @@ void StepChecks::Compare(const Plant& plant, const GraspController& controller, 
     idle = std::max(idle, std::abs(q - start));
   }
   Add(kIdleJoints, idle);
-  CheckJointRanges(state);
+  CheckJointStops(state);
   int worst = -1;
   Add(kActuators, plant.CalcEffort(tau, &worst));
   ++steps_;
@@ -298,7 +307,7 @@ void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
   Add(kTractionUse, cone_use);
 }
 
-void StepChecks::CheckJointRanges(const MeasuredState& state) {
+void StepChecks::CheckJointStops(const MeasuredState& state) {
   const std::vector<Joint>& joints = setup_->model().joints();
   const int offset = setup_->model().num_base_positions();
   double beyond = 0.0;
@@ -310,10 +319,10 @@ void StepChecks::CheckJointRanges(const MeasuredState& state) {
     beyond = over;
     farthest = i;
   }
-  if (beyond > 0.0 && !checks_[kJointRange].failed) {
-    checks_[kJointRange].where = "joint " + Quote(joints[farthest].name);
+  if (beyond > 0.0 && !checks_[kJointStop].failed) {
+    checks_[kJointStop].where = "joint " + Quote(joints[farthest].name);
   }
-  Add(kJointRange, beyond);
+  Add(kJointStop, beyond);
 }
 
 void StepChecks::CompareKappa(const GraspController& controller, const MeasuredState& state, double dt) {

@@ -52,7 +52,7 @@ struct Handling {
 /// Of a task each step is predicted with the contacts that it has: (46) for the fingertips that touch, and an
 /// object that does not move while it lies on something. Soft contacts need some milliseconds to become what
 /// rigid ones are at once: for kTransient after a contact has come, gone or been let go, balance and
-/// prediction are not judged.
+/// prediction are not judged. How long that lasts in one go is a check itself.
 class StepChecks {
  public:
   static constexpr double kTransient = 0.05;  ///< s
@@ -102,7 +102,8 @@ class StepChecks {
     kBaseTilt,
     kIdleJoints,
     kSolver,
-    kJointRange,
+    kJointStop,
+    kUnjudged,
     kActuators,
     kCheckCount
   };
@@ -125,7 +126,7 @@ class StepChecks {
   void ForgetSlip();
   /// Of the object, N.
   [[nodiscard]] double Weight() const;
-  void CheckJointRanges(const MeasuredState& state);
+  void CheckJointStops(const MeasuredState& state);
   void CompareKappa(const GraspController& controller, const MeasuredState& state, double dt);
 
   const Setup* setup_;
@@ -146,6 +147,8 @@ class StepChecks {
   Vector6d solver_residual_ = Vector6d::Zero();                   // likewise
   double support_force_ = 0.0;
   long transient_steps_ = 0;
+  double unjudged_since_ = 0.0;  // s, while it lasts
+  bool is_unjudged_ = false;
   std::span<const EngineContact> contacts_;
   std::vector<SlipState> fingertip_slip_, wheel_slip_;
   std::vector<int> wheel_bodies_, tip_bodies_;

@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 #include <mujoco/mujoco.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -20,38 +19,12 @@
 #include "renders/offscreen_context.h"
 #include "renders/renderer.h"
 #include "renders/run_decorations.h"
+#include "tests/benchmarks/measured_time.h"
 #include "tests/common/files.h"
 #include "tests/renders/kinematic_run.h"
 
 namespace dexcheck {
 namespace {
-
-struct Times {
-  double wall;
-  double processor;
-};
-
-/// Of this process and of its children that have ended.
-double ProcessorSeconds() {
-  double seconds = 0.0;
-  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
-    rusage usage{};
-    ::getrusage(who, &usage);
-    for (const timeval& time : {usage.ru_utime, usage.ru_stime}) {
-      seconds += static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-    }
-  }
-  return seconds;
-}
-
-template <typename Function>
-Times Measure(const Function& function) {
-  const double processor = ProcessorSeconds();
-  const auto start = std::chrono::steady_clock::now();
-  function();
-  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return {wall, ProcessorSeconds() - processor};
-}
 
 /// Draws every n-th frame with the engine's functions and nothing else.
 void DrawBare(const mjModel& model, const RunFrames& run, const MovieOptions& options, long first,
@@ -102,7 +75,7 @@ int Run(long frames) {
   fmt::print("{} frames of {} x {}, {} samples a pixel, {} processes\n", frames, options.width,
              options.height, options.samples * options.samples, options.workers);
 
-  const Times bare = Measure([&] {
+  const MeasuredTime bare = Measure([&] {
     for (int k = 0; k < options.workers; ++k) {
       if (::fork() != 0) continue;
       DrawBare(*model, run, options, k, frames);
@@ -113,7 +86,7 @@ int Run(long frames) {
       if (status != EXIT_SUCCESS) throw Error("a process that draws died");
     }
   });
-  const Times movie = Measure([&] {
+  const MeasuredTime movie = Measure([&] {
     VideoOptions encoding;
     encoding.width = options.width;
     encoding.height = options.height;

@@ -5,7 +5,6 @@
 // study_benchmark [REPETITIONS]
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
@@ -16,38 +15,13 @@
 #include "harness/simulation/closed_loop.h"
 #include "harness/study/study_store.h"
 #include "harness/study/trial_pool.h"
+#include "tests/benchmarks/measured_time.h"
 #include "tests/common/files.h"
 
 namespace dexcheck {
 namespace {
 
 const std::string kSource = DEXCHECK_SOURCE_DIR;
-
-struct Times {
-  double wall = 0.0;
-  double processor = 0.0;  // of this process and of those that it waited for
-};
-
-double ProcessorSeconds() {
-  double seconds = 0.0;
-  for (const auto who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
-    rusage usage{};
-    ::getrusage(who, &usage);
-    for (const timeval& time : {usage.ru_utime, usage.ru_stime}) {
-      seconds += static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-    }
-  }
-  return seconds;
-}
-
-template <typename Function>
-Times Measure(const Function& function) {
-  const double processor = ProcessorSeconds();
-  const auto start = std::chrono::steady_clock::now();
-  function();
-  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return {wall, ProcessorSeconds() - processor};
-}
 
 double Median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<long>(values.size() / 2);
@@ -95,12 +69,12 @@ void Compare(int repetitions) {
   for (int i = 0; i < repetitions; ++i) {
     const Trial& trial = trials[static_cast<size_t>(i)];
     const Setup setup(MakeTrialScenario(inputs, trial), inputs.robot, inputs.mjcf);
-    const Times bare = Measure([&] {
+    const MeasuredTime bare = Measure([&] {
       ClosedLoop loop(setup, /*check=*/false);
       loop.Settle();
       while (loop.step() < loop.num_steps()) loop.Step();
     });
-    const Times whole = Measure([&] { run(1, static_cast<size_t>(i), 1); });
+    const MeasuredTime whole = Measure([&] { run(1, static_cast<size_t>(i), 1); });
     wall.push_back(whole.wall / bare.wall);
     processor.push_back(whole.processor / bare.processor);
     bare_seconds += bare.processor / repetitions;

@@ -14,11 +14,28 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-constexpr const char* kSteps[] = {
-    "balance_object", "reduced_acceleration", "contact_force",  "actuator_effort", "cone_use", "traction_use",
-    "contacts_lost",  "penetration",          "fingertip_slip", "wheel_slip",      "base_tilt"};
+struct Step {
+  const char* name;
+  CheckKind kind = CheckKind::kAssumption;
+};
+constexpr Step kSteps[] = {{"balance_object", CheckKind::kBalance},
+                           {"reduced_acceleration", CheckKind::kPrediction},
+                           {"contact_force", CheckKind::kPrediction},
+                           {"fingertip_slip"},
+                           {"wheel_slip"},
+                           {"cone_use"},
+                           {"traction_use"},
+                           {"contacts_lost"},
+                           {"penetration"},
+                           {"kappa"},
+                           {"base_tilt"},
+                           {"idle_joints"},
+                           {"solver"},
+                           {"joint_stop"},
+                           {"unjudged"},
+                           {"actuator_effort"}};
 
-RunCheck MakeCheck(const std::string& name, CheckKind kind = CheckKind::kAssumption) {
+RunCheck MakeCheck(const std::string& name, CheckKind kind) {
   RunCheck check;
   check.name = name;
   check.kind = kind;
@@ -32,7 +49,7 @@ class FakeRun {
  public:
   FakeRun() {
     for (const char* name : {"M_bar", "gravity"}) model_.push_back(MakeCheck(name, CheckKind::kModel));
-    for (const char* name : kSteps) steps_.push_back(MakeCheck(name));
+    for (const Step& step : kSteps) steps_.push_back(MakeCheck(step.name, step.kind));
   }
 
   FakeRun& Fail(const std::string& name, double time) {
@@ -139,7 +156,7 @@ TEST(Attribute, OfSeveralThatSlideTheFirstCounts) {
 }
 
 TEST(Attribute, SlipWithoutSlidingIsSoftness) {
-  for (const char* name : {"fingertip_slip", "wheel_slip", "penetration"}) {
+  for (const char* name : {"fingertip_slip", "wheel_slip", "penetration", "kappa", "unjudged"}) {
     const AttributionResult result = FakeRun().Fail(name, 0.1).Fail("reduced_acceleration", 0.05).Explain();
     EXPECT_EQ(result.cause, Cause::kContactSoftness) << name;
     EXPECT_THAT(result.evidence, StartsWith(name));
@@ -153,6 +170,18 @@ TEST(Attribute, WithoutABrokenAssumptionTheIntegratorRemains) {
   EXPECT_EQ(result.cause, Cause::kIntegrator);
   EXPECT_EQ(result.evidence, "no assumption broke");
   EXPECT_EQ(FindCause(result, "contact_force"), "integrator");
+}
+
+TEST(Attribute, NeverSaysThatNoAssumptionBrokeWhereOneDid) {
+  const AttributionResult result = FakeRun().Fail("idle_joints", 0.1).Explain();
+  EXPECT_EQ(result.cause, Cause::kIntegrator);
+  EXPECT_THAT(result.evidence, StartsWith("idle_joints"));
+}
+
+TEST(Attribute, TheSolverIsBlamedForWhatItLeftOver) {
+  const AttributionResult result = FakeRun().Fail("solver", 0.1).Fail("contact_force", 0.1).Explain();
+  EXPECT_EQ(result.cause, Cause::kSolver);
+  EXPECT_EQ(FindCause(result, "contact_force"), "solver");
 }
 
 TEST(Attribute, EvidenceHasUnitPlaceAndTime) {
@@ -173,7 +202,7 @@ TEST(Attribute, NeverContradictsItself) {
       size_t failed = 0;
       for (size_t i = 0; i < std::size(kSteps); ++i) {
         if ((set >> i & 1U) == 0) continue;
-        run.Fail(kSteps[i], forward ? 0.1 * static_cast<double>(i) : 2.0 - 0.1 * static_cast<double>(i));
+        run.Fail(kSteps[i].name, forward ? 0.1 * static_cast<double>(i) : 2.0 - 0.1 * static_cast<double>(i));
         ++failed;
       }
       const AttributionResult result = run.Explain();
@@ -191,8 +220,9 @@ TEST(Attribute, NeverContradictsItself) {
 
 TEST(NameOf, CausesHaveDifferentNames) {
   std::vector<std::string> names;
-  for (const Cause cause : {Cause::kNone, Cause::kModel, Cause::kActuatorLimit, Cause::kFingertipSlip,
-                            Cause::kWheelSlip, Cause::kContactSoftness, Cause::kTilt, Cause::kIntegrator}) {
+  for (const Cause cause :
+       {Cause::kNone, Cause::kModel, Cause::kActuatorLimit, Cause::kJointStop, Cause::kFingertipSlip,
+        Cause::kWheelSlip, Cause::kContactSoftness, Cause::kTilt, Cause::kSolver, Cause::kIntegrator}) {
     names.emplace_back(NameOf(cause));
   }
   std::sort(names.begin(), names.end());

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -71,6 +72,15 @@ TEST_F(LiftTest, TakesCarriesAndPutsDown) {
   // Unjudged: some hundredths of a second where contacts come and go.
   EXPECT_GT(loop.checks().transient_steps(), 50);
   EXPECT_LT(loop.checks().transient_steps(), 500);
+  EXPECT_GT(run_->Worst("unjudged"), 0.03);
+  // A check that has the name of another would hide it in the summary.
+  std::set<std::string> names;
+  for (const CheckRecord& record : run_->setup().gate().records)
+    EXPECT_TRUE(names.insert(record.name).second) << record.name;
+  for (const RunCheck& check : loop.model_checks())
+    EXPECT_TRUE(names.insert(check.name).second) << check.name;
+  for (const RunCheck& check : loop.checks().checks())
+    EXPECT_TRUE(names.insert(check.name).second) << check.name;
   EXPECT_LE(task().push(), 1e-6);
   // Torques of some 50 N m; measured 3e-3.
   EXPECT_LE(loop.torque_jump(), 0.02);
