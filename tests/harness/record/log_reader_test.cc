@@ -45,7 +45,7 @@ class LogReaderTest : public ::testing::Test {
 
 TEST_F(LogReaderTest, FilesComeBackWithTheirBytes) {
   std::string all_bytes;
-  for (int i = 0; i < 100000; ++i) all_bytes += static_cast<char>(i * i / 7);
+  for (unsigned i = 0; i < 100000; ++i) all_bytes += static_cast<char>(i * i / 7);
   {
     LogWriter log(path_, 10);
     log.EmbedFile("inputs/a", "all", all_bytes);
