@@ -59,6 +59,7 @@ int FindBody(const mjModel& model, const std::string& name) {
 
 std::vector<std::string> ListCameras(const mjModel& model) {
   std::vector<std::string> names;
+  names.reserve(static_cast<size_t>(model.ncam));
   for (int id = 0; id < model.ncam; ++id) names.push_back(NameOf(model, mjOBJ_CAMERA, id));
   return names;
 }

@@ -67,7 +67,8 @@ CheckHistory::CheckHistory(const RunFrames& run) : run_(run) {
     worst.reserve(check.residuals.size());
     double largest = 0.0;
     for (const double residual : check.residuals) {
-      largest = std::max(largest, std::isnan(residual) ? kInfinity : std::abs(residual));
+      largest = std::max(largest, std::abs(residual));
+      if (std::isnan(residual)) largest = kInfinity;
       worst.push_back(largest);
     }
   }

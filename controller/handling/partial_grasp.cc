@@ -15,6 +15,7 @@ std::vector<size_t> ListMembers(ContactSet set, size_t count) {
 
 std::vector<int> Pick(std::span<const int> fingertips, const std::vector<size_t>& members) {
   std::vector<int> picked;
+  picked.reserve(members.size());
   for (const size_t i : members) picked.push_back(fingertips[i]);
   return picked;
 }

@@ -26,20 +26,20 @@ JointEntry ReadJointEntry(const TomlValue& value) {
   if (!range) table.FailMissing("range");
   const Vector2d limits = unit * range->AsVector<2>();
   if (limits[0] > limits[1]) range->Fail("lower limit must not exceed upper limit");
-  const JointEntry entry{value,
-                         *range,
-                         unit != 1.0,
-                         limits[0],
-                         limits[1],
-                         table.Get("damping").AsNotNegative(),
-                         table.Get("armature").AsNotNegative()};
+  JointEntry entry{value,
+                   *range,
+                   unit != 1.0,
+                   limits[0],
+                   limits[1],
+                   table.Get("damping").AsNotNegative(),
+                   table.Get("armature").AsNotNegative()};
   table.RejectUnused();
   return entry;
 }
 
 LinkEntry ReadLinkEntry(const TomlValue& value) {
   TomlTable table = value.AsTable();
-  const LinkEntry entry{value, ReadBody(table)};
+  LinkEntry entry{value, ReadBody(table)};
   table.RejectUnused();
   return entry;
 }

@@ -37,6 +37,7 @@ struct Chain {
 template <typename Map>
 std::vector<std::string> ListKeys(const Map& map) {
   std::vector<std::string> keys;
+  keys.reserve(map.size());
   for (const auto& [key, value] : map) keys.push_back(key);
   return keys;
 }

@@ -94,4 +94,5 @@ int Run(int argc, char** argv) {
 }  // namespace
 }  // namespace dexcheck::cli
 
+// What a handler of exceptions throws is want of memory. NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) { return dexcheck::cli::Run(argc, argv); }

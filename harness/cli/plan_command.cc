@@ -286,8 +286,7 @@ int Run(Request request) {
 void AddPlanCommand(CLI::App* app, int* exit_code) {
   const auto request = std::make_shared<Request>();
   CLI::App* command = app->add_subcommand("plan", "Choose where a hand should hold the object");
-  command->add_flag("--contacts", "Contact points, posture and margin, as a scenario's [grasp]")
-      ->required();
+  command->add_flag("--contacts", "Contact points, posture and margin, as a scenario's [grasp]")->required();
   command->add_option("--object-xyz", request->xyz, "Object in the world, m")
       ->type_name("X Y Z")
       ->expected(3)

@@ -77,6 +77,7 @@ ExitCode Run(Request request) {
   runs.push_back(ReadRecordedFrames(request.run_folder));
   if (!request.beside.empty()) runs.push_back(ReadRecordedFrames(request.beside));
   std::vector<RunView> views;
+  views.reserve(runs.size());
   for (const RecordedFrames& run : runs) views.push_back({run.model.get(), &run.frames});
   std::string out = request.out;
   if (out.empty()) out = (request.run_folder / (request.still ? "still.png" : "video.mp4")).string();

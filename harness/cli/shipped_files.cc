@@ -7,7 +7,7 @@ namespace dexcheck::cli {
 std::filesystem::path FindShippedFile(const std::filesystem::path& name) {
   std::error_code error;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::filesystem::path installed = program.parent_path().parent_path() / "share/dexcheck" / name;
+  std::filesystem::path installed = program.parent_path().parent_path() / "share/dexcheck" / name;
   if (!error && std::filesystem::exists(installed, error)) return installed;
   return std::filesystem::path(DEXCHECK_DATA_DIR) / name;
 }

@@ -158,7 +158,7 @@ void BodyFit::SetTarget(const mjModel& engine) {
 }
 
 VectorXd BodyFit::CalcRows(const RobotModel& model) const {
-  const VectorXd forces = evidence_->CalcForces(model);
+  VectorXd forces = evidence_->CalcForces(model);
   if (!bodies_) return forces;
   VectorXd rows(target_.size());
   rows.head(forces.size()) = forces;
@@ -415,6 +415,7 @@ std::vector<Cause> BodyFit::Run() {
   std::vector<Solution> solutions;
   if (!FindSolution(&solutions)) solutions = {Grow()};
   std::vector<Cause> whole;
+  whole.reserve(solutions.size());
   for (const Solution& solution : solutions) whole.push_back(ToCause(solution));
   std::vector<size_t> order(whole.size());
   std::iota(order.begin(), order.end(), 0);

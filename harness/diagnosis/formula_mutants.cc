@@ -270,9 +270,8 @@ class MutantTable {
 /// Everything that a view shows at one state, and its size.
 VectorXd CollectTerms(const ModelView& view) {
   std::vector<double> all;
-  const auto append = [&](const auto& terms) {
-    const MatrixXd plain = terms;
-    all.insert(all.end(), plain.data(), plain.data() + plain.size());
+  const auto append = [&](const MatrixXd& terms) {
+    all.insert(all.end(), terms.data(), terms.data() + terms.size());
   };
   append(view.M());
   append(view.C());

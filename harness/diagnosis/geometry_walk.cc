@@ -283,6 +283,7 @@ void GeometryWalk::TryParameters(int link, const std::vector<Parameter>& paramet
                                  const std::vector<std::vector<int>>& targets,
                                  std::vector<Candidate>* candidates) {
   std::vector<double> now;
+  now.reserve(parameters.size());
   for (const Parameter& parameter : parameters) now.push_back(GetValue(spec_, parameter));
   const bool turns = std::any_of(parameters.begin(), parameters.end(),
                                  [](const Parameter& parameter) { return IsRotation(parameter.kind); });

@@ -114,6 +114,7 @@ class MutantList {
     constexpr double kSame = 1e-9;  // of the trace: a tensor that the mistake leaves as it is
     if ((changed.inertia - before).norm() <= kSame * before.trace()) return;
     std::vector<Parameter> entries;
+    entries.reserve(6);
     for (int k = 0; k < 6; ++k) entries.push_back({Kind::kInertia, link, k});
     Mutant& mutant = Add(kind, entries);
     mutant.change = [link, change](RobotSpec* spec) { change(&JointOf(spec, link).body); };

@@ -92,7 +92,8 @@ MjModelPtr LoadMjcfText(const std::string& text, const std::string& source) {
   mj_defaultVFS(vfs.get());
   constexpr const char* kName = "model.xml";
   mj_makeEmptyFileVFS(vfs.get(), kName, static_cast<int>(text.size()));
-  std::memcpy(vfs->filedata[mj_findFileVFS(vfs.get(), kName)], text.data(), text.size());
+  void* const file = vfs->filedata[mj_findFileVFS(vfs.get(), kName)];
+  std::copy(text.begin(), text.end(), static_cast<char*>(file));
   try {
     MjModelPtr model = Load(kName, vfs.get(), source);
     mj_deleteVFS(vfs.get());

@@ -122,6 +122,7 @@ void EngineStep::ListChains(std::span<const int> fingertips) {
       chain.insert(chain.begin(), base_size_ + i);
     }
     std::vector<int> dofs;
+    dofs.reserve(chain.size());
     for (const int coordinate : chain) {
       dofs.push_back(adapter_->joint_dofs()[static_cast<size_t>(coordinate - base_size_)]);
     }

@@ -124,7 +124,8 @@ void RunData::ReadChecksOfSignals() {
         line.failed_at = time_[row];
       }
       if (value <= line.max) continue;
-      line.max = value > line.max ? value : kInfinity;
+      line.max = value;
+      if (std::isnan(value)) line.max = kInfinity;
       line.at_time = time_[row];
     }
     checks_.push_back(line);

@@ -72,6 +72,7 @@ void ReadSample(const TomlValue& value, Study* study) {
 
 void ReadMetrics(const TomlValue& value, Study* study) {
   std::vector<std::string> known;
+  known.reserve(kMetrics.size());
   for (const MetricInfo& metric : kMetrics) known.emplace_back(metric.name);
   for (const TomlValue& entry : value.AsList()) {
     const std::string name = entry.AsName();
