@@ -69,7 +69,9 @@ void TomlValue::Reject(std::string_view problem) const {
 double TomlValue::AsNumber() const {
   if (!node_->is_number() && !node_->is_string()) Fail("must be a number");
   if (node_->is_number()) {
-    const double value = node_->value<double>().value();
+    // value<double>() has none where a whole number does not fit a double exactly.
+    const auto whole = node_->value_exact<int64_t>();
+    const double value = whole ? static_cast<double>(*whole) : node_->value_exact<double>().value();
     if (!std::isfinite(value)) Fail("must be finite");
     return value;
   }

@@ -48,6 +48,12 @@ std::string TakeMessage(const std::string& assignment, const std::string& key = 
   return "accepted";
 }
 
+TEST(TomlOverride, WholeNumbersWithoutAnEqualDoubleAreRounded) {
+  TomlDocument document(kText, "file.toml");
+  document.Override("size=9007199254740993");  // 2^53 + 1
+  EXPECT_EQ(document.Open().Get("size").AsNumber(), 9007199254740992.0);
+}
+
 TEST(TomlOverride, SaysWhereAValueComesFrom) {
   EXPECT_EQ(TakeMessage("size=9", "size"), "--set size=9: size: must be a whole number from 0 to 5, got 9");
   EXPECT_EQ(TakeMessage("name=b", "size"), "accepted");
