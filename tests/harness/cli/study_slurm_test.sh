@@ -4,7 +4,7 @@
 set -euo pipefail
 
 skip=77
-dexcheck=$1
+dexcheck=$(realpath "$1")
 [[ $(id -u) -eq 0 ]] || { echo "skipped: slurmd needs root"; exit $skip; }
 for program in munged slurmctld slurmd sbatch squeue scontrol sqlite3; do
   command -v $program >/dev/null || { echo "skipped: no $program here"; exit $skip; }
@@ -35,9 +35,9 @@ key = "control.K_v"
 values = [20, 200, 2100]
 END
 
-# A cluster: its own munge key and socket, ports by the process id.
+# A cluster: its own munge key and socket, three ports by the process id, below those that the system gives out.
 host=$(hostname -s)
-port=$((20000 + $$ % 20000))
+port=$((10000 + 4 * ($$ % 5000)))
 export SLURM_CONF=$folder/slurm.conf
 cat >slurm.conf <<END
 ClusterName=test
