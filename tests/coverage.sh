@@ -16,6 +16,8 @@ cmake --preset coverage
 cmake --build --preset coverage
 rm -rf "$profiles"
 ctest --preset coverage
+# A task's phases are tested where they meet contacts.
+"$build/tests/simulation_test" --gtest_filter='Lift*' --gtest_brief=1
 
 mapfile -t programs < <(find "$build/tests" -maxdepth 1 -type f -executable -name '*_test' | sort)
 objects=("${programs[0]}")
