@@ -15,6 +15,7 @@
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
 #include "harness/common/shell.h"
+#include "harness/common/version.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -59,7 +60,7 @@ std::string JoinArguments(int argc, char** argv) {
 
 int Run(int argc, char** argv) {
   CLI::App app("Validates analytic robot models and controllers against MuJoCo.", "dexcheck");
-  app.set_version_flag("--version", DEXCHECK_VERSION);
+  app.set_version_flag("--version", Version());
   app.require_subcommand(1);
   int exit_code = kSuccess;
   AddConsistencyCommand(&app, &exit_code);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/common/version.h"
+
 namespace dexcheck {
 namespace {
 
@@ -118,7 +120,7 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
                    {"grasp_force_us_per_solve",
                     times.solves > 0 ? 1e6 * times.grasp_force / static_cast<double>(times.solves) : 0.0},
                    {"recording_us_per_step", microseconds * result.recording_seconds}};
-  json["versions"] = {{"dexcheck", DEXCHECK_VERSION}, {"mujoco", mj_versionString()}};
+  json["versions"] = {{"dexcheck", Version()}, {"mujoco", mj_versionString()}};
   return json;
 }
 

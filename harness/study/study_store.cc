@@ -8,6 +8,7 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/common/files.h"
+#include "harness/common/version.h"
 #include "harness/engine/engine.h"
 #include "harness/record/mjcf_files.h"
 #include "harness/study/git_revision.h"
@@ -65,7 +66,7 @@ StudyIdentity IdentifyStudy(const StudyInputs& inputs) {
           {"scenario", inputs.scenario_text},
           {"robot", ReadTextFile(inputs.robot.string())},
           {"mjcf_hash", HashMjcf(inputs.mjcf)},
-          {"dexcheck_version", DEXCHECK_VERSION},
+          {"dexcheck_version", Version()},
           {"git_revision", kGitRevision},
           {"mujoco_version", mj_versionString()}};
 }

@@ -10,6 +10,7 @@
 #include "harness/adapter/adapter.h"
 #include "harness/adapter/velocity_map.h"
 #include "harness/engine/engine.h"
+#include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
 namespace dexcheck {
@@ -21,8 +22,8 @@ constexpr int kFingertips = 4;
 /// The paper's robot in both worlds, with states to cycle through.
 struct Robot {
   Robot()
-      : model(ReadRobotModel(DEXCHECK_SOURCE_DIR "/controller/parameters/assistant_robot.toml")),
-        engine(LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml")),
+      : model(ReadRobotModel(testing::SourcePath("/controller/parameters/assistant_robot.toml"))),
+        engine(LoadMjcf(testing::SourcePath("/mjcf/scene.xml"))),
         adapter(model, *engine, "scene.xml") {
     std::mt19937 random(1);
     VelocityMap map(adapter, Coordinates::kReduced);

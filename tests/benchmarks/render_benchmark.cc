@@ -21,6 +21,7 @@
 #include "renders/run_decorations.h"
 #include "tests/benchmarks/measured_time.h"
 #include "tests/common/files.h"
+#include "tests/common/paths.h"
 #include "tests/renders/kinematic_run.h"
 
 namespace dexcheck {
@@ -68,7 +69,7 @@ void DrawBare(const mjModel& model, const RunFrames& run, const MovieOptions& op
 }
 
 int Run(long frames) {
-  const MjModelPtr model = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  const MjModelPtr model = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   const MovieOptions options;
   const RunFrames run = testing::MakeKinematicRun(*model, static_cast<double>(frames) / options.fps, 0.001);
   const testing::TempFolder folder;

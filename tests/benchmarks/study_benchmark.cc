@@ -17,11 +17,12 @@
 #include "harness/study/trial_pool.h"
 #include "tests/benchmarks/measured_time.h"
 #include "tests/common/files.h"
+#include "tests/common/paths.h"
 
 namespace dexcheck {
 namespace {
 
-const std::string kSource = DEXCHECK_SOURCE_DIR;
+const std::string kSource = testing::SourcePath();
 
 double Median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<long>(values.size() / 2);

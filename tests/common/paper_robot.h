@@ -5,18 +5,19 @@
 #include <string>
 
 #include "controller/model/parameter_reader.h"
+#include "tests/common/paths.h"
 
 namespace dexcheck::testing {
 
 /// The paper's robot with the given choice of v (12).
 inline RobotModel ReadPaperRobot(DriveVelocity velocity = DriveVelocity::kTwist) {
-  RobotSpec spec = ReadRobotModel(DEXCHECK_SOURCE_DIR "/controller/parameters/assistant_robot.toml").spec();
+  RobotSpec spec = ReadRobotModel(testing::SourcePath("/controller/parameters/assistant_robot.toml")).spec();
   spec.base.velocity = velocity;
   return RobotModel(spec);
 }
 
 inline RobotModel ReadPanda() {
-  return ReadRobotModel(DEXCHECK_SOURCE_DIR "/controller/parameters/panda.toml");
+  return ReadRobotModel(testing::SourcePath("/controller/parameters/panda.toml"));
 }
 
 }  // namespace dexcheck::testing

@@ -16,6 +16,7 @@
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"
 #include "tests/common/matrix_near.h"
+#include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
 namespace dexcheck {
@@ -376,8 +377,8 @@ INSTANTIATE_TEST_SUITE_P(Bases, WheeledAdapterTest, ::testing::ValuesIn(Select(H
 INSTANTIATE_TEST_SUITE_P(Bases, WheelRatesAdapterTest, ::testing::ValuesIn(Select(HasWheelRates)), PrintName);
 
 TEST(ShippedAdapter, LeavesTheObjectAlone) {
-  const RobotModel model = ReadRobotModel(DEXCHECK_SOURCE_DIR "/controller/parameters/assistant_robot.toml");
-  const MjModelPtr engine = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  const RobotModel model = ReadRobotModel(testing::SourcePath("/controller/parameters/assistant_robot.toml"));
+  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *engine, "scene.xml");
   ASSERT_EQ(engine->nv, 6 + 2 + 48 + 6);
   constexpr double kMark = 77.0;

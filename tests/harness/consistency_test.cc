@@ -13,6 +13,7 @@
 #include "harness/checks/random_states.h"
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"
+#include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 #include "tests/harness/simulation/shipped_run.h"
 
@@ -157,7 +158,7 @@ TEST(Consistency, FindsSmallErrorsOnRandomRobots) {
 // The shipped robot with the larger ring of its two-hand scenario.
 TEST(Consistency, HoldsOnTheRingScene) {
   const Scenario scenario = testing::ReadShippedScenario("two-hands");
-  const std::string robot = DEXCHECK_SOURCE_DIR "/controller/parameters/assistant_robot.toml";
+  const std::string robot = testing::SourcePath("/controller/parameters/assistant_robot.toml");
   const RobotModel model = ParseRobotModel(testing::ReadText(robot), robot, scenario.model_overrides);
   const MjModelPtr engine = LoadMjcf(scenario.mjcf_file);
   ConsistencyOptions options;

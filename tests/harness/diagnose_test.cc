@@ -13,6 +13,7 @@
 #include "harness/diagnosis/mutation.h"
 #include "harness/engine/engine.h"
 #include "tests/common/paper_robot.h"
+#include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
 namespace dexcheck {
@@ -29,9 +30,9 @@ struct Robot {
   MjModelPtr engine;
 };
 
-Robot LoadPanda() { return {testing::ReadPanda().spec(), LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/panda.xml")}; }
+Robot LoadPanda() { return {testing::ReadPanda().spec(), LoadMjcf(testing::SourcePath("/mjcf/panda.xml"))}; }
 Robot LoadPaperRobot() {
-  return {testing::ReadPaperRobot().spec(), LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml")};
+  return {testing::ReadPaperRobot().spec(), LoadMjcf(testing::SourcePath("/mjcf/scene.xml"))};
 }
 
 /// All kinds of base, of joint and of branching.

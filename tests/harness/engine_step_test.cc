@@ -9,6 +9,7 @@
 #include "harness/engine/engine_terms.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
+#include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
 namespace dexcheck {
@@ -23,7 +24,7 @@ class EngineStepTest : public ::testing::TestWithParam<DriveVelocity> {};
 
 TEST_P(EngineStepTest, IsWhatEngineTermsHas) {
   const RobotModel model = testing::ReadPaperRobot(GetParam());
-  const MjModelPtr engine = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *engine, "scene.xml");
   EngineTerms dense(adapter, Coordinates::kReduced);
   EngineStep sparse(adapter, model.fingertips());
@@ -84,11 +85,11 @@ TEST(EngineStep, NeedsAnObjectAndSpheresThatTouch) {
   RobotSpec spec = model.spec();
   spec.object.reset();
   const RobotModel alone(spec);
-  const MjModelPtr robot = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/robot.xml");
+  const MjModelPtr robot = LoadMjcf(testing::SourcePath("/mjcf/robot.xml"));
   const Adapter without_object(alone, *robot, "robot.xml");
   EXPECT_THROW(EngineStep(without_object, model.fingertips()), InputError);
 
-  const MjModelPtr scene = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  const MjModelPtr scene = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *scene, "scene.xml");
   const std::vector<int> palm = {model.FindFrame("r_palm_frame")};
   EXPECT_THROW(EngineStep(adapter, palm), InputError);

@@ -16,6 +16,7 @@
 #include "harness/adapter/velocity_map.h"
 #include "harness/engine/engine.h"
 #include "tests/common/matrix_near.h"
+#include "tests/common/paths.h"
 
 namespace dexcheck {
 namespace {
@@ -31,8 +32,8 @@ constexpr double kRounding = 2e-14;
 class RandomGrasp : public ::testing::Test {
  protected:
   RandomGrasp()
-      : model_(ReadRobotModel(DEXCHECK_SOURCE_DIR "/controller/parameters/assistant_robot.toml")),
-        engine_(LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml")),
+      : model_(ReadRobotModel(testing::SourcePath("/controller/parameters/assistant_robot.toml"))),
+        engine_(LoadMjcf(testing::SourcePath("/mjcf/scene.xml"))),
         adapter_(model_, *engine_, "scene.xml"),
         map_(adapter_, Coordinates::kReduced),
         data_(MakeData(*engine_)),

@@ -10,6 +10,7 @@
 #include "harness/diagnosis/formula_mutants.h"
 #include "harness/engine/engine.h"
 #include "tests/common/paper_robot.h"
+#include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
 namespace dexcheck {
@@ -28,7 +29,7 @@ class WrongEquations : public ::testing::TestWithParam<Files> {};
 
 TEST_P(WrongEquations, AreAllFoundByTheCheckThatTheyBelongTo) {
   const RobotModel model = GetParam().read();
-  const MjModelPtr engine = LoadMjcf(std::string(DEXCHECK_SOURCE_DIR) + GetParam().mjcf);
+  const MjModelPtr engine = LoadMjcf(testing::SourcePath(GetParam().mjcf));
   const Adapter adapter(model, *engine, "mjcf");
   std::vector<FormulaMutant> mutants = ListFormulaMutants(model);
   EXPECT_GE(mutants.size(), GetParam().formulas);
@@ -50,7 +51,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(ContactCheck, AgreesAtRandomContacts) {
   const RobotModel model = testing::ReadPaperRobot();
-  const MjModelPtr engine = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *engine, "mjcf");
   ContactCheck check(adapter);
   StateSource source(model, {}, 3);
@@ -98,7 +99,7 @@ TEST(Mutants, CoverEveryNumberOfTheModel) {
 // A range that the MJCF does not limit only says where to look.
 TEST(Mutants, WithoutEffectAreShownToHaveNone) {
   const RobotModel model = testing::ReadPanda();
-  const MjModelPtr engine = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/panda.xml");
+  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/panda.xml"));
   const int joint = mj_name2id(engine.get(), mjOBJ_JOINT, "panda_joint2");
   int limits = 0;
   for (Mutant& mutant : ListMutants(model.spec(), 1e-3)) {
@@ -123,7 +124,7 @@ TEST(Mutants, WithoutEffectAreShownToHaveNone) {
 
 TEST(Mutants, ThatAreNoRobotAreRefused) {
   const RobotModel model = testing::ReadPanda();
-  const MjModelPtr engine = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/panda.xml");
+  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/panda.xml"));
   Mutant mutant = ListMutants(model.spec(), 1e-3).front();
   mutant.change = [](RobotSpec* spec) { spec->joints[1].body.mass = -1.0; };
   RunMutant(model, *engine, "mjcf", {}, &mutant);

@@ -13,6 +13,7 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
 #include "harness/engine/engine.h"
+#include "tests/common/paths.h"
 
 namespace dexcheck {
 namespace {
@@ -124,10 +125,10 @@ struct Files {
 class NegativeControl : public ::testing::TestWithParam<Files> {};
 
 TEST_P(NegativeControl, EveryNumberIsFoundAndNamed) {
-  const std::string path = std::string(DEXCHECK_SOURCE_DIR) + GetParam().robot;
+  const std::string path = testing::SourcePath(GetParam().robot);
   const std::string text = ReadText(path);
   const RobotModel model = ReadRobotModel(path);
-  const MjModelPtr engine = LoadMjcf(std::string(DEXCHECK_SOURCE_DIR) + GetParam().mjcf);
+  const MjModelPtr engine = LoadMjcf(testing::SourcePath(GetParam().mjcf));
   ConsistencyOptions options;
   options.samples = kSamples;
   const auto go_on = [](long) { return true; };

@@ -9,6 +9,7 @@
 #include "controller/contact/shapes.h"
 #include "controller/object/so3.h"
 #include "harness/engine/engine.h"
+#include "tests/common/paths.h"
 
 namespace dexcheck {
 namespace {
@@ -35,7 +36,7 @@ class RollingBall {
                 <geom type="mesh" mesh="torus" mass="0" user="{} {}"/></body>
               <body name="ball"><freejoint/><geom type="sphere" size="{}" mass="0.05"/></body>
               </worldbody></mujoco>)",
-                                     DEXCHECK_SOURCE_DIR, time_step, 2.0 * time_step, kRing, kTube, kBall),
+                                     testing::SourcePath(), time_step, 2.0 * time_step, kRing, kTube, kBall),
                          "rolling ball")),
         data_(MakeData(*engine_)) {
     const SurfaceGeometry start = torus_.Evaluate(PathPoint(0.0));

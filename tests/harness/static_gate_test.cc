@@ -11,6 +11,7 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"
+#include "tests/common/paths.h"
 #include "tests/harness/simulation/shipped_run.h"
 
 namespace dexcheck {
@@ -21,8 +22,8 @@ using testing::ReplaceOnce;
 using testing::TempFolder;
 using testing::WriteText;
 
-const std::string kParameters = DEXCHECK_SOURCE_DIR "/controller/parameters/";
-const std::string kMjcf = DEXCHECK_SOURCE_DIR "/mjcf/";
+const std::string kParameters = testing::SourcePath("/controller/parameters/");
+const std::string kMjcf = testing::SourcePath("/mjcf/");
 
 /// One place changed in the shipped MJCF, and the finding that it must lead to.
 struct Mutation {

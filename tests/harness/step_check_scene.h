@@ -6,6 +6,7 @@
 
 #include "harness/adapter/adapter.h"
 #include "harness/checks/step_model_check.h"
+#include "tests/common/paths.h"
 #include "tests/controller/control/grasp_scene.h"
 
 namespace dexcheck::testing {
@@ -16,7 +17,7 @@ class CheckedController {
   CheckedController(const RobotSpec& spec, const Torus& torus, std::span<const int> fingertips,
                     OrientationFeedback orientation = OrientationFeedback::kAngles)
       : model(spec),
-        engine(LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml")),
+        engine(LoadMjcf(testing::SourcePath("/mjcf/scene.xml"))),
         adapter(model, *engine, "scene.xml"),
         surface(torus),
         robot(model),

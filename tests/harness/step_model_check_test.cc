@@ -13,6 +13,7 @@
 #include "harness/plant/observer.h"
 #include "harness/plant/plant.h"
 #include "tests/common/allocation_counter.h"
+#include "tests/common/paths.h"
 #include "tests/harness/step_check_scene.h"
 
 namespace dexcheck {
@@ -75,7 +76,7 @@ INSTANTIATE_TEST_SUITE_P(Orientation, StepModelCheckTest,
 
 TEST(StepModelCheck, AgreesWithWhatTheControllerEvaluatesInThePlant) {
   const RobotModel model = testing::ReadPaperRobot();
-  const MjModelPtr engine = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *engine, "scene.xml");
   const Torus torus(kRingRadius, kTubeRadius);
   const std::span<const int> fingertips = std::span(model.fingertips()).first(4);

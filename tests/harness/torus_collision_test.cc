@@ -13,6 +13,7 @@
 #include "controller/contact/shapes.h"
 #include "harness/engine/engine.h"
 #include "tests/common/matrix_near.h"
+#include "tests/common/paths.h"
 
 namespace dexcheck {
 namespace {
@@ -35,7 +36,7 @@ MjModelPtr LoadBallAndTorus(double ball_radius, bool exact, bool torus_fixed = f
           <geom name="torus" type="mesh" mesh="torus" mass="0" {}/></body>
         <body name="ball" pos="0 0 1"><freejoint/><geom name="ball" type="sphere" size="{}" mass="0.01"/></body>
         </worldbody></mujoco>)",
-                                  DEXCHECK_SOURCE_DIR, torus_fixed ? "" : "<freejoint/>",
+                                  testing::SourcePath(), torus_fixed ? "" : "<freejoint/>",
                                   exact ? "user=\"0.035 0.011\"" : "", ball_radius),
                       "ball and torus");
 }
@@ -170,7 +171,7 @@ TEST(TorusCollision, BallFallsThroughTheHole) {
 TEST(TorusCollision, ShippedMeshesShowTheSurface) {
   constexpr double kFloats = 1e-6;  // coordinates of some 0.3 m as floats, and the engine's own rotation
   for (const char* scene : {"scene.xml", "ring_scene.xml"}) {
-    const MjModelPtr model = LoadMjcf(std::string(DEXCHECK_SOURCE_DIR "/mjcf/") + scene);
+    const MjModelPtr model = LoadMjcf(testing::SourcePath("/mjcf/") + scene);
     const int geom = mj_name2id(model.get(), mjOBJ_GEOM, "torus_geom");
     double ring_radius = 0.0;
     double tube_radius = 0.0;
@@ -272,7 +273,7 @@ TEST(TorusInTheEngine, LiesStillOnABox) {
           <inertial pos="0 0 0" mass="0.2" diaginertia="0.000137625 0.000137625 0.00026315"/>
           <geom name="torus" type="mesh" mesh="torus" mass="0" user="0.035 0.011"/></body>
         </worldbody></mujoco>)",
-                               DEXCHECK_SOURCE_DIR),
+                               testing::SourcePath()),
                    "torus on a box");
   const MjDataPtr data = MakeData(*model);
   for (int i = 0; i < 2000; ++i) mj_step(model.get(), data.get());

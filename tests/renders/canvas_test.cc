@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "controller/common/errors.h"
+#include "tests/common/paths.h"
 #include "tests/common/throws.h"
 
 namespace dexcheck {
@@ -117,7 +118,7 @@ TEST(Font, BrokenUtf8IsDrawnAsReplacement) {
 TEST(Font, NamesAFileThatIsNone) {
   EXPECT_TRUE(Throws<InputError>([] { Font font("/nowhere/font.ttf"); },
                                  "/nowhere/font.ttf: cannot be used as a font: cannot be read"));
-  EXPECT_TRUE(Throws<InputError>([] { Font font(DEXCHECK_SOURCE_DIR "/README.md"); }, "not a font file"));
+  EXPECT_TRUE(Throws<InputError>([] { Font font(testing::SourcePath("/README.md")); }, "not a font file"));
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "renders/frame_line.h"
 #include "renders/renderer.h"
 #include "tests/common/files.h"
+#include "tests/common/paths.h"
 #include "tests/common/run_program.h"
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"
@@ -56,7 +57,7 @@ class MovieTest : public ::testing::Test {
     return true;
   }
 
-  MjModelPtr model_ = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  MjModelPtr model_ = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   RunFrames run_ = testing::MakeKinematicRun(*model_, 0.5);
   RunView view_ = {model_.get(), &run_};
   TempFolder folder_;

@@ -14,6 +14,7 @@
 #include "renders/png_file.h"
 #include "renders/run_decorations.h"
 #include "tests/common/files.h"
+#include "tests/common/paths.h"
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"
 
@@ -81,7 +82,7 @@ class RendererTest : public ::testing::Test {
     return count;
   }
 
-  MjModelPtr model_ = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  MjModelPtr model_ = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   MjDataPtr data_ = MakeData(*model_);
   RunFrames run_;
 };
@@ -247,7 +248,7 @@ TEST_F(RendererTest, StillLooksAsItDid) {
     return MoviePainter({&view, 1}, options).Paint(0.1);
   };
   const Image image = paint(run_);
-  const std::string path = DEXCHECK_SOURCE_DIR "/tests/renders/golden_still.png";
+  const std::string path = testing::SourcePath("/tests/renders/golden_still.png");
   if (std::getenv("DEXCHECK_WRITE_GOLDEN") != nullptr) WritePng(path, image);
   const Image golden = ReadPng(path);
   ASSERT_EQ(golden.rgb.size(), image.rgb.size());

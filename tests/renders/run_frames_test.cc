@@ -8,6 +8,7 @@
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"
+#include "tests/common/paths.h"
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"
 
@@ -20,7 +21,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 class RunFramesTest : public ::testing::Test {
  protected:
-  MjModelPtr model_ = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  MjModelPtr model_ = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   RunFrames run_ = testing::MakeKinematicRun(*model_, 0.1);
 };
 

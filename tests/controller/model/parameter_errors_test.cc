@@ -13,6 +13,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/toml_reader.h"
 #include "controller/model/parameter_reader.h"
+#include "tests/common/paths.h"
 
 namespace dexcheck {
 namespace {
@@ -22,8 +23,9 @@ using ::testing::Not;
 using ::testing::StartsWith;
 
 const std::string& ShippedText() {
-  static const std::string text =
-      ReadTextFile((std::filesystem::path(DEXCHECK_PARAMETERS) / "assistant_robot.toml").string());
+  static const std::string text = ReadTextFile(
+      (std::filesystem::path(testing::SourcePath("/controller/parameters")) / "assistant_robot.toml")
+          .string());
   return text;
 }
 

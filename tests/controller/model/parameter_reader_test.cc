@@ -11,6 +11,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/toml_reader.h"
 #include "tests/common/matrix_near.h"
+#include "tests/common/paths.h"
 
 namespace dexcheck {
 namespace {
@@ -18,7 +19,7 @@ namespace {
 using dexcheck::testing::MatrixNear;
 using ::testing::ElementsAre;
 
-const std::filesystem::path kParameters = DEXCHECK_PARAMETERS;
+const std::filesystem::path kParameters = testing::SourcePath("/controller/parameters");
 
 // A chain of at most 13 transforms of size 1, some four roundings each, and pi/2 rounded once per joint.
 constexpr double kRounding = 100.0 * std::numeric_limits<double>::epsilon();

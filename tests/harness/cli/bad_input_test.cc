@@ -2,6 +2,7 @@
 
 #include <ostream>
 
+#include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck {
@@ -250,7 +251,7 @@ TEST_F(BadFiles, MobileBaseNeedsAFreeJoint) {
 
 TEST_F(BadFiles, AnotherMujocoVersionIsNamed) {
   testing::ProgramOptions options;
-  options.environment = {{"LD_PRELOAD", DEXCHECK_OTHER_MUJOCO}};
+  options.environment = {{"LD_PRELOAD", testing::BuildPath("/tests/libother_mujoco_version.so")}};
   EXPECT_TRUE(IsRefused(RunDexcheck({"consistency", "--samples", "1"}, options),
                         {"libmujoco: version must be 2.2.2, got 2.3.1"}));
 }

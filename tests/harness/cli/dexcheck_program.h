@@ -8,13 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "tests/common/paths.h"
 #include "tests/common/run_program.h"
 
 namespace dexcheck::testing {
 
 /// Command that runs dexcheck with these arguments.
 inline std::vector<std::string> DexcheckCommand(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), DEXCHECK_PROGRAM);
+  arguments.insert(arguments.begin(), testing::ProgramPath());
   return arguments;
 }
 
@@ -46,8 +47,8 @@ inline ::testing::AssertionResult IsRefused(const ProgramResult& result,
 }
 
 /// Shipped files.
-inline const std::string kParameters = DEXCHECK_SOURCE_DIR "/controller/parameters/";
-inline const std::string kMjcf = DEXCHECK_SOURCE_DIR "/mjcf/";
+inline const std::string kParameters = testing::SourcePath("/controller/parameters/");
+inline const std::string kMjcf = testing::SourcePath("/mjcf/");
 inline const std::vector<std::string> kPandaFiles = {"--robot", kParameters + "panda.toml", "--mjcf",
                                                      kMjcf + "panda.xml"};
 

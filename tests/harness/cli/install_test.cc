@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck {
@@ -19,7 +20,7 @@ TEST(InstalledProgram, UsesTheFilesBesideIt) {
   const testing::TempFolder folder;
   const std::filesystem::path first = folder.path() / "first";
   const ProgramResult install =
-      RunProgram({DEXCHECK_CMAKE, "--install", DEXCHECK_BUILD_DIR, "--prefix", first.string()});
+      RunProgram({DEXCHECK_CMAKE, "--install", testing::BuildPath(), "--prefix", first.string()});
   ASSERT_EQ(install.exit_code, 0) << install.out << install.err;
   const std::filesystem::path prefix = folder.path() / "moved here";
   std::filesystem::rename(first, prefix);

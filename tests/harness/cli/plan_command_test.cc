@@ -9,6 +9,7 @@
 #include "controller/object/euler_zyz.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
+#include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck {
@@ -27,7 +28,7 @@ using testing::WriteText;
 
 /// The shipped scenario `hold` with another [grasp].
 std::string MakeScenario(const std::string& grasp, bool is_singular) {
-  std::string text = ReadText(DEXCHECK_SOURCE_DIR "/harness/scenarios/hold.toml");
+  std::string text = ReadText(testing::SourcePath("/harness/scenarios/hold.toml"));
   const size_t begin = text.find("[grasp]");
   const size_t end = text.find("[trajectory]");
   text.replace(begin, end - begin, grasp + "\n");

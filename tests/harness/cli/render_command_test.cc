@@ -16,6 +16,7 @@
 #include "harness/engine/engine.h"
 #include "harness/record/log_writer.h"
 #include "renders/png_file.h"
+#include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/renders/kinematic_run.h"
 
@@ -36,7 +37,7 @@ struct Flaw {
 };
 
 void EmbedModel(LogWriter* log) {
-  const fs::path mjcf = DEXCHECK_SOURCE_DIR "/mjcf";
+  const fs::path mjcf = testing::SourcePath("/mjcf");
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(mjcf)) {
     const std::string extension = entry.path().extension();
     if (extension != ".xml" && extension != ".msh") continue;
@@ -48,7 +49,7 @@ void EmbedModel(LogWriter* log) {
 /// Writes FOLDER/log.h5.
 void WriteRun(const fs::path& folder, double duration, const Flaw& flaw = {}) {
   fs::create_directory(folder);
-  const MjModelPtr model = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  const MjModelPtr model = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   const RunFrames run = testing::MakeKinematicRun(*model, duration);
   LogWriter log(folder / "log.h5", run.rows());
   log.SetText("scenario", "posed");

@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "harness/study/study_store.h"
+#include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck {
@@ -232,7 +233,7 @@ TEST_F(StudyCommand, AFullFileSystemLosesNothing) {
   const auto run = [&](const std::string& script) {
     std::vector<std::string> command = apart;
     command.insert(command.end(), {script, "sh", folder_.path() / "disk", folder_.path() / "tiny.toml",
-                                   folder_.path(), DEXCHECK_PROGRAM});
+                                   folder_.path(), testing::ProgramPath()});
     return testing::RunProgram(command);
   };
   std::filesystem::create_directory(folder_.path() / "disk");
@@ -299,7 +300,7 @@ TEST_F(StudyCommand, TheReportsCommandsRepeatTheTrials) {
     shown.replace(at, quote.size(), "'");
   }
   EXPECT_THAT(shown, HasSubstr("--set control.K_p=10000 --set control.K_v=200"));
-  const std::filesystem::path program = DEXCHECK_PROGRAM;
+  const std::filesystem::path program = testing::ProgramPath();
   ProgramOptions options;
   options.folder = folder_.path();
   options.environment = {{"PATH", program.parent_path().string() + ":" + ::getenv("PATH")}};

@@ -5,6 +5,7 @@
 #include "controller/common/errors.h"
 #include "harness/record/mjcf_files.h"
 #include "tests/common/files.h"
+#include "tests/common/paths.h"
 #include "tests/common/throws.h"
 #include "tests/harness/simulation/shipped_run.h"
 
@@ -96,7 +97,7 @@ TEST(ReadScenario, RefusesAMovingStartThatIsNoneBeforeItRuns) {
 }
 
 TEST(ListMjcfFiles, FollowsIncludesAndAssets) {
-  const std::vector<std::string> files = ListMjcfFiles(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  const std::vector<std::string> files = ListMjcfFiles(testing::SourcePath("/mjcf/scene.xml"));
   ASSERT_FALSE(files.empty());
   EXPECT_EQ(files[0], "scene.xml");
   for (const char* needed : {"robot.xml", "torus.xml", "stage.xml", "assets/torus.msh"}) {

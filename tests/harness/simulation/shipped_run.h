@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "harness/simulation/runner.h"
+#include "tests/common/paths.h"
 
 namespace dexcheck::testing {
 
 inline Scenario ReadShippedScenario(const std::string& name, const std::vector<std::string>& overrides = {}) {
-  const std::filesystem::path folder = DEXCHECK_SOURCE_DIR "/harness/scenarios";
+  const std::filesystem::path folder = testing::SourcePath("/harness/scenarios");
   const std::string file = (folder / (name + ".toml")).string();
   return ParseScenario(ReadTextFile(file), file, folder, overrides);
 }
@@ -24,8 +25,8 @@ class ShippedRun {
     Scenario scenario = ReadShippedScenario(name, overrides);
     scenario.seed = seed;
     setup_ = std::make_unique<Setup>(
-        scenario, DEXCHECK_SOURCE_DIR "/controller/parameters/assistant_robot.toml",
-        scenario.mjcf_file.empty() ? DEXCHECK_SOURCE_DIR "/mjcf/scene.xml" : scenario.mjcf_file);
+        scenario, testing::SourcePath("/controller/parameters/assistant_robot.toml"),
+        scenario.mjcf_file.empty() ? testing::SourcePath("/mjcf/scene.xml") : scenario.mjcf_file);
     runner_ = std::make_unique<Runner>(*setup_, /*check=*/true);
   }
 

@@ -15,11 +15,12 @@
 #include "controller/common/toml_reader.h"
 #include "harness/simulation/runner.h"
 #include "harness/study/trial.h"
+#include "tests/common/paths.h"
 
 namespace dexcheck {
 namespace {
 
-const std::string kFolder = DEXCHECK_SOURCE_DIR "/harness/scenarios";
+const std::string kFolder = testing::SourcePath("/harness/scenarios");
 
 /// One sample built step by step, and its spectral radius by a solver.
 double SolveSpectralRadius(const SampledLoop& loop, const AxisGains& gains) {
@@ -96,8 +97,8 @@ StudyInputs MakeInputs(const std::vector<std::string>& overrides) {
   inputs.scenario_text = ReadTextFile(kFolder + "/offset.toml");
   inputs.scenario_source = "offset";
   inputs.scenario_folder = kFolder;
-  inputs.robot = DEXCHECK_SOURCE_DIR "/controller/parameters/assistant_robot.toml";
-  inputs.mjcf = DEXCHECK_SOURCE_DIR "/mjcf/scene.xml";
+  inputs.robot = testing::SourcePath("/controller/parameters/assistant_robot.toml");
+  inputs.mjcf = testing::SourcePath("/mjcf/scene.xml");
   return inputs;
 }
 

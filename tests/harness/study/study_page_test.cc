@@ -10,6 +10,7 @@
 #include "harness/study/study_report.h"
 #include "tests/common/browser.h"
 #include "tests/common/files.h"
+#include "tests/common/paths.h"
 
 namespace dexcheck {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 using testing::Browser;
 using ::testing::HasSubstr;
 
-const std::string kSource = DEXCHECK_SOURCE_DIR;
+const std::string kSource = testing::SourcePath();
 constexpr double kLimit = 2000.0;  // 1/s: of K_v at steps of 1 ms
 
 class StudyPageTest : public ::testing::Test {
