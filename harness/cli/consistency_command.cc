@@ -140,26 +140,25 @@ int Run(const Request& request) {
 
 }  // namespace
 
-void AddConsistencyCommand(CLI::App* app, int* exit_code) {
+void AddConsistencyCommand(Command app) {
   constexpr long kMaxSamples = 1000000000;
   const auto request = std::make_shared<Request>();
-  CLI::App* command =
-      app->add_subcommand("consistency", "Compare every term of model and engine at random states");
+  Command command =
+      app.AddCommand("consistency", "Compare every term of model and engine at random states");
   AddRobotOptions(command, &request->files);
-  command->add_option("--samples", request->options.samples, "Number of random states")
-      ->type_name("N")
-      ->check(WholeNumber(1, kMaxSamples))
-      ->capture_default_str();
-  command->add_option("--seed", request->options.seed, "Of the random states")
-      ->type_name("N")
-      ->check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
-      ->capture_default_str();
-  command
-      ->add_option("--json", request->json_file,
+  command.AddOption("--samples", &request->options.samples, "Number of random states")
+      .TypeName("N")
+      .Check(WholeNumber(1, kMaxSamples))
+      .ShowDefault();
+  command.AddOption("--seed", &request->options.seed, "Of the random states")
+      .TypeName("N")
+      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
+      .ShowDefault();
+  command.AddOption("--json", &request->json_file,
                    "Write the results to this file (- for standard output, then without the table)")
-      ->type_name("FILE.json");
-  command->add_flag("--quiet", request->quiet, "Print the verdict only");
-  command->callback([=] { *exit_code = Run(*request); });
+      .TypeName("FILE.json");
+  command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
+  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

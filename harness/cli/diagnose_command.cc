@@ -134,26 +134,26 @@ int Run(const Request& request) {
 
 }  // namespace
 
-void AddDiagnoseCommand(CLI::App* app, int* exit_code) {
+void AddDiagnoseCommand(Command app) {
   constexpr std::uint64_t kMaxSamples = 1000;
   const auto request = std::make_shared<Request>();
-  CLI::App* command =
-      app->add_subcommand("diagnose", "Say why model and engine disagree, and what would repair it");
+  Command command =
+      app.AddCommand("diagnose", "Say why model and engine disagree, and what would repair it");
   AddRobotOptions(command, &request->files);
-  command->add_option("--samples", request->options.samples, "Number of random states")
-      ->type_name("N")
-      ->check(WholeNumber(1, kMaxSamples))
-      ->capture_default_str();
-  command->add_option("--seed", request->options.seed, "Of the random states")
-      ->type_name("N")
-      ->check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
-      ->capture_default_str();
-  command->add_flag("--by-motion", request->options.by_motion,
+  command.AddOption("--samples", &request->options.samples, "Number of random states")
+      .TypeName("N")
+      .Check(WholeNumber(1, kMaxSamples))
+      .ShowDefault();
+  command.AddOption("--seed", &request->options.seed, "Of the random states")
+      .TypeName("N")
+      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
+      .ShowDefault();
+  command.AddFlag("--by-motion", &request->options.by_motion,
                     "Use axes, frames and forces only, not the bodies' masses and inertias in the MJCF");
-  command->add_option("--json", request->json_file, "Write the results to this file (- for standard output)")
-      ->type_name("FILE.json");
-  command->add_flag("--quiet", request->quiet, "No progress, and causes only");
-  command->callback([=] { *exit_code = Run(*request); });
+  command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
+      .TypeName("FILE.json");
+  command.AddFlag("--quiet", &request->quiet, "No progress, and causes only");
+  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

@@ -41,26 +41,24 @@ int Run(const Request& request) {
 
 }  // namespace
 
-void AddEvalCommand(CLI::App* app, int* exit_code) {
+void AddEvalCommand(Command app) {
   const auto request = std::make_shared<Request>();
-  CLI::App* command = app->add_subcommand("eval", "Print every term at one state, as JSON");
-  CLI::Option* robot =
-      command->add_option("--robot", request->robot, "Parameter file (TOML) of the analytic model")
-          ->type_name("FILE.toml");
-  command
-      ->add_option("--mjcf", request->mjcf,
+  Command command = app.AddCommand("eval", "Print every term at one state, as JSON");
+  Option robot =
+      command.AddOption("--robot", &request->robot, "Parameter file (TOML) of the analytic model")
+          .TypeName("FILE.toml");
+  command.AddOption("--mjcf", &request->mjcf,
                    "The same robot for the engine: adds the engine's values of the terms as \"engine\"")
-      ->type_name("FILE.xml")
-      ->needs(robot);
-  command
-      ->add_option("--state", request->state_file,
+      .TypeName("FILE.xml")
+      .Needs(robot);
+  command.AddOption("--state", &request->state_file,
                    "JSON with q, xi; optionally object, kappa or contact_points, fingers, mu")
-      ->type_name("STATE.json")
-      ->required();
-  command->add_option("--out", request->out, "File to write (- for standard output)")
-      ->type_name("FILE.json")
-      ->capture_default_str();
-  command->callback([=] { *exit_code = Run(*request); });
+      .TypeName("STATE.json")
+      .Required();
+  command.AddOption("--out", &request->out, "File to write (- for standard output)")
+      .TypeName("FILE.json")
+      .ShowDefault();
+  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

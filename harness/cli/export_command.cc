@@ -160,25 +160,24 @@ int Run(const Request& request) {
 
 }  // namespace
 
-void AddExportCommand(CLI::App* app, int* exit_code) {
+void AddExportCommand(Command app) {
   const auto request = std::make_shared<Request>();
-  CLI::App* command = app->add_subcommand("export", "Write a run's log as a table of numbers (CSV)");
-  command->add_option("RUN_DIR", request->run_folder, "Folder of the run, with its log.h5")->required();
-  CLI::Option* csv = command->add_option("--csv", request->csv_file, "File to write (- for standard output)")
-                         ->type_name("FILE.csv");
-  command
-      ->add_option("--signals", request->patterns,
+  Command command = app.AddCommand("export", "Write a run's log as a table of numbers (CSV)");
+  command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run, with its log.h5").Required();
+  Option csv = command.AddOption("--csv", &request->csv_file, "File to write (- for standard output)")
+                         .TypeName("FILE.csv");
+  command.AddOption("--signals", &request->patterns,
                    "Only time and these signals; * stands for any text: time,object/*,check/M_bar")
-      ->type_name("A,B,...")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  command->add_option("--every", request->every, "Only the first of every N rows")
-      ->type_name("N")
-      ->check(WholeNumber(1, std::numeric_limits<int>::max()))
-      ->capture_default_str();
-  command->add_flag("--list", request->list, "Print the signals, their units and descriptions")
-      ->excludes(csv);
-  command->callback([=] { *exit_code = Run(*request); });
+      .TypeName("A,B,...")
+      .Delimiter(',')
+      .Repeatable();
+  command.AddOption("--every", &request->every, "Only the first of every N rows")
+      .TypeName("N")
+      .Check(WholeNumber(1, std::numeric_limits<int>::max()))
+      .ShowDefault();
+  command.AddFlag("--list", &request->list, "Print the signals, their units and descriptions")
+      .Excludes(csv);
+  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

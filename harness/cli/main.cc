@@ -29,28 +29,6 @@ int Report(std::string problem, ExitCode code) {
   return code;
 }
 
-/// What CLI11 says, but for unknown words the nearest known one.
-std::string Explain(const CLI::App& app, const CLI::ParseError& error) {
-  const std::vector<std::string> unknown = app.remaining(/*recurse=*/true);
-  if (unknown.empty()) return error.what();
-  const std::string& word = unknown.front();
-  const std::vector<CLI::App*> chosen = app.get_subcommands();
-  const CLI::App& place = chosen.empty() ? app : *chosen.front();
-  const bool is_option = word.starts_with("-");
-  std::vector<std::string> known;
-  if (is_option) {
-    for (const CLI::Option* option : place.get_options()) known.push_back(option->get_name());
-  } else {
-    for (const CLI::App* command : place.get_subcommands([](const CLI::App*) { return true; })) {
-      known.push_back(command->get_name());
-    }
-  }
-  const std::string nearest = FindNearest(word, known);
-  const std::string kind = is_option ? "option" : known.empty() ? "argument" : "command";
-  return "unknown " + kind + " " + Quote(word) +
-         (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?");
-}
-
 /// The command line as one could type it.
 std::string JoinArguments(int argc, char** argv) {
   std::string text = "dexcheck";
@@ -59,28 +37,25 @@ std::string JoinArguments(int argc, char** argv) {
 }
 
 int Run(int argc, char** argv) {
-  CLI::App app("Validates analytic robot models and controllers against MuJoCo.", "dexcheck");
-  app.set_version_flag("--version", Version());
-  app.require_subcommand(1);
-  int exit_code = kSuccess;
-  AddConsistencyCommand(&app, &exit_code);
-  AddDiagnoseCommand(&app, &exit_code);
-  AddMutateCommand(&app, &exit_code);
-  AddEvalCommand(&app, &exit_code);
-  AddPlanCommand(&app, &exit_code);
-  AddRunCommand(&app, JoinArguments(argc, argv), &exit_code);
-  AddExportCommand(&app, &exit_code);
-  AddRenderCommand(&app, &exit_code);
-  AddReportCommand(&app, &exit_code);
-  AddStudyCommand(&app, &exit_code);
+  CommandLine line("dexcheck", "Validates analytic robot models and controllers against MuJoCo.", Version());
+  Command app = line.root();
+  app.RequireCommand();
+  AddConsistencyCommand(app);
+  AddDiagnoseCommand(app);
+  AddMutateCommand(app);
+  AddEvalCommand(app);
+  AddPlanCommand(app);
+  AddRunCommand(app, JoinArguments(argc, argv));
+  AddExportCommand(app);
+  AddRenderCommand(app);
+  AddReportCommand(app);
+  AddStudyCommand(app);
   try {
-    app.parse(argc, argv);
+    const int exit_code = line.Run(argc, argv);
     if (std::fflush(stdout) == 0) return exit_code;
     return Report(std::string("standard output: cannot be written: ") + std::strerror(errno), kInputError);
-  } catch (const CLI::Success& success) {
-    return app.exit(success);
-  } catch (const CLI::ParseError& error) {
-    return Report(Explain(app, error) + " (see dexcheck --help)", kInputError);
+  } catch (const UsageError& error) {
+    return Report(std::string(error.what()) + " (see dexcheck --help)", kInputError);
   } catch (const InputError& error) {
     return Report(error.what(), kInputError);
   } catch (const std::invalid_argument& error) {

@@ -229,25 +229,25 @@ int Run(Request request) {
 
 }  // namespace
 
-void AddMutateCommand(CLI::App* app, int* exit_code) {
+void AddMutateCommand(Command app) {
   const auto request = std::make_shared<Request>();
-  CLI::App* command = app->add_subcommand(
+  Command command = app.AddCommand(
       "mutate",
       "Change every number and equation of the model on purpose: which mistakes are found and named?");
   AddRobotOptions(command, &request->files);
-  command->add_option("--scale", request->options.scale, "Change of a number, relative to it")
-      ->type_name("X")
-      ->check(CLI::Validator(CheckScale, ""))
-      ->capture_default_str();
-  command->add_option("--samples", request->options.samples, "Random states per mutant")
-      ->type_name("N")
-      ->check(WholeNumber(1, 1000))
-      ->capture_default_str();
-  command->add_flag("--no-diagnosis", request->no_diagnosis, "Only whether each is found, not what is named");
-  command->add_option("--json", request->json_file, "Write the results to this file (- for standard output)")
-      ->type_name("FILE.json");
-  command->add_flag("--quiet", request->quiet, "Print the verdict only");
-  command->callback([=] { *exit_code = Run(*request); });
+  command.AddOption("--scale", &request->options.scale, "Change of a number, relative to it")
+      .TypeName("X")
+      .Check(CheckScale)
+      .ShowDefault();
+  command.AddOption("--samples", &request->options.samples, "Random states per mutant")
+      .TypeName("N")
+      .Check(WholeNumber(1, 1000))
+      .ShowDefault();
+  command.AddFlag("--no-diagnosis", &request->no_diagnosis, "Only whether each is found, not what is named");
+  command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
+      .TypeName("FILE.json");
+  command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
+  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

@@ -283,57 +283,50 @@ int Run(Request request) {
 
 }  // namespace
 
-void AddPlanCommand(CLI::App* app, int* exit_code) {
+void AddPlanCommand(Command app) {
   const auto request = std::make_shared<Request>();
-  CLI::App* command = app->add_subcommand("plan", "Choose where a hand should hold the object");
-  command->add_flag("--contacts", "Contact points, posture and margin, as a scenario's [grasp]")->required();
-  command->add_option("--object-xyz", request->xyz, "Object in the world, m")
-      ->type_name("X Y Z")
-      ->expected(3)
-      ->required();
-  command->add_option("--object-zyz-deg", request->zyz_deg, "Its orientation, ZYZ angles (default 0 0 0)")
-      ->type_name("A B C")
-      ->expected(3);
-  CLI::Option* hand = command->add_option("--hand", request->hand, "Of the assistant robot")
-                          ->type_name("right|left")
-                          ->check(CLI::IsMember({"right", "left"}))
-                          ->capture_default_str();
-  command
-      ->add_option("--palm", request->palm,
+  Command command = app.AddCommand("plan", "Choose where a hand should hold the object");
+  command.AddFlag("--contacts", "Contact points, posture and margin, as a scenario's [grasp]").Required();
+  command.AddOption("--object-xyz", &request->xyz, "Object in the world, m")
+      .TypeName("X Y Z")
+      .Takes(3)
+      .Required();
+  command.AddOption("--object-zyz-deg", &request->zyz_deg, "Its orientation, ZYZ angles (default 0 0 0)")
+      .TypeName("A B C")
+      .Takes(3);
+  Option hand = command.AddOption("--hand", &request->hand, "Of the assistant robot")
+                          .TypeName("right|left")
+                          .OneOf({"right", "left"})
+                          .ShowDefault();
+  command.AddOption("--palm", &request->palm,
                    "Frame of a palm, z along the fingers; the fingertips are those on its link")
-      ->type_name("FRAME")
-      ->excludes(hand);
-  command->add_option("--mu", request->options.mu, "Friction counted on")
-      ->type_name("MU")
-      ->capture_default_str();
-  command
-      ->add_option("--support-height", request->support_height,
+      .TypeName("FRAME")
+      .Excludes(hand);
+  command.AddOption("--mu", &request->options.mu, "Friction counted on")
+      .TypeName("MU")
+      .ShowDefault();
+  command.AddOption("--support-height", &request->support_height,
                    "Height of the table that the object lies on, m: the hand comes from above")
-      ->type_name("Z");
-  command
-      ->add_option("--lift", request->lift,
+      .TypeName("Z");
+  command.AddOption("--lift", &request->lift,
                    "Displacement, m, that the arm must be able to make while holding")
-      ->type_name("X Y Z")
-      ->expected(3);
-  command->add_option("--joint-margin", request->options.joint_margin, "From the ends of ranges, rad or m")
-      ->type_name("MARGIN")
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--joints-deg", request->joints_deg,
+      .TypeName("X Y Z")
+      .Takes(3);
+  command.AddOption("--joint-margin", &request->options.joint_margin, "From the ends of ranges, rad or m")
+      .TypeName("MARGIN")
+      .ShowDefault();
+  command.AddOption("--joints-deg", &request->joints_deg,
           "Posture to stay near to; arm joints are otherwise in the middle of their ranges, others 0")
-      ->type_name("NAME=DEGREES");
-  command
-      ->add_option("--arm-joints", request->arm_joints,
+      .TypeName("NAME=DEGREES");
+  command.AddOption("--arm-joints", &request->arm_joints,
                    "Joints that may move the palm (default: those that move no other fingertips)")
-      ->type_name("NAME");
-  command->add_option("--robot", request->robot, "Parameter file (TOML) with fingertips and an object")
-      ->type_name("FILE.toml");
-  command
-      ->add_option("--json", request->json_file,
+      .TypeName("NAME");
+  command.AddOption("--robot", &request->robot, "Parameter file (TOML) with fingertips and an object")
+      .TypeName("FILE.toml");
+  command.AddOption("--json", &request->json_file,
                    "Write the plan to this file (- for standard output, then without the [grasp])")
-      ->type_name("FILE.json");
-  command->callback([=] { *exit_code = Run(*request); });
+      .TypeName("FILE.json");
+  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

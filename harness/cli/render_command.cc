@@ -88,43 +88,41 @@ ExitCode Run(Request request) {
 
 }  // namespace
 
-void AddRenderCommand(CLI::App* app, int* exit_code) {
+void AddRenderCommand(Command app) {
   constexpr int kMostFramesPerSecond = 120;
   constexpr int kMostJobs = 64;
   const auto request = std::make_shared<Request>();
   request->movie.workers = CountDrawers();
-  CLI::App* command = app->add_subcommand("render", "Draw a recorded run as a video, or one instant of it");
-  command->add_option("RUN_DIR", request->run_folder, "Folder of the run")->required()->type_name("");
-  command->add_option("--out", request->out, "Default: video.mp4 or still.png in RUN_DIR")->type_name("FILE");
-  command->add_option("--still", request->still, "One picture (PNG) at this time of the run, s")
-      ->type_name("T");
-  command
-      ->add_option("--camera", request->movie.camera,
+  Command command = app.AddCommand("render", "Draw a recorded run as a video, or one instant of it");
+  command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
+  command.AddOption("--out", &request->out, "Default: video.mp4 or still.png in RUN_DIR").TypeName("FILE");
+  command.AddOption("--still", &request->still, "One picture (PNG) at this time of the run, s")
+      .TypeName("T");
+  command.AddOption("--camera", &request->movie.camera,
                    "overview, follow, grasp, top, or another of the MJCF's; course stands still "
                    "and sees the whole way")
-      ->type_name("NAME")
-      ->capture_default_str();
-  command->add_option("--inset", request->movie.inset, "A second camera in the lower right corner")
-      ->type_name("NAME");
-  command->add_option("--beside", request->beside, "Another run, shown at the right")->type_name("RUN_DIR");
-  command->add_option("--size", request->size, "Of the picture in pixels")
-      ->type_name("WxH")
-      ->capture_default_str();
-  command->add_option("--fps", request->movie.fps, "Frames a second")
-      ->type_name("N")
-      ->check(WholeNumber(1, kMostFramesPerSecond))
-      ->capture_default_str();
-  command
-      ->add_option("--jobs", request->movie.workers,
+      .TypeName("NAME")
+      .ShowDefault();
+  command.AddOption("--inset", &request->movie.inset, "A second camera in the lower right corner")
+      .TypeName("NAME");
+  command.AddOption("--beside", &request->beside, "Another run, shown at the right").TypeName("RUN_DIR");
+  command.AddOption("--size", &request->size, "Of the picture in pixels")
+      .TypeName("WxH")
+      .ShowDefault();
+  command.AddOption("--fps", &request->movie.fps, "Frames a second")
+      .TypeName("N")
+      .Check(WholeNumber(1, kMostFramesPerSecond))
+      .ShowDefault();
+  command.AddOption("--jobs", &request->movie.workers,
                    "Processes that draw; default: one for each processor, at most 8")
-      ->type_name("N")
-      ->check(WholeNumber(1, kMostJobs));
-  command->add_flag("--forces", request->movie.forces, "Draw contact forces and friction cones");
-  command->add_flag("--tracks", request->movie.tracks, "Draw the contacts' tracks and the object's path");
-  command->add_flag("--frames", request->movie.frames, "Draw the object's axes");
-  command->add_flag("--no-panel", request->no_panel, "Leave out the panel with time, errors and checks");
-  command->add_flag("--quiet", request->quiet, "Print nothing");
-  command->callback([=] { *exit_code = Run(*request); });
+      .TypeName("N")
+      .Check(WholeNumber(1, kMostJobs));
+  command.AddFlag("--forces", &request->movie.forces, "Draw contact forces and friction cones");
+  command.AddFlag("--tracks", &request->movie.tracks, "Draw the contacts' tracks and the object's path");
+  command.AddFlag("--frames", &request->movie.frames, "Draw the object's axes");
+  command.AddFlag("--no-panel", &request->no_panel, "Leave out the panel with time, errors and checks");
+  command.AddFlag("--quiet", &request->quiet, "Print nothing");
+  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

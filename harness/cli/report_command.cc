@@ -18,22 +18,21 @@ struct Request {
 
 }  // namespace
 
-void AddReportCommand(CLI::App* app, int* exit_code) {
+void AddReportCommand(Command app) {
   const auto request = std::make_shared<Request>();
-  CLI::App* command =
-      app->add_subcommand("report", "Write a recorded run's report: one page and its figures");
-  command->add_option("RUN_DIR", request->run_folder, "Folder of the run")->required()->type_name("");
-  command
-      ->add_option("--out", request->out,
+  Command command =
+      app.AddCommand("report", "Write a recorded run's report: one page and its figures");
+  command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
+  command.AddOption("--out", &request->out,
                    "Write only the page, here (default: report.html and figures/ in RUN_DIR)")
-      ->type_name("FILE.html");
-  command->add_flag("--quiet", request->quiet, "Print nothing");
-  command->callback([=] {
+      .TypeName("FILE.html");
+  command.AddFlag("--quiet", &request->quiet, "Print nothing");
+  command.SetAction([=] {
     ReportFiles files = MakeReportFiles(request->run_folder);
     if (!request->out.empty()) files = {request->out, {}};
     MakeReport(request->run_folder, files);
     if (!request->quiet) fmt::print("{}\n", files.page.string());
-    *exit_code = kSuccess;
+    return kSuccess;
   });
 }
 

@@ -127,41 +127,38 @@ int Run(const Request& request) {
 
 }  // namespace
 
-void AddRunCommand(CLI::App* app, const std::string& command_line, int* exit_code) {
+void AddRunCommand(Command app, const std::string& command_line) {
   const auto request = std::make_shared<Request>();
   request->command = command_line;
-  CLI::App* command = app->add_subcommand("run", "Simulate a scenario, cross-checked at every step");
-  CLI::Option* scenario = command->add_option("SCENARIO", request->scenario,
+  Command command = app.AddCommand("run", "Simulate a scenario, cross-checked at every step");
+  Option scenario = command.AddOption("SCENARIO", &request->scenario,
                                               "Name of a shipped scenario (--list), or a TOML file");
-  CLI::Option* list = command->add_flag("--list", request->list, "List the shipped scenarios");
-  CLI::Option* replay = command
-                            ->add_option("--replay", request->replay,
+  Option list = command.AddFlag("--list", &request->list, "List the shipped scenarios");
+  Option replay = command.AddOption("--replay", &request->replay,
                                          "Repeat a recorded run and compare every number bit for bit")
-                            ->type_name("RUN_DIR");
-  command
-      ->add_option("--out", request->out,
+                            .TypeName("RUN_DIR");
+  command.AddOption("--out", &request->out,
                    "Folder for the results, made by the run (runs/SCENARIO by default)")
-      ->type_name("DIR");
-  command
-      ->add_option("--set", request->overrides,
+      .TypeName("DIR");
+  command.AddOption("--set", &request->overrides,
                    "Set a key of the scenario, or with model. before it one of the parameter file")
-      ->type_name("KEY=VALUE")
-      ->allow_extra_args(false);
-  command->add_option("--seed", request->seed, "Vary posture and grasp at random; 0 does not")
-      ->type_name("N")
-      ->check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
-  command->add_flag("--no-check", request->no_check, "Simulate without cross-checks");
-  command->add_flag("--video", request->video, "Draw the run as a video, video.mp4");
-  command->add_flag("--no-report", request->no_report, "Write the log and the summary only");
-  command->add_flag("--no-log", request->no_log, "Write no files");
-  command->add_flag("--quiet", request->quiet, "Print the verdict only");
-  scenario->excludes(list)->excludes(replay);
-  list->excludes(replay);
-  command->callback([=] {
+      .TypeName("KEY=VALUE")
+      .Repeatable();
+  command.AddOption("--seed", &request->seed, "Vary posture and grasp at random; 0 does not")
+      .TypeName("N")
+      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
+  command.AddFlag("--no-check", &request->no_check, "Simulate without cross-checks");
+  command.AddFlag("--video", &request->video, "Draw the run as a video, video.mp4");
+  command.AddFlag("--no-report", &request->no_report, "Write the log and the summary only");
+  command.AddFlag("--no-log", &request->no_log, "Write no files");
+  command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
+  scenario.Excludes(list).Excludes(replay);
+  list.Excludes(replay);
+  command.SetAction([=] {
     if (request->scenario.empty() && !request->list && request->replay.empty()) {
-      throw CLI::RequiredError("SCENARIO (or --list, or --replay)");
+      throw UsageError("SCENARIO (or --list, or --replay) is required");
     }
-    *exit_code = Run(*request);
+    return Run(*request);
   });
 }
 

@@ -143,55 +143,55 @@ int MergeStudies(const std::string& out, const std::vector<std::string>& databas
 
 }  // namespace
 
-void AddStudyCommand(CLI::App* app, int* exit_code) {
-  CLI::App* study = app->add_subcommand("study", "Vary a scenario's gains, models or plant over many runs");
-  study->require_subcommand(1);
+void AddStudyCommand(Command app) {
+  Command study = app.AddCommand("study", "Vary a scenario's gains, models or plant over many runs");
+  study.RequireCommand();
   const auto request = std::make_shared<Request>();
   const auto databases = std::make_shared<std::vector<std::string>>();
   const auto whole = WholeNumber(1, 1000000);
-  const auto add_quiet = [&](CLI::App* command) {
-    command->add_flag("--quiet", request->quiet, "Print nothing but errors");
+  const auto add_quiet = [&](Command command) {
+    command.AddFlag("--quiet", &request->quiet, "Print nothing but errors");
   };
 
-  CLI::App* run = study->add_subcommand("run", "Make the trials that are missing in the database");
-  run->add_option("STUDY", request->study, "Name of a shipped study, or a TOML file")->required();
-  run->add_option("--db", request->database, "The study's database (SQLite), made when there is none")
-      ->type_name("FILE.sqlite")
-      ->required();
-  run->add_option("--jobs", request->jobs, "Trials at a time (all processors by default)")
-      ->type_name("N")
-      ->check(whole);
-  run->add_option("--shard", request->shard, "Only the I-th of N parts of the study")->type_name("I/N");
+  Command run = study.AddCommand("run", "Make the trials that are missing in the database");
+  run.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();
+  run.AddOption("--db", &request->database, "The study's database (SQLite), made when there is none")
+      .TypeName("FILE.sqlite")
+      .Required();
+  run.AddOption("--jobs", &request->jobs, "Trials at a time (all processors by default)")
+      .TypeName("N")
+      .Check(whole);
+  run.AddOption("--shard", &request->shard, "Only the I-th of N parts of the study").TypeName("I/N");
   add_quiet(run);
-  run->callback([=] { *exit_code = RunStudy(*request); });
+  run.SetAction([=] { return RunStudy(*request); });
 
-  CLI::App* merge = study->add_subcommand("merge", "Put the databases of one study together");
-  merge->add_option("OUT", request->database, "Database that gets all trials")->required();
-  merge->add_option("DB", *databases, "Databases of the same study")->required();
+  Command merge = study.AddCommand("merge", "Put the databases of one study together");
+  merge.AddOption("OUT", &request->database, "Database that gets all trials").Required();
+  merge.AddOption("DB", databases.get(), "Databases of the same study").Required();
   add_quiet(merge);
-  merge->callback([=] { *exit_code = MergeStudies(request->database, *databases, request->quiet); });
+  merge.SetAction([=] { return MergeStudies(request->database, *databases, request->quiet); });
 
-  CLI::App* report = study->add_subcommand("report", "Write an HTML page of a study's results");
-  report->add_option("DB", request->database, "The study's database")->required();
+  Command report = study.AddCommand("report", "Write an HTML page of a study's results");
+  report.AddOption("DB", &request->database, "The study's database").Required();
   const auto page = std::make_shared<std::string>();
-  report->add_option("--out", *page, "The page (DB.html by default); - for standard output")
-      ->type_name("FILE.html");
-  report->callback([=] {
+  report.AddOption("--out", page.get(), "The page (DB.html by default); - for standard output")
+      .TypeName("FILE.html");
+  report.SetAction([=] {
     const StudyStore store = StudyStore::Open(request->database);
     OutputFile out(page->empty() ? request->database + ".html" : *page);
     out.Write(MakeStudyReport(store));
-    *exit_code = kSuccess;
+    return kSuccess;
   });
 
-  CLI::App* slurm = study->add_subcommand("slurm", "Print an array job for Slurm that makes the study");
-  slurm->add_option("STUDY", request->study, "Name of a shipped study, or a TOML file")->required();
-  slurm->add_option("--tasks", request->jobs, "Parts of the study, each a task")
-      ->type_name("N")
-      ->required()
-      ->check(whole);
-  slurm->callback([=] {
+  Command slurm = study.AddCommand("slurm", "Print an array job for Slurm that makes the study");
+  slurm.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();
+  slurm.AddOption("--tasks", &request->jobs, "Parts of the study, each a task")
+      .TypeName("N")
+      .Required()
+      .Check(whole);
+  slurm.SetAction([=] {
     fmt::print("{}", MakeSlurmScript(FindStudy(request->study), request->study, request->jobs));
-    *exit_code = kSuccess;
+    return kSuccess;
   });
 }
 

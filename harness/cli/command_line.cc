@@ -1,0 +1,165 @@
+#include "harness/cli/command_line.h"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <system_error>
+
+#include "controller/common/text.h"
+
+namespace dexcheck::cli {
+
+ValueCheck WholeNumber(std::uint64_t least, std::uint64_t most) {
+  return [least, most](const std::string& text) -> std::string {
+    std::uint64_t value = 0;
+    const char* const end = text.data() + text.size();
+    const std::from_chars_result result = std::from_chars(text.data(), end, value);
+    if (result.ec == std::errc() && result.ptr == end && least <= value && value <= most) return {};
+    return "must be a whole number from " + std::to_string(least) + " to " + std::to_string(most) + ", got " +
+           Quote(text);
+  };
+}
+
+Option& Option::TypeName(const std::string& name) {
+  option_->type_name(name);
+  return *this;
+}
+
+Option& Option::Required() {
+  option_->required();
+  return *this;
+}
+
+Option& Option::Excludes(const Option& other) {
+  option_->excludes(other.option_);
+  return *this;
+}
+
+Option& Option::Needs(const Option& other) {
+  option_->needs(other.option_);
+  return *this;
+}
+
+Option& Option::Check(const ValueCheck& check) {
+  option_->check(CLI::Validator([check](std::string& text) { return check(text); }, ""));
+  return *this;
+}
+
+Option& Option::OneOf(std::initializer_list<const char*> values) {
+  option_->check(CLI::IsMember(std::vector<std::string>(values.begin(), values.end())));
+  return *this;
+}
+
+Option& Option::Takes(int count) {
+  option_->expected(count);
+  return *this;
+}
+
+Option& Option::Repeatable() {
+  option_->allow_extra_args(false);
+  return *this;
+}
+
+Option& Option::Delimiter(char delimiter) {
+  option_->delimiter(delimiter);
+  return *this;
+}
+
+Option& Option::ShowDefault() {
+  option_->capture_default_str();
+  return *this;
+}
+
+bool Option::is_given() const { return option_->count() > 0; }
+
+template <typename Value>
+Option Command::Add(const std::string& name, Value* value, const std::string& help) {
+  return Option(app_->add_option(name, *value, help));
+}
+
+Option Command::AddOption(const std::string& name, std::string* value, const std::string& help) {
+  return Add(name, value, help);
+}
+Option Command::AddOption(const std::string& name, std::filesystem::path* value, const std::string& help) {
+  return Add(name, value, help);
+}
+Option Command::AddOption(const std::string& name, double* value, const std::string& help) {
+  return Add(name, value, help);
+}
+Option Command::AddOption(const std::string& name, int* value, const std::string& help) {
+  return Add(name, value, help);
+}
+Option Command::AddOption(const std::string& name, long* value, const std::string& help) {
+  return Add(name, value, help);
+}
+Option Command::AddOption(const std::string& name, std::uint64_t* value, const std::string& help) {
+  return Add(name, value, help);
+}
+Option Command::AddOption(const std::string& name, std::optional<double>* value, const std::string& help) {
+  return Add(name, value, help);
+}
+Option Command::AddOption(const std::string& name, std::vector<double>* values, const std::string& help) {
+  return Add(name, values, help);
+}
+Option Command::AddOption(const std::string& name, std::vector<std::string>* values,
+                          const std::string& help) {
+  return Add(name, values, help);
+}
+
+Option Command::AddFlag(const std::string& name, bool* value, const std::string& help) {
+  return Option(app_->add_flag(name, *value, help));
+}
+
+Option Command::AddFlag(const std::string& name, const std::string& help) {
+  return Option(app_->add_flag(name, help));
+}
+
+Command Command::AddCommand(const std::string& name, const std::string& help) {
+  return {app_->add_subcommand(name, help), exit_code_};
+}
+
+void Command::RequireCommand() { app_->require_subcommand(1); }
+
+void Command::SetAction(const std::function<int()>& action) {
+  app_->callback([action, exit_code = exit_code_] { *exit_code = action(); });
+}
+
+CommandLine::CommandLine(const std::string& program, const std::string& help, const std::string& version)
+    : app_(std::make_unique<CLI::App>(help, program)) {
+  app_->set_version_flag("--version", version);
+}
+
+CommandLine::~CommandLine() = default;
+
+int CommandLine::Run(int argc, char** argv) {
+  try {
+    app_->parse(argc, argv);
+    return exit_code_;
+  } catch (const CLI::Success& success) {
+    return app_->exit(success);
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(Explain(error.what()));
+  }
+}
+
+std::string CommandLine::Explain(const std::string& what) const {
+  const std::vector<std::string> unknown = app_->remaining(/*recurse=*/true);
+  if (unknown.empty()) return what;
+  const std::string& word = unknown.front();
+  const std::vector<CLI::App*> chosen = app_->get_subcommands();
+  const CLI::App& place = chosen.empty() ? *app_ : *chosen.front();
+  const bool is_option = word.starts_with("-");
+  std::vector<std::string> known;
+  if (is_option) {
+    for (const CLI::Option* option : place.get_options()) known.push_back(option->get_name());
+  } else {
+    for (const CLI::App* command : place.get_subcommands([](const CLI::App*) { return true; })) {
+      known.push_back(command->get_name());
+    }
+  }
+  const std::string nearest = FindNearest(word, known);
+  const std::string kind = is_option ? "option" : known.empty() ? "argument" : "command";
+  return "unknown " + kind + " " + Quote(word) +
+         (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?");
+}
+
+}  // namespace dexcheck::cli

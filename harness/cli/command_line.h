@@ -1,0 +1,115 @@
+#pragma once
+
+// The command line's words: commands, options, flags. CLI11 reads them; it consists of headers that cost each source
+// which includes them ten seconds, so that only command_line.cc does.
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <initializer_list>
+#include <memory>
+#include <stdexcept>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+namespace dexcheck::cli {
+
+/// 0 all good, 1 the check found a disagreement, 2 usage or input error, 3 the run could not be completed.
+enum ExitCode { kSuccess = 0, kDisagreement = 1, kInputError = 2, kFailure = 3 };
+
+/// The words cannot be understood; what() says why.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// What is wrong with a value as typed; empty when nothing is.
+using ValueCheck = std::function<std::string(const std::string& value)>;
+
+/// Accepts decimal whole numbers from `least` to `most`.
+ValueCheck WholeNumber(std::uint64_t least, std::uint64_t most);
+
+/// An option, a flag or a positional argument.
+class Option {
+ public:
+  /// How the help names its value: "FILE.toml".
+  Option& TypeName(const std::string& name);
+  Option& Required();
+  Option& Excludes(const Option& other);
+  Option& Needs(const Option& other);
+  Option& Check(const ValueCheck& check);
+  Option& OneOf(std::initializer_list<const char*> values);
+  /// Takes this many values.
+  Option& Takes(int count);
+  /// Takes one value each time that it is given, and may be given again.
+  Option& Repeatable();
+  /// Values may be separated by this character.
+  Option& Delimiter(char delimiter);
+  /// The help tells the value that the variable has now.
+  Option& ShowDefault();
+  /// Whether the user gave it.
+  [[nodiscard]] bool is_given() const;
+
+ private:
+  friend class Command;
+  explicit Option(CLI::Option* option) : option_(option) {}
+  CLI::Option* option_;
+};
+
+/// A command with its options, or the program with its commands. A handle: copies are the same command.
+class Command {
+ public:
+  /// @param name of an option with its dashes, of a positional argument without. @param value lives as long as the
+  /// command; what it holds is the default.
+  Option AddOption(const std::string& name, std::string* value, const std::string& help);
+  Option AddOption(const std::string& name, std::filesystem::path* value, const std::string& help);
+  Option AddOption(const std::string& name, double* value, const std::string& help);
+  Option AddOption(const std::string& name, int* value, const std::string& help);
+  Option AddOption(const std::string& name, long* value, const std::string& help);
+  Option AddOption(const std::string& name, std::uint64_t* value, const std::string& help);
+  Option AddOption(const std::string& name, std::optional<double>* value, const std::string& help);
+  Option AddOption(const std::string& name, std::vector<double>* values, const std::string& help);
+  Option AddOption(const std::string& name, std::vector<std::string>* values, const std::string& help);
+  Option AddFlag(const std::string& name, bool* value, const std::string& help);
+  /// A word that says what the command does already.
+  Option AddFlag(const std::string& name, const std::string& help);
+
+  Command AddCommand(const std::string& name, const std::string& help);
+  /// One of its commands must be given.
+  void RequireCommand();
+  /// What runs when the command is given; its exit code is the program's. @throws UsageError.
+  void SetAction(const std::function<int()>& action);
+
+ private:
+  friend class CommandLine;
+  Command(CLI::App* app, int* exit_code) : app_(app), exit_code_(exit_code) {}
+  template <typename Value>
+  Option Add(const std::string& name, Value* value, const std::string& help);
+  CLI::App* app_;
+  int* exit_code_;
+};
+
+/// The program's whole command line.
+class CommandLine {
+ public:
+  CommandLine(const std::string& program, const std::string& help, const std::string& version);
+  ~CommandLine();
+
+  [[nodiscard]] Command root() { return {app_.get(), &exit_code_}; }
+  /// Reads the words and runs the command's action. @returns the program's exit code; --help and --version print and
+  /// are a success. @throws UsageError, which for an unknown word names the nearest known one; what the action throws.
+  int Run(int argc, char** argv);
+
+ private:
+  [[nodiscard]] std::string Explain(const std::string& what) const;
+  std::unique_ptr<CLI::App> app_;
+  int exit_code_ = kSuccess;
+};
+
+}  // namespace dexcheck::cli
