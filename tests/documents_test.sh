@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# Checks the documents: documents_test.sh DEXCHECK. Relative links of all Markdown files lead to files and headings that
+# exist, README.md is short, and the commands that it lists are those that the program has.
+set -euo pipefail
+
+dexcheck=$1
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+longest_readme=180  # lines
+status=0
+fail() {
+  echo "$*"
+  status=1
+}
+
+# The anchors that a document's headings get: lower case, without punctuation, hyphens for spaces.
+list_anchors() {
+  awk '/^```/ { code = !code } !code && /^#+ / { sub(/^#+ +/, ""); print }' "$1" |
+    tr '[:upper:]' '[:lower:]' | sed -E 's/[^a-z0-9 _-]//g; s/ /-/g'
+}
+
+# Targets of links and pictures outside code.
+list_links() {
+  awk '/^```/ { code = !code } !code' "$1" | sed 's/`[^`]*`//g' | grep -oE '\]\([^)]+\)' | sed -E 's/^\]\(|\)$//g' || true
+}
+
+# Prints each broken link of a document.
+list_broken_links() {
+  local document=$1 link file anchor
+  while IFS= read -r link; do
+    [[ $link != *://* && $link != mailto:* && -n $link ]] || continue
+    file=$(dirname "$document")/${link%%#*}
+    [[ $link != '#'* ]] || file=$document
+    anchor=
+    [[ $link != *'#'* ]] || anchor=${link#*#}
+    if [[ ! -e $file ]]; then
+      echo "$document: $link: no such file"
+    elif [[ -n $anchor ]] && ! list_anchors "$file" | grep -qxF -- "$anchor"; then
+      echo "$document: $link: no such heading"
+    fi
+  done < <(list_links "$document")
+}
+
+# What must be found: the test can fail.
+scratch=$(mktemp -d)
+trap 'rm -r "$scratch"' EXIT
+printf '# Here\n[a](b.md) [c](#there) [d](#here) [e](https://nowhere.example)\n' >"$scratch/bad.md"
+[[ $(list_broken_links "$scratch/bad.md" | wc -l) -eq 2 ]] || fail "broken links are not found"
+
+mapfile -t documents < <(find "$root" -name '*.md' -not -path "$root/build/*" -not -path "$root/runs/*" \
+  -not -path "$root/out/*" -not -path "$root/.cache/*" | sort)
+[[ ${#documents[@]} -gt 10 ]] || fail "only ${#documents[@]} documents are found in $root"
+links=0
+for document in "${documents[@]}"; do
+  broken=$(list_broken_links "$document")
+  [[ -z $broken ]] || fail "$broken"
+  links=$((links + $(list_links "$document" | wc -l)))
+done
+[[ $links -gt 50 ]] || fail "only $links links are found"
+
+lines=$(wc -l <"$root/README.md")
+((lines <= longest_readme)) || fail "README.md has $lines lines, more than $longest_readme"
+
+# Rows of the table of commands against the subcommands that --help lists.
+sed -nE 's/^\| `dexcheck ([a-z-]+)` .*/\1/p' "$root/README.md" | sort >"$scratch/listed"
+"$dexcheck" --help | sed -nE '/^Subcommands:/,$ s/^  ([a-z-]+) .*/\1/p' | sort >"$scratch/known"
+[[ $(wc -l <"$scratch/known") -ge 5 ]] || fail "dexcheck --help lists no commands"
+diff "$scratch/listed" "$scratch/known" >"$scratch/difference" ||
+  fail "README.md (<) and dexcheck --help (>) have other commands:"$'\n'"$(cat "$scratch/difference")"
+
+[[ $status -ne 0 ]] || echo "${#documents[@]} documents, $links links, $lines lines of README.md"
+exit $status
