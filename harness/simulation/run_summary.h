@@ -48,7 +48,7 @@ struct RunResult {
 /// The verdict and its attribution. Call when the last step is done.
 void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result);
 
-/// Keys as harness/record/README.md lists them for summary.json; lengths m, angles rad.
+/// Keys as README.md lists them for summary.json; lengths m, angles rad.
 nlohmann::ordered_json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& result);
 
 }  // namespace dexcheck
