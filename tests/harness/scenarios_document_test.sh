@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Holds harness/scenarios/README.md against the reader of scenarios: scenarios_document_test.sh DEXCHECK.
 # The program must accept each key of the document's tables with its example, and the document must have each key and
-# choice that the reader's sources name.
+# choice that the reader's sources name; so must that of studies.
 set -euo pipefail
 
 dexcheck=$1
@@ -75,14 +75,22 @@ for batch in "${!batches[@]}"; do
   accepts "$base" "${arguments[@]}" || fail "[$section] is refused with the examples of $document"
 done
 
-# Keys and choices are texts of letters and _ in the reader's sources.
+# Keys and choices are texts of letters and _ in the reader's sources: explain_all DOCUMENT LEAST SOURCE...
+explain_all() {
+  local explained=$1 least=$2 words word
+  shift 2
+  mapfile -t words < <(sed -E 's://.*::' "$@" | grep -oE '"[A-Za-z][A-Za-z_]*"' | tr -d '"' | sort -u)
+  [[ ${#words[@]} -ge $least ]] || fail "only ${#words[@]} keys are found in $*"
+  for word in "${words[@]}"; do
+    grep -qE "[\`\"[]$word[\`\"]|\`\[$word\]|\`\[\[$word\]\]|[|] $word [|]|[{ ,]$word = " "$explained" ||
+      fail "$explained does not explain $word"
+  done
+  total=$((total + ${#words[@]}))
+}
+total=0
 mapfile -t readers < <(find "$root/harness" -name 'scenario*.cc' -o -name 'scenario*.h' | sort)
-mapfile -t words < <(sed -E 's://.*::' "${readers[@]}" "$root/controller/control/trajectory_reader.cc" |
-  grep -oE '"[A-Za-z][A-Za-z_]*"' | tr -d '"' | sort -u)
-[[ ${#words[@]} -ge 80 ]] || fail "only ${#words[@]} keys are found in ${readers[*]}"
-for word in "${words[@]}"; do
-  grep -qE "[\`\"[]$word[\`\"]|\`\[$word\]|[|] $word [|]|[{ ,]$word = " "$document" || fail "$document does not explain $word"
-done
+explain_all "$document" 80 "${readers[@]}" "$root/controller/control/trajectory_reader.cc"
+explain_all "$root/harness/studies/README.md" 35 "$root/harness/study/study.cc" "$root/harness/study/trial_result.h"
 
-[[ $status -ne 0 ]] || echo "$count keys of the document are accepted, ${#words[@]} of the reader are explained"
+[[ $status -ne 0 ]] || echo "$count keys of the document are accepted, $total of the readers are explained"
 exit $status
