@@ -2,30 +2,13 @@
 
 #include <cmath>
 
+#include "controller/model/body_frame.h"
+
 namespace dexcheck {
 namespace {
 
 // Axes are unit vectors to about the digits that people write: 0.7071.
 constexpr double kUnitVectorAllowance = 1e-4;
-
-/// A rotation that turns z into the given direction; which one does not matter to a body of revolution.
-Matrix3d MakeRotationFromZ(const Vector3d& z) {
-  int least = 0;
-  z.cwiseAbs().minCoeff(&least);
-  const Vector3d x = Vector3d::Unit(least).cross(z).normalized();
-  Matrix3d R;
-  R << x, z.cross(x), z;
-  return R;
-}
-
-Vector3d ReadAxis(const TomlValue& value) {
-  if (value.IsText()) {
-    return Vector3d::Unit(value.AsChoice<Eigen::Index>({{"x", 0}, {"y", 1}, {"z", 2}}));
-  }
-  const Vector3d axis = value.AsVector<3>();
-  if (!(std::abs(axis.stableNorm() - 1.0) <= kUnitVectorAllowance)) value.Fail("must be a unit vector");
-  return axis.normalized();
-}
 
 Matrix3d ReadRotation(TomlTable& table) {
   const Vector3d rpy = table.FindAngles<3>("rpy").value_or(Vector3d::Zero());
@@ -60,6 +43,19 @@ MassProperties ReadSolid(const TomlValue& value) {
   return solid;
 }
 
+/// An entry of `bodies`: its frame stands at `xyz`, `rpy` in the link's frame.
+MassProperties ReadPart(const TomlValue& value) {
+  TomlTable table = value.AsTable();
+  const Pose X_LB = ReadPose(table);
+  const std::optional<TomlValue> com = table.Find("com");
+  const TomlValue inertia = table.Get("inertia");
+  const MassProperties body{table.Get("mass").AsNotNegative(),
+                            com ? com->AsVector<3>() : Vector3d(Vector3d::Zero()), ReadInertia(inertia)};
+  CheckBody(inertia, body);
+  table.RejectUnused();
+  return ExpressIn(body, X_LB);
+}
+
 SolidTorus ReadTorus(TomlTable& table) {
   const SolidTorus torus{table.Get("ring_radius").AsPositive(), table.Get("tube_radius").AsPositive()};
   if (torus.tube_radius >= torus.ring_radius) {
@@ -76,6 +72,15 @@ SolidBox ReadBox(TomlTable& table) {
 }
 
 }  // namespace
+
+Vector3d ReadAxis(const TomlValue& value) {
+  if (value.IsText()) {
+    return Vector3d::Unit(value.AsChoice<Eigen::Index>({{"x", 0}, {"y", 1}, {"z", 2}}));
+  }
+  const Vector3d axis = value.AsVector<3>();
+  if (!(std::abs(axis.stableNorm() - 1.0) <= kUnitVectorAllowance)) value.Fail("must be a unit vector");
+  return axis.normalized();
+}
 
 Pose ReadPose(TomlTable& table) {
   Pose X = Pose::Identity();
@@ -124,7 +129,13 @@ Matrix3d ReadInertia(const TomlValue& value) {
 }
 
 MassProperties ReadBody(TomlTable& table) {
-  table.RejectTogether("shapes", {"mass", "com", "inertia"});
+  table.RejectTogether("shapes", {"mass", "com", "inertia", "bodies"});
+  table.RejectTogether("bodies", {"mass", "com", "inertia"});
+  if (const std::optional<TomlValue> bodies = table.Find("bodies")) {
+    std::vector<MassProperties> parts;
+    for (const TomlValue& body : bodies->AsList()) parts.push_back(ReadPart(body));
+    return Combine(parts);
+  }
   if (const std::optional<TomlValue> shapes = table.Find("shapes")) {
     std::vector<MassProperties> parts;
     for (const TomlValue& shape : shapes->AsList()) parts.push_back(ReadSolid(shape));

@@ -20,7 +20,11 @@ Shape ReadShape(TomlTable& table);
 /// Inertia about the centre of mass from a list [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] of tensor entries, kg m^2.
 Matrix3d ReadInertia(const TomlValue& value);
 
-/// Mass properties from the key `shapes`, or from `mass`, `com` and `inertia`; physically consistent.
+/// Unit vector from "x", "y", "z" or a list of three numbers.
+Vector3d ReadAxis(const TomlValue& value);
+
+/// Mass properties from the key `shapes`, or from `bodies` with a frame each, or from `mass`, `com` and
+/// `inertia`; physically consistent.
 MassProperties ReadBody(TomlTable& table);
 
 /// Throws at `value` when the body cannot be real.

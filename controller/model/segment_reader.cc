@@ -1,23 +1,72 @@
 #include "controller/model/segment_reader.h"
 
+#include "controller/model/body_frame.h"
 #include "controller/model/body_reader.h"
 
 namespace dexcheck {
 namespace {
 
-SegmentRow ReadRow(const TomlValue& value) {
+enum class Convention { kModified, kClassic };
+
+/// Rot(z, q) Trans(z, d) Trans(x, a) Rot(x, alpha): frame i turns with the joint about its z axis, and the
+/// link's own frame, whose z axis is the next joint's, stands at a and alpha in it.
+void MakeClassic(SegmentRow& row) {
+  row.X_iL = Eigen::Translation3d(row.mdh.a, 0.0, 0.0) * Eigen::AngleAxisd(row.mdh.alpha, Vector3d::UnitX());
+  row.mdh.a = 0.0;
+  row.mdh.alpha = 0.0;
+}
+
+/// X(xyz, rpy) and the joint's axis in the frame there, which is the link's own.
+void ReadPlainTransform(TomlTable& table, SegmentRow& row) {
+  const Pose X_PL = ReadPose(table);
+  const std::optional<TomlValue> axis = table.Find("axis");
+  const Vector3d z = axis ? ReadAxis(*axis) : Vector3d::UnitZ();
+  row.X_before = X_PL;
+  if (z == Vector3d::UnitZ()) return;
+  const Matrix3d R = MakeRotationFromZ(z);
+  row.X_before.linear() = X_PL.linear() * R;
+  row.X_iL.linear() = R.transpose();
+}
+
+SegmentRow ReadRow(const TomlValue& value, Convention convention) {
   TomlTable table = value.AsTable();
-  SegmentRow row{value, table.Get("joint").AsName(), table.Get("link").AsName(), JointType::kRevolute, {}};
+  SegmentRow row{
+      value,           table.Get("joint").AsName(), table.Get("link").AsName(), JointType::kRevolute, {},
+      Pose::Identity()};
   if (const std::optional<TomlValue> type = table.Find("type")) {
     row.type =
         type->AsChoice<JointType>({{"revolute", JointType::kRevolute}, {"prismatic", JointType::kPrismatic}});
+  }
+  bool is_plain = false;
+  for (const char* key : {"xyz", "rpy", "rpy_deg", "axis"}) {
+    table.RejectTogether(key, {"alpha", "alpha_deg", "a", "q", "q_deg", "d"});
+    is_plain = is_plain || table.Find(key);
+  }
+  if (is_plain) {
+    ReadPlainTransform(table, row);
+    table.RejectUnused();
+    return row;
   }
   row.mdh.alpha = table.GetAngle("alpha");
   row.mdh.a = table.Get("a").AsNumber();
   row.mdh.q = table.GetAngle("q");
   row.mdh.d = table.Get("d").AsNumber();
   table.RejectUnused();
+  if (convention == Convention::kClassic) MakeClassic(row);
   return row;
+}
+
+std::vector<SegmentRow> ReadRows(TomlTable& table) {
+  Convention convention = Convention::kModified;
+  if (const std::optional<TomlValue> value = table.Find("convention")) {
+    convention =
+        value->AsChoice<Convention>({{"modified", Convention::kModified}, {"classic", Convention::kClassic}});
+  }
+  std::vector<SegmentRow> rows;
+  const std::optional<TomlValue> list = table.Find("rows");
+  if (!list) return rows;
+  for (const TomlValue& value : list->AsList()) rows.push_back(ReadRow(value, convention));
+  return rows;
 }
 
 JointEntry ReadJointEntry(const TomlValue& value) {
@@ -77,7 +126,7 @@ FrameEntry ReadFrameEntry(const TomlValue& value) {
 }
 
 Segment ReadSegment(TomlTable& table) {
-  return {ReadList(table.Find("rows"), ReadRow), ReadEntries(table.Find("joints"), ReadJointEntry),
+  return {ReadRows(table), ReadEntries(table.Find("joints"), ReadJointEntry),
           ReadEntries(table.Find("links"), ReadLinkEntry), ReadList(table.Find("frames"), ReadFrameEntry)};
 }
 

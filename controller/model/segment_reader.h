@@ -12,13 +12,16 @@
 
 namespace dexcheck {
 
-/// A row of an MDH table, with the names of the joint and of the link that it moves.
+/// A row of a table of joints, with the names of the joint and of the link that it moves. It is a row of MDH
+/// parameters, of classic Denavit-Hartenberg parameters, or a plain transform with an axis.
 struct SegmentRow {
   TomlValue value;
   std::string joint;
   std::string link;
   JointType type;
-  MdhRow mdh;
+  MdhRow mdh;     ///< Of frame i; zeros for a plain transform.
+  Pose X_before;  ///< Comes before the MDH row: a plain transform and the turn of z to its axis.
+  Pose X_iL = Pose::Identity();  ///< The link's own frame in frame i.
 };
 
 /// An entry of `joints`.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/common/text.h"
+#include "controller/model/body_frame.h"
 #include "controller/model/body_reader.h"
 #include "controller/model/segment_reader.h"
 
@@ -24,7 +25,7 @@ struct Chain {
   TomlValue value;
   TomlValue parent;
   std::string prefix;
-  Pose X_PB;  ///< Where the first row starts, in the parent link's frame.
+  Pose X_PB;  ///< Where the first row starts, in the parent link's own frame.
   Segment own;
   Template* common = nullptr;
 
@@ -179,11 +180,11 @@ class TreeReader {
   void BuildChain(size_t index) {
     Chain& chain = chains_[index];
     int parent = FindParent(index);
-    Pose X_PB = chain.X_PB;
+    Pose X_LB = chain.X_PB;  // in the parent link's own frame
     for (const Segment* segment : chain.segments()) {
       for (const SegmentRow& row : segment->rows) {
-        parent = BuildJoint(chain, row, parent, X_PB);
-        X_PB = Pose::Identity();
+        parent = BuildJoint(chain, row, parent, X_LB);
+        X_LB = Pose::Identity();
       }
     }
     for (const Segment* segment : chain.segments()) {
@@ -191,16 +192,30 @@ class TreeReader {
     }
   }
 
+  /// A pose in a link's own frame as a pose in the frame of the joint that moves it; nothing is rounded where
+  /// they coincide.
+  [[nodiscard]] Pose FromOwnFrame(int joint, const Pose& X) const {
+    if (joint < 0) return X;
+    const Pose& X_iL = own_frames_[static_cast<size_t>(joint)];
+    return X_iL.isApprox(Pose::Identity(), 0.0) ? X : X_iL * X;
+  }
+
+  /// @param X_LB where the row starts, in the parent link's own frame.
   /// @return the joint's index.
-  int BuildJoint(Chain& chain, const SegmentRow& row, int parent, const Pose& X_PB) {
+  int BuildJoint(Chain& chain, const SegmentRow& row, int parent, const Pose& X_LB) {
     const JointEntry& entry = FindEntry(chain, &Segment::joints, "joints", row.joint, row.value);
     const LinkEntry& link = FindEntry(chain, &Segment::links, "links", row.link, row.value);
     if (row.type == JointType::kPrismatic && entry.range_is_angle) {
       entry.range.Fail("must be in m for a prismatic joint, not in degrees");
     }
     const int index = static_cast<int>(spec_.joints.size());
-    spec_.joints.push_back({chain.prefix + row.joint, chain.prefix + row.link, parent, row.type, X_PB,
-                            row.mdh, entry.lower, entry.upper, entry.damping, entry.armature, link.body});
+    const bool is_plain = !row.X_before.isApprox(Pose::Identity(), 0.0);
+    const bool has_own_frame = !row.X_iL.isApprox(Pose::Identity(), 0.0);
+    spec_.joints.push_back({chain.prefix + row.joint, chain.prefix + row.link, parent, row.type,
+                            FromOwnFrame(parent, is_plain ? X_LB * row.X_before : X_LB), row.mdh, entry.lower,
+                            entry.upper, entry.damping, entry.armature,
+                            has_own_frame ? ExpressIn(link.body, row.X_iL) : link.body});
+    own_frames_.push_back(row.X_iL);
     joint_of_link_[chain.prefix + row.link] = index;
     return index;
   }
@@ -237,7 +252,7 @@ class TreeReader {
       if (found == joint_of_link_.end()) frame.link.Fail("must be a link" + SuggestLink(own_link, prefix));
       joint = found->second;
     }
-    spec_.frames.push_back({name, joint, frame.X_LF, frame.sphere_radius});
+    spec_.frames.push_back({name, joint, FromOwnFrame(joint, frame.X_LF), frame.sphere_radius});
   }
 
   void RejectUnused() const {
@@ -258,6 +273,7 @@ class TreeReader {
   }
 
   RobotSpec& spec_;
+  std::vector<Pose> own_frames_;  // X_iL: each link's own frame, in which the file gives masses, in frame i
   std::map<std::string, Template> templates_;
   std::vector<Chain> chains_;
   NameRegistry joint_names_{"joint"};

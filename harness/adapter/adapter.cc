@@ -51,6 +51,16 @@ double CalcRollingRadius(const mjModel& engine, int body) {
   return touching > 0.0 ? touching : any;
 }
 
+/// The body of a joint's link: by name, or by the joint when the MJCF gives the body none.
+template <typename Need>
+int FindLinkBody(const mjModel& engine, const Joint& joint, int joint_id, const Need& need) {
+  if (joint_id >= 0) {
+    const int body = engine.jnt_bodyid[joint_id];
+    if (engine.names[engine.name_bodyadr[body]] == '\0') return body;
+  }
+  return need(mjOBJ_BODY, "body", joint.link);
+}
+
 /// The wheels' and base's joints of an MJCF are known by name or place; everything else must be in the
 /// parameters.
 std::set<int> ListBaseJoints(const RobotModel& model, const mjModel& engine) {
@@ -97,7 +107,7 @@ void Adapter::MatchJoints(const std::string& engine_source) {
   }
   for (const Joint& joint : model_->joints()) {
     joint_ids_.push_back(need(mjOBJ_JOINT, "joint", joint.name));
-    link_bodies_.push_back(need(mjOBJ_BODY, "body", joint.link));
+    link_bodies_.push_back(FindLinkBody(engine, joint, joint_ids_.back(), need));
     known.insert(joint_ids_.back());
   }
   for (const Frame& frame : model_->frames()) frame_sites_.push_back(need(mjOBJ_SITE, "site", frame.name));

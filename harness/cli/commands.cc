@@ -4,14 +4,16 @@
 
 namespace dexcheck::cli {
 
-void AddRobotOptions(Command command, RobotFiles* files) {
+Option AddRobotOptions(Command command, RobotFiles* files) {
   files->robot = FindShippedFile("controller/parameters/assistant_robot.toml");
   files->mjcf = FindShippedFile("mjcf/scene.xml");
-  Option robot =
-      command.AddOption("--robot", &files->robot, "Parameter file (TOML) of the analytic model").TypeName("FILE.toml");
-  Option mjcf = command.AddOption("--mjcf", &files->mjcf, "The same robot for the engine").TypeName("FILE.xml");
+  Option robot = command.AddOption("--robot", &files->robot, "Parameter file (TOML) of the analytic model")
+                     .TypeName("FILE.toml");
+  Option mjcf =
+      command.AddOption("--mjcf", &files->mjcf, "The same robot for the engine").TypeName("FILE.xml");
   robot.Needs(mjcf);
   mjcf.Needs(robot);
+  return robot;
 }
 
 }  // namespace dexcheck::cli

@@ -15,14 +15,15 @@ struct RobotFiles {
   std::filesystem::path mjcf;
 };
 
-/// Adds --robot and --mjcf, both or neither.
-void AddRobotOptions(Command command, RobotFiles* files);
+/// Adds --robot and --mjcf, both or neither. @return the first of them.
+Option AddRobotOptions(Command command, RobotFiles* files);
 
 /// Each adds its command to `app`.
 void AddConsistencyCommand(Command app);
 void AddDiagnoseCommand(Command app);
 void AddMutateCommand(Command app);
 void AddEvalCommand(Command app);
+void AddImportCommand(Command app);
 void AddPlanCommand(Command app);
 /// @param command_line as typed, to be kept in the log.
 void AddRunCommand(Command app, const std::string& command_line);

@@ -1,18 +1,30 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/engine/engine.h"
+#include "harness/sides/complete_description.h"
+#include "harness/sides/description_check.h"
+#include "harness/sides/description_match.h"
+#include "harness/sides/model_comparison.h"
+#include "harness/sides/read_description.h"
+#include "harness/sides/robot_file.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -20,7 +32,10 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct Request {
+  std::string a, b;  ///< Two descriptions; none with --robot and --mjcf.
   RobotFiles files;
+  std::vector<std::string> packages;
+  bool with_engine = true;  ///< files.mjcf is an MJCF; otherwise any other description.
   ConsistencyOptions options;
   std::string json_file;
   bool quiet = false;
@@ -31,13 +46,28 @@ struct Request {
 
 std::string FileName(const std::filesystem::path& path) { return path.filename().string(); }
 
+/// What was compared: the model that locations belong to, and the results.
+struct Comparison {
+  std::optional<RobotModel> model;
+  std::vector<std::string> notes;
+  ConsistencyResult result;
+};
+
 /// Large results first fail, then where to look: what a person reads.
-void PrintTable(const Request& request, const RobotModel& model, const ConsistencyResult& result) {
+void PrintTable(const Request& request, const Comparison& comparison) {
+  const RobotModel& model = *comparison.model;
+  const ConsistencyResult& result = comparison.result;
   const int base = model.num_base_velocities();
-  fmt::print("{}: {} against {}, MuJoCo {}\n{} random states (seed {}), {:.1f} s\n\n", model.name(),
-             FileName(request.files.robot), FileName(request.files.mjcf), mj_versionString(), result.samples,
+  fmt::print("{}: {} against {}{}\n{} random states (seed {}), {:.1f} s\n\n", model.name(),
+             FileName(request.files.robot), FileName(request.files.mjcf),
+             request.with_engine ? std::string(", MuJoCo ") + mj_versionString() : "", result.samples,
              request.options.seed, result.seconds);
 
+  if (!comparison.notes.empty()) {
+    fmt::print("not compared, or worth knowing:\n");
+    for (const std::string& note : comparison.notes) fmt::print("  {}\n", note);
+    fmt::print("\n");
+  }
   fmt::print("{:<24}{:>9}  {:>12}  {:>9}\n", "constant", "compared", "worst error", "bound");
   for (const CheckRecord& record : result.gate.records) {
     fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {}\n", record.name, record.comparisons, record.worst,
@@ -53,13 +83,16 @@ void PrintTable(const Request& request, const RobotModel& model, const Consisten
   fmt::print("\nErrors are relative to each term's own scale; bounds follow from rounding (README.md).\n");
 }
 
-void PrintVerdict(const Request& request, const RobotModel& model, const ConsistencyResult& result) {
+void PrintVerdict(const Request& request, const Comparison& comparison) {
+  const RobotModel& model = *comparison.model;
+  const ConsistencyResult& result = comparison.result;
   const int base = model.num_base_velocities();
   if (result.samples < request.options.samples) {
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
   }
   if (result.Agrees()) {
-    fmt::print("AGREE: the analytic model and MuJoCo agree to rounding in all {} terms.\n",
+    fmt::print("AGREE: {} agree to rounding in all {} terms.\n",
+               request.with_engine ? "the analytic model and MuJoCo" : "the two descriptions",
                result.terms.size());
     return;
   }
@@ -70,9 +103,11 @@ void PrintVerdict(const Request& request, const RobotModel& model, const Consist
   }
   for (const CheckRecord& record : result.terms) {
     if (!record.failed) continue;
-    fmt::print("  {}: nearest the base: {}; worst: {}: {:.12g} in the model, {:.12g} in MuJoCo (sample {})\n",
+    fmt::print("  {}: nearest the base: {}; worst: {}: {:.12g} in {}, {:.12g} in {} (sample {})\n",
                record.name, Describe(record.first_failure, model, base), Describe(record.where, model, base),
-               record.model_value, record.engine_value, record.sample);
+               record.model_value, request.with_engine ? "the model" : FileName(request.files.robot),
+               record.engine_value, request.with_engine ? "MuJoCo" : FileName(request.files.mjcf),
+               record.sample);
   }
 }
 
@@ -92,8 +127,9 @@ const char* Judge(ExitCode code) {
   return code == kDisagreement ? "disagreement" : "failed";
 }
 
-std::string ToText(const Request& request, const RobotModel& model, const ConsistencyResult& result,
-                   ExitCode code) {
+std::string ToText(const Request& request, const Comparison& comparison, ExitCode code) {
+  const RobotModel& model = *comparison.model;
+  const ConsistencyResult& result = comparison.result;
   Json json = {{"robot", request.files.robot.string()},
                {"mjcf", request.files.mjcf.string()},
                {"mujoco", mj_versionString()},
@@ -102,6 +138,7 @@ std::string ToText(const Request& request, const RobotModel& model, const Consis
                {"seed", request.options.seed},
                {"seconds", result.seconds},
                {"verdict", Judge(code)}};
+  json["notes"] = comparison.notes;
   json["checks"] = Json::object();
   for (const CheckRecord& record : result.gate.records) json["checks"][record.name] = ToJson(record, model);
   for (const CheckRecord& record : result.terms) json["checks"][record.name] = ToJson(record, model);
@@ -115,25 +152,100 @@ std::string ToText(const Request& request, const RobotModel& model, const Consis
   return json.dump(2) + "\n";
 }
 
-int Run(const Request& request) {
-  const RobotModel model = ReadRobotModel(request.files.robot);
-  const MjModelPtr engine = LoadMjcf(request.files.mjcf);
-  const Adapter adapter(model, *engine, request.files.mjcf.string());
+ConsistencyResult Compare(const Request& request,
+                          const std::function<ConsistencyResult(const std::function<bool(long)>&)>& check) {
   CatchInterrupts();
-  std::optional<OutputFile> json;
-  if (!request.json_file.empty()) json.emplace(request.json_file);
   ProgressBar bar("comparing", request.options.samples, request.quiet);
-  const ConsistencyResult result = CheckConsistency(adapter, request.options, [&](long samples) {
+  ConsistencyResult result = check([&](long samples) {
     bar.Update(samples);
     return !IsInterrupted();
   });
   bar.Finish();
+  return result;
+}
+
+UrdfOptions MakeUrdfOptions(const Request& request) {
+  return {{request.packages.begin(), request.packages.end()}};
+}
+
+void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& more) {
+  notes->insert(notes->end(), more.begin(), more.end());
+}
+
+/// A parameter file against the engine.
+void CompareTableWithEngine(const Request& request, Comparison* comparison) {
+  comparison->model = ReadRobotModel(request.files.robot);
+  const MjModelPtr engine = LoadMjcf(request.files.mjcf);
+  const Adapter adapter(*comparison->model, *engine, request.files.mjcf.string());
+  comparison->result = Compare(request, [&](const std::function<bool(long)>& progress) {
+    return CheckConsistency(adapter, request.options, progress);
+  });
+}
+
+/// A URDF, or another MJCF, against the engine.
+void CompareDescriptionWithEngine(const Request& request, Comparison* comparison) {
+  RobotDescription robot = ReadDescription(request.files.robot, MakeUrdfOptions(request));
+  const MjModelPtr engine = LoadMjcf(request.files.mjcf);
+  Completion completion = CompleteFromEngine(*engine, FileName(request.files.mjcf), &robot);
+  comparison->model.emplace(robot.spec);
+  const Adapter adapter(*comparison->model, *engine, request.files.mjcf.string());
+  comparison->result = Compare(request, [&](const std::function<bool(long)>& progress) {
+    return CheckConsistency(adapter, request.options, progress);
+  });
+  GateResult& gate = comparison->result.gate;
+  std::erase_if(gate.records, [&](const CheckRecord& record) {
+    return std::find(completion.unstated.begin(), completion.unstated.end(), record.name) !=
+           completion.unstated.end();
+  });
+  const std::vector<std::string> others = CheckDescription(robot, adapter, &gate);
+  for (const auto& notes : {robot.notes, completion.notes, others}) AppendTo(&comparison->notes, notes);
+}
+
+/// Two descriptions without the engine.
+void CompareTwoDescriptions(const Request& request, Comparison* comparison) {
+  RobotDescription a = ReadDescription(request.files.robot, MakeUrdfOptions(request));
+  RobotDescription b = ReadDescription(request.files.mjcf, MakeUrdfOptions(request));
+  const std::vector<std::string> taken = CompleteEachOther(&a, &b);
+  for (const auto& notes : {a.notes, b.notes, taken}) AppendTo(&comparison->notes, notes);
+  comparison->model.emplace(a.spec);
+  comparison->result = Compare(request, [&](const std::function<bool(long)>& progress) {
+    return CompareDescriptions(a, b, request.options, progress);
+  });
+}
+
+/// Puts A and B where --robot and --mjcf would stand: an MJCF second, if there is one.
+void SortSides(Request* request) {
+  if (request->a.empty()) return;
+  if (request->b.empty()) {
+    throw InputError("consistency: two files must be given, got " + Quote(request->a));
+  }
+  request->files = {request->a, request->b};
+  const bool engine_first = FindFormat(request->files.robot) == RobotFormat::kMjcf;
+  if (engine_first && FindFormat(request->files.mjcf) != RobotFormat::kMjcf) {
+    std::swap(request->files.robot, request->files.mjcf);
+  }
+  request->with_engine = FindFormat(request->files.mjcf) == RobotFormat::kMjcf;
+}
+
+int Run(Request request) {
+  SortSides(&request);
+  std::optional<OutputFile> json;
+  if (!request.json_file.empty()) json.emplace(request.json_file);
+  Comparison comparison;
+  if (!request.with_engine) {
+    CompareTwoDescriptions(request, &comparison);
+  } else if (FindFormat(request.files.robot) == RobotFormat::kToml) {
+    CompareTableWithEngine(request, &comparison);
+  } else {
+    CompareDescriptionWithEngine(request, &comparison);
+  }
+  const ConsistencyResult& result = comparison.result;
   ExitCode code = result.samples < request.options.samples ? kFailure : kSuccess;
   if (!result.Agrees()) code = kDisagreement;
-  if (json) json->Write(ToText(request, model, result, code));
+  if (json) json->Write(ToText(request, comparison, code));
   if (!request.PrintsJson()) {
-    if (!request.quiet) PrintTable(request, model, result);
-    PrintVerdict(request, model, result);
+    if (!request.quiet) PrintTable(request, comparison);
+    PrintVerdict(request, comparison);
   }
   return code;
 }
@@ -143,9 +255,18 @@ int Run(const Request& request) {
 void AddConsistencyCommand(Command app) {
   constexpr long kMaxSamples = 1000000000;
   const auto request = std::make_shared<Request>();
-  Command command =
-      app.AddCommand("consistency", "Compare every term of model and engine at random states");
-  AddRobotOptions(command, &request->files);
+  Command command = app.AddCommand("consistency", "Compare every term of model and engine at random states");
+  const Option robot = AddRobotOptions(command, &request->files);
+  command
+      .AddOption("A", &request->a,
+                 "One of two descriptions of a robot, instead of --robot and --mjcf: parameter file (TOML), "
+                 "URDF or MJCF")
+      .TypeName("FILE")
+      .Excludes(robot);
+  command.AddOption("B", &request->b, "The other one").TypeName("FILE");
+  command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
+      .TypeName("PATH")
+      .Repeatable();
   command.AddOption("--samples", &request->options.samples, "Number of random states")
       .TypeName("N")
       .Check(WholeNumber(1, kMaxSamples))
@@ -154,8 +275,9 @@ void AddConsistencyCommand(Command app) {
       .TypeName("N")
       .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
       .ShowDefault();
-  command.AddOption("--json", &request->json_file,
-                   "Write the results to this file (- for standard output, then without the table)")
+  command
+      .AddOption("--json", &request->json_file,
+                 "Write the results to this file (- for standard output, then without the table)")
       .TypeName("FILE.json");
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });

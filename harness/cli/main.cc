@@ -44,6 +44,7 @@ int Run(int argc, char** argv) {
   AddDiagnoseCommand(app);
   AddMutateCommand(app);
   AddEvalCommand(app);
+  AddImportCommand(app);
   AddPlanCommand(app);
   AddRunCommand(app, JoinArguments(argc, argv));
   AddExportCommand(app);

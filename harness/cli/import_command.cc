@@ -1,0 +1,55 @@
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/model/parameter_reader.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/output_file.h"
+#include "harness/sides/parameter_writer.h"
+#include "harness/sides/read_description.h"
+#include "harness/sides/robot_file.h"
+
+namespace dexcheck::cli {
+namespace {
+
+struct Request {
+  std::filesystem::path source;
+  std::string out = "-";
+  std::vector<std::string> packages;
+};
+
+RobotDescription ReadSource(const Request& request) {
+  if (FindFormat(request.source) == RobotFormat::kToml) {
+    throw InputError(request.source.string() + ": must be a URDF or an MJCF, is a parameter file already");
+  }
+  return ReadDescription(request.source, {{request.packages.begin(), request.packages.end()}});
+}
+
+int Run(const Request& request) {
+  const RobotDescription robot = ReadSource(request);
+  const std::string text = WriteParameters(robot, request.source.filename().string());
+  // What cannot be read back must not be written: a name that is too long, for example.
+  ParseRobotModel(text, request.source.string() + " as a parameter file");
+  OutputFile file(request.out);
+  file.Write(text);
+  return kSuccess;
+}
+
+}  // namespace
+
+void AddImportCommand(Command app) {
+  const auto request = std::make_shared<Request>();
+  Command command =
+      app.AddCommand("import", "Write a parameter file (TOML) from a URDF or an MJCF, to start from");
+  command.AddOption("FILE", &request->source, "URDF or MJCF").Required();
+  command.AddOption("--out", &request->out, "Parameter file to write (- for standard output)")
+      .TypeName("FILE.toml")
+      .ShowDefault();
+  command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
+      .TypeName("PATH")
+      .Repeatable();
+  command.SetAction([=] { return Run(*request); });
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,121 @@
+#include "harness/sides/description_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "harness/sides/engine_coupling.h"
+#include "harness/sides/join_names.h"
+
+namespace dexcheck {
+namespace {
+
+// Both sides read decimal numbers and form at most short sums and products of them.
+constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
+
+class DescriptionCheck {
+ public:
+  DescriptionCheck(const RobotDescription& robot, const Adapter& adapter, GateResult* gate)
+      : robot_(robot), adapter_(adapter), engine_(adapter.engine()), gate_(*gate) {}
+
+  std::vector<std::string> Run() {
+    CheckDryFriction();
+    CheckCouplings();
+    return notes_;
+  }
+
+ private:
+  CheckRecord* Define(const std::string& name) {
+    CheckRecord record;
+    record.name = name;
+    record.bound = kRounding;
+    gate_.records.push_back(record);
+    return &gate_.records.back();
+  }
+
+  void Compare(CheckRecord* record, int joint, double model, double engine, int entry) {
+    const Location where{Location::Kind::kJoint, joint, -1};
+    const double size = std::max(std::abs(model), std::abs(engine));
+    const double error = record->Add(model, engine, size > 0.0 ? size : 1.0, where, -1);
+    if (error <= kRounding) return;
+    const RobotModel& described = adapter_.model();
+    gate_.findings.push_back({record->name, Describe(where, described, described.num_base_velocities()),
+                              model, engine, where, entry});
+  }
+
+  void CheckDryFriction() {
+    const std::string name = "joint_dry_friction";
+    std::erase_if(gate_.records, [&](const CheckRecord& record) { return record.name == name; });
+    std::erase_if(gate_.findings, [&](const GateFinding& finding) { return finding.check == name; });
+    CheckRecord* record = nullptr;
+    for (size_t i = 0; i < robot_.joints.size(); ++i) {
+      if (!robot_.joints[i].states_dry_friction) continue;
+      if (record == nullptr) record = Define(name);
+      Compare(record, static_cast<int>(i), robot_.joints[i].dry_friction,
+              engine_.dof_frictionloss[adapter_.joint_dofs()[i]], 0);
+    }
+  }
+
+  /// The description's index of a joint of the engine's model; -1 when it has none.
+  [[nodiscard]] int FindIndex(int engine_joint) const {
+    const std::vector<int>& ids = adapter_.joint_ids();
+    const auto found = std::find(ids.begin(), ids.end(), engine_joint);
+    return found == ids.end() ? -1 : static_cast<int>(found - ids.begin());
+  }
+
+  void CheckCouplings() {
+    CheckRecord* record = nullptr;
+    std::vector<std::string> only_here;
+    std::vector<std::string> only_there;
+    for (size_t i = 0; i < robot_.joints.size(); ++i) {
+      const std::string& name = robot_.spec.joints[i].name;
+      const std::optional<JointCoupling>& own = robot_.joints[i].coupling;
+      const std::optional<JointCoupling> other = FindEngineCoupling(engine_, adapter_.joint_ids()[i]);
+      if (own && !other) only_here.push_back(name);
+      if (!own && other) only_there.push_back(name);
+      if (!own || !other) continue;
+      if (record == nullptr) record = Define("joint_coupling");
+      const int joint = static_cast<int>(i);
+      Compare(record, joint, own->leader, FindIndex(other->leader), 0);
+      Compare(record, joint, own->multiplier, other->multiplier, 1);
+      Compare(record, joint, own->offset, other->offset, 2);
+    }
+    const auto note = [&](const std::vector<std::string>& names, const std::string& side) {
+      if (names.empty()) return;
+      notes_.push_back("coupled joints: only the " + side + " couples " + JoinNames(names) +
+                       "; terms are compared with all joints free");
+    };
+    note(only_here, "description");
+    note(only_there, "MJCF");
+  }
+
+  const RobotDescription& robot_;
+  const Adapter& adapter_;
+  const mjModel& engine_;
+  GateResult& gate_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace
+
+std::optional<JointCoupling> FindEngineCoupling(const mjModel& engine, int joint) {
+  for (int eq = 0; eq < engine.neq; ++eq) {
+    if (engine.eq_type[eq] != mjEQ_JOINT || engine.eq_active[eq] == 0) continue;
+    if (engine.eq_obj1id[eq] != joint || engine.eq_obj2id[eq] < 0) continue;
+    // q1 - q1_0 = a0 + a1 (q2 - q2_0) + ...
+    const mjtNum* a = engine.eq_data + mjNEQDATA * eq;
+    if (a[2] != 0.0 || a[3] != 0.0 || a[4] != 0.0) continue;
+    const int leader = engine.eq_obj2id[eq];
+    const double q1_0 = engine.qpos0[engine.jnt_qposadr[joint]];
+    const double q2_0 = engine.qpos0[engine.jnt_qposadr[leader]];
+    return JointCoupling{leader, a[1], a[0] + q1_0 - a[1] * q2_0};
+  }
+  return std::nullopt;
+}
+
+std::vector<std::string> CheckDescription(const RobotDescription& robot, const Adapter& adapter,
+                                          GateResult* gate) {
+  return DescriptionCheck(robot, adapter, gate).Run();
+}
+
+}  // namespace dexcheck

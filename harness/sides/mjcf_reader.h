@@ -1,0 +1,20 @@
+#pragma once
+
+// A table of parameters from an engine's model: the mechanism as the engine compiled it.
+
+#include <mujoco/mujoco.h>
+
+#include <string>
+
+#include "harness/sides/robot_description.h"
+
+namespace dexcheck {
+
+/// Reads the mechanism of an engine's model: hinges and slides on a fixed base, masses, couplings by
+/// equality/joint, named sites. A body's own frame is kept (DescribedJoint::X_iL); frame i stands at the
+/// joint's anchor. A body with several joints becomes as many links, of which the last carries the mass. What
+/// a table has no place for is noted.
+/// @throws InputError for free and ball joints.
+RobotDescription ReadMjcfDescription(const mjModel& engine, const std::string& source);
+
+}  // namespace dexcheck

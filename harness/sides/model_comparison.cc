@@ -1,0 +1,325 @@
+#include "harness/sides/model_comparison.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "harness/checks/rounding_scales.h"
+#include "harness/sides/description_match.h"
+
+namespace dexcheck {
+namespace {
+
+// Both sides read decimal numbers and form at most short sums and products of them.
+constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
+
+/// Compares two models' constants and terms; coordinates and locations are those of `a`.
+class ModelComparison {
+ public:
+  ModelComparison(const RobotDescription& a, const RobotDescription& b)
+      : a_(a),
+        b_(b),
+        model_a_(a.spec),
+        model_b_(b.spec),
+        terms_a_(model_a_),
+        terms_b_(model_b_),
+        scales_(model_a_),
+        base_(model_a_.num_base_velocities()),
+        b_of_a_(MatchJoints(a.spec, b.spec)) {
+    const int n = model_a_.num_velocities();
+    const int offset_a = model_a_.num_base_positions();
+    position_of_.resize(static_cast<size_t>(model_a_.num_positions()));
+    velocity_of_.resize(static_cast<size_t>(n));
+    for (int i = 0; i < offset_a; ++i) position_of_[static_cast<size_t>(i)] = i;
+    for (int i = 0; i < base_; ++i) velocity_of_[static_cast<size_t>(i)] = i;
+    for (size_t i = 0; i < b_of_a_.size(); ++i) {
+      position_of_[static_cast<size_t>(offset_a) + i] = offset_a + b_of_a_[i];
+      velocity_of_[static_cast<size_t>(base_) + i] = base_ + b_of_a_[i];
+    }
+    q_b_.setZero(model_a_.num_positions());
+    xi_b_.setZero(n);
+    for (Matrix6Xd* J : {&J_a_, &J_dot_a_, &J_b_, &J_dot_b_}) J->setZero(6, n);
+    const double depth_bound = CalcRoundingBound(std::max(model_a_.max_depth(), model_b_.max_depth()), 1.0);
+    const auto define = [&](CheckRecord* record, const char* name, double factors) {
+      record->name = name;
+      record->bound = factors * depth_bound;
+    };
+    define(&records_[kJointAxis], "joint_axis", 1.0);
+    define(&records_[kLinkCom], "link_com", 1.0);
+    define(&records_[kLinkInertia], "link_inertia", 2.0);
+    define(&records_[kFramePose], "frame_pose", 1.0);
+    define(&records_[kJ], "J", 1.0);
+    define(&records_[kJDotXi], "J_dot_xi", 3.0);
+    define(&records_[kMassMatrix], "M_bar", 2.0);
+    define(&records_[kCoriolisForce], "C_bar_xi", 4.0);
+    define(&records_[kCoriolisMatrix], "C_bar", 4.0);
+    define(&records_[kGravity], "gravity", 1.0);
+    define(&records_[kFriction], "friction", 2.0);
+    define(&records_[kKineticEnergy], "kinetic_energy", 2.0);
+    define(&records_[kPotentialEnergy], "potential_energy", 1.0);
+    define(&records_[kLinearMomentum], "linear_momentum", 1.0);
+    define(&records_[kAngularMomentum], "angular_momentum", 2.0);
+  }
+
+  [[nodiscard]] const RobotModel& model() const { return model_a_; }
+
+  GateResult CompareConstants() {
+    GateResult gate;
+    if (a_.states_gravity && b_.states_gravity) {
+      for (int k = 0; k < 3; ++k) {
+        AddConstant(&gate, "gravity_vector", {}, a_.spec.gravity[k], b_.spec.gravity[k], k,
+                    a_.spec.gravity.norm());
+      }
+    }
+    ForJoints([&](size_t i, size_t j) {
+      AddConstant(&gate, "link_mass", {Location::Kind::kLink, static_cast<int>(i), -1},
+                  a_.spec.joints[i].body.mass, b_.spec.joints[j].body.mass, 0);
+    });
+    CompareStated(&gate, "joint_damping", &DescribedJoint::states_damping,
+                  [](const RobotDescription& robot, size_t i) {
+                    return std::vector<double>{robot.spec.joints[i].damping};
+                  });
+    CompareStated(&gate, "joint_dry_friction", &DescribedJoint::states_dry_friction,
+                  [](const RobotDescription& robot, size_t i) {
+                    return std::vector<double>{robot.joints[i].dry_friction};
+                  });
+    CompareStated(&gate, "joint_armature", &DescribedJoint::states_armature,
+                  [](const RobotDescription& robot, size_t i) {
+                    return std::vector<double>{robot.spec.joints[i].armature};
+                  });
+    CompareStated(&gate, "joint_range", &DescribedJoint::states_range,
+                  [](const RobotDescription& robot, size_t i) {
+                    return std::vector<double>{robot.spec.joints[i].lower, robot.spec.joints[i].upper};
+                  });
+    ForJoints([&](size_t i, size_t j) {
+      const std::optional<JointCoupling>& own = a_.joints[i].coupling;
+      const std::optional<JointCoupling>& other = b_.joints[j].coupling;
+      if (!own || !other) return;
+      const Location where{Location::Kind::kJoint, static_cast<int>(i), -1};
+      const std::string name = "joint_coupling";
+      AddConstant(&gate, name, where, b_of_a_[static_cast<size_t>(own->leader)], other->leader, 0);
+      AddConstant(&gate, name, where, own->multiplier, other->multiplier, 1);
+      AddConstant(&gate, name, where, own->offset, other->offset, 2);
+    });
+    return gate;
+  }
+
+  void Compare(const VectorXd& q, const VectorXd& xi, long sample) {
+    sample_ = sample;
+    for (size_t i = 0; i < position_of_.size(); ++i) q_b_[position_of_[i]] = q[static_cast<Eigen::Index>(i)];
+    for (size_t i = 0; i < velocity_of_.size(); ++i)
+      xi_b_[velocity_of_[i]] = xi[static_cast<Eigen::Index>(i)];
+    terms_a_.SetState(q, xi);
+    terms_b_.SetState(q_b_, xi_b_);
+    terms_a_.CalcDynamics();
+    terms_b_.CalcDynamics();
+    scales_.SetState(terms_a_, q, xi);
+    CompareLinks();
+    CompareFrames(xi);
+    CompareDynamics(xi);
+    CompareEnergies();
+  }
+
+  [[nodiscard]] std::vector<CheckRecord> TakeRecords() const {
+    std::vector<CheckRecord> records;
+    for (const CheckRecord& record : records_) {
+      if (record.comparisons > 0) records.push_back(record);
+    }
+    return records;
+  }
+
+ private:
+  enum Term {
+    kJointAxis,
+    kLinkCom,
+    kLinkInertia,
+    kFramePose,
+    kJ,
+    kJDotXi,
+    kMassMatrix,
+    kCoriolisForce,
+    kCoriolisMatrix,
+    kGravity,
+    kFriction,
+    kKineticEnergy,
+    kPotentialEnergy,
+    kLinearMomentum,
+    kAngularMomentum,
+    kTermCount
+  };
+
+  void ForJoints(const std::function<void(size_t, size_t)>& visit) const {
+    for (size_t i = 0; i < b_of_a_.size(); ++i) visit(i, static_cast<size_t>(b_of_a_[i]));
+  }
+
+  void CompareStated(GateResult* gate, const std::string& name, bool DescribedJoint::*states,
+                     const std::function<std::vector<double>(const RobotDescription&, size_t)>& numbers) {
+    ForJoints([&](size_t i, size_t j) {
+      if (!(a_.joints[i].*states) || !(b_.joints[j].*states)) return;
+      const std::vector<double> own = numbers(a_, i);
+      const std::vector<double> other = numbers(b_, j);
+      for (size_t k = 0; k < own.size(); ++k) {
+        AddConstant(gate, name, {Location::Kind::kJoint, static_cast<int>(i), -1}, own[k], other[k],
+                    static_cast<int>(k));
+      }
+    });
+  }
+
+  void AddConstant(GateResult* gate, const std::string& name, const Location& where, double a, double b,
+                   int entry, double scale = 0.0) {
+    if (gate->records.empty() || gate->records.back().name != name) {
+      CheckRecord record;
+      record.name = name;
+      record.bound = kRounding;
+      gate->records.push_back(record);
+    }
+    const double size = std::max({std::abs(a), std::abs(b), scale});
+    if (gate->records.back().Add(a, b, size > 0.0 ? size : 1.0, where, -1) <= kRounding) return;
+    gate->findings.push_back({name, Describe(where, model_a_, base_), a, b, where, entry});
+  }
+
+  void Add(Term term, double a, double b, double scale, const Location& where) {
+    records_[term].Add(a, b, scale, where, sample_);
+  }
+
+  /// Physical quantities: link frames are each description's own choice.
+  void CompareLinks() {
+    const double length = scales_.world_length();
+    ForJoints([&](size_t i, size_t j) {
+      const Joint& joint = a_.spec.joints[i];
+      const Joint& other = b_.spec.joints[j];
+      const Pose X_a = terms_a_.CalcLinkPose(static_cast<int>(i));
+      const Pose X_b = terms_b_.CalcLinkPose(static_cast<int>(j));
+      const Location at_joint{Location::Kind::kJoint, static_cast<int>(i), -1};
+      const Vector3d axis = X_a.linear().col(2);
+      for (int k = 0; k < 3; ++k) Add(kJointAxis, axis[k], X_b.linear()(k, 2), 1.0, at_joint);
+      if (joint.type == JointType::kRevolute) {
+        const Vector3d anchor = X_b.translation();
+        const Vector3d foot = X_a.translation() + axis.dot(anchor - X_a.translation()) * axis;
+        for (int k = 0; k < 3; ++k) Add(kJointAxis, foot[k], anchor[k], length, at_joint);
+      }
+      const Location at_link{Location::Kind::kLink, static_cast<int>(i), -1};
+      if (joint.body.mass > 0.0 && other.body.mass > 0.0) {
+        const Vector3d com_a = X_a * joint.body.com;
+        const Vector3d com_b = X_b * other.body.com;
+        for (int k = 0; k < 3; ++k) Add(kLinkCom, com_a[k], com_b[k], length, at_link);
+      }
+      const Matrix3d I_a = X_a.linear() * joint.body.inertia * X_a.linear().transpose();
+      const Matrix3d I_b = X_b.linear() * other.body.inertia * X_b.linear().transpose();
+      const double scale = Positive(std::max(I_a.trace(), I_b.trace()));
+      for (int k = 0; k < 9; ++k) Add(kLinkInertia, I_a.data()[k], I_b.data()[k], scale, at_link);
+    });
+  }
+
+  void CompareFrames(const VectorXd& xi) {
+    const double acceleration = Positive(scales_.acceleration());
+    const double angular_acceleration = Positive(scales_.angular_rate() * scales_.angular_rate());
+    for (int frame = 0; frame < static_cast<int>(model_a_.frames().size()); ++frame) {
+      const int other = model_b_.FindFrame(model_a_.frames()[static_cast<size_t>(frame)].name);
+      const Location where{Location::Kind::kFrame, frame, -1};
+      const Pose X_a = terms_a_.CalcFramePose(frame);
+      const Pose X_b = terms_b_.CalcFramePose(other);
+      for (int row = 0; row < 3; ++row) {
+        Add(kFramePose, X_a.translation()[row], X_b.translation()[row], scales_.world_length(), where);
+        for (int col = 0; col < 3; ++col)
+          Add(kFramePose, X_a.linear()(row, col), X_b.linear()(row, col), 1.0, where);
+      }
+      terms_a_.CalcFrameJacobian(frame, J_a_, J_dot_a_);
+      terms_b_.CalcFrameJacobian(other, J_b_, J_dot_b_);
+      const Vector6d bias_a = J_dot_a_ * xi;
+      const Vector6d bias_b = J_dot_b_ * xi_b_;
+      for (int row = 0; row < 6; ++row) {
+        const bool linear = row < 3;
+        for (Eigen::Index col = 0; col < xi.size(); ++col) {
+          const double scale = scales_.CalcVelocityScale(static_cast<int>(col));
+          Add(kJ, J_a_(row, col), J_b_(row, velocity_of_[static_cast<size_t>(col)]),
+              linear ? scale : Positive(scale / scales_.length()), where);
+        }
+        Add(kJDotXi, bias_a[row], bias_b[row], linear ? acceleration : angular_acceleration, where);
+      }
+    }
+  }
+
+  void CompareDynamics(const VectorXd& xi) {
+    const int n = model_a_.num_velocities();
+    const VectorXd force_a = terms_a_.C() * xi;
+    const VectorXd force_b = terms_b_.C() * xi_b_;
+    for (int col = 0; col < n; ++col) {
+      const int other_col = velocity_of_[static_cast<size_t>(col)];
+      const Location where{Location::Kind::kVelocity, col, -1};
+      for (int row = 0; row < n; ++row) {
+        const int other_row = velocity_of_[static_cast<size_t>(row)];
+        const Location pair{Location::Kind::kVelocityPair, row, col};
+        Add(kMassMatrix, terms_a_.M()(row, col), terms_b_.M()(other_row, other_col),
+            scales_.CalcMassScale(row, col), pair);
+        // C_ij is a force per velocity.
+        const double rate =
+            std::max(scales_.angular_rate(), scales_.linear_rate() / Positive(scales_.length()));
+        Add(kCoriolisMatrix, terms_a_.C()(row, col), terms_b_.C()(other_row, other_col),
+            Positive(scales_.CalcMassScale(row, col) * rate), pair);
+      }
+      Add(kCoriolisForce, force_a[col], force_b[other_col], scales_.CalcCoriolisScale(col), where);
+      Add(kGravity, terms_a_.gravity()[col], terms_b_.gravity()[other_col], scales_.CalcGravityScale(col),
+          where);
+      Add(kFriction, terms_a_.friction()[col], terms_b_.friction()[other_col],
+          scales_.CalcFrictionScale(col, xi), where);
+    }
+  }
+
+  void CompareEnergies() {
+    const EnergyAndMomentum a = terms_a_.CalcEnergyAndMomentum();
+    const EnergyAndMomentum b = terms_b_.CalcEnergyAndMomentum();
+    const double momentum = scales_.CalcMomentumScale();
+    Add(kKineticEnergy, a.kinetic, b.kinetic, scales_.CalcKineticEnergyScale(), {});
+    Add(kPotentialEnergy, a.potential, b.potential, scales_.CalcPotentialEnergyScale(), {});
+    for (int k = 0; k < 3; ++k) {
+      Add(kLinearMomentum, a.linear_momentum[k], b.linear_momentum[k], Positive(momentum), {});
+      Add(kAngularMomentum, a.angular_momentum[k], b.angular_momentum[k],
+          Positive(momentum * scales_.length()), {});
+    }
+  }
+
+  const RobotDescription& a_;
+  const RobotDescription& b_;
+  RobotModel model_a_;
+  RobotModel model_b_;
+  ModelTerms terms_a_;
+  ModelTerms terms_b_;
+  RoundingScales scales_;
+  int base_;
+  std::vector<int> b_of_a_;
+  std::vector<int> position_of_;  // index in b's q' and xi of each entry of a's
+  std::vector<int> velocity_of_;
+  VectorXd q_b_, xi_b_;
+  Matrix6Xd J_a_, J_dot_a_, J_b_, J_dot_b_;
+  CheckRecord records_[kTermCount];
+  long sample_ = -1;
+};
+
+}  // namespace
+
+ConsistencyResult CompareDescriptions(const RobotDescription& a, const RobotDescription& b,
+                                      const ConsistencyOptions& options,
+                                      const std::function<bool(long)>& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  ModelComparison comparison(a, b);
+  ConsistencyResult result;
+  result.gate = comparison.CompareConstants();
+  StateSource source(comparison.model(), options.range, options.seed);
+  VectorXd q = VectorXd::Zero(comparison.model().num_positions());
+  VectorXd xi = VectorXd::Zero(comparison.model().num_velocities());
+  bool go_on = true;
+  while (go_on && result.samples < options.samples) {
+    const long sample = result.samples++;
+    source.DrawPositions(&q);
+    source.DrawVelocity(&xi);
+    comparison.Compare(q, xi, sample);
+    go_on = progress(result.samples);
+  }
+  result.terms = comparison.TakeRecords();
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+}  // namespace dexcheck

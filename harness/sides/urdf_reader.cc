@@ -1,0 +1,334 @@
+#include "harness/sides/urdf_reader.h"
+
+#include <console_bridge/console.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/model/body_frame.h"
+#include "harness/common/files.h"
+#include "harness/sides/join_names.h"
+#include "harness/sides/urdf_outline.h"
+
+namespace dexcheck {
+namespace {
+
+/// Keeps what urdfdom would print while it lives.
+class MessageCollector : public console_bridge::OutputHandler {
+ public:
+  MessageCollector() { console_bridge::useOutputHandler(this); }
+  ~MessageCollector() override { console_bridge::restorePreviousOutputHandler(); }
+  MessageCollector(const MessageCollector&) = delete;
+  MessageCollector& operator=(const MessageCollector&) = delete;
+
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) errors_.push_back(text);
+  }
+
+  /// What was found first and where: urdfdom reports from the inside out.
+  [[nodiscard]] std::string Describe() const {
+    if (errors_.empty()) return "cannot be parsed";
+    return errors_.size() == 1 ? errors_[0] : errors_[0] + " (" + errors_[1] + ")";
+  }
+
+ private:
+  std::vector<std::string> errors_;
+};
+
+urdf::ModelInterfaceSharedPtr ParseWithUrdfdom(const std::string& text, const std::string& source) {
+  const MessageCollector messages;
+  urdf::ModelInterfaceSharedPtr model;
+  try {
+    model = urdf::parseURDF(text);
+  } catch (const std::exception& error) {
+    throw InputError(source + ": " + error.what());
+  }
+  if (!model) throw InputError(source + ": " + messages.Describe());
+  return model;
+}
+
+Pose ToPose(const urdf::Pose& pose) {
+  Pose X = Pose::Identity();
+  const urdf::Rotation& q = pose.rotation;
+  X.linear() = Eigen::Quaterniond(q.w, q.x, q.y, q.z).toRotationMatrix();
+  X.translation() = Vector3d(pose.position.x, pose.position.y, pose.position.z);
+  return X;
+}
+
+class UrdfReader {
+ public:
+  UrdfReader(std::string source, UrdfOutline outline, urdf::ModelInterfaceSharedPtr model)
+      : source_(std::move(source)), outline_(std::move(outline)), model_(std::move(model)) {}
+
+  RobotDescription Read() {
+    robot_.spec.name = model_->getName();
+    robot_.spec.source = source_;
+    robot_.states_gravity = false;
+    ReadTree();
+    FinishBodies();
+    ReadCouplings();
+    NoteInertials();
+    return std::move(robot_);
+  }
+
+ private:
+  /// Where a link is: the joint that moves it (-1 the base) and its own frame in that joint's frame i.
+  struct Place {
+    int joint;
+    Pose X_iL;
+  };
+
+  [[noreturn]] void Fail(int line, const std::string& problem) const {
+    throw InputError(source_ + ":" + std::to_string(line) + ": " + problem);
+  }
+
+  void ReadTree() {
+    robot_.spec.base.link = outline_.links[static_cast<size_t>(outline_.root)].name;
+    parts_.emplace_back();
+    std::vector<std::pair<int, Place>> open;  // joints to come, and where their parent links are
+    const auto visit = [&](int index, const Place& place) {
+      const UrdfLink& link = outline_.links[static_cast<size_t>(index)];
+      ReadBody(link, place);
+      for (auto joint = link.child_joints.rbegin(); joint != link.child_joints.rend(); ++joint) {
+        open.emplace_back(*joint, place);
+      }
+    };
+    visit(outline_.root, {-1, Pose::Identity()});
+    while (!open.empty()) {
+      const auto [index, parent] = open.back();
+      open.pop_back();
+      const UrdfJoint& element = outline_.joints[static_cast<size_t>(index)];
+      visit(element.child, ReadJoint(element, parent));
+    }
+  }
+
+  /// @param parent where the parent link is. @return where the child link is.
+  Place ReadJoint(const UrdfJoint& element, const Place& parent) {
+    const urdf::Joint& joint = *model_->getJoint(element.name);
+    const std::string& link = outline_.links[static_cast<size_t>(element.child)].name;
+    const std::string key = "joint " + Quote(element.name) + ": ";
+    const Pose X_iJ = parent.X_iL * ToPose(joint.parent_to_joint_origin_transform);
+    if (!X_iJ.matrix().allFinite()) Fail(element.line, key + "origin: must be finite");
+    switch (joint.type) {
+      case urdf::Joint::FIXED:
+        robot_.spec.frames.push_back({link, parent.joint, X_iJ, std::nullopt});
+        return {parent.joint, X_iJ};
+      case urdf::Joint::REVOLUTE:
+      case urdf::Joint::CONTINUOUS:
+      case urdf::Joint::PRISMATIC:
+        break;
+      default:
+        Fail(element.line, key + "type: must be fixed, revolute, continuous or prismatic, got " +
+                               (joint.type == urdf::Joint::FLOATING ? "\"floating\"" : "\"planar\""));
+    }
+    return {AddMovingJoint(joint, link, parent.joint, X_iJ, element.line), robot_.joints.back().X_iL};
+  }
+
+  /// @return its index.
+  int AddMovingJoint(const urdf::Joint& joint, const std::string& link, int parent, const Pose& X_PJ,
+                     int line) {
+    const std::string key = "joint " + Quote(joint.name) + ": ";
+    const Vector3d given(joint.axis.x, joint.axis.y, joint.axis.z);
+    const double length = given.stableNorm();
+    if (!(length > 0.0)) Fail(line, key + "axis: must not be zero, got " + FormatNumbers(given));
+    constexpr double kUnitVectorAllowance = 1e-4;  // of the digits that people write
+    if (std::abs(length - 1.0) > kUnitVectorAllowance) {
+      robot_.notes.push_back(key + "axis " + FormatNumbers(given) +
+                             " is not a unit vector; its direction counts");
+    }
+    // Frame i has its z axis along the joint's; the link's own frame is turned back.
+    const Matrix3d R = MakeRotation(given / length);
+    Joint added;
+    added.name = joint.name;
+    added.link = link;
+    added.parent = parent;
+    added.type = joint.type == urdf::Joint::PRISMATIC ? JointType::kPrismatic : JointType::kRevolute;
+    added.X_PB = X_PJ;
+    added.X_PB.linear() = X_PJ.linear() * R;
+    DescribedJoint stated;
+    stated.states_armature = false;
+    stated.X_iL.linear() = R.transpose();
+    ReadLimits(joint, line, &added, &stated);
+    ReadFriction(joint, line, &added, &stated);
+    robot_.spec.joints.push_back(added);
+    robot_.joints.push_back(stated);
+    parts_.emplace_back();
+    return static_cast<int>(robot_.spec.joints.size()) - 1;
+  }
+
+  static Matrix3d MakeRotation(const Vector3d& z) {
+    return z == Vector3d::UnitZ() ? Matrix3d(Matrix3d::Identity()) : MakeRotationFromZ(z);
+  }
+
+  void ReadLimits(const urdf::Joint& joint, int line, Joint* added, DescribedJoint* stated) const {
+    added->lower = -kPi;
+    added->upper = kPi;
+    stated->states_range = joint.limits != nullptr && joint.type != urdf::Joint::CONTINUOUS;
+    if (!stated->states_range) return;
+    added->lower = joint.limits->lower;
+    added->upper = joint.limits->upper;
+    if (added->lower <= added->upper) return;
+    Fail(line, "joint " + Quote(joint.name) + ": limit: lower must not exceed upper " +
+                   FormatNumber(added->upper) + ", got " + FormatNumber(added->lower));
+  }
+
+  void ReadFriction(const urdf::Joint& joint, int line, Joint* added, DescribedJoint* stated) const {
+    stated->states_damping = stated->states_dry_friction = joint.dynamics != nullptr;
+    if (!joint.dynamics) return;
+    added->damping = joint.dynamics->damping;
+    stated->dry_friction = joint.dynamics->friction;
+    const auto check = [&](const char* name, double value) {
+      if (value >= 0.0) return;
+      Fail(line, "joint " + Quote(joint.name) + ": dynamics: " + name + " must not be negative, got " +
+                     FormatNumber(value));
+    };
+    check("damping", added->damping);
+    check("friction", stated->dry_friction);
+  }
+
+  void ReadBody(const UrdfLink& element, const Place& place) {
+    const urdf::LinkConstSharedPtr link = model_->getLink(element.name);
+    if (!link->inertial) return;
+    const urdf::Inertial& inertial = *link->inertial;
+    // The inertia is given along the axes of the inertial's own frame, which stands at the centre of mass.
+    MassProperties body{inertial.mass, Vector3d::Zero(), Matrix3d::Zero()};
+    // clang-format off
+    body.inertia << inertial.ixx, inertial.ixy, inertial.ixz,
+                    inertial.ixy, inertial.iyy, inertial.iyz,
+                    inertial.ixz, inertial.iyz, inertial.izz;
+    // clang-format on
+    const std::string problem = FindPhysicalInconsistency(body);
+    if (!problem.empty()) Fail(element.line, "link " + Quote(element.name) + ": inertial: " + problem);
+    body = ExpressIn(body, ToPose(inertial.origin));
+    parts_[static_cast<size_t>(place.joint + 1)].push_back(ExpressIn(body, place.X_iL));
+  }
+
+  void FinishBodies() {
+    for (size_t i = 0; i < robot_.spec.joints.size(); ++i) {
+      // One part stays as it is: its sum would be rounded.
+      const std::vector<MassProperties>& parts = parts_[i + 1];
+      robot_.spec.joints[i].body = parts.size() == 1 ? parts[0] : Combine(parts);
+    }
+  }
+
+  /// A joint that follows one which follows a third follows the third.
+  void ReadCouplings() {
+    std::map<std::string, int> index_of;
+    for (const Joint& joint : robot_.spec.joints) {
+      index_of.emplace(joint.name, static_cast<int>(index_of.size()));
+    }
+    for (const UrdfJoint& element : outline_.joints) {
+      const urdf::JointConstSharedPtr joint = model_->getJoint(element.name);
+      const auto own = index_of.find(element.name);
+      if (!joint->mimic || own == index_of.end()) continue;
+      JointCoupling coupling{-1, 1.0, 0.0};
+      std::set<std::string> seen = {element.name};
+      for (urdf::JointConstSharedPtr at = joint; at->mimic;) {
+        coupling.offset += coupling.multiplier * at->mimic->offset;
+        coupling.multiplier *= at->mimic->multiplier;
+        const std::string& name = at->mimic->joint_name;
+        const auto leader = index_of.find(name);
+        const std::string key = "joint " + Quote(element.name) + ": mimic: ";
+        if (leader == index_of.end())
+          Fail(element.line, key + "must be a joint that moves, got " + Quote(name));
+        if (!seen.insert(name).second) Fail(element.line, key + "must not be cyclic, got " + Quote(name));
+        coupling.leader = leader->second;
+        at = model_->getJoint(name);
+      }
+      robot_.joints[static_cast<size_t>(own->second)].coupling = coupling;
+    }
+  }
+
+  void NoteInertials() {
+    std::vector<std::string> without;
+    for (const UrdfLink& link : outline_.links) {
+      if (!link.has_inertial) without.push_back(link.name);
+    }
+    if (without.size() == outline_.links.size()) {
+      Fail(outline_.links[static_cast<size_t>(outline_.root)].line,
+           "no link has an inertial, so that there are no dynamics, got " + std::to_string(without.size()) +
+               " links");
+    }
+    if (!without.empty())
+      robot_.notes.push_back("links without inertial, taken as massless: " + JoinNames(without));
+    std::vector<std::string> idle;
+    std::vector<double> carried(parts_.size(), 0.0);
+    for (size_t i = robot_.spec.joints.size(); i-- > 0;) {
+      const Joint& joint = robot_.spec.joints[i];
+      carried[i + 1] += joint.body.mass;
+      carried[static_cast<size_t>(joint.parent + 1)] += carried[i + 1];
+      if (carried[i + 1] == 0.0) idle.insert(idle.begin(), joint.name);
+    }
+    if (!idle.empty()) robot_.notes.push_back("joints that move no mass: " + JoinNames(idle));
+  }
+
+  std::string source_;
+  UrdfOutline outline_;
+  urdf::ModelInterfaceSharedPtr model_;
+  RobotDescription robot_;
+  std::vector<std::vector<MassProperties>> parts_;  // of the base, then of each joint's link, in frame i
+};
+
+/// The file of a mesh; empty when it is in none of the packages.
+std::filesystem::path FindMesh(const std::string& name, const std::filesystem::path& folder,
+                               const UrdfOptions& options) {
+  std::vector<std::filesystem::path> candidates;
+  constexpr std::string_view kPackage = "package://";
+  constexpr std::string_view kFile = "file://";
+  if (name.starts_with(kPackage)) {
+    const std::filesystem::path path = name.substr(kPackage.size());
+    const std::filesystem::path package = path.begin() == path.end() ? path : *path.begin();
+    for (const std::filesystem::path& root : options.packages) {
+      candidates.push_back(root / path);
+      if (std::filesystem::absolute(root).lexically_normal().filename() == package) {
+        candidates.push_back(root / path.lexically_relative(package));
+      }
+    }
+  } else {
+    candidates.push_back(folder / (name.starts_with(kFile) ? name.substr(kFile.size()) : name));
+  }
+  for (const std::filesystem::path& path : candidates) {
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(path, ignored)) return path;
+  }
+  return {};
+}
+
+}  // namespace
+
+RobotDescription ParseUrdf(std::string_view text, const std::string& source, const UrdfOptions& options) {
+  UrdfOutline outline = ReadUrdfOutline(text, source);
+  const std::vector<std::string> meshes = outline.meshes;
+  urdf::ModelInterfaceSharedPtr model = ParseWithUrdfdom(std::string(text), source);
+  for (const UrdfLink& link : outline.links) {
+    if (!model->getLink(link.name))
+      throw InputError(source + ": link " + Quote(link.name) + ": cannot be parsed");
+  }
+  for (const UrdfJoint& joint : outline.joints) {
+    if (!model->getJoint(joint.name))
+      throw InputError(source + ": joint " + Quote(joint.name) + ": cannot be parsed");
+  }
+  RobotDescription robot = UrdfReader(source, std::move(outline), std::move(model)).Read();
+  if (options.packages.empty()) return robot;
+  std::vector<std::string> missing;
+  for (const std::string& mesh : meshes) {
+    if (FindMesh(mesh, std::filesystem::path(source).parent_path(), options).empty()) missing.push_back(mesh);
+  }
+  if (!missing.empty()) {
+    robot.notes.push_back("meshes that are missing (dynamics need none): " + JoinNames(missing));
+  }
+  return robot;
+}
+
+RobotDescription ReadUrdf(const std::filesystem::path& path, const UrdfOptions& options) {
+  return ParseUrdf(ReadBytes(path), path.string(), options);
+}
+
+}  // namespace dexcheck

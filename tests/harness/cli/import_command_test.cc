@@ -1,0 +1,104 @@
+// dexcheck import, and dexcheck consistency between two descriptions of any kind.
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/harness/cli/dexcheck_program.h"
+#include "tests/harness/sides/panda_urdf.h"
+
+namespace dexcheck {
+namespace {
+
+using Json = nlohmann::json;
+using ::testing::HasSubstr;
+using testing::ProgramResult;
+using testing::ReadText;
+using testing::ReplaceOnce;
+using testing::RunDexcheck;
+using testing::TempFolder;
+using testing::WriteText;
+
+class TwoDescriptions : public ::testing::Test {
+ protected:
+  TwoDescriptions() { WriteText(folder_.path() / "panda.urdf", testing::MakePandaUrdf()); }
+
+  [[nodiscard]] ProgramResult Run(const std::vector<std::string>& arguments) const {
+    return RunDexcheck(arguments, {folder_.path()});
+  }
+
+  TempFolder folder_;
+  std::string mjcf_ = testing::kMjcf + "panda.xml";
+  std::string table_ = testing::kParameters + "panda.toml";
+};
+
+TEST_F(TwoDescriptions, AgreeInEveryPairing) {
+  for (const std::string& a : {std::string("panda.urdf"), mjcf_, table_}) {
+    for (const std::string& b : {std::string("panda.urdf"), mjcf_, table_}) {
+      const ProgramResult result = Run({"consistency", a, b, "--samples", "20"});
+      EXPECT_EQ(result.exit_code, 0) << a << " " << b << result.err << result.out;
+      EXPECT_THAT(result.out, HasSubstr("\nAGREE: "));
+    }
+  }
+}
+
+TEST_F(TwoDescriptions, ReportWhatOneLacksAndWhatDiffers) {
+  WriteText(folder_.path() / "motors.xml",
+            ReplaceOnce(ReadText(mjcf_), "armature=\"0\"", "armature=\"0.1\""));
+  const ProgramResult lacks =
+      Run({"consistency", "panda.urdf", "motors.xml", "--samples", "20", "--json", "out.json"});
+  EXPECT_EQ(lacks.exit_code, 0);
+  EXPECT_THAT(lacks.out,
+              HasSubstr("armature: only motors.xml states it, up to 0.1, for panda_joint1, panda_joint2"));
+  EXPECT_THAT(lacks.out, ::testing::Not(HasSubstr("joint_armature")));
+  const Json results = Json::parse(ReadText(folder_.path() / "out.json"));
+  EXPECT_EQ(results.at("verdict"), "pass");
+  EXPECT_THAT(results.at("notes").dump(), HasSubstr("gravity: only motors.xml states it"));
+
+  WriteText(folder_.path() / "wrong.urdf",
+            ReplaceOnce(testing::MakePandaUrdf(), "<mass value=\"3.228604\"/>", "<mass value=\"3.3\"/>"));
+  const ProgramResult against_engine = Run({"consistency", "wrong.urdf", mjcf_, "--samples", "20"});
+  EXPECT_EQ(against_engine.exit_code, 1);
+  EXPECT_THAT(against_engine.out,
+              HasSubstr("link_mass: link panda_link3: 3.3 in wrong.urdf, 3.228604 in panda.xml"));
+  const ProgramResult against_table = Run({"consistency", "wrong.urdf", table_, "--samples", "20"});
+  EXPECT_EQ(against_table.exit_code, 1);
+  EXPECT_THAT(against_table.out,
+              HasSubstr("link_mass: link panda_link3: 3.3 in wrong.urdf, 3.228604 in panda.toml"));
+  EXPECT_THAT(against_table.out, HasSubstr("in wrong.urdf, "));
+}
+
+TEST_F(TwoDescriptions, AreImportedAsTablesThatAgreeWithThem) {
+  for (const std::string& source : {std::string("panda.urdf"), mjcf_}) {
+    const ProgramResult import = Run({"import", source, "--out", "imported.toml"});
+    EXPECT_EQ(import.exit_code, 0) << import.err;
+    EXPECT_EQ(import.out, "");
+    const ProgramResult result = Run({"consistency", "imported.toml", mjcf_, "--samples", "20"});
+    EXPECT_EQ(result.exit_code, 0) << result.err << result.out;
+  }
+  const ProgramResult printed = Run({"import", "panda.urdf"});
+  EXPECT_THAT(printed.out,
+              HasSubstr("# Parameters of one robot, written by dexcheck import from panda.urdf."));
+}
+
+TEST_F(TwoDescriptions, AreRefusedInOneLineWhenTheyCannotBeRead) {
+  WriteText(folder_.path() / "broken.urdf", "<robot name=\"x\">\n<link name=\"a\">\n</robot>");
+  WriteText(folder_.path() / "scene.sdf", "<sdf/>");
+  const auto expect_refused = [&](const std::vector<std::string>& arguments, const std::string& problem) {
+    const ProgramResult result = Run(arguments);
+    EXPECT_EQ(result.exit_code, 2) << result.out;
+    EXPECT_EQ(result.out, "");
+    EXPECT_THAT(result.err, ::testing::StartsWith("dexcheck: " + problem));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  };
+  expect_refused({"consistency", "broken.urdf", mjcf_}, "broken.urdf:3: is not XML");
+  expect_refused({"consistency", mjcf_, "scene.sdf"}, "scene.sdf: must be a parameter file (TOML), a URDF");
+  expect_refused({"consistency", mjcf_}, "consistency: two files must be given");
+  expect_refused({"consistency", "none.urdf", mjcf_}, "none.urdf: cannot be read");
+  expect_refused({"import", "broken.urdf", "--out", "x.toml"}, "broken.urdf:3: is not XML");
+  expect_refused({"import", table_}, table_ + ": must be a URDF or an MJCF, is a parameter file already");
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "x.toml"));
+}
+
+}  // namespace
+}  // namespace dexcheck

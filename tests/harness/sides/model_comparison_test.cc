@@ -1,0 +1,154 @@
+// Two descriptions without the engine: they agree when they describe one robot, whatever the order of joints
+// and the choice of frames, and what differs is found.
+
+#include "harness/sides/model_comparison.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "controller/common/errors.h"
+#include "harness/sides/description_match.h"
+#include "harness/sides/read_description.h"
+#include "tests/common/paths.h"
+#include "tests/common/random_robot.h"
+#include "tests/common/urdf_text.h"
+#include "tests/harness/sides/panda_urdf.h"
+
+namespace dexcheck {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string ListFailures(RobotDescription a, RobotDescription b, long samples = 20) {
+  CompleteEachOther(&a, &b);
+  ConsistencyOptions options;
+  options.samples = samples;
+  const ConsistencyResult result = CompareDescriptions(a, b, options, [](long) { return true; });
+  EXPECT_GE(result.terms.size(), 12U);
+  std::string failures;
+  for (const std::vector<CheckRecord>* records : {&result.gate.records, &result.terms}) {
+    for (const CheckRecord& record : *records) {
+      if (record.failed) failures += record.name + " ";
+    }
+  }
+  return failures;
+}
+
+RobotDescription ReadPandaTable() {
+  return ReadDescription(testing::SourcePath("/controller/parameters/panda.toml"));
+}
+
+TEST(ModelComparison, PandaByTableByUrdfAndByMjcf) {
+  const RobotDescription urdf = ParseUrdf(testing::MakePandaUrdf(), "panda.urdf");
+  const RobotDescription mjcf = ReadDescription(testing::SourcePath("/mjcf/panda.xml"));
+  EXPECT_EQ(ListFailures(ReadPandaTable(), urdf, 200), "");
+  EXPECT_EQ(ListFailures(urdf, ReadPandaTable()), "");
+  EXPECT_EQ(ListFailures(mjcf, urdf), "");
+}
+
+TEST(ModelComparison, RandomUrdfsWithOtherFramesAgree) {
+  std::mt19937 random(1710);
+  for (int index = 0; index < 20; ++index) {
+    testing::RandomRobotOptions options;
+    options.base = BaseType::kFixed;
+    options.joints = 1 + index % 13;
+    RobotSpec spec = testing::MakeRandomRobot(options, &random);
+    // The welded bodies are part of the specification after this.
+    const RobotDescription turned = ParseUrdf(testing::WriteUrdf(&spec, &random, 0.3), "turned.urdf");
+    const RobotDescription straight = ParseUrdf(testing::WriteUrdf(&spec, nullptr, 0.3), "straight.urdf");
+    EXPECT_EQ(ListFailures(turned, straight), "") << "robot " << index;
+  }
+}
+
+/// Two arms on one base; the order of joints is the file's.
+std::string MakeTwoArms(bool left_first) {
+  const auto arm = [](const std::string& name, const std::string& y) {
+    return "<link name=\"" + name +
+           "\"><inertial><origin xyz=\"0.1 0 0.2\"/><mass value=\"2\"/><inertia ixx=\"0.1\" " +
+           "ixy=\"0\" ixz=\"0\" iyy=\"0.1\" iyz=\"0\" izz=\"0.1\"/></inertial></link><joint name=\"" + name +
+           "_joint\" type=\"continuous\"><origin xyz=\"0 " + y +
+           " 0\"/><parent link=\"base\"/><child link=\"" + name + "\"/><axis xyz=\"0 1 0\"/></joint>\n";
+  };
+  const std::string left = arm("left", "1");
+  const std::string right = arm("right", "-1");
+  return "<robot name=\"two\"><link name=\"base\"/>\n" + (left_first ? left + right : right + left) +
+         "</robot>";
+}
+
+TEST(ModelComparison, DoesNotMindTheOrderOfJoints) {
+  const RobotDescription a = ParseUrdf(MakeTwoArms(true), "a.urdf");
+  const RobotDescription b = ParseUrdf(MakeTwoArms(false), "b.urdf");
+  EXPECT_EQ(a.spec.joints[0].name, "left_joint");
+  EXPECT_EQ(b.spec.joints[0].name, "right_joint");
+  EXPECT_EQ(ListFailures(a, b), "");
+}
+
+TEST(ModelComparison, FindsWhatDiffers) {
+  const RobotDescription right = ParseUrdf(testing::MakePandaUrdf(), "panda.urdf");
+  RobotDescription wrong = right;
+  wrong.spec.joints[3].body.com.y() += 1e-6;
+  EXPECT_THAT(ListFailures(right, wrong), HasSubstr("link_com"));
+  EXPECT_THAT(ListFailures(right, wrong), HasSubstr("gravity"));
+  wrong = right;
+  wrong.spec.joints[6].body.mass *= 1.0001;
+  EXPECT_THAT(ListFailures(right, wrong), HasSubstr("link_mass"));
+  EXPECT_THAT(ListFailures(right, wrong), HasSubstr("M_bar"));
+  EXPECT_THAT(ListFailures(right, wrong), HasSubstr("C_bar"));
+  wrong = right;
+  wrong.joints[2].dry_friction = 0.1;
+  EXPECT_EQ(ListFailures(right, wrong), "joint_dry_friction ");
+  wrong = right;
+  wrong.spec.joints[2].damping = 0.1;
+  EXPECT_EQ(ListFailures(right, wrong), "joint_damping friction ");
+  wrong = right;
+  wrong.spec.frames[0].X_LF.translation().x() += 1e-9;
+  EXPECT_THAT(ListFailures(right, wrong), HasSubstr("frame_pose"));
+}
+
+TEST(ModelComparison, WhatOneLacksIsNotCompared) {
+  RobotDescription urdf = ParseUrdf(testing::MakePandaUrdf(), "panda.urdf");
+  RobotDescription table = ReadPandaTable();
+  table.spec.joints[1].armature = 0.1;
+  table.spec.gravity.x() = 1.0;
+  urdf.spec.joints[2].link = "elbow";
+  EXPECT_EQ(ListFailures(urdf, table), "");
+  const std::vector<std::string> notes = CompleteEachOther(&urdf, &table);
+  EXPECT_THAT(notes, ::testing::Contains(HasSubstr("armature: only")));
+  EXPECT_THAT(notes, ::testing::Contains(HasSubstr("gravity: only")));
+  EXPECT_THAT(notes, ::testing::Contains("links by other names: \"panda_link3\" is \"elbow\""));
+  EXPECT_EQ(urdf.spec.joints[1].armature, 0.1);
+}
+
+TEST(ModelComparison, RefusesOtherMechanisms) {
+  const RobotDescription right = ParseUrdf(testing::MakePandaUrdf(), "panda.urdf");
+  const auto problem = [&](RobotDescription other) {
+    RobotDescription own = right;
+    try {
+      CompleteEachOther(&own, &other);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  RobotDescription other = right;
+  other.spec.source = "other.urdf";
+  other.spec.joints[2].name = "elbow";
+  EXPECT_EQ(problem(other),
+            "other.urdf: does not match panda.urdf; only in panda.urdf: joint \"panda_joint3\"; only in "
+            "other.urdf: "
+            "joint \"elbow\"");
+  other = right;
+  other.spec.source = "other.urdf";
+  other.spec.joints[2].type = JointType::kPrismatic;
+  EXPECT_EQ(problem(other), "other.urdf: joint \"panda_joint3\": must be revolute as in panda.urdf");
+  other = right;
+  other.spec.source = "other.urdf";
+  other.spec.joints[2].parent = 0;
+  EXPECT_EQ(
+      problem(other),
+      "other.urdf: joint \"panda_joint3\": must come after \"panda_joint2\" as in panda.urdf, comes after "
+      "\"panda_joint1\"");
+}
+
+}  // namespace
+}  // namespace dexcheck
