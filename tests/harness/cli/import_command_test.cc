@@ -91,11 +91,11 @@ TEST_F(TwoDescriptions, AreRefusedInOneLineWhenTheyCannotBeRead) {
     EXPECT_THAT(result.err, ::testing::StartsWith("dexcheck: " + problem));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   };
-  expect_refused({"consistency", "broken.urdf", mjcf_}, "broken.urdf:3: is not XML");
+  expect_refused({"consistency", "broken.urdf", mjcf_}, "broken.urdf:2: is not XML");
   expect_refused({"consistency", mjcf_, "scene.sdf"}, "scene.sdf: must be a parameter file (TOML), a URDF");
   expect_refused({"consistency", mjcf_}, "consistency: two files must be given");
   expect_refused({"consistency", "none.urdf", mjcf_}, "none.urdf: cannot be read");
-  expect_refused({"import", "broken.urdf", "--out", "x.toml"}, "broken.urdf:3: is not XML");
+  expect_refused({"import", "broken.urdf", "--out", "x.toml"}, "broken.urdf:2: is not XML");
   expect_refused({"import", table_}, table_ + ": must be a URDF or an MJCF, is a parameter file already");
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "x.toml"));
 }
