@@ -73,9 +73,10 @@ Matrix3Xd ContactCheck::CalcPointJacobian(int body, const Vector3d& point, Matri
   return linear;
 }
 
-void ContactCheck::Compare(const VectorXd& q, const VectorXd& xi, StateSource* source, long sample) {
+void ContactCheck::Compare(const VectorXd& q, const VectorXd& xi, StateSource* source, long sample_number) {
+  const auto sample = static_cast<double>(sample_number);
   const RobotModel& model = adapter_->model();
-  const size_t tip_index = static_cast<size_t>(sample) % model.fingertips().size();
+  const size_t tip_index = static_cast<size_t>(sample_number) % model.fingertips().size();
   const int frame = model.fingertips()[tip_index];
   const Location where{Location::Kind::kFrame, frame, -1};
   const Sphere tip(*model.frames()[static_cast<size_t>(frame)].sphere_radius);
@@ -142,7 +143,7 @@ void ContactCheck::Compare(const VectorXd& q, const VectorXd& xi, StateSource* s
   const auto compare = [&](Term term, const auto& of_model, const auto& of_engine, double scale) {
     for (Eigen::Index col = 0; col < of_model.cols(); ++col) {
       for (Eigen::Index row = 0; row < of_model.rows(); ++row)
-        records_[term].Add(of_model(row, col), of_engine(row, col), scale, where, sample);
+        records_[term].Compare(of_model(row, col), of_engine(row, col), scale, where, sample);
     }
   };
   const Pose placed = X_Bo * contact.geometry.g_o_cf;

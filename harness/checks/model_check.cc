@@ -48,7 +48,7 @@ ModelCheck::ModelCheck(const Adapter& adapter, const ModelViewFactory& make_view
 
 void ModelCheck::Compare(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi,
                          const Eigen::Ref<const VectorXd>& w, long sample) {
-  sample_ = sample;
+  sample_ = static_cast<double>(sample);
   terms_->SetState(q, xi);
   engine_.SetState(q, xi);
   scales_.SetState(terms_->terms(), q, xi);
@@ -71,13 +71,13 @@ void ModelCheck::CompareGeometry() {
       const Location at_joint{Location::Kind::kJoint, i, -1};
       const Vector3d axis = X.linear().col(2);
       const Vector3d axis_engine = engine_.JointAxis(i);
-      for (int k = 0; k < 3; ++k) record(kJointAxis).Add(axis[k], axis_engine[k], 1.0, at_joint, sample_);
+      for (int k = 0; k < 3; ++k) record(kJointAxis).Compare(axis[k], axis_engine[k], 1.0, at_joint, sample_);
       if (model.joints()[static_cast<size_t>(i)].type == JointType::kRevolute) {
         // Where along the axis the anchor stands is a choice of frames: compare the foot of the
         // perpendicular.
         const Vector3d anchor = engine_.JointAnchor(i);
         const Vector3d foot = X.translation() + axis.dot(anchor - X.translation()) * axis;
-        for (int k = 0; k < 3; ++k) record(kJointAxis).Add(foot[k], anchor[k], length, at_joint, sample_);
+        for (int k = 0; k < 3; ++k) record(kJointAxis).Compare(foot[k], anchor[k], length, at_joint, sample_);
       }
     } else if (model.base().type == BaseType::kFixed) {
       continue;  // the world carries no mass
@@ -88,12 +88,12 @@ void ModelCheck::CompareGeometry() {
     const Location at_link{Location::Kind::kLink, i, -1};
     if (body.mass > 0.0 || link.mass > 0.0) {
       const Vector3d com = X * body.com;
-      for (int k = 0; k < 3; ++k) record(kLinkCom).Add(com[k], link.com[k], length, at_link, sample_);
+      for (int k = 0; k < 3; ++k) record(kLinkCom).Compare(com[k], link.com[k], length, at_link, sample_);
     }
     const Matrix3d inertia = X.linear() * body.inertia * X.linear().transpose();
     const double scale = Positive(std::max(inertia.trace(), link.inertia.trace()));
     for (int k = 0; k < 9; ++k) {
-      record(kLinkInertia).Add(inertia.data()[k], link.inertia.data()[k], scale, at_link, sample_);
+      record(kLinkInertia).Compare(inertia.data()[k], link.inertia.data()[k], scale, at_link, sample_);
     }
   }
 }
@@ -109,9 +109,9 @@ void ModelCheck::CompareFrames(const Eigen::Ref<const VectorXd>& xi) {
     const Pose X_engine = engine_.FramePose(frame);
     for (int row = 0; row < 3; ++row) {
       record(kFramePose)
-          .Add(X.translation()[row], X_engine.translation()[row], scales_.world_length(), where, sample_);
+          .Compare(X.translation()[row], X_engine.translation()[row], scales_.world_length(), where, sample_);
       for (int col = 0; col < 3; ++col) {
-        record(kFramePose).Add(X.linear()(row, col), X_engine.linear()(row, col), 1.0, where, sample_);
+        record(kFramePose).Compare(X.linear()(row, col), X_engine.linear()(row, col), 1.0, where, sample_);
       }
     }
     terms_->CalcFrameJacobian(frame, J_, J_dot_);
@@ -126,8 +126,9 @@ void ModelCheck::CompareFrames(const Eigen::Ref<const VectorXd>& xi) {
       const Vector3d angular = X.linear() * J_.col(col).tail<3>();
       const double scale = scales_.CalcVelocityScale(col);
       for (int k = 0; k < 3; ++k) {
-        record(kJ).Add(linear[k], J_engine_(k, col), scale, where, sample_);
-        record(kJ).Add(angular[k], J_engine_(3 + k, col), Positive(scale / scales_.length()), where, sample_);
+        record(kJ).Compare(linear[k], J_engine_(k, col), scale, where, sample_);
+        record(kJ).Compare(angular[k], J_engine_(3 + k, col), Positive(scale / scales_.length()), where,
+                           sample_);
       }
       omega += angular * xi[col];
       velocity += linear * xi[col];
@@ -137,8 +138,8 @@ void ModelCheck::CompareFrames(const Eigen::Ref<const VectorXd>& xi) {
     // In world axes d/dt (R V) = R V_dot + omega x R V; the angular part has omega x omega = 0.
     bias.head<3>() += omega.cross(velocity);
     for (int k = 0; k < 3; ++k) {
-      record(kJDotXi).Add(bias[k], bias_engine[k], acceleration, where, sample_);
-      record(kJDotXi).Add(bias[3 + k], bias_engine[3 + k], angular_acceleration, where, sample_);
+      record(kJDotXi).Compare(bias[k], bias_engine[k], acceleration, where, sample_);
+      record(kJDotXi).Compare(bias[3 + k], bias_engine[3 + k], angular_acceleration, where, sample_);
     }
   }
 }
@@ -148,8 +149,8 @@ void ModelCheck::CompareMassMatrices() {
   for (int col = 0; col < n; ++col) {
     for (int row = 0; row < n; ++row) {
       record(kReducedMassMatrix)
-          .Add(terms_->M()(row, col), engine_.M()(row, col), scales_.CalcMassScale(row, col),
-               {Location::Kind::kVelocityPair, row, col}, sample_);
+          .Compare(terms_->M()(row, col), engine_.M()(row, col), scales_.CalcMassScale(row, col),
+                   {Location::Kind::kVelocityPair, row, col}, sample_);
     }
   }
   // M of (16): its first three rows are along the world's x, y and about z; the others are M_bar's.
@@ -165,9 +166,10 @@ void ModelCheck::CompareMassMatrices() {
       const double row_mass = row < base ? mass : scales_.GetSubtreeMass(row - shift);
       const double col_mass = col < base ? mass : scales_.GetSubtreeMass(col - shift);
       record(kMassMatrix)
-          .Add(unreduced_->M()(row, col), engine_unreduced_.M()(row, col),
-               Positive(std::min(row_mass, col_mass) * row_scale * col_scale),
-               {Location::Kind::kVelocityPair, std::max(row - shift, 0), std::max(col - shift, 0)}, sample_);
+          .Compare(unreduced_->M()(row, col), engine_unreduced_.M()(row, col),
+                   Positive(std::min(row_mass, col_mass) * row_scale * col_scale),
+                   {Location::Kind::kVelocityPair, std::max(row - shift, 0), std::max(col - shift, 0)},
+                   sample_);
     }
   }
 }
@@ -179,11 +181,11 @@ void ModelCheck::CompareForces(const Eigen::Ref<const VectorXd>& xi, const Eigen
   for (int i = 0; i < n; ++i) {
     const Location where{Location::Kind::kVelocity, i, -1};
     record(kCoriolisForce)
-        .Add(force_[i], engine_.coriolis()[i], scales_.CalcCoriolisScale(i), where, sample_);
-    record(kGravity).Add(terms_->gravity()[i], engine_.gravity()[i], scales_.CalcGravityScale(i), where,
-                         sample_);
-    record(kFriction).Add(terms_->friction()[i], engine_.friction()[i], scales_.CalcFrictionScale(i, xi),
-                          where, sample_);
+        .Compare(force_[i], engine_.coriolis()[i], scales_.CalcCoriolisScale(i), where, sample_);
+    record(kGravity).Compare(terms_->gravity()[i], engine_.gravity()[i], scales_.CalcGravityScale(i), where,
+                             sample_);
+    record(kFriction).Compare(terms_->friction()[i], engine_.friction()[i], scales_.CalcFrictionScale(i, xi),
+                              where, sample_);
   }
 
   // Every entry of C_bar(xi) at once.
@@ -195,8 +197,9 @@ void ModelCheck::CompareForces(const Eigen::Ref<const VectorXd>& xi, const Eigen
   scales_at_w_.SetState(terms_at_w_, q, w);
   for (int i = 0; i < n; ++i) {
     record(kCoriolisMatrix)
-        .Add(force_[i], force_engine_[i], scales_.CalcCoriolisScale(i) + scales_at_w_.CalcCoriolisScale(i),
-             {Location::Kind::kVelocity, i, -1}, sample_);
+        .Compare(force_[i], force_engine_[i],
+                 scales_.CalcCoriolisScale(i) + scales_at_w_.CalcCoriolisScale(i),
+                 {Location::Kind::kVelocity, i, -1}, sample_);
   }
 }
 
@@ -205,15 +208,16 @@ void ModelCheck::CompareEnergies() {
   const EnergyAndMomentum& engine = engine_.energy_and_momentum();
   const EnergyAndMomentum model = terms_->CalcEnergyAndMomentum();
   const double momentum = scales_.CalcMomentumScale();
-  record(kKineticEnergy).Add(model.kinetic, engine.kinetic, scales_.CalcKineticEnergyScale(), whole, sample_);
+  record(kKineticEnergy)
+      .Compare(model.kinetic, engine.kinetic, scales_.CalcKineticEnergyScale(), whole, sample_);
   record(kPotentialEnergy)
-      .Add(model.potential, engine.potential, scales_.CalcPotentialEnergyScale(), whole, sample_);
+      .Compare(model.potential, engine.potential, scales_.CalcPotentialEnergyScale(), whole, sample_);
   for (int k = 0; k < 3; ++k) {
     record(kLinearMomentum)
-        .Add(model.linear_momentum[k], engine.linear_momentum[k], Positive(momentum), whole, sample_);
+        .Compare(model.linear_momentum[k], engine.linear_momentum[k], Positive(momentum), whole, sample_);
     record(kAngularMomentum)
-        .Add(model.angular_momentum[k], engine.angular_momentum[k], Positive(momentum * scales_.length()),
-             whole, sample_);
+        .Compare(model.angular_momentum[k], engine.angular_momentum[k], Positive(momentum * scales_.length()),
+                 whole, sample_);
   }
 }
 

@@ -64,7 +64,7 @@ class ModelCheck {
   RoundingScales scales_;
   ModelTerms terms_at_w_;  // for scales only
   RoundingScales scales_at_w_;
-  long sample_ = -1;
+  double sample_ = -1.0;
 
   VectorXd unreduced_velocity_;
   Matrix6Xd J_, J_dot_, J_engine_;

@@ -71,7 +71,8 @@ void ObjectCheck::SetEngineState(const Vector6d& X_o, const Vector6d& X_o_dot) {
   mj_fullM(engine_.get(), M_nv_.data(), data_->qM);
 }
 
-void ObjectCheck::Compare(const Vector6d& X_o, const Vector6d& X_o_dot, long sample) {
+void ObjectCheck::Compare(const Vector6d& X_o, const Vector6d& X_o_dot, long sample_number) {
+  const auto sample = static_cast<double>(sample_number);
   const MassProperties& body = adapter_->model().object()->body;
   const Vector3d gravity = adapter_->model().gravity();
   const ObjectTerms terms = formulas_.terms(body, gravity, X_o, X_o_dot);
@@ -83,7 +84,7 @@ void ObjectCheck::Compare(const Vector6d& X_o, const Vector6d& X_o_dot, long sam
     CheckRecord& record = records_[static_cast<size_t>(term)];
     for (Eigen::Index col = 0; col < model.cols(); ++col) {
       for (Eigen::Index row = 0; row < model.rows(); ++row) {
-        record.Add(model(row, col), engine(row, col), scale, where, sample);
+        record.Compare(model(row, col), engine(row, col), scale, where, sample);
       }
     }
   };
@@ -109,7 +110,7 @@ void ObjectCheck::Compare(const Vector6d& X_o, const Vector6d& X_o_dot, long sam
       (Vector6d() << Vector3d::Constant(body.mass), Vector3d::Constant(body.inertia.trace())).finished();
   for (int row = 0; row < 6; ++row) {
     for (int col = 0; col < 6; ++col) {
-      records_[kInertia].Add(terms.M_o(row, col), M_engine(row, col), mass_scale[row], where, sample);
+      records_[kInertia].Compare(terms.M_o(row, col), M_engine(row, col), mass_scale[row], where, sample);
     }
   }
   mj_comVel(engine_.get(), data_.get());
@@ -130,14 +131,14 @@ void ObjectCheck::Compare(const Vector6d& X_o, const Vector6d& X_o_dot, long sam
   const double weight = body.mass * gravity.norm();
   for (int row = 0; row < 6; ++row) {
     const double arm = row < 3 ? 1.0 : place;
-    records_[kCoriolis].Add(coriolis[row], coriolis_engine[row], coriolis_force * arm, where, sample);
-    records_[kGravity].Add(terms.N_o[row], gravity_engine[row], (weight > 0.0 ? weight : 1.0) * arm, where,
-                           sample);
+    records_[kCoriolis].Compare(coriolis[row], coriolis_engine[row], coriolis_force * arm, where, sample);
+    records_[kGravity].Compare(terms.N_o[row], gravity_engine[row], (weight > 0.0 ? weight : 1.0) * arm,
+                               where, sample);
   }
   const double kinetic = CalcObjectKineticEnergy(body, terms.V_Bo);
   const double kinetic_engine = 0.5 * V_engine.dot(B.transpose() * M * B * V_engine);
-  records_[kKineticEnergy].Add(kinetic, kinetic_engine, (body.mass + body.inertia.trace()) * rate * rate,
-                               where, sample);
+  records_[kKineticEnergy].Compare(kinetic, kinetic_engine, (body.mass + body.inertia.trace()) * rate * rate,
+                                   where, sample);
 }
 
 }  // namespace dexcheck

@@ -72,7 +72,7 @@ StepModelCheck::ContactScales StepModelCheck::CalcContactScales(const ContactGeo
 }
 
 void StepModelCheck::CompareContacts(const GraspTerms& grasp, const MeasuredState& state, const Pose& X_W0,
-                                     long step) {
+                                     double when) {
   StepTerm& frames = term(kContactFrame);
   StepTerm& maps = term(kG);
   StepTerm& jacobian = term(kJB);
@@ -142,7 +142,7 @@ void StepModelCheck::CompareContacts(const GraspTerms& grasp, const MeasuredStat
   const auto where = [&](Eigen::Index row, Eigen::Index) {
     return Location{Location::Kind::kFrame, fingertips_[static_cast<size_t>(row / 3)], -1};
   };
-  jacobian.CheckZeros(other_zeros_[1], grasp.J_B(), scale, where, step);
+  jacobian.CheckZeros(other_zeros_[1], grasp.J_B(), scale, where, when);
 }
 
 void StepModelCheck::CompareContactRates(const Contact& contact, int finger, const ContactPlace& place) {

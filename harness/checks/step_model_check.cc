@@ -87,20 +87,20 @@ void StepModelCheck::DefineRobotTerms() {
 }
 
 void StepModelCheck::Compare(const ModelTerms& robot, const GraspTerms& grasp, const MeasuredState& state,
-                             const Pose& X_W0, long step) {
+                             const Pose& X_W0, double when) {
   engine_.SetState(state.q, state.xi, state.X_Bo, state.V_Bo);
   scales_.SetState(robot, state.q, state.xi);
   CompareFrames(robot);
   CompareForces(robot, state);
   CompareEnergies(robot);
   CompareObject(grasp, state);
-  CompareMass(robot, step);
-  CompareJacobians(robot, step);
-  if (with_contacts_) CompareContacts(grasp, state, X_W0, step);
+  CompareMass(robot, when);
+  CompareJacobians(robot, when);
+  if (with_contacts_) CompareContacts(grasp, state, X_W0, when);
   for (size_t i = 0; i < terms_.size(); ++i) {
     step_errors_[i] = 0.0;
     if (IsOfContacts(i) && !with_contacts_) continue;
-    terms_[i].Finish(step);
+    terms_[i].Finish(when);
     step_errors_[i] = terms_[i].step_error();
   }
 }
@@ -140,7 +140,7 @@ void StepModelCheck::CompareFrames(const ModelTerms& robot) {
   }
 }
 
-void StepModelCheck::CompareJacobians(const ModelTerms& robot, long step) {
+void StepModelCheck::CompareJacobians(const ModelTerms& robot, double when) {
   StepTerm& jacobian = term(kJ);
   Eigen::Index k = 0;
   for (size_t i = 0; i < fingertips_.size(); ++i) {
@@ -164,11 +164,11 @@ void StepModelCheck::CompareJacobians(const ModelTerms& robot, long step) {
     const auto where = [&](Eigen::Index, Eigen::Index) {
       return Location{Location::Kind::kFrame, fingertips_[i], -1};
     };
-    jacobian.CheckZeros(J_zeros_[i], J_, scale, where, step);
+    jacobian.CheckZeros(J_zeros_[i], J_, scale, where, when);
   }
 }
 
-void StepModelCheck::CompareMass(const ModelTerms& robot, long step) {
+void StepModelCheck::CompareMass(const ModelTerms& robot, double when) {
   StepTerm& mass = term(kMassMatrix);
   const Eigen::Index half = engine_.mass().size();
   const double* const M = robot.M().data();
@@ -182,7 +182,7 @@ void StepModelCheck::CompareMass(const ModelTerms& robot, long step) {
   const auto where = [](Eigen::Index row, Eigen::Index col) {
     return Location{Location::Kind::kVelocityPair, static_cast<int>(row), static_cast<int>(col)};
   };
-  mass.CheckZeros(other_zeros_[0], robot.M(), scale, where, step);
+  mass.CheckZeros(other_zeros_[0], robot.M(), scale, where, when);
 }
 
 void StepModelCheck::CompareForces(const ModelTerms& robot, const MeasuredState& state) {

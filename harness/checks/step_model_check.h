@@ -37,7 +37,7 @@ class StepModelCheck {
   /// @param X_W0 pose of Sigma_0 in the plant, tilt and height included: kappa was found there. Without a
   /// plant, robot.CalcLinkPose(-1).
   void Compare(const ModelTerms& robot, const GraspTerms& grasp, const MeasuredState& state, const Pose& X_W0,
-               long step);
+               double when);
 
   /// Worst over all steps, in a fixed order.
   [[nodiscard]] std::vector<CheckRecord> records() const;
@@ -95,11 +95,11 @@ class StepModelCheck {
   [[nodiscard]] ContactScales CalcContactScales(const ContactGeometry& contact) const;
 
   void CompareFrames(const ModelTerms& robot);
-  void CompareJacobians(const ModelTerms& robot, long step);
-  void CompareMass(const ModelTerms& robot, long step);
+  void CompareJacobians(const ModelTerms& robot, double when);
+  void CompareMass(const ModelTerms& robot, double when);
   void CompareForces(const ModelTerms& robot, const MeasuredState& state);
   void CompareEnergies(const ModelTerms& robot);
-  void CompareContacts(const GraspTerms& grasp, const MeasuredState& state, const Pose& X_W0, long step);
+  void CompareContacts(const GraspTerms& grasp, const MeasuredState& state, const Pose& X_W0, double when);
   void CompareContactRates(const Contact& contact, int finger, const ContactPlace& place);
   void CompareObject(const GraspTerms& grasp, const MeasuredState& state);
 

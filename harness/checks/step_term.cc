@@ -36,20 +36,20 @@ StepTerm::StepTerm(std::string name, double bound, std::vector<Location> where) 
   weight.setOnes(size);
 }
 
-void StepTerm::Finish(long step) {
+void StepTerm::Finish(double when) {
   double error = ((model - engine).abs() * weight).maxCoeff<Eigen::PropagateNaN>();
   if (!(error < std::numeric_limits<double>::infinity())) error = std::numeric_limits<double>::infinity();
   step_error_ = std::max(error, zeros_error_);
   zeros_error_ = 0.0;
-  const bool is_worst = error > record_.worst || record_.sample < 0;
-  const bool fails_first = error > record_.bound && !record_.failed;
+  const bool is_worst = error > record_.worst || record_.comparisons == 0;
+  const bool fails_first = !(error <= record_.bound) && !record_.failed;
   if (!is_worst && !fails_first) {
     record_.comparisons += size();
     return;
   }
   for (Eigen::Index i = 0; i < size(); ++i) {
-    record_.AddError(std::abs(model[i] - engine[i]) * weight[i], model[i], engine[i],
-                     where_[static_cast<size_t>(i)], step);
+    record_.CompareError(std::abs(model[i] - engine[i]) * weight[i], model[i], engine[i],
+                         where_[static_cast<size_t>(i)], when);
   }
 }
 

@@ -50,19 +50,19 @@ class StepTerm {
   /// entry.
   template <typename Matrix, typename Scale, typename Where>
   void CheckZeros(const ZeroPattern& pattern, const Matrix& matrix, const Scale& scale, const Where& location,
-                  long step) {
+                  double when) {
     if (pattern.Holds(matrix.data())) {
       record_.comparisons += pattern.count();
       return;
     }
     pattern.ForEach([&](Eigen::Index row, Eigen::Index col) {
-      const double error = record_.Add(matrix(row, col), 0.0, scale(row, col), location(row, col), step);
+      const double error = record_.Compare(matrix(row, col), 0.0, scale(row, col), location(row, col), when);
       if (error > zeros_error_) zeros_error_ = error;
     });
   }
 
   /// Adds this step's numbers to the record.
-  void Finish(long step);
+  void Finish(double when);
 
   [[nodiscard]] const CheckRecord& record() const { return record_; }
   /// Largest relative error of the last step.

@@ -106,7 +106,7 @@ class ModelComparison {
   }
 
   void Compare(const VectorXd& q, const VectorXd& xi, long sample) {
-    sample_ = sample;
+    sample_ = static_cast<double>(sample);
     for (size_t i = 0; i < position_of_.size(); ++i) q_b_[position_of_[i]] = q[static_cast<Eigen::Index>(i)];
     for (size_t i = 0; i < velocity_of_.size(); ++i)
       xi_b_[velocity_of_[i]] = xi[static_cast<Eigen::Index>(i)];
@@ -175,12 +175,12 @@ class ModelComparison {
       gate->records.push_back(record);
     }
     const double size = std::max({std::abs(a), std::abs(b), scale});
-    if (gate->records.back().Add(a, b, size > 0.0 ? size : 1.0, where, -1) <= kRounding) return;
+    if (gate->records.back().Compare(a, b, size > 0.0 ? size : 1.0, where, -1) <= kRounding) return;
     gate->findings.push_back({name, Describe(where, model_a_, base_), a, b, where, entry});
   }
 
   void Add(Term term, double a, double b, double scale, const Location& where) {
-    records_[term].Add(a, b, scale, where, sample_);
+    records_[term].Compare(a, b, scale, where, sample_);
   }
 
   /// Physical quantities: link frames are each description's own choice.
@@ -294,7 +294,7 @@ class ModelComparison {
   VectorXd q_b_, xi_b_;
   Matrix6Xd J_a_, J_dot_a_, J_b_, J_dot_b_;
   CheckRecord records_[kTermCount];
-  long sample_ = -1;
+  double sample_ = -1.0;
 };
 
 }  // namespace

@@ -49,7 +49,7 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check)
     const bool bonded = !setup.bonds().empty();
     model_check_->IncludeContacts(!bonded);
     for (size_t i = 0; i < records.size(); ++i) {
-      RunCheck run_check;
+      CheckRecord run_check;
       run_check.name = records[i].name;
       run_check.kind = records[i].kind;
       run_check.bound = records[i].bound;
@@ -268,7 +268,7 @@ void ClosedLoop::CompareModel() {
     model_check_->IncludeContacts(
         std::all_of(overlap.begin(), overlap.end(), [](double depth) { return depth > -Observer::kFar; }));
   }
-  model_check_->Compare(controller_.robot(), controller_.grasp(), state_, observer_.X_W0(), step_);
+  model_check_->Compare(controller_.robot(), controller_.grasp(), state_, observer_.X_W0(), step_time_);
   const std::span<const double> errors = model_check_->step_errors();
   bool newly_failed = false;
   for (size_t i = 0; i < errors.size(); ++i) {
@@ -282,7 +282,7 @@ void ClosedLoop::CompareModel() {
   const RobotModel& model = setup_->model();
   for (size_t i = 0; i < records.size(); ++i) {
     if (records[i].failed) {
-      model_checks_[i].where = Describe(records[i].first_failure, model, model.num_base_velocities());
+      model_checks_[i].part = Describe(records[i].first_failure, model, model.num_base_velocities());
     }
   }
 }

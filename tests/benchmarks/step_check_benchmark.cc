@@ -78,9 +78,9 @@ void Compare(benchmark::State& state) {
   States& states = SharedStates();
   testing::CheckedController& controller = *states.controller;
   controller.SetState(states.q[0], states.xi[0], states.X_Bo[0], states.V_Bo[0]);
-  long step = 0;
+  double step = 0.0;
   for (auto _ : state) {
-    controller.Compare(step++);
+    controller.Compare(step += 1.0);
     benchmark::ClobberMemory();
   }
 }

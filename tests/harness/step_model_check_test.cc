@@ -65,7 +65,7 @@ TEST_P(StepModelCheckTest, ShippedRobotAgreesAlongAWalk) {
   for (const CheckRecord& record : records) {
     EXPECT_FALSE(record.failed) << record.name << ": " << record.worst << " > " << record.bound << ", "
                                 << Describe(record.where, controller.model, 2) << ", " << record.model_value
-                                << " against " << record.engine_value << ", step " << record.sample;
+                                << " against " << record.engine_value << ", step " << record.at;
     EXPECT_EQ(record.kind, CheckKind::kModel);
     EXPECT_GE(record.comparisons, kSteps);
   }
@@ -171,7 +171,7 @@ TEST_P(MutatedModel, IsFoundAndNamed) {
   controller.SetState(walk.q, walk.xi, walk.X_Bo, walk.V_Bo);
   controller.Compare(1);
   EXPECT_GE(FindRecord(controller.check.records(), GetParam().term).worst, worst);
-  EXPECT_EQ(FindRecord(controller.check.records(), GetParam().term).first_failing_sample, 0);
+  EXPECT_EQ(FindRecord(controller.check.records(), GetParam().term).failed_at, 0);
 }
 
 constexpr double kChange = 1.001;
@@ -299,7 +299,7 @@ TEST(StepTerm, CountsWhatIsNotANumberAsInfinite) {
     term.model << 0.0, value, 0.0;
     term.Finish(5);
     EXPECT_TRUE(term.record().failed);
-    EXPECT_EQ(term.record().first_failing_sample, 5);
+    EXPECT_EQ(term.record().failed_at, 5);
     EXPECT_EQ(term.step_error(), std::numeric_limits<double>::infinity());
   }
 }
