@@ -1,0 +1,91 @@
+#include "harness/engine/remove_looks.h"
+
+#include <mujoco/mjxmacro.h>
+
+#include <cstring>
+#include <string_view>
+#include <vector>
+
+#include "harness/engine/engine.h"
+
+namespace dexcheck {
+namespace {
+
+/// Calls visit(id) for each reference that an element other than a pair makes to a geom.
+template <typename Visit>
+void ForEachReference(mjModel* m, const Visit& visit) {
+  for (int i = 0; i < m->nwrap; ++i) {
+    if (m->wrap_type[i] == mjWRAP_SPHERE || m->wrap_type[i] == mjWRAP_CYLINDER) visit(m->wrap_objid + i);
+  }
+  for (int i = 0; i < m->nsensor; ++i) {
+    if (m->sensor_objtype[i] == mjOBJ_GEOM) visit(m->sensor_objid + i);
+    if (m->sensor_reftype[i] == mjOBJ_GEOM) visit(m->sensor_refid + i);
+  }
+  for (int i = 0; i < m->neq; ++i) {
+    if (m->eq_type[i] != mjEQ_DISTANCE) continue;
+    visit(m->eq_obj1id + i);
+    visit(m->eq_obj2id + i);
+  }
+  for (int i = 0; i < m->ntupledata; ++i) {
+    if (m->tuple_objtype[i] == mjOBJ_GEOM) visit(m->tuple_objid + i);
+  }
+}
+
+/// Moves the rows of the geoms that stay to the front of an array.
+template <typename Number>
+void KeepRows(const std::vector<int>& stay, int columns, Number* rows) {
+  for (size_t i = 0; i < stay.size(); ++i) {
+    std::memmove(rows + i * static_cast<size_t>(columns),
+                 rows + static_cast<size_t>(stay[i]) * static_cast<size_t>(columns),
+                 static_cast<size_t>(columns) * sizeof(Number));
+  }
+}
+
+}  // namespace
+
+int RemoveLooks(mjModel* m) {
+  std::vector<bool> keep(static_cast<size_t>(m->ngeom), false);
+  for (int geom = 0; geom < m->ngeom; ++geom) {
+    keep[static_cast<size_t>(geom)] = CanTouch(*m, geom) || m->geom_fluid[mjNFLUID * geom] != 0.0;
+  }
+  ForEachReference(m, [&](const int* geom) {
+    if (*geom >= 0) keep[static_cast<size_t>(*geom)] = true;
+  });
+  std::vector<int> stay;
+  std::vector<int> new_id(keep.size(), -1);
+  for (int geom = 0; geom < m->ngeom; ++geom) {
+    if (!keep[static_cast<size_t>(geom)]) continue;
+    new_id[static_cast<size_t>(geom)] = static_cast<int>(stay.size());
+    stay.push_back(geom);
+  }
+  const int removed = m->ngeom - static_cast<int>(stay.size());
+  if (removed == 0) return 0;
+
+  const auto renumber = [&](int* geom) {
+    if (*geom >= 0) *geom = new_id[static_cast<size_t>(*geom)];
+  };
+  ForEachReference(m, renumber);
+  for (int pair = 0; pair < m->npair; ++pair) {
+    renumber(m->pair_geom1 + pair);
+    renumber(m->pair_geom2 + pair);
+  }
+  // All arrays with a row for each geom, as the engine lists them.
+#undef MJ_M
+#define MJ_M(size) m->size
+#define X(type, name, rows, columns) \
+  if (std::string_view(#rows) == "ngeom") KeepRows(stay, static_cast<int>(columns), m->name);
+  MJMODEL_POINTERS
+#undef X
+  m->ngeom = static_cast<int>(stay.size());
+
+  int next = 0;
+  for (int body = 0; body < m->nbody; ++body) {
+    const int first = next;
+    while (next < m->ngeom && m->geom_bodyid[next] == body) ++next;
+    m->body_geomnum[body] = next - first;
+    m->body_geomadr[body] = next > first ? first : -1;
+  }
+  return removed;
+}
+
+}  // namespace dexcheck
