@@ -62,7 +62,7 @@ BENCHMARK(PlantStep)->Unit(benchmark::kMicrosecond);
 /// The engine's side of the check alone.
 void EngineSide(benchmark::State& state) {
   States& states = SharedStates();
-  EngineStep engine(states.controller->adapter, states.fingertips);
+  EngineTerms engine(states.controller->adapter, states.fingertips);
   size_t k = 0;
   for (auto _ : state) {
     engine.SetState(states.q[k], states.xi[k], states.X_Bo[k], states.V_Bo[k]);

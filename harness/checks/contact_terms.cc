@@ -1,0 +1,220 @@
+// The contacts' terms: (22)-(40) against the engine's narrow phase and the motion of the two bodies that
+// touch.
+
+#include <algorithm>
+#include <cmath>
+
+#include "controller/contact/rolling.h"
+#include "harness/checks/term_table.h"
+
+namespace dexcheck {
+namespace {
+
+using Numbers = Eigen::ArrayXd;
+using Context = TermContext;
+using Kind = Location::Kind;
+
+/// Rounding errors of a contact's place.
+void CalcPlaceScales(const RoundingScales& robot, const ContactGeometry& contact, ContactScales* scales) {
+  // A fingertip displaced by e over the object moves the contact by (K_f + Kt_o)^-1 K_f e on the object and
+  // turns the normal by K_o times that.
+  const Matrix2d sum = contact.fingertip.K + contact.R_psi * contact.object.K * contact.R_psi;
+  // The smallest eigenvalue. R_psi K_o R_psi is symmetric but for rounding, and hypot knows no negative
+  // squares.
+  const double half = 0.5 * (sum(0, 0) - sum(1, 1));
+  const double least = 0.5 * sum.trace() - std::hypot(half, 0.5 * (sum(0, 1) + sum(1, 0)));
+  const double moved = contact.fingertip.K.norm() / least;
+  const double length = robot.world_length();
+  scales->normal = 1.0 + contact.object.K.norm() * moved * length;
+  scales->position = (1.0 + moved) * length;
+  scales->moment = scales->position + contact.g_o_cf.translation().norm() * scales->normal;
+  scales->J_B = scales->normal + scales->position / robot.length();
+}
+
+/// Sigma_cf by the engine, in the plant's world and where the projected robot has it.
+struct ContactPlace {
+  Matrix3d R;
+  Vector3d p;
+  Matrix3d R_projected;
+  Vector3d p_projected;
+};
+
+/// Rates of the two bodies' velocities at the contact, as Sigma_cf has them.
+void EvaluateRates(const Context& c, const Contact& contact, const ContactPlace& place, ContactSides* sides) {
+  // Everything in Sigma_cf, which moves over the fingertip at u_f and turns at omega.
+  const EngineMotion tip = c.engine->FrameMotion(sides->frame).MoveTo(place.p_projected);
+  const EngineMotion object = c.engine->ObjectMotion().MoveTo(place.p);
+  const Vector3d v_f = place.R_projected.transpose() * tip.v;
+  const Vector3d omega_f = place.R_projected.transpose() * tip.omega;
+  const Vector3d v_o = place.R.transpose() * object.v;
+  const Vector3d omega_o = place.R.transpose() * object.omega;
+  const Vector6d over_tip = CalcFrameTwistOnFingertip(contact.geometry, contact.kappa_dot);
+  const Vector3d u_f = over_tip.head<3>();
+  Vector3d u_o = v_f + u_f - v_o;
+  u_o.z() = 0.0;  // kappa moves within the surfaces, also while the bodies approach
+  const Vector3d omega = omega_f + over_tip.tail<3>();
+  // d/dt (R_cf^T v_f(p_c)), and the same of the object's velocity at p_c
+  ContactValues& engine = sides->engine;
+  engine.J_B_dot_xi = place.R_projected.transpose() * tip.a + omega_f.cross(u_f) - omega.cross(v_f);
+  engine.G_dot_T_V = place.R.transpose() * object.a + omega_o.cross(u_o) - omega.cross(v_o);
+  // Both ways to Sigma_cf: V_f_cf + Ad^-1 V_f = V_o_cf + Ad^-1 V_o.
+  engine.relative_twist << v_f - v_o, omega_f - omega_o;
+  sides->model.relative_twist = CalcFrameTwistOnObject(contact.geometry, contact.kappa_dot) - over_tip;
+
+  ContactScales& scales = sides->scales;
+  const double turning = omega.norm();
+  const double linear = c.scales->linear_rate() + u_f.norm();
+  const double angular = c.scales->angular_rate() + turning;
+  scales.J_B_dot_xi = Positive(linear * angular * scales.normal + scales.position * angular * angular);
+  // An error of v_f - v_o is one of u_o, and turns Sigma_cf's rate by the fingertip's curvature.
+  const double object_linear = v_o.norm() + u_o.norm();
+  const double object_angular = omega_o.norm() + turning;
+  const double curvature = contact.geometry.fingertip.K.norm() * scales.position / c.scales->world_length();
+  scales.G_dot_T_V = Positive(object_linear * object_angular * scales.normal +
+                              scales.position * object_angular * object_angular +
+                              c.scales->linear_rate() * (omega_o.norm() + curvature * v_o.norm()));
+  // Rolling rates are the relative rates over the surfaces' relative curvature.
+  scales.relative_twist = Positive((v_f.norm() + v_o.norm() + over_tip.norm()) * scales.normal +
+                                   scales.position * (omega_f.norm() + omega_o.norm()));
+}
+
+std::vector<Location> ListNumbers(const Context& c, size_t count) {
+  std::vector<Location> where;
+  for (const ContactSides& contact : c.contacts)
+    where.insert(where.end(), count, {Kind::kFrame, contact.frame, -1});
+  return where;
+}
+
+/// A member of ContactValues of all contacts, one after the other.
+template <auto kMember, ContactValues ContactSides::*kSide>
+void Copy(const Context& c, Numbers& out) {
+  Eigen::Index k = 0;
+  for (const ContactSides& contact : c.contacts) {
+    const auto& values = (contact.*kSide).*kMember;
+    out.segment(k, values.size()) = values.reshaped().array();
+    k += values.size();
+  }
+}
+template <auto kMember>
+constexpr auto kModel = &Copy<kMember, &ContactSides::model>;
+template <auto kMember>
+constexpr auto kEngine = &Copy<kMember, &ContactSides::engine>;
+
+template <size_t kCount>
+std::vector<Location> List(const Context& c) {
+  return ListNumbers(c, kCount);
+}
+
+/// One scale for each contact.
+template <double ContactScales::*kScale>
+void Weigh(const Context& c, Numbers& weight) {
+  const Eigen::Index numbers = weight.size() / static_cast<Eigen::Index>(c.contacts.size());
+  for (size_t i = 0; i < c.contacts.size(); ++i) {
+    weight.segment(static_cast<Eigen::Index>(i) * numbers, numbers)
+        .setConstant(1.0 / (c.contacts[i].scales.*kScale));
+  }
+}
+
+void WeighFrames(const Context& c, Numbers& weight) {
+  Weigh<&ContactScales::position>(c, weight);
+  for (size_t i = 0; i < c.contacts.size(); ++i) {
+    const auto k = 19 * static_cast<Eigen::Index>(i);
+    weight.segment<3>(k + 3).setConstant(1.0 / c.contacts[i].scales.normal);
+    weight.segment<9>(k + 7).setConstant(1.0 / c.contacts[i].scales.normal);
+  }
+}
+
+void WeighMaps(const Context& c, Numbers& weight) {
+  Weigh<&ContactScales::moment>(c, weight);
+  for (Eigen::Index k = 0; k < weight.size(); k += 6)
+    weight.segment<3>(k).setConstant(1.0 / c.contacts[static_cast<size_t>(k / 18)].scales.normal);
+}
+
+std::vector<Location> ListJacobians(const Context& c) {
+  std::vector<Location> where;
+  for (const ContactSides& contact : c.contacts)
+    where.insert(where.end(), 3 * c.engine->chain(contact.frame).size(), {Kind::kFrame, contact.frame, -1});
+  return where;
+}
+void WeighJacobians(const Context& c, Numbers& weight) {
+  Eigen::Index k = 0;
+  for (const ContactSides& contact : c.contacts) {
+    for (const int col : c.engine->chain(contact.frame)) {
+      weight.segment<3>(k).setConstant(1.0 / (c.scales->CalcVelocityScale(col) * contact.scales.J_B));
+      k += 3;
+    }
+  }
+}
+std::vector<ZeroPattern> ListJacobianZeros(const Context& c) {
+  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> may_differ;
+  may_differ.setConstant(3 * static_cast<Eigen::Index>(c.contacts.size()), c.engine->size(), false);
+  for (size_t i = 0; i < c.contacts.size(); ++i) {
+    for (const int col : c.engine->chain(c.contacts[i].frame))
+      may_differ.block(3 * static_cast<Eigen::Index>(i), col, 3, 1) = true;
+  }
+  return {ZeroPattern(may_differ)};
+}
+void CheckJacobianZeros(const Context& c, ComparedTerm* term) {
+  term->CheckZeros(
+      0, *c.J_B,
+      [&](Eigen::Index, Eigen::Index col) { return c.scales->CalcVelocityScale(static_cast<int>(col)); },
+      [&](Eigen::Index row, Eigen::Index) {
+        return Location{Kind::kFrame, c.contacts[static_cast<size_t>(row / 3)].frame, -1};
+      },
+      c.when);
+}
+
+using V = ContactValues;
+using S = ContactScales;
+constexpr TermGroup kGroup = TermGroup::kContact;
+constexpr unsigned kBoth = kAskedByRun | kAskedByContacts;
+
+constexpr TermEntry kTerms[] = {
+    {"contact_frame", "contact_frame", "g_o_cf", "(22), (39)", kGroup, kBoth, 1.0, List<19>,
+     kModel<&V::frame>, kEngine<&V::frame>, WeighFrames},
+    {"G", "G", "G", "(25)", kGroup, kBoth, 1.0, List<18>, kModel<&V::G>, kEngine<&V::G>, WeighMaps},
+    {"J_B", "J_B", "J_B'", "(34), (44)", kGroup, kBoth, 1.0, ListJacobians, kModel<&V::J_B>, kEngine<&V::J_B>,
+     WeighJacobians, Weighed::kAtEachState, ListJacobianZeros, CheckJacobianZeros},
+    {"kappa_dot", "kappa_dot", "kappa_dot", "(40)", kGroup, kAskedByContacts, 1.0, List<6>,
+     kModel<&V::relative_twist>, kEngine<&V::relative_twist>, Weigh<&S::relative_twist>},
+    {"J_B_dot_xi", "J_B_dot_xi", "d/dt J_B' xi", "(46)", kGroup, kAskedByRun, 3.0, List<3>,
+     kModel<&V::J_B_dot_xi>, kEngine<&V::J_B_dot_xi>, Weigh<&S::J_B_dot_xi>},
+    {"G_dot_T_V", "G_dot_T_V", "d/dt G^T V_Bo", "(46)", kGroup, kAskedByRun, 3.0, List<3>,
+     kModel<&V::G_dot_T_V>, kEngine<&V::G_dot_T_V>, Weigh<&S::G_dot_T_V>},
+};
+
+}  // namespace
+
+std::span<const TermEntry> ListContactTerms() { return kTerms; }
+
+void EvaluateContact(const TermContext& c, const Contact& contact, const Pose& shift, ContactSides* sides) {
+  const Pose& g_o_cf = contact.geometry.g_o_cf;
+  const Pose X_oW = c.engine->ObjectPose().inverse(Eigen::Isometry);
+  const Pose X_cf = shift * c.engine->FramePose(sides->frame) * contact.geometry.g_f_cf;
+  const EngineTouch touch = c.engine->CalcTouch(sides->frame, shift);
+  CalcPlaceScales(*c.scales, contact.geometry, &sides->scales);
+
+  ContactValues& model = sides->model;
+  model.frame.head<3>() = g_o_cf.translation();
+  model.frame.segment<3>(3) = g_o_cf.linear().col(2);
+  model.frame.tail<12>() = g_o_cf.matrix().topRows<3>().reshaped();
+  ContactValues& engine = sides->engine;
+  engine.frame.head<3>() = X_oW * touch.position;
+  engine.frame.segment<3>(3) = X_oW.linear() * touch.normal;
+  engine.frame[ContactValues::kOverlap] = -touch.distance;
+  engine.frame.tail<12>() = (X_oW * X_cf).matrix().topRows<3>().reshaped();
+
+  // Sigma_cf by the engine's normal; where its x axis points about the normal is a convention.
+  Matrix3d R_cf;
+  R_cf.col(2) = touch.normal;
+  R_cf.col(1) = touch.normal.cross(X_cf.linear().col(0)).normalized();
+  R_cf.col(0) = R_cf.col(1).cross(R_cf.col(2));
+  const ContactPlace place{R_cf, touch.position, shift.linear().transpose() * R_cf,
+                           shift.inverse(Eigen::Isometry) * touch.position};
+  engine.G = (R_cf.transpose() * c.engine->CalcObjectJacobian(touch.position)).transpose();
+  c.engine->CalcFrameColumns(sides->frame, place.p_projected, sides->columns);
+  engine.J_B.noalias() = place.R_projected.transpose() * sides->columns.topRows<3>();
+  EvaluateRates(c, contact, place, sides);
+}
+
+}  // namespace dexcheck

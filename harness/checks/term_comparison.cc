@@ -1,0 +1,51 @@
+#include "harness/checks/term_comparison.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace dexcheck {
+
+TermComparison::TermComparison(const Adapter& adapter) : scales_(adapter.model()) {
+  context_.adapter = &adapter;
+  context_.scales = &scales_;
+}
+
+void TermComparison::Ask(Asker asker, std::span<const TermGroup> leave_out) {
+  std::vector<const TermEntry*> entries;
+  for (const TermEntry& entry : ListTerms()) {
+    const bool left_out = std::find(leave_out.begin(), leave_out.end(), entry.group) != leave_out.end();
+    if ((entry.askers & asker) != 0 && !left_out) entries.push_back(&entry);
+  }
+  // The terms point to their records.
+  records_.resize(entries.size());
+  for (size_t i = 0; i < entries.size(); ++i) {
+    const TermEntry& entry = *entries[i];
+    CheckRecord& record = records_[i];
+    record.name = asker == kAskedByRun ? entry.name : entry.consistency_name;
+    record.description = "model against engine at the same state, relative to the term's scale";
+    record.bound = CalcBound(entry, model().max_depth());
+    std::vector<ZeroPattern> zeros;
+    if (entry.list_zeros != nullptr) zeros = entry.list_zeros(context_);
+    AskedTerm& asked =
+        terms_.emplace_back(AskedTerm{&entry, ComparedTerm(&record, entry.list(context_), std::move(zeros))});
+    if (entry.weighed == Weighed::kOnce) entry.weigh(context_, asked.term.weight);
+  }
+}
+
+void TermComparison::Compare(double when, bool contacts) {
+  context_.when = when;
+  for (size_t i = 0; i < terms_.size(); ++i) {
+    auto& [entry, term] = terms_[i];
+    if (IsOfContacts(i) && !contacts) continue;
+    entry->model(context_, term.model);
+    entry->engine(context_, term.engine);
+    if (entry->weighed == Weighed::kAtEachState) entry->weigh(context_, term.weight);
+    if (entry->check_zeros != nullptr) entry->check_zeros(context_, &term);
+    const bool failed_before = records_[i].failed;
+    term.Finish(when);
+    if (!records_[i].failed || failed_before) continue;
+    records_[i].part = Describe(records_[i].first_failure, model(), model().num_base_velocities());
+  }
+}
+
+}  // namespace dexcheck
