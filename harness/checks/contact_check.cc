@@ -39,7 +39,7 @@ ContactCheck::ContactCheck(const Adapter& adapter, int fingertip, ContactFormula
   G_.setZero(6, 3);
   context_.engine = &engine_;
   context_.J_B = &J_B_;
-  context_.contacts.emplace_back(fingertip, engine_.chain(fingertip).size());
+  SetFrames({&fingertip_, 1}, /*contacts=*/true);
   Ask(kAskedByContacts, {});
 }
 
@@ -72,6 +72,7 @@ void ContactCheck::Compare(const VectorXd& q, const VectorXd& xi, StateSource* s
   Vector6d V_o;
   V_o << X_Bo.linear().transpose() * v_o, X_Bo.linear().transpose() * omega_o;
   engine_.SetState(q, xi, X_Bo, V_o);
+  EvaluateFrames();
 
   // The model's side.
   robot_.SetState(q, xi);
@@ -83,12 +84,12 @@ void ContactCheck::Compare(const VectorXd& q, const VectorXd& xi, StateSource* s
   contact.kappa_dot = formulas_.kappa_dot(contact.geometry, CalcRelativeTwist(contact.geometry, V_f, V_o));
   formulas_.jacobian(contact, J_f_, J_B_);
   formulas_.grasp_map(contact, G_);
-  ContactSides& sides = context_.contacts[0];
-  sides.model.frame[ContactValues::kOverlap] = 0.0;
-  sides.model.G = G_;
+  ContactValues& model_side = context_.contacts[0].model;
+  model_side.frame[ContactValues::kOverlap] = 0.0;
+  model_side.G = G_;
   Eigen::Index k = 0;
-  for (const int col : engine_.chain(fingertip_)) sides.model.J_B.col(k++) = J_B_.col(col);
-  EvaluateContact(context_, contact, Pose::Identity(), &sides);
+  for (const int col : engine_.chain(fingertip_)) model_side.J_B.col(k++) = J_B_.col(col);
+  EvaluateContact(contact, Pose::Identity(), 0, &context_);
   TermComparison::Compare(static_cast<double>(sample), /*contacts=*/true);
 }
 

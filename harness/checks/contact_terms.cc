@@ -187,7 +187,9 @@ constexpr TermEntry kTerms[] = {
 
 std::span<const TermEntry> ListContactTerms() { return kTerms; }
 
-void EvaluateContact(const TermContext& c, const Contact& contact, const Pose& shift, ContactSides* sides) {
+void EvaluateContact(const Contact& contact, const Pose& shift, size_t index, TermContext* context) {
+  const TermContext& c = *context;
+  ContactSides* const sides = &context->contacts[index];
   const Pose& g_o_cf = contact.geometry.g_o_cf;
   const Pose X_oW = c.engine->ObjectPose().inverse(Eigen::Isometry);
   const Pose X_cf = shift * c.engine->FramePose(sides->frame) * contact.geometry.g_f_cf;
@@ -212,8 +214,13 @@ void EvaluateContact(const TermContext& c, const Contact& contact, const Pose& s
   const ContactPlace place{R_cf, touch.position, shift.linear().transpose() * R_cf,
                            shift.inverse(Eigen::Isometry) * touch.position};
   engine.G = (R_cf.transpose() * c.engine->CalcObjectJacobian(touch.position)).transpose();
-  c.engine->CalcFrameColumns(sides->frame, place.p_projected, sides->columns);
-  engine.J_B.noalias() = place.R_projected.transpose() * sides->columns.topRows<3>();
+  // v + omega x arm at the contact
+  const Vector3d arm = place.p_projected - c.engine->FramePose(sides->frame).translation();
+  const Matrix6Xd& columns = c.columns[index];
+  for (Eigen::Index col = 0; col < columns.cols(); ++col) {
+    engine.J_B.col(col) =
+        place.R_projected.transpose() * (columns.col(col).head<3>() + columns.col(col).tail<3>().cross(arm));
+  }
   EvaluateRates(c, contact, place, sides);
 }
 

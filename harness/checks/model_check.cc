@@ -63,9 +63,10 @@ ModelCheck::ModelCheck(const Adapter& adapter, const ModelViewFactory& make_view
   context_.unreduced = unreduced_.get();
   context_.scales_at_w = &scales_at_w_;
   context_.links = engine_.links();
-  context_.frames.resize(frames);
-  std::iota(context_.frames.begin(), context_.frames.end(), 0);
-  for (size_t i = 0; i < frames; ++i) context_.jacobians.push_back({&J_[i], &J_dot_[i]});
+  std::vector<int> all(frames);
+  std::iota(all.begin(), all.end(), 0);
+  SetFrames(all, /*contacts=*/false);
+  for (size_t i = 0; i < frames; ++i) context_.jacobians[i] = {&J_[i], &J_dot_[i]};
   constexpr TermGroup kObject[] = {TermGroup::kObject, TermGroup::kObjectCoordinates};
   Ask(kAskedByConsistency, has_object ? std::span<const TermGroup>() : kObject);
 }
@@ -85,6 +86,7 @@ void ModelCheck::Compare(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<c
   context_.w = w;
   context_.energy = robot_->CalcEnergyAndMomentum();
   context_.links = engine_.links();
+  EvaluateFrames();
   for (size_t i = 0; i < J_.size(); ++i) robot_->CalcFrameJacobian(static_cast<int>(i), J_[i], J_dot_[i]);
   if (model().object()) ReadObject(X_o, X_o_dot);
   TermComparison::Compare(static_cast<double>(sample), /*contacts=*/false);

@@ -188,15 +188,11 @@ void ModelJacobians(const Context& c, Numbers& out) {
 }
 void EngineJacobians(const Context& c, Numbers& out) {
   Eigen::Index k = 0;
-  for (const int frame : c.frames) {
-    const auto columns = static_cast<Eigen::Index>(c.engine->chain(frame).size());
-    const Pose X = c.engine->FramePose(frame);
-    Eigen::Map<Matrix6Xd> J(out.data() + k, 6, columns);
-    c.engine->CalcFrameColumns(frame, X.translation(), J);
-    const Matrix3d R_T = X.linear().transpose();
-    for (Eigen::Index col = 0; col < columns; ++col, k += 6) {
-      J.col(col).head<3>() = R_T * J.col(col).head<3>();
-      J.col(col).tail<3>() = R_T * J.col(col).tail<3>();
+  for (size_t i = 0; i < c.frames.size(); ++i) {
+    const Matrix3d R_T = c.engine->FramePose(c.frames[i]).linear().transpose();
+    for (Eigen::Index col = 0; col < c.columns[i].cols(); ++col, k += 6) {
+      out.segment<3>(k) = R_T * c.columns[i].col(col).head<3>();
+      out.segment<3>(k + 3) = R_T * c.columns[i].col(col).tail<3>();
     }
   }
 }

@@ -10,9 +10,7 @@ StepModelCheck::StepModelCheck(const Adapter& adapter, std::span<const int> fing
       has_coordinates_(orientation == OrientationFeedback::kAngles),
       engine_(adapter, fingertips) {
   context_.engine = &engine_;
-  context_.frames.assign(fingertips.begin(), fingertips.end());
-  context_.jacobians.resize(fingertips.size());
-  for (const int frame : fingertips) context_.contacts.emplace_back(frame, engine_.chain(frame).size());
+  SetFrames(fingertips, /*contacts=*/true);
   J_B_dot_xi_.setZero(3 * static_cast<Eigen::Index>(fingertips.size()));
   context_.xi.setZero(engine_.size());
   constexpr TermGroup kCoordinates[] = {TermGroup::kObjectCoordinates};
@@ -27,6 +25,7 @@ void StepModelCheck::LeaveOutContacts() {
 void StepModelCheck::Compare(const ModelTerms& robot, const GraspTerms& grasp, const MeasuredState& state,
                              const Pose& X_W0, double when) {
   engine_.SetState(state.q, state.xi, state.X_Bo, state.V_Bo);
+  EvaluateFrames();
   scales_.SetState(robot, state.q, state.xi);
   const ModelView view(robot);
   context_.robot = &view;
@@ -47,15 +46,15 @@ void StepModelCheck::ReadContacts(const GraspTerms& grasp, const MeasuredState& 
   context_.J_B = &grasp.J_B();
   for (size_t i = 0; i < context_.contacts.size(); ++i) {
     const auto row = 3 * static_cast<Eigen::Index>(i);
-    ContactSides& sides = context_.contacts[i];
-    ContactValues& model = sides.model;
+    ContactValues& model = context_.contacts[i].model;
     model.frame[ContactValues::kOverlap] = state.overlap[i];
     model.G = grasp.G().middleCols<3>(row);
     Eigen::Index k = 0;
-    for (const int col : engine_.chain(sides.frame)) model.J_B.col(k++) = grasp.J_B().block<3, 1>(row, col);
+    for (const int col : engine_.chain(context_.frames[i]))
+      model.J_B.col(k++) = grasp.J_B().block<3, 1>(row, col);
     model.J_B_dot_xi = J_B_dot_xi_.segment<3>(row);
     model.G_dot_T_V = grasp.G_dot().middleCols<3>(row).transpose() * grasp.V_Bo();
-    EvaluateContact(context_, grasp.contacts()[i], shift, &sides);
+    EvaluateContact(grasp.contacts()[i], shift, i, &context_);
   }
 }
 

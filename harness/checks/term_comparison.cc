@@ -10,6 +10,25 @@ TermComparison::TermComparison(const Adapter& adapter) : scales_(adapter.model()
   context_.scales = &scales_;
 }
 
+void TermComparison::SetFrames(std::span<const int> frames, bool contacts) {
+  for (const int frame : frames) {
+    const auto chain = static_cast<Eigen::Index>(context_.engine->chain(frame).size());
+    context_.frames.push_back(frame);
+    context_.jacobians.emplace_back();
+    context_.columns.emplace_back(Matrix6Xd::Zero(6, chain));
+    if (!contacts) continue;
+    ContactSides& sides = context_.contacts.emplace_back();
+    sides.frame = frame;
+    sides.model.J_B.setZero(3, chain);
+    sides.engine.J_B.setZero(3, chain);
+  }
+}
+
+void TermComparison::EvaluateFrames() {
+  for (size_t i = 0; i < context_.frames.size(); ++i)
+    context_.engine->CalcFrameColumns(context_.frames[i], context_.columns[i]);
+}
+
 void TermComparison::Ask(Asker asker, std::span<const TermGroup> leave_out) {
   std::vector<const TermEntry*> entries;
   for (const TermEntry& entry : ListTerms()) {

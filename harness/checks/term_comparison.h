@@ -21,7 +21,11 @@ class TermComparison {
   TermComparison(const TermComparison&) = delete;
   TermComparison& operator=(const TermComparison&) = delete;
 
-  /// Takes an asker's terms from the table; the context must have its frames, contacts and links.
+  /// Frames whose Jacobians are compared, and their contacts if they have any. The engine must be there.
+  void SetFrames(std::span<const int> frames, bool contacts);
+  /// By the engine, at the state set.
+  void EvaluateFrames();
+  /// Takes an asker's terms from the table; the frames must be set, and the links.
   /// @param leave_out groups that this asker has nothing to compare with.
   void Ask(Asker asker, std::span<const TermGroup> leave_out);
   /// Compares all terms at the state of the context. Nothing allocates but when a new worst case is stored.

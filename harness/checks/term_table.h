@@ -78,19 +78,10 @@ struct ContactScales {
   double relative_twist = 1.0;
 };
 
-/// A contact of a fingertip that has a chain of so many columns.
 struct ContactSides {
-  ContactSides(int fingertip, size_t chain) : frame(fingertip) {
-    const auto count = static_cast<Eigen::Index>(chain);
-    model.J_B.setZero(3, count);
-    engine.J_B.setZero(3, count);
-    columns.setZero(6, count);
-  }
-
-  int frame;  ///< Of the fingertip.
+  int frame = -1;  ///< Of the fingertip.
   ContactValues model, engine;
   ContactScales scales;
-  Matrix6Xd columns;  ///< Scratch: the engine's Jacobian at the contact, 6 x chain.
 };
 
 /// Everything that evaluators read, at one state.
@@ -100,7 +91,8 @@ struct TermContext {
   const ModelView* robot = nullptr;
   const RoundingScales* scales = nullptr;
   std::vector<int> frames;               ///< Those whose Jacobians are compared,
-  std::vector<FrameJacobian> jacobians;  ///< one for each.
+  std::vector<FrameJacobian> jacobians;  ///< one for each by the model,
+  std::vector<Matrix6Xd> columns;        ///< and by the engine, 6 x chain, world axes.
   VectorXd xi;
   EnergyAndMomentum energy;  ///< The model's.
 
@@ -113,8 +105,8 @@ struct TermContext {
 
   ObjectValues object_model, object_engine;
   ObjectScales object_scales;
-  std::vector<ContactSides> contacts;
-  const MatrixXd* J_B = nullptr;  ///< The model's, all contacts' rows.
+  std::vector<ContactSides> contacts;  ///< Of the first frames, one for each.
+  const MatrixXd* J_B = nullptr;       ///< The model's, all contacts' rows.
   double when = 0.0;
 };
 

@@ -65,9 +65,9 @@ std::vector<LinkInWorld> EngineTerms::links() const {
   return links;
 }
 
-void EngineTerms::CalcFrameColumns(int frame, const Vector3d& point, Eigen::Ref<Matrix6Xd> J) {
-  mj_jac(engine_.get(), data_.get(), J_nv_.data(), J_nv_.data() + 3 * engine_->nv, point.data(),
-         body_of(frame));
+void EngineTerms::CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J) {
+  mj_jacSite(engine_.get(), data_.get(), J_nv_.data(), J_nv_.data() + 3 * engine_->nv,
+             adapter_->frame_sites()[static_cast<size_t>(frame)]);
   for (int col = 0; col < base_size_; ++col) {
     J.col(col).setZero();
     for (int k = 0; k < carrying_dofs_; ++k) {
@@ -81,7 +81,7 @@ void EngineTerms::CalcFrameColumns(int frame, const Vector3d& point, Eigen::Ref<
 Matrix6Xd EngineTerms::CalcFrameJacobian(int frame) {
   const std::vector<int>& coordinates = chain(frame);
   Matrix6Xd columns(6, static_cast<Eigen::Index>(coordinates.size()));
-  CalcFrameColumns(frame, FramePose(frame).translation(), columns);
+  CalcFrameColumns(frame, columns);
   Matrix6Xd J = Matrix6Xd::Zero(6, size());
   for (size_t i = 0; i < coordinates.size(); ++i)
     J.col(coordinates[i]) = columns.col(static_cast<Eigen::Index>(i));

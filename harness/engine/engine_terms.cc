@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <optional>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -120,32 +119,39 @@ void EngineTerms::ListMassEntries() {
   for (size_t i = 0; i < dofs.size(); ++i) {
     coordinate[static_cast<size_t>(dofs[i])] = base_size_ + static_cast<int>(i);
   }
-  // By row and column of the whole matrix; an empty source's entry is zero.
-  std::vector<std::optional<MassSource>> whole(static_cast<size_t>(n) * static_cast<size_t>(n));
-  const auto set = [&](int row, int col, const MassSource& source) {
-    whole[static_cast<size_t>(col * n + row)] = whole[static_cast<size_t>(row * n + col)] = source;
-  };
-  for (int row = 0; row < base_size_; ++row) {
-    for (int col = 0; col <= row; ++col) set(row, col, {});
-  }
+  // Address and column of the source of each entry of the whole matrix; without one it is zero.
+  constexpr int kNone = -2;
+  constexpr int kOfBase = -1;
+  Eigen::MatrixXi address = Eigen::MatrixXi::Constant(n, n, kNone);
+  address.topLeftCorner(base_size_, base_size_).setConstant(kOfBase);
   for (const int dof : dofs) {
     const int row = coordinate[static_cast<size_t>(dof)];
     // A row of qM goes from the diagonal to the root, where the base's dofs are.
     const int root = m.dof_Madr[dof] + CountAncestors(m, dof) - 1;
-    for (int col = 0; col < base_size_; ++col) set(row, col, {root, true});
-    int address = m.dof_Madr[dof];
-    for (int other = dof; other >= 0; other = m.dof_parentid[other], ++address) {
+    address.row(row).head(base_size_).setConstant(root);
+    int at = m.dof_Madr[dof];
+    for (int other = dof; other >= 0; other = m.dof_parentid[other], ++at) {
       const int col = coordinate[static_cast<size_t>(other)];
-      if (col >= 0) set(row, col, {address, false});
+      if (col >= 0) address(std::max(row, col), std::min(row, col)) = at;
+    }
+  }
+  Eigen::MatrixXi place = Eigen::MatrixXi::Constant(n, n, -1);
+  for (int col = 0; col < n; ++col) {
+    for (int row = 0; row < n; ++row) {
+      if (address(std::max(row, col), std::min(row, col)) == kNone) continue;
+      place(row, col) = static_cast<int>(mass_entries_.size());
+      mass_entries_.push_back({row, col});
     }
   }
   for (int col = 0; col < n; ++col) {
-    for (int row = 0; row < n; ++row) {
-      const std::optional<MassSource>& source = whole[static_cast<size_t>(col * n + row)];
-      if (!source) continue;
-      mass_entries_.push_back({row, col});
-      mass_sources_.push_back(*source);
+    for (int row = col; row < n; ++row) {
+      if (address(row, col) < 0) continue;
+      mass_sources_.push_back(
+          {address(row, col), col < base_size_ ? col : -1, place(row, col), place(col, row)});
     }
+  }
+  for (int col = 0; col < base_size_; ++col) {
+    for (int row = 0; row < base_size_; ++row) base_places_.push_back(place(row, col));
   }
   mass_.setZero(static_cast<Eigen::Index>(mass_entries_.size()));
 }
@@ -234,23 +240,21 @@ void EngineTerms::CalcMass() {
       base_mass_(i, j) = base_mass_(j, i) = qM[address];
     }
   }
-  for (size_t i = 0; i < mass_entries_.size(); ++i) {
-    const auto [address, with_base] = mass_sources_[i];
-    double& entry = mass_[static_cast<Eigen::Index>(i)];
-    if (address >= 0 && !with_base) {
-      entry = qM[address];
-      continue;
+  auto place = base_places_.begin();
+  for (int col = 0; col < base_size_; ++col) {
+    for (int row = 0; row < base_size_; ++row) {
+      double sum = 0.0;
+      for (Eigen::Index j = 0; j < T.rows(); ++j) sum += base_mass_.col(j).dot(T.col(row)) * T(j, col);
+      mass_[*place++] = sum;
     }
-    const auto [row, col] = mass_entries_[i];
-    const int base = std::min(row, col);
-    double sum = 0.0;
-    if (with_base) {
-      for (int k = 0; k < carrying_dofs_; ++k) sum += qM[address - k] * T(k, base);
-    } else {
-      const int other = std::max(row, col);
-      for (Eigen::Index j = 0; j < T.rows(); ++j) sum += base_mass_.col(j).dot(T.col(other)) * T(j, base);
+  }
+  for (const MassSource& source : mass_sources_) {
+    double entry = qM[source.address];
+    if (source.column >= 0) {
+      entry = 0.0;
+      for (int k = 0; k < carrying_dofs_; ++k) entry += qM[source.address - k] * T(k, source.column);
     }
-    entry = sum;
+    mass_[source.place] = mass_[source.mirror] = entry;
   }
 }
 

@@ -100,8 +100,8 @@ class EngineTerms {
 
   /// Velocity coordinates that move a frame, ascending, by the engine's own tree.
   [[nodiscard]] const std::vector<int>& chain(int frame) const { return chain_of(frame).coordinates; }
-  /// Jacobian of a point of a frame's body, [linear; angular] in world axes: 6 x chain columns.
-  void CalcFrameColumns(int frame, const Vector3d& point, Eigen::Ref<Matrix6Xd> J);
+  /// Jacobian of a frame's origin, [linear; angular] in world axes: 6 x chain columns.
+  void CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J);
   /// The whole Jacobian of a frame's origin, 6 x n.
   [[nodiscard]] Matrix6Xd CalcFrameJacobian(int frame);
   /// Motion of a frame's origin.
@@ -159,14 +159,17 @@ class EngineTerms {
   int carrying_dofs_;  // the base's without the wheels
   VectorXd q_;
 
-  /// Where an entry of M_bar' comes from: address in qM of an entry between joints, or of a joint's entry
-  /// with the base's first dof (the following dofs' are before it), or -1 among the base's columns.
+  /// An entry of M_bar' among the joints (column -1) or with a column of the base, at two places in mass_:
+  /// its own and its mirror image's. The address in qM is that of the entry, or of the joint's with the
+  /// base's first dof; the following dofs' are before it.
   struct MassSource {
-    int address = -1;
-    bool with_base = false;
+    int address;
+    int column;
+    Eigen::Index place, mirror;
   };
   std::vector<MassEntry> mass_entries_;
   std::vector<MassSource> mass_sources_;
+  std::vector<Eigen::Index> base_places_;  // base_size x base_size, column by column
   VectorXd mass_;
   MatrixXd base_mass_;  // scratch, among base_dofs
   VectorXd force_nv_, bracket_nv_;
