@@ -10,8 +10,8 @@
 namespace dexcheck {
 namespace {
 
-using Numbers = Eigen::ArrayXd;
-using Context = TermContext;
+using C = TermContext;
+using N = Eigen::Ref<Eigen::ArrayXd>;
 using Kind = Location::Kind;
 
 /// Rounding errors of a contact's place.
@@ -40,7 +40,7 @@ struct ContactPlace {
 };
 
 /// Rates of the two bodies' velocities at the contact, as Sigma_cf has them.
-void EvaluateRates(const Context& c, const Contact& contact, const ContactPlace& place, ContactSides* sides) {
+void EvaluateRates(const C& c, const Contact& contact, const ContactPlace& place, ContactSides* sides) {
   // Everything in Sigma_cf, which moves over the fingertip at u_f and turns at omega.
   const EngineMotion tip = c.engine->FrameMotion(sides->frame).MoveTo(place.p_projected);
   const EngineMotion object = c.engine->ObjectMotion().MoveTo(place.p);
@@ -78,74 +78,36 @@ void EvaluateRates(const Context& c, const Contact& contact, const ContactPlace&
                                    scales.position * (omega_f.norm() + omega_o.norm()));
 }
 
-std::vector<Location> ListNumbers(const Context& c, size_t count) {
-  std::vector<Location> where;
-  for (const ContactSides& contact : c.contacts)
-    where.insert(where.end(), count, {Kind::kFrame, contact.frame, -1});
-  return where;
-}
+const ContactSides& ContactOf(const C& c, int i) { return c.contacts[static_cast<size_t>(i)]; }
 
-/// A member of ContactValues of all contacts, one after the other.
-template <auto kMember, ContactValues ContactSides::*kSide>
-void Copy(const Context& c, Numbers& out) {
-  Eigen::Index k = 0;
-  for (const ContactSides& contact : c.contacts) {
-    const auto& values = (contact.*kSide).*kMember;
-    out.segment(k, values.size()) = values.reshaped().array();
-    k += values.size();
-  }
-}
-template <auto kMember>
-constexpr auto kModel = &Copy<kMember, &ContactSides::model>;
-template <auto kMember>
-constexpr auto kEngine = &Copy<kMember, &ContactSides::engine>;
-
+/// @param count numbers of each contact; the chain's columns when zero.
 template <size_t kCount>
-std::vector<Location> List(const Context& c) {
-  return ListNumbers(c, kCount);
-}
-
-/// One scale for each contact.
-template <double ContactScales::*kScale>
-void Weigh(const Context& c, Numbers& weight) {
-  const Eigen::Index numbers = weight.size() / static_cast<Eigen::Index>(c.contacts.size());
-  for (size_t i = 0; i < c.contacts.size(); ++i) {
-    weight.segment(static_cast<Eigen::Index>(i) * numbers, numbers)
-        .setConstant(1.0 / (c.contacts[i].scales.*kScale));
+std::vector<TermItem> List(const C& c) {
+  std::vector<TermItem> items;
+  for (int i = 0; i < static_cast<int>(c.contacts.size()); ++i) {
+    const int frame = ContactOf(c, i).frame;
+    const size_t count = kCount > 0 ? kCount : 3 * c.engine->chain(frame).size();
+    items.push_back({i, std::vector(count, Location{Kind::kFrame, frame, -1})});
   }
+  return items;
 }
 
-void WeighFrames(const Context& c, Numbers& weight) {
-  Weigh<&ContactScales::position>(c, weight);
-  for (size_t i = 0; i < c.contacts.size(); ++i) {
-    const auto k = 19 * static_cast<Eigen::Index>(i);
-    weight.segment<3>(k + 3).setConstant(1.0 / c.contacts[i].scales.normal);
-    weight.segment<9>(k + 7).setConstant(1.0 / c.contacts[i].scales.normal);
-  }
+/// A member of ContactValues.
+template <auto kMember>
+void Model(const C& c, int i, N out) {
+  out = (ContactOf(c, i).model.*kMember).reshaped().array();
+}
+template <auto kMember>
+void Engine(const C& c, int i, N out) {
+  out = (ContactOf(c, i).engine.*kMember).reshaped().array();
+}
+/// One scale for all numbers of a contact.
+template <auto kScale>
+void Weigh(const C& c, int i, N weight) {
+  weight.setConstant(1.0 / (ContactOf(c, i).scales.*kScale));
 }
 
-void WeighMaps(const Context& c, Numbers& weight) {
-  Weigh<&ContactScales::moment>(c, weight);
-  for (Eigen::Index k = 0; k < weight.size(); k += 6)
-    weight.segment<3>(k).setConstant(1.0 / c.contacts[static_cast<size_t>(k / 18)].scales.normal);
-}
-
-std::vector<Location> ListJacobians(const Context& c) {
-  std::vector<Location> where;
-  for (const ContactSides& contact : c.contacts)
-    where.insert(where.end(), 3 * c.engine->chain(contact.frame).size(), {Kind::kFrame, contact.frame, -1});
-  return where;
-}
-void WeighJacobians(const Context& c, Numbers& weight) {
-  Eigen::Index k = 0;
-  for (const ContactSides& contact : c.contacts) {
-    for (const int col : c.engine->chain(contact.frame)) {
-      weight.segment<3>(k).setConstant(1.0 / (c.scales->CalcVelocityScale(col) * contact.scales.J_B));
-      k += 3;
-    }
-  }
-}
-std::vector<ZeroPattern> ListJacobianZeros(const Context& c) {
+std::vector<ZeroPattern> ListJacobianZeros(const C& c) {
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> may_differ;
   may_differ.setConstant(3 * static_cast<Eigen::Index>(c.contacts.size()), c.engine->size(), false);
   for (size_t i = 0; i < c.contacts.size(); ++i) {
@@ -154,7 +116,7 @@ std::vector<ZeroPattern> ListJacobianZeros(const Context& c) {
   }
   return {ZeroPattern(may_differ)};
 }
-void CheckJacobianZeros(const Context& c, ComparedTerm* term) {
+void CheckJacobianZeros(const C& c, ComparedTerm* term) {
   term->CheckZeros(
       0, *c.J_B,
       [&](Eigen::Index, Eigen::Index col) { return c.scales->CalcVelocityScale(static_cast<int>(col)); },
@@ -166,21 +128,41 @@ void CheckJacobianZeros(const Context& c, ComparedTerm* term) {
 
 using V = ContactValues;
 using S = ContactScales;
-constexpr TermGroup kGroup = TermGroup::kContact;
+constexpr TermGroup kContact = TermGroup::kContact;
 constexpr unsigned kBoth = kAskedByRun | kAskedByContacts;
 
 constexpr TermEntry kTerms[] = {
-    {"contact_frame", "contact_frame", "g_o_cf", "(22), (39)", kGroup, kBoth, 1.0, List<19>,
-     kModel<&V::frame>, kEngine<&V::frame>, WeighFrames},
-    {"G", "G", "G", "(25)", kGroup, kBoth, 1.0, List<18>, kModel<&V::G>, kEngine<&V::G>, WeighMaps},
-    {"J_B", "J_B", "J_B'", "(34), (44)", kGroup, kBoth, 1.0, ListJacobians, kModel<&V::J_B>, kEngine<&V::J_B>,
-     WeighJacobians, Weighed::kAtEachState, ListJacobianZeros, CheckJacobianZeros},
-    {"kappa_dot", "kappa_dot", "kappa_dot", "(40)", kGroup, kAskedByContacts, 1.0, List<6>,
-     kModel<&V::relative_twist>, kEngine<&V::relative_twist>, Weigh<&S::relative_twist>},
-    {"J_B_dot_xi", "J_B_dot_xi", "d/dt J_B' xi", "(46)", kGroup, kAskedByRun, 3.0, List<3>,
-     kModel<&V::J_B_dot_xi>, kEngine<&V::J_B_dot_xi>, Weigh<&S::J_B_dot_xi>},
-    {"G_dot_T_V", "G_dot_T_V", "d/dt G^T V_Bo", "(46)", kGroup, kAskedByRun, 3.0, List<3>,
-     kModel<&V::G_dot_T_V>, kEngine<&V::G_dot_T_V>, Weigh<&S::G_dot_T_V>},
+    {"contact_frame", "contact_frame", "g_o_cf", "(22), (39)", kContact, kBoth, 1.0, List<19>,
+     Model<&V::frame>, Engine<&V::frame>,
+     [](const C& c, int i, N weight) {
+       const ContactScales& scales = ContactOf(c, i).scales;
+       weight.setConstant(1.0 / scales.position);
+       weight.segment<3>(3).setConstant(1.0 / scales.normal);
+       weight.segment<9>(7).setConstant(1.0 / scales.normal);
+     }},
+    {"G", "G", "G", "(25)", kContact, kBoth, 1.0, List<18>, Model<&V::G>, Engine<&V::G>,
+     [](const C& c, int i, N weight) {
+       for (Eigen::Index k = 0; k < 18; k += 6) {
+         weight.segment<3>(k).setConstant(1.0 / ContactOf(c, i).scales.normal);
+         weight.segment<3>(k + 3).setConstant(1.0 / ContactOf(c, i).scales.moment);
+       }
+     }},
+    {"J_B", "J_B", "J_B'", "(34), (44)", kContact, kBoth, 1.0, List<0>, Model<&V::J_B>, Engine<&V::J_B>,
+     [](const C& c, int i, N weight) {
+       Eigen::Index k = 0;
+       for (const int col : c.engine->chain(ContactOf(c, i).frame)) {
+         weight.segment<3>(k).setConstant(1.0 /
+                                          (c.scales->CalcVelocityScale(col) * ContactOf(c, i).scales.J_B));
+         k += 3;
+       }
+     },
+     Weighed::kAtEachState, ListJacobianZeros, CheckJacobianZeros},
+    {"kappa_dot", "kappa_dot", "kappa_dot", "(40)", kContact, kAskedByContacts, 1.0, List<6>,
+     Model<&V::relative_twist>, Engine<&V::relative_twist>, Weigh<&S::relative_twist>},
+    {"J_B_dot_xi", "J_B_dot_xi", "d/dt J_B' xi", "(46)", kContact, kAskedByRun, 3.0, List<3>,
+     Model<&V::J_B_dot_xi>, Engine<&V::J_B_dot_xi>, Weigh<&S::J_B_dot_xi>},
+    {"G_dot_T_V", "G_dot_T_V", "d/dt G^T V_Bo", "(46)", kContact, kAskedByRun, 3.0, List<3>,
+     Model<&V::G_dot_T_V>, Engine<&V::G_dot_T_V>, Weigh<&S::G_dot_T_V>},
 };
 
 }  // namespace

@@ -9,8 +9,8 @@
 namespace dexcheck {
 namespace {
 
-using Numbers = Eigen::ArrayXd;
-using Context = TermContext;
+using C = TermContext;
+using N = Eigen::Ref<Eigen::ArrayXd>;
 
 // Three rotations and the engine's normalised quaternion, of a few roundings each; products of two such
 // factors.
@@ -20,48 +20,39 @@ constexpr double kObjectErrors = 128.0;
 constexpr double kLeastRate = 1e-3;
 
 template <size_t kCount>
-std::vector<Location> List(const Context&) {
-  return std::vector<Location>(kCount, {Location::Kind::kObject, -1, -1});
+std::vector<TermItem> List(const C&) {
+  return {{0, std::vector(kCount, Location{Location::Kind::kObject, -1, -1})}};
 }
 
-/// A member of ObjectValues on either side.
-template <auto kMember, ObjectValues TermContext::*kSide>
-void Copy(const Context& c, Numbers& out) {
-  const auto& value = (c.*kSide).*kMember;
+/// A member of ObjectValues.
+template <auto kMember>
+void CopyMember(const ObjectValues& values, N out) {
   if constexpr (std::is_same_v<decltype(kMember), double ObjectValues::*>) {
-    out[0] = value;
+    out[0] = values.*kMember;
   } else {
-    out = value.reshaped().array();
+    out = (values.*kMember).reshaped().array();
   }
 }
 template <auto kMember>
-constexpr auto kModel = &Copy<kMember, &TermContext::object_model>;
-template <auto kMember>
-constexpr auto kEngine = &Copy<kMember, &TermContext::object_engine>;
-
-void WeighPose(const Context& c, Numbers& weight) {
-  weight.tail<3>().setConstant(1.0 / c.object_scales.place);
+void Model(const C& c, int, N out) {
+  CopyMember<kMember>(c.object_model, out);
 }
-void WeighVelocity(const Context& c, Numbers& weight) { weight.setConstant(1.0 / c.object_scales.rate); }
-void WeighInertia(const Context& c, Numbers& weight) {
+template <auto kMember>
+void Engine(const C& c, int, N out) {
+  CopyMember<kMember>(c.object_engine, out);
+}
+
+void WeighInertia(const C& c, int, N weight) {
   for (Eigen::Index i = 0; i < 36; ++i)
     weight[i] = 1.0 / (i % 6 < 3 ? c.object_scales.mass : c.object_scales.inertia);
 }
 /// Moments are sums of forces times world coordinates, which cancel to the moment about the centre of mass.
-void WeighWrench(const Context& c, double force, Numbers& weight) {
+void WeighWrench(const C& c, double force, N weight) {
   weight.head<3>().setConstant(1.0 / force);
   weight.tail<3>().setConstant(1.0 / (force * c.object_scales.place));
 }
-void WeighCoriolis(const Context& c, Numbers& weight) {
+void WeighCoriolis(const C& c, int, N weight) {
   WeighWrench(c, c.object_scales.mass * c.object_scales.rate * c.object_scales.rate, weight);
-}
-void WeighGravity(const Context& c, Numbers& weight) { WeighWrench(c, c.object_scales.weight, weight); }
-void WeighKinetic(const Context& c, Numbers& weight) {
-  const ObjectScales& s = c.object_scales;
-  weight.setConstant(1.0 / ((s.mass + s.inertia) * s.rate * s.rate));
-}
-void WeighPotential(const Context& c, Numbers& weight) {
-  weight.setConstant(1.0 / (c.object_scales.weight * c.object_scales.place));
 }
 
 using V = ObjectValues;
@@ -70,24 +61,32 @@ constexpr TermGroup kCoordinates = TermGroup::kObjectCoordinates;
 constexpr unsigned kBoth = kAskedByRun | kAskedByConsistency;
 
 constexpr TermEntry kTerms[] = {
-    {"object_pose", "object_pose", "^B T_o", "(8)", kCoordinates, kBoth, 1.0, List<12>, kModel<&V::pose>,
-     kEngine<&V::pose>, WeighPose},
-    {"V_Bo", "P_inv", "V^o_Bo = P^-1 X_o_dot", "(8)", kCoordinates, kBoth, 1.0, List<6>, kModel<&V::V_Bo>,
-     kEngine<&V::V_Bo>, WeighVelocity},
-    {"M_hat", "M_hat", "M_hat", "(19)", kBody, kAskedByRun, 1.0, List<36>, kModel<&V::M_hat>,
-     kEngine<&V::M_hat>, WeighInertia},
-    {"C_hat_V", "C_hat_V", "C_hat V_Bo", "(19)", kBody, kAskedByRun, 1.0, List<6>, kModel<&V::C_hat_V>,
-     kEngine<&V::C_hat_V>, WeighCoriolis},
-    {"N_o", "N_o", "N_o", "(19)", kBody, kBoth, 1.0, List<6>, kModel<&V::N_o>, kEngine<&V::N_o>,
-     WeighGravity},
+    {"object_pose", "object_pose", "^B T_o", "(8)", kCoordinates, kBoth, 1.0, List<12>, Model<&V::pose>,
+     Engine<&V::pose>,
+     [](const C& c, int, N weight) { weight.tail<3>().setConstant(1.0 / c.object_scales.place); }},
+    {"V_Bo", "P_inv", "V^o_Bo = P^-1 X_o_dot", "(8)", kCoordinates, kBoth, 1.0, List<6>, Model<&V::V_Bo>,
+     Engine<&V::V_Bo>, [](const C& c, int, N weight) { weight.setConstant(1.0 / c.object_scales.rate); }},
+    {"M_hat", "M_hat", "M_hat", "(19)", kBody, kAskedByRun, 1.0, List<36>, Model<&V::M_hat>,
+     Engine<&V::M_hat>, WeighInertia},
+    {"C_hat_V", "C_hat_V", "C_hat V_Bo", "(19)", kBody, kAskedByRun, 1.0, List<6>, Model<&V::C_hat_V>,
+     Engine<&V::C_hat_V>, WeighCoriolis},
+    {"N_o", "N_o", "N_o", "(19)", kBody, kBoth, 1.0, List<6>, Model<&V::N_o>, Engine<&V::N_o>,
+     [](const C& c, int, N weight) { WeighWrench(c, c.object_scales.weight, weight); }},
     {"object_kinetic_energy", "object_kinetic_energy", "V_Bo^T M_hat V_Bo / 2", "(19)", kBody, kBoth, 1.0,
-     List<1>, kModel<&V::kinetic>, kEngine<&V::kinetic>, WeighKinetic},
+     List<1>, Model<&V::kinetic>, Engine<&V::kinetic>,
+     [](const C& c, int, N weight) {
+       const ObjectScales& s = c.object_scales;
+       weight.setConstant(1.0 / ((s.mass + s.inertia) * s.rate * s.rate));
+     }},
     {"object_potential_energy", "object_potential_energy", "-", "(19)", kBody, kAskedByRun, 1.0, List<1>,
-     kModel<&V::potential>, kEngine<&V::potential>, WeighPotential},
-    {"M_o", "M_o", "M_o", "(19)", kCoordinates, kBoth, 1.0, List<36>, kModel<&V::M_o>, kEngine<&V::M_o>,
+     Model<&V::potential>, Engine<&V::potential>,
+     [](const C& c, int, N weight) {
+       weight.setConstant(1.0 / (c.object_scales.weight * c.object_scales.place));
+     }},
+    {"M_o", "M_o", "M_o", "(19)", kCoordinates, kBoth, 1.0, List<36>, Model<&V::M_o>, Engine<&V::M_o>,
      WeighInertia},
     {"C_o_X_o_dot", "C_o_X_o_dot", "C_o X_o_dot", "(19)", kCoordinates, kBoth, 1.0, List<6>,
-     kModel<&V::C_o_X_o_dot>, kEngine<&V::C_o_X_o_dot>, WeighCoriolis},
+     Model<&V::C_o_X_o_dot>, Engine<&V::C_o_X_o_dot>, WeighCoriolis},
 };
 
 }  // namespace

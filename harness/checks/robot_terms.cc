@@ -7,218 +7,81 @@
 namespace dexcheck {
 namespace {
 
-using Numbers = Eigen::ArrayXd;
-using Context = TermContext;
+using C = TermContext;
+using N = Eigen::Ref<Eigen::ArrayXd>;
+using Items = std::vector<TermItem>;
 using Kind = Location::Kind;
 using BoolArray = Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic>;
-using Block34 = Eigen::Matrix<double, 3, 4>;
 
 constexpr unsigned kBoth = kAskedByRun | kAskedByConsistency;
 constexpr unsigned kOnce = kAskedByConsistency;
 
-const RobotModel& ModelOf(const Context& c) { return c.adapter->model(); }
-
-/// Calls visit(link) for the links that move, the base as -1.
-template <typename Visit>
-void ForEachLink(const Context& c, const Visit& visit) {
-  const bool fixed = ModelOf(c).base().type == BaseType::kFixed;  // the world carries no mass
-  for (int link = fixed ? 0 : -1; link < ModelOf(c).num_joints(); ++link) visit(link);
+const RobotModel& ModelOf(const C& c) { return c.adapter->model(); }
+const Joint& JointOf(const C& c, int joint) { return ModelOf(c).joints()[static_cast<size_t>(joint)]; }
+const LinkInWorld& EngineLink(const C& c, int link) { return c.links[static_cast<size_t>(link + 1)]; }
+const MassProperties& BodyOf(const C& c, int link) {
+  return link < 0 ? ModelOf(c).base_with_wheels() : JointOf(c, link).body;
 }
+const FrameJacobian& JacobianOf(const C& c, int i) { return c.jacobians[static_cast<size_t>(i)]; }
+int FrameOf(const C& c, int i) { return c.frames[static_cast<size_t>(i)]; }
+const std::vector<int>& ChainOf(const C& c, int i) { return c.engine->chain(FrameOf(c, i)); }
+Matrix3d TurnedBack(const C& c, int i) { return c.engine->FramePose(FrameOf(c, i)).linear().transpose(); }
 
-const MassProperties& BodyOf(const Context& c, int link) {
-  return link < 0 ? ModelOf(c).base_with_wheels() : ModelOf(c).joints()[static_cast<size_t>(link)].body;
+TermItem MakeItem(int index, size_t count, Location where) { return {index, std::vector(count, where)}; }
+
+template <size_t kCount>
+Items ListWhole(const C&) {
+  return {MakeItem(0, kCount, {})};
 }
-
-/// The same for those that carry mass on either side: without any there is no centre.
-template <typename Visit>
-void ForEachMass(const Context& c, const Visit& visit) {
-  ForEachLink(c, [&](int link) {
-    if (BodyOf(c, link).mass > 0.0 || c.links[static_cast<size_t>(link + 1)].mass > 0.0) visit(link);
-  });
+Items ListVelocities(const C& c) {
+  TermItem all{0, {}};
+  for (int i = 0; i < c.engine->size(); ++i) all.where.push_back({Kind::kVelocity, i, -1});
+  return {all};
 }
-
-bool IsRevolute(const Context& c, int joint) {
-  return ModelOf(c).joints()[static_cast<size_t>(joint)].type == JointType::kRevolute;
-}
-
-std::vector<Location> ListVelocities(const Context& c) {
-  std::vector<Location> where;
-  for (int i = 0; i < c.engine->size(); ++i) where.push_back({Kind::kVelocity, i, -1});
-  return where;
-}
-
-std::vector<Location> ListOne(const Context&) { return {Location{}}; }
-std::vector<Location> ListThree(const Context&) { return std::vector<Location>(3); }
-
-/// Weights by the scale of each velocity coordinate.
-template <typename Scale>
-void SetWeights(Numbers& weight, const Scale& scale) {
-  for (Eigen::Index i = 0; i < weight.size(); ++i) weight[i] = 1.0 / scale(static_cast<int>(i));
-}
-
-// joint_axis: direction, and the foot of the perpendicular from the engine's anchor, whose place along the
-// axis is a choice of frames.
-
-std::vector<Location> ListAxes(const Context& c) {
-  std::vector<Location> where;
+Items ListAxes(const C& c) {
+  Items items;
   for (int i = 0; i < ModelOf(c).num_joints(); ++i)
-    where.insert(where.end(), IsRevolute(c, i) ? 6 : 3, {Kind::kJoint, i, -1});
-  return where;
+    items.push_back(MakeItem(i, JointOf(c, i).type == JointType::kRevolute ? 6 : 3, {Kind::kJoint, i, -1}));
+  return items;
 }
-void ModelAxes(const Context& c, Numbers& out) {
-  Eigen::Index k = 0;
-  for (int i = 0; i < ModelOf(c).num_joints(); ++i) {
-    const Pose X = c.robot->CalcLinkPose(i);
-    const Vector3d axis = X.linear().col(2);
-    out.segment<3>(k) = axis;
-    k += 3;
-    if (!IsRevolute(c, i)) continue;
-    out.segment<3>(k) = X.translation() + axis.dot(c.engine->JointAnchor(i) - X.translation()) * axis;
-    k += 3;
+/// Links that move, the base as -1. @param massive only those with mass on either side.
+Items ListLinks(const C& c, size_t count, bool massive) {
+  Items items;
+  const bool fixed = ModelOf(c).base().type == BaseType::kFixed;  // the world carries no mass
+  for (int link = fixed ? 0 : -1; link < ModelOf(c).num_joints(); ++link) {
+    if (massive && !(BodyOf(c, link).mass > 0.0 || EngineLink(c, link).mass > 0.0)) continue;
+    items.push_back(MakeItem(link, count, {Kind::kLink, link, -1}));
   }
+  return items;
 }
-void EngineAxes(const Context& c, Numbers& out) {
-  Eigen::Index k = 0;
-  for (int i = 0; i < ModelOf(c).num_joints(); ++i) {
-    out.segment<3>(k) = c.engine->JointAxis(i);
-    k += 3;
-    if (!IsRevolute(c, i)) continue;
-    out.segment<3>(k) = c.engine->JointAnchor(i);
-    k += 3;
-  }
-}
-void WeighAxes(const Context& c, Numbers& weight) {
-  Eigen::Index k = 0;
-  for (int i = 0; i < ModelOf(c).num_joints(); ++i) {
-    k += 3;
-    if (!IsRevolute(c, i)) continue;
-    weight.segment<3>(k).setConstant(1.0 / c.scales->world_length());
-    k += 3;
-  }
-}
-
-std::vector<Location> ListMasses(const Context& c) {
-  std::vector<Location> where;
-  ForEachMass(c, [&](int link) { where.insert(where.end(), 3, {Kind::kLink, link, -1}); });
-  return where;
-}
-void ModelCenters(const Context& c, Numbers& out) {
-  Eigen::Index k = 0;
-  ForEachMass(c, [&](int link) {
-    out.segment<3>(k) = c.robot->CalcLinkPose(link) * BodyOf(c, link).com;
-    k += 3;
-  });
-}
-void EngineCenters(const Context& c, Numbers& out) {
-  Eigen::Index k = 0;
-  ForEachMass(c, [&](int link) {
-    out.segment<3>(k) = c.links[static_cast<size_t>(link + 1)].com;
-    k += 3;
-  });
-}
-void WeighPlaces(const Context& c, Numbers& weight) { weight.setConstant(1.0 / c.scales->world_length()); }
-
-std::vector<Location> ListInertias(const Context& c) {
-  std::vector<Location> where;
-  ForEachLink(c, [&](int link) { where.insert(where.end(), 9, {Kind::kLink, link, -1}); });
-  return where;
-}
-void ModelInertias(const Context& c, Numbers& out) {
-  Eigen::Index k = 0;
-  ForEachLink(c, [&](int link) {
-    const Matrix3d R = c.robot->CalcLinkPose(link).linear();
-    Eigen::Map<Matrix3d>(out.data() + k) = R * BodyOf(c, link).inertia * R.transpose();
-    k += 9;
-  });
-}
-void EngineInertias(const Context& c, Numbers& out) {
-  Eigen::Index k = 0;
-  ForEachLink(c, [&](int link) {
-    Eigen::Map<Matrix3d>(out.data() + k) = c.links[static_cast<size_t>(link + 1)].inertia;
-    k += 9;
-  });
-}
-void WeighInertias(const Context& c, Numbers& weight) {
-  Eigen::Index k = 0;
-  ForEachLink(c, [&](int link) {
-    const double by_model = BodyOf(c, link).inertia.trace();
-    const double by_engine = c.links[static_cast<size_t>(link + 1)].inertia.trace();
-    weight.segment<9>(k).setConstant(1.0 / Positive(std::max(by_model, by_engine)));
-    k += 9;
-  });
-}
-
-std::vector<Location> ListFramePoses(const Context& c) {
-  std::vector<Location> where;
+Items ListFramePoses(const C& c) {
+  Items items;
   for (int frame = 0; frame < static_cast<int>(ModelOf(c).frames().size()); ++frame)
-    where.insert(where.end(), 12, {Kind::kFrame, frame, -1});
-  return where;
+    items.push_back(MakeItem(frame, 12, {Kind::kFrame, frame, -1}));
+  return items;
 }
-void ModelFramePoses(const Context& c, Numbers& out) {
-  for (Eigen::Index k = 0; k < out.size(); k += 12)
-    Eigen::Map<Block34>(out.data() + k) =
-        c.robot->CalcFramePose(static_cast<int>(k / 12)).matrix().topRows<3>();
-}
-void EngineFramePoses(const Context& c, Numbers& out) {
-  for (Eigen::Index k = 0; k < out.size(); k += 12)
-    Eigen::Map<Block34>(out.data() + k) = c.engine->FramePose(static_cast<int>(k / 12)).matrix().topRows<3>();
-}
-void WeighFramePoses(const Context& c, Numbers& weight) {
-  for (Eigen::Index k = 0; k < weight.size(); k += 12)
-    weight.segment<3>(k + 9).setConstant(1.0 / c.scales->world_length());
+Items ListFrames(const C& c, bool chains) {
+  Items items;
+  for (int i = 0; i < static_cast<int>(c.frames.size()); ++i)
+    items.push_back(MakeItem(i, chains ? 6 * ChainOf(c, i).size() : 6, {Kind::kFrame, FrameOf(c, i), -1}));
+  return items;
 }
 
-// J: the columns of each frame's chain, in the frame's own axes.
-
-std::vector<Location> ListJacobians(const Context& c) {
-  std::vector<Location> where;
-  for (const int frame : c.frames) {
-    where.insert(where.end(), 6 * c.engine->chain(frame).size(), {Kind::kFrame, frame, -1});
-  }
-  return where;
-}
-void ModelJacobians(const Context& c, Numbers& out) {
-  Eigen::Index k = 0;
-  for (size_t i = 0; i < c.frames.size(); ++i) {
-    for (const int col : c.engine->chain(c.frames[i])) {
-      out.segment<6>(k) = c.jacobians[i].J->col(col);
-      k += 6;
-    }
-  }
-}
-void EngineJacobians(const Context& c, Numbers& out) {
-  Eigen::Index k = 0;
-  for (size_t i = 0; i < c.frames.size(); ++i) {
-    const Matrix3d R_T = c.engine->FramePose(c.frames[i]).linear().transpose();
-    for (Eigen::Index col = 0; col < c.columns[i].cols(); ++col, k += 6) {
-      out.segment<3>(k) = R_T * c.columns[i].col(col).head<3>();
-      out.segment<3>(k + 3) = R_T * c.columns[i].col(col).tail<3>();
-    }
-  }
-}
 /// Rows of the angular part are pure numbers.
-double ScaleJacobian(const Context& c, Eigen::Index row, Eigen::Index col) {
+double ScaleJacobian(const C& c, Eigen::Index row, Eigen::Index col) {
   const double velocity = c.scales->CalcVelocityScale(static_cast<int>(col));
   return row < 3 ? velocity : Positive(velocity / c.scales->length());
 }
-void WeighJacobians(const Context& c, Numbers& weight) {
-  Eigen::Index k = 0;
-  for (const int frame : c.frames) {
-    for (const int col : c.engine->chain(frame)) {
-      for (int row = 0; row < 6; ++row) weight[k++] = 1.0 / ScaleJacobian(c, row, col);
-    }
-  }
-}
-std::vector<ZeroPattern> ListJacobianZeros(const Context& c) {
+std::vector<ZeroPattern> ListJacobianZeros(const C& c) {
   std::vector<ZeroPattern> zeros;
-  for (const int frame : c.frames) {
+  for (int i = 0; i < static_cast<int>(c.frames.size()); ++i) {
     BoolArray may_differ = BoolArray::Constant(6, c.engine->size(), false);
-    for (const int col : c.engine->chain(frame)) may_differ.col(col) = true;
+    for (const int col : ChainOf(c, i)) may_differ.col(col) = true;
     zeros.emplace_back(may_differ);
   }
   return zeros;
 }
-void CheckJacobianZeros(const Context& c, ComparedTerm* term) {
+void CheckJacobianZeros(const C& c, ComparedTerm* term) {
   for (size_t i = 0; i < c.frames.size(); ++i) {
     term->CheckZeros(
         i, *c.jacobians[i].J, [&](Eigen::Index row, Eigen::Index col) { return ScaleJacobian(c, row, col); },
@@ -229,59 +92,18 @@ void CheckJacobianZeros(const Context& c, ComparedTerm* term) {
   }
 }
 
-// J_dot_xi: acceleration of a frame's origin at constant xi, in its own axes.
-
-std::vector<Location> ListAccelerations(const Context& c) {
-  std::vector<Location> where;
-  for (const int frame : c.frames) where.insert(where.end(), 6, {Kind::kFrame, frame, -1});
-  return where;
-}
-void ModelAccelerations(const Context& c, Numbers& out) {
-  for (size_t i = 0; i < c.frames.size(); ++i) {
-    Vector6d V = Vector6d::Zero();
-    Vector6d A = Vector6d::Zero();
-    for (const int col : c.engine->chain(c.frames[i])) {
-      V += c.jacobians[i].J->col(col) * c.xi[col];
-      A += c.jacobians[i].J_dot->col(col) * c.xi[col];
-    }
-    // Of the axes' own turn: R^T d/dt (R v) = v_dot + omega x v; omega x omega = 0.
-    A.head<3>() += V.tail<3>().cross(V.head<3>());
-    out.segment<6>(6 * static_cast<Eigen::Index>(i)) = A;
-  }
-}
-void EngineAccelerations(const Context& c, Numbers& out) {
-  Eigen::Index k = 0;
-  for (const int frame : c.frames) {
-    const EngineMotion motion = c.engine->FrameMotion(frame);
-    const Matrix3d R_T = c.engine->FramePose(frame).linear().transpose();
-    out.segment<3>(k) = R_T * motion.a;
-    out.segment<3>(k + 3) = R_T * motion.alpha;
-    k += 6;
-  }
-}
-void WeighAccelerations(const Context& c, Numbers& weight) {
-  const double rate = c.scales->angular_rate();
-  for (Eigen::Index k = 0; k < weight.size(); k += 6) {
-    weight.segment<3>(k).setConstant(1.0 / Positive(c.scales->acceleration()));
-    weight.segment<3>(k + 3).setConstant(1.0 / Positive(rate * rate));
-  }
-}
-
-// M of (16): its first three rows are along the world's x, y and about z; the others are M_bar's.
-
-std::vector<Location> ListWholeMass(const Context& c) {
+/// M of (16): its first three rows are along the world's x, y and about z; the others are M_bar's.
+Items ListWholeMass(const C& c) {
   const int n = c.unreduced->size();
   const int shift = n - c.robot->size();
-  std::vector<Location> where;
+  TermItem all{0, {}};
   for (int col = 0; col < n; ++col) {
     for (int row = 0; row < n; ++row)
-      where.push_back({Kind::kVelocityPair, std::max(row - shift, 0), std::max(col - shift, 0)});
+      all.where.push_back({Kind::kVelocityPair, std::max(row - shift, 0), std::max(col - shift, 0)});
   }
-  return where;
+  return {all};
 }
-void ModelWholeMass(const Context& c, Numbers& out) { out = c.unreduced->M().reshaped(); }
-void EngineWholeMass(const Context& c, Numbers& out) { out = c.engine_unreduced->M().reshaped(); }
-void WeighWholeMass(const Context& c, Numbers& weight) {
+void WeighWholeMass(const C& c, int, N weight) {
   const int n = c.unreduced->size();
   const int shift = n - c.robot->size();
   const int base = ModelOf(c).num_base_positions();
@@ -292,39 +114,35 @@ void WeighWholeMass(const Context& c, Numbers& weight) {
   const auto mass = [&](int i) {
     return i < base ? Positive(scales.total_mass()) : scales.GetSubtreeMass(i - shift);
   };
-  for (int col = 0; col < n; ++col) {
-    for (int row = 0; row < n; ++row) {
-      weight[col * n + row] = 1.0 / Positive(std::min(mass(row), mass(col)) * velocity(row) * velocity(col));
-    }
+  for (int i = 0; i < n * n; ++i) {
+    weight[i] = 1.0 / Positive(std::min(mass(i % n), mass(i / n)) * velocity(i % n) * velocity(i / n));
   }
 }
 
-// M_bar: the entries that the engine's tree has.
-
-std::vector<Location> ListMassEntries(const Context& c) {
-  std::vector<Location> where;
+/// M_bar: the entries that the engine's tree has.
+Items ListMassEntries(const C& c) {
+  TermItem all{0, {}};
   for (const MassEntry& entry : c.engine->mass_entries())
-    where.push_back({Kind::kVelocityPair, entry.row, entry.col});
-  return where;
+    all.where.push_back({Kind::kVelocityPair, entry.row, entry.col});
+  return {all};
 }
-void ModelMass(const Context& c, Numbers& out) {
+void ModelMass(const C& c, int, N out) {
   const double* const M = c.robot->M().data();
   const Eigen::Index n = c.robot->size();
   double* number = out.data();
   for (const MassEntry& entry : c.engine->mass_entries()) *number++ = M[entry.col * n + entry.row];
 }
-void EngineMass(const Context& c, Numbers& out) { out = c.engine->mass(); }
-void WeighMass(const Context& c, Numbers& weight) {
+void WeighMass(const C& c, int, N weight) {
   double* number = weight.data();
   for (const MassEntry& entry : c.engine->mass_entries())
     *number++ = 1.0 / c.scales->CalcMassScale(entry.row, entry.col);
 }
-std::vector<ZeroPattern> ListMassZeros(const Context& c) {
+std::vector<ZeroPattern> ListMassZeros(const C& c) {
   BoolArray may_differ = BoolArray::Constant(c.engine->size(), c.engine->size(), false);
   for (const MassEntry& entry : c.engine->mass_entries()) may_differ(entry.row, entry.col) = true;
   return {ZeroPattern(may_differ)};
 }
-void CheckMassZeros(const Context& c, ComparedTerm* term) {
+void CheckMassZeros(const C& c, ComparedTerm* term) {
   term->CheckZeros(
       0, c.robot->M(),
       [&](Eigen::Index row, Eigen::Index col) {
@@ -336,103 +154,169 @@ void CheckMassZeros(const Context& c, ComparedTerm* term) {
       c.when);
 }
 
-void ModelCoriolis(const Context& c, Numbers& out) { out.matrix().noalias() = c.robot->C() * c.xi; }
-void EngineCoriolis(const Context& c, Numbers& out) { out = c.engine->coriolis(); }
-void WeighCoriolis(const Context& c, Numbers& weight) {
-  SetWeights(weight, [&](int i) { return c.scales->CalcCoriolisScale(i); });
+/// A number, or a vector, of EnergyAndMomentum.
+template <auto kMember>
+void ModelEnergy(const C& c, int, N out) {
+  out = Eigen::Map<const Eigen::ArrayXd>(reinterpret_cast<const double*>(&(c.energy.*kMember)), out.size());
 }
-
-// C_bar: every entry at once, by its action on a second velocity w. The engine has quarters of the forces at
-// xi + w and xi - w: |xi +- w|^2 / 4 is at most (|xi|^2 + |w|^2) / 2, twice.
-void ModelCoriolisMatrix(const Context& c, Numbers& out) { out.matrix().noalias() = c.robot->C() * c.w; }
-void EngineCoriolisMatrix(const Context& c, Numbers& out) {
-  c.engine->CalcCoriolisProduct(c.xi, c.w, out.matrix());
-}
-void WeighCoriolisMatrix(const Context& c, Numbers& weight) {
-  SetWeights(weight,
-             [&](int i) { return c.scales->CalcCoriolisScale(i) + c.scales_at_w->CalcCoriolisScale(i); });
-}
-
-void ModelGravity(const Context& c, Numbers& out) { out = c.robot->gravity(); }
-void EngineGravity(const Context& c, Numbers& out) { out = c.engine->gravity(); }
-void WeighGravity(const Context& c, Numbers& weight) {
-  SetWeights(weight, [&](int i) { return c.scales->CalcGravityScale(i); });
-}
-
-void ModelFriction(const Context& c, Numbers& out) { out = c.robot->friction(); }
-void EngineFriction(const Context& c, Numbers& out) { out = c.engine->friction(); }
-void WeighFriction(const Context& c, Numbers& weight) {
-  SetWeights(weight, [&](int i) { return c.scales->CalcFrictionScale(i, c.xi); });
-}
-
-/// A number of EnergyAndMomentum on either side.
-template <double EnergyAndMomentum::*kEnergy>
-void ModelEnergy(const Context& c, Numbers& out) {
-  out[0] = c.energy.*kEnergy;
-}
-template <double EnergyAndMomentum::*kEnergy>
-void EngineEnergy(const Context& c, Numbers& out) {
-  out[0] = c.engine->energy_and_momentum().*kEnergy;
-}
-template <Vector3d EnergyAndMomentum::*kMomentum>
-void ModelMomentum(const Context& c, Numbers& out) {
-  out = (c.energy.*kMomentum).array();
-}
-template <Vector3d EnergyAndMomentum::*kMomentum>
-void EngineMomentum(const Context& c, Numbers& out) {
-  out = (c.engine->energy_and_momentum().*kMomentum).array();
-}
-void WeighKinetic(const Context& c, Numbers& weight) {
-  weight.setConstant(1.0 / c.scales->CalcKineticEnergyScale());
-}
-void WeighPotential(const Context& c, Numbers& weight) {
-  weight.setConstant(1.0 / c.scales->CalcPotentialEnergyScale());
-}
-void WeighMomentum(const Context& c, Numbers& weight) {
-  weight.setConstant(1.0 / Positive(c.scales->CalcMomentumScale()));
-}
-void WeighAngularMomentum(const Context& c, Numbers& weight) {
-  weight.setConstant(1.0 / Positive(c.scales->CalcMomentumScale() * c.scales->length()));
+template <auto kMember>
+void EngineEnergy(const C& c, int, N out) {
+  const EnergyAndMomentum& energy = c.engine->energy_and_momentum();
+  out = Eigen::Map<const Eigen::ArrayXd>(reinterpret_cast<const double*>(&(energy.*kMember)), out.size());
 }
 
 using E = EnergyAndMomentum;
-constexpr TermGroup kGroup = TermGroup::kRobot;
+constexpr TermGroup kRobot = TermGroup::kRobot;
 
 // From the base outward and from geometry to dynamics, so that the first failure is the one that the others
 // follow from. C_bar is the last that reads the engine's velocities.
-constexpr TermEntry kTerms[] = {
-    {"joint_axis", "joint_axis", "z_i", "(3), (4)", kGroup, kOnce, 1.0, ListAxes, ModelAxes, EngineAxes,
-     WeighAxes},
-    {"link_com", "link_com", "r_i", "(5)", kGroup, kOnce, 1.0, ListMasses, ModelCenters, EngineCenters,
-     WeighPlaces},
-    {"link_inertia", "link_inertia", "I_i", "(16)", kGroup, kOnce, 2.0, ListInertias, ModelInertias,
-     EngineInertias, WeighInertias},
-    {"frame_pose", "frame_pose", "^B T_f", "(5)", kGroup, kBoth, 1.0, ListFramePoses, ModelFramePoses,
-     EngineFramePoses, WeighFramePoses},
-    {"J", "J", "J_f", "(6), (28), (34)", kGroup, kBoth, 1.0, ListJacobians, ModelJacobians, EngineJacobians,
-     WeighJacobians, Weighed::kOnce, ListJacobianZeros, CheckJacobianZeros},
-    {"J_dot_xi", "J_dot_xi", "d/dt J_f xi", "(46)", kGroup, kBoth, 3.0, ListAccelerations, ModelAccelerations,
-     EngineAccelerations, WeighAccelerations},
-    {"M", "M", "M", "(16)", kGroup, kOnce, 2.0, ListWholeMass, ModelWholeMass, EngineWholeMass,
-     WeighWholeMass, Weighed::kOnce},
-    {"M_bar", "M_bar", "M_bar'", "(18), (42)", kGroup, kBoth, 2.0, ListMassEntries, ModelMass, EngineMass,
-     WeighMass, Weighed::kOnce, ListMassZeros, CheckMassZeros},
-    {"C_bar_xi", "C_bar_xi", "C_bar' xi", "(18), (42)", kGroup, kBoth, 4.0, ListVelocities, ModelCoriolis,
-     EngineCoriolis, WeighCoriolis},
-    {"C_bar", "C_bar", "C_bar'", "(18), (42)", kGroup, kOnce, 4.0, ListVelocities, ModelCoriolisMatrix,
-     EngineCoriolisMatrix, WeighCoriolisMatrix},
-    {"gravity", "gravity", "F_bar'", "(18), (42)", kGroup, kBoth, 1.0, ListVelocities, ModelGravity,
-     EngineGravity, WeighGravity, Weighed::kOnce},
-    {"friction", "friction", "F_bar'", "(18), (42)", kGroup, kBoth, 2.0, ListVelocities, ModelFriction,
-     EngineFriction, WeighFriction},
-    {"kinetic_energy", "kinetic_energy", "xi^T M_bar' xi / 2", "(16)", kGroup, kBoth, 2.0, ListOne,
-     ModelEnergy<&E::kinetic>, EngineEnergy<&E::kinetic>, WeighKinetic},
-    {"potential_energy", "potential_energy", "-", "(16)", kGroup, kBoth, 1.0, ListOne,
-     ModelEnergy<&E::potential>, EngineEnergy<&E::potential>, WeighPotential},
-    {"linear_momentum", "linear_momentum", "-", "(16)", kGroup, kBoth, 1.0, ListThree,
-     ModelMomentum<&E::linear_momentum>, EngineMomentum<&E::linear_momentum>, WeighMomentum},
-    {"angular_momentum", "angular_momentum", "-", "(16)", kGroup, kBoth, 2.0, ListThree,
-     ModelMomentum<&E::angular_momentum>, EngineMomentum<&E::angular_momentum>, WeighAngularMomentum},
+constexpr TermEntry kTerms[] =
+    {
+        // Direction, and the foot of the perpendicular from the engine's anchor: where along the axis that
+        // stands is
+        // a choice of frames.
+        {"joint_axis", "joint_axis", "z_i", "(3), (4)", kRobot, kOnce, 1.0, ListAxes,
+         [](const C& c, int joint, N out) {
+           const Pose X = c.robot->CalcLinkPose(joint);
+           const Vector3d axis = X.linear().col(2);
+           out.head<3>() = axis;
+           if (out.size() == 3) return;
+           out.tail<3>() = X.translation() + axis.dot(c.engine->JointAnchor(joint) - X.translation()) * axis;
+         },
+         [](const C& c, int joint, N out) {
+           out.head<3>() = c.engine->JointAxis(joint);
+           if (out.size() == 6) out.tail<3>() = c.engine->JointAnchor(joint);
+         },
+         [](const C& c, int, N weight) {
+           if (weight.size() == 6) weight.tail<3>().setConstant(1.0 / c.scales->world_length());
+         }},
+        {"link_com", "link_com", "r_i", "(5)", kRobot, kOnce, 1.0,
+         [](const C& c) { return ListLinks(c, 3, /*massive=*/true); },
+         [](const C& c, int link, N out) {
+           out = (c.robot->CalcLinkPose(link) * BodyOf(c, link).com).array();
+         },
+         [](const C& c, int link, N out) { out = EngineLink(c, link).com.array(); },
+         [](const C& c, int, N weight) { weight.setConstant(1.0 / c.scales->world_length()); }},
+        {"link_inertia", "link_inertia", "I_i", "(16)", kRobot, kOnce, 2.0,
+         [](const C& c) { return ListLinks(c, 9, /*massive=*/false); },
+         [](const C& c, int link, N out) {
+           const Matrix3d R = c.robot->CalcLinkPose(link).linear();
+           Eigen::Map<Matrix3d>(out.data()) = R * BodyOf(c, link).inertia * R.transpose();
+         },
+         [](const C& c, int link, N out) { Eigen::Map<Matrix3d>(out.data()) = EngineLink(c, link).inertia; },
+         [](const C& c, int link, N weight) {
+           const double by_model = BodyOf(c, link).inertia.trace();
+           weight.setConstant(1.0 / Positive(std::max(by_model, EngineLink(c, link).inertia.trace())));
+         }},
+        {"frame_pose", "frame_pose", "^B T_f", "(5)", kRobot, kBoth, 1.0, ListFramePoses,
+         [](const C& c, int frame, N out) {
+           Eigen::Map<Matrix34d>(out.data()) = c.robot->CalcFramePose(frame).matrix().topRows<3>();
+         },
+         [](const C& c, int frame, N out) {
+           Eigen::Map<Matrix34d>(out.data()) = c.engine->FramePose(frame).matrix().topRows<3>();
+         },
+         [](const C& c, int, N weight) { weight.tail<3>().setConstant(1.0 / c.scales->world_length()); }},
+        // The columns of each frame's chain, in the frame's own axes.
+        {"J", "J", "J_f", "(6), (28), (34)", kRobot, kBoth, 1.0,
+         [](const C& c) { return ListFrames(c, true); },
+         [](const C& c, int i, N out) {
+           Eigen::Index k = 0;
+           for (const int col : ChainOf(c, i)) {
+             out.segment<6>(k) = JacobianOf(c, i).J->col(col);
+             k += 6;
+           }
+         },
+         [](const C& c, int i, N out) {
+           const Matrix6Xd& columns = c.columns[static_cast<size_t>(i)];
+           const Matrix3d R_T = TurnedBack(c, i);
+           for (Eigen::Index col = 0; col < columns.cols(); ++col) {
+             out.segment<3>(6 * col) = R_T * columns.col(col).head<3>();
+             out.segment<3>(6 * col + 3) = R_T * columns.col(col).tail<3>();
+           }
+         },
+         [](const C& c, int i, N weight) {
+           double* number = weight.data();
+           for (const int col : ChainOf(c, i)) {
+             for (int row = 0; row < 6; ++row) *number++ = 1.0 / ScaleJacobian(c, row, col);
+           }
+         },
+         Weighed::kOnce, ListJacobianZeros, CheckJacobianZeros},
+        // Acceleration of the frame's origin at constant xi, in its own axes.
+        {"J_dot_xi", "J_dot_xi", "d/dt J_f xi", "(46)", kRobot, kBoth, 3.0,
+         [](const C& c) { return ListFrames(c, false); },
+         [](const C& c, int i, N out) {
+           Vector6d V = Vector6d::Zero();
+           Vector6d A = Vector6d::Zero();
+           for (const int col : ChainOf(c, i)) {
+             V += JacobianOf(c, i).J->col(col) * c.xi[col];
+             A += JacobianOf(c, i).J_dot->col(col) * c.xi[col];
+           }
+           // Of the axes' own turn: R^T d/dt (R v) = v_dot + omega x v; omega x omega = 0.
+           A.head<3>() += V.tail<3>().cross(V.head<3>());
+           out = A.array();
+         },
+         [](const C& c, int i, N out) {
+           const EngineMotion motion = c.engine->FrameMotion(FrameOf(c, i));
+           const Matrix3d R_T = TurnedBack(c, i);
+           out.head<3>() = R_T * motion.a;
+           out.tail<3>() = R_T * motion.alpha;
+         },
+         [](const C& c, int, N weight) {
+           const double rate = c.scales->angular_rate();
+           weight.head<3>().setConstant(1.0 / Positive(c.scales->acceleration()));
+           weight.tail<3>().setConstant(1.0 / Positive(rate * rate));
+         }},
+        {"M", "M", "M", "(16)", kRobot, kOnce, 2.0, ListWholeMass,
+         [](const C& c, int, N out) { out = c.unreduced->M().reshaped().array(); },
+         [](const C& c, int, N out) { out = c.engine_unreduced->M().reshaped().array(); }, WeighWholeMass,
+         Weighed::kOnce},
+        {"M_bar", "M_bar", "M_bar'", "(18), (42)", kRobot, kBoth, 2.0, ListMassEntries, ModelMass,
+         [](const C& c, int, N out) { out = c.engine->mass().array(); }, WeighMass, Weighed::kOnce,
+         ListMassZeros, CheckMassZeros},
+        {"C_bar_xi", "C_bar_xi", "C_bar' xi", "(18), (42)", kRobot, kBoth, 4.0, ListVelocities,
+         [](const C& c, int, N out) { out.matrix().noalias() = c.robot->C() * c.xi; },
+         [](const C& c, int, N out) { out = c.engine->coriolis().array(); },
+         [](const C& c, int, N weight) {
+           for (int i = 0; i < weight.size(); ++i) weight[i] = 1.0 / c.scales->CalcCoriolisScale(i);
+         }},
+        // Every entry at once, by its action on a second velocity w. The engine has quarters of the forces at
+        // xi + w
+        // and xi - w: |xi +- w|^2 / 4 is at most (|xi|^2 + |w|^2) / 2, twice.
+        {"C_bar", "C_bar", "C_bar'", "(18), (42)", kRobot, kOnce, 4.0, ListVelocities,
+         [](const C& c, int, N out) { out.matrix().noalias() = c.robot->C() * c.w; },
+         [](const C& c, int, N out) { c.engine->CalcCoriolisProduct(c.xi, c.w, out.matrix()); },
+         [](const C& c, int, N weight) {
+           for (int i = 0; i < weight.size(); ++i)
+             weight[i] = 1.0 / (c.scales->CalcCoriolisScale(i) + c.scales_at_w->CalcCoriolisScale(i));
+         }},
+        {"gravity", "gravity", "F_bar'", "(18), (42)", kRobot, kBoth, 1.0, ListVelocities,
+         [](const C& c, int, N out) { out = c.robot->gravity().array(); },
+         [](const C& c, int, N out) { out = c.engine->gravity().array(); },
+         [](const C& c, int, N weight) {
+           for (int i = 0; i < weight.size(); ++i) weight[i] = 1.0 / c.scales->CalcGravityScale(i);
+         },
+         Weighed::kOnce},
+        {"friction", "friction", "F_bar'", "(18), (42)", kRobot, kBoth, 2.0, ListVelocities,
+         [](const C& c, int, N out) { out = c.robot->friction().array(); },
+         [](const C& c, int, N out) { out = c.engine->friction().array(); },
+         [](const C& c, int, N weight) {
+           for (int i = 0; i < weight.size(); ++i) weight[i] = 1.0 / c.scales->CalcFrictionScale(i, c.xi);
+         }},
+        {"kinetic_energy", "kinetic_energy", "xi^T M_bar' xi / 2", "(16)", kRobot, kBoth, 2.0, ListWhole<1>,
+         ModelEnergy<&E::kinetic>, EngineEnergy<&E::kinetic>,
+         [](const C& c, int, N weight) { weight.setConstant(1.0 / c.scales->CalcKineticEnergyScale()); }},
+        {"potential_energy", "potential_energy", "-", "(16)", kRobot, kBoth, 1.0, ListWhole<1>,
+         ModelEnergy<&E::potential>, EngineEnergy<&E::potential>,
+         [](const C& c, int, N weight) { weight.setConstant(1.0 / c.scales->CalcPotentialEnergyScale()); }},
+        {"linear_momentum", "linear_momentum", "-", "(16)", kRobot, kBoth, 1.0, ListWhole<3>,
+         ModelEnergy<&E::linear_momentum>, EngineEnergy<&E::linear_momentum>,
+         [](const C& c, int,
+            N weight) { weight.setConstant(1.0 / Positive(c.scales->CalcMomentumScale())); }},
+        {"angular_momentum", "angular_momentum", "-", "(16)", kRobot, kBoth, 2.0, ListWhole<3>,
+         ModelEnergy<&E::angular_momentum>, EngineEnergy<&E::angular_momentum>,
+         [](const C& c, int, N weight) {
+           weight.setConstant(1.0 / Positive(c.scales->CalcMomentumScale() * c.scales->length()));
+         }},
 };
 
 }  // namespace

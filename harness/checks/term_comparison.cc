@@ -45,20 +45,32 @@ void TermComparison::Ask(Asker asker, std::span<const TermGroup> leave_out) {
     record.bound = CalcBound(entry, model().max_depth());
     std::vector<ZeroPattern> zeros;
     if (entry.list_zeros != nullptr) zeros = entry.list_zeros(context_);
-    AskedTerm& asked =
-        terms_.emplace_back(AskedTerm{&entry, ComparedTerm(&record, entry.list(context_), std::move(zeros))});
-    if (entry.weighed == Weighed::kOnce) entry.weigh(context_, asked.term.weight);
+    std::vector<Item> items;
+    std::vector<Location> where;
+    for (const TermItem& item : entry.list(context_)) {
+      items.push_back({item.index, static_cast<Eigen::Index>(where.size()),
+                       static_cast<Eigen::Index>(item.where.size())});
+      where.insert(where.end(), item.where.begin(), item.where.end());
+    }
+    AskedTerm& asked = terms_.emplace_back(
+        AskedTerm{&entry, std::move(items), ComparedTerm(&record, std::move(where), std::move(zeros))});
+    if (entry.weighed == Weighed::kOnce) Evaluate(entry.weigh, asked.items, &asked.term.weight);
   }
+}
+
+void TermComparison::Evaluate(Evaluator evaluate, const std::vector<Item>& items,
+                              Eigen::ArrayXd* numbers) const {
+  for (const Item& item : items) evaluate(context_, item.index, numbers->segment(item.begin, item.count));
 }
 
 void TermComparison::Compare(double when, bool contacts) {
   context_.when = when;
   for (size_t i = 0; i < terms_.size(); ++i) {
-    auto& [entry, term] = terms_[i];
+    auto& [entry, items, term] = terms_[i];
     if (IsOfContacts(i) && !contacts) continue;
-    entry->model(context_, term.model);
-    entry->engine(context_, term.engine);
-    if (entry->weighed == Weighed::kAtEachState) entry->weigh(context_, term.weight);
+    Evaluate(entry->model, items, &term.model);
+    Evaluate(entry->engine, items, &term.engine);
+    if (entry->weighed == Weighed::kAtEachState) Evaluate(entry->weigh, items, &term.weight);
     if (entry->check_zeros != nullptr) entry->check_zeros(context_, &term);
     const bool failed_before = records_[i].failed;
     term.Finish(when);

@@ -41,10 +41,17 @@ class TermComparison {
   std::vector<CheckRecord> records_;
 
  private:
+  struct Item {
+    int index;
+    Eigen::Index begin, count;  // among the term's numbers
+  };
   struct AskedTerm {
     const TermEntry* entry;
+    std::vector<Item> items;
     ComparedTerm term;
   };
+  void Evaluate(Evaluator evaluate, const std::vector<Item>& items, Eigen::ArrayXd* numbers) const;
+
   std::vector<AskedTerm> terms_;
 };
 

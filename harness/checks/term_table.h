@@ -27,9 +27,12 @@ struct FrameJacobian {
   const Matrix6Xd* J_dot = nullptr;
 };
 
+/// Rotation and place of a pose.
+using Matrix34d = Eigen::Matrix<double, 3, 4>;
+
 /// The object's terms by either side, in Sigma_o.
 struct ObjectValues {
-  Eigen::Matrix<double, 3, 4> pose;  ///< World.
+  Matrix34d pose;  ///< World.
   Vector6d V_Bo;
   Matrix6d M_hat;
   Vector6d C_hat_V;
@@ -78,6 +81,7 @@ struct ContactScales {
   double relative_twist = 1.0;
 };
 
+/// A contact by both sides.
 struct ContactSides {
   int frame = -1;  ///< Of the fingertip.
   ContactValues model, engine;
@@ -120,6 +124,15 @@ enum class TermGroup {
 /// When a term's scales are formed.
 enum class Weighed { kOnce, kAtEachState };
 
+/// Numbers of a term that are evaluated together: those of a joint, a link, a frame, a contact.
+struct TermItem {
+  int index;                    ///< Of the joint, ...; of frames and contacts, their place in the context.
+  std::vector<Location> where;  ///< One for each number.
+};
+
+/// Numbers of an item on either side, or one over the size of what is summed up to form them.
+using Evaluator = void (*)(const TermContext&, int item, Eigen::Ref<Eigen::ArrayXd> numbers);
+
 /// One entry of the table.
 struct TermEntry {
   const char* name;              ///< In log and summary; NOTATION.md has it.
@@ -128,16 +141,12 @@ struct TermEntry {
   const char* equation;
   TermGroup group;
   unsigned askers;  ///< Of Asker.
-  double
-      factor;  ///< Geometric quantities (poses, Jacobians are one) that its formation chains: see CalcBound.
+  double factor;    ///< Geometric quantities (poses, Jacobians are one) that its formation chains.
 
-  /// One location for each number.
-  std::vector<Location> (*list)(const TermContext&);
-  /// Of the numbers, in that order.
-  void (*model)(const TermContext&, Eigen::ArrayXd&);
-  void (*engine)(const TermContext&, Eigen::ArrayXd&);
-  /// One over the size of what is summed up to form each number, so that one bound holds for all.
-  void (*weigh)(const TermContext&, Eigen::ArrayXd&);
+  std::vector<TermItem> (*list)(const TermContext&);
+  Evaluator model;
+  Evaluator engine;
+  Evaluator weigh;  ///< So that one bound holds for all numbers.
   Weighed weighed = Weighed::kAtEachState;
   /// Matrices of which `list` has only what the tree lets differ from zero; null where it has everything.
   std::vector<ZeroPattern> (*list_zeros)(const TermContext&) = nullptr;
@@ -150,10 +159,9 @@ std::span<const TermEntry> ListTerms();
 /// Largest relative error that rounding explains, on chains of `depth` joints.
 double CalcBound(const TermEntry& term, int depth);
 
-/// By the engine, with its scales: the contact of a fingertip whose model's side is at hand.
+/// By the engine, with its scales: the contact of one of the frames, whose model's side is at hand.
 /// @param shift carries the projected robot to where the plant has it.
-void EvaluateContact(const TermContext& context, const Contact& contact, const Pose& shift,
-                     ContactSides* sides);
+void EvaluateContact(const Contact& contact, const Pose& shift, size_t index, TermContext* context);
 
 /// By the engine, in coordinates X_o with X_o_dot when `coordinates` has them.
 void EvaluateObject(const MassProperties& body, const Vector3d& gravity, const ObjectCoordinates* coordinates,
