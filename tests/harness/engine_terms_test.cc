@@ -8,6 +8,7 @@
 #include "controller/common/errors.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
+#include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
 namespace dexcheck {
@@ -193,7 +194,7 @@ constexpr double kSmall = 1e-12;
 
 TEST_P(SparseTerms, AreThoseOfDenseProjections) {
   const RobotModel model = testing::ReadPaperRobot(GetParam());
-  const MjModelPtr engine = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *engine, "scene.xml");
   EngineTerms all(adapter, Coordinates::kReduced);
   EngineTerms grasp(adapter, model.fingertips());

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "harness/engine/engine.h"
+#include "tests/common/paths.h"
 
 namespace dexcheck {
 namespace {
@@ -25,7 +26,7 @@ namespace {
 class SameMotion : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(SameMotion, WithAndWithoutLooks) {
-  const MjModelPtr full = LoadMjcf(std::string(DEXCHECK_SOURCE_DIR) + GetParam());
+  const MjModelPtr full = LoadMjcf(testing::SourcePath(GetParam()));
   const MjModelPtr bare(mj_copyModel(nullptr, full.get()));
   const int removed = RemoveLooks(bare.get());
   EXPECT_GT(removed, 10);
