@@ -33,12 +33,54 @@ void ForEachReference(mjModel* m, const Visit& visit) {
 
 /// Moves the rows of the geoms that stay to the front of an array.
 template <typename Number>
-void KeepRows(const std::vector<int>& stay, int columns, Number* rows) {
+void KeepRows(const std::vector<int>& stay, size_t columns, Number* rows) {
   for (size_t i = 0; i < stay.size(); ++i) {
-    std::memmove(rows + i * static_cast<size_t>(columns),
-                 rows + static_cast<size_t>(stay[i]) * static_cast<size_t>(columns),
-                 static_cast<size_t>(columns) * sizeof(Number));
+    std::memmove(rows + i * columns, rows + static_cast<size_t>(stay[i]) * columns, columns * sizeof(Number));
   }
+}
+
+// All arrays of a model, as the engine lists them: visit(type, array, bytes of a row, rows, whether one for
+// each geom).
+#undef MJ_M
+#define MJ_M(size) m->size
+#define DEXCHECK_VISIT(type, name, rows, columns)                            \
+  visit(m->name, static_cast<size_t>(m->rows), static_cast<size_t>(columns), \
+        std::string_view(#rows) == "ngeom");
+template <typename Visit>
+void ForEachArray(mjModel* m, const Visit& visit) {
+#define X DEXCHECK_VISIT
+  MJMODEL_POINTERS
+#undef X
+}
+
+/// The engine lays them out one after the other, each at a multiple of this.
+constexpr size_t kAlignment = 64;
+
+size_t RoundUp(size_t offset) { return (offset + kAlignment - 1) / kAlignment * kAlignment; }
+
+bool HasKnownLayout(mjModel* m) {
+  bool known = true;
+  size_t offset = 0;
+  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
+    offset = RoundUp(offset);
+    known = known && reinterpret_cast<char*>(array) == static_cast<char*>(m->buffer) + offset;
+    offset += sizeof(Number) * rows * columns;
+  });
+  return known && static_cast<size_t>(m->nbuffer) == offset;
+}
+
+/// Moves the arrays to where a model of these sizes has them.
+void LayOut(mjModel* m) {
+  size_t offset = 0;
+  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
+    offset = RoundUp(offset);
+    char* const place = static_cast<char*>(m->buffer) + offset;
+    const size_t bytes = sizeof(Number) * rows * columns;
+    std::memmove(place, array, bytes);
+    array = reinterpret_cast<Number*>(place);
+    offset += bytes;
+  });
+  m->nbuffer = static_cast<decltype(m->nbuffer)>(offset);
 }
 
 }  // namespace
@@ -59,7 +101,7 @@ int RemoveLooks(mjModel* m) {
     stay.push_back(geom);
   }
   const int removed = m->ngeom - static_cast<int>(stay.size());
-  if (removed == 0) return 0;
+  if (removed == 0 || !HasKnownLayout(m)) return 0;
 
   const auto renumber = [&](int* geom) {
     if (*geom >= 0) *geom = new_id[static_cast<size_t>(*geom)];
@@ -69,14 +111,11 @@ int RemoveLooks(mjModel* m) {
     renumber(m->pair_geom1 + pair);
     renumber(m->pair_geom2 + pair);
   }
-  // All arrays with a row for each geom, as the engine lists them.
-#undef MJ_M
-#define MJ_M(size) m->size
-#define X(type, name, rows, columns) \
-  if (std::string_view(#rows) == "ngeom") KeepRows(stay, static_cast<int>(columns), m->name);
-  MJMODEL_POINTERS
-#undef X
+  ForEachArray(m, [&]<typename Number>(Number*& array, size_t, size_t columns, bool of_geoms) {
+    if (of_geoms) KeepRows(stay, columns, array);
+  });
   m->ngeom = static_cast<int>(stay.size());
+  LayOut(m);
 
   int next = 0;
   for (int body = 0; body < m->nbody; ++body) {

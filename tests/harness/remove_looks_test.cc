@@ -110,8 +110,12 @@ TEST(RemoveLooks, KeepsWhatAnythingRefersTo) {
   EXPECT_EQ(model->body_geomnum[second], 4);
   EXPECT_EQ(model->body_geomnum[mj_name2id(model.get(), mjOBJ_BODY, "only_drawn")], 0);
   const MjDataPtr data = MakeData(*model);
-  for (int step = 0; step < 100; ++step) mj_step(model.get(), data.get());
-  EXPECT_GT(data->ncon, 0);
+  int contacts = 0;
+  for (int step = 0; step < 100; ++step) {
+    mj_step(model.get(), data.get());
+    contacts += data->ncon;
+  }
+  EXPECT_GT(contacts, 0);
 }
 
 }  // namespace

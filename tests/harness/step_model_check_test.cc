@@ -60,7 +60,7 @@ TEST_P(StepModelCheckTest, ShippedRobotAgreesAlongAWalk) {
     }
   }
   const std::span<const CheckRecord> records = controller.check.records();
-  EXPECT_EQ(records.size(), GetParam() == OrientationFeedback::kAngles ? 25u : 23u);
+  EXPECT_EQ(records.size(), GetParam() == OrientationFeedback::kAngles ? 25u : 21u);
   for (const CheckRecord& record : records) {
     EXPECT_FALSE(record.failed) << record.name << ": " << record.worst << " > " << record.bound << ", "
                                 << Describe(record.where, controller.model, 2) << ", " << record.model_value
