@@ -74,8 +74,8 @@ void EvaluateRates(const C& c, const Contact& contact, const ContactPlace& place
                               scales.position * object_angular * object_angular +
                               c.scales->linear_rate() * (omega_o.norm() + curvature * v_o.norm()));
   // Rolling rates are the relative rates over the surfaces' relative curvature.
-  scales.relative_twist = Positive((v_f.norm() + v_o.norm() + over_tip.norm()) * scales.normal +
-                                   scales.position * (omega_f.norm() + omega_o.norm()));
+  scales.relative_twist = Positive(v_f.norm() + v_o.norm() + over_tip.norm() +
+                                   c.scales->world_length() * (omega_f.norm() + omega_o.norm()));
 }
 
 const ContactSides& ContactOf(const C& c, int i) { return c.contacts[static_cast<size_t>(i)]; }
