@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <stdexcept>
 
+#include "controller/common/text.h"
 #include "controller/object/object_dynamics.h"
 #include "harness/checks/term_table.h"
 
@@ -129,6 +131,13 @@ std::span<const TermEntry> ListTerms() {
     return all;
   }();
   return kAll;
+}
+
+const TermEntry& FindTerm(std::string_view consistency_name) {
+  for (const TermEntry& term : ListTerms()) {
+    if (term.consistency_name == consistency_name) return term;
+  }
+  throw std::invalid_argument("no term " + Quote(std::string(consistency_name)));
 }
 
 double CalcBound(const TermEntry& term, int depth) {

@@ -4,6 +4,7 @@
 // either side. `consistency`, `run`, `diagnose` and `mutate` ask the entries that are marked as theirs.
 
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "controller/contact/grasp_map.h"
@@ -155,6 +156,9 @@ struct TermEntry {
 
 /// All terms, in the order in which they are shown: what stands above explains what stands below.
 std::span<const TermEntry> ListTerms();
+
+/// The entry that consistency calls so. @throws std::invalid_argument when there is none.
+const TermEntry& FindTerm(std::string_view consistency_name);
 
 /// Largest relative error that rounding explains, on chains of `depth` joints.
 double CalcBound(const TermEntry& term, int depth);

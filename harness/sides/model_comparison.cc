@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "harness/checks/rounding_scales.h"
+#include "harness/checks/term_table.h"
 #include "harness/sides/description_match.h"
 
 namespace dexcheck {
@@ -40,26 +41,16 @@ class ModelComparison {
     q_b_.setZero(model_a_.num_positions());
     xi_b_.setZero(n);
     for (Matrix6Xd* J : {&J_a_, &J_dot_a_, &J_b_, &J_dot_b_}) J->setZero(6, n);
-    const double depth_bound = CalcRoundingBound(std::max(model_a_.max_depth(), model_b_.max_depth()), 1.0);
-    const auto define = [&](CheckRecord* record, const char* name, double factors) {
-      record->name = name;
-      record->bound = factors * depth_bound;
-    };
-    define(&records_[kJointAxis], "joint_axis", 1.0);
-    define(&records_[kLinkCom], "link_com", 1.0);
-    define(&records_[kLinkInertia], "link_inertia", 2.0);
-    define(&records_[kFramePose], "frame_pose", 1.0);
-    define(&records_[kJ], "J", 1.0);
-    define(&records_[kJDotXi], "J_dot_xi", 3.0);
-    define(&records_[kMassMatrix], "M_bar", 2.0);
-    define(&records_[kCoriolisForce], "C_bar_xi", 4.0);
-    define(&records_[kCoriolisMatrix], "C_bar", 4.0);
-    define(&records_[kGravity], "gravity", 1.0);
-    define(&records_[kFriction], "friction", 2.0);
-    define(&records_[kKineticEnergy], "kinetic_energy", 2.0);
-    define(&records_[kPotentialEnergy], "potential_energy", 1.0);
-    define(&records_[kLinearMomentum], "linear_momentum", 1.0);
-    define(&records_[kAngularMomentum], "angular_momentum", 2.0);
+    const int depth = std::max(model_a_.max_depth(), model_b_.max_depth());
+    constexpr const char* kNames[] = {
+        "joint_axis", "link_com",       "link_inertia",     "frame_pose",      "J",
+        "J_dot_xi",   "M_bar",          "C_bar_xi",         "C_bar",           "gravity",
+        "friction",   "kinetic_energy", "potential_energy", "linear_momentum", "angular_momentum"};
+    static_assert(std::size(kNames) == kTermCount);
+    for (int term = 0; term < kTermCount; ++term) {
+      records_[term].name = kNames[term];
+      records_[term].bound = CalcBound(FindTerm(kNames[term]), depth);
+    }
   }
 
   [[nodiscard]] const RobotModel& model() const { return model_a_; }
