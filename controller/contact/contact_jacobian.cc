@@ -23,17 +23,38 @@ void RequireRowsShape(const Contact& contact, Eigen::Index columns, Eigen::Ref<M
           "must equal those of the fingertip Jacobian", static_cast<double>(rows.cols()));
 }
 
+/// Calls visit(columns) for each run of columns, or for all columns at once when there are none.
+template <typename Visit>
+void ForEachRun(std::span<const ColumnRun> columns, Eigen::Index all, const Visit& visit) {
+  if (columns.empty()) return visit(ColumnRun{0, all});
+  for (const ColumnRun& run : columns) visit(run);
+}
+
+/// rows = A J, of some columns.
+void Multiply(const TransmittedRows& A, const Eigen::Ref<const Matrix6Xd>& J, Eigen::Ref<MatrixXd> rows) {
+  rows = A.lazyProduct(J);
+}
+
+/// rows += A J, of some columns.
+void AddProduct(const TransmittedRows& A, const Eigen::Ref<const Matrix6Xd>& J, Eigen::Ref<MatrixXd> rows) {
+  rows += A.lazyProduct(J);
+}
+
 }  // namespace
 
 void CalcContactJacobian(const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
-                         Eigen::Ref<MatrixXd> rows) {
+                         Eigen::Ref<MatrixXd> rows, std::span<const ColumnRun> columns) {
   RequireRowsShape(contact, J_f.cols(), rows);
   // B_c^T Ad_{g_cf_f} J_f
-  rows = SelectTransmittedRows(contact.type, CalcAdjointInverse(contact.geometry.g_f_cf)).lazyProduct(J_f);
+  const TransmittedRows A = SelectTransmittedRows(contact.type, CalcAdjointInverse(contact.geometry.g_f_cf));
+  ForEachRun(columns, J_f.cols(), [&](const ColumnRun& run) {
+    Multiply(A, J_f.middleCols(run.begin, run.count), rows.middleCols(run.begin, run.count));
+  });
 }
 
 void CalcContactJacobianDot(const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
-                            const Eigen::Ref<const Matrix6Xd>& J_f_dot, Eigen::Ref<MatrixXd> rows_dot) {
+                            const Eigen::Ref<const Matrix6Xd>& J_f_dot, Eigen::Ref<MatrixXd> rows_dot,
+                            std::span<const ColumnRun> columns) {
   RequireRowsShape(contact, J_f.cols(), rows_dot);
   Require(J_f_dot.cols() == J_f.cols(), "columns of J_f_dot", "must equal those of J_f",
           static_cast<double>(J_f_dot.cols()));
@@ -41,8 +62,13 @@ void CalcContactJacobianDot(const Contact& contact, const Eigen::Ref<const Matri
   const Matrix6d Ad = CalcAdjointInverse(contact.geometry.g_f_cf);
   const Matrix6d Ad_dot =
       -CalcTwistCross(CalcFrameTwistOnFingertip(contact.geometry, contact.kappa_dot)) * Ad;
-  rows_dot = SelectTransmittedRows(contact.type, Ad).lazyProduct(J_f_dot);
-  rows_dot += SelectTransmittedRows(contact.type, Ad_dot).lazyProduct(J_f);
+  const TransmittedRows A = SelectTransmittedRows(contact.type, Ad);
+  const TransmittedRows A_dot = SelectTransmittedRows(contact.type, Ad_dot);
+  ForEachRun(columns, J_f.cols(), [&](const ColumnRun& run) {
+    Eigen::Ref<MatrixXd> part = rows_dot.middleCols(run.begin, run.count);
+    Multiply(A, J_f_dot.middleCols(run.begin, run.count), part);
+    AddProduct(A_dot, J_f.middleCols(run.begin, run.count), part);
+  });
 }
 
 void CalcHandJacobian(std::span<const Contact> contacts, std::span<const Matrix6Xd> J_f,

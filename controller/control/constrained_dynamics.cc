@@ -38,11 +38,11 @@ ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contac
   Require(num_contacts > 0, "number of contacts", "must be positive", num_contacts);
   const Eigen::Index n = model.num_velocities();
   const Eigen::Index k = Eigen::Index{3} * num_contacts;
-  half_.setZero(n + 6, k + 1);
+  half_.setZero(n + 6, k);
+  half_force_.setZero(n + 6, 1);
   schur_.setZero(k, k);
   schur_llt_ = Eigen::LLT<MatrixXd>(k);
   motion_.setZero(n + 6);
-  free_.setZero(n, 1);
   prediction_.xi_dot.setZero(n);
   prediction_.f_c.setZero(k);
 }
@@ -59,34 +59,45 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
   factor_.Compute(robot.M());
   const Eigen::LLT<Matrix6d> M_hat_llt(body.M_hat);
 
-  // M = L^T L of the robot, L L^T of the object; half = M^-1/2 [J_B'^T; -G | what the constraints leave
-  // alone]
-  const Eigen::Index k = schur_.rows();
-  half_.topLeftCorner(n, k) = grasp.J_B().transpose();
+  // M = L^T L of the robot, L L^T of the object; half = M^-1/2 [J_B'^T; -G], and M^-1/2 of what the
+  // constraints leave alone
+  const std::span<const int> moving = grasp.moving_entries();
+  half_.topRows(n).setZero();
+  for (const int i : moving) half_.row(i) = grasp.J_B().col(i).transpose();
   CalcFreeForce(robot, force);
   if (object == ObjectSupport::kHand) {
-    half_.bottomLeftCorner(6, k) = -grasp.G();
+    half_.bottomRows<6>() = -grasp.G();
     motion_.tail<6>() = -body.C_hat * grasp.V_Bo() - body.N_o;
   } else {
-    half_.bottomLeftCorner(6, k).setZero();
+    half_.bottomRows<6>().setZero();
     motion_.tail<6>().setZero();
   }
-  half_.col(k) = motion_;
-  factor_.SolveTransposed(half_.topRows(n));
+  half_force_ = motion_;
+  factor_.SolveTransposed(moving, half_.topRows(n));
+  factor_.SolveTransposed(half_force_.topRows(n));
   M_hat_llt.matrixL().solveInPlace(half_.bottomRows<6>());
+  M_hat_llt.matrixL().solveInPlace(half_force_.bottomRows<6>());
 
   // (half^T half) f_c = half^T half_force + slip_bias
-  const auto constraints = half_.leftCols(k);
-  schur_.noalias() = constraints.transpose() * constraints;
+  schur_.setZero();
+  prediction_.f_c = grasp.slip_bias();
+  const auto add_row = [&](Eigen::Index i) {
+    for (Eigen::Index col = 0; col < schur_.cols(); ++col) {
+      schur_.col(col).tail(schur_.rows() - col) +=
+          half_(i, col) * half_.row(i).tail(schur_.rows() - col).transpose();
+    }
+    prediction_.f_c += half_force_(i, 0) * half_.row(i).transpose();
+  };
+  for (const int i : moving) add_row(i);
+  for (Eigen::Index i = n; i < n + 6; ++i) add_row(i);
   schur_llt_.compute(schur_);
   RequireIndependentConstraints(schur_, schur_llt_);
-  prediction_.f_c = grasp.slip_bias();
-  prediction_.f_c.noalias() += constraints.transpose() * half_.col(k);
   schur_llt_.solveInPlace(prediction_.f_c);
 
   // [xi_dot; V_Bo_dot] = M^-1/2 (half_force - half f_c)
-  motion_ = half_.col(k);
-  motion_.noalias() -= constraints * prediction_.f_c;
+  motion_ = half_force_;
+  for (const int i : moving) motion_[i] -= half_.row(i).dot(prediction_.f_c);
+  for (Eigen::Index i = n; i < n + 6; ++i) motion_[i] -= half_.row(i).dot(prediction_.f_c);
   prediction_.xi_dot = motion_.head(n);
   factor_.Solve(prediction_.xi_dot);
   prediction_.V_Bo_dot = motion_.tail<6>();
@@ -101,9 +112,9 @@ const Prediction& ConstrainedDynamics::PredictFree(const ModelTerms& robot,
           static_cast<double>(force.size()));
   factor_.Compute(robot.M());
   CalcFreeForce(robot, force);
-  free_ = motion_.head(n);
-  factor_.SolveTransposed(free_);
-  prediction_.xi_dot = free_.col(0);
+  half_force_.topRows(n) = motion_.head(n);
+  factor_.SolveTransposed(half_force_.topRows(n));
+  prediction_.xi_dot = half_force_.topRows(n);
   factor_.Solve(prediction_.xi_dot);
   prediction_.V_Bo_dot.setZero();
   prediction_.f_c.setZero();

@@ -61,11 +61,12 @@ class ConstrainedDynamics {
   void CalcFreeForce(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force);
 
   TreeFactor factor_;
-  RowMatrixXd half_;  // n + 6 x k + 1, [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G | forces without contact]
+  // Most rows of J_B'^T are zero, those of joints that carry no fingertip, and stay so.
+  RowMatrixXd half_;        // n + 6 x k, [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G]
+  RowMatrixXd half_force_;  // n + 6 x 1, M^-1/2 of the forces without contact
   MatrixXd schur_;
   Eigen::LLT<MatrixXd> schur_llt_;
-  VectorXd motion_;   // n + 6
-  RowMatrixXd free_;  // n x 1
+  VectorXd motion_;  // n + 6
   Prediction prediction_;
 };
 

@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "controller/common/errors.h"
-#include "controller/contact/contact_jacobian.h"
 #include "controller/contact/rolling.h"
 #include "controller/object/euler_zyz.h"
 
@@ -30,10 +29,33 @@ GraspTerms::GraspTerms(const RobotModel& model, std::span<const int> fingertips,
   G_dot_.setZero(6, k);
   J_B_.setZero(k, n);
   J_B_dot_.setZero(k, n);
-  J_f_.setZero(6, n);
-  J_f_dot_.setZero(6, n);
+  tip_jacobians_.assign(fingertips_.size(), {Matrix6Xd::Zero(6, n), Matrix6Xd::Zero(6, n)});
   slip_.setZero(k);
   slip_bias_.setZero(k);
+  ListChains(model);
+}
+
+void GraspTerms::ListChains(const RobotModel& model) {
+  const int base = model.num_base_velocities();
+  std::vector<bool> moves_any(static_cast<size_t>(model.num_velocities()), false);
+  for (const int frame : fingertips_) {
+    std::vector<bool> moves(moves_any.size(), false);
+    std::fill_n(moves.begin(), base, true);
+    for (int i = model.frames()[static_cast<size_t>(frame)].link; i >= 0;
+         i = model.joints()[static_cast<size_t>(i)].parent) {
+      moves[static_cast<size_t>(base + i)] = true;
+    }
+    std::vector<ColumnRun>& runs = chains_.emplace_back();
+    for (int i = 0; i < model.num_velocities(); ++i) {
+      if (!moves[static_cast<size_t>(i)]) continue;
+      moves_any[static_cast<size_t>(i)] = true;
+      if (runs.empty() || runs.back().begin + runs.back().count != i) runs.push_back({i, 0});
+      ++runs.back().count;
+    }
+  }
+  for (int i = 0; i < model.num_velocities(); ++i) {
+    if (moves_any[static_cast<size_t>(i)]) moving_entries_.push_back(i);
+  }
 }
 
 void GraspTerms::SetOverlaps(std::span<const double> overlaps) {
@@ -66,12 +88,13 @@ void GraspTerms::SetBond(const Pose& X_Bf, const Vector6d& V_f, size_t finger) {
   const Eigen::Index row = 3 * static_cast<Eigen::Index>(finger);
   auto J = J_B_.middleRows<3>(row);
   auto J_dot = J_B_dot_.middleRows<3>(row);
-  J.noalias() = R_cf_f * J_f_.topRows<3>();
-  J.noalias() -= (R_cf_f * S) * J_f_.bottomRows<3>();
-  J_dot.noalias() = R_dot * J_f_.topRows<3>();
-  J_dot.noalias() -= (R_dot * S) * J_f_.bottomRows<3>();
-  J_dot.noalias() += R_cf_f * J_f_dot_.topRows<3>();
-  J_dot.noalias() -= (R_cf_f * S) * J_f_dot_.bottomRows<3>();
+  const auto& [J_f, J_f_dot] = tip_jacobians_[finger];
+  J.noalias() = R_cf_f * J_f.topRows<3>();
+  J.noalias() -= (R_cf_f * S) * J_f.bottomRows<3>();
+  J_dot.noalias() = R_dot * J_f.topRows<3>();
+  J_dot.noalias() -= (R_dot * S) * J_f.bottomRows<3>();
+  J_dot.noalias() += R_cf_f * J_f_dot.topRows<3>();
+  J_dot.noalias() -= (R_cf_f * S) * J_f_dot.bottomRows<3>();
 }
 
 void GraspTerms::SetState(const ModelTerms& robot, const Vector6d& X_o, const Vector6d& X_o_dot,
@@ -102,16 +125,17 @@ void GraspTerms::SetContacts(const ModelTerms& robot, std::span<const ContactCoo
   for (size_t i = 0; i < fingertips_.size(); ++i) {
     const Eigen::Index row = 3 * static_cast<Eigen::Index>(i);
     Contact& contact = contacts_[i];
-    robot.CalcFrameJacobian(fingertips_[i], J_f_, J_f_dot_);
+    auto& [J_f, J_f_dot] = tip_jacobians_[i];
+    robot.CalcFrameJacobian(fingertips_[i], J_f, J_f_dot);
     contact.geometry = CalcContactGeometry(tips_[i], *surface_, kappa[i], overlaps_[i]);
     if (!bonds_.empty()) {
-      SetBond(robot.CalcFramePose(fingertips_[i]), J_f_ * robot.velocity(), i);
+      SetBond(robot.CalcFramePose(fingertips_[i]), J_f * robot.velocity(), i);
       continue;
     }
-    const Vector6d V_f = J_f_ * robot.velocity();
+    const Vector6d V_f = J_f * robot.velocity();
     contact.kappa_dot = CalcKappaDot(contact.geometry, CalcRelativeTwist(contact.geometry, V_f, V_Bo_));
-    CalcContactJacobian(contact, J_f_, J_B_.middleRows(row, 3));
-    CalcContactJacobianDot(contact, J_f_, J_f_dot_, J_B_dot_.middleRows(row, 3));
+    CalcContactJacobian(contact, J_f, J_B_.middleRows(row, 3), chains_[i]);
+    CalcContactJacobianDot(contact, J_f, J_f_dot, J_B_dot_.middleRows(row, 3), chains_[i]);
   }
   CalcGraspMap(contacts_, G_);
   CalcGraspMapDot(contacts_, G_dot_);

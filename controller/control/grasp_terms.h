@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "controller/common/types.h"
+#include "controller/contact/contact_jacobian.h"
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/shapes.h"
 #include "controller/dynamics/model_terms.h"
@@ -69,6 +70,15 @@ class GraspTerms {
   /// J_B' (k x n), (44), and its rate.
   [[nodiscard]] const MatrixXd& J_B() const { return J_B_; }
   [[nodiscard]] const MatrixXd& J_B_dot() const { return J_B_dot_; }
+  /// Body Jacobian of a finger's tip in the fingertip frame, 6 x n, and its rate.
+  [[nodiscard]] const Matrix6Xd& J_f(int finger) const {
+    return tip_jacobians_[static_cast<size_t>(finger)].J;
+  }
+  [[nodiscard]] const Matrix6Xd& J_f_dot(int finger) const {
+    return tip_jacobians_[static_cast<size_t>(finger)].J_dot;
+  }
+  /// Entries of xi that move any of the fingertips, ascending: the other columns of J_B' are zero.
+  [[nodiscard]] std::span<const int> moving_entries() const { return moving_entries_; }
   /// Pose and body velocity of the object.
   [[nodiscard]] const Pose& X_Bo() const { return X_Bo_; }
   [[nodiscard]] const Vector6d& V_Bo() const { return V_Bo_; }
@@ -88,11 +98,18 @@ class GraspTerms {
 
  private:
   void SetContacts(const ModelTerms& robot, std::span<const ContactCoordinates> kappa);
+  void ListChains(const RobotModel& model);
   void SetBond(const Pose& X_Bf, const Vector6d& V_f, size_t finger);
   void RequireCoordinates() const;
 
+  struct TipJacobian {
+    Matrix6Xd J, J_dot;
+  };
+
   std::vector<int> fingertips_;
   std::vector<Sphere> tips_;
+  std::vector<std::vector<ColumnRun>> chains_;  // entries of xi that move each fingertip
+  std::vector<int> moving_entries_;
   MassProperties object_;
   Vector3d gravity_;
   const Surface* surface_;
@@ -102,7 +119,7 @@ class GraspTerms {
   std::vector<Contact> contacts_;
   Matrix6Xd G_, G_dot_;
   MatrixXd J_B_, J_B_dot_;
-  Matrix6Xd J_f_, J_f_dot_;
+  std::vector<TipJacobian> tip_jacobians_;
   Pose X_Bo_ = Pose::Identity();
   Vector6d V_Bo_ = Vector6d::Zero();
   ObjectBodyTerms body_{};

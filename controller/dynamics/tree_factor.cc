@@ -1,72 +1,94 @@
 #include "controller/dynamics/tree_factor.h"
 
 #include <cmath>
+#include <numeric>
 
 #include "controller/common/errors.h"
 
 namespace dexcheck {
 
-TreeFactor::TreeFactor(const RobotModel& model)
-    : L_(RowMatrixXd::Zero(model.num_velocities(), model.num_velocities())) {
+TreeFactor::TreeFactor(const RobotModel& model) {
   const int base = model.num_base_velocities();
-  for (int i = 0; i < base; ++i) parent_.push_back(i - 1);
-  for (const Joint& joint : model.joints()) {
-    parent_.push_back(joint.parent >= 0 ? base + joint.parent : base - 1);
+  const auto add = [&](int coordinate, int parent) {
+    const size_t begin = path_.size();
+    if (parent >= 0) {
+      const Row above = rows_[static_cast<size_t>(parent)];
+      for (size_t k = 0; k < above.size; ++k) path_.push_back(path_[above.begin + k]);
+    }
+    path_.push_back(coordinate);
+    rows_.push_back({begin, path_.size() - begin});
+  };
+  for (int i = 0; i < base; ++i) add(i, i - 1);
+  for (int i = 0; i < model.num_joints(); ++i) {
+    const int parent = model.joints()[static_cast<size_t>(i)].parent;
+    add(base + i, parent >= 0 ? base + parent : base - 1);
   }
+  L_.assign(path_.size(), 0.0);
+  all_rows_.resize(rows_.size());
+  std::iota(all_rows_.begin(), all_rows_.end(), 0);
 }
 
 void TreeFactor::Compute(const Eigen::Ref<const MatrixXd>& M) {
-  const int n = static_cast<int>(parent_.size());
+  const auto n = static_cast<Eigen::Index>(rows_.size());
   Require(M.rows() == n && M.cols() == n, "rows of M", "must be those of xi", static_cast<double>(M.rows()));
-  for (int i = 0; i < n; ++i) {
-    for (int j = i; j >= 0; j = parent_[static_cast<size_t>(j)]) L_(i, j) = M(i, j);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Row row = rows_[static_cast<size_t>(i)];
+    for (size_t k = row.begin; k < row.begin + row.size; ++k) L_[k] = M(i, path_[k]);
   }
-  // From the tips inward: row k is final, then its part is taken from the rows that it hangs on.
-  for (int k = n - 1; k >= 0; --k) {
-    const double pivot = L_(k, k);
+  // From the tips inward: a row is final, then its part is taken from the rows that it hangs on.
+  for (auto i = rows_.rbegin(); i != rows_.rend(); ++i) {
+    const Row row = *i;
+    double* const entries = L_.data() + row.begin;
+    const size_t last = row.size - 1;
+    const double pivot = entries[last];
     Require(pivot > 0.0, "M_bar'", "must be positive definite; pivot", pivot);
     const double root = std::sqrt(pivot);
     const double inverse = 1.0 / root;
-    L_(k, k) = root;
-    const int above = parent_[static_cast<size_t>(k)];
-    for (int i = above; i >= 0; i = parent_[static_cast<size_t>(i)]) L_(k, i) *= inverse;
-    for (int i = above; i >= 0; i = parent_[static_cast<size_t>(i)]) {
-      const double factor = L_(k, i);
-      for (int j = i; j >= 0; j = parent_[static_cast<size_t>(j)]) L_(i, j) -= factor * L_(k, j);
+    entries[last] = root;
+    for (size_t k = 0; k < last; ++k) entries[k] *= inverse;
+    for (size_t above = 0; above < last; ++above) {
+      const double factor = entries[above];
+      double* const others = L_.data() + rows_[static_cast<size_t>(path_[row.begin + above])].begin;
+      for (size_t k = 0; k <= above; ++k) others[k] -= factor * entries[k];
     }
   }
 }
 
 void TreeFactor::Multiply(Eigen::Ref<VectorXd> x) const {
   // Rows use entries above themselves only.
-  for (int i = static_cast<int>(parent_.size()) - 1; i >= 0; --i) {
+  for (auto i = static_cast<Eigen::Index>(rows_.size()) - 1; i >= 0; --i) {
+    const Row row = rows_[static_cast<size_t>(i)];
     double sum = 0.0;
-    for (int j = i; j >= 0; j = parent_[static_cast<size_t>(j)]) sum += L_(i, j) * x[j];
+    for (size_t k = row.begin + row.size; k-- > row.begin;) sum += L_[k] * x[path_[k]];
     x[i] = sum;
   }
 }
 
 void TreeFactor::Solve(Eigen::Ref<VectorXd> x) const {
-  const int n = static_cast<int>(parent_.size());
-  for (int i = 0; i < n; ++i) {
+  for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows_.size()); ++i) {
+    const Row row = rows_[static_cast<size_t>(i)];
+    const size_t last = row.begin + row.size - 1;
     double sum = x[i];
-    for (int j = parent_[static_cast<size_t>(i)]; j >= 0; j = parent_[static_cast<size_t>(j)]) {
-      sum -= L_(i, j) * x[j];
-    }
-    x[i] = sum / L_(i, i);
+    for (size_t k = last; k-- > row.begin;) sum -= L_[k] * x[path_[k]];
+    x[i] = sum / L_[last];
   }
 }
 
-void TreeFactor::SolveTransposed(Eigen::Ref<RowMatrixXd> X) const {
+void TreeFactor::SolveTransposed(Eigen::Ref<RowMatrixXd> X) const { SolveTransposed(all_rows_, X); }
+
+void TreeFactor::SolveTransposed(std::span<const int> rows, Eigen::Ref<RowMatrixXd> X) const {
   // Plain loops: rows are short, and there are hundreds of them.
   const Eigen::Index width = X.cols();
-  for (int i = static_cast<int>(parent_.size()) - 1; i >= 0; --i) {
+  for (auto index = rows.rbegin(); index != rows.rend(); ++index) {
+    const Eigen::Index i = *index;
+    const Row row = rows_[static_cast<size_t>(i)];
+    const size_t last = row.begin + row.size - 1;
     double* const x_i = X.data() + i * X.outerStride();
-    const double inverse = 1.0 / L_(i, i);
+    const double inverse = 1.0 / L_[last];
     for (Eigen::Index c = 0; c < width; ++c) x_i[c] *= inverse;
-    for (int j = parent_[static_cast<size_t>(i)]; j >= 0; j = parent_[static_cast<size_t>(j)]) {
-      double* const x_j = X.data() + j * X.outerStride();
-      const double factor = L_(i, j);
+    for (size_t k = last; k-- > row.begin;) {
+      double* const x_j = X.data() + path_[k] * X.outerStride();
+      const double factor = L_[k];
       for (Eigen::Index c = 0; c < width; ++c) x_j[c] -= factor * x_i[c];
     }
   }

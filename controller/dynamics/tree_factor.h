@@ -7,6 +7,7 @@
 // R. Featherstone, Efficient factorization of the joint-space inertia matrix for branched kinematic trees,
 // International Journal of Robotics Research 24(6), 2005.
 
+#include <span>
 #include <vector>
 
 #include "controller/common/types.h"
@@ -29,10 +30,22 @@ class TreeFactor {
   void Solve(Eigen::Ref<VectorXd> x) const;
   /// Each column of X (n x k, row-major) becomes L^-T times it: |L^-T x| = sqrt(x^T M^-1 x).
   void SolveTransposed(Eigen::Ref<RowMatrixXd> X) const;
+  /// The same of an X that has zeros but in some rows, which then has zeros there too.
+  /// @param rows ascending, and with each row those that its coordinate hangs on: chains from the base.
+  void SolveTransposed(std::span<const int> rows, Eigen::Ref<RowMatrixXd> X) const;
 
  private:
-  std::vector<int> parent_;  // coordinate that a coordinate hangs on; -1 for none. Parents come first.
-  RowMatrixXd L_;            // n x n, lower triangle
+  /// Entries of row i: those of the coordinates from the root to i, which the part of the path up to any of
+  /// them has at the same places.
+  struct Row {
+    size_t begin;  // in L_ and path_
+    size_t size;
+  };
+
+  std::vector<Row> rows_;
+  std::vector<int> all_rows_;
+  std::vector<int> path_;  // coordinates from the root, row by row
+  std::vector<double> L_;
 };
 
 }  // namespace dexcheck

@@ -10,15 +10,15 @@
 namespace dexcheck {
 namespace {
 
-const RunCheck* Find(std::span<const RunCheck> checks, std::string_view name) {
-  for (const RunCheck& check : checks) {
+const CheckRecord* Find(std::span<const CheckRecord> checks, std::string_view name) {
+  for (const CheckRecord& check : checks) {
     if (check.name == name) return &check;
   }
   return nullptr;
 }
 
-bool Failed(std::span<const RunCheck> checks, std::string_view name) {
-  const RunCheck* check = Find(checks, name);
+bool Failed(std::span<const CheckRecord> checks, std::string_view name) {
+  const CheckRecord* check = Find(checks, name);
   return check != nullptr && check->failed;
 }
 
@@ -28,10 +28,10 @@ std::string FormatShort(double value) {
   return text;
 }
 
-std::string Tell(const RunCheck& check) {
-  return check.name + " " + FormatShort(check.max) + (check.unit == "1" ? "" : " " + check.unit) +
+std::string Tell(const CheckRecord& check) {
+  return check.name + " " + FormatShort(check.worst) + (check.unit == "1" ? "" : " " + check.unit) +
          " (bound " + FormatShort(check.bound) + "), first above it at t = " + FormatShort(check.failed_at) +
-         " s" + (check.where.empty() ? "" : ", " + check.where);
+         " s" + (check.part.empty() ? "" : ", " + check.part);
 }
 
 /// A check whose failure means its cause by itself.
@@ -62,12 +62,12 @@ constexpr bool IsDecisive(Cause cause) {
 }
 
 /// The evidence that came first among those of the strongest sort.
-const RunCheck* FindFirst(std::span<const RunCheck> steps, Cause* cause) {
-  const RunCheck* first = nullptr;
+const CheckRecord* FindFirst(std::span<const CheckRecord> steps, Cause* cause) {
+  const CheckRecord* first = nullptr;
   for (const bool decisive : {true, false}) {
     for (const Evidence& evidence : kEvidence) {
       if (IsDecisive(evidence.cause) != decisive) continue;
-      const RunCheck* check = Find(steps, evidence.check);
+      const CheckRecord* check = Find(steps, evidence.check);
       if (check == nullptr || !check->failed) continue;
       if (first != nullptr && check->failed_at >= first->failed_at) continue;
       first = check;
@@ -79,7 +79,7 @@ const RunCheck* FindFirst(std::span<const RunCheck> steps, Cause* cause) {
 }
 
 /// Checks of a contact that have a cause of their own, whatever else happens in the run.
-Cause AttributeOne(const RunCheck& check, Cause run, std::span<const RunCheck> steps) {
+Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRecord> steps) {
   if (check.kind == CheckKind::kModel || run == Cause::kModel) return Cause::kModel;
   if (check.name == "actuator_effort") return Cause::kActuatorLimit;
   if (check.name == "joint_stop") return Cause::kJointStop;
@@ -123,16 +123,17 @@ const char* NameOf(Cause cause) {
   return "none";
 }
 
-AttributionResult Attribute(const GateResult& gate, std::span<const RunCheck> model,
-                            std::span<const RunCheck> steps) {
+AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord> model,
+                            std::span<const CheckRecord> steps) {
   AttributionResult result;
-  const RunCheck* first_model = nullptr;
-  for (const RunCheck& check : model) {
+  const CheckRecord* first_model = nullptr;
+  for (const CheckRecord& check : model) {
     if (check.failed && (first_model == nullptr || check.failed_at < first_model->failed_at)) {
       first_model = &check;
     }
   }
-  const bool any_step = std::any_of(steps.begin(), steps.end(), [](const RunCheck& c) { return c.failed; });
+  const bool any_step =
+      std::any_of(steps.begin(), steps.end(), [](const CheckRecord& c) { return c.failed; });
   if (!gate.findings.empty()) {
     const GateFinding& finding = gate.findings.front();
     result.cause = Cause::kModel;
@@ -143,22 +144,22 @@ AttributionResult Attribute(const GateResult& gate, std::span<const RunCheck> mo
     result.evidence = Tell(*first_model);
   } else if (any_step) {
     // The object's balance has no other unknowns than the model's: its inertia and the contacts' geometry.
-    const RunCheck* object = Find(steps, "balance_object");
+    const CheckRecord* object = Find(steps, "balance_object");
     if (object != nullptr && object->failed) {
       result.cause = Cause::kModel;
       result.evidence = Tell(*object);
-    } else if (const RunCheck* first = FindFirst(steps, &result.cause)) {
+    } else if (const CheckRecord* first = FindFirst(steps, &result.cause)) {
       result.evidence = Tell(*first);
     } else {
       result.cause = Cause::kIntegrator;
-      const auto assumption = std::find_if(steps.begin(), steps.end(), [](const RunCheck& check) {
+      const auto assumption = std::find_if(steps.begin(), steps.end(), [](const CheckRecord& check) {
         return check.failed && check.kind == CheckKind::kAssumption;
       });
       result.evidence = assumption == steps.end() ? "no assumption broke" : Tell(*assumption);
     }
   }
-  for (const std::span<const RunCheck> checks : {model, steps}) {
-    for (const RunCheck& check : checks) {
+  for (const std::span<const CheckRecord> checks : {model, steps}) {
+    for (const CheckRecord& check : checks) {
       if (check.failed) {
         result.attributions.push_back({check.name, AttributeOne(check, result.cause, steps)});
       }

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/checks/run_check.h"
+#include "harness/checks/check_record.h"
 #include "harness/checks/static_gate.h"
 
 namespace dexcheck {
@@ -44,7 +44,7 @@ struct AttributionResult {
 /// fails, the model is the cause of everything else. Otherwise the cause is the assumption that broke first;
 /// sliding shows at the edge of the friction cone, and tells slip from contacts that merely give.
 /// @param model checks of the first question.
-AttributionResult Attribute(const GateResult& gate, std::span<const RunCheck> model,
-                            std::span<const RunCheck> steps);
+AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord> model,
+                            std::span<const CheckRecord> steps);
 
 }  // namespace dexcheck

@@ -1,11 +1,11 @@
 #pragma once
 
-// One check: a comparison of the analytic model with the engine, with its bound and what went worst.
+// One check, with its bound and what went worst.
 
 #include <cmath>
 #include <limits>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include "controller/model/robot_model.h"
 
@@ -32,48 +32,103 @@ struct Location {
 /// @param velocities number of the base's velocity coordinates that precede the joints'.
 std::string Describe(const Location& where, const RobotModel& model, int base_velocities);
 
-/// The largest relative error of a term over all that was compared, and where it first left its bound.
+/// One check: what is asked, and what went worst over the steps of a run or the samples of a comparison.
+/// Every question of the harness keeps its results in this record, and everything that prints, stores or
+/// judges results reads it.
+///
+/// A check has one number each step, which Add takes, or many numbers on two sides. Those are given to
+/// Compare one by one, or, where they are formed in bulk, to a ComparedTerm, which keeps the record.
 struct CheckRecord {
-  std::string name;  ///< As in NOTATION.md.
+  // What is asked.
+  std::string name;  ///< As in the log and in summary.json; of terms, as in NOTATION.md.
   CheckKind kind = CheckKind::kModel;
-  double bound = 0.0;  ///< On the error relative to the term's scale.
+  std::string unit = "1";
+  std::string description;  ///< What is measured, and against what: one line for log and report.
+  double bound = 0.0;       ///< Largest value that passes.
+  bool applies = true;      ///< Whether this run asks it at all; otherwise Add does nothing.
 
-  double worst =
-      0.0;  ///< Largest error relative to the term's scale; infinity when something was not a number.
+  // What came of it. "When" is the time in s of a step of a run, the number of a sample elsewhere.
+  double last = 0.0;   ///< Value of the last step.
+  double worst = 0.0;  ///< Largest value; infinity when something was not a number.
+  double at = 0.0;     ///< When it was worst, for the first time.
+  Location where;      ///< Of the worst number.
   double model_value = 0.0;
   double engine_value = 0.0;
-  Location where;
-  long sample = -1;
-
-  /// Of the failures at the earliest failing sample, the one nearest the base: where to look first.
-  bool failed = false;
+  bool failed = false;     ///< Whether any value was above the bound, or was not a number.
+  double failed_at = 0.0;  ///< When, for the first time.
+  /// Of the failures at that time, the one nearest the base: where to look first.
   Location first_failure;
-  long first_failing_sample = -1;
+  std::string part;      ///< The same in words, when the check has parts.
+  long comparisons = 0;  ///< Numbers.
+  long count = 0;        ///< Steps.
+  double sum_of_squares = 0.0;
 
-  long comparisons = 0;
-
-  /// Adds one compared number. `scale` is positive; the error is |model - engine| / scale, which is returned.
-  double Add(double model, double engine, double scale, const Location& location, long at_sample) {
-    return AddError(std::abs(model - engine) / scale, model, engine, location, at_sample);
+  /// Adds the value of one step.
+  void Add(double value, double when) {
+    if (!applies) return;
+    Note(value, when);
+    AddStep(value);
   }
 
-  /// The same with the relative error calculated before; returns infinity when it is not a number.
-  double AddError(double error, double model, double engine, const Location& location, long at_sample) {
-    if (!(error < std::numeric_limits<double>::infinity())) error = std::numeric_limits<double>::infinity();
-    ++comparisons;
-    if (error > worst || comparisons == 1) {
-      worst = error;
+  /// Adds one of a step's numbers. `scale` is positive; the error is |model - engine| / scale. Returns it, or
+  /// infinity when it is not a number.
+  double Compare(double model, double engine, double scale, const Location& location, double when) {
+    return CompareError(std::abs(model - engine) / scale, model, engine, location, when);
+  }
+
+  /// The same with the relative error calculated before.
+  double CompareError(double error, double model, double engine, const Location& location, double when) {
+    const bool failed_before = failed;
+    if (Note(error, when)) {
       model_value = model;
       engine_value = engine;
       where = location;
-      sample = at_sample;
     }
-    if (error > bound && !failed) {
+    if (failed && !failed_before) first_failure = location;
+    return std::isnan(error) ? std::numeric_limits<double>::infinity() : error;
+  }
+
+  /// Adds a step's largest error, whose numbers were compared one by one, to `last` and the mean.
+  void AddStep(double value) {
+    last = value;
+    const double size = std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
+    sum_of_squares += size * size;
+    ++count;
+  }
+
+  /// Root of the mean square over the steps.
+  [[nodiscard]] double rms() const {
+    return count > 0 ? std::sqrt(sum_of_squares / static_cast<double>(count)) : 0.0;
+  }
+
+  /// Forgets what came of it.
+  void Reset() {
+    CheckRecord fresh;
+    fresh.name = std::move(name);
+    fresh.kind = kind;
+    fresh.unit = std::move(unit);
+    fresh.description = std::move(description);
+    fresh.bound = bound;
+    fresh.applies = applies;
+    *this = std::move(fresh);
+  }
+
+ private:
+  /// What is not a number counts as infinite, and fails whatever the bound is. Returns whether it is the
+  /// worst.
+  bool Note(double value, double when) {
+    const double size = std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
+    const bool is_worst = size > worst || comparisons == 0;
+    ++comparisons;
+    if (is_worst) {
+      worst = size;
+      at = when;
+    }
+    if (!(value <= bound) && !failed) {
       failed = true;
-      first_failure = location;
-      first_failing_sample = at_sample;
+      failed_at = when;
     }
-    return error;
+    return is_worst;
   }
 };
 

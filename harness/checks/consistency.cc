@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <optional>
-
-#include "harness/checks/model_check.h"
 
 namespace dexcheck {
 
@@ -21,9 +18,7 @@ ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOpti
   ConsistencyResult result;
   result.gate = RunStaticGate(adapter);
 
-  ModelCheck check(adapter, options.make_view);
-  std::optional<ObjectCheck> object_check;
-  if (model.object()) object_check.emplace(adapter, options.object);
+  ModelCheck check(adapter, options.make_view, options.object);
   StateSource source(model, options.range, options.seed);
   VectorXd q = VectorXd::Zero(model.num_positions());
   VectorXd xi = VectorXd::Zero(model.num_velocities());
@@ -36,17 +31,11 @@ ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOpti
     source.DrawPositions(&q);
     source.DrawVelocity(&xi);
     source.DrawVelocity(&w);
-    check.Compare(q, xi, w, sample);
-    if (object_check) {
-      source.DrawObject(&X_o, &X_o_dot);
-      object_check->Compare(X_o, X_o_dot, sample);
-    }
+    if (model.object()) source.DrawObject(&X_o, &X_o_dot);
+    check.Compare(q, xi, w, X_o, X_o_dot, sample);
     go_on = progress(result.samples);
   }
-  result.terms = check.records();
-  if (object_check) {
-    result.terms.insert(result.terms.end(), object_check->records().begin(), object_check->records().end());
-  }
+  result.terms.assign(check.records().begin(), check.records().end());
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }

@@ -8,8 +8,7 @@
 
 #include "harness/adapter/adapter.h"
 #include "harness/checks/check_record.h"
-#include "harness/checks/model_view.h"
-#include "harness/checks/object_check.h"
+#include "harness/checks/model_check.h"
 #include "harness/checks/random_states.h"
 #include "harness/checks/static_gate.h"
 

@@ -10,10 +10,8 @@
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/rolling.h"
 #include "controller/contact/shapes.h"
-#include "harness/adapter/velocity_map.h"
-#include "harness/checks/check_record.h"
 #include "harness/checks/random_states.h"
-#include "harness/engine/engine.h"
+#include "harness/checks/term_comparison.h"
 
 namespace dexcheck {
 
@@ -28,39 +26,37 @@ struct ContactFormulas {
     CalcGraspMap({&contact, 1}, G);
   };
   std::function<void(const Contact&, const Eigen::Ref<const Matrix6Xd>&, Eigen::Ref<MatrixXd>)> jacobian =
-      CalcContactJacobian;
+      [](const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f, Eigen::Ref<MatrixXd> rows) {
+        CalcContactJacobian(contact, J_f, rows);
+      };
   std::function<Vector5d(const ContactGeometry&, const Vector6d&)> kappa_dot = CalcKappaDot;
 };
 
-/// Puts the object against one fingertip at random contact coordinates and compares, with the engine's
-/// Jacobians of the two bodies at the contact point: g_o_cf, J_B', G, and whether Sigma_cf, moved by (40),
-/// stays one frame on both.
-class ContactCheck {
+/// Puts the object against a fingertip at random contact coordinates and compares, with the engine's narrow
+/// phase and the motion of its two bodies: g_o_cf, G, J_B', and whether Sigma_cf, moved by (40), stays one
+/// frame on both.
+class ContactCheck : public TermComparison {
  public:
-  /// @throws InputError unless the robot has fingertips and an object that is a free torus or another smooth
+  /// @param fingertip a frame that carries a sphere.
+  /// @throws InputError unless the fingertip can touch and the object is a free torus or another smooth
   /// solid.
-  explicit ContactCheck(const Adapter& adapter, ContactFormulas formulas = {});
+  ContactCheck(const Adapter& adapter, int fingertip, ContactFormulas formulas = {});
 
-  /// One contact of one fingertip at q', xi.
+  /// One contact at q', xi.
   void Compare(const VectorXd& q, const VectorXd& xi, StateSource* source, long sample);
 
-  [[nodiscard]] const std::vector<CheckRecord>& records() const { return records_; }
-
  private:
-  enum Term { kFrame, kJacobian, kGraspMap, kRolling, kTermCount };
-  void PlaceObject(const Pose& X_Bo);
-  [[nodiscard]] Matrix3Xd CalcPointJacobian(int body, const Vector3d& point, Matrix3Xd* angular) const;
+  /// Where these contact coordinates put the object, in the engine's world.
+  [[nodiscard]] Pose CalcObjectPose(const ContactCoordinates& kappa, const Pose& X_cf) const;
 
-  const Adapter* adapter_;
+  int fingertip_;
   ContactFormulas formulas_;
-  MjModelPtr engine_;
-  MjDataPtr data_;
-  VelocityMap map_;
-  ModelTerms terms_;
+  EngineTerms engine_;
+  ModelTerms robot_;
+  Sphere tip_;
   std::unique_ptr<Surface> object_;
-  int object_qpos_ = 0;
-  int object_dof_ = 0;
-  std::vector<CheckRecord> records_;
+  MatrixXd J_B_;
+  Matrix6Xd J_f_, J_f_dot_, G_;
 };
 
 }  // namespace dexcheck

@@ -1,220 +1,109 @@
 #include "harness/checks/model_check.h"
 
-#include <algorithm>
-#include <cmath>
+#include <numeric>
+#include <utility>
 
 namespace dexcheck {
+namespace {
 
-ModelCheck::ModelCheck(const Adapter& adapter, const ModelViewFactory& make_view)
-    : terms_(make_view(adapter.model(), Coordinates::kReduced)),
-      unreduced_(make_view(adapter.model(), Coordinates::kUnreduced)),
+/// Pose and body velocity of the object at X_o, X_o_dot by the engine's quaternions.
+struct EngineObjectState {
+  Pose X_Bo = Pose::Identity();
+  Vector6d V_Bo = Vector6d::Zero();
+};
+
+EngineObjectState CalcEngineObjectState(const Vector6d& X_o, const Vector6d& X_o_dot) {
+  // Quaternion z(alpha) y(beta) z(gamma); each angle's rate turns about its axis as the later rotations leave
+  // it.
+  const mjtNum axes[3][3] = {{0, 0, 1}, {0, 1, 0}, {0, 0, 1}};
+  mjtNum rotation[4] = {1, 0, 0, 0};
+  Vector3d omega = Vector3d::Zero();  // in the frame reached so far
+  for (int k = 0; k < 3; ++k) {
+    mjtNum step[4];
+    mjtNum inverse[4];
+    mjtNum turned[3];
+    mju_axisAngle2Quat(step, axes[k], X_o[3 + k]);
+    mju_mulQuat(rotation, rotation, step);
+    mju_negQuat(inverse, step);
+    mju_rotVecQuat(turned, omega.data(), inverse);
+    omega = Vector3d(turned[0], turned[1], turned[2]) +
+            X_o_dot[3 + k] * Vector3d(axes[k][0], axes[k][1], axes[k][2]);
+  }
+  mju_normalize4(rotation);
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R;
+  mju_quat2Mat(R.data(), rotation);
+  EngineObjectState state;
+  state.X_Bo.linear() = R;
+  state.X_Bo.translation() = X_o.head<3>();
+  state.V_Bo << R.transpose() * X_o_dot.head<3>(), omega;
+  return state;
+}
+
+}  // namespace
+
+ModelCheck::ModelCheck(const Adapter& adapter, const ModelViewFactory& make_view, ObjectFormulas object)
+    : TermComparison(adapter),
+      object_(std::move(object)),
       engine_(adapter, Coordinates::kReduced),
       engine_unreduced_(adapter, Coordinates::kUnreduced),
-      scales_(adapter.model()),
+      robot_(make_view(adapter.model(), Coordinates::kReduced)),
+      unreduced_(make_view(adapter.model(), Coordinates::kUnreduced)),
       terms_at_w_(adapter.model()),
       scales_at_w_(adapter.model()) {
-  const RobotModel& model = adapter.model();
-  const int depth = model.max_depth();
-  records_.resize(kTermCount);
-  const auto define = [&](Term term, const char* name, double factors) {
-    records_[term].name = name;
-    records_[term].bound = CalcRoundingBound(depth, factors);
-  };
-  define(kJointAxis, "joint_axis", 1.0);
-  define(kLinkCom, "link_com", 1.0);
-  define(kLinkInertia, "link_inertia", 2.0);
-  define(kFramePose, "frame_pose", 1.0);
-  define(kJ, "J", 1.0);
-  define(kJDotXi, "J_dot_xi", 3.0);
-  define(kMassMatrix, "M", 2.0);
-  define(kReducedMassMatrix, "M_bar", 2.0);
-  define(kCoriolisForce, "C_bar_xi", 4.0);
-  define(kCoriolisMatrix, "C_bar", 4.0);
-  define(kGravity, "gravity", 1.0);
-  define(kFriction, "friction", 2.0);
-  define(kKineticEnergy, "kinetic_energy", 2.0);
-  define(kPotentialEnergy, "potential_energy", 1.0);
-  define(kLinearMomentum, "linear_momentum", 1.0);
-  define(kAngularMomentum, "angular_momentum", 2.0);
-
-  const int n = terms_->size();
+  const bool has_object = adapter.model().object().has_value();
+  if (has_object) engine_.RequireObject();
+  const int n = engine_.size();
+  const size_t frames = adapter.model().frames().size();
   unreduced_velocity_.setZero(unreduced_->size());
-  J_.setZero(6, n);
-  J_dot_.setZero(6, n);
-  J_engine_.setZero(6, n);
-  force_.setZero(n);
-  force_engine_.setZero(n);
+  J_.assign(frames, Matrix6Xd::Zero(6, n));
+  J_dot_ = J_;
+  context_.engine = &engine_;
+  context_.engine_unreduced = &engine_unreduced_;
+  context_.robot = robot_.get();
+  context_.unreduced = unreduced_.get();
+  context_.scales_at_w = &scales_at_w_;
+  context_.links = engine_.links();
+  std::vector<int> all(frames);
+  std::iota(all.begin(), all.end(), 0);
+  SetFrames(all, /*contacts=*/false);
+  for (size_t i = 0; i < frames; ++i) context_.jacobians[i] = {&J_[i], &J_dot_[i]};
+  constexpr TermGroup kObject[] = {TermGroup::kObject, TermGroup::kObjectCoordinates};
+  Ask(kAskedByConsistency, has_object ? std::span<const TermGroup>() : kObject);
 }
 
 void ModelCheck::Compare(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi,
-                         const Eigen::Ref<const VectorXd>& w, long sample) {
-  sample_ = sample;
-  terms_->SetState(q, xi);
-  engine_.SetState(q, xi);
-  scales_.SetState(terms_->terms(), q, xi);
-  CompareGeometry();
-  CompareFrames(xi);
+                         const Eigen::Ref<const VectorXd>& w, const Vector6d& X_o, const Vector6d& X_o_dot,
+                         long sample) {
+  robot_->SetState(q, xi);
   unreduced_->SetState(q, unreduced_velocity_);
+  const EngineObjectState object = CalcEngineObjectState(X_o, X_o_dot);
+  engine_.SetState(q, xi, object.X_Bo, object.V_Bo);
   engine_unreduced_.SetState(q, unreduced_velocity_);
-  CompareMassMatrices();
-  CompareEnergies();
-  CompareForces(xi, w, q);
-}
-
-void ModelCheck::CompareGeometry() {
-  const RobotModel& model = terms_->model();
-  const double length = scales_.world_length();
-  // From the base outward, so that the first failure is the one that the others follow from.
-  for (int i = -1; i < model.num_joints(); ++i) {
-    const Pose X = terms_->CalcLinkPose(i);
-    if (i >= 0) {
-      const Location at_joint{Location::Kind::kJoint, i, -1};
-      const Vector3d axis = X.linear().col(2);
-      const Vector3d axis_engine = engine_.JointAxis(i);
-      for (int k = 0; k < 3; ++k) record(kJointAxis).Add(axis[k], axis_engine[k], 1.0, at_joint, sample_);
-      if (model.joints()[static_cast<size_t>(i)].type == JointType::kRevolute) {
-        // Where along the axis the anchor stands is a choice of frames: compare the foot of the
-        // perpendicular.
-        const Vector3d anchor = engine_.JointAnchor(i);
-        const Vector3d foot = X.translation() + axis.dot(anchor - X.translation()) * axis;
-        for (int k = 0; k < 3; ++k) record(kJointAxis).Add(foot[k], anchor[k], length, at_joint, sample_);
-      }
-    } else if (model.base().type == BaseType::kFixed) {
-      continue;  // the world carries no mass
-    }
-    const MassProperties& body =
-        i < 0 ? model.base_with_wheels() : model.joints()[static_cast<size_t>(i)].body;
-    const LinkInWorld& link = engine_.links()[static_cast<size_t>(i + 1)];
-    const Location at_link{Location::Kind::kLink, i, -1};
-    if (body.mass > 0.0 || link.mass > 0.0) {
-      const Vector3d com = X * body.com;
-      for (int k = 0; k < 3; ++k) record(kLinkCom).Add(com[k], link.com[k], length, at_link, sample_);
-    }
-    const Matrix3d inertia = X.linear() * body.inertia * X.linear().transpose();
-    const double scale = Positive(std::max(inertia.trace(), link.inertia.trace()));
-    for (int k = 0; k < 9; ++k) {
-      record(kLinkInertia).Add(inertia.data()[k], link.inertia.data()[k], scale, at_link, sample_);
-    }
-  }
-}
-
-void ModelCheck::CompareFrames(const Eigen::Ref<const VectorXd>& xi) {
-  const int frames = static_cast<int>(terms_->model().frames().size());
-  const int n = terms_->size();
-  const double acceleration = Positive(scales_.acceleration());
-  const double angular_acceleration = Positive(scales_.angular_rate() * scales_.angular_rate());
-  for (int frame = 0; frame < frames; ++frame) {
-    const Location where{Location::Kind::kFrame, frame, -1};
-    const Pose X = terms_->CalcFramePose(frame);
-    const Pose X_engine = engine_.FramePose(frame);
-    for (int row = 0; row < 3; ++row) {
-      record(kFramePose)
-          .Add(X.translation()[row], X_engine.translation()[row], scales_.world_length(), where, sample_);
-      for (int col = 0; col < 3; ++col) {
-        record(kFramePose).Add(X.linear()(row, col), X_engine.linear()(row, col), 1.0, where, sample_);
-      }
-    }
-    terms_->CalcFrameJacobian(frame, J_, J_dot_);
-    engine_.CalcFrameJacobian(frame, J_engine_);
-    Vector6d bias = Vector6d::Zero();
-    const Vector6d bias_engine = engine_.CalcFrameBiasAcceleration(frame);
-    Vector3d omega = Vector3d::Zero();
-    Vector3d velocity = Vector3d::Zero();
-    for (int col = 0; col < n; ++col) {
-      // The body Jacobian turned to world axes; rows of the angular part are pure numbers.
-      const Vector3d linear = X.linear() * J_.col(col).head<3>();
-      const Vector3d angular = X.linear() * J_.col(col).tail<3>();
-      const double scale = scales_.CalcVelocityScale(col);
-      for (int k = 0; k < 3; ++k) {
-        record(kJ).Add(linear[k], J_engine_(k, col), scale, where, sample_);
-        record(kJ).Add(angular[k], J_engine_(3 + k, col), Positive(scale / scales_.length()), where, sample_);
-      }
-      omega += angular * xi[col];
-      velocity += linear * xi[col];
-      bias.head<3>() += X.linear() * (J_dot_.col(col).head<3>() * xi[col]);
-      bias.tail<3>() += X.linear() * (J_dot_.col(col).tail<3>() * xi[col]);
-    }
-    // In world axes d/dt (R V) = R V_dot + omega x R V; the angular part has omega x omega = 0.
-    bias.head<3>() += omega.cross(velocity);
-    for (int k = 0; k < 3; ++k) {
-      record(kJDotXi).Add(bias[k], bias_engine[k], acceleration, where, sample_);
-      record(kJDotXi).Add(bias[3 + k], bias_engine[3 + k], angular_acceleration, where, sample_);
-    }
-  }
-}
-
-void ModelCheck::CompareMassMatrices() {
-  const int n = terms_->size();
-  for (int col = 0; col < n; ++col) {
-    for (int row = 0; row < n; ++row) {
-      record(kReducedMassMatrix)
-          .Add(terms_->M()(row, col), engine_.M()(row, col), scales_.CalcMassScale(row, col),
-               {Location::Kind::kVelocityPair, row, col}, sample_);
-    }
-  }
-  // M of (16): its first three rows are along the world's x, y and about z; the others are M_bar's.
-  const int shift = unreduced_->size() - n;
-  const int base = terms_->model().num_base_positions();
-  const double mass = Positive(scales_.total_mass());
-  for (int col = 0; col < unreduced_->size(); ++col) {
-    for (int row = 0; row < unreduced_->size(); ++row) {
-      const double row_scale =
-          row < base ? (row < 2 ? 1.0 : scales_.length()) : scales_.CalcVelocityScale(row - shift);
-      const double col_scale =
-          col < base ? (col < 2 ? 1.0 : scales_.length()) : scales_.CalcVelocityScale(col - shift);
-      const double row_mass = row < base ? mass : scales_.GetSubtreeMass(row - shift);
-      const double col_mass = col < base ? mass : scales_.GetSubtreeMass(col - shift);
-      record(kMassMatrix)
-          .Add(unreduced_->M()(row, col), engine_unreduced_.M()(row, col),
-               Positive(std::min(row_mass, col_mass) * row_scale * col_scale),
-               {Location::Kind::kVelocityPair, std::max(row - shift, 0), std::max(col - shift, 0)}, sample_);
-    }
-  }
-}
-
-void ModelCheck::CompareForces(const Eigen::Ref<const VectorXd>& xi, const Eigen::Ref<const VectorXd>& w,
-                               const Eigen::Ref<const VectorXd>& q) {
-  const int n = terms_->size();
-  force_.noalias() = terms_->C() * xi;
-  for (int i = 0; i < n; ++i) {
-    const Location where{Location::Kind::kVelocity, i, -1};
-    record(kCoriolisForce)
-        .Add(force_[i], engine_.coriolis()[i], scales_.CalcCoriolisScale(i), where, sample_);
-    record(kGravity).Add(terms_->gravity()[i], engine_.gravity()[i], scales_.CalcGravityScale(i), where,
-                         sample_);
-    record(kFriction).Add(terms_->friction()[i], engine_.friction()[i], scales_.CalcFrictionScale(i, xi),
-                          where, sample_);
-  }
-
-  // Every entry of C_bar(xi) at once.
-  force_.noalias() = terms_->C() * w;
-  engine_.CalcCoriolisProduct(xi, w, force_engine_);
-  // The engine's quarters of the forces at xi + w and xi - w: |xi +- w|^2 / 4 is at most (|xi|^2 + |w|^2) /
-  // 2, twice.
+  scales_.SetState(robot_->terms(), q, xi);
   terms_at_w_.SetState(q, w);
   scales_at_w_.SetState(terms_at_w_, q, w);
-  for (int i = 0; i < n; ++i) {
-    record(kCoriolisMatrix)
-        .Add(force_[i], force_engine_[i], scales_.CalcCoriolisScale(i) + scales_at_w_.CalcCoriolisScale(i),
-             {Location::Kind::kVelocity, i, -1}, sample_);
-  }
+  context_.xi = xi;
+  context_.w = w;
+  context_.energy = robot_->CalcEnergyAndMomentum();
+  context_.links = engine_.links();
+  EvaluateFrames();
+  for (size_t i = 0; i < J_.size(); ++i) robot_->CalcFrameJacobian(static_cast<int>(i), J_[i], J_dot_[i]);
+  if (model().object()) ReadObject(X_o, X_o_dot);
+  TermComparison::Compare(static_cast<double>(sample), /*contacts=*/false);
 }
 
-void ModelCheck::CompareEnergies() {
-  const Location whole;
-  const EnergyAndMomentum& engine = engine_.energy_and_momentum();
-  const EnergyAndMomentum model = terms_->CalcEnergyAndMomentum();
-  const double momentum = scales_.CalcMomentumScale();
-  record(kKineticEnergy).Add(model.kinetic, engine.kinetic, scales_.CalcKineticEnergyScale(), whole, sample_);
-  record(kPotentialEnergy)
-      .Add(model.potential, engine.potential, scales_.CalcPotentialEnergyScale(), whole, sample_);
-  for (int k = 0; k < 3; ++k) {
-    record(kLinearMomentum)
-        .Add(model.linear_momentum[k], engine.linear_momentum[k], Positive(momentum), whole, sample_);
-    record(kAngularMomentum)
-        .Add(model.angular_momentum[k], engine.angular_momentum[k], Positive(momentum * scales_.length()),
-             whole, sample_);
-  }
+void ModelCheck::ReadObject(const Vector6d& X_o, const Vector6d& X_o_dot) {
+  const MassProperties& body = model().object()->body;
+  const ObjectTerms terms = object_.terms(body, model().gravity(), X_o, X_o_dot);
+  ObjectValues& values = context_.object_model;
+  values.pose = object_.pose(X_o).matrix().topRows<3>();
+  values.V_Bo = terms.V_Bo;
+  values.N_o = terms.N_o;
+  values.kinetic = CalcObjectKineticEnergy(body, terms.V_Bo);
+  values.M_o = terms.M_o;
+  values.C_o_X_o_dot = terms.C_o * X_o_dot;
+  const ObjectCoordinates coordinates{X_o_dot, terms.P_inv, terms.P_inv_dot};
+  EvaluateObject(body, model().gravity(), &coordinates, &context_);
 }
 
 }  // namespace dexcheck

@@ -51,8 +51,8 @@ class StaticGate {
     const double size = std::max({std::abs(model), std::abs(engine), scale});
     CheckRecord one;
     one.bound = kRounding;
-    one.Add(model, engine, size > 0.0 ? size : 1.0, where, -1);
-    result_.records.back().Add(model, engine, size > 0.0 ? size : 1.0, where, -1);
+    one.Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
+    result_.records.back().Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
     if (one.failed) {
       result_.findings.push_back(
           {check, Describe(where, model_, model_.num_base_velocities()), model, engine, where, entry_});

@@ -62,7 +62,7 @@ StepChecks::StepChecks(const Setup& setup)
   }
   for (const auto& [name, bound] : setup.scenario().bounds) {
     const auto found = std::find_if(checks_.begin(), checks_.end(),
-                                    [&, &key = name](const RunCheck& check) { return check.name == key; });
+                                    [&, &key = name](const CheckRecord& check) { return check.name == key; });
     if (found == checks_.end()) {
       throw InputError(setup.scenario().source + ": bounds." + name + ": no check has this name");
     }
@@ -93,7 +93,7 @@ StepChecks::StepChecks(const Setup& setup)
 
 void StepChecks::Define(Check check, const char* name, CheckKind kind, const char* unit, double bound,
                         const char* description) {
-  RunCheck& c = checks_[check];
+  CheckRecord& c = checks_[check];
   c.name = name;
   c.kind = kind;
   c.unit = unit;
@@ -102,7 +102,7 @@ void StepChecks::Define(Check check, const char* name, CheckKind kind, const cha
 }
 
 void StepChecks::Reset() {
-  for (RunCheck& check : checks_) check.Reset();
+  for (CheckRecord& check : checks_) check.Reset();
   std::fill(fingertip_slip_.begin(), fingertip_slip_.end(), SlipState{});
   std::fill(wheel_slip_.begin(), wheel_slip_.end(), SlipState{});
   contacts_lost_ = 0;
@@ -114,8 +114,8 @@ void StepChecks::Reset() {
   changed_at_ = -std::numeric_limits<double>::infinity();
 }
 
-const RunCheck& StepChecks::Find(std::string_view name) const {
-  for (const RunCheck& check : checks_) {
+const CheckRecord& StepChecks::Find(std::string_view name) const {
+  for (const CheckRecord& check : checks_) {
     if (check.name == name) return check;
   }
   throw std::invalid_argument("no check " + Quote(name));
@@ -320,7 +320,7 @@ void StepChecks::CheckJointStops(const MeasuredState& state) {
     farthest = i;
   }
   if (beyond > 0.0 && !checks_[kJointStop].failed) {
-    checks_[kJointStop].where = "joint " + Quote(joints[farthest].name);
+    checks_[kJointStop].part = "joint " + Quote(joints[farthest].name);
   }
   Add(kJointStop, beyond);
 }

@@ -16,7 +16,7 @@
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/grasp_controller.h"
 #include "controller/handling/partial_grasp.h"
-#include "harness/checks/run_check.h"
+#include "harness/checks/check_record.h"
 #include "harness/plant/observer.h"
 #include "harness/plant/plant.h"
 #include "harness/simulation/setup.h"
@@ -69,8 +69,8 @@ class StepChecks {
   /// Forgets all steps so far: time begins anew.
   void Reset();
 
-  [[nodiscard]] const std::vector<RunCheck>& checks() const { return checks_; }
-  [[nodiscard]] const RunCheck& Find(std::string_view name) const;
+  [[nodiscard]] const std::vector<CheckRecord>& checks() const { return checks_; }
+  [[nodiscard]] const CheckRecord& Find(std::string_view name) const;
   [[nodiscard]] const PlantMotion& engine() const { return engine_; }
   /// Of the last step that had one.
   [[nodiscard]] const Prediction& prediction() const { return *prediction_; }
@@ -130,7 +130,7 @@ class StepChecks {
   void CompareKappa(const GraspController& controller, const MeasuredState& state, double dt);
 
   const Setup* setup_;
-  std::vector<RunCheck> checks_;
+  std::vector<CheckRecord> checks_;
   ConstrainedDynamics dynamics_;
   ActuationMap actuation_;
   PlantMotion engine_;

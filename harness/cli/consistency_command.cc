@@ -78,7 +78,7 @@ void PrintTable(const Request& request, const Comparison& comparison) {
   for (const CheckRecord& record : result.terms) {
     fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:<7}  {}, sample {}\n", record.name, record.comparisons,
                record.worst, record.bound, record.failed ? "DIFFERS" : "ok",
-               Describe(record.where, model, base), record.sample);
+               Describe(record.where, model, base), static_cast<long>(record.at));
   }
   fmt::print("\nErrors are relative to each term's own scale; bounds follow from rounding (README.md).\n");
 }
@@ -107,16 +107,20 @@ void PrintVerdict(const Request& request, const Comparison& comparison) {
                record.name, Describe(record.first_failure, model, base), Describe(record.where, model, base),
                record.model_value, request.with_engine ? "the model" : FileName(request.files.robot),
                record.engine_value, request.with_engine ? "MuJoCo" : FileName(request.files.mjcf),
-               record.sample);
+               static_cast<long>(record.at));
   }
 }
 
 Json ToJson(const CheckRecord& record, const RobotModel& model) {
   const int base = model.num_base_velocities();
-  Json json = {{"kind", NameOf(record.kind)},    {"max", record.worst},
-               {"bound", record.bound},          {"pass", !record.failed},
-               {"compared", record.comparisons}, {"where", Describe(record.where, model, base)},
-               {"sample", record.sample},        {"model", record.model_value},
+  Json json = {{"kind", NameOf(record.kind)},
+               {"max", record.worst},
+               {"bound", record.bound},
+               {"pass", !record.failed},
+               {"compared", record.comparisons},
+               {"where", Describe(record.where, model, base)},
+               {"sample", static_cast<long>(record.at)},
+               {"model", record.model_value},
                {"engine", record.engine_value}};
   if (record.failed) json["first_failure"] = Describe(record.first_failure, model, base);
   return json;

@@ -124,18 +124,17 @@ Json EvaluateEngineTerms(const Adapter& adapter, const State& state) {
   out["M_bar"] = ToRows(terms.M());
   AddForces({terms.coriolis(), terms.gravity(), terms.friction()}, &out);
   AddEnergyAndMomentum(terms.energy_and_momentum(), &out);
-  Matrix6Xd J(6, terms.size());
   const auto describe = [&](int frame) {
     const Pose X = terms.FramePose(frame);
-    terms.CalcFrameJacobian(frame, J);
-    const Vector6d A = terms.CalcFrameBiasAcceleration(frame);
+    Matrix6Xd J = terms.CalcFrameJacobian(frame);
+    const EngineMotion motion = terms.FrameMotion(frame);
     // From world axes to the frame's own: J_f = R^T J,  d/dt (R^T v) = R^T v_dot - omega_f x v_f
     const Matrix3d R_T = X.linear().transpose();
     J.topRows<3>() = R_T * J.topRows<3>();
     J.bottomRows<3>() = R_T * J.bottomRows<3>();
     const Vector6d V = J * state.xi;
     Vector6d bias;
-    bias << R_T * A.head<3>() - V.tail<3>().cross(V.head<3>()), R_T * A.tail<3>();
+    bias << R_T * motion.a - V.tail<3>().cross(V.head<3>()), R_T * motion.alpha;
     return Json{{"pose", ToRows(X.matrix())}, {"J_f", ToRows(J)}, {"J_f_dot_xi", ToList(bias)}};
   };
   AddFrames(adapter.model(), describe, &out);

@@ -8,9 +8,9 @@
 namespace dexcheck::cli {
 namespace {
 
-void PrintCheck(const RunCheck& check) {
+void PrintCheck(const CheckRecord& check) {
   if (!check.applies) return;
-  fmt::print("  {:<12}{:<24}{:>10.2e}{:>10.1e}  {:<4} {}{}\n", NameOf(check.kind), check.name, check.max,
+  fmt::print("  {:<12}{:<24}{:>10.2e}{:>10.1e}  {:<4} {}{}\n", NameOf(check.kind), check.name, check.worst,
              check.bound, check.unit == "1" ? "" : check.unit, check.failed ? "FAILS" : "ok",
              check.failed ? fmt::format(" from t = {:.3f} s", check.failed_at) : "");
 }
@@ -21,8 +21,8 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop) {
   const auto differs = std::count_if(gate.begin(), gate.end(), [](const CheckRecord& r) { return r.failed; });
   fmt::print("  {:<12}{:<24}{:>10}{:>10}       {}\n", "model", "constants", differs, 0,
              differs > 0 ? "FAILS" : "ok");
-  for (const RunCheck& check : loop.model_checks()) PrintCheck(check);
-  for (const RunCheck& check : loop.checks().checks()) PrintCheck(check);
+  for (const CheckRecord& check : loop.model_checks()) PrintCheck(check);
+  for (const CheckRecord& check : loop.checks().checks()) PrintCheck(check);
 }
 
 /// "approach 0.0, close 3.4, ..." with the time each began.

@@ -27,7 +27,8 @@ EngineEvidence::EngineEvidence(const RobotModel& model, const mjModel& engine,
     source.DrawPositions(&at.q);
     source.DrawVelocity(&at.xi);
     terms.SetState(at.q, at.xi);
-    const VectorXd root = terms.M().diagonal().cwiseMax(0.0).cwiseSqrt();
+    const MatrixXd M = terms.M();
+    const VectorXd root = M.diagonal().cwiseMax(0.0).cwiseSqrt();
     mass_roots_.push_back(root.unaryExpr([](double x) { return x > 0.0 ? x : 1.0; }));
     at.probes.setZero(n, kProbes);
     for (double& entry : at.probes.reshaped()) entry = source.Draw(-1.0, 1.0);
@@ -39,7 +40,7 @@ EngineEvidence::EngineEvidence(const RobotModel& model, const mjModel& engine,
     for (size_t i = 0; i < model.frames().size(); ++i)
       at.frames.push_back(terms.FramePose(static_cast<int>(i)));
     at.links = terms.links();
-    at.forces = CollectForces(terms.M(), at, terms.coriolis(), terms.gravity(), terms.friction());
+    at.forces = CollectForces(M, at, terms.coriolis(), terms.gravity(), terms.friction());
     Vector3d base = model.base().X_B0.translation();
     if (model.num_base_positions() == 3) base.head<2>() += at.q.head<2>();
     for (const Vector3d& anchor : at.anchors) length_ = std::max(length_, (anchor - base).norm());

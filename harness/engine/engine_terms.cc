@@ -1,6 +1,10 @@
 #include "harness/engine/engine_terms.h"
 
 #include <algorithm>
+#include <numeric>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
 
 namespace dexcheck {
 namespace {
@@ -9,155 +13,361 @@ using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
+int FindTipGeom(const mjModel& model, int site) {
+  const int body = model.site_bodyid[site];
+  for (int g = 0; g < model.ngeom; ++g) {
+    if (model.geom_bodyid[g] == body && model.geom_type[g] == mjGEOM_SPHERE && CanTouch(model, g)) return g;
+  }
+  throw InputError("MJCF: site " + Quote(NameOf(model, mjOBJ_SITE, site)) +
+                   ": its body needs a sphere that can touch");
+}
+
+std::vector<int> ListAll(size_t count) {
+  std::vector<int> all(count);
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+/// Dofs from `dof` to the root, itself included.
+int CountAncestors(const mjModel& model, int dof) {
+  int count = 0;
+  for (int i = dof; i >= 0; i = model.dof_parentid[i]) ++count;
+  return count;
+}
+
 }  // namespace
 
-EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates)
+EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates, std::span<const int> frames)
     : adapter_(&adapter),
       engine_(mj_copyModel(nullptr, &adapter.engine())),
       data_(MakeData(*engine_)),
-      map_(adapter, coordinates) {
+      map_(adapter, coordinates),
+      base_size_(static_cast<int>(map_.base_columns().cols())),
+      carrying_dofs_(static_cast<int>(map_.base_dofs().size() - adapter.wheels().size())),
+      object_body_(adapter.object_body()) {
   const int nv = engine_->nv;
   const int n = map_.size();
+  for (const std::vector<int>& welded : adapter.welded_bodies()) {
+    robot_bodies_.insert(robot_bodies_.end(), welded.begin(), welded.end());
+  }
+  const Eigen::Index base_dofs = map_.base_columns().rows();
   q_.setZero(adapter.model().num_positions());
-  bias_nv_.setZero(nv);
+  base_mass_.setZero(base_dofs, base_dofs);
   force_nv_.setZero(nv);
-  M_nv_.setZero(nv, nv);
-  M_.setZero(n, n);
+  bracket_nv_.setZero(nv);
   coriolis_.setZero(n);
   gravity_.setZero(n);
   friction_.setZero(n);
-  velocity_.setZero(n);
-  force_.setZero(n);
+  other_velocity_.setZero(n);
+  other_force_.setZero(n);
   J_nv_.setZero(6, nv);
-  J_.setZero(6, n);
-  links_.resize(adapter.link_bodies().size());
+  FindObject();
+  ListMassEntries();
+  ListChains(frames);
+  // Gravity is formed from the masses' places, so that the bias force is Coriolis alone.
+  mju_zero(engine_->opt.gravity, 3);
 }
 
-void EngineTerms::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity) {
-  const mjModel* m = engine_.get();
-  mjData* d = data_.get();
-  const Vector3d gravity = MapVector(adapter_->engine().opt.gravity);
+EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates)
+    : EngineTerms(adapter, coordinates, ListAll(adapter.model().frames().size())) {
+  engine_->ngeom = 0;
+}
+
+EngineTerms::EngineTerms(const Adapter& adapter, std::span<const int> fingertips)
+    : EngineTerms(adapter, Coordinates::kReduced, fingertips) {
+  if (object_body_ < 0) throw InputError("parameters: a grasp needs an object");
+  RequireObject();
+  FindTouchingGeoms(fingertips);
+  // Of the geoms only those that touch are needed, and placed where they are.
+  engine_->ngeom = 0;
+}
+
+void EngineTerms::FindObject() {
+  if (object_body_ < 0) return;
+  const int joint = engine_->body_jntadr[object_body_];
+  has_object_ = engine_->body_jntnum[object_body_] == 1 && engine_->jnt_type[joint] == mjJNT_FREE;
+  if (!has_object_) return;
+  object_qpos_ = engine_->jnt_qposadr[joint];
+  object_dof_ = engine_->jnt_dofadr[joint];
+}
+
+void EngineTerms::RequireObject() const {
+  if (has_object_) return;
+  throw InputError("MJCF: body " + Quote(NameOf(*engine_, mjOBJ_BODY, object_body_)) +
+                   ": must move by a free joint");
+}
+
+void EngineTerms::FindTouchingGeoms(std::span<const int> fingertips) {
+  for (const int frame : fingertips) {
+    chains_[static_cast<size_t>(frame)].tip_geom =
+        FindTipGeom(*engine_, adapter_->frame_sites()[static_cast<size_t>(frame)]);
+  }
+  for (int g = 0; g < engine_->ngeom; ++g) {
+    if (engine_->geom_bodyid[g] == object_body_ && CanTouch(*engine_, g)) object_geoms_.push_back(g);
+  }
+  if (object_geoms_.empty()) {
+    throw InputError("MJCF: body " + Quote(NameOf(*engine_, mjOBJ_BODY, object_body_)) +
+                     ": needs a geom that can touch");
+  }
+}
+
+void EngineTerms::ListMassEntries() {
+  const mjModel& m = *engine_;
+  const int n = map_.size();
+  const std::vector<int>& dofs = adapter_->joint_dofs();
+  std::vector<int> coordinate(static_cast<size_t>(m.nv), -1);
+  for (size_t i = 0; i < dofs.size(); ++i) {
+    coordinate[static_cast<size_t>(dofs[i])] = base_size_ + static_cast<int>(i);
+  }
+  // Address and column of the source of each entry of the whole matrix; without one it is zero.
+  constexpr int kNone = -2;
+  constexpr int kOfBase = -1;
+  Eigen::MatrixXi address = Eigen::MatrixXi::Constant(n, n, kNone);
+  address.topLeftCorner(base_size_, base_size_).setConstant(kOfBase);
+  for (const int dof : dofs) {
+    const int row = coordinate[static_cast<size_t>(dof)];
+    // A row of qM goes from the diagonal to the root, where the base's dofs are.
+    const int root = m.dof_Madr[dof] + CountAncestors(m, dof) - 1;
+    address.row(row).head(base_size_).setConstant(root);
+    int at = m.dof_Madr[dof];
+    for (int other = dof; other >= 0; other = m.dof_parentid[other], ++at) {
+      const int col = coordinate[static_cast<size_t>(other)];
+      if (col >= 0) address(std::max(row, col), std::min(row, col)) = at;
+    }
+  }
+  Eigen::MatrixXi place = Eigen::MatrixXi::Constant(n, n, -1);
+  for (int col = 0; col < n; ++col) {
+    for (int row = 0; row < n; ++row) {
+      if (address(std::max(row, col), std::min(row, col)) == kNone) continue;
+      place(row, col) = static_cast<int>(mass_entries_.size());
+      mass_entries_.push_back({row, col});
+    }
+  }
+  for (int col = 0; col < n; ++col) {
+    for (int row = col; row < n; ++row) {
+      if (address(row, col) < 0) continue;
+      mass_sources_.push_back(
+          {address(row, col), col < base_size_ ? col : -1, place(row, col), place(col, row)});
+    }
+  }
+  for (int col = 0; col < base_size_; ++col) {
+    for (int row = 0; row < base_size_; ++row) base_places_.push_back(place(row, col));
+  }
+  mass_.setZero(static_cast<Eigen::Index>(mass_entries_.size()));
+}
+
+void EngineTerms::ListChains(std::span<const int> frames) {
+  std::vector<bool> needed(static_cast<size_t>(engine_->nbody), false);
+  const std::vector<int>& joint_dofs = adapter_->joint_dofs();
+  chains_.resize(adapter_->model().frames().size());
+  for (const int frame : frames) {
+    Chain& chain = chains_[static_cast<size_t>(frame)];
+    for (int i = 0; i < base_size_; ++i) chain.coordinates.push_back(i);
+    std::vector<bool> moves(static_cast<size_t>(engine_->nv), false);
+    for (int body = body_of(frame); body > 0; body = engine_->body_parentid[body]) {
+      needed[static_cast<size_t>(body)] = true;
+      for (int k = 0; k < engine_->body_dofnum[body]; ++k)
+        moves[static_cast<size_t>(engine_->body_dofadr[body] + k)] = true;
+    }
+    for (size_t i = 0; i < joint_dofs.size(); ++i) {
+      if (!moves[static_cast<size_t>(joint_dofs[i])]) continue;
+      chain.coordinates.push_back(base_size_ + static_cast<int>(i));
+      chain.dofs.push_back(joint_dofs[i]);
+    }
+  }
+  if (has_object_) needed[static_cast<size_t>(object_body_)] = true;
+  for (int body = 1; body < engine_->nbody; ++body) {
+    if (needed[static_cast<size_t>(body)]) moving_bodies_.push_back(body);
+  }
+}
+
+void EngineTerms::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity,
+                           const Pose& X_Bo, const Vector6d& V_Bo) {
   q_ = q;
-  adapter_->SetPositions(q, d->qpos);
-  mj_kinematics(m, d);
-  mj_comPos(m, d);
-  mj_crb(m, d);
-  mj_fullM(m, M_nv_.data(), d->qM);  // symmetric, so the storage order does not matter
-  map_.SetState(q, velocity);
-  map_.ProjectMatrix(M_nv_, M_);
-
-  // Gravity alone: the bias force at rest.
-  for (int i = 0; i < 3; ++i) engine_->opt.gravity[i] = gravity[i];
-  mju_zero(d->qvel, m->nv);
-  mj_comVel(m, d);
-  mj_rne(m, d, 0, force_nv_.data());
-  map_.ProjectForce(force_nv_.data(), gravity_);
-  mju_zero(engine_->opt.gravity, 3);
-
-  CalcCoriolis(velocity, coriolis_);
-  mj_passive(m, d);
-  map_.ProjectForce(d->qfrc_passive, friction_);
-  friction_ = -friction_;
-  mju_copy(d->qacc, bias_nv_.data(), m->nv);
-  mj_rnePostConstraint(m, d);  // body accelerations at constant coordinates' rates
+  SetPositions(q, X_Bo);
+  SetVelocities(q, velocity, V_Bo);
+  CalcMass();
+  CalcForces();
+  CalcBodyAccelerations();
   CalcEnergyAndMomentum();
 }
 
-void EngineTerms::CalcCoriolis(const Eigen::Ref<const VectorXd>& velocity, Eigen::Ref<VectorXd> result) {
+void EngineTerms::SetPositions(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) {
   const mjModel* m = engine_.get();
   mjData* d = data_.get();
-  map_.SetState(q_, velocity);
+  adapter_->SetPositions(q, d->qpos);
+  if (has_object_) {
+    const Eigen::Quaterniond rotation(X_Bo.linear());
+    const mjtNum wxyz[4] = {rotation.w(), rotation.x(), rotation.y(), rotation.z()};
+    mju_copy3(d->qpos + object_qpos_, X_Bo.translation().data());
+    mju_copy4(d->qpos + object_qpos_ + 3, wxyz);
+  }
+  mj_kinematics(m, d);
+  mj_comPos(m, d);
+  mj_crb(m, d);
+}
+
+void EngineTerms::SetVelocities(const Eigen::Ref<const VectorXd>& q,
+                                const Eigen::Ref<const VectorXd>& velocity, const Vector6d& V_Bo) {
+  mjData* d = data_.get();
+  map_.SetState(q, velocity);
   map_.Expand(velocity, d->qvel);
-  map_.ExpandBias(bias_nv_.data());
-  mj_comVel(m, d);
-  mj_rne(m, d, 0, force_nv_.data());
-  force_nv_.noalias() += M_nv_ * bias_nv_;
+  map_.ExpandBias(d->qacc);
+  if (has_object_) {
+    // qvel = [R v; omega]; the rates of a constant V_Bo are [omega x R v; 0].
+    const Matrix3d R = ObjectRotation();
+    const Vector3d v = R * V_Bo.head<3>();
+    const Vector3d turning = (R * V_Bo.tail<3>()).cross(v);
+    mju_copy3(d->qvel + object_dof_, v.data());
+    mju_copy3(d->qvel + object_dof_ + 3, V_Bo.data() + 3);
+    mju_copy3(d->qacc + object_dof_, turning.data());
+    mju_zero3(d->qacc + object_dof_ + 3);
+  }
+  mj_comVel(engine_.get(), d);
+}
+
+void EngineTerms::CalcMass() {
+  const mjModel& m = *engine_;
+  const mjtNum* const qM = data_->qM;
+  const MatrixXd& T = map_.base_columns();
+  const std::vector<int>& dofs = map_.base_dofs();
+  // T^T M T among the base and the wheels, which hang on it.
+  for (Eigen::Index i = 0; i < base_mass_.rows(); ++i) {
+    const int dof = dofs[static_cast<size_t>(i)];
+    int address = m.dof_Madr[dof];
+    for (int other = dof; other >= 0; other = m.dof_parentid[other], ++address) {
+      const Eigen::Index j = other == dof ? i : other - dofs[0];
+      base_mass_(i, j) = base_mass_(j, i) = qM[address];
+    }
+  }
+  auto place = base_places_.begin();
+  for (int col = 0; col < base_size_; ++col) {
+    for (int row = 0; row < base_size_; ++row) {
+      double sum = 0.0;
+      for (Eigen::Index j = 0; j < T.rows(); ++j) sum += base_mass_.col(j).dot(T.col(row)) * T(j, col);
+      mass_[*place++] = sum;
+    }
+  }
+  for (const MassSource& source : mass_sources_) {
+    double entry = qM[source.address];
+    if (source.column >= 0) {
+      entry = 0.0;
+      for (int k = 0; k < carrying_dofs_; ++k) entry += qM[source.address - k] * T(k, source.column);
+    }
+    mass_[source.place] = mass_[source.mirror] = entry;
+  }
+}
+
+MatrixXd EngineTerms::M() const {
+  MatrixXd M = MatrixXd::Zero(size(), size());
+  for (size_t i = 0; i < mass_entries_.size(); ++i) {
+    M(mass_entries_[i].row, mass_entries_[i].col) = mass_[static_cast<Eigen::Index>(i)];
+  }
+  return M;
+}
+
+void EngineTerms::CalcForces() {
+  const mjModel* m = engine_.get();
+  mjData* d = data_.get();
+  CalcBiasForce();
+  map_.ProjectForce(force_nv_.data(), coriolis_);
+  if (has_object_) object_coriolis_ = force_nv_.segment<6>(object_dof_);
+
+  // A dof moves the centre of mass of what it carries by v + omega x p, both about the whole tree's centre of
+  // mass.
+  const Vector3d g = MapVector(adapter_->engine().opt.gravity);
+  for (int i = 0; i < m->nv; ++i) {
+    const int body = m->dof_bodyid[i];
+    const Vector3d arm =
+        MapVector(d->subtree_com + 3 * body) - MapVector(d->subtree_com + 3 * m->body_rootid[body]);
+    const Vector3d moved = MapVector(d->cdof + 6 * i + 3) + MapVector(d->cdof + 6 * i).cross(arm);
+    force_nv_[i] = -m->body_subtreemass[body] * g.dot(moved);
+  }
+  map_.ProjectForce(force_nv_.data(), gravity_);
+  if (has_object_) object_gravity_ = force_nv_.segment<6>(object_dof_);
+
+  mj_passive(m, d);
+  map_.ProjectForce(d->qfrc_passive, friction_);
+  friction_ = -friction_;
+}
+
+void EngineTerms::CalcBiasForce() {
+  // bias + M T_dot velocity; the engine's recursion leaves out the armature.
+  mj_rne(engine_.get(), data_.get(), 1, force_nv_.data());
+  for (int i = 0; i < engine_->nv; ++i) force_nv_[i] += engine_->dof_armature[i] * data_->qacc[i];
+}
+
+void EngineTerms::CalcCoriolis(const Eigen::Ref<const VectorXd>& velocity, Eigen::Ref<VectorXd> result) {
+  map_.SetState(q_, velocity);
+  map_.Expand(velocity, data_->qvel);
+  map_.ExpandBias(data_->qacc);
+  mj_comVel(engine_.get(), data_.get());
+  CalcBiasForce();
   map_.ProjectForce(force_nv_.data(), result);
 }
 
 void EngineTerms::CalcCoriolisProduct(const Eigen::Ref<const VectorXd>& velocity,
                                       const Eigen::Ref<const VectorXd>& w, Eigen::Ref<VectorXd> result) {
-  velocity_ = velocity + w;
-  CalcCoriolis(velocity_, result);
-  velocity_ = velocity - w;
-  CalcCoriolis(velocity_, force_);
-  result -= force_;
-  map_.ExpandBracket(q_, velocity, w, bias_nv_.data());
-  force_nv_.noalias() = M_nv_ * bias_nv_;
-  map_.ProjectForce(force_nv_.data(), force_);
-  result = 0.25 * result + 0.5 * force_;
+  other_velocity_ = velocity + w;
+  CalcCoriolis(other_velocity_, result);
+  other_velocity_ = velocity - w;
+  CalcCoriolis(other_velocity_, other_force_);
+  result -= other_force_;
+  map_.ExpandBracket(q_, velocity, w, bracket_nv_.data());
+  mj_mulM(engine_.get(), data_.get(), force_nv_.data(), bracket_nv_.data());
+  map_.ProjectForce(force_nv_.data(), other_force_);
+  result = 0.25 * result + 0.5 * other_force_;
+}
+
+void EngineTerms::CalcBodyAccelerations() {
+  const mjModel& m = *engine_;
+  mjData* d = data_.get();
+  mju_zero(d->cacc, 6);
+  for (const int body : moving_bodies_) {
+    Eigen::Map<Vector6d> a(d->cacc + 6 * body);
+    a = Eigen::Map<const Vector6d>(d->cacc + 6 * m.body_parentid[body]);
+    for (int k = 0; k < m.body_dofnum[body]; ++k) {
+      const int dof = m.body_dofadr[body] + k;
+      a += d->qvel[dof] * Eigen::Map<const Vector6d>(d->cdof_dot + 6 * dof) +
+           d->qacc[dof] * Eigen::Map<const Vector6d>(d->cdof + 6 * dof);
+    }
+  }
 }
 
 void EngineTerms::CalcEnergyAndMomentum() {
-  const mjModel* m = engine_.get();
-  mjData* d = data_.get();
-  const Vector3d gravity = MapVector(adapter_->engine().opt.gravity);
+  const mjModel& m = *engine_;
+  const mjData* d = data_.get();
   energy_ = EnergyAndMomentum{};
   double total_mass = 0.0;
   Vector3d mass_moment = Vector3d::Zero();
-  Vector3d angular_about_origin = Vector3d::Zero();
-  for (size_t link = 0; link < links_.size(); ++link) {
-    LinkInWorld& sum = links_[link];
-    sum = LinkInWorld{};
-    for (const int body : adapter_->welded_bodies()[link]) {
-      sum.mass += m->body_mass[body];
-      sum.com += m->body_mass[body] * MapVector(d->xipos + 3 * body);
-    }
-    if (sum.mass > 0.0) sum.com /= sum.mass;
-    for (const int body : adapter_->welded_bodies()[link]) {
-      const Eigen::Map<const RowMatrix3d> R(d->ximat + 9 * body);
-      const Matrix3d inertia = R * MapVector(m->body_inertia + 3 * body).asDiagonal() * R.transpose();
-      const Vector3d com = MapVector(d->xipos + 3 * body);
-      const Vector3d arm = com - sum.com;
-      const double mass = m->body_mass[body];
-      sum.inertia += inertia + mass * (arm.squaredNorm() * Matrix3d::Identity() - arm * arm.transpose());
-
-      mjtNum velocity[6];  // angular, linear; of the body's centre of mass
-      mj_objectVelocity(m, d, mjOBJ_BODY, body, velocity, 0);
-      const Vector3d p = mass * MapVector(velocity + 3);
-      energy_.linear_momentum += p;
-      angular_about_origin += com.cross(p) + inertia * MapVector(velocity);
-    }
-    total_mass += sum.mass;
-    mass_moment += sum.mass * sum.com;
+  Vector3d about_origin = Vector3d::Zero();
+  for (const int body : robot_bodies_) {
+    // About the centre of mass of the body's tree: inertia (xx, yy, zz, xy, xz, yz), mass times centre of
+    // mass, mass.
+    const mjtNum* I = d->cinert + 10 * body;
+    const Vector3d omega = MapVector(d->cvel + 6 * body);
+    const Vector3d v = MapVector(d->cvel + 6 * body + 3);
+    const Vector3d mc = MapVector(I + 6);
+    const Vector3d p = I[9] * v + omega.cross(mc);
+    Vector3d L = mc.cross(v);
+    L[0] += I[0] * omega[0] + I[3] * omega[1] + I[4] * omega[2];
+    L[1] += I[3] * omega[0] + I[1] * omega[1] + I[5] * omega[2];
+    L[2] += I[4] * omega[0] + I[5] * omega[1] + I[2] * omega[2];
+    energy_.kinetic += 0.5 * (omega.dot(L) + v.dot(p));
+    energy_.linear_momentum += p;
+    const Vector3d center = MapVector(d->subtree_com + 3 * m.body_rootid[body]);
+    about_origin += L + center.cross(p);
+    total_mass += I[9];
+    mass_moment += I[9] * center + mc;
   }
+  const auto add_rotor = [&](int dof) {
+    energy_.kinetic += 0.5 * m.dof_armature[dof] * d->qvel[dof] * d->qvel[dof];
+  };
+  for (const int dof : map_.base_dofs()) add_rotor(dof);
+  for (const int dof : adapter_->joint_dofs()) add_rotor(dof);
   if (total_mass > 0.0) energy_.com = mass_moment / total_mass;
-  energy_.potential = -gravity.dot(mass_moment);
-  energy_.angular_momentum = angular_about_origin - energy_.com.cross(energy_.linear_momentum);
-  force_nv_.noalias() = M_nv_ * Eigen::Map<const VectorXd>(d->qvel, m->nv);
-  energy_.kinetic = 0.5 * force_nv_.dot(Eigen::Map<const VectorXd>(d->qvel, m->nv));
-}
-
-Vector3d EngineTerms::JointAxis(int joint) const {
-  return MapVector(data_->xaxis + 3 * adapter_->joint_ids()[static_cast<size_t>(joint)]);
-}
-
-Vector3d EngineTerms::JointAnchor(int joint) const {
-  return MapVector(data_->xanchor + 3 * adapter_->joint_ids()[static_cast<size_t>(joint)]);
-}
-
-Pose EngineTerms::FramePose(int frame) const {
-  const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
-  Pose X = Pose::Identity();
-  X.linear() = Eigen::Map<const RowMatrix3d>(data_->site_xmat + 9 * site);
-  X.translation() = MapVector(data_->site_xpos + 3 * site);
-  return X;
-}
-
-void EngineTerms::CalcFrameJacobian(int frame, Eigen::Ref<Matrix6Xd> J) {
-  const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
-  mj_jacSite(engine_.get(), data_.get(), J_nv_.data(), J_nv_.data() + 3 * engine_->nv, site);
-  map_.ProjectJacobian(J_nv_, J_);
-  J = J_;
-}
-
-Vector6d EngineTerms::CalcFrameBiasAcceleration(int frame) const {
-  const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
-  mjtNum acceleration[6];  // angular, linear
-  mj_objectAcceleration(engine_.get(), data_.get(), mjOBJ_SITE, site, acceleration, 0);
-  Vector6d result;
-  result << MapVector(acceleration + 3), MapVector(acceleration);
-  return result;
+  energy_.potential = -MapVector(adapter_->engine().opt.gravity).dot(mass_moment);
+  energy_.angular_momentum = about_origin - energy_.com.cross(energy_.linear_momentum);
 }
 
 }  // namespace dexcheck

@@ -1,5 +1,8 @@
 #pragma once
 
+// The engine's terms of robot, object and contacts at one state.
+
+#include <span>
 #include <vector>
 
 #include "controller/dynamics/model_terms.h"
@@ -7,6 +10,32 @@
 #include "harness/engine/engine.h"
 
 namespace dexcheck {
+
+/// Motion of a point of a body at constant xi and V_Bo, world axes.
+struct EngineMotion {
+  Vector3d p = Vector3d::Zero();      ///< Where the point is, m.
+  Vector3d v = Vector3d::Zero();      ///< m/s
+  Vector3d omega = Vector3d::Zero();  ///< Of the body, rad/s.
+  Vector3d a = Vector3d::Zero();      ///< m/s^2
+  Vector3d alpha = Vector3d::Zero();  ///< Of the body, rad/s^2.
+
+  /// The same of another point of the body, at `point` in the world.
+  [[nodiscard]] EngineMotion MoveTo(const Vector3d& point) const;
+};
+
+/// Where the engine's narrow phase has a fingertip and the object meet.
+struct EngineTouch {
+  bool found = false;
+  double distance = 0.0;                 ///< m, negative when the bodies overlap.
+  Vector3d position = Vector3d::Zero();  ///< Midway between the surfaces, world, m.
+  Vector3d normal = Vector3d::Zero();    ///< From the fingertip into the object, world.
+};
+
+/// Entry of M_bar', row >= col.
+struct MassEntry {
+  int row;
+  int col;
+};
 
 /// Mass properties of a link in the world at the state set: centre of mass, and inertia about it in world
 /// axes.
@@ -16,68 +45,150 @@ struct LinkInWorld {
   Matrix3d inertia = Matrix3d::Zero();
 };
 
-/// The engine's own values of the analytic model's terms, projected on the same coordinates. Works in a
-/// private copy of the engine's model and data, at states without tilt and with rolling wheels, so that a
-/// disagreement is a disagreement of models.
+/// The engine's own values of the analytic model's terms, in the same coordinates. Works in a private copy of
+/// the engine's model and data, at states without tilt and with rolling wheels, so that a disagreement is a
+/// disagreement of models. Only what the engine's tree can have different from zero is formed, so that every
+/// step of a run can afford it; whole matrices are expanded from that. What is const, or has "whole" in its
+/// description, is for single states. The rest does not allocate after construction.
 class EngineTerms {
  public:
+  /// All frames, no contacts. The object, if there is one that moves by a free joint, has its terms too.
   EngineTerms(const Adapter& adapter, Coordinates coordinates);
+  /// Reduced coordinates; of the frames only these fingertips, with their contacts.
+  /// @throws InputError when a fingertip has no sphere that can touch, or the object does not move by a free
+  /// joint alone or cannot touch.
+  EngineTerms(const Adapter& adapter, std::span<const int> fingertips);
 
-  /// Kinematics and dynamics at q' and velocity (xi or q_dot'). The object stays where its body starts.
-  void SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity);
+  /// @throws InputError when the object does not move by a free joint alone.
+  void RequireObject() const;
 
+  /// Evaluates robot and object at q', velocity (xi or q_dot'), the object's pose and body velocity.
+  void SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity,
+                const Pose& X_Bo = Pose::Identity(), const Vector6d& V_Bo = Vector6d::Zero());
+
+  /// n, entries of the velocity.
   [[nodiscard]] int size() const { return map_.size(); }
-  /// T^T M T.
-  [[nodiscard]] const MatrixXd& M() const { return M_; }
+  /// T^T M T: entries that can differ from zero, column by column, and their values.
+  [[nodiscard]] const std::vector<MassEntry>& mass_entries() const { return mass_entries_; }
+  [[nodiscard]] const VectorXd& mass() const { return mass_; }
+  /// The whole matrix, n x n.
+  [[nodiscard]] MatrixXd M() const;
   /// Coriolis and centrifugal forces T^T (bias(q, qvel) without gravity + M T_dot velocity) = C velocity.
   [[nodiscard]] const VectorXd& coriolis() const { return coriolis_; }
-  /// T^T of gravity's part of the bias force.
+  /// T^T of the weights of what each dof moves.
   [[nodiscard]] const VectorXd& gravity() const { return gravity_; }
   /// Minus T^T of the engine's passive forces: damping, and whatever else the MJCF has (springs, fluid).
   [[nodiscard]] const VectorXd& friction() const { return friction_; }
-  [[nodiscard]] const EnergyAndMomentum& energy_and_momentum() const { return energy_; }
-  /// Links, base first.
-  [[nodiscard]] const std::vector<LinkInWorld>& links() const { return links_; }
-
   /// C(velocity) w, which only C's matrix knows; both at the q' of SetState. With the forces c(x) = C(x) x,
   ///   C(x) w = (c(x + w) - c(x - w)) / 4 + T^T M (T_dot(x) w - T_dot(w) x) / 2,
   /// since without the second part, which is zero where velocities are rates of coordinates, the Christoffel
-  /// choice has C(x) w = C(w) x. Changes the stored velocity-dependent state.
+  /// choice has C(x) w = C(w) x. Changes what depends on the velocity: call it last.
   void CalcCoriolisProduct(const Eigen::Ref<const VectorXd>& velocity, const Eigen::Ref<const VectorXd>& w,
                            Eigen::Ref<VectorXd> result);
+  /// Of the robot.
+  [[nodiscard]] const EnergyAndMomentum& energy_and_momentum() const { return energy_; }
 
+  /// Links, base first.
+  [[nodiscard]] std::vector<LinkInWorld> links() const;
   /// Axis direction and a point on the axis of a joint, world frame.
   [[nodiscard]] Vector3d JointAxis(int joint) const;
   [[nodiscard]] Vector3d JointAnchor(int joint) const;
-  /// Pose of a frame's site. The frame must have one.
-  [[nodiscard]] Pose FramePose(int frame) const;
-  /// Jacobian J T of a frame's site, [linear; angular] in world axes, 6 x size.
-  void CalcFrameJacobian(int frame, Eigen::Ref<Matrix6Xd> J);
-  /// J_dot velocity of a frame's site, [linear; angular] in world axes. Valid right after SetState.
-  [[nodiscard]] Vector6d CalcFrameBiasAcceleration(int frame) const;
 
-  [[nodiscard]] const Adapter& adapter() const { return *adapter_; }
+  /// Pose of Sigma_0.
+  [[nodiscard]] Pose BasePose() const { return adapter_->GetBasePose(data_->qpos); }
+  [[nodiscard]] Pose FramePose(int frame) const;
+
+  /// Velocity coordinates that move a frame, ascending, by the engine's own tree.
+  [[nodiscard]] const std::vector<int>& chain(int frame) const { return chain_of(frame).coordinates; }
+  /// Jacobian of a frame's origin, [linear; angular] in world axes: 6 x chain columns.
+  void CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J);
+  /// The whole Jacobian of a frame's origin, 6 x n.
+  [[nodiscard]] Matrix6Xd CalcFrameJacobian(int frame);
+  /// Motion of a frame's origin.
+  [[nodiscard]] EngineMotion FrameMotion(int frame) const;
+
+  // The object: M_hat V_dot + C_hat V + N_o = F_o, in Sigma_o.
+  [[nodiscard]] Pose ObjectPose() const;
+  /// Body velocity, back from the engine's.
+  [[nodiscard]] Vector6d ObjectVelocity() const;
+  [[nodiscard]] EngineMotion ObjectMotion() const;
+  [[nodiscard]] Matrix6d ObjectInertia() const;
+  /// C_hat V_Bo.
+  [[nodiscard]] Vector6d ObjectCoriolis() const;
+  /// N_o.
+  [[nodiscard]] Vector6d ObjectGravity() const;
+  /// Rows of a point's velocity by V_Bo, world axes.
+  [[nodiscard]] Eigen::Matrix<double, 3, 6> CalcObjectJacobian(const Vector3d& point);
+
+  /// The narrow phase on a fingertip's frame and the object, with the robot carried by `shift` from where it
+  /// is.
+  [[nodiscard]] EngineTouch CalcTouch(int frame, const Pose& shift);
 
  private:
-  /// Coriolis force at a velocity.
+  /// What moves a frame.
+  struct Chain {
+    int tip_geom = -1;             ///< Sphere of a fingertip that can touch.
+    std::vector<int> coordinates;  ///< The base's first.
+    std::vector<int> dofs;         ///< The engine's, of the joints among them.
+  };
+
+  EngineTerms(const Adapter& adapter, Coordinates coordinates, std::span<const int> frames);
+  [[nodiscard]] const Chain& chain_of(int frame) const { return chains_[static_cast<size_t>(frame)]; }
+  [[nodiscard]] int body_of(int frame) const;
+  void FindObject();
+  void FindTouchingGeoms(std::span<const int> fingertips);
+  void ListMassEntries();
+  void ListChains(std::span<const int> frames);
+  void SetPositions(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo);
+  void SetVelocities(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity,
+                     const Vector6d& V_Bo);
+  void CalcMass();
+  void CalcForces();
+  void CalcBiasForce();
   void CalcCoriolis(const Eigen::Ref<const VectorXd>& velocity, Eigen::Ref<VectorXd> result);
+  void CalcBodyAccelerations();
   void CalcEnergyAndMomentum();
+  [[nodiscard]] EngineMotion ReadMotion(mjtObj type, int id, const mjtNum* place) const;
+  [[nodiscard]] Matrix3d ObjectRotation() const;
 
   const Adapter* adapter_;
-  MjModelPtr engine_;  // gravity is switched on and off here
+  MjModelPtr engine_;  // without gravity; places no geoms
   MjDataPtr data_;
   VelocityMap map_;
+  int base_size_;
+  int carrying_dofs_;  // the base's without the wheels
   VectorXd q_;
-  VectorXd bias_nv_;
-  VectorXd force_nv_;
-  MatrixXd M_nv_;
-  MatrixXd M_;
+
+  /// An entry of M_bar' among the joints (column -1) or with a column of the base, at two places in mass_:
+  /// its own and its mirror image's. The address in qM is that of the entry, or of the joint's with the
+  /// base's first dof; the following dofs' are before it.
+  struct MassSource {
+    int address;
+    int column;
+    Eigen::Index place, mirror;
+  };
+  std::vector<MassEntry> mass_entries_;
+  std::vector<MassSource> mass_sources_;
+  std::vector<Eigen::Index> base_places_;  // base_size x base_size, column by column
+  VectorXd mass_;
+  MatrixXd base_mass_;  // scratch, among base_dofs
+  VectorXd force_nv_, bracket_nv_;
   VectorXd coriolis_, gravity_, friction_;
-  VectorXd velocity_, force_;  // scratch of CalcCoriolisProduct
-  RowMatrixXd J_nv_;
-  MatrixXd J_;
-  std::vector<LinkInWorld> links_;
+  VectorXd other_velocity_, other_force_;  // scratch of CalcCoriolisProduct
   EnergyAndMomentum energy_;
+
+  std::vector<int> robot_bodies_;
+  std::vector<int> moving_bodies_;  // those whose accelerations are needed, parents first
+  std::vector<Chain> chains_;       // by frame; empty unless asked for
+  RowMatrixXd J_nv_;
+
+  int object_body_;
+  bool has_object_ = false;
+  std::vector<int> object_geoms_;
+  int object_qpos_ = 0;
+  int object_dof_ = 0;
+  Vector6d object_coriolis_ = Vector6d::Zero();  // in the engine's coordinates
+  Vector6d object_gravity_ = Vector6d::Zero();
 };
 
 }  // namespace dexcheck

@@ -213,9 +213,9 @@ void RunRecorder::AddTaskSignals() {
 
 void RunRecorder::AddCheckSignals() {
   if (!loop_->is_checking()) return;
-  for (const std::span<const RunCheck> checks :
-       {loop_->model_checks(), std::span<const RunCheck>(loop_->checks().checks())}) {
-    for (const RunCheck& check : checks) {
+  for (const std::span<const CheckRecord> checks :
+       {loop_->model_checks(), std::span<const CheckRecord>(loop_->checks().checks())}) {
+    for (const CheckRecord& check : checks) {
       if (!check.applies) continue;
       Add({"check/" + check.name,
            check.unit,

@@ -36,7 +36,7 @@ class DescriptionCheck {
   void Compare(CheckRecord* record, int joint, double model, double engine, int entry) {
     const Location where{Location::Kind::kJoint, joint, -1};
     const double size = std::max(std::abs(model), std::abs(engine));
-    const double error = record->Add(model, engine, size > 0.0 ? size : 1.0, where, -1);
+    const double error = record->Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
     if (error <= kRounding) return;
     const RobotModel& described = adapter_.model();
     gate_.findings.push_back({record->name, Describe(where, described, described.num_base_velocities()),

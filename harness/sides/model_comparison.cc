@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "harness/checks/rounding_scales.h"
+#include "harness/checks/term_table.h"
 #include "harness/sides/description_match.h"
 
 namespace dexcheck {
@@ -40,26 +41,16 @@ class ModelComparison {
     q_b_.setZero(model_a_.num_positions());
     xi_b_.setZero(n);
     for (Matrix6Xd* J : {&J_a_, &J_dot_a_, &J_b_, &J_dot_b_}) J->setZero(6, n);
-    const double depth_bound = CalcRoundingBound(std::max(model_a_.max_depth(), model_b_.max_depth()), 1.0);
-    const auto define = [&](CheckRecord* record, const char* name, double factors) {
-      record->name = name;
-      record->bound = factors * depth_bound;
-    };
-    define(&records_[kJointAxis], "joint_axis", 1.0);
-    define(&records_[kLinkCom], "link_com", 1.0);
-    define(&records_[kLinkInertia], "link_inertia", 2.0);
-    define(&records_[kFramePose], "frame_pose", 1.0);
-    define(&records_[kJ], "J", 1.0);
-    define(&records_[kJDotXi], "J_dot_xi", 3.0);
-    define(&records_[kMassMatrix], "M_bar", 2.0);
-    define(&records_[kCoriolisForce], "C_bar_xi", 4.0);
-    define(&records_[kCoriolisMatrix], "C_bar", 4.0);
-    define(&records_[kGravity], "gravity", 1.0);
-    define(&records_[kFriction], "friction", 2.0);
-    define(&records_[kKineticEnergy], "kinetic_energy", 2.0);
-    define(&records_[kPotentialEnergy], "potential_energy", 1.0);
-    define(&records_[kLinearMomentum], "linear_momentum", 1.0);
-    define(&records_[kAngularMomentum], "angular_momentum", 2.0);
+    const int depth = std::max(model_a_.max_depth(), model_b_.max_depth());
+    constexpr const char* kNames[] = {
+        "joint_axis", "link_com",       "link_inertia",     "frame_pose",      "J",
+        "J_dot_xi",   "M_bar",          "C_bar_xi",         "C_bar",           "gravity",
+        "friction",   "kinetic_energy", "potential_energy", "linear_momentum", "angular_momentum"};
+    static_assert(std::size(kNames) == kTermCount);
+    for (int term = 0; term < kTermCount; ++term) {
+      records_[term].name = kNames[term];
+      records_[term].bound = CalcBound(FindTerm(kNames[term]), depth);
+    }
   }
 
   [[nodiscard]] const RobotModel& model() const { return model_a_; }
@@ -106,7 +97,7 @@ class ModelComparison {
   }
 
   void Compare(const VectorXd& q, const VectorXd& xi, long sample) {
-    sample_ = sample;
+    sample_ = static_cast<double>(sample);
     for (size_t i = 0; i < position_of_.size(); ++i) q_b_[position_of_[i]] = q[static_cast<Eigen::Index>(i)];
     for (size_t i = 0; i < velocity_of_.size(); ++i)
       xi_b_[velocity_of_[i]] = xi[static_cast<Eigen::Index>(i)];
@@ -175,12 +166,12 @@ class ModelComparison {
       gate->records.push_back(record);
     }
     const double size = std::max({std::abs(a), std::abs(b), scale});
-    if (gate->records.back().Add(a, b, size > 0.0 ? size : 1.0, where, -1) <= kRounding) return;
+    if (gate->records.back().Compare(a, b, size > 0.0 ? size : 1.0, where, -1) <= kRounding) return;
     gate->findings.push_back({name, Describe(where, model_a_, base_), a, b, where, entry});
   }
 
   void Add(Term term, double a, double b, double scale, const Location& where) {
-    records_[term].Add(a, b, scale, where, sample_);
+    records_[term].Compare(a, b, scale, where, sample_);
   }
 
   /// Physical quantities: link frames are each description's own choice.
@@ -294,7 +285,7 @@ class ModelComparison {
   VectorXd q_b_, xi_b_;
   Matrix6Xd J_a_, J_dot_a_, J_b_, J_dot_b_;
   CheckRecord records_[kTermCount];
-  long sample_ = -1;
+  double sample_ = -1.0;
 };
 
 }  // namespace

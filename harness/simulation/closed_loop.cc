@@ -45,18 +45,7 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check)
   if (check) {
     model_check_ =
         std::make_unique<StepModelCheck>(setup.adapter(), setup.fingertips(), scenario.control.orientation);
-    const std::vector<CheckRecord> records = model_check_->records();
-    const bool bonded = !setup.bonds().empty();
-    model_check_->IncludeContacts(!bonded);
-    for (size_t i = 0; i < records.size(); ++i) {
-      RunCheck run_check;
-      run_check.name = records[i].name;
-      run_check.kind = records[i].kind;
-      run_check.bound = records[i].bound;
-      run_check.description = "model against engine at the same state, relative to the term's scale";
-      run_check.applies = !bonded || !StepModelCheck::IsOfContacts(i);
-      model_checks_.push_back(run_check);
-    }
+    if (!setup.bonds().empty()) model_check_->LeaveOutContacts();
   }
   PlaceRobot();
   if (scenario.task) {
@@ -268,23 +257,7 @@ void ClosedLoop::CompareModel() {
     model_check_->IncludeContacts(
         std::all_of(overlap.begin(), overlap.end(), [](double depth) { return depth > -Observer::kFar; }));
   }
-  model_check_->Compare(controller_.robot(), controller_.grasp(), state_, observer_.X_W0(), step_);
-  const std::span<const double> errors = model_check_->step_errors();
-  bool newly_failed = false;
-  for (size_t i = 0; i < errors.size(); ++i) {
-    if (StepModelCheck::IsOfContacts(i) && !model_check_->includes_contacts()) continue;
-    const bool failed_before = model_checks_[i].failed;
-    model_checks_[i].Add(errors[i], step_time_);
-    newly_failed = newly_failed || (model_checks_[i].failed && !failed_before);
-  }
-  if (!newly_failed) return;
-  const std::vector<CheckRecord> records = model_check_->records();
-  const RobotModel& model = setup_->model();
-  for (size_t i = 0; i < records.size(); ++i) {
-    if (records[i].failed) {
-      model_checks_[i].where = Describe(records[i].first_failure, model, model.num_base_velocities());
-    }
-  }
+  model_check_->Compare(controller_.robot(), controller_.grasp(), state_, observer_.X_W0(), step_time_);
 }
 
 Vector6d ClosedLoop::X_o() const {

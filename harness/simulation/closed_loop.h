@@ -82,7 +82,9 @@ class ClosedLoop {
   [[nodiscard]] bool is_checking() const { return check_; }
   [[nodiscard]] const StepChecks& checks() const { return checks_; }
   /// Checks of the first question, model against engine at the plant's state.
-  [[nodiscard]] std::span<const RunCheck> model_checks() const { return model_checks_; }
+  [[nodiscard]] std::span<const CheckRecord> model_checks() const {
+    return model_check_ ? model_check_->records() : std::span<const CheckRecord>();
+  }
   /// The sequence of phases; null unless the scenario is a task.
   [[nodiscard]] const PickAndPlace* task() const { return task_.get(); }
   /// Whether the object should follow a trajectory, so that its tracking error means something.
@@ -120,7 +122,6 @@ class ClosedLoop {
   GraspController controller_;
   StepChecks checks_;
   std::unique_ptr<StepModelCheck> model_check_;
-  std::vector<RunCheck> model_checks_;
   std::unique_ptr<Trajectory> trajectory_;        // null for a task
   std::unique_ptr<HandlingController> handling_;  // null without a task
   std::unique_ptr<PickAndPlace> task_;

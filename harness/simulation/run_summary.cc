@@ -14,17 +14,18 @@ double Rms(double squares, long count) {
   return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
 }
 
-Json ToJson(const RunCheck& check) {
-  Json json = {{"kind", NameOf(check.kind)}, {"max", check.max},   {"rms", check.rms()},
-               {"bound", check.bound},       {"unit", check.unit}, {"at_time_s", check.at_time},
+Json ToJson(const CheckRecord& check) {
+  Json json = {{"kind", NameOf(check.kind)}, {"max", check.worst}, {"rms", check.rms()},
+               {"bound", check.bound},       {"unit", check.unit}, {"at_time_s", check.at},
                {"pass", !check.failed}};
   if (check.failed) json["failed_at_s"] = check.failed_at;
-  if (!check.where.empty()) json["where"] = check.where;
+  if (!check.part.empty()) json["where"] = check.part;
   json["description"] = check.description;
   return json;
 }
 
-Json ToJson(const CheckRecord& record) {
+/// Of a constant, which has no time.
+Json ConstantToJson(const CheckRecord& record) {
   return {{"kind", NameOf(record.kind)},
           {"max", record.worst},
           {"bound", record.bound},
@@ -95,17 +96,18 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
   }
   json["checks"] = Json::object();
   if (loop.is_checking()) {
-    for (const CheckRecord& record : setup.gate().records) json["checks"][record.name] = ToJson(record);
-    for (const std::span<const RunCheck> checks :
-         {loop.model_checks(), std::span<const RunCheck>(loop.checks().checks())}) {
-      for (const RunCheck& check : checks) {
+    for (const CheckRecord& record : setup.gate().records)
+      json["checks"][record.name] = ConstantToJson(record);
+    for (const std::span<const CheckRecord> checks :
+         {loop.model_checks(), std::span<const CheckRecord>(loop.checks().checks())}) {
+      for (const CheckRecord& check : checks) {
         if (check.applies) json["checks"][check.name] = ToJson(check);
       }
     }
     const StepChecks& checks = loop.checks();
-    json["assumptions"] = {{"fingertip_slip_max_m", checks.Find("fingertip_slip").max},
-                           {"wheel_slip_max_m", checks.Find("wheel_slip").max},
-                           {"base_tilt_max_rad", checks.Find("base_tilt").max},
+    json["assumptions"] = {{"fingertip_slip_max_m", checks.Find("fingertip_slip").worst},
+                           {"wheel_slip_max_m", checks.Find("wheel_slip").worst},
+                           {"base_tilt_max_rad", checks.Find("base_tilt").worst},
                            {"cone_margin_min", checks.least_cone_margin()},
                            {"contacts_lost", checks.contacts_lost()}};
   }

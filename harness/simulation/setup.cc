@@ -10,6 +10,7 @@
 #include "controller/contact/object_surface.h"
 #include "controller/model/parameter_reader.h"
 #include "controller/object/euler_zyz.h"
+#include "harness/engine/remove_looks.h"
 
 namespace dexcheck {
 namespace {
@@ -47,6 +48,7 @@ Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const
   if (!model_.object()) {
     throw InputError(robot.string() + ": object: is missing, and the scenario holds one");
   }
+  RemoveLooks(engine_.get());
   adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
   gate_ = RunStaticGate(*adapter_);
   ApplyPlantOptions();

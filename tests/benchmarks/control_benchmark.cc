@@ -56,6 +56,24 @@ void ContactAndObjectTerms(benchmark::State& state) {
 }
 BENCHMARK(ContactAndObjectTerms)->Unit(benchmark::kMicrosecond);
 
+/// The same of a growing number of contacts, on the robot's eight fingertips in turn.
+void GrowingGrasp(benchmark::State& state) {
+  Step step;
+  GraspScene& scene = step.scene;
+  std::vector<int> fingertips;
+  std::vector<ContactCoordinates> kappa;
+  for (size_t i = 0; i < static_cast<size_t>(state.range(0)); ++i) {
+    fingertips.push_back(scene.model.fingertips()[i % scene.model.fingertips().size()]);
+    kappa.push_back(scene.kappa[i % scene.kappa.size()]);
+  }
+  GraspTerms grasp(scene.model, fingertips, scene.model.object()->body, scene.grasp.surface());
+  for (auto _ : state) {
+    grasp.SetState(scene.robot, scene.X_o, scene.X_o_dot, kappa);
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(GrowingGrasp)->Arg(1)->Arg(2)->Arg(4)->Arg(8)->Arg(12)->Unit(benchmark::kMicrosecond);
+
 void CalcLaw(Step* step) {
   const GraspScene& scene = step->scene;
   step->task.CalcAcceleration(scene.q, scene.xi, step->sigma_prime);

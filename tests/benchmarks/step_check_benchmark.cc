@@ -62,7 +62,7 @@ BENCHMARK(PlantStep)->Unit(benchmark::kMicrosecond);
 /// The engine's side of the check alone.
 void EngineSide(benchmark::State& state) {
   States& states = SharedStates();
-  EngineStep engine(states.controller->adapter, states.fingertips);
+  EngineTerms engine(states.controller->adapter, states.fingertips);
   size_t k = 0;
   for (auto _ : state) {
     engine.SetState(states.q[k], states.xi[k], states.X_Bo[k], states.V_Bo[k]);
@@ -78,9 +78,9 @@ void Compare(benchmark::State& state) {
   States& states = SharedStates();
   testing::CheckedController& controller = *states.controller;
   controller.SetState(states.q[0], states.xi[0], states.X_Bo[0], states.V_Bo[0]);
-  long step = 0;
+  double step = 0.0;
   for (auto _ : state) {
-    controller.Compare(step++);
+    controller.Compare(step += 1.0);
     benchmark::ClobberMemory();
   }
 }

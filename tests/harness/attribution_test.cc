@@ -35,8 +35,8 @@ constexpr Step kSteps[] = {{"balance_object", CheckKind::kBalance},
                            {"unjudged"},
                            {"actuator_effort"}};
 
-RunCheck MakeCheck(const std::string& name, CheckKind kind) {
-  RunCheck check;
+CheckRecord MakeCheck(const std::string& name, CheckKind kind) {
+  CheckRecord check;
   check.name = name;
   check.kind = kind;
   check.bound = 1.0;
@@ -53,8 +53,8 @@ class FakeRun {
   }
 
   FakeRun& Fail(const std::string& name, double time) {
-    for (std::vector<RunCheck>* checks : {&model_, &steps_}) {
-      for (RunCheck& check : *checks) {
+    for (std::vector<CheckRecord>* checks : {&model_, &steps_}) {
+      for (CheckRecord& check : *checks) {
         if (check.name == name) check.Add(2.0, time);
       }
     }
@@ -65,14 +65,14 @@ class FakeRun {
     return *this;
   }
   [[nodiscard]] AttributionResult Explain() const { return Attribute(gate_, model_, steps_); }
-  RunCheck& step(const std::string& name) {
+  CheckRecord& step(const std::string& name) {
     return *std::find_if(steps_.begin(), steps_.end(),
-                         [&](const RunCheck& check) { return check.name == name; });
+                         [&](const CheckRecord& check) { return check.name == name; });
   }
 
  private:
   GateResult gate_;
-  std::vector<RunCheck> model_, steps_;
+  std::vector<CheckRecord> model_, steps_;
 };
 
 /// The cause of one failed check; "" when it did not fail.
@@ -188,7 +188,7 @@ TEST(Attribute, EvidenceHasUnitPlaceAndTime) {
   FakeRun run;
   run.Fail("fingertip_slip", 0.125);
   run.step("fingertip_slip").unit = "m";
-  run.step("fingertip_slip").where = "rf2_tip";
+  run.step("fingertip_slip").part = "rf2_tip";
   EXPECT_EQ(run.Explain().evidence, "fingertip_slip 2 m (bound 1), first above it at t = 0.125 s, rf2_tip");
 }
 

@@ -132,7 +132,7 @@ TEST(Consistency, HoldsForVelocitiesOfDifferentSize) {
       source.DrawPositions(&q);
       source.DrawVelocity(&xi);
       source.DrawVelocity(&w);
-      check.Compare(q, xi, ratio * w, 0);
+      check.Compare(q, xi, ratio * w, Vector6d::Zero(), Vector6d::Zero(), 0);
       for (const CheckRecord& record : check.records()) {
         EXPECT_FALSE(record.failed) << record.name << " of robot " << index << ": " << record.worst;
       }

@@ -54,7 +54,7 @@ class CheckedController {
     }
   }
 
-  void Compare(long step) { check.Compare(robot, grasp, state, X_W0, step); }
+  void Compare(double when) { check.Compare(robot, grasp, state, X_W0, when); }
 
   RobotModel model;
   MjModelPtr engine;

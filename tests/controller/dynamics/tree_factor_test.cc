@@ -63,6 +63,31 @@ TEST(TreeFactor, FactorsRandomRobots) {
   }
 }
 
+// The right-hand sides of contacts have zeros at the joints that move no fingertip.
+TEST(TreeFactor, SolvesForChainsAlone) {
+  const RobotModel model = ReadPaperRobot(DriveVelocity::kTwist);
+  ModelTerms terms(model, Coordinates::kReduced);
+  const int n = terms.size();
+  std::mt19937 random(4);
+  terms.SetState(DrawPositions(model, &random), VectorXd::Zero(n));
+  terms.CalcDynamics();
+  TreeFactor factor(model);
+  factor.Compute(terms.M());
+  std::vector<int> rows = {0, 1};
+  const int tip = model.frames()[static_cast<size_t>(model.fingertips()[1])].link;
+  for (int i = tip; i >= 0; i = model.joints()[static_cast<size_t>(i)].parent) {
+    rows.insert(rows.begin() + 2, 2 + i);
+  }
+  ASSERT_LT(static_cast<int>(rows.size()), n / 2);
+  RowMatrixXd F = RowMatrixXd::Zero(n, 3);
+  for (const int row : rows) F.row(row) = Vector3d::Random().transpose();
+  RowMatrixXd whole = F;
+  factor.SolveTransposed(whole);
+  factor.SolveTransposed(rows, F);
+  ASSERT_GT(whole.norm(), 1e-3);
+  EXPECT_TRUE(F == whole);
+}
+
 TEST(TreeFactor, RefusesMatricesThatAreNotPositiveDefinite) {
   const RobotModel model = ReadPaperRobot(DriveVelocity::kTwist);
   TreeFactor factor(model);

@@ -58,10 +58,10 @@ TEST_F(LiftTest, TakesCarriesAndPutsDown) {
   EXPECT_LE(result.tracking.position_max(), 1e-4);  // measured 1.3e-7
   EXPECT_GT(result.tracking.position_max(), 0.0);
   const ClosedLoop& loop = run_->loop();
-  for (const RunCheck& check : loop.model_checks()) EXPECT_LE(check.max, 1e-10) << check.name;
+  for (const CheckRecord& check : loop.model_checks()) EXPECT_LE(check.worst, 1e-10) << check.name;
   // While the hand is far from the object nothing is said of contacts, but that is the smaller part.
   const auto count = [&](std::string_view name) {
-    for (const RunCheck& check : loop.model_checks()) {
+    for (const CheckRecord& check : loop.model_checks()) {
       if (check.name == name) return check.count;
     }
     return 0L;
@@ -77,9 +77,9 @@ TEST_F(LiftTest, TakesCarriesAndPutsDown) {
   std::set<std::string> names;
   for (const CheckRecord& record : run_->setup().gate().records)
     EXPECT_TRUE(names.insert(record.name).second) << record.name;
-  for (const RunCheck& check : loop.model_checks())
+  for (const CheckRecord& check : loop.model_checks())
     EXPECT_TRUE(names.insert(check.name).second) << check.name;
-  for (const RunCheck& check : loop.checks().checks())
+  for (const CheckRecord& check : loop.checks().checks())
     EXPECT_TRUE(names.insert(check.name).second) << check.name;
   EXPECT_LE(task().push(), 1e-6);
   // Torques of some 50 N m; measured 3e-3.

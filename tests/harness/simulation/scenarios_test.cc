@@ -15,10 +15,10 @@ constexpr double kModelBound = 1e-10;
 
 void ExpectModelAgrees(const ClosedLoop& loop) {
   ASSERT_GE(loop.model_checks().size(), 20U);
-  for (const RunCheck& check : loop.model_checks()) {
+  for (const CheckRecord& check : loop.model_checks()) {
     EXPECT_EQ(check.count, loop.step()) << check.name;
-    EXPECT_LE(check.max, kModelBound) << check.name;
-    EXPECT_FALSE(check.failed) << check.name << " " << check.max;
+    EXPECT_LE(check.worst, kModelBound) << check.name;
+    EXPECT_FALSE(check.failed) << check.name << " " << check.worst;
   }
 }
 

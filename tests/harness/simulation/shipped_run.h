@@ -40,7 +40,7 @@ class ShippedRun {
 
   [[nodiscard]] const Setup& setup() const { return *setup_; }
   [[nodiscard]] const ClosedLoop& loop() const { return runner_->loop(); }
-  [[nodiscard]] double Worst(std::string_view check) const { return loop().checks().Find(check).max; }
+  [[nodiscard]] double Worst(std::string_view check) const { return loop().checks().Find(check).worst; }
 
  private:
   std::unique_ptr<Setup> setup_;

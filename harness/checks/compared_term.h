@@ -1,8 +1,7 @@
 #pragma once
 
-// One term of a step's cross-check: its numbers side by side, and what went worst over the run.
+// One term's numbers side by side at a state, and what went worst over all states.
 
-#include <string>
 #include <vector>
 
 #include "harness/checks/check_record.h"
@@ -37,46 +36,47 @@ class ZeroPattern {
   long count_ = 0;
 };
 
-/// A step fills `model`, `engine` and `weight`, then calls Finish. Nothing allocates after construction but
+/// A state fills `model`, `engine` and `weight`, then calls Finish. Nothing allocates after construction but
 /// when a new worst case is stored.
-class StepTerm {
+class ComparedTerm {
  public:
-  /// @param where one location for each number.
-  StepTerm(std::string name, double bound, std::vector<Location> where);
+  /// @param record what is asked; the results are kept there. It must outlive this.
+  /// @param where one location for each number. @param zeros of matrices of which only the other entries are
+  /// among the numbers.
+  ComparedTerm(CheckRecord* record, std::vector<Location> where, std::vector<ZeroPattern> zeros = {});
 
   [[nodiscard]] Eigen::Index size() const { return model.size(); }
 
-  /// Adds entries that should be zero; before Finish. @param scale(row, col), @param location(row, col) of an
-  /// entry.
+  /// Adds a matrix's entries that should be zero; before Finish. @param pattern which of `zeros` is its own.
+  /// @param scale(row, col), @param location(row, col) of an entry.
   template <typename Matrix, typename Scale, typename Where>
-  void CheckZeros(const ZeroPattern& pattern, const Matrix& matrix, const Scale& scale, const Where& location,
-                  long step) {
-    if (pattern.Holds(matrix.data())) {
-      record_.comparisons += pattern.count();
+  void CheckZeros(size_t pattern, const Matrix& matrix, const Scale& scale, const Where& location,
+                  double when) {
+    const ZeroPattern& zeros = zeros_[pattern];
+    if (zeros.Holds(matrix.data())) {
+      record_->comparisons += zeros.count();
       return;
     }
-    pattern.ForEach([&](Eigen::Index row, Eigen::Index col) {
-      const double error = record_.Add(matrix(row, col), 0.0, scale(row, col), location(row, col), step);
+    zeros.ForEach([&](Eigen::Index row, Eigen::Index col) {
+      const double error = record_->Compare(matrix(row, col), 0.0, scale(row, col), location(row, col), when);
       if (error > zeros_error_) zeros_error_ = error;
     });
   }
 
-  /// Adds this step's numbers to the record.
-  void Finish(long step);
+  /// Adds this state's numbers to the record.
+  void Finish(double when);
 
-  [[nodiscard]] const CheckRecord& record() const { return record_; }
-  /// Largest relative error of the last step.
-  [[nodiscard]] double step_error() const { return step_error_; }
+  [[nodiscard]] const CheckRecord& record() const { return *record_; }
 
   Eigen::ArrayXd model;
   Eigen::ArrayXd engine;
   Eigen::ArrayXd weight;  ///< 1 / scale
 
  private:
-  CheckRecord record_;
+  CheckRecord* record_;
   std::vector<Location> where_;
-  double zeros_error_ = 0.0;  // of this step's CheckZeros
-  double step_error_ = 0.0;
+  std::vector<ZeroPattern> zeros_;
+  double zeros_error_ = 0.0;  // of this state's CheckZeros
 };
 
 }  // namespace dexcheck

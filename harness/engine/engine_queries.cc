@@ -1,6 +1,6 @@
 // What the engine has at the state set: poses, Jacobians, motions, object, contacts.
 
-#include "harness/engine/engine_step.h"
+#include "harness/engine/engine_terms.h"
 
 namespace dexcheck {
 namespace {
@@ -27,15 +27,47 @@ EngineMotion EngineMotion::MoveTo(const Vector3d& point) const {
   return moved;
 }
 
-Pose EngineStep::FramePose(int frame) const {
+Pose EngineTerms::FramePose(int frame) const {
   const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
   return MakePose(data_->site_xmat + 9 * site, data_->site_xpos + 3 * site);
 }
 
-void EngineStep::CalcTipJacobian(int finger, const Vector3d& point, Eigen::Ref<Matrix6Xd> J) {
-  const auto i = static_cast<size_t>(finger);
-  mj_jac(engine_.get(), data_.get(), J_nv_.data(), J_nv_.data() + 3 * engine_->nv, point.data(),
-         tip_bodies_[i]);
+int EngineTerms::body_of(int frame) const {
+  return engine_->site_bodyid[adapter_->frame_sites()[static_cast<size_t>(frame)]];
+}
+
+Vector3d EngineTerms::JointAxis(int joint) const {
+  return MapVector(data_->xaxis + 3 * adapter_->joint_ids()[static_cast<size_t>(joint)]);
+}
+
+Vector3d EngineTerms::JointAnchor(int joint) const {
+  return MapVector(data_->xanchor + 3 * adapter_->joint_ids()[static_cast<size_t>(joint)]);
+}
+
+std::vector<LinkInWorld> EngineTerms::links() const {
+  const mjModel* m = engine_.get();
+  const mjData* d = data_.get();
+  std::vector<LinkInWorld> links;
+  for (const std::vector<int>& welded : adapter_->welded_bodies()) {
+    LinkInWorld& link = links.emplace_back();
+    for (const int body : welded) {
+      link.mass += m->body_mass[body];
+      link.com += m->body_mass[body] * MapVector(d->xipos + 3 * body);
+    }
+    if (link.mass > 0.0) link.com /= link.mass;
+    for (const int body : welded) {
+      const Eigen::Map<const RowMatrix3d> R(d->ximat + 9 * body);
+      const Vector3d arm = MapVector(d->xipos + 3 * body) - link.com;
+      link.inertia += R * MapVector(m->body_inertia + 3 * body).asDiagonal() * R.transpose() +
+                      m->body_mass[body] * (arm.squaredNorm() * Matrix3d::Identity() - arm * arm.transpose());
+    }
+  }
+  return links;
+}
+
+void EngineTerms::CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J) {
+  mj_jacSite(engine_.get(), data_.get(), J_nv_.data(), J_nv_.data() + 3 * engine_->nv,
+             adapter_->frame_sites()[static_cast<size_t>(frame)]);
   for (int col = 0; col < base_size_; ++col) {
     J.col(col).setZero();
     for (int k = 0; k < carrying_dofs_; ++k) {
@@ -43,10 +75,20 @@ void EngineStep::CalcTipJacobian(int finger, const Vector3d& point, Eigen::Ref<M
     }
   }
   Eigen::Index col = base_size_;
-  for (const int dof : chain_dofs_[i]) J.col(col++) = J_nv_.col(dof);
+  for (const int dof : chain_of(frame).dofs) J.col(col++) = J_nv_.col(dof);
 }
 
-EngineMotion EngineStep::ReadMotion(mjtObj type, int id, const mjtNum* place) const {
+Matrix6Xd EngineTerms::CalcFrameJacobian(int frame) {
+  const std::vector<int>& coordinates = chain(frame);
+  Matrix6Xd columns(6, static_cast<Eigen::Index>(coordinates.size()));
+  CalcFrameColumns(frame, columns);
+  Matrix6Xd J = Matrix6Xd::Zero(6, size());
+  for (size_t i = 0; i < coordinates.size(); ++i)
+    J.col(coordinates[i]) = columns.col(static_cast<Eigen::Index>(i));
+  return J;
+}
+
+EngineMotion EngineTerms::ReadMotion(mjtObj type, int id, const mjtNum* place) const {
   mjtNum velocity[6];  // angular, linear
   mjtNum acceleration[6];
   mj_objectVelocity(engine_.get(), data_.get(), type, id, velocity, 0);
@@ -55,20 +97,20 @@ EngineMotion EngineStep::ReadMotion(mjtObj type, int id, const mjtNum* place) co
           MapVector(acceleration)};
 }
 
-EngineMotion EngineStep::TipMotion(int finger) const {
-  const int site = tip_sites_[static_cast<size_t>(finger)];
+EngineMotion EngineTerms::FrameMotion(int frame) const {
+  const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
   return ReadMotion(mjOBJ_SITE, site, data_->site_xpos + 3 * site);
 }
 
-Matrix3d EngineStep::ObjectRotation() const {
+Matrix3d EngineTerms::ObjectRotation() const {
   return Eigen::Map<const RowMatrix3d>(data_->xmat + 9 * object_body_);
 }
 
-Pose EngineStep::ObjectPose() const {
+Pose EngineTerms::ObjectPose() const {
   return MakePose(data_->xmat + 9 * object_body_, data_->xpos + 3 * object_body_);
 }
 
-Vector6d EngineStep::ObjectVelocity() const {
+Vector6d EngineTerms::ObjectVelocity() const {
   const EngineMotion motion = ObjectMotion();
   const Matrix3d R = ObjectRotation();
   Vector6d V;
@@ -76,11 +118,11 @@ Vector6d EngineStep::ObjectVelocity() const {
   return V;
 }
 
-EngineMotion EngineStep::ObjectMotion() const {
+EngineMotion EngineTerms::ObjectMotion() const {
   return ReadMotion(mjOBJ_XBODY, object_body_, data_->xpos + 3 * object_body_);
 }
 
-Matrix6d EngineStep::ObjectInertia() const {
+Matrix6d EngineTerms::ObjectInertia() const {
   const mjModel& m = *engine_;
   Matrix6d M;
   for (int i = 0; i < 6; ++i) {
@@ -91,33 +133,33 @@ Matrix6d EngineStep::ObjectInertia() const {
   return B.transpose() * M * B;
 }
 
-Vector6d EngineStep::ObjectCoriolis() const {
-  Vector6d wrench = object_force_.head<6>();
+Vector6d EngineTerms::ObjectCoriolis() const {
+  Vector6d wrench = object_coriolis_;
   wrench.head<3>() = ObjectRotation().transpose() * wrench.head<3>().eval();
   return wrench;
 }
 
-Vector6d EngineStep::ObjectGravity() const {
-  Vector6d wrench = object_force_.tail<6>();
+Vector6d EngineTerms::ObjectGravity() const {
+  Vector6d wrench = object_gravity_;
   wrench.head<3>() = ObjectRotation().transpose() * wrench.head<3>().eval();
   return wrench;
 }
 
-Eigen::Matrix<double, 3, 6> EngineStep::CalcObjectJacobian(const Vector3d& point) {
+Eigen::Matrix<double, 3, 6> EngineTerms::CalcObjectJacobian(const Vector3d& point) {
   mj_jac(engine_.get(), data_.get(), J_nv_.data(), nullptr, point.data(), object_body_);
   Eigen::Matrix<double, 3, 6> J = J_nv_.block<3, 6>(0, object_dof_);
   J.leftCols<3>() *= ObjectRotation();
   return J;
 }
 
-EngineTouch EngineStep::CalcTouch(int finger, const Pose& shift) {
+EngineTouch EngineTerms::CalcTouch(int frame, const Pose& shift) {
   const mjModel* m = engine_.get();
   mjData* d = data_.get();
   const auto place = [&](int geom) {
     mj_local2Global(d, d->geom_xpos + 3 * geom, d->geom_xmat + 9 * geom, m->geom_pos + 3 * geom,
                     m->geom_quat + 4 * geom, m->geom_bodyid[geom], m->geom_sameframe[geom]);
   };
-  const int tip = tip_geoms_[static_cast<size_t>(finger)];
+  const int tip = chain_of(frame).tip_geom;
   place(tip);
   Eigen::Map<Vector3d> center(d->geom_xpos + 3 * tip);  // a sphere has no axes
   center = shift * Vector3d(center);

@@ -1,4 +1,4 @@
-#include "harness/checks/step_term.h"
+#include "harness/checks/compared_term.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,30 +27,30 @@ bool ZeroPattern::Holds(const double* data) const {
   return sum == 0.0;
 }
 
-StepTerm::StepTerm(std::string name, double bound, std::vector<Location> where) : where_(std::move(where)) {
-  record_.name = std::move(name);
-  record_.bound = bound;
+ComparedTerm::ComparedTerm(CheckRecord* record, std::vector<Location> where, std::vector<ZeroPattern> zeros)
+    : record_(record), where_(std::move(where)), zeros_(std::move(zeros)) {
   const auto size = static_cast<Eigen::Index>(where_.size());
   model.setZero(size);
   engine.setZero(size);
   weight.setOnes(size);
 }
 
-void StepTerm::Finish(long step) {
-  double error = ((model - engine).abs() * weight).maxCoeff<Eigen::PropagateNaN>();
+void ComparedTerm::Finish(double when) {
+  double error = 0.0;
+  if (size() > 0) error = ((model - engine).abs() * weight).maxCoeff<Eigen::PropagateNaN>();
   if (!(error < std::numeric_limits<double>::infinity())) error = std::numeric_limits<double>::infinity();
-  step_error_ = std::max(error, zeros_error_);
+  const bool is_worst = error > record_->worst || record_->comparisons == 0;
+  const bool fails_first = !(error <= record_->bound) && !record_->failed;
+  if (is_worst || fails_first) {
+    for (Eigen::Index i = 0; i < size(); ++i) {
+      record_->CompareError(std::abs(model[i] - engine[i]) * weight[i], model[i], engine[i],
+                            where_[static_cast<size_t>(i)], when);
+    }
+  } else {
+    record_->comparisons += size();
+  }
+  record_->AddStep(std::max(error, zeros_error_));
   zeros_error_ = 0.0;
-  const bool is_worst = error > record_.worst || record_.sample < 0;
-  const bool fails_first = error > record_.bound && !record_.failed;
-  if (!is_worst && !fails_first) {
-    record_.comparisons += size();
-    return;
-  }
-  for (Eigen::Index i = 0; i < size(); ++i) {
-    record_.AddError(std::abs(model[i] - engine[i]) * weight[i], model[i], engine[i],
-                     where_[static_cast<size_t>(i)], step);
-  }
 }
 
 }  // namespace dexcheck

@@ -1,0 +1,130 @@
+#include "harness/engine/remove_looks.h"
+
+#include <mujoco/mjxmacro.h>
+
+#include <cstring>
+#include <string_view>
+#include <vector>
+
+#include "harness/engine/engine.h"
+
+namespace dexcheck {
+namespace {
+
+/// Calls visit(id) for each reference that an element other than a pair makes to a geom.
+template <typename Visit>
+void ForEachReference(mjModel* m, const Visit& visit) {
+  for (int i = 0; i < m->nwrap; ++i) {
+    if (m->wrap_type[i] == mjWRAP_SPHERE || m->wrap_type[i] == mjWRAP_CYLINDER) visit(m->wrap_objid + i);
+  }
+  for (int i = 0; i < m->nsensor; ++i) {
+    if (m->sensor_objtype[i] == mjOBJ_GEOM) visit(m->sensor_objid + i);
+    if (m->sensor_reftype[i] == mjOBJ_GEOM) visit(m->sensor_refid + i);
+  }
+  for (int i = 0; i < m->neq; ++i) {
+    if (m->eq_type[i] != mjEQ_DISTANCE) continue;
+    visit(m->eq_obj1id + i);
+    visit(m->eq_obj2id + i);
+  }
+  for (int i = 0; i < m->ntupledata; ++i) {
+    if (m->tuple_objtype[i] == mjOBJ_GEOM) visit(m->tuple_objid + i);
+  }
+}
+
+/// Moves the rows of the geoms that stay to the front of an array.
+template <typename Number>
+void KeepRows(const std::vector<int>& stay, size_t columns, Number* rows) {
+  for (size_t i = 0; i < stay.size(); ++i) {
+    std::memmove(rows + i * columns, rows + static_cast<size_t>(stay[i]) * columns, columns * sizeof(Number));
+  }
+}
+
+// All arrays of a model, as the engine lists them: visit(type, array, bytes of a row, rows, whether one for
+// each geom).
+#undef MJ_M
+#define MJ_M(size) m->size
+#define DEXCHECK_VISIT(type, name, rows, columns)                            \
+  visit(m->name, static_cast<size_t>(m->rows), static_cast<size_t>(columns), \
+        std::string_view(#rows) == "ngeom");
+template <typename Visit>
+void ForEachArray(mjModel* m, const Visit& visit) {
+#define X DEXCHECK_VISIT
+  MJMODEL_POINTERS
+#undef X
+}
+
+/// The engine lays them out one after the other, each at a multiple of this.
+constexpr size_t kAlignment = 64;
+
+size_t RoundUp(size_t offset) { return (offset + kAlignment - 1) / kAlignment * kAlignment; }
+
+bool HasKnownLayout(mjModel* m) {
+  bool known = true;
+  size_t offset = 0;
+  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
+    offset = RoundUp(offset);
+    known = known && reinterpret_cast<char*>(array) == static_cast<char*>(m->buffer) + offset;
+    offset += sizeof(Number) * rows * columns;
+  });
+  return known && static_cast<size_t>(m->nbuffer) == offset;
+}
+
+/// Moves the arrays to where a model of these sizes has them.
+void LayOut(mjModel* m) {
+  size_t offset = 0;
+  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
+    offset = RoundUp(offset);
+    char* const place = static_cast<char*>(m->buffer) + offset;
+    const size_t bytes = sizeof(Number) * rows * columns;
+    std::memmove(place, array, bytes);
+    array = reinterpret_cast<Number*>(place);
+    offset += bytes;
+  });
+  m->nbuffer = static_cast<decltype(m->nbuffer)>(offset);
+}
+
+}  // namespace
+
+int RemoveLooks(mjModel* m) {
+  std::vector<bool> keep(static_cast<size_t>(m->ngeom), false);
+  for (int geom = 0; geom < m->ngeom; ++geom) {
+    keep[static_cast<size_t>(geom)] = CanTouch(*m, geom) || m->geom_fluid[mjNFLUID * geom] != 0.0;
+  }
+  ForEachReference(m, [&](const int* geom) {
+    if (*geom >= 0) keep[static_cast<size_t>(*geom)] = true;
+  });
+  std::vector<int> stay;
+  std::vector<int> new_id(keep.size(), -1);
+  for (int geom = 0; geom < m->ngeom; ++geom) {
+    if (!keep[static_cast<size_t>(geom)]) continue;
+    new_id[static_cast<size_t>(geom)] = static_cast<int>(stay.size());
+    stay.push_back(geom);
+  }
+  const int removed = m->ngeom - static_cast<int>(stay.size());
+  if (removed == 0 || !HasKnownLayout(m)) return 0;
+
+  const auto renumber = [&](int* geom) {
+    if (*geom >= 0) *geom = new_id[static_cast<size_t>(*geom)];
+  };
+  ForEachReference(m, renumber);
+  for (int pair = 0; pair < m->npair; ++pair) {
+    renumber(m->pair_geom1 + pair);
+    renumber(m->pair_geom2 + pair);
+  }
+  ForEachArray(m, [&]<typename Number>(Number*& array, size_t, size_t columns, bool of_geoms) {
+    if (of_geoms) KeepRows(stay, columns, array);
+  });
+  m->ngeom = static_cast<int>(stay.size());
+  LayOut(m);
+
+  int next = 0;
+  for (int body = 0; body < m->nbody; ++body) {
+    const int first = next;
+    while (next < m->ngeom && m->geom_bodyid[next] == body) ++next;
+    m->body_geomnum[body] = next - first;
+    m->body_geomadr[body] = next > first ? first : -1;
+  }
+  return removed;
+}
+
+}  // namespace dexcheck

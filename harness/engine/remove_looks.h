@@ -1,0 +1,15 @@
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+namespace dexcheck {
+
+/// Removes from a compiled model the geoms that are only looked at: those that cannot touch anything and that
+/// no tendon, sensor, equality, tuple or fluid force refers to. The engine places every geom in every step,
+/// so that a robot with fine looks costs more to simulate; without them it moves bit for bit the same.
+/// Bodies, joints and sites keep their numbers, the geoms that stay get new ones in the old order. Draw
+/// another model of the same file.
+/// @return the number of geoms removed.
+int RemoveLooks(mjModel* model);
+
+}  // namespace dexcheck
