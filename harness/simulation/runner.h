@@ -19,7 +19,8 @@ class Runner {
   [[nodiscard]] const RunResult& result() const { return result_; }
 
   /// Settles, steps to the end or to a failure, and judges.
-  /// @param after_step called after each step, also after one that failed; its time counts as recording.
+  /// @param after_step(const StepRecord&) called after each step, also after one that failed; its time counts
+  /// as recording.
   /// @param should_stop asked before each step; true ends the run as interrupted.
   template <typename AfterStep, typename ShouldStop>
   const RunResult& Run(const AfterStep& after_step, const ShouldStop& should_stop) {
@@ -32,10 +33,10 @@ class Runner {
         break;
       }
       Guard([&] { loop_.Step(); }, /*settling=*/false);
-      if (loop_.step() == 0) break;
-      if (loop_.is_tracking()) result_.tracking.Add(loop_.error());
+      if (loop_.record().step == 0) break;
+      if (loop_.record().command.tracks) result_.tracking.Add(loop_.record().error);
       const Clock::time_point recording = Clock::now();
-      after_step();
+      after_step(loop_.record());
       result_.recording_seconds += SecondsSince(recording);
     }
     result_.wall_seconds = SecondsSince(begin);
@@ -57,8 +58,8 @@ class Runner {
       throw;
     } catch (const Error& error) {
       result_.grasp_lost = dynamic_cast<const GraspLost*>(&error) != nullptr;
-      result_.failure =
-          error.what() + (settling ? " while settling" : " at t = " + FormatNumber(loop_.step_time()) + " s");
+      result_.failure = error.what() + (settling ? " while settling"
+                                                 : " at t = " + FormatNumber(loop_.record().time) + " s");
     }
   }
 

@@ -1,0 +1,43 @@
+#pragma once
+
+// All questions of a run, asked at every step.
+
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "harness/checks/step_checks.h"
+#include "harness/checks/step_model_check.h"
+#include "harness/checks/step_record.h"
+
+namespace dexcheck {
+
+/// The checks of one run, with what went worst. Nothing allocates in a step, except as StepChecks and where a
+/// check of the model fails for the first time.
+class CrossCheck {
+ public:
+  /// @throws InputError as EngineStep, or when a bound of the scenario has the name of no check.
+  explicit CrossCheck(const Setup& setup);
+
+  /// The first question: are the terms that the controller used the engine's?
+  void CompareModel(const StepRecord& step);
+  /// The others, which compare motion and forces.
+  void CompareMotion(const StepRecord& step) { motion_.Compare(step); }
+  /// Forgets motion and forces of all steps so far: time begins anew.
+  void Reset() { motion_.Reset(); }
+
+  [[nodiscard]] std::span<const RunCheck> model_checks() const { return model_checks_; }
+  [[nodiscard]] std::span<const RunCheck> motion_checks() const { return motion_.checks(); }
+  /// A check of the motion. @throws std::invalid_argument unless there is one of that name.
+  [[nodiscard]] const RunCheck& Find(std::string_view name) const { return motion_.Find(name); }
+  /// Of the last step.
+  [[nodiscard]] const StepFindings& findings() const { return motion_.findings(); }
+
+ private:
+  const Setup* setup_;
+  StepModelCheck model_;
+  std::vector<RunCheck> model_checks_;
+  StepChecks motion_;
+};
+
+}  // namespace dexcheck
