@@ -3,9 +3,9 @@
 #include <chrono>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "controller/common/text.h"
-#include "harness/run/make_parts.h"
 
 namespace dexcheck {
 namespace {
@@ -25,20 +25,15 @@ constexpr double kGraspTimeout = 0.005;  // s without all fingertips on the obje
 
 }  // namespace
 
-ClosedLoop::ClosedLoop(const Setup& setup, bool check)
+ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
     : setup_(&setup),
-      plant_(MakePlant(setup)),
-      sensing_({.contact_error = setup.scenario().control.contact_error}),
+      plant_(std::move(parts.plant)),
+      sensing_(parts.sensing),
+      controller_(std::move(parts.controller)),
+      task_(parts.task),
       drive_(plant_->motors()),
       num_steps_(std::lround(setup.scenario().duration / setup.scenario().plant.time_step)) {
   const Scenario& scenario = setup.scenario();
-  if (scenario.task) {
-    std::unique_ptr<PickAndPlaceController> task = MakeTaskController(setup);
-    task_ = task.get();
-    controller_ = std::move(task);
-  } else {
-    controller_ = MakeTrajectoryController(setup);
-  }
   StepChecks::RequireKnownBounds(scenario);
   if (check) checks_.emplace(setup);
   record_.model = &controller_->model();

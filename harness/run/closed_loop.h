@@ -7,12 +7,12 @@
 
 #include "controller/control/controller.h"
 #include "controller/control/trajectory.h"
-#include "controller/handling/pick_and_place_controller.h"
 #include "harness/checks/cross_check.h"
 #include "harness/checks/step_record.h"
 #include "harness/plant/motor_drive.h"
 #include "harness/plant/plant.h"
 #include "harness/plant/sensing.h"
+#include "harness/run/loop_parts.h"
 #include "harness/simulation/setup.h"
 
 namespace dexcheck {
@@ -42,7 +42,9 @@ class ClosedLoop {
  public:
   /// @param check whether to cross-check.
   /// @throws InputError when the scenario asks for what cannot be.
-  ClosedLoop(const Setup& setup, bool check);
+  ClosedLoop(const Setup& setup, bool check) : ClosedLoop(setup, check, MakeLoopParts(setup)) {}
+  /// The same with other parts than the scenario's own.
+  ClosedLoop(const Setup& setup, bool check, LoopParts parts);
 
   /// Holds the object until all has come to rest (and then moves on, for a moving start): call once, before
   /// the first Step, at t = 0. @throws as Step.

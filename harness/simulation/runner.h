@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <string>
+#include <utility>
 
 #include "controller/common/text.h"
 #include "harness/simulation/run_summary.h"
@@ -14,6 +15,9 @@ class Runner {
  public:
   /// @throws InputError as ClosedLoop.
   Runner(const Setup& setup, bool check) : setup_(&setup), loop_(setup, check) {}
+  /// The same with other parts than the scenario's own.
+  Runner(const Setup& setup, bool check, LoopParts parts)
+      : setup_(&setup), loop_(setup, check, std::move(parts)) {}
 
   [[nodiscard]] const ClosedLoop& loop() const { return loop_; }
   [[nodiscard]] const RunResult& result() const { return result_; }

@@ -1,12 +1,14 @@
-#include "harness/run/make_parts.h"
+#include "harness/run/loop_parts.h"
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "controller/control/trajectory_controller.h"
 #include "harness/plant/engine_plant.h"
 
 namespace dexcheck {
+namespace {
 
 std::unique_ptr<Plant> MakePlant(const Setup& setup) {
   auto plant = std::make_unique<EnginePlant>(setup.adapter(), setup.fingertips(), setup.surface(),
@@ -29,6 +31,22 @@ std::unique_ptr<PickAndPlaceController> MakeTaskController(const Setup& setup) {
   return std::make_unique<PickAndPlaceController>(
       setup.model(), setup.hand(), setup.object().body, setup.surface(), setup.MakeControllerOptions(),
       setup.q_start(), scenario.task->pick_and_place, scenario.plant.time_step);
+}
+
+}  // namespace
+
+LoopParts MakeLoopParts(const Setup& setup) {
+  LoopParts parts;
+  parts.plant = MakePlant(setup);
+  if (setup.scenario().task) {
+    std::unique_ptr<PickAndPlaceController> task = MakeTaskController(setup);
+    parts.task = task.get();
+    parts.controller = std::move(task);
+  } else {
+    parts.controller = MakeTrajectoryController(setup);
+  }
+  parts.sensing.contact_error = setup.scenario().control.contact_error;
+  return parts;
 }
 
 }  // namespace dexcheck
