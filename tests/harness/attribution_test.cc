@@ -232,8 +232,8 @@ TEST(StepCheckTable, SaysWhatEachFailureMeansWithoutTies) {
     if (meaning.cause != Cause::kNone && meaning.cause != Cause::kModel) {
       precedences.push_back(meaning.precedence);
     }
-    if (meaning.is_own) EXPECT_NE(meaning.cause, Cause::kNone) << info.name;
-    if (meaning.sharper != StepCheck::kCount) EXPECT_TRUE(meaning.is_own) << info.name;
+    EXPECT_TRUE(!meaning.is_own || meaning.cause != Cause::kNone) << info.name;
+    EXPECT_TRUE(meaning.sharper == StepCheck::kCount || meaning.is_own) << info.name;
   }
   for (const Step& step : kSteps) EXPECT_NE(FindStepCheck(step.name), nullptr) << step.name;
   std::sort(names.begin(), names.end());
