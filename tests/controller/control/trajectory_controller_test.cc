@@ -103,10 +103,12 @@ TEST_F(TrajectoryControllerTest, TheRigidSystemAnswersWithTheDemand) {
 
 TEST_F(TrajectoryControllerTest, HoldsTorquesUntilTheNextAreDue) {
   TrajectoryController controller = Make({.time_step = 1e-3, .hold = 3});
+  double t = 0.0;
   const auto count_solves = [&](int steps) {
     int solves = 0;
     for (int i = 0; i < steps; ++i) {
-      controller.Step(reading_, 0.1 * i, &command_);
+      t += 0.1;
+      controller.Step(reading_, t, &command_);
       solves += command_.force_solves;
     }
     return solves;
@@ -114,7 +116,7 @@ TEST_F(TrajectoryControllerTest, HoldsTorquesUntilTheNextAreDue) {
   controller.Follow(motion_);
   EXPECT_EQ(count_solves(3), 1);
   const VectorXd held = command_.tau;
-  EXPECT_EQ(command_.desired.X_d, motion_.Evaluate(0.2).X_d);  // though the torques are older
+  EXPECT_EQ(command_.desired.X_d, motion_.Evaluate(t).X_d);  // though the torques are older
   EXPECT_EQ(count_solves(1), 1);
   EXPECT_NE(command_.tau, held);
   // A new motion is due at once.
