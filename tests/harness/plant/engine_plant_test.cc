@@ -36,7 +36,7 @@ class EnginePlantTest : public ::testing::Test {
   }
 
   ShippedRun scenario_;
-  const Setup& setup_;
+  const dexcheck::Setup& setup_;
   EnginePlant plant_;
   VectorXd tau_;
   PlantReading reading_;
