@@ -2,8 +2,6 @@
 
 #include <chrono>
 
-#include "controller/object/euler_zyz.h"
-
 namespace dexcheck {
 
 void RequireGraspForce(const GraspForceResult& result) {
@@ -17,41 +15,30 @@ GraspController::GraspController(const RobotModel& model, std::span<const int> f
                                  const MassProperties& object, const Surface& surface,
                                  const GraspControllerOptions& options)
     : options_(options),
-      robot_(model, Coordinates::kReduced),
-      grasp_(model, fingertips, object, surface),
+      model_(model, fingertips, object, surface, options),
       law_(model, static_cast<int>(fingertips.size()), options.weight),
       problem_(static_cast<int>(fingertips.size())),
       solver_(static_cast<int>(fingertips.size()), 0, options.force) {
-  if (!options.bonds.empty()) grasp_.SetBonds(options.bonds);
   problem_.mu.setConstant(options.mu);
   problem_.f_min.setConstant(options.f_min);
   problem_.f_max.setConstant(options.f_max);
   sigma_prime_.setZero(model.num_velocities());
-  F_N_.setZero(grasp_.num_forces());
+  F_N_.setZero(grasp().num_forces());
 }
 
 void GraspController::SetState(const MeasuredState& state) {
-  robot_.SetState(state.q, state.xi);
-  robot_.CalcDynamics();
-  grasp_.SetOverlaps(state.overlap);
-  if (options_.orientation == OrientationFeedback::kAngles) {
-    X_o_ = CalcObjectCoordinates(state.X_Bo, has_X_o_ ? X_o_ : options_.X_o_start);
-    has_X_o_ = true;
-    grasp_.SetState(robot_, X_o_, CalcP(X_o_) * state.V_Bo, state.kappa);
-  } else {
-    grasp_.SetPose(robot_, state.X_Bo, state.V_Bo, state.kappa);
-  }
+  model_.SetState(state);
   options_.posture.CalcAcceleration(state.q, state.xi, sigma_prime_);
 }
 
 const VectorXd& GraspController::CalcTorque(const DesiredMotion& desired) {
-  const Vector6d V_Bo_dot = CalcTrackingAcceleration(options_.gains, options_.orientation, grasp_, desired);
-  law_.SetDemand(robot_, grasp_, V_Bo_dot, sigma_prime_);
+  V_Bo_dot_ = CalcTrackingAcceleration(options_.gains, options_.orientation, grasp(), desired);
+  law_.SetDemand(robot(), grasp(), V_Bo_dot_, sigma_prime_);
 
   if (!law_.F_o().allFinite() || !law_.tau_0().allFinite()) {
     throw GraspForceError("the demanded forces are not finite");
   }
-  problem_.G = grasp_.G();
+  problem_.G = grasp().G();
   problem_.F_o = law_.F_o();
   const auto begin = std::chrono::steady_clock::now();
   force_ = &solver_.Solve(problem_);
@@ -59,7 +46,7 @@ const VectorXd& GraspController::CalcTorque(const DesiredMotion& desired) {
   RequireGraspForce(*force_);
   // F_N = f_c - G^+ F_o, so that (49) gives f_c back
   law_.CalcInternalForce(force_->f_c, F_N_);
-  return law_.CalcTorque(grasp_, F_N_);
+  return law_.CalcTorque(grasp(), F_N_);
 }
 
 }  // namespace dexcheck

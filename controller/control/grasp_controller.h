@@ -7,10 +7,9 @@
 
 #include "controller/common/errors.h"
 #include "controller/control/computed_torque.h"
-#include "controller/control/grasp_terms.h"
+#include "controller/control/grasp_model.h"
 #include "controller/control/object_tracking.h"
 #include "controller/control/posture_task.h"
-#include "controller/dynamics/model_terms.h"
 #include "controller/grasp/grasp_force.h"
 
 namespace dexcheck {
@@ -25,29 +24,16 @@ class GraspForceError : public Error {
 void RequireGraspForce(const GraspForceResult& result);
 
 /// What the controller may choose.
-struct GraspControllerOptions {
+struct GraspControllerOptions : GraspModelOptions {
   explicit GraspControllerOptions(const RobotModel& model) : posture(model) {}
 
   ObjectGains gains;
-  OrientationFeedback orientation = OrientationFeedback::kAngles;
   RedundancyWeight weight;
   PostureTask posture;
-  Vector6d X_o_start = Vector6d::Zero();  ///< The angles' branch is the one nearest to this at first.
-  std::vector<Bond> bonds;                ///< None, or one for each fingertip.
-  double mu = 0.5;                        ///< Friction coefficient that the grasp force counts on.
-  double f_min = 0.0;                     ///< Least normal force of each finger, N.
-  double f_max = 100.0;                   ///< Largest, N.
+  double mu = 0.5;       ///< Friction coefficient that the grasp force counts on.
+  double f_min = 0.0;    ///< Least normal force of each finger, N.
+  double f_max = 100.0;  ///< Largest, N.
   GraspForceOptions force;
-};
-
-/// What the controller is told of the world at one instant.
-struct MeasuredState {
-  VectorXd q;   ///< q' (p').
-  VectorXd xi;  ///< n.
-  Pose X_Bo = Pose::Identity();
-  Vector6d V_Bo = Vector6d::Zero();       ///< Body velocity, Sigma_o.
-  std::vector<ContactCoordinates> kappa;  ///< One for each fingertip of the grasp.
-  std::vector<double> overlap;            ///< Likewise, m; see CalcContactGeometry.
 };
 
 /// Computed torque (55) with the grasp force from the friction cones. Owns every term that one step needs.
@@ -67,28 +53,30 @@ class GraspController {
   /// cones holds the object.
   const VectorXd& CalcTorque(const DesiredMotion& desired);
 
-  [[nodiscard]] const ModelTerms& robot() const { return robot_; }
-  [[nodiscard]] const GraspTerms& grasp() const { return grasp_; }
+  [[nodiscard]] const GraspModel& model() const { return model_; }
+  [[nodiscard]] const ModelTerms& robot() const { return model_.robot(); }
+  [[nodiscard]] const GraspTerms& grasp() const { return model_.grasp(); }
   [[nodiscard]] const ComputedTorque& law() const { return law_; }
   /// sigma' (n) of the state set, from the posture task.
   [[nodiscard]] const VectorXd& sigma_prime() const { return sigma_prime_; }
   [[nodiscard]] const GraspForceResult& force() const { return *force_; }
+  /// V_Bo_dot (Sigma_o) that the last torques demand of the object.
+  [[nodiscard]] const Vector6d& V_Bo_dot() const { return V_Bo_dot_; }
+  /// F_N (k) of (49) that belongs to them, N.
+  [[nodiscard]] const VectorXd& F_N() const { return F_N_; }
   /// Time that the last grasp-force problem took, s.
   [[nodiscard]] double force_seconds() const { return force_seconds_; }
-  [[nodiscard]] GraspControllerOptions& options() { return options_; }
   [[nodiscard]] const GraspControllerOptions& options() const { return options_; }
 
  private:
   GraspControllerOptions options_;
-  ModelTerms robot_;
-  GraspTerms grasp_;
+  GraspModel model_;
   ComputedTorque law_;
   GraspForceProblem problem_;
   GraspForceSolver solver_;
   const GraspForceResult* force_ = nullptr;
   double force_seconds_ = 0.0;
-  Vector6d X_o_ = Vector6d::Zero();  // of the last step, to stay on one branch of the angles
-  bool has_X_o_ = false;
+  Vector6d V_Bo_dot_ = Vector6d::Zero();
   VectorXd sigma_prime_;  // n
   VectorXd F_N_;          // k
 };

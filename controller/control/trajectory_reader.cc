@@ -1,6 +1,8 @@
 #include "controller/control/trajectory_reader.h"
 
 #include <cmath>
+#include <utility>
+#include <vector>
 
 namespace dexcheck {
 namespace {
@@ -64,18 +66,32 @@ std::vector<WayPoint> ReadWayPoints(TomlTable& table) {
   return points;
 }
 
-std::vector<std::unique_ptr<Trajectory>> ReadParts(TomlTable& table) {
-  std::vector<std::unique_ptr<Trajectory>> parts;
+std::vector<TrajectoryMaker> ReadParts(TomlTable& table) {
+  std::vector<TrajectoryMaker> parts;
   const TomlValue list = table.Get("parts");
   for (const TomlValue& entry : list.AsList()) {
     TomlTable part = entry.AsTable();
-    parts.push_back(ReadTrajectory(part, Vector6d::Zero()));
+    parts.push_back(ReadTrajectory(part));
   }
   if (parts.empty()) list.Reject("needs at least one part");
   return parts;
 }
 
-std::unique_ptr<Trajectory> ReadByType(TomlTable& table, const Vector6d& X_start) {
+/// A maker of trajectories of one type, whose constructor takes the start and then these arguments.
+template <typename Motion, typename... Arguments>
+TrajectoryMaker MakerOf(const Arguments&... arguments) {
+  return [=](const Vector6d& X_start) { return std::make_unique<Motion>(X_start, arguments...); };
+}
+
+TrajectoryMaker MakerOfSum(const std::vector<TrajectoryMaker>& parts) {
+  return [=](const Vector6d& X_start) {
+    std::vector<std::unique_ptr<Trajectory>> made;
+    for (const TrajectoryMaker& part : parts) made.push_back(part(Vector6d::Zero()));
+    return std::make_unique<SumTrajectory>(X_start, std::move(made));
+  };
+}
+
+TrajectoryMaker ReadByType(TomlTable& table) {
   const Type type = table.Get("type").AsChoice<Type>({{"line", Type::kLine},
                                                       {"point_to_point", Type::kPointToPoint},
                                                       {"oscillation", Type::kOscillation},
@@ -84,40 +100,46 @@ std::unique_ptr<Trajectory> ReadByType(TomlTable& table, const Vector6d& X_start
                                                       {"way_points", Type::kWayPoints},
                                                       {"sum", Type::kSum}});
   switch (type) {
-    case Type::kLine:
-      return std::make_unique<LineTrajectory>(X_start, ReadCoordinates(table, "velocity", "turning"),
-                                              ReadRampTime(table));
-    case Type::kPointToPoint:
-      return std::make_unique<PointToPointTrajectory>(X_start, ReadCoordinates(table, "xyz", "zyz"),
-                                                      table.Get("duration").AsPositive());
-    case Type::kOscillation:
-      return std::make_unique<OscillationTrajectory>(X_start, ReadCoordinates(table, "xyz", "zyz"),
-                                                     ReadFrequency(table), ReadRampTime(table));
+    case Type::kLine: {
+      const Vector6d velocity = ReadCoordinates(table, "velocity", "turning");
+      return MakerOf<LineTrajectory>(velocity, ReadRampTime(table));
+    }
+    case Type::kPointToPoint: {
+      const Vector6d displacement = ReadCoordinates(table, "xyz", "zyz");
+      return MakerOf<PointToPointTrajectory>(displacement, table.Get("duration").AsPositive());
+    }
+    case Type::kOscillation: {
+      const Vector6d amplitude = ReadCoordinates(table, "xyz", "zyz");
+      const double frequency = ReadFrequency(table);
+      return MakerOf<OscillationTrajectory>(amplitude, frequency, ReadRampTime(table));
+    }
     case Type::kWeave: {
       const Wave wave = ReadWave(table);
-      return std::make_unique<WeaveTrajectory>(X_start, ReadHeading(table), table.Get("speed").AsNumber(),
-                                               ReadRampTime(table), wave.amplitude, wave.wavelength);
+      const double heading = ReadHeading(table);
+      const double speed = table.Get("speed").AsNumber();
+      return MakerOf<WeaveTrajectory>(heading, speed, ReadRampTime(table), wave.amplitude, wave.wavelength);
     }
     case Type::kCircle: {
       const TomlValue radius = table.Get("radius");
       if (radius.AsNumber() == 0.0) radius.Fail("must not be zero");
-      return std::make_unique<CircleTrajectory>(X_start, ReadHeading(table), table.Get("speed").AsNumber(),
-                                                ReadRampTime(table), radius.AsNumber());
+      const double heading = ReadHeading(table);
+      const double speed = table.Get("speed").AsNumber();
+      return MakerOf<CircleTrajectory>(heading, speed, ReadRampTime(table), radius.AsNumber());
     }
     case Type::kWayPoints:
-      return std::make_unique<WayPointTrajectory>(X_start, ReadWayPoints(table));
+      return MakerOf<WayPointTrajectory>(ReadWayPoints(table));
     case Type::kSum:
-      return std::make_unique<SumTrajectory>(X_start, ReadParts(table));
+      return MakerOfSum(ReadParts(table));
   }
   return nullptr;
 }
 
 }  // namespace
 
-std::unique_ptr<Trajectory> ReadTrajectory(TomlTable& table, const Vector6d& X_start) {
-  std::unique_ptr<Trajectory> trajectory = ReadByType(table, X_start);
+TrajectoryMaker ReadTrajectory(TomlTable& table) {
+  TrajectoryMaker maker = ReadByType(table);
   table.RejectUnused();
-  return trajectory;
+  return maker;
 }
 
 }  // namespace dexcheck

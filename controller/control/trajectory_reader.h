@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "controller/common/toml_reader.h"
@@ -7,7 +8,11 @@
 
 namespace dexcheck {
 
-/// Reads a trajectory that starts at X_start from a table. Keys by `type`; SI units, angles also as KEY_deg:
+/// Makes a trajectory that starts at X_start.
+using TrajectoryMaker = std::function<std::unique_ptr<Trajectory>(const Vector6d& X_start)>;
+
+/// Reads a trajectory from a table; where it starts is not in it. Keys by `type`; SI units, angles also as
+/// KEY_deg:
 ///
 ///   line            velocity = [3], turning = [3] (rates of the ZYZ angles), ramp_time
 ///   point_to_point  xyz = [3], zyz = [3], duration
@@ -20,6 +25,6 @@ namespace dexcheck {
 /// xyz and zyz are displacements or amplitudes against X_start. Optional: velocity, turning, xyz, zyz,
 /// heading and ramp_time, 0 unless given.
 /// @throws InputError, one line that names file, line, key and value.
-std::unique_ptr<Trajectory> ReadTrajectory(TomlTable& table, const Vector6d& X_start);
+TrajectoryMaker ReadTrajectory(TomlTable& table);
 
 }  // namespace dexcheck

@@ -8,18 +8,19 @@ namespace dexcheck {
 
 HandlingController::HandlingController(const RobotModel& model, std::span<const int> fingertips,
                                        const MassProperties& object, const Surface& surface,
-                                       const GraspController& grasp)
+                                       const GraspControllerOptions& options)
     : model_(&model),
       fingertips_(fingertips.begin(), fingertips.end()),
       object_(object),
       surface_(&surface),
-      grasp_(&grasp),
+      options_(options),
       problem_(static_cast<int>(fingertips.size())),
-      solver_(static_cast<int>(fingertips.size()), 0, grasp.options().force) {
-  problem_.mu.setConstant(grasp.options().mu);
-  problem_.f_max.setConstant(grasp.options().f_max);
+      solver_(static_cast<int>(fingertips.size()), 0, options.force) {
+  problem_.mu.setConstant(options.mu);
+  problem_.f_max.setConstant(options.f_max);
   f_c_.setZero(3 * static_cast<Eigen::Index>(fingertips.size()));
   f_grip_ = f_c_;
+  xi_dot_d_.setZero(model.num_velocities());
   const ContactSet all = AllContacts(static_cast<int>(fingertips_.size()));
   FindLaw(all, false);
   FindLaw(all, true);
@@ -28,7 +29,7 @@ HandlingController::HandlingController(const RobotModel& model, std::span<const 
 HandlingController::Law& HandlingController::FindLaw(ContactSet set, bool by_inertia) {
   std::unique_ptr<Law>& law = laws_[{set, by_inertia}];
   if (!law) {
-    RedundancyWeight weight = grasp_->options().weight;
+    RedundancyWeight weight = options_.weight;
     if (by_inertia) weight.kind = RedundancyWeight::Kind::kMass;
     law = std::make_unique<Law>(*model_, fingertips_, object_, *surface_, weight, set);
     law->f_c.setZero(law->grasp.terms().num_forces());
@@ -36,24 +37,28 @@ HandlingController::Law& HandlingController::FindLaw(ContactSet set, bool by_ine
   return *law;
 }
 
-const VectorXd& HandlingController::CalcTorque(const MeasuredState& state, const HandlingDemand& demand) {
+const VectorXd& HandlingController::CalcTorque(const GraspModel& terms, const MeasuredState& state,
+                                               const HandlingDemand& demand,
+                                               const Eigen::Ref<const VectorXd>& sigma_prime) {
   force_seconds_ = 0.0;
+  V_Bo_dot_.setZero();
   const ContactSet all = AllContacts(static_cast<int>(fingertips_.size()));
   if (demand.contacts == 0) {
     f_c_.setZero();
     ComputedTorque& law = FindLaw(all, false).torque;
-    law.SetFreeMotion(grasp_->robot(), grasp_->sigma_prime());
+    law.SetFreeMotion(terms.robot(), sigma_prime);
+    xi_dot_d_ = law.xi_dot_d();
     return law.tau_0();
   }
   Law& law = FindLaw(demand.contacts, demand.by_inertia);
-  if (demand.contacts != all) law.grasp.SetState(grasp_->robot(), state);
-  const GraspTerms& terms = demand.contacts == all ? grasp_->grasp() : law.grasp.terms();
-  Vector6d V_Bo_dot = Vector6d::Zero();
+  if (demand.contacts != all) law.grasp.SetState(terms.robot(), state);
+  const GraspTerms& grasp = demand.contacts == all ? terms.grasp() : law.grasp.terms();
   if (demand.carried) {
-    V_Bo_dot = CalcTrackingAcceleration(grasp_->options().gains, OrientationFeedback::kRotation, terms,
-                                        demand.desired);
+    V_Bo_dot_ =
+        CalcTrackingAcceleration(options_.gains, OrientationFeedback::kRotation, grasp, demand.desired);
   }
-  law.torque.SetMotion(grasp_->robot(), terms, V_Bo_dot, grasp_->sigma_prime());
+  law.torque.SetMotion(terms.robot(), grasp, V_Bo_dot_, sigma_prime);
+  xi_dot_d_ = law.torque.xi_dot_d();
 
   for (size_t i = 0; i < law.grasp.members().size(); ++i) {
     law.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) =
@@ -61,11 +66,11 @@ const VectorXd& HandlingController::CalcTorque(const MeasuredState& state, const
   }
   if (demand.grip > 0.0) {
     Require(demand.contacts == all, "grip", "must be zero without all contacts", demand.grip);
-    CalcGripForce(terms, V_Bo_dot, demand);
+    CalcGripForce(grasp, V_Bo_dot_, demand);
     law.f_c += demand.grip * f_grip_;
   }
   law.grasp.Scatter(law.f_c, f_c_);
-  return law.torque.CalcTorqueWithForces(terms, law.f_c);
+  return law.torque.CalcTorqueWithForces(grasp, law.f_c);
 }
 
 void HandlingController::CalcGripForce(const GraspTerms& terms, const Vector6d& V_Bo_dot,

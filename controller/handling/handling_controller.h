@@ -43,16 +43,21 @@ struct HandlingDemand {
 /// first time, and never again.
 class HandlingController {
  public:
-  /// @param grasp the controller whose state, gains, limits and posture are used; must outlive this, as must
-  /// all else.
+  /// @param options gains, weight and limits; the posture task is the caller's. All else must outlive this.
   HandlingController(const RobotModel& model, std::span<const int> fingertips, const MassProperties& object,
-                     const Surface& surface, const GraspController& grasp);
+                     const Surface& surface, const GraspControllerOptions& options);
 
-  /// tau' (n), N m, after grasp.SetState(state).
+  /// tau' (n), N m.
+  /// @param terms evaluated at `state`. @param sigma_prime (n) null-space acceleration (PostureTask).
   /// @throws GraspForceError when no admissible forces give F_o; SingularityError as ComputedTorque;
   /// std::invalid_argument when grip is positive without all contacts.
-  const VectorXd& CalcTorque(const MeasuredState& state, const HandlingDemand& demand);
+  const VectorXd& CalcTorque(const GraspModel& terms, const MeasuredState& state,
+                             const HandlingDemand& demand, const Eigen::Ref<const VectorXd>& sigma_prime);
 
+  /// V_Bo_dot (Sigma_o) that the torques demand of the object; zero unless it is carried.
+  [[nodiscard]] const Vector6d& V_Bo_dot() const { return V_Bo_dot_; }
+  /// xi_dot_d (n) of the torques.
+  [[nodiscard]] const VectorXd& xi_dot_d() const { return xi_dot_d_; }
   /// f_c (3N) that belongs to the torques, zero without contact.
   [[nodiscard]] const VectorXd& f_c() const { return f_c_; }
   /// Time that the last grasp-force problem took, s.
@@ -75,12 +80,14 @@ class HandlingController {
   std::vector<int> fingertips_;
   MassProperties object_;
   const Surface* surface_;
-  const GraspController* grasp_;
+  GraspControllerOptions options_;
   std::map<std::pair<ContactSet, bool>, std::unique_ptr<Law>> laws_;
   GraspForceProblem problem_;
   GraspForceSolver solver_;
-  VectorXd f_c_;     // 3N
-  VectorXd f_grip_;  // 3N
+  Vector6d V_Bo_dot_ = Vector6d::Zero();
+  VectorXd xi_dot_d_;  // n
+  VectorXd f_c_;       // 3N
+  VectorXd f_grip_;    // 3N
   double force_seconds_ = 0.0;
 };
 

@@ -2,21 +2,14 @@
 
 // A grasp in the making: the terms of those of its fingertips that touch.
 
-#include <cstdint>
 #include <span>
 #include <vector>
 
-#include "controller/control/grasp_controller.h"
+#include "controller/control/contact_set.h"
 #include "controller/control/grasp_terms.h"
+#include "controller/control/measured_state.h"
 
 namespace dexcheck {
-
-/// Fingertips of a grasp, bit i for the i-th.
-using ContactSet = std::uint32_t;
-
-/// All of `count` fingertips.
-constexpr ContactSet AllContacts(int count) { return (ContactSet{1} << count) - 1; }
-constexpr bool Contains(ContactSet set, size_t fingertip) { return (set >> fingertip & 1U) != 0; }
 
 /// G, J_B' and their rates of some fingertips of a grasp, by the same order.
 class PartialGrasp {

@@ -63,6 +63,7 @@ PickAndPlace::PickAndPlace(const RobotModel& model, const Hand& hand, const Surf
       options_(options),
       half_step_(0.5 * time_step),
       own_joints_(grasp_internal::ListOwnJoints(model, hand.fingertips)),
+      posture_(model),
       touched_at_(hand.fingertips.size()) {
   demand_.touch_force.assign(hand.fingertips.size(), 0.0);
 }
@@ -149,19 +150,19 @@ void PickAndPlace::EvaluateWay(double s) {
   way_ += move_.offset;
 }
 
-void PickAndPlace::FollowMove(double t, PostureTask* posture) {
+void PickAndPlace::FollowMove(double t) {
   const Eigen::Index joints = model_->num_joints();
   const ScalarMotion before = EvaluateMove(t - half_step_);
   EvaluateWay(before.s);
-  posture->xi_reference.tail(joints) = before.s_dot * way_s_;
+  posture_.xi_reference.tail(joints) = before.s_dot * way_s_;
   const ScalarMotion now = EvaluateMove(t);
   EvaluateWay(now.s);
-  posture->q_posture = way_;
-  posture->acceleration.tail(joints) = now.s_ddot * way_s_ + now.s_dot * now.s_dot * way_ss_;
-  SetPostureGains(t, posture);
+  posture_.q_posture = way_;
+  posture_.acceleration.tail(joints) = now.s_ddot * way_s_ + now.s_dot * now.s_dot * way_ss_;
+  SetPostureGains(t);
 }
 
-void PickAndPlace::SetPostureGains(double t, PostureTask* posture) {
+void PickAndPlace::SetPostureGains(double t) {
   // Platform and arm are free to follow the object, so that the fingers need not roll; they come to rest
   // without a jolt.
   double standing = phase_ == Phase::kCarry ? 0.0 : 1.0;
@@ -171,18 +172,18 @@ void PickAndPlace::SetPostureGains(double t, PostureTask* posture) {
   const double frequency = options_.posture_frequency;
   const double arm = frequency * (kArmShare + standing * (1.0 - kArmShare));
   const Eigen::Index base = model_->num_base_velocities();
-  posture->stiffness.setConstant(arm * arm);
-  posture->damping.head(base).setConstant(standing * kPlatformDamping);
-  posture->damping.tail(posture->stiffness.size()).setConstant(2.0 * arm);
+  posture_.stiffness.setConstant(arm * arm);
+  posture_.damping.head(base).setConstant(standing * kPlatformDamping);
+  posture_.damping.tail(posture_.stiffness.size()).setConstant(2.0 * arm);
   for (const std::vector<int>& joints : own_joints_) {
     for (const int joint : joints) {
-      posture->stiffness[joint] = frequency * frequency;
-      posture->damping[base + joint] = 2.0 * frequency;
+      posture_.stiffness[joint] = frequency * frequency;
+      posture_.damping[base + joint] = 2.0 * frequency;
     }
   }
 }
 
-void PickAndPlace::Update(double t, const MeasuredState& state, const Touch& touch, PostureTask* posture) {
+void PickAndPlace::Update(double t, const MeasuredState& state, const Touch& touch) {
   if (phase_ == Phase::kClose || phase_ == Phase::kGrip) {
     push_ = std::max(push_, (state.X_Bo.translation() - lay_at_).norm());
   }
@@ -214,7 +215,7 @@ void PickAndPlace::Update(double t, const MeasuredState& state, const Touch& tou
     case Phase::kDone:
       break;
   }
-  FollowMove(t, posture);
+  FollowMove(t);
 }
 
 void PickAndPlace::UpdateApproach(double t) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "controller/control/controller.h"
 #include "controller/control/posture_task.h"
 #include "controller/control/trajectory.h"
 #include "controller/handling/handling_controller.h"
@@ -52,12 +53,6 @@ struct PickAndPlaceOptions {
   PickPlanOptions plan;
 };
 
-/// What the hand feels, and the support.
-struct Touch {
-  ContactSet fingertips = 0;   ///< That touch the object.
-  double support_force = 0.0;  ///< Upward, on the object by what it lies on, N.
-};
-
 /// When a phase began.
 struct PhaseEntry {
   Phase phase;
@@ -79,12 +74,14 @@ class PickAndPlace {
   /// reach.
   void Begin(double t, const MeasuredState& state);
 
-  /// Decides what to do at time t (s): sets the posture and the demand.
-  void Update(double t, const MeasuredState& state, const Touch& touch, PostureTask* posture);
+  /// Decides what to do at time t (s): the posture and the demand.
+  void Update(double t, const MeasuredState& state, const Touch& touch);
   /// The demand's forces do not exist: bears less, and gives the object back.
   void Refuse(double t, const std::string& reason);
 
   [[nodiscard]] const HandlingDemand& demand() const { return demand_; }
+  /// Where the joints should be, and how stiffly; after the first Update.
+  [[nodiscard]] const PostureTask& posture() const { return posture_; }
   [[nodiscard]] Phase phase() const { return phase_; }
   [[nodiscard]] bool is_done() const { return phase_ == Phase::kDone; }
   /// Why the object was not brought; empty when it was, or may yet be.
@@ -117,8 +114,8 @@ class PickAndPlace {
   [[nodiscard]] ScalarMotion EvaluateMove(double t) const;
   /// Sets way_ and its derivatives.
   void EvaluateWay(double s);
-  void FollowMove(double t, PostureTask* posture);
-  void SetPostureGains(double t, PostureTask* posture);
+  void FollowMove(double t);
+  void SetPostureGains(double t);
   void HoldPosture(const VectorXd& q_joints);
   [[nodiscard]] VectorXd Joints(const MeasuredState& state) const;
 
@@ -152,6 +149,7 @@ class PickAndPlace {
   Move move_;
   VectorXd way_, way_s_, way_ss_;  // posture of the move and its derivatives by s
   HandlingDemand demand_;
+  PostureTask posture_;
   std::vector<double> touched_at_;  // by fingertip, s
   Vector3d lay_at_ = Vector3d::Zero();
   Vector6d X_start_ = Vector6d::Zero();

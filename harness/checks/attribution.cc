@@ -2,24 +2,23 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <limits>
 #include <string_view>
 
 #include "controller/common/text.h"
+#include "harness/checks/step_check_table.h"
 
 namespace dexcheck {
 namespace {
 
-const CheckRecord* Find(std::span<const CheckRecord> checks, std::string_view name) {
-  for (const CheckRecord& check : checks) {
-    if (check.name == name) return &check;
-  }
-  return nullptr;
+bool Failed(std::span<const CheckRecord> checks, std::string_view name) {
+  return std::any_of(checks.begin(), checks.end(),
+                     [&](const CheckRecord& check) { return check.name == name && check.failed; });
 }
 
-bool Failed(std::span<const CheckRecord> checks, std::string_view name) {
-  const CheckRecord* check = Find(checks, name);
-  return check != nullptr && check->failed;
+/// What the failure of a check means; nothing for one that has no entry.
+FailureMeaning MeaningOf(const CheckRecord& check) {
+  const StepCheckInfo* info = FindStepCheck(check.name);
+  return info == nullptr ? FailureMeaning{} : info->meaning;
 }
 
 std::string FormatShort(double value) {
@@ -34,65 +33,43 @@ std::string Tell(const CheckRecord& check) {
          " s" + (check.part.empty() ? "" : ", " + check.part);
 }
 
-/// A check whose failure means its cause by itself.
-struct Evidence {
-  const char* check;
-  Cause cause;
-};
-
 // Sliding before giving before tilting: a tyre that spins also tilts the platform.
-constexpr Evidence kEvidence[] = {
-    {"actuator_effort", Cause::kActuatorLimit},
-    {"joint_stop", Cause::kJointStop},
-    {"cone_use", Cause::kFingertipSlip},
-    {"traction_use", Cause::kWheelSlip},
-    {"contacts_lost", Cause::kFingertipSlip},
-    {"penetration", Cause::kContactSoftness},
-    {"fingertip_slip", Cause::kContactSoftness},
-    {"wheel_slip", Cause::kContactSoftness},
-    {"kappa", Cause::kContactSoftness},
-    {"unjudged", Cause::kContactSoftness},
-    {"solver", Cause::kSolver},
-    {"base_tilt", Cause::kTilt},
-};
-
 constexpr bool IsDecisive(Cause cause) {
   return cause == Cause::kActuatorLimit || cause == Cause::kJointStop || cause == Cause::kFingertipSlip ||
          cause == Cause::kWheelSlip;
 }
 
-/// The evidence that came first among those of the strongest sort.
-const CheckRecord* FindFirst(std::span<const CheckRecord> steps, Cause* cause) {
+/// Of the failed checks whose meaning passes, the one that failed first; by precedence at one time.
+template <typename Passes>
+const CheckRecord* FindFirst(std::span<const CheckRecord> steps, const Passes& passes) {
   const CheckRecord* first = nullptr;
-  for (const bool decisive : {true, false}) {
-    for (const Evidence& evidence : kEvidence) {
-      if (IsDecisive(evidence.cause) != decisive) continue;
-      const CheckRecord* check = Find(steps, evidence.check);
-      if (check == nullptr || !check->failed) continue;
-      if (first != nullptr && check->failed_at >= first->failed_at) continue;
-      first = check;
-      *cause = evidence.cause;
+  for (const CheckRecord& check : steps) {
+    if (!check.failed || !passes(MeaningOf(check).cause)) continue;
+    if (first != nullptr && check.failed_at > first->failed_at) continue;
+    if (first != nullptr && check.failed_at == first->failed_at &&
+        MeaningOf(check).precedence > MeaningOf(*first).precedence) {
+      continue;
     }
-    if (first != nullptr) return first;
+    first = &check;
   }
-  return nullptr;
+  return first;
 }
 
-/// Checks of a contact that have a cause of their own, whatever else happens in the run.
+/// The check that tells why, among those of the strongest sort; null when none tells.
+const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
+  const CheckRecord* first = FindFirst(steps, [](Cause cause) { return cause == Cause::kModel; });
+  if (first == nullptr) first = FindFirst(steps, IsDecisive);
+  if (first == nullptr) first = FindFirst(steps, [](Cause cause) { return cause != Cause::kNone; });
+  return first;
+}
+
 Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRecord> steps) {
   if (check.kind == CheckKind::kModel || run == Cause::kModel) return Cause::kModel;
-  if (check.name == "actuator_effort") return Cause::kActuatorLimit;
-  if (check.name == "joint_stop") return Cause::kJointStop;
-  if (check.name == "solver") return Cause::kSolver;
-  if (check.name == "wheel_slip" || check.name == "traction_use") {
-    return Failed(steps, "traction_use") ? Cause::kWheelSlip : Cause::kContactSoftness;
-  }
-  if (check.name == "contacts_lost") return Cause::kFingertipSlip;
-  if (check.name == "fingertip_slip" || check.name == "cone_use") {
-    return Failed(steps, "cone_use") ? Cause::kFingertipSlip : Cause::kContactSoftness;
-  }
-  if (check.name == "penetration") return Cause::kContactSoftness;
-  return run;
+  const FailureMeaning meaning = MeaningOf(check);
+  if (!meaning.is_own) return run;
+  if (meaning.sharper == StepCheck::kCount) return meaning.cause;
+  const StepCheckInfo& sharper = kStepChecks[static_cast<size_t>(meaning.sharper)];
+  return Failed(steps, sharper.name) ? sharper.meaning.cause : meaning.cause;
 }
 
 }  // namespace
@@ -143,12 +120,8 @@ AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord>
     result.cause = Cause::kModel;
     result.evidence = Tell(*first_model);
   } else if (any_step) {
-    // The object's balance has no other unknowns than the model's: its inertia and the contacts' geometry.
-    const CheckRecord* object = Find(steps, "balance_object");
-    if (object != nullptr && object->failed) {
-      result.cause = Cause::kModel;
-      result.evidence = Tell(*object);
-    } else if (const CheckRecord* first = FindFirst(steps, &result.cause)) {
+    if (const CheckRecord* first = FindEvidence(steps)) {
+      result.cause = MeaningOf(*first).cause;
       result.evidence = Tell(*first);
     } else {
       result.cause = Cause::kIntegrator;

@@ -6,27 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "harness/checks/failure_cause.h"
 #include "harness/checks/check_record.h"
 #include "harness/checks/static_gate.h"
 
 namespace dexcheck {
-
-/// What a disagreement of model and engine comes from.
-enum class Cause {
-  kNone,
-  kModel,            ///< The two descriptions differ: constants, kinematics, dynamics, contact geometry.
-  kActuatorLimit,    ///< A motor could not give its torque.
-  kJointStop,        ///< A joint reached the end of its range.
-  kFingertipSlip,    ///< A fingertip slides: its force is at the edge of the friction cone.
-  kWheelSlip,        ///< A wheel slides: assumption (1), rolling without slipping.
-  kContactSoftness,  ///< Contacts give or creep without sliding.
-  kTilt,             ///< The platform does not stay level.
-  kSolver,           ///< The engine's solver stopped before its forces fit its motion.
-  kIntegrator,       ///< None of these: what time stepping leaves.
-};
-
-/// "model", "wheel slip", ...
-const char* NameOf(Cause cause);
 
 /// One failed check with its cause.
 struct Attribution {

@@ -5,7 +5,6 @@
 
 #include "controller/common/text.h"
 #include "controller/contact/rolling.h"
-#include "harness/plant/body_contact.h"
 
 namespace dexcheck {
 
@@ -15,101 +14,56 @@ StepChecks::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)
 
 StepChecks::StepChecks(const Setup& setup)
     : setup_(&setup),
-      checks_(kCheckCount),
       dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())),
-      actuation_(setup.model()) {
-  const RobotModel& model = setup.model();
-  const mjModel& engine = setup.engine();
-  using enum CheckKind;
-  Define(
-      kBalanceRobot, "balance_robot", kBalance, "1", 1e-5,
-      "what is left of (48) with the engine's accelerations and contact forces, against the forces balanced");
-  Define(kBalanceObject, "balance_object", kBalance, "1", 1e-9,
-         "what is left of (19) with the engine's acceleration and contact forces, less what its solver left "
-         "over, against the contact forces");
-  Define(kReducedAcceleration, "reduced_acceleration", kPrediction, "1", 1e-5,
-         "xi_dot of the rigid constrained system (46), (48) against the engine's");
-  Define(kContactForce, "contact_force", kPrediction, "1", 1e-6,
-         "f_c of the rigid constrained system against the engine's, relative to |f_c|");
-  Define(kFingertipSlip, "fingertip_slip", kAssumption, "m", 2e-4,
-         "how far a fingertip has slipped on the object since t = 0");
-  Define(kWheelSlip, "wheel_slip", kAssumption, "m", 1e-3,
-         "how far a wheel has slipped on the floor since t = 0, (1)");
-  Define(kConeUse, "cone_use", kAssumption, "1", 0.99,
-         "tangential force over mu times normal force at a fingertip; 1 slides, (21)");
-  Define(kTractionUse, "traction_use", kAssumption, "1", 0.99,
-         "tangential force over mu times normal force at a wheel; 1 spins or skids");
-  Define(kContactsLost, "contacts_lost", kAssumption, "1", 0.0, "fingertips that do not touch the object");
-  Define(kPenetration, "penetration", kAssumption, "m", 2e-5, "overlap of fingertip and object");
-  Define(kKappa, "kappa", kAssumption, "m", 2e-4,
-         "contact point on the object: kappa integrated by (40) against the engine's");
-  Define(kBaseTilt, "base_tilt", kAssumption, "rad", 1e-5, "angle of the platform against the vertical");
-  Define(kIdleJoints, "idle_joints", kAssumption, "rad", 1e-5,
-         "movement since t = 0 of joints that do not carry the object");
-  // As small as the discrepancies that balance_robot and the prediction are judged by.
-  Define(kSolver, "solver", kAssumption, "1", 1e-5,
-         "what the engine's solver left over of its own equation of motion of the object, as balance_object");
-  Define(kJointStop, "joint_stop", kAssumption, "rad", 0.0,
-         "how far a joint is beyond its range, where a stop pushes that the model does not have");
-  // The fingers of one hand touch within some hundredths of a second, kTransient each at the most.
-  Define(kUnjudged, "unjudged", kAssumption, "s", 5.0 * kTransient,
-         "how long in one go contacts have come and gone, so that balance and prediction were not judged");
-  Define(kActuators, "actuator_effort", kAssumption, "1", 1.0, "|tau'| over the motor's limit");
-  // A bond neither slides nor rolls, nor does it care for friction.
-  if (!setup.bonds().empty()) {
-    checks_[kFingertipSlip].description = "distance of the joined points on fingertip and object";
-    for (const Check check : {kConeUse, kContactsLost, kPenetration, kKappa}) checks_[check].applies = false;
-  }
-  for (const auto& [name, bound] : setup.scenario().bounds) {
-    const auto found = std::find_if(checks_.begin(), checks_.end(),
-                                    [&, &key = name](const CheckRecord& check) { return check.name == key; });
-    if (found == checks_.end()) {
-      throw InputError(setup.scenario().source + ": bounds." + name + ": no check has this name");
-    }
-    found->bound = bound;
-  }
-
-  fingertip_slip_.resize(setup.fingertips().size());
-  wheel_slip_.resize(setup.adapter().wheels().size());
-  for (const int tip : setup.fingertips()) {
-    tip_bodies_.push_back(engine.site_bodyid[setup.adapter().frame_sites()[static_cast<size_t>(tip)]]);
-  }
-  for (const EngineWheel& wheel : setup.adapter().wheels()) {
-    wheel_bodies_.push_back(engine.jnt_bodyid[wheel.joint]);
-  }
-  const int n = model.num_velocities();
-  engine_.xi_dot.setZero(n);
-  engine_.f_c.setZero(3 * static_cast<Eigen::Index>(setup.fingertips().size()));
+      actuation_(setup.model()),
+      time_step_(setup.scenario().plant.time_step) {
+  DefineChecks();
+  findings_.fingertip_slip.resize(setup.fingertips().size());
+  findings_.wheel_slip.resize(setup.adapter().wheels().size());
+  const int n = setup.model().num_velocities();
+  findings_.f_c.setZero(3 * static_cast<Eigen::Index>(setup.fingertips().size()));
+  findings_.f_c_model = findings_.f_c;
+  findings_.xi_dot_model.setZero(n);
   force_.setZero(n);
   bias_.setZero(n);
   residual_.setZero(n);
   column_.setZero(n, 1);
-  part_prediction_.xi_dot.setZero(n);
-  part_prediction_.f_c = engine_.f_c;
-  prediction_ = &part_prediction_;
   idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
   kappa_.resize(setup.fingertips().size());
 }
 
-void StepChecks::Define(Check check, const char* name, CheckKind kind, const char* unit, double bound,
-                        const char* description) {
-  CheckRecord& c = checks_[check];
-  c.name = name;
-  c.kind = kind;
-  c.unit = unit;
-  c.bound = bound;
-  c.description = description;
+void StepChecks::DefineChecks() {
+  const bool bonded = !setup_->bonds().empty();
+  for (const StepCheckInfo& info : kStepChecks) {
+    CheckRecord check;
+    check.name = info.name;
+    check.kind = info.kind;
+    check.unit = info.unit;
+    check.bound = info.bound;
+    check.description =
+        bonded && *info.bonded_description != '\0' ? info.bonded_description : info.description;
+    check.applies = !bonded || *info.bonded_description != '\0';
+    checks_.push_back(check);
+  }
+  RequireKnownBounds(setup_->scenario());
+  for (const auto& [name, bound] : setup_->scenario().bounds) check(FindStepCheck(name)->check).bound = bound;
+}
+
+void StepChecks::RequireKnownBounds(const Scenario& scenario) {
+  for (const auto& [name, bound] : scenario.bounds) {
+    if (FindStepCheck(name) != nullptr) continue;
+    throw InputError(scenario.source + ": bounds." + name + ": no check has this name");
+  }
 }
 
 void StepChecks::Reset() {
   for (CheckRecord& check : checks_) check.Reset();
-  std::fill(fingertip_slip_.begin(), fingertip_slip_.end(), SlipState{});
-  std::fill(wheel_slip_.begin(), wheel_slip_.end(), SlipState{});
-  contacts_lost_ = 0;
-  least_cone_margin_ = std::numeric_limits<double>::infinity();
+  ForgetSlip();
+  std::fill(findings_.wheel_slip.begin(), findings_.wheel_slip.end(), SlipState{});
+  findings_.contacts_lost = 0;
+  findings_.least_cone_margin = std::numeric_limits<double>::infinity();
+  findings_.unjudged_steps = 0;
   steps_ = 0;
-  has_kappa_ = false;
-  transient_steps_ = 0;
   is_unjudged_ = false;
   changed_at_ = -std::numeric_limits<double>::infinity();
 }
@@ -121,43 +75,51 @@ const CheckRecord& StepChecks::Find(std::string_view name) const {
   throw std::invalid_argument("no check " + Quote(name));
 }
 
-void StepChecks::Compare(const Plant& plant, const GraspController& controller, const MeasuredState& state,
-                         const Eigen::Ref<const VectorXd>& tau, Observer* observer, double time,
-                         const Handling& handling) {
-  time_ = time;
-  observer->ReadAccelerations(plant, state, engine_.xi_dot, &engine_.V_Bo_dot);
-  contacts_ = observer->ReadContacts(plant);
-  int lost = 0;
-  double penetration = 0.0;
-  for (size_t i = 0; i < contacts_.size(); ++i) {
-    const Matrix3d R_B_cf = state.X_Bo.linear() * controller.grasp().contacts()[i].geometry.g_o_cf.linear();
-    engine_.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) = R_B_cf.transpose() * contacts_[i].force;
-    if (!contacts_[i].touching) ++lost;
-    if (handling.holding && !contacts_[i].touching && fingertip_slip_[i].touching) ++contacts_lost_;
-    penetration = std::max(penetration, -contacts_[i].distance);
-  }
-  Add(kContactsLost, handling.holding ? lost : 0);
-  Add(kPenetration, penetration);
-  support_ = observer->ReadSupportWrench(plant, state.X_Bo);
-  solver_residual_ = observer->ReadSolverResidual(plant, state.X_Bo);
-  support_force_ = (state.X_Bo.linear() * support_.head<3>()).z();
-  FindContacts(handling);
-  const bool unjudged = handling.partial && time - changed_at_ < kTransient;
-  if (unjudged && !is_unjudged_) unjudged_since_ = time;
+void StepChecks::Compare(const StepRecord& step) {
+  const Handling& handling = step.command.handling;
+  time_ = step.time;
+  CompareContacts(step);
+  FindContacts(step);
+  const bool unjudged = handling.partial && time_ - changed_at_ < kTransient;
+  if (unjudged && !is_unjudged_) unjudged_since_ = time_;
   is_unjudged_ = unjudged;
-  Add(kUnjudged, unjudged ? time - unjudged_since_ : 0.0);
+  Add(StepCheck::kUnjudged, unjudged ? time_ - unjudged_since_ : 0.0);
   if (unjudged) {
-    ++transient_steps_;
+    ++findings_.unjudged_steps;
   } else {
-    CompareDynamics(controller, state, tau);
-    CompareObject(controller);
+    CompareDynamics(step);
+    CompareObject(step);
   }
   if (handling.holding && !was_holding_) ForgetSlip();
   was_holding_ = handling.holding;
-  ReadSlip(plant, state);
-  if (handling.holding) CompareKappa(controller, state, plant.time_step());
+  ReadSlip(step);
+  if (handling.holding) CompareKappa(step);
 
-  Add(kBaseTilt, observer->departure().tilt);
+  Add(StepCheck::kBaseTilt, step.reading.departure.tilt);
+  CheckIdleJoints(step.reading.state);
+  CheckJointStops(step.reading.state);
+  Add(StepCheck::kActuators, step.drive.effort);
+  ++steps_;
+}
+
+void StepChecks::CompareContacts(const StepRecord& step) {
+  const bool holding = step.command.handling.holding;
+  const std::vector<PlantContact>& contacts = step.response.contacts;
+  int lost = 0;
+  double penetration = 0.0;
+  for (size_t i = 0; i < contacts.size(); ++i) {
+    const Matrix3d R_B_cf =
+        step.reading.state.X_Bo.linear() * step.model->grasp().contacts()[i].geometry.g_o_cf.linear();
+    findings_.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) = R_B_cf.transpose() * contacts[i].force;
+    if (!contacts[i].touching) ++lost;
+    if (holding && !contacts[i].touching && findings_.fingertip_slip[i].touching) ++findings_.contacts_lost;
+    penetration = std::max(penetration, -contacts[i].distance);
+  }
+  Add(StepCheck::kContactsLost, holding ? lost : 0);
+  Add(StepCheck::kPenetration, penetration);
+}
+
+void StepChecks::CheckIdleJoints(const MeasuredState& state) {
   double idle = 0.0;
   const std::vector<int>& joints = setup_->idle_joints();
   const int offset = setup_->model().num_base_positions();
@@ -167,72 +129,70 @@ void StepChecks::Compare(const Plant& plant, const GraspController& controller, 
     if (steps_ == 0) start = q;
     idle = std::max(idle, std::abs(q - start));
   }
-  Add(kIdleJoints, idle);
-  CheckJointStops(state);
-  int worst = -1;
-  Add(kActuators, plant.CalcEffort(tau, &worst));
-  ++steps_;
+  Add(StepCheck::kIdleJoints, idle);
 }
 
-void StepChecks::FindContacts(const Handling& handling) {
+void StepChecks::FindContacts(const StepRecord& step) {
+  const Handling& handling = step.command.handling;
   if (handling.contacts != handling_.contacts) changed_at_ = time_;
   handling_ = handling;
   ContactSet touching = 0;
-  for (size_t i = 0; i < contacts_.size(); ++i) {
-    if (contacts_[i].touching) touching |= ContactSet{1} << i;
+  for (size_t i = 0; i < step.response.contacts.size(); ++i) {
+    if (step.response.contacts[i].touching) touching |= ContactSet{1} << i;
   }
-  const bool supported = !support_.isZero(0.0);
+  const bool supported = !step.response.support_wrench.isZero(0.0);
   if (touching != touching_ || supported != supported_) changed_at_ = time_;
   touching_ = touching;
   supported_ = supported;
 }
 
 void StepChecks::ForgetSlip() {
-  std::fill(fingertip_slip_.begin(), fingertip_slip_.end(), SlipState{});
+  std::fill(findings_.fingertip_slip.begin(), findings_.fingertip_slip.end(), SlipState{});
   has_kappa_ = false;
 }
 
-void StepChecks::Predict(const GraspController& controller, const MeasuredState& state) {
-  const bool whole = touching_ == AllContacts(static_cast<int>(contacts_.size()));
-  mass_factor_ = &dynamics_.mass_factor();
+void StepChecks::Predict(const StepRecord& step) {
+  const ModelTerms& robot = step.model->robot();
+  const GraspTerms& grasp = step.model->grasp();
+  const bool whole = touching_ == AllContacts(grasp.num_contacts());
+  if (handling_.partial && !whole && touching_ != 0) return PredictPart(step);
+  const Prediction* prediction = nullptr;
   if (!handling_.partial || (whole && !supported_)) {
-    prediction_ = &dynamics_.Predict(controller.robot(), controller.grasp(), force_);
+    prediction = &dynamics_.Predict(robot, grasp, force_);
   } else if (whole) {
-    prediction_ = &dynamics_.Predict(controller.robot(), controller.grasp(), force_, ObjectSupport::kAtRest);
-  } else if (touching_ == 0) {
-    prediction_ = &dynamics_.PredictFree(controller.robot(), force_);
+    prediction = &dynamics_.Predict(robot, grasp, force_, ObjectSupport::kAtRest);
   } else {
-    PredictPart(controller, state);
+    prediction = &dynamics_.PredictFree(robot, force_);
   }
+  findings_.xi_dot_model = prediction->xi_dot;
+  findings_.f_c_model = prediction->f_c;
+  mass_factor_ = &dynamics_.mass_factor();
 }
 
-void StepChecks::PredictPart(const GraspController& controller, const MeasuredState& state) {
+void StepChecks::PredictPart(const StepRecord& step) {
+  const ModelTerms& robot = step.model->robot();
   std::unique_ptr<PartialDynamics>& part = parts_[touching_];
   if (!part) part = std::make_unique<PartialDynamics>(*setup_, touching_);
-  part->grasp.SetState(controller.robot(), state);
-  const Prediction& prediction =
-      part->dynamics.Predict(controller.robot(), part->grasp.terms(), force_,
-                             supported_ ? ObjectSupport::kAtRest : ObjectSupport::kHand);
-  part_prediction_.xi_dot = prediction.xi_dot;
-  part_prediction_.V_Bo_dot = prediction.V_Bo_dot;
-  part->grasp.Scatter(prediction.f_c, part_prediction_.f_c);
-  prediction_ = &part_prediction_;
+  part->grasp.SetState(robot, step.reading.state);
+  const Prediction& prediction = part->dynamics.Predict(
+      robot, part->grasp.terms(), force_, supported_ ? ObjectSupport::kAtRest : ObjectSupport::kHand);
+  findings_.xi_dot_model = prediction.xi_dot;
+  part->grasp.Scatter(prediction.f_c, findings_.f_c_model);
   mass_factor_ = &part->dynamics.mass_factor();
 }
 
-void StepChecks::CompareDynamics(const GraspController& controller, const MeasuredState& state,
-                                 const Eigen::Ref<const VectorXd>& tau) {
-  const ModelTerms& robot = controller.robot();
-  const GraspTerms& grasp = controller.grasp();
-  actuation_.CalcForce(tau, force_);
-  Predict(controller, state);
+void StepChecks::CompareDynamics(const StepRecord& step) {
+  const ModelTerms& robot = step.model->robot();
+  const VectorXd& xi_dot = step.response.xi_dot;
+  actuation_.CalcForce(step.drive.tau, force_);
+  Predict(step);
 
   // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
   bias_ = robot.gravity() + robot.friction();
-  bias_.noalias() += robot.C() * state.xi;
+  bias_.noalias() += robot.C() * step.reading.state.xi;
   residual_ = bias_ - force_;
-  residual_.noalias() += robot.M() * engine_.xi_dot;
-  residual_.noalias() += grasp.J_B().transpose() * engine_.f_c;
+  residual_.noalias() += robot.M() * xi_dot;
+  residual_.noalias() += step.model->grasp().J_B().transpose() * findings_.f_c;
   // |f|_M^-1 = |L^-T f|
   const auto norm = [&](const VectorXd& f) {
     column_ = f;
@@ -240,36 +200,40 @@ void StepChecks::CompareDynamics(const GraspController& controller, const Measur
     return column_.norm();
   };
   const double scale = std::max(norm(bias_), std::numeric_limits<double>::min());
-  Add(kBalanceRobot, norm(residual_) / scale);
+  Add(StepCheck::kBalanceRobot, norm(residual_) / scale);
 
   // |a|_M = |L a|
-  residual_ = prediction_->xi_dot - engine_.xi_dot;
+  residual_ = findings_.xi_dot_model - xi_dot;
   mass_factor_->Multiply(residual_);
-  Add(kReducedAcceleration, residual_.norm() / scale);
-  double force_scale = std::max(engine_.f_c.norm(), std::numeric_limits<double>::min());
+  Add(StepCheck::kReducedAcceleration, residual_.norm() / scale);
+  double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) force_scale = std::max(force_scale, Weight());
-  Add(kContactForce, (prediction_->f_c - engine_.f_c).norm() / force_scale);
+  Add(StepCheck::kContactForce, (findings_.f_c_model - findings_.f_c).norm() / force_scale);
 }
 
 double StepChecks::Weight() const { return setup_->object().body.mass * setup_->model().gravity().norm(); }
 
-void StepChecks::CompareObject(const GraspController& controller) {
+void StepChecks::CompareObject(const StepRecord& step) {
   // (19), as forces at the contacts' arm
-  const GraspTerms& grasp = controller.grasp();
+  const GraspTerms& grasp = step.model->grasp();
+  const PlantResponse& response = step.response;
   const ObjectBodyTerms& body = grasp.body();
   const double arm = grasp.contacts()[0].geometry.g_o_cf.translation().norm();
   const auto relative = [&](const Vector6d& wrench) {
     return std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) /
-           std::max(Weight(), engine_.f_c.norm());
+           std::max(Weight(), findings_.f_c.norm());
   };
-  Add(kBalanceObject, relative(body.M_hat * engine_.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
-                               grasp.G() * engine_.f_c - support_ - solver_residual_));
-  Add(kSolver, relative(solver_residual_));
+  Add(StepCheck::kBalanceObject,
+      relative(body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
+               grasp.G() * findings_.f_c - response.support_wrench - response.solver_residual));
+  Add(StepCheck::kSolver, relative(response.solver_residual));
 }
 
-void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
-  const double dt = plant.time_step();
+void StepChecks::ReadSlip(const StepRecord& step) {
+  const bool holding = step.command.handling.holding;
+  const MeasuredState& state = step.reading.state;
+  const PlantResponse& response = step.response;
   double slipped = 0.0;
   double cone_use = 0.0;
   const auto update = [&](SlipState* slip, const BodyContact& contact, const Matrix3d& R) {
@@ -277,34 +241,33 @@ void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
     slip->cone_use = contact.cone_use;
     slip->cone_margin = contact.cone_margin;
     slip->velocity = R.transpose() * contact.slip;
-    slip->distance += dt * slip->velocity;
+    slip->distance += time_step_ * slip->velocity;
     slipped = std::max(slipped, slip->distance.norm());
     cone_use = std::max(cone_use, contact.cone_use);
   };
-  const int object = setup_->adapter().object_body();
-  for (size_t i = 0; i < tip_bodies_.size(); ++i) {
-    update(&fingertip_slip_[i], ReadBodyContact(plant.model(), plant.data(), tip_bodies_[i], object),
-           state.X_Bo.linear());
-    if (fingertip_slip_[i].touching && handling_.holding) {
-      least_cone_margin_ = std::min(least_cone_margin_, fingertip_slip_[i].cone_margin);
+  for (size_t i = 0; i < response.fingertips.size(); ++i) {
+    SlipState& slip = findings_.fingertip_slip[i];
+    update(&slip, response.fingertips[i], state.X_Bo.linear());
+    if (slip.touching && holding) {
+      findings_.least_cone_margin = std::min(findings_.least_cone_margin, slip.cone_margin);
     }
   }
   if (!setup_->bonds().empty()) {
-    for (const EngineContact& bond : contacts_) slipped = std::max(slipped, bond.distance);
+    for (const PlantContact& bond : response.contacts) slipped = std::max(slipped, bond.distance);
   }
-  if (handling_.holding) {
-    Add(kFingertipSlip, slipped);
-    Add(kConeUse, cone_use);
+  if (holding) {
+    Add(StepCheck::kFingertipSlip, slipped);
+    Add(StepCheck::kConeUse, cone_use);
   }
   slipped = 0.0;
   cone_use = 0.0;
   const double phi = setup_->model().num_base_positions() == 3 ? state.q[2] : 0.0;
   const Matrix3d R_B0 = Eigen::AngleAxisd(phi, Vector3d::UnitZ()).toRotationMatrix();
-  for (size_t i = 0; i < wheel_bodies_.size(); ++i) {
-    update(&wheel_slip_[i], ReadBodyContact(plant.model(), plant.data(), wheel_bodies_[i], 0), R_B0);
+  for (size_t i = 0; i < response.wheels.size(); ++i) {
+    update(&findings_.wheel_slip[i], response.wheels[i], R_B0);
   }
-  Add(kWheelSlip, slipped);
-  Add(kTractionUse, cone_use);
+  Add(StepCheck::kWheelSlip, slipped);
+  Add(StepCheck::kTractionUse, cone_use);
 }
 
 void StepChecks::CheckJointStops(const MeasuredState& state) {
@@ -319,14 +282,15 @@ void StepChecks::CheckJointStops(const MeasuredState& state) {
     beyond = over;
     farthest = i;
   }
-  if (beyond > 0.0 && !checks_[kJointStop].failed) {
-    checks_[kJointStop].part = "joint " + Quote(joints[farthest].name);
+  if (beyond > 0.0 && !check(StepCheck::kJointStop).failed) {
+    check(StepCheck::kJointStop).part = "joint " + Quote(joints[farthest].name);
   }
-  Add(kJointStop, beyond);
+  Add(StepCheck::kJointStop, beyond);
 }
 
-void StepChecks::CompareKappa(const GraspController& controller, const MeasuredState& state, double dt) {
-  const GraspTerms& grasp = controller.grasp();
+void StepChecks::CompareKappa(const StepRecord& step) {
+  const GraspTerms& grasp = step.model->grasp();
+  const MeasuredState& state = step.reading.state;
   double apart = 0.0;
   for (size_t i = 0; i < kappa_.size(); ++i) {
     if (!has_kappa_) {
@@ -334,7 +298,7 @@ void StepChecks::CompareKappa(const GraspController& controller, const MeasuredS
       continue;
     }
     // The velocity at hand led from the last state to this one.
-    const Vector5d change = dt * grasp.contacts()[i].kappa_dot;
+    const Vector5d change = time_step_ * grasp.contacts()[i].kappa_dot;
     kappa_[i] =
         NormalizeContact(grasp.tip(static_cast<int>(i)), grasp.surface(), Displace(kappa_[i], change));
     const Vector3d integrated = grasp.surface().Evaluate(kappa_[i].alpha_o).p;
@@ -342,7 +306,7 @@ void StepChecks::CompareKappa(const GraspController& controller, const MeasuredS
     apart = std::max(apart, (integrated - measured).norm());
   }
   has_kappa_ = true;
-  Add(kKappa, apart);
+  Add(StepCheck::kKappa, apart);
 }
 
 }  // namespace dexcheck

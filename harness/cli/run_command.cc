@@ -64,9 +64,9 @@ int RunScenario(const Request& request) {
   }
   ProgressBar bar(setup.scenario().name, runner.loop().num_steps(), request.quiet);
   runner.Run(
-      [&] {
-        if (recorder) recorder->Record();
-        bar.Update(runner.loop().step());
+      [&](const StepRecord& step) {
+        if (recorder) recorder->Record(step);
+        bar.Update(step.step);
       },
       IsInterrupted);
   bar.Finish();
@@ -74,7 +74,7 @@ int RunScenario(const Request& request) {
   const std::string summary = MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n";
   if (recorder) recorder->Close(summary);
   if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
-  if (folder && runner.loop().step() > 0 && !IsInterrupted()) {
+  if (folder && runner.loop().record().step > 0 && !IsInterrupted()) {
     if (request.video) WriteRunMovie(folder->path(), (folder->path() / "video.mp4").string(), request.quiet);
     if (!request.no_report) TryToReport(folder->path());
   } else if (folder && request.video && !IsInterrupted()) {
@@ -97,8 +97,8 @@ int ReplayRun(const Request& request) {
   ProgressBar bar("replaying", recorded.rows(), request.quiet);
   long rows = 0;
   runner.Run(
-      [&] {
-        if (rows++ < recorded.rows()) recorder.Record();
+      [&](const StepRecord& step) {
+        if (rows++ < recorded.rows()) recorder.Record(step);
         bar.Update(rows);
       },
       [&] { return IsInterrupted() || rows >= recorded.rows(); });

@@ -21,13 +21,13 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop) {
   const auto differs = std::count_if(gate.begin(), gate.end(), [](const CheckRecord& r) { return r.failed; });
   fmt::print("  {:<12}{:<24}{:>10}{:>10}       {}\n", "model", "constants", differs, 0,
              differs > 0 ? "FAILS" : "ok");
-  for (const CheckRecord& check : loop.model_checks()) PrintCheck(check);
-  for (const CheckRecord& check : loop.checks().checks()) PrintCheck(check);
+  for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check);
+  for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check);
 }
 
 /// "approach 0.0, close 3.4, ..." with the time each began.
 void PrintTask(const ClosedLoop& loop) {
-  const PickAndPlace& task = *loop.task();
+  const PickAndPlace& task = loop.task()->task();
   std::string line;
   for (const PhaseEntry& entry : task.history()) {
     line += fmt::format("{}{} {:.1f}", line.empty() ? "" : ", ", NameOf(entry.phase), entry.time);
@@ -36,12 +36,12 @@ void PrintTask(const ClosedLoop& loop) {
   if (!task.first_failure().empty()) fmt::print("first attempt: {}\n", task.first_failure());
   if (task.scale() != 1.0) fmt::print("weighed: {:.3f} of the stated mass\n", task.scale());
   fmt::print("object pushed by {:.1e} m before it was held; largest step of a torque {:.1e} N m\n",
-             task.push(), loop.torque_jump());
+             task.push(), loop.task()->torque_jump());
 }
 
 void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
   const LoopTimes& times = loop.times();
-  const double scale = 1e6 / static_cast<double>(std::max(loop.step(), 1L));
+  const double scale = 1e6 / static_cast<double>(std::max(loop.record().step, 1L));
   fmt::print(
       "\n{:.1f} x real time. Microseconds a step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, "
       "recording {:.0f}\n",
@@ -57,7 +57,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
   if (!quiet) {
     fmt::print("{}: {}\n", scenario.name, scenario.description);
     fmt::print("{:.3f} of {:.3f} s simulated, {} steps of {} ms\n", loop.time(), scenario.duration,
-               loop.step(), 1e3 * scenario.plant.time_step);
+               loop.record().step, 1e3 * scenario.plant.time_step);
     fmt::print("object: position error {:.2e} m (rms {:.2e}), orientation error {:.2e} rad\n",
                result.tracking.position_max(), result.tracking.position_rms(),
                result.tracking.orientation_max());

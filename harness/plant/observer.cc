@@ -11,6 +11,8 @@ namespace {
 
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
+constexpr int kWorldBody = 0;
+
 Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
 /// The geom on the fingertip's body that can touch, by its site: the sphere at the site's place.
@@ -32,7 +34,10 @@ Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, cons
     tip_sites_.push_back(adapter.frame_sites()[static_cast<size_t>(frame)]);
     tip_geoms_.push_back(FindTipGeom(adapter.engine(), tip_sites_.back(), tip.name));
   }
-  contacts_.resize(fingertips_.size());
+  for (const int site : tip_sites_) tip_bodies_.push_back(adapter.engine().site_bodyid[site]);
+  for (const EngineWheel& wheel : adapter.wheels()) {
+    wheel_bodies_.push_back(adapter.engine().jnt_bodyid[wheel.joint]);
+  }
   M_qacc_.setZero(adapter.engine().nv);
   constraint_force_.setZero(adapter.engine().nv);
 }
@@ -45,18 +50,56 @@ Observer::BaseRates Observer::ReadBaseRates(const mjData& data) const {
   return rates;
 }
 
-void Observer::Read(const Plant& plant, MeasuredState* state) {
-  const mjData& data = plant.data();
+void Observer::Read(const EngineSimulation& simulation, PlantReading* reading) {
+  const mjModel& m = simulation.model();
+  const mjData& d = simulation.data();
+  qpos_ = Eigen::Map<const VectorXd>(d.qpos, m.nq);
+  X_W0_ = adapter_->GetBasePose(d.qpos);
+  rates_ = ReadBaseRates(d);
+  const Vector3d up = X_W0_.linear().col(2);
+  reading->departure.tilt = std::atan2(up.head<2>().norm(), up.z());
+  reading->departure.height = X_W0_.translation().z() - adapter_->model().base().X_B0.translation().z();
+  reading->X_W0 = X_W0_;
+  reading->qpos = qpos_;
+  reading->qvel = Eigen::Map<const VectorXd>(d.qvel, m.nv);
+  ReadState(d, &reading->state);
+  if (bond_kappa_.empty()) {
+    FindContacts(d, &reading->state);
+  } else {
+    reading->state.kappa = bond_kappa_;
+    reading->state.overlap.assign(fingertips_.size(), 0.0);
+  }
+  reading->touch.fingertips = FindTouching(m, d);
+}
+
+void Observer::Read(const EngineSimulation& simulation, PlantResponse* response) {
+  const mjModel& m = simulation.model();
+  const mjData& d = simulation.data();
+  ReadAccelerations(m, d, response);
+  response->contacts.resize(fingertips_.size());
+  if (bond_constraints_.empty()) {
+    ReadContacts(m, d, &response->contacts);
+  } else {
+    ReadBonds(m, d, &response->contacts);
+  }
+  response->fingertips.resize(tip_bodies_.size());
+  for (size_t i = 0; i < tip_bodies_.size(); ++i) {
+    response->fingertips[i] = ReadBodyContact(m, d, tip_bodies_[i], adapter_->object_body());
+  }
+  response->wheels.resize(wheel_bodies_.size());
+  for (size_t i = 0; i < wheel_bodies_.size(); ++i) {
+    response->wheels[i] = ReadBodyContact(m, d, wheel_bodies_[i], kWorldBody);
+  }
+  response->support_wrench = ReadSupportWrench(m, d);
+  response->support_force = (X_Bo_.linear() * response->support_wrench.head<3>()).z();
+  response->solver_residual = ReadSolverResidual(m, d);
+}
+
+void Observer::ReadState(const mjData& data, MeasuredState* state) {
   const RobotModel& model = adapter_->model();
   state->q.resize(model.num_positions());
   state->xi.resize(model.num_velocities());
   adapter_->GetPositions(data.qpos, state->q);
-
-  X_W0_ = adapter_->GetBasePose(data.qpos);
-  const Vector3d up = X_W0_.linear().col(2);
-  departure_.tilt = std::atan2(up.head<2>().norm(), up.z());
-  departure_.height = X_W0_.translation().z() - model.base().X_B0.translation().z();
-  rates_ = ReadBaseRates(data);
   const int base = model.num_base_velocities();
   if (base == 3) {
     state->xi.head<3>() << rates_.velocity.x(), rates_.velocity.y(), rates_.omega.z();
@@ -68,37 +111,40 @@ void Observer::Read(const Plant& plant, MeasuredState* state) {
   for (size_t i = 0; i < dofs.size(); ++i) state->xi[base + static_cast<int>(i)] = data.qvel[dofs[i]];
 
   const int body = adapter_->object_body();
-  const int joint = plant.model().body_jntadr[body];
-  const mjtNum* const pose = data.qpos + plant.model().jnt_qposadr[joint];
-  const mjtNum* const rate = data.qvel + plant.model().jnt_dofadr[joint];
+  const mjModel& m = adapter_->engine();
+  const int joint = m.body_jntadr[body];
+  const mjtNum* const pose = data.qpos + m.jnt_qposadr[joint];
+  const mjtNum* const rate = data.qvel + m.jnt_dofadr[joint];
   state->X_Bo.linear() =
       Eigen::Quaterniond(pose[3], pose[4], pose[5], pose[6]).normalized().toRotationMatrix();
   state->X_Bo.translation() = MapVector(pose);
   state->V_Bo << state->X_Bo.linear().transpose() * MapVector(rate), MapVector(rate + 3);
 
-  if (!bond_kappa_.empty()) {
-    state->kappa = bond_kappa_;
-    state->overlap.assign(fingertips_.size(), 0.0);
-    return;
-  }
+  if (model.num_base_positions() == 3) phi_ = state->q[2];
+  X_Bo_ = state->X_Bo;
+  V_Bo_ = state->V_Bo;
+}
+
+void Observer::FindContacts(const mjData& data, MeasuredState* state) {
   // Contacts where the plant's fingertips are.
   const Pose X_oB = state->X_Bo.inverse();
-  const bool guess = has_guess_ && state->kappa.size() == fingertips_.size();
-  state->kappa.resize(fingertips_.size());
-  state->overlap.resize(fingertips_.size());
+  const bool has_guess = !kappa_.empty();
+  kappa_.resize(fingertips_.size());
+  overlap_.resize(fingertips_.size());
   for (size_t i = 0; i < fingertips_.size(); ++i) {
     const int site = tip_sites_[i];
     Pose X_Bf = Pose::Identity();
     X_Bf.linear() = Eigen::Map<const RowMatrix3d>(data.site_xmat + 9 * site);
     X_Bf.translation() = MapVector(data.site_xpos + 3 * site);
     const Pose X_of = X_oB * X_Bf;
-    const bool near = guess && state->overlap[i] > -kFar;
-    const FoundContact found = near ? FindContact(tips_[i], *surface_, X_of, state->kappa[i])
-                                    : FindContact(tips_[i], *surface_, X_of);
-    state->kappa[i] = found.kappa;
-    state->overlap[i] = std::max(-found.gap, -kFar);
+    const bool near = has_guess && overlap_[i] > -PlantReading::kFar;
+    const FoundContact found =
+        near ? FindContact(tips_[i], *surface_, X_of, kappa_[i]) : FindContact(tips_[i], *surface_, X_of);
+    kappa_[i] = found.kappa;
+    overlap_[i] = std::max(-found.gap, -PlantReading::kFar);
   }
-  has_guess_ = true;
+  state->kappa = kappa_;
+  state->overlap = overlap_;
 }
 
 Vector2d Observer::CalcDriveVelocity(double forward, double yaw_rate) const {
@@ -108,33 +154,33 @@ Vector2d Observer::CalcDriveVelocity(double forward, double yaw_rate) const {
   return Vector2d(forward + turn, forward - turn) / base.wheel_radius;
 }
 
-void Observer::ReadAccelerations(const Plant& plant, const MeasuredState& state, Eigen::Ref<VectorXd> xi_dot,
-                                 Vector6d* V_Bo_dot) const {
-  const mjData& data = plant.data();
+void Observer::ReadAccelerations(const mjModel& m, const mjData& d, PlantResponse* response) const {
   const RobotModel& model = adapter_->model();
+  VectorXd& xi_dot = response->xi_dot;
+  xi_dot.resize(model.num_velocities());
   const int base = model.num_base_velocities();
   Vector3d linear, angular;
-  adapter_->GetBaseMotion(plant.step_qpos().data(), data.qacc, &linear, &angular);
+  adapter_->GetBaseMotion(qpos_.data(), d.qacc, &linear, &angular);
   const Vector3d arm = X_W0_.linear() * adapter_->anchor();
   // d/dt (v_A - omega x p_0A)
   linear -= angular.cross(arm) + rates_.omega.cross(rates_.omega.cross(arm));
   if (base == 3) {
     xi_dot.head<3>() << linear.x(), linear.y(), angular.z();
   } else if (base == 2) {
-    const Vector3d heading(std::cos(state.q[2]), std::sin(state.q[2]), 0.0);
+    const Vector3d heading(std::cos(phi_), std::sin(phi_), 0.0);
     const Vector3d left(-heading.y(), heading.x(), 0.0);
     const double forward = heading.dot(linear) + rates_.omega.z() * left.dot(rates_.velocity);
     xi_dot.head<2>() = CalcDriveVelocity(forward, angular.z());
   }
   const std::vector<int>& dofs = adapter_->joint_dofs();
-  for (size_t i = 0; i < dofs.size(); ++i) xi_dot[base + static_cast<int>(i)] = data.qacc[dofs[i]];
+  for (size_t i = 0; i < dofs.size(); ++i) xi_dot[base + static_cast<int>(i)] = d.qacc[dofs[i]];
 
-  const int joint = plant.model().body_jntadr[adapter_->object_body()];
-  const mjtNum* const rate = data.qacc + plant.model().jnt_dofadr[joint];
+  const int joint = m.body_jntadr[adapter_->object_body()];
+  const mjtNum* const rate = d.qacc + m.jnt_dofadr[joint];
   // v = R^T p_dot, hence v_dot = R^T p_ddot - omega x v
-  const Vector3d v = state.V_Bo.head<3>();
-  const Vector3d omega = state.V_Bo.tail<3>();
-  *V_Bo_dot << state.X_Bo.linear().transpose() * MapVector(rate) - omega.cross(v), MapVector(rate + 3);
+  const Vector3d v = V_Bo_.head<3>();
+  const Vector3d omega = V_Bo_.tail<3>();
+  response->V_Bo_dot << X_Bo_.linear().transpose() * MapVector(rate) - omega.cross(v), MapVector(rate + 3);
 }
 
 void Observer::SetBonds(std::span<const ContactCoordinates> kappa, std::span<const int> constraints) {
@@ -142,12 +188,10 @@ void Observer::SetBonds(std::span<const ContactCoordinates> kappa, std::span<con
   bond_constraints_.assign(constraints.begin(), constraints.end());
 }
 
-void Observer::ReadBonds(const Plant& plant) {
-  const mjModel& m = plant.model();
-  const mjData& d = plant.data();
-  for (size_t i = 0; i < contacts_.size(); ++i) {
-    EngineContact& contact = contacts_[i];
-    contact = EngineContact{};
+void Observer::ReadBonds(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const {
+  for (size_t i = 0; i < contacts->size(); ++i) {
+    PlantContact& contact = (*contacts)[i];
+    contact = PlantContact{};
     const int eq = bond_constraints_[i];
     for (int row = 0; row + 2 < d.nefc; ++row) {
       if (d.efc_type[row] != mjCNSTR_EQUALITY || d.efc_id[row] != eq) continue;
@@ -169,9 +213,7 @@ int Observer::FindFingertip(int geom) const {
   return found == tip_geoms_.end() ? -1 : static_cast<int>(found - tip_geoms_.begin());
 }
 
-ContactSet Observer::FindTouching(const Plant& plant) const {
-  const mjModel& m = plant.model();
-  const mjData& d = plant.data();
+ContactSet Observer::FindTouching(const mjModel& m, const mjData& d) const {
   const int object = adapter_->object_body();
   ContactSet touching = 0;
   for (int k = 0; k < d.ncon; ++k) {
@@ -183,9 +225,7 @@ ContactSet Observer::FindTouching(const Plant& plant) const {
   return touching;
 }
 
-Vector6d Observer::ReadSupportWrench(const Plant& plant, const Pose& X_Bo) const {
-  const mjModel& m = plant.model();
-  const mjData& d = plant.data();
+Vector6d Observer::ReadSupportWrench(const mjModel& m, const mjData& d) const {
   const int object = adapter_->object_body();
   Vector6d wrench = Vector6d::Zero();
   for (int k = 0; k < d.ncon; ++k) {
@@ -197,16 +237,14 @@ Vector6d Observer::ReadSupportWrench(const Plant& plant, const Pose& X_Bo) const
     mjtNum contact_force[6];  // on geom2, in the contact's frame
     mj_contactForce(&m, &d, k, contact_force);
     const Vector3d force = (first ? -1.0 : 1.0) * (frame.transpose() * MapVector(contact_force));
-    const Vector3d arm = MapVector(c.pos) - X_Bo.translation();
-    wrench.head<3>() += X_Bo.linear().transpose() * force;
-    wrench.tail<3>() += X_Bo.linear().transpose() * arm.cross(force);
+    const Vector3d arm = MapVector(c.pos) - X_Bo_.translation();
+    wrench.head<3>() += X_Bo_.linear().transpose() * force;
+    wrench.tail<3>() += X_Bo_.linear().transpose() * arm.cross(force);
   }
   return wrench;
 }
 
-Vector6d Observer::ReadSolverResidual(const Plant& plant, const Pose& X_Bo) {
-  const mjModel& m = plant.model();
-  const mjData& d = plant.data();
+Vector6d Observer::ReadSolverResidual(const mjModel& m, const mjData& d) {
   mj_mulM(&m, &d, M_qacc_.data(), d.qacc);
   // Not qfrc_constraint, which the engine makes fit. The call uses the data's scratch space alone.
   mj_mulJacTVec(&m, const_cast<mjData*>(&d), constraint_force_.data(), d.efc_force);
@@ -216,21 +254,15 @@ Vector6d Observer::ReadSolverResidual(const Plant& plant, const Pose& X_Bo) {
   };
   // The free joint's forces: in the world, then about the body's axes.
   Vector6d wrench;
-  wrench << X_Bo.linear().transpose() * Vector3d(residual(0), residual(1), residual(2)), residual(3),
+  wrench << X_Bo_.linear().transpose() * Vector3d(residual(0), residual(1), residual(2)), residual(3),
       residual(4), residual(5);
   return wrench;
 }
 
-std::span<const EngineContact> Observer::ReadContacts(const Plant& plant) {
-  if (!bond_constraints_.empty()) {
-    ReadBonds(plant);
-    return contacts_;
-  }
-  const mjModel& m = plant.model();
-  const mjData& d = plant.data();
+void Observer::ReadContacts(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const {
   for (size_t i = 0; i < fingertips_.size(); ++i) {
-    EngineContact& contact = contacts_[i];
-    contact = EngineContact{};
+    PlantContact& contact = (*contacts)[i];
+    contact = PlantContact{};
     for (int k = 0; k < d.ncon; ++k) {
       const mjContact& c = d.contact[k];
       const bool first = c.geom1 == tip_geoms_[i] && m.geom_bodyid[c.geom2] == adapter_->object_body();
@@ -248,7 +280,6 @@ std::span<const EngineContact> Observer::ReadContacts(const Plant& plant) {
       contact.force = sign * (frame.transpose() * MapVector(force));
     }
   }
-  return contacts_;
 }
 
 }  // namespace dexcheck

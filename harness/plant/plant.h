@@ -1,15 +1,13 @@
 #pragma once
 
-// The ground truth: the engine's simulation of robot and object, stepped by torques.
+// The ground truth: robot and object, driven by torques.
 
 #include <span>
 #include <string>
-#include <vector>
 
 #include "controller/common/errors.h"
 #include "controller/common/types.h"
-#include "harness/adapter/adapter.h"
-#include "harness/engine/engine.h"
+#include "harness/plant/plant_reading.h"
 
 namespace dexcheck {
 
@@ -19,60 +17,56 @@ class DivergenceError : public Error {
   using Error::Error;
 };
 
-/// Engine state that determines everything after it.
-struct EngineState {
-  VectorXd qpos, qvel, act, qacc_warmstart;
-  double time = 0.0;
+/// The simulated robot failed: fell, or reached a motor's limit.
+class RunFailure : public Error {
+ public:
+  using Error::Error;
 };
 
-/// One simulation. A step has two halves, so that a controller can be put between them:
+/// The motor of one entry of tau'.
+struct Motor {
+  std::string name;    ///< Of its joint.
+  double limit = 0.0;  ///< Of |tau'|, N m; infinity without.
+};
+
+/// One plant. A step has two halves, so that a controller can be put between them:
 ///
-///   BeginStep   positions, velocities, contacts at time()
-///   (read the state, set torques)
-///   EndStep     accelerations and forces for these torques, then the state at time() + dt
-///
-/// After EndStep, data() still has accelerations, contacts and forces of the step, at the state before it.
+///   BeginStep              positions, velocities, contacts
+///   Read(PlantReading*)
+///   EndStep(tau')          accelerations and forces for these torques, then the state a time step later
+///   Read(PlantResponse*)
 class Plant {
  public:
-  /// @param implicit_damping integrate joint damping as the engine's Euler does, which changes velocities by
-  /// other than dt qacc; otherwise it acts as an explicit force, as in (48).
-  /// @throws InputError when a joint or wheel has no motor or several.
-  Plant(const Adapter& adapter, bool implicit_damping);
+  virtual ~Plant() = default;
+  Plant(const Plant&) = delete;
+  Plant& operator=(const Plant&) = delete;
 
-  [[nodiscard]] const Adapter& adapter() const { return *adapter_; }
-  [[nodiscard]] const mjModel& model() const { return *model_; }
-  [[nodiscard]] const mjData& data() const { return *data_; }
-  [[nodiscard]] mjData& data() { return *data_; }
-  [[nodiscard]] double time() const { return data_->time; }
-  /// Positions at the beginning of the step (nq).
-  [[nodiscard]] const VectorXd& step_qpos() const { return step_qpos_; }
-  [[nodiscard]] double time_step() const { return model_->opt.timestep; }
+  /// s.
+  [[nodiscard]] virtual double time_step() const = 0;
+  /// By entry of tau'.
+  [[nodiscard]] virtual std::span<const Motor> motors() const = 0;
 
-  void BeginStep();
-  /// tau' (n), N m: of the right and left wheel, then of the joints.
-  void SetTorques(const Eigen::Ref<const VectorXd>& tau);
-  /// Largest |tau'| / limit over the motors, and the motor; more than 1 is cut off by the engine.
-  [[nodiscard]] double CalcEffort(const Eigen::Ref<const VectorXd>& tau, int* worst) const;
-  /// Name of the joint of a motor by its entry of tau'.
-  [[nodiscard]] std::string motor_name(int entry) const;
-  /// Limit of |tau'| of a motor by its entry of tau', N m; infinity without.
-  [[nodiscard]] double torque_limit(int entry) const { return limits_[static_cast<size_t>(entry)]; }
-  /// @throws DivergenceError when the engine warned or the state is not finite.
-  void EndStep();
+  virtual void BeginStep() = 0;
+  /// What the plant is; between BeginStep and EndStep.
+  virtual void Read(PlantReading* reading) = 0;
+  /// @param tau tau' (n), N m: of the right and left wheel, then of the joints.
+  /// @throws DivergenceError when there is no state afterwards.
+  virtual void EndStep(const Eigen::Ref<const VectorXd>& tau) = 0;
+  /// How it answered; after EndStep, of a step whose reading was read.
+  virtual void Read(PlantResponse* response) = 0;
 
-  [[nodiscard]] EngineState GetState() const;
-  void SetState(const EngineState& state);
+  // Between steps.
 
- private:
-  void CheckHealth(double expected_time) const;
+  /// Robot and object at rest at q' and X_Bo.
+  virtual void Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) = 0;
+  /// Adds v (m/s, world) to the velocity of everything: the platform drives straight ahead at it, wheels
+  /// rolling, and what it carries goes along. @param state last read.
+  virtual void AddVelocity(const MeasuredState& state, const Vector3d& v) = 0;
+  /// Moves robot and object by `way` (m, world, horizontal).
+  virtual void Translate(const Vector3d& way) = 0;
 
-  const Adapter* adapter_;
-  MjModelPtr model_;  // the adapter's, but for the damping
-  MjDataPtr data_;
-  VectorXd damping_;  // nv, N m s/rad; what is not integrated implicitly
-  VectorXd step_qpos_;
-  std::vector<int> motors_;     // by entry of tau'
-  std::vector<double> limits_;  // likewise
+ protected:
+  Plant() = default;
 };
 
 }  // namespace dexcheck

@@ -31,7 +31,7 @@ int CountOf(const std::vector<std::string>& names) { return static_cast<int>(nam
 
 RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& loop, const Setup& setup,
                          const RunInputs& inputs)
-    : loop_(&loop), setup_(&setup), log_(path, loop.num_steps()) {
+    : setup_(&setup), checks_(loop.is_checking() ? &loop.checks() : nullptr), log_(path, loop.num_steps()) {
   const Scenario& scenario = setup.scenario();
   std::string overrides;
   for (const std::string& assignment : scenario.overrides) overrides += assignment + "\n";
@@ -51,8 +51,8 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
   AddStateSignals();
   AddObjectSignals();
   AddContactSignals();
-  AddTaskSignals();
-  AddCheckSignals();
+  if (loop.task() != nullptr) AddTaskSignals();
+  if (checks_ != nullptr) AddCheckSignals();
   log_.StartRows();
 }
 
@@ -63,7 +63,6 @@ void RunRecorder::Add(const SignalInfo& signal, Source source) {
 void RunRecorder::AddStateSignals() {
   const RobotModel& model = setup_->model();
   const mjModel& m = setup_->engine();
-  const ClosedLoop& loop = *loop_;
   std::vector<std::string> q_names;
   std::vector<std::string> xi_names;
   std::vector<std::string> tau_names;
@@ -81,47 +80,45 @@ void RunRecorder::AddStateSignals() {
     for (auto* names : {&q_names, &xi_names, &tau_names}) names->push_back(joint.name);
   }
   Add({"engine/qpos", "m, rad, 1", "MuJoCo's positions, quaternions wxyz", m.nq, {}, {}},
-      [&loop](std::span<double> row) { Copy(loop.qpos(), row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.qpos, row); });
   Add({"engine/qvel", "m/s, rad/s", "MuJoCo's velocities", m.nv, {}, {}},
-      [&loop](std::span<double> row) { Copy(loop.qvel(), row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.qvel, row); });
   const int n = model.num_velocities();
   Add({"q", "m, rad", "q' as read from the plant", model.num_positions(), q_names, {}},
-      [&loop](std::span<double> row) { Copy(loop.state().q, row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.q, row); });
   Add({"xi", "m/s, rad/s", "reduced velocity as read from the plant", n, xi_names, {}},
-      [&loop](std::span<double> row) { Copy(loop.state().xi, row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.xi, row); });
   Add({"tau", "N m", "tau' of the computed torque law (55)", n, tau_names, {}},
-      [&loop](std::span<double> row) { Copy(loop.tau(), row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(step.command.tau, row); });
   Add({"base/tilt", "rad", "angle of the platform against the vertical", 1, {}, {}},
-      [&loop](std::span<double> row) { row[0] = loop.observer().departure().tilt; });
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.reading.departure.tilt; });
   Add({"base/height", "m", "height of the axle's midpoint against the model's", 1, {}, {}},
-      [&loop](std::span<double> row) { row[0] = loop.observer().departure().height; });
-  if (!loop.is_checking()) return;
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.reading.departure.height; });
+  if (checks_ == nullptr) return;
   Add({"engine/xi_dot", "m/s^2, rad/s^2", "reduced acceleration of the plant", n, xi_names, {}},
-      [&loop](std::span<double> row) { Copy(loop.checks().engine().xi_dot, row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(step.response.xi_dot, row); });
   Add({"model/xi_dot", "m/s^2, rad/s^2", "reduced acceleration that (46), (48) predict", n, xi_names, {}},
-      [&loop](std::span<double> row) { Copy(loop.checks().prediction().xi_dot, row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(step.findings.xi_dot_model, row); });
 }
 
 void RunRecorder::AddObjectSignals() {
-  const ClosedLoop& loop = *loop_;
   const std::vector<std::string> columns = {"x", "y", "z", "alpha", "beta", "gamma"};
   Add({"object/X_o", "m, rad", "pose of the object, ZYZ angles (8)", 6, columns, {}},
-      [&loop](std::span<double> row) { Copy(loop.X_o(), row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(CalcX_o(step), row); });
   Add({"object/X_d", "m, rad", "desired pose of the object", 6, columns, {}},
-      [&loop](std::span<double> row) { Copy(loop.desired().X_d, row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(step.command.desired.X_d, row); });
   const std::vector<std::string> twist = {"v_x", "v_y", "v_z", "w_x", "w_y", "w_z"};
   Add({"object/V", "m/s, rad/s", "body velocity of the object", 6, twist, {}},
-      [&loop](std::span<double> row) { Copy(loop.state().V_Bo, row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.V_Bo, row); });
   Add({"object/error", "m", "X_d - X_o, position", 3, {"x", "y", "z"}, {}},
-      [&loop](std::span<double> row) { Copy(loop.error().position, row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(step.error.position, row); });
   Add({"object/position_error", "m", "distance of the object from its desired place", 1, {}, {}},
-      [&loop](std::span<double> row) { row[0] = loop.error().position.norm(); });
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.error.position.norm(); });
   Add({"object/orientation_error", "rad", "angle between the object and its desired orientation", 1, {}, {}},
-      [&loop](std::span<double> row) { row[0] = loop.error().orientation; });
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.error.orientation; });
 }
 
 void RunRecorder::AddContactSignals() {
-  const ClosedLoop& loop = *loop_;
   const std::vector<std::string>& tips = setup_->scenario().grasp.fingertips;
   const int count = CountOf(tips);
   const double mu = setup_->object().friction;
@@ -132,48 +129,50 @@ void RunRecorder::AddContactSignals() {
        5 * count,
        Expand(tips, {"u_f", "v_f", "u_o", "v_o", "psi"}),
        {}},
-      [&loop](std::span<double> row) {
-        for (size_t i = 0; i < loop.state().kappa.size(); ++i) {
-          Copy(loop.state().kappa[i].CalcVector(), row.subspan(5 * i, 5));
+      [](const StepRecord& step, std::span<double> row) {
+        for (size_t i = 0; i < step.reading.state.kappa.size(); ++i) {
+          Copy(step.reading.state.kappa[i].CalcVector(), row.subspan(5 * i, 5));
         }
       });
   Add({"contact/overlap", "m", "depth to which fingertip and object overlap", count, tips, {}},
-      [&loop](std::span<double> row) {
-        std::copy(loop.state().overlap.begin(), loop.state().overlap.end(), row.begin());
+      [](const StepRecord& step, std::span<double> row) {
+        std::copy(step.reading.state.overlap.begin(), step.reading.state.overlap.end(), row.begin());
       });
-  if (!loop.is_checking()) return;
-  const auto each = [&loop](Vector3d EngineContact::*member) {
-    return [&loop, member](std::span<double> row) {
-      for (size_t i = 0; i < loop.checks().contacts().size(); ++i) {
-        Copy(loop.checks().contacts()[i].*member, row.subspan(3 * i, 3));
+  if (checks_ == nullptr) return;
+  const auto each = [](Vector3d PlantContact::*member) {
+    return [member](const StepRecord& step, std::span<double> row) {
+      for (size_t i = 0; i < step.response.contacts.size(); ++i) {
+        Copy(step.response.contacts[i].*member, row.subspan(3 * i, 3));
       }
     };
   };
   Add({"contact/position", "m", "contact points in the world", 3 * count, xyz, {}},
-      each(&EngineContact::position));
+      each(&PlantContact::position));
   Add({"contact/normal", "1", "normals in the world, into the object", 3 * count, xyz, {}},
-      each(&EngineContact::normal));
+      each(&PlantContact::normal));
   Add({"contact/force", "N", "forces of finger on object in the world", 3 * count, xyz, {{"mu", mu}}},
-      each(&EngineContact::force));
+      each(&PlantContact::force));
   Add({"contact/f_c",
        "N",
        "f_c of the engine, each in its contact frame, z into the object",
        3 * count,
        xyz,
        {{"mu", mu}}},
-      [&loop](std::span<double> row) { Copy(loop.checks().engine().f_c, row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(step.findings.f_c, row); });
   Add({"contact/f_c_model", "N", "f_c that (19), (46), (48) predict", 3 * count, xyz, {{"mu", mu}}},
-      [&loop](std::span<double> row) { Copy(loop.checks().prediction().f_c, row); });
+      [](const StepRecord& step, std::span<double> row) { Copy(step.findings.f_c_model, row); });
   const auto add_slip = [&](const std::string& group, const std::string& what,
-                            const std::vector<std::string>& parts, const std::vector<SlipState>& states) {
+                            const std::vector<std::string>& parts,
+                            std::vector<SlipState> StepFindings::*states) {
     Add({group + "/slip",
          "m",
          "slip of each " + what + " since t = 0",
          3 * CountOf(parts),
          Expand(parts, {"x", "y", "z"}),
          {}},
-        [&states](std::span<double> row) {
-          for (size_t i = 0; i < states.size(); ++i) Copy(states[i].distance, row.subspan(3 * i, 3));
+        [states](const StepRecord& step, std::span<double> row) {
+          const std::vector<SlipState>& slip = step.findings.*states;
+          for (size_t i = 0; i < slip.size(); ++i) Copy(slip[i].distance, row.subspan(3 * i, 3));
         });
     Add({group + "/cone_use",
          "1",
@@ -181,40 +180,37 @@ void RunRecorder::AddContactSignals() {
          CountOf(parts),
          parts,
          {}},
-        [&states](std::span<double> row) {
-          for (size_t i = 0; i < states.size(); ++i) row[i] = states[i].cone_use;
+        [states](const StepRecord& step, std::span<double> row) {
+          const std::vector<SlipState>& slip = step.findings.*states;
+          for (size_t i = 0; i < slip.size(); ++i) row[i] = slip[i].cone_use;
         });
   };
-  add_slip("contact", "fingertip", tips, loop.checks().fingertip_slip());
+  add_slip("contact", "fingertip", tips, &StepFindings::fingertip_slip);
   std::vector<std::string> wheels;
   for (const EngineWheel& wheel : setup_->adapter().wheels()) {
     wheels.push_back(NameOf(setup_->engine(), mjOBJ_JOINT, wheel.joint));
   }
-  if (!wheels.empty()) add_slip("wheel", "wheel", wheels, loop.checks().wheel_slip());
+  if (!wheels.empty()) add_slip("wheel", "wheel", wheels, &StepFindings::wheel_slip);
 }
 
 void RunRecorder::AddTaskSignals() {
-  if (loop_->task() == nullptr) return;
-  const ClosedLoop& loop = *loop_;
   std::string phases;
   for (int i = 0; i <= static_cast<int>(Phase::kDone); ++i) {
     phases += (i > 0 ? ", " : "") + std::to_string(i) + " " + NameOf(static_cast<Phase>(i));
   }
   Add({"task/phase", "1", "phase of the task: " + phases, 1, {}, {}},
-      [&loop](std::span<double> row) { row[0] = static_cast<double>(loop.task()->phase()); });
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.command.task.phase; });
   Add({"task/contacts", "1", "fingertips that the law lets push, bit by bit", 1, {}, {}},
-      [&loop](std::span<double> row) { row[0] = loop.task()->demand().contacts; });
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.command.handling.contacts; });
   Add({"task/weight", "1", "part of the object's stated weight that the hand bears", 1, {}, {}},
-      [&loop](std::span<double> row) { row[0] = loop.task()->demand().weight; });
-  if (!loop.is_checking()) return;
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.command.task.weight; });
+  if (checks_ == nullptr) return;
   Add({"task/support_force", "N", "upward force on the object by what it lies on", 1, {}, {}},
-      [&loop](std::span<double> row) { row[0] = loop.checks().support_force(); });
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.response.support_force; });
 }
 
 void RunRecorder::AddCheckSignals() {
-  if (!loop_->is_checking()) return;
-  for (const std::span<const CheckRecord> checks :
-       {loop_->model_checks(), std::span<const CheckRecord>(loop_->checks().checks())}) {
+  for (const std::span<const CheckRecord> checks : {checks_->model_checks(), checks_->motion_checks()}) {
     for (const CheckRecord& check : checks) {
       if (!check.applies) continue;
       Add({"check/" + check.name,
@@ -223,14 +219,14 @@ void RunRecorder::AddCheckSignals() {
            1,
            {},
            {{"bound", check.bound}, {"kind", static_cast<double>(check.kind)}}},
-          [&check](std::span<double> row) { row[0] = check.last; });
+          [&check](const StepRecord& /*step*/, std::span<double> row) { row[0] = check.last; });
     }
   }
 }
 
-void RunRecorder::Record() {
-  log_.Row(LogWriter::kTime)[0] = loop_->step_time();
-  for (const Channel& channel : channels_) channel.source(log_.Row(channel.signal));
+void RunRecorder::Record(const StepRecord& step) {
+  log_.Row(LogWriter::kTime)[0] = step.time;
+  for (const Channel& channel : channels_) channel.source(step, log_.Row(channel.signal));
   log_.EndRow();
 }
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "harness/record/log_writer.h"
-#include "harness/simulation/closed_loop.h"
+#include "harness/run/closed_loop.h"
 
 namespace dexcheck {
 
@@ -26,13 +26,13 @@ class RunRecorder {
   RunRecorder(const std::filesystem::path& path, const ClosedLoop& loop, const Setup& setup,
               const RunInputs& inputs);
 
-  /// Records the loop's last step; allocates nothing.
-  void Record();
+  /// Records a step; allocates nothing.
+  void Record(const StepRecord& step);
   /// Adds the summary and finishes the file.
   void Close(const std::string& summary);
 
  private:
-  using Source = std::function<void(std::span<double>)>;
+  using Source = std::function<void(const StepRecord& step, std::span<double> row)>;
   void Add(const SignalInfo& signal, Source source);
   void AddStateSignals();
   void AddObjectSignals();
@@ -40,8 +40,8 @@ class RunRecorder {
   void AddTaskSignals();
   void AddCheckSignals();
 
-  const ClosedLoop* loop_;
   const Setup* setup_;
+  const CrossCheck* checks_;  // null without
   LogWriter log_;
   struct Channel {
     int signal;

@@ -32,15 +32,16 @@ Json ConstantToJson(const CheckRecord& record) {
           {"pass", !record.failed}};
 }
 
-Json ToJson(const PickAndPlace& task, const ClosedLoop& loop) {
+Json TaskToJson(const ClosedLoop& loop) {
+  const PickAndPlace& task = loop.task()->task();
   Json json = {{"done", task.is_done()},
                {"attempts", task.history().empty() ? 0 : task.history().back().attempt},
                {"first_failure", task.first_failure()},
                {"weighed", task.scale()},
                {"push_m", task.push()},
-               {"torque_jump_max_N_m", loop.torque_jump()},
+               {"torque_jump_max_N_m", loop.task()->torque_jump()},
                {"force_closure_margin", task.plan().contacts.margin},
-               {"unjudged_steps", loop.checks().transient_steps()},
+               {"unjudged_steps", loop.record().findings.unjudged_steps},
                {"phases", Json::array()}};
   for (const PhaseEntry& entry : task.history()) {
     json["phases"].push_back(
@@ -69,7 +70,8 @@ double TrackingStatistics::orientation_rms() const { return Rms(orientation_squa
 
 void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   if (loop.is_checking()) {
-    result->attribution = Attribute(setup.gate(), loop.model_checks(), loop.checks().checks());
+    result->attribution =
+        Attribute(setup.gate(), loop.checks().model_checks(), loop.checks().motion_checks());
   }
   const bool disagrees = result->attribution.cause != Cause::kNone;
   result->verdict = disagrees ? Verdict::kDisagreement : Verdict::kPass;
@@ -87,7 +89,7 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
                       {"position_error_rms_m", result.tracking.position_rms()},
                       {"orientation_error_max_rad", result.tracking.orientation_max()},
                       {"orientation_error_rms_rad", result.tracking.orientation_rms()}};
-  if (loop.task() != nullptr) json["task"] = ToJson(*loop.task(), loop);
+  if (loop.task() != nullptr) json["task"] = TaskToJson(loop);
   json["attribution"] = {{"cause", NameOf(result.attribution.cause)},
                          {"evidence", result.attribution.evidence},
                          {"checks", Json::object()}};
@@ -96,25 +98,26 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
   }
   json["checks"] = Json::object();
   if (loop.is_checking()) {
-    for (const CheckRecord& record : setup.gate().records)
-      json["checks"][record.name] = ConstantToJson(record);
+    for (const CheckRecord& record : setup.gate().records) json["checks"][record.name] = 
+        ConstantToJson(record);
     for (const std::span<const CheckRecord> checks :
-         {loop.model_checks(), std::span<const CheckRecord>(loop.checks().checks())}) {
+         {loop.checks().model_checks(), loop.checks().motion_checks()}) {
       for (const CheckRecord& check : checks) {
         if (check.applies) json["checks"][check.name] = ToJson(check);
       }
     }
-    const StepChecks& checks = loop.checks();
+    const CrossCheck& checks = loop.checks();
+    const StepFindings& findings = checks.findings();
     json["assumptions"] = {{"fingertip_slip_max_m", checks.Find("fingertip_slip").worst},
                            {"wheel_slip_max_m", checks.Find("wheel_slip").worst},
                            {"base_tilt_max_rad", checks.Find("base_tilt").worst},
-                           {"cone_margin_min", checks.least_cone_margin()},
-                           {"contacts_lost", checks.contacts_lost()}};
+                           {"cone_margin_min", findings.least_cone_margin},
+                           {"contacts_lost", findings.contacts_lost}};
   }
   const LoopTimes& times = loop.times();
-  const double steps = static_cast<double>(std::max(loop.step(), 1L));
+  const double steps = static_cast<double>(std::max(loop.record().step, 1L));
   const double microseconds = 1e6 / steps;
-  json["speed"] = {{"steps", loop.step()},
+  json["speed"] = {{"steps", loop.record().step},
                    {"real_time_factor", result.wall_seconds > 0.0 ? loop.time() / result.wall_seconds : 0.0},
                    {"plant_us_per_step", microseconds * times.plant},
                    {"controller_us_per_step", microseconds * times.controller},

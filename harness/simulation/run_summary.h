@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "harness/checks/attribution.h"
-#include "harness/simulation/closed_loop.h"
+#include "harness/run/closed_loop.h"
 
 namespace dexcheck {
 

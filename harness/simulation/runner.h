@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <string>
+#include <utility>
 
 #include "controller/common/text.h"
 #include "harness/simulation/run_summary.h"
@@ -14,12 +15,16 @@ class Runner {
  public:
   /// @throws InputError as ClosedLoop.
   Runner(const Setup& setup, bool check) : setup_(&setup), loop_(setup, check) {}
+  /// The same with other parts than the scenario's own.
+  Runner(const Setup& setup, bool check, LoopParts parts)
+      : setup_(&setup), loop_(setup, check, std::move(parts)) {}
 
   [[nodiscard]] const ClosedLoop& loop() const { return loop_; }
   [[nodiscard]] const RunResult& result() const { return result_; }
 
   /// Settles, steps to the end or to a failure, and judges.
-  /// @param after_step called after each step, also after one that failed; its time counts as recording.
+  /// @param after_step(const StepRecord&) called after each step, also after one that failed; its time counts
+  /// as recording.
   /// @param should_stop asked before each step; true ends the run as interrupted.
   template <typename AfterStep, typename ShouldStop>
   const RunResult& Run(const AfterStep& after_step, const ShouldStop& should_stop) {
@@ -32,10 +37,10 @@ class Runner {
         break;
       }
       Guard([&] { loop_.Step(); }, /*settling=*/false);
-      if (loop_.step() == 0) break;
-      if (loop_.is_tracking()) result_.tracking.Add(loop_.error());
+      if (loop_.record().step == 0) break;
+      if (loop_.record().command.tracks) result_.tracking.Add(loop_.record().error);
       const Clock::time_point recording = Clock::now();
-      after_step();
+      after_step(loop_.record());
       result_.recording_seconds += SecondsSince(recording);
     }
     result_.wall_seconds = SecondsSince(begin);
@@ -57,8 +62,8 @@ class Runner {
       throw;
     } catch (const Error& error) {
       result_.grasp_lost = dynamic_cast<const GraspLost*>(&error) != nullptr;
-      result_.failure =
-          error.what() + (settling ? " while settling" : " at t = " + FormatNumber(loop_.step_time()) + " s");
+      result_.failure = error.what() + (settling ? " while settling"
+                                                 : " at t = " + FormatNumber(loop_.record().time) + " s");
     }
   }
 

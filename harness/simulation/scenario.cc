@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "controller/control/trajectory_reader.h"
 #include "controller/object/euler_zyz.h"
 
 namespace dexcheck {
@@ -20,7 +19,7 @@ TomlDocument OpenDocument(const std::string& text, const std::string& source,
   for (const std::string& assignment : overrides) {
     const bool own = assignment.starts_with("model.file=") || assignment.starts_with("model.overrides");
     if (assignment.starts_with(kModel) && !own) {
-      if (model_overrides != nullptr) model_overrides->push_back(assignment.substr(kModel.size()));
+      model_overrides->push_back(assignment.substr(kModel.size()));
     } else {
       document.Override(assignment);
     }
@@ -251,19 +250,10 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   if (scenario.duration / scenario.plant.time_step > kMaxSteps) {
     root.Get("duration").Fail("must be at most 1e8 time steps");
   }
-  // Once now, so that a mistake is found before anything is simulated.
-  MakeTrajectory(scenario, Vector6d::Zero());
+  if (scenario.task) return scenario;
+  TomlTable trajectory = root.Get("trajectory").AsTable();
+  scenario.trajectory = ReadTrajectory(trajectory);
   return scenario;
-}
-
-std::unique_ptr<Trajectory> MakeTrajectory(const Scenario& scenario, const Vector6d& X_start) {
-  if (scenario.task) return nullptr;
-  const TomlDocument document = OpenDocument(scenario.text, scenario.source, scenario.overrides, nullptr);
-  TomlTable root = document.Open();
-  TomlTable table = root.Get("trajectory").AsTable();
-  std::unique_ptr<Trajectory> trajectory = ReadTrajectory(table, X_start);
-  table.RejectUnused();
-  return trajectory;
 }
 
 }  // namespace dexcheck

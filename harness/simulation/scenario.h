@@ -15,7 +15,7 @@
 #include "controller/contact/surface.h"
 #include "controller/control/computed_torque.h"
 #include "controller/control/object_tracking.h"
-#include "controller/control/trajectory.h"
+#include "controller/control/trajectory_reader.h"
 #include "controller/handling/pick_and_place.h"
 
 namespace dexcheck {
@@ -88,6 +88,7 @@ struct Scenario {
   std::string mjcf_file;                     ///< Empty for the shipped one.
   PlantOptions plant;
   GraspOptions grasp;
+  TrajectoryMaker trajectory;       ///< None for a task.
   std::optional<TaskOptions> task;  ///< Instead of a trajectory; the grasp's contacts are then planned.
   ControlOptions control;
   std::vector<BoundOverride> bounds;
@@ -103,8 +104,5 @@ struct Scenario {
 /// @throws InputError, one line that names file, line, key and value.
 Scenario ParseScenario(const std::string& text, const std::string& source,
                        const std::filesystem::path& folder, const std::vector<std::string>& overrides);
-
-/// The scenario's trajectory from X_start; none for a task. @throws InputError as ParseScenario.
-std::unique_ptr<Trajectory> MakeTrajectory(const Scenario& scenario, const Vector6d& X_start);
 
 }  // namespace dexcheck

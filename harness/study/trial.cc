@@ -59,8 +59,9 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
     const Scenario scenario = MakeTrialScenario(inputs, trial);
     const Setup setup(scenario, inputs.robot, inputs.mjcf, MakeEngine(inputs));
     Runner runner(setup, inputs.study.check);
-    TrialMonitor monitor(setup, runner.loop());
-    const RunResult& run = runner.Run([&] { monitor.Record(); }, [] { return false; });
+    TrialMonitor monitor(setup, runner.loop().num_steps());
+    const RunResult& run =
+        runner.Run([&](const StepRecord& step) { monitor.Record(step); }, [] { return false; });
     result.failure = run.failure;
     result.metrics = monitor.CalcMetrics(run.tracking);
     result.outcome = Classify(setup, run, result);

@@ -4,97 +4,88 @@
 #include <cmath>
 #include <limits>
 
-#include "harness/plant/body_contact.h"
-
 namespace dexcheck {
 namespace {
 
 constexpr double kSettledShare = 0.02;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr int kWorldBody = 0;
 
 }  // namespace
 
-TrialMonitor::TrialMonitor(const Setup& setup, const ClosedLoop& loop)
-    : setup_(&setup), loop_(&loop), cone_margin_(std::numeric_limits<double>::infinity()) {
+TrialMonitor::TrialMonitor(const Setup& setup, long num_steps)
+    : num_steps_(num_steps),
+      time_step_(setup.scenario().plant.time_step),
+      has_heading_(setup.model().num_base_positions() == 3),
+      fingertip_slips_(setup.fingertips().size(), Vector3d::Zero()),
+      wheel_slips_(setup.adapter().wheels().size(), Vector3d::Zero()),
+      cone_margin_(std::numeric_limits<double>::infinity()) {
   const Vector6d& start = setup.scenario().start_error;
   by_position_ = start.head<3>().norm() > 0.0 || start.tail<3>().norm() == 0.0;
   start_error_ = by_position_ ? start.head<3>().norm() : start.tail<3>().norm();
   if (by_position_ && start_error_ > 0.0) direction_ = start.head<3>() / start_error_;
-  const mjModel& engine = setup.engine();
-  for (const int tip : setup.fingertips()) {
-    fingertips_.push_back(
-        {engine.site_bodyid[setup.adapter().frame_sites()[static_cast<size_t>(tip)]], Vector3d::Zero()});
-  }
-  for (const EngineWheel& wheel : setup.adapter().wheels()) {
-    wheels_.push_back({engine.jnt_bodyid[wheel.joint], Vector3d::Zero()});
-    motor_dofs_.push_back(wheel.dof);
-  }
+  for (const EngineWheel& wheel : setup.adapter().wheels()) motor_dofs_.push_back(wheel.dof);
   for (const int dof : setup.adapter().joint_dofs()) motor_dofs_.push_back(dof);
 }
 
-void TrialMonitor::Record() {
-  RecordError();
-  RecordSlip();
-  RecordMotors();
+void TrialMonitor::Record(const StepRecord& step) {
+  // A step that ended before the plant answered has no slip of its own.
+  const bool is_complete = step.step > steps_;
+  steps_ = step.step;
+  RecordError(step);
+  if (is_complete) RecordSlip(step);
+  RecordMotors(step);
 }
 
-void TrialMonitor::RecordError() {
-  const TrackingError& error = loop_->error();
+void TrialMonitor::RecordError(const StepRecord& step) {
+  const TrackingError& error = step.error;
   const double size = by_position_ ? error.position.norm() : error.orientation;
   const bool inside = size <= kSettledShare * start_error_;
-  if (inside && !settled_) settled_since_ = loop_->step_time();
+  if (inside && !settled_) settled_since_ = step.time;
   settled_ = inside;
   if (start_error_ > 0.0) {
     overshoot_ = std::max(overshoot_, -error.position.dot(direction_) / start_error_);
   }
-  // step() is already that of the next one.
-  const long quarter = 4 * (loop_->step() - 1) / std::max(loop_->num_steps(), 1L);
+  const long quarter = 4 * (step.step - 1) / std::max(num_steps_, 1L);
   if (quarter != 0 && quarter != 3) return;
   const size_t which = quarter == 0 ? 0 : 1;
   quarter_squares_[which] += size * size;
   ++quarter_steps_[which];
 }
 
-double TrialMonitor::Slide(Slip* slip, int other, const Matrix3d& R) {
-  const Plant& plant = loop_->plant();
-  const BodyContact contact = ReadBodyContact(plant.model(), plant.data(), slip->body, other);
-  if (!contact.touching) return std::numeric_limits<double>::infinity();
-  slip->distance += plant.time_step() * (R.transpose() * contact.slip);
-  return contact.cone_margin;
-}
-
-void TrialMonitor::RecordSlip() {
-  const MeasuredState& state = loop_->state();
-  for (Slip& slip : fingertips_) {
-    const double margin = Slide(&slip, setup_->adapter().object_body(), state.X_Bo.linear());
-    cone_margin_ = std::min(cone_margin_, margin);
-    fingertip_slip_ = std::max(fingertip_slip_, slip.distance.norm());
+void TrialMonitor::RecordSlip(const StepRecord& step) {
+  const auto slide = [&](const BodyContact& contact, const Matrix3d& R, Vector3d* distance, double* largest) {
+    if (contact.touching) *distance += time_step_ * (R.transpose() * contact.slip);
+    *largest = std::max(*largest, distance->norm());
+  };
+  const MeasuredState& state = step.reading.state;
+  for (size_t i = 0; i < fingertip_slips_.size(); ++i) {
+    const BodyContact& contact = step.response.fingertips[i];
+    if (contact.touching) cone_margin_ = std::min(cone_margin_, contact.cone_margin);
+    slide(contact, state.X_Bo.linear(), &fingertip_slips_[i], &fingertip_slip_);
   }
-  const double phi = setup_->model().num_base_positions() == 3 ? state.q[2] : 0.0;
+  const double phi = has_heading_ ? state.q[2] : 0.0;
   const Matrix3d R_B0 = Eigen::AngleAxisd(phi, Vector3d::UnitZ()).toRotationMatrix();
-  for (Slip& slip : wheels_) {
-    Slide(&slip, kWorldBody, R_B0);
-    wheel_slip_ = std::max(wheel_slip_, slip.distance.norm());
+  for (size_t i = 0; i < wheel_slips_.size(); ++i) {
+    slide(step.response.wheels[i], R_B0, &wheel_slips_[i], &wheel_slip_);
   }
 }
 
-void TrialMonitor::RecordMotors() {
-  const VectorXd& tau = loop_->tau();
+void TrialMonitor::RecordMotors(const StepRecord& step) {
+  const VectorXd& tau = step.command.tau;
   double power = 0.0;
   for (size_t i = 0; i < motor_dofs_.size(); ++i) {
-    power += std::abs(tau[static_cast<Eigen::Index>(i)] * loop_->qvel()[motor_dofs_[i]]);
+    power += std::abs(tau[static_cast<Eigen::Index>(i)] * step.reading.qvel[motor_dofs_[i]]);
   }
-  energy_ += power * loop_->plant().time_step();
+  energy_ += power * time_step_;
   peak_torque_ = std::max(peak_torque_, tau.cwiseAbs().maxCoeff());
-  peak_effort_ = std::max(peak_effort_, loop_->effort());
+  peak_effort_ = std::max(peak_effort_, step.drive.effort);
 }
 
 std::array<double, kNumMetrics> TrialMonitor::CalcMetrics(const TrackingStatistics& tracking) const {
   std::array<double, kNumMetrics> metrics;
   metrics.fill(kNone);
-  metrics[kSimulatedTime] = loop_->time();
-  if (loop_->step() == 0) return metrics;
+  metrics[kSimulatedTime] = static_cast<double>(steps_) * time_step_;
+  if (steps_ == 0) return metrics;
   metrics[kPositionErrorRms] = tracking.position_rms();
   metrics[kPositionErrorMax] = tracking.position_max();
   metrics[kOrientationErrorRms] = tracking.orientation_rms();

@@ -17,26 +17,24 @@ constexpr double kWheelSlipBound = 1e-3;
 /// Watches one run. Nothing allocates after construction.
 class TrialMonitor {
  public:
-  TrialMonitor(const Setup& setup, const ClosedLoop& loop);
+  /// @param num_steps that the run has.
+  TrialMonitor(const Setup& setup, long num_steps);
 
-  /// Takes in the loop's last step.
-  void Record();
+  /// Takes in a step.
+  void Record(const StepRecord& step);
 
   /// All metrics of the steps so far, those of `tracking` included.
   [[nodiscard]] std::array<double, kNumMetrics> CalcMetrics(const TrackingStatistics& tracking) const;
 
  private:
-  struct Slip {
-    int body = -1;
-    Vector3d distance = Vector3d::Zero();
-  };
-  double Slide(Slip* slip, int other, const Matrix3d& R);
-  void RecordError();
-  void RecordSlip();
-  void RecordMotors();
+  void RecordError(const StepRecord& step);
+  void RecordSlip(const StepRecord& step);
+  void RecordMotors(const StepRecord& step);
 
-  const Setup* setup_;
-  const ClosedLoop* loop_;
+  long num_steps_;
+  double time_step_;
+  bool has_heading_;
+  long steps_ = 0;                         // that were completed
   Vector3d direction_ = Vector3d::Zero();  // of the start error
   double start_error_ = 0.0;               // m, or rad when the object is only turned
   bool by_position_ = true;
@@ -45,8 +43,8 @@ class TrialMonitor {
   double overshoot_ = 0.0;
   std::array<double, 2> quarter_squares_{};  // first and last quarter
   std::array<long, 2> quarter_steps_{};
-  std::vector<Slip> fingertips_, wheels_;
-  std::vector<int> motor_dofs_;  // by entry of tau'
+  std::vector<Vector3d> fingertip_slips_, wheel_slips_;  // m
+  std::vector<int> motor_dofs_;                          // by entry of tau'
   double fingertip_slip_ = 0.0, wheel_slip_ = 0.0, cone_margin_;
   double peak_torque_ = 0.0, peak_effort_ = 0.0, energy_ = 0.0;
 };

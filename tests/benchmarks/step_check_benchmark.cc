@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "harness/plant/plant.h"
+#include "harness/plant/engine_simulation.h"
 #include "tests/harness/step_check_scene.h"
 
 namespace dexcheck {
@@ -42,7 +42,7 @@ States& SharedStates() {
 /// mj_step1 and mj_step2 of the scene, from the grasp of its keyframe.
 void PlantStep(benchmark::State& state) {
   States& states = SharedStates();
-  Plant plant(states.controller->adapter, /*implicit_damping=*/false);
+  EngineSimulation plant(states.controller->adapter, /*implicit_damping=*/false);
   const mjModel& model = plant.model();
   const int key = mj_name2id(&model, mjOBJ_KEY, "grasp_ready");
   mj_resetDataKeyframe(&model, &plant.data(), key);

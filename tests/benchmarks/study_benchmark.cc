@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "controller/common/toml_reader.h"
-#include "harness/simulation/closed_loop.h"
+#include "harness/run/closed_loop.h"
 #include "harness/study/study_store.h"
 #include "harness/study/trial_pool.h"
 #include "tests/benchmarks/measured_time.h"
@@ -73,7 +73,7 @@ void Compare(int repetitions) {
     const MeasuredTime bare = Measure([&] {
       ClosedLoop loop(setup, /*check=*/false);
       loop.Settle();
-      while (loop.step() < loop.num_steps()) loop.Step();
+      while (!loop.is_finished()) loop.Step();
     });
     const MeasuredTime whole = Measure([&] { run(1, static_cast<size_t>(i), 1); });
     wall.push_back(whole.wall / bare.wall);

@@ -12,7 +12,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     const TomlDocument document(AsText(data, size), "trajectory.toml");
     TomlTable root = document.Open();
-    const std::unique_ptr<Trajectory> trajectory = ReadTrajectory(root, Vector6d::Ones());
+    const std::unique_ptr<Trajectory> trajectory = ReadTrajectory(root)(Vector6d::Ones());
     Expect(trajectory->Evaluate(0.0).X_d == Vector6d::Ones(), "does not start at X_start",
            AsText(data, size));
     for (const double t : {-1.0, 0.3, 1.0, 1e6}) {

@@ -10,8 +10,8 @@
 #include <limits>
 #include <set>
 
+#include "harness/plant/engine_simulation.h"
 #include "harness/plant/observer.h"
-#include "harness/plant/plant.h"
 #include "tests/common/allocation_counter.h"
 #include "tests/common/paths.h"
 #include "tests/harness/step_check_scene.h"
@@ -79,7 +79,7 @@ TEST(StepModelCheck, AgreesWithWhatTheControllerEvaluatesInThePlant) {
   const Adapter adapter(model, *engine, "scene.xml");
   const Torus torus(kRingRadius, kTubeRadius);
   const std::span<const int> fingertips = std::span(model.fingertips()).first(4);
-  Plant plant(adapter, /*implicit_damping=*/false);
+  EngineSimulation plant(adapter, /*implicit_damping=*/false);
   mj_resetDataKeyframe(engine.get(), &plant.data(), mj_name2id(engine.get(), mjOBJ_KEY, "grasp_ready"));
   const mjtNum axis[3] = {0.6, 0.8, 0.0};
   constexpr double kTilt = 1e-3;  // rad, of the base as the plant starts
@@ -87,19 +87,18 @@ TEST(StepModelCheck, AgreesWithWhatTheControllerEvaluatesInThePlant) {
   Observer observer(adapter, fingertips, torus);
   GraspController controller(model, fingertips, model.object()->body, torus, GraspControllerOptions(model));
   StepModelCheck check(adapter, fingertips, controller.options().orientation);
-  MeasuredState state;
+  PlantReading reading;
   double tilt = 0.0;
   double speed = 0.0;
   constexpr int kSteps = 100;  // without torques, so that the robot sinks
   for (int step = 0; step < kSteps; ++step) {
     plant.BeginStep();
-    observer.Read(plant, &state);
-    controller.SetState(state);
-    check.Compare(controller.robot(), controller.grasp(), state, adapter.GetBasePose(plant.data().qpos),
-                  step);
+    observer.Read(plant, &reading);
+    controller.SetState(reading.state);
+    check.Compare(controller.robot(), controller.grasp(), reading.state, reading.X_W0, step);
     plant.EndStep();
-    tilt = std::max(tilt, observer.departure().tilt);
-    speed = std::max(speed, state.xi.norm());
+    tilt = std::max(tilt, reading.departure.tilt);
+    speed = std::max(speed, reading.state.xi.norm());
   }
   EXPECT_GT(tilt, 0.5 * kTilt);
   EXPECT_GT(speed, 0.1);

@@ -32,7 +32,7 @@ class HandlingControllerTest : public ::testing::Test {
   HandlingControllerTest()
       : options_(MakeOptions(scene_.model)),
         grasp_(scene_.model, scene_.fingertips, scene_.object, scene_.surface, options_),
-        handling_(scene_.model, scene_.fingertips, scene_.object, scene_.surface, grasp_) {
+        handling_(scene_.model, scene_.fingertips, scene_.object, scene_.surface, options_) {
     demand_.touch_force.assign(4, 0.3);
     demand_.contacts = kAll;
     demand_.desired.X_d = scene_.X_o;
@@ -67,6 +67,10 @@ class HandlingControllerTest : public ::testing::Test {
     grasp_.SetState(state_);
   }
 
+  const VectorXd& CalcTorque() {
+    return handling_.CalcTorque(grasp_.model(), state_, demand_, grasp_.sigma_prime());
+  }
+
   VectorXd CalcForce(const VectorXd& tau) const {
     VectorXd force(tau.size());
     ActuationMap(scene_.model).CalcForce(tau, force);
@@ -86,7 +90,7 @@ TEST_F(HandlingControllerTest, CarryingWithAllContactsIsTheLawOfThePaper) {
   demand_.carried = true;
   demand_.grip = demand_.weight = 1.0;
   demand_.desired.X_d_ddot << 0.3, -0.2, 0.5, 0.0, 0.0, 0.0;
-  const VectorXd tau = handling_.CalcTorque(state_, demand_);
+  const VectorXd tau = CalcTorque();
   const VectorXd expected = grasp_.CalcTorque(demand_.desired);
   ASSERT_GT(expected.norm(), 1.0);
   EXPECT_TRUE(MatrixNear(tau, expected, kTorqueRounding));
@@ -96,7 +100,7 @@ TEST_F(HandlingControllerTest, CarryingWithAllContactsIsTheLawOfThePaper) {
 TEST_F(HandlingControllerTest, WithoutContactItIsComputedTorque) {
   SetState(/*object_rests=*/true);
   demand_.contacts = 0;
-  const VectorXd tau = handling_.CalcTorque(state_, demand_);
+  const VectorXd tau = CalcTorque();
   ConstrainedDynamics dynamics(scene_.model, 4);
   const Prediction& free = dynamics.PredictFree(grasp_.robot(), CalcForce(tau));
   ASSERT_GT(grasp_.sigma_prime().norm(), 0.1);
@@ -110,7 +114,7 @@ TEST_F(HandlingControllerTest, FingertipsThatTouchPushAsTheyShould) {
     SCOPED_TRACE(set);
     demand_.contacts = set;
     demand_.touch_force = {0.3, 0.25, 0.2, 0.15};
-    const VectorXd tau = handling_.CalcTorque(state_, demand_);
+    const VectorXd tau = CalcTorque();
     // The rigid robot against an object that lies still.
     PartialGrasp part(scene_.model, scene_.fingertips, scene_.object, scene_.surface, set);
     part.SetState(grasp_.robot(), state_);
@@ -133,7 +137,7 @@ TEST_F(HandlingControllerTest, BearsThePartOfTheWeightThatIsAskedFor) {
   demand_.grip = 1.0;
   for (const double weight : {0.0, 0.4, 1.3}) {
     demand_.weight = weight;
-    handling_.CalcTorque(state_, demand_);
+    CalcTorque();
     const Vector6d borne = grasp_.grasp().G() * handling_.f_c();
     EXPECT_TRUE(MatrixNear(borne, Vector6d(weight * grasp_.grasp().body().N_o), 1e-9));
     EXPECT_GE(CalcLeastConeMargin(handling_.f_c(), VectorXd::Constant(4, options_.mu)), 0.0);
@@ -146,10 +150,10 @@ TEST_F(HandlingControllerTest, AHeavierObjectTakesAsMuchMoreForce) {
   demand_.grip = 1.0;
   demand_.desired.X_d_ddot[2] = 2.0;
   demand_.scale = demand_.weight = 1.3;
-  handling_.CalcTorque(state_, demand_);
+  CalcTorque();
   const Vector6d heavy = grasp_.grasp().G() * handling_.f_c();
   demand_.scale = demand_.weight = 1.0;
-  handling_.CalcTorque(state_, demand_);
+  CalcTorque();
   const Vector6d stated = grasp_.grasp().G() * handling_.f_c();
   ASSERT_GT(stated.norm(), 2.0);
   EXPECT_TRUE(MatrixNear(heavy, Vector6d(1.3 * stated), 1e-9));
@@ -161,43 +165,43 @@ TEST_F(HandlingControllerTest, TorquesDoNotJumpWhereAFingertipStartsToPush) {
   grasp_.SetState(state_);
   demand_.touch_force.assign(4, 0.0);
   demand_.contacts = 0;
-  const VectorXd before = handling_.CalcTorque(state_, demand_);
+  const VectorXd before = CalcTorque();
   demand_.contacts = kAll;
-  const VectorXd after = handling_.CalcTorque(state_, demand_);
+  const VectorXd after = CalcTorque();
   EXPECT_TRUE(MatrixNear(after, before, kTorqueRounding));
   // A negative control: with force they do.
   demand_.touch_force.assign(4, 1.0);
-  EXPECT_GT((handling_.CalcTorque(state_, demand_) - before).norm(), 0.1);
+  EXPECT_GT((CalcTorque() - before).norm(), 0.1);
 }
 
 TEST_F(HandlingControllerTest, RefusesWhatCannotBe) {
   SetState(/*object_rests=*/true);
   demand_.contacts = 3;
   demand_.grip = 0.5;
-  EXPECT_THROW(handling_.CalcTorque(state_, demand_), std::invalid_argument);
+  EXPECT_THROW(CalcTorque(), std::invalid_argument);
   demand_.contacts = kAll;
   demand_.weight = 1000.0;
-  EXPECT_THROW(handling_.CalcTorque(state_, demand_), GraspForceError);
+  EXPECT_THROW(CalcTorque(), GraspForceError);
 }
 
 TEST_F(HandlingControllerTest, AllocatesForNewSetsOfContactsOnly) {
   SetState(/*object_rests=*/true);
   demand_.grip = 1.0;
-  handling_.CalcTorque(state_, demand_);
+  CalcTorque();
   {
     const AllocationCounter counter;
-    handling_.CalcTorque(state_, demand_);
+    CalcTorque();
     EXPECT_EQ(counter.count(), 0U);
   }
   demand_.grip = 0.0;
   demand_.contacts = 5;
   {
     const AllocationCounter counter;
-    handling_.CalcTorque(state_, demand_);
+    CalcTorque();
     EXPECT_GT(counter.count(), 0U);
   }
   const AllocationCounter counter;
-  handling_.CalcTorque(state_, demand_);
+  CalcTorque();
   EXPECT_EQ(counter.count(), 0U);
 }
 

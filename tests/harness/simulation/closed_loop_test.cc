@@ -40,8 +40,8 @@ TEST_P(ErrorDynamics, FollowTheClosedFormOfEquation57) {
   Vector6d worst = Vector6d::Zero();
   Vector6d last = Vector6d::Zero();
   run.Run([&] {
-    const Vector6d E = run.loop().desired().X_d - run.loop().X_o();
-    const Vector6d expected = CalcErrorDecay(omega, zeta, run.loop().step_time()) * E_0;
+    const Vector6d E = run.step().command.desired.X_d - CalcX_o(run.step());
+    const Vector6d expected = CalcErrorDecay(omega, zeta, run.step().time) * E_0;
     worst = worst.cwiseMax((E - expected).cwiseQuotient(E_0).cwiseAbs());
     last = E;
   });
@@ -94,9 +94,9 @@ TEST(ClosedLoop, IsDeterministic) {
   ShippedRun second("curve", {"duration=0.2"}, 5);
   first.Run();
   second.Run();
-  EXPECT_EQ(first.loop().qpos(), second.loop().qpos());
-  EXPECT_EQ(first.loop().tau(), second.loop().tau());
-  EXPECT_EQ(first.loop().checks().prediction().f_c, second.loop().checks().prediction().f_c);
+  EXPECT_EQ(first.step().reading.qpos, second.step().reading.qpos);
+  EXPECT_EQ(first.step().command.tau, second.step().command.tau);
+  EXPECT_EQ(first.step().findings.f_c_model, second.step().findings.f_c_model);
 }
 
 TEST(ClosedLoop, StepsWithoutAllocation) {
@@ -114,8 +114,8 @@ TEST(ClosedLoop, TorquesCanBeHeldForSeveralSteps) {
   VectorXd last;
   int changes = 0;
   run.Run([&] {
-    if (last.size() > 0 && run.loop().tau() != last) ++changes;
-    last = run.loop().tau();
+    if (last.size() > 0 && run.step().command.tau != last) ++changes;
+    last = run.step().command.tau;
   });
   EXPECT_EQ(changes, 9);
 }

@@ -30,15 +30,16 @@ class LiftTest : public ::testing::Test {
     start_ = run_->setup().X_Bo_start().translation();
     return run_->Run([&] {
       const ClosedLoop& loop = run_->loop();
-      highest_ = std::max(highest_, loop.state().X_Bo.translation().z());
-      const bool apart = std::all_of(loop.state().overlap.begin(), loop.state().overlap.end(),
-                                     [](double depth) { return depth < 0.0; });
-      if (loop.task()->phase() == Phase::kApproach && !apart) touched_early_ = true;
+      highest_ = std::max(highest_, loop.record().reading.state.X_Bo.translation().z());
+      const bool apart =
+          std::all_of(loop.record().reading.state.overlap.begin(), loop.record().reading.state.overlap.end(),
+                      [](double depth) { return depth < 0.0; });
+      if (loop.task()->task().phase() == Phase::kApproach && !apart) touched_early_ = true;
     });
   }
 
-  [[nodiscard]] const PickAndPlace& task() const { return *run_->loop().task(); }
-  [[nodiscard]] Vector3d Way() const { return run_->loop().state().X_Bo.translation() - start_; }
+  [[nodiscard]] const PickAndPlace& task() const { return run_->loop().task()->task(); }
+  [[nodiscard]] Vector3d Way() const { return run_->step().reading.state.X_Bo.translation() - start_; }
 
   std::unique_ptr<ShippedRun> run_;
   Vector3d start_ = Vector3d::Zero();
@@ -58,33 +59,33 @@ TEST_F(LiftTest, TakesCarriesAndPutsDown) {
   EXPECT_LE(result.tracking.position_max(), 1e-4);  // measured 1.3e-7
   EXPECT_GT(result.tracking.position_max(), 0.0);
   const ClosedLoop& loop = run_->loop();
-  for (const CheckRecord& check : loop.model_checks()) EXPECT_LE(check.worst, 1e-10) << check.name;
+  for (const CheckRecord& check : loop.checks().model_checks()) EXPECT_LE(check.worst, 1e-10) << check.name;
   // While the hand is far from the object nothing is said of contacts, but that is the smaller part.
   const auto count = [&](std::string_view name) {
-    for (const CheckRecord& check : loop.model_checks()) {
+    for (const CheckRecord& check : loop.checks().model_checks()) {
       if (check.name == name) return check.count;
     }
     return 0L;
   };
-  EXPECT_EQ(count("M_bar"), loop.step());
-  EXPECT_GT(count("G"), loop.step() / 2);
-  EXPECT_LT(count("G"), loop.step());
+  EXPECT_EQ(count("M_bar"), loop.record().step);
+  EXPECT_GT(count("G"), loop.record().step / 2);
+  EXPECT_LT(count("G"), loop.record().step);
   // Unjudged: some hundredths of a second where contacts come and go.
-  EXPECT_GT(loop.checks().transient_steps(), 50);
-  EXPECT_LT(loop.checks().transient_steps(), 500);
+  EXPECT_GT(loop.record().findings.unjudged_steps, 50);
+  EXPECT_LT(loop.record().findings.unjudged_steps, 500);
   EXPECT_GT(run_->Worst("unjudged"), 0.03);
   // A check that has the name of another would hide it in the summary.
   std::set<std::string> names;
   for (const CheckRecord& record : run_->setup().gate().records)
     EXPECT_TRUE(names.insert(record.name).second) << record.name;
-  for (const CheckRecord& check : loop.model_checks())
+  for (const CheckRecord& check : loop.checks().model_checks())
     EXPECT_TRUE(names.insert(check.name).second) << check.name;
-  for (const CheckRecord& check : loop.checks().checks())
+  for (const CheckRecord& check : loop.checks().motion_checks())
     EXPECT_TRUE(names.insert(check.name).second) << check.name;
   EXPECT_LE(task().push(), 1e-6);
   // Torques of some 50 N m; measured 3e-3.
-  EXPECT_LE(loop.torque_jump(), 0.02);
-  EXPECT_GT(loop.torque_jump(), 0.0);
+  EXPECT_LE(loop.task()->torque_jump(), 0.02);
+  EXPECT_GT(loop.task()->torque_jump(), 0.0);
 }
 
 TEST_F(LiftTest, WeighsAHeavierObjectAndLiftsIt) {

@@ -14,9 +14,9 @@ namespace {
 constexpr double kModelBound = 1e-10;
 
 void ExpectModelAgrees(const ClosedLoop& loop) {
-  ASSERT_GE(loop.model_checks().size(), 20U);
-  for (const CheckRecord& check : loop.model_checks()) {
-    EXPECT_EQ(check.count, loop.step()) << check.name;
+  ASSERT_GE(loop.checks().model_checks().size(), 20U);
+  for (const CheckRecord& check : loop.checks().model_checks()) {
+    EXPECT_EQ(check.count, loop.record().step) << check.name;
     EXPECT_LE(check.worst, kModelBound) << check.name;
     EXPECT_FALSE(check.failed) << check.name << " " << check.worst;
   }
@@ -24,12 +24,12 @@ void ExpectModelAgrees(const ClosedLoop& loop) {
 
 void ExpectPass(const ShippedRun& run, const RunResult& result) {
   EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
-  EXPECT_EQ(run.loop().step(), run.loop().num_steps());
-  EXPECT_EQ(run.loop().checks().contacts_lost(), 0);
-  EXPECT_GT(run.loop().checks().least_cone_margin(), 0.0);
+  EXPECT_EQ(run.step().step, run.loop().num_steps());
+  EXPECT_EQ(run.step().findings.contacts_lost, 0);
+  EXPECT_GT(run.step().findings.least_cone_margin, 0.0);
   ExpectModelAgrees(run.loop());
   // The fingers do push.
-  EXPECT_GT(run.loop().checks().engine().f_c.cwiseAbs().maxCoeff(), 0.5);
+  EXPECT_GT(run.step().findings.f_c.cwiseAbs().maxCoeff(), 0.5);
 }
 
 void ExpectBondedPass(const ShippedRun& run, const RunResult& result) {
@@ -39,7 +39,7 @@ void ExpectBondedPass(const ShippedRun& run, const RunResult& result) {
   EXPECT_LE(run.Worst("contact_force"), 1e-6);
   EXPECT_LE(run.Worst("fingertip_slip"), 1e-5);  // measured 1.2e-6: the bonds' give
   EXPECT_EQ(run.loop().checks().Find("penetration").count, 0);
-  EXPECT_GT(run.loop().checks().engine().f_c.cwiseAbs().maxCoeff(), 0.5);
+  EXPECT_GT(run.step().findings.f_c.cwiseAbs().maxCoeff(), 0.5);
 }
 
 TEST(ShippedScenarios, PaperFollowsTheLine) {
@@ -51,7 +51,7 @@ TEST(ShippedScenarios, PaperFollowsTheLine) {
   EXPECT_LE(run.Worst("reduced_acceleration"), 1e-5);
   EXPECT_LE(run.Worst("contact_force"), 1e-6);
   EXPECT_LE(run.Worst("idle_joints"), 1e-5);
-  const double way = run.loop().state().X_Bo.translation().x() - run.setup().X_start()[0];
+  const double way = run.step().reading.state.X_Bo.translation().x() - run.setup().X_start()[0];
   EXPECT_NEAR(way, 10.0 - 1e-3, 1e-6);
 }
 
@@ -61,14 +61,14 @@ TEST(ShippedScenarios, PaperRampFollowsTheLine) {
   ExpectPass(run, result);
   EXPECT_LE(result.tracking.position_max(), 1e-7);     // measured 7e-9
   EXPECT_LE(result.tracking.orientation_max(), 1e-6);  // measured 4e-8
-  EXPECT_NEAR(run.loop().state().xi[0], 1.0, 1e-4);
+  EXPECT_NEAR(run.step().reading.state.xi[0], 1.0, 1e-4);
 }
 
 TEST(ShippedScenarios, CurveTurnsWithItsPath) {
   ShippedRun run("curve");
   double largest_turn = 0.0;
   const RunResult& result =
-      run.Run([&] { largest_turn = std::max(largest_turn, std::abs(run.loop().state().q[2])); });
+      run.Run([&] { largest_turn = std::max(largest_turn, std::abs(run.step().reading.state.q[2])); });
   ExpectPass(run, result);
   EXPECT_GT(largest_turn, 0.1);
   EXPECT_LE(result.tracking.position_max(), 1e-6);     // measured 3e-9
@@ -85,7 +85,7 @@ TEST(ShippedScenarios, ReorientRollsTheObjectInPlace) {
   double rolled = 0.0;
   double platform = 0.0;
   const RunResult& result = run.Run([&] {
-    const MeasuredState& state = run.loop().state();
+    const MeasuredState& state = run.step().reading.state;
     for (size_t i = 0; i < state.kappa.size(); ++i) {
       if (first.size() <= i) first.push_back(state.kappa[i].CalcVector());
       rolled = std::max(rolled, std::abs(state.kappa[i].alpha_o.u - first[i][2]));
@@ -111,15 +111,15 @@ TEST(ShippedScenarios, BondedFingertipsNeitherSlipNorRoll) {
   ShippedRun run("bonded", {"duration=3"});
   const RunResult& result = run.Run();
   ExpectBondedPass(run, result);
-  EXPECT_GT(run.loop().state().q[0], 0.1);
+  EXPECT_GT(run.step().reading.state.q[0], 0.1);
 }
 
 // The object turns against the fingertips about the bonds, so that J_B_dot' counts.
 TEST(ShippedScenarios, BondedFingertipsLetTheObjectTurn) {
   ShippedRun run("reorient", {"duration=2.5", "plant.bonded=true"});
   double turned = 0.0;
-  const RunResult& result =
-      run.Run([&] { turned = std::max(turned, std::abs(run.loop().X_o()[5] - run.setup().X_start()[5])); });
+  const RunResult& result = run.Run(
+      [&] { turned = std::max(turned, std::abs(CalcX_o(run.step())[5] - run.setup().X_start()[5])); });
   ExpectBondedPass(run, result);
   EXPECT_GT(turned, 0.1);
 }
@@ -132,21 +132,21 @@ TEST(ShippedScenarios, TwoHandsRaiseTiltAndTurn) {
   ShippedRun run("two-hands");
   const RunResult& result = run.Run();
   ExpectPass(run, result);
-  const GraspTerms& grasp = run.loop().controller().grasp();
+  const GraspTerms& grasp = run.step().model->grasp();
   EXPECT_EQ(grasp.G().cols(), 24);
   EXPECT_EQ(grasp.J_B().rows(), 24);
   EXPECT_EQ(grasp.J_B().cols(), 50);
   // All eight push.
-  for (Eigen::Index i = 2; i < 24; i += 3) EXPECT_GT(run.loop().checks().engine().f_c[i], 0.5) << i;
+  for (Eigen::Index i = 2; i < 24; i += 3) EXPECT_GT(run.step().findings.f_c[i], 0.5) << i;
 
   const Pose& start = run.setup().X_Bo_start();
-  const Pose& end = run.loop().state().X_Bo;
+  const Pose& end = run.step().reading.state.X_Bo;
   EXPECT_NEAR(end.translation().z() - start.translation().z(), 0.12, 1e-6);
   EXPECT_NEAR(CalcLean(end) - CalcLean(start), DegToRad(30.0), 1e-6);
   // Turn and tilt, both about axes that the tilt's does not leave the horizontal plane with.
-  const double turn = run.loop().desired().X_d[3] - run.setup().X_start()[3];
+  const double turn = run.step().command.desired.X_d[3] - run.setup().X_start()[3];
   EXPECT_LT(turn, -0.7);
-  EXPECT_LT(run.loop().state().q[2], -0.6);  // so does the platform
+  EXPECT_LT(run.step().reading.state.q[2], -0.6);  // so does the platform
   const Matrix3d R = end.linear() * start.linear().transpose();
   const Vector3d tilt = LogSo3(R * Eigen::AngleAxisd(-turn, Vector3d::UnitZ()).toRotationMatrix());
   EXPECT_NEAR(tilt.z(), 0.0, 1e-6);

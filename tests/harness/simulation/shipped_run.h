@@ -31,15 +31,17 @@ class ShippedRun {
   }
 
   const RunResult& Run() {
-    return runner_->Run([] {}, [] { return false; });
+    return runner_->Run([](const StepRecord&) {}, [] { return false; });
   }
   template <typename AfterStep>
   const RunResult& Run(const AfterStep& after_step) {
-    return runner_->Run(after_step, [] { return false; });
+    return runner_->Run([&](const StepRecord&) { after_step(); }, [] { return false; });
   }
 
   [[nodiscard]] const Setup& setup() const { return *setup_; }
   [[nodiscard]] const ClosedLoop& loop() const { return runner_->loop(); }
+  /// The last step.
+  [[nodiscard]] const StepRecord& step() const { return loop().record(); }
   [[nodiscard]] double Worst(std::string_view check) const { return loop().checks().Find(check).worst; }
 
  private:

@@ -127,7 +127,8 @@ std::vector<double> MeasureResponse(const SampledLoop& loop, const AxisGains& ga
   const Setup setup(MakeTrialScenario(inputs, {0, 0, {gains.K_v}}), inputs.robot, inputs.mjcf);
   Runner runner(setup, /*check=*/false);
   std::vector<double> measured;
-  runner.Run([&] { measured.push_back(runner.loop().error().position.x() / kStep); }, [] { return false; });
+  runner.Run([&](const StepRecord& step) { measured.push_back(step.error.position.x() / kStep); },
+             [] { return false; });
   EXPECT_EQ(runner.result().failure, "");
   return measured;
 }

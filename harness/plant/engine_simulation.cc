@@ -1,4 +1,4 @@
-#include "harness/plant/plant.h"
+#include "harness/plant/engine_simulation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -30,7 +30,7 @@ VectorXd Copy(const mjtNum* values, int count) { return Eigen::Map<const VectorX
 
 }  // namespace
 
-Plant::Plant(const Adapter& adapter, bool implicit_damping)
+EngineSimulation::EngineSimulation(const Adapter& adapter, bool implicit_damping)
     : adapter_(&adapter),
       model_(mj_copyModel(nullptr, &adapter.engine())),
       data_(MakeData(*model_)),
@@ -42,20 +42,12 @@ Plant::Plant(const Adapter& adapter, bool implicit_damping)
   }
   for (const EngineWheel& wheel : adapter.wheels()) motors_.push_back(FindMotor(*model_, wheel.joint));
   for (const int joint : adapter.joint_ids()) motors_.push_back(FindMotor(*model_, joint));
-  for (const int motor : motors_) {
-    const double gear = std::abs(model_->actuator_gear[6 * motor]);
-    const mjtNum* range = model_->actuator_ctrlrange + 2 * motor;
-    limits_.push_back(model_->actuator_ctrllimited[motor] != 0 ? gear * std::min(-range[0], range[1])
-                                                               : std::numeric_limits<double>::infinity());
-  }
+  for (const int motor : motors_) dofs_.push_back(model_->jnt_dofadr[model_->actuator_trnid[2 * motor]]);
 }
 
-void Plant::BeginStep() {
-  mj_step1(model_.get(), data_.get());
-  step_qpos_ = Eigen::Map<const VectorXd>(data_->qpos, model_->nq);
-}
+void EngineSimulation::BeginStep() { mj_step1(model_.get(), data_.get()); }
 
-void Plant::SetTorques(const Eigen::Ref<const VectorXd>& tau) {
+void EngineSimulation::SetTorques(const Eigen::Ref<const VectorXd>& tau) {
   Require(tau.size() == static_cast<Eigen::Index>(motors_.size()), "length of tau'", "must be that of xi",
           static_cast<double>(tau.size()));
   for (size_t i = 0; i < motors_.size(); ++i) {
@@ -63,23 +55,26 @@ void Plant::SetTorques(const Eigen::Ref<const VectorXd>& tau) {
   }
 }
 
-std::string Plant::motor_name(int entry) const {
-  const int joint = model_->actuator_trnid[2 * motors_[static_cast<size_t>(entry)]];
-  return NameOf(*model_, mjOBJ_JOINT, joint);
-}
-
-double Plant::CalcEffort(const Eigen::Ref<const VectorXd>& tau, int* worst) const {
-  double largest = 0.0;
-  for (size_t i = 0; i < limits_.size(); ++i) {
-    const double effort = std::abs(tau[static_cast<Eigen::Index>(i)]) / limits_[i];
-    if (effort <= largest) continue;
-    largest = effort;
-    *worst = static_cast<int>(i);
+void EngineSimulation::ReadMotorTorques(VectorXd* tau) const {
+  tau->resize(static_cast<Eigen::Index>(dofs_.size()));
+  for (size_t i = 0; i < dofs_.size(); ++i) {
+    (*tau)[static_cast<Eigen::Index>(i)] = data_->qfrc_actuator[dofs_[i]];
   }
-  return largest;
 }
 
-void Plant::EndStep() {
+std::vector<Motor> EngineSimulation::ListMotors() const {
+  std::vector<Motor> motors;
+  for (const int motor : motors_) {
+    const double gear = std::abs(model_->actuator_gear[6 * motor]);
+    const mjtNum* range = model_->actuator_ctrlrange + 2 * motor;
+    const double limit = model_->actuator_ctrllimited[motor] != 0 ? gear * std::min(-range[0], range[1])
+                                                                  : std::numeric_limits<double>::infinity();
+    motors.push_back({NameOf(*model_, mjOBJ_JOINT, model_->actuator_trnid[2 * motor]), limit});
+  }
+  return motors;
+}
+
+void EngineSimulation::EndStep() {
   const double expected_time = data_->time + time_step();
   Eigen::Map<VectorXd>(data_->qfrc_applied, model_->nv) =
       -damping_.cwiseProduct(Eigen::Map<const VectorXd>(data_->qvel, model_->nv));
@@ -87,7 +82,7 @@ void Plant::EndStep() {
   CheckHealth(expected_time);
 }
 
-void Plant::CheckHealth(double expected_time) const {
+void EngineSimulation::CheckHealth(double expected_time) const {
   // After a bad position, velocity or acceleration the engine warns and starts over, at time zero.
   for (int i = 0; i < mjNWARNING; ++i) {
     if (data_->warning[i].number == 0) continue;
@@ -101,12 +96,12 @@ void Plant::CheckHealth(double expected_time) const {
       "the simulation's state is not finite after t = " + FormatNumber(expected_time - time_step()) + " s");
 }
 
-EngineState Plant::GetState() const {
+EngineState EngineSimulation::GetState() const {
   return {Copy(data_->qpos, model_->nq), Copy(data_->qvel, model_->nv), Copy(data_->act, model_->na),
           Copy(data_->qacc_warmstart, model_->nv), data_->time};
 }
 
-void Plant::SetState(const EngineState& state) {
+void EngineSimulation::SetState(const EngineState& state) {
   mj_resetData(model_.get(), data_.get());
   std::copy_n(state.qpos.data(), model_->nq, data_->qpos);
   std::copy_n(state.qvel.data(), model_->nv, data_->qvel);

@@ -1,0 +1,40 @@
+#pragma once
+
+// All questions of a run, asked at every step.
+
+#include <span>
+#include <string_view>
+
+#include "harness/checks/step_checks.h"
+#include "harness/checks/step_model_check.h"
+#include "harness/checks/step_record.h"
+
+namespace dexcheck {
+
+/// The checks of one run, with what went worst. Nothing allocates in a step, except as StepChecks and where a
+/// check of the model fails for the first time.
+class CrossCheck {
+ public:
+  /// @throws InputError as EngineStep, or when a bound of the scenario has the name of no check.
+  explicit CrossCheck(const Setup& setup);
+
+  /// The first question: are the terms that the controller used the engine's?
+  void CompareModel(const StepRecord& step);
+  /// The others, which compare motion and forces.
+  void CompareMotion(const StepRecord& step) { motion_.Compare(step); }
+  /// Forgets motion and forces of all steps so far: time begins anew.
+  void Reset() { motion_.Reset(); }
+
+  [[nodiscard]] std::span<const CheckRecord> model_checks() const { return model_.records(); }
+  [[nodiscard]] std::span<const CheckRecord> motion_checks() const { return motion_.checks(); }
+  /// A check of the motion. @throws std::invalid_argument unless there is one of that name.
+  [[nodiscard]] const CheckRecord& Find(std::string_view name) const { return motion_.Find(name); }
+  /// Of the last step.
+  [[nodiscard]] const StepFindings& findings() const { return motion_.findings(); }
+
+ private:
+  StepModelCheck model_;
+  StepChecks motion_;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,215 @@
+#pragma once
+
+// The checks of questions two to four: one entry says all that is fixed about a check. StepChecks measures
+// them, attribution reads what their failure means, and summary, log and report take names and bounds from
+// the records that are made of the entries.
+
+#include <string_view>
+
+#include "harness/checks/check_record.h"
+#include "harness/checks/failure_cause.h"
+
+namespace dexcheck {
+
+/// In the order of log and summary.
+enum class StepCheck {
+  kBalanceRobot,
+  kBalanceObject,
+  kReducedAcceleration,
+  kContactForce,
+  kFingertipSlip,
+  kWheelSlip,
+  kConeUse,
+  kTractionUse,
+  kContactsLost,
+  kPenetration,
+  kKappa,
+  kBaseTilt,
+  kIdleJoints,
+  kSolver,
+  kJointStop,
+  kUnjudged,
+  kActuators,
+  kCount
+};
+inline constexpr int kStepCheckCount = static_cast<int>(StepCheck::kCount);
+
+/// How long balance and prediction are not judged after a contact has come, gone or been let go: soft
+/// contacts need some milliseconds to become what rigid ones are at once. s.
+inline constexpr double kTransient = 0.05;
+
+/// What the failure of a check says of its cause.
+struct FailureMeaning {
+  Cause cause = Cause::kNone;  ///< kNone: nothing by itself, it follows from the cause of the run.
+  /// Of checks that failed at one time, the one with the smallest number tells the run's cause.
+  int precedence = 0;
+  /// Whether the failure has this cause whatever else happened in the run; otherwise it has the run's.
+  bool is_own = false;
+  /// When this check failed too, its cause holds for both.
+  StepCheck sharper = StepCheck::kCount;
+};
+
+/// One entry.
+struct StepCheckInfo {
+  StepCheck check;
+  const char* name;
+  CheckKind kind;
+  const char* unit;
+  double bound;
+  const char* description;
+  FailureMeaning meaning = {};
+  /// The same for fingertips that hang on bonds; empty where that question has no meaning.
+  const char* bonded_description = description;
+};
+
+inline constexpr StepCheckInfo kStepChecks[] = {
+    {.check = StepCheck::kBalanceRobot,
+     .name = "balance_robot",
+     .kind = CheckKind::kBalance,
+     .unit = "1",
+     .bound = 1e-5,
+     .description = "what is left of (48) with the engine's accelerations and contact forces, against the "
+                    "forces balanced"},
+    // The object's balance has no other unknowns than the model's: its inertia and the contacts' geometry.
+    {.check = StepCheck::kBalanceObject,
+     .name = "balance_object",
+     .kind = CheckKind::kBalance,
+     .unit = "1",
+     .bound = 1e-9,
+     .description = "what is left of (19) with the engine's acceleration and contact forces, less what its "
+                    "solver left over, against the contact forces",
+     .meaning = {.cause = Cause::kModel}},
+    {.check = StepCheck::kReducedAcceleration,
+     .name = "reduced_acceleration",
+     .kind = CheckKind::kPrediction,
+     .unit = "1",
+     .bound = 1e-5,
+     .description = "xi_dot of the rigid constrained system (46), (48) against the engine's"},
+    {.check = StepCheck::kContactForce,
+     .name = "contact_force",
+     .kind = CheckKind::kPrediction,
+     .unit = "1",
+     .bound = 1e-6,
+     .description = "f_c of the rigid constrained system against the engine's, relative to |f_c|"},
+    // Slip and use of the cone tell sliding from contacts that merely give.
+    {.check = StepCheck::kFingertipSlip,
+     .name = "fingertip_slip",
+     .kind = CheckKind::kAssumption,
+     .unit = "m",
+     .bound = 2e-4,
+     .description = "how far a fingertip has slipped on the object since t = 0",
+     .meaning =
+         {.cause = Cause::kContactSoftness, .precedence = 6, .is_own = true, .sharper = StepCheck::kConeUse},
+     .bonded_description = "distance of the joined points on fingertip and object"},
+    {.check = StepCheck::kWheelSlip,
+     .name = "wheel_slip",
+     .kind = CheckKind::kAssumption,
+     .unit = "m",
+     .bound = 1e-3,
+     .description = "how far a wheel has slipped on the floor since t = 0, (1)",
+     .meaning = {.cause = Cause::kContactSoftness,
+                 .precedence = 7,
+                 .is_own = true,
+                 .sharper = StepCheck::kTractionUse}},
+    {.check = StepCheck::kConeUse,
+     .name = "cone_use",
+     .kind = CheckKind::kAssumption,
+     .unit = "1",
+     .bound = 0.99,
+     .description = "tangential force over mu times normal force at a fingertip; 1 slides, (21)",
+     .meaning = {.cause = Cause::kFingertipSlip, .precedence = 2, .is_own = true},
+     .bonded_description = ""},
+    {.check = StepCheck::kTractionUse,
+     .name = "traction_use",
+     .kind = CheckKind::kAssumption,
+     .unit = "1",
+     .bound = 0.99,
+     .description = "tangential force over mu times normal force at a wheel; 1 spins or skids",
+     .meaning = {.cause = Cause::kWheelSlip, .precedence = 3, .is_own = true}},
+    {.check = StepCheck::kContactsLost,
+     .name = "contacts_lost",
+     .kind = CheckKind::kAssumption,
+     .unit = "1",
+     .bound = 0.0,
+     .description = "fingertips that do not touch the object",
+     .meaning = {.cause = Cause::kFingertipSlip, .precedence = 4, .is_own = true},
+     .bonded_description = ""},
+    {.check = StepCheck::kPenetration,
+     .name = "penetration",
+     .kind = CheckKind::kAssumption,
+     .unit = "m",
+     .bound = 2e-5,
+     .description = "overlap of fingertip and object",
+     .meaning = {.cause = Cause::kContactSoftness, .precedence = 5, .is_own = true},
+     .bonded_description = ""},
+    {.check = StepCheck::kKappa,
+     .name = "kappa",
+     .kind = CheckKind::kAssumption,
+     .unit = "m",
+     .bound = 2e-4,
+     .description = "contact point on the object: kappa integrated by (40) against the engine's",
+     .meaning = {.cause = Cause::kContactSoftness, .precedence = 8},
+     .bonded_description = ""},
+    {.check = StepCheck::kBaseTilt,
+     .name = "base_tilt",
+     .kind = CheckKind::kAssumption,
+     .unit = "rad",
+     .bound = 1e-5,
+     .description = "angle of the platform against the vertical",
+     .meaning = {.cause = Cause::kTilt, .precedence = 11}},
+    {.check = StepCheck::kIdleJoints,
+     .name = "idle_joints",
+     .kind = CheckKind::kAssumption,
+     .unit = "rad",
+     .bound = 1e-5,
+     .description = "movement since t = 0 of joints that do not carry the object"},
+    // As small as the discrepancies that balance_robot and the prediction are judged by.
+    {.check = StepCheck::kSolver,
+     .name = "solver",
+     .kind = CheckKind::kAssumption,
+     .unit = "1",
+     .bound = 1e-5,
+     .description = "what the engine's solver left over of its own equation of motion of the object, as "
+                    "balance_object",
+     .meaning = {.cause = Cause::kSolver, .precedence = 10, .is_own = true}},
+    {.check = StepCheck::kJointStop,
+     .name = "joint_stop",
+     .kind = CheckKind::kAssumption,
+     .unit = "rad",
+     .bound = 0.0,
+     .description = "how far a joint is beyond its range, where a stop pushes that the model does not have",
+     .meaning = {.cause = Cause::kJointStop, .precedence = 1, .is_own = true}},
+    // The fingers of one hand touch within some hundredths of a second, kTransient each at the most.
+    {.check = StepCheck::kUnjudged,
+     .name = "unjudged",
+     .kind = CheckKind::kAssumption,
+     .unit = "s",
+     .bound = 5.0 * kTransient,
+     .description = "how long in one go contacts have come and gone, so that balance and prediction were not "
+                    "judged",
+     .meaning = {.cause = Cause::kContactSoftness, .precedence = 9}},
+    {.check = StepCheck::kActuators,
+     .name = "actuator_effort",
+     .kind = CheckKind::kAssumption,
+     .unit = "1",
+     .bound = 1.0,
+     .description = "|tau'| over the motor's limit",
+     .meaning = {.cause = Cause::kActuatorLimit, .precedence = 0, .is_own = true}},
+};
+
+static_assert([] {
+  for (int i = 0; i < kStepCheckCount; ++i) {
+    if (kStepChecks[i].check != static_cast<StepCheck>(i)) return false;
+  }
+  return std::size(kStepChecks) == static_cast<size_t>(kStepCheckCount);
+}());
+
+/// The entry of that name; null for checks of the first question.
+constexpr const StepCheckInfo* FindStepCheck(std::string_view name) {
+  for (const StepCheckInfo& info : kStepChecks) {
+    if (info.name == name) return &info;
+  }
+  return nullptr;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,66 @@
+#pragma once
+
+// One step of a run as values: what checks, log, summary, studies and viewers read of it.
+
+#include <limits>
+#include <vector>
+
+#include "controller/control/controller.h"
+#include "controller/control/grasp_model.h"
+#include "harness/plant/motor_drive.h"
+#include "harness/plant/plant_reading.h"
+
+namespace dexcheck {
+
+/// Distance of the object from its desired pose.
+struct TrackingError {
+  Vector3d position = Vector3d::Zero();  ///< X_d - X_o, world, m.
+  double orientation = 0.0;              ///< Angle between R_Bo and R_Bd, rad.
+};
+
+/// Slip of one contact, from the plant's own velocities.
+struct SlipState {
+  bool touching = false;
+  Vector3d velocity = Vector3d::Zero();  ///< Tangential, in the frame of the body that is slipped on, m/s.
+  Vector3d distance = Vector3d::Zero();  ///< Its integral, m.
+  double cone_use = 0.0;                 ///< |tangential force| / (mu normal force); 1 slides.
+  double cone_margin = 0.0;              ///< mu normal force - |tangential force|, N.
+};
+
+/// What the checks made of a step, besides their records.
+struct StepFindings {
+  VectorXd f_c;  ///< 3N, N: the plant's contact forces, each in its Sigma_cf as the model has it.
+  /// What the rigid constrained system (19), (46), (48) does under the same torques: xi_dot (n) and f_c (3N)
+  /// of the last step that was predicted.
+  VectorXd xi_dot_model, f_c_model;
+  std::vector<SlipState> fingertip_slip, wheel_slip;
+
+  // Of all steps so far.
+  long unjudged_steps = 0;  ///< Whose balance and prediction were not judged: contacts had just changed.
+  long contacts_lost = 0;   ///< Contacts of fingertips that broke.
+  double least_cone_margin = std::numeric_limits<double>::infinity();  ///< Of a fingertip, N.
+};
+
+/// One step, at its beginning but for the response. When a step fails, what came after the failure is still
+/// that of the step before.
+struct StepRecord {
+  long step = 0;      ///< Steps of the run that are complete, this one included; 0 before.
+  double time = 0.0;  ///< s; below zero while everything comes to rest.
+  PlantReading reading;
+  Reading told;  ///< What the controller was told of it.
+  Command command;
+  DriveOutput drive;  ///< What the motors made of the command.
+  PlantResponse response;
+  TrackingError error;
+  /// The model as the controller evaluated it, at what it was told; until the next step.
+  const GraspModel* model = nullptr;
+  StepFindings findings;  ///< Without cross-check empty.
+};
+
+/// Pose of the object, whose angles are on the controller's branch where it uses them.
+[[nodiscard]] Vector6d CalcX_o(const StepRecord& step);
+
+/// How far the object is from where the command wants it.
+[[nodiscard]] TrackingError CalcTrackingError(const StepRecord& step);
+
+}  // namespace dexcheck

@@ -1,0 +1,69 @@
+#include "harness/plant/engine_plant.h"
+
+#include <cmath>
+
+#include "harness/adapter/velocity_map.h"
+
+namespace dexcheck {
+
+EnginePlant::EnginePlant(const Adapter& adapter, std::span<const int> fingertips, const Surface& surface,
+                         bool implicit_damping)
+    : adapter_(&adapter),
+      simulation_(adapter, implicit_damping),
+      observer_(adapter, fingertips, surface),
+      motors_(simulation_.ListMotors()) {}
+
+void EnginePlant::Read(PlantReading* reading) {
+  observer_.Read(simulation_, reading);
+  reading->touch.support_force = support_force_;
+}
+
+void EnginePlant::EndStep(const Eigen::Ref<const VectorXd>& tau) {
+  simulation_.SetTorques(tau);
+  simulation_.EndStep();
+}
+
+void EnginePlant::Read(PlantResponse* response) {
+  observer_.Read(simulation_, response);
+  simulation_.ReadMotorTorques(&response->motor_torques);
+  support_force_ = response->support_force;
+}
+
+void EnginePlant::Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) {
+  const mjModel& m = adapter_->engine();
+  EngineState state = simulation_.GetState();
+  adapter_->SetPositions(q, state.qpos.data());
+  const Eigen::Quaterniond rotation(X_Bo.linear());
+  const int joint = m.body_jntadr[adapter_->object_body()];
+  state.qpos.segment<7>(m.jnt_qposadr[joint]) << X_Bo.translation(), rotation.w(), rotation.x(), rotation.y(),
+      rotation.z();
+  simulation_.SetState(state);
+}
+
+void EnginePlant::AddVelocity(const MeasuredState& state, const Vector3d& v) {
+  const mjModel& m = adapter_->engine();
+  const RobotModel& model = adapter_->model();
+  const Vector3d heading(std::cos(state.q[2]), std::sin(state.q[2]), 0.0);
+  EngineState moving = simulation_.GetState();
+  VectorXd xi = VectorXd::Zero(model.num_velocities());
+  xi.head<2>() = model.base().velocity == DriveVelocity::kTwist
+                     ? Vector2d(v.dot(heading), 0.0)
+                     : Vector2d::Constant(v.dot(heading) / model.base().wheel_radius);
+  VelocityMap map(*adapter_, Coordinates::kReduced);
+  map.SetState(state.q, xi);
+  VectorXd added = VectorXd::Zero(m.nv);
+  map.Expand(xi, added.data());
+  added.segment<3>(m.jnt_dofadr[m.body_jntadr[adapter_->object_body()]]) = v;
+  moving.qvel += added;
+  simulation_.SetState(moving);
+}
+
+void EnginePlant::Translate(const Vector3d& way) {
+  const mjModel& m = adapter_->engine();
+  EngineState moved = simulation_.GetState();
+  moved.qpos.segment<2>(m.jnt_qposadr[adapter_->base_joints()[0]]) += way.head<2>();
+  moved.qpos.segment<3>(m.jnt_qposadr[m.body_jntadr[adapter_->object_body()]]) += way;
+  simulation_.SetState(moved);
+}
+
+}  // namespace dexcheck

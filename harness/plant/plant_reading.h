@@ -1,0 +1,60 @@
+#pragma once
+
+// What is read of a plant in one step: what it is before it is driven, and how it answered.
+
+#include <vector>
+
+#include "controller/common/types.h"
+#include "controller/control/controller.h"
+#include "controller/control/measured_state.h"
+#include "harness/plant/body_contact.h"
+
+namespace dexcheck {
+
+/// Motion of the base that the paper's coordinates leave out.
+struct BaseDeparture {
+  double tilt = 0.0;    ///< Angle of the base's z axis against the vertical, rad.
+  double height = 0.0;  ///< Of Sigma_0's origin against the model's, m.
+};
+
+/// The truth at the beginning of a step.
+struct PlantReading {
+  /// In the paper's coordinates: tilt and height of the base, which q' does not have, are dropped; kappa is
+  /// where the plant's fingertips touch. Of a fingertip that is far from the object, kappa is the nearest
+  /// place and the overlap -kFar.
+  MeasuredState state;
+  Touch touch;
+  BaseDeparture departure;
+  Pose X_W0 = Pose::Identity();  ///< Pose of Sigma_0 in the world, tilt and height included.
+  VectorXd qpos;                 ///< MuJoCo's positions (nq), which draw the scene.
+  VectorXd qvel;                 ///< MuJoCo's velocities (nv).
+
+  /// Gap between fingertip and object from which on they are just far apart, m.
+  static constexpr double kFar = 5e-3;
+};
+
+/// One fingertip's contact as the plant has it.
+struct PlantContact {
+  bool touching = false;
+  Vector3d position = Vector3d::Zero();  ///< World, m.
+  Vector3d normal = Vector3d::Zero();    ///< World, from the fingertip into the object.
+  double distance = 0.0;                 ///< m, negative when the bodies overlap.
+  Vector3d force = Vector3d::Zero();     ///< World, N, of finger on object.
+};
+
+/// Accelerations and forces of the same step, for the torques that were applied.
+struct PlantResponse {
+  VectorXd xi_dot;                       ///< n.
+  Vector6d V_Bo_dot = Vector6d::Zero();  ///< Sigma_o.
+  std::vector<PlantContact> contacts;    ///< By fingertip.
+  std::vector<BodyContact> fingertips;   ///< How the fingertips slip on the object.
+  std::vector<BodyContact> wheels;       ///< How the right and left wheel slip on the floor.
+  Vector6d support_wrench =
+      Vector6d::Zero();        ///< On the object by all else than fingertips, Sigma_o, N, N m.
+  double support_force = 0.0;  ///< Its upward part, N.
+  /// What the plant's solver left over of its own equation of motion of the object, as such a wrench.
+  Vector6d solver_residual = Vector6d::Zero();
+  VectorXd motor_torques;  ///< n, N m: what wheels and joints received from their motors, as tau'.
+};
+
+}  // namespace dexcheck

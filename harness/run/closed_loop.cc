@@ -1,0 +1,169 @@
+#include "harness/run/closed_loop.h"
+
+#include <chrono>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "controller/common/text.h"
+
+namespace dexcheck {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double Seconds(Clock::time_point from, Clock::time_point to) {
+  return std::chrono::duration<double>(to - from).count();
+}
+
+constexpr double kRoughTime = 0.02;      // s after the first contact
+constexpr double kLargestSkew = 1e-2;    // rad between the platform's heading and the way ahead
+constexpr double kSettleMoving = 0.5;    // s
+constexpr double kLargestTilt = 0.2;     // rad, of a robot that still stands
+constexpr double kLargestSink = 0.02;    // m, likewise
+constexpr double kGraspTimeout = 0.005;  // s without all fingertips on the object: lost
+
+}  // namespace
+
+ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
+    : setup_(&setup),
+      plant_(std::move(parts.plant)),
+      sensing_(parts.sensing),
+      controller_(std::move(parts.controller)),
+      task_(parts.task),
+      drive_(plant_->motors()),
+      num_steps_(std::lround(setup.scenario().duration / setup.scenario().plant.time_step)) {
+  const Scenario& scenario = setup.scenario();
+  StepChecks::RequireKnownBounds(scenario);
+  if (check) checks_.emplace(setup);
+  record_.model = &controller_->model();
+  record_.command.tau.setZero(setup.model().num_velocities());
+  record_.reading.qvel.setZero(setup.engine().nv);
+  if (scenario.task) return;
+  trajectory_ = scenario.trajectory(setup.X_start() + scenario.start_error);
+  if (scenario.start == Start::kMoving) CheckMovingStart();
+}
+
+void ClosedLoop::CheckMovingStart() const {
+  const DesiredMotion at_start = trajectory_->Evaluate(0.0);
+  const Vector3d v = at_start.X_d_dot.head<3>();
+  const bool is_drive = setup_->model().base().type == BaseType::kDifferentialDrive;
+  const double phi = is_drive ? setup_->q_start()[2] : 0.0;
+  const Vector3d heading(std::cos(phi), std::sin(phi), 0.0);
+  const bool along = (v - v.dot(heading) * heading).norm() <= kLargestSkew * v.norm();
+  if (is_drive && along && at_start.X_d_dot.tail<3>().norm() == 0.0 && at_start.X_d_ddot.norm() == 0.0)
+    return;
+  throw InputError(setup_->scenario().source +
+                   ": start: \"moving\" needs a platform, and a trajectory that begins straight ahead at "
+                   "constant speed");
+}
+
+void ClosedLoop::Settle() {
+  SettleOn(LineTrajectory(setup_->X_start(), Vector6d::Zero(), 0.0), setup_->scenario().settle);
+  if (setup_->scenario().start == Start::kMoving) StartMoving(trajectory_->Evaluate(0.0).X_d_dot.head<3>());
+  if (trajectory_) controller_->Follow(*trajectory_);
+  BeginRun();
+  times_ = LoopTimes{};
+  if (checks_) checks_->Reset();
+}
+
+void ClosedLoop::BeginRun() {
+  const std::string where = setup_->scenario().source + (task_ != nullptr ? ": task: " : ": control: ");
+  try {
+    controller_->Begin(0.0, record_.told);
+  } catch (const InputError& error) {
+    throw InputError(where + error.what());
+  } catch (const std::invalid_argument& error) {
+    throw InputError(where + error.what());
+  }
+}
+
+void ClosedLoop::SettleOn(const Trajectory& motion, double duration) {
+  const double dt = plant_->time_step();
+  const long count = std::lround(duration / dt);
+  controller_->Follow(motion);
+  if (checks_) checks_->Reset();
+  for (long i = 0; i < count; ++i) {
+    const double t = static_cast<double>(i) * dt;
+    record_.time = t - duration;
+    ControlStep(t);
+    // The first contact is rough; what goes wrong later has a cause that the checks should tell.
+    if (checks_ && t >= kRoughTime) checks_->CompareMotion(record_);
+    CheckGrasp();
+  }
+}
+
+void ClosedLoop::StartMoving(const Vector3d& v) {
+  plant_->AddVelocity(record_.reading.state, v);
+  Vector6d velocity = Vector6d::Zero();
+  velocity.head<3>() = v;
+  SettleOn(LineTrajectory(setup_->X_start(), velocity, 0.0), kSettleMoving);
+  // Back to where it began: on a level floor every place is alike.
+  const double dt = plant_->time_step();
+  const Vector3d way = static_cast<double>(std::lround(kSettleMoving / dt)) * dt * v;
+  plant_->Translate(-way);
+}
+
+void ClosedLoop::ControlStep(double t) {
+  const auto begin = Clock::now();
+  plant_->BeginStep();
+  const auto read = Clock::now();
+  plant_->Read(&record_.reading);
+  CheckRobot();
+  sensing_.Tell(record_.reading, &record_.told);
+  controller_->Step(record_.told, t, &record_.command);
+  drive_.Apply(record_.command.tau, &record_.drive);
+  const auto control = Clock::now();
+  plant_->EndStep(record_.drive.tau);
+  const auto end = Clock::now();
+  plant_->Read(&record_.response);
+  if (checks_) times_.cross_check += Seconds(end, Clock::now());
+  times_.plant += Seconds(begin, read) + Seconds(control, end);
+  times_.controller += Seconds(read, control);
+  times_.grasp_force += record_.command.force_seconds;
+  times_.solves += record_.command.force_solves;
+}
+
+void ClosedLoop::Step() {
+  record_.time = time();
+  ControlStep(record_.time);
+  record_.error = CalcTrackingError(record_);
+  ++record_.step;
+  if (checks_) {
+    const auto begin = Clock::now();
+    checks_->CompareModel(record_);
+    checks_->CompareMotion(record_);
+    record_.findings = checks_->findings();
+    times_.cross_check += Seconds(begin, Clock::now());
+  }
+  CheckGrasp();
+  if (task_ != nullptr) CheckTask();
+}
+
+void ClosedLoop::CheckTask() const {
+  const PickAndPlace& task = task_->task();
+  if (task.is_done() && !task.failure().empty()) throw RunFailure(task.failure());
+  if (!task.is_done() && record_.step >= num_steps_) {
+    throw RunFailure("the task was not done in time, it was in phase " + Quote(NameOf(task.phase())));
+  }
+}
+
+void ClosedLoop::CheckRobot() const {
+  const BaseDeparture& departure = record_.reading.departure;
+  if (departure.tilt < kLargestTilt && std::abs(departure.height) < kLargestSink) return;
+  throw RunFailure("the robot fell: tilt " + FormatNumber(departure.tilt) + " rad, height " +
+                   FormatNumber(departure.height) + " m off");
+}
+
+void ClosedLoop::CheckGrasp() {
+  if (!record_.command.handling.holding) return;
+  std::string missing;
+  for (size_t i = 0; i < record_.response.contacts.size(); ++i) {
+    if (!record_.response.contacts[i].touching) missing = setup_->scenario().grasp.fingertips[i];
+  }
+  steps_without_grasp_ = missing.empty() ? 0 : steps_without_grasp_ + 1;
+  if (static_cast<double>(steps_without_grasp_) * plant_->time_step() < kGraspTimeout) return;
+  throw GraspLost("the grasp is lost: fingertip " + Quote(missing) + " no longer touches the object");
+}
+
+}  // namespace dexcheck

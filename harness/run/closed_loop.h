@@ -1,0 +1,97 @@
+#pragma once
+
+// The loop of plant and controller, cross-checked at every step.
+
+#include <memory>
+#include <optional>
+
+#include "controller/control/controller.h"
+#include "controller/control/trajectory.h"
+#include "harness/checks/cross_check.h"
+#include "harness/checks/step_record.h"
+#include "harness/plant/motor_drive.h"
+#include "harness/plant/plant.h"
+#include "harness/plant/sensing.h"
+#include "harness/run/loop_parts.h"
+#include "harness/simulation/setup.h"
+
+namespace dexcheck {
+
+/// A fingertip left the object.
+class GraspLost : public RunFailure {
+ public:
+  using RunFailure::RunFailure;
+};
+
+/// Time spent in each part, s.
+struct LoopTimes {
+  double plant = 0.0;
+  double controller = 0.0;   ///< Reading the plant included.
+  double grasp_force = 0.0;  ///< Part of controller.
+  double cross_check = 0.0;  ///< Reading the plant's response included.
+  long solves = 0;           ///< Grasp-force problems.
+};
+
+/// One run:
+///
+///   plant --PlantReading--> sensing --Reading--> controller --Command--> motors --tau'--> plant
+///     `----PlantResponse----> checks: all of it is one StepRecord
+///
+/// Deterministic. Nothing allocates in a step, except as the controller and StepChecks say.
+class ClosedLoop {
+ public:
+  /// @param check whether to cross-check.
+  /// @throws InputError when the scenario asks for what cannot be.
+  ClosedLoop(const Setup& setup, bool check) : ClosedLoop(setup, check, MakeLoopParts(setup)) {}
+  /// The same with other parts than the scenario's own.
+  ClosedLoop(const Setup& setup, bool check, LoopParts parts);
+
+  /// Holds the object until all has come to rest (and then moves on, for a moving start): call once, before
+  /// the first Step, at t = 0. @throws as Step.
+  void Settle();
+
+  /// One step. @throws RunFailure, DivergenceError, GraspForceError, SingularityError. What the step saw up
+  /// to then can be read.
+  void Step();
+
+  /// The last step. It stays in its place.
+  [[nodiscard]] const StepRecord& record() const { return record_; }
+  /// Number of steps of the scenario's duration, the most that a task may take.
+  [[nodiscard]] long num_steps() const { return num_steps_; }
+  /// Whether there is nothing left to do.
+  [[nodiscard]] bool is_finished() const { return record_.step >= num_steps_ || controller_->is_done(); }
+  /// Time that the next step begins at, s.
+  [[nodiscard]] double time() const { return static_cast<double>(record_.step) * plant_->time_step(); }
+
+  [[nodiscard]] bool is_checking() const { return checks_.has_value(); }
+  /// Only when checking.
+  [[nodiscard]] const CrossCheck& checks() const { return checks_.value(); }
+  /// The controller of a task; null unless the scenario is one.
+  [[nodiscard]] const PickAndPlaceController* task() const { return task_; }
+  [[nodiscard]] const LoopTimes& times() const { return times_; }
+
+ private:
+  void CheckMovingStart() const;
+  void StartMoving(const Vector3d& v);
+  void SettleOn(const Trajectory& motion, double duration);
+  void BeginRun();
+  void ControlStep(double t);
+  void CheckRobot() const;
+  void CheckGrasp();
+  void CheckTask() const;
+
+  const Setup* setup_;
+  std::unique_ptr<Plant> plant_;
+  Sensing sensing_;
+  std::unique_ptr<Controller> controller_;
+  const PickAndPlaceController* task_ = nullptr;  // is controller_, or null
+  MotorDrive drive_;
+  std::optional<CrossCheck> checks_;
+  std::unique_ptr<Trajectory> trajectory_;  // null for a task
+  StepRecord record_;
+  long num_steps_ = 0;
+  long steps_without_grasp_ = 0;
+  LoopTimes times_;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,155 @@
+// The law along a trajectory as one controller: what it sends, when, and what it says that it meant.
+
+#include "controller/control/trajectory_controller.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <stdexcept>
+
+#include "controller/control/constrained_dynamics.h"
+#include "tests/common/allocation_counter.h"
+#include "tests/common/matrix_near.h"
+#include "tests/controller/control/grasp_scene.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::AllocationCounter;
+using testing::GraspScene;
+using testing::MatrixNear;
+
+// Measured 2e-11 rad/s^2 of 100, 2e-13 N.
+constexpr double kAccelerationRounding = 1e-9;
+constexpr double kForceRounding = 1e-10;
+
+class TrajectoryControllerTest : public ::testing::Test {
+ protected:
+  TrajectoryControllerTest()
+      : options_(MakeOptions(scene_)),
+        motion_(scene_.X_o, (Vector6d() << 0.1, -0.2, 0.3, 0.2, 0.1, -0.1).finished(), 2.0) {
+    std::mt19937 random(3);
+    scene_.DrawVelocities(&random, 0.05);
+    reading_.state = {scene_.q,
+                      scene_.xi,
+                      scene_.grasp.X_Bo(),
+                      scene_.grasp.V_Bo(),
+                      scene_.kappa,
+                      std::vector<double>(4, 0.0)};
+  }
+
+  static GraspControllerOptions MakeOptions(const GraspScene& scene) {
+    GraspControllerOptions options(scene.model);
+    options.gains.K_p.setConstant(400.0);
+    options.gains.K_v.setConstant(40.0);
+    options.posture.damping.setConstant(5.0);
+    options.X_o_start = scene.X_o;
+    options.f_min = 1.0;
+    options.f_max = 50.0;
+    return options;
+  }
+
+  TrajectoryController Make(const Sampling& sampling) const {
+    return {scene_.model, scene_.fingertips, scene_.object, scene_.surface, options_, sampling};
+  }
+
+  GraspScene scene_;
+  GraspControllerOptions options_;
+  PointToPointTrajectory motion_;
+  Reading reading_;
+  Command command_;
+};
+
+TEST_F(TrajectoryControllerTest, SendsTheLawsTorquesWithTheVelocityOfHalfAStepBefore) {
+  constexpr double kStep = 0.01;
+  TrajectoryController controller = Make({.time_step = kStep});
+  controller.Follow(motion_);
+  controller.Step(reading_, 0.7, &command_);
+  DesiredMotion desired = motion_.Evaluate(0.7);
+  ASSERT_GT((desired.X_d_dot - motion_.Evaluate(0.7 - 0.5 * kStep).X_d_dot).norm(), 1e-5);
+  desired.X_d_dot = motion_.Evaluate(0.7 - 0.5 * kStep).X_d_dot;
+  GraspController law(scene_.model, scene_.fingertips, scene_.object, scene_.surface, options_);
+  law.SetState(reading_.state);
+  EXPECT_EQ(command_.tau, law.CalcTorque(desired));
+  EXPECT_EQ(command_.desired.X_d_dot, desired.X_d_dot);
+  EXPECT_TRUE(command_.tracks);
+  EXPECT_TRUE(command_.handling.holding);
+  EXPECT_FALSE(command_.handling.partial);
+  EXPECT_EQ(command_.force_solves, 1);
+}
+
+// (56) to (57): the rigid system under the torques does what the demand says.
+TEST_F(TrajectoryControllerTest, TheRigidSystemAnswersWithTheDemand) {
+  TrajectoryController controller = Make({.time_step = 1e-3});
+  controller.Follow(motion_);
+  controller.Step(reading_, 0.5, &command_);
+  VectorXd force(command_.tau.size());
+  ActuationMap(scene_.model).CalcForce(command_.tau, force);
+  ConstrainedDynamics dynamics(scene_.model, 4);
+  const GraspTerms& grasp = controller.model().grasp();
+  const Prediction& rigid = dynamics.Predict(controller.model().robot(), grasp, force);
+  const LawDemand& demand = command_.demand;
+  ASSERT_GT(demand.V_Bo_dot.norm(), 0.1);
+  EXPECT_TRUE(MatrixNear(rigid.V_Bo_dot, demand.V_Bo_dot, kAccelerationRounding));
+  EXPECT_TRUE(MatrixNear(rigid.xi_dot, demand.xi_dot, kAccelerationRounding));
+  EXPECT_TRUE(MatrixNear(rigid.f_c, demand.f_c, kForceRounding));
+  // (49): f_c = G^+ F_o + F_N, G F_N = 0
+  ASSERT_GT(demand.F_N.norm(), 0.5);
+  EXPECT_TRUE(MatrixNear(Vector6d(grasp.G() * demand.F_N), Vector6d::Zero().eval(), kForceRounding));
+  const Vector6d F_o =
+      grasp.body().M_hat * demand.V_Bo_dot + grasp.body().C_hat * grasp.V_Bo() + grasp.body().N_o;
+  EXPECT_TRUE(MatrixNear(Vector6d(grasp.G() * demand.f_c), F_o, kForceRounding));
+}
+
+TEST_F(TrajectoryControllerTest, HoldsTorquesUntilTheNextAreDue) {
+  TrajectoryController controller = Make({.time_step = 1e-3, .hold = 3});
+  double t = 0.0;
+  const auto count_solves = [&](int steps) {
+    int solves = 0;
+    for (int i = 0; i < steps; ++i) {
+      t += 0.1;
+      controller.Step(reading_, t, &command_);
+      solves += command_.force_solves;
+    }
+    return solves;
+  };
+  controller.Follow(motion_);
+  EXPECT_EQ(count_solves(3), 1);
+  const VectorXd held = command_.tau;
+  EXPECT_EQ(command_.desired.X_d, motion_.Evaluate(t).X_d);  // though the torques are older
+  EXPECT_EQ(count_solves(1), 1);
+  EXPECT_NE(command_.tau, held);
+  // A new motion is due at once.
+  controller.Follow(motion_);
+  EXPECT_EQ(count_solves(7), 3);
+}
+
+TEST_F(TrajectoryControllerTest, TellsWhatItKnewWhenTheLawFails) {
+  TrajectoryController controller = Make({});
+  controller.Follow(motion_);
+  controller.Step(reading_, 0.0, &command_);
+  const VectorXd before = command_.tau;
+  const LineTrajectory impossible(scene_.X_o, Vector6d::Constant(1e6), 0.0);
+  controller.Follow(impossible);
+  EXPECT_THROW(controller.Step(reading_, 0.5, &command_), GraspForceError);
+  EXPECT_EQ(command_.tau, before);
+  EXPECT_EQ(command_.desired.X_d, impossible.Evaluate(0.5).X_d);
+}
+
+TEST_F(TrajectoryControllerTest, RefusesWhatCannotBe) {
+  EXPECT_THROW(Make({.hold = 0}), std::invalid_argument);
+  TrajectoryController controller = Make({});
+  EXPECT_THROW(controller.Step(reading_, 0.0, &command_), std::logic_error);
+}
+
+TEST_F(TrajectoryControllerTest, StepsWithoutAllocation) {
+  TrajectoryController controller = Make({.time_step = 1e-3});
+  controller.Follow(motion_);
+  controller.Step(reading_, 0.1, &command_);
+  const AllocationCounter counter;
+  controller.Step(reading_, 0.2, &command_);
+  EXPECT_EQ(counter.count(), 0);
+}
+
+}  // namespace
+}  // namespace dexcheck

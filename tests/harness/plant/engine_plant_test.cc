@@ -1,0 +1,153 @@
+// The engine as plant: what is read of it, and what stands between it and the controller.
+
+#include "harness/plant/engine_plant.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "harness/plant/motor_drive.h"
+#include "harness/plant/sensing.h"
+#include "tests/common/allocation_counter.h"
+#include "tests/common/matrix_near.h"
+#include "tests/common/throws.h"
+#include "tests/harness/simulation/shipped_run.h"
+
+namespace dexcheck::testing {
+namespace {
+
+class EnginePlantTest : public ::testing::Test {
+ protected:
+  EnginePlantTest()
+      : scenario_("curve"),
+        setup_(scenario_.setup()),
+        plant_(setup_.adapter(), setup_.fingertips(), setup_.surface(), /*implicit_damping=*/false) {
+    plant_.Place(setup_.q_start(), setup_.X_Bo_start());
+    tau_.setZero(setup_.model().num_velocities());
+  }
+
+  void Step() {
+    plant_.BeginStep();
+    plant_.Read(&reading_);
+    plant_.EndStep(tau_);
+    plant_.Read(&response_);
+  }
+
+  ShippedRun scenario_;
+  const dexcheck::Setup& setup_;
+  EnginePlant plant_;
+  VectorXd tau_;
+  PlantReading reading_;
+  PlantResponse response_;
+};
+
+// qpos keeps quaternions; the start's contacts overlap by 1e-6 m.
+constexpr double kRounding = 1e-12;
+
+TEST_F(EnginePlantTest, ReadsWhereRobotAndObjectWerePlaced) {
+  Step();
+  EXPECT_TRUE(MatrixNear(reading_.state.q, setup_.q_start(), kRounding));
+  EXPECT_TRUE(
+      MatrixNear(reading_.state.X_Bo.matrix().eval(), setup_.X_Bo_start().matrix().eval(), kRounding));
+  EXPECT_EQ(reading_.state.xi.norm(), 0.0);
+  EXPECT_EQ(reading_.touch.fingertips, AllContacts(4));
+  EXPECT_NEAR(reading_.departure.tilt, 0.0, kRounding);
+  for (const double overlap : reading_.state.overlap) EXPECT_NEAR(overlap, 1e-6, 1e-7);
+  for (const PlantContact& contact : response_.contacts) EXPECT_TRUE(contact.touching);
+  EXPECT_EQ(response_.fingertips.size(), 4U);
+  EXPECT_EQ(response_.wheels.size(), 2U);
+  EXPECT_EQ(response_.support_force, 0.0);
+}
+
+TEST_F(EnginePlantTest, MotorsGiveWhatIsSentToThem) {
+  for (Eigen::Index i = 0; i < tau_.size(); ++i) {
+    const double limit = plant_.motors()[static_cast<size_t>(i)].limit;
+    tau_[i] = (i % 2 == 0 ? 0.3 : -0.2) * std::min(limit, 1.0);
+  }
+  Step();
+  EXPECT_TRUE(MatrixNear(response_.motor_torques, tau_, kRounding));
+  EXPECT_EQ(plant_.motors().size(), static_cast<size_t>(tau_.size()));
+  EXPECT_EQ(plant_.motors()[0].name, setup_.model().base().wheel_joint_right);
+}
+
+// Accelerations are those of the step: v(t + dt) = v(t) + dt a.
+TEST_F(EnginePlantTest, AnswersWithTheAccelerationsOfTheStep) {
+  tau_.setConstant(0.05);
+  Step();
+  const PlantReading before = reading_;
+  const PlantResponse response = response_;
+  Step();
+  const double dt = plant_.time_step();
+  ASSERT_GT(response.xi_dot.norm(), 1.0);
+  EXPECT_TRUE(MatrixNear(VectorXd((reading_.state.xi - before.state.xi) / dt), response.xi_dot, 1e-3));
+  EXPECT_TRUE(MatrixNear(Vector6d((reading_.state.V_Bo - before.state.V_Bo) / dt), response.V_Bo_dot, 1e-3));
+}
+
+TEST_F(EnginePlantTest, MovesAsAWhole) {
+  Step();
+  const PlantReading before = reading_;
+  const Vector3d v(0.5, 0.0, 0.0);
+  plant_.Place(setup_.q_start(), setup_.X_Bo_start());
+  plant_.AddVelocity(reading_.state, v);
+  plant_.Translate(Vector3d(0.25, -0.125, 0.0));
+  Step();
+  EXPECT_NEAR(reading_.state.xi[0], 0.5, kRounding);
+  EXPECT_TRUE(MatrixNear(reading_.state.xi.tail(reading_.state.xi.size() - 1).eval(),
+                         VectorXd::Zero(reading_.state.xi.size() - 1).eval(), kRounding));
+  const Vector3d v_Bo = reading_.state.X_Bo.linear() * reading_.state.V_Bo.head<3>();
+  EXPECT_TRUE(MatrixNear(v_Bo, v, kRounding));
+  EXPECT_NEAR(reading_.state.q[0] - before.state.q[0], 0.25, kRounding);
+  EXPECT_NEAR(reading_.state.q[1] - before.state.q[1], -0.125, kRounding);
+  const Vector3d moved = reading_.state.X_Bo.translation() - before.state.X_Bo.translation();
+  EXPECT_TRUE(MatrixNear(moved, Vector3d(0.25, -0.125, 0.0), kRounding));
+}
+
+TEST_F(EnginePlantTest, ReadsWithoutAllocation) {
+  Step();
+  const AllocationCounter counter;
+  Step();
+  EXPECT_EQ(counter.count(), 0);
+}
+
+TEST_F(EnginePlantTest, TheControllerIsToldTheTruthUnlessAskedOtherwise) {
+  Step();
+  Reading told;
+  Sensing({}).Tell(reading_, &told);
+  EXPECT_EQ(told.state.q, reading_.state.q);
+  EXPECT_EQ(told.state.xi, reading_.state.xi);
+  EXPECT_EQ(told.state.X_Bo.matrix(), reading_.state.X_Bo.matrix());
+  EXPECT_EQ(told.state.V_Bo, reading_.state.V_Bo);
+  EXPECT_EQ(told.state.overlap, reading_.state.overlap);
+  EXPECT_EQ(told.touch.fingertips, reading_.touch.fingertips);
+  const auto difference = [&](size_t i) {
+    return Vector5d(told.state.kappa[i].CalcVector() - reading_.state.kappa[i].CalcVector());
+  };
+  for (size_t i = 0; i < 4; ++i) EXPECT_EQ(difference(i).norm(), 0.0);
+  Sensing({.contact_error = 0.25}).Tell(reading_, &told);
+  for (size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(difference(i)[2], 0.25, kRounding);
+    EXPECT_NEAR(difference(i).norm(), 0.25, kRounding);
+  }
+  EXPECT_EQ(told.state.q, reading_.state.q);
+}
+
+TEST(MotorDrive, GivesWhatIsCommandedUpToTheLimit) {
+  const std::vector<Motor> motors = {{"free", std::numeric_limits<double>::infinity()}, {"elbow", 4.0}};
+  const MotorDrive drive(motors);
+  DriveOutput output;
+  drive.Apply(Eigen::Vector2d(1e6, -3.0), &output);
+  EXPECT_EQ(output.tau, VectorXd(Eigen::Vector2d(1e6, -3.0)));
+  EXPECT_EQ(output.effort, 0.75);
+  EXPECT_EQ(output.busiest_motor, 1);
+  EXPECT_TRUE(Throws<RunFailure>([&] { drive.Apply(Eigen::Vector2d(0.0, -4.5), &output); },
+                                 "motor \"elbow\" is at its limit, 4 N m"));
+  EXPECT_EQ(output.effort, 1.125);  // what ended the run can be read
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(
+      Throws<RunFailure>([&] { drive.Apply(Eigen::Vector2d(0.0, nan), &output); }, "is not a number"));
+}
+
+}  // namespace
+}  // namespace dexcheck::testing
