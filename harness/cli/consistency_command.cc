@@ -12,6 +12,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
+#include "harness/common/interrupts.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck::cli {
