@@ -24,8 +24,8 @@
 namespace dexcheck {
 namespace {
 
-/// Some thousand times what a run's log needs, and a hundred times what the largest log needs.
-constexpr rlim_t kMostSeconds = 20;
+/// Hundreds of times what the log of a run needs.
+constexpr rlim_t kMostSeconds = 3;
 /// What the walk may take beyond what this process has.
 constexpr rlim_t kMostMemory = rlim_t{2} << 30;
 /// Bytes that the other process may tell; texts are the large ones among them.
