@@ -10,6 +10,7 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/cli/shipped_files.h"
+#include "harness/record/mjcf_files.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -91,6 +92,7 @@ std::filesystem::path FindEmbedded(const LogReader& log, const std::string& kind
                                    const std::filesystem::path& unpacked) {
   const std::string name = kind + "/" + log.ReadText(kind);
   (void)log.ReadFile("inputs", name);  // which is an error unless the log has it
+  if (kind == "mjcf") (void)ListMjcfFiles(unpacked / name);
   return unpacked / name;
 }
 

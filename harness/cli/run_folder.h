@@ -56,7 +56,7 @@ struct ReplayDifference {
 };
 
 /// Where the robot ("robot") or the model ("mjcf") that a log names lies, once its files are unpacked.
-/// @throws InputError when the log holds no such file, as one that names a file outside.
+/// @throws InputError when the log holds no such file, or the model names files outside its folder.
 std::filesystem::path FindEmbedded(const LogReader& log, const std::string& kind,
                                    const std::filesystem::path& unpacked);
 
