@@ -31,6 +31,7 @@ void Redirect(int descriptor, const std::filesystem::path& path) {
     const rlimit limit{*options.largest_file, *options.largest_file};
     if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(kCannotStart);
   }
+  for (const int signal : {SIGHUP, SIGPIPE}) std::signal(signal, SIG_DFL);  // nohup's are ignored
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);

@@ -7,8 +7,10 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <cstring>
 #include <functional>
-#include <optional>
+#include <memory>
+#include <vector>
 
 #include "harness/common/files.h"
 #include "harness/common/interrupts.h"
@@ -27,6 +29,7 @@ constexpr int kExitCode = 3;
 int RunForked(const std::function<void()>& work) {
   const pid_t process = ::fork();
   if (process == 0) {
+    for (const int signal : {SIGHUP, SIGPIPE}) std::signal(signal, SIG_DFL);  // nohup's are ignored
     HandleSignals(kExitCode);
     work();
     ::_exit(EXIT_SUCCESS);
