@@ -29,8 +29,10 @@ void Warn(const std::string& text) {
 }
 
 void FlushOutput() {
-  if (std::fflush(stdout) == 0) return;
-  throw InputError(std::string("standard output: cannot be written: ") + std::strerror(errno));
+  const bool is_flushed = std::fflush(stdout) == 0;
+  if (is_flushed && std::ferror(stdout) == 0) return;
+  throw InputError(std::string("standard output: cannot be written: ") +
+                   (is_flushed ? "a part of it was lost" : std::strerror(errno)));
 }
 
 }  // namespace dexcheck
