@@ -49,7 +49,7 @@ class ForgedLog : public ::testing::Test {
     for (const std::vector<std::string>& command : {std::vector<std::string>{"run", "--replay", run},
                                                     {"render", run},
                                                     {"report", run, "--out", page}}) {
-      const ::testing::AssertionResult refused = IsRefused(RunDexcheck(command), {part});
+      ::testing::AssertionResult refused = IsRefused(RunDexcheck(command), {part});
       if (!refused) return refused << " from " << command[0];
     }
     const auto left = std::distance(fs::directory_iterator(run_dir()), fs::directory_iterator());
