@@ -11,6 +11,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/common/interrupts.h"
 
 namespace dexcheck {
 
@@ -40,6 +41,7 @@ TemporaryFolder::TemporaryFolder() {
     const char* const named = std::getenv("TMPDIR");
     throw InputError("TMPDIR: must name a folder, got " + Quote(named == nullptr ? "/tmp" : named));
   }
+  const HeldSignals until_protected;
   std::string pattern = (parent / "dexcheck-XXXXXX").string();
   if (::mkdtemp(pattern.data()) == nullptr) {
     throw InputError(pattern + ": cannot be made: " + std::strerror(errno));

@@ -71,6 +71,15 @@ void EndOnInterrupts(int exit_code) {
   catching = false;
 }
 
+HeldSignals::HeldSignals() {
+  sigset_t held;
+  ::sigemptyset(&held);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) ::sigaddset(&held, signal);
+  ::sigprocmask(SIG_BLOCK, &held, &before_);
+}
+
+HeldSignals::~HeldSignals() { ::sigprocmask(SIG_SETMASK, &before_, nullptr); }
+
 void LeaveInterruptsToParent() {
   Install(SIGINT, SIG_IGN);
   Install(SIGTERM, SIG_DFL);

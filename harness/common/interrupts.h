@@ -2,6 +2,8 @@
 
 // Signals: Ctrl-C ends the program without leaving anything half done, and a full quota is an ordinary error.
 
+#include <csignal>
+
 namespace dexcheck {
 
 /// To be called first thing in main. SIGINT, SIGTERM and SIGHUP (unless it is ignored, as under nohup) end
@@ -16,6 +18,18 @@ void CatchInterrupts();
 bool IsInterrupted();
 /// From now on a signal ends the program at once again, with this exit code.
 void EndOnInterrupts(int exit_code);
+
+/// While it lives, signals that end the program wait: between making a file or folder and protecting it.
+class HeldSignals {
+ public:
+  HeldSignals();
+  ~HeldSignals();
+  HeldSignals(const HeldSignals&) = delete;
+  HeldSignals& operator=(const HeldSignals&) = delete;
+
+ private:
+  sigset_t before_ = {};
+};
 
 /// For a forked process that works for this one: Ctrl-C reaches the whole group and the parent decides, other
 /// signals end it at once.

@@ -12,6 +12,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/common/files.h"
+#include "harness/common/interrupts.h"
 #include "harness/common/partial_file.h"
 #include "harness/common/temporary_path.h"
 #include "harness/report/run_figures.h"
@@ -33,6 +34,7 @@ void WriteText(const std::string& text, const PartialFile& file) {
 class FigureFolder {
  public:
   explicit FigureFolder(fs::path folder) : folder_(std::move(folder)) {
+    const HeldSignals until_protected;
     std::error_code error;
     made_ = fs::create_directory(folder_, error);
     if (error || !fs::is_directory(folder_)) {

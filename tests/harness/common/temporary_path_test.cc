@@ -10,6 +10,7 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "harness/common/files.h"
@@ -93,6 +94,22 @@ TEST_F(TemporaryPathTest, ACaughtSignalEndsOnlyTheSecondTime) {
                         }),
                         1));
   EXPECT_TRUE(IsOnlyKeptLeft());
+}
+
+TEST_F(TemporaryPathTest, ASignalThatIsHeldComesLater) {
+  const fs::path made = folder_.path() / "made";
+  EXPECT_TRUE(HasExited(RunForked([&] {
+                          std::optional<TemporaryPath> protection;
+                          {
+                            const HeldSignals held;
+                            fs::create_directory(made);
+                            std::raise(SIGTERM);
+                            protection.emplace(made);
+                          }
+                          ::_exit(11);
+                        }),
+                        kExitCode));
+  EXPECT_TRUE(fs::is_empty(folder_.path()));
 }
 
 TEST_F(TemporaryPathTest, WhatIsFinishedStays) {
