@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "harness/common/interrupts.h"
 
 namespace dexcheck {
 namespace {
@@ -114,9 +115,7 @@ void FrameLine::Start(const std::function<Painter()>& make_painter, long index) 
 }
 
 void FrameLine::Work(const std::function<Painter()>& make_painter, long first, int socket) const {
-  // Ctrl-C reaches the whole group; the parent decides.
-  std::signal(SIGINT, SIG_IGN);
-  std::signal(SIGTERM, SIG_DFL);
+  LeaveInterruptsToParent();
   std::string told;
   try {
     Draw(make_painter, first, socket);

@@ -12,18 +12,28 @@ struct VideoOptions {
   int width = 1280;                 ///< Even.
   int height = 720;                 ///< Even.
   int fps = 30;                     ///< Frames a second.
-  int quality = 21;                 ///< x264's constant rate factor: 0 lossless, 51 worst.
+  int quality = 21;                 ///< x264's constant rate factor: 0 lossless, 51 worst; not of a GIF.
   int threads = 1;                  ///< Of the encoder.
-  std::string preset = "veryfast";  ///< x264's trade of time for size.
+  std::string preset = "veryfast";  ///< x264's trade of time for size; of an MP4 only.
 };
 
-/// Writes an H.264 MP4 (yuv420p, BT.709, index before the data) that browsers play while it loads, frame by
-/// frame. The file appears under its name when it is finished; until then, and after an error, there is
-/// nothing.
+/// H.264 in MP4, VP9 in WebM (both yuv420p, BT.709), and GIF, which has 256 colours and plays without end.
+enum class VideoFormat { kMp4, kWebm, kGif };
+
+/// Times in a GIF are hundredths of a second, and viewers slow down what has less than two of them a frame.
+inline constexpr int kMostGifFramesPerSecond = 50;
+
+/// By the name's extension, in small or capital letters.
+/// @throws InputError "PATH: cannot be written: ..." when it is none of theirs.
+VideoFormat FindVideoFormat(const std::filesystem::path& path);
+
+/// Writes a film that browsers play (an MP4 while it loads: its index stands before the data), frame by
+/// frame, in the format that its name says. The file appears under its name when it is finished; until then,
+/// and after an error, there is nothing.
 class VideoWriter {
  public:
   /// @throws InputError "PATH: cannot be written: reason".
-  /// @throws std::invalid_argument for sizes or rates that H.264 cannot take.
+  /// @throws std::invalid_argument for sizes or rates that the format cannot take.
   VideoWriter(const std::filesystem::path& path, const VideoOptions& options);
   /// Removes what was written unless Finish was called.
   ~VideoWriter();

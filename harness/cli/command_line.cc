@@ -2,6 +2,8 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <cstdio>
+#include <sstream>
 #include <system_error>
 
 #include "controller/common/text.h"
@@ -135,7 +137,11 @@ int CommandLine::Run(int argc, char** argv) {
     app_->parse(argc, argv);
     return exit_code_;
   } catch (const CLI::Success& success) {
-    return app_->exit(success);
+    // By way of a text: whether standard output takes it is the caller's to see.
+    std::ostringstream help;
+    const int exit_code = app_->exit(success, help, help);
+    std::fputs(help.str().c_str(), stdout);
+    return exit_code;
   } catch (const CLI::ParseError& error) {
     throw UsageError(Explain(error.what()));
   }

@@ -18,6 +18,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
+#include "harness/common/interrupts.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/complete_description.h"
 #include "harness/sides/description_check.h"

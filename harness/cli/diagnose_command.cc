@@ -12,6 +12,7 @@
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
+#include "harness/common/interrupts.h"
 #include "harness/diagnosis/diagnose.h"
 #include "harness/engine/engine.h"
 
@@ -129,6 +130,7 @@ int Run(const Request& request) {
     if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");
     Print(request, model, diagnosis);
   }
+  if (IsInterrupted()) return kFailure;
   return diagnosis.agrees ? kSuccess : kDisagreement;
 }
 

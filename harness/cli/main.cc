@@ -1,32 +1,31 @@
 // dexcheck: is my analytic robot model, and the controller built on it, right?
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cerrno>
-#include <cstring>
+#include <cstdio>
 #include <exception>
 #include <stdexcept>
 #include <string>
 #include <system_error>
-#include <vector>
 
 #include "controller/common/errors.h"
-#include "controller/common/text.h"
 #include "harness/cli/commands.h"
+#include "harness/common/console.h"
+#include "harness/common/interrupts.h"
 #include "harness/common/shell.h"
 #include "harness/common/version.h"
 
 namespace dexcheck::cli {
 namespace {
 
-/// One line on standard error, whatever control characters stand in file names.
-int Report(std::string problem, ExitCode code) {
-  std::replace_if(
-      problem.begin(), problem.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+int Report(const std::string& problem, ExitCode code) {
   std::fflush(stdout);
-  fmt::print(stderr, "dexcheck: {}\n", problem);
+  Warn(problem);
   return code;
+}
+
+/// What a call of the system said. When it was about printing, it names standard output.
+std::string Explain(const std::system_error& error) {
+  return std::ferror(stdout) != 0 ? "standard output: cannot be written: " + error.code().message()
+                                  : error.what();
 }
 
 /// The command line as one could type it.
@@ -53,8 +52,8 @@ int Run(int argc, char** argv) {
   AddStudyCommand(app);
   try {
     const int exit_code = line.Run(argc, argv);
-    if (std::fflush(stdout) == 0) return exit_code;
-    return Report(std::string("standard output: cannot be written: ") + std::strerror(errno), kInputError);
+    FlushOutput();
+    return exit_code;
   } catch (const UsageError& error) {
     return Report(std::string(error.what()) + " (see dexcheck --help)", kInputError);
   } catch (const InputError& error) {
@@ -62,7 +61,7 @@ int Run(int argc, char** argv) {
   } catch (const std::invalid_argument& error) {
     return Report(error.what(), kInputError);
   } catch (const std::system_error& error) {
-    return Report(error.what(), kInputError);
+    return Report(Explain(error), kInputError);
   } catch (const std::exception& error) {
     return Report(error.what(), kFailure);
   }
@@ -72,4 +71,8 @@ int Run(int argc, char** argv) {
 }  // namespace dexcheck::cli
 
 // What a handler of exceptions throws is want of memory. NOLINTNEXTLINE(bugprone-exception-escape)
-int main(int argc, char** argv) { return dexcheck::cli::Run(argc, argv); }
+int main(int argc, char** argv) {
+  dexcheck::OccupyStandardStreams();
+  dexcheck::HandleSignals(dexcheck::cli::kFailure);
+  return dexcheck::cli::Run(argc, argv);
+}

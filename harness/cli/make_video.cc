@@ -9,6 +9,8 @@
 
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_frames_reader.h"
+#include "harness/common/console.h"
+#include "harness/common/interrupts.h"
 
 namespace dexcheck::cli {
 
@@ -31,8 +33,7 @@ bool WriteMovie(const std::vector<RunView>& views, const MovieOptions& options, 
   });
   bar.Finish();
   if (!complete) {
-    fmt::print(stderr, "dexcheck: stopped after {} of {} frames; {} was not written\n", video.frames(),
-               frames, out);
+    Warn(fmt::format("stopped after {} of {} frames; {} was not written", video.frames(), frames, out));
     return false;
   }
   video.Finish();

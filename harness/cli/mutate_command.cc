@@ -15,6 +15,7 @@
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
+#include "harness/common/interrupts.h"
 #include "harness/diagnosis/formula_mutants.h"
 #include "harness/engine/engine.h"
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "harness/common/files.h"
 
 namespace dexcheck::cli {
 
@@ -49,6 +50,14 @@ void OutputFile::Finish() {
 void OutputFile::Fail(int error) const {
   const std::string name = path_ == "-" ? "standard output" : path_.string();
   throw InputError(name + ": cannot be written: " + std::strerror(error));
+}
+
+void RequirePageName(const std::filesystem::path& path) {
+  const std::string extension = ExtensionOf(path);
+  if (extension.empty() || extension == ".html" || extension == ".htm") return;
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) return;  // refused as such
+  throw InputError(path.string() + ": cannot be written: a page's name must end in .html");
 }
 
 }  // namespace dexcheck::cli

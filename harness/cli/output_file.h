@@ -37,4 +37,8 @@ class OutputFile {
   std::FILE* file_ = nullptr;
 };
 
+/// @throws InputError when the name says that the file is something else than an HTML page, such as
+/// "page.pdf".
+void RequirePageName(const std::filesystem::path& path);
+
 }  // namespace dexcheck::cli

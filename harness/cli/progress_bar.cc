@@ -3,17 +3,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <cstdio>
 #include <utility>
 
 namespace dexcheck::cli {
-namespace {
-
-volatile std::sig_atomic_t interrupted = 0;
-
-}  // namespace
-
 ProgressBar::ProgressBar(std::string label, long total, bool quiet)
     : label_(std::move(label)), total_(total), visible_(!quiet && ::isatty(STDERR_FILENO) != 0) {}
 
@@ -29,9 +22,11 @@ void ProgressBar::Update(long done) {
   const int filled = static_cast<int>(fraction * kWidth);
   const double elapsed = std::chrono::duration<double>(now - start_).count();
   const double left = fraction > 0.0 ? elapsed * (1.0 - fraction) / fraction : 0.0;
-  fmt::print(stderr, "\r{} [{}{}] {:3.0f} % ({} of {}), {:.0f} s left ", label_,
-             std::string(static_cast<size_t>(filled), '#'),
-             std::string(static_cast<size_t>(kWidth - filled), '.'), 100.0 * fraction, done, total_, left);
+  const std::string line = fmt::format("\r{} [{}{}] {:3.0f} % ({} of {}), {:.0f} s left ", label_,
+                                       std::string(static_cast<size_t>(filled), '#'),
+                                       std::string(static_cast<size_t>(kWidth - filled), '.'),
+                                       100.0 * fraction, done, total_, left);
+  std::fputs(line.c_str(), stderr);  // a terminal that has gone does not matter
   std::fflush(stderr);
 }
 
@@ -41,16 +36,5 @@ void ProgressBar::Finish() {
   std::fputs("\r\033[K", stderr);
   std::fflush(stderr);
 }
-
-void CatchInterrupts() {
-  const auto raise_flag = [](int signal) {
-    interrupted = 1;
-    std::signal(signal, SIG_DFL);
-  };
-  std::signal(SIGINT, raise_flag);
-  std::signal(SIGTERM, raise_flag);
-}
-
-bool IsInterrupted() { return interrupted != 0; }
 
 }  // namespace dexcheck::cli

@@ -26,10 +26,4 @@ class ProgressBar {
   std::chrono::steady_clock::time_point last_drawn_{};
 };
 
-/// From now on Ctrl-C (SIGINT) and SIGTERM only raise a flag, so that work can stop in good order; a second
-/// signal ends the process.
-void CatchInterrupts();
-/// True once a signal has come.
-bool IsInterrupted();
-
 }  // namespace dexcheck::cli

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -15,7 +17,8 @@
 #include "harness/cli/make_video.h"
 #include "harness/cli/run_frames_reader.h"
 #include "renders/movie.h"
-#include "renders/png_file.h"
+#include "renders/picture_file.h"
+#include "renders/video_writer.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -63,15 +66,32 @@ void WriteStill(const Request& request, const std::vector<RunView>& views, const
     throw InputError("--still: must be from 0 to " + FormatNumber(longest) + " s, got " +
                      FormatNumber(*request.still));
   }
-  WritePng(out, MoviePainter(views, request.movie).Paint(*request.still));
+  WritePicture(out, MoviePainter(views, request.movie).Paint(*request.still));
   if (!request.quiet) {
     fmt::print("{}: {:.2f} s of the run, {} x {}\n", out, *request.still, request.movie.width,
                request.movie.height);
   }
 }
 
+/// What the name of the output says is what it gets.
+void CheckOutput(const Request& request, const std::string& out) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(out, ignored)) {
+    throw InputError(out + ": cannot be written: " + std::strerror(EISDIR));
+  }
+  if (request.still) {
+    RequirePictureName(out);
+  } else if (FindVideoFormat(out) == VideoFormat::kGif && request.movie.fps > kMostGifFramesPerSecond) {
+    throw InputError(fmt::format("--fps: must be at most {} for a GIF, got {}", kMostGifFramesPerSecond,
+                                 request.movie.fps));
+  }
+}
+
 ExitCode Run(Request request) {
   ReadSize(request.size, &request.movie);
+  std::string out = request.out;
+  if (out.empty()) out = (request.run_folder / (request.still ? "still.png" : "video.mp4")).string();
+  CheckOutput(request, out);
   request.movie.panel = !request.no_panel;
   std::vector<RecordedFrames> runs;
   runs.push_back(ReadRecordedFrames(request.run_folder));
@@ -79,8 +99,6 @@ ExitCode Run(Request request) {
   std::vector<RunView> views;
   views.reserve(runs.size());
   for (const RecordedFrames& run : runs) views.push_back({run.model.get(), &run.frames});
-  std::string out = request.out;
-  if (out.empty()) out = (request.run_folder / (request.still ? "still.png" : "video.mp4")).string();
   if (!request.still) return WriteMovie(views, request.movie, out, request.quiet) ? kSuccess : kFailure;
   WriteStill(request, views, out);
   return kSuccess;
@@ -95,26 +113,29 @@ void AddRenderCommand(Command app) {
   request->movie.workers = CountDrawers();
   Command command = app.AddCommand("render", "Draw a recorded run as a video, or one instant of it");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
-  command.AddOption("--out", &request->out, "Default: video.mp4 or still.png in RUN_DIR").TypeName("FILE");
-  command.AddOption("--still", &request->still, "One picture (PNG) at this time of the run, s")
-      .TypeName("T");
-  command.AddOption("--camera", &request->movie.camera,
-                   "overview, follow, grasp, top, or another of the MJCF's; course stands still "
-                   "and sees the whole way")
+  command
+      .AddOption("--out", &request->out,
+                 "A film .mp4, .webm or .gif, or a picture .png or .jpg (default: video.mp4 or still.png in "
+                 "RUN_DIR)")
+      .TypeName("FILE");
+  command.AddOption("--still", &request->still, "One picture at this time of the run, s").TypeName("T");
+  command
+      .AddOption("--camera", &request->movie.camera,
+                 "overview, follow, grasp, top, or another of the MJCF's; course stands still "
+                 "and sees the whole way")
       .TypeName("NAME")
       .ShowDefault();
   command.AddOption("--inset", &request->movie.inset, "A second camera in the lower right corner")
       .TypeName("NAME");
   command.AddOption("--beside", &request->beside, "Another run, shown at the right").TypeName("RUN_DIR");
-  command.AddOption("--size", &request->size, "Of the picture in pixels")
-      .TypeName("WxH")
-      .ShowDefault();
+  command.AddOption("--size", &request->size, "Of the picture in pixels").TypeName("WxH").ShowDefault();
   command.AddOption("--fps", &request->movie.fps, "Frames a second")
       .TypeName("N")
       .Check(WholeNumber(1, kMostFramesPerSecond))
       .ShowDefault();
-  command.AddOption("--jobs", &request->movie.workers,
-                   "Processes that draw; default: one for each processor, at most 8")
+  command
+      .AddOption("--jobs", &request->movie.workers,
+                 "Processes that draw; default: one for each processor, at most 8")
       .TypeName("N")
       .Check(WholeNumber(1, kMostJobs));
   command.AddFlag("--forces", &request->movie.forces, "Draw contact forces and friction cones");

@@ -6,6 +6,7 @@
 
 #include "harness/cli/commands.h"
 #include "harness/cli/make_report.h"
+#include "harness/cli/output_file.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -20,14 +21,15 @@ struct Request {
 
 void AddReportCommand(Command app) {
   const auto request = std::make_shared<Request>();
-  Command command =
-      app.AddCommand("report", "Write a recorded run's report: one page and its figures");
+  Command command = app.AddCommand("report", "Write a recorded run's report: one page and its figures");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
-  command.AddOption("--out", &request->out,
-                   "Write only the page, here (default: report.html and figures/ in RUN_DIR)")
+  command
+      .AddOption("--out", &request->out,
+                 "Write only the page, here (default: report.html and figures/ in RUN_DIR)")
       .TypeName("FILE.html");
   command.AddFlag("--quiet", &request->quiet, "Print nothing");
   command.SetAction([=] {
+    RequirePageName(request->out);
     ReportFiles files = MakeReportFiles(request->run_folder);
     if (!request->out.empty()) files = {request->out, {}};
     MakeReport(request->run_folder, files);

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <exception>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +16,8 @@
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
 #include "harness/cli/shipped_files.h"
+#include "harness/common/console.h"
+#include "harness/common/interrupts.h"
 #include "harness/record/run_recorder.h"
 #include "harness/simulation/runner.h"
 
@@ -41,13 +44,28 @@ ExitCode ToExitCode(const RunResult& result) {
   return result.verdict == Verdict::kPass ? kSuccess : kDisagreement;
 }
 
-/// The run and its verdict stand without a report: why there is none is only told.
-void TryToReport(const std::filesystem::path& folder) {
+/// The run and its verdict stand without a video or a report: why there is none is only told.
+template <typename Make>
+void TryToMake(const char* what, const Make& make) {
   try {
-    MakeReport(folder, MakeReportFiles(folder));
-  } catch (const InputError& error) {
-    fmt::print(stderr, "dexcheck: no report: {}\n", error.what());
+    make();
+  } catch (const std::exception& error) {
+    Warn(fmt::format("no {}: {}", what, error.what()));
   }
+}
+
+/// Draws what was asked for into the run's folder, after the verdict.
+void DrawRun(const Request& request, const std::filesystem::path& folder, ExitCode verdict) {
+  if (request.video) {
+    TryToMake("video", [&] { WriteRunMovie(folder, (folder / "video.mp4").string(), request.quiet); });
+  }
+  EndOnInterrupts(verdict);
+  if (request.no_report || IsInterrupted()) return;
+  TryToMake("report", [&] {
+    const ReportFiles files = MakeReportFiles(folder);
+    MakeReport(folder, files);
+    if (!request.quiet) fmt::print("report: {}\n", files.page.string());
+  });
 }
 
 int RunScenario(const Request& request) {
@@ -74,14 +92,24 @@ int RunScenario(const Request& request) {
   const std::string summary = MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n";
   if (recorder) recorder->Close(summary);
   if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
-  if (folder && runner.loop().record().step > 0 && !IsInterrupted()) {
-    if (request.video) WriteRunMovie(folder->path(), (folder->path() / "video.mp4").string(), request.quiet);
-    if (!request.no_report) TryToReport(folder->path());
-  } else if (folder && request.video && !IsInterrupted()) {
-    fmt::print(stderr, "dexcheck: no video: the run ended before its first step\n");
+  const ExitCode verdict = ToExitCode(runner.result());
+  std::exception_ptr unprinted;
+  try {
+    PrintRunReport(setup, runner.loop(), runner.result(), folder ? folder->path().string() : "",
+                   request.quiet);
+    FlushOutput();
+  } catch (const std::exception&) {
+    unprinted = std::current_exception();  // standard output takes nothing: told when all is done
   }
-  PrintRunReport(setup, runner.loop(), runner.result(), folder ? folder->path().string() : "", request.quiet);
-  return ToExitCode(runner.result());
+  if (folder && !IsInterrupted()) {
+    if (runner.loop().record().step > 0) {
+      DrawRun(request, folder->path(), verdict);
+    } else if (request.video) {
+      Warn("no video: the run ended before its first step");
+    }
+  }
+  if (unprinted) std::rethrow_exception(unprinted);
+  return verdict;
 }
 
 /// Repeats a recorded run from what its log keeps, and compares every number bit for bit.
@@ -103,6 +131,10 @@ int ReplayRun(const Request& request) {
       },
       [&] { return IsInterrupted() || rows >= recorded.rows(); });
   bar.Finish();
+  if (IsInterrupted() && rows < recorded.rows()) {
+    throw Error(fmt::format("interrupted after {} of {} steps; nothing was compared", rows, recorded.rows()));
+  }
+  EndOnInterrupts(kFailure);
   recorder.Close("");
   const ReplayDifference difference = recorded.Compare(log);
   if (difference.signal.empty()) {
@@ -132,28 +164,37 @@ void AddRunCommand(Command app, const std::string& command_line) {
   request->command = command_line;
   Command command = app.AddCommand("run", "Simulate a scenario, cross-checked at every step");
   Option scenario = command.AddOption("SCENARIO", &request->scenario,
-                                              "Name of a shipped scenario (--list), or a TOML file");
+                                      "Name of a shipped scenario (--list), or a TOML file");
   Option list = command.AddFlag("--list", &request->list, "List the shipped scenarios");
-  Option replay = command.AddOption("--replay", &request->replay,
-                                         "Repeat a recorded run and compare every number bit for bit")
-                            .TypeName("RUN_DIR");
-  command.AddOption("--out", &request->out,
-                   "Folder for the results, made by the run (runs/SCENARIO by default)")
-      .TypeName("DIR");
-  command.AddOption("--set", &request->overrides,
-                   "Set a key of the scenario, or with model. before it one of the parameter file")
-      .TypeName("KEY=VALUE")
-      .Repeatable();
-  command.AddOption("--seed", &request->seed, "Vary posture and grasp at random; 0 does not")
-      .TypeName("N")
-      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
-  command.AddFlag("--no-check", &request->no_check, "Simulate without cross-checks");
-  command.AddFlag("--video", &request->video, "Draw the run as a video, video.mp4");
-  command.AddFlag("--no-report", &request->no_report, "Write the log and the summary only");
-  command.AddFlag("--no-log", &request->no_log, "Write no files");
+  Option replay = command
+                      .AddOption("--replay", &request->replay,
+                                 "Repeat a recorded run and compare every number bit for bit")
+                      .TypeName("RUN_DIR");
+  Option out = command
+                   .AddOption("--out", &request->out,
+                              "Folder for the results, made by the run (runs/SCENARIO by default)")
+                   .TypeName("DIR");
+  Option set = command
+                   .AddOption("--set", &request->overrides,
+                              "Set a key of the scenario, or with model. before it one of the parameter file")
+                   .TypeName("KEY=VALUE")
+                   .Repeatable();
+  Option seed = command.AddOption("--seed", &request->seed, "Vary posture and grasp at random; 0 does not")
+                    .TypeName("N")
+                    .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
+  Option no_check = command.AddFlag("--no-check", &request->no_check, "Simulate without cross-checks");
+  Option video = command.AddFlag("--video", &request->video, "Draw the run as a video, video.mp4");
+  Option no_report =
+      command.AddFlag("--no-report", &request->no_report, "Write the log and the summary only");
+  Option no_log = command.AddFlag("--no-log", &request->no_log, "Write no files");
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   scenario.Excludes(list).Excludes(replay);
   list.Excludes(replay);
+  // What would be ignored is refused.
+  no_log.Excludes(video).Excludes(out);
+  for (Option option : {out, set, seed, no_check, video, no_report, no_log}) {
+    option.Excludes(replay).Excludes(list);
+  }
   command.SetAction([=] {
     if (request->scenario.empty() && !request->list && request->replay.empty()) {
       throw UsageError("SCENARIO (or --list, or --replay) is required");

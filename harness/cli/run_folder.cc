@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <charconv>
 #include <sstream>
 #include <system_error>
 
@@ -9,6 +10,7 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/cli/shipped_files.h"
+#include "harness/record/mjcf_files.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -27,6 +29,17 @@ ScenarioFiles Open(const std::filesystem::path& path, const std::vector<std::str
   files.robot = OrShipped(files.scenario.model_file, "controller/parameters/assistant_robot.toml");
   files.mjcf = OrShipped(files.scenario.mjcf_file, "mjcf/scene.xml");
   return files;
+}
+
+std::uint64_t ReadSeed(const LogReader& log, const std::filesystem::path& path) {
+  const std::string text = log.ReadText("seed");
+  std::uint64_t seed = 0;
+  const char* const end = text.data() + text.size();
+  if (const auto result = std::from_chars(text.data(), end, seed);
+      result.ec == std::errc() && result.ptr == end) {
+    return seed;
+  }
+  throw InputError(path.string() + ": seed: must be a whole number, got " + Quote(text));
 }
 
 }  // namespace
@@ -75,6 +88,14 @@ RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(p
   }
 }
 
+std::filesystem::path FindEmbedded(const LogReader& log, const std::string& kind,
+                                   const std::filesystem::path& unpacked) {
+  const std::string name = kind + "/" + log.ReadText(kind);
+  (void)log.ReadFile("inputs", name);  // which is an error unless the log has it
+  if (kind == "mjcf") (void)ListMjcfFiles(unpacked / name);
+  return unpacked / name;
+}
+
 RecordedRun::RecordedRun(const std::filesystem::path& folder) : log_(folder / "log.h5") {
   log_.ExtractFiles("inputs", unpacked_.path());
   std::vector<std::string> overrides;
@@ -84,9 +105,9 @@ RecordedRun::RecordedRun(const std::filesystem::path& folder) : log_(folder / "l
     const bool is_file = line.starts_with("model.file=") || line.starts_with("plant.mjcf=");
     if (!is_file) overrides.push_back(line);
   }
-  files_ = Open(unpacked_.path() / "scenario.toml", overrides, std::stoull(log_.ReadText("seed")));
-  files_.robot = unpacked_.path() / "robot" / log_.ReadText("robot");
-  files_.mjcf = unpacked_.path() / "mjcf" / log_.ReadText("mjcf");
+  files_ = Open(unpacked_.path() / "scenario.toml", overrides, ReadSeed(log_, folder / "log.h5"));
+  files_.robot = FindEmbedded(log_, "robot", unpacked_.path());
+  files_.mjcf = FindEmbedded(log_, "mjcf", unpacked_.path());
 }
 
 bool RecordedRun::was_checked() const {

@@ -10,6 +10,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/handling/pick_and_place.h"
+#include "harness/cli/run_folder.h"
 #include "harness/common/files.h"
 #include "harness/record/log_reader.h"
 
@@ -26,7 +27,7 @@ class FramesReader {
   MjModelPtr ReadModel() const {
     const TemporaryFolder folder;
     log_.ExtractFiles("inputs", folder.path());
-    const std::filesystem::path mjcf = folder.path() / "mjcf" / log_.ReadText("mjcf");
+    const std::filesystem::path mjcf = FindEmbedded(log_, "mjcf", folder.path());
     try {
       return LoadMjcf(mjcf);
     } catch (const InputError& error) {

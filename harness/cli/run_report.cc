@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 
 namespace dexcheck::cli {
 namespace {
@@ -64,10 +63,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     if (loop.task() != nullptr) PrintTask(loop);
     if (loop.is_checking()) PrintChecks(setup, loop);
     PrintSpeed(loop, result);
-    if (!folder.empty()) {
-      const bool reported = std::filesystem::exists(std::filesystem::path(folder) / "report.html");
-      fmt::print("{} in {}\n", reported ? "log, summary and report" : "log and summary", folder);
-    }
+    if (!folder.empty()) fmt::print("log and summary in {}\n", folder);
     fmt::print("\n");
   }
   switch (result.verdict) {

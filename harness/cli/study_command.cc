@@ -15,6 +15,7 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/study_files.h"
+#include "harness/common/interrupts.h"
 #include "harness/study/study_report.h"
 #include "harness/study/study_store.h"
 #include "harness/study/trial_pool.h"
@@ -177,6 +178,7 @@ void AddStudyCommand(Command app) {
   report.AddOption("--out", page.get(), "The page (DB.html by default); - for standard output")
       .TypeName("FILE.html");
   report.SetAction([=] {
+    RequirePageName(*page);
     const StudyStore store = StudyStore::Open(request->database);
     OutputFile out(page->empty() ? request->database + ".html" : *page);
     out.Write(MakeStudyReport(store));

@@ -3,12 +3,15 @@
 #include <stdlib.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <system_error>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/common/interrupts.h"
 
 namespace dexcheck {
 
@@ -25,12 +28,26 @@ std::string ReadBytes(const std::filesystem::path& path) {
   return bytes;
 }
 
+std::string ExtensionOf(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = 'A' <= c && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return extension;
+}
+
 TemporaryFolder::TemporaryFolder() {
-  std::string pattern = (std::filesystem::temp_directory_path() / "dexcheck-XXXXXX").string();
+  std::error_code error;
+  const std::filesystem::path parent = std::filesystem::temp_directory_path(error);
+  if (error) {
+    const char* const named = std::getenv("TMPDIR");
+    throw InputError("TMPDIR: must name a folder, got " + Quote(named == nullptr ? "/tmp" : named));
+  }
+  const HeldSignals until_protected;
+  std::string pattern = (parent / "dexcheck-XXXXXX").string();
   if (::mkdtemp(pattern.data()) == nullptr) {
     throw InputError(pattern + ": cannot be made: " + std::strerror(errno));
   }
   path_ = pattern;
+  protection_.emplace(path_);
 }
 
 TemporaryFolder::~TemporaryFolder() {

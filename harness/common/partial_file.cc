@@ -28,6 +28,7 @@ PartialFile::PartialFile(const std::filesystem::path& target) : path_(target), t
   }
   const std::string partial =
       target_.string() + ".partial-" + std::to_string(::getpid()) + "-" + std::to_string(count++);
+  protection_.emplace(partial);
   const int descriptor = ::open(partial.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
   if (descriptor < 0) Fail(std::strerror(errno));
   ::close(descriptor);
@@ -39,12 +40,14 @@ PartialFile::~PartialFile() { Abort(); }
 void PartialFile::Commit() {
   if (std::rename(partial_.c_str(), target_.c_str()) != 0) Fail(std::strerror(errno));
   partial_.clear();
+  protection_.reset();
 }
 
 void PartialFile::Abort() {
   if (partial_.empty()) return;
   std::remove(partial_.c_str());
   partial_.clear();
+  protection_.reset();
 }
 
 void PartialFile::Fail(const std::string& reason) const {

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
+
+#include "harness/common/temporary_path.h"
 
 namespace dexcheck {
 
 /// A file that is written under a temporary name beside its target and takes the target's name when it is
-/// complete. Destroyed before that, it leaves nothing behind.
+/// complete. Destroyed before that, it leaves nothing behind; nor does a signal that ends the program.
 class PartialFile {
  public:
   /// Creates the temporary file, so that a bad path is known before long work starts.
@@ -31,6 +34,7 @@ class PartialFile {
   std::filesystem::path path_;     // as given, for messages
   std::filesystem::path target_;   // links followed
   std::filesystem::path partial_;  // empty once committed or removed
+  std::optional<TemporaryPath> protection_;
 };
 
 }  // namespace dexcheck

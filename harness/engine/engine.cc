@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "controller/common/errors.h"
+#include "harness/common/temporary_path.h"
 #include "harness/engine/finite_check.h"
 #include "harness/engine/torus_collision.h"
 
@@ -29,6 +30,7 @@ void InstallMessageHandlers() {
   };
   mju_user_error = [](const char* message) {
     std::fprintf(stderr, "dexcheck: MuJoCo error: %s\n", message);
+    RemoveTemporaryPaths();
     std::_Exit(kEngineFailureExitCode);
   };
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace dexcheck {
@@ -38,5 +39,10 @@ struct LogContent {
   std::map<std::string, ReservedText> reserved_texts;
   std::vector<EmbeddedFile> files;
 };
+
+/// Whether a name is a relative path of plain components, which stays below its folder: no empty ones, no "."
+/// or
+/// "..", no backslashes or control characters.
+bool IsPlainPath(std::string_view name);
 
 }  // namespace dexcheck

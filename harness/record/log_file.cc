@@ -287,6 +287,19 @@ int WriteAt(int descriptor, const void* bytes, size_t count, std::uint64_t offse
   return 0;
 }
 
+int ReadExactly(int descriptor, void* bytes, size_t count, std::uint64_t offset) {
+  size_t done = 0;
+  while (done < count) {
+    const ssize_t step = ::pread(descriptor, static_cast<char*>(bytes) + done, count - done,
+                                 static_cast<off_t>(offset + done));
+    if (step < 0 && errno == EINTR) continue;
+    if (step < 0) return errno;
+    if (step == 0) return EIO;
+    done += static_cast<size_t>(step);
+  }
+  return 0;
+}
+
 int CopyBytes(int from, std::uint64_t from_offset, int to, std::uint64_t to_offset, size_t count) {
   constexpr size_t kChunk = size_t{1} << 20;
   std::vector<char> chunk(std::min(kChunk, count));

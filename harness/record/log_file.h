@@ -42,6 +42,10 @@ class FileDescriptor {
 /// Writes all bytes at the offset, or returns the system's error number; 0 is success.
 int WriteAt(int descriptor, const void* bytes, size_t count, std::uint64_t offset);
 
+/// Reads all bytes at the offset, or returns the system's error number; 0 is success, EIO a file that ends
+/// before.
+int ReadExactly(int descriptor, void* bytes, size_t count, std::uint64_t offset);
+
 /// Copies bytes between files, or returns the system's error number; 0 is success.
 int CopyBytes(int from, std::uint64_t from_offset, int to, std::uint64_t to_offset, size_t count);
 

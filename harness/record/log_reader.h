@@ -1,22 +1,24 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "controller/common/types.h"
 #include "harness/record/log_content.h"
+#include "harness/record/log_file.h"
+#include "harness/record/log_structure.h"
 
 namespace dexcheck {
 
 /// Reads logs that LogWriter wrote, also unfinished ones: of a killed run, or of one that still goes on.
-/// Every member throws InputError, one line that names the file and says what is wrong.
+/// Every member throws InputError, one line that names the file and says what is wrong. A forged log cannot
+/// crash the reader, nor make it read or write anything outside (see log_structure.h).
 class LogReader {
  public:
   /// Opens the log and compares everything but its numbers with the checksum.
   explicit LogReader(const std::filesystem::path& path);
-  ~LogReader();
   LogReader(const LogReader&) = delete;
   LogReader& operator=(const LogReader&) = delete;
 
@@ -37,17 +39,17 @@ class LogReader {
   [[nodiscard]] std::string ReadFile(const std::string& group, const std::string& relative_name) const;
 
   /// Writes the files of a group into a folder, which it makes when it is not there. What it cannot write is
-  /// an error, and so is a file that is already there.
+  /// an error, and so is a file that is already there; links in that folder are not followed.
   void ExtractFiles(const std::string& group, const std::filesystem::path& folder) const;
 
  private:
-  struct Hdf5;  // keeps HDF5's headers out of this one
-
-  void ReadSignals();
   void CountRows();
+  void Read(std::uint64_t begin, size_t count, void* out) const;
+  [[nodiscard]] std::string ReadRange(const ByteRange& range) const;
 
   std::filesystem::path path_;
-  std::unique_ptr<Hdf5> hdf5_;
+  FileDescriptor file_;
+  LogStructure structure_;
   std::vector<SignalInfo> signals_;
   long rows_ = 0;
 };

@@ -14,6 +14,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/common/temporary_path.h"
 
 namespace dexcheck {
 namespace {
@@ -22,19 +23,6 @@ constexpr double kUnwritten = std::numeric_limits<double>::quiet_NaN();
 
 /// HDF5 keeps all attributes of an object together in 64 kB; a name takes 16 bytes.
 constexpr size_t kMaxNames = 3000;
-
-/// Whether a name is a path of plain components: no empty ones, no "." or "..", no control characters.
-bool IsPlainPath(std::string_view name) {
-  size_t begin = 0;
-  while (begin <= name.size()) {
-    const size_t end = std::min(name.find('/', begin), name.size());
-    const std::string_view part = name.substr(begin, end - begin);
-    if (part.empty() || part == "." || part == "..") return false;
-    begin = end + 1;
-  }
-  return std::none_of(name.begin(), name.end(),
-                      [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
-}
 
 [[noreturn]] void Refuse(const std::string& what, const std::string& requirement) {
   throw std::invalid_argument(what + ": " + requirement);
@@ -78,6 +66,7 @@ int Publish(const std::filesystem::path& from, const std::filesystem::path& to) 
 /// Removes a file on leaving the scope, unless it has been moved away.
 struct Remover {
   const std::filesystem::path& path;
+  const TemporaryPath protection{path};  // against signals
   ~Remover() { ::unlink(path.c_str()); }
 };
 

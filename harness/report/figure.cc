@@ -13,6 +13,7 @@
 #include <limits>
 
 #include "controller/common/errors.h"
+#include "harness/common/temporary_path.h"
 #include "harness/report/thinning.h"
 
 extern char** environ;
@@ -151,6 +152,7 @@ void RunGnuplot(const std::filesystem::path& folder) {
     throw InputError(std::string("gnuplot: cannot be run: ") + std::strerror(error) +
                      " (Debian's package gnuplot-nox has it)");
   }
+  const TemporaryChild child(process);
   int status = 0;
   while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
   }

@@ -12,7 +12,9 @@
 
 #include "controller/common/errors.h"
 #include "harness/common/files.h"
+#include "harness/common/interrupts.h"
 #include "harness/common/partial_file.h"
+#include "harness/common/temporary_path.h"
 #include "harness/report/run_figures.h"
 
 namespace dexcheck {
@@ -32,12 +34,14 @@ void WriteText(const std::string& text, const PartialFile& file) {
 class FigureFolder {
  public:
   explicit FigureFolder(fs::path folder) : folder_(std::move(folder)) {
+    const HeldSignals until_protected;
     std::error_code error;
     made_ = fs::create_directory(folder_, error);
     if (error || !fs::is_directory(folder_)) {
       throw InputError(folder_.string() +
                        ": cannot be made: " + (error ? error.message() : std::strerror(ENOTDIR)));
     }
+    if (made_) protection_.emplace(folder_);
   }
   ~FigureFolder() {
     files_.clear();
@@ -57,12 +61,14 @@ class FigureFolder {
   void Commit() {
     for (const auto& file : files_) file->Commit();
     made_ = false;
+    protection_.reset();
   }
 
  private:
   fs::path folder_;
   std::vector<std::unique_ptr<PartialFile>> files_;
   bool made_ = false;
+  std::optional<TemporaryPath> protection_;  // of a folder that was made
 };
 
 /// The video beside the log, and how the page can link to it.

@@ -16,6 +16,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/common/interrupts.h"
 
 namespace dexcheck {
 namespace {
@@ -86,9 +87,7 @@ std::vector<long> TrialPool::ListRunning() const {
 void TrialPool::Work(const Trial& trial, int results, int messages, pid_t parent) const {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(EXIT_FAILURE);
-  // Ctrl-C reaches the whole group; the parent decides.
-  std::signal(SIGINT, SIG_IGN);
-  std::signal(SIGTERM, SIG_DFL);
+  LeaveInterruptsToParent();
   ::dup2(messages, STDERR_FILENO);
   try {
     ::_exit(WriteAll(results, Pack(run_(trial))) ? EXIT_SUCCESS : EXIT_FAILURE);

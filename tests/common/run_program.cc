@@ -23,14 +23,15 @@ void Redirect(int descriptor, const std::filesystem::path& path) {
 [[noreturn]] void Execute(const std::vector<std::string>& command, const ProgramOptions& options,
                           const std::filesystem::path& captured) {
   Redirect(STDOUT_FILENO, options.out.value_or(captured / "out"));
-  Redirect(STDERR_FILENO, captured / "err");
+  Redirect(STDERR_FILENO, options.err.value_or(captured / "err"));
+  for (const int stream : options.closed) ::close(stream);
   if (!options.folder.empty() && ::chdir(options.folder.c_str()) != 0) ::_exit(kCannotStart);
   for (const auto& [name, value] : options.environment) ::setenv(name.c_str(), value.c_str(), 1);
   if (options.largest_file) {
     const rlimit limit{*options.largest_file, *options.largest_file};
     if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(kCannotStart);
-    std::signal(SIGXFSZ, SIG_IGN);  // then writing fails, as on a full disk
   }
+  for (const int signal : {SIGHUP, SIGPIPE}) std::signal(signal, SIG_DFL);  // nohup's are ignored
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
@@ -61,7 +62,7 @@ ProgramResult Program::Wait() {
   ProgramResult result;
   if (WIFEXITED(status)) result.exit_code = WEXITSTATUS(status);
   if (std::filesystem::exists(captured_.path() / "out")) result.out = ReadText(captured_.path() / "out");
-  result.err = ReadText(captured_.path() / "err");
+  if (std::filesystem::exists(captured_.path() / "err")) result.err = ReadText(captured_.path() / "err");
   return result;
 }
 

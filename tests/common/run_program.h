@@ -24,8 +24,10 @@ struct ProgramResult {
 struct ProgramOptions {
   std::filesystem::path folder;                                       ///< Where it runs; here unless given.
   std::vector<std::pair<std::string, std::string>> environment = {};  ///< Added to this process's.
-  std::optional<rlim_t> largest_file = {};        ///< Bytes; the program cannot write more into one file.
+  std::optional<rlim_t> largest_file = {};  ///< Bytes; more in one file is SIGXFSZ, as after `ulimit -f`.
   std::optional<std::filesystem::path> out = {};  ///< Standard output goes into this file instead.
+  std::optional<std::filesystem::path> err = {};  ///< Standard error goes into this file instead.
+  std::vector<int> closed = {};                   ///< Standard streams that it finds closed.
   unsigned seconds = 60;                          ///< After these it is ended by force.
 };
 

@@ -143,6 +143,66 @@ TEST(VideoWriter, SameFramesGiveTheSameBytes) {
   }
 }
 
+/// What ffprobe says of a file's only stream.
+nlohmann::json Probe(const fs::path& path) {
+  const testing::ProgramResult probe =
+      RunProgram({DEXCHECK_FFPROBE, "-v", "error", "-count_frames", "-show_streams", "-show_format", "-of",
+                  "json", path.string()});
+  EXPECT_EQ(probe.exit_code, 0) << probe.err;
+  return nlohmann::json::parse(probe.out);
+}
+
+TEST(VideoWriter, WritesWhatTheNameSays) {
+  struct Format {
+    const char* name;
+    const char* codec;
+    const char* container;
+    int levels;  // how far colours may be off
+  };
+  // Plain colours; a GIF has those of its first frame and 64 others, at most 43 from any.
+  constexpr int kVideoLevels = 6;
+  constexpr int kGifLevels = 43;
+  const TempFolder folder;
+  for (const Format& format :
+       {Format{"a.webm", "vp9", "matroska,webm", kVideoLevels}, Format{"a.gif", "gif", "gif", kGifLevels},
+        Format{"A.MP4", "h264", "mov,mp4", kVideoLevels}}) {
+    const fs::path path = folder.path() / format.name;
+    WriteVideo(path, 20);
+    const nlohmann::json json = Probe(path);
+    EXPECT_EQ(json["streams"][0]["codec_name"], format.codec);
+    EXPECT_EQ(json["format"]["format_name"].get<std::string>().find(format.container), 0U) << format.name;
+    EXPECT_EQ(json["streams"][0]["nb_read_frames"], "20") << format.name;
+    EXPECT_NEAR(std::stod(json["format"]["duration"].get<std::string>()), 20.0 / 25.0, 0.01) << format.name;
+    const testing::ProgramResult decoded =
+        RunProgram({DEXCHECK_FFMPEG, "-v", "error", "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"});
+    ASSERT_EQ(decoded.out.size(), 20UL * 3 * kWidth * kHeight) << format.name;
+    for (size_t k = 0; k < 20; ++k) {
+      const Image expected = MakeFrame(static_cast<int>(k));
+      for (size_t c = 0; c < 3; ++c) {
+        const int value = static_cast<unsigned char>(decoded.out[k * 3 * kWidth * kHeight + c]);
+        EXPECT_NEAR(value, expected.rgb[c], format.levels) << format.name << ", frame " << k;
+      }
+    }
+    const std::string bytes = testing::ReadText(path);
+    fs::remove(path);
+    WriteVideo(path, 20);
+    EXPECT_TRUE(testing::ReadText(path) == bytes) << format.name << ": same frames, same bytes";
+  }
+}
+
+TEST(VideoWriter, RefusesNamesOfOtherFormats) {
+  const TempFolder folder;
+  for (const char* name : {"a.avi", "a.png", "a", "mp4", "a.mp4.txt"}) {
+    EXPECT_TRUE(Throws<InputError>([&] { VideoWriter video(folder.path() / name, MakeOptions()); },
+                                   "a film's name must end in .mp4, .webm or .gif"));
+  }
+  VideoOptions options = MakeOptions();
+  options.fps = kMostGifFramesPerSecond + 1;
+  EXPECT_TRUE(Throws<std::invalid_argument>([&] { VideoWriter video(folder.path() / "a.gif", options); },
+                                            "must be at most 50 in a GIF"));
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
 TEST(VideoWriter, LeavesNothingUnlessFinished) {
   const TempFolder folder;
   testing::WriteText(folder.path() / "old.mp4", "old");

@@ -132,6 +132,26 @@ TEST_F(RenderCommandTest, WritesAStillOfTwoRuns) {
   EXPECT_EQ(image.height, 90);
 }
 
+TEST_F(RenderCommandTest, WritesWhatTheNameSays) {
+  WriteRun(run_, 0.2);
+  struct Output {
+    const char* name;
+    const char* begin;  // of the file's bytes
+    bool still;
+  };
+  for (const Output& output :
+       {Output{"/a.gif", "GIF89a", false}, Output{"/a.WEBM", "\x1a\x45\xdf\xa3", false},
+        Output{"/a.png", "\x89PNG", true}, Output{"/a.jpg", "\xff\xd8\xff", true},
+        Output{"/a.JPEG", "\xff\xd8\xff", true}}) {
+    std::vector<std::string> command = {"render", run_, "--size", "64x64",
+                                        "--fps",  "10", "--out",  run_ + output.name};
+    if (output.still) command.insert(command.end(), {"--still", "0.1"});
+    const testing::ProgramResult result = RunDexcheck(command);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(testing::ReadText(run_ + output.name), ::testing::StartsWith(output.begin)) << output.name;
+  }
+}
+
 TEST_F(RenderCommandTest, TheEndOfTheLastStepIsPartOfTheRun) {
   WriteRun(run_, 0.1);
   const auto draw = [&](const char* time, const char* out) {
@@ -162,6 +182,14 @@ TEST_F(RenderCommandTest, RefusesBadRequestsAndLeavesNothing) {
   for (const char* size : {"1280", "x", "1280x721", "0x720", "1280x720x3", "99999x99999", "-2x4"}) {
     EXPECT_TRUE(refused({std::string("--size=") + size}, {"--size: must be WIDTHxHEIGHT", size}));
   }
+  for (const char* name : {"/film.avi", "/film", "/film.png", "/film.jpg"}) {
+    EXPECT_TRUE(refused({"--out", run_ + name}, {name, "a film's name must end in .mp4, .webm or .gif"}));
+  }
+  for (const char* name : {"/still.mp4", "/still", "/still.tiff"}) {
+    EXPECT_TRUE(refused({"--still", "0", "--out", run_ + name},
+                        {name, "a picture's name must end in .png, .jpg or .jpeg"}));
+  }
+  EXPECT_TRUE(refused({"--out", run_ + "/film.gif", "--fps", "60"}, {"--fps: must be at most 50 for a GIF"}));
   EXPECT_TRUE(refused({"--fps", "0"}, {"--fps", "must be a whole number from 1 to 120"}));
   EXPECT_TRUE(refused({"--beside", "/nowhere"}, {"/nowhere/log.h5"}));
   EXPECT_TRUE(refused({"--camra", "top"}, {"did you mean \"--camera\"?"}));

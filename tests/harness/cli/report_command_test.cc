@@ -73,6 +73,9 @@ TEST_F(ReportCommandTest, RefusesOutputsThatCannotBeWritten) {
     EXPECT_TRUE(IsRefused(RunDexcheck({"report", run_dir().string(), "--out", out.string()}),
                           {out.string(), "cannot be written"}));
   }
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck({"report", run_dir().string(), "--out", (folder_.path() / "page.pdf").string()}),
+                {"page.pdf", "a page's name must end in .html"}));
   testing::WriteText(run_dir() / "figures", "a file");
   EXPECT_TRUE(IsRefused(RunDexcheck({"report", run_dir().string()}), {"figures", "cannot be made"}));
   EXPECT_FALSE(fs::exists(run_dir() / "report.html"));

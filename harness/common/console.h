@@ -1,0 +1,20 @@
+#pragma once
+
+// Standard output and standard error, which may be closed, full or gone.
+
+#include <string>
+
+namespace dexcheck {
+
+/// To be called first thing in main. A standard stream that is closed gets a descriptor that takes nothing:
+/// otherwise the next file to be opened, such as a log, would get its number and what is printed.
+void OccupyStandardStreams();
+
+/// One line on standard error, "dexcheck: " and the text, whatever control characters stand in file names.
+/// Whether it can be written does not matter.
+void Warn(const std::string& text);
+
+/// Writes what was printed. @throws InputError "standard output: cannot be written: reason".
+void FlushOutput();
+
+}  // namespace dexcheck

@@ -1,0 +1,58 @@
+// What harness/quickstart.sh asks of dexcheck, with a build and a program that only say what they were told.
+
+#include <gtest/gtest.h>
+
+#include "tests/common/paths.h"
+#include "tests/common/run_program.h"
+
+namespace dexcheck {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ReadText;
+using testing::WriteText;
+
+class Quickstart : public ::testing::Test {
+ protected:
+  Quickstart() {
+    WriteScript("harness/quickstart.sh", ReadText(testing::SourcePath("/harness/quickstart.sh")));
+    WriteScript("harness/install-packages.sh", "#!/bin/sh\n");
+    WriteScript("bin/cmake", "#!/bin/sh\n");
+    WriteScript("build/release/bin/dexcheck", "#!/bin/sh\necho \"$@\"\n");
+  }
+
+  /// What dexcheck is told.
+  [[nodiscard]] std::string Run(const std::vector<std::string>& arguments) const {
+    std::vector<std::string> command = {folder_.path() / "harness/quickstart.sh"};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    testing::ProgramOptions options;
+    options.environment = {{"PATH", (folder_.path() / "bin").string() + ":/usr/bin:/bin"}};
+    const testing::ProgramResult result = testing::RunProgram(command, options);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.out;
+  }
+
+ private:
+  void WriteScript(const fs::path& name, const std::string& text) const {
+    const fs::path path = folder_.path() / name;
+    fs::create_directories(path.parent_path());
+    WriteText(path, text);
+    fs::permissions(path, fs::perms::owner_all);
+  }
+
+  testing::TempFolder folder_;
+};
+
+TEST_F(Quickstart, RunsThePapersExperimentUnlessToldOtherwise) {
+  EXPECT_EQ(Run({}), "run paper\n");
+  EXPECT_EQ(Run({"--set", "duration=1"}), "run paper --set duration=1\n");
+  EXPECT_EQ(Run({"--quiet", "--out", "folder", "--seed", "3"}), "run paper --quiet --out folder --seed 3\n");
+  EXPECT_EQ(Run({"--set=duration=1"}), "run paper --set=duration=1\n");
+  EXPECT_EQ(Run({"curve", "--set", "duration=1"}), "run curve --set duration=1\n");
+  EXPECT_EQ(Run({"--set", "duration=1", "curve"}), "run --set duration=1 curve\n");
+  EXPECT_EQ(Run({"--list"}), "run --list\n");
+  EXPECT_EQ(Run({"--replay", "folder"}), "run --replay folder\n");
+}
+
+}  // namespace
+}  // namespace dexcheck
