@@ -97,9 +97,11 @@ void ClosedLoop::PlaceRobot() {
   plant_.SetState(state);
 }
 
-void ClosedLoop::Settle() {
-  SettleOn(LineTrajectory(setup_->X_start(), Vector6d::Zero(), 0.0), setup_->scenario().settle);
-  if (setup_->scenario().start == Start::kMoving) StartMoving(trajectory_->Evaluate(0.0));
+bool ClosedLoop::Settle(const std::function<bool()>& should_stop) {
+  const LineTrajectory rest(setup_->X_start(), Vector6d::Zero(), 0.0);
+  if (!SettleOn(rest, setup_->scenario().settle, should_stop)) return false;
+  const bool moving = setup_->scenario().start == Start::kMoving;
+  if (moving && !StartMoving(trajectory_->Evaluate(0.0), should_stop)) return false;
   if (task_) {
     const std::string where = setup_->scenario().source + ": task: ";
     try {
@@ -113,13 +115,16 @@ void ClosedLoop::Settle() {
   }
   times_ = LoopTimes{};
   checks_.Reset();
+  return true;
 }
 
-void ClosedLoop::SettleOn(const Trajectory& trajectory, double duration) {
+bool ClosedLoop::SettleOn(const Trajectory& trajectory, double duration,
+                          const std::function<bool()>& should_stop) {
   const double dt = plant_.time_step();
   const long count = std::lround(duration / dt);
   checks_.Reset();
   for (long i = 0; i < count; ++i) {
+    if (should_stop()) return false;
     const double t = static_cast<double>(i) * dt;
     ControlStep(EvaluateDesired(trajectory, t), i, t - duration);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
@@ -127,9 +132,10 @@ void ClosedLoop::SettleOn(const Trajectory& trajectory, double duration) {
       checks_.Compare(plant_, controller_, state_, tau_, &observer_, t - duration, DescribeHandling());
     CheckGrasp();
   }
+  return true;
 }
 
-void ClosedLoop::StartMoving(const DesiredMotion& at_start) {
+bool ClosedLoop::StartMoving(const DesiredMotion& at_start, const std::function<bool()>& should_stop) {
   const RobotModel& model = setup_->model();
   const Vector3d v = at_start.X_d_dot.head<3>();
   const Vector3d heading(std::cos(state_.q[2]), std::sin(state_.q[2]), 0.0);
@@ -151,7 +157,7 @@ void ClosedLoop::StartMoving(const DesiredMotion& at_start) {
 
   Vector6d velocity = Vector6d::Zero();
   velocity.head<3>() = v;
-  SettleOn(LineTrajectory(setup_->X_start(), velocity, 0.0), kSettleMoving);
+  if (!SettleOn(LineTrajectory(setup_->X_start(), velocity, 0.0), kSettleMoving, should_stop)) return false;
 
   // Back to where it began: on a level floor every place is alike.
   EngineState moved = plant_.GetState();
@@ -162,6 +168,7 @@ void ClosedLoop::StartMoving(const DesiredMotion& at_start) {
   moved.qpos.segment<2>(base) -= way.head<2>();
   moved.qpos.segment<3>(body) -= way;
   plant_.SetState(moved);
+  return true;
 }
 
 DesiredMotion ClosedLoop::EvaluateDesired(const Trajectory& trajectory, double t) const {

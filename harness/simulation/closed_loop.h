@@ -53,8 +53,10 @@ class ClosedLoop {
   ClosedLoop(const Setup& setup, bool check);
 
   /// Holds the object until all has come to rest (and then moves on, for a moving start): call once, before
-  /// the first Step, at t = 0. @throws as Step.
-  void Settle();
+  /// the first Step, at t = 0.
+  /// @param should_stop asked before each step of settling.
+  /// @return whether all came to rest; false when it was stopped before. @throws as Step.
+  bool Settle(const std::function<bool()>& should_stop = [] { return false; });
 
   /// Number of steps of the scenario's duration, the most that a task may take.
   [[nodiscard]] long num_steps() const { return num_steps_; }
@@ -101,8 +103,8 @@ class ClosedLoop {
  private:
   void PlaceRobot();
   void CheckMovingStart() const;
-  void StartMoving(const DesiredMotion& at_start);
-  void SettleOn(const Trajectory& trajectory, double duration);
+  bool StartMoving(const DesiredMotion& at_start, const std::function<bool()>& should_stop);
+  bool SettleOn(const Trajectory& trajectory, double duration, const std::function<bool()>& should_stop);
   void ControlStep(const DesiredMotion& desired, long step, double t);
   [[nodiscard]] DesiredMotion EvaluateDesired(const Trajectory& trajectory, double t) const;
   void CompareModel();

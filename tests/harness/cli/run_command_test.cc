@@ -134,6 +134,33 @@ TEST(RunCommand, CtrlCWritesWhatThereIs) {
   EXPECT_EQ(LogReader(out / "log.h5").rows(), summary["speed"]["steps"].get<long>());
 }
 
+TEST(RunCommand, CtrlCEndsSettlingToo) {
+  // The second settles twice, the second time while it moves: as short before as the test can tell.
+  for (const std::vector<std::string>& settings :
+       {std::vector<std::string>{"hold", "--set", "settle=100"},
+        {"paper", "--set", "settle=1e-4", "--set", "plant.time_step=1e-6", "--set", "duration=1e-3"}}) {
+    const TempFolder folder;
+    const std::filesystem::path out = folder.path() / "run";
+    std::vector<std::string> arguments = {"run"};
+    arguments.insert(arguments.end(), settings.begin(), settings.end());
+    arguments.insert(arguments.end(), {"--out", out.string()});
+    Program program(testing::DexcheckCommand(arguments), {});
+    for (int i = 0; i < 300 && !std::filesystem::exists(out / "log.h5"); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    program.Signal(SIGINT);
+    const auto begin = std::chrono::steady_clock::now();
+    const ProgramResult result = program.Wait();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+    EXPECT_EQ(result.exit_code, 3) << result.err;
+    EXPECT_THAT(result.out, HasSubstr("interrupted"));
+    const nlohmann::json summary = ReadSummary(out);
+    EXPECT_TRUE(summary["interrupted"].get<bool>());
+    EXPECT_EQ(summary["speed"]["steps"], 0);
+  }
+}
+
 TEST(RunCommand, AKilledRunLeavesAReadableLog) {
   const TempFolder folder;
   const std::filesystem::path out = folder.path() / "run";
