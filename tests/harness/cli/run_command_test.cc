@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "harness/record/log_reader.h"
+#include "harness/record/log_writer.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck {
@@ -93,6 +94,69 @@ TEST(RunCommand, WritesAFolderThatTellsAll) {
   EXPECT_TRUE(
       IsRefused(RunDexcheck({"run", "hold", "--out", out.string()}), {out.string(), "already holds files"}));
   EXPECT_EQ(ReadText(out / "summary.json"), before);
+}
+
+/// Writes a log again, with one number of its last row changed.
+void CopyLog(const std::filesystem::path& from, const std::filesystem::path& to, const std::string& changed,
+             double change) {
+  const LogReader log(from);
+  LogWriter copy(to, log.rows());
+  for (const std::string& text : log.ListTexts()) copy.SetText(text, log.ReadText(text));
+  for (const std::string& file : log.ListFiles("inputs")) {
+    copy.EmbedFile("inputs", file, log.ReadFile("inputs", file));
+  }
+  std::vector<std::pair<int, RowMatrixXd>> signals;
+  for (const SignalInfo& signal : log.signals()) {
+    RowMatrixXd values = log.ReadSignal(signal.name);
+    if (signal.name == changed) values(log.rows() - 1, 0) += change;
+    signals.emplace_back(signal.name == "time" ? LogWriter::kTime : copy.AddSignal(signal), values);
+  }
+  for (long row = 0; row < log.rows(); ++row) {
+    for (const auto& [signal, values] : signals) {
+      std::copy_n(values.row(row).data(), values.cols(), copy.Row(signal).data());
+    }
+    copy.EndRow();
+  }
+  copy.Close();
+}
+
+// The C library's mathematics without fused multiply-add has other last bits: another machine.
+TEST(RunCommand, AReplayTellsAnotherMachineFromAnotherRun) {
+  const TempFolder folder;
+  const std::filesystem::path out = folder.path() / "run";
+  ASSERT_EQ(RunDexcheck({"run", "hold", "--set", "duration=0.05", "--set", "settle=0.2", "--no-report",
+                         "--out", out.string()})
+                .exit_code,
+            0);
+  const std::string machine = LogReader(out / "log.h5").ReadText("machine");
+  EXPECT_EQ(ReadSummary(out)["machine"], machine);
+  EXPECT_THAT(machine, HasSubstr("; glibc 2."));
+  if (machine.find(" FMA") == std::string::npos) GTEST_SKIP() << "this machine has no fused multiply-add";
+
+  testing::ProgramOptions other;
+  other.environment = {{"GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX2,-FMA"}};
+  const auto replay = [&](const char* name, bool elsewhere) {
+    return RunDexcheck({"run", "--replay", (folder.path() / name).string()},
+                       elsewhere ? other : testing::ProgramOptions{});
+  };
+  EXPECT_THAT(replay("run", false).out, HasSubstr("IDENTICAL"));
+  const ProgramResult there = replay("run", true);
+  EXPECT_EQ(there.exit_code, 0);
+  EXPECT_THAT(there.out, HasSubstr("DIFFERENT MACHINE: "));
+  EXPECT_THAT(there.out, HasSubstr("written on:  " + machine));
+
+  // Less than rounding on the same machine is a difference; more than rounding on another one is, too.
+  for (const auto& [name, change] : {std::pair("slightly", 1e-15), {"much", 1e-6}}) {
+    std::filesystem::create_directory(folder.path() / name);
+    CopyLog(out / "log.h5", folder.path() / name / "log.h5", "object/X_o", change);
+    const ProgramResult here = replay(name, false);
+    EXPECT_EQ(here.exit_code, 1) << name;
+    EXPECT_THAT(here.out, HasSubstr("DIFFERENT: object/X_o at t = 0.049 s")) << name;
+    const ProgramResult elsewhere = replay(name, true);
+    const bool much = change > 1e-9;
+    EXPECT_EQ(elsewhere.exit_code, much ? 1 : 0) << name << elsewhere.out;
+    EXPECT_THAT(elsewhere.out, HasSubstr(much ? "Rounding alone does not explain" : "DIFFERENT MACHINE: "));
+  }
 }
 
 TEST(RunCommand, DisagreementIsExitCodeOneAndNamesTheCause) {
