@@ -125,7 +125,8 @@ TEST_F(StudyStoreTest, DifferentResultsOfOneTrialAreRefused) {
 }
 
 TEST_F(StudyStoreTest, BetweenMachinesResultsAreTheSameWithinRounding) {
-  const TrialRow row = MakeRow(0);
+  TrialRow row = MakeRow(0);
+  row.result.failure.clear();
   TrialRow other = row;
   for (double& metric : other.result.metrics) metric *= 1.0 + 1e-12;
   EXPECT_FALSE(IsSame(row, other)) << "bit for bit on one machine";
@@ -150,11 +151,11 @@ TEST_F(StudyStoreTest, BetweenMachinesResultsAreTheSameWithinRounding) {
   EXPECT_FALSE(IsSame(row, wrong));
   // A run that failed amplified its rounding until then.
   TrialRow later = other;
-  later.result.failure = "it's \"so\" a step later";
+  later.result.failure = "it fell at t = 2.001 s";
   later.result.metrics[kEnergy] *= 2.0;
-  EXPECT_TRUE(IsSame(row, later));
-  later.result.failure.clear();
   EXPECT_FALSE(IsSame(row, later)) << "one of them came to its end";
+  row.result.failure = "it fell at t = 2 s";
+  EXPECT_TRUE(IsSame(row, later));
 }
 
 TEST_F(StudyStoreTest, FailedTrialsGiveWay) {
