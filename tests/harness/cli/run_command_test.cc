@@ -111,6 +111,7 @@ void CopyLog(const std::filesystem::path& from, const std::filesystem::path& to,
     if (signal.name == changed) values(log.rows() - 1, 0) += change;
     signals.emplace_back(signal.name == "time" ? LogWriter::kTime : copy.AddSignal(signal), values);
   }
+  copy.StartRows();
   for (long row = 0; row < log.rows(); ++row) {
     for (const auto& [signal, values] : signals) {
       std::copy_n(values.row(row).data(), values.cols(), copy.Row(signal).data());
