@@ -18,6 +18,7 @@
 #include "harness/cli/shipped_files.h"
 #include "harness/common/console.h"
 #include "harness/common/interrupts.h"
+#include "harness/engine/machine.h"
 #include "harness/record/run_recorder.h"
 #include "harness/simulation/runner.h"
 
@@ -141,9 +142,21 @@ int ReplayRun(const Request& request) {
     fmt::print("IDENTICAL: {} steps of {} signals, bit for bit.\n", difference.rows, difference.signals);
     return kSuccess;
   }
-  fmt::print("DIFFERENT: {} at t = {} s: {} in the log, {} now.\n", difference.signal,
-             FormatNumber(difference.time), FormatNumber(difference.recorded), FormatNumber(difference.now));
-  return kDisagreement;
+  const std::string machine = recorded.machine();
+  const bool other_machine = machine != DescribeMachine();
+  const bool expected = other_machine && !machine.empty() && difference.within_rounding;
+  fmt::print("DIFFERENT{}: {} at t = {} s: {} in the log, {} now.\n", expected ? " MACHINE" : "",
+             difference.signal, FormatNumber(difference.time), FormatNumber(difference.recorded),
+             FormatNumber(difference.now));
+  if (!other_machine) return kDisagreement;
+  if (machine.empty()) {
+    fmt::print("The log does not tell on what machine it was written.\n");
+    return kDisagreement;
+  }
+  fmt::print("written on:  {}\nrepeated on: {}\n{}\n", machine, DescribeMachine(),
+             expected ? "All numbers agree within what rounding makes of that."
+                      : "Rounding alone does not explain the difference.");
+  return expected ? kSuccess : kDisagreement;
 }
 
 int Run(const Request& request) {

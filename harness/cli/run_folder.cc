@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <charconv>
+#include <cmath>
 #include <sstream>
 #include <system_error>
 
@@ -11,6 +12,7 @@
 #include "controller/common/toml_reader.h"
 #include "harness/cli/shipped_files.h"
 #include "harness/record/mjcf_files.h"
+#include "harness/engine/machine.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -40,6 +42,15 @@ std::uint64_t ReadSeed(const LogReader& log, const std::filesystem::path& path) 
     return seed;
   }
   throw InputError(path.string() + ": seed: must be a whole number, got " + Quote(text));
+}
+
+/// The largest finite value, without its sign.
+double CalcLargest(const RowMatrixXd& values) {
+  double largest = 0.0;
+  for (const double value : values.reshaped()) {
+    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  }
+  return largest;
 }
 
 }  // namespace
@@ -115,6 +126,12 @@ bool RecordedRun::was_checked() const {
                      [](const SignalInfo& signal) { return signal.name.starts_with("check/"); });
 }
 
+std::string RecordedRun::machine() const {
+  const std::vector<std::string> texts = log_.ListTexts();
+  const bool told = std::find(texts.begin(), texts.end(), "machine") != texts.end();
+  return told ? log_.ReadText("machine") : "";
+}
+
 ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) const {
   const LogReader other(other_log);
   const RowMatrixXd time = log_.ReadSignal("time");
@@ -125,11 +142,13 @@ ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) co
   for (const SignalInfo& signal : log_.signals()) {
     const RowMatrixXd recorded = log_.ReadSignal(signal.name);
     const RowMatrixXd now = other.ReadSignal(signal.name);
-    for (long row = 0; row < std::min<long>(first_row, recorded.rows()); ++row) {
+    const double scale = CalcLargest(recorded);
+    for (long row = 0; row < recorded.rows(); ++row) {
       for (Eigen::Index col = 0; col < recorded.cols(); ++col) {
         const double value = row < now.rows() ? now(row, col) : std::numeric_limits<double>::quiet_NaN();
         const double before = recorded(row, col);
         if (std::bit_cast<std::uint64_t>(before) == std::bit_cast<std::uint64_t>(value)) continue;
+        if (!IsSameWithin(kSignalTolerance, before, value, scale)) first.within_rounding = false;
         if (row >= first_row) continue;
         first_row = row;
         first.signal = signal.name;

@@ -47,6 +47,7 @@ class RunFolder {
 
 /// The first number in which two logs differ; no signal when they do not.
 struct ReplayDifference {
+  bool within_rounding = true;  ///< All numbers agree as those of different machines do.
   std::string signal;
   double time = 0.0;
   double recorded = 0.0;
@@ -68,6 +69,8 @@ class RecordedRun {
   [[nodiscard]] const ScenarioFiles& files() const { return files_; }
   [[nodiscard]] long rows() const { return log_.rows(); }
   [[nodiscard]] bool was_checked() const;
+  /// What the bits depended on, as DescribeMachine says; empty when the log does not tell.
+  [[nodiscard]] std::string machine() const;
   [[nodiscard]] ReplayDifference Compare(const std::filesystem::path& other_log) const;
   [[nodiscard]] const LogReader& log() const { return log_; }
 

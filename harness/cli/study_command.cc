@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <charconv>
+#include <deque>
+#include <filesystem>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -14,8 +17,11 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
+#include "harness/cli/slurm_script.h"
 #include "harness/cli/study_files.h"
 #include "harness/common/interrupts.h"
+#include "harness/common/partial_file.h"
+#include "harness/engine/machine.h"
 #include "harness/study/study_report.h"
 #include "harness/study/study_store.h"
 #include "harness/study/trial_pool.h"
@@ -28,8 +34,12 @@ struct Request {
   std::string database;
   std::string shard;
   std::uint64_t jobs = 0;
+  bool retry_failed = false;
   bool quiet = false;
 };
+
+/// So often a trial is begun whose process is killed from outside every time.
+constexpr int kMostTries = 3;
 
 /// The trials of one of N shards; "" is all.
 std::vector<Trial> SelectShard(const std::vector<Trial>& trials, const std::string& text) {
@@ -54,40 +64,79 @@ void PrintOutcomes(const std::vector<TrialRow>& rows) {
   for (const auto& [outcome, count] : counts) fmt::print("  {:<18}{:>7}\n", NameOf(outcome), count);
 }
 
-/// Makes the trials that are missing. @return how many of them are done.
-long RunMissing(const StudyInputs& inputs, const std::vector<Trial>& trials, const Request& request,
-                StudyStore* store) {
-  std::vector<bool> done(trials.empty() ? 0 : static_cast<size_t>(trials.back().number) + 1);
-  for (const TrialRow& row : store->ReadRows()) {
-    if (static_cast<size_t>(row.trial.number) < done.size()) {
-      done[static_cast<size_t>(row.trial.number)] = true;
-    }
+/// "0-3, 7, 9" of ascending numbers; a long list ends in "...".
+std::string ListNumbers(const std::vector<long>& numbers) {
+  constexpr size_t kMostRanges = 20;
+  std::string text;
+  size_t ranges = 0;
+  for (size_t i = 0; i < numbers.size(); ++ranges) {
+    if (ranges == kMostRanges) return text + ", ...";
+    size_t last = i;
+    while (last + 1 < numbers.size() && numbers[last + 1] == numbers[last] + 1) ++last;
+    text += (text.empty() ? "" : ", ") + std::to_string(numbers[i]);
+    if (last > i) text += "-" + std::to_string(numbers[last]);
+    i = last + 1;
   }
-  std::vector<Trial> waiting;
+  return text;
+}
+
+/// Numbers of the trials that have no row.
+std::vector<long> FindMissing(const std::vector<Trial>& trials, const std::vector<TrialRow>& rows) {
+  std::set<long> done;
+  for (const TrialRow& row : rows) done.insert(row.trial.number);
+  std::vector<long> missing;
   for (const Trial& trial : trials) {
-    if (!done[static_cast<size_t>(trial.number)]) waiting.push_back(trial);
+    if (done.count(trial.number) == 0) missing.push_back(trial.number);
+  }
+  return missing;
+}
+
+void PrintStudy(const Study& study, const std::string& database, const std::vector<TrialRow>& rows) {
+  fmt::print("{}: {} of {} trials in {}\n", study.name, rows.size(), ListTrials(study).size(), database);
+  PrintOutcomes(rows);
+}
+
+/// Makes the trials that are missing.
+void RunMissing(const StudyInputs& inputs, const std::vector<Trial>& trials, const Request& request,
+                StudyStore* store) {
+  std::deque<Trial> waiting;
+  const std::vector<long> missing = FindMissing(trials, store->ReadRows());
+  for (const Trial& trial : trials) {
+    if (std::binary_search(missing.begin(), missing.end(), trial.number)) waiting.push_back(trial);
   }
   const long total = static_cast<long>(trials.size());
   long finished = total - static_cast<long>(waiting.size());
-  std::reverse(waiting.begin(), waiting.end());
+  std::map<long, int> tries;
+  const std::string machine = DescribeMachine();
   ProgressBar bar(inputs.study.name, total, request.quiet);
   const auto jobs =
       static_cast<int>(request.jobs > 0 ? request.jobs : std::max(std::thread::hardware_concurrency(), 1U));
-  TrialPool pool(jobs, [&](const Trial& trial) { return RunTrial(inputs, trial); });
+  TrialPool pool(jobs, inputs.study.trial_time_limit,
+                 [&](const Trial& trial) { return RunTrial(inputs, trial); });
   const auto release = [&] {
     for (const long trial : pool.ListRunning()) store->Release(trial);
   };
   try {
     while (!IsInterrupted() && (!waiting.empty() || !pool.IsEmpty())) {
       while (!pool.IsFull() && !waiting.empty()) {
-        const Trial trial = waiting.back();
-        waiting.pop_back();
+        const Trial trial = waiting.front();
+        waiting.pop_front();
         if (store->Claim(trial.number)) pool.Start(trial);
       }
-      if (const auto row = pool.Wait()) {
-        store->Add(*row);
-        bar.Update(++finished);
+      auto ended = pool.Wait();
+      if (!ended) continue;
+      const Trial& trial = ended->row.trial;
+      if (ended->killed_from_outside) {
+        // With all others when it is this program that is ended; else once more, when others are done.
+        const bool again = ++tries[trial.number] < kMostTries;
+        if (again || IsInterrupted()) store->Release(trial.number);
+        if (again) waiting.push_back(trial);
+        if (again || IsInterrupted()) continue;
+        ended->row.result.failure += fmt::format(", {} times", kMostTries);
       }
+      ended->row.machine = machine;
+      store->Add(ended->row);
+      bar.Update(++finished);
     }
   } catch (const InputError&) {
     throw;  // the database takes no more; nothing can be released in it
@@ -96,7 +145,6 @@ long RunMissing(const StudyInputs& inputs, const std::vector<Trial>& trials, con
     throw;
   }
   release();
-  return finished;
 }
 
 int RunStudy(const Request& request) {
@@ -105,41 +153,60 @@ int RunStudy(const Request& request) {
   CheckTrials(&inputs);
   StudyStore store = StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), inputs.study);
   CatchInterrupts();
+  if (request.retry_failed) store.RemoveFailed(trials);
   RunMissing(inputs, trials, request, &store);
-  const std::vector<TrialRow> rows = store.ReadRows();
-  const auto missing = std::count_if(trials.begin(), trials.end(),
-                                     [&](const Trial& trial) { return !store.Has(trial.number); });
-  if (missing > 0) {
-    throw Error(fmt::format("{}: {} of {} trials are missing ({}); the same command goes on with them",
-                            request.database, missing, trials.size(),
-                            IsInterrupted() ? "interrupted" : "another process has them"));
+  // From the file that is there now under this name: what another program removed is not done.
+  const std::vector<TrialRow> rows = StudyStore::Open(request.database).ReadRows();
+  const std::vector<long> missing = FindMissing(trials, rows);
+  if (!missing.empty()) {
+    throw Error(fmt::format("{}: {} of {} trials are missing ({}): {}; the same command goes on with them",
+                            request.database, missing.size(), trials.size(),
+                            IsInterrupted() ? "interrupted" : "another process has them",
+                            ListNumbers(missing)));
   }
-  if (!request.quiet) {
-    fmt::print("{}: {} of {} trials in {}\n", inputs.study.name, rows.size(), ListTrials(inputs.study).size(),
-               request.database);
-    PrintOutcomes(rows);
+  if (request.quiet) return kSuccess;
+  PrintStudy(inputs.study, request.database, rows);
+  if (std::any_of(rows.begin(), rows.end(),
+                  [](const TrialRow& row) { return IsFailed(row.result.outcome); })) {
+    fmt::print("Trials that crashed or timed out are made again with --retry-failed.\n");
   }
   return kSuccess;
 }
 
+/// Adds to a database that is there, or makes one under a temporary name that it loses when it is complete.
+/// @return all rows.
+std::vector<TrialRow> AddToDatabase(const std::string& path, const StudyStore& like,
+                                    const std::vector<TrialSource>& sources) {
+  const auto add = [&](const std::filesystem::path& database) {
+    StudyStore store = StudyStore::OpenOrCreate(database, like.identity(), like.study());
+    store.AddAll(sources);
+    return store.ReadRows();
+  };
+  RequirePlainFile(path);
+  std::error_code error;
+  if (std::filesystem::file_size(path, error) > 0 && !error) return add(path);
+  PartialFile file(path);
+  std::vector<TrialRow> rows = add(file.partial());
+  file.Commit();
+  return rows;
+}
+
 int MergeStudies(const std::string& out, const std::vector<std::string>& databases, bool quiet) {
   // All are looked at before anything is written.
-  std::vector<std::vector<TrialRow>> rows;
+  std::vector<TrialSource> sources;
   const StudyStore first = StudyStore::Open(databases.front());
   for (const std::string& database : databases) {
     const StudyStore store = StudyStore::Open(database);
     store.RequireSame(first.identity());
-    rows.push_back(store.ReadRows());
+    sources.push_back({database, store.ReadRows()});
   }
-  StudyStore merged = StudyStore::OpenOrCreate(out, first.identity(), first.study());
-  for (size_t i = 0; i < databases.size(); ++i) merged.AddAll(rows[i], databases[i]);
-  const std::vector<TrialRow> all = merged.ReadRows();
-  if (!quiet) {
-    fmt::print("{}: {} of {} trials in {}\n", first.study().name, all.size(),
-               ListTrials(first.study()).size(), out);
-    PrintOutcomes(all);
-  }
-  return kSuccess;
+  const std::vector<TrialRow> all = AddToDatabase(out, first, sources);
+  if (!quiet) PrintStudy(first.study(), out, all);
+  const std::vector<Trial> trials = ListTrials(first.study());
+  const std::vector<long> missing = FindMissing(trials, all);
+  if (missing.empty()) return kSuccess;
+  throw Error(fmt::format("{}: {} of {} trials are missing: {}; merge again when they are done", out,
+                          missing.size(), trials.size(), ListNumbers(missing)));
 }
 
 }  // namespace
@@ -163,6 +230,7 @@ void AddStudyCommand(Command app) {
       .TypeName("N")
       .Check(whole);
   run.AddOption("--shard", &request->shard, "Only the I-th of N parts of the study").TypeName("I/N");
+  run.AddFlag("--retry-failed", &request->retry_failed, "Make trials again that crashed or timed out");
   add_quiet(run);
   run.SetAction([=] { return RunStudy(*request); });
 
@@ -187,12 +255,30 @@ void AddStudyCommand(Command app) {
 
   Command slurm = study.AddCommand("slurm", "Print an array job for Slurm that makes the study");
   slurm.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();
-  slurm.AddOption("--tasks", &request->jobs, "Parts of the study, each a task")
+  const auto job = std::make_shared<SlurmJob>();
+  slurm.AddOption("--tasks", &job->tasks, "Parts of the study, each with a database of its own")
       .TypeName("N")
       .Required()
       .Check(whole);
+  slurm
+      .AddOption("--array-size", &job->array_size,
+                 "Most elements of the array (1000, as Slurm's MaxArraySize of 1001 allows); of more parts "
+                 "each makes several")
+      .TypeName("N")
+      .Check(whole);
+  slurm.AddOption("--throttle", &job->throttle, "Elements that run at a time").TypeName("N").Check(whole);
+  slurm
+      .AddOption("--time", &job->time,
+                 "Time limit of an element: MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]]")
+      .TypeName("TIME")
+      .Check(CheckSlurmTime);
+  slurm.AddOption("--memory", &job->memory, "Memory of an element, as 500M or 2G")
+      .TypeName("SIZE")
+      .Check(CheckSlurmMemory);
   slurm.SetAction([=] {
-    fmt::print("{}", MakeSlurmScript(FindStudy(request->study), request->study, request->jobs));
+    StudyInputs inputs = FindStudy(request->study);
+    CheckTrials(&inputs);  // what study run would refuse, must not be queued
+    fmt::print("{}", MakeSlurmScript(inputs, request->study, *job));
     return kSuccess;
   });
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <string>
 
 #include "harness/study/trial.h"
@@ -10,9 +9,7 @@ namespace dexcheck::cli {
 /// A shipped study by name, or a TOML file, with its scenario. @throws InputError.
 StudyInputs FindStudy(const std::string& name_or_file);
 
-/// The text of a batch script whose array of tasks makes the study, a shard each; killed and requeued tasks
-/// go on where they were.
-/// @param name_or_file as typed.
-std::string MakeSlurmScript(const StudyInputs& inputs, const std::string& name_or_file, std::uint64_t tasks);
+/// Whether a name is that of a file, and not of a shipped study.
+bool IsStudyFile(const std::string& name);
 
 }  // namespace dexcheck::cli

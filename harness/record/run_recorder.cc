@@ -4,6 +4,7 @@
 
 #include "harness/common/files.h"
 #include "harness/common/version.h"
+#include "harness/engine/machine.h"
 #include "harness/record/mjcf_files.h"
 
 namespace dexcheck {
@@ -43,6 +44,7 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
   log_.SetText("mjcf", inputs.mjcf.filename().string());
   log_.SetText("mujoco_version", mj_versionString());
   log_.SetText("dexcheck_version", Version());
+  log_.SetText("machine", DescribeMachine());
   log_.EmbedFile("inputs", "scenario.toml", scenario.text);
   log_.EmbedFile("inputs", "robot/" + inputs.robot.filename().string(), ReadBytes(inputs.robot));
   for (const std::string& file : ListMjcfFiles(inputs.mjcf)) {

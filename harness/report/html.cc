@@ -1,10 +1,9 @@
 #include "harness/report/html.h"
 
-#include <fmt/format.h>
-
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 namespace dexcheck {
 namespace {
@@ -20,7 +19,7 @@ void RemoveAll(const std::string& from, const std::string& to, std::string* text
 
 }  // namespace
 
-std::string EscapeHtml(std::string_view text) {
+Html Html::Text(std::string_view text) {
   std::string escaped;
   escaped.reserve(text.size());
   for (const char c : text) {
@@ -44,7 +43,7 @@ std::string EscapeHtml(std::string_view text) {
         escaped += c;
     }
   }
-  return escaped;
+  return Raw(std::move(escaped));
 }
 
 std::string EncodeBase64(std::string_view bytes) {
@@ -79,7 +78,7 @@ std::string FormatShare(double share) {
   return percent < 0.01 ? "< 0.01 %" : fmt::format("{:.2g} %", percent);
 }
 
-std::string MakeInlineSvg(std::string svg, const std::string& title) {
+Html MakeInlineSvg(std::string svg, const std::string& title) {
   svg.erase(0, svg.find("<svg"));
   RemoveAll("<defs>", "</defs>", &svg);
   RemoveAll("<title>", "</title>", &svg);
@@ -87,9 +86,9 @@ std::string MakeInlineSvg(std::string svg, const std::string& title) {
   RemoveAll(" id=\"", "\"", &svg);
   RemoveAll(" xmlns:xlink=\"", "\"", &svg);
   const size_t tag_end = svg.find('>');
-  if (tag_end == std::string::npos) return "";
-  svg.insert(tag_end, " role=\"img\" aria-label=\"" + EscapeHtml(title) + "\"");
-  return svg;
+  if (tag_end == std::string::npos) return {};
+  svg.insert(tag_end, FormatHtml(" role=\"img\" aria-label=\"{}\"", title).markup());
+  return Html::Raw(std::move(svg));
 }
 
 }  // namespace dexcheck

@@ -1,14 +1,76 @@
 #pragma once
 
-// Pieces of HTML text.
+// HTML that is made of markup and text. They have different types, so that text cannot get into a page
+// without being escaped.
+
+#include <fmt/format.h>
 
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <utility>
 
 namespace dexcheck {
 
-/// The text with HTML's special characters escaped, for content and quoted attributes.
-std::string EscapeHtml(std::string_view text);
+/// Markup that stands in the source code.
+class HtmlLiteral {
+ public:
+  // Only what the compiler knows. NOLINTNEXTLINE(google-explicit-constructor)
+  consteval HtmlLiteral(const char* markup) : markup_(markup) {}
+  [[nodiscard]] std::string_view markup() const { return markup_; }
+
+ private:
+  std::string_view markup_;
+};
+
+/// Markup, with the texts that were put into it escaped. Made by FormatHtml and from literals; Raw alone lets
+/// other text pass as it is.
+class Html {
+ public:
+  Html() = default;
+  // NOLINTNEXTLINE(google-explicit-constructor)
+  Html(HtmlLiteral literal) : markup_(literal.markup()) {}
+  /// @param markup is markup already, and no text from files.
+  static Html Raw(std::string markup) {
+    Html html;
+    html.markup_ = std::move(markup);
+    return html;
+  }
+  /// The text with HTML's special characters escaped, for content and quoted attributes.
+  static Html Text(std::string_view text);
+
+  Html& operator+=(const Html& more) {
+    markup_ += more.markup_;
+    return *this;
+  }
+  Html& operator+=(HtmlLiteral more) {
+    markup_ += more.markup();
+    return *this;
+  }
+
+  [[nodiscard]] bool empty() const { return markup_.empty(); }
+  [[nodiscard]] const std::string& markup() const { return markup_; }
+
+ private:
+  std::string markup_;
+};
+
+namespace html_detail {
+
+inline const std::string& Show(const Html& html) { return html.markup(); }
+inline std::string Show(std::string_view text) { return Html::Text(text).markup(); }
+template <typename Number>
+requires std::is_arithmetic_v<Number> Number Show(Number number) { return number; }
+template <typename Argument>
+using Shown = std::remove_cvref_t<decltype(Show(std::declval<const Argument&>()))>;
+
+}  // namespace html_detail
+
+/// As fmt::format. Texts among the arguments are escaped, numbers and Html stand as they are.
+template <typename... Arguments>
+Html FormatHtml(fmt::format_string<html_detail::Shown<Arguments>...> format, const Arguments&... arguments) {
+  return Html::Raw(fmt::format(format, html_detail::Shown<Arguments>(html_detail::Show(arguments))...));
+}
 
 std::string EncodeBase64(std::string_view bytes);
 
@@ -19,6 +81,6 @@ std::string FormatShort(double value);
 std::string FormatShare(double share);
 
 /// What gnuplot wrote as SVG, ready to stand in a page: without prolog, definitions and ids.
-std::string MakeInlineSvg(std::string svg, const std::string& title);
+Html MakeInlineSvg(std::string svg, const std::string& title);
 
 }  // namespace dexcheck

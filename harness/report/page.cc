@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <sstream>
 #include <system_error>
 
 #include "controller/common/errors.h"
@@ -76,23 +77,25 @@ class Page {
     AddInputs();
     html_ += "</main>\n";
     AddFooter();
-    return std::move(html_);
+    return html_.markup();
   }
 
  private:
+  /// Texts among the arguments are escaped.
   template <typename... Arguments>
-  void Add(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
-    fmt::format_to(std::back_inserter(html_), format, std::forward<Arguments>(arguments)...);
+  void Add(fmt::format_string<html_detail::Shown<Arguments>...> format, const Arguments&... arguments) {
+    html_ += FormatHtml(format, arguments...);
   }
 
-  std::string Text(const char* name) const { return EscapeHtml(run_.FindText(name)); }
+  std::string Text(const char* name) const { return run_.FindText(name); }
 
   void AddHead() {
     Add("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
         "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n<title>{}: {} – dexcheck</title>\n"
         "<link rel=\"icon\" href=\"data:,\">\n<style>\n{}\n{}</style>\n</head>\n<body>\n",
-        kContentPolicy, FindHeadline(run_).word, Text("scenario"), kDygraphCss, kPageCss);
+        kContentPolicy, FindHeadline(run_).word, Text("scenario"), Html::Raw(kDygraphCss),
+        Html::Raw(kPageCss));
   }
 
   void AddVerdict() {
@@ -101,12 +104,11 @@ class Page {
     const std::string description = summary.is_null() ? "" : summary.value("description", "");
     Add("<header>\n<h1><b>{}</b>{}{}</h1>\n<section class=\"verdict {}\" id=\"verdict\"><strong>{}</strong>"
         "<p>{}</p>",
-        Text("scenario"), description.empty() ? "" : " – ", EscapeHtml(description), headline.tone,
-        headline.word, EscapeHtml(headline.sentence));
+        Text("scenario"), description.empty() ? "" : " – ", description, headline.tone, headline.word,
+        headline.sentence);
     const std::string cause = FindString(summary, "attribution", "cause");
     if (!cause.empty() && cause != "none") {
-      Add("<p>Cause: <b>{}</b>. Evidence: {}.</p>", EscapeHtml(cause),
-          EscapeHtml(FindString(summary, "attribution", "evidence")));
+      Add("<p>Cause: <b>{}</b>. Evidence: {}.</p>", cause, FindString(summary, "attribution", "evidence"));
     }
     if (!summary.is_null() && summary.value("interrupted", false)) {
       Add("<p>The run was stopped by hand after {:.3f} s.</p>", run_.time()[run_.time().size() - 1]);
@@ -208,12 +210,11 @@ class Page {
         "<td data-label=\"of bound\"><span class=\"number\">{}</span><span class=\"meter\"><i "
         "style=\"width:{:.1f}%\">"
         "</i></span></td><td class=\"where\" data-label=\"{}\"><small>{}</small></td></tr>\n",
-        check.pass ? "pass" : "fail", EscapeHtml(check.name), EscapeHtml(check.description), verdict,
-        cause.empty() ? "" : "<small>cause: " + EscapeHtml(cause) + "</small>", NameOf(check.kind),
-        FormatShort(check.max), check.max == 0.0 ? "" : EscapeHtml(unit), FormatShort(check.bound),
-        check.bound == 0.0 ? "" : EscapeHtml(unit), FormatShare(share),
-        100.0 * std::clamp(std::isfinite(share) ? share : 1.0, 0.0, 1.0), where.empty() ? "" : "at",
-        EscapeHtml(where));
+        check.pass ? "pass" : "fail", check.name, check.description, verdict,
+        cause.empty() ? Html() : FormatHtml("<small>cause: {}</small>", cause), NameOf(check.kind),
+        FormatShort(check.max), check.max == 0.0 ? "" : unit, FormatShort(check.bound),
+        check.bound == 0.0 ? "" : unit, FormatShare(share),
+        100.0 * std::clamp(std::isfinite(share) ? share : 1.0, 0.0, 1.0), where.empty() ? "" : "at", where);
   }
 
   void AddCheckTable(const std::vector<const CheckLine*>& checks) {
@@ -257,9 +258,9 @@ class Page {
       const Figure& figure = content_.figures[i];
       Add("<section class=\"card\" data-plot=\"{}\"><h3>{} {}<span class=\"soft number time\"></span></h3>"
           "<div class=\"keys\"></div><div class=\"plot\"></div></section>\n",
-          i, EscapeHtml(figure.title),
-          figure.panel.empty() ? ""
-                               : "<span class=\"panel\">Figure " + EscapeHtml(figure.panel) + "</span> ");
+          i, figure.title,
+          figure.panel.empty() ? Html()
+                               : FormatHtml("<span class=\"panel\">Figure {}</span> ", figure.panel));
     }
     html_ += "</div></section>\n";
   }
@@ -269,18 +270,18 @@ class Page {
     html_ += "<h2 id=\"video\">Video</h2>\n";
     std::error_code error;
     if (std::filesystem::file_size(content_.video, error) > kLargestEmbeddedVideo || error) {
-      Add("<p><a href=\"{}\">{}</a> (too large to be part of this page)</p>\n",
-          EscapeHtml(content_.video_link), EscapeHtml(content_.video.filename().string()));
+      Add("<p><a href=\"{}\">{}</a> (too large to be part of this page)</p>\n", content_.video_link,
+          content_.video.filename().string());
       return;
     }
     html_ += "<video controls playsinline preload=\"metadata\" src=\"data:video/mp4;base64,";
-    html_ += EncodeBase64(ReadBytes(content_.video));
+    html_ += Html::Raw(EncodeBase64(ReadBytes(content_.video)));
     html_ += "\"></video>\n";
   }
 
   void AddCaption(const std::string& panel, const std::string& title) {
-    Add("<figcaption>{}{}</figcaption>", panel.empty() ? "" : "<b>Figure " + EscapeHtml(panel) + "</b>",
-        EscapeHtml(title));
+    Add("<figcaption>{}{}</figcaption>", panel.empty() ? Html() : FormatHtml("<b>Figure {}</b>", panel),
+        title);
   }
 
   void AddFigures() {
@@ -291,7 +292,7 @@ class Page {
     for (const Picture& picture : content_.pictures) {
       html_ += "<figure class=\"card\">";
       AddCaption(picture.panel, picture.title);
-      Add("<img alt=\"{}\" src=\"data:image/png;base64,{}\"></figure>\n", EscapeHtml(picture.title),
+      Add("<img alt=\"{}\" src=\"data:image/png;base64,{}\"></figure>\n", picture.title,
           EncodeBase64(ReadBytes(picture.file)));
     }
     for (const Figure& figure : content_.figures) {
@@ -299,7 +300,7 @@ class Page {
       html_ += "<figure class=\"card\">";
       AddCaption(figure.panel, figure.title);
       html_ += MakeInlineSvg(ReadBytes(content_.drawings / (figure.name + ".svg")), figure.title);
-      if (!figure.note.empty()) Add("<p class=\"soft\"><small>{}</small></p>", EscapeHtml(figure.note));
+      if (!figure.note.empty()) Add("<p class=\"soft\"><small>{}</small></p>", figure.note);
       html_ += "</figure>\n";
     }
     html_ += "</div>\n";
@@ -308,28 +309,29 @@ class Page {
   void AddFile(const std::string& name, const std::string& title, bool open) {
     const std::vector<std::string> files = run_.log().ListFiles("inputs");
     if (std::find(files.begin(), files.end(), name) == files.end()) return;
-    Add("<details{}><summary>{}</summary><pre>{}</pre></details>\n", open ? " open" : "", EscapeHtml(title),
-        EscapeHtml(run_.log().ReadFile("inputs", name)));
+    Add("<details{}><summary>{}</summary><pre>{}</pre></details>\n", open ? " open" : "", title,
+        run_.log().ReadFile("inputs", name));
   }
 
   void AddInputs() {
     html_ += "<h2 id=\"inputs\">Inputs</h2>\n<div class=\"card\">\n<dl>\n";
-    const auto add = [&](const char* term, const std::string& value) {
+    const auto add = [&](const char* term, const Html& value) {
       if (!value.empty()) Add("<dt>{}</dt><dd>{}</dd>\n", term, value);
     };
     const std::string command = Text("command");
-    add("Command", command.empty() ? "" : "<code>" + command + "</code>");
-    std::string overrides = Text("overrides");
-    while (overrides.ends_with('\n')) overrides.pop_back();
-    for (size_t at = overrides.find('\n'); at != std::string::npos; at = overrides.find('\n', at)) {
-      overrides.replace(at, 1, "<br>");
+    add("Command", command.empty() ? Html() : FormatHtml("<code>{}</code>", command));
+    Html overrides;
+    std::istringstream lines(Text("overrides"));
+    for (std::string line; std::getline(lines, line);) {
+      overrides += FormatHtml("{}{}", overrides.empty() ? Html() : Html("<br>"), line);
     }
-    add("Overrides", overrides.empty() ? "none" : "<code>" + overrides + "</code>");
-    add("Seed", Text("seed"));
-    add("Model", Text("robot"));
-    add("MJCF", Text("mjcf"));
-    add("dexcheck", Text("dexcheck_version"));
-    add("MuJoCo", Text("mujoco_version"));
+    add("Overrides", overrides.empty() ? Html("none") : FormatHtml("<code>{}</code>", overrides));
+    add("Seed", Html::Text(Text("seed")));
+    add("Model", Html::Text(Text("robot")));
+    add("MJCF", Html::Text(Text("mjcf")));
+    add("dexcheck", Html::Text(Text("dexcheck_version")));
+    add("MuJoCo", Html::Text(Text("mujoco_version")));
+    add("Machine", Html::Text(Text("machine")));
     html_ += "</dl>\n";
     AddFile("scenario.toml", "Scenario", true);
     const std::string robot = run_.FindText("robot");
@@ -345,15 +347,15 @@ class Page {
         "for bit: <code>dexcheck run --replay RUN_DIR</code>. Plots by dygraphs (MIT license).</footer>\n",
         Text("dexcheck_version"));
     const PlotData data = MakePlotData(content_.figures, run_.time());
-    html_ += "<script type=\"application/json\" id=\"run-plots\">" + data.json + "</script>\n";
-    html_ += "<script type=\"text/plain\" id=\"run-values\">" + data.values + "</script>\n";
-    html_ += std::string("<script>\n") + kDygraphJs + "\n</script>\n<script>\n" + kPageJs + "</script>\n";
+    Add("<script type=\"application/json\" id=\"run-plots\">{}</script>\n", Html::Raw(data.json));
+    Add("<script type=\"text/plain\" id=\"run-values\">{}</script>\n", Html::Raw(data.values));
+    Add("<script>\n{}\n</script>\n<script>\n{}</script>\n", Html::Raw(kDygraphJs), Html::Raw(kPageJs));
     html_ += "</body>\n</html>\n";
   }
 
   const RunData& run_;
   const PageContent& content_;
-  std::string html_;
+  Html html_;
 };
 
 }  // namespace

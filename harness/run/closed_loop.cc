@@ -58,13 +58,16 @@ void ClosedLoop::CheckMovingStart() const {
                    "constant speed");
 }
 
-void ClosedLoop::Settle() {
-  SettleOn(LineTrajectory(setup_->X_start(), Vector6d::Zero(), 0.0), setup_->scenario().settle);
-  if (setup_->scenario().start == Start::kMoving) StartMoving(trajectory_->Evaluate(0.0).X_d_dot.head<3>());
+bool ClosedLoop::Settle(const std::function<bool()>& should_stop) {
+  const LineTrajectory rest(setup_->X_start(), Vector6d::Zero(), 0.0);
+  if (!SettleOn(rest, setup_->scenario().settle, should_stop)) return false;
+  const bool moving = setup_->scenario().start == Start::kMoving;
+  if (moving && !StartMoving(trajectory_->Evaluate(0.0).X_d_dot.head<3>(), should_stop)) return false;
   if (trajectory_) controller_->Follow(*trajectory_);
   BeginRun();
   times_ = LoopTimes{};
   if (checks_) checks_->Reset();
+  return true;
 }
 
 void ClosedLoop::BeginRun() {
@@ -78,12 +81,14 @@ void ClosedLoop::BeginRun() {
   }
 }
 
-void ClosedLoop::SettleOn(const Trajectory& motion, double duration) {
+bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
+                          const std::function<bool()>& should_stop) {
   const double dt = plant_->time_step();
   const long count = std::lround(duration / dt);
   controller_->Follow(motion);
   if (checks_) checks_->Reset();
   for (long i = 0; i < count; ++i) {
+    if (should_stop()) return false;
     const double t = static_cast<double>(i) * dt;
     record_.time = t - duration;
     ControlStep(t);
@@ -91,17 +96,19 @@ void ClosedLoop::SettleOn(const Trajectory& motion, double duration) {
     if (checks_ && t >= kRoughTime) checks_->CompareMotion(record_);
     CheckGrasp();
   }
+  return true;
 }
 
-void ClosedLoop::StartMoving(const Vector3d& v) {
+bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& should_stop) {
   plant_->AddVelocity(record_.reading.state, v);
   Vector6d velocity = Vector6d::Zero();
   velocity.head<3>() = v;
-  SettleOn(LineTrajectory(setup_->X_start(), velocity, 0.0), kSettleMoving);
+  if (!SettleOn(LineTrajectory(setup_->X_start(), velocity, 0.0), kSettleMoving, should_stop)) return false;
   // Back to where it began: on a level floor every place is alike.
   const double dt = plant_->time_step();
   const Vector3d way = static_cast<double>(std::lround(kSettleMoving / dt)) * dt * v;
   plant_->Translate(-way);
+  return true;
 }
 
 void ClosedLoop::ControlStep(double t) {

@@ -2,6 +2,7 @@
 
 // The loop of plant and controller, cross-checked at every step.
 
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -47,8 +48,10 @@ class ClosedLoop {
   ClosedLoop(const Setup& setup, bool check, LoopParts parts);
 
   /// Holds the object until all has come to rest (and then moves on, for a moving start): call once, before
-  /// the first Step, at t = 0. @throws as Step.
-  void Settle();
+  /// the first Step, at t = 0.
+  /// @param should_stop asked before each step of settling.
+  /// @return whether all came to rest; false when it was stopped before. @throws as Step.
+  bool Settle(const std::function<bool()>& should_stop = [] { return false; });
 
   /// One step. @throws RunFailure, DivergenceError, GraspForceError, SingularityError. What the step saw up
   /// to then can be read.
@@ -72,8 +75,8 @@ class ClosedLoop {
 
  private:
   void CheckMovingStart() const;
-  void StartMoving(const Vector3d& v);
-  void SettleOn(const Trajectory& motion, double duration);
+  bool StartMoving(const Vector3d& v, const std::function<bool()>& should_stop);
+  bool SettleOn(const Trajectory& motion, double duration, const std::function<bool()>& should_stop);
   void BeginRun();
   void ControlStep(double t);
   void CheckRobot() const;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "harness/common/version.h"
+#include "harness/engine/machine.h"
 
 namespace dexcheck {
 namespace {
@@ -126,6 +127,7 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
                     times.solves > 0 ? 1e6 * times.grasp_force / static_cast<double>(times.solves) : 0.0},
                    {"recording_us_per_step", microseconds * result.recording_seconds}};
   json["versions"] = {{"dexcheck", Version()}, {"mujoco", mj_versionString()}};
+  json["machine"] = DescribeMachine();
   return json;
 }
 

@@ -25,15 +25,18 @@ class Runner {
   /// Settles, steps to the end or to a failure, and judges.
   /// @param after_step(const StepRecord&) called after each step, also after one that failed; its time counts
   /// as recording.
-  /// @param should_stop asked before each step; true ends the run as interrupted.
+  /// @param should_stop asked before each step, of settling too; true ends the run as interrupted.
   template <typename AfterStep, typename ShouldStop>
   const RunResult& Run(const AfterStep& after_step, const ShouldStop& should_stop) {
-    Guard([&] { loop_.Settle(); }, /*settling=*/true);
+    Guard(
+        [&] {
+          if (!loop_.Settle(should_stop)) Interrupt();
+        },
+        /*settling=*/true);
     const Clock::time_point begin = Clock::now();
     while (result_.failure.empty() && !loop_.is_finished()) {
       if (should_stop()) {
-        result_.interrupted = true;
-        result_.failure = "interrupted";
+        Interrupt();
         break;
       }
       Guard([&] { loop_.Step(); }, /*settling=*/false);
@@ -52,6 +55,11 @@ class Runner {
   using Clock = std::chrono::steady_clock;
   static double SecondsSince(Clock::time_point begin) {
     return std::chrono::duration<double>(Clock::now() - begin).count();
+  }
+
+  void Interrupt() {
+    result_.interrupted = true;
+    result_.failure = "interrupted";
   }
 
   template <typename Work>

@@ -10,6 +10,11 @@
 namespace dexcheck {
 namespace {
 
+constexpr double kMaxSteps = 1e8;
+/// s. Contacts settle within some of their time constants, 2 ms each, and posture within some periods of its
+/// task; whatever has not come to rest by then, never will.
+constexpr double kMaxSettle = 100.0;
+
 /// A document with the overrides that are the scenario's own; the others go to `model_overrides`.
 TomlDocument OpenDocument(const std::string& text, const std::string& source,
                           const std::vector<std::string>& overrides,
@@ -223,6 +228,7 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   if (const auto description = root.Find("description")) scenario.description = description->AsText();
   scenario.duration = root.Get("duration").AsPositive();
   scenario.settle = ReadOr(root, "settle", 1.0);
+  if (scenario.settle > kMaxSettle) root.Get("settle").Fail("must be at most 100 s");
   scenario.start = root.Get("start").AsChoice<Start>({{"moving", Start::kMoving}, {"rest", Start::kRest}});
   if (const auto error = root.Find("start_error")) {
     TomlTable table = error->AsTable();
@@ -244,11 +250,14 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
       scenario.bounds.emplace_back(name, value.AsNotNegative());
     }
   }
-  constexpr double kMaxSteps = 1e8;
   if (scenario.duration < scenario.plant.time_step)
     root.Get("duration").Fail("must be at least one time step");
   if (scenario.duration / scenario.plant.time_step > kMaxSteps) {
     root.Get("duration").Fail("must be at most 1e8 time steps");
+  }
+  if (scenario.settle / scenario.plant.time_step > kMaxSteps) {
+    if (const auto settle = root.Find("settle")) settle->Fail("must be at most 1e8 time steps");
+    root.Get("plant").AsTable().Get("time_step").Fail("is too small to settle in 1e8 time steps");
   }
   if (scenario.task) return scenario;
   TomlTable trajectory = root.Get("trajectory").AsTable();

@@ -2,8 +2,10 @@
 
 #include <cmath>
 #include <limits>
+#include <system_error>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 
 namespace dexcheck {
 namespace {
@@ -37,7 +39,25 @@ std::string Explain(int code, const char* message) {
 
 }  // namespace
 
+/// SQLite gives empty names, those that begin with a colon and URIs a meaning of their own: databases in
+/// memory, or temporary ones.
+void RequirePlainFile(const std::string& name) {
+  const auto refuse = [&](const std::string& why) {
+    throw InputError(Quote(name) + ": a database must be a plain file: " + why);
+  };
+  if (name.empty()) refuse("the name is empty");
+  if (name.starts_with(':')) refuse("the name begins with a colon (a file of this name is ./" + name + ")");
+  if (name.starts_with("file:")) refuse("this is a URI (a file of this name is ./" + name + ")");
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(name, error);
+  if (std::filesystem::is_directory(status)) refuse("this is a folder");
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    refuse("this is a device, a pipe or a socket");
+  }
+}
+
 Database::Database(const std::filesystem::path& path, Mode mode) : name_(path.string()) {
+  RequirePlainFile(name_);
   const int code = sqlite3_open_v2(name_.c_str(), &handle_, FlagsOf(mode), nullptr);
   if (code != SQLITE_OK) {
     const std::string why = Explain(code, sqlite3_errmsg(handle_));

@@ -11,7 +11,8 @@
 
 namespace dexcheck {
 
-/// An open database file. Everything that fails throws InputError "FILE: what: why".
+/// An open database file: a regular file, and nothing else that SQLite would take a name for (nothing that is
+/// gone when the process ends). Everything that fails throws InputError "FILE: what: why".
 class Database {
  public:
   enum class Mode { kExisting, kCreate };
@@ -33,6 +34,9 @@ class Database {
   std::string name_;
   sqlite3* handle_ = nullptr;
 };
+
+/// @throws InputError when this cannot be the name of a database file.
+void RequirePlainFile(const std::string& name);
 
 /// A prepared statement. Parameters and columns count from 1 and 0, as SQLite's do.
 class Statement {

@@ -142,8 +142,8 @@ Study ParseStudy(const std::string& text, const std::string& source) {
   study.source = source;
   const TomlDocument document(text, source);
   TomlTable root = document.Open();
-  root.RejectOthersThan(
-      {"name", "description", "scenario", "set", "seeds", "check", "metrics", "sample", "vary"});
+  root.RejectOthersThan({"name", "description", "scenario", "set", "seeds", "check", "trial_time_limit",
+                         "metrics", "sample", "vary"});
   study.name = root.Get("name").AsName();
   if (const auto description = root.Find("description")) study.description = description->AsText();
   study.scenario = root.Get("scenario").AsText();
@@ -161,6 +161,7 @@ Study ParseStudy(const std::string& text, const std::string& source) {
     if (study.seeds.empty()) list->Reject("needs at least one seed");
   }
   if (const auto check = root.Find("check")) study.check = check->AsFlag();
+  if (const auto limit = root.Find("trial_time_limit")) study.trial_time_limit = limit->AsPositive();
   if (const auto metrics = root.Find("metrics")) ReadMetrics(*metrics, &study);
   if (const auto sample = root.Find("sample")) ReadSample(*sample, &study);
   ReadVariations(root.Get("vary"), &study);

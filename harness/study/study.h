@@ -32,6 +32,7 @@ struct Study {
   std::uint64_t sample_seed = 0;           ///< Of a Latin hypercube.
   std::vector<std::uint64_t> seeds = {0};  ///< Of the grasp; every point is tried with each.
   bool check = false;                      ///< Cross-check the trials.
+  double trial_time_limit = 0.0;           ///< Most processor time of a trial, s; 0 for any.
   std::vector<std::string> metrics;        ///< That the report shows.
 
   std::string text;    ///< The file.

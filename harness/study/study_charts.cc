@@ -39,20 +39,19 @@ double FindPlace(const Axis& axis, double value) {
   return static_cast<double>(i) + (Scale(value, axis.logarithmic) - from) / (to - from);
 }
 
-std::string Open(const std::string& title, double width, double height) {
-  return fmt::format(
+Html Open(const std::string& title, double width, double height) {
+  return FormatHtml(
       "<figure class=\"card\"><svg viewBox=\"0 0 {} {}\" width=\"{}\" height=\"{}\" "
       "role=\"img\">\n<title>{}</title>\n"
       "<text x=\"{}\" y=\"18\" class=\"title\">{}</text>\n",
-      width, height, width, height, EscapeHtml(title), kLeft, EscapeHtml(title));
+      width, height, width, height, title, kLeft, title);
 }
 
-std::string DrawLabels(const Axis& x, const Axis& y) {
-  return fmt::format(
+Html DrawLabels(const Axis& x, const Axis& y) {
+  return FormatHtml(
       "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n"
       "<text transform=\"translate(14 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-      kLeft + 0.5 * kInnerWidth, kHeight - 10.0, EscapeHtml(x.label), kTop + 0.5 * kInnerHeight,
-      EscapeHtml(y.label));
+      kLeft + 0.5 * kInnerWidth, kHeight - 10.0, x.label, kTop + 0.5 * kInnerHeight, y.label);
 }
 
 constexpr int kRoundDigits = 6;  // enough for values that are round
@@ -90,28 +89,29 @@ std::vector<double> ListRoundValues(double from, double to, bool logarithmic) {
   return ticks;
 }
 
-std::string DrawTick(bool horizontal, double at, const std::string& label) {
+Html DrawTick(bool horizontal, double at, const std::string& label) {
   if (horizontal) {
-    return fmt::format(
+    return FormatHtml(
         "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\" class=\"mark\"/>"
         "<text x=\"{0:.1f}\" y=\"{3:.1f}\" text-anchor=\"middle\" class=\"tick\">{4}</text>\n",
         at, kTop + kInnerHeight, kTop + kInnerHeight + 4.0, kTop + kInnerHeight + 17.0, label);
   }
-  return fmt::format(
+  return FormatHtml(
       "<line x1=\"{0:.1f}\" x2=\"{1:.1f}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\" class=\"mark\"/>"
       "<text x=\"{3:.1f}\" y=\"{4:.1f}\" text-anchor=\"end\" class=\"tick\">{5}</text>\n",
       kLeft - 4.0, kLeft, at, kLeft - 7.0, at + 4.0, label);
 }
 
-std::string Link(const std::string& link, const std::string& title, const std::string& shape) {
-  const std::string inner =
-      fmt::format("{}<title>{}</title></{}>", shape, EscapeHtml(title), shape.substr(1, shape.find(' ') - 1));
-  return link.empty() ? inner + "\n" : fmt::format("<a href=\"{}\">{}</a>\n", EscapeHtml(link), inner);
+/// A shape, shown with a title when pointed at, that leads somewhere.
+/// @param tag of the shape, "rect".
+Html Link(const std::string& link, const std::string& title, const char* tag, const Html& attributes) {
+  const Html inner = FormatHtml("<{0} {1}><title>{2}</title></{0}>", tag, attributes, title);
+  return link.empty() ? FormatHtml("{}\n", inner) : FormatHtml("<a href=\"{}\">{}</a>\n", link, inner);
 }
 
-std::string DrawEdge(double x1, double y1, double x2, double y2) {
-  return fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" class=\"edge\"/>\n", x1,
-                     y1, x2, y2);
+Html DrawEdge(double x1, double y1, double x2, double y2) {
+  return FormatHtml("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" class=\"edge\"/>\n", x1,
+                    y1, x2, y2);
 }
 
 /// Ends of an axis that hold all values, with a little room.
@@ -140,7 +140,7 @@ std::vector<double> ListCellTicks(const Axis& axis) {
 }
 
 /// Colours from the least value to the most, right of the map.
-std::string DrawScale(double least, double most) {
+Html DrawScale(double least, double most) {
   constexpr int kSteps = 40;
   constexpr double kLeftEdge = kLeft + kInnerWidth + 14.0;
   constexpr double kBarWidth = 12.0;
@@ -150,19 +150,22 @@ std::string DrawScale(double least, double most) {
   const auto place = [&](double value) {
     return kTop + kInnerHeight * (to > from ? (to - Scale(value, logarithmic)) / (to - from) : 0.5);
   };
-  std::string svg;
+  Html svg;
   for (int i = 0; i < kSteps; ++i) {
     const double at = from + (i + 0.5) / kSteps * (to - from);
     const double height = kInnerHeight / kSteps;
-    svg += fmt::format("<rect x=\"{:.1f}\" y=\"{:.2f}\" width=\"{}\" height=\"{:.2f}\" fill=\"{}\"/>\n",
-                       kLeftEdge, kTop + kInnerHeight - (i + 1) * height, kBarWidth, height + 0.3,
-                       ColorOf(logarithmic ? std::exp(at) : at, least, most));
+    svg += FormatHtml("<rect x=\"{:.1f}\" y=\"{:.2f}\" width=\"{}\" height=\"{:.2f}\" fill=\"{}\"/>\n",
+                      kLeftEdge, kTop + kInnerHeight - (i + 1) * height, kBarWidth, height + 0.3,
+                      ColorOf(logarithmic ? std::exp(at) : at, least, most));
   }
   const auto label = [&](double value) {
-    return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" class=\"tick\">{}</text>\n",
-                       kLeftEdge + kBarWidth + 4.0, place(value) + 4.0, FormatTick(value, kRoundDigits));
+    return FormatHtml("<text x=\"{:.1f}\" y=\"{:.1f}\" class=\"tick\">{}</text>\n",
+                      kLeftEdge + kBarWidth + 4.0, place(value) + 4.0, FormatTick(value, kRoundDigits));
   };
-  if (!(to > from)) return svg + label(least);
+  if (!(to > from)) {
+    svg += label(least);
+    return svg;
+  }
   for (const double value : ListRoundValues(least, most, logarithmic)) svg += label(value);
   return svg;
 }
@@ -170,14 +173,14 @@ std::string DrawScale(double least, double most) {
 constexpr int kKeyColumns = 2;
 
 /// Below the chart.
-std::string DrawKey(int number, const ChartLine& line) {
+Html DrawKey(int number, const ChartLine& line) {
   const double x = kLeft + kInnerWidth / kKeyColumns * (number % kKeyColumns);
   const int row = number / kKeyColumns;
   const double y = kHeight + kKeyRow * row + 4.0;
-  return fmt::format(
+  return FormatHtml(
       "<line x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\" stroke-width=\"2.5\"/>"
       "<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
-      x, x + 18.0, y, y, line.color, x + 24.0, y + 4.0, EscapeHtml(line.label));
+      x, x + 18.0, y, y, line.color, x + 24.0, y + 4.0, line.label);
 }
 
 }  // namespace
@@ -197,25 +200,24 @@ std::string ColorOf(double value, double least, double most) {
   return fmt::format("#{:02x}{:02x}{:02x}", mix(255, 65, 8), mix(255, 182, 29), mix(204, 196, 88));
 }
 
-std::string DrawHeatMap(const HeatMap& map) {
+Html DrawHeatMap(const HeatMap& map) {
   const size_t columns = map.x.values.size();
   const size_t rows = map.y.values.size();
   const double w = kInnerWidth / static_cast<double>(columns);
   const double h = kInnerHeight / static_cast<double>(rows);
   const auto left = [&](double column) { return kLeft + w * column; };
   const auto top = [&](double row) { return kTop + kInnerHeight - h * (row + 1.0); };
-  std::string svg = Open(map.title, kWidth + (map.range ? kScaleRoom : 0.0), kHeight);
-  std::string edges;
+  Html svg = Open(map.title, kWidth + (map.range ? kScaleRoom : 0.0), kHeight);
+  Html edges;
   for (size_t j = 0; j < rows; ++j) {
     for (size_t i = 0; i < columns; ++i) {
       const HeatCell& cell = map.cells[j * columns + i];
       if (cell.color.empty()) continue;
       const double x = left(static_cast<double>(i));
       const double y = top(static_cast<double>(j));
-      svg +=
-          Link(cell.link, cell.title,
-               fmt::format("<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" fill=\"{}\">",
-                           x, y, w, h, cell.color));
+      svg += Link(cell.link, cell.title, "rect",
+                  FormatHtml("x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" fill=\"{}\"", x, y,
+                             w, h, cell.color));
       const auto differs = [&](size_t other) {
         return map.with_boundary && !map.cells[other].color.empty() && map.cells[other].held != cell.held;
       };
@@ -226,8 +228,8 @@ std::string DrawHeatMap(const HeatMap& map) {
   svg += edges;
   for (const Dots& dots : map.overlays) {
     for (const auto& [x, y] : dots.points) {
-      svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.2\" fill=\"{}\" class=\"dot\"/>\n",
-                         left(FindPlace(map.x, x) + 0.5), top(FindPlace(map.y, y) - 0.5), dots.color);
+      svg += FormatHtml("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.2\" fill=\"{}\" class=\"dot\"/>\n",
+                        left(FindPlace(map.x, x) + 0.5), top(FindPlace(map.y, y) - 0.5), dots.color);
     }
   }
   for (const double value : ListCellTicks(map.x))
@@ -235,10 +237,12 @@ std::string DrawHeatMap(const HeatMap& map) {
   for (const double value : ListCellTicks(map.y))
     svg += DrawTick(false, top(FindPlace(map.y, value) - 0.5), FormatTick(value, 3));
   if (map.range) svg += DrawScale((*map.range)[0], (*map.range)[1]);
-  return svg + DrawLabels(map.x, map.y) + "</svg></figure>\n";
+  svg += DrawLabels(map.x, map.y);
+  svg += "</svg></figure>\n";
+  return svg;
 }
 
-std::string DrawChart(Chart chart) {
+Html DrawChart(Chart chart) {
   std::vector<double> xs;
   std::vector<double> ys;
   for (const ChartPoint& point : chart.points) {
@@ -258,9 +262,9 @@ std::string DrawChart(Chart chart) {
   const auto named = static_cast<int>(std::count_if(
       chart.lines.begin(), chart.lines.end(), [](const ChartLine& line) { return !line.label.empty(); }));
   const int key_rows = (named + kKeyColumns - 1) / kKeyColumns;
-  std::string svg = Open(chart.title, kWidth, kHeight + kKeyRow * key_rows);
-  svg += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"frame\"/>\n", kLeft, kTop,
-                     kInnerWidth, kInnerHeight);
+  Html svg = Open(chart.title, kWidth, kHeight + kKeyRow * key_rows);
+  svg += FormatHtml("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"frame\"/>\n", kLeft, kTop,
+                    kInnerWidth, kInnerHeight);
   const auto list = [](const Axis& axis) {
     return ListRoundValues(axis.values[0], axis.values[1], axis.logarithmic);
   };
@@ -274,17 +278,19 @@ std::string DrawChart(Chart chart) {
     for (const auto& [x, y] : line.points) {
       if (std::isfinite(y)) points += fmt::format("{:.1f},{:.1f} ", place_x(x), place_y(y));
     }
-    svg += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"/>\n", points,
-                       line.color);
+    svg += FormatHtml("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"/>\n", points,
+                      line.color);
     if (!line.label.empty()) svg += DrawKey(key++, line);
   }
   for (const ChartPoint& point : chart.points) {
     if (!std::isfinite(point.x) || !std::isfinite(point.y)) continue;
-    svg += Link(point.link, point.title,
-                fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\">", place_x(point.x),
-                            place_y(point.y), point.color));
+    svg += Link(point.link, point.title, "circle",
+                FormatHtml("cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\"", place_x(point.x),
+                           place_y(point.y), point.color));
   }
-  return svg + DrawLabels(chart.x, chart.y) + "</svg></figure>\n";
+  svg += DrawLabels(chart.x, chart.y);
+  svg += "</svg></figure>\n";
+  return svg;
 }
 
 }  // namespace dexcheck

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "harness/report/html.h"
+
 namespace dexcheck {
 
 struct Axis {
@@ -37,7 +39,7 @@ struct HeatMap {
   std::optional<std::array<double, 2>> range;  ///< Of the values that colours stand for; none for no scale.
   std::vector<Dots> overlays;
 };
-std::string DrawHeatMap(const HeatMap& map);
+Html DrawHeatMap(const HeatMap& map);
 
 struct ChartPoint {
   double x = 0.0;
@@ -59,7 +61,7 @@ struct Chart {
   std::vector<ChartPoint> points;
   std::vector<ChartLine> lines;
 };
-std::string DrawChart(Chart chart);
+Html DrawChart(Chart chart);
 
 /// Colour of a value between the least and the most, by its logarithm where the range spans decades.
 std::string ColorOf(double value, double least, double most);

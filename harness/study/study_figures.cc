@@ -14,8 +14,8 @@
 namespace dexcheck {
 namespace {
 
-constexpr std::array<const char*, kNumOutcomes> kOutcomeColors = {"#7bb662", "#f2c14e", "#e4572e", "#f78154",
-                                                                  "#9b2226", "#577590", "#cccccc", "#000000"};
+constexpr std::array<const char*, kNumOutcomes> kOutcomeColors = {
+    "#7bb662", "#f2c14e", "#e4572e", "#f78154", "#9b2226", "#577590", "#cccccc", "#000000", "#6d597a"};
 constexpr const char* kStabilityColor = "#0b3c8c";
 constexpr const char* kDampingColor = "#ffffff";
 constexpr size_t kMostLines = 6;
@@ -38,7 +38,7 @@ class Grid {
   explicit Grid(const StudyResults& results)
       : results_(results), x_(AxisOf(results.study.variations[0])), y_(AxisOf(results.study.variations[1])) {}
 
-  [[nodiscard]] std::string DrawOutcomes() const {
+  [[nodiscard]] Html DrawOutcomes() const {
     const auto cells = WorstOfCells([](const TrialRow& a, const TrialRow& b) {
       return IsHeld(a.result.outcome) < IsHeld(b.result.outcome) ||
              (IsHeld(a.result.outcome) == IsHeld(b.result.outcome) && a.result.outcome > b.result.outcome);
@@ -59,7 +59,7 @@ class Grid {
     return DrawHeatMap(map);
   }
 
-  [[nodiscard]] std::string DrawMetric(Metric metric) const {
+  [[nodiscard]] Html DrawMetric(Metric metric) const {
     const double sign = metric == kConeMargin ? -1.0 : 1.0;  // a small margin is the worse
     const auto cells = WorstOfCells([&](const TrialRow& a, const TrialRow& b) {
       return !(sign * a.result.metrics[metric] <= sign * b.result.metrics[metric]);
@@ -109,8 +109,10 @@ class Grid {
                                  axis.values.begin());
     };
     for (const TrialRow& row : results_.rows) {
-      const size_t cell =
-          find(y_, row.trial.parameters[1]) * x_.values.size() + find(x_, row.trial.parameters[0]);
+      const size_t column = find(x_, row.trial.parameters[0]);
+      const size_t line = find(y_, row.trial.parameters[1]);
+      if (column == x_.values.size() || line == y_.values.size()) continue;  // not of this grid
+      const size_t cell = line * x_.values.size() + column;
       if (cells[cell] == nullptr || is_worse(row, *cells[cell])) cells[cell] = &row;
     }
     return cells;
@@ -195,9 +197,9 @@ std::string Describe(const Study& study, const TrialRow& row) {
   return text;
 }
 
-std::string DrawOutcomes(const StudyResults& results) {
+Html DrawOutcomes(const StudyResults& results) {
   const Study& study = results.study;
-  if (study.variations.size() < 2) return "";
+  if (study.variations.size() < 2) return {};
   if (IsGrid(study)) return Grid(results).DrawOutcomes();
   // Samples: where they lie.
   Chart chart = MakeChart("outcome", study.variations[0].key, study.variations[1].key);
@@ -208,19 +210,19 @@ std::string DrawOutcomes(const StudyResults& results) {
   return DrawChart(chart);
 }
 
-std::string DrawMetrics(const StudyResults& results) {
-  if (!IsGrid(results.study)) return "";
-  std::string figures;
+Html DrawMetrics(const StudyResults& results) {
+  if (!IsGrid(results.study)) return {};
+  Html figures;
   for (const Metric metric : results.metrics) figures += Grid(results).DrawMetric(metric);
   return figures;
 }
 
-std::string DrawLines(const StudyResults& results) {
+Html DrawLines(const StudyResults& results) {
   const Study& study = results.study;
-  if (study.sampling != Sampling::kGrid) return "";
+  if (study.sampling != Sampling::kGrid) return {};
   const bool has_second = study.variations.size() > 1;
   const std::vector<double> chosen = ChooseLines(study);
-  std::string figures;
+  Html figures;
   for (const Metric metric : results.metrics) {
     Chart chart = MakeChart(LabelOf(metric), study.variations[0].key, LabelOf(metric));
     for (size_t i = 0; i < chosen.size(); ++i) {
@@ -240,9 +242,9 @@ std::string DrawLines(const StudyResults& results) {
   return figures;
 }
 
-std::string DrawErrorAgainstEffort(const StudyResults& results) {
+Html DrawErrorAgainstEffort(const StudyResults& results) {
   const std::vector<const TrialRow*> tracked = results.ListTracked();
-  if (tracked.empty()) return "";
+  if (tracked.empty()) return {};
   Chart chart = MakeChart("error against effort", LabelOf(kEnergy), LabelOf(kPositionErrorRms));
   ChartLine line{"Pareto front", "#9b2226", {}};
   for (const TrialRow* row : ListFront(tracked)) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/report/html.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck {
@@ -37,13 +38,13 @@ std::string LinkTo(const TrialRow& row);
 std::string Describe(const Study& study, const TrialRow& row);
 
 /// Outcomes over the first two keys, with the measured and the theoretical boundary of stability.
-std::string DrawOutcomes(const StudyResults& results);
-/// A map for each metric over the first two keys of a grid; "" for other studies.
-std::string DrawMetrics(const StudyResults& results);
-/// Metrics along the first key of a grid, a line for each of a few values of the second; "" for other
-/// studies.
-std::string DrawLines(const StudyResults& results);
-/// Error against effort of all trials that tracked, with the Pareto front; "" when none did.
-std::string DrawErrorAgainstEffort(const StudyResults& results);
+Html DrawOutcomes(const StudyResults& results);
+/// A map for each metric over the first two keys of a grid; empty for other studies.
+Html DrawMetrics(const StudyResults& results);
+/// Metrics along the first key of a grid, a line for each of a few values of the second; empty for
+/// other studies.
+Html DrawLines(const StudyResults& results);
+/// Error against effort of all trials that tracked, with the Pareto front; empty when none did.
+Html DrawErrorAgainstEffort(const StudyResults& results);
 
 }  // namespace dexcheck

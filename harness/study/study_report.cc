@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <regex>
 
 #include "harness/common/shell.h"
 #include "harness/report/html.h"
@@ -46,67 +45,82 @@ svg .dot { stroke: #333; stroke-width: .5; }
 }
 )";
 
+/// A failure without the time that it happened at, so that equal ones can be counted.
+std::string WithoutTime(const std::string& failure) {
+  constexpr std::string_view kSettling = " while settling";
+  if (failure.ends_with(kSettling)) return failure.substr(0, failure.size() - kSettling.size());
+  return failure.substr(0, failure.find(" at t = "));
+}
+
 class Report {
  public:
   explicit Report(const StudyStore& store)
       : store_(store), results_(store), tracked_(results_.ListTracked()) {}
 
   std::string Make() {
-    std::string html = fmt::format(
+    Html html = FormatHtml(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
         "content=\"width=device-width, initial-scale=1\">\n<meta http-equiv=\"Content-Security-Policy\" "
         "content=\"{}\">\n<title>{} – dexcheck study</title>\n<link rel=\"icon\" "
         "href=\"data:,\">\n<style>\n{}{}</style>\n</head>\n<body>\n",
-        kContentPolicy, EscapeHtml(results_.study.name), kPageCss, kStyle);
+        kContentPolicy, results_.study.name, Html::Raw(kPageCss), Html(kStyle));
     html += Head();
     html += "<main>\n";
     if (results_.rows.empty()) {
       html += "<p>No trial is done yet.</p>\n";
     } else {
-      html += Outcomes() + Maps() + Lines() + ErrorAgainstEffort() + Best() + Trials();
+      for (const Html& part : {Outcomes(), Maps(), Lines(), ErrorAgainstEffort(), Best(), Trials()})
+        html += part;
     }
-    return html + "</main>\n" + Footer() + "</body>\n</html>\n";
+    html += "</main>\n";
+    html += Footer();
+    html += "</body>\n</html>\n";
+    return html.markup();
   }
 
  private:
-  [[nodiscard]] static std::string MakeTile(const std::string& value, const std::string& label) {
-    return fmt::format("<div class=\"card\"><b>{}</b><span>{}</span></div>\n", value, label);
+  [[nodiscard]] static Html MakeTile(const std::string& value, const Html& label) {
+    return FormatHtml("<div class=\"card\"><b>{}</b><span>{}</span></div>\n", value, label);
   }
 
-  [[nodiscard]] std::string Head() const {
+  [[nodiscard]] Html Head() const {
     const Study& study = results_.study;
-    std::string html =
-        fmt::format("<header>\n<h1><b>{}</b>{}{}</h1>\n<div class=\"tiles\">\n", EscapeHtml(study.name),
-                    study.description.empty() ? "" : " – ", EscapeHtml(study.description));
+    Html html = FormatHtml("<header>\n<h1><b>{}</b>{}{}</h1>\n<div class=\"tiles\">\n", study.name,
+                           study.description.empty() ? "" : " – ", study.description);
     const size_t count = ListTrials(study).size();
     html += MakeTile(fmt::format("{} of {}", results_.rows.size(), count),
-                     fmt::format("trials of scenario {} are done", EscapeHtml(study.scenario)));
-    if (results_.rows.empty()) return html + "</div>\n</header>\n";
-    html += MakeTile(fmt::format("{}", tracked_.size()), "tracked to their end, without slip");
+                     FormatHtml("trials of scenario {} are done", study.scenario));
+    if (results_.rows.empty()) {
+      html += "</div>\n</header>\n";
+      return html;
+    }
+    html += MakeTile(fmt::format("{}", tracked_.size()), Html("tracked to their end, without slip"));
     if (!tracked_.empty()) {
       html += MakeTile(FormatShort(tracked_.front()->result.metrics[kPositionErrorRms]) + " m",
-                       fmt::format("least rms position error, <a href=\"{}\">trial {}</a>",
-                                   LinkTo(*tracked_.front()), tracked_.front()->trial.number));
+                       FormatHtml("least rms position error, <a href=\"{}\">trial {}</a>",
+                                  LinkTo(*tracked_.front()), tracked_.front()->trial.number));
     }
-    return html +
-           "</div>\n</header>\n<nav><div><a href=\"#outcomes\">Outcomes</a><a href=\"#maps\">Maps</a><a "
-           "href=\"#lines\">Lines</a><a href=\"#effort\">Effort</a><a href=\"#best\">Best</a><a "
-           "href=\"#trials\">Trials</a></div></nav>\n";
+    html +=
+        "</div>\n</header>\n<nav><div><a href=\"#outcomes\">Outcomes</a><a href=\"#maps\">Maps</a><a "
+        "href=\"#lines\">Lines</a><a href=\"#effort\">Effort</a><a href=\"#best\">Best</a><a "
+        "href=\"#trials\">Trials</a></div></nav>\n";
+    return html;
   }
 
-  [[nodiscard]] std::string Outcomes() const {
+  [[nodiscard]] Html Outcomes() const {
     std::map<Outcome, long> counts;
     for (const TrialRow& row : results_.rows) ++counts[row.result.outcome];
-    std::string html =
+    Html html(
         "<h2 id=\"outcomes\">Outcomes</h2>\n<div class=\"grid\">\n<div class=\"card\">\n<table "
-        "class=\"counts\">\n";
+        "class=\"counts\">\n");
     for (const auto& [outcome, count] : counts) {
-      html += fmt::format(
+      html += FormatHtml(
           "<tr><td><span class=\"key\" style=\"background:{}\"></span> {}</td><td class=\"value "
           "number\">{}</td></tr>\n",
           FindColor(outcome), NameOf(outcome), count);
     }
-    return html + "</table>\n</div>\n<div class=\"card\">\n" + Departures() + "</div>\n</div>\n";
+    html += FormatHtml("</table>\n</div>\n<div class=\"card\">\n{}</div>\n</div>\n", Departures());
+    return html;
   }
 
   [[nodiscard]] static std::string ExplainDivergence(const TrialRow& row) {
@@ -115,7 +129,7 @@ class Report {
   }
 
   /// Where theory is stable and the run was not held to its end, by reason.
-  [[nodiscard]] std::string Departures() const {
+  [[nodiscard]] Html Departures() const {
     std::map<std::string, long> reasons;
     long agree = 0;
     long asked = 0;
@@ -127,13 +141,12 @@ class Report {
         ++agree;
         continue;
       }
-      static const std::regex kTime("( at t = .*| while settling)$");
-      std::string reason = std::regex_replace(row.result.failure, kTime, "");
+      std::string reason = WithoutTime(row.result.failure);
       if (reason.empty()) reason = ExplainDivergence(row);
       ++reasons[stable ? "stable in theory, but " + reason
                        : "unstable in theory, but held to the end of the run"];
     }
-    std::string html = fmt::format(
+    Html html = FormatHtml(
         "<p>The sampled error dynamics E_ddot + K_v E_dot + K_p E = 0, stepped as the engine steps, tell {} "
         "of {} "
         "trials rightly.</p>\n",
@@ -141,66 +154,70 @@ class Report {
     if (reasons.empty()) return html;
     html += "<p>Where the plant departs from them, and why:</p>\n<table class=\"counts\">\n";
     for (const auto& [reason, count] : reasons) {
-      html +=
-          fmt::format("<tr><td>{}</td><td class=\"value number\">{}</td></tr>\n", EscapeHtml(reason), count);
+      html += FormatHtml("<tr><td>{}</td><td class=\"value number\">{}</td></tr>\n", reason, count);
     }
-    return html + "</table>\n";
+    html += "</table>\n";
+    return html;
   }
 
   /// What is drawn over the maps.
-  [[nodiscard]] static std::string ExplainMaps(const std::string& figure) {
-    std::string text =
+  [[nodiscard]] static Html ExplainMaps(const Html& figure) {
+    Html text(
         "<span class=\"key rule\"></span> Measured boundary between runs that were held to their end and "
         "others; in "
-        "the map of overshoot, between less and more than 1 %. ";
-    text +=
-        figure.find("class=\"dot\"") == std::string::npos
-            ? "The theoretical boundary of stability does not run through this range. "
-            : "Dots are theory: <span class=\"key dot\" style=\"background:#0b3c8c\"></span> the boundary of "
-              "stability, <span class=\"key dot\" style=\"background:#fff\"></span> critical damping; in the "
-              "map "
-              "of overshoot, 1 %. ";
-    return text + "Of several trials in one cell the worst is shown; grey: no value. ";
+        "the map of overshoot, between less and more than 1 %. ");
+    text += figure.markup().find("class=\"dot\"") == std::string::npos
+                ? Html("The theoretical boundary of stability does not run through this range. ")
+                : Html(
+                      "Dots are theory: <span class=\"key dot\" style=\"background:#0b3c8c\"></span> the "
+                      "boundary of "
+                      "stability, <span class=\"key dot\" style=\"background:#fff\"></span> critical "
+                      "damping; in the "
+                      "map "
+                      "of overshoot, 1 %. ");
+    text += "Of several trials in one cell the worst is shown; grey: no value. ";
+    return text;
   }
 
-  [[nodiscard]] std::string Maps() const {
-    const std::string outcomes = DrawOutcomes(results_);
-    if (outcomes.empty()) return "";
+  [[nodiscard]] Html Maps() const {
+    const Html outcomes = DrawOutcomes(results_);
+    if (outcomes.empty()) return {};
     const Study& study = results_.study;
-    return fmt::format(
+    return FormatHtml(
         "<h2 id=\"maps\">Over {} and {}</h2>\n<p class=\"soft\">{}Each {} leads to its trial and the command "
         "that "
         "repeats it.</p>\n<div class=\"grid\">\n{}{}</div>\n",
-        EscapeHtml(study.variations[0].key), EscapeHtml(study.variations[1].key),
-        study.sampling == Sampling::kGrid ? ExplainMaps(outcomes) : "",
+        study.variations[0].key, study.variations[1].key,
+        study.sampling == Sampling::kGrid ? ExplainMaps(outcomes) : Html(),
         study.sampling == Sampling::kGrid ? "cell" : "point", outcomes, DrawMetrics(results_));
   }
 
-  [[nodiscard]] std::string Lines() const {
-    const std::string lines = DrawLines(results_);
-    if (lines.empty()) return "";
-    return "<h2 id=\"lines\">Along " + EscapeHtml(results_.study.variations[0].key) +
-           "</h2>\n<p class=\"soft\">Trials that were held to their end.</p>\n<div class=\"grid\">\n" +
-           lines + "</div>\n";
+  [[nodiscard]] Html Lines() const {
+    const Html lines = DrawLines(results_);
+    if (lines.empty()) return {};
+    return FormatHtml(
+        "<h2 id=\"lines\">Along {}</h2>\n<p class=\"soft\">Trials that were held to their end.</p>\n<div "
+        "class=\"grid\">\n{}</div>\n",
+        results_.study.variations[0].key, lines);
   }
 
-  [[nodiscard]] std::string ErrorAgainstEffort() const {
-    const std::string chart = DrawErrorAgainstEffort(results_);
-    if (chart.empty()) return "";
-    return "<h2 id=\"effort\">Error against effort</h2>\n<p class=\"soft\">Trials that tracked, by the work "
-           "of "
-           "their motors. To the left of the front nothing is had: less error costs more work.</p>\n<div "
-           "class=\"grid\">\n" +
-           chart + "</div>\n";
+  [[nodiscard]] Html ErrorAgainstEffort() const {
+    const Html chart = DrawErrorAgainstEffort(results_);
+    if (chart.empty()) return {};
+    return FormatHtml(
+        "<h2 id=\"effort\">Error against effort</h2>\n<p class=\"soft\">Trials that tracked, by the work of "
+        "their motors. To the left of the front nothing is had: less error costs more work.</p>\n<div "
+        "class=\"grid\">\n{}</div>\n",
+        chart);
   }
 
-  [[nodiscard]] std::string Best() const {
-    if (tracked_.empty()) return "";
-    std::string html =
+  [[nodiscard]] Html Best() const {
+    if (tracked_.empty()) return {};
+    Html html(
         "<h2 id=\"best\">Best</h2>\n<p class=\"soft\">By rms position error, of the trials that "
-        "tracked.</p>\n<div class=\"card scroll\"><table>\n<tr><th class=\"value\">trial</th>";
+        "tracked.</p>\n<div class=\"card scroll\"><table>\n<tr><th class=\"value\">trial</th>");
     const auto add_head = [&](const std::string& text) {
-      html += "<th class=\"value\">" + EscapeHtml(text) + "</th>";
+      html += FormatHtml("<th class=\"value\">{}</th>", text);
     };
     for (const Variation& variation : results_.study.variations) add_head(variation.key);
     std::vector<Metric> shown = {kPositionErrorRms, kEnergy};
@@ -211,10 +228,9 @@ class Report {
     html += "</tr>\n";
     for (size_t i = 0; i < std::min(tracked_.size(), kMostBest); ++i) {
       const TrialRow& row = *tracked_[i];
-      html +=
-          fmt::format("<tr><td class=\"value\"><a href=\"{}\">{}</a></td>", LinkTo(row), row.trial.number);
+      html += FormatHtml("<tr><td class=\"value\"><a href=\"{}\">{}</a></td>", LinkTo(row), row.trial.number);
       const auto add = [&](const std::string& text) {
-        html += "<td class=\"value number\">" + text + "</td>";
+        html += FormatHtml("<td class=\"value number\">{}</td>", text);
       };
       for (const double value : row.trial.parameters) add(fmt::format("{:.6g}", value));
       for (const Metric metric : shown) {
@@ -223,14 +239,15 @@ class Report {
       }
       html += "</tr>\n";
     }
-    return html + "</table></div>\n";
+    html += "</table></div>\n";
+    return html;
   }
 
-  [[nodiscard]] std::string Trials() const {
-    std::string html =
+  [[nodiscard]] Html Trials() const {
+    Html html(
         "<h2 id=\"trials\">Trials</h2>\n<p class=\"soft\">Each command repeats one trial, with its log, "
         "report and "
-        "video.</p>\n<div class=\"card trials\">\n";
+        "video.</p>\n<div class=\"card trials\">\n");
     for (const TrialRow& row : results_.rows) {
       std::string metrics;
       for (size_t i = 0; i < kMetrics.size(); ++i) {
@@ -241,22 +258,22 @@ class Report {
                                unit == "1" ? "" : " " + unit);
       }
       const std::string title = Describe(results_.study, row);
-      html += fmt::format(
+      html += FormatHtml(
           "<section class=\"trial\" id=\"trial-{}\"><a class=\"close\" href=\"#none\">close</a><b><span "
           "class=\"key\" "
           "style=\"background:{}\"></span> {}</b><br><small "
           "class=\"soft\">{}</small><pre>{}</pre></section>\n",
-          row.trial.number, FindColor(row.result.outcome), EscapeHtml(title), metrics,
-          EscapeHtml(MakeReplayCommand(results_.study, row.trial)));
+          row.trial.number, FindColor(row.result.outcome), title, metrics,
+          MakeReplayCommand(results_.study, row.trial));
     }
-    return html + "</div>\n";
+    html += "</div>\n";
+    return html;
   }
 
-  [[nodiscard]] std::string Footer() const {
+  [[nodiscard]] Html Footer() const {
     const std::string& revision = store_.Identify("git_revision");
-    return fmt::format("<footer>dexcheck {}{}{}, MuJoCo {}.</footer>\n", store_.Identify("dexcheck_version"),
-                       revision.empty() ? "" : ", revision ", EscapeHtml(revision),
-                       store_.Identify("mujoco_version"));
+    return FormatHtml("<footer>dexcheck {}{}{}, MuJoCo {}.</footer>\n", store_.Identify("dexcheck_version"),
+                      revision.empty() ? "" : ", revision ", revision, store_.Identify("mujoco_version"));
   }
 
   const StudyStore& store_;

@@ -1,8 +1,10 @@
 #include "harness/study/study_store.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <set>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -10,6 +12,7 @@
 #include "harness/common/files.h"
 #include "harness/common/version.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/machine.h"
 #include "harness/record/mjcf_files.h"
 #include "harness/study/git_revision.h"
 #include "harness/study/process_name.h"
@@ -18,7 +21,8 @@ namespace dexcheck {
 namespace {
 
 constexpr int kApplicationId = 0x44584353;  // "DXCS", tells a study from other databases
-constexpr const char* kLayout = "1";
+constexpr const char* kLayout = "2";
+constexpr const char* kLayoutWithoutMachine = "1";  // does not say which machine made a trial
 
 /// FNV-1a, 64 bits.
 std::string Hash(const std::string& text) {
@@ -44,20 +48,31 @@ std::string QuoteName(const std::string& name) {
   return quoted + "\"";
 }
 
-bool IsSame(double a, double b) {
+bool IsSameNumber(double a, double b) {
   return (std::isnan(a) && std::isnan(b)) ||
          std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }
 
-bool IsSame(const TrialRow& a, const TrialRow& b) {
-  for (size_t i = 0; i < a.result.metrics.size(); ++i) {
-    if (!IsSame(a.result.metrics[i], b.result.metrics[i])) return false;
-  }
-  return a.trial.seed == b.trial.seed && a.trial.parameters == b.trial.parameters &&
-         a.result.outcome == b.result.outcome && a.result.failure == b.result.failure;
-}
-
 }  // namespace
+
+bool IsSame(const TrialRow& a, const TrialRow& b) {
+  if (a.trial.seed != b.trial.seed || a.trial.parameters != b.trial.parameters ||
+      a.result.outcome != b.result.outcome) {
+    return false;
+  }
+  const bool exactly = a.machine == b.machine;
+  if (exactly && a.result.failure != b.result.failure) return false;
+  if (!exactly && !a.result.failure.empty() && !b.result.failure.empty()) return true;
+  for (size_t i = 0; i < a.result.metrics.size(); ++i) {
+    const double x = a.result.metrics[i];
+    const double y = b.result.metrics[i];
+    if (exactly ? !IsSameNumber(x, y)
+                : !IsSameWithin(kMetricTolerance, x, y, std::max(std::abs(x), std::abs(y)))) {
+      return false;
+    }
+  }
+  return a.result.failure == b.result.failure;
+}
 
 StudyIdentity IdentifyStudy(const StudyInputs& inputs) {
   return {{"layout", kLayout},
@@ -116,7 +131,7 @@ void StudyStore::Create(const StudyIdentity& identity, const Study& study) {
   }
   table += ", outcome TEXT NOT NULL, failure TEXT NOT NULL";
   for (const MetricInfo& metric : kMetrics) table += std::string(", ") + metric.name + " REAL";
-  database_->Execute(table + ")");
+  database_->Execute(table + ", machine TEXT NOT NULL)");
   // Of trials that are running: who has them.
   database_->Execute("CREATE TABLE claims (trial INTEGER PRIMARY KEY, process TEXT NOT NULL)");
   transaction.Commit();
@@ -127,10 +142,7 @@ void StudyStore::Load() {
   if (!id.Step() || id.GetWhole(0) != kApplicationId) {
     throw InputError(database_->name() + ": is not the database of a study");
   }
-  Statement layout(database_.get(), "SELECT layout FROM study");
-  if (!layout.Step() || layout.GetText(0) != kLayout) {
-    throw InputError(database_->name() + ": was written by another version of dexcheck");
-  }
+  Upgrade();
   identity_.clear();
   for (const char* column : {"layout", "name", "study", "scenario", "robot", "mjcf_hash", "dexcheck_version",
                              "git_revision", "mujoco_version"}) {
@@ -139,6 +151,22 @@ void StudyStore::Load() {
     identity_.emplace_back(column, select.GetText(0));
   }
   study_ = ParseStudy(Identify("study"), database_->name());
+}
+
+void StudyStore::Upgrade() {
+  const auto read_layout = [&] {
+    Statement layout(database_.get(), "SELECT layout FROM study");
+    return layout.Step() ? layout.GetText(0) : "";
+  };
+  if (read_layout() == kLayout) return;
+  Transaction transaction(database_.get());
+  if (read_layout() == kLayout) return;  // another process was faster
+  if (read_layout() != kLayoutWithoutMachine) {
+    throw InputError(database_->name() + ": was written by another version of dexcheck");
+  }
+  database_->Execute("ALTER TABLE trials ADD COLUMN machine TEXT NOT NULL DEFAULT ''");
+  database_->Execute(std::string("UPDATE study SET layout = '") + kLayout + "'");
+  transaction.Commit();
 }
 
 const std::string& StudyStore::Identify(const std::string& column) const {
@@ -164,7 +192,7 @@ std::string StudyStore::ListColumns() const {
   for (const Variation& variation : study_.variations) columns += ", " + QuoteName(variation.key);
   columns += ", outcome, failure";
   for (const MetricInfo& metric : kMetrics) columns += std::string(", ") + metric.name;
-  return columns;
+  return columns + ", machine";
 }
 
 std::vector<TrialRow> StudyStore::ReadRows() const {
@@ -186,6 +214,7 @@ std::vector<TrialRow> StudyStore::ReadRows() const {
     row.result.outcome = *FindOutcome(outcome);
     row.result.failure = select.GetText(column++);
     for (double& metric : row.result.metrics) metric = select.GetNumber(column++);
+    row.machine = select.GetText(column++);
     rows.push_back(row);
   }
   return rows;
@@ -219,7 +248,7 @@ void StudyStore::Release(long trial) {
 }
 
 void StudyStore::Insert(const TrialRow& row) {
-  std::string marks = "?, ?, ?, ?";
+  std::string marks = "?, ?, ?, ?, ?";
   for (size_t i = 0; i < study_.variations.size() + kNumMetrics; ++i) marks += ", ?";
   Statement insert(database_.get(),
                    "INSERT OR IGNORE INTO trials (" + ListColumns() + ") VALUES (" + marks + ")");
@@ -230,6 +259,7 @@ void StudyStore::Insert(const TrialRow& row) {
   insert.Bind(parameter++, NameOf(row.result.outcome));
   insert.Bind(parameter++, row.result.failure);
   for (const double metric : row.result.metrics) insert.Bind(parameter++, metric);
+  insert.Bind(parameter++, row.machine);
   insert.Step();
 }
 
@@ -240,20 +270,56 @@ void StudyStore::Add(const TrialRow& row) {
   transaction.Commit();
 }
 
-void StudyStore::AddAll(const std::vector<TrialRow>& rows, const std::string& source) {
+void StudyStore::Remove(long trial) {
+  Statement remove(database_.get(), "DELETE FROM trials WHERE trial = ?");
+  remove.Bind(1, static_cast<long long>(trial));
+  remove.Step();
+}
+
+void StudyStore::AddAll(const std::vector<TrialSource>& sources) {
   Transaction transaction(database_.get());
-  std::map<long, TrialRow> known;
-  for (const TrialRow& row : ReadRows()) known.emplace(row.trial.number, row);
-  for (const TrialRow& row : rows) {
-    const auto found = known.find(row.trial.number);
-    if (found == known.end()) {
+  struct Known {
+    TrialRow row;
+    const std::string* source;
+  };
+  std::map<long, Known> known;
+  for (const TrialRow& row : ReadRows()) known.insert({row.trial.number, {row, &database_->name()}});
+  for (const TrialSource& source : sources) {
+    for (const TrialRow& row : source.rows) {
+      const auto found = known.find(row.trial.number);
+      if (found != known.end()) {
+        const Known& other = found->second;
+        if (IsFailed(row.result.outcome)) continue;
+        if (IsFailed(other.row.result.outcome)) {
+          Remove(row.trial.number);
+        } else if (IsSame(other.row, row)) {
+          continue;
+        } else {
+          throw InputError(source.name + ": trial " + std::to_string(row.trial.number) +
+                           " has another result than in " + *other.source);
+        }
+      }
       Insert(row);
-    } else if (!IsSame(found->second, row)) {
-      throw InputError(source + ": trial " + std::to_string(row.trial.number) +
-                       " has another result than in " + database_->name());
+      known.insert_or_assign(row.trial.number, Known{row, &source.name});
     }
   }
   transaction.Commit();
+}
+
+long StudyStore::RemoveFailed(const std::vector<Trial>& trials) {
+  Transaction transaction(database_.get());
+  std::set<long> failed;
+  for (const TrialRow& row : ReadRows()) {
+    if (IsFailed(row.result.outcome)) failed.insert(row.trial.number);
+  }
+  long count = 0;
+  for (const Trial& trial : trials) {
+    if (failed.count(trial.number) == 0) continue;
+    Remove(trial.number);
+    ++count;
+  }
+  transaction.Commit();
+  return count;
 }
 
 }  // namespace dexcheck

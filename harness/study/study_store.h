@@ -26,7 +26,19 @@ StudyIdentity IdentifyStudy(const StudyInputs& inputs);
 struct TrialRow {
   Trial trial;
   TrialResult result;
+  std::string machine;  ///< That made it, as DescribeMachine says; empty when that was not recorded.
 };
+
+/// Rows and where they are from, for messages.
+struct TrialSource {
+  std::string name;
+  std::vector<TrialRow> rows;
+};
+
+/// Whether two rows of one trial are the same: bit for bit when one machine made both, else within rounding
+/// (kMetricTolerance). A run that ended early amplifies rounding until it does: of two such the outcomes are
+/// compared.
+bool IsSame(const TrialRow& a, const TrialRow& b);
 
 class StudyStore {
  public:
@@ -55,12 +67,17 @@ class StudyStore {
   void Release(long trial);
   /// Stores a trial and ends its claim. A row that is already there stays.
   void Add(const TrialRow& row);
-  /// All rows in one transaction; equal ones may be there already. @throws InputError when one differs.
-  void AddAll(const std::vector<TrialRow>& rows, const std::string& source);
+  /// All rows in one transaction. Those that are the same as one that is there may be, and failed ones
+  /// (IsFailed) give way to others. @throws InputError when one differs; then nothing is added.
+  void AddAll(const std::vector<TrialSource>& sources);
+  /// Forgets these trials where they failed (IsFailed). @return how many.
+  long RemoveFailed(const std::vector<Trial>& trials);
 
  private:
   StudyStore(const std::filesystem::path& path, Database::Mode mode);
   void Create(const StudyIdentity& identity, const Study& study);
+  void Upgrade();
+  void Remove(long trial);
   void Load();
   void Insert(const TrialRow& row);
   [[nodiscard]] std::string ListColumns() const;

@@ -11,6 +11,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <limits>
 #include <utility>
 
@@ -64,10 +65,18 @@ std::string ReadLastLine(int file) {
   return text.substr(text.rfind('\n') + 1);
 }
 
+/// Of a process and its threads so far, s; 0 when there is none.
+double ReadProcessorTime(pid_t pid) {
+  clockid_t clock = 0;
+  timespec time{};
+  if (::clock_getcpuclockid(pid, &clock) != 0 || ::clock_gettime(clock, &time) != 0) return 0.0;
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
 }  // namespace
 
-TrialPool::TrialPool(int size, std::function<TrialResult(const Trial&)> run)
-    : size_(static_cast<size_t>(size)), run_(std::move(run)) {}
+TrialPool::TrialPool(int size, double time_limit, std::function<TrialResult(const Trial&)> run)
+    : size_(static_cast<size_t>(size)), time_limit_(time_limit), run_(std::move(run)) {}
 
 TrialPool::~TrialPool() {
   for (const Worker& worker : workers_) {
@@ -120,7 +129,17 @@ void TrialPool::Start(const Trial& trial) {
   workers_.push_back(std::move(worker));
 }
 
-std::optional<TrialRow> TrialPool::Wait() {
+void TrialPool::EndSlowTrials() {
+  if (time_limit_ <= 0.0) return;
+  for (Worker& worker : workers_) {
+    if (worker.timed_out || !(ReadProcessorTime(worker.pid) > time_limit_)) continue;
+    worker.timed_out = true;
+    ::kill(worker.pid, SIGKILL);
+  }
+}
+
+std::optional<EndedTrial> TrialPool::Wait() {
+  EndSlowTrials();
   std::vector<pollfd> files;
   for (const Worker& worker : workers_) files.push_back({worker.results, POLLIN, 0});
   if (::poll(files.data(), files.size(), kWait) <= 0) return std::nullopt;
@@ -134,7 +153,7 @@ std::optional<TrialRow> TrialPool::Wait() {
   return std::nullopt;
 }
 
-TrialRow TrialPool::Finish(size_t index) {
+EndedTrial TrialPool::Finish(size_t index) {
   const Worker worker = std::move(workers_[index]);
   workers_.erase(workers_.begin() + static_cast<std::ptrdiff_t>(index));
   int status = 0;
@@ -142,24 +161,29 @@ TrialRow TrialPool::Finish(size_t index) {
   const std::string message = ReadLastLine(worker.messages);
   ::close(worker.results);
   ::close(worker.messages);
-  TrialRow row;
-  row.trial = worker.trial;
-  const bool ended = WIFEXITED(status) && WEXITSTATUS(status) == EXIT_SUCCESS;
-  if (const auto result = Unpack(worker.received); result && ended) {
-    row.result = *result;
-    return row;
+  EndedTrial ended;
+  ended.row.trial = worker.trial;
+  const bool succeeded = WIFEXITED(status) && WEXITSTATUS(status) == EXIT_SUCCESS;
+  if (const auto result = Unpack(worker.received); result && succeeded) {
+    ended.row.result = *result;
+    return ended;
+  }
+  TrialResult& result = ended.row.result;
+  result.outcome = worker.timed_out ? Outcome::kTimedOut : Outcome::kCrashed;
+  result.metrics.fill(std::numeric_limits<double>::quiet_NaN());
+  if (worker.timed_out) {
+    result.failure =
+        "it took more than trial_time_limit, " + FormatNumber(time_limit_) + " s of processor time";
+    return ended;
   }
   const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
-  if (signal == SIGKILL || signal == SIGTERM || signal == SIGHUP) {
-    throw Error("the process of trial " + std::to_string(worker.trial.number) + " was killed from outside (" +
-                ::strsignal(signal) + ")");
-  }
-  row.result.outcome = Outcome::kCrashed;
-  row.result.metrics.fill(std::numeric_limits<double>::quiet_NaN());
-  row.result.failure = signal != 0       ? std::string("the process died: ") + ::strsignal(signal)
-                       : message.empty() ? "the process ended without a result"
-                                         : Abbreviate(message);
-  return row;
+  ended.killed_from_outside = signal == SIGKILL || signal == SIGTERM || signal == SIGHUP;
+  result.failure = ended.killed_from_outside
+                       ? std::string("the process was killed from outside: ") + ::strsignal(signal)
+                   : signal != 0     ? std::string("the process died: ") + ::strsignal(signal)
+                   : message.empty() ? "the process ended without a result"
+                                     : Abbreviate(message);
+  return ended;
 }
 
 }  // namespace dexcheck

@@ -13,11 +13,20 @@
 
 namespace dexcheck {
 
+/// A trial whose process has ended.
+struct EndedTrial {
+  TrialRow row;
+  /// Its process was killed, by hand or by the system when memory is short: the trial may be tried again.
+  bool killed_from_outside = false;
+};
+
 /// Processes that each make one trial. They end when this process does, however it ends.
 class TrialPool {
  public:
   /// @param run makes a trial; called in the trial's process.
-  TrialPool(int size, std::function<TrialResult(const Trial&)> run);
+  /// @param time_limit most processor time of a trial, s; 0 for any. One that takes more is ended and gives
+  ///   Outcome::kTimedOut.
+  TrialPool(int size, double time_limit, std::function<TrialResult(const Trial&)> run);
   /// Ends what still runs.
   ~TrialPool();
   TrialPool(const TrialPool&) = delete;
@@ -31,9 +40,8 @@ class TrialPool {
   /// Begins a trial; the pool must not be full. @throws Error when no process can be made.
   void Start(const Trial& trial);
 
-  /// Waits a little for a trial to end; none when none did. A process that died by itself gives
-  /// Outcome::kCrashed. @throws Error when a trial's process was killed from outside.
-  std::optional<TrialRow> Wait();
+  /// Waits a little for a trial to end; none when none did. A process that died gives Outcome::kCrashed.
+  std::optional<EndedTrial> Wait();
 
  private:
   struct Worker {
@@ -42,11 +50,14 @@ class TrialPool {
     int results = -1;   // the pipe's end to read from
     int messages = -1;  // its standard error
     std::string received;
+    bool timed_out = false;
   };
   [[noreturn]] void Work(const Trial& trial, int results, int messages, pid_t parent) const;
-  TrialRow Finish(size_t index);
+  void EndSlowTrials();
+  EndedTrial Finish(size_t index);
 
   size_t size_;
+  double time_limit_;
   std::function<TrialResult(const Trial&)> run_;
   std::vector<Worker> workers_;
 };

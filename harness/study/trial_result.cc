@@ -3,8 +3,8 @@
 namespace dexcheck {
 namespace {
 
-constexpr const char* kNames[] = {"tracked",  "slipped",          "lost contact", "wheels spun",
-                                  "diverged", "checks disagreed", "refused",      "crashed"};
+constexpr const char* kNames[] = {"tracked",          "slipped", "lost contact", "wheels spun", "diverged",
+                                  "checks disagreed", "refused", "crashed",      "timed out"};
 static_assert(std::size(kNames) == kNumOutcomes);
 
 }  // namespace

@@ -19,12 +19,17 @@ enum class Outcome {
   kChecksDisagreed,  ///< Model and engine differ at one and the same state.
   kRefused,          ///< The values make no run, such as a grasp out of reach.
   kCrashed,          ///< The trial's process died.
+  kTimedOut,         ///< It took longer than the study allows, and was ended.
 };
-constexpr int kNumOutcomes = 8;
+constexpr int kNumOutcomes = 9;
 
 /// "tracked", "slipped", ...
 const char* NameOf(Outcome outcome);
 std::optional<Outcome> FindOutcome(std::string_view name);
+/// Whether a trial came to no result of its own, so that it may be tried again.
+constexpr bool IsFailed(Outcome outcome) {
+  return outcome == Outcome::kCrashed || outcome == Outcome::kTimedOut;
+}
 
 enum Metric {
   kPositionErrorRms,

@@ -54,14 +54,14 @@ void Compare(int repetitions) {
       StudyStore::OpenOrCreate(folder.path() / "study.sqlite", IdentifyStudy(inputs), inputs.study);
   // The trials from `first` on, so many at a time.
   const auto run = [&](int jobs, size_t first, size_t count) {
-    TrialPool pool(jobs, [&](const Trial& trial) { return RunTrial(inputs, trial); });
+    TrialPool pool(jobs, 0.0, [&](const Trial& trial) { return RunTrial(inputs, trial); });
     size_t next = first;
     while (next < first + count || !pool.IsEmpty()) {
       while (!pool.IsFull() && next < first + count) {
         store.Claim(trials[next].number);
         pool.Start(trials[next++]);
       }
-      if (const auto row = pool.Wait()) store.Add(*row);
+      if (const auto ended = pool.Wait()) store.Add(ended->row);
     }
   };
   std::vector<double> wall;

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "harness/record/log_reader.h"
+#include "harness/record/log_writer.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck {
@@ -95,6 +96,70 @@ TEST(RunCommand, WritesAFolderThatTellsAll) {
   EXPECT_EQ(ReadText(out / "summary.json"), before);
 }
 
+/// Writes a log again, with one number of its last row changed.
+void CopyLog(const std::filesystem::path& from, const std::filesystem::path& to, const std::string& changed,
+             double change) {
+  const LogReader log(from);
+  LogWriter copy(to, log.rows());
+  for (const std::string& text : log.ListTexts()) copy.SetText(text, log.ReadText(text));
+  for (const std::string& file : log.ListFiles("inputs")) {
+    copy.EmbedFile("inputs", file, log.ReadFile("inputs", file));
+  }
+  std::vector<std::pair<int, RowMatrixXd>> signals;
+  for (const SignalInfo& signal : log.signals()) {
+    RowMatrixXd values = log.ReadSignal(signal.name);
+    if (signal.name == changed) values(log.rows() - 1, 0) += change;
+    signals.emplace_back(signal.name == "time" ? LogWriter::kTime : copy.AddSignal(signal), values);
+  }
+  copy.StartRows();
+  for (long row = 0; row < log.rows(); ++row) {
+    for (const auto& [signal, values] : signals) {
+      std::copy_n(values.row(row).data(), values.cols(), copy.Row(signal).data());
+    }
+    copy.EndRow();
+  }
+  copy.Close();
+}
+
+// The C library's mathematics without fused multiply-add has other last bits: another machine.
+TEST(RunCommand, AReplayTellsAnotherMachineFromAnotherRun) {
+  const TempFolder folder;
+  const std::filesystem::path out = folder.path() / "run";
+  ASSERT_EQ(RunDexcheck({"run", "hold", "--set", "duration=0.05", "--set", "settle=0.2", "--no-report",
+                         "--out", out.string()})
+                .exit_code,
+            0);
+  const std::string machine = LogReader(out / "log.h5").ReadText("machine");
+  EXPECT_EQ(ReadSummary(out)["machine"], machine);
+  EXPECT_THAT(machine, HasSubstr("; glibc 2."));
+  if (machine.find(" FMA") == std::string::npos) GTEST_SKIP() << "this machine has no fused multiply-add";
+
+  testing::ProgramOptions other;
+  other.environment = {{"GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX2,-FMA"}};
+  const auto replay = [&](const char* name, bool elsewhere) {
+    return RunDexcheck({"run", "--replay", (folder.path() / name).string()},
+                       elsewhere ? other : testing::ProgramOptions{});
+  };
+  EXPECT_THAT(replay("run", false).out, HasSubstr("IDENTICAL"));
+  const ProgramResult there = replay("run", true);
+  EXPECT_EQ(there.exit_code, 0);
+  EXPECT_THAT(there.out, HasSubstr("DIFFERENT MACHINE: "));
+  EXPECT_THAT(there.out, HasSubstr("written on:  " + machine));
+
+  // Less than rounding on the same machine is a difference; more than rounding on another one is, too.
+  for (const auto& [name, change] : {std::pair("slightly", 1e-15), {"much", 1e-6}}) {
+    std::filesystem::create_directory(folder.path() / name);
+    CopyLog(out / "log.h5", folder.path() / name / "log.h5", "object/X_o", change);
+    const ProgramResult here = replay(name, false);
+    EXPECT_EQ(here.exit_code, 1) << name;
+    EXPECT_THAT(here.out, HasSubstr("DIFFERENT: object/X_o at t = 0.049 s")) << name;
+    const ProgramResult elsewhere = replay(name, true);
+    const bool much = change > 1e-9;
+    EXPECT_EQ(elsewhere.exit_code, much ? 1 : 0) << name << elsewhere.out;
+    EXPECT_THAT(elsewhere.out, HasSubstr(much ? "Rounding alone does not explain" : "DIFFERENT MACHINE: "));
+  }
+}
+
 TEST(RunCommand, DisagreementIsExitCodeOneAndNamesTheCause) {
   const ProgramResult result = RunDexcheck({"run", "paper-rest", "--set", "duration=0.3", "--no-log"});
   EXPECT_EQ(result.exit_code, 1) << result.err;
@@ -132,6 +197,33 @@ TEST(RunCommand, CtrlCWritesWhatThereIs) {
   const nlohmann::json summary = ReadSummary(out);
   EXPECT_TRUE(summary["interrupted"].get<bool>());
   EXPECT_EQ(LogReader(out / "log.h5").rows(), summary["speed"]["steps"].get<long>());
+}
+
+TEST(RunCommand, CtrlCEndsSettlingToo) {
+  // The second settles twice, the second time while it moves: as short before as the test can tell.
+  for (const std::vector<std::string>& settings :
+       {std::vector<std::string>{"hold", "--set", "settle=100"},
+        {"paper", "--set", "settle=1e-4", "--set", "plant.time_step=1e-6", "--set", "duration=1e-3"}}) {
+    const TempFolder folder;
+    const std::filesystem::path out = folder.path() / "run";
+    std::vector<std::string> arguments = {"run"};
+    arguments.insert(arguments.end(), settings.begin(), settings.end());
+    arguments.insert(arguments.end(), {"--out", out.string()});
+    Program program(testing::DexcheckCommand(arguments), {});
+    for (int i = 0; i < 300 && !std::filesystem::exists(out / "log.h5"); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    program.Signal(SIGINT);
+    const auto begin = std::chrono::steady_clock::now();
+    const ProgramResult result = program.Wait();
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+    EXPECT_EQ(result.exit_code, 3) << result.err;
+    EXPECT_THAT(result.out, HasSubstr("interrupted"));
+    const nlohmann::json summary = ReadSummary(out);
+    EXPECT_TRUE(summary["interrupted"].get<bool>());
+    EXPECT_EQ(summary["speed"]["steps"], 0);
+  }
 }
 
 TEST(RunCommand, AKilledRunLeavesAReadableLog) {

@@ -12,6 +12,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <random>
+#include <set>
 #include <thread>
 
 #include "harness/study/study_store.h"
@@ -197,6 +198,125 @@ TEST_F(StudyCommand, MergedShardsAreTheStudy) {
   EXPECT_FALSE(std::filesystem::exists(Path("none.sqlite")));
 }
 
+TEST_F(StudyCommand, AMergeWithAConflictLeavesNothing) {
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})).exit_code, 0);
+  std::filesystem::copy(Path("a.sqlite"), Path("b.sqlite"));
+  Database(Path("b.sqlite"), Database::Mode::kExisting)
+      .Execute("UPDATE trials SET energy = energy * (1 + 1e-15) WHERE trial = 4");
+  ASSERT_FALSE(Dump(Path("a.sqlite")) == Dump(Path("b.sqlite")));
+  const auto list = [&] {
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path())) {
+      names.insert(entry.path().filename());
+    }
+    return names;
+  };
+  const std::set<std::string> before = list();
+  const std::string conflict = "b.sqlite: trial 4 has another result than in ";
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck({"study", "merge", Path("all.sqlite"), Path("a.sqlite"), Path("b.sqlite")}),
+                {conflict + Path("a.sqlite")}));
+  EXPECT_EQ(list(), before);
+  // What was there stays as it was.
+  ASSERT_EQ(RunDexcheck(RunArguments("all.sqlite", {"--shard", "2/3"})).exit_code, 0);
+  const std::string all = Dump(Path("all.sqlite"));
+  EXPECT_TRUE(IsRefused(
+      RunDexcheck({"study", "merge", Path("all.sqlite"), Path("a.sqlite"), Path("b.sqlite")}), {conflict}));
+  EXPECT_EQ(Dump(Path("all.sqlite")), all);
+}
+
+TEST_F(StudyCommand, AnIncompleteMergeSaysWhatIsMissing) {
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--shard", "2/3"})).exit_code, 0);
+  const ProgramResult merged = RunDexcheck({"study", "merge", Path("all.sqlite"), Path("a.sqlite")});
+  EXPECT_EQ(merged.exit_code, 3);
+  EXPECT_THAT(merged.out, HasSubstr("tiny: 2 of 6 trials"));
+  EXPECT_THAT(merged.err, HasSubstr("all.sqlite: 4 of 6 trials are missing: 0, 2-3, 5; merge again"));
+  EXPECT_EQ(CountRows("all.sqlite"), 2) << "what there is, is kept";
+  // Into what is there, with the rest.
+  ASSERT_EQ(RunDexcheck(RunArguments("b.sqlite", {"--shard", "1/3"})).exit_code, 0);
+  ASSERT_EQ(RunDexcheck(RunArguments("c.sqlite", {"--shard", "3/3"})).exit_code, 0);
+  EXPECT_EQ(RunDexcheck({"study", "merge", Path("all.sqlite"), Path("c.sqlite"), Path("b.sqlite")}).exit_code,
+            0);
+  EXPECT_EQ(Dump(Path("all.sqlite")), Reference());
+}
+
+// The C library's mathematics without fused multiply-add has other last bits: another machine.
+TEST_F(StudyCommand, RowsOfOtherMachinesAreMergedWithinRounding) {
+  ProgramOptions other;
+  other.environment = {{"GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX2,-FMA"}};
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
+  ASSERT_EQ(RunDexcheck(RunArguments("b.sqlite"), other).exit_code, 0);
+  const std::vector<TrialRow> here = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  const std::vector<TrialRow> there = StudyStore::Open(Path("b.sqlite")).ReadRows();
+  if (here[0].machine == there[0].machine) GTEST_SKIP() << "this machine has no fused multiply-add";
+  EXPECT_THAT(here[0].machine, HasSubstr(" FMA"));
+  EXPECT_THAT(there[0].machine, ::testing::Not(HasSubstr(" FMA;")));
+  EXPECT_THAT(here[0].machine, HasSubstr("; glibc 2."));
+  EXPECT_THAT(here[0].machine, HasSubstr("; MuJoCo 2.2.2; compiled by "));
+  bool differs = false;
+  for (size_t i = 0; i < here.size(); ++i) {
+    TrialRow row = there[i];
+    row.machine = here[i].machine;
+    differs = differs || !IsSame(here[i], row);
+  }
+  EXPECT_TRUE(differs) << "the bits are the same: this test tests nothing";
+  const ProgramResult merged =
+      RunDexcheck({"study", "merge", Path("all.sqlite"), Path("a.sqlite"), Path("b.sqlite")});
+  EXPECT_EQ(merged.exit_code, 0) << merged.err;
+  EXPECT_EQ(Dump(Path("all.sqlite")), Dump(Path("a.sqlite"))) << "the first one's rows";
+  Database(Path("b.sqlite"), Database::Mode::kExisting)
+      .Execute("UPDATE trials SET cone_margin = cone_margin * (1 + 1e-6) WHERE trial = 1");
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck({"study", "merge", Path("new.sqlite"), Path("a.sqlite"), Path("b.sqlite")}),
+                {"b.sqlite: trial 1 has another result"}));
+}
+
+// One trial that takes about two seconds of processor time, and one that takes none to speak of.
+const std::string kSlowStudy = R"(name = "slow"
+scenario = "offset"
+set = ["settle=0.3"]
+[[vary]]
+key = "duration"
+values = [20, 0.02]
+)";
+
+TEST_F(StudyCommand, ATrialThatIsAlwaysKilledEndsNoStudyAndCanBeRetried) {
+  WriteText(folder_.path() / "tiny.toml", kSlowStudy);
+  std::vector<std::string> limited = DexcheckCommand(RunArguments("a.sqlite", {"--jobs", "2"}));
+  // With a hard limit of its processor time the system kills every process that takes more.
+  limited.insert(limited.begin(), {"prlimit", "--cpu=1:1"});
+  const ProgramResult result = testing::RunProgram(limited);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("--retry-failed"));
+  std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].result.outcome, Outcome::kCrashed);
+  EXPECT_EQ(rows[0].result.failure, "the process was killed from outside: Killed, 3 times");
+  EXPECT_EQ(rows[1].result.outcome, Outcome::kTracked);
+  const std::string before = Dump(Path("a.sqlite"));
+  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
+  EXPECT_EQ(Dump(Path("a.sqlite")), before) << "not unless told";
+  const ProgramResult retried = RunDexcheck(RunArguments("a.sqlite", {"--retry-failed"}));
+  EXPECT_EQ(retried.exit_code, 0) << retried.err;
+  rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].result.outcome, Outcome::kTracked) << rows[0].result.failure;
+  EXPECT_EQ(rows[0].result.metrics[kSimulatedTime], 20.0);
+}
+
+TEST_F(StudyCommand, TrialsHaveATimeLimit) {
+  WriteText(folder_.path() / "tiny.toml", "trial_time_limit = 0.5\n" + kSlowStudy);
+  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
+  const std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].result.outcome, Outcome::kTimedOut);
+  EXPECT_THAT(rows[0].result.failure, HasSubstr("trial_time_limit, 0.5 s"));
+  EXPECT_EQ(rows[1].result.outcome, Outcome::kTracked);
+  const ProgramResult report = RunDexcheck({"study", "report", Path("a.sqlite"), "--out", "-"});
+  EXPECT_EQ(report.exit_code, 0) << report.err;
+  EXPECT_THAT(report.out, HasSubstr("timed out"));
+}
+
 TEST_F(StudyCommand, CtrlCEndsItInGoodOrder) {
   Program program(DexcheckCommand(RunArguments("a.sqlite", {"--jobs", "1"})), {});
   while (!std::filesystem::exists(Path("a.sqlite")))
@@ -275,6 +395,24 @@ TEST_F(StudyCommand, MistakesAreNamed) {
   EXPECT_TRUE(IsRefused(RunDexcheck({"study", "run", "gain", "--db", Path("a.sqlite")}),
                         {"study \"gain\"", "did you mean \"gains\"?"}));
   EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("no/a.sqlite")), {"no/a.sqlite: cannot be opened"}));
+  // Nothing is thrown away: what is no file is refused, by every command.
+  ASSERT_EQ(RunDexcheck(RunArguments("good.sqlite", {"--shard", "1/6"})).exit_code, 0);
+  ProgramOptions here;
+  here.folder = folder_.path();
+  for (const std::string name : {"", ":memory:", "file:x.sqlite?mode=memory", ".", "/dev/null"}) {
+    const std::string quoted = "\"" + name + "\": a database must be a plain file";
+    for (const std::vector<std::string>& arguments :
+         {std::vector<std::string>{"run", "tiny.toml", "--db", name},
+          {"merge", name, "good.sqlite"},
+          {"merge", "new.sqlite", name},
+          {"report", name, "--out", "page.html"}}) {
+      std::vector<std::string> command = {"study"};
+      command.insert(command.end(), arguments.begin(), arguments.end());
+      EXPECT_TRUE(IsRefused(RunDexcheck(command, here), {quoted})) << arguments[0];
+    }
+  }
+  EXPECT_FALSE(std::filesystem::exists(Path("page.html")));
+  EXPECT_FALSE(std::filesystem::exists(Path("new.sqlite")));
   for (const char* shard : {"0/2", "3/2", "1", "1/", "a/b", "1/2x"}) {
     EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite", {"--shard", shard})),
                           {"--shard: must be I/N with 1 <= I <= N, got \"" + std::string(shard) + "\""}));
@@ -318,9 +456,65 @@ TEST_F(StudyCommand, TheBatchScriptIsReady) {
   const ProgramResult result = RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "7"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.out, ::testing::StartsWith("#!/bin/bash\n"));
-  for (const char* part :
-       {"#SBATCH --array=1-7\n", "#SBATCH --requeue\n", "--shard \"$SLURM_ARRAY_TASK_ID/7\""}) {
+  for (const char* part : {"#SBATCH --array=1-7\n", "#SBATCH --requeue\n", "--shard \"$task/7\""}) {
     EXPECT_THAT(result.out, HasSubstr(part));
+  }
+  EXPECT_THAT(result.out, ::testing::Not(HasSubstr("--time")));
+  EXPECT_THAT(result.out, ::testing::Not(HasSubstr("--mem")));
+  // Slurm's MaxArraySize is 1001 unless configured, and indices must be below it.
+  const ProgramResult many = RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "5000",
+                                          "--throttle", "20", "--time", "1-02:30:00", "--memory", "2G"});
+  EXPECT_EQ(many.exit_code, 0) << many.err;
+  for (const char* part :
+       {"#SBATCH --array=1-1000%20\n", "#SBATCH --time=1-02:30:00\n", "#SBATCH --mem=2G\n"}) {
+    EXPECT_THAT(many.out, HasSubstr(part));
+  }
+}
+
+TEST_F(StudyCommand, TheBatchScriptMakesTheStudyInFewElements) {
+  const ProgramResult script =
+      RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "3", "--array-size", "2"});
+  ASSERT_EQ(script.exit_code, 0) << script.err;
+  EXPECT_THAT(script.out, HasSubstr("#SBATCH --array=1-2\n"));
+  WriteText(folder_.path() / "job.sh", script.out);
+  ProgramOptions options;
+  options.folder = folder_.path();
+  for (const char* element : {"1", "2"}) {
+    options.environment = {{"SLURM_ARRAY_TASK_ID", element}, {"SLURM_CPUS_PER_TASK", "2"}};
+    const ProgramResult result = testing::RunProgram({"bash", "job.sh"}, options);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+  const ProgramResult merged = RunDexcheck({"study", "merge", Path("all.sqlite"), Path("tiny-1-of-3.sqlite"),
+                                            Path("tiny-2-of-3.sqlite"), Path("tiny-3-of-3.sqlite")});
+  EXPECT_EQ(merged.exit_code, 0) << merged.err;
+  EXPECT_EQ(Dump(Path("all.sqlite")), Reference());
+}
+
+TEST_F(StudyCommand, NoJobIsPrintedThatCannotRun) {
+  const auto slurm = [&](std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"study", "slurm", Path("tiny.toml"), "--tasks", "2"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunDexcheck(arguments);
+  };
+  for (const char* time :
+       {"", "x", "1:", ":1", "1-", "1:2:3:4", "1h", "-1", "1 --wrap=x", "1\n#SBATCH -n9"}) {
+    EXPECT_TRUE(IsRefused(slurm({"--time", time}), {"--time"})) << time;
+  }
+  for (const char* memory : {"", "G", "1.5G", "2GB", "2g", "-1", "2G\n"}) {
+    EXPECT_TRUE(IsRefused(slurm({"--memory", memory}), {"--memory"})) << memory;
+  }
+  EXPECT_TRUE(IsRefused(slurm({"--throttle", "0"}), {"--throttle"}));
+  EXPECT_TRUE(IsRefused(slurm({"--array-size", "0"}), {"--array-size"}));
+  // Whatever study run refuses.
+  for (const auto& [from, to] : {std::pair<std::string, std::string>{"control.K_v", "control.K_w"},
+                                 {"settle=0.3", "settle=-1"},
+                                 {"\"offset\"", "\"offsett\""},
+                                 {"settle=0.3", "grasp.xyz=[0, 0, 9]"}}) {
+    WriteText(folder_.path() / "tiny.toml", testing::ReplaceOnce(kStudy, from, to));
+    const ProgramResult run = RunDexcheck(RunArguments("a.sqlite"));
+    const ProgramResult printed = slurm({});
+    EXPECT_TRUE(IsRefused(printed, {}));
+    EXPECT_EQ(printed.err, run.err);
   }
 }
 

@@ -67,6 +67,11 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"no_assignment", {"duration"}, "--set duration: must be PATH=VALUE"},
         BadInput{
             "negative_duration", {"duration=-1"}, "--set duration=-1: duration: must be positive, got -1"},
+        BadInput{"endless_settling", {"settle=1e9"}, "--set settle=1e9: settle: must be at most 100 s"},
+        BadInput{"settling_never", {"settle=inf"}, "settle: must be"},
+        BadInput{"settling_in_tiny_steps",
+                 {"plant.time_step=1e-9", "duration=1e-6"},
+                 "settle: must be at most 1e8 time steps"},
         BadInput{"unknown_key",
                  {"plant.time_stop=1"},
                  "plant.time_stop: unknown key, did you mean \"time_step\"?"},

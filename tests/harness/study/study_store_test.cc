@@ -27,7 +27,7 @@ class StudyStoreTest : public ::testing::Test {
  protected:
   StudyStoreTest() {
     study_ = ParseStudy(kText, "study.toml");
-    identity_ = {{"layout", "1"},           {"name", "s"},        {"study", study_.text},
+    identity_ = {{"layout", "2"},           {"name", "s"},        {"study", study_.text},
                  {"scenario", "text"},      {"robot", "text"},    {"mjcf_hash", "0"},
                  {"dexcheck_version", "1"}, {"git_revision", ""}, {"mujoco_version", "2"}};
   }
@@ -102,18 +102,118 @@ TEST_F(StudyStoreTest, OtherFilesAreRefused) {
 
 TEST_F(StudyStoreTest, DifferentResultsOfOneTrialAreRefused) {
   StudyStore store = Open();
-  store.AddAll({MakeRow(0), MakeRow(1)}, "a.sqlite");
-  store.AddAll({MakeRow(1), MakeRow(2)}, "b.sqlite");
+  store.AddAll({{"a.sqlite", {MakeRow(0), MakeRow(1)}}});
+  store.AddAll({{"b.sqlite", {MakeRow(1), MakeRow(2)}}});
   EXPECT_EQ(store.ReadRows().size(), 3u);
   TrialRow other = MakeRow(2);
   other.result.metrics[kEnergy] = std::nextafter(other.result.metrics[kEnergy], 1.0);
   EXPECT_TRUE(Throws<InputError>(
       [&] {
-        store.AddAll({MakeRow(5), other}, "c.sqlite");
+        store.AddAll({{"c.sqlite", {MakeRow(5)}}, {"d.sqlite", {MakeRow(6), other}}});
         return 0;
       },
-      "c.sqlite: trial 2 has another result"));
-  EXPECT_FALSE(store.Has(5)) << "all or nothing";
+      "d.sqlite: trial 2 has another result"));
+  EXPECT_TRUE(Throws<InputError>(
+      [&] {
+        TrialRow third = MakeRow(7);
+        third.result.outcome = Outcome::kTracked;
+        store.AddAll({{"c.sqlite", {MakeRow(7)}}, {"d.sqlite", {third}}});
+        return 0;
+      },
+      "d.sqlite: trial 7 has another result than in c.sqlite"));
+  EXPECT_EQ(store.ReadRows().size(), 3u) << "all or nothing";
+}
+
+TEST_F(StudyStoreTest, BetweenMachinesResultsAreTheSameWithinRounding) {
+  TrialRow row = MakeRow(0);
+  row.result.failure.clear();
+  TrialRow other = row;
+  for (double& metric : other.result.metrics) metric *= 1.0 + 1e-12;
+  EXPECT_FALSE(IsSame(row, other)) << "bit for bit on one machine";
+  other.machine = "another";
+  EXPECT_TRUE(IsSame(row, other));
+  for (size_t i = 0; i < kNumMetrics; ++i) {
+    if (i == kSettlingTime) continue;
+    TrialRow wrong = other;
+    wrong.result.metrics[i] += 1e-8;
+    EXPECT_FALSE(IsSame(row, wrong)) << i;
+    wrong.result.metrics[i] = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_FALSE(IsSame(row, wrong)) << i;
+  }
+  TrialRow wrong = other;
+  wrong.result.outcome = Outcome::kTracked;
+  EXPECT_FALSE(IsSame(row, wrong));
+  wrong = other;
+  wrong.trial.seed = 5;
+  EXPECT_FALSE(IsSame(row, wrong));
+  wrong = other;
+  wrong.trial.parameters[0] = 7.0;
+  EXPECT_FALSE(IsSame(row, wrong));
+  // A run that failed amplified its rounding until then.
+  TrialRow later = other;
+  later.result.failure = "it fell at t = 2.001 s";
+  later.result.metrics[kEnergy] *= 2.0;
+  EXPECT_FALSE(IsSame(row, later)) << "one of them came to its end";
+  row.result.failure = "it fell at t = 2 s";
+  EXPECT_TRUE(IsSame(row, later));
+}
+
+TEST_F(StudyStoreTest, FailedTrialsGiveWay) {
+  for (const Outcome failed : {Outcome::kCrashed, Outcome::kTimedOut}) {
+    TrialRow crashed = MakeRow(0);
+    crashed.result.outcome = failed;
+    std::filesystem::remove(folder_.path() / "s.sqlite");
+    StudyStore store = Open();
+    store.AddAll({{"a.sqlite", {crashed}}, {"b.sqlite", {MakeRow(0)}}, {"c.sqlite", {crashed}}});
+    ASSERT_EQ(store.ReadRows().size(), 1u);
+    EXPECT_EQ(store.ReadRows()[0].result.outcome, Outcome::kSlipped);
+
+    crashed.trial.number = 1;
+    store.Add(crashed);
+    EXPECT_EQ(store.RemoveFailed({MakeRow(0).trial}), 0) << "not this one";
+    EXPECT_EQ(store.RemoveFailed({MakeRow(0).trial, crashed.trial}), 1);
+    EXPECT_TRUE(store.Has(0));
+    EXPECT_FALSE(store.Has(1));
+    EXPECT_TRUE(store.Claim(1));
+  }
+}
+
+TEST_F(StudyStoreTest, DatabasesThatDoNotTellTheMachineAreReadAndContinued) {
+  const std::filesystem::path path = folder_.path() / "s.sqlite";
+  Open().Add(MakeRow(0));
+  {
+    Database database(path, Database::Mode::kExisting);
+    database.Execute("ALTER TABLE trials DROP COLUMN machine");
+    database.Execute("UPDATE study SET layout = '1'");
+  }
+  TrialRow row = MakeRow(1);
+  row.machine = "this";
+  Open().Add(row);
+  const std::vector<TrialRow> rows = StudyStore::Open(path).ReadRows();
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].machine, "");
+  EXPECT_EQ(rows[0].result.metrics[kEnergy], MakeRow(0).result.metrics[kEnergy]);
+  EXPECT_EQ(rows[1].machine, "this");
+  {
+    Database database(path, Database::Mode::kExisting);
+    database.Execute("UPDATE study SET layout = '0'");
+  }
+  EXPECT_TRUE(Throws<InputError>([&] { return StudyStore::Open(path); }, "another version of dexcheck"));
+}
+
+// Rows in what SQLite keeps in memory, or in a temporary file, are gone with the process.
+TEST_F(StudyStoreTest, OnlyPlainFilesAreDatabases) {
+  std::filesystem::create_directory(folder_.path() / "folder");
+  for (const std::string& name :
+       {std::string(), std::string(":memory:"), std::string(":other"), std::string("file:s?mode=memory"),
+        std::string("file:s.sqlite"), std::string("file::memory:"), std::string("/dev/null"),
+        (folder_.path() / "folder").string()}) {
+    const std::string message = "a database must be a plain file";
+    EXPECT_TRUE(
+        Throws<InputError>([&] { return StudyStore::OpenOrCreate(name, identity_, study_); }, message))
+        << name;
+    EXPECT_TRUE(Throws<InputError>([&] { return StudyStore::Open(name); }, message)) << name;
+  }
 }
 
 TEST_F(StudyStoreTest, AClaimHoldsAsLongAsItsProcessLives) {

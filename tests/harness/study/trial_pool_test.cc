@@ -11,9 +11,7 @@
 #include <map>
 #include <stdexcept>
 
-#include "controller/common/errors.h"
 #include "harness/engine/engine.h"
-#include "tests/common/throws.h"
 
 namespace dexcheck {
 namespace {
@@ -33,14 +31,14 @@ std::map<long, TrialResult> RunAll(TrialPool* pool, long count) {
       pool->Start({next, 0, {0.1 * static_cast<double>(next)}});
       ++next;
     }
-    if (const auto row = pool->Wait()) results[row->trial.number] = row->result;
+    if (const auto ended = pool->Wait()) results[ended->row.trial.number] = ended->row.result;
   }
   return results;
 }
 
 TEST(TrialPool, ResultsComeBackWhole) {
   const std::string failure(20000, 'x');  // more than a pipe takes at once
-  TrialPool pool(3, [&](const Trial& trial) {
+  TrialPool pool(3, 0.0, [&](const Trial& trial) {
     TrialResult result = MakeResult(trial);
     result.outcome = Outcome::kWheelsSpun;
     result.failure = failure;
@@ -57,7 +55,7 @@ TEST(TrialPool, ResultsComeBackWhole) {
 
 TEST(TrialPool, ACrashCostsNoOtherTrial) {
   const MjModelPtr engine = LoadMjcfText("<mujoco/>", "empty.xml");  // the handlers of engine errors
-  TrialPool pool(2, [](const Trial& trial) {
+  TrialPool pool(2, 0.0, [](const Trial& trial) {
     if (trial.number == 1) {
       std::signal(SIGSEGV, SIG_DFL);  // sanitizers have a handler of their own
       std::raise(SIGSEGV);
@@ -76,12 +74,36 @@ TEST(TrialPool, ACrashCostsNoOtherTrial) {
   EXPECT_NE(results.at(3).failure.find("thrown"), std::string::npos) << results.at(3).failure;
 }
 
-TEST(TrialPool, WhatIsKilledFromOutsideIsNoResult) {
-  TrialPool pool(1, [](const Trial& trial) {
-    std::raise(SIGKILL);
+TEST(TrialPool, TellsWhatWasKilledFromOutside) {
+  for (const int signal : {SIGKILL, SIGTERM, SIGHUP, SIGABRT}) {
+    TrialPool pool(1, 0.0, [&](const Trial& trial) {
+      std::signal(signal, SIG_DFL);
+      std::raise(signal);
+      return MakeResult(trial);
+    });
+    pool.Start({0, 0, {0.0}});
+    std::optional<EndedTrial> ended;
+    while (!ended) ended = pool.Wait();
+    EXPECT_EQ(ended->killed_from_outside, signal != SIGABRT) << signal;
+    EXPECT_EQ(ended->row.result.outcome, Outcome::kCrashed);
+    EXPECT_TRUE(pool.IsEmpty());
+  }
+}
+
+TEST(TrialPool, EndsTrialsThatTakeTooLong) {
+  constexpr double kLimit = 0.2;  // s of processor time
+  TrialPool pool(2, kLimit, [](const Trial& trial) {
+    volatile double sum = 0.0;
+    while (trial.number == 1) sum = sum + 1.0;
+    // Waiting costs no processor time.
+    if (trial.number == 2) ::usleep(500'000);
     return MakeResult(trial);
   });
-  EXPECT_TRUE(testing::Throws<Error>([&] { return RunAll(&pool, 1); }, "trial 0 was killed from outside"));
+  const auto results = RunAll(&pool, 4);
+  ASSERT_EQ(results.size(), 4u);
+  EXPECT_EQ(results.at(1).outcome, Outcome::kTimedOut);
+  EXPECT_EQ(results.at(1).failure, "it took more than trial_time_limit, 0.2 s of processor time");
+  for (const long good : {0L, 2L, 3L}) EXPECT_EQ(results.at(good).outcome, Outcome::kTracked) << good;
 }
 
 }  // namespace

@@ -1,0 +1,93 @@
+#include "harness/cli/slurm_script.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string_view>
+
+#include "controller/common/text.h"
+#include "harness/cli/study_files.h"
+#include "harness/common/shell.h"
+
+namespace dexcheck::cli {
+namespace {
+
+/// Takes digits from the front of a text; false when there are none, or more than a sensible number has.
+bool TakeNumber(std::string_view* text) {
+  constexpr size_t kMostDigits = 9;
+  size_t count = 0;
+  while (count < text->size() && (*text)[count] >= '0' && (*text)[count] <= '9') ++count;
+  text->remove_prefix(count);
+  return count >= 1 && count <= kMostDigits;
+}
+
+bool IsTime(std::string_view text) {
+  if (!TakeNumber(&text)) return false;
+  const bool has_days = text.starts_with('-');
+  if (has_days) {
+    text.remove_prefix(1);
+    if (!TakeNumber(&text)) return false;
+  }
+  for (int parts = 0; text.starts_with(':') && parts < 2; ++parts) {
+    text.remove_prefix(1);
+    if (!TakeNumber(&text)) return false;
+  }
+  return text.empty();
+}
+
+bool IsMemory(std::string_view text) {
+  if (!TakeNumber(&text)) return false;
+  return text.empty() ||
+         (text.size() == 1 && std::string_view("KMGT").find(text[0]) != std::string_view::npos);
+}
+
+}  // namespace
+
+std::string CheckSlurmTime(const std::string& text) {
+  if (IsTime(text)) return {};
+  return "must be MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]], got " + Quote(text);
+}
+
+std::string CheckSlurmMemory(const std::string& text) {
+  if (IsMemory(text)) return {};
+  return "must be a whole number with K, M, G or T, got " + Quote(text);
+}
+
+std::string MakeSlurmScript(const StudyInputs& inputs, const std::string& name_or_file, const SlurmJob& job) {
+  const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
+  const std::string study = IsStudyFile(name_or_file)
+                                ? std::filesystem::absolute(name_or_file).lexically_normal().string()
+                                : name_or_file;
+  const std::string& name = inputs.study.name;
+  std::string more;
+  if (!job.time.empty()) more += "#SBATCH --time=" + job.time + "\n";
+  if (!job.memory.empty()) more += "#SBATCH --mem=" + job.memory + "\n";
+  return fmt::format(
+      R"(#!/bin/bash
+# Makes the study {name} in {tasks} tasks: sbatch THIS_FILE. Each task writes a database into the folder that the job
+# is submitted from; a task that was killed goes on where it was when it is requeued. When all are done:
+#   {program} study merge {name}.sqlite {name}-*-of-{tasks}.sqlite
+#SBATCH --job-name={name}
+#SBATCH --array=1-{elements}{throttle}
+#SBATCH --ntasks=1
+#SBATCH --cpus-per-task=1
+{more}#SBATCH --requeue
+#SBATCH --open-mode=append
+#SBATCH --output={name}-%a-of-{elements}.log
+# The array has {elements} elements; each makes every {elements}th task, from the one of its own number on.
+code=0
+for ((task = SLURM_ARRAY_TASK_ID; task <= {tasks}; task += {elements})); do
+  {program} study run {study} --quiet --jobs "${{SLURM_CPUS_PER_TASK:-1}}" \
+    --shard "$task/{tasks}" --db "{name}-$task-of-{tasks}.sqlite" || code=$?
+done
+exit $code
+)",
+      fmt::arg("name", name), fmt::arg("tasks", job.tasks),
+      fmt::arg("elements", std::min(job.tasks, job.array_size)),
+      fmt::arg("throttle", job.throttle > 0 ? "%" + std::to_string(job.throttle) : ""),
+      fmt::arg("more", more), fmt::arg("program", QuoteForShell(program)),
+      fmt::arg("study", QuoteForShell(study)));
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,71 @@
+#include "harness/engine/machine.h"
+
+#include <gnu/libc-version.h>
+#include <mujoco/mujoco.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#if defined(__x86_64__)
+#define _Bool bool  // The header is written for C. NOLINT(bugprone-reserved-identifier)
+#include <sys/platform/x86.h>
+#undef _Bool
+#endif
+
+namespace dexcheck {
+namespace {
+
+/// Those that libm's selectors of code ask for (ifunc-avx-fma4.h, ifunc-fma.h, ifunc-fma4.h, ifunc-sse4_1.h),
+/// as far as they are in use: the processor may have them and the system, or GLIBC_TUNABLES, not allow them.
+std::string DescribeProcessor() {
+#if defined(__x86_64__)
+  std::string text = "x86_64";
+  if (CPU_FEATURE_ACTIVE(SSE4_1)) text += " SSE4.1";
+  if (CPU_FEATURE_ACTIVE(AVX)) text += " AVX";
+  if (CPU_FEATURE_ACTIVE(AVX2)) text += " AVX2";
+  if (CPU_FEATURE_ACTIVE(FMA)) text += " FMA";
+  if (CPU_FEATURE_ACTIVE(FMA4)) text += " FMA4";
+  return text;
+#elif defined(__aarch64__)
+  return "aarch64";
+#else
+  return "another processor";
+#endif
+}
+
+/// What the compiler was allowed to use.
+std::string DescribeBuild() {
+  std::string text = "compiled by " __VERSION__;
+#if defined(__AVX__)
+  text += ", AVX";
+#endif
+#if defined(__AVX2__)
+  text += ", AVX2";
+#endif
+#if defined(__AVX512F__)
+  text += ", AVX512F";
+#endif
+#if defined(__FMA__)
+  text += ", FMA";
+#endif
+#if !defined(__OPTIMIZE__)
+  text += ", not optimised";
+#endif
+  return text;
+}
+
+}  // namespace
+
+std::string DescribeMachine() {
+  return DescribeProcessor() + "; glibc " + gnu_get_libc_version() + "; MuJoCo " + mj_versionString() + "; " +
+         DescribeBuild();
+}
+
+bool IsSameWithin(double tolerance, double a, double b, double scale) {
+  if (std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b)) return true;
+  if (std::isnan(a) || std::isnan(b)) return std::isnan(a) && std::isnan(b);
+  if (std::isinf(a) || std::isinf(b)) return a == b;
+  return std::abs(a - b) <= tolerance * (1.0 + std::abs(scale));
+}
+
+}  // namespace dexcheck

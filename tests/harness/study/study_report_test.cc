@@ -1,0 +1,75 @@
+// A study's page from a database that somebody else may have written.
+
+#include "harness/study/study_report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "controller/common/toml_reader.h"
+#include "tests/common/files.h"
+#include "tests/common/paths.h"
+
+namespace dexcheck {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+const std::string kMarkup = "<img src=x onerror=\"alert(1)\">";
+
+class StudyReportTest : public ::testing::Test {
+ protected:
+  StudyReportTest() {
+    study_ = ParseStudy("name = \"" + kName + "\"\ndescription = '" + kMarkup + "'\nscenario = '" + kMarkup +
+                            "'\n[[vary]]\nkey = 'control.K_p'\nvalues = [1, 2]\n[[vary]]\nkey = "
+                            "'control.K_v'\nvalues = [20, 200]\n",
+                        "study.toml");
+  }
+
+  /// The page of a database with one text in all columns, the study itself and its scenario excepted.
+  std::string Report(const std::string& text) {
+    StudyIdentity identity;
+    for (const char* column : {"layout", "name", "study", "scenario", "robot", "mjcf_hash",
+                               "dexcheck_version", "git_revision", "mujoco_version"}) {
+      identity.emplace_back(column, text);
+    }
+    identity[0].second = "2";
+    identity[2].second = study_.text;
+    identity[3].second = ReadTextFile(testing::SourcePath("/harness/scenarios/offset.toml"));
+    StudyStore store = StudyStore::OpenOrCreate(folder_.path() / "s.sqlite", identity, study_);
+    for (const Trial& trial : ListTrials(study_)) {
+      TrialRow row;
+      row.trial = trial;
+      row.result.outcome = trial.number % 2 == 0 ? Outcome::kTracked : Outcome::kDiverged;
+      if (trial.number % 2 == 1) row.result.failure = text;
+      store.Add(row);
+    }
+    return MakeStudyReport(store);
+  }
+
+  static inline const std::string kName = "page";
+  testing::TempFolder folder_;
+  Study study_;
+};
+
+TEST_F(StudyReportTest, NoTextBecomesMarkup) {
+  const std::string page = Report(kMarkup);
+  EXPECT_THAT(page, Not(HasSubstr("<img")));
+  size_t count = 0;
+  for (size_t at = page.find("&lt;img src=x"); at != std::string::npos;
+       at = page.find("&lt;img src=x", at + 1)) {
+    ++count;
+  }
+  EXPECT_GE(count, 6U) << "description, scenario, two versions, revision, failures: all are shown";
+}
+
+TEST_F(StudyReportTest, TextsMayHaveAnyLength) {
+  constexpr size_t kLength = 1000000;
+  const std::string page = Report(std::string(kLength, 'x') + " at t = 1 s");
+  EXPECT_THAT(page, HasSubstr(std::string(kLength, 'x')));
+}
+
+}  // namespace
+}  // namespace dexcheck
