@@ -49,7 +49,9 @@ constexpr Evidence kEvidence[] = {
     {"contacts_lost", Cause::kFingertipSlip},
     {"penetration", Cause::kContactSoftness},
     {"fingertip_slip", Cause::kContactSoftness},
+    {"fingertip_slip_rate", Cause::kContactSoftness},
     {"wheel_slip", Cause::kContactSoftness},
+    {"wheel_slip_rate", Cause::kContactSoftness},
     {"kappa", Cause::kContactSoftness},
     {"unjudged", Cause::kContactSoftness},
     {"solver", Cause::kSolver},
@@ -84,11 +86,11 @@ Cause AttributeOne(const RunCheck& check, Cause run, std::span<const RunCheck> s
   if (check.name == "actuator_effort") return Cause::kActuatorLimit;
   if (check.name == "joint_stop") return Cause::kJointStop;
   if (check.name == "solver") return Cause::kSolver;
-  if (check.name == "wheel_slip" || check.name == "traction_use") {
+  if (check.name == "wheel_slip" || check.name == "wheel_slip_rate" || check.name == "traction_use") {
     return Failed(steps, "traction_use") ? Cause::kWheelSlip : Cause::kContactSoftness;
   }
   if (check.name == "contacts_lost") return Cause::kFingertipSlip;
-  if (check.name == "fingertip_slip" || check.name == "cone_use") {
+  if (check.name == "fingertip_slip" || check.name == "fingertip_slip_rate" || check.name == "cone_use") {
     return Failed(steps, "cone_use") ? Cause::kFingertipSlip : Cause::kContactSoftness;
   }
   if (check.name == "penetration") return Cause::kContactSoftness;

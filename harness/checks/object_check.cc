@@ -6,6 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/checks/object_rates.h"
 
 namespace dexcheck {
 namespace {
@@ -102,9 +103,10 @@ void ObjectCheck::Compare(const Vector6d& X_o, const Vector6d& X_o_dot, long sam
   compare(kBodyVelocity, terms.V_Bo, V_engine, rate);
 
   // Wrench of the body: F_o = B^T (M qacc + bias), qacc = B (V_dot + [omega x v; 0]), V_dot = P^-1 X_ddot +
-  // ...
+  // d/dt (P^-1) X_dot.
+  const ObjectRates rates = CalcObjectRates(X_o, X_o_dot);
   const Matrix6d M = M_nv_.block<6, 6>(dof_address_, dof_address_);
-  const Matrix6d M_engine = B.transpose() * M * B * terms.P_inv;
+  const Matrix6d M_engine = B.transpose() * M * B * rates.P_inv;
   const Vector6d mass_scale =
       (Vector6d() << Vector3d::Constant(body.mass), Vector3d::Constant(body.inertia.trace())).finished();
   for (int row = 0; row < 6; ++row) {
@@ -115,7 +117,7 @@ void ObjectCheck::Compare(const Vector6d& X_o, const Vector6d& X_o_dot, long sam
   mj_comVel(engine_.get(), data_.get());
   mju_zero(engine_->opt.gravity, 3);
   mj_rne(engine_.get(), data_.get(), 0, force_nv_.data());
-  Vector6d V_dot = terms.P_inv_dot * X_o_dot;
+  Vector6d V_dot = rates.bias;
   V_dot.head<3>() += V_engine.tail<3>().cross(V_engine.head<3>());
   const Vector6d coriolis_engine = B.transpose() * (force_nv_.segment<6>(dof_address_) + M * (B * V_dot));
   const Vector6d coriolis = terms.C_o * X_o_dot;

@@ -1,6 +1,7 @@
 #include "harness/checks/step_checks.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "controller/common/text.h"
@@ -32,17 +33,25 @@ StepChecks::StepChecks(const Setup& setup)
   Define(kContactForce, "contact_force", kPrediction, "1", 1e-6,
          "f_c of the rigid constrained system against the engine's, relative to |f_c|");
   Define(kFingertipSlip, "fingertip_slip", kAssumption, "m", 2e-4,
-         "how far a fingertip has slipped on the object since t = 0");
+         "how far a fingertip has slipped on the object in the last 5 to 10 s");
+  const double dt = setup.scenario().plant.time_step;
+  constexpr PlantOptions kShipped;
+  Define(kFingertipSlipRate, "fingertip_slip_rate", kAssumption, "m/s",
+         (1.0 - kShipped.contact_impedance) * dt / kShipped.impratio * kTipLoad,
+         "how fast a fingertip slips on the object, less what (46) and the engine's constraint differ by");
   Define(kWheelSlip, "wheel_slip", kAssumption, "m", 1e-3,
-         "how far a wheel has slipped on the floor since t = 0, (1)");
+         "how far a wheel has slipped on the floor in the last 5 to 10 s, (1)");
+  Define(kWheelSlipRate, "wheel_slip_rate", kAssumption, "m/s", dt * kSideways,
+         "how fast a wheel slips on the floor");
   Define(kConeUse, "cone_use", kAssumption, "1", 0.99,
          "tangential force over mu times normal force at a fingertip; 1 slides, (21)");
   Define(kTractionUse, "traction_use", kAssumption, "1", 0.99,
          "tangential force over mu times normal force at a wheel; 1 spins or skids");
   Define(kContactsLost, "contacts_lost", kAssumption, "1", 0.0, "fingertips that do not touch the object");
   Define(kPenetration, "penetration", kAssumption, "m", 2e-5, "overlap of fingertip and object");
-  Define(kKappa, "kappa", kAssumption, "m", 2e-4,
-         "contact point on the object: kappa integrated by (40) against the engine's");
+  Define(
+      kKappa, "kappa", kAssumption, "m", 2e-4,
+      "contact point on the object: kappa integrated by (40) over the last 5 to 10 s against the engine's");
   Define(kBaseTilt, "base_tilt", kAssumption, "rad", 1e-5, "angle of the platform against the vertical");
   Define(kIdleJoints, "idle_joints", kAssumption, "rad", 1e-5,
          "movement since t = 0 of joints that do not carry the object");
@@ -55,11 +64,7 @@ StepChecks::StepChecks(const Setup& setup)
   Define(kUnjudged, "unjudged", kAssumption, "s", 5.0 * kTransient,
          "how long in one go contacts have come and gone, so that balance and prediction were not judged");
   Define(kActuators, "actuator_effort", kAssumption, "1", 1.0, "|tau'| over the motor's limit");
-  // A bond neither slides nor rolls, nor does it care for friction.
-  if (!setup.bonds().empty()) {
-    checks_[kFingertipSlip].description = "distance of the joined points on fingertip and object";
-    for (const Check check : {kConeUse, kContactsLost, kPenetration, kKappa}) checks_[check].applies = false;
-  }
+  SetApplying();
   for (const auto& [name, bound] : setup.scenario().bounds) {
     const auto found = std::find_if(checks_.begin(), checks_.end(),
                                     [&, &key = name](const RunCheck& check) { return check.name == key; });
@@ -89,6 +94,25 @@ StepChecks::StepChecks(const Setup& setup)
   prediction_ = &part_prediction_;
   idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
   kappa_.resize(setup.fingertips().size());
+  next_kappa_ = kappa_;
+}
+
+void StepChecks::SetApplying() {
+  const auto leave_out = [&](bool leave, std::initializer_list<Check> checks) {
+    for (const Check check : checks) checks_[check].applies = checks_[check].applies && !leave;
+  };
+  const mjModel& engine = setup_->engine();
+  // A bond neither slides nor rolls, nor does it care for friction.
+  const bool bonded = !setup_->bonds().empty();
+  if (bonded) checks_[kFingertipSlip].description = "distance of the joined points on fingertip and object";
+  leave_out(bonded, {kFingertipSlipRate, kConeUse, kContactsLost, kPenetration, kKappa});
+  // Without a task every step is judged.
+  leave_out(!setup_->scenario().task, {kUnjudged});
+  leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kTractionUse});
+  leave_out(setup_->model().base().type == BaseType::kFixed, {kBaseTilt});
+  leave_out(setup_->idle_joints().empty(), {kIdleJoints});
+  const mjtByte* const limited = engine.actuator_ctrllimited;
+  leave_out(std::none_of(limited, limited + engine.nu, [](mjtByte flag) { return flag != 0; }), {kActuators});
 }
 
 void StepChecks::Define(Check check, const char* name, CheckKind kind, const char* unit, double bound,
@@ -154,7 +178,8 @@ void StepChecks::Compare(const Plant& plant, const GraspController& controller, 
   }
   if (handling.holding && !was_holding_) ForgetSlip();
   was_holding_ = handling.holding;
-  ReadSlip(plant, state);
+  MoveWindows(state, plant.time_step());
+  ReadSlip(plant, controller.grasp(), state);
   if (handling.holding) CompareKappa(controller, state, plant.time_step());
 
   Add(kBaseTilt, observer->departure().tilt);
@@ -169,8 +194,6 @@ void StepChecks::Compare(const Plant& plant, const GraspController& controller, 
   }
   Add(kIdleJoints, idle);
   CheckJointStops(state);
-  int worst = -1;
-  Add(kActuators, plant.CalcEffort(tau, &worst));
   ++steps_;
 }
 
@@ -268,9 +291,24 @@ void StepChecks::CompareObject(const GraspController& controller) {
   Add(kSolver, relative(solver_residual_));
 }
 
-void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
+void StepChecks::MoveWindows(const MeasuredState& state, double dt) {
+  const long half = std::max(1L, std::lround(0.5 * kWindow / dt));
+  if (steps_ == 0 || steps_ % half != 0) return;
+  for (std::vector<SlipState>* slips : {&fingertip_slip_, &wheel_slip_}) {
+    for (SlipState& slip : *slips) {
+      slip.window = slip.next_window;
+      slip.next_window = slip.distance;
+    }
+  }
+  if (!has_kappa_) return;
+  kappa_ = next_kappa_;
+  next_kappa_ = state.kappa;
+}
+
+void StepChecks::ReadSlip(const Plant& plant, const GraspTerms& grasp, const MeasuredState& state) {
   const double dt = plant.time_step();
   double slipped = 0.0;
+  double rate = 0.0;
   double cone_use = 0.0;
   const auto update = [&](SlipState* slip, const BodyContact& contact, const Matrix3d& R) {
     slip->touching = contact.touching;
@@ -278,13 +316,15 @@ void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
     slip->cone_margin = contact.cone_margin;
     slip->velocity = R.transpose() * contact.slip;
     slip->distance += dt * slip->velocity;
-    slipped = std::max(slipped, slip->distance.norm());
+    slipped = std::max(slipped, (slip->distance - slip->window).norm());
     cone_use = std::max(cone_use, contact.cone_use);
   };
   const int object = setup_->adapter().object_body();
   for (size_t i = 0; i < tip_bodies_.size(); ++i) {
     update(&fingertip_slip_[i], ReadBodyContact(plant.model(), plant.data(), tip_bodies_[i], object),
            state.X_Bo.linear());
+    const Vector2d unasked = grasp.slip_bias().segment<2>(3 * static_cast<Eigen::Index>(i));
+    rate = std::max(rate, fingertip_slip_[i].velocity.norm() - dt * unasked.norm());
     if (fingertip_slip_[i].touching && handling_.holding) {
       least_cone_margin_ = std::min(least_cone_margin_, fingertip_slip_[i].cone_margin);
     }
@@ -294,16 +334,20 @@ void StepChecks::ReadSlip(const Plant& plant, const MeasuredState& state) {
   }
   if (handling_.holding) {
     Add(kFingertipSlip, slipped);
+    if (!is_unjudged_) Add(kFingertipSlipRate, rate);
     Add(kConeUse, cone_use);
   }
   slipped = 0.0;
+  rate = 0.0;
   cone_use = 0.0;
   const double phi = setup_->model().num_base_positions() == 3 ? state.q[2] : 0.0;
   const Matrix3d R_B0 = Eigen::AngleAxisd(phi, Vector3d::UnitZ()).toRotationMatrix();
   for (size_t i = 0; i < wheel_bodies_.size(); ++i) {
     update(&wheel_slip_[i], ReadBodyContact(plant.model(), plant.data(), wheel_bodies_[i], 0), R_B0);
+    rate = std::max(rate, wheel_slip_[i].velocity.norm());
   }
   Add(kWheelSlip, slipped);
+  Add(kWheelSlipRate, rate);
   Add(kTractionUse, cone_use);
 }
 
@@ -330,13 +374,21 @@ void StepChecks::CompareKappa(const GraspController& controller, const MeasuredS
   double apart = 0.0;
   for (size_t i = 0; i < kappa_.size(); ++i) {
     if (!has_kappa_) {
-      kappa_[i] = state.kappa[i];
+      kappa_[i] = next_kappa_[i] = state.kappa[i];
       continue;
     }
     // The velocity at hand led from the last state to this one.
     const Vector5d change = dt * grasp.contacts()[i].kappa_dot;
-    kappa_[i] =
-        NormalizeContact(grasp.tip(static_cast<int>(i)), grasp.surface(), Displace(kappa_[i], change));
+    const Surface& tip = grasp.tip(static_cast<int>(i));
+    // kappa_dot is in the charts of the state.
+    const int tip_chart = state.kappa[i].alpha_f.chart;
+    const int object_chart = state.kappa[i].alpha_o.chart;
+    for (std::vector<ContactCoordinates>* integrated : {&kappa_, &next_kappa_}) {
+      ContactCoordinates& kappa = (*integrated)[i];
+      if (kappa.alpha_f.chart != tip_chart || kappa.alpha_o.chart != object_chart)
+        kappa = ChangeCharts(tip, grasp.surface(), kappa, tip_chart, object_chart);
+      kappa = NormalizeContact(tip, grasp.surface(), Displace(kappa, change));
+    }
     const Vector3d integrated = grasp.surface().Evaluate(kappa_[i].alpha_o).p;
     const Vector3d measured = grasp.surface().Evaluate(state.kappa[i].alpha_o).p;
     apart = std::max(apart, (integrated - measured).norm());

@@ -35,8 +35,10 @@ struct SlipState {
   bool touching = false;
   Vector3d velocity = Vector3d::Zero();  ///< Tangential, in the frame of the body that is slipped on, m/s.
   Vector3d distance = Vector3d::Zero();  ///< Its integral, m.
-  double cone_use = 0.0;                 ///< |tangential force| / (mu normal force); 1 slides.
-  double cone_margin = 0.0;              ///< mu normal force - |tangential force|, N.
+  /// The distance where the window begins that slip is judged over, and where the next one will.
+  Vector3d window = Vector3d::Zero(), next_window = Vector3d::Zero();
+  double cone_use = 0.0;     ///< |tangential force| / (mu normal force); 1 slides.
+  double cone_margin = 0.0;  ///< mu normal force - |tangential force|, N.
 };
 
 /// What a step's contacts are meant to be.
@@ -53,9 +55,32 @@ struct Handling {
 /// object that does not move while it lies on something. Soft contacts need some milliseconds to become what
 /// rigid ones are at once: for kTransient after a contact has come, gone or been let go, balance and
 /// prediction are not judged. How long that lasts in one go is a check itself.
+///
+/// Contacts hold by soft constraints, so a fingertip that sticks still creeps. Along a tangent the engine
+/// lets
+///
+///   v_dot = -b v - R f_t + J_dot qvel,   hence after some 1/b   v = (J_dot qvel - R f_t) / b,
+///
+/// with b = 2 / (tc d) = 1 / (d dt) of the time constant tc = 2 dt and the impedance d, and R =
+/// (1 - d) / (d m impratio) of the mass m that the contact moves. J_dot qvel is what (46) has and the
+/// engine's constraint has not: the model's J_B_dot' xi - G_dot^T V_Bo. So distances grow with time, at rates
+/// that do not: distances are judged over the last kWindow at most, and the rates besides:
+///
+///   fingertip_slip_rate   |v| - dt |J_B_dot' xi - G_dot^T V_Bo| <= (1 - d) dt / impratio * kTipLoad,
+///                         of d = 0.99, impratio = 100, whatever the plant has: 2e-5 m/s at 1 ms
+///   wheel_slip_rate       |v| <= dt * kSideways: tyres give by v w / b in a curve; 1e-4 m/s at 1 ms
+///
+/// Up to kWindow after the start the windows begin there. Joints that do not carry the object are held by
+/// stiffness: what moves them does not add up.
 class StepChecks {
  public:
   static constexpr double kTransient = 0.05;  ///< s
+  /// Distances are judged from a place between half of this and this ago, s.
+  static constexpr double kWindow = 10.0;
+  /// f_t / m up to which a fingertip may creep, m/s^2: 10 N on a phalanx of 50 g. `hold` has 6.
+  static constexpr double kTipLoad = 200.0;
+  /// Acceleration v w in a curve up to which tyres may give, m/s^2. `curve` has 0.03.
+  static constexpr double kSideways = 0.1;
 
   explicit StepChecks(const Setup& setup);
 
@@ -65,6 +90,9 @@ class StepChecks {
   void Compare(const Plant& plant, const GraspController& controller, const MeasuredState& state,
                const Eigen::Ref<const VectorXd>& tau, Observer* observer, double time,
                const Handling& handling = {});
+
+  /// Adds the largest |tau'| / limit of a motor: before the step, which does not come when that is above 1.
+  void JudgeEffort(double effort, double time) { checks_[kActuators].Add(effort, time); }
 
   /// Forgets all steps so far: time begins anew.
   void Reset();
@@ -93,7 +121,9 @@ class StepChecks {
     kReducedAcceleration,
     kContactForce,
     kFingertipSlip,
+    kFingertipSlipRate,
     kWheelSlip,
+    kWheelSlipRate,
     kConeUse,
     kTractionUse,
     kContactsLost,
@@ -122,7 +152,10 @@ class StepChecks {
   void CompareDynamics(const GraspController& controller, const MeasuredState& state,
                        const Eigen::Ref<const VectorXd>& tau);
   void CompareObject(const GraspController& controller);
-  void ReadSlip(const Plant& plant, const MeasuredState& state);
+  /// Leaves out what this run cannot ask.
+  void SetApplying();
+  void ReadSlip(const Plant& plant, const GraspTerms& grasp, const MeasuredState& state);
+  void MoveWindows(const MeasuredState& state, double dt);
   void ForgetSlip();
   /// Of the object, N.
   [[nodiscard]] double Weight() const;
@@ -152,7 +185,8 @@ class StepChecks {
   std::span<const EngineContact> contacts_;
   std::vector<SlipState> fingertip_slip_, wheel_slip_;
   std::vector<int> wheel_bodies_, tip_bodies_;
-  std::vector<ContactCoordinates> kappa_;  // integrated from (40)
+  /// Integrated from (40) since the window's beginning, and since the next one's.
+  std::vector<ContactCoordinates> kappa_, next_kappa_;
   VectorXd idle_start_;
   bool has_kappa_ = false;
   long steps_ = 0;

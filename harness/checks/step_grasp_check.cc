@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "harness/checks/object_rates.h"
 #include "harness/checks/step_model_check.h"
 
 namespace dexcheck {
@@ -48,14 +49,14 @@ void StepModelCheck::DefineGraspTerms() {
     terms_.emplace_back(name, kObjectBound,
                         std::vector<Location>(numbers, {Location::Kind::kObject, -1, -1}));
   };
-  define_object("object_pose", 12);
-  define_object("V_Bo", 6);
   define_object("M_hat", 36);
   define_object("C_hat_V", 6);
   define_object("N_o", 6);
   define_object("object_kinetic_energy", 1);
   define_object("object_potential_energy", 1);
   if (!has_coordinates_) return;
+  define_object("object_pose", 12);
+  define_object("V_Bo", 6);
   define_object("M_o", 36);
   define_object("C_o_X_o_dot", 6);
 }
@@ -64,8 +65,10 @@ StepModelCheck::ContactScales StepModelCheck::CalcContactScales(const ContactGeo
   // A fingertip displaced by e over the object moves the contact by (K_f + Kt_o)^-1 K_f e on the object and
   // turns the normal by K_o times that.
   const Matrix2d sum = contact.fingertip.K + contact.R_psi * contact.object.K * contact.R_psi;
+  // The smallest eigenvalue. R_psi K_o R_psi is symmetric but for rounding, and hypot knows no negative
+  // squares.
   const double half = 0.5 * (sum(0, 0) - sum(1, 1));
-  const double least = 0.5 * sum.trace() - std::sqrt(half * half + sum(0, 1) * sum(1, 0));
+  const double least = 0.5 * sum.trace() - std::hypot(half, 0.5 * (sum(0, 1) + sum(1, 0)));
   const double moved = contact.fingertip.K.norm() / least;
   const double length = scales_.world_length();
   return {1.0 + contact.object.K.norm() * moved * length, (1.0 + moved) * length};
@@ -202,13 +205,6 @@ void StepModelCheck::CompareObject(const GraspTerms& grasp, const MeasuredState&
   if (has_coordinates_) angular_rate = std::max(angular_rate, grasp.X_o_dot().tail<3>().cwiseAbs().sum());
   const double rate = std::max({linear_rate, angular_rate, kLeastRate});
 
-  const Eigen::Matrix<double, 3, 4> pose = grasp.X_Bo().matrix().topRows<3>();
-  const Eigen::Matrix<double, 3, 4> pose_engine = X.matrix().topRows<3>();
-  set(kObjectPose, pose, pose_engine);
-  term(kObjectPose).weight.tail<3>().setConstant(1.0 / place);
-  set(kBodyVelocity, V_Bo, V);
-  term(kBodyVelocity).weight.setConstant(1.0 / rate);
-
   const double inertia = body.inertia.trace();
   set(kMHat, grasp.body().M_hat, M_hat);
   for (Eigen::Index i = 0; i < 36; ++i) term(kMHat).weight[i] = 1.0 / (i % 6 < 3 ? body.mass : inertia);
@@ -233,12 +229,19 @@ void StepModelCheck::CompareObject(const GraspTerms& grasp, const MeasuredState&
   term(kObjectPotentialEnergy).weight[0] = 1.0 / (weight * place);
   if (!has_coordinates_) return;
 
+  const Eigen::Matrix<double, 3, 4> pose = grasp.X_Bo().matrix().topRows<3>();
+  const Eigen::Matrix<double, 3, 4> pose_engine = X.matrix().topRows<3>();
+  set(kObjectPose, pose, pose_engine);
+  term(kObjectPose).weight.tail<3>().setConstant(1.0 / place);
+  set(kBodyVelocity, V_Bo, V);
+  term(kBodyVelocity).weight.setConstant(1.0 / rate);
   const ObjectTerms& terms = grasp.coordinates();
-  const Matrix6d M_o = M_hat * terms.P_inv;
+  const ObjectRates rates = CalcObjectRates(grasp.X_o(), grasp.X_o_dot());
+  const Matrix6d M_o = M_hat * rates.P_inv;
   set(kMo, terms.M_o, M_o);
   term(kMo).weight = term(kMHat).weight;
   const Vector6d C_o_X_o_dot = terms.C_o * grasp.X_o_dot();
-  const Vector6d C_o_X_o_dot_engine = C_hat_V + M_hat * (terms.P_inv_dot * grasp.X_o_dot());
+  const Vector6d C_o_X_o_dot_engine = C_hat_V + M_hat * rates.bias;
   set(kCoXoDot, C_o_X_o_dot, C_o_X_o_dot_engine);
   set_weights(kCoXoDot, body.mass * rate * rate);
 }

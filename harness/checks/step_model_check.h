@@ -63,14 +63,14 @@ class StepModelCheck {
     kJB,
     kJBDotXi,
     kGDotV,
-    kObjectPose,
-    kBodyVelocity,
     kMHat,
     kCHatV,
     kNo,
     kObjectKineticEnergy,
     kObjectPotentialEnergy,
-    kMo,  // from here on with kAngles alone
+    kObjectPose,  // from here on with kAngles alone: a pose that is measured and used as it is tells nothing
+    kBodyVelocity,
+    kMo,
     kCoXoDot,
     kTermCount
   };

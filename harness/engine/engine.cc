@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "controller/common/errors.h"
+#include "harness/engine/cylinder_collision.h"
 #include "harness/engine/finite_check.h"
 #include "harness/engine/torus_collision.h"
 
@@ -58,6 +59,7 @@ void CheckReadable(const std::filesystem::path& path) {
 void PrepareEngine() {
   InstallMessageHandlers();
   CheckVersion();
+  InstallCylinderCollision();
   InstallTorusCollision();
 }
 

@@ -227,7 +227,7 @@ void ClosedLoop::ControlStep(const DesiredMotion& desired, long step, double t) 
       ++times_.solves;
     }
   }
-  CheckTorques();
+  CheckTorques(t);
   const auto control = Clock::now();
   plant_.SetTorques(tau_);
   plant_.EndStep();
@@ -302,10 +302,11 @@ void ClosedLoop::CheckRobot() const {
                    FormatNumber(departure.height) + " m off");
 }
 
-void ClosedLoop::CheckTorques() {
+void ClosedLoop::CheckTorques(double t) {
   if (!tau_.allFinite()) throw RunFailure("a torque is not a number");
   effort_ = plant_.CalcEffort(tau_, &busiest_motor_);
-  if (effort_ < 1.0) return;
+  checks_.JudgeEffort(effort_, t);
+  if (effort_ <= 1.0) return;
   throw RunFailure("motor " + Quote(plant_.motor_name(busiest_motor_)) + " is at its limit, " +
                    FormatNumber(plant_.torque_limit(busiest_motor_)) + " N m");
 }

@@ -107,7 +107,7 @@ class ClosedLoop {
   [[nodiscard]] DesiredMotion EvaluateDesired(const Trajectory& trajectory, double t) const;
   void CompareModel();
   void CheckRobot() const;
-  void CheckTorques();
+  void CheckTorques(double t);
   void CheckGrasp();
   void CheckTask();
   void CalcTaskTorque(double t);
