@@ -9,6 +9,28 @@
 #include "harness/plant/body_contact.h"
 
 namespace dexcheck {
+namespace {
+
+/// Integrated and measured contact farther apart than this have nothing to do with each other any more, and
+/// one may lie at the pole of the other's chart, m. Less than from a chart's margin to its pole, 4 mm on a
+/// fingertip of 9 mm.
+constexpr double kStray = 1e-3;
+
+/// Writes the integrated contact in the charts of the measured one, which kappa_dot is in.
+void FollowCharts(const Surface& tip, const Surface& object, const ContactCoordinates& measured,
+                  ContactCoordinates* integrated) {
+  const int tip_chart = measured.alpha_f.chart;
+  const int object_chart = measured.alpha_o.chart;
+  if (integrated->alpha_f.chart == tip_chart && integrated->alpha_o.chart == object_chart) return;
+  const auto is_near = [](const Surface& surface, const SurfacePoint& a, const SurfacePoint& b) {
+    return (surface.Evaluate(a).p - surface.Evaluate(b).p).norm() < kStray;
+  };
+  if (!is_near(tip, integrated->alpha_f, measured.alpha_f)) return;
+  if (!is_near(object, integrated->alpha_o, measured.alpha_o)) return;
+  *integrated = ChangeCharts(tip, object, *integrated, tip_chart, object_chart);
+}
+
+}  // namespace
 
 StepChecks::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)
     : grasp(setup.model(), setup.fingertips(), setup.object().body, setup.surface(), set),
@@ -380,13 +402,9 @@ void StepChecks::CompareKappa(const GraspController& controller, const MeasuredS
     // The velocity at hand led from the last state to this one.
     const Vector5d change = dt * grasp.contacts()[i].kappa_dot;
     const Surface& tip = grasp.tip(static_cast<int>(i));
-    // kappa_dot is in the charts of the state.
-    const int tip_chart = state.kappa[i].alpha_f.chart;
-    const int object_chart = state.kappa[i].alpha_o.chart;
     for (std::vector<ContactCoordinates>* integrated : {&kappa_, &next_kappa_}) {
       ContactCoordinates& kappa = (*integrated)[i];
-      if (kappa.alpha_f.chart != tip_chart || kappa.alpha_o.chart != object_chart)
-        kappa = ChangeCharts(tip, grasp.surface(), kappa, tip_chart, object_chart);
+      FollowCharts(tip, grasp.surface(), state.kappa[i], &kappa);
       kappa = NormalizeContact(tip, grasp.surface(), Displace(kappa, change));
     }
     const Vector3d integrated = grasp.surface().Evaluate(kappa_[i].alpha_o).p;

@@ -44,7 +44,7 @@ TEST_P(WrongEquations, AreAllFoundByTheCheckThatTheyBelongTo) {
 // A term on both sides of its own comparison, or one that nothing can spoil, would say "ok" for ever.
 TEST(FormulaMutants, FailEveryTermThatConsistencyCompares) {
   const RobotModel model = testing::ReadPaperRobot();
-  const MjModelPtr engine = LoadMjcf(DEXCHECK_SOURCE_DIR "/mjcf/scene.xml");
+  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *engine, "mjcf");
   ConsistencyOptions options;
   options.samples = kSamples;

@@ -39,7 +39,7 @@ class HeldObjects : public ::testing::TestWithParam<HeldObject> {
   void WriteFiles(const std::string& geom) {
     const HeldObject& object = GetParam();
     const std::string name = object.body;
-    const std::filesystem::path source = DEXCHECK_SOURCE_DIR;
+    const std::filesystem::path source = SourcePath();
     const std::filesystem::path mjcf = folder_.path() / "mjcf";
     if (!std::filesystem::exists(mjcf)) {
       std::filesystem::copy(source / "mjcf", mjcf, std::filesystem::copy_options::recursive);
