@@ -31,7 +31,7 @@ const HeldObject kObjects[] = {
 
 // Up, aside and turned: fingertips roll, and the contacts bear changing forces.
 constexpr const char* kMotion =
-    "trajectory={ type = 'point_to_point', xyz = [0, 0.001, 0.002], zyz_deg = [2, 2, 2], duration = 0.3 }";
+    "trajectory={ type = 'point_to_point', xyz = [0, 5e-5, 1e-4], zyz_deg = [0.1, 0.1, 0.1], duration = 0.3 }";
 
 class HeldObjects : public ::testing::TestWithParam<HeldObject> {
  protected:
