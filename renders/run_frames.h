@@ -20,9 +20,9 @@ struct CheckSeries {
 
 /// What a movie needs of a run: n rows, one a recorded instant. Everything but times and qpos may be empty.
 struct RunFrames {
-  std::string source;  ///< The run's folder or file, for messages.
-  std::string title;   ///< Name of the scenario.
-  std::string object_body = "torus";
+  std::string source;       ///< The run's folder or file, for messages.
+  std::string title;        ///< Name of the scenario.
+  std::string object_body;  ///< Of what is held.
 
   std::vector<double> times;  ///< s, increasing; n.
   RowMatrixXd qpos;           ///< n x nq.

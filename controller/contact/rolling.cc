@@ -33,6 +33,15 @@ double CalcFrameAngle(const Surface& surface, const SurfacePoint& from, const Su
   return std::atan2(R_from.col(1).dot(x_to), R_from.col(0).dot(x_to));
 }
 
+// The contact with its points written as alpha_f and alpha_o. Like T_f and T_o in psidot: each frame's turn
+// about its own outward normal adds to psi.
+ContactCoordinates Rewrite(const Surface& fingertip, const Surface& object, const ContactCoordinates& kappa,
+                           const SurfacePoint& alpha_f, const SurfacePoint& alpha_o) {
+  const double turn =
+      CalcFrameAngle(fingertip, kappa.alpha_f, alpha_f) + CalcFrameAngle(object, kappa.alpha_o, alpha_o);
+  return {alpha_f, alpha_o, std::remainder(kappa.psi + turn, 2.0 * kPi)};
+}
+
 }  // namespace
 
 Vector5d CalcKappaDot(const ContactGeometry& contact, const Vector6d& V) {
@@ -60,14 +69,14 @@ Vector5d CalcKappaDot(const ContactGeometry& contact, const Vector6d& V) {
 
 ContactCoordinates NormalizeContact(const Surface& fingertip, const Surface& object,
                                     const ContactCoordinates& kappa) {
-  ContactCoordinates normalized;
-  normalized.alpha_f = fingertip.Normalize(kappa.alpha_f);
-  normalized.alpha_o = object.Normalize(kappa.alpha_o);
-  // Like T_f and T_o in psidot: each frame's turn about its own outward normal adds to psi.
-  const double turn = CalcFrameAngle(fingertip, kappa.alpha_f, normalized.alpha_f) +
-                      CalcFrameAngle(object, kappa.alpha_o, normalized.alpha_o);
-  normalized.psi = std::remainder(kappa.psi + turn, 2.0 * kPi);
-  return normalized;
+  return Rewrite(fingertip, object, kappa, fingertip.Normalize(kappa.alpha_f),
+                 object.Normalize(kappa.alpha_o));
+}
+
+ContactCoordinates ChangeCharts(const Surface& fingertip, const Surface& object,
+                                const ContactCoordinates& kappa, int fingertip_chart, int object_chart) {
+  return Rewrite(fingertip, object, kappa, fingertip.ToChart(kappa.alpha_f, fingertip_chart),
+                 object.ToChart(kappa.alpha_o, object_chart));
 }
 
 ContactCoordinates Displace(const ContactCoordinates& kappa, const Vector5d& change) {

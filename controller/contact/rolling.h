@@ -20,6 +20,11 @@ Vector5d CalcKappaDot(const ContactGeometry& contact, const Vector6d& V);
 ContactCoordinates NormalizeContact(const Surface& fingertip, const Surface& object,
                                     const ContactCoordinates& kappa);
 
+/// The same contact in given charts, psi turned with the Gauss frames. Throws std::invalid_argument for an
+/// unknown chart.
+ContactCoordinates ChangeCharts(const Surface& fingertip, const Surface& object,
+                                const ContactCoordinates& kappa, int fingertip_chart, int object_chart);
+
 /// kappa displaced by `change` (5x1, order of (39)) within its charts.
 ContactCoordinates Displace(const ContactCoordinates& kappa, const Vector5d& change);
 

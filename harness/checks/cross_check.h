@@ -22,6 +22,8 @@ class CrossCheck {
   void CompareModel(const StepRecord& step);
   /// The others, which compare motion and forces.
   void CompareMotion(const StepRecord& step) { motion_.Compare(step); }
+  /// The largest effort of a motor, before the step that it belongs to.
+  void JudgeEffort(double effort, double time) { motion_.JudgeEffort(effort, time); }
   /// Forgets motion and forces of all steps so far: time begins anew.
   void Reset() { motion_.Reset(); }
 

@@ -102,7 +102,7 @@ void ModelCheck::ReadObject(const Vector6d& X_o, const Vector6d& X_o_dot) {
   values.kinetic = CalcObjectKineticEnergy(body, terms.V_Bo);
   values.M_o = terms.M_o;
   values.C_o_X_o_dot = terms.C_o * X_o_dot;
-  const ObjectCoordinates coordinates{X_o_dot, terms.P_inv, terms.P_inv_dot};
+  const ObjectCoordinates coordinates{X_o, X_o_dot};
   EvaluateObject(body, model().gravity(), &coordinates, &context_);
 }
 

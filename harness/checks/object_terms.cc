@@ -6,6 +6,7 @@
 
 #include "controller/common/text.h"
 #include "controller/object/object_dynamics.h"
+#include "harness/checks/object_rates.h"
 #include "harness/checks/term_table.h"
 
 namespace dexcheck {
@@ -119,8 +120,9 @@ void EvaluateObject(const MassProperties& body, const Vector3d& gravity, const O
 
   const Vector6d& X_o_dot = coordinates->X_o_dot;
   scales.rate = std::max(scales.rate, X_o_dot.tail<3>().cwiseAbs().sum());
-  values.M_o = values.M_hat * coordinates->P_inv;
-  values.C_o_X_o_dot = values.C_hat_V + values.M_hat * (coordinates->P_inv_dot * X_o_dot);
+  const ObjectRates rates = CalcObjectRates(coordinates->X_o, X_o_dot);
+  values.M_o = values.M_hat * rates.P_inv;
+  values.C_o_X_o_dot = values.C_hat_V + values.M_hat * rates.bias;
 }
 
 std::span<const TermEntry> ListTerms() {

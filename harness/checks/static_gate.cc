@@ -195,7 +195,33 @@ class StaticGate {
       Compare("object_shape", where, torus->ring_radius, ring_radius);
       Compare("object_shape", where, torus->tube_radius, tube_radius);
     }
+    CompareRoundShape(object.shape, where);
     for (const int frame : model_.fingertips()) CompareFriction(object, frame);
+  }
+
+  /// A sphere's or cylinder's size, place and axis against the object's geom that can touch.
+  void CompareRoundShape(const Shape& shape, const Location& where) {
+    const SolidSphere* sphere = std::get_if<SolidSphere>(&shape);
+    const SolidCylinder* cylinder = std::get_if<SolidCylinder>(&shape);
+    if (sphere == nullptr && cylinder == nullptr) return;
+    int found = -1;
+    for (int geom = 0; geom < engine_.ngeom; ++geom) {
+      const bool fits = engine_.geom_type[geom] == (sphere != nullptr ? mjGEOM_SPHERE : mjGEOM_CYLINDER);
+      if (IsObject(geom) && fits && CanTouch(engine_, geom)) found = geom;
+    }
+    const auto size = [&](int k) { return found < 0 ? kMissing : engine_.geom_size[3 * found + k]; };
+    const double radius = sphere != nullptr ? sphere->radius : cylinder->radius;
+    Compare("object_shape", where, radius, size(0));
+    if (cylinder != nullptr) Compare("object_shape", where, 0.5 * cylinder->length, size(1));
+    if (found < 0) return;
+    for (int k = 0; k < 3; ++k) {
+      Compare("object_shape", where, 0.0, engine_.geom_pos[3 * found + k], radius);
+    }
+    if (cylinder == nullptr) return;
+    mjtNum R[9];
+    mju_quat2Mat(R, engine_.geom_quat + 4 * found);
+    // Either way along z: a cylinder has no head.
+    Compare("object_shape", where, 1.0, std::abs(R[8]), 1.0);
   }
 
   /// Sliding friction of the explicit contact pairs between a fingertip and the object. Without a pair the

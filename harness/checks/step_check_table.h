@@ -18,7 +18,9 @@ enum class StepCheck {
   kReducedAcceleration,
   kContactForce,
   kFingertipSlip,
+  kFingertipSlipRate,
   kWheelSlip,
+  kWheelSlipRate,
   kConeUse,
   kTractionUse,
   kContactsLost,
@@ -37,6 +39,31 @@ inline constexpr int kStepCheckCount = static_cast<int>(StepCheck::kCount);
 /// How long balance and prediction are not judged after a contact has come, gone or been let go: soft
 /// contacts need some milliseconds to become what rigid ones are at once. s.
 inline constexpr double kTransient = 0.05;
+
+// Contacts hold by soft constraints, so a fingertip that sticks still creeps. Along a tangent the engine lets
+//
+//   v_dot = -b v - R f_t + J_dot qvel,   hence after some 1/b   v = (J_dot qvel - R f_t) / b,
+//
+// with b = 2 / (tc d) = 1 / (d dt) of the time constant tc = 2 dt and the impedance d, and R = (1 - d) / (d m impratio)
+// of the mass m that the contact moves. J_dot qvel is what (46) has and the engine's constraint has not: the model's
+// J_B_dot' xi - G_dot^T V_Bo. So distances grow with time, at rates that do not: distances are judged over the last
+// kSlipWindow at most, and the rates besides:
+//
+//   fingertip_slip_rate   |v| - dt |J_B_dot' xi - G_dot^T V_Bo| <= (1 - d) dt / impratio * kTipLoad,
+//                         of d = 0.99, impratio = 100, whatever the plant has: 2e-5 m/s at 1 ms
+//   wheel_slip_rate       |v| <= dt * kSideways: tyres give by v w / b in a curve; 1e-4 m/s at 1 ms
+//
+// Up to kSlipWindow after the start the windows begin there. Joints that do not carry the object are held by stiffness:
+// what moves them does not add up.
+
+/// Distances are judged from a place between half of this and this ago, s.
+inline constexpr double kSlipWindow = 10.0;
+/// f_t / m up to which a fingertip may creep, m/s^2: 10 N on a phalanx of 50 g. `hold` has 6.
+inline constexpr double kTipLoad = 200.0;
+/// Its creep over the time step, m/s^2, with the shipped plant's impedance and impratio.
+inline constexpr double kTipCreep = (1.0 - 0.99) / 100.0 * kTipLoad;
+/// Acceleration v w in a curve up to which tyres may give, m/s^2. `curve` has 0.03.
+inline constexpr double kSideways = 0.1;
 
 /// What the failure of a check says of its cause.
 struct FailureMeaning {
@@ -97,16 +124,35 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kAssumption,
      .unit = "m",
      .bound = 2e-4,
-     .description = "how far a fingertip has slipped on the object since t = 0",
+     .description = "how far a fingertip has slipped on the object in the last 5 to 10 s",
      .meaning =
          {.cause = Cause::kContactSoftness, .precedence = 6, .is_own = true, .sharper = StepCheck::kConeUse},
      .bonded_description = "distance of the joined points on fingertip and object"},
+    {.check = StepCheck::kFingertipSlipRate,
+     .name = "fingertip_slip_rate",
+     .kind = CheckKind::kAssumption,
+     .unit = "m/s",
+     .bound = kTipCreep,  // times the time step
+     .description = "how fast a fingertip slips on the object, less what (46) and the engine's constraint differ by",
+     .meaning =
+         {.cause = Cause::kContactSoftness, .precedence = 6, .is_own = true, .sharper = StepCheck::kConeUse},
+     .bonded_description = ""},
     {.check = StepCheck::kWheelSlip,
      .name = "wheel_slip",
      .kind = CheckKind::kAssumption,
      .unit = "m",
      .bound = 1e-3,
-     .description = "how far a wheel has slipped on the floor since t = 0, (1)",
+     .description = "how far a wheel has slipped on the floor in the last 5 to 10 s, (1)",
+     .meaning = {.cause = Cause::kContactSoftness,
+                 .precedence = 7,
+                 .is_own = true,
+                 .sharper = StepCheck::kTractionUse}},
+    {.check = StepCheck::kWheelSlipRate,
+     .name = "wheel_slip_rate",
+     .kind = CheckKind::kAssumption,
+     .unit = "m/s",
+     .bound = kSideways,  // times the time step
+     .description = "how fast a wheel slips on the floor",
      .meaning = {.cause = Cause::kContactSoftness,
                  .precedence = 7,
                  .is_own = true,
@@ -147,7 +193,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kAssumption,
      .unit = "m",
      .bound = 2e-4,
-     .description = "contact point on the object: kappa integrated by (40) against the engine's",
+     .description =
+         "contact point on the object: kappa integrated by (40) over the last 5 to 10 s against the engine's",
      .meaning = {.cause = Cause::kContactSoftness, .precedence = 8},
      .bonded_description = ""},
     {.check = StepCheck::kBaseTilt,

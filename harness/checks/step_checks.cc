@@ -1,12 +1,36 @@
 #include "harness/checks/step_checks.h"
 
 #include <algorithm>
+#include <cmath>
+#include <initializer_list>
 #include <stdexcept>
 
 #include "controller/common/text.h"
 #include "controller/contact/rolling.h"
 
 namespace dexcheck {
+namespace {
+
+/// Integrated and measured contact farther apart than this have nothing to do with each other any more, and
+/// one may lie at the pole of the other's chart, m. Less than from a chart's margin to its pole, 4 mm on a
+/// fingertip of 9 mm.
+constexpr double kStray = 1e-3;
+
+/// Writes the integrated contact in the charts of the measured one, which kappa_dot is in.
+void FollowCharts(const Surface& tip, const Surface& object, const ContactCoordinates& measured,
+                  ContactCoordinates* integrated) {
+  const int tip_chart = measured.alpha_f.chart;
+  const int object_chart = measured.alpha_o.chart;
+  if (integrated->alpha_f.chart == tip_chart && integrated->alpha_o.chart == object_chart) return;
+  const auto is_near = [](const Surface& surface, const SurfacePoint& a, const SurfacePoint& b) {
+    return (surface.Evaluate(a).p - surface.Evaluate(b).p).norm() < kStray;
+  };
+  if (!is_near(tip, integrated->alpha_f, measured.alpha_f)) return;
+  if (!is_near(object, integrated->alpha_o, measured.alpha_o)) return;
+  *integrated = ChangeCharts(tip, object, *integrated, tip_chart, object_chart);
+}
+
+}  // namespace
 
 StepChecks::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)
     : grasp(setup.model(), setup.fingertips(), setup.object().body, setup.surface(), set),
@@ -30,6 +54,7 @@ StepChecks::StepChecks(const Setup& setup)
   column_.setZero(n, 1);
   idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
   kappa_.resize(setup.fingertips().size());
+  next_kappa_ = kappa_;
 }
 
 void StepChecks::DefineChecks() {
@@ -45,8 +70,26 @@ void StepChecks::DefineChecks() {
     check.applies = !bonded || *info.bonded_description != '\0';
     checks_.push_back(check);
   }
+  check(StepCheck::kFingertipSlipRate).bound *= time_step_;
+  check(StepCheck::kWheelSlipRate).bound *= time_step_;
+  SetApplying();
   RequireKnownBounds(setup_->scenario());
   for (const auto& [name, bound] : setup_->scenario().bounds) check(FindStepCheck(name)->check).bound = bound;
+}
+
+void StepChecks::SetApplying() {
+  const auto leave_out = [&](bool leave, std::initializer_list<StepCheck> checks) {
+    for (const StepCheck which : checks) check(which).applies = check(which).applies && !leave;
+  };
+  using enum StepCheck;
+  // Without a task every step is judged.
+  leave_out(!setup_->scenario().task, {kUnjudged});
+  leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kTractionUse});
+  leave_out(setup_->model().base().type == BaseType::kFixed, {kBaseTilt});
+  leave_out(setup_->idle_joints().empty(), {kIdleJoints});
+  const mjModel& engine = setup_->engine();
+  const mjtByte* const limited = engine.actuator_ctrllimited;
+  leave_out(std::none_of(limited, limited + engine.nu, [](mjtByte flag) { return flag != 0; }), {kActuators});
 }
 
 void StepChecks::RequireKnownBounds(const Scenario& scenario) {
@@ -92,13 +135,13 @@ void StepChecks::Compare(const StepRecord& step) {
   }
   if (handling.holding && !was_holding_) ForgetSlip();
   was_holding_ = handling.holding;
+  MoveWindows(step.reading.state);
   ReadSlip(step);
   if (handling.holding) CompareKappa(step);
 
   Add(StepCheck::kBaseTilt, step.reading.departure.tilt);
   CheckIdleJoints(step.reading.state);
   CheckJointStops(step.reading.state);
-  Add(StepCheck::kActuators, step.drive.effort);
   ++steps_;
 }
 
@@ -230,11 +273,26 @@ void StepChecks::CompareObject(const StepRecord& step) {
   Add(StepCheck::kSolver, relative(response.solver_residual));
 }
 
+void StepChecks::MoveWindows(const MeasuredState& state) {
+  const long half = std::max(1L, std::lround(0.5 * kSlipWindow / time_step_));
+  if (steps_ == 0 || steps_ % half != 0) return;
+  for (std::vector<SlipState>* slips : {&findings_.fingertip_slip, &findings_.wheel_slip}) {
+    for (SlipState& slip : *slips) {
+      slip.window = slip.next_window;
+      slip.next_window = slip.distance;
+    }
+  }
+  if (!has_kappa_) return;
+  kappa_ = next_kappa_;
+  next_kappa_ = state.kappa;
+}
+
 void StepChecks::ReadSlip(const StepRecord& step) {
   const bool holding = step.command.handling.holding;
   const MeasuredState& state = step.reading.state;
   const PlantResponse& response = step.response;
   double slipped = 0.0;
+  double rate = 0.0;
   double cone_use = 0.0;
   const auto update = [&](SlipState* slip, const BodyContact& contact, const Matrix3d& R) {
     slip->touching = contact.touching;
@@ -242,12 +300,15 @@ void StepChecks::ReadSlip(const StepRecord& step) {
     slip->cone_margin = contact.cone_margin;
     slip->velocity = R.transpose() * contact.slip;
     slip->distance += time_step_ * slip->velocity;
-    slipped = std::max(slipped, slip->distance.norm());
+    slipped = std::max(slipped, (slip->distance - slip->window).norm());
     cone_use = std::max(cone_use, contact.cone_use);
   };
   for (size_t i = 0; i < response.fingertips.size(); ++i) {
     SlipState& slip = findings_.fingertip_slip[i];
     update(&slip, response.fingertips[i], state.X_Bo.linear());
+    const Vector2d unasked =
+        step.model->grasp().slip_bias().segment<2>(3 * static_cast<Eigen::Index>(i));
+    rate = std::max(rate, slip.velocity.norm() - time_step_ * unasked.norm());
     if (slip.touching && holding) {
       findings_.least_cone_margin = std::min(findings_.least_cone_margin, slip.cone_margin);
     }
@@ -257,16 +318,20 @@ void StepChecks::ReadSlip(const StepRecord& step) {
   }
   if (holding) {
     Add(StepCheck::kFingertipSlip, slipped);
+    if (!is_unjudged_) Add(StepCheck::kFingertipSlipRate, rate);
     Add(StepCheck::kConeUse, cone_use);
   }
   slipped = 0.0;
+  rate = 0.0;
   cone_use = 0.0;
   const double phi = setup_->model().num_base_positions() == 3 ? state.q[2] : 0.0;
   const Matrix3d R_B0 = Eigen::AngleAxisd(phi, Vector3d::UnitZ()).toRotationMatrix();
   for (size_t i = 0; i < response.wheels.size(); ++i) {
     update(&findings_.wheel_slip[i], response.wheels[i], R_B0);
+    rate = std::max(rate, findings_.wheel_slip[i].velocity.norm());
   }
   Add(StepCheck::kWheelSlip, slipped);
+  Add(StepCheck::kWheelSlipRate, rate);
   Add(StepCheck::kTractionUse, cone_use);
 }
 
@@ -294,13 +359,17 @@ void StepChecks::CompareKappa(const StepRecord& step) {
   double apart = 0.0;
   for (size_t i = 0; i < kappa_.size(); ++i) {
     if (!has_kappa_) {
-      kappa_[i] = state.kappa[i];
+      kappa_[i] = next_kappa_[i] = state.kappa[i];
       continue;
     }
     // The velocity at hand led from the last state to this one.
     const Vector5d change = time_step_ * grasp.contacts()[i].kappa_dot;
-    kappa_[i] =
-        NormalizeContact(grasp.tip(static_cast<int>(i)), grasp.surface(), Displace(kappa_[i], change));
+    const Surface& tip = grasp.tip(static_cast<int>(i));
+    for (std::vector<ContactCoordinates>* integrated : {&kappa_, &next_kappa_}) {
+      ContactCoordinates& kappa = (*integrated)[i];
+      FollowCharts(tip, grasp.surface(), state.kappa[i], &kappa);
+      kappa = NormalizeContact(tip, grasp.surface(), Displace(kappa, change));
+    }
     const Vector3d integrated = grasp.surface().Evaluate(kappa_[i].alpha_o).p;
     const Vector3d measured = grasp.surface().Evaluate(state.kappa[i].alpha_o).p;
     apart = std::max(apart, (integrated - measured).norm());

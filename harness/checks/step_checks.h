@@ -38,6 +38,9 @@ class StepChecks {
   /// Compares one step, whose response was read.
   void Compare(const StepRecord& step);
 
+  /// Adds the largest |tau'| / limit of a motor: before the step, which does not come when that is above 1.
+  void JudgeEffort(double effort, double time) { check(StepCheck::kActuators).Add(effort, time); }
+
   /// Forgets all steps so far: time begins anew.
   void Reset();
 
@@ -48,6 +51,9 @@ class StepChecks {
 
  private:
   void DefineChecks();
+  /// Leaves out what this run cannot ask.
+  void SetApplying();
+  void MoveWindows(const MeasuredState& state);
   [[nodiscard]] CheckRecord& check(StepCheck which) { return checks_[static_cast<size_t>(which)]; }
   void Add(StepCheck which, double value) { check(which).Add(value, time_); }
   /// Contacts of a task, and how the rigid system behaves with them.
@@ -84,7 +90,8 @@ class StepChecks {
   double changed_at_ = -std::numeric_limits<double>::infinity();  // the contacts, s
   double unjudged_since_ = 0.0;                                   // s, while it lasts
   bool is_unjudged_ = false;
-  std::vector<ContactCoordinates> kappa_;  // integrated from (40)
+  /// Integrated from (40) since the window's beginning, and since the next one's.
+  std::vector<ContactCoordinates> kappa_, next_kappa_;
   VectorXd idle_start_;
   bool has_kappa_ = false;
   long steps_ = 0;

@@ -73,7 +73,7 @@ void StepModelCheck::ReadObject(const GraspTerms& grasp) {
   const ObjectTerms& terms = grasp.coordinates();
   model.M_o = terms.M_o;
   model.C_o_X_o_dot = terms.C_o * grasp.X_o_dot();
-  const ObjectCoordinates coordinates{grasp.X_o_dot(), terms.P_inv, terms.P_inv_dot};
+  const ObjectCoordinates coordinates{grasp.X_o(), grasp.X_o_dot()};
   EvaluateObject(body, grasp.gravity(), &coordinates, &context_);
 }
 

@@ -44,11 +44,10 @@ struct ObjectValues {
   Vector6d C_o_X_o_dot;
 };
 
-/// X_o, its rate, and what leads from them to the body velocity.
+/// X_o and its rate, which the checks lead to the body velocity by themselves.
 struct ObjectCoordinates {
+  Vector6d X_o;
   Vector6d X_o_dot;
-  Matrix6d P_inv;
-  Matrix6d P_inv_dot;
 };
 
 /// Sizes that the object's rounding errors are relative to.

@@ -39,6 +39,7 @@ class FramesReader {
     RunFrames run;
     run.source = path_.string();
     run.title = log_.ReadText("scenario");
+    run.object_body = ReadObjectBody();
     run.times = ReadSeries("time");
     run.qpos = log_.ReadSignal("engine/qpos");
     for (const double phase : ReadSeries("task/phase")) {
@@ -64,6 +65,13 @@ class FramesReader {
   }
 
  private:
+  /// Older logs do not say it, and had no other.
+  [[nodiscard]] std::string ReadObjectBody() const {
+    const std::vector<std::string> texts = log_.ListTexts();
+    const bool has = std::find(texts.begin(), texts.end(), "object_body") != texts.end();
+    return has ? log_.ReadText("object_body") : "torus";
+  }
+
   [[nodiscard]] const SignalInfo* Find(const std::string& name) const {
     const auto signal = std::find_if(log_.signals().begin(), log_.signals().end(),
                                      [&](const SignalInfo& info) { return info.name == name; });

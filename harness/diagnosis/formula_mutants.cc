@@ -125,6 +125,15 @@ class MutantTable {
       t->V_Bo.tail<3>() = R * t->V_Bo.tail<3>();
     });
     spoil("M_o of the Lagrange form", "M_o", [](Terms* t) { t->M_o = t->P_inv.transpose() * t->M_o; });
+    // A wrong P^-1 that M_o and C_o share.
+    spoil("P^-1 of angles in reverse", "M_o", [](Terms* t) {
+      t->P_inv.col(3).swap(t->P_inv.col(5));
+      t->M_o = t->body.M_hat * t->P_inv;
+    });
+    spoil("rate of P^-1 with the wrong sign", "C_o_X_o_dot", [](Terms* t) {
+      t->P_inv_dot *= -1.0;
+      t->C_o = t->body.M_hat * t->P_inv_dot + t->body.C_hat * t->P_inv;
+    });
     spoil("C_o without the rate of P^-1", "C_o_X_o_dot", [](Terms* t) { t->C_o = t->body.C_hat * t->P_inv; });
     spoil("C_o without gyroscopic terms", "C_o_X_o_dot",
           [](Terms* t) { t->C_o = t->body.M_hat * t->P_inv_dot; });

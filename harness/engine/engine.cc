@@ -11,6 +11,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/common/temporary_path.h"
+#include "harness/engine/cylinder_collision.h"
 #include "harness/engine/finite_check.h"
 #include "harness/engine/torus_collision.h"
 
@@ -60,6 +61,7 @@ void CheckReadable(const std::filesystem::path& path) {
 void PrepareEngine() {
   InstallMessageHandlers();
   CheckVersion();
+  InstallCylinderCollision();
   InstallTorusCollision();
 }
 

@@ -7,6 +7,10 @@ namespace {
 
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
+/// Gap up to which CalcTouch looks for the nearest points, m: much more than contacts are compared at, and
+/// not more than the engine's general method for convex bodies bears.
+constexpr double kTouchMargin = 0.1;
+
 Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
 Pose MakePose(const mjtNum* rotation, const mjtNum* position) {
@@ -171,9 +175,8 @@ EngineTouch EngineTerms::CalcTouch(int frame, const Pose& shift) {
     const int second = tip_first ? geom : tip;
     const mjfCollision collide = mjCOLLISIONFUNC[m->geom_type[first]][m->geom_type[second]];
     if (collide == nullptr) continue;
-    // The margin is as large as can be: the nearest points are wanted also where the bodies are apart.
     mjContact contacts[mjMAXCONPAIR];
-    const int count = collide(m, d, contacts, first, second, mjMAXVAL);
+    const int count = collide(m, d, contacts, first, second, kTouchMargin);
     for (int i = 0; i < count; ++i) {
       if (touch.found && contacts[i].dist >= touch.distance) continue;
       touch.found = true;

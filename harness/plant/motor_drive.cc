@@ -10,7 +10,7 @@ void MotorDrive::Apply(const VectorXd& tau, DriveOutput* output) const {
   output->tau = tau;
   if (!tau.allFinite()) throw RunFailure("a torque is not a number");
   output->effort = CalcEffort(tau, &output->busiest_motor);
-  if (output->effort < 1.0) return;
+  if (output->effort <= 1.0) return;
   const Motor& motor = motors_[static_cast<size_t>(output->busiest_motor)];
   throw RunFailure("motor " + Quote(motor.name) + " is at its limit, " + FormatNumber(motor.limit) + " N m");
 }

@@ -42,6 +42,7 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
   log_.SetText("seed", std::to_string(scenario.seed));
   log_.SetText("robot", inputs.robot.filename().string());
   log_.SetText("mjcf", inputs.mjcf.filename().string());
+  log_.SetText("object_body", NameOf(setup.engine(), mjOBJ_BODY, setup.adapter().object_body()));
   log_.SetText("mujoco_version", mj_versionString());
   log_.SetText("dexcheck_version", Version());
   log_.SetText("machine", DescribeMachine());
@@ -134,6 +135,19 @@ void RunRecorder::AddContactSignals() {
       [](const StepRecord& step, std::span<double> row) {
         for (size_t i = 0; i < step.reading.state.kappa.size(); ++i) {
           Copy(step.reading.state.kappa[i].CalcVector(), row.subspan(5 * i, 5));
+        }
+      });
+  Add({"contact/chart",
+       "1",
+       "chart of the fingertip's (u_f, v_f) and of the object's (u_o, v_o) of contact/kappa",
+       2 * count,
+       Expand(tips, {"f", "o"}),
+       {}},
+      [](const StepRecord& step, std::span<double> row) {
+        for (size_t i = 0; i < step.reading.state.kappa.size(); ++i) {
+          const ContactCoordinates& kappa = step.reading.state.kappa[i];
+          row[2 * i] = kappa.alpha_f.chart;
+          row[2 * i + 1] = kappa.alpha_o.chart;
         }
       });
   Add({"contact/overlap", "m", "depth to which fingertip and object overlap", count, tips, {}},

@@ -119,7 +119,7 @@ void ClosedLoop::ControlStep(double t) {
   CheckRobot();
   sensing_.Tell(record_.reading, &record_.told);
   controller_->Step(record_.told, t, &record_.command);
-  drive_.Apply(record_.command.tau, &record_.drive);
+  DriveMotors(t);
   const auto control = Clock::now();
   plant_->EndStep(record_.drive.tau);
   const auto end = Clock::now();
@@ -129,6 +129,16 @@ void ClosedLoop::ControlStep(double t) {
   times_.controller += Seconds(read, control);
   times_.grasp_force += record_.command.force_seconds;
   times_.solves += record_.command.force_solves;
+}
+
+void ClosedLoop::DriveMotors(double t) {
+  try {
+    drive_.Apply(record_.command.tau, &record_.drive);
+  } catch (const RunFailure&) {
+    if (checks_) checks_->JudgeEffort(record_.drive.effort, t);
+    throw;
+  }
+  if (checks_) checks_->JudgeEffort(record_.drive.effort, t);
 }
 
 void ClosedLoop::Step() {

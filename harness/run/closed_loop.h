@@ -79,6 +79,7 @@ class ClosedLoop {
   bool SettleOn(const Trajectory& motion, double duration, const std::function<bool()>& should_stop);
   void BeginRun();
   void ControlStep(double t);
+  void DriveMotors(double t);
   void CheckRobot() const;
   void CheckGrasp();
   void CheckTask() const;

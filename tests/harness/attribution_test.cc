@@ -24,7 +24,9 @@ constexpr Step kSteps[] = {{"balance_object", CheckKind::kBalance},
                            {"reduced_acceleration", CheckKind::kPrediction},
                            {"contact_force", CheckKind::kPrediction},
                            {"fingertip_slip"},
+                           {"fingertip_slip_rate"},
                            {"wheel_slip"},
+                           {"wheel_slip_rate"},
                            {"cone_use"},
                            {"traction_use"},
                            {"contacts_lost"},
@@ -158,7 +160,8 @@ TEST(Attribute, OfSeveralThatSlideTheFirstCounts) {
 }
 
 TEST(Attribute, SlipWithoutSlidingIsSoftness) {
-  for (const char* name : {"fingertip_slip", "wheel_slip", "penetration", "kappa", "unjudged"}) {
+  for (const char* name : {"fingertip_slip", "fingertip_slip_rate", "wheel_slip", "wheel_slip_rate",
+                           "penetration", "kappa", "unjudged"}) {
     const AttributionResult result = FakeRun().Fail(name, 0.1).Fail("reduced_acceleration", 0.05).Explain();
     EXPECT_EQ(result.cause, Cause::kContactSoftness) << name;
     EXPECT_THAT(result.evidence, StartsWith(name));

@@ -2,10 +2,11 @@
 
 #include "harness/diagnosis/mutation.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <cmath>
 #include <set>
+#include <sstream>
 
 #include "harness/diagnosis/formula_mutants.h"
 #include "harness/engine/engine.h"
@@ -38,6 +39,25 @@ TEST_P(WrongEquations, AreAllFoundByTheCheckThatTheyBelongTo) {
     EXPECT_EQ(mutant.fate, MutantFate::kKilled) << mutant.name;
     EXPECT_TRUE(mutant.localised) << mutant.name << ": " << mutant.failed_checks;
   }
+}
+
+// A term on both sides of its own comparison, or one that nothing can spoil, would say "ok" for ever.
+TEST(FormulaMutants, FailEveryTermThatConsistencyCompares) {
+  const RobotModel model = testing::ReadPaperRobot();
+  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
+  const Adapter adapter(model, *engine, "mjcf");
+  ConsistencyOptions options;
+  options.samples = kSamples;
+  std::set<std::string> names;
+  for (const CheckRecord& record : CheckConsistency(adapter, options, [](long) { return true; }).terms)
+    names.insert(record.name);
+  EXPECT_GE(names.size(), 20U);
+  for (FormulaMutant& mutant : ListFormulaMutants(model)) {
+    RunFormulaMutant(adapter, kSamples, &mutant);
+    std::istringstream failed(mutant.failed_checks);
+    for (std::string name; failed >> name;) names.erase(name);
+  }
+  EXPECT_THAT(names, ::testing::IsEmpty());
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -28,6 +28,7 @@ RunFrames MakeKinematicRun(const mjModel& model, double duration, double step) {
   RunFrames run;
   run.source = "kinematic run";
   run.title = "kinematic";
+  run.object_body = "torus";
   run.friction = 0.8;
   const auto n = static_cast<long>(std::lround(duration / step)) + 1;
   const double* ready = model.key_qpos + model.nq * mj_name2id(&model, mjOBJ_KEY, "grasp_ready");

@@ -1,0 +1,56 @@
+#include "harness/engine/cylinder_collision.h"
+
+#include <cmath>
+#include <mutex>
+
+namespace dexcheck {
+namespace {
+
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+int CollideGeoms(const mjModel* m, const mjData* d, mjContact* con, int g1, int g2, mjtNum margin) {
+  const Eigen::Map<const RowMatrix3d> R(d->geom_xmat + 9 * g2);
+  const Eigen::Map<const Vector3d> origin(d->geom_xpos + 3 * g2);
+  const Eigen::Map<const Vector3d> sphere(d->geom_xpos + 3 * g1);
+  const SphereCylinderContact contact =
+      CollideSphereCylinder(R.transpose() * (sphere - origin), m->geom_size[3 * g1], m->geom_size[3 * g2],
+                            m->geom_size[3 * g2 + 1]);
+  if (contact.distance > margin) return 0;
+  con->dist = contact.distance;
+  Eigen::Map<Vector3d>(con->pos) = origin + R * contact.position;
+  Eigen::Map<Vector3d>(con->frame) = R * contact.normal;
+  mju_zero3(con->frame + 3);
+  return 1;
+}
+
+}  // namespace
+
+SphereCylinderContact CollideSphereCylinder(const Vector3d& center, double sphere_radius,
+                                            double cylinder_radius, double half_length) {
+  const double rho = center.head<2>().norm();
+  const Vector3d outward = rho > 0.0 ? Vector3d(center.x() / rho, center.y() / rho, 0.0) : Vector3d::UnitX();
+  const Vector3d along = center.z() < 0.0 ? Vector3d(-Vector3d::UnitZ()) : Vector3d::UnitZ();
+  const double beyond_side = rho - cylinder_radius;
+  const double beyond_end = std::abs(center.z()) - half_length;
+  SphereCylinderContact contact;
+  if (beyond_side > 0.0 && beyond_end > 0.0) {
+    const double apart = std::hypot(beyond_side, beyond_end);
+    contact.normal = -(beyond_side * outward + beyond_end * along) / apart;
+    contact.distance = apart - sphere_radius;
+  } else if (beyond_side > beyond_end) {
+    contact.normal = -outward;
+    contact.distance = beyond_side - sphere_radius;
+  } else {
+    contact.normal = -along;
+    contact.distance = beyond_end - sphere_radius;
+  }
+  contact.position = center + (sphere_radius + 0.5 * contact.distance) * contact.normal;
+  return contact;
+}
+
+void InstallCylinderCollision() {
+  static std::once_flag once;
+  std::call_once(once, [] { mjCOLLISIONFUNC[mjGEOM_SPHERE][mjGEOM_CYLINDER] = CollideGeoms; });
+}
+
+}  // namespace dexcheck
