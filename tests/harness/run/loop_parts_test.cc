@@ -56,7 +56,7 @@ class LoopPartsTest : public ::testing::Test {
     return runner_->loop().record();
   }
   [[nodiscard]] double Worst(std::string_view check) const {
-    return runner_->loop().checks().Find(check).max;
+    return runner_->loop().checks().Find(check).worst;
   }
 
   ShippedRun shipped_;

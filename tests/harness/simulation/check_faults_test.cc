@@ -76,9 +76,9 @@ TEST_P(CheckFaults, FailTheirCheck) {
   const dexcheck::Setup setup(scenario, kRobot, mjcf, std::move(engine));
   Runner runner(setup, /*check=*/true);
   const RunResult& result = runner.Run([] {}, [] { return false; });
-  const RunCheck& check = runner.loop().checks().Find(fault.check);
+  const CheckRecord& check = runner.loop().checks().Find(fault.check);
   EXPECT_TRUE(check.applies);
-  EXPECT_TRUE(check.failed) << check.max << " of " << check.bound << "; " << result.failure;
+  EXPECT_TRUE(check.failed) << check.worst << " of " << check.bound << "; " << result.failure;
   EXPECT_NE(result.verdict, Verdict::kPass);
   EXPECT_NE(result.attribution.cause, Cause::kNone);
 }
@@ -91,15 +91,15 @@ TEST(CheckFaults, AreThereForEveryCheck) {
   for (const CheckFault& fault : kFaults) seeded.insert(fault.check);
   std::set<std::string> checks;
   const ShippedRun run("hold");
-  for (const RunCheck& check : run.loop().checks().checks()) checks.insert(check.name);
+  for (const CheckRecord& check : run.loop().checks().motion_checks()) checks.insert(check.name);
   EXPECT_EQ(seeded, checks);
 }
 
 std::set<std::string> ListApplying(const ShippedRun& run) {
   std::set<std::string> names;
-  for (const std::span<const RunCheck> checks :
-       {run.loop().model_checks(), std::span<const RunCheck>(run.loop().checks().checks())}) {
-    for (const RunCheck& check : checks) {
+  for (const std::span<const CheckRecord> checks :
+       {run.loop().checks().model_checks(), run.loop().checks().motion_checks()}) {
+    for (const CheckRecord& check : checks) {
       if (check.applies) names.insert(check.name);
     }
   }
@@ -130,12 +130,12 @@ TEST(SlipWindow, ForgetsWhatWasLongAgo) {
   ShippedRun run("hold", {"duration=16", "settle=0.5", "plant.time_step=2e-3"});
   const RunResult& result = run.Run();
   EXPECT_EQ(result.verdict, Verdict::kPass) << result.attribution.evidence;
-  const SlipState& slip = run.loop().checks().fingertip_slip()[0];
-  const RunCheck& check = run.loop().checks().Find("fingertip_slip");
+  const SlipState& slip = run.step().findings.fingertip_slip[0];
+  const CheckRecord& check = run.loop().checks().Find("fingertip_slip");
   // Windows begin at 0 until t = 10 s, at 5 s until 15 s, then at 10 s.
-  EXPECT_GT(check.max, 1e-6);
+  EXPECT_GT(check.worst, 1e-6);
   EXPECT_NEAR(check.at_time, 10.0, 5.1);
-  EXPECT_NEAR(check.last / check.max, 0.6, 0.01);
+  EXPECT_NEAR(check.last / check.worst, 0.6, 0.01);
   // What is recorded goes on from t = 0.
   EXPECT_NEAR((slip.distance - slip.window).norm() / slip.distance.norm(), 6.0 / 16.0, 0.01);
 }
