@@ -75,7 +75,7 @@ TEST_P(CheckFaults, FailTheirCheck) {
   if (fault.change != nullptr) fault.change(engine.get());
   const dexcheck::Setup setup(scenario, kRobot, mjcf, std::move(engine));
   Runner runner(setup, /*check=*/true);
-  const RunResult& result = runner.Run([] {}, [] { return false; });
+  const RunResult& result = runner.Run([](const StepRecord&) {}, [] { return false; });
   const CheckRecord& check = runner.loop().checks().Find(fault.check);
   EXPECT_TRUE(check.applies);
   EXPECT_TRUE(check.failed) << check.worst << " of " << check.bound << "; " << result.failure;
@@ -134,7 +134,7 @@ TEST(SlipWindow, ForgetsWhatWasLongAgo) {
   const CheckRecord& check = run.loop().checks().Find("fingertip_slip");
   // Windows begin at 0 until t = 10 s, at 5 s until 15 s, then at 10 s.
   EXPECT_GT(check.worst, 1e-6);
-  EXPECT_NEAR(check.at_time, 10.0, 5.1);
+  EXPECT_NEAR(check.at, 10.0, 5.1);
   EXPECT_NEAR(check.last / check.worst, 0.6, 0.01);
   // What is recorded goes on from t = 0.
   EXPECT_NEAR((slip.distance - slip.window).norm() / slip.distance.norm(), 6.0 / 16.0, 0.01);
