@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/checks/failure_cause.h"
 #include "harness/checks/check_record.h"
+#include "harness/checks/failure_cause.h"
 #include "harness/checks/static_gate.h"
 
 namespace dexcheck {

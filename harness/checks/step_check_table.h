@@ -44,17 +44,17 @@ inline constexpr double kTransient = 0.05;
 //
 //   v_dot = -b v - R f_t + J_dot qvel,   hence after some 1/b   v = (J_dot qvel - R f_t) / b,
 //
-// with b = 2 / (tc d) = 1 / (d dt) of the time constant tc = 2 dt and the impedance d, and R = (1 - d) / (d m impratio)
-// of the mass m that the contact moves. J_dot qvel is what (46) has and the engine's constraint has not: the model's
-// J_B_dot' xi - G_dot^T V_Bo. So distances grow with time, at rates that do not: distances are judged over the last
-// kSlipWindow at most, and the rates besides:
+// with b = 2 / (tc d) = 1 / (d dt) of the time constant tc = 2 dt and the impedance d, and R = (1 - d) / (d m
+// impratio) of the mass m that the contact moves. J_dot qvel is what (46) has and the engine's constraint has
+// not: the model's J_B_dot' xi - G_dot^T V_Bo. So distances grow with time, at rates that do not: distances
+// are judged over the last kSlipWindow at most, and the rates besides:
 //
 //   fingertip_slip_rate   |v| - dt |J_B_dot' xi - G_dot^T V_Bo| <= (1 - d) dt / impratio * kTipLoad,
 //                         of d = 0.99, impratio = 100, whatever the plant has: 2e-5 m/s at 1 ms
 //   wheel_slip_rate       |v| <= dt * kSideways: tyres give by v w / b in a curve; 1e-4 m/s at 1 ms
 //
-// Up to kSlipWindow after the start the windows begin there. Joints that do not carry the object are held by stiffness:
-// what moves them does not add up.
+// Up to kSlipWindow after the start the windows begin there. Joints that do not carry the object are held by
+// stiffness: what moves them does not add up.
 
 /// Distances are judged from a place between half of this and this ago, s.
 inline constexpr double kSlipWindow = 10.0;
@@ -133,9 +133,10 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kAssumption,
      .unit = "m/s",
      .bound = kTipCreep,  // times the time step
-     .description = "how fast a fingertip slips on the object, less what (46) and the engine's constraint differ by",
+     .description =
+         "how fast a fingertip slips on the object, less what (46) and the engine's constraint differ by",
      .meaning =
-         {.cause = Cause::kContactSoftness, .precedence = 6, .is_own = true, .sharper = StepCheck::kConeUse},
+         {.cause = Cause::kContactSoftness, .precedence = 7, .is_own = true, .sharper = StepCheck::kConeUse},
      .bonded_description = ""},
     {.check = StepCheck::kWheelSlip,
      .name = "wheel_slip",
@@ -144,7 +145,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .bound = 1e-3,
      .description = "how far a wheel has slipped on the floor in the last 5 to 10 s, (1)",
      .meaning = {.cause = Cause::kContactSoftness,
-                 .precedence = 7,
+                 .precedence = 8,
                  .is_own = true,
                  .sharper = StepCheck::kTractionUse}},
     {.check = StepCheck::kWheelSlipRate,
@@ -154,7 +155,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .bound = kSideways,  // times the time step
      .description = "how fast a wheel slips on the floor",
      .meaning = {.cause = Cause::kContactSoftness,
-                 .precedence = 7,
+                 .precedence = 9,
                  .is_own = true,
                  .sharper = StepCheck::kTractionUse}},
     {.check = StepCheck::kConeUse,
@@ -195,7 +196,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .bound = 2e-4,
      .description =
          "contact point on the object: kappa integrated by (40) over the last 5 to 10 s against the engine's",
-     .meaning = {.cause = Cause::kContactSoftness, .precedence = 8},
+     .meaning = {.cause = Cause::kContactSoftness, .precedence = 10},
      .bonded_description = ""},
     {.check = StepCheck::kBaseTilt,
      .name = "base_tilt",
@@ -203,7 +204,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .unit = "rad",
      .bound = 1e-5,
      .description = "angle of the platform against the vertical",
-     .meaning = {.cause = Cause::kTilt, .precedence = 11}},
+     .meaning = {.cause = Cause::kTilt, .precedence = 13}},
     {.check = StepCheck::kIdleJoints,
      .name = "idle_joints",
      .kind = CheckKind::kAssumption,
@@ -218,7 +219,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .bound = 1e-5,
      .description = "what the engine's solver left over of its own equation of motion of the object, as "
                     "balance_object",
-     .meaning = {.cause = Cause::kSolver, .precedence = 10, .is_own = true}},
+     .meaning = {.cause = Cause::kSolver, .precedence = 12, .is_own = true}},
     {.check = StepCheck::kJointStop,
      .name = "joint_stop",
      .kind = CheckKind::kAssumption,
@@ -234,7 +235,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .bound = 5.0 * kTransient,
      .description = "how long in one go contacts have come and gone, so that balance and prediction were not "
                     "judged",
-     .meaning = {.cause = Cause::kContactSoftness, .precedence = 9}},
+     .meaning = {.cause = Cause::kContactSoftness, .precedence = 11}},
     {.check = StepCheck::kActuators,
      .name = "actuator_effort",
      .kind = CheckKind::kAssumption,

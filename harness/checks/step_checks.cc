@@ -306,8 +306,7 @@ void StepChecks::ReadSlip(const StepRecord& step) {
   for (size_t i = 0; i < response.fingertips.size(); ++i) {
     SlipState& slip = findings_.fingertip_slip[i];
     update(&slip, response.fingertips[i], state.X_Bo.linear());
-    const Vector2d unasked =
-        step.model->grasp().slip_bias().segment<2>(3 * static_cast<Eigen::Index>(i));
+    const Vector2d unasked = step.model->grasp().slip_bias().segment<2>(3 * static_cast<Eigen::Index>(i));
     rate = std::max(rate, slip.velocity.norm() - time_step_ * unasked.norm());
     if (slip.touching && holding) {
       findings_.least_cone_margin = std::min(findings_.least_cone_margin, slip.cone_margin);

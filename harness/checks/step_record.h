@@ -25,8 +25,8 @@ struct SlipState {
   Vector3d distance = Vector3d::Zero();  ///< Its integral, m.
   /// The distance where the window begins that slip is judged over, and where the next one will.
   Vector3d window = Vector3d::Zero(), next_window = Vector3d::Zero();
-  double cone_use = 0.0;                 ///< |tangential force| / (mu normal force); 1 slides.
-  double cone_margin = 0.0;              ///< mu normal force - |tangential force|, N.
+  double cone_use = 0.0;     ///< |tangential force| / (mu normal force); 1 slides.
+  double cone_margin = 0.0;  ///< mu normal force - |tangential force|, N.
 };
 
 /// What the checks made of a step, besides their records.

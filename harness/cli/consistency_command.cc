@@ -159,7 +159,6 @@ std::string ToText(const Request& request, const Comparison& comparison, ExitCod
 
 ConsistencyResult Compare(const Request& request,
                           const std::function<ConsistencyResult(const std::function<bool(long)>&)>& check) {
-  CatchInterrupts();
   ProgressBar bar("comparing", request.options.samples, request.quiet);
   ConsistencyResult result = check([&](long samples) {
     bar.Update(samples);
@@ -234,6 +233,7 @@ void SortSides(Request* request) {
 
 int Run(Request request) {
   SortSides(&request);
+  CatchInterrupts();
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
   Comparison comparison;

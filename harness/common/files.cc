@@ -16,15 +16,15 @@
 namespace dexcheck {
 
 std::string ReadBytes(const std::filesystem::path& path) {
-  const auto fail = [&](int error) {
-    throw InputError(path.string() + ": cannot be read: " + std::strerror(error));
+  const auto fail = [&](const std::string& why) {
+    throw InputError(path.string() + ": cannot be read: " + why);
   };
-  if (std::error_code ignored; std::filesystem::is_directory(path, ignored)) fail(EISDIR);
+  if (std::error_code ignored; std::filesystem::is_directory(path, ignored)) fail("is a directory");
   errno = 0;
   std::ifstream file(path, std::ios::binary);
-  if (!file) fail(errno);
+  if (!file) fail(std::strerror(errno));
   std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  if (file.bad()) fail(errno);
+  if (file.bad()) fail(std::strerror(errno));
   return bytes;
 }
 

@@ -32,6 +32,8 @@ void EnginePlant::Read(PlantResponse* response) {
 void EnginePlant::Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) {
   const mjModel& m = adapter_->engine();
   EngineState state = simulation_.GetState();
+  state.qvel.setZero();
+  state.qacc_warmstart.setZero();
   adapter_->SetPositions(q, state.qpos.data());
   const Eigen::Quaterniond rotation(X_Bo.linear());
   const int joint = m.body_jntadr[adapter_->object_body()];

@@ -203,7 +203,7 @@ TEST(RunCommand, CtrlCEndsSettlingToo) {
   // The second settles twice, the second time while it moves: as short before as the test can tell.
   for (const std::vector<std::string>& settings :
        {std::vector<std::string>{"hold", "--set", "settle=100"},
-        {"paper", "--set", "settle=1e-4", "--set", "plant.time_step=1e-6", "--set", "duration=1e-3"}}) {
+        {"paper", "--set", "settle=0.01", "--set", "plant.time_step=1e-5", "--set", "duration=1e-3"}}) {
     const TempFolder folder;
     const std::filesystem::path out = folder.path() / "run";
     std::vector<std::string> arguments = {"run"};
