@@ -33,38 +33,28 @@ std::string Tell(const CheckRecord& check) {
          " s" + (check.part.empty() ? "" : ", " + check.part);
 }
 
-// Sliding before giving before tilting: a tyre that spins also tilts the platform.
-constexpr bool IsDecisive(Cause cause) {
-  return cause == Cause::kActuatorLimit || cause == Cause::kJointStop || cause == Cause::kFingertipSlip ||
-         cause == Cause::kWheelSlip;
+/// Whether `check` tells more of the cause than `other`: by rank, then by time, then by precedence.
+bool TellsMore(const CheckRecord& check, const CheckRecord& other) {
+  const FailureMeaning a = MeaningOf(check);
+  const FailureMeaning b = MeaningOf(other);
+  if (a.rank != b.rank) return a.rank < b.rank;
+  if (check.failed_at != other.failed_at) return check.failed_at < other.failed_at;
+  return a.precedence < b.precedence;
 }
 
-/// Of the failed checks whose meaning passes, the one that failed first; by precedence at one time.
-template <typename Passes>
-const CheckRecord* FindFirst(std::span<const CheckRecord> steps, const Passes& passes) {
+/// The failed check that tells why; null when none tells.
+const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
   const CheckRecord* first = nullptr;
   for (const CheckRecord& check : steps) {
-    if (!check.failed || !passes(MeaningOf(check).cause)) continue;
-    if (first != nullptr && check.failed_at > first->failed_at) continue;
-    if (first != nullptr && check.failed_at == first->failed_at &&
-        MeaningOf(check).precedence > MeaningOf(*first).precedence) {
-      continue;
-    }
-    first = &check;
+    if (!check.failed || MeaningOf(check).cause == Cause::kNone) continue;
+    if (first == nullptr || TellsMore(check, *first)) first = &check;
   }
   return first;
 }
 
-/// The check that tells why, among those of the strongest sort; null when none tells.
-const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
-  const CheckRecord* first = FindFirst(steps, [](Cause cause) { return cause == Cause::kModel; });
-  if (first == nullptr) first = FindFirst(steps, IsDecisive);
-  if (first == nullptr) first = FindFirst(steps, [](Cause cause) { return cause != Cause::kNone; });
-  return first;
-}
-
 Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRecord> steps) {
-  if (check.kind == CheckKind::kModel || run == Cause::kModel) return Cause::kModel;
+  if (run == Cause::kModel || run == Cause::kSensing) return run;
+  if (check.kind == CheckKind::kModel) return Cause::kModel;
   const FailureMeaning meaning = MeaningOf(check);
   if (!meaning.is_own) return run;
   if (meaning.sharper == StepCheck::kCount) return meaning.cause;
@@ -80,6 +70,12 @@ const char* NameOf(Cause cause) {
       return "none";
     case Cause::kModel:
       return "model";
+    case Cause::kSensing:
+      return "sensing";
+    case Cause::kControlLaw:
+      return "control law";
+    case Cause::kActuator:
+      return "actuator";
     case Cause::kActuatorLimit:
       return "actuator limit";
     case Cause::kJointStop:
@@ -94,6 +90,8 @@ const char* NameOf(Cause cause) {
       return "tilt";
     case Cause::kSolver:
       return "solver";
+    case Cause::kUnmodelledForce:
+      return "unmodelled force";
     case Cause::kIntegrator:
       return "integrator";
   }
@@ -101,7 +99,7 @@ const char* NameOf(Cause cause) {
 }
 
 AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord> model,
-                            std::span<const CheckRecord> steps) {
+                            std::span<const CheckRecord> steps, const std::string& law) {
   AttributionResult result;
   const CheckRecord* first_model = nullptr;
   for (const CheckRecord& check : model) {
@@ -116,13 +114,15 @@ AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord>
     result.cause = Cause::kModel;
     result.evidence = finding.check + ": " + finding.where + ": " + FormatNumber(finding.model) +
                       " in the model, " + FormatNumber(finding.engine) + " in the MJCF";
-  } else if (first_model != nullptr) {
+  } else if (first_model != nullptr &&
+             !Failed(steps, kStepChecks[static_cast<size_t>(StepCheck::kTold)].name)) {
     result.cause = Cause::kModel;
     result.evidence = Tell(*first_model);
   } else if (any_step) {
     if (const CheckRecord* first = FindEvidence(steps)) {
       result.cause = MeaningOf(*first).cause;
       result.evidence = Tell(*first);
+      if (result.cause == Cause::kControlLaw && !law.empty()) result.evidence += "; " + law;
     } else {
       result.cause = Cause::kIntegrator;
       const auto assumption = std::find_if(steps.begin(), steps.end(), [](const CheckRecord& check) {

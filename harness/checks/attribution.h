@@ -29,6 +29,6 @@ struct AttributionResult {
 /// sliding shows at the edge of the friction cone, and tells slip from contacts that merely give.
 /// @param model checks of the first question.
 AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord> model,
-                            std::span<const CheckRecord> steps);
+                            std::span<const CheckRecord> steps, const std::string& law = {});
 
 }  // namespace dexcheck

@@ -17,6 +17,8 @@ std::string DescribeVelocity(int coordinate, const RobotModel& model, int base_v
 
 const char* NameOf(CheckKind kind) {
   switch (kind) {
+    case CheckKind::kLaw:
+      return "law";
     case CheckKind::kBalance:
       return "balance";
     case CheckKind::kPrediction:

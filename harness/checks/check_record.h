@@ -11,10 +11,10 @@
 
 namespace dexcheck {
 
-/// Which of the harness's four questions a check answers.
-enum class CheckKind { kModel, kBalance, kPrediction, kAssumption };
+/// Which of the harness's five questions a check answers.
+enum class CheckKind { kModel, kLaw, kBalance, kPrediction, kAssumption };
 
-/// "model", "balance", "prediction" or "assumption".
+/// "model", "law", "balance", "prediction" or "assumption".
 const char* NameOf(CheckKind kind);
 
 /// The part of the robot that a compared number belongs to.

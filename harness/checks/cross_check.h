@@ -2,9 +2,12 @@
 
 // All questions of a run, asked at every step.
 
+#include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 
+#include "harness/checks/law_check.h"
 #include "harness/checks/step_checks.h"
 #include "harness/checks/step_model_check.h"
 #include "harness/checks/step_record.h"
@@ -22,11 +25,16 @@ class CrossCheck {
   void CompareModel(const StepRecord& step);
   /// The others, which compare motion and forces.
   void CompareMotion(const StepRecord& step) { motion_.Compare(step); }
+  /// The law's question: are the torques those of (53)-(55), and do they do what is expected? After the other
+  /// two.
+  void CompareLaw(const StepRecord& step);
   /// The largest effort of a motor, before the step that it belongs to.
   void JudgeEffort(double effort, double time) { motion_.JudgeEffort(effort, time); }
   /// Forgets motion and forces of all steps so far: time begins anew.
   void Reset() { motion_.Reset(); }
 
+  /// Which part of the law differs, in words; empty when none does.
+  [[nodiscard]] std::string TellLaw() const { return law_ ? law_->attribution().Tell() : std::string(); }
   [[nodiscard]] std::span<const CheckRecord> model_checks() const { return model_.records(); }
   [[nodiscard]] std::span<const CheckRecord> motion_checks() const { return motion_.checks(); }
   /// A check of the motion. @throws std::invalid_argument unless there is one of that name.
@@ -35,8 +43,13 @@ class CrossCheck {
   [[nodiscard]] const StepFindings& findings() const { return motion_.findings(); }
 
  private:
+  static double CompareTold(const StepRecord& step);
+
+  const Setup* setup_;
   StepModelCheck model_;
   StepChecks motion_;
+  std::optional<LawCheck> law_;  // none for a task
+  LawTerms law_terms_;           // the engine's
 };
 
 }  // namespace dexcheck

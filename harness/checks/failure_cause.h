@@ -6,6 +6,9 @@ namespace dexcheck {
 enum class Cause {
   kNone,
   kModel,            ///< The two descriptions differ: constants, kinematics, dynamics, contact geometry.
+  kSensing,          ///< The controller was told what is not so.
+  kControlLaw,       ///< The torques are not those of the law, or the law with these gains does not do what is expected.
+  kActuator,         ///< The motors gave other torques than were sent.
   kActuatorLimit,    ///< A motor could not give its torque.
   kJointStop,        ///< A joint reached the end of its range.
   kFingertipSlip,    ///< A fingertip slides: its force is at the edge of the friction cone.
@@ -13,6 +16,7 @@ enum class Cause {
   kContactSoftness,  ///< Contacts give or creep without sliding.
   kTilt,             ///< The platform does not stay level.
   kSolver,           ///< The engine's solver stopped before its forces fit its motion.
+  kUnmodelledForce,  ///< A force acts that neither the model nor the engine's description has.
   kIntegrator,       ///< None of these: what time stepping leaves.
 };
 

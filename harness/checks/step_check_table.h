@@ -13,6 +13,15 @@ namespace dexcheck {
 
 /// In the order of log and summary.
 enum class StepCheck {
+  kGains,
+  kTold,
+  kLawTorque,
+  kLawDemand,
+  kGraspForce,
+  kTorqueApplied,
+  kErrorDynamics,
+  kExpectPosition,
+  kExpectOrientation,
   kBalanceRobot,
   kBalanceObject,
   kReducedAcceleration,
@@ -64,6 +73,33 @@ inline constexpr double kTipLoad = 200.0;
 inline constexpr double kTipCreep = (1.0 - 0.99) / 100.0 * kTipLoad;
 /// Acceleration v w in a curve up to which tyres may give, m/s^2. `curve` has 0.03.
 inline constexpr double kSideways = 0.1;
+// Bounds of the law. The engine's terms agree with the model's to some 1e-15 of their scales; the
+// pseudoinverses of (47), (49) multiply that by the condition number, which is divided out, and are formed
+// from Gram matrices, which have its square: an entry of the quotient keeps some 1e-12.
+inline constexpr double kLawTorqueBound = 1e-11;
+// Where contacts creep, (47) plans for xi_c and the rigid system starts from xi: C_bar' (xi - xi_c) and
+// J_dot (xi - xi_c) stay, slip speeds of some 1e-5 m/s against rates of the order of 1/s.
+inline constexpr double kLawDemandBound = 1e-6;
+// A torque goes through the gear's ratio once and back: two roundings.
+inline constexpr double kTorqueAppliedBound = 1e-14;
+// What law_demand leaves, over K_p.
+inline constexpr double kErrorDynamicsBound = 1e-8;
+
+/// What explains what: of the failed checks, those of the first of these ranks tell why, however late they
+/// failed.
+enum class Rank {
+  kTold,           ///< Whoever is told wrongly does what is wrong.
+  kLaw,            ///< Torques that are not the law's, or gains that cannot settle.
+  kActuator,       ///< Torques that did not arrive.
+  kDecisive,       ///< A limit, a stop, a contact that slides: from then on everything else is void.
+  kObjectBalance,  ///< A force on the object that neither side has.
+  kAssumption,     ///< Contacts that give, a platform that tilts, a solver that stopped early.
+  kBalance,        ///< A force on the robot that neither side has.
+  /// By algebra the prediction differs from the engine's motion by what the balances leave and by how the
+  /// contacts give, J_B' xi_dot + J_B_dot' xi - d/dt(G^T V_o): where the balances hold, contacts gave.
+  kPrediction,
+  kResidual,  ///< Nothing else failed.
+};
 
 /// What the failure of a check says of its cause.
 struct FailureMeaning {
@@ -74,6 +110,7 @@ struct FailureMeaning {
   bool is_own = false;
   /// When this check failed too, its cause holds for both.
   StepCheck sharper = StepCheck::kCount;
+  Rank rank = Rank::kAssumption;
 };
 
 /// One entry.
@@ -90,14 +127,88 @@ struct StepCheckInfo {
 };
 
 inline constexpr StepCheckInfo kStepChecks[] = {
+    // Asked once, before anything moves. A radius of 1 never settles; so near to it an error takes 1e9 steps.
+    {.check = StepCheck::kGains,
+     .name = "gain_stability",
+     .kind = CheckKind::kLaw,
+     .unit = "1",
+     .bound = 1.0 - 1e-9,
+     .description = "largest eigenvalue of (57) with the scenario's gains, sampled as the controller does it",
+     .meaning = {.cause = Cause::kControlLaw, .is_own = true, .rank = Rank::kLaw}},
+    {.check = StepCheck::kTold,
+     .name = "told",
+     .kind = CheckKind::kLaw,
+     .unit = "1",
+     .bound = 0.0,
+     .description =
+         "what the controller is told of the state against what is so, beyond what the scenario asks for",
+     .meaning = {.cause = Cause::kSensing, .is_own = true, .rank = Rank::kTold}},
+    {.check = StepCheck::kLawTorque,
+     .name = "law_torque",
+     .kind = CheckKind::kLaw,
+     .unit = "1",
+     .bound = kLawTorqueBound,
+     .description =
+         "tau' sent against (53)-(55) computed from the engine's terms, relative to the forces balanced and "
+         "to the condition number of J_B'",
+     .meaning = {.cause = Cause::kControlLaw, .is_own = true, .rank = Rank::kLaw}},
+    {.check = StepCheck::kLawDemand,
+     .name = "law_demand",
+     .kind = CheckKind::kLaw,
+     .unit = "1",
+     .bound = kLawDemandBound,
+     .description = "accelerations and contact forces of the rigid system (46), (48) under tau' against "
+                    "those that (47), "
+                    "(49), (55) demand, likewise",
+     .meaning = {.cause = Cause::kControlLaw, .is_own = true, .rank = Rank::kLaw}},
+    {.check = StepCheck::kGraspForce,
+     .name = "grasp_force",
+     .kind = CheckKind::kLaw,
+     .unit = "1",
+     .bound = 1.0,
+     .description = "F_N by its certificate: in null(G), in the cones, optimal; each over its tolerance",
+     .meaning = {.cause = Cause::kControlLaw, .is_own = true, .rank = Rank::kLaw}},
+    {.check = StepCheck::kTorqueApplied,
+     .name = "torque_applied",
+     .kind = CheckKind::kLaw,
+     .unit = "1",
+     .bound = kTorqueAppliedBound,
+     .description = "torques that the joints received against those that were sent, relative to the largest",
+     .meaning = {.cause = Cause::kActuator, .is_own = true, .rank = Rank::kActuator}},
+    {.check = StepCheck::kErrorDynamics,
+     .name = "error_dynamics",
+     .kind = CheckKind::kLaw,
+     .unit = "m",
+     .bound = kErrorDynamicsBound,
+     .description =
+         "object's position against (57) integrated beside the run, driven by the accelerations that the "
+         "prediction missed",
+     .meaning = {.cause = Cause::kIntegrator, .rank = Rank::kResidual}},
+    {.check = StepCheck::kExpectPosition,
+     .name = "expect_position",
+     .kind = CheckKind::kLaw,
+     .unit = "m",
+     .bound = 0.0,
+     .description = "object's position error, against what the scenario expects",
+     .meaning = {.cause = Cause::kControlLaw, .rank = Rank::kResidual}},
+    {.check = StepCheck::kExpectOrientation,
+     .name = "expect_orientation",
+     .kind = CheckKind::kLaw,
+     .unit = "rad",
+     .bound = 0.0,
+     .description = "object's orientation error, against what the scenario expects",
+     .meaning = {.cause = Cause::kControlLaw, .rank = Rank::kResidual}},
     {.check = StepCheck::kBalanceRobot,
      .name = "balance_robot",
      .kind = CheckKind::kBalance,
      .unit = "1",
      .bound = 1e-5,
      .description = "what is left of (48) with the engine's accelerations and contact forces, against the "
-                    "forces balanced"},
-    // The object's balance has no other unknowns than the model's: its inertia and the contacts' geometry.
+                    "forces balanced",
+     .meaning = {.cause = Cause::kUnmodelledForce, .rank = Rank::kBalance}},
+    // The object's balance has no other unknowns than its inertia and the contacts' geometry, which the first
+    // question
+    // compares: where that holds, a force acts on the object that nobody has.
     {.check = StepCheck::kBalanceObject,
      .name = "balance_object",
      .kind = CheckKind::kBalance,
@@ -105,19 +216,21 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .bound = 1e-9,
      .description = "what is left of (19) with the engine's acceleration and contact forces, less what its "
                     "solver left over, against the contact forces",
-     .meaning = {.cause = Cause::kModel}},
+     .meaning = {.cause = Cause::kUnmodelledForce, .rank = Rank::kObjectBalance}},
     {.check = StepCheck::kReducedAcceleration,
      .name = "reduced_acceleration",
      .kind = CheckKind::kPrediction,
      .unit = "1",
      .bound = 1e-5,
-     .description = "xi_dot of the rigid constrained system (46), (48) against the engine's"},
+     .description = "xi_dot of the rigid constrained system (46), (48) against the engine's",
+     .meaning = {.cause = Cause::kContactSoftness, .rank = Rank::kPrediction}},
     {.check = StepCheck::kContactForce,
      .name = "contact_force",
      .kind = CheckKind::kPrediction,
      .unit = "1",
      .bound = 1e-6,
-     .description = "f_c of the rigid constrained system against the engine's, relative to |f_c|"},
+     .description = "f_c of the rigid constrained system against the engine's, relative to |f_c|",
+     .meaning = {.cause = Cause::kContactSoftness, .rank = Rank::kPrediction}},
     // Slip and use of the cone tell sliding from contacts that merely give.
     {.check = StepCheck::kFingertipSlip,
      .name = "fingertip_slip",
@@ -164,7 +277,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .unit = "1",
      .bound = 0.99,
      .description = "tangential force over mu times normal force at a fingertip; 1 slides, (21)",
-     .meaning = {.cause = Cause::kFingertipSlip, .precedence = 2, .is_own = true},
+     .meaning = {.cause = Cause::kFingertipSlip, .precedence = 2, .is_own = true, .rank = Rank::kDecisive},
      .bonded_description = ""},
     {.check = StepCheck::kTractionUse,
      .name = "traction_use",
@@ -172,14 +285,14 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .unit = "1",
      .bound = 0.99,
      .description = "tangential force over mu times normal force at a wheel; 1 spins or skids",
-     .meaning = {.cause = Cause::kWheelSlip, .precedence = 3, .is_own = true}},
+     .meaning = {.cause = Cause::kWheelSlip, .precedence = 3, .is_own = true, .rank = Rank::kDecisive}},
     {.check = StepCheck::kContactsLost,
      .name = "contacts_lost",
      .kind = CheckKind::kAssumption,
      .unit = "1",
      .bound = 0.0,
      .description = "fingertips that do not touch the object",
-     .meaning = {.cause = Cause::kFingertipSlip, .precedence = 4, .is_own = true},
+     .meaning = {.cause = Cause::kFingertipSlip, .precedence = 4, .is_own = true, .rank = Rank::kDecisive},
      .bonded_description = ""},
     {.check = StepCheck::kPenetration,
      .name = "penetration",
@@ -226,7 +339,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .unit = "rad",
      .bound = 0.0,
      .description = "how far a joint is beyond its range, where a stop pushes that the model does not have",
-     .meaning = {.cause = Cause::kJointStop, .precedence = 1, .is_own = true}},
+     .meaning = {.cause = Cause::kJointStop, .precedence = 1, .is_own = true, .rank = Rank::kDecisive}},
     // The fingers of one hand touch within some hundredths of a second, kTransient each at the most.
     {.check = StepCheck::kUnjudged,
      .name = "unjudged",
@@ -242,7 +355,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .unit = "1",
      .bound = 1.0,
      .description = "|tau'| over the motor's limit",
-     .meaning = {.cause = Cause::kActuatorLimit, .precedence = 0, .is_own = true}},
+     .meaning = {.cause = Cause::kActuatorLimit, .precedence = 0, .is_own = true, .rank = Rank::kDecisive}},
 };
 
 static_assert([] {

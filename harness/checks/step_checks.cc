@@ -73,6 +73,11 @@ void StepChecks::DefineChecks() {
   check(StepCheck::kFingertipSlipRate).bound *= time_step_;
   check(StepCheck::kWheelSlipRate).bound *= time_step_;
   SetApplying();
+  const Expectation& expect = setup_->scenario().expect;
+  check(StepCheck::kExpectPosition).bound = expect.position.value_or(0.0);
+  check(StepCheck::kExpectPosition).applies = expect.position.has_value();
+  check(StepCheck::kExpectOrientation).bound = expect.orientation.value_or(0.0);
+  check(StepCheck::kExpectOrientation).applies = expect.orientation.has_value();
   RequireKnownBounds(setup_->scenario());
   for (const auto& [name, bound] : setup_->scenario().bounds) check(FindStepCheck(name)->check).bound = bound;
 }
@@ -208,6 +213,7 @@ void StepChecks::Predict(const StepRecord& step) {
     prediction = &dynamics_.PredictFree(robot, force_);
   }
   findings_.xi_dot_model = prediction->xi_dot;
+  findings_.V_Bo_dot_model = prediction->V_Bo_dot;
   findings_.f_c_model = prediction->f_c;
   mass_factor_ = &dynamics_.mass_factor();
 }
@@ -220,6 +226,7 @@ void StepChecks::PredictPart(const StepRecord& step) {
   const Prediction& prediction = part->dynamics.Predict(
       robot, part->grasp.terms(), force_, supported_ ? ObjectSupport::kAtRest : ObjectSupport::kHand);
   findings_.xi_dot_model = prediction.xi_dot;
+  findings_.V_Bo_dot_model = prediction.V_Bo_dot;
   part->grasp.Scatter(prediction.f_c, findings_.f_c_model);
   mass_factor_ = &part->dynamics.mass_factor();
 }

@@ -37,6 +37,12 @@ class StepChecks {
 
   /// Compares one step, whose response was read.
   void Compare(const StepRecord& step);
+  /// Adds the value of a check that others measure.
+  void Add(StepCheck which, double value, double time) { check(which).Add(value, time); }
+  /// Takes checks out that this run cannot answer.
+  void LeaveOut(StepCheck which) { check(which).applies = false; }
+  /// M_bar' = L^T L of the last step that was judged; null before.
+  [[nodiscard]] const TreeFactor* mass_factor() const { return mass_factor_; }
 
   /// Adds the largest |tau'| / limit of a motor: before the step, which does not come when that is above 1.
   void JudgeEffort(double effort, double time) { check(StepCheck::kActuators).Add(effort, time); }

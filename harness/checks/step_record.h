@@ -35,6 +35,7 @@ struct StepFindings {
   /// What the rigid constrained system (19), (46), (48) does under the same torques: xi_dot (n) and f_c (3N)
   /// of the last step that was predicted.
   VectorXd xi_dot_model, f_c_model;
+  Vector6d V_Bo_dot_model = Vector6d::Zero();  ///< Likewise of the object, Sigma_o.
   std::vector<SlipState> fingertip_slip, wheel_slip;
 
   // Of all steps so far.

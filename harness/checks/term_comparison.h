@@ -14,6 +14,8 @@ class TermComparison {
  public:
   /// One for each term asked, in the table's order.
   [[nodiscard]] std::span<const CheckRecord> records() const { return records_; }
+  /// Both sides' numbers at the last state.
+  [[nodiscard]] const TermContext& context() const { return context_; }
 
  protected:
   explicit TermComparison(const Adapter& adapter);

@@ -125,8 +125,9 @@ class Page {
       const char* name;
       const char* text;
     };
-    static constexpr std::array<Question, 4> kQuestions = {
+    static constexpr std::array<Question, 5> kQuestions = {
         {{CheckKind::kModel, "Model", "same state, both descriptions"},
+         {CheckKind::kLaw, "Law", "torques against (53)-(55)"},
          {CheckKind::kBalance, "Balance", "engine's motion in the model's equations"},
          {CheckKind::kPrediction, "Prediction", "accelerations and contact forces"},
          {CheckKind::kAssumption, "Assumptions", "no slip, level base, forces in cones"}}};

@@ -12,6 +12,8 @@ const char* AskQuestion(CheckKind kind) {
   switch (kind) {
     case CheckKind::kModel:
       return "Model: both descriptions at the same state";
+    case CheckKind::kLaw:
+      return "Law: torques against (53)-(55), and what they do";
     case CheckKind::kBalance:
       return "Balance: the engine's motion and forces in the model's equations";
     case CheckKind::kPrediction:
@@ -56,8 +58,8 @@ Figure MakeFigure(const RunData& run, CheckKind kind) {
 
 std::vector<Figure> MakeResidualFigures(const RunData& run) {
   std::vector<Figure> figures;
-  for (const CheckKind kind :
-       {CheckKind::kModel, CheckKind::kBalance, CheckKind::kPrediction, CheckKind::kAssumption}) {
+  for (const CheckKind kind : {CheckKind::kModel, CheckKind::kLaw, CheckKind::kBalance,
+                               CheckKind::kPrediction, CheckKind::kAssumption}) {
     Figure figure = MakeFigure(run, kind);
     if (!figure.curves.empty()) figures.push_back(std::move(figure));
   }

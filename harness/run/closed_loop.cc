@@ -150,6 +150,7 @@ void ClosedLoop::Step() {
     const auto begin = Clock::now();
     checks_->CompareModel(record_);
     checks_->CompareMotion(record_);
+    checks_->CompareLaw(record_);
     record_.findings = checks_->findings();
     times_.cross_check += Seconds(begin, Clock::now());
   }

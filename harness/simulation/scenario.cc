@@ -211,6 +211,16 @@ void ReadControl(const TomlValue& value, Scenario* scenario) {
   table.RejectUnused();
 }
 
+void ReadExpectation(const TomlValue& value, Expectation* expect) {
+  TomlTable table = value.AsTable();
+  if (const auto position = table.Find("position")) expect->position = position->AsPositive();
+  if (const auto [orientation, unit] = table.FindWithAngleUnit("orientation"); orientation) {
+    expect->orientation = unit * orientation->AsPositive();
+  }
+  expect->from = ReadOr(table, "from", 0.0, &TomlValue::AsNotNegative);
+  table.RejectUnused();
+}
+
 }  // namespace
 
 Scenario ParseScenario(const std::string& text, const std::string& source,
@@ -223,7 +233,7 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   const TomlDocument document = OpenDocument(text, source, overrides, &model_overrides);
   TomlTable root = document.Open();
   root.RejectOthersThan({"name", "description", "duration", "settle", "start", "start_error", "model",
-                         "plant", "grasp", "task", "trajectory", "control", "bounds"});
+                         "plant", "grasp", "task", "trajectory", "control", "bounds", "expect"});
   scenario.name = root.Get("name").AsName();
   if (const auto description = root.Find("description")) scenario.description = description->AsText();
   scenario.duration = root.Get("duration").AsPositive();
@@ -250,6 +260,7 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
       scenario.bounds.emplace_back(name, value.AsNotNegative());
     }
   }
+  if (const auto expect = root.Find("expect")) ReadExpectation(*expect, &scenario.expect);
   if (scenario.duration < scenario.plant.time_step)
     root.Get("duration").Fail("must be at least one time step");
   if (scenario.duration / scenario.plant.time_step > kMaxSteps) {

@@ -71,6 +71,13 @@ struct TaskOptions {
   PickAndPlaceOptions pick_and_place;
 };
 
+/// How well the object must follow, which belongs to what the scenario means. From `from` on, s.
+struct Expectation {
+  std::optional<double> position;     ///< Largest position error, m.
+  std::optional<double> orientation;  ///< Largest orientation error, rad.
+  double from = 0.0;
+};
+
 /// One bound that a scenario sets for a check by name.
 using BoundOverride = std::pair<std::string, double>;
 
@@ -92,6 +99,7 @@ struct Scenario {
   std::optional<TaskOptions> task;  ///< Instead of a trajectory; the grasp's contacts are then planned.
   ControlOptions control;
   std::vector<BoundOverride> bounds;
+  Expectation expect;
   std::uint64_t seed = 0;  ///< Of random changes to posture and grasp; 0 for none.
 
   std::string text;                    ///< The file.

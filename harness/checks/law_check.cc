@@ -1,0 +1,166 @@
+#include "harness/checks/law_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+
+namespace dexcheck {
+namespace {
+
+// A barrier solution is optimal to the solver's tolerance of the slacks; near a cone's edge its slope follows
+// with ten times that.
+constexpr double kSlopePerSlack = 10.0;
+// F_N = f_c - G^+ F_o has the residual of f_c and the rounding of G^+.
+constexpr double kLeastNullTolerance = 1e-9;
+// Torques that differ by more than this, relative, tell which part is wrong; less is rounding.
+constexpr double kTellingDifference = 1e-9;
+
+}  // namespace
+
+double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold) {
+  const double h = static_cast<double>(hold);
+  double radius = 0.0;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    // u = -(K_v v + K_p e) is held for h steps: v_h = v + h dt u, e_h = e + h dt v + h (h + 1) / 2 dt^2 u.
+    const double b_v = h * time_step;
+    const double b_e = 0.5 * h * (h + 1.0) * time_step * time_step;
+    Matrix2d A;
+    A << 1.0 - b_v * gains.K_v[i], -b_v * gains.K_p[i], b_v - b_e * gains.K_v[i], 1.0 - b_e * gains.K_p[i];
+    const double half = 0.5 * A.trace();
+    const std::complex<double> root = std::sqrt(std::complex<double>(half * half - A.determinant()));
+    const double largest = std::max(std::abs(half + root), std::abs(half - root));
+    radius = std::max(radius, std::isnan(largest) ? std::numeric_limits<double>::infinity() : largest);
+  }
+  return std::pow(radius, 1.0 / h);
+}
+
+LawCheck::LawCheck(const Setup& setup)
+    : spec_(MakeLawSpec(setup.MakeControllerOptions())),
+      time_step_(setup.scenario().plant.time_step),
+      hold_(std::max(1L, std::lround(setup.scenario().plant.control_step / time_step_))),
+      actuation_(setup.model()),
+      reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())) {
+  const GraspControllerOptions options = setup.MakeControllerOptions();
+  mu_ = options.mu;
+  f_min_ = options.f_min;
+  f_max_ = options.f_max;
+  barrier_weight_ = options.force.barrier_weight;
+  slack_tolerance_ = options.force.slack_tolerance;
+  residual_tolerance_ = options.force.residual_tolerance;
+  trajectory_ = setup.scenario().trajectory(setup.X_start() + setup.scenario().start_error);
+  force_.setZero(setup.model().num_velocities());
+  difference_ = force_;
+  slope_.setZero(3 * static_cast<Eigen::Index>(setup.fingertips().size()));
+  column_.setZero(setup.model().num_velocities(), 1);
+}
+
+double LawCheck::sampled_radius() const { return CalcSampledRadius(spec_.gains, time_step_, hold_); }
+
+DesiredMotion LawCheck::EvaluateDesired(double t) const {
+  // Semi-implicit Euler steps like a leapfrog: velocities belong to the middle of the step before.
+  DesiredMotion desired = trajectory_->Evaluate(t);
+  desired.X_d_dot = trajectory_->Evaluate(t - 0.5 * time_step_).X_d_dot;
+  return desired;
+}
+
+double LawCheck::Norm(const VectorXd& force) {
+  // |f|_M^-1 = |L^-T f|
+  column_ = force;
+  mass_factor_->SolveTransposed(column_);
+  return column_.norm();
+}
+
+const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& findings,
+                                   const LawTerms& terms, const TreeFactor& mass_factor) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  mass_factor_ = &mass_factor;
+  const DesiredMotion desired = EvaluateDesired(step.time);
+  errors_ = LawErrors{};
+  if (!reference_.Evaluate(spec_, terms, desired, step.command.demand.F_N)) {
+    errors_ = {kInfinity, kInfinity, kInfinity, kInfinity};
+    return errors_;
+  }
+  force_ = terms.C_xi + terms.gravity + terms.friction;
+  scale_ = std::max(Norm(force_), std::numeric_limits<double>::min());
+  CompareTorque(step);
+  CompareDemand(findings);
+  CompareGraspForce(step, terms);
+  if (follows_error()) FollowError(step, findings, terms, desired);
+  return errors_;
+}
+
+double LawCheck::CompareApplied(const StepRecord& step) {
+  return (step.response.motor_torques - step.command.tau).cwiseAbs().maxCoeff() /
+         std::max(step.command.tau.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
+}
+
+void LawCheck::CompareTorque(const StepRecord& step) {
+  actuation_.CalcForce(step.command.tau, force_);
+  difference_ = force_ - reference_.force();
+  const double relative = Norm(difference_) / scale_;
+  errors_.torque = relative / reference_.condition_number();
+  if (relative > kTellingDifference) attribution_.Add(difference_, reference_.parts(), 1.0 / scale_);
+}
+
+void LawCheck::CompareDemand(const StepFindings& findings) {
+  // |a|_M = |L a|
+  difference_ = findings.xi_dot_model - reference_.xi_dot_d();
+  mass_factor_->Multiply(difference_);
+  const double motion = difference_.norm() / scale_;
+  const VectorXd& f_c = reference_.f_c();
+  const double forces =
+      (findings.f_c_model - f_c).norm() / std::max(f_c.norm(), std::numeric_limits<double>::min());
+  errors_.demand = std::max(motion, forces) / reference_.condition_number();
+}
+
+void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms) {
+  const VectorXd& f_c = reference_.f_c();
+  const VectorXd& F_N = step.command.demand.F_N;
+  const double size = std::max(1.0, f_c.norm());
+  const double null =
+      (terms.G * F_N).cwiseAbs().maxCoeff() / size / std::max(residual_tolerance_, kLeastNullTolerance);
+
+  // Slope of sum f_i3 - rho [sum log det P_i + sum log slack]: at the optimum it is in the range of G^T, so
+  // that no internal force improves on F_N.
+  double outside = 0.0;
+  const double rho = barrier_weight_;
+  for (Eigen::Index i = 0; i < f_c.size(); i += 3) {
+    const double x = f_c[i], y = f_c[i + 1], z = f_c[i + 2];
+    const double det = mu_ * mu_ * z * z - x * x - y * y;
+    outside = std::max({outside, std::hypot(x, y) - mu_ * z, f_min_ - z, z - f_max_});
+    slope_.segment<3>(i) << 2.0 * rho * x / det, 2.0 * rho * y / det,
+        1.0 - 2.0 * rho * mu_ * mu_ * z / det - rho / (z - f_min_) + rho / (f_max_ - z);
+  }
+  double slope = 0.0;
+  if (outside <= 0.0) {
+    const double whole = slope_.norm();
+    const Vector6d y = reference_.SolveGrasp(slope_);
+    slope_.noalias() -= terms.G.transpose() * y;
+    slope = slope_.norm() / std::max(whole, 1.0) / (kSlopePerSlack * slack_tolerance_);
+  }
+  errors_.grasp_force = std::max({null, outside / size / kLeastNullTolerance, slope});
+}
+
+void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
+                           const DesiredMotion& desired) {
+  const Matrix3d& R = terms.X_Bo.linear();
+  const Vector3d v = terms.V_Bo.head<3>();
+  if (!follows_) {
+    p_ = terms.X_Bo.translation();
+    p_dot_ = R * v;
+    follows_ = true;
+  }
+  errors_.error_dynamics = (p_ - terms.X_Bo.translation()).norm();
+  // What the engine's object did beyond the rigid prediction, p_ddot = R (v_dot + omega x v).
+  const Vector3d missed = R * (step.response.V_Bo_dot.head<3>() - findings.V_Bo_dot_model.head<3>());
+  const Eigen::Array3d K_v = spec_.gains.K_v.head<3>();
+  const Eigen::Array3d K_p = spec_.gains.K_p.head<3>();
+  const Vector3d p_ddot = desired.X_d_ddot.head<3>() +
+                          (K_v * (desired.X_d_dot.head<3>() - p_dot_).array()).matrix() +
+                          (K_p * (desired.X_d.head<3>() - p_).array()).matrix() + missed;
+  p_dot_ += time_step_ * p_ddot;
+  p_ += time_step_ * p_dot_;
+}
+
+}  // namespace dexcheck

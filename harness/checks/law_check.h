@@ -1,0 +1,92 @@
+#pragma once
+
+// The question about the law: are the torques those of (53)-(55), and do they mean what they should?
+
+#include <memory>
+
+#include "controller/control/actuation.h"
+#include "controller/control/trajectory.h"
+#include "controller/dynamics/tree_factor.h"
+#include "harness/checks/law_attribution.h"
+#include "harness/checks/law_reference.h"
+#include "harness/checks/step_record.h"
+#include "harness/simulation/setup.h"
+
+namespace dexcheck {
+
+/// What one step says of the law. Each is relative to what rounding, or the named tolerance, can explain.
+struct LawErrors {
+  /// |E_bar' (tau' - tau'_printed)| against the forces that the motors balance, both in the metric of the
+  /// robot's inertia, over the condition number of J_B'.
+  double torque = 0.0;
+  /// xi_dot, V_o_dot and f_c of the rigid system (46), (48) under tau' against what (47), (49), (55) demand,
+  /// likewise; forces relative to |f_c|. The largest of them.
+  double demand = 0.0;
+  /// F_N by its certificate: the largest of |G F_N|, of what f_c is outside its cones and bounds, and of the
+  /// slope that the objective has left within null(G), each over its own tolerance.
+  double grasp_force = 0.0;
+  /// Object's position against (57) integrated from t = 0 and driven by the accelerations that the prediction
+  /// missed, m.
+  double error_dynamics = 0.0;
+};
+
+/// Largest magnitude of the eigenvalues of (57), per time step, when velocities are those of the middle of
+/// the step before and the command is held for `hold` steps: 1 and more does not settle. Over all six axes.
+double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold);
+
+/// Computes the printed law at each step, from the engine's terms, from the scenario's gains and from the
+/// scenario's trajectory: nothing of it comes from the controller but F_N, which it may choose.
+class LawCheck {
+ public:
+  /// @param setup of a scenario that is no task.
+  explicit LawCheck(const Setup& setup);
+
+  /// Whether this step's torques are those of (55): not in a task, and not while torques are held.
+  [[nodiscard]] static bool IsJudged(const StepRecord& step) {
+    return !step.command.handling.partial && step.command.force_solves > 0;
+  }
+  /// Of the scenario's gains.
+  [[nodiscard]] double sampled_radius() const;
+  /// Whether the controller computes anew at every step, so that (57) can be integrated beside it.
+  [[nodiscard]] bool follows_error() const { return hold_ == 1; }
+
+  /// @param terms the engine's, at the state that the controller was told.
+  /// @param L factor of M_bar' = L^T L: the check measures in |f|_M^-1 = |L^-T f|.
+  /// @param findings of the same step: what the rigid system does under its torques.
+  const LawErrors& Compare(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
+                           const TreeFactor& mass_factor);
+  /// Largest |tau' received - tau' sent| over the largest |tau'|.
+  [[nodiscard]] static double CompareApplied(const StepRecord& step);
+
+  /// Which part of the law differs, over all steps whose torques did.
+  [[nodiscard]] const LawAttribution& attribution() const { return attribution_; }
+
+ private:
+  [[nodiscard]] DesiredMotion EvaluateDesired(double t) const;
+  void CompareTorque(const StepRecord& step);
+  void CompareDemand(const StepFindings& findings);
+  void CompareGraspForce(const StepRecord& step, const LawTerms& terms);
+  void FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
+                   const DesiredMotion& desired);
+  double Norm(const VectorXd& force);
+
+  LawSpec spec_;
+  double mu_, f_min_, f_max_, barrier_weight_, slack_tolerance_, residual_tolerance_;
+  double time_step_;
+  long hold_;
+  std::unique_ptr<Trajectory> trajectory_;
+  ActuationMap actuation_;
+  LawReference reference_;
+  LawAttribution attribution_;
+  LawErrors errors_;
+  const TreeFactor* mass_factor_ = nullptr;
+  double scale_ = 1.0;
+  VectorXd force_, difference_;        // n
+  VectorXd slope_;                     // k
+  RowMatrixXd column_;                 // n x 1
+  bool follows_ = false;               // whether the two below are set
+  Vector3d p_ = Vector3d::Zero();      // of (57), m
+  Vector3d p_dot_ = Vector3d::Zero();  // m/s, half a step before
+};
+
+}  // namespace dexcheck

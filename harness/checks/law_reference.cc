@@ -1,0 +1,233 @@
+#include "harness/checks/law_reference.h"
+
+#include <cmath>
+
+#include "controller/object/so3.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr unsigned Bit(LawPart part) { return 1U << static_cast<unsigned>(part); }
+
+constexpr unsigned kMotion = Bit(LawPart::kFeedForward) | Bit(LawPart::kVelocityFeedback) |
+                             Bit(LawPart::kPositionFeedback) | Bit(LawPart::kCoordinateRate);
+constexpr unsigned kInertia =
+    kMotion | Bit(LawPart::kGraspMapRate) | Bit(LawPart::kJacobianRate) | Bit(LawPart::kPosture);
+constexpr unsigned kObject =
+    Bit(LawPart::kObjectInertia) | Bit(LawPart::kObjectCoriolis) | Bit(LawPart::kObjectGravity);
+
+constexpr LawPartName kLawParts[] = {
+    {"M_bar' J^+ G^T P^-1 X_d_ddot", "feed-forward acceleration", Bit(LawPart::kFeedForward)},
+    {"M_bar' J^+ G^T P^-1 K_v E_dot", "velocity feedback K_v", Bit(LawPart::kVelocityFeedback)},
+    {"M_bar' J^+ G^T P^-1 K_p E", "position feedback K_p", Bit(LawPart::kPositionFeedback)},
+    {"M_bar' J^+ G^T d/dt(P^-1) X_o_dot", "rate of P^-1", Bit(LawPart::kCoordinateRate)},
+    {"M_bar' J^+ G_dot^T V_o", "G_dot", Bit(LawPart::kGraspMapRate)},
+    {"M_bar' J^+ J_dot xi_c", "J_dot", Bit(LawPart::kJacobianRate)},
+    {"M_bar' N sigma'", "null-space acceleration sigma'", Bit(LawPart::kPosture)},
+    {"C_bar' xi_c", "Coriolis forces C_bar'", Bit(LawPart::kCoriolis)},
+    {"F_bar' (gravity)", "gravity in F_bar'", Bit(LawPart::kGravity)},
+    {"F_bar' (friction)", "friction in F_bar'", Bit(LawPart::kFriction)},
+    {"J^T G^+ M_hat V_o_dot", "object's inertia M_o", Bit(LawPart::kObjectInertia)},
+    {"J^T G^+ C_hat V_o", "object's C_o", Bit(LawPart::kObjectCoriolis)},
+    {"J^T G^+ N_o", "object's gravity N_o", Bit(LawPart::kObjectGravity)},
+    {"J^T F_N", "internal force F_N", Bit(LawPart::kInternalForce)},
+    {"M_bar' xi_dot_d", "mass matrix M_bar'", kInertia},
+    {"M_bar' J^+ (...)", "acceleration without the null space", kInertia & ~Bit(LawPart::kPosture)},
+    {"M_bar' J^+ G^T V_o_dot", "demanded acceleration V_o_dot", kMotion},
+    {"M_bar' J^+ G^T P^-1 (K_v E_dot + K_p E)", "feedback of both gains",
+     Bit(LawPart::kVelocityFeedback) | Bit(LawPart::kPositionFeedback)},
+    {"F_bar'", "gravity and friction F_bar'", Bit(LawPart::kGravity) | Bit(LawPart::kFriction)},
+    {"J^T G^+ F_o", "object's wrench G^+ F_o", kObject},
+    {"J^T f_c", "contact forces J_B'^T f_c", kObject | Bit(LawPart::kInternalForce)},
+    {"tau'", "all torques", (1U << kLawPartCount) - 1U},
+};
+
+/// Body angular velocity by the rates of ZYZ angles: omega = B [alpha_dot; beta_dot; gamma_dot], R = R_z R_y
+/// R_z.
+Matrix3d CalcAngleMap(const Vector3d& angles) {
+  const double sb = std::sin(angles[1]), cb = std::cos(angles[1]);
+  const double sg = std::sin(angles[2]), cg = std::cos(angles[2]);
+  Matrix3d B;
+  B << -sb * cg, sg, 0.0, sb * sg, cg, 0.0, cb, 0.0, 1.0;
+  return B;
+}
+
+/// Its rate.
+Matrix3d CalcAngleMapRate(const Vector3d& angles, const Vector3d& rates) {
+  const double sb = std::sin(angles[1]), cb = std::cos(angles[1]);
+  const double sg = std::sin(angles[2]), cg = std::cos(angles[2]);
+  const double b = rates[1], g = rates[2];
+  Matrix3d B_dot;
+  B_dot << -cb * cg * b + sb * sg * g, cg * g, 0.0, cb * sg * b + sb * cg * g, -sg * g, 0.0, -sb * b, 0.0,
+      0.0;
+  return B_dot;
+}
+
+}  // namespace
+
+LawSpec MakeLawSpec(const GraspControllerOptions& options) {
+  return {options.gains, options.orientation, options.weight, options.posture};
+}
+
+std::span<const LawPartName> ListLawParts() { return kLawParts; }
+
+LawTerms::LawTerms(int num_positions, int num_velocities, int num_forces) {
+  q.setZero(num_positions);
+  xi.setZero(num_velocities);
+  M.setZero(num_velocities, num_velocities);
+  C_xi.setZero(num_velocities);
+  gravity.setZero(num_velocities);
+  friction.setZero(num_velocities);
+  J.setZero(num_forces, num_velocities);
+  J_dot_xi.setZero(num_forces);
+  G.setZero(6, num_forces);
+  G_dot_T_V.setZero(num_forces);
+  C.setZero(num_velocities, num_velocities);
+  J_dot.setZero(num_forces, num_velocities);
+}
+
+LawReference::LawReference(int num_velocities, int num_forces) : llt_(num_forces), W_llt_(num_velocities) {
+  J_plus_.setZero(num_velocities, num_forces);
+  W_inv_J_T_.setZero(num_velocities, num_forces);
+  A_.setZero(num_forces, num_forces);
+  A_inv_.setZero(num_forces, num_forces);
+  G_.setZero(6, num_forces);
+  rates_.setZero(num_forces);
+  f_c_.setZero(num_forces);
+  xi_c_.setZero(num_velocities);
+  xi_dot_d_.setZero(num_velocities);
+  motion_.setZero(num_velocities);
+  sigma_prime_.setZero(num_velocities);
+  force_.setZero(num_velocities);
+  parts_.setZero(num_velocities, kLawPartCount);
+  demand_.fill(Vector6d::Zero());
+}
+
+bool LawReference::FactorJacobian(const LawSpec& spec, const LawTerms& terms) {
+  // J^+ = W^-1 J^T (J W^-1 J^T)^-1
+  W_inv_J_T_ = terms.J.transpose();
+  if (spec.weight.kind == RedundancyWeight::Kind::kDiagonal) {
+    W_inv_J_T_.array().colwise() /= spec.weight.w.array();
+  } else if (spec.weight.kind == RedundancyWeight::Kind::kMass) {
+    W_llt_.compute(terms.M);
+    W_llt_.solveInPlace(W_inv_J_T_);
+  }
+  A_.noalias() = terms.J * W_inv_J_T_;
+  llt_.compute(A_);
+  if (llt_.info() != Eigen::Success) return false;
+  A_inv_.setIdentity();
+  llt_.solveInPlace(A_inv_);
+  J_plus_.noalias() = W_inv_J_T_ * A_inv_;
+  condition_number_ = std::sqrt(A_.trace() * A_inv_.trace());
+  G_ = terms.G;
+  G_llt_.compute(G_ * G_.transpose());
+  return G_llt_.info() == Eigen::Success && std::isfinite(condition_number_);
+}
+
+Vector6d LawReference::SolveGrasp(const Eigen::Ref<const VectorXd>& f) const { return G_llt_.solve(G_ * f); }
+
+void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawTerms& terms,
+                                          const DesiredMotion& desired) {
+  const Matrix3d R_T = terms.X_Bo.linear().transpose();
+  const Vector3d v = terms.V_Bo.head<3>();
+  const Vector3d omega = terms.V_Bo.tail<3>();
+  auto& [feed_forward, velocity, position, rate] = demand_;
+
+  // v = R^T p_dot, hence v_dot = R^T p_ddot - omega x v
+  const Vector3d p_dot = R_T.transpose() * v;
+  const auto K_v = spec.gains.K_v.array();
+  const auto K_p = spec.gains.K_p.array();
+  feed_forward.head<3>() = R_T * desired.X_d_ddot.head<3>();
+  velocity.head<3>() = R_T * (K_v.head<3>() * (desired.X_d_dot.head<3>() - p_dot).array()).matrix();
+  position.head<3>() =
+      R_T * (K_p.head<3>() * (desired.X_d.head<3>() - terms.X_Bo.translation()).array()).matrix();
+  rate.head<3>() = -omega.cross(v);
+
+  if (spec.orientation == OrientationFeedback::kAngles) {
+    // omega = B a_dot, hence omega_dot = B a_ddot + B_dot a_dot
+    const Vector3d angles = terms.X_o.tail<3>();
+    const Matrix3d B = CalcAngleMap(angles);
+    const Vector3d angle_rates = B.inverse() * omega;
+    feed_forward.tail<3>() = B * desired.X_d_ddot.tail<3>();
+    velocity.tail<3>() = B * (K_v.tail<3>() * (desired.X_d_dot.tail<3>() - angle_rates).array()).matrix();
+    position.tail<3>() = B * (K_p.tail<3>() * (desired.X_d.tail<3>() - angles).array()).matrix();
+    rate.tail<3>() = CalcAngleMapRate(angles, angle_rates) * angle_rates;
+  } else {
+    // e_R = log(R_Bo^T R_Bd) obeys (57). omega_dot is affine in e_R_ddot: its parts by that of each summand.
+    const DesiredPose pose = CalcDesiredPose(desired);
+    const OrientationError error = CalcOrientationError(terms.X_Bo.linear(), omega, pose.R_Bd, pose.omega_d);
+    const auto accelerate = [&](const Vector3d& omega_d_dot, const Vector3d& e_R_ddot) {
+      return CalcAngularAcceleration(error, pose.omega_d, omega_d_dot, e_R_ddot);
+    };
+    const Vector3d zero = Vector3d::Zero();
+    const Vector3d bias = accelerate(zero, zero);
+    rate.tail<3>() = bias;
+    feed_forward.tail<3>() = accelerate(pose.omega_d_dot, zero) - bias;
+    velocity.tail<3>() = accelerate(zero, -(K_v.tail<3>() * error.e_R_dot.array()).matrix()) - bias;
+    position.tail<3>() = accelerate(zero, -(K_p.tail<3>() * error.e_R.array()).matrix()) - bias;
+  }
+  V_Bo_dot_ = feed_forward + velocity + position + rate;
+}
+
+void LawReference::AddMotionPart(LawPart part, const LawTerms& terms,
+                                 const Eigen::Ref<const VectorXd>& rates) {
+  motion_.noalias() = J_plus_ * rates;
+  xi_dot_d_ += motion_;
+  parts_.col(static_cast<Eigen::Index>(part)).noalias() = terms.M * motion_;
+}
+
+bool LawReference::Evaluate(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired,
+                            const Eigen::Ref<const VectorXd>& F_N) {
+  if (!FactorJacobian(spec, terms)) return false;
+  CalcObjectAcceleration(spec, terms, desired);
+  const auto part = [&](LawPart which) { return parts_.col(static_cast<Eigen::Index>(which)); };
+
+  // xi_c = xi - J^+ (J xi - G^T V_o)
+  rates_.noalias() = terms.J * terms.xi;
+  rates_.noalias() -= terms.G.transpose() * terms.V_Bo;
+  xi_c_.noalias() = -J_plus_ * rates_;  // less xi
+
+  // xi_dot_d = J^+ (G^T V_o_dot + G_dot^T V_o - J_dot xi_c) + N sigma'
+  xi_dot_d_.setZero();
+  for (size_t i = 0; i < demand_.size(); ++i) {
+    rates_.noalias() = terms.G.transpose() * demand_[i];
+    AddMotionPart(static_cast<LawPart>(i), terms, rates_);
+  }
+  AddMotionPart(LawPart::kGraspMapRate, terms, terms.G_dot_T_V);
+  rates_ = -terms.J_dot_xi;
+  rates_.noalias() -= terms.J_dot * xi_c_;
+  AddMotionPart(LawPart::kJacobianRate, terms, rates_);
+
+  // sigma' = acceleration + damping (xi_reference - xi) + stiffness [0; q_posture - q]
+  const PostureTask& posture = spec.posture;
+  const Eigen::Index joints = posture.q_posture.size();
+  sigma_prime_ = posture.acceleration + posture.damping.cwiseProduct(posture.xi_reference - terms.xi);
+  sigma_prime_.tail(joints) += posture.stiffness.cwiseProduct(posture.q_posture - terms.q.tail(joints));
+  rates_.noalias() = terms.J * sigma_prime_;
+  motion_ = sigma_prime_;
+  motion_.noalias() -= J_plus_ * rates_;
+  xi_dot_d_ += motion_;
+  part(LawPart::kPosture).noalias() = terms.M * motion_;
+
+  part(LawPart::kCoriolis) = terms.C_xi;
+  part(LawPart::kCoriolis).noalias() += terms.C * xi_c_;
+  part(LawPart::kGravity) = terms.gravity;
+  part(LawPart::kFriction) = terms.friction;
+
+  // f_c = G^+ F_o + F_N, G^+ = G^T (G G^T)^-1
+  f_c_ = F_N;
+  const auto add_wrench = [&](LawPart which, const Vector6d& wrench) {
+    rates_.noalias() = G_.transpose() * G_llt_.solve(wrench);
+    f_c_ += rates_;
+    part(which).noalias() = terms.J.transpose() * rates_;
+  };
+  add_wrench(LawPart::kObjectInertia, terms.M_hat * V_Bo_dot_);
+  add_wrench(LawPart::kObjectCoriolis, terms.C_hat_V);
+  add_wrench(LawPart::kObjectGravity, terms.N_o);
+  part(LawPart::kInternalForce).noalias() = terms.J.transpose() * F_N;
+
+  force_ = parts_.rowwise().sum();
+  return true;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,134 @@
+#pragma once
+
+// The printed law (53)-(55), computed a second time: with dense matrices, straight from the formulas, and
+// from terms that another side evaluated. It shares no code with controller/control, so that a mistake there
+// is seen.
+//
+//   X_o_ddot = X_d_ddot + K_v (X_d_dot - X_o_dot) + K_p (X_d - X_o)                 the last bracket of (55)
+//   V_o_dot  = P^-1 X_o_ddot + d/dt(P^-1) X_o_dot
+//   xi_c     = xi - J^+ (J xi - G^T V_o)                                            (47) with sigma = xi
+//   xi_dot_d = J^+ (G_dot^T V_o + G^T V_o_dot - J_dot xi_c) + N sigma'              (47)
+//   f_c      = G^+ (M_hat V_o_dot + C_hat V_o + N_o) + F_N                          (49)
+//   E_bar' tau' = M_bar' xi_dot_d + C_bar' xi_c + F_bar' + J^T f_c                  (55)
+//
+// Every summand is kept by itself, as generalised forces, so that a difference of torques can be told as one
+// of them.
+
+#include <Eigen/Cholesky>
+#include <array>
+
+#include "controller/common/types.h"
+#include "controller/control/computed_torque.h"
+#include "controller/control/desired_motion.h"
+#include "controller/control/grasp_controller.h"
+#include "controller/control/object_tracking.h"
+#include "controller/control/posture_task.h"
+
+namespace dexcheck {
+
+/// Robot, object and contacts at one state, by either side. n entries of xi, k = 3N of f_c; contact forces
+/// and J in each Sigma_cf, the object in Sigma_o.
+struct LawTerms {
+  VectorXd q, xi;              ///< q' (p'), xi (n).
+  MatrixXd M;                  ///< M_bar' (n x n).
+  VectorXd C_xi;               ///< C_bar' xi (n).
+  VectorXd gravity, friction;  ///< n; F_bar' is their sum.
+  MatrixXd J;                  ///< J_B' (k x n).
+  VectorXd J_dot_xi;           ///< k.
+  Matrix6Xd G;                 ///< 6 x k.
+  VectorXd G_dot_T_V;          ///< G_dot^T V_Bo (k).
+  Pose X_Bo = Pose::Identity();
+  Vector6d V_Bo = Vector6d::Zero();
+  Vector6d X_o = Vector6d::Zero();  ///< Of X_Bo, on the law's branch of the angles; kAngles only.
+  Matrix6d M_hat = Matrix6d::Zero();
+  Vector6d C_hat_V = Vector6d::Zero();
+  Vector6d N_o = Vector6d::Zero();
+  /// C_bar' (n x n) and J_B_dot' (k x n) multiply only xi - xi_c here, which is zero where nothing slips.
+  MatrixXd C, J_dot;
+
+  /// Sizes all members.
+  LawTerms(int num_positions, int num_velocities, int num_forces);
+};
+
+/// What the law is meant to be.
+struct LawSpec {
+  ObjectGains gains;
+  OrientationFeedback orientation = OrientationFeedback::kAngles;
+  RedundancyWeight weight;
+  PostureTask posture;
+};
+
+/// Of the scenario's law.
+LawSpec MakeLawSpec(const GraspControllerOptions& options);
+
+/// The summands of E_bar' tau'.
+enum class LawPart {
+  kFeedForward,       ///< M_bar' J^+ G^T P^-1 X_d_ddot
+  kVelocityFeedback,  ///< M_bar' J^+ G^T P^-1 K_v E_dot
+  kPositionFeedback,  ///< M_bar' J^+ G^T P^-1 K_p E
+  kCoordinateRate,    ///< M_bar' J^+ G^T d/dt(P^-1) X_o_dot; with rotation feedback what e_R's rates leave
+  kGraspMapRate,      ///< M_bar' J^+ G_dot^T V_o
+  kJacobianRate,      ///< - M_bar' J^+ J_dot xi_c
+  kPosture,           ///< M_bar' N sigma'
+  kCoriolis,          ///< C_bar' xi_c
+  kGravity,           ///< gravity's part of F_bar'
+  kFriction,          ///< friction's part of F_bar'
+  kObjectInertia,     ///< J^T G^+ M_hat V_o_dot
+  kObjectCoriolis,    ///< J^T G^+ C_hat V_o
+  kObjectGravity,     ///< J^T G^+ N_o
+  kInternalForce,     ///< J^T F_N
+  kCount
+};
+inline constexpr int kLawPartCount = static_cast<int>(LawPart::kCount);
+
+/// One summand, or several that are one thing, with the words that name it.
+struct LawPartName {
+  const char* symbol;
+  const char* name;
+  unsigned parts;  ///< Bits by LawPart.
+};
+/// Single summands first, then sums: whoever finds two equally good takes the first.
+std::span<const LawPartName> ListLawParts();
+
+/// The law at one state. Nothing allocates after construction.
+class LawReference {
+ public:
+  LawReference(int num_velocities, int num_forces);
+
+  /// @param F_N (k) internal force chosen by the law's optimisation. @param desired X_d and its rates.
+  /// @returns false when J or G has not full row rank.
+  bool Evaluate(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired,
+                const Eigen::Ref<const VectorXd>& F_N);
+
+  /// E_bar' tau' (n), and its summands (n x kLawPartCount).
+  [[nodiscard]] const VectorXd& force() const { return force_; }
+  [[nodiscard]] const MatrixXd& parts() const { return parts_; }
+  [[nodiscard]] const Vector6d& V_Bo_dot() const { return V_Bo_dot_; }
+  [[nodiscard]] const VectorXd& xi_dot_d() const { return xi_dot_d_; }
+  [[nodiscard]] const VectorXd& f_c() const { return f_c_; }
+  [[nodiscard]] const VectorXd& sigma_prime() const { return sigma_prime_; }
+  /// Bound on the condition number of J W^-1/2: sqrt(trace(A) trace(A^-1)) of A = J W^-1 J^T.
+  [[nodiscard]] double condition_number() const { return condition_number_; }
+  /// (G G^T)^-1 G f (k -> 6): the wrench-free part of f is f - G^T of this.
+  [[nodiscard]] Vector6d SolveGrasp(const Eigen::Ref<const VectorXd>& f) const;
+
+ private:
+  [[nodiscard]] bool FactorJacobian(const LawSpec& spec, const LawTerms& terms);
+  void CalcObjectAcceleration(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired);
+  void AddMotionPart(LawPart part, const LawTerms& terms, const Eigen::Ref<const VectorXd>& rates);
+
+  MatrixXd J_plus_;     // n x k
+  MatrixXd W_inv_J_T_;  // n x k
+  MatrixXd A_, A_inv_;  // k x k
+  Eigen::LLT<MatrixXd> llt_, W_llt_;
+  Eigen::LLT<Matrix6d> G_llt_;
+  Matrix6Xd G_;
+  std::array<Vector6d, 4> demand_;  // summands of V_o_dot
+  Vector6d V_Bo_dot_ = Vector6d::Zero();
+  VectorXd rates_, f_c_;                                     // k
+  VectorXd xi_c_, xi_dot_d_, motion_, sigma_prime_, force_;  // n
+  MatrixXd parts_;
+  double condition_number_ = 0.0;
+};
+
+}  // namespace dexcheck
