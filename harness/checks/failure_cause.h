@@ -5,14 +5,15 @@ namespace dexcheck {
 /// What a disagreement of model and engine comes from.
 enum class Cause {
   kNone,
-  kModel,            ///< The two descriptions differ: constants, kinematics, dynamics, contact geometry.
-  kSensing,          ///< The controller was told what is not so.
-  kControlLaw,       ///< The torques are not those of the law, or the law with these gains does not do what is expected.
-  kActuator,         ///< The motors gave other torques than were sent.
-  kActuatorLimit,    ///< A motor could not give its torque.
-  kJointStop,        ///< A joint reached the end of its range.
-  kFingertipSlip,    ///< A fingertip slides: its force is at the edge of the friction cone.
-  kWheelSlip,        ///< A wheel slides: assumption (1), rolling without slipping.
+  kModel,          ///< The two descriptions differ: constants, kinematics, dynamics, contact geometry.
+  kSensing,        ///< The controller was told what is not so.
+  kControlLaw,     ///< The torques are not those of the law, or the law with these gains does not do what is
+                   ///< expected.
+  kActuator,       ///< The motors gave other torques than were sent.
+  kActuatorLimit,  ///< A motor could not give its torque.
+  kJointStop,      ///< A joint reached the end of its range.
+  kFingertipSlip,  ///< A fingertip slides: its force is at the edge of the friction cone.
+  kWheelSlip,      ///< A wheel slides: assumption (1), rolling without slipping.
   kContactSoftness,  ///< Contacts give or creep without sliding.
   kTilt,             ///< The platform does not stay level.
   kSolver,           ///< The engine's solver stopped before its forces fit its motion.

@@ -1,5 +1,6 @@
 #include "harness/checks/law_attribution.h"
 
+#include <cmath>
 #include <cstdio>
 
 namespace dexcheck {
@@ -7,8 +8,10 @@ namespace {
 
 // What a summand explains less well than this is not its doing.
 constexpr double kExplains = 0.98;
+// A factor nearer to zero than this is one of a part that is missing.
+constexpr double kZero = 1e-6;
 // Two explanations that differ by less are equally good.
-constexpr double kSame = 1e-6;
+constexpr double kSame = 1e-10;
 
 }  // namespace
 
@@ -40,7 +43,8 @@ LawFinding LawAttribution::FindOne() const {
 
 std::string LawAttribution::Tell() const {
   if (!has_any()) return {};
-  const LawFinding found = FindOne();
+  LawFinding found = FindOne();
+  if (std::abs(found.factor) < kZero) found.factor = 0.0;
   char text[256];
   if (found.explained < kExplains) {
     std::snprintf(text, sizeof(text),

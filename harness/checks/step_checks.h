@@ -73,6 +73,8 @@ class StepChecks {
   void Predict(const StepRecord& step);
   void PredictPart(const StepRecord& step);
   void CompareDynamics(const StepRecord& step);
+  /// Adds a change, relative, to what contacts give; see kGive.
+  void AddGive(double change, double* give) const;
   void CompareObject(const StepRecord& step);
   void ReadSlip(const StepRecord& step);
   void ForgetSlip();
@@ -103,8 +105,11 @@ class StepChecks {
   long steps_ = 0;
   double time_step_ = 0.0;
   double time_ = 0.0;
-  VectorXd force_, bias_, residual_;  // n
-  RowMatrixXd column_;                // n x 1
+  VectorXd force_, bias_, residual_;    // n
+  VectorXd force_before_, f_c_before_;  // n, 3N: of the last step that was judged; empty before
+  double robot_give_ = 0.0;  // what contacts give for changes of E_bar' tau', relative as balance_robot
+  double force_give_ = 0.0;  // likewise of f_c, relative as contact_force
+  RowMatrixXd column_;       // n x 1
 };
 
 }  // namespace dexcheck

@@ -39,7 +39,7 @@ INSTANTIATE_TEST_SUITE_P(
               {"duration=0.2", "model.template.arm.links.forearm.shapes.0.radius=0.036"},
               Cause::kModel},
         Fault{"link_length", "curve", {"duration=0.2", "model.lengths.L_7=0.2503"}, Cause::kModel},
-        Fault{"misplaced_contact", "curve", {"duration=0.2", "control.contact_error_deg=2"}, Cause::kModel},
+        Fault{"misplaced_contact", "curve", {"duration=0.2", "control.contact_error_deg=2"}, Cause::kSensing},
         Fault{"low_fingertip_friction",
               "curve",
               {"duration=1", "plant.finger_friction=0.18"},
