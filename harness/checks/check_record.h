@@ -12,7 +12,7 @@
 namespace dexcheck {
 
 /// Which of the harness's five questions a check answers.
-enum class CheckKind { kModel, kLaw, kBalance, kPrediction, kAssumption };
+enum class CheckKind { kModel, kBalance, kPrediction, kAssumption, kLaw };
 
 /// "model", "law", "balance", "prediction" or "assumption".
 const char* NameOf(CheckKind kind);

@@ -5,6 +5,8 @@
 #include <complex>
 #include <limits>
 
+#include "harness/checks/step_check_table.h"
+
 namespace dexcheck {
 namespace {
 
@@ -13,6 +15,9 @@ namespace {
 constexpr double kSlopePerSlack = 10.0;
 // F_N = f_c - G^+ F_o has the residual of f_c and the rounding of G^+.
 constexpr double kLeastNullTolerance = 1e-9;
+// What slip changes in accelerations and forces, over the condition number, against the forces that it
+// changes.
+constexpr double kSlipShare = 10.0;
 // Torques that differ by more than this, relative, tell which part is wrong; less is rounding.
 constexpr double kTellingDifference = 1e-9;
 
@@ -111,7 +116,10 @@ void LawCheck::CompareDemand(const StepFindings& findings) {
   const VectorXd& f_c = reference_.f_c();
   const double forces =
       (findings.f_c_model - f_c).norm() / std::max(f_c.norm(), std::numeric_limits<double>::min());
-  errors_.demand = std::max(motion, forces) / reference_.condition_number();
+  // Where contacts slip, (47) plans for xi_c and the rigid system starts from xi.
+  const double kappa = reference_.condition_number();
+  const double slip = (Norm(reference_.slip_coriolis()) + Norm(reference_.slip_inertia())) / scale_;
+  errors_.demand = std::max(0.0, std::max(motion, forces) / kappa - kSlipShare * slip);
 }
 
 void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms) {
@@ -139,7 +147,8 @@ void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms) 
     slope_.noalias() -= terms.G.transpose() * y;
     slope = slope_.norm() / std::max(whole, 1.0) / (kSlopePerSlack * slack_tolerance_);
   }
-  errors_.grasp_force = std::max({null, outside / size / kLeastNullTolerance, slope});
+  // All in units of the slope's tolerance, so that one bound holds.
+  errors_.grasp_force = kGraspForceBound * std::max({null, outside / size / kLeastNullTolerance, slope});
 }
 
 void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,

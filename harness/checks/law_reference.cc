@@ -94,6 +94,8 @@ LawReference::LawReference(int num_velocities, int num_forces) : llt_(num_forces
   G_.setZero(6, num_forces);
   rates_.setZero(num_forces);
   f_c_.setZero(num_forces);
+  slip_coriolis_.setZero(num_velocities);
+  slip_inertia_.setZero(num_velocities);
   xi_c_.setZero(num_velocities);
   xi_dot_d_.setZero(num_velocities);
   motion_.setZero(num_velocities);
@@ -194,6 +196,10 @@ bool LawReference::Evaluate(const LawSpec& spec, const LawTerms& terms, const De
     AddMotionPart(static_cast<LawPart>(i), terms, rates_);
   }
   AddMotionPart(LawPart::kGraspMapRate, terms, terms.G_dot_T_V);
+  rates_.noalias() = terms.J_dot * xi_c_;
+  motion_.noalias() = J_plus_ * rates_;
+  slip_inertia_.noalias() = terms.M * motion_;
+  slip_coriolis_.noalias() = terms.C * xi_c_;
   rates_ = -terms.J_dot_xi;
   rates_.noalias() -= terms.J_dot * xi_c_;
   AddMotionPart(LawPart::kJacobianRate, terms, rates_);
@@ -210,7 +216,7 @@ bool LawReference::Evaluate(const LawSpec& spec, const LawTerms& terms, const De
   part(LawPart::kPosture).noalias() = terms.M * motion_;
 
   part(LawPart::kCoriolis) = terms.C_xi;
-  part(LawPart::kCoriolis).noalias() += terms.C * xi_c_;
+  part(LawPart::kCoriolis) += slip_coriolis_;
   part(LawPart::kGravity) = terms.gravity;
   part(LawPart::kFriction) = terms.friction;
 

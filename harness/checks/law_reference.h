@@ -109,6 +109,10 @@ class LawReference {
   [[nodiscard]] const VectorXd& sigma_prime() const { return sigma_prime_; }
   /// Bound on the condition number of J W^-1/2: sqrt(trace(A) trace(A^-1)) of A = J W^-1 J^T.
   [[nodiscard]] double condition_number() const { return condition_number_; }
+  /// C_bar' (xi_c - xi) and M_bar' J^+ J_dot (xi_c - xi) (n): by what (46), (48) differ from (47), (55) where
+  /// contacts slip.
+  [[nodiscard]] const VectorXd& slip_coriolis() const { return slip_coriolis_; }
+  [[nodiscard]] const VectorXd& slip_inertia() const { return slip_inertia_; }
   /// (G G^T)^-1 G f (k -> 6): the wrench-free part of f is f - G^T of this.
   [[nodiscard]] Vector6d SolveGrasp(const Eigen::Ref<const VectorXd>& f) const;
 
@@ -126,6 +130,7 @@ class LawReference {
   std::array<Vector6d, 4> demand_;  // summands of V_o_dot
   Vector6d V_Bo_dot_ = Vector6d::Zero();
   VectorXd rates_, f_c_;                                     // k
+  VectorXd slip_coriolis_, slip_inertia_;                    // n
   VectorXd xi_c_, xi_dot_d_, motion_, sigma_prime_, force_;  // n
   MatrixXd parts_;
   double condition_number_ = 0.0;

@@ -65,11 +65,12 @@ inline constexpr double kTransient = 0.05;
 // Up to kSlipWindow after the start the windows begin there. Joints that do not carry the object are held by
 // stiffness: what moves them does not add up.
 
-// When the forces change by a step, soft contacts first give: the engine lets J qacc = a_ref - R f with R = (1 - d) / d
-// times its estimate of what the contact moves, so about (1 - d) / d of the change is missing at first and comes back
-// within some of the contact's time constants, critically damped. At the start of `offset` it is all of the residual:
-// 1.33e-2, 1.33e-3, 1.33e-4 at d = 0.9, 0.99, 0.999, which is 5.5 (1 - d) / d of the change of E_bar' tau' (the estimate
-// for a wheel that carries the robot is that much too large). kGive times (1 - d) / d is taken off the residuals.
+// When the forces change by a step, soft contacts first give: the engine lets J qacc = a_ref - R f with R =
+// (1 - d) / d times its estimate of what the contact moves, so about (1 - d) / d of the change is missing at
+// first and comes back within some of the contact's time constants, critically damped. At the start of
+// `offset` it is all of the residual: 1.33e-2, 1.33e-3, 1.33e-4 at d = 0.9, 0.99, 0.999, which is 5.5 (1 - d)
+// / d of the change of E_bar' tau' (the estimate for a wheel that carries the robot is that much too large).
+// kGive times (1 - d) / d is taken off the residuals.
 inline constexpr double kGive = 8.0;
 
 /// Distances are judged from a place between half of this and this ago, s.
@@ -84,10 +85,12 @@ inline constexpr double kSideways = 0.1;
 // pseudoinverses of (47), (49) multiply that by the condition number, which is divided out, and are formed
 // from Gram matrices, which have its square. Measured 6e-16 in `curve`, on a condition number of some tens.
 inline constexpr double kLawTorqueBound = 1e-12;
-// Where contacts creep, (47) plans for xi_c and the rigid system starts from xi: C_bar' (xi - xi_c) and
+// Where contacts slip, (47) plans for xi_c and the rigid system starts from xi: C_bar' (xi - xi_c) and
 // J_dot (xi - xi_c) stay, slip speeds of some 1e-6 m/s against rates of the order of 1/s: measured 8e-10 in
 // `curve`.
 inline constexpr double kLawDemandBound = 1e-8;
+// Slope of the grasp-force objective, relative: ten times the tolerance of the solver's slacks.
+inline constexpr double kGraspForceBound = 1e-4;
 // A torque goes through the gear's ratio once and back: two roundings.
 inline constexpr double kTorqueAppliedBound = 1e-14;
 // What law_demand leaves, over K_p: measured 1.2e-9 m in `curve`.
@@ -173,7 +176,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "grasp_force",
      .kind = CheckKind::kLaw,
      .unit = "1",
-     .bound = 1.0,
+     .bound = kGraspForceBound,
      .description = "F_N by its certificate: in null(G), in the cones, optimal; each over its tolerance",
      .meaning = {.cause = Cause::kControlLaw, .precedence = 18, .is_own = true, .rank = Rank::kLaw}},
     {.check = StepCheck::kTorqueApplied,

@@ -256,19 +256,19 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
     AddGive(norm(bias_) / scale, &robot_give_);
   }
   force_before_ = force_;
-  Add(StepCheck::kBalanceRobot, std::max(0.0, balance - robot_give_));
+  AddLessGive(StepCheck::kBalanceRobot, balance, robot_give_);
 
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
   mass_factor_->Multiply(residual_);
-  Add(StepCheck::kReducedAcceleration, std::max(0.0, residual_.norm() / scale - robot_give_));
+  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale, robot_give_);
   double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) force_scale = std::max(force_scale, Weight());
   const VectorXd& f_c = findings_.f_c_model;
   if (f_c_before_.size() == f_c.size()) AddGive((f_c - f_c_before_).norm() / force_scale, &force_give_);
   f_c_before_ = f_c;
-  Add(StepCheck::kContactForce, std::max(0.0, (f_c - findings_.f_c).norm() / force_scale - force_give_));
+  AddLessGive(StepCheck::kContactForce, (f_c - findings_.f_c).norm() / force_scale, force_give_);
 }
 
 void StepChecks::AddGive(double change, double* give) const {
@@ -276,6 +276,11 @@ void StepChecks::AddGive(double change, double* give) const {
   const double constant = plant.contact_time_constant > 0.0 ? plant.contact_time_constant : 2.0 * time_step_;
   *give *= std::exp(-0.5 * time_step_ / constant);
   *give += kGive * (1.0 - plant.contact_impedance) / plant.contact_impedance * change;
+}
+
+void StepChecks::AddLessGive(StepCheck which, double residual, double give) {
+  Add(which,
+      std::isnan(residual) ? residual : std::max(std::min(residual, check(which).bound), residual - give));
 }
 
 double StepChecks::Weight() const { return setup_->object().body.mass * setup_->model().gravity().norm(); }

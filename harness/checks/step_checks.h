@@ -75,6 +75,8 @@ class StepChecks {
   void CompareDynamics(const StepRecord& step);
   /// Adds a change, relative, to what contacts give; see kGive.
   void AddGive(double change, double* give) const;
+  /// The residual as it is up to the bound, and above it less what contacts give.
+  void AddLessGive(StepCheck which, double residual, double give);
   void CompareObject(const StepRecord& step);
   void ReadSlip(const StepRecord& step);
   void ForgetSlip();

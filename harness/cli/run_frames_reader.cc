@@ -95,8 +95,8 @@ class FramesReader {
       throw InputError(path_.string() + ": " + signal.name + ": has no attribute " + Quote(name));
     };
     const double kind = attribute("kind");
-    if (!(kind >= 0.0 && kind <= 3.0) || kind != std::floor(kind)) {
-      throw InputError(path_.string() + ": " + signal.name + ": kind must be 0, 1, 2 or 3, got " +
+    if (!(kind >= 0.0 && kind <= 4.0) || kind != std::floor(kind)) {
+      throw InputError(path_.string() + ": " + signal.name + ": kind must be 0, 1, 2, 3 or 4, got " +
                        FormatNumber(kind));
     }
     return {signal.name.substr(std::strlen(kCheckPrefix)), static_cast<CheckKind>(static_cast<int>(kind)),
