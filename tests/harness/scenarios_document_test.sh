@@ -67,8 +67,9 @@ for batch in "${!batches[@]}"; do
   [[ $section != task ]] || base=lift
   arguments=()
   [[ $start == - ]] || arguments+=(--set "$start")
-  # K_p and K_v stand in the place of what paper.toml has.
+  # K_p and K_v, and an angle in degrees, stand in the place of what paper.toml has.
   [[ $section/$number != control/2 ]] || arguments+=(--set "control={ f_max = 50, mu = 0.6 }")
+  [[ $section/$number != expect/2 ]] || arguments+=(--set "expect={ from = 0 }")
   while IFS= read -r assignment; do
     [[ -z $assignment ]] || arguments+=(--set "$assignment")
   done <<<"${batches[$batch]}"
