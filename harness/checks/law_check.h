@@ -34,8 +34,9 @@ struct LawErrors {
 /// the step before and the command is held for `hold` steps: 1 and more does not settle. Over all six axes.
 double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold);
 
-/// Computes the printed law at each step, from the engine's terms, from the scenario's gains and from the
-/// scenario's trajectory: nothing of it comes from the controller but F_N, which it may choose.
+/// Computes the printed law at each step, from the engine's terms, the scenario's gains and the scenario's
+/// trajectory. Of the controller it takes F_N, which the law may choose, X_o's angles on the law's branch (the first
+/// question compares their pose with the engine's), and C_bar', J_B_dot' where they multiply what slips.
 class LawCheck {
  public:
   /// @param setup of a scenario that is no task.
