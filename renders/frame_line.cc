@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "harness/common/interrupts.h"
+#include "harness/base/interrupts.h"
 
 namespace dexcheck {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/common/files.h"
-#include "harness/common/partial_file.h"
+#include "harness/base/files.h"
+#include "harness/base/partial_file.h"
 #include "renders/libav.h"
 #include "renders/png_file.h"
 

@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "controller/common/errors.h"
-#include "harness/common/partial_file.h"
+#include "harness/base/partial_file.h"
 
 namespace dexcheck {
 namespace {

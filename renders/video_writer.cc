@@ -10,8 +10,8 @@ extern "C" {
 #include <optional>
 
 #include "controller/common/errors.h"
-#include "harness/common/files.h"
-#include "harness/common/partial_file.h"
+#include "harness/base/files.h"
+#include "harness/base/partial_file.h"
 #include "renders/libav.h"
 #include "renders/palette.h"
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/checks/check_record.h"
+#include "harness/base/check_record.h"
 #include "harness/checks/failure_cause.h"
-#include "harness/checks/static_gate.h"
+#include "harness/gate/static_gate.h"
 
 namespace dexcheck {
 

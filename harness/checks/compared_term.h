@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "harness/checks/check_record.h"
+#include "harness/base/check_record.h"
 
 namespace dexcheck {
 

@@ -6,11 +6,11 @@
 #include <functional>
 #include <vector>
 
-#include "harness/adapter/adapter.h"
-#include "harness/checks/check_record.h"
+#include "harness/base/check_record.h"
 #include "harness/checks/model_check.h"
 #include "harness/checks/random_states.h"
-#include "harness/checks/static_gate.h"
+#include "harness/engine/adapter.h"
+#include "harness/gate/static_gate.h"
 
 namespace dexcheck {
 

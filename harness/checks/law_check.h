@@ -10,7 +10,7 @@
 #include "harness/checks/law_attribution.h"
 #include "harness/checks/law_reference.h"
 #include "harness/checks/step_record.h"
-#include "harness/simulation/setup.h"
+#include "harness/scenario/setup.h"
 
 namespace dexcheck {
 
@@ -35,8 +35,9 @@ struct LawErrors {
 double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold);
 
 /// Computes the printed law at each step, from the engine's terms, the scenario's gains and the scenario's
-/// trajectory. Of the controller it takes F_N, which the law may choose, X_o's angles on the law's branch (the first
-/// question compares their pose with the engine's), and C_bar', J_B_dot' where they multiply what slips.
+/// trajectory. Of the controller it takes F_N, which the law may choose, X_o's angles on the law's branch
+/// (the first question compares their pose with the engine's), and C_bar', J_B_dot' where they multiply what
+/// slips.
 class LawCheck {
  public:
   /// @param setup of a scenario that is no task.

@@ -6,7 +6,7 @@
 
 #include <string_view>
 
-#include "harness/checks/check_record.h"
+#include "harness/base/check_record.h"
 #include "harness/checks/failure_cause.h"
 
 namespace dexcheck {

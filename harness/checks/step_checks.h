@@ -15,10 +15,10 @@
 #include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/handling/partial_grasp.h"
-#include "harness/checks/check_record.h"
+#include "harness/base/check_record.h"
 #include "harness/checks/step_check_table.h"
 #include "harness/checks/step_record.h"
-#include "harness/simulation/setup.h"
+#include "harness/scenario/setup.h"
 
 namespace dexcheck {
 

@@ -1,15 +1,15 @@
 #pragma once
 
-// The command line's words: commands, options, flags. CLI11 reads them; it consists of headers that cost each source
-// which includes them ten seconds, so that only command_line.cc does.
+// The command line's words: commands, options, flags. CLI11 reads them; it consists of headers that cost each
+// source which includes them ten seconds, so that only command_line.cc does.
 
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <initializer_list>
 #include <memory>
-#include <stdexcept>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -65,8 +65,8 @@ class Option {
 /// A command with its options, or the program with its commands. A handle: copies are the same command.
 class Command {
  public:
-  /// @param name of an option with its dashes, of a positional argument without. @param value lives as long as the
-  /// command; what it holds is the default.
+  /// @param name of an option with its dashes, of a positional argument without. @param value lives as long
+  /// as the command; what it holds is the default.
   Option AddOption(const std::string& name, std::string* value, const std::string& help);
   Option AddOption(const std::string& name, std::filesystem::path* value, const std::string& help);
   Option AddOption(const std::string& name, double* value, const std::string& help);
@@ -102,8 +102,9 @@ class CommandLine {
   ~CommandLine();
 
   [[nodiscard]] Command root() { return {app_.get(), &exit_code_}; }
-  /// Reads the words and runs the command's action. @returns the program's exit code; --help and --version print and
-  /// are a success. @throws UsageError, which for an unknown word names the nearest known one; what the action throws.
+  /// Reads the words and runs the command's action. @returns the program's exit code; --help and --version
+  /// print and are a success. @throws UsageError, which for an unknown word names the nearest known one; what
+  /// the action throws.
   int Run(int argc, char** argv);
 
  private:

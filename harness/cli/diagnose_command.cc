@@ -8,11 +8,11 @@
 #include <string>
 
 #include "controller/model/parameter_reader.h"
+#include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
-#include "harness/common/interrupts.h"
 #include "harness/diagnosis/diagnose.h"
 #include "harness/engine/engine.h"
 
@@ -139,8 +139,7 @@ int Run(const Request& request) {
 void AddDiagnoseCommand(Command app) {
   constexpr std::uint64_t kMaxSamples = 1000;
   const auto request = std::make_shared<Request>();
-  Command command =
-      app.AddCommand("diagnose", "Say why model and engine disagree, and what would repair it");
+  Command command = app.AddCommand("diagnose", "Say why model and engine disagree, and what would repair it");
   AddRobotOptions(command, &request->files);
   command.AddOption("--samples", &request->options.samples, "Number of random states")
       .TypeName("N")
@@ -151,7 +150,7 @@ void AddDiagnoseCommand(Command app) {
       .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
       .ShowDefault();
   command.AddFlag("--by-motion", &request->options.by_motion,
-                    "Use axes, frames and forces only, not the bodies' masses and inertias in the MJCF");
+                  "Use axes, frames and forces only, not the bodies' masses and inertias in the MJCF");
   command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
       .TypeName("FILE.json");
   command.AddFlag("--quiet", &request->quiet, "No progress, and causes only");

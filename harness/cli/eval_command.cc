@@ -44,15 +44,16 @@ int Run(const Request& request) {
 void AddEvalCommand(Command app) {
   const auto request = std::make_shared<Request>();
   Command command = app.AddCommand("eval", "Print every term at one state, as JSON");
-  Option robot =
-      command.AddOption("--robot", &request->robot, "Parameter file (TOML) of the analytic model")
-          .TypeName("FILE.toml");
-  command.AddOption("--mjcf", &request->mjcf,
-                   "The same robot for the engine: adds the engine's values of the terms as \"engine\"")
+  Option robot = command.AddOption("--robot", &request->robot, "Parameter file (TOML) of the analytic model")
+                     .TypeName("FILE.toml");
+  command
+      .AddOption("--mjcf", &request->mjcf,
+                 "The same robot for the engine: adds the engine's values of the terms as \"engine\"")
       .TypeName("FILE.xml")
       .Needs(robot);
-  command.AddOption("--state", &request->state_file,
-                   "JSON with q, xi; optionally object, kappa or contact_points, fingers, mu")
+  command
+      .AddOption("--state", &request->state_file,
+                 "JSON with q, xi; optionally object, kappa or contact_points, fingers, mu")
       .TypeName("STATE.json")
       .Required();
   command.AddOption("--out", &request->out, "File to write (- for standard output)")

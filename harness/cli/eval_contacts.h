@@ -2,7 +2,7 @@
 
 #include "controller/dynamics/model_terms.h"
 #include "harness/cli/eval_terms.h"
-#include "harness/cli/state_file.h"
+#include "harness/scenario/state_file.h"
 
 namespace dexcheck::cli {
 

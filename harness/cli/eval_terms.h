@@ -3,9 +3,9 @@
 // Terms of model and engine at one state, as JSON by their names in controller/NOTATION.md; matrices are
 // lists of rows.
 
-#include "harness/adapter/adapter.h"
 #include "harness/cli/json_matrix.h"
-#include "harness/cli/state_file.h"
+#include "harness/engine/adapter.h"
+#include "harness/scenario/state_file.h"
 
 namespace dexcheck::cli {
 

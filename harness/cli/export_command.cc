@@ -14,7 +14,7 @@
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
-#include "harness/record/log_reader.h"
+#include "harness/log/log_reader.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -165,9 +165,10 @@ void AddExportCommand(Command app) {
   Command command = app.AddCommand("export", "Write a run's log as a table of numbers (CSV)");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run, with its log.h5").Required();
   Option csv = command.AddOption("--csv", &request->csv_file, "File to write (- for standard output)")
-                         .TypeName("FILE.csv");
-  command.AddOption("--signals", &request->patterns,
-                   "Only time and these signals; * stands for any text: time,object/*,check/M_bar")
+                   .TypeName("FILE.csv");
+  command
+      .AddOption("--signals", &request->patterns,
+                 "Only time and these signals; * stands for any text: time,object/*,check/M_bar")
       .TypeName("A,B,...")
       .Delimiter(',')
       .Repeatable();
@@ -175,8 +176,7 @@ void AddExportCommand(Command app) {
       .TypeName("N")
       .Check(WholeNumber(1, std::numeric_limits<int>::max()))
       .ShowDefault();
-  command.AddFlag("--list", &request->list, "Print the signals, their units and descriptions")
-      .Excludes(csv);
+  command.AddFlag("--list", &request->list, "Print the signals, their units and descriptions").Excludes(csv);
   command.SetAction([=] { return Run(*request); });
 }
 

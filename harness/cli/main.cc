@@ -7,11 +7,11 @@
 #include <system_error>
 
 #include "controller/common/errors.h"
+#include "harness/base/console.h"
+#include "harness/base/interrupts.h"
+#include "harness/base/shell.h"
+#include "harness/base/version.h"
 #include "harness/cli/commands.h"
-#include "harness/common/console.h"
-#include "harness/common/interrupts.h"
-#include "harness/common/shell.h"
-#include "harness/common/version.h"
 
 namespace dexcheck::cli {
 namespace {

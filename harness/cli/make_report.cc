@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "harness/cli/run_frames_reader.h"
-#include "harness/record/log_reader.h"
+#include "harness/log/log_reader.h"
 #include "renders/movie.h"
 #include "renders/png_file.h"
 #include "renders/renderer.h"

@@ -7,10 +7,10 @@
 #include <system_error>
 #include <thread>
 
+#include "harness/base/console.h"
+#include "harness/base/interrupts.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_frames_reader.h"
-#include "harness/common/console.h"
-#include "harness/common/interrupts.h"
 
 namespace dexcheck::cli {
 

@@ -11,11 +11,11 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
+#include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
-#include "harness/common/interrupts.h"
 #include "harness/diagnosis/formula_mutants.h"
 #include "harness/engine/engine.h"
 

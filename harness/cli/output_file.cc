@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "harness/common/files.h"
+#include "harness/base/files.h"
 
 namespace dexcheck::cli {
 

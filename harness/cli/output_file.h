@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "harness/common/partial_file.h"
+#include "harness/base/partial_file.h"
 
 namespace dexcheck::cli {
 

@@ -295,36 +295,39 @@ void AddPlanCommand(Command app) {
       .TypeName("A B C")
       .Takes(3);
   Option hand = command.AddOption("--hand", &request->hand, "Of the assistant robot")
-                          .TypeName("right|left")
-                          .OneOf({"right", "left"})
-                          .ShowDefault();
-  command.AddOption("--palm", &request->palm,
-                   "Frame of a palm, z along the fingers; the fingertips are those on its link")
+                    .TypeName("right|left")
+                    .OneOf({"right", "left"})
+                    .ShowDefault();
+  command
+      .AddOption("--palm", &request->palm,
+                 "Frame of a palm, z along the fingers; the fingertips are those on its link")
       .TypeName("FRAME")
       .Excludes(hand);
-  command.AddOption("--mu", &request->options.mu, "Friction counted on")
-      .TypeName("MU")
-      .ShowDefault();
-  command.AddOption("--support-height", &request->support_height,
-                   "Height of the table that the object lies on, m: the hand comes from above")
+  command.AddOption("--mu", &request->options.mu, "Friction counted on").TypeName("MU").ShowDefault();
+  command
+      .AddOption("--support-height", &request->support_height,
+                 "Height of the table that the object lies on, m: the hand comes from above")
       .TypeName("Z");
-  command.AddOption("--lift", &request->lift,
-                   "Displacement, m, that the arm must be able to make while holding")
+  command
+      .AddOption("--lift", &request->lift, "Displacement, m, that the arm must be able to make while holding")
       .TypeName("X Y Z")
       .Takes(3);
   command.AddOption("--joint-margin", &request->options.joint_margin, "From the ends of ranges, rad or m")
       .TypeName("MARGIN")
       .ShowDefault();
-  command.AddOption("--joints-deg", &request->joints_deg,
-          "Posture to stay near to; arm joints are otherwise in the middle of their ranges, others 0")
+  command
+      .AddOption("--joints-deg", &request->joints_deg,
+                 "Posture to stay near to; arm joints are otherwise in the middle of their ranges, others 0")
       .TypeName("NAME=DEGREES");
-  command.AddOption("--arm-joints", &request->arm_joints,
-                   "Joints that may move the palm (default: those that move no other fingertips)")
+  command
+      .AddOption("--arm-joints", &request->arm_joints,
+                 "Joints that may move the palm (default: those that move no other fingertips)")
       .TypeName("NAME");
   command.AddOption("--robot", &request->robot, "Parameter file (TOML) with fingertips and an object")
       .TypeName("FILE.toml");
-  command.AddOption("--json", &request->json_file,
-                   "Write the plan to this file (- for standard output, then without the [grasp])")
+  command
+      .AddOption("--json", &request->json_file,
+                 "Write the plan to this file (- for standard output, then without the [grasp])")
       .TypeName("FILE.json");
   command.SetAction([=] { return Run(*request); });
 }

@@ -8,6 +8,8 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/base/console.h"
+#include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/make_report.h"
 #include "harness/cli/make_video.h"
@@ -16,11 +18,9 @@
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
 #include "harness/cli/shipped_files.h"
-#include "harness/common/console.h"
-#include "harness/common/interrupts.h"
 #include "harness/engine/machine.h"
-#include "harness/record/run_recorder.h"
-#include "harness/simulation/runner.h"
+#include "harness/run/run_recorder.h"
+#include "harness/run/runner.h"
 
 namespace dexcheck::cli {
 namespace {

@@ -11,13 +11,13 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/cli/shipped_files.h"
-#include "harness/record/mjcf_files.h"
 #include "harness/engine/machine.h"
+#include "harness/engine/mjcf_files.h"
 
 namespace dexcheck::cli {
 namespace {
 
-constexpr const char* kScenarioFolder = "harness/scenarios";
+constexpr const char* kScenarioFolder = "harness/shipped/scenarios";
 
 std::filesystem::path OrShipped(const std::string& file, const char* shipped) {
   return file.empty() ? FindShippedFile(shipped) : std::filesystem::path(file);

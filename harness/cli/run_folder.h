@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/common/files.h"
-#include "harness/record/log_reader.h"
-#include "harness/simulation/scenario.h"
+#include "harness/base/files.h"
+#include "harness/log/log_reader.h"
+#include "harness/scenario/scenario.h"
 
 namespace dexcheck::cli {
 

@@ -10,9 +10,9 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/handling/pick_and_place.h"
+#include "harness/base/files.h"
 #include "harness/cli/run_folder.h"
-#include "harness/common/files.h"
-#include "harness/record/log_reader.h"
+#include "harness/log/log_reader.h"
 
 namespace dexcheck::cli {
 namespace {

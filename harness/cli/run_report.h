@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "harness/simulation/run_summary.h"
+#include "harness/run/run_summary.h"
 
 namespace dexcheck::cli {
 

@@ -7,8 +7,8 @@
 #include <string_view>
 
 #include "controller/common/text.h"
+#include "harness/base/shell.h"
 #include "harness/cli/study_files.h"
-#include "harness/common/shell.h"
 
 namespace dexcheck::cli {
 namespace {

@@ -13,7 +13,7 @@
 namespace dexcheck::cli {
 namespace {
 
-constexpr const char* kStudyFolder = "harness/studies";
+constexpr const char* kStudyFolder = "harness/shipped/studies";
 
 std::filesystem::path FindStudyFile(const std::string& name) {
   if (IsStudyFile(name)) return name;

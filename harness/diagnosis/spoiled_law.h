@@ -6,7 +6,7 @@
 
 #include "controller/control/controller.h"
 #include "harness/checks/law_reference.h"
-#include "harness/simulation/setup.h"
+#include "harness/scenario/setup.h"
 
 namespace dexcheck {
 

@@ -30,7 +30,8 @@ class SpoiledView : public ModelView {
     ModelView::SetState(q, velocity);
     const VectorXd at = q;
     const VectorXd rates = velocity;
-    Terms terms{model(), at, rates, ModelView::M(), ModelView::C(), ModelView::gravity(), ModelView::friction()};
+    Terms terms{
+        model(), at, rates, ModelView::M(), ModelView::C(), ModelView::gravity(), ModelView::friction()};
     spoil_(&terms);
     M_ = std::move(terms.M);
     C_ = std::move(terms.C);

@@ -10,7 +10,7 @@
 #include <system_error>
 
 #include "controller/common/errors.h"
-#include "harness/common/temporary_path.h"
+#include "harness/base/temporary_path.h"
 #include "harness/engine/cylinder_collision.h"
 #include "harness/engine/finite_check.h"
 #include "harness/engine/torus_collision.h"

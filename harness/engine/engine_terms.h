@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "controller/dynamics/model_terms.h"
-#include "harness/adapter/velocity_map.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/velocity_map.h"
 
 namespace dexcheck {
 

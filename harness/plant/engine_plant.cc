@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "harness/adapter/velocity_map.h"
+#include "harness/engine/velocity_map.h"
 
 namespace dexcheck {
 

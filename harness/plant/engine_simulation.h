@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "controller/common/types.h"
-#include "harness/adapter/adapter.h"
+#include "harness/engine/adapter.h"
 #include "harness/engine/engine.h"
 #include "harness/plant/plant.h"
 

@@ -13,7 +13,7 @@
 #include <limits>
 
 #include "controller/common/errors.h"
-#include "harness/common/temporary_path.h"
+#include "harness/base/temporary_path.h"
 #include "harness/report/thinning.h"
 
 extern char** environ;

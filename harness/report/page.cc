@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "controller/common/errors.h"
-#include "harness/common/files.h"
+#include "harness/base/files.h"
 #include "harness/report/html.h"
 #include "harness/report/page_assets.h"
 #include "harness/report/page_plots.h"

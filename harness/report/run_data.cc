@@ -14,7 +14,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr const char* kCheckPrefix = "check/";
 
 CheckKind ReadKind(const std::string& name) {
-  for (const CheckKind kind : {CheckKind::kModel, CheckKind::kLaw, CheckKind::kBalance, CheckKind::kPrediction}) {
+  for (const CheckKind kind :
+       {CheckKind::kModel, CheckKind::kLaw, CheckKind::kBalance, CheckKind::kPrediction}) {
     if (name == NameOf(kind)) return kind;
   }
   return CheckKind::kAssumption;

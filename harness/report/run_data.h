@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/checks/check_record.h"
-#include "harness/record/log_reader.h"
+#include "harness/base/check_record.h"
+#include "harness/log/log_reader.h"
 
 namespace dexcheck {
 

@@ -11,10 +11,10 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "harness/common/files.h"
-#include "harness/common/interrupts.h"
-#include "harness/common/partial_file.h"
-#include "harness/common/temporary_path.h"
+#include "harness/base/files.h"
+#include "harness/base/interrupts.h"
+#include "harness/base/partial_file.h"
+#include "harness/base/temporary_path.h"
 #include "harness/report/run_figures.h"
 
 namespace dexcheck {

@@ -14,7 +14,7 @@
 #include "harness/plant/plant.h"
 #include "harness/plant/sensing.h"
 #include "harness/run/loop_parts.h"
-#include "harness/simulation/setup.h"
+#include "harness/scenario/setup.h"
 
 namespace dexcheck {
 

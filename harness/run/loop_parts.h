@@ -8,7 +8,7 @@
 #include "controller/handling/pick_and_place_controller.h"
 #include "harness/plant/plant.h"
 #include "harness/plant/sensing.h"
-#include "harness/simulation/setup.h"
+#include "harness/scenario/setup.h"
 
 namespace dexcheck {
 

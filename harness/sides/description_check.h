@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/checks/static_gate.h"
+#include "harness/gate/static_gate.h"
 #include "harness/sides/robot_description.h"
 
 namespace dexcheck {

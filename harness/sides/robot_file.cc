@@ -4,7 +4,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/common/files.h"
+#include "harness/base/files.h"
 
 namespace dexcheck {
 namespace {

@@ -13,7 +13,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
-#include "harness/common/files.h"
+#include "harness/base/files.h"
 #include "harness/sides/join_names.h"
 #include "harness/sides/urdf_outline.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "harness/common/shell.h"
+#include "harness/base/shell.h"
 #include "harness/report/html.h"
 #include "harness/report/page_assets.h"
 #include "harness/study/study_figures.h"

@@ -5,7 +5,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
-#include "harness/simulation/runner.h"
+#include "harness/run/runner.h"
 #include "harness/study/trial_monitor.h"
 
 namespace dexcheck {

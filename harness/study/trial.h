@@ -5,7 +5,7 @@
 #include <string>
 
 #include "harness/engine/engine.h"
-#include "harness/simulation/scenario.h"
+#include "harness/scenario/scenario.h"
 #include "harness/study/study.h"
 #include "harness/study/trial_result.h"
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "harness/simulation/run_summary.h"
+#include "harness/run/run_summary.h"
 #include "harness/study/trial_result.h"
 
 namespace dexcheck {

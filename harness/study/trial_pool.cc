@@ -17,7 +17,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/common/interrupts.h"
+#include "harness/base/interrupts.h"
 
 namespace dexcheck {
 namespace {

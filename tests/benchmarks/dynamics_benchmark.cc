@@ -7,9 +7,9 @@
 
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
-#include "harness/adapter/adapter.h"
-#include "harness/adapter/velocity_map.h"
+#include "harness/engine/adapter.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/velocity_map.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 

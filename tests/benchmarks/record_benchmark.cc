@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/record/log_reader.h"
-#include "harness/record/log_writer.h"
+#include "harness/log/log_reader.h"
+#include "harness/log/log_writer.h"
 #include "tests/common/files.h"
 
 namespace dexcheck {

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "harness/plant/engine_simulation.h"
-#include "tests/harness/step_check_scene.h"
+#include "tests/harness/checks/step_check_scene.h"
 
 namespace dexcheck {
 namespace {

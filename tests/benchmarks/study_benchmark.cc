@@ -37,7 +37,7 @@ StudyInputs MakeInputs() {
       "0]\"]\n[[vary]]\nkey = "
       "\"control.K_v\"\nfrom = 20\nto = 60\ncount = 1000\n",
       "study.toml");
-  inputs.scenario_folder = kSource + "/harness/scenarios";
+  inputs.scenario_folder = kSource + "/harness/shipped/scenarios";
   inputs.scenario_text = ReadTextFile(inputs.scenario_folder / "offset.toml");
   inputs.scenario_source = "offset";
   inputs.robot = kSource + "/controller/parameters/assistant_robot.toml";

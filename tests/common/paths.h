@@ -1,7 +1,7 @@
 #pragma once
 
-// Where the tests find the project's files and what the build made. Only paths.cc knows folders of this machine, so that
-// a compiled test serves every clone.
+// Where the tests find the project's files and what the build made. Only paths.cc knows folders of this
+// machine, so that a compiled test serves every clone.
 
 #include <string>
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "controller/common/errors.h"
-#include "harness/simulation/scenario.h"
+#include "harness/scenario/scenario.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace dexcheck::fuzz {

@@ -2,7 +2,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
-#include "harness/cli/state_file.h"
+#include "harness/scenario/state_file.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace dexcheck::fuzz {
@@ -48,11 +48,11 @@ mass = 0.2
 friction = 0.8
 )";
 
-void ExpectSizes(const cli::State& state, const RobotModel& model) {
+void ExpectSizes(const State& state, const RobotModel& model) {
   Expect(state.q.size() == model.num_positions() && state.q.allFinite(), "q");
   Expect(state.xi.size() == model.num_velocities() && state.xi.allFinite(), "xi");
   if (!state.contacts) return;
-  const cli::ContactState& contacts = *state.contacts;
+  const ContactState& contacts = *state.contacts;
   const auto count = static_cast<Eigen::Index>(contacts.fingertips.size());
   Expect(count >= 3 && count <= static_cast<Eigen::Index>(model.fingertips().size()), "fingertips");
   Expect((contacts.kappa.rows() == count) != (contacts.points.rows() == count), "contacts");
@@ -67,7 +67,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace dexcheck::fuzz;
   static const dexcheck::RobotModel model = dexcheck::ParseRobotModel(kHand, "hand.toml");
   try {
-    ExpectSizes(dexcheck::cli::ParseState(AsText(data, size), "state.json", model), model);
+    ExpectSizes(dexcheck::ParseState(AsText(data, size), "state.json", model), model);
   } catch (const dexcheck::InputError& error) {
     ExpectGoodMessage(error.what(), "state.json:");
   }

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "controller/common/errors.h"
-#include "harness/record/log_writer.h"
+#include "harness/log/log_writer.h"
 #include "harness/report/page.h"
 #include "tests/fuzz/fuzz_target.h"
 

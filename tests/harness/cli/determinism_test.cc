@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/record/log_reader.h"
+#include "harness/log/log_reader.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck {

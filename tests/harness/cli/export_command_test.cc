@@ -7,7 +7,7 @@
 #include <limits>
 #include <sstream>
 
-#include "harness/record/log_writer.h"
+#include "harness/log/log_writer.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck {

@@ -13,7 +13,7 @@
 #include <limits>
 #include <random>
 
-#include "harness/record/log_reader.h"
+#include "harness/log/log_reader.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck {

@@ -2,9 +2,9 @@
 
 #include <gmock/gmock.h>
 
-#include "harness/record/log_writer.h"
+#include "harness/log/log_writer.h"
 #include "tests/harness/cli/dexcheck_program.h"
-#include "tests/harness/record/forge.h"
+#include "tests/harness/log/forge.h"
 
 namespace dexcheck {
 namespace {
@@ -29,7 +29,7 @@ class ForgedLog : public ::testing::Test {
     log.SetText("robot", "robot.toml");
     log.SetText("mjcf", mjcf);
     log.EmbedFile("inputs", "scenario.toml",
-                  testing::ReadText(testing::SourcePath("/harness/scenarios/hold.toml")));
+                  testing::ReadText(testing::SourcePath("/harness/shipped/scenarios/hold.toml")));
     log.EmbedFile("inputs", "robot/robot.toml", "name = \"robot\"\n");
     log.EmbedFile("inputs", "mjcf/scene.xml", model);
     const int qpos = log.AddSignal({"engine/qpos", "1", "positions", 7, {}, {}});

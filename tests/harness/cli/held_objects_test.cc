@@ -31,7 +31,8 @@ const HeldObject kObjects[] = {
 
 // Up, aside and turned: fingertips roll, and the contacts bear changing forces.
 constexpr const char* kMotion =
-    "trajectory={ type = 'point_to_point', xyz = [0, 5e-5, 1e-4], zyz_deg = [0.1, 0.1, 0.1], duration = 0.3 }";
+    "trajectory={ type = 'point_to_point', xyz = [0, 5e-5, 1e-4], zyz_deg = [0.1, 0.1, 0.1], duration = 0.3 "
+    "}";
 
 class HeldObjects : public ::testing::TestWithParam<HeldObject> {
  protected:
@@ -60,7 +61,7 @@ class HeldObjects : public ::testing::TestWithParam<HeldObject> {
     WriteText(folder_.path() / "robot.toml", robot.substr(0, robot.find("[object]")) + "[object]\nbody = \"" +
                                                  name + "\"\nmass = 0.2\nfriction = 0.8\n" + object.shape +
                                                  "\n");
-    const std::string hold = ReadText(source / "harness/scenarios/hold.toml");
+    const std::string hold = ReadText(source / "harness/shipped/scenarios/hold.toml");
     WriteText(folder_.path() / "hold.toml",
               ReplaceOnce(hold, "[grasp]",
                           "[model]\nfile = \"robot.toml\"\n[plant]\nmjcf = \"mjcf/held.xml\"\n[grasp]"));

@@ -6,7 +6,7 @@
 #include <csignal>
 #include <thread>
 
-#include "harness/record/log_reader.h"
+#include "harness/log/log_reader.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/report/report_run.h"
 

@@ -28,7 +28,7 @@ using testing::WriteText;
 
 /// The shipped scenario `hold` with another [grasp].
 std::string MakeScenario(const std::string& grasp, bool is_singular) {
-  std::string text = ReadText(testing::SourcePath("/harness/scenarios/hold.toml"));
+  std::string text = ReadText(testing::SourcePath("/harness/shipped/scenarios/hold.toml"));
   const size_t begin = text.find("[grasp]");
   const size_t end = text.find("[trajectory]");
   text.replace(begin, end - begin, grasp + "\n");

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "harness/engine/engine.h"
-#include "harness/record/log_writer.h"
+#include "harness/log/log_writer.h"
 #include "renders/png_file.h"
 #include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "harness/record/log_reader.h"
-#include "harness/record/log_writer.h"
+#include "harness/log/log_reader.h"
+#include "harness/log/log_writer.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck {

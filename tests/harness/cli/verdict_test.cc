@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
-#include "harness/record/log_reader.h"
+#include "harness/log/log_reader.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck {

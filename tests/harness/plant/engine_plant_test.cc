@@ -13,7 +13,7 @@
 #include "tests/common/allocation_counter.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
-#include "tests/harness/simulation/shipped_run.h"
+#include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing {
 namespace {

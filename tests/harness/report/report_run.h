@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/record/log_writer.h"
+#include "harness/log/log_writer.h"
 
 namespace dexcheck::testing {
 

@@ -4,8 +4,8 @@
 
 #include <utility>
 
-#include "harness/simulation/runner.h"
-#include "tests/harness/simulation/shipped_run.h"
+#include "harness/run/runner.h"
+#include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing {
 namespace {

@@ -13,14 +13,14 @@
 
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
-#include "harness/simulation/runner.h"
+#include "harness/run/runner.h"
 #include "harness/study/trial.h"
 #include "tests/common/paths.h"
 
 namespace dexcheck {
 namespace {
 
-const std::string kFolder = testing::SourcePath("/harness/scenarios");
+const std::string kFolder = testing::SourcePath("/harness/shipped/scenarios");
 
 /// One sample built step by step, and its spectral radius by a solver.
 double SolveSpectralRadius(const SampledLoop& loop, const AxisGains& gains) {

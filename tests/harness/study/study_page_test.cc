@@ -31,7 +31,7 @@ class StudyPageTest : public ::testing::Test {
         "\"energy\"]\n[[vary]]\nkey = \"control.K_p\"\nvalues = [100, 1e3, 1e4]\n[[vary]]\nkey = "
         "\"control.K_v\"\nvalues = [20, 200, 2100, 3000]\n",
         "study.toml");
-    inputs.scenario_text = ReadTextFile(kSource + "/harness/scenarios/offset.toml");
+    inputs.scenario_text = ReadTextFile(kSource + "/harness/shipped/scenarios/offset.toml");
     inputs.scenario_source = "offset";
     inputs.robot = kSource + "/controller/parameters/assistant_robot.toml";
     inputs.mjcf = kSource + "/mjcf/scene.xml";

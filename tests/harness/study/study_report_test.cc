@@ -37,7 +37,7 @@ class StudyReportTest : public ::testing::Test {
     }
     identity[0].second = "2";
     identity[2].second = study_.text;
-    identity[3].second = ReadTextFile(testing::SourcePath("/harness/scenarios/offset.toml"));
+    identity[3].second = ReadTextFile(testing::SourcePath("/harness/shipped/scenarios/offset.toml"));
     StudyStore store = StudyStore::OpenOrCreate(folder_.path() / "s.sqlite", identity, study_);
     for (const Trial& trial : ListTrials(study_)) {
       TrialRow row;

@@ -1,0 +1,38 @@
+#include "harness/base/console.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include "controller/common/errors.h"
+
+namespace dexcheck {
+
+void OccupyStandardStreams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(stream, F_GETFD) != -1 || errno != EBADF) continue;
+    // The lowest free number is this one. Opened the wrong way round, so that using it fails.
+    ::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+  }
+}
+
+void Warn(const std::string& text) {
+  std::string line = "dexcheck: " + text;
+  std::replace_if(
+      line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  line += '\n';
+  std::fwrite(line.data(), 1, line.size(), stderr);
+}
+
+void FlushOutput() {
+  const bool is_flushed = std::fflush(stdout) == 0;
+  if (is_flushed && std::ferror(stdout) == 0) return;
+  throw InputError(std::string("standard output: cannot be written: ") +
+                   (is_flushed ? "a part of it was lost" : std::strerror(errno)));
+}
+
+}  // namespace dexcheck

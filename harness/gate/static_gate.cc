@@ -1,0 +1,290 @@
+#include "harness/gate/static_gate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "harness/engine/engine.h"
+#include "harness/engine/torus_collision.h"
+
+namespace dexcheck {
+namespace {
+
+// Both sides read decimal numbers and form at most short sums and products of them.
+constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
+
+constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+
+Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
+
+class StaticGate {
+ public:
+  explicit StaticGate(const Adapter& adapter)
+      : adapter_(adapter), model_(adapter.model()), engine_(adapter.engine()) {}
+
+  GateResult Run() {
+    CompareGravity();
+    CompareLinks();
+    CompareJoints();
+    if (!adapter_.wheels().empty()) CompareWheels();
+    CompareFingertips();
+    if (model_.object()) CompareObject(*model_.object());
+    FindUnmodelledForces();
+    return std::move(result_);
+  }
+
+ private:
+  /// Compares relative to the larger of the two, or to `scale` where zero is a proper value.
+  void Compare(const std::string& check, const Location& where, double model, double engine,
+               double scale = 0.0) {
+    const bool new_check = result_.records.empty() || result_.records.back().name != check;
+    if (new_check) {
+      CheckRecord record;
+      record.name = check;
+      record.bound = kRounding;
+      result_.records.push_back(record);
+    }
+    entry_ = !new_check && where == last_location_ ? entry_ + 1 : 0;
+    last_location_ = where;
+    const double size = std::max({std::abs(model), std::abs(engine), scale});
+    CheckRecord one;
+    one.bound = kRounding;
+    one.Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
+    result_.records.back().Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
+    if (one.failed) {
+      result_.findings.push_back(
+          {check, Describe(where, model_, model_.num_base_velocities()), model, engine, where, entry_});
+    }
+  }
+
+  static Location AtLink(int link) { return {Location::Kind::kLink, link, -1}; }
+  static Location AtJoint(int joint) { return {Location::Kind::kJoint, joint, -1}; }
+
+  void CompareGravity() {
+    for (int k = 0; k < 3; ++k) {
+      Compare("gravity_vector", {}, model_.gravity()[k], engine_.opt.gravity[k], model_.gravity().norm());
+    }
+  }
+
+  void CompareLinks() {
+    for (int link = -1; link < model_.num_joints(); ++link) {
+      if (link < 0 && model_.base().type == BaseType::kFixed) continue;
+      const MassProperties& body =
+          link < 0 ? model_.base_with_wheels() : model_.joints()[static_cast<size_t>(link)].body;
+      double mass = 0.0;
+      for (const int b : adapter_.welded_bodies()[static_cast<size_t>(link + 1)])
+        mass += engine_.body_mass[b];
+      Compare("link_mass", AtLink(link), body.mass, mass);
+    }
+  }
+
+  void CompareJoints() {
+    for (int i = 0; i < model_.num_joints(); ++i) {
+      const int dof = adapter_.joint_dofs()[static_cast<size_t>(i)];
+      Compare("joint_damping", AtJoint(i), model_.joints()[static_cast<size_t>(i)].damping,
+              engine_.dof_damping[dof]);
+    }
+    for (int i = 0; i < model_.num_joints(); ++i) {
+      const int dof = adapter_.joint_dofs()[static_cast<size_t>(i)];
+      Compare("joint_armature", AtJoint(i), model_.joints()[static_cast<size_t>(i)].armature,
+              engine_.dof_armature[dof]);
+    }
+    for (int i = 0; i < model_.num_joints(); ++i) {
+      const int id = adapter_.joint_ids()[static_cast<size_t>(i)];
+      if (!engine_.jnt_limited[id]) continue;  // then the parameter file's range is only where to sample
+      Compare("joint_range", AtJoint(i), model_.joints()[static_cast<size_t>(i)].lower,
+              engine_.jnt_range[2 * id]);
+      Compare("joint_range", AtJoint(i), model_.joints()[static_cast<size_t>(i)].upper,
+              engine_.jnt_range[2 * id + 1]);
+    }
+  }
+
+  void CompareWheels() {
+    const Base& base = model_.base();
+    const auto each = [&](const auto& compare) {
+      for (size_t k = 0; k < 2; ++k) {
+        compare(adapter_.wheels()[k], Location{Location::Kind::kWheel, static_cast<int>(k), -1},
+                k == 0 ? -1.0 : 1.0);
+      }
+    };
+    each([&](const EngineWheel& wheel, const Location& where, double) {
+      Compare("wheel_radius", where, base.wheel_radius, wheel.radius);
+    });
+    each([&](const EngineWheel& wheel, const Location& where, double side) {
+      Compare("wheel_distance", where, base.wheel_distance, 2.0 * side * wheel.center.y());
+    });
+    each([&](const EngineWheel& wheel, const Location& where, double) {
+      Compare("axle_position", where, 0.0, wheel.center.x(), base.wheel_radius);
+      Compare("axle_position", where, 0.0, wheel.center.z(), base.wheel_radius);
+    });
+    each([&](const EngineWheel& wheel, const Location& where, double) {
+      for (int k = 0; k < 3; ++k) Compare("wheel_axis", where, k == 1 ? 1.0 : 0.0, wheel.axis[k], 1.0);
+    });
+    each([&](const EngineWheel& wheel, const Location& where, double) {
+      Compare("wheel_mass", where, base.wheel.mass, engine_.body_mass[engine_.jnt_bodyid[wheel.joint]]);
+    });
+    each([&](const EngineWheel& wheel, const Location& where, double) {
+      // Of the wheel's body, about the hinge axis.
+      const int body = engine_.jnt_bodyid[wheel.joint];
+      mjtNum axis[3];
+      mjtNum inverse[4];
+      mju_negQuat(inverse, engine_.body_iquat + 4 * body);
+      mju_rotVecQuat(axis, engine_.jnt_axis + 3 * wheel.joint, inverse);
+      const Vector3d moments = MapVector(engine_.body_inertia + 3 * body);
+      const double spin = moments.dot(MapVector(axis).cwiseAbs2());
+      Compare("wheel_spin_inertia", where, base.wheel.spin_inertia, spin);
+    });
+    each([&](const EngineWheel& wheel, const Location& where, double) {
+      Compare("wheel_damping", where, base.wheel.damping, engine_.dof_damping[wheel.dof]);
+    });
+    each([&](const EngineWheel& wheel, const Location& where, double) {
+      Compare("wheel_armature", where, base.wheel.armature, engine_.dof_armature[wheel.dof]);
+    });
+  }
+
+  /// The sphere at a frame's site, the one that can touch when there are several; -1 when there is none.
+  [[nodiscard]] int FindTipGeom(int site) const {
+    constexpr double kSamePlace = 1e-9;  // m; two decimal numbers for one point
+    int found = -1;
+    for (int geom = 0; geom < engine_.ngeom; ++geom) {
+      if (engine_.geom_bodyid[geom] != engine_.site_bodyid[site]) continue;
+      if (engine_.geom_type[geom] != mjGEOM_SPHERE) continue;
+      const Vector3d apart = MapVector(engine_.geom_pos + 3 * geom) - MapVector(engine_.site_pos + 3 * site);
+      if (apart.norm() >= kSamePlace) continue;
+      if (CanTouch(engine_, geom)) return geom;
+      if (found < 0) found = geom;
+    }
+    return found;
+  }
+
+  void CompareFingertips() {
+    for (const int frame : model_.fingertips()) {
+      const Location where{Location::Kind::kFrame, frame, -1};
+      const int geom = FindTipGeom(adapter_.frame_sites()[static_cast<size_t>(frame)]);
+      const double radius = geom < 0 ? kMissing : engine_.geom_size[3 * geom];
+      Compare("fingertip_radius", where, *model_.frames()[static_cast<size_t>(frame)].sphere_radius, radius);
+    }
+  }
+
+  void CompareObject(const ObjectModel& object) {
+    const Location where{Location::Kind::kObject, -1, -1};
+    const int body = adapter_.object_body();
+    Compare("object_mass", where, object.body.mass, engine_.body_mass[body]);
+    for (int k = 0; k < 3; ++k) {
+      Compare("object_com", where, object.body.com[k], engine_.body_ipos[3 * body + k], 1.0);
+    }
+    mjtNum R[9];
+    mju_quat2Mat(R, engine_.body_iquat + 4 * body);
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> axes(R);
+    const Matrix3d inertia =
+        axes * MapVector(engine_.body_inertia + 3 * body).asDiagonal() * axes.transpose();
+    for (int row = 0; row < 3; ++row) {
+      for (int col = 0; col < 3; ++col) {
+        Compare("object_inertia", where, object.body.inertia(row, col), inertia(row, col),
+                object.body.inertia.trace());
+      }
+    }
+    if (const SolidTorus* torus = std::get_if<SolidTorus>(&object.shape)) {
+      double ring_radius = kMissing;
+      double tube_radius = kMissing;
+      for (int geom = 0; geom < engine_.ngeom; ++geom) {
+        if (engine_.geom_bodyid[geom] == body) GetTorusRadii(engine_, geom, &ring_radius, &tube_radius);
+      }
+      Compare("object_shape", where, torus->ring_radius, ring_radius);
+      Compare("object_shape", where, torus->tube_radius, tube_radius);
+    }
+    CompareRoundShape(object.shape, where);
+    for (const int frame : model_.fingertips()) CompareFriction(object, frame);
+  }
+
+  /// A sphere's or cylinder's size, place and axis against the object's geom that can touch.
+  void CompareRoundShape(const Shape& shape, const Location& where) {
+    const SolidSphere* sphere = std::get_if<SolidSphere>(&shape);
+    const SolidCylinder* cylinder = std::get_if<SolidCylinder>(&shape);
+    if (sphere == nullptr && cylinder == nullptr) return;
+    int found = -1;
+    for (int geom = 0; geom < engine_.ngeom; ++geom) {
+      const bool fits = engine_.geom_type[geom] == (sphere != nullptr ? mjGEOM_SPHERE : mjGEOM_CYLINDER);
+      if (IsObject(geom) && fits && CanTouch(engine_, geom)) found = geom;
+    }
+    const auto size = [&](int k) { return found < 0 ? kMissing : engine_.geom_size[3 * found + k]; };
+    const double radius = sphere != nullptr ? sphere->radius : cylinder->radius;
+    Compare("object_shape", where, radius, size(0));
+    if (cylinder != nullptr) Compare("object_shape", where, 0.5 * cylinder->length, size(1));
+    if (found < 0) return;
+    for (int k = 0; k < 3; ++k) {
+      Compare("object_shape", where, 0.0, engine_.geom_pos[3 * found + k], radius);
+    }
+    if (cylinder == nullptr) return;
+    mjtNum R[9];
+    mju_quat2Mat(R, engine_.geom_quat + 4 * found);
+    // Either way along z: a cylinder has no head.
+    Compare("object_shape", where, 1.0, std::abs(R[8]), 1.0);
+  }
+
+  /// Sliding friction of the explicit contact pairs between a fingertip and the object. Without a pair the
+  /// two touch by their contype and conaffinity, or not at all.
+  void CompareFriction(const ObjectModel& object, int frame) {
+    const Location where{Location::Kind::kFrame, frame, -1};
+    const int tip = FindTipGeom(adapter_.frame_sites()[static_cast<size_t>(frame)]);
+    if (tip < 0) return;  // a finding of its own
+    bool touches = false;
+    for (int pair = 0; pair < engine_.npair; ++pair) {
+      const int geom1 = engine_.pair_geom1[pair];
+      const int geom2 = engine_.pair_geom2[pair];
+      if (!(geom1 == tip && IsObject(geom2)) && !(geom2 == tip && IsObject(geom1))) continue;
+      touches = true;
+      for (int k = 0; k < 2; ++k) {
+        Compare("contact_friction", where, object.friction, engine_.pair_friction[5 * pair + k]);
+      }
+    }
+    if (touches) return;
+    // The engine takes the larger friction of two geoms of one priority.
+    double friction = kMissing;
+    for (int geom = 0; geom < engine_.ngeom; ++geom) {
+      const bool by_type = (engine_.geom_contype[tip] & engine_.geom_conaffinity[geom]) != 0 ||
+                           (engine_.geom_contype[geom] & engine_.geom_conaffinity[tip]) != 0;
+      if (IsObject(geom) && by_type) {
+        friction = std::max(engine_.geom_friction[3 * tip], engine_.geom_friction[3 * geom]);
+      }
+    }
+    Compare("contact_friction", where, object.friction, friction);
+  }
+
+  [[nodiscard]] bool IsObject(int geom) const { return engine_.geom_bodyid[geom] == adapter_.object_body(); }
+
+  /// Forces of the engine on the robot's joints that have no counterpart in the analytic model.
+  void FindUnmodelledForces() {
+    std::vector<std::pair<int, Location>> joints;
+    for (const int joint : adapter_.base_joints()) joints.emplace_back(joint, AtLink(-1));
+    for (size_t k = 0; k < adapter_.wheels().size(); ++k) {
+      joints.emplace_back(adapter_.wheels()[k].joint,
+                          Location{Location::Kind::kWheel, static_cast<int>(k), -1});
+    }
+    for (int i = 0; i < model_.num_joints(); ++i) {
+      joints.emplace_back(adapter_.joint_ids()[static_cast<size_t>(i)], AtJoint(i));
+    }
+    for (const auto& [joint, where] : joints)
+      Compare("joint_spring", where, 0.0, engine_.jnt_stiffness[joint]);
+    for (const auto& [joint, where] : joints) {
+      Compare("joint_dry_friction", where, 0.0, engine_.dof_frictionloss[engine_.jnt_dofadr[joint]]);
+    }
+    Compare("fluid", {}, 0.0, engine_.opt.density);
+    Compare("fluid", {}, 0.0, engine_.opt.viscosity);
+  }
+
+  const Adapter& adapter_;
+  const RobotModel& model_;
+  const mjModel& engine_;
+  GateResult result_;
+  Location last_location_;
+  int entry_ = 0;
+};
+
+}  // namespace
+
+GateResult RunStaticGate(const Adapter& adapter) { return StaticGate(adapter).Run(); }
+
+}  // namespace dexcheck

@@ -1,0 +1,19 @@
+#include "harness/log/log_content.h"
+
+#include <algorithm>
+
+namespace dexcheck {
+
+bool IsPlainPath(std::string_view name) {
+  size_t begin = 0;
+  while (begin <= name.size()) {
+    const size_t end = std::min(name.find('/', begin), name.size());
+    const std::string_view part = name.substr(begin, end - begin);
+    if (part.empty() || part == "." || part == "..") return false;
+    begin = end + 1;
+  }
+  return std::none_of(name.begin(), name.end(),
+                      [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f || c == '\\'; });
+}
+
+}  // namespace dexcheck

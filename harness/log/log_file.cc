@@ -1,0 +1,339 @@
+#include "harness/log/log_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+#include "controller/common/errors.h"
+#include "harness/log/hdf5_handle.h"
+#include "harness/log/hdf5_memory.h"
+
+namespace dexcheck {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
+
+using hdf5::Check;
+
+/// A dataset's or attribute's extents: none for a single value.
+using Extents = std::vector<hsize_t>;
+
+hdf5::Dataspace MakeSpace(const Extents& extents) {
+  if (extents.empty()) return hdf5::Dataspace(H5Screate(H5S_SCALAR));
+  return hdf5::Dataspace(H5Screate_simple(static_cast<int>(extents.size()), extents.data(), nullptr));
+}
+
+/// How a dataset is stored: in one piece, without a time stamp; its numbers' place is taken at the first
+/// write, and not filled.
+hdf5::Properties MakeDatasetProperties() {
+  hdf5::Properties properties(H5Pcreate(H5P_DATASET_CREATE));
+  Check(H5Pset_obj_track_times(properties.id(), false));
+  Check(H5Pset_layout(properties.id(), H5D_CONTIGUOUS));
+  Check(H5Pset_alloc_time(properties.id(), H5D_ALLOC_TIME_LATE));
+  Check(H5Pset_fill_time(properties.id(), H5D_FILL_TIME_NEVER));
+  return properties;
+}
+
+class LogBuilder {
+ public:
+  LogBuilder(const LogContent& content, long rows, hdf5::MemoryImage* image)
+      : content_(content),
+        rows_(static_cast<hsize_t>(rows)),
+        string_type_(hdf5::MakeStringType()),
+        dataset_properties_(MakeDatasetProperties()),
+        group_properties_(H5Pcreate(H5P_GROUP_CREATE)),
+        link_properties_(H5Pcreate(H5P_LINK_CREATE)),
+        driver_(hdf5::RegisterMemoryDriver()),
+        file_(CreateFile(driver_, image)) {
+    Check(H5Pset_obj_track_times(group_properties_.id(), false));
+    Check(H5Pset_create_intermediate_group(link_properties_.id(), 1));
+  }
+
+  /// Writes everything but the numbers, and closes the image.
+  LogLayout Build() {
+    AddRootAttributes();
+    AddTexts();
+    for (const EmbeddedFile& file : content_.files) AddFile(file);
+    std::vector<hdf5::Dataset> datasets;
+    for (const SignalInfo& signal : content_.signals) datasets.push_back(AddSignal(signal));
+    std::map<std::string, hdf5::Dataset> texts;
+    for (const auto& [name, reserved] : content_.reserved_texts) {
+      texts.emplace(name, AddReservedText(name, reserved));
+    }
+    // Last, so that the variable part lies together behind everything else.
+    LogLayout layout;
+    for (const auto& [name, dataset] : texts) {
+      layout.reserved_texts[name] = WriteReservedText(dataset, content_.reserved_texts.at(name));
+    }
+    for (const hdf5::Dataset& dataset : datasets) layout.signals.push_back(TakePlace(dataset));
+    for (auto& [name, dataset] : texts) dataset.Close();
+    for (hdf5::Dataset& dataset : datasets) dataset.Close();
+    file_.Close();
+    return layout;
+  }
+
+ private:
+  static hdf5::File CreateFile(const hdf5::Driver& driver, hdf5::MemoryImage* image) {
+    const hdf5::Properties creation(H5Pcreate(H5P_FILE_CREATE));
+    Check(H5Pset_userblock(creation.id(), kSealSize));
+    Check(H5Pset_obj_track_times(creation.id(), false));
+    const hdf5::Properties access(H5Pcreate(H5P_FILE_ACCESS));
+    Check(H5Pset_libver_bounds(access.id(), H5F_LIBVER_EARLIEST, H5F_LIBVER_LATEST));
+    Check(H5Pset_fclose_degree(access.id(), H5F_CLOSE_STRONG));
+    hdf5::UseMemory(driver, access, image);
+    return hdf5::File(H5Fcreate("log", H5F_ACC_TRUNC, creation.id(), access.id()));
+  }
+
+  void AddAttribute(hid_t object, const std::string& name, hid_t type, const Extents& extents,
+                    const void* value) const {
+    const hdf5::Dataspace space = MakeSpace(extents);
+    const hdf5::Attribute attribute(
+        H5Acreate2(object, name.c_str(), type, space.id(), H5P_DEFAULT, H5P_DEFAULT));
+    Check(H5Awrite(attribute.id(), type, value));
+  }
+
+  void AddAttribute(hid_t object, const std::string& name, const std::string& text) const {
+    const char* const value = text.c_str();
+    AddAttribute(object, name, string_type_.id(), {}, &value);
+  }
+
+  void AddAttribute(hid_t object, const std::string& name, const std::vector<std::string>& texts) const {
+    std::vector<const char*> values;
+    values.reserve(texts.size());
+    for (const std::string& text : texts) values.push_back(text.c_str());
+    AddAttribute(object, name, string_type_.id(), {values.size()}, values.data());
+  }
+
+  [[nodiscard]] hdf5::Dataset AddDataset(const std::string& name, hid_t type, const Extents& extents) const {
+    const hdf5::Dataspace space = MakeSpace(extents);
+    return hdf5::Dataset(H5Dcreate2(file_.id(), name.c_str(), type, space.id(), link_properties_.id(),
+                                    dataset_properties_.id(), H5P_DEFAULT));
+  }
+
+  void AddRootAttributes() const {
+    std::vector<std::string> names;
+    for (const SignalInfo& signal : content_.signals) names.push_back(signal.name);
+    AddAttribute(file_.id(), "signals", names);
+  }
+
+  void AddTexts() const {
+    const hdf5::Group meta(H5Gcreate2(file_.id(), "meta", H5P_DEFAULT, group_properties_.id(), H5P_DEFAULT));
+    for (const auto& [name, text] : content_.texts) AddAttribute(meta.id(), name, text);
+  }
+
+  void AddFile(const EmbeddedFile& file) const {
+    const hdf5::Dataset dataset = AddDataset(file.path, H5T_STD_U8LE, {file.bytes.size()});
+    if (file.bytes.empty()) return;
+    Check(H5Dwrite(dataset.id(), H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, file.bytes.data()));
+  }
+
+  [[nodiscard]] hdf5::Dataset AddSignal(const SignalInfo& signal) const {
+    Extents extents = {rows_};
+    if (signal.width != 1) extents.push_back(static_cast<hsize_t>(signal.width));
+    hdf5::Dataset dataset = AddDataset(signal.name, H5T_IEEE_F64LE, extents);
+    AddAttribute(dataset.id(), "unit", signal.unit);
+    AddAttribute(dataset.id(), "description", signal.description);
+    if (!signal.columns.empty()) AddAttribute(dataset.id(), "columns", signal.columns);
+    for (const auto& [name, value] : signal.attributes) {
+      AddAttribute(dataset.id(), name, H5T_IEEE_F64LE, {}, &value);
+    }
+    return dataset;
+  }
+
+  static hdf5::Datatype MakeReservedType(const ReservedText& reserved) {
+    hdf5::Datatype type(H5Tcopy(H5T_C_S1));
+    Check(H5Tset_size(type.id(), reserved.capacity));
+    Check(H5Tset_cset(type.id(), H5T_CSET_UTF8));
+    return type;
+  }
+
+  [[nodiscard]] hdf5::Dataset AddReservedText(const std::string& name, const ReservedText& reserved) const {
+    return AddDataset("meta/" + name, MakeReservedType(reserved).id(), {});
+  }
+
+  /// @return the text's offset.
+  static std::uint64_t WriteReservedText(const hdf5::Dataset& dataset, const ReservedText& reserved) {
+    const std::string padded = Pad(reserved);
+    const hdf5::Datatype type = MakeReservedType(reserved);
+    Check(H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()));
+    return GetOffset(dataset);
+  }
+
+  static std::uint64_t GetOffset(const hdf5::Dataset& dataset) {
+    const haddr_t offset = H5Dget_offset(dataset.id());
+    if (offset == HADDR_UNDEF) throw hdf5::Hdf5Error(hdf5::DescribeLastError());
+    return offset;
+  }
+
+  /// Takes the signal's place in the file. @return its offset.
+  [[nodiscard]] std::uint64_t TakePlace(const hdf5::Dataset& dataset) const {
+    if (rows_ == 0) return 0;
+    const hdf5::Dataspace space(H5Dget_space(dataset.id()));
+    const std::array<hsize_t, 2> first{};
+    Check(H5Sselect_elements(space.id(), H5S_SELECT_SET, 1, first.data()));
+    const hdf5::Dataspace one = MakeSpace({1});
+    const double zero = 0.0;
+    Check(H5Dwrite(dataset.id(), H5T_NATIVE_DOUBLE, one.id(), space.id(), H5P_DEFAULT, &zero));
+    return GetOffset(dataset);
+  }
+
+  const LogContent& content_;
+  hsize_t rows_;
+  hdf5::Datatype string_type_;
+  hdf5::Properties dataset_properties_;
+  hdf5::Properties group_properties_;
+  hdf5::Properties link_properties_;
+  hdf5::Driver driver_;
+  hdf5::File file_;
+};
+
+/// Begin and end of the variable part. @throws std::logic_error unless it lies together.
+std::pair<std::uint64_t, std::uint64_t> FindVariablePart(const LogContent& content, const LogLayout& layout,
+                                                         long rows) {
+  std::uint64_t begin = std::numeric_limits<std::uint64_t>::max();
+  std::uint64_t end = kSealSize;
+  std::uint64_t total = 0;
+  const auto add = [&](std::uint64_t offset, std::uint64_t size) {
+    if (size == 0) return;
+    begin = std::min(begin, offset);
+    end = std::max(end, offset + size);
+    total += size;
+  };
+  for (size_t i = 0; i < content.signals.size(); ++i) {
+    const auto width = static_cast<std::uint64_t>(content.signals[i].width);
+    add(layout.signals[i], sizeof(double) * static_cast<std::uint64_t>(rows) * width);
+  }
+  for (const auto& [name, reserved] : content.reserved_texts) {
+    add(layout.reserved_texts.at(name), reserved.capacity);
+  }
+  begin = std::min(begin, end);
+  if (end - begin != total) throw std::logic_error("HDF5 did not lay the log's variable part together");
+  return {begin, end};
+}
+
+/// Writes the image to an empty file. @return 0, or the system's error number.
+int WriteImage(int descriptor, const hdf5::MemoryImage& image) {
+  if (::ftruncate(descriptor, static_cast<off_t>(image.size())) != 0) return errno;
+  for (const auto& [number, page] : image.pages()) {
+    const std::uint64_t offset = number * page.size();
+    if (offset >= image.size()) break;
+    const auto count = static_cast<size_t>(std::min<std::uint64_t>(page.size(), image.size() - offset));
+    const int error = WriteAt(descriptor, page.data(), count, offset);
+    if (error != 0) return error;
+  }
+  return 0;
+}
+
+/// @return 0, or the system's error number.
+int MarkAllRowsUnwritten(int descriptor, std::uint64_t time_offset, long rows) {
+  std::array<double, 4096> chunk;
+  chunk.fill(std::numeric_limits<double>::quiet_NaN());
+  for (size_t row = 0; row < static_cast<size_t>(rows); row += chunk.size()) {
+    const size_t count = std::min(chunk.size(), static_cast<size_t>(rows) - row);
+    const int error =
+        WriteAt(descriptor, chunk.data(), count * sizeof(double), time_offset + row * sizeof(double));
+    if (error != 0) return error;
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::string Pad(const ReservedText& reserved) {
+  std::string padded = reserved.text;
+  padded.resize(reserved.capacity, '\0');
+  return padded;
+}
+
+void FailToWrite(const std::filesystem::path& path, int error) {
+  throw InputError(path.string() + ": cannot be written: " + std::strerror(error));
+}
+
+void FailToRead(const std::filesystem::path& path, int error) {
+  throw InputError(path.string() + ": cannot be read: " + std::strerror(error));
+}
+
+FileDescriptor::~FileDescriptor() { Close(); }
+
+FileDescriptor::FileDescriptor(FileDescriptor&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+FileDescriptor& FileDescriptor::operator=(FileDescriptor&& other) noexcept {
+  std::swap(descriptor_, other.descriptor_);
+  return *this;
+}
+
+int FileDescriptor::Close() {
+  if (!is_open()) return 0;
+  return ::close(std::exchange(descriptor_, -1)) == 0 ? 0 : errno;
+}
+
+int WriteAt(int descriptor, const void* bytes, size_t count, std::uint64_t offset) {
+  size_t done = 0;
+  while (done < count) {
+    const ssize_t step = ::pwrite(descriptor, static_cast<const char*>(bytes) + done, count - done,
+                                  static_cast<off_t>(offset + done));
+    if (step < 0 && errno == EINTR) continue;
+    if (step < 0) return errno;
+    done += static_cast<size_t>(step);
+  }
+  return 0;
+}
+
+int ReadExactly(int descriptor, void* bytes, size_t count, std::uint64_t offset) {
+  size_t done = 0;
+  while (done < count) {
+    const ssize_t step = ::pread(descriptor, static_cast<char*>(bytes) + done, count - done,
+                                 static_cast<off_t>(offset + done));
+    if (step < 0 && errno == EINTR) continue;
+    if (step < 0) return errno;
+    if (step == 0) return EIO;
+    done += static_cast<size_t>(step);
+  }
+  return 0;
+}
+
+int CopyBytes(int from, std::uint64_t from_offset, int to, std::uint64_t to_offset, size_t count) {
+  constexpr size_t kChunk = size_t{1} << 20;
+  std::vector<char> chunk(std::min(kChunk, count));
+  for (size_t done = 0; done < count;) {
+    const ssize_t step = ::pread(from, chunk.data(), std::min(chunk.size(), count - done),
+                                 static_cast<off_t>(from_offset + done));
+    if (step < 0 && errno == EINTR) continue;
+    if (step <= 0) return step == 0 ? EIO : errno;
+    const int error = WriteAt(to, chunk.data(), static_cast<size_t>(step), to_offset + done);
+    if (error != 0) return error;
+    done += static_cast<size_t>(step);
+  }
+  return 0;
+}
+
+LogLayout WriteLogFile(const std::filesystem::path& path, const std::string& name, const LogContent& content,
+                       long rows) {
+  hdf5::MemoryImage image;
+  LogLayout layout;
+  try {
+    const hdf5::SilencedErrors silenced;
+    layout = LogBuilder(content, rows, &image).Build();
+  } catch (const hdf5::Hdf5Error& error) {
+    throw InputError(name + ": cannot be written: " + error.what());
+  }
+  const auto [begin, end] = FindVariablePart(content, layout, rows);
+  FileDescriptor file(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (!file.is_open()) FailToWrite(name, errno);
+  int error = WriteImage(file.get(), image);
+  if (error == 0) error = MarkAllRowsUnwritten(file.get(), layout.signals.front(), rows);
+  if (error == 0) error = WriteSeal(file.get(), begin, end);
+  if (error == 0) error = file.Close();
+  if (error != 0) FailToWrite(name, error);
+  return layout;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,254 @@
+#include "harness/run/run_recorder.h"
+
+#include <algorithm>
+
+#include "harness/base/files.h"
+#include "harness/base/version.h"
+#include "harness/engine/machine.h"
+#include "harness/engine/mjcf_files.h"
+
+namespace dexcheck {
+namespace {
+
+/// Copies a vector or matrix expression into a row.
+template <typename Derived>
+void Copy(const Eigen::DenseBase<Derived>& from, std::span<double> to) {
+  Eigen::Map<VectorXd>(to.data(), static_cast<Eigen::Index>(to.size())) = from.derived();
+}
+
+/// "NAME.PART" for each of the names and parts.
+std::vector<std::string> Expand(const std::vector<std::string>& names,
+                                std::initializer_list<const char*> parts) {
+  std::vector<std::string> columns;
+  for (const std::string& name : names) {
+    for (const char* part : parts) columns.push_back(name + "." + part);
+  }
+  return columns;
+}
+
+int CountOf(const std::vector<std::string>& names) { return static_cast<int>(names.size()); }
+
+}  // namespace
+
+RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& loop, const Setup& setup,
+                         const RunInputs& inputs)
+    : setup_(&setup), checks_(loop.is_checking() ? &loop.checks() : nullptr), log_(path, loop.num_steps()) {
+  const Scenario& scenario = setup.scenario();
+  std::string overrides;
+  for (const std::string& assignment : scenario.overrides) overrides += assignment + "\n";
+  log_.SetText("command", inputs.command);
+  log_.SetText("scenario", scenario.name);
+  log_.SetText("overrides", overrides);
+  log_.SetText("seed", std::to_string(scenario.seed));
+  log_.SetText("robot", inputs.robot.filename().string());
+  log_.SetText("mjcf", inputs.mjcf.filename().string());
+  log_.SetText("object_body", NameOf(setup.engine(), mjOBJ_BODY, setup.adapter().object_body()));
+  log_.SetText("mujoco_version", mj_versionString());
+  log_.SetText("dexcheck_version", Version());
+  log_.SetText("machine", DescribeMachine());
+  log_.EmbedFile("inputs", "scenario.toml", scenario.text);
+  log_.EmbedFile("inputs", "robot/" + inputs.robot.filename().string(), ReadBytes(inputs.robot));
+  for (const std::string& file : ListMjcfFiles(inputs.mjcf)) {
+    log_.EmbedFile("inputs", "mjcf/" + file, ReadBytes(inputs.mjcf.parent_path() / file));
+  }
+  AddStateSignals();
+  AddObjectSignals();
+  AddContactSignals();
+  if (loop.task() != nullptr) AddTaskSignals();
+  if (checks_ != nullptr) AddCheckSignals();
+  log_.StartRows();
+}
+
+void RunRecorder::Add(const SignalInfo& signal, Source source) {
+  channels_.push_back({log_.AddSignal(signal), std::move(source)});
+}
+
+void RunRecorder::AddStateSignals() {
+  const RobotModel& model = setup_->model();
+  const mjModel& m = setup_->engine();
+  std::vector<std::string> q_names;
+  std::vector<std::string> xi_names;
+  std::vector<std::string> tau_names;
+  if (model.num_base_positions() == 3) q_names = {"x_c", "y_c", "phi"};
+  if (model.num_base_velocities() == 3) xi_names = {"x_dot", "y_dot", "phi_dot"};
+  if (model.num_base_velocities() == 2) {
+    xi_names = model.base().velocity == DriveVelocity::kTwist
+                   ? std::vector<std::string>{"v_c", "w_c"}
+                   : std::vector<std::string>{"theta_dot_r", "theta_dot_l"};
+  }
+  for (const EngineWheel& wheel : setup_->adapter().wheels()) {
+    tau_names.push_back(NameOf(m, mjOBJ_JOINT, wheel.joint));
+  }
+  for (const Joint& joint : model.joints()) {
+    for (auto* names : {&q_names, &xi_names, &tau_names}) names->push_back(joint.name);
+  }
+  Add({"engine/qpos", "m, rad, 1", "MuJoCo's positions, quaternions wxyz", m.nq, {}, {}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.qpos, row); });
+  Add({"engine/qvel", "m/s, rad/s", "MuJoCo's velocities", m.nv, {}, {}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.qvel, row); });
+  const int n = model.num_velocities();
+  Add({"q", "m, rad", "q' as read from the plant", model.num_positions(), q_names, {}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.q, row); });
+  Add({"xi", "m/s, rad/s", "reduced velocity as read from the plant", n, xi_names, {}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.xi, row); });
+  Add({"tau", "N m", "tau' of the computed torque law (55)", n, tau_names, {}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.command.tau, row); });
+  Add({"base/tilt", "rad", "angle of the platform against the vertical", 1, {}, {}},
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.reading.departure.tilt; });
+  Add({"base/height", "m", "height of the axle's midpoint against the model's", 1, {}, {}},
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.reading.departure.height; });
+  if (checks_ == nullptr) return;
+  Add({"engine/xi_dot", "m/s^2, rad/s^2", "reduced acceleration of the plant", n, xi_names, {}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.response.xi_dot, row); });
+  Add({"model/xi_dot", "m/s^2, rad/s^2", "reduced acceleration that (46), (48) predict", n, xi_names, {}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.findings.xi_dot_model, row); });
+}
+
+void RunRecorder::AddObjectSignals() {
+  const std::vector<std::string> columns = {"x", "y", "z", "alpha", "beta", "gamma"};
+  Add({"object/X_o", "m, rad", "pose of the object, ZYZ angles (8)", 6, columns, {}},
+      [](const StepRecord& step, std::span<double> row) { Copy(CalcX_o(step), row); });
+  Add({"object/X_d", "m, rad", "desired pose of the object", 6, columns, {}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.command.desired.X_d, row); });
+  const std::vector<std::string> twist = {"v_x", "v_y", "v_z", "w_x", "w_y", "w_z"};
+  Add({"object/V", "m/s, rad/s", "body velocity of the object", 6, twist, {}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.V_Bo, row); });
+  Add({"object/error", "m", "X_d - X_o, position", 3, {"x", "y", "z"}, {}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.error.position, row); });
+  Add({"object/position_error", "m", "distance of the object from its desired place", 1, {}, {}},
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.error.position.norm(); });
+  Add({"object/orientation_error", "rad", "angle between the object and its desired orientation", 1, {}, {}},
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.error.orientation; });
+}
+
+void RunRecorder::AddContactSignals() {
+  const std::vector<std::string>& tips = setup_->scenario().grasp.fingertips;
+  const int count = CountOf(tips);
+  const double mu = setup_->object().friction;
+  const std::vector<std::string> xyz = Expand(tips, {"x", "y", "z"});
+  Add({"contact/kappa",
+       "rad",
+       "contact coordinates (39)",
+       5 * count,
+       Expand(tips, {"u_f", "v_f", "u_o", "v_o", "psi"}),
+       {}},
+      [](const StepRecord& step, std::span<double> row) {
+        for (size_t i = 0; i < step.reading.state.kappa.size(); ++i) {
+          Copy(step.reading.state.kappa[i].CalcVector(), row.subspan(5 * i, 5));
+        }
+      });
+  Add({"contact/chart",
+       "1",
+       "chart of the fingertip's (u_f, v_f) and of the object's (u_o, v_o) of contact/kappa",
+       2 * count,
+       Expand(tips, {"f", "o"}),
+       {}},
+      [](const StepRecord& step, std::span<double> row) {
+        for (size_t i = 0; i < step.reading.state.kappa.size(); ++i) {
+          const ContactCoordinates& kappa = step.reading.state.kappa[i];
+          row[2 * i] = kappa.alpha_f.chart;
+          row[2 * i + 1] = kappa.alpha_o.chart;
+        }
+      });
+  Add({"contact/overlap", "m", "depth to which fingertip and object overlap", count, tips, {}},
+      [](const StepRecord& step, std::span<double> row) {
+        std::copy(step.reading.state.overlap.begin(), step.reading.state.overlap.end(), row.begin());
+      });
+  if (checks_ == nullptr) return;
+  const auto each = [](Vector3d PlantContact::*member) {
+    return [member](const StepRecord& step, std::span<double> row) {
+      for (size_t i = 0; i < step.response.contacts.size(); ++i) {
+        Copy(step.response.contacts[i].*member, row.subspan(3 * i, 3));
+      }
+    };
+  };
+  Add({"contact/position", "m", "contact points in the world", 3 * count, xyz, {}},
+      each(&PlantContact::position));
+  Add({"contact/normal", "1", "normals in the world, into the object", 3 * count, xyz, {}},
+      each(&PlantContact::normal));
+  Add({"contact/force", "N", "forces of finger on object in the world", 3 * count, xyz, {{"mu", mu}}},
+      each(&PlantContact::force));
+  Add({"contact/f_c",
+       "N",
+       "f_c of the engine, each in its contact frame, z into the object",
+       3 * count,
+       xyz,
+       {{"mu", mu}}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.findings.f_c, row); });
+  Add({"contact/f_c_model", "N", "f_c that (19), (46), (48) predict", 3 * count, xyz, {{"mu", mu}}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.findings.f_c_model, row); });
+  const auto add_slip = [&](const std::string& group, const std::string& what,
+                            const std::vector<std::string>& parts,
+                            std::vector<SlipState> StepFindings::*states) {
+    Add({group + "/slip",
+         "m",
+         "slip of each " + what + " since t = 0",
+         3 * CountOf(parts),
+         Expand(parts, {"x", "y", "z"}),
+         {}},
+        [states](const StepRecord& step, std::span<double> row) {
+          const std::vector<SlipState>& slip = step.findings.*states;
+          for (size_t i = 0; i < slip.size(); ++i) Copy(slip[i].distance, row.subspan(3 * i, 3));
+        });
+    Add({group + "/cone_use",
+         "1",
+         "tangential force over mu times normal force of each " + what,
+         CountOf(parts),
+         parts,
+         {}},
+        [states](const StepRecord& step, std::span<double> row) {
+          const std::vector<SlipState>& slip = step.findings.*states;
+          for (size_t i = 0; i < slip.size(); ++i) row[i] = slip[i].cone_use;
+        });
+  };
+  add_slip("contact", "fingertip", tips, &StepFindings::fingertip_slip);
+  std::vector<std::string> wheels;
+  for (const EngineWheel& wheel : setup_->adapter().wheels()) {
+    wheels.push_back(NameOf(setup_->engine(), mjOBJ_JOINT, wheel.joint));
+  }
+  if (!wheels.empty()) add_slip("wheel", "wheel", wheels, &StepFindings::wheel_slip);
+}
+
+void RunRecorder::AddTaskSignals() {
+  std::string phases;
+  for (int i = 0; i <= static_cast<int>(Phase::kDone); ++i) {
+    phases += (i > 0 ? ", " : "") + std::to_string(i) + " " + NameOf(static_cast<Phase>(i));
+  }
+  Add({"task/phase", "1", "phase of the task: " + phases, 1, {}, {}},
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.command.task.phase; });
+  Add({"task/contacts", "1", "fingertips that the law lets push, bit by bit", 1, {}, {}},
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.command.handling.contacts; });
+  Add({"task/weight", "1", "part of the object's stated weight that the hand bears", 1, {}, {}},
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.command.task.weight; });
+  if (checks_ == nullptr) return;
+  Add({"task/support_force", "N", "upward force on the object by what it lies on", 1, {}, {}},
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.response.support_force; });
+}
+
+void RunRecorder::AddCheckSignals() {
+  for (const std::span<const CheckRecord> checks : {checks_->model_checks(), checks_->motion_checks()}) {
+    for (const CheckRecord& check : checks) {
+      if (!check.applies) continue;
+      Add({"check/" + check.name,
+           check.unit,
+           check.description,
+           1,
+           {},
+           {{"bound", check.bound}, {"kind", static_cast<double>(check.kind)}}},
+          [&check](const StepRecord& /*step*/, std::span<double> row) { row[0] = check.last; });
+    }
+  }
+}
+
+void RunRecorder::Record(const StepRecord& step) {
+  log_.Row(LogWriter::kTime)[0] = step.time;
+  for (const Channel& channel : channels_) channel.source(step, log_.Row(channel.signal));
+  log_.EndRow();
+}
+
+void RunRecorder::Close(const std::string& summary) {
+  log_.SetText("summary", summary);
+  log_.Close();
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,53 @@
+#pragma once
+
+// Which quantities of a run go into its log.
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "harness/log/log_writer.h"
+#include "harness/run/closed_loop.h"
+
+namespace dexcheck {
+
+/// Where a run's inputs lie, to be kept in the log.
+struct RunInputs {
+  std::filesystem::path robot;
+  std::filesystem::path mjcf;
+  std::string command;  ///< As it was typed.
+};
+
+/// Writes log.h5 of one run.
+class RunRecorder {
+ public:
+  /// @throws InputError when the log cannot be written.
+  RunRecorder(const std::filesystem::path& path, const ClosedLoop& loop, const Setup& setup,
+              const RunInputs& inputs);
+
+  /// Records a step; allocates nothing.
+  void Record(const StepRecord& step);
+  /// Adds the summary and finishes the file.
+  void Close(const std::string& summary);
+
+ private:
+  using Source = std::function<void(const StepRecord& step, std::span<double> row)>;
+  void Add(const SignalInfo& signal, Source source);
+  void AddStateSignals();
+  void AddObjectSignals();
+  void AddContactSignals();
+  void AddTaskSignals();
+  void AddCheckSignals();
+
+  const Setup* setup_;
+  const CrossCheck* checks_;  // null without
+  LogWriter log_;
+  struct Channel {
+    int signal;
+    Source source;
+  };
+  std::vector<Channel> channels_;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,134 @@
+#include "harness/run/run_summary.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "harness/base/version.h"
+#include "harness/engine/machine.h"
+
+namespace dexcheck {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double Rms(double squares, long count) {
+  return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
+}
+
+Json ToJson(const CheckRecord& check) {
+  Json json = {{"kind", NameOf(check.kind)}, {"max", check.worst}, {"rms", check.rms()},
+               {"bound", check.bound},       {"unit", check.unit}, {"at_time_s", check.at},
+               {"pass", !check.failed}};
+  if (check.failed) json["failed_at_s"] = check.failed_at;
+  if (!check.part.empty()) json["where"] = check.part;
+  json["description"] = check.description;
+  return json;
+}
+
+/// Of a constant, which has no time.
+Json ConstantToJson(const CheckRecord& record) {
+  return {{"kind", NameOf(record.kind)},
+          {"max", record.worst},
+          {"bound", record.bound},
+          {"pass", !record.failed}};
+}
+
+Json TaskToJson(const ClosedLoop& loop) {
+  const PickAndPlace& task = loop.task()->task();
+  Json json = {{"done", task.is_done()},
+               {"attempts", task.history().empty() ? 0 : task.history().back().attempt},
+               {"first_failure", task.first_failure()},
+               {"weighed", task.scale()},
+               {"push_m", task.push()},
+               {"torque_jump_max_N_m", loop.task()->torque_jump()},
+               {"force_closure_margin", task.plan().contacts.margin},
+               {"unjudged_steps", loop.record().findings.unjudged_steps},
+               {"phases", Json::array()}};
+  for (const PhaseEntry& entry : task.history()) {
+    json["phases"].push_back(
+        {{"phase", NameOf(entry.phase)}, {"begin_s", entry.time}, {"attempt", entry.attempt}});
+  }
+  return json;
+}
+
+}  // namespace
+
+const char* NameOf(Verdict verdict) {
+  if (verdict == Verdict::kPass) return "pass";
+  return verdict == Verdict::kDisagreement ? "disagreement" : "failed";
+}
+
+void TrackingStatistics::Add(const TrackingError& error) {
+  position_max_ = std::max(position_max_, error.position.norm());
+  position_squares_ += error.position.squaredNorm();
+  orientation_max_ = std::max(orientation_max_, error.orientation);
+  orientation_squares_ += error.orientation * error.orientation;
+  ++count_;
+}
+
+double TrackingStatistics::position_rms() const { return Rms(position_squares_, count_); }
+double TrackingStatistics::orientation_rms() const { return Rms(orientation_squares_, count_); }
+
+void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
+  if (loop.is_checking()) {
+    result->attribution = Attribute(setup.gate(), loop.checks().model_checks(), loop.checks().motion_checks(),
+                                    loop.checks().TellLaw());
+  }
+  const bool disagrees = result->attribution.cause != Cause::kNone;
+  result->verdict = disagrees ? Verdict::kDisagreement : Verdict::kPass;
+  if (!result->failure.empty()) result->verdict = Verdict::kFailed;
+}
+
+Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& result) {
+  const Scenario& scenario = setup.scenario();
+  Json json = {{"scenario", scenario.name},         {"description", scenario.description},
+               {"verdict", NameOf(result.verdict)}, {"failure", result.failure},
+               {"interrupted", result.interrupted}, {"seed", scenario.seed},
+               {"overrides", scenario.overrides},   {"duration_s", scenario.duration},
+               {"simulated_s", loop.time()},        {"time_step_s", scenario.plant.time_step}};
+  json["tracking"] = {{"position_error_max_m", result.tracking.position_max()},
+                      {"position_error_rms_m", result.tracking.position_rms()},
+                      {"orientation_error_max_rad", result.tracking.orientation_max()},
+                      {"orientation_error_rms_rad", result.tracking.orientation_rms()}};
+  if (loop.task() != nullptr) json["task"] = TaskToJson(loop);
+  json["attribution"] = {{"cause", NameOf(result.attribution.cause)},
+                         {"evidence", result.attribution.evidence},
+                         {"checks", Json::object()}};
+  for (const Attribution& one : result.attribution.attributions) {
+    json["attribution"]["checks"][one.check] = NameOf(one.cause);
+  }
+  json["checks"] = Json::object();
+  if (loop.is_checking()) {
+    for (const CheckRecord& record : setup.gate().records)
+      json["checks"][record.name] = ConstantToJson(record);
+    for (const std::span<const CheckRecord> checks :
+         {loop.checks().model_checks(), loop.checks().motion_checks()}) {
+      for (const CheckRecord& check : checks) {
+        if (check.applies) json["checks"][check.name] = ToJson(check);
+      }
+    }
+    const CrossCheck& checks = loop.checks();
+    const StepFindings& findings = checks.findings();
+    json["assumptions"] = {{"fingertip_slip_max_m", checks.Find("fingertip_slip").worst},
+                           {"wheel_slip_max_m", checks.Find("wheel_slip").worst},
+                           {"base_tilt_max_rad", checks.Find("base_tilt").worst},
+                           {"cone_margin_min", findings.least_cone_margin},
+                           {"contacts_lost", findings.contacts_lost}};
+  }
+  const LoopTimes& times = loop.times();
+  const double steps = static_cast<double>(std::max(loop.record().step, 1L));
+  const double microseconds = 1e6 / steps;
+  json["speed"] = {{"steps", loop.record().step},
+                   {"real_time_factor", result.wall_seconds > 0.0 ? loop.time() / result.wall_seconds : 0.0},
+                   {"plant_us_per_step", microseconds * times.plant},
+                   {"controller_us_per_step", microseconds * times.controller},
+                   {"cross_check_us_per_step", microseconds * times.cross_check},
+                   {"grasp_force_us_per_solve",
+                    times.solves > 0 ? 1e6 * times.grasp_force / static_cast<double>(times.solves) : 0.0},
+                   {"recording_us_per_step", microseconds * result.recording_seconds}};
+  json["versions"] = {{"dexcheck", Version()}, {"mujoco", mj_versionString()}};
+  json["machine"] = DescribeMachine();
+  return json;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <utility>
+
+#include "controller/common/text.h"
+#include "harness/run/run_summary.h"
+
+namespace dexcheck {
+
+/// One run from the first contact to its verdict. What goes wrong in the simulation ends the run and becomes
+/// part of the result; what is wrong with the input is thrown.
+class Runner {
+ public:
+  /// @throws InputError as ClosedLoop.
+  Runner(const Setup& setup, bool check) : setup_(&setup), loop_(setup, check) {}
+  /// The same with other parts than the scenario's own.
+  Runner(const Setup& setup, bool check, LoopParts parts)
+      : setup_(&setup), loop_(setup, check, std::move(parts)) {}
+
+  [[nodiscard]] const ClosedLoop& loop() const { return loop_; }
+  [[nodiscard]] const RunResult& result() const { return result_; }
+
+  /// Settles, steps to the end or to a failure, and judges.
+  /// @param after_step(const StepRecord&) called after each step, also after one that failed; its time counts
+  /// as recording.
+  /// @param should_stop asked before each step, of settling too; true ends the run as interrupted.
+  template <typename AfterStep, typename ShouldStop>
+  const RunResult& Run(const AfterStep& after_step, const ShouldStop& should_stop) {
+    Guard(
+        [&] {
+          if (!loop_.Settle(should_stop)) Interrupt();
+        },
+        /*settling=*/true);
+    const Clock::time_point begin = Clock::now();
+    while (result_.failure.empty() && !loop_.is_finished()) {
+      if (should_stop()) {
+        Interrupt();
+        break;
+      }
+      Guard([&] { loop_.Step(); }, /*settling=*/false);
+      if (loop_.record().step == 0) break;
+      if (loop_.record().command.tracks) result_.tracking.Add(loop_.record().error);
+      const Clock::time_point recording = Clock::now();
+      after_step(loop_.record());
+      result_.recording_seconds += SecondsSince(recording);
+    }
+    result_.wall_seconds = SecondsSince(begin);
+    Judge(*setup_, loop_, &result_);
+    return result_;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static double SecondsSince(Clock::time_point begin) {
+    return std::chrono::duration<double>(Clock::now() - begin).count();
+  }
+
+  void Interrupt() {
+    result_.interrupted = true;
+    result_.failure = "interrupted";
+  }
+
+  template <typename Work>
+  void Guard(const Work& work, bool settling) {
+    try {
+      work();
+    } catch (const InputError&) {
+      throw;
+    } catch (const Error& error) {
+      result_.grasp_lost = dynamic_cast<const GraspLost*>(&error) != nullptr;
+      result_.failure = error.what() + (settling ? " while settling"
+                                                 : " at t = " + FormatNumber(loop_.record().time) + " s");
+    }
+  }
+
+  const Setup* setup_;
+  ClosedLoop loop_;
+  RunResult result_;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,279 @@
+#include "harness/scenario/scenario.h"
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "controller/common/errors.h"
+#include "controller/object/euler_zyz.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr double kMaxSteps = 1e8;
+/// s. Contacts settle within some of their time constants, 2 ms each, and posture within some periods of its
+/// task; whatever has not come to rest by then, never will.
+constexpr double kMaxSettle = 100.0;
+
+/// A document with the overrides that are the scenario's own; the others go to `model_overrides`.
+TomlDocument OpenDocument(const std::string& text, const std::string& source,
+                          const std::vector<std::string>& overrides,
+                          std::vector<std::string>* model_overrides) {
+  constexpr std::string_view kModel = "model.";
+  TomlDocument document(text, source);
+  for (const std::string& assignment : overrides) {
+    const bool own = assignment.starts_with("model.file=") || assignment.starts_with("model.overrides");
+    if (assignment.starts_with(kModel) && !own) {
+      model_overrides->push_back(assignment.substr(kModel.size()));
+    } else {
+      document.Override(assignment);
+    }
+  }
+  return document;
+}
+
+double ReadOr(TomlTable& table, std::string_view key, double otherwise,
+              double (TomlValue::*read)() const = &TomlValue::AsPositive) {
+  const auto value = table.Find(key);
+  return value ? ((*value).*read)() : otherwise;
+}
+
+std::string ReadPath(TomlTable& table, std::string_view key, const std::filesystem::path& folder) {
+  const auto value = table.Find(key);
+  return value ? (folder / value->AsText()).lexically_normal().string() : "";
+}
+
+void ReadModel(const TomlValue& value, const std::filesystem::path& folder, Scenario* scenario) {
+  TomlTable table = value.AsTable();
+  scenario->model_file = ReadPath(table, "file", folder);
+  if (const auto list = table.Find("overrides")) {
+    for (const TomlValue& entry : list->AsList()) scenario->model_overrides.push_back(entry.AsText());
+  }
+  table.RejectUnused();
+}
+
+void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scenario* scenario) {
+  constexpr long kMaxNoslipIterations = 1000;
+  TomlTable table = value.AsTable();
+  PlantOptions& plant = scenario->plant;
+  scenario->mjcf_file = ReadPath(table, "mjcf", folder);
+  plant.time_step = ReadOr(table, "time_step", plant.time_step);
+  plant.control_step = ReadOr(table, "control_step", 0.0, &TomlValue::AsNotNegative);
+  plant.contact_time_constant = ReadOr(table, "contact_time_constant", 0.0, &TomlValue::AsNotNegative);
+  plant.contact_impedance = ReadOr(table, "contact_impedance", plant.contact_impedance);
+  if (plant.contact_impedance >= 1.0) table.Get("contact_impedance").Fail("must be less than 1");
+  plant.impratio = ReadOr(table, "impratio", plant.impratio);
+  if (const auto count = table.Find("noslip_iterations")) {
+    plant.noslip_iterations = static_cast<int>(count->AsWhole(0, kMaxNoslipIterations));
+  }
+  if (const auto flag = table.Find("bonded")) plant.bonded = flag->AsFlag();
+  if (const auto flag = table.Find("implicit_damping")) plant.implicit_damping = flag->AsFlag();
+  if (const auto mu = table.Find("floor_friction")) plant.floor_friction = mu->AsPositive();
+  if (const auto mu = table.Find("finger_friction")) plant.finger_friction = mu->AsPositive();
+  table.RejectUnused();
+}
+
+SurfacePoint ReadContact(const TomlValue& value) {
+  // On the torus: u around its axis, v around its tube.
+  const Vector2d degrees = value.AsVector<2>();
+  return {DegToRad(degrees[0]), DegToRad(degrees[1]), 0};
+}
+
+void ReadContacts(TomlTable& table, GraspOptions* grasp) {
+  const TomlValue contacts = table.Get("contacts_deg");
+  for (const TomlValue& entry : contacts.AsList()) grasp->contacts.push_back(ReadContact(entry));
+  if (grasp->contacts.size() != grasp->fingertips.size()) {
+    contacts.Reject("must have one contact for each of the " + std::to_string(grasp->fingertips.size()) +
+                    " fingertips");
+  }
+  if (const auto xyz = table.Find("xyz")) grasp->X_FO.translation() = xyz->AsVector<3>();
+  if (const auto zyz = table.FindAngles<3>("zyz")) grasp->X_FO.linear() = CalcRotationZyz(*zyz);
+}
+
+/// @param planned whether a task chooses the contacts.
+void ReadGrasp(const TomlValue& value, bool planned, Scenario* scenario) {
+  TomlTable table = value.AsTable();
+  GraspOptions& grasp = scenario->grasp;
+  const TomlValue fingertips = table.Get("fingertips");
+  for (const TomlValue& entry : fingertips.AsList()) grasp.fingertips.push_back(entry.AsName());
+  if (grasp.fingertips.size() < 3) fingertips.Reject("needs at least three fingertips to hold an object");
+  if (!planned) ReadContacts(table, &grasp);
+  grasp.frame = table.Get("frame").AsName();
+  if (const auto joints = table.Find("joints_deg")) {
+    for (const auto& [name, angle] : joints->AsTable().GetEntries()) {
+      grasp.joints.emplace_back(name, DegToRad(angle.AsNumber()));
+    }
+  }
+  table.RejectUnused();
+}
+
+void ReadTask(const TomlValue& value, Scenario* scenario) {
+  TomlTable table = value.AsTable();
+  TaskOptions task;
+  PickAndPlaceOptions& pick = task.pick_and_place;
+  task.X_Bo.translation() = table.Get("xyz").AsVector<3>();
+  if (const auto zyz = table.FindAngles<3>("zyz")) task.X_Bo.linear() = CalcRotationZyz(*zyz);
+  if (const auto joints = table.Find("arm_joints")) {
+    for (const TomlValue& entry : joints->AsList()) task.arm_joints.push_back(entry.AsName());
+  }
+  pick.raise.z() = pick.plan.raise = table.Get("raise").AsPositive();
+  pick.transport = table.Get("transport").AsVector<3>();
+  pick.plan.support = table.Get("support_height").AsNumber();
+  constexpr std::pair<const char*, double PickAndPlaceOptions::*> kNumbers[] = {
+      {"approach_time", &PickAndPlaceOptions::approach_time},
+      {"lower_time", &PickAndPlaceOptions::lower_time},
+      {"close_time", &PickAndPlaceOptions::close_time},
+      {"search_speed", &PickAndPlaceOptions::search_speed},
+      {"grip_time", &PickAndPlaceOptions::grip_time},
+      {"take_over_time", &PickAndPlaceOptions::take_over_time},
+      {"raise_time", &PickAndPlaceOptions::raise_time},
+      {"arm_rate", &PickAndPlaceOptions::arm_rate},
+      {"transport_time", &PickAndPlaceOptions::transport_time},
+      {"touch_force", &PickAndPlaceOptions::touch_force},
+      {"overload", &PickAndPlaceOptions::overload},
+      {"largest_push", &PickAndPlaceOptions::largest_push},
+  };
+  for (const auto& [key, member] : kNumbers) pick.*member = ReadOr(table, key, pick.*member);
+  pick.plan.opening = ReadOr(table, "opening", pick.plan.opening);
+  constexpr long kMaxAttempts = 10;
+  if (const auto attempts = table.Find("attempts")) {
+    pick.attempts = static_cast<int>(attempts->AsWhole(1, kMaxAttempts));
+  }
+  table.RejectUnused();
+  scenario->task = task;
+}
+
+/// What a task takes from the rest of the scenario. @throws InputError when that does not fit a task.
+void FinishTask(Scenario* scenario) {
+  const auto require = [&](bool holds, const char* problem) {
+    if (!holds) throw InputError(scenario->source + ": " + problem);
+  };
+  require(scenario->start == Start::kRest, "start: must be \"rest\" for a task");
+  require(!scenario->plant.bonded, "plant.bonded: a task needs contacts that open and close");
+  require(scenario->plant.control_step <= scenario->plant.time_step,
+          "plant.control_step: a task decides at every time step");
+  require(scenario->control.orientation == OrientationFeedback::kRotation,
+          "control.orientation: must be \"rotation\" for a task");
+  PickAndPlaceOptions& pick = scenario->task->pick_and_place;
+  pick.f_min = scenario->control.f_min;
+  pick.posture_frequency = scenario->control.posture_frequency;
+  pick.plan.mu = scenario->control.mu;
+}
+
+/// K_p and K_v, or natural frequency and damping ratio of (57).
+void ReadGains(TomlTable& table, ObjectGains* gains) {
+  table.RejectTogether("K_p", {"natural_frequency"});
+  table.RejectTogether("K_v", {"damping_ratio"});
+  if (const auto frequency = table.Find("natural_frequency")) {
+    const Vector6d omega = frequency->AsVectorOrNumber<6>();
+    const Vector6d zeta = table.Get("damping_ratio").AsVectorOrNumber<6>();
+    gains->K_p = omega.cwiseAbs2();
+    gains->K_v = 2.0 * zeta.cwiseProduct(omega);
+    if ((omega.array() < 0.0).any()) frequency->Fail("must not be negative");
+    return;
+  }
+  gains->K_p = table.Get("K_p").AsVectorOrNumber<6>();
+  gains->K_v = table.Get("K_v").AsVectorOrNumber<6>();
+}
+
+/// "identity", "mass", or { platform, arm }: a diagonal with 1 for all other joints.
+void ReadWeight(const TomlValue& value, ControlOptions* control) {
+  if (value.IsText()) {
+    control->weight = value.AsChoice<RedundancyWeight::Kind>(
+        {{"identity", RedundancyWeight::Kind::kIdentity}, {"mass", RedundancyWeight::Kind::kMass}});
+    return;
+  }
+  TomlTable table = value.AsTable();
+  control->weight = RedundancyWeight::Kind::kDiagonal;
+  control->platform_weight = ReadOr(table, "platform", 1.0);
+  control->arm_weight = ReadOr(table, "arm", 1.0);
+  table.RejectUnused();
+}
+
+void ReadControl(const TomlValue& value, Scenario* scenario) {
+  TomlTable table = value.AsTable();
+  ControlOptions& control = scenario->control;
+  ReadGains(table, &control.gains);
+  if (const auto choice = table.Find("orientation")) {
+    control.orientation = choice->AsChoice<OrientationFeedback>(
+        {{"angles", OrientationFeedback::kAngles}, {"rotation", OrientationFeedback::kRotation}});
+  }
+  if (const auto weight = table.Find("weight")) ReadWeight(*weight, &control);
+  control.posture_frequency =
+      ReadOr(table, "posture_frequency", control.posture_frequency, &TomlValue::AsNotNegative);
+  control.f_min = ReadOr(table, "f_min", 0.0, &TomlValue::AsNotNegative);
+  control.f_max = table.Get("f_max").AsPositive();
+  if (control.f_max <= control.f_min) table.Get("f_max").Fail("must be greater than f_min");
+  control.mu = table.Get("mu").AsPositive();
+  if (const auto [error, unit] = table.FindWithAngleUnit("contact_error"); error) {
+    control.contact_error = unit * error->AsNumber();
+  }
+  table.RejectUnused();
+}
+
+void ReadExpectation(const TomlValue& value, Expectation* expect) {
+  TomlTable table = value.AsTable();
+  if (const auto position = table.Find("position")) expect->position = position->AsPositive();
+  if (const auto [orientation, unit] = table.FindWithAngleUnit("orientation"); orientation) {
+    expect->orientation = unit * orientation->AsPositive();
+  }
+  expect->from = ReadOr(table, "from", 0.0, &TomlValue::AsNotNegative);
+  table.RejectUnused();
+}
+
+}  // namespace
+
+Scenario ParseScenario(const std::string& text, const std::string& source,
+                       const std::filesystem::path& folder, const std::vector<std::string>& overrides) {
+  Scenario scenario;
+  scenario.text = text;
+  scenario.source = source;
+  scenario.overrides = overrides;
+  std::vector<std::string> model_overrides;
+  const TomlDocument document = OpenDocument(text, source, overrides, &model_overrides);
+  TomlTable root = document.Open();
+  root.RejectOthersThan({"name", "description", "duration", "settle", "start", "start_error", "model",
+                         "plant", "grasp", "task", "trajectory", "control", "bounds", "expect"});
+  scenario.name = root.Get("name").AsName();
+  if (const auto description = root.Find("description")) scenario.description = description->AsText();
+  scenario.duration = root.Get("duration").AsPositive();
+  scenario.settle = ReadOr(root, "settle", 1.0);
+  if (scenario.settle > kMaxSettle) root.Get("settle").Fail("must be at most 100 s");
+  scenario.start = root.Get("start").AsChoice<Start>({{"moving", Start::kMoving}, {"rest", Start::kRest}});
+  if (const auto error = root.Find("start_error")) {
+    TomlTable table = error->AsTable();
+    if (const auto xyz = table.Find("xyz")) scenario.start_error.head<3>() = xyz->AsVector<3>();
+    if (const auto zyz = table.FindAngles<3>("zyz")) scenario.start_error.tail<3>() = *zyz;
+    table.RejectUnused();
+  }
+  if (const auto model = root.Find("model")) ReadModel(*model, folder, &scenario);
+  scenario.model_overrides.insert(scenario.model_overrides.end(), model_overrides.begin(),
+                                  model_overrides.end());
+  if (const auto plant = root.Find("plant")) ReadPlant(*plant, folder, &scenario);
+  root.RejectTogether("task", {"trajectory", "start_error"});
+  if (const auto task = root.Find("task")) ReadTask(*task, &scenario);
+  ReadGrasp(root.Get("grasp"), scenario.task.has_value(), &scenario);
+  ReadControl(root.Get("control"), &scenario);
+  if (scenario.task) FinishTask(&scenario);
+  if (const auto bounds = root.Find("bounds")) {
+    for (const auto& [name, value] : bounds->AsTable().GetEntries()) {
+      scenario.bounds.emplace_back(name, value.AsNotNegative());
+    }
+  }
+  if (const auto expect = root.Find("expect")) ReadExpectation(*expect, &scenario.expect);
+  if (scenario.duration < scenario.plant.time_step)
+    root.Get("duration").Fail("must be at least one time step");
+  if (scenario.duration / scenario.plant.time_step > kMaxSteps) {
+    root.Get("duration").Fail("must be at most 1e8 time steps");
+  }
+  if (scenario.settle / scenario.plant.time_step > kMaxSteps) {
+    if (const auto settle = root.Find("settle")) settle->Fail("must be at most 1e8 time steps");
+    root.Get("plant").AsTable().Get("time_step").Fail("is too small to settle in 1e8 time steps");
+  }
+  if (scenario.task) return scenario;
+  TomlTable trajectory = root.Get("trajectory").AsTable();
+  scenario.trajectory = ReadTrajectory(trajectory);
+  return scenario;
+}
+
+}  // namespace dexcheck

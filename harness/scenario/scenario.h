@@ -1,0 +1,116 @@
+#pragma once
+
+// What a run is: plant, model, grasp, trajectory, controller, checks. Read from a TOML file; the shipped ones
+// are in harness/shipped/scenarios.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "controller/common/toml_reader.h"
+#include "controller/common/types.h"
+#include "controller/contact/surface.h"
+#include "controller/control/computed_torque.h"
+#include "controller/control/object_tracking.h"
+#include "controller/control/trajectory_reader.h"
+#include "controller/handling/pick_and_place.h"
+
+namespace dexcheck {
+
+/// How a run begins.
+enum class Start {
+  kMoving,  ///< Settled, then robot and object move with X_d_dot(0) from before t = 0 on.
+  kRest,    ///< Settled at rest; X_d takes off at t = 0 as its formula says.
+};
+
+/// Changes to the MJCF's plant.
+struct PlantOptions {
+  double time_step = 1e-3;             ///< s.
+  double control_step = 0.0;           ///< Torques are held this long, s; 0 for every step.
+  double contact_time_constant = 0.0;  ///< solref of all contact pairs, s; 0 for twice the time step.
+  double contact_impedance = 0.99;     ///< solimp, constant.
+  double impratio = 100.0;
+  int noslip_iterations = 0;
+  bool bonded = false;            ///< Fingertips hang on the object by ball joints instead of contacts.
+  bool implicit_damping = false;  ///< The engine's own treatment of joint damping.
+  std::optional<double> floor_friction;   ///< mu of wheels on the floor.
+  std::optional<double> finger_friction;  ///< mu of fingertips on the object.
+};
+
+/// Where and how the object is held.
+struct GraspOptions {
+  std::vector<std::string> fingertips;  ///< Frames.
+  std::vector<SurfacePoint> contacts;   ///< Of the object, one for each fingertip; none for a task.
+  std::string frame;                    ///< Frame that the object is placed in; of a task: the palm.
+  Pose X_FO = Pose::Identity();         ///< Object in it.
+  std::vector<std::pair<std::string, double>> joints;  ///< Posture, rad; other joints are 0.
+};
+
+/// Law, gains and forces.
+struct ControlOptions {
+  ObjectGains gains;
+  OrientationFeedback orientation = OrientationFeedback::kAngles;
+  RedundancyWeight::Kind weight = RedundancyWeight::Kind::kIdentity;
+  double platform_weight = 1.0;     ///< W of the platform's velocities; kDiagonal.
+  double arm_weight = 1.0;          ///< Of joints that move several fingertips of the grasp; kDiagonal.
+  double posture_frequency = 10.0;  ///< Of the null-space posture task, rad/s, critically damped.
+  double f_min = 0.0;               ///< Least normal force (squeeze), N.
+  double f_max = 0.0;               ///< Largest, N.
+  double mu = 0.0;                  ///< Friction that the grasp force counts on.
+  double contact_error = 0.0;       ///< By how much kappa is told wrongly, rad: a fault to be found.
+};
+
+/// Take the object from a support, carry it, put it down.
+struct TaskOptions {
+  Pose X_Bo = Pose::Identity();  ///< Where the object lies.
+  /// Joints that may place the palm; empty for those of the arm alone.
+  std::vector<std::string> arm_joints;
+  PickAndPlaceOptions pick_and_place;
+};
+
+/// How well the object must follow, which belongs to what the scenario means. From `from` on, s.
+struct Expectation {
+  std::optional<double> position;     ///< Largest position error, m.
+  std::optional<double> orientation;  ///< Largest orientation error, rad.
+  double from = 0.0;
+};
+
+/// One bound that a scenario sets for a check by name.
+using BoundOverride = std::pair<std::string, double>;
+
+/// A run.
+struct Scenario {
+  std::string name;
+  std::string description;
+  double duration = 0.0;  ///< s.
+  double settle = 0.0;    ///< Before t = 0, s.
+  Start start = Start::kRest;
+  Vector6d start_error = Vector6d::Zero();  ///< X_d - X_o at t = 0: m, rad.
+
+  std::string model_file;                    ///< Empty for the shipped one.
+  std::vector<std::string> model_overrides;  ///< "PATH=VALUE" of the parameter file.
+  std::string mjcf_file;                     ///< Empty for the shipped one.
+  PlantOptions plant;
+  GraspOptions grasp;
+  TrajectoryMaker trajectory;       ///< None for a task.
+  std::optional<TaskOptions> task;  ///< Instead of a trajectory; the grasp's contacts are then planned.
+  ControlOptions control;
+  std::vector<BoundOverride> bounds;
+  Expectation expect;
+  std::uint64_t seed = 0;  ///< Of random changes to posture and grasp; 0 for none.
+
+  std::string text;                    ///< The file.
+  std::string source;                  ///< Its name, for messages.
+  std::vector<std::string> overrides;  ///< "PATH=VALUE" of the scenario.
+};
+
+/// Reads a scenario. Relative paths in it start at `folder`, its own.
+/// @param overrides "PATH=VALUE" each; "model.PATH=VALUE" reaches into the parameter file.
+/// @throws InputError, one line that names file, line, key and value.
+Scenario ParseScenario(const std::string& text, const std::string& source,
+                       const std::filesystem::path& folder, const std::vector<std::string>& overrides);
+
+}  // namespace dexcheck

@@ -1,0 +1,264 @@
+#include "harness/scenario/setup.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/contact/find_contact.h"
+#include "controller/contact/object_surface.h"
+#include "controller/model/parameter_reader.h"
+#include "controller/object/euler_zyz.h"
+#include "harness/engine/remove_looks.h"
+
+namespace dexcheck {
+namespace {
+
+/// Deep enough that the engine sees a contact, less than any grasp force makes it, m.
+constexpr double kStartPenetration = 1e-6;
+
+// How far a seed moves the grasp, either way.
+constexpr double kVariedJoint = DegToRad(2.0);    // rad
+constexpr double kVariedContact = DegToRad(3.0);  // rad on the object,
+constexpr double kFarthestContact = 2.5e-3;       // but not farther than this along it, m
+constexpr double kVariedPlace = 2e-3;             // m
+constexpr double kVariedLay = 0.05;               // m, of an object that lies on a support, either way
+constexpr int kMostDraws = 100;                   // until the fingers reach
+
+RobotModel ReadModel(const Scenario& scenario, const std::filesystem::path& robot) {
+  return ParseRobotModel(ReadTextFile(robot.string()), robot.string(), scenario.model_overrides);
+}
+
+/// From -1 to 1.
+double Draw(std::mt19937_64* random) { return 2.0 * static_cast<double>((*random)() >> 11) * 0x1p-53 - 1.0; }
+
+[[noreturn]] void Fail(const Scenario& scenario, const std::string& key, const std::string& problem) {
+  throw InputError(scenario.source + ": " + key + ": " + problem);
+}
+
+}  // namespace
+
+Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf)
+    : Setup(scenario, robot, mjcf, LoadMjcf(mjcf)) {}
+
+Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
+             MjModelPtr engine)
+    : scenario_(scenario), model_(ReadModel(scenario, robot)), engine_(std::move(engine)) {
+  if (!model_.object()) {
+    throw InputError(robot.string() + ": object: is missing, and the scenario holds one");
+  }
+  RemoveLooks(engine_.get());
+  adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
+  gate_ = RunStaticGate(*adapter_);
+  ApplyPlantOptions();
+  try {
+    surface_ = MakeSurface(model_.object()->shape);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(robot.string() + ": " + error.what());
+  }
+  FindFingertips();
+  FindGrasp();
+  if (scenario_.plant.bonded) MakeBonds();
+}
+
+void Setup::ApplyPlantOptions() {
+  const PlantOptions& plant = scenario_.plant;
+  mjModel& m = *engine_;
+  m.opt.timestep = plant.time_step;
+  m.opt.impratio = plant.impratio;
+  m.opt.noslip_iterations = plant.noslip_iterations;
+  const double time_constant =
+      plant.contact_time_constant > 0.0 ? plant.contact_time_constant : 2.0 * plant.time_step;
+  for (int pair = 0; pair < m.npair; ++pair) {
+    m.pair_solref[mjNREF * pair] = time_constant;
+    mjtNum* const solimp = m.pair_solimp + mjNIMP * pair;
+    solimp[0] = solimp[1] = plant.contact_impedance;
+    const bool has_floor =
+        m.geom_type[m.pair_geom1[pair]] == mjGEOM_PLANE || m.geom_type[m.pair_geom2[pair]] == mjGEOM_PLANE;
+    const std::optional<double>& mu = has_floor ? plant.floor_friction : plant.finger_friction;
+    if (mu) m.pair_friction[5 * pair] = m.pair_friction[5 * pair + 1] = *mu;
+  }
+}
+
+void Setup::FindFingertips() {
+  for (const std::string& name : scenario_.grasp.fingertips) {
+    int frame = -1;
+    for (const int tip : model_.fingertips()) {
+      if (model_.frames()[static_cast<size_t>(tip)].name == name) frame = tip;
+    }
+    if (frame < 0) Fail(scenario_, "grasp.fingertips", Quote(name) + " is no fingertip of the model");
+    if (std::find(fingertips_.begin(), fingertips_.end(), frame) != fingertips_.end()) {
+      Fail(scenario_, "grasp.fingertips", Quote(name) + " is named twice");
+    }
+    fingertips_.push_back(frame);
+  }
+  std::vector<int> users(static_cast<size_t>(model_.num_joints()), 0);
+  for (const int tip : fingertips_) {
+    int joint = model_.frames()[static_cast<size_t>(tip)].link;
+    for (; joint >= 0; joint = model_.joints()[static_cast<size_t>(joint)].parent) {
+      ++users[static_cast<size_t>(joint)];
+    }
+  }
+  for (int i = 0; i < model_.num_joints(); ++i) {
+    if (users[static_cast<size_t>(i)] == 0) idle_joints_.push_back(i);
+    if (users[static_cast<size_t>(i)] > 1) arm_joints_.push_back(i);
+  }
+}
+
+void Setup::FindGrasp() {
+  std::mt19937_64 random(scenario_.seed);
+  if (scenario_.task) return PlaceTask(&random);
+  const GraspOptions given = scenario_.grasp;
+  double residual = 0.0;
+  for (int i = 0; i < (scenario_.seed == 0 ? 1 : kMostDraws); ++i) {
+    scenario_.grasp = given;
+    if (scenario_.seed != 0) VaryGrasp(&random);
+    const FingerPlacement placement = SolveGrasp();
+    q_start_ = placement.q;
+    if (placement.reached) return;
+    residual = placement.residual;
+  }
+  Fail(scenario_, "grasp.contacts_deg",
+       "the fingertips do not reach their contacts within the joint ranges; the farthest stays " +
+           FormatNumber(residual) + " m away");
+}
+
+void Setup::VaryGrasp(std::mt19937_64* random) {
+  const auto draw = [&](double size) { return size * Draw(random); };
+  GraspOptions& grasp = scenario_.grasp;
+  for (auto& [name, angle] : grasp.joints) angle += draw(kVariedJoint);
+  for (SurfacePoint& contact : grasp.contacts) {
+    const Matrix2d M = surface_->Evaluate(contact).M;
+    contact.u += draw(std::min(kVariedContact, kFarthestContact / M.col(0).norm()));
+    contact.v += draw(std::min(kVariedContact, kFarthestContact / M.col(1).norm()));
+  }
+  for (double& x : grasp.X_FO.translation()) x += draw(kVariedPlace);
+}
+
+VectorXd Setup::ReadPosture() const {
+  VectorXd q = VectorXd::Zero(model_.num_positions());
+  for (const auto& [name, angle] : scenario_.grasp.joints) {
+    const int joint = model_.FindJoint(name);
+    if (joint < 0) Fail(scenario_, "grasp.joints_deg", Quote(name) + " is no joint of the model");
+    q[model_.num_base_positions() + joint] = angle;
+  }
+  return q;
+}
+
+int Setup::FindGraspFrame() const {
+  try {
+    return model_.FindFrame(scenario_.grasp.frame);
+  } catch (const std::invalid_argument&) {
+    Fail(scenario_, "grasp.frame", Quote(scenario_.grasp.frame) + " is no frame of the model");
+  }
+}
+
+void Setup::PlaceTask(std::mt19937_64* random) {
+  if (scenario_.seed != 0) {
+    Pose& X_Bo = scenario_.task->X_Bo;
+    X_Bo.translation().x() += kVariedLay * Draw(random);
+    X_Bo.translation().y() += kVariedLay * Draw(random);
+    X_Bo.linear() = Eigen::AngleAxisd(kPi * Draw(random), Vector3d::UnitZ()) * X_Bo.linear();
+  }
+  hand_.fingertips = fingertips_;
+  hand_.palm_frame = FindGraspFrame();
+  for (const std::string& name : scenario_.task->arm_joints) {
+    const int joint = model_.FindJoint(name);
+    if (joint < 0) Fail(scenario_, "task.arm_joints", Quote(name) + " is no joint of the model");
+    hand_.arm_joints.push_back(joint);
+  }
+  if (hand_.arm_joints.empty()) hand_.arm_joints = ListArmJoints(model_, fingertips_, hand_.palm_frame);
+  q_start_ = ReadPosture();
+  X_Bo_start_ = scenario_.task->X_Bo;
+  X_start_ << X_Bo_start_.translation(), CalcAnyZyzAngles(X_Bo_start_.linear());
+}
+
+FingerPlacement Setup::SolveGrasp() {
+  const GraspOptions& grasp = scenario_.grasp;
+  const VectorXd q = ReadPosture();
+  ModelTerms kinematics(model_, Coordinates::kReduced);
+  kinematics.SetState(q, VectorXd::Zero(model_.num_velocities()));
+  X_Bo_start_ = kinematics.CalcFramePose(FindGraspFrame()) * grasp.X_FO;
+  X_start_ << X_Bo_start_.translation(), CalcAnyZyzAngles(X_Bo_start_.linear());
+  if (scenario_.control.orientation == OrientationFeedback::kAngles &&
+      std::abs(std::sin(X_start_[4])) < kMinSinBeta) {
+    Fail(scenario_, "control.orientation",
+         "\"angles\" are singular where the object starts, at beta = " + FormatNumber(X_start_[4]) +
+             " rad; take \"rotation\"");
+  }
+  return SolveFingerPlacement(model_, fingertips_, *surface_, X_Bo_start_, grasp.contacts, q,
+                              {.penetration = scenario_.plant.bonded ? 0.0 : kStartPenetration});
+}
+
+void Setup::MakeBonds() {
+  mjModel& m = *engine_;
+  const int object = adapter_->object_body();
+  const MjDataPtr data = MakeData(m);
+  adapter_->SetPositions(q_start_, data->qpos);
+  mj_kinematics(&m, data.get());
+  ModelTerms kinematics(model_, Coordinates::kReduced);
+  kinematics.SetState(q_start_, VectorXd::Zero(model_.num_velocities()));
+  for (const int tip : fingertips_) {
+    const Pose X_Bf = kinematics.CalcFramePose(tip);
+    const Sphere sphere(*model_.frames()[static_cast<size_t>(tip)].sphere_radius);
+    kappa_start_.push_back(FindContact(sphere, *surface_, X_Bo_start_.inverse() * X_Bf).kappa);
+    const ContactGeometry contact = CalcContactGeometry(sphere, *surface_, kappa_start_.back());
+    bonds_.push_back({contact.g_f_cf.translation(), contact.g_o_cf});
+
+    const int body = m.site_bodyid[adapter_->frame_sites()[static_cast<size_t>(tip)]];
+    int found = -1;
+    for (int eq = 0; eq < m.neq; ++eq) {
+      if (m.eq_type[eq] == mjEQ_CONNECT && m.eq_obj1id[eq] == body && m.eq_obj2id[eq] == object) found = eq;
+    }
+    if (found < 0) {
+      throw InputError("MJCF: plant.bonded: needs an equality connect from body " +
+                       Quote(NameOf(m, mjOBJ_BODY, body)) + " to body " +
+                       Quote(NameOf(m, mjOBJ_BODY, object)));
+    }
+    bond_constraints_.push_back(found);
+    m.eq_active[found] = 1;
+    m.eq_solref[mjNREF * found] = m.pair_solref[0];
+    mjtNum* const solimp = m.eq_solimp + mjNIMP * found;
+    solimp[0] = solimp[1] = scenario_.plant.contact_impedance;
+    // The same point in both bodies.
+    const Vector3d on_object = contact.g_o_cf.translation();
+    const Vector3d p_B = X_Bo_start_ * on_object;
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(data->xmat + 9 * body);
+    const Vector3d on_finger = R.transpose() * (p_B - Eigen::Map<const Vector3d>(data->xpos + 3 * body));
+    std::copy_n(on_finger.data(), 3, m.eq_data + mjNEQDATA * found);
+    std::copy_n(on_object.data(), 3, m.eq_data + mjNEQDATA * found + 3);
+  }
+  // A pair whose margin is below any distance never touches.
+  for (int pair = 0; pair < m.npair; ++pair) {
+    const bool has_object =
+        m.geom_bodyid[m.pair_geom1[pair]] == object || m.geom_bodyid[m.pair_geom2[pair]] == object;
+    if (has_object) m.pair_margin[pair] = -1.0;
+  }
+}
+
+GraspControllerOptions Setup::MakeControllerOptions() const {
+  const ControlOptions& control = scenario_.control;
+  GraspControllerOptions options(model_);
+  options.gains = control.gains;
+  options.orientation = control.orientation;
+  options.weight.kind = control.weight;
+  if (control.weight == RedundancyWeight::Kind::kDiagonal) {
+    const int base = model_.num_base_velocities();
+    options.weight.w.setOnes(model_.num_velocities());
+    options.weight.w.head(base).setConstant(control.platform_weight);
+    for (const int joint : arm_joints_) options.weight.w[base + joint] = control.arm_weight;
+  }
+  options.posture.q_posture = q_start_.tail(model_.num_joints());
+  options.posture.stiffness.setConstant(control.posture_frequency * control.posture_frequency);
+  // The platform has no posture; damped, it would hold the object back.
+  options.posture.damping.tail(model_.num_joints()).setConstant(2.0 * control.posture_frequency);
+  options.X_o_start = X_start_;
+  options.bonds = bonds_;
+  options.mu = control.mu;
+  options.f_min = control.f_min;
+  options.f_max = control.f_max;
+  return options;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,98 @@
+#pragma once
+
+// A scenario made real: both models loaded, the grasp solved, the simulation settled.
+
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "controller/control/grasp_controller.h"
+#include "controller/control/trajectory.h"
+#include "controller/grasp/contact_plan.h"
+#include "controller/grasp/finger_placement.h"
+#include "controller/model/robot_model.h"
+#include "harness/engine/adapter.h"
+#include "harness/gate/static_gate.h"
+#include "harness/plant/observer.h"
+#include "harness/plant/plant.h"
+#include "harness/scenario/scenario.h"
+
+namespace dexcheck {
+
+/// Everything of a run that does not change while it runs. Owns both models.
+class Setup {
+ public:
+  /// @param robot parameter file. @param mjcf scene.
+  /// @throws InputError when a file, a name or a value cannot be used.
+  Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf);
+  /// The same with the scene compiled already, which is most of the work. @param mjcf names it in messages.
+  Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
+        MjModelPtr engine);
+  Setup(const Setup&) = delete;
+  Setup& operator=(const Setup&) = delete;
+
+  [[nodiscard]] const Scenario& scenario() const { return scenario_; }
+  [[nodiscard]] const RobotModel& model() const { return model_; }
+  /// With the scenario's changes.
+  [[nodiscard]] const mjModel& engine() const { return *engine_; }
+  [[nodiscard]] const Adapter& adapter() const { return *adapter_; }
+  /// What the two descriptions disagree on before anything moves, the scenario's changes to the plant aside.
+  [[nodiscard]] const GateResult& gate() const { return gate_; }
+  [[nodiscard]] const ObjectModel& object() const { return *model_.object(); }
+  [[nodiscard]] const Surface& surface() const { return *surface_; }
+  /// Frames of the grasp.
+  [[nodiscard]] const std::vector<int>& fingertips() const { return fingertips_; }
+  /// Joints that lie on no chain from the base to a fingertip of the grasp: they should stay still.
+  [[nodiscard]] const std::vector<int>& idle_joints() const { return idle_joints_; }
+
+  /// The hand that does the task; palm_frame -1 when the scenario is none.
+  [[nodiscard]] const Hand& hand() const { return hand_; }
+
+  /// The posture that holds the object, or that a task begins in, and where the object is; X_o on the branch
+  /// with beta > 0.
+  [[nodiscard]] const VectorXd& q_start() const { return q_start_; }
+  [[nodiscard]] const Pose& X_Bo_start() const { return X_Bo_start_; }
+  [[nodiscard]] const Vector6d& X_start() const { return X_start_; }
+
+  /// Where fingertips and object are joined, in the bonded variant of the plant; none otherwise.
+  [[nodiscard]] const std::vector<Bond>& bonds() const { return bonds_; }
+  /// The engine's constraints that do it, by fingertip.
+  [[nodiscard]] const std::vector<int>& bond_constraints() const { return bond_constraints_; }
+  /// kappa at the start, by fingertip.
+  [[nodiscard]] const std::vector<ContactCoordinates>& kappa_start() const { return kappa_start_; }
+
+  /// Options of the law, with the posture and the angles' branch of the start.
+  [[nodiscard]] GraspControllerOptions MakeControllerOptions() const;
+
+ private:
+  void ApplyPlantOptions();
+  void FindFingertips();
+  void PlaceTask(std::mt19937_64* random);
+  [[nodiscard]] VectorXd ReadPosture() const;
+  [[nodiscard]] int FindGraspFrame() const;
+  /// The grasp as given, or varied at random until the fingertips reach their contacts.
+  void FindGrasp();
+  void VaryGrasp(std::mt19937_64* random);
+  FingerPlacement SolveGrasp();
+  void MakeBonds();
+
+  Scenario scenario_;
+  RobotModel model_;
+  MjModelPtr engine_;
+  std::unique_ptr<Adapter> adapter_;
+  GateResult gate_;
+  std::unique_ptr<Surface> surface_;
+  std::vector<int> fingertips_;
+  Hand hand_;
+  std::vector<int> arm_joints_;  // on the chains of several fingertips
+  std::vector<int> idle_joints_;
+  std::vector<Bond> bonds_;
+  std::vector<int> bond_constraints_;
+  std::vector<ContactCoordinates> kappa_start_;
+  VectorXd q_start_;
+  Pose X_Bo_start_ = Pose::Identity();
+  Vector6d X_start_ = Vector6d::Zero();
+};
+
+}  // namespace dexcheck

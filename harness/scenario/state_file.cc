@@ -1,0 +1,180 @@
+#include "harness/scenario/state_file.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/common/toml_reader.h"
+
+namespace dexcheck {
+namespace {
+
+using Json = nlohmann::json;
+
+// Three hard fingers are the fewest that can balance every wrench.
+constexpr size_t kFewestContacts = 3;
+// Messages print values by recursion; a state has three brackets inside each other.
+constexpr int kMaxDepth = 32;
+
+/// Reads the keys that it knows and refuses all others. A key is named by its path, such as "object.X_o".
+class StateReader {
+ public:
+  explicit StateReader(const std::string& file) : file_(file) {}
+
+  State Read(std::string_view text, const RobotModel& model) {
+    const Json json = Parse(text);
+    CheckKeys(json, "", {"q", "xi", "object", "kappa", "contact_points", "fingers", "mu"});
+    State state;
+    state.q = ReadVector(Get(json, "", "q"), "q", model.num_positions());
+    state.xi = ReadVector(Get(json, "", "xi"), "xi", model.num_velocities());
+    if (json.contains("object")) {
+      if (!model.object()) Fail("object", "the robot of " + model.spec().source + " has no [object]");
+      state.object = ReadObject(json.at("object"));
+    }
+    const bool has_contacts = json.contains("kappa") || json.contains("contact_points");
+    for (const char* key : {"fingers", "mu"}) {
+      if (json.contains(key) && !has_contacts) Fail(key, "needs kappa or contact_points");
+    }
+    if (has_contacts) state.contacts = ReadContacts(json, model);
+    return state;
+  }
+
+ private:
+  [[noreturn]] void Fail(const std::string& key, const std::string& problem) const {
+    throw InputError(file_ + ": " + key + (key.empty() ? "" : ": ") + problem);
+  }
+
+  [[nodiscard]] Json Parse(std::string_view text) const {
+    const auto check = [this](int depth, Json::parse_event_t, const Json&) {
+      if (depth > kMaxDepth)
+        Fail("", "nested too deeply, more than " + std::to_string(kMaxDepth) + " brackets");
+      return true;
+    };
+    try {
+      return Json::parse(text, check);
+    } catch (const Json::exception& error) {
+      // The library's messages begin with "[json.exception.NAME.NUMBER] ".
+      const std::string message = error.what();
+      const size_t tag = message.find("] ");
+      Fail("", "not valid JSON: " + Abbreviate(tag == std::string::npos ? message : message.substr(tag + 2)));
+    }
+  }
+
+  void CheckKeys(const Json& table, const std::string& prefix, const std::vector<std::string>& known) const {
+    const std::string key = prefix.empty() ? "" : prefix.substr(0, prefix.size() - 1);
+    if (!table.is_object()) Fail(key, "must be a JSON object, got " + Abbreviate(table.dump()));
+    for (const auto& item : table.items()) {
+      if (std::find(known.begin(), known.end(), item.key()) != known.end()) continue;
+      std::string list;
+      for (const std::string& name : known) list += (list.empty() ? "" : ", ") + name;
+      Fail(prefix + Abbreviate(item.key()), "unknown key, known here are " + list);
+    }
+  }
+
+  [[nodiscard]] const Json& Get(const Json& table, const std::string& prefix, const std::string& key) const {
+    if (!table.contains(key)) Fail(prefix + key, "missing key");
+    return table.at(key);
+  }
+
+  void CheckList(const Json& list, const std::string& key, int size, const std::string& what) const {
+    const std::string expected = "must be a list of " + std::to_string(size) + " " + what + ", got ";
+    if (!list.is_array()) Fail(key, expected + Abbreviate(list.dump()));
+    if (list.size() != static_cast<size_t>(size)) Fail(key, expected + std::to_string(list.size()));
+  }
+
+  [[nodiscard]] VectorXd ReadVector(const Json& list, const std::string& key, int size) const {
+    CheckList(list, key, size, "numbers");
+    VectorXd values(size);
+    for (int i = 0; i < size; ++i) {
+      const Json& value = list[static_cast<size_t>(i)];
+      const std::string entry = key + "[" + std::to_string(i) + "]";
+      if (!value.is_number()) Fail(entry, "must be a number, got " + Abbreviate(value.dump()));
+      values[i] = value.get<double>();
+    }
+    return values;
+  }
+
+  [[nodiscard]] ObjectState ReadObject(const Json& object) const {
+    CheckKeys(object, "object.", {"X_o", "X_o_dot"});
+    return {ReadVector(Get(object, "object.", "X_o"), "object.X_o", 6),
+            ReadVector(Get(object, "object.", "X_o_dot"), "object.X_o_dot", 6)};
+  }
+
+  [[nodiscard]] ContactState ReadContacts(const Json& json, const RobotModel& model) const {
+    if (!model.object()) Fail("kappa", "the robot of " + model.spec().source + " has no [object] to touch");
+    ContactState contacts;
+    if (json.contains("kappa") && json.contains("contact_points"))
+      Fail("kappa", "give kappa or contact_points, not both");
+    const std::string key = json.contains("kappa") ? "kappa" : "contact_points";
+    if (key == "contact_points" && !json.contains("object")) Fail(key, "needs object");
+    const Json& rows = json.at(key);
+    const auto most = model.fingertips().size();
+    if (most < kFewestContacts) {
+      Fail(key, "the robot of " + model.spec().source + " has " + std::to_string(most) +
+                    " fingertips, needed are " + std::to_string(kFewestContacts));
+    }
+    if (!rows.is_array() || rows.size() < kFewestContacts || rows.size() > most) {
+      Fail(key, "must be a list of " + std::to_string(kFewestContacts) + " to " + std::to_string(most) +
+                    " lists, one for each contact, got " +
+                    Abbreviate(rows.is_array() ? std::to_string(rows.size()) : rows.dump()));
+    }
+    const auto count = static_cast<Eigen::Index>(rows.size());
+    if (key == "kappa") contacts.kappa.resize(count, 5);
+    if (key == "contact_points") contacts.points.resize(count, 3);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const std::string entry = key + "[" + std::to_string(i) + "]";
+      const Json& row = rows[static_cast<size_t>(i)];
+      if (key == "kappa") {
+        contacts.kappa.row(i) = ReadVector(row, entry, 5);
+      } else {
+        contacts.points.row(i) = ReadVector(row, entry, 3);
+      }
+    }
+    contacts.fingertips.assign(model.fingertips().begin(), model.fingertips().begin() + count);
+    if (json.contains("fingers")) ReadFingers(json.at("fingers"), model, &contacts.fingertips);
+    contacts.friction = model.object()->friction;
+    if (json.contains("mu")) {
+      const Json& mu = json.at("mu");
+      if (!mu.is_number() || !(mu.get<double>() > 0.0))
+        Fail("mu", "must be a positive number, got " + Abbreviate(mu.dump()));
+      contacts.friction = mu.get<double>();
+    }
+    return contacts;
+  }
+
+  void ReadFingers(const Json& names, const RobotModel& model, std::vector<int>* fingertips) const {
+    CheckList(names, "fingers", static_cast<int>(fingertips->size()), "names");
+    for (size_t i = 0; i < names.size(); ++i) {
+      const std::string entry = "fingers[" + std::to_string(i) + "]";
+      const auto is_named = [&](int frame) {
+        return names[i] == model.frames()[static_cast<size_t>(frame)].name;
+      };
+      const auto found = std::find_if(model.fingertips().begin(), model.fingertips().end(), is_named);
+      if (found == model.fingertips().end())
+        Fail(entry, "must name a fingertip, got " + Abbreviate(names[i].dump()));
+      if (std::find(fingertips->begin(), fingertips->begin() + static_cast<long>(i), *found) !=
+          fingertips->begin() + static_cast<long>(i)) {
+        Fail(entry, "names a fingertip again, got " + Abbreviate(names[i].dump()));
+      }
+      (*fingertips)[i] = *found;
+    }
+  }
+
+  std::string file_;
+};
+
+}  // namespace
+
+State ParseState(std::string_view text, const std::string& source, const RobotModel& model) {
+  return StateReader(source).Read(text, model);
+}
+
+State ReadState(const std::string& file, const RobotModel& model) {
+  return ParseState(ReadTextFile(file), file, model);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,161 @@
+// A check over steps or samples: worst value, first failure, rms; what is not a number.
+
+#include "harness/base/check_record.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace dexcheck {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+Location AtJoint(int joint) { return {Location::Kind::kJoint, joint, -1}; }
+
+CheckRecord MakeRecord(double bound) {
+  CheckRecord record;
+  record.bound = bound;
+  return record;
+}
+
+TEST(CheckRecord, KeepsTheWorstError) {
+  CheckRecord record = MakeRecord(0.1);
+  record.Compare(1.0, 1.0, 1.0, AtJoint(0), 10);
+  EXPECT_EQ(record.at, 10);  // the first counts, even without error
+  record.Compare(2.0, 2.25, 10.0, AtJoint(1), 11);
+  record.Compare(3.0, 2.9375, 10.0, AtJoint(2), 12);
+  EXPECT_EQ(record.worst, 0.025);
+  EXPECT_EQ(record.model_value, 2.0);
+  EXPECT_EQ(record.engine_value, 2.25);
+  EXPECT_EQ(record.where.first, 1);
+  EXPECT_EQ(record.at, 11);
+  EXPECT_EQ(record.comparisons, 3);
+  EXPECT_FALSE(record.failed);
+}
+
+TEST(CheckRecord, KeepsTheFirstFailure) {
+  CheckRecord record = MakeRecord(0.1);
+  record.Compare(1.0, 1.0625, 1.0, AtJoint(0), 0);  // within the bound
+  record.Compare(1.0, 1.25, 1.0, AtJoint(1), 1);
+  record.Compare(1.0, 1.5, 1.0, AtJoint(2), 2);
+  EXPECT_TRUE(record.failed);
+  EXPECT_EQ(record.first_failure.first, 1);
+  EXPECT_EQ(record.failed_at, 1);
+  EXPECT_EQ(record.where.first, 2);
+  EXPECT_EQ(record.worst, 0.5);
+}
+
+TEST(CheckRecord, ErrorAtTheBoundPasses) {
+  CheckRecord record;
+  record.bound = 0.25;
+  record.Compare(1.0, 1.25, 1.0, {}, 0);
+  EXPECT_FALSE(record.failed);
+  record.Compare(1.0, 1.250001, 1.0, {}, 0);
+  EXPECT_TRUE(record.failed);
+}
+
+TEST(CheckRecord, WhatIsNotANumberFails) {
+  for (const auto& [model, engine] :
+       {std::pair(kNaN, 1.0), {1.0, kNaN}, {kNaN, kNaN}, {kInfinity, kInfinity}}) {
+    CheckRecord record = MakeRecord(0.1);
+    record.Compare(model, engine, 1.0, AtJoint(3), 7);
+    record.Compare(1.0, 2.0, 1.0, AtJoint(4), 8);
+    EXPECT_TRUE(record.failed);
+    EXPECT_EQ(record.worst, kInfinity);
+    EXPECT_EQ(record.where.first, 3);  // nothing is worse
+    EXPECT_EQ(record.first_failure.first, 3);
+  }
+}
+
+TEST(CheckRecord, KeepsWorstAndFirstFailure) {
+  CheckRecord check = MakeRecord(1.0);
+  check.Add(0.5, 0.1);
+  EXPECT_FALSE(check.failed);
+  EXPECT_EQ(check.at, 0.1);
+  check.Add(2.0, 0.2);
+  check.Add(3.0, 0.3);
+  check.Add(1.5, 0.4);
+  EXPECT_TRUE(check.failed);
+  EXPECT_EQ(check.failed_at, 0.2);
+  EXPECT_EQ(check.worst, 3.0);
+  EXPECT_EQ(check.at, 0.3);
+  EXPECT_EQ(check.last, 1.5);
+  EXPECT_EQ(check.count, 4);
+  EXPECT_DOUBLE_EQ(check.rms(), std::sqrt((0.25 + 4.0 + 9.0 + 2.25) / 4.0));
+}
+
+TEST(CheckRecord, ValueAtTheBoundPasses) {
+  CheckRecord check = MakeRecord(1.0);
+  check.Add(1.0, 0.0);
+  EXPECT_FALSE(check.failed);
+  check.Add(std::nextafter(1.0, 2.0), 0.1);
+  EXPECT_TRUE(check.failed);
+}
+
+TEST(CheckRecord, EqualValuesKeepTheFirstTime) {
+  CheckRecord check = MakeRecord(1.0);
+  check.Add(0.5, 0.1);
+  check.Add(0.5, 0.2);
+  EXPECT_EQ(check.at, 0.1);
+}
+
+TEST(CheckRecord, WhatIsNotANumberIsInfinite) {
+  for (const double bad : {kNaN, kInfinity}) {
+    CheckRecord check = MakeRecord(1.0);
+    check.Add(0.5, 0.1);
+    check.Add(bad, 0.2);
+    check.Add(bad, 0.3);
+    check.Add(5.0, 0.4);
+    EXPECT_TRUE(check.failed);
+    EXPECT_EQ(check.failed_at, 0.2);
+    EXPECT_EQ(check.worst, kInfinity);
+    EXPECT_EQ(check.at, 0.2) << "nothing is worse than the first";
+    EXPECT_EQ(check.rms(), kInfinity);
+  }
+}
+
+TEST(CheckRecord, AnInfiniteBoundStillRefusesWhatIsNotANumber) {
+  CheckRecord check;
+  check.bound = kInfinity;
+  check.Add(1e300, 0.1);
+  EXPECT_FALSE(check.failed);
+  check.Add(kNaN, 0.2);
+  EXPECT_TRUE(check.failed);
+  EXPECT_EQ(check.failed_at, 0.2);
+}
+
+TEST(CheckRecord, WhatDoesNotApplyIsNotAsked) {
+  CheckRecord check = MakeRecord(1.0);
+  check.applies = false;
+  check.Add(5.0, 0.1);
+  check.Add(kNaN, 0.2);
+  EXPECT_FALSE(check.failed);
+  EXPECT_EQ(check.count, 0);
+  EXPECT_EQ(check.worst, 0.0);
+  EXPECT_EQ(check.rms(), 0.0);
+}
+
+TEST(CheckRecord, ResetForgetsValuesOnly) {
+  CheckRecord check = MakeRecord(1.0);
+  check.name = "fingertip_slip";
+  check.Add(5.0, 0.1);
+  check.part = "rf1_tip";
+  check.Reset();
+  EXPECT_FALSE(check.failed);
+  EXPECT_EQ(check.worst, 0.0);
+  EXPECT_EQ(check.last, 0.0);
+  EXPECT_EQ(check.failed_at, 0.0);
+  EXPECT_EQ(check.count, 0);
+  EXPECT_EQ(check.rms(), 0.0);
+  EXPECT_EQ(check.part, "");
+  EXPECT_EQ(check.name, "fingertip_slip");
+  EXPECT_EQ(check.bound, 1.0);
+  check.Add(0.25, 0.3);
+  EXPECT_EQ(check.worst, 0.25);
+  EXPECT_EQ(check.at, 0.3);
+}
+
+}  // namespace
+}  // namespace dexcheck

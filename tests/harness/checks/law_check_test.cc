@@ -1,0 +1,223 @@
+// The question about the law: right torques pass to rounding, wrong ones are found and the wrong part is
+// named.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "harness/checks/law_terms.h"
+#include "harness/checks/step_check_table.h"
+#include "harness/diagnosis/spoiled_law.h"
+#include "tests/harness/run/shipped_run.h"
+
+namespace dexcheck::testing {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+/// What a run with a spoiled law came to.
+struct Outcome {
+  RunResult result;
+  double law_torque = 0.0;
+  double law_demand = 0.0;
+};
+
+Outcome RunSpoiled(const Setup& setup, unsigned parts, double factor) {
+  LoopParts loop = MakeLoopParts(setup);
+  loop.controller = std::make_unique<SpoiledLaw>(setup, std::move(loop.controller), parts, factor);
+  Runner runner(setup, /*check=*/true, std::move(loop));
+  Outcome outcome;
+  outcome.result = runner.Run([](const StepRecord&) {}, [] { return false; });
+  outcome.law_torque = runner.loop().checks().Find("law_torque").worst;
+  outcome.law_demand = runner.loop().checks().Find("law_demand").worst;
+  return outcome;
+}
+
+const LawPartName& FindPart(std::string_view name) {
+  for (const LawPartName& part : ListLawParts()) {
+    if (part.name == name) return part;
+  }
+  throw std::invalid_argument("no such part");
+}
+
+const std::vector<std::string> kShort = {"duration=0.8", "settle=0.2"};
+// The feedback's parts show only where there is an error to feed back.
+const std::vector<std::string> kSpoiled = {"duration=0.5", "settle=0.2", "start_error.xyz=[1e-4, 1e-4, 0]"};
+
+TEST(LawCheck, TheRightLawPassesToRounding) {
+  ShippedRun run("curve", kShort);
+  const RunResult& result = run.Run();
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.attribution.evidence;
+  EXPECT_EQ(run.loop().checks().Find("law_torque").count, 800);
+  for (const char* name : {"law_torque", "law_demand", "grasp_force", "torque_applied", "error_dynamics"}) {
+    const CheckRecord& check = run.loop().checks().Find(name);
+    EXPECT_LE(check.worst, 0.5 * check.bound) << name;
+    EXPECT_GT(check.count, 0) << name;
+  }
+}
+
+TEST(LawCheck, AnUnchangedLawIsNotSpoiled) {
+  const ShippedRun shipped("curve", {"duration=0.05", "settle=0.1"});
+  const Outcome outcome = RunSpoiled(shipped.setup(), FindPart("all torques").parts, 1.0);
+  EXPECT_EQ(outcome.result.verdict, Verdict::kPass);
+}
+
+/// Every part, a thousandth too large and dropped.
+class SpoiledLawTest : public ::testing::TestWithParam<size_t> {};
+
+TEST_P(SpoiledLawTest, IsFoundAndTheWrongPartIsNamed) {
+  static const ShippedRun shipped("curve", kSpoiled);
+  const LawPartName& part = ListLawParts()[GetParam()];
+  for (const double factor : {1.001, 0.0}) {
+    SCOPED_TRACE(::testing::Message() << part.name << " times " << factor);
+    const Outcome outcome = RunSpoiled(shipped.setup(), part.parts, factor);
+    EXPECT_NE(outcome.result.verdict, Verdict::kPass);
+    if (factor == 0.0) EXPECT_GT(outcome.law_demand, kLawDemandBound);
+    EXPECT_EQ(outcome.result.attribution.cause, Cause::kControlLaw) << outcome.result.attribution.evidence;
+    EXPECT_THAT(outcome.result.attribution.evidence,
+                AllOf(HasSubstr(part.name), HasSubstr(factor == 0.0 ? "has 0 times" : "has 1.001 times")));
+  }
+}
+
+std::string NamePart(const ::testing::TestParamInfo<size_t>& part) {
+  std::string name;
+  for (const char* c = ListLawParts()[part.param].name; *c != '\0'; ++c) {
+    if (std::isalnum(static_cast<unsigned char>(*c)) != 0) name += *c;
+  }
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Parts, SpoiledLawTest, ::testing::Range<size_t>(0, ListLawParts().size()), NamePart);
+
+/// A controller with one fault besides its law.
+class FaultyController final : public Controller {
+ public:
+  FaultyController(const Setup& setup, std::unique_ptr<Controller> law)
+      : law_(std::move(law)), actuation_(setup.model()) {}
+  void Follow(const Trajectory& motion) override { law_->Follow(motion); }
+  void Begin(double t, const Reading& reading) override { law_->Begin(t, reading); }
+  void Step(const Reading& reading, double t, Command* command) override {
+    law_->Step(reading, t, command);
+    // More squeeze than is best: still in null(G), still in the cones.
+    VectorXd force = law_->model().grasp().J_B().transpose() * (0.05 * command->demand.F_N);
+    actuation_.CalcTorque(force, force);
+    command->tau += force;
+    command->demand.F_N *= 1.05;
+  }
+  const GraspModel& model() const override { return law_->model(); }
+
+ private:
+  std::unique_ptr<Controller> law_;
+  ActuationMap actuation_;
+};
+
+TEST(LawCheck, AnInternalForceThatIsNotTheBestIsFound) {
+  const ShippedRun shipped("hold", {"duration=0.05", "settle=0.2"});
+  LoopParts parts = MakeLoopParts(shipped.setup());
+  parts.controller = std::make_unique<FaultyController>(shipped.setup(), std::move(parts.controller));
+  Runner runner(shipped.setup(), /*check=*/true, std::move(parts));
+  const RunResult& result = runner.Run([](const StepRecord&) {}, [] { return false; });
+  EXPECT_EQ(result.attribution.cause, Cause::kControlLaw) << result.attribution.evidence;
+  EXPECT_TRUE(runner.loop().checks().Find("grasp_force").failed);
+  EXPECT_FALSE(runner.loop().checks().Find("law_torque").failed);
+}
+
+/// A plant with faults: motors that give another torque than they are sent, an object that accelerates
+/// otherwise than it says.
+class FaultyPlant final : public Plant {
+ public:
+  FaultyPlant(std::unique_ptr<Plant> plant, double gain, double told)
+      : plant_(std::move(plant)), gain_(gain), told_(told) {}
+  double time_step() const override { return plant_->time_step(); }
+  std::span<const Motor> motors() const override { return plant_->motors(); }
+  void BeginStep() override { plant_->BeginStep(); }
+  void Read(PlantReading* reading) override { plant_->Read(reading); }
+  void EndStep(const Eigen::Ref<const VectorXd>& tau) override { plant_->EndStep(gain_ * tau); }
+  void Read(PlantResponse* response) override {
+    plant_->Read(response);
+    response->V_Bo_dot[0] += told_;
+  }
+  void Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) override { plant_->Place(q, X_Bo); }
+  void AddVelocity(const MeasuredState& state, const Vector3d& v) override { plant_->AddVelocity(state, v); }
+  void Translate(const Vector3d& way) override { plant_->Translate(way); }
+
+ private:
+  std::unique_ptr<Plant> plant_;
+  double gain_;
+  double told_;
+};
+
+RunResult RunFaultyPlant(double gain, double told, const char* check) {
+  const ShippedRun shipped("hold", {"duration=0.2", "settle=0.2"});
+  LoopParts parts = MakeLoopParts(shipped.setup());
+  parts.plant = std::make_unique<FaultyPlant>(std::move(parts.plant), gain, told);
+  Runner runner(shipped.setup(), /*check=*/true, std::move(parts));
+  RunResult result = runner.Run([](const StepRecord&) {}, [] { return false; });
+  EXPECT_TRUE(runner.loop().checks().Find(check).failed) << check;
+  return result;
+}
+
+TEST(LawCheck, TorquesThatDoNotArriveAreTheActuators) {
+  EXPECT_EQ(RunFaultyPlant(0.999, 0.0, "torque_applied").attribution.cause, Cause::kActuator);
+}
+
+TEST(LawCheck, AnErrorThatDoesNotFollowIsFound) {
+  EXPECT_NE(RunFaultyPlant(1.0, 1e-3, "error_dynamics").verdict, Verdict::kPass);
+}
+
+TEST(LawCheck, WhatAScenarioExpectsIsJudgedFromItsTimeOn) {
+  for (const auto& [from, fails] : {std::pair{0.0, true}, std::pair{0.9, false}}) {
+    ShippedRun run(
+        "offset", {"expect.position=1e-6", "expect.orientation=1e-5", "expect.from=" + std::to_string(from)});
+    const RunResult& result = run.Run();
+    EXPECT_EQ(run.loop().checks().Find("expect_position").failed, fails);
+    EXPECT_FALSE(run.loop().checks().Find("expect_orientation").failed);
+    EXPECT_EQ(result.attribution.cause, fails ? Cause::kControlLaw : Cause::kNone)
+        << result.attribution.evidence;
+  }
+  ShippedRun strict("offset", {"duration=0.05", "expect.orientation=1e-15", "expect.from=0"});
+  EXPECT_NE(strict.Run().verdict, Verdict::kPass);
+  EXPECT_TRUE(strict.loop().checks().Find("expect_orientation").failed);
+}
+
+TEST(LawCheck, GainsThatCannotSettleFailBeforeAnythingMoves) {
+  for (const auto& [scenario, gain] :
+       {std::pair{"curve", "control.natural_frequency=0"}, std::pair{"offset", "control.K_p=0"},
+        std::pair{"offset", "control.K_p=-9"}}) {
+    SCOPED_TRACE(gain);
+    ShippedRun run(scenario, {gain, "duration=0.05", "settle=0.1"});
+    const RunResult& result = run.Run();
+    EXPECT_NE(result.verdict, Verdict::kPass);
+    EXPECT_EQ(result.attribution.cause, Cause::kControlLaw);
+    EXPECT_TRUE(run.loop().checks().Find("gain_stability").failed);
+    EXPECT_EQ(run.loop().checks().Find("gain_stability").failed_at, 0.0);
+  }
+}
+
+TEST(LawCheck, SampledRadiusIsThatOfTheRecursion) {
+  ObjectGains gains;
+  gains.K_v.setConstant(30.0);
+  gains.K_p.setConstant(700.0);
+  for (const long hold : {1L, 4L}) {
+    const double dt = 1e-3;
+    double e = 1.0, v = 0.3, u = 0.0;
+    double last = 0.0;
+    constexpr long kSteps = 4000;
+    for (long i = 0; i < kSteps; ++i) {
+      if (i % hold == 0) u = -30.0 * v - 700.0 * e;
+      if (i == kSteps / 2) last = std::hypot(e, v);
+      v += dt * u;
+      e += dt * v;
+    }
+    // The envelope of a damped oscillation: its phase leaves some hundredths over 2000 steps.
+    const double measured = std::pow(std::hypot(e, v) / last, 2.0 / static_cast<double>(kSteps));
+    EXPECT_NEAR(CalcSampledRadius(gains, dt, hold), measured, 3e-3) << hold;
+  }
+  gains.K_p.setZero();
+  EXPECT_NEAR(CalcSampledRadius(gains, 1e-3, 1), 1.0, 1e-12);
+  gains.K_v.setConstant(2100.0);
+  EXPECT_GT(CalcSampledRadius(gains, 1e-3, 1), 1.0);
+}
+
+}  // namespace
+}  // namespace dexcheck::testing

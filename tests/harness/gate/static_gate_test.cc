@@ -1,0 +1,187 @@
+// Every kind of constant that the MJCF can have otherwise than the parameters is found and named.
+
+#include "harness/gate/static_gate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <ostream>
+
+#include "controller/model/parameter_reader.h"
+#include "harness/engine/engine.h"
+#include "tests/common/files.h"
+#include "tests/common/paths.h"
+#include "tests/harness/run/shipped_run.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::ReadText;
+using testing::ReplaceOnce;
+using testing::TempFolder;
+using testing::WriteText;
+
+const std::string kParameters = testing::SourcePath("/controller/parameters/");
+const std::string kMjcf = testing::SourcePath("/mjcf/");
+
+/// One place changed in the shipped MJCF, and the finding that it must lead to.
+struct Mutation {
+  const char* name;
+  const char* file;
+  std::string from;
+  std::string to;
+  const char* check;
+  const char* where;
+};
+void PrintTo(const Mutation& mutation, std::ostream* stream) { *stream << mutation.name; }
+
+class StaticGateTest : public ::testing::TestWithParam<Mutation> {
+ protected:
+  StaticGateTest() {
+    std::filesystem::copy(
+        kMjcf, folder_.path(),
+        std::filesystem::copy_options::recursive | std::filesystem::copy_options::overwrite_existing);
+  }
+
+  [[nodiscard]] GateResult Run() const {
+    const MjModelPtr engine = LoadMjcf(folder_.path() / "scene.xml");
+    return RunStaticGate(Adapter(model_, *engine, "scene.xml"));
+  }
+
+  TempFolder folder_;
+  RobotModel model_ = ReadRobotModel(kParameters + "assistant_robot.toml");
+};
+
+TEST_P(StaticGateTest, FindsAndNames) {
+  const Mutation& mutation = GetParam();
+  const std::filesystem::path file = folder_.path() / mutation.file;
+  WriteText(file, ReplaceOnce(ReadText(file), mutation.from, mutation.to));
+  const GateResult result = Run();
+  const auto finding = std::find_if(
+      result.findings.begin(), result.findings.end(),
+      [&](const GateFinding& one) { return one.check == mutation.check && one.where == mutation.where; });
+  std::string found;
+  for (const GateFinding& one : result.findings) found += one.check + ": " + one.where + "; ";
+  ASSERT_NE(finding, result.findings.end()) << "found: " << found;
+  EXPECT_NE(finding->model, finding->engine);
+  for (const CheckRecord& record : result.records) {
+    EXPECT_EQ(record.failed, found.find(record.name + ": ") != std::string::npos) << record.name;
+  }
+}
+
+const std::string kRightWheelColumn =
+    "<joint name=\"wheel_right\" class=\"wheel\"/>\n        <geom class=\"column\" size=\"0.1 0.02\" "
+    "quat=\"1 1 0 0\" "
+    "mass=\"1.5\"/>";
+const char* const kWheel = "joint wheel_right";
+const char* const kElbow = "joint r_elbow on link r_upper_arm";
+const char* const kFingertip = "frame rf3_tip on link rf3_phalanx_4";
+
+INSTANTIATE_TEST_SUITE_P(
+    Mjcf, StaticGateTest,
+    ::testing::ValuesIn(std::vector<Mutation>{
+        {"BaseMass", "robot.xml", "mass=\"12\"", "mass=\"12.01\"", "link_mass", "link platform"},
+        {"LinkMass", "robot.xml", "mass=\"2.5\"", "mass=\"2.501\"", "link_mass", "link torso"},
+        {"Damping", "robot.xml", "damping=\"0.2\" armature=\"0.02\"", "damping=\"0.21\" armature=\"0.02\"",
+         "joint_damping", kElbow},
+        {"Armature", "robot.xml", "damping=\"0.2\" armature=\"0.02\"", "damping=\"0.2\" armature=\"0\"",
+         "joint_armature", kElbow},
+        {"LowerLimit", "robot.xml", "range=\"-0.1 2.5\"", "range=\"-0.2 2.5\"", "joint_range", kElbow},
+        {"UpperLimit", "robot.xml", "range=\"-0.1 2.5\"", "range=\"-0.1 2.4\"", "joint_range", kElbow},
+        {"Spring", "robot.xml", "range=\"-0.1 2.5\"", "range=\"-0.1 2.5\" stiffness=\"1\"", "joint_spring",
+         kElbow},
+        {"DryFriction", "robot.xml", "range=\"-0.1 2.5\"", "range=\"-0.1 2.5\" frictionloss=\"0.1\"",
+         "joint_dry_friction", kElbow},
+        {"Gravity", "stage.xml", "gravity=\"0 0 -9.81\"", "gravity=\"0 0 -9.8\"", "gravity_vector", "robot"},
+        {"GravityTilted", "stage.xml", "gravity=\"0 0 -9.81\"", "gravity=\"0.01 0 -9.81\"", "gravity_vector",
+         "robot"},
+        {"Density", "stage.xml", "gravity=\"0 0 -9.81\"", "gravity=\"0 0 -9.81\" density=\"1.2\"", "fluid",
+         "robot"},
+        {"Viscosity", "stage.xml", "gravity=\"0 0 -9.81\"", "gravity=\"0 0 -9.81\" viscosity=\"2e-5\"",
+         "fluid", "robot"},
+        {"WheelRadiusLarger", "robot.xml", "<default class=\"tyre\"> <geom size=\"0.1\"/>",
+         "<default class=\"tyre\"> <geom size=\"0.101\"/>", "wheel_radius", kWheel},
+        {"WheelRadiusSmaller", "robot.xml", "<default class=\"tyre\"> <geom size=\"0.1\"/>",
+         "<default class=\"tyre\"> <geom size=\"0.099\"/>", "wheel_radius", kWheel},
+        {"WheelDistance", "robot.xml", "<body name=\"wheel_right\" pos=\"0 -0.20 0\">",
+         "<body name=\"wheel_right\" pos=\"0 -0.21 0\">", "wheel_distance", kWheel},
+        {"AxleForward", "robot.xml", "<body name=\"wheel_right\" pos=\"0 -0.20 0\">",
+         "<body name=\"wheel_right\" pos=\"0.01 -0.20 0\">", "axle_position", kWheel},
+        {"AxleHigh", "robot.xml", "<body name=\"wheel_right\" pos=\"0 -0.20 0\">",
+         "<body name=\"wheel_right\" pos=\"0 -0.20 0.01\">", "axle_position", kWheel},
+        {"WheelAxis", "robot.xml", "<joint axis=\"0 1 0\" limited=\"false\"",
+         "<joint axis=\"0 1 0.01\" limited=\"false\"", "wheel_axis", kWheel},
+        {"WheelBackwards", "robot.xml", "<joint axis=\"0 1 0\" limited=\"false\"",
+         "<joint axis=\"0 -1 0\" limited=\"false\"", "wheel_axis", kWheel},
+        {"WheelMass", "robot.xml", kRightWheelColumn, ReplaceOnce(kRightWheelColumn, "1.5", "1.6"),
+         "wheel_mass", kWheel},
+        {"WheelSpinInertia", "robot.xml", kRightWheelColumn,
+         ReplaceOnce(kRightWheelColumn, "0.1 0.02", "0.09 0.02"), "wheel_spin_inertia", kWheel},
+        {"WheelDamping", "robot.xml", "damping=\"0.02\" armature=\"0.004\"",
+         "damping=\"0.03\" armature=\"0.004\"", "wheel_damping", kWheel},
+        {"WheelArmature", "robot.xml", "damping=\"0.02\" armature=\"0.004\"",
+         "damping=\"0.02\" armature=\"0.005\"", "wheel_armature", kWheel},
+        {"WheelSpring", "robot.xml", "damping=\"0.02\" armature=\"0.004\"",
+         "damping=\"0.02\" armature=\"0.004\" stiffness=\"1\"", "joint_spring", kWheel},
+        {"WheelDryFriction", "robot.xml", "damping=\"0.02\" armature=\"0.004\"",
+         "damping=\"0.02\" armature=\"0.004\" frictionloss=\"0.1\"", "joint_dry_friction", kWheel},
+        {"BaseDryFriction", "robot.xml", "<freejoint name=\"base\"/>",
+         "<joint name=\"base\" type=\"free\" limited=\"false\" frictionloss=\"0.1\"/>", "joint_dry_friction",
+         "link platform"},
+        {"FingertipRadius", "robot.xml", "<default class=\"tip\"> <geom size=\"0.009\"",
+         "<default class=\"tip\"> <geom size=\"0.0091\"", "fingertip_radius", kFingertip},
+        {"FingertipPlace", "robot.xml", "<default class=\"tip\"> <geom size=\"0.009\" pos=\"0 0 -0.0185\"/>",
+         "<default class=\"tip\"> <geom size=\"0.008\" pos=\"0 0 -0.0195\"/>", "contact_friction",
+         kFingertip},
+        {"PairFriction", "contacts.xml",
+         "<default class=\"fingertip\"> <pair condim=\"3\" friction=\"0.8 0.8",
+         "<default class=\"fingertip\"> <pair condim=\"3\" friction=\"0.8 0.7", "contact_friction",
+         kFingertip},
+        {"PairMissing", "contacts.xml",
+         "<pair name=\"rf3_torus\" class=\"fingertip\" geom1=\"rf3_tip_geom\" geom2=\"torus_geom\"/>", "",
+         "contact_friction", kFingertip},
+        {"ObjectMass", "torus.xml", "mass=\"0.2\"", "mass=\"0.21\"", "object_mass", "object torus"},
+        {"ObjectInertia", "torus.xml", "0.00026315\"", "0.00026\"", "object_inertia", "object torus"},
+        {"ObjectCom", "torus.xml", "<inertial pos=\"0 0 0\"", "<inertial pos=\"0 0 0.001\"", "object_com",
+         "object torus"},
+        {"ObjectShape", "torus.xml", "user=\"0.035 0.011\"", "user=\"0.035 0.012\"", "object_shape",
+         "object torus"},
+        {"ObjectUnmarked", "torus.xml", "user=\"0.035 0.011\"", "", "object_shape", "object torus"},
+    }),
+    [](const auto& info) { return info.param.name; });
+
+void ExpectNoFindings(const RobotModel& model, const std::filesystem::path& mjcf) {
+  const MjModelPtr engine = LoadMjcf(mjcf);
+  const GateResult result = RunStaticGate(Adapter(model, *engine, mjcf));
+  EXPECT_TRUE(result.findings.empty())
+      << result.findings.front().check << " " << result.findings.front().where;
+  EXPECT_GE(result.records.size(), 7U);
+  for (const CheckRecord& record : result.records) {
+    EXPECT_FALSE(record.failed) << record.name;
+    EXPECT_GT(record.comparisons, 0) << record.name;
+  }
+}
+
+TEST(StaticGate, RaisesNoFalseAlarm) {
+  ExpectNoFindings(ReadRobotModel(kParameters + "assistant_robot.toml"), kMjcf + "scene.xml");
+  ExpectNoFindings(ReadRobotModel(kParameters + "panda.toml"), kMjcf + "panda.xml");
+}
+
+// The larger ring agrees with what its scenario says of it, and not with the torus of the parameter file.
+TEST(StaticGate, TellsTheRingFromTheTorus) {
+  const Scenario scenario = testing::ReadShippedScenario("two-hands");
+  const std::string robot = kParameters + "assistant_robot.toml";
+  ExpectNoFindings(ParseRobotModel(ReadText(robot), robot, scenario.model_overrides), scenario.mjcf_file);
+
+  const RobotModel torus = ReadRobotModel(robot);
+  const MjModelPtr engine = LoadMjcf(scenario.mjcf_file);
+  std::vector<std::string> found;
+  for (const GateFinding& one : RunStaticGate(Adapter(torus, *engine, "ring_scene.xml")).findings) {
+    found.push_back(one.check);
+  }
+  EXPECT_THAT(found, ::testing::IsSupersetOf({"object_mass", "object_inertia", "object_shape"}));
+}
+
+}  // namespace
+}  // namespace dexcheck

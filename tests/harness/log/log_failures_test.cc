@@ -1,0 +1,318 @@
+// Writers that are refused: by the file system, or for a caller's mistake.
+
+#include <gmock/gmock.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+
+#include "controller/common/errors.h"
+#include "tests/common/files.h"
+#include "tests/harness/log/sample_log_check.h"
+
+namespace dexcheck {
+namespace {
+
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using testing::IsSample;
+using testing::ReadText;
+using testing::StartSample;
+using ::testing::StartsWith;
+using testing::TempFolder;
+using testing::WriteSampleLog;
+using testing::WriteSampleRow;
+using testing::WriteSampleRows;
+using testing::WriteText;
+
+/// What the exception says; fails the test when there is none of this type.
+template <typename Exception, typename Function>
+std::string MessageOf(const Function& function) {
+  try {
+    function();
+  } catch (const Exception& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "nothing was thrown";
+  return "";
+}
+
+class LogFailures : public ::testing::Test {
+ protected:
+  [[nodiscard]] long CountFiles() const {
+    const auto files = std::filesystem::directory_iterator(folder_.path());
+    return std::distance(begin(files), end(files));
+  }
+
+  TempFolder folder_;
+  std::filesystem::path path_ = folder_.path() / "log.h5";
+};
+
+TEST_F(LogFailures, NothingIsOverwritten) {
+  WriteText(path_, "before");
+  EXPECT_EQ(MessageOf<InputError>([&] { LogWriter(path_, 10); }),
+            path_.string() + ": cannot be written: File exists");
+  std::filesystem::remove(path_);
+  // Not even what appears after construction.
+  LogWriter log(path_, 10);
+  WriteText(path_, "before");
+  EXPECT_EQ(MessageOf<InputError>([&] { log.StartRows(); }),
+            path_.string() + ": cannot be written: File exists");
+  EXPECT_EQ(ReadText(path_), "before");
+  EXPECT_EQ(CountFiles(), 1);
+}
+
+TEST_F(LogFailures, NoFileBeforeTheRowsStart) {
+  {
+    LogWriter log(path_, 10);
+    EXPECT_EQ(CountFiles(), 0);
+  }
+  EXPECT_EQ(CountFiles(), 0);
+}
+
+TEST_F(LogFailures, PathsThatCannotBeWrittenAreNamed) {
+  const std::filesystem::path missing = folder_.path() / "no/log.h5";
+  EXPECT_EQ(MessageOf<InputError>([&] { LogWriter(missing, 10); }),
+            missing.string() + ": cannot be written: No such file or directory");
+  WriteText(folder_.path() / "file", "");
+  const std::filesystem::path below_file = folder_.path() / "file/log.h5";
+  EXPECT_EQ(MessageOf<InputError>([&] { LogWriter(below_file, 10); }),
+            below_file.string() + ": cannot be written: Not a directory");
+}
+
+/// Gives up the superuser's rights for a while: they would let it write anywhere.
+class OrdinaryUser {
+ public:
+  OrdinaryUser() {
+    if (::geteuid() == 0) switched_ = ::seteuid(kNobody) == 0;
+  }
+  ~OrdinaryUser() {
+    if (switched_ && ::seteuid(0) != 0) std::abort();
+  }
+
+ private:
+  static constexpr uid_t kNobody = 65534;
+  bool switched_ = false;
+};
+
+TEST_F(LogFailures, ForbiddenFoldersAreNamed) {
+  std::filesystem::permissions(folder_.path(), std::filesystem::perms(0555));
+  {
+    const OrdinaryUser user;
+    EXPECT_EQ(MessageOf<InputError>([&] { LogWriter(path_, 10); }),
+              path_.string() + ": cannot be written: Permission denied");
+  }
+  std::filesystem::permissions(folder_.path(), std::filesystem::perms(0755));
+}
+
+/// Lets this process write no more than so many bytes into a file, as if the disk were full then.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{bytes, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = nullptr;
+};
+
+TEST_F(LogFailures, FullDiskAtTheBegin) {
+  const std::string reason = path_.string() + ": cannot be written: File too large";
+  for (const rlim_t bytes : {0UL, 1UL, 600UL, 2000UL, 5000UL, 9000UL}) {
+    LogWriter log(path_, 100, 10);
+    {
+      const FullDisk full(bytes);
+      EXPECT_EQ(MessageOf<InputError>([&] { StartSample(&log); }), reason) << bytes;
+    }
+    EXPECT_EQ(CountFiles(), 0) << bytes;
+  }
+  // HDF5 has nothing left that would disturb what follows.
+  WriteSampleLog(path_, 20, 20);
+  EXPECT_TRUE(IsSample(LogReader(path_), 20));
+}
+
+/// HDF5 must not hold anything against the program at its end.
+TEST_F(LogFailures, FullDiskLetsTheProgramEnd) {
+  ::testing::FLAGS_gtest_death_test_style = "threadsafe";
+  constexpr int kCaught = 7;
+  const auto run = [&] {
+    LogWriter log(path_, 100, 10);
+    const FullDisk full(3000);
+    try {
+      StartSample(&log);
+    } catch (const InputError&) {
+      std::exit(kCaught);
+    }
+  };
+  EXPECT_EXIT(run(), ::testing::ExitedWithCode(kCaught), "");
+}
+
+TEST_F(LogFailures, FullDiskKeepsWhatWasFlushed) {
+  const std::string reason = path_.string() + ": cannot be written: ";
+  LogWriter log(path_, 2000, 10);
+  StartSample(&log);
+  WriteSampleRows(25, &log);
+  const auto size = static_cast<rlim_t>(std::filesystem::file_size(path_));
+  {
+    const FullDisk full(size / 2);
+    EXPECT_EQ(MessageOf<InputError>([&] { WriteSampleRows(10, &log); }), reason + "File too large");
+    EXPECT_TRUE(IsSample(LogReader(path_), 20));
+  }
+  EXPECT_EQ(MessageOf<InputError>([&] { log.EndRow(); }), reason + "it failed before");
+  EXPECT_EQ(MessageOf<InputError>([&] { log.Flush(); }), reason + "it failed before");
+  log.Close();
+  EXPECT_TRUE(IsSample(LogReader(path_), 20));
+}
+
+TEST_F(LogFailures, FullDiskAtTheEndKeepsAllRows) {
+  LogWriter log(path_, 2000, 10);
+  StartSample(&log);
+  WriteSampleRows(1500, &log);
+  log.SetText("summary", "late");
+  {
+    // The rows' places are there; the trimmed copy, of some 150 kB, fails.
+    const rlim_t enough = std::filesystem::file_size(path_);
+    ASSERT_GT(enough, 150000U);
+    log.Flush();
+    const FullDisk full(100000);
+    EXPECT_EQ(MessageOf<InputError>([&] { log.Close(); }),
+              path_.string() + ": cannot be written: File too large");
+  }
+  EXPECT_EQ(CountFiles(), 1);
+  const LogReader reader(path_);
+  EXPECT_TRUE(IsSample(reader, 1500));
+  EXPECT_THAT(reader.ListTexts(), ::testing::Not(::testing::Contains("summary")));
+}
+
+TEST_F(LogFailures, VanishedFilesAndFoldersAreNoticed) {
+  std::filesystem::create_directory(folder_.path() / "run");
+  const std::filesystem::path path = folder_.path() / "run/log.h5";
+  LogWriter log(path, 100, 10);
+  StartSample(&log);
+  WriteSampleRows(10, &log);
+  std::filesystem::remove_all(folder_.path() / "run");
+  EXPECT_EQ(MessageOf<InputError>([&] { WriteSampleRows(10, &log); }),
+            path.string() + ": cannot be written: it was removed");
+}
+
+TEST_F(LogFailures, FoldersThatVanishBeforeTheRowsAreNoticed) {
+  std::filesystem::create_directory(folder_.path() / "run");
+  const std::filesystem::path path = folder_.path() / "run/log.h5";
+  LogWriter log(path, 100);
+  std::filesystem::remove(folder_.path() / "run");
+  EXPECT_EQ(MessageOf<InputError>([&] { log.StartRows(); }),
+            path.string() + ": cannot be written: No such file or directory");
+}
+
+TEST_F(LogFailures, AnotherFileInItsPlaceIsNotReplaced) {
+  LogWriter log(path_, 100, 10);
+  StartSample(&log);
+  WriteSampleRows(10, &log);
+  std::filesystem::rename(path_, folder_.path() / "moved.h5");
+  WriteText(path_, "another");
+  EXPECT_EQ(MessageOf<InputError>([&] { log.Close(); }),
+            path_.string() + ": cannot be written: another file has taken its place");
+  EXPECT_EQ(ReadText(path_), "another");
+  EXPECT_TRUE(IsSample(LogReader(folder_.path() / "moved.h5"), 10));
+}
+
+TEST_F(LogFailures, RelativePathsStayWhereTheyWere) {
+  const std::filesystem::path here = std::filesystem::current_path();
+  std::filesystem::current_path(folder_.path());
+  {
+    LogWriter log("log.h5", 100, 10);
+    std::filesystem::current_path(here);
+    StartSample(&log);
+    WriteSampleRows(5, &log);
+    log.Close();
+  }
+  EXPECT_TRUE(IsSample(LogReader(path_), 5));
+}
+
+using Misuse = LogFailures;
+
+TEST_F(Misuse, NamesMustBePlainAndFree) {
+  LogWriter log(path_, 10);
+  const auto add = [&](const std::string& name) {
+    return MessageOf<std::invalid_argument>([&] { log.AddSignal({name, "m", "", 1, {}, {}}); });
+  };
+  for (const char* name : {"", "/x", "x/", "a//b", "a/../b", ".", "a/./b", "a\nb", "a,b"}) {
+    EXPECT_THAT(add(name), StartsWith("signal \"")) << name;
+  }
+  EXPECT_EQ(log.AddSignal({"a/b", "m", "", 1, {}, {}}), 1);
+  for (const char* name : {"time", "a", "a/b", "a/b/c", "meta", "meta/x", "time/x"}) {
+    EXPECT_THAT(add(name), EndsWith("is taken in the log")) << name;
+  }
+  EXPECT_EQ(log.AddSignal({"a/bc", "m", "", 1, {}, {}}), 2);
+  const auto embed = [&](const std::string& group, const std::string& name) {
+    return MessageOf<std::invalid_argument>([&] { log.EmbedFile(group, name, "x"); });
+  };
+  EXPECT_THAT(embed("a/b", "c"), EndsWith("is taken in the log"));
+  EXPECT_THAT(embed("inputs", "../c"), StartsWith("embedded file \"../c\""));
+  EXPECT_THAT(embed("inputs", "/etc/passwd"), StartsWith("embedded file \"/etc/passwd\""));
+  EXPECT_THAT(embed("", "c"), StartsWith("group \"\""));
+  log.EmbedFile("inputs", "c", "x");
+  EXPECT_THAT(embed("inputs", "c"), EndsWith("is taken in the log"));
+  EXPECT_THAT(embed("inputs", "c/d"), EndsWith("is taken in the log"));
+}
+
+TEST_F(Misuse, SignalsMustFitTheirColumns) {
+  LogWriter log(path_, 10);
+  const auto add = [&](const SignalInfo& signal) {
+    return MessageOf<std::invalid_argument>([&] { log.AddSignal(signal); });
+  };
+  EXPECT_THAT(add({"x", "m", "", 0, {}, {}}), HasSubstr("width: must be at least 1, got 0"));
+  EXPECT_THAT(add({"x", "m", "", 2, {"a"}, {}}), HasSubstr("columns: must be none or one for each number"));
+  EXPECT_THAT(add({"x", "m", "", 1, {}, {{"unit", 1.0}}}), HasSubstr("attribute \"unit\""));
+  EXPECT_THAT(add({"x", std::string("m\0", 2), "", 1, {}, {}}), HasSubstr("zero byte"));
+  EXPECT_THAT(MessageOf<std::invalid_argument>([&] { log.SetText("t", std::string(1, '\0')); }),
+              HasSubstr("zero byte"));
+  EXPECT_THAT(MessageOf<std::invalid_argument>([&] { log.SetText("", "x"); }), HasSubstr("name"));
+}
+
+TEST_F(Misuse, ReservedTextsNeedFreeNames) {
+  LogWriter log(path_, 10);
+  log.SetText("scenario", "x");
+  log.ReserveText("summary", 10);
+  for (const char* name : {"scenario", "summary", "a/b", "", ".."}) {
+    EXPECT_THAT(MessageOf<std::invalid_argument>([&] { log.ReserveText(name, 10); }), StartsWith("text \""))
+        << name;
+  }
+  EXPECT_THAT(MessageOf<std::invalid_argument>([&] { log.ReserveText("x", 0); }), StartsWith("capacity"));
+}
+
+TEST_F(Misuse, CallsMustComeInOrder) {
+  const auto message = [](const auto& call) { return MessageOf<std::invalid_argument>(call); };
+  EXPECT_THAT(message([&] { LogWriter(path_, 0); }), HasSubstr("max_rows"));
+  EXPECT_THAT(message([&] { LogWriter(path_, 1, 0); }), HasSubstr("rows_per_flush"));
+  LogWriter log(path_, 2);
+  EXPECT_THAT(message([&] { log.EndRow(); }), EndsWith("the rows have not been started"));
+  EXPECT_THAT(message([&] { log.Close(); }), EndsWith("the rows have not been started"));
+  StartSample(&log);
+  EXPECT_THAT(message([&] { log.StartRows(); }), EndsWith("the rows have been started"));
+  EXPECT_THAT(message([&] {
+                log.AddSignal({"x", "m", "", 1, {}, {}});
+              }),
+              EndsWith("the rows have been started"));
+  EXPECT_THAT(message([&] { log.EndRow(); }), HasSubstr("time of a row: must be finite, got nan"));
+  WriteSampleRows(2, &log);
+  EXPECT_THAT(message([&] { WriteSampleRow(&log); }), HasSubstr("must not exceed max_rows"));
+  log.Close();
+  EXPECT_THAT(message([&] { log.Flush(); }), EndsWith("the log is closed"));
+  EXPECT_THAT(message([&] { log.SetText("a", "b"); }), EndsWith("the log is closed"));
+  EXPECT_TRUE(IsSample(LogReader(path_), 2));
+}
+
+}  // namespace
+}  // namespace dexcheck

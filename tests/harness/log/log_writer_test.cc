@@ -1,0 +1,255 @@
+#include "harness/log/log_writer.h"
+
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmath>
+
+#include "tests/common/allocation_counter.h"
+#include "tests/common/files.h"
+#include "tests/common/run_program.h"
+#include "tests/harness/log/sample_log_check.h"
+
+namespace dexcheck {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::IsSample;
+using testing::ReadText;
+using testing::StartSample;
+using testing::TempFolder;
+using testing::WriteSampleLog;
+using testing::WriteSampleRow;
+using testing::WriteSampleRows;
+
+class LogWriterTest : public ::testing::Test {
+ protected:
+  [[nodiscard]] long CountFiles() const {
+    const auto files = std::filesystem::directory_iterator(folder_.path());
+    return std::distance(begin(files), end(files));
+  }
+
+  TempFolder folder_;
+  std::filesystem::path path_ = folder_.path() / "log.h5";
+};
+
+TEST_F(LogWriterTest, RowsComeBackExactly) {
+  for (const auto& [rows, max_rows] : {std::pair{50L, 50L}, {49L, 49L}, {1L, 1L}, {3L, 50L}, {0L, 50L}}) {
+    WriteSampleLog(path_, rows, max_rows);
+    EXPECT_TRUE(IsSample(LogReader(path_), rows));
+    EXPECT_EQ(CountFiles(), 1);
+    std::filesystem::remove(path_);
+  }
+}
+
+TEST_F(LogWriterTest, UnitsAndDescriptionsComeBack) {
+  WriteSampleLog(path_, 5, 5);
+  const LogReader log(path_);
+  ASSERT_EQ(log.signals().size(), 4U);
+  EXPECT_EQ(log.signals()[0].name, "time");
+  EXPECT_EQ(log.signals()[0].unit, "s");
+  const SignalInfo& pose = log.signals()[1];
+  EXPECT_EQ(pose.name, "object/X_o");
+  EXPECT_EQ(pose.unit, "m, m, m, rad, rad, rad");
+  EXPECT_EQ(pose.description, "Pose of the object");
+  EXPECT_THAT(pose.columns, ::testing::ElementsAre("x", "y", "z", "phi", "theta", "psi"));
+  EXPECT_TRUE(pose.attributes.empty());
+  const SignalInfo& check = log.signals()[2];
+  EXPECT_EQ(check.width, 1);
+  EXPECT_TRUE(check.columns.empty());
+  EXPECT_EQ(check.attributes, (std::map<std::string, double>{{"bound", 1e-10}, {"kind", 2.0}}));
+  EXPECT_THAT(log.ListTexts(), ::testing::ElementsAre("empty", "scenario"));
+  EXPECT_EQ(log.ReadText("empty"), "");
+}
+
+TEST_F(LogWriterTest, SameRowsGiveTheSameBytes) {
+  WriteSampleLog(path_, 30, 30);
+  const std::string bytes = ReadText(path_);
+  ::usleep(1100000);  // a time stamp in the file would differ
+  WriteSampleLog(folder_.path() / "other.h5", 30, 30);
+  EXPECT_TRUE(ReadText(folder_.path() / "other.h5") == bytes);
+  // Trimmed: room that was never used leaves no trace.
+  WriteSampleLog(folder_.path() / "trimmed.h5", 30, 100000);
+  EXPECT_TRUE(ReadText(folder_.path() / "trimmed.h5") == bytes);
+}
+
+TEST_F(LogWriterTest, FlushMakesRowsVisible) {
+  LogWriter log(path_, 100000, 10);
+  StartSample(&log);
+  EXPECT_TRUE(IsSample(LogReader(path_), 0));
+  WriteSampleRows(19, &log);
+  EXPECT_TRUE(IsSample(LogReader(path_), 10));
+  log.Flush();
+  EXPECT_TRUE(IsSample(LogReader(path_), 19));
+  log.Flush();
+  WriteSampleRows(12, &log);
+  EXPECT_TRUE(IsSample(LogReader(path_), 29));
+  EXPECT_EQ(log.rows(), 31);
+}
+
+TEST_F(LogWriterTest, DestructionKeepsCompleteRows) {
+  {
+    LogWriter log(path_, 100, 40);
+    StartSample(&log);
+    WriteSampleRows(3, &log);
+    log.Row(1)[0] = 5.0;  // a row that never ends
+  }
+  EXPECT_TRUE(IsSample(LogReader(path_), 3));
+}
+
+TEST_F(LogWriterTest, WhatARowLeavesOutIsNotANumber) {
+  {
+    LogWriter log(path_, 10, 2);
+    StartSample(&log);
+    WriteSampleRows(3, &log);
+    log.Flush();
+    for (int row = 3; row < 7; ++row) {
+      log.Row(LogWriter::kTime)[0] = testing::kTimeStep * row;
+      log.Row(1)[2] = 7.0;
+      log.EndRow();
+    }
+    log.Close();
+  }
+  const LogReader log(path_);
+  ASSERT_EQ(log.rows(), 7);
+  const RowMatrixXd pose = log.ReadSignal("object/X_o");
+  for (int row = 3; row < 7; ++row) {
+    for (int k = 0; k < 6; ++k) EXPECT_EQ(std::isnan(pose(row, k)), k != 2) << row << " " << k;
+    EXPECT_EQ(pose(row, 2), 7.0);
+  }
+}
+
+TEST_F(LogWriterTest, FlushForgetsARowUnderConstruction) {
+  {
+    LogWriter log(path_, 10, 5);
+    StartSample(&log);
+    WriteSampleRow(&log);
+    log.Row(2)[0] = 3.0;
+    log.Flush();
+    log.Row(LogWriter::kTime)[0] = testing::kTimeStep;
+    log.EndRow();
+    log.Close();
+  }
+  EXPECT_TRUE(std::isnan(LogReader(path_).ReadSignal("check/M_bar")(1, 0)));
+}
+
+TEST_F(LogWriterTest, LateTextsAndFilesReachTheFile) {
+  for (const long max_rows : {20L, 1000L}) {
+    LogWriter log(path_, max_rows, 8);
+    StartSample(&log);
+    WriteSampleRows(20, &log);
+    const std::string long_text(1 << 20, 'x');
+    log.SetText("summary", long_text);
+    log.SetText("empty", "no longer");
+    log.EmbedFile("outputs", "figure.svg", "<svg/>");
+    log.Close();
+    const LogReader reader(path_);
+    EXPECT_TRUE(IsSample(reader, 20));
+    EXPECT_TRUE(reader.ReadText("summary") == long_text);
+    EXPECT_EQ(reader.ReadText("empty"), "no longer");
+    EXPECT_EQ(reader.ReadFile("outputs", "figure.svg"), "<svg/>");
+    EXPECT_EQ(CountFiles(), 1);
+    std::filesystem::remove(path_);
+  }
+}
+
+TEST_F(LogWriterTest, ReservedTextsAreWrittenInPlace) {
+  LogWriter log(path_, 20, 8);
+  log.ReserveText("summary", 100);
+  log.ReserveText("verdict", 8);
+  log.ReserveText("unused", 5);
+  log.SetText("verdict", "none yet");
+  StartSample(&log);
+  EXPECT_EQ(LogReader(path_).ReadText("summary"), "");
+  EXPECT_EQ(LogReader(path_).ReadText("verdict"), "none yet");
+  WriteSampleRows(20, &log);
+  struct stat before {};
+  ASSERT_EQ(::stat(path_.c_str(), &before), 0);
+  log.SetText("summary", std::string(100, 'x'));
+  log.SetText("summary", "short");
+  log.SetText("verdict", "pass");
+  EXPECT_EQ(LogReader(path_).ReadText("summary"), "short");
+  log.Close();
+  struct stat after {};
+  ASSERT_EQ(::stat(path_.c_str(), &after), 0);
+  EXPECT_EQ(after.st_ino, before.st_ino) << "the file was written anew";
+  const LogReader reader(path_);
+  EXPECT_TRUE(IsSample(reader, 20));
+  EXPECT_EQ(reader.ReadText("verdict"), "pass");
+  EXPECT_THAT(reader.ListTexts(),
+              ::testing::ElementsAre("empty", "scenario", "summary", "unused", "verdict"));
+}
+
+TEST_F(LogWriterTest, ReservedTextsSurviveTrimming) {
+  for (const size_t size : {50U, 51U, 5000U}) {
+    for (const long rows : {0L, 10L}) {
+      LogWriter log(path_, 20, 8);
+      log.ReserveText("summary", 50);
+      StartSample(&log);
+      WriteSampleRows(rows, &log);
+      log.SetText("summary", "first");
+      log.SetText("summary", std::string(size, 'x'));
+      log.Close();
+      const LogReader reader(path_);
+      EXPECT_TRUE(IsSample(reader, rows));
+      EXPECT_EQ(reader.ReadText("summary"), std::string(size, 'x'));
+      std::filesystem::remove(path_);
+    }
+  }
+}
+
+TEST_F(LogWriterTest, RoomCostsNoDiskSpace) {
+  struct stat status {};
+  LogWriter log(path_, 10000000, 10);  // 960 MB
+  log.AddSignal({"wide", "1", "", 11, {}, {}});
+  log.StartRows();
+  ASSERT_EQ(::stat(path_.c_str(), &status), 0);
+  EXPECT_GT(status.st_size, 900000000);
+  // Time alone is filled.
+  constexpr long kBlock = 512;
+  EXPECT_LT(status.st_blocks * kBlock, 90000000);
+  log.Close();
+  EXPECT_LT(std::filesystem::file_size(path_), 10000U);
+}
+
+TEST_F(LogWriterTest, RowsAllocateNothing) {
+  LogWriter log(path_, 1000, 10);
+  StartSample(&log);
+  WriteSampleRows(20, &log);
+  const testing::AllocationCounter counter;
+  WriteSampleRows(500, &log);
+  EXPECT_EQ(counter.count(), 0);
+  EXPECT_FALSE(ReadText(path_).empty());
+  EXPECT_GT(counter.count(), 0) << "the counter does not count";
+}
+
+TEST_F(LogWriterTest, AnOtherProgramReadsIt) {
+  {
+    LogWriter log(path_, 40, 8);
+    StartSample(&log);
+    WriteSampleRows(20, &log);
+    for (const char* state : {"unfinished", "finished"}) {
+      const testing::ProgramResult dump =
+          testing::RunProgram({DEXCHECK_H5DUMP, "--attribute=object/X_o/columns", "--attribute=meta/scenario",
+                               "--dataset=check/M_bar", "--format=%.17g", path_});
+      EXPECT_EQ(dump.exit_code, 0) << state << dump.err;
+      EXPECT_EQ(dump.err, "") << state;
+      // Rows 14 and 15 of check/M_bar; "theta" among the columns.
+      EXPECT_THAT(dump.out, HasSubstr("14.533333333333333")) << state;
+      EXPECT_THAT(dump.out, HasSubstr("\"theta\"")) << state;
+      EXPECT_THAT(dump.out, HasSubstr("zeile")) << state;
+      if (log.rows() == 20) {
+        WriteSampleRows(1, &log);
+        log.Close();
+      }
+    }
+  }
+  const testing::ProgramResult header = testing::RunProgram({DEXCHECK_H5DUMP, "--header", path_});
+  EXPECT_THAT(header.out, HasSubstr("DATASET \"X_o\""));
+  EXPECT_THAT(header.out, HasSubstr("SIMPLE { ( 21, 6 ) / ( 21, 6 ) }"));
+  EXPECT_THAT(header.out, HasSubstr("H5T_IEEE_F64LE"));
+}
+
+}  // namespace
+}  // namespace dexcheck

@@ -1,0 +1,96 @@
+// Faults seeded in model or plant: each must be found, and blamed on the right one.
+
+#include <gtest/gtest.h>
+
+#include "tests/harness/run/shipped_run.h"
+
+namespace dexcheck::testing {
+namespace {
+
+struct Fault {
+  const char* name;
+  const char* scenario;
+  std::vector<std::string> overrides;
+  Cause cause;
+};
+
+void PrintTo(const Fault& fault, std::ostream* out) { *out << fault.name; }
+
+class SeededFaults : public ::testing::TestWithParam<Fault> {};
+
+TEST_P(SeededFaults, AreBlamedOnTheirCause) {
+  const Fault& fault = GetParam();
+  ShippedRun run(fault.scenario, fault.overrides);
+  const RunResult& result = run.Run();
+  EXPECT_NE(result.verdict, Verdict::kPass);
+  EXPECT_STREQ(NameOf(result.attribution.cause), NameOf(fault.cause))
+      << result.attribution.evidence << "; " << result.failure;
+  for (const Attribution& one : result.attribution.attributions) {
+    EXPECT_EQ(one.cause == Cause::kModel, fault.cause == Cause::kModel) << one.check;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, SeededFaults,
+    ::testing::Values(
+        Fault{"object_mass", "curve", {"duration=0.2", "model.object.mass=0.21"}, Cause::kModel},
+        Fault{"link_inertia",
+              "curve",
+              {"duration=0.2", "model.template.arm.links.forearm.shapes.0.radius=0.036"},
+              Cause::kModel},
+        Fault{"link_length", "curve", {"duration=0.2", "model.lengths.L_7=0.2503"}, Cause::kModel},
+        Fault{"misplaced_contact", "curve", {"duration=0.2", "control.contact_error_deg=2"}, Cause::kSensing},
+        Fault{"low_fingertip_friction",
+              "curve",
+              {"duration=1", "plant.finger_friction=0.18"},
+              Cause::kFingertipSlip},
+        Fault{"soft_contacts",
+              "curve",
+              {"duration=1", "plant.contact_time_constant=0.02", "plant.contact_impedance=0.9"},
+              Cause::kContactSoftness},
+        Fault{
+            "creeping_contacts", "paper-ramp", {"duration=4.5", "plant.impratio=1"}, Cause::kContactSoftness},
+        Fault{"joint_stop",
+              "two-hands",
+              {"duration=5.5", "grasp.contacts_deg.3=[-121, 109]"},
+              Cause::kJointStop},
+        Fault{"ring_radius", "two-hands", {"duration=0.1", "model.object.ring_radius=0.2503"}, Cause::kModel},
+        Fault{"slippery_floor", "paper-ramp", {"duration=2", "plant.floor_friction=0.1"}, Cause::kWheelSlip}),
+    [](const ::testing::TestParamInfo<Fault>& info) { return info.param.name; });
+
+struct Failure {
+  const char* name;
+  std::vector<std::string> overrides;
+  const char* message;
+};
+
+void PrintTo(const Failure& failure, std::ostream* out) { *out << failure.name; }
+
+class Failures : public ::testing::TestWithParam<Failure> {};
+
+TEST_P(Failures, EndTheRunWithTheirReason) {
+  ShippedRun run("paper-ramp", GetParam().overrides);
+  const RunResult& result = run.Run();
+  EXPECT_EQ(result.verdict, Verdict::kFailed);
+  EXPECT_NE(result.failure.find(GetParam().message), std::string::npos) << result.failure;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, Failures,
+    ::testing::Values(
+        Failure{"motor_limit",
+                {"duration=1", "control.natural_frequency=100", "start_error.xyz=[0, 0, 0.05]"},
+                "is at its limit"},
+        Failure{"not_finite", {"duration=1", "start_error.xyz=[1e308, 0, 0]"}, "not finite"},
+        Failure{"fall",
+                {"duration=5", "plant.floor_friction=3",
+                 "trajectory={ type = 'circle', speed = 3, radius = 1.5, ramp_time = 5 }"},
+                "the robot fell"},
+        Failure{"lost_grasp",
+                {"plant.finger_friction=0.15", "control.weight={ platform = 1e8, arm = 1e8 }"},
+                "the grasp is lost"},
+        Failure{"no_forces", {"duration=1", "control.f_max=0.3", "control.f_min=0"}, "contact forces"}),
+    [](const ::testing::TestParamInfo<Failure>& info) { return info.param.name; });
+
+}  // namespace
+}  // namespace dexcheck::testing

@@ -1,0 +1,210 @@
+// The task: take the torus from the bench, carry it, put it down.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "tests/common/allocation_counter.h"
+#include "tests/harness/run/shipped_run.h"
+
+namespace dexcheck::testing {
+namespace {
+
+std::vector<std::string> ListPhases(const PickAndPlace& task) {
+  std::vector<std::string> phases;
+  for (const PhaseEntry& entry : task.history()) phases.emplace_back(NameOf(entry.phase));
+  return phases;
+}
+
+const std::vector<std::string> kWholeTask = {"approach",  "close",   "grip",     "take over", "carry",
+                                             "hand over", "release", "withdraw", "done"};
+
+class LiftTest : public ::testing::Test {
+ protected:
+  /// Runs with highest place of the object and largest support force while it is carried.
+  const RunResult& Lift(const std::vector<std::string>& overrides, std::uint64_t seed = 0) {
+    run_ = std::make_unique<ShippedRun>("lift", overrides, seed);
+    start_ = run_->setup().X_Bo_start().translation();
+    return run_->Run([&] {
+      const ClosedLoop& loop = run_->loop();
+      highest_ = std::max(highest_, loop.record().reading.state.X_Bo.translation().z());
+      const bool apart =
+          std::all_of(loop.record().reading.state.overlap.begin(), loop.record().reading.state.overlap.end(),
+                      [](double depth) { return depth < 0.0; });
+      if (loop.task()->task().phase() == Phase::kApproach && !apart) touched_early_ = true;
+    });
+  }
+
+  [[nodiscard]] const PickAndPlace& task() const { return run_->loop().task()->task(); }
+  [[nodiscard]] Vector3d Way() const { return run_->step().reading.state.X_Bo.translation() - start_; }
+
+  std::unique_ptr<ShippedRun> run_;
+  Vector3d start_ = Vector3d::Zero();
+  double highest_ = 0.0;
+  bool touched_early_ = false;
+};
+
+TEST_F(LiftTest, TakesCarriesAndPutsDown) {
+  const RunResult& result = Lift({});
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  EXPECT_EQ(ListPhases(task()), kWholeTask);
+  EXPECT_FALSE(touched_early_);
+  // 0.15 m up and 1 m along, and it lies where it should.
+  EXPECT_NEAR(highest_ - start_.z(), 0.15, 1e-4);
+  EXPECT_NEAR(Way().x(), 1.0, 1e-4);
+  EXPECT_NEAR(Way().tail<2>().norm(), 0.0, 1e-4);
+  EXPECT_LE(result.tracking.position_max(), 1e-4);  // measured 1.3e-7
+  EXPECT_GT(result.tracking.position_max(), 0.0);
+  const ClosedLoop& loop = run_->loop();
+  for (const CheckRecord& check : loop.checks().model_checks()) EXPECT_LE(check.worst, 1e-10) << check.name;
+  // While the hand is far from the object nothing is said of contacts, but that is the smaller part.
+  const auto count = [&](std::string_view name) {
+    for (const CheckRecord& check : loop.checks().model_checks()) {
+      if (check.name == name) return check.count;
+    }
+    return 0L;
+  };
+  EXPECT_EQ(count("M_bar"), loop.record().step);
+  EXPECT_GT(count("G"), loop.record().step / 2);
+  EXPECT_LT(count("G"), loop.record().step);
+  // Unjudged: some hundredths of a second where contacts come and go.
+  EXPECT_GT(loop.record().findings.unjudged_steps, 50);
+  EXPECT_LT(loop.record().findings.unjudged_steps, 500);
+  EXPECT_GT(run_->Worst("unjudged"), 0.03);
+  // A check that has the name of another would hide it in the summary.
+  std::set<std::string> names;
+  for (const CheckRecord& record : run_->setup().gate().records)
+    EXPECT_TRUE(names.insert(record.name).second) << record.name;
+  for (const CheckRecord& check : loop.checks().model_checks())
+    EXPECT_TRUE(names.insert(check.name).second) << check.name;
+  for (const CheckRecord& check : loop.checks().motion_checks())
+    EXPECT_TRUE(names.insert(check.name).second) << check.name;
+  EXPECT_LE(task().push(), 1e-6);
+  // Torques of some 50 N m; measured 3e-3.
+  EXPECT_LE(loop.task()->torque_jump(), 0.02);
+  EXPECT_GT(loop.task()->torque_jump(), 0.0);
+}
+
+TEST_F(LiftTest, WeighsAHeavierObjectAndLiftsIt) {
+  // The torus is 30 % heavier than the model has it: lifted well, and the models disagree.
+  const RunResult& result = Lift({"model.object.mass=0.153846153846"});
+  EXPECT_EQ(result.failure, "");
+  EXPECT_EQ(ListPhases(task()), kWholeTask);
+  EXPECT_NEAR(task().scale(), 1.3, 0.01);
+  EXPECT_LE(result.tracking.position_max(), 1e-4);
+  EXPECT_EQ(result.verdict, Verdict::kDisagreement);
+  EXPECT_EQ(result.attribution.cause, Cause::kModel);
+}
+
+TEST_F(LiftTest, LiftsWithLessFrictionThanStated) {
+  const RunResult& result = Lift({"plant.finger_friction=0.56"});
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  EXPECT_EQ(ListPhases(task()), kWholeTask);
+  EXPECT_GT(run_->Worst("cone_use"), 0.7);
+}
+
+TEST_F(LiftTest, RefusesWhatIsTooHeavyAndLeavesItWhereItLies) {
+  const RunResult& result = Lift({"model.object.mass=0.1"});
+  EXPECT_EQ(result.verdict, Verdict::kFailed);
+  EXPECT_NE(result.failure.find("refused to lift: the object weighs more than 1.5 times"), std::string::npos)
+      << result.failure;
+  EXPECT_EQ(ListPhases(task()), (std::vector<std::string>{"approach", "close", "grip", "take over",
+                                                          "hand over", "release", "withdraw", "done"}));
+  EXPECT_LE(Way().norm(), 1e-4);
+  EXPECT_LE(highest_ - start_.z(), 1e-4);
+}
+
+TEST_F(LiftTest, RefusesWhatItsFingersCannotHold) {
+  const RunResult& result = Lift({"control.f_max=1.2"});
+  EXPECT_EQ(result.verdict, Verdict::kFailed);
+  EXPECT_NE(result.failure.find("refused to lift: no contact forces inside the friction cones"),
+            std::string::npos)
+      << result.failure;
+  EXPECT_LE(Way().norm(), 1e-4);
+}
+
+TEST_F(LiftTest, TriesAgainAndSaysWhichFingerMissed) {
+  // The model's torus is thicker than the real one: the fingers close on air.
+  const RunResult& result = Lift({"model.object.tube_radius=0.016"});
+  EXPECT_EQ(result.verdict, Verdict::kFailed);
+  EXPECT_EQ(task().history().back().attempt, 2);
+  EXPECT_NE(task().first_failure().find("found no object"), std::string::npos) << task().first_failure();
+  EXPECT_NE(result.failure.find("_tip\" found no object where it should be, attempt 2 of 2"),
+            std::string::npos)
+      << result.failure;
+  EXPECT_LE(Way().norm(), 5e-3);
+}
+
+TEST_F(LiftTest, LosesTheGraspWhereFrictionIsFarLessThanStated) {
+  const RunResult& result = Lift({"plant.finger_friction=0.3"});
+  EXPECT_EQ(result.verdict, Verdict::kFailed);
+  EXPECT_TRUE(result.grasp_lost);
+  EXPECT_EQ(result.attribution.cause, Cause::kFingertipSlip);
+}
+
+TEST_F(LiftTest, SucceedsFromOtherPlaces) {
+  for (const std::uint64_t seed : {3U, 14U}) {
+    SCOPED_TRACE(seed);
+    const RunResult& result = Lift({}, seed);
+    EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+    EXPECT_EQ(ListPhases(task()), kWholeTask);
+    EXPECT_NEAR(Way().x(), 1.0, 1e-4);
+    EXPECT_GT((start_ - Vector3d(0.25, -0.5, 0.631)).norm(), 1e-3);
+  }
+}
+
+TEST(LiftScenario, AllocatesOnlyWherePhasesChange) {
+  const ShippedRun run("lift");
+  ClosedLoop loop(run.setup(), /*check=*/false);
+  loop.Settle();
+  long allocating = 0;
+  while (!loop.is_finished()) {
+    const AllocationCounter counter;
+    loop.Step();
+    if (counter.count() > 0) ++allocating;
+  }
+  // Of some 25 000 steps those that begin a phase or a movement, or see a set of contacts for the first time.
+  EXPECT_GT(allocating, 0);
+  EXPECT_LT(allocating, 40);
+}
+
+TEST(LiftScenario, RefusesWhatDoesNotFitATask) {
+  const auto fails = [](const std::vector<std::string>& overrides, const std::string& part) {
+    try {
+      ShippedRun run("lift", overrides);
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+      return;
+    }
+    FAIL() << part << ": accepted";
+  };
+  fails({"start=moving"}, "start: must be \"rest\"");
+  fails({"control.orientation=angles"}, "control.orientation: must be \"rotation\"");
+  fails({"plant.bonded=true"}, "plant.bonded");
+  fails({"plant.control_step=0.002"}, "plant.control_step");
+  fails({"task.attempts=0"}, "task.attempts");
+  fails({"task.raise=-1"}, "task.raise");
+  fails({"grasp.frame=nowhere"}, "grasp.frame");
+}
+
+TEST(LiftScenario, SaysWhyThereIsNoPlan) {
+  const auto fails = [](const std::string& override, const std::string& part) {
+    ShippedRun run("lift", {override});
+    try {
+      run.Run();
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("lift.toml: task: "), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+      return;
+    }
+    FAIL() << override << ": accepted";
+  };
+  fails("task.xyz=[0.9, -0.5, 0.631]", "the arm does not reach");
+  fails("task.arm_joints=[\"l_elbow\"]", "each must move frame r_palm_frame");
+}
+
+}  // namespace
+}  // namespace dexcheck::testing

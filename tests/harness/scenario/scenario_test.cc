@@ -1,0 +1,123 @@
+#include "harness/scenario/scenario.h"
+
+#include <gtest/gtest.h>
+
+#include "controller/common/errors.h"
+#include "harness/engine/mjcf_files.h"
+#include "tests/common/files.h"
+#include "tests/common/paths.h"
+#include "tests/common/throws.h"
+#include "tests/harness/run/shipped_run.h"
+
+namespace dexcheck::testing {
+namespace {
+
+TEST(ReadScenario, ReadsEveryPart) {
+  const Scenario scenario = ReadShippedScenario(
+      "paper-rest", {"plant.floor_friction=0.5", "plant.control_step=0.004", "model.object.mass=0.25",
+                     "control.weight={ platform = 3, arm = 2 }", "bounds.wheel_slip=0.5"});
+  EXPECT_EQ(scenario.name, "paper-rest");
+  EXPECT_EQ(scenario.start, Start::kRest);
+  EXPECT_EQ(scenario.duration, 10.0);
+  EXPECT_EQ(scenario.control.gains.K_p[0], 2.25);
+  EXPECT_EQ(scenario.control.gains.K_v[5], 40.0);
+  EXPECT_EQ(scenario.plant.floor_friction, 0.5);
+  EXPECT_FALSE(scenario.plant.finger_friction);
+  EXPECT_EQ(scenario.plant.control_step, 0.004);
+  EXPECT_EQ(scenario.model_overrides, std::vector<std::string>{"object.mass=0.25"});
+  EXPECT_EQ(scenario.control.weight, RedundancyWeight::Kind::kDiagonal);
+  EXPECT_EQ(scenario.control.platform_weight, 3.0);
+  ASSERT_EQ(scenario.bounds.size(), 1U);
+  EXPECT_EQ(scenario.bounds[0].second, 0.5);
+  EXPECT_EQ(scenario.grasp.fingertips.size(), 4U);
+  EXPECT_DOUBLE_EQ(scenario.grasp.contacts[3].u, -kPi / 2.0);
+}
+
+TEST(ReadScenario, TurnsFrequencyAndDampingIntoGains) {
+  const Scenario scenario = ReadShippedScenario(
+      "paper", {"control.natural_frequency=[1, 2, 3, 4, 5, 6]", "control.damping_ratio=0.5"});
+  EXPECT_EQ(scenario.control.gains.K_p[2], 9.0);
+  EXPECT_EQ(scenario.control.gains.K_v[2], 3.0);
+}
+
+struct BadInput {
+  const char* name;
+  std::vector<std::string> overrides;
+  const char* message;
+};
+
+void PrintTo(const BadInput& bad, std::ostream* out) { *out << bad.name; }
+
+class BadScenarios : public ::testing::TestWithParam<BadInput> {};
+
+TEST_P(BadScenarios, AreRefusedInOneLine) {
+  try {
+    ShippedRun run("paper", GetParam().overrides);
+    FAIL() << "was accepted";
+  } catch (const InputError& error) {
+    const std::string message = error.what();
+    EXPECT_NE(message.find(GetParam().message), std::string::npos) << message;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, BadScenarios,
+    ::testing::Values(
+        BadInput{"no_assignment", {"duration"}, "--set duration: must be PATH=VALUE"},
+        BadInput{
+            "negative_duration", {"duration=-1"}, "--set duration=-1: duration: must be positive, got -1"},
+        BadInput{"endless_settling", {"settle=1e9"}, "--set settle=1e9: settle: must be at most 100 s"},
+        BadInput{"settling_never", {"settle=inf"}, "settle: must be"},
+        BadInput{"settling_in_tiny_steps",
+                 {"plant.time_step=1e-9", "duration=1e-6"},
+                 "settle: must be at most 1e8 time steps"},
+        BadInput{"unknown_key",
+                 {"plant.time_stop=1"},
+                 "plant.time_stop: unknown key, did you mean \"time_step\"?"},
+        BadInput{"unknown_table", {"plants.time_step=1"}, "plants: unknown key"},
+        BadInput{"text_for_number", {"plant.impratio=much"}, "plant.impratio: must be a number"},
+        BadInput{
+            "path_through_number", {"duration.x=1"}, "--set duration.x=1: \"duration\" is no table or list"},
+        BadInput{"no_such_entry", {"grasp.fingertips.7=rf1_tip"}, "is no entry of a list of 4"},
+        BadInput{"no_such_fingertip", {"grasp.fingertips.0=rf9_tip"}, "\"rf9_tip\" is no fingertip"},
+        BadInput{"fingertip_twice", {"grasp.fingertips.0=rf2_tip"}, "\"rf2_tip\" is named twice"},
+        BadInput{"no_such_joint", {"grasp.joints_deg.elbow=3"}, "\"elbow\" is no joint"},
+        BadInput{"no_such_frame", {"grasp.frame=palm"}, "\"palm\" is no frame"},
+        BadInput{"too_few_contacts", {"grasp.contacts_deg=[[0, 0]]"}, "one contact for each of the 4"},
+        BadInput{"out_of_reach", {"grasp.xyz=[0, 0, 0.5]"}, "do not reach their contacts"},
+        BadInput{"gains_twice", {"control.K_p=3"}, "K_p"},
+        BadInput{"force_bounds", {"control.f_max=0.5"}, "f_max: must be greater than f_min"},
+        BadInput{"impedance", {"plant.contact_impedance=1"}, "contact_impedance: must be less than 1"},
+        BadInput{"no_such_bound", {"bounds.slip=1"}, "bounds.slip: no check has this name"},
+        BadInput{"bad_trajectory", {"trajectory.type=loop"}, "trajectory.type: must be one of"},
+        BadInput{"model_value", {"model.object.mass=-1"}, "object.mass"},
+        BadInput{"model_key", {"model.object.weight=1"}, "object.weight: unknown key"},
+        BadInput{"singular_angles", {"grasp.zyz_deg=[90, -105, 0]"}, "take \"rotation\""}),
+    [](const ::testing::TestParamInfo<BadInput>& info) { return info.param.name; });
+
+TEST(ReadScenario, RefusesAMovingStartThatIsNoneBeforeItRuns) {
+  EXPECT_THROW(ShippedRun("paper", {"trajectory.velocity=[0, 1, 0]"}), InputError);
+  EXPECT_THROW(ShippedRun("paper", {"trajectory.turning=[0.1, 0, 0]"}), InputError);
+}
+
+TEST(ListMjcfFiles, FollowsIncludesAndAssets) {
+  const std::vector<std::string> files = ListMjcfFiles(testing::SourcePath("/mjcf/scene.xml"));
+  ASSERT_FALSE(files.empty());
+  EXPECT_EQ(files[0], "scene.xml");
+  for (const char* needed : {"robot.xml", "torus.xml", "stage.xml", "assets/torus.msh"}) {
+    EXPECT_NE(std::find(files.begin(), files.end(), needed), files.end()) << needed;
+  }
+}
+
+TEST(ListMjcfFiles, RefusesFilesFromElsewhere) {
+  const TempFolder folder;
+  WriteText(folder.path() / "a.xml",
+            "<mujoco><!-- <include file=\"gone.xml\"/> --><include file=\"../b.xml\"/></mujoco>");
+  WriteText(folder.path().parent_path() / "b.xml", "<mujoco/>");
+  EXPECT_THROW(ListMjcfFiles(folder.path() / "a.xml"), InputError);
+  std::filesystem::remove(folder.path().parent_path() / "b.xml");
+}
+
+}  // namespace
+}  // namespace dexcheck::testing

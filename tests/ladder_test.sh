@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# Fails when folders of the sources include one another in a cycle, or when a folder of harness/ includes a header of one
+# that harness/CMakeLists.txt adds later: ladder_test.sh ROOT
+# Exit code: 0 a ladder, 1 not, 2 nothing to look at.
+set -euo pipefail
+
+# Prints "FOLDER INCLUDED FILE" for each include of another folder of ROOT.
+list_includes() {
+  (cd "$1" && find controller harness renders -type f \( -name '*.h' -o -name '*.cc' \) -exec \
+    grep -HoE '^#include "(controller|harness|renders)/[^"]+"' {} +) |
+    sed -E 's|^((.*)/[^/:]+):#include "(.*)/[^/]+"$|\2 \3 \1|' | awk '$1 != $2' | sort -u
+}
+
+# Prints what is wrong with the tree ROOT.
+list_faults() {
+  local includes order
+  includes=$(list_includes "$1")
+  awk '{ print $1, $2 }' <<<"$includes" | sort -u | tsort 2>&1 >/dev/null | sed -E 's/^tsort: -: //' |
+    tr '\n' ' ' | sed -E 's/ $/\n/; s/^/folders include one another: /'
+  order=$(sed -nE 's|^add_subdirectory\((.*)\)$|harness/\1|p' "$1/harness/CMakeLists.txt")
+  awk 'NR == FNR { height[$1] = NR; next }
+    $1 ~ /^harness\// && !($1 in height) { print $3 ": its folder is not added by harness/CMakeLists.txt"; next }
+    $2 in height && $1 in height && height[$2] > height[$1] { print $3 ": includes a header of " $2 ", which is above" }
+    $1 ~ /^controller\// && $2 !~ /^controller\// { print $3 ": includes a header of " $2 }' \
+    <(printf '%s\n' "$order") - <<<"$includes"
+}
+
+root=$1
+[[ $(list_includes "$root" | wc -l) -gt 100 ]] || { echo "no sources in $root"; exit 2; }
+
+# What must be found: the test can fail.
+scratch=$(mktemp -d)
+trap 'rm -r "$scratch"' EXIT
+mkdir -p "$scratch"/{controller/model,harness/base,harness/log,renders}
+printf 'add_subdirectory(base)\nadd_subdirectory(log)\n' >"$scratch/harness/CMakeLists.txt"
+echo '#include "harness/base/files.h"' >"$scratch/harness/log/writer.cc"
+[[ -z $(list_faults "$scratch") ]] || { echo "a ladder is taken for none"; exit 1; }
+echo '#include "harness/log/writer.h"' >"$scratch/harness/base/files.cc"
+[[ $(list_faults "$scratch" | grep -c 'include one another.*harness/log\|files.cc: includes a header of harness/log') -eq 2 ]] ||
+  { echo "a cycle is not found"; exit 1; }
+
+faults=$(list_faults "$root")
+[[ -z $faults ]] || { echo "$faults"; exit 1; }
+echo "$(list_includes "$root" | wc -l) includes between folders, no cycle"
