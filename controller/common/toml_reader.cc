@@ -13,10 +13,18 @@ namespace {
 constexpr size_t kMaxNameLength = 64;
 constexpr std::string_view kNameLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
 constexpr std::string_view kNameRule = "a name of 1 to 64 letters, digits, and _ - .";
+constexpr size_t kMaxKeyLength = 256;
+constexpr std::string_view kKeyRule = "a name of 1 to 256 bytes without control characters";
 
 bool IsName(std::string_view text) {
   return !text.empty() && text.size() <= kMaxNameLength &&
          text.find_first_not_of(kNameLetters) == std::string_view::npos;
+}
+
+/// Keys name parts of robots too, which other formats name as they like.
+bool IsKey(std::string_view text) {
+  return !text.empty() && text.size() <= kMaxKeyLength &&
+         std::none_of(text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
 }
 
 std::string Format(const toml::node& node);
@@ -177,7 +185,7 @@ std::vector<std::pair<std::string, TomlValue>> TomlTable::ListInFileOrder() cons
 std::vector<std::pair<std::string, TomlValue>> TomlTable::GetEntries() {
   std::vector<std::pair<std::string, TomlValue>> entries = ListInFileOrder();
   for (const auto& [key, value] : entries) {
-    if (!IsName(key)) value.Reject("must have " + std::string(kNameRule));
+    if (!IsKey(key)) value.Reject("must have " + std::string(kKeyRule));
     asked_.insert(key);
   }
   return entries;

@@ -5,6 +5,7 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "controller/model/body_reader.h"
+#include "controller/model/segment_reader.h"
 #include "controller/model/tree_reader.h"
 
 namespace dexcheck {
@@ -65,7 +66,7 @@ Base ReadBase(const TomlValue& value) {
   base.type = table.Get("type").AsChoice<BaseType>({{"fixed", BaseType::kFixed},
                                                     {"planar", BaseType::kPlanar},
                                                     {"differential_drive", BaseType::kDifferentialDrive}});
-  base.link = table.Get("link").AsName();
+  base.link = ReadPartName(table.Get("link"));
   if (base.type == BaseType::kDifferentialDrive) {
     ReadDrive(table, base);
   } else if (const std::optional<TomlValue> pose = table.Find("pose")) {

@@ -1,5 +1,7 @@
 #include "controller/model/segment_reader.h"
 
+#include <algorithm>
+
 #include "controller/model/body_frame.h"
 #include "controller/model/body_reader.h"
 
@@ -30,9 +32,12 @@ void ReadPlainTransform(TomlTable& table, SegmentRow& row) {
 
 SegmentRow ReadRow(const TomlValue& value, Convention convention) {
   TomlTable table = value.AsTable();
-  SegmentRow row{
-      value,           table.Get("joint").AsName(), table.Get("link").AsName(), JointType::kRevolute, {},
-      Pose::Identity()};
+  SegmentRow row{value,
+                 ReadPartName(table.Get("joint")),
+                 ReadPartName(table.Get("link")),
+                 JointType::kRevolute,
+                 {},
+                 Pose::Identity()};
   if (const std::optional<TomlValue> type = table.Find("type")) {
     row.type =
         type->AsChoice<JointType>({{"revolute", JointType::kRevolute}, {"prismatic", JointType::kPrismatic}});
@@ -114,6 +119,17 @@ std::vector<Entry> ReadList(const std::optional<TomlValue>& value, Entry (*read)
 }
 
 }  // namespace
+
+std::string ReadPartName(const TomlValue& value) {
+  constexpr size_t kMaxLength = 256;
+  std::string name = value.AsText();
+  const bool has_controls =
+      std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+  if (name.empty() || name.size() > kMaxLength || has_controls) {
+    value.Fail("must be a name of 1 to 256 bytes without control characters");
+  }
+  return name;
+}
 
 FrameEntry ReadFrameEntry(const TomlValue& value) {
   TomlTable table = value.AsTable();

@@ -108,7 +108,7 @@ class TreeReader {
   void ReadChain(const TomlValue& value) {
     TomlTable table = value.AsTable();
     Chain chain{value, table.Get("parent"), "", Pose::Identity(), ReadSegment(table)};
-    if (const std::optional<TomlValue> prefix = table.Find("prefix")) chain.prefix = prefix->AsName();
+    if (const std::optional<TomlValue> prefix = table.Find("prefix")) chain.prefix = ReadPartName(*prefix);
     if (const std::optional<TomlValue> pose = table.Find("pose")) chain.X_PB = ReadPose(*pose);
     if (const std::optional<TomlValue> name = table.Find("template")) chain.common = FindTemplate(*name);
     table.RejectUnused();
@@ -241,7 +241,7 @@ class TreeReader {
   }
 
   void BuildFrame(const FrameEntry& frame, const TomlValue& owner, const std::string& prefix) {
-    const std::string name = prefix + frame.name.AsName();
+    const std::string name = prefix + ReadPartName(frame.name);
     const std::string own_link = frame.link.AsText();
     const std::string link = prefix + own_link;
     frame_names_.Add(name, owner);

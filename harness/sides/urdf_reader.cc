@@ -72,6 +72,10 @@ class UrdfReader {
     robot_.spec.source = source_;
     robot_.states_gravity = false;
     ReadTree();
+    if (robot_.spec.joints.empty()) {
+      Fail(outline_.links[static_cast<size_t>(outline_.root)].line,
+           "no joint moves, got " + std::to_string(outline_.joints.size()) + " joints");
+    }
     FinishBodies();
     ReadCouplings();
     NoteInertials();
@@ -204,10 +208,31 @@ class UrdfReader {
                     inertial.ixy, inertial.iyy, inertial.iyz,
                     inertial.ixz, inertial.iyz, inertial.izz;
     // clang-format on
+    const bool is_usable = body.mass >= 0.0 && std::isfinite(body.mass) && body.inertia.allFinite();
     const std::string problem = FindPhysicalInconsistency(body);
-    if (!problem.empty()) Fail(element.line, "link " + Quote(element.name) + ": inertial: " + problem);
+    if (!is_usable) FailInertial(element, problem);
+    if (!problem.empty()) impossible_.push_back({&element, problem, place.joint});
     body = ExpressIn(body, ToPose(inertial.origin));
     parts_[static_cast<size_t>(place.joint + 1)].push_back(ExpressIn(body, place.X_iL));
+  }
+
+  [[noreturn]] void FailInertial(const UrdfLink& link, const std::string& problem) const {
+    Fail(link.line, "link " + Quote(link.name) + ": inertial: " + problem);
+  }
+
+  /// Published robots have small parts that no body can be; what counts is the body that they are welded to.
+  void JudgeImpossibleParts() {
+    std::vector<std::string> names;
+    for (const ImpossiblePart& part : impossible_) {
+      if (part.joint >= 0) {
+        const MassProperties& whole = robot_.spec.joints[static_cast<size_t>(part.joint)].body;
+        if (!FindPhysicalInconsistency(whole).empty()) FailInertial(*part.link, part.problem);
+      }
+      names.push_back(part.link->name);
+    }
+    if (names.empty()) return;
+    robot_.notes.push_back("inertials that no body can have, counted in what they are welded to: " +
+                           JoinNames(names));
   }
 
   void FinishBodies() {
@@ -216,6 +241,7 @@ class UrdfReader {
       const std::vector<MassProperties>& parts = parts_[i + 1];
       robot_.spec.joints[i].body = parts.size() == 1 ? parts[0] : Combine(parts);
     }
+    JudgeImpossibleParts();
   }
 
   /// A joint that follows one which follows a third follows the third.
@@ -273,6 +299,13 @@ class UrdfReader {
   UrdfOutline outline_;
   urdf::ModelInterfaceSharedPtr model_;
   RobotDescription robot_;
+  /// A link whose own inertial breaks an inequality.
+  struct ImpossiblePart {
+    const UrdfLink* link;
+    std::string problem;
+    int joint;  ///< That moves it; -1 the base.
+  };
+  std::vector<ImpossiblePart> impossible_;
   std::vector<std::vector<MassProperties>> parts_;  // of the base, then of each joint's link, in frame i
 };
 

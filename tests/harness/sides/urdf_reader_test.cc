@@ -12,10 +12,12 @@
 
 #include "controller/common/errors.h"
 #include "controller/model/body_frame.h"
+#include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/complete_description.h"
 #include "harness/sides/description_check.h"
+#include "harness/sides/parameter_writer.h"
 #include "tests/common/files.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
@@ -201,6 +203,30 @@ TEST(Urdf, ReadsAHandByHand) {
   EXPECT_EQ(CalcCouplingMap(hand), T);
 }
 
+TEST(Urdf, KeepsAnyNameInATable) {
+  const RobotModel table =
+      ParseRobotModel(WriteParameters(ParseUrdf(kHand, "hand.urdf"), "hand.urdf"), "hand.toml");
+  EXPECT_EQ(table.joints()[0].link, "finger 1");
+  EXPECT_EQ(table.joints()[1].link, "finger/2");
+  EXPECT_EQ(table.joints()[2].parent, 1);
+}
+
+// What counts is the body that a part is welded to; published robots have many such parts.
+TEST(Urdf, TakesPartsThatNoBodyCanBe) {
+  std::string text = kHand;
+  const std::string point =
+      "<mass value=\"0.2\"/><inertia ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/>";
+  const size_t at = text.find(point);
+  ASSERT_NE(at, std::string::npos);
+  text.replace(
+      at, point.size(),
+      "<mass value=\"0\"/><inertia ixx=\"1e-6\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/>");
+  const RobotDescription hand = ParseUrdf(text, "hand.urdf");
+  EXPECT_THAT(hand.notes, ::testing::Contains(
+                              "inertials that no body can have, counted in what they are welded to: tip"));
+  EXPECT_NEAR(hand.spec.joints[1].body.inertia.trace(), 3.1e-5, 1e-18);
+}
+
 TEST(Urdf, FollowsAFollowerToItsLeader) {
   std::string text = kHand;
   text.insert(text.find("</robot>"), R"(<link name="last"/><joint name="last" type="continuous">
@@ -324,7 +350,12 @@ TEST(Urdf, RefusesWhatIsTooLargeOrEmpty) {
   EXPECT_THAT(CatchProblem("<robot name=\"none\"/>"), HasSubstr("must have links"));
   EXPECT_THAT(CatchProblem("<mujoco/>"), HasSubstr("must have the root element <robot>, got \"<mujoco>\""));
   EXPECT_THAT(CatchProblem("<robot name=\"r\"><link name=\"a\"/></robot>"),
-              HasSubstr("no link has an inertial"));
+              HasSubstr("no joint moves, got 0 joints"));
+  EXPECT_THAT(
+      CatchProblem(
+          "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><joint name=\"j\" type=\"continuous\">"
+          "<parent link=\"a\"/><child link=\"b\"/></joint></robot>"),
+      HasSubstr("no link has an inertial"));
 }
 
 }  // namespace
