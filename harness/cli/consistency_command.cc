@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -26,6 +28,7 @@
 #include "harness/sides/model_comparison.h"
 #include "harness/sides/read_description.h"
 #include "harness/sides/robot_file.h"
+#include "harness/sides/tolerance.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -40,6 +43,13 @@ struct Request {
   ConsistencyOptions options;
   std::string json_file;
   bool quiet = false;
+  int digits = 0;                   ///< 0: not given.
+  std::optional<double> tolerance;  ///< Relative, wider than rounding.
+
+  /// By which published numbers are judged; none: by rounding.
+  [[nodiscard]] std::optional<double> FindTolerance() const {
+    return digits > 0 ? std::pow(10.0, -digits) : tolerance;
+  }
 
   /// The results themselves take standard output: a table would spoil them.
   [[nodiscard]] bool PrintsJson() const { return json_file == "-"; }
@@ -69,19 +79,23 @@ void PrintTable(const Request& request, const Comparison& comparison) {
     for (const std::string& note : comparison.notes) fmt::print("  {}\n", note);
     fmt::print("\n");
   }
-  fmt::print("{:<24}{:>9}  {:>12}  {:>9}\n", "constant", "compared", "worst error", "bound");
+  fmt::print("{:<24}{:>9}  {:>12}  {:>9}  {:>6}\n", "constant", "compared", "worst error", "bound", "digits");
   for (const CheckRecord& record : result.gate.records) {
-    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {}\n", record.name, record.comparisons, record.worst,
-               record.bound, record.failed ? "DIFFERS" : "ok");
+    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {}\n", record.name, record.comparisons, record.worst,
+               record.bound, CountDigits(record.worst), record.failed ? "DIFFERS" : "ok");
   }
-  fmt::print("\n{:<24}{:>9}  {:>12}  {:>9}           {}\n", "term", "compared", "worst error", "bound",
-             "where it is worst");
+  fmt::print("\n{:<24}{:>9}  {:>12}  {:>9}  {:>6}           {}\n", "term", "compared", "worst error", "bound",
+             "digits", "where it is worst");
   for (const CheckRecord& record : result.terms) {
-    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:<7}  {}, sample {}\n", record.name, record.comparisons,
-               record.worst, record.bound, record.failed ? "DIFFERS" : "ok",
-               Describe(record.where, model, base), static_cast<long>(record.at));
+    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {:<7}  {}, sample {}\n", record.name,
+               record.comparisons, record.worst, record.bound, CountDigits(record.worst),
+               record.failed ? "DIFFERS" : "ok", Describe(record.where, model, base),
+               static_cast<long>(record.at));
   }
-  fmt::print("\nErrors are relative to each term's own scale; bounds follow from rounding (README.md).\n");
+  fmt::print("\nErrors are relative to each term's own scale; {} (README.md).\n",
+             request.FindTolerance()
+                 ? "bounds are those of rounding or the tolerance given, whichever is wider"
+                 : "bounds follow from rounding");
 }
 
 void PrintVerdict(const Request& request, const Comparison& comparison) {
@@ -92,9 +106,10 @@ void PrintVerdict(const Request& request, const Comparison& comparison) {
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
   }
   if (result.Agrees()) {
-    fmt::print("AGREE: {} agree to rounding in all {} terms.\n",
+    const std::optional<double> tolerance = request.FindTolerance();
+    fmt::print("AGREE: {} agree to {} in all {} terms.\n",
                request.with_engine ? "the analytic model and MuJoCo" : "the two descriptions",
-               result.terms.size());
+               tolerance ? fmt::format("{:g}", *tolerance) : "rounding", result.terms.size());
     return;
   }
   fmt::print("DISAGREE:\n");
@@ -110,6 +125,15 @@ void PrintVerdict(const Request& request, const Comparison& comparison) {
                record.engine_value, request.with_engine ? "MuJoCo" : FileName(request.files.mjcf),
                static_cast<long>(record.at));
   }
+  // Inertias printed with six digits, 1.5708 for pi / 2, a "fullinertia" that the engine diagonalises to
+  // 1e-6.
+  constexpr int kDigitsOfRoundedInput = 4;
+  const int digits = CountDigits(result);
+  if (digits < kDigitsOfRoundedInput) return;
+  fmt::print(
+      "All checks agree to {} digits, as they would with rounded numbers on one side; --digits {} judges by "
+      "that.\n",
+      digits, digits);
 }
 
 Json ToJson(const CheckRecord& record, const RobotModel& model) {
@@ -122,7 +146,8 @@ Json ToJson(const CheckRecord& record, const RobotModel& model) {
                {"where", Describe(record.where, model, base)},
                {"sample", static_cast<long>(record.at)},
                {"model", record.model_value},
-               {"engine", record.engine_value}};
+               {"engine", record.engine_value},
+               {"digits", CountDigits(record.worst)}};
   if (record.failed) json["first_failure"] = Describe(record.first_failure, model, base);
   return json;
 }
@@ -144,6 +169,7 @@ std::string ToText(const Request& request, const Comparison& comparison, ExitCod
                {"seconds", result.seconds},
                {"verdict", Judge(code)}};
   json["notes"] = comparison.notes;
+  if (const std::optional<double> tolerance = request.FindTolerance()) json["tolerance"] = *tolerance;
   json["checks"] = Json::object();
   for (const CheckRecord& record : result.gate.records) json["checks"][record.name] = ToJson(record, model);
   for (const CheckRecord& record : result.terms) json["checks"][record.name] = ToJson(record, model);
@@ -170,6 +196,15 @@ ConsistencyResult Compare(const Request& request,
 
 UrdfOptions MakeUrdfOptions(const Request& request) {
   return {{request.packages.begin(), request.packages.end()}};
+}
+
+/// Accepts a number above 0 and below 1.
+std::string Fraction(const std::string& text) {
+  double value = 0.0;
+  const char* const end = text.data() + text.size();
+  const std::from_chars_result read = std::from_chars(text.data(), end, value);
+  if (read.ec == std::errc() && read.ptr == end && 0.0 < value && value < 1.0) return {};
+  return "must be a number above 0 and below 1, got " + Quote(text);
 }
 
 void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& more) {
@@ -244,6 +279,9 @@ int Run(Request request) {
   } else {
     CompareDescriptionWithEngine(request, &comparison);
   }
+  if (const std::optional<double> tolerance = request.FindTolerance()) {
+    JudgeByTolerance(*tolerance, &comparison.result);
+  }
   const ConsistencyResult& result = comparison.result;
   ExitCode code = result.samples < request.options.samples ? kFailure : kSuccess;
   if (!result.Agrees()) code = kDisagreement;
@@ -284,6 +322,16 @@ void AddConsistencyCommand(Command app) {
       .AddOption("--json", &request->json_file,
                  "Write the results to this file (- for standard output, then without the table)")
       .TypeName("FILE.json");
+  constexpr int kMostDigits = 15;
+  const Option digits = command
+                            .AddOption("--digits", &request->digits,
+                                       "Agreement to this many digits of a term's scale is enough")
+                            .TypeName("N")
+                            .Check(WholeNumber(1, kMostDigits));
+  command.AddOption("--tolerance", &request->tolerance, "The same as a relative tolerance")
+      .TypeName("REL")
+      .Check(Fraction)
+      .Excludes(digits);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

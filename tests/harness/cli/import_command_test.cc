@@ -68,6 +68,47 @@ TEST_F(TwoDescriptions, ReportWhatOneLacksAndWhatDiffers) {
   EXPECT_THAT(against_table.out, HasSubstr("in wrong.urdf, "));
 }
 
+// Published numbers are rounded: 1.5708 for pi / 2 is 3.7e-6 off.
+TEST_F(TwoDescriptions, AreJudgedByDigitsWhenTold) {
+  std::string rounded = testing::MakePandaUrdf();
+  for (size_t at = rounded.find("1.5707963267948966"); at != std::string::npos;
+       at = rounded.find("1.5707963267948966")) {
+    rounded.replace(at, 18, "1.5708");
+  }
+  WriteText(folder_.path() / "rounded.urdf", rounded);
+  const ProgramResult strict = Run({"consistency", "rounded.urdf", mjcf_, "--samples", "20"});
+  EXPECT_EQ(strict.exit_code, 1);
+  EXPECT_THAT(strict.out,
+              HasSubstr("All checks agree to 4 digits, as they would with rounded numbers on one side; "
+                        "--digits 4 judges by that."));
+  const ProgramResult told =
+      Run({"consistency", "rounded.urdf", mjcf_, "--samples", "20", "--digits", "4", "--json", "-"});
+  EXPECT_EQ(told.exit_code, 0) << told.out;
+  const Json results = Json::parse(told.out);
+  EXPECT_EQ(results.at("tolerance"), 1e-4);
+  EXPECT_EQ(results.at("checks").at("joint_axis").at("bound"), 1e-4);
+  EXPECT_GE(results.at("checks").at("joint_axis").at("digits"), 4);
+  EXPECT_EQ(results.at("checks").at("link_mass").at("digits"), 16);
+  EXPECT_EQ(Run({"consistency", "rounded.urdf", mjcf_, "--samples", "20", "--digits", "7"}).exit_code, 1);
+  const ProgramResult tolerant =
+      Run({"consistency", "rounded.urdf", mjcf_, "--samples", "20", "--tolerance", "1e-3"});
+  EXPECT_EQ(tolerant.exit_code, 0);
+  EXPECT_THAT(tolerant.out, HasSubstr("agree to 0.001 in all"));
+
+  // A mistake is none of rounding: nothing is said of digits.
+  WriteText(folder_.path() / "wrong.urdf",
+            ReplaceOnce(testing::MakePandaUrdf(), "<mass value=\"3.228604\"/>", "<mass value=\"3.3\"/>"));
+  const ProgramResult wrong = Run({"consistency", "wrong.urdf", mjcf_, "--samples", "20", "--digits", "4"});
+  EXPECT_EQ(wrong.exit_code, 1);
+  EXPECT_THAT(wrong.out, HasSubstr("link_mass: link panda_link3: 3.3 in wrong.urdf"));
+  EXPECT_THAT(wrong.out, ::testing::Not(HasSubstr("rounded numbers")));
+  for (const std::string bad : {"0", "1", "-1e-3", "nan", "x"}) {
+    EXPECT_EQ(Run({"consistency", "rounded.urdf", mjcf_, "--tolerance", bad}).exit_code, 2) << bad;
+  }
+  EXPECT_EQ(Run({"consistency", "rounded.urdf", mjcf_, "--digits", "16"}).exit_code, 2);
+  EXPECT_EQ(Run({"consistency", "rounded.urdf", mjcf_, "--digits", "4", "--tolerance", "1e-3"}).exit_code, 2);
+}
+
 TEST_F(TwoDescriptions, AreImportedAsTablesThatAgreeWithThem) {
   for (const std::string& source : {std::string("panda.urdf"), mjcf_}) {
     const ProgramResult import = Run({"import", source, "--out", "imported.toml"});
