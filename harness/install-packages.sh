@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
-# Installs the Debian 12 packages that building, running and testing dexcheck needs, and nothing when all are there:
-# harness/install-packages.sh [development], with the tools for changing it too.
+# Installs the Debian 12 packages that dexcheck needs, and nothing when all are there:
+#   harness/install-packages.sh              to build and run the program
+#   harness/install-packages.sh tests        to build and run the tests and benchmarks too
+#   harness/install-packages.sh development  to change it too
 set -euo pipefail
 
 packages=(
@@ -23,13 +25,22 @@ packages=(
   fonts-dejavu-core
   # the report: its figures, its page's plots
   gnuplot-nox libjs-dygraphs
-  # tests and benchmarks, and the programs they take as oracles
-  libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools ffmpeg
-  sqlite3 slurm-wlm munge
-  chromium chromium-driver
 )
-# with the argument "development": sanitizers and libFuzzer, coverage, static analysis
-if [[ ${1:-} == development ]]; then
+purpose=${1:-program}
+case $purpose in
+  program | tests | development) ;;
+  *) echo "install-packages: $purpose: must be program, tests or development" >&2; exit 2 ;;
+esac
+if [[ $purpose != program ]]; then
+  # tests and benchmarks, and the programs they take as oracles
+  packages+=(
+    libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools ffmpeg
+    sqlite3 slurm-wlm munge
+    chromium chromium-driver
+  )
+fi
+if [[ $purpose == development ]]; then
+  # sanitizers and libFuzzer, coverage, static analysis
   packages+=(libclang-rt-14-dev llvm-14 clang-format-14 clang-tidy-14 cppcheck)
 fi
 

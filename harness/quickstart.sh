@@ -23,5 +23,5 @@ for word in "$@"; do
 done
 
 "$root/harness/install-packages.sh"
-(cd "$root" && cmake --preset release && cmake --build --preset release --target dexcheck)
+(cd "$root" && cmake --preset program && cmake --build --preset program)
 exec "$root/build/release/bin/dexcheck" run "${scenario[@]}" "$@"

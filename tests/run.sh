@@ -5,8 +5,8 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 export CMAKE_BUILD_PARALLEL_LEVEL=${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)}
 
-tools=()
-[[ ${1:-} != sanitize && ${1:-} != thread ]] || tools=(development)
-"$root/harness/install-packages.sh" "${tools[@]}"
+purpose=tests
+[[ ${1:-} != sanitize && ${1:-} != thread ]] || purpose=development
+"$root/harness/install-packages.sh" "$purpose"
 cd "$root"
 exec cmake --workflow --preset "${1:-release}"
