@@ -17,7 +17,7 @@ list_faults() {
   includes=$(list_includes "$1")
   awk '{ print $1, $2 }' <<<"$includes" | sort -u | tsort 2>&1 >/dev/null | sed -E 's/^tsort: -: //' |
     tr '\n' ' ' | sed -E 's/ $/\n/; s/^/folders include one another: /'
-  order=$(sed -nE 's|^add_subdirectory\((.*)\)$|harness/\1|p' "$1/harness/CMakeLists.txt")
+  order=$(sed -nE 's|^ *add_subdirectory\((.*)\)$|harness/\1|p' "$1/harness/CMakeLists.txt")
   awk 'NR == FNR { height[$1] = NR; next }
     $1 ~ /^harness\// && !($1 in height) { print $3 ": its folder is not added by harness/CMakeLists.txt"; next }
     $2 in height && $1 in height && height[$2] > height[$1] { print $3 ": includes a header of " $2 ", which is above" }

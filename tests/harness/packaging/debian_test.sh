@@ -8,7 +8,7 @@ repository=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)
 build=$(realpath "${1:-$repository/build/release}")
 scratch=$(mktemp -d)
 root=$scratch/root
-trap 'rm -rf --one-file-system "$scratch"' EXIT
+trap 'umount -q "$root/proc" || true; rm -rf --one-file-system "$scratch"' EXIT
 
 (cd "$build" && cpack -B "$scratch/packages" >"$scratch/cpack.txt") || { tail -20 "$scratch/cpack.txt"; exit 1; }
 debootstrap --variant=minbase bookworm "$root" ${DEBIAN_MIRROR:+"$DEBIAN_MIRROR"} >"$scratch/debootstrap.txt" ||
@@ -21,5 +21,6 @@ cp "$scratch"/packages/dexcheck_*.deb "$root/tmp/"
 chroot "$root" sh -c 'DEBIAN_FRONTEND=noninteractive apt-get --quiet=2 update &&
   apt-get --quiet=2 --yes install --no-install-recommends /tmp/dexcheck_*.deb' >"$scratch/apt.txt" 2>&1 ||
   { tail -20 "$scratch/apt.txt"; exit 1; }
+mount -t proc proc "$root/proc"
 chroot --userspec=nobody:nogroup "$root" sh -c 'cd /var/tmp && HOME=/var/tmp dexcheck run paper --out /var/tmp/paper --quiet'
 ls "$root"/var/tmp/paper
