@@ -64,6 +64,25 @@ Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRec
 
 }  // namespace
 
+const std::string& FindMeasured(Cause cause, const MeasuredCauses& measured) {
+  static const std::string kNothing;
+  switch (cause) {
+    case Cause::kControlLaw:
+      return measured.law;
+    case Cause::kActuator:
+      return measured.motors;
+    case Cause::kSensing:
+      return measured.sensors;
+    case Cause::kUnmodelledForce:
+    case Cause::kSlope:
+      return measured.force;
+    case Cause::kWheelGeometry:
+      return measured.wheels;
+    default:
+      return kNothing;
+  }
+}
+
 const char* NameOf(Cause cause) {
   switch (cause) {
     case Cause::kNone:
@@ -94,12 +113,18 @@ const char* NameOf(Cause cause) {
       return "unmodelled force";
     case Cause::kIntegrator:
       return "integrator";
+    case Cause::kSlope:
+      return "slope";
+    case Cause::kWheelGeometry:
+      return "wheel geometry";
+    case Cause::kUnexplained:
+      return "unexplained";
   }
   return "none";
 }
 
 AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord> model,
-                            std::span<const CheckRecord> steps, const std::string& law) {
+                            std::span<const CheckRecord> steps, const MeasuredCauses& measured) {
   AttributionResult result;
   const CheckRecord* first_model = nullptr;
   for (const CheckRecord& check : model) {
@@ -122,9 +147,11 @@ AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord>
     if (const CheckRecord* first = FindEvidence(steps)) {
       result.cause = MeaningOf(*first).cause;
       result.evidence = Tell(*first);
-      if (result.cause == Cause::kControlLaw && !law.empty()) result.evidence += "; " + law;
+      if (result.cause == Cause::kUnmodelledForce && measured.is_slope) result.cause = Cause::kSlope;
+      const std::string& how = FindMeasured(result.cause, measured);
+      if (!how.empty()) result.evidence += "; " + how;
     } else {
-      result.cause = Cause::kIntegrator;
+      result.cause = Cause::kUnexplained;
       const auto assumption = std::find_if(steps.begin(), steps.end(), [](const CheckRecord& check) {
         return check.failed && check.kind == CheckKind::kAssumption;
       });

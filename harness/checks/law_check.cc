@@ -18,8 +18,6 @@ constexpr double kLeastNullTolerance = 1e-9;
 // What slip changes in accelerations and forces, over the condition number, against the forces that it
 // changes.
 constexpr double kSlipShare = 10.0;
-// Torques that differ by more than this, relative, tell which part is wrong; less is rounding.
-constexpr double kTellingDifference = 1e-9;
 
 }  // namespace
 
@@ -45,7 +43,8 @@ LawCheck::LawCheck(const Setup& setup)
       time_step_(setup.scenario().plant.time_step),
       hold_(std::max(1L, std::lround(setup.scenario().plant.control_step / time_step_))),
       actuation_(setup.model()),
-      reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())) {
+      reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())),
+      own_factor_(setup.model()) {
   const GraspControllerOptions options = setup.MakeControllerOptions();
   mu_ = options.mu;
   f_min_ = options.f_min;
@@ -95,6 +94,18 @@ const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& f
   return errors_;
 }
 
+double LawCheck::CompareUnsent(const StepRecord& step, const LawTerms& terms) {
+  own_factor_.Compute(terms.M);
+  mass_factor_ = &own_factor_;
+  errors_ = LawErrors{};
+  if (!reference_.Evaluate(spec_, terms, EvaluateDesired(step.time), step.command.demand.F_N))
+    return std::numeric_limits<double>::infinity();
+  force_ = terms.C_xi + terms.gravity + terms.friction;
+  scale_ = std::max(Norm(force_), std::numeric_limits<double>::min());
+  CompareTorque(step);
+  return errors_.torque;
+}
+
 double LawCheck::CompareApplied(const StepRecord& step) {
   return (step.response.motor_torques - step.command.tau).cwiseAbs().maxCoeff() /
          std::max(step.command.tau.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
@@ -105,7 +116,8 @@ void LawCheck::CompareTorque(const StepRecord& step) {
   difference_ = force_ - reference_.force();
   const double relative = Norm(difference_) / scale_;
   errors_.torque = relative / reference_.condition_number();
-  if (relative > kTellingDifference) attribution_.Add(difference_, reference_.parts(), 1.0 / scale_);
+  // Less is rounding, which tells nothing.
+  if (errors_.torque > kLawTorqueBound) attribution_.Add(difference_, reference_.parts(), 1.0 / scale_);
 }
 
 void LawCheck::CompareDemand(const StepFindings& findings) {

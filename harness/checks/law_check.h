@@ -57,6 +57,8 @@ class LawCheck {
   /// @param findings of the same step: what the rigid system does under its torques.
   const LawErrors& Compare(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                            const TreeFactor& mass_factor);
+  /// The torques alone, for a step that the motors refuse: nothing is known of what they would do.
+  double CompareUnsent(const StepRecord& step, const LawTerms& terms);
   /// Largest |tau' received - tau' sent| over the largest |tau'|.
   [[nodiscard]] static double CompareApplied(const StepRecord& step);
 
@@ -82,6 +84,7 @@ class LawCheck {
   LawAttribution attribution_;
   LawErrors errors_;
   const TreeFactor* mass_factor_ = nullptr;
+  TreeFactor own_factor_;  // of a step without prediction
   double scale_ = 1.0;
   VectorXd force_, difference_;        // n
   VectorXd slope_;                     // k

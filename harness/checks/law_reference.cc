@@ -13,29 +13,35 @@ constexpr unsigned kMotion = Bit(LawPart::kFeedForward) | Bit(LawPart::kVelocity
                              Bit(LawPart::kPositionFeedback) | Bit(LawPart::kCoordinateRate);
 constexpr unsigned kInertia =
     kMotion | Bit(LawPart::kGraspMapRate) | Bit(LawPart::kJacobianRate) | Bit(LawPart::kPosture);
-constexpr unsigned kObject =
-    Bit(LawPart::kObjectInertia) | Bit(LawPart::kObjectCoriolis) | Bit(LawPart::kObjectGravity);
+constexpr unsigned kObjectInertia = Bit(LawPart::kInertiaOfFeedForward) | Bit(LawPart::kInertiaOfVelocity) |
+                                    Bit(LawPart::kInertiaOfPosition) | Bit(LawPart::kInertiaOfRate);
+constexpr unsigned kObject = kObjectInertia | Bit(LawPart::kObjectCoriolis) | Bit(LawPart::kObjectGravity);
+// Robot and object are both to accelerate so.
+constexpr unsigned kFeedForward = Bit(LawPart::kFeedForward) | Bit(LawPart::kInertiaOfFeedForward);
+constexpr unsigned kVelocity = Bit(LawPart::kVelocityFeedback) | Bit(LawPart::kInertiaOfVelocity);
+constexpr unsigned kPosition = Bit(LawPart::kPositionFeedback) | Bit(LawPart::kInertiaOfPosition);
+constexpr unsigned kRate = Bit(LawPart::kCoordinateRate) | Bit(LawPart::kInertiaOfRate);
 
 constexpr LawPartName kLawParts[] = {
-    {"M_bar' J^+ G^T P^-1 X_d_ddot", "feed-forward acceleration", Bit(LawPart::kFeedForward)},
-    {"M_bar' J^+ G^T P^-1 K_v E_dot", "velocity feedback K_v", Bit(LawPart::kVelocityFeedback)},
-    {"M_bar' J^+ G^T P^-1 K_p E", "position feedback K_p", Bit(LawPart::kPositionFeedback)},
-    {"M_bar' J^+ G^T d/dt(P^-1) X_o_dot", "rate of P^-1", Bit(LawPart::kCoordinateRate)},
+    {"(M_bar' J^+ G^T + J^T G^+ M_hat) P^-1 X_d_ddot", "feed-forward acceleration", kFeedForward},
+    {"(M_bar' J^+ G^T + J^T G^+ M_hat) P^-1 K_v E_dot", "velocity feedback K_v", kVelocity},
+    {"(M_bar' J^+ G^T + J^T G^+ M_hat) P^-1 K_p E", "position feedback K_p", kPosition},
+    {"(M_bar' J^+ G^T + J^T G^+ M_hat) d/dt(P^-1) X_o_dot", "rate of P^-1", kRate},
     {"M_bar' J^+ G_dot^T V_o", "G_dot", Bit(LawPart::kGraspMapRate)},
     {"M_bar' J^+ J_dot xi_c", "J_dot", Bit(LawPart::kJacobianRate)},
     {"M_bar' N sigma'", "null-space acceleration sigma'", Bit(LawPart::kPosture)},
     {"C_bar' xi_c", "Coriolis forces C_bar'", Bit(LawPart::kCoriolis)},
     {"F_bar' (gravity)", "gravity in F_bar'", Bit(LawPart::kGravity)},
     {"F_bar' (friction)", "friction in F_bar'", Bit(LawPart::kFriction)},
-    {"J^T G^+ M_hat V_o_dot", "object's inertia M_o", Bit(LawPart::kObjectInertia)},
+    {"J^T G^+ M_hat V_o_dot", "object's inertia M_o", kObjectInertia},
     {"J^T G^+ C_hat V_o", "object's C_o", Bit(LawPart::kObjectCoriolis)},
     {"J^T G^+ N_o", "object's gravity N_o", Bit(LawPart::kObjectGravity)},
     {"J^T F_N", "internal force F_N", Bit(LawPart::kInternalForce)},
     {"M_bar' xi_dot_d", "mass matrix M_bar'", kInertia},
     {"M_bar' J^+ (...)", "acceleration without the null space", kInertia & ~Bit(LawPart::kPosture)},
-    {"M_bar' J^+ G^T V_o_dot", "demanded acceleration V_o_dot", kMotion},
-    {"M_bar' J^+ G^T P^-1 (K_v E_dot + K_p E)", "feedback of both gains",
-     Bit(LawPart::kVelocityFeedback) | Bit(LawPart::kPositionFeedback)},
+    {"(M_bar' J^+ G^T + J^T G^+ M_hat) V_o_dot", "demanded acceleration V_o_dot", kMotion | kObjectInertia},
+    {"(M_bar' J^+ G^T + J^T G^+ M_hat) P^-1 (K_v E_dot + K_p E)", "feedback of both gains",
+     kVelocity | kPosition},
     {"F_bar'", "gravity and friction F_bar'", Bit(LawPart::kGravity) | Bit(LawPart::kFriction)},
     {"J^T G^+ F_o", "object's wrench G^+ F_o", kObject},
     {"J^T f_c", "contact forces J_B'^T f_c", kObject | Bit(LawPart::kInternalForce)},
@@ -227,7 +233,10 @@ bool LawReference::Evaluate(const LawSpec& spec, const LawTerms& terms, const De
     f_c_ += rates_;
     part(which).noalias() = terms.J.transpose() * rates_;
   };
-  add_wrench(LawPart::kObjectInertia, terms.M_hat * V_Bo_dot_);
+  for (size_t i = 0; i < demand_.size(); ++i) {
+    add_wrench(static_cast<LawPart>(static_cast<size_t>(LawPart::kInertiaOfFeedForward) + i),
+               terms.M_hat * demand_[i]);
+  }
   add_wrench(LawPart::kObjectCoriolis, terms.C_hat_V);
   add_wrench(LawPart::kObjectGravity, terms.N_o);
   part(LawPart::kInternalForce).noalias() = terms.J.transpose() * F_N;

@@ -73,7 +73,10 @@ enum class LawPart {
   kCoriolis,          ///< C_bar' xi_c
   kGravity,           ///< gravity's part of F_bar'
   kFriction,          ///< friction's part of F_bar'
-  kObjectInertia,     ///< J^T G^+ M_hat V_o_dot
+  kInertiaOfFeedForward,  ///< J^T G^+ M_hat V_o_dot, of the first summand of V_o_dot,
+  kInertiaOfVelocity,     ///< of the second,
+  kInertiaOfPosition,     ///< of the third,
+  kInertiaOfRate,         ///< and of the fourth.
   kObjectCoriolis,    ///< J^T G^+ C_hat V_o
   kObjectGravity,     ///< J^T G^+ N_o
   kInternalForce,     ///< J^T F_N

@@ -40,7 +40,9 @@ StepChecks::StepChecks(const Setup& setup)
     : setup_(&setup),
       dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())),
       actuation_(setup.model()),
-      time_step_(setup.scenario().plant.time_step) {
+      time_step_(setup.scenario().plant.time_step),
+      forces_(setup.model()),
+      wheels_(setup.model().base()) {
   DefineChecks();
   findings_.fingertip_slip.resize(setup.fingertips().size());
   findings_.wheel_slip.resize(setup.adapter().wheels().size());
@@ -52,6 +54,7 @@ StepChecks::StepChecks(const Setup& setup)
   bias_.setZero(n);
   residual_.setZero(n);
   column_.setZero(n, 1);
+  left_of_robot_.setZero(n);
   idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
   kappa_.resize(setup.fingertips().size());
   next_kappa_ = kappa_;
@@ -89,7 +92,7 @@ void StepChecks::SetApplying() {
   using enum StepCheck;
   // Without a task every step is judged.
   leave_out(!setup_->scenario().task, {kUnjudged});
-  leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kTractionUse});
+  leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kRolling, kTractionUse});
   leave_out(setup_->model().base().type == BaseType::kFixed, {kBaseTilt});
   leave_out(setup_->idle_joints().empty(), {kIdleJoints});
   const mjModel& engine = setup_->engine();
@@ -137,11 +140,13 @@ void StepChecks::Compare(const StepRecord& step) {
   } else {
     CompareDynamics(step);
     CompareObject(step);
+    KeepForces(step);
   }
   if (handling.holding && !was_holding_) ForgetSlip();
   was_holding_ = handling.holding;
   MoveWindows(step.reading.state);
   ReadSlip(step);
+  if (!setup_->adapter().wheels().empty()) CompareRolling(step);
   if (handling.holding) CompareKappa(step);
 
   Add(StepCheck::kBaseTilt, step.reading.departure.tilt);
@@ -243,6 +248,8 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   residual_ = bias_ - force_;
   residual_.noalias() += robot.M() * xi_dot;
   residual_.noalias() += step.model->grasp().J_B().transpose() * findings_.f_c;
+  if (step.response.departure_force.size() > 0) residual_ += step.response.departure_force;
+  left_of_robot_ = residual_;
   // |f|_M^-1 = |L^-T f|
   const auto norm = [&](const VectorXd& f) {
     column_ = f;
@@ -250,13 +257,13 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
     return column_.norm();
   };
   const double scale = std::max(norm(bias_), std::numeric_limits<double>::min());
-  const double balance = norm(residual_) / scale;
+  scale_ = scale;
+  Add(StepCheck::kBalanceRobot, norm(residual_) / scale);
   if (force_before_.size() == force_.size()) {
     bias_ = force_ - force_before_;
     AddGive(norm(bias_) / scale, &robot_give_);
   }
   force_before_ = force_;
-  AddLessGive(StepCheck::kBalanceRobot, balance, robot_give_);
 
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
@@ -295,10 +302,32 @@ void StepChecks::CompareObject(const StepRecord& step) {
     return std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) /
            std::max(Weight(), findings_.f_c.norm());
   };
-  Add(StepCheck::kBalanceObject,
-      relative(body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
-               grasp.G() * findings_.f_c - response.support_wrench - response.solver_residual));
+  left_of_object_ = body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
+                    grasp.G() * findings_.f_c - response.support_wrench - response.solver_residual;
+  Add(StepCheck::kBalanceObject, relative(left_of_object_));
   Add(StepCheck::kSolver, relative(response.solver_residual));
+}
+
+void StepChecks::KeepForces(const StepRecord& step) {
+  const auto fails = [&](StepCheck which) { return check(which).applies && !(check(which).last <= check(which).bound); };
+  if (!fails(StepCheck::kBalanceRobot) && !fails(StepCheck::kBalanceObject)) return;
+  forces_.Add(left_of_robot_, left_of_object_, *step.model, step.reading.state.q, *mass_factor_, scale_);
+}
+
+void StepChecks::CompareRolling(const StepRecord& step) {
+  const VectorXd& xi = step.reading.state.xi;
+  const std::vector<EngineWheel>& wheels = setup_->adapter().wheels();
+  Vector2d rates;
+  for (size_t k = 0; k < 2; ++k)
+    rates[static_cast<Eigen::Index>(k)] = wheels[k].axis.y() * step.reading.qvel[wheels[k].dof];
+  const Vector2d mismatch = wheels_.CalcMismatch(xi, rates);
+  double beyond = 0.0;
+  for (size_t k = 0; k < 2; ++k) {
+    beyond = std::max(beyond, std::abs(mismatch[static_cast<Eigen::Index>(k)]) -
+                                  step.response.wheels[k].slip.norm());
+  }
+  Add(StepCheck::kRolling, beyond);
+  if (!(beyond <= check(StepCheck::kRolling).bound)) wheels_.Add(xi, rates);
 }
 
 void StepChecks::MoveWindows(const MeasuredState& state) {

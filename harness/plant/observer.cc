@@ -27,7 +27,10 @@ int FindTipGeom(const mjModel& model, int site, const std::string& name) {
 }  // namespace
 
 Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, const Surface& surface)
-    : adapter_(&adapter), fingertips_(fingertips.begin(), fingertips.end()), surface_(&surface) {
+    : adapter_(&adapter),
+      fingertips_(fingertips.begin(), fingertips.end()),
+      surface_(&surface),
+      map_(adapter, Coordinates::kReduced) {
   for (const int frame : fingertips_) {
     const Frame& tip = adapter.model().frames()[static_cast<size_t>(frame)];
     tips_.emplace_back(tip.sphere_radius.value());
@@ -40,6 +43,7 @@ Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, cons
   }
   M_qacc_.setZero(adapter.engine().nv);
   constraint_force_.setZero(adapter.engine().nv);
+  departure_.setZero(adapter.engine().nv);
 }
 
 Observer::BaseRates Observer::ReadBaseRates(const mjData& data) const {
@@ -93,6 +97,7 @@ void Observer::Read(const EngineSimulation& simulation, PlantResponse* response)
   response->support_wrench = ReadSupportWrench(m, d);
   response->support_force = (X_Bo_.linear() * response->support_wrench.head<3>()).z();
   response->solver_residual = ReadSolverResidual(m, d);
+  ReadDeparture(m, d, response);
 }
 
 void Observer::ReadState(const mjData& data, MeasuredState* state) {
@@ -120,6 +125,8 @@ void Observer::ReadState(const mjData& data, MeasuredState* state) {
   state->X_Bo.translation() = MapVector(pose);
   state->V_Bo << state->X_Bo.linear().transpose() * MapVector(rate), MapVector(rate + 3);
 
+  q_ = state->q;
+  xi_ = state->xi;
   if (model.num_base_positions() == 3) phi_ = state->q[2];
   X_Bo_ = state->X_Bo;
   V_Bo_ = state->V_Bo;
@@ -242,6 +249,22 @@ Vector6d Observer::ReadSupportWrench(const mjModel& m, const mjData& d) const {
     wrench.tail<3>() += X_Bo_.linear().transpose() * arm.cross(force);
   }
   return wrench;
+}
+
+void Observer::ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* response) {
+  // On the robot's dofs qacc - T xi_dot - T_dot xi; on all others zero.
+  map_.SetState(q_, xi_);
+  departure_.setZero();
+  map_.ExpandBias(departure_.data());
+  constraint_force_.setZero();
+  map_.Expand(response->xi_dot, constraint_force_.data());
+  departure_ += constraint_force_;
+  const auto subtract = [&](int dof) { departure_[dof] = d.qacc[dof] - departure_[dof]; };
+  for (const int dof : map_.base_dofs()) subtract(dof);
+  for (const int dof : adapter_->joint_dofs()) subtract(dof);
+  mj_mulM(&m, &d, M_qacc_.data(), departure_.data());
+  response->departure_force.resize(response->xi_dot.size());
+  map_.ProjectForce(M_qacc_.data(), response->departure_force);
 }
 
 Vector6d Observer::ReadSolverResidual(const mjModel& m, const mjData& d) {

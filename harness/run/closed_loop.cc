@@ -29,6 +29,7 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
     : setup_(&setup),
       plant_(std::move(parts.plant)),
       sensing_(parts.sensing),
+      hidden_sensor_fault_(std::move(parts.hidden_sensor_fault)),
       controller_(std::move(parts.controller)),
       task_(parts.task),
       drive_(plant_->motors()),
@@ -67,6 +68,7 @@ bool ClosedLoop::Settle(const std::function<bool()>& should_stop) {
   BeginRun();
   times_ = LoopTimes{};
   if (checks_) checks_->Reset();
+  is_running_ = true;
   return true;
 }
 
@@ -118,6 +120,7 @@ void ClosedLoop::ControlStep(double t) {
   plant_->Read(&record_.reading);
   CheckRobot();
   sensing_.Tell(record_.reading, &record_.told);
+  if (hidden_sensor_fault_) hidden_sensor_fault_(t, &record_.told.state);
   controller_->Step(record_.told, t, &record_.command);
   DriveMotors(t);
   const auto control = Clock::now();
@@ -136,6 +139,8 @@ void ClosedLoop::DriveMotors(double t) {
     drive_.Apply(record_.command.tau, &record_.drive);
   } catch (const RunFailure&) {
     if (checks_) checks_->JudgeEffort(record_.drive.effort, t);
+    // Torques that are too large may be those of no law. While everything settles they follow another trajectory.
+    if (checks_ && is_running_) checks_->CompareUnsent(record_);
     throw;
   }
   if (checks_) checks_->JudgeEffort(record_.drive.effort, t);

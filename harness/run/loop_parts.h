@@ -2,6 +2,7 @@
 
 // What a scenario puts into the loop.
 
+#include <functional>
 #include <memory>
 
 #include "controller/control/controller.h"
@@ -19,6 +20,8 @@ struct LoopParts {
   std::unique_ptr<Controller> controller;
   const PickAndPlaceController* task = nullptr;  ///< The controller, when it does a task.
   SensingOptions sensing;
+  /// Changes what the controller is told at time t besides, as no scenario says; empty for nothing.
+  std::function<void(double t, MeasuredState* told)> hidden_sensor_fault;
 };
 
 /// The parts that the scenario names, robot and object where it starts.

@@ -72,7 +72,7 @@ double TrackingStatistics::orientation_rms() const { return Rms(orientation_squa
 void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   if (loop.is_checking()) {
     result->attribution = Attribute(setup.gate(), loop.checks().model_checks(), loop.checks().motion_checks(),
-                                    loop.checks().TellLaw());
+                                    loop.checks().Tell());
   }
   const bool disagrees = result->attribution.cause != Cause::kNone;
   result->verdict = disagrees ? Verdict::kDisagreement : Verdict::kPass;
