@@ -49,7 +49,12 @@ const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
     if (!check.failed || MeaningOf(check).cause == Cause::kNone) continue;
     if (first == nullptr || TellsMore(check, *first)) first = &check;
   }
-  return first;
+  // Wheels of another size give other forces besides, which show before they have rolled far. Wheels that slide do too.
+  const auto name = [](StepCheck which) { return kStepChecks[static_cast<size_t>(which)].name; };
+  if (first == nullptr || first->name != name(StepCheck::kBalanceRobot)) return first;
+  if (!Failed(steps, name(StepCheck::kRolling)) || Failed(steps, name(StepCheck::kTractionUse))) return first;
+  return &*std::find_if(steps.begin(), steps.end(),
+                        [&](const CheckRecord& check) { return check.name == name(StepCheck::kRolling); });
 }
 
 Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRecord> steps) {

@@ -21,7 +21,17 @@ CrossCheck::CrossCheck(const Setup& setup)
   if (!law_) {
     for (const StepCheck check : {kGains, kLawTorque, kLawDemand, kGraspForce}) motion_.LeaveOut(check);
   }
-  if (!law_ || !law_->follows_error()) motion_.LeaveOut(kErrorDynamics);
+  if (!law_ || !law_->follows_error()) {
+    motion_.LeaveOut(kErrorDynamics);
+    motion_.LeaveOut(kOrientationDynamics);
+  }
+}
+
+void CrossCheck::Reset() {
+  for (const CheckRecord& check : motion_.checks()) {
+    if (check.failed) settling_failures_.push_back(check);
+  }
+  motion_.Reset();
 }
 
 void CrossCheck::CompareModel(const StepRecord& step) {
@@ -90,6 +100,7 @@ void CrossCheck::CompareLaw(const StepRecord& step) {
   motion_.Add(StepCheck::kLawDemand, errors.demand, t);
   motion_.Add(StepCheck::kGraspForce, errors.grasp_force, t);
   motion_.Add(StepCheck::kErrorDynamics, errors.error_dynamics, t);
+  motion_.Add(StepCheck::kOrientationDynamics, errors.orientation_dynamics, t);
 }
 
 }  // namespace dexcheck

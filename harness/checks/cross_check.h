@@ -34,8 +34,10 @@ class CrossCheck {
   void CompareUnsent(const StepRecord& step);
   /// The largest effort of a motor, before the step that it belongs to.
   void JudgeEffort(double effort, double time) { motion_.JudgeEffort(effort, time); }
-  /// Forgets motion and forces of all steps so far: time begins anew.
-  void Reset() { motion_.Reset(); }
+  /// Forgets motion and forces of all steps so far, but for the checks that failed: time begins anew.
+  void Reset();
+  /// Checks of motion and forces that failed before the last Reset, while everything settled, in that order.
+  [[nodiscard]] std::span<const CheckRecord> settling_failures() const { return settling_failures_; }
 
   /// What was measured of each cause, in words.
   [[nodiscard]] MeasuredCauses Tell() const;
@@ -54,6 +56,7 @@ class CrossCheck {
   StepChecks motion_;
   std::optional<LawCheck> law_;  // none for a task
   LawTerms law_terms_;           // the engine's
+  std::vector<CheckRecord> settling_failures_;
   MotorEvidence motors_;
   SensorEvidence sensors_;
 };

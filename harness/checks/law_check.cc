@@ -5,6 +5,8 @@
 #include <complex>
 #include <limits>
 
+#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 #include "harness/checks/step_check_table.h"
 
 namespace dexcheck {
@@ -165,23 +167,28 @@ void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms) 
 
 void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                            const DesiredMotion& desired) {
-  const Matrix3d& R = terms.X_Bo.linear();
-  const Vector3d v = terms.V_Bo.head<3>();
   if (!follows_) {
-    p_ = terms.X_Bo.translation();
-    p_dot_ = R * v;
+    followed_ = {terms.X_Bo, terms.V_Bo, terms.X_o};
     follows_ = true;
   }
-  errors_.error_dynamics = (p_ - terms.X_Bo.translation()).norm();
-  // What the engine's object did beyond the rigid prediction, p_ddot = R (v_dot + omega x v).
-  const Vector3d missed = R * (step.response.V_Bo_dot.head<3>() - findings.V_Bo_dot_model.head<3>());
-  const Eigen::Array3d K_v = spec_.gains.K_v.head<3>();
-  const Eigen::Array3d K_p = spec_.gains.K_p.head<3>();
-  const Vector3d p_ddot = desired.X_d_ddot.head<3>() +
-                          (K_v * (desired.X_d_dot.head<3>() - p_dot_).array()).matrix() +
-                          (K_p * (desired.X_d.head<3>() - p_).array()).matrix() + missed;
-  p_dot_ += time_step_ * p_ddot;
-  p_ += time_step_ * p_dot_;
+  errors_.error_dynamics = (followed_.X_Bo.translation() - terms.X_Bo.translation()).norm();
+  errors_.orientation_dynamics =
+      LogSo3(followed_.X_Bo.linear().transpose() * terms.X_Bo.linear()).norm();
+  // Semi-implicit, as the plant: velocities first. v = R^T p_dot, hence p_ddot = R (v_dot + omega x v).
+  if (spec_.orientation == OrientationFeedback::kAngles)
+    followed_.X_o = CalcObjectCoordinates(followed_.X_Bo, followed_.X_o);
+  Vector6d V_dot = reference_.CalcDemand(spec_, followed_, desired);
+  // What the engine's object did beyond the rigid prediction.
+  V_dot += step.response.V_Bo_dot - findings.V_Bo_dot_model;
+  Matrix3d R = followed_.X_Bo.linear();
+  const Vector3d v = followed_.V_Bo.head<3>();
+  Vector3d omega = followed_.V_Bo.tail<3>();
+  const Vector3d p_dot = R * (v + time_step_ * (V_dot.head<3>() + omega.cross(v)));
+  omega += time_step_ * V_dot.tail<3>();
+  R = R * ExpSo3(time_step_ * omega);
+  followed_.X_Bo.translation() += time_step_ * p_dot;
+  followed_.X_Bo.linear() = Eigen::Quaterniond(R).normalized().toRotationMatrix();
+  followed_.V_Bo << followed_.X_Bo.linear().transpose() * p_dot, omega;
 }
 
 }  // namespace dexcheck

@@ -28,6 +28,7 @@ struct LawErrors {
   /// Object's position against (57) integrated from t = 0 and driven by the accelerations that the prediction
   /// missed, m.
   double error_dynamics = 0.0;
+  double orientation_dynamics = 0.0;  ///< Its orientation likewise, rad.
 };
 
 /// Largest magnitude of the eigenvalues of (57), per time step, when velocities are those of the middle of
@@ -89,9 +90,8 @@ class LawCheck {
   VectorXd force_, difference_;        // n
   VectorXd slope_;                     // k
   RowMatrixXd column_;                 // n x 1
-  bool follows_ = false;               // whether the two below are set
-  Vector3d p_ = Vector3d::Zero();      // of (57), m
-  Vector3d p_dot_ = Vector3d::Zero();  // m/s, half a step before
+  bool follows_ = false;               // whether the one below is set
+  ObjectState followed_;               // of (57); velocities half a step before
 };
 
 }  // namespace dexcheck

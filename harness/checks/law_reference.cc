@@ -134,11 +134,11 @@ bool LawReference::FactorJacobian(const LawSpec& spec, const LawTerms& terms) {
 
 Vector6d LawReference::SolveGrasp(const Eigen::Ref<const VectorXd>& f) const { return G_llt_.solve(G_ * f); }
 
-void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawTerms& terms,
+void LawReference::CalcObjectAcceleration(const LawSpec& spec, const ObjectState& object,
                                           const DesiredMotion& desired) {
-  const Matrix3d R_T = terms.X_Bo.linear().transpose();
-  const Vector3d v = terms.V_Bo.head<3>();
-  const Vector3d omega = terms.V_Bo.tail<3>();
+  const Matrix3d R_T = object.X_Bo.linear().transpose();
+  const Vector3d v = object.V_Bo.head<3>();
+  const Vector3d omega = object.V_Bo.tail<3>();
   auto& [feed_forward, velocity, position, rate] = demand_;
 
   // v = R^T p_dot, hence v_dot = R^T p_ddot - omega x v
@@ -148,12 +148,12 @@ void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawTerms& t
   feed_forward.head<3>() = R_T * desired.X_d_ddot.head<3>();
   velocity.head<3>() = R_T * (K_v.head<3>() * (desired.X_d_dot.head<3>() - p_dot).array()).matrix();
   position.head<3>() =
-      R_T * (K_p.head<3>() * (desired.X_d.head<3>() - terms.X_Bo.translation()).array()).matrix();
+      R_T * (K_p.head<3>() * (desired.X_d.head<3>() - object.X_Bo.translation()).array()).matrix();
   rate.head<3>() = -omega.cross(v);
 
   if (spec.orientation == OrientationFeedback::kAngles) {
     // omega = B a_dot, hence omega_dot = B a_ddot + B_dot a_dot
-    const Vector3d angles = terms.X_o.tail<3>();
+    const Vector3d angles = object.X_o.tail<3>();
     const Matrix3d B = CalcAngleMap(angles);
     const Vector3d angle_rates = B.inverse() * omega;
     feed_forward.tail<3>() = B * desired.X_d_ddot.tail<3>();
@@ -163,7 +163,7 @@ void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawTerms& t
   } else {
     // e_R = log(R_Bo^T R_Bd) obeys (57). omega_dot is affine in e_R_ddot: its parts by that of each summand.
     const DesiredPose pose = CalcDesiredPose(desired);
-    const OrientationError error = CalcOrientationError(terms.X_Bo.linear(), omega, pose.R_Bd, pose.omega_d);
+    const OrientationError error = CalcOrientationError(object.X_Bo.linear(), omega, pose.R_Bd, pose.omega_d);
     const auto accelerate = [&](const Vector3d& omega_d_dot, const Vector3d& e_R_ddot) {
       return CalcAngularAcceleration(error, pose.omega_d, omega_d_dot, e_R_ddot);
     };
@@ -177,6 +177,11 @@ void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawTerms& t
   V_Bo_dot_ = feed_forward + velocity + position + rate;
 }
 
+Vector6d LawReference::CalcDemand(const LawSpec& spec, const ObjectState& object, const DesiredMotion& desired) {
+  CalcObjectAcceleration(spec, object, desired);
+  return V_Bo_dot_;
+}
+
 void LawReference::AddMotionPart(LawPart part, const LawTerms& terms,
                                  const Eigen::Ref<const VectorXd>& rates) {
   motion_.noalias() = J_plus_ * rates;
@@ -187,7 +192,7 @@ void LawReference::AddMotionPart(LawPart part, const LawTerms& terms,
 bool LawReference::Evaluate(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired,
                             const Eigen::Ref<const VectorXd>& F_N) {
   if (!FactorJacobian(spec, terms)) return false;
-  CalcObjectAcceleration(spec, terms, desired);
+  CalcObjectAcceleration(spec, {terms.X_Bo, terms.V_Bo, terms.X_o}, desired);
   const auto part = [&](LawPart which) { return parts_.col(static_cast<Eigen::Index>(which)); };
 
   // xi_c = xi - J^+ (J xi - G^T V_o)

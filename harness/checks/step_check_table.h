@@ -20,6 +20,7 @@ enum class StepCheck {
   kGraspForce,
   kTorqueApplied,
   kErrorDynamics,
+  kOrientationDynamics,
   kExpectPosition,
   kExpectOrientation,
   kBalanceRobot,
@@ -97,8 +98,14 @@ inline constexpr double kTorqueAppliedBound = 1e-14;
 // A wheel that rolls and does not slip has the speed of the platform above it, but for how fast the platform
 // tilts or sinks on soft tyres: its tilt of at most 1e-5 rad within some ms, at an arm of r.
 inline constexpr double kRollingBound = 1e-5;
+// What is left of (48) is compared less the inertia of what the platform does on soft tyres besides rolling, less what the
+// solver left over, and less what tilt and slip can come to (StepChecks::CalcUnevenForce). Then all of it is rounding of the
+// engine's terms, 1e-14 of forces that cancel, and products of small departures: 1e-5 rad of tilt times 1e-2 of the
+// forces that change with it.
+inline constexpr double kBalanceRobotBound = 1e-6;
 // What law_demand leaves, over K_p: measured 1.2e-9 m in `curve`.
 inline constexpr double kErrorDynamicsBound = 1e-8;
+inline constexpr double kOrientationDynamicsBound = 1e-7;
 
 /// What explains what: of the failed checks, those of the first of these ranks tell why, however late they
 /// failed.
@@ -200,6 +207,13 @@ inline constexpr StepCheckInfo kStepChecks[] = {
          "object's position against (57) integrated beside the run, driven by the accelerations that the "
          "prediction missed",
      .meaning = {.cause = Cause::kUnexplained, .precedence = 20, .rank = Rank::kResidual}},
+    {.check = StepCheck::kOrientationDynamics,
+     .name = "orientation_dynamics",
+     .kind = CheckKind::kLaw,
+     .unit = "rad",
+     .bound = kOrientationDynamicsBound,
+     .description = "object's orientation likewise",
+     .meaning = {.cause = Cause::kUnexplained, .precedence = 28, .rank = Rank::kResidual}},
     {.check = StepCheck::kExpectPosition,
      .name = "expect_position",
      .kind = CheckKind::kLaw,
@@ -218,9 +232,9 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "balance_robot",
      .kind = CheckKind::kBalance,
      .unit = "1",
-     .bound = 1e-5,
-     .description = "what is left of (48) with the engine's accelerations and contact forces, against the "
-                    "forces balanced",
+     .bound = kBalanceRobotBound,
+     .description = "what is left of (48) with the engine's accelerations and contact forces, less what the "
+                    "platform does besides and its solver left over, against the forces balanced",
      .meaning = {.cause = Cause::kUnmodelledForce, .precedence = -1, .rank = Rank::kDecisive}},
     // The object's balance has no other unknowns than its inertia and the contacts' geometry, which the first
     // question
@@ -347,15 +361,16 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .unit = "rad",
      .bound = 1e-5,
      .description = "movement since t = 0 of joints that do not carry the object"},
-    // As small as the discrepancies that balance_robot and the prediction are judged by.
+    // As small as the discrepancies that the prediction is judged by. Forces that do not fit the motion explain whatever
+    // else is wrong from then on.
     {.check = StepCheck::kSolver,
      .name = "solver",
      .kind = CheckKind::kAssumption,
      .unit = "1",
      .bound = 1e-5,
-     .description = "what the engine's solver left over of its own equation of motion of the object, as "
-                    "balance_object",
-     .meaning = {.cause = Cause::kSolver, .precedence = 12, .is_own = true}},
+     .description = "what the engine's solver left over of its own equations of motion, of the object as "
+                    "balance_object, of the robot as balance_robot",
+     .meaning = {.cause = Cause::kSolver, .precedence = -4, .is_own = true, .rank = Rank::kDecisive}},
     {.check = StepCheck::kJointStop,
      .name = "joint_stop",
      .kind = CheckKind::kAssumption,

@@ -44,6 +44,8 @@ StepChecks::StepChecks(const Setup& setup)
       forces_(setup.model()),
       wheels_(setup.model().base()) {
   DefineChecks();
+  mass_ = setup.model().base_with_wheels().mass;
+  for (const Joint& joint : setup.model().joints()) mass_ += joint.body.mass;
   findings_.fingertip_slip.resize(setup.fingertips().size());
   findings_.wheel_slip.resize(setup.adapter().wheels().size());
   const int n = setup.model().num_velocities();
@@ -249,6 +251,7 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   residual_.noalias() += robot.M() * xi_dot;
   residual_.noalias() += step.model->grasp().J_B().transpose() * findings_.f_c;
   if (step.response.departure_force.size() > 0) residual_ += step.response.departure_force;
+  if (step.response.solver_force.size() > 0) residual_ -= step.response.solver_force;
   left_of_robot_ = residual_;
   // |f|_M^-1 = |L^-T f|
   const auto norm = [&](const VectorXd& f) {
@@ -258,7 +261,9 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   };
   const double scale = std::max(norm(bias_), std::numeric_limits<double>::min());
   scale_ = scale;
-  Add(StepCheck::kBalanceRobot, norm(residual_) / scale);
+  const double left = norm(residual_);
+  Add(StepCheck::kBalanceRobot, std::isnan(left) ? left : std::max(0.0, left - CalcUnevenForce(step)) / scale);
+  solver_of_robot_ = step.response.solver_force.size() > 0 ? norm(step.response.solver_force) / scale : 0.0;
   if (force_before_.size() == force_.size()) {
     bias_ = force_ - force_before_;
     AddGive(norm(bias_) / scale, &robot_give_);
@@ -276,6 +281,17 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   if (f_c_before_.size() == f_c.size()) AddGive((f_c - f_c_before_).norm() / force_scale, &force_give_);
   f_c_before_ = f_c;
   AddLessGive(StepCheck::kContactForce, (f_c - findings_.f_c).norm() / force_scale, force_give_);
+}
+
+double StepChecks::CalcUnevenForce(const StepRecord& step) const {
+  // In |.|_M^-1 the force of an acceleration a that all masses feel is at most a sqrt(m): a tilt by theta gives gravity
+  // g theta along the floor, and tyres that slip by v in a turn at w give 2 v w.
+  double slip = 0.0;
+  for (const BodyContact& wheel : step.response.wheels) slip = std::max(slip, wheel.slip.norm());
+  const double turn = step.reading.state.q.size() > 0 && !step.response.wheels.empty()
+                          ? std::abs(wheels_.CalcTurn(step.reading.state.xi))
+                          : 0.0;
+  return (setup_->model().gravity().norm() * step.reading.departure.tilt + 2.0 * slip * turn) * std::sqrt(mass_);
 }
 
 void StepChecks::AddGive(double change, double* give) const {
@@ -305,7 +321,7 @@ void StepChecks::CompareObject(const StepRecord& step) {
   left_of_object_ = body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
                     grasp.G() * findings_.f_c - response.support_wrench - response.solver_residual;
   Add(StepCheck::kBalanceObject, relative(left_of_object_));
-  Add(StepCheck::kSolver, relative(response.solver_residual));
+  Add(StepCheck::kSolver, std::max(relative(response.solver_residual), solver_of_robot_));
 }
 
 void StepChecks::KeepForces(const StepRecord& step) {

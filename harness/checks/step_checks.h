@@ -78,6 +78,8 @@ class StepChecks {
   void Predict(const StepRecord& step);
   void PredictPart(const StepRecord& step);
   void CompareDynamics(const StepRecord& step);
+  /// Largest force, in |.|_M^-1, that comes of the platform's tilt and of the tyres' slip.
+  [[nodiscard]] double CalcUnevenForce(const StepRecord& step) const;
   /// Adds a change, relative, to what contacts give; see kGive.
   void AddGive(double change, double* give) const;
   /// The residual as it is up to the bound, and above it less what contacts give.
@@ -125,6 +127,8 @@ class StepChecks {
   VectorXd left_of_robot_;                        // n, of the step's balance
   Vector6d left_of_object_ = Vector6d::Zero();
   double scale_ = 1.0;
+  double solver_of_robot_ = 0.0;  // relative, as balance_robot
+  double mass_ = 0.0;             // of the robot, kg
 };
 
 }  // namespace dexcheck

@@ -17,6 +17,8 @@ class WheelEvidence {
  public:
   explicit WheelEvidence(const Base& base) : base_(&base) {}
 
+  /// w, rad/s, of a platform that rolls.
+  [[nodiscard]] double CalcTurn(const VectorXd& xi) const { return CalcTwist(xi)[1]; }
   /// d of the right and left wheel. @param xi starts with the base's velocity. @param rates thetadot, rad/s.
   [[nodiscard]] Vector2d CalcMismatch(const VectorXd& xi, const Vector2d& rates) const;
   /// Adds a step in which d is more than the wheels slip.

@@ -96,7 +96,8 @@ void Observer::Read(const EngineSimulation& simulation, PlantResponse* response)
   }
   response->support_wrench = ReadSupportWrench(m, d);
   response->support_force = (X_Bo_.linear() * response->support_wrench.head<3>()).z();
-  response->solver_residual = ReadSolverResidual(m, d);
+  map_.SetState(q_, xi_);
+  ReadSolverResidual(m, d, response);
   ReadDeparture(m, d, response);
 }
 
@@ -253,7 +254,6 @@ Vector6d Observer::ReadSupportWrench(const mjModel& m, const mjData& d) const {
 
 void Observer::ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* response) {
   // On the robot's dofs qacc - T xi_dot - T_dot xi; on all others zero.
-  map_.SetState(q_, xi_);
   departure_.setZero();
   map_.ExpandBias(departure_.data());
   constraint_force_.setZero();
@@ -267,19 +267,16 @@ void Observer::ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* r
   map_.ProjectForce(M_qacc_.data(), response->departure_force);
 }
 
-Vector6d Observer::ReadSolverResidual(const mjModel& m, const mjData& d) {
+void Observer::ReadSolverResidual(const mjModel& m, const mjData& d, PlantResponse* response) {
   mj_mulM(&m, &d, M_qacc_.data(), d.qacc);
   // Not qfrc_constraint, which the engine makes fit. The call uses the data's scratch space alone.
   mj_mulJacTVec(&m, const_cast<mjData*>(&d), constraint_force_.data(), d.efc_force);
   const int dof = m.jnt_dofadr[m.body_jntadr[adapter_->object_body()]];
-  const auto residual = [&](int i) {
-    return M_qacc_[dof + i] - d.qfrc_smooth[dof + i] - constraint_force_[dof + i];
-  };
+  departure_ = M_qacc_ - Eigen::Map<const VectorXd>(d.qfrc_smooth, m.nv) - constraint_force_;
+  response->solver_force.resize(response->xi_dot.size());
+  map_.ProjectForce(departure_.data(), response->solver_force);
   // The free joint's forces: in the world, then about the body's axes.
-  Vector6d wrench;
-  wrench << X_Bo_.linear().transpose() * Vector3d(residual(0), residual(1), residual(2)), residual(3),
-      residual(4), residual(5);
-  return wrench;
+  response->solver_residual << X_Bo_.linear().transpose() * departure_.segment<3>(dof), departure_.segment<3>(dof + 3);
 }
 
 void Observer::ReadContacts(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const {

@@ -17,6 +17,7 @@ double Seconds(Clock::time_point from, Clock::time_point to) {
 }
 
 constexpr double kRoughTime = 0.02;      // s after the first contact
+constexpr long kStepsPerModelCheck = 20;  // while everything settles
 constexpr double kLargestSkew = 1e-2;    // rad between the platform's heading and the way ahead
 constexpr double kSettleMoving = 0.5;    // s
 constexpr double kLargestTilt = 0.2;     // rad, of a robot that still stands
@@ -96,6 +97,8 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
     ControlStep(t);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
     if (checks_ && t >= kRoughTime) checks_->CompareMotion(record_);
+    // A state is as good as any other for the first question; some of them are enough.
+    if (checks_ && i % kStepsPerModelCheck == 0) checks_->CompareModel(record_);
     CheckGrasp();
   }
   return true;

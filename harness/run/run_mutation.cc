@@ -10,14 +10,20 @@
 namespace dexcheck {
 namespace {
 
-/// A trajectory that begins later, and a little off.
+// Where the object is where it should be, feedback is nothing whatever its gains are: laws are judged from an error on,
+// m and rad, that comes within some steps. It takes 4 mm/s^2 at 20 rad/s, far below what softens contacts or makes wheels
+// slip.
+constexpr double kNudge = 1e-5;
+constexpr double kNudgeTime = 5e-3;  // s
+
+/// A trajectory that begins later, and goes a little off.
 class LaterTrajectory final : public Trajectory {
  public:
   LaterTrajectory(std::unique_ptr<Trajectory> whole, double from, double nudge)
       : whole_(std::move(whole)), from_(from), nudge_(nudge) {}
   [[nodiscard]] DesiredMotion Evaluate(double t) const override {
     DesiredMotion motion = whole_->Evaluate(t + from_);
-    motion.X_d.array() += nudge_;
+    motion.X_d.array() += nudge_ * CalcMinJerk(t, kNudgeTime).s;
     return motion;
   }
 
@@ -25,10 +31,6 @@ class LaterTrajectory final : public Trajectory {
   std::unique_ptr<Trajectory> whole_;
   double from_, nudge_;
 };
-
-// Where the object is where it should be, feedback is nothing whatever its gains are: laws are judged from an error on,
-// m and rad. It takes 4 mm/s^2 at 20 rad/s, far below what softens contacts or makes wheels slip.
-constexpr double kNudge = 1e-5;
 
 // Mistakes that are there from the beginning settle so long at the most, s.
 constexpr double kSettle = 0.3;
