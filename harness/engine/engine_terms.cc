@@ -5,6 +5,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/engine/passive_forces.h"
 
 namespace dexcheck {
 namespace {
@@ -286,7 +287,7 @@ void EngineTerms::CalcForces() {
   map_.ProjectForce(force_nv_.data(), gravity_);
   if (has_object_) object_gravity_ = force_nv_.segment<6>(object_dof_);
 
-  mj_passive(m, d);
+  CalcPassiveForces(*m, d);
   map_.ProjectForce(d->qfrc_passive, friction_);
   friction_ = -friction_;
 }

@@ -259,5 +259,49 @@ TEST(EngineTerms, NeedsAnObjectAndSpheresThatTouch) {
   EXPECT_THROW(EngineTerms(adapter, std::span<const int>(model.fingertips())), InputError);
 }
 
+// Springs and dampers of tendons are among the engine's passive forces, however its Jacobians are stored.
+TEST(EngineTerms, FrictionHasTheForcesOfTendons) {
+  std::mt19937 random(20162);
+  RandomRobotOptions options;
+  options.base = BaseType::kFixed;
+  options.joints = 6;
+  const RobotSpec spec = testing::MakeRandomRobot(options, &random);
+  const RobotModel model(spec);
+  for (const char* jacobian : {"dense", "sparse"}) {
+    std::string text = testing::WriteMjcf(spec);
+    const std::string end = "</mujoco>";
+    text.replace(
+        text.rfind(end), end.size(),
+        std::string("<option jacobian=\"") + jacobian +
+            "\"/><tendon><fixed stiffness=\"300\" springlength=\"0.1\"><joint joint=\"joint_1\" coef=\"1\"/>"
+            "<joint joint=\"joint_3\" coef=\"-2\"/></fixed><fixed damping=\"7\"><joint joint=\"joint_2\" "
+            "coef=\"1.5\"/><joint joint=\"joint_5\" coef=\"1\"/></fixed></tendon></mujoco>");
+    const MjModelPtr engine = LoadMjcfText(text, "text");
+    ASSERT_EQ(engine->ntendon, 2);
+    const Adapter adapter(model, *engine, "text");
+    EngineTerms terms(adapter, Coordinates::kReduced);
+    const MjDataPtr data = MakeData(*engine);
+    for (int trial = 0; trial < 5; ++trial) {
+      const VectorXd q = DrawPositions(model, &random);
+      const VectorXd xi = DrawVelocities(model.num_velocities(), &random);
+      terms.SetState(q, xi);
+      adapter.SetPositions(q, data->qpos);
+      VectorXd passive(xi.size());
+      for (int i = 0; i < model.num_joints(); ++i)
+        data->qvel[adapter.joint_dofs()[static_cast<size_t>(i)]] = xi[i];
+      mj_forward(engine.get(), data.get());
+      for (int i = 0; i < model.num_joints(); ++i)
+        passive[i] = data->qfrc_passive[adapter.joint_dofs()[static_cast<size_t>(i)]];
+      constexpr double kScale = 1000.0;  // N m, of springs of 300 N m/rad
+      EXPECT_TRUE(MatrixNear(terms.friction(), -passive, kRounding * kScale));
+      double largest = 0.0;
+      for (int i = 0; i < model.num_joints(); ++i)
+        largest =
+            std::max(largest, std::abs(passive[i] + spec.joints[static_cast<size_t>(i)].damping * xi[i]));
+      EXPECT_GT(largest, 1.0);  // the tendons' own forces
+    }
+  }
+}
+
 }  // namespace
 }  // namespace dexcheck
