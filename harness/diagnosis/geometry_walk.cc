@@ -114,9 +114,10 @@ bool GeometryWalk::FindCause(int first, Cause* cause) {
     best = std::min_element(candidates.begin(), candidates.end(), by_cost);
   }
   if (best == candidates.end() || best->cost >= cost_before) {
-    for (size_t i = 0; i < suspects.size(); ++i) {
-      for (size_t j = i + 1; j < suspects.size(); ++j)
-        TryParameters(link, {suspects[i], suspects[j]}, {targets[0]}, &candidates);
+    const std::vector<Parameter> near = ListNear(link, suspects);
+    for (size_t i = 0; i < near.size(); ++i) {
+      for (size_t j = i + 1; j < near.size(); ++j)
+        TryParameters(link, {near[i], near[j]}, {targets[0]}, &candidates);
     }
     best = std::min_element(candidates.begin(), candidates.end(), by_cost);
   }
@@ -174,6 +175,16 @@ std::vector<Parameter> GeometryWalk::ListSuspects(int link, const std::vector<in
     if (item.kind == ItemKind::kFrameRotation) add(Kind::kFrameRotation, item.index, 3);
   }
   return suspects;
+}
+
+std::vector<Parameter> GeometryWalk::ListNear(int link, const std::vector<Parameter>& suspects) const {
+  // Where nearly all is wrong, nearly all is suspect: pairs of far numbers would take for ever.
+  constexpr size_t kMostPaired = 30;
+  if (suspects.size() <= kMostPaired) return suspects;
+  std::vector<Parameter> near;
+  std::copy_if(suspects.begin(), suspects.end(), std::back_inserter(near),
+               [&](const Parameter& parameter) { return CarrierOf(spec_, parameter) == link; });
+  return near;
 }
 
 bool GeometryWalk::KeepsWhatIsRight(const Parameter& parameter) {

@@ -39,6 +39,8 @@ class GeometryWalk {
   [[nodiscard]] int FindFirst(const std::vector<int>& failing) const;
   [[nodiscard]] bool FindCause(int first, Cause* cause);
   [[nodiscard]] std::vector<Parameter> ListSuspects(int link, const std::vector<int>& failing);
+  /// Suspects among which pairs are tried: all, or when they are many, those of the link itself.
+  [[nodiscard]] std::vector<Parameter> ListNear(int link, const std::vector<Parameter>& suspects) const;
   [[nodiscard]] bool KeepsWhatIsRight(const Parameter& parameter);
   [[nodiscard]] std::vector<std::vector<int>> ListTargets(int link, const std::vector<int>& failing) const;
   void TryParameters(int link, const std::vector<Parameter>& parameters,
