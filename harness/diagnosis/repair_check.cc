@@ -77,6 +77,9 @@ struct RepairCheck::Trial {
       const bool same = std::abs(finding.model - finding.engine) <= kSame * size;
       if (parameter && !same) wrong.push_back(*parameter);
     }
+    const Adapter adapter(model, engine, source);
+    for (const EngineWheel& wheel : adapter.wheels())
+      axle_right &= std::hypot(wheel.center.x(), wheel.center.z()) <= kSame * evidence.length();
     if (bodies) {
       for (const Cause& cause : BodyComparison(spec, evidence, engine).Run())
         wrong.insert(wrong.end(), cause.parameters.begin(), cause.parameters.end());
@@ -101,6 +104,7 @@ struct RepairCheck::Trial {
   Placement placement;
   std::vector<Parameter> wrong;  // numbers that differ from what is read from the engine
   bool forces_agree = true;
+  bool axle_right = true;  // Sigma_0 stands where the engine's wheels have their axle
 };
 
 RepairCheck::RepairCheck(RobotSpec original, const mjModel& engine, std::string engine_source, int samples,
@@ -125,6 +129,9 @@ std::optional<RobotSpec> RepairCheck::Repair(std::span<const Cause> causes) cons
 
 bool RepairCheck::RepairsNumber(const Parameter& parameter, const Trial& trial) const {
   const bool differs = std::find(trial.wrong.begin(), trial.wrong.end(), parameter) != trial.wrong.end();
+  if (parameter.index < 0 && !trial.axle_right &&
+      (IsGeometric(parameter.kind) || parameter.kind == Kind::kCom || parameter.kind == Kind::kInertia))
+    return false;
   if (IsGeometric(parameter.kind)) return trial.IsLinkRight(CarrierOf(trial.spec, parameter));
   if (!bodies_ && IsOfBody(parameter.kind)) return trial.forces_agree;
   if (parameter.kind == Kind::kCom || parameter.kind == Kind::kInertia)
