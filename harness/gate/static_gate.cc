@@ -230,7 +230,8 @@ class StaticGate {
       Compare("object_shape", where, sizes[k],
               found < 0 ? kMissing : engine_.geom_size[3 * found + static_cast<int>(k)]);
     if (found < 0) return;
-    for (int k = 0; k < 3; ++k) Compare("object_shape", where, 0.0, engine_.geom_pos[3 * found + k], 1.0);
+    for (int k = 0; k < 3; ++k)
+      Compare("object_shape", where, 0.0, engine_.geom_pos[3 * found + k], sizes[0]);
     if (type == mjGEOM_SPHERE) return;
     mjtNum R[9];
     mju_quat2Mat(R, engine_.geom_quat + 4 * found);

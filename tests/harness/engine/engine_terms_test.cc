@@ -303,5 +303,41 @@ TEST(EngineTerms, FrictionHasTheForcesOfTendons) {
   }
 }
 
+// A string around a post pulls the robot as the engine's own pipeline has it, which places the post.
+TEST(EngineTerms, FrictionHasTheForcesOfTendonsAroundGeoms) {
+  std::mt19937 random(20163);
+  RandomRobotOptions options;
+  options.base = BaseType::kFixed;
+  options.joints = 4;
+  const RobotSpec spec = testing::MakeRandomRobot(options, &random);
+  const RobotModel model(spec);
+  std::string text = testing::WriteMjcf(spec);
+  const std::string end = "</mujoco>";
+  text.replace(text.rfind(end), end.size(),
+               "<worldbody><site name=\"hook\" pos=\"3 0 0\"/><geom name=\"post\" type=\"sphere\" size=\"0.6\" "
+               "pos=\"1.5 0 0\" contype=\"0\" conaffinity=\"0\"/></worldbody><tendon><spatial stiffness=\"100\" "
+               "springlength=\"0.1\"><site site=\"hook\"/><geom geom=\"post\"/><site site=\"tip_3\"/></spatial>"
+               "</tendon></mujoco>");
+  const MjModelPtr engine = LoadMjcfText(text, "text");
+  const Adapter adapter(model, *engine, "text");
+  EngineTerms terms(adapter, Coordinates::kReduced);
+  const MjDataPtr data = MakeData(*engine);
+  int wrapped = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    const VectorXd q = DrawPositions(model, &random);
+    terms.SetState(q, VectorXd::Zero(model.num_velocities()));
+    adapter.SetPositions(q, data->qpos);
+    mj_forward(engine.get(), data.get());
+    wrapped += data->ten_wrapnum[0] == 4 ? 1 : 0;  // hook, two points on the post, tip
+    VectorXd passive(model.num_joints());
+    for (int i = 0; i < model.num_joints(); ++i)
+      passive[i] = data->qfrc_passive[adapter.joint_dofs()[static_cast<size_t>(i)]];
+    constexpr double kScale = 1000.0;  // N m: some metres of 100 N/m on some metres
+    EXPECT_TRUE(MatrixNear(terms.friction(), -passive, kRounding * kScale));
+    EXPECT_GT(passive.norm(), 1.0);
+  }
+  EXPECT_GT(wrapped, 3);
+}
+
 }  // namespace
 }  // namespace dexcheck
