@@ -13,6 +13,9 @@ using Kind = ParameterKind;
 
 constexpr int kMaxCauses = 12;
 
+// Where nearly all is wrong, nearly all is suspect: pairs of far numbers would take for ever.
+constexpr size_t kMostPaired = 30;
+
 bool IsBodyItem(const PlacedItem& item) {
   return item.kind == ItemKind::kCom || item.kind == ItemKind::kInertia;
 }
@@ -64,11 +67,7 @@ std::vector<Cause> GeometryWalk::Run() {
       Apply(cause, &spec_);
       for (Cause& part : Split(cause)) causes.push_back(std::move(part));
     } else {
-      const int link = placement_.items()[static_cast<size_t>(first)].link;
-      for (const int item : failing) {
-        if (placement_.items()[static_cast<size_t>(item)].link == link)
-          left_[static_cast<size_t>(item)] = true;
-      }
+      Leave(placement_.items()[static_cast<size_t>(first)].link, failing);
     }
     placement_.Replace(spec_);
   }
@@ -92,10 +91,27 @@ int GeometryWalk::FindFirst(const std::vector<int>& failing) const {
   return first;
 }
 
+void GeometryWalk::Leave(int link, const std::vector<int>& failing) {
+  const auto is_axis = [&](int index) {
+    const PlacedItem& item = placement_.items()[static_cast<size_t>(index)];
+    return item.link == link && !IsBodyItem(item) && item.kind != ItemKind::kFramePosition &&
+           item.kind != ItemKind::kFrameRotation;
+  };
+  // What hangs on an axis that stays wrong cannot be put right, and its suspects grow with each link.
+  const bool with_carried =
+      num_suspects_ > kMostPaired && std::any_of(failing.begin(), failing.end(), is_axis);
+  for (const int item : failing) {
+    const int there = placement_.items()[static_cast<size_t>(item)].link;
+    if (there == link || (with_carried && placement_.Carries(link, there)))
+      left_[static_cast<size_t>(item)] = true;
+  }
+}
+
 bool GeometryWalk::FindCause(int first, Cause* cause) {
   const int link = placement_.items()[static_cast<size_t>(first)].link;
   const std::vector<int> failing = ListFailing(placement_.ItemsBeyond(-1));
   const std::vector<Parameter> suspects = ListSuspects(link, failing);
+  num_suspects_ = suspects.size();
   const std::vector<std::vector<int>> targets = ListTargets(link, failing);
   std::vector<Candidate> candidates;
   for (const Parameter& suspect : suspects) TryParameters(link, {suspect}, targets, &candidates);
@@ -178,8 +194,6 @@ std::vector<Parameter> GeometryWalk::ListSuspects(int link, const std::vector<in
 }
 
 std::vector<Parameter> GeometryWalk::ListNear(int link, const std::vector<Parameter>& suspects) const {
-  // Where nearly all is wrong, nearly all is suspect: pairs of far numbers would take for ever.
-  constexpr size_t kMostPaired = 30;
   if (suspects.size() <= kMostPaired) return suspects;
   std::vector<Parameter> near;
   std::copy_if(suspects.begin(), suspects.end(), std::back_inserter(near),

@@ -38,6 +38,8 @@ class GeometryWalk {
   [[nodiscard]] std::vector<int> ListFailing(const std::vector<int>& items) const;
   [[nodiscard]] int FindFirst(const std::vector<int>& failing) const;
   [[nodiscard]] bool FindCause(int first, Cause* cause);
+  /// Gives up what fails on a link; when nearly all is suspect, what the link carries too.
+  void Leave(int link, const std::vector<int>& failing);
   [[nodiscard]] std::vector<Parameter> ListSuspects(int link, const std::vector<int>& failing);
   /// Suspects among which pairs are tried: all, or when they are many, those of the link itself.
   [[nodiscard]] std::vector<Parameter> ListNear(int link, const std::vector<Parameter>& suspects) const;
@@ -57,7 +59,8 @@ class GeometryWalk {
   RobotSpec spec_;
   Placement placement_;
   std::function<double(const RobotSpec&)> force_error_;
-  std::vector<bool> left_;  // items that no geometry explains
+  std::vector<bool> left_;   // items that no geometry explains
+  size_t num_suspects_ = 0;  // of the last FindCause
 };
 
 }  // namespace dexcheck

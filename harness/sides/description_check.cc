@@ -62,7 +62,8 @@ class DescriptionCheck {
 
   void CheckDryFriction() {
     const std::string name = "joint_dry_friction";
-    TakeBack(name, [](const GateFinding& finding) { return finding.location.kind == Location::Kind::kJoint; });
+    TakeBack(name,
+             [](const GateFinding& finding) { return finding.location.kind == Location::Kind::kJoint; });
     CheckRecord* record = nullptr;
     for (size_t i = 0; i < robot_.joints.size(); ++i) {
       if (!robot_.joints[i].states_dry_friction) continue;
@@ -92,9 +93,8 @@ class DescriptionCheck {
       if (!own && other) only_there.push_back(name);
       if (!own || !other) continue;
       if (record == nullptr) record = Define("joint_coupling");
-      constraints.push_back(
-          "constraint " +
-          NameOf(engine_, mjOBJ_EQUALITY, FindCouplingConstraint(engine_, adapter_.joint_ids()[i])));
+      constraints.push_back("constraint " + NameOf(engine_, mjOBJ_EQUALITY,
+                                                   FindCouplingConstraint(engine_, adapter_.joint_ids()[i])));
       const int joint = static_cast<int>(i);
       Compare(record, joint, own->leader, FindIndex(other->leader), 0);
       Compare(record, joint, own->multiplier, other->multiplier, 1);

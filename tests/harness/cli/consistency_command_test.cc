@@ -36,7 +36,8 @@ size_t CheckSchema(const Json& results) {
   EXPECT_EQ(results.at("mujoco"), "2.2.2");
   EXPECT_TRUE(results.at("findings").is_array());
   EXPECT_FALSE(results.at("engine_notes").empty());
-  for (const Json& note : results.at("engine_notes")) EXPECT_TRUE(note.contains("kind") && note.contains("text"));
+  for (const Json& note : results.at("engine_notes"))
+    EXPECT_TRUE(note.contains("kind") && note.contains("text"));
   for (const auto& [name, check] : results.at("checks").items()) {
     SCOPED_TRACE(name);
     EXPECT_EQ(check.at("kind"), "model");

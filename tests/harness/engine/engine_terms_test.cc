@@ -313,11 +313,12 @@ TEST(EngineTerms, FrictionHasTheForcesOfTendonsAroundGeoms) {
   const RobotModel model(spec);
   std::string text = testing::WriteMjcf(spec);
   const std::string end = "</mujoco>";
-  text.replace(text.rfind(end), end.size(),
-               "<worldbody><site name=\"hook\" pos=\"3 0 0\"/><geom name=\"post\" type=\"sphere\" size=\"0.6\" "
-               "pos=\"1.5 0 0\" contype=\"0\" conaffinity=\"0\"/></worldbody><tendon><spatial stiffness=\"100\" "
-               "springlength=\"0.1\"><site site=\"hook\"/><geom geom=\"post\"/><site site=\"tip_3\"/></spatial>"
-               "</tendon></mujoco>");
+  text.replace(
+      text.rfind(end), end.size(),
+      "<worldbody><site name=\"hook\" pos=\"3 0 0\"/><geom name=\"post\" type=\"sphere\" size=\"0.6\" "
+      "pos=\"1.5 0 0\" contype=\"0\" conaffinity=\"0\"/></worldbody><tendon><spatial stiffness=\"100\" "
+      "springlength=\"0.1\"><site site=\"hook\"/><geom geom=\"post\"/><site site=\"tip_3\"/></spatial>"
+      "</tendon></mujoco>");
   const MjModelPtr engine = LoadMjcfText(text, "text");
   const Adapter adapter(model, *engine, "text");
   EngineTerms terms(adapter, Coordinates::kReduced);

@@ -130,10 +130,11 @@ TEST(Urdf, CouplingsAreComparedWithTheMjcfs) {
     EXPECT_NE(joint, std::string::npos);
     return coupled.insert(coupled.find("<parent", joint), mimic);
   };
-  EXPECT_EQ(ListFailures(couple("<mimic joint=\"panda_joint5\" multiplier=\"0.5\" offset=\"0.1\"/>"), *engine),
-            "");
-  EXPECT_EQ(ListFailures(couple("<mimic joint=\"panda_joint5\" multiplier=\"0.6\" offset=\"0.1\"/>"), *engine),
-            "joint_coupling ");
+  EXPECT_EQ(
+      ListFailures(couple("<mimic joint=\"panda_joint5\" multiplier=\"0.5\" offset=\"0.1\"/>"), *engine), "");
+  EXPECT_EQ(
+      ListFailures(couple("<mimic joint=\"panda_joint5\" multiplier=\"0.6\" offset=\"0.1\"/>"), *engine),
+      "joint_coupling ");
 }
 
 // Two fingers with a coupled joint, a welded tip, odd names, and what URDFs leave out.
