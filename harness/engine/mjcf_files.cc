@@ -25,13 +25,14 @@ struct MjcfReferences {
   bool strips_paths = false;  ///< The engine then takes a file's name only, without its folder.
 };
 
-/// Reads an XML document as the engine does, with the same parser. @throws InputError.
-void ReadXml(const std::filesystem::path& path, tinyxml2::XMLDocument* document) {
+/// Reads an XML document as the engine does, with the same parser.
+/// @param shown the file in messages. @throws InputError.
+void ReadXml(const std::filesystem::path& path, const std::string& shown, tinyxml2::XMLDocument* document) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path.string() + ": cannot be read");
+  if (!file) throw InputError(shown + ": cannot be read");
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (document->Parse(text.data(), text.size()) == tinyxml2::XML_SUCCESS) return;
-  throw InputError(path.string() + ": line " + std::to_string(document->ErrorLineNum()) +
+  throw InputError(shown + ": line " + std::to_string(document->ErrorLineNum()) +
                    ": is not well-formed XML: " + document->ErrorName());
 }
 
@@ -98,7 +99,8 @@ std::vector<std::string> ListMjcfFiles(const std::filesystem::path& mjcf) {
     if (!read.insert(name).second) continue;
     add(name);
     tinyxml2::XMLDocument document;
-    ReadXml(folder / name, &document);
+    const bool is_included = files.size() > 1;
+    ReadXml(folder / name, is_included ? mjcf.string() + ": file " + Quote(name) : mjcf.string(), &document);
     ReadElements(document, &found);
   }
   const auto add_assets = [&](const std::vector<std::string>& names, const std::string& asset_folder) {
