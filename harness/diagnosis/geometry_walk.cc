@@ -243,10 +243,23 @@ VectorXd GeometryWalk::CollectResidual(const std::vector<int>& target) const {
 
 bool GeometryWalk::Solve(const std::vector<Parameter>& parameters, const std::vector<int>& target,
                          const std::vector<double>& start) {
+  placement_.Focus(target);
+  const bool solves =
+      Iterate(parameters, target, start) &&
+      std::none_of(target.begin(), target.end(), [&](int item) { return placement_.Fails(item); });
+  placement_.Unfocus();
+  if (solves) placement_.Follow();  // otherwise the parameters are restored
+  return solves;
+}
+
+bool GeometryWalk::Iterate(const std::vector<Parameter>& parameters, const std::vector<int>& target,
+                           const std::vector<double>& start) {
   constexpr int kMaxIterations = 30;
   constexpr double kStep = 1e-6;
   constexpr double kConverged = 1e-14;
-  constexpr double kFar = 10.0;  // of the robot's size: no length is that long
+  constexpr double kZero = 1e-9;       // far above what is left of a right solution, far below any mistake
+  constexpr double kExplained = 1e-3;  // of the residual, by a step
+  constexpr double kFar = 10.0;        // of the robot's size: no length is that long
   constexpr double kLongestTurn =
       0.7;  // rad; Gauss-Newton steps that stay where the linearisation means something
   const auto count = static_cast<Eigen::Index>(parameters.size());
@@ -265,6 +278,9 @@ bool GeometryWalk::Solve(const std::vector<Parameter>& parameters, const std::ve
     }
     if (slope.colwise().norm().minCoeff() < 1e-9) return false;  // moves nothing of the target
     VectorXd step = -slope.colPivHouseholderQr().solve(residual);
+    // Where the residual is least and not zero, a step explains next to nothing of it.
+    const bool is_zero = residual.cwiseAbs().maxCoeff() < kZero;
+    if (!is_zero && (slope * step).norm() < kExplained * residual.norm()) return false;
     double change = 0.0;
     for (size_t i = 0; i < parameters.size(); ++i) {
       double& entry = step[static_cast<Eigen::Index>(i)];
@@ -277,7 +293,7 @@ bool GeometryWalk::Solve(const std::vector<Parameter>& parameters, const std::ve
     }
     if (change < kConverged) break;
   }
-  return std::none_of(target.begin(), target.end(), [&](int item) { return placement_.Fails(item); });
+  return true;
 }
 
 int GeometryWalk::CountWrongNumbers(int link) const {

@@ -50,6 +50,8 @@ class GeometryWalk {
   void TryStructure(int link, std::vector<Candidate>* candidates);
   bool Solve(const std::vector<Parameter>& parameters, const std::vector<int>& target,
              const std::vector<double>& start);
+  bool Iterate(const std::vector<Parameter>& parameters, const std::vector<int>& target,
+               const std::vector<double>& start);
   [[nodiscard]] VectorXd CollectResidual(const std::vector<int>& target) const;
   /// Of what stands on one link.
   [[nodiscard]] int CountWrongNumbers(int link) const;

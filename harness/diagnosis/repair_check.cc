@@ -37,6 +37,17 @@ bool IsOfBody(Kind kind) {
   }
 }
 
+/// Whether Sigma_0 stands where the engine's wheels have the middle of their axle; without wheels it stands
+/// where it is said to.
+bool IsAxleRight(const Adapter& adapter, double rounding) {
+  Vector3d sum = Vector3d::Zero();
+  for (const EngineWheel& wheel : adapter.wheels()) {
+    sum += wheel.center;
+    if (!(std::hypot(wheel.center.x(), wheel.center.z()) <= rounding)) return false;
+  }
+  return std::abs(sum.y()) <= rounding;
+}
+
 }  // namespace
 
 std::optional<Parameter> FindParameter(const RobotSpec& spec, const GateFinding& finding) {
@@ -77,9 +88,7 @@ struct RepairCheck::Trial {
       const bool same = std::abs(finding.model - finding.engine) <= kSame * size;
       if (parameter && !same) wrong.push_back(*parameter);
     }
-    const Adapter adapter(model, engine, source);
-    for (const EngineWheel& wheel : adapter.wheels())
-      axle_right &= std::hypot(wheel.center.x(), wheel.center.z()) <= kSame * evidence.length();
+    axle_right = IsAxleRight(Adapter(model, engine, source), kSame * evidence.length());
     if (bodies) {
       for (const Cause& cause : BodyComparison(spec, evidence, engine).Run())
         wrong.insert(wrong.end(), cause.parameters.begin(), cause.parameters.end());
@@ -104,7 +113,7 @@ struct RepairCheck::Trial {
   Placement placement;
   std::vector<Parameter> wrong;  // numbers that differ from what is read from the engine
   bool forces_agree = true;
-  bool axle_right = true;  // Sigma_0 stands where the engine's wheels have their axle
+  bool axle_right = true;  // what the base's numbers are relative to
 };
 
 RepairCheck::RepairCheck(RobotSpec original, const mjModel& engine, std::string engine_source, int samples,

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/gate/static_gate.h"
 #include "harness/diagnosis/cause.h"
+#include "harness/gate/static_gate.h"
 
 namespace dexcheck {
 

@@ -196,7 +196,6 @@ class StaticGate {
       Compare("object_shape", where, torus->ring_radius, ring_radius);
       Compare("object_shape", where, torus->tube_radius, tube_radius);
     }
-    CompareRoundShape(object.shape, where);
     for (const int frame : model_.fingertips()) CompareFriction(object, frame);
   }
 
