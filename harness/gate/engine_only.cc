@@ -58,6 +58,8 @@ class EngineOnly {
     }
     double error = std::abs(engine - neutral);
     if (error <= tolerance) error = 0.0;
+    // How large a force may be that should not be there is nothing that a relative tolerance says.
+    if (tolerance == 0.0 && error > 0.0) error /= std::max(std::abs(engine), std::abs(neutral));
     if (!(record->CompareError(error, neutral, engine, {}, -1) <= kRounding))
       result_->findings.push_back({check, where, neutral, engine, {}, 0, true});
   }
