@@ -30,6 +30,14 @@ RobotModel ReadModel(const Scenario& scenario, const std::filesystem::path& robo
   return ParseRobotModel(ReadTextFile(robot.string()), robot.string(), scenario.model_overrides);
 }
 
+/// Critically damped, of constant impedance, whatever the MJCF says.
+void SetStiffness(double time_constant, double impedance, mjtNum* solref, mjtNum* solimp) {
+  solref[0] = time_constant;
+  solref[1] = 1.0;
+  const mjtNum constant[mjNIMP] = {impedance, impedance, 0.001, 0.5, 2.0};  // the last three without effect
+  std::copy_n(constant, mjNIMP, solimp);
+}
+
 /// From -1 to 1.
 double Draw(std::mt19937_64* random) { return 2.0 * static_cast<double>((*random)() >> 11) * 0x1p-53 - 1.0; }
 
@@ -71,9 +79,8 @@ void Setup::ApplyPlantOptions() {
   const double time_constant =
       plant.contact_time_constant > 0.0 ? plant.contact_time_constant : 2.0 * plant.time_step;
   for (int pair = 0; pair < m.npair; ++pair) {
-    m.pair_solref[mjNREF * pair] = time_constant;
-    mjtNum* const solimp = m.pair_solimp + mjNIMP * pair;
-    solimp[0] = solimp[1] = plant.contact_impedance;
+    SetStiffness(time_constant, plant.contact_impedance, m.pair_solref + mjNREF * pair,
+                 m.pair_solimp + mjNIMP * pair);
     const bool has_floor =
         m.geom_type[m.pair_geom1[pair]] == mjGEOM_PLANE || m.geom_type[m.pair_geom2[pair]] == mjGEOM_PLANE;
     const std::optional<double>& mu = has_floor ? plant.floor_friction : plant.finger_friction;
@@ -218,9 +225,8 @@ void Setup::MakeBonds() {
     }
     bond_constraints_.push_back(found);
     m.eq_active[found] = 1;
-    m.eq_solref[mjNREF * found] = m.pair_solref[0];
-    mjtNum* const solimp = m.eq_solimp + mjNIMP * found;
-    solimp[0] = solimp[1] = scenario_.plant.contact_impedance;
+    SetStiffness(m.pair_solref[0], scenario_.plant.contact_impedance, m.eq_solref + mjNREF * found,
+                 m.eq_solimp + mjNIMP * found);
     // The same point in both bodies.
     const Vector3d on_object = contact.g_o_cf.translation();
     const Vector3d p_B = X_Bo_start_ * on_object;
