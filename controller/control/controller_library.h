@@ -5,8 +5,8 @@
 //   std::unique_ptr<dexcheck::Controller> Make(const dexcheck::ControllerContext& context);
 //   DEXCHECK_CONTROLLER(Make)
 //
-// The library is compiled with the headers and the compiler's options of the program that loads it; the program refuses
-// one that differs. What the library calls of controller/ is the program's.
+// The library is compiled with the headers and the compiler's options of the program that loads it; the
+// program refuses one that differs. What the library calls of controller/ is the program's.
 
 #include <cstdio>
 #include <memory>
@@ -33,10 +33,12 @@ struct ControllerContext {
 /// Number of the interface: it changes with what the classes mean.
 inline constexpr int kControllerInterface = 1;
 
-/// What both sides must have in common, as text: the interface, and how the compiler lays out what is handed over.
+/// What both sides must have in common, as text: the interface, and how the compiler lays out what is handed
+/// over.
 static inline std::string DescribeControllerInterface() {
   char text[160];
-  std::snprintf(text, sizeof(text), "%d, Eigen %d.%d.%d aligned to %d, Reading %zu, Command %zu, options %zu bytes",
+  std::snprintf(text, sizeof(text),
+                "%d, Eigen %d.%d.%d aligned to %d, Reading %zu, Command %zu, options %zu bytes",
                 kControllerInterface, EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION,
                 EIGEN_MAX_ALIGN_BYTES, sizeof(Reading), sizeof(Command), sizeof(GraspControllerOptions));
   return text;
@@ -45,11 +47,11 @@ static inline std::string DescribeControllerInterface() {
 }  // namespace dexcheck
 
 /// Names the function that makes the library's controller.
-#define DEXCHECK_CONTROLLER(make)                                                                      \
-  extern "C" const char* dexcheck_controller_interface() {                                             \
-    static const std::string text = dexcheck::DescribeControllerInterface();                           \
-    return text.c_str();                                                                               \
-  }                                                                                                    \
+#define DEXCHECK_CONTROLLER(make)                                                                         \
+  extern "C" const char* dexcheck_controller_interface() {                                                \
+    static const std::string text = dexcheck::DescribeControllerInterface();                              \
+    return text.c_str();                                                                                  \
+  }                                                                                                       \
   extern "C" dexcheck::Controller* dexcheck_make_controller(const dexcheck::ControllerContext* context) { \
-    return make(*context).release();                                                                   \
+    return make(*context).release();                                                                      \
   }

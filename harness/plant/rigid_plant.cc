@@ -37,6 +37,7 @@ RigidPlant::RigidPlant(const RobotModel& model, const Adapter& adapter, std::spa
     rate->q_dot.setZero(p);
     rate->xi_dot.setZero(n);
     rate->kappa_dot.setZero(5 * static_cast<Eigen::Index>(count));
+    rate->f_c.setZero(grasp_.num_forces());
   }
   gaps_.assign(count, 0.0);
   gaps_before_ = gaps_;
@@ -101,6 +102,8 @@ void RigidPlant::EndStep(const Eigen::Ref<const VectorXd>& tau) {
     StepEuler();
   }
   time_ += options_.time_step;
+  // Products of rotations leave the group by rounding.
+  state_.X_Bo.linear() = Eigen::Quaterniond(state_.X_Bo.linear()).normalized().toRotationMatrix();
   for (size_t i = 0; i < state_.kappa.size(); ++i) {
     state_.kappa[i] = NormalizeContact(grasp_.tip(static_cast<int>(i)), *surface_, state_.kappa[i]);
   }
@@ -108,20 +111,20 @@ void RigidPlant::EndStep(const Eigen::Ref<const VectorXd>& tau) {
 }
 
 void RigidPlant::RequireFinite() const {
-  if (state_.q.allFinite() && state_.xi.allFinite() && state_.X_Bo.matrix().allFinite() && state_.V_Bo.allFinite())
+  if (state_.q.allFinite() && state_.xi.allFinite() && state_.X_Bo.matrix().allFinite() &&
+      state_.V_Bo.allFinite())
     return;
-  throw DivergenceError("the rigid plant's state is not finite after t = " +
-                        FormatNumber(time_ - options_.time_step) + " s");
+  throw DivergenceError(
+      "the rigid plant's state is not finite after t = " + FormatNumber(time_ - options_.time_step) + " s");
 }
 
-void RigidPlant::CalcCoordinateRates(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& xi,
-                                     VectorXd* q_dot) const {
+void RigidPlant::CalcCoordinateRates(const Eigen::Ref<const VectorXd>& q,
+                                     const Eigen::Ref<const VectorXd>& xi, VectorXd* q_dot) const {
   // q_dot' = S' xi
   const Eigen::Index joints = model_->num_joints();
   q_dot->tail(joints) = xi.tail(joints);
   if (model_->base().type == BaseType::kDifferentialDrive) {
-    q_dot->head<3>() =
-        CalcPlatformConstraint(model_->base(), q.head<3>(), xi.head<2>()).S_v * xi.head<2>();
+    q_dot->head<3>() = CalcPlatformConstraint(model_->base(), q.head<3>(), xi.head<2>()).S_v * xi.head<2>();
   } else {
     q_dot->head(q.size() - joints) = xi.head(xi.size() - joints);
   }
@@ -138,11 +141,11 @@ void RigidPlant::Evaluate(const State& state, const Vector3d& turn, Rate* rate) 
   for (size_t i = 0; i < gaps_.size(); ++i) {
     stabilisation_[3 * static_cast<Eigen::Index>(i) + 2] += gaps_[i] / (4.0 * h * h);
   }
-  const Prediction& motion =
-      dynamics_.Predict(robot_, grasp_, force_, ObjectSupport::kHand, &stabilisation_);
+  const Prediction& motion = dynamics_.Predict(robot_, grasp_, force_, ObjectSupport::kHand, &stabilisation_);
   CalcCoordinateRates(state.q, state.xi, &rate->q_dot);
   rate->xi_dot = motion.xi_dot;
   rate->V_Bo_dot = motion.V_Bo_dot;
+  rate->f_c = motion.f_c;
   rate->p_dot = state.X_Bo.linear() * state.V_Bo.head<3>();
   // omega = J_r(turn) turn_dot, J_r(turn) = J_l(-turn)
   rate->turn_dot = CalcLeftJacobianInverse(-turn) * state.V_Bo.tail<3>();
@@ -156,9 +159,8 @@ void RigidPlant::KeepResponse() {
   X_Bo_before_ = state_.X_Bo;
   for (size_t i = 0; i < gaps_.size(); ++i) {
     g_o_cf_before_[i] = grasp_.contacts()[i].geometry.g_o_cf;
-    f_c_before_.segment<3>(3 * static_cast<Eigen::Index>(i)) =
-        dynamics_.prediction().f_c.segment<3>(3 * static_cast<Eigen::Index>(i));
   }
+  f_c_before_ = k1_.f_c;
   gaps_before_ = gaps_;
   slip_before_ = grasp_.slip();
 }

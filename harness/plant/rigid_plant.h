@@ -5,9 +5,9 @@
 //   q_dot' = S' xi,  p_dot = R_Bo v,  R_dot = R_Bo [omega]x,  kappa_dot by (40)
 //   [xi_dot; V_o_dot; f_c] by ConstrainedDynamics under E_bar' tau', tau' held during a time step
 //
-// Bodies are rigid, wheels roll and fingertips stick and stay closed, whatever the forces are: friction cones, normal
-// forces and traction are reported and limit nothing. Where integration drifts off the constraints it is led back: with
-// r = J_B' xi - G^T V_o and the gaps g between the bodies,
+// Bodies are rigid, wheels roll and fingertips stick and stay closed, whatever the forces are: friction
+// cones, normal forces and traction are reported and limit nothing. Where integration drifts off the
+// constraints it is led back: with r = J_B' xi - G^T V_o and the gaps g between the bodies,
 //
 //   d/dt r = -r / h + [0; 0; g / (4 h^2)]      per contact, h the time step
 //
@@ -28,9 +28,10 @@ namespace dexcheck {
 
 /// How the rigid plant steps.
 enum class Integrator {
-  kRungeKutta4,  ///< Four evaluations, fourth order for the torques given; velocities and positions of one time.
-  /// One evaluation: new velocities, then positions by them. Velocities belong to the middle of the step before, as
-  /// the engine's.
+  kRungeKutta4,  ///< Four evaluations, fourth order for the torques given; velocities and positions of one
+                 ///< time.
+  /// One evaluation: new velocities, then positions by them. Velocities belong to the middle of the step
+  /// before, as the engine's.
   kSemiImplicitEuler,
 };
 
@@ -43,9 +44,9 @@ struct RigidPlantOptions {
 /// Nothing allocates in a step, once the values that are read into have their sizes.
 class RigidPlant final : public Plant {
  public:
-  /// @param model of the plant. @param adapter for the engine's coordinates, which draw the scene. @param fingertips
-  /// frames of the grasp. @param object, surface in Sigma_o. @param motors by entry of tau'. All references must outlive
-  /// this. @throws as GraspTerms.
+  /// @param model of the plant. @param adapter for the engine's coordinates, which draw the scene. @param
+  /// fingertips frames of the grasp. @param object, surface in Sigma_o. @param motors by entry of tau'. All
+  /// references must outlive this. @throws as GraspTerms.
   RigidPlant(const RobotModel& model, const Adapter& adapter, std::span<const int> fingertips,
              const MassProperties& object, const Surface& surface, std::span<const Motor> motors,
              const RigidPlantOptions& options);
@@ -81,6 +82,7 @@ class RigidPlant final : public Plant {
     Vector3d turn_dot = Vector3d::Zero();
     Vector6d V_Bo_dot = Vector6d::Zero();
     VectorXd kappa_dot;  // 5 each
+    VectorXd f_c;        // k, N
     double power = 0.0;  // W
   };
 

@@ -10,12 +10,12 @@
 
 namespace dexcheck {
 
-/// Loads a library (controller/control/controller_library.h). What it throws ends the run, with its words; a torque
-/// of the wrong size likewise.
+/// Loads a library (controller/control/controller_library.h). What it throws ends the run, with its words; a
+/// torque of the wrong size likewise.
 class LibraryController final : public Controller {
  public:
-  /// @throws InputError when the library cannot be loaded, names no controller or was built for another interface;
-  /// RunFailure when its controller cannot be made.
+  /// @throws InputError when the library cannot be loaded, names no controller or was built for another
+  /// interface; RunFailure when its controller cannot be made.
   LibraryController(const std::string& library, const OwnControllerSetup& setup);
   ~LibraryController() override;
 

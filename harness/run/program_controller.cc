@@ -49,7 +49,7 @@ ProgramController::ProgramController(const std::string& command, const OwnContro
   try {
     Greet();
   } catch (...) {
-    this->~ProgramController();
+    Stop();
     throw;
   }
 }
@@ -80,6 +80,7 @@ void ProgramController::Start(const std::string& command) {
   posix_spawnattr_destroy(&attributes);
   close(ends[1]);
   if (error == 0) return;
+  process_ = -1;
   close(socket_);
   throw RunFailure(name_ + ": " + std::strerror(error));
 }
@@ -123,12 +124,15 @@ void ProgramController::Greet() {
   request_.assign(1 + doubles, 0.0);
 }
 
-ProgramController::~ProgramController() {
-  if (process_ < 0) return;
+ProgramController::~ProgramController() { Stop(); }
+
+void ProgramController::Stop() {
+  if (socket_ < 0) return;
   const dexcheck_message end{DEXCHECK_END, 0};
   (void)!send(socket_, &end, sizeof(end), MSG_NOSIGNAL | MSG_DONTWAIT);
   close(socket_);
-  if (TellEnd().empty()) {
+  socket_ = -1;
+  if (process_ >= 0 && TellEnd().empty()) {
     kill(-process_, SIGKILL);
     waitpid(process_, nullptr, 0);
   }

@@ -13,12 +13,13 @@
 
 namespace dexcheck {
 
-/// Runs the program and asks it at each step. A program that ends, is killed, says nothing in time or answers what was
-/// not asked ends the run, in one line. Nothing allocates in a step.
+/// Runs the program and asks it at each step. A program that ends, is killed, says nothing in time or answers
+/// what was not asked ends the run, in one line. Nothing allocates in a step.
 class ProgramController final : public Controller {
  public:
   /// Starts the program and greets it.
-  /// @param command for the shell. @throws InputError when it cannot be started; RunFailure when it does not answer.
+  /// @param command for the shell. @throws InputError when it cannot be started; RunFailure when it does not
+  /// answer.
   ProgramController(const std::string& command, const OwnControllerSetup& setup);
   /// Ends the program, by force when it does not end by itself.
   ~ProgramController() override;
@@ -31,6 +32,7 @@ class ProgramController final : public Controller {
  private:
   void Start(const std::string& command);
   void Greet();
+  void Stop();
   void Send(const void* data, size_t size);
   void Receive(void* data, size_t size);
   void FillRequest(const Reading& reading, double t, const DesiredMotion& desired);
