@@ -14,7 +14,8 @@ CrossCheck::CrossCheck(const Setup& setup)
       law_terms_(setup.model().num_positions(), setup.model().num_velocities(),
                  3 * static_cast<int>(setup.fingertips().size())) {
   if (!setup.bonds().empty()) model_.LeaveOutContacts();
-  if (!setup.scenario().task) law_.emplace(setup);
+  const bool is_paper_law = setup.scenario().control.law == ControlLaw::kComputedTorque;
+  if (!setup.scenario().task && is_paper_law) law_.emplace(setup);
   using enum StepCheck;
   if (!law_) {
     for (const StepCheck check : {kGains, kLawTorque, kLawDemand, kGraspForce}) motion_.LeaveOut(check);

@@ -48,7 +48,7 @@ class CrossCheck {
   const Setup* setup_;
   StepModelCheck model_;
   StepChecks motion_;
-  std::optional<LawCheck> law_;  // none for a task
+  std::optional<LawCheck> law_;  // none for a task or another law than (55)
   LawTerms law_terms_;           // the engine's
 };
 

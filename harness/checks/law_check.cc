@@ -23,13 +23,13 @@ constexpr double kTellingDifference = 1e-9;
 
 }  // namespace
 
-double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold) {
+double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold, double velocity_age) {
   const double h = static_cast<double>(hold);
   double radius = 0.0;
   for (Eigen::Index i = 0; i < 6; ++i) {
-    // u = -(K_v v + K_p e) is held for h steps: v_h = v + h dt u, e_h = e + h dt v + h (h + 1) / 2 dt^2 u.
+    // u = -(K_v v + K_p e) is held for h steps: v_h = v + h dt u, e_h = e + h dt v + (h dt / 2 + age) h dt u.
     const double b_v = h * time_step;
-    const double b_e = 0.5 * h * (h + 1.0) * time_step * time_step;
+    const double b_e = 0.5 * h * (h + 2.0 * velocity_age / time_step) * time_step * time_step;
     Matrix2d A;
     A << 1.0 - b_v * gains.K_v[i], -b_v * gains.K_p[i], b_v - b_e * gains.K_v[i], 1.0 - b_e * gains.K_p[i];
     const double half = 0.5 * A.trace();
@@ -43,6 +43,7 @@ double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold) 
 LawCheck::LawCheck(const Setup& setup)
     : spec_(MakeLawSpec(setup.MakeControllerOptions())),
       time_step_(setup.scenario().plant.time_step),
+      velocity_age_(setup.scenario().plant.velocity_age()),
       hold_(std::max(1L, std::lround(setup.scenario().plant.control_step / time_step_))),
       actuation_(setup.model()),
       reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())) {
@@ -60,12 +61,14 @@ LawCheck::LawCheck(const Setup& setup)
   column_.setZero(setup.model().num_velocities(), 1);
 }
 
-double LawCheck::sampled_radius() const { return CalcSampledRadius(spec_.gains, time_step_, hold_); }
+double LawCheck::sampled_radius() const {
+  return CalcSampledRadius(spec_.gains, time_step_, hold_, velocity_age_);
+}
 
 DesiredMotion LawCheck::EvaluateDesired(double t) const {
   // Semi-implicit Euler steps like a leapfrog: velocities belong to the middle of the step before.
   DesiredMotion desired = trajectory_->Evaluate(t);
-  desired.X_d_dot = trajectory_->Evaluate(t - 0.5 * time_step_).X_d_dot;
+  desired.X_d_dot = trajectory_->Evaluate(t - velocity_age_).X_d_dot;
   return desired;
 }
 

@@ -30,9 +30,11 @@ struct LawErrors {
   double error_dynamics = 0.0;
 };
 
-/// Largest magnitude of the eigenvalues of (57), per time step, when velocities are those of the middle of
-/// the step before and the command is held for `hold` steps: 1 and more does not settle. Over all six axes.
-double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold);
+/// Largest magnitude of the eigenvalues of (57), per time step, when the command is held for `hold` steps: 1
+/// and more does not settle. Over all six axes. @param velocity_age by how much velocities are older than
+/// positions, s: half a time step where velocities step first and positions by them, 0 where both step
+/// together.
+double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold, double velocity_age);
 
 /// Computes the printed law at each step, from the engine's terms, the scenario's gains and the scenario's
 /// trajectory. Of the controller it takes F_N, which the law may choose, X_o's angles on the law's branch
@@ -50,7 +52,8 @@ class LawCheck {
   /// Of the scenario's gains.
   [[nodiscard]] double sampled_radius() const;
   /// Whether the controller computes anew at every step, so that (57) can be integrated beside it.
-  [[nodiscard]] bool follows_error() const { return hold_ == 1; }
+  /// in the way that its velocities need: those of the middle of the step before.
+  [[nodiscard]] bool follows_error() const { return hold_ == 1 && velocity_age_ > 0.0; }
 
   /// @param terms the engine's, at the state that the controller was told.
   /// @param L factor of M_bar' = L^T L: the check measures in |f|_M^-1 = |L^-T f|.
@@ -75,6 +78,7 @@ class LawCheck {
   LawSpec spec_;
   double mu_, f_min_, f_max_, barrier_weight_, slack_tolerance_, residual_tolerance_;
   double time_step_;
+  double velocity_age_;
   long hold_;
   std::unique_ptr<Trajectory> trajectory_;
   ActuationMap actuation_;

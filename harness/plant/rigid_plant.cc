@@ -5,6 +5,7 @@
 
 #include "controller/common/text.h"
 #include "controller/contact/find_contact.h"
+#include "controller/contact/object_surface.h"
 #include "controller/contact/rolling.h"
 #include "controller/model/platform.h"
 #include "controller/object/object_dynamics.h"
@@ -13,15 +14,14 @@
 namespace dexcheck {
 
 RigidPlant::RigidPlant(const RobotModel& model, const Adapter& adapter, std::span<const int> fingertips,
-                       const MassProperties& object, const Surface& surface, std::span<const Motor> motors,
-                       const RigidPlantOptions& options)
+                       std::span<const Motor> motors, const RigidPlantOptions& options)
     : model_(&model),
       adapter_(&adapter),
-      surface_(&surface),
+      surface_(MakeSurface(model.object().value().shape)),
       motors_(motors.begin(), motors.end()),
       options_(options),
       robot_(model, Coordinates::kReduced),
-      grasp_(model, fingertips, object, surface),
+      grasp_(model, fingertips, model.object()->body, *surface_),
       dynamics_(model, static_cast<int>(fingertips.size())),
       actuation_(model),
       velocity_map_(adapter, Coordinates::kReduced) {

@@ -13,6 +13,7 @@
 //
 // which on the constraints is (46), and off them the contact that engines have, with a time constant of 2 h.
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -21,19 +22,11 @@
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/grasp_terms.h"
 #include "controller/dynamics/model_terms.h"
-#include "harness/adapter/velocity_map.h"
+#include "harness/engine/velocity_map.h"
+#include "harness/plant/integrator.h"
 #include "harness/plant/plant.h"
 
 namespace dexcheck {
-
-/// How the rigid plant steps.
-enum class Integrator {
-  kRungeKutta4,  ///< Four evaluations, fourth order for the torques given; velocities and positions of one
-                 ///< time.
-  /// One evaluation: new velocities, then positions by them. Velocities belong to the middle of the step
-  /// before, as the engine's.
-  kSemiImplicitEuler,
-};
 
 struct RigidPlantOptions {
   double time_step = 1e-3;  ///< s.
@@ -44,12 +37,11 @@ struct RigidPlantOptions {
 /// Nothing allocates in a step, once the values that are read into have their sizes.
 class RigidPlant final : public Plant {
  public:
-  /// @param model of the plant. @param adapter for the engine's coordinates, which draw the scene. @param
-  /// fingertips frames of the grasp. @param object, surface in Sigma_o. @param motors by entry of tau'. All
-  /// references must outlive this. @throws as GraspTerms.
+  /// @param model of robot and object. @param adapter for the engine's coordinates, which draw the scene;
+  /// both outlive this. @param fingertips frames of the grasp. @param motors by entry of tau'. @throws as
+  /// GraspTerms and MakeSurface.
   RigidPlant(const RobotModel& model, const Adapter& adapter, std::span<const int> fingertips,
-             const MassProperties& object, const Surface& surface, std::span<const Motor> motors,
-             const RigidPlantOptions& options);
+             std::span<const Motor> motors, const RigidPlantOptions& options);
 
   [[nodiscard]] double time_step() const override { return options_.time_step; }
   [[nodiscard]] std::span<const Motor> motors() const override { return motors_; }
@@ -101,7 +93,7 @@ class RigidPlant final : public Plant {
 
   const RobotModel* model_;
   const Adapter* adapter_;
-  const Surface* surface_;
+  std::unique_ptr<Surface> surface_;
   std::vector<Motor> motors_;
   RigidPlantOptions options_;
   ModelTerms robot_;

@@ -211,12 +211,12 @@ TEST(LawCheck, SampledRadiusIsThatOfTheRecursion) {
     }
     // The envelope of a damped oscillation: its phase leaves some hundredths over 2000 steps.
     const double measured = std::pow(std::hypot(e, v) / last, 2.0 / static_cast<double>(kSteps));
-    EXPECT_NEAR(CalcSampledRadius(gains, dt, hold), measured, 3e-3) << hold;
+    EXPECT_NEAR(CalcSampledRadius(gains, dt, hold, 0.5 * dt), measured, 3e-3) << hold;
   }
   gains.K_p.setZero();
-  EXPECT_NEAR(CalcSampledRadius(gains, 1e-3, 1), 1.0, 1e-12);
+  EXPECT_NEAR(CalcSampledRadius(gains, 1e-3, 1, 0.5e-3), 1.0, 1e-12);
   gains.K_v.setConstant(2100.0);
-  EXPECT_GT(CalcSampledRadius(gains, 1e-3, 1), 1.0);
+  EXPECT_GT(CalcSampledRadius(gains, 1e-3, 1, 0.5e-3), 1.0);
 }
 
 }  // namespace

@@ -26,8 +26,7 @@ class RigidPlantTest : public ::testing::Test {
   RigidPlantTest() : shipped_("hold", {kRigid}), setup_(shipped_.setup()) {}
 
   RigidPlant MakePlant(double time_step, Integrator integrator = Integrator::kRungeKutta4) const {
-    RigidPlant plant(setup_.model(), setup_.adapter(), setup_.fingertips(), setup_.object().body,
-                     setup_.surface(), motors_,
+    RigidPlant plant(setup_.model(), setup_.adapter(), setup_.fingertips(), motors_,
                      {.time_step = time_step, .integrator = integrator, .finger_friction = 1.0});
     plant.Place(setup_.q_start(), setup_.X_Bo_start());
     return plant;
