@@ -14,12 +14,13 @@ CrossCheck::CrossCheck(const Setup& setup)
       law_terms_(setup.model().num_positions(), setup.model().num_velocities(),
                  3 * static_cast<int>(setup.fingertips().size())) {
   if (!setup.bonds().empty()) model_.LeaveOutContacts();
-  const bool is_paper_law = setup.scenario().control.law == ControlLaw::kComputedTorque;
-  if (!setup.scenario().task && is_paper_law) law_.emplace(setup);
+  if (!setup.scenario().task) law_.emplace(setup);
   using enum StepCheck;
   if (!law_) {
     for (const StepCheck check : {kGains, kLawTorque, kLawDemand, kGraspForce}) motion_.LeaveOut(check);
   }
+  if (law_ && !law_->has_error_dynamics()) motion_.LeaveOut(kGains);
+  if (law_ && !law_->has_demand()) motion_.LeaveOut(kLawDemand);
   if (!law_ || !law_->follows_error()) motion_.LeaveOut(kErrorDynamics);
 }
 

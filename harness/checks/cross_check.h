@@ -48,7 +48,7 @@ class CrossCheck {
   const Setup* setup_;
   StepModelCheck model_;
   StepChecks motion_;
-  std::optional<LawCheck> law_;  // none for a task or another law than (55)
+  std::optional<LawCheck> law_;  // none for a task
   LawTerms law_terms_;           // the engine's
 };
 

@@ -54,6 +54,12 @@ LawCheck::LawCheck(const Setup& setup)
   barrier_weight_ = options.force.barrier_weight;
   slack_tolerance_ = options.force.slack_tolerance;
   residual_tolerance_ = options.force.residual_tolerance;
+  const int n = setup.model().num_velocities();
+  const int k = 3 * static_cast<int>(setup.fingertips().size());
+  if (options.law != ControlLaw::kComputedTorque) {
+    baseline_ = std::make_unique<BaselineReference>(options.law, options.stiffness, n, k);
+    has_error_dynamics_ = options.law == ControlLaw::kOperationalSpace;
+  }
   trajectory_ = setup.scenario().trajectory(setup.X_start() + setup.scenario().start_error);
   force_.setZero(setup.model().num_velocities());
   difference_ = force_;
@@ -91,9 +97,19 @@ const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& f
   }
   force_ = terms.C_xi + terms.gravity + terms.friction;
   scale_ = std::max(Norm(force_), std::numeric_limits<double>::min());
-  CompareTorque(step);
-  CompareDemand(findings);
-  CompareGraspForce(step, terms);
+  if (baseline_) {
+    const Matrix6Xd& G_dot = step.model->grasp().G_dot();
+    if (!baseline_->Evaluate(spec_, reference_, terms, G_dot, desired, step.command.demand.F_N)) {
+      errors_ = {kInfinity, kInfinity, kInfinity, kInfinity};
+      return errors_;
+    }
+    CompareTorque(step, baseline_->force());
+    CompareGraspForce(step, terms, baseline_->f_c());
+  } else {
+    CompareTorque(step, reference_.force());
+    CompareDemand(findings);
+    CompareGraspForce(step, terms, reference_.f_c());
+  }
   if (follows_error()) FollowError(step, findings, terms, desired);
   return errors_;
 }
@@ -103,12 +119,14 @@ double LawCheck::CompareApplied(const StepRecord& step) {
          std::max(step.command.tau.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
 }
 
-void LawCheck::CompareTorque(const StepRecord& step) {
+void LawCheck::CompareTorque(const StepRecord& step, const VectorXd& force) {
   actuation_.CalcForce(step.command.tau, force_);
-  difference_ = force_ - reference_.force();
+  difference_ = force_ - force;
   const double relative = Norm(difference_) / scale_;
   errors_.torque = relative / reference_.condition_number();
-  if (relative > kTellingDifference) attribution_.Add(difference_, reference_.parts(), 1.0 / scale_);
+  // Only the printed law is known summand by summand.
+  if (!baseline_ && relative > kTellingDifference)
+    attribution_.Add(difference_, reference_.parts(), 1.0 / scale_);
 }
 
 void LawCheck::CompareDemand(const StepFindings& findings) {
@@ -125,8 +143,7 @@ void LawCheck::CompareDemand(const StepFindings& findings) {
   errors_.demand = std::max(0.0, std::max(motion, forces) / kappa - kSlipShare * slip);
 }
 
-void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms) {
-  const VectorXd& f_c = reference_.f_c();
+void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms, const VectorXd& f_c) {
   const VectorXd& F_N = step.command.demand.F_N;
   const double size = std::max(1.0, f_c.norm());
   const double null =

@@ -52,14 +52,19 @@ void ReadModel(const TomlValue& value, const std::filesystem::path& folder, Scen
   table.RejectUnused();
 }
 
-void ReadRigidPlant(TomlTable& table, PlantOptions* plant) {
+/// "engine", or one of the rigid plants, for which the engine's keys mean nothing.
+void ReadPlantType(TomlTable& table, PlantOptions* plant) {
+  const auto type = table.Find("type");
+  if (!type) return;
+  enum class Choice { kEngine, kRigid, kRigidEuler };
+  const auto choice = type->AsChoice<Choice>(
+      {{"engine", Choice::kEngine}, {"rigid", Choice::kRigid}, {"rigid_euler", Choice::kRigidEuler}});
+  if (choice == Choice::kEngine) return;
+  plant->type = PlantType::kRigid;
+  if (choice == Choice::kRigidEuler) plant->integrator = Integrator::kSemiImplicitEuler;
   for (const char* key : {"contact_time_constant", "contact_impedance", "impratio", "noslip_iterations",
                           "bonded", "implicit_damping", "floor_friction"}) {
     if (const auto value = table.Find(key)) value->Reject("has no meaning for a rigid plant");
-  }
-  if (const auto choice = table.Find("integrator")) {
-    plant->integrator = choice->AsChoice<Integrator>(
-        {{"rk4", Integrator::kRungeKutta4}, {"euler", Integrator::kSemiImplicitEuler}});
   }
 }
 
@@ -68,10 +73,7 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
   TomlTable table = value.AsTable();
   PlantOptions& plant = scenario->plant;
   scenario->mjcf_file = ReadPath(table, "mjcf", folder);
-  if (const auto type = table.Find("type")) {
-    plant.type = type->AsChoice<PlantType>({{"engine", PlantType::kEngine}, {"rigid", PlantType::kRigid}});
-  }
-  if (plant.type == PlantType::kRigid) ReadRigidPlant(table, &plant);
+  ReadPlantType(table, &plant);
   plant.time_step = ReadOr(table, "time_step", plant.time_step);
   plant.control_step = ReadOr(table, "control_step", 0.0, &TomlValue::AsNotNegative);
   plant.contact_time_constant = ReadOr(table, "contact_time_constant", 0.0, &TomlValue::AsNotNegative);

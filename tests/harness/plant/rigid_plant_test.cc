@@ -13,13 +13,13 @@
 #include "harness/plant/engine_plant.h"
 #include "tests/common/allocation_counter.h"
 #include "tests/common/matrix_near.h"
-#include "tests/harness/scenario/shipped_run.h"
+#include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing {
 namespace {
 
-const std::string kRigid = "plant.type=\"rigid\"";
-const std::string kEuler = "plant.integrator=\"euler\"";
+const std::string kRigid = "plant.type=rigid";
+const std::string kEuler = "plant.type=rigid_euler";
 
 class RigidPlantTest : public ::testing::Test {
  protected:
@@ -226,7 +226,7 @@ VectorXd Finish(std::vector<std::string> overrides) {
 
 // Side by side under the same law: what parts the two is how soft the engine's contacts are.
 TEST(RigidRun, TheEngineComesToItAsItsContactsBecomeStiff) {
-  const VectorXd rigid = Finish({kRigid, kEuler});
+  const VectorXd rigid = Finish({kEuler});
   const double soft = (Finish({"plant.contact_impedance=0.9"}) - rigid).norm();
   const double stiff = (Finish({"plant.contact_impedance=0.99"}) - rigid).norm();
   EXPECT_GT(soft, 1e-9);
