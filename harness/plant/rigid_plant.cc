@@ -12,6 +12,13 @@
 #include "controller/object/so3.h"
 
 namespace dexcheck {
+namespace {
+
+/// 1/s. Of Runge-Kutta's method; the stages of a step are off the constraints by h^2 and more, so a rate that
+/// grew as the step shrinks would cost two orders.
+constexpr double kStabilisationRate = 20.0;
+
+}  // namespace
 
 RigidPlant::RigidPlant(const RobotModel& model, const Adapter& adapter, std::span<const int> fingertips,
                        std::span<const Motor> motors, const RigidPlantOptions& options)
@@ -41,6 +48,7 @@ RigidPlant::RigidPlant(const RobotModel& model, const Adapter& adapter, std::spa
   }
   gaps_.assign(count, 0.0);
   gaps_before_ = gaps_;
+  overlaps_ = gaps_;
   g_o_cf_before_.assign(count, Pose::Identity());
   force_.setZero(n);
   tau_.setZero(n);
@@ -61,7 +69,9 @@ void RigidPlant::FindContacts() {
                                              : FindContact(tip, *surface_, X_of);
     state_.kappa[i] = found.kappa;
     gaps_[i] = found.gap;
+    overlaps_[i] = -found.gap;
   }
+  grasp_.SetOverlaps(overlaps_);
   has_contacts_ = true;
 }
 
@@ -72,8 +82,7 @@ void RigidPlant::Read(PlantReading* reading) {
   state.X_Bo = state_.X_Bo;
   state.V_Bo = state_.V_Bo;
   state.kappa = state_.kappa;
-  state.overlap.resize(gaps_.size());
-  for (size_t i = 0; i < gaps_.size(); ++i) state.overlap[i] = -gaps_[i];
+  state.overlap = overlaps_;
   reading->touch.fingertips = AllContacts(static_cast<int>(gaps_.size()));
   reading->touch.support_force = 0.0;
   reading->departure = BaseDeparture{};
@@ -134,12 +143,15 @@ void RigidPlant::Evaluate(const State& state, const Vector3d& turn, Rate* rate) 
   robot_.SetState(state.q, state.xi);
   robot_.CalcDynamics();
   grasp_.SetPose(robot_, state.X_Bo, state.V_Bo, state.kappa);
+  // d/dt r = -2 w r + [0; 0; w^2 g]
   const double h = options_.time_step;
-  stabilisation_ = -grasp_.slip() / h;
+  const bool euler = options_.integrator == Integrator::kSemiImplicitEuler;
+  const double w = euler ? 0.5 / h : kStabilisationRate;
+  stabilisation_ = -2.0 * w * grasp_.slip();
   // Velocities of half a step before satisfy (45) there: r(t - h/2) = r - h/2 dr/dt.
-  if (options_.integrator == Integrator::kSemiImplicitEuler) stabilisation_ += 0.5 * grasp_.slip_bias();
+  if (euler) stabilisation_ += w * h * grasp_.slip_bias();
   for (size_t i = 0; i < gaps_.size(); ++i) {
-    stabilisation_[3 * static_cast<Eigen::Index>(i) + 2] += gaps_[i] / (4.0 * h * h);
+    stabilisation_[3 * static_cast<Eigen::Index>(i) + 2] += w * w * gaps_[i];
   }
   const Prediction& motion = dynamics_.Predict(robot_, grasp_, force_, ObjectSupport::kHand, &stabilisation_);
   CalcCoordinateRates(state.q, state.xi, &rate->q_dot);
