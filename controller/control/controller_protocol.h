@@ -28,11 +28,13 @@
  *
  * and, when the program wants DEXCHECK_TERMS, the model's terms at that state (controller/NOTATION.md):
  *
- *   M_bar'                     n n
- *   C_bar' xi, gravity, friction   3 n
- *   J_B', J_B_dot' xi          k n, k
- *   G, G_dot^T V_o             6 k, k
+ *   M_bar', C_bar'             n n, n n
+ *   gravity, friction          n, n   parts of F_bar'
+ *   J_B', J_B_dot'             k n, k n
+ *   G, G_dot                   6 k, 6 k
  *   M_hat, C_hat V_o, N_o      36, 6, 6
+ *   sigma'                     n      of the posture task
+ *   E_bar'^-1                  4      its block of the wheels; a unit matrix without
  *
  * Doubles of STEP from the program: tau' (n), N m: right wheel, left wheel, then joints; after DEXCHECK_TELLS_F_N also the
  * internal force F_N (k), which a check of the law needs.

@@ -5,9 +5,11 @@
 #include <limits>
 #include <utility>
 
+#include "controller/common/toml_reader.h"
 #include "controller/control/trajectory_controller.h"
 #include "harness/plant/engine_plant.h"
 #include "harness/plant/rigid_plant.h"
+#include "harness/run/own_controller.h"
 
 namespace dexcheck {
 namespace {
@@ -49,12 +51,16 @@ std::unique_ptr<Plant> MakePlant(const Setup& setup) {
   return plant;
 }
 
-std::unique_ptr<Controller> MakeTrajectoryController(const Setup& setup) {
+Sampling MakeSampling(const Setup& setup) {
   const PlantOptions& plant = setup.scenario().plant;
-  const Sampling sampling = {.time_step = 2.0 * plant.velocity_age(),
-                             .hold = std::max(1L, std::lround(plant.control_step / plant.time_step))};
+  return {.time_step = 2.0 * plant.velocity_age(),
+          .hold = std::max(1L, std::lround(plant.control_step / plant.time_step))};
+}
+
+std::unique_ptr<Controller> MakeTrajectoryController(const Setup& setup) {
   return std::make_unique<TrajectoryController>(setup.model(), setup.fingertips(), setup.object().body,
-                                                setup.surface(), setup.MakeControllerOptions(), sampling);
+                                                setup.surface(), setup.MakeControllerOptions(),
+                                                MakeSampling(setup));
 }
 
 std::unique_ptr<PickAndPlaceController> MakeTaskController(const Setup& setup) {
@@ -77,6 +83,19 @@ LoopParts MakeLoopParts(const Setup& setup) {
     parts.controller = MakeTrajectoryController(setup);
   }
   parts.sensing.contact_error = setup.scenario().control.contact_error;
+  return parts;
+}
+
+LoopParts MakeLoopParts(const Setup& setup, const std::string& what, const std::filesystem::path& robot,
+                        double time_limit) {
+  const Scenario& scenario = setup.scenario();
+  if (scenario.task) throw InputError(scenario.source + ": task: is done by no other controller");
+  LoopParts parts = MakeLoopParts(setup);
+  parts.controller = MakeOwnController(
+      what, OwnControllerSetup{&setup.model(), setup.fingertips(), setup.object().body, &setup.surface(),
+                               setup.MakeControllerOptions(), MakeSampling(setup),
+                               ReadTextFile(robot.string()), scenario.text, time_limit});
+  parts.knows_law = scenario.control.names_law;
   return parts;
 }
 

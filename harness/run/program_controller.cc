@@ -6,7 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
+#include <Eigen/LU>
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -14,7 +14,7 @@
 
 #include "controller/common/text.h"
 #include "controller/control/controller_protocol.h"
-#include "harness/checks/law_terms.h"
+#include "controller/model/platform.h"
 #include "harness/plant/plant.h"
 
 extern char** environ;
@@ -22,6 +22,8 @@ extern char** environ;
 namespace dexcheck {
 namespace {
 
+// How much more time than for an answer a program has to start.
+constexpr double kGreetingShare = 10.0;
 // Time in which a program that has closed its output may end, s, before it is asked no more.
 constexpr double kEndTime = 0.5;
 
@@ -43,8 +45,10 @@ ProgramController::ProgramController(const std::string& command, const OwnContro
     : name_("controller " + Quote(command)),
       setup_(setup),
       model_(MakeModel(setup)),
-      terms_(setup.model->num_positions(), setup.model->num_velocities(),
-             3 * static_cast<int>(setup.fingertips.size())) {
+      sigma_prime_(VectorXd::Zero(setup.model->num_velocities())) {
+  if (setup.model->base().type == BaseType::kDifferentialDrive) {
+    wheels_inverse_ = CalcWheelRateMap(setup.model->base()).transpose().inverse();
+  }
   Start(command);
   try {
     Greet();
@@ -60,9 +64,7 @@ void ProgramController::Start(const std::string& command) {
     throw RunFailure(name_ + ": " + std::strerror(errno));
   }
   socket_ = ends[0];
-  const timeval limit = ToTime(setup_.time_limit);
-  setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof(limit));
-  setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof(limit));
+  SetTimeLimit(kGreetingShare * setup_.time_limit);
 
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -83,6 +85,13 @@ void ProgramController::Start(const std::string& command) {
   process_ = -1;
   close(socket_);
   throw RunFailure(name_ + ": " + std::strerror(error));
+}
+
+void ProgramController::SetTimeLimit(double seconds) {
+  time_limit_ = seconds;
+  const timeval limit = ToTime(seconds);
+  setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof(limit));
+  setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof(limit));
 }
 
 void ProgramController::Greet() {
@@ -120,8 +129,9 @@ void ProgramController::Greet() {
   tells_F_N_ = (answer.flags & DEXCHECK_TELLS_F_N) != 0;
   const size_t p = hello.positions, n = hello.velocities, N = count, k = 3 * N;
   size_t doubles = 1 + 18 + p + n + 12 + 6 + 6 + 5 * N + N + N + 1;
-  if (wants_terms_) doubles += n * n + 3 * n + k * n + k + 6 * k + k + 36 + 12;
+  if (wants_terms_) doubles += 2 * n * n + 2 * n + 2 * k * n + 12 * k + 36 + 12 + n + 4;
   request_.assign(1 + doubles, 0.0);
+  SetTimeLimit(setup_.time_limit);
 }
 
 ProgramController::~ProgramController() { Stop(); }
@@ -160,7 +170,7 @@ void ProgramController::Send(const void* data, size_t size) {
     const ssize_t sent = send(socket_, from, size, MSG_NOSIGNAL);
     if (sent < 0 && errno == EINTR) continue;
     if (sent < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
-      throw RunFailure(name_ + ": read nothing for " + FormatNumber(setup_.time_limit) + " s");
+      throw RunFailure(name_ + ": read nothing for " + FormatNumber(time_limit_) + " s");
     }
     if (sent < 0) {
       const std::string end = TellEnd();
@@ -177,7 +187,7 @@ void ProgramController::Receive(void* data, size_t size) {
     const ssize_t got = recv(socket_, to, size, MSG_WAITALL);
     if (got < 0 && errno == EINTR) continue;
     if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
-      throw RunFailure(name_ + ": did not answer within " + FormatNumber(setup_.time_limit) + " s");
+      throw RunFailure(name_ + ": did not answer within " + FormatNumber(time_limit_) + " s");
     }
     if (got <= 0) {
       const std::string end = TellEnd();
@@ -217,18 +227,22 @@ void ProgramController::FillRequest(const Reading& reading, double t, const Desi
   }
   request_[filled_++] = reading.touch.support_force;
   if (!wants_terms_) return;
-  ReadModelTerms(model_, state, &terms_);
-  add(terms_.M);
-  add(terms_.C_xi);
-  add(terms_.gravity);
-  add(terms_.friction);
-  add(terms_.J);
-  add(terms_.J_dot_xi);
-  add(terms_.G);
-  add(terms_.G_dot_T_V);
-  add(terms_.M_hat);
-  add(terms_.C_hat_V);
-  add(terms_.N_o);
+  const ModelTerms& robot = model_.robot();
+  const GraspTerms& grasp = model_.grasp();
+  setup_.options.posture.CalcAcceleration(state.q, state.xi, sigma_prime_);
+  add(robot.M());
+  add(robot.C());
+  add(robot.gravity());
+  add(robot.friction());
+  add(grasp.J_B());
+  add(grasp.J_B_dot());
+  add(grasp.G());
+  add(grasp.G_dot());
+  add(grasp.body().M_hat);
+  add(Vector6d(grasp.body().C_hat * grasp.V_Bo()));
+  add(grasp.body().N_o);
+  add(sigma_prime_);
+  add(wheels_inverse_);
 }
 
 void ProgramController::Begin(double /*t*/, const Reading& /*reading*/) {

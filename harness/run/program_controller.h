@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "controller/control/controller.h"
-#include "harness/checks/law_reference.h"
 #include "harness/run/own_controller.h"
 
 namespace dexcheck {
@@ -32,6 +31,7 @@ class ProgramController final : public Controller {
  private:
   void Start(const std::string& command);
   void Greet();
+  void SetTimeLimit(double seconds);
   void Stop();
   void Send(const void* data, size_t size);
   void Receive(void* data, size_t size);
@@ -42,9 +42,11 @@ class ProgramController final : public Controller {
   std::string name_;
   OwnControllerSetup setup_;
   GraspModel model_;
-  LawTerms terms_;
+  VectorXd sigma_prime_;                            // n
+  Matrix2d wheels_inverse_ = Matrix2d::Identity();  // of E_bar'
   const Trajectory* motion_ = nullptr;
   int socket_ = -1;
+  double time_limit_ = 0.0;  // s
   pid_t process_ = -1;
   bool wants_terms_ = false;
   bool tells_F_N_ = false;
