@@ -5,6 +5,8 @@
 #include <complex>
 #include <limits>
 
+#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 #include "harness/checks/step_check_table.h"
 
 namespace dexcheck {
@@ -18,8 +20,6 @@ constexpr double kLeastNullTolerance = 1e-9;
 // What slip changes in accelerations and forces, over the condition number, against the forces that it
 // changes.
 constexpr double kSlipShare = 10.0;
-// Torques that differ by more than this, relative, tell which part is wrong; less is rounding.
-constexpr double kTellingDifference = 1e-9;
 
 }  // namespace
 
@@ -46,7 +46,8 @@ LawCheck::LawCheck(const Setup& setup)
       velocity_age_(setup.scenario().plant.velocity_age()),
       hold_(std::max(1L, std::lround(setup.scenario().plant.control_step / time_step_))),
       actuation_(setup.model()),
-      reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())) {
+      reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())),
+      own_factor_(setup.model()) {
   const GraspControllerOptions options = setup.MakeControllerOptions();
   mu_ = options.mu;
   f_min_ = options.f_min;
@@ -114,6 +115,18 @@ const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& f
   return errors_;
 }
 
+double LawCheck::CompareUnsent(const StepRecord& step, const LawTerms& terms) {
+  own_factor_.Compute(terms.M);
+  mass_factor_ = &own_factor_;
+  errors_ = LawErrors{};
+  if (!reference_.Evaluate(spec_, terms, EvaluateDesired(step.time), step.command.demand.F_N))
+    return std::numeric_limits<double>::infinity();
+  force_ = terms.C_xi + terms.gravity + terms.friction;
+  scale_ = std::max(Norm(force_), std::numeric_limits<double>::min());
+  CompareTorque(step);
+  return errors_.torque;
+}
+
 double LawCheck::CompareApplied(const StepRecord& step) {
   return (step.response.motor_torques - step.command.tau).cwiseAbs().maxCoeff() /
          std::max(step.command.tau.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
@@ -124,8 +137,8 @@ void LawCheck::CompareTorque(const StepRecord& step, const VectorXd& force) {
   difference_ = force_ - force;
   const double relative = Norm(difference_) / scale_;
   errors_.torque = relative / reference_.condition_number();
-  // Only the printed law is known summand by summand.
-  if (!baseline_ && relative > kTellingDifference)
+  // Less is rounding, which tells nothing, and only the printed law is known summand by summand.
+  if (!baseline_ && errors_.torque > kLawTorqueBound)
     attribution_.Add(difference_, reference_.parts(), 1.0 / scale_);
 }
 
@@ -173,23 +186,28 @@ void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms, 
 
 void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                            const DesiredMotion& desired) {
-  const Matrix3d& R = terms.X_Bo.linear();
-  const Vector3d v = terms.V_Bo.head<3>();
   if (!follows_) {
-    p_ = terms.X_Bo.translation();
-    p_dot_ = R * v;
+    followed_ = {terms.X_Bo, terms.V_Bo, terms.X_o};
     follows_ = true;
   }
-  errors_.error_dynamics = (p_ - terms.X_Bo.translation()).norm();
-  // What the engine's object did beyond the rigid prediction, p_ddot = R (v_dot + omega x v).
-  const Vector3d missed = R * (step.response.V_Bo_dot.head<3>() - findings.V_Bo_dot_model.head<3>());
-  const Eigen::Array3d K_v = spec_.gains.K_v.head<3>();
-  const Eigen::Array3d K_p = spec_.gains.K_p.head<3>();
-  const Vector3d p_ddot = desired.X_d_ddot.head<3>() +
-                          (K_v * (desired.X_d_dot.head<3>() - p_dot_).array()).matrix() +
-                          (K_p * (desired.X_d.head<3>() - p_).array()).matrix() + missed;
-  p_dot_ += time_step_ * p_ddot;
-  p_ += time_step_ * p_dot_;
+  errors_.error_dynamics = (followed_.X_Bo.translation() - terms.X_Bo.translation()).norm();
+  errors_.orientation_dynamics =
+      LogSo3(followed_.X_Bo.linear().transpose() * terms.X_Bo.linear()).norm();
+  // Semi-implicit, as the plant: velocities first. v = R^T p_dot, hence p_ddot = R (v_dot + omega x v).
+  if (spec_.orientation == OrientationFeedback::kAngles)
+    followed_.X_o = CalcObjectCoordinates(followed_.X_Bo, followed_.X_o);
+  Vector6d V_dot = reference_.CalcDemand(spec_, followed_, desired);
+  // What the engine's object did beyond the rigid prediction.
+  V_dot += step.response.V_Bo_dot - findings.V_Bo_dot_model;
+  Matrix3d R = followed_.X_Bo.linear();
+  const Vector3d v = followed_.V_Bo.head<3>();
+  Vector3d omega = followed_.V_Bo.tail<3>();
+  const Vector3d p_dot = R * (v + time_step_ * (V_dot.head<3>() + omega.cross(v)));
+  omega += time_step_ * V_dot.tail<3>();
+  R = R * ExpSo3(time_step_ * omega);
+  followed_.X_Bo.translation() += time_step_ * p_dot;
+  followed_.X_Bo.linear() = Eigen::Quaterniond(R).normalized().toRotationMatrix();
+  followed_.V_Bo << followed_.X_Bo.linear().transpose() * p_dot, omega;
 }
 
 }  // namespace dexcheck

@@ -29,6 +29,7 @@ struct LawErrors {
   /// Object's position against (57) integrated from t = 0 and driven by the accelerations that the prediction
   /// missed, m.
   double error_dynamics = 0.0;
+  double orientation_dynamics = 0.0;  ///< Its orientation likewise, rad.
 };
 
 /// Largest magnitude of the eigenvalues of (57), per time step, when the command is held for `hold` steps: 1
@@ -67,6 +68,8 @@ class LawCheck {
   /// @param findings of the same step: what the rigid system does under its torques.
   const LawErrors& Compare(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                            const TreeFactor& mass_factor);
+  /// The torques alone, for a step that the motors refuse: nothing is known of what they would do.
+  double CompareUnsent(const StepRecord& step, const LawTerms& terms);
   /// Largest |tau' received - tau' sent| over the largest |tau'|.
   [[nodiscard]] static double CompareApplied(const StepRecord& step);
 
@@ -95,13 +98,13 @@ class LawCheck {
   LawAttribution attribution_;
   LawErrors errors_;
   const TreeFactor* mass_factor_ = nullptr;
+  TreeFactor own_factor_;  // of a step without prediction
   double scale_ = 1.0;
   VectorXd force_, difference_;        // n
   VectorXd slope_;                     // k
   RowMatrixXd column_;                 // n x 1
-  bool follows_ = false;               // whether the two below are set
-  Vector3d p_ = Vector3d::Zero();      // of (57), m
-  Vector3d p_dot_ = Vector3d::Zero();  // m/s, half a step before
+  bool follows_ = false;               // whether the one below is set
+  ObjectState followed_;               // of (57); velocities half a step before
 };
 
 }  // namespace dexcheck

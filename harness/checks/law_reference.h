@@ -56,6 +56,13 @@ struct LawTerms {
   LawTerms(int num_positions, int num_velocities, int num_forces);
 };
 
+/// The object's part of it.
+struct ObjectState {
+  Pose X_Bo = Pose::Identity();
+  Vector6d V_Bo = Vector6d::Zero();
+  Vector6d X_o = Vector6d::Zero();  ///< kAngles only.
+};
+
 /// What the law is meant to be.
 struct LawSpec {
   ObjectGains gains;
@@ -79,7 +86,10 @@ enum class LawPart {
   kCoriolis,          ///< C_bar' xi_c
   kGravity,           ///< gravity's part of F_bar'
   kFriction,          ///< friction's part of F_bar'
-  kObjectInertia,     ///< J^T G^+ M_hat V_o_dot
+  kInertiaOfFeedForward,  ///< J^T G^+ M_hat V_o_dot, of the first summand of V_o_dot,
+  kInertiaOfVelocity,     ///< of the second,
+  kInertiaOfPosition,     ///< of the third,
+  kInertiaOfRate,         ///< and of the fourth.
   kObjectCoriolis,    ///< J^T G^+ C_hat V_o
   kObjectGravity,     ///< J^T G^+ N_o
   kInternalForce,     ///< J^T F_N
@@ -106,6 +116,9 @@ class LawReference {
   bool Evaluate(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired,
                 const Eigen::Ref<const VectorXd>& F_N);
 
+  /// V_o_dot that (55) demands of an object in this state, wherever the robot is.
+  Vector6d CalcDemand(const LawSpec& spec, const ObjectState& object, const DesiredMotion& desired);
+
   /// E_bar' tau' (n), and its summands (n x kLawPartCount).
   [[nodiscard]] const VectorXd& force() const { return force_; }
   [[nodiscard]] const MatrixXd& parts() const { return parts_; }
@@ -128,7 +141,7 @@ class LawReference {
 
  private:
   [[nodiscard]] bool FactorJacobian(const LawSpec& spec, const LawTerms& terms);
-  void CalcObjectAcceleration(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired);
+  void CalcObjectAcceleration(const LawSpec& spec, const ObjectState& object, const DesiredMotion& desired);
   void AddMotionPart(LawPart part, const LawTerms& terms, const Eigen::Ref<const VectorXd>& rates);
 
   MatrixXd J_plus_;     // n x k

@@ -3,6 +3,7 @@
 // What a scenario puts into the loop.
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -22,6 +23,8 @@ struct LoopParts {
   const PickAndPlaceController* task = nullptr;  ///< The controller, when it does a task.
   bool knows_law = true;                         ///< Whether the controller's law is the scenario's.
   SensingOptions sensing;
+  /// Changes what the controller is told at time t besides, as no scenario says; empty for nothing.
+  std::function<void(double t, MeasuredState* told)> hidden_sensor_fault;
 };
 
 /// The parts that the scenario names, robot and object where it starts.

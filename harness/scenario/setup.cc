@@ -59,13 +59,15 @@ Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const
 
 Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
              MjModelPtr engine)
+    : Setup(scenario, ReadModel(scenario, robot), mjcf, std::move(engine)) {}
+
+Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::path& mjcf, MjModelPtr engine)
     : scenario_(scenario),
-      model_(ReadModel(scenario, robot)),
-      plant_model_(ReadPlantModel(scenario, robot)),
+      model_(std::move(model)),
+      plant_model_(ReadPlantModel(scenario, model_.spec().source)),
       engine_(std::move(engine)) {
-  if (!model_.object()) {
-    throw InputError(robot.string() + ": object: is missing, and the scenario holds one");
-  }
+  const std::string& robot = model_.spec().source;
+  if (!model_.object()) throw InputError(robot + ": object: is missing, and the scenario holds one");
   RemoveLooks(engine_.get());
   adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
   gate_ = RunStaticGate(*adapter_);
@@ -73,7 +75,7 @@ Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const
   try {
     surface_ = MakeSurface(model_.object()->shape);
   } catch (const std::invalid_argument& error) {
-    throw InputError(robot.string() + ": " + error.what());
+    throw InputError(robot + ": " + error.what());
   }
   FindFingertips();
   FindGrasp();

@@ -29,6 +29,8 @@ class Setup {
   /// The same with the scene compiled already, which is most of the work. @param mjcf names it in messages.
   Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
         MjModelPtr engine);
+  /// The same with the robot read already. Overrides of its parameters are not applied again.
+  Setup(const Scenario& scenario, RobotModel model, const std::filesystem::path& mjcf, MjModelPtr engine);
   Setup(const Setup&) = delete;
   Setup& operator=(const Setup&) = delete;
 
