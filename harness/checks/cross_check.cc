@@ -7,7 +7,7 @@
 
 namespace dexcheck {
 
-CrossCheck::CrossCheck(const Setup& setup)
+CrossCheck::CrossCheck(const Setup& setup, bool knows_law)
     : setup_(&setup),
       model_(setup.adapter(), setup.fingertips(), setup.scenario().control.orientation),
       motion_(setup),
@@ -16,11 +16,13 @@ CrossCheck::CrossCheck(const Setup& setup)
       motors_(setup.model(), setup.scenario().plant.time_step),
       sensors_(setup.model(), setup.fingertips(), setup.scenario().plant.time_step) {
   if (!setup.bonds().empty()) model_.LeaveOutContacts();
-  if (!setup.scenario().task) law_.emplace(setup);
+  if (!setup.scenario().task && knows_law) law_.emplace(setup);
   using enum StepCheck;
   if (!law_) {
     for (const StepCheck check : {kGains, kLawTorque, kLawDemand, kGraspForce}) motion_.LeaveOut(check);
   }
+  if (law_ && !law_->has_error_dynamics()) motion_.LeaveOut(kGains);
+  if (law_ && !law_->has_demand()) motion_.LeaveOut(kLawDemand);
   if (!law_ || !law_->follows_error()) {
     motion_.LeaveOut(kErrorDynamics);
     motion_.LeaveOut(kOrientationDynamics);

@@ -21,7 +21,8 @@ namespace dexcheck {
 class CrossCheck {
  public:
   /// @throws InputError as EngineStep, or when a bound of the scenario has the name of no check.
-  explicit CrossCheck(const Setup& setup);
+  /// @param knows_law whether the controller's law is the scenario's; otherwise no check of the law is made.
+  explicit CrossCheck(const Setup& setup, bool knows_law = true);
 
   /// The first question: are the terms that the controller used the engine's?
   void CompareModel(const StepRecord& step);
@@ -54,7 +55,7 @@ class CrossCheck {
   const Setup* setup_;
   StepModelCheck model_;
   StepChecks motion_;
-  std::optional<LawCheck> law_;  // none for a task
+  std::optional<LawCheck> law_;  // none for a task, or an unknown law
   LawTerms law_terms_;           // the engine's
   std::vector<CheckRecord> settling_failures_;
   MotorEvidence motors_;

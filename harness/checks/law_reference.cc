@@ -48,8 +48,8 @@ constexpr LawPartName kLawParts[] = {
     {"tau'", "all torques", (1U << kLawPartCount) - 1U},
 };
 
-/// Body angular velocity by the rates of ZYZ angles: omega = B [alpha_dot; beta_dot; gamma_dot], R = R_z R_y
-/// R_z.
+}  // namespace
+
 Matrix3d CalcAngleMap(const Vector3d& angles) {
   const double sb = std::sin(angles[1]), cb = std::cos(angles[1]);
   const double sg = std::sin(angles[2]), cg = std::cos(angles[2]);
@@ -58,7 +58,6 @@ Matrix3d CalcAngleMap(const Vector3d& angles) {
   return B;
 }
 
-/// Its rate.
 Matrix3d CalcAngleMapRate(const Vector3d& angles, const Vector3d& rates) {
   const double sb = std::sin(angles[1]), cb = std::cos(angles[1]);
   const double sg = std::sin(angles[2]), cg = std::cos(angles[2]);
@@ -68,8 +67,6 @@ Matrix3d CalcAngleMapRate(const Vector3d& angles, const Vector3d& rates) {
       0.0;
   return B_dot;
 }
-
-}  // namespace
 
 LawSpec MakeLawSpec(const GraspControllerOptions& options) {
   return {options.gains, options.orientation, options.weight, options.posture};
@@ -130,6 +127,10 @@ bool LawReference::FactorJacobian(const LawSpec& spec, const LawTerms& terms) {
   G_ = terms.G;
   G_llt_.compute(G_ * G_.transpose());
   return G_llt_.info() == Eigen::Success && std::isfinite(condition_number_);
+}
+
+void LawReference::AddLeastForces(const Vector6d& F_o, VectorXd* f_c) const {
+  f_c->noalias() += G_.transpose() * G_llt_.solve(F_o);
 }
 
 Vector6d LawReference::SolveGrasp(const Eigen::Ref<const VectorXd>& f) const { return G_llt_.solve(G_ * f); }

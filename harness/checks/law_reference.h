@@ -26,6 +26,12 @@
 
 namespace dexcheck {
 
+/// Body angular velocity by the rates of ZYZ angles: omega = B [alpha_dot; beta_dot; gamma_dot], R = R_z R_y
+/// R_z.
+Matrix3d CalcAngleMap(const Vector3d& angles);
+/// Its rate.
+Matrix3d CalcAngleMapRate(const Vector3d& angles, const Vector3d& rates);
+
 /// Robot, object and contacts at one state, by either side. n entries of xi, k = 3N of f_c; contact forces
 /// and J in each Sigma_cf, the object in Sigma_o.
 struct LawTerms {
@@ -126,6 +132,10 @@ class LawReference {
   /// contacts slip.
   [[nodiscard]] const VectorXd& slip_coriolis() const { return slip_coriolis_; }
   [[nodiscard]] const VectorXd& slip_inertia() const { return slip_inertia_; }
+  /// J^+ (n x k) of (47).
+  [[nodiscard]] const MatrixXd& J_plus() const { return J_plus_; }
+  /// Adds G^+ F_o (k) to contact forces.
+  void AddLeastForces(const Vector6d& F_o, VectorXd* f_c) const;
   /// (G G^T)^-1 G f (k -> 6): the wrench-free part of f is f - G^T of this.
   [[nodiscard]] Vector6d SolveGrasp(const Eigen::Ref<const VectorXd>& f) const;
 

@@ -97,6 +97,9 @@ void StepChecks::SetApplying() {
   leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kRolling, kTractionUse});
   leave_out(setup_->model().base().type == BaseType::kFixed, {kBaseTilt});
   leave_out(setup_->idle_joints().empty(), {kIdleJoints});
+  // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
+  leave_out(setup_->scenario().plant.type == PlantType::kRigid,
+            {kWheelSlip, kWheelSlipRate, kTractionUse, kBaseTilt, kSolver});
   const mjModel& engine = setup_->engine();
   const mjtByte* const limited = engine.actuator_ctrllimited;
   leave_out(std::none_of(limited, limited + engine.nu, [](mjtByte flag) { return flag != 0; }), {kActuators});

@@ -66,9 +66,13 @@ std::vector<Motor> EngineSimulation::ListMotors() const {
   std::vector<Motor> motors;
   for (const int motor : motors_) {
     const double gear = std::abs(model_->actuator_gear[6 * motor]);
-    const mjtNum* range = model_->actuator_ctrlrange + 2 * motor;
-    const double limit = model_->actuator_ctrllimited[motor] != 0 ? gear * std::min(-range[0], range[1])
-                                                                  : std::numeric_limits<double>::infinity();
+    double limit = std::numeric_limits<double>::infinity();
+    // The engine cuts off the control and, of a motor with gain 1, the force alike.
+    const auto cut = [&](mjtByte limited, const mjtNum* range) {
+      if (limited != 0) limit = std::min(limit, gear * std::min(-range[0], range[1]));
+    };
+    cut(model_->actuator_ctrllimited[motor], model_->actuator_ctrlrange + 2 * motor);
+    cut(model_->actuator_forcelimited[motor], model_->actuator_forcerange + 2 * motor);
     motors.push_back({NameOf(*model_, mjOBJ_JOINT, model_->actuator_trnid[2 * motor]), limit});
   }
   return motors;

@@ -37,7 +37,7 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
       num_steps_(std::lround(setup.scenario().duration / setup.scenario().plant.time_step)) {
   const Scenario& scenario = setup.scenario();
   StepChecks::RequireKnownBounds(scenario);
-  if (check) checks_.emplace(setup);
+  if (check) checks_.emplace(setup, parts.knows_law);
   record_.model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);

@@ -163,25 +163,25 @@ TEST(LawCheck, SampledRadiusIsThatOfTheRecursion) {
   ObjectGains gains;
   gains.K_v.setConstant(30.0);
   gains.K_p.setConstant(700.0);
-  for (const long hold : {1L, 4L}) {
-    const double dt = 1e-3;
+  const double dt = 1e-3;
+  for (const auto& [hold, age] : {std::pair(1L, 0.5 * dt), {4L, 0.5 * dt}, {1L, 0.0}, {4L, 0.0}}) {
     double e = 1.0, v = 0.3, u = 0.0;
     double last = 0.0;
     constexpr long kSteps = 4000;
     for (long i = 0; i < kSteps; ++i) {
       if (i % hold == 0) u = -30.0 * v - 700.0 * e;
       if (i == kSteps / 2) last = std::hypot(e, v);
+      e += dt * (v + dt * u * (0.5 + age / dt));
       v += dt * u;
-      e += dt * v;
     }
     // The envelope of a damped oscillation: its phase leaves some hundredths over 2000 steps.
     const double measured = std::pow(std::hypot(e, v) / last, 2.0 / static_cast<double>(kSteps));
-    EXPECT_NEAR(CalcSampledRadius(gains, dt, hold), measured, 3e-3) << hold;
+    EXPECT_NEAR(CalcSampledRadius(gains, dt, hold, age), measured, 3e-3) << hold;
   }
   gains.K_p.setZero();
-  EXPECT_NEAR(CalcSampledRadius(gains, 1e-3, 1), 1.0, 1e-12);
+  EXPECT_NEAR(CalcSampledRadius(gains, 1e-3, 1, 0.5e-3), 1.0, 1e-12);
   gains.K_v.setConstant(2100.0);
-  EXPECT_GT(CalcSampledRadius(gains, 1e-3, 1), 1.0);
+  EXPECT_GT(CalcSampledRadius(gains, 1e-3, 1, 0.5e-3), 1.0);
 }
 
 }  // namespace
