@@ -15,6 +15,8 @@ constexpr double kExplains = 0.95;
 constexpr double kSimpler = 0.02;
 // The first steps are looked at, then every one that is a power of two away.
 constexpr long kFirstSteps = 8;
+// Directions in which a link moves less than this share of the others do not count.
+constexpr double kSingular = 1e-3;
 // Gravity whose size differs by less than this share of its change only points elsewhere.
 constexpr double kTilted = 0.2;
 
@@ -75,7 +77,9 @@ void ForceEvidence::AddLinks(const RowMatrixXd& half_inverse, const VectorXd& y,
   for (size_t i = 0; i < links_.size(); ++i) {
     const MatrixXd columns = half_inverse * link_jacobians_[i].transpose();
     // A base on wheels moves in some directions only: least squares of least norm.
-    const Vector3d force = columns.completeOrthogonalDecomposition().solve(y);
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
+    decomposition.setThreshold(kSingular);
+    const Vector3d force = decomposition.compute(columns).solve(y);
     links_[i].square += weight * (columns * force).squaredNorm();
     links_[i].largest = std::max(links_[i].largest, force.norm());
   }
@@ -124,7 +128,15 @@ ForceFinding ForceEvidence::Find() const {
     finding.joint = joint.name;
     finding.joint_share = joint.square / robot_squares_;
     finding.torque = joint.largest;
-    const Candidate& link = *std::max_element(links_.begin(), links_.end(), larger);
+    // Of links that explain it equally well, the one where the least force does: bodies near the base, which a chain of
+    // joints carries along, move in few directions, and a huge force there may look the same.
+    const double best = std::max_element(links_.begin(), links_.end(), larger)->square;
+    const Candidate* least = nullptr;
+    for (const Candidate& one : links_) {
+      if (one.square < (1.0 - kSimpler) * best) continue;
+      if (least == nullptr || one.largest < least->largest) least = &one;
+    }
+    const Candidate& link = *least;
     finding.link = link.name;
     finding.link_share = link.square / robot_squares_;
     finding.link_force = link.largest;

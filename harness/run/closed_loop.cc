@@ -16,7 +16,7 @@ double Seconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-constexpr double kRoughTime = 0.02;      // s after the first contact
+constexpr double kRoughTime = 0.1;       // s after the first contact
 constexpr long kStepsPerModelCheck = 20;  // while everything settles
 constexpr double kLargestSkew = 1e-2;    // rad between the platform's heading and the way ahead
 constexpr double kSettleMoving = 0.5;    // s

@@ -18,9 +18,9 @@ const std::string kRobot = SourcePath("/controller/parameters/assistant_robot.to
 const std::string kScene = SourcePath("/mjcf/scene.xml");
 const auto kGoOn = [] { return false; };
 
-/// A short campaign in the curve.
-RunCampaign MakeCampaign(const RunMutationOptions& options) {
-  return {ReadShippedScenario("curve", {"settle=0.2"}), kRobot, kScene, options, kGoOn};
+/// A short campaign.
+RunCampaign MakeCampaign(const RunMutationOptions& options, const char* scenario = "curve") {
+  return {ReadShippedScenario(scenario, {"settle=0.2"}), kRobot, kScene, options, kGoOn};
 }
 
 /// How many of the campaign's mistakes came to what.
@@ -56,13 +56,16 @@ TEST(RunCampaign, FindsEveryWrongLawAndNamesThePart) {
   options.duration = 0.02;
   options.parameters = 0;
   options.plants = false;
-  RunCampaign campaign = MakeCampaign(options);
-  const Count laws = RunSome(&campaign, [](const RunMutant&) { return true; });
-  EXPECT_GE(laws.made, 55);
-  EXPECT_EQ(laws.killed, laws.made);
-  EXPECT_EQ(laws.cause, laws.made);
-  EXPECT_EQ(laws.with_part, 45);
-  EXPECT_GE(laws.part, 43);
+  for (const char* scenario : {"curve", "exercise"}) {
+    SCOPED_TRACE(scenario);
+    RunCampaign campaign = MakeCampaign(options, scenario);
+    const Count laws = RunSome(&campaign, [](const RunMutant&) { return true; });
+    EXPECT_GE(laws.made, 55);
+    EXPECT_EQ(laws.killed, laws.made);
+    EXPECT_EQ(laws.cause, laws.made);
+    EXPECT_EQ(laws.with_part, 45);
+    EXPECT_GE(laws.part, 43);
+  }
 }
 
 TEST(RunCampaign, FindsFaultsOfPlantsAndTheirCauses) {
