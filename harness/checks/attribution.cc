@@ -49,9 +49,15 @@ const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
     if (!check.failed || MeaningOf(check).cause == Cause::kNone) continue;
     if (first == nullptr || TellsMore(check, *first)) first = &check;
   }
-  // Wheels of another size give other forces besides, which show before they have rolled far. Wheels that slide do too.
+  // What slides in the step in which a force shows tells more than the force. Wheels of another size give other forces
+  // besides, which show before they have rolled far; wheels that slide do too.
   const auto name = [](StepCheck which) { return kStepChecks[static_cast<size_t>(which)].name; };
   if (first == nullptr || first->name != name(StepCheck::kBalanceRobot)) return first;
+  for (const StepCheck slides : {StepCheck::kConeUse, StepCheck::kTractionUse, StepCheck::kContactsLost}) {
+    for (const CheckRecord& check : steps) {
+      if (check.name == name(slides) && check.failed && check.failed_at <= first->failed_at) return &check;
+    }
+  }
   if (!Failed(steps, name(StepCheck::kRolling)) || Failed(steps, name(StepCheck::kTractionUse))) return first;
   return &*std::find_if(steps.begin(), steps.end(),
                         [&](const CheckRecord& check) { return check.name == name(StepCheck::kRolling); });

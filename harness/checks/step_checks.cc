@@ -342,8 +342,10 @@ void StepChecks::CompareRolling(const StepRecord& step) {
   const Vector2d mismatch = wheels_.CalcMismatch(xi, rates);
   double beyond = 0.0;
   for (size_t k = 0; k < 2; ++k) {
-    beyond = std::max(beyond, std::abs(mismatch[static_cast<Eigen::Index>(k)]) -
-                                  step.response.wheels[k].slip.norm());
+    // A tyre that gives rolls on a radius that is smaller by as much.
+    const BodyContact& wheel = step.response.wheels[k];
+    const double sunk = std::max(0.0, -wheel.distance) * std::abs(rates[static_cast<Eigen::Index>(k)]);
+    beyond = std::max(beyond, std::abs(mismatch[static_cast<Eigen::Index>(k)]) - wheel.slip.norm() - sunk);
   }
   Add(StepCheck::kRolling, beyond);
   if (!(beyond <= check(StepCheck::kRolling).bound)) wheels_.Add(xi, rates);

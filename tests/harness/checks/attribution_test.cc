@@ -197,8 +197,8 @@ TEST(Attribute, AForceOnTheRobotAndWhatSlidesAreToldByTime) {
                                          .Explain();
     EXPECT_EQ(result.cause, force_first ? Cause::kUnmodelledForce : Cause::kWheelSlip);
   }
-  // A force that makes something slide in the same step was there before it slid; what pushes at a stop is the stop.
-  EXPECT_EQ(FakeRun().Fail("balance_robot", 0.1).Fail("cone_use", 0.1).Explain().cause, Cause::kUnmodelledForce);
+  // What slides in the same step tells; what pushes at a stop is the stop.
+  EXPECT_EQ(FakeRun().Fail("balance_robot", 0.1).Fail("cone_use", 0.1).Explain().cause, Cause::kFingertipSlip);
   EXPECT_EQ(FakeRun().Fail("balance_robot", 0.1).Fail("joint_stop", 0.1).Explain().cause, Cause::kJointStop);
 }
 

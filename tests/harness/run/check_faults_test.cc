@@ -49,6 +49,7 @@ const CheckFault kFaults[] = {
     {"fingertip_slip_rate", "hold", {"duration=0.02", "plant.impratio=1"}},
     {"wheel_slip", "paper-rest", kShort},
     {"wheel_slip_rate", "paper-rest", kShort},
+    {"rolling", "paper-ramp", {"duration=1", "settle=0.3", "model.base.wheel_radius=0.1002"}},
     {"cone_use", "hold", kSlippery},
     {"traction_use", "paper-rest", kShort},
     {"contacts_lost", "hold", kSlippery},
