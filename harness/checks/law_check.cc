@@ -119,11 +119,16 @@ double LawCheck::CompareUnsent(const StepRecord& step, const LawTerms& terms) {
   own_factor_.Compute(terms.M);
   mass_factor_ = &own_factor_;
   errors_ = LawErrors{};
-  if (!reference_.Evaluate(spec_, terms, EvaluateDesired(step.time), step.command.demand.F_N))
+  const DesiredMotion desired = EvaluateDesired(step.time);
+  const VectorXd& F_N = step.command.demand.F_N;
+  if (!reference_.Evaluate(spec_, terms, desired, F_N) ||
+      (baseline_ &&
+       !baseline_->Evaluate(spec_, reference_, terms, step.model->grasp().G_dot(), desired, F_N))) {
     return std::numeric_limits<double>::infinity();
+  }
   force_ = terms.C_xi + terms.gravity + terms.friction;
   scale_ = std::max(Norm(force_), std::numeric_limits<double>::min());
-  CompareTorque(step, reference_.force());
+  CompareTorque(step, baseline_ ? baseline_->force() : reference_.force());
   return errors_.torque;
 }
 
@@ -191,8 +196,9 @@ void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings,
     follows_ = true;
   }
   errors_.error_dynamics = (followed_.X_Bo.translation() - terms.X_Bo.translation()).norm();
-  errors_.orientation_dynamics =
-      LogSo3(followed_.X_Bo.linear().transpose() * terms.X_Bo.linear()).norm();
+  const Matrix3d D = followed_.X_Bo.linear().transpose() * terms.X_Bo.linear();
+  const Vector3d twice_sine(D(2, 1) - D(1, 2), D(0, 2) - D(2, 0), D(1, 0) - D(0, 1));
+  errors_.orientation_dynamics = std::atan2(0.5 * twice_sine.norm(), 0.5 * (D.trace() - 1.0));
   // Semi-implicit, as the plant: velocities first. v = R^T p_dot, hence p_ddot = R (v_dot + omega x v).
   if (spec_.orientation == OrientationFeedback::kAngles)
     followed_.X_o = CalcObjectCoordinates(followed_.X_Bo, followed_.X_o);
