@@ -55,6 +55,16 @@ TEST(ShippedScenarios, PaperFollowsTheLine) {
   EXPECT_NEAR(way, 10.0 - 1e-3, 1e-6);
 }
 
+TEST(ShippedScenarios, PaperRigidFollowsTheLineToRounding) {
+  ShippedRun run("paper-rigid", {"duration=1"});
+  const RunResult& result = run.Run();
+  ExpectPass(run, result);
+  EXPECT_LE(result.tracking.position_max(), 1e-11);    // measured 5e-13
+  EXPECT_LE(result.tracking.orientation_max(), 1e-9);  // measured 4e-11
+  EXPECT_FALSE(run.loop().checks().Find("traction_use").applies);
+  EXPECT_GT(run.loop().checks().Find("law_torque").count, 0);
+}
+
 TEST(ShippedScenarios, PaperRampFollowsTheLine) {
   ShippedRun run("paper-ramp", {"duration=5"});
   const RunResult& result = run.Run();
