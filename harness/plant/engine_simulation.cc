@@ -100,6 +100,12 @@ void EngineSimulation::CheckHealth(double expected_time) const {
       "the simulation's state is not finite after t = " + FormatNumber(expected_time - time_step()) + " s");
 }
 
+void EngineSimulation::Change(const std::function<void(mjModel*)>& change) {
+  change(model_.get());
+  const MjDataPtr scratch = MakeData(*model_);
+  mj_setConst(model_.get(), scratch.get());
+}
+
 EngineState EngineSimulation::GetState() const {
   return {Copy(data_->qpos, model_->nq), Copy(data_->qvel, model_->nv), Copy(data_->act, model_->na),
           Copy(data_->qacc_warmstart, model_->nv), data_->time};
