@@ -27,7 +27,7 @@ constexpr char kTaken = 't';
 
 }  // namespace
 
-void FrameLine::Unmap::operator()(std::uint8_t* slots) const { ::munmap(slots, size); }
+void UnmapMemory::operator()(std::uint8_t* memory) const { ::munmap(memory, size); }
 
 FrameLine::FrameLine(const std::function<Painter()>& make_painter, long frames, int workers, int width,
                      int height)
@@ -38,7 +38,7 @@ FrameLine::FrameLine(const std::function<Painter()>& make_painter, long frames, 
   void* memory = ::mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED)
     throw Error(std::string("drawing: no memory for pictures: ") + std::strerror(errno));
-  slots_ = {static_cast<std::uint8_t*>(memory), Unmap{size_}};
+  slots_ = {static_cast<std::uint8_t*>(memory), UnmapMemory{size_}};
   for (long k = 0; k < num_workers_; ++k) {
     workers_.emplace_back("drawing: a process", [&](int channel) { return Work(make_painter, k, channel); });
   }

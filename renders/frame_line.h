@@ -13,6 +13,12 @@
 
 namespace dexcheck {
 
+/// Gives memory that processes share back to the system.
+struct UnmapMemory {
+  std::size_t size = 0;  ///< Bytes.
+  void operator()(std::uint8_t* memory) const;
+};
+
 /// Processes that draw the frames of a film, each every n-th, and hand them over in order. Threads would wait
 /// for each other: OSMesa has one rasterizer for all contexts of a process and locks it for each picture. The
 /// processes end with the line.
@@ -28,16 +34,13 @@ class FrameLine {
   /// @param width, height of all pictures.
   /// @throws Error when there is no memory for pictures or no process can be made.
   FrameLine(const std::function<Painter()>& make_painter, long frames, int workers, int width, int height);
+
   /// The next frame, at most `frames` times. At most two frames of each process wait to be taken.
   /// @throws what the frame's process threw: InputError and std::invalid_argument as such, everything else
   /// as Error; also Error when the process died.
   Image Take();
 
  private:
-  struct Unmap {
-    std::size_t size = 0;  // bytes
-    void operator()(std::uint8_t* slots) const;
-  };
   bool Work(const std::function<Painter()>& make_painter, long first, int channel) const;
   void Draw(const std::function<Painter()>& make_painter, long first, int channel) const;
   [[nodiscard]] std::uint8_t* FindSlot(long frame) const;
@@ -48,9 +51,9 @@ class FrameLine {
   int width_;
   int height_;
   long taken_ = 0;
-  std::size_t size_ = 0;                          // bytes of all slots
-  std::unique_ptr<std::uint8_t[], Unmap> slots_;  // shared by all processes
-  std::vector<WorkerProcess> workers_;            // tell of drawn frames, and are told of those taken
+  std::size_t size_ = 0;                                // bytes of all slots
+  std::unique_ptr<std::uint8_t[], UnmapMemory> slots_;  // shared by all processes
+  std::vector<WorkerProcess> workers_;                  // tell of drawn frames, and are told of those taken
 };
 
 }  // namespace dexcheck
