@@ -252,6 +252,25 @@ bool IsGeometric(ParameterKind kind) {
   }
 }
 
+bool IsDynamic(ParameterKind kind) {
+  switch (kind) {
+    case Kind::kMass:
+    case Kind::kCom:
+    case Kind::kInertia:
+    case Kind::kDamping:
+    case Kind::kArmature:
+    case Kind::kGravity:
+    case Kind::kWheelMass:
+    case Kind::kWheelSpinInertia:
+    case Kind::kWheelTransverseInertia:
+    case Kind::kWheelArmature:
+    case Kind::kWheelDamping:
+      return true;
+    default:
+      return false;
+  }
+}
+
 double GetScale(const RobotSpec& spec, const Parameter& p) {
   const double size = std::abs(GetValue(spec, p));
   if (IsTensor(p)) {

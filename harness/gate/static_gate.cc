@@ -6,9 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "harness/gate/engine_only.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/torus_collision.h"
+#include "harness/engine/wheel_inertia.h"
+#include "harness/gate/engine_only.h"
 
 namespace dexcheck {
 namespace {
@@ -126,15 +127,7 @@ class StaticGate {
       Compare("wheel_mass", where, base.wheel.mass, engine_.body_mass[engine_.jnt_bodyid[wheel.joint]]);
     });
     each([&](const EngineWheel& wheel, const Location& where, double) {
-      // Of the wheel's body, about the hinge axis.
-      const int body = engine_.jnt_bodyid[wheel.joint];
-      mjtNum axis[3];
-      mjtNum inverse[4];
-      mju_negQuat(inverse, engine_.body_iquat + 4 * body);
-      mju_rotVecQuat(axis, engine_.jnt_axis + 3 * wheel.joint, inverse);
-      const Vector3d moments = MapVector(engine_.body_inertia + 3 * body);
-      const double spin = moments.dot(MapVector(axis).cwiseAbs2());
-      Compare("wheel_spin_inertia", where, base.wheel.spin_inertia, spin);
+      Compare("wheel_spin_inertia", where, base.wheel.spin_inertia, CalcWheelInertia(engine_, wheel).spin);
     });
     each([&](const EngineWheel& wheel, const Location& where, double) {
       Compare("wheel_damping", where, base.wheel.damping, engine_.dof_damping[wheel.dof]);
