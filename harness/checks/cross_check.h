@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "controller/control/constrained_dynamics.h"
+#include "harness/checks/known_plant.h"
 #include "harness/checks/law_check.h"
 #include "harness/checks/step_checks.h"
 #include "harness/checks/step_model_check.h"
@@ -18,8 +20,17 @@ namespace dexcheck {
 /// check of the model fails for the first time.
 class CrossCheck {
  public:
+  /// @param motors of the plant.
   /// @throws InputError as EngineStep, or when a bound of the scenario has the name of no check.
-  explicit CrossCheck(const Setup& setup);
+  CrossCheck(const Setup& setup, std::span<const Motor> motors);
+
+  /// What the scenario itself asks for; null for an ideal plant. Once at each step, before the questions, also
+  /// of those steps that are not asked about.
+  const KnownStep* Follow(const StepRecord& step) { return known_ ? &known_->plant.Follow(step) : nullptr; }
+  /// Robot and object are elsewhere from now on, by `way` (m, world).
+  void Translate(const Vector3d& way) {
+    if (known_) known_->plant.Translate(way);
+  }
 
   /// The first question: are the terms that the controller used the engine's?
   void CompareModel(const StepRecord& step);
@@ -43,11 +54,27 @@ class CrossCheck {
   [[nodiscard]] const StepFindings& findings() const { return motion_.findings(); }
 
  private:
+  /// What a plant that is not ideal needs besides.
+  struct NotIdeal {
+    NotIdeal(const Setup& setup, std::span<const Motor> motors);
+    KnownPlant plant;
+    /// Of the controller's terms at what it was told, by an engine without the scenario's mismatch.
+    StepModelCheck controller;
+    /// The rigid system there, under the torques that were sent.
+    ConstrainedDynamics dynamics;
+    ActuationMap actuation;
+    VectorXd force;  // n
+    StepFindings findings;
+  };
   static double CompareTold(const StepRecord& step);
+  /// Of torques that the controller computed at this step.
+  const LawErrors& CompareIdealLaw(const StepRecord& step);
+  const LawErrors& CompareKnownLaw(const StepRecord& step);
 
   const Setup* setup_;
   StepModelCheck model_;
   StepChecks motion_;
+  std::optional<NotIdeal> known_;
   std::optional<LawCheck> law_;  // none for a task
   LawTerms law_terms_;           // the engine's
 };

@@ -5,6 +5,7 @@
 #include <complex>
 #include <limits>
 
+#include "harness/checks/known_plant.h"
 #include "harness/checks/step_check_table.h"
 
 namespace dexcheck {
@@ -96,7 +97,8 @@ const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& f
 }
 
 double LawCheck::CompareApplied(const StepRecord& step) {
-  return (step.response.motor_torques - step.command.tau).cwiseAbs().maxCoeff() /
+  const VectorXd& expected = step.known != nullptr ? step.known->tau : step.command.tau;
+  return (step.response.motor_torques - expected).cwiseAbs().maxCoeff() /
          std::max(step.command.tau.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
 }
 
@@ -153,18 +155,31 @@ void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms) 
 
 void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                            const DesiredMotion& desired) {
-  const Matrix3d& R = terms.X_Bo.linear();
-  const Vector3d v = terms.V_Bo.head<3>();
+  // The truth, which the law's terms may not be at.
+  const MeasuredState& truth = step.reading.state;
+  const Pose& X_Bo = step.known != nullptr ? truth.X_Bo : terms.X_Bo;
+  const Vector6d& V_Bo = step.known != nullptr ? truth.V_Bo : terms.V_Bo;
+  const Matrix3d R = X_Bo.linear();
+  const Vector3d v = V_Bo.head<3>();
   if (!follows_) {
-    p_ = terms.X_Bo.translation();
+    p_ = X_Bo.translation();
     p_dot_ = R * v;
     follows_ = true;
   }
-  errors_.error_dynamics = (p_ - terms.X_Bo.translation()).norm();
+  errors_.error_dynamics = (p_ - X_Bo.translation()).norm();
   // What the engine's object did beyond the rigid prediction, p_ddot = R (v_dot + omega x v).
   const Vector3d missed = R * (step.response.V_Bo_dot.head<3>() - findings.V_Bo_dot_model.head<3>());
   const Eigen::Array3d K_v = spec_.gains.K_v.head<3>();
   const Eigen::Array3d K_p = spec_.gains.K_p.head<3>();
+  if (step.known != nullptr) {
+    // What is told otherwise, given otherwise and pushed drives (57) as well: all that the object did beyond
+    // what its true error demands.
+    const Vector3d actual = R * (step.response.V_Bo_dot.head<3>() + V_Bo.tail<3>().cross(v));
+    p_dot_ += time_step_ * (actual + (K_v * (R * v - p_dot_).array()).matrix() +
+                            (K_p * (X_Bo.translation() - p_).array()).matrix());
+    p_ += time_step_ * p_dot_;
+    return;
+  }
   const Vector3d p_ddot = desired.X_d_ddot.head<3>() +
                           (K_v * (desired.X_d_dot.head<3>() - p_dot_).array()).matrix() +
                           (K_p * (desired.X_d.head<3>() - p_).array()).matrix() + missed;

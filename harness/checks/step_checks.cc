@@ -7,6 +7,7 @@
 
 #include "controller/common/text.h"
 #include "controller/contact/rolling.h"
+#include "harness/checks/known_plant.h"
 
 namespace dexcheck {
 namespace {
@@ -30,11 +31,16 @@ void FollowCharts(const Surface& tip, const Surface& object, const ContactCoordi
   *integrated = ChangeCharts(tip, object, *integrated, tip_chart, object_chart);
 }
 
+/// Null for none.
+const Vector6d* PushOf(const StepRecord& step) {
+  return step.known != nullptr ? &step.known->object_wrench : nullptr;
+}
+
 }  // namespace
 
 StepChecks::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)
-    : grasp(setup.model(), setup.fingertips(), setup.object().body, setup.surface(), set),
-      dynamics(setup.model(), static_cast<int>(grasp.members().size())) {}
+    : grasp(setup.plant_model(), setup.fingertips(), setup.plant_model().object()->body, setup.surface(), set),
+      dynamics(setup.plant_model(), static_cast<int>(grasp.members().size())) {}
 
 StepChecks::StepChecks(const Setup& setup)
     : setup_(&setup),
@@ -91,7 +97,8 @@ void StepChecks::SetApplying() {
   leave_out(!setup_->scenario().task, {kUnjudged});
   leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kTractionUse});
   leave_out(setup_->model().base().type == BaseType::kFixed, {kBaseTilt});
-  leave_out(setup_->idle_joints().empty(), {kIdleJoints});
+  // Nothing but stiffness holds them: whatever is not ideal moves them.
+  leave_out(setup_->idle_joints().empty() || !setup_->scenario().imperfections.is_ideal(), {kIdleJoints});
   const mjModel& engine = setup_->engine();
   const mjtByte* const limited = engine.actuator_ctrllimited;
   leave_out(std::none_of(limited, limited + engine.nu, [](mjtByte flag) { return flag != 0; }), {kActuators});
@@ -157,7 +164,7 @@ void StepChecks::CompareContacts(const StepRecord& step) {
   double penetration = 0.0;
   for (size_t i = 0; i < contacts.size(); ++i) {
     const Matrix3d R_B_cf =
-        step.reading.state.X_Bo.linear() * step.model->grasp().contacts()[i].geometry.g_o_cf.linear();
+        step.reading.state.X_Bo.linear() * ModelAtTruth(step).grasp().contacts()[i].geometry.g_o_cf.linear();
     findings_.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) = R_B_cf.transpose() * contacts[i].force;
     if (!contacts[i].touching) ++lost;
     if (holding && !contacts[i].touching && findings_.fingertip_slip[i].touching) ++findings_.contacts_lost;
@@ -200,13 +207,13 @@ void StepChecks::ForgetSlip() {
 }
 
 void StepChecks::Predict(const StepRecord& step) {
-  const ModelTerms& robot = step.model->robot();
-  const GraspTerms& grasp = step.model->grasp();
+  const ModelTerms& robot = ModelAtTruth(step).robot();
+  const GraspTerms& grasp = ModelAtTruth(step).grasp();
   const bool whole = touching_ == AllContacts(grasp.num_contacts());
   if (handling_.partial && !whole && touching_ != 0) return PredictPart(step);
   const Prediction* prediction = nullptr;
   if (!handling_.partial || (whole && !supported_)) {
-    prediction = &dynamics_.Predict(robot, grasp, force_);
+    prediction = &dynamics_.Predict(robot, grasp, force_, ObjectSupport::kHand, PushOf(step));
   } else if (whole) {
     prediction = &dynamics_.Predict(robot, grasp, force_, ObjectSupport::kAtRest);
   } else {
@@ -219,12 +226,13 @@ void StepChecks::Predict(const StepRecord& step) {
 }
 
 void StepChecks::PredictPart(const StepRecord& step) {
-  const ModelTerms& robot = step.model->robot();
+  const ModelTerms& robot = ModelAtTruth(step).robot();
   std::unique_ptr<PartialDynamics>& part = parts_[touching_];
   if (!part) part = std::make_unique<PartialDynamics>(*setup_, touching_);
   part->grasp.SetState(robot, step.reading.state);
   const Prediction& prediction = part->dynamics.Predict(
-      robot, part->grasp.terms(), force_, supported_ ? ObjectSupport::kAtRest : ObjectSupport::kHand);
+      robot, part->grasp.terms(), force_, supported_ ? ObjectSupport::kAtRest : ObjectSupport::kHand,
+      PushOf(step));
   findings_.xi_dot_model = prediction.xi_dot;
   findings_.V_Bo_dot_model = prediction.V_Bo_dot;
   part->grasp.Scatter(prediction.f_c, findings_.f_c_model);
@@ -232,9 +240,10 @@ void StepChecks::PredictPart(const StepRecord& step) {
 }
 
 void StepChecks::CompareDynamics(const StepRecord& step) {
-  const ModelTerms& robot = step.model->robot();
+  const ModelTerms& robot = ModelAtTruth(step).robot();
   const VectorXd& xi_dot = step.response.xi_dot;
   actuation_.CalcForce(step.drive.tau, force_);
+  if (step.known != nullptr) force_ += step.known->force;
   Predict(step);
 
   // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
@@ -242,7 +251,7 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   bias_.noalias() += robot.C() * step.reading.state.xi;
   residual_ = bias_ - force_;
   residual_.noalias() += robot.M() * xi_dot;
-  residual_.noalias() += step.model->grasp().J_B().transpose() * findings_.f_c;
+  residual_.noalias() += ModelAtTruth(step).grasp().J_B().transpose() * findings_.f_c;
   // |f|_M^-1 = |L^-T f|
   const auto norm = [&](const VectorXd& f) {
     column_ = f;
@@ -287,17 +296,18 @@ double StepChecks::Weight() const { return setup_->object().body.mass * setup_->
 
 void StepChecks::CompareObject(const StepRecord& step) {
   // (19), as forces at the contacts' arm
-  const GraspTerms& grasp = step.model->grasp();
+  const GraspTerms& grasp = ModelAtTruth(step).grasp();
   const PlantResponse& response = step.response;
   const ObjectBodyTerms& body = grasp.body();
   const double arm = grasp.contacts()[0].geometry.g_o_cf.translation().norm();
+  const Vector6d push = step.known != nullptr ? step.known->object_wrench : Vector6d(Vector6d::Zero());
   const auto relative = [&](const Vector6d& wrench) {
     return std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) /
            std::max(Weight(), findings_.f_c.norm());
   };
   Add(StepCheck::kBalanceObject,
       relative(body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
-               grasp.G() * findings_.f_c - response.support_wrench - response.solver_residual));
+               grasp.G() * findings_.f_c - response.support_wrench - response.solver_residual - push));
   Add(StepCheck::kSolver, relative(response.solver_residual));
 }
 
@@ -334,7 +344,7 @@ void StepChecks::ReadSlip(const StepRecord& step) {
   for (size_t i = 0; i < response.fingertips.size(); ++i) {
     SlipState& slip = findings_.fingertip_slip[i];
     update(&slip, response.fingertips[i], state.X_Bo.linear());
-    const Vector2d unasked = step.model->grasp().slip_bias().segment<2>(3 * static_cast<Eigen::Index>(i));
+    const Vector2d unasked = ModelAtTruth(step).grasp().slip_bias().segment<2>(3 * static_cast<Eigen::Index>(i));
     rate = std::max(rate, slip.velocity.norm() - time_step_ * unasked.norm());
     if (slip.touching && holding) {
       findings_.least_cone_margin = std::min(findings_.least_cone_margin, slip.cone_margin);
@@ -381,7 +391,7 @@ void StepChecks::CheckJointStops(const MeasuredState& state) {
 }
 
 void StepChecks::CompareKappa(const StepRecord& step) {
-  const GraspTerms& grasp = step.model->grasp();
+  const GraspTerms& grasp = ModelAtTruth(step).grasp();
   const MeasuredState& state = step.reading.state;
   double apart = 0.0;
   for (size_t i = 0; i < kappa_.size(); ++i) {

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "harness/plant/plant.h"
-#include "harness/scenario/imperfections.h"
-#include "harness/scenario/part_context.h"
+#include "harness/plant/imperfections.h"
+#include "harness/plant/part_context.h"
 
 namespace dexcheck {
 

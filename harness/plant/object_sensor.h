@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "harness/plant/velocity_filter.h"
-#include "harness/scenario/imperfections.h"
-#include "harness/scenario/random_stream.h"
+#include "harness/plant/imperfections.h"
+#include "harness/plant/random_stream.h"
 
 namespace dexcheck {
 

@@ -8,9 +8,9 @@
 #include "harness/plant/object_sensor.h"
 #include "harness/plant/plant_reading.h"
 #include "harness/plant/velocity_filter.h"
-#include "harness/scenario/imperfections.h"
-#include "harness/scenario/part_context.h"
-#include "harness/scenario/random_stream.h"
+#include "harness/plant/imperfections.h"
+#include "harness/plant/part_context.h"
+#include "harness/plant/random_stream.h"
 
 namespace dexcheck {
 

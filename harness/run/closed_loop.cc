@@ -28,14 +28,15 @@ constexpr double kGraspTimeout = 0.005;  // s without all fingertips on the obje
 ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
     : setup_(&setup),
       plant_(std::move(parts.plant)),
-      sensing_(parts.sensing),
+      sensing_(parts.sensing, setup.MakePartContext()),
       controller_(std::move(parts.controller)),
       task_(parts.task),
-      drive_(plant_->motors()),
+      drive_(plant_->motors(), parts.actuation, setup.MakePartContext()),
+      disturbances_(parts.disturbances, setup.MakePartContext()),
       num_steps_(std::lround(setup.scenario().duration / setup.scenario().plant.time_step)) {
   const Scenario& scenario = setup.scenario();
   StepChecks::RequireKnownBounds(scenario);
-  if (check) checks_.emplace(setup);
+  if (check) checks_.emplace(setup, plant_->motors());
   record_.model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);
@@ -108,6 +109,8 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
   const double dt = plant_->time_step();
   const Vector3d way = static_cast<double>(std::lround(kSettleMoving / dt)) * dt * v;
   plant_->Translate(-way);
+  sensing_.Translate(-way);
+  if (checks_) checks_->Translate(-way);
   return true;
 }
 
@@ -120,10 +123,14 @@ void ClosedLoop::ControlStep(double t) {
   sensing_.Tell(record_.reading, &record_.told);
   controller_->Step(record_.told, t, &record_.command);
   DriveMotors(t);
+  if (!disturbances_.empty()) {
+    plant_->Push(disturbances_.Evaluate(record_.time, record_.reading.state));
+  }
   const auto control = Clock::now();
   plant_->EndStep(record_.drive.tau);
   const auto end = Clock::now();
   plant_->Read(&record_.response);
+  if (checks_) record_.known = checks_->Follow(record_);
   if (checks_) times_.cross_check += Seconds(end, Clock::now());
   times_.plant += Seconds(begin, read) + Seconds(control, end);
   times_.controller += Seconds(read, control);
@@ -133,7 +140,7 @@ void ClosedLoop::ControlStep(double t) {
 
 void ClosedLoop::DriveMotors(double t) {
   try {
-    drive_.Apply(record_.command.tau, &record_.drive);
+    drive_.Apply(record_.command.tau, record_.reading.state.xi, &record_.drive);
   } catch (const RunFailure&) {
     if (checks_) checks_->JudgeEffort(record_.drive.effort, t);
     throw;

@@ -3,11 +3,12 @@
 // What a scenario puts into the loop.
 
 #include <memory>
+#include <vector>
 
 #include "controller/control/controller.h"
 #include "controller/handling/pick_and_place_controller.h"
 #include "harness/plant/plant.h"
-#include "harness/plant/sensing.h"
+#include "harness/plant/imperfections.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
@@ -19,6 +20,8 @@ struct LoopParts {
   std::unique_ptr<Controller> controller;
   const PickAndPlaceController* task = nullptr;  ///< The controller, when it does a task.
   SensingOptions sensing;
+  ActuationOptions actuation;
+  std::vector<DisturbanceOptions> disturbances;
 };
 
 /// The parts that the scenario names, robot and object where it starts.

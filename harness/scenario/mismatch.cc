@@ -8,7 +8,7 @@
 #include "controller/common/errors.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/engine/engine.h"
-#include "harness/scenario/random_stream.h"
+#include "harness/plant/random_stream.h"
 
 namespace dexcheck {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "controller/model/robot_model.h"
 #include "harness/engine/adapter.h"
-#include "harness/scenario/imperfections.h"
+#include "harness/plant/imperfections.h"
 
 namespace dexcheck {
 

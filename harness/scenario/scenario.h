@@ -17,6 +17,7 @@
 #include "controller/control/object_tracking.h"
 #include "controller/control/trajectory_reader.h"
 #include "controller/handling/pick_and_place.h"
+#include "harness/plant/imperfections.h"
 
 namespace dexcheck {
 
@@ -98,6 +99,7 @@ struct Scenario {
   TrajectoryMaker trajectory;       ///< None for a task.
   std::optional<TaskOptions> task;  ///< Instead of a trajectory; the grasp's contacts are then planned.
   ControlOptions control;
+  Imperfections imperfections;
   std::vector<BoundOverride> bounds;
   Expectation expect;
   std::uint64_t seed = 0;  ///< Of random changes to posture and grasp; 0 for none.

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "controller/common/toml_reader.h"
-#include "harness/scenario/imperfections.h"
+#include "harness/plant/imperfections.h"
 
 namespace dexcheck {
 

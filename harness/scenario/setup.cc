@@ -11,6 +11,7 @@
 #include "controller/model/parameter_reader.h"
 #include "controller/object/euler_zyz.h"
 #include "harness/engine/remove_looks.h"
+#include "harness/scenario/mismatch.h"
 
 namespace dexcheck {
 namespace {
@@ -60,6 +61,21 @@ Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const
   FindFingertips();
   FindGrasp();
   if (scenario_.plant.bonded) MakeBonds();
+  if (!scenario_.imperfections.mismatch.is_none()) MakeMismatch(mjcf.string());
+}
+
+void Setup::MakeMismatch(const std::string& mjcf) {
+  controller_engine_ = MjModelPtr(mj_copyModel(nullptr, engine_.get()));
+  RobotSpec plant = model_.spec();
+  ApplyMismatch(scenario_.imperfections.mismatch, scenario_.seed, scenario_.source, *adapter_, engine_.get(),
+                &plant);
+  plant_model_.emplace(std::move(plant));
+  plant_side_ = std::make_unique<Adapter>(*plant_model_, *engine_, mjcf);
+  controller_side_ = std::make_unique<Adapter>(model_, *controller_engine_, mjcf);
+}
+
+PartContext Setup::MakePartContext() const {
+  return {&model_, fingertips_.size(), scenario_.plant.time_step, scenario_.seed, scenario_.source};
 }
 
 void Setup::ApplyPlantOptions() {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <complex>
+#include <limits>
 
 #include "controller/common/errors.h"
 #include "tests/common/paper_robot.h"
@@ -44,7 +45,12 @@ class MotorDriveTest : public ::testing::Test {
 TEST_F(MotorDriveTest, WithoutFaultsTorquesArriveAsTheyAre) {
   MotorDrive drive = Make({});
   for (const double u : {0.1, -3.7, 40.0}) EXPECT_EQ(Give(drive, u), u);
-  EXPECT_TRUE(Throws<RunFailure>([&] { return Give(drive, 40.1); }, "is at its limit, 40 N m"));
+  EXPECT_EQ(output_.effort, 1.0);
+  EXPECT_EQ(output_.busiest_motor, kJoint);
+  EXPECT_TRUE(Throws<RunFailure>([&] { return Give(drive, 50.0); }, "is at its limit, 40 N m"));
+  EXPECT_EQ(output_.effort, 1.25);  // what ended the run can be read
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(Throws<RunFailure>([&] { return Give(drive, nan); }, "is not a number"));
 }
 
 TEST_F(MotorDriveTest, DelaysAreTimeAlsoBetweenSteps) {

@@ -1,4 +1,4 @@
-#include "harness/scenario/imperfections.h"
+#include "harness/plant/imperfections.h"
 
 #include <algorithm>
 #include <string_view>
