@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "harness/checks/law_terms.h"
 
@@ -9,12 +10,9 @@ namespace dexcheck {
 
 CrossCheck::NotIdeal::NotIdeal(const Setup& setup, std::span<const Motor> motors)
     : plant(setup, motors),
-      controller(setup.controller_side(), setup.fingertips(), setup.scenario().control.orientation),
-      dynamics(setup.model(), static_cast<int>(setup.fingertips().size())),
-      actuation(setup.model()) {
+      controller(setup.controller_side(), setup.fingertips(), setup.scenario().control.orientation) {
   // What is told of robot, object and contacts need not fit together: contacts are compared at the truth.
   controller.LeaveOutContacts();
-  force.setZero(setup.model().num_velocities());
 }
 
 CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors)
@@ -22,7 +20,10 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors)
       model_(setup.plant_side(), setup.fingertips(), setup.scenario().control.orientation),
       motion_(setup),
       law_terms_(setup.model().num_positions(), setup.model().num_velocities(),
-                 3 * static_cast<int>(setup.fingertips().size())) {
+                 3 * static_cast<int>(setup.fingertips().size())),
+      meant_dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())),
+      actuation_(setup.model()),
+      meant_force_(VectorXd::Zero(setup.model().num_velocities())) {
   if (!setup.bonds().empty()) model_.LeaveOutContacts();
   if (!setup.scenario().task) law_.emplace(setup);
   if (!setup.scenario().imperfections.is_ideal()) known_.emplace(setup, motors);
@@ -50,7 +51,10 @@ void CrossCheck::CompareModel(const StepRecord& step) {
 double CrossCheck::CompareTold(const StepRecord& step) {
   const MeasuredState& told = step.told.state;
   const MeasuredState& truth = step.known != nullptr ? step.known->told.state : step.reading.state;
-  double apart = (told.q - truth.q).lpNorm<Eigen::Infinity>();
+  const Touch& touch = step.known != nullptr ? step.known->told.touch : step.reading.touch;
+  double apart = std::abs(step.told.touch.support_force - touch.support_force);
+  if (step.told.touch.fingertips != touch.fingertips) apart = std::numeric_limits<double>::infinity();
+  apart = std::max(apart, (told.q - truth.q).lpNorm<Eigen::Infinity>());
   apart = std::max(apart, (told.xi - truth.xi).lpNorm<Eigen::Infinity>());
   apart = std::max(apart, (told.X_Bo.matrix() - truth.X_Bo.matrix()).cwiseAbs().maxCoeff());
   apart = std::max(apart, (told.V_Bo - truth.V_Bo).lpNorm<Eigen::Infinity>());
@@ -61,22 +65,23 @@ double CrossCheck::CompareTold(const StepRecord& step) {
   return apart;
 }
 
-const LawErrors& CrossCheck::CompareIdealLaw(const StepRecord& step) {
-  const bool contacts = setup_->bonds().empty();
-  ReadEngineTerms(model_.context(), *step.model, step.told.state, contacts, &law_terms_);
-  return law_->Compare(step, motion_.findings(), law_terms_, *motion_.mass_factor());
+void CrossCheck::FindMeant(const StepRecord& step) {
+  actuation_.CalcForce(step.command.tau, meant_force_);
+  const Prediction& meant = meant_dynamics_.Predict(step.model->robot(), step.model->grasp(), meant_force_);
+  meant_.xi_dot_model = meant.xi_dot;
+  meant_.V_Bo_dot_model = meant.V_Bo_dot;
+  meant_.f_c_model = meant.f_c;
 }
 
-const LawErrors& CrossCheck::CompareKnownLaw(const StepRecord& step) {
-  NotIdeal& known = *known_;
-  const GraspModel& told = *step.model;
-  ReadEngineTerms(known.controller.context(), told, step.told.state, /*contacts=*/false, &law_terms_);
-  known.actuation.CalcForce(step.command.tau, known.force);
-  const Prediction& meant = known.dynamics.Predict(told.robot(), told.grasp(), known.force);
-  known.findings.xi_dot_model = meant.xi_dot;
-  known.findings.V_Bo_dot_model = meant.V_Bo_dot;
-  known.findings.f_c_model = meant.f_c;
-  return law_->Compare(step, known.findings, law_terms_, known.dynamics.mass_factor());
+const LawErrors& CrossCheck::CompareControl(const StepRecord& step) {
+  const StepModelCheck& controller = known_ ? known_->controller : model_;
+  const bool contacts = setup_->bonds().empty() && !known_;
+  ReadEngineTerms(controller.context(), *step.model, step.told.state, contacts, &law_terms_);
+  if (!known_ && step.drive.tau == step.command.tau) {
+    return law_->Compare(step, motion_.findings(), law_terms_, *motion_.mass_factor());
+  }
+  FindMeant(step);
+  return law_->Compare(step, meant_, law_terms_, meant_dynamics_.mass_factor());
 }
 
 void CrossCheck::CompareLaw(const StepRecord& step) {
@@ -91,7 +96,7 @@ void CrossCheck::CompareLaw(const StepRecord& step) {
   if (!law_) return;
   motion_.Add(StepCheck::kGains, law_->sampled_radius(), t);
   if (!LawCheck::IsJudged(step)) return;
-  const LawErrors& errors = known_ ? CompareKnownLaw(step) : CompareIdealLaw(step);
+  const LawErrors& errors = CompareControl(step);
   motion_.Add(StepCheck::kLawTorque, errors.torque, t);
   motion_.Add(StepCheck::kLawDemand, errors.demand, t);
   motion_.Add(StepCheck::kGraspForce, errors.grasp_force, t);

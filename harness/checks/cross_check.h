@@ -60,16 +60,12 @@ class CrossCheck {
     KnownPlant plant;
     /// Of the controller's terms at what it was told, by an engine without the scenario's mismatch.
     StepModelCheck controller;
-    /// The rigid system there, under the torques that were sent.
-    ConstrainedDynamics dynamics;
-    ActuationMap actuation;
-    VectorXd force;  // n
-    StepFindings findings;
   };
   static double CompareTold(const StepRecord& step);
+  /// What the controller's rigid system does under the torques that were sent.
+  void FindMeant(const StepRecord& step);
   /// Of torques that the controller computed at this step.
-  const LawErrors& CompareIdealLaw(const StepRecord& step);
-  const LawErrors& CompareKnownLaw(const StepRecord& step);
+  const LawErrors& CompareControl(const StepRecord& step);
 
   const Setup* setup_;
   StepModelCheck model_;
@@ -77,6 +73,10 @@ class CrossCheck {
   std::optional<NotIdeal> known_;
   std::optional<LawCheck> law_;  // none for a task
   LawTerms law_terms_;           // the engine's
+  ConstrainedDynamics meant_dynamics_;
+  ActuationMap actuation_;
+  VectorXd meant_force_;  // n
+  StepFindings meant_;    // by FindMeant
 };
 
 }  // namespace dexcheck

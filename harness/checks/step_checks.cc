@@ -267,10 +267,16 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   force_before_ = force_;
   AddLessGive(StepCheck::kBalanceRobot, balance, robot_give_);
 
+  if (step.known != nullptr && f_c_before_.size() == findings_.f_c_model.size()) {
+    // A push on the object changes contact forces without any torque.
+    bias_.noalias() = ModelAtTruth(step).grasp().J_B().transpose() * (findings_.f_c_model - f_c_before_);
+    AddGive(norm(bias_) / scale, &push_give_);
+  }
+
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
   mass_factor_->Multiply(residual_);
-  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale, robot_give_);
+  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale, robot_give_ + push_give_);
   double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) force_scale = std::max(force_scale, Weight());

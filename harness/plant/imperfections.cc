@@ -1,25 +1,11 @@
 #include "harness/plant/imperfections.h"
 
 #include <algorithm>
-#include <string_view>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 
 namespace dexcheck {
-namespace {
-
-/// Whether a name is that of the pattern, in which one * stands for any letters.
-bool Fits(std::string_view pattern, std::string_view name) {
-  const size_t star = pattern.find('*');
-  if (star == std::string_view::npos) return pattern == name;
-  const std::string_view head = pattern.substr(0, star);
-  const std::string_view tail = pattern.substr(star + 1);
-  return name.size() >= head.size() + tail.size() && name.starts_with(head) && name.ends_with(tail);
-}
-
-}  // namespace
-
 bool ByName::Is(double value) const {
   return all == value &&
          std::all_of(groups.begin(), groups.end(), [&](const auto& group) { return group.second == value; });
@@ -27,17 +13,19 @@ bool ByName::Is(double value) const {
 
 VectorXd ByName::Resolve(std::span<const std::string> names, const std::string& source) const {
   VectorXd values = VectorXd::Constant(static_cast<Eigen::Index>(names.size()), all);
-  for (const auto& [pattern, value] : groups) {
+  for (const auto& [group, value] : groups) {
+    const bool is_name = std::find(names.begin(), names.end(), group) != names.end();
     bool found = false;
     for (size_t i = 0; i < names.size(); ++i) {
-      if (!Fits(pattern, names[i])) continue;
+      const bool fits = is_name ? names[i] == group : group == "all" || names[i].starts_with(group);
+      if (!fits) continue;
       values[static_cast<Eigen::Index>(i)] = value;
       found = true;
     }
     if (found) continue;
-    const std::string nearest = FindNearest(pattern, {names.begin(), names.end()});
+    const std::string nearest = FindNearest(group, {names.begin(), names.end()});
     throw InputError(source + ": " + key + ": fits no name of the robot" +
-                     (nearest.empty() ? "" : " (" + Quote(nearest) + "?)") + ", got " + Quote(pattern));
+                     (nearest.empty() ? "" : " (" + Quote(nearest) + "?)") + ", got " + Quote(group));
   }
   return values;
 }

@@ -15,9 +15,10 @@ namespace dexcheck {
 
 /// One number for each of several named things: joints, motors, links.
 struct ByName {
-  double all = 0.0;                                    ///< For those that no group names.
-  std::vector<std::pair<std::string, double>> groups;  ///< Names, or patterns with one *; later ones win.
-  std::string key;                                     ///< For messages: "sensing.joint_noise".
+  double all = 0.0;  ///< For those that no group names.
+  /// A name, or how names begin, or "all"; later ones win.
+  std::vector<std::pair<std::string, double>> groups;
+  std::string key;  ///< For messages: "sensing.joint_noise".
 
   /// Whether everything has this value.
   [[nodiscard]] bool Is(double value) const;

@@ -39,10 +39,15 @@ class Bodies {
                      (nearest.empty() ? "" : " (" + Quote(nearest) + "?)") + ", got " + Quote(name));
   }
 
+  /// The base with its wheels.
   void ScaleMass(size_t body, double factor) {
     MassProperties& model = Model(body);
     model.mass *= factor;
     model.inertia *= factor;
+    if (body == 0) {
+      WheelProperties& wheel = plant_->base.wheel;
+      for (double* value : {&wheel.mass, &wheel.spin_inertia, &wheel.transverse_inertia}) *value *= factor;
+    }
     for (const int id : EngineBodies(body)) {
       engine_->body_mass[id] *= factor;
       for (int i = 0; i < 3; ++i) engine_->body_inertia[3 * id + i] *= factor;
@@ -53,6 +58,7 @@ class Bodies {
     Model(body).com += shift;
     const Vector3d moved = R_engine_link_[body] * shift;
     for (const int id : EngineBodies(body)) {
+      if (IsWheel(id)) continue;
       // Bodies that are welded to the link's own are turned against it at most.
       const Eigen::Map<const RowMatrix3d> R_own(reference_->xmat + 9 * MainBody(body));
       const Eigen::Map<const RowMatrix3d> R(reference_->xmat + 9 * id);
@@ -118,6 +124,13 @@ class Bodies {
   [[nodiscard]] std::vector<int> EngineBodies(size_t body) const {
     if (IsObject(body)) return {adapter_->object_body()};
     return adapter_->welded_bodies()[body];
+  }
+
+  [[nodiscard]] bool IsWheel(int id) const {
+    const auto& wheels = adapter_->wheels();
+    return std::any_of(wheels.begin(), wheels.end(), [&](const EngineWheel& wheel) {
+      return engine_->body_weldid[id] == engine_->body_weldid[engine_->jnt_bodyid[wheel.joint]];
+    });
   }
 
   /// Where each link's frame is in the engine's body of it.

@@ -35,7 +35,7 @@ class MotorDriveTest : public ::testing::Test {
     return output_.tau[kJoint];
   }
 
-  static constexpr int kJoint = 9;  // an arm's
+  static constexpr int kJoint = 5;  // a shoulder's
   RobotModel model_;
   std::vector<Motor> motors_;
   VectorXd tau_, xi_;

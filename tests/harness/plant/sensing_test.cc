@@ -71,7 +71,7 @@ TEST_F(SensingTest, QuantisationHasTheVarianceOfAnEvenError) {
 }
 
 TEST_F(SensingTest, NoiseIsWhiteNormalAndItsOwnPerJoint) {
-  Sensing sensing = Make({.joint_noise = {.groups = {{"rf*", 1e-3}, {"rf1_1", 2e-3}}, .key = "sensing.joint_noise"}});
+  Sensing sensing = Make({.joint_noise = {.groups = {{"rf", 1e-3}, {"rf1_1", 2e-3}}, .key = "sensing.joint_noise"}});
   const int named = model_.FindJoint("rf1_1"), other = model_.FindJoint("rf2_1"), none = model_.FindJoint("r_elbow");
   constexpr int kSteps = 20000;
   double s_named = 0.0, s_other = 0.0, cross = 0.0, lag_one = 0.0, fourth = 0.0, last = 0.0;

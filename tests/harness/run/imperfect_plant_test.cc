@@ -125,7 +125,7 @@ TEST(ImperfectPlant, ZeroSettingsGiveTheSameBits) {
   ShippedRun with("curve",
                   With(kShort, {"sensing.joint_counts=0", "sensing.joint_noise=0", "sensing.latency=0",
                                 "sensing.object_rate=0", "sensing.velocity_cutoff=30", "actuation.delay=0",
-                                "actuation.lag={ \"rf*\" = 0 }", "actuation.coulomb=0",
+                                "actuation.lag={ rf = 0 }", "actuation.coulomb=0",
                                 "actuation.torque_step=0", "mismatch.mass=1", "mismatch.mass_within=0",
                                 "mismatch.com={ r_forearm = [0, 0, 0] }", "disturbance=[]"}));
   EXPECT_EQ(without.Run().verdict, Verdict::kPass);
