@@ -57,6 +57,7 @@ StepChecks::StepChecks(const Setup& setup)
   force_.setZero(n);
   bias_.setZero(n);
   residual_.setZero(n);
+  push_before_.setZero(n);
   column_.setZero(n, 1);
   idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
   kappa_.resize(setup.fingertips().size());
@@ -268,9 +269,12 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   AddLessGive(StepCheck::kBalanceRobot, balance, robot_give_);
 
   if (step.known != nullptr && f_c_before_.size() == findings_.f_c_model.size()) {
-    // A push on the object changes contact forces without any torque.
+    // A push changes contact forces without any torque, and wheels give to it as well.
     bias_.noalias() = ModelAtTruth(step).grasp().J_B().transpose() * (findings_.f_c_model - f_c_before_);
     AddGive(norm(bias_) / scale, &push_give_);
+    bias_ = step.known->force - push_before_;
+    AddGive(norm(bias_) / scale, &edge_give_);
+    push_before_ = step.known->force;
   }
 
   // |a|_M = |L a|
@@ -283,7 +287,7 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   const VectorXd& f_c = findings_.f_c_model;
   if (f_c_before_.size() == f_c.size()) AddGive((f_c - f_c_before_).norm() / force_scale, &force_give_);
   f_c_before_ = f_c;
-  AddLessGive(StepCheck::kContactForce, (f_c - findings_.f_c).norm() / force_scale, force_give_);
+  AddLessGive(StepCheck::kContactForce, (f_c - findings_.f_c).norm() / force_scale, force_give_ + edge_give_);
 }
 
 void StepChecks::AddGive(double change, double* give) const {

@@ -110,7 +110,9 @@ class StepChecks {
   VectorXd force_, bias_, residual_;    // n
   VectorXd force_before_, f_c_before_;  // n, 3N: of the last step that was judged; empty before
   double robot_give_ = 0.0;  // what contacts give for changes of E_bar' tau', relative as balance_robot
-  double push_give_ = 0.0;   // likewise for changes of J_B'^T f_c; only where the plant is not ideal
+  // Likewise for changes of J_B'^T f_c, and of pushes on the robot; zero where the plant is ideal.
+  double push_give_ = 0.0, edge_give_ = 0.0;
+  VectorXd push_before_;     // n
   double force_give_ = 0.0;  // likewise of f_c, relative as contact_force
   RowMatrixXd column_;       // n x 1
 };

@@ -16,6 +16,9 @@ std::vector<std::string> ListNames(const RobotModel& model, bool wheels) {
   return names;
 }
 
+/// Rates below this are none, rad/s.
+constexpr double kStandstill = 1e-30;
+
 Reading MakeReading(const PartContext& context) {
   Reading reading;
   reading.state.q.setZero(context.model->num_positions());
@@ -94,6 +97,8 @@ void Sensing::TellVelocity(int joint, double position, double* rate) {
       rate_[joint] = *rate;
     } else {
       rate_[joint] += low_pass_ * ((position - last_[joint]) / time_step_ - rate_[joint]);
+      // Between two counts the filter's output decays for ever.
+      if (std::abs(rate_[joint]) < kStandstill) rate_[joint] = 0.0;
     }
     last_[joint] = position;
     *rate = rate_[joint];

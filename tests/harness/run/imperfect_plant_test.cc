@@ -42,6 +42,8 @@ const Known kKnown[] = {
     {"backlash", {"actuation.backlash={ r_elbow = 1e-4 }"}},
     {"push_on_link",
      {"disturbance=[{ type = 'pulse', body = 'r_forearm', force = [0, 5, 0], begin = 0.05, duration = 0.05 }]"}},
+    {"push_on_platform",
+     {"disturbance=[{ type = 'pulse', body = 'platform', force = [0, 20, 0], begin = 0.05, duration = 0.05 }]"}},
     {"push_on_object",
      {"disturbance=[{ type = 'sine', body = 'object', force = [0, 0, 1], frequency = 10 }]"}},
     {"payload", {"disturbance=[{ type = 'payload', body = 'r_palm', mass = 0.2, at = [0, 0, 0.03] }]"}},
