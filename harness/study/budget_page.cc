@@ -69,9 +69,9 @@ Html DrawChart(const ErrorBudget& budget) {
 }
 
 Html MakeTable(const ErrorBudget& budget) {
-  Html table =
+  Html table = HtmlLiteral(
       "<table><tr><th>source</th><th>alone, rms</th><th>alone, max</th><th>predicted, rms</th>"
-      "<th>without it, rms</th><th>interaction</th><th></th></tr>";
+      "<th>without it, rms</th><th>interaction</th><th></th></tr>");
   for (const BudgetEntry& e : budget.entries) {
     table += FormatHtml("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.0f} %</td><td>{}</td></tr>",
                         e.name, FormatShort(e.alone.rms), FormatShort(e.alone.max), FormatShort(e.predicted.rms),
@@ -92,9 +92,9 @@ Html MakeTable(const ErrorBudget& budget) {
 }  // namespace
 
 std::string MakeBudgetPage(const ErrorBudget& budget) {
-  Html page =
+  Html page = HtmlLiteral(
       "<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'>"
-      "<meta name='viewport' content='width=device-width, initial-scale=1'>";
+      "<meta name='viewport' content='width=device-width, initial-scale=1'>");
   page += FormatHtml("<title>error budget of {}</title>", budget.scenario);
   page +=
       "<style>body{font:15px/1.45 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1d2733}"
