@@ -7,6 +7,14 @@
 #include "harness/checks/law_terms.h"
 
 namespace dexcheck {
+namespace {
+
+/// What should have been told.
+const MeasuredState& ToldOf(const StepRecord& step) {
+  return step.known != nullptr ? step.known->told.state : step.reading.state;
+}
+
+}  // namespace
 
 CrossCheck::NotIdeal::NotIdeal(const Setup& setup, std::span<const Motor> motors)
     : plant(setup, motors),
@@ -15,23 +23,37 @@ CrossCheck::NotIdeal::NotIdeal(const Setup& setup, std::span<const Motor> motors
   controller.LeaveOutContacts();
 }
 
-CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors)
+CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool knows_law)
     : setup_(&setup),
       model_(setup.plant_side(), setup.fingertips(), setup.scenario().control.orientation),
       motion_(setup),
       law_terms_(setup.model().num_positions(), setup.model().num_velocities(),
                  3 * static_cast<int>(setup.fingertips().size())),
+      motors_(setup.model(), setup.scenario().plant.time_step),
+      sensors_(setup.model(), setup.fingertips(), setup.scenario().plant.time_step),
       meant_dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())),
       actuation_(setup.model()),
       meant_force_(VectorXd::Zero(setup.model().num_velocities())) {
   if (!setup.bonds().empty()) model_.LeaveOutContacts();
-  if (!setup.scenario().task) law_.emplace(setup);
+  if (!setup.scenario().task && knows_law) law_.emplace(setup);
   if (!setup.scenario().imperfections.is_ideal()) known_.emplace(setup, motors);
   using enum StepCheck;
   if (!law_) {
     for (const StepCheck check : {kGains, kLawTorque, kLawDemand, kGraspForce}) motion_.LeaveOut(check);
   }
-  if (!law_ || !law_->follows_error()) motion_.LeaveOut(kErrorDynamics);
+  if (law_ && !law_->has_error_dynamics()) motion_.LeaveOut(kGains);
+  if (law_ && !law_->has_demand()) motion_.LeaveOut(kLawDemand);
+  if (!law_ || !law_->follows_error()) {
+    motion_.LeaveOut(kErrorDynamics);
+    motion_.LeaveOut(kOrientationDynamics);
+  }
+}
+
+void CrossCheck::Reset() {
+  for (const CheckRecord& check : motion_.checks()) {
+    if (check.failed) settling_failures_.push_back(check);
+  }
+  motion_.Reset();
 }
 
 void CrossCheck::CompareModel(const StepRecord& step) {
@@ -50,7 +72,7 @@ void CrossCheck::CompareModel(const StepRecord& step) {
 
 double CrossCheck::CompareTold(const StepRecord& step) {
   const MeasuredState& told = step.told.state;
-  const MeasuredState& truth = step.known != nullptr ? step.known->told.state : step.reading.state;
+  const MeasuredState& truth = ToldOf(step);
   const Touch& touch = step.known != nullptr ? step.known->told.touch : step.reading.touch;
   double apart = std::abs(step.told.touch.support_force - touch.support_force);
   if (step.told.touch.fingertips != touch.fingertips) apart = std::numeric_limits<double>::infinity();
@@ -73,10 +95,14 @@ void CrossCheck::FindMeant(const StepRecord& step) {
   meant_.f_c_model = meant.f_c;
 }
 
-const LawErrors& CrossCheck::CompareControl(const StepRecord& step) {
+void CrossCheck::ReadControllersTerms(const StepRecord& step) {
   const StepModelCheck& controller = known_ ? known_->controller : model_;
   const bool contacts = setup_->bonds().empty() && !known_;
   ReadEngineTerms(controller.context(), *step.model, step.told.state, contacts, &law_terms_);
+}
+
+const LawErrors& CrossCheck::CompareControl(const StepRecord& step) {
+  ReadControllersTerms(step);
   if (!known_ && step.drive.tau == step.command.tau) {
     return law_->Compare(step, motion_.findings(), law_terms_, *motion_.mass_factor());
   }
@@ -84,11 +110,36 @@ const LawErrors& CrossCheck::CompareControl(const StepRecord& step) {
   return law_->Compare(step, meant_, law_terms_, meant_dynamics_.mass_factor());
 }
 
+void CrossCheck::CompareUnsent(const StepRecord& step) {
+  if (!law_ || !LawCheck::IsJudged(step)) return;
+  CompareModel(step);
+  motion_.Add(StepCheck::kTold, CompareTold(step), step.time);
+  sensors_.Add(step.told.state, ToldOf(step));
+  ReadControllersTerms(step);
+  motion_.Add(StepCheck::kLawTorque, law_->CompareUnsent(step, law_terms_), step.time);
+}
+
+MeasuredCauses CrossCheck::Tell() const {
+  MeasuredCauses measured;
+  if (law_) measured.law = law_->attribution().Tell();
+  measured.motors = motors_.Tell();
+  measured.sensors = sensors_.Tell();
+  measured.wheels = motion_.wheels().Tell();
+  const ForceEvidence& forces = motion_.forces();
+  if (!forces.has_any()) return measured;
+  measured.force = forces.Tell();
+  measured.is_slope = ForceEvidence::IsSlope(forces.Find(), setup_->model().gravity());
+  return measured;
+}
+
 void CrossCheck::CompareLaw(const StepRecord& step) {
   const double t = step.time;
   const Expectation& expect = setup_->scenario().expect;
   motion_.Add(StepCheck::kTold, CompareTold(step), t);
   motion_.Add(StepCheck::kTorqueApplied, LawCheck::CompareApplied(step), t);
+  motors_.Add(step.known != nullptr ? step.known->tau : step.command.tau, step.response.motor_torques,
+              step.reading.state.xi);
+  sensors_.Add(step.told.state, ToldOf(step));
   if (step.command.tracks && t >= expect.from) {
     motion_.Add(StepCheck::kExpectPosition, step.error.position.norm(), t);
     motion_.Add(StepCheck::kExpectOrientation, step.error.orientation, t);
@@ -101,6 +152,7 @@ void CrossCheck::CompareLaw(const StepRecord& step) {
   motion_.Add(StepCheck::kLawDemand, errors.demand, t);
   motion_.Add(StepCheck::kGraspForce, errors.grasp_force, t);
   motion_.Add(StepCheck::kErrorDynamics, errors.error_dynamics, t);
+  motion_.Add(StepCheck::kOrientationDynamics, errors.orientation_dynamics, t);
 }
 
 }  // namespace dexcheck

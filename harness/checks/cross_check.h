@@ -8,8 +8,10 @@
 #include <string_view>
 
 #include "controller/control/constrained_dynamics.h"
+#include "harness/checks/attribution.h"
 #include "harness/checks/known_plant.h"
 #include "harness/checks/law_check.h"
+#include "harness/checks/signal_evidence.h"
 #include "harness/checks/step_checks.h"
 #include "harness/checks/step_model_check.h"
 #include "harness/checks/step_record.h"
@@ -22,7 +24,8 @@ class CrossCheck {
  public:
   /// @param motors of the plant.
   /// @throws InputError as EngineStep, or when a bound of the scenario has the name of no check.
-  CrossCheck(const Setup& setup, std::span<const Motor> motors);
+  /// @param knows_law whether the controller's law is the scenario's; otherwise no check of the law is made.
+  CrossCheck(const Setup& setup, std::span<const Motor> motors, bool knows_law = true);
 
   /// What the scenario itself asks for; null for an ideal plant. Once at each step, before the questions, also
   /// of those steps that are not asked about.
@@ -39,13 +42,17 @@ class CrossCheck {
   /// The law's question: are the torques those of (53)-(55), and do they do what is expected? After the other
   /// two.
   void CompareLaw(const StepRecord& step);
+  /// The first question and the law's, of torques that were not sent because they are above a motor's limit.
+  void CompareUnsent(const StepRecord& step);
   /// The largest effort of a motor, before the step that it belongs to.
   void JudgeEffort(double effort, double time) { motion_.JudgeEffort(effort, time); }
-  /// Forgets motion and forces of all steps so far: time begins anew.
-  void Reset() { motion_.Reset(); }
+  /// Forgets motion and forces of all steps so far, but for the checks that failed: time begins anew.
+  void Reset();
+  /// Checks of motion and forces that failed before the last Reset, while everything settled, in that order.
+  [[nodiscard]] std::span<const CheckRecord> settling_failures() const { return settling_failures_; }
 
-  /// Which part of the law differs, in words; empty when none does.
-  [[nodiscard]] std::string TellLaw() const { return law_ ? law_->attribution().Tell() : std::string(); }
+  /// What was measured of each cause, in words.
+  [[nodiscard]] MeasuredCauses Tell() const;
   [[nodiscard]] std::span<const CheckRecord> model_checks() const { return model_.records(); }
   [[nodiscard]] std::span<const CheckRecord> motion_checks() const { return motion_.checks(); }
   /// A check of the motion. @throws std::invalid_argument unless there is one of that name.
@@ -62,6 +69,8 @@ class CrossCheck {
     StepModelCheck controller;
   };
   static double CompareTold(const StepRecord& step);
+  /// The engine's at what the controller was told; contacts that need not fit together are the controller's.
+  void ReadControllersTerms(const StepRecord& step);
   /// What the controller's rigid system does under the torques that were sent.
   void FindMeant(const StepRecord& step);
   /// Of torques that the controller computed at this step.
@@ -71,8 +80,11 @@ class CrossCheck {
   StepModelCheck model_;
   StepChecks motion_;
   std::optional<NotIdeal> known_;
-  std::optional<LawCheck> law_;  // none for a task
+  std::optional<LawCheck> law_;  // none for a task, or an unknown law
   LawTerms law_terms_;           // the engine's
+  std::vector<CheckRecord> settling_failures_;
+  MotorEvidence motors_;
+  SensorEvidence sensors_;
   ConstrainedDynamics meant_dynamics_;
   ActuationMap actuation_;
   VectorXd meant_force_;  // n

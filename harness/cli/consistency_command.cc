@@ -84,6 +84,12 @@ void PrintTable(const Request& request, const Comparison& comparison) {
     fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {}\n", record.name, record.comparisons, record.worst,
                record.bound, CountDigits(record.worst), record.failed ? "DIFFERS" : "ok");
   }
+  if (!result.gate.notes.empty()) {
+    fmt::print(
+        "{} notes on what only a run has (contacts, solver, limits of motors, what a scenario overrides): "
+        "--json\n",
+        result.gate.notes.size());
+  }
   fmt::print("\n{:<24}{:>9}  {:>12}  {:>9}  {:>6}           {}\n", "term", "compared", "worst error", "bound",
              "digits", "where it is worst");
   for (const CheckRecord& record : result.terms) {
@@ -180,6 +186,9 @@ std::string ToText(const Request& request, const Comparison& comparison, ExitCod
                                 {"model", finding.model},
                                 {"engine", finding.engine}});
   }
+  json["engine_notes"] = Json::array();
+  for (const GateNote& note : result.gate.notes)
+    json["engine_notes"].push_back({{"kind", note.kind}, {"text", note.text}});
   return json.dump(2) + "\n";
 }
 
@@ -233,8 +242,8 @@ void CompareDescriptionWithEngine(const Request& request, Comparison* comparison
   });
   GateResult& gate = comparison->result.gate;
   std::erase_if(gate.records, [&](const CheckRecord& record) {
-    return std::find(completion.unstated.begin(), completion.unstated.end(), record.name) !=
-           completion.unstated.end();
+    return !record.failed && std::find(completion.unstated.begin(), completion.unstated.end(), record.name) !=
+                                 completion.unstated.end();
   });
   const std::vector<std::string> others = CheckDescription(robot, adapter, &gate);
   for (const auto& notes : {robot.notes, completion.notes, others}) AppendTo(&comparison->notes, notes);

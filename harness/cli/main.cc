@@ -47,6 +47,7 @@ int Run(int argc, char** argv) {
   AddPlanCommand(app);
   AddRunCommand(app, JoinArguments(argc, argv));
   AddBudgetCommand(app);
+  AddCompareCommand(app);
   AddExportCommand(app);
   AddRenderCommand(app);
   AddReportCommand(app);

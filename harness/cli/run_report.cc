@@ -22,6 +22,9 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop) {
              differs > 0 ? "FAILS" : "ok");
   for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check);
   for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check);
+  const std::span<const CheckRecord> settling = loop.checks().settling_failures();
+  if (!settling.empty()) fmt::print("\n  while settling, before t = 0:\n");
+  for (const CheckRecord& check : settling) PrintCheck(check);
 }
 
 /// "approach 0.0, close 3.4, ..." with the time each began.
@@ -73,8 +76,8 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     case Verdict::kPass:
       fmt::print("PASS: {}\n", loop.is_checking()
                                    ? scenario.imperfections.is_ideal()
-                                         ? "model, balance, prediction and assumptions hold at every step."
-                                         : "model, balance, prediction and assumptions hold at every step, with "
+                                         ? "model, law, balance, prediction and assumptions hold at every step."
+                                         : "model, law, balance, prediction and assumptions hold at every step, with "
                                            "what the scenario asks of the plant counted in."
                                    : "the run completed; nothing was checked.");
       return;

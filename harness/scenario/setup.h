@@ -31,17 +31,21 @@ class Setup {
   /// The same with the scene compiled already, which is most of the work. @param mjcf names it in messages.
   Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
         MjModelPtr engine);
+  /// The same with the robot read already. Overrides of its parameters are not applied again.
+  Setup(const Scenario& scenario, RobotModel model, const std::filesystem::path& mjcf, MjModelPtr engine);
   Setup(const Setup&) = delete;
   Setup& operator=(const Setup&) = delete;
 
   [[nodiscard]] const Scenario& scenario() const { return scenario_; }
   [[nodiscard]] const RobotModel& model() const { return model_; }
+  /// The robot that a rigid plant moves, without the scenario's changes to the model; null for the engine.
+  [[nodiscard]] const RobotModel* plant_model() const { return plant_model_.get(); }
   /// With the scenario's changes.
   [[nodiscard]] const mjModel& engine() const { return *engine_; }
   [[nodiscard]] const Adapter& adapter() const { return *adapter_; }
   /// What the robot of engine() is: model(), but for a mismatch that the scenario asks for.
-  [[nodiscard]] const RobotModel& plant_model() const { return plant_model_ ? *plant_model_ : model_; }
-  /// plant_model() and engine(); model() and an engine without the mismatch.
+  [[nodiscard]] const RobotModel& known_model() const { return known_model_ ? *known_model_ : model_; }
+  /// known_model() and engine(); model() and an engine without the mismatch.
   [[nodiscard]] const Adapter& plant_side() const { return plant_side_ ? *plant_side_ : *adapter_; }
   [[nodiscard]] const Adapter& controller_side() const {
     return controller_side_ ? *controller_side_ : *adapter_;
@@ -88,12 +92,15 @@ class Setup {
   FingerPlacement SolveGrasp();
   void MakeBonds();
   void MakeMismatch(const std::string& mjcf);
+  /// Stiffness and damping of a law that has them: the scenario's, or those that follow from its gains.
+  [[nodiscard]] ObjectStiffness FindStiffness(const GraspControllerOptions& options) const;
 
   Scenario scenario_;
   RobotModel model_;
+  std::unique_ptr<RobotModel> plant_model_;
   MjModelPtr engine_;
   std::unique_ptr<Adapter> adapter_;
-  std::optional<RobotModel> plant_model_;  // these four only with a mismatch
+  std::optional<RobotModel> known_model_;  // these four only with a mismatch
   MjModelPtr controller_engine_;
   std::unique_ptr<Adapter> plant_side_, controller_side_;
   GateResult gate_;

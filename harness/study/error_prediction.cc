@@ -11,9 +11,9 @@ ErrorPrediction::ErrorPrediction(const Setup& setup, bool acts_at_rest)
       disturbances_(setup.scenario().imperfections.disturbances, setup.MakePartContext()),
       trajectory_(setup.scenario().trajectory(setup.X_start() + setup.scenario().start_error)),
       controller_(MakeLoopParts(setup).controller),
-      model_(setup.plant_model(), setup.fingertips(), setup.plant_model().object()->body, setup.surface(),
+      model_(setup.known_model(), setup.fingertips(), setup.known_model().object()->body, setup.surface(),
              setup.MakeControllerOptions()),
-      dynamics_(setup.plant_model(), static_cast<int>(setup.fingertips().size())),
+      dynamics_(setup.known_model(), static_cast<int>(setup.fingertips().size())),
       actuation_(setup.model()),
       K_p_(setup.scenario().control.gains.K_p.head<3>()),
       K_v_(setup.scenario().control.gains.K_v.head<3>()),
@@ -35,7 +35,7 @@ Vector3d ErrorPrediction::CalcAcceleration(const StepRecord& ideal) {
   AddRobotForce(wrenches, model_.robot(), force_);
   const Vector6d push = CalcObjectWrench(wrenches, truth.X_Bo);
   const Vector6d& V_Bo_dot =
-      dynamics_.Predict(model_.robot(), model_.grasp(), force_, ObjectSupport::kHand, &push).V_Bo_dot;
+      dynamics_.Predict(model_.robot(), model_.grasp(), force_, ObjectSupport::kHand, nullptr, &push).V_Bo_dot;
   // p_ddot = R (v_dot + omega x v)
   const Vector3d v = truth.V_Bo.head<3>(), omega = truth.V_Bo.tail<3>();
   return truth.X_Bo.linear() * (V_Bo_dot.head<3>() + omega.cross(v));

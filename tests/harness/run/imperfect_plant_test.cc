@@ -157,6 +157,14 @@ TEST(ImperfectPlant, WhatIsTooBadForTheExpectationIsStillSaid) {
   EXPECT_FALSE(run.loop().checks().Find("balance_robot").failed);
 }
 
+TEST(ImperfectPlant, CurveRealDoesWhatItExpects) {
+  ShippedRun run("curve-real", {"duration=3.3"});  // the first push included
+  const RunResult& result = run.Run();
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  EXPECT_GT(result.tracking.position_max(), 1e-4);
+  EXPECT_GE(run.setup().scenario().imperfections.asked.size(), 6U);
+}
+
 TEST(ImperfectPlant, AMotorThatSaturatesGoesOnAndIsReported) {
   const std::vector<std::string> hard = {"duration=0.05", "settle=0.3", "control.natural_frequency=100",
                                          "start_error.xyz=[0, 0, 0.05]"};
