@@ -49,8 +49,7 @@ ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contac
 
 const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const GraspTerms& grasp,
                                                const Eigen::Ref<const VectorXd>& force, ObjectSupport object,
-                                               const VectorXd* contact_acceleration,
-                                               const Vector6d* push) {
+                                               const VectorXd* contact_acceleration, const Vector6d* push) {
   const Eigen::Index n = prediction_.xi_dot.size();
   Require(robot.size() == n && force.size() == n, "length of force", "must be that of xi",
           static_cast<double>(force.size()));

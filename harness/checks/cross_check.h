@@ -27,8 +27,8 @@ class CrossCheck {
   /// @param knows_law whether the controller's law is the scenario's; otherwise no check of the law is made.
   CrossCheck(const Setup& setup, std::span<const Motor> motors, bool knows_law = true);
 
-  /// What the scenario itself asks for; null for an ideal plant. Once at each step, before the questions, also
-  /// of those steps that are not asked about.
+  /// What the scenario itself asks for; null for an ideal plant. Once at each step, before the questions,
+  /// also of those steps that are not asked about.
   const KnownStep* Follow(const StepRecord& step) { return known_ ? &known_->plant.Follow(step) : nullptr; }
   /// Robot and object are elsewhere from now on, by `way` (m, world).
   void Translate(const Vector3d& way) {

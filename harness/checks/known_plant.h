@@ -1,7 +1,8 @@
 #pragma once
 
-// What a scenario itself asks for (faults of sensing and motors, pushes, other masses), computed a second time
-// beside the loop: causes that are known cry no wolf, and what is hidden from the scenario is still found.
+// What a scenario itself asks for (faults of sensing and motors, pushes, other masses), computed a second
+// time beside the loop: causes that are known cry no wolf, and what is hidden from the scenario is still
+// found.
 
 #include "controller/control/controller.h"
 #include "controller/control/grasp_model.h"
@@ -16,10 +17,10 @@ struct StepRecord;
 
 /// What is known of one step.
 struct KnownStep {
-  Reading told;                              ///< What the scenario's sensing makes of the truth.
-  VectorXd tau;                              ///< What its motors make of the command, tau' (n), N m.
-  const GraspModel* model = nullptr;         ///< Terms of the plant's own masses, at the truth.
-  VectorXd force;                            ///< Its pushes on the robot, as forces on xi (n).
+  Reading told;                               ///< What the scenario's sensing makes of the truth.
+  VectorXd tau;                               ///< What its motors make of the command, tau' (n), N m.
+  const GraspModel* model = nullptr;          ///< Terms of the plant's own masses, at the truth.
+  VectorXd force;                             ///< Its pushes on the robot, as forces on xi (n).
   Vector6d object_wrench = Vector6d::Zero();  ///< And on the object, Sigma_o.
 };
 

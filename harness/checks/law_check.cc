@@ -208,8 +208,8 @@ void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings,
   Vector6d V_dot = reference_.CalcDemand(spec_, followed_, desired);
   // What the engine's object did beyond the rigid prediction. Where it is told otherwise, given otherwise and
   // pushed, all of that drives (57) as well: what it did beyond what its true error demands.
-  V_dot += step.response.V_Bo_dot - (step.known != nullptr ? reference_.CalcDemand(spec_, truth, desired)
-                                                            : findings.V_Bo_dot_model);
+  V_dot += step.response.V_Bo_dot -
+           (step.known != nullptr ? reference_.CalcDemand(spec_, truth, desired) : findings.V_Bo_dot_model);
   Matrix3d R = followed_.X_Bo.linear();
   const Vector3d v = followed_.V_Bo.head<3>();
   Vector3d omega = followed_.V_Bo.tail<3>();

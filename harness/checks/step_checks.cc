@@ -39,7 +39,8 @@ const Vector6d* PushOf(const StepRecord& step) {
 }  // namespace
 
 StepChecks::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)
-    : grasp(setup.known_model(), setup.fingertips(), setup.known_model().object()->body, setup.surface(), set),
+    : grasp(setup.known_model(), setup.fingertips(), setup.known_model().object()->body, setup.surface(),
+            set),
       dynamics(setup.known_model(), static_cast<int>(grasp.members().size())) {}
 
 StepChecks::StepChecks(const Setup& setup)
@@ -242,8 +243,8 @@ void StepChecks::PredictPart(const StepRecord& step) {
   if (!part) part = std::make_unique<PartialDynamics>(*setup_, touching_);
   part->grasp.SetState(robot, step.reading.state);
   const Prediction& prediction = part->dynamics.Predict(
-      robot, part->grasp.terms(), force_, supported_ ? ObjectSupport::kAtRest : ObjectSupport::kHand,
-      nullptr, PushOf(step));
+      robot, part->grasp.terms(), force_, supported_ ? ObjectSupport::kAtRest : ObjectSupport::kHand, nullptr,
+      PushOf(step));
   findings_.xi_dot_model = prediction.xi_dot;
   findings_.V_Bo_dot_model = prediction.V_Bo_dot;
   part->grasp.Scatter(prediction.f_c, findings_.f_c_model);
@@ -275,7 +276,8 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   const double scale = std::max(norm(bias_), std::numeric_limits<double>::min());
   scale_ = scale;
   const double left = norm(residual_);
-  Add(StepCheck::kBalanceRobot, std::isnan(left) ? left : std::max(0.0, left - CalcUnevenForce(step)) / scale);
+  Add(StepCheck::kBalanceRobot,
+      std::isnan(left) ? left : std::max(0.0, left - CalcUnevenForce(step)) / scale);
   solver_of_robot_ = step.response.solver_force.size() > 0 ? norm(step.response.solver_force) / scale : 0.0;
   if (force_before_.size() == force_.size()) {
     bias_ = force_ - force_before_;
@@ -306,14 +308,15 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
 }
 
 double StepChecks::CalcUnevenForce(const StepRecord& step) const {
-  // In |.|_M^-1 the force of an acceleration a that all masses feel is at most a sqrt(m): a tilt by theta gives gravity
-  // g theta along the floor, and tyres that slip by v in a turn at w give 2 v w.
+  // In |.|_M^-1 the force of an acceleration a that all masses feel is at most a sqrt(m): a tilt by theta
+  // gives gravity g theta along the floor, and tyres that slip by v in a turn at w give 2 v w.
   double slip = 0.0;
   for (const BodyContact& wheel : step.response.wheels) slip = std::max(slip, wheel.slip.norm());
   const double turn = step.reading.state.q.size() > 0 && !step.response.wheels.empty()
                           ? std::abs(wheels_.CalcTurn(step.reading.state.xi))
                           : 0.0;
-  return (setup_->model().gravity().norm() * step.reading.departure.tilt + 2.0 * slip * turn) * std::sqrt(mass_);
+  return (setup_->model().gravity().norm() * step.reading.departure.tilt + 2.0 * slip * turn) *
+         std::sqrt(mass_);
 }
 
 void StepChecks::AddGive(double change, double* give) const {
@@ -348,9 +351,12 @@ void StepChecks::CompareObject(const StepRecord& step) {
 }
 
 void StepChecks::KeepForces(const StepRecord& step) {
-  const auto fails = [&](StepCheck which) { return check(which).applies && !(check(which).last <= check(which).bound); };
+  const auto fails = [&](StepCheck which) {
+    return check(which).applies && !(check(which).last <= check(which).bound);
+  };
   if (!fails(StepCheck::kBalanceRobot) && !fails(StepCheck::kBalanceObject)) return;
-  forces_.Add(left_of_robot_, left_of_object_, ModelAtTruth(step), step.reading.state.q, *mass_factor_, scale_);
+  forces_.Add(left_of_robot_, left_of_object_, ModelAtTruth(step), step.reading.state.q, *mass_factor_,
+              scale_);
 }
 
 void StepChecks::CompareRolling(const StepRecord& step) {
@@ -362,8 +368,8 @@ void StepChecks::CompareRolling(const StepRecord& step) {
   const Vector2d mismatch = wheels_.CalcMismatch(xi, rates);
   double beyond = 0.0;
   for (size_t k = 0; k < 2; ++k) {
-    beyond = std::max(beyond, std::abs(mismatch[static_cast<Eigen::Index>(k)]) -
-                                  step.response.wheels[k].slip.norm());
+    beyond = std::max(beyond,
+                      std::abs(mismatch[static_cast<Eigen::Index>(k)]) - step.response.wheels[k].slip.norm());
   }
   Add(StepCheck::kRolling, beyond);
   if (!(beyond <= check(StepCheck::kRolling).bound)) wheels_.Add(xi, rates);
@@ -402,7 +408,8 @@ void StepChecks::ReadSlip(const StepRecord& step) {
   for (size_t i = 0; i < response.fingertips.size(); ++i) {
     SlipState& slip = findings_.fingertip_slip[i];
     update(&slip, response.fingertips[i], state.X_Bo.linear());
-    const Vector2d unasked = ModelAtTruth(step).grasp().slip_bias().segment<2>(3 * static_cast<Eigen::Index>(i));
+    const Vector2d unasked =
+        ModelAtTruth(step).grasp().slip_bias().segment<2>(3 * static_cast<Eigen::Index>(i));
     rate = std::max(rate, slip.velocity.norm() - time_step_ * unasked.norm());
     if (slip.touching && holding) {
       findings_.least_cone_margin = std::min(findings_.least_cone_margin, slip.cone_margin);

@@ -28,15 +28,16 @@ struct Request {
 
 void Print(const ErrorBudget& budget) {
   fmt::print("{}: RMS and largest position error of the object, m\n\n", budget.scenario);
-  fmt::print("  {:<34}{:>10}{:>10}{:>11}{:>12}{:>13}\n", "source", "alone", "largest", "by (57)", "without it",
-             "interaction");
+  fmt::print("  {:<34}{:>10}{:>10}{:>11}{:>12}{:>13}\n", "source", "alone", "largest", "by (57)",
+             "without it", "interaction");
   for (const BudgetEntry& e : budget.entries) {
     if (!e.failure.empty()) {
       fmt::print("  {:<34}{}\n", e.name, e.failure);
       continue;
     }
-    fmt::print("  {:<34}{:>10.2e}{:>10.2e}{:>11.2e}{:>12.2e}{:>11.0f} % {}\n", e.name, e.alone.rms, e.alone.max,
-               e.predicted.rms, e.without.rms, 100.0 * e.interaction, e.interacts() ? "interacts" : "");
+    fmt::print("  {:<34}{:>10.2e}{:>10.2e}{:>11.2e}{:>12.2e}{:>11.0f} % {}\n", e.name, e.alone.rms,
+               e.alone.max, e.predicted.rms, e.without.rms, 100.0 * e.interaction,
+               e.interacts() ? "interacts" : "");
   }
   const auto row = [](const char* name, const ErrorSize& size) {
     fmt::print("  {:<34}{:>10.2e}{:>10.2e}\n", name, size.rms, size.max);
@@ -95,8 +96,7 @@ void AddBudgetCommand(Command app) {
       .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
   command.AddOption("--json", &request->json_file, "Write the budget to this file (- for standard output)")
       .TypeName("FILE.json");
-  command.AddOption("--page", &request->page, "Write table and bar chart as a page")
-      .TypeName("FILE.html");
+  command.AddOption("--page", &request->page, "Write table and bar chart as a page").TypeName("FILE.html");
   command.AddFlag("--quiet", &request->quiet, "Print the last line only");
   command.SetAction([=] { return Run(*request); });
 }

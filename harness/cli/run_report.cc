@@ -74,12 +74,13 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
   }
   switch (result.verdict) {
     case Verdict::kPass:
-      fmt::print("PASS: {}\n", loop.is_checking()
-                                   ? scenario.imperfections.is_ideal()
-                                         ? "model, law, balance, prediction and assumptions hold at every step."
-                                         : "model, law, balance, prediction and assumptions hold at every step, with "
-                                           "what the scenario asks of the plant counted in."
-                                   : "the run completed; nothing was checked.");
+      fmt::print("PASS: {}\n",
+                 loop.is_checking()
+                     ? scenario.imperfections.is_ideal()
+                           ? "model, law, balance, prediction and assumptions hold at every step."
+                           : "model, law, balance, prediction and assumptions hold at every step, with "
+                             "what the scenario asks of the plant counted in."
+                     : "the run completed; nothing was checked.");
       return;
     case Verdict::kFailed:
       fmt::print("FAILED: {}.\n", result.failure);

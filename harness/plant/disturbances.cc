@@ -31,10 +31,9 @@ int FindBody(const RobotModel& model, const DisturbanceOptions& options, const s
 Disturbances::Disturbances(std::span<const DisturbanceOptions> options, const PartContext& context)
     : robot_(*context.model) {
   for (const DisturbanceOptions& one : options) {
-    sources_.push_back({one, FindBody(*context.model, one, context.source),
-                        RandomStream(context.seed, one.key + ".begin"),
-                        RandomStream(context.seed, one.key + ".size"),
-                        RandomStream(context.seed, one.key + ".noise")});
+    sources_.push_back(
+        {one, FindBody(*context.model, one, context.source), RandomStream(context.seed, one.key + ".begin"),
+         RandomStream(context.seed, one.key + ".size"), RandomStream(context.seed, one.key + ".noise")});
     on_robot_ = on_robot_ || sources_.back().body != Wrench::kObject;
   }
   wrenches_.reserve(sources_.size());
@@ -101,8 +100,8 @@ void AddRobotForce(std::span<const Wrench> wrenches, const ModelTerms& robot, Ei
       const Vector3d axis = X_Bj.linear().col(2);
       const bool turns = model.joints()[static_cast<size_t>(joint)].type == JointType::kRevolute;
       // A point moves by z x (p - o), or by z, for each unit of q_i.
-      force[offset + joint] += turns ? axis.dot(w.torque + (w.point - X_Bj.translation()).cross(w.force))
-                                     : axis.dot(w.force);
+      force[offset + joint] +=
+          turns ? axis.dot(w.torque + (w.point - X_Bj.translation()).cross(w.force)) : axis.dot(w.force);
     }
     if (offset == 0) continue;
     const Pose X_B0 = robot.CalcLinkPose(-1);

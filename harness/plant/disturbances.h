@@ -7,10 +7,10 @@
 
 #include "controller/control/measured_state.h"
 #include "controller/dynamics/model_terms.h"
-#include "harness/plant/wrench.h"
 #include "harness/plant/imperfections.h"
 #include "harness/plant/part_context.h"
 #include "harness/plant/random_stream.h"
+#include "harness/plant/wrench.h"
 
 namespace dexcheck {
 

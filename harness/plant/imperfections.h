@@ -1,7 +1,7 @@
 #pragma once
 
-// What a scenario asks of a plant that is not ideal: faults of sensing and motors, disturbances, and an engine
-// whose masses are not those that the controller knows. The defaults are the ideal plant.
+// What a scenario asks of a plant that is not ideal: faults of sensing and motors, disturbances, and an
+// engine whose masses are not those that the controller knows. The defaults are the ideal plant.
 
 #include <cmath>
 #include <span>
@@ -46,9 +46,10 @@ struct SensingOptions {
   ByName joint_noise;     ///< Standard deviation of a joint's position, rad, before the encoder counts.
   ByName velocity_noise;  ///< Of a joint's or wheel's rate where it is measured, rad/s.
   VelocitySource velocity = VelocitySource::kMeasured;  ///< Of the joints.
-  double velocity_cutoff = 0.0;      ///< Of the low pass after differencing, Hz; 0 for none.
-  double kalman_acceleration = 0.0;  ///< Standard deviation that the filter expects of accelerations, rad/s^2.
-  bool odometry = false;             ///< The base's pose is integrated from its wheels' rates.
+  double velocity_cutoff = 0.0;  ///< Of the low pass after differencing, Hz; 0 for none.
+  double kalman_acceleration =
+      0.0;                ///< Standard deviation that the filter expects of accelerations, rad/s^2.
+  bool odometry = false;  ///< The base's pose is integrated from its wheels' rates.
 
   double object_position_noise = 0.0;                          ///< Standard deviation of each axis, m.
   double object_orientation_noise = 0.0;                       ///< Likewise, rad.
@@ -56,7 +57,7 @@ struct SensingOptions {
   double object_latency = 0.0;                                 ///< Age of the pose, s.
   VelocitySource object_velocity = VelocitySource::kMeasured;  ///< kMeasured: told with the pose.
   double object_velocity_cutoff = 0.0;                         ///< As velocity_cutoff, Hz.
-  double object_acceleration = 0.0;  ///< As kalman_acceleration, m/s^2 and rad/s^2.
+  double object_acceleration = 0.0;                            ///< As kalman_acceleration, m/s^2 and rad/s^2.
 
   double contact_force_noise = 0.0;  ///< Of the support's force, N.
   double latency = 0.0;              ///< Age of all that is told, s; a whole number of time steps.
@@ -91,18 +92,18 @@ struct DisturbanceOptions {
     kNoise,  ///< Random with variance 1 times the wrench, no faster than `frequency`.
   };
   Kind kind = Kind::kPulse;
-  std::string body;                     ///< A link, or the object.
-  Vector3d force = Vector3d::Zero();    ///< N.
-  Vector3d torque = Vector3d::Zero();   ///< N m.
-  Vector3d at = Vector3d::Zero();       ///< Where the force acts, in the body's frame, m.
-  bool in_body_frame = false;           ///< Force and torque turn with the body; otherwise they are the world's.
-  double begin = 0.0;                   ///< s.
-  double duration = 0.0;                ///< s; 0 until the end.
-  double period = 0.0;                  ///< It comes again after this, s; 0 does not.
-  double frequency = 0.0;               ///< Hz.
-  double begin_within = 0.0;            ///< It begins at random up to this later, s.
-  double size_within = 0.0;             ///< Its size is drawn from 1 -+ this.
-  std::string key;                      ///< For messages: "disturbance.0".
+  std::string body;                    ///< A link, or the object.
+  Vector3d force = Vector3d::Zero();   ///< N.
+  Vector3d torque = Vector3d::Zero();  ///< N m.
+  Vector3d at = Vector3d::Zero();      ///< Where the force acts, in the body's frame, m.
+  bool in_body_frame = false;  ///< Force and torque turn with the body; otherwise they are the world's.
+  double begin = 0.0;          ///< s.
+  double duration = 0.0;       ///< s; 0 until the end.
+  double period = 0.0;         ///< It comes again after this, s; 0 does not.
+  double frequency = 0.0;      ///< Hz.
+  double begin_within = 0.0;   ///< It begins at random up to this later, s.
+  double size_within = 0.0;    ///< Its size is drawn from 1 -+ this.
+  std::string key;             ///< For messages: "disturbance.0".
 };
 
 /// A mass that is fixed to a link of the plant and that the controller does not know.
@@ -119,7 +120,8 @@ struct MismatchOptions {
   ByName mass_within;           ///< The factor is drawn from 1 -+ this, times `mass`.
   ByName damping{.all = 1.0};   ///< Factor of a joint's viscous friction.
   ByName armature{.all = 1.0};  ///< Factor of a joint's rotor inertia.
-  std::vector<std::pair<std::string, Vector3d>> com;  ///< By how much a link's centre of mass is elsewhere, m.
+  std::vector<std::pair<std::string, Vector3d>>
+      com;  ///< By how much a link's centre of mass is elsewhere, m.
   std::vector<Payload> payloads;
   Vector2d slope = Vector2d::Zero();  ///< Rise of the floor along x and y, rad.
 

@@ -41,7 +41,7 @@ MotorDrive::MotorDrive(std::span<const Motor> motors, const ActuationOptions& op
   for (Eigen::Index i = 0; i < armature_.size(); ++i) {
     const bool needs = coulomb_[i] + stribeck_[i] > 0.0 || backlash_[i] > 0.0;
     if (!needs || armature_[i] > 0.0) continue;
-    const std::string& key = backlash_[i] > 0.0 ? options.backlash.key
+    const std::string& key = backlash_[i] > 0.0  ? options.backlash.key
                              : coulomb_[i] > 0.0 ? options.coulomb.key
                                                  : options.stribeck.key;
     throw InputError(context.source + ": " + key + ": needs a joint with armature, got " +

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/plant/plant.h"
 #include "harness/plant/imperfections.h"
 #include "harness/plant/part_context.h"
+#include "harness/plant/plant.h"
 
 namespace dexcheck {
 
@@ -19,17 +19,15 @@ struct DriveOutput {
 /// Stands between the controller and the plant: what the motors make of the torques that are sent, in this
 /// order, each part of it absent unless the options ask for it:
 ///
-///   delay      the torques of `delay` ago; a fraction of a step mixes two of them as their times share the step
-///   step       whole multiples of torque_step
-///   gain       times 1 + gain_error
-///   lag        1 / (1 + lag s); what is given is its mean over the step, so that the impulse is right
-///   limit      not above the motor's
-///   backlash   nothing while the rotor, of the joint's armature, crosses the play
-///   friction   less (coulomb + stribeck exp(-(w / stribeck_velocity)^2)) sign(w)
+///   delay      the torques of `delay` ago; a fraction of a step mixes two of them as their times share the
+///   step step       whole multiples of torque_step gain       times 1 + gain_error lag        1 / (1 + lag
+///   s); what is given is its mean over the step, so that the impulse is right limit      not above the
+///   motor's backlash   nothing while the rotor, of the joint's armature, crosses the play friction   less
+///   (coulomb + stribeck exp(-(w / stribeck_velocity)^2)) sign(w)
 ///
-/// sign(w) is w / w_0 below w_0 = dt (coulomb + stribeck) / armature: an explicit force that is steeper makes a
-/// sampled joint rattle. Nothing allocates after construction. Two drives that are made alike and are sent the
-/// same give the same: a check makes its own.
+/// sign(w) is w / w_0 below w_0 = dt (coulomb + stribeck) / armature: an explicit force that is steeper makes
+/// a sampled joint rattle. Nothing allocates after construction. Two drives that are made alike and are sent
+/// the same give the same: a check makes its own.
 class MotorDrive {
  public:
   /// @throws InputError when the options name a motor that is not there, or ask for friction or backlash of a

@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "harness/plant/velocity_filter.h"
 #include "harness/plant/imperfections.h"
 #include "harness/plant/random_stream.h"
+#include "harness/plant/velocity_filter.h"
 
 namespace dexcheck {
 

@@ -116,7 +116,8 @@ void Sensing::TellJoints(MeasuredState* told) {
     if (options_.velocity != VelocitySource::kMeasured) {
       TellVelocity(i, q, &rate);
     } else if (velocity_noise_[wheels + i] > 0.0) {
-      rate += velocity_noise_[wheels + i] * velocity_stream_.Normal(k_, static_cast<std::uint64_t>(wheels + i));
+      rate +=
+          velocity_noise_[wheels + i] * velocity_stream_.Normal(k_, static_cast<std::uint64_t>(wheels + i));
     }
   }
 }

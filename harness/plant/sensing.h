@@ -5,12 +5,12 @@
 #include <vector>
 
 #include "controller/control/controller.h"
-#include "harness/plant/object_sensor.h"
-#include "harness/plant/plant_reading.h"
-#include "harness/plant/velocity_filter.h"
 #include "harness/plant/imperfections.h"
+#include "harness/plant/object_sensor.h"
 #include "harness/plant/part_context.h"
+#include "harness/plant/plant_reading.h"
 #include "harness/plant/random_stream.h"
+#include "harness/plant/velocity_filter.h"
 
 namespace dexcheck {
 
@@ -37,16 +37,16 @@ class Sensing {
   Base base_;
   int base_positions_, base_velocities_;
   double time_step_;
-  VectorXd count_;                             // one step of each encoder, rad; 0 is exact
-  VectorXd joint_noise_, velocity_noise_;      // velocities: wheels first
+  VectorXd count_;                         // one step of each encoder, rad; 0 is exact
+  VectorXd joint_noise_, velocity_noise_;  // velocities: wheels first
   RandomStream joint_stream_, velocity_stream_, force_stream_;
-  std::vector<VelocityFilter> filters_;        // by joint; kKalman
-  VectorXd last_, rate_;                       // kDifferenced
+  std::vector<VelocityFilter> filters_;  // by joint; kKalman
+  VectorXd last_, rate_;                 // kDifferenced
   double low_pass_ = 1.0;
-  Vector3d odometry_ = Vector3d::Zero();       // x, y, phi
+  Vector3d odometry_ = Vector3d::Zero();  // x, y, phi
   ObjectSensor object_;
-  std::vector<Reading> delayed_;               // ring; empty without latency
-  std::uint64_t k_ = 0;                        // steps told
+  std::vector<Reading> delayed_;  // ring; empty without latency
+  std::uint64_t k_ = 0;           // steps told
 };
 
 }  // namespace dexcheck

@@ -16,13 +16,13 @@ double Seconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-constexpr double kRoughTime = 0.02;      // s after the first contact
+constexpr double kRoughTime = 0.02;       // s after the first contact
 constexpr long kStepsPerModelCheck = 20;  // while everything settles
-constexpr double kLargestSkew = 1e-2;    // rad between the platform's heading and the way ahead
-constexpr double kSettleMoving = 0.5;    // s
-constexpr double kLargestTilt = 0.2;     // rad, of a robot that still stands
-constexpr double kLargestSink = 0.02;    // m, likewise
-constexpr double kGraspTimeout = 0.005;  // s without all fingertips on the object: lost
+constexpr double kLargestSkew = 1e-2;     // rad between the platform's heading and the way ahead
+constexpr double kSettleMoving = 0.5;     // s
+constexpr double kLargestTilt = 0.2;      // rad, of a robot that still stands
+constexpr double kLargestSink = 0.02;     // m, likewise
+constexpr double kGraspTimeout = 0.005;   // s without all fingertips on the object: lost
 
 }  // namespace
 
@@ -150,7 +150,8 @@ void ClosedLoop::DriveMotors(double t) {
   } catch (const RunFailure&) {
     if (checks_) checks_->JudgeEffort(record_.drive.effort, t);
     if (checks_) record_.known = checks_->Follow(record_);
-    // Torques that are too large may be those of no law. While everything settles they follow another trajectory.
+    // Torques that are too large may be those of no law. While everything settles they follow another
+    // trajectory.
     if (checks_ && is_running_) checks_->CompareUnsent(record_);
     throw;
   }

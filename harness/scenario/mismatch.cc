@@ -75,8 +75,7 @@ class Bodies {
     own.com = Eigen::Map<const Vector3d>(engine_->body_ipos + 3 * id);
     const mjtNum* const iquat = engine_->body_iquat + 4 * id;
     const Matrix3d R = Eigen::Quaterniond(iquat[0], iquat[1], iquat[2], iquat[3]).toRotationMatrix();
-    own.inertia =
-        R * Eigen::Map<const Vector3d>(engine_->body_inertia + 3 * id).asDiagonal() * R.transpose();
+    own.inertia = R * Eigen::Map<const Vector3d>(engine_->body_inertia + 3 * id).asDiagonal() * R.transpose();
     const Vector3d point = R_engine_link_[body] * at + p_engine_link_[body];
     const MassProperties both = Combine({own, MassProperties{.mass = mass, .com = point}});
     engine_->body_mass[id] = both.mass;

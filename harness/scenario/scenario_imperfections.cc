@@ -81,7 +81,8 @@ void ReadSensing(const TomlValue& value, double time_step, SensingOptions* sensi
     const double steps = 1.0 / (sensing->object_rate * time_step);
     if (steps < 1.0 - 1e-9) table.Get("object_rate").Fail("must be at most one pose a time step");
     if (steps > static_cast<double>(kMaxDelaySteps)) {
-      table.Get("object_rate").Fail("must be at least one pose in " + std::to_string(kMaxDelaySteps) + " time steps");
+      table.Get("object_rate")
+          .Fail("must be at least one pose in " + std::to_string(kMaxDelaySteps) + " time steps");
     }
   }
   ReadDelay(table, "object_latency", time_step, /*whole=*/true, &sensing->object_latency);

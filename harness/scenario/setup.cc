@@ -88,7 +88,8 @@ void Setup::MakeMismatch(const std::string& mjcf) {
   controller_engine_ = MjModelPtr(mj_copyModel(nullptr, engine_.get()));
   const auto change = [&](const RobotModel& model, mjModel* engine) {
     RobotSpec spec = model.spec();
-    ApplyMismatch(scenario_.imperfections.mismatch, scenario_.seed, scenario_.source, *adapter_, engine, &spec);
+    ApplyMismatch(scenario_.imperfections.mismatch, scenario_.seed, scenario_.source, *adapter_, engine,
+                  &spec);
     return RobotModel(std::move(spec));
   };
   if (plant_model_) {

@@ -37,12 +37,16 @@ struct LogAxis {
 
 Html DrawBar(const LogAxis& axis, double y, const std::string& name, double measured, double predicted,
              bool interacts) {
-  Html bar = FormatHtml("<text x='{:.0f}' y='{:.0f}' text-anchor='end'>{}</text>", kLabelWidth - 8.0, y + 15.0, name);
-  bar += FormatHtml("<rect x='{:.0f}' y='{:.0f}' width='{:.1f}' height='13' class='{}'><title>measured {} m</title></rect>",
-                    kLabelWidth, y + 2.0, std::max(1.0, axis.Place(measured)),
-                    std::string(interacts ? "interacts" : "measured"), FormatShort(measured));
-  bar += FormatHtml("<rect x='{:.0f}' y='{:.0f}' width='{:.1f}' height='7' class='predicted'><title>predicted {} m</title></rect>",
-                    kLabelWidth, y + 16.0, std::max(1.0, axis.Place(predicted)), FormatShort(predicted));
+  Html bar = FormatHtml("<text x='{:.0f}' y='{:.0f}' text-anchor='end'>{}</text>", kLabelWidth - 8.0,
+                        y + 15.0, name);
+  bar += FormatHtml(
+      "<rect x='{:.0f}' y='{:.0f}' width='{:.1f}' height='13' class='{}'><title>measured {} m</title></rect>",
+      kLabelWidth, y + 2.0, std::max(1.0, axis.Place(measured)),
+      std::string(interacts ? "interacts" : "measured"), FormatShort(measured));
+  bar += FormatHtml(
+      "<rect x='{:.0f}' y='{:.0f}' width='{:.1f}' height='7' class='predicted'><title>predicted {} "
+      "m</title></rect>",
+      kLabelWidth, y + 16.0, std::max(1.0, axis.Place(predicted)), FormatShort(predicted));
   return bar;
 }
 
@@ -53,9 +57,10 @@ Html DrawChart(const ErrorBudget& budget) {
                           kLabelWidth + kBarWidth + 20.0, height);
   for (double decade = axis.least; decade <= axis.most; decade += 1.0) {
     const double x = kLabelWidth + axis.Place(std::pow(10.0, decade));
-    chart += FormatHtml("<line x1='{:.1f}' x2='{:.1f}' y1='0' y2='{:.0f}' class='grid'/>"
-                        "<text x='{:.1f}' y='{:.0f}' text-anchor='middle'>1e{:.0f} m</text>",
-                        x, x, height - 18.0, x, height - 4.0, decade);
+    chart += FormatHtml(
+        "<line x1='{:.1f}' x2='{:.1f}' y1='0' y2='{:.0f}' class='grid'/>"
+        "<text x='{:.1f}' y='{:.0f}' text-anchor='middle'>1e{:.0f} m</text>",
+        x, x, height - 18.0, x, height - 4.0, decade);
   }
   double y = 0.0;
   for (const BudgetEntry& entry : budget.entries) {
@@ -73,14 +78,15 @@ Html MakeTable(const ErrorBudget& budget) {
       "<table><tr><th>source</th><th>alone, rms</th><th>alone, max</th><th>predicted, rms</th>"
       "<th>without it, rms</th><th>interaction</th><th></th></tr>");
   for (const BudgetEntry& e : budget.entries) {
-    table += FormatHtml("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.0f} %</td><td>{}</td></tr>",
-                        e.name, FormatShort(e.alone.rms), FormatShort(e.alone.max), FormatShort(e.predicted.rms),
-                        FormatShort(e.without.rms), 100.0 * e.interaction,
-                        !e.failure.empty() ? e.failure : std::string(e.interacts() ? "interacts" : ""));
+    table += FormatHtml(
+        "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.0f} %</td><td>{}</td></tr>",
+        e.name, FormatShort(e.alone.rms), FormatShort(e.alone.max), FormatShort(e.predicted.rms),
+        FormatShort(e.without.rms), 100.0 * e.interaction,
+        !e.failure.empty() ? e.failure : std::string(e.interacts() ? "interacts" : ""));
   }
   const auto row = [&](const std::string& name, const ErrorSize& size) {
-    table += FormatHtml("<tr><td>{}</td><td>{}</td><td>{}</td><td></td><td></td><td></td><td></td></tr>", name,
-                        FormatShort(size.rms), FormatShort(size.max));
+    table += FormatHtml("<tr><td>{}</td><td>{}</td><td>{}</td><td></td><td></td><td></td><td></td></tr>",
+                        name, FormatShort(size.rms), FormatShort(size.max));
   };
   row("none of them", budget.ideal);
   row("sum of the above", budget.sum);
@@ -97,14 +103,17 @@ std::string MakeBudgetPage(const ErrorBudget& budget) {
       "<meta name='viewport' content='width=device-width, initial-scale=1'>");
   page += FormatHtml("<title>error budget of {}</title>", budget.scenario);
   page +=
-      "<style>body{font:15px/1.45 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1d2733}"
-      "svg{width:100%;height:auto;font-size:13px}svg text{fill:#1d2733}.measured{fill:#2f6fb0}.interacts{fill:#c2571a}"
+      "<style>body{font:15px/1.45 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 "
+      "1rem;color:#1d2733}"
+      "svg{width:100%;height:auto;font-size:13px}svg "
+      "text{fill:#1d2733}.measured{fill:#2f6fb0}.interacts{fill:#c2571a}"
       ".predicted{fill:#9aa3ad}.grid{stroke:#d9dee4}table{border-collapse:collapse;width:100%}"
       "td,th{padding:.25rem .5rem;border-bottom:1px solid #d9dee4;text-align:right}"
       "td:first-child,th:first-child{text-align:left}</style></head><body>";
   page += FormatHtml("<h1>Error budget of {}</h1>", budget.scenario);
   page +=
-      "<p>RMS of the object's position error with each source alone (blue; orange where it makes another error in "
+      "<p>RMS of the object's position error with each source alone (blue; orange where it makes another "
+      "error in "
       "company than alone), and what (57) predicts of it to first order (grey).</p>";
   if (!budget.failure.empty()) page += FormatHtml("<p><strong>{}</strong></p>", budget.failure);
   page += DrawChart(budget);

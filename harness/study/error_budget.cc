@@ -39,7 +39,8 @@ Measured RunIdeal(const Setup& setup, const std::vector<std::unique_ptr<ErrorPre
       [&](const StepRecord& step) {
         measured.errors.push_back(step.error.position);
         const Vector3d ideal = reference.CalcAcceleration(step);
-        for (const auto& prediction : predictions) prediction->Step(prediction->CalcAcceleration(step) - ideal);
+        for (const auto& prediction : predictions)
+          prediction->Step(prediction->CalcAcceleration(step) - ideal);
       },
       [] { return false; });
   measured.failure = result.failure;
@@ -64,13 +65,16 @@ void Add(const Errors& b, double sign, Errors* a) {
 }
 
 /// A source with one number or one by name.
-ErrorSource ByKey(const char* name, std::function<void(Imperfections*)> drop) { return {name, std::move(drop)}; }
+ErrorSource ByKey(const char* name, std::function<void(Imperfections*)> drop) {
+  return {name, std::move(drop)};
+}
 
 void ListSensing(const SensingOptions& s, std::vector<ErrorSource>* list) {
   const auto add = [&](bool given, const char* name, auto drop) {
     if (given) list->push_back(ByKey(name, drop));
   };
-  add(!s.joint_counts.Is(0.0), "sensing.joint_counts", [](Imperfections* i) { i->sensing.joint_counts = {}; });
+  add(!s.joint_counts.Is(0.0), "sensing.joint_counts",
+      [](Imperfections* i) { i->sensing.joint_counts = {}; });
   add(!s.joint_noise.Is(0.0), "sensing.joint_noise", [](Imperfections* i) { i->sensing.joint_noise = {}; });
   add(s.velocity != VelocitySource::kMeasured, "sensing.velocity",
       [](Imperfections* i) { i->sensing.velocity = VelocitySource::kMeasured; });
@@ -94,7 +98,8 @@ void ListActuation(const ActuationOptions& a, std::vector<ErrorSource>* list) {
     if (given) list->push_back(ByKey(name, drop));
   };
   add(a.delay > 0.0, "actuation.delay", [](Imperfections* i) { i->actuation.delay = 0.0; });
-  add(!a.torque_step.Is(0.0), "actuation.torque_step", [](Imperfections* i) { i->actuation.torque_step = {}; });
+  add(!a.torque_step.Is(0.0), "actuation.torque_step",
+      [](Imperfections* i) { i->actuation.torque_step = {}; });
   add(!a.gain_error.Is(0.0), "actuation.gain_error", [](Imperfections* i) { i->actuation.gain_error = {}; });
   add(!a.lag.Is(0.0), "actuation.lag", [](Imperfections* i) { i->actuation.lag = {}; });
   add(!a.backlash.Is(0.0), "actuation.backlash", [](Imperfections* i) { i->actuation.backlash = {}; });
@@ -161,10 +166,10 @@ nlohmann::ordered_json ToJson(const ErrorBudget& budget) {
   const auto size = [](const ErrorSize& error) {
     return nlohmann::ordered_json{{"rms_m", error.rms}, {"max_m", error.max}};
   };
-  nlohmann::ordered_json json = {{"scenario", budget.scenario}, {"complete", budget.is_complete()},
-                                 {"failure", budget.failure},   {"ideal", size(budget.ideal)},
-                                 {"all", size(budget.all)},     {"sum", size(budget.sum)},
-                                 {"predicted", size(budget.predicted)}};
+  nlohmann::ordered_json json = {
+      {"scenario", budget.scenario},        {"complete", budget.is_complete()}, {"failure", budget.failure},
+      {"ideal", size(budget.ideal)},        {"all", size(budget.all)},          {"sum", size(budget.sum)},
+      {"predicted", size(budget.predicted)}};
   json["sources"] = nlohmann::ordered_json::array();
   for (const BudgetEntry& entry : budget.entries) {
     json["sources"].push_back({{"name", entry.name},
@@ -189,8 +194,9 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
   if (scenario.task) throw InputError(scenario.source + ": task: a budget needs a trajectory");
   const std::vector<ErrorSource> sources = ListErrorSources(scenario.imperfections);
   if (sources.empty()) {
-    throw InputError(scenario.source + ": asks for nothing of [sensing], [actuation], [[disturbance]] or "
-                                       "[mismatch] that could cost accuracy");
+    throw InputError(scenario.source +
+                     ": asks for nothing of [sensing], [actuation], [[disturbance]] or "
+                     "[mismatch] that could cost accuracy");
   }
   const SetupMaker maker(scenario, robot, mjcf);
   const auto from = static_cast<size_t>(std::lround(scenario.expect.from / scenario.plant.time_step));

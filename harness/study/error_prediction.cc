@@ -35,7 +35,8 @@ Vector3d ErrorPrediction::CalcAcceleration(const StepRecord& ideal) {
   AddRobotForce(wrenches, model_.robot(), force_);
   const Vector6d push = CalcObjectWrench(wrenches, truth.X_Bo);
   const Vector6d& V_Bo_dot =
-      dynamics_.Predict(model_.robot(), model_.grasp(), force_, ObjectSupport::kHand, nullptr, &push).V_Bo_dot;
+      dynamics_.Predict(model_.robot(), model_.grasp(), force_, ObjectSupport::kHand, nullptr, &push)
+          .V_Bo_dot;
   // p_ddot = R (v_dot + omega x v)
   const Vector3d v = truth.V_Bo.head<3>(), omega = truth.V_Bo.tail<3>();
   return truth.X_Bo.linear() * (V_Bo_dot.head<3>() + omega.cross(v));

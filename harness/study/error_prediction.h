@@ -16,9 +16,9 @@
 
 namespace dexcheck {
 
-/// What a plant that is not ideal makes of the object's position, to first order: along the run of an ideal one
-/// it asks at each step what would be told, what the law would send then, what the motors would give, and how
-/// the rigid system (19), (46), (48) with the plant's own masses and pushes would accelerate. By that
+/// What a plant that is not ideal makes of the object's position, to first order: along the run of an ideal
+/// one it asks at each step what would be told, what the law would send then, what the motors would give, and
+/// how the rigid system (19), (46), (48) with the plant's own masses and pushes would accelerate. By that
 /// acceleration less the ideal one, d, (57) is driven:
 ///
 ///   e_ddot + K_v e_dot + K_p e = -d,   e = X_d - X_o

@@ -105,7 +105,8 @@ TEST_F(MotorDriveTest, TheImpulseThroughALagIsThatOfTheCommand) {
 }
 
 TEST_F(MotorDriveTest, StepsAndGainErrors) {
-  MotorDrive drive = Make({.torque_step = {.all = 0.25}, .gain_error = {.groups = {{motors_[kJoint].name, 0.02}}, .key = "k"}});
+  MotorDrive drive = Make(
+      {.torque_step = {.all = 0.25}, .gain_error = {.groups = {{motors_[kJoint].name, 0.02}}, .key = "k"}});
   EXPECT_NEAR(Give(drive, 1.1), 1.02 * 1.0, 1e-15);
   EXPECT_NEAR(Give(drive, 1.13), 1.02 * 1.25, 1e-15);
   tau_[kJoint + 1] = 1.1;
@@ -172,7 +173,9 @@ TEST_F(MotorDriveTest, FrictionWithoutArmatureIsRefused) {
   const RobotModel bare(spec);
   ActuationOptions options{.coulomb = {.all = 0.1, .key = "actuation.coulomb"}};
   EXPECT_TRUE(Throws<InputError>(
-      [&] { return MotorDrive(motors_, options, PartContext{&bare, 4, kDt, 1, "s.toml"}); },
+      [&] {
+        return MotorDrive(motors_, options, PartContext{&bare, 4, kDt, 1, "s.toml"});
+      },
       "s.toml: actuation.coulomb: needs a joint with armature, got"));
 }
 

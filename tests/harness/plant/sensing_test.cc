@@ -71,8 +71,10 @@ TEST_F(SensingTest, QuantisationHasTheVarianceOfAnEvenError) {
 }
 
 TEST_F(SensingTest, NoiseIsWhiteNormalAndItsOwnPerJoint) {
-  Sensing sensing = Make({.joint_noise = {.groups = {{"rf", 1e-3}, {"rf1_1", 2e-3}}, .key = "sensing.joint_noise"}});
-  const int named = model_.FindJoint("rf1_1"), other = model_.FindJoint("rf2_1"), none = model_.FindJoint("r_elbow");
+  Sensing sensing =
+      Make({.joint_noise = {.groups = {{"rf", 1e-3}, {"rf1_1", 2e-3}}, .key = "sensing.joint_noise"}});
+  const int named = model_.FindJoint("rf1_1"), other = model_.FindJoint("rf2_1"),
+            none = model_.FindJoint("r_elbow");
   constexpr int kSteps = 20000;
   double s_named = 0.0, s_other = 0.0, cross = 0.0, lag_one = 0.0, fourth = 0.0, last = 0.0;
   for (int k = 0; k < kSteps; ++k) {
@@ -96,7 +98,8 @@ TEST_F(SensingTest, NoiseIsWhiteNormalAndItsOwnPerJoint) {
 }
 
 TEST_F(SensingTest, EachSourceHasItsOwnNumbers) {
-  SensingOptions both{.joint_noise = {.all = 1e-3}, .velocity_noise = {.all = 1e-2}, .object_position_noise = 1e-3};
+  SensingOptions both{
+      .joint_noise = {.all = 1e-3}, .velocity_noise = {.all = 1e-2}, .object_position_noise = 1e-3};
   SensingOptions one = both;
   one.joint_noise = {};
   Sensing with = Make(both), without = Make(one), other_seed = Make(both, 2);
@@ -113,8 +116,7 @@ TEST_F(SensingTest, EachSourceHasItsOwnNumbers) {
 TEST_F(SensingTest, FilteredDifferencesHaveTheLowPassesTransferFunction) {
   constexpr double kCutoff = 20.0;
   for (const double f : {2.0, 20.0, 60.0}) {
-    Sensing sensing =
-        Make({.velocity = VelocitySource::kDifferenced, .velocity_cutoff = kCutoff});
+    Sensing sensing = Make({.velocity = VelocitySource::kDifferenced, .velocity_cutoff = kCutoff});
     std::complex<double> in = 0.0, out = 0.0;
     constexpr int kSettle = 200, kSteps = 1000;  // whole periods of all three
     for (int k = 0; k < kSettle + kSteps; ++k) {

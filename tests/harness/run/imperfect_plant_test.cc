@@ -1,4 +1,5 @@
-// A plant that is not ideal: what the scenario asks for is known to the checks, what is hidden from it is found.
+// A plant that is not ideal: what the scenario asks for is known to the checks, what is hidden from it is
+// found.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -41,9 +42,11 @@ const Known kKnown[] = {
     {"friction", {"actuation.coulomb={ r_elbow = 0.1 }"}},
     {"backlash", {"actuation.backlash={ r_elbow = 1e-4 }"}},
     {"push_on_link",
-     {"disturbance=[{ type = 'pulse', body = 'r_forearm', force = [0, 5, 0], begin = 0.05, duration = 0.05 }]"}},
+     {"disturbance=[{ type = 'pulse', body = 'r_forearm', force = [0, 5, 0], begin = 0.05, duration = 0.05 "
+      "}]"}},
     {"push_on_platform",
-     {"disturbance=[{ type = 'pulse', body = 'platform', force = [0, 20, 0], begin = 0.05, duration = 0.05 }]"}},
+     {"disturbance=[{ type = 'pulse', body = 'platform', force = [0, 20, 0], begin = 0.05, duration = 0.05 "
+      "}]"}},
     {"push_on_object",
      {"disturbance=[{ type = 'sine', body = 'object', force = [0, 0, 1], frequency = 10 }]"}},
     {"payload", {"disturbance=[{ type = 'payload', body = 'r_palm', mass = 0.2, at = [0, 0, 0.03] }]"}},
@@ -127,8 +130,8 @@ TEST(ImperfectPlant, ZeroSettingsGiveTheSameBits) {
   ShippedRun with("curve",
                   With(kShort, {"sensing.joint_counts=0", "sensing.joint_noise=0", "sensing.latency=0",
                                 "sensing.object_rate=0", "sensing.velocity_cutoff=30", "actuation.delay=0",
-                                "actuation.lag={ rf = 0 }", "actuation.coulomb=0",
-                                "actuation.torque_step=0", "mismatch.mass=1", "mismatch.mass_within=0",
+                                "actuation.lag={ rf = 0 }", "actuation.coulomb=0", "actuation.torque_step=0",
+                                "mismatch.mass=1", "mismatch.mass_within=0",
                                 "mismatch.com={ r_forearm = [0, 0, 0] }", "disturbance=[]"}));
   EXPECT_EQ(without.Run().verdict, Verdict::kPass);
   EXPECT_EQ(with.Run().verdict, Verdict::kPass);

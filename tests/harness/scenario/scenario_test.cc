@@ -110,7 +110,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"fast_camera",
                  {"sensing.object_rate=1500"},
                  "sensing.object_rate: must be at most one pose a time step, got 1500"},
-        BadInput{"filter_without_size", {"sensing.velocity=kalman"}, "sensing.kalman_acceleration: is missing"},
+        BadInput{
+            "filter_without_size", {"sensing.velocity=kalman"}, "sensing.kalman_acceleration: is missing"},
         BadInput{"unknown_source",
                  {"sensing.velocity=guessed"},
                  "sensing.velocity: must be one of \"measured\", \"differenced\", \"kalman\""},
@@ -127,12 +128,14 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"payload_on_the_object",
                  {"disturbance=[{ type = 'payload', body = 'object', mass = 1 }]"},
                  "disturbance.0.body: is no link of the robot, got \"object\""},
-        BadInput{"steep", {"disturbance=[{ type = 'slope', slope_deg = [31, 0] }]"}, "must be at most 30 degrees"},
+        BadInput{
+            "steep", {"disturbance=[{ type = 'slope', slope_deg = [31, 0] }]"}, "must be at most 30 degrees"},
         BadInput{"no_such_link",
                  {"mismatch.mass={ r_fore_arm = 1.05 }"},
                  "mismatch.mass: fits no name of the robot (\"r_forearm\"?), got \"r_fore_arm\""},
         BadInput{"massless", {"mismatch.mass=0"}, "mismatch.mass: must be positive, got 0"},
-        BadInput{"too_random", {"mismatch.mass_within=1"}, "mismatch.mass_within: must be at most 0.99, got 1"},
+        BadInput{
+            "too_random", {"mismatch.mass_within=1"}, "mismatch.mass_within: must be at most 0.99, got 1"},
         BadInput{"unknown_key", {"actuation.lags=1"}, "actuation.lags"}),
     [](const ::testing::TestParamInfo<BadInput>& info) { return info.param.name; });
 

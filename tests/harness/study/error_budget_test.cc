@@ -21,9 +21,10 @@ ErrorBudget Calc(const std::vector<std::string>& overrides) {
 }
 
 TEST(ErrorBudget, PartsThatDoNotInteractAddUpAndArePredicted) {
-  const ErrorBudget budget = Calc({"duration=0.6", "settle=0.5", "mismatch.mass={ r_forearm = 1.01 }",
-                                   "actuation.gain_error={ r_elbow = 2e-3 }",
-                                   "disturbance=[{ type = 'step', body = 'object', force = [0, 0.05, 0], begin = 0.1 }]"});
+  const ErrorBudget budget =
+      Calc({"duration=0.6", "settle=0.5", "mismatch.mass={ r_forearm = 1.01 }",
+            "actuation.gain_error={ r_elbow = 2e-3 }",
+            "disturbance=[{ type = 'step', body = 'object', force = [0, 0.05, 0], begin = 0.1 }]"});
   EXPECT_TRUE(budget.is_complete()) << budget.failure;
   ASSERT_EQ(budget.entries.size(), 3U);
   for (const BudgetEntry& entry : budget.entries) {
@@ -39,19 +40,23 @@ TEST(ErrorBudget, EverySourceOfAScenarioIsListedAndDropped) {
   const Scenario scenario = ReadShippedScenario(
       "curve",
       {"sensing={ joint_counts = 4096, joint_noise = 1e-5, velocity = 'kalman', kalman_acceleration = 10, "
-       "velocity_noise = 1e-3, odometry = true, object_position_noise = 1e-4, object_orientation_noise = 1e-4, "
+       "velocity_noise = 1e-3, odometry = true, object_position_noise = 1e-4, object_orientation_noise = "
+       "1e-4, "
        "object_rate = 100, object_latency = 0.01, object_velocity = 'differenced', latency = 0.002 }",
-       "actuation={ delay = 0.001, torque_step = 0.01, gain_error = 0.01, lag = 0.001, backlash = 1e-4, coulomb = 0.1 }",
+       "actuation={ delay = 0.001, torque_step = 0.01, gain_error = 0.01, lag = 0.001, backlash = 1e-4, "
+       "coulomb = 0.1 }",
        "disturbance=[{ type = 'slope', slope_deg = [1, 0] }, { type = 'step', body = 'object' }, "
        "{ type = 'payload', body = 'r_palm', mass = 0.1 }]",
-       "mismatch={ mass = 1.1, mass_within = 0.1, com = { r_palm = [0.01, 0, 0] }, damping = 1.1, armature = 1.1 }"});
+       "mismatch={ mass = 1.1, mass_within = 0.1, com = { r_palm = [0.01, 0, 0] }, damping = 1.1, armature = "
+       "1.1 }"});
   Imperfections left = scenario.imperfections;
   const std::vector<ErrorSource> sources = ListErrorSources(left);
   EXPECT_EQ(sources.size(), 11U + 6U + 1U + 7U);
   for (const ErrorSource& source : sources) {
     EXPECT_FALSE(left.is_ideal()) << source.name;
     source.drop(&left);
-    EXPECT_EQ(ListErrorSources(left).size(), sources.size() - 1U - static_cast<size_t>(&source - sources.data()))
+    EXPECT_EQ(ListErrorSources(left).size(),
+              sources.size() - 1U - static_cast<size_t>(&source - sources.data()))
         << source.name;
   }
   EXPECT_TRUE(left.is_ideal());
