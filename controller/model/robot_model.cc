@@ -88,6 +88,10 @@ class SpecChecker {
             Eigen::AngleAxisd(base.X_B0.linear()).angle());
       CheckBody("base", base.body);
     }
+    if (base.type == BaseType::kFloating) {
+      Check(base.X_B0.translation().isZero(0.0), "base.pose",
+            "must not stand beside a floating base, distance 0", base.X_B0.translation().norm());
+    }
     if (base.type != BaseType::kDifferentialDrive) return;
     CheckPositive("base.wheel_radius", base.wheel_radius);
     CheckPositive("base.wheel_distance", base.wheel_distance);
@@ -183,16 +187,25 @@ RobotModel::RobotModel(RobotSpec spec) : spec_(std::move(spec)) {
   base_with_wheels_ = CalcBaseWithWheels(spec_.base);
 }
 
-int RobotModel::num_base_velocities() const {
+int RobotModel::num_base_positions() const {
   switch (spec_.base.type) {
     case BaseType::kPlanar:
-      return 3;
     case BaseType::kDifferentialDrive:
-      return 2;
+      return 3;
+    case BaseType::kFloating:
+      return 7;
     case BaseType::kFixed:
       break;
   }
   return 0;
+}
+
+int RobotModel::num_base_velocities() const {
+  return spec_.base.type == BaseType::kDifferentialDrive ? 2 : num_unreduced_base_velocities();
+}
+
+int RobotModel::num_unreduced_base_velocities() const {
+  return spec_.base.type == BaseType::kFloating ? 6 : num_base_positions();
 }
 
 int RobotModel::FindJoint(std::string_view name) const {

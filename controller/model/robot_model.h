@@ -18,6 +18,10 @@ enum class BaseType {
   kFixed,              ///< No coordinates.
   kPlanar,             ///< q_v = [x, y, phi], v = q_v_dot.
   kDifferentialDrive,  ///< q_v = [x_c, y_c, phi] with the constraint (1); v has two entries (12).
+  /// q_v = [x, y, z, qw, qx, qy, qz], origin and unit quaternion of Sigma_0 in the world; v = [velocity of
+  /// the origin in world axes; angular velocity in Sigma_0's axes]. q_v_dot is no velocity of the model: the
+  /// unreduced coordinates have v too.
+  kFloating,
 };
 
 /// The two choices of v in (12) for a differential drive.
@@ -40,8 +44,9 @@ struct WheelProperties {
 struct Base {
   BaseType type = BaseType::kFixed;
   std::string link = "base";
-  MassProperties body;           ///< Without the wheels, in Sigma_0. Ignored for a fixed base.
-  Pose X_B0 = Pose::Identity();  ///< Sigma_0 in the world frame Sigma_B at q_v = 0; turned only when fixed.
+  MassProperties body;  ///< Without the wheels, in Sigma_0. Ignored for a fixed base.
+  /// Sigma_0 in the world frame Sigma_B at q_v = 0; turned only when fixed, the identity when floating.
+  Pose X_B0 = Pose::Identity();
 
   // Differential drive only.
   DriveVelocity velocity = DriveVelocity::kTwist;
@@ -113,10 +118,12 @@ class RobotModel {
 
   /// Number of joints of the tree (without the base and the wheels).
   [[nodiscard]] int num_joints() const { return static_cast<int>(spec_.joints.size()); }
-  /// Entries of q_v: 0 or 3.
-  [[nodiscard]] int num_base_positions() const { return spec_.base.type == BaseType::kFixed ? 0 : 3; }
-  /// Entries of v: 0, 3, or 2.
+  /// Entries of q_v: 0, 3, or 7.
+  [[nodiscard]] int num_base_positions() const;
+  /// Entries of v: 0, 3, 2, or 6.
   [[nodiscard]] int num_base_velocities() const;
+  /// Entries of the base's velocity in unreduced coordinates: of q_v_dot, or of v for a floating base.
+  [[nodiscard]] int num_unreduced_base_velocities() const;
   /// p', entries of q': 51 for the paper's robot.
   [[nodiscard]] int num_positions() const { return num_base_positions() + num_joints(); }
   /// p' - r, entries of xi: 50 for the paper's robot.
