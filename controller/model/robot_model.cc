@@ -208,6 +208,19 @@ int RobotModel::num_unreduced_base_velocities() const {
   return spec_.base.type == BaseType::kFloating ? 6 : num_base_positions();
 }
 
+Pose RobotModel::CalcBasePose(const Eigen::Ref<const VectorXd>& q) const {
+  Pose X_B0 = spec_.base.X_B0;
+  if (spec_.base.type == BaseType::kFixed) return X_B0;
+  if (spec_.base.type == BaseType::kFloating) {
+    X_B0.linear() = Eigen::Quaterniond(q[3], q[4], q[5], q[6]).normalized().toRotationMatrix();
+    X_B0.translation() = q.head<3>();
+    return X_B0;
+  }
+  X_B0.linear() = Eigen::AngleAxisd(q[2], Vector3d::UnitZ()).toRotationMatrix();
+  X_B0.translation() += Vector3d(q[0], q[1], 0.0);
+  return X_B0;
+}
+
 int RobotModel::FindJoint(std::string_view name) const {
   return FindByName(spec_.joints, &Joint::name, name);
 }

@@ -148,6 +148,9 @@ class RobotModel {
   [[nodiscard]] int depth(int joint) const { return depth_[static_cast<size_t>(joint)]; }
   [[nodiscard]] int max_depth() const { return max_depth_; }
 
+  /// Pose of Sigma_0 in the world at q' (num_positions entries).
+  [[nodiscard]] Pose CalcBasePose(const Eigen::Ref<const VectorXd>& q) const;
+
   /// The base's link with the wheels as part of it (their mass at +-b/2 on the axle), in Sigma_0.
   [[nodiscard]] const MassProperties& base_with_wheels() const { return base_with_wheels_; }
 

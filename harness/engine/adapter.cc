@@ -180,6 +180,10 @@ void Adapter::MatchBase(const std::string& engine_source) {
   base_is_free_ = count == 1 && engine.jnt_type[first] == mjJNT_FREE;
   const bool planar = count == 3 && engine.jnt_type[first] == mjJNT_SLIDE &&
                       engine.jnt_type[first + 1] == mjJNT_SLIDE && engine.jnt_type[first + 2] == mjJNT_HINGE;
+  if (model_->base().type == BaseType::kFloating) {
+    if (!base_is_free_) fail("must move by a free joint (base.type is \"floating\")");
+    return;
+  }
   if (!base_is_free_ && !planar) fail("must move by a free joint, or by two slides and a hinge");
 
   const MjDataPtr data = MakeData(engine);
@@ -223,13 +227,6 @@ void Adapter::MatchWheels(const mjData& reference, const std::string& engine_sou
   }
 }
 
-Pose Adapter::CalcBasePose(const Eigen::Ref<const VectorXd>& q) const {
-  Pose X_W0 = Pose::Identity();
-  X_W0.linear() = Eigen::AngleAxisd(q[2], Vector3d::UnitZ()).toRotationMatrix();
-  X_W0.translation() = model_->base().X_B0.translation() + Vector3d(q[0], q[1], 0.0);
-  return X_W0;
-}
-
 void Adapter::CalcBaseRates(const Vector3d& anchor_velocity, double yaw_rate,
                             Eigen::Ref<VectorXd> rates) const {
   if (base_joints_.empty()) return;
@@ -248,7 +245,14 @@ void Adapter::SetPositions(const Eigen::Ref<const VectorXd>& q, mjtNum* qpos) co
   for (size_t i = 0; i < joint_qpos_.size(); ++i) qpos[joint_qpos_[i]] = q[offset + static_cast<int>(i)];
   if (base_joints_.empty()) return;
 
-  const Pose X_WA = CalcBasePose(q) * X_0b_;
+  if (model_->base().type == BaseType::kFloating) {
+    mjtNum* const pose = qpos + engine_->jnt_qposadr[base_joints_[0]];
+    mju_copy3(pose, q.data());
+    mju_copy4(pose + 3, q.data() + 3);
+    mju_normalize4(pose + 3);
+    return;
+  }
+  const Pose X_WA = model_->CalcBasePose(q) * X_0b_;
   if (base_is_free_) {
     mjtNum* const pose = qpos + engine_->jnt_qposadr[base_joints_[0]];
     const Eigen::Quaterniond rotation(X_WA.linear());
@@ -294,6 +298,10 @@ void Adapter::GetPositions(const mjtNum* qpos, Eigen::Ref<VectorXd> q) const {
   for (size_t i = 0; i < joint_qpos_.size(); ++i) q[offset + static_cast<int>(i)] = qpos[joint_qpos_[i]];
   if (base_joints_.empty()) return;
 
+  if (model_->base().type == BaseType::kFloating) {
+    mju_copy(q.data(), qpos + engine_->jnt_qposadr[base_joints_[0]], 7);
+    return;
+  }
   const Pose X_W0 = GetBasePose(qpos);
   q.head<2>() = (X_W0.translation() - model_->base().X_B0.translation()).head<2>();
   q[2] = base_is_free_ ? std::atan2(X_W0.linear()(1, 0), X_W0.linear()(0, 0)) : GetHingeYaw(qpos);
