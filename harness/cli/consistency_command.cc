@@ -22,12 +22,15 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/engine/engine.h"
+#include "harness/sides/answer_files.h"
 #include "harness/sides/complete_description.h"
 #include "harness/sides/description_check.h"
 #include "harness/sides/description_match.h"
 #include "harness/sides/model_comparison.h"
+#include "harness/sides/program_side.h"
 #include "harness/sides/read_description.h"
 #include "harness/sides/robot_file.h"
+#include "harness/sides/side_comparison.h"
 #include "harness/sides/tolerance.h"
 
 namespace dexcheck::cli {
@@ -38,7 +41,11 @@ using Json = nlohmann::ordered_json;
 struct Request {
   std::string a, b;  ///< Two descriptions; none with --robot and --mjcf.
   RobotFiles files;
+  std::string program;             ///< Command of the shell that stands for B.
+  std::filesystem::path answers;   ///< Folder that stands for B.
+  ProgramOptions program_options;
   std::vector<std::string> packages;
+  bool floating = false;
   bool with_engine = true;  ///< files.mjcf is an MJCF; otherwise any other description.
   ConsistencyOptions options;
   std::string json_file;
@@ -50,6 +57,9 @@ struct Request {
   [[nodiscard]] std::optional<double> FindTolerance() const {
     return digits > 0 ? std::pow(10.0, -digits) : tolerance;
   }
+
+  /// What stands for B answers terms, and is no description.
+  [[nodiscard]] bool has_answers() const { return !program.empty() || !answers.empty(); }
 
   /// The results themselves take standard output: a table would spoil them.
   [[nodiscard]] bool PrintsJson() const { return json_file == "-"; }
@@ -195,7 +205,10 @@ ConsistencyResult Compare(const Request& request,
 }
 
 UrdfOptions MakeUrdfOptions(const Request& request) {
-  return {{request.packages.begin(), request.packages.end()}};
+  UrdfOptions options;
+  options.packages.assign(request.packages.begin(), request.packages.end());
+  options.floating = request.floating;
+  return options;
 }
 
 /// Accepts a number above 0 and below 1.
@@ -205,6 +218,15 @@ std::string Fraction(const std::string& text) {
   const std::from_chars_result read = std::from_chars(text.data(), end, value);
   if (read.ec == std::errc() && read.ptr == end && 0.0 < value && value < 1.0) return {};
   return "must be a number above 0 and below 1, got " + Quote(text);
+}
+
+/// Accepts a number above 0.
+std::string PositiveNumber(const std::string& text) {
+  double value = 0.0;
+  const char* const end = text.data() + text.size();
+  const std::from_chars_result read = std::from_chars(text.data(), end, value);
+  if (read.ec == std::errc() && read.ptr == end && value > 0.0 && std::isfinite(value)) return {};
+  return "must be a number above 0, got " + Quote(text);
 }
 
 void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& more) {
@@ -237,7 +259,9 @@ void CompareDescriptionWithEngine(const Request& request, Comparison* comparison
            completion.unstated.end();
   });
   const std::vector<std::string> others = CheckDescription(robot, adapter, &gate);
-  for (const auto& notes : {robot.notes, completion.notes, others}) AppendTo(&comparison->notes, notes);
+  for (const auto& notes : {robot.notes, completion.notes, others, DescribeBaseCoordinates(robot)}) {
+    AppendTo(&comparison->notes, notes);
+  }
 }
 
 /// Two descriptions without the engine.
@@ -245,16 +269,84 @@ void CompareTwoDescriptions(const Request& request, Comparison* comparison) {
   RobotDescription a = ReadDescription(request.files.robot, MakeUrdfOptions(request));
   RobotDescription b = ReadDescription(request.files.mjcf, MakeUrdfOptions(request));
   const std::vector<std::string> taken = CompleteEachOther(&a, &b);
-  for (const auto& notes : {a.notes, b.notes, taken}) AppendTo(&comparison->notes, notes);
+  for (const auto& notes : {a.notes, b.notes, taken, DescribeBaseCoordinates(a)}) {
+    AppendTo(&comparison->notes, notes);
+  }
   comparison->model.emplace(a.spec);
   comparison->result = Compare(request, [&](const std::function<bool(long)>& progress) {
     return CompareDescriptions(a, b, request.options, progress);
   });
 }
 
+/// What a program answers, or has answered, against a description; of an MJCF against the engine.
+void CompareWithAnswers(const Request& request, Comparison* comparison) {
+  const RobotDescription robot = ReadDescription(request.files.robot, MakeUrdfOptions(request));
+  comparison->model.emplace(robot.spec);
+  std::unique_ptr<TermSide> a;
+  if (FindFormat(request.files.robot) == RobotFormat::kMjcf) {
+    a = std::make_unique<EngineSide>(robot, LoadMjcf(request.files.robot), request.files.robot.string(), "MuJoCo");
+  } else {
+    a = std::make_unique<AnalyticSide>(robot, FileName(request.files.robot));
+  }
+  std::unique_ptr<ProgramSide> program;
+  std::unique_ptr<AnswerFiles> answers;
+  if (request.answers.empty()) {
+    program = std::make_unique<ProgramSide>(request.program, robot, request.program_options);
+  } else {
+    answers = std::make_unique<AnswerFiles>(request.answers, robot);
+  }
+  TermSide& b = program ? static_cast<TermSide&>(*program) : *answers;
+  const SideLayout& layout = program ? program->layout() : answers->layout();
+  const auto make_feed = [&]() -> StateFeed {
+    if (program) return FeedRandomStates(*comparison->model, request.options);
+    return [&](long sample, VectorXd* q, VectorXd* xi) {
+      if (sample >= answers->count()) return false;
+      *q = answers->positions(sample);
+      *xi = answers->velocities(sample);
+      return true;
+    };
+  };
+  SideComparison sides(robot, {a.get(), &b});
+  comparison->result = Compare(request, [&](const std::function<bool(long)>& progress) {
+    ConsistencyResult result;
+    result.samples = CompareAtStates(make_feed(), progress, &sides);
+    result.terms = sides.TakePairs().front().terms;
+    return result;
+  });
+  for (const auto& notes : {robot.notes, DescribeBaseCoordinates(robot)}) AppendTo(&comparison->notes, notes);
+  if (layout.is_reduced()) {
+    comparison->notes.push_back("joints that follow others have no coordinate there; both sides' terms are T^T M T "
+                                "and T^T of the forces");
+  }
+  if (!layout.is_floating()) return;
+  const BaseConvention spoken = layout.convention();
+  comparison->notes.push_back("its base is taken as " + Describe(spoken));
+  if (comparison->result.Agrees()) return;
+  const std::optional<BaseConvention> other =
+      FindOtherConvention(robot, a.get(), &b, spoken,
+                          [&](const BaseConvention& convention) {
+                            program ? program->set_convention(convention) : answers->set_convention(convention);
+                          },
+                          make_feed);
+  if (other) {
+    comparison->notes.push_back("all terms agree with its base taken as " + Describe(*other) +
+                                ": this is its convention, which its key \"base\" can say");
+  }
+}
+
 /// Puts A and B where --robot and --mjcf would stand: an MJCF second, if there is one.
 void SortSides(Request* request) {
-  if (request->a.empty()) return;
+  if (request->a.empty() && !request->has_answers()) return;
+  if (request->has_answers()) {
+    if (request->a.empty() || !request->b.empty()) {
+      throw InputError("consistency: one file must be given beside --program or --answers, got " +
+                       std::string(request->a.empty() ? "none" : "two"));
+    }
+    request->files.robot = request->a;
+    request->files.mjcf = request->answers.empty() ? std::filesystem::path("the program") : request->answers;
+    request->with_engine = false;
+    return;
+  }
   if (request->b.empty()) {
     throw InputError("consistency: two files must be given, got " + Quote(request->a));
   }
@@ -272,7 +364,9 @@ int Run(Request request) {
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
   Comparison comparison;
-  if (!request.with_engine) {
+  if (request.has_answers()) {
+    CompareWithAnswers(request, &comparison);
+  } else if (!request.with_engine) {
     CompareTwoDescriptions(request, &comparison);
   } else if (FindFormat(request.files.robot) == RobotFormat::kToml) {
     CompareTableWithEngine(request, &comparison);
@@ -283,7 +377,8 @@ int Run(Request request) {
     JudgeByTolerance(*tolerance, &comparison.result);
   }
   const ConsistencyResult& result = comparison.result;
-  ExitCode code = result.samples < request.options.samples ? kFailure : kSuccess;
+  const bool is_whole = result.samples >= request.options.samples || !request.answers.empty();
+  ExitCode code = is_whole ? kSuccess : kFailure;
   if (!result.Agrees()) code = kDisagreement;
   if (json) json->Write(ToText(request, comparison, code));
   if (!request.PrintsJson()) {
@@ -307,6 +402,21 @@ void AddConsistencyCommand(Command app) {
       .TypeName("FILE")
       .Excludes(robot);
   command.AddOption("B", &request->b, "The other one").TypeName("FILE");
+  const Option program =
+      command
+          .AddOption("--program", &request->program,
+                     "Command of a program that answers terms, instead of B (harness/sides/README.md)")
+          .TypeName("CMD");
+  command
+      .AddOption("--answers", &request->answers,
+                 "Folder with states as dexcheck states writes them and NumPy arrays of answers, instead of B")
+      .TypeName("FOLDER")
+      .Excludes(program);
+  command.AddOption("--time-limit", &request->program_options.seconds, "For each answer of the program, s")
+      .TypeName("S")
+      .Check(PositiveNumber)
+      .ShowDefault();
+  command.AddFlag("--floating", &request->floating, "The root of a URDF floats");
   command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
       .TypeName("PATH")
       .Repeatable();

@@ -6,6 +6,7 @@
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/join_names.h"
+#include "harness/sides/mjcf_reader.h"
 
 namespace dexcheck {
 namespace {
@@ -17,6 +18,7 @@ class EngineCompletion {
       : engine_(engine), engine_source_(std::move(engine_source)), robot_(*robot) {}
 
   Completion Run() {
+    TakeBase();
     TakeGravity();
     TakeNames();
     TakeJointConstants();
@@ -27,6 +29,22 @@ class EngineCompletion {
  private:
   [[nodiscard]] int FindEngineJoint(const Joint& joint) const {
     return mj_name2id(&engine_, mjOBJ_JOINT, joint.name.c_str());
+  }
+
+  /// A base that the file does not state floats if the engine's does, in the frame of the body of one name.
+  void TakeBase() {
+    const int body = FindFloatingBase(engine_);
+    if (body < 0) return;
+    if (!robot_.states_base) {
+      LetBaseFloat(&robot_);
+      result_.notes.push_back("base: " + robot_.spec.source + " does not say how its root moves; it floats as in " +
+                              engine_source_);
+    }
+    if (robot_.spec.base.type != BaseType::kFloating) return;
+    const std::string name = engine_.names + engine_.name_bodyadr[body];
+    if (MoveBaseTo(name, &robot_)) return;
+    result_.notes.push_back("links by other names: " + Quote(robot_.spec.base.link) + " is " + Quote(name));
+    robot_.spec.base.link = name;
   }
 
   void TakeGravity() {

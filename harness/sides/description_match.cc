@@ -18,6 +18,7 @@ class Completion {
       : a_(*a), b_(*b), b_of_a_(MatchJoints(a_.spec, b_.spec)), a_of_b_(MatchJoints(b_.spec, a_.spec)) {}
 
   std::vector<std::string> Run() {
+    TakeBase();
     RequireSameMechanism();
     TakeGravity();
     TakeNames();
@@ -58,6 +59,21 @@ class Completion {
       throw InputError(key + "must come after " + name(a_.spec, joint.parent) + " as in " + a_.spec.source +
                        ", comes after " + name(b_.spec, other.parent));
     }
+  }
+
+  /// A base that one file does not state moves as the other one's; a floating one's frame is that of the link
+  /// of one name.
+  void TakeBase() {
+    const auto take = [this](RobotDescription* robot, const RobotDescription& other) {
+      if (robot->states_base || other.spec.base.type != BaseType::kFloating) return;
+      LetBaseFloat(robot);
+      notes_.push_back("base: " + robot->spec.source + " does not say how its root moves; it floats as that of " +
+                       other.spec.source);
+    };
+    take(&a_, b_);
+    take(&b_, a_);
+    if (a_.spec.base.type != BaseType::kFloating || b_.spec.base.type != BaseType::kFloating) return;
+    if (!MoveBaseTo(a_.spec.base.link, &b_)) MoveBaseTo(b_.spec.base.link, &a_);
   }
 
   void TakeGravity() {
