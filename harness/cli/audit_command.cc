@@ -98,8 +98,11 @@ int Run(const Request& request) {
 
 void AddAuditCommand(Command app) {
   const auto request = std::make_shared<Request>();
-  Command command = app.AddCommand("audit", "Look for what cannot be, or is odd, in one description of a robot");
-  command.AddOption("FILE", &request->robot, "Parameter file (TOML), URDF or MJCF").TypeName("FILE").Required();
+  Command command =
+      app.AddCommand("audit", "Look for what cannot be, or is odd, in one description of a robot");
+  command.AddOption("FILE", &request->robot, "Parameter file (TOML), URDF or MJCF")
+      .TypeName("FILE")
+      .Required();
   command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
       .TypeName("PATH")
       .Repeatable();

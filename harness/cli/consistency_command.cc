@@ -23,6 +23,7 @@
 #include "harness/cli/progress_bar.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/answer_files.h"
+#include "harness/sides/answers_comparison.h"
 #include "harness/sides/complete_description.h"
 #include "harness/sides/description_check.h"
 #include "harness/sides/description_match.h"
@@ -30,7 +31,6 @@
 #include "harness/sides/program_side.h"
 #include "harness/sides/read_description.h"
 #include "harness/sides/robot_file.h"
-#include "harness/sides/side_comparison.h"
 #include "harness/sides/tolerance.h"
 
 namespace dexcheck::cli {
@@ -41,8 +41,8 @@ using Json = nlohmann::ordered_json;
 struct Request {
   std::string a, b;  ///< Two descriptions; none with --robot and --mjcf.
   RobotFiles files;
-  std::string program;             ///< Command of the shell that stands for B.
-  std::filesystem::path answers;   ///< Folder that stands for B.
+  std::string program;            ///< Command of the shell that stands for B.
+  std::filesystem::path answers;  ///< Folder that stands for B.
   ProgramOptions program_options;
   std::vector<std::string> packages;
   bool floating = false;
@@ -112,13 +112,15 @@ void PrintVerdict(const Request& request, const Comparison& comparison) {
   const RobotModel& model = *comparison.model;
   const ConsistencyResult& result = comparison.result;
   const int base = model.num_base_velocities();
-  if (result.samples < request.options.samples) {
+  if (result.samples < request.options.samples && request.answers.empty()) {
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
   }
   if (result.Agrees()) {
     const std::optional<double> tolerance = request.FindTolerance();
     fmt::print("AGREE: {} agree to {} in all {} terms.\n",
-               request.with_engine ? "the analytic model and MuJoCo" : "the two descriptions",
+               request.with_engine     ? "the analytic model and MuJoCo"
+               : request.has_answers() ? "the description and the answers"
+                                       : "the two descriptions",
                tolerance ? fmt::format("{:g}", *tolerance) : "rounding", result.terms.size());
     return;
   }
@@ -278,60 +280,26 @@ void CompareTwoDescriptions(const Request& request, Comparison* comparison) {
   });
 }
 
-/// What a program answers, or has answered, against a description; of an MJCF against the engine.
+/// A description against what a program answers, or has answered; of an MJCF the engine is the other side.
 void CompareWithAnswers(const Request& request, Comparison* comparison) {
   const RobotDescription robot = ReadDescription(request.files.robot, MakeUrdfOptions(request));
   comparison->model.emplace(robot.spec);
-  std::unique_ptr<TermSide> a;
-  if (FindFormat(request.files.robot) == RobotFormat::kMjcf) {
-    a = std::make_unique<EngineSide>(robot, LoadMjcf(request.files.robot), request.files.robot.string(), "MuJoCo");
-  } else {
-    a = std::make_unique<AnalyticSide>(robot, FileName(request.files.robot));
-  }
-  std::unique_ptr<ProgramSide> program;
-  std::unique_ptr<AnswerFiles> answers;
-  if (request.answers.empty()) {
-    program = std::make_unique<ProgramSide>(request.program, robot, request.program_options);
-  } else {
-    answers = std::make_unique<AnswerFiles>(request.answers, robot);
-  }
-  TermSide& b = program ? static_cast<TermSide&>(*program) : *answers;
-  const SideLayout& layout = program ? program->layout() : answers->layout();
-  const auto make_feed = [&]() -> StateFeed {
-    if (program) return FeedRandomStates(*comparison->model, request.options);
-    return [&](long sample, VectorXd* q, VectorXd* xi) {
-      if (sample >= answers->count()) return false;
-      *q = answers->positions(sample);
-      *xi = answers->velocities(sample);
-      return true;
-    };
+  const std::unique_ptr<TermSide> reference = MakeReferenceSide(robot, request.files.robot.string());
+  std::unique_ptr<AnsweringSide> side;
+  std::function<StateFeed()> make_feed = [&] {
+    return FeedRandomStates(*comparison->model, request.options);
   };
-  SideComparison sides(robot, {a.get(), &b});
-  comparison->result = Compare(request, [&](const std::function<bool(long)>& progress) {
-    ConsistencyResult result;
-    result.samples = CompareAtStates(make_feed(), progress, &sides);
-    result.terms = sides.TakePairs().front().terms;
-    return result;
-  });
+  if (request.answers.empty()) {
+    side = std::make_unique<ProgramSide>(request.program, robot, request.program_options);
+  } else {
+    auto answers = std::make_unique<AnswerFiles>(request.answers, robot);
+    make_feed = [&feed = *answers] { return feed.MakeFeed(); };
+    side = std::move(answers);
+  }
   for (const auto& notes : {robot.notes, DescribeBaseCoordinates(robot)}) AppendTo(&comparison->notes, notes);
-  if (layout.is_reduced()) {
-    comparison->notes.push_back("joints that follow others have no coordinate there; both sides' terms are T^T M T "
-                                "and T^T of the forces");
-  }
-  if (!layout.is_floating()) return;
-  const BaseConvention spoken = layout.convention();
-  comparison->notes.push_back("its base is taken as " + Describe(spoken));
-  if (comparison->result.Agrees()) return;
-  const std::optional<BaseConvention> other =
-      FindOtherConvention(robot, a.get(), &b, spoken,
-                          [&](const BaseConvention& convention) {
-                            program ? program->set_convention(convention) : answers->set_convention(convention);
-                          },
-                          make_feed);
-  if (other) {
-    comparison->notes.push_back("all terms agree with its base taken as " + Describe(*other) +
-                                ": this is its convention, which its key \"base\" can say");
-  }
+  comparison->result = Compare(request, [&](const std::function<bool(long)>& progress) {
+    return CompareAnswers(robot, reference.get(), side.get(), make_feed, progress, &comparison->notes);
+  });
 }
 
 /// Puts A and B where --robot and --mjcf would stand: an MJCF second, if there is one.
@@ -408,8 +376,9 @@ void AddConsistencyCommand(Command app) {
                      "Command of a program that answers terms, instead of B (harness/sides/README.md)")
           .TypeName("CMD");
   command
-      .AddOption("--answers", &request->answers,
-                 "Folder with states as dexcheck states writes them and NumPy arrays of answers, instead of B")
+      .AddOption(
+          "--answers", &request->answers,
+          "Folder with states as dexcheck states writes them and NumPy arrays of answers, instead of B")
       .TypeName("FOLDER")
       .Excludes(program);
   command.AddOption("--time-limit", &request->program_options.seconds, "For each answer of the program, s")

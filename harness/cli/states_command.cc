@@ -46,7 +46,9 @@ void AddStatesCommand(Command app) {
   const auto request = std::make_shared<Request>();
   Command command = app.AddCommand(
       "states", "Write random states of a robot, for a program whose answers consistency --answers reads");
-  command.AddOption("ROBOT", &request->robot, "Parameter file (TOML), URDF or MJCF").TypeName("FILE").Required();
+  command.AddOption("ROBOT", &request->robot, "Parameter file (TOML), URDF or MJCF")
+      .TypeName("FILE")
+      .Required();
   command.AddOption("--out", &request->out, "Folder for layout.json, states.jsonl, q.npy and v.npy")
       .TypeName("FOLDER")
       .Required();

@@ -11,8 +11,9 @@ namespace dexcheck {
 
 /// T(q') between the paper's velocities and the engine's: qvel = T velocity, qacc = T velocity_dot + T_dot
 /// velocity, for an upright base on rolling wheels. The wheels' rolling is taken from the engine's own
-/// geometry. For a floating base T is the identity: both have the origin's velocity along the world's axes and
-/// the angular velocity along the base's. T has dense columns for the base and one unit entry for each joint.
+/// geometry. For a floating base T is the identity: both have the origin's velocity along the world's axes
+/// and the angular velocity along the base's. T has dense columns for the base and one unit entry for each
+/// joint.
 class VelocityMap {
  public:
   VelocityMap(const Adapter& adapter, Coordinates coordinates);

@@ -45,6 +45,10 @@ Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const
 Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
              MjModelPtr engine)
     : scenario_(scenario), model_(ReadModel(scenario, robot)), engine_(std::move(engine)) {
+  if (model_.base().type == BaseType::kFloating) {
+    throw InputError(robot.string() +
+                     ": base.type: must not be \"floating\" in a run, whose law drives the base");
+  }
   if (!model_.object()) {
     throw InputError(robot.string() + ": object: is missing, and the scenario holds one");
   }

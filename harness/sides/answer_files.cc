@@ -1,5 +1,6 @@
 #include "harness/sides/answer_files.h"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "controller/common/errors.h"
@@ -76,7 +77,7 @@ std::string WriteLayout(const RobotDescription& robot, const std::string& origin
 }
 
 AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescription& robot)
-    : folder_(folder), name_(folder.string()), layout_(ReadLayout(folder / "layout.json", robot)) {
+    : AnsweringSide(ReadLayout(folder / "layout.json", robot)), folder_(folder), name_(folder.string()) {
   const RobotModel model(robot.spec);
   q_ = ParseNpy(ReadBytes(folder / "q.npy"), (folder / "q.npy").string());
   const size_t count = q_.shape.empty() ? 0 : q_.shape[0];
@@ -84,7 +85,7 @@ AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescrip
   if (count == 0) throw InputError((folder / "q.npy").string() + ": must have states, got none");
   q_ = Read("q.npy", {count, static_cast<size_t>(model.num_positions())});
   v_ = Read("v.npy", {count, static_cast<size_t>(model.num_velocities())});
-  const auto n = static_cast<size_t>(layout_.size());
+  const auto n = static_cast<size_t>(layout().size());
   const auto find = [&](const std::string& term, const std::vector<size_t>& shape) {
     const std::string file = term + ".npy";
     if (std::filesystem::exists(folder_ / file)) terms_.emplace(term, Read(file, shape));
@@ -93,9 +94,19 @@ AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescrip
   for (const char* term : {"c", "g", "h", "friction"}) find(term, {count, n});
   for (const char* term : {"kinetic_energy", "potential_energy"}) find(term, {count});
   if (!terms_.empty()) return;
-  throw InputError(folder.string() +
-                   ": must have answers: M.npy, C.npy, c.npy, g.npy, h.npy, friction.npy, kinetic_energy.npy or "
-                   "potential_energy.npy, got none");
+  throw InputError(
+      folder.string() +
+      ": must have answers: M.npy, C.npy, c.npy, g.npy, h.npy, friction.npy, kinetic_energy.npy or "
+      "potential_energy.npy, got none");
+}
+
+StateFeed AnswerFiles::MakeFeed() const {
+  return [this](long sample, VectorXd* q, VectorXd* xi) {
+    if (sample >= count_) return false;
+    *q = positions(sample);
+    *xi = velocities(sample);
+    return true;
+  };
 }
 
 NpyArray AnswerFiles::Read(const std::string& file, const std::vector<size_t>& shape) const {
@@ -122,7 +133,7 @@ VectorXd AnswerFiles::FindRow(const std::string& term, long sample) const {
 
 SideTerms AnswerFiles::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
   SideTerms terms;
-  const Eigen::Index n = layout_.size();
+  const Eigen::Index n = layout().size();
   const auto matrix = [&](const char* term) {
     // Rows as NumPy has them.
     const VectorXd numbers = FindRow(term, sample);
@@ -131,7 +142,7 @@ SideTerms AnswerFiles::Evaluate(long sample, const VectorXd& q, const VectorXd& 
   terms.M = matrix("M");
   terms.coriolis = FindRow("c", sample);
   const MatrixXd C = matrix("C");
-  if (C.size() > 0 && terms.coriolis.size() == 0) terms.coriolis = C * layout_.WriteVelocities(q, xi);
+  if (C.size() > 0 && terms.coriolis.size() == 0) terms.coriolis = C * layout().WriteVelocities(q, xi);
   terms.gravity = FindRow("g", sample);
   terms.bias = FindRow("h", sample);
   terms.friction = FindRow("friction", sample);
@@ -142,7 +153,7 @@ SideTerms AnswerFiles::Evaluate(long sample, const VectorXd& q, const VectorXd& 
   const VectorXd potential = FindRow("potential_energy", sample);
   if (kinetic.size() > 0) terms.kinetic = kinetic[0];
   if (potential.size() > 0) terms.potential = potential[0];
-  layout_.ReadTerms(q, xi, &terms);
+  layout().ReadTerms(q, xi, &terms);
   return terms;
 }
 

@@ -8,7 +8,7 @@
 
 #include "harness/checks/consistency.h"
 #include "harness/sides/npy_file.h"
-#include "harness/sides/side_layout.h"
+#include "harness/sides/side_comparison.h"
 
 namespace dexcheck {
 
@@ -31,20 +31,19 @@ std::string WriteLayout(const RobotDescription& robot, const std::string& origin
 /// robot's own layout; M.npy, C.npy (N x n x n), c.npy, g.npy, h.npy, friction.npy (N x n),
 /// kinetic_energy.npy, potential_energy.npy (N), each of which may be missing, in the layout of layout.json,
 /// or in the robot's own without such a file.
-class AnswerFiles : public TermSide {
+class AnswerFiles : public AnsweringSide {
  public:
   /// @throws InputError, one line that names the file.
   AnswerFiles(const std::filesystem::path& folder, const RobotDescription& robot);
 
   [[nodiscard]] const std::string& name() const override { return name_; }
-  [[nodiscard]] bool is_reduced() const override { return layout_.is_reduced(); }
-  [[nodiscard]] const SideLayout& layout() const { return layout_; }
-  void set_convention(const BaseConvention& convention) { layout_.set_convention(convention); }
 
   /// Number of states, and each of them.
   [[nodiscard]] long count() const { return count_; }
   [[nodiscard]] VectorXd positions(long sample) const { return Row(q_, sample); }
   [[nodiscard]] VectorXd velocities(long sample) const { return Row(v_, sample); }
+  /// Gives the states, from the first to the last.
+  [[nodiscard]] StateFeed MakeFeed() const;
   SideTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
 
  private:
@@ -54,7 +53,6 @@ class AnswerFiles : public TermSide {
 
   std::filesystem::path folder_;
   std::string name_;
-  SideLayout layout_;
   long count_ = 0;
   NpyArray q_, v_;
   std::map<std::string, NpyArray> terms_;

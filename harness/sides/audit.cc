@@ -47,7 +47,8 @@ double CalcCondition(const RobotDescription& robot, const RobotSpec& spec) {
   for (size_t link = 0; link < bodies.excess.size(); ++link) {
     if (bodies.excess[link].isZero(0.0)) continue;
     added.emplace_back(static_cast<int>(bodies.spec.frames.size()), bodies.excess[link]);
-    bodies.spec.frames.push_back({"link" + std::to_string(link), static_cast<int>(link) - 1, Pose::Identity(), {}});
+    bodies.spec.frames.push_back(
+        {"link" + std::to_string(link), static_cast<int>(link) - 1, Pose::Identity(), {}});
   }
   const RobotModel model(bodies.spec);
   ModelTerms terms(model);
@@ -80,7 +81,8 @@ double CalcCondition(const RobotDescription& robot, const RobotSpec& spec) {
     const double least = solver.eigenvalues().minCoeff();
     const double largest = solver.eigenvalues().maxCoeff();
     // Below rounding of the largest, an eigenvalue is zero.
-    const bool is_singular = least <= largest * static_cast<double>(n) * std::numeric_limits<double>::epsilon();
+    const bool is_singular =
+        least <= largest * static_cast<double>(n) * std::numeric_limits<double>::epsilon();
     conditions.push_back(is_singular ? kInfinity : largest / least);
   }
   std::nth_element(conditions.begin(), conditions.begin() + kStates / 2, conditions.end());
@@ -115,7 +117,8 @@ class JointAudit {
  private:
   AuditFinding& Add(AuditLevel level, const std::string& check, size_t joint, const std::string& text) {
     const int line = robot_.joints[joint].line;
-    findings_.push_back({level, check, "joint " + spec_.joints[joint].name, line, text, {}, AuditFinding::kNoBody});
+    findings_.push_back(
+        {level, check, "joint " + spec_.joints[joint].name, line, text, {}, AuditFinding::kNoBody});
     return findings_.back();
   }
 
@@ -166,7 +169,8 @@ class JointAudit {
       if (joint.armature > 0.0) continue;
       const std::string end = is_end[i] ? ", the end of a chain" : "";
       if (mass[i] <= 0.0) {
-        Add(AuditLevel::kOdd, "load", i, "moves no mass" + end + ": M is singular").body = static_cast<int>(i);
+        Add(AuditLevel::kOdd, "load", i, "moves no mass" + end + ": M is singular").body =
+            static_cast<int>(i);
         continue;
       }
       if (joint.type != JointType::kRevolute || !is_end[i]) continue;
@@ -202,8 +206,7 @@ class JointAudit {
       check(&joints, "joint", spec_.joints[i].name, robot_.joints[i].line);
     }
     for (const std::string& name : robot_.unused) {
-      findings_.push_back(
-          {AuditLevel::kNote, "name", name, 0, "nothing uses it", {}, AuditFinding::kNoBody});
+      findings_.push_back({AuditLevel::kNote, "name", name, 0, "nothing uses it", {}, AuditFinding::kNoBody});
     }
   }
 
@@ -242,8 +245,8 @@ void AuditJoints(const RobotDescription& robot, std::vector<AuditFinding>* findi
 void AuditCondition(const RobotDescription& robot, AuditResult* result) {
   result->condition = CalcCondition(robot, robot.spec);
   for (AuditFinding& finding : result->findings) {
-    const bool is_moving = finding.body >= 0 ||
-                           (finding.body == -1 && robot.spec.base.type != BaseType::kFixed);
+    const bool is_moving =
+        finding.body >= 0 || (finding.body == -1 && robot.spec.base.type != BaseType::kFixed);
     if (!is_moving || finding.level == AuditLevel::kNote) continue;
     RobotSpec spec = robot.spec;
     MassProperties* body =

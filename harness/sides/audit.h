@@ -57,8 +57,8 @@ void AuditJoints(const RobotDescription& robot, std::vector<AuditFinding>* findi
 /// Condition numbers, with and without each finding about a body.
 void AuditCondition(const RobotDescription& robot, AuditResult* result);
 
-/// The body in whose place a file's would not stand out: a uniform solid sphere of its mass and the density of
-/// water, at its centre of mass.
+/// The body in whose place a file's would not stand out: a uniform solid sphere of its mass and the density
+/// of water, at its centre of mass.
 MassProperties MakePlausibleBody(const MassProperties& body);
 
 }  // namespace dexcheck

@@ -29,7 +29,8 @@ std::string Format(const Vector3d& v) {
 }
 
 Vector3d CalcMoments(const Matrix3d& inertia) {
-  return Eigen::SelfAdjointEigenSolver<Matrix3d>(0.5 * (inertia + inertia.transpose()), Eigen::EigenvaluesOnly)
+  return Eigen::SelfAdjointEigenSolver<Matrix3d>(0.5 * (inertia + inertia.transpose()),
+                                                 Eigen::EigenvaluesOnly)
       .eigenvalues();
 }
 
@@ -111,18 +112,20 @@ class BodyAudit {
     return true;
   }
 
-  /// The uniform ellipsoid that has the body's mass and inertia: half axes a_i^2 = 5 / (2 m) (I_j + I_k - I_i).
+  /// The uniform ellipsoid that has the body's mass and inertia: half axes a_i^2 = 5 / (2 m) (I_j + I_k -
+  /// I_i).
   void AuditSize(const DescribedPart& part) {
     const MassProperties& body = part.body;
     const Vector3d moments = CalcMoments(body.inertia);
-    const Vector3d squares =
-        (2.5 / body.mass) * Vector3d(moments[1] + moments[2] - moments[0], moments[2] + moments[0] - moments[1],
-                                     moments[0] + moments[1] - moments[2]);
+    const Vector3d squares = (2.5 / body.mass) * Vector3d(moments[1] + moments[2] - moments[0],
+                                                          moments[2] + moments[0] - moments[1],
+                                                          moments[0] + moments[1] - moments[2]);
     const Vector3d axes = squares.cwiseMax(0.0).cwiseSqrt();
     constexpr double kThin = 1e-3;  // of the longest axis: a plate or rod, which has no density
     if (axes.minCoeff() < kThin * axes.maxCoeff()) return;
     const double density = body.mass / (4.0 / 3.0 * std::numbers::pi * axes.prod());
-    // Foam has 10 kg/m^3 and tungsten 19,300; hollow shells look larger than they are, by less than ten times.
+    // Foam has 10 kg/m^3 and tungsten 19,300; hollow shells look larger than they are, by less than ten
+    // times.
     constexpr double kLightest = 2.0;
     constexpr double kHeaviest = 1e5;
     if (density >= kLightest && density <= kHeaviest) return;
@@ -169,8 +172,10 @@ class BodyAudit {
     constexpr double kAllowance = 1.5;  // covers and cables that the geometry leaves out
     if (largest > kAllowance * body.mass * farthest) {
       Add(AuditLevel::kOdd, "inertia", part,
-          "has a principal moment of " + Format(largest) + " kg m^2, more than its mass can have within its "
-          "geometry, " + Format(body.mass * farthest) + " kg m^2");
+          "has a principal moment of " + Format(largest) +
+              " kg m^2, more than its mass can have within its "
+              "geometry, " +
+              Format(body.mass * farthest) + " kg m^2");
     }
   }
 
@@ -179,9 +184,14 @@ class BodyAudit {
 };
 
 /// Words that stand for one side, and the other side's.
-constexpr std::array<std::pair<const char*, const char*>, 8> kSides = {
-    {{"left", "right"}, {"l", "r"}, {"fl", "fr"}, {"rl", "rr"}, {"hl", "hr"}, {"bl", "br"}, {"lf", "rf"},
-     {"lh", "rh"}}};
+constexpr std::array<std::pair<const char*, const char*>, 8> kSides = {{{"left", "right"},
+                                                                        {"l", "r"},
+                                                                        {"fl", "fr"},
+                                                                        {"rl", "rr"},
+                                                                        {"hl", "hr"},
+                                                                        {"bl", "br"},
+                                                                        {"lf", "rf"},
+                                                                        {"lh", "rh"}}};
 
 std::string ToLower(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -208,7 +218,8 @@ std::string FindMirrorName(const std::string& name) {
       std::string other = right;
       for (size_t i = 0; i < other.size(); ++i) {
         const char model = word[std::min(i, word.size() - 1)];
-        if (!is_small(model)) other[i] = static_cast<char>(std::toupper(static_cast<unsigned char>(other[i])));
+        if (!is_small(model))
+          other[i] = static_cast<char>(std::toupper(static_cast<unsigned char>(other[i])));
       }
       return name.substr(0, begin) + other + name.substr(end);
     }
@@ -233,13 +244,19 @@ class MirrorAudit {
 
  private:
   void Add(const DescribedPart& left, const DescribedPart& right, const std::string& text) {
-    findings_.push_back({AuditLevel::kOdd, "mirror", "link " + right.name, right.line,
-                         text + " (against " + left.name + ")", {}, AuditFinding::kNoBody});
+    findings_.push_back({AuditLevel::kOdd,
+                         "mirror",
+                         "link " + right.name,
+                         right.line,
+                         text + " (against " + left.name + ")",
+                         {},
+                         AuditFinding::kNoBody});
   }
 
   void ComparePair(const DescribedPart& left, const DescribedPart& right) {
     if (left.states_inertial != right.states_inertial) {
-      Add(left, right, right.states_inertial ? "has an inertial, the other side has none" : "has no inertial");
+      Add(left, right,
+          right.states_inertial ? "has an inertial, the other side has none" : "has no inertial");
       return;
     }
     const MassProperties& a = left.body;
@@ -275,7 +292,8 @@ class MirrorAudit {
     const MassProperties& b = right.body;
     bool com_fits = false;
     for (int signs = 0; signs < 8; ++signs) {
-      const Vector3d s((signs & 1) != 0 ? -1.0 : 1.0, (signs & 2) != 0 ? -1.0 : 1.0, (signs & 4) != 0 ? -1.0 : 1.0);
+      const Vector3d s((signs & 1) != 0 ? -1.0 : 1.0, (signs & 2) != 0 ? -1.0 : 1.0,
+                       (signs & 4) != 0 ? -1.0 : 1.0);
       if ((s.asDiagonal() * a.com - b.com).cwiseAbs().maxCoeff() > com_allowance) continue;
       com_fits = true;
       const Matrix3d mirrored = s.asDiagonal() * a.inertia * s.asDiagonal();

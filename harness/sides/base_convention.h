@@ -19,7 +19,8 @@ struct BaseConvention {
   Position position = Position::kXyzWxyz;
   bool angular_first = false;   ///< The velocity is [angular; linear] (Drake, Simbody, Featherstone).
   bool linear_in_base = false;  ///< The origin's velocity is along the base's axes (Pinocchio).
-  bool angular_in_world = false;  ///< The angular velocity is along the world's axes (Drake, Simbody, Bullet).
+  bool angular_in_world =
+      false;  ///< The angular velocity is along the world's axes (Drake, Simbody, Bullet).
 
   bool operator==(const BaseConvention&) const = default;
 };

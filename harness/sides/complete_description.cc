@@ -37,8 +37,8 @@ class EngineCompletion {
     if (body < 0) return;
     if (!robot_.states_base) {
       LetBaseFloat(&robot_);
-      result_.notes.push_back("base: " + robot_.spec.source + " does not say how its root moves; it floats as in " +
-                              engine_source_);
+      result_.notes.push_back("base: " + robot_.spec.source +
+                              " does not say how its root moves; it floats as in " + engine_source_);
     }
     if (robot_.spec.base.type != BaseType::kFloating) return;
     const std::string name = engine_.names + engine_.name_bodyadr[body];

@@ -67,8 +67,8 @@ class Completion {
     const auto take = [this](RobotDescription* robot, const RobotDescription& other) {
       if (robot->states_base || other.spec.base.type != BaseType::kFloating) return;
       LetBaseFloat(robot);
-      notes_.push_back("base: " + robot->spec.source + " does not say how its root moves; it floats as that of " +
-                       other.spec.source);
+      notes_.push_back("base: " + robot->spec.source +
+                       " does not say how its root moves; it floats as that of " + other.spec.source);
     };
     take(&a_, b_);
     take(&b_, a_);

@@ -125,7 +125,8 @@ class ParameterWriter {
     text_ += robot_.states_gravity ? "\n\n" : "  # not stated there\n\n";
     const bool floats = spec_.base.type == BaseType::kFloating;
     text_ += std::string("[base]\ntype = ") + (floats ? "\"floating\"" : "\"fixed\"");
-    text_ += (robot_.states_base ? "\nlink = " : "  # not stated there\nlink = ") + QuoteToml(spec_.base.link) + "\n";
+    text_ += (robot_.states_base ? "\nlink = " : "  # not stated there\nlink = ") +
+             QuoteToml(spec_.base.link) + "\n";
     if (floats) WriteBody(spec_.base.body);
     const std::string pose = FormatPose(spec_.base.X_B0, false);
     if (!pose.empty()) text_ += "pose = {" + pose.substr(1) + " }\n";

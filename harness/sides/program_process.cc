@@ -29,7 +29,9 @@ void Close(int* descriptor) {
   *descriptor = -1;
 }
 
-void SetNonBlocking(int descriptor) { ::fcntl(descriptor, F_SETFL, ::fcntl(descriptor, F_GETFL) | O_NONBLOCK); }
+void SetNonBlocking(int descriptor) {
+  ::fcntl(descriptor, F_SETFL, ::fcntl(descriptor, F_GETFL) | O_NONBLOCK);
+}
 
 /// In the child. Only calls that are safe after a fork.
 [[noreturn]] void BecomeProgram(const char* command, int input, int output, int messages) {
@@ -51,8 +53,8 @@ ProgramProcess::ProgramProcess(std::string command, double seconds)
   int out[2] = {-1, -1};
   int err[2] = {-1, -1};
   const auto fail = [&] {
-    throw ProgramError("program " + Quote(command_) + ": cannot be started: " +
-                       std::generic_category().message(errno));
+    throw ProgramError("program " + Quote(command_) +
+                       ": cannot be started: " + std::generic_category().message(errno));
   };
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) != 0) fail();
   if (::pipe2(out, O_CLOEXEC) != 0 || ::pipe2(err, O_CLOEXEC) != 0) fail();

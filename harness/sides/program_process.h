@@ -28,8 +28,8 @@ class ProgramProcess {
   ProgramProcess& operator=(const ProgramProcess&) = delete;
 
   /// Sends a line and returns the next line of standard output, without its end.
-  /// @throws ProgramError when the program ends, hangs or answers without end, InputError when the shell knows
-  /// no such command.
+  /// @throws ProgramError when the program ends, hangs or answers without end, InputError when the shell
+  /// knows no such command.
   std::string Ask(const std::string& line);
 
   [[nodiscard]] const std::string& command() const { return command_; }

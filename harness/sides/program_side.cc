@@ -17,8 +17,7 @@ OrderedJson MakeHello(const RobotDescription& robot, const SideLayout& layout) {
     joints.push_back(
         {{"name", joint.name}, {"type", joint.type == JointType::kRevolute ? "revolute" : "prismatic"}});
     if (!robot.joints[i].coupling) continue;
-    joints.back()["follows"] =
-        robot.spec.joints[static_cast<size_t>(robot.joints[i].coupling->leader)].name;
+    joints.back()["follows"] = robot.spec.joints[static_cast<size_t>(robot.joints[i].coupling->leader)].name;
     joints.back()["multiplier"] = robot.joints[i].coupling->multiplier;
     joints.back()["offset"] = robot.joints[i].coupling->offset;
   }
@@ -38,21 +37,21 @@ OrderedJson MakeHello(const RobotDescription& robot, const SideLayout& layout) {
 
 ProgramSide::ProgramSide(const std::string& command, const RobotDescription& robot,
                          const ProgramOptions& options)
-    : robot_(robot),
+    : AnsweringSide(SideLayout(robot)),
+      robot_(robot),
       process_(command, options.seconds),
       source_("program " + Quote(command)),
-      name_(command),
-      layout_(robot) {
-  const Json answer = Ask(MakeHello(robot, layout_));
+      name_(command) {
+  const Json answer = Ask(MakeHello(robot, layout()));
   if (!answer.contains("dexcheck_protocol") || answer.at("dexcheck_protocol") != kProgramProtocol) {
-    throw InputError(source_ + ": dexcheck_protocol: must be " + std::to_string(kProgramProtocol) + ", got " +
-                     (answer.contains("dexcheck_protocol") ? Abbreviate(answer.at("dexcheck_protocol").dump())
-                                                           : "none"));
+    throw InputError(
+        source_ + ": dexcheck_protocol: must be " + std::to_string(kProgramProtocol) + ", got " +
+        (answer.contains("dexcheck_protocol") ? Abbreviate(answer.at("dexcheck_protocol").dump()) : "none"));
   }
   if (answer.contains("name") && answer.at("name").is_string()) {
     name_ = Abbreviate(answer.at("name").get<std::string>());
   }
-  layout_ = SideLayout(robot_, answer, source_);
+  set_layout(SideLayout(robot_, answer, source_));
 }
 
 Json ProgramSide::Ask(const OrderedJson& request) {
@@ -66,20 +65,21 @@ Json ProgramSide::Ask(const OrderedJson& request) {
   };
   Json answer = Json::parse(line, check, /*allow_exceptions=*/false);
   if (is_deep || answer.is_discarded() || !answer.is_object()) {
-    throw InputError(source_ + ": must answer with a JSON object on one line (NaN and Infinity are none), got " +
+    throw InputError(source_ +
+                     ": must answer with a JSON object on one line (NaN and Infinity are none), got " +
                      Quote(line));
   }
   if (answer.contains("error")) {
     const Json& error = answer.at("error");
-    throw ProgramError(source_ + ": says: " +
-                       Abbreviate(error.is_string() ? error.get<std::string>() : error.dump()));
+    throw ProgramError(source_ +
+                       ": says: " + Abbreviate(error.is_string() ? error.get<std::string>() : error.dump()));
   }
   return answer;
 }
 
 SideTerms ProgramSide::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
-  const VectorXd positions = layout_.WritePositions(q);
-  const VectorXd velocities = layout_.WriteVelocities(q, xi);
+  const VectorXd positions = layout().WritePositions(q);
+  const VectorXd velocities = layout().WriteVelocities(q, xi);
   const Json answer =
       Ask({{"request", "terms"}, {"id", sample}, {"q", ToList(positions)}, {"v", ToList(velocities)}});
   const std::string source = source_ + ": state " + std::to_string(sample);
@@ -87,8 +87,8 @@ SideTerms ProgramSide::Evaluate(long sample, const VectorXd& q, const VectorXd& 
     throw InputError(source + ": id: must be " + std::to_string(sample) + ", got " +
                      (answer.contains("id") ? Abbreviate(answer.at("id").dump()) : "none"));
   }
-  SideTerms terms = ReadSideTerms(answer, layout_, velocities, source);
-  layout_.ReadTerms(q, xi, &terms);
+  SideTerms terms = ReadSideTerms(answer, layout(), velocities, source);
+  layout().ReadTerms(q, xi, &terms);
   return terms;
 }
 

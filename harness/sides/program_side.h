@@ -18,7 +18,7 @@ struct ProgramOptions {
 };
 
 /// A running program as one side.
-class ProgramSide : public TermSide {
+class ProgramSide : public AnsweringSide {
  public:
   /// Starts it and says hello. @param robot outlives this.
   /// @throws ProgramError when it dies or hangs, InputError for what it says that is no answer; one line.
@@ -26,12 +26,7 @@ class ProgramSide : public TermSide {
 
   /// As it calls itself, or its command.
   [[nodiscard]] const std::string& name() const override { return name_; }
-  [[nodiscard]] bool is_reduced() const override { return layout_.is_reduced(); }
   SideTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
-
-  [[nodiscard]] const SideLayout& layout() const { return layout_; }
-  /// Takes the program's words for another convention of the base than the one it said.
-  void set_convention(const BaseConvention& convention) { layout_.set_convention(convention); }
 
  private:
   nlohmann::json Ask(const nlohmann::ordered_json& request);
@@ -40,7 +35,6 @@ class ProgramSide : public TermSide {
   ProgramProcess process_;
   std::string source_;  // for messages
   std::string name_;
-  SideLayout layout_;
 };
 
 }  // namespace dexcheck

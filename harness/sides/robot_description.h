@@ -36,17 +36,17 @@ struct DescribedJoint {
 
 /// Geometry of a part, as the file gives it.
 struct DescribedShape {
-  double volume = 0.0;                ///< m^3; 0 when it is not known.
-  Vector3d low = Vector3d::Zero();    ///< Corners of a box around it, along the link's own axes, m.
+  double volume = 0.0;              ///< m^3; 0 when it is not known.
+  Vector3d low = Vector3d::Zero();  ///< Corners of a box around it, along the link's own axes, m.
   Vector3d high = Vector3d::Zero();
 };
 
 /// A link as the file gives it, before what is welded together becomes one body.
 struct DescribedPart {
   std::string name;
-  int line = 0;                 ///< Of the file; 0 when it is not known.
-  bool states_inertial = true;  ///< Otherwise `body` is zero.
-  MassProperties body;          ///< In the link's own frame.
+  int line = 0;                  ///< Of the file; 0 when it is not known.
+  bool states_inertial = true;   ///< Otherwise `body` is zero.
+  MassProperties body;           ///< In the link's own frame.
   Pose X_LC = Pose::Identity();  ///< Frame along whose axes the file gives the inertia, in the link's own.
   int joint = -1;                ///< That moves it; -1 for the base.
   Pose X_iL = Pose::Identity();  ///< The link's own frame in that joint's frame i.
@@ -61,7 +61,7 @@ struct RobotDescription {
   bool states_base = true;  ///< Whether the base is fixed or floats; otherwise `spec` has a fixed one.
   std::vector<DescribedPart> parts;
   std::vector<std::string> unused;  ///< "mesh hand": what the file defines and nothing uses.
-  std::vector<std::string> notes;  ///< What was done with the file that its reader may not expect.
+  std::vector<std::string> notes;   ///< What was done with the file that its reader may not expect.
 };
 
 /// T with xi = T xi_free, size joints x (joints - coupled joints): the rates that the couplings leave free. T

@@ -105,7 +105,8 @@ void SideComparison::SetScales(const VectorXd& q, const VectorXd& xi) {
 
 void SideComparison::ComparePair(const SideTerms& a, const SideTerms& b, double sample, Pair* pair) {
   std::vector<CheckRecord>& records = pair->records;
-  const auto compare_forces = [&](Term term, const VectorXd& own, const VectorXd& other, const VectorXd& scale) {
+  const auto compare_forces = [&](Term term, const VectorXd& own, const VectorXd& other,
+                                  const VectorXd& scale) {
     if (own.size() == 0 || other.size() == 0) return;
     for (Eigen::Index i = 0; i < own.size(); ++i) {
       records[term].Compare(own[i], other[i], Positive(scale[i]),
@@ -195,11 +196,11 @@ std::optional<BaseConvention> FindOtherConvention(const RobotDescription& robot,
     set(convention);
     try {
       SideComparison comparison(robot, {reference, side});
-      CompareAtStates(make_feed(), [](long samples) { return samples < kStates; }, &comparison);
+      CompareAtStates(
+          make_feed(), [](long samples) { return samples < kStates; }, &comparison);
       const std::vector<CheckRecord> terms = comparison.TakePairs().front().terms;
-      const bool agrees = !terms.empty() && std::none_of(terms.begin(), terms.end(), [](const CheckRecord& r) {
-        return r.failed;
-      });
+      const bool agrees = !terms.empty() && std::none_of(terms.begin(), terms.end(),
+                                                         [](const CheckRecord& r) { return r.failed; });
       if (agrees) found = convention;
     } catch (const Error&) {
       break;  // a program may not bear what it did not ask for

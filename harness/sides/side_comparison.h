@@ -18,9 +18,9 @@ struct ComparedPair {
   std::vector<CheckRecord> terms;  ///< Those that both have.
 };
 
-/// Compares what the sides answer: M_bar, C_bar_xi, gravity, bias (their sum), friction, kinetic and potential
-/// energy. Bounds and scales are those of the analytic model's terms (rounding_scales.h). If one side is
-/// reduced, all are: by T of CalcCouplingMap, at states in which the followers follow.
+/// Compares what the sides answer: M_bar, C_bar_xi, gravity, bias (their sum), friction, kinetic and
+/// potential energy. Bounds and scales are those of the analytic model's terms (rounding_scales.h). If one
+/// side is reduced, all are: by T of CalcCouplingMap, at states in which the followers follow.
 class SideComparison {
  public:
   /// @param robot whose coordinates the sides answer in. All outlive this.

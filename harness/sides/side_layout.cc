@@ -32,7 +32,8 @@ size_t ReadChoice(const Json& table, const char* key, std::initializer_list<cons
     if (table.at(key) == word) return index;
     list += (index++ == 0 ? "" : ", ") + Quote(word);
   }
-  Fail(source, std::string("base.") + key, "must be one of " + list + ", got " + Abbreviate(table.at(key).dump()));
+  Fail(source, std::string("base.") + key,
+       "must be one of " + list + ", got " + Abbreviate(table.at(key).dump()));
 }
 
 BaseConvention ReadConvention(const Json& table, const std::string& source) {
@@ -44,7 +45,8 @@ BaseConvention ReadConvention(const Json& table, const std::string& source) {
          "unknown key, known here are position, velocity, linear_axes, angular_axes");
   }
   BaseConvention convention;
-  convention.position = kPositions[ReadChoice(table, "position", {"xyz_wxyz", "xyz_xyzw", "wxyz_xyz"}, source)].second;
+  convention.position =
+      kPositions[ReadChoice(table, "position", {"xyz_wxyz", "xyz_xyzw", "wxyz_xyz"}, source)].second;
   convention.angular_first = ReadChoice(table, "velocity", {"linear_angular", "angular_linear"}, source) == 1;
   convention.linear_in_base = ReadChoice(table, "linear_axes", {"world", "base"}, source) == 1;
   convention.angular_in_world = ReadChoice(table, "angular_axes", {"base", "world"}, source) == 1;
@@ -76,8 +78,8 @@ MatrixXd ReadMatrix(const Json& rows, Eigen::Index size, const std::string& key,
   }
   MatrixXd M(size, size);
   for (Eigen::Index i = 0; i < size; ++i) {
-    M.row(i) =
-        ReadVector(rows[static_cast<size_t>(i)], size, key + "[" + std::to_string(i) + "]", source).transpose();
+    M.row(i) = ReadVector(rows[static_cast<size_t>(i)], size, key + "[" + std::to_string(i) + "]", source)
+                   .transpose();
   }
   return M;
 }
@@ -144,8 +146,7 @@ SideLayout::SideLayout(const RobotDescription& robot, const Json& json, const st
   size_t followers = 0;
   for (const DescribedJoint& joint : robot.joints) followers += joint.coupling ? 1 : 0;
   if (!only_followers || missing.size() != followers) {
-    Fail(source, "joints",
-         "must be all joints, or all that follow no other; missing: " + JoinNames(missing));
+    Fail(source, "joints", "must be all joints, or all that follow no other; missing: " + JoinNames(missing));
   }
 }
 
@@ -211,7 +212,8 @@ SideTerms ReadSideTerms(const Json& json, const SideLayout& layout, const Vector
                         terms.bias.size() == 0 && terms.friction.size() == 0 && !terms.kinetic &&
                         !terms.potential;
   if (is_empty) {
-    throw InputError(source + ": must have M, C, c, g, h, friction, kinetic_energy or potential_energy, got " +
+    throw InputError(source +
+                     ": must have M, C, c, g, h, friction, kinetic_energy or potential_energy, got " +
                      Abbreviate(json.dump()));
   }
   if (terms.bias.size() == 0 && terms.coriolis.size() > 0 && terms.gravity.size() > 0) {

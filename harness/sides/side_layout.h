@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/sides/base_convention.h"
@@ -50,6 +51,22 @@ class SideLayout {
   std::vector<int> places_;  // where the side has the robot's free joints, in the robot's order
   bool is_reduced_ = false;
   BaseConvention convention_;
+};
+
+/// A side that answers in a layout of its own.
+class AnsweringSide : public TermSide {
+ public:
+  [[nodiscard]] bool is_reduced() const override { return layout_.is_reduced(); }
+  [[nodiscard]] const SideLayout& layout() const { return layout_; }
+  /// Takes its words for another convention of the base than the one it said.
+  void set_convention(const BaseConvention& convention) { layout_.set_convention(convention); }
+
+ protected:
+  explicit AnsweringSide(SideLayout layout) : layout_(std::move(layout)) {}
+  void set_layout(SideLayout layout) { layout_ = std::move(layout); }
+
+ private:
+  SideLayout layout_;
 };
 
 /// Terms from the keys M (n x n), C (n x n) or c = C v (n), g (n), h = c + g (n), friction (n),

@@ -301,9 +301,8 @@ class UrdfReader {
     for (const ImpossiblePart& part : impossible_) {
       const bool moves = part.joint >= 0 || robot_.spec.base.type != BaseType::kFixed;
       if (moves) {
-        const MassProperties& whole = part.joint < 0
-                                          ? robot_.spec.base.body
-                                          : robot_.spec.joints[static_cast<size_t>(part.joint)].body;
+        const MassProperties& whole =
+            part.joint < 0 ? robot_.spec.base.body : robot_.spec.joints[static_cast<size_t>(part.joint)].body;
         if (!FindPhysicalInconsistency(whole).empty()) FailInertial(*part.link, part.problem);
       }
       names.push_back(part.link->name);
