@@ -35,7 +35,7 @@ if [[ $purpose != program ]]; then
   # tests and benchmarks, and the programs they take as oracles
   packages+=(
     libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools ffmpeg
-    sqlite3 slurm-wlm munge
+    sqlite3 slurm-wlm munge python3-numpy
     chromium chromium-driver
   )
 fi

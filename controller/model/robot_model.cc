@@ -123,7 +123,20 @@ class SpecChecker {
           "lower limit must not exceed upper limit " + FormatNumber(joint.upper), joint.lower);
     CheckNotNegative(key + "damping", joint.damping);
     CheckNotNegative(key + "armature", joint.armature);
+    CheckNotNegative(key + "dry_friction", joint.dry_friction);
+    if (joint.coupling) CheckCoupling(key + "mimic", *joint.coupling, index);
     CheckBody("link " + Quote(joint.link), joint.body);
+  }
+
+  void CheckCoupling(const std::string& key, const JointCoupling& coupling, int index) const {
+    const bool is_joint = 0 <= coupling.leader && coupling.leader < static_cast<int>(spec_.joints.size());
+    Check(is_joint && coupling.leader != index, key, "must be another joint, index of one", coupling.leader);
+    if (spec_.joints[static_cast<size_t>(coupling.leader)].coupling) {
+      Fail(key, "must be a joint that follows none, got " +
+                    Quote(spec_.joints[static_cast<size_t>(coupling.leader)].name));
+    }
+    CheckFinite(key + ".multiplier", coupling.multiplier);
+    CheckFinite(key + ".offset", coupling.offset);
   }
 
   void CheckFrame(const Frame& frame) {

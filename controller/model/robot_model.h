@@ -59,6 +59,13 @@ struct Base {
 
 enum class JointType { kRevolute, kPrismatic };
 
+/// A joint that follows another one: q_i = multiplier q_leader + offset (rad or m).
+struct JointCoupling {
+  int leader = -1;  ///< Index of the joint that is followed, which follows none itself.
+  double multiplier = 1.0;
+  double offset = 0.0;  ///< rad or m
+};
+
 /// A joint and the link that it moves. Frame i of the link follows from its parent's by
 /// X_PB (usually identity), then the MDH row with q_i added to theta (revolute) or to d (prismatic).
 struct Joint {
@@ -73,6 +80,11 @@ struct Joint {
   double damping = 0.0;   ///< Viscous friction, N m s/rad or N s/m.
   double armature = 0.0;  ///< Reflected rotor inertia, kg m^2 or kg.
   MassProperties body;    ///< Of the link, in frame i.
+
+  // No part of F, which is smooth: the force -dry_friction sign(q_i_dot) stands beside it, and the terms are
+  // those of all joints, of which CalcCouplingMap (harness/sides) takes those that are free.
+  double dry_friction = 0.0;  ///< Coulomb friction, N m or N.
+  std::optional<JointCoupling> coupling;
 };
 
 /// A frame fixed to a link; a fingertip when it carries a sphere.

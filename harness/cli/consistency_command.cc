@@ -15,7 +15,6 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/model/parameter_reader.h"
 #include "harness/base/interrupts.h"
 #include "harness/checks/consistency.h"
 #include "harness/cli/commands.h"
@@ -237,12 +236,15 @@ void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& m
 
 /// A parameter file against the engine.
 void CompareTableWithEngine(const Request& request, Comparison* comparison) {
-  comparison->model = ReadRobotModel(request.files.robot);
+  const RobotDescription table = ReadDescription(request.files.robot);
+  comparison->model.emplace(table.spec);
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
   const Adapter adapter(*comparison->model, *engine, request.files.mjcf.string());
   comparison->result = Compare(request, [&](const std::function<bool(long)>& progress) {
     return CheckConsistency(adapter, request.options, progress);
   });
+  AppendTo(&comparison->notes, CheckDescription(table, adapter, &comparison->result.gate));
+  AppendTo(&comparison->notes, DescribeBaseCoordinates(table));
 }
 
 /// A URDF, or another MJCF, against the engine.

@@ -62,7 +62,7 @@ std::vector<Cause> Neutralise(const Adapter& adapter, const GateResult& gate, mj
   for (const GateFinding& finding : gate.findings) {
     if (finding.check == "joint_spring")
       report(fmt::format("{}: spring of {:.9g}", finding.where, finding.engine));
-    if (finding.check == "joint_dry_friction")
+    if (finding.check == "joint_dry_friction" && finding.model == 0.0)
       report(fmt::format("{}: dry friction of {:.9g}", finding.where, finding.engine));
     if (finding.check == "fluid")
       report(fmt::format("a fluid (density or viscosity {:.9g})", finding.engine));

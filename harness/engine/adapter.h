@@ -44,7 +44,8 @@ class Adapter {
   [[nodiscard]] const std::vector<int>& joint_ids() const { return joint_ids_; }
   /// Engine's dof address of each joint of the model.
   [[nodiscard]] const std::vector<int>& joint_dofs() const { return joint_dofs_; }
-  /// Engine's body id of each link: base first, then by joint.
+  /// Engine's body id of each link: base first, then by joint; -1 for links between several joints that one
+  /// body has.
   [[nodiscard]] const std::vector<int>& link_bodies() const { return link_bodies_; }
   /// All engine bodies that move as one with a link (welded to it), by the link's index + 1.
   [[nodiscard]] const std::vector<std::vector<int>>& welded_bodies() const { return welded_bodies_; }

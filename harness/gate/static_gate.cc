@@ -269,7 +269,9 @@ class StaticGate {
     for (const auto& [joint, where] : joints)
       Compare("joint_spring", where, 0.0, engine_.jnt_stiffness[joint]);
     for (const auto& [joint, where] : joints) {
-      Compare("joint_dry_friction", where, 0.0, engine_.dof_frictionloss[engine_.jnt_dofadr[joint]]);
+      const bool is_of_tree = where.kind == Location::Kind::kJoint;
+      const double own = is_of_tree ? model_.joints()[static_cast<size_t>(where.first)].dry_friction : 0.0;
+      Compare("joint_dry_friction", where, own, engine_.dof_frictionloss[engine_.jnt_dofadr[joint]]);
     }
     Compare("fluid", {}, 0.0, engine_.opt.density);
     Compare("fluid", {}, 0.0, engine_.opt.viscosity);

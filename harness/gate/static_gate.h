@@ -29,8 +29,8 @@ struct GateResult {
 
 /// Compares constants: mass of each link; damping, armature and range of each joint; gravity; the wheels'
 /// radius, place, axis, mass, inertia, damping and armature; fingertip radii; the object's mass, inertia,
-/// centre of mass and friction; and that the MJCF has no forces which the analytic model lacks (springs, dry
-/// friction, fluid).
+/// centre of mass and friction; and that the MJCF has no forces which the analytic model lacks (springs,
+/// fluid); dry friction.
 GateResult RunStaticGate(const Adapter& adapter);
 
 }  // namespace dexcheck

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "controller/common/text.h"
+#include "controller/dynamics/model_terms.h"
 #include "harness/checks/random_states.h"
 
 namespace dexcheck {

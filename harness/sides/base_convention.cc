@@ -56,19 +56,23 @@ VectorXd BaseConversion::ConvertVelocities(const VectorXd& q, const VectorXd& xi
   return converted;
 }
 
+VectorXd BaseConversion::CalcRate(const VectorXd& q, const VectorXd& xi) const {
+  VectorXd rate = VectorXd::Zero(xi.size());
+  if (!convention_.linear_in_base) return rate;
+  const Vector3d v = CalcRotation(q).transpose() * xi.head<3>();
+  rate.segment<3>(convention_.angular_first ? 3 : 0) = -Vector3d(xi.segment<3>(3)).cross(v);
+  return rate;
+}
+
 void BaseConversion::Restore(const VectorXd& q, const VectorXd& xi, SideTerms* terms) const {
   const Matrix6d B = CalcB(q);
-  if (convention_.linear_in_base) {
-    const Vector3d v = CalcRotation(q).transpose() * xi.head<3>();
-    VectorXd rate = VectorXd::Zero(xi.size());
-    rate.segment<3>(convention_.angular_first ? 3 : 0) = -Vector3d(xi.segment<3>(3)).cross(v);
-    for (VectorXd* force : {&terms->coriolis, &terms->bias}) {
-      if (force->size() == 0) continue;
-      if (terms->M.size() == 0) {
-        force->resize(0);
-      } else {
-        *force += terms->M * rate;
-      }
+  const VectorXd rate = CalcRate(q, xi);
+  for (VectorXd* force : {&terms->coriolis, &terms->bias}) {
+    if (force->size() == 0 || rate.isZero(0.0)) continue;
+    if (terms->M.size() == 0) {
+      force->resize(0);
+    } else {
+      *force += terms->M * rate;
     }
   }
   for (VectorXd* force : {&terms->coriolis, &terms->gravity, &terms->bias, &terms->friction}) {
@@ -77,6 +81,20 @@ void BaseConversion::Restore(const VectorXd& q, const VectorXd& xi, SideTerms* t
   if (terms->M.size() == 0) return;
   terms->M.topRows<6>() = (B.transpose() * terms->M.topRows<6>()).eval();
   terms->M.leftCols<6>() = (terms->M.leftCols<6>() * B).eval();
+}
+
+void BaseConversion::Apply(const VectorXd& q, const VectorXd& xi, SideTerms* terms) const {
+  // B is made of rotations: B^-1 = B^T.
+  const Matrix6d B = CalcB(q);
+  terms->M.topRows<6>() = (B * terms->M.topRows<6>()).eval();
+  terms->M.leftCols<6>() = (terms->M.leftCols<6>() * B.transpose()).eval();
+  for (VectorXd* force : {&terms->coriolis, &terms->gravity, &terms->bias, &terms->friction}) {
+    if (force->size() > 0) force->head<6>() = (B * force->head<6>()).eval();
+  }
+  const VectorXd change = terms->M * CalcRate(q, xi);
+  for (VectorXd* force : {&terms->coriolis, &terms->bias}) {
+    if (force->size() > 0) *force -= change;
+  }
 }
 
 }  // namespace dexcheck

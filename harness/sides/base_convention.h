@@ -47,9 +47,13 @@ class BaseConversion {
   /// where B_dot xi = [-omega x v; 0] when the linear velocity is along the base's axes, and zero otherwise.
   /// A side that gives forces with velocities in them and no M cannot be converted then: they are left out.
   void Restore(const VectorXd& q, const VectorXd& xi, SideTerms* terms) const;
+  /// The other way: whole terms of the default convention in this one.
+  void Apply(const VectorXd& q, const VectorXd& xi, SideTerms* terms) const;
 
  private:
   [[nodiscard]] Matrix6d CalcB(const VectorXd& q) const;
+  /// B_dot xi, of the size of xi.
+  [[nodiscard]] VectorXd CalcRate(const VectorXd& q, const VectorXd& xi) const;
 
   BaseConvention convention_;
 };

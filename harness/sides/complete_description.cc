@@ -110,7 +110,7 @@ class EngineCompletion {
                  [&](int id, size_t i) { robot_.spec.joints[i].damping = of_dof(engine_.dof_damping)(id); });
     TakeConstant(&DescribedJoint::states_dry_friction, "joint_dry_friction", "dry friction",
                  of_dof(engine_.dof_frictionloss), [&](int id, size_t i) {
-                   robot_.joints[i].dry_friction = of_dof(engine_.dof_frictionloss)(id);
+                   robot_.spec.joints[i].dry_friction = of_dof(engine_.dof_frictionloss)(id);
                  });
     const auto is_limited = [&](int id) { return engine_.jnt_limited[id] != 0 ? 1.0 : 0.0; };
     for (size_t i = 0; i < robot_.spec.joints.size(); ++i) {

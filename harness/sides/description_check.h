@@ -1,6 +1,6 @@
 #pragma once
 
-// The constants of a description for which the analytic model has no place: dry friction, coupled joints.
+// The constants of a description that are no part of the terms: coupled joints.
 
 #include <string>
 #include <vector>
@@ -10,8 +10,7 @@
 
 namespace dexcheck {
 
-/// Compares dry friction (in the place of the gate's check that the engine has none) and couplings of joints
-/// with those of the engine's model.
+/// Compares couplings of joints with those of the engine's model.
 /// @return notes on what one side lacks, and is not compared.
 std::vector<std::string> CheckDescription(const RobotDescription& robot, const Adapter& adapter,
                                           GateResult* gate);

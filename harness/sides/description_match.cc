@@ -106,7 +106,7 @@ class Completion {
       return std::vector<double*>{&robot.spec.joints[i].damping};
     });
     Take("dry friction", &DescribedJoint::states_dry_friction, [](RobotDescription& robot, size_t i) {
-      return std::vector<double*>{&robot.joints[i].dry_friction};
+      return std::vector<double*>{&robot.spec.joints[i].dry_friction};
     });
     Take("range", &DescribedJoint::states_range, [](RobotDescription& robot, size_t i) {
       return std::vector<double*>{&robot.spec.joints[i].lower, &robot.spec.joints[i].upper};

@@ -183,7 +183,7 @@ class MjcfDescriptionReader {
     const int dof = engine_.jnt_dofadr[id];
     joint.damping = engine_.dof_damping[dof];
     joint.armature = engine_.dof_armature[dof];
-    stated.dry_friction = engine_.dof_frictionloss[dof];
+    joint.dry_friction = engine_.dof_frictionloss[dof];
     stated.states_range = engine_.jnt_limited[id] != 0;
     joint.lower = stated.states_range ? engine_.jnt_range[2 * id] : -kPi;
     joint.upper = stated.states_range ? engine_.jnt_range[2 * id + 1] : kPi;
@@ -212,7 +212,7 @@ class MjcfDescriptionReader {
       const auto leader = std::find(joint_ids_.begin(), joint_ids_.end(), coupling->leader);
       if (leader == joint_ids_.end()) continue;
       coupling->leader = static_cast<int>(leader - joint_ids_.begin());
-      robot_.joints[i].coupling = coupling;
+      robot_.spec.joints[i].coupling = coupling;
       --other_equalities_;
     }
   }

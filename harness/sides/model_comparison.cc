@@ -77,7 +77,7 @@ class ModelComparison {
                   });
     CompareStated(&gate, "joint_dry_friction", &DescribedJoint::states_dry_friction,
                   [](const RobotDescription& robot, size_t i) {
-                    return std::vector<double>{robot.joints[i].dry_friction};
+                    return std::vector<double>{robot.spec.joints[i].dry_friction};
                   });
     CompareStated(&gate, "joint_armature", &DescribedJoint::states_armature,
                   [](const RobotDescription& robot, size_t i) {
@@ -88,8 +88,8 @@ class ModelComparison {
                     return std::vector<double>{robot.spec.joints[i].lower, robot.spec.joints[i].upper};
                   });
     ForJoints([&](size_t i, size_t j) {
-      const std::optional<JointCoupling>& own = a_.joints[i].coupling;
-      const std::optional<JointCoupling>& other = b_.joints[j].coupling;
+      const std::optional<JointCoupling>& own = a_.spec.joints[i].coupling;
+      const std::optional<JointCoupling>& other = b_.spec.joints[j].coupling;
       if (!own || !other) return;
       const Location where{Location::Kind::kJoint, static_cast<int>(i), -1};
       const std::string name = "joint_coupling";

@@ -158,6 +158,13 @@ class ParameterWriter {
   void WriteJoint(const Joint& joint, const DescribedJoint& stated) {
     text_ += QuoteToml(joint.name) + " = { range = " + FormatNumbers(Vector2d(joint.lower, joint.upper)) +
              ", damping = " + FormatNumber(joint.damping) + ", armature = " + FormatNumber(joint.armature);
+    if (joint.dry_friction != 0.0) text_ += ", dry_friction = " + FormatNumber(joint.dry_friction);
+    if (joint.coupling) {
+      text_ +=
+          ", mimic = { joint = " + QuoteToml(spec_.joints[static_cast<size_t>(joint.coupling->leader)].name) +
+          ", multiplier = " + FormatNumber(joint.coupling->multiplier) +
+          ", offset = " + FormatNumber(joint.coupling->offset) + " }";
+    }
     text_ += " }";
     std::string unstated;
     const auto note = [&](bool is_stated, const char* name) {
@@ -166,15 +173,6 @@ class ParameterWriter {
     note(stated.states_range, "range");
     note(stated.states_damping, "damping");
     note(stated.states_armature, "armature");
-    // What tables have no key for.
-    if (stated.dry_friction != 0.0)
-      unstated += "  # dry friction there: " + FormatNumber(stated.dry_friction);
-    if (stated.coupling) {
-      unstated += "  # follows " +
-                  FormatComment(spec_.joints[static_cast<size_t>(stated.coupling->leader)].name) +
-                  " there: " + FormatNumber(stated.coupling->multiplier) + " q + " +
-                  FormatNumber(stated.coupling->offset);
-    }
     text_ += unstated + "\n";
   }
 

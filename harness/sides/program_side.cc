@@ -16,10 +16,11 @@ OrderedJson MakeHello(const RobotDescription& robot, const SideLayout& layout) {
     const Joint& joint = robot.spec.joints[i];
     joints.push_back(
         {{"name", joint.name}, {"type", joint.type == JointType::kRevolute ? "revolute" : "prismatic"}});
-    if (!robot.joints[i].coupling) continue;
-    joints.back()["follows"] = robot.spec.joints[static_cast<size_t>(robot.joints[i].coupling->leader)].name;
-    joints.back()["multiplier"] = robot.joints[i].coupling->multiplier;
-    joints.back()["offset"] = robot.joints[i].coupling->offset;
+    if (!robot.spec.joints[i].coupling) continue;
+    joints.back()["follows"] =
+        robot.spec.joints[static_cast<size_t>(robot.spec.joints[i].coupling->leader)].name;
+    joints.back()["multiplier"] = robot.spec.joints[i].coupling->multiplier;
+    joints.back()["offset"] = robot.spec.joints[i].coupling->offset;
   }
   const auto& g = robot.spec.gravity;
   return {{"dexcheck_protocol", kProgramProtocol},

@@ -19,7 +19,6 @@ RobotDescription ReadTable(const std::filesystem::path& path) {
   RobotDescription robot;
   robot.spec = ReadRobotModel(path).spec();
   robot.joints.resize(robot.spec.joints.size());
-  for (DescribedJoint& joint : robot.joints) joint.states_dry_friction = false;  // tables have no key for it
   if (robot.spec.base.type != BaseType::kFixed)
     AddPart(robot.spec.base.link, robot.spec.base.body, -1, &robot);
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {

@@ -10,13 +10,6 @@
 
 namespace dexcheck {
 
-/// A joint that follows another one: q_i = multiplier q_leader + offset (rad or m).
-struct JointCoupling {
-  int leader = -1;  ///< Index of the joint that is followed, which follows none itself.
-  double multiplier = 1.0;
-  double offset = 0.0;  ///< rad or m
-};
-
 /// What a file says of a joint and its link, beside the specification.
 struct DescribedJoint {
   // Which constants the file states. What it does not state is zero in the specification, or a range of +-pi.
@@ -25,9 +18,6 @@ struct DescribedJoint {
   bool states_dry_friction = true;
   bool states_armature = true;
 
-  double dry_friction =
-      0.0;  ///< Coulomb friction, N m or N: the force of a sliding joint, -this sign(q_i_dot).
-  std::optional<JointCoupling> coupling;
   /// The link's own frame L, in which its file gives masses and what hangs on it, in frame i.
   Pose X_iL = Pose::Identity();
   int line = 0;              ///< Of the file; 0 when it is not known.

@@ -54,8 +54,8 @@ SideComparison::SideComparison(const RobotDescription& robot, std::vector<TermSi
 int SideComparison::CoordinateOf(Eigen::Index entry) const {
   // The column's leader is the only joint of it that follows none.
   for (Eigen::Index row = 0; row < T_.rows(); ++row) {
-    const bool is_free =
-        row < base_ || !is_reduced_ || !robot_.joints[static_cast<size_t>(row - base_)].coupling.has_value();
+    const bool is_free = row < base_ || !is_reduced_ ||
+                         !robot_.spec.joints[static_cast<size_t>(row - base_)].coupling.has_value();
     if (is_free && T_(row, entry) != 0.0) return static_cast<int>(row);
   }
   return static_cast<int>(entry);
@@ -64,8 +64,8 @@ int SideComparison::CoordinateOf(Eigen::Index entry) const {
 void SideComparison::Follow(VectorXd* q, VectorXd* xi) const {
   if (!is_reduced_) return;
   const Eigen::Index offset = model_.num_base_positions();
-  for (size_t i = 0; i < robot_.joints.size(); ++i) {
-    const std::optional<JointCoupling>& coupling = robot_.joints[i].coupling;
+  for (size_t i = 0; i < robot_.spec.joints.size(); ++i) {
+    const std::optional<JointCoupling>& coupling = robot_.spec.joints[i].coupling;
     if (!coupling) continue;
     const auto own = static_cast<Eigen::Index>(i);
     (*q)[offset + own] = coupling->multiplier * (*q)[offset + coupling->leader] + coupling->offset;

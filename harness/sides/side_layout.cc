@@ -139,12 +139,12 @@ SideLayout::SideLayout(const RobotDescription& robot, const Json& json, const st
       continue;
     }
     missing.push_back(names_[joint]);
-    only_followers = only_followers && robot.joints[joint].coupling.has_value();
+    only_followers = only_followers && robot.spec.joints[joint].coupling.has_value();
   }
   is_reduced_ = !missing.empty();
   if (!is_reduced_) return;
   size_t followers = 0;
-  for (const DescribedJoint& joint : robot.joints) followers += joint.coupling ? 1 : 0;
+  for (const Joint& joint : robot.spec.joints) followers += joint.coupling ? 1 : 0;
   if (!only_followers || missing.size() != followers) {
     Fail(source, "joints", "must be all joints, or all that follow no other; missing: " + JoinNames(missing));
   }

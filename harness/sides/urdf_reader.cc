@@ -251,14 +251,14 @@ class UrdfReader {
     stated->states_damping = stated->states_dry_friction = joint.dynamics != nullptr;
     if (!joint.dynamics) return;
     added->damping = joint.dynamics->damping;
-    stated->dry_friction = joint.dynamics->friction;
+    added->dry_friction = joint.dynamics->friction;
     const auto check = [&](const char* name, double value) {
       if (value >= 0.0) return;
       Fail(line, "joint " + Quote(joint.name) + ": dynamics: " + name + " must not be negative, got " +
                      FormatNumber(value));
     };
     check("damping", added->damping);
-    check("friction", stated->dry_friction);
+    check("friction", added->dry_friction);
   }
 
   void ReadBody(const UrdfLink& element, const Place& place) {
@@ -344,7 +344,7 @@ class UrdfReader {
         coupling.leader = leader->second;
         at = model_->getJoint(name);
       }
-      robot_.joints[static_cast<size_t>(own->second)].coupling = coupling;
+      robot_.spec.joints[static_cast<size_t>(own->second)].coupling = coupling;
     }
   }
 
