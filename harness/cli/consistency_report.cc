@@ -38,7 +38,7 @@ const char* Judge(ExitCode code) {
 
 std::string FileName(const std::filesystem::path& path) { return path.filename().string(); }
 
-Json ToJson(const std::vector<Hypothesis>& hypotheses) {
+Json ListHypotheses(const std::vector<Hypothesis>& hypotheses) {
   Json list = Json::array();
   for (const Hypothesis& hypothesis : hypotheses) {
     list.push_back(
@@ -153,7 +153,7 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
                                 {"model", finding.model},
                                 {"engine", finding.engine}});
   }
-  json["hypotheses"] = ToJson(comparison.hypotheses);
+  json["hypotheses"] = ListHypotheses(comparison.hypotheses);
   return json.dump(2) + "\n";
 }
 

@@ -62,7 +62,7 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
 std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
 
 /// Their lines, shares and values.
-nlohmann::ordered_json ToJson(const std::vector<Hypothesis>& hypotheses);
+nlohmann::ordered_json ListHypotheses(const std::vector<Hypothesis>& hypotheses);
 
 /// "  LINE; explains 100 %", and what each values line says below it.
 void PrintHypotheses(const std::vector<Hypothesis>& hypotheses);

@@ -104,7 +104,7 @@ std::string ToText(const Request& request, const RobotModel& model, const Diagno
       {"mujoco", mj_versionString()},          {"samples", request.options.samples},
       {"seed", request.options.seed},          {"verdict", diagnosis.agrees ? "pass" : "disagreement"},
       {"explained", diagnosis.explained},      {"explained_of_forces", diagnosis.explained_of_forces}};
-  json["hypotheses"] = ToJson(hypotheses);
+  json["hypotheses"] = ListHypotheses(hypotheses);
   json["causes"] = Json::array();
   for (const Cause& cause : diagnosis.causes) json["causes"].push_back(ToJson(cause, model.spec(), file));
   json["remaining"] = Json::array();

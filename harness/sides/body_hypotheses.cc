@@ -84,6 +84,13 @@ Matrix3d FromList(const std::array<double, 6>& I) {
   return tensor;
 }
 
+/// But for what rotations leave by rounding.
+bool IsDiagonal(const Matrix3d& I) {
+  constexpr double kRounding = 1e-12;  // of the trace
+  const Matrix3d products = I - Matrix3d(I.diagonal().asDiagonal());
+  return products.cwiseAbs().maxCoeff() <= kRounding * std::abs(I.trace());
+}
+
 void AddInertiaMistakes(std::vector<BodyMistake>* mistakes) {
   const auto add = [&](const std::string& text, const Undo& undo) {
     mistakes->push_back({"inertia", "inertias", text, undo});
@@ -111,17 +118,14 @@ void AddInertiaMistakes(std::vector<BodyMistake>* mistakes) {
   add("without its products", [](const ComparedBody& body) -> std::optional<MassProperties> {
     Matrix3d products = body.right.inertia;
     products.diagonal().setZero();
-    const Matrix3d own = body.given.inertia - Matrix3d(body.given.inertia.diagonal().asDiagonal());
-    if (!own.isZero(0.0)) return std::nullopt;
+    const Matrix3d& I = body.given.inertia;
+    if (!IsDiagonal(I)) return std::nullopt;
     return WithInertia(body, body.given.inertia + products);
   });
   add("of principal moments without their axes (the rotation of its frame is missing)",
       [](const ComparedBody& body) -> std::optional<MassProperties> {
         const Matrix3d& I = body.given.inertia;
-        constexpr double kDiagonal = 1e-12;  // of the trace
-        if ((I - Matrix3d(I.diagonal().asDiagonal())).cwiseAbs().maxCoeff() > kDiagonal * I.trace()) {
-          return std::nullopt;
-        }
+        if (!IsDiagonal(I)) return std::nullopt;
         const Eigen::SelfAdjointEigenSolver<Matrix3d> right(body.right.inertia);
         Vector3d moments = I.diagonal();
         std::sort(moments.begin(), moments.end());

@@ -69,6 +69,8 @@ class EngineCompletion {
       const int id = FindEngineJoint(joint);
       if (id < 0) continue;
       const int body = engine_.jnt_bodyid[id];
+      // Of several joints of one body the last moves it; the links between them have no body.
+      if (id + 1 < engine_.body_jntadr[body] + engine_.body_jntnum[body]) continue;
       rename(&joint.link, body);
       if (joint.parent < 0 && mj_name2id(&engine_, mjOBJ_BODY, base.link.c_str()) < 0) {
         rename(&base.link, engine_.body_weldid[engine_.body_parentid[body]]);

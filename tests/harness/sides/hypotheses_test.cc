@@ -73,11 +73,14 @@ Matrix3d CalcOffset(const MassProperties& body) {
   return body.mass * (body.com.squaredNorm() * Matrix3d::Identity() - body.com * body.com.transpose());
 }
 
+/// Of bodies that are one part; the identity, which makes no mistake, of others.
 Matrix3d FindPartRotation(const RobotDescription& robot, size_t joint) {
+  std::vector<Matrix3d> rotations;
   for (const DescribedPart& part : robot.parts) {
-    if (part.joint == static_cast<int>(joint)) return part.X_LC.linear();
+    if (part.joint == static_cast<int>(joint) && part.states_inertial)
+      rotations.push_back(part.X_LC.linear());
   }
-  return Matrix3d::Identity();
+  return rotations.size() == 1 ? rotations[0] : Matrix3d(Matrix3d::Identity());
 }
 
 Pose FindPlace(const RobotDescription& robot, size_t joint) { return ListOwnRows(robot)[joint].X_PL; }
@@ -291,8 +294,20 @@ TEST(Hypotheses, ALostPartIsNamed) {
 struct JointMistakeCase {
   std::string name;
   std::string text;
-  std::function<void(Joint*)> make;
+  std::function<void(size_t, RobotDescription*)> make;
 };
+
+/// The link's own frame and what hangs on it stay where they are; frame i, whose z is the axis, is turned.
+void TurnAxisAround(size_t i, RobotDescription* robot) {
+  const Pose turn(Eigen::AngleAxisd(kPi, Vector3d::UnitX()));
+  Joint& joint = robot->spec.joints[i];
+  joint.X_PB = joint.X_PB * turn;
+  joint.body = ExpressIn(joint.body, turn.inverse());
+  robot->joints[i].X_iL = turn.inverse() * robot->joints[i].X_iL;
+  for (Joint& child : robot->spec.joints) {
+    if (child.parent == static_cast<int>(i)) child.X_PB = turn.inverse() * child.X_PB;
+  }
+}
 
 class JointMistakes : public ::testing::TestWithParam<JointMistakeCase> {};
 
@@ -301,7 +316,7 @@ TEST_P(JointMistakes, AreNamed) {
   for (const Pair& pair : ListRobots()) {
     for (const size_t i : {size_t{1}, size_t{3}}) {
       RobotDescription wrong = pair.a;
-      GetParam().make(&wrong.spec.joints[i]);
+      GetParam().make(i, &wrong);
       if (wrong.spec.joints[i].type != JointType::kRevolute) continue;
       const std::vector<Hypothesis> found = ExplainDifference(wrong, pair.b);
       if (found.empty() && wrong.spec.joints[i].X_PB.isApprox(pair.a.spec.joints[i].X_PB)) continue;
@@ -314,24 +329,23 @@ TEST_P(JointMistakes, AreNamed) {
   EXPECT_GE(named, 3);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Hypotheses, JointMistakes,
-    ::testing::Values(JointMistakeCase{"Zero", "zero looks offset by 30 deg",
-                                       [](Joint* joint) { joint->mdh.q += DegToRad(30.0); }},
-                      JointMistakeCase{"Sign", "axis looks turned around (its sign)",
-                                       [](Joint* joint) {
-                                         // The own frame stays, the axis does not.
-                                         joint->name += "";
-                                         joint->X_PB =
-                                             joint->X_PB * Eigen::AngleAxisd(kPi, Vector3d::UnitX());
-                                         joint->body = ExpressIn(
-                                             joint->body, Pose(Eigen::AngleAxisd(kPi, Vector3d::UnitX())));
-                                       }},
-                      JointMistakeCase{"Millimetres", "origin looks as if in mm",
-                                       [](Joint* joint) { joint->X_PB.translation() *= 1e3; }},
-                      JointMistakeCase{"OriginSign", "origin looks turned around",
-                                       [](Joint* joint) { joint->X_PB.translation() *= -1.0; }}),
-    [](const auto& named) { return named.param.name; });
+INSTANTIATE_TEST_SUITE_P(Hypotheses, JointMistakes,
+                         ::testing::Values(JointMistakeCase{"Zero", "zero looks offset by 30 deg",
+                                                            [](size_t i, RobotDescription* robot) {
+                                                              robot->spec.joints[i].mdh.q += DegToRad(30.0);
+                                                            }},
+                                           JointMistakeCase{"Sign", "axis looks turned around (its sign)",
+                                                            TurnAxisAround},
+                                           JointMistakeCase{"Millimetres", "origin looks as if in mm",
+                                                            [](size_t i, RobotDescription* robot) {
+                                                              robot->spec.joints[i].X_PB.translation() *= 1e3;
+                                                            }},
+                                           JointMistakeCase{"OriginSign", "origin looks turned around",
+                                                            [](size_t i, RobotDescription* robot) {
+                                                              robot->spec.joints[i].X_PB.translation() *=
+                                                                  -1.0;
+                                                            }}),
+                         [](const auto& named) { return named.param.name; });
 
 TEST(Hypotheses, GravityAndUnitsOfJoints) {
   RobotDescription table = ReadDescription(testing::SourcePath("/controller/parameters/panda.toml"));
