@@ -12,7 +12,7 @@ packages=(
   libeigen3-dev libtomlplusplus-dev
   # the engine; its CMake files ask for OpenGL and for qhull's headers
   libmujoco-dev libgl-dev libqhull-dev
-  # robots described by URDFs
+  # robots described by URDFs, the files that an MJCF names
   liburdfdom-dev libtinyxml2-dev
   # the run's log
   libhdf5-dev zlib1g-dev
@@ -35,8 +35,8 @@ if [[ $purpose != program ]]; then
   # tests and benchmarks, and the programs they take as oracles
   packages+=(
     libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools ffmpeg
-    sqlite3 slurm-wlm munge python3-numpy
-    chromium chromium-driver
+    sqlite3 slurm-wlm munge
+    chromium chromium-driver python3-numpy
   )
 fi
 if [[ $purpose == development ]]; then

@@ -7,6 +7,18 @@
 
 namespace dexcheck {
 
+void FactorJacobian(const RedundancyWeight& weight, const ModelTerms& robot, const GraspTerms& grasp,
+                    Pseudoinverse* J_B_pinv) {
+  switch (weight.kind) {
+    case RedundancyWeight::Kind::kIdentity:
+      return J_B_pinv->Factor(grasp.J_B());
+    case RedundancyWeight::Kind::kDiagonal:
+      return J_B_pinv->FactorDiagonal(grasp.J_B(), weight.w);
+    case RedundancyWeight::Kind::kMass:
+      return J_B_pinv->FactorWeighted(grasp.J_B(), robot.M());
+  }
+}
+
 ComputedTorque::ComputedTorque(const RobotModel& model, int num_contacts, RedundancyWeight weight)
     : weight_(std::move(weight)),
       actuation_(model),
@@ -28,17 +40,6 @@ ComputedTorque::ComputedTorque(const RobotModel& model, int num_contacts, Redund
   rates_.setZero(k);
 }
 
-void ComputedTorque::FactorJacobian(const ModelTerms& robot, const GraspTerms& grasp) {
-  switch (weight_.kind) {
-    case RedundancyWeight::Kind::kIdentity:
-      return J_B_pinv_.Factor(grasp.J_B());
-    case RedundancyWeight::Kind::kDiagonal:
-      return J_B_pinv_.FactorDiagonal(grasp.J_B(), weight_.w);
-    case RedundancyWeight::Kind::kMass:
-      return J_B_pinv_.FactorWeighted(grasp.J_B(), robot.M());
-  }
-}
-
 void ComputedTorque::SetDemand(const ModelTerms& robot, const GraspTerms& grasp, const Vector6d& V_Bo_dot,
                                const Eigen::Ref<const VectorXd>& sigma_prime) {
   SetMotion(robot, grasp, V_Bo_dot, sigma_prime);
@@ -54,7 +55,7 @@ void ComputedTorque::SetMotion(const ModelTerms& robot, const GraspTerms& grasp,
           static_cast<double>(sigma_prime.size()));
   Require(grasp.num_forces() == f_c_.size(), "number of contact forces", "must be as constructed",
           grasp.num_forces());
-  FactorJacobian(robot, grasp);
+  FactorJacobian(weight_, robot, grasp, &J_B_pinv_);
 
   // xi_c = J^+ G^T V + N xi = xi - J^+ (J xi - G^T V)
   J_B_pinv_.Apply(grasp.slip(), work_);
@@ -78,6 +79,17 @@ void ComputedTorque::SetFreeMotion(const ModelTerms& robot, const Eigen::Ref<con
   xi_c_ = robot.velocity();
   xi_dot_d_ = sigma_prime;
   CalcFreeTorque(robot);
+}
+
+void ComputedTorque::SetForces(const GraspTerms& grasp, const Vector6d& F_o,
+                               const Eigen::Ref<const VectorXd>& force,
+                               const Eigen::Ref<const VectorXd>& xi_dot_d) {
+  Require(force.size() == tau_0_.size() && xi_dot_d.size() == tau_0_.size(), "length of force",
+          "must be that of xi", static_cast<double>(force.size()));
+  G_pinv_.Factor(grasp.G());
+  F_o_ = F_o;
+  xi_dot_d_ = xi_dot_d;
+  actuation_.CalcTorque(force, tau_0_);
 }
 
 void ComputedTorque::CalcFreeTorque(const ModelTerms& robot) {

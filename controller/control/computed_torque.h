@@ -28,6 +28,11 @@ struct RedundancyWeight {
   VectorXd w;  ///< n, positive; kDiagonal only.
 };
 
+/// Factors J (k x n) with this W.
+/// @param robot whose M_bar' is W for kMass. @throws as Pseudoinverse.
+void FactorJacobian(const RedundancyWeight& weight, const ModelTerms& robot, const GraspTerms& grasp,
+                    Pseudoinverse* J_B_pinv);
+
 /// The law's workspace. Sized by the constructor; nothing else allocates.
 class ComputedTorque {
  public:
@@ -48,6 +53,11 @@ class ComputedTorque {
                  const Eigen::Ref<const VectorXd>& sigma_prime);
   /// The same without any contact, (18): xi_dot_d is sigma'.
   void SetFreeMotion(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& sigma_prime);
+
+  /// In the place of the first stage, what another law demands: F_o (Sigma_o) and E_bar' tau_0 (n); xi_dot_d
+  /// (n) is what the law means xi_dot to be. @throws as SetDemand.
+  void SetForces(const GraspTerms& grasp, const Vector6d& F_o, const Eigen::Ref<const VectorXd>& force,
+                 const Eigen::Ref<const VectorXd>& xi_dot_d);
 
   /// xi_c (n) and xi_dot_d (n), (47).
   [[nodiscard]] const VectorXd& xi_c() const { return xi_c_; }
@@ -73,7 +83,6 @@ class ComputedTorque {
   [[nodiscard]] const VectorXd& f_c() const { return f_c_; }
 
  private:
-  void FactorJacobian(const ModelTerms& robot, const GraspTerms& grasp);
   void CalcFreeTorque(const ModelTerms& robot);
   const VectorXd& AddContactTorque(const GraspTerms& grasp);
 

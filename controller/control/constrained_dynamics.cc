@@ -48,8 +48,8 @@ ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contac
 }
 
 const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const GraspTerms& grasp,
-                                               const Eigen::Ref<const VectorXd>& force,
-                                               ObjectSupport object) {
+                                               const Eigen::Ref<const VectorXd>& force, ObjectSupport object,
+                                               const VectorXd* contact_acceleration) {
   const Eigen::Index n = prediction_.xi_dot.size();
   Require(robot.size() == n && force.size() == n, "length of force", "must be that of xi",
           static_cast<double>(force.size()));
@@ -78,9 +78,10 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
   M_hat_llt.matrixL().solveInPlace(half_.bottomRows<6>());
   M_hat_llt.matrixL().solveInPlace(half_force_.bottomRows<6>());
 
-  // (half^T half) f_c = half^T half_force + slip_bias
+  // (half^T half) f_c = half^T half_force + slip_bias - contact_acceleration
   schur_.setZero();
   prediction_.f_c = grasp.slip_bias();
+  if (contact_acceleration != nullptr) prediction_.f_c -= *contact_acceleration;
   const auto add_row = [&](Eigen::Index i) {
     for (Eigen::Index col = 0; col < schur_.cols(); ++col) {
       schur_.col(col).tail(schur_.rows() - col) +=

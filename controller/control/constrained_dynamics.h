@@ -44,11 +44,14 @@ class ConstrainedDynamics {
   /// by its Schur complement in f_c.
   /// @param robot with CalcDynamics done, reduced. @param force E_bar' tau' (n), N, N m.
   /// @param object kAtRest: it does not move, whatever the contacts do; its rows are left out.
+  /// @param contact_acceleration (k), m/s^2: what the left of the third row less its right is to be, each in
+  /// its Sigma_cf, for whoever stabilises the constraint; null for zero.
   /// @throws SingularityError when the contacts' constraints depend on each other; std::invalid_argument when
   /// sizes differ.
   const Prediction& Predict(const ModelTerms& robot, const GraspTerms& grasp,
                             const Eigen::Ref<const VectorXd>& force,
-                            ObjectSupport object = ObjectSupport::kHand);
+                            ObjectSupport object = ObjectSupport::kHand,
+                            const VectorXd* contact_acceleration = nullptr);
 
   /// The robot without contacts, (18): xi_dot; V_Bo_dot and f_c are zero.
   const Prediction& PredictFree(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force);

@@ -24,6 +24,11 @@ GraspController::GraspController(const RobotModel& model, std::span<const int> f
   problem_.f_max.setConstant(options.f_max);
   sigma_prime_.setZero(model.num_velocities());
   F_N_.setZero(grasp().num_forces());
+  if (options.law != ControlLaw::kComputedTorque) {
+    baseline_.emplace(
+        model, static_cast<int>(fingertips.size()), options.law,
+        BaselineLaw::Options{options.gains, options.orientation, options.weight, options.stiffness});
+  }
 }
 
 void GraspController::SetState(const MeasuredState& state) {
@@ -32,8 +37,14 @@ void GraspController::SetState(const MeasuredState& state) {
 }
 
 const VectorXd& GraspController::CalcTorque(const DesiredMotion& desired) {
-  V_Bo_dot_ = CalcTrackingAcceleration(options_.gains, options_.orientation, grasp(), desired);
-  law_.SetDemand(robot(), grasp(), V_Bo_dot_, sigma_prime_);
+  if (baseline_) {
+    baseline_->SetDemand(robot(), grasp(), desired, sigma_prime_);
+    V_Bo_dot_ = baseline_->V_Bo_dot();
+    law_.SetForces(grasp(), baseline_->F_o(), baseline_->force(), baseline_->xi_dot_d());
+  } else {
+    V_Bo_dot_ = CalcTrackingAcceleration(options_.gains, options_.orientation, grasp(), desired);
+    law_.SetDemand(robot(), grasp(), V_Bo_dot_, sigma_prime_);
+  }
 
   if (!law_.F_o().allFinite() || !law_.tau_0().allFinite()) {
     throw GraspForceError("the demanded forces are not finite");

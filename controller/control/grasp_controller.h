@@ -1,11 +1,13 @@
 #pragma once
 
-// The whole law of section 5 as one step: measured state in, torques out.
+// The whole law of section 5, or one that it is compared with, as one step: measured state in, torques out.
 
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "controller/common/errors.h"
+#include "controller/control/baseline_law.h"
 #include "controller/control/computed_torque.h"
 #include "controller/control/grasp_model.h"
 #include "controller/control/object_tracking.h"
@@ -27,7 +29,9 @@ void RequireGraspForce(const GraspForceResult& result);
 struct GraspControllerOptions : GraspModelOptions {
   explicit GraspControllerOptions(const RobotModel& model) : posture(model) {}
 
+  ControlLaw law = ControlLaw::kComputedTorque;
   ObjectGains gains;
+  ObjectStiffness stiffness;  ///< Of the laws that have one.
   RedundancyWeight weight;
   PostureTask posture;
   double mu = 0.5;       ///< Friction coefficient that the grasp force counts on.
@@ -36,8 +40,8 @@ struct GraspControllerOptions : GraspModelOptions {
   GraspForceOptions force;
 };
 
-/// Computed torque (55) with the grasp force from the friction cones. Owns every term that one step needs.
-/// Nothing allocates in Step.
+/// Computed torque (55), or another law for the object, with the grasp force from the friction cones. Owns
+/// every term that one step needs. Nothing allocates in Step.
 class GraspController {
  public:
   /// @param fingertips frames that hold the object. @param object, surface in Sigma_o; surface outlives this.
@@ -60,7 +64,8 @@ class GraspController {
   /// sigma' (n) of the state set, from the posture task.
   [[nodiscard]] const VectorXd& sigma_prime() const { return sigma_prime_; }
   [[nodiscard]] const GraspForceResult& force() const { return *force_; }
-  /// V_Bo_dot (Sigma_o) that the last torques demand of the object.
+  /// V_Bo_dot (Sigma_o) that the last torques demand of the object: what it would do if the law's terms were
+  /// all there is.
   [[nodiscard]] const Vector6d& V_Bo_dot() const { return V_Bo_dot_; }
   /// F_N (k) of (49) that belongs to them, N.
   [[nodiscard]] const VectorXd& F_N() const { return F_N_; }
@@ -72,6 +77,7 @@ class GraspController {
   GraspControllerOptions options_;
   GraspModel model_;
   ComputedTorque law_;
+  std::optional<BaselineLaw> baseline_;  // none for computed torque
   GraspForceProblem problem_;
   GraspForceSolver solver_;
   const GraspForceResult* force_ = nullptr;

@@ -39,4 +39,29 @@ Vector6d CalcTrackingAcceleration(const ObjectGains& gains, OrientationFeedback 
   return CalcTrackingAcceleration(gains, grasp.X_Bo(), grasp.V_Bo(), CalcDesiredPose(desired));
 }
 
+ObjectErrors CalcObjectErrors(OrientationFeedback feedback, const GraspTerms& grasp,
+                              const DesiredMotion& desired) {
+  ObjectErrors errors;
+  if (feedback == OrientationFeedback::kAngles) {
+    const ObjectTerms& terms = grasp.coordinates();
+    errors.e = terms.P_inv * (desired.X_d - grasp.X_o());
+    errors.V_error = terms.P_inv * (desired.X_d_dot - grasp.X_o_dot());
+    errors.V_d_dot = terms.P_inv * desired.X_d_ddot + terms.P_inv_dot * desired.X_d_dot;
+    return errors;
+  }
+  const DesiredPose pose = CalcDesiredPose(desired);
+  const Matrix3d R_oB = grasp.X_Bo().linear().transpose();
+  const Vector3d omega = grasp.V_Bo().tail<3>();
+  const OrientationError error = CalcOrientationError(grasp.X_Bo().linear(), omega, pose.R_Bd, pose.omega_d);
+  const Vector3d v_d = R_oB * pose.p_Bd_dot;
+  const Vector3d omega_d = error.R_od * pose.omega_d;
+  errors.e << R_oB * (pose.p_Bd - grasp.X_Bo().translation()), error.e_R;
+  errors.V_error << v_d - grasp.V_Bo().head<3>(), error.omega_od;
+  // d/dt (R_oB x) = R_oB x_dot - omega x (R_oB x), d/dt (R_od x) = R_od (x_dot + omega_d x x) - omega x (R_od
+  // x)
+  errors.V_d_dot << R_oB * pose.p_Bd_ddot - omega.cross(v_d),
+      error.R_od * pose.omega_d_dot - omega.cross(omega_d);
+  return errors;
+}
+
 }  // namespace dexcheck

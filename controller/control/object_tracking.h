@@ -38,4 +38,19 @@ Vector6d CalcTrackingAcceleration(const ObjectGains& gains, const Pose& X_Bo, co
 Vector6d CalcTrackingAcceleration(const ObjectGains& gains, OrientationFeedback feedback,
                                   const GraspTerms& grasp, const DesiredMotion& desired);
 
+/// How far the object is from its desired motion, as twists in Sigma_o.
+struct ObjectErrors {
+  /// kAngles: P^-1 (X_d - X_o); kRotation: [R_Bo^T (p_d - p_o); e_R]. m, rad.
+  Vector6d e = Vector6d::Zero();
+  /// V_d - V_Bo, the desired body velocity less the object's. m/s, rad/s.
+  Vector6d V_error = Vector6d::Zero();
+  /// Of the desired motion: d/dt V_d along the object's motion, m/s^2, rad/s^2.
+  Vector6d V_d_dot = Vector6d::Zero();
+};
+
+/// kAngles: V_d = P^-1 X_d_dot; kRotation: V_d = [R_Bo^T p_d_dot; R_od omega_d]. At the object's own pose
+/// either is the desired frame's body velocity. @throws as CalcTrackingAcceleration.
+ObjectErrors CalcObjectErrors(OrientationFeedback feedback, const GraspTerms& grasp,
+                              const DesiredMotion& desired);
+
 }  // namespace dexcheck

@@ -49,7 +49,12 @@ const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
     if (!check.failed || MeaningOf(check).cause == Cause::kNone) continue;
     if (first == nullptr || TellsMore(check, *first)) first = &check;
   }
-  return first;
+  // Wheels of another size give other forces besides, which show before they have rolled far. Wheels that slide do too.
+  const auto name = [](StepCheck which) { return kStepChecks[static_cast<size_t>(which)].name; };
+  if (first == nullptr || first->name != name(StepCheck::kBalanceRobot)) return first;
+  if (!Failed(steps, name(StepCheck::kRolling)) || Failed(steps, name(StepCheck::kTractionUse))) return first;
+  return &*std::find_if(steps.begin(), steps.end(),
+                        [&](const CheckRecord& check) { return check.name == name(StepCheck::kRolling); });
 }
 
 Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRecord> steps) {
@@ -63,6 +68,25 @@ Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRec
 }
 
 }  // namespace
+
+const std::string& FindMeasured(Cause cause, const MeasuredCauses& measured) {
+  static const std::string kNothing;
+  switch (cause) {
+    case Cause::kControlLaw:
+      return measured.law;
+    case Cause::kActuator:
+      return measured.motors;
+    case Cause::kSensing:
+      return measured.sensors;
+    case Cause::kUnmodelledForce:
+    case Cause::kSlope:
+      return measured.force;
+    case Cause::kWheelGeometry:
+      return measured.wheels;
+    default:
+      return kNothing;
+  }
+}
 
 const char* NameOf(Cause cause) {
   switch (cause) {
@@ -94,12 +118,18 @@ const char* NameOf(Cause cause) {
       return "unmodelled force";
     case Cause::kIntegrator:
       return "integrator";
+    case Cause::kSlope:
+      return "slope";
+    case Cause::kWheelGeometry:
+      return "wheel geometry";
+    case Cause::kUnexplained:
+      return "unexplained";
   }
   return "none";
 }
 
 AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord> model,
-                            std::span<const CheckRecord> steps, const std::string& law) {
+                            std::span<const CheckRecord> steps, const MeasuredCauses& measured) {
   AttributionResult result;
   const CheckRecord* first_model = nullptr;
   for (const CheckRecord& check : model) {
@@ -122,9 +152,11 @@ AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord>
     if (const CheckRecord* first = FindEvidence(steps)) {
       result.cause = MeaningOf(*first).cause;
       result.evidence = Tell(*first);
-      if (result.cause == Cause::kControlLaw && !law.empty()) result.evidence += "; " + law;
+      if (result.cause == Cause::kUnmodelledForce && measured.is_slope) result.cause = Cause::kSlope;
+      const std::string& how = FindMeasured(result.cause, measured);
+      if (!how.empty()) result.evidence += "; " + how;
     } else {
-      result.cause = Cause::kIntegrator;
+      result.cause = Cause::kUnexplained;
       const auto assumption = std::find_if(steps.begin(), steps.end(), [](const CheckRecord& check) {
         return check.failed && check.kind == CheckKind::kAssumption;
       });

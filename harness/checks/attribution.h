@@ -18,6 +18,16 @@ struct Attribution {
   Cause cause = Cause::kNone;
 };
 
+/// What was measured of the causes that it can be measured of, in words: which part, and how much.
+struct MeasuredCauses {
+  std::string law;      ///< Which summand of (55), and its factor.
+  std::string motors;   ///< Which motor, and its gain, delay, offset or friction.
+  std::string sensors;  ///< Which reading, and how much.
+  std::string force;    ///< On which joint or body, and how large.
+  std::string wheels;   ///< Which radius or distance.
+  bool is_slope = false;  ///< The force is gravity's, which does not point down.
+};
+
 struct AttributionResult {
   Cause cause = Cause::kNone;             ///< Of the run: the one that the others follow from.
   std::string evidence;                   ///< In words: which check says so, with its value and time.
@@ -28,7 +38,11 @@ struct AttributionResult {
 /// fails, the model is the cause of everything else. Otherwise the cause is the assumption that broke first;
 /// sliding shows at the edge of the friction cone, and tells slip from contacts that merely give.
 /// @param model checks of the first question.
+/// @param measured what was found out beside the checks.
 AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord> model,
-                            std::span<const CheckRecord> steps, const std::string& law = {});
+                            std::span<const CheckRecord> steps, const MeasuredCauses& measured = {});
+
+/// What was measured of a cause; empty when nothing was.
+const std::string& FindMeasured(Cause cause, const MeasuredCauses& measured);
 
 }  // namespace dexcheck

@@ -7,7 +7,9 @@
 #include <string>
 #include <string_view>
 
+#include "harness/checks/attribution.h"
 #include "harness/checks/law_check.h"
+#include "harness/checks/signal_evidence.h"
 #include "harness/checks/step_checks.h"
 #include "harness/checks/step_model_check.h"
 #include "harness/checks/step_record.h"
@@ -19,7 +21,8 @@ namespace dexcheck {
 class CrossCheck {
  public:
   /// @throws InputError as EngineStep, or when a bound of the scenario has the name of no check.
-  explicit CrossCheck(const Setup& setup);
+  /// @param knows_law whether the controller's law is the scenario's; otherwise no check of the law is made.
+  explicit CrossCheck(const Setup& setup, bool knows_law = true);
 
   /// The first question: are the terms that the controller used the engine's?
   void CompareModel(const StepRecord& step);
@@ -28,13 +31,17 @@ class CrossCheck {
   /// The law's question: are the torques those of (53)-(55), and do they do what is expected? After the other
   /// two.
   void CompareLaw(const StepRecord& step);
+  /// The first question and the law's, of torques that were not sent because they are above a motor's limit.
+  void CompareUnsent(const StepRecord& step);
   /// The largest effort of a motor, before the step that it belongs to.
   void JudgeEffort(double effort, double time) { motion_.JudgeEffort(effort, time); }
-  /// Forgets motion and forces of all steps so far: time begins anew.
-  void Reset() { motion_.Reset(); }
+  /// Forgets motion and forces of all steps so far, but for the checks that failed: time begins anew.
+  void Reset();
+  /// Checks of motion and forces that failed before the last Reset, while everything settled, in that order.
+  [[nodiscard]] std::span<const CheckRecord> settling_failures() const { return settling_failures_; }
 
-  /// Which part of the law differs, in words; empty when none does.
-  [[nodiscard]] std::string TellLaw() const { return law_ ? law_->attribution().Tell() : std::string(); }
+  /// What was measured of each cause, in words.
+  [[nodiscard]] MeasuredCauses Tell() const;
   [[nodiscard]] std::span<const CheckRecord> model_checks() const { return model_.records(); }
   [[nodiscard]] std::span<const CheckRecord> motion_checks() const { return motion_.checks(); }
   /// A check of the motion. @throws std::invalid_argument unless there is one of that name.
@@ -48,8 +55,11 @@ class CrossCheck {
   const Setup* setup_;
   StepModelCheck model_;
   StepChecks motion_;
-  std::optional<LawCheck> law_;  // none for a task
+  std::optional<LawCheck> law_;  // none for a task, or an unknown law
   LawTerms law_terms_;           // the engine's
+  std::vector<CheckRecord> settling_failures_;
+  MotorEvidence motors_;
+  SensorEvidence sensors_;
 };
 
 }  // namespace dexcheck

@@ -18,7 +18,10 @@ enum class Cause {
   kTilt,             ///< The platform does not stay level.
   kSolver,           ///< The engine's solver stopped before its forces fit its motion.
   kUnmodelledForce,  ///< A force acts that neither the model nor the engine's description has.
-  kIntegrator,       ///< None of these: what time stepping leaves.
+  kIntegrator,       ///< What time stepping leaves: half the step leaves less.
+  kSlope,            ///< The floor is not level: gravity points elsewhere.
+  kWheelGeometry,    ///< The wheels' radius or distance is another.
+  kUnexplained,      ///< None of these was seen.
 };
 
 /// "model", "wheel slip", ...

@@ -5,6 +5,8 @@
 #include <complex>
 #include <limits>
 
+#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 #include "harness/checks/step_check_table.h"
 
 namespace dexcheck {
@@ -18,18 +20,16 @@ constexpr double kLeastNullTolerance = 1e-9;
 // What slip changes in accelerations and forces, over the condition number, against the forces that it
 // changes.
 constexpr double kSlipShare = 10.0;
-// Torques that differ by more than this, relative, tell which part is wrong; less is rounding.
-constexpr double kTellingDifference = 1e-9;
 
 }  // namespace
 
-double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold) {
+double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold, double velocity_age) {
   const double h = static_cast<double>(hold);
   double radius = 0.0;
   for (Eigen::Index i = 0; i < 6; ++i) {
-    // u = -(K_v v + K_p e) is held for h steps: v_h = v + h dt u, e_h = e + h dt v + h (h + 1) / 2 dt^2 u.
+    // u = -(K_v v + K_p e) is held for h steps: v_h = v + h dt u, e_h = e + h dt v + (h dt / 2 + age) h dt u.
     const double b_v = h * time_step;
-    const double b_e = 0.5 * h * (h + 1.0) * time_step * time_step;
+    const double b_e = 0.5 * h * (h + 2.0 * velocity_age / time_step) * time_step * time_step;
     Matrix2d A;
     A << 1.0 - b_v * gains.K_v[i], -b_v * gains.K_p[i], b_v - b_e * gains.K_v[i], 1.0 - b_e * gains.K_p[i];
     const double half = 0.5 * A.trace();
@@ -43,9 +43,11 @@ double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold) 
 LawCheck::LawCheck(const Setup& setup)
     : spec_(MakeLawSpec(setup.MakeControllerOptions())),
       time_step_(setup.scenario().plant.time_step),
+      velocity_age_(setup.scenario().plant.velocity_age()),
       hold_(std::max(1L, std::lround(setup.scenario().plant.control_step / time_step_))),
       actuation_(setup.model()),
-      reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())) {
+      reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())),
+      own_factor_(setup.model()) {
   const GraspControllerOptions options = setup.MakeControllerOptions();
   mu_ = options.mu;
   f_min_ = options.f_min;
@@ -53,6 +55,12 @@ LawCheck::LawCheck(const Setup& setup)
   barrier_weight_ = options.force.barrier_weight;
   slack_tolerance_ = options.force.slack_tolerance;
   residual_tolerance_ = options.force.residual_tolerance;
+  const int n = setup.model().num_velocities();
+  const int k = 3 * static_cast<int>(setup.fingertips().size());
+  if (options.law != ControlLaw::kComputedTorque) {
+    baseline_ = std::make_unique<BaselineReference>(options.law, options.stiffness, n, k);
+    has_error_dynamics_ = options.law == ControlLaw::kOperationalSpace;
+  }
   trajectory_ = setup.scenario().trajectory(setup.X_start() + setup.scenario().start_error);
   force_.setZero(setup.model().num_velocities());
   difference_ = force_;
@@ -60,12 +68,14 @@ LawCheck::LawCheck(const Setup& setup)
   column_.setZero(setup.model().num_velocities(), 1);
 }
 
-double LawCheck::sampled_radius() const { return CalcSampledRadius(spec_.gains, time_step_, hold_); }
+double LawCheck::sampled_radius() const {
+  return CalcSampledRadius(spec_.gains, time_step_, hold_, velocity_age_);
+}
 
 DesiredMotion LawCheck::EvaluateDesired(double t) const {
   // Semi-implicit Euler steps like a leapfrog: velocities belong to the middle of the step before.
   DesiredMotion desired = trajectory_->Evaluate(t);
-  desired.X_d_dot = trajectory_->Evaluate(t - 0.5 * time_step_).X_d_dot;
+  desired.X_d_dot = trajectory_->Evaluate(t - velocity_age_).X_d_dot;
   return desired;
 }
 
@@ -88,11 +98,33 @@ const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& f
   }
   force_ = terms.C_xi + terms.gravity + terms.friction;
   scale_ = std::max(Norm(force_), std::numeric_limits<double>::min());
-  CompareTorque(step);
-  CompareDemand(findings);
-  CompareGraspForce(step, terms);
+  if (baseline_) {
+    const Matrix6Xd& G_dot = step.model->grasp().G_dot();
+    if (!baseline_->Evaluate(spec_, reference_, terms, G_dot, desired, step.command.demand.F_N)) {
+      errors_ = {kInfinity, kInfinity, kInfinity, kInfinity};
+      return errors_;
+    }
+    CompareTorque(step, baseline_->force());
+    CompareGraspForce(step, terms, baseline_->f_c());
+  } else {
+    CompareTorque(step, reference_.force());
+    CompareDemand(findings);
+    CompareGraspForce(step, terms, reference_.f_c());
+  }
   if (follows_error()) FollowError(step, findings, terms, desired);
   return errors_;
+}
+
+double LawCheck::CompareUnsent(const StepRecord& step, const LawTerms& terms) {
+  own_factor_.Compute(terms.M);
+  mass_factor_ = &own_factor_;
+  errors_ = LawErrors{};
+  if (!reference_.Evaluate(spec_, terms, EvaluateDesired(step.time), step.command.demand.F_N))
+    return std::numeric_limits<double>::infinity();
+  force_ = terms.C_xi + terms.gravity + terms.friction;
+  scale_ = std::max(Norm(force_), std::numeric_limits<double>::min());
+  CompareTorque(step);
+  return errors_.torque;
 }
 
 double LawCheck::CompareApplied(const StepRecord& step) {
@@ -100,12 +132,14 @@ double LawCheck::CompareApplied(const StepRecord& step) {
          std::max(step.command.tau.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
 }
 
-void LawCheck::CompareTorque(const StepRecord& step) {
+void LawCheck::CompareTorque(const StepRecord& step, const VectorXd& force) {
   actuation_.CalcForce(step.command.tau, force_);
-  difference_ = force_ - reference_.force();
+  difference_ = force_ - force;
   const double relative = Norm(difference_) / scale_;
   errors_.torque = relative / reference_.condition_number();
-  if (relative > kTellingDifference) attribution_.Add(difference_, reference_.parts(), 1.0 / scale_);
+  // Less is rounding, which tells nothing, and only the printed law is known summand by summand.
+  if (!baseline_ && errors_.torque > kLawTorqueBound)
+    attribution_.Add(difference_, reference_.parts(), 1.0 / scale_);
 }
 
 void LawCheck::CompareDemand(const StepFindings& findings) {
@@ -122,8 +156,7 @@ void LawCheck::CompareDemand(const StepFindings& findings) {
   errors_.demand = std::max(0.0, std::max(motion, forces) / kappa - kSlipShare * slip);
 }
 
-void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms) {
-  const VectorXd& f_c = reference_.f_c();
+void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms, const VectorXd& f_c) {
   const VectorXd& F_N = step.command.demand.F_N;
   const double size = std::max(1.0, f_c.norm());
   const double null =
@@ -153,23 +186,28 @@ void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms) 
 
 void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                            const DesiredMotion& desired) {
-  const Matrix3d& R = terms.X_Bo.linear();
-  const Vector3d v = terms.V_Bo.head<3>();
   if (!follows_) {
-    p_ = terms.X_Bo.translation();
-    p_dot_ = R * v;
+    followed_ = {terms.X_Bo, terms.V_Bo, terms.X_o};
     follows_ = true;
   }
-  errors_.error_dynamics = (p_ - terms.X_Bo.translation()).norm();
-  // What the engine's object did beyond the rigid prediction, p_ddot = R (v_dot + omega x v).
-  const Vector3d missed = R * (step.response.V_Bo_dot.head<3>() - findings.V_Bo_dot_model.head<3>());
-  const Eigen::Array3d K_v = spec_.gains.K_v.head<3>();
-  const Eigen::Array3d K_p = spec_.gains.K_p.head<3>();
-  const Vector3d p_ddot = desired.X_d_ddot.head<3>() +
-                          (K_v * (desired.X_d_dot.head<3>() - p_dot_).array()).matrix() +
-                          (K_p * (desired.X_d.head<3>() - p_).array()).matrix() + missed;
-  p_dot_ += time_step_ * p_ddot;
-  p_ += time_step_ * p_dot_;
+  errors_.error_dynamics = (followed_.X_Bo.translation() - terms.X_Bo.translation()).norm();
+  errors_.orientation_dynamics =
+      LogSo3(followed_.X_Bo.linear().transpose() * terms.X_Bo.linear()).norm();
+  // Semi-implicit, as the plant: velocities first. v = R^T p_dot, hence p_ddot = R (v_dot + omega x v).
+  if (spec_.orientation == OrientationFeedback::kAngles)
+    followed_.X_o = CalcObjectCoordinates(followed_.X_Bo, followed_.X_o);
+  Vector6d V_dot = reference_.CalcDemand(spec_, followed_, desired);
+  // What the engine's object did beyond the rigid prediction.
+  V_dot += step.response.V_Bo_dot - findings.V_Bo_dot_model;
+  Matrix3d R = followed_.X_Bo.linear();
+  const Vector3d v = followed_.V_Bo.head<3>();
+  Vector3d omega = followed_.V_Bo.tail<3>();
+  const Vector3d p_dot = R * (v + time_step_ * (V_dot.head<3>() + omega.cross(v)));
+  omega += time_step_ * V_dot.tail<3>();
+  R = R * ExpSo3(time_step_ * omega);
+  followed_.X_Bo.translation() += time_step_ * p_dot;
+  followed_.X_Bo.linear() = Eigen::Quaterniond(R).normalized().toRotationMatrix();
+  followed_.V_Bo << followed_.X_Bo.linear().transpose() * p_dot, omega;
 }
 
 }  // namespace dexcheck

@@ -7,6 +7,7 @@
 #include "controller/control/actuation.h"
 #include "controller/control/trajectory.h"
 #include "controller/dynamics/tree_factor.h"
+#include "harness/checks/baseline_reference.h"
 #include "harness/checks/law_attribution.h"
 #include "harness/checks/law_reference.h"
 #include "harness/checks/step_record.h"
@@ -28,16 +29,19 @@ struct LawErrors {
   /// Object's position against (57) integrated from t = 0 and driven by the accelerations that the prediction
   /// missed, m.
   double error_dynamics = 0.0;
+  double orientation_dynamics = 0.0;  ///< Its orientation likewise, rad.
 };
 
-/// Largest magnitude of the eigenvalues of (57), per time step, when velocities are those of the middle of
-/// the step before and the command is held for `hold` steps: 1 and more does not settle. Over all six axes.
-double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold);
+/// Largest magnitude of the eigenvalues of (57), per time step, when the command is held for `hold` steps: 1
+/// and more does not settle. Over all six axes. @param velocity_age by how much velocities are older than
+/// positions, s: half a time step where velocities step first and positions by them, 0 where both step
+/// together.
+double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold, double velocity_age);
 
-/// Computes the printed law at each step, from the engine's terms, the scenario's gains and the scenario's
-/// trajectory. Of the controller it takes F_N, which the law may choose, X_o's angles on the law's branch
-/// (the first question compares their pose with the engine's), and C_bar', J_B_dot' where they multiply what
-/// slips.
+/// Computes the scenario's law, as a rule the printed one, at each step, from the engine's terms, the
+/// scenario's gains and the scenario's trajectory. Of the controller it takes F_N, which the law may choose,
+/// X_o's angles on the law's branch (the first question compares their pose with the engine's), and C_bar',
+/// J_B_dot' where they multiply what slips.
 class LawCheck {
  public:
   /// @param setup of a scenario that is no task.
@@ -49,14 +53,23 @@ class LawCheck {
   }
   /// Of the scenario's gains.
   [[nodiscard]] double sampled_radius() const;
+  /// Whether the law's closed loop is (57): that of the paper's, and by algebra that of operational space.
+  [[nodiscard]] bool has_error_dynamics() const { return has_error_dynamics_; }
+  /// Whether the rigid system answers with what the law demands of it: the paper's does.
+  [[nodiscard]] bool has_demand() const { return baseline_ == nullptr; }
   /// Whether the controller computes anew at every step, so that (57) can be integrated beside it.
-  [[nodiscard]] bool follows_error() const { return hold_ == 1; }
+  /// in the way that its velocities need: those of the middle of the step before.
+  [[nodiscard]] bool follows_error() const {
+    return has_error_dynamics_ && hold_ == 1 && velocity_age_ > 0.0;
+  }
 
   /// @param terms the engine's, at the state that the controller was told.
   /// @param L factor of M_bar' = L^T L: the check measures in |f|_M^-1 = |L^-T f|.
   /// @param findings of the same step: what the rigid system does under its torques.
   const LawErrors& Compare(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                            const TreeFactor& mass_factor);
+  /// The torques alone, for a step that the motors refuse: nothing is known of what they would do.
+  double CompareUnsent(const StepRecord& step, const LawTerms& terms);
   /// Largest |tau' received - tau' sent| over the largest |tau'|.
   [[nodiscard]] static double CompareApplied(const StepRecord& step);
 
@@ -65,9 +78,9 @@ class LawCheck {
 
  private:
   [[nodiscard]] DesiredMotion EvaluateDesired(double t) const;
-  void CompareTorque(const StepRecord& step);
+  void CompareTorque(const StepRecord& step, const VectorXd& force);
   void CompareDemand(const StepFindings& findings);
-  void CompareGraspForce(const StepRecord& step, const LawTerms& terms);
+  void CompareGraspForce(const StepRecord& step, const LawTerms& terms, const VectorXd& f_c);
   void FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                    const DesiredMotion& desired);
   double Norm(const VectorXd& force);
@@ -75,20 +88,23 @@ class LawCheck {
   LawSpec spec_;
   double mu_, f_min_, f_max_, barrier_weight_, slack_tolerance_, residual_tolerance_;
   double time_step_;
+  double velocity_age_;
+  bool has_error_dynamics_ = true;
   long hold_;
   std::unique_ptr<Trajectory> trajectory_;
   ActuationMap actuation_;
   LawReference reference_;
+  std::unique_ptr<BaselineReference> baseline_;  // null for the paper's law
   LawAttribution attribution_;
   LawErrors errors_;
   const TreeFactor* mass_factor_ = nullptr;
+  TreeFactor own_factor_;  // of a step without prediction
   double scale_ = 1.0;
   VectorXd force_, difference_;        // n
   VectorXd slope_;                     // k
   RowMatrixXd column_;                 // n x 1
-  bool follows_ = false;               // whether the two below are set
-  Vector3d p_ = Vector3d::Zero();      // of (57), m
-  Vector3d p_dot_ = Vector3d::Zero();  // m/s, half a step before
+  bool follows_ = false;               // whether the one below is set
+  ObjectState followed_;               // of (57); velocities half a step before
 };
 
 }  // namespace dexcheck

@@ -13,37 +13,43 @@ constexpr unsigned kMotion = Bit(LawPart::kFeedForward) | Bit(LawPart::kVelocity
                              Bit(LawPart::kPositionFeedback) | Bit(LawPart::kCoordinateRate);
 constexpr unsigned kInertia =
     kMotion | Bit(LawPart::kGraspMapRate) | Bit(LawPart::kJacobianRate) | Bit(LawPart::kPosture);
-constexpr unsigned kObject =
-    Bit(LawPart::kObjectInertia) | Bit(LawPart::kObjectCoriolis) | Bit(LawPart::kObjectGravity);
+constexpr unsigned kObjectInertia = Bit(LawPart::kInertiaOfFeedForward) | Bit(LawPart::kInertiaOfVelocity) |
+                                    Bit(LawPart::kInertiaOfPosition) | Bit(LawPart::kInertiaOfRate);
+constexpr unsigned kObject = kObjectInertia | Bit(LawPart::kObjectCoriolis) | Bit(LawPart::kObjectGravity);
+// Robot and object are both to accelerate so.
+constexpr unsigned kFeedForward = Bit(LawPart::kFeedForward) | Bit(LawPart::kInertiaOfFeedForward);
+constexpr unsigned kVelocity = Bit(LawPart::kVelocityFeedback) | Bit(LawPart::kInertiaOfVelocity);
+constexpr unsigned kPosition = Bit(LawPart::kPositionFeedback) | Bit(LawPart::kInertiaOfPosition);
+constexpr unsigned kRate = Bit(LawPart::kCoordinateRate) | Bit(LawPart::kInertiaOfRate);
 
 constexpr LawPartName kLawParts[] = {
-    {"M_bar' J^+ G^T P^-1 X_d_ddot", "feed-forward acceleration", Bit(LawPart::kFeedForward)},
-    {"M_bar' J^+ G^T P^-1 K_v E_dot", "velocity feedback K_v", Bit(LawPart::kVelocityFeedback)},
-    {"M_bar' J^+ G^T P^-1 K_p E", "position feedback K_p", Bit(LawPart::kPositionFeedback)},
-    {"M_bar' J^+ G^T d/dt(P^-1) X_o_dot", "rate of P^-1", Bit(LawPart::kCoordinateRate)},
+    {"(M_bar' J^+ G^T + J^T G^+ M_hat) P^-1 X_d_ddot", "feed-forward acceleration", kFeedForward},
+    {"(M_bar' J^+ G^T + J^T G^+ M_hat) P^-1 K_v E_dot", "velocity feedback K_v", kVelocity},
+    {"(M_bar' J^+ G^T + J^T G^+ M_hat) P^-1 K_p E", "position feedback K_p", kPosition},
+    {"(M_bar' J^+ G^T + J^T G^+ M_hat) d/dt(P^-1) X_o_dot", "rate of P^-1", kRate},
     {"M_bar' J^+ G_dot^T V_o", "G_dot", Bit(LawPart::kGraspMapRate)},
     {"M_bar' J^+ J_dot xi_c", "J_dot", Bit(LawPart::kJacobianRate)},
     {"M_bar' N sigma'", "null-space acceleration sigma'", Bit(LawPart::kPosture)},
     {"C_bar' xi_c", "Coriolis forces C_bar'", Bit(LawPart::kCoriolis)},
     {"F_bar' (gravity)", "gravity in F_bar'", Bit(LawPart::kGravity)},
     {"F_bar' (friction)", "friction in F_bar'", Bit(LawPart::kFriction)},
-    {"J^T G^+ M_hat V_o_dot", "object's inertia M_o", Bit(LawPart::kObjectInertia)},
+    {"J^T G^+ M_hat V_o_dot", "object's inertia M_o", kObjectInertia},
     {"J^T G^+ C_hat V_o", "object's C_o", Bit(LawPart::kObjectCoriolis)},
     {"J^T G^+ N_o", "object's gravity N_o", Bit(LawPart::kObjectGravity)},
     {"J^T F_N", "internal force F_N", Bit(LawPart::kInternalForce)},
     {"M_bar' xi_dot_d", "mass matrix M_bar'", kInertia},
     {"M_bar' J^+ (...)", "acceleration without the null space", kInertia & ~Bit(LawPart::kPosture)},
-    {"M_bar' J^+ G^T V_o_dot", "demanded acceleration V_o_dot", kMotion},
-    {"M_bar' J^+ G^T P^-1 (K_v E_dot + K_p E)", "feedback of both gains",
-     Bit(LawPart::kVelocityFeedback) | Bit(LawPart::kPositionFeedback)},
+    {"(M_bar' J^+ G^T + J^T G^+ M_hat) V_o_dot", "demanded acceleration V_o_dot", kMotion | kObjectInertia},
+    {"(M_bar' J^+ G^T + J^T G^+ M_hat) P^-1 (K_v E_dot + K_p E)", "feedback of both gains",
+     kVelocity | kPosition},
     {"F_bar'", "gravity and friction F_bar'", Bit(LawPart::kGravity) | Bit(LawPart::kFriction)},
     {"J^T G^+ F_o", "object's wrench G^+ F_o", kObject},
     {"J^T f_c", "contact forces J_B'^T f_c", kObject | Bit(LawPart::kInternalForce)},
     {"tau'", "all torques", (1U << kLawPartCount) - 1U},
 };
 
-/// Body angular velocity by the rates of ZYZ angles: omega = B [alpha_dot; beta_dot; gamma_dot], R = R_z R_y
-/// R_z.
+}  // namespace
+
 Matrix3d CalcAngleMap(const Vector3d& angles) {
   const double sb = std::sin(angles[1]), cb = std::cos(angles[1]);
   const double sg = std::sin(angles[2]), cg = std::cos(angles[2]);
@@ -52,7 +58,6 @@ Matrix3d CalcAngleMap(const Vector3d& angles) {
   return B;
 }
 
-/// Its rate.
 Matrix3d CalcAngleMapRate(const Vector3d& angles, const Vector3d& rates) {
   const double sb = std::sin(angles[1]), cb = std::cos(angles[1]);
   const double sg = std::sin(angles[2]), cg = std::cos(angles[2]);
@@ -62,8 +67,6 @@ Matrix3d CalcAngleMapRate(const Vector3d& angles, const Vector3d& rates) {
       0.0;
   return B_dot;
 }
-
-}  // namespace
 
 LawSpec MakeLawSpec(const GraspControllerOptions& options) {
   return {options.gains, options.orientation, options.weight, options.posture};
@@ -126,13 +129,17 @@ bool LawReference::FactorJacobian(const LawSpec& spec, const LawTerms& terms) {
   return G_llt_.info() == Eigen::Success && std::isfinite(condition_number_);
 }
 
+void LawReference::AddLeastForces(const Vector6d& F_o, VectorXd* f_c) const {
+  f_c->noalias() += G_.transpose() * G_llt_.solve(F_o);
+}
+
 Vector6d LawReference::SolveGrasp(const Eigen::Ref<const VectorXd>& f) const { return G_llt_.solve(G_ * f); }
 
-void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawTerms& terms,
+void LawReference::CalcObjectAcceleration(const LawSpec& spec, const ObjectState& object,
                                           const DesiredMotion& desired) {
-  const Matrix3d R_T = terms.X_Bo.linear().transpose();
-  const Vector3d v = terms.V_Bo.head<3>();
-  const Vector3d omega = terms.V_Bo.tail<3>();
+  const Matrix3d R_T = object.X_Bo.linear().transpose();
+  const Vector3d v = object.V_Bo.head<3>();
+  const Vector3d omega = object.V_Bo.tail<3>();
   auto& [feed_forward, velocity, position, rate] = demand_;
 
   // v = R^T p_dot, hence v_dot = R^T p_ddot - omega x v
@@ -142,12 +149,12 @@ void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawTerms& t
   feed_forward.head<3>() = R_T * desired.X_d_ddot.head<3>();
   velocity.head<3>() = R_T * (K_v.head<3>() * (desired.X_d_dot.head<3>() - p_dot).array()).matrix();
   position.head<3>() =
-      R_T * (K_p.head<3>() * (desired.X_d.head<3>() - terms.X_Bo.translation()).array()).matrix();
+      R_T * (K_p.head<3>() * (desired.X_d.head<3>() - object.X_Bo.translation()).array()).matrix();
   rate.head<3>() = -omega.cross(v);
 
   if (spec.orientation == OrientationFeedback::kAngles) {
     // omega = B a_dot, hence omega_dot = B a_ddot + B_dot a_dot
-    const Vector3d angles = terms.X_o.tail<3>();
+    const Vector3d angles = object.X_o.tail<3>();
     const Matrix3d B = CalcAngleMap(angles);
     const Vector3d angle_rates = B.inverse() * omega;
     feed_forward.tail<3>() = B * desired.X_d_ddot.tail<3>();
@@ -157,7 +164,7 @@ void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawTerms& t
   } else {
     // e_R = log(R_Bo^T R_Bd) obeys (57). omega_dot is affine in e_R_ddot: its parts by that of each summand.
     const DesiredPose pose = CalcDesiredPose(desired);
-    const OrientationError error = CalcOrientationError(terms.X_Bo.linear(), omega, pose.R_Bd, pose.omega_d);
+    const OrientationError error = CalcOrientationError(object.X_Bo.linear(), omega, pose.R_Bd, pose.omega_d);
     const auto accelerate = [&](const Vector3d& omega_d_dot, const Vector3d& e_R_ddot) {
       return CalcAngularAcceleration(error, pose.omega_d, omega_d_dot, e_R_ddot);
     };
@@ -171,6 +178,11 @@ void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawTerms& t
   V_Bo_dot_ = feed_forward + velocity + position + rate;
 }
 
+Vector6d LawReference::CalcDemand(const LawSpec& spec, const ObjectState& object, const DesiredMotion& desired) {
+  CalcObjectAcceleration(spec, object, desired);
+  return V_Bo_dot_;
+}
+
 void LawReference::AddMotionPart(LawPart part, const LawTerms& terms,
                                  const Eigen::Ref<const VectorXd>& rates) {
   motion_.noalias() = J_plus_ * rates;
@@ -181,7 +193,7 @@ void LawReference::AddMotionPart(LawPart part, const LawTerms& terms,
 bool LawReference::Evaluate(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired,
                             const Eigen::Ref<const VectorXd>& F_N) {
   if (!FactorJacobian(spec, terms)) return false;
-  CalcObjectAcceleration(spec, terms, desired);
+  CalcObjectAcceleration(spec, {terms.X_Bo, terms.V_Bo, terms.X_o}, desired);
   const auto part = [&](LawPart which) { return parts_.col(static_cast<Eigen::Index>(which)); };
 
   // xi_c = xi - J^+ (J xi - G^T V_o)
@@ -227,7 +239,10 @@ bool LawReference::Evaluate(const LawSpec& spec, const LawTerms& terms, const De
     f_c_ += rates_;
     part(which).noalias() = terms.J.transpose() * rates_;
   };
-  add_wrench(LawPart::kObjectInertia, terms.M_hat * V_Bo_dot_);
+  for (size_t i = 0; i < demand_.size(); ++i) {
+    add_wrench(static_cast<LawPart>(static_cast<size_t>(LawPart::kInertiaOfFeedForward) + i),
+               terms.M_hat * demand_[i]);
+  }
   add_wrench(LawPart::kObjectCoriolis, terms.C_hat_V);
   add_wrench(LawPart::kObjectGravity, terms.N_o);
   part(LawPart::kInternalForce).noalias() = terms.J.transpose() * F_N;

@@ -26,6 +26,12 @@
 
 namespace dexcheck {
 
+/// Body angular velocity by the rates of ZYZ angles: omega = B [alpha_dot; beta_dot; gamma_dot], R = R_z R_y
+/// R_z.
+Matrix3d CalcAngleMap(const Vector3d& angles);
+/// Its rate.
+Matrix3d CalcAngleMapRate(const Vector3d& angles, const Vector3d& rates);
+
 /// Robot, object and contacts at one state, by either side. n entries of xi, k = 3N of f_c; contact forces
 /// and J in each Sigma_cf, the object in Sigma_o.
 struct LawTerms {
@@ -48,6 +54,13 @@ struct LawTerms {
 
   /// Sizes all members.
   LawTerms(int num_positions, int num_velocities, int num_forces);
+};
+
+/// The object's part of it.
+struct ObjectState {
+  Pose X_Bo = Pose::Identity();
+  Vector6d V_Bo = Vector6d::Zero();
+  Vector6d X_o = Vector6d::Zero();  ///< kAngles only.
 };
 
 /// What the law is meant to be.
@@ -73,7 +86,10 @@ enum class LawPart {
   kCoriolis,          ///< C_bar' xi_c
   kGravity,           ///< gravity's part of F_bar'
   kFriction,          ///< friction's part of F_bar'
-  kObjectInertia,     ///< J^T G^+ M_hat V_o_dot
+  kInertiaOfFeedForward,  ///< J^T G^+ M_hat V_o_dot, of the first summand of V_o_dot,
+  kInertiaOfVelocity,     ///< of the second,
+  kInertiaOfPosition,     ///< of the third,
+  kInertiaOfRate,         ///< and of the fourth.
   kObjectCoriolis,    ///< J^T G^+ C_hat V_o
   kObjectGravity,     ///< J^T G^+ N_o
   kInternalForce,     ///< J^T F_N
@@ -100,6 +116,9 @@ class LawReference {
   bool Evaluate(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired,
                 const Eigen::Ref<const VectorXd>& F_N);
 
+  /// V_o_dot that (55) demands of an object in this state, wherever the robot is.
+  Vector6d CalcDemand(const LawSpec& spec, const ObjectState& object, const DesiredMotion& desired);
+
   /// E_bar' tau' (n), and its summands (n x kLawPartCount).
   [[nodiscard]] const VectorXd& force() const { return force_; }
   [[nodiscard]] const MatrixXd& parts() const { return parts_; }
@@ -113,12 +132,16 @@ class LawReference {
   /// contacts slip.
   [[nodiscard]] const VectorXd& slip_coriolis() const { return slip_coriolis_; }
   [[nodiscard]] const VectorXd& slip_inertia() const { return slip_inertia_; }
+  /// J^+ (n x k) of (47).
+  [[nodiscard]] const MatrixXd& J_plus() const { return J_plus_; }
+  /// Adds G^+ F_o (k) to contact forces.
+  void AddLeastForces(const Vector6d& F_o, VectorXd* f_c) const;
   /// (G G^T)^-1 G f (k -> 6): the wrench-free part of f is f - G^T of this.
   [[nodiscard]] Vector6d SolveGrasp(const Eigen::Ref<const VectorXd>& f) const;
 
  private:
   [[nodiscard]] bool FactorJacobian(const LawSpec& spec, const LawTerms& terms);
-  void CalcObjectAcceleration(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired);
+  void CalcObjectAcceleration(const LawSpec& spec, const ObjectState& object, const DesiredMotion& desired);
   void AddMotionPart(LawPart part, const LawTerms& terms, const Eigen::Ref<const VectorXd>& rates);
 
   MatrixXd J_plus_;     // n x k

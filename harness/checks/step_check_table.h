@@ -20,6 +20,7 @@ enum class StepCheck {
   kGraspForce,
   kTorqueApplied,
   kErrorDynamics,
+  kOrientationDynamics,
   kExpectPosition,
   kExpectOrientation,
   kBalanceRobot,
@@ -30,6 +31,7 @@ enum class StepCheck {
   kFingertipSlipRate,
   kWheelSlip,
   kWheelSlipRate,
+  kRolling,
   kConeUse,
   kTractionUse,
   kContactsLost,
@@ -93,8 +95,17 @@ inline constexpr double kLawDemandBound = 1e-8;
 inline constexpr double kGraspForceBound = 1e-4;
 // A torque goes through the gear's ratio once and back: two roundings.
 inline constexpr double kTorqueAppliedBound = 1e-14;
+// A wheel that rolls and does not slip has the speed of the platform above it, but for how fast the platform
+// tilts or sinks on soft tyres: its tilt of at most 1e-5 rad within some ms, at an arm of r.
+inline constexpr double kRollingBound = 1e-5;
+// What is left of (48) is compared less the inertia of what the platform does on soft tyres besides rolling, less what the
+// solver left over, and less what tilt and slip can come to (StepChecks::CalcUnevenForce). Then all of it is rounding of the
+// engine's terms, 1e-14 of forces that cancel, and products of small departures: 1e-5 rad of tilt times 1e-2 of the
+// forces that change with it.
+inline constexpr double kBalanceRobotBound = 1e-6;
 // What law_demand leaves, over K_p: measured 1.2e-9 m in `curve`.
 inline constexpr double kErrorDynamicsBound = 1e-8;
+inline constexpr double kOrientationDynamicsBound = 1e-7;
 
 /// What explains what: of the failed checks, those of the first of these ranks tell why, however late they
 /// failed.
@@ -103,9 +114,10 @@ enum class Rank {
   kLaw,            ///< Torques that are not the law's, or gains that cannot settle.
   kActuator,       ///< Torques that did not arrive.
   kObjectBalance,  ///< A force on the object that neither side has.
-  kDecisive,       ///< A limit, a stop, a contact that slides: from then on everything else is void.
+  /// A limit, a stop, a contact that slides: from then on everything else is void. So it is from a force on
+  /// the robot on that neither side has, and with wheels that do not roll as they should; what came first tells.
+  kDecisive,
   kAssumption,     ///< Contacts that give, a platform that tilts, a solver that stopped early.
-  kBalance,        ///< A force on the robot that neither side has.
   /// By algebra the prediction differs from the engine's motion by what the balances leave and by how the
   /// contacts give, J_B' xi_dot + J_B_dot' xi - d/dt(G^T V_o): where the balances hold, contacts gave.
   kPrediction,
@@ -194,7 +206,14 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .description =
          "object's position against (57) integrated beside the run, driven by the accelerations that the "
          "prediction missed",
-     .meaning = {.cause = Cause::kIntegrator, .precedence = 20, .rank = Rank::kResidual}},
+     .meaning = {.cause = Cause::kUnexplained, .precedence = 20, .rank = Rank::kResidual}},
+    {.check = StepCheck::kOrientationDynamics,
+     .name = "orientation_dynamics",
+     .kind = CheckKind::kLaw,
+     .unit = "rad",
+     .bound = kOrientationDynamicsBound,
+     .description = "object's orientation likewise",
+     .meaning = {.cause = Cause::kUnexplained, .precedence = 28, .rank = Rank::kResidual}},
     {.check = StepCheck::kExpectPosition,
      .name = "expect_position",
      .kind = CheckKind::kLaw,
@@ -213,10 +232,10 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "balance_robot",
      .kind = CheckKind::kBalance,
      .unit = "1",
-     .bound = 1e-5,
-     .description = "what is left of (48) with the engine's accelerations and contact forces, against the "
-                    "forces balanced",
-     .meaning = {.cause = Cause::kUnmodelledForce, .precedence = 23, .rank = Rank::kBalance}},
+     .bound = kBalanceRobotBound,
+     .description = "what is left of (48) with the engine's accelerations and contact forces, less what the "
+                    "platform does besides and its solver left over, against the forces balanced",
+     .meaning = {.cause = Cause::kUnmodelledForce, .precedence = -1, .rank = Rank::kDecisive}},
     // The object's balance has no other unknowns than its inertia and the contacts' geometry, which the first
     // question
     // compares: where that holds, a force acts on the object that nobody has.
@@ -282,6 +301,13 @@ inline constexpr StepCheckInfo kStepChecks[] = {
                  .precedence = 9,
                  .is_own = true,
                  .sharper = StepCheck::kTractionUse}},
+    {.check = StepCheck::kRolling,
+     .name = "rolling",
+     .kind = CheckKind::kAssumption,
+     .unit = "m/s",
+     .bound = kRollingBound,
+     .description = "speed of a wheel's rim against that of the platform above it, less its slip, (1)",
+     .meaning = {.cause = Cause::kWheelGeometry, .precedence = 27, .is_own = true, .rank = Rank::kDecisive}},
     {.check = StepCheck::kConeUse,
      .name = "cone_use",
      .kind = CheckKind::kAssumption,
@@ -335,22 +361,23 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .unit = "rad",
      .bound = 1e-5,
      .description = "movement since t = 0 of joints that do not carry the object"},
-    // As small as the discrepancies that balance_robot and the prediction are judged by.
+    // As small as the discrepancies that the prediction is judged by. Forces that do not fit the motion explain whatever
+    // else is wrong from then on.
     {.check = StepCheck::kSolver,
      .name = "solver",
      .kind = CheckKind::kAssumption,
      .unit = "1",
      .bound = 1e-5,
-     .description = "what the engine's solver left over of its own equation of motion of the object, as "
-                    "balance_object",
-     .meaning = {.cause = Cause::kSolver, .precedence = 12, .is_own = true}},
+     .description = "what the engine's solver left over of its own equations of motion, of the object as "
+                    "balance_object, of the robot as balance_robot",
+     .meaning = {.cause = Cause::kSolver, .precedence = -4, .is_own = true, .rank = Rank::kDecisive}},
     {.check = StepCheck::kJointStop,
      .name = "joint_stop",
      .kind = CheckKind::kAssumption,
      .unit = "rad",
      .bound = 0.0,
      .description = "how far a joint is beyond its range, where a stop pushes that the model does not have",
-     .meaning = {.cause = Cause::kJointStop, .precedence = 1, .is_own = true, .rank = Rank::kDecisive}},
+     .meaning = {.cause = Cause::kJointStop, .precedence = -2, .is_own = true, .rank = Rank::kDecisive}},
     // The fingers of one hand touch within some hundredths of a second, kTransient each at the most.
     {.check = StepCheck::kUnjudged,
      .name = "unjudged",
@@ -366,7 +393,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .unit = "1",
      .bound = 1.0,
      .description = "|tau'| over the motor's limit",
-     .meaning = {.cause = Cause::kActuatorLimit, .precedence = 0, .is_own = true, .rank = Rank::kDecisive}},
+     .meaning = {.cause = Cause::kActuatorLimit, .precedence = -3, .is_own = true, .rank = Rank::kDecisive}},
 };
 
 static_assert([] {

@@ -40,8 +40,12 @@ StepChecks::StepChecks(const Setup& setup)
     : setup_(&setup),
       dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())),
       actuation_(setup.model()),
-      time_step_(setup.scenario().plant.time_step) {
+      time_step_(setup.scenario().plant.time_step),
+      forces_(setup.model()),
+      wheels_(setup.model().base()) {
   DefineChecks();
+  mass_ = setup.model().base_with_wheels().mass;
+  for (const Joint& joint : setup.model().joints()) mass_ += joint.body.mass;
   findings_.fingertip_slip.resize(setup.fingertips().size());
   findings_.wheel_slip.resize(setup.adapter().wheels().size());
   const int n = setup.model().num_velocities();
@@ -52,6 +56,7 @@ StepChecks::StepChecks(const Setup& setup)
   bias_.setZero(n);
   residual_.setZero(n);
   column_.setZero(n, 1);
+  left_of_robot_.setZero(n);
   idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
   kappa_.resize(setup.fingertips().size());
   next_kappa_ = kappa_;
@@ -89,9 +94,12 @@ void StepChecks::SetApplying() {
   using enum StepCheck;
   // Without a task every step is judged.
   leave_out(!setup_->scenario().task, {kUnjudged});
-  leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kTractionUse});
+  leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kRolling, kTractionUse});
   leave_out(setup_->model().base().type == BaseType::kFixed, {kBaseTilt});
   leave_out(setup_->idle_joints().empty(), {kIdleJoints});
+  // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
+  leave_out(setup_->scenario().plant.type == PlantType::kRigid,
+            {kWheelSlip, kWheelSlipRate, kTractionUse, kBaseTilt, kSolver});
   const mjModel& engine = setup_->engine();
   const mjtByte* const limited = engine.actuator_ctrllimited;
   leave_out(std::none_of(limited, limited + engine.nu, [](mjtByte flag) { return flag != 0; }), {kActuators});
@@ -137,11 +145,13 @@ void StepChecks::Compare(const StepRecord& step) {
   } else {
     CompareDynamics(step);
     CompareObject(step);
+    KeepForces(step);
   }
   if (handling.holding && !was_holding_) ForgetSlip();
   was_holding_ = handling.holding;
   MoveWindows(step.reading.state);
   ReadSlip(step);
+  if (!setup_->adapter().wheels().empty()) CompareRolling(step);
   if (handling.holding) CompareKappa(step);
 
   Add(StepCheck::kBaseTilt, step.reading.departure.tilt);
@@ -243,6 +253,9 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   residual_ = bias_ - force_;
   residual_.noalias() += robot.M() * xi_dot;
   residual_.noalias() += step.model->grasp().J_B().transpose() * findings_.f_c;
+  if (step.response.departure_force.size() > 0) residual_ += step.response.departure_force;
+  if (step.response.solver_force.size() > 0) residual_ -= step.response.solver_force;
+  left_of_robot_ = residual_;
   // |f|_M^-1 = |L^-T f|
   const auto norm = [&](const VectorXd& f) {
     column_ = f;
@@ -250,13 +263,15 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
     return column_.norm();
   };
   const double scale = std::max(norm(bias_), std::numeric_limits<double>::min());
-  const double balance = norm(residual_) / scale;
+  scale_ = scale;
+  const double left = norm(residual_);
+  Add(StepCheck::kBalanceRobot, std::isnan(left) ? left : std::max(0.0, left - CalcUnevenForce(step)) / scale);
+  solver_of_robot_ = step.response.solver_force.size() > 0 ? norm(step.response.solver_force) / scale : 0.0;
   if (force_before_.size() == force_.size()) {
     bias_ = force_ - force_before_;
     AddGive(norm(bias_) / scale, &robot_give_);
   }
   force_before_ = force_;
-  AddLessGive(StepCheck::kBalanceRobot, balance, robot_give_);
 
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
@@ -269,6 +284,17 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   if (f_c_before_.size() == f_c.size()) AddGive((f_c - f_c_before_).norm() / force_scale, &force_give_);
   f_c_before_ = f_c;
   AddLessGive(StepCheck::kContactForce, (f_c - findings_.f_c).norm() / force_scale, force_give_);
+}
+
+double StepChecks::CalcUnevenForce(const StepRecord& step) const {
+  // In |.|_M^-1 the force of an acceleration a that all masses feel is at most a sqrt(m): a tilt by theta gives gravity
+  // g theta along the floor, and tyres that slip by v in a turn at w give 2 v w.
+  double slip = 0.0;
+  for (const BodyContact& wheel : step.response.wheels) slip = std::max(slip, wheel.slip.norm());
+  const double turn = step.reading.state.q.size() > 0 && !step.response.wheels.empty()
+                          ? std::abs(wheels_.CalcTurn(step.reading.state.xi))
+                          : 0.0;
+  return (setup_->model().gravity().norm() * step.reading.departure.tilt + 2.0 * slip * turn) * std::sqrt(mass_);
 }
 
 void StepChecks::AddGive(double change, double* give) const {
@@ -295,10 +321,32 @@ void StepChecks::CompareObject(const StepRecord& step) {
     return std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) /
            std::max(Weight(), findings_.f_c.norm());
   };
-  Add(StepCheck::kBalanceObject,
-      relative(body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
-               grasp.G() * findings_.f_c - response.support_wrench - response.solver_residual));
-  Add(StepCheck::kSolver, relative(response.solver_residual));
+  left_of_object_ = body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
+                    grasp.G() * findings_.f_c - response.support_wrench - response.solver_residual;
+  Add(StepCheck::kBalanceObject, relative(left_of_object_));
+  Add(StepCheck::kSolver, std::max(relative(response.solver_residual), solver_of_robot_));
+}
+
+void StepChecks::KeepForces(const StepRecord& step) {
+  const auto fails = [&](StepCheck which) { return check(which).applies && !(check(which).last <= check(which).bound); };
+  if (!fails(StepCheck::kBalanceRobot) && !fails(StepCheck::kBalanceObject)) return;
+  forces_.Add(left_of_robot_, left_of_object_, *step.model, step.reading.state.q, *mass_factor_, scale_);
+}
+
+void StepChecks::CompareRolling(const StepRecord& step) {
+  const VectorXd& xi = step.reading.state.xi;
+  const std::vector<EngineWheel>& wheels = setup_->adapter().wheels();
+  Vector2d rates;
+  for (size_t k = 0; k < 2; ++k)
+    rates[static_cast<Eigen::Index>(k)] = wheels[k].axis.y() * step.reading.qvel[wheels[k].dof];
+  const Vector2d mismatch = wheels_.CalcMismatch(xi, rates);
+  double beyond = 0.0;
+  for (size_t k = 0; k < 2; ++k) {
+    beyond = std::max(beyond, std::abs(mismatch[static_cast<Eigen::Index>(k)]) -
+                                  step.response.wheels[k].slip.norm());
+  }
+  Add(StepCheck::kRolling, beyond);
+  if (!(beyond <= check(StepCheck::kRolling).bound)) wheels_.Add(xi, rates);
 }
 
 void StepChecks::MoveWindows(const MeasuredState& state) {

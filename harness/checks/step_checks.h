@@ -16,8 +16,10 @@
 #include "controller/control/constrained_dynamics.h"
 #include "controller/handling/partial_grasp.h"
 #include "harness/base/check_record.h"
+#include "harness/checks/force_evidence.h"
 #include "harness/checks/step_check_table.h"
 #include "harness/checks/step_record.h"
+#include "harness/checks/wheel_evidence.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
@@ -54,6 +56,9 @@ class StepChecks {
   [[nodiscard]] const CheckRecord& Find(std::string_view name) const;
   /// Of the last step.
   [[nodiscard]] const StepFindings& findings() const { return findings_; }
+  /// Of the forces that the balances leave, and of the wheels.
+  [[nodiscard]] const ForceEvidence& forces() const { return forces_; }
+  [[nodiscard]] const WheelEvidence& wheels() const { return wheels_; }
 
  private:
   void DefineChecks();
@@ -73,11 +78,16 @@ class StepChecks {
   void Predict(const StepRecord& step);
   void PredictPart(const StepRecord& step);
   void CompareDynamics(const StepRecord& step);
+  /// Largest force, in |.|_M^-1, that comes of the platform's tilt and of the tyres' slip.
+  [[nodiscard]] double CalcUnevenForce(const StepRecord& step) const;
   /// Adds a change, relative, to what contacts give; see kGive.
   void AddGive(double change, double* give) const;
   /// The residual as it is up to the bound, and above it less what contacts give.
   void AddLessGive(StepCheck which, double residual, double give);
   void CompareObject(const StepRecord& step);
+  /// Keeps what the balances leave, when one of them fails.
+  void KeepForces(const StepRecord& step);
+  void CompareRolling(const StepRecord& step);
   void ReadSlip(const StepRecord& step);
   void ForgetSlip();
   /// Of the object, N.
@@ -109,9 +119,16 @@ class StepChecks {
   double time_ = 0.0;
   VectorXd force_, bias_, residual_;    // n
   VectorXd force_before_, f_c_before_;  // n, 3N: of the last step that was judged; empty before
-  double robot_give_ = 0.0;  // what contacts give for changes of E_bar' tau', relative as balance_robot
+  double robot_give_ = 0.0;  // what contacts give for changes of E_bar' tau', relative as reduced_acceleration
   double force_give_ = 0.0;  // likewise of f_c, relative as contact_force
   RowMatrixXd column_;       // n x 1
+  ForceEvidence forces_;
+  WheelEvidence wheels_;
+  VectorXd left_of_robot_;                        // n, of the step's balance
+  Vector6d left_of_object_ = Vector6d::Zero();
+  double scale_ = 1.0;
+  double solver_of_robot_ = 0.0;  // relative, as balance_robot
+  double mass_ = 0.0;             // of the robot, kg
 };
 
 }  // namespace dexcheck

@@ -28,6 +28,7 @@ void AddImportCommand(Command app);
 void AddPlanCommand(Command app);
 /// @param command_line as typed, to be kept in the log.
 void AddRunCommand(Command app, const std::string& command_line);
+void AddCompareCommand(Command app);
 void AddExportCommand(Command app);
 void AddRenderCommand(Command app);
 void AddReportCommand(Command app);

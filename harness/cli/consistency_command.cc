@@ -98,8 +98,8 @@ void CompareDescriptionWithEngine(const ConsistencyRequest& request, Comparison*
   });
   GateResult& gate = comparison->result.gate;
   std::erase_if(gate.records, [&](const CheckRecord& record) {
-    return std::find(completion.unstated.begin(), completion.unstated.end(), record.name) !=
-           completion.unstated.end();
+    return !record.failed && std::find(completion.unstated.begin(), completion.unstated.end(), record.name) !=
+                                 completion.unstated.end();
   });
   const std::vector<std::string> others = CheckDescription(robot, adapter, &gate);
   for (const auto& notes : {robot.notes, completion.notes, others, DescribeBaseCoordinates(robot)}) {

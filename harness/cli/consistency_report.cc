@@ -75,6 +75,12 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
     fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {}\n", record.name, record.comparisons, record.worst,
                record.bound, CountDigits(record.worst), record.failed ? "DIFFERS" : "ok");
   }
+  if (!result.gate.notes.empty()) {
+    fmt::print(
+        "{} notes on what only a run has (contacts, solver, limits of motors, what a scenario overrides): "
+        "--json\n",
+        result.gate.notes.size());
+  }
   fmt::print("\n{:<24}{:>9}  {:>12}  {:>9}  {:>6}           {}\n", "term", "compared", "worst error", "bound",
              "digits", "where it is worst");
   for (const CheckRecord& record : result.terms) {
@@ -153,6 +159,9 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
                                 {"model", finding.model},
                                 {"engine", finding.engine}});
   }
+  json["engine_notes"] = Json::array();
+  for (const GateNote& note : result.gate.notes)
+    json["engine_notes"].push_back({{"kind", note.kind}, {"text", note.text}});
   json["hypotheses"] = ListHypotheses(comparison.hypotheses);
   return json.dump(2) + "\n";
 }

@@ -69,7 +69,7 @@ void Print(const Request& request, const RobotModel& model, const Diagnosis& dia
   if (!request.quiet && diagnosis.causes.size() > 1 && diagnosis.ranking.size() > 1) {
     fmt::print("One number alone (masses, inertias, joint constants, gravity) would explain at most:\n");
     for (const auto& [cause, share] : diagnosis.ranking)
-      fmt::print("  {:5.2g} %  {}\n", 100.0 * share, Describe(cause, model.spec(), file));
+      fmt::print("  {:5.2g} %  {}\n", 100.0 * share, DescribeShort(cause, model.spec()));
   }
   if (IsRepairedWholly(diagnosis)) {
     fmt::print("With {} the two agree to rounding.\n", number == 1 ? "it repaired" : "these repaired");

@@ -7,7 +7,6 @@
 #include <limits>
 #include <memory>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "controller/common/errors.h"
@@ -56,21 +55,6 @@ std::vector<SignalInfo> ChooseSignals(const LogReader& log, const Request& reque
   return chosen;
 }
 
-/// The unit of each column, where the signal's unit names one unit or as many as there are columns; otherwise
-/// the whole text for each.
-std::vector<std::string> SplitUnit(const SignalInfo& signal) {
-  constexpr std::string_view kSeparator = ", ";
-  std::vector<std::string> units;
-  for (size_t begin = 0; begin <= signal.unit.size();) {
-    const size_t end = std::min(signal.unit.find(kSeparator, begin), signal.unit.size());
-    units.push_back(signal.unit.substr(begin, end - begin));
-    begin = end + kSeparator.size();
-  }
-  const auto width = static_cast<size_t>(signal.width);
-  if (units.size() != width) units.assign(width, signal.unit);
-  return units;
-}
-
 /// A field of a CSV line, in quotes where its text needs them.
 std::string ToField(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
@@ -86,7 +70,7 @@ std::string ToField(const std::string& text) {
 std::string MakeHeader(const std::vector<SignalInfo>& signals) {
   std::string header;
   for (const SignalInfo& signal : signals) {
-    const std::vector<std::string> units = SplitUnit(signal);
+    const std::vector<std::string> units = ListUnits(signal);
     for (size_t k = 0; k < units.size(); ++k) {
       std::string name = signal.name;
       if (!signal.columns.empty()) {

@@ -48,6 +48,7 @@ int Run(int argc, char** argv) {
   AddStatesCommand(app);
   AddPlanCommand(app);
   AddRunCommand(app, JoinArguments(argc, argv));
+  AddCompareCommand(app);
   AddExportCommand(app);
   AddRenderCommand(app);
   AddReportCommand(app);

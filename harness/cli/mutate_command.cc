@@ -14,6 +14,7 @@
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
+#include "harness/cli/mutate_run.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/diagnosis/formula_mutants.h"
@@ -23,6 +24,7 @@ namespace dexcheck::cli {
 namespace {
 
 struct Request {
+  MutateRunRequest run;  // with a scenario, mistakes are made in its run
   RobotFiles files;
   MutationOptions options;
   bool no_diagnosis = false;
@@ -191,7 +193,24 @@ std::string CheckScale(const std::string& text) {
   return fmt::format("must be a number from {} to {}, got {}", kSmallest, kLargest, Quote(text));
 }
 
+/// Empty for a time that can be taken.
+ValueCheck Seconds(double least, double most) {
+  return [=](const std::string& text) -> std::string {
+    double value = 0.0;
+    const char* const end = text.data() + text.size();
+    const std::from_chars_result result = std::from_chars(text.data(), end, value);
+    if (result.ec == std::errc() && result.ptr == end && least <= value && value <= most) return {};
+    return fmt::format("must be a number of seconds from {} to {}, got {}", least, most, Quote(text));
+  };
+}
+
 int Run(Request request) {
+  if (!request.run.scenario.empty()) {
+    request.run.options.scale = request.options.scale;
+    request.run.json_file = request.json_file;
+    request.run.quiet = request.quiet;
+    return MutateRun(request.run);
+  }
   request.options.diagnose = !request.no_diagnosis;
   const RobotModel model = ReadRobotModel(request.files.robot);
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
@@ -235,16 +254,46 @@ void AddMutateCommand(Command app) {
   Command command = app.AddCommand(
       "mutate",
       "Change every number and equation of the model on purpose: which mistakes are found and named?");
-  AddRobotOptions(command, &request->files);
+  Option robot = AddRobotOptions(command, &request->files);
   command.AddOption("--scale", &request->options.scale, "Change of a number, relative to it")
       .TypeName("X")
       .Check(CheckScale)
       .ShowDefault();
-  command.AddOption("--samples", &request->options.samples, "Random states per mutant")
+  Option run = command
+                   .AddOption("--run", &request->run.scenario,
+                              "Make mistakes in a run of this scenario instead: numbers, laws, plants")
+                   .TypeName("SCENARIO");
+  command
+      .AddOption("--set", &request->run.overrides, "Set a key of the scenario, as `dexcheck run` does")
+      .TypeName("KEY=VALUE")
+      .Repeatable()
+      .Needs(run);
+  command.AddOption("--from", &request->run.options.from, "In a run: when the mistake begins, s")
+      .TypeName("T")
+      .Check(Seconds(0.0, 1e4))
+      .Needs(run)
+      .ShowDefault();
+  command.AddOption("--duration", &request->run.options.duration, "In a run: how long it is looked at, s")
+      .TypeName("T")
+      .Check(Seconds(1e-3, 1e4))
+      .Needs(run)
+      .ShowDefault();
+  command
+      .AddOption("--numbers", &request->run.options.parameters,
+                 "In a run: how many numbers of the model are changed, evenly out of all")
+      .TypeName("N")
+      .Check(WholeNumber(0, 100000))
+      .Needs(run)
+      .ShowDefault();
+  Option samples = command.AddOption("--samples", &request->options.samples, "Random states per mutant")
       .TypeName("N")
       .Check(WholeNumber(1, 1000))
       .ShowDefault();
-  command.AddFlag("--no-diagnosis", &request->no_diagnosis, "Only whether each is found, not what is named");
+  Option no_diagnosis =
+      command.AddFlag("--no-diagnosis", &request->no_diagnosis, "Only whether each is found, not what is named");
+  robot.Excludes(run);
+  samples.Excludes(run);
+  no_diagnosis.Excludes(run);
   command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
       .TypeName("FILE.json");
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <charconv>
+#include <cmath>
 #include <exception>
 #include <memory>
 #include <optional>
@@ -37,8 +39,21 @@ struct Request {
   bool quiet = false;
   bool list = false;
   std::string replay;
+  std::string controller;  // of the user's own
+  double controller_time_limit = 1.0;
   std::string command;  // as typed
 };
+
+/// Accepts a number of seconds above zero.
+ValueCheck PositiveNumber() {
+  return [](const std::string& text) -> std::string {
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const bool is_number = error == std::errc() && end == text.data() + text.size();
+    if (is_number && std::isfinite(value) && value > 0.0) return {};
+    return "must be a positive number, got " + Quote(text);
+  };
+}
 
 ExitCode ToExitCode(const RunResult& result) {
   if (result.verdict == Verdict::kFailed) return kFailure;
@@ -69,17 +84,22 @@ void DrawRun(const Request& request, const std::filesystem::path& folder, ExitCo
   });
 }
 
+LoopParts MakeParts(const Request& request, const Setup& setup, const std::filesystem::path& robot) {
+  if (request.controller.empty()) return MakeLoopParts(setup);
+  return MakeLoopParts(setup, request.controller, robot, request.controller_time_limit);
+}
+
 int RunScenario(const Request& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides, request.seed);
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
-  Runner runner(setup, !request.no_check);
+  Runner runner(setup, !request.no_check, MakeParts(request, setup, files.robot));
   std::optional<RunFolder> folder;
   if (!request.no_log) folder.emplace(request.out, setup.scenario().name);
   std::optional<RunRecorder> recorder;
   if (folder) {
     recorder.emplace(folder->path() / "log.h5", runner.loop(), setup,
-                     RunInputs{files.robot, files.mjcf, request.command});
+                     RunInputs{files.robot, files.mjcf, request.command, request.controller});
   }
   ProgressBar bar(setup.scenario().name, runner.loop().num_steps(), request.quiet);
   runner.Run(
@@ -116,13 +136,18 @@ int RunScenario(const Request& request) {
 /// Repeats a recorded run from what its log keeps, and compares every number bit for bit.
 int ReplayRun(const Request& request) {
   const RecordedRun recorded(request.replay);
+  const std::string controller = recorded.controller();
+  if (!controller.empty() && request.controller.empty()) {
+    throw InputError(request.replay + ": its controller is not in the log; give it again: --controller " +
+                     Quote(controller));
+  }
   const Setup setup(recorded.files().scenario, recorded.files().robot, recorded.files().mjcf);
   CatchInterrupts();
-  Runner runner(setup, recorded.was_checked());
+  Runner runner(setup, recorded.was_checked(), MakeParts(request, setup, recorded.files().robot));
   const TemporaryFolder scratch;
   const std::filesystem::path log = scratch.path() / "log.h5";
   RunRecorder recorder(log, runner.loop(), setup,
-                       RunInputs{recorded.files().robot, recorded.files().mjcf, ""});
+                       RunInputs{recorded.files().robot, recorded.files().mjcf, "", ""});
   ProgressBar bar("replaying", recorded.rows(), request.quiet);
   long rows = 0;
   runner.Run(
@@ -195,12 +220,26 @@ void AddRunCommand(Command app, const std::string& command_line) {
   Option seed = command.AddOption("--seed", &request->seed, "Vary posture and grasp at random; 0 does not")
                     .TypeName("N")
                     .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
+  Option controller =
+      command
+          .AddOption(
+              "--controller", &request->controller,
+              "A controller of your own: a shared library (.so), or a command that speaks the protocol "
+              "of controller_protocol.h; --replay of its runs needs it again")
+          .TypeName("LIBRARY.so|COMMAND");
+  command
+      .AddOption("--controller-time-limit", &request->controller_time_limit,
+                 "For each answer of the command, s (1 by default), and ten times that for its start")
+      .TypeName("SECONDS")
+      .Check(PositiveNumber())
+      .Needs(controller);
   Option no_check = command.AddFlag("--no-check", &request->no_check, "Simulate without cross-checks");
   Option video = command.AddFlag("--video", &request->video, "Draw the run as a video, video.mp4");
   Option no_report =
       command.AddFlag("--no-report", &request->no_report, "Write the log and the summary only");
   Option no_log = command.AddFlag("--no-log", &request->no_log, "Write no files");
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
+  controller.Excludes(list);
   scenario.Excludes(list).Excludes(replay);
   list.Excludes(replay);
   // What would be ignored is refused.

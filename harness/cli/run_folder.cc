@@ -126,11 +126,14 @@ bool RecordedRun::was_checked() const {
                      [](const SignalInfo& signal) { return signal.name.starts_with("check/"); });
 }
 
-std::string RecordedRun::machine() const {
+std::string RecordedRun::ReadTextIfThere(const std::string& name) const {
   const std::vector<std::string> texts = log_.ListTexts();
-  const bool told = std::find(texts.begin(), texts.end(), "machine") != texts.end();
-  return told ? log_.ReadText("machine") : "";
+  return std::find(texts.begin(), texts.end(), name) != texts.end() ? log_.ReadText(name) : "";
 }
+
+std::string RecordedRun::machine() const { return ReadTextIfThere("machine"); }
+
+std::string RecordedRun::controller() const { return ReadTextIfThere("controller"); }
 
 ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) const {
   const LogReader other(other_log);

@@ -71,10 +71,14 @@ class RecordedRun {
   [[nodiscard]] bool was_checked() const;
   /// What the bits depended on, as DescribeMachine says; empty when the log does not tell.
   [[nodiscard]] std::string machine() const;
+  /// The controller that the user brought along; empty for the scenario's.
+  [[nodiscard]] std::string controller() const;
   [[nodiscard]] ReplayDifference Compare(const std::filesystem::path& other_log) const;
   [[nodiscard]] const LogReader& log() const { return log_; }
 
  private:
+  [[nodiscard]] std::string ReadTextIfThere(const std::string& name) const;
+
   LogReader log_;
   TemporaryFolder unpacked_;
   ScenarioFiles files_;

@@ -22,6 +22,9 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop) {
              differs > 0 ? "FAILS" : "ok");
   for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check);
   for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check);
+  const std::span<const CheckRecord> settling = loop.checks().settling_failures();
+  if (!settling.empty()) fmt::print("\n  while settling, before t = 0:\n");
+  for (const CheckRecord& check : settling) PrintCheck(check);
 }
 
 /// "approach 0.0, close 3.4, ..." with the time each began.
@@ -69,7 +72,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
   switch (result.verdict) {
     case Verdict::kPass:
       fmt::print("PASS: {}\n", loop.is_checking()
-                                   ? "model, balance, prediction and assumptions hold at every step."
+                                   ? "model, law, balance, prediction and assumptions hold at every step."
                                    : "the run completed; nothing was checked.");
       return;
     case Verdict::kFailed:

@@ -56,6 +56,17 @@ std::optional<RobotModel> TryModel(const RobotSpec& spec) {
   }
 }
 
+/// Places of the largest entries, the largest first.
+std::vector<Eigen::Index> BestOf(const VectorXd& score, size_t wanted) {
+  std::vector<Eigen::Index> order(static_cast<size_t>(score.size()));
+  std::iota(order.begin(), order.end(), 0);
+  wanted = std::min(wanted, order.size());
+  std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(wanted), order.end(),
+                    [&](Eigen::Index a, Eigen::Index b) { return score[a] > score[b]; });
+  order.resize(wanted);
+  return order;
+}
+
 /// Vectors and tensors whose entries are one thing to a reader.
 bool AreOneThing(const Parameter& a, const Parameter& b) { return a.kind == b.kind && a.index == b.index; }
 
@@ -234,8 +245,40 @@ BodyFit::Solution BodyFit::Solve(const std::vector<Parameter>& parameters) const
   return solution;
 }
 
+VectorXd BodyFit::CalcGains(const VectorXd& residual, const VectorXd* first) const {
+  VectorXd products = columns_.transpose() * residual;
+  const VectorXd norms_squared = columns_.colwise().squaredNorm().transpose();
+  VectorXd squares = norms_squared;
+  if (first != nullptr) squares -= (columns_.transpose() * *first).cwiseAbs2();
+  for (Eigen::Index i = 0; i < products.size(); ++i) {
+    constexpr double kDependent = 1e-10;
+    products[i] = squares[i] > kDependent * norms_squared[i] ? products[i] * products[i] / squares[i] : 0.0;
+  }
+  return products;
+}
+
+bool BodyFit::Linearise() {
+  residual_ = CalcResidual(spec_);
+  if (!(residual_.cwiseAbs().maxCoeff() > kRounding)) return false;
+  columns_ = CalcColumns(spec_, candidates_);
+  for (size_t i = 0; i < candidates_.size(); ++i)
+    columns_.col(static_cast<Eigen::Index>(i)) *= GetScale(spec_, candidates_[i]);
+  return true;
+}
+
+void BodyFit::Rank() {
+  if (!Linearise()) return;
+  const VectorXd gains = CalcGains(residual_, nullptr);
+  for (const Eigen::Index i : BestOf(gains, kRanked)) {
+    if (!(gains[i] > 0.0)) break;
+    Cause cause;
+    cause.parameters = {candidates_[static_cast<size_t>(i)]};
+    cause.values = {GetValue(spec_, cause.parameters.front())};
+    ranking_.emplace_back(cause, gains[i] / residual_.squaredNorm());
+  }
+}
+
 bool BodyFit::FindSolution(std::vector<Solution>* solutions) {
-  const auto count = static_cast<Eigen::Index>(candidates_.size());
   const VectorXd norms = columns_.colwise().norm().transpose();
   const auto keep_solved = [&](const std::vector<std::vector<Parameter>>& sets) {
     for (const std::vector<Parameter>& set : sets) {
@@ -245,43 +288,14 @@ bool BodyFit::FindSolution(std::vector<Solution>* solutions) {
     }
     return !solutions->empty();
   };
-  const auto best_of = [](VectorXd score, size_t wanted) {
-    std::vector<Eigen::Index> order(static_cast<size_t>(score.size()));
-    std::iota(order.begin(), order.end(), 0);
-    wanted = std::min(wanted, order.size());
-    std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(wanted), order.end(),
-                      [&](Eigen::Index a, Eigen::Index b) { return score[a] > score[b]; });
-    order.resize(wanted);
-    return order;
-  };
-  /// Squared length that each column takes from a residual, after the part along `first` has been taken.
-  const auto gain = [&](const VectorXd& residual, const VectorXd* first) {
-    VectorXd products = columns_.transpose() * residual;
-    VectorXd squares = norms.cwiseAbs2();
-    if (first != nullptr) squares -= (columns_.transpose() * *first).cwiseAbs2();
-    for (Eigen::Index i = 0; i < count; ++i) {
-      constexpr double kDependent = 1e-10;
-      products[i] =
-          squares[i] > kDependent * norms[i] * norms[i] ? products[i] * products[i] / squares[i] : 0.0;
-    }
-    return products;
-  };
-
   constexpr size_t kSingles = 8;
   constexpr size_t kFirsts = 24;
   constexpr size_t kPairs = 8;
-  const VectorXd single = gain(residual_, nullptr);
+  const VectorXd single = CalcGains(residual_, nullptr);
   std::vector<std::vector<Parameter>> sets;
-  for (const Eigen::Index i : best_of(single, kSingles)) {
+  for (const Eigen::Index i : BestOf(single, kSingles)) {
     const Parameter& parameter = candidates_[static_cast<size_t>(i)];
     sets.push_back({parameter});
-    if (ranking_.size() < kRanked && single[i] > 0.0) {
-      Cause cause;
-      cause.parameters = {parameter};
-      cause.values = {GetValue(spec_, parameter) +
-                      columns_.col(i).dot(residual_) / norms[i] / norms[i] * GetScale(spec_, parameter)};
-      ranking_.emplace_back(cause, single[i] / residual_.squaredNorm());
-    }
   }
   if (keep_solved(sets)) return true;
 
@@ -290,12 +304,12 @@ bool BodyFit::FindSolution(std::vector<Solution>* solutions) {
     double gain;
   };
   std::vector<Pair> pairs;
-  for (const Eigen::Index i : best_of(single, kFirsts)) {
+  for (const Eigen::Index i : BestOf(single, kFirsts)) {
     if (!(norms[i] > 0.0)) continue;
     const VectorXd direction = columns_.col(i) / norms[i];
     const VectorXd rest = residual_ - direction.dot(residual_) * direction;
-    const VectorXd more = gain(rest, &direction);
-    for (const Eigen::Index j : best_of(more, 2)) pairs.push_back({i, j, single[i] + more[j]});
+    const VectorXd more = CalcGains(rest, &direction);
+    for (const Eigen::Index j : BestOf(more, 2)) pairs.push_back({i, j, single[i] + more[j]});
   }
   std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.gain > b.gain; });
   sets.clear();
@@ -406,11 +420,8 @@ void BodyFit::MergeScaledBodies(std::vector<Cause>* causes) const {
 }
 
 std::vector<Cause> BodyFit::Run() {
-  residual_ = CalcResidual(spec_);
-  if (!(residual_.cwiseAbs().maxCoeff() > kRounding)) return {};
-  columns_ = CalcColumns(spec_, candidates_);
-  for (size_t i = 0; i < candidates_.size(); ++i)
-    columns_.col(static_cast<Eigen::Index>(i)) *= GetScale(spec_, candidates_[i]);
+  Rank();
+  if (columns_.size() == 0) return {};
 
   std::vector<Solution> solutions;
   if (!FindSolution(&solutions)) solutions = {Grow()};
@@ -422,6 +433,7 @@ std::vector<Cause> BodyFit::Run() {
   std::stable_sort(order.begin(), order.end(),
                    [&](size_t a, size_t b) { return IsLikelier(whole[a], whole[b], spec_); });
   const Solution& chosen = solutions[order.front()];
+  if (!(chosen.worst <= kRounding)) return {};
 
   // One cause for each thing that is changed.
   std::vector<Cause> causes;
@@ -438,7 +450,6 @@ std::vector<Cause> BodyFit::Run() {
   if (causes.size() == 1) {
     for (size_t i = 1; i < order.size(); ++i) causes.front().equivalents.push_back(whole[order[i]]);
   }
-  spec_ = chosen.repaired;
   return causes;
 }
 

@@ -30,9 +30,10 @@ class BodyFit {
   ///   forces that follow from them. Without, what forces do not show stays unknown.
   BodyFit(const RobotSpec& spec, const EngineEvidence& evidence, const mjModel& engine, bool bodies);
 
-  /// Causes, the one that explains most first.
+  /// Causes, the one that explains most first; none when not all of the disagreement is explained.
   std::vector<Cause> Run();
-  [[nodiscard]] const RobotSpec& repaired() const { return spec_; }
+  /// Only the ranking.
+  void Rank();
   /// Single numbers by the share of the disagreement that each explains by itself, the first few, before any
   /// repair.
   [[nodiscard]] const std::vector<std::pair<Cause, double>>& ranking() const { return ranking_; }
@@ -57,6 +58,10 @@ class BodyFit {
   [[nodiscard]] MatrixXd CalcColumns(const RobotSpec& spec, const std::vector<Parameter>& parameters) const;
   [[nodiscard]] Solution Solve(const std::vector<Parameter>& parameters) const;
   [[nodiscard]] std::vector<Parameter> ListCandidates() const;
+  /// The residual and what each candidate does to it; false when there is nothing to explain.
+  bool Linearise();
+  /// Squared length that each column takes from a residual, after the part along `first` has been taken.
+  [[nodiscard]] VectorXd CalcGains(const VectorXd& residual, const VectorXd* first) const;
   [[nodiscard]] bool FindSolution(std::vector<Solution>* solutions);
   [[nodiscard]] Solution Grow() const;
   /// Takes numbers from a solution that it leaves as they were.

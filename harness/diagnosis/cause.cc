@@ -12,6 +12,9 @@ namespace {
 
 constexpr int kManyDigits = 9;
 
+// What both sides keep after some dozen rotations; what is printed must repair.
+constexpr int kPrintedDigits = 13;
+
 Joint& JointOf(RobotSpec* spec, int joint) { return spec->joints[static_cast<size_t>(joint)]; }
 
 /// A mass, and with it the inertia: the only causes of several kinds.
@@ -24,12 +27,17 @@ void TurnBody(const Matrix3d& R, MassProperties* body) {
   body->inertia = R * body->inertia * R.transpose();
 }
 
-/// "1.9 kg", "-90 deg"; rounding errors of a solved value are not printed.
-std::string FormatValue(const RobotSpec& spec, const Parameter& parameter, double value) {
+/// "1.9", "-90"; rounding errors of a solved value are not printed.
+std::string FormatNumber(const RobotSpec& spec, const Parameter& parameter, double value) {
   double printed = ToPrinted(spec, parameter, value);
   if (std::abs(value) < 1e-12 * GetScale(spec, parameter)) printed = 0.0;
+  return fmt::format("{:.{}g}", printed, kPrintedDigits);
+}
+
+/// "1.9 kg", "-90 deg".
+std::string FormatValue(const RobotSpec& spec, const Parameter& parameter, double value) {
   const std::string unit = UnitOf(spec, parameter);
-  return fmt::format("{:.{}g}{}{}", printed, kManyDigits + 1, unit.empty() ? "" : " ", unit);
+  return FormatNumber(spec, parameter, value) + (unit.empty() ? "" : " ") + unit;
 }
 
 std::string FormatValues(const RobotSpec& spec, const std::vector<Parameter>& parameters,
@@ -169,6 +177,11 @@ double RoundSolved(const RobotSpec& spec, const Parameter& parameter, double val
   if (!IsAngle(spec, parameter)) return rounded;
   const auto [degrees, degree_digits] = Round(RadToDeg(value));
   return degree_digits <= digits && degree_digits < kManyDigits ? DegToRad(degrees) : rounded;
+}
+
+double ReadBackPrinted(const RobotSpec& spec, const Parameter& parameter, double value) {
+  const double printed = std::stod(FormatNumber(spec, parameter, value));
+  return IsAngle(spec, parameter) ? DegToRad(printed) : printed;
 }
 
 bool IsLikelier(const Cause& a, const Cause& b, const RobotSpec& spec) {

@@ -47,6 +47,9 @@ void SwapPoses(RobotSpec* spec, int joint, int other);
 /// Decimal digits that the value needs, in the units of a parameter file; 0 for zero. People write few.
 int CountDigits(const RobotSpec& spec, const Parameter& parameter, double value);
 
+/// The value as it is read back from what is printed of it, in the model's units.
+double ReadBackPrinted(const RobotSpec& spec, const Parameter& parameter, double value);
+
 /// A solved value as a person would have written it, when that is within the accuracy of solving; else as it
 /// is.
 double RoundSolved(const RobotSpec& spec, const Parameter& parameter, double value);

@@ -8,37 +8,18 @@
 #include <optional>
 
 #include "controller/common/errors.h"
+#include "harness/diagnosis/body_comparison.h"
 #include "harness/diagnosis/body_fit.h"
 #include "harness/diagnosis/geometry_walk.h"
+#include "harness/diagnosis/repair_check.h"
 
 namespace dexcheck {
 namespace {
 
 using Kind = ParameterKind;
 
-/// The number of the parameter file that a constant of the static gate is, when it can be read there at once.
-std::optional<Parameter> FindParameter(const GateFinding& finding) {
-  const std::string& check = finding.check;
-  const int part = finding.location.first;
-  if (check == "joint_range")
-    return Parameter{finding.entry == 0 ? Kind::kLowerLimit : Kind::kUpperLimit, part, 0};
-  if (check == "fingertip_radius") return Parameter{Kind::kSphereRadius, part, 0};
-  if (check == "object_mass") return Parameter{Kind::kObjectMass, -1, 0};
-  if (check == "object_shape")
-    return Parameter{finding.entry == 0 ? Kind::kObjectRingRadius : Kind::kObjectTubeRadius, -1, 0};
-  if (check == "contact_friction") return Parameter{Kind::kObjectFriction, -1, 0};
-  if (check == "object_inertia") {
-    static constexpr int kEntries[9] = {0, 3, 4, 3, 1, 5, 4, 5, 2};
-    return Parameter{Kind::kObjectInertia, -1, kEntries[finding.entry]};
-  }
-  if (check == "wheel_radius") return Parameter{Kind::kWheelRadius, -1, 0};
-  if (check == "wheel_distance") return Parameter{Kind::kWheelDistance, -1, 0};
-  if (check == "wheel_mass") return Parameter{Kind::kWheelMass, -1, 0};
-  if (check == "wheel_spin_inertia") return Parameter{Kind::kWheelSpinInertia, -1, 0};
-  if (check == "wheel_damping") return Parameter{Kind::kWheelDamping, -1, 0};
-  if (check == "wheel_armature") return Parameter{Kind::kWheelArmature, -1, 0};
-  return std::nullopt;
-}
+// Solved numbers that no person would have written have some twelve digits.
+constexpr double kSolved = 1e-11;
 
 /// Whether motion shows the constant, so that it need not be read.
 bool MovesTheRobot(Kind kind) {
@@ -48,6 +29,17 @@ bool MovesTheRobot(Kind kind) {
 
 bool IsOfBothWheels(Kind kind) {
   return MovesTheRobot(kind) || kind == Kind::kWheelRadius || kind == Kind::kWheelDistance;
+}
+
+/// "dry friction" of the check "joint_dry_friction": what a finding of something that only the MJCF has is
+/// about.
+std::string InWords(const std::string& check) {
+  for (const char* part : {"joint_", "tendon_"}) {
+    if (check.starts_with(part)) return InWords(check.substr(std::string(part).size()));
+  }
+  std::string words = check;
+  std::replace(words.begin(), words.end(), '_', ' ');
+  return words;
 }
 
 /// Takes from the engine's model what the analytic model cannot have, and says what it was.
@@ -60,24 +52,36 @@ std::vector<Cause> Neutralise(const Adapter& adapter, const GateResult& gate, mj
     causes.push_back(cause);
   };
   for (const GateFinding& finding : gate.findings) {
-    if (finding.check == "joint_spring")
-      report(fmt::format("{}: spring of {:.9g}", finding.where, finding.engine));
-    if (finding.check == "joint_dry_friction" && finding.model == 0.0)
-      report(fmt::format("{}: dry friction of {:.9g}", finding.where, finding.engine));
-    if (finding.check == "fluid")
-      report(fmt::format("a fluid (density or viscosity {:.9g})", finding.engine));
+    if (finding.engine_only)
+      report(fmt::format("{}: {} of {:.9g}", finding.where, InWords(finding.check), finding.engine));
   }
   if (causes.empty()) return causes;
   std::vector<int> joints = adapter.joint_ids();
   joints.insert(joints.end(), adapter.base_joints().begin(), adapter.base_joints().end());
   for (const EngineWheel& wheel : adapter.wheels()) joints.push_back(wheel.joint);
-  for (const int joint : joints) {
-    engine->jnt_stiffness[joint] = 0.0;
-    engine->dof_frictionloss[engine->jnt_dofadr[joint]] = 0.0;
+  for (const int joint : joints) engine->jnt_stiffness[joint] = 0.0;
+  mju_zero(engine->dof_frictionloss, engine->nv);
+  for (const int joint : adapter.base_joints()) {
+    const int dofs = engine->jnt_type[joint] == mjJNT_FREE ? 6 : 1;
+    mju_zero(engine->dof_damping + engine->jnt_dofadr[joint], dofs);
+    mju_zero(engine->dof_armature + engine->jnt_dofadr[joint], dofs);
   }
+  mju_zero(engine->tendon_stiffness, engine->ntendon);
+  mju_zero(engine->tendon_damping, engine->ntendon);
+  engine->opt.disableflags = 0;
   engine->opt.density = 0.0;
   engine->opt.viscosity = 0.0;
   return causes;
+}
+
+/// Takes numbers out of a cause; what remains of it has no equivalents that are known.
+void ForgetNumbers(const std::vector<Parameter>& numbers, Cause* cause) {
+  for (size_t i = cause->parameters.size(); i-- > 0;) {
+    if (std::find(numbers.begin(), numbers.end(), cause->parameters[i]) == numbers.end()) continue;
+    cause->parameters.erase(cause->parameters.begin() + static_cast<std::ptrdiff_t>(i));
+    cause->values.erase(cause->values.begin() + static_cast<std::ptrdiff_t>(i));
+    cause->equivalents.clear();
+  }
 }
 
 class Diagnostician {
@@ -98,11 +102,11 @@ class Diagnostician {
     if (progress("geometry")) WalkGeometry();
     if (progress("bodies")) FitBodies();
     progress("verdict");
+    WithdrawWhatFails();
     const ConsistencyResult after = Compare(RobotModel(result_.repaired));
-    // Solved numbers that no person would have written have some twelve digits.
-    constexpr double kSolved = 1e-11;
     std::copy_if(after.gate.findings.begin(), after.gate.findings.end(),
                  std::back_inserter(result_.remaining_constants), [](const GateFinding& finding) {
+                   if (finding.engine_only) return false;  // named already
                    const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
                    return !(std::abs(finding.model - finding.engine) <= kSolved * size);
                  });
@@ -124,19 +128,55 @@ class Diagnostician {
     return {model, *engine_, source_, options_.samples, options_.seed};
   }
 
-  /// Takes a repair unless the result cannot be a robot.
-  void Accept(Cause cause) {
-    for (size_t i = 0; i < cause.parameters.size(); ++i)
-      cause.values[i] = RoundSolved(result_.repaired, cause.parameters[i], cause.values[i]);
+  /// Takes repairs with values as they will be printed, unless the result cannot be a robot; another repair
+  /// may have to come first then. A value that is printed like the file's repairs nothing.
+  void Accept(std::vector<Cause> causes) {
+    for (size_t before = causes.size() + 1; !causes.empty() && causes.size() < before;) {
+      before = causes.size();
+      std::erase_if(causes, [&](const Cause& cause) { return TryAccept(cause); });
+    }
+  }
+
+  bool TryAccept(Cause cause) {
+    std::vector<Parameter> changed;
+    std::vector<double> values;
+    for (size_t i = 0; i < cause.parameters.size(); ++i) {
+      const Parameter& parameter = cause.parameters[i];
+      const double value = RoundPrinted(parameter, cause.values[i]);
+      const RobotSpec& file = model_.spec();
+      if (value == ReadBackPrinted(file, parameter, GetValue(result_.repaired, parameter))) continue;
+      changed.push_back(parameter);
+      values.push_back(value);
+    }
+    if (changed.empty() && !cause.parameters.empty()) return true;
+    cause.parameters = std::move(changed);
+    cause.values = std::move(values);
+    for (Cause& equal : cause.equivalents) {
+      for (size_t i = 0; i < equal.parameters.size(); ++i)
+        equal.values[i] = RoundPrinted(equal.parameters[i], equal.values[i]);
+    }
     RobotSpec repaired = result_.repaired;
     Apply(cause, &repaired);
     try {
       static_cast<void>(RobotModel(repaired));
     } catch (const InputError&) {
-      return;
+      return false;
     }
     result_.repaired = std::move(repaired);
+    // Of a number that is repaired again, the last value holds, in whatever order the repairs are printed.
+    for (Cause& earlier : result_.causes) ForgetNumbers(cause.parameters, &earlier);
+    std::erase_if(result_.causes, [](const Cause& earlier) {
+      return earlier.kind == CauseKind::kParameters && earlier.parameters.empty();
+    });
     result_.causes.push_back(std::move(cause));
+    return true;
+  }
+
+  /// As a person would have written it, unless that is another number; in the precision printed.
+  [[nodiscard]] double RoundPrinted(const Parameter& parameter, double value) const {
+    const double rounded = RoundSolved(result_.repaired, parameter, value);
+    const bool same = rounded == 0.0 || std::abs(rounded - value) <= kSolved * std::abs(value);
+    return ReadBackPrinted(model_.spec(), parameter, same ? rounded : value);
   }
 
   void ReadConstants(const GateResult& gate) {
@@ -149,7 +189,7 @@ class Diagnostician {
     std::vector<Reading> readings;
     constexpr double kSame = 1e-12;
     for (const GateFinding& finding : gate.findings) {
-      const std::optional<Parameter> parameter = FindParameter(finding);
+      const std::optional<Parameter> parameter = FindParameter(result_.repaired, finding);
       if (!parameter || !std::isfinite(finding.engine)) continue;
       if (options_.by_motion && MovesTheRobot(parameter->kind)) continue;
       const auto again = std::find_if(readings.begin(), readings.end(), [&](const Reading& reading) {
@@ -174,7 +214,7 @@ class Diagnostician {
       same->parameters.push_back(reading.parameter);
       same->values.push_back(reading.value);
     }
-    for (const Cause& cause : causes) Accept(cause);
+    Accept(std::move(causes));
   }
 
   void WalkGeometry() {
@@ -188,15 +228,29 @@ class Diagnostician {
       }
     };
     GeometryWalk walk(result_.repaired, evidence, !options_.by_motion, force_error);
-    for (const Cause& cause : walk.Run()) Accept(cause);
+    for (const Cause& cause : walk.Run()) Accept({cause});
   }
 
   void FitBodies() {
     const RobotModel model(result_.repaired);
     const EngineEvidence evidence = Collect(model);
     BodyFit fit(result_.repaired, evidence, *engine_, !options_.by_motion);
-    for (const Cause& cause : fit.Run()) Accept(cause);
+    if (options_.by_motion) {
+      Accept(fit.Run());
+    } else {
+      fit.Rank();
+      Accept(BodyComparison(result_.repaired, evidence, *engine_).Run());
+    }
     result_.ranking = fit.ranking();
+  }
+
+  /// Withdraws what does not repair: nothing wrong is printed, however many numbers are wrong at once.
+  void WithdrawWhatFails() {
+    const RepairCheck check(model_.spec(), *engine_, source_, options_.samples, options_.seed,
+                            !options_.by_motion);
+    check.KeepWhatRepairs(&result_.causes);
+    result_.repaired = model_.spec();
+    for (const Cause& cause : result_.causes) Apply(cause, &result_.repaired);
   }
 
   struct Size {
@@ -216,6 +270,7 @@ class Diagnostician {
       placement.AppendResidual(static_cast<int>(item), &rows);
     for (const double row : rows) size.all += row * row;
     for (const GateFinding& finding : RunStaticGate(Adapter(model, *engine_, source_)).findings) {
+      if (finding.engine_only) continue;
       const double larger = std::max(std::abs(finding.model), std::abs(finding.engine));
       const double apart = (finding.model - finding.engine) / larger;
       if (std::isfinite(apart)) size.all += apart * apart;
@@ -241,6 +296,11 @@ class Diagnostician {
     result_.explained = before.all > 0.0 ? share(before.all, last.all, before.all) : 1.0;
     result_.explained_of_forces =
         before.forces > 0.0 ? share(before.forces, last.forces, before.forces) : 1.0;
+    // Rows and axes that were exchanged or turned must be repaired in the order found.
+    const bool ordered = std::any_of(result_.causes.begin(), result_.causes.end(), [](const Cause& cause) {
+      return cause.kind != CauseKind::kParameters && cause.kind != CauseKind::kEngineOnly;
+    });
+    if (ordered) return;
     std::stable_sort(result_.causes.begin(), result_.causes.end(),
                      [](const Cause& a, const Cause& b) { return a.explained > b.explained; });
   }

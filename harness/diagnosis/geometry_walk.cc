@@ -13,6 +13,9 @@ using Kind = ParameterKind;
 
 constexpr int kMaxCauses = 12;
 
+// Where nearly all is wrong, nearly all is suspect: pairs of far numbers would take for ever.
+constexpr size_t kMostPaired = 30;
+
 bool IsBodyItem(const PlacedItem& item) {
   return item.kind == ItemKind::kCom || item.kind == ItemKind::kInertia;
 }
@@ -64,11 +67,7 @@ std::vector<Cause> GeometryWalk::Run() {
       Apply(cause, &spec_);
       for (Cause& part : Split(cause)) causes.push_back(std::move(part));
     } else {
-      const int link = placement_.items()[static_cast<size_t>(first)].link;
-      for (const int item : failing) {
-        if (placement_.items()[static_cast<size_t>(item)].link == link)
-          left_[static_cast<size_t>(item)] = true;
-      }
+      Leave(placement_.items()[static_cast<size_t>(first)].link, failing);
     }
     placement_.Replace(spec_);
   }
@@ -92,10 +91,27 @@ int GeometryWalk::FindFirst(const std::vector<int>& failing) const {
   return first;
 }
 
+void GeometryWalk::Leave(int link, const std::vector<int>& failing) {
+  const auto is_axis = [&](int index) {
+    const PlacedItem& item = placement_.items()[static_cast<size_t>(index)];
+    return item.link == link && !IsBodyItem(item) && item.kind != ItemKind::kFramePosition &&
+           item.kind != ItemKind::kFrameRotation;
+  };
+  // What hangs on an axis that stays wrong cannot be put right, and its suspects grow with each link.
+  const bool with_carried =
+      num_suspects_ > kMostPaired && std::any_of(failing.begin(), failing.end(), is_axis);
+  for (const int item : failing) {
+    const int there = placement_.items()[static_cast<size_t>(item)].link;
+    if (there == link || (with_carried && placement_.Carries(link, there)))
+      left_[static_cast<size_t>(item)] = true;
+  }
+}
+
 bool GeometryWalk::FindCause(int first, Cause* cause) {
   const int link = placement_.items()[static_cast<size_t>(first)].link;
   const std::vector<int> failing = ListFailing(placement_.ItemsBeyond(-1));
   const std::vector<Parameter> suspects = ListSuspects(link, failing);
+  num_suspects_ = suspects.size();
   const std::vector<std::vector<int>> targets = ListTargets(link, failing);
   std::vector<Candidate> candidates;
   for (const Parameter& suspect : suspects) TryParameters(link, {suspect}, targets, &candidates);
@@ -114,9 +130,10 @@ bool GeometryWalk::FindCause(int first, Cause* cause) {
     best = std::min_element(candidates.begin(), candidates.end(), by_cost);
   }
   if (best == candidates.end() || best->cost >= cost_before) {
-    for (size_t i = 0; i < suspects.size(); ++i) {
-      for (size_t j = i + 1; j < suspects.size(); ++j)
-        TryParameters(link, {suspects[i], suspects[j]}, {targets[0]}, &candidates);
+    const std::vector<Parameter> near = ListNear(link, suspects);
+    for (size_t i = 0; i < near.size(); ++i) {
+      for (size_t j = i + 1; j < near.size(); ++j)
+        TryParameters(link, {near[i], near[j]}, {targets[0]}, &candidates);
     }
     best = std::min_element(candidates.begin(), candidates.end(), by_cost);
   }
@@ -176,6 +193,14 @@ std::vector<Parameter> GeometryWalk::ListSuspects(int link, const std::vector<in
   return suspects;
 }
 
+std::vector<Parameter> GeometryWalk::ListNear(int link, const std::vector<Parameter>& suspects) const {
+  if (suspects.size() <= kMostPaired) return suspects;
+  std::vector<Parameter> near;
+  std::copy_if(suspects.begin(), suspects.end(), std::back_inserter(near),
+               [&](const Parameter& parameter) { return CarrierOf(spec_, parameter) == link; });
+  return near;
+}
+
 bool GeometryWalk::KeepsWhatIsRight(const Parameter& parameter) {
   constexpr double kNudge = 1e-3;  // rad or m
   const std::vector<int>& items = placement_.ItemsBeyond(CarrierOf(spec_, parameter));
@@ -218,10 +243,23 @@ VectorXd GeometryWalk::CollectResidual(const std::vector<int>& target) const {
 
 bool GeometryWalk::Solve(const std::vector<Parameter>& parameters, const std::vector<int>& target,
                          const std::vector<double>& start) {
+  placement_.Focus(target);
+  const bool solves =
+      Iterate(parameters, target, start) &&
+      std::none_of(target.begin(), target.end(), [&](int item) { return placement_.Fails(item); });
+  placement_.Unfocus();
+  if (solves) placement_.Follow();  // otherwise the parameters are restored
+  return solves;
+}
+
+bool GeometryWalk::Iterate(const std::vector<Parameter>& parameters, const std::vector<int>& target,
+                           const std::vector<double>& start) {
   constexpr int kMaxIterations = 30;
   constexpr double kStep = 1e-6;
   constexpr double kConverged = 1e-14;
-  constexpr double kFar = 10.0;  // of the robot's size: no length is that long
+  constexpr double kZero = 1e-9;       // far above what is left of a right solution, far below any mistake
+  constexpr double kExplained = 1e-3;  // of the residual, by a step
+  constexpr double kFar = 10.0;        // of the robot's size: no length is that long
   constexpr double kLongestTurn =
       0.7;  // rad; Gauss-Newton steps that stay where the linearisation means something
   const auto count = static_cast<Eigen::Index>(parameters.size());
@@ -240,6 +278,9 @@ bool GeometryWalk::Solve(const std::vector<Parameter>& parameters, const std::ve
     }
     if (slope.colwise().norm().minCoeff() < 1e-9) return false;  // moves nothing of the target
     VectorXd step = -slope.colPivHouseholderQr().solve(residual);
+    // Where the residual is least and not zero, a step explains next to nothing of it.
+    const bool is_zero = residual.cwiseAbs().maxCoeff() < kZero;
+    if (!is_zero && (slope * step).norm() < kExplained * residual.norm()) return false;
     double change = 0.0;
     for (size_t i = 0; i < parameters.size(); ++i) {
       double& entry = step[static_cast<Eigen::Index>(i)];
@@ -252,7 +293,7 @@ bool GeometryWalk::Solve(const std::vector<Parameter>& parameters, const std::ve
     }
     if (change < kConverged) break;
   }
-  return std::none_of(target.begin(), target.end(), [&](int item) { return placement_.Fails(item); });
+  return true;
 }
 
 int GeometryWalk::CountWrongNumbers(int link) const {

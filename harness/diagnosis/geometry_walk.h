@@ -38,7 +38,11 @@ class GeometryWalk {
   [[nodiscard]] std::vector<int> ListFailing(const std::vector<int>& items) const;
   [[nodiscard]] int FindFirst(const std::vector<int>& failing) const;
   [[nodiscard]] bool FindCause(int first, Cause* cause);
+  /// Gives up what fails on a link; when nearly all is suspect, what the link carries too.
+  void Leave(int link, const std::vector<int>& failing);
   [[nodiscard]] std::vector<Parameter> ListSuspects(int link, const std::vector<int>& failing);
+  /// Suspects among which pairs are tried: all, or when they are many, those of the link itself.
+  [[nodiscard]] std::vector<Parameter> ListNear(int link, const std::vector<Parameter>& suspects) const;
   [[nodiscard]] bool KeepsWhatIsRight(const Parameter& parameter);
   [[nodiscard]] std::vector<std::vector<int>> ListTargets(int link, const std::vector<int>& failing) const;
   void TryParameters(int link, const std::vector<Parameter>& parameters,
@@ -46,6 +50,8 @@ class GeometryWalk {
   void TryStructure(int link, std::vector<Candidate>* candidates);
   bool Solve(const std::vector<Parameter>& parameters, const std::vector<int>& target,
              const std::vector<double>& start);
+  bool Iterate(const std::vector<Parameter>& parameters, const std::vector<int>& target,
+               const std::vector<double>& start);
   [[nodiscard]] VectorXd CollectResidual(const std::vector<int>& target) const;
   /// Of what stands on one link.
   [[nodiscard]] int CountWrongNumbers(int link) const;
@@ -55,7 +61,8 @@ class GeometryWalk {
   RobotSpec spec_;
   Placement placement_;
   std::function<double(const RobotSpec&)> force_error_;
-  std::vector<bool> left_;  // items that no geometry explains
+  std::vector<bool> left_;   // items that no geometry explains
+  size_t num_suspects_ = 0;  // of the last FindCause
 };
 
 }  // namespace dexcheck

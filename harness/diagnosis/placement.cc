@@ -37,6 +37,7 @@ Placement::Placement(const RobotSpec& spec, const EngineEvidence& evidence, bool
     subtree_[0].push_back(i);
   }
   poses_.assign(used_, std::vector<Pose>(At(joints), Pose::Identity()));
+  rows_ = poses_;
   for (int i = 0; i < joints; ++i) {
     const Joint& joint = spec.joints[static_cast<size_t>(i)];
     items_.push_back({Kind::kAxisDirection, i, i});
@@ -55,7 +56,7 @@ Placement::Placement(const RobotSpec& spec, const EngineEvidence& evidence, bool
     for (int j = items_[item].link; j >= 0; j = spec.joints[static_cast<size_t>(j)].parent)
       beyond_[At(j)].push_back(static_cast<int>(item));
   }
-  UpdateFrom(-1);
+  UpdateAll();
 }
 
 bool Placement::Carries(int inner, int outer) const {
@@ -78,35 +79,62 @@ Pose Placement::CalcBasePose(const VectorXd& q) const {
   return X;
 }
 
-void Placement::UpdateFrom(int from) {
+void Placement::UpdateRow(int i) {
   const int offset = trial_.base.type == BaseType::kFixed      ? 0
                      : trial_.base.type == BaseType::kFloating ? 7
                                                                : 3;
+  const Joint& joint = trial_.joints[static_cast<size_t>(i)];
+  const bool revolute = joint.type == JointType::kRevolute;
   for (size_t sample = 0; sample < used_; ++sample) {
-    const VectorXd& q = evidence_->snapshots()[sample].q;
-    std::vector<Pose>& poses = poses_[sample];
-    if (from < 0) poses[0] = CalcBasePose(q);
-    for (const int i : subtree_[At(from)]) {
-      const Joint& joint = trial_.joints[static_cast<size_t>(i)];
-      const double q_i = q[offset + i];
-      const bool revolute = joint.type == JointType::kRevolute;
-      poses[At(i)] = poses[At(joint.parent)] * joint.X_PB *
-                     CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q + (revolute ? q_i : 0.0),
+    const double q_i = evidence_->snapshots()[sample].q[offset + i];
+    rows_[sample][At(i)] =
+        joint.X_PB * CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q + (revolute ? q_i : 0.0),
                                       joint.mdh.d + (revolute ? 0.0 : q_i));
+  }
+}
+
+void Placement::UpdateFrom(int from) {
+  for (size_t sample = 0; sample < used_; ++sample) {
+    std::vector<Pose>& poses = poses_[sample];
+    if (from < 0) poses[0] = CalcBasePose(evidence_->snapshots()[sample].q);
+    for (const int i : subtree_[At(from)]) {
+      if (!focus_.empty() && !focus_[At(i)]) continue;
+      poses[At(i)] = poses[At(trial_.joints[static_cast<size_t>(i)].parent)] * rows_[sample][At(i)];
     }
   }
 }
+
+void Placement::UpdateAll() {
+  for (int i = 0; i < static_cast<int>(trial_.joints.size()); ++i) UpdateRow(i);
+  UpdateFrom(-1);
+}
+
+void Placement::Focus(const std::vector<int>& items) {
+  focus_.assign(subtree_.size(), false);
+  for (const int item : items) {
+    for (int j = items_[static_cast<size_t>(item)].link; j >= 0;
+         j = trial_.joints[static_cast<size_t>(j)].parent)
+      focus_[At(j)] = true;
+  }
+}
+
+void Placement::Unfocus() { focus_.clear(); }
+
+void Placement::Follow() { UpdateFrom(-1); }
 
 void Placement::Set(const Parameter& parameter, double value) {
   SetValue(&trial_, parameter, value);
   const bool frame =
       parameter.kind == ParameterKind::kFramePosition || parameter.kind == ParameterKind::kFrameRotation;
-  if (!frame) UpdateFrom(CarrierOf(trial_, parameter));
+  if (frame) return;
+  const int carrier = CarrierOf(trial_, parameter);
+  if (carrier >= 0) UpdateRow(carrier);
+  UpdateFrom(carrier);
 }
 
 void Placement::Replace(const RobotSpec& spec) {
   trial_ = spec;
-  UpdateFrom(-1);
+  UpdateAll();
 }
 
 void Placement::Restore(const RobotSpec& spec, const Parameter& parameter) {
@@ -124,6 +152,7 @@ void Placement::Restore(const RobotSpec& spec, const Parameter& parameter) {
     const size_t i = static_cast<size_t>(joint);
     trial_.joints[i].X_PB = spec.joints[i].X_PB;
     trial_.joints[i].mdh = spec.joints[i].mdh;
+    UpdateRow(joint);
   }
   UpdateFrom(joint);
 }

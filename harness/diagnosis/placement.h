@@ -42,6 +42,12 @@ class Placement {
   void Set(const Parameter& parameter, double value);
   /// Replaces the whole trial; the tree must be the same.
   void Replace(const RobotSpec& spec);
+  /// From now on changes are followed only as far as these items need them.
+  void Focus(const std::vector<int>& items);
+  /// From now on they are followed wholly; what was left out until now comes with Follow, or with Restore of
+  /// what was changed.
+  void Unfocus();
+  void Follow();
   /// Puts the geometry of one joint and of all frames back to that of `spec` (-1: the base's place).
   void Restore(const RobotSpec& spec, const Parameter& parameter);
 
@@ -57,7 +63,11 @@ class Placement {
   [[nodiscard]] double CalcError(int item) const;
 
  private:
+  /// The joint's own transforms.
+  void UpdateRow(int joint);
+  /// Poses of what a joint carries; -1: all.
   void UpdateFrom(int joint);
+  void UpdateAll();
   [[nodiscard]] Pose CalcBasePose(const VectorXd& q) const;
 
   RobotSpec trial_;
@@ -67,7 +77,9 @@ class Placement {
   std::vector<PlacedItem> items_;
   std::vector<std::vector<int>> beyond_;
   std::vector<std::vector<int>> subtree_;  // joints that move with a joint, itself first; base first
+  std::vector<std::vector<Pose>> rows_;    // from parent to link, by snapshot; the base's is not used
   std::vector<std::vector<Pose>> poses_;   // by snapshot, base first
+  std::vector<bool> focus_;                // links whose poses are followed, base first; empty: all
   mutable std::vector<double> scratch_;
 };
 

@@ -5,6 +5,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/engine/passive_forces.h"
 
 namespace dexcheck {
 namespace {
@@ -33,6 +34,17 @@ int CountAncestors(const mjModel& model, int dof) {
   int count = 0;
   for (int i = dof; i >= 0; i = model.dof_parentid[i]) ++count;
   return count;
+}
+
+/// Whether passive forces depend on where geoms stand: of tendons that wrap around them, of a fluid that
+/// flows about them.
+bool ForcesNeedGeoms(const mjModel& model) {
+  const auto is_geom = [](int type) { return type == mjWRAP_SPHERE || type == mjWRAP_CYLINDER; };
+  if (std::any_of(model.wrap_type, model.wrap_type + model.nwrap, is_geom)) return true;
+  for (int geom = 0; geom < model.ngeom; ++geom) {
+    if (model.geom_fluid[mjNFLUID * geom] != 0.0) return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -70,7 +82,7 @@ EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates, std::s
 
 EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates)
     : EngineTerms(adapter, coordinates, ListAll(adapter.model().frames().size())) {
-  engine_->ngeom = 0;
+  DropGeoms();
 }
 
 EngineTerms::EngineTerms(const Adapter& adapter, std::span<const int> fingertips)
@@ -78,8 +90,12 @@ EngineTerms::EngineTerms(const Adapter& adapter, std::span<const int> fingertips
   if (object_body_ < 0) throw InputError("parameters: a grasp needs an object");
   RequireObject();
   FindTouchingGeoms(fingertips);
-  // Of the geoms only those that touch are needed, and placed where they are.
-  engine_->ngeom = 0;
+  DropGeoms();
+}
+
+void EngineTerms::DropGeoms() {
+  // Those that touch are placed by CalcTouch. Hardly any robot has forces that need the others.
+  if (!ForcesNeedGeoms(*engine_)) engine_->ngeom = 0;
 }
 
 void EngineTerms::FindObject() {
@@ -286,7 +302,7 @@ void EngineTerms::CalcForces() {
   map_.ProjectForce(force_nv_.data(), gravity_);
   if (has_object_) object_gravity_ = force_nv_.segment<6>(object_dof_);
 
-  mj_passive(m, d);
+  CalcPassiveForces(*m, d);
   map_.ProjectForce(d->qfrc_passive, friction_);
   friction_ = -friction_;
 }

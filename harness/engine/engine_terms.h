@@ -137,6 +137,8 @@ class EngineTerms {
   [[nodiscard]] int body_of(int frame) const;
   void FindObject();
   void FindTouchingGeoms(std::span<const int> fingertips);
+  /// Keeps the engine from placing geoms in every state, unless a force depends on them.
+  void DropGeoms();
   void ListMassEntries();
   void ListChains(std::span<const int> frames);
   void SetPositions(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo);
@@ -152,7 +154,7 @@ class EngineTerms {
   [[nodiscard]] Matrix3d ObjectRotation() const;
 
   const Adapter* adapter_;
-  MjModelPtr engine_;  // without gravity; places no geoms
+  MjModelPtr engine_;  // without gravity; places no geoms unless forces need them
   MjDataPtr data_;
   VelocityMap map_;
   int base_size_;

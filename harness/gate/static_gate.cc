@@ -8,6 +8,7 @@
 
 #include "harness/engine/engine.h"
 #include "harness/engine/torus_collision.h"
+#include "harness/gate/engine_only.h"
 
 namespace dexcheck {
 namespace {
@@ -31,7 +32,8 @@ class StaticGate {
     if (!adapter_.wheels().empty()) CompareWheels();
     CompareFingertips();
     if (model_.object()) CompareObject(*model_.object());
-    FindUnmodelledForces();
+    CompareOtherJoints();
+    FindEngineOnly(adapter_, &result_);
     return std::move(result_);
   }
 
@@ -39,21 +41,19 @@ class StaticGate {
   /// Compares relative to the larger of the two, or to `scale` where zero is a proper value.
   void Compare(const std::string& check, const Location& where, double model, double engine,
                double scale = 0.0) {
-    const bool new_check = result_.records.empty() || result_.records.back().name != check;
-    if (new_check) {
-      CheckRecord record;
-      record.name = check;
-      record.bound = kRounding;
-      result_.records.push_back(record);
+    auto record = std::find_if(result_.records.begin(), result_.records.end(),
+                               [&](const CheckRecord& one) { return one.name == check; });
+    if (record == result_.records.end()) {
+      record = result_.records.insert(record, CheckRecord{});
+      record->name = check;
+      record->bound = kRounding;
     }
-    entry_ = !new_check && where == last_location_ ? entry_ + 1 : 0;
+    entry_ = check == last_check_ && where == last_location_ ? entry_ + 1 : 0;
+    last_check_ = check;
     last_location_ = where;
     const double size = std::max({std::abs(model), std::abs(engine), scale});
-    CheckRecord one;
-    one.bound = kRounding;
-    one.Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
-    result_.records.back().Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
-    if (one.failed) {
+    const double error = record->Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
+    if (error > kRounding) {
       result_.findings.push_back(
           {check, Describe(where, model_, model_.num_base_velocities()), model, engine, where, entry_});
     }
@@ -186,6 +186,7 @@ class StaticGate {
                 object.body.inertia.trace());
       }
     }
+    CompareSimpleShape(object.shape, body);
     if (const SolidTorus* torus = std::get_if<SolidTorus>(&object.shape)) {
       double ring_radius = kMissing;
       double tube_radius = kMissing;
@@ -195,33 +196,46 @@ class StaticGate {
       Compare("object_shape", where, torus->ring_radius, ring_radius);
       Compare("object_shape", where, torus->tube_radius, tube_radius);
     }
-    CompareRoundShape(object.shape, where);
     for (const int frame : model_.fingertips()) CompareFriction(object, frame);
   }
 
-  /// A sphere's or cylinder's size, place and axis against the object's geom that can touch.
-  void CompareRoundShape(const Shape& shape, const Location& where) {
-    const SolidSphere* sphere = std::get_if<SolidSphere>(&shape);
-    const SolidCylinder* cylinder = std::get_if<SolidCylinder>(&shape);
-    if (sphere == nullptr && cylinder == nullptr) return;
+  /// Size and place of the object's geom of that type, the one that can touch when there are several. (A
+  /// torus is a marked mesh.)
+  void CompareSimpleShape(const Shape& shape, int body) {
+    int type = mjGEOM_NONE;
+    std::vector<double> sizes;  // as the MJCF writes them
+    if (const auto* sphere = std::get_if<SolidSphere>(&shape)) {
+      type = mjGEOM_SPHERE;
+      sizes = {sphere->radius};
+    } else if (const auto* cylinder = std::get_if<SolidCylinder>(&shape)) {
+      type = mjGEOM_CYLINDER;
+      sizes = {cylinder->radius, 0.5 * cylinder->length};
+    } else if (const auto* capsule = std::get_if<SolidCapsule>(&shape)) {
+      type = mjGEOM_CAPSULE;
+      sizes = {capsule->radius, 0.5 * capsule->length};
+    } else if (const auto* box = std::get_if<SolidBox>(&shape)) {
+      type = mjGEOM_BOX;
+      sizes = {0.5 * box->size.x(), 0.5 * box->size.y(), 0.5 * box->size.z()};
+    } else {
+      return;
+    }
     int found = -1;
     for (int geom = 0; geom < engine_.ngeom; ++geom) {
-      const bool fits = engine_.geom_type[geom] == (sphere != nullptr ? mjGEOM_SPHERE : mjGEOM_CYLINDER);
-      if (IsObject(geom) && fits && CanTouch(engine_, geom)) found = geom;
+      if (engine_.geom_bodyid[geom] != body || engine_.geom_type[geom] != type) continue;
+      if (found < 0 || (CanTouch(engine_, geom) && !CanTouch(engine_, found))) found = geom;
     }
-    const auto size = [&](int k) { return found < 0 ? kMissing : engine_.geom_size[3 * found + k]; };
-    const double radius = sphere != nullptr ? sphere->radius : cylinder->radius;
-    Compare("object_shape", where, radius, size(0));
-    if (cylinder != nullptr) Compare("object_shape", where, 0.5 * cylinder->length, size(1));
+    const Location where{Location::Kind::kObject, -1, -1};
+    for (size_t k = 0; k < sizes.size(); ++k)
+      Compare("object_shape", where, sizes[k],
+              found < 0 ? kMissing : engine_.geom_size[3 * found + static_cast<int>(k)]);
     if (found < 0) return;
-    for (int k = 0; k < 3; ++k) {
-      Compare("object_shape", where, 0.0, engine_.geom_pos[3 * found + k], radius);
-    }
-    if (cylinder == nullptr) return;
+    for (int k = 0; k < 3; ++k)
+      Compare("object_shape", where, 0.0, engine_.geom_pos[3 * found + k], sizes[0]);
+    if (type == mjGEOM_SPHERE) return;
     mjtNum R[9];
     mju_quat2Mat(R, engine_.geom_quat + 4 * found);
-    // Either way along z: a cylinder has no head.
-    Compare("object_shape", where, 1.0, std::abs(R[8]), 1.0);
+    Compare("object_shape", where, 1.0, std::abs(R[8]));  // the axis, or a box's z
+    if (type == mjGEOM_BOX) Compare("object_shape", where, 1.0, std::abs(R[0]));
   }
 
   /// Sliding friction of the explicit contact pairs between a fingertip and the object. Without a pair the
@@ -255,32 +269,69 @@ class StaticGate {
 
   [[nodiscard]] bool IsObject(int geom) const { return engine_.geom_bodyid[geom] == adapter_.object_body(); }
 
-  /// Forces of the engine on the robot's joints that have no counterpart in the analytic model.
-  void FindUnmodelledForces() {
+  /// Joints that carry the base or the object: nothing holds or drives them. And springs, dry friction and
+  /// stops where the analytic model has none.
+  void CompareOtherJoints() {
+    const size_t first_finding = result_.findings.size();
     std::vector<std::pair<int, Location>> joints;
     for (const int joint : adapter_.base_joints()) joints.emplace_back(joint, AtLink(-1));
+    const size_t own = joints.size();
     for (size_t k = 0; k < adapter_.wheels().size(); ++k) {
       joints.emplace_back(adapter_.wheels()[k].joint,
                           Location{Location::Kind::kWheel, static_cast<int>(k), -1});
     }
+    const size_t limitless = joints.size();
     for (int i = 0; i < model_.num_joints(); ++i) {
       joints.emplace_back(adapter_.joint_ids()[static_cast<size_t>(i)], AtJoint(i));
+    }
+    const size_t robots = joints.size();
+    if (adapter_.object_body() >= 0) {
+      const int first = engine_.body_jntadr[adapter_.object_body()];
+      for (int k = 0; k < engine_.body_jntnum[adapter_.object_body()]; ++k)
+        joints.emplace_back(first + k, Location{Location::Kind::kObject, -1, -1});
+    }
+    const auto each_dof = [&](int joint, const auto& compare) {
+      constexpr int kDofs[] = {6, 3, 1, 1};  // of a free joint, a ball, a slide, a hinge
+      const int first = engine_.jnt_dofadr[joint];
+      for (int dof = first; dof < first + kDofs[engine_.jnt_type[joint]]; ++dof) compare(dof);
+    };
+    for (size_t i = 0; i < joints.size(); ++i) {
+      const auto& [joint, where] = joints[i];
+      if (i < own || i >= robots) {
+        each_dof(joint, [&, at = where](int dof) {
+          Compare("joint_damping", at, 0.0, engine_.dof_damping[dof]);
+          Compare("joint_armature", at, 0.0, engine_.dof_armature[dof]);
+        });
+      }
+      if (i < limitless || i >= robots)
+        Compare("joint_stop", where, 0.0, engine_.jnt_limited[joint] != 0 ? 1.0 : 0.0);
     }
     for (const auto& [joint, where] : joints)
       Compare("joint_spring", where, 0.0, engine_.jnt_stiffness[joint]);
     for (const auto& [joint, where] : joints) {
       const bool is_of_tree = where.kind == Location::Kind::kJoint;
       const double own = is_of_tree ? model_.joints()[static_cast<size_t>(where.first)].dry_friction : 0.0;
-      Compare("joint_dry_friction", where, own, engine_.dof_frictionloss[engine_.jnt_dofadr[joint]]);
+      each_dof(joint, [&, at = where](int dof) {
+        Compare("joint_dry_friction", at, own, engine_.dof_frictionloss[dof]);
+      });
+    }
+    for (const auto& [joint, where] : joints) {
+      if (engine_.jnt_limited[joint] != 0)
+        Compare("joint_stop_margin", where, 0.0, engine_.jnt_margin[joint]);
     }
     Compare("fluid", {}, 0.0, engine_.opt.density);
     Compare("fluid", {}, 0.0, engine_.opt.viscosity);
+    for (size_t i = first_finding; i < result_.findings.size(); ++i) {
+      GateFinding& finding = result_.findings[i];
+      finding.engine_only = finding.check != "joint_dry_friction" || finding.model == 0.0;
+    }
   }
 
   const Adapter& adapter_;
   const RobotModel& model_;
   const mjModel& engine_;
   GateResult result_;
+  std::string last_check_;
   Location last_location_;
   int entry_ = 0;
 };

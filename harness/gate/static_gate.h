@@ -18,19 +18,27 @@ struct GateFinding {
   double model = 0.0;
   double engine = 0.0;
   Location location;
-  int entry =
-      0;  ///< Which of the numbers that the check compares there: of a vector, of a range, of a 3x3 tensor.
+  int entry = 0;  ///< Which of the numbers that the check compares there: of a vector, a range, a 3x3 tensor.
+  bool engine_only = false;  ///< The analytic model has no such number: it takes the neutral value.
+};
+
+/// Something that the MJCF sets and the analytic model has no number for, and that is no disagreement: it
+/// belongs to the plant of a run, which overrides it or whose checks judge it.
+struct GateNote {
+  std::string kind;  ///< As in ListEngineFields, such as "contact_pair".
+  std::string text;  ///< With the element's name and all its numbers.
 };
 
 struct GateResult {
   std::vector<CheckRecord> records;
   std::vector<GateFinding> findings;  ///< Every disagreement, in the file's order.
+  std::vector<GateNote> notes;
 };
 
 /// Compares constants: mass of each link; damping, armature and range of each joint; gravity; the wheels'
-/// radius, place, axis, mass, inertia, damping and armature; fingertip radii; the object's mass, inertia,
-/// centre of mass and friction; and that the MJCF has no forces which the analytic model lacks (springs,
-/// fluid); dry friction.
+/// radius, place, axis, mass, inertia, damping and armature; the floor they stand on; fingertip radii; the
+/// object's mass, inertia, centre of mass, shape and friction; and finds whatever the MJCF has that the
+/// analytic model lacks. engine_fields.h says of each field of the engine's model how it is seen.
 GateResult RunStaticGate(const Adapter& adapter);
 
 }  // namespace dexcheck

@@ -40,9 +40,12 @@ struct LogContent {
   std::vector<EmbeddedFile> files;
 };
 
+/// The unit of each column, where the signal's unit names one unit or as many as there are columns ("m, m,
+/// rad"); otherwise the whole text for each.
+std::vector<std::string> ListUnits(const SignalInfo& signal);
+
 /// Whether a name is a relative path of plain components, which stays below its folder: no empty ones, no "."
-/// or
-/// "..", no backslashes or control characters.
+/// or "..", no backslashes or control characters.
 bool IsPlainPath(std::string_view name);
 
 }  // namespace dexcheck

@@ -30,6 +30,9 @@ class EnginePlant final : public Plant {
   void EndStep(const Eigen::Ref<const VectorXd>& tau) override;
   void Read(PlantResponse* response) override;
 
+  /// For what acts in the engine and is no part of the scenario.
+  [[nodiscard]] EngineSimulation& simulation() { return simulation_; }
+
   void Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) override;
   void AddVelocity(const MeasuredState& state, const Vector3d& v) override;
   void Translate(const Vector3d& way) override;

@@ -66,9 +66,13 @@ std::vector<Motor> EngineSimulation::ListMotors() const {
   std::vector<Motor> motors;
   for (const int motor : motors_) {
     const double gear = std::abs(model_->actuator_gear[6 * motor]);
-    const mjtNum* range = model_->actuator_ctrlrange + 2 * motor;
-    const double limit = model_->actuator_ctrllimited[motor] != 0 ? gear * std::min(-range[0], range[1])
-                                                                  : std::numeric_limits<double>::infinity();
+    double limit = std::numeric_limits<double>::infinity();
+    // The engine cuts off the control and, of a motor with gain 1, the force alike.
+    const auto cut = [&](mjtByte limited, const mjtNum* range) {
+      if (limited != 0) limit = std::min(limit, gear * std::min(-range[0], range[1]));
+    };
+    cut(model_->actuator_ctrllimited[motor], model_->actuator_ctrlrange + 2 * motor);
+    cut(model_->actuator_forcelimited[motor], model_->actuator_forcerange + 2 * motor);
     motors.push_back({NameOf(*model_, mjOBJ_JOINT, model_->actuator_trnid[2 * motor]), limit});
   }
   return motors;
@@ -94,6 +98,12 @@ void EngineSimulation::CheckHealth(double expected_time) const {
   if (finite && std::abs(data_->time - expected_time) < 0.5 * time_step()) return;
   throw DivergenceError(
       "the simulation's state is not finite after t = " + FormatNumber(expected_time - time_step()) + " s");
+}
+
+void EngineSimulation::Change(const std::function<void(mjModel*)>& change) {
+  change(model_.get());
+  const MjDataPtr scratch = MakeData(*model_);
+  mj_setConst(model_.get(), scratch.get());
 }
 
 EngineState EngineSimulation::GetState() const {

@@ -2,6 +2,7 @@
 
 // The engine's simulation of robot and object, stepped by torques.
 
+#include <functional>
 #include <vector>
 
 #include "controller/common/types.h"
@@ -47,6 +48,9 @@ class EngineSimulation {
   [[nodiscard]] std::vector<Motor> ListMotors() const;
   /// @throws DivergenceError when the engine warned or the state is not finite.
   void EndStep();
+
+  /// Changes the model that is simulated, which is this simulation's own, and what the engine derives of it.
+  void Change(const std::function<void(mjModel*)>& change);
 
   [[nodiscard]] EngineState GetState() const;
   void SetState(const EngineState& state);

@@ -27,7 +27,10 @@ int FindTipGeom(const mjModel& model, int site, const std::string& name) {
 }  // namespace
 
 Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, const Surface& surface)
-    : adapter_(&adapter), fingertips_(fingertips.begin(), fingertips.end()), surface_(&surface) {
+    : adapter_(&adapter),
+      fingertips_(fingertips.begin(), fingertips.end()),
+      surface_(&surface),
+      map_(adapter, Coordinates::kReduced) {
   for (const int frame : fingertips_) {
     const Frame& tip = adapter.model().frames()[static_cast<size_t>(frame)];
     tips_.emplace_back(tip.sphere_radius.value());
@@ -40,6 +43,7 @@ Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, cons
   }
   M_qacc_.setZero(adapter.engine().nv);
   constraint_force_.setZero(adapter.engine().nv);
+  departure_.setZero(adapter.engine().nv);
 }
 
 Observer::BaseRates Observer::ReadBaseRates(const mjData& data) const {
@@ -92,7 +96,9 @@ void Observer::Read(const EngineSimulation& simulation, PlantResponse* response)
   }
   response->support_wrench = ReadSupportWrench(m, d);
   response->support_force = (X_Bo_.linear() * response->support_wrench.head<3>()).z();
-  response->solver_residual = ReadSolverResidual(m, d);
+  map_.SetState(q_, xi_);
+  ReadSolverResidual(m, d, response);
+  ReadDeparture(m, d, response);
 }
 
 void Observer::ReadState(const mjData& data, MeasuredState* state) {
@@ -120,6 +126,8 @@ void Observer::ReadState(const mjData& data, MeasuredState* state) {
   state->X_Bo.translation() = MapVector(pose);
   state->V_Bo << state->X_Bo.linear().transpose() * MapVector(rate), MapVector(rate + 3);
 
+  q_ = state->q;
+  xi_ = state->xi;
   if (model.num_base_positions() == 3) phi_ = state->q[2];
   X_Bo_ = state->X_Bo;
   V_Bo_ = state->V_Bo;
@@ -244,19 +252,31 @@ Vector6d Observer::ReadSupportWrench(const mjModel& m, const mjData& d) const {
   return wrench;
 }
 
-Vector6d Observer::ReadSolverResidual(const mjModel& m, const mjData& d) {
+void Observer::ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* response) {
+  // On the robot's dofs qacc - T xi_dot - T_dot xi; on all others zero.
+  departure_.setZero();
+  map_.ExpandBias(departure_.data());
+  constraint_force_.setZero();
+  map_.Expand(response->xi_dot, constraint_force_.data());
+  departure_ += constraint_force_;
+  const auto subtract = [&](int dof) { departure_[dof] = d.qacc[dof] - departure_[dof]; };
+  for (const int dof : map_.base_dofs()) subtract(dof);
+  for (const int dof : adapter_->joint_dofs()) subtract(dof);
+  mj_mulM(&m, &d, M_qacc_.data(), departure_.data());
+  response->departure_force.resize(response->xi_dot.size());
+  map_.ProjectForce(M_qacc_.data(), response->departure_force);
+}
+
+void Observer::ReadSolverResidual(const mjModel& m, const mjData& d, PlantResponse* response) {
   mj_mulM(&m, &d, M_qacc_.data(), d.qacc);
   // Not qfrc_constraint, which the engine makes fit. The call uses the data's scratch space alone.
   mj_mulJacTVec(&m, const_cast<mjData*>(&d), constraint_force_.data(), d.efc_force);
   const int dof = m.jnt_dofadr[m.body_jntadr[adapter_->object_body()]];
-  const auto residual = [&](int i) {
-    return M_qacc_[dof + i] - d.qfrc_smooth[dof + i] - constraint_force_[dof + i];
-  };
+  departure_ = M_qacc_ - Eigen::Map<const VectorXd>(d.qfrc_smooth, m.nv) - constraint_force_;
+  response->solver_force.resize(response->xi_dot.size());
+  map_.ProjectForce(departure_.data(), response->solver_force);
   // The free joint's forces: in the world, then about the body's axes.
-  Vector6d wrench;
-  wrench << X_Bo_.linear().transpose() * Vector3d(residual(0), residual(1), residual(2)), residual(3),
-      residual(4), residual(5);
-  return wrench;
+  response->solver_residual << X_Bo_.linear().transpose() * departure_.segment<3>(dof), departure_.segment<3>(dof + 3);
 }
 
 void Observer::ReadContacts(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const {

@@ -7,6 +7,7 @@
 
 #include "controller/contact/contact_geometry.h"
 #include "controller/contact/shapes.h"
+#include "harness/engine/velocity_map.h"
 #include "harness/plant/engine_simulation.h"
 #include "harness/plant/plant_reading.h"
 
@@ -42,8 +43,9 @@ class Observer {
   void ReadContacts(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const;
   void ReadBonds(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const;
   [[nodiscard]] Vector6d ReadSupportWrench(const mjModel& m, const mjData& d) const;
-  [[nodiscard]] Vector6d ReadSolverResidual(const mjModel& m, const mjData& d);
+  void ReadSolverResidual(const mjModel& m, const mjData& d, PlantResponse* response);
   [[nodiscard]] int FindFingertip(int geom) const;
+  void ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* response);
   [[nodiscard]] BaseRates ReadBaseRates(const mjData& data) const;
   [[nodiscard]] Vector2d CalcDriveVelocity(double forward, double yaw_rate) const;
 
@@ -55,10 +57,13 @@ class Observer {
   std::vector<int> tip_geoms_;
   std::vector<int> tip_bodies_, wheel_bodies_;
   VectorXd M_qacc_, constraint_force_;  // nv
+  VelocityMap map_;
+  VectorXd departure_;                  // nv
   std::vector<ContactCoordinates> bond_kappa_;
   std::vector<int> bond_constraints_;
   // Of the last reading.
   VectorXd qpos_;  // nq
+  VectorXd q_, xi_;
   double phi_ = 0.0;
   Pose X_Bo_ = Pose::Identity();
   Vector6d V_Bo_ = Vector6d::Zero();

@@ -11,17 +11,12 @@
 #include "controller/common/errors.h"
 #include "harness/base/files.h"
 #include "harness/report/html.h"
-#include "harness/report/page_assets.h"
-#include "harness/report/page_plots.h"
+#include "harness/report/page_frame.h"
 
 namespace dexcheck {
 namespace {
 
 constexpr std::uintmax_t kLargestEmbeddedVideo = 20'000'000;  // bytes
-constexpr const char* kContentPolicy =
-    "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'; script-src "
-    "'unsafe-inline'";
-
 /// The verdict in the words of the page.
 struct Headline {
   const char* tone;  ///< CSS class.
@@ -54,11 +49,12 @@ Headline FindHeadline(const RunData& run) {
   if (verdict == "disagreement") {
     const std::string cause = FindString(summary, "attribution", "cause");
     return {"fail", "DISAGREEMENT",
-            cause == "model" ? "The two descriptions of the robot differ."
+            cause == "model"         ? "The two descriptions of the robot differ."
+            : cause == "control law" ? "The torques are not those of the law, or do not do what is expected."
                              : "The engine does not do what the equations say."};
   }
   if (run.checks().empty()) return {"open", "NOT CHECKED", "The run completed; nothing was checked."};
-  return {"pass", "PASS", "Model, balance, prediction and assumptions hold at every step."};
+  return {"pass", "PASS", "Model, law, balance, prediction and assumptions hold at every step."};
 }
 
 class Page {
@@ -71,7 +67,7 @@ class Page {
     AddNavigation();
     html_ += "<main>\n";
     AddChecks();
-    AddPlots();
+    html_ += MakePlotSection(content_.figures);
     AddVideo();
     AddFigures();
     AddInputs();
@@ -90,12 +86,7 @@ class Page {
   std::string Text(const char* name) const { return run_.FindText(name); }
 
   void AddHead() {
-    Add("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-        "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n<title>{}: {} – dexcheck</title>\n"
-        "<link rel=\"icon\" href=\"data:,\">\n<style>\n{}\n{}</style>\n</head>\n<body>\n",
-        kContentPolicy, FindHeadline(run_).word, Text("scenario"), Html::Raw(kDygraphCss),
-        Html::Raw(kPageCss));
+    html_ += BeginPage(fmt::format("{}: {} – dexcheck", FindHeadline(run_).word, Text("scenario")));
   }
 
   void AddVerdict() {
@@ -247,25 +238,6 @@ class Page {
     html_ += "</div>\n";
   }
 
-  void AddPlots() {
-    html_ +=
-        "<section id=\"plots\"><h2>Plots</h2>\n<div class=\"tools\"><button id=\"show-all\" "
-        "type=\"button\">Show the "
-        "whole run</button><span class=\"soft\">Drag to zoom (all plots follow), Shift-drag to move, "
-        "double-click "
-        "for the whole run; on a touch screen use two fingers. Names switch curves on and off.</span></div>\n"
-        "<div class=\"grid\">\n";
-    for (size_t i = 0; i < content_.figures.size(); ++i) {
-      const Figure& figure = content_.figures[i];
-      Add("<section class=\"card\" data-plot=\"{}\"><h3>{} {}<span class=\"soft number time\"></span></h3>"
-          "<div class=\"keys\"></div><div class=\"plot\"></div></section>\n",
-          i, figure.title,
-          figure.panel.empty() ? Html()
-                               : FormatHtml("<span class=\"panel\">Figure {}</span> ", figure.panel));
-    }
-    html_ += "</div></section>\n";
-  }
-
   void AddVideo() {
     if (content_.video.empty()) return;
     html_ += "<h2 id=\"video\">Video</h2>\n";
@@ -347,11 +319,7 @@ class Page {
         "the run bit "
         "for bit: <code>dexcheck run --replay RUN_DIR</code>. Plots by dygraphs (MIT license).</footer>\n",
         Text("dexcheck_version"));
-    const PlotData data = MakePlotData(content_.figures, run_.time());
-    Add("<script type=\"application/json\" id=\"run-plots\">{}</script>\n", Html::Raw(data.json));
-    Add("<script type=\"text/plain\" id=\"run-values\">{}</script>\n", Html::Raw(data.values));
-    Add("<script>\n{}\n</script>\n<script>\n{}</script>\n", Html::Raw(kDygraphJs), Html::Raw(kPageJs));
-    html_ += "</body>\n</html>\n";
+    html_ += EndPage(content_.figures, run_.time());
   }
 
   const RunData& run_;

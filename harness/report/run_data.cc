@@ -113,7 +113,8 @@ void RunData::ReadChecksOfSignals() {
     }
     CheckLine line;
     line.name = signal.name.substr(std::string(kCheckPrefix).size());
-    line.kind = static_cast<CheckKind>(std::clamp(static_cast<int>(kind->second), 0, 3));
+    line.kind = static_cast<CheckKind>(
+        std::clamp(static_cast<int>(kind->second), 0, static_cast<int>(CheckKind::kLaw)));
     line.unit = signal.unit;
     line.description = signal.description;
     line.bound = bound->second;

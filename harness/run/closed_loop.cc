@@ -17,6 +17,7 @@ double Seconds(Clock::time_point from, Clock::time_point to) {
 }
 
 constexpr double kRoughTime = 0.02;      // s after the first contact
+constexpr long kStepsPerModelCheck = 20;  // while everything settles
 constexpr double kLargestSkew = 1e-2;    // rad between the platform's heading and the way ahead
 constexpr double kSettleMoving = 0.5;    // s
 constexpr double kLargestTilt = 0.2;     // rad, of a robot that still stands
@@ -29,13 +30,14 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
     : setup_(&setup),
       plant_(std::move(parts.plant)),
       sensing_(parts.sensing),
+      hidden_sensor_fault_(std::move(parts.hidden_sensor_fault)),
       controller_(std::move(parts.controller)),
       task_(parts.task),
       drive_(plant_->motors()),
       num_steps_(std::lround(setup.scenario().duration / setup.scenario().plant.time_step)) {
   const Scenario& scenario = setup.scenario();
   StepChecks::RequireKnownBounds(scenario);
-  if (check) checks_.emplace(setup);
+  if (check) checks_.emplace(setup, parts.knows_law);
   record_.model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);
@@ -67,6 +69,7 @@ bool ClosedLoop::Settle(const std::function<bool()>& should_stop) {
   BeginRun();
   times_ = LoopTimes{};
   if (checks_) checks_->Reset();
+  is_running_ = true;
   return true;
 }
 
@@ -94,6 +97,8 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
     ControlStep(t);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
     if (checks_ && t >= kRoughTime) checks_->CompareMotion(record_);
+    // A state is as good as any other for the first question; some of them are enough.
+    if (checks_ && i % kStepsPerModelCheck == 0) checks_->CompareModel(record_);
     CheckGrasp();
   }
   return true;
@@ -118,6 +123,7 @@ void ClosedLoop::ControlStep(double t) {
   plant_->Read(&record_.reading);
   CheckRobot();
   sensing_.Tell(record_.reading, &record_.told);
+  if (hidden_sensor_fault_) hidden_sensor_fault_(t, &record_.told.state);
   controller_->Step(record_.told, t, &record_.command);
   DriveMotors(t);
   const auto control = Clock::now();
@@ -136,6 +142,8 @@ void ClosedLoop::DriveMotors(double t) {
     drive_.Apply(record_.command.tau, &record_.drive);
   } catch (const RunFailure&) {
     if (checks_) checks_->JudgeEffort(record_.drive.effort, t);
+    // Torques that are too large may be those of no law. While everything settles they follow another trajectory.
+    if (checks_ && is_running_) checks_->CompareUnsent(record_);
     throw;
   }
   if (checks_) checks_->JudgeEffort(record_.drive.effort, t);

@@ -87,6 +87,7 @@ class ClosedLoop {
   const Setup* setup_;
   std::unique_ptr<Plant> plant_;
   Sensing sensing_;
+  std::function<void(double t, MeasuredState* told)> hidden_sensor_fault_;
   std::unique_ptr<Controller> controller_;
   const PickAndPlaceController* task_ = nullptr;  // is controller_, or null
   MotorDrive drive_;
@@ -94,6 +95,7 @@ class ClosedLoop {
   std::unique_ptr<Trajectory> trajectory_;  // null for a task
   StepRecord record_;
   long num_steps_ = 0;
+  bool is_running_ = false;  // all has settled
   long steps_without_grasp_ = 0;
   LoopTimes times_;
 };

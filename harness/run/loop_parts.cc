@@ -2,15 +2,48 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
+#include "controller/common/toml_reader.h"
 #include "controller/control/trajectory_controller.h"
 #include "harness/plant/engine_plant.h"
+#include "harness/plant/rigid_plant.h"
+#include "harness/run/own_controller.h"
 
 namespace dexcheck {
 namespace {
 
+/// The least mu between a fingertip of the grasp and the object.
+double FindFingerFriction(const Setup& setup) {
+  const mjModel& m = setup.engine();
+  const int object = setup.adapter().object_body();
+  double mu = std::numeric_limits<double>::infinity();
+  for (const int tip : setup.fingertips()) {
+    const int body = m.site_bodyid[setup.adapter().frame_sites()[static_cast<size_t>(tip)]];
+    for (int pair = 0; pair < m.npair; ++pair) {
+      const int first = m.geom_bodyid[m.pair_geom1[pair]];
+      const int second = m.geom_bodyid[m.pair_geom2[pair]];
+      if ((first == body && second == object) || (first == object && second == body)) {
+        mu = std::min(mu, m.pair_friction[5 * pair]);
+      }
+    }
+  }
+  return mu;
+}
+
+std::unique_ptr<Plant> MakeRigidPlant(const Setup& setup) {
+  const PlantOptions& options = setup.scenario().plant;
+  const EngineSimulation engine(setup.adapter(), /*implicit_damping=*/false);
+  auto plant = std::make_unique<RigidPlant>(
+      *setup.plant_model(), setup.adapter(), setup.fingertips(), engine.ListMotors(),
+      RigidPlantOptions{options.time_step, options.integrator, FindFingerFriction(setup)});
+  plant->Place(setup.q_start(), setup.X_Bo_start());
+  return plant;
+}
+
 std::unique_ptr<Plant> MakePlant(const Setup& setup) {
+  if (setup.scenario().plant.type == PlantType::kRigid) return MakeRigidPlant(setup);
   auto plant = std::make_unique<EnginePlant>(setup.adapter(), setup.fingertips(), setup.surface(),
                                              setup.scenario().plant.implicit_damping);
   if (!setup.bonds().empty()) plant->SetBonds(setup.kappa_start(), setup.bond_constraints());
@@ -18,12 +51,16 @@ std::unique_ptr<Plant> MakePlant(const Setup& setup) {
   return plant;
 }
 
-std::unique_ptr<Controller> MakeTrajectoryController(const Setup& setup) {
+Sampling MakeSampling(const Setup& setup) {
   const PlantOptions& plant = setup.scenario().plant;
-  const Sampling sampling = {.time_step = plant.time_step,
-                             .hold = std::max(1L, std::lround(plant.control_step / plant.time_step))};
+  return {.time_step = 2.0 * plant.velocity_age(),
+          .hold = std::max(1L, std::lround(plant.control_step / plant.time_step))};
+}
+
+std::unique_ptr<Controller> MakeTrajectoryController(const Setup& setup) {
   return std::make_unique<TrajectoryController>(setup.model(), setup.fingertips(), setup.object().body,
-                                                setup.surface(), setup.MakeControllerOptions(), sampling);
+                                                setup.surface(), setup.MakeControllerOptions(),
+                                                MakeSampling(setup));
 }
 
 std::unique_ptr<PickAndPlaceController> MakeTaskController(const Setup& setup) {
@@ -46,6 +83,19 @@ LoopParts MakeLoopParts(const Setup& setup) {
     parts.controller = MakeTrajectoryController(setup);
   }
   parts.sensing.contact_error = setup.scenario().control.contact_error;
+  return parts;
+}
+
+LoopParts MakeLoopParts(const Setup& setup, const std::string& what, const std::filesystem::path& robot,
+                        double time_limit) {
+  const Scenario& scenario = setup.scenario();
+  if (scenario.task) throw InputError(scenario.source + ": task: is done by no other controller");
+  LoopParts parts = MakeLoopParts(setup);
+  parts.controller = MakeOwnController(
+      what, OwnControllerSetup{&setup.model(), setup.fingertips(), setup.object().body, &setup.surface(),
+                               setup.MakeControllerOptions(), MakeSampling(setup),
+                               ReadTextFile(robot.string()), scenario.text, time_limit});
+  parts.knows_law = scenario.control.names_law;
   return parts;
 }
 

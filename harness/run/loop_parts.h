@@ -2,7 +2,10 @@
 
 // What a scenario puts into the loop.
 
+#include <filesystem>
+#include <functional>
 #include <memory>
+#include <string>
 
 #include "controller/control/controller.h"
 #include "controller/handling/pick_and_place_controller.h"
@@ -18,11 +21,20 @@ struct LoopParts {
   std::unique_ptr<Plant> plant;
   std::unique_ptr<Controller> controller;
   const PickAndPlaceController* task = nullptr;  ///< The controller, when it does a task.
+  bool knows_law = true;                         ///< Whether the controller's law is the scenario's.
   SensingOptions sensing;
+  /// Changes what the controller is told at time t besides, as no scenario says; empty for nothing.
+  std::function<void(double t, MeasuredState* told)> hidden_sensor_fault;
 };
 
 /// The parts that the scenario names, robot and object where it starts.
 /// @throws InputError as EnginePlant; what the controllers' constructors throw.
 LoopParts MakeLoopParts(const Setup& setup);
+
+/// The same with a controller of the user's own. Its law is the scenario's when the scenario names one.
+/// @param what, time_limit as MakeOwnController. @param robot the parameter file.
+/// @throws also InputError for a task, and as MakeOwnController.
+LoopParts MakeLoopParts(const Setup& setup, const std::string& what, const std::filesystem::path& robot,
+                        double time_limit);
 
 }  // namespace dexcheck

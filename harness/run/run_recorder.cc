@@ -37,6 +37,7 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
   std::string overrides;
   for (const std::string& assignment : scenario.overrides) overrides += assignment + "\n";
   log_.SetText("command", inputs.command);
+  if (!inputs.controller.empty()) log_.SetText("controller", inputs.controller);
   log_.SetText("scenario", scenario.name);
   log_.SetText("overrides", overrides);
   log_.SetText("seed", std::to_string(scenario.seed));

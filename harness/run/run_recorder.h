@@ -16,7 +16,8 @@ namespace dexcheck {
 struct RunInputs {
   std::filesystem::path robot;
   std::filesystem::path mjcf;
-  std::string command;  ///< As it was typed.
+  std::string command;     ///< As it was typed.
+  std::string controller;  ///< The user's own; empty for the scenario's.
 };
 
 /// Writes log.h5 of one run.

@@ -72,7 +72,7 @@ double TrackingStatistics::orientation_rms() const { return Rms(orientation_squa
 void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   if (loop.is_checking()) {
     result->attribution = Attribute(setup.gate(), loop.checks().model_checks(), loop.checks().motion_checks(),
-                                    loop.checks().TellLaw());
+                                    loop.checks().Tell());
   }
   const bool disagrees = result->attribution.cause != Cause::kNone;
   result->verdict = disagrees ? Verdict::kDisagreement : Verdict::kPass;
@@ -107,6 +107,8 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
         if (check.applies) json["checks"][check.name] = ToJson(check);
       }
     }
+    json["settling"] = Json::object();
+    for (const CheckRecord& check : loop.checks().settling_failures()) json["settling"][check.name] = ToJson(check);
     const CrossCheck& checks = loop.checks();
     const StepFindings& findings = checks.findings();
     json["assumptions"] = {{"fingertip_slip_max_m", checks.Find("fingertip_slip").worst},

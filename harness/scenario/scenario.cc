@@ -52,11 +52,28 @@ void ReadModel(const TomlValue& value, const std::filesystem::path& folder, Scen
   table.RejectUnused();
 }
 
+/// "engine", or one of the rigid plants, for which the engine's keys mean nothing.
+void ReadPlantType(TomlTable& table, PlantOptions* plant) {
+  const auto type = table.Find("type");
+  if (!type) return;
+  enum class Choice { kEngine, kRigid, kRigidEuler };
+  const auto choice = type->AsChoice<Choice>(
+      {{"engine", Choice::kEngine}, {"rigid", Choice::kRigid}, {"rigid_euler", Choice::kRigidEuler}});
+  if (choice == Choice::kEngine) return;
+  plant->type = PlantType::kRigid;
+  if (choice == Choice::kRigidEuler) plant->integrator = Integrator::kSemiImplicitEuler;
+  for (const char* key : {"contact_time_constant", "contact_impedance", "impratio", "noslip_iterations",
+                          "bonded", "implicit_damping", "floor_friction"}) {
+    if (const auto value = table.Find(key)) value->Reject("has no meaning for a rigid plant");
+  }
+}
+
 void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scenario* scenario) {
   constexpr long kMaxNoslipIterations = 1000;
   TomlTable table = value.AsTable();
   PlantOptions& plant = scenario->plant;
   scenario->mjcf_file = ReadPath(table, "mjcf", folder);
+  ReadPlantType(table, &plant);
   plant.time_step = ReadOr(table, "time_step", plant.time_step);
   plant.control_step = ReadOr(table, "control_step", 0.0, &TomlValue::AsNotNegative);
   plant.contact_time_constant = ReadOr(table, "contact_time_constant", 0.0, &TomlValue::AsNotNegative);
@@ -149,6 +166,10 @@ void FinishTask(Scenario* scenario) {
     if (!holds) throw InputError(scenario->source + ": " + problem);
   };
   require(scenario->start == Start::kRest, "start: must be \"rest\" for a task");
+  require(scenario->plant.type == PlantType::kEngine,
+          "plant.type: a task needs contacts that open and close, which a rigid plant has not");
+  require(scenario->control.law == ControlLaw::kComputedTorque,
+          "control.law: a task is done by \"computed_torque\"");
   require(!scenario->plant.bonded, "plant.bonded: a task needs contacts that open and close");
   require(scenario->plant.control_step <= scenario->plant.time_step,
           "plant.control_step: a task decides at every time step");
@@ -190,9 +211,31 @@ void ReadWeight(const TomlValue& value, ControlOptions* control) {
   table.RejectUnused();
 }
 
+/// The law, and the stiffness and damping of those that have them.
+void ReadLaw(TomlTable& table, ControlOptions* control) {
+  if (const auto law = table.Find("law")) {
+    control->law = law->AsChoice<ControlLaw>({{"computed_torque", ControlLaw::kComputedTorque},
+                                              {"pd_gravity", ControlLaw::kPdGravity},
+                                              {"feedforward_pd", ControlLaw::kFeedforwardPd},
+                                              {"operational_space", ControlLaw::kOperationalSpace},
+                                              {"impedance", ControlLaw::kImpedance}});
+    control->names_law = true;
+  }
+  const auto read = [&](const char* key, bool has_it, std::optional<Vector6d>* result) {
+    const auto value = table.Find(key);
+    if (!value) return;
+    if (!has_it) value->Reject("has no meaning for the law " + Quote(NameOf(control->law)));
+    *result = value->AsVectorOrNumber<6>();
+    if (((*result)->array() < 0.0).any()) value->Fail("must not be negative");
+  };
+  read("stiffness", HasStiffness(control->law), &control->stiffness);
+  read("damping", HasStiffness(control->law) && control->law != ControlLaw::kImpedance, &control->damping);
+}
+
 void ReadControl(const TomlValue& value, Scenario* scenario) {
   TomlTable table = value.AsTable();
   ControlOptions& control = scenario->control;
+  ReadLaw(table, &control);
   ReadGains(table, &control.gains);
   if (const auto choice = table.Find("orientation")) {
     control.orientation = choice->AsChoice<OrientationFeedback>(

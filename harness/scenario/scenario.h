@@ -13,10 +13,12 @@
 #include "controller/common/toml_reader.h"
 #include "controller/common/types.h"
 #include "controller/contact/surface.h"
+#include "controller/control/baseline_law.h"
 #include "controller/control/computed_torque.h"
 #include "controller/control/object_tracking.h"
 #include "controller/control/trajectory_reader.h"
 #include "controller/handling/pick_and_place.h"
+#include "harness/plant/integrator.h"
 
 namespace dexcheck {
 
@@ -26,10 +28,18 @@ enum class Start {
   kRest,    ///< Settled at rest; X_d takes off at t = 0 as its formula says.
 };
 
-/// Changes to the MJCF's plant.
+/// What simulates robot and object.
+enum class PlantType {
+  kEngine,  ///< MuJoCo.
+  kRigid,   ///< The paper's own equations, (46) and (48).
+};
+
+/// The plant, and changes to the MJCF's.
 struct PlantOptions {
-  double time_step = 1e-3;             ///< s.
-  double control_step = 0.0;           ///< Torques are held this long, s; 0 for every step.
+  PlantType type = PlantType::kEngine;
+  Integrator integrator = Integrator::kRungeKutta4;  ///< kRigid.
+  double time_step = 1e-3;                           ///< s.
+  double control_step = 0.0;                         ///< Torques are held this long, s; 0 for every step.
   double contact_time_constant = 0.0;  ///< solref of all contact pairs, s; 0 for twice the time step.
   double contact_impedance = 0.99;     ///< solimp, constant.
   double impratio = 100.0;
@@ -38,6 +48,11 @@ struct PlantOptions {
   bool implicit_damping = false;  ///< The engine's own treatment of joint damping.
   std::optional<double> floor_friction;   ///< mu of wheels on the floor.
   std::optional<double> finger_friction;  ///< mu of fingertips on the object.
+
+  /// By how much velocities are older than positions, s.
+  [[nodiscard]] double velocity_age() const {
+    return type == PlantType::kRigid && integrator == Integrator::kRungeKutta4 ? 0.0 : 0.5 * time_step;
+  }
 };
 
 /// Where and how the object is held.
@@ -51,7 +66,11 @@ struct GraspOptions {
 
 /// Law, gains and forces.
 struct ControlOptions {
+  ControlLaw law = ControlLaw::kComputedTorque;
+  bool names_law = false;  ///< Whether the scenario says which.
   ObjectGains gains;
+  std::optional<Vector6d> stiffness;  ///< N/m, N m/rad; none: as K_p with the inertia at the start.
+  std::optional<Vector6d> damping;    ///< N s/m, N m s/rad; none: as K_v.
   OrientationFeedback orientation = OrientationFeedback::kAngles;
   RedundancyWeight::Kind weight = RedundancyWeight::Kind::kIdentity;
   double platform_weight = 1.0;     ///< W of the platform's velocities; kDiagonal.

@@ -30,6 +30,21 @@ RobotModel ReadModel(const Scenario& scenario, const std::filesystem::path& robo
   return ParseRobotModel(ReadTextFile(robot.string()), robot.string(), scenario.model_overrides);
 }
 
+/// Critically damped, of constant impedance, whatever the MJCF says.
+void SetStiffness(double time_constant, double impedance, mjtNum* solref, mjtNum* solimp) {
+  solref[0] = time_constant;
+  solref[1] = 1.0;
+  const mjtNum constant[mjNIMP] = {impedance, impedance, 0.001, 0.5, 2.0};  // the last three without effect
+  std::copy_n(constant, mjNIMP, solimp);
+}
+
+/// The robot that a rigid plant moves: the parameter file's, whatever the scenario makes the controller
+/// believe.
+std::unique_ptr<RobotModel> ReadPlantModel(const Scenario& scenario, const std::filesystem::path& robot) {
+  if (scenario.plant.type != PlantType::kRigid) return nullptr;
+  return std::make_unique<RobotModel>(ParseRobotModel(ReadTextFile(robot.string()), robot.string(), {}));
+}
+
 /// From -1 to 1.
 double Draw(std::mt19937_64* random) { return 2.0 * static_cast<double>((*random)() >> 11) * 0x1p-53 - 1.0; }
 
@@ -44,14 +59,18 @@ Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const
 
 Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
              MjModelPtr engine)
-    : scenario_(scenario), model_(ReadModel(scenario, robot)), engine_(std::move(engine)) {
+    : Setup(scenario, ReadModel(scenario, robot), mjcf, std::move(engine)) {}
+
+Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::path& mjcf, MjModelPtr engine)
+    : scenario_(scenario),
+      model_(std::move(model)),
+      plant_model_(ReadPlantModel(scenario, model_.spec().source)),
+      engine_(std::move(engine)) {
+  const std::string& robot = model_.spec().source;
   if (model_.base().type == BaseType::kFloating) {
-    throw InputError(robot.string() +
-                     ": base.type: must not be \"floating\" in a run, whose law drives the base");
+    throw InputError(robot + ": base.type: must not be \"floating\" in a run, whose law drives the base");
   }
-  if (!model_.object()) {
-    throw InputError(robot.string() + ": object: is missing, and the scenario holds one");
-  }
+  if (!model_.object()) throw InputError(robot + ": object: is missing, and the scenario holds one");
   RemoveLooks(engine_.get());
   adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
   gate_ = RunStaticGate(*adapter_);
@@ -59,7 +78,7 @@ Setup::Setup(const Scenario& scenario, const std::filesystem::path& robot, const
   try {
     surface_ = MakeSurface(model_.object()->shape);
   } catch (const std::invalid_argument& error) {
-    throw InputError(robot.string() + ": " + error.what());
+    throw InputError(robot + ": " + error.what());
   }
   FindFingertips();
   FindGrasp();
@@ -75,9 +94,8 @@ void Setup::ApplyPlantOptions() {
   const double time_constant =
       plant.contact_time_constant > 0.0 ? plant.contact_time_constant : 2.0 * plant.time_step;
   for (int pair = 0; pair < m.npair; ++pair) {
-    m.pair_solref[mjNREF * pair] = time_constant;
-    mjtNum* const solimp = m.pair_solimp + mjNIMP * pair;
-    solimp[0] = solimp[1] = plant.contact_impedance;
+    SetStiffness(time_constant, plant.contact_impedance, m.pair_solref + mjNREF * pair,
+                 m.pair_solimp + mjNIMP * pair);
     const bool has_floor =
         m.geom_type[m.pair_geom1[pair]] == mjGEOM_PLANE || m.geom_type[m.pair_geom2[pair]] == mjGEOM_PLANE;
     const std::optional<double>& mu = has_floor ? plant.floor_friction : plant.finger_friction;
@@ -191,8 +209,9 @@ FingerPlacement Setup::SolveGrasp() {
          "\"angles\" are singular where the object starts, at beta = " + FormatNumber(X_start_[4]) +
              " rad; take \"rotation\"");
   }
+  const bool soft = scenario_.plant.type == PlantType::kEngine && !scenario_.plant.bonded;
   return SolveFingerPlacement(model_, fingertips_, *surface_, X_Bo_start_, grasp.contacts, q,
-                              {.penetration = scenario_.plant.bonded ? 0.0 : kStartPenetration});
+                              {.penetration = soft ? kStartPenetration : 0.0});
 }
 
 void Setup::MakeBonds() {
@@ -222,9 +241,8 @@ void Setup::MakeBonds() {
     }
     bond_constraints_.push_back(found);
     m.eq_active[found] = 1;
-    m.eq_solref[mjNREF * found] = m.pair_solref[0];
-    mjtNum* const solimp = m.eq_solimp + mjNIMP * found;
-    solimp[0] = solimp[1] = scenario_.plant.contact_impedance;
+    SetStiffness(m.pair_solref[0], scenario_.plant.contact_impedance, m.eq_solref + mjNREF * found,
+                 m.eq_solimp + mjNIMP * found);
     // The same point in both bodies.
     const Vector3d on_object = contact.g_o_cf.translation();
     const Vector3d p_B = X_Bo_start_ * on_object;
@@ -244,6 +262,7 @@ void Setup::MakeBonds() {
 GraspControllerOptions Setup::MakeControllerOptions() const {
   const ControlOptions& control = scenario_.control;
   GraspControllerOptions options(model_);
+  options.law = control.law;
   options.gains = control.gains;
   options.orientation = control.orientation;
   options.weight.kind = control.weight;
@@ -262,7 +281,32 @@ GraspControllerOptions Setup::MakeControllerOptions() const {
   options.mu = control.mu;
   options.f_min = control.f_min;
   options.f_max = control.f_max;
+  if (HasStiffness(control.law)) options.stiffness = FindStiffness(options);
   return options;
+}
+
+ObjectStiffness Setup::FindStiffness(const GraspControllerOptions& options) const {
+  GraspModel model(model_, fingertips_, object().body, *surface_, options);
+  MeasuredState state{q_start_,     VectorXd::Zero(model_.num_velocities()),
+                      X_Bo_start_,  Vector6d::Zero(),
+                      kappa_start_, std::vector<double>(fingertips_.size(), 0.0)};
+  if (kappa_start_.empty()) {
+    ModelTerms kinematics(model_, Coordinates::kReduced);
+    kinematics.SetState(state.q, state.xi);
+    for (const int tip : fingertips_) {
+      const Sphere sphere(*model_.frames()[static_cast<size_t>(tip)].sphere_radius);
+      const Pose X_of = X_Bo_start_.inverse() * kinematics.CalcFramePose(tip);
+      state.kappa.push_back(FindContact(sphere, *surface_, X_of).kappa);
+    }
+  }
+  model.SetState(state);
+  ObjectSpaceInertia inertia(model_, static_cast<int>(fingertips_.size()));
+  inertia.Compute(model.robot(), model.grasp());
+  const ControlOptions& control = scenario_.control;
+  ObjectStiffness stiffness = CalcStiffness(control.gains, inertia.Lambda(), X_Bo_start_.linear());
+  if (control.stiffness) stiffness.K = *control.stiffness;
+  if (control.damping) stiffness.D = *control.damping;
+  return stiffness;
 }
 
 }  // namespace dexcheck

@@ -29,11 +29,15 @@ class Setup {
   /// The same with the scene compiled already, which is most of the work. @param mjcf names it in messages.
   Setup(const Scenario& scenario, const std::filesystem::path& robot, const std::filesystem::path& mjcf,
         MjModelPtr engine);
+  /// The same with the robot read already. Overrides of its parameters are not applied again.
+  Setup(const Scenario& scenario, RobotModel model, const std::filesystem::path& mjcf, MjModelPtr engine);
   Setup(const Setup&) = delete;
   Setup& operator=(const Setup&) = delete;
 
   [[nodiscard]] const Scenario& scenario() const { return scenario_; }
   [[nodiscard]] const RobotModel& model() const { return model_; }
+  /// The robot that a rigid plant moves, without the scenario's changes to the model; null for the engine.
+  [[nodiscard]] const RobotModel* plant_model() const { return plant_model_.get(); }
   /// With the scenario's changes.
   [[nodiscard]] const mjModel& engine() const { return *engine_; }
   [[nodiscard]] const Adapter& adapter() const { return *adapter_; }
@@ -76,9 +80,12 @@ class Setup {
   void VaryGrasp(std::mt19937_64* random);
   FingerPlacement SolveGrasp();
   void MakeBonds();
+  /// Stiffness and damping of a law that has them: the scenario's, or those that follow from its gains.
+  [[nodiscard]] ObjectStiffness FindStiffness(const GraspControllerOptions& options) const;
 
   Scenario scenario_;
   RobotModel model_;
+  std::unique_ptr<RobotModel> plant_model_;
   MjModelPtr engine_;
   std::unique_ptr<Adapter> adapter_;
   GateResult gate_;

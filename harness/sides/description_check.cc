@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
+#include "harness/engine/engine.h"
 #include "harness/sides/engine_coupling.h"
 #include "harness/sides/join_names.h"
 
@@ -24,12 +26,27 @@ class DescriptionCheck {
   }
 
  private:
+  /// The check of that name, a new one when there is none.
   CheckRecord* Define(const std::string& name) {
+    const auto old = std::find_if(gate_.records.begin(), gate_.records.end(),
+                                  [&](const CheckRecord& one) { return one.name == name; });
+    if (old != gate_.records.end()) return &*old;
     CheckRecord record;
     record.name = name;
     record.bound = kRounding;
     gate_.records.push_back(record);
     return &gate_.records.back();
+  }
+
+  /// Takes back findings of the gate about what it believes that only the engine has. The check goes with the
+  /// last of them.
+  void TakeBack(const std::string& check, const std::function<bool(const GateFinding&)>& is_known) {
+    std::erase_if(gate_.findings,
+                  [&](const GateFinding& finding) { return finding.check == check && is_known(finding); });
+    const bool has_more = std::any_of(gate_.findings.begin(), gate_.findings.end(),
+                                      [&](const GateFinding& finding) { return finding.check == check; });
+    if (has_more) return;
+    std::erase_if(gate_.records, [&](const CheckRecord& record) { return record.name == check; });
   }
 
   void Compare(CheckRecord* record, int joint, double model, double engine, int entry) {
@@ -53,6 +70,7 @@ class DescriptionCheck {
     CheckRecord* record = nullptr;
     std::vector<std::string> only_here;
     std::vector<std::string> only_there;
+    std::vector<std::string> constraints;
     for (size_t i = 0; i < robot_.joints.size(); ++i) {
       const std::string& name = robot_.spec.joints[i].name;
       const std::optional<JointCoupling>& own = robot_.spec.joints[i].coupling;
@@ -61,10 +79,17 @@ class DescriptionCheck {
       if (!own && other) only_there.push_back(name);
       if (!own || !other) continue;
       if (record == nullptr) record = Define("joint_coupling");
+      constraints.push_back("constraint " + NameOf(engine_, mjOBJ_EQUALITY,
+                                                   FindCouplingConstraint(engine_, adapter_.joint_ids()[i])));
       const int joint = static_cast<int>(i);
       Compare(record, joint, own->leader, FindIndex(other->leader), 0);
       Compare(record, joint, own->multiplier, other->multiplier, 1);
       Compare(record, joint, own->offset, other->offset, 2);
+    }
+    if (!constraints.empty()) {
+      TakeBack("equality_constraint", [&](const GateFinding& finding) {
+        return std::find(constraints.begin(), constraints.end(), finding.where) != constraints.end();
+      });
     }
     const auto note = [&](const std::vector<std::string>& names, const std::string& side) {
       if (names.empty()) return;
@@ -84,19 +109,25 @@ class DescriptionCheck {
 
 }  // namespace
 
-std::optional<JointCoupling> FindEngineCoupling(const mjModel& engine, int joint) {
+int FindCouplingConstraint(const mjModel& engine, int joint) {
   for (int eq = 0; eq < engine.neq; ++eq) {
     if (engine.eq_type[eq] != mjEQ_JOINT || engine.eq_active[eq] == 0) continue;
     if (engine.eq_obj1id[eq] != joint || engine.eq_obj2id[eq] < 0) continue;
-    // q1 - q1_0 = a0 + a1 (q2 - q2_0) + ...
     const mjtNum* a = engine.eq_data + mjNEQDATA * eq;
-    if (a[2] != 0.0 || a[3] != 0.0 || a[4] != 0.0) continue;
-    const int leader = engine.eq_obj2id[eq];
-    const double q1_0 = engine.qpos0[engine.jnt_qposadr[joint]];
-    const double q2_0 = engine.qpos0[engine.jnt_qposadr[leader]];
-    return JointCoupling{leader, a[1], a[0] + q1_0 - a[1] * q2_0};
+    if (a[2] == 0.0 && a[3] == 0.0 && a[4] == 0.0) return eq;
   }
-  return std::nullopt;
+  return -1;
+}
+
+std::optional<JointCoupling> FindEngineCoupling(const mjModel& engine, int joint) {
+  const int eq = FindCouplingConstraint(engine, joint);
+  if (eq < 0) return std::nullopt;
+  // q1 - q1_0 = a0 + a1 (q2 - q2_0)
+  const mjtNum* a = engine.eq_data + mjNEQDATA * eq;
+  const int leader = engine.eq_obj2id[eq];
+  const double q1_0 = engine.qpos0[engine.jnt_qposadr[joint]];
+  const double q2_0 = engine.qpos0[engine.jnt_qposadr[leader]];
+  return JointCoupling{leader, a[1], a[0] + q1_0 - a[1] * q2_0};
 }
 
 std::vector<std::string> CheckDescription(const RobotDescription& robot, const Adapter& adapter,

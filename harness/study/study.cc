@@ -30,7 +30,15 @@ Variation ReadVariation(const TomlValue& value, Sampling sampling) {
   }
   if (sampling == Sampling::kGrid) table.RejectTogether("values", {"from", "to", "count", "spacing"});
   if (const auto list = sampling == Sampling::kGrid ? table.Find("values") : std::nullopt) {
-    for (const TomlValue& entry : list->AsList()) variation.values.push_back(entry.AsNumber());
+    for (const TomlValue& entry : list->AsList()) {
+      const bool are_texts = !variation.labels.empty();
+      if (are_texts || (variation.values.empty() && entry.IsText())) {
+        variation.values.push_back(static_cast<double>(variation.labels.size()));
+        variation.labels.push_back(entry.AsText());
+      } else {
+        variation.values.push_back(entry.AsNumber());
+      }
+    }
     if (variation.values.empty()) list->Reject("needs at least one value");
     const auto [least, most] = std::minmax_element(variation.values.begin(), variation.values.end());
     variation.from = *least;
@@ -178,10 +186,16 @@ std::vector<Trial> ListTrials(const Study& study) {
   return trials;
 }
 
+std::string FormatValue(const Variation& variation, double value) {
+  if (variation.labels.empty()) return FormatNumber(value);
+  return variation.labels.at(static_cast<size_t>(std::lround(value)));
+}
+
 std::vector<std::string> ListOverrides(const Study& study, const Trial& trial) {
   std::vector<std::string> overrides = study.overrides;
   for (size_t i = 0; i < study.variations.size(); ++i) {
-    overrides.push_back(study.variations[i].key + "=" + FormatNumber(trial.parameters[i]));
+    overrides.push_back(study.variations[i].key + "=" +
+                        FormatValue(study.variations[i], trial.parameters[i]));
   }
   return overrides;
 }

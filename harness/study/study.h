@@ -13,7 +13,10 @@ namespace dexcheck {
 struct Variation {
   std::string key;             ///< As --set takes it.
   std::vector<double> values;  ///< Of a grid; empty in sampled studies.
-  double from = 0.0;           ///< Ends of the range.
+  /// Of a key whose values are texts: values and parameters are then their numbers, from 0. Empty for
+  /// numbers.
+  std::vector<std::string> labels;
+  double from = 0.0;  ///< Ends of the range.
   double to = 0.0;
   bool logarithmic = false;  ///< Even in the logarithm.
 };
@@ -54,6 +57,9 @@ Study ParseStudy(const std::string& text, const std::string& source);
 
 /// All trials; the same list for the same file, always.
 std::vector<Trial> ListTrials(const Study& study);
+
+/// A value of the key as --set takes it.
+std::string FormatValue(const Variation& variation, double value);
 
 /// What makes the study's scenario into this trial: "PATH=VALUE" each.
 std::vector<std::string> ListOverrides(const Study& study, const Trial& trial);

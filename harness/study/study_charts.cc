@@ -132,8 +132,20 @@ void Fit(Axis* axis, const std::vector<double>& values) {
   if (axis->logarithmic) axis->values = {std::exp(from - room), std::exp(to + room)};
 }
 
+/// 0, 1, ..: the values that have labels.
+std::vector<double> ListLabelled(const Axis& axis) {
+  std::vector<double> values;
+  for (size_t i = 0; i < axis.labels.size(); ++i) values.push_back(static_cast<double>(i));
+  return values;
+}
+
+std::string LabelTick(const Axis& axis, double value, int digits) {
+  return axis.labels.empty() ? FormatTick(value, digits) : axis.labels.at(static_cast<size_t>(value));
+}
+
 /// All values of a few cells, round ones of many.
 std::vector<double> ListCellTicks(const Axis& axis) {
+  if (!axis.labels.empty()) return ListLabelled(axis);
   constexpr size_t kMostCells = 13;
   if (axis.values.size() <= kMostCells) return axis.values;
   return ListRoundValues(axis.values.front(), axis.values.back(), axis.logarithmic);
@@ -233,9 +245,9 @@ Html DrawHeatMap(const HeatMap& map) {
     }
   }
   for (const double value : ListCellTicks(map.x))
-    svg += DrawTick(true, left(FindPlace(map.x, value) + 0.5), FormatTick(value, 3));
+    svg += DrawTick(true, left(FindPlace(map.x, value) + 0.5), LabelTick(map.x, value, 3));
   for (const double value : ListCellTicks(map.y))
-    svg += DrawTick(false, top(FindPlace(map.y, value) - 0.5), FormatTick(value, 3));
+    svg += DrawTick(false, top(FindPlace(map.y, value) - 0.5), LabelTick(map.y, value, 3));
   if (map.range) svg += DrawScale((*map.range)[0], (*map.range)[1]);
   svg += DrawLabels(map.x, map.y);
   svg += "</svg></figure>\n";
@@ -266,12 +278,13 @@ Html DrawChart(Chart chart) {
   svg += FormatHtml("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"frame\"/>\n", kLeft, kTop,
                     kInnerWidth, kInnerHeight);
   const auto list = [](const Axis& axis) {
+    if (!axis.labels.empty()) return ListLabelled(axis);
     return ListRoundValues(axis.values[0], axis.values[1], axis.logarithmic);
   };
   for (const double value : list(chart.x))
-    svg += DrawTick(true, place_x(value), FormatTick(value, kRoundDigits));
+    svg += DrawTick(true, place_x(value), LabelTick(chart.x, value, kRoundDigits));
   for (const double value : list(chart.y))
-    svg += DrawTick(false, place_y(value), FormatTick(value, kRoundDigits));
+    svg += DrawTick(false, place_y(value), LabelTick(chart.y, value, kRoundDigits));
   int key = 0;
   for (const ChartLine& line : chart.lines) {
     std::string points;

@@ -16,6 +16,7 @@ struct Axis {
   std::string label;
   std::vector<double> values;  ///< Ascending; the cells' of a heat map, else the ends.
   bool logarithmic = false;
+  std::vector<std::string> labels = {};  ///< Of the values 0, 1, ..; empty for numbers.
 };
 
 struct HeatCell {

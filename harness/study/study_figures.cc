@@ -23,10 +23,10 @@ constexpr size_t kMostLines = 6;
 using IsWorse = std::function<bool(const TrialRow&, const TrialRow&)>;
 
 Axis AxisOf(const Variation& variation) {
-  Axis axis{variation.key, variation.values, false};
+  Axis axis{variation.key, variation.values, false, variation.labels};
   std::sort(axis.values.begin(), axis.values.end());
   const double first = axis.values.front();
-  axis.logarithmic = first > 0.0 && axis.values.back() / first > 10.0;
+  axis.logarithmic = variation.labels.empty() && first > 0.0 && axis.values.back() / first > 10.0;
   return axis;
 }
 
@@ -190,7 +190,11 @@ std::string LinkTo(const TrialRow& row) { return fmt::format("#trial-{}", row.tr
 std::string Describe(const Study& study, const TrialRow& row) {
   std::string text = fmt::format("trial {}: ", row.trial.number);
   for (size_t i = 0; i < study.variations.size(); ++i) {
-    text += fmt::format("{} = {:.6g}, ", study.variations[i].key, row.trial.parameters[i]);
+    const Variation& variation = study.variations[i];
+    const double value = row.trial.parameters[i];
+    text +=
+        fmt::format("{} = {}, ", variation.key,
+                    variation.labels.empty() ? fmt::format("{:.6g}", value) : FormatValue(variation, value));
   }
   text += NameOf(row.result.outcome);
   if (!row.result.failure.empty()) text += ": " + row.result.failure;
@@ -225,17 +229,31 @@ Html DrawLines(const StudyResults& results) {
   Html figures;
   for (const Metric metric : results.metrics) {
     Chart chart = MakeChart(LabelOf(metric), study.variations[0].key, LabelOf(metric));
+    chart.x.labels = study.variations[0].labels;
     for (size_t i = 0; i < chosen.size(); ++i) {
       ChartLine line;
       line.color = FindColor(static_cast<int>(i));
-      if (has_second) line.label = fmt::format("{} = {:.3g}", study.variations[1].key, chosen[i]);
+      if (has_second) {
+        const Variation& second = study.variations[1];
+        const bool is_number = second.labels.empty();
+        line.label =
+            fmt::format("{} = {}", second.key,
+                        is_number ? fmt::format("{:.3g}", chosen[i]) : FormatValue(second, chosen[i]));
+      }
       for (const TrialRow& row : results.rows) {
         const bool mine = (!has_second || row.trial.parameters[1] == chosen[i]) &&
                           IsHeld(row.result.outcome) && std::isfinite(row.result.metrics[metric]);
-        if (mine) line.points.emplace_back(row.trial.parameters[0], row.result.metrics[metric]);
+        if (!mine) continue;
+        line.points.emplace_back(row.trial.parameters[0], row.result.metrics[metric]);
+        if (chart.x.labels.empty()) continue;
+        chart.points.push_back({row.trial.parameters[0], row.result.metrics[metric], line.color,
+                                Describe(study, row), LinkTo(row)});
       }
       std::sort(line.points.begin(), line.points.end());
-      if (!line.points.empty()) chart.lines.push_back(line);
+      if (line.points.empty()) continue;
+      // Between texts there is no line.
+      if (!chart.x.labels.empty()) line.points.clear();
+      chart.lines.push_back(line);
     }
     if (!chart.lines.empty()) figures += DrawChart(chart);
   }

@@ -232,7 +232,11 @@ class Report {
       const auto add = [&](const std::string& text) {
         html += FormatHtml("<td class=\"value number\">{}</td>", text);
       };
-      for (const double value : row.trial.parameters) add(fmt::format("{:.6g}", value));
+      for (size_t k = 0; k < row.trial.parameters.size(); ++k) {
+        const Variation& variation = results_.study.variations[k];
+        const double value = row.trial.parameters[k];
+        add(variation.labels.empty() ? fmt::format("{:.6g}", value) : FormatValue(variation, value));
+      }
       for (const Metric metric : shown) {
         const double value = row.result.metrics[metric];
         add(std::isfinite(value) ? fmt::format("{:.4g}", value) : "–");

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <bit>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@ struct Step {
   CheckKind kind = CheckKind::kAssumption;
 };
 constexpr Step kSteps[] = {{"balance_object", CheckKind::kBalance},
+                           {"balance_robot", CheckKind::kBalance},
+                           {"rolling"},
                            {"reduced_acceleration", CheckKind::kPrediction},
                            {"contact_force", CheckKind::kPrediction},
                            {"fingertip_slip"},
@@ -68,7 +71,9 @@ class FakeRun {
     gate_.findings.push_back({name, "link r_forearm", 1.5, 1.25, {}, 0});
     return *this;
   }
-  [[nodiscard]] AttributionResult Explain() const { return Attribute(gate_, model_, steps_); }
+  [[nodiscard]] AttributionResult Explain(const MeasuredCauses& measured = {}) const {
+    return Attribute(gate_, model_, steps_, measured);
+  }
   CheckRecord& step(const std::string& name) {
     return *std::find_if(steps_.begin(), steps_.end(),
                          [&](const CheckRecord& check) { return check.name == name; });
@@ -179,8 +184,42 @@ TEST(Attribute, WithoutABrokenAssumptionContactsGave) {
 
 TEST(Attribute, NeverSaysThatNoAssumptionBrokeWhereOneDid) {
   const AttributionResult result = FakeRun().Fail("idle_joints", 0.1).Explain();
-  EXPECT_EQ(result.cause, Cause::kIntegrator);
+  EXPECT_EQ(result.cause, Cause::kUnexplained);
   EXPECT_THAT(result.evidence, StartsWith("idle_joints"));
+}
+
+TEST(Attribute, AForceOnTheRobotAndWhatSlidesAreToldByTime) {
+  for (const bool force_first : {true, false}) {
+    const AttributionResult result = FakeRun()
+                                         .Fail("balance_robot", force_first ? 0.1 : 0.2)
+                                         .Fail("traction_use", force_first ? 0.2 : 0.1)
+                                         .Fail("base_tilt", 0.05)
+                                         .Explain();
+    EXPECT_EQ(result.cause, force_first ? Cause::kUnmodelledForce : Cause::kWheelSlip);
+  }
+  // A force that makes something slide in the same step was there before it slid; what pushes at a stop is the stop.
+  EXPECT_EQ(FakeRun().Fail("balance_robot", 0.1).Fail("cone_use", 0.1).Explain().cause, Cause::kUnmodelledForce);
+  EXPECT_EQ(FakeRun().Fail("balance_robot", 0.1).Fail("joint_stop", 0.1).Explain().cause, Cause::kJointStop);
+}
+
+TEST(Attribute, WheelsThatDoNotRollAsTheyShouldExplainForces) {
+  const AttributionResult result = FakeRun().Fail("balance_robot", 0.1).Fail("rolling", 0.3).Explain();
+  EXPECT_EQ(result.cause, Cause::kWheelGeometry);
+  EXPECT_THAT(result.evidence, StartsWith("rolling"));
+  // Unless they slide.
+  EXPECT_EQ(FakeRun().Fail("traction_use", 0.1).Fail("rolling", 0.2).Explain().cause, Cause::kWheelSlip);
+}
+
+TEST(Attribute, EvidenceEndsWithWhatWasMeasured) {
+  FakeRun run;
+  run.Fail("balance_object", 0.1).Fail("balance_robot", 0.1);
+  MeasuredCauses measured;
+  measured.force = "at joint r_elbow";
+  EXPECT_THAT(run.Explain(measured).evidence, HasSubstr("; at joint r_elbow"));
+  measured.is_slope = true;
+  const AttributionResult slope = run.Explain(measured);
+  EXPECT_EQ(slope.cause, Cause::kSlope);
+  EXPECT_EQ(FindCause(slope, "balance_robot"), "slope");
 }
 
 TEST(Attribute, TheSolverIsBlamedForWhatItLeftOver) {
@@ -201,7 +240,9 @@ TEST(Attribute, EvidenceHasUnitPlaceAndTime) {
 // the run's cause is taken from has the same.
 TEST(Attribute, NeverContradictsItself) {
   constexpr unsigned kSets = 1U << std::size(kSteps);
+  // All sets of four or less, and every 37th of the others.
   for (unsigned set = 1; set < kSets; ++set) {
+    if (std::popcount(set) > 4 && set % 37 != 0) continue;
     for (const bool forward : {true, false}) {
       FakeRun run;
       size_t failed = 0;
@@ -216,7 +257,8 @@ TEST(Attribute, NeverContradictsItself) {
       ASSERT_EQ(result.attributions.size(), failed) << set;
       for (const Attribution& one : result.attributions) ASSERT_NE(one.cause, Cause::kNone) << set;
       const std::string evidence = result.evidence.substr(0, result.evidence.find(' '));
-      if (result.cause != Cause::kIntegrator) {
+      ASSERT_NE(result.cause, Cause::kIntegrator) << set;
+      if (result.cause != Cause::kUnexplained) {
         ASSERT_EQ(FindCause(result, evidence), NameOf(result.cause)) << set << " " << evidence;
       }
     }
@@ -251,7 +293,8 @@ TEST(NameOf, CausesHaveDifferentNames) {
   for (const Cause cause :
        {Cause::kNone, Cause::kModel, Cause::kActuatorLimit, Cause::kJointStop, Cause::kFingertipSlip,
         Cause::kWheelSlip, Cause::kContactSoftness, Cause::kTilt, Cause::kSolver, Cause::kIntegrator,
-        Cause::kSensing, Cause::kControlLaw, Cause::kActuator, Cause::kUnmodelledForce}) {
+        Cause::kSensing, Cause::kControlLaw, Cause::kActuator, Cause::kUnmodelledForce, Cause::kSlope,
+        Cause::kWheelGeometry, Cause::kUnexplained}) {
     names.emplace_back(NameOf(cause));
   }
   std::sort(names.begin(), names.end());

@@ -35,6 +35,9 @@ size_t CheckSchema(const Json& results) {
   }
   EXPECT_EQ(results.at("mujoco"), "2.2.2");
   EXPECT_TRUE(results.at("findings").is_array());
+  EXPECT_FALSE(results.at("engine_notes").empty());
+  for (const Json& note : results.at("engine_notes"))
+    EXPECT_TRUE(note.contains("kind") && note.contains("text"));
   for (const auto& [name, check] : results.at("checks").items()) {
     SCOPED_TRACE(name);
     EXPECT_EQ(check.at("kind"), "model");
@@ -110,6 +113,46 @@ TEST(ConsistencyCommand, ChangedNumberIsADisagreement) {
   EXPECT_EQ(finding.at("where"), "link panda_link3");
   EXPECT_EQ(finding.at("model"), 3.3);
   EXPECT_EQ(finding.at("engine"), 3.228604);
+}
+
+// What only the MJCF has is a disagreement, whatever it is.
+TEST(ConsistencyCommand, WhatOnlyTheMjcfHasIsADisagreement) {
+  struct Addition {
+    const char* text;
+    const char* finding;
+  };
+  for (const Addition& addition : {
+           Addition{"<tendon><fixed name='t' stiffness='300'><joint joint='panda_joint2' "
+                    "coef='1'/></fixed></tendon>",
+                    "  tendon_spring: tendon t: 0 in panda.toml, 300 in "},
+           {"<tendon><fixed name='t' damping='2'><joint joint='panda_joint2' coef='1'/></fixed></tendon>",
+            "  tendon_damping: tendon t: "},
+           {"<tendon><fixed name='t' frictionloss='2'><joint joint='panda_joint2' "
+            "coef='1'/></fixed></tendon>",
+            "  tendon_friction: tendon t: "},
+           {"<tendon><fixed name='t' limited='true' range='0 1'><joint joint='panda_joint2' "
+            "coef='1'/></fixed></tendon>",
+            "  tendon_limit: tendon t: "},
+           {"<equality><joint name='e' joint1='panda_joint2' joint2='panda_joint3'/></equality>",
+            "  equality_constraint: constraint e: "},
+           {"<actuator><position name='p' joint='panda_joint2' kp='50'/></actuator>",
+            "  motor_bias: actuator p: "},
+           {"<actuator><velocity name='p' joint='panda_joint2' kv='5'/></actuator>",
+            "  motor_gain: actuator p: "},
+           {"<option><flag gravity='disable'/></option>", "  disable_flag: Gravity: "},
+           {"<option><flag override='enable'/></option>", "  enable_flag: Override: "},
+       }) {
+    const TempFolder folder;
+    std::string text = ReadText(testing::kMjcf + "panda.xml");
+    const std::string end = "</mujoco>";
+    text.replace(text.rfind(end), end.size(), addition.text + end);
+    WriteText(folder.path() / "more.xml", text);
+    const ProgramResult result =
+        RunDexcheck({"consistency", "--samples", "2", "--robot", testing::kParameters + "panda.toml",
+                     "--mjcf", (folder.path() / "more.xml").string()});
+    EXPECT_EQ(result.exit_code, 1) << addition.text << result.err;
+    EXPECT_THAT(result.out, HasSubstr(addition.finding));
+  }
 }
 
 TEST(ConsistencyCommand, SeedDecidesTheStates) {

@@ -259,5 +259,86 @@ TEST(EngineTerms, NeedsAnObjectAndSpheresThatTouch) {
   EXPECT_THROW(EngineTerms(adapter, std::span<const int>(model.fingertips())), InputError);
 }
 
+// Springs and dampers of tendons are among the engine's passive forces, however its Jacobians are stored.
+TEST(EngineTerms, FrictionHasTheForcesOfTendons) {
+  std::mt19937 random(20162);
+  RandomRobotOptions options;
+  options.base = BaseType::kFixed;
+  options.joints = 6;
+  const RobotSpec spec = testing::MakeRandomRobot(options, &random);
+  const RobotModel model(spec);
+  for (const char* jacobian : {"dense", "sparse"}) {
+    std::string text = testing::WriteMjcf(spec);
+    const std::string end = "</mujoco>";
+    text.replace(
+        text.rfind(end), end.size(),
+        std::string("<option jacobian=\"") + jacobian +
+            "\"/><tendon><fixed stiffness=\"300\" springlength=\"0.1\"><joint joint=\"joint_1\" coef=\"1\"/>"
+            "<joint joint=\"joint_3\" coef=\"-2\"/></fixed><fixed damping=\"7\"><joint joint=\"joint_2\" "
+            "coef=\"1.5\"/><joint joint=\"joint_5\" coef=\"1\"/></fixed></tendon></mujoco>");
+    const MjModelPtr engine = LoadMjcfText(text, "text");
+    ASSERT_EQ(engine->ntendon, 2);
+    const Adapter adapter(model, *engine, "text");
+    EngineTerms terms(adapter, Coordinates::kReduced);
+    const MjDataPtr data = MakeData(*engine);
+    for (int trial = 0; trial < 5; ++trial) {
+      const VectorXd q = DrawPositions(model, &random);
+      const VectorXd xi = DrawVelocities(model.num_velocities(), &random);
+      terms.SetState(q, xi);
+      adapter.SetPositions(q, data->qpos);
+      VectorXd passive(xi.size());
+      for (int i = 0; i < model.num_joints(); ++i)
+        data->qvel[adapter.joint_dofs()[static_cast<size_t>(i)]] = xi[i];
+      mj_forward(engine.get(), data.get());
+      for (int i = 0; i < model.num_joints(); ++i)
+        passive[i] = data->qfrc_passive[adapter.joint_dofs()[static_cast<size_t>(i)]];
+      constexpr double kScale = 1000.0;  // N m, of springs of 300 N m/rad
+      EXPECT_TRUE(MatrixNear(terms.friction(), -passive, kRounding * kScale));
+      double largest = 0.0;
+      for (int i = 0; i < model.num_joints(); ++i)
+        largest =
+            std::max(largest, std::abs(passive[i] + spec.joints[static_cast<size_t>(i)].damping * xi[i]));
+      EXPECT_GT(largest, 1.0);  // the tendons' own forces
+    }
+  }
+}
+
+// A string around a post pulls the robot as the engine's own pipeline has it, which places the post.
+TEST(EngineTerms, FrictionHasTheForcesOfTendonsAroundGeoms) {
+  std::mt19937 random(20163);
+  RandomRobotOptions options;
+  options.base = BaseType::kFixed;
+  options.joints = 4;
+  const RobotSpec spec = testing::MakeRandomRobot(options, &random);
+  const RobotModel model(spec);
+  std::string text = testing::WriteMjcf(spec);
+  const std::string end = "</mujoco>";
+  text.replace(
+      text.rfind(end), end.size(),
+      "<worldbody><site name=\"hook\" pos=\"3 0 0\"/><geom name=\"post\" type=\"sphere\" size=\"0.6\" "
+      "pos=\"1.5 0 0\" contype=\"0\" conaffinity=\"0\"/></worldbody><tendon><spatial stiffness=\"100\" "
+      "springlength=\"0.1\"><site site=\"hook\"/><geom geom=\"post\"/><site site=\"tip_3\"/></spatial>"
+      "</tendon></mujoco>");
+  const MjModelPtr engine = LoadMjcfText(text, "text");
+  const Adapter adapter(model, *engine, "text");
+  EngineTerms terms(adapter, Coordinates::kReduced);
+  const MjDataPtr data = MakeData(*engine);
+  int wrapped = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    const VectorXd q = DrawPositions(model, &random);
+    terms.SetState(q, VectorXd::Zero(model.num_velocities()));
+    adapter.SetPositions(q, data->qpos);
+    mj_forward(engine.get(), data.get());
+    wrapped += data->ten_wrapnum[0] == 4 ? 1 : 0;  // hook, two points on the post, tip
+    VectorXd passive(model.num_joints());
+    for (int i = 0; i < model.num_joints(); ++i)
+      passive[i] = data->qfrc_passive[adapter.joint_dofs()[static_cast<size_t>(i)]];
+    constexpr double kScale = 1000.0;  // N m: some metres of 100 N/m on some metres
+    EXPECT_TRUE(MatrixNear(terms.friction(), -passive, kRounding * kScale));
+    EXPECT_GT(passive.norm(), 1.0);
+  }
+  EXPECT_GT(wrapped, 3);
+}
+
 }  // namespace
 }  // namespace dexcheck

@@ -91,6 +91,20 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"impedance", {"plant.contact_impedance=1"}, "contact_impedance: must be less than 1"},
         BadInput{"no_such_bound", {"bounds.slip=1"}, "bounds.slip: no check has this name"},
         BadInput{"bad_trajectory", {"trajectory.type=loop"}, "trajectory.type: must be one of"},
+        BadInput{"unknown_law", {"control.law=pid"}, "control.law: must be one of"},
+        BadInput{"law_without_stiffness",
+                 {"control.stiffness=100"},
+                 "control.stiffness: has no meaning for the law \"computed_torque\""},
+        BadInput{"impedance_with_damping",
+                 {"control.law=impedance", "control.damping=100"},
+                 "control.damping: has no meaning for the law \"impedance\""},
+        BadInput{"negative_stiffness",
+                 {"control.law=pd_gravity", "control.stiffness=[1, 1, -1, 1, 1, 1]"},
+                 "control.stiffness: must not be negative"},
+        BadInput{"unknown_plant", {"plant.type=soft"}, "plant.type: must be one of"},
+        BadInput{"engine_key_of_a_rigid_plant",
+                 {"plant.type=rigid", "plant.impratio=3"},
+                 "plant.impratio: has no meaning for a rigid plant"},
         BadInput{"model_value", {"model.object.mass=-1"}, "object.mass"},
         BadInput{"model_key", {"model.object.weight=1"}, "object.weight: unknown key"},
         BadInput{"singular_angles", {"grasp.zyz_deg=[90, -105, 0]"}, "take \"rotation\""}),
@@ -117,6 +131,47 @@ TEST(ListMjcfFiles, RefusesFilesFromElsewhere) {
   WriteText(folder.path().parent_path() / "b.xml", "<mujoco/>");
   EXPECT_THROW(ListMjcfFiles(folder.path() / "a.xml"), InputError);
   std::filesystem::remove(folder.path().parent_path() / "b.xml");
+  for (const char* file : {"sub/../../b.xml", "/b.xml", "sub/../.."}) {
+    WriteText(folder.path() / "a.xml",
+              std::string("<mujoco><asset><mesh file=\"") + file + "\"/></asset></mujoco>");
+    EXPECT_THROW(ListMjcfFiles(folder.path() / "a.xml"), InputError) << file;
+    WriteText(folder.path() / "a.xml", std::string("<mujoco><include file=\"") + file + "\"/></mujoco>");
+    EXPECT_THROW(ListMjcfFiles(folder.path() / "a.xml"), InputError) << file;
+  }
+}
+
+// Text of any length and depth, and XML as it may be written: other quotes, order, blanks, marks in values.
+TEST(ListMjcfFiles, ReadsAnyXml) {
+  const TempFolder folder;
+  std::string vertices;
+  for (int i = 0; i < 300000; ++i) vertices += "0.25 ";
+  WriteText(folder.path() / "a.xml",
+            "<mujoco>\n<compiler texturedir='looks' meshdir=\n\"shapes\"/><asset>\n"
+            "<mesh name=\"a > b\" vertex=\"" +
+                vertices +
+                "\"/>\n"
+                "<mesh scale='1 1 1'\n file = 'x &amp; y.stl' name=\"<include file='no.xml'>\"/>\n"
+                "<hfield file=\"h.png\"/><texture fileright=\"r.png\" fileleft=\"l.png\"/></asset>\n"
+                "<worldbody><body><body><include file=\"b.xml\"></include></body></body></worldbody>\n"
+                "<!-- <include file=\"gone.xml\"/> --><![CDATA[<mesh file=\"gone.stl\"/>]]></mujoco>");
+  WriteText(folder.path() / "b.xml",
+            "<mujocoinclude><include file='./a.xml'/><skin file=\"s.skn\"/></mujocoinclude>");
+  EXPECT_EQ(ListMjcfFiles(folder.path() / "a.xml"),
+            (std::vector<std::string>{"a.xml", "b.xml", "looks/l.png", "looks/r.png", "shapes/h.png",
+                                      "shapes/s.skn", "shapes/x & y.stl"}));
+
+  WriteText(folder.path() / "stripped.xml",
+            "<mujoco><compiler strippath=\"true\" meshdir=\"shapes\"/><asset><mesh "
+            "file=\"../far/x.stl\"/></asset></mujoco>");
+  EXPECT_EQ(ListMjcfFiles(folder.path() / "stripped.xml"),
+            (std::vector<std::string>{"stripped.xml", "shapes/x.stl"}));
+
+  std::string deep;
+  for (int i = 0; i < 100000; ++i) deep += "<body>";
+  for (const std::string& broken : {deep, std::string("<mujoco><mesh file=\"a\""), std::string()}) {
+    WriteText(folder.path() / "broken.xml", broken);
+    EXPECT_THROW(ListMjcfFiles(folder.path() / "broken.xml"), InputError) << broken.size();
+  }
 }
 
 }  // namespace

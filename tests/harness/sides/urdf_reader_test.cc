@@ -114,6 +114,29 @@ INSTANTIATE_TEST_SUITE_P(
                       Mistake{"Flange", "0 0 0.107", "0 0 0.108", "frame_pose"}),
     [](const auto& named) { return named.param.name; });
 
+// A coupling that both sides have is compared; one that only the MJCF has is a disagreement.
+TEST(Urdf, CouplingsAreComparedWithTheMjcfs) {
+  std::string mjcf = testing::ReadText(testing::SourcePath("/mjcf/panda.xml"));
+  const std::string end = "</mujoco>";
+  mjcf.replace(mjcf.rfind(end), end.size(),
+               "<equality><joint name=\"tied\" joint1=\"panda_joint3\" joint2=\"panda_joint5\" "
+               "polycoef=\"0.1 0.5 0 0 0\"/></equality></mujoco>");
+  const MjModelPtr engine = LoadMjcfText(mjcf, "text");
+  const std::string urdf = testing::MakePandaUrdf();
+  EXPECT_EQ(ListFailures(urdf, *engine), "equality_constraint ");
+  const auto couple = [&](const std::string& mimic) {
+    std::string coupled = urdf;
+    const size_t joint = coupled.find("<joint name=\"panda_joint3\"");
+    EXPECT_NE(joint, std::string::npos);
+    return coupled.insert(coupled.find("<parent", joint), mimic);
+  };
+  EXPECT_EQ(
+      ListFailures(couple("<mimic joint=\"panda_joint5\" multiplier=\"0.5\" offset=\"0.1\"/>"), *engine), "");
+  EXPECT_EQ(
+      ListFailures(couple("<mimic joint=\"panda_joint5\" multiplier=\"0.6\" offset=\"0.1\"/>"), *engine),
+      "joint_coupling ");
+}
+
 // Two fingers with a coupled joint, a welded tip, odd names, and what URDFs leave out.
 constexpr const char* kHand = R"(<?xml version="1.0"?>
 <robot name="hand">

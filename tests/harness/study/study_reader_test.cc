@@ -47,6 +47,21 @@ TEST(StudyReader, ReadsEveryKey) {
   EXPECT_EQ(study.variations[0].values, (std::vector<double>{1, 10, 100}));
 }
 
+TEST(StudyReader, TextsAreValuesToo) {
+  const std::string text =
+      ReplaceOnce(ReplaceOnce(kStudy, "values = [5, 4.5]", "values = [\"mass\", \"identity\"]"),
+                  "control.K_v", "control.weight");
+  const Study study = ParseStudy(text, "study.toml");
+  EXPECT_EQ(study.variations[1].labels, (std::vector<std::string>{"mass", "identity"}));
+  EXPECT_EQ(study.variations[1].values, (std::vector<double>{0, 1}));
+  const std::vector<Trial> trials = ListTrials(study);
+  EXPECT_EQ(ListOverrides(study, trials[2]).back(), "control.weight=identity");
+  for (const char* mixed : {"values = [5, \"identity\"]", "values = [\"identity\", 5]"}) {
+    EXPECT_THROW(ParseStudy(ReplaceOnce(kStudy, "values = [5, 4.5]", mixed), "study.toml"), InputError)
+        << mixed;
+  }
+}
+
 TEST(StudyReader, TrialsAreTheProductTheLastKeyFastest) {
   const Study study = ParseStudy(kStudy, "study.toml");
   const std::vector<Trial> trials = ListTrials(study);

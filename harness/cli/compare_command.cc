@@ -1,0 +1,190 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/output_file.h"
+#include "harness/report/comparison_page.h"
+#include "harness/report/html.h"
+
+namespace dexcheck::cli {
+namespace {
+
+/// Signals that are printed unless --all is given.
+constexpr size_t kMostPrinted = 10;
+
+struct Request {
+  std::vector<std::string> run_folders;
+  RunComparisonOptions options;
+  std::optional<double> tolerance;  ///< With it, a difference is exit code 1.
+  bool all = false;
+  bool quiet = false;
+  std::string page;
+  std::string json;
+};
+
+std::string Show(const std::optional<double>& value) { return value ? FormatShort(*value) : "-"; }
+
+bool FailsAnywhere(const ComparedNumber& number) {
+  return std::find(number.fails.begin(), number.fails.end(), true) != number.fails.end();
+}
+
+void PrintNumbers(const std::vector<ComparedNumber>& numbers, bool all) {
+  size_t width = 0;
+  for (const ComparedNumber& number : numbers) width = std::max(width, number.name.size());
+  for (const ComparedNumber& number : numbers) {
+    if (!all && !FailsAnywhere(number)) continue;
+    std::string line = fmt::format("  {:<{}}", number.name, width);
+    for (size_t i = 0; i < number.values.size(); ++i)
+      line += fmt::format("  {:>9}{}", Show(number.values[i]), number.fails[i] ? "!" : " ");
+    line += fmt::format("  {:<4}", number.unit == "1" ? "" : number.unit);
+    for (size_t i = 1; i < number.values.size(); ++i)
+      line += fmt::format("  x {:<8}", Show(number.CalcRatio(i)));
+    fmt::print("{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
+  }
+}
+
+void PrintSignals(const RunComparison& comparison, bool all) {
+  const auto equal = std::count_if(comparison.signals.begin(), comparison.signals.end(),
+                                   [](const SignalDifference& signal) { return signal.difference == 0.0; });
+  fmt::print("\nsignals: {} of {} are equal bit for bit\n", equal, comparison.signals.size());
+  size_t printed = 0;
+  for (const SignalDifference& signal : comparison.signals) {
+    if (!all && (signal.difference == 0.0 || printed++ == kMostPrinted)) break;
+    const std::string name = signal.column.empty() ? signal.name : signal.name + "." + signal.column;
+    fmt::print("  {} - A  {:<32}  {:>9} {:<6}  {:>9} of its size, at {:.3f} s\n",
+               static_cast<char>('A' + signal.run), name, FormatShort(signal.difference),
+               signal.unit == "1" ? "" : signal.unit, FormatShort(signal.share()), signal.at_time);
+  }
+  if (!comparison.not_compared.empty())
+    fmt::print("  {} signals are not in all runs\n", comparison.not_compared.size());
+}
+
+void Print(const Request& request, const RunComparison& comparison) {
+  for (size_t i = 0; i < request.run_folders.size(); ++i) {
+    fmt::print("{}  {}: {}\n", static_cast<char>('A' + i), request.run_folders[i], comparison.verdicts[i]);
+  }
+  fmt::print("\ninputs{}\n", comparison.inputs.empty() ? ": the same" : "");
+  for (const InputDifference& input : comparison.inputs) {
+    fmt::print("  {}\n", input.name);
+    for (size_t i = 0; i < input.values.size(); ++i)
+      fmt::print("    {}  {}\n", static_cast<char>('A' + i),
+                 input.values[i].empty() ? "none" : input.values[i]);
+  }
+  fmt::print("\nresults\n");
+  PrintNumbers(comparison.results, true);
+  const auto failing = std::count_if(comparison.checks.begin(), comparison.checks.end(), FailsAnywhere);
+  fmt::print("\nchecks: {} of {} are above their bounds (!)\n", failing, comparison.checks.size());
+  PrintNumbers(comparison.checks, request.all);
+  PrintSignals(comparison, request.all);
+}
+
+nlohmann::ordered_json ToJson(const Request& request, const RunComparison& comparison) {
+  nlohmann::ordered_json json;
+  json["runs"] = request.run_folders;
+  json["verdicts"] = comparison.verdicts;
+  json["tolerance"] = request.options.tolerance;
+  json["same"] = comparison.IsSame();
+  json["inputs"] = nlohmann::ordered_json::object();
+  for (const InputDifference& input : comparison.inputs) json["inputs"][input.name] = input.values;
+  const auto add = [&](const char* key, const std::vector<ComparedNumber>& numbers) {
+    json[key] = nlohmann::ordered_json::object();
+    for (const ComparedNumber& number : numbers) {
+      nlohmann::ordered_json values = nlohmann::ordered_json::array();
+      for (const std::optional<double>& value : number.values) {
+        values.push_back(value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json());
+      }
+      json[key][number.name] = {{"unit", number.unit}, {"values", values}};
+    }
+  };
+  add("results", comparison.results);
+  add("checks", comparison.checks);
+  json["signals"] = nlohmann::ordered_json::array();
+  for (const SignalDifference& signal : comparison.signals) {
+    json["signals"].push_back({{"name", signal.name},
+                               {"column", signal.column},
+                               {"run", request.run_folders[signal.run]},
+                               {"unit", signal.unit},
+                               {"difference", signal.difference},
+                               {"size", signal.size},
+                               {"at_time_s", signal.at_time},
+                               {"differs", signal.differs}});
+  }
+  json["not_compared"] = comparison.not_compared;
+  return json;
+}
+
+int Run(const Request& request) {
+  if (request.tolerance && !(*request.tolerance >= 0.0 && std::isfinite(*request.tolerance)))
+    throw InputError("--tolerance: must not be negative, got " + FormatNumber(*request.tolerance));
+  if (request.run_folders.size() < 2) throw InputError("compare: at least two runs are needed");
+  if (request.run_folders.size() > 26) throw InputError("compare: at most 26 runs are compared");
+  std::vector<std::unique_ptr<RunData>> runs;
+  std::vector<const RunData*> pointers;
+  for (const std::string& folder : request.run_folders) {
+    runs.push_back(std::make_unique<RunData>(folder));
+    pointers.push_back(runs.back().get());
+  }
+  std::optional<OutputFile> page;
+  std::optional<OutputFile> json;
+  if (!request.page.empty()) {
+    RequirePageName(request.page);
+    page.emplace(request.page);
+  }
+  if (!request.json.empty()) json.emplace(request.json);
+  const RunComparison comparison = CompareRuns(pointers, request.options);
+  const bool prints = !json || !json->is_stdout();
+  if (prints && !request.quiet) Print(request, comparison);
+  if (prints)
+    fmt::print("{}{}\n", request.quiet ? "" : "\n",
+               DescribeComparison(comparison, request.options.tolerance));
+  if (json) json->Write(ToJson(request, comparison).dump(1) + "\n");
+  if (page) {
+    page->Write(MakeComparisonPage(pointers, request.run_folders, comparison));
+    if (prints && !request.quiet) fmt::print("page: {}\n", request.page);
+  }
+  return request.tolerance && !comparison.IsSame() ? kDisagreement : kSuccess;
+}
+
+}  // namespace
+
+void AddCompareCommand(Command app) {
+  const auto request = std::make_shared<Request>();
+  Command command = app.AddCommand("compare", "Compare recorded runs: inputs, results, checks and signals");
+  command
+      .AddOption("RUN_DIR", &request->run_folders,
+                 "Folders of runs; the first is what the others are compared with")
+      .Required()
+      .TypeName("RUN_DIR...");
+  command
+      .AddOption(
+          "--tolerance", &request->tolerance,
+          "Exit with 1 when a signal differs by more than this share of its size, or a verdict differs")
+      .TypeName("REL");
+  command
+      .AddOption("--signals", &request->options.patterns,
+                 "Only these signals; * stands for any text: object/*,tau")
+      .TypeName("A,B,...")
+      .Delimiter(',')
+      .Repeatable();
+  command.AddOption("--out", &request->page, "Write a page with the signals overlaid and subtracted")
+      .TypeName("FILE.html");
+  command.AddOption("--json", &request->json, "Write the numbers (- for standard output)")
+      .TypeName("FILE.json");
+  command.AddFlag("--all", &request->all, "Print all checks and signals");
+  command.AddFlag("--quiet", &request->quiet, "Print the last line only");
+  command.SetAction([=] {
+    request->options.tolerance = request->tolerance.value_or(0.0);
+    return Run(*request);
+  });
+}
+
+}  // namespace dexcheck::cli

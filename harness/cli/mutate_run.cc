@@ -1,0 +1,152 @@
+#include "harness/cli/mutate_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "harness/base/interrupts.h"
+#include "harness/cli/command_line.h"
+#include "harness/cli/json_matrix.h"
+#include "harness/cli/output_file.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/cli/run_folder.h"
+#include "harness/run/run_mutation.h"
+
+namespace dexcheck::cli {
+namespace {
+
+/// A line of the table.
+struct Row {
+  std::string kind;
+  int mutants = 0, refused = 0, killed = 0, survived = 0, cause = 0, with_part = 0, part = 0;
+
+  void Add(const RunMutant& mutant) {
+    ++mutants;
+    refused += mutant.refused ? 1 : 0;
+    if (mutant.refused) return;
+    killed += mutant.killed ? 1 : 0;
+    survived += mutant.killed ? 0 : 1;
+    cause += mutant.has_right_cause() ? 1 : 0;
+    if (mutant.part.empty()) return;
+    ++with_part;
+    part += mutant.has_right_cause() && mutant.names_part ? 1 : 0;
+  }
+};
+
+std::vector<Row> SumUp(const std::vector<RunMutant>& mutants, size_t done) {
+  std::vector<Row> rows;
+  Row all;
+  all.kind = "all";
+  for (size_t i = 0; i < done; ++i) {
+    auto row = std::find_if(rows.begin(), rows.end(), [&](const Row& r) { return r.kind == mutants[i].kind; });
+    if (row == rows.end()) {
+      row = rows.insert(rows.end(), Row{});
+      row->kind = mutants[i].kind;
+    }
+    row->Add(mutants[i]);
+    all.Add(mutants[i]);
+  }
+  rows.push_back(all);
+  return rows;
+}
+
+const char* FateOf(const RunMutant& mutant) {
+  if (mutant.refused) return "refused";
+  return mutant.killed ? "killed" : "survived";
+}
+
+/// What the table does not say: mistakes that were not found, or whose cause or part is another.
+void PrintExceptions(const std::vector<RunMutant>& mutants, size_t done) {
+  for (size_t i = 0; i < done; ++i) {
+    const RunMutant& mutant = mutants[i];
+    if (mutant.refused) {
+      fmt::print("refused: {}: {}\n", mutant.name, mutant.failure);
+    } else if (!mutant.killed) {
+      fmt::print("survived: {}{}\n", mutant.name,
+                 mutant.is_as_expected ? ""
+                                       : fmt::format(", though the object is {:.1e} m off", mutant.position_error));
+    } else if (!mutant.has_right_cause()) {
+      fmt::print("cause: {}: expected {}, told {} ({})\n", mutant.name, NameOf(mutant.expected), NameOf(mutant.cause),
+                 mutant.evidence);
+    } else if (!mutant.names_part) {
+      fmt::print("part: {}: expected {}, told {}\n", mutant.name, mutant.part, mutant.evidence);
+    }
+  }
+}
+
+void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t done) {
+  const std::vector<Row> rows = SumUp(campaign.mutants(), done);
+  const Row& all = rows.back();
+  if (!request.quiet) {
+    fmt::print("{:<18}{:>9}{:>9}{:>9}{:>10}{:>13}{:>12}\n", "what was wrong", "mistakes", "found", "refused",
+               "survived", "cause right", "part named");
+    for (const Row& row : rows) {
+      fmt::print("{:<18}{:>9}{:>9}{:>9}{:>10}{:>13}{:>12}\n", row.kind, row.mutants, row.killed, row.refused,
+                 row.survived, row.cause, row.with_part > 0 ? fmt::format("{} of {}", row.part, row.with_part) : "");
+    }
+    PrintExceptions(campaign.mutants(), done);
+    fmt::print("\n");
+  }
+  if (done < campaign.mutants().size())
+    fmt::print("INTERRUPTED after {} of {} mistakes. So far:\n", done, campaign.mutants().size());
+  const int possible = all.mutants - all.refused;
+  fmt::print("{}: {} of {} mistakes that are possible were found; the cause is right in {}, the part in {} of {}.\n",
+             all.survived == 0 ? "ALL FOUND" : "SURVIVORS", all.killed, possible, all.cause, all.part, all.with_part);
+}
+
+std::string ToText(const MutateRunRequest& request, const RunCampaign& campaign, size_t done) {
+  Json json = {{"scenario", request.scenario},
+               {"overrides", request.overrides},
+               {"from_s", request.options.from},
+               {"duration_s", request.options.duration},
+               {"scale", request.options.scale},
+               {"complete", done == campaign.mutants().size()}};
+  json["kinds"] = Json::object();
+  for (const Row& row : SumUp(campaign.mutants(), done)) {
+    json["kinds"][row.kind] = {{"mistakes", row.mutants},     {"found", row.killed},
+                               {"refused", row.refused},      {"survived", row.survived},
+                               {"cause_right", row.cause},    {"part_named", row.part},
+                               {"with_a_part", row.with_part}};
+  }
+  json["mistakes"] = Json::array();
+  for (size_t i = 0; i < done; ++i) {
+    const RunMutant& mutant = campaign.mutants()[i];
+    json["mistakes"].push_back({{"kind", mutant.kind},
+                                {"name", mutant.name},
+                                {"fate", FateOf(mutant)},
+                                {"expected_cause", NameOf(mutant.expected)},
+                                {"cause", NameOf(mutant.cause)},
+                                {"expected_part", mutant.part},
+                                {"part_named", mutant.names_part},
+                                {"evidence", mutant.evidence},
+                                {"failure", mutant.failure},
+                                {"failed_checks", mutant.failed_checks},
+                                {"position_error_max_m", mutant.position_error}});
+  }
+  return json.dump(2) + "\n";
+}
+
+}  // namespace
+
+int MutateRun(const MutateRunRequest& request) {
+  const ScenarioFiles files = FindScenario(request.scenario, request.overrides, /*seed=*/0);
+  CatchInterrupts();
+  std::optional<OutputFile> json;
+  if (!request.json_file.empty()) json.emplace(request.json_file);
+  RunCampaign campaign(files.scenario, files.robot, files.mjcf, request.options, IsInterrupted);
+  const size_t total = campaign.mutants().size();
+  ProgressBar bar("changing", static_cast<long>(total), request.quiet || request.json_file == "-");
+  size_t done = 0;
+  while (done < total && !IsInterrupted() && campaign.Run(done, IsInterrupted)) {
+    ++done;
+    bar.Update(static_cast<long>(done));
+  }
+  bar.Finish();
+  if (json) json->Write(ToText(request, campaign, done));
+  if (request.json_file != "-") Print(request, campaign, done);
+  if (done < total) return kFailure;
+  return SumUp(campaign.mutants(), done).back().survived > 0 ? kDisagreement : kSuccess;
+}
+
+}  // namespace dexcheck::cli

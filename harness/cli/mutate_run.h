@@ -1,0 +1,24 @@
+#pragma once
+
+// `dexcheck mutate --run SCENARIO`: mistakes in a run.
+
+#include <string>
+#include <vector>
+
+#include "harness/run/run_mutation_options.h"
+
+namespace dexcheck::cli {
+
+struct MutateRunRequest {
+  std::string scenario;
+  std::vector<std::string> overrides;
+  RunMutationOptions options;
+  std::string json_file;
+  bool quiet = false;
+};
+
+/// Makes every mistake, prints the table, writes the JSON. @returns the exit code: 1 when one was not found, 3
+/// when it was interrupted. @throws InputError.
+int MutateRun(const MutateRunRequest& request);
+
+}  // namespace dexcheck::cli

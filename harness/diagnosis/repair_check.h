@@ -1,0 +1,44 @@
+#pragma once
+
+// Whether a repair, in the precision in which it is printed, makes what it repairs agree.
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "harness/diagnosis/cause.h"
+#include "harness/gate/static_gate.h"
+
+namespace dexcheck {
+
+/// The number of the parameter file that a constant of the static gate is, when it can be read there at once.
+std::optional<Parameter> FindParameter(const RobotSpec& spec, const GateFinding& finding);
+
+/// Holds repairs against the engine.
+class RepairCheck {
+ public:
+  /// @param original the model as it is in the file. @param bodies whether the engine's bodies may be read.
+  RepairCheck(RobotSpec original, const mjModel& engine, std::string engine_source, int samples,
+              std::uint64_t seed, bool bodies);
+
+  /// Takes out the causes whose part (joint row, frame, body, constant) does not agree after all of them are
+  /// applied, until all that stay do; and equivalents that do not do as well.
+  void KeepWhatRepairs(std::vector<Cause>* causes) const;
+
+ private:
+  struct Trial;
+  [[nodiscard]] bool Repairs(const Cause& cause, const Trial& trial) const;
+  [[nodiscard]] bool RepairsNumber(const Parameter& parameter, const Trial& trial) const;
+  /// The original with the causes' repairs, in their order; nothing when that is no robot.
+  [[nodiscard]] std::optional<RobotSpec> Repair(std::span<const Cause> causes) const;
+
+  RobotSpec original_;
+  const mjModel& engine_;
+  std::string source_;
+  int samples_;
+  std::uint64_t seed_;
+  bool bodies_;
+};
+
+}  // namespace dexcheck

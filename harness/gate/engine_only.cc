@@ -1,0 +1,306 @@
+#include "harness/gate/engine_only.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <span>
+#include <string>
+
+#include "harness/engine/engine.h"
+#include "harness/engine/torus_collision.h"
+
+namespace dexcheck {
+namespace {
+
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+// Places are sums of a few rotated lengths of the robot's size.
+constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
+
+/// Hard fingers and wheels (20): a normal force and friction along the surface.
+constexpr int kHardContact = 3;
+
+std::string List(const mjtNum* values, int count) {
+  return fmt::format("{:.17g}", fmt::join(values, values + count, " "));
+}
+
+class EngineOnly {
+ public:
+  EngineOnly(const Adapter& adapter, GateResult* result)
+      : adapter_(adapter), engine_(adapter.engine()), result_(result) {}
+
+  void Run() {
+    FindTendonForces();
+    FindConstraints();
+    FindMotors();
+    FindFlags();
+    ComparePairs();
+    if (!adapter_.wheels().empty()) CompareFloor();
+    NoteContactsByType();
+    NoteSettings();
+  }
+
+ private:
+  /// A number that must be `neutral`.
+  void Expect(const std::string& check, const std::string& where, double neutral, double engine,
+              double tolerance = 0.0) {
+    auto& records = result_->records;
+    auto record = std::find_if(records.begin(), records.end(),
+                               [&](const CheckRecord& one) { return one.name == check; });
+    if (record == records.end()) {
+      record = records.insert(record, CheckRecord{});
+      record->name = check;
+      record->bound = kRounding;
+    }
+    double error = std::abs(engine - neutral);
+    if (error <= tolerance) error = 0.0;
+    // How large a force may be that should not be there is nothing that a relative tolerance says.
+    if (tolerance == 0.0 && error > 0.0) error /= std::max(std::abs(engine), std::abs(neutral));
+    if (!(record->CompareError(error, neutral, engine, {}, -1) <= kRounding))
+      result_->findings.push_back({check, where, neutral, engine, {}, 0, true});
+  }
+
+  void Note(const std::string& kind, std::string text) { result_->notes.push_back({kind, std::move(text)}); }
+
+  [[nodiscard]] std::string Name(mjtObj type, const char* kind, int id) const {
+    return std::string(kind) + " " + NameOf(engine_, type, id);
+  }
+  [[nodiscard]] std::string GeomName(int geom) const { return Name(mjOBJ_GEOM, "geom", geom); }
+
+  void FindTendonForces() {
+    for (int i = 0; i < engine_.ntendon; ++i) {
+      const std::string where = Name(mjOBJ_TENDON, "tendon", i);
+      Expect("tendon_spring", where, 0.0, engine_.tendon_stiffness[i]);
+      Expect("tendon_damping", where, 0.0, engine_.tendon_damping[i]);
+      Expect("tendon_friction", where, 0.0, engine_.tendon_frictionloss[i]);
+      Expect("tendon_limit", where, 0.0, engine_.tendon_limited[i] != 0 ? 1.0 : 0.0);
+    }
+  }
+
+  void FindConstraints() {
+    for (int i = 0; i < engine_.neq; ++i) {
+      Expect("equality_constraint", Name(mjOBJ_EQUALITY, "constraint", i), 0.0,
+             engine_.eq_active[i] != 0 ? 1.0 : 0.0);
+    }
+  }
+
+  /// A motor is a torque on its joint: gear times control. The plant divides by the gear.
+  void FindMotors() {
+    for (int i = 0; i < engine_.nu; ++i) {
+      const std::string where = Name(mjOBJ_ACTUATOR, "actuator", i);
+      const int transmission = engine_.actuator_trntype[i];
+      const mjtNum* const gear = engine_.actuator_gear + 6 * i;
+      Expect("motor_transmission", where, mjTRN_JOINT,
+             transmission == mjTRN_JOINTINPARENT ? mjTRN_JOINT : transmission);
+      Expect("motor_dynamics", where, mjDYN_NONE, engine_.actuator_dyntype[i]);
+      const bool fixed = engine_.actuator_gaintype[i] == mjGAIN_FIXED && gear[0] != 0.0;
+      Expect("motor_gain", where, 1.0,
+             fixed ? engine_.actuator_gainprm[mjNGAIN * i] : std::numeric_limits<double>::quiet_NaN());
+      Expect("motor_bias", where, mjBIAS_NONE, engine_.actuator_biastype[i]);
+      if (engine_.actuator_ctrllimited[i] != 0)
+        Note("motor_limit",
+             fmt::format("{}: control from {}", where, List(engine_.actuator_ctrlrange + 2 * i, 2)));
+      if (engine_.actuator_forcelimited[i] != 0)
+        Note("motor_limit",
+             fmt::format("{}: force from {}", where, List(engine_.actuator_forcerange + 2 * i, 2)));
+    }
+  }
+
+  void FindFlags() {
+    // Sensors measure only; so do the energy, the comparison with the inverse dynamics and sensors' noise.
+    constexpr int kHarmlessToDisable = mjDSBL_SENSOR;
+    constexpr int kHarmlessToEnable = mjENBL_ENERGY | mjENBL_FWDINV | mjENBL_SENSORNOISE;
+    const auto find = [&](const char* check, std::span<const char* const> names, int flags, int harmless) {
+      for (size_t i = 0; i < names.size(); ++i) {
+        const int flag = 1 << i;
+        if ((flag & harmless) == 0) Expect(check, names[i], 0.0, (flags & flag) != 0 ? 1.0 : 0.0);
+      }
+      const int unknown = flags & ~((1 << names.size()) - 1);
+      Expect(check, "unknown flag", 0.0, unknown);
+    };
+    find("disable_flag", {mjDISABLESTRING, mjNDISABLE}, engine_.opt.disableflags, kHarmlessToDisable);
+    find("enable_flag", {mjENABLESTRING, mjNENABLE}, engine_.opt.enableflags, kHarmlessToEnable);
+  }
+
+  [[nodiscard]] bool IsObject(int geom) const {
+    return adapter_.object_body() >= 0 && engine_.geom_bodyid[geom] == adapter_.object_body();
+  }
+  [[nodiscard]] bool IsWorld(int geom) const { return engine_.body_weldid[engine_.geom_bodyid[geom]] == 0; }
+  [[nodiscard]] bool IsWheel(int geom) const {
+    return std::any_of(adapter_.wheels().begin(), adapter_.wheels().end(), [&](const EngineWheel& wheel) {
+      return engine_.geom_bodyid[geom] == engine_.jnt_bodyid[wheel.joint];
+    });
+  }
+  [[nodiscard]] bool IsFingertip(int geom) const {
+    const auto& tips = adapter_.model().fingertips();
+    return std::any_of(tips.begin(), tips.end(), [&](int frame) {
+      return engine_.site_bodyid[adapter_.frame_sites()[static_cast<size_t>(frame)]] ==
+             engine_.geom_bodyid[geom];
+    });
+  }
+
+  [[nodiscard]] std::string DescribeGeom(int geom) const {
+    return fmt::format("{} (type {}, size {}, pos {}, quat {})", GeomName(geom), engine_.geom_type[geom],
+                       List(engine_.geom_size + 3 * geom, 3), List(engine_.geom_pos + 3 * geom, 3),
+                       List(engine_.geom_quat + 4 * geom, 4));
+  }
+
+  /// Explicit contact pairs: nothing acts at a distance, fingers and wheels are hard, and all else of the
+  /// robot that touches the world slides without friction.
+  void ComparePairs() {
+    std::set<int> meshes;
+    for (int pair = 0; pair < engine_.npair; ++pair) {
+      const std::string where = Name(mjOBJ_PAIR, "pair", pair);
+      const int geoms[2] = {engine_.pair_geom1[pair], engine_.pair_geom2[pair]};
+      const mjtNum* const friction = engine_.pair_friction + 5 * pair;
+      const int dim = engine_.pair_dim[pair];
+      Expect("contact_margin", where, 0.0, engine_.pair_margin[pair]);
+      Expect("contact_margin", where, 0.0, engine_.pair_gap[pair]);
+      for (int k = 0; k < 2; ++k) {
+        const int own = geoms[k];
+        const int other = geoms[1 - k];
+        if (engine_.geom_type[own] == mjGEOM_MESH || engine_.geom_type[own] == mjGEOM_HFIELD)
+          meshes.insert(own);
+        const bool hard = (IsFingertip(own) && IsObject(other)) || (IsWheel(own) && IsWorld(other));
+        if (hard) Expect("contact_dimension", where, kHardContact, dim);
+        const bool rubs =
+            IsWorld(other) && !IsWorld(own) && !IsObject(own) && !IsWheel(own) && !IsFingertip(own);
+        if (rubs) Expect("contact_rubbing", where, 0.0, dim > 1 ? std::max(friction[0], friction[1]) : 0.0);
+      }
+      Note("contact_pair",
+           fmt::format("{}: {} and {}: dimension {}, friction {}, margin {:.17g}, gap {:.17g}", where,
+                       DescribeGeom(geoms[0]), DescribeGeom(geoms[1]), dim, List(friction, 5),
+                       engine_.pair_margin[pair], engine_.pair_gap[pair]));
+    }
+    for (const int geom : meshes) NoteMesh(geom);
+  }
+
+  /// The engine collides a mesh as its convex hull.
+  void NoteMesh(int geom) {
+    const int id = engine_.geom_dataid[geom];
+    double sum = 0.0;
+    if (engine_.geom_type[geom] == mjGEOM_MESH) {
+      const float* const first = engine_.mesh_vert + 3 * engine_.mesh_vertadr[id];
+      for (int k = 0; k < 3 * engine_.mesh_vertnum[id]; ++k) sum += std::abs(static_cast<double>(first[k]));
+    } else {
+      const float* const first = engine_.hfield_data + engine_.hfield_adr[id];
+      for (int k = 0; k < engine_.hfield_nrow[id] * engine_.hfield_ncol[id]; ++k)
+        sum += std::abs(static_cast<double>(first[k]));
+      for (int k = 0; k < 4; ++k) sum += engine_.hfield_size[4 * id + k];
+    }
+    Note("mesh_contacts",
+         fmt::format("{}: touches with its mesh's hull or height field{}; its coordinates "
+                     "add up to {:.17g}",
+                     GeomName(geom), IsTorus(geom) ? ", spheres and boxes with the exact torus" : "", sum));
+  }
+
+  [[nodiscard]] bool IsTorus(int geom) const {
+    double ring_radius = 0.0;
+    double tube_radius = 0.0;
+    return GetTorusRadii(engine_, geom, &ring_radius, &tube_radius);
+  }
+
+  /// The wheels are round about the axle and stand on a level floor.
+  void CompareFloor() {
+    const MjDataPtr data = MakeData(engine_);
+    mj_kinematics(&engine_, data.get());
+    const auto place = [&](int geom) {
+      return Vector3d(Eigen::Map<const Vector3d>(data->geom_xpos + 3 * geom));
+    };
+    const auto axis = [&](int geom) {
+      return Vector3d(Eigen::Map<const RowMatrix3d>(data->geom_xmat + 9 * geom).col(2));
+    };
+    for (const EngineWheel& wheel : adapter_.wheels()) {
+      const Vector3d center = adapter_.model().base().X_B0 * wheel.center;
+      const double tolerance = kRounding * std::max(1.0, center.norm());
+      for (int geom = 0; geom < engine_.ngeom; ++geom) {
+        if (engine_.geom_bodyid[geom] != engine_.jnt_bodyid[wheel.joint] || !Touches(geom)) continue;
+        Expect("wheel_geom_place", GeomName(geom), 0.0, (place(geom) - center).norm(), tolerance);
+        if (engine_.geom_type[geom] != mjGEOM_SPHERE)
+          Expect("wheel_geom_place", GeomName(geom), 1.0, std::abs(axis(geom).dot(wheel.axis)), tolerance);
+        for (const int floor : FindFloors(geom)) {
+          Expect("floor_pose", GeomName(floor), 1.0, axis(floor).z(), tolerance);
+          Expect("floor_pose", GeomName(floor), 0.0, axis(floor).head<2>().norm(), tolerance);
+          Expect("floor_pose", GeomName(floor), center.z() - wheel.radius, place(floor).z(), tolerance);
+        }
+      }
+    }
+  }
+
+  /// Whether a geom takes part in contacts as the option "collision" has it.
+  [[nodiscard]] bool Touches(int geom) const {
+    bool touches = false;
+    for (int pair = 0; pair < engine_.npair; ++pair)
+      touches |= engine_.pair_geom1[pair] == geom || engine_.pair_geom2[pair] == geom;
+    const bool by_type = engine_.geom_contype[geom] != 0 || engine_.geom_conaffinity[geom] != 0;
+    return (touches && engine_.opt.collision != mjCOL_DYNAMIC) ||
+           (by_type && engine_.opt.collision != mjCOL_PAIR);
+  }
+
+  /// Planes that a geom has a contact pair with.
+  [[nodiscard]] std::set<int> FindFloors(int geom) const {
+    std::set<int> floors;
+    for (int pair = 0; pair < engine_.npair; ++pair) {
+      const int geoms[2] = {engine_.pair_geom1[pair], engine_.pair_geom2[pair]};
+      for (int k = 0; k < 2; ++k) {
+        if (geoms[k] == geom && engine_.geom_type[geoms[1 - k]] == mjGEOM_PLANE) floors.insert(geoms[1 - k]);
+      }
+    }
+    return floors;
+  }
+
+  void NoteContactsByType() {
+    if (engine_.opt.collision == mjCOL_PAIR) return;
+    Note("contacts_by_type",
+         fmt::format("option collision {}: geoms touch by contype and conaffinity, but {} pairs of bodies",
+                     engine_.opt.collision, engine_.nexclude));
+    for (int geom = 0; geom < engine_.ngeom; ++geom) {
+      if (engine_.geom_contype[geom] == 0 && engine_.geom_conaffinity[geom] == 0) continue;
+      Note("contacts_by_type",
+           fmt::format("{}: contype {}, conaffinity {}, condim {}, priority {}, friction {}, margin {:.17g}, "
+                       "gap {:.17g}, "
+                       "solmix {:.17g}, solref {}, solimp {}",
+                       DescribeGeom(geom), engine_.geom_contype[geom], engine_.geom_conaffinity[geom],
+                       engine_.geom_condim[geom], engine_.geom_priority[geom],
+                       List(engine_.geom_friction + 3 * geom, 3), engine_.geom_margin[geom],
+                       engine_.geom_gap[geom], engine_.geom_solmix[geom],
+                       List(engine_.geom_solref + mjNREF * geom, mjNREF),
+                       List(engine_.geom_solimp + mjNIMP * geom, mjNIMP)));
+    }
+    for (int i = 0; i < engine_.nexclude; ++i) {
+      const int signature = engine_.exclude_signature[i];  // (body1 << 16) + body2
+      Note("contacts_by_type",
+           fmt::format("excluded: {} and {}", NameOf(engine_, mjOBJ_BODY, signature >> 16),
+                       NameOf(engine_, mjOBJ_BODY, signature & 0xffff)));
+    }
+  }
+
+  void NoteSettings() {
+    const mjOption& option = engine_.opt;
+    Note("overridden",
+         fmt::format(
+             "a run sets the time step ({:.17g} s here), impratio ({:.17g}), noslip iterations ({}) and "
+             "the stiffness of all contact pairs; joint damping acts as an explicit force",
+             option.timestep, option.impratio, option.noslip_iterations));
+    Note("solver", fmt::format("integrator {}, cone {}, jacobian {}, solver {}, iterations {}, tolerance "
+                               "{:.17g}, noslip tolerance {:.17g}, "
+                               "mpr iterations {}, mpr tolerance {:.17g}, mean inertia {:.17g}",
+                               option.integrator, option.cone, option.jacobian, option.solver,
+                               option.iterations, option.tolerance, option.noslip_tolerance,
+                               option.mpr_iterations, option.mpr_tolerance, engine_.stat.meaninertia));
+  }
+
+  const Adapter& adapter_;
+  const mjModel& engine_;
+  GateResult* result_;
+};
+
+}  // namespace
+
+void FindEngineOnly(const Adapter& adapter, GateResult* result) { EngineOnly(adapter, result).Run(); }
+
+}  // namespace dexcheck

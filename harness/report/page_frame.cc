@@ -1,0 +1,52 @@
+#include "harness/report/page_frame.h"
+
+#include "harness/report/page_assets.h"
+#include "harness/report/page_plots.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr const char* kContentPolicy =
+    "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'; script-src "
+    "'unsafe-inline'";
+
+}  // namespace
+
+Html BeginPage(const std::string& title) {
+  return FormatHtml(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n<title>{}</title>\n"
+      "<link rel=\"icon\" href=\"data:,\">\n<style>\n{}\n{}</style>\n</head>\n<body>\n",
+      kContentPolicy, title, Html::Raw(kDygraphCss), Html::Raw(kPageCss));
+}
+
+Html MakePlotSection(const std::vector<Figure>& figures) {
+  Html html;
+  html +=
+      "<section id=\"plots\"><h2>Plots</h2>\n<div class=\"tools\"><button id=\"show-all\" "
+      "type=\"button\">Show the whole run</button><span class=\"soft\">Drag to zoom (all plots follow), "
+      "Shift-drag to move, double-click for the whole run; on a touch screen use two fingers. Names switch "
+      "curves on and off.</span></div>\n<div class=\"grid\">\n";
+  for (size_t i = 0; i < figures.size(); ++i) {
+    const Figure& figure = figures[i];
+    html += FormatHtml(
+        "<section class=\"card\" data-plot=\"{}\"><h3>{} {}<span class=\"soft number time\"></span></h3>"
+        "<div class=\"keys\"></div><div class=\"plot\"></div></section>\n",
+        i, figure.title,
+        figure.panel.empty() ? Html() : FormatHtml("<span class=\"panel\">Figure {}</span> ", figure.panel));
+  }
+  html += "</div></section>\n";
+  return html;
+}
+
+Html EndPage(const std::vector<Figure>& figures, const VectorXd& time) {
+  const PlotData data = MakePlotData(figures, time);
+  return FormatHtml(
+      "<script type=\"application/json\" id=\"run-plots\">{}</script>\n"
+      "<script type=\"text/plain\" id=\"run-values\">{}</script>\n"
+      "<script>\n{}\n</script>\n<script>\n{}</script>\n</body>\n</html>\n",
+      Html::Raw(data.json), Html::Raw(data.values), Html::Raw(kDygraphJs), Html::Raw(kPageJs));
+}
+
+}  // namespace dexcheck

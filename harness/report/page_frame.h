@@ -1,0 +1,22 @@
+#pragma once
+
+// What all pages with plots have around their content.
+
+#include <string>
+#include <vector>
+
+#include "harness/report/figure.h"
+#include "harness/report/html.h"
+
+namespace dexcheck {
+
+/// From the document's beginning to the beginning of its body, styles included.
+Html BeginPage(const std::string& title);
+
+/// The section with a plot for each figure; EndPage brings their numbers.
+Html MakePlotSection(const std::vector<Figure>& figures);
+
+/// The plots' numbers and scripts, and the document's end. @param time of the curves' values, s.
+Html EndPage(const std::vector<Figure>& figures, const VectorXd& time);
+
+}  // namespace dexcheck

@@ -1,0 +1,72 @@
+#include "harness/run/library_controller.h"
+
+#include <dlfcn.h>
+
+#include <exception>
+#include <filesystem>
+
+#include "controller/common/text.h"
+#include "harness/plant/plant.h"
+
+namespace dexcheck {
+namespace {
+
+template <typename Function>
+Function* FindFunction(void* handle, const char* name) {
+  return reinterpret_cast<Function*>(dlsym(handle, name));
+}
+
+}  // namespace
+
+void LibraryController::CloseLibrary::operator()(void* handle) const { dlclose(handle); }
+
+LibraryController::LibraryController(const std::string& library, const OwnControllerSetup& setup)
+    : name_("controller " + library), setup_(setup) {
+  // A bare name would be searched for among the system's libraries.
+  const std::string path = std::filesystem::absolute(library).string();
+  handle_.reset(dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL));
+  if (handle_ == nullptr) throw InputError("--controller: " + std::string(dlerror()));
+  const auto interface = FindFunction<const char*()>(handle_.get(), "dexcheck_controller_interface");
+  const auto make =
+      FindFunction<Controller*(const ControllerContext*)>(handle_.get(), "dexcheck_make_controller");
+  if (interface == nullptr || make == nullptr) {
+    throw InputError("--controller: " + library + ": names no controller (DEXCHECK_CONTROLLER is missing)");
+  }
+  const std::string built_for = interface();
+  if (built_for != DescribeControllerInterface()) {
+    throw InputError("--controller: " + library + ": was built for interface " + Quote(built_for) +
+                     ", this program has " + Quote(DescribeControllerInterface()));
+  }
+  const ControllerContext context{*setup_.model,   setup_.fingertips, setup_.object,
+                                  *setup_.surface, setup_.options,    setup_.sampling};
+  Guard([&] { controller_.reset(make(&context)); });
+  if (controller_ == nullptr) throw RunFailure(name_ + ": made no controller");
+}
+
+LibraryController::~LibraryController() = default;
+
+template <typename Work>
+void LibraryController::Guard(const Work& work) const {
+  try {
+    work();
+  } catch (const std::exception& error) {
+    throw RunFailure(name_ + ": " + error.what());
+  } catch (...) {
+    throw RunFailure(name_ + ": threw something that is no std::exception");
+  }
+}
+
+void LibraryController::Follow(const Trajectory& motion) {
+  Guard([&] { controller_->Follow(motion); });
+}
+
+void LibraryController::Begin(double t, const Reading& reading) {
+  Guard([&] { controller_->Begin(t, reading); });
+}
+
+void LibraryController::Step(const Reading& reading, double t, Command* command) {
+  Guard([&] { controller_->Step(reading, t, command); });
+  RequireTorques(name_, *command, setup_.model->num_velocities());
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,42 @@
+#pragma once
+
+// A controller of the user's own from a shared library.
+
+#include <memory>
+#include <string>
+
+#include "controller/control/controller.h"
+#include "harness/run/own_controller.h"
+
+namespace dexcheck {
+
+/// Loads a library (controller/control/controller_library.h). What it throws ends the run, with its words; a
+/// torque of the wrong size likewise.
+class LibraryController final : public Controller {
+ public:
+  /// @throws InputError when the library cannot be loaded, names no controller or was built for another
+  /// interface; RunFailure when its controller cannot be made.
+  LibraryController(const std::string& library, const OwnControllerSetup& setup);
+  ~LibraryController() override;
+
+  void Follow(const Trajectory& motion) override;
+  void Begin(double t, const Reading& reading) override;
+  void Step(const Reading& reading, double t, Command* command) override;
+  [[nodiscard]] bool is_done() const override { return controller_->is_done(); }
+  [[nodiscard]] const GraspModel& model() const override { return controller_->model(); }
+
+ private:
+  template <typename Work>
+  void Guard(const Work& work) const;
+
+  struct CloseLibrary {
+    void operator()(void* handle) const;
+  };
+
+  std::string name_;
+  OwnControllerSetup setup_;
+  std::unique_ptr<void, CloseLibrary> handle_;  // outlives the controller
+  std::unique_ptr<Controller> controller_;
+};
+
+}  // namespace dexcheck

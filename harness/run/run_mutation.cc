@@ -1,0 +1,207 @@
+#include "harness/run/run_mutation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "controller/common/text.h"
+#include "controller/model/parameter_reader.h"
+
+namespace dexcheck {
+namespace {
+
+// Where the object is where it should be, feedback is nothing whatever its gains are: laws are judged from an error on,
+// m and rad, that comes within some steps. It takes 4 mm/s^2 at 20 rad/s, far below what softens contacts or makes wheels
+// slip.
+constexpr double kNudge = 1e-5;
+constexpr double kNudgeTime = 5e-3;  // s
+
+/// A trajectory that begins later, and goes a little off.
+class LaterTrajectory final : public Trajectory {
+ public:
+  LaterTrajectory(std::unique_ptr<Trajectory> whole, double from, double nudge)
+      : whole_(std::move(whole)), from_(from), nudge_(nudge) {}
+  [[nodiscard]] DesiredMotion Evaluate(double t) const override {
+    DesiredMotion motion = whole_->Evaluate(t + from_);
+    motion.X_d.array() += nudge_ * CalcMinJerk(t, kNudgeTime).s;
+    return motion;
+  }
+
+ private:
+  std::unique_ptr<Trajectory> whole_;
+  double from_, nudge_;
+};
+
+// Mistakes that are there from the beginning settle so long at the most, s.
+constexpr double kSettle = 0.3;
+
+/// The engine's simulation among the parts.
+EnginePlant* FindEngine(const LoopParts& parts) {
+  auto* const plant = dynamic_cast<EnginePlant*>(parts.plant.get());
+  if (plant == nullptr) throw InputError("mistakes are made in a run of the engine's plant alone");
+  return plant;
+}
+
+/// The robot with one number changed by `scale` times its size, up or, where that is no robot, down.
+RobotModel ChangeNumber(RobotSpec spec, const Parameter& number, double scale) {
+  const double value = GetValue(spec, number);
+  const double change = scale * GetScale(spec, number);
+  SetValue(&spec, number, value + change);
+  try {
+    return RobotModel(spec);
+  } catch (const InputError&) {
+    SetValue(&spec, number, value - change);
+    return RobotModel(spec);
+  }
+}
+
+std::string JoinFailed(const CrossCheck& checks) {
+  std::string names;
+  for (const std::span<const CheckRecord> records : {checks.model_checks(), checks.motion_checks()}) {
+    for (const CheckRecord& record : records) {
+      if (record.failed) names += (names.empty() ? "" : " ") + record.name;
+    }
+  }
+  return names;
+}
+
+}  // namespace
+
+RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, std::filesystem::path mjcf,
+                         const RunMutationOptions& options, const std::function<bool()>& should_stop)
+    : scenario_(scenario),
+      robot_(std::move(robot)),
+      mjcf_(std::move(mjcf)),
+      options_(options),
+      compiled_(LoadMjcf(mjcf_)) {
+  if (scenario.task) throw InputError(scenario.source + ": task: mistakes are made in runs along a trajectory");
+  const RobotModel model = ParseRobotModel(ReadTextFile(robot_.string()), robot_.string(), scenario.model_overrides);
+  if (options.parameters > 0) {
+    const std::vector<Parameter> numbers = ListParameters(model.spec());
+    const size_t count = std::min(numbers.size(), static_cast<size_t>(options.parameters));
+    for (size_t i = 0; i < count; ++i) {
+      parameters_.push_back(numbers[i * numbers.size() / count]);
+      mutants_.push_back({.kind = "number",
+                          .name = DescribePart(model.spec(), parameters_.back()) + ": " +
+                                  DescribeQuantity(parameters_.back()),
+                          .expected = Cause::kModel});
+    }
+  }
+  if (options.laws) laws_ = ListLawMistakes();
+  for (const LawMistake& law : laws_) {
+    mutants_.push_back({.kind = law.part == SIZE_MAX ? "law, otherwise" : "law, one part",
+                        .name = law.name,
+                        .expected = Cause::kControlLaw,
+                        .part = law.part == SIZE_MAX ? "" : ListLawParts()[law.part].name});
+  }
+  if (options.plants) plants_ = ListPlantFaults();
+  for (const PlantFault& fault : plants_)
+    mutants_.push_back({.kind = fault.kind, .name = fault.name, .expected = fault.cause, .part = fault.part});
+  MoveToStart(should_stop);
+  if (!should_stop()) RequireNoMistakeToPass(should_stop);
+}
+
+std::unique_ptr<Setup> RunCampaign::MakeSetup(const Scenario& scenario, const RobotModel* model) const {
+  MjModelPtr engine(mj_copyModel(nullptr, compiled_.get()));
+  if (model != nullptr) return std::make_unique<Setup>(scenario, *model, mjcf_, std::move(engine));
+  return std::make_unique<Setup>(scenario, robot_, mjcf_, std::move(engine));
+}
+
+Scenario RunCampaign::MakeScenario(double from, double duration, double nudge) const {
+  Scenario scenario = scenario_;
+  scenario.duration = duration;
+  if (!(from > 0.0)) return scenario;
+  scenario.start = Start::kRest;
+  scenario.settle = 0.0;
+  scenario.expect.from = std::max(0.0, scenario_.expect.from - from);
+  scenario.trajectory = [whole = scenario_.trajectory, from, nudge](const Vector6d& X_start) {
+    return std::make_unique<LaterTrajectory>(whole(X_start), from, nudge);
+  };
+  if (nudge != 0.0) scenario.expect = {};
+  return scenario;
+}
+
+void RunCampaign::MoveToStart(const std::function<bool()>& should_stop) {
+  // Even a run that is looked at from its beginning starts settled, one step in.
+  const double from = std::max(options_.from, scenario_.plant.time_step);
+  options_.from = from;
+  const std::unique_ptr<Setup> whole = MakeSetup(MakeScenario(0.0, from, 0.0), nullptr);
+  LoopParts parts = MakeLoopParts(*whole);
+  EnginePlant* const plant = FindEngine(parts);
+  ClosedLoop loop(*whole, /*check=*/false, std::move(parts));
+  if (!loop.Settle(should_stop)) return;
+  while (!loop.is_finished() && !should_stop()) loop.Step();
+  start_ = plant->simulation().GetState();
+  setup_ = MakeSetup(MakeScenario(from, options_.duration, 0.0), nullptr);
+  nudged_ = MakeSetup(MakeScenario(from, options_.duration, kNudge), nullptr);
+}
+
+void RunCampaign::RequireNoMistakeToPass(const std::function<bool()>& should_stop) {
+  for (const Setup* setup : {setup_.get(), nudged_.get()}) {
+    RunMutant none;
+    LoopParts parts = MakeLoopParts(*setup);
+    FindEngine(parts)->simulation().SetState(start_);
+    if (!RunLoop(*setup, std::move(parts), &none, should_stop)) return;
+    if (!none.killed) continue;
+    throw InputError(scenario_.source + ": must pass before mistakes are made in it, got " +
+                     (none.failure.empty() ? NameOf(none.cause) + (" (" + none.evidence + ")") : none.failure));
+  }
+}
+
+bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant,
+                          const std::function<bool()>& should_stop) {
+  Runner runner(setup, /*check=*/true, std::move(parts));
+  const RunResult& result = runner.Run([](const StepRecord&) {}, should_stop);
+  if (result.interrupted) return false;
+  mutant->killed = result.verdict != Verdict::kPass;
+  mutant->cause = result.attribution.cause;
+  mutant->evidence = result.attribution.evidence;
+  mutant->names_part = mutant->evidence.find(mutant->part) != std::string::npos;
+  mutant->failure = result.failure;
+  mutant->failed_checks = JoinFailed(runner.loop().checks());
+  mutant->position_error = result.tracking.position_max();
+  const Expectation& expect = setup.scenario().expect;
+  mutant->is_as_expected = result.failure.empty() && !(expect.position && mutant->position_error > *expect.position);
+  return true;
+}
+
+bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
+  RunMutant& mutant = mutants_[index];
+  try {
+    if (index < parameters_.size()) {
+      const RobotModel model = ChangeNumber(setup_->model().spec(), parameters_[index], options_.scale);
+      const std::unique_ptr<Setup> setup = MakeSetup(setup_->scenario(), &model);
+      LoopParts parts = MakeLoopParts(*setup);
+      FindEngine(parts)->simulation().SetState(start_);
+      return RunLoop(*setup, std::move(parts), &mutant, should_stop);
+    }
+    index -= parameters_.size();
+    const bool is_law = index < laws_.size();
+    const bool from_start = !is_law && plants_[index - laws_.size()].from_start;
+    std::unique_ptr<Setup> whole;
+    if (from_start) {
+      Scenario scenario = MakeScenario(0.0, options_.from + options_.duration, 0.0);
+      scenario.settle = std::min(scenario.settle, kSettle);
+      whole = MakeSetup(scenario, nullptr);
+    }
+    const Setup& setup = from_start ? *whole : is_law ? *nudged_ : *setup_;
+    LoopParts parts = MakeLoopParts(setup);
+    EnginePlant* const engine = FindEngine(parts);
+    if (!from_start) engine->simulation().SetState(start_);
+    if (is_law) {
+      parts.controller = std::make_unique<SpoiledLaw>(setup, laws_[index]);
+    } else {
+      const PlantFault& fault = plants_[index - laws_.size()];
+      parts.plant.release();
+      parts.plant = std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault);
+      if (fault.sensors) parts.hidden_sensor_fault = fault.sensors(setup);
+    }
+    return RunLoop(setup, std::move(parts), &mutant, should_stop);
+  } catch (const InputError& error) {
+    mutant.refused = true;
+    mutant.failure = error.what();
+    return true;
+  }
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,75 @@
+#pragma once
+
+// Mistakes made on purpose in a run: wrong numbers of the model, wrong laws, wrong plants. Which of them do
+// the questions of a run find, and which cause do they name?
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "harness/diagnosis/parameters.h"
+#include "harness/diagnosis/plant_faults.h"
+#include "harness/diagnosis/spoiled_law.h"
+#include "harness/run/run_mutation_options.h"
+#include "harness/run/runner.h"
+
+namespace dexcheck {
+
+/// One mistake, and what a run with it came to.
+struct RunMutant {
+  std::string kind;  ///< "law", "motor", "sensor", ...: what a table sums up by.
+  std::string name;
+  Cause expected = Cause::kNone;
+  std::string part;  ///< What the evidence should name; empty for nothing.
+
+  bool refused = false;  ///< There is no such robot, or the scenario cannot be run with it.
+  bool killed = false;   ///< The verdict is not "pass".
+  Cause cause = Cause::kNone;
+  bool names_part = false;  ///< The evidence has `part` in it.
+  std::string evidence;
+  std::string failure;           ///< Why the run ended early; empty when it did not.
+  std::string failed_checks;     ///< Names, separated by blanks.
+  double position_error = 0.0;   ///< Largest of the object, m.
+  bool is_as_expected = true;    ///< Whether the object was where [expect] wants it.
+
+  [[nodiscard]] bool has_right_cause() const { return killed && cause == expected; }
+};
+
+/// All runs of one scenario. The right robot settles and moves up to options.from once; every mistake starts
+/// from the state that it had there, those of the contacts' geometry from the beginning.
+class RunCampaign {
+ public:
+  /// @param scenario that is no task. @throws InputError when it is one; when the scenario without a mistake does
+  /// not pass, with its cause.
+  RunCampaign(const Scenario& scenario, std::filesystem::path robot, std::filesystem::path mjcf,
+              const RunMutationOptions& options, const std::function<bool()>& should_stop);
+
+  [[nodiscard]] const std::vector<RunMutant>& mutants() const { return mutants_; }
+  /// Makes the mistake and looks what comes of it. @param should_stop asked before each step; what was
+  /// stopped is not done.
+  /// @returns whether it is done.
+  bool Run(size_t index, const std::function<bool()>& should_stop);
+
+ private:
+  void MoveToStart(const std::function<bool()>& should_stop);
+  /// @param nudge by which X_d jumps at the beginning, m and rad.
+  [[nodiscard]] Scenario MakeScenario(double from, double duration, double nudge) const;
+  [[nodiscard]] std::unique_ptr<Setup> MakeSetup(const Scenario& scenario, const RobotModel* model) const;
+  bool RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant, const std::function<bool()>& should_stop);
+  void RequireNoMistakeToPass(const std::function<bool()>& should_stop);
+
+  Scenario scenario_;
+  std::filesystem::path robot_, mjcf_;
+  RunMutationOptions options_;
+  MjModelPtr compiled_;
+  EngineState start_;
+  std::unique_ptr<Setup> setup_;       // of the right robot, from the start
+  std::unique_ptr<Setup> nudged_;      // the same with an error that feedback has to answer
+  std::vector<Parameter> parameters_;  // by mutant, those of numbers first
+  std::vector<LawMistake> laws_;
+  std::vector<PlantFault> plants_;
+  std::vector<RunMutant> mutants_;
+};
+
+}  // namespace dexcheck
