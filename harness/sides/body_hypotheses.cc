@@ -262,6 +262,14 @@ void AddMassMistakes(std::vector<BodyMistake>* mistakes) {
        }});
 }
 
+std::vector<BodyMistake> ListMistakes() {
+  std::vector<BodyMistake> mistakes;
+  AddInertiaMistakes(&mistakes);
+  AddComMistakes(&mistakes);
+  AddMassMistakes(&mistakes);
+  return mistakes;
+}
+
 class BodySearch {
  public:
   BodySearch(const std::vector<ComparedBody>& bodies, double length, double tolerance)
@@ -277,11 +285,7 @@ class BodySearch {
   std::vector<Hypothesis> Run() {
     FindShiftedLists();
     FindExchanges();
-    std::vector<BodyMistake> mistakes;
-    AddInertiaMistakes(&mistakes);
-    AddComMistakes(&mistakes);
-    AddMassMistakes(&mistakes);
-    FindMistakes(mistakes);
+    FindMistakes(ListMistakes());
     FindLostParts();
     return std::move(found_);
   }
@@ -425,6 +429,14 @@ class BodySearch {
 };
 
 }  // namespace
+
+bool IsExplainedAlone(const ComparedBody& body, double length, double tolerance) {
+  const std::vector<BodyMistake> mistakes = ListMistakes();
+  return std::any_of(mistakes.begin(), mistakes.end(), [&](const BodyMistake& mistake) {
+    const std::optional<MassProperties> undone = mistake.undo(body);
+    return undone && Compare(*undone, body.right, length).largest() <= tolerance;
+  });
+}
 
 std::vector<Hypothesis> FindBodyHypotheses(const std::vector<ComparedBody>& bodies, double length,
                                            double tolerance) {

@@ -56,6 +56,9 @@ struct ComparedBody {
 std::vector<Hypothesis> FindBodyHypotheses(const std::vector<ComparedBody>& bodies, double length,
                                            double tolerance);
 
+/// Whether one of the mistakes of single bodies explains this one.
+bool IsExplainedAlone(const ComparedBody& body, double length, double tolerance);
+
 /// A joint and its link in the link's own frame: the joint turns about, or slides along, `axis` there.
 struct OwnRow {
   int parent = -1;

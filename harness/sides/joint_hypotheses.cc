@@ -163,6 +163,30 @@ class Comparison {
   }
   [[nodiscard]] int CountAll(size_t i) const { return 2 + static_cast<int>(children_[i].size()); }
 
+  /// Whether a mistake of joint i's body alone explains that it is not right; its axis is.
+  [[nodiscard]] bool IsBodysOwnMistake(const std::vector<OwnRow>& rows, size_t i) const {
+    ComparedBody body;
+    body.given = rows[i].body;
+    body.right = ExpressIn(right_[i].body, Place(rows)[0][i + 1].inverse() * right_poses_[0][i + 1]);
+    body.X_PL = rows[i].X_PL;
+    return IsExplainedAlone(body, length_, tolerance_);
+  }
+  /// Axes on joint i's link that are not right.
+  [[nodiscard]] std::vector<size_t> ListWrongChildren(const std::vector<OwnRow>& rows, size_t i) const {
+    const std::vector<std::vector<Pose>> poses = Place(rows);
+    std::vector<size_t> wrong;
+    for (const size_t child : children_[i]) {
+      if (!IsAxisRight(rows, poses, child)) wrong.push_back(child);
+    }
+    return wrong;
+  }
+  [[nodiscard]] bool IsAxisRight(const std::vector<OwnRow>& rows, size_t i) const {
+    return IsAxisRight(rows, Place(rows), i);
+  }
+  [[nodiscard]] bool IsBodyRight(const std::vector<OwnRow>& rows, size_t i) const {
+    return IsBodyRight(rows, Place(rows), i);
+  }
+
   /// Joints and bodies that are not where they should be.
   [[nodiscard]] size_t CountWrong(const std::vector<OwnRow>& rows) const {
     const std::vector<std::vector<Pose>> poses = Place(rows);
@@ -305,9 +329,26 @@ class JointSearch {
     return false;
   }
 
+  /// Whether what is wrong at a joint whose axis is right is a mistake of its body, or of the joints on its
+  /// link.
+  bool IsOthersMistake(size_t i, const std::vector<JointMistake>& mistakes) {
+    if (!comparison_.IsAxisRight(rows_, i)) return false;
+    if (!comparison_.IsBodyRight(rows_, i) && !comparison_.IsBodysOwnMistake(rows_, i)) return false;
+    const std::vector<size_t> children = comparison_.ListWrongChildren(rows_, i);
+    return std::all_of(children.begin(), children.end(), [&](size_t child) {
+      const OwnRow given = rows_[child];
+      const bool repairs = std::any_of(mistakes.begin(), mistakes.end(), [&](const JointMistake& mistake) {
+        rows_[child] = mistake.undo(given);
+        return comparison_.CountRight(rows_, child) == comparison_.CountAll(child);
+      });
+      rows_[child] = given;
+      return repairs;
+    });
+  }
+
   void JudgeJoint(size_t i, const std::vector<JointMistake>& mistakes) {
     const int before = comparison_.CountRight(rows_, i);
-    if (before == comparison_.CountAll(i)) return;
+    if (before == comparison_.CountAll(i) || IsOthersMistake(i, mistakes)) return;
     const OwnRow given = rows_[i];
     int best = before;
     OwnRow best_row = given;

@@ -7,12 +7,35 @@
 namespace dexcheck::testing {
 namespace {
 
-/// One side's numbers: y and the turns about x and z change their signs.
+/// The other side's place: y changes its sign.
 std::string Mirror(const std::string& xyz) {
   std::istringstream in(xyz);
   std::string x, y, z;
   in >> x >> y >> z;
   return x + " " + (y.starts_with("-") ? y.substr(1) : y == "0" ? y : "-" + y) + " " + z;
+}
+
+/// The same of roll, pitch and yaw.
+std::string MirrorTurn(const std::string& rpy) {
+  std::istringstream in(rpy);
+  std::string numbers[3];
+  in >> numbers[0] >> numbers[1] >> numbers[2];
+  for (const int k : {0, 2}) {
+    std::string& x = numbers[k];
+    x = x.starts_with("-") ? x.substr(1) : x == "0" ? x : "-" + x;
+  }
+  return numbers[0] + " " + numbers[1] + " " + numbers[2];
+}
+
+/// Of all links whose names begin so.
+void MirrorTurns(const std::vector<std::string>& prefixes, std::vector<LeggedLink>* links) {
+  for (LeggedLink& link : *links) {
+    for (const std::string& prefix : prefixes) {
+      if (!link.name.starts_with(prefix)) continue;
+      link.rpy = MirrorTurn(link.rpy);
+      link.com_rpy = MirrorTurn(link.com_rpy);
+    }
+  }
 }
 
 /// @param child_of what hangs on a body, written into it.
@@ -53,6 +76,7 @@ std::vector<LeggedLink> ListQuadruped() {
     links.push_back({leg + "_foot", leg + "_calf", "0 0 -0.213", "0.2 0 0", "", 0.06, "0.001 0 0", "0 0 0",
                      "0.0000096 0.0000096 0.0000096", false});
   }
+  MirrorTurns({"FR_", "RR_"}, &links);
   return links;
 }
 
@@ -99,6 +123,7 @@ std::vector<LeggedLink> ListHumanoid() {
          "0.0009 0.001 0.0004"}};
     links.insert(links.end(), limb.begin(), limb.end());
   }
+  MirrorTurns({"right_"}, &links);
   return links;
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "controller/dynamics/model_terms.h"
+#include "controller/model/body_frame.h"
 #include "controller/model/body_reader.h"
 #include "controller/model/parameter_reader.h"
 #include "tests/common/matrix_near.h"

@@ -7,6 +7,7 @@
 
 #include <cmath>
 
+#include "harness/engine/engine.h"
 #include "harness/sides/mjcf_reader.h"
 #include "harness/sides/read_description.h"
 #include "harness/sides/urdf_reader.h"

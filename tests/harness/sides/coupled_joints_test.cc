@@ -6,6 +6,7 @@
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
+#include "harness/engine/engine.h"
 #include "harness/sides/answers_comparison.h"
 #include "harness/sides/description_check.h"
 #include "harness/sides/description_match.h"

@@ -7,6 +7,7 @@
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
+#include "harness/engine/engine.h"
 #include "harness/sides/complete_description.h"
 #include "harness/sides/description_match.h"
 #include "harness/sides/mjcf_reader.h"
@@ -74,7 +75,12 @@ TEST(FloatingBase, RandomRobotsAgree) {
     EXPECT_EQ(CompareWithEngine(urdf, *engine), "") << "robot " << index;
     const RobotDescription mjcf = ReadMjcfDescription(*engine, "robot.xml");
     EXPECT_EQ(CompareBoth(urdf, mjcf), "") << "robot " << index;
-    EXPECT_EQ(CompareWithEngine(ReadTable(WriteParameters(mjcf, "robot.xml")), *engine), "");
+    // Angles of a table are rounded twice: when they are written, and when they are read.
+    constexpr double kWritten = 1e-13;
+    const RobotModel table = ParseRobotModel(WriteParameters(mjcf, "robot.xml"), "robot.toml");
+    const ConsistencyResult result =
+        CheckConsistency(Adapter(table, *engine, "robot.xml"), Few(), [](long) { return true; });
+    for (const CheckRecord& record : result.terms) EXPECT_LT(record.worst, kWritten) << record.name;
   }
 }
 

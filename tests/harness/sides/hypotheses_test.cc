@@ -12,6 +12,7 @@
 #include <ostream>
 
 #include "controller/model/body_frame.h"
+#include "harness/engine/engine.h"
 #include "harness/sides/mjcf_reader.h"
 #include "harness/sides/read_description.h"
 #include "tests/common/legged_robots.h"
@@ -109,9 +110,9 @@ const std::vector<BodyMistake>& ListMistakes() {
        }},
       {"Transposed", "turned the other way",
        [](const Robot& robot, size_t i, Body body) {
+         // The file has R^T where R would be right: I = R I_C R^T, read as R^T I_C R.
          const Matrix3d R = FindPartRotation(robot, i);
-         const Matrix3d own = R.transpose() * body.inertia * R;  // as it should have been read: R I R^T
-         return body.inertia = R * (R * own * R.transpose()) * R.transpose(), body;
+         return body.inertia = R.transpose() * R.transpose() * body.inertia * R * R, body;
        }},
       {"AxesXY", "with the axes x and y exchanged",
        [](const Robot&, size_t, Body body) {
@@ -152,6 +153,13 @@ void Spoil(const BodyMistake& mistake, size_t i, RobotDescription* robot) {
   const Pose& X_iL = robot->joints[i].X_iL;
   MassProperties& body = robot->spec.joints[i].body;
   body = ExpressIn(mistake.make(*robot, i, ExpressIn(body, X_iL.inverse())), X_iL);
+  if (mistake.name != "Transposed") return;
+  const Matrix3d R = FindPartRotation(*robot, i);
+  for (DescribedPart& part : robot->parts) {
+    if (part.joint == static_cast<int>(i) && part.states_inertial && part.X_LC.linear() == R) {
+      part.X_LC.linear() = R.transpose();
+    }
+  }
 }
 
 std::string List(const std::vector<Hypothesis>& found) {
