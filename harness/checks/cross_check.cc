@@ -64,6 +64,7 @@ void CrossCheck::CompareUnsent(const StepRecord& step) {
   CompareModel(step);
   motion_.Add(StepCheck::kTold, CompareTold(step), step.time);
   sensors_.Add(step.told.state, step.reading.state);
+  if (!law_->has_demand()) return;  // of a baseline
   ReadEngineTerms(model_.context(), *step.model, step.told.state, setup_->bonds().empty(), &law_terms_);
   motion_.Add(StepCheck::kLawTorque, law_->CompareUnsent(step, law_terms_), step.time);
 }

@@ -123,7 +123,7 @@ double LawCheck::CompareUnsent(const StepRecord& step, const LawTerms& terms) {
     return std::numeric_limits<double>::infinity();
   force_ = terms.C_xi + terms.gravity + terms.friction;
   scale_ = std::max(Norm(force_), std::numeric_limits<double>::min());
-  CompareTorque(step);
+  CompareTorque(step, reference_.force());
   return errors_.torque;
 }
 
