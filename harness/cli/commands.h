@@ -19,6 +19,7 @@ struct RobotFiles {
 Option AddRobotOptions(Command command, RobotFiles* files);
 
 /// Each adds its command to `app`.
+void AddAuditCommand(Command app);
 void AddConsistencyCommand(Command app);
 void AddDiagnoseCommand(Command app);
 void AddMutateCommand(Command app);
@@ -32,6 +33,7 @@ void AddCompareCommand(Command app);
 void AddExportCommand(Command app);
 void AddRenderCommand(Command app);
 void AddReportCommand(Command app);
+void AddStatesCommand(Command app);
 void AddStudyCommand(Command app);
 
 }  // namespace dexcheck::cli

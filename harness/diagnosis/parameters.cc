@@ -174,7 +174,7 @@ std::vector<Parameter> ListParameters(const RobotSpec& spec) {
     add(Kind::kFrameRotation, i, 3);
     if (spec.frames[static_cast<size_t>(i)].sphere_radius) add(Kind::kSphereRadius, i);
   }
-  add(Kind::kBasePosition, -1, 3);
+  if (spec.base.type != BaseType::kFloating) add(Kind::kBasePosition, -1, 3);
   if (spec.base.type == BaseType::kFixed) {
     add(Kind::kBaseRotation, -1, 3);
   } else {

@@ -302,8 +302,10 @@ class StaticGate {
     for (const auto& [joint, where] : joints)
       Compare("joint_spring", where, 0.0, engine_.jnt_stiffness[joint]);
     for (const auto& [joint, where] : joints) {
+      const bool is_of_tree = where.kind == Location::Kind::kJoint;
+      const double own = is_of_tree ? model_.joints()[static_cast<size_t>(where.first)].dry_friction : 0.0;
       each_dof(joint, [&, at = where](int dof) {
-        Compare("joint_dry_friction", at, 0.0, engine_.dof_frictionloss[dof]);
+        Compare("joint_dry_friction", at, own, engine_.dof_frictionloss[dof]);
       });
     }
     for (const auto& [joint, where] : joints) {
@@ -312,7 +314,10 @@ class StaticGate {
     }
     Compare("fluid", {}, 0.0, engine_.opt.density);
     Compare("fluid", {}, 0.0, engine_.opt.viscosity);
-    for (size_t i = first_finding; i < result_.findings.size(); ++i) result_.findings[i].engine_only = true;
+    for (size_t i = first_finding; i < result_.findings.size(); ++i) {
+      GateFinding& finding = result_.findings[i];
+      finding.engine_only = finding.check != "joint_dry_friction" || finding.model == 0.0;
+    }
   }
 
   const Adapter& adapter_;

@@ -68,6 +68,9 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
       plant_model_(ReadPlantModel(scenario, model_.spec().source)),
       engine_(std::move(engine)) {
   const std::string& robot = model_.spec().source;
+  if (model_.base().type == BaseType::kFloating) {
+    throw InputError(robot + ": base.type: must not be \"floating\" in a run, whose law drives the base");
+  }
   if (!model_.object()) throw InputError(robot + ": object: is missing, and the scenario holds one");
   RemoveLooks(engine_.get());
   adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
