@@ -194,7 +194,7 @@ void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms, 
 void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                            const DesiredMotion& desired) {
   // The truth, which the law's terms need not be at.
-  ObjectState truth{terms.X_Bo, terms.V_Bo, terms.X_o};
+  LawObject truth{terms.X_Bo, terms.V_Bo, terms.X_o};
   if (step.known != nullptr) {
     truth.X_Bo = step.reading.state.X_Bo;
     truth.V_Bo = step.reading.state.V_Bo;
