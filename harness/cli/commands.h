@@ -27,6 +27,7 @@ void AddImportCommand(Command app);
 void AddPlanCommand(Command app);
 /// @param command_line as typed, to be kept in the log.
 void AddRunCommand(Command app, const std::string& command_line);
+void AddBudgetCommand(Command app);
 void AddCompareCommand(Command app);
 void AddExportCommand(Command app);
 void AddRenderCommand(Command app);

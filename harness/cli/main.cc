@@ -46,6 +46,7 @@ int Run(int argc, char** argv) {
   AddImportCommand(app);
   AddPlanCommand(app);
   AddRunCommand(app, JoinArguments(argc, argv));
+  AddBudgetCommand(app);
   AddCompareCommand(app);
   AddExportCommand(app);
   AddRenderCommand(app);
