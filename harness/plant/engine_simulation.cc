@@ -42,6 +42,7 @@ EngineSimulation::EngineSimulation(const Adapter& adapter, bool implicit_damping
   }
   // Whoever commands torques keeps to the limits; friction comes on top.
   std::fill_n(model_->actuator_ctrllimited, model_->nu, mjtByte{0});
+  std::fill_n(model_->actuator_forcelimited, model_->nu, mjtByte{0});
   for (const EngineWheel& wheel : adapter.wheels()) motors_.push_back(FindMotor(*model_, wheel.joint));
   for (const int joint : adapter.joint_ids()) motors_.push_back(FindMotor(*model_, joint));
   for (const int motor : motors_) dofs_.push_back(model_->jnt_dofadr[model_->actuator_trnid[2 * motor]]);
