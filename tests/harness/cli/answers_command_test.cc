@@ -106,7 +106,7 @@ class BadPrograms : public ::testing::TestWithParam<BadProgram> {};
 TEST_P(BadPrograms, AreNamedInOneLine) {
   const ProgramResult result =
       RunDexcheck({"consistency", kExamples + "arm.urdf", "--program", GetParam().command, "--samples", "5",
-                   "--time-limit", "0.7", "--quiet"});
+                   "--time-limit", "2", "--quiet"});
   EXPECT_EQ(result.exit_code, GetParam().exit_code);
   EXPECT_EQ(result.out, "");
   EXPECT_THAT(result.err, ::testing::StartsWith("dexcheck: program \""));
@@ -124,8 +124,8 @@ INSTANTIATE_TEST_SUITE_P(
                    "ended with exit code 3 before its first answer, its last words: \"oh no\""},
         BadProgram{"IsKilled", "kill -9 $$", 3, "was ended by signal 9"},
         BadProgram{"DiesLater", kHello + "exit 4", 3, "ended with exit code 4 after 1 answers"},
-        BadProgram{"Hangs", "sleep 60", 3, "gave no answer within 0.7 s (--time-limit)"},
-        BadProgram{"HangsLater", kHello + "sleep 60", 3, "gave no answer within 0.7 s"},
+        BadProgram{"Hangs", "sleep 60", 3, "gave no answer within 2 s (--time-limit)"},
+        BadProgram{"HangsLater", kHello + "sleep 60", 3, "gave no answer within 2 s"},
         BadProgram{"ClosesItsOutput", "exec >&-; sleep 60", 3, "closed its standard output"},
         BadProgram{"NeverEndsALine", "cat /dev/zero", 3, "answers without end"},
         BadProgram{"SaysNoJson", "yes", 2, "must answer with a JSON object on one line"},
@@ -180,9 +180,11 @@ TEST_F(Answers, AuditExitsByWhatItFinds) {
   EXPECT_EQ(json.at("verdict"), "disagreement");
   EXPECT_EQ(json.at("findings").at(0).at("level"), "impossible");
   EXPECT_EQ(json.at("findings").at(0).at("line"), 5);
-  for (const std::string file : {testing::kMjcf + "panda.xml", testing::kParameters + "panda.toml"}) {
-    EXPECT_EQ(Run({"audit", file, "--quiet"}).exit_code, 0) << file;
-  }
+  EXPECT_EQ(Run({"audit", testing::kParameters + "panda.toml", "--quiet"}).exit_code, 0);
+  // The published inertia of this link was identified, and is that of something much longer than the link.
+  const ProgramResult panda = Run({"audit", testing::kMjcf + "panda.xml"});
+  EXPECT_EQ(panda.exit_code, 1);
+  EXPECT_THAT(panda.out, HasSubstr("odd        panda.xml: link panda_link1 has a principal moment of 0.70"));
   WriteText(folder_.path() / "broken.urdf", "<robot name=\"x\"><link name=\"a\"></robot>");
   EXPECT_TRUE(testing::IsRefused(Run({"audit", "broken.urdf"}), {"broken.urdf:1: is not XML"}));
 }
@@ -196,7 +198,8 @@ TEST_F(Answers, FloatingBasesSayTheirConvention) {
   EXPECT_THAT(result.out, HasSubstr("q = [x y z, qw qx qy qz, joints from q[7]]"));
   EXPECT_THAT(result.out, HasSubstr("in Pinocchio's convention"));
   ASSERT_EQ(Run({"import", "robot.xml", "--out", "robot.toml"}).exit_code, 0);
-  const ProgramResult table = Run({"consistency", "robot.toml", "robot.xml", "--samples", "20"});
+  const ProgramResult table =
+      Run({"consistency", "robot.toml", "robot.xml", "--samples", "20", "--tolerance", "1e-12"});
   EXPECT_EQ(table.exit_code, 0) << table.err << table.out;
   const ProgramResult run = Run({"run", "hold", "--robot", "robot.toml", "--mjcf", "robot.xml"});
   EXPECT_TRUE(testing::IsRefused(run, {"robot.toml: base.type: must not be \"floating\" in a run"}));
