@@ -201,6 +201,24 @@ TEST_F(Answers, FloatingBasesSayTheirConvention) {
   const ProgramResult table =
       Run({"consistency", "robot.toml", "robot.xml", "--samples", "20", "--tolerance", "1e-12"});
   EXPECT_EQ(table.exit_code, 0) << table.err << table.out;
+  // Turned about x by an angle with cosine 0.28 and sine 0.96.
+  std::vector<double> q = {1.0, 2.0, 0.3, 0.8, 0.6, 0.0, 0.0};
+  q.resize(19, 0.1);
+  std::vector<double> xi = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
+  xi.resize(18, 0.2);
+  WriteText(folder_.path() / "state.json", Json{{"q", q}, {"xi", xi}}.dump());
+  const ProgramResult eval = Run({"eval", "--robot", "robot.toml", "--mjcf", "robot.xml", "--state",
+                                  "state.json", "--out", "eval.json"});
+  ASSERT_EQ(eval.exit_code, 0) << eval.err;
+  const Json model = Json::parse(ReadText(folder_.path() / "eval.json"));
+  const Json& pinocchio = model.at("pinocchio");
+  EXPECT_EQ(pinocchio.at("q").get<std::vector<double>>()[3], 0.6);
+  EXPECT_EQ(pinocchio.at("q").get<std::vector<double>>()[6], 0.8);
+  const std::vector<double> v = pinocchio.at("v").get<std::vector<double>>();
+  EXPECT_NEAR(v[1], 0.28 * 0.2 + 0.96 * 0.3, 1e-12);
+  EXPECT_NEAR(v[2], -0.96 * 0.2 + 0.28 * 0.3, 1e-12);
+  EXPECT_NE(pinocchio.at("nle").at(1), model.at("bias").at(1));
+
   const ProgramResult run = Run({"run", "hold", "--robot", "robot.toml", "--mjcf", "robot.xml"});
   EXPECT_TRUE(testing::IsRefused(run, {"robot.toml: base.type: must not be \"floating\" in a run"}));
 }
