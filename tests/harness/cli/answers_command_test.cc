@@ -219,7 +219,10 @@ TEST_F(Answers, FloatingBasesSayTheirConvention) {
   EXPECT_NEAR(v[2], -0.96 * 0.2 + 0.28 * 0.3, 1e-12);
   EXPECT_NE(pinocchio.at("nle").at(1), model.at("bias").at(1));
 
-  const ProgramResult run = Run({"run", "hold", "--robot", "robot.toml", "--mjcf", "robot.xml"});
+  WriteText(folder_.path() / "floating.toml",
+            ReadText(testing::SourcePath("/harness/shipped/scenarios/hold.toml")) + "\n[model]\nfile = \"" +
+                (folder_.path() / "robot.toml").string() + "\"\n");
+  const ProgramResult run = Run({"run", "floating.toml", "--out", "run"});
   EXPECT_TRUE(testing::IsRefused(run, {"robot.toml: base.type: must not be \"floating\" in a run"}));
 }
 
