@@ -141,9 +141,9 @@ TEST(OwnController, EachFailureOfAProgramIsOneClearLine) {
 
 TEST(OwnController, ProgramsThatDoNotSpeakAreRefusedAtOnce) {
   EXPECT_TRUE(HasFailed(RunWith("/nowhere/law"), "ended with exit code 127"));
-  EXPECT_TRUE(HasFailed(RunWith("echo 'I know nothing of your protocol'"), "does not speak the protocol"));
-  EXPECT_TRUE(
-      HasFailed(RunWith("sleep 9", {"--controller-time-limit", "0.2"}), "did not answer within 2 s"));
+  EXPECT_TRUE(HasFailed(RunWith("sh -c 'echo I know nothing of your protocol; sleep 9'"),
+                        "does not speak the protocol"));
+  EXPECT_TRUE(HasFailed(RunWith("sleep 9", {"--controller-time-limit", "0.2"}), "did not answer within 2 s"));
   EXPECT_EQ(RunWith("true", {"--controller-time-limit", "0"}).exit_code, 2);
 }
 
