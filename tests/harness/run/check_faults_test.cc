@@ -5,6 +5,7 @@
 #include <functional>
 #include <set>
 
+#include "harness/plant/engine_plant.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing {
@@ -72,10 +73,11 @@ TEST_P(CheckFaults, FailTheirCheck) {
   const CheckFault& fault = GetParam();
   const Scenario scenario = ReadShippedScenario(fault.scenario, fault.overrides);
   const std::string mjcf = scenario.mjcf_file.empty() ? SourcePath("/mjcf/scene.xml") : scenario.mjcf_file;
-  MjModelPtr engine = LoadMjcf(mjcf);
-  if (fault.change != nullptr) fault.change(engine.get());
-  const dexcheck::Setup setup(scenario, kRobot, mjcf, std::move(engine));
-  Runner runner(setup, /*check=*/true);
+  const dexcheck::Setup setup(scenario, kRobot, mjcf);
+  LoopParts parts = MakeLoopParts(setup);
+  // Of the simulation alone, after the scenario has set what it sets.
+  if (fault.change != nullptr) dynamic_cast<EnginePlant&>(*parts.plant).simulation().Change(fault.change);
+  Runner runner(setup, /*check=*/true, std::move(parts));
   const RunResult& result = runner.Run([](const StepRecord&) {}, [] { return false; });
   const CheckRecord& check = runner.loop().checks().Find(fault.check);
   EXPECT_TRUE(check.applies);
