@@ -2,20 +2,26 @@
 
 // Pictures drawn in processes of their own, several at a time.
 
-#include <sys/types.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
+#include "harness/base/worker_process.h"
 #include "renders/image.h"
 
 namespace dexcheck {
 
+/// Gives memory that processes share back to the system.
+struct UnmapMemory {
+  std::size_t size = 0;  ///< Bytes.
+  void operator()(std::uint8_t* memory) const;
+};
+
 /// Processes that draw the frames of a film, each every n-th, and hand them over in order. Threads would wait
 /// for each other: OSMesa has one rasterizer for all contexts of a process and locks it for each picture. The
-/// processes end when this one does, however it ends.
+/// processes end with the line.
 class FrameLine {
  public:
   /// Draws frame number `frame`.
@@ -28,10 +34,6 @@ class FrameLine {
   /// @param width, height of all pictures.
   /// @throws Error when there is no memory for pictures or no process can be made.
   FrameLine(const std::function<Painter()>& make_painter, long frames, int workers, int width, int height);
-  /// Ends the processes.
-  ~FrameLine();
-  FrameLine(const FrameLine&) = delete;
-  FrameLine& operator=(const FrameLine&) = delete;
 
   /// The next frame, at most `frames` times. At most two frames of each process wait to be taken.
   /// @throws what the frame's process threw: InputError and std::invalid_argument as such, everything else
@@ -39,25 +41,19 @@ class FrameLine {
   Image Take();
 
  private:
-  struct Worker {
-    pid_t pid = -1;
-    int socket = -1;  // tells of drawn frames, and is told of those taken
-  };
-  void Start(const std::function<Painter()>& make_painter, long index);
-  [[noreturn]] void Work(const std::function<Painter()>& make_painter, long first, int socket) const;
-  void Draw(const std::function<Painter()>& make_painter, long first, int socket) const;
+  bool Work(const std::function<Painter()>& make_painter, long first, int channel) const;
+  void Draw(const std::function<Painter()>& make_painter, long first, int channel) const;
   [[nodiscard]] std::uint8_t* FindSlot(long frame) const;
-  [[noreturn]] void Fail(Worker* worker, char told);
-  void Stop();
+  [[noreturn]] static void Fail(WorkerProcess* worker, char told);
 
   long frames_;
   long num_workers_;
   int width_;
   int height_;
   long taken_ = 0;
-  std::size_t size_ = 0;           // bytes of all slots
-  std::uint8_t* slots_ = nullptr;  // shared by all processes
-  std::vector<Worker> workers_;
+  std::size_t size_ = 0;                                // bytes of all slots
+  std::unique_ptr<std::uint8_t[], UnmapMemory> slots_;  // shared by all processes
+  std::vector<WorkerProcess> workers_;                  // tell of drawn frames, and are told of those taken
 };
 
 }  // namespace dexcheck

@@ -39,6 +39,15 @@ std::string FormatList(const toml::array& list) {
   return text + "]";
 }
 
+std::string FormatTable(const toml::table& table) {
+  std::string text = "{";
+  for (const auto& [key, entry] : table) {
+    text += (text.size() > 1 ? ", " : " ") + std::string(key.str()) + " = " + Format(entry);
+    if (Abbreviate(text) != text) break;
+  }
+  return text + " }";
+}
+
 /// The value as it might stand in the file, on one line.
 std::string Format(const toml::node& node) {
   if (const auto text = node.value_exact<std::string_view>()) return Quote(*text);
@@ -53,6 +62,11 @@ std::string Format(const toml::node& node) {
 
 TomlValue::TomlValue(const TomlContext& context, const toml::node& node, std::string path)
     : context_(&context), node_(&node), path_(std::move(path)) {}
+
+std::string TomlValue::Show() const {
+  const toml::table* table = node_->as_table();
+  return Abbreviate(table != nullptr ? FormatTable(*table) : Format(*node_));
+}
 
 int TomlValue::line() const { return static_cast<int>(node_->source().begin.line); }
 

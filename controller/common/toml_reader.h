@@ -49,6 +49,9 @@ class TomlValue {
   /// true or false.
   [[nodiscard]] bool AsFlag() const;
   [[nodiscard]] bool IsText() const { return node_->is_string(); }
+  [[nodiscard]] bool IsTable() const { return node_->is_table(); }
+  /// As it might stand in the file, on one line.
+  [[nodiscard]] std::string Show() const;
   [[nodiscard]] std::string AsText() const;
   /// Text that can name a thing: 1 to 64 of the letters A-Z, a-z, digits, and _ - .
   [[nodiscard]] std::string AsName() const;

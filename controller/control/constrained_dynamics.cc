@@ -49,7 +49,7 @@ ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contac
 
 const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const GraspTerms& grasp,
                                                const Eigen::Ref<const VectorXd>& force, ObjectSupport object,
-                                               const VectorXd* contact_acceleration) {
+                                               const VectorXd* contact_acceleration, const Vector6d* push) {
   const Eigen::Index n = prediction_.xi_dot.size();
   Require(robot.size() == n && force.size() == n, "length of force", "must be that of xi",
           static_cast<double>(force.size()));
@@ -68,6 +68,7 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
   if (object == ObjectSupport::kHand) {
     half_.bottomRows<6>() = -grasp.G();
     motion_.tail<6>() = -body.C_hat * grasp.V_Bo() - body.N_o;
+    if (push != nullptr) motion_.tail<6>() += *push;
   } else {
     half_.bottomRows<6>().setZero();
     motion_.tail<6>().setZero();

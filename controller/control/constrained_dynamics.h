@@ -46,12 +46,13 @@ class ConstrainedDynamics {
   /// @param object kAtRest: it does not move, whatever the contacts do; its rows are left out.
   /// @param contact_acceleration (k), m/s^2: what the left of the third row less its right is to be, each in
   /// its Sigma_cf, for whoever stabilises the constraint; null for zero.
+  /// @param push wrench on the object by others than contacts, Sigma_o, N, N m; null for none.
   /// @throws SingularityError when the contacts' constraints depend on each other; std::invalid_argument when
   /// sizes differ.
   const Prediction& Predict(const ModelTerms& robot, const GraspTerms& grasp,
                             const Eigen::Ref<const VectorXd>& force,
                             ObjectSupport object = ObjectSupport::kHand,
-                            const VectorXd* contact_acceleration = nullptr);
+                            const VectorXd* contact_acceleration = nullptr, const Vector6d* push = nullptr);
 
   /// The robot without contacts, (18): xi_dot; V_Bo_dot and f_c are zero.
   const Prediction& PredictFree(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force);

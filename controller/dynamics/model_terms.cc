@@ -28,7 +28,7 @@ ModelTerms::ModelTerms(const RobotModel& model, Coordinates coordinates)
     : model_(&model),
       coordinates_(coordinates),
       base_size_(coordinates == Coordinates::kReduced ? model.num_base_velocities()
-                                                      : model.num_base_positions()),
+                                                      : model.num_unreduced_base_velocities()),
       size_(base_size_ + model.num_joints()) {
   const auto add_mass = [this](const MassProperties& body) {
     // Second moments about the link's origin: P = (tr(I)/2) 1 - I + m c c^T.
@@ -89,6 +89,16 @@ void ModelTerms::SetBaseState(const Eigen::Ref<const VectorXd>& q,
   state = LinkState{};
   if (base.type == BaseType::kFixed) return;
 
+  if (base.type == BaseType::kFloating) {
+    base_position_ = q.head<3>();
+    // Rotation of the normalised quaternion: states that were integrated have left the unit sphere a little.
+    base_R_ = Eigen::Quaterniond(q[3], q[4], q[5], q[6]).normalized().toRotationMatrix();
+    state.v = base_R_.transpose() * velocity.head<3>();
+    state.w = velocity.segment<3>(3);
+    SetFloatingColumns();
+    state.v_dot = state.v.cross(state.w);
+    return;
+  }
   phi_ = q[2];
   base_position_ += Vector3d(q[0], q[1], 0.0);
   base_R_ = Eigen::AngleAxisd(phi_, Vector3d::UnitZ()).toRotationMatrix();
@@ -110,6 +120,22 @@ void ModelTerms::SetBaseState(const Eigen::Ref<const VectorXd>& q,
   for (int i = 0; i < base_size_; ++i) {
     state.w_dot += columns_[static_cast<size_t>(i)].w_dot * velocity[i];
     state.v_dot += columns_[static_cast<size_t>(i)].v_dot * velocity[i];
+  }
+}
+
+void ModelTerms::SetFloatingColumns() {
+  // Along the world's axes, which stand still, and about Sigma_0's axes e, which move: such a column has
+  // w = e and v = -e x origin, so w_dot = w_0 x e and, now that the origin is zero, v_dot = v_0 x e.
+  const LinkState& base = links_[0];
+  for (int i = 0; i < 3; ++i) {
+    Column& along = columns_[static_cast<size_t>(i)];
+    along = Column{};
+    along.v = base_R_.row(i).transpose();
+    Column& about = columns_[static_cast<size_t>(3 + i)];
+    about = Column{};
+    about.w = Vector3d::Unit(i);
+    about.w_dot = base.w.cross(about.w);
+    about.v_dot = base.v.cross(about.w);
   }
 }
 

@@ -12,7 +12,8 @@ namespace dexcheck {
 /// Which velocities the terms refer to.
 enum class Coordinates {
   kReduced,    ///< xi = [v; joint rates], equation (18): M_bar', C_bar', F_bar'.
-  kUnreduced,  ///< q_dot' = [q_v_dot; joint rates], equation (16): M, C, F.
+  /// q_dot' = [q_v_dot; joint rates], equation (16): M, C, F. Of a floating base v stands for q_v_dot.
+  kUnreduced,
 };
 
 /// Kinetic energy, potential energy (zero at the world's origin) and momenta of robot or object.
@@ -135,6 +136,7 @@ class ModelTerms {
 
   void SetBaseState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity);
   void SetBaseColumns(const Vector3d& base_linear_velocity);
+  void SetFloatingColumns();
   void SetJointState(int joint, double q, double rate);
   static MassIntegrals CalcLinkIntegrals(const LinkMass& mass, const LinkState& state);
   void PushColumn(int depth, const Column& column, int dof);

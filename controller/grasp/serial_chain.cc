@@ -11,17 +11,6 @@
 #include "controller/object/so3.h"
 
 namespace dexcheck::grasp_internal {
-namespace {
-
-Pose CalcBasePose(const RobotModel& model, const Eigen::Ref<const VectorXd>& q) {
-  Pose X_B0 = model.base().X_B0;
-  if (model.num_base_positions() == 0) return X_B0;
-  X_B0.translation() += Vector3d(q[0], q[1], 0.0);
-  X_B0.linear() = Eigen::AngleAxisd(q[2], Vector3d::UnitZ()).toRotationMatrix();
-  return X_B0;
-}
-
-}  // namespace
 
 SerialChain::SerialChain(const RobotModel& model, int frame, std::span<const int> joints,
                          const Eigen::Ref<const VectorXd>& q)
@@ -29,7 +18,7 @@ SerialChain::SerialChain(const RobotModel& model, int frame, std::span<const int
   Require(q.size() == model.num_positions(), "q", "must have an entry for each position",
           static_cast<double>(q.size()));
   const std::vector<int> chain = ListChain(model, frame);
-  Pose held = CalcBasePose(model, q);
+  Pose held = model.CalcBasePose(q);
   for (const int index : chain) {
     const Joint& joint = model.joints()[static_cast<size_t>(index)];
     const bool revolute = joint.type == JointType::kRevolute;

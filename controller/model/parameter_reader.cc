@@ -65,7 +65,8 @@ Base ReadBase(const TomlValue& value) {
   Base base;
   base.type = table.Get("type").AsChoice<BaseType>({{"fixed", BaseType::kFixed},
                                                     {"planar", BaseType::kPlanar},
-                                                    {"differential_drive", BaseType::kDifferentialDrive}});
+                                                    {"differential_drive", BaseType::kDifferentialDrive},
+                                                    {"floating", BaseType::kFloating}});
   base.link = ReadPartName(table.Get("link"));
   if (base.type == BaseType::kDifferentialDrive) {
     ReadDrive(table, base);

@@ -88,6 +88,10 @@ class SpecChecker {
             Eigen::AngleAxisd(base.X_B0.linear()).angle());
       CheckBody("base", base.body);
     }
+    if (base.type == BaseType::kFloating) {
+      Check(base.X_B0.translation().isZero(0.0), "base.pose",
+            "must not stand beside a floating base, distance 0", base.X_B0.translation().norm());
+    }
     if (base.type != BaseType::kDifferentialDrive) return;
     CheckPositive("base.wheel_radius", base.wheel_radius);
     CheckPositive("base.wheel_distance", base.wheel_distance);
@@ -119,7 +123,20 @@ class SpecChecker {
           "lower limit must not exceed upper limit " + FormatNumber(joint.upper), joint.lower);
     CheckNotNegative(key + "damping", joint.damping);
     CheckNotNegative(key + "armature", joint.armature);
+    CheckNotNegative(key + "dry_friction", joint.dry_friction);
+    if (joint.coupling) CheckCoupling(key + "mimic", *joint.coupling, index);
     CheckBody("link " + Quote(joint.link), joint.body);
+  }
+
+  void CheckCoupling(const std::string& key, const JointCoupling& coupling, int index) const {
+    const bool is_joint = 0 <= coupling.leader && coupling.leader < static_cast<int>(spec_.joints.size());
+    Check(is_joint && coupling.leader != index, key, "must be another joint, index of one", coupling.leader);
+    if (spec_.joints[static_cast<size_t>(coupling.leader)].coupling) {
+      Fail(key, "must be a joint that follows none, got " +
+                    Quote(spec_.joints[static_cast<size_t>(coupling.leader)].name));
+    }
+    CheckFinite(key + ".multiplier", coupling.multiplier);
+    CheckFinite(key + ".offset", coupling.offset);
   }
 
   void CheckFrame(const Frame& frame) {
@@ -183,16 +200,38 @@ RobotModel::RobotModel(RobotSpec spec) : spec_(std::move(spec)) {
   base_with_wheels_ = CalcBaseWithWheels(spec_.base);
 }
 
-int RobotModel::num_base_velocities() const {
+int RobotModel::num_base_positions() const {
   switch (spec_.base.type) {
     case BaseType::kPlanar:
-      return 3;
     case BaseType::kDifferentialDrive:
-      return 2;
+      return 3;
+    case BaseType::kFloating:
+      return 7;
     case BaseType::kFixed:
       break;
   }
   return 0;
+}
+
+int RobotModel::num_base_velocities() const {
+  return spec_.base.type == BaseType::kDifferentialDrive ? 2 : num_unreduced_base_velocities();
+}
+
+int RobotModel::num_unreduced_base_velocities() const {
+  return spec_.base.type == BaseType::kFloating ? 6 : num_base_positions();
+}
+
+Pose RobotModel::CalcBasePose(const Eigen::Ref<const VectorXd>& q) const {
+  Pose X_B0 = spec_.base.X_B0;
+  if (spec_.base.type == BaseType::kFixed) return X_B0;
+  if (spec_.base.type == BaseType::kFloating) {
+    X_B0.linear() = Eigen::Quaterniond(q[3], q[4], q[5], q[6]).normalized().toRotationMatrix();
+    X_B0.translation() = q.head<3>();
+    return X_B0;
+  }
+  X_B0.linear() = Eigen::AngleAxisd(q[2], Vector3d::UnitZ()).toRotationMatrix();
+  X_B0.translation() += Vector3d(q[0], q[1], 0.0);
+  return X_B0;
 }
 
 int RobotModel::FindJoint(std::string_view name) const {

@@ -18,6 +18,10 @@ enum class BaseType {
   kFixed,              ///< No coordinates.
   kPlanar,             ///< q_v = [x, y, phi], v = q_v_dot.
   kDifferentialDrive,  ///< q_v = [x_c, y_c, phi] with the constraint (1); v has two entries (12).
+  /// q_v = [x, y, z, qw, qx, qy, qz], origin and unit quaternion of Sigma_0 in the world; v = [velocity of
+  /// the origin in world axes; angular velocity in Sigma_0's axes]. q_v_dot is no velocity of the model: the
+  /// unreduced coordinates have v too.
+  kFloating,
 };
 
 /// The two choices of v in (12) for a differential drive.
@@ -40,8 +44,9 @@ struct WheelProperties {
 struct Base {
   BaseType type = BaseType::kFixed;
   std::string link = "base";
-  MassProperties body;           ///< Without the wheels, in Sigma_0. Ignored for a fixed base.
-  Pose X_B0 = Pose::Identity();  ///< Sigma_0 in the world frame Sigma_B at q_v = 0; turned only when fixed.
+  MassProperties body;  ///< Without the wheels, in Sigma_0. Ignored for a fixed base.
+  /// Sigma_0 in the world frame Sigma_B at q_v = 0; turned only when fixed, the identity when floating.
+  Pose X_B0 = Pose::Identity();
 
   // Differential drive only.
   DriveVelocity velocity = DriveVelocity::kTwist;
@@ -53,6 +58,13 @@ struct Base {
 };
 
 enum class JointType { kRevolute, kPrismatic };
+
+/// A joint that follows another one: q_i = multiplier q_leader + offset (rad or m).
+struct JointCoupling {
+  int leader = -1;  ///< Index of the joint that is followed, which follows none itself.
+  double multiplier = 1.0;
+  double offset = 0.0;  ///< rad or m
+};
 
 /// A joint and the link that it moves. Frame i of the link follows from its parent's by
 /// X_PB (usually identity), then the MDH row with q_i added to theta (revolute) or to d (prismatic).
@@ -68,6 +80,11 @@ struct Joint {
   double damping = 0.0;   ///< Viscous friction, N m s/rad or N s/m.
   double armature = 0.0;  ///< Reflected rotor inertia, kg m^2 or kg.
   MassProperties body;    ///< Of the link, in frame i.
+
+  // No part of F, which is smooth: the force -dry_friction sign(q_i_dot) stands beside it, and the terms are
+  // those of all joints, of which CalcCouplingMap (harness/sides) takes those that are free.
+  double dry_friction = 0.0;  ///< Coulomb friction, N m or N.
+  std::optional<JointCoupling> coupling;
 };
 
 /// A frame fixed to a link; a fingertip when it carries a sphere.
@@ -113,10 +130,12 @@ class RobotModel {
 
   /// Number of joints of the tree (without the base and the wheels).
   [[nodiscard]] int num_joints() const { return static_cast<int>(spec_.joints.size()); }
-  /// Entries of q_v: 0 or 3.
-  [[nodiscard]] int num_base_positions() const { return spec_.base.type == BaseType::kFixed ? 0 : 3; }
-  /// Entries of v: 0, 3, or 2.
+  /// Entries of q_v: 0, 3, or 7.
+  [[nodiscard]] int num_base_positions() const;
+  /// Entries of v: 0, 3, 2, or 6.
   [[nodiscard]] int num_base_velocities() const;
+  /// Entries of the base's velocity in unreduced coordinates: of q_v_dot, or of v for a floating base.
+  [[nodiscard]] int num_unreduced_base_velocities() const;
   /// p', entries of q': 51 for the paper's robot.
   [[nodiscard]] int num_positions() const { return num_base_positions() + num_joints(); }
   /// p' - r, entries of xi: 50 for the paper's robot.
@@ -140,6 +159,9 @@ class RobotModel {
   /// Number of joints from the base to this one, itself included.
   [[nodiscard]] int depth(int joint) const { return depth_[static_cast<size_t>(joint)]; }
   [[nodiscard]] int max_depth() const { return max_depth_; }
+
+  /// Pose of Sigma_0 in the world at q' (num_positions entries).
+  [[nodiscard]] Pose CalcBasePose(const Eigen::Ref<const VectorXd>& q) const;
 
   /// The base's link with the wheels as part of it (their mass at +-b/2 on the axle), in Sigma_0.
   [[nodiscard]] const MassProperties& base_with_wheels() const { return base_with_wheels_; }

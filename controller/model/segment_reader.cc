@@ -74,19 +74,33 @@ std::vector<SegmentRow> ReadRows(TomlTable& table) {
   return rows;
 }
 
+MimicEntry ReadMimic(const TomlValue& value) {
+  TomlTable table = value.AsTable();
+  const std::optional<TomlValue> multiplier = table.Find("multiplier");
+  const std::optional<TomlValue> offset = table.Find("offset");
+  MimicEntry entry{table.Get("joint"), multiplier ? multiplier->AsNumber() : 1.0,
+                   offset ? offset->AsNumber() : 0.0};
+  table.RejectUnused();
+  return entry;
+}
+
 JointEntry ReadJointEntry(const TomlValue& value) {
   TomlTable table = value.AsTable();
   const auto [range, unit] = table.FindWithAngleUnit("range");
   if (!range) table.FailMissing("range");
   const Vector2d limits = unit * range->AsVector<2>();
   if (limits[0] > limits[1]) range->Fail("lower limit must not exceed upper limit");
+  const std::optional<TomlValue> dry_friction = table.Find("dry_friction");
+  const std::optional<TomlValue> mimic = table.Find("mimic");
   JointEntry entry{value,
                    *range,
                    unit != 1.0,
                    limits[0],
                    limits[1],
                    table.Get("damping").AsNotNegative(),
-                   table.Get("armature").AsNotNegative()};
+                   table.Get("armature").AsNotNegative(),
+                   dry_friction ? dry_friction->AsNotNegative() : 0.0,
+                   mimic ? std::optional(ReadMimic(*mimic)) : std::nullopt};
   table.RejectUnused();
   return entry;
 }

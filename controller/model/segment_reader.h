@@ -24,6 +24,13 @@ struct SegmentRow {
   Pose X_iL = Pose::Identity();  ///< The link's own frame in frame i.
 };
 
+/// The joint that another one follows: q = multiplier q_leader + offset.
+struct MimicEntry {
+  TomlValue joint;
+  double multiplier;
+  double offset;  ///< rad or m
+};
+
 /// An entry of `joints`.
 struct JointEntry {
   TomlValue value;
@@ -33,7 +40,9 @@ struct JointEntry {
   double upper;         ///< rad or m
   double damping;       ///< N m s/rad or N s/m
   double armature;      ///< kg m^2 or kg
-  bool used = false;    ///< A row of this name was found.
+  double dry_friction;  ///< N m or N
+  std::optional<MimicEntry> mimic;
+  bool used = false;  ///< A row of this name was found.
 };
 
 /// An entry of `links`.

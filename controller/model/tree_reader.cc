@@ -20,6 +20,12 @@ struct Template {
   bool used = false;
 };
 
+/// What an entry says of the joint that it follows, and the prefix of its chain's names.
+struct Mimic {
+  const MimicEntry* entry;
+  std::string prefix;
+};
+
 /// An unbranched run of joints: its own rows, then its template's.
 struct Chain {
   TomlValue value;
@@ -82,6 +88,8 @@ class TreeReader {
     if (const std::optional<TomlValue> templates = root.Find("template")) ReadTemplates(*templates);
     for (const TomlValue& value : root.Get("chain").AsList()) ReadChain(value);
     for (size_t i = 0; i < chains_.size(); ++i) BuildChain(i);
+    for (const auto& [joint, mimic] : mimics_)
+      spec_.joints[static_cast<size_t>(joint)].coupling = Resolve(joint, mimic);
     if (const std::optional<TomlValue> frames = root.Find("frame")) {
       for (const TomlValue& value : frames->AsList()) BuildFrame(ReadFrameEntry(value), value, "");
     }
@@ -214,10 +222,42 @@ class TreeReader {
     spec_.joints.push_back({chain.prefix + row.joint, chain.prefix + row.link, parent, row.type,
                             FromOwnFrame(parent, is_plain ? X_LB * row.X_before : X_LB), row.mdh, entry.lower,
                             entry.upper, entry.damping, entry.armature,
-                            has_own_frame ? ExpressIn(link.body, row.X_iL) : link.body});
+                            has_own_frame ? ExpressIn(link.body, row.X_iL) : link.body, entry.dry_friction,
+                            std::nullopt});
+    if (entry.mimic) mimics_.emplace(index, Mimic{&*entry.mimic, chain.prefix});
     own_frames_.push_back(row.X_iL);
     joint_of_link_[chain.prefix + row.link] = index;
     return index;
+  }
+
+  /// The joint that one follows in the end, by its chain's own names or by whole ones.
+  JointCoupling Resolve(int joint, const Mimic& first) const {
+    JointCoupling coupling;
+    std::set<int> seen = {joint};
+    for (const Mimic* at = &first; at != nullptr;) {
+      const MimicEntry& entry = *at->entry;
+      const std::string name = ReadPartName(entry.joint);
+      coupling.leader = FindJoint(at->prefix + name);
+      if (coupling.leader < 0) coupling.leader = FindJoint(name);
+      if (coupling.leader < 0) {
+        std::vector<std::string> names;
+        for (const Joint& other : spec_.joints) names.push_back(other.name);
+        entry.joint.Fail("must be a joint" + Suggest(name, names));
+      }
+      if (!seen.insert(coupling.leader).second) entry.joint.Fail("must not follow itself");
+      coupling.offset += coupling.multiplier * entry.offset;
+      coupling.multiplier *= entry.multiplier;
+      const auto next = mimics_.find(coupling.leader);
+      at = next == mimics_.end() ? nullptr : &next->second;
+    }
+    return coupling;
+  }
+
+  [[nodiscard]] int FindJoint(const std::string& name) const {
+    for (size_t i = 0; i < spec_.joints.size(); ++i) {
+      if (spec_.joints[i].name == name) return static_cast<int>(i);
+    }
+    return -1;
   }
 
   /// The chain's own entry of that name, or else its template's.
@@ -273,6 +313,7 @@ class TreeReader {
   }
 
   RobotSpec& spec_;
+  std::map<int, Mimic> mimics_;   // by joint
   std::vector<Pose> own_frames_;  // X_iL: each link's own frame, in which the file gives masses, in frame i
   std::map<std::string, Template> templates_;
   std::vector<Chain> chains_;

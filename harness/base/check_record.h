@@ -101,6 +101,25 @@ struct CheckRecord {
     return count > 0 ? std::sqrt(sum_of_squares / static_cast<double>(count)) : 0.0;
   }
 
+  /// Takes what is worse in the record of the same check elsewhere; `last` becomes the larger of the two.
+  void Merge(const CheckRecord& other) {
+    if (other.worst > worst) {
+      worst = other.worst;
+      at = other.at;
+      model_value = other.model_value;
+      engine_value = other.engine_value;
+      where = other.where;
+      if (!failed) part = other.part;
+    }
+    if (other.failed && !failed) {
+      failed = true;
+      failed_at = other.failed_at;
+      first_failure = other.first_failure;
+      part = other.part;
+    }
+    if (other.last > last) last = other.last;
+  }
+
   /// Forgets what came of it.
   void Reset() {
     CheckRecord fresh;

@@ -2,21 +2,41 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "harness/checks/law_terms.h"
 
 namespace dexcheck {
+namespace {
 
-CrossCheck::CrossCheck(const Setup& setup, bool knows_law)
+/// What should have been told.
+const MeasuredState& ToldOf(const StepRecord& step) {
+  return step.known != nullptr ? step.known->told.state : step.reading.state;
+}
+
+}  // namespace
+
+CrossCheck::NotIdeal::NotIdeal(const Setup& setup, std::span<const Motor> motors)
+    : plant(setup, motors),
+      controller(setup.controller_side(), setup.fingertips(), setup.scenario().control.orientation) {
+  // What is told of robot, object and contacts need not fit together: contacts are compared at the truth.
+  controller.LeaveOutContacts();
+}
+
+CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool knows_law)
     : setup_(&setup),
-      model_(setup.adapter(), setup.fingertips(), setup.scenario().control.orientation),
+      model_(setup.plant_side(), setup.fingertips(), setup.scenario().control.orientation),
       motion_(setup),
       law_terms_(setup.model().num_positions(), setup.model().num_velocities(),
                  3 * static_cast<int>(setup.fingertips().size())),
       motors_(setup.model(), setup.scenario().plant.time_step),
-      sensors_(setup.model(), setup.fingertips(), setup.scenario().plant.time_step) {
+      sensors_(setup.model(), setup.fingertips(), setup.scenario().plant.time_step),
+      meant_dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())),
+      actuation_(setup.model()),
+      meant_force_(VectorXd::Zero(setup.model().num_velocities())) {
   if (!setup.bonds().empty()) model_.LeaveOutContacts();
   if (!setup.scenario().task && knows_law) law_.emplace(setup);
+  if (!setup.scenario().imperfections.is_ideal()) known_.emplace(setup, motors);
   using enum StepCheck;
   if (!law_) {
     for (const StepCheck check : {kGains, kLawTorque, kLawDemand, kGraspForce}) motion_.LeaveOut(check);
@@ -42,13 +62,21 @@ void CrossCheck::CompareModel(const StepRecord& step) {
     model_.IncludeContacts(std::all_of(state.overlap.begin(), state.overlap.end(),
                                        [](double depth) { return depth > -PlantReading::kFar; }));
   }
-  model_.Compare(step.model->robot(), step.model->grasp(), state, step.reading.X_W0, step.time);
+  const GraspModel& plant = ModelAtTruth(step);
+  model_.Compare(plant.robot(), plant.grasp(), state, step.reading.X_W0, step.time);
+  if (!known_) return;
+  StepModelCheck& controller = known_->controller;
+  controller.Compare(step.model->robot(), step.model->grasp(), step.told.state, step.reading.X_W0, step.time);
+  model_.Merge(controller);
 }
 
 double CrossCheck::CompareTold(const StepRecord& step) {
   const MeasuredState& told = step.told.state;
-  const MeasuredState& truth = step.reading.state;
-  double apart = (told.q - truth.q).lpNorm<Eigen::Infinity>();
+  const MeasuredState& truth = ToldOf(step);
+  const Touch& touch = step.known != nullptr ? step.known->told.touch : step.reading.touch;
+  double apart = std::abs(step.told.touch.support_force - touch.support_force);
+  if (step.told.touch.fingertips != touch.fingertips) apart = std::numeric_limits<double>::infinity();
+  apart = std::max(apart, (told.q - truth.q).lpNorm<Eigen::Infinity>());
   apart = std::max(apart, (told.xi - truth.xi).lpNorm<Eigen::Infinity>());
   apart = std::max(apart, (told.X_Bo.matrix() - truth.X_Bo.matrix()).cwiseAbs().maxCoeff());
   apart = std::max(apart, (told.V_Bo - truth.V_Bo).lpNorm<Eigen::Infinity>());
@@ -59,13 +87,35 @@ double CrossCheck::CompareTold(const StepRecord& step) {
   return apart;
 }
 
+void CrossCheck::FindMeant(const StepRecord& step) {
+  actuation_.CalcForce(step.command.tau, meant_force_);
+  const Prediction& meant = meant_dynamics_.Predict(step.model->robot(), step.model->grasp(), meant_force_);
+  meant_.xi_dot_model = meant.xi_dot;
+  meant_.V_Bo_dot_model = meant.V_Bo_dot;
+  meant_.f_c_model = meant.f_c;
+}
+
+void CrossCheck::ReadControllersTerms(const StepRecord& step) {
+  const StepModelCheck& controller = known_ ? known_->controller : model_;
+  const bool contacts = setup_->bonds().empty() && !known_;
+  ReadEngineTerms(controller.context(), *step.model, step.told.state, contacts, &law_terms_);
+}
+
+const LawErrors& CrossCheck::CompareControl(const StepRecord& step) {
+  ReadControllersTerms(step);
+  if (!known_ && step.drive.tau == step.command.tau) {
+    return law_->Compare(step, motion_.findings(), law_terms_, *motion_.mass_factor());
+  }
+  FindMeant(step);
+  return law_->Compare(step, meant_, law_terms_, meant_dynamics_.mass_factor());
+}
+
 void CrossCheck::CompareUnsent(const StepRecord& step) {
   if (!law_ || !LawCheck::IsJudged(step)) return;
   CompareModel(step);
   motion_.Add(StepCheck::kTold, CompareTold(step), step.time);
-  sensors_.Add(step.told.state, step.reading.state);
-  if (!law_->has_demand()) return;  // of a baseline
-  ReadEngineTerms(model_.context(), *step.model, step.told.state, setup_->bonds().empty(), &law_terms_);
+  sensors_.Add(step.told.state, ToldOf(step));
+  ReadControllersTerms(step);
   motion_.Add(StepCheck::kLawTorque, law_->CompareUnsent(step, law_terms_), step.time);
 }
 
@@ -87,8 +137,9 @@ void CrossCheck::CompareLaw(const StepRecord& step) {
   const Expectation& expect = setup_->scenario().expect;
   motion_.Add(StepCheck::kTold, CompareTold(step), t);
   motion_.Add(StepCheck::kTorqueApplied, LawCheck::CompareApplied(step), t);
-  motors_.Add(step.command.tau, step.response.motor_torques, step.reading.state.xi);
-  sensors_.Add(step.told.state, step.reading.state);
+  motors_.Add(step.known != nullptr ? step.known->tau : step.command.tau, step.response.motor_torques,
+              step.reading.state.xi);
+  sensors_.Add(step.told.state, ToldOf(step));
   if (step.command.tracks && t >= expect.from) {
     motion_.Add(StepCheck::kExpectPosition, step.error.position.norm(), t);
     motion_.Add(StepCheck::kExpectOrientation, step.error.orientation, t);
@@ -96,9 +147,7 @@ void CrossCheck::CompareLaw(const StepRecord& step) {
   if (!law_) return;
   motion_.Add(StepCheck::kGains, law_->sampled_radius(), t);
   if (!LawCheck::IsJudged(step)) return;
-  const bool contacts = setup_->bonds().empty();
-  ReadEngineTerms(model_.context(), *step.model, step.told.state, contacts, &law_terms_);
-  const LawErrors& errors = law_->Compare(step, motion_.findings(), law_terms_, *motion_.mass_factor());
+  const LawErrors& errors = CompareControl(step);
   motion_.Add(StepCheck::kLawTorque, errors.torque, t);
   motion_.Add(StepCheck::kLawDemand, errors.demand, t);
   motion_.Add(StepCheck::kGraspForce, errors.grasp_force, t);

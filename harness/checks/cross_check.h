@@ -7,7 +7,9 @@
 #include <string>
 #include <string_view>
 
+#include "controller/control/constrained_dynamics.h"
 #include "harness/checks/attribution.h"
+#include "harness/checks/known_plant.h"
 #include "harness/checks/law_check.h"
 #include "harness/checks/signal_evidence.h"
 #include "harness/checks/step_checks.h"
@@ -20,9 +22,18 @@ namespace dexcheck {
 /// check of the model fails for the first time.
 class CrossCheck {
  public:
+  /// @param motors of the plant.
   /// @throws InputError as EngineStep, or when a bound of the scenario has the name of no check.
   /// @param knows_law whether the controller's law is the scenario's; otherwise no check of the law is made.
-  explicit CrossCheck(const Setup& setup, bool knows_law = true);
+  CrossCheck(const Setup& setup, std::span<const Motor> motors, bool knows_law = true);
+
+  /// What the scenario itself asks for; null for an ideal plant. Once at each step, before the questions,
+  /// also of those steps that are not asked about.
+  const KnownStep* Follow(const StepRecord& step) { return known_ ? &known_->plant.Follow(step) : nullptr; }
+  /// Robot and object are elsewhere from now on, by `way` (m, world).
+  void Translate(const Vector3d& way) {
+    if (known_) known_->plant.Translate(way);
+  }
 
   /// The first question: are the terms that the controller used the engine's?
   void CompareModel(const StepRecord& step);
@@ -50,16 +61,34 @@ class CrossCheck {
   [[nodiscard]] const StepFindings& findings() const { return motion_.findings(); }
 
  private:
+  /// What a plant that is not ideal needs besides.
+  struct NotIdeal {
+    NotIdeal(const Setup& setup, std::span<const Motor> motors);
+    KnownPlant plant;
+    /// Of the controller's terms at what it was told, by an engine without the scenario's mismatch.
+    StepModelCheck controller;
+  };
   static double CompareTold(const StepRecord& step);
+  /// The engine's at what the controller was told; contacts that need not fit together are the controller's.
+  void ReadControllersTerms(const StepRecord& step);
+  /// What the controller's rigid system does under the torques that were sent.
+  void FindMeant(const StepRecord& step);
+  /// Of torques that the controller computed at this step.
+  const LawErrors& CompareControl(const StepRecord& step);
 
   const Setup* setup_;
   StepModelCheck model_;
   StepChecks motion_;
+  std::optional<NotIdeal> known_;
   std::optional<LawCheck> law_;  // none for a task, or an unknown law
   LawTerms law_terms_;           // the engine's
   std::vector<CheckRecord> settling_failures_;
   MotorEvidence motors_;
   SensorEvidence sensors_;
+  ConstrainedDynamics meant_dynamics_;
+  ActuationMap actuation_;
+  VectorXd meant_force_;  // n
+  StepFindings meant_;    // by FindMeant
 };
 
 }  // namespace dexcheck

@@ -7,6 +7,7 @@
 
 #include "controller/object/euler_zyz.h"
 #include "controller/object/so3.h"
+#include "harness/checks/known_plant.h"
 #include "harness/checks/step_check_table.h"
 
 namespace dexcheck {
@@ -119,16 +120,22 @@ double LawCheck::CompareUnsent(const StepRecord& step, const LawTerms& terms) {
   own_factor_.Compute(terms.M);
   mass_factor_ = &own_factor_;
   errors_ = LawErrors{};
-  if (!reference_.Evaluate(spec_, terms, EvaluateDesired(step.time), step.command.demand.F_N))
+  const DesiredMotion desired = EvaluateDesired(step.time);
+  const VectorXd& F_N = step.command.demand.F_N;
+  if (!reference_.Evaluate(spec_, terms, desired, F_N) ||
+      (baseline_ &&
+       !baseline_->Evaluate(spec_, reference_, terms, step.model->grasp().G_dot(), desired, F_N))) {
     return std::numeric_limits<double>::infinity();
+  }
   force_ = terms.C_xi + terms.gravity + terms.friction;
   scale_ = std::max(Norm(force_), std::numeric_limits<double>::min());
-  CompareTorque(step, reference_.force());
+  CompareTorque(step, baseline_ ? baseline_->force() : reference_.force());
   return errors_.torque;
 }
 
 double LawCheck::CompareApplied(const StepRecord& step) {
-  return (step.response.motor_torques - step.command.tau).cwiseAbs().maxCoeff() /
+  const VectorXd& expected = step.known != nullptr ? step.known->tau : step.command.tau;
+  return (step.response.motor_torques - expected).cwiseAbs().maxCoeff() /
          std::max(step.command.tau.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
 }
 
@@ -186,19 +193,30 @@ void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms, 
 
 void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                            const DesiredMotion& desired) {
+  // The truth, which the law's terms need not be at.
+  LawObject truth{terms.X_Bo, terms.V_Bo, terms.X_o};
+  if (step.known != nullptr) {
+    truth.X_Bo = step.reading.state.X_Bo;
+    truth.V_Bo = step.reading.state.V_Bo;
+    if (spec_.orientation == OrientationFeedback::kAngles)
+      truth.X_o = CalcObjectCoordinates(truth.X_Bo, terms.X_o);
+  }
   if (!follows_) {
-    followed_ = {terms.X_Bo, terms.V_Bo, terms.X_o};
+    followed_ = truth;
     follows_ = true;
   }
-  errors_.error_dynamics = (followed_.X_Bo.translation() - terms.X_Bo.translation()).norm();
-  errors_.orientation_dynamics =
-      LogSo3(followed_.X_Bo.linear().transpose() * terms.X_Bo.linear()).norm();
+  errors_.error_dynamics = (followed_.X_Bo.translation() - truth.X_Bo.translation()).norm();
+  const Matrix3d D = followed_.X_Bo.linear().transpose() * truth.X_Bo.linear();
+  const Vector3d twice_sine(D(2, 1) - D(1, 2), D(0, 2) - D(2, 0), D(1, 0) - D(0, 1));
+  errors_.orientation_dynamics = std::atan2(0.5 * twice_sine.norm(), 0.5 * (D.trace() - 1.0));
   // Semi-implicit, as the plant: velocities first. v = R^T p_dot, hence p_ddot = R (v_dot + omega x v).
   if (spec_.orientation == OrientationFeedback::kAngles)
     followed_.X_o = CalcObjectCoordinates(followed_.X_Bo, followed_.X_o);
   Vector6d V_dot = reference_.CalcDemand(spec_, followed_, desired);
-  // What the engine's object did beyond the rigid prediction.
-  V_dot += step.response.V_Bo_dot - findings.V_Bo_dot_model;
+  // What the engine's object did beyond the rigid prediction. Where it is told otherwise, given otherwise and
+  // pushed, all of that drives (57) as well: what it did beyond what its true error demands.
+  V_dot += step.response.V_Bo_dot -
+           (step.known != nullptr ? reference_.CalcDemand(spec_, truth, desired) : findings.V_Bo_dot_model);
   Matrix3d R = followed_.X_Bo.linear();
   const Vector3d v = followed_.V_Bo.head<3>();
   Vector3d omega = followed_.V_Bo.tail<3>();

@@ -104,7 +104,7 @@ class LawCheck {
   VectorXd slope_;                     // k
   RowMatrixXd column_;                 // n x 1
   bool follows_ = false;               // whether the one below is set
-  ObjectState followed_;               // of (57); velocities half a step before
+  LawObject followed_;               // of (57); velocities half a step before
 };
 
 }  // namespace dexcheck

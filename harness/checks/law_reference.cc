@@ -135,7 +135,7 @@ void LawReference::AddLeastForces(const Vector6d& F_o, VectorXd* f_c) const {
 
 Vector6d LawReference::SolveGrasp(const Eigen::Ref<const VectorXd>& f) const { return G_llt_.solve(G_ * f); }
 
-void LawReference::CalcObjectAcceleration(const LawSpec& spec, const ObjectState& object,
+void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawObject& object,
                                           const DesiredMotion& desired) {
   const Matrix3d R_T = object.X_Bo.linear().transpose();
   const Vector3d v = object.V_Bo.head<3>();
@@ -178,7 +178,7 @@ void LawReference::CalcObjectAcceleration(const LawSpec& spec, const ObjectState
   V_Bo_dot_ = feed_forward + velocity + position + rate;
 }
 
-Vector6d LawReference::CalcDemand(const LawSpec& spec, const ObjectState& object, const DesiredMotion& desired) {
+Vector6d LawReference::CalcDemand(const LawSpec& spec, const LawObject& object, const DesiredMotion& desired) {
   CalcObjectAcceleration(spec, object, desired);
   return V_Bo_dot_;
 }

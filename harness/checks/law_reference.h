@@ -57,7 +57,7 @@ struct LawTerms {
 };
 
 /// The object's part of it.
-struct ObjectState {
+struct LawObject {
   Pose X_Bo = Pose::Identity();
   Vector6d V_Bo = Vector6d::Zero();
   Vector6d X_o = Vector6d::Zero();  ///< kAngles only.
@@ -117,7 +117,7 @@ class LawReference {
                 const Eigen::Ref<const VectorXd>& F_N);
 
   /// V_o_dot that (55) demands of an object in this state, wherever the robot is.
-  Vector6d CalcDemand(const LawSpec& spec, const ObjectState& object, const DesiredMotion& desired);
+  Vector6d CalcDemand(const LawSpec& spec, const LawObject& object, const DesiredMotion& desired);
 
   /// E_bar' tau' (n), and its summands (n x kLawPartCount).
   [[nodiscard]] const VectorXd& force() const { return force_; }
@@ -141,7 +141,7 @@ class LawReference {
 
  private:
   [[nodiscard]] bool FactorJacobian(const LawSpec& spec, const LawTerms& terms);
-  void CalcObjectAcceleration(const LawSpec& spec, const ObjectState& object, const DesiredMotion& desired);
+  void CalcObjectAcceleration(const LawSpec& spec, const LawObject& object, const DesiredMotion& desired);
   void AddMotionPart(LawPart part, const LawTerms& terms, const Eigen::Ref<const VectorXd>& rates);
 
   MatrixXd J_plus_;     // n x k

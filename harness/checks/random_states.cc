@@ -1,5 +1,7 @@
 #include "harness/checks/random_states.h"
 
+#include <cmath>
+
 namespace dexcheck {
 
 StateSource::StateSource(const RobotModel& model, const StateRange& range, std::uint64_t seed)
@@ -16,6 +18,15 @@ void StateSource::DrawPositions(VectorXd* q) {
     for (int i = 0; i < 2; ++i) (*q)[i] = Draw(-range_.area, range_.area);
     (*q)[2] = Draw(-kPi, kPi);
   }
+  if (model_->base().type == BaseType::kFloating) {
+    for (int i = 0; i < 3; ++i) (*q)[i] = Draw(-range_.area, range_.area);
+    // Any rotation, all alike [Shoemake, Uniform random rotations, Graphics Gems III, 1992].
+    const double u = Draw(0.0, 1.0);
+    const double first = Draw(0.0, 2.0 * kPi);
+    const double second = Draw(0.0, 2.0 * kPi);
+    q->segment<4>(3) << std::sqrt(1.0 - u) * std::sin(first), std::sqrt(1.0 - u) * std::cos(first),
+        std::sqrt(u) * std::sin(second), std::sqrt(u) * std::cos(second);
+  }
   for (int i = 0; i < model_->num_joints(); ++i) {
     const Joint& joint = model_->joints()[static_cast<size_t>(i)];
     (*q)[offset + i] = Draw(joint.lower, joint.upper);
@@ -26,7 +37,7 @@ void StateSource::DrawVelocity(VectorXd* xi) {
   const auto draw = [&](double limit) { return Draw(-limit, limit); };
   const int base = model_->num_base_velocities();
   for (int i = 0; i < base; ++i) {
-    const bool linear = base == 3 ? i < 2 : i == 0;
+    const bool linear = base == 6 ? i < 3 : base == 3 ? i < 2 : i == 0;
     (*xi)[i] = draw(linear ? range_.linear_speed : range_.joint_speed);
   }
   if (base == 2 && model_->base().velocity == DriveVelocity::kWheelRates) {

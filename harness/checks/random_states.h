@@ -11,7 +11,7 @@ namespace dexcheck {
 
 /// Where random states lie.
 struct StateRange {
-  double joint_speed = 5.0;   ///< Revolute joints and yaw, at most, rad/s.
+  double joint_speed = 5.0;   ///< Revolute joints, yaw, and each angular rate of the base, at most, rad/s.
   double linear_speed = 2.0;  ///< Base and prismatic joints, at most, m/s.
   double area = 5.0;          ///< The base stands within +-area of the origin, m.
 };
@@ -23,7 +23,7 @@ class StateSource {
   /// The model must outlive this.
   StateSource(const RobotModel& model, const StateRange& range, std::uint64_t seed);
 
-  /// q': joints within their ranges, any heading. `q` has the right size.
+  /// q': joints within their ranges, any heading, any attitude of a floating base. `q` has the right size.
   void DrawPositions(VectorXd* q);
   /// xi.
   void DrawVelocity(VectorXd* xi);

@@ -92,7 +92,8 @@ void CheckJacobianZeros(const C& c, ComparedTerm* term) {
   }
 }
 
-/// M of (16): its first three rows are along the world's x, y and about z; the others are M_bar's.
+/// M of (16): its first rows are along the world's x, y and about z; the others are M_bar's. Of a floating
+/// base there is no other choice: M is M_bar.
 Items ListWholeMass(const C& c) {
   const int n = c.unreduced->size();
   const int shift = n - c.robot->size();
@@ -106,7 +107,8 @@ Items ListWholeMass(const C& c) {
 void WeighWholeMass(const C& c, int, N weight) {
   const int n = c.unreduced->size();
   const int shift = n - c.robot->size();
-  const int base = ModelOf(c).num_base_positions();
+  // Rows that M_bar does not have.
+  const int base = shift > 0 ? ModelOf(c).num_unreduced_base_velocities() : 0;
   const RoundingScales& scales = *c.scales;
   const auto velocity = [&](int i) {
     return i < base ? (i < 2 ? 1.0 : scales.length()) : scales.CalcVelocityScale(i - shift);

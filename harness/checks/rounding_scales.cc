@@ -59,6 +59,7 @@ void RoundingScales::SetState(const ModelTerms& terms, const Eigen::Ref<const Ve
                               const Eigen::Ref<const VectorXd>& xi) {
   world_length_ = reach_ + model_->base().X_B0.translation().norm();
   if (model_->num_base_positions() == 3) world_length_ += q.head<2>().norm();
+  if (model_->base().type == BaseType::kFloating) world_length_ += q.head<3>().norm();
 
   base_velocity_ = terms.CalcLinkVelocity(-1);
   double sliding = base_velocity_.head<3>().squaredNorm();
@@ -82,6 +83,7 @@ double RoundingScales::CalcVelocityScale(int coordinate) const {
         model_->joints()[static_cast<size_t>(coordinate - base_velocities_)].type == JointType::kRevolute;
     return revolute ? reach_ : 1.0;
   }
+  if (base_velocities_ == 6) return coordinate < 3 ? 1.0 : reach_;
   if (base_velocities_ == 3) return coordinate < 2 ? 1.0 : reach_;
   if (model_->base().velocity == DriveVelocity::kTwist) return coordinate == 0 ? 1.0 : reach_;
   return 0.5 * model_->base().wheel_radius +

@@ -7,6 +7,7 @@
 
 #include "controller/common/text.h"
 #include "controller/contact/rolling.h"
+#include "harness/checks/known_plant.h"
 
 namespace dexcheck {
 namespace {
@@ -30,11 +31,17 @@ void FollowCharts(const Surface& tip, const Surface& object, const ContactCoordi
   *integrated = ChangeCharts(tip, object, *integrated, tip_chart, object_chart);
 }
 
+/// Null for none.
+const Vector6d* PushOf(const StepRecord& step) {
+  return step.known != nullptr ? &step.known->object_wrench : nullptr;
+}
+
 }  // namespace
 
 StepChecks::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)
-    : grasp(setup.model(), setup.fingertips(), setup.object().body, setup.surface(), set),
-      dynamics(setup.model(), static_cast<int>(grasp.members().size())) {}
+    : grasp(setup.known_model(), setup.fingertips(), setup.known_model().object()->body, setup.surface(),
+            set),
+      dynamics(setup.known_model(), static_cast<int>(grasp.members().size())) {}
 
 StepChecks::StepChecks(const Setup& setup)
     : setup_(&setup),
@@ -55,6 +62,7 @@ StepChecks::StepChecks(const Setup& setup)
   force_.setZero(n);
   bias_.setZero(n);
   residual_.setZero(n);
+  push_before_.setZero(n);
   column_.setZero(n, 1);
   left_of_robot_.setZero(n);
   idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
@@ -96,10 +104,11 @@ void StepChecks::SetApplying() {
   leave_out(!setup_->scenario().task, {kUnjudged});
   leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kRolling, kTractionUse});
   leave_out(setup_->model().base().type == BaseType::kFixed, {kBaseTilt});
-  leave_out(setup_->idle_joints().empty(), {kIdleJoints});
+  // Nothing but stiffness holds them: whatever is not ideal moves them.
+  leave_out(setup_->idle_joints().empty() || !setup_->scenario().imperfections.is_ideal(), {kIdleJoints});
   // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
   leave_out(setup_->scenario().plant.type == PlantType::kRigid,
-            {kWheelSlip, kWheelSlipRate, kTractionUse, kBaseTilt, kSolver});
+            {kWheelSlip, kRolling, kWheelSlipRate, kTractionUse, kBaseTilt, kSolver});
   const mjModel& engine = setup_->engine();
   const mjtByte* const limited = engine.actuator_ctrllimited;
   leave_out(std::none_of(limited, limited + engine.nu, [](mjtByte flag) { return flag != 0; }), {kActuators});
@@ -151,7 +160,7 @@ void StepChecks::Compare(const StepRecord& step) {
   was_holding_ = handling.holding;
   MoveWindows(step.reading.state);
   ReadSlip(step);
-  if (!setup_->adapter().wheels().empty()) CompareRolling(step);
+  if (step.response.wheels.size() == 2) CompareRolling(step);
   if (handling.holding) CompareKappa(step);
 
   Add(StepCheck::kBaseTilt, step.reading.departure.tilt);
@@ -167,7 +176,7 @@ void StepChecks::CompareContacts(const StepRecord& step) {
   double penetration = 0.0;
   for (size_t i = 0; i < contacts.size(); ++i) {
     const Matrix3d R_B_cf =
-        step.reading.state.X_Bo.linear() * step.model->grasp().contacts()[i].geometry.g_o_cf.linear();
+        step.reading.state.X_Bo.linear() * ModelAtTruth(step).grasp().contacts()[i].geometry.g_o_cf.linear();
     findings_.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) = R_B_cf.transpose() * contacts[i].force;
     if (!contacts[i].touching) ++lost;
     if (holding && !contacts[i].touching && findings_.fingertip_slip[i].touching) ++findings_.contacts_lost;
@@ -210,13 +219,13 @@ void StepChecks::ForgetSlip() {
 }
 
 void StepChecks::Predict(const StepRecord& step) {
-  const ModelTerms& robot = step.model->robot();
-  const GraspTerms& grasp = step.model->grasp();
+  const ModelTerms& robot = ModelAtTruth(step).robot();
+  const GraspTerms& grasp = ModelAtTruth(step).grasp();
   const bool whole = touching_ == AllContacts(grasp.num_contacts());
   if (handling_.partial && !whole && touching_ != 0) return PredictPart(step);
   const Prediction* prediction = nullptr;
   if (!handling_.partial || (whole && !supported_)) {
-    prediction = &dynamics_.Predict(robot, grasp, force_);
+    prediction = &dynamics_.Predict(robot, grasp, force_, ObjectSupport::kHand, nullptr, PushOf(step));
   } else if (whole) {
     prediction = &dynamics_.Predict(robot, grasp, force_, ObjectSupport::kAtRest);
   } else {
@@ -229,12 +238,13 @@ void StepChecks::Predict(const StepRecord& step) {
 }
 
 void StepChecks::PredictPart(const StepRecord& step) {
-  const ModelTerms& robot = step.model->robot();
+  const ModelTerms& robot = ModelAtTruth(step).robot();
   std::unique_ptr<PartialDynamics>& part = parts_[touching_];
   if (!part) part = std::make_unique<PartialDynamics>(*setup_, touching_);
   part->grasp.SetState(robot, step.reading.state);
   const Prediction& prediction = part->dynamics.Predict(
-      robot, part->grasp.terms(), force_, supported_ ? ObjectSupport::kAtRest : ObjectSupport::kHand);
+      robot, part->grasp.terms(), force_, supported_ ? ObjectSupport::kAtRest : ObjectSupport::kHand, nullptr,
+      PushOf(step));
   findings_.xi_dot_model = prediction.xi_dot;
   findings_.V_Bo_dot_model = prediction.V_Bo_dot;
   part->grasp.Scatter(prediction.f_c, findings_.f_c_model);
@@ -242,9 +252,10 @@ void StepChecks::PredictPart(const StepRecord& step) {
 }
 
 void StepChecks::CompareDynamics(const StepRecord& step) {
-  const ModelTerms& robot = step.model->robot();
+  const ModelTerms& robot = ModelAtTruth(step).robot();
   const VectorXd& xi_dot = step.response.xi_dot;
   actuation_.CalcForce(step.drive.tau, force_);
+  if (step.known != nullptr) force_ += step.known->force;
   Predict(step);
 
   // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
@@ -252,7 +263,7 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   bias_.noalias() += robot.C() * step.reading.state.xi;
   residual_ = bias_ - force_;
   residual_.noalias() += robot.M() * xi_dot;
-  residual_.noalias() += step.model->grasp().J_B().transpose() * findings_.f_c;
+  residual_.noalias() += ModelAtTruth(step).grasp().J_B().transpose() * findings_.f_c;
   if (step.response.departure_force.size() > 0) residual_ += step.response.departure_force;
   if (step.response.solver_force.size() > 0) residual_ -= step.response.solver_force;
   left_of_robot_ = residual_;
@@ -265,7 +276,8 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   const double scale = std::max(norm(bias_), std::numeric_limits<double>::min());
   scale_ = scale;
   const double left = norm(residual_);
-  Add(StepCheck::kBalanceRobot, std::isnan(left) ? left : std::max(0.0, left - CalcUnevenForce(step)) / scale);
+  Add(StepCheck::kBalanceRobot,
+      std::isnan(left) ? left : std::max(0.0, left - CalcUnevenForce(step)) / scale);
   solver_of_robot_ = step.response.solver_force.size() > 0 ? norm(step.response.solver_force) / scale : 0.0;
   if (force_before_.size() == force_.size()) {
     bias_ = force_ - force_before_;
@@ -273,28 +285,38 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   }
   force_before_ = force_;
 
+  if (step.known != nullptr && f_c_before_.size() == findings_.f_c_model.size()) {
+    // A push changes contact forces without any torque, and wheels give to it as well.
+    bias_.noalias() = ModelAtTruth(step).grasp().J_B().transpose() * (findings_.f_c_model - f_c_before_);
+    AddGive(norm(bias_) / scale, &push_give_);
+    bias_ = step.known->force - push_before_;
+    AddGive(norm(bias_) / scale, &edge_give_);
+    push_before_ = step.known->force;
+  }
+
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
   mass_factor_->Multiply(residual_);
-  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale, robot_give_);
+  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale, robot_give_ + push_give_);
   double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) force_scale = std::max(force_scale, Weight());
   const VectorXd& f_c = findings_.f_c_model;
   if (f_c_before_.size() == f_c.size()) AddGive((f_c - f_c_before_).norm() / force_scale, &force_give_);
   f_c_before_ = f_c;
-  AddLessGive(StepCheck::kContactForce, (f_c - findings_.f_c).norm() / force_scale, force_give_);
+  AddLessGive(StepCheck::kContactForce, (f_c - findings_.f_c).norm() / force_scale, force_give_ + edge_give_);
 }
 
 double StepChecks::CalcUnevenForce(const StepRecord& step) const {
-  // In |.|_M^-1 the force of an acceleration a that all masses feel is at most a sqrt(m): a tilt by theta gives gravity
-  // g theta along the floor, and tyres that slip by v in a turn at w give 2 v w.
+  // In |.|_M^-1 the force of an acceleration a that all masses feel is at most a sqrt(m): a tilt by theta
+  // gives gravity g theta along the floor, and tyres that slip by v in a turn at w give 2 v w.
   double slip = 0.0;
   for (const BodyContact& wheel : step.response.wheels) slip = std::max(slip, wheel.slip.norm());
   const double turn = step.reading.state.q.size() > 0 && !step.response.wheels.empty()
                           ? std::abs(wheels_.CalcTurn(step.reading.state.xi))
                           : 0.0;
-  return (setup_->model().gravity().norm() * step.reading.departure.tilt + 2.0 * slip * turn) * std::sqrt(mass_);
+  return (setup_->model().gravity().norm() * step.reading.departure.tilt + 2.0 * slip * turn) *
+         std::sqrt(mass_);
 }
 
 void StepChecks::AddGive(double change, double* give) const {
@@ -313,24 +335,28 @@ double StepChecks::Weight() const { return setup_->object().body.mass * setup_->
 
 void StepChecks::CompareObject(const StepRecord& step) {
   // (19), as forces at the contacts' arm
-  const GraspTerms& grasp = step.model->grasp();
+  const GraspTerms& grasp = ModelAtTruth(step).grasp();
   const PlantResponse& response = step.response;
   const ObjectBodyTerms& body = grasp.body();
   const double arm = grasp.contacts()[0].geometry.g_o_cf.translation().norm();
+  const Vector6d push = step.known != nullptr ? step.known->object_wrench : Vector6d(Vector6d::Zero());
   const auto relative = [&](const Vector6d& wrench) {
     return std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) /
            std::max(Weight(), findings_.f_c.norm());
   };
   left_of_object_ = body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
-                    grasp.G() * findings_.f_c - response.support_wrench - response.solver_residual;
+                    grasp.G() * findings_.f_c - response.support_wrench - response.solver_residual - push;
   Add(StepCheck::kBalanceObject, relative(left_of_object_));
   Add(StepCheck::kSolver, std::max(relative(response.solver_residual), solver_of_robot_));
 }
 
 void StepChecks::KeepForces(const StepRecord& step) {
-  const auto fails = [&](StepCheck which) { return check(which).applies && !(check(which).last <= check(which).bound); };
+  const auto fails = [&](StepCheck which) {
+    return check(which).applies && !(check(which).last <= check(which).bound);
+  };
   if (!fails(StepCheck::kBalanceRobot) && !fails(StepCheck::kBalanceObject)) return;
-  forces_.Add(left_of_robot_, left_of_object_, *step.model, step.reading.state.q, *mass_factor_, scale_);
+  forces_.Add(left_of_robot_, left_of_object_, ModelAtTruth(step), step.reading.state.q, *mass_factor_,
+              scale_);
 }
 
 void StepChecks::CompareRolling(const StepRecord& step) {
@@ -342,8 +368,8 @@ void StepChecks::CompareRolling(const StepRecord& step) {
   const Vector2d mismatch = wheels_.CalcMismatch(xi, rates);
   double beyond = 0.0;
   for (size_t k = 0; k < 2; ++k) {
-    beyond = std::max(beyond, std::abs(mismatch[static_cast<Eigen::Index>(k)]) -
-                                  step.response.wheels[k].slip.norm());
+    beyond = std::max(beyond,
+                      std::abs(mismatch[static_cast<Eigen::Index>(k)]) - step.response.wheels[k].slip.norm());
   }
   Add(StepCheck::kRolling, beyond);
   if (!(beyond <= check(StepCheck::kRolling).bound)) wheels_.Add(xi, rates);
@@ -382,7 +408,8 @@ void StepChecks::ReadSlip(const StepRecord& step) {
   for (size_t i = 0; i < response.fingertips.size(); ++i) {
     SlipState& slip = findings_.fingertip_slip[i];
     update(&slip, response.fingertips[i], state.X_Bo.linear());
-    const Vector2d unasked = step.model->grasp().slip_bias().segment<2>(3 * static_cast<Eigen::Index>(i));
+    const Vector2d unasked =
+        ModelAtTruth(step).grasp().slip_bias().segment<2>(3 * static_cast<Eigen::Index>(i));
     rate = std::max(rate, slip.velocity.norm() - time_step_ * unasked.norm());
     if (slip.touching && holding) {
       findings_.least_cone_margin = std::min(findings_.least_cone_margin, slip.cone_margin);
@@ -429,7 +456,7 @@ void StepChecks::CheckJointStops(const MeasuredState& state) {
 }
 
 void StepChecks::CompareKappa(const StepRecord& step) {
-  const GraspTerms& grasp = step.model->grasp();
+  const GraspTerms& grasp = ModelAtTruth(step).grasp();
   const MeasuredState& state = step.reading.state;
   double apart = 0.0;
   for (size_t i = 0; i < kappa_.size(); ++i) {

@@ -119,12 +119,16 @@ class StepChecks {
   double time_ = 0.0;
   VectorXd force_, bias_, residual_;    // n
   VectorXd force_before_, f_c_before_;  // n, 3N: of the last step that was judged; empty before
-  double robot_give_ = 0.0;  // what contacts give for changes of E_bar' tau', relative as reduced_acceleration
+  double robot_give_ =
+      0.0;  // what contacts give for changes of E_bar' tau', relative as reduced_acceleration
+  // Likewise for changes of J_B'^T f_c, and of pushes on the robot; zero where the plant is ideal.
+  double push_give_ = 0.0, edge_give_ = 0.0;
+  VectorXd push_before_;     // n
   double force_give_ = 0.0;  // likewise of f_c, relative as contact_force
   RowMatrixXd column_;       // n x 1
   ForceEvidence forces_;
   WheelEvidence wheels_;
-  VectorXd left_of_robot_;                        // n, of the step's balance
+  VectorXd left_of_robot_;  // n, of the step's balance
   Vector6d left_of_object_ = Vector6d::Zero();
   double scale_ = 1.0;
   double solver_of_robot_ = 0.0;  // relative, as balance_robot

@@ -17,6 +17,12 @@ StepModelCheck::StepModelCheck(const Adapter& adapter, std::span<const int> fing
   Ask(kAskedByRun, has_coordinates_ ? std::span<const TermGroup>() : kCoordinates);
 }
 
+void StepModelCheck::Merge(const StepModelCheck& other) {
+  for (size_t i = 0; i < records_.size(); ++i) {
+    if (other.records_[i].applies) records_[i].Merge(other.records_[i]);
+  }
+}
+
 void StepModelCheck::LeaveOutContacts() {
   with_contacts_ = false;
   for (size_t i = 0; i < records_.size(); ++i) records_[i].applies = !IsOfContacts(i);

@@ -21,6 +21,8 @@ class StepModelCheck : public TermComparison {
 
   /// Whether Compare includes the contacts' terms: not while a fingertip is far from the object.
   void IncludeContacts(bool include) { with_contacts_ = include; }
+  /// Takes what is worse in the records of another such check, of the terms that it compares.
+  void Merge(const StepModelCheck& other);
   /// There are bonds in the place of contacts, where the engine has nothing to compare with.
   void LeaveOutContacts();
 

@@ -12,6 +12,8 @@
 
 namespace dexcheck {
 
+struct KnownStep;
+
 /// Distance of the object from its desired pose.
 struct TrackingError {
   Vector3d position = Vector3d::Zero();  ///< X_d - X_o, world, m.
@@ -57,8 +59,13 @@ struct StepRecord {
   TrackingError error;
   /// The model as the controller evaluated it, at what it was told; until the next step.
   const GraspModel* model = nullptr;
+  /// What the scenario itself asks for beyond an ideal plant; null without cross-check or where it is ideal.
+  const KnownStep* known = nullptr;
   StepFindings findings;  ///< Without cross-check empty.
 };
+
+/// The model at the truth: the controller's own where it is told that and the plant is ideal.
+[[nodiscard]] const GraspModel& ModelAtTruth(const StepRecord& step);
 
 /// Pose of the object, whose angles are on the controller's branch where it uses them.
 [[nodiscard]] Vector6d CalcX_o(const StepRecord& step);

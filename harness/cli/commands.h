@@ -19,6 +19,7 @@ struct RobotFiles {
 Option AddRobotOptions(Command command, RobotFiles* files);
 
 /// Each adds its command to `app`.
+void AddAuditCommand(Command app);
 void AddConsistencyCommand(Command app);
 void AddDiagnoseCommand(Command app);
 void AddMutateCommand(Command app);
@@ -27,10 +28,12 @@ void AddImportCommand(Command app);
 void AddPlanCommand(Command app);
 /// @param command_line as typed, to be kept in the log.
 void AddRunCommand(Command app, const std::string& command_line);
+void AddBudgetCommand(Command app);
 void AddCompareCommand(Command app);
 void AddExportCommand(Command app);
 void AddRenderCommand(Command app);
 void AddReportCommand(Command app);
+void AddStatesCommand(Command app);
 void AddStudyCommand(Command app);
 
 }  // namespace dexcheck::cli

@@ -10,6 +10,7 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/consistency_report.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
@@ -25,8 +26,6 @@ struct Request {
   std::string json_file;
   bool quiet = false;
 };
-
-std::string FileName(const std::filesystem::path& path) { return path.filename().string(); }
 
 bool IsRepairedWholly(const Diagnosis& diagnosis) {
   return diagnosis.remaining_terms.empty() && diagnosis.remaining_constants.empty();
@@ -44,7 +43,8 @@ void PrintRemaining(const Request& request, const RobotModel& model, const Diagn
   }
 }
 
-void Print(const Request& request, const RobotModel& model, const Diagnosis& diagnosis) {
+void Print(const Request& request, const RobotModel& model, const Diagnosis& diagnosis,
+           const std::vector<Hypothesis>& hypotheses) {
   const std::string file = FileName(request.files.robot);
   if (diagnosis.agrees) {
     fmt::print("AGREE: nothing to explain: {} and {} agree to rounding at {} random states.\n", file,
@@ -52,6 +52,7 @@ void Print(const Request& request, const RobotModel& model, const Diagnosis& dia
     return;
   }
   fmt::print("DISAGREE: {} against {}.\n", file, FileName(request.files.mjcf));
+  PrintHypotheses(hypotheses);
   if (diagnosis.causes.empty()) fmt::print("No change of single numbers explains it.\n");
   int number = 0;
   for (const Cause& cause : diagnosis.causes) {
@@ -95,13 +96,15 @@ Json ToJson(const Cause& cause, const RobotSpec& spec, const std::string& file) 
   return json;
 }
 
-std::string ToText(const Request& request, const RobotModel& model, const Diagnosis& diagnosis) {
+std::string ToText(const Request& request, const RobotModel& model, const Diagnosis& diagnosis,
+                   const std::vector<Hypothesis>& hypotheses) {
   const std::string file = FileName(request.files.robot);
   Json json = {
       {"robot", request.files.robot.string()}, {"mjcf", request.files.mjcf.string()},
       {"mujoco", mj_versionString()},          {"samples", request.options.samples},
       {"seed", request.options.seed},          {"verdict", diagnosis.agrees ? "pass" : "disagreement"},
       {"explained", diagnosis.explained},      {"explained_of_forces", diagnosis.explained_of_forces}};
+  json["hypotheses"] = ListHypotheses(hypotheses);
   json["causes"] = Json::array();
   for (const Cause& cause : diagnosis.causes) json["causes"].push_back(ToJson(cause, model.spec(), file));
   json["remaining"] = Json::array();
@@ -125,10 +128,14 @@ int Run(const Request& request) {
         return !IsInterrupted();
       });
   bar.Finish();
-  if (json) json->Write(ToText(request, model, diagnosis));
+  // Mistakes of conventions first; what can only be moved shows no bodies to compare.
+  const bool is_open = !diagnosis.agrees && !request.options.by_motion;
+  const std::vector<Hypothesis> hypotheses =
+      is_open ? ExplainDifference(request.files.robot, request.files.mjcf) : std::vector<Hypothesis>();
+  if (json) json->Write(ToText(request, model, diagnosis, hypotheses));
   if (request.json_file != "-") {
     if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");
-    Print(request, model, diagnosis);
+    Print(request, model, diagnosis, hypotheses);
   }
   if (IsInterrupted()) return kFailure;
   return diagnosis.agrees ? kSuccess : kDisagreement;

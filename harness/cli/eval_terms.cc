@@ -10,6 +10,7 @@
 #include "harness/cli/eval_contacts.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/engine/engine_terms.h"
+#include "harness/sides/base_convention.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -89,6 +90,25 @@ void AddUnreducedTerms(const RobotModel& model, const State& state, Json* out) {
   (*out)["F"] = ToList(terms.gravity() + terms.friction());
 }
 
+/// What Pinocchio has at the same state of a floating base: [x y z, qx qy qz qw], the origin's velocity in
+/// the base's axes.
+void AddPinocchioTerms(const ModelTerms& terms, const State& state, Json* out) {
+  BaseConvention convention;
+  convention.position = BaseConvention::Position::kXyzXyzw;
+  convention.linear_in_base = true;
+  const BaseConversion conversion(convention);
+  SideTerms converted;
+  converted.M = terms.M();
+  converted.gravity = terms.gravity();
+  converted.bias = terms.C() * state.xi + terms.gravity();
+  conversion.Apply(state.q, state.xi, &converted);
+  (*out)["pinocchio"] = {{"q", ToList(conversion.ConvertPositions(state.q))},
+                         {"v", ToList(conversion.ConvertVelocities(state.q, state.xi))},
+                         {"M", ToRows(converted.M)},
+                         {"g", ToList(converted.gravity)},
+                         {"nle", ToList(converted.bias)}};
+}
+
 void AddObjectTerms(const RobotModel& model, const ObjectState& object, Json* out) {
   const ObjectTerms terms =
       CalcObjectTerms(model.object()->body, model.gravity(), object.X_o, object.X_o_dot);
@@ -109,6 +129,7 @@ void AddModelTerms(const RobotModel& model, const State& state, Json* out) {
   terms.CalcDynamics();
   AddReducedTerms(terms, state.xi, out);
   AddUnreducedTerms(model, state, out);
+  if (model.base().type == BaseType::kFloating) AddPinocchioTerms(terms, state, out);
   try {
     if (state.object) AddObjectTerms(model, *state.object, out);
   } catch (const SingularityError& error) {

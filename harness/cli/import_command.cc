@@ -17,13 +17,17 @@ struct Request {
   std::filesystem::path source;
   std::string out = "-";
   std::vector<std::string> packages;
+  bool floating = false;
 };
 
 RobotDescription ReadSource(const Request& request) {
   if (FindFormat(request.source) == RobotFormat::kToml) {
     throw InputError(request.source.string() + ": must be a URDF or an MJCF, is a parameter file already");
   }
-  return ReadDescription(request.source, {{request.packages.begin(), request.packages.end()}});
+  UrdfOptions options;
+  options.packages.assign(request.packages.begin(), request.packages.end());
+  options.floating = request.floating;
+  return ReadDescription(request.source, options);
 }
 
 int Run(const Request& request) {
@@ -49,6 +53,7 @@ void AddImportCommand(Command app) {
   command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
       .TypeName("PATH")
       .Repeatable();
+  command.AddFlag("--floating", &request->floating, "The root of a URDF floats");
   command.SetAction([=] { return Run(*request); });
 }
 

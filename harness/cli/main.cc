@@ -40,12 +40,15 @@ int Run(int argc, char** argv) {
   Command app = line.root();
   app.RequireCommand();
   AddConsistencyCommand(app);
+  AddAuditCommand(app);
   AddDiagnoseCommand(app);
   AddMutateCommand(app);
   AddEvalCommand(app);
   AddImportCommand(app);
+  AddStatesCommand(app);
   AddPlanCommand(app);
   AddRunCommand(app, JoinArguments(argc, argv));
+  AddBudgetCommand(app);
   AddCompareCommand(app);
   AddExportCommand(app);
   AddRenderCommand(app);

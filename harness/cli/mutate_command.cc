@@ -209,7 +209,7 @@ int Run(Request request) {
     request.run.options.scale = request.options.scale;
     request.run.json_file = request.json_file;
     request.run.quiet = request.quiet;
-    return MutateRun(request.run);
+    return request.run.smallest ? PrintSmallestErrors(request.run) : MutateRun(request.run);
   }
   request.options.diagnose = !request.no_diagnosis;
   const RobotModel model = ReadRobotModel(request.files.robot);
@@ -255,7 +255,7 @@ void AddMutateCommand(Command app) {
       "mutate",
       "Change every number and equation of the model on purpose: which mistakes are found and named?");
   Option robot = AddRobotOptions(command, &request->files);
-  command.AddOption("--scale", &request->options.scale, "Change of a number, relative to it")
+  Option scale = command.AddOption("--scale", &request->options.scale, "Change of a number, relative to it")
       .TypeName("X")
       .Check(CheckScale)
       .ShowDefault();
@@ -268,17 +268,17 @@ void AddMutateCommand(Command app) {
       .TypeName("KEY=VALUE")
       .Repeatable()
       .Needs(run);
-  command.AddOption("--from", &request->run.options.from, "In a run: when the mistake begins, s")
+  Option from = command.AddOption("--from", &request->run.options.from, "In a run: when the mistake begins, s")
       .TypeName("T")
       .Check(Seconds(0.0, 1e4))
       .Needs(run)
       .ShowDefault();
-  command.AddOption("--duration", &request->run.options.duration, "In a run: how long it is looked at, s")
+  Option duration = command.AddOption("--duration", &request->run.options.duration, "In a run: how long it is looked at, s")
       .TypeName("T")
       .Check(Seconds(1e-3, 1e4))
       .Needs(run)
       .ShowDefault();
-  command
+  Option mistakes = command
       .AddOption("--numbers", &request->run.options.parameters,
                  "In a run: how many numbers of the model are changed, evenly out of all")
       .TypeName("N")
@@ -292,6 +292,11 @@ void AddMutateCommand(Command app) {
   Option no_diagnosis =
       command.AddFlag("--no-diagnosis", &request->no_diagnosis, "Only whether each is found, not what is named");
   robot.Excludes(run);
+  Option smallest =
+      command.AddFlag("--smallest", &request->run.smallest,
+                      "In a run: how small an error of each number the balances find, and how well it moves everything");
+  smallest.Needs(run);
+  for (Option option : {from, duration, mistakes, scale}) option.Excludes(smallest);
   samples.Excludes(run);
   no_diagnosis.Excludes(run);
   command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")

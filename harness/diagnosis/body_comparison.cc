@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/engine/wheel_inertia.h"
+
 namespace dexcheck {
 namespace {
 
@@ -134,16 +136,7 @@ void BodyComparison::CompareJoints(std::vector<Cause>* causes) const {
   }
   if (adapter_.wheels().size() == 2) {
     double transverse[2];
-    for (size_t k = 0; k < 2; ++k) {
-      const EngineWheel& wheel = adapter_.wheels()[k];
-      const int body = engine_.jnt_bodyid[wheel.joint];
-      mjtNum axis[3];
-      mjtNum inverse[4];
-      mju_negQuat(inverse, engine_.body_iquat + 4 * body);
-      mju_rotVecQuat(axis, engine_.jnt_axis + 3 * wheel.joint, inverse);
-      const Vector3d moments = MapVector(engine_.body_inertia + 3 * body);
-      transverse[k] = 0.5 * (moments.sum() - moments.dot(MapVector(axis).cwiseAbs2()));
-    }
+    for (size_t k = 0; k < 2; ++k) transverse[k] = CalcWheelInertia(engine_, adapter_.wheels()[k]).transverse;
     // Wheels that differ from each other are no single number of the model.
     if (std::abs(transverse[0] - transverse[1]) <= kSame * std::abs(transverse[0]))
       Compare({{Kind::kWheelTransverseInertia, -1, 0}}, {transverse[0]}, 0.0, causes);

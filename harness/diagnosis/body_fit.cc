@@ -82,25 +82,9 @@ BodyFit::BodyFit(const RobotSpec& spec, const EngineEvidence& evidence, const mj
 std::vector<Parameter> BodyFit::ListCandidates() const {
   std::vector<Parameter> candidates;
   for (const Parameter& parameter : ListParameters(spec_)) {
-    switch (parameter.kind) {
-      case Kind::kCom:
-      case Kind::kInertia:
-        if (BodyOf(spec_, parameter.index).mass > 0.0) candidates.push_back(parameter);
-        break;
-      case Kind::kMass:
-      case Kind::kDamping:
-      case Kind::kArmature:
-      case Kind::kGravity:
-      case Kind::kWheelMass:
-      case Kind::kWheelSpinInertia:
-      case Kind::kWheelTransverseInertia:
-      case Kind::kWheelArmature:
-      case Kind::kWheelDamping:
-        candidates.push_back(parameter);
-        break;
-      default:
-        break;
-    }
+    if (!IsDynamic(parameter.kind)) continue;
+    const bool needs_mass = parameter.kind == Kind::kCom || parameter.kind == Kind::kInertia;
+    if (!needs_mass || BodyOf(spec_, parameter.index).mass > 0.0) candidates.push_back(parameter);
   }
   return candidates;
 }

@@ -43,6 +43,7 @@ EngineEvidence::EngineEvidence(const RobotModel& model, const mjModel& engine,
     at.forces = CollectForces(M, at, terms.coriolis(), terms.gravity(), terms.friction());
     Vector3d base = model.base().X_B0.translation();
     if (model.num_base_positions() == 3) base.head<2>() += at.q.head<2>();
+    if (model.base().type == BaseType::kFloating) base = at.q.head<3>();
     for (const Vector3d& anchor : at.anchors) length_ = std::max(length_, (anchor - base).norm());
     for (const Pose& frame : at.frames) length_ = std::max(length_, (frame.translation() - base).norm());
     snapshots_.push_back(std::move(at));

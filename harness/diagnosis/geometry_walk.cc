@@ -182,7 +182,7 @@ std::vector<Parameter> GeometryWalk::ListSuspects(int link, const std::vector<in
     add(Kind::kPosition, joint, 3);
     add(Kind::kRotation, joint, 3);
   }
-  add(Kind::kBasePosition, -1, 3);
+  if (spec_.base.type != BaseType::kFloating) add(Kind::kBasePosition, -1, 3);
   if (spec_.base.type == BaseType::kFixed) add(Kind::kBaseRotation, -1, 3);
   for (const int index : failing) {
     const PlacedItem& item = placement_.items()[static_cast<size_t>(index)];

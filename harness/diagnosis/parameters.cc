@@ -174,7 +174,7 @@ std::vector<Parameter> ListParameters(const RobotSpec& spec) {
     add(Kind::kFrameRotation, i, 3);
     if (spec.frames[static_cast<size_t>(i)].sphere_radius) add(Kind::kSphereRadius, i);
   }
-  add(Kind::kBasePosition, -1, 3);
+  if (spec.base.type != BaseType::kFloating) add(Kind::kBasePosition, -1, 3);
   if (spec.base.type == BaseType::kFixed) {
     add(Kind::kBaseRotation, -1, 3);
   } else {
@@ -246,6 +246,25 @@ bool IsGeometric(ParameterKind kind) {
     case Kind::kFrameRotation:
     case Kind::kBasePosition:
     case Kind::kBaseRotation:
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool IsDynamic(ParameterKind kind) {
+  switch (kind) {
+    case Kind::kMass:
+    case Kind::kCom:
+    case Kind::kInertia:
+    case Kind::kDamping:
+    case Kind::kArmature:
+    case Kind::kGravity:
+    case Kind::kWheelMass:
+    case Kind::kWheelSpinInertia:
+    case Kind::kWheelTransverseInertia:
+    case Kind::kWheelArmature:
+    case Kind::kWheelDamping:
       return true;
     default:
       return false;

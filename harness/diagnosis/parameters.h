@@ -64,6 +64,8 @@ void SetValue(RobotSpec* spec, const Parameter& parameter, double value);
 bool IsAngle(const RobotSpec& spec, const Parameter& parameter);
 /// Whether it moves links or frames.
 bool IsGeometric(ParameterKind kind);
+/// Whether it changes forces and moves nothing: of bodies, joints, wheels, gravity; not of the object.
+bool IsDynamic(ParameterKind kind);
 
 /// A length or quantity that a change of the value can be compared with, positive: the value itself, or for a
 /// value of zero what stands beside it (the tensor's trace, the link's length, a radian).

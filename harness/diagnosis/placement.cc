@@ -67,6 +67,11 @@ bool Placement::Carries(int inner, int outer) const {
 Pose Placement::CalcBasePose(const VectorXd& q) const {
   Pose X = trial_.base.X_B0;
   if (trial_.base.type == BaseType::kFixed) return X;
+  if (trial_.base.type == BaseType::kFloating) {
+    X.linear() = Eigen::Quaterniond(q[3], q[4], q[5], q[6]).normalized().toRotationMatrix();
+    X.translation() = q.head<3>();
+    return X;
+  }
   // The engine's base was placed by X_B0 as it was; what a change moves is Sigma_0 on the base.
   X.linear() = Eigen::AngleAxisd(q[2], Vector3d::UnitZ()).toRotationMatrix();
   X.translation() = base_origin_ + X.linear() * (trial_.base.X_B0.translation() - base_origin_);
@@ -75,7 +80,9 @@ Pose Placement::CalcBasePose(const VectorXd& q) const {
 }
 
 void Placement::UpdateRow(int i) {
-  const int offset = trial_.base.type == BaseType::kFixed ? 0 : 3;
+  const int offset = trial_.base.type == BaseType::kFixed      ? 0
+                     : trial_.base.type == BaseType::kFloating ? 7
+                                                               : 3;
   const Joint& joint = trial_.joints[static_cast<size_t>(i)];
   const bool revolute = joint.type == JointType::kRevolute;
   for (size_t sample = 0; sample < used_; ++sample) {

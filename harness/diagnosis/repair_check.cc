@@ -18,25 +18,6 @@ constexpr double kSame = 1e-11;
 // Of forces that follow from fitted numbers, relative to their size.
 constexpr double kSameForces = 1e-8;
 
-bool IsOfBody(Kind kind) {
-  switch (kind) {
-    case Kind::kMass:
-    case Kind::kCom:
-    case Kind::kInertia:
-    case Kind::kDamping:
-    case Kind::kArmature:
-    case Kind::kGravity:
-    case Kind::kWheelMass:
-    case Kind::kWheelSpinInertia:
-    case Kind::kWheelTransverseInertia:
-    case Kind::kWheelArmature:
-    case Kind::kWheelDamping:
-      return true;
-    default:
-      return false;
-  }
-}
-
 /// Whether Sigma_0 stands where the engine's wheels have the middle of their axle; without wheels it stands
 /// where it is said to.
 bool IsAxleRight(const Adapter& adapter, double rounding) {
@@ -142,7 +123,7 @@ bool RepairCheck::RepairsNumber(const Parameter& parameter, const Trial& trial) 
       (IsGeometric(parameter.kind) || parameter.kind == Kind::kCom || parameter.kind == Kind::kInertia))
     return false;
   if (IsGeometric(parameter.kind)) return trial.IsLinkRight(CarrierOf(trial.spec, parameter));
-  if (!bodies_ && IsOfBody(parameter.kind)) return trial.forces_agree;
+  if (!bodies_ && IsDynamic(parameter.kind)) return trial.forces_agree;
   if (parameter.kind == Kind::kCom || parameter.kind == Kind::kInertia)
     return !differs && IsPlaced(trial.placement, parameter.index);
   return !differs;

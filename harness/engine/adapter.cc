@@ -51,10 +51,20 @@ double CalcRollingRadius(const mjModel& engine, int body) {
   return touching > 0.0 ? touching : any;
 }
 
-/// The body of a joint's link: by name, or by the joint when the MJCF gives the body none.
+constexpr int kNoBody = -1;
+
+/// Whether another joint of the same body stands between this one and the body.
+bool HasJointBehind(const mjModel& engine, int joint) {
+  const int body = engine.jnt_bodyid[joint];
+  return joint + 1 < engine.body_jntadr[body] + engine.body_jntnum[body];
+}
+
+/// The body of a joint's link: by name, or by the joint when the MJCF gives the body none. Of several joints
+/// that one body has, only the last moves it; the others' links have no body.
 template <typename Need>
 int FindLinkBody(const mjModel& engine, const Joint& joint, int joint_id, const Need& need) {
   if (joint_id >= 0) {
+    if (HasJointBehind(engine, joint_id)) return kNoBody;
     const int body = engine.jnt_bodyid[joint_id];
     if (engine.names[engine.name_bodyadr[body]] == '\0') return body;
   }
@@ -135,22 +145,28 @@ void Adapter::MatchJoints(const std::string& engine_source) {
       fail(key + "must be a hinge (revolute in the parameters)");
     if (joint.type == JointType::kPrismatic && !slide)
       fail(key + "must be a slide (prismatic in the parameters)");
-    if (engine.body_jntnum[body] != 1) {
-      fail(key + "its body " + Quote(NameOf(engine, mjOBJ_BODY, body)) + " must have one joint, got " +
-           std::to_string(engine.body_jntnum[body]));
-    }
-    if (body != link_bodies_[static_cast<size_t>(i + 1)]) {
+    const int link_body = link_bodies_[static_cast<size_t>(i + 1)];
+    if (link_body != kNoBody && body != link_body) {
       fail(key + "must move body " + Quote(joint.link) + ", moves " +
            Quote(NameOf(engine, mjOBJ_BODY, body)));
     }
+    joint_dofs_.push_back(engine.jnt_dofadr[id]);
+    joint_qpos_.push_back(engine.jnt_qposadr[id]);
+    if (id > engine.body_jntadr[body]) {
+      if (joint.parent >= 0 && joint_ids_[static_cast<size_t>(joint.parent)] == id - 1) continue;
+      fail(key + "must come after joint " + Quote(NameOf(engine, mjOBJ_JOINT, id - 1)) +
+           " of the same body, comes after link " + Quote(model_->link_name(joint.parent)));
+    }
     const int parent = MovingBody(engine, engine.body_parentid[body]);
+    if (link_bodies_[static_cast<size_t>(joint.parent + 1)] == kNoBody) {
+      fail(key + "must hang on body " + Quote(NameOf(engine, mjOBJ_BODY, parent)) + ", hangs on link " +
+           Quote(model_->link_name(joint.parent)) + ", which has none");
+    }
     const int expected = MovingBody(engine, link_bodies_[static_cast<size_t>(joint.parent + 1)]);
     if (parent != expected) {
       fail(key + "must hang on body " + Quote(model_->link_name(joint.parent)) + ", hangs on " +
            Quote(NameOf(engine, mjOBJ_BODY, parent)));
     }
-    joint_dofs_.push_back(engine.jnt_dofadr[id]);
-    joint_qpos_.push_back(engine.jnt_qposadr[id]);
   }
 }
 
@@ -165,6 +181,7 @@ void Adapter::MatchBase(const std::string& engine_source) {
   welded_bodies_.resize(link_bodies_.size());
   for (int b = 1; b < engine.nbody; ++b) {
     for (size_t link = 0; link < link_bodies_.size(); ++link) {
+      if (link_bodies_[link] == kNoBody) continue;
       const bool is_world = MovingBody(engine, link_bodies_[link]) == 0;
       if (!is_world && MovingBody(engine, b) == link_bodies_[link]) welded_bodies_[link].push_back(b);
     }
@@ -180,6 +197,10 @@ void Adapter::MatchBase(const std::string& engine_source) {
   base_is_free_ = count == 1 && engine.jnt_type[first] == mjJNT_FREE;
   const bool planar = count == 3 && engine.jnt_type[first] == mjJNT_SLIDE &&
                       engine.jnt_type[first + 1] == mjJNT_SLIDE && engine.jnt_type[first + 2] == mjJNT_HINGE;
+  if (model_->base().type == BaseType::kFloating) {
+    if (!base_is_free_) fail("must move by a free joint (base.type is \"floating\")");
+    return;
+  }
   if (!base_is_free_ && !planar) fail("must move by a free joint, or by two slides and a hinge");
 
   const MjDataPtr data = MakeData(engine);
@@ -223,13 +244,6 @@ void Adapter::MatchWheels(const mjData& reference, const std::string& engine_sou
   }
 }
 
-Pose Adapter::CalcBasePose(const Eigen::Ref<const VectorXd>& q) const {
-  Pose X_W0 = Pose::Identity();
-  X_W0.linear() = Eigen::AngleAxisd(q[2], Vector3d::UnitZ()).toRotationMatrix();
-  X_W0.translation() = model_->base().X_B0.translation() + Vector3d(q[0], q[1], 0.0);
-  return X_W0;
-}
-
 void Adapter::CalcBaseRates(const Vector3d& anchor_velocity, double yaw_rate,
                             Eigen::Ref<VectorXd> rates) const {
   if (base_joints_.empty()) return;
@@ -248,7 +262,14 @@ void Adapter::SetPositions(const Eigen::Ref<const VectorXd>& q, mjtNum* qpos) co
   for (size_t i = 0; i < joint_qpos_.size(); ++i) qpos[joint_qpos_[i]] = q[offset + static_cast<int>(i)];
   if (base_joints_.empty()) return;
 
-  const Pose X_WA = CalcBasePose(q) * X_0b_;
+  if (model_->base().type == BaseType::kFloating) {
+    mjtNum* const pose = qpos + engine_->jnt_qposadr[base_joints_[0]];
+    mju_copy3(pose, q.data());
+    mju_copy4(pose + 3, q.data() + 3);
+    mju_normalize4(pose + 3);
+    return;
+  }
+  const Pose X_WA = model_->CalcBasePose(q) * X_0b_;
   if (base_is_free_) {
     mjtNum* const pose = qpos + engine_->jnt_qposadr[base_joints_[0]];
     const Eigen::Quaterniond rotation(X_WA.linear());
@@ -294,6 +315,10 @@ void Adapter::GetPositions(const mjtNum* qpos, Eigen::Ref<VectorXd> q) const {
   for (size_t i = 0; i < joint_qpos_.size(); ++i) q[offset + static_cast<int>(i)] = qpos[joint_qpos_[i]];
   if (base_joints_.empty()) return;
 
+  if (model_->base().type == BaseType::kFloating) {
+    mju_copy(q.data(), qpos + engine_->jnt_qposadr[base_joints_[0]], 7);
+    return;
+  }
   const Pose X_W0 = GetBasePose(qpos);
   q.head<2>() = (X_W0.translation() - model_->base().X_B0.translation()).head<2>();
   q[2] = base_is_free_ ? std::atan2(X_W0.linear()(1, 0), X_W0.linear()(0, 0)) : GetHingeYaw(qpos);

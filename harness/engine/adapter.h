@@ -28,8 +28,9 @@ struct EngineWheel {
 ///
 /// q_i is the engine's position of the joint of the same name. The base's q_v = 0 is the pose that the MJCF
 /// gives to the base's body. The base may move by a free joint, or by two slides and a hinge; a differential
-/// drive has a hinge per wheel besides. qvel = T velocity, where T has dense base columns and one entry per
-/// joint.
+/// drive has a hinge per wheel besides. A floating base's Sigma_0 is the frame of its body, which moves by a
+/// free joint: its q_v and v are the engine's. qvel = T velocity, where T has dense base columns and one
+/// entry per joint.
 class Adapter {
  public:
   /// @throws InputError that lists the joints, bodies and sites that the other side lacks (the first few of
@@ -43,7 +44,8 @@ class Adapter {
   [[nodiscard]] const std::vector<int>& joint_ids() const { return joint_ids_; }
   /// Engine's dof address of each joint of the model.
   [[nodiscard]] const std::vector<int>& joint_dofs() const { return joint_dofs_; }
-  /// Engine's body id of each link: base first, then by joint.
+  /// Engine's body id of each link: base first, then by joint; -1 for links between several joints that one
+  /// body has.
   [[nodiscard]] const std::vector<int>& link_bodies() const { return link_bodies_; }
   /// All engine bodies that move as one with a link (welded to it), by the link's index + 1.
   [[nodiscard]] const std::vector<std::vector<int>>& welded_bodies() const { return welded_bodies_; }
@@ -66,7 +68,7 @@ class Adapter {
   /// Robot's part of qpos for q' (rolling leaves no mark on the wheels' angles, which are set to zero).
   void SetPositions(const Eigen::Ref<const VectorXd>& q, mjtNum* qpos) const;
 
-  /// q' from the engine's qpos: yaw and midpoint of the base; tilt is dropped.
+  /// q' from the engine's qpos: of a floating base its pose; otherwise yaw and midpoint, tilt is dropped.
   void GetPositions(const mjtNum* qpos, Eigen::Ref<VectorXd> q) const;
   /// Pose of Sigma_0 in the world, tilt and height included.
   [[nodiscard]] Pose GetBasePose(const mjtNum* qpos) const;
@@ -78,7 +80,6 @@ class Adapter {
   void MatchJoints(const std::string& engine_source);
   void MatchBase(const std::string& engine_source);
   void MatchWheels(const mjData& reference, const std::string& engine_source);
-  [[nodiscard]] Pose CalcBasePose(const Eigen::Ref<const VectorXd>& q) const;
   [[nodiscard]] double GetHingeYaw(const mjtNum* qpos) const;
 
   const RobotModel* model_;

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <set>
+#include <system_error>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -28,6 +29,8 @@ struct MjcfReferences {
 /// Reads an XML document as the engine does, with the same parser.
 /// @param shown the file in messages. @throws InputError.
 void ReadXml(const std::filesystem::path& path, const std::string& shown, tinyxml2::XMLDocument* document) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) throw InputError(shown + ": cannot be read: is a folder");
   std::ifstream file(path, std::ios::binary);
   if (!file) throw InputError(shown + ": cannot be read");
   const std::string text{std::istreambuf_iterator<char>(file), {}};

@@ -6,8 +6,9 @@ namespace dexcheck {
 
 VelocityMap::VelocityMap(const Adapter& adapter, Coordinates coordinates)
     : adapter_(&adapter),
+      is_floating_(adapter.model().base().type == BaseType::kFloating),
       base_size_(coordinates == Coordinates::kReduced ? adapter.model().num_base_velocities()
-                                                      : adapter.model().num_base_positions()) {
+                                                      : adapter.model().num_unreduced_base_velocities()) {
   const mjModel& engine = adapter.engine();
   for (const int joint : adapter.base_joints()) {
     const int dofs = engine.jnt_type[joint] == mjJNT_FREE ? 6 : 1;
@@ -19,6 +20,7 @@ VelocityMap::VelocityMap(const Adapter& adapter, Coordinates coordinates)
   bias_.setZero(rows);
   bracket_.setZero(rows);
   M_T_.setZero(engine.nv, base_size_);
+  if (is_floating_) T_base_.setIdentity();
 }
 
 VelocityMap::BaseMotion VelocityMap::CalcColumnMotion(int column, const Vector3d& heading) const {
@@ -57,7 +59,7 @@ void VelocityMap::FillRates(const Vector3d& anchor_velocity, double yaw, double 
 }
 
 void VelocityMap::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity) {
-  if (base_size_ == 0) return;
+  if (base_size_ == 0 || is_floating_) return;
   const double phi = q[2];
   const Vector3d heading(std::cos(phi), std::sin(phi), 0.0);
   const Vector3d left(-heading.y(), heading.x(), 0.0);
@@ -97,7 +99,9 @@ void VelocityMap::ExpandBias(mjtNum* qacc) const {
 void VelocityMap::ExpandBracket(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& a,
                                 const Eigen::Ref<const VectorXd>& b, mjtNum* qacc) {
   bracket_.setZero();
-  if (base_size_ == 2) {
+  if (is_floating_) {
+    bracket_.tail<3>() = Vector3d(a.segment<3>(3)).cross(Vector3d(b.segment<3>(3)));
+  } else if (base_size_ == 2) {
     // T_dot(a) turns b's forward velocity to the left; centripetal parts are the same both ways.
     const Vector3d heading(std::cos(q[2]), std::sin(q[2]), 0.0);
     const Vector3d left(-heading.y(), heading.x(), 0.0);

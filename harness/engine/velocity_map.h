@@ -11,7 +11,9 @@ namespace dexcheck {
 
 /// T(q') between the paper's velocities and the engine's: qvel = T velocity, qacc = T velocity_dot + T_dot
 /// velocity, for an upright base on rolling wheels. The wheels' rolling is taken from the engine's own
-/// geometry. T has dense columns for the base and one unit entry for each joint.
+/// geometry. For a floating base T is the identity: both have the origin's velocity along the world's axes
+/// and the angular velocity along the base's. T has dense columns for the base and one unit entry for each
+/// joint.
 class VelocityMap {
  public:
   VelocityMap(const Adapter& adapter, Coordinates coordinates);
@@ -33,7 +35,8 @@ class VelocityMap {
   void ExpandBias(mjtNum* qacc) const;
   /// Writes T_dot(a) b - T_dot(b) a at q', T_dot(a) being T's rate at velocity a, on the robot's dofs of an
   /// nv-vector. It is zero where velocities are rates of coordinates; reduced columns turn with the heading,
-  /// and it points sideways.
+  /// and it points sideways. The angular velocity of a floating base is no rate of coordinates, whose T has
+  /// the bracket [0; omega_a x omega_b].
   void ExpandBracket(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& a,
                      const Eigen::Ref<const VectorXd>& b, mjtNum* qacc);
   /// result = T^T force.
@@ -56,6 +59,7 @@ class VelocityMap {
                  Eigen::Ref<VectorXd> rates) const;
 
   const Adapter* adapter_;
+  bool is_floating_;
   int base_size_;
   std::vector<int> base_dofs_;
   MatrixXd T_base_;   // base_dofs x base_size

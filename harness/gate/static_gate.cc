@@ -6,9 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "harness/gate/engine_only.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/torus_collision.h"
+#include "harness/engine/wheel_inertia.h"
+#include "harness/gate/engine_only.h"
 
 namespace dexcheck {
 namespace {
@@ -126,15 +127,7 @@ class StaticGate {
       Compare("wheel_mass", where, base.wheel.mass, engine_.body_mass[engine_.jnt_bodyid[wheel.joint]]);
     });
     each([&](const EngineWheel& wheel, const Location& where, double) {
-      // Of the wheel's body, about the hinge axis.
-      const int body = engine_.jnt_bodyid[wheel.joint];
-      mjtNum axis[3];
-      mjtNum inverse[4];
-      mju_negQuat(inverse, engine_.body_iquat + 4 * body);
-      mju_rotVecQuat(axis, engine_.jnt_axis + 3 * wheel.joint, inverse);
-      const Vector3d moments = MapVector(engine_.body_inertia + 3 * body);
-      const double spin = moments.dot(MapVector(axis).cwiseAbs2());
-      Compare("wheel_spin_inertia", where, base.wheel.spin_inertia, spin);
+      Compare("wheel_spin_inertia", where, base.wheel.spin_inertia, CalcWheelInertia(engine_, wheel).spin);
     });
     each([&](const EngineWheel& wheel, const Location& where, double) {
       Compare("wheel_damping", where, base.wheel.damping, engine_.dof_damping[wheel.dof]);
@@ -309,8 +302,10 @@ class StaticGate {
     for (const auto& [joint, where] : joints)
       Compare("joint_spring", where, 0.0, engine_.jnt_stiffness[joint]);
     for (const auto& [joint, where] : joints) {
+      const bool is_of_tree = where.kind == Location::Kind::kJoint;
+      const double own = is_of_tree ? model_.joints()[static_cast<size_t>(where.first)].dry_friction : 0.0;
       each_dof(joint, [&, at = where](int dof) {
-        Compare("joint_dry_friction", at, 0.0, engine_.dof_frictionloss[dof]);
+        Compare("joint_dry_friction", at, own, engine_.dof_frictionloss[dof]);
       });
     }
     for (const auto& [joint, where] : joints) {
@@ -319,7 +314,10 @@ class StaticGate {
     }
     Compare("fluid", {}, 0.0, engine_.opt.density);
     Compare("fluid", {}, 0.0, engine_.opt.viscosity);
-    for (size_t i = first_finding; i < result_.findings.size(); ++i) result_.findings[i].engine_only = true;
+    for (size_t i = first_finding; i < result_.findings.size(); ++i) {
+      GateFinding& finding = result_.findings[i];
+      finding.engine_only = finding.check != "joint_dry_friction" || finding.model == 0.0;
+    }
   }
 
   const Adapter& adapter_;

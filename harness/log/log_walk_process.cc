@@ -1,22 +1,17 @@
-#include <fcntl.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
-#include <cstdlib>
-#include <cstring>
 #include <exception>
 #include <fstream>
 #include <new>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/base/interrupts.h"
+#include "harness/base/worker_process.h"
 #include "harness/log/hdf5_handle.h"
 #include "harness/log/log_file.h"
 #include "harness/log/log_structure.h"
@@ -43,10 +38,7 @@ rlim_t MeasureAddressSpace() {
   return file ? pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) : 0;
 }
 
-void LimitProcess(pid_t parent) {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != parent) ::_exit(EXIT_FAILURE);
-  LeaveInterruptsToParent();
+void LimitProcess() {
   // What catches crashes in a program under test must not take them for its own.
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) std::signal(signal, SIG_DFL);
   const auto limit = [](auto resource, rlim_t most) {
@@ -60,17 +52,8 @@ void LimitProcess(pid_t parent) {
   if (const rlim_t taken = MeasureAddressSpace(); taken > 0) limit(RLIMIT_AS, taken + kMostMemory);
 }
 
-void Tell(int pipe, const std::string& bytes) {
-  for (size_t done = 0; done < bytes.size();) {
-    const ssize_t count = ::write(pipe, bytes.data() + done, bytes.size() - done);
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) ::_exit(EXIT_FAILURE);
-    done += static_cast<size_t>(count);
-  }
-}
-
-[[noreturn]] void Work(int descriptor, int pipe, pid_t parent) {
-  LimitProcess(parent);
+bool Work(int descriptor, int channel) {
+  LimitProcess();
   std::string told;
   try {
     told = kStructure + PackStructure(WalkStructure(descriptor));
@@ -79,49 +62,31 @@ void Tell(int pipe, const std::string& bytes) {
   } catch (const std::exception& error) {
     told = kProblem + std::string(error.what());
   }
-  Tell(pipe, told);
-  ::_exit(EXIT_SUCCESS);
+  return Send(channel, told);
 }
 
 /// Everything until the other side ends; nothing more than kMostTold.
-std::string Receive(int pipe) {
+std::string ReceiveAll(int channel) {
+  constexpr size_t kChunk = size_t{1} << 16;
   std::string bytes;
-  std::string chunk(size_t{1} << 16, '\0');
-  for (;;) {
-    const ssize_t count = ::read(pipe, chunk.data(), chunk.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0 || bytes.size() > kMostTold) return bytes;
-    bytes.append(chunk, 0, static_cast<size_t>(count));
+  for (std::string part = Receive(channel, kChunk); !part.empty() && bytes.size() <= kMostTold;
+       part = Receive(channel, kChunk)) {
+    bytes += part;
   }
-}
-
-[[noreturn]] void FailToStart() {
-  throw Error(std::string("a process that reads the log cannot be started: ") + std::strerror(errno));
+  return bytes;
 }
 
 /// What the process told. @throws InputError when it ended otherwise.
 std::string WalkApart(int descriptor) {
   H5open();  // so that each process need not
-  int ends[2];
-  if (::pipe2(ends, O_CLOEXEC) != 0) FailToStart();
-  const FileDescriptor from(ends[0]);
-  FileDescriptor to(ends[1]);
-  const pid_t parent = ::getpid();
-  const pid_t process = ::fork();
-  if (process < 0) FailToStart();
-  if (process == 0) Work(descriptor, to.get(), parent);
-  to.Close();
-  std::string told = Receive(from.get());
-  if (told.size() > kMostTold) ::kill(process, SIGKILL);
-  int status = 0;
-  while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
-  }
+  WorkerProcess process("a process that reads the log",
+                        [&](int channel) { return Work(descriptor, channel); });
+  const std::string told = ReceiveAll(process.channel());
   if (told.size() > kMostTold) throw InputError("it holds too much text");
+  const ProcessEnd end = process.Wait();
   if (!told.empty()) return told;
-  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)
-    throw InputError("HDF5 does not come to an end with it");
-  const std::string how = WIFSIGNALED(status) ? ::strsignal(WTERMSIG(status)) : "it ended without a result";
-  throw InputError("HDF5 fails on it: " + how);
+  if (end.signal == SIGXCPU) throw InputError("HDF5 does not come to an end with it");
+  throw InputError("HDF5 fails on it: " + end.Describe("it ended without a result"));
 }
 
 }  // namespace

@@ -27,6 +27,7 @@ class EnginePlant final : public Plant {
 
   void BeginStep() override { simulation_.BeginStep(); }
   void Read(PlantReading* reading) override;
+  void Push(std::span<const Wrench> wrenches) override { simulation_.Push(wrenches); }
   void EndStep(const Eigen::Ref<const VectorXd>& tau) override;
   void Read(PlantResponse* response) override;
 

@@ -40,6 +40,9 @@ EngineSimulation::EngineSimulation(const Adapter& adapter, bool implicit_damping
     damping_ = damping;
     damping.setZero();
   }
+  // Whoever commands torques keeps to the limits; friction comes on top.
+  std::fill_n(model_->actuator_ctrllimited, model_->nu, mjtByte{0});
+  std::fill_n(model_->actuator_forcelimited, model_->nu, mjtByte{0});
   for (const EngineWheel& wheel : adapter.wheels()) motors_.push_back(FindMotor(*model_, wheel.joint));
   for (const int joint : adapter.joint_ids()) motors_.push_back(FindMotor(*model_, joint));
   for (const int motor : motors_) dofs_.push_back(model_->jnt_dofadr[model_->actuator_trnid[2 * motor]]);
@@ -53,6 +56,20 @@ void EngineSimulation::SetTorques(const Eigen::Ref<const VectorXd>& tau) {
   for (size_t i = 0; i < motors_.size(); ++i) {
     data_->ctrl[motors_[i]] = tau[static_cast<Eigen::Index>(i)] / model_->actuator_gear[6 * motors_[i]];
   }
+}
+
+void EngineSimulation::Push(std::span<const Wrench> wrenches) {
+  if (wrenches.empty() && !is_pushed_) return;
+  std::fill_n(data_->xfrc_applied, 6 * model_->nbody, 0.0);
+  for (const Wrench& w : wrenches) {
+    const int body = w.body == Wrench::kObject ? adapter_->object_body()
+                                               : adapter_->link_bodies()[static_cast<size_t>(w.body + 1)];
+    // The engine's act at the centre of mass.
+    const Vector3d arm = w.point - Eigen::Map<const Vector3d>(data_->xipos + 3 * body);
+    Eigen::Map<Vector3d>(data_->xfrc_applied + 6 * body) += w.force;
+    Eigen::Map<Vector3d>(data_->xfrc_applied + 6 * body + 3) += w.torque + arm.cross(w.force);
+  }
+  is_pushed_ = !wrenches.empty();
 }
 
 void EngineSimulation::ReadMotorTorques(VectorXd* tau) const {
@@ -71,8 +88,8 @@ std::vector<Motor> EngineSimulation::ListMotors() const {
     const auto cut = [&](mjtByte limited, const mjtNum* range) {
       if (limited != 0) limit = std::min(limit, gear * std::min(-range[0], range[1]));
     };
-    cut(model_->actuator_ctrllimited[motor], model_->actuator_ctrlrange + 2 * motor);
-    cut(model_->actuator_forcelimited[motor], model_->actuator_forcerange + 2 * motor);
+    cut(adapter_->engine().actuator_ctrllimited[motor], model_->actuator_ctrlrange + 2 * motor);
+    cut(adapter_->engine().actuator_forcelimited[motor], model_->actuator_forcerange + 2 * motor);
     motors.push_back({NameOf(*model_, mjOBJ_JOINT, model_->actuator_trnid[2 * motor]), limit});
   }
   return motors;

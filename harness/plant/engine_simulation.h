@@ -42,6 +42,8 @@ class EngineSimulation {
   void BeginStep();
   /// tau' (n), N m: of the right and left wheel, then of the joints.
   void SetTorques(const Eigen::Ref<const VectorXd>& tau);
+  /// Forces and torques on bodies, instead of those before.
+  void Push(std::span<const Wrench> wrenches);
   /// The torques that wheels and joints received in the last step, as tau' (n), N m.
   void ReadMotorTorques(VectorXd* tau) const;
   /// By entry of tau'.
@@ -61,6 +63,7 @@ class EngineSimulation {
   const Adapter* adapter_;
   MjModelPtr model_;  // the adapter's, but for the damping
   MjDataPtr data_;
+  bool is_pushed_ = false;
   VectorXd damping_;         // nv, N m s/rad; what is not integrated implicitly
   std::vector<int> motors_;  // by entry of tau'
   std::vector<int> dofs_;    // likewise

@@ -1,8 +1,10 @@
 #pragma once
 
-#include <span>
+#include <string>
 #include <vector>
 
+#include "harness/plant/imperfections.h"
+#include "harness/plant/part_context.h"
 #include "harness/plant/plant.h"
 
 namespace dexcheck {
@@ -14,20 +16,53 @@ struct DriveOutput {
   int busiest_motor = 0;  ///< Whose it is, by its entry of tau'.
 };
 
-/// Stands between the controller and the plant: gives the torques that are commanded, or ends the run.
+/// Stands between the controller and the plant: what the motors make of the torques that are sent, in this
+/// order, each part of it absent unless the options ask for it:
+///
+///   delay      the torques of `delay` ago; a fraction of a step mixes two of them as their times share the
+///   step step       whole multiples of torque_step gain       times 1 + gain_error lag        1 / (1 + lag
+///   s); what is given is its mean over the step, so that the impulse is right limit      not above the
+///   motor's backlash   nothing while the rotor, of the joint's armature, crosses the play friction   less
+///   (coulomb + stribeck exp(-(w / stribeck_velocity)^2)) sign(w)
+///
+/// sign(w) is w / w_0 below w_0 = dt (coulomb + stribeck) / armature: an explicit force that is steeper makes
+/// a sampled joint rattle. Nothing allocates after construction. Two drives that are made alike and are sent
+/// the same give the same: a check makes its own.
 class MotorDrive {
  public:
-  explicit MotorDrive(std::span<const Motor> motors) : motors_(motors.begin(), motors.end()) {}
+  /// @throws InputError when the options name a motor that is not there, or ask for friction or backlash of a
+  /// joint without armature.
+  MotorDrive(std::span<const Motor> motors, const ActuationOptions& options, const PartContext& context);
 
-  /// @param output its effort is set before anything is thrown.
-  /// @throws RunFailure when a torque is not finite, or a motor is at its limit.
-  void Apply(const VectorXd& tau, DriveOutput* output) const;
+  /// Requires torques that can be given, then drives. Once at each step.
+  /// @param xi velocities of the plant (n). @param output its effort is set before anything is thrown.
+  /// @throws RunFailure when a torque is not finite, or a motor is at its limit and may not saturate.
+  void Apply(const VectorXd& tau, const VectorXd& xi, DriveOutput* output);
+  /// Drives without any requirement.
+  void Drive(const VectorXd& tau, const VectorXd& xi, VectorXd* given);
 
-  /// Largest |tau'| / limit over the motors, and the motor; more than 1 cannot be given.
+  /// Largest |tau'| / limit over the motors, and the motor.
   [[nodiscard]] double CalcEffort(const VectorXd& tau, int* busiest) const;
 
  private:
+  void Delay(VectorXd* tau);
+  double Play(Eigen::Index i, double tau, double rate);
+  [[nodiscard]] double CalcFriction(Eigen::Index i, double rate) const;
+  void ReadRates(const VectorXd& xi);
+
   std::vector<Motor> motors_;
+  ActuationOptions options_;
+  bool is_exact_;
+  Base base_;
+  double time_step_;
+  VectorXd step_, gain_, lag_, coulomb_, stribeck_, backlash_, armature_;  // n
+  std::vector<VectorXd> sent_;                                             // ring
+  double fraction_ = 0.0;  // of a step by which the delay is more than a whole number of them
+  VectorXd rates_;         // n, of wheels and joints, rad/s
+  VectorXd lagging_;       // n, state of the lag, N m
+  VectorXd play_;          // n, rotor against joint, rad
+  VectorXd rotor_;         // n, its rate, rad/s
+  std::uint64_t k_ = 0;
 };
 
 }  // namespace dexcheck

@@ -8,6 +8,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/types.h"
 #include "harness/plant/plant_reading.h"
+#include "harness/plant/wrench.h"
 
 namespace dexcheck {
 
@@ -49,6 +50,11 @@ class Plant {
   virtual void BeginStep() = 0;
   /// What the plant is; between BeginStep and EndStep.
   virtual void Read(PlantReading* reading) = 0;
+  /// Pushes that act besides during the step whose torques come next.
+  /// @throws InputError when there are any and this kind of plant takes none.
+  virtual void Push(std::span<const Wrench> wrenches) {
+    if (!wrenches.empty()) throw InputError("disturbance: this plant takes no pushes");
+  }
   /// @param tau tau' (n), N m: of the right and left wheel, then of the joints.
   /// @throws DivergenceError when there is no state afterwards.
   virtual void EndStep(const Eigen::Ref<const VectorXd>& tau) = 0;

@@ -1,29 +1,52 @@
 #pragma once
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include "controller/control/controller.h"
+#include "harness/plant/imperfections.h"
+#include "harness/plant/object_sensor.h"
+#include "harness/plant/part_context.h"
 #include "harness/plant/plant_reading.h"
+#include "harness/plant/random_stream.h"
+#include "harness/plant/velocity_filter.h"
 
 namespace dexcheck {
 
-/// Faults of what the controller is told. All zero: it is told the truth.
-struct SensingOptions {
-  double contact_error = 0.0;  ///< By how much each contact's place on the object is told wrongly, rad.
-};
-
-/// Stands between the plant and the controller.
+/// Stands between the plant and the controller: encoders, tachometers, odometry, a camera, a latency. Two of
+/// them that are made alike and hear the same truth tell the same: a check makes its own. Nothing allocates
+/// after construction, once `told` has its sizes.
 class Sensing {
  public:
-  explicit Sensing(const SensingOptions& options) : options_(options) {}
+  /// @throws InputError when the options name what the robot does not have.
+  Sensing(const SensingOptions& options, const PartContext& context);
 
-  /// What the controller is told when this is the truth. Nothing allocates, once `told` has its sizes.
-  void Tell(const PlantReading& truth, Reading* told) const {
-    told->state = truth.state;
-    told->touch = truth.touch;
-    for (ContactCoordinates& kappa : told->state.kappa) kappa.alpha_o.u += options_.contact_error;
-  }
+  /// What the controller is told when this is the truth; once at each step, from the first one on.
+  void Tell(const PlantReading& truth, Reading* told);
+  /// Robot and object are elsewhere from now on, by `way` (m, world): what is remembered moves along.
+  void Translate(const Vector3d& way);
 
  private:
+  void TellJoints(MeasuredState* told);
+  void TellBase(const MeasuredState& truth, MeasuredState* told);
+  void TellVelocity(int joint, double position, double* rate);
+
   SensingOptions options_;
+  bool is_exact_;
+  Base base_;
+  int base_positions_, base_velocities_;
+  double time_step_;
+  VectorXd count_;                         // one step of each encoder, rad; 0 is exact
+  VectorXd joint_noise_, velocity_noise_;  // velocities: wheels first
+  RandomStream joint_stream_, velocity_stream_, force_stream_;
+  std::vector<VelocityFilter> filters_;  // by joint; kKalman
+  VectorXd last_, rate_;                 // kDifferenced
+  double low_pass_ = 1.0;
+  Vector3d odometry_ = Vector3d::Zero();  // x, y, phi
+  ObjectSensor object_;
+  std::vector<Reading> delayed_;  // ring; empty without latency
+  std::uint64_t k_ = 0;           // steps told
 };
 
 }  // namespace dexcheck

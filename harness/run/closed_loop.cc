@@ -16,28 +16,29 @@ double Seconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-constexpr double kRoughTime = 0.02;      // s after the first contact
+constexpr double kRoughTime = 0.02;       // s after the first contact
 constexpr long kStepsPerModelCheck = 20;  // while everything settles
-constexpr double kLargestSkew = 1e-2;    // rad between the platform's heading and the way ahead
-constexpr double kSettleMoving = 0.5;    // s
-constexpr double kLargestTilt = 0.2;     // rad, of a robot that still stands
-constexpr double kLargestSink = 0.02;    // m, likewise
-constexpr double kGraspTimeout = 0.005;  // s without all fingertips on the object: lost
+constexpr double kLargestSkew = 1e-2;     // rad between the platform's heading and the way ahead
+constexpr double kSettleMoving = 0.5;     // s
+constexpr double kLargestTilt = 0.2;      // rad, of a robot that still stands
+constexpr double kLargestSink = 0.02;     // m, likewise
+constexpr double kGraspTimeout = 0.005;   // s without all fingertips on the object: lost
 
 }  // namespace
 
 ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
     : setup_(&setup),
       plant_(std::move(parts.plant)),
-      sensing_(parts.sensing),
+      sensing_(parts.sensing, setup.MakePartContext()),
       hidden_sensor_fault_(std::move(parts.hidden_sensor_fault)),
       controller_(std::move(parts.controller)),
       task_(parts.task),
-      drive_(plant_->motors()),
+      drive_(plant_->motors(), parts.actuation, setup.MakePartContext()),
+      disturbances_(parts.disturbances, setup.MakePartContext()),
       num_steps_(std::lround(setup.scenario().duration / setup.scenario().plant.time_step)) {
   const Scenario& scenario = setup.scenario();
   StepChecks::RequireKnownBounds(scenario);
-  if (check) checks_.emplace(setup, parts.knows_law);
+  if (check) checks_.emplace(setup, plant_->motors(), parts.knows_law);
   record_.model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);
@@ -113,6 +114,8 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
   const double dt = plant_->time_step();
   const Vector3d way = static_cast<double>(std::lround(kSettleMoving / dt)) * dt * v;
   plant_->Translate(-way);
+  sensing_.Translate(-way);
+  if (checks_) checks_->Translate(-way);
   return true;
 }
 
@@ -126,10 +129,14 @@ void ClosedLoop::ControlStep(double t) {
   if (hidden_sensor_fault_) hidden_sensor_fault_(t, &record_.told.state);
   controller_->Step(record_.told, t, &record_.command);
   DriveMotors(t);
+  if (!disturbances_.empty()) {
+    plant_->Push(disturbances_.Evaluate(record_.time, record_.reading.state));
+  }
   const auto control = Clock::now();
   plant_->EndStep(record_.drive.tau);
   const auto end = Clock::now();
   plant_->Read(&record_.response);
+  if (checks_) record_.known = checks_->Follow(record_);
   if (checks_) times_.cross_check += Seconds(end, Clock::now());
   times_.plant += Seconds(begin, read) + Seconds(control, end);
   times_.controller += Seconds(read, control);
@@ -139,10 +146,12 @@ void ClosedLoop::ControlStep(double t) {
 
 void ClosedLoop::DriveMotors(double t) {
   try {
-    drive_.Apply(record_.command.tau, &record_.drive);
+    drive_.Apply(record_.command.tau, record_.reading.state.xi, &record_.drive);
   } catch (const RunFailure&) {
     if (checks_) checks_->JudgeEffort(record_.drive.effort, t);
-    // Torques that are too large may be those of no law. While everything settles they follow another trajectory.
+    if (checks_) record_.known = checks_->Follow(record_);
+    // Torques that are too large may be those of no law. While everything settles they follow another
+    // trajectory.
     if (checks_ && is_running_) checks_->CompareUnsent(record_);
     throw;
   }

@@ -10,6 +10,7 @@
 #include "controller/control/trajectory.h"
 #include "harness/checks/cross_check.h"
 #include "harness/checks/step_record.h"
+#include "harness/plant/disturbances.h"
 #include "harness/plant/motor_drive.h"
 #include "harness/plant/plant.h"
 #include "harness/plant/sensing.h"
@@ -35,7 +36,7 @@ struct LoopTimes {
 
 /// One run:
 ///
-///   plant --PlantReading--> sensing --Reading--> controller --Command--> motors --tau'--> plant
+///   plant --PlantReading--> sensing --Reading--> controller --Command--> motors --tau'--> plant <-- pushes
 ///     `----PlantResponse----> checks: all of it is one StepRecord
 ///
 /// Deterministic. Nothing allocates in a step, except as the controller and StepChecks say.
@@ -91,6 +92,7 @@ class ClosedLoop {
   std::unique_ptr<Controller> controller_;
   const PickAndPlaceController* task_ = nullptr;  // is controller_, or null
   MotorDrive drive_;
+  Disturbances disturbances_;
   std::optional<CrossCheck> checks_;
   std::unique_ptr<Trajectory> trajectory_;  // null for a task
   StepRecord record_;

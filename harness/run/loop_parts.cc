@@ -82,6 +82,11 @@ LoopParts MakeLoopParts(const Setup& setup) {
   } else {
     parts.controller = MakeTrajectoryController(setup);
   }
+  const Imperfections& imperfections = setup.scenario().imperfections;
+  parts.sensing = imperfections.sensing;
+  parts.actuation = imperfections.actuation;
+  parts.disturbances = imperfections.disturbances;
+  // A fault to be found: the checks do not know of it.
   parts.sensing.contact_error = setup.scenario().control.contact_error;
   return parts;
 }

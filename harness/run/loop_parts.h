@@ -6,11 +6,12 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "controller/control/controller.h"
 #include "controller/handling/pick_and_place_controller.h"
 #include "harness/plant/plant.h"
-#include "harness/plant/sensing.h"
+#include "harness/plant/imperfections.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
@@ -23,6 +24,8 @@ struct LoopParts {
   const PickAndPlaceController* task = nullptr;  ///< The controller, when it does a task.
   bool knows_law = true;                         ///< Whether the controller's law is the scenario's.
   SensingOptions sensing;
+  ActuationOptions actuation;
+  std::vector<DisturbanceOptions> disturbances;
   /// Changes what the controller is told at time t besides, as no scenario says; empty for nothing.
   std::function<void(double t, MeasuredState* told)> hidden_sensor_fault;
 };

@@ -87,7 +87,8 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
                           .expected = Cause::kModel});
     }
   }
-  if (options.laws) laws_ = ListLawMistakes();
+  // Those of another law are not known.
+  if (options.laws && scenario.control.law == ControlLaw::kComputedTorque) laws_ = ListLawMistakes();
   for (const LawMistake& law : laws_) {
     mutants_.push_back({.kind = law.part == SIZE_MAX ? "law, otherwise" : "law, one part",
                         .name = law.name,

@@ -94,6 +94,14 @@ void RunRecorder::AddStateSignals() {
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.xi, row); });
   Add({"tau", "N m", "tau' of the computed torque law (55)", n, tau_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.command.tau, row); });
+  if (!setup_->scenario().imperfections.is_ideal()) {
+    Add({"told/q", "m, rad", "q' as the controller was told it", model.num_positions(), q_names, {}},
+        [](const StepRecord& step, std::span<double> row) { Copy(step.told.state.q, row); });
+    Add({"told/xi", "m/s, rad/s", "reduced velocity as the controller was told it", n, xi_names, {}},
+        [](const StepRecord& step, std::span<double> row) { Copy(step.told.state.xi, row); });
+    Add({"tau_given", "N m", "what the motors made of tau", n, tau_names, {}},
+        [](const StepRecord& step, std::span<double> row) { Copy(step.drive.tau, row); });
+  }
   Add({"base/tilt", "rad", "angle of the platform against the vertical", 1, {}, {}},
       [](const StepRecord& step, std::span<double> row) { row[0] = step.reading.departure.tilt; });
   Add({"base/height", "m", "height of the axle's midpoint against the model's", 1, {}, {}},

@@ -91,6 +91,7 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
                       {"orientation_error_max_rad", result.tracking.orientation_max()},
                       {"orientation_error_rms_rad", result.tracking.orientation_rms()}};
   if (loop.task() != nullptr) json["task"] = TaskToJson(loop);
+  if (!scenario.imperfections.is_ideal()) json["plant_asked_for"] = scenario.imperfections.asked;
   json["attribution"] = {{"cause", NameOf(result.attribution.cause)},
                          {"evidence", result.attribution.evidence},
                          {"checks", Json::object()}};

@@ -6,6 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/object/euler_zyz.h"
+#include "harness/scenario/scenario_imperfections.h"
 
 namespace dexcheck {
 namespace {
@@ -276,7 +277,8 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   const TomlDocument document = OpenDocument(text, source, overrides, &model_overrides);
   TomlTable root = document.Open();
   root.RejectOthersThan({"name", "description", "duration", "settle", "start", "start_error", "model",
-                         "plant", "grasp", "task", "trajectory", "control", "bounds", "expect"});
+                         "plant", "grasp", "task", "trajectory", "control", "sensing", "actuation", "disturbance",
+                         "mismatch", "bounds", "expect"});
   scenario.name = root.Get("name").AsName();
   if (const auto description = root.Find("description")) scenario.description = description->AsText();
   scenario.duration = root.Get("duration").AsPositive();
@@ -298,6 +300,10 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   ReadGrasp(root.Get("grasp"), scenario.task.has_value(), &scenario);
   ReadControl(root.Get("control"), &scenario);
   if (scenario.task) FinishTask(&scenario);
+  scenario.imperfections = ReadImperfections(&root, scenario.plant.time_step);
+  if (scenario.plant.type == PlantType::kRigid && !scenario.imperfections.disturbances.empty()) {
+    root.Get("disturbance").Reject("pushes need plant.type = \"engine\"");
+  }
   if (const auto bounds = root.Find("bounds")) {
     for (const auto& [name, value] : bounds->AsTable().GetEntries()) {
       scenario.bounds.emplace_back(name, value.AsNotNegative());

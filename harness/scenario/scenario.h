@@ -18,6 +18,7 @@
 #include "controller/control/object_tracking.h"
 #include "controller/control/trajectory_reader.h"
 #include "controller/handling/pick_and_place.h"
+#include "harness/plant/imperfections.h"
 #include "harness/plant/integrator.h"
 
 namespace dexcheck {
@@ -117,6 +118,7 @@ struct Scenario {
   TrajectoryMaker trajectory;       ///< None for a task.
   std::optional<TaskOptions> task;  ///< Instead of a trajectory; the grasp's contacts are then planned.
   ControlOptions control;
+  Imperfections imperfections;
   std::vector<BoundOverride> bounds;
   Expectation expect;
   std::uint64_t seed = 0;  ///< Of random changes to posture and grasp; 0 for none.

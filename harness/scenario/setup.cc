@@ -11,6 +11,7 @@
 #include "controller/model/parameter_reader.h"
 #include "controller/object/euler_zyz.h"
 #include "harness/engine/remove_looks.h"
+#include "harness/scenario/mismatch.h"
 
 namespace dexcheck {
 namespace {
@@ -67,6 +68,9 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
       plant_model_(ReadPlantModel(scenario, model_.spec().source)),
       engine_(std::move(engine)) {
   const std::string& robot = model_.spec().source;
+  if (model_.base().type == BaseType::kFloating) {
+    throw InputError(robot + ": base.type: must not be \"floating\" in a run, whose law drives the base");
+  }
   if (!model_.object()) throw InputError(robot + ": object: is missing, and the scenario holds one");
   RemoveLooks(engine_.get());
   adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
@@ -80,6 +84,28 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
   FindFingertips();
   FindGrasp();
   if (scenario_.plant.bonded) MakeBonds();
+  if (!scenario_.imperfections.mismatch.is_none()) MakeMismatch(mjcf.string());
+}
+
+void Setup::MakeMismatch(const std::string& mjcf) {
+  controller_engine_ = MjModelPtr(mj_copyModel(nullptr, engine_.get()));
+  const auto change = [&](const RobotModel& model, mjModel* engine) {
+    RobotSpec spec = model.spec();
+    ApplyMismatch(scenario_.imperfections.mismatch, scenario_.seed, scenario_.source, *adapter_, engine,
+                  &spec);
+    return RobotModel(std::move(spec));
+  };
+  if (plant_model_) {
+    const MjModelPtr scratch(mj_copyModel(nullptr, engine_.get()));
+    plant_model_ = std::make_unique<RobotModel>(change(*plant_model_, scratch.get()));
+  }
+  known_model_.emplace(change(model_, engine_.get()));
+  plant_side_ = std::make_unique<Adapter>(*known_model_, *engine_, mjcf);
+  controller_side_ = std::make_unique<Adapter>(model_, *controller_engine_, mjcf);
+}
+
+PartContext Setup::MakePartContext() const {
+  return {&model_, fingertips_.size(), scenario_.plant.time_step, scenario_.seed, scenario_.source};
 }
 
 void Setup::ApplyPlantOptions() {

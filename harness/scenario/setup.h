@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "harness/engine/adapter.h"
 #include "harness/gate/static_gate.h"
 #include "harness/plant/observer.h"
+#include "harness/plant/part_context.h"
 #include "harness/plant/plant.h"
 #include "harness/scenario/scenario.h"
 
@@ -41,6 +43,13 @@ class Setup {
   /// With the scenario's changes.
   [[nodiscard]] const mjModel& engine() const { return *engine_; }
   [[nodiscard]] const Adapter& adapter() const { return *adapter_; }
+  /// What the robot of engine() is: model(), but for a mismatch that the scenario asks for.
+  [[nodiscard]] const RobotModel& known_model() const { return known_model_ ? *known_model_ : model_; }
+  /// known_model() and engine(); model() and an engine without the mismatch.
+  [[nodiscard]] const Adapter& plant_side() const { return plant_side_ ? *plant_side_ : *adapter_; }
+  [[nodiscard]] const Adapter& controller_side() const {
+    return controller_side_ ? *controller_side_ : *adapter_;
+  }
   /// What the two descriptions disagree on before anything moves, the scenario's changes to the plant aside.
   [[nodiscard]] const GateResult& gate() const { return gate_; }
   [[nodiscard]] const ObjectModel& object() const { return *model_.object(); }
@@ -66,6 +75,8 @@ class Setup {
   /// kappa at the start, by fingertip.
   [[nodiscard]] const std::vector<ContactCoordinates>& kappa_start() const { return kappa_start_; }
 
+  /// For the parts of a loop.
+  [[nodiscard]] PartContext MakePartContext() const;
   /// Options of the law, with the posture and the angles' branch of the start.
   [[nodiscard]] GraspControllerOptions MakeControllerOptions() const;
 
@@ -80,6 +91,7 @@ class Setup {
   void VaryGrasp(std::mt19937_64* random);
   FingerPlacement SolveGrasp();
   void MakeBonds();
+  void MakeMismatch(const std::string& mjcf);
   /// Stiffness and damping of a law that has them: the scenario's, or those that follow from its gains.
   [[nodiscard]] ObjectStiffness FindStiffness(const GraspControllerOptions& options) const;
 
@@ -88,6 +100,9 @@ class Setup {
   std::unique_ptr<RobotModel> plant_model_;
   MjModelPtr engine_;
   std::unique_ptr<Adapter> adapter_;
+  std::optional<RobotModel> known_model_;  // these four only with a mismatch
+  MjModelPtr controller_engine_;
+  std::unique_ptr<Adapter> plant_side_, controller_side_;
   GateResult gate_;
   std::unique_ptr<Surface> surface_;
   std::vector<int> fingertips_;

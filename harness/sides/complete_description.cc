@@ -6,6 +6,7 @@
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/join_names.h"
+#include "harness/sides/mjcf_reader.h"
 
 namespace dexcheck {
 namespace {
@@ -17,6 +18,7 @@ class EngineCompletion {
       : engine_(engine), engine_source_(std::move(engine_source)), robot_(*robot) {}
 
   Completion Run() {
+    TakeBase();
     TakeGravity();
     TakeNames();
     TakeJointConstants();
@@ -27,6 +29,22 @@ class EngineCompletion {
  private:
   [[nodiscard]] int FindEngineJoint(const Joint& joint) const {
     return mj_name2id(&engine_, mjOBJ_JOINT, joint.name.c_str());
+  }
+
+  /// A base that the file does not state floats if the engine's does, in the frame of the body of one name.
+  void TakeBase() {
+    const int body = FindFloatingBase(engine_);
+    if (body < 0) return;
+    if (!robot_.states_base) {
+      LetBaseFloat(&robot_);
+      result_.notes.push_back("base: " + robot_.spec.source +
+                              " does not say how its root moves; it floats as in " + engine_source_);
+    }
+    if (robot_.spec.base.type != BaseType::kFloating) return;
+    const std::string name = engine_.names + engine_.name_bodyadr[body];
+    if (MoveBaseTo(name, &robot_)) return;
+    result_.notes.push_back("links by other names: " + Quote(robot_.spec.base.link) + " is " + Quote(name));
+    robot_.spec.base.link = name;
   }
 
   void TakeGravity() {
@@ -51,6 +69,8 @@ class EngineCompletion {
       const int id = FindEngineJoint(joint);
       if (id < 0) continue;
       const int body = engine_.jnt_bodyid[id];
+      // Of several joints of one body the last moves it; the links between them have no body.
+      if (id + 1 < engine_.body_jntadr[body] + engine_.body_jntnum[body]) continue;
       rename(&joint.link, body);
       if (joint.parent < 0 && mj_name2id(&engine_, mjOBJ_BODY, base.link.c_str()) < 0) {
         rename(&base.link, engine_.body_weldid[engine_.body_parentid[body]]);
@@ -92,7 +112,7 @@ class EngineCompletion {
                  [&](int id, size_t i) { robot_.spec.joints[i].damping = of_dof(engine_.dof_damping)(id); });
     TakeConstant(&DescribedJoint::states_dry_friction, "joint_dry_friction", "dry friction",
                  of_dof(engine_.dof_frictionloss), [&](int id, size_t i) {
-                   robot_.joints[i].dry_friction = of_dof(engine_.dof_frictionloss)(id);
+                   robot_.spec.joints[i].dry_friction = of_dof(engine_.dof_frictionloss)(id);
                  });
     const auto is_limited = [&](int id) { return engine_.jnt_limited[id] != 0 ? 1.0 : 0.0; };
     for (size_t i = 0; i < robot_.spec.joints.size(); ++i) {

@@ -21,7 +21,6 @@ class DescriptionCheck {
       : robot_(robot), adapter_(adapter), engine_(adapter.engine()), gate_(*gate) {}
 
   std::vector<std::string> Run() {
-    CheckDryFriction();
     CheckCouplings();
     return notes_;
   }
@@ -60,19 +59,6 @@ class DescriptionCheck {
                               model, engine, where, entry});
   }
 
-  void CheckDryFriction() {
-    const std::string name = "joint_dry_friction";
-    TakeBack(name,
-             [](const GateFinding& finding) { return finding.location.kind == Location::Kind::kJoint; });
-    CheckRecord* record = nullptr;
-    for (size_t i = 0; i < robot_.joints.size(); ++i) {
-      if (!robot_.joints[i].states_dry_friction) continue;
-      if (record == nullptr) record = Define(name);
-      Compare(record, static_cast<int>(i), robot_.joints[i].dry_friction,
-              engine_.dof_frictionloss[adapter_.joint_dofs()[i]], 0);
-    }
-  }
-
   /// The description's index of a joint of the engine's model; -1 when it has none.
   [[nodiscard]] int FindIndex(int engine_joint) const {
     const std::vector<int>& ids = adapter_.joint_ids();
@@ -87,7 +73,7 @@ class DescriptionCheck {
     std::vector<std::string> constraints;
     for (size_t i = 0; i < robot_.joints.size(); ++i) {
       const std::string& name = robot_.spec.joints[i].name;
-      const std::optional<JointCoupling>& own = robot_.joints[i].coupling;
+      const std::optional<JointCoupling>& own = robot_.spec.joints[i].coupling;
       const std::optional<JointCoupling> other = FindEngineCoupling(engine_, adapter_.joint_ids()[i]);
       if (own && !other) only_here.push_back(name);
       if (!own && other) only_there.push_back(name);

@@ -18,6 +18,7 @@ class Completion {
       : a_(*a), b_(*b), b_of_a_(MatchJoints(a_.spec, b_.spec)), a_of_b_(MatchJoints(b_.spec, a_.spec)) {}
 
   std::vector<std::string> Run() {
+    TakeBase();
     RequireSameMechanism();
     TakeGravity();
     TakeNames();
@@ -60,6 +61,21 @@ class Completion {
     }
   }
 
+  /// A base that one file does not state moves as the other one's; a floating one's frame is that of the link
+  /// of one name.
+  void TakeBase() {
+    const auto take = [this](RobotDescription* robot, const RobotDescription& other) {
+      if (robot->states_base || other.spec.base.type != BaseType::kFloating) return;
+      LetBaseFloat(robot);
+      notes_.push_back("base: " + robot->spec.source +
+                       " does not say how its root moves; it floats as that of " + other.spec.source);
+    };
+    take(&a_, b_);
+    take(&b_, a_);
+    if (a_.spec.base.type != BaseType::kFloating || b_.spec.base.type != BaseType::kFloating) return;
+    if (!MoveBaseTo(a_.spec.base.link, &b_)) MoveBaseTo(b_.spec.base.link, &a_);
+  }
+
   void TakeGravity() {
     if (a_.states_gravity == b_.states_gravity) return;
     (a_.states_gravity ? b_ : a_).spec.gravity = (a_.states_gravity ? a_ : b_).spec.gravity;
@@ -90,7 +106,7 @@ class Completion {
       return std::vector<double*>{&robot.spec.joints[i].damping};
     });
     Take("dry friction", &DescribedJoint::states_dry_friction, [](RobotDescription& robot, size_t i) {
-      return std::vector<double*>{&robot.joints[i].dry_friction};
+      return std::vector<double*>{&robot.spec.joints[i].dry_friction};
     });
     Take("range", &DescribedJoint::states_range, [](RobotDescription& robot, size_t i) {
       return std::vector<double*>{&robot.spec.joints[i].lower, &robot.spec.joints[i].upper};

@@ -1,5 +1,6 @@
 #include "harness/sides/mjcf_reader.h"
 
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -35,6 +36,7 @@ class MjcfDescriptionReader {
     robot_.spec.gravity = MapVector(engine_.opt.gravity);
     PlaceBase();
     for (int body = 1; body < engine_.nbody; ++body) AddBody(body);
+    robot_.spec.base.body = Combine(base_parts_);
     for (size_t i = 0; i < robot_.spec.joints.size(); ++i) robot_.spec.joints[i].body = Combine(parts_[i]);
     AddSites();
     AddCouplings();
@@ -51,8 +53,16 @@ class MjcfDescriptionReader {
 
   [[nodiscard]] bool IsBase(int body) const { return engine_.body_weldid[body] == 0; }
 
-  /// The base's link is the fixed body that everything hangs on; several such bodies are the world.
+  /// The base's link is the floating body, or the fixed body that everything hangs on; several such bodies
+  /// are the world.
   void PlaceBase() {
+    places_.resize(static_cast<size_t>(engine_.nbody));
+    floating_ = FindFloatingBase(engine_);
+    if (floating_ > 0) {
+      robot_.spec.base.link = NameOf(engine_, mjOBJ_BODY, floating_);
+      LetBaseFloat(&robot_);
+      return;
+    }
     int base = -1;
     for (int body = 1; body < engine_.nbody; ++body) {
       if (engine_.body_jntnum[body] == 0 || !IsBase(engine_.body_parentid[body])) continue;
@@ -66,26 +76,82 @@ class MjcfDescriptionReader {
       robot_.spec.base.X_B0 =
           MapPose(engine_.body_pos + 3 * body, engine_.body_quat + 4 * body) * robot_.spec.base.X_B0;
     }
-    places_.resize(static_cast<size_t>(engine_.nbody));
     places_[0].X_iL = robot_.spec.base.X_B0.inverse();
     if (base == 0) places_[0].X_iL.setIdentity();
   }
 
   void AddBody(int body) {
+    if (floating_ > 0 && engine_.body_rootid[body] != floating_) return;  // stands in the world
     const Place& parent = places_[static_cast<size_t>(engine_.body_parentid[body])];
     Place place = {parent.joint,
                    parent.X_iL * MapPose(engine_.body_pos + 3 * body, engine_.body_quat + 4 * body)};
     const int first = engine_.body_jntadr[body];
     const int count = engine_.body_jntnum[body];
-    for (int k = 0; k < count; ++k) place = AddJoint(first + k, k + 1 == count, place);
+    if (body == floating_) {
+      place = Place{};
+    } else {
+      for (int k = 0; k < count; ++k) place = AddJoint(first + k, k + 1 == count, place);
+    }
     places_[static_cast<size_t>(body)] = place;
-    if (place.joint < 0) return;
     const Vector3d moments = MapVector(engine_.body_inertia + 3 * body);
     const MassProperties principal{engine_.body_mass[body], Vector3d::Zero(), moments.asDiagonal()};
     const Pose X_LC = MapPose(engine_.body_ipos + 3 * body, engine_.body_iquat + 4 * body);
-    if (principal.mass > 0.0) {
-      parts_[static_cast<size_t>(place.joint)].push_back(ExpressIn(principal, place.X_iL * X_LC));
+    AddPart(body, place, ExpressIn(principal, X_LC), X_LC);
+    if (principal.mass <= 0.0) return;
+    const MassProperties whole = ExpressIn(principal, place.X_iL * X_LC);
+    (place.joint < 0 ? base_parts_ : parts_[static_cast<size_t>(place.joint)]).push_back(whole);
+  }
+
+  void AddPart(int body, const Place& place, const MassProperties& mass, const Pose& X_LC) {
+    DescribedPart& part = robot_.parts.emplace_back();
+    part.name = NameOf(engine_, mjOBJ_BODY, body);
+    part.body = mass;
+    part.states_inertial = mass.mass > 0.0;
+    part.X_LC = X_LC;
+    part.joint = place.joint;
+    part.X_iL = place.X_iL;
+    const int first = engine_.body_geomadr[body];
+    for (const bool touching : {true, false}) {
+      for (int geom = first; geom >= 0 && geom < first + engine_.body_geomnum[body]; ++geom) {
+        if (touching && !CanTouch(engine_, geom)) continue;
+        part.shapes.push_back(ReadGeom(geom));
+      }
+      if (!part.shapes.empty()) return;
     }
+  }
+
+  [[nodiscard]] DescribedShape ReadGeom(int geom) const {
+    DescribedShape shape;
+    const mjtNum* size = engine_.geom_size + 3 * geom;
+    Vector3d half(size[0], size[0], size[0]);
+    switch (engine_.geom_type[geom]) {
+      case mjGEOM_SPHERE:
+        shape.volume = 4.0 / 3.0 * kPi * size[0] * size[0] * size[0];
+        break;
+      case mjGEOM_CAPSULE:
+        half[2] += size[1];
+        shape.volume = kPi * size[0] * size[0] * (2.0 * size[1] + 4.0 / 3.0 * size[0]);
+        break;
+      case mjGEOM_CYLINDER:
+        half[2] = size[1];
+        shape.volume = kPi * size[0] * size[0] * 2.0 * size[1];
+        break;
+      case mjGEOM_ELLIPSOID:
+        half = MapVector(size);
+        shape.volume = 4.0 / 3.0 * kPi * half.prod();
+        break;
+      case mjGEOM_BOX:
+        half = MapVector(size);
+        shape.volume = 8.0 * half.prod();
+        break;
+      default:
+        half.setConstant(engine_.geom_rbound[geom]);  // a mesh: around it
+    }
+    const Pose X_LG = MapPose(engine_.geom_pos + 3 * geom, engine_.geom_quat + 4 * geom);
+    const Vector3d around = X_LG.linear().cwiseAbs() * half;
+    shape.low = X_LG.translation() - around;
+    shape.high = X_LG.translation() + around;
+    return shape;
   }
 
   /// @param place of the body before this joint. @return its place behind it.
@@ -117,12 +183,13 @@ class MjcfDescriptionReader {
     const int dof = engine_.jnt_dofadr[id];
     joint.damping = engine_.dof_damping[dof];
     joint.armature = engine_.dof_armature[dof];
-    stated.dry_friction = engine_.dof_frictionloss[dof];
+    joint.dry_friction = engine_.dof_frictionloss[dof];
     stated.states_range = engine_.jnt_limited[id] != 0;
     joint.lower = stated.states_range ? engine_.jnt_range[2 * id] : -kPi;
     joint.upper = stated.states_range ? engine_.jnt_range[2 * id + 1] : kPi;
     robot_.spec.joints.push_back(joint);
     robot_.joints.push_back(stated);
+    joint_ids_.push_back(id);
     parts_.emplace_back();
     return {static_cast<int>(robot_.spec.joints.size()) - 1, stated.X_iL};
   }
@@ -130,6 +197,7 @@ class MjcfDescriptionReader {
   void AddSites() {
     for (int site = 0; site < engine_.nsite; ++site) {
       if (engine_.names[engine_.name_siteadr[site]] == '\0') continue;
+      if (floating_ > 0 && engine_.body_rootid[engine_.site_bodyid[site]] != floating_) continue;
       const Place& place = places_[static_cast<size_t>(engine_.site_bodyid[site])];
       const Pose X_LF = MapPose(engine_.site_pos + 3 * site, engine_.site_quat + 4 * site);
       robot_.spec.frames.push_back({NameOf(engine_, mjOBJ_SITE, site), place.joint, place.X_iL * X_LF, {}});
@@ -138,9 +206,14 @@ class MjcfDescriptionReader {
 
   /// Couplings of first order; all others are counted.
   void AddCouplings() {
-    for (int id = 0; id < engine_.njnt; ++id) {  // joints were added in the engine's order
-      robot_.joints[static_cast<size_t>(id)].coupling = FindEngineCoupling(engine_, id);
-      if (robot_.joints[static_cast<size_t>(id)].coupling) --other_equalities_;
+    for (size_t i = 0; i < robot_.joints.size(); ++i) {
+      std::optional<JointCoupling> coupling = FindEngineCoupling(engine_, joint_ids_[i]);
+      if (!coupling) continue;
+      const auto leader = std::find(joint_ids_.begin(), joint_ids_.end(), coupling->leader);
+      if (leader == joint_ids_.end()) continue;
+      coupling->leader = static_cast<int>(leader - joint_ids_.begin());
+      robot_.spec.joints[i].coupling = coupling;
+      --other_equalities_;
     }
   }
 
@@ -164,12 +237,28 @@ class MjcfDescriptionReader {
   const mjModel& engine_;
   std::string source_;
   RobotDescription robot_;
+  int floating_ = -1;          // the base's body, when it floats
   std::vector<Place> places_;  // by body
+  std::vector<int> joint_ids_;
+  std::vector<MassProperties> base_parts_;
   std::vector<std::vector<MassProperties>> parts_;
   int other_equalities_;
 };
 
 }  // namespace
+
+int FindFloatingBase(const mjModel& engine) {
+  int base = -1;
+  for (int id = 0; id < engine.njnt; ++id) {
+    const int body = engine.jnt_bodyid[id];
+    if (engine.jnt_type[id] == mjJNT_FREE) base = base < 0 ? body : 0;
+  }
+  if (base <= 0) return -1;
+  for (int id = 0; id < engine.njnt; ++id) {
+    if (engine.body_rootid[engine.jnt_bodyid[id]] != base) return -1;
+  }
+  return base;
+}
 
 RobotDescription ReadMjcfDescription(const mjModel& engine, const std::string& source) {
   return MjcfDescriptionReader(engine, source).Read();

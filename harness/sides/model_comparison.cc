@@ -63,6 +63,10 @@ class ModelComparison {
                     a_.spec.gravity.norm());
       }
     }
+    if (model_a_.base().type != BaseType::kFixed) {
+      AddConstant(&gate, "link_mass", {Location::Kind::kLink, -1, -1}, model_a_.base_with_wheels().mass,
+                  model_b_.base_with_wheels().mass, 0);
+    }
     ForJoints([&](size_t i, size_t j) {
       AddConstant(&gate, "link_mass", {Location::Kind::kLink, static_cast<int>(i), -1},
                   a_.spec.joints[i].body.mass, b_.spec.joints[j].body.mass, 0);
@@ -73,7 +77,7 @@ class ModelComparison {
                   });
     CompareStated(&gate, "joint_dry_friction", &DescribedJoint::states_dry_friction,
                   [](const RobotDescription& robot, size_t i) {
-                    return std::vector<double>{robot.joints[i].dry_friction};
+                    return std::vector<double>{robot.spec.joints[i].dry_friction};
                   });
     CompareStated(&gate, "joint_armature", &DescribedJoint::states_armature,
                   [](const RobotDescription& robot, size_t i) {
@@ -84,8 +88,8 @@ class ModelComparison {
                     return std::vector<double>{robot.spec.joints[i].lower, robot.spec.joints[i].upper};
                   });
     ForJoints([&](size_t i, size_t j) {
-      const std::optional<JointCoupling>& own = a_.joints[i].coupling;
-      const std::optional<JointCoupling>& other = b_.joints[j].coupling;
+      const std::optional<JointCoupling>& own = a_.spec.joints[i].coupling;
+      const std::optional<JointCoupling>& other = b_.spec.joints[j].coupling;
       if (!own || !other) return;
       const Location where{Location::Kind::kJoint, static_cast<int>(i), -1};
       const std::string name = "joint_coupling";
@@ -190,17 +194,24 @@ class ModelComparison {
         const Vector3d foot = X_a.translation() + axis.dot(anchor - X_a.translation()) * axis;
         for (int k = 0; k < 3; ++k) Add(kJointAxis, foot[k], anchor[k], length, at_joint);
       }
-      const Location at_link{Location::Kind::kLink, static_cast<int>(i), -1};
-      if (joint.body.mass > 0.0 && other.body.mass > 0.0) {
-        const Vector3d com_a = X_a * joint.body.com;
-        const Vector3d com_b = X_b * other.body.com;
-        for (int k = 0; k < 3; ++k) Add(kLinkCom, com_a[k], com_b[k], length, at_link);
-      }
-      const Matrix3d I_a = X_a.linear() * joint.body.inertia * X_a.linear().transpose();
-      const Matrix3d I_b = X_b.linear() * other.body.inertia * X_b.linear().transpose();
-      const double scale = Positive(std::max(I_a.trace(), I_b.trace()));
-      for (int k = 0; k < 9; ++k) Add(kLinkInertia, I_a.data()[k], I_b.data()[k], scale, at_link);
+      CompareBody({Location::Kind::kLink, static_cast<int>(i), -1}, joint.body, X_a, other.body, X_b);
     });
+    if (model_a_.base().type == BaseType::kFixed) return;
+    CompareBody({Location::Kind::kLink, -1, -1}, model_a_.base_with_wheels(), terms_a_.CalcLinkPose(-1),
+                model_b_.base_with_wheels(), terms_b_.CalcLinkPose(-1));
+  }
+
+  void CompareBody(const Location& where, const MassProperties& a, const Pose& X_a, const MassProperties& b,
+                   const Pose& X_b) {
+    if (a.mass > 0.0 && b.mass > 0.0) {
+      const Vector3d com_a = X_a * a.com;
+      const Vector3d com_b = X_b * b.com;
+      for (int k = 0; k < 3; ++k) Add(kLinkCom, com_a[k], com_b[k], scales_.world_length(), where);
+    }
+    const Matrix3d I_a = X_a.linear() * a.inertia * X_a.linear().transpose();
+    const Matrix3d I_b = X_b.linear() * b.inertia * X_b.linear().transpose();
+    const double scale = Positive(std::max(I_a.trace(), I_b.trace()));
+    for (int k = 0; k < 9; ++k) Add(kLinkInertia, I_a.data()[k], I_b.data()[k], scale, where);
   }
 
   void CompareFrames(const VectorXd& xi) {

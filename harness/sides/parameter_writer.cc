@@ -80,8 +80,8 @@ class ParameterWriter {
   explicit ParameterWriter(const RobotDescription& robot) : robot_(robot), spec_(robot.spec) {}
 
   std::string Write(const std::string& origin) {
-    if (spec_.base.type != BaseType::kFixed) {
-      throw InputError(spec_.source + ": base: must be fixed to be written as a parameter file");
+    if (spec_.base.type != BaseType::kFixed && spec_.base.type != BaseType::kFloating) {
+      throw InputError(spec_.source + ": base: must be fixed or floating to be written as a parameter file");
     }
     WriteHead(origin);
     for (size_t begin = 0; begin < spec_.joints.size();) {
@@ -123,7 +123,11 @@ class ParameterWriter {
     text_ += "name = " + QuoteToml(spec_.name) + "\n";
     text_ += "gravity = " + FormatNumbers(spec_.gravity);
     text_ += robot_.states_gravity ? "\n\n" : "  # not stated there\n\n";
-    text_ += "[base]\ntype = \"fixed\"\nlink = " + QuoteToml(spec_.base.link) + "\n";
+    const bool floats = spec_.base.type == BaseType::kFloating;
+    text_ += std::string("[base]\ntype = ") + (floats ? "\"floating\"" : "\"fixed\"");
+    text_ += (robot_.states_base ? "\nlink = " : "  # not stated there\nlink = ") +
+             QuoteToml(spec_.base.link) + "\n";
+    if (floats) WriteBody(spec_.base.body);
     const std::string pose = FormatPose(spec_.base.X_B0, false);
     if (!pose.empty()) text_ += "pose = {" + pose.substr(1) + " }\n";
     text_ += "\n";
@@ -154,6 +158,13 @@ class ParameterWriter {
   void WriteJoint(const Joint& joint, const DescribedJoint& stated) {
     text_ += QuoteToml(joint.name) + " = { range = " + FormatNumbers(Vector2d(joint.lower, joint.upper)) +
              ", damping = " + FormatNumber(joint.damping) + ", armature = " + FormatNumber(joint.armature);
+    if (joint.dry_friction != 0.0) text_ += ", dry_friction = " + FormatNumber(joint.dry_friction);
+    if (joint.coupling) {
+      text_ +=
+          ", mimic = { joint = " + QuoteToml(spec_.joints[static_cast<size_t>(joint.coupling->leader)].name) +
+          ", multiplier = " + FormatNumber(joint.coupling->multiplier) +
+          ", offset = " + FormatNumber(joint.coupling->offset) + " }";
+    }
     text_ += " }";
     std::string unstated;
     const auto note = [&](bool is_stated, const char* name) {
@@ -162,24 +173,19 @@ class ParameterWriter {
     note(stated.states_range, "range");
     note(stated.states_damping, "damping");
     note(stated.states_armature, "armature");
-    // What tables have no key for.
-    if (stated.dry_friction != 0.0)
-      unstated += "  # dry friction there: " + FormatNumber(stated.dry_friction);
-    if (stated.coupling) {
-      unstated += "  # follows " +
-                  FormatComment(spec_.joints[static_cast<size_t>(stated.coupling->leader)].name) +
-                  " there: " + FormatNumber(stated.coupling->multiplier) + " q + " +
-                  FormatNumber(stated.coupling->offset);
-    }
     text_ += unstated + "\n";
   }
 
   void WriteLink(const Joint& joint, const Pose& X_iW) {
-    const MassProperties body = ExpressIn(joint.body, X_iW.inverse());
+    text_ += "[chain.links." + QuoteToml(joint.link) + "]\n";
+    WriteBody(ExpressIn(joint.body, X_iW.inverse()));
+  }
+
+  void WriteBody(const MassProperties& body) {
     const Matrix3d& I = body.inertia;
     Vector6d entries;
     entries << I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
-    text_ += "[chain.links." + QuoteToml(joint.link) + "]\nmass = " + FormatTidy(body.mass, body.mass) +
+    text_ += "mass = " + FormatTidy(body.mass, body.mass) +
              "\ncom = " + FormatTidyList(body.com, body.com.norm()) +
              "\ninertia = " + FormatTidyList(entries, I.trace()) + "\n";
   }

@@ -8,11 +8,23 @@
 namespace dexcheck {
 namespace {
 
+void AddPart(const std::string& name, const MassProperties& body, int joint, RobotDescription* robot) {
+  DescribedPart& part = robot->parts.emplace_back();
+  part.name = name;
+  part.body = body;
+  part.joint = joint;
+}
+
 RobotDescription ReadTable(const std::filesystem::path& path) {
   RobotDescription robot;
   robot.spec = ReadRobotModel(path).spec();
   robot.joints.resize(robot.spec.joints.size());
-  for (DescribedJoint& joint : robot.joints) joint.states_dry_friction = false;  // tables have no key for it
+  if (robot.spec.base.type != BaseType::kFixed)
+    AddPart(robot.spec.base.link, robot.spec.base.body, -1, &robot);
+  for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
+    const Joint& joint = robot.spec.joints[i];
+    AddPart(joint.link, joint.body, static_cast<int>(i), &robot);
+  }
   return robot;
 }
 

@@ -1,16 +1,21 @@
 #include "harness/sides/robot_description.h"
 
+#include <algorithm>
+
+#include "controller/common/text.h"
+#include "controller/model/body_frame.h"
+
 namespace dexcheck {
 
 MatrixXd CalcCouplingMap(const RobotDescription& robot) {
   std::vector<int> column(robot.joints.size(), -1);
   int free = 0;
   for (size_t i = 0; i < column.size(); ++i) {
-    if (!robot.joints[i].coupling) column[i] = free++;
+    if (!robot.spec.joints[i].coupling) column[i] = free++;
   }
   MatrixXd T = MatrixXd::Zero(static_cast<Eigen::Index>(column.size()), free);
   for (size_t i = 0; i < column.size(); ++i) {
-    const std::optional<JointCoupling>& coupling = robot.joints[i].coupling;
+    const std::optional<JointCoupling>& coupling = robot.spec.joints[i].coupling;
     const auto row = static_cast<Eigen::Index>(i);
     if (coupling) {
       T(row, column[static_cast<size_t>(coupling->leader)]) = coupling->multiplier;
@@ -19,6 +24,49 @@ MatrixXd CalcCouplingMap(const RobotDescription& robot) {
     }
   }
   return T;
+}
+
+void LetBaseFloat(RobotDescription* robot) {
+  robot->spec.base.type = BaseType::kFloating;
+  robot->spec.base.X_B0 = Pose::Identity();
+  robot->states_base = true;
+}
+
+bool MoveBaseTo(const std::string& frame, RobotDescription* robot) {
+  RobotSpec& spec = robot->spec;
+  if (frame == spec.base.link) return true;
+  const auto found = std::find_if(spec.frames.begin(), spec.frames.end(), [&](const Frame& candidate) {
+    return candidate.link < 0 && candidate.name == frame;
+  });
+  if (found == spec.frames.end()) return false;
+  const Pose X_F0 = found->X_LF.inverse();  // Sigma_0 in the frame
+  *found = {spec.base.link, -1, X_F0, std::nullopt};
+  for (Frame& other : spec.frames) {
+    if (other.link < 0 && &other != &*found) other.X_LF = X_F0 * other.X_LF;
+  }
+  for (Joint& joint : spec.joints) {
+    if (joint.parent < 0) joint.X_PB = X_F0 * joint.X_PB;
+  }
+  for (DescribedPart& part : robot->parts) {
+    if (part.joint < 0) part.X_iL = X_F0 * part.X_iL;
+  }
+  spec.base.body = ExpressIn(spec.base.body, X_F0);
+  spec.base.link = frame;
+  return true;
+}
+
+std::vector<std::string> DescribeBaseCoordinates(const RobotDescription& robot) {
+  if (robot.spec.base.type != BaseType::kFloating) return {};
+  return {
+      "base " + Quote(robot.spec.base.link) +
+          " floats: q = [x y z, qw qx qy qz, joints from q[7]], xi = [velocity of its origin in world axes, "
+          "angular velocity in its own axes, joints from xi[6]], as MuJoCo has them",
+      "in Pinocchio's convention the quaternion is qx qy qz qw and the origin's velocity is in the base's "
+      "axes: xi' = B xi with B = diag(R^T, 1, 1), M' = B^-T M B^-1, bias' = B^-T bias + M' [omega x v; 0; "
+      "0] (dexcheck eval prints both)",
+      "in Drake's convention q = [qw qx qy qz, x y z, joints], xi = [angular velocity, velocity of its "
+      "origin, "
+      "both in world axes, joints]"};
 }
 
 }  // namespace dexcheck

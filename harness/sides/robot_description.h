@@ -10,13 +10,6 @@
 
 namespace dexcheck {
 
-/// A joint that follows another one: q_i = multiplier q_leader + offset (rad or m).
-struct JointCoupling {
-  int leader = -1;  ///< Index of the joint that is followed, which follows none itself.
-  double multiplier = 1.0;
-  double offset = 0.0;  ///< rad or m
-};
-
 /// What a file says of a joint and its link, beside the specification.
 struct DescribedJoint {
   // Which constants the file states. What it does not state is zero in the specification, or a range of +-pi.
@@ -25,11 +18,29 @@ struct DescribedJoint {
   bool states_dry_friction = true;
   bool states_armature = true;
 
-  double dry_friction =
-      0.0;  ///< Coulomb friction, N m or N: the force of a sliding joint, -this sign(q_i_dot).
-  std::optional<JointCoupling> coupling;
   /// The link's own frame L, in which its file gives masses and what hangs on it, in frame i.
   Pose X_iL = Pose::Identity();
+  int line = 0;              ///< Of the file; 0 when it is not known.
+  double axis_length = 1.0;  ///< Of the axis as the file gives it.
+};
+
+/// Geometry of a part, as the file gives it.
+struct DescribedShape {
+  double volume = 0.0;              ///< m^3; 0 when it is not known.
+  Vector3d low = Vector3d::Zero();  ///< Corners of a box around it, along the link's own axes, m.
+  Vector3d high = Vector3d::Zero();
+};
+
+/// A link as the file gives it, before what is welded together becomes one body.
+struct DescribedPart {
+  std::string name;
+  int line = 0;                  ///< Of the file; 0 when it is not known.
+  bool states_inertial = true;   ///< Otherwise `body` is zero.
+  MassProperties body;           ///< In the link's own frame.
+  Pose X_LC = Pose::Identity();  ///< Frame along whose axes the file gives the inertia, in the link's own.
+  int joint = -1;                ///< That moves it; -1 for the base.
+  Pose X_iL = Pose::Identity();  ///< The link's own frame in that joint's frame i.
+  std::vector<DescribedShape> shapes;
 };
 
 /// A robot as one file describes it.
@@ -37,11 +48,24 @@ struct RobotDescription {
   RobotSpec spec;
   std::vector<DescribedJoint> joints;  ///< By joint.
   bool states_gravity = true;
-  std::vector<std::string> notes;  ///< What was done with the file that its reader may not expect.
+  bool states_base = true;  ///< Whether the base is fixed or floats; otherwise `spec` has a fixed one.
+  std::vector<DescribedPart> parts;
+  std::vector<std::string> unused;  ///< "mesh hand": what the file defines and nothing uses.
+  std::vector<std::string> notes;   ///< What was done with the file that its reader may not expect.
 };
 
 /// T with xi = T xi_free, size joints x (joints - coupled joints): the rates that the couplings leave free. T
 /// is constant, so T^T M T, T^T C T, T^T F are the terms of the coupled robot.
 MatrixXd CalcCouplingMap(const RobotDescription& robot);
+
+/// Lets a base that the file does not state float: its link's frame is Sigma_0.
+void LetBaseFloat(RobotDescription* robot);
+
+/// Puts Sigma_0 of a floating base at one of the base's frames and names the base's link by it; what was the
+/// base's link becomes a frame. @return false when the base has no such frame.
+bool MoveBaseTo(const std::string& frame, RobotDescription* robot);
+
+/// What q' and xi of a floating base are, in this convention and in that of other libraries: notes.
+std::vector<std::string> DescribeBaseCoordinates(const RobotDescription& robot);
 
 }  // namespace dexcheck

@@ -62,15 +62,57 @@ Pose ToPose(const urdf::Pose& pose) {
   return X;
 }
 
+/// Volume and box of a primitive shape; a mesh has no volume here.
+DescribedShape ReadShape(const urdf::Geometry& geometry, const Pose& X_LS) {
+  DescribedShape shape;
+  Vector3d half = Vector3d::Zero();
+  if (geometry.type == urdf::Geometry::SPHERE) {
+    const double r = static_cast<const urdf::Sphere&>(geometry).radius;
+    half.setConstant(r);
+    shape.volume = 4.0 / 3.0 * kPi * r * r * r;
+  } else if (geometry.type == urdf::Geometry::BOX) {
+    const urdf::Vector3& size = static_cast<const urdf::Box&>(geometry).dim;
+    half = 0.5 * Vector3d(size.x, size.y, size.z);
+    shape.volume = size.x * size.y * size.z;
+  } else if (geometry.type == urdf::Geometry::CYLINDER) {
+    const auto& cylinder = static_cast<const urdf::Cylinder&>(geometry);
+    half = Vector3d(cylinder.radius, cylinder.radius, 0.5 * cylinder.length);
+    shape.volume = kPi * cylinder.radius * cylinder.radius * cylinder.length;
+  }
+  const Vector3d around =
+      geometry.type == urdf::Geometry::SPHERE ? half : Vector3d(X_LS.linear().cwiseAbs() * half);
+  shape.low = X_LS.translation() - around;
+  shape.high = X_LS.translation() + around;
+  return shape;
+}
+
+/// What can touch, or else what is seen.
+std::vector<DescribedShape> ReadShapes(const urdf::Link& link) {
+  std::vector<DescribedShape> shapes;
+  for (const auto& collision : link.collision_array) {
+    if (collision->geometry) shapes.push_back(ReadShape(*collision->geometry, ToPose(collision->origin)));
+  }
+  if (!shapes.empty()) return shapes;
+  for (const auto& visual : link.visual_array) {
+    if (visual->geometry) shapes.push_back(ReadShape(*visual->geometry, ToPose(visual->origin)));
+  }
+  return shapes;
+}
+
 class UrdfReader {
  public:
-  UrdfReader(std::string source, UrdfOutline outline, urdf::ModelInterfaceSharedPtr model)
-      : source_(std::move(source)), outline_(std::move(outline)), model_(std::move(model)) {}
+  UrdfReader(std::string source, UrdfOutline outline, urdf::ModelInterfaceSharedPtr model,
+             const UrdfOptions& options)
+      : source_(std::move(source)),
+        outline_(std::move(outline)),
+        model_(std::move(model)),
+        options_(options) {}
 
   RobotDescription Read() {
     robot_.spec.name = model_->getName();
     robot_.spec.source = source_;
     robot_.states_gravity = false;
+    PlaceBase();
     ReadTree();
     if (robot_.spec.joints.empty()) {
       Fail(outline_.links[static_cast<size_t>(outline_.root)].line,
@@ -93,8 +135,26 @@ class UrdfReader {
     throw InputError(source_ + ":" + std::to_string(line) + ": " + problem);
   }
 
+  [[nodiscard]] const UrdfLink& Link(int index) const { return outline_.links[static_cast<size_t>(index)]; }
+
+  /// Which link is the base, and whether it floats.
+  void PlaceBase() {
+    base_ = outline_.root;
+    const UrdfLink& root = Link(base_);
+    bool floats = options_.floating;
+    if (root.child_joints.size() == 1) {
+      const UrdfJoint& only = outline_.joints[static_cast<size_t>(root.child_joints[0])];
+      if (model_->getJoint(only.name)->type == urdf::Joint::FLOATING) {
+        base_ = only.child;
+        floats = true;
+      }
+    }
+    robot_.spec.base.link = Link(base_).name;
+    robot_.states_base = floats || root.name == "world";
+    if (floats) LetBaseFloat(&robot_);
+  }
+
   void ReadTree() {
-    robot_.spec.base.link = outline_.links[static_cast<size_t>(outline_.root)].name;
     parts_.emplace_back();
     std::vector<std::pair<int, Place>> open;  // joints to come, and where their parent links are
     const auto visit = [&](int index, const Place& place) {
@@ -104,7 +164,7 @@ class UrdfReader {
         open.emplace_back(*joint, place);
       }
     };
-    visit(outline_.root, {-1, Pose::Identity()});
+    visit(base_, {-1, Pose::Identity()});
     while (!open.empty()) {
       const auto [index, parent] = open.back();
       open.pop_back();
@@ -130,7 +190,9 @@ class UrdfReader {
         break;
       default:
         Fail(element.line, key + "type: must be fixed, revolute, continuous or prismatic, got " +
-                               (joint.type == urdf::Joint::FLOATING ? "\"floating\"" : "\"planar\""));
+                               (joint.type == urdf::Joint::FLOATING
+                                    ? "\"floating\", which must be the only joint on the root"
+                                    : "\"planar\""));
     }
     return {AddMovingJoint(joint, link, parent.joint, X_iJ, element.line), robot_.joints.back().X_iL};
   }
@@ -159,6 +221,8 @@ class UrdfReader {
     DescribedJoint stated;
     stated.states_armature = false;
     stated.X_iL.linear() = R.transpose();
+    stated.line = line;
+    stated.axis_length = length;
     ReadLimits(joint, line, &added, &stated);
     ReadFriction(joint, line, &added, &stated);
     robot_.spec.joints.push_back(added);
@@ -187,18 +251,25 @@ class UrdfReader {
     stated->states_damping = stated->states_dry_friction = joint.dynamics != nullptr;
     if (!joint.dynamics) return;
     added->damping = joint.dynamics->damping;
-    stated->dry_friction = joint.dynamics->friction;
+    added->dry_friction = joint.dynamics->friction;
     const auto check = [&](const char* name, double value) {
       if (value >= 0.0) return;
       Fail(line, "joint " + Quote(joint.name) + ": dynamics: " + name + " must not be negative, got " +
                      FormatNumber(value));
     };
     check("damping", added->damping);
-    check("friction", stated->dry_friction);
+    check("friction", added->dry_friction);
   }
 
   void ReadBody(const UrdfLink& element, const Place& place) {
     const urdf::LinkConstSharedPtr link = model_->getLink(element.name);
+    DescribedPart& part = robot_.parts.emplace_back();
+    part.name = element.name;
+    part.line = element.line;
+    part.joint = place.joint;
+    part.X_iL = place.X_iL;
+    part.shapes = ReadShapes(*link);
+    part.states_inertial = link->inertial != nullptr;
     if (!link->inertial) return;
     const urdf::Inertial& inertial = *link->inertial;
     // The inertia is given along the axes of the inertial's own frame, which stands at the centre of mass.
@@ -210,9 +281,12 @@ class UrdfReader {
     // clang-format on
     const bool is_usable = body.mass >= 0.0 && std::isfinite(body.mass) && body.inertia.allFinite();
     const std::string problem = FindPhysicalInconsistency(body);
-    if (!is_usable) FailInertial(element, problem);
+    if (!is_usable && !options_.keep_impossible) FailInertial(element, problem);
     if (!problem.empty()) impossible_.push_back({&element, problem, place.joint});
-    body = ExpressIn(body, ToPose(inertial.origin));
+    part.X_LC = ToPose(inertial.origin);
+    body = ExpressIn(body, part.X_LC);
+    part.body = body;
+    if (!is_usable) return;
     parts_[static_cast<size_t>(place.joint + 1)].push_back(ExpressIn(body, place.X_iL));
   }
 
@@ -222,10 +296,13 @@ class UrdfReader {
 
   /// Published robots have small parts that no body can be; what counts is the body that they are welded to.
   void JudgeImpossibleParts() {
+    if (options_.keep_impossible) return;  // the audit names them
     std::vector<std::string> names;
     for (const ImpossiblePart& part : impossible_) {
-      if (part.joint >= 0) {
-        const MassProperties& whole = robot_.spec.joints[static_cast<size_t>(part.joint)].body;
+      const bool moves = part.joint >= 0 || robot_.spec.base.type != BaseType::kFixed;
+      if (moves) {
+        const MassProperties& whole =
+            part.joint < 0 ? robot_.spec.base.body : robot_.spec.joints[static_cast<size_t>(part.joint)].body;
         if (!FindPhysicalInconsistency(whole).empty()) FailInertial(*part.link, part.problem);
       }
       names.push_back(part.link->name);
@@ -236,11 +313,10 @@ class UrdfReader {
   }
 
   void FinishBodies() {
-    for (size_t i = 0; i < robot_.spec.joints.size(); ++i) {
-      // One part stays as it is: its sum would be rounded.
-      const std::vector<MassProperties>& parts = parts_[i + 1];
-      robot_.spec.joints[i].body = parts.size() == 1 ? parts[0] : Combine(parts);
-    }
+    // One part stays as it is: its sum would be rounded.
+    const auto combine = [&](size_t i) { return parts_[i].size() == 1 ? parts_[i][0] : Combine(parts_[i]); };
+    robot_.spec.base.body = combine(0);
+    for (size_t i = 0; i < robot_.spec.joints.size(); ++i) robot_.spec.joints[i].body = combine(i + 1);
     JudgeImpossibleParts();
   }
 
@@ -268,7 +344,7 @@ class UrdfReader {
         coupling.leader = leader->second;
         at = model_->getJoint(name);
       }
-      robot_.joints[static_cast<size_t>(own->second)].coupling = coupling;
+      robot_.spec.joints[static_cast<size_t>(own->second)].coupling = coupling;
     }
   }
 
@@ -298,6 +374,8 @@ class UrdfReader {
   std::string source_;
   UrdfOutline outline_;
   urdf::ModelInterfaceSharedPtr model_;
+  UrdfOptions options_;
+  int base_ = -1;  // the base's link
   RobotDescription robot_;
   /// A link whose own inertial breaks an inequality.
   struct ImpossiblePart {
@@ -348,7 +426,7 @@ RobotDescription ParseUrdf(std::string_view text, const std::string& source, con
     if (!model->getJoint(joint.name))
       throw InputError(source + ": joint " + Quote(joint.name) + ": cannot be parsed");
   }
-  RobotDescription robot = UrdfReader(source, std::move(outline), std::move(model)).Read();
+  RobotDescription robot = UrdfReader(source, std::move(outline), std::move(model), options).Read();
   if (options.packages.empty()) return robot;
   std::vector<std::string> missing;
   for (const std::string& mesh : meshes) {

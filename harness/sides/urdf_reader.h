@@ -15,6 +15,11 @@ struct UrdfOptions {
   /// Where "package://NAME/..." lies: folders that contain NAME, or that are NAME. When there are some,
   /// meshes that are missing are noted; dynamics need none.
   std::vector<std::filesystem::path> packages;
+  /// The root link moves freely. Otherwise it is fixed when it is called "world", floats when the only joint
+  /// on it is of the type "floating", and of others the file does not say: RobotDescription::states_base.
+  bool floating = false;
+  /// Bodies that no robot can have are kept for an audit; a RobotModel refuses them.
+  bool keep_impossible = false;
 };
 
 /// Reads a URDF: links joined by fixed joints are one body, named by the link that the moving joint carries;

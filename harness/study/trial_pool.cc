@@ -1,12 +1,10 @@
 #include "harness/study/trial_pool.h"
 
-#include <fcntl.h>
 #include <poll.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -17,7 +15,6 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/base/interrupts.h"
 
 namespace dexcheck {
 namespace {
@@ -40,16 +37,6 @@ std::optional<TrialResult> Unpack(const std::string& bytes) {
   std::memcpy(result.metrics.data(), bytes.data() + 1, sizeof(double) * kNumMetrics);
   result.failure = bytes.substr(kFixedBytes);
   return result;
-}
-
-bool WriteAll(int file, const std::string& bytes) {
-  size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t count = ::write(file, bytes.data() + done, bytes.size() - done);
-    if (count < 0 && errno != EINTR) return false;
-    if (count > 0) done += static_cast<size_t>(count);
-  }
-  return true;
 }
 
 /// The last line of what a process wrote.
@@ -78,93 +65,64 @@ double ReadProcessorTime(pid_t pid) {
 TrialPool::TrialPool(int size, double time_limit, std::function<TrialResult(const Trial&)> run)
     : size_(static_cast<size_t>(size)), time_limit_(time_limit), run_(std::move(run)) {}
 
-TrialPool::~TrialPool() {
-  for (const Worker& worker : workers_) {
-    ::kill(worker.pid, SIGKILL);
-    ::waitpid(worker.pid, nullptr, 0);
-    ::close(worker.results);
-    ::close(worker.messages);
-  }
-}
-
 std::vector<long> TrialPool::ListRunning() const {
   std::vector<long> trials;
   for (const Worker& worker : workers_) trials.push_back(worker.trial.number);
   return trials;
 }
 
-void TrialPool::Work(const Trial& trial, int results, int messages, pid_t parent) const {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != parent) ::_exit(EXIT_FAILURE);
-  LeaveInterruptsToParent();
+bool TrialPool::Work(const Trial& trial, int channel, int messages) const {
   ::dup2(messages, STDERR_FILENO);
   try {
-    ::_exit(WriteAll(results, Pack(run_(trial))) ? EXIT_SUCCESS : EXIT_FAILURE);
+    return Send(channel, Pack(run_(trial)));
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
   } catch (...) {
     std::fprintf(stderr, "unknown error\n");
   }
   std::fflush(stderr);
-  ::_exit(EXIT_FAILURE);
+  return false;
 }
 
 void TrialPool::Start(const Trial& trial) {
-  const auto fail = [] { throw Error(std::string("a trial cannot be started: ") + std::strerror(errno)); };
-  Worker worker;
-  worker.trial = trial;
-  int ends[2];
-  if (::pipe2(ends, O_CLOEXEC) != 0) fail();
-  worker.results = ends[0];
-  worker.messages = ::memfd_create("messages", MFD_CLOEXEC);
-  const pid_t parent = ::getpid();
-  worker.pid = worker.messages < 0 ? -1 : ::fork();
-  if (worker.pid < 0) {
-    ::close(ends[0]);
-    ::close(ends[1]);
-    fail();
-  }
-  if (worker.pid == 0) Work(trial, ends[1], worker.messages, parent);
-  ::close(ends[1]);
-  workers_.push_back(std::move(worker));
+  FileDescriptor messages(::memfd_create("messages", MFD_CLOEXEC));
+  if (!messages.is_open()) throw Error(std::string("a trial cannot be started: ") + std::strerror(errno));
+  WorkerProcess process("a trial", [&](int channel) { return Work(trial, channel, messages.get()); });
+  workers_.push_back({trial, std::move(process), std::move(messages), {}, false});
 }
 
 void TrialPool::EndSlowTrials() {
   if (time_limit_ <= 0.0) return;
   for (Worker& worker : workers_) {
-    if (worker.timed_out || !(ReadProcessorTime(worker.pid) > time_limit_)) continue;
+    if (worker.timed_out || !(ReadProcessorTime(worker.process.pid()) > time_limit_)) continue;
     worker.timed_out = true;
-    ::kill(worker.pid, SIGKILL);
+    worker.process.Kill();
   }
 }
 
 std::optional<EndedTrial> TrialPool::Wait() {
   EndSlowTrials();
   std::vector<pollfd> files;
-  for (const Worker& worker : workers_) files.push_back({worker.results, POLLIN, 0});
+  for (const Worker& worker : workers_) files.push_back({worker.process.channel(), POLLIN, 0});
   if (::poll(files.data(), files.size(), kWait) <= 0) return std::nullopt;
   for (size_t i = 0; i < files.size(); ++i) {
     if (files[i].revents == 0) continue;
-    char buffer[4096];
-    const ssize_t count = ::read(workers_[i].results, buffer, sizeof(buffer));
-    if (count > 0) workers_[i].received.append(buffer, static_cast<size_t>(count));
-    if (count == 0) return Finish(i);
+    constexpr size_t kChunk = 4096;
+    const std::string bytes = Receive(workers_[i].process.channel(), kChunk);
+    if (bytes.empty()) return Finish(i);
+    workers_[i].received += bytes;
   }
   return std::nullopt;
 }
 
 EndedTrial TrialPool::Finish(size_t index) {
-  const Worker worker = std::move(workers_[index]);
+  Worker worker = std::move(workers_[index]);
   workers_.erase(workers_.begin() + static_cast<std::ptrdiff_t>(index));
-  int status = 0;
-  ::waitpid(worker.pid, &status, 0);
-  const std::string message = ReadLastLine(worker.messages);
-  ::close(worker.results);
-  ::close(worker.messages);
+  const ProcessEnd end = worker.process.Wait();
+  const std::string message = ReadLastLine(worker.messages.get());
   EndedTrial ended;
   ended.row.trial = worker.trial;
-  const bool succeeded = WIFEXITED(status) && WEXITSTATUS(status) == EXIT_SUCCESS;
-  if (const auto result = Unpack(worker.received); result && succeeded) {
+  if (const auto result = Unpack(worker.received); result && end.succeeded) {
     ended.row.result = *result;
     return ended;
   }
@@ -176,13 +134,12 @@ EndedTrial TrialPool::Finish(size_t index) {
         "it took more than trial_time_limit, " + FormatNumber(time_limit_) + " s of processor time";
     return ended;
   }
-  const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
-  ended.killed_from_outside = signal == SIGKILL || signal == SIGTERM || signal == SIGHUP;
-  result.failure = ended.killed_from_outside
-                       ? std::string("the process was killed from outside: ") + ::strsignal(signal)
-                   : signal != 0     ? std::string("the process died: ") + ::strsignal(signal)
-                   : message.empty() ? "the process ended without a result"
-                                     : Abbreviate(message);
+  ended.killed_from_outside = end.signal == SIGKILL || end.signal == SIGTERM || end.signal == SIGHUP;
+  const std::string how = end.Describe(message.empty() ? "" : Abbreviate(message));
+  result.failure = ended.killed_from_outside ? "the process was killed from outside: " + how
+                   : end.signal != 0         ? "the process died: " + how
+                   : how.empty()             ? "the process ended without a result"
+                                             : how;
   return ended;
 }
 

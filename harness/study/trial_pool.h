@@ -2,13 +2,13 @@
 
 // Trials in processes of their own: one that crashes costs no other.
 
-#include <sys/types.h>
-
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "harness/base/worker_process.h"
+#include "harness/log/log_file.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck {
@@ -20,17 +20,13 @@ struct EndedTrial {
   bool killed_from_outside = false;
 };
 
-/// Processes that each make one trial. They end when this process does, however it ends.
+/// Processes that each make one trial. They end with the pool.
 class TrialPool {
  public:
   /// @param run makes a trial; called in the trial's process.
   /// @param time_limit most processor time of a trial, s; 0 for any. One that takes more is ended and gives
   ///   Outcome::kTimedOut.
   TrialPool(int size, double time_limit, std::function<TrialResult(const Trial&)> run);
-  /// Ends what still runs.
-  ~TrialPool();
-  TrialPool(const TrialPool&) = delete;
-  TrialPool& operator=(const TrialPool&) = delete;
 
   [[nodiscard]] bool IsFull() const { return workers_.size() >= size_; }
   [[nodiscard]] bool IsEmpty() const { return workers_.empty(); }
@@ -46,13 +42,12 @@ class TrialPool {
  private:
   struct Worker {
     Trial trial;
-    pid_t pid = -1;
-    int results = -1;   // the pipe's end to read from
-    int messages = -1;  // its standard error
+    WorkerProcess process;
+    FileDescriptor messages;  // its standard error
     std::string received;
     bool timed_out = false;
   };
-  [[noreturn]] void Work(const Trial& trial, int results, int messages, pid_t parent) const;
+  bool Work(const Trial& trial, int channel, int messages) const;
   void EndSlowTrials();
   EndedTrial Finish(size_t index);
 

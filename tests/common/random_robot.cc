@@ -107,7 +107,7 @@ RobotSpec MakeRandomRobot(const RandomRobotOptions& options, std::mt19937* rando
     base.X_B0.linear() = DrawRotation(random);
     base.X_B0.translation() = DrawVector(random, 0.5);
   } else {
-    base.X_B0.translation().z() = 0.12;
+    if (base.type != BaseType::kFloating) base.X_B0.translation().z() = 0.12;
     spec.gravity = Vector3d(0.3, -0.4, -9.7);
   }
   if (base.type == BaseType::kDifferentialDrive) {
@@ -180,6 +180,10 @@ std::string WriteMjcf(const RobotSpec& spec, bool planar_by_free_joint, const Po
 VectorXd DrawPositions(const RobotModel& model, std::mt19937* random) {
   VectorXd q(model.num_positions());
   const int offset = model.num_base_positions();
+  if (offset == 7) {
+    for (int i = 0; i < 7; ++i) q[i] = Draw(random, -2.0, 2.0);
+    q.segment<4>(3).normalize();
+  }
   if (offset == 3) q.head<3>() << Draw(random, -2, 2), Draw(random, -2, 2), Draw(random, -kPi, kPi);
   for (int i = 0; i < model.num_joints(); ++i) {
     const Joint& joint = model.joints()[static_cast<size_t>(i)];

@@ -47,11 +47,14 @@ class UrdfWriter {
       : spec_(*spec), random_(random), dry_friction_(dry_friction) {}
 
   std::string Write() {
-    // The root stands for the world, the base's link where it is fixed to it.
-    text_ = fmt::format(
-        "<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n<link name=\"world\"/>\n<link name=\"{}\"/>\n",
-        spec_.name, spec_.base.link);
-    AddJoint("world_fixed", "fixed", "world", spec_.base.link, spec_.base.X_B0, "");
+    // The root stands for the world, the base's link where it is fixed to it; or it floats.
+    text_ = fmt::format("<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n", spec_.name);
+    if (spec_.base.type == BaseType::kFloating) {
+      AddBody(spec_.base.link, spec_.base.body, Pose::Identity());
+    } else {
+      text_ += fmt::format("<link name=\"world\"/>\n<link name=\"{}\"/>\n", spec_.base.link);
+      AddJoint("world_fixed", "fixed", "world", spec_.base.link, spec_.base.X_B0, "");
+    }
     // Frames turned about the joint's axis point stay on the axis, as the joint's own frame must.
     for (size_t i = 0; i < spec_.joints.size(); ++i) {
       Pose X_iL = Pose::Identity();

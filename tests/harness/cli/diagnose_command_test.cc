@@ -132,5 +132,44 @@ TEST(MutateCommand, InterruptedEndsWithWhatWasDone) {
   EXPECT_FALSE(Json::parse(ReadText(folder.path() / "out.json")).at("complete").get<bool>());
 }
 
+// Mistakes in a run: the same exit codes, a table, JSON that a program reads, and what has no meaning there is refused.
+TEST(MutateRunCommand, CountsWhatIsFoundInARun) {
+  const TempFolder folder;
+  const std::string file = (folder.path() / "out.json").string();
+  const ProgramResult result = RunDexcheck({"mutate", "--run", "hold", "--set", "settle=0.2", "--from", "0.01", "--duration",
+                                            "0.01", "--numbers", "4", "--json", file});
+  // `hold` does not move: what acts on velocities alone survives.
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("SURVIVORS"));
+  EXPECT_THAT(result.out, HasSubstr("law, one part"));
+  const Json json = Json::parse(ReadText(file));
+  EXPECT_EQ(json["complete"], true);
+  EXPECT_EQ(json["kinds"]["number"]["cause_right"], 4);
+  EXPECT_EQ(json["kinds"]["law, one part"]["mistakes"], 45);
+  EXPECT_EQ(json["mistakes"].size(), json["kinds"]["all"]["mistakes"].get<size_t>());
+}
+
+TEST(MutateRunCommand, RefusesWhatHasNoMeaning) {
+  EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "--from", "1"}), {"--from", "--run"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "--run", "hold", "--from", "-1"}), {"--from", "-1"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "--run", "hold", "--samples", "5"}), {"--samples", "--run"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "--run", "lift"}), {"lift.toml", "task"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "--run", "nowhere"}), {"nowhere"}));
+}
+
+TEST(MutateRunCommand, InterruptedTellsWhatWasDone) {
+  const TempFolder folder;
+  testing::Program program(DexcheckCommand({"mutate", "--run", "hold", "--set", "settle=0.1", "--from", "0.01", "--numbers",
+                                            "100000", "--json", "out.json"}),
+                           {folder.path()});
+  for (int attempt = 0; attempt < 3000 && std::filesystem::is_empty(folder.path()); ++attempt)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  program.Signal(SIGINT);
+  const ProgramResult result = program.Wait();
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("INTERRUPTED"));
+  EXPECT_EQ(Json::parse(ReadText(folder.path() / "out.json"))["complete"], false);
+}
+
 }  // namespace
 }  // namespace dexcheck

@@ -109,6 +109,18 @@ TEST(ClosedLoop, StepsWithoutAllocation) {
   EXPECT_EQ(counter.count(), 0);
 }
 
+TEST(ClosedLoop, StepsOfAPlantThatIsNotIdealAllocateNothing) {
+  const ShippedRun setup("curve-real", {"sensing.latency=0.003", "sensing.object_latency=0.002",
+                                        "sensing.object_velocity=kalman", "sensing.object_acceleration=5",
+                                        "actuation.coulomb=0.001", "actuation.lag=0.001"});
+  ClosedLoop loop(setup.setup(), /*check=*/true);
+  loop.Settle();
+  for (int i = 0; i < 100; ++i) loop.Step();
+  const AllocationCounter counter;
+  for (int i = 0; i < 100; ++i) loop.Step();
+  EXPECT_EQ(counter.count(), 0);
+}
+
 TEST(ClosedLoop, TorquesCanBeHeldForSeveralSteps) {
   ShippedRun run("hold", {"duration=0.1", "plant.control_step=0.01"});
   VectorXd last;

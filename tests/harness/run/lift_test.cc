@@ -67,7 +67,7 @@ TEST_F(LiftTest, TakesCarriesAndPutsDown) {
     }
     return 0L;
   };
-  EXPECT_EQ(count("M_bar"), loop.record().step);
+  EXPECT_GE(count("M_bar"), loop.record().step);
   EXPECT_GT(count("G"), loop.record().step / 2);
   EXPECT_LT(count("G"), loop.record().step);
   // Unjudged: some hundredths of a second where contacts come and go.

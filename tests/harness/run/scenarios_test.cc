@@ -16,7 +16,8 @@ constexpr double kModelBound = 1e-10;
 void ExpectModelAgrees(const ClosedLoop& loop) {
   ASSERT_GE(loop.checks().model_checks().size(), 20U);
   for (const CheckRecord& check : loop.checks().model_checks()) {
-    EXPECT_EQ(check.count, loop.record().step) << check.name;
+    // At each step, and now and then while everything settled.
+    EXPECT_GE(check.count, loop.record().step) << check.name;
     EXPECT_LE(check.worst, kModelBound) << check.name;
     EXPECT_FALSE(check.failed) << check.name << " " << check.worst;
   }

@@ -40,6 +40,28 @@ TEST(ReadScenario, TurnsFrequencyAndDampingIntoGains) {
   EXPECT_EQ(scenario.control.gains.K_v[2], 3.0);
 }
 
+TEST(ReadScenario, ReadsWhatIsNotIdeal) {
+  const Scenario scenario = ReadShippedScenario(
+      "curve", {"sensing.joint_counts={ all = 4096, rf = 1024 }", "sensing.latency=0.002",
+                "actuation.delay=0.0025", "actuation.saturate=true",
+                "disturbance=[{ type = 'slope', slope_deg = [2, 0] }, { type = 'pulse', body = 'object', "
+                "force = [0, 20, 0], begin = 1, duration = 0.1, frame = 'body' }]",
+                "mismatch.mass_within=0.05", "mismatch.com={ r_forearm = [0.01, 0, 0] }"});
+  const Imperfections& all = scenario.imperfections;
+  EXPECT_FALSE(all.is_ideal());
+  EXPECT_EQ(all.sensing.joint_counts.groups.size(), 2U);
+  EXPECT_EQ(all.sensing.latency, 0.002);
+  EXPECT_EQ(all.actuation.delay, 0.0025);
+  EXPECT_TRUE(all.actuation.saturate);
+  EXPECT_DOUBLE_EQ(all.mismatch.slope[0], DegToRad(2.0));
+  ASSERT_EQ(all.disturbances.size(), 1U);
+  EXPECT_EQ(all.disturbances[0].key, "disturbance.1");
+  EXPECT_TRUE(all.disturbances[0].in_body_frame);
+  EXPECT_EQ(all.mismatch.mass_within.all, 0.05);
+  EXPECT_EQ(all.asked[1], "sensing.latency = 0.002");
+  EXPECT_TRUE(ReadShippedScenario("curve").imperfections.is_ideal());
+}
+
 struct BadInput {
   const char* name;
   std::vector<std::string> overrides;
@@ -60,6 +82,62 @@ TEST_P(BadScenarios, AreRefusedInOneLine) {
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(
+    NotIdeal, BadScenarios,
+    ::testing::Values(
+        BadInput{"negative_noise",
+                 {"sensing.joint_noise=-1e-3"},
+                 "sensing.joint_noise: must not be negative, got -0.001"},
+        BadInput{"negative_noise_of_a_group",
+                 {"sensing.joint_noise={ rf = -1 }"},
+                 "sensing.joint_noise.rf: must not be negative, got -1"},
+        BadInput{"no_such_joint",
+                 {"sensing.joint_noise={ r_elbov = 1 }"},
+                 "sensing.joint_noise: fits no name of the robot (\"r_elbow\"?), got \"r_elbov\""},
+        BadInput{"no_such_motor",
+                 {"actuation.coulomb={ x = 1 }"},
+                 "actuation.coulomb: fits no name of the robot, got \"x\""},
+        BadInput{"long_latency",
+                 {"sensing.latency=1.001"},
+                 "sensing.latency: must be at most 1000 time steps, which the buffer holds, got 1.001"},
+        BadInput{"long_delay",
+                 {"actuation.delay=2"},
+                 "actuation.delay: must be at most 1000 time steps, which the buffer holds, got 2"},
+        BadInput{"half_a_sample",
+                 {"sensing.latency=0.0015"},
+                 "sensing.latency: must be a whole number of time steps, got 0.0015"},
+        BadInput{"fast_camera",
+                 {"sensing.object_rate=1500"},
+                 "sensing.object_rate: must be at most one pose a time step, got 1500"},
+        BadInput{
+            "filter_without_size", {"sensing.velocity=kalman"}, "sensing.kalman_acceleration: is missing"},
+        BadInput{"unknown_source",
+                 {"sensing.velocity=guessed"},
+                 "sensing.velocity: must be one of \"measured\", \"differenced\", \"kalman\""},
+        BadInput{"unknown_body",
+                 {"disturbance=[{ type = 'step', body = 'r_forarm' }]"},
+                 "disturbance.0.body: is no link of the robot and not the object (\"r_forearm\"?), got "
+                 "\"r_forarm\""},
+        BadInput{"pulse_without_end",
+                 {"disturbance=[{ type = 'pulse', body = 'object' }]"},
+                 "disturbance[0].duration: is missing"},
+        BadInput{"period_too_short",
+                 {"disturbance=[{ type = 'pulse', body = 'object', duration = 1, period = 0.5 }]"},
+                 "disturbance[0].period: must not be shorter than the duration, got 0.5"},
+        BadInput{"payload_on_the_object",
+                 {"disturbance=[{ type = 'payload', body = 'object', mass = 1 }]"},
+                 "disturbance.0.body: is no link of the robot, got \"object\""},
+        BadInput{
+            "steep", {"disturbance=[{ type = 'slope', slope_deg = [31, 0] }]"}, "must be at most 30 degrees"},
+        BadInput{"no_such_link",
+                 {"mismatch.mass={ r_fore_arm = 1.05 }"},
+                 "mismatch.mass: fits no name of the robot (\"r_forearm\"?), got \"r_fore_arm\""},
+        BadInput{"massless", {"mismatch.mass=0"}, "mismatch.mass: must be positive, got 0"},
+        BadInput{
+            "too_random", {"mismatch.mass_within=1"}, "mismatch.mass_within: must be at most 0.99, got 1"},
+        BadInput{"unknown_key", {"actuation.lags=1"}, "actuation.lags"}),
+    [](const ::testing::TestParamInfo<BadInput>& info) { return info.param.name; });
 
 INSTANTIATE_TEST_SUITE_P(
     All, BadScenarios,

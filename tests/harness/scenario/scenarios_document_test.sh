@@ -19,6 +19,7 @@ list_keys() {
   awk -F' *[|] *' -v OFS='\t' '
     /^## The run/ { section = "-"; start = "-" }
     /^## `\[/ { section = $0; gsub(/^## `\[|\]`$/, "", section); start = "-" }
+    section ~ /^\[/ { section = substr(section, 2, length(section) - 2) ".0" }  # the first of a list of tables
     /^### `/ { section = "trajectory"; start = "-" }
     /^    [a-z]+ = / { start = $0; sub(/^ +/, "", start); sub(/ = /, "=", start) }
     /^\| `/ && NF == 8 && section != "" {

@@ -149,37 +149,37 @@ TEST(MjcfDescription, IsTheEnginesModel) {
   // What tables have no place for, and the description has.
   std::vector<std::string> found;
   for (const GateFinding& finding : result.gate.findings) found.push_back(finding.check);
-  EXPECT_THAT(found, ElementsAre("joint_dry_friction", "equality_constraint"));
+  EXPECT_THAT(found, ElementsAre("equality_constraint"));
   GateResult gate = result.gate;
   EXPECT_THAT(CheckDescription(robot, adapter, &gate), IsEmpty());
   EXPECT_TRUE(gate.findings.empty());
   for (const CheckRecord& record : gate.records) EXPECT_FALSE(record.failed) << record.name;
-  EXPECT_EQ(robot.joints[1].dry_friction, 0.7);
+  EXPECT_EQ(robot.spec.joints[1].dry_friction, 0.7);
   EXPECT_FALSE(robot.joints[0].states_range);
   EXPECT_TRUE(robot.joints[1].states_range);
-  ASSERT_TRUE(robot.joints[1].coupling);
-  EXPECT_EQ(robot.joints[1].coupling->leader, 0);
-  EXPECT_EQ(robot.joints[1].coupling->multiplier, 0.5);
+  ASSERT_TRUE(robot.spec.joints[1].coupling);
+  EXPECT_EQ(robot.spec.joints[1].coupling->leader, 0);
+  EXPECT_EQ(robot.spec.joints[1].coupling->multiplier, 0.5);
   // reach + 0.1 = 0.01 + 0.5 (shoulder - 0.3)
-  EXPECT_DOUBLE_EQ(robot.joints[1].coupling->offset, 0.01 - 0.1 - 0.15);
+  EXPECT_DOUBLE_EQ(robot.spec.joints[1].coupling->offset, 0.01 - 0.1 - 0.15);
   EXPECT_THAT(robot.notes, ElementsAre("not taken over: 1 actuators"));
 
   std::mt19937 random(1704);
   ExpectSameModel(model, ParseRobotModel(WriteParameters(robot, "odd.xml"), "odd.toml"), &random);
 }
 
-TEST(MjcfDescription, RefusesFreeAndBallJoints) {
-  for (const std::string type : {"free", "ball"}) {
-    const MjModelPtr engine = LoadMjcfText("<mujoco><worldbody><body name=\"b\"><joint name=\"j\" type=\"" +
-                                               type + "\"/><geom size=\"1\"/></body></worldbody></mujoco>",
-                                           "text");
-    try {
-      ReadMjcfDescription(*engine, "robot.xml");
-      FAIL() << type;
-    } catch (const InputError& error) {
-      EXPECT_EQ(std::string(error.what()),
-                "robot.xml: joint \"j\": must be a hinge or a slide, got a " + type + " joint");
-    }
+TEST(MjcfDescription, RefusesBallJoints) {
+  const MjModelPtr engine = LoadMjcfText(
+      "<mujoco><worldbody><body name=\"b\"><joint name=\"j\" type=\"ball\"/><geom "
+      "size=\"1\"/></body></worldbody>"
+      "</mujoco>",
+      "text");
+  try {
+    ReadMjcfDescription(*engine, "robot.xml");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "robot.xml: joint \"j\": must be a hinge or a slide, got a ball joint");
   }
 }
 

@@ -95,7 +95,7 @@ TEST(ModelComparison, FindsWhatDiffers) {
   EXPECT_THAT(ListFailures(right, wrong), HasSubstr("M_bar"));
   EXPECT_THAT(ListFailures(right, wrong), HasSubstr("C_bar"));
   wrong = right;
-  wrong.joints[2].dry_friction = 0.1;
+  wrong.spec.joints[2].dry_friction = 0.1;
   EXPECT_EQ(ListFailures(right, wrong), "joint_dry_friction ");
   wrong = right;
   wrong.spec.joints[2].damping = 0.1;

@@ -186,9 +186,9 @@ TEST(Urdf, ReadsAHandByHand) {
   EXPECT_TRUE(
       MatrixNear(finger.inertia, Matrix3d(Vector3d(1e-5, 2e-5, 1.5e-5).asDiagonal()), 1e-5 * kRounding));
   EXPECT_EQ(knuckle.damping, 0.1);
-  EXPECT_EQ(hand.joints[0].dry_friction, 0.3);
+  EXPECT_EQ(hand.spec.joints[0].dry_friction, 0.3);
   EXPECT_EQ(knuckle.lower, -1.0);
-  EXPECT_FALSE(hand.joints[0].coupling);
+  EXPECT_FALSE(hand.spec.joints[0].coupling);
 
   // The finger carries the tip: 0.2 kg at 0.01 m and 0.2 kg at 0.03 m.
   const Joint& slide = spec.joints[1];
@@ -199,10 +199,10 @@ TEST(Urdf, ReadsAHandByHand) {
   EXPECT_TRUE(MatrixNear(both.com, Vector3d(0.0, 0.02, 0.0), kRounding));
   const double I_xx = 1e-5 + 0.4 * 0.01 * 0.01;
   EXPECT_TRUE(MatrixNear(both.inertia, Matrix3d(Vector3d(I_xx, 1e-5, I_xx).asDiagonal()), 1e-5 * kRounding));
-  ASSERT_TRUE(hand.joints[1].coupling);
-  EXPECT_EQ(hand.joints[1].coupling->leader, 0);
-  EXPECT_EQ(hand.joints[1].coupling->multiplier, -0.05);
-  EXPECT_EQ(hand.joints[1].coupling->offset, 0.02);
+  ASSERT_TRUE(hand.spec.joints[1].coupling);
+  EXPECT_EQ(hand.spec.joints[1].coupling->leader, 0);
+  EXPECT_EQ(hand.spec.joints[1].coupling->multiplier, -0.05);
+  EXPECT_EQ(hand.spec.joints[1].coupling->offset, 0.02);
   EXPECT_FALSE(hand.joints[1].states_damping);
   EXPECT_FALSE(hand.joints[1].states_armature);
 
@@ -255,10 +255,10 @@ TEST(Urdf, FollowsAFollowerToItsLeader) {
   text.insert(text.find("</robot>"), R"(<link name="last"/><joint name="last" type="continuous">
     <parent link="palm"/><child link="last"/><mimic joint="slide" multiplier="10" offset="1"/></joint>)");
   const RobotDescription hand = ParseUrdf(text, "hand.urdf");
-  ASSERT_TRUE(hand.joints[3].coupling);
-  EXPECT_EQ(hand.joints[3].coupling->leader, 0);
-  EXPECT_DOUBLE_EQ(hand.joints[3].coupling->multiplier, -0.5);
-  EXPECT_DOUBLE_EQ(hand.joints[3].coupling->offset, 1.2);
+  ASSERT_TRUE(hand.spec.joints[3].coupling);
+  EXPECT_EQ(hand.spec.joints[3].coupling->leader, 0);
+  EXPECT_DOUBLE_EQ(hand.spec.joints[3].coupling->multiplier, -0.5);
+  EXPECT_DOUBLE_EQ(hand.spec.joints[3].coupling->offset, 1.2);
 }
 
 TEST(Urdf, LooksForMeshesWhenToldWhere) {

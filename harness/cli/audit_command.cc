@@ -1,0 +1,118 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/common/text.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/output_file.h"
+#include "harness/sides/audit.h"
+#include "harness/sides/read_description.h"
+
+namespace dexcheck::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Request {
+  std::filesystem::path robot;
+  std::vector<std::string> packages;
+  std::string json_file;
+  bool floating = false;
+  bool quiet = false;
+};
+
+Json ToJson(double value) { return std::isfinite(value) ? Json(value) : Json("infinity"); }
+
+std::string ToText(const Request& request, const AuditResult& result) {
+  Json json = {{"robot", request.robot.string()},
+               {"verdict", result.IsGood() ? "pass" : "disagreement"},
+               {"condition_number", ToJson(result.condition)}};
+  json["findings"] = Json::array();
+  for (const AuditFinding& finding : result.findings) {
+    Json entry = {{"level", NameOf(finding.level)},
+                  {"check", finding.check},
+                  {"where", finding.where},
+                  {"line", finding.line},
+                  {"text", finding.text}};
+    if (finding.condition_without) entry["condition_number_without"] = ToJson(*finding.condition_without);
+    json["findings"].push_back(entry);
+  }
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string FormatCondition(double condition) {
+  return std::isfinite(condition) ? fmt::format("{:.2g}", condition) : "infinite";
+}
+
+void Print(const Request& request, const RobotDescription& robot, const AuditResult& result) {
+  const std::string file = request.robot.filename().string();
+  if (!request.quiet) {
+    fmt::print("{}: {}, {} joints, {} links\ncondition number of M: {} (median of random states)\n\n",
+               robot.spec.name, file, robot.spec.joints.size(), robot.parts.size(),
+               FormatCondition(result.condition));
+  }
+  size_t counted = 0;
+  for (const AuditFinding& finding : result.findings) {
+    if (finding.level != AuditLevel::kNote) ++counted;
+    if (request.quiet) continue;
+    fmt::print("{:<11}{}: {} {}", NameOf(finding.level),
+               finding.line > 0 ? fmt::format("{}:{}", file, finding.line) : file, Abbreviate(finding.where),
+               finding.text);
+    if (finding.condition_without) {
+      fmt::print("; with a plausible body there M's condition number is {}",
+                 FormatCondition(*finding.condition_without));
+    }
+    fmt::print("\n");
+  }
+  for (const std::string& note : robot.notes) {
+    if (!request.quiet) fmt::print("{:<11}{}: {}\n", "note", file, note);
+  }
+  if (counted == 0) {
+    fmt::print("{}GOOD: nothing that a robot cannot have, and nothing odd.\n", request.quiet ? "" : "\n");
+  } else {
+    fmt::print("{}FOUND: {} {} a robot cannot have or that look like mistakes.\n", request.quiet ? "" : "\n",
+               counted, counted == 1 ? "thing that" : "things that");
+  }
+}
+
+int Run(const Request& request) {
+  std::optional<OutputFile> json;
+  UrdfOptions options;
+  options.packages.assign(request.packages.begin(), request.packages.end());
+  options.keep_impossible = true;
+  options.floating = request.floating;
+  const RobotDescription robot = ReadDescription(request.robot, options);
+  if (!request.json_file.empty()) json.emplace(request.json_file);
+  const AuditResult result = AuditRobot(robot);
+  if (json) json->Write(ToText(request, result));
+  if (request.json_file != "-") Print(request, robot, result);
+  return result.IsGood() ? kSuccess : kDisagreement;
+}
+
+}  // namespace
+
+void AddAuditCommand(Command app) {
+  const auto request = std::make_shared<Request>();
+  Command command =
+      app.AddCommand("audit", "Look for what cannot be, or is odd, in one description of a robot");
+  command.AddOption("FILE", &request->robot, "Parameter file (TOML), URDF or MJCF")
+      .TypeName("FILE")
+      .Required();
+  command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
+      .TypeName("PATH")
+      .Repeatable();
+  command.AddFlag("--floating", &request->floating, "The root of a URDF floats");
+  command
+      .AddOption("--json", &request->json_file,
+                 "Write the findings to this file (- for standard output, then without the table)")
+      .TypeName("FILE.json");
+  command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
+  command.SetAction([=] { return Run(*request); });
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,104 @@
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/base/interrupts.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/output_file.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/cli/run_folder.h"
+#include "harness/study/error_budget.h"
+
+namespace dexcheck::cli {
+namespace {
+
+struct Request {
+  std::string scenario;
+  std::vector<std::string> overrides;
+  std::uint64_t seed = 0;
+  std::string json_file;
+  std::string page;
+  bool quiet = false;
+};
+
+void Print(const ErrorBudget& budget) {
+  fmt::print("{}: RMS and largest position error of the object, m\n\n", budget.scenario);
+  fmt::print("  {:<34}{:>10}{:>10}{:>11}{:>12}{:>13}\n", "source", "alone", "largest", "by (57)",
+             "without it", "interaction");
+  for (const BudgetEntry& e : budget.entries) {
+    if (!e.failure.empty()) {
+      fmt::print("  {:<34}{}\n", e.name, e.failure);
+      continue;
+    }
+    fmt::print("  {:<34}{:>10.2e}{:>10.2e}{:>11.2e}{:>12.2e}{:>11.0f} % {}\n", e.name, e.alone.rms,
+               e.alone.max, e.predicted.rms, e.without.rms, 100.0 * e.interaction,
+               e.interacts() ? "interacts" : "");
+  }
+  const auto row = [](const char* name, const ErrorSize& size) {
+    fmt::print("  {:<34}{:>10.2e}{:>10.2e}\n", name, size.rms, size.max);
+  };
+  row("none of them", budget.ideal);
+  fmt::print("  {:<34}{:>10.2e}{:>10.2e}{:>11.2e}\n", "sum of the above", budget.sum.rms, budget.sum.max,
+             budget.predicted.rms);
+  row("all together", budget.all);
+  fmt::print("\n");
+}
+
+int Run(const Request& request) {
+  const ScenarioFiles files = FindScenario(request.scenario, request.overrides, request.seed);
+  CatchInterrupts();
+  std::optional<OutputFile> json, page;
+  if (!request.json_file.empty()) json.emplace(request.json_file);
+  if (!request.page.empty()) {
+    RequirePageName(request.page);
+    page.emplace(request.page);
+  }
+  std::unique_ptr<ProgressBar> bar;
+  const ErrorBudget budget =
+      CalcErrorBudget(files.scenario, files.robot, files.mjcf, [&](long done, long total) {
+        if (!bar) bar = std::make_unique<ProgressBar>("running", total, request.quiet);
+        bar->Update(done);
+        return !IsInterrupted();
+      });
+  if (bar) bar->Finish();
+  if (json) json->Write(ToJson(budget).dump(2) + "\n");
+  if (page) page->Write(MakeBudgetPage(budget));
+  const bool to_stdout = request.json_file == "-" || request.page == "-";
+  if (!to_stdout) {
+    if (!request.quiet) Print(budget);
+    if (budget.is_complete()) {
+      fmt::print("{} sources: their errors add up to {:.2e} m, all together make {:.2e} m.\n",
+                 budget.entries.size(), budget.sum.rms, budget.all.rms);
+    } else {
+      fmt::print("INCOMPLETE: {}\n", budget.failure.empty() ? "a run ended early" : budget.failure);
+    }
+  }
+  return budget.is_complete() ? kSuccess : kFailure;
+}
+
+}  // namespace
+
+void AddBudgetCommand(Command app) {
+  const auto request = std::make_shared<Request>();
+  Command command = app.AddCommand(
+      "budget", "Which part of a plant that is not ideal costs the accuracy: each alone, all but each, all");
+  command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();
+  command.AddOption("--set", &request->overrides, "Set a key of the scenario, as for run")
+      .TypeName("KEY=VALUE")
+      .Repeatable();
+  command.AddOption("--seed", &request->seed, "Seed of all that is random")
+      .TypeName("N")
+      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
+  command.AddOption("--json", &request->json_file, "Write the budget to this file (- for standard output)")
+      .TypeName("FILE.json");
+  command.AddOption("--page", &request->page, "Write table and bar chart as a page").TypeName("FILE.html");
+  command.AddFlag("--quiet", &request->quiet, "Print the last line only");
+  command.SetAction([=] { return Run(*request); });
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,169 @@
+#include "harness/cli/consistency_report.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "controller/common/text.h"
+#include "harness/engine/engine.h"
+#include "harness/sides/tolerance.h"
+
+namespace dexcheck::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json ToJson(const CheckRecord& record, const RobotModel& model) {
+  const int base = model.num_base_velocities();
+  Json json = {{"kind", NameOf(record.kind)},
+               {"max", record.worst},
+               {"bound", record.bound},
+               {"pass", !record.failed},
+               {"compared", record.comparisons},
+               {"where", Describe(record.where, model, base)},
+               {"sample", static_cast<long>(record.at)},
+               {"model", record.model_value},
+               {"engine", record.engine_value},
+               {"digits", CountDigits(record.worst)}};
+  if (record.failed) json["first_failure"] = Describe(record.first_failure, model, base);
+  return json;
+}
+
+const char* Judge(ExitCode code) {
+  if (code == kSuccess) return "pass";
+  return code == kDisagreement ? "disagreement" : "failed";
+}
+
+}  // namespace
+
+std::string FileName(const std::filesystem::path& path) { return path.filename().string(); }
+
+Json ListHypotheses(const std::vector<Hypothesis>& hypotheses) {
+  Json list = Json::array();
+  for (const Hypothesis& hypothesis : hypotheses) {
+    list.push_back(
+        {{"text", hypothesis.text}, {"explained", hypothesis.explained}, {"values", hypothesis.values}});
+  }
+  return list;
+}
+
+void PrintHypotheses(const std::vector<Hypothesis>& hypotheses) {
+  if (hypotheses.empty()) return;
+  fmt::print("LIKELY:\n");
+  for (const Hypothesis& hypothesis : hypotheses) {
+    fmt::print("  {}; explains {:.0f} %\n", hypothesis.text, 100.0 * hypothesis.explained);
+    for (const std::string& value : hypothesis.values) fmt::print("    {}\n", value);
+  }
+}
+
+void PrintTable(const ConsistencyRequest& request, const Comparison& comparison) {
+  const RobotModel& model = *comparison.model;
+  const ConsistencyResult& result = comparison.result;
+  const int base = model.num_base_velocities();
+  fmt::print("{}: {} against {}{}\n{} random states (seed {}), {:.1f} s\n\n", model.name(),
+             FileName(request.files.robot), FileName(request.files.mjcf),
+             request.with_engine ? std::string(", MuJoCo ") + mj_versionString() : "", result.samples,
+             request.options.seed, result.seconds);
+
+  if (!comparison.notes.empty()) {
+    fmt::print("not compared, or worth knowing:\n");
+    for (const std::string& note : comparison.notes) fmt::print("  {}\n", note);
+    fmt::print("\n");
+  }
+  fmt::print("{:<24}{:>9}  {:>12}  {:>9}  {:>6}\n", "constant", "compared", "worst error", "bound", "digits");
+  for (const CheckRecord& record : result.gate.records) {
+    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {}\n", record.name, record.comparisons, record.worst,
+               record.bound, CountDigits(record.worst), record.failed ? "DIFFERS" : "ok");
+  }
+  if (!result.gate.notes.empty()) {
+    fmt::print(
+        "{} notes on what only a run has (contacts, solver, limits of motors, what a scenario overrides): "
+        "--json\n",
+        result.gate.notes.size());
+  }
+  fmt::print("\n{:<24}{:>9}  {:>12}  {:>9}  {:>6}           {}\n", "term", "compared", "worst error", "bound",
+             "digits", "where it is worst");
+  for (const CheckRecord& record : result.terms) {
+    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {:<7}  {}, sample {}\n", record.name,
+               record.comparisons, record.worst, record.bound, CountDigits(record.worst),
+               record.failed ? "DIFFERS" : "ok", Describe(record.where, model, base),
+               static_cast<long>(record.at));
+  }
+  fmt::print("\nErrors are relative to each term's own scale; {} (README.md).\n",
+             request.FindTolerance()
+                 ? "bounds are those of rounding or the tolerance given, whichever is wider"
+                 : "bounds follow from rounding");
+}
+
+void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison) {
+  const RobotModel& model = *comparison.model;
+  const ConsistencyResult& result = comparison.result;
+  const int base = model.num_base_velocities();
+  if (result.samples < request.options.samples && request.answers.empty()) {
+    fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
+  }
+  if (result.Agrees()) {
+    const std::optional<double> tolerance = request.FindTolerance();
+    fmt::print("AGREE: {} agree to {} in all {} terms.\n",
+               request.with_engine     ? "the analytic model and MuJoCo"
+               : request.has_answers() ? "the description and the answers"
+                                       : "the two descriptions",
+               tolerance ? fmt::format("{:g}", *tolerance) : "rounding", result.terms.size());
+    return;
+  }
+  fmt::print("DISAGREE:\n");
+  for (const GateFinding& finding : result.gate.findings) {
+    fmt::print("  {}: {}: {:.12g} in {}, {:.12g} in {}\n", finding.check, finding.where, finding.model,
+               FileName(request.files.robot), finding.engine, FileName(request.files.mjcf));
+  }
+  for (const CheckRecord& record : result.terms) {
+    if (!record.failed) continue;
+    fmt::print("  {}: nearest the base: {}; worst: {}: {:.12g} in {}, {:.12g} in {} (sample {})\n",
+               record.name, Describe(record.first_failure, model, base), Describe(record.where, model, base),
+               record.model_value, request.with_engine ? "the model" : FileName(request.files.robot),
+               record.engine_value, request.with_engine ? "MuJoCo" : FileName(request.files.mjcf),
+               static_cast<long>(record.at));
+  }
+  PrintHypotheses(comparison.hypotheses);
+  // Inertias printed with six digits, 1.5708 for pi / 2, a "fullinertia" that the engine diagonalises to
+  // 1e-6.
+  constexpr int kDigitsOfRoundedInput = 4;
+  const int digits = CountDigits(result);
+  if (digits < kDigitsOfRoundedInput) return;
+  fmt::print(
+      "All checks agree to {} digits, as they would with rounded numbers on one side; --digits {} judges by "
+      "that.\n",
+      digits, digits);
+}
+
+std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code) {
+  const RobotModel& model = *comparison.model;
+  const ConsistencyResult& result = comparison.result;
+  Json json = {{"robot", request.files.robot.string()},
+               {"mjcf", request.files.mjcf.string()},
+               {"mujoco", mj_versionString()},
+               {"samples", result.samples},
+               {"samples_requested", request.options.samples},
+               {"seed", request.options.seed},
+               {"seconds", result.seconds},
+               {"verdict", Judge(code)}};
+  json["notes"] = comparison.notes;
+  if (const std::optional<double> tolerance = request.FindTolerance()) json["tolerance"] = *tolerance;
+  json["checks"] = Json::object();
+  for (const CheckRecord& record : result.gate.records) json["checks"][record.name] = ToJson(record, model);
+  for (const CheckRecord& record : result.terms) json["checks"][record.name] = ToJson(record, model);
+  json["findings"] = Json::array();
+  for (const GateFinding& finding : result.gate.findings) {
+    json["findings"].push_back({{"check", finding.check},
+                                {"where", finding.where},
+                                {"model", finding.model},
+                                {"engine", finding.engine}});
+  }
+  json["engine_notes"] = Json::array();
+  for (const GateNote& note : result.gate.notes)
+    json["engine_notes"].push_back({{"kind", note.kind}, {"text", note.text}});
+  json["hypotheses"] = ListHypotheses(comparison.hypotheses);
+  return json.dump(2) + "\n";
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,70 @@
+#pragma once
+
+// What consistency was asked, what it found, and how that is printed.
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/checks/consistency.h"
+#include "harness/cli/commands.h"
+#include "harness/sides/hypotheses.h"
+#include "harness/sides/program_side.h"
+
+namespace dexcheck::cli {
+
+/// What was asked.
+struct ConsistencyRequest {
+  std::string a, b;  ///< Two descriptions; none with --robot and --mjcf.
+  RobotFiles files;
+  std::string program;            ///< Command of the shell that stands for B.
+  std::filesystem::path answers;  ///< Folder that stands for B.
+  ProgramOptions program_options;
+  std::vector<std::string> packages;
+  bool floating = false;
+  bool with_engine = true;  ///< files.mjcf is an MJCF; otherwise any other description.
+  ConsistencyOptions options;
+  std::string json_file;
+  bool quiet = false;
+  int digits = 0;                   ///< 0: not given.
+  std::optional<double> tolerance;  ///< Relative, wider than rounding.
+
+  /// By which published numbers are judged; none: by rounding.
+  [[nodiscard]] std::optional<double> FindTolerance() const {
+    return digits > 0 ? std::pow(10.0, -digits) : tolerance;
+  }
+
+  /// What stands for B answers terms, and is no description.
+  [[nodiscard]] bool has_answers() const { return !program.empty() || !answers.empty(); }
+
+  /// The results themselves take standard output: a table would spoil them.
+  [[nodiscard]] bool PrintsJson() const { return json_file == "-"; }
+};
+
+/// What was compared: the model that locations belong to, and the results.
+struct Comparison {
+  std::optional<RobotModel> model;
+  std::vector<std::string> notes;
+  ConsistencyResult result;
+  std::vector<Hypothesis> hypotheses;  ///< Mistakes that would explain what differs.
+};
+
+/// The file's name without its folder.
+std::string FileName(const std::filesystem::path& path);
+
+/// Large results first fail, then where to look: what a person reads.
+void PrintTable(const ConsistencyRequest& request, const Comparison& comparison);
+/// Whether the two agree, and if not, in what and why.
+void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison);
+/// The same as JSON.
+std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
+
+/// Their lines, shares and values.
+nlohmann::ordered_json ListHypotheses(const std::vector<Hypothesis>& hypotheses);
+
+/// "  LINE; explains 100 %", and what each values line says below it.
+void PrintHypotheses(const std::vector<Hypothesis>& hypotheses);
+
+}  // namespace dexcheck::cli

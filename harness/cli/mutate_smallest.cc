@@ -1,0 +1,115 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "harness/base/interrupts.h"
+#include "harness/cli/command_line.h"
+#include "harness/cli/json_matrix.h"
+#include "harness/cli/mutate_run.h"
+#include "harness/cli/output_file.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/cli/run_folder.h"
+#include "harness/run/detectability.h"
+
+namespace dexcheck::cli {
+namespace {
+
+constexpr int kStates = 24;
+constexpr double kGood = 1e-3;  // an error that should be found
+
+/// A line of the table: the numbers of one quantity.
+struct Row {
+  std::string quantity;
+  int numbers = 0, shown = 0, good = 0;
+  double median = 0.0;
+  std::vector<double> errors;
+};
+
+double Smallest(const Detectability& number) { return std::min(number.robot, number.object); }
+
+std::vector<Row> SumUp(const DetectabilityResult& result) {
+  std::vector<Row> rows;
+  for (const Detectability& number : result.numbers) {
+    auto row = std::find_if(rows.begin(), rows.end(), [&](const Row& r) { return r.quantity == number.quantity; });
+    if (row == rows.end()) {
+      row = rows.insert(rows.end(), Row{});
+      row->quantity = number.quantity;
+    }
+    ++row->numbers;
+    const double error = Smallest(number);
+    if (!std::isfinite(error)) continue;
+    ++row->shown;
+    row->good += error <= kGood ? 1 : 0;
+    row->errors.push_back(error);
+  }
+  for (Row& row : rows) std::sort(row.errors.begin(), row.errors.end());
+  return rows;
+}
+
+Json ToJson(double error) { return std::isfinite(error) ? Json(error) : Json(nullptr); }
+
+std::string ToText(const MutateRunRequest& request, const DetectabilityResult& result, bool complete) {
+  Json json = {{"scenario", request.scenario},
+               {"overrides", request.overrides},
+               {"states", kStates},
+               {"complete", complete},
+               {"rank", result.rank},
+               {"largest_singular_value", result.largest_singular_value},
+               {"smallest_singular_value", result.smallest_singular_value}};
+  json["numbers"] = Json::array();
+  for (const Detectability& number : result.numbers) {
+    json["numbers"].push_back({{"name", number.name},
+                               {"quantity", number.quantity},
+                               {"balance_robot", ToJson(number.robot)},
+                               {"balance_object", ToJson(number.object)}});
+  }
+  return json.dump(2) + "\n";
+}
+
+void Print(const DetectabilityResult& result) {
+  fmt::print("smallest relative error that fails a balance\n\n{:<24}{:>9}{:>9}{:>11}{:>12}{:>12}{:>12}\n", "quantity",
+             "numbers", "shown", "to 0.1 %", "best", "median", "worst");
+  int numbers = 0, shown = 0, good = 0;
+  for (const Row& row : SumUp(result)) {
+    numbers += row.numbers;
+    shown += row.shown;
+    good += row.good;
+    fmt::print("{:<24}{:>9}{:>9}{:>11}", row.quantity, row.numbers, row.shown, row.good);
+    if (!row.errors.empty()) {
+      fmt::print("{:>12.1e}{:>12.1e}{:>12.1e}", row.errors.front(), row.errors[row.errors.size() / 2],
+                 row.errors.back());
+    }
+    fmt::print("\n");
+  }
+  fmt::print("{:<24}{:>9}{:>9}{:>11}\n\n", "all", numbers, shown, good);
+  fmt::print("{} combinations of numbers show; singular values from {:.2e} to {:.2e}.\n", result.rank,
+             result.smallest_singular_value, result.largest_singular_value);
+}
+
+}  // namespace
+
+int PrintSmallestErrors(const MutateRunRequest& request) {
+  const ScenarioFiles files = FindScenario(request.scenario, request.overrides, /*seed=*/0);
+  const Setup setup(files.scenario, files.robot, files.mjcf);
+  CatchInterrupts();
+  std::optional<OutputFile> json;
+  if (!request.json_file.empty()) json.emplace(request.json_file);
+  std::optional<ProgressBar> bar;
+  size_t total = 0;
+  const DetectabilityResult result = FindDetectability(setup, kStates, [&](size_t done, size_t all) {
+    if (!bar) bar.emplace("changing", static_cast<long>(all), request.quiet || request.json_file == "-");
+    bar->Update(static_cast<long>(done));
+    total = all;
+    return !IsInterrupted();
+  });
+  if (bar) bar->Finish();
+  const bool complete = !IsInterrupted() && total > 0;
+  if (json) json->Write(ToText(request, result, complete));
+  if (request.json_file != "-") Print(result);
+  if (!complete) fmt::print("INTERRUPTED after {} of {} numbers.\n", result.numbers.size(), total);
+  return complete ? kSuccess : kFailure;
+}
+
+}  // namespace dexcheck::cli

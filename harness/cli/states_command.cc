@@ -1,0 +1,67 @@
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/output_file.h"
+#include "harness/sides/answer_files.h"
+#include "harness/sides/read_description.h"
+
+namespace dexcheck::cli {
+namespace {
+
+struct Request {
+  std::filesystem::path robot;
+  std::filesystem::path out;
+  long count = 1000;
+  ConsistencyOptions options;
+  UrdfOptions urdf;
+};
+
+int Run(const Request& request) {
+  const RobotDescription robot = ReadDescription(request.robot, request.urdf);
+  const StateTable states = DrawStates(robot, request.count, request.options);
+  std::error_code error;
+  std::filesystem::create_directories(request.out, error);
+  if (error) throw InputError(request.out.string() + ": cannot be made: " + error.message());
+  const auto write = [&](const char* name, const std::string& text) {
+    OutputFile file(request.out / name);
+    file.Write(text);
+  };
+  write("layout.json", WriteLayout(robot, request.robot.filename().string()));
+  write("states.jsonl", WriteStateLines(states));
+  write("q.npy", WriteNpy(states.q));
+  write("v.npy", WriteNpy(states.v));
+  return kSuccess;
+}
+
+}  // namespace
+
+void AddStatesCommand(Command app) {
+  constexpr long kMaxCount = 1000000;
+  const auto request = std::make_shared<Request>();
+  Command command = app.AddCommand(
+      "states", "Write random states of a robot, for a program whose answers consistency --answers reads");
+  command.AddOption("ROBOT", &request->robot, "Parameter file (TOML), URDF or MJCF")
+      .TypeName("FILE")
+      .Required();
+  command.AddOption("--out", &request->out, "Folder for layout.json, states.jsonl, q.npy and v.npy")
+      .TypeName("FOLDER")
+      .Required();
+  command.AddOption("--count", &request->count, "Number of random states")
+      .TypeName("N")
+      .Check(WholeNumber(1, kMaxCount))
+      .ShowDefault();
+  command.AddOption("--seed", &request->options.seed, "Of the random states")
+      .TypeName("N")
+      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
+      .ShowDefault();
+  command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats");
+  command.SetAction([=] { return Run(*request); });
+}
+
+}  // namespace dexcheck::cli

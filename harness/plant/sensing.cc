@@ -1,0 +1,168 @@
+#include "harness/plant/sensing.h"
+
+#include <cmath>
+
+namespace dexcheck {
+namespace {
+
+/// Wheels, then joints: by the entries of tau'.
+std::vector<std::string> ListNames(const RobotModel& model, bool wheels) {
+  std::vector<std::string> names;
+  const Base& base = model.base();
+  if (wheels && base.type == BaseType::kDifferentialDrive) {
+    names = {base.wheel_joint_right, base.wheel_joint_left};
+  }
+  for (const Joint& joint : model.joints()) names.push_back(joint.name);
+  return names;
+}
+
+/// Rates below this are none, rad/s.
+constexpr double kStandstill = 1e-30;
+
+Reading MakeReading(const PartContext& context) {
+  Reading reading;
+  reading.state.q.setZero(context.model->num_positions());
+  reading.state.xi.setZero(context.model->num_velocities());
+  reading.state.kappa.resize(context.num_contacts);
+  reading.state.overlap.resize(context.num_contacts);
+  return reading;
+}
+
+}  // namespace
+
+Sensing::Sensing(const SensingOptions& options, const PartContext& context)
+    : options_(options),
+      is_exact_(options.is_exact()),
+      base_(context.model->base()),
+      base_positions_(context.model->num_base_positions()),
+      base_velocities_(context.model->num_base_velocities()),
+      time_step_(context.time_step),
+      joint_stream_(context.seed, "sensing.joint_noise"),
+      velocity_stream_(context.seed, "sensing.velocity_noise"),
+      force_stream_(context.seed, "sensing.contact_force_noise"),
+      low_pass_(CalcLowPassGain(options.velocity_cutoff, context.time_step)),
+      object_(options, context.time_step, context.seed) {
+  const RobotModel& model = *context.model;
+  const std::vector<std::string> joints = ListNames(model, /*wheels=*/false);
+  const std::vector<std::string> all = ListNames(model, /*wheels=*/true);
+  joint_noise_ = options.joint_noise.Resolve(joints, context.source);
+  velocity_noise_ = options.velocity_noise.Resolve(all, context.source);
+  count_ = options.joint_counts.Resolve(joints, context.source);
+  for (Eigen::Index i = 0; i < count_.size(); ++i) {
+    const bool turns = model.joints()[static_cast<size_t>(i)].type == JointType::kRevolute;
+    if (count_[i] > 0.0) count_[i] = (turns ? 2.0 * kPi : 1.0) / count_[i];
+    // A position that is rounded to whole counts is off by up to half of one, evenly: variance q^2 / 12.
+    const double variance = joint_noise_[i] * joint_noise_[i] + count_[i] * count_[i] / 12.0;
+    filters_.emplace_back(options.kalman_acceleration, variance, time_step_);
+  }
+  last_ = rate_ = VectorXd::Zero(count_.size());
+  const long latency = CountSteps(options.latency, time_step_);
+  if (latency > 0) delayed_.assign(static_cast<size_t>(latency) + 1, MakeReading(context));
+}
+
+void Sensing::Tell(const PlantReading& truth, Reading* told) {
+  told->state = truth.state;
+  told->touch = truth.touch;
+  if (is_exact_) return;
+  TellJoints(&told->state);
+  TellBase(truth.state, &told->state);
+  if (!object_.is_exact()) {
+    const ObjectMotion object = object_.Tell({truth.state.X_Bo, truth.state.V_Bo}, k_);
+    told->state.X_Bo = object.X_Bo;
+    told->state.V_Bo = object.V_Bo;
+  }
+  for (ContactCoordinates& kappa : told->state.kappa) kappa.alpha_o.u += options_.contact_error;
+  if (options_.contact_force_noise > 0.0) {
+    told->touch.support_force += options_.contact_force_noise * force_stream_.Normal(k_);
+  }
+  if (!delayed_.empty()) {
+    if (k_ == 0) delayed_.assign(delayed_.size(), *told);
+    delayed_[k_ % delayed_.size()] = *told;
+    *told = delayed_[(k_ + 1) % delayed_.size()];
+  }
+  ++k_;
+}
+
+void Sensing::TellVelocity(int joint, double position, double* rate) {
+  VelocityFilter& filter = filters_[static_cast<size_t>(joint)];
+  if (options_.velocity == VelocitySource::kKalman) {
+    if (k_ == 0) {
+      filter.Reset(position, *rate);
+    } else {
+      filter.Update(position);
+    }
+    *rate = filter.v();
+  } else if (options_.velocity == VelocitySource::kDifferenced) {
+    if (k_ == 0) {
+      rate_[joint] = *rate;
+    } else {
+      rate_[joint] += low_pass_ * ((position - last_[joint]) / time_step_ - rate_[joint]);
+      // Between two counts the filter's output decays for ever.
+      if (std::abs(rate_[joint]) < kStandstill) rate_[joint] = 0.0;
+    }
+    last_[joint] = position;
+    *rate = rate_[joint];
+  }
+}
+
+void Sensing::TellJoints(MeasuredState* told) {
+  const auto wheels = static_cast<int>(velocity_noise_.size() - count_.size());
+  for (int i = 0; i < static_cast<int>(count_.size()); ++i) {
+    double& q = told->q[base_positions_ + i];
+    double& rate = told->xi[base_velocities_ + i];
+    const auto channel = static_cast<std::uint64_t>(i);
+    if (joint_noise_[i] > 0.0) q += joint_noise_[i] * joint_stream_.Normal(k_, channel);
+    if (count_[i] > 0.0) q = count_[i] * std::round(q / count_[i]);
+    if (options_.velocity != VelocitySource::kMeasured) {
+      TellVelocity(i, q, &rate);
+    } else if (velocity_noise_[wheels + i] > 0.0) {
+      rate +=
+          velocity_noise_[wheels + i] * velocity_stream_.Normal(k_, static_cast<std::uint64_t>(wheels + i));
+    }
+  }
+}
+
+void Sensing::TellBase(const MeasuredState& truth, MeasuredState* told) {
+  if (base_positions_ == 0) return;
+  if (base_.type == BaseType::kDifferentialDrive) {
+    Vector2d noise = Vector2d::Zero();  // of the wheels' rates
+    for (int i = 0; i < 2; ++i) {
+      if (velocity_noise_[i] > 0.0) {
+        noise[i] = velocity_noise_[i] * velocity_stream_.Normal(k_, static_cast<std::uint64_t>(i));
+      }
+    }
+    if (base_.velocity == DriveVelocity::kTwist) {
+      // v = r (w_r + w_l) / 2, w = r (w_r - w_l) / b
+      noise = Vector2d(0.5 * base_.wheel_radius * (noise[0] + noise[1]),
+                       base_.wheel_radius * (noise[0] - noise[1]) / base_.wheel_distance);
+    }
+    told->xi.head<2>() += noise;
+  }
+  if (!options_.odometry) return;
+  if (k_ == 0) {
+    odometry_ = truth.q.head<3>();
+  } else if (base_.type == BaseType::kPlanar) {
+    odometry_ += time_step_ * told->xi.head<3>();
+  } else {
+    double v = told->xi[0], w = told->xi[1];
+    if (base_.velocity == DriveVelocity::kWheelRates) {
+      v = 0.5 * base_.wheel_radius * (told->xi[0] + told->xi[1]);
+      w = base_.wheel_radius * (told->xi[0] - told->xi[1]) / base_.wheel_distance;
+    }
+    // Velocities are those of the middle of the step that has led here.
+    const double phi = odometry_[2] + 0.5 * time_step_ * w;
+    odometry_ += time_step_ * Vector3d(v * std::cos(phi), v * std::sin(phi), w);
+  }
+  told->q.head<3>() = odometry_;
+}
+
+void Sensing::Translate(const Vector3d& way) {
+  odometry_.head<2>() += way.head<2>();
+  object_.Translate(way);
+  for (Reading& reading : delayed_) {
+    if (base_positions_ > 0) reading.state.q.head<2>() += way.head<2>();
+    reading.state.X_Bo.translation() += way;
+  }
+}
+
+}  // namespace dexcheck

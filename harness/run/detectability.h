@@ -1,0 +1,40 @@
+#pragma once
+
+// How small an error of each number of the model may be and still be found in a run, without looking at the
+// model itself: by what it leaves of the balances.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "harness/diagnosis/parameters.h"
+#include "harness/run/runner.h"
+
+namespace dexcheck {
+
+/// One number of the model.
+struct Detectability {
+  std::string name;      ///< "link r_forearm: mass".
+  std::string quantity;  ///< "mass".
+  double robot = 0.0;    ///< Smallest error that fails balance_robot, relative to GetScale; infinity where none does.
+  double object = 0.0;   ///< Likewise balance_object.
+};
+
+/// What a run says of the model's numbers.
+struct DetectabilityResult {
+  std::vector<Detectability> numbers;
+  /// Of the matrix whose columns are what a relative error of one leaves of (48), in |.|_M^-1 relative to the
+  /// forces balanced, at all states that were looked at: the largest singular value, the smallest that is not
+  /// rounding, and how many there are. The other columns are sums of these.
+  double largest_singular_value = 0.0, smallest_singular_value = 0.0;
+  int rank = 0;
+};
+
+/// Runs a scenario and changes every number of the model at some of its states: what is left of (48) and (19)
+/// with the plant's accelerations and forces, to first order, against the bounds of the balances.
+/// @param states how many are looked at, evenly over the run.
+/// @throws InputError for a task; when the run fails. Stops early, with fewer numbers, when `go_on` says so after one.
+DetectabilityResult FindDetectability(const Setup& setup, int states,
+                                      const std::function<bool(size_t done, size_t all)>& go_on);
+
+}  // namespace dexcheck

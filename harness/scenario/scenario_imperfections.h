@@ -1,0 +1,13 @@
+#pragma once
+
+#include "controller/common/toml_reader.h"
+#include "harness/plant/imperfections.h"
+
+namespace dexcheck {
+
+/// Reads [sensing], [actuation], [[disturbance]] and [mismatch], all of which may be missing.
+/// @param time_step of the plant, s: delays are kept in steps.
+/// @throws InputError as TomlValue. Names of joints and bodies are looked up where the robot is known.
+Imperfections ReadImperfections(TomlTable* root, double time_step);
+
+}  // namespace dexcheck

@@ -1,0 +1,225 @@
+#include "harness/sides/side_layout.h"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <utility>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/sides/join_names.h"
+
+namespace dexcheck {
+namespace {
+
+using Json = nlohmann::json;
+using Position = BaseConvention::Position;
+
+[[noreturn]] void Fail(const std::string& source, const std::string& key, const std::string& problem) {
+  throw InputError(source + ": " + key + ": " + problem);
+}
+
+constexpr std::pair<const char*, Position> kPositions[] = {
+    {"xyz_wxyz", Position::kXyzWxyz}, {"xyz_xyzw", Position::kXyzXyzw}, {"wxyz_xyz", Position::kWxyzXyz}};
+
+/// Index of a key's word among those that it may have; 0 when the key is missing.
+size_t ReadChoice(const Json& table, const char* key, std::initializer_list<const char*> words,
+                  const std::string& source) {
+  if (!table.contains(key)) return 0;
+  size_t index = 0;
+  std::string list;
+  for (const char* word : words) {
+    if (table.at(key) == word) return index;
+    list += (index++ == 0 ? "" : ", ") + Quote(word);
+  }
+  Fail(source, std::string("base.") + key,
+       "must be one of " + list + ", got " + Abbreviate(table.at(key).dump()));
+}
+
+BaseConvention ReadConvention(const Json& table, const std::string& source) {
+  if (!table.is_object()) Fail(source, "base", "must be an object, got " + Abbreviate(table.dump()));
+  for (const auto& item : table.items()) {
+    const std::string& key = item.key();
+    if (key == "position" || key == "velocity" || key == "linear_axes" || key == "angular_axes") continue;
+    Fail(source, "base." + Abbreviate(key),
+         "unknown key, known here are position, velocity, linear_axes, angular_axes");
+  }
+  BaseConvention convention;
+  convention.position =
+      kPositions[ReadChoice(table, "position", {"xyz_wxyz", "xyz_xyzw", "wxyz_xyz"}, source)].second;
+  convention.angular_first = ReadChoice(table, "velocity", {"linear_angular", "angular_linear"}, source) == 1;
+  convention.linear_in_base = ReadChoice(table, "linear_axes", {"world", "base"}, source) == 1;
+  convention.angular_in_world = ReadChoice(table, "angular_axes", {"base", "world"}, source) == 1;
+  return convention;
+}
+
+VectorXd ReadVector(const Json& list, Eigen::Index size, const std::string& key, const std::string& source) {
+  if (!list.is_array() || list.size() != static_cast<size_t>(size)) {
+    Fail(source, key,
+         "must be a list of " + std::to_string(size) + " numbers, got " +
+             (list.is_array() ? std::to_string(list.size()) : Abbreviate(list.dump())));
+  }
+  VectorXd values(size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const Json& value = list[static_cast<size_t>(i)];
+    if (!value.is_number()) {
+      Fail(source, key + "[" + std::to_string(i) + "]", "must be a number, got " + Abbreviate(value.dump()));
+    }
+    values[i] = value.get<double>();
+  }
+  return values;
+}
+
+MatrixXd ReadMatrix(const Json& rows, Eigen::Index size, const std::string& key, const std::string& source) {
+  if (!rows.is_array() || rows.size() != static_cast<size_t>(size)) {
+    Fail(source, key,
+         "must be a list of " + std::to_string(size) + " rows, got " +
+             (rows.is_array() ? std::to_string(rows.size()) : Abbreviate(rows.dump())));
+  }
+  MatrixXd M(size, size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    M.row(i) = ReadVector(rows[static_cast<size_t>(i)], size, key + "[" + std::to_string(i) + "]", source)
+                   .transpose();
+  }
+  return M;
+}
+
+double ReadNumber(const Json& value, const std::string& key, const std::string& source) {
+  if (!value.is_number()) Fail(source, key, "must be a number, got " + Abbreviate(value.dump()));
+  return value.get<double>();
+}
+
+}  // namespace
+
+SideLayout::SideLayout(const RobotDescription& robot)
+    : base_(robot.spec.base.type == BaseType::kFloating ? 6 : 0), base_positions_(base_ > 0 ? 7 : 0) {
+  if (base_ == 0 && robot.spec.base.type != BaseType::kFixed) {
+    throw InputError(robot.spec.source + ": base: must be fixed or floating to be compared with a program");
+  }
+  for (const Joint& joint : robot.spec.joints) {
+    names_.push_back(joint.name);
+    joints_.push_back(static_cast<int>(joints_.size()));
+  }
+  places_ = joints_;
+}
+
+SideLayout::SideLayout(const RobotDescription& robot, const Json& json, const std::string& source)
+    : SideLayout(robot) {
+  if (json.contains("base")) {
+    if (base_ == 0) Fail(source, "base", "must not be given, the base is fixed");
+    convention_ = ReadConvention(json.at("base"), source);
+  }
+  if (!json.contains("joints")) return;
+  const Json& list = json.at("joints");
+  if (!list.is_array()) Fail(source, "joints", "must be a list of names, got " + Abbreviate(list.dump()));
+  joints_.clear();
+  std::vector<int> place(names_.size(), -1);
+  for (size_t i = 0; i < list.size(); ++i) {
+    const std::string key = "joints[" + std::to_string(i) + "]";
+    if (!list[i].is_string()) Fail(source, key, "must be a name, got " + Abbreviate(list[i].dump()));
+    const std::string name = list[i].get<std::string>();
+    const auto found = std::find(names_.begin(), names_.end(), name);
+    if (found == names_.end()) {
+      const std::string nearest = FindNearest(name, names_);
+      Fail(source, key,
+           "must be a joint of " + robot.spec.source +
+               (nearest.empty() ? "" : " (did you mean " + Quote(nearest) + "?)") + ", got " + Quote(name));
+    }
+    const auto joint = static_cast<size_t>(found - names_.begin());
+    if (place[joint] >= 0) Fail(source, key, "must be named once, got " + Quote(name) + " again");
+    place[joint] = static_cast<int>(i);
+    joints_.push_back(static_cast<int>(joint));
+  }
+  std::vector<std::string> missing;
+  bool only_followers = true;
+  places_.clear();
+  for (size_t joint = 0; joint < place.size(); ++joint) {
+    if (place[joint] >= 0) {
+      places_.push_back(place[joint]);
+      continue;
+    }
+    missing.push_back(names_[joint]);
+    only_followers = only_followers && robot.spec.joints[joint].coupling.has_value();
+  }
+  is_reduced_ = !missing.empty();
+  if (!is_reduced_) return;
+  size_t followers = 0;
+  for (const Joint& joint : robot.spec.joints) followers += joint.coupling ? 1 : 0;
+  if (!only_followers || missing.size() != followers) {
+    Fail(source, "joints", "must be all joints, or all that follow no other; missing: " + JoinNames(missing));
+  }
+}
+
+nlohmann::ordered_json SideLayout::ToJson() const {
+  nlohmann::ordered_json json;
+  json["joints"] = nlohmann::ordered_json::array();
+  for (const int joint : joints_) json["joints"].push_back(names_[static_cast<size_t>(joint)]);
+  if (base_ == 0) return json;
+  const auto position = std::find_if(std::begin(kPositions), std::end(kPositions),
+                                     [&](const auto& entry) { return entry.second == convention_.position; });
+  json["base"] = {{"position", position->first},
+                  {"velocity", convention_.angular_first ? "angular_linear" : "linear_angular"},
+                  {"linear_axes", convention_.linear_in_base ? "base" : "world"},
+                  {"angular_axes", convention_.angular_in_world ? "world" : "base"}};
+  return json;
+}
+
+VectorXd SideLayout::WritePositions(const VectorXd& q) const {
+  VectorXd written(num_positions());
+  if (base_ > 0) written.head<7>() = BaseConversion(convention_).ConvertPositions(q).head<7>();
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    written[base_positions_ + static_cast<int>(i)] = q[base_positions_ + joints_[i]];
+  }
+  return written;
+}
+
+VectorXd SideLayout::WriteVelocities(const VectorXd& q, const VectorXd& xi) const {
+  VectorXd written(size());
+  if (base_ > 0) written.head<6>() = BaseConversion(convention_).ConvertVelocities(q, xi).head<6>();
+  for (size_t i = 0; i < joints_.size(); ++i) written[base_ + static_cast<int>(i)] = xi[base_ + joints_[i]];
+  return written;
+}
+
+void SideLayout::ReadTerms(const VectorXd& q, const VectorXd& xi, SideTerms* terms) const {
+  std::vector<Eigen::Index> from;
+  for (int i = 0; i < base_; ++i) from.push_back(i);
+  for (const int place : places_) from.push_back(base_ + place);
+  for (VectorXd* force : {&terms->coriolis, &terms->gravity, &terms->bias, &terms->friction}) {
+    if (force->size() > 0) *force = VectorXd((*force)(from));
+  }
+  if (terms->M.size() > 0) terms->M = MatrixXd(terms->M(from, from));
+  if (base_ == 0) return;
+  // The rate of the conversion lies in the base's entries alone.
+  VectorXd own = VectorXd::Zero(static_cast<Eigen::Index>(from.size()));
+  own.head<6>() = xi.head<6>();
+  BaseConversion(convention_).Restore(q, own, terms);
+}
+
+SideTerms ReadSideTerms(const Json& json, const SideLayout& layout, const VectorXd& v,
+                        const std::string& source) {
+  const Eigen::Index n = layout.size();
+  SideTerms terms;
+  const auto find = [&](const char* key) { return json.contains(key) ? &json.at(key) : nullptr; };
+  if (const Json* M = find("M")) terms.M = ReadMatrix(*M, n, "M", source);
+  if (const Json* C = find("C")) terms.coriolis = ReadMatrix(*C, n, "C", source) * v;
+  if (const Json* c = find("c")) terms.coriolis = ReadVector(*c, n, "c", source);
+  if (const Json* g = find("g")) terms.gravity = ReadVector(*g, n, "g", source);
+  if (const Json* h = find("h")) terms.bias = ReadVector(*h, n, "h", source);
+  if (const Json* friction = find("friction")) terms.friction = ReadVector(*friction, n, "friction", source);
+  if (const Json* T = find("kinetic_energy")) terms.kinetic = ReadNumber(*T, "kinetic_energy", source);
+  if (const Json* U = find("potential_energy")) terms.potential = ReadNumber(*U, "potential_energy", source);
+  const bool is_empty = terms.M.size() == 0 && terms.coriolis.size() == 0 && terms.gravity.size() == 0 &&
+                        terms.bias.size() == 0 && terms.friction.size() == 0 && !terms.kinetic &&
+                        !terms.potential;
+  if (is_empty) {
+    throw InputError(source +
+                     ": must have M, C, c, g, h, friction, kinetic_energy or potential_energy, got " +
+                     Abbreviate(json.dump()));
+  }
+  if (terms.bias.size() == 0 && terms.coriolis.size() > 0 && terms.gravity.size() > 0) {
+    terms.bias = terms.coriolis + terms.gravity;
+  }
+  return terms;
+}
+
+}  // namespace dexcheck

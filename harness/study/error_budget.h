@@ -1,0 +1,73 @@
+#pragma once
+
+// Which part of a plant that is not ideal costs the accuracy?
+
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "harness/scenario/scenario.h"
+
+namespace dexcheck {
+
+/// One thing that a scenario asks of its plant.
+struct ErrorSource {
+  std::string name;  ///< Its key: "sensing.joint_counts", "disturbance.0".
+  /// Takes it out. The random numbers of the others stay as they are.
+  std::function<void(Imperfections*)> drop;
+  bool acts_at_rest = true;  ///< Whether its error is there before t = 0: all but pushes.
+};
+
+/// Those that do something. `actuation.saturate` is no source: it says what becomes of a limit.
+std::vector<ErrorSource> ListErrorSources(const Imperfections& imperfections);
+
+/// Size of a position error over a run, m.
+struct ErrorSize {
+  double rms = 0.0;
+  double max = 0.0;
+};
+
+/// One source.
+struct BudgetEntry {
+  std::string name;
+  ErrorSize alone;      ///< With this source only.
+  ErrorSize without;    ///< With all others.
+  ErrorSize predicted;  ///< By (57), see ErrorPrediction.
+  /// RMS of what it adds in company less what it adds alone, relative to the RMS of all.
+  double interaction = 0.0;
+  std::string failure;  ///< Why one of its two runs ended early; empty when none did.
+
+  /// Whether it makes another error in company than alone: more than kInteracts.
+  [[nodiscard]] bool interacts() const { return interaction > kInteracts; }
+  static constexpr double kInteracts = 0.1;
+};
+
+/// All sources of a scenario. Errors are judged from `expect.from` on.
+struct ErrorBudget {
+  std::string scenario;
+  ErrorSize ideal;      ///< With no source.
+  ErrorSize all;        ///< With every source.
+  ErrorSize sum;        ///< Errors of the runs with one source each, added as functions of time.
+  ErrorSize predicted;  ///< Likewise of the predictions.
+  std::string failure;  ///< Why the ideal run or that with all ended early; empty when none did.
+  std::vector<BudgetEntry> entries;
+
+  /// Whether every run came to its end.
+  [[nodiscard]] bool is_complete() const;
+};
+
+/// Runs the scenario 2 n + 2 times for its n sources, unchecked.
+/// @param progress asked before each run with the number of runs done and to do; false stops.
+/// @throws InputError as Setup; when the scenario is a task or its plant is ideal.
+ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::path& robot,
+                            const std::filesystem::path& mjcf,
+                            const std::function<bool(long done, long total)>& progress);
+
+nlohmann::ordered_json ToJson(const ErrorBudget& budget);
+
+/// A page with the table and a bar chart, which needs no other file.
+std::string MakeBudgetPage(const ErrorBudget& budget);
+
+}  // namespace dexcheck

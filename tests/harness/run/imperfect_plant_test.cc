@@ -1,0 +1,184 @@
+// A plant that is not ideal: what the scenario asks for is known to the checks, what is hidden from it is
+// found.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "harness/run/runner.h"
+#include "tests/harness/run/shipped_run.h"
+
+namespace dexcheck::testing {
+namespace {
+
+const std::vector<std::string> kShort = {"duration=0.2", "settle=0.3", "expect={}"};
+
+std::vector<std::string> With(std::vector<std::string> base, const std::vector<std::string>& more) {
+  base.insert(base.end(), more.begin(), more.end());
+  return base;
+}
+
+/// Something that a scenario may ask for.
+struct Known {
+  const char* name;
+  std::vector<std::string> overrides;
+};
+void PrintTo(const Known& known, std::ostream* out) { *out << known.name; }
+
+const Known kKnown[] = {
+    {"joint_counts", {"sensing.joint_counts=65536"}},
+    {"joint_noise", {"sensing.joint_noise=1e-6"}},
+    {"differenced", {"sensing.velocity=differenced", "sensing.velocity_cutoff=50"}},
+    {"kalman", {"sensing.velocity=kalman", "sensing.kalman_acceleration=20", "sensing.joint_noise=1e-6"}},
+    {"velocity_noise", {"sensing.velocity_noise=1e-4"}},
+    {"odometry", {"sensing.odometry=true"}},
+    {"camera",
+     {"sensing.object_rate=500", "sensing.object_latency=0.002", "sensing.object_velocity=kalman",
+      "sensing.object_acceleration=5", "sensing.object_position_noise=1e-6"}},
+    {"sensing_latency", {"sensing.latency=0.002"}},
+    {"torque_step", {"actuation.torque_step=1e-3"}},
+    {"gain_error", {"actuation.gain_error={ r_elbow = 0.02 }"}},
+    {"lag", {"actuation.lag=1e-3"}},
+    {"delay", {"actuation.delay=0.0015"}},
+    {"friction", {"actuation.coulomb={ r_elbow = 0.1 }"}},
+    {"backlash", {"actuation.backlash={ r_elbow = 1e-4 }"}},
+    {"push_on_link",
+     {"disturbance=[{ type = 'pulse', body = 'r_forearm', force = [0, 5, 0], begin = 0.05, duration = 0.05 "
+      "}]"}},
+    {"push_on_platform",
+     {"disturbance=[{ type = 'pulse', body = 'platform', force = [0, 20, 0], begin = 0.05, duration = 0.05 "
+      "}]"}},
+    {"push_on_object",
+     {"disturbance=[{ type = 'sine', body = 'object', force = [0, 0, 1], frequency = 10 }]"}},
+    {"payload", {"disturbance=[{ type = 'payload', body = 'r_palm', mass = 0.2, at = [0, 0, 0.03] }]"}},
+    {"slope", {"disturbance=[{ type = 'slope', slope_deg = [0.5, 0.2] }]"}},
+    {"mass", {"mismatch.mass={ r_forearm = 1.05, object = 1.1 }"}},
+    {"mass_within", {"mismatch.mass_within=0.03"}},
+    {"com", {"mismatch.com={ r_forearm = [0.005, 0, 0] }"}},
+    {"joint_constants", {"mismatch.damping=1.2", "mismatch.armature=0.9"}},
+};
+
+/// The same asked for of the scenario: nothing to find. The same hidden: found.
+class KnownCauses : public ::testing::TestWithParam<Known> {};
+
+TEST_P(KnownCauses, CryNoWolf) {
+  ShippedRun run("curve", With(kShort, GetParam().overrides), 1);
+  const RunResult& result = run.Run();
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  for (const CheckRecord& check : run.loop().checks().motion_checks()) {
+    EXPECT_FALSE(check.failed) << check.name << " " << check.worst << " at " << check.at;
+  }
+  for (const CheckRecord& check : run.loop().checks().model_checks()) {
+    EXPECT_FALSE(check.failed) << check.name << " " << check.worst << " " << check.part;
+  }
+  // It does something: the object is no longer where the ideal plant has it.
+  EXPECT_GT(result.tracking.position_max(), 1e-9);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, KnownCauses, ::testing::ValuesIn(kKnown),
+                         [](const ::testing::TestParamInfo<Known>& info) { return info.param.name; });
+
+/// A loop with the imperfections of one scenario in it, judged by another that does not have them.
+RunResult RunHidden(const std::vector<std::string>& hidden) {
+  const ShippedRun judged("curve", kShort);
+  const ShippedRun other("curve", With(kShort, hidden));
+  LoopParts parts = MakeLoopParts(judged.setup());
+  LoopParts faulty = MakeLoopParts(other.setup());
+  parts.sensing = faulty.sensing;
+  parts.actuation = faulty.actuation;
+  parts.disturbances = faulty.disturbances;
+  parts.plant = std::move(faulty.plant);
+  Runner runner(judged.setup(), /*check=*/true, std::move(parts));
+  return runner.Run([](const StepRecord&) {}, [] { return false; });
+}
+
+struct Hidden {
+  const char* name;
+  std::vector<std::string> overrides;
+  Cause cause;
+};
+void PrintTo(const Hidden& hidden, std::ostream* out) { *out << hidden.name; }
+
+class HiddenCauses : public ::testing::TestWithParam<Hidden> {};
+
+TEST_P(HiddenCauses, AreFound) {
+  const RunResult result = RunHidden(GetParam().overrides);
+  EXPECT_NE(result.verdict, Verdict::kPass);
+  EXPECT_STREQ(NameOf(result.attribution.cause), NameOf(GetParam().cause))
+      << result.failure << " " << result.attribution.evidence;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, HiddenCauses,
+    ::testing::Values(
+        Hidden{"encoders", {"sensing.joint_counts=65536"}, Cause::kSensing},
+        Hidden{"noise", {"sensing.joint_noise=1e-7"}, Cause::kSensing},
+        Hidden{"latency", {"sensing.latency=0.001"}, Cause::kSensing},
+        Hidden{"gain", {"actuation.gain_error={ r_elbow = 1e-3 }"}, Cause::kActuator},
+        Hidden{"delay", {"actuation.delay=5e-4"}, Cause::kActuator},
+        Hidden{"friction", {"actuation.coulomb={ r_elbow = 0.05 }"}, Cause::kActuator},
+        Hidden{"push_on_link",
+               {"disturbance=[{ type = 'step', body = 'r_forearm', force = [0, 1, 0], begin = 0.05 }]"},
+               Cause::kUnmodelledForce},
+        Hidden{"push_on_object",
+               {"disturbance=[{ type = 'step', body = 'object', force = [0, 0, 0.2], begin = 0.05 }]"},
+               Cause::kUnmodelledForce},
+        Hidden{"mass", {"mismatch.mass={ r_forearm = 1.05 }"}, Cause::kUnmodelledForce}),
+    [](const ::testing::TestParamInfo<Hidden>& info) { return info.param.name; });
+
+TEST(ImperfectPlant, ZeroSettingsGiveTheSameBits) {
+  ShippedRun without("curve", kShort);
+  ShippedRun with("curve",
+                  With(kShort, {"sensing.joint_counts=0", "sensing.joint_noise=0", "sensing.latency=0",
+                                "sensing.object_rate=0", "sensing.velocity_cutoff=30", "actuation.delay=0",
+                                "actuation.lag={ rf = 0 }", "actuation.coulomb=0", "actuation.torque_step=0",
+                                "mismatch.mass=1", "mismatch.mass_within=0",
+                                "mismatch.com={ r_forearm = [0, 0, 0] }", "disturbance=[]"}));
+  EXPECT_EQ(without.Run().verdict, Verdict::kPass);
+  EXPECT_EQ(with.Run().verdict, Verdict::kPass);
+  EXPECT_EQ(with.step().reading.qpos, without.step().reading.qpos);
+  EXPECT_EQ(with.step().reading.qvel, without.step().reading.qvel);
+  EXPECT_EQ(with.step().command.tau, without.step().command.tau);
+  EXPECT_EQ(with.step().findings.xi_dot_model, without.step().findings.xi_dot_model);
+}
+
+TEST(ImperfectPlant, TheSameSeedGivesTheSameRun) {
+  const std::vector<std::string> noisy =
+      With(kShort, {"sensing.joint_noise=1e-6", "mismatch.mass_within=0.03"});
+  ShippedRun first("curve", noisy, 3), second("curve", noisy, 3), other("curve", noisy, 4);
+  first.Run();
+  second.Run();
+  other.Run();
+  EXPECT_EQ(first.step().reading.qpos, second.step().reading.qpos);
+  EXPECT_NE(first.step().reading.qpos, other.step().reading.qpos);
+}
+
+TEST(ImperfectPlant, WhatIsTooBadForTheExpectationIsStillSaid) {
+  ShippedRun run("curve", {"duration=0.2", "settle=0.3", "mismatch.mass={ r_forearm = 1.2 }"});
+  const RunResult& result = run.Run();
+  EXPECT_EQ(result.verdict, Verdict::kDisagreement);
+  EXPECT_TRUE(run.loop().checks().Find("expect_position").failed);
+  EXPECT_FALSE(run.loop().checks().Find("balance_robot").failed);
+}
+
+TEST(ImperfectPlant, CurveRealDoesWhatItExpects) {
+  ShippedRun run("curve-real", {"duration=3.3"});  // the first push included
+  const RunResult& result = run.Run();
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  EXPECT_GT(result.tracking.position_max(), 1e-4);
+  EXPECT_GE(run.setup().scenario().imperfections.asked.size(), 6U);
+}
+
+TEST(ImperfectPlant, AMotorThatSaturatesGoesOnAndIsReported) {
+  const std::vector<std::string> hard = {"duration=0.05", "settle=0.3", "control.natural_frequency=100",
+                                         "start_error.xyz=[0, 0, 0.05]"};
+  ShippedRun ends("curve", hard);
+  EXPECT_THAT(ends.Run().failure, ::testing::HasSubstr("is at its limit"));
+  ShippedRun goes_on("curve", With(hard, {"actuation.saturate=true"}));
+  const RunResult& result = goes_on.Run();
+  EXPECT_THAT(result.failure, ::testing::Not(::testing::HasSubstr("is at its limit")));
+  EXPECT_EQ(result.attribution.cause, Cause::kActuatorLimit) << result.attribution.evidence;
+  EXPECT_FALSE(goes_on.loop().checks().Find("torque_applied").failed);
+}
+
+}  // namespace
+}  // namespace dexcheck::testing

@@ -1,0 +1,418 @@
+// Mistakes that people make, on one link and on all, on four robots: each is named in words, and nothing else
+// is.
+
+#include "harness/sides/hypotheses.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <functional>
+#include <ostream>
+
+#include "controller/model/body_frame.h"
+#include "harness/engine/engine.h"
+#include "harness/sides/mjcf_reader.h"
+#include "harness/sides/read_description.h"
+#include "tests/common/legged_robots.h"
+#include "tests/common/paths.h"
+#include "tests/common/random_robot.h"
+#include "tests/common/urdf_text.h"
+#include "tests/harness/sides/panda_urdf.h"
+
+namespace dexcheck {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+/// A robot twice: as the description that may be wrong, and as it should be.
+struct Pair {
+  std::string name;
+  RobotDescription a, b;
+};
+
+Pair MakeRandomPair(int seed, BaseType base) {
+  std::mt19937 random(static_cast<unsigned>(seed));
+  testing::RandomRobotOptions options;
+  options.base = base;
+  options.joints = 6;
+  options.branching = 0.2;
+  options.prismatic = 0.1;
+  RobotSpec spec = testing::MakeRandomRobot(options, &random);
+  RobotDescription a = ParseUrdf(testing::WriteUrdf(&spec, &random), "a.urdf");
+  return {"random" + std::to_string(seed), a,
+          ReadMjcfDescription(*LoadMjcfText(testing::WriteMjcf(spec), "b.xml"), "b.xml")};
+}
+
+const std::vector<Pair>& ListRobots() {
+  static const std::vector<Pair> robots = [] {
+    const std::vector<testing::LeggedLink> humanoid = testing::ListHumanoid();
+    std::vector<Pair> list;
+    list.push_back({"panda", ParseUrdf(testing::MakePandaUrdf(), "panda.urdf"),
+                    ReadDescription(testing::SourcePath("/mjcf/panda.xml"))});
+    list.push_back(
+        {"humanoid", ParseUrdf(testing::WriteLeggedUrdf("humanoid", humanoid), "humanoid.urdf"),
+         ReadMjcfDescription(*LoadMjcfText(testing::WriteLeggedMjcf("humanoid", humanoid), "humanoid.xml"),
+                             "humanoid.xml")});
+    list.push_back(MakeRandomPair(1730, BaseType::kFixed));
+    list.push_back(MakeRandomPair(1731, BaseType::kFloating));
+    return list;
+  }();
+  return robots;
+}
+
+/// What a person may have done to a body, in the link's own frame.
+struct BodyMistake {
+  std::string name;
+  std::string text;
+  std::function<MassProperties(const RobotDescription&, size_t, MassProperties)> make;
+};
+
+Matrix3d CalcOffset(const MassProperties& body) {
+  return body.mass * (body.com.squaredNorm() * Matrix3d::Identity() - body.com * body.com.transpose());
+}
+
+/// Of bodies that are one part; the identity, which makes no mistake, of others.
+Matrix3d FindPartRotation(const RobotDescription& robot, size_t joint) {
+  std::vector<Matrix3d> rotations;
+  for (const DescribedPart& part : robot.parts) {
+    if (part.joint == static_cast<int>(joint) && part.states_inertial)
+      rotations.push_back(part.X_LC.linear());
+  }
+  return rotations.size() == 1 ? rotations[0] : Matrix3d(Matrix3d::Identity());
+}
+
+Pose FindPlace(const RobotDescription& robot, size_t joint) { return ListOwnRows(robot)[joint].X_PL; }
+
+const std::vector<BodyMistake>& ListMistakes() {
+  using Body = MassProperties;
+  using Robot = RobotDescription;
+  static const std::vector<BodyMistake> mistakes = {
+      {"Origin", "as if given about the link's origin",
+       [](const Robot&, size_t, Body body) { return body.inertia += CalcOffset(body), body; }},
+      {"Signs", "with the products' sign turned around",
+       [](const Robot&, size_t, Body body) {
+         const Vector3d diagonal = body.inertia.diagonal();
+         body.inertia = -body.inertia;
+         body.inertia.diagonal() = diagonal;
+         return body;
+       }},
+      {"NoProducts", "without its products",
+       [](const Robot&, size_t, Body body) {
+         return body.inertia = Matrix3d(body.inertia.diagonal().asDiagonal()), body;
+       }},
+      {"PrincipalMoments", "of principal moments without their axes",
+       [](const Robot&, size_t, Body body) {
+         const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(body.inertia);
+         return body.inertia = Matrix3d(solver.eigenvalues().asDiagonal()), body;
+       }},
+      {"Transposed", "turned the other way",
+       [](const Robot& robot, size_t i, Body body) {
+         // The file has R^T where R would be right: I = R I_C R^T, read as R^T I_C R.
+         const Matrix3d R = FindPartRotation(robot, i);
+         return body.inertia = R.transpose() * R.transpose() * body.inertia * R * R, body;
+       }},
+      {"AxesXY", "with the axes x and y exchanged",
+       [](const Robot&, size_t, Body body) {
+         Matrix3d P;
+         P << 0, 1, 0, 1, 0, 0, 0, 0, 1;
+         return body.inertia = P * body.inertia * P, body;
+       }},
+      {"GramMillimetres", "as if in g mm^2",
+       [](const Robot&, size_t, Body body) { return body.inertia *= 1e9, body; }},
+      {"KilogramMillimetres", "as if in kg mm^2",
+       [](const Robot&, size_t, Body body) { return body.inertia *= 1e6, body; }},
+      {"Grams", "as if in g", [](const Robot&, size_t, Body body) { return body.mass *= 1e3, body; }},
+      {"Pounds", "as if in lb",
+       [](const Robot&, size_t, Body body) { return body.mass /= 0.45359237, body; }},
+      {"ComMillimetres", "as if in mm",
+       [](const Robot&, size_t, Body body) { return body.com *= 1e3, body; }},
+      {"ComOfParent", "as if given in the parent's frame",
+       [](const Robot& robot, size_t i, Body body) {
+         return body.com = FindPlace(robot, i) * body.com, body;
+       }},
+      {"ComSign", "with its sign turned around",
+       [](const Robot&, size_t, Body body) { return body.com = -body.com, body; }},
+      {"ComOrder", "in the order y, z, x",
+       [](const Robot&, size_t, Body body) {
+         return body.com = Vector3d(body.com[1], body.com[2], body.com[0]), body;
+       }},
+      {"Order", "in the order xx, xy, xz, yy, yz, zz", [](const Robot&, size_t, Body body) {
+         const Matrix3d I = body.inertia;
+         // The numbers xx, xy, xz, yy, yz, zz stand where xx, yy, zz, xy, xz, yz are read.
+         body.inertia << I(0, 0), I(1, 1), I(1, 2), I(1, 1), I(0, 1), I(2, 2), I(1, 2), I(2, 2), I(0, 2);
+         return body;
+       }}};
+  return mistakes;
+}
+
+/// Own frames stand on the axis in ListOwnRows; a URDF's do so already.
+void Spoil(const BodyMistake& mistake, size_t i, RobotDescription* robot) {
+  const Pose& X_iL = robot->joints[i].X_iL;
+  MassProperties& body = robot->spec.joints[i].body;
+  body = ExpressIn(mistake.make(*robot, i, ExpressIn(body, X_iL.inverse())), X_iL);
+  if (mistake.name != "Transposed") return;
+  const Matrix3d R = FindPartRotation(*robot, i);
+  for (DescribedPart& part : robot->parts) {
+    if (part.joint == static_cast<int>(i) && part.states_inertial && part.X_LC.linear() == R) {
+      part.X_LC.linear() = R.transpose();
+    }
+  }
+}
+
+std::string List(const std::vector<Hypothesis>& found) {
+  std::string text;
+  for (const Hypothesis& hypothesis : found) text += hypothesis.text + "\n";
+  return text;
+}
+
+bool IsVisible(const RobotDescription& robot, const RobotDescription& spoiled, size_t i) {
+  const MassProperties& a = robot.spec.joints[i].body;
+  const MassProperties& b = spoiled.spec.joints[i].body;
+  return std::abs(a.mass - b.mass) > 1e-4 * a.mass || (a.com - b.com).norm() > 1e-4 ||
+         (a.inertia - b.inertia).norm() > 1e-4 * a.inertia.trace();
+}
+
+struct Case {
+  int robot;
+  int mistake;
+};
+void PrintTo(const Case& tried, std::ostream* out) {
+  *out << ListRobots()[static_cast<size_t>(tried.robot)].name
+       << ListMistakes()[static_cast<size_t>(tried.mistake)].name;
+}
+
+class BodyMistakes : public ::testing::TestWithParam<Case> {
+ protected:
+  [[nodiscard]] const Pair& pair() const { return ListRobots()[static_cast<size_t>(GetParam().robot)]; }
+  [[nodiscard]] const BodyMistake& mistake() const {
+    return ListMistakes()[static_cast<size_t>(GetParam().mistake)];
+  }
+};
+
+TEST_P(BodyMistakes, OfAllLinksAreNamedInOneLine) {
+  RobotDescription wrong = pair().a;
+  size_t visible = 0;
+  for (size_t i = 0; i < wrong.spec.joints.size(); ++i) {
+    Spoil(mistake(), i, &wrong);
+    visible += IsVisible(pair().a, wrong, i) ? 1 : 0;
+  }
+  if (visible < 2) GTEST_SKIP() << "the robot's bodies do not show it";
+  const std::vector<Hypothesis> found = ExplainDifference(wrong, pair().b);
+  ASSERT_FALSE(found.empty());
+  EXPECT_THAT(List(found), HasSubstr(mistake().text));
+  double explained = 0.0;
+  for (const Hypothesis& hypothesis : found) explained += hypothesis.explained;
+  EXPECT_NEAR(explained, 1.0, 1e-6) << List(found);
+  // Symmetric bodies may look like something simpler; the others are one line.
+  EXPECT_LE(found.size(), 3U) << List(found);
+}
+
+TEST_P(BodyMistakes, OfOneLinkNameTheLink) {
+  for (size_t i = 0; i < pair().a.spec.joints.size(); ++i) {
+    RobotDescription wrong = pair().a;
+    Spoil(mistake(), i, &wrong);
+    if (!IsVisible(pair().a, wrong, i)) continue;
+    const std::vector<Hypothesis> found = ExplainDifference(wrong, pair().b);
+    ASSERT_EQ(found.size(), 1U) << List(found);
+    EXPECT_THAT(found[0].text, StartsWith("link " + pair().a.spec.joints[i].link + ": its "));
+    EXPECT_NEAR(found[0].explained, 1.0, 1e-6);
+    ASSERT_EQ(found[0].values.size(), 1U);
+    EXPECT_THAT(found[0].values[0], HasSubstr("; right would be mass "));
+    return;
+  }
+  GTEST_SKIP() << "the robot's bodies do not show it";
+}
+
+std::vector<Case> ListCases() {
+  std::vector<Case> cases;
+  for (int robot = 0; robot < 4; ++robot) {
+    for (int mistake = 0; mistake < static_cast<int>(ListMistakes().size()); ++mistake)
+      cases.push_back({robot, mistake});
+  }
+  return cases;
+}
+
+INSTANTIATE_TEST_SUITE_P(Hypotheses, BodyMistakes, ::testing::ValuesIn(ListCases()));
+
+TEST(Hypotheses, NothingIsSaidOfRobotsThatAgree) {
+  for (const Pair& pair : ListRobots()) EXPECT_EQ(List(ExplainDifference(pair.a, pair.b)), "") << pair.name;
+}
+
+// What no convention explains is left to the numbers.
+TEST(Hypotheses, NothingIsSaidOfOtherNumbers) {
+  for (const Pair& pair : ListRobots()) {
+    RobotDescription wrong = pair.a;
+    for (Joint& joint : wrong.spec.joints) {
+      joint.body.mass *= 1.2345;
+      joint.body.inertia *= 1.321;
+      joint.body.com += Vector3d(0.0123, -0.0456, 0.0789);
+    }
+    EXPECT_EQ(List(ExplainDifference(wrong, pair.b)), "") << pair.name;
+  }
+}
+
+TEST(Hypotheses, ListsThatAreShiftedAndBodiesThatAreExchanged) {
+  for (const Pair& pair : ListRobots()) {
+    // In own frames, as tables have them.
+    const auto own = [&](const RobotDescription& robot, size_t i) {
+      return ExpressIn(robot.spec.joints[i].body, robot.joints[i].X_iL.inverse());
+    };
+    RobotDescription shifted = pair.a;
+    const size_t n = shifted.spec.joints.size();
+    for (size_t i = 0; i + 1 < n; ++i) {
+      shifted.spec.joints[i].body = ExpressIn(own(pair.a, i + 1), pair.a.joints[i].X_iL);
+    }
+    if (pair.name != "humanoid") {  // whose list is a tree
+      EXPECT_THAT(List(ExplainDifference(shifted, pair.b)),
+                  HasSubstr("the list of bodies looks shifted by one"))
+          << pair.name;
+    }
+    RobotDescription exchanged = pair.a;
+    exchanged.spec.joints[1].body = ExpressIn(own(pair.a, 2), pair.a.joints[1].X_iL);
+    exchanged.spec.joints[2].body = ExpressIn(own(pair.a, 1), pair.a.joints[2].X_iL);
+    const std::string links = pair.a.spec.joints[1].link + " and " + pair.a.spec.joints[2].link;
+    EXPECT_EQ(List(ExplainDifference(exchanged, pair.b)),
+              "links " + links + ": their bodies look exchanged\n");
+    RobotDescription inertias = pair.a;
+    MassProperties first = own(pair.a, 1);
+    MassProperties second = own(pair.a, 2);
+    std::swap(first.inertia, second.inertia);
+    inertias.spec.joints[1].body = ExpressIn(first, pair.a.joints[1].X_iL);
+    inertias.spec.joints[2].body = ExpressIn(second, pair.a.joints[2].X_iL);
+    EXPECT_EQ(List(ExplainDifference(inertias, pair.b)),
+              "links " + links + ": their inertias look exchanged\n");
+  }
+}
+
+TEST(Hypotheses, ALostPartIsNamed) {
+  const std::vector<testing::LeggedLink> links = testing::ListQuadruped();
+  std::string text = testing::WriteLeggedUrdf("quadruped", links);
+  const RobotDescription right = ParseUrdf(text, "right.urdf");
+  const size_t begin = text.find("<inertial>", text.find("<link name=\"FR_foot\">"));
+  const size_t end = text.find("</inertial>", begin) + std::string("</inertial>").size();
+  text.erase(begin, end - begin);
+  EXPECT_EQ(List(ExplainDifference(ParseUrdf(text, "wrong.urdf"), right)),
+            "link FR_calf: the mass of \"FR_foot\", which is welded to it, looks lost\n");
+}
+
+/// What a person may have done to a joint.
+struct JointMistakeCase {
+  std::string name;
+  std::string text;
+  std::function<void(size_t, RobotDescription*)> make;
+};
+
+/// The link's own frame and what hangs on it stay where they are; frame i, whose z is the axis, is turned.
+void TurnAxisAround(size_t i, RobotDescription* robot) {
+  const Pose turn(Eigen::AngleAxisd(kPi, Vector3d::UnitX()));
+  Joint& joint = robot->spec.joints[i];
+  joint.X_PB = joint.X_PB * turn;
+  joint.body = ExpressIn(joint.body, turn.inverse());
+  robot->joints[i].X_iL = turn.inverse() * robot->joints[i].X_iL;
+  for (Joint& child : robot->spec.joints) {
+    if (child.parent == static_cast<int>(i)) child.X_PB = turn.inverse() * child.X_PB;
+  }
+}
+
+class JointMistakes : public ::testing::TestWithParam<JointMistakeCase> {};
+
+TEST_P(JointMistakes, AreNamed) {
+  int named = 0;
+  for (const Pair& pair : ListRobots()) {
+    for (const size_t i : {size_t{1}, size_t{3}}) {
+      RobotDescription wrong = pair.a;
+      GetParam().make(i, &wrong);
+      if (wrong.spec.joints[i].type != JointType::kRevolute) continue;
+      const std::vector<Hypothesis> found = ExplainDifference(wrong, pair.b);
+      if (found.empty() && wrong.spec.joints[i].X_PB.isApprox(pair.a.spec.joints[i].X_PB)) continue;
+      ASSERT_EQ(found.size(), 1U) << pair.name << " " << i << "\n" << List(found);
+      EXPECT_THAT(found[0].text, StartsWith("joint " + wrong.spec.joints[i].name + ": its ")) << pair.name;
+      EXPECT_NEAR(found[0].explained, 1.0, 1e-12);
+      named += found[0].text.find(GetParam().text) != std::string::npos ? 1 : 0;
+    }
+  }
+  EXPECT_GE(named, 3);
+}
+
+INSTANTIATE_TEST_SUITE_P(Hypotheses, JointMistakes,
+                         ::testing::Values(JointMistakeCase{"Zero", "zero looks offset by 30 deg",
+                                                            [](size_t i, RobotDescription* robot) {
+                                                              robot->spec.joints[i].mdh.q += DegToRad(30.0);
+                                                            }},
+                                           JointMistakeCase{"Sign", "axis looks turned around (its sign)",
+                                                            TurnAxisAround},
+                                           JointMistakeCase{"Millimetres", "origin looks as if in mm",
+                                                            [](size_t i, RobotDescription* robot) {
+                                                              robot->spec.joints[i].X_PB.translation() *= 1e3;
+                                                            }},
+                                           JointMistakeCase{"OriginSign", "origin looks turned around",
+                                                            [](size_t i, RobotDescription* robot) {
+                                                              robot->spec.joints[i].X_PB.translation() *=
+                                                                  -1.0;
+                                                            }}),
+                         [](const auto& named) { return named.param.name; });
+
+TEST(Hypotheses, GravityAndUnitsOfJoints) {
+  RobotDescription table = ReadDescription(testing::SourcePath("/controller/parameters/panda.toml"));
+  const RobotDescription mjcf = ReadDescription(testing::SourcePath("/mjcf/panda.xml"));
+  EXPECT_EQ(List(ExplainDifference(table, mjcf)), "");
+  RobotDescription wrong = table;
+  wrong.spec.gravity *= -1.0;
+  EXPECT_EQ(List(ExplainDifference(wrong, mjcf)), "gravity looks turned around (its sign)\n");
+  wrong.spec.gravity = Vector3d(0.0, 0.0, -9.8);
+  EXPECT_EQ(List(ExplainDifference(wrong, mjcf)), "gravity has the right direction and another value\n");
+  wrong.spec.gravity = Vector3d(0.0, -9.81, 0.0);
+  EXPECT_EQ(List(ExplainDifference(wrong, mjcf)), "gravity points along another axis\n");
+  wrong = table;
+  for (Joint& joint : wrong.spec.joints) {
+    joint.lower = RadToDeg(joint.lower);
+    joint.upper = RadToDeg(joint.upper);
+  }
+  EXPECT_EQ(List(ExplainDifference(wrong, mjcf)), "ranges look as if in degrees: 7 of 7 joints\n");
+}
+
+// Tables of the Panda that were read by another convention.
+TEST(Hypotheses, TablesThatAreMisread) {
+  const RobotDescription right = ReadDescription(testing::SourcePath("/controller/parameters/panda.toml"));
+  const RobotDescription mjcf = ReadDescription(testing::SourcePath("/mjcf/panda.xml"));
+  RobotDescription degrees = right;
+  for (Joint& joint : degrees.spec.joints) joint.mdh.alpha = RadToDeg(joint.mdh.alpha);
+  EXPECT_EQ(List(ExplainDifference(degrees, mjcf)),
+            "alpha and q of the rows look as if in degrees: 7 of 7 joints\n");
+  RobotDescription millimetres = right;
+  for (Joint& joint : millimetres.spec.joints) {
+    joint.mdh.a *= 1e3;
+    joint.mdh.d *= 1e3;
+  }
+  EXPECT_EQ(List(ExplainDifference(millimetres, mjcf)),
+            "a and d of the rows look as if in mm: 7 of 7 joints\n");
+  RobotDescription signs = right;
+  for (Joint& joint : signs.spec.joints) joint.mdh.alpha *= -1.0;
+  EXPECT_EQ(List(ExplainDifference(signs, mjcf)),
+            "alpha of all rows looks turned around (its sign): 7 of 7 joints\n");
+
+  // The same arm by classic rows (q, d, a, alpha of each joint, and bodies in their frames), read as
+  // modified.
+  RobotDescription classic = right;
+  classic.spec.frames.clear();
+  for (size_t i = 0; i < classic.spec.joints.size(); ++i) {
+    Joint& joint = classic.spec.joints[i];
+    const bool is_last = i + 1 == classic.spec.joints.size();
+    const MdhRow next = is_last ? MdhRow{} : right.spec.joints[i + 1].mdh;
+    joint.mdh.alpha = next.alpha;
+    joint.mdh.a = next.a;
+    const Pose X_iL =
+        Eigen::Translation3d(next.a, 0.0, 0.0) * Eigen::AngleAxisd(next.alpha, Vector3d::UnitX());
+    joint.body = ExpressIn(right.spec.joints[i].body, X_iL.inverse());
+  }
+  EXPECT_EQ(List(ExplainDifference(classic, mjcf)),
+            "the rows look like classic (standard) Denavit-Hartenberg parameters, and are read as modified "
+            "ones: 7 of "
+            "7 joints\n");
+}
+
+}  // namespace
+}  // namespace dexcheck
