@@ -265,7 +265,10 @@ void RigidPlant::Read(PlantResponse* response) {
     tip.cone_use = contact.touching ? tangential / (mu * f.z()) : 0.0;
     tip.cone_margin = mu * f.z() - tangential;
   }
-  response->wheels.clear();
+  // They roll.
+  BodyContact rolling;
+  rolling.touching = true;
+  response->wheels.assign(adapter_->wheels().size(), rolling);
   response->support_wrench.setZero();
   response->support_force = 0.0;
   response->solver_residual.setZero();

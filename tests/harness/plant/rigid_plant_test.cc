@@ -175,6 +175,9 @@ TEST_F(RigidPlantTest, AnswersWithTheForcesThatBalanceTheObject) {
   Vector3d force = -body.mass * reading.state.X_Bo.linear() * (response.V_Bo_dot.head<3>() + omega.cross(v));
   force += body.mass * setup_.model().gravity();
   ASSERT_GT(force.norm(), 0.1);
+  // Whoever looks at the wheels finds both, and no slip.
+  ASSERT_EQ(response.wheels.size(), setup_.adapter().wheels().size());
+  for (const BodyContact& wheel : response.wheels) EXPECT_EQ(wheel.slip.norm(), 0.0);
   for (const PlantContact& contact : response.contacts) {
     EXPECT_TRUE(contact.touching);
     EXPECT_GT(contact.force.dot(contact.normal), 0.0);
