@@ -67,7 +67,7 @@ void BodyComparison::Compare(const std::vector<Parameter>& parameters, const std
 
 MassProperties BodyComparison::ReadBody(int link) const {
   MassProperties body;
-  if (link >= 0) {
+  if (link >= 0 || adapter_.wheels().empty()) {
     const Snapshot& at = evidence_.snapshots().front();
     const LinkInWorld& there = at.links[static_cast<size_t>(link + 1)];
     ModelTerms terms(model_);
@@ -75,7 +75,7 @@ MassProperties BodyComparison::ReadBody(int link) const {
     const Pose X = terms.CalcLinkPose(link).inverse();
     return {there.mass, X * there.com, X.linear() * there.inertia * X.linear().transpose()};
   }
-  // The base, without its wheels, where the MJCF starts it: there Sigma_0 stands at X_B0.
+  // A base without its wheels, where the MJCF starts it: there Sigma_0 stands at X_B0.
   const MjDataPtr data = MakeData(engine_);
   mj_kinematics(&engine_, data.get());
   const Pose X = spec_.base.X_B0.inverse();

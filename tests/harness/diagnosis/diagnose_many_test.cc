@@ -227,12 +227,15 @@ Robot LoadAssistant() {
 }
 Robot MakeRandom(int index, std::mt19937* random) {
   testing::RandomRobotOptions options;
-  constexpr BaseType kBases[] = {BaseType::kFixed, BaseType::kPlanar, BaseType::kDifferentialDrive};
-  options.base = kBases[index % 3];
+  constexpr BaseType kBases[] = {BaseType::kFixed, BaseType::kPlanar, BaseType::kDifferentialDrive,
+                                 BaseType::kFloating};
+  options.base = kBases[index % 4];
   options.joints = 2 + index % 6;
   options.branching = 0.1 * (index % 10);
   RobotSpec spec = testing::MakeRandomRobot(options, random);
   MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "text");
+  // Where a floating base starts in the MJCF says nothing of the robot.
+  if (options.base == BaseType::kFloating) engine->qpos0[2] += 0.7;
   return {std::move(spec), std::move(engine)};
 }
 
