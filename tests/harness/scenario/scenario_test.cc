@@ -111,7 +111,7 @@ INSTANTIATE_TEST_SUITE_P(
                  {"sensing.object_rate=1500"},
                  "sensing.object_rate: must be at most one pose a time step, got 1500"},
         BadInput{
-            "filter_without_size", {"sensing.velocity=kalman"}, "sensing.kalman_acceleration: is missing"},
+            "filter_without_size", {"sensing.velocity=kalman"}, "sensing: missing key \"kalman_acceleration\""},
         BadInput{"unknown_source",
                  {"sensing.velocity=guessed"},
                  "sensing.velocity: must be one of \"measured\", \"differenced\", \"kalman\""},
@@ -121,7 +121,7 @@ INSTANTIATE_TEST_SUITE_P(
                  "\"r_forarm\""},
         BadInput{"pulse_without_end",
                  {"disturbance=[{ type = 'pulse', body = 'object' }]"},
-                 "disturbance[0].duration: is missing"},
+                 "disturbance[0]: missing key \"duration\""},
         BadInput{"period_too_short",
                  {"disturbance=[{ type = 'pulse', body = 'object', duration = 1, period = 0.5 }]"},
                  "disturbance[0].period: must not be shorter than the duration, got 0.5"},
