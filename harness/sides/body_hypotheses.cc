@@ -284,8 +284,13 @@ class BodySearch {
 
   std::vector<Hypothesis> Run() {
     FindShiftedLists();
+    // One mistake of many links is likelier than many exchanges: left and right are mirrored, and a wrong
+    // sign makes one of the other.
+    constexpr size_t kMany = 3;
+    const std::vector<BodyMistake> mistakes = ListMistakes();
+    FindMistakes(mistakes, kMany);
     FindExchanges();
-    FindMistakes(ListMistakes());
+    FindMistakes(mistakes, 1);
     FindLostParts();
     return std::move(found_);
   }
@@ -326,7 +331,8 @@ class BodySearch {
   }
 
   /// The mistake that explains most links comes first; of two that explain the same ones, the first.
-  void FindMistakes(const std::vector<BodyMistake>& mistakes) {
+  /// @param fewest links that a mistake must explain.
+  void FindMistakes(const std::vector<BodyMistake>& mistakes, size_t fewest) {
     while (true) {
       const std::vector<size_t> open = ListOpen();
       std::vector<size_t> best;
@@ -341,7 +347,7 @@ class BodySearch {
         best = links;
         cause = &mistake;
       }
-      if (cause == nullptr) return;
+      if (cause == nullptr || best.size() < fewest) return;
       if (best.size() == 1) {
         Add("link " + bodies_[best[0]].link + ": its " + cause->noun + " looks " + cause->text, best);
       } else {
