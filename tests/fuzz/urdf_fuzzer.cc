@@ -11,9 +11,9 @@ namespace {
 void UseDescription(const RobotDescription& robot) {
   Expect(!robot.spec.joints.empty(), "a robot without joints");
   Expect(robot.joints.size() == robot.spec.joints.size(), "joints");
-  for (const DescribedJoint& joint : robot.joints) {
+  for (const Joint& joint : robot.spec.joints) {
     if (joint.coupling) {
-      Expect(joint.coupling->leader >= 0 && joint.coupling->leader < static_cast<int>(robot.joints.size()),
+      Expect(joint.coupling->leader >= 0 && joint.coupling->leader < static_cast<int>(robot.spec.joints.size()),
              "a coupling without a leader");
     }
   }
