@@ -35,7 +35,9 @@ class MessageCollector : public console_bridge::OutputHandler {
   /// What was found first and where: urdfdom reports from the inside out.
   [[nodiscard]] std::string Describe() const {
     if (errors_.empty()) return "cannot be parsed";
-    return errors_.size() == 1 ? errors_[0] : errors_[0] + " (" + errors_[1] + ")";
+    // urdfdom quotes the file, which may have any characters.
+    const std::string first = Abbreviate(errors_[0]);
+    return errors_.size() == 1 ? first : first + " (" + Abbreviate(errors_[1]) + ")";
   }
 
  private:
