@@ -20,9 +20,13 @@ const KnownStep& KnownPlant::Follow(const StepRecord& step) {
   drive_.Drive(step.command.tau, truth.xi, &known_.tau);
   model_.SetState(truth);
   known_.force.setZero();
+  known_.push.setZero();
   known_.object_wrench.setZero();
   if (!disturbances_.empty()) {
     const std::span<const Wrench> wrenches = disturbances_.Evaluate(step.time, truth);
+    for (const Wrench& w : wrenches) {
+      if (w.body != Wrench::kObject) known_.push += w.force;
+    }
     AddRobotForce(wrenches, model_.robot(), known_.force);
     known_.object_wrench = CalcObjectWrench(wrenches, truth.X_Bo);
   }

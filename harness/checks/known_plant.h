@@ -21,6 +21,7 @@ struct KnownStep {
   VectorXd tau;                               ///< What its motors make of the command, tau' (n), N m.
   const GraspModel* model = nullptr;          ///< Terms of the plant's own masses, at the truth.
   VectorXd force;                             ///< Its pushes on the robot, as forces on xi (n).
+  Vector3d push = Vector3d::Zero();           ///< Sum of those forces, world, N.
   Vector6d object_wrench = Vector6d::Zero();  ///< And on the object, Sigma_o.
 };
 

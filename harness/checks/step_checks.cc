@@ -62,7 +62,6 @@ StepChecks::StepChecks(const Setup& setup)
   force_.setZero(n);
   bias_.setZero(n);
   residual_.setZero(n);
-  push_before_.setZero(n);
   column_.setZero(n, 1);
   left_of_robot_.setZero(n);
   idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
@@ -287,17 +286,20 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
 
   if (step.known != nullptr && f_c_before_.size() == findings_.f_c_model.size()) {
     // A push changes contact forces without any torque, and wheels give to it as well.
-    bias_.noalias() = ModelAtTruth(step).grasp().J_B().transpose() * (findings_.f_c_model - f_c_before_);
+    const MatrixXd& J_B = ModelAtTruth(step).grasp().J_B();
+    bias_.noalias() = J_B.transpose() * findings_.f_c_model;
+    bias_.noalias() -= J_B.transpose() * f_c_before_;
     AddGive(norm(bias_) / scale, &push_give_);
-    bias_ = step.known->force - push_before_;
-    AddGive(norm(bias_) / scale, &edge_give_);
-    push_before_ = step.known->force;
+    // What pushes sideways is held by tyres, and no part of a force on xi: |f|_M^-1 of a force on all masses.
+    AddGive((step.known->push - push_before_).norm() / std::sqrt(mass_) / scale, &edge_give_);
+    push_before_ = step.known->push;
   }
 
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
   mass_factor_->Multiply(residual_);
-  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale, robot_give_ + push_give_);
+  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale,
+              robot_give_ + push_give_ + edge_give_);
   double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) force_scale = std::max(force_scale, Weight());

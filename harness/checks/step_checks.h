@@ -123,9 +123,9 @@ class StepChecks {
       0.0;  // what contacts give for changes of E_bar' tau', relative as reduced_acceleration
   // Likewise for changes of J_B'^T f_c, and of pushes on the robot; zero where the plant is ideal.
   double push_give_ = 0.0, edge_give_ = 0.0;
-  VectorXd push_before_;     // n
-  double force_give_ = 0.0;  // likewise of f_c, relative as contact_force
-  RowMatrixXd column_;       // n x 1
+  Vector3d push_before_ = Vector3d::Zero();  // N
+  double force_give_ = 0.0;                  // likewise of f_c, relative as contact_force
+  RowMatrixXd column_;                       // n x 1
   ForceEvidence forces_;
   WheelEvidence wheels_;
   VectorXd left_of_robot_;  // n, of the step's balance
