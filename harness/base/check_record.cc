@@ -9,6 +9,8 @@ std::string DescribeVelocity(int coordinate, const RobotModel& model, int base_v
   static constexpr const char* kUnreduced[] = {"x_dot", "y_dot", "phi_dot"};
   static constexpr const char* kTwist[] = {"v_c", "w_c"};
   static constexpr const char* kWheelRates[] = {"thetadot_r", "thetadot_l"};
+  static constexpr const char* kFloating[] = {"v_x", "v_y", "v_z", "w_x", "w_y", "w_z"};
+  if (base_velocities == 6) return kFloating[coordinate];
   if (base_velocities == 3) return kUnreduced[coordinate];
   return model.base().velocity == DriveVelocity::kTwist ? kTwist[coordinate] : kWheelRates[coordinate];
 }

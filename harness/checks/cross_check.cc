@@ -56,6 +56,8 @@ void CrossCheck::Reset() {
   motion_.Reset();
 }
 
+void CrossCheck::Forget() { motion_.Reset(); }
+
 void CrossCheck::CompareModel(const StepRecord& step) {
   const MeasuredState& state = step.reading.state;
   if (step.command.handling.partial) {

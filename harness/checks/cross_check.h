@@ -48,6 +48,8 @@ class CrossCheck {
   void JudgeEffort(double effort, double time) { motion_.JudgeEffort(effort, time); }
   /// Forgets motion and forces of all steps so far, but for the checks that failed: time begins anew.
   void Reset();
+  /// The same for the checks that failed, too.
+  void Forget();
   /// Checks of motion and forces that failed before the last Reset, while everything settled, in that order.
   [[nodiscard]] std::span<const CheckRecord> settling_failures() const { return settling_failures_; }
 

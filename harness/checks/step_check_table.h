@@ -96,12 +96,13 @@ inline constexpr double kGraspForceBound = 1e-4;
 // A torque goes through the gear's ratio once and back: two roundings.
 inline constexpr double kTorqueAppliedBound = 1e-14;
 // A wheel that rolls and does not slip has the speed of the platform above it, but for how fast the platform
-// tilts or sinks on soft tyres: its tilt of at most 1e-5 rad within some ms, at an arm of r.
+// tilts or sinks on soft tyres: its tilt of at most 1e-5 rad within some ms, at an arm of r. Softer tyres
+// sink farther: the bound is a multiple of this as their sinking is of the shipped plant's.
 inline constexpr double kRollingBound = 1e-5;
-// What is left of (48) is compared less the inertia of what the platform does on soft tyres besides rolling, less what the
-// solver left over, and less what tilt and slip can come to (StepChecks::CalcUnevenForce). Then all of it is rounding of the
-// engine's terms, 1e-14 of forces that cancel, and products of small departures: 1e-5 rad of tilt times 1e-2 of the
-// forces that change with it.
+// What is left of (48) is compared less the inertia of what the platform does on soft tyres besides rolling,
+// less what the solver left over, and less what tilt and slip can come to (StepChecks::CalcUnevenForce). Then
+// all of it is rounding of the engine's terms, 1e-14 of forces that cancel, and products of small departures:
+// 1e-5 rad of tilt times 1e-2 of the forces that change with it.
 inline constexpr double kBalanceRobotBound = 1e-6;
 // What law_demand leaves, over K_p: measured 1.2e-9 m in `curve`.
 inline constexpr double kErrorDynamicsBound = 1e-8;
@@ -115,9 +116,10 @@ enum class Rank {
   kActuator,       ///< Torques that did not arrive.
   kObjectBalance,  ///< A force on the object that neither side has.
   /// A limit, a stop, a contact that slides: from then on everything else is void. So it is from a force on
-  /// the robot on that neither side has, and with wheels that do not roll as they should; what came first tells.
+  /// the robot on that neither side has, and with wheels that do not roll as they should; what came first
+  /// tells.
   kDecisive,
-  kAssumption,     ///< Contacts that give, a platform that tilts, a solver that stopped early.
+  kAssumption,  ///< Contacts that give, a platform that tilts, a solver that stopped early.
   /// By algebra the prediction differs from the engine's motion by what the balances leave and by how the
   /// contacts give, J_B' xi_dot + J_B_dot' xi - d/dt(G^T V_o): where the balances hold, contacts gave.
   kPrediction,
@@ -361,7 +363,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .unit = "rad",
      .bound = 1e-5,
      .description = "movement since t = 0 of joints that do not carry the object"},
-    // As small as the discrepancies that the prediction is judged by. Forces that do not fit the motion explain whatever
+    // As small as the discrepancies that the prediction is judged by. Forces that do not fit the motion
+    // explain whatever
     // else is wrong from then on.
     {.check = StepCheck::kSolver,
      .name = "solver",

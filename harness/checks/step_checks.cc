@@ -36,6 +36,17 @@ const Vector6d* PushOf(const StepRecord& step) {
   return step.known != nullptr ? &step.known->object_wrench : nullptr;
 }
 
+/// How far tyres sink, as a multiple of what they do with the shipped plant's stiffness; at least 1. A
+/// contact of time constant tc and impedance d under a load f of mass m gives way by tc^2 (1 - d) / d f / m.
+double CalcSinking(const PlantOptions& plant) {
+  const PlantOptions shipped;
+  const auto sink = [](const PlantOptions& of) {
+    const double tc = of.contact_time_constant > 0.0 ? of.contact_time_constant : 2.0 * of.time_step;
+    return tc * tc * (1.0 - of.contact_impedance) / of.contact_impedance;
+  };
+  return std::max(1.0, sink(plant) / sink(shipped));
+}
+
 }  // namespace
 
 StepChecks::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)
@@ -84,6 +95,7 @@ void StepChecks::DefineChecks() {
   }
   check(StepCheck::kFingertipSlipRate).bound *= time_step_;
   check(StepCheck::kWheelSlipRate).bound *= time_step_;
+  check(StepCheck::kRolling).bound *= CalcSinking(setup_->scenario().plant);
   SetApplying();
   const Expectation& expect = setup_->scenario().expect;
   check(StepCheck::kExpectPosition).bound = expect.position.value_or(0.0);

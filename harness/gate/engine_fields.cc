@@ -91,7 +91,7 @@ constexpr EngineField kFields[] = {
     {"jnt_dofadr", FieldClass::kDerived, "order of the tree, which names match (adapter)"},
     {"jnt_bodyid", FieldClass::kDerived, "order of the tree, which names match (adapter)"},
     {"jnt_group", FieldClass::kNoEffect, "looks"},
-    {"jnt_limited", FieldClass::kReported, "joint_stop"},
+    {"jnt_limited", FieldClass::kReported, "joint_limited"},
     {"jnt_solref", FieldClass::kNoEffect, "acts beyond the joints' ranges alone, where no run may go"},
     {"jnt_solimp", FieldClass::kNoEffect, "acts beyond the joints' ranges alone, where no run may go"},
     {"jnt_pos", FieldClass::kCompared, "joint_axis"},

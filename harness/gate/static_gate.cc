@@ -297,7 +297,7 @@ class StaticGate {
         });
       }
       if (i < limitless || i >= robots)
-        Compare("joint_stop", where, 0.0, engine_.jnt_limited[joint] != 0 ? 1.0 : 0.0);
+        Compare("joint_limited", where, 0.0, engine_.jnt_limited[joint] != 0 ? 1.0 : 0.0);
     }
     for (const auto& [joint, where] : joints)
       Compare("joint_spring", where, 0.0, engine_.jnt_stiffness[joint]);
