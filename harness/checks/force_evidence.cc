@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "controller/common/text.h"
 
@@ -32,7 +33,8 @@ bool IsLookedAt(long step) { return step < kFirstSteps || (step & (step - 1)) ==
 
 }  // namespace
 
-ForceEvidence::ForceEvidence(const RobotModel& model) : model_(&model), kinematics_(model), actuation_(model) {
+ForceEvidence::ForceEvidence(const RobotModel& model)
+    : model_(&model), kinematics_(model), actuation_(model) {
   const Base& base = model.base();
   const int base_velocities = model.num_base_velocities();
   for (int i = 0; i < base_velocities; ++i) {
@@ -128,15 +130,18 @@ ForceFinding ForceEvidence::Find() const {
     finding.joint = joint.name;
     finding.joint_share = joint.square / robot_squares_;
     finding.torque = joint.largest;
-    // Of links that explain it equally well, the one where the least force does: bodies near the base, which a chain of
-    // joints carries along, move in few directions, and a huge force there may look the same.
+    // Of links that explain it equally well, the one where the least force does: bodies near the base, which
+    // a chain of joints carries along, move in few directions, and a huge force there may look the same. Of
+    // forces that are as good as equal, the one nearest the base.
     const double best = std::max_element(links_.begin(), links_.end(), larger)->square;
-    const Candidate* least = nullptr;
+    const auto explains = [&](const Candidate& one) { return one.square >= (1.0 - kSimpler) * best; };
+    double least = std::numeric_limits<double>::infinity();
     for (const Candidate& one : links_) {
-      if (one.square < (1.0 - kSimpler) * best) continue;
-      if (least == nullptr || one.largest < least->largest) least = &one;
+      if (explains(one)) least = std::min(least, one.largest);
     }
-    const Candidate& link = *least;
+    const Candidate& link = *std::find_if(links_.begin(), links_.end(), [&](const Candidate& one) {
+      return explains(one) && one.largest <= (1.0 + kSimpler) * least;
+    });
     finding.link = link.name;
     finding.link_share = link.square / robot_squares_;
     finding.link_force = link.largest;
@@ -162,9 +167,9 @@ std::string ForceEvidence::Tell() const {
   if (IsSlope(finding, gravity)) {
     const Vector3d actual = gravity + finding.gravity;
     const double slope = std::atan2(actual.cross(gravity).norm(), actual.dot(gravity));
-    return "gravity is not upright but " + Short(RadToDeg(slope)) + " deg off, by (" + Short(finding.gravity.x()) +
-           ", " + Short(finding.gravity.y()) + ", " + Short(finding.gravity.z()) + ") m/s^2; explains " +
-           Percent(finding.gravity_share);
+    return "gravity is not upright but " + Short(RadToDeg(slope)) + " deg off, by (" +
+           Short(finding.gravity.x()) + ", " + Short(finding.gravity.y()) + ", " +
+           Short(finding.gravity.z()) + ") m/s^2; explains " + Percent(finding.gravity_share);
   }
   if (finding.gravity_share >= kExplains) {
     return "gravity differs by (" + Short(finding.gravity.x()) + ", " + Short(finding.gravity.y()) + ", " +
@@ -177,11 +182,12 @@ std::string ForceEvidence::Tell() const {
   }
   const bool joint = finding.joint_share >= kExplains || finding.joint_share + kSimpler >= finding.link_share;
   if (joint) {
-    return std::string(finding.joint_share >= kExplains ? "at" : "nearest:") + " joint " + finding.joint + ", up to " +
-           Short(std::abs(finding.torque)) + " N m; explains " + Percent(finding.joint_share);
+    return std::string(finding.joint_share >= kExplains ? "at" : "nearest:") + " joint " + finding.joint +
+           ", up to " + Short(std::abs(finding.torque)) + " N m; explains " + Percent(finding.joint_share);
   }
-  return std::string(finding.link_share >= kExplains ? "on" : "nearest:") + " body " + finding.link + ", up to " +
-         Short(finding.link_force) + " N at its centre of mass; explains " + Percent(finding.link_share);
+  return std::string(finding.link_share >= kExplains ? "on" : "nearest:") + " body " + finding.link +
+         ", up to " + Short(finding.link_force) + " N at its centre of mass; explains " +
+         Percent(finding.link_share);
 }
 
 }  // namespace dexcheck
