@@ -36,6 +36,14 @@ std::string FormatNumber(double value) {
   return {buffer.data(), result.ptr};
 }
 
+std::string FormatNumber(double value, int digits) {
+  if (std::isnan(value)) return "nan";
+  std::array<char, 32> buffer{};
+  const std::to_chars_result result =
+      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::general, digits);
+  return {buffer.data(), result.ptr};
+}
+
 std::string Abbreviate(std::string_view text) {
   size_t end = std::min(text.size(), kMaxShown);
   const auto continues = [&](size_t i) { return (static_cast<unsigned char>(text[i]) & 0xc0U) == 0x80U; };

@@ -10,6 +10,8 @@ namespace dexcheck {
 
 /// Shortest decimal text that reads back as the same number.
 std::string FormatNumber(double value);
+/// The same with at most this many significant digits.
+std::string FormatNumber(double value, int digits);
 
 /// "[a, b, c]" of any range of numbers.
 template <typename Range>

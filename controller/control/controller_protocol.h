@@ -3,8 +3,9 @@
 
 /* How dexcheck talks to a controller that is a program of its own (C, or any language that reads bytes).
  *
- * dexcheck writes to the program's standard input and reads from its standard output; standard error is the user's.
- * Numbers are of the machine: IEEE doubles and 32-bit integers in its byte order. Both sides take turns:
+ * dexcheck writes to the program's standard input and reads from its standard output; standard error is the
+ * user's. Numbers are of the machine: IEEE doubles and 32-bit integers in its byte order. Both sides take
+ * turns:
  *
  *   dexcheck  hello, the parameter file's text, the scenario's text
  *   program   answer to it: what it wants and tells
@@ -13,18 +14,15 @@
  *   dexcheck  message BEGIN              once, between the steps at rest and the run; no answer
  *   dexcheck  message END                once; the program ends (also when its standard input does)
  *
- * Doubles of STEP from dexcheck; p positions, n velocities, N contacts, k = 3 N; matrices row by row, SI units:
+ * Doubles of STEP from dexcheck; p positions, n velocities, N contacts, k = 3 N; matrices row by row, SI
+ * units:
  *
  *   t                          1     s, since the run, or the rest before it, began
- *   X_d, X_d_dot, X_d_ddot     18    desired motion, ZYZ angles; X_d_dot at the time that velocities belong to
- *   q', xi                     p, n
- *   R_Bo, p_Bo                 9, 3  pose of the object
- *   V_Bo                       6     its body velocity
- *   X_o                        6     its coordinates, on one branch of the angles; zero with control.orientation "rotation"
- *   kappa                      5 N   u_f v_f u_o v_o psi of each contact
- *   overlap                    N     m
- *   touching                   N     1 or 0 for each fingertip
- *   support force              1     N
+ *   X_d, X_d_dot, X_d_ddot     18    desired motion, ZYZ angles; X_d_dot at the time that velocities belong
+ * to q', xi                     p, n R_Bo, p_Bo                 9, 3  pose of the object V_Bo 6     its body
+ * velocity X_o                        6     its coordinates, on one branch of the angles; zero with
+ * control.orientation "rotation" kappa                      5 N   u_f v_f u_o v_o psi of each contact overlap
+ * N     m touching                   N     1 or 0 for each fingertip support force              1     N
  *
  * and, when the program wants DEXCHECK_TERMS, the model's terms at that state (controller/NOTATION.md):
  *
@@ -36,8 +34,8 @@
  *   sigma'                     n      of the posture task
  *   E_bar'^-1                  4      its block of the wheels; a unit matrix without
  *
- * Doubles of STEP from the program: tau' (n), N m: right wheel, left wheel, then joints; after DEXCHECK_TELLS_F_N also the
- * internal force F_N (k), which a check of the law needs.
+ * Doubles of STEP from the program: tau' (n), N m: right wheel, left wheel, then joints; after
+ * DEXCHECK_TELLS_F_N also the internal force F_N (k), which a check of the law needs.
  */
 
 #include <stdint.h>

@@ -11,7 +11,7 @@ namespace dexcheck {
 
 /// Which velocities the terms refer to.
 enum class Coordinates {
-  kReduced,    ///< xi = [v; joint rates], equation (18): M_bar', C_bar', F_bar'.
+  kReduced,  ///< xi = [v; joint rates], equation (18): M_bar', C_bar', F_bar'.
   /// q_dot' = [q_v_dot; joint rates], equation (16): M, C, F. Of a floating base v stands for q_v_dot.
   kUnreduced,
 };

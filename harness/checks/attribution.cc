@@ -1,7 +1,6 @@
 #include "harness/checks/attribution.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <string_view>
 
 #include "controller/common/text.h"
@@ -21,16 +20,11 @@ FailureMeaning MeaningOf(const CheckRecord& check) {
   return info == nullptr ? FailureMeaning{} : info->meaning;
 }
 
-std::string FormatShort(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.3g", value);
-  return text;
-}
-
 std::string Tell(const CheckRecord& check) {
-  return check.name + " " + FormatShort(check.worst) + (check.unit == "1" ? "" : " " + check.unit) +
-         " (bound " + FormatShort(check.bound) + "), first above it at t = " + FormatShort(check.failed_at) +
-         " s" + (check.part.empty() ? "" : ", " + check.part);
+  return check.name + " " + FormatNumber(check.worst, 3) + (check.unit == "1" ? "" : " " + check.unit) +
+         " (bound " + FormatNumber(check.bound, 3) +
+         "), first above it at t = " + FormatNumber(check.failed_at, 3) + " s" +
+         (check.part.empty() ? "" : ", " + check.part);
 }
 
 /// Whether `check` tells more of the cause than `other`: by rank, then by time, then by precedence.
@@ -49,8 +43,8 @@ const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
     if (!check.failed || MeaningOf(check).cause == Cause::kNone) continue;
     if (first == nullptr || TellsMore(check, *first)) first = &check;
   }
-  // What slides in the step in which a force shows tells more than the force. Wheels of another size give other forces
-  // besides, which show before they have rolled far; wheels that slide do too.
+  // What slides in the step in which a force shows tells more than the force. Wheels of another size give
+  // other forces besides, which show before they have rolled far; wheels that slide do too.
   const auto name = [](StepCheck which) { return kStepChecks[static_cast<size_t>(which)].name; };
   if (first == nullptr || first->name != name(StepCheck::kBalanceRobot)) return first;
   for (const StepCheck slides : {StepCheck::kConeUse, StepCheck::kTractionUse, StepCheck::kContactsLost}) {

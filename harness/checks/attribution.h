@@ -20,11 +20,11 @@ struct Attribution {
 
 /// What was measured of the causes that it can be measured of, in words: which part, and how much.
 struct MeasuredCauses {
-  std::string law;      ///< Which summand of (55), and its factor.
-  std::string motors;   ///< Which motor, and its gain, delay, offset or friction.
-  std::string sensors;  ///< Which reading, and how much.
-  std::string force;    ///< On which joint or body, and how large.
-  std::string wheels;   ///< Which radius or distance.
+  std::string law;        ///< Which summand of (55), and its factor.
+  std::string motors;     ///< Which motor, and its gain, delay, offset or friction.
+  std::string sensors;    ///< Which reading, and how much.
+  std::string force;      ///< On which joint or body, and how large.
+  std::string wheels;     ///< Which radius or distance.
   bool is_slope = false;  ///< The force is gravity's, which does not point down.
 };
 

@@ -21,11 +21,7 @@ constexpr double kSingular = 1e-3;
 // Gravity whose size differs by less than this share of its change only points elsewhere.
 constexpr double kTilted = 0.2;
 
-std::string Short(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.3g", value);
-  return text;
-}
+std::string Short(double value) { return FormatNumber(value, 3); }
 
 std::string Percent(double share) { return std::to_string(std::lround(100.0 * share)) + " %"; }
 

@@ -100,11 +100,11 @@ class LawCheck {
   const TreeFactor* mass_factor_ = nullptr;
   TreeFactor own_factor_;  // of a step without prediction
   double scale_ = 1.0;
-  VectorXd force_, difference_;        // n
-  VectorXd slope_;                     // k
-  RowMatrixXd column_;                 // n x 1
-  bool follows_ = false;               // whether the one below is set
-  LawObject followed_;               // of (57); velocities half a step before
+  VectorXd force_, difference_;  // n
+  VectorXd slope_;               // k
+  RowMatrixXd column_;           // n x 1
+  bool follows_ = false;         // whether the one below is set
+  LawObject followed_;           // of (57); velocities half a step before
 };
 
 }  // namespace dexcheck

@@ -178,7 +178,8 @@ void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawObject& 
   V_Bo_dot_ = feed_forward + velocity + position + rate;
 }
 
-Vector6d LawReference::CalcDemand(const LawSpec& spec, const LawObject& object, const DesiredMotion& desired) {
+Vector6d LawReference::CalcDemand(const LawSpec& spec, const LawObject& object,
+                                  const DesiredMotion& desired) {
   CalcObjectAcceleration(spec, object, desired);
   return V_Bo_dot_;
 }

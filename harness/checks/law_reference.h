@@ -90,9 +90,9 @@ enum class LawPart {
   kInertiaOfVelocity,     ///< of the second,
   kInertiaOfPosition,     ///< of the third,
   kInertiaOfRate,         ///< and of the fourth.
-  kObjectCoriolis,    ///< J^T G^+ C_hat V_o
-  kObjectGravity,     ///< J^T G^+ N_o
-  kInternalForce,     ///< J^T F_N
+  kObjectCoriolis,        ///< J^T G^+ C_hat V_o
+  kObjectGravity,         ///< J^T G^+ N_o
+  kInternalForce,         ///< J^T F_N
   kCount
 };
 inline constexpr int kLawPartCount = static_cast<int>(LawPart::kCount);

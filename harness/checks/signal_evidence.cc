@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 
+#include "controller/common/text.h"
 #include "controller/object/so3.h"
 
 namespace dexcheck {
@@ -17,11 +17,7 @@ constexpr double kRounding = 1e-15;
 // Of entries that differ, this share is "all" of them.
 constexpr double kMost = 0.5;
 
-std::string Short(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.4g", value);
-  return text;
-}
+std::string Short(double value) { return FormatNumber(value, 4); }
 
 /// In words, of a signal in `unit`. Empty when no single number explains it.
 std::string Describe(const SignalFinding& finding, const std::string& unit, double time_step) {
@@ -30,7 +26,8 @@ std::string Describe(const SignalFinding& finding, const std::string& unit, doub
     case Kind::kGain:
       return Short(finding.value) + " times";
     case Kind::kOffset:
-      return Short(std::abs(finding.value)) + " " + unit + (finding.value > 0.0 ? " more than" : " less than");
+      return Short(std::abs(finding.value)) + " " + unit +
+             (finding.value > 0.0 ? " more than" : " less than");
     case Kind::kDelay:
       return Short(finding.value) + (finding.value == 1.0 ? " step (" : " steps (") +
              Short(1e3 * finding.value * time_step) + " ms) after";
@@ -50,8 +47,8 @@ std::string Describe(const SignalFinding& finding, const std::string& unit, doub
 }  // namespace
 
 SignalEvidence::SignalEvidence(Eigen::Index size) {
-  for (VectorXd* vector : {&difference_, &squares_, &largest_, &by_meant_, &meant_squares_, &by_sign_, &by_rate_,
-                           &rate_squares_, &lag_by_, &lag_squares_, &lag_change_, &before_}) {
+  for (VectorXd* vector : {&difference_, &squares_, &largest_, &by_meant_, &meant_squares_, &by_sign_,
+                           &by_rate_, &rate_squares_, &lag_by_, &lag_squares_, &lag_change_, &before_}) {
     vector->setZero(size);
   }
   history_.setZero(size, kMostDelay + 1);
@@ -114,7 +111,8 @@ SignalFinding SignalEvidence::Fit(Eigen::Index begin, Eigen::Index count) const 
     if (square > 0.0) offer(kind, base + sign * product / square, product * product / square / all);
   };
   const double steps = static_cast<double>(steps_ * count);
-  slope(Kind::kGain, by_meant_.segment(begin, count).sum(), meant_squares_.segment(begin, count).sum(), 1.0, 1.0);
+  slope(Kind::kGain, by_meant_.segment(begin, count).sum(), meant_squares_.segment(begin, count).sum(), 1.0,
+        1.0);
   slope(Kind::kOffset, difference_.segment(begin, count).sum(), steps, 0.0, 1.0);
   // Friction gives less, never more.
   const double by_sign = std::min(0.0, by_sign_.segment(begin, count).sum());
@@ -124,7 +122,8 @@ SignalFinding SignalEvidence::Fit(Eigen::Index begin, Eigen::Index count) const 
   for (long k = 1; k <= kMostDelay; ++k) {
     const double square = delay_squares_.row(k).segment(begin, count).sum();
     if (square > 0.0) {
-      offer(Kind::kDelay, static_cast<double>(k), 1.0 - delay_left_.row(k).segment(begin, count).sum() / square);
+      offer(Kind::kDelay, static_cast<double>(k),
+            1.0 - delay_left_.row(k).segment(begin, count).sum() / square);
     }
   }
   const double by = lag_by_.segment(begin, count).sum();
@@ -171,13 +170,15 @@ std::string MotorEvidence::Tell() const {
             (how.empty() ? " is up to " + Short(evidence_.largest(different[i])) + " N m off what was sent"
                          : " gives " + how + " what was sent");
   }
-  if (different.size() > kMostNamed) text += " and " + std::to_string(different.size() - kMostNamed) + " more";
+  if (different.size() > kMostNamed)
+    text += " and " + std::to_string(different.size() - kMostNamed) + " more";
   return text;
 }
 
 SensorEvidence::SensorEvidence(const RobotModel& model, const std::vector<int>& fingertips, double time_step)
     : time_step_(time_step),
-      evidence_(model.num_positions() + model.num_velocities() + 12 + 2 * static_cast<Eigen::Index>(fingertips.size())) {
+      evidence_(model.num_positions() + model.num_velocities() + 12 +
+                2 * static_cast<Eigen::Index>(fingertips.size())) {
   const auto add = [&](const std::string& name, const char* unit) {
     names_.push_back(name);
     units_.push_back(unit);
@@ -189,13 +190,15 @@ SensorEvidence::SensorEvidence(const RobotModel& model, const std::vector<int>& 
   }
   for (const Joint& joint : model.joints())
     add("position of joint " + joint.name, joint.type == JointType::kRevolute ? "rad" : "m");
-  for (int i = 0; i < model.num_base_velocities(); ++i) add("velocity " + std::to_string(i) + " of the base", "1/s");
+  for (int i = 0; i < model.num_base_velocities(); ++i)
+    add("velocity " + std::to_string(i) + " of the base", "1/s");
   for (const Joint& joint : model.joints())
     add("rate of joint " + joint.name, joint.type == JointType::kRevolute ? "rad/s" : "m/s");
   for (const char* axis : {"x", "y", "z"}) add(std::string("place of the object, ") + axis, "m");
   for (const char* axis : {"x", "y", "z"}) add(std::string("orientation of the object, ") + axis, "rad");
   for (const char* axis : {"x", "y", "z"}) add(std::string("velocity of the object, ") + axis, "m/s");
-  for (const char* axis : {"x", "y", "z"}) add(std::string("angular velocity of the object, ") + axis, "rad/s");
+  for (const char* axis : {"x", "y", "z"})
+    add(std::string("angular velocity of the object, ") + axis, "rad/s");
   for (const int tip : fingertips) {
     const std::string& name = model.frames()[static_cast<size_t>(tip)].name;
     add("contact of " + name + " on the object, u", "rad");
@@ -212,7 +215,8 @@ void SensorEvidence::Pack(const MeasuredState& state, const MeasuredState& truth
       VectorXd::Zero(entries->size() - p - n - 12);
   // Of the orientation, the rotation from the truth: log(R_truth^T R_told).
   const Matrix3d R = truth.X_Bo.linear().transpose() * state.X_Bo.linear();
-  entries->segment<3>(p + n + 3) << 0.5 * (R(2, 1) - R(1, 2)), 0.5 * (R(0, 2) - R(2, 0)), 0.5 * (R(1, 0) - R(0, 1));
+  entries->segment<3>(p + n + 3) << 0.5 * (R(2, 1) - R(1, 2)), 0.5 * (R(0, 2) - R(2, 0)),
+      0.5 * (R(1, 0) - R(0, 1));
   for (size_t i = 0; i < state.kappa.size(); ++i) {
     const auto row = p + n + 12 + 2 * static_cast<Eigen::Index>(i);
     (*entries)[row] = state.kappa[i].alpha_o.u;
@@ -239,10 +243,12 @@ std::string SensorEvidence::Tell() const {
     const auto entry = static_cast<size_t>(different[i]);
     const std::string how = Describe(evidence_.Find(different[i]), units_[entry], time_step_);
     text += (i == 0 ? "" : ", ") + names_[entry] + " is told " +
-            (how.empty() ? "up to " + Short(evidence_.largest(different[i])) + " " + units_[entry] + " off what it is"
-                         : how + " what it is");
+            (how.empty()
+                 ? "up to " + Short(evidence_.largest(different[i])) + " " + units_[entry] + " off what it is"
+                 : how + " what it is");
   }
-  if (different.size() > kMostNamed) text += " and " + std::to_string(different.size() - kMostNamed) + " more";
+  if (different.size() > kMostNamed)
+    text += " and " + std::to_string(different.size() - kMostNamed) + " more";
   return text;
 }
 

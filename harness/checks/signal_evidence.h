@@ -15,8 +15,8 @@ namespace dexcheck {
 struct SignalFinding {
   enum class Kind { kNone, kGain, kOffset, kDelay, kLag, kDryFriction, kDamping };
   Kind kind = Kind::kNone;  ///< kNone: several numbers, or none of these.
-  /// kGain: the factor; kOffset: in the signal's unit; kDelay: steps; kLag: share of the difference that is made up a
-  /// step; kDryFriction, kDamping: N m, N m s/rad.
+  /// kGain: the factor; kOffset: in the signal's unit; kDelay: steps; kLag: share of the difference that is
+  /// made up a step; kDryFriction, kDamping: N m, N m s/rad.
   double value = 0.0;
   double explained = 0.0;  ///< Share of the difference's square.
 };

@@ -2,7 +2,6 @@
 
 #include "controller/object/euler_zyz.h"
 #include "controller/object/so3.h"
-
 #include "harness/checks/known_plant.h"
 
 namespace dexcheck {

@@ -1,7 +1,6 @@
 #include "harness/checks/wheel_evidence.h"
 
-#include <cstdio>
-
+#include "controller/common/text.h"
 #include "controller/model/platform.h"
 
 namespace dexcheck {
@@ -12,11 +11,7 @@ constexpr double kExplains = 0.95;
 constexpr double kOwn = 0.05;
 constexpr std::array<double, 2> kSide = {1.0, -1.0};  // right, left
 
-std::string Metres(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.6g m", value);
-  return text;
-}
+std::string Metres(double value) { return FormatNumber(value, 6) + " m"; }
 
 }  // namespace
 

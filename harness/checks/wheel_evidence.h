@@ -10,9 +10,9 @@
 
 namespace dexcheck {
 
-/// What the wheels' rates say of the platform's geometry. A wheel that rolls has r thetadot = v +- w b / 2, the
-/// right one with +; d = v +- w b / 2 - r thetadot is what is left of it, m/s. Another radius leaves
-/// d = dr thetadot, another distance d = -+ w db / 2 at both.
+/// What the wheels' rates say of the platform's geometry. A wheel that rolls has r thetadot = v +- w b / 2,
+/// the right one with +; d = v +- w b / 2 - r thetadot is what is left of it, m/s. Another radius leaves d =
+/// dr thetadot, another distance d = -+ w db / 2 at both.
 class WheelEvidence {
  public:
   explicit WheelEvidence(const Base& base) : base_(&base) {}

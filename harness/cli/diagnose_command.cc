@@ -55,14 +55,14 @@ void Print(const Request& request, const RobotModel& model, const Diagnosis& dia
   PrintHypotheses(hypotheses);
   if (diagnosis.causes.empty()) fmt::print("No change of single numbers explains it.\n");
   int number = 0;
-  for (const Cause& cause : diagnosis.causes) {
+  for (const Repair& cause : diagnosis.causes) {
     fmt::print("{}. {}", ++number, Describe(cause, model.spec(), file));
-    if (cause.kind == CauseKind::kEngineOnly) {
+    if (cause.kind == RepairKind::kEngineOnly) {
       fmt::print("\n");
       continue;
     }
     fmt::print("; explains {:.4g} % of the residual\n", 100.0 * cause.explained);
-    for (const Cause& equal : cause.equivalents)
+    for (const Repair& equal : cause.equivalents)
       fmt::print("   or, just as well: {}\n", Describe(equal, model.spec(), file));
   }
   if (number > 1) fmt::print("Together: {:.4g} %.\n", 100.0 * diagnosis.explained);
@@ -78,7 +78,7 @@ void Print(const Request& request, const RobotModel& model, const Diagnosis& dia
   }
 }
 
-Json ToJson(const Cause& cause, const RobotSpec& spec, const std::string& file) {
+Json ToJson(const Repair& cause, const RobotSpec& spec, const std::string& file) {
   Json json = {{"text", Describe(cause, spec, file)}, {"what", DescribeShort(cause, spec)}};
   json["changes"] = Json::array();
   for (size_t i = 0; i < cause.parameters.size(); ++i) {
@@ -92,7 +92,7 @@ Json ToJson(const Cause& cause, const RobotSpec& spec, const std::string& file) 
   json["explained"] = cause.explained;
   json["explained_of_forces"] = cause.explained_of_forces;
   json["equivalents"] = Json::array();
-  for (const Cause& equal : cause.equivalents) json["equivalents"].push_back(ToJson(equal, spec, file));
+  for (const Repair& equal : cause.equivalents) json["equivalents"].push_back(ToJson(equal, spec, file));
   return json;
 }
 
@@ -106,7 +106,7 @@ std::string ToText(const Request& request, const RobotModel& model, const Diagno
       {"explained", diagnosis.explained},      {"explained_of_forces", diagnosis.explained_of_forces}};
   json["hypotheses"] = ListHypotheses(hypotheses);
   json["causes"] = Json::array();
-  for (const Cause& cause : diagnosis.causes) json["causes"].push_back(ToJson(cause, model.spec(), file));
+  for (const Repair& cause : diagnosis.causes) json["causes"].push_back(ToJson(cause, model.spec(), file));
   json["remaining"] = Json::array();
   for (const GateFinding& finding : diagnosis.remaining_constants) json["remaining"].push_back(finding.check);
   for (const CheckRecord& record : diagnosis.remaining_terms) json["remaining"].push_back(record.name);

@@ -256,45 +256,46 @@ void AddMutateCommand(Command app) {
       "Change every number and equation of the model on purpose: which mistakes are found and named?");
   Option robot = AddRobotOptions(command, &request->files);
   Option scale = command.AddOption("--scale", &request->options.scale, "Change of a number, relative to it")
-      .TypeName("X")
-      .Check(CheckScale)
-      .ShowDefault();
+                     .TypeName("X")
+                     .Check(CheckScale)
+                     .ShowDefault();
   Option run = command
                    .AddOption("--run", &request->run.scenario,
                               "Make mistakes in a run of this scenario instead: numbers, laws, plants")
                    .TypeName("SCENARIO");
-  command
-      .AddOption("--set", &request->run.overrides, "Set a key of the scenario, as `dexcheck run` does")
+  command.AddOption("--set", &request->run.overrides, "Set a key of the scenario, as `dexcheck run` does")
       .TypeName("KEY=VALUE")
       .Repeatable()
       .Needs(run);
-  Option from = command.AddOption("--from", &request->run.options.from, "In a run: when the mistake begins, s")
-      .TypeName("T")
-      .Check(Seconds(0.0, 1e4))
-      .Needs(run)
-      .ShowDefault();
-  Option duration = command.AddOption("--duration", &request->run.options.duration, "In a run: how long it is looked at, s")
-      .TypeName("T")
-      .Check(Seconds(1e-3, 1e4))
-      .Needs(run)
-      .ShowDefault();
+  Option from =
+      command.AddOption("--from", &request->run.options.from, "In a run: when the mistake begins, s")
+          .TypeName("T")
+          .Check(Seconds(0.0, 1e4))
+          .Needs(run)
+          .ShowDefault();
+  Option duration =
+      command.AddOption("--duration", &request->run.options.duration, "In a run: how long it is looked at, s")
+          .TypeName("T")
+          .Check(Seconds(1e-3, 1e4))
+          .Needs(run)
+          .ShowDefault();
   Option mistakes = command
-      .AddOption("--numbers", &request->run.options.parameters,
-                 "In a run: how many numbers of the model are changed, evenly out of all")
-      .TypeName("N")
-      .Check(WholeNumber(0, 100000))
-      .Needs(run)
-      .ShowDefault();
+                        .AddOption("--numbers", &request->run.options.parameters,
+                                   "In a run: how many numbers of the model are changed, evenly out of all")
+                        .TypeName("N")
+                        .Check(WholeNumber(0, 100000))
+                        .Needs(run)
+                        .ShowDefault();
   Option samples = command.AddOption("--samples", &request->options.samples, "Random states per mutant")
-      .TypeName("N")
-      .Check(WholeNumber(1, 1000))
-      .ShowDefault();
-  Option no_diagnosis =
-      command.AddFlag("--no-diagnosis", &request->no_diagnosis, "Only whether each is found, not what is named");
+                       .TypeName("N")
+                       .Check(WholeNumber(1, 1000))
+                       .ShowDefault();
+  Option no_diagnosis = command.AddFlag("--no-diagnosis", &request->no_diagnosis,
+                                        "Only whether each is found, not what is named");
   robot.Excludes(run);
-  Option smallest =
-      command.AddFlag("--smallest", &request->run.smallest,
-                      "In a run: how small an error of each number the balances find, and how well it moves everything");
+  Option smallest = command.AddFlag(
+      "--smallest", &request->run.smallest,
+      "In a run: how small an error of each number the balances find, and how well it moves everything");
   smallest.Needs(run);
   for (Option option : {from, duration, mistakes, scale}) option.Excludes(smallest);
   samples.Excludes(run);

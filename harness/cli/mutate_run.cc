@@ -39,7 +39,8 @@ std::vector<Row> SumUp(const std::vector<RunMutant>& mutants, size_t done) {
   Row all;
   all.kind = "all";
   for (size_t i = 0; i < done; ++i) {
-    auto row = std::find_if(rows.begin(), rows.end(), [&](const Row& r) { return r.kind == mutants[i].kind; });
+    auto row =
+        std::find_if(rows.begin(), rows.end(), [&](const Row& r) { return r.kind == mutants[i].kind; });
     if (row == rows.end()) {
       row = rows.insert(rows.end(), Row{});
       row->kind = mutants[i].kind;
@@ -64,11 +65,12 @@ void PrintExceptions(const std::vector<RunMutant>& mutants, size_t done) {
       fmt::print("refused: {}: {}\n", mutant.name, mutant.failure);
     } else if (!mutant.killed) {
       fmt::print("survived: {}{}\n", mutant.name,
-                 mutant.is_as_expected ? ""
-                                       : fmt::format(", though the object is {:.1e} m off", mutant.position_error));
+                 mutant.is_as_expected
+                     ? ""
+                     : fmt::format(", though the object is {:.1e} m off", mutant.position_error));
     } else if (!mutant.has_right_cause()) {
-      fmt::print("cause: {}: expected {}, told {} ({})\n", mutant.name, NameOf(mutant.expected), NameOf(mutant.cause),
-                 mutant.evidence);
+      fmt::print("cause: {}: expected {}, told {} ({})\n", mutant.name, NameOf(mutant.expected),
+                 NameOf(mutant.cause), mutant.evidence);
     } else if (!mutant.names_part) {
       fmt::print("part: {}: expected {}, told {}\n", mutant.name, mutant.part, mutant.evidence);
     }
@@ -83,7 +85,8 @@ void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t 
                "survived", "cause right", "part named");
     for (const Row& row : rows) {
       fmt::print("{:<18}{:>9}{:>9}{:>9}{:>10}{:>13}{:>12}\n", row.kind, row.mutants, row.killed, row.refused,
-                 row.survived, row.cause, row.with_part > 0 ? fmt::format("{} of {}", row.part, row.with_part) : "");
+                 row.survived, row.cause,
+                 row.with_part > 0 ? fmt::format("{} of {}", row.part, row.with_part) : "");
     }
     PrintExceptions(campaign.mutants(), done);
     fmt::print("\n");
@@ -91,17 +94,16 @@ void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t 
   if (done < campaign.mutants().size())
     fmt::print("INTERRUPTED after {} of {} mistakes. So far:\n", done, campaign.mutants().size());
   const int possible = all.mutants - all.refused;
-  fmt::print("{}: {} of {} mistakes that are possible were found; the cause is right in {}, the part in {} of {}.\n",
-             all.survived == 0 ? "ALL FOUND" : "SURVIVORS", all.killed, possible, all.cause, all.part, all.with_part);
+  fmt::print(
+      "{}: {} of {} mistakes that are possible were found; the cause is right in {}, the part in {} of {}.\n",
+      all.survived == 0 ? "ALL FOUND" : "SURVIVORS", all.killed, possible, all.cause, all.part,
+      all.with_part);
 }
 
 std::string ToText(const MutateRunRequest& request, const RunCampaign& campaign, size_t done) {
-  Json json = {{"scenario", request.scenario},
-               {"overrides", request.overrides},
-               {"from_s", request.options.from},
-               {"duration_s", request.options.duration},
-               {"scale", request.options.scale},
-               {"complete", done == campaign.mutants().size()}};
+  Json json = {{"scenario", request.scenario},   {"overrides", request.overrides},
+               {"from_s", request.options.from}, {"duration_s", request.options.duration},
+               {"scale", request.options.scale}, {"complete", done == campaign.mutants().size()}};
   json["kinds"] = Json::object();
   for (const Row& row : SumUp(campaign.mutants(), done)) {
     json["kinds"][row.kind] = {{"mistakes", row.mutants},     {"found", row.killed},

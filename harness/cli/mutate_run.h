@@ -18,12 +18,12 @@ struct MutateRunRequest {
   bool smallest = false;  ///< PrintSmallestErrors instead of MutateRun.
 };
 
-/// Makes every mistake, prints the table, writes the JSON. @returns the exit code: 1 when one was not found, 3
-/// when it was interrupted. @throws InputError.
+/// Makes every mistake, prints the table, writes the JSON. @returns the exit code: 1 when one was not found,
+/// 3 when it was interrupted. @throws InputError.
 int MutateRun(const MutateRunRequest& request);
 
-/// Prints, for every kind of number, how small an error of one the balances find in that run. @returns the exit
-/// code: 3 when it was interrupted. @throws InputError.
+/// Prints, for every kind of number, how small an error of one the balances find in that run. @returns the
+/// exit code: 3 when it was interrupted. @throws InputError.
 int PrintSmallestErrors(const MutateRunRequest& request);
 
 }  // namespace dexcheck::cli

@@ -32,7 +32,8 @@ double Smallest(const Detectability& number) { return std::min(number.robot, num
 std::vector<Row> SumUp(const DetectabilityResult& result) {
   std::vector<Row> rows;
   for (const Detectability& number : result.numbers) {
-    auto row = std::find_if(rows.begin(), rows.end(), [&](const Row& r) { return r.quantity == number.quantity; });
+    auto row =
+        std::find_if(rows.begin(), rows.end(), [&](const Row& r) { return r.quantity == number.quantity; });
     if (row == rows.end()) {
       row = rows.insert(rows.end(), Row{});
       row->quantity = number.quantity;
@@ -69,8 +70,8 @@ std::string ToText(const MutateRunRequest& request, const DetectabilityResult& r
 }
 
 void Print(const DetectabilityResult& result) {
-  fmt::print("smallest relative error that fails a balance\n\n{:<24}{:>9}{:>9}{:>11}{:>12}{:>12}{:>12}\n", "quantity",
-             "numbers", "shown", "to 0.1 %", "best", "median", "worst");
+  fmt::print("smallest relative error that fails a balance\n\n{:<24}{:>9}{:>9}{:>11}{:>12}{:>12}{:>12}\n",
+             "quantity", "numbers", "shown", "to 0.1 %", "best", "median", "worst");
   int numbers = 0, shown = 0, good = 0;
   for (const Row& row : SumUp(result)) {
     numbers += row.numbers;

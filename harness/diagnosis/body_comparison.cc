@@ -44,8 +44,8 @@ BodyComparison::BodyComparison(const RobotSpec& spec, const EngineEvidence& evid
       adapter_(model_, engine, spec.source),
       placement_(spec, evidence, false) {}
 
-std::vector<Cause> BodyComparison::Run() const {
-  std::vector<Cause> causes;
+std::vector<Repair> BodyComparison::Run() const {
+  std::vector<Repair> causes;
   for (int link = spec_.base.type == BaseType::kFixed ? 0 : -1; link < model_.num_joints(); ++link)
     CompareBody(link, &causes);
   CompareJoints(&causes);
@@ -53,8 +53,8 @@ std::vector<Cause> BodyComparison::Run() const {
 }
 
 void BodyComparison::Compare(const std::vector<Parameter>& parameters, const std::vector<double>& values,
-                             double scale, std::vector<Cause>* causes) const {
-  Cause cause;
+                             double scale, std::vector<Repair>* causes) const {
+  Repair cause;
   for (size_t i = 0; i < parameters.size(); ++i) {
     const double value = GetValue(spec_, parameters[i]);
     const double size = scale > 0.0 ? scale : std::max(std::abs(value), std::abs(values[i]));
@@ -97,7 +97,7 @@ MassProperties BodyComparison::ReadBody(int link) const {
   return body;
 }
 
-void BodyComparison::CompareBody(int link, std::vector<Cause>* causes) const {
+void BodyComparison::CompareBody(int link, std::vector<Repair>* causes) const {
   const MassProperties there = ReadBody(link);
   const MassProperties& here = link < 0 ? spec_.base.body : spec_.joints[static_cast<size_t>(link)].body;
   const size_t first = causes->size();
@@ -121,14 +121,14 @@ void BodyComparison::CompareBody(int link, std::vector<Cause>* causes) const {
   if (!mass || causes->back().parameters.front().kind != Kind::kInertia) return;
   const Matrix3d expected = there.mass / here.mass * here.inertia;
   if ((there.inertia - expected).norm() > kAlike * expected.norm()) return;
-  const Cause inertia = causes->back();
+  const Repair inertia = causes->back();
   causes->pop_back();
-  Cause& whole = (*causes)[first];
+  Repair& whole = (*causes)[first];
   whole.parameters.insert(whole.parameters.end(), inertia.parameters.begin(), inertia.parameters.end());
   whole.values.insert(whole.values.end(), inertia.values.begin(), inertia.values.end());
 }
 
-void BodyComparison::CompareJoints(std::vector<Cause>* causes) const {
+void BodyComparison::CompareJoints(std::vector<Repair>* causes) const {
   for (int i = 0; i < model_.num_joints(); ++i) {
     const int dof = adapter_.joint_dofs()[static_cast<size_t>(i)];
     Compare({{Kind::kDamping, i, 0}}, {engine_.dof_damping[dof]}, 0.0, causes);

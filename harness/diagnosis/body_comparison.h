@@ -5,8 +5,8 @@
 
 #include <vector>
 
-#include "harness/diagnosis/cause.h"
 #include "harness/diagnosis/placement.h"
+#include "harness/diagnosis/repair.h"
 
 namespace dexcheck {
 
@@ -22,15 +22,15 @@ class BodyComparison {
 
   /// One cause for each number, vector or tensor that differs; a mass whose inertia differs in proportion is
   /// one with it. In the file's order.
-  [[nodiscard]] std::vector<Cause> Run() const;
+  [[nodiscard]] std::vector<Repair> Run() const;
 
  private:
-  void CompareBody(int link, std::vector<Cause>* causes) const;
+  void CompareBody(int link, std::vector<Repair>* causes) const;
   /// In the link's frame as the specification places it; of the base without the wheels.
   [[nodiscard]] MassProperties ReadBody(int link) const;
   void Compare(const std::vector<Parameter>& parameters, const std::vector<double>& values, double scale,
-               std::vector<Cause>* causes) const;
-  void CompareJoints(std::vector<Cause>* causes) const;
+               std::vector<Repair>* causes) const;
+  void CompareJoints(std::vector<Repair>* causes) const;
 
   const RobotSpec& spec_;
   const EngineEvidence& evidence_;

@@ -255,7 +255,7 @@ void BodyFit::Rank() {
   const VectorXd gains = CalcGains(residual_, nullptr);
   for (const Eigen::Index i : BestOf(gains, kRanked)) {
     if (!(gains[i] > 0.0)) break;
-    Cause cause;
+    Repair cause;
     cause.parameters = {candidates_[static_cast<size_t>(i)]};
     cause.values = {GetValue(spec_, cause.parameters.front())};
     ranking_.emplace_back(cause, gains[i] / residual_.squaredNorm());
@@ -372,20 +372,20 @@ void BodyFit::DropUnchanged(Solution* solution) const {
   });
 }
 
-Cause BodyFit::ToCause(const Solution& solution) const {
-  Cause cause;
+Repair BodyFit::ToCause(const Solution& solution) const {
+  Repair cause;
   cause.parameters = solution.parameters;
   for (const Parameter& parameter : solution.parameters)
     cause.values.push_back(GetValue(solution.repaired, parameter));
   return cause;
 }
 
-void BodyFit::MergeScaledBodies(std::vector<Cause>* causes) const {
+void BodyFit::MergeScaledBodies(std::vector<Repair>* causes) const {
   constexpr double kSame = 1e-8;
   for (size_t i = 0; i < causes->size(); ++i) {
     const Parameter mass = (*causes)[i].parameters.front();
     if (mass.kind != Kind::kMass || !(GetValue(spec_, mass) > 0.0)) continue;
-    const auto inertia = std::find_if(causes->begin(), causes->end(), [&](const Cause& cause) {
+    const auto inertia = std::find_if(causes->begin(), causes->end(), [&](const Repair& cause) {
       return cause.parameters.front().kind == Kind::kInertia && cause.parameters.front().index == mass.index;
     });
     if (inertia == causes->end()) continue;
@@ -394,7 +394,7 @@ void BodyFit::MergeScaledBodies(std::vector<Cause>* causes) const {
     Apply(*inertia, &scaled);
     const Matrix3d expected = ratio * BodyOf(spec_, mass.index).inertia;
     if ((BodyOf(scaled, mass.index).inertia - expected).norm() > kSame * expected.norm()) continue;
-    Cause& whole = (*causes)[i];
+    Repair& whole = (*causes)[i];
     whole.parameters.insert(whole.parameters.end(), inertia->parameters.begin(), inertia->parameters.end());
     whole.values.insert(whole.values.end(), inertia->values.begin(), inertia->values.end());
     const bool before = static_cast<size_t>(inertia - causes->begin()) < i;
@@ -403,13 +403,13 @@ void BodyFit::MergeScaledBodies(std::vector<Cause>* causes) const {
   }
 }
 
-std::vector<Cause> BodyFit::Run() {
+std::vector<Repair> BodyFit::Run() {
   Rank();
   if (columns_.size() == 0) return {};
 
   std::vector<Solution> solutions;
   if (!FindSolution(&solutions)) solutions = {Grow()};
-  std::vector<Cause> whole;
+  std::vector<Repair> whole;
   whole.reserve(solutions.size());
   for (const Solution& solution : solutions) whole.push_back(ToCause(solution));
   std::vector<size_t> order(whole.size());
@@ -420,13 +420,13 @@ std::vector<Cause> BodyFit::Run() {
   if (!(chosen.worst <= kRounding)) return {};
 
   // One cause for each thing that is changed.
-  std::vector<Cause> causes;
+  std::vector<Repair> causes;
   for (size_t i = 0; i < chosen.parameters.size(); ++i) {
     const Parameter& parameter = chosen.parameters[i];
-    const auto same = std::find_if(causes.begin(), causes.end(), [&](const Cause& cause) {
+    const auto same = std::find_if(causes.begin(), causes.end(), [&](const Repair& cause) {
       return AreOneThing(cause.parameters.front(), parameter);
     });
-    Cause& cause = same == causes.end() ? causes.emplace_back() : *same;
+    Repair& cause = same == causes.end() ? causes.emplace_back() : *same;
     cause.parameters.push_back(parameter);
     cause.values.push_back(GetValue(chosen.repaired, parameter));
   }

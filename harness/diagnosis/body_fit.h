@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "harness/diagnosis/cause.h"
 #include "harness/diagnosis/evidence.h"
+#include "harness/diagnosis/repair.h"
 
 namespace dexcheck {
 
@@ -31,12 +31,12 @@ class BodyFit {
   BodyFit(const RobotSpec& spec, const EngineEvidence& evidence, const mjModel& engine, bool bodies);
 
   /// Causes, the one that explains most first; none when not all of the disagreement is explained.
-  std::vector<Cause> Run();
+  std::vector<Repair> Run();
   /// Only the ranking.
   void Rank();
   /// Single numbers by the share of the disagreement that each explains by itself, the first few, before any
   /// repair.
-  [[nodiscard]] const std::vector<std::pair<Cause, double>>& ranking() const { return ranking_; }
+  [[nodiscard]] const std::vector<std::pair<Repair, double>>& ranking() const { return ranking_; }
 
  private:
   struct Solution {
@@ -67,8 +67,8 @@ class BodyFit {
   /// Takes numbers from a solution that it leaves as they were.
   void DropUnchanged(Solution* solution) const;
   /// Makes one cause of a mass and an inertia that grow alike: a solid of another mass.
-  void MergeScaledBodies(std::vector<Cause>* causes) const;
-  [[nodiscard]] Cause ToCause(const Solution& solution) const;
+  void MergeScaledBodies(std::vector<Repair>* causes) const;
+  [[nodiscard]] Repair ToCause(const Solution& solution) const;
 
   RobotSpec spec_;
   const EngineEvidence* evidence_;
@@ -81,7 +81,7 @@ class BodyFit {
   std::vector<Parameter> candidates_;
   MatrixXd columns_;  // at spec_, of all candidates
   VectorXd residual_;
-  std::vector<std::pair<Cause, double>> ranking_;
+  std::vector<std::pair<Repair, double>> ranking_;
 };
 
 }  // namespace dexcheck

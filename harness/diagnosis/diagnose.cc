@@ -43,11 +43,11 @@ std::string InWords(const std::string& check) {
 }
 
 /// Takes from the engine's model what the analytic model cannot have, and says what it was.
-std::vector<Cause> Neutralise(const Adapter& adapter, const GateResult& gate, mjModel* engine) {
-  std::vector<Cause> causes;
+std::vector<Repair> Neutralise(const Adapter& adapter, const GateResult& gate, mjModel* engine) {
+  std::vector<Repair> causes;
   const auto report = [&](const std::string& note) {
-    Cause cause;
-    cause.kind = CauseKind::kEngineOnly;
+    Repair cause;
+    cause.kind = RepairKind::kEngineOnly;
     cause.note = note + " only in the MJCF: the analytic model has none";
     causes.push_back(cause);
   };
@@ -75,7 +75,7 @@ std::vector<Cause> Neutralise(const Adapter& adapter, const GateResult& gate, mj
 }
 
 /// Takes numbers out of a cause; what remains of it has no equivalents that are known.
-void ForgetNumbers(const std::vector<Parameter>& numbers, Cause* cause) {
+void ForgetNumbers(const std::vector<Parameter>& numbers, Repair* cause) {
   for (size_t i = cause->parameters.size(); i-- > 0;) {
     if (std::find(numbers.begin(), numbers.end(), cause->parameters[i]) == numbers.end()) continue;
     cause->parameters.erase(cause->parameters.begin() + static_cast<std::ptrdiff_t>(i));
@@ -96,7 +96,7 @@ class Diagnostician {
     const ConsistencyResult before = Compare(model_);
     result_.agrees = before.Agrees();
     if (result_.agrees) return std::move(result_);
-    for (const Cause& cause : Neutralise(Adapter(model_, *engine_, source_), before.gate, engine_.get()))
+    for (const Repair& cause : Neutralise(Adapter(model_, *engine_, source_), before.gate, engine_.get()))
       result_.causes.push_back(cause);
     if (progress("constants")) ReadConstants(before.gate);
     if (progress("geometry")) WalkGeometry();
@@ -130,14 +130,14 @@ class Diagnostician {
 
   /// Takes repairs with values as they will be printed, unless the result cannot be a robot; another repair
   /// may have to come first then. A value that is printed like the file's repairs nothing.
-  void Accept(std::vector<Cause> causes) {
+  void Accept(std::vector<Repair> causes) {
     for (size_t before = causes.size() + 1; !causes.empty() && causes.size() < before;) {
       before = causes.size();
-      std::erase_if(causes, [&](const Cause& cause) { return TryAccept(cause); });
+      std::erase_if(causes, [&](const Repair& cause) { return TryAccept(cause); });
     }
   }
 
-  bool TryAccept(Cause cause) {
+  bool TryAccept(Repair cause) {
     std::vector<Parameter> changed;
     std::vector<double> values;
     for (size_t i = 0; i < cause.parameters.size(); ++i) {
@@ -151,7 +151,7 @@ class Diagnostician {
     if (changed.empty() && !cause.parameters.empty()) return true;
     cause.parameters = std::move(changed);
     cause.values = std::move(values);
-    for (Cause& equal : cause.equivalents) {
+    for (Repair& equal : cause.equivalents) {
       for (size_t i = 0; i < equal.parameters.size(); ++i)
         equal.values[i] = RoundPrinted(equal.parameters[i], equal.values[i]);
     }
@@ -164,9 +164,9 @@ class Diagnostician {
     }
     result_.repaired = std::move(repaired);
     // Of a number that is repaired again, the last value holds, in whatever order the repairs are printed.
-    for (Cause& earlier : result_.causes) ForgetNumbers(cause.parameters, &earlier);
-    std::erase_if(result_.causes, [](const Cause& earlier) {
-      return earlier.kind == CauseKind::kParameters && earlier.parameters.empty();
+    for (Repair& earlier : result_.causes) ForgetNumbers(cause.parameters, &earlier);
+    std::erase_if(result_.causes, [](const Repair& earlier) {
+      return earlier.kind == RepairKind::kParameters && earlier.parameters.empty();
     });
     result_.causes.push_back(std::move(cause));
     return true;
@@ -203,14 +203,14 @@ class Diagnostician {
       }
     }
     // A vector or a tensor is one cause. When the two wheels disagree, something else is wrong.
-    std::vector<Cause> causes;
+    std::vector<Repair> causes;
     for (const Reading& reading : readings) {
       if (!reading.agreed || (IsOfBothWheels(reading.parameter.kind) && reading.count < 2)) continue;
-      auto same = std::find_if(causes.begin(), causes.end(), [&](const Cause& cause) {
+      auto same = std::find_if(causes.begin(), causes.end(), [&](const Repair& cause) {
         return cause.parameters[0].kind == reading.parameter.kind &&
                cause.parameters[0].index == reading.parameter.index;
       });
-      if (same == causes.end()) same = causes.insert(causes.end(), Cause{});
+      if (same == causes.end()) same = causes.insert(causes.end(), Repair{});
       same->parameters.push_back(reading.parameter);
       same->values.push_back(reading.value);
     }
@@ -228,7 +228,7 @@ class Diagnostician {
       }
     };
     GeometryWalk walk(result_.repaired, evidence, !options_.by_motion, force_error);
-    for (const Cause& cause : walk.Run()) Accept({cause});
+    for (const Repair& cause : walk.Run()) Accept({cause});
   }
 
   void FitBodies() {
@@ -250,7 +250,7 @@ class Diagnostician {
                             !options_.by_motion);
     check.KeepWhatRepairs(&result_.causes);
     result_.repaired = model_.spec();
-    for (const Cause& cause : result_.causes) Apply(cause, &result_.repaired);
+    for (const Repair& cause : result_.causes) Apply(cause, &result_.repaired);
   }
 
   struct Size {
@@ -285,8 +285,8 @@ class Diagnostician {
     const Size before = Measure(spec);
     Size last = before;
     const auto share = [](double from, double to, double of) { return of > 0.0 ? (from - to) / of : 0.0; };
-    for (Cause& cause : result_.causes) {
-      if (cause.kind == CauseKind::kEngineOnly) continue;
+    for (Repair& cause : result_.causes) {
+      if (cause.kind == RepairKind::kEngineOnly) continue;
       Apply(cause, &spec);
       const Size now = Measure(spec);
       cause.explained = share(last.all, now.all, before.all);
@@ -297,12 +297,12 @@ class Diagnostician {
     result_.explained_of_forces =
         before.forces > 0.0 ? share(before.forces, last.forces, before.forces) : 1.0;
     // Rows and axes that were exchanged or turned must be repaired in the order found.
-    const bool ordered = std::any_of(result_.causes.begin(), result_.causes.end(), [](const Cause& cause) {
-      return cause.kind != CauseKind::kParameters && cause.kind != CauseKind::kEngineOnly;
+    const bool ordered = std::any_of(result_.causes.begin(), result_.causes.end(), [](const Repair& cause) {
+      return cause.kind != RepairKind::kParameters && cause.kind != RepairKind::kEngineOnly;
     });
     if (ordered) return;
     std::stable_sort(result_.causes.begin(), result_.causes.end(),
-                     [](const Cause& a, const Cause& b) { return a.explained > b.explained; });
+                     [](const Repair& a, const Repair& b) { return a.explained > b.explained; });
   }
 
   const RobotModel& model_;

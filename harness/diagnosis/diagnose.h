@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "harness/checks/consistency.h"
-#include "harness/diagnosis/cause.h"
+#include "harness/diagnosis/repair.h"
 
 namespace dexcheck {
 
@@ -22,10 +22,10 @@ struct DiagnosisOptions {
 
 struct Diagnosis {
   bool agrees = true;
-  std::vector<Cause> causes;  ///< The one that explains most first.
-  double explained = 0.0;     ///< Share of all residuals, squared and scaled, that they explain together.
+  std::vector<Repair> causes;  ///< The one that explains most first.
+  double explained = 0.0;      ///< Share of all residuals, squared and scaled, that they explain together.
   double explained_of_forces = 0.0;
-  std::vector<std::pair<Cause, double>>
+  std::vector<std::pair<Repair, double>>
       ranking;  ///< Single numbers by the share of the bodies' residuals explained.
   std::vector<GateFinding> remaining_constants;  ///< What disagrees after all repairs.
   std::vector<CheckRecord> remaining_terms;      ///< Failed checks after all repairs.

@@ -32,15 +32,15 @@ bool IsPitch(const Parameter& parameter) {
 }
 
 /// A cause for each vector that is changed: two numbers solved for together may be two mistakes.
-std::vector<Cause> Split(const Cause& cause) {
+std::vector<Repair> Split(const Repair& cause) {
   if (cause.parameters.size() < 2) return {cause};
-  std::vector<Cause> parts;
+  std::vector<Repair> parts;
   for (size_t i = 0; i < cause.parameters.size(); ++i) {
     const Parameter& parameter = cause.parameters[i];
-    auto same = std::find_if(parts.begin(), parts.end(), [&](const Cause& part) {
+    auto same = std::find_if(parts.begin(), parts.end(), [&](const Repair& part) {
       return part.parameters[0].kind == parameter.kind && part.parameters[0].index == parameter.index;
     });
-    if (same == parts.end()) same = parts.insert(parts.end(), Cause{});
+    if (same == parts.end()) same = parts.insert(parts.end(), Repair{});
     same->parameters.push_back(parameter);
     same->values.push_back(cause.values[i]);
   }
@@ -56,16 +56,16 @@ GeometryWalk::GeometryWalk(const RobotSpec& spec, const EngineEvidence& evidence
       force_error_(std::move(force_error)),
       left_(placement_.items().size(), false) {}
 
-std::vector<Cause> GeometryWalk::Run() {
-  std::vector<Cause> causes;
+std::vector<Repair> GeometryWalk::Run() {
+  std::vector<Repair> causes;
   while (causes.size() < kMaxCauses) {
     const std::vector<int> failing = ListFailing(placement_.ItemsBeyond(-1));
     const int first = FindFirst(failing);
     if (first < 0) break;
-    Cause cause;
+    Repair cause;
     if (FindCause(first, &cause)) {
       Apply(cause, &spec_);
-      for (Cause& part : Split(cause)) causes.push_back(std::move(part));
+      for (Repair& part : Split(cause)) causes.push_back(std::move(part));
     } else {
       Leave(placement_.items()[static_cast<size_t>(first)].link, failing);
     }
@@ -107,7 +107,7 @@ void GeometryWalk::Leave(int link, const std::vector<int>& failing) {
   }
 }
 
-bool GeometryWalk::FindCause(int first, Cause* cause) {
+bool GeometryWalk::FindCause(int first, Repair* cause) {
   const int link = placement_.items()[static_cast<size_t>(first)].link;
   const std::vector<int> failing = ListFailing(placement_.ItemsBeyond(-1));
   const std::vector<Parameter> suspects = ListSuspects(link, failing);
@@ -139,7 +139,7 @@ bool GeometryWalk::FindCause(int first, Cause* cause) {
   }
   if (best == candidates.end() || best->cost >= cost_before) return false;
   const double least_cost = best->cost;
-  std::vector<Cause> equal;
+  std::vector<Repair> equal;
   for (const Candidate& candidate : candidates) {
     // Angles that were reached through a pole do not come out as they went in.
     if (candidate.cost == least_cost && CalcCostAfter(candidate.cause) == least_cost)
@@ -148,7 +148,7 @@ bool GeometryWalk::FindCause(int first, Cause* cause) {
   if (equal.empty()) return false;
   if (equal.size() > 1 && force_error_) {
     std::vector<double> errors;
-    for (const Cause& one : equal) {
+    for (const Repair& one : equal) {
       RobotSpec repaired = spec_;
       Apply(one, &repaired);
       errors.push_back(force_error_(repaired));
@@ -156,14 +156,14 @@ bool GeometryWalk::FindCause(int first, Cause* cause) {
     constexpr double kSame = 1.0 + 1e-6;
     const double least = *std::min_element(errors.begin(), errors.end());
     const double rounding = 1e-9;
-    std::vector<Cause> kept;
+    std::vector<Repair> kept;
     for (size_t i = 0; i < equal.size(); ++i) {
       if (errors[i] <= least * kSame + rounding) kept.push_back(equal[i]);
     }
     equal = std::move(kept);
   }
   std::stable_sort(equal.begin(), equal.end(),
-                   [&](const Cause& a, const Cause& b) { return IsLikelier(a, b, spec_); });
+                   [&](const Repair& a, const Repair& b) { return IsLikelier(a, b, spec_); });
   *cause = equal.front();
   cause->equivalents.assign(equal.begin() + 1, equal.end());
   return true;
@@ -311,7 +311,7 @@ double GeometryWalk::CalcCost(size_t changes) const {
   return cost;
 }
 
-double GeometryWalk::CalcCostAfter(const Cause& cause) {
+double GeometryWalk::CalcCostAfter(const Repair& cause) {
   RobotSpec changed = spec_;
   Apply(cause, &changed);
   placement_.Replace(changed);
@@ -362,7 +362,7 @@ void GeometryWalk::TryParameters(int link, const std::vector<Parameter>& paramet
 }
 
 void GeometryWalk::TryStructure(int link, std::vector<Candidate>* candidates) {
-  const auto attempt = [&](CauseKind kind, int joint, int other) {
+  const auto attempt = [&](RepairKind kind, int joint, int other) {
     Candidate candidate;
     candidate.cause.kind = kind;
     candidate.cause.joint = joint;
@@ -372,14 +372,14 @@ void GeometryWalk::TryStructure(int link, std::vector<Candidate>* candidates) {
   };
   if (link < 0) return;
   const int parent = spec_.joints[static_cast<size_t>(link)].parent;
-  attempt(CauseKind::kAxisReversed, link, -1);
-  if (parent >= 0) attempt(CauseKind::kAxisReversed, parent, -1);
+  attempt(RepairKind::kAxisReversed, link, -1);
+  if (parent >= 0) attempt(RepairKind::kAxisReversed, parent, -1);
   for (int other = 0; other < static_cast<int>(spec_.joints.size()); ++other) {
     const int above = spec_.joints[static_cast<size_t>(other)].parent;
     if (other == link) continue;
     if (above == link || above == parent)
-      attempt(CauseKind::kRowsSwapped, std::min(link, other), std::max(link, other));
-    if (above == parent) attempt(CauseKind::kPosesSwapped, std::min(link, other), std::max(link, other));
+      attempt(RepairKind::kRowsSwapped, std::min(link, other), std::max(link, other));
+    if (above == parent) attempt(RepairKind::kPosesSwapped, std::min(link, other), std::max(link, other));
   }
 }
 

@@ -5,8 +5,8 @@
 #include <functional>
 #include <vector>
 
-#include "harness/diagnosis/cause.h"
 #include "harness/diagnosis/placement.h"
+#include "harness/diagnosis/repair.h"
 
 namespace dexcheck {
 
@@ -26,18 +26,18 @@ class GeometryWalk {
                std::function<double(const RobotSpec&)> force_error);
 
   /// Causes in the order found, each to be repaired after those before it.
-  std::vector<Cause> Run();
+  std::vector<Repair> Run();
   /// The specification with all of them repaired.
   [[nodiscard]] const RobotSpec& repaired() const { return spec_; }
 
  private:
   struct Candidate {
-    Cause cause;
+    Repair cause;
     double cost = 0.0;
   };
   [[nodiscard]] std::vector<int> ListFailing(const std::vector<int>& items) const;
   [[nodiscard]] int FindFirst(const std::vector<int>& failing) const;
-  [[nodiscard]] bool FindCause(int first, Cause* cause);
+  [[nodiscard]] bool FindCause(int first, Repair* cause);
   /// Gives up what fails on a link; when nearly all is suspect, what the link carries too.
   void Leave(int link, const std::vector<int>& failing);
   [[nodiscard]] std::vector<Parameter> ListSuspects(int link, const std::vector<int>& failing);
@@ -56,7 +56,7 @@ class GeometryWalk {
   /// Of what stands on one link.
   [[nodiscard]] int CountWrongNumbers(int link) const;
   [[nodiscard]] double CalcCost(size_t changes) const;
-  [[nodiscard]] double CalcCostAfter(const Cause& cause);
+  [[nodiscard]] double CalcCostAfter(const Repair& cause);
 
   RobotSpec spec_;
   Placement placement_;

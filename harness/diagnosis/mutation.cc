@@ -49,13 +49,13 @@ class MutantList {
     const int joints = static_cast<int>(spec_.joints.size());
     for (int i = 0; i < joints; ++i) {
       const Joint& joint = spec_.joints[static_cast<size_t>(i)];
-      AddStructural("axis reversed", CauseKind::kAxisReversed, i, -1);
+      AddStructural("axis reversed", RepairKind::kAxisReversed, i, -1);
       AddShift("alpha a quarter turn off", {Kind::kAlpha, i, 0}, 0.5 * kPi);
       AddShift("home angle a quarter turn off", {Kind::kHomeAngle, i, 0}, 0.5 * kPi);
-      if (joint.parent >= 0) AddStructural("rows exchanged", CauseKind::kRowsSwapped, joint.parent, i);
+      if (joint.parent >= 0) AddStructural("rows exchanged", RepairKind::kRowsSwapped, joint.parent, i);
       for (int j = i + 1; j < joints; ++j) {
         if (spec_.joints[static_cast<size_t>(j)].parent == joint.parent)
-          AddStructural("places exchanged", CauseKind::kPosesSwapped, i, j);
+          AddStructural("places exchanged", RepairKind::kPosesSwapped, i, j);
       }
       AddShift("armature missing", {Kind::kArmature, i, 0}, -joint.armature);
       AddShift("damping missing", {Kind::kDamping, i, 0}, -joint.damping);
@@ -120,8 +120,8 @@ class MutantList {
     mutant.change = [link, change](RobotSpec* spec) { change(&JointOf(spec, link).body); };
   }
 
-  void AddStructural(const std::string& kind, CauseKind cause_kind, int joint, int other) {
-    Cause cause;
+  void AddStructural(const std::string& kind, RepairKind cause_kind, int joint, int other) {
+    Repair cause;
     cause.kind = cause_kind;
     cause.joint = joint;
     cause.other = other;
@@ -178,10 +178,10 @@ std::vector<Mutant> ListMutants(const RobotSpec& spec, double scale) {
   return list.Take();
 }
 
-bool IsNamedBy(const Mutant& mutant, const Cause& cause) {
-  const Cause& expected = mutant.expected;
+bool IsNamedBy(const Mutant& mutant, const Repair& cause) {
+  const Repair& expected = mutant.expected;
   if (cause.kind != expected.kind) return false;
-  if (cause.kind != CauseKind::kParameters)
+  if (cause.kind != RepairKind::kParameters)
     return cause.joint == expected.joint && cause.other == expected.other;
   if (expected.parameters.size() == 1) return cause.parameters == expected.parameters;
   const Parameter& named = cause.parameters.front();
@@ -221,11 +221,11 @@ void RunMutant(const RobotModel& model, const mjModel& engine, const std::string
   mutant->causes = static_cast<int>(diagnosis.causes.size());
   mutant->explained = diagnosis.explained;
   if (diagnosis.causes.empty()) return;
-  const Cause& first = diagnosis.causes.front();
+  const Repair& first = diagnosis.causes.front();
   mutant->named = DescribeShort(first, spec);
   mutant->named_first = IsNamedBy(*mutant, first);
   mutant->named_equal = std::any_of(first.equivalents.begin(), first.equivalents.end(),
-                                    [&](const Cause& equal) { return IsNamedBy(*mutant, equal); });
+                                    [&](const Repair& equal) { return IsNamedBy(*mutant, equal); });
 }
 
 }  // namespace dexcheck

@@ -23,7 +23,7 @@ struct Mutant {
   std::string name;  ///< "link r_forearm: mass".
   std::string kind;  ///< "mass": what the table sums up by.
   std::function<void(RobotSpec*)> change;
-  Cause expected;  ///< What the diagnosis should name, without values.
+  Repair expected;  ///< What the diagnosis should name, without values.
 
   MutantFate fate = MutantFate::kSurvived;
   std::string failed_checks;  ///< Names, separated by blanks.
@@ -52,7 +52,7 @@ std::vector<Mutant> ListMutants(const RobotSpec& spec, double scale);
 
 /// Whether a cause names what was changed: the same number, or any numbers of the same vector or tensor when
 /// several were changed; the same joints for changes of structure.
-bool IsNamedBy(const Mutant& mutant, const Cause& cause);
+bool IsNamedBy(const Mutant& mutant, const Repair& cause);
 
 /// Runs the checks, and the diagnosis, on a mutant.
 void RunMutant(const RobotModel& model, const mjModel& engine, const std::string& engine_source,

@@ -53,11 +53,12 @@ PlantFault AllMotors(const std::string& how, double (*give)(double sent, double 
 
 /// @param joint empty for all.
 PlantFault Delay(const std::string& joint, size_t steps) {
-  PlantFault fault{(joint.empty() ? "all motors" : "motor " + joint) + ": " + std::to_string(steps) + " steps late",
-                   "motor", Cause::kActuator, joint.empty() ? "motors" : joint};
+  PlantFault fault{
+      (joint.empty() ? "all motors" : "motor " + joint) + ": " + std::to_string(steps) + " steps late",
+      "motor", Cause::kActuator, joint.empty() ? "motors" : joint};
   fault.motors = [joint, steps](const Setup& setup) -> MotorFault {
-    return [joint, steps, i = joint.empty() ? 0 : MotorOf(setup, joint),
-            sent = std::deque<VectorXd>()](double, VectorXd* tau) mutable {
+    return [joint, steps, i = joint.empty() ? 0 : MotorOf(setup, joint), sent = std::deque<VectorXd>()](
+               double, VectorXd* tau) mutable {
       sent.push_back(*tau);
       if (sent.size() > steps + 1) sent.pop_front();
       if (joint.empty()) {
@@ -72,11 +73,12 @@ PlantFault Delay(const std::string& joint, size_t steps) {
 
 /// a' = (sent - a) / time: what is given follows what is sent.
 PlantFault Lag(const std::string& joint, double share) {
-  PlantFault fault{(joint.empty() ? "all motors" : "motor " + joint) + ": follow by " + FormatNumber(share) + " a step",
-                   "motor", Cause::kActuator, joint.empty() ? "motors" : joint};
+  PlantFault fault{
+      (joint.empty() ? "all motors" : "motor " + joint) + ": follow by " + FormatNumber(share) + " a step",
+      "motor", Cause::kActuator, joint.empty() ? "motors" : joint};
   fault.motors = [joint, share](const Setup& setup) -> MotorFault {
-    return [joint, share, i = joint.empty() ? 0 : MotorOf(setup, joint), given = VectorXd()](double,
-                                                                                   VectorXd* tau) mutable {
+    return [joint, share, i = joint.empty() ? 0 : MotorOf(setup, joint), given = VectorXd()](
+               double, VectorXd* tau) mutable {
       if (given.size() == 0) given = *tau;
       given += share * (*tau - given);
       if (joint.empty()) {
@@ -92,13 +94,16 @@ PlantFault Lag(const std::string& joint, double share) {
 PlantFault Exchange(const std::string& a, const std::string& b) {
   PlantFault fault{"motors " + a + " and " + b + " exchanged", "motor", Cause::kActuator};
   fault.motors = [a, b](const Setup& setup) -> MotorFault {
-    return [i = MotorOf(setup, a), j = MotorOf(setup, b)](double, VectorXd* tau) { std::swap((*tau)[i], (*tau)[j]); };
+    return [i = MotorOf(setup, a), j = MotorOf(setup, b)](double, VectorXd* tau) {
+      std::swap((*tau)[i], (*tau)[j]);
+    };
   };
   return fault;
 }
 
 /// In the engine, where nobody sent it.
-PlantFault EngineMotor(const std::string& joint, const std::string& how, void (*change)(mjModel*, int motor)) {
+PlantFault EngineMotor(const std::string& joint, const std::string& how,
+                       void (*change)(mjModel*, int motor)) {
   PlantFault fault{"motor " + joint + " in the engine: " + how, "motor", Cause::kActuator, joint};
   fault.engine = [joint, change](const Setup&, mjModel* m) {
     const int id = JointId(*m, joint);
@@ -120,8 +125,9 @@ void AddMotorFaults(std::vector<PlantFault>* faults) {
   add(OneMotor("r_elbow", "0.05 N m too much", [](double sent, double) { return sent + 0.05; }));
   add(OneMotor("rf2_3", "0.001 N m too much", [](double sent, double) { return sent + 1e-3; }));
   add(OneMotor("wheel_left", "0.01 N m too much", [](double sent, double) { return sent + 0.01; }));
-  add(OneMotor("r_wrist_flexion", "dry friction of 0.01 N m",
-               [](double sent, double) { return std::abs(sent) > 0.01 ? sent - std::copysign(0.01, sent) : 0.0; }));
+  add(OneMotor("r_wrist_flexion", "dry friction of 0.01 N m", [](double sent, double) {
+    return std::abs(sent) > 0.01 ? sent - std::copysign(0.01, sent) : 0.0;
+  }));
   add(OneMotor("r_elbow", "at most 1 N m", [](double sent, double) { return std::clamp(sent, -1.0, 1.0); }));
   add(OneMotor("waist_pitch", "a ripple of 0.02 N m at 30 Hz",
                [](double sent, double t) { return sent + 0.02 * std::sin(2.0 * kPi * 30.0 * t); }));
@@ -134,7 +140,8 @@ void AddMotorFaults(std::vector<PlantFault>* faults) {
   add(Lag("", 0.5));
   add(Lag("r_shoulder_roll", 0.1));
   add(Exchange("rf1_2", "rf2_2"));
-  add(EngineMotor("r_elbow", "gain 1.01", [](mjModel* m, int i) { m->actuator_gainprm[mjNGAIN * i] *= 1.01; }));
+  add(EngineMotor("r_elbow", "gain 1.01",
+                  [](mjModel* m, int i) { m->actuator_gainprm[mjNGAIN * i] *= 1.01; }));
   add(EngineMotor("r_wrist_deviation", "0.1 N m s/rad of damping", [](mjModel* m, int i) {
     m->actuator_biastype[i] = mjBIAS_AFFINE;
     m->actuator_biasprm[mjNBIAS * i + 2] = -0.1;
@@ -143,16 +150,20 @@ void AddMotorFaults(std::vector<PlantFault>* faults) {
 
 // Joints and links.
 
-PlantFault JointForce(const std::string& joint, const std::string& what, void (*change)(mjModel*, int joint, int dof)) {
+PlantFault JointForce(const std::string& joint, const std::string& what,
+                      void (*change)(mjModel*, int joint, int dof)) {
   PlantFault fault{"joint " + joint + ": " + what, "joint", Cause::kUnmodelledForce, joint};
-  fault.engine = [joint, change](const Setup&, mjModel* m) { change(m, JointId(*m, joint), DofOf(*m, joint)); };
+  fault.engine = [joint, change](const Setup&, mjModel* m) {
+    change(m, JointId(*m, joint), DofOf(*m, joint));
+  };
   return fault;
 }
 
 /// A force (world, N) and a moment (N m) at a body's centre of mass, from `begin` to `end`, s.
-PlantFault Push(const std::string& body, const std::string& what, const Vector3d& force, const Vector3d& moment,
-                double begin = 0.0, double end = 1e9) {
-  PlantFault fault{"body " + body + ": " + what, body == "torus" ? "object" : "link", Cause::kUnmodelledForce, body};
+PlantFault Push(const std::string& body, const std::string& what, const Vector3d& force,
+                const Vector3d& moment, double begin = 0.0, double end = 1e9) {
+  PlantFault fault{"body " + body + ": " + what, body == "torus" ? "object" : "link", Cause::kUnmodelledForce,
+                   body};
   fault.forces = [=](const mjModel& m, double t, mjData* d) {
     mjtNum* const wrench = d->xfrc_applied + 6 * BodyId(m, body);
     const double on = begin <= t && t < end ? 1.0 : 0.0;
@@ -165,7 +176,8 @@ PlantFault Push(const std::string& body, const std::string& what, const Vector3d
 }
 
 PlantFault Body(const std::string& body, const std::string& what, void (*change)(mjModel*, int body)) {
-  PlantFault fault{"body " + body + ": " + what, body == "torus" ? "object" : "link", Cause::kUnmodelledForce};
+  PlantFault fault{"body " + body + ": " + what, body == "torus" ? "object" : "link",
+                   Cause::kUnmodelledForce};
   if (body == "torus") fault.part = body;
   fault.engine = [body, change](const Setup&, mjModel* m) { change(m, BodyId(*m, body)); };
   return fault;
@@ -252,8 +264,8 @@ void ScaleWheel(mjModel* m, const char* geom, double by) {
 /// Pairs of the floor, or of the object.
 void ChangePairs(mjModel* m, bool floor, const std::function<void(int pair)>& change) {
   for (int pair = 0; pair < m->npair; ++pair) {
-    const bool has_floor =
-        m->geom_type[m->pair_geom1[pair]] == mjGEOM_PLANE || m->geom_type[m->pair_geom2[pair]] == mjGEOM_PLANE;
+    const bool has_floor = m->geom_type[m->pair_geom1[pair]] == mjGEOM_PLANE ||
+                           m->geom_type[m->pair_geom2[pair]] == mjGEOM_PLANE;
     if (has_floor == floor) change(pair);
   }
 }
@@ -277,16 +289,23 @@ void AddWorldFaults(std::vector<PlantFault>* faults) {
             [](const Setup&, mjModel* m) { Tilt(m, 0.0, DegToRad(0.1)); }));
   add(World("gravity: 0.1 % stronger", "floor", Cause::kUnmodelledForce, "gravity",
             [](const Setup&, mjModel* m) { m->opt.gravity[2] *= 1.001; }));
-  add(World("wheels: both 0.1 mm larger", "wheels", Cause::kWheelGeometry, "wheel", [](const Setup&, mjModel* m) {
-    ScaleWheel(m, "wheel_right_geom", 1e-4);
-    ScaleWheel(m, "wheel_left_geom", 1e-4);
-  }, true));
-  add(World("wheels: the left one 0.05 mm smaller", "wheels", Cause::kWheelGeometry, "wheel_left",
-            [](const Setup&, mjModel* m) { ScaleWheel(m, "wheel_left_geom", -5e-5); }, true));
-  add(World("wheels: 2 mm farther apart", "wheels", Cause::kWheelGeometry, "wheel", [](const Setup&, mjModel* m) {
-    m->body_pos[3 * BodyId(*m, "wheel_right") + 1] -= 1e-3;
-    m->body_pos[3 * BodyId(*m, "wheel_left") + 1] += 1e-3;
-  }, true));
+  add(World(
+      "wheels: both 0.1 mm larger", "wheels", Cause::kWheelGeometry, "wheel",
+      [](const Setup&, mjModel* m) {
+        ScaleWheel(m, "wheel_right_geom", 1e-4);
+        ScaleWheel(m, "wheel_left_geom", 1e-4);
+      },
+      true));
+  add(World(
+      "wheels: the left one 0.05 mm smaller", "wheels", Cause::kWheelGeometry, "wheel_left",
+      [](const Setup&, mjModel* m) { ScaleWheel(m, "wheel_left_geom", -5e-5); }, true));
+  add(World(
+      "wheels: 2 mm farther apart", "wheels", Cause::kWheelGeometry, "wheel",
+      [](const Setup&, mjModel* m) {
+        m->body_pos[3 * BodyId(*m, "wheel_right") + 1] -= 1e-3;
+        m->body_pos[3 * BodyId(*m, "wheel_left") + 1] += 1e-3;
+      },
+      true));
   add(World("contacts: fingertips slide, mu = 0.15", "contacts", Cause::kFingertipSlip, "",
             [](const Setup&, mjModel* m) { SetFriction(m, false, 0.15); }));
   add(World("contacts: wheels slide, mu = 0.002", "contacts", Cause::kWheelSlip, "",
@@ -303,7 +322,8 @@ void AddWorldFaults(std::vector<PlantFault>* faults) {
 
 // Sensors.
 
-PlantFault Sensor(const std::string& name, const std::string& part, std::function<SensorFault(const Setup&)> make) {
+PlantFault Sensor(const std::string& name, const std::string& part,
+                  std::function<SensorFault(const Setup&)> make) {
   PlantFault fault{"sensor: " + name, "sensor", Cause::kSensing, part};
   fault.sensors = std::move(make);
   return fault;
@@ -323,9 +343,10 @@ void AddSensorFaults(std::vector<PlantFault>* faults) {
       told->q[i] += 1e-5 * (2.0 * static_cast<double>(random()) * 0x1p-32 - 1.0);
     };
   }));
-  add(Sensor("rate of r_shoulder_pitch times 1.01", "r_shoulder_pitch", [](const Setup& setup) -> SensorFault {
-    return [i = MotorOf(setup, "r_shoulder_pitch")](double, MeasuredState* told) { told->xi[i] *= 1.01; };
-  }));
+  add(Sensor(
+      "rate of r_shoulder_pitch times 1.01", "r_shoulder_pitch", [](const Setup& setup) -> SensorFault {
+        return [i = MotorOf(setup, "r_shoulder_pitch")](double, MeasuredState* told) { told->xi[i] *= 1.01; };
+      }));
   add(Sensor("heading 0.001 rad off", "heading", [](const Setup&) -> SensorFault {
     return [](double, MeasuredState* told) { told->q[2] += 1e-3; };
   }));

@@ -21,20 +21,20 @@ using SensorFault = std::function<void(double t, MeasuredState* told)>;
 
 /// One fault. Its members are called for each run anew, so that none remembers another's.
 struct PlantFault {
-  std::string name;             ///< "motor r_elbow: gain 0.99".
-  std::string kind;             ///< "motor": what a table sums up by.
-  Cause cause = Cause::kNone;   ///< That the verdict should have.
-  std::string part = {};        ///< What the evidence should name; empty for nothing.
+  std::string name;            ///< "motor r_elbow: gain 0.99".
+  std::string kind;            ///< "motor": what a table sums up by.
+  Cause cause = Cause::kNone;  ///< That the verdict should have.
+  std::string part = {};       ///< What the evidence should name; empty for nothing.
   /// Whether it is there before the robot settles: a step of the contacts' geometry would throw it.
   bool from_start = false;
-  std::function<void(const Setup&, mjModel*)> engine = {};                       ///< Changes bodies and constraints.
+  std::function<void(const Setup&, mjModel*)> engine = {};             ///< Changes bodies and constraints.
   std::function<void(const mjModel&, double t, mjData*)> forces = {};  ///< Sets xfrc_applied.
   std::function<MotorFault(const Setup&)> motors = {};
   std::function<SensorFault(const Setup&)> sensors = {};
 };
 
-/// Faults of motors, of joints, links and object, of floor, wheels and contacts, of sensors and of the solver,
-/// for the assistant robot with an object in its right hand.
+/// Faults of motors, of joints, links and object, of floor, wheels and contacts, of sensors and of the
+/// solver, for the assistant robot with an object in its right hand.
 std::vector<PlantFault> ListPlantFaults();
 
 /// The engine's simulation with a fault.

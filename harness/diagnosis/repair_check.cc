@@ -71,7 +71,7 @@ struct RepairCheck::Trial {
     }
     axle_right = IsAxleRight(Adapter(model, engine, source), kSame * evidence.length());
     if (bodies) {
-      for (const Cause& cause : BodyComparison(spec, evidence, engine).Run())
+      for (const Repair& cause : BodyComparison(spec, evidence, engine).Run())
         wrong.insert(wrong.end(), cause.parameters.begin(), cause.parameters.end());
     } else {
       forces_agree = evidence.CalcForceResidual(model).cwiseAbs().maxCoeff() <= kSameForces;
@@ -106,9 +106,9 @@ RepairCheck::RepairCheck(RobotSpec original, const mjModel& engine, std::string 
       seed_(seed),
       bodies_(bodies) {}
 
-std::optional<RobotSpec> RepairCheck::Repair(std::span<const Cause> causes) const {
+std::optional<RobotSpec> RepairCheck::MakeRepaired(std::span<const Repair> causes) const {
   RobotSpec spec = original_;
-  for (const Cause& cause : causes) Apply(cause, &spec);
+  for (const Repair& cause : causes) Apply(cause, &spec);
   try {
     static_cast<void>(RobotModel(spec));
   } catch (const InputError&) {
@@ -129,46 +129,47 @@ bool RepairCheck::RepairsNumber(const Parameter& parameter, const Trial& trial) 
   return !differs;
 }
 
-bool RepairCheck::Repairs(const Cause& cause, const Trial& trial) const {
+bool RepairCheck::Repairs(const Repair& cause, const Trial& trial) const {
   switch (cause.kind) {
-    case CauseKind::kEngineOnly:
+    case RepairKind::kEngineOnly:
       return true;
-    case CauseKind::kAxisReversed:
+    case RepairKind::kAxisReversed:
       return trial.IsLinkRight(cause.joint);
-    case CauseKind::kRowsSwapped:
-    case CauseKind::kPosesSwapped:
+    case RepairKind::kRowsSwapped:
+    case RepairKind::kPosesSwapped:
       return trial.IsLinkRight(cause.joint) && trial.IsLinkRight(cause.other);
-    case CauseKind::kParameters:
+    case RepairKind::kParameters:
       break;
   }
   return std::all_of(cause.parameters.begin(), cause.parameters.end(),
                      [&](const Parameter& parameter) { return RepairsNumber(parameter, trial); });
 }
 
-void RepairCheck::KeepWhatRepairs(std::vector<Cause>* causes) const {
+void RepairCheck::KeepWhatRepairs(std::vector<Repair>* causes) const {
   const auto make_trial = [&](const RobotSpec& spec) {
     return Trial(spec, engine_, source_, samples_, seed_, bodies_);
   };
   while (!causes->empty()) {
-    const std::optional<RobotSpec> spec = Repair(*causes);
+    const std::optional<RobotSpec> spec = MakeRepaired(*causes);
     if (!spec) {
       causes->pop_back();
       continue;
     }
     const Trial trial = make_trial(*spec);
-    const size_t dropped = std::erase_if(*causes, [&](const Cause& cause) { return !Repairs(cause, trial); });
+    const size_t dropped =
+        std::erase_if(*causes, [&](const Repair& cause) { return !Repairs(cause, trial); });
     if (dropped == 0) break;
   }
   for (size_t i = 0; i < causes->size(); ++i) {
     if ((*causes)[i].equivalents.empty()) continue;
-    std::vector<Cause> others = *causes;
-    std::erase_if((*causes)[i].equivalents, [&](const Cause& equivalent) {
+    std::vector<Repair> others = *causes;
+    std::erase_if((*causes)[i].equivalents, [&](const Repair& equivalent) {
       others[i] = equivalent;
-      const std::optional<RobotSpec> spec = Repair(others);
+      const std::optional<RobotSpec> spec = MakeRepaired(others);
       if (!spec) return true;
       const Trial trial = make_trial(*spec);
       return !std::all_of(others.begin(), others.end(),
-                          [&](const Cause& cause) { return Repairs(cause, trial); });
+                          [&](const Repair& cause) { return Repairs(cause, trial); });
     });
   }
 }

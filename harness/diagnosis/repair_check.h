@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/diagnosis/cause.h"
+#include "harness/diagnosis/repair.h"
 #include "harness/gate/static_gate.h"
 
 namespace dexcheck {
@@ -24,14 +24,14 @@ class RepairCheck {
 
   /// Takes out the causes whose part (joint row, frame, body, constant) does not agree after all of them are
   /// applied, until all that stay do; and equivalents that do not do as well.
-  void KeepWhatRepairs(std::vector<Cause>* causes) const;
+  void KeepWhatRepairs(std::vector<Repair>* causes) const;
 
  private:
   struct Trial;
-  [[nodiscard]] bool Repairs(const Cause& cause, const Trial& trial) const;
+  [[nodiscard]] bool Repairs(const Repair& cause, const Trial& trial) const;
   [[nodiscard]] bool RepairsNumber(const Parameter& parameter, const Trial& trial) const;
   /// The original with the causes' repairs, in their order; nothing when that is no robot.
-  [[nodiscard]] std::optional<RobotSpec> Repair(std::span<const Cause> causes) const;
+  [[nodiscard]] std::optional<RobotSpec> MakeRepaired(std::span<const Repair> causes) const;
 
   RobotSpec original_;
   const mjModel& engine_;

@@ -97,7 +97,8 @@ SpoiledLaw::SpoiledLaw(const Setup& setup, LawMistake mistake)
       mistake_(std::move(mistake)),
       model_(setup.model(), setup.fingertips(), setup.object().body, setup.surface(), options_),
       actuation_(setup.model()),
-      J_pinv_("J_B'", 3 * static_cast<Eigen::Index>(setup.fingertips().size()), setup.model().num_velocities()),
+      J_pinv_("J_B'", 3 * static_cast<Eigen::Index>(setup.fingertips().size()),
+              setup.model().num_velocities()),
       G_pinv_("G", 6, 3 * static_cast<Eigen::Index>(setup.fingertips().size())),
       problem_(static_cast<int>(setup.fingertips().size())),
       solver_(static_cast<int>(setup.fingertips().size()), 0, options_.force),
@@ -172,8 +173,7 @@ Vector6d SpoiledLaw::CalcObjectAcceleration(const DesiredMotion& desired) const 
   const Matrix3d R = grasp.X_Bo().linear();
   const Vector3d v = grasp.V_Bo().head<3>();
   const Vector3d omega = grasp.V_Bo().tail<3>();
-  const Vector3d p_ddot = feed * pose.p_Bd_ddot +
-                          K_v.head<3>().cwiseProduct(pose.p_Bd_dot - R * v) +
+  const Vector3d p_ddot = feed * pose.p_Bd_ddot + K_v.head<3>().cwiseProduct(pose.p_Bd_dot - R * v) +
                           K_p.head<3>().cwiseProduct(pose.p_Bd - grasp.X_Bo().translation());
   const OrientationError error = CalcOrientationError(R, omega, pose.R_Bd, pose.omega_d);
   const Vector3d e_R_ddot =
@@ -241,7 +241,8 @@ void SpoiledLaw::SendTorques(Command* command) {
   const Parts& part = AllParts();
   const ModelTerms& robot = model_.robot();
   // E_bar' tau' = M_bar' xi_dot_d + C_bar' xi_c + F_bar' + J^T f_c
-  force_ = factor(part.F) * (factor(part.gravity) * robot.gravity() + factor(part.friction) * robot.friction());
+  force_ =
+      factor(part.F) * (factor(part.gravity) * robot.gravity() + factor(part.friction) * robot.friction());
   force_.noalias() += factor(part.M) * (robot.M() * xi_dot_d_);
   if (Has(LawSlip::kCoriolisTransposed)) {
     force_.noalias() += robot.C().transpose() * xi_c_;

@@ -18,27 +18,27 @@ namespace dexcheck {
 /// What else than a factor can be wrong in a law.
 enum class LawSlip {
   kNone,
-  kNotProjected,      ///< xi_dot_d has sigma' instead of N sigma'.
-  kOtherWeight,       ///< The pseudoinverse of J_B' has the weight M_bar', or 1 where M_bar' is asked for.
-  kGraspTransposed,   ///< G^T in the place of G^+.
-  kCoriolisTransposed,///< C_bar'^T xi_c.
-  kNoActuationMap,    ///< Forces on v sent as wheel torques, without E_bar'^-1.
-  kWheelsExchanged,   ///< The torques of both wheels.
-  kJointsExchanged,   ///< The torques of the last two joints that carry the object.
-  kForceAxes,         ///< Tangential axes of each contact force exchanged.
-  kLate,              ///< X_d of one time step before.
-  kVelocityOfNow,     ///< X_d_dot at t instead of half a time step before.
-  kOneGain,           ///< K_p of x alone, 1 % too large.
-  kWideCone,          ///< F_N counts on 1.1 times the friction that is asked for.
-  kLessSqueeze,       ///< F_N with half of f_min.
-  kOtherBarrier,      ///< F_N with 1.1 times the weight of the barrier.
+  kNotProjected,        ///< xi_dot_d has sigma' instead of N sigma'.
+  kOtherWeight,         ///< The pseudoinverse of J_B' has the weight M_bar', or 1 where M_bar' is asked for.
+  kGraspTransposed,     ///< G^T in the place of G^+.
+  kCoriolisTransposed,  ///< C_bar'^T xi_c.
+  kNoActuationMap,      ///< Forces on v sent as wheel torques, without E_bar'^-1.
+  kWheelsExchanged,     ///< The torques of both wheels.
+  kJointsExchanged,     ///< The torques of the last two joints that carry the object.
+  kForceAxes,           ///< Tangential axes of each contact force exchanged.
+  kLate,                ///< X_d of one time step before.
+  kVelocityOfNow,       ///< X_d_dot at t instead of half a time step before.
+  kOneGain,             ///< K_p of x alone, 1 % too large.
+  kWideCone,            ///< F_N counts on 1.1 times the friction that is asked for.
+  kLessSqueeze,         ///< F_N with half of f_min.
+  kOtherBarrier,        ///< F_N with 1.1 times the weight of the barrier.
 };
 
 /// One mistake.
 struct LawMistake {
-  std::string name;         ///< "Coriolis forces C_bar' times 1.001".
-  size_t part = SIZE_MAX;   ///< In ListLawParts; its name is what the evidence should say.
-  double factor = 1.0;      ///< Of that part: 0 leaves it out.
+  std::string name;        ///< "Coriolis forces C_bar' times 1.001".
+  size_t part = SIZE_MAX;  ///< In ListLawParts; its name is what the evidence should say.
+  double factor = 1.0;     ///< Of that part: 0 leaves it out.
   LawSlip slip = LawSlip::kNone;
 };
 

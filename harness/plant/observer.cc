@@ -276,7 +276,8 @@ void Observer::ReadSolverResidual(const mjModel& m, const mjData& d, PlantRespon
   response->solver_force.resize(response->xi_dot.size());
   map_.ProjectForce(departure_.data(), response->solver_force);
   // The free joint's forces: in the world, then about the body's axes.
-  response->solver_residual << X_Bo_.linear().transpose() * departure_.segment<3>(dof), departure_.segment<3>(dof + 3);
+  response->solver_residual << X_Bo_.linear().transpose() * departure_.segment<3>(dof),
+      departure_.segment<3>(dof + 3);
 }
 
 void Observer::ReadContacts(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const {

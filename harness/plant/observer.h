@@ -58,7 +58,7 @@ class Observer {
   std::vector<int> tip_bodies_, wheel_bodies_;
   VectorXd M_qacc_, constraint_force_;  // nv
   VelocityMap map_;
-  VectorXd departure_;                  // nv
+  VectorXd departure_;  // nv
   std::vector<ContactCoordinates> bond_kappa_;
   std::vector<int> bond_constraints_;
   // Of the last reading.

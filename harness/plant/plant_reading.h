@@ -55,10 +55,11 @@ struct PlantResponse {
   /// What the plant's solver left over of its own equation of motion of the object, as such a wrench.
   Vector6d solver_residual = Vector6d::Zero();
   VectorXd motor_torques;  ///< n, N m: what wheels and joints received from their motors, as tau'.
-  /// n, N and N m: T^T M (qacc - T xi_dot - T_dot xi), the inertia of what xi_dot leaves out, a platform that tilts
-  /// or sinks and wheels that slip, on soft contacts. Empty for a plant that has nothing of the kind.
+  /// n, N and N m: T^T M (qacc - T xi_dot - T_dot xi), the inertia of what xi_dot leaves out, a platform that
+  /// tilts or sinks and wheels that slip, on soft contacts. Empty for a plant that has nothing of the kind.
   VectorXd departure_force;
-  /// n, N and N m: what the plant's solver left over of its own equation of motion of the robot; empty likewise.
+  /// n, N and N m: what the plant's solver left over of its own equation of motion of the robot; empty
+  /// likewise.
   VectorXd solver_force;
 };
 

@@ -51,7 +51,7 @@ Headline FindHeadline(const RunData& run) {
     return {"fail", "DISAGREEMENT",
             cause == "model"         ? "The two descriptions of the robot differ."
             : cause == "control law" ? "The torques are not those of the law, or do not do what is expected."
-                             : "The engine does not do what the equations say."};
+                                     : "The engine does not do what the equations say."};
   }
   if (run.checks().empty()) return {"open", "NOT CHECKED", "The run completed; nothing was checked."};
   return {"pass", "PASS", "Model, law, balance, prediction and assumptions hold at every step."};

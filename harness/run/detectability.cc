@@ -22,9 +22,9 @@ struct Sample {
   MeasuredState state;
   VectorXd xi_dot, f_c;
   Vector6d V_Bo_dot;
-  double scale = 1.0;        // |C_bar' xi + F_bar'|_M^-1
-  double object_scale = 1.0; // N
-  RowMatrixXd half_inverse;  // L^-T
+  double scale = 1.0;         // |C_bar' xi + F_bar'|_M^-1
+  double object_scale = 1.0;  // N
+  RowMatrixXd half_inverse;   // L^-T
 };
 
 /// What is left of (48) and (19).
@@ -136,10 +136,12 @@ DetectabilityResult FindDetectability(const Setup& setup, int states,
                                     (kStep * sample.object_scale));
     }
     result.numbers.push_back({DescribePart(spec, numbers[k]) + ": " + DescribeQuantity(numbers[k]),
-                              DescribeGroup(numbers[k]), SmallestError(bound(StepCheck::kBalanceRobot), robot),
+                              DescribeGroup(numbers[k]),
+                              SmallestError(bound(StepCheck::kBalanceRobot), robot),
                               SmallestError(bound(StepCheck::kBalanceObject), object)});
   }
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(regressor.transpose() * regressor, Eigen::EigenvaluesOnly);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(regressor.transpose() * regressor,
+                                                      Eigen::EigenvaluesOnly);
   const double largest = std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
   result.largest_singular_value = largest;
   for (Eigen::Index i = eigen.eigenvalues().size() - 1; i >= 0; --i) {

@@ -16,8 +16,9 @@ namespace dexcheck {
 struct Detectability {
   std::string name;      ///< "link r_forearm: mass".
   std::string quantity;  ///< "mass".
-  double robot = 0.0;    ///< Smallest error that fails balance_robot, relative to GetScale; infinity where none does.
-  double object = 0.0;   ///< Likewise balance_object.
+  double robot =
+      0.0;  ///< Smallest error that fails balance_robot, relative to GetScale; infinity where none does.
+  double object = 0.0;  ///< Likewise balance_object.
 };
 
 /// What a run says of the model's numbers.
@@ -33,7 +34,8 @@ struct DetectabilityResult {
 /// Runs a scenario and changes every number of the model at some of its states: what is left of (48) and (19)
 /// with the plant's accelerations and forces, to first order, against the bounds of the balances.
 /// @param states how many are looked at, evenly over the run.
-/// @throws InputError for a task; when the run fails. Stops early, with fewer numbers, when `go_on` says so after one.
+/// @throws InputError for a task; when the run fails. Stops early, with fewer numbers, when `go_on` says so
+/// after one.
 DetectabilityResult FindDetectability(const Setup& setup, int states,
                                       const std::function<bool(size_t done, size_t all)>& go_on);
 

@@ -10,8 +10,8 @@
 
 #include "controller/control/controller.h"
 #include "controller/handling/pick_and_place_controller.h"
-#include "harness/plant/plant.h"
 #include "harness/plant/imperfections.h"
+#include "harness/plant/plant.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {

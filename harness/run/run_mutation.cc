@@ -10,9 +10,9 @@
 namespace dexcheck {
 namespace {
 
-// Where the object is where it should be, feedback is nothing whatever its gains are: laws are judged from an error on,
-// m and rad, that comes within some steps. It takes 4 mm/s^2 at 20 rad/s, far below what softens contacts or makes wheels
-// slip.
+// Where the object is where it should be, feedback is nothing whatever its gains are: laws are judged from an
+// error on, m and rad, that comes within some steps. It takes 4 mm/s^2 at 20 rad/s, far below what softens
+// contacts or makes wheels slip.
 constexpr double kNudge = 1e-5;
 constexpr double kNudgeTime = 5e-3;  // s
 
@@ -74,8 +74,10 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
       mjcf_(std::move(mjcf)),
       options_(options),
       compiled_(LoadMjcf(mjcf_)) {
-  if (scenario.task) throw InputError(scenario.source + ": task: mistakes are made in runs along a trajectory");
-  const RobotModel model = ParseRobotModel(ReadTextFile(robot_.string()), robot_.string(), scenario.model_overrides);
+  if (scenario.task)
+    throw InputError(scenario.source + ": task: mistakes are made in runs along a trajectory");
+  const RobotModel model =
+      ParseRobotModel(ReadTextFile(robot_.string()), robot_.string(), scenario.model_overrides);
   if (options.parameters > 0) {
     const std::vector<Parameter> numbers = ListParameters(model.spec());
     const size_t count = std::min(numbers.size(), static_cast<size_t>(options.parameters));
@@ -144,8 +146,9 @@ void RunCampaign::RequireNoMistakeToPass(const std::function<bool()>& should_sto
     FindEngine(parts)->simulation().SetState(start_);
     if (!RunLoop(*setup, std::move(parts), &none, should_stop)) return;
     if (!none.killed) continue;
-    throw InputError(scenario_.source + ": must pass before mistakes are made in it, got " +
-                     (none.failure.empty() ? NameOf(none.cause) + (" (" + none.evidence + ")") : none.failure));
+    throw InputError(
+        scenario_.source + ": must pass before mistakes are made in it, got " +
+        (none.failure.empty() ? NameOf(none.cause) + (" (" + none.evidence + ")") : none.failure));
   }
 }
 
@@ -162,7 +165,8 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   mutant->failed_checks = JoinFailed(runner.loop().checks());
   mutant->position_error = result.tracking.position_max();
   const Expectation& expect = setup.scenario().expect;
-  mutant->is_as_expected = result.failure.empty() && !(expect.position && mutant->position_error > *expect.position);
+  mutant->is_as_expected =
+      result.failure.empty() && !(expect.position && mutant->position_error > *expect.position);
   return true;
 }
 

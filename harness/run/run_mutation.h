@@ -28,10 +28,10 @@ struct RunMutant {
   Cause cause = Cause::kNone;
   bool names_part = false;  ///< The evidence has `part` in it.
   std::string evidence;
-  std::string failure;           ///< Why the run ended early; empty when it did not.
-  std::string failed_checks;     ///< Names, separated by blanks.
-  double position_error = 0.0;   ///< Largest of the object, m.
-  bool is_as_expected = true;    ///< Whether the object was where [expect] wants it.
+  std::string failure;          ///< Why the run ended early; empty when it did not.
+  std::string failed_checks;    ///< Names, separated by blanks.
+  double position_error = 0.0;  ///< Largest of the object, m.
+  bool is_as_expected = true;   ///< Whether the object was where [expect] wants it.
 
   [[nodiscard]] bool has_right_cause() const { return killed && cause == expected; }
 };
@@ -40,8 +40,8 @@ struct RunMutant {
 /// from the state that it had there, those of the contacts' geometry from the beginning.
 class RunCampaign {
  public:
-  /// @param scenario that is no task. @throws InputError when it is one; when the scenario without a mistake does
-  /// not pass, with its cause.
+  /// @param scenario that is no task. @throws InputError when it is one; when the scenario without a mistake
+  /// does not pass, with its cause.
   RunCampaign(const Scenario& scenario, std::filesystem::path robot, std::filesystem::path mjcf,
               const RunMutationOptions& options, const std::function<bool()>& should_stop);
 
@@ -56,7 +56,8 @@ class RunCampaign {
   /// @param nudge by which X_d jumps at the beginning, m and rad.
   [[nodiscard]] Scenario MakeScenario(double from, double duration, double nudge) const;
   [[nodiscard]] std::unique_ptr<Setup> MakeSetup(const Scenario& scenario, const RobotModel* model) const;
-  bool RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant, const std::function<bool()>& should_stop);
+  bool RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant,
+               const std::function<bool()>& should_stop);
   void RequireNoMistakeToPass(const std::function<bool()>& should_stop);
 
   Scenario scenario_;

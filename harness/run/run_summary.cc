@@ -109,7 +109,8 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
       }
     }
     json["settling"] = Json::object();
-    for (const CheckRecord& check : loop.checks().settling_failures()) json["settling"][check.name] = ToJson(check);
+    for (const CheckRecord& check : loop.checks().settling_failures())
+      json["settling"][check.name] = ToJson(check);
     const CrossCheck& checks = loop.checks();
     const StepFindings& findings = checks.findings();
     json["assumptions"] = {{"fingertip_slip_max_m", checks.Find("fingertip_slip").worst},

@@ -277,8 +277,8 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   const TomlDocument document = OpenDocument(text, source, overrides, &model_overrides);
   TomlTable root = document.Open();
   root.RejectOthersThan({"name", "description", "duration", "settle", "start", "start_error", "model",
-                         "plant", "grasp", "task", "trajectory", "control", "sensing", "actuation", "disturbance",
-                         "mismatch", "bounds", "expect"});
+                         "plant", "grasp", "task", "trajectory", "control", "sensing", "actuation",
+                         "disturbance", "mismatch", "bounds", "expect"});
   scenario.name = root.Get("name").AsName();
   if (const auto description = root.Find("description")) scenario.description = description->AsText();
   scenario.duration = root.Get("duration").AsPositive();

@@ -13,8 +13,9 @@ void UseDescription(const RobotDescription& robot) {
   Expect(robot.joints.size() == robot.spec.joints.size(), "joints");
   for (const Joint& joint : robot.spec.joints) {
     if (joint.coupling) {
-      Expect(joint.coupling->leader >= 0 && joint.coupling->leader < static_cast<int>(robot.spec.joints.size()),
-             "a coupling without a leader");
+      Expect(
+          joint.coupling->leader >= 0 && joint.coupling->leader < static_cast<int>(robot.spec.joints.size()),
+          "a coupling without a leader");
     }
   }
   const RobotModel model(robot.spec);

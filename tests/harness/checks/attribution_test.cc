@@ -198,7 +198,8 @@ TEST(Attribute, AForceOnTheRobotAndWhatSlidesAreToldByTime) {
     EXPECT_EQ(result.cause, force_first ? Cause::kUnmodelledForce : Cause::kWheelSlip);
   }
   // What slides in the same step tells; what pushes at a stop is the stop.
-  EXPECT_EQ(FakeRun().Fail("balance_robot", 0.1).Fail("cone_use", 0.1).Explain().cause, Cause::kFingertipSlip);
+  EXPECT_EQ(FakeRun().Fail("balance_robot", 0.1).Fail("cone_use", 0.1).Explain().cause,
+            Cause::kFingertipSlip);
   EXPECT_EQ(FakeRun().Fail("balance_robot", 0.1).Fail("joint_stop", 0.1).Explain().cause, Cause::kJointStop);
 }
 

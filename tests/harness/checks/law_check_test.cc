@@ -30,9 +30,10 @@ TEST(LawCheck, TheRightLawPassesToRounding) {
 
 // What is spoiled is the controller's own law: without a mistake it sends what the controller sends.
 TEST(LawCheck, AnUnchangedLawIsNotSpoiled) {
-  for (const std::vector<std::string>& overrides :
-       {std::vector<std::string>{}, {"control.orientation='rotation'"}, {"control.weight='mass'"},
-        {"plant.control_step=4e-3"}}) {
+  for (const std::vector<std::string>& overrides : {std::vector<std::string>{},
+                                                    {"control.orientation='rotation'"},
+                                                    {"control.weight='mass'"},
+                                                    {"plant.control_step=4e-3"}}) {
     std::vector<std::string> all = {"duration=0.05", "settle=0.1", "start_error.xyz=[1e-4, 0, 0]"};
     all.insert(all.end(), overrides.begin(), overrides.end());
     const ShippedRun shipped("curve", all);

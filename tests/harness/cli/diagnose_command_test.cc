@@ -132,12 +132,13 @@ TEST(MutateCommand, InterruptedEndsWithWhatWasDone) {
   EXPECT_FALSE(Json::parse(ReadText(folder.path() / "out.json")).at("complete").get<bool>());
 }
 
-// Mistakes in a run: the same exit codes, a table, JSON that a program reads, and what has no meaning there is refused.
+// Mistakes in a run: the same exit codes, a table, JSON that a program reads, and what has no meaning there
+// is refused.
 TEST(MutateRunCommand, CountsWhatIsFoundInARun) {
   const TempFolder folder;
   const std::string file = (folder.path() / "out.json").string();
-  const ProgramResult result = RunDexcheck({"mutate", "--run", "hold", "--set", "settle=0.2", "--from", "0.01", "--duration",
-                                            "0.01", "--numbers", "4", "--json", file});
+  const ProgramResult result = RunDexcheck({"mutate", "--run", "hold", "--set", "settle=0.2", "--from",
+                                            "0.01", "--duration", "0.01", "--numbers", "4", "--json", file});
   // `hold` does not move: what acts on velocities alone survives.
   EXPECT_EQ(result.exit_code, 1) << result.err;
   EXPECT_THAT(result.out, HasSubstr("SURVIVORS"));
@@ -159,8 +160,8 @@ TEST(MutateRunCommand, RefusesWhatHasNoMeaning) {
 
 TEST(MutateRunCommand, InterruptedTellsWhatWasDone) {
   const TempFolder folder;
-  testing::Program program(DexcheckCommand({"mutate", "--run", "hold", "--set", "settle=0.1", "--from", "0.01", "--numbers",
-                                            "100000", "--json", "out.json"}),
+  testing::Program program(DexcheckCommand({"mutate", "--run", "hold", "--set", "settle=0.1", "--from",
+                                            "0.01", "--numbers", "100000", "--json", "out.json"}),
                            {folder.path()});
   for (int attempt = 0; attempt < 3000 && std::filesystem::is_empty(folder.path()); ++attempt)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));

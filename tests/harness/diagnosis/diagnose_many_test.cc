@@ -168,16 +168,16 @@ void Look(const Robot& robot, const RobotSpec& wrong, bool bodies_only, const st
   ++tally->sets;
   tally->causes += static_cast<int>(diagnosis.causes.size());
   RobotSpec repaired = wrong;
-  for (const Cause& cause : diagnosis.causes) {
-    Cause printed = cause;
+  for (const Repair& cause : diagnosis.causes) {
+    Repair printed = cause;
     for (size_t i = 0; i < cause.parameters.size(); ++i)
       printed.values[i] = ReadBackPrinted(wrong, cause.parameters[i], cause.values[i]);
     Apply(printed, &repaired);
   }
   ASSERT_TRUE(IsRobot(repaired)) << what;
   Comparison comparison(robot, repaired, random);
-  for (const Cause& cause : diagnosis.causes) {
-    EXPECT_NE(cause.kind, CauseKind::kEngineOnly) << what;
+  for (const Repair& cause : diagnosis.causes) {
+    EXPECT_NE(cause.kind, RepairKind::kEngineOnly) << what;
     for (const Parameter& parameter : cause.parameters)
       EXPECT_TRUE(comparison.IsSame(parameter)) << what << ": " << Describe(cause, wrong, "FILE");
     for (const int joint : {cause.joint, cause.other}) {

@@ -69,10 +69,10 @@ bool IsNamed(const Diagnosis& diagnosis, const Mutant& mutant, size_t mistakes) 
   const size_t looked_at = std::min(mistakes, diagnosis.causes.size());
   return std::any_of(diagnosis.causes.begin(),
                      diagnosis.causes.begin() + static_cast<std::ptrdiff_t>(looked_at),
-                     [&](const Cause& cause) {
+                     [&](const Repair& cause) {
                        return IsNamedBy(mutant, cause) ||
                               std::any_of(cause.equivalents.begin(), cause.equivalents.end(),
-                                          [&](const Cause& equal) { return IsNamedBy(mutant, equal); });
+                                          [&](const Repair& equal) { return IsNamedBy(mutant, equal); });
                      });
 }
 
@@ -99,8 +99,8 @@ class Score {
 /// Whether two changes are of one vector, tensor or row, and so one mistake.
 bool AreOneMistake(const Mutant& a, const Mutant& b) {
   const auto touches = [](const Mutant& mutant, const Mutant& other) {
-    if (mutant.expected.kind != CauseKind::kParameters) {
-      if (other.expected.kind != CauseKind::kParameters) return true;
+    if (mutant.expected.kind != RepairKind::kParameters) {
+      if (other.expected.kind != RepairKind::kParameters) return true;
       const int joint = other.expected.parameters.front().index;
       return joint == mutant.expected.joint || joint == mutant.expected.other;
     }
@@ -260,7 +260,7 @@ TEST(Diagnose, SaysWhatOnlyTheMjcfHas) {
   ASSERT_EQ(diagnosis.causes.size(), 2U);
   EXPECT_EQ(DescribeShort(diagnosis.causes[0], robot.spec), "joint panda_joint3: armature");
   EXPECT_EQ(diagnosis.causes[0].values, std::vector<double>{0.1});
-  EXPECT_EQ(diagnosis.causes[1].kind, CauseKind::kEngineOnly);
+  EXPECT_EQ(diagnosis.causes[1].kind, RepairKind::kEngineOnly);
   EXPECT_NE(diagnosis.causes[1].note.find("panda_joint3"), std::string::npos);
   EXPECT_NE(diagnosis.causes[1].note.find("spring of 2 only in the MJCF"), std::string::npos);
 }

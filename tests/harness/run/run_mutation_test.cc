@@ -81,14 +81,15 @@ TEST(RunCampaign, FindsFaultsOfPlantsAndTheirCauses) {
   EXPECT_GE(20 * faults.killed, 19 * faults.made);
   EXPECT_GE(20 * faults.cause, 19 * faults.made);
   EXPECT_GE(20 * faults.part, 19 * faults.with_part);
-  for (const RunMutant& mutant : campaign.mutants()) EXPECT_NE(mutant.cause, Cause::kIntegrator) << mutant.name;
+  for (const RunMutant& mutant : campaign.mutants())
+    EXPECT_NE(mutant.cause, Cause::kIntegrator) << mutant.name;
 }
 
 TEST(RunCampaign, ARunThatDoesNotPassIsNoPlaceForMistakes) {
   RunMutationOptions options;
   options.from = 0.01;
-  EXPECT_THROW(RunCampaign(ReadShippedScenario("curve", {"settle=0.1", "model.object.mass=0.21"}), kRobot, kScene, options,
-                           kGoOn),
+  EXPECT_THROW(RunCampaign(ReadShippedScenario("curve", {"settle=0.1", "model.object.mass=0.21"}), kRobot,
+                           kScene, options, kGoOn),
                InputError);
   EXPECT_THROW(RunCampaign(ReadShippedScenario("lift"), kRobot, kScene, options, kGoOn), InputError);
 }

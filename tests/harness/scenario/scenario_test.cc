@@ -110,8 +110,9 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"fast_camera",
                  {"sensing.object_rate=1500"},
                  "sensing.object_rate: must be at most one pose a time step, got 1500"},
-        BadInput{
-            "filter_without_size", {"sensing.velocity=kalman"}, "sensing: missing key \"kalman_acceleration\""},
+        BadInput{"filter_without_size",
+                 {"sensing.velocity=kalman"},
+                 "sensing: missing key \"kalman_acceleration\""},
         BadInput{"unknown_source",
                  {"sensing.velocity=guessed"},
                  "sensing.velocity: must be one of \"measured\", \"differenced\", \"kalman\""},

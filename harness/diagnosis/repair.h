@@ -9,7 +9,7 @@
 
 namespace dexcheck {
 
-enum class CauseKind {
+enum class RepairKind {
   kParameters,    ///< One number, or several of one vector or tensor.
   kAxisReversed,  ///< A joint turns (or slides) the other way.
   kRowsSwapped,   ///< The MDH rows of two joints are exchanged.
@@ -17,8 +17,8 @@ enum class CauseKind {
   kEngineOnly,    ///< The MJCF has something that the analytic model cannot have.
 };
 
-struct Cause {
-  CauseKind kind = CauseKind::kParameters;
+struct Repair {
+  RepairKind kind = RepairKind::kParameters;
   std::vector<Parameter>
       parameters;  ///< kParameters: what to change (a mass first when its inertia scales with it),
   std::vector<double> values;  ///< and the values that repair it.
@@ -28,16 +28,16 @@ struct Cause {
 
   double explained = 0.0;  ///< Share of all residuals that the repair removes, after the causes before it.
   double explained_of_forces = 0.0;  ///< The same of the forces alone.
-  std::vector<Cause> equivalents;    ///< Other repairs that remove just as much.
+  std::vector<Repair> equivalents;   ///< Other repairs that remove just as much.
 };
 
 /// The repair.
-void Apply(const Cause& cause, RobotSpec* spec);
+void Apply(const Repair& cause, RobotSpec* spec);
 
 /// "link r_forearm: mass 1.9 kg in FILE, 1.998 kg repairs it". `spec` is the model as it is in the file.
-std::string Describe(const Cause& cause, const RobotSpec& spec, const std::string& file);
+std::string Describe(const Repair& cause, const RobotSpec& spec, const std::string& file);
 /// "link r_forearm: mass".
-std::string DescribeShort(const Cause& cause, const RobotSpec& spec);
+std::string DescribeShort(const Repair& cause, const RobotSpec& spec);
 
 /// The joint turns the other way: q_i becomes -q_i, and at q_i = 0 nothing moves.
 void ReverseAxis(RobotSpec* spec, int joint);
@@ -56,6 +56,6 @@ double RoundSolved(const RobotSpec& spec, const Parameter& parameter, double val
 
 /// Of repairs that remove as much, the likelier: whose numbers are rounder, then whose numbers are not zero
 /// in the file, then the earlier kind.
-bool IsLikelier(const Cause& a, const Cause& b, const RobotSpec& spec);
+bool IsLikelier(const Repair& a, const Repair& b, const RobotSpec& spec);
 
 }  // namespace dexcheck

@@ -1,4 +1,4 @@
-#include "harness/diagnosis/cause.h"
+#include "harness/diagnosis/repair.h"
 
 #include <fmt/format.h>
 
@@ -18,7 +18,7 @@ constexpr int kPrintedDigits = 13;
 Joint& JointOf(RobotSpec* spec, int joint) { return spec->joints[static_cast<size_t>(joint)]; }
 
 /// A mass, and with it the inertia: the only causes of several kinds.
-bool IsBodyScaled(const Cause& cause) {
+bool IsBodyScaled(const Repair& cause) {
   return cause.parameters.size() > 1 && cause.parameters[0].kind == ParameterKind::kMass;
 }
 
@@ -50,7 +50,7 @@ std::string FormatValues(const RobotSpec& spec, const std::vector<Parameter>& pa
   return text;
 }
 
-std::string DescribeWhat(const Cause& cause) {
+std::string DescribeWhat(const Repair& cause) {
   if (IsBodyScaled(cause)) return DescribeQuantity(cause.parameters[0]);
   return cause.parameters.size() == 1 ? DescribeQuantity(cause.parameters[0])
                                       : DescribeGroup(cause.parameters[0]);
@@ -87,43 +87,43 @@ void SwapPoses(RobotSpec* spec, int joint, int other) {
   std::swap(JointOf(spec, joint).X_PB, JointOf(spec, other).X_PB);
 }
 
-void Apply(const Cause& cause, RobotSpec* spec) {
+void Apply(const Repair& cause, RobotSpec* spec) {
   switch (cause.kind) {
-    case CauseKind::kParameters:
+    case RepairKind::kParameters:
       for (size_t i = 0; i < cause.parameters.size(); ++i)
         SetValue(spec, cause.parameters[i], cause.values[i]);
       return;
-    case CauseKind::kAxisReversed:
+    case RepairKind::kAxisReversed:
       return ReverseAxis(spec, cause.joint);
-    case CauseKind::kRowsSwapped:
+    case RepairKind::kRowsSwapped:
       return SwapRows(spec, cause.joint, cause.other);
-    case CauseKind::kPosesSwapped:
+    case RepairKind::kPosesSwapped:
       return SwapPoses(spec, cause.joint, cause.other);
-    case CauseKind::kEngineOnly:
+    case RepairKind::kEngineOnly:
       return;
   }
 }
 
-std::string DescribeShort(const Cause& cause, const RobotSpec& spec) {
+std::string DescribeShort(const Repair& cause, const RobotSpec& spec) {
   const auto name = [&](int joint) { return spec.joints[static_cast<size_t>(joint)].name; };
   switch (cause.kind) {
-    case CauseKind::kParameters:
+    case RepairKind::kParameters:
       return DescribePart(spec, cause.parameters[0]) + ": " + DescribeWhat(cause);
-    case CauseKind::kAxisReversed:
+    case RepairKind::kAxisReversed:
       return "joint " + name(cause.joint) + ": sign of the axis";
-    case CauseKind::kRowsSwapped:
+    case RepairKind::kRowsSwapped:
       return "joints " + name(cause.joint) + " and " + name(cause.other) + ": rows exchanged";
-    case CauseKind::kPosesSwapped:
+    case RepairKind::kPosesSwapped:
       return "joints " + name(cause.joint) + " and " + name(cause.other) + ": places exchanged";
-    case CauseKind::kEngineOnly:
+    case RepairKind::kEngineOnly:
       break;
   }
   return cause.note;
 }
 
-std::string Describe(const Cause& cause, const RobotSpec& spec, const std::string& file) {
+std::string Describe(const Repair& cause, const RobotSpec& spec, const std::string& file) {
   switch (cause.kind) {
-    case CauseKind::kParameters: {
+    case RepairKind::kParameters: {
       if (IsBodyScaled(cause)) {
         const Parameter& mass = cause.parameters[0];
         return fmt::format("{} {} in {}, {} repairs it, with the inertia in proportion",
@@ -136,13 +136,13 @@ std::string Describe(const Cause& cause, const RobotSpec& spec, const std::strin
                          FormatValues(spec, cause.parameters, found), file,
                          FormatValues(spec, cause.parameters, cause.values));
     }
-    case CauseKind::kAxisReversed:
+    case RepairKind::kAxisReversed:
       return fmt::format("{}: turns the other way in {}; its axis reversed repairs it",
                          DescribeShort(cause, spec), file);
-    case CauseKind::kRowsSwapped:
-    case CauseKind::kPosesSwapped:
+    case RepairKind::kRowsSwapped:
+    case RepairKind::kPosesSwapped:
       return fmt::format("{} in {}; exchanging them repairs it", DescribeShort(cause, spec), file);
-    case CauseKind::kEngineOnly:
+    case RepairKind::kEngineOnly:
       break;
   }
   return cause.note;
@@ -184,8 +184,8 @@ double ReadBackPrinted(const RobotSpec& spec, const Parameter& parameter, double
   return IsAngle(spec, parameter) ? DegToRad(printed) : printed;
 }
 
-bool IsLikelier(const Cause& a, const Cause& b, const RobotSpec& spec) {
-  const auto rank = [&](const Cause& cause) {
+bool IsLikelier(const Repair& a, const Repair& b, const RobotSpec& spec) {
+  const auto rank = [&](const Repair& cause) {
     int digits = 0;
     int zeros = 0;
     int kind = -1;
