@@ -373,8 +373,8 @@ class Page {
   void AddFooter() {
     Add("<footer>Made by dexcheck {} from the run's log, which holds every number, and the inputs to repeat "
         "the run bit "
-        "for bit: <code>dexcheck run --replay RUN_DIR</code>. Plots by dygraphs, replay by three.js (both "
-        "MIT license).</footer>\n",
+        "for bit: <code>dexcheck run --replay RUN_DIR</code>. Plots by dygraphs, replay by three.js "
+        "(copyright 2010-2019 three.js authors; both MIT license).</footer>\n",
         Text("dexcheck_version"));
     html_ +=
         EndPage(content_.figures, run_.time(), content_.scene.replay ? &*content_.scene.replay : nullptr);
