@@ -149,9 +149,10 @@ void ReplayBrowserTest::ExpectObjectDrawnAt(long row, Renderer* renderer, double
 
 TEST_F(ReplayBrowserTest, DrawsWhatTheOffscreenRendererDrawsAndCostsAPhoneLittle) {
   for (const long row : {0L, 37L, 100L}) ExpectPartsAt(row);
-  const nlohmann::json info = Ask(
-      "const info = r.renderer.info; info.autoReset = false; info.reset(); r.draw(); info.autoReset = true;"
-      "return [info.render.calls, info.render.triangles];");
+  const nlohmann::json info =
+      Ask("const info = r.renderer.info; info.autoReset = false; info.reset(); r.draw();"
+          "const spent = [info.render.calls, info.render.triangles]; info.autoReset = true; info.reset(); "
+          "return spent;");
   EXPECT_GT(info[0], 5);
   EXPECT_LE(info[0], kMostCalls);
   EXPECT_GT(info[1], 20'000);
