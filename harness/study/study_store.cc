@@ -195,8 +195,17 @@ std::string StudyStore::ListColumns() const {
   return columns + ", machine";
 }
 
-std::vector<TrialRow> StudyStore::ReadRows() const {
-  Statement select(database_.get(), "SELECT " + ListColumns() + " FROM trials ORDER BY trial");
+std::vector<long> StudyStore::ListNumbers() const {
+  Statement select(database_.get(), "SELECT trial FROM trials WHERE trial >= 0 ORDER BY trial");
+  std::vector<long> numbers;
+  while (select.Step()) numbers.push_back(static_cast<long>(select.GetWhole(0)));
+  return numbers;
+}
+
+std::vector<TrialRow> StudyStore::ReadRows(long first) const {
+  Statement select(database_.get(),
+                   "SELECT " + ListColumns() + " FROM trials WHERE trial >= ? ORDER BY trial");
+  select.Bind(1, static_cast<long long>(first));
   std::vector<TrialRow> rows;
   while (select.Step()) {
     TrialRow row;
@@ -306,16 +315,22 @@ void StudyStore::AddAll(const std::vector<TrialSource>& sources) {
   transaction.Commit();
 }
 
-long StudyStore::RemoveFailed(const std::vector<Trial>& trials) {
+void StudyStore::RemoveFrom(long first) {
+  Statement remove(database_.get(), "DELETE FROM trials WHERE trial >= ?");
+  remove.Bind(1, static_cast<long long>(first));
+  remove.Step();
+}
+
+long StudyStore::RemoveFailed(const std::vector<long>& trials) {
   Transaction transaction(database_.get());
   std::set<long> failed;
   for (const TrialRow& row : ReadRows()) {
     if (IsFailed(row.result.outcome)) failed.insert(row.trial.number);
   }
   long count = 0;
-  for (const Trial& trial : trials) {
-    if (failed.count(trial.number) == 0) continue;
-    Remove(trial.number);
+  for (const long trial : trials) {
+    if (failed.count(trial) == 0) continue;
+    Remove(trial);
     ++count;
   }
   transaction.Commit();

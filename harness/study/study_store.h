@@ -56,8 +56,10 @@ class StudyStore {
   /// Throws InputError that names the first column in which this study is another one.
   void RequireSame(const StudyIdentity& other) const;
 
-  /// By trial number.
-  [[nodiscard]] std::vector<TrialRow> ReadRows() const;
+  /// By trial number. @param first number that is read.
+  [[nodiscard]] std::vector<TrialRow> ReadRows(long first = 0) const;
+  /// Numbers of the trials that have a row, ascending.
+  [[nodiscard]] std::vector<long> ListNumbers() const;
   [[nodiscard]] bool Has(long trial) const;
 
   /// Takes a trial on for this process. False when it is done, or another living process of this machine has
@@ -71,7 +73,9 @@ class StudyStore {
   /// (IsFailed) give way to others. @throws InputError when one differs; then nothing is added.
   void AddAll(const std::vector<TrialSource>& sources);
   /// Forgets these trials where they failed (IsFailed). @return how many.
-  long RemoveFailed(const std::vector<Trial>& trials);
+  long RemoveFailed(const std::vector<long>& trials);
+  /// Forgets all trials from this number on.
+  void RemoveFrom(long first);
 
  private:
   StudyStore(const std::filesystem::path& path, Database::Mode mode);
