@@ -152,7 +152,12 @@ int RunStudy(const Request& request) {
   const std::vector<Trial> trials =
       study.is_search() ? std::vector<Trial>() : SelectShard(ListTrials(study), request.shard);
   CheckTrials(&inputs);
-  StudyStore store = StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), study);
+  const auto makes_same_rows = [&](const std::vector<TrialRow>& rows) {
+    return MakesRowsAgain(inputs, rows);
+  };
+  StudyStore store =
+      StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), study, makes_same_rows);
+  if (!request.quiet && !store.change().empty()) fmt::print("{}: {}\n", request.database, store.change());
   CatchInterrupts();
   if (request.retry_failed) RemoveFailed(study, &store);
   const std::vector<long> missing =

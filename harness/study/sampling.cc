@@ -7,6 +7,7 @@
 #include <random>
 
 #include "controller/common/errors.h"
+#include "harness/study/sensitivity.h"
 
 namespace dexcheck {
 namespace {
@@ -66,17 +67,43 @@ std::vector<UnitPoint> MakeSobol(int dimensions, long count, std::optional<std::
   return points;
 }
 
-std::vector<UnitPoint> MakeUnitPoints(const Sample& sample, int dimensions) {
-  const std::optional<std::uint64_t> scramble =
-      sample.scramble ? std::optional<std::uint64_t>(sample.seed) : std::nullopt;
-  return sample.method == Sampling::kSobol ? MakeSobol(dimensions, sample.count, scramble)
-                                           : MakeLatinHypercube(dimensions, sample.count, sample.seed);
+std::vector<UnitPoint> MakeRandom(int dimensions, long count, std::uint64_t seed) {
+  std::vector<UnitPoint> points(static_cast<size_t>(count), UnitPoint(static_cast<size_t>(dimensions)));
+  std::mt19937_64 random(seed);
+  for (UnitPoint& point : points) {
+    for (double& x : point) x = static_cast<double>(random() >> 11U) * 0x1p-53;
+  }
+  return points;
 }
 
-long CountUnitPoints(const Sample& sample, int /*dimensions*/) { return sample.count; }
+std::vector<UnitPoint> MakeUnitPoints(const Sample& sample, int dimensions) {
+  switch (sample.method) {
+    case Sampling::kSobol:
+      return MakeSobol(dimensions, sample.count,
+                       sample.scramble ? std::optional<std::uint64_t>(sample.seed) : std::nullopt);
+    case Sampling::kRandom:
+      return MakeRandom(dimensions, sample.count, sample.seed);
+    case Sampling::kSaltelli:
+      return MakeSaltelli(dimensions, sample.count, sample.seed);
+    case Sampling::kMorris:
+      return MakeMorris(dimensions, sample.count, sample.seed);
+    case Sampling::kLatinHypercube:
+    case Sampling::kGrid:
+      break;
+  }
+  return MakeLatinHypercube(dimensions, sample.count, sample.seed);
+}
+
+long CountUnitPoints(const Sample& sample, int dimensions) {
+  if (sample.method == Sampling::kSaltelli) return sample.count * (dimensions + 2);
+  if (sample.method == Sampling::kMorris) return sample.count * (dimensions + 1);
+  return sample.count;
+}
 
 int CountMostDimensions(const Sample& sample) {
-  return sample.method == Sampling::kSobol ? kMaxSobolDimensions : std::numeric_limits<int>::max();
+  if (sample.method == Sampling::kSobol) return kMaxSobolDimensions;
+  if (sample.method == Sampling::kSaltelli) return kMaxSobolDimensions / 2;
+  return std::numeric_limits<int>::max();
 }
 
 }  // namespace dexcheck

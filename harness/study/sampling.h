@@ -26,6 +26,9 @@ constexpr int kMaxSobolDimensions = 64;
 ///   uniformly distributed and each dyadic box keeps its share of the points.
 std::vector<UnitPoint> MakeSobol(int dimensions, long count, std::optional<std::uint64_t> scramble = {});
 
+/// `count` independent points, even in the cube.
+std::vector<UnitPoint> MakeRandom(int dimensions, long count, std::uint64_t seed);
+
 /// What a study's sample asks for.
 std::vector<UnitPoint> MakeUnitPoints(const Sample& sample, int dimensions);
 /// How many points those are.

@@ -23,17 +23,17 @@ struct Variation {
   bool logarithmic = false;  ///< Even in the logarithm.
 };
 
-enum class Sampling { kGrid, kLatinHypercube, kSobol };
+enum class Sampling { kGrid, kLatinHypercube, kSobol, kRandom, kSaltelli, kMorris };
 
 /// Points of the ranges of some keys.
 struct Sample {
   Sampling method = Sampling::kGrid;
-  long count = 0;          ///< Points; of a grid its keys say how many.
-  std::uint64_t seed = 0;  ///< Of a Latin hypercube, and of a Sobol sequence that is scrambled.
+  long count = 0;  ///< Points; of a grid its keys say how many. Blocks and walks of kSaltelli and kMorris.
+  std::uint64_t seed = 0;  ///< Of all but a grid and a Sobol sequence that is not scrambled.
   bool scramble = false;   ///< A Sobol sequence.
 };
 
-enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kBobyqa };
+enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kBobyqa, kMargins };
 enum class SearchStart { kMiddle, kTheory, kValues };
 
 /// How a study looks for the best point.
@@ -42,8 +42,9 @@ struct Search {
   long count = 0;           ///< Points at most.
   long population = 0;      ///< Points of a generation, of kCmaEs and kNsga2.
   long starts = 1;          ///< Local searches at a time, of kNelderMead and kBobyqa.
+  long directions = 0;      ///< Random ones, of kMargins.
   double step = 0.25;       ///< First step relative to the ranges.
-  double tolerance = 1e-3;  ///< Relative to the ranges: where a local search ends.
+  double tolerance = 1e-3;  ///< Relative to the ranges: where a local search or a bisection ends.
   std::uint64_t seed = 0;
   SearchStart start = SearchStart::kMiddle;
   std::vector<double> start_values;  ///< Of kValues, one for each key.

@@ -6,6 +6,7 @@
 
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
+#include "harness/study/margin_search.h"
 #include "harness/study/sampling.h"
 #include "harness/study/study.h"
 
@@ -90,8 +91,11 @@ void ReadVariations(const TomlValue& value, bool is_grid, Study* study) {
 /// Keys "method", "count", "seed" and "scramble".
 Sample ReadSample(TomlTable* table) {
   Sample sample;
-  sample.method = table->Get("method").AsChoice<Sampling>(
-      {{"latin_hypercube", Sampling::kLatinHypercube}, {"sobol", Sampling::kSobol}});
+  sample.method = table->Get("method").AsChoice<Sampling>({{"latin_hypercube", Sampling::kLatinHypercube},
+                                                           {"sobol", Sampling::kSobol},
+                                                           {"random", Sampling::kRandom},
+                                                           {"saltelli", Sampling::kSaltelli},
+                                                           {"morris", Sampling::kMorris}});
   sample.count = table->Get("count").AsWhole(1, kMaxTrials);
   if (const auto seed = table->Find("seed")) {
     sample.seed = static_cast<std::uint64_t>(seed->AsWhole(0, kMaxSeed));
@@ -105,12 +109,15 @@ Sample ReadSample(TomlTable* table) {
 
 void RequireDimensions(const TomlValue& where, const Sample& sample, size_t keys) {
   const auto most = static_cast<size_t>(CountMostDimensions(sample));
-  if (keys > most) where.Reject("a Sobol sequence varies at most " + std::to_string(most) + " keys");
+  if (keys > most) where.Reject("this method varies at most " + std::to_string(most) + " keys");
 }
 
 void ReadNested(const TomlValue& value, Study* study) {
   TomlTable table = value.AsTable();
   study->nested = ReadSample(&table);
+  if (study->nested.method == Sampling::kSaltelli || study->nested.method == Sampling::kMorris) {
+    table.Get("method").Fail("must be one of \"latin_hypercube\", \"sobol\", \"random\"");
+  }
   const TomlValue vary = table.Get("vary");
   const size_t before = study->variations.size();
   ReadVariations(vary, /*is_grid=*/false, study);
@@ -203,6 +210,24 @@ void ReadStart(const TomlValue& value, Study* study) {
   }
 }
 
+/// Keys of `method = "margins"`.
+void ReadMargins(TomlTable* table, Study* study) {
+  constexpr long kMaxDirections = 10000;
+  constexpr double kFinest = 1e-9;
+  Search& search = study->search;
+  if (const auto directions = table->Find("directions"))
+    search.directions = directions->AsWhole(0, kMaxDirections);
+  if (const auto tolerance = table->Find("tolerance")) {
+    search.tolerance = tolerance->AsPositive();
+    if (search.tolerance < kFinest) tolerance->Fail("must be at least " + FormatNumber(kFinest));
+  }
+  if (const auto seed = table->Find("seed"))
+    search.seed = static_cast<std::uint64_t>(seed->AsWhole(0, kMaxSeed));
+  if (const auto start = table->Find("start")) ReadStart(*start, study);
+  table->RejectUnused();
+  search.count = MarginSearcher::CountPoints(search, study->num_keys());
+}
+
 void ReadSearch(const TomlValue& value, Study* study) {
   constexpr long kLeastPopulation = 8;  // of which CMA-ES and NSGA-II take the better half
   constexpr long kMaxPopulation = 10000;
@@ -213,7 +238,12 @@ void ReadSearch(const TomlValue& value, Study* study) {
   search.method = method.AsChoice<SearchMethod>({{"cma_es", SearchMethod::kCmaEs},
                                                  {"nsga2", SearchMethod::kNsga2},
                                                  {"nelder_mead", SearchMethod::kNelderMead},
-                                                 {"bobyqa", SearchMethod::kBobyqa}});
+                                                 {"bobyqa", SearchMethod::kBobyqa},
+                                                 {"margins", SearchMethod::kMargins}});
+  if (search.method == SearchMethod::kMargins) {
+    ReadMargins(&table, study);
+    return;
+  }
   const TomlValue count = table.Get("count");
   search.count = count.AsWhole(1, kMaxTrials);
   if (search.method == SearchMethod::kCmaEs || search.method == SearchMethod::kNsga2) {

@@ -4,6 +4,8 @@
 #include <chrono>
 #include <deque>
 #include <map>
+#include <optional>
+#include <set>
 #include <thread>
 
 #include "controller/common/errors.h"
@@ -90,6 +92,26 @@ void RunTrials(const StudyInputs& inputs, const std::vector<Trial>& trials, cons
   auto finished = static_cast<long>(trials.size() - missing.size());
   TrialMaker maker(inputs, options, store);
   maker.Run(missing, [&](const TrialRow&) { options.tell(++finished); });
+}
+
+bool MakesRowsAgain(const StudyInputs& inputs, const std::vector<TrialRow>& rows) {
+  std::vector<const TrialRow*> good;
+  for (const TrialRow& row : rows) {
+    if (!IsFailed(row.result.outcome)) good.push_back(&row);
+  }
+  if (good.empty()) return true;
+  const std::set<const TrialRow*> chosen = {good.front(), good[good.size() / 2], good.back()};
+  for (const TrialRow* row : chosen) {
+    // In a process of its own, as when it was made.
+    TrialPool pool(1, inputs.study.trial_time_limit,
+                   [&](const Trial& trial) { return RunTrial(inputs, trial); });
+    pool.Start(row->trial);
+    std::optional<EndedTrial> ended;
+    while (!ended) ended = pool.Wait();
+    ended->row.machine = DescribeMachine();
+    if (!IsSame(*row, ended->row)) return false;
+  }
+  return true;
 }
 
 void RunSearch(const StudyInputs& inputs, const RunOptions& options, StudyStore* store) {

@@ -20,6 +20,10 @@ struct RunOptions {
 void RunTrials(const StudyInputs& inputs, const std::vector<Trial>& trials, const RunOptions& options,
                StudyStore* store);
 
+/// Whether this program makes the same rows: the first, the middle and the last that came to a result of
+/// their own are made once more, and compared.
+bool MakesRowsAgain(const StudyInputs& inputs, const std::vector<TrialRow>& rows);
+
 /// Makes a search's trials, batch by batch, until it is over or interrupted. Several processes may work on
 /// one database: each waits for the others' part of a batch.
 void RunSearch(const StudyInputs& inputs, const RunOptions& options, StudyStore* store);

@@ -86,7 +86,7 @@ class StudyCommand : public ::testing::Test {
     if (reference->empty()) {
       const ProgramResult result = RunDexcheck(RunArguments("reference.sqlite"));
       EXPECT_EQ(result.exit_code, 0) << result.err;
-      EXPECT_THAT(result.out, HasSubstr("tiny: 6 of 6 trials"));
+      EXPECT_THAT(result.out, ::testing::HasSubstr("tiny: 6 of 6 trials"));
       *reference = Dump(Path("reference.sqlite"));
     }
     return *reference;

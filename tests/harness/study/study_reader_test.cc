@@ -178,6 +178,19 @@ TEST(StudyReader, MistakesOfASearchAreNamed) {
       "a search needs an [[objective]]"));
 }
 
+TEST(StudyReader, ReadsMargins) {
+  const std::string text =
+      "name = \"s\"\nscenario = \"hold\"\n[search]\nmethod = \"margins\"\nstart = [0.5]\ndirections = "
+      "3\ntolerance = "
+      "0.125\n[[vary]]\nkey = \"a\"\nfrom = 0\nto = 1\n";
+  EXPECT_EQ(CountTrials(ParseStudy(text, "study.toml")), 1 + 5 * (1 + 3))
+      << "the start, 5 directions, 3 bisections each";
+  EXPECT_TRUE(Throws<InputError>([&] { return ParseStudy(ReplaceOnce(text, "0.125", "0"), "study.toml"); },
+                                 "tolerance"));
+  EXPECT_TRUE(Throws<InputError>(
+      [&] { return ParseStudy(ReplaceOnce(text, "directions", "count"), "study.toml"); }, "search.count"));
+}
+
 TEST(StudyReader, SamplesChooseAmongValues) {
   const Study study = ParseStudy(
       "name = \"s\"\nscenario = \"hold\"\n[sample]\nmethod = \"sobol\"\ncount = 32\n[[vary]]\nkey = "
