@@ -16,8 +16,8 @@ packages=(
   liburdfdom-dev libtinyxml2-dev
   # the run's log
   libhdf5-dev zlib1g-dev
-  # studies' databases
-  libsqlite3-dev
+  # studies: databases, searches, samples (Boost.Random)
+  libsqlite3-dev libpagmo-dev libnlopt-dev libnlopt-cxx-dev libboost-dev
   # the command line
   libcli11-dev libfmt-dev nlohmann-json3-dev
   # off-screen drawing and video
