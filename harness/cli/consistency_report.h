@@ -10,7 +10,7 @@
 
 #include "harness/checks/consistency.h"
 #include "harness/cli/commands.h"
-#include "harness/sides/hypotheses.h"
+#include "harness/sides/file_comparison.h"
 #include "harness/sides/program_side.h"
 
 namespace dexcheck::cli {
@@ -24,7 +24,6 @@ struct ConsistencyRequest {
   ProgramOptions program_options;
   std::vector<std::string> packages;
   bool floating = false;
-  bool with_engine = true;  ///< files.mjcf is an MJCF; otherwise any other description.
   ConsistencyOptions options;
   std::string json_file;
   bool quiet = false;
@@ -42,17 +41,6 @@ struct ConsistencyRequest {
   /// The results themselves take standard output: a table would spoil them.
   [[nodiscard]] bool PrintsJson() const { return json_file == "-"; }
 };
-
-/// What was compared: the model that locations belong to, and the results.
-struct Comparison {
-  std::optional<RobotModel> model;
-  std::vector<std::string> notes;
-  ConsistencyResult result;
-  std::vector<Hypothesis> hypotheses;  ///< Mistakes that would explain what differs.
-};
-
-/// The file's name without its folder.
-std::string FileName(const std::filesystem::path& path);
 
 /// Large results first fail, then where to look: what a person reads.
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison);

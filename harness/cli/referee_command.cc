@@ -29,7 +29,7 @@ struct Request {
   RefereeOptions options;
   UrdfOptions urdf;
   std::string json_file;
-  int digits = 9;
+  int digits = 6;  ///< MuJoCo 2.2.2 diagonalises inertias to 1e-6 or better.
   bool quiet = false;
 };
 

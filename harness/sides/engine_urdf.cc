@@ -36,18 +36,26 @@ std::string FindRoot(XMLElement* robot) {
   return {};
 }
 
+/// MuJoCo lets move freely only what hangs on a link called "world".
 void LetFloat(XMLElement* robot) {
-  for (const XMLElement* joint = robot->FirstChildElement("joint"); joint != nullptr;
-       joint = joint->NextSiblingElement("joint")) {
-    if (joint->Attribute("type", "floating") != nullptr) return;
-  }
   const std::string root = FindRoot(robot);
-  const std::string world = "dexcheck_world";
-  robot->InsertNewChildElement("link")->SetAttribute("name", world.c_str());
+  for (XMLElement* joint = robot->FirstChildElement("joint"); joint != nullptr;
+       joint = joint->NextSiblingElement("joint")) {
+    XMLElement* const parent = joint->FirstChildElement("parent");
+    if (parent == nullptr || joint->Attribute("type", "floating") == nullptr) continue;
+    if (parent->Attribute("link", root.c_str()) == nullptr) continue;
+    parent->SetAttribute("link", "world");
+    for (XMLElement* link = robot->FirstChildElement("link"); link != nullptr;
+         link = link->NextSiblingElement("link")) {
+      if (link->Attribute("name", root.c_str()) != nullptr) link->SetAttribute("name", "world");
+    }
+    return;
+  }
+  robot->InsertNewChildElement("link")->SetAttribute("name", "world");
   XMLElement* const joint = robot->InsertNewChildElement("joint");
   joint->SetAttribute("name", "dexcheck_floating_base");
   joint->SetAttribute("type", "floating");
-  joint->InsertNewChildElement("parent")->SetAttribute("link", world.c_str());
+  joint->InsertNewChildElement("parent")->SetAttribute("link", "world");
   joint->InsertNewChildElement("child")->SetAttribute("link", root.c_str());
 }
 

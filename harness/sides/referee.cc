@@ -1,5 +1,7 @@
 #include "harness/sides/referee.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <fstream>
 #include <optional>
@@ -7,12 +9,14 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/model/body_frame.h"
 #include "harness/base/files.h"
 #include "harness/base/shell.h"
 #include "harness/sides/complete_description.h"
 #include "harness/sides/engine_settings.h"
 #include "harness/sides/engine_urdf.h"
 #include "harness/sides/join_names.h"
+#include "harness/sides/mjcf_reader.h"
 #include "harness/sides/robot_file.h"
 
 namespace dexcheck {
@@ -152,11 +156,33 @@ class RefereeRun {
     }
     if (!options_.mjcf.empty()) {
       for (const std::string& note : completion.notes) result_.notes.push_back("MuJoCo: " + note);
-      others_of_mjcf_.push_back(
-          {"as with what only " + file + " states: armature, damping, gravity", completed});
+      others_.push_back({"as with what only " + file + " states: armature, damping, gravity", completed});
     }
+    NoteCompiledInertias(*engine, path.string(), completed);
     return std::make_unique<EngineSide>(completed, std::move(engine), path.string(),
                                         std::string("MuJoCo ") + mj_versionString());
+  }
+
+  /// The description with the bodies that MuJoCo's compiler made of it: it diagonalises inertias, to 1e-6.
+  void NoteCompiledInertias(const mjModel& engine, const std::string& source, RobotDescription completed) {
+    const RobotDescription compiled = ReadMjcfDescription(engine, source);
+    double largest = 0.0;
+    for (size_t i = 0; i < completed.spec.joints.size(); ++i) {
+      Joint& joint = completed.spec.joints[i];
+      const auto other = std::find_if(compiled.spec.joints.begin(), compiled.spec.joints.end(),
+                                      [&](const Joint& candidate) { return candidate.name == joint.name; });
+      if (other == compiled.spec.joints.end()) return;
+      const auto j = static_cast<size_t>(other - compiled.spec.joints.begin());
+      // From the compiled joint's frame over the link's own, which both know.
+      const MassProperties body =
+          ExpressIn(other->body, completed.joints[i].X_iL * compiled.joints[j].X_iL.inverse());
+      const double size = joint.body.inertia.norm();
+      if (size > 0.0) largest = std::max(largest, (body.inertia - joint.body.inertia).norm() / size);
+      joint.body = body;
+    }
+    others_.push_back(
+        {fmt::format("as with the inertias that its compiler made of the file, up to {:.0e} off", largest),
+         completed});
   }
 
   [[nodiscard]] StateFeed MakeFeed() const { return FeedRandomStates(model_, options_.states); }
@@ -207,8 +233,7 @@ class RefereeRun {
     for (const SidePtr& owned : sides_) {
       TermSide* const side = owned.get();
       if (AgreeAtFirst(robot_, &model, side, make_feed, options_.tolerance)) continue;
-      std::optional<std::string> setting =
-          FindSetting(robot_, side, make_feed, options_.tolerance, others_of_mjcf_);
+      std::optional<std::string> setting = FindSetting(robot_, side, make_feed, options_.tolerance, others_);
       auto* const answering = dynamic_cast<AnsweringSide*>(side);
       if (!setting && answering != nullptr && answering->layout().is_floating()) {
         const std::optional<BaseConvention> other = FindOtherConvention(
@@ -228,7 +253,7 @@ class RefereeRun {
   RobotModel model_;
   std::optional<TemporaryFolder> folder_;
   std::filesystem::path mujoco_file_;
-  std::vector<OtherDescription> others_of_mjcf_;
+  std::vector<OtherDescription> others_;
   std::vector<SidePtr> sides_;
   RefereeResult result_;
 };
