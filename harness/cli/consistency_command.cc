@@ -109,6 +109,8 @@ int Run(ConsistencyRequest request) {
   CatchInterrupts();
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
+  std::optional<OutputFile> junit;
+  if (!request.junit_file.empty()) junit.emplace(request.junit_file);
   Comparison comparison;
   if (request.has_answers()) {
     comparison.first = request.files.robot;
@@ -129,6 +131,7 @@ int Run(ConsistencyRequest request) {
   ExitCode code = is_whole ? kSuccess : kFailure;
   if (!result.Agrees()) code = kDisagreement;
   if (json) json->Write(ToText(request, comparison, code));
+  if (junit) junit->Write(WriteJUnit(request, comparison));
   if (!request.PrintsJson()) {
     if (!request.quiet) PrintTable(request, comparison);
     PrintVerdict(request, comparison);
@@ -139,7 +142,7 @@ int Run(ConsistencyRequest request) {
 }  // namespace
 
 void AddConsistencyCommand(Command app) {
-  constexpr long kMaxSamples = 1000000000;
+  constexpr std::uint64_t kMaxSamples = 1000000000;
   const auto request = std::make_shared<ConsistencyRequest>();
   Command command = app.AddCommand("consistency", "Compare every term of model and engine at random states");
   const Option robot = AddRobotOptions(command, &request->files);
@@ -169,18 +172,15 @@ void AddConsistencyCommand(Command app) {
   command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
       .TypeName("PATH")
       .Repeatable();
-  command.AddOption("--samples", &request->options.samples, "Number of random states")
-      .TypeName("N")
-      .Check(WholeNumber(1, kMaxSamples))
-      .ShowDefault();
-  command.AddOption("--seed", &request->options.seed, "Of the random states")
-      .TypeName("N")
-      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
-      .ShowDefault();
+  AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
   command
       .AddOption("--json", &request->json_file,
                  "Write the results to this file (- for standard output, then without the table)")
       .TypeName("FILE.json");
+  command
+      .AddOption("--junit", &request->junit_file,
+                 "Write each check as a test case of JUnit's XML to this file")
+      .TypeName("FILE.xml");
   constexpr int kMostDigits = 15;
   const Option digits = command
                             .AddOption("--digits", &request->digits,

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "controller/common/text.h"
+#include "harness/cli/junit_file.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/tolerance.h"
 
@@ -149,6 +151,31 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
     json["engine_notes"].push_back({{"kind", note.kind}, {"text", note.text}});
   json["hypotheses"] = ListHypotheses(comparison.hypotheses);
   return json.dump(2) + "\n";
+}
+
+std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comparison) {
+  const RobotModel& model = *comparison.model;
+  const ConsistencyResult& result = comparison.result;
+  std::vector<JUnitCase> cases;
+  const auto add = [&](const std::string& group, const CheckRecord& record) {
+    cases.push_back(MakeJUnitCase(group, record, Describe(record.where, model, model.num_base_velocities())));
+  };
+  for (const CheckRecord& record : result.gate.records) add("constant", record);
+  for (const CheckRecord& record : result.terms) add("term", record);
+  // What the engine's model alone has belongs to no check of its own.
+  for (const GateFinding& finding : result.gate.findings) {
+    const bool has_case = std::any_of(cases.begin(), cases.end(),
+                                      [&](const JUnitCase& test) { return test.name == finding.check; });
+    if (!has_case) cases.push_back({"constant", finding.check, finding.where, ""});
+  }
+  std::string likely;
+  for (const Hypothesis& hypothesis : comparison.hypotheses) likely += "\nlikely: " + hypothesis.text;
+  for (JUnitCase& test : cases) {
+    if (!test.failure.empty()) test.failure += likely;
+  }
+  const bool is_whole = result.samples >= request.options.samples || !request.answers.empty();
+  return WriteJUnit("dexcheck.consistency." + comparison.first.stem().string(), cases, result.seconds,
+                    is_whole ? "" : "interrupted");
 }
 
 }  // namespace dexcheck::cli

@@ -26,6 +26,7 @@ struct ConsistencyRequest {
   bool floating = false;
   ConsistencyOptions options;
   std::string json_file;
+  std::string junit_file;
   bool quiet = false;
   int digits = 0;                   ///< 0: not given.
   std::optional<double> tolerance;  ///< Relative, wider than rounding.
@@ -48,6 +49,9 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
 void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison);
 /// The same as JSON.
 std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
+
+/// The same as a JUnit document.
+std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comparison);
 
 /// Their lines, shares and values.
 nlohmann::ordered_json ListHypotheses(const std::vector<Hypothesis>& hypotheses);

@@ -48,8 +48,9 @@ std::string WriteJUnit(const std::string& suite, const std::vector<JUnitCase>& c
                        const std::string& error) {
   const auto failures =
       std::count_if(cases.begin(), cases.end(), [](const JUnitCase& test) { return !test.failure.empty(); });
-  const std::string counts = fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" time=\"{:.3f}\"",
-                                         cases.size() + (error.empty() ? 0 : 1), failures, error.empty() ? 0 : 1, seconds);
+  const std::string counts =
+      fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" time=\"{:.3f}\"",
+                  cases.size() + (error.empty() ? 0 : 1), failures, error.empty() ? 0 : 1, seconds);
   std::string text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
   text += fmt::format("<testsuites {}>\n <testsuite name=\"{}\" {}>\n", counts, Escape(suite), counts);
   for (const JUnitCase& test : cases) {
@@ -68,8 +69,9 @@ std::string WriteJUnit(const std::string& suite, const std::vector<JUnitCase>& c
     text += "</testcase>\n";
   }
   if (!error.empty()) {
-    text += fmt::format("  <testcase classname=\"{0}.command\" name=\"ends\"><error message=\"{1}\">{1}</error></testcase>\n",
-                        Escape(suite), Escape(error));
+    text += fmt::format(
+        "  <testcase classname=\"{0}.command\" name=\"ends\"><error message=\"{1}\">{1}</error></testcase>\n",
+        Escape(suite), Escape(error));
   }
   return text + " </testsuite>\n</testsuites>\n";
 }

@@ -12,6 +12,7 @@
 #include "controller/common/text.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/sides/join_names.h"
@@ -29,6 +30,7 @@ struct Request {
   RefereeOptions options;
   UrdfOptions urdf;
   std::string json_file;
+  std::string junit_file;
   int digits = 6;  ///< MuJoCo 2.2.2 diagonalises inertias to 1e-6 or better.
   bool quiet = false;
 };
@@ -138,6 +140,19 @@ std::string ToText(const Request& request, const RobotModel& model, const Refere
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
+/// A case for each pair and term.
+std::string WriteJUnit(const Request& request, const RobotModel& model, const RefereeResult& result) {
+  std::vector<JUnitCase> cases;
+  for (const ComparedPair& pair : result.pairs) {
+    for (const CheckRecord& record : pair.terms) {
+      cases.push_back(MakeJUnitCase(result.names[pair.first] + " - " + result.names[pair.second], record,
+                                    Describe(record.where, model, model.num_base_velocities())));
+    }
+  }
+  return dexcheck::cli::WriteJUnit("dexcheck.referee." + request.robot.stem().string(), cases, 0.0,
+                                   result.lacks_requested ? JoinNames(result.absent) : "");
+}
+
 /// What is shipped beside the program: ../libexec/dexcheck, in a build as when installed.
 std::filesystem::path FindProgramsFolder() {
   std::error_code ignored;
@@ -151,6 +166,8 @@ int Run(Request request) {
   request.options.programs_folder = FindProgramsFolder();
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
+  std::optional<OutputFile> junit;
+  if (!request.junit_file.empty()) junit.emplace(request.junit_file);
   const RobotDescription robot = ReadDescription(request.robot, request.urdf);
   const RobotModel model(robot.spec);
   ProgressBar bar("comparing", request.options.states.samples, request.quiet);
@@ -163,6 +180,7 @@ int Run(Request request) {
   ExitCode code = is_whole ? kSuccess : kFailure;
   if (!result.Agrees()) code = kDisagreement;
   if (json) json->Write(ToText(request, model, result));
+  if (junit) junit->Write(WriteJUnit(request, model, result));
   if (request.json_file == "-") return code;
   if (!request.quiet) PrintTable(request, model, result);
   PrintVerdict(request, result);
@@ -214,6 +232,10 @@ void AddRefereeCommand(Command app) {
       .ShowDefault();
   command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
       .TypeName("FILE.json");
+  command
+      .AddOption("--junit", &request->junit_file,
+                 "Write each check as a test case of JUnit's XML to this file")
+      .TypeName("FILE.xml");
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }
