@@ -37,6 +37,8 @@ if [[ $purpose != program ]]; then
     libgtest-dev libgmock-dev libbenchmark-dev coinor-csdp hdf5-tools ffmpeg
     sqlite3 slurm-wlm munge
     chromium chromium-driver python3-numpy doxygen
+    # the Python module
+    pybind11-dev python3-dev python3-pytest
     # other physics engines
     libbullet-dev liborocos-kdl-dev libsimbody-dev
   )

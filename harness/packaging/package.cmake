@@ -6,6 +6,7 @@ configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/dexcheckConfig.cmake.in
   ${PROJECT_BINARY_DIR}/dexcheckConfig.cmake INSTALL_DESTINATION ${package_folder})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/dexcheckConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/dexcheckConfig.cmake ${PROJECT_BINARY_DIR}/dexcheckConfigVersion.cmake
+  ${CMAKE_CURRENT_LIST_DIR}/dexcheckConsistencyTest.cmake
   DESTINATION ${package_folder} COMPONENT development)
 install(EXPORT dexcheckController NAMESPACE dexcheck:: DESTINATION ${package_folder} COMPONENT development)
 if(DEXCHECK_BUILD_HARNESS)
