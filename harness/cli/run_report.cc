@@ -45,6 +45,16 @@ void PrintTask(const ClosedLoop& loop) {
              task.push(), loop.task()->torque_jump());
 }
 
+void PrintTracking(const Scenario& scenario, const TrackingStatistics& tracking) {
+  if (scenario.joint_motion) {
+    fmt::print("joints: largest error {:.2e} rad (rms {:.2e})\n", tracking.joints_max(),
+               tracking.joints_rms());
+    return;
+  }
+  fmt::print("object: position error {:.2e} m (rms {:.2e}), orientation error {:.2e} rad\n",
+             tracking.position_max(), tracking.position_rms(), tracking.orientation_max());
+}
+
 void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
   const LoopTimes& times = loop.times();
   const double scale = 1e6 / static_cast<double>(std::max(loop.record().step, 1L));
@@ -67,9 +77,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     if (!scenario.imperfections.is_ideal()) {
       for (const std::string& key : scenario.imperfections.asked) fmt::print("asked for: {}\n", key);
     }
-    fmt::print("object: position error {:.2e} m (rms {:.2e}), orientation error {:.2e} rad\n",
-               result.tracking.position_max(), result.tracking.position_rms(),
-               result.tracking.orientation_max());
+    PrintTracking(scenario, result.tracking);
     if (loop.task() != nullptr) PrintTask(loop);
     if (loop.is_checking()) PrintChecks(setup, loop);
     PrintSpeed(loop, result);
