@@ -82,8 +82,9 @@ class CrossCheck {
   StepModelCheck model_;
   StepChecks motion_;
   std::optional<NotIdeal> known_;
-  std::optional<LawCheck> law_;  // none for a task, or an unknown law
-  LawTerms law_terms_;           // the engine's
+  std::optional<LawCheck> law_;                                // none for a task, or an unknown law
+  LawTerms law_terms_;                                         // the engine's
+  double position_by_law_ = -1.0, orientation_by_law_ = -1.0;  // largest; see MeasuredCauses
   std::vector<CheckRecord> settling_failures_;
   MotorEvidence motors_;
   SensorEvidence sensors_;
