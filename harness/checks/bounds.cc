@@ -11,25 +11,20 @@ constexpr double kShippedPosture = 10.0;  // rad/s
 
 double Square(double x) { return x * x; }
 
-/// How far contacts sink under a load, (1 - d) tc^2.
-double CalcSinking(const PlantOptions& plant) {
-  return (1.0 - plant.contact_impedance) * Square(FindContactTimeConstant(plant));
-}
-
-/// Of a contact: by the numbers of the engine, which a rigid plant has not.
+/// By the numbers of the engine's contacts, which a rigid plant has not.
 double CalcContactScale(Scaling scaling, const PlantOptions& plant) {
-  const double tc = FindContactTimeConstant(plant);
+  const double dt = plant.time_step;
   const double softness = 1.0 - plant.contact_impedance;
   switch (scaling) {
     case Scaling::kCreep:
-      return softness * tc / plant.impratio;
+      return softness * dt;
     case Scaling::kLag:
-      return tc;
+      return dt;
     case Scaling::kSinking:
     case Scaling::kPosture:
-      return CalcSinking(plant);
+      return softness * dt * dt;
     case Scaling::kSinkingRate:
-      return softness * tc;
+      return softness * FindContactTimeConstant(plant);
     default:
       return 1.0;
   }

@@ -18,8 +18,10 @@ namespace dexcheck {
 // a fingertip, v w in a curve at a tyre. So fingertips that stick creep, tyres give sideways, the platform
 // sinks and tilts, each by a load f / m or an acceleration that is the same whatever the step is; each bound
 // below is that of the shipped plant (dt = 1 ms, d = 0.99, impratio = 100) and scales as its formula says
-// (bounds.h). Distances grow with time, at rates that do not: distances are judged over the last kSlipWindow
-// at most, with kSlipWindow times the rate's bound.
+// (bounds.h). Where the paper's assumptions are judged, tc is 2 dt, the least that the engine can step, and
+// impratio 100: contacts that a scenario makes softer than that need not be, and are told. Distances grow
+// with time, at rates that do not: distances are judged over the last kSlipWindow at most, with kSlipWindow
+// times the rate's bound.
 //
 // The prediction differs from the engine's motion by r_ddot and v_dot, which die out under a constant force,
 // and by what tilt leaves. What they come to is computed at each step, from the engine's own A = J M^-1 J^T
@@ -72,11 +74,11 @@ inline constexpr double kOrientationDynamicsBound = 1e-7;
 /// What a bound is proportional to; none of them for one that is rounding, or a share.
 enum class Scaling {
   kNone,
-  kCreep,            ///< (1 - d) tc / impratio
-  kLag,              ///< tc
-  kSinking,          ///< (1 - d) tc^2
+  kCreep,            ///< (1 - d) dt
+  kLag,              ///< dt
+  kSinking,          ///< (1 - d) dt^2
   kSinkingRate,      ///< (1 - d) tc
-  kPosture,          ///< (1 - d) tc^2 / omega_p^2 of the posture task
+  kPosture,          ///< (1 - d) dt^2 / omega_p^2 of the posture task
   kPositionGain,     ///< 1 / K_p, the least of position
   kOrientationGain,  ///< 1 / K_p, the least of orientation
 };

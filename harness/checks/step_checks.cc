@@ -33,6 +33,19 @@ void FollowCharts(const Surface& tip, const Surface& object, const ContactCoordi
   *integrated = ChangeCharts(tip, object, *integrated, tip_chart, object_chart);
 }
 
+/// How far integrated and measured contact are apart, m: the point on the object, the point on the fingertip,
+/// and psi at the fingertip's radius. The largest of them.
+double CalcDrift(const Surface& tip, const Surface& object, const ContactCoordinates& integrated,
+                 const ContactCoordinates& measured) {
+  const auto apart = [](const Surface& surface, const SurfacePoint& a, const SurfacePoint& b) {
+    return (surface.Evaluate(a).p - surface.Evaluate(b).p).norm();
+  };
+  const double turned = std::abs(std::remainder(integrated.psi - measured.psi, 2.0 * M_PI));
+  return std::max({apart(object, integrated.alpha_o, measured.alpha_o),
+                   apart(tip, integrated.alpha_f, measured.alpha_f),
+                   turned * tip.Evaluate(measured.alpha_f).p.norm()});
+}
+
 /// Null for none.
 const Vector6d* PushOf(const StepRecord& step) {
   return step.known != nullptr ? &step.known->object_wrench : nullptr;
@@ -304,13 +317,13 @@ Vector2d StepChecks::ReadWheelRates(const StepRecord& step) const {
 void StepChecks::AddSpin(const StepRecord& step) {
   // r (thetadot - thetadot of a wheel that rolls) is what is left of (1), the other way round.
   const Vector2d mismatch = wheels_.CalcMismatch(step.reading.state.xi, ReadWheelRates(step));
-  column_.setZero();
+  left_of_robot_.setZero();
   for (Eigen::Index k = 0; k < 2; ++k) {
     const double damping =
         setup_->engine().dof_damping[setup_->adapter().wheels()[static_cast<size_t>(k)].dof];
-    column_(k, 0) = -damping * mismatch[k] / setup_->model().base().wheel_radius;
+    left_of_robot_[k] = -damping * mismatch[k] / setup_->model().base().wheel_radius;
   }
-  actuation_.CalcForce(column_.col(0), left_of_robot_);
+  actuation_.CalcForce(left_of_robot_, left_of_robot_);
   residual_ += left_of_robot_;
 }
 
@@ -482,9 +495,7 @@ void StepChecks::CompareKappa(const StepRecord& step) {
       FollowCharts(tip, grasp.surface(), state.kappa[i], &kappa);
       kappa = NormalizeContact(tip, grasp.surface(), Displace(kappa, change));
     }
-    const Vector3d integrated = grasp.surface().Evaluate(kappa_[i].alpha_o).p;
-    const Vector3d measured = grasp.surface().Evaluate(state.kappa[i].alpha_o).p;
-    apart = std::max(apart, (integrated - measured).norm());
+    apart = std::max(apart, CalcDrift(tip, grasp.surface(), kappa_[i], state.kappa[i]));
   }
   has_kappa_ = true;
   Add(StepCheck::kKappa, apart);
