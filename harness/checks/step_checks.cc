@@ -268,7 +268,9 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   const VectorXd& xi_dot = step.response.xi_dot;
   actuation_.CalcForce(step.drive.tau, force_);
   if (step.known != nullptr) force_ += step.known->force;
-  Predict(step);
+  // Soft contacts become only in some milliseconds what rigid ones are at once.
+  if (!is_unjudged_) Predict(step);
+  if (mass_factor_ == nullptr) return;
 
   // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
   bias_ = robot.gravity() + robot.friction();
@@ -289,7 +291,6 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   const double uneven = CalcUnevenForce(step);
   give_->Follow(step, bias_, findings_.f_c_model, uneven, [this](const VectorXd& f) { return Norm(f); });
 
-  // Soft contacts become only in some milliseconds what rigid ones are at once.
   if (is_unjudged_) return;
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
@@ -376,6 +377,7 @@ void StepChecks::KeepForces(const StepRecord& step) {
   const auto fails = [&](StepCheck which) {
     return check(which).applies && !(check(which).last <= check(which).bound);
   };
+  if (mass_factor_ == nullptr) return;
   if (!fails(StepCheck::kBalanceRobot) && !fails(StepCheck::kBalanceObject)) return;
   forces_.Add(left_of_robot_, left_of_object_, ModelAtTruth(step), step.reading.state.q, *mass_factor_,
               scale_);
