@@ -30,6 +30,9 @@ struct LawErrors {
   /// missed, m.
   double error_dynamics = 0.0;
   double orientation_dynamics = 0.0;  ///< Its orientation likewise, rad.
+  /// How far from its desired pose the object would be if (57) alone drove it, m and rad: what the gains
+  /// leave.
+  double position_by_law = 0.0, orientation_by_law = 0.0;
 };
 
 /// Largest magnitude of the eigenvalues of (57), per time step, when the command is held for `hold` steps: 1
@@ -84,6 +87,8 @@ class LawCheck {
   void FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                    const DesiredMotion& desired);
   double Norm(const VectorXd& force);
+  /// As the plant steps: velocities first.
+  void Move(const Vector6d& V_dot, LawObject* object) const;
 
   LawSpec spec_;
   double mu_, f_min_, f_max_, barrier_weight_, slack_tolerance_, residual_tolerance_;
@@ -102,8 +107,9 @@ class LawCheck {
   double scale_ = 1.0;
   VectorXd force_, difference_, work_;  // n
   VectorXd slope_;                      // k
-  bool follows_ = false;                // whether the one below is set
+  bool follows_ = false;                // whether those below are set
   LawObject followed_;                  // of (57); velocities half a step before
+  LawObject undisturbed_;               // the same, driven by nothing
 };
 
 }  // namespace dexcheck
