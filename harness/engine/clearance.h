@@ -5,19 +5,14 @@
 
 #include <mujoco/mujoco.h>
 
-#include <span>
+#include <utility>
 #include <vector>
 
 #include "controller/common/types.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/overlap.h"
 
 namespace dexcheck {
-
-/// How deep two bodies overlap.
-struct Overlap {
-  double depth = 0.0;  ///< m; 0 when nothing does.
-  int body1 = -1, body2 = -1;
-};
 
 /// Looks for overlaps of all bodies that the MJCF lets move against each other, but for
 ///
