@@ -17,14 +17,11 @@ struct SurfaceMaker {
   std::unique_ptr<Surface> operator()(const SolidTorus& torus) const {
     return std::make_unique<Torus>(torus.ring_radius, torus.tube_radius);
   }
-  std::unique_ptr<Surface> operator()(const SolidEllipsoid& ellipsoid) const {
-    return std::make_unique<Ellipsoid>(ellipsoid.semi_axes);
-  }
   std::unique_ptr<Surface> operator()(const SolidBox&) const { throw std::invalid_argument(kNotSmooth); }
   std::unique_ptr<Surface> operator()(const SolidCapsule&) const { throw std::invalid_argument(kNotSmooth); }
 
   static constexpr const char* kNotSmooth =
-      "object shape: must be a sphere, an ellipsoid, a cylinder or a torus for contact terms";
+      "object shape: must be a sphere, a cylinder or a torus for contact terms";
 };
 
 }  // namespace

@@ -29,9 +29,7 @@ Pose ReadShapePose(TomlTable& table, const Shape& shape) {
   if (std::holds_alternative<SolidSphere>(shape)) return X_BS;
   table.RejectTogether("axis", {"rpy", "rpy_deg"});
   const std::optional<TomlValue> axis =
-      std::holds_alternative<SolidBox>(shape) || std::holds_alternative<SolidEllipsoid>(shape)
-          ? std::nullopt
-          : table.Find("axis");
+      std::holds_alternative<SolidBox>(shape) ? std::nullopt : table.Find("axis");
   X_BS.linear() = axis ? MakeRotationFromZ(ReadAxis(*axis)) : ReadRotation(table);
   return X_BS;
 }
@@ -64,13 +62,6 @@ SolidTorus ReadTorus(TomlTable& table) {
     table.Get("tube_radius").Fail("must be less than ring_radius");
   }
   return torus;
-}
-
-SolidEllipsoid ReadEllipsoid(TomlTable& table) {
-  const TomlValue semi_axes = table.Get("semi_axes");
-  SolidEllipsoid ellipsoid{semi_axes.AsVector<3>()};
-  if (ellipsoid.semi_axes.minCoeff() <= 0.0) semi_axes.Fail("must be positive");
-  return ellipsoid;
 }
 
 SolidBox ReadBox(TomlTable& table) {
@@ -106,13 +97,12 @@ Pose ReadPose(const TomlValue& value) {
 }
 
 Shape ReadShape(TomlTable& table) {
-  enum class Kind { kSphere, kCylinder, kCapsule, kBox, kTorus, kEllipsoid };
+  enum class Kind { kSphere, kCylinder, kCapsule, kBox, kTorus };
   switch (table.Get("shape").AsChoice<Kind>({{"sphere", Kind::kSphere},
                                              {"cylinder", Kind::kCylinder},
                                              {"capsule", Kind::kCapsule},
                                              {"box", Kind::kBox},
-                                             {"torus", Kind::kTorus},
-                                             {"ellipsoid", Kind::kEllipsoid}})) {
+                                             {"torus", Kind::kTorus}})) {
     case Kind::kCylinder:
       return SolidCylinder{table.Get("radius").AsPositive(), table.Get("length").AsPositive()};
     case Kind::kCapsule:
@@ -121,8 +111,6 @@ Shape ReadShape(TomlTable& table) {
       return ReadBox(table);
     case Kind::kTorus:
       return ReadTorus(table);
-    case Kind::kEllipsoid:
-      return ReadEllipsoid(table);
     case Kind::kSphere:
       break;
   }

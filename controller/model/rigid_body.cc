@@ -42,12 +42,6 @@ Matrix3d CalcInertia(const SolidBox& box, double m) {
   return Diagonal(s2.y() + s2.z(), s2.z() + s2.x(), s2.x() + s2.y()) * (m / 12.0);
 }
 
-Matrix3d CalcInertia(const SolidEllipsoid& ellipsoid, double m) {
-  // I_x = m (b^2 + c^2) / 5 and cyclic
-  const Vector3d s2 = ellipsoid.semi_axes.array().square();
-  return Diagonal(s2.y() + s2.z(), s2.z() + s2.x(), s2.x() + s2.y()) * (m / 5.0);
-}
-
 Matrix3d CalcInertia(const SolidTorus& torus, double m) {
   // I_x = m (R^2 / 2 + 5/8 r^2),  I_z = m (R^2 + 3/4 r^2)
   const double R = torus.ring_radius;

@@ -32,14 +32,11 @@ struct SolidCapsule {
 struct SolidBox {
   Vector3d size;  ///< Full edge lengths, m.
 };
-struct SolidEllipsoid {
-  Vector3d semi_axes;  ///< Along the shape's x, y, z, m.
-};
 struct SolidTorus {
   double ring_radius;  ///< Centre to the middle of the tube, m. The ring lies in the shape's x-y plane.
   double tube_radius;  ///< m
 };
-using Shape = std::variant<SolidSphere, SolidCylinder, SolidCapsule, SolidBox, SolidTorus, SolidEllipsoid>;
+using Shape = std::variant<SolidSphere, SolidCylinder, SolidCapsule, SolidBox, SolidTorus>;
 
 /// Rotational inertia of a uniform solid about its centre of mass, in its own axes, kg m^2.
 Matrix3d CalcUniformInertia(const Shape& shape, double mass);

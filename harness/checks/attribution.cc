@@ -102,8 +102,6 @@ const char* NameOf(Cause cause) {
       return "actuator";
     case Cause::kActuatorLimit:
       return "actuator limit";
-    case Cause::kCollision:
-      return "collision";
     case Cause::kJointStop:
       return "joint stop";
     case Cause::kFingertipSlip:

@@ -47,8 +47,6 @@ class CrossCheck {
   void CompareUnsent(const StepRecord& step);
   /// The largest effort of a motor, before the step that it belongs to.
   void JudgeEffort(double effort, double time) { motion_.JudgeEffort(effort, time); }
-  /// The plant cannot tell of collisions.
-  void LeaveOutCollisions() { motion_.LeaveOut(StepCheck::kCollision); }
   /// Forgets motion and forces of all steps so far, but for the checks that failed: time begins anew.
   void Reset();
   /// The same for the checks that failed, too.

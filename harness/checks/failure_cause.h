@@ -11,7 +11,6 @@ enum class Cause {
                    ///< expected.
   kActuator,       ///< The motors gave other torques than were sent.
   kActuatorLimit,  ///< A motor could not give its torque.
-  kCollision,      ///< Bodies overlap that should not touch.
   kJointStop,      ///< A joint reached the end of its range.
   kFingertipSlip,  ///< A fingertip slides: its force is at the edge of the friction cone.
   kWheelSlip,      ///< A wheel slides: assumption (1), rolling without slipping.

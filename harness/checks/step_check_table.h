@@ -43,7 +43,6 @@ enum class StepCheck {
   kIdleJoints,
   kSolver,
   kJointStop,
-  kCollision,
   kUnjudged,
   kActuators,
   kCount
@@ -401,17 +400,6 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .bound = 0.0,
      .description = "how far a joint is beyond its range, where a stop pushes that the model does not have",
      .meaning = {.cause = Cause::kJointStop, .precedence = -2, .is_own = true, .rank = Rank::kDecisive}},
-    // Nothing may overlap at all: what is to touch has a contact pair. What bodies look like is not known to
-    // a
-    // thousandth of a millimetre, though.
-    {.check = StepCheck::kCollision,
-     .name = "collision",
-     .kind = CheckKind::kAssumption,
-     .unit = "m",
-     .bound = 1e-6,
-     .description = "how deep bodies overlap that have no contact pair: palm, phalanges, arms and platform "
-                    "against object, table, floor and each other",
-     .meaning = {.cause = Cause::kCollision, .precedence = -5, .is_own = true, .rank = Rank::kDecisive}},
     // The fingers of one hand touch within some hundredths of a second, kTransient each at the most.
     {.check = StepCheck::kUnjudged,
      .name = "unjudged",

@@ -184,7 +184,6 @@ void StepChecks::Compare(const StepRecord& step) {
   Add(StepCheck::kBaseTilt, step.reading.departure.tilt);
   CheckIdleJoints(step.reading.state);
   CheckJointStops(step.reading.state);
-  CheckCollisions(step.reading.collision);
   ++steps_;
 }
 
@@ -465,15 +464,6 @@ void StepChecks::ReadSlip(const StepRecord& step) {
   Add(StepCheck::kWheelSlip, slipped);
   Add(StepCheck::kWheelSlipRate, rate);
   Add(StepCheck::kTractionUse, cone_use);
-}
-
-void StepChecks::CheckCollisions(const Overlap& collision) {
-  CheckRecord& record = check(StepCheck::kCollision);
-  if (collision.depth > record.bound && !record.failed) {
-    const auto name = [&](int body) { return Quote(NameOf(setup_->engine(), mjOBJ_BODY, body)); };
-    record.part = "body " + name(collision.body1) + " in body " + name(collision.body2);
-  }
-  Add(StepCheck::kCollision, collision.depth);
 }
 
 void StepChecks::CheckJointStops(const MeasuredState& state) {

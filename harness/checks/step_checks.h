@@ -93,7 +93,6 @@ class StepChecks {
   /// Of the object, N.
   [[nodiscard]] double Weight() const;
   void CheckIdleJoints(const MeasuredState& state);
-  void CheckCollisions(const Overlap& collision);
   void CheckJointStops(const MeasuredState& state);
   void CompareKappa(const StepRecord& step);
 

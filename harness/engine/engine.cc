@@ -12,7 +12,6 @@
 #include "controller/common/errors.h"
 #include "harness/base/temporary_path.h"
 #include "harness/engine/cylinder_collision.h"
-#include "harness/engine/ellipsoid_collision.h"
 #include "harness/engine/finite_check.h"
 #include "harness/engine/torus_collision.h"
 
@@ -63,7 +62,6 @@ void PrepareEngine() {
   InstallMessageHandlers();
   CheckVersion();
   InstallCylinderCollision();
-  InstallEllipsoidCollision();
   InstallTorusCollision();
 }
 

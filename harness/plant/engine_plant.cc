@@ -16,13 +16,6 @@ EnginePlant::EnginePlant(const Adapter& adapter, std::span<const int> fingertips
 void EnginePlant::Read(PlantReading* reading) {
   observer_.Read(simulation_, reading);
   reading->touch.support_force = support_force_;
-  const mjData& data = simulation_.data();
-  if (clearance_) reading->collision = clearance_->Find(data.xpos, data.xmat);
-}
-
-bool EnginePlant::Watch(const mjModel& model) {
-  clearance_.emplace(model);
-  return true;
 }
 
 void EnginePlant::EndStep(const Eigen::Ref<const VectorXd>& tau) {

@@ -1,9 +1,7 @@
 #pragma once
 
-#include <optional>
 #include <vector>
 
-#include "harness/engine/clearance.h"
 #include "harness/plant/engine_simulation.h"
 #include "harness/plant/observer.h"
 #include "harness/plant/plant.h"
@@ -27,7 +25,6 @@ class EnginePlant final : public Plant {
   [[nodiscard]] double time_step() const override { return simulation_.time_step(); }
   [[nodiscard]] std::span<const Motor> motors() const override { return motors_; }
 
-  bool Watch(const mjModel& model) override;
   void BeginStep() override { simulation_.BeginStep(); }
   void Read(PlantReading* reading) override;
   void Push(std::span<const Wrench> wrenches) override { simulation_.Push(wrenches); }
@@ -42,7 +39,6 @@ class EnginePlant final : public Plant {
   void Translate(const Vector3d& way) override;
 
  private:
-  std::optional<Clearance> clearance_;
   const Adapter* adapter_;
   EngineSimulation simulation_;
   Observer observer_;

@@ -2,8 +2,6 @@
 
 // The ground truth: robot and object, driven by torques.
 
-#include <mujoco/mujoco.h>
-
 #include <span>
 #include <string>
 
@@ -48,10 +46,6 @@ class Plant {
   [[nodiscard]] virtual double time_step() const = 0;
   /// By entry of tau'.
   [[nodiscard]] virtual std::span<const Motor> motors() const = 0;
-
-  /// From now on a reading says which bodies overlap that should not touch.
-  /// @param model the engine's with all its geoms. @return whether this kind of plant can tell.
-  virtual bool Watch(const mjModel& /*model*/) { return false; }
 
   virtual void BeginStep() = 0;
   /// What the plant is; between BeginStep and EndStep.

@@ -7,7 +7,6 @@
 #include "controller/common/types.h"
 #include "controller/control/controller.h"
 #include "controller/control/measured_state.h"
-#include "harness/engine/overlap.h"
 #include "harness/plant/body_contact.h"
 
 namespace dexcheck {
@@ -26,7 +25,6 @@ struct PlantReading {
   MeasuredState state;
   Touch touch;
   BaseDeparture departure;
-  Overlap collision;             ///< Of bodies that should not touch, where somebody watches them.
   Pose X_W0 = Pose::Identity();  ///< Pose of Sigma_0 in the world, tilt and height included.
   VectorXd qpos;                 ///< MuJoCo's positions (nq), which draw the scene.
   VectorXd qvel;                 ///< MuJoCo's velocities (nv).

@@ -39,7 +39,6 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
   const Scenario& scenario = setup.scenario();
   StepChecks::RequireKnownBounds(scenario);
   if (check) checks_.emplace(setup, plant_->motors(), parts.knows_law);
-  if (check && !plant_->Watch(setup.whole_engine())) checks_->LeaveOutCollisions();
   record_.model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);

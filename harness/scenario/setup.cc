@@ -75,7 +75,6 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
   if (!model_.object() && !scenario_.joint_motion) {
     throw InputError(robot + ": object: is missing, and the scenario holds one");
   }
-  whole_engine_ = MjModelPtr(mj_copyModel(nullptr, engine_.get()));
   RemoveLooks(engine_.get());
   adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
   gate_ = RunStaticGate(*adapter_);

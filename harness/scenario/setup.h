@@ -43,8 +43,6 @@ class Setup {
   [[nodiscard]] const RobotModel* plant_model() const { return plant_model_.get(); }
   /// With the scenario's changes.
   [[nodiscard]] const mjModel& engine() const { return *engine_; }
-  /// The MJCF's with the geoms that are only looked at.
-  [[nodiscard]] const mjModel& whole_engine() const { return *whole_engine_; }
   [[nodiscard]] const Adapter& adapter() const { return *adapter_; }
   /// What the robot of engine() is: model(), but for a mismatch that the scenario asks for.
   [[nodiscard]] const RobotModel& known_model() const { return known_model_ ? *known_model_ : model_; }
@@ -117,7 +115,7 @@ class Setup {
   Scenario scenario_;
   RobotModel model_;
   std::unique_ptr<RobotModel> plant_model_;
-  MjModelPtr whole_engine_, engine_;
+  MjModelPtr engine_;
   std::unique_ptr<Adapter> adapter_;
   std::optional<RobotModel> known_model_;  // these four only with a mismatch
   MjModelPtr controller_engine_;

@@ -23,8 +23,6 @@ void PrintTo(const HeldObject& object, std::ostream* out) { *out << object.body;
 
 const HeldObject kObjects[] = {
     {"ball", R"(type="sphere" size="0.046" mass="0.2")", "", "shape = \"sphere\"\nradius = 0.046"},
-    {"egg", R"(type="ellipsoid" size="0.046 0.044 0.05" mass="0.2")", "",
-     "shape = \"ellipsoid\"\nsemi_axes = [0.046, 0.044, 0.05]"},
     {"can", R"(type="cylinder" size="0.046 0.03" mass="0.2")", "",
      "shape = \"cylinder\"\nradius = 0.046\nlength = 0.06"},
     {"doughnut", R"(type="mesh" mesh="torus" user="0.035 0.011" mass="0")",
