@@ -66,12 +66,12 @@ class ConstrainedDynamics {
   void CalcFreeForce(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force);
 
   TreeFactor factor_;
-  // Most rows of J_B'^T are zero, those of joints that carry no fingertip, and stay so.
-  RowMatrixXd half_;        // n + 6 x k, [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G]
-  RowMatrixXd half_force_;  // n + 6 x 1, M^-1/2 of the forces without contact
-  MatrixXd schur_;
+  // Of J_B'^T those rows are used whose joints carry a fingertip, and then the object's six.
+  std::vector<int> rows_;
+  RowMatrixXd half_;  // n + 6 x k, padded: [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G]
+  MatrixXd schur_;    // k x k, padded
   Eigen::LLT<MatrixXd> schur_llt_;
-  VectorXd motion_;  // n + 6
+  VectorXd motion_;  // n + 6, M^-1/2 of the forces without contact, then without those of contacts
   Prediction prediction_;
 };
 

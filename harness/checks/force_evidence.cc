@@ -88,7 +88,7 @@ void ForceEvidence::Add(const VectorXd& f, const Vector6d& w, const GraspModel& 
   if (!IsLookedAt(steps_++)) return;
   const Eigen::Index n = f.size();
   RowMatrixXd half_inverse = RowMatrixXd::Identity(n, n);
-  mass_factor.SolveTransposed(half_inverse);  // L^-T
+  mass_factor.SolveTransposedColumns(half_inverse);  // L^-T
   // Without an object there is no weight of one.
   const double object_mass = model_->object() ? model.grasp().object().mass : 0.0;
   const Eigen::LLT<Matrix6d> M_hat(model.grasp().body().M_hat);

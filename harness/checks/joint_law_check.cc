@@ -63,7 +63,7 @@ void JointLawCheck::CompareTorque(const StepRecord& step, const LawTerms& terms)
       force_ = terms.gravity;
     } else {
       force_.noalias() += terms.M * desired_.q_ddot;
-      force_.noalias() += terms.C * (desired_.q_dot - terms.xi);
+      force_.noalias() += *terms.C * (desired_.q_dot - terms.xi);
     }
     force_ += gains_.K.cwiseProduct(desired_.q - terms.q);
     force_ += gains_.D.cwiseProduct(desired_.q_dot - terms.xi);

@@ -73,7 +73,7 @@ StepChecks::StepChecks(const Setup& setup)
   force_.setZero(n);
   bias_.setZero(n);
   residual_.setZero(n);
-  column_.setZero(n, 1);
+  work_.setZero(n);
   left_of_robot_.setZero(n);
   idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
   kappa_.resize(setup.fingertips().size());
@@ -279,20 +279,14 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   Predict(step);
 
   // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
-  bias_ = robot.gravity() + robot.friction();
-  bias_.noalias() += robot.C() * step.reading.state.xi;
+  bias_ = robot.coriolis() + robot.gravity() + robot.friction();
   residual_ = bias_ - force_;
   residual_.noalias() += robot.M() * xi_dot;
   residual_.noalias() += ModelAtTruth(step).grasp().J_B().transpose() * findings_.f_c;
   if (step.response.departure_force.size() > 0) residual_ += step.response.departure_force;
   if (step.response.solver_force.size() > 0) residual_ -= step.response.solver_force;
   left_of_robot_ = residual_;
-  // |f|_M^-1 = |L^-T f|
-  const auto norm = [&](const VectorXd& f) {
-    column_ = f;
-    mass_factor_->SolveTransposed(column_);
-    return column_.norm();
-  };
+  const auto norm = [&](const VectorXd& f) { return mass_factor_->CalcForceNorm(f, &work_); };
   const double scale = std::max(norm(bias_), std::numeric_limits<double>::min());
   scale_ = scale;
   const double left = norm(residual_);

@@ -3,6 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
+#include <vector>
+
+#include "harness/cli/junit_file.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -103,6 +107,26 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     fmt::print("  {}: {}: {:.12g} in the model, {:.12g} in the MJCF\n", finding.check, finding.where,
                finding.model, finding.engine);
   }
+}
+
+std::string WriteJUnit(const Setup& setup, const ClosedLoop& loop, const RunResult& result) {
+  std::vector<JUnitCase> cases;
+  if (loop.is_checking()) {
+    for (const CheckRecord& check : setup.gate().records) {
+      cases.push_back(MakeJUnitCase("constant", check, ""));
+    }
+    for (const std::span<const CheckRecord> checks :
+         {loop.checks().model_checks(), loop.checks().motion_checks()}) {
+      for (const CheckRecord& check : checks) {
+        if (check.applies) cases.push_back(MakeJUnitCase(NameOf(check.kind), check, check.part));
+      }
+    }
+  }
+  const bool disagrees = result.verdict == Verdict::kDisagreement;
+  const std::string cause =
+      fmt::format("cause: {} ({})", NameOf(result.attribution.cause), result.attribution.evidence);
+  cases.push_back({"run", "verdict", disagrees ? cause : "", ""});
+  return WriteJUnit("dexcheck.run." + setup.scenario().name, cases, result.wall_seconds, result.failure);
 }
 
 }  // namespace dexcheck::cli
