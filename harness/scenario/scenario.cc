@@ -316,9 +316,6 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   }
   if (scenario.task) FinishTask(&scenario);
   scenario.imperfections = ReadImperfections(&root, scenario.plant.time_step);
-  if (scenario.plant.type == PlantType::kRigid && !scenario.imperfections.disturbances.empty()) {
-    root.Get("disturbance").Reject("pushes need plant.type = \"engine\"");
-  }
   if (const auto bounds = root.Find("bounds")) {
     for (const auto& [name, value] : bounds->AsTable().GetEntries()) {
       scenario.bounds.emplace_back(name, value.AsNotNegative());
