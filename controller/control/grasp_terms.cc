@@ -136,6 +136,7 @@ void GraspTerms::SetContacts(const ModelTerms& robot, std::span<const ContactCoo
     CalcContactJacobian(contact, J_f, J_B_.middleRows(row, 3), chains_[i]);
     CalcContactJacobianDot(contact, J_f, J_f_dot, J_B_dot_.middleRows(row, 3), chains_[i]);
   }
+  if (fingertips_.empty()) return;  // nothing is held
   CalcGraspMap(contacts_, G_);
   CalcGraspMapDot(contacts_, G_dot_);
   // (45), (46)

@@ -271,6 +271,7 @@ void Observer::ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* r
 
 void Observer::ReadSolverResidual(const mjModel& m, const mjData& d, PlantResponse* response) {
   mj_mulM(&m, &d, M_qacc_.data(), d.qacc);
+  constraint_force_.setZero();  // the engine leaves it alone where nothing is constrained
   // Not qfrc_constraint, which the engine makes fit. The call uses the data's scratch space alone.
   mj_mulJacTVec(&m, const_cast<mjData*>(&d), constraint_force_.data(), d.efc_force);
   departure_ = M_qacc_ - Eigen::Map<const VectorXd>(d.qfrc_smooth, m.nv) - constraint_force_;
