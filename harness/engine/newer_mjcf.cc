@@ -39,9 +39,12 @@ class Schema {
  private:
   void ReadLine(const std::string& line, std::vector<SchemaElement*>* path) {
     std::istringstream words(line);
-    const size_t kind = line.find(" (");
-    const bool is_element = kind != std::string::npos && kind + 3 < line.size() && line[kind + 3] == ')';
-    if (is_element) {
+    // " (?)", with one of !, ?, *, R between the brackets; "(world)body (R)" has others before.
+    size_t kind = line.find(" (");
+    while (kind != std::string::npos && !(kind + 3 < line.size() && line[kind + 3] == ')')) {
+      kind = line.find(" (", kind + 1);
+    }
+    if (kind != std::string::npos) {
       const size_t indent = line.find_first_not_of(' ');
       std::string name;
       words >> name;

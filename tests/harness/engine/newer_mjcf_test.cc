@@ -22,6 +22,14 @@ struct Words {
   std::string compiler, option, flag, root, joint, geom, body, in_body, actuator, tendon, sensor;
 };
 
+void PrintTo(const Words& words, std::ostream* out) {
+  for (const std::string* word :
+       {&words.compiler, &words.option, &words.flag, &words.root, &words.joint, &words.geom, &words.body,
+        &words.in_body, &words.actuator, &words.tendon, &words.sensor}) {
+    *out << *word;
+  }
+}
+
 std::string WriteMjcf(const Words& words) {
   return "<mujoco>\n<compiler angle=\"radian\" autolimits=\"true\" " + words.compiler + "/>\n<option " +
          words.option + "><flag " + words.flag + "/></option>\n" + words.root +
@@ -83,6 +91,7 @@ struct Refused {
   Words words;
   std::string message;
 };
+void PrintTo(const Refused& refused, std::ostream* out) { PrintTo(refused.words, out); }
 class NotLeftOut : public ::testing::TestWithParam<Refused> {};
 
 TEST_P(NotLeftOut, IsNamed) {
