@@ -23,8 +23,8 @@ packages=(
   # off-screen drawing and video
   pkg-config libosmesa6-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libpng-dev libfreetype-dev
   fonts-dejavu-core
-  # the report: its figures, its page's plots
-  gnuplot-nox libjs-dygraphs
+  # the report: its figures, its page's plots and replay
+  gnuplot-nox libjs-dygraphs libjs-three
 )
 purpose=${1:-program}
 case $purpose in
