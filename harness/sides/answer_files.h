@@ -50,7 +50,7 @@ class AnswerFiles : public AnsweringSide {
  private:
   [[nodiscard]] NpyArray Read(const std::string& file, const std::vector<size_t>& shape) const;
   [[nodiscard]] static NpyArray Check(NpyArray array, const std::string& source,
-                                      const std::vector<size_t>& shape) const;
+                                      const std::vector<size_t>& shape);
   void ReadLines(const std::filesystem::path& path);
   [[nodiscard]] static VectorXd Row(const NpyArray& array, long sample);
   [[nodiscard]] VectorXd FindRow(const std::string& term, long sample) const;
