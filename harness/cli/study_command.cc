@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
+#include <iostream>
 #include <map>
 #include <memory>
 #include <string>
@@ -22,6 +23,7 @@
 #include "harness/study/study_answer.h"
 #include "harness/study/study_progress.h"
 #include "harness/study/study_runner.h"
+#include "harness/study/study_server.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck::cli {
@@ -127,9 +129,37 @@ std::vector<long> MakeSearch(const StudyInputs& inputs, const Request& request, 
   return missing;
 }
 
+StudyStore OpenDatabase(const StudyInputs& inputs, const Request& request) {
+  const auto makes_same_rows = [&](const std::vector<TrialRow>& rows) {
+    return MakesRowsAgain(inputs, rows);
+  };
+  return StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), inputs.study, makes_same_rows);
+}
+
+int ServeStudy(const Request& request) {
+  StudyInputs inputs = FindStudy(request.study);
+  if (!inputs.study.is_external()) {
+    throw InputError(inputs.study.source +
+                     ": search.method: must be \"external\" for points that another program chooses");
+  }
+  CheckTrials(&inputs);
+  StudyStore store = OpenDatabase(inputs, request);
+  CatchInterrupts();
+  ProgressBar bar(inputs.study.name, CountTrials(inputs.study), /*quiet=*/true);
+  ServePoints(inputs, MakeRunOptions(request, &bar), &store, std::cin, std::cout);
+  if (IsInterrupted())
+    throw Error(request.database + ": interrupted; the same points are answered from there again");
+  return kSuccess;
+}
+
 int RunStudy(const Request& request) {
   StudyInputs inputs = FindStudy(request.study);
   const Study& study = inputs.study;
+  if (study.is_external()) {
+    throw InputError(
+        study.source +
+        ": search.method: the points come from another program, which asks \"dexcheck study serve\"");
+  }
   if (study.is_search() && !request.shard.empty()) {
     throw InputError(
         "--shard: the trials of a search follow from one another; --jobs makes several at a time, and "
@@ -139,11 +169,7 @@ int RunStudy(const Request& request) {
   const std::vector<Trial> trials =
       study.is_search() ? std::vector<Trial>() : SelectShard(ListTrials(study), request.shard);
   CheckTrials(&inputs);
-  const auto makes_same_rows = [&](const std::vector<TrialRow>& rows) {
-    return MakesRowsAgain(inputs, rows);
-  };
-  StudyStore store =
-      StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), study, makes_same_rows);
+  StudyStore store = OpenDatabase(inputs, request);
   if (!request.quiet && !store.change().empty()) fmt::print("{}: {}\n", request.database, store.change());
   CatchInterrupts();
   if (request.retry_failed) RemoveFailed(study, &store);
@@ -222,6 +248,17 @@ void AddStudyCommand(Command app) {
   run.AddFlag("--retry-failed", &request->retry_failed, "Make trials again that crashed or timed out");
   add_quiet(run);
   run.SetAction([=] { return RunStudy(*request); });
+
+  Command serve =
+      study.AddCommand("serve", "Make the points that another program's optimiser asks for, line by line");
+  serve.AddOption("STUDY", &request->study, "A TOML file with search.method = \"external\"").Required();
+  serve.AddOption("--db", &request->database, "The study's database (SQLite), made when there is none")
+      .TypeName("FILE.sqlite")
+      .Required();
+  serve.AddOption("--jobs", &request->jobs, "Trials at a time (all processors by default)")
+      .TypeName("N")
+      .Check(whole);
+  serve.SetAction([=] { return ServeStudy(*request); });
 
   Command merge = study.AddCommand("merge", "Put the databases of one study together");
   merge.AddOption("OUT", &request->database, "Database that gets all trials").Required();
