@@ -16,8 +16,8 @@ StudyProgress FindProgress(const StudyStore& store) {
     progress.done += count;
     outcomes += fmt::format("  {:<18}{:>7}\n", NameOf(outcome), count);
   }
-  progress.text = fmt::format("{}: {} of {}{} trials\n", study.name, progress.done,
-                              study.is_search() ? "at most " : "", progress.total) +
+  progress.text = fmt::format("{}: {} of {}{} trials in {}\n", study.name, progress.done,
+                              study.is_search() ? "at most " : "", progress.total, store.name()) +
                   outcomes;
   progress.is_over = progress.done >= progress.total;
   const bool asks = study.is_search() || !study.objectives.empty() || !study.constraints.empty() ||

@@ -61,6 +61,8 @@ class StudyStore {
   /// Opens one that exists. @throws InputError.
   static StudyStore Open(const std::filesystem::path& path);
 
+  /// The file, as it was named.
+  [[nodiscard]] const std::string& name() const { return database_->name(); }
   [[nodiscard]] const StudyIdentity& identity() const { return identity_; }
   [[nodiscard]] const std::string& Identify(const std::string& column) const;
   /// As the file has it.
