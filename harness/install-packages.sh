@@ -36,7 +36,7 @@ if [[ $purpose != program ]]; then
   packages+=(
     libgtest-dev libgmock-dev libbenchmark-dev coinor-csdp hdf5-tools ffmpeg
     sqlite3 slurm-wlm munge
-    chromium chromium-driver python3-numpy doxygen
+    chromium chromium-driver python3-numpy python3-optuna doxygen
     # the Python module
     pybind11-dev python3-dev python3-pytest
     # other physics engines
