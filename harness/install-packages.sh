@@ -25,6 +25,8 @@ packages=(
   fonts-dejavu-core
   # the report: its figures, its page's plots and replay
   gnuplot-nox libjs-dygraphs libjs-three
+  # the live window
+  libglfw3-dev
 )
 purpose=${1:-program}
 case $purpose in
@@ -37,6 +39,7 @@ if [[ $purpose != program ]]; then
     libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools ffmpeg
     sqlite3 slurm-wlm munge
     chromium chromium-driver python3-numpy
+    xvfb xdotool imagemagick tmux zsh bash-completion
   )
 fi
 if [[ $purpose == development ]]; then

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <memory>
@@ -33,21 +32,6 @@ struct Request {
   bool no_panel = false;
   bool quiet = false;
 };
-
-/// "1280x720" into the options.
-void ReadSize(const std::string& text, MovieOptions* movie) {
-  const char* const end = text.data() + text.size();
-  const std::from_chars_result width = std::from_chars(text.data(), end, movie->width);
-  if (width.ec == std::errc() && width.ptr != end && *width.ptr == 'x') {
-    const std::from_chars_result height = std::from_chars(width.ptr + 1, end, movie->height);
-    const auto is_size = [](int value, int most) { return value >= 32 && value <= most && value % 2 == 0; };
-    if (height.ec == std::errc() && height.ptr == end && is_size(movie->width, 3840) &&
-        is_size(movie->height, 2160)) {
-      return;
-    }
-  }
-  throw InputError("--size: must be WIDTHxHEIGHT, even numbers from 32x32 to 3840x2160, got " + Quote(text));
-}
 
 double Duration(const RunFrames& run) { return run.times.back() - run.times.front(); }
 
@@ -88,7 +72,7 @@ void CheckOutput(const Request& request, const std::string& out) {
 }
 
 ExitCode Run(Request request) {
-  ReadSize(request.size, &request.movie);
+  ReadSize(request.size, &request.movie.width, &request.movie.height);
   std::string out = request.out;
   if (out.empty()) out = (request.run_folder / (request.still ? "still.png" : "video.mp4")).string();
   CheckOutput(request, out);
