@@ -38,7 +38,7 @@ if [[ $purpose != program ]]; then
   packages+=(
     libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools ffmpeg
     sqlite3 slurm-wlm munge
-    chromium chromium-driver python3-numpy
+    chromium chromium-driver python3-numpy doxygen
     xvfb xdotool imagemagick tmux zsh bash-completion
   )
 fi

@@ -22,13 +22,13 @@ ValueCheck WholeNumber(std::uint64_t least, std::uint64_t most) {
   };
 }
 
-ValueCheck PositiveNumber() {
-  return [](const std::string& text) -> std::string {
+ValueCheck PositiveNumber(const std::string& demand) {
+  return [demand](const std::string& text) -> std::string {
     double value = 0.0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     const bool is_number = error == std::errc() && end == text.data() + text.size();
     if (is_number && std::isfinite(value) && value > 0.0) return {};
-    return "must be a positive number, got " + Quote(text);
+    return demand + ", got " + Quote(text);
   };
 }
 

@@ -35,8 +35,8 @@ using ValueCheck = std::function<std::string(const std::string& value)>;
 /// Accepts decimal whole numbers from `least` to `most`.
 ValueCheck WholeNumber(std::uint64_t least, std::uint64_t most);
 
-/// Accepts finite numbers above zero.
-ValueCheck PositiveNumber();
+/// Accepts finite numbers above zero. @param demand what is said of others.
+ValueCheck PositiveNumber(const std::string& demand = "must be a positive number");
 
 /// An option, a flag or a positional argument.
 class Option {

@@ -60,15 +60,6 @@ std::string Fraction(const std::string& text) {
   return "must be a number above 0 and below 1, got " + Quote(text);
 }
 
-/// Accepts a number above 0.
-std::string PositiveNumber(const std::string& text) {
-  double value = 0.0;
-  const char* const end = text.data() + text.size();
-  const std::from_chars_result read = std::from_chars(text.data(), end, value);
-  if (read.ec == std::errc() && read.ptr == end && value > 0.0 && std::isfinite(value)) return {};
-  return "must be a number above 0, got " + Quote(text);
-}
-
 void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& more) {
   notes->insert(notes->end(), more.begin(), more.end());
 }
@@ -208,7 +199,7 @@ int Run(ConsistencyRequest request) {
 }  // namespace
 
 void AddConsistencyCommand(Command app) {
-  constexpr long kMaxSamples = 1000000000;
+  constexpr std::uint64_t kMaxSamples = 1000000000;
   const auto request = std::make_shared<ConsistencyRequest>();
   Command command = app.AddCommand("consistency", "Compare every term of model and engine at random states");
   const Option robot = AddRobotOptions(command, &request->files);
@@ -232,20 +223,13 @@ void AddConsistencyCommand(Command app) {
       .Excludes(program);
   command.AddOption("--time-limit", &request->program_options.seconds, "For each answer of the program, s")
       .TypeName("S")
-      .Check(PositiveNumber)
+      .Check(PositiveNumber("must be a number above 0"))
       .ShowDefault();
   command.AddFlag("--floating", &request->floating, "The root of a URDF floats");
   command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
       .TypeName("PATH")
       .Repeatable();
-  command.AddOption("--samples", &request->options.samples, "Number of random states")
-      .TypeName("N")
-      .Check(WholeNumber(1, kMaxSamples))
-      .ShowDefault();
-  command.AddOption("--seed", &request->options.seed, "Of the random states")
-      .TypeName("N")
-      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
-      .ShowDefault();
+  AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
   command
       .AddOption("--json", &request->json_file,
                  "Write the results to this file (- for standard output, then without the table)")
