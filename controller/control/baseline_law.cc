@@ -79,7 +79,6 @@ BaselineLaw::BaselineLaw(const RobotModel& model, int num_contacts, ControlLaw l
   xi_dot_d_.setZero(n);
   force_.setZero(n);
   work_.setZero(n);
-  half_force_.setZero(n, 1);
   rates_.setZero(Eigen::Index{3} * num_contacts);
 }
 
@@ -144,11 +143,10 @@ void BaselineLaw::SetOperationalSpace(const ModelTerms& robot, const GraspTerms&
   work_.noalias() = grasp.J_B().transpose() * rates_;
   force_ = work_ + robot.gravity() + robot.friction();
   force_.noalias() += robot.M() * sigma_prime;
-  force_.noalias() += robot.C() * robot.velocity();
+  force_ += robot.coriolis();
   // xi_dot_d = sigma' + M_bar'^-1 J^T F_c, M^-1 = L^-1 L^-T
-  half_force_ = work_;
-  inertia_.mass_factor().SolveTransposed(half_force_);
-  xi_dot_d_ = half_force_.col(0);
+  xi_dot_d_ = work_;
+  inertia_.mass_factor().SolveTransposed(xi_dot_d_);
   inertia_.mass_factor().Solve(xi_dot_d_);
   xi_dot_d_ += sigma_prime;
   F_o_ = grasp.body().M_hat * V_Bo_dot_ + grasp.body().C_hat * grasp.V_Bo() + grasp.body().N_o;

@@ -113,7 +113,6 @@ class BaselineLaw {
   Vector6d V_Bo_dot_ = Vector6d::Zero();
   Vector6d F_o_ = Vector6d::Zero();
   VectorXd xi_d_, xi_dot_d_, force_, work_;  // n
-  RowMatrixXd half_force_;                   // n x 1
   VectorXd rates_;                           // k
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "controller/common/errors.h"
+#include "controller/common/gram_matrix.h"
 #include "controller/common/text.h"
 #include "controller/object/euler_zyz.h"
 
@@ -17,7 +18,7 @@ void RequireIndependentConstraints(const MatrixXd& schur, const Eigen::LLT<Matri
   double smallest = 0.0;
   if (llt.info() == Eigen::Success) {
     smallest = 1.0;
-    for (Eigen::Index i = 0; i < schur.rows(); ++i) {
+    for (Eigen::Index i = 0; i < llt.rows(); ++i) {
       const double pivot = llt.matrixLLT()(i, i);
       smallest = std::min(smallest, pivot * pivot / schur(i, i));
     }
@@ -35,12 +36,12 @@ Vector6d CalcCoordinateAcceleration(const GraspTerms& grasp, const Vector6d& V_B
 }
 
 ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contacts) : factor_(model) {
-  Require(num_contacts > 0, "number of contacts", "must be positive", num_contacts);
+  Require(num_contacts >= 0, "number of contacts", "must not be negative", num_contacts);
   const Eigen::Index n = model.num_velocities();
   const Eigen::Index k = Eigen::Index{3} * num_contacts;
-  half_.setZero(n + 6, k);
-  half_force_.setZero(n + 6, 1);
-  schur_.setZero(k, k);
+  rows_.reserve(static_cast<size_t>(n + 6));
+  half_.setZero(n + 6, PadToGramBlock(k));
+  schur_.setZero(half_.cols(), half_.cols());
   schur_llt_ = Eigen::LLT<MatrixXd>(k);
   motion_.setZero(n + 6);
   prediction_.xi_dot.setZero(n);
@@ -53,7 +54,8 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
   const Eigen::Index n = prediction_.xi_dot.size();
   Require(robot.size() == n && force.size() == n, "length of force", "must be that of xi",
           static_cast<double>(force.size()));
-  Require(grasp.num_forces() == schur_.rows(), "number of contact forces", "must be as constructed",
+  const Eigen::Index k = prediction_.f_c.size();
+  Require(grasp.num_forces() == k && k > 0, "number of contact forces", "must be as constructed and positive",
           grasp.num_forces());
   const ObjectBodyTerms& body = grasp.body();
   factor_.Compute(robot.M());
@@ -62,44 +64,34 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
   // M = L^T L of the robot, L L^T of the object; half = M^-1/2 [J_B'^T; -G], and M^-1/2 of what the
   // constraints leave alone
   const std::span<const int> moving = grasp.moving_entries();
-  half_.topRows(n).setZero();
-  for (const int i : moving) half_.row(i) = grasp.J_B().col(i).transpose();
+  for (const int i : moving) half_.row(i).head(k) = grasp.J_B().col(i).transpose();
   CalcFreeForce(robot, force);
   if (object == ObjectSupport::kHand) {
-    half_.bottomRows<6>() = -grasp.G();
+    half_.bottomLeftCorner(6, k) = -grasp.G();
     motion_.tail<6>() = -body.C_hat * grasp.V_Bo() - body.N_o;
     if (push != nullptr) motion_.tail<6>() += *push;
   } else {
     half_.bottomRows<6>().setZero();
     motion_.tail<6>().setZero();
   }
-  half_force_ = motion_;
-  factor_.SolveTransposed(moving, half_.topRows(n));
-  factor_.SolveTransposed(half_force_.topRows(n));
+  factor_.SolveTransposedColumns(moving, half_.topRows(n));
+  factor_.SolveTransposed(motion_.head(n));
   M_hat_llt.matrixL().solveInPlace(half_.bottomRows<6>());
-  M_hat_llt.matrixL().solveInPlace(half_force_.bottomRows<6>());
+  M_hat_llt.matrixL().solveInPlace(motion_.tail<6>());
 
-  // (half^T half) f_c = half^T half_force + slip_bias - contact_acceleration
-  schur_.setZero();
+  // (half^T half) f_c = half^T M^-1/2 force + slip_bias - contact_acceleration
+  rows_.assign(moving.begin(), moving.end());
+  for (Eigen::Index i = n; i < n + 6; ++i) rows_.push_back(static_cast<int>(i));
+  CalcGramMatrix(half_, rows_, &schur_);
   prediction_.f_c = grasp.slip_bias();
   if (contact_acceleration != nullptr) prediction_.f_c -= *contact_acceleration;
-  const auto add_row = [&](Eigen::Index i) {
-    for (Eigen::Index col = 0; col < schur_.cols(); ++col) {
-      schur_.col(col).tail(schur_.rows() - col) +=
-          half_(i, col) * half_.row(i).tail(schur_.rows() - col).transpose();
-    }
-    prediction_.f_c += half_force_(i, 0) * half_.row(i).transpose();
-  };
-  for (const int i : moving) add_row(i);
-  for (Eigen::Index i = n; i < n + 6; ++i) add_row(i);
-  schur_llt_.compute(schur_);
+  for (const int i : rows_) prediction_.f_c += motion_[i] * half_.row(i).head(k).transpose();
+  schur_llt_.compute(schur_.topLeftCorner(k, k));
   RequireIndependentConstraints(schur_, schur_llt_);
   schur_llt_.solveInPlace(prediction_.f_c);
 
-  // [xi_dot; V_Bo_dot] = M^-1/2 (half_force - half f_c)
-  motion_ = half_force_;
-  for (const int i : moving) motion_[i] -= half_.row(i).dot(prediction_.f_c);
-  for (Eigen::Index i = n; i < n + 6; ++i) motion_[i] -= half_.row(i).dot(prediction_.f_c);
+  // [xi_dot; V_Bo_dot] = M^-1/2 (M^-1/2 force - half f_c)
+  for (const int i : rows_) motion_[i] -= half_.row(i).head(k).dot(prediction_.f_c);
   prediction_.xi_dot = motion_.head(n);
   factor_.Solve(prediction_.xi_dot);
   prediction_.V_Bo_dot = motion_.tail<6>();
@@ -114,9 +106,8 @@ const Prediction& ConstrainedDynamics::PredictFree(const ModelTerms& robot,
           static_cast<double>(force.size()));
   factor_.Compute(robot.M());
   CalcFreeForce(robot, force);
-  half_force_.topRows(n) = motion_.head(n);
-  factor_.SolveTransposed(half_force_.topRows(n));
-  prediction_.xi_dot = half_force_.topRows(n);
+  prediction_.xi_dot = motion_.head(n);
+  factor_.SolveTransposed(prediction_.xi_dot);
   factor_.Solve(prediction_.xi_dot);
   prediction_.V_Bo_dot.setZero();
   prediction_.f_c.setZero();
@@ -125,8 +116,7 @@ const Prediction& ConstrainedDynamics::PredictFree(const ModelTerms& robot,
 
 void ConstrainedDynamics::CalcFreeForce(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force) {
   auto free = motion_.head(prediction_.xi_dot.size());
-  free = force - robot.gravity() - robot.friction();
-  free.noalias() -= robot.C() * robot.velocity();
+  free = force - robot.gravity() - robot.friction() - robot.coriolis();
 }
 
 ObjectSpaceTerms CalcObjectSpaceTerms(const ModelTerms& robot, const GraspTerms& grasp,

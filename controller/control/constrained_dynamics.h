@@ -34,7 +34,8 @@ enum class ObjectSupport {
 /// rigid and nothing slipped. Sized by the constructor; nothing else allocates.
 class ConstrainedDynamics {
  public:
-  /// @throws std::invalid_argument unless num_contacts > 0.
+  /// @param num_contacts 0 for a robot that holds nothing, for which there is PredictFree alone.
+  /// @throws std::invalid_argument when it is negative.
   ConstrainedDynamics(const RobotModel& model, int num_contacts);
 
   /// One solve of the saddle-point system
@@ -48,7 +49,7 @@ class ConstrainedDynamics {
   /// its Sigma_cf, for whoever stabilises the constraint; null for zero.
   /// @param push wrench on the object by others than contacts, Sigma_o, N, N m; null for none.
   /// @throws SingularityError when the contacts' constraints depend on each other; std::invalid_argument when
-  /// sizes differ.
+  /// sizes differ or there are no contacts.
   const Prediction& Predict(const ModelTerms& robot, const GraspTerms& grasp,
                             const Eigen::Ref<const VectorXd>& force,
                             ObjectSupport object = ObjectSupport::kHand,
@@ -65,12 +66,12 @@ class ConstrainedDynamics {
   void CalcFreeForce(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force);
 
   TreeFactor factor_;
-  // Most rows of J_B'^T are zero, those of joints that carry no fingertip, and stay so.
-  RowMatrixXd half_;        // n + 6 x k, [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G]
-  RowMatrixXd half_force_;  // n + 6 x 1, M^-1/2 of the forces without contact
-  MatrixXd schur_;
+  // Of J_B'^T those rows are used whose joints carry a fingertip, and then the object's six.
+  std::vector<int> rows_;
+  RowMatrixXd half_;  // n + 6 x k, padded: [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G]
+  MatrixXd schur_;    // k x k, padded
   Eigen::LLT<MatrixXd> schur_llt_;
-  VectorXd motion_;  // n + 6
+  VectorXd motion_;  // n + 6, M^-1/2 of the forces without contact, then without those of contacts
   Prediction prediction_;
 };
 

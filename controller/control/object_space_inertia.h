@@ -35,8 +35,8 @@ class ObjectSpaceInertia {
 
  private:
   TreeFactor factor_;
-  RowMatrixXd half_;  // n x k, M_bar'^-1/2 J_B'^T
-  MatrixXd inverse_;  // k x k, Lambda_c^-1
+  RowMatrixXd half_;  // n x k, padded: M_bar'^-1/2 J_B'^T
+  MatrixXd inverse_;  // k x k, padded: Lambda_c^-1
   Eigen::LLT<MatrixXd> inverse_llt_;
   MatrixXd G_T_;  // k x 6, L_c^-1 G^T with Lambda_c^-1 = L_c L_c^T
   Matrix6d Lambda_ = Matrix6d::Identity();

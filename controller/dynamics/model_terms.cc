@@ -66,6 +66,7 @@ ModelTerms::ModelTerms(const RobotModel& model, Coordinates coordinates)
   path_C_row_.setZero(path_length);
   M_.setZero(size_, size_);
   C_.setZero(size_, size_);
+  coriolis_.setZero(size_);
   gravity_.setZero(size_);
   friction_.setZero(size_);
 }

@@ -60,6 +60,8 @@ class ModelTerms {
   [[nodiscard]] const MatrixXd& M() const { return M_; }
   /// C of (16), or C_bar' of (18): Christoffel choice, M_dot - 2 C is skew (Property 2).
   [[nodiscard]] const MatrixXd& C() const { return C_; }
+  /// C velocity, N m or N.
+  [[nodiscard]] const VectorXd& coriolis() const { return coriolis_; }
   /// Part of F due to gravity, N m or N.
   [[nodiscard]] const VectorXd& gravity() const { return gravity_; }
   /// Part of F due to viscous friction, N m or N.
@@ -171,6 +173,8 @@ class ModelTerms {
 
   MatrixXd M_;
   MatrixXd C_;
+  VectorXd coriolis_;
+  double kinetic_ = 0.0;  // velocity^T M velocity / 2
   VectorXd gravity_;
   VectorXd friction_;
 };

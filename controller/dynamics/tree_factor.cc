@@ -38,7 +38,7 @@ void TreeFactor::Compute(const Eigen::Ref<const MatrixXd>& M) {
   // From the tips inward: a row is final, then its part is taken from the rows that it hangs on.
   for (auto i = rows_.rbegin(); i != rows_.rend(); ++i) {
     const Row row = *i;
-    double* const entries = L_.data() + row.begin;
+    double* const __restrict entries = L_.data() + row.begin;
     const size_t last = row.size - 1;
     const double pivot = entries[last];
     Require(pivot > 0.0, "M_bar'", "must be positive definite; pivot", pivot);
@@ -48,7 +48,8 @@ void TreeFactor::Compute(const Eigen::Ref<const MatrixXd>& M) {
     for (size_t k = 0; k < last; ++k) entries[k] *= inverse;
     for (size_t above = 0; above < last; ++above) {
       const double factor = entries[above];
-      double* const others = L_.data() + rows_[static_cast<size_t>(path_[row.begin + above])].begin;
+      double* const __restrict others =
+          L_.data() + rows_[static_cast<size_t>(path_[row.begin + above])].begin;
       for (size_t k = 0; k <= above; ++k) others[k] -= factor * entries[k];
     }
   }
@@ -74,20 +75,38 @@ void TreeFactor::Solve(Eigen::Ref<VectorXd> x) const {
   }
 }
 
-void TreeFactor::SolveTransposed(Eigen::Ref<RowMatrixXd> X) const { SolveTransposed(all_rows_, X); }
+void TreeFactor::SolveTransposed(Eigen::Ref<VectorXd> x) const {
+  for (auto i = static_cast<Eigen::Index>(rows_.size()) - 1; i >= 0; --i) {
+    const Row row = rows_[static_cast<size_t>(i)];
+    const size_t last = row.begin + row.size - 1;
+    const double x_i = x[i] * (1.0 / L_[last]);
+    x[i] = x_i;
+    for (size_t k = row.begin; k < last; ++k) x[path_[k]] -= L_[k] * x_i;
+  }
+}
 
-void TreeFactor::SolveTransposed(std::span<const int> rows, Eigen::Ref<RowMatrixXd> X) const {
+double TreeFactor::CalcForceNorm(const Eigen::Ref<const VectorXd>& f, VectorXd* work) const {
+  *work = f;
+  SolveTransposed(*work);
+  return work->norm();
+}
+
+void TreeFactor::SolveTransposedColumns(Eigen::Ref<RowMatrixXd> X) const {
+  SolveTransposedColumns(all_rows_, X);
+}
+
+void TreeFactor::SolveTransposedColumns(std::span<const int> rows, Eigen::Ref<RowMatrixXd> X) const {
   // Plain loops: rows are short, and there are hundreds of them.
   const Eigen::Index width = X.cols();
   for (auto index = rows.rbegin(); index != rows.rend(); ++index) {
     const Eigen::Index i = *index;
     const Row row = rows_[static_cast<size_t>(i)];
     const size_t last = row.begin + row.size - 1;
-    double* const x_i = X.data() + i * X.outerStride();
+    double* const __restrict x_i = X.data() + i * X.outerStride();
     const double inverse = 1.0 / L_[last];
     for (Eigen::Index c = 0; c < width; ++c) x_i[c] *= inverse;
     for (size_t k = last; k-- > row.begin;) {
-      double* const x_j = X.data() + path_[k] * X.outerStride();
+      double* const __restrict x_j = X.data() + path_[k] * X.outerStride();
       const double factor = L_[k];
       for (Eigen::Index c = 0; c < width; ++c) x_j[c] -= factor * x_i[c];
     }

@@ -28,11 +28,17 @@ class TreeFactor {
   void Multiply(Eigen::Ref<VectorXd> x) const;
   /// x becomes L^-1 x.
   void Solve(Eigen::Ref<VectorXd> x) const;
-  /// Each column of X (n x k, row-major) becomes L^-T times it: |L^-T x| = sqrt(x^T M^-1 x).
-  void SolveTransposed(Eigen::Ref<RowMatrixXd> X) const;
-  /// The same of an X that has zeros but in some rows, which then has zeros there too.
+  /// x becomes L^-T x.
+  void SolveTransposed(Eigen::Ref<VectorXd> x) const;
+  /// Each column of X (n x k, row-major) becomes L^-T times it.
+  void SolveTransposedColumns(Eigen::Ref<RowMatrixXd> X) const;
+  /// The same of an X that has zeros but in some rows, which then has zeros there too; the other rows are
+  /// neither read nor written.
   /// @param rows ascending, and with each row those that its coordinate hangs on: chains from the base.
-  void SolveTransposed(std::span<const int> rows, Eigen::Ref<RowMatrixXd> X) const;
+  void SolveTransposedColumns(std::span<const int> rows, Eigen::Ref<RowMatrixXd> X) const;
+  /// |f|_M^-1 = sqrt(f^T M^-1 f) = |L^-T f|, the size of a force f (n) in the metric of the inertia.
+  /// @param work scratch.
+  [[nodiscard]] double CalcForceNorm(const Eigen::Ref<const VectorXd>& f, VectorXd* work) const;
 
  private:
   /// Entries of row i: those of the coordinates from the root to i, which the part of the path up to any of

@@ -14,14 +14,10 @@ BaselineReference::BaselineReference(ControlLaw law, const ObjectStiffness& stif
   Require(law != ControlLaw::kComputedTorque, "law", "must be one of the baselines",
           static_cast<double>(law));
   M_inv_J_T_.setZero(num_velocities, num_forces);
-  Lambda_c_inv_.setZero(num_forces, num_forces);
-  Lambda_c_.setZero(num_forces, num_forces);
   G_Lambda_c_.setZero(6, num_forces);
-  force_.setZero(num_velocities);
-  motion_.setZero(num_velocities);
-  xi_e_.setZero(num_velocities);
-  f_c_.setZero(num_forces);
-  rates_.setZero(num_forces);
+  for (MatrixXd* matrix : {&Lambda_c_inv_, &Lambda_c_}) matrix->setZero(num_forces, num_forces);
+  for (VectorXd* vector : {&force_, &motion_, &xi_e_}) vector->setZero(num_velocities);
+  for (VectorXd* vector : {&f_c_, &rates_}) vector->setZero(num_forces);
 }
 
 bool BaselineReference::CalcInertia(const LawTerms& terms) {
@@ -108,12 +104,12 @@ bool BaselineReference::Evaluate(const LawSpec& spec, const LawReference& plain,
       // Terms of V_d and xi_d by those of V_o and xi: xi_d - xi = J^+ (G^T V_d - J xi)
       rates_.noalias() = terms.G.transpose() * (terms.V_Bo + V_e_);
       rates_.noalias() -= terms.J * terms.xi;
-      xi_e_.noalias() = plain.J_plus() * rates_;
+      plain.ApplyPseudoinverse(&rates_, &xi_e_);
       rates_ = terms.G_dot_T_V - terms.J_dot_xi;
       rates_.noalias() += G_dot.transpose() * V_e_;
-      rates_.noalias() -= terms.J_dot * xi_e_;
+      rates_.noalias() -= *terms.J_dot * xi_e_;
       force_ += terms.friction + terms.C_xi;
-      force_.noalias() += terms.C * xi_e_;
+      force_.noalias() += *terms.C * xi_e_;
       // C_hat = diag(m [omega]x, -[I_o omega]x)
       const Vector6d momentum = terms.M_hat * terms.V_Bo;
       F_o += terms.C_hat_V;
@@ -123,7 +119,7 @@ bool BaselineReference::Evaluate(const LawSpec& spec, const LawReference& plain,
     rates_.noalias() += terms.G.transpose() * V_dot;
     // J^+ rates + sigma' - J^+ J sigma'
     rates_.noalias() -= terms.J * plain.sigma_prime();
-    motion_.noalias() = plain.J_plus() * rates_;
+    plain.ApplyPseudoinverse(&rates_, &motion_);
     motion_ += plain.sigma_prime();
     force_.noalias() += terms.M * motion_;
     F_o += terms.M_hat * V_dot;

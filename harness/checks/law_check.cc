@@ -66,7 +66,6 @@ LawCheck::LawCheck(const Setup& setup)
   force_.setZero(setup.model().num_velocities());
   difference_ = force_;
   slope_.setZero(3 * static_cast<Eigen::Index>(setup.fingertips().size()));
-  column_.setZero(setup.model().num_velocities(), 1);
 }
 
 double LawCheck::sampled_radius() const {
@@ -80,12 +79,7 @@ DesiredMotion LawCheck::EvaluateDesired(double t) const {
   return desired;
 }
 
-double LawCheck::Norm(const VectorXd& force) {
-  // |f|_M^-1 = |L^-T f|
-  column_ = force;
-  mass_factor_->SolveTransposed(column_);
-  return column_.norm();
-}
+double LawCheck::Norm(const VectorXd& force) { return mass_factor_->CalcForceNorm(force, &work_); }
 
 const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& findings,
                                    const LawTerms& terms, const TreeFactor& mass_factor) {
@@ -105,10 +99,10 @@ const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& f
       errors_ = {kInfinity, kInfinity, kInfinity, kInfinity};
       return errors_;
     }
-    CompareTorque(step, baseline_->force());
+    CompareTorque(step, terms, baseline_->force());
     CompareGraspForce(step, terms, baseline_->f_c());
   } else {
-    CompareTorque(step, reference_.force());
+    CompareTorque(step, terms, reference_.force());
     CompareDemand(findings);
     CompareGraspForce(step, terms, reference_.f_c());
   }
@@ -129,7 +123,7 @@ double LawCheck::CompareUnsent(const StepRecord& step, const LawTerms& terms) {
   }
   force_ = terms.C_xi + terms.gravity + terms.friction;
   scale_ = std::max(Norm(force_), std::numeric_limits<double>::min());
-  CompareTorque(step, baseline_ ? baseline_->force() : reference_.force());
+  CompareTorque(step, terms, baseline_ ? baseline_->force() : reference_.force());
   return errors_.torque;
 }
 
@@ -139,14 +133,14 @@ double LawCheck::CompareApplied(const StepRecord& step) {
          std::max(step.command.tau.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
 }
 
-void LawCheck::CompareTorque(const StepRecord& step, const VectorXd& force) {
+void LawCheck::CompareTorque(const StepRecord& step, const LawTerms& terms, const VectorXd& force) {
   actuation_.CalcForce(step.command.tau, force_);
   difference_ = force_ - force;
   const double relative = Norm(difference_) / scale_;
   errors_.torque = relative / reference_.condition_number();
   // Less is rounding, which tells nothing, and only the printed law is known summand by summand.
   if (!baseline_ && errors_.torque > kLawTorqueBound)
-    attribution_.Add(difference_, reference_.parts(), 1.0 / scale_);
+    attribution_.Add(difference_, reference_.CalcParts(terms, step.command.demand.F_N), 1.0 / scale_);
 }
 
 void LawCheck::CompareDemand(const StepFindings& findings) {
@@ -159,7 +153,9 @@ void LawCheck::CompareDemand(const StepFindings& findings) {
       (findings.f_c_model - f_c).norm() / std::max(f_c.norm(), std::numeric_limits<double>::min());
   // Where contacts slip, (47) plans for xi_c and the rigid system starts from xi.
   const double kappa = reference_.condition_number();
-  const double slip = (Norm(reference_.slip_coriolis()) + Norm(reference_.slip_inertia())) / scale_;
+  difference_ = reference_.slip_acceleration();
+  mass_factor_->Multiply(difference_);
+  const double slip = (Norm(reference_.slip_coriolis()) + difference_.norm()) / scale_;
   errors_.demand = std::max(0.0, std::max(motion, forces) / kappa - kSlipShare * slip);
 }
 

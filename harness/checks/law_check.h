@@ -78,7 +78,7 @@ class LawCheck {
 
  private:
   [[nodiscard]] DesiredMotion EvaluateDesired(double t) const;
-  void CompareTorque(const StepRecord& step, const VectorXd& force);
+  void CompareTorque(const StepRecord& step, const LawTerms& terms, const VectorXd& force);
   void CompareDemand(const StepFindings& findings);
   void CompareGraspForce(const StepRecord& step, const LawTerms& terms, const VectorXd& f_c);
   void FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
@@ -100,11 +100,10 @@ class LawCheck {
   const TreeFactor* mass_factor_ = nullptr;
   TreeFactor own_factor_;  // of a step without prediction
   double scale_ = 1.0;
-  VectorXd force_, difference_;  // n
-  VectorXd slope_;               // k
-  RowMatrixXd column_;           // n x 1
-  bool follows_ = false;         // whether the one below is set
-  LawObject followed_;           // of (57); velocities half a step before
+  VectorXd force_, difference_, work_;  // n
+  VectorXd slope_;                      // k
+  bool follows_ = false;                // whether the one below is set
+  LawObject followed_;                  // of (57); velocities half a step before
 };
 
 }  // namespace dexcheck

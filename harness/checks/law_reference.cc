@@ -85,25 +85,16 @@ LawTerms::LawTerms(int num_positions, int num_velocities, int num_forces) {
   J_dot_xi.setZero(num_forces);
   G.setZero(6, num_forces);
   G_dot_T_V.setZero(num_forces);
-  C.setZero(num_velocities, num_velocities);
-  J_dot.setZero(num_forces, num_velocities);
 }
 
 LawReference::LawReference(int num_velocities, int num_forces) : llt_(num_forces), W_llt_(num_velocities) {
-  J_plus_.setZero(num_velocities, num_forces);
+  for (MatrixXd* matrix : {&A_, &L_inv_}) matrix->setZero(num_forces, num_forces);
+  for (VectorXd* vector : {&rates_, &slip_rates_, &f_c_}) vector->setZero(num_forces);
+  for (VectorXd* vector :
+       {&slip_coriolis_, &slip_acceleration_, &xi_c_, &xi_dot_d_, &motion_, &sigma_prime_, &force_})
+    vector->setZero(num_velocities);
   W_inv_J_T_.setZero(num_velocities, num_forces);
-  A_.setZero(num_forces, num_forces);
-  A_inv_.setZero(num_forces, num_forces);
   G_.setZero(6, num_forces);
-  rates_.setZero(num_forces);
-  f_c_.setZero(num_forces);
-  slip_coriolis_.setZero(num_velocities);
-  slip_inertia_.setZero(num_velocities);
-  xi_c_.setZero(num_velocities);
-  xi_dot_d_.setZero(num_velocities);
-  motion_.setZero(num_velocities);
-  sigma_prime_.setZero(num_velocities);
-  force_.setZero(num_velocities);
   parts_.setZero(num_velocities, kLawPartCount);
   demand_.fill(Vector6d::Zero());
 }
@@ -120,13 +111,17 @@ bool LawReference::FactorJacobian(const LawSpec& spec, const LawTerms& terms) {
   A_.noalias() = terms.J * W_inv_J_T_;
   llt_.compute(A_);
   if (llt_.info() != Eigen::Success) return false;
-  A_inv_.setIdentity();
-  llt_.solveInPlace(A_inv_);
-  J_plus_.noalias() = W_inv_J_T_ * A_inv_;
-  condition_number_ = std::sqrt(A_.trace() * A_inv_.trace());
+  L_inv_.setIdentity();
+  llt_.matrixL().solveInPlace(L_inv_);
+  condition_number_ = std::sqrt(A_.trace()) * L_inv_.norm();
   G_ = terms.G;
   G_llt_.compute(G_ * G_.transpose());
   return G_llt_.info() == Eigen::Success && std::isfinite(condition_number_);
+}
+
+void LawReference::ApplyPseudoinverse(VectorXd* y, VectorXd* x) const {
+  llt_.solveInPlace(*y);
+  x->noalias() = W_inv_J_T_ * *y;
 }
 
 void LawReference::AddLeastForces(const Vector6d& F_o, VectorXd* f_c) const {
@@ -135,12 +130,13 @@ void LawReference::AddLeastForces(const Vector6d& F_o, VectorXd* f_c) const {
 
 Vector6d LawReference::SolveGrasp(const Eigen::Ref<const VectorXd>& f) const { return G_llt_.solve(G_ * f); }
 
-void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawObject& object,
-                                          const DesiredMotion& desired) {
+LawReference::Demand LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawObject& object,
+                                                          const DesiredMotion& desired) {
   const Matrix3d R_T = object.X_Bo.linear().transpose();
   const Vector3d v = object.V_Bo.head<3>();
   const Vector3d omega = object.V_Bo.tail<3>();
-  auto& [feed_forward, velocity, position, rate] = demand_;
+  Demand demand;
+  auto& [feed_forward, velocity, position, rate] = demand;
 
   // v = R^T p_dot, hence v_dot = R^T p_ddot - omega x v
   const Vector3d p_dot = R_T.transpose() * v;
@@ -175,81 +171,91 @@ void LawReference::CalcObjectAcceleration(const LawSpec& spec, const LawObject& 
     velocity.tail<3>() = accelerate(zero, -(K_v.tail<3>() * error.e_R_dot.array()).matrix()) - bias;
     position.tail<3>() = accelerate(zero, -(K_p.tail<3>() * error.e_R.array()).matrix()) - bias;
   }
-  V_Bo_dot_ = feed_forward + velocity + position + rate;
+  return demand;
 }
 
 Vector6d LawReference::CalcDemand(const LawSpec& spec, const LawObject& object,
                                   const DesiredMotion& desired) {
-  CalcObjectAcceleration(spec, object, desired);
-  return V_Bo_dot_;
-}
-
-void LawReference::AddMotionPart(LawPart part, const LawTerms& terms,
-                                 const Eigen::Ref<const VectorXd>& rates) {
-  motion_.noalias() = J_plus_ * rates;
-  xi_dot_d_ += motion_;
-  parts_.col(static_cast<Eigen::Index>(part)).noalias() = terms.M * motion_;
+  const Demand demand = CalcObjectAcceleration(spec, object, desired);
+  return demand[0] + demand[1] + demand[2] + demand[3];
 }
 
 bool LawReference::Evaluate(const LawSpec& spec, const LawTerms& terms, const DesiredMotion& desired,
                             const Eigen::Ref<const VectorXd>& F_N) {
   if (!FactorJacobian(spec, terms)) return false;
-  CalcObjectAcceleration(spec, {terms.X_Bo, terms.V_Bo, terms.X_o}, desired);
-  const auto part = [&](LawPart which) { return parts_.col(static_cast<Eigen::Index>(which)); };
+  demand_ = CalcObjectAcceleration(spec, {terms.X_Bo, terms.V_Bo, terms.X_o}, desired);
+  V_Bo_dot_ = demand_[0] + demand_[1] + demand_[2] + demand_[3];
 
   // xi_c = xi - J^+ (J xi - G^T V_o)
-  rates_.noalias() = terms.J * terms.xi;
-  rates_.noalias() -= terms.G.transpose() * terms.V_Bo;
-  xi_c_.noalias() = -J_plus_ * rates_;  // less xi
-
-  // xi_dot_d = J^+ (G^T V_o_dot + G_dot^T V_o - J_dot xi_c) + N sigma'
-  xi_dot_d_.setZero();
-  for (size_t i = 0; i < demand_.size(); ++i) {
-    rates_.noalias() = terms.G.transpose() * demand_[i];
-    AddMotionPart(static_cast<LawPart>(i), terms, rates_);
-  }
-  AddMotionPart(LawPart::kGraspMapRate, terms, terms.G_dot_T_V);
-  rates_.noalias() = terms.J_dot * xi_c_;
-  motion_.noalias() = J_plus_ * rates_;
-  slip_inertia_.noalias() = terms.M * motion_;
-  slip_coriolis_.noalias() = terms.C * xi_c_;
-  rates_ = -terms.J_dot_xi;
-  rates_.noalias() -= terms.J_dot * xi_c_;
-  AddMotionPart(LawPart::kJacobianRate, terms, rates_);
+  rates_.noalias() = -terms.J * terms.xi;
+  rates_.noalias() += terms.G.transpose() * terms.V_Bo;
+  ApplyPseudoinverse(&rates_, &xi_c_);  // less xi
+  slip_rates_.noalias() = *terms.J_dot * xi_c_;
+  rates_ = slip_rates_;
+  ApplyPseudoinverse(&rates_, &slip_acceleration_);
+  slip_coriolis_.noalias() = *terms.C * xi_c_;
 
   // sigma' = acceleration + damping (xi_reference - xi) + stiffness [0; q_posture - q]
   const PostureTask& posture = spec.posture;
   const Eigen::Index joints = posture.q_posture.size();
   sigma_prime_ = posture.acceleration + posture.damping.cwiseProduct(posture.xi_reference - terms.xi);
   sigma_prime_.tail(joints) += posture.stiffness.cwiseProduct(posture.q_posture - terms.q.tail(joints));
+
+  // xi_dot_d = J^+ (G^T V_o_dot + G_dot^T V_o - J_dot xi_c) + N sigma', N = 1 - J^+ J
+  rates_ = terms.G_dot_T_V - terms.J_dot_xi - slip_rates_;
+  rates_.noalias() += terms.G.transpose() * V_Bo_dot_;
+  rates_.noalias() -= terms.J * sigma_prime_;
+  ApplyPseudoinverse(&rates_, &xi_dot_d_);
+  xi_dot_d_ += sigma_prime_;
+
+  // f_c = G^+ F_o + F_N, F_o = M_hat V_o_dot + C_hat V_o + N_o
+  f_c_ = F_N;
+  AddLeastForces(terms.M_hat * V_Bo_dot_ + terms.C_hat_V + terms.N_o, &f_c_);
+
+  force_ = terms.C_xi + slip_coriolis_ + terms.gravity + terms.friction;
+  force_.noalias() += terms.M * xi_dot_d_;
+  force_.noalias() += terms.J.transpose() * f_c_;
+  return true;
+}
+
+const MatrixXd& LawReference::CalcParts(const LawTerms& terms, const Eigen::Ref<const VectorXd>& F_N) {
+  const auto part = [&](LawPart which) { return parts_.col(static_cast<Eigen::Index>(which)); };
+  // M_bar' J^+ rates
+  const auto set_motion = [&](LawPart which) {
+    ApplyPseudoinverse(&rates_, &motion_);
+    part(which).noalias() = terms.M * motion_;
+  };
+  for (size_t i = 0; i < demand_.size(); ++i) {
+    rates_.noalias() = terms.G.transpose() * demand_[i];
+    set_motion(static_cast<LawPart>(i));
+  }
+  rates_ = terms.G_dot_T_V;
+  set_motion(LawPart::kGraspMapRate);
+  rates_ = -terms.J_dot_xi - slip_rates_;
+  set_motion(LawPart::kJacobianRate);
   rates_.noalias() = terms.J * sigma_prime_;
-  motion_ = sigma_prime_;
-  motion_.noalias() -= J_plus_ * rates_;
-  xi_dot_d_ += motion_;
+  ApplyPseudoinverse(&rates_, &motion_);
+  motion_ = sigma_prime_ - motion_;
   part(LawPart::kPosture).noalias() = terms.M * motion_;
 
-  part(LawPart::kCoriolis) = terms.C_xi;
-  part(LawPart::kCoriolis) += slip_coriolis_;
+  part(LawPart::kCoriolis) = terms.C_xi + slip_coriolis_;
   part(LawPart::kGravity) = terms.gravity;
   part(LawPart::kFriction) = terms.friction;
 
-  // f_c = G^+ F_o + F_N, G^+ = G^T (G G^T)^-1
-  f_c_ = F_N;
-  const auto add_wrench = [&](LawPart which, const Vector6d& wrench) {
-    rates_.noalias() = G_.transpose() * G_llt_.solve(wrench);
-    f_c_ += rates_;
+  // J^T G^+ wrench
+  const auto set_wrench = [&](LawPart which, const Vector6d& wrench) {
+    rates_.setZero();
+    AddLeastForces(wrench, &rates_);
     part(which).noalias() = terms.J.transpose() * rates_;
   };
   for (size_t i = 0; i < demand_.size(); ++i) {
-    add_wrench(static_cast<LawPart>(static_cast<size_t>(LawPart::kInertiaOfFeedForward) + i),
+    set_wrench(static_cast<LawPart>(static_cast<size_t>(LawPart::kInertiaOfFeedForward) + i),
                terms.M_hat * demand_[i]);
   }
-  add_wrench(LawPart::kObjectCoriolis, terms.C_hat_V);
-  add_wrench(LawPart::kObjectGravity, terms.N_o);
+  set_wrench(LawPart::kObjectCoriolis, terms.C_hat_V);
+  set_wrench(LawPart::kObjectGravity, terms.N_o);
   part(LawPart::kInternalForce).noalias() = terms.J.transpose() * F_N;
-
-  force_ = parts_.rowwise().sum();
-  return true;
+  return parts_;
 }
 
 }  // namespace dexcheck

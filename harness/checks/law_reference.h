@@ -11,11 +11,12 @@
 //   f_c      = G^+ (M_hat V_o_dot + C_hat V_o + N_o) + F_N                          (49)
 //   E_bar' tau' = M_bar' xi_dot_d + C_bar' xi_c + F_bar' + J^T f_c                  (55)
 //
-// Every summand is kept by itself, as generalised forces, so that a difference of torques can be told as one
-// of them.
+// A difference of torques is told as one of the summands, each as generalised forces: they are formed only
+// when there is a difference.
 
 #include <Eigen/Cholesky>
 #include <array>
+#include <span>
 
 #include "controller/common/types.h"
 #include "controller/control/computed_torque.h"
@@ -50,7 +51,8 @@ struct LawTerms {
   Vector6d C_hat_V = Vector6d::Zero();
   Vector6d N_o = Vector6d::Zero();
   /// C_bar' (n x n) and J_B_dot' (k x n) multiply only xi - xi_c here, which is zero where nothing slips.
-  MatrixXd C, J_dot;
+  const MatrixXd* C = nullptr;
+  const MatrixXd* J_dot = nullptr;
 
   /// Sizes all members.
   LawTerms(int num_positions, int num_velocities, int num_forces);
@@ -119,41 +121,44 @@ class LawReference {
   /// V_o_dot that (55) demands of an object in this state, wherever the robot is.
   Vector6d CalcDemand(const LawSpec& spec, const LawObject& object, const DesiredMotion& desired);
 
-  /// E_bar' tau' (n), and its summands (n x kLawPartCount).
+  /// The summands of E_bar' tau' (n x kLawPartCount) of the last Evaluate. @param terms, F_N the same again.
+  const MatrixXd& CalcParts(const LawTerms& terms, const Eigen::Ref<const VectorXd>& F_N);
+
+  /// E_bar' tau' (n).
   [[nodiscard]] const VectorXd& force() const { return force_; }
-  [[nodiscard]] const MatrixXd& parts() const { return parts_; }
   [[nodiscard]] const Vector6d& V_Bo_dot() const { return V_Bo_dot_; }
   [[nodiscard]] const VectorXd& xi_dot_d() const { return xi_dot_d_; }
   [[nodiscard]] const VectorXd& f_c() const { return f_c_; }
   [[nodiscard]] const VectorXd& sigma_prime() const { return sigma_prime_; }
   /// Bound on the condition number of J W^-1/2: sqrt(trace(A) trace(A^-1)) of A = J W^-1 J^T.
   [[nodiscard]] double condition_number() const { return condition_number_; }
-  /// C_bar' (xi_c - xi) and M_bar' J^+ J_dot (xi_c - xi) (n): by what (46), (48) differ from (47), (55) where
-  /// contacts slip.
+  /// Force C_bar' (xi_c - xi) and acceleration J^+ J_dot (xi_c - xi) (n): by what (46), (48) differ from
+  /// (47), (55) where contacts slip.
   [[nodiscard]] const VectorXd& slip_coriolis() const { return slip_coriolis_; }
-  [[nodiscard]] const VectorXd& slip_inertia() const { return slip_inertia_; }
-  /// J^+ (n x k) of (47).
-  [[nodiscard]] const MatrixXd& J_plus() const { return J_plus_; }
+  [[nodiscard]] const VectorXd& slip_acceleration() const { return slip_acceleration_; }
+  /// x (n) = J^+ y of (47); y (k) is lost.
+  void ApplyPseudoinverse(VectorXd* y, VectorXd* x) const;
   /// Adds G^+ F_o (k) to contact forces.
   void AddLeastForces(const Vector6d& F_o, VectorXd* f_c) const;
   /// (G G^T)^-1 G f (k -> 6): the wrench-free part of f is f - G^T of this.
   [[nodiscard]] Vector6d SolveGrasp(const Eigen::Ref<const VectorXd>& f) const;
 
  private:
+  /// Summands of V_o_dot.
+  using Demand = std::array<Vector6d, 4>;
   [[nodiscard]] bool FactorJacobian(const LawSpec& spec, const LawTerms& terms);
-  void CalcObjectAcceleration(const LawSpec& spec, const LawObject& object, const DesiredMotion& desired);
-  void AddMotionPart(LawPart part, const LawTerms& terms, const Eigen::Ref<const VectorXd>& rates);
+  static Demand CalcObjectAcceleration(const LawSpec& spec, const LawObject& object,
+                                       const DesiredMotion& desired);
 
-  MatrixXd J_plus_;     // n x k
   MatrixXd W_inv_J_T_;  // n x k
-  MatrixXd A_, A_inv_;  // k x k
+  MatrixXd A_, L_inv_;  // k x k: A = J W^-1 J^T = L L^T
   Eigen::LLT<MatrixXd> llt_, W_llt_;
   Eigen::LLT<Matrix6d> G_llt_;
   Matrix6Xd G_;
-  std::array<Vector6d, 4> demand_;  // summands of V_o_dot
+  Demand demand_{};
   Vector6d V_Bo_dot_ = Vector6d::Zero();
-  VectorXd rates_, f_c_;                                     // k
-  VectorXd slip_coriolis_, slip_inertia_;                    // n
+  VectorXd rates_, slip_rates_, f_c_;                        // k
+  VectorXd slip_coriolis_, slip_acceleration_;               // n
   VectorXd xi_c_, xi_dot_d_, motion_, sigma_prime_, force_;  // n
   MatrixXd parts_;
   double condition_number_ = 0.0;

@@ -1,6 +1,6 @@
 #pragma once
 
-// The terms of the law by either side, as whole matrices.
+// The terms of the law as whole matrices.
 
 #include "controller/control/grasp_model.h"
 #include "harness/checks/law_reference.h"
@@ -8,12 +8,11 @@
 
 namespace dexcheck {
 
-/// By the model, at the state that it was evaluated at.
-void ReadModelTerms(const GraspModel& model, const MeasuredState& state, LawTerms* terms);
-
 /// By the engine: all that the table of terms has evaluated on its side. What multiplies only the slip,
 /// C_bar' and J_B_dot', and X_o's branch of the angles are the model's.
 /// @param contacts whether the engine has contacts to compare; bonds it has not, and theirs are the model's.
+/// @param terms of this engine and model at each step, or new: entries that are always zero are not written.
+/// It keeps pointers into the model.
 void ReadEngineTerms(const TermContext& engine, const GraspModel& model, const MeasuredState& state,
                      bool contacts, LawTerms* terms);
 

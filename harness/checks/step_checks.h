@@ -125,7 +125,7 @@ class StepChecks {
   double push_give_ = 0.0, edge_give_ = 0.0;
   Vector3d push_before_ = Vector3d::Zero();  // N
   double force_give_ = 0.0;                  // likewise of f_c, relative as contact_force
-  RowMatrixXd column_;                       // n x 1
+  VectorXd work_;                            // n
   ForceEvidence forces_;
   WheelEvidence wheels_;
   VectorXd left_of_robot_;  // n, of the step's balance

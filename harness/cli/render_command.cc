@@ -131,11 +131,11 @@ void AddRenderCommand(Command app) {
   command.AddOption("--still", &request->still, "One picture at this time of the run, s").TypeName("T");
   Option camera =
       command
-          .AddOption("--camera", &request->movie.camera,
-                     "overview, follow, grasp, top, or another of the MJCF's; course stands still "
-                     "and sees the whole way")
-          .TypeName("NAME")
-          .ShowDefault();
+          .AddOption(
+              "--camera", &request->movie.camera,
+              "overview (the default), follow, grasp, top, or another of the MJCF's; course stands still "
+              "and sees the whole way")
+          .TypeName("NAME");
   Option from =
       command.AddOption("--from", &request->from, "Where a camera of your own stands at the beginning, m")
           .TypeName("X,Y,Z")

@@ -18,4 +18,7 @@ enum class Detail {
 void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result,
                     const std::string& folder, Detail detail);
 
+/// Its checks as a JUnit document; an unfinished run is an error.
+std::string WriteJUnit(const Setup& setup, const ClosedLoop& loop, const RunResult& result);
+
 }  // namespace dexcheck::cli

@@ -73,7 +73,7 @@ std::vector<Sample> TakeSamples(const Setup& setup, int states) {
         factor.Compute(robot.M());
         const Eigen::Index n = sample.xi_dot.size();
         sample.half_inverse = RowMatrixXd::Identity(n, n);
-        factor.SolveTransposed(sample.half_inverse);
+        factor.SolveTransposedColumns(sample.half_inverse);
         sample.scale =
             (sample.half_inverse * (robot.C() * sample.state.xi + robot.gravity() + robot.friction())).norm();
         sample.object_scale = std::max(weight, sample.f_c.norm());

@@ -31,7 +31,7 @@ void ExpectFactors(const RobotModel& model, unsigned seed) {
   for (Eigen::Index i = 0; i < F.size(); ++i) F.data()[i] = uniform(random);
   const MatrixXd expected = F.transpose() * terms.M().llt().solve(MatrixXd(F));
   RowMatrixXd half = F;
-  factor.SolveTransposed(half);
+  factor.SolveTransposedColumns(half);
   const double scale = expected.cwiseAbs().maxCoeff();
   EXPECT_LE((half.transpose() * half - expected).cwiseAbs().maxCoeff(), kTolerance * scale);
 
@@ -42,7 +42,11 @@ void ExpectFactors(const RobotModel& model, unsigned seed) {
   factor.Solve(La);
   EXPECT_LE((La - a).cwiseAbs().maxCoeff(), kTolerance * a.cwiseAbs().maxCoeff());
 
-  VectorXd x = half.col(0);
+  VectorXd x = F.col(0);
+  factor.SolveTransposed(x);
+  EXPECT_LE((x - half.col(0)).norm(), kTolerance * half.col(0).norm());
+  VectorXd work;
+  EXPECT_DOUBLE_EQ(factor.CalcForceNorm(F.col(0), &work), x.norm());
   factor.Solve(x);
   EXPECT_LE((terms.M() * x - F.col(0)).norm(), kTolerance * F.col(0).norm() * 1e3);
 }
@@ -82,8 +86,8 @@ TEST(TreeFactor, SolvesForChainsAlone) {
   RowMatrixXd F = RowMatrixXd::Zero(n, 3);
   for (const int row : rows) F.row(row) = Vector3d::Random().transpose();
   RowMatrixXd whole = F;
-  factor.SolveTransposed(whole);
-  factor.SolveTransposed(rows, F);
+  factor.SolveTransposedColumns(whole);
+  factor.SolveTransposedColumns(rows, F);
   ASSERT_GT(whole.norm(), 1e-3);
   EXPECT_TRUE(F == whole);
 }
