@@ -39,7 +39,7 @@ if [[ $purpose != program ]]; then
     libgtest-dev libgmock-dev libbenchmark-dev coinor-csdp hdf5-tools ffmpeg
     sqlite3 slurm-wlm munge
     chromium chromium-driver python3-numpy doxygen
-    xvfb xdotool imagemagick tmux zsh bash-completion
+    xvfb xdotool imagemagick tmux zsh bash-completion python3-h5py
     # the Python module
     pybind11-dev python3-dev python3-pytest
     # other physics engines

@@ -65,7 +65,7 @@ class MoviePainter::RunPainter {
         checks_(run_),
         error_range_(ErrorRange(run_.position_errors)) {
     if (options.panel) overlay_.emplace();
-    if (options.free) FindObject();
+    if (options.free && (options.free->follow || !options.free->look_at)) FindObject();
     inset_height_ = static_cast<int>(std::lround(kInsetHeight * options.height));
     inset_width_ =
         static_cast<int>(std::lround(std::min(kInsetAspect * inset_height_, kWidestInset * width)));
@@ -120,7 +120,7 @@ class MoviePainter::RunPainter {
   /// @param row whose kinematics data_ has.
   [[nodiscard]] Viewpoint FindFreeView(long row) const {
     const FreeCamera& free = *options_.free;
-    const Vector3d object = BodyPose(*data_, object_).translation();
+    const Vector3d object = object_ < 0 ? object_start_ : Vector3d(BodyPose(*data_, object_).translation());
     const Vector3d way = free.follow ? Vector3d(object - object_start_) : Vector3d(Vector3d::Zero());
     const Vector3d target = free.look_at ? Vector3d(*free.look_at + way) : object;
     const double angle = free.orbit * (run_.times[static_cast<size_t>(row)] - run_.times.front());

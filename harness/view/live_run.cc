@@ -94,8 +94,11 @@ void LiveRun::Record(const StepRecord& step) {
   ViewFrame view;
   RunFrames& frame = view.frame;
   frame.title = setup_->scenario().name;
-  frame.object_body = NameOf(setup_->engine(), mjOBJ_BODY, setup_->adapter().object_body());
-  frame.friction = setup_->object().friction;
+  const int object = setup_->adapter().object_body();
+  if (object >= 0) {
+    frame.object_body = NameOf(setup_->engine(), mjOBJ_BODY, object);
+    frame.friction = setup_->object().friction;
+  }
   frame.times = {step.time};
   frame.qpos = step.reading.qpos.transpose();
   if (runner_->loop().task() != nullptr) {
