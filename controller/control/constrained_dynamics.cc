@@ -44,6 +44,7 @@ ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contac
   schur_.setZero(half_.cols(), half_.cols());
   schur_llt_ = Eigen::LLT<MatrixXd>(k);
   motion_.setZero(n + 6);
+  bias_.setZero(n);
   prediction_.xi_dot.setZero(n);
   prediction_.f_c.setZero(k);
 }
@@ -115,7 +116,9 @@ const Prediction& ConstrainedDynamics::PredictFree(const ModelTerms& robot,
 
 void ConstrainedDynamics::CalcFreeForce(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force) {
   auto free = motion_.head(prediction_.xi_dot.size());
-  free = force - robot.gravity() - robot.friction() - robot.coriolis();
+  bias_ = robot.gravity() + robot.friction();
+  bias_.noalias() += robot.C() * robot.velocity();
+  free = force - bias_;
 }
 
 ObjectSpaceTerms CalcObjectSpaceTerms(const ModelTerms& robot, const GraspTerms& grasp,

@@ -57,6 +57,8 @@ class ConstrainedDynamics {
   /// The robot without contacts, (18): xi_dot; V_Bo_dot and f_c are zero.
   const Prediction& PredictFree(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force);
 
+  /// C_bar' xi + F_bar' (n) of the last Predict.
+  [[nodiscard]] const VectorXd& bias() const { return bias_; }
   /// M_bar' = L^T L of the last Predict.
   [[nodiscard]] const TreeFactor& mass_factor() const { return factor_; }
 
@@ -71,6 +73,7 @@ class ConstrainedDynamics {
   MatrixXd schur_;    // k x k, padded
   Eigen::LLT<MatrixXd> schur_llt_;
   VectorXd motion_;  // n + 6, M^-1/2 of the forces without contact, then without those of contacts
+  VectorXd bias_;    // n
   Prediction prediction_;
 };
 

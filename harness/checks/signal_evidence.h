@@ -43,9 +43,11 @@ class SignalEvidence {
  private:
   [[nodiscard]] SignalFinding Fit(Eigen::Index begin, Eigen::Index count) const;
 
-  using Delays = Eigen::Array<double, kMostDelay + 1, Eigen::Dynamic>;
+  /// One column for each delay from 0 on, one row for each entry.
+  using Delays = Eigen::Array<double, Eigen::Dynamic, kMostDelay + 1>;
   long steps_ = 0;
-  VectorXd difference_, squares_, largest_;  // of got - meant: sum, sum of squares, largest
+  Eigen::ArrayXd step_difference_;           // got - meant
+  VectorXd difference_, squares_, largest_;  // of that: sum, sum of squares, largest
   VectorXd by_meant_, meant_squares_;
   VectorXd by_sign_;
   VectorXd by_rate_, rate_squares_;

@@ -245,7 +245,7 @@ void StepChecks::Predict(const StepRecord& step) {
   findings_.xi_dot_model = prediction->xi_dot;
   findings_.V_Bo_dot_model = prediction->V_Bo_dot;
   findings_.f_c_model = prediction->f_c;
-  mass_factor_ = &dynamics_.mass_factor();
+  predicted_by_ = &dynamics_;
 }
 
 void StepChecks::PredictPart(const StepRecord& step) {
@@ -259,7 +259,7 @@ void StepChecks::PredictPart(const StepRecord& step) {
   findings_.xi_dot_model = prediction.xi_dot;
   findings_.V_Bo_dot_model = prediction.V_Bo_dot;
   part->grasp.Scatter(prediction.f_c, findings_.f_c_model);
-  mass_factor_ = &part->dynamics.mass_factor();
+  predicted_by_ = &part->dynamics;
 }
 
 void StepChecks::CompareDynamics(const StepRecord& step) {
@@ -270,14 +270,15 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   Predict(step);
 
   // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
-  bias_ = robot.coriolis() + robot.gravity() + robot.friction();
+  bias_ = predicted_by_->bias();
   residual_ = bias_ - force_;
   residual_.noalias() += robot.M() * xi_dot;
   residual_.noalias() += ModelAtTruth(step).grasp().J_B().transpose() * findings_.f_c;
   if (step.response.departure_force.size() > 0) residual_ += step.response.departure_force;
   if (step.response.solver_force.size() > 0) residual_ -= step.response.solver_force;
   left_of_robot_ = residual_;
-  const auto norm = [&](const VectorXd& f) { return mass_factor_->CalcForceNorm(f, &work_); };
+  const TreeFactor& mass_factor = predicted_by_->mass_factor();
+  const auto norm = [&](const VectorXd& f) { return mass_factor.CalcForceNorm(f, &work_); };
   const double scale = std::max(norm(bias_), std::numeric_limits<double>::min());
   scale_ = scale;
   const double left = norm(residual_);
@@ -303,7 +304,7 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
 
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
-  mass_factor_->Multiply(residual_);
+  mass_factor.Multiply(residual_);
   AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale,
               robot_give_ + push_give_ + edge_give_);
   double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
@@ -363,7 +364,7 @@ void StepChecks::KeepForces(const StepRecord& step) {
     return check(which).applies && !(check(which).last <= check(which).bound);
   };
   if (!fails(StepCheck::kBalanceRobot) && !fails(StepCheck::kBalanceObject)) return;
-  forces_.Add(left_of_robot_, left_of_object_, ModelAtTruth(step), step.reading.state.q, *mass_factor_,
+  forces_.Add(left_of_robot_, left_of_object_, ModelAtTruth(step), step.reading.state.q, *mass_factor(),
               scale_);
 }
 
