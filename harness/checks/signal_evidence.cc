@@ -53,7 +53,7 @@ SignalEvidence::SignalEvidence(Eigen::Index size) {
   }
   history_.setZero(size, kMostDelay + 1);
   delay_left_.setZero(size, kMostDelay + 1);
-  delay_squares_ = delay_left_;
+  squares_before_ = delay_left_;
   step_difference_.setZero(size);
 }
 
@@ -77,8 +77,8 @@ void SignalEvidence::Add(const VectorXd& meant, const VectorXd& got, const Vecto
   for (long k = 1; k <= std::min(steps_, kMostDelay); ++k) {
     const long then = (column - k + kMostDelay + 1) % (kMostDelay + 1);
     delay_left_.col(k) += (g - history_.col(then).array()).square();
-    delay_squares_.col(k) += d.square();
   }
+  if (steps_ < kMostDelay) squares_before_.col(steps_ + 1) = squares_;
   if (steps_ > 0) {
     lag_by_.array() += (m - before_.array()) * (g - before_.array());
     lag_squares_.array() += (m - before_.array()).square();
@@ -120,7 +120,9 @@ SignalFinding SignalEvidence::Fit(Eigen::Index begin, Eigen::Index count) const 
   slope(Kind::kDryFriction, by_sign, steps, 0.0, -1.0);
   slope(Kind::kDamping, by_rate, rate_squares_.segment(begin, count).sum(), 0.0, -1.0);
   for (long k = 1; k <= kMostDelay; ++k) {
-    const double square = delay_squares_.col(k).segment(begin, count).sum();
+    // Of steps whose delayed value is known.
+    const double square =
+        (squares_.array() - squares_before_.col(std::min(k, steps_))).segment(begin, count).sum();
     if (square > 0.0) {
       offer(Kind::kDelay, static_cast<double>(k),
             1.0 - delay_left_.col(k).segment(begin, count).sum() / square);

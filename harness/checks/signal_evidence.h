@@ -54,7 +54,8 @@ class SignalEvidence {
   VectorXd lag_by_, lag_squares_, lag_change_;  // got_t - got_t-1 on meant_t - got_t-1
   VectorXd before_;                             // got
   MatrixXd history_;                            // meant of the last steps, one column each
-  Delays delay_left_, delay_squares_;           // (got_t - meant_t-k)^2 and (got - meant)^2 of the same steps
+  Delays delay_left_;                           // sum of (got_t - meant_t-k)^2
+  Delays squares_before_;                       // squares_ after the first k steps
 };
 
 /// Motors: which, and gain, delay, lag, offset, friction.

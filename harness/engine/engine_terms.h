@@ -184,7 +184,6 @@ class EngineTerms {
   std::vector<int> robot_bodies_;
   std::vector<int> moving_bodies_;  // those whose accelerations are needed, parents first
   std::vector<Chain> chains_;       // by frame; empty unless asked for
-  RowMatrixXd J_nv_;
 
   int object_body_;
   bool has_object_ = false;
