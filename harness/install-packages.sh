@@ -23,8 +23,8 @@ packages=(
   # off-screen drawing and video
   pkg-config libosmesa6-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libpng-dev libfreetype-dev
   fonts-dejavu-core
-  # the report: its figures, its page's plots
-  gnuplot-nox libjs-dygraphs
+  # the report: its figures, its page's plots and replay
+  gnuplot-nox libjs-dygraphs libjs-three
 )
 purpose=${1:-program}
 case $purpose in
@@ -36,7 +36,7 @@ if [[ $purpose != program ]]; then
   packages+=(
     libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools ffmpeg
     sqlite3 slurm-wlm munge
-    chromium chromium-driver python3-numpy
+    chromium chromium-driver python3-numpy doxygen
   )
 fi
 if [[ $purpose == development ]]; then

@@ -56,12 +56,7 @@ void SetRow(const mjModel& model, const RunFrames& run, long row, mjData* data) 
   mj_camlight(&model, data);
 }
 
-RunDecorator::RunDecorator(const mjModel& model, const RunFrames& run, const DecorationOptions& options,
-                           mjData* data)
-    : run_(run), options_(options), object_(mj_name2id(&model, mjOBJ_BODY, run.object_body.c_str())) {
-  if ((options.tracks || options.frames) && object_ < 0) {
-    throw InputError(run.source + ": object: no body " + Quote(run.object_body) + " in the model");
-  }
+double CalcMetersPerNewton(const RunFrames& run) {
   double largest = 0.0;
   for (long row = 0; row < run.contact_forces.rows(); ++row) {
     for (long k = 0; k < run.contact_forces.cols() / 3; ++k) {
@@ -69,7 +64,18 @@ RunDecorator::RunDecorator(const mjModel& model, const RunFrames& run, const Dec
       if (std::isfinite(size)) largest = std::max(largest, size);
     }
   }
-  if (largest > 0.0) meters_per_newton_ = kLongestForce / largest;
+  return largest > 0.0 ? kLongestForce / largest : 1.0;
+}
+
+RunDecorator::RunDecorator(const mjModel& model, const RunFrames& run, const DecorationOptions& options,
+                           mjData* data)
+    : run_(run),
+      options_(options),
+      object_(mj_name2id(&model, mjOBJ_BODY, run.object_body.c_str())),
+      meters_per_newton_(CalcMetersPerNewton(run)) {
+  if ((options.tracks || options.frames) && object_ < 0) {
+    throw InputError(run.source + ": object: no body " + Quote(run.object_body) + " in the model");
+  }
   if (!options.tracks) return;
   const long stride = (run.rows() + kMostSamples - 1) / kMostSamples;
   for (long row = 0; row < run.rows(); row += stride) {

@@ -36,10 +36,14 @@ class RunDecorator {
   const RunFrames& run_;
   DecorationOptions options_;
   int object_ = -1;  // body
-  double meters_per_newton_ = 0.0;
+  double meters_per_newton_;
   std::vector<long> sampled_;  // rows, evenly spread
   std::vector<Pose> poses_;    // X_WO at the sampled rows
 };
+
+/// How long the arrow of 1 N is drawn: the run's largest contact force fits beside a hand. 1 when there is
+/// none.
+double CalcMetersPerNewton(const RunFrames& run);
 
 /// The pose of a body in computed kinematics.
 Pose BodyPose(const mjData& data, int body);

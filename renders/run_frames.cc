@@ -59,6 +59,7 @@ void CheckRunFrames(const mjModel& model, const RunFrames& run) {
   check_matrix("contact forces", run.contact_forces, contact_columns);
   check_matrix("contact normals", run.contact_normals, contact_columns);
   check_matrix("desired positions", run.desired_positions, 3);
+  check_matrix("desired angles", run.desired_angles, 3);
 }
 
 CheckHistory::CheckHistory(const RunFrames& run) : run_(run) {

@@ -39,6 +39,7 @@ struct RunFrames {
   double friction = 0.0;          ///< Coefficient mu of the fingertips.
 
   RowMatrixXd desired_positions;  ///< n x 3, m, world: where the object should be.
+  RowMatrixXd desired_angles;     ///< n x 3, rad: ZYZ angles that it should have there.
 
   [[nodiscard]] long rows() const { return static_cast<long>(times.size()); }
   [[nodiscard]] long contacts() const { return contact_positions.cols() / 3; }

@@ -40,9 +40,14 @@ list_broken_links() {
   done < <(list_links "$document")
 }
 
+# Lines that git leaves where it could not merge.
+list_conflicts() { grep -nE '^(<{7}|={7}|>{7}|\|{7})( |$)' /dev/null "$@" || true; }
+
 # What must be found: the test can fail.
 scratch=$(mktemp -d)
 trap 'rm -r "$scratch"' EXIT
+printf 'a\n<<''<<<<< HEAD\nb\n===''====\nc\n>>''>>>>> merge\n' >"$scratch/conflict.md"
+[[ $(list_conflicts "$scratch/conflict.md" | wc -l) -eq 3 ]] || fail "conflicts are not found"
 printf '# Here\n[a](b.md) [c](#there) [d](#here) [e](https://nowhere.example)\n' >"$scratch/bad.md"
 [[ $(list_broken_links "$scratch/bad.md" | wc -l) -eq 2 ]] || fail "broken links are not found"
 
@@ -56,6 +61,9 @@ for document in "${documents[@]}"; do
   links=$((links + $(list_links "$document" | wc -l)))
 done
 [[ $links -gt 50 ]] || fail "only $links links are found"
+
+conflicts=$(list_conflicts "${documents[@]}")
+[[ -z $conflicts ]] || fail "$conflicts"
 
 lines=$(wc -l <"$root/README.md")
 ((lines <= longest_readme)) || fail "README.md has $lines lines, more than $longest_readme"

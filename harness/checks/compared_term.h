@@ -48,7 +48,8 @@ class ComparedTerm {
   [[nodiscard]] Eigen::Index size() const { return model.size(); }
 
   /// Adds a matrix's entries that should be zero; before Finish. @param pattern which of `zeros` is its own.
-  /// @param scale(row, col), @param location(row, col) of an entry.
+  /// @param scale of an entry: scale(row, col).
+  /// @param location of an entry: location(row, col).
   template <typename Matrix, typename Scale, typename Where>
   void CheckZeros(size_t pattern, const Matrix& matrix, const Scale& scale, const Where& location,
                   double when) {

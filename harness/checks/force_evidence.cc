@@ -96,7 +96,7 @@ void ForceEvidence::Add(const VectorXd& f, const Vector6d& w, const GraspModel& 
   if (!y.allFinite() || !y_o.allFinite()) return;
   squares_ += weight * (y.squaredNorm() + y_o.squaredNorm());
   robot_squares_ += weight * y.squaredNorm();
-  if (w.head<3>().norm() >= object_force_) object_force_ = w.head<3>().norm();
+  object_force_ = std::max(object_force_, w.head<3>().norm());
   object_moment_ = std::max(object_moment_, w.tail<3>().norm());
   CalcLinkJacobians(q);
   AddJoints(half_inverse, y, weight);

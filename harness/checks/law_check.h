@@ -64,8 +64,8 @@ class LawCheck {
   }
 
   /// @param terms the engine's, at the state that the controller was told.
-  /// @param L factor of M_bar' = L^T L: the check measures in |f|_M^-1 = |L^-T f|.
   /// @param findings of the same step: what the rigid system does under its torques.
+  /// @param mass_factor of M_bar' = L^T L: the check measures in |f|_M^-1 = |L^-T f|.
   const LawErrors& Compare(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                            const TreeFactor& mass_factor);
   /// The torques alone, for a step that the motors refuse: nothing is known of what they would do.

@@ -39,17 +39,11 @@ void WheelEvidence::Add(const VectorXd& xi, const Vector2d& rates) {
 
 std::string WheelEvidence::Tell() const {
   if (!has_any()) return {};
-  const double all = squares_.sum();
-  double by_radius = 0.0;
-  for (Eigen::Index k = 0; k < 2; ++k) {
-    if (rate_squares_[k] > 0.0) by_radius += by_rate_[k] * by_rate_[k] / rate_squares_[k] / all;
-  }
-  const double by_distance = turn_squares_ > 0.0 ? by_turn_ * by_turn_ / turn_squares_ / all : 0.0;
-  // The distance is one number, the radii are two.
-  if (by_distance >= kExplains || by_distance >= by_radius) {
-    const double distance = base_->wheel_distance + (turn_squares_ > 0.0 ? by_turn_ / turn_squares_ : 0.0);
-    if (by_distance >= kExplains)
-      return "the wheels are " + Metres(distance) + " apart instead of " + Metres(base_->wheel_distance);
+  // The distance is one number, the radii are two: what it explains needs no other.
+  const double by_distance = turn_squares_ > 0.0 ? by_turn_ * by_turn_ / turn_squares_ / squares_.sum() : 0.0;
+  if (by_distance >= kExplains) {
+    return "the wheels are " + Metres(base_->wheel_distance + by_turn_ / turn_squares_) +
+           " apart instead of " + Metres(base_->wheel_distance);
   }
   std::string text;
   const std::array<const std::string*, 2> names = {&base_->wheel_joint_right, &base_->wheel_joint_left};

@@ -2,7 +2,9 @@
 
 // The commands of the program dexcheck.
 
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <string>
 
 #include "harness/cli/command_line.h"
@@ -17,6 +19,19 @@ struct RobotFiles {
 
 /// Adds --robot and --mjcf, both or neither. @return the first of them.
 Option AddRobotOptions(Command command, RobotFiles* files);
+
+/// Adds --samples, of at most `most`, and --seed: the random states at which two sides are compared.
+template <typename Count>
+void AddSampleOptions(Command command, std::uint64_t most, Count* samples, std::uint64_t* seed) {
+  command.AddOption("--samples", samples, "Number of random states")
+      .TypeName("N")
+      .Check(WholeNumber(1, most))
+      .ShowDefault();
+  command.AddOption("--seed", seed, "Of the random states")
+      .TypeName("N")
+      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
+      .ShowDefault();
+}
 
 /// Each adds its command to `app`.
 void AddAuditCommand(Command app);

@@ -208,7 +208,7 @@ int Run(ConsistencyRequest request) {
 }  // namespace
 
 void AddConsistencyCommand(Command app) {
-  constexpr long kMaxSamples = 1000000000;
+  constexpr std::uint64_t kMaxSamples = 1000000000;
   const auto request = std::make_shared<ConsistencyRequest>();
   Command command = app.AddCommand("consistency", "Compare every term of model and engine at random states");
   const Option robot = AddRobotOptions(command, &request->files);
@@ -238,14 +238,7 @@ void AddConsistencyCommand(Command app) {
   command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
       .TypeName("PATH")
       .Repeatable();
-  command.AddOption("--samples", &request->options.samples, "Number of random states")
-      .TypeName("N")
-      .Check(WholeNumber(1, kMaxSamples))
-      .ShowDefault();
-  command.AddOption("--seed", &request->options.seed, "Of the random states")
-      .TypeName("N")
-      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
-      .ShowDefault();
+  AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
   command
       .AddOption("--json", &request->json_file,
                  "Write the results to this file (- for standard output, then without the table)")

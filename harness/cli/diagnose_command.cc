@@ -148,14 +148,7 @@ void AddDiagnoseCommand(Command app) {
   const auto request = std::make_shared<Request>();
   Command command = app.AddCommand("diagnose", "Say why model and engine disagree, and what would repair it");
   AddRobotOptions(command, &request->files);
-  command.AddOption("--samples", &request->options.samples, "Number of random states")
-      .TypeName("N")
-      .Check(WholeNumber(1, kMaxSamples))
-      .ShowDefault();
-  command.AddOption("--seed", &request->options.seed, "Of the random states")
-      .TypeName("N")
-      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
-      .ShowDefault();
+  AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
   command.AddFlag("--by-motion", &request->options.by_motion,
                   "Use axes, frames and forces only, not the bodies' masses and inertias in the MJCF");
   command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")

@@ -10,7 +10,7 @@
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/progress_bar.h"
-#include "harness/cli/run_frames_reader.h"
+#include "harness/report/recorded_frames.h"
 
 namespace dexcheck::cli {
 

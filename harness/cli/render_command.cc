@@ -15,7 +15,7 @@
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/make_video.h"
-#include "harness/cli/run_frames_reader.h"
+#include "harness/report/recorded_frames.h"
 #include "renders/movie.h"
 #include "renders/picture_file.h"
 #include "renders/video_writer.h"

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "harness/cli/commands.h"
-#include "harness/cli/make_report.h"
 #include "harness/cli/output_file.h"
+#include "harness/report/write_report.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -32,7 +32,7 @@ void AddReportCommand(Command app) {
     RequirePageName(request->out);
     ReportFiles files = MakeReportFiles(request->run_folder);
     if (!request->out.empty()) files = {request->out, {}};
-    MakeReport(request->run_folder, files);
+    WriteRunReport(request->run_folder, files);
     if (!request->quiet) fmt::print("{}\n", files.page.string());
     return kSuccess;
   });

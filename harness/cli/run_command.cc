@@ -13,7 +13,6 @@
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/make_report.h"
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
@@ -21,6 +20,7 @@
 #include "harness/cli/run_report.h"
 #include "harness/cli/shipped_files.h"
 #include "harness/engine/machine.h"
+#include "harness/report/write_report.h"
 #include "harness/run/run_recorder.h"
 #include "harness/run/runner.h"
 
@@ -79,7 +79,7 @@ void DrawRun(const Request& request, const std::filesystem::path& folder, ExitCo
   if (request.no_report || IsInterrupted()) return;
   TryToMake("report", [&] {
     const ReportFiles files = MakeReportFiles(folder);
-    MakeReport(folder, files);
+    WriteRunReport(folder, files);
     if (!request.quiet) fmt::print("report: {}\n", files.page.string());
   });
 }

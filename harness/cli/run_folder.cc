@@ -12,7 +12,7 @@
 #include "controller/common/toml_reader.h"
 #include "harness/cli/shipped_files.h"
 #include "harness/engine/machine.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/report/recorded_frames.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -97,14 +97,6 @@ RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(p
   if (!std::filesystem::is_empty(path_, error) || error) {
     throw InputError(path_.string() + ": already holds files; give a new folder with --out");
   }
-}
-
-std::filesystem::path FindEmbedded(const LogReader& log, const std::string& kind,
-                                   const std::filesystem::path& unpacked) {
-  const std::string name = kind + "/" + log.ReadText(kind);
-  (void)log.ReadFile("inputs", name);  // which is an error unless the log has it
-  if (kind == "mjcf") (void)ListMjcfFiles(unpacked / name);
-  return unpacked / name;
 }
 
 RecordedRun::RecordedRun(const std::filesystem::path& folder) : log_(folder / "log.h5") {

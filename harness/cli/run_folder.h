@@ -56,11 +56,6 @@ struct ReplayDifference {
   size_t signals = 0;
 };
 
-/// Where the robot ("robot") or the model ("mjcf") that a log names lies, once its files are unpacked.
-/// @throws InputError when the log holds no such file, or the model names files outside its folder.
-std::filesystem::path FindEmbedded(const LogReader& log, const std::string& kind,
-                                   const std::filesystem::path& unpacked);
-
 /// A run as its log keeps it, unpacked.
 class RecordedRun {
  public:

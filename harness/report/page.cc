@@ -57,6 +57,26 @@ Headline FindHeadline(const RunData& run) {
   return {"pass", "PASS", "Model, law, balance, prediction and assumptions hold at every step."};
 }
 
+/// One of the five questions.
+struct Question {
+  CheckKind kind;
+  const char* name;
+  const char* text;
+};
+
+constexpr std::array<Question, 5> kQuestions = {
+    {{CheckKind::kModel, "Model", "same state, both descriptions"},
+     {CheckKind::kLaw, "Law", "torques against (53)-(55)"},
+     {CheckKind::kBalance, "Balance", "engine's motion in the model's equations"},
+     {CheckKind::kPrediction, "Prediction", "accelerations and contact forces"},
+     {CheckKind::kAssumption, "Assumptions", "no slip, level base, forces in cones"}}};
+
+/// A button that brings the page to a time. @param words before the time.
+Html MakeTimeButton(const char* style, const std::string& words, double time) {
+  return FormatHtml("<button type=\"button\" class=\"{}\" data-time=\"{:.6f}\">{} {:.3f} s</button>", style,
+                    time, words, time);
+}
+
 class Page {
  public:
   Page(const RunData& run, const PageContent& content) : run_(run), content_(content) {}
@@ -66,9 +86,10 @@ class Page {
     AddVerdict();
     AddNavigation();
     html_ += "<main>\n";
-    AddChecks();
-    html_ += MakePlotSection(content_.figures);
+    if (content_.scene.replay) html_ += MakeReplaySection();
     AddVideo();
+    html_ += MakePlotSection(content_.figures);
+    AddChecks();
     AddFigures();
     AddInputs();
     html_ += "</main>\n";
@@ -101,6 +122,9 @@ class Page {
     if (!cause.empty() && cause != "none") {
       Add("<p>Cause: <b>{}</b>. Evidence: {}.</p>", cause, FindString(summary, "attribution", "evidence"));
     }
+    if (const CheckLine* const first = FindFirstFailure()) {
+      Add("<p>{}</p>", MakeTimeButton("", "See it: " + first->name + " fails from", first->failed_at));
+    }
     if (!summary.is_null() && summary.value("interrupted", false)) {
       Add("<p>The run was stopped by hand after {:.3f} s.</p>", run_.time()[run_.time().size() - 1]);
     }
@@ -110,40 +134,58 @@ class Page {
     html_ += "</header>\n";
   }
 
+  /// The check that failed first in time; null when none did in the run.
+  [[nodiscard]] const CheckLine* FindFirstFailure() const {
+    const CheckLine* first = nullptr;
+    for (const CheckLine& check : run_.checks()) {
+      if (check.pass || check.constant) continue;
+      if (first == nullptr || check.failed_at < first->failed_at) first = &check;
+    }
+    return first;
+  }
+
+  /// What the checks of a question say together.
+  struct Answer {
+    std::vector<const CheckLine*> checks;
+    const char* tone = "open";  ///< CSS class.
+    std::string word = "not asked";
+    std::string extent;  ///< "3 checks, at most 40 % of a bound".
+    bool fails = false;
+  };
+
+  [[nodiscard]] Answer FindAnswer(const Question& question) const {
+    Answer answer;
+    long failed = 0;
+    double share = 0.0;
+    for (const CheckLine& check : run_.checks()) {
+      if (check.kind != question.kind) continue;
+      answer.checks.push_back(&check);
+      failed += check.pass ? 0 : 1;
+      share = std::max(share, check.share());
+    }
+    const size_t count = answer.checks.size();
+    if (count == 0) return answer;
+    answer.fails = failed > 0;
+    answer.tone = answer.fails ? "fail" : "pass";
+    answer.word = answer.fails ? fmt::format("{} of {} fail", failed, count) : "holds";
+    answer.extent = fmt::format("{}, at most {} of a bound",
+                                count == 1 ? "1 check" : fmt::format("{} checks", count), FormatShare(share));
+    return answer;
+  }
+
   void AddQuestions() {
-    struct Question {
-      CheckKind kind;
-      const char* name;
-      const char* text;
-    };
-    static constexpr std::array<Question, 5> kQuestions = {
-        {{CheckKind::kModel, "Model", "same state, both descriptions"},
-         {CheckKind::kLaw, "Law", "torques against (53)-(55)"},
-         {CheckKind::kBalance, "Balance", "engine's motion in the model's equations"},
-         {CheckKind::kPrediction, "Prediction", "accelerations and contact forces"},
-         {CheckKind::kAssumption, "Assumptions", "no slip, level base, forces in cones"}}};
     if (run_.checks().empty()) return;
     html_ += "<div class=\"tiles\">\n";
     for (const Question& question : kQuestions) {
-      long count = 0;
-      long failed = 0;
-      double share = 0.0;
-      for (const CheckLine& check : run_.checks()) {
-        if (check.kind != question.kind) continue;
-        ++count;
-        failed += check.pass ? 0 : 1;
-        share = std::max(share, check.share());
+      const Answer answer = FindAnswer(question);
+      const Html text = FormatHtml("<b>{}: {}</b><span>{}</span><span>{}</span>", question.name, answer.word,
+                                   question.text, answer.extent);
+      if (answer.checks.empty()) {
+        Add("<div class=\"card question {}\">{}</div>\n", answer.tone, text);
+      } else {
+        Add("<a class=\"card question {}\" href=\"#checks-{}\">{}</a>\n", answer.tone, NameOf(question.kind),
+            text);
       }
-      Add("<div class=\"card question {}\"><b>{}: {}</b><span>{}</span><span>{}, at most {} of a "
-          "bound</span></div>\n",
-          count == 0   ? "open"
-          : failed > 0 ? "fail"
-                       : "pass",
-          question.name,
-          count == 0   ? "not asked"
-          : failed > 0 ? fmt::format("{} of {} fail", failed, count)
-                       : std::string("holds"),
-          question.text, count == 1 ? "1 check" : fmt::format("{} checks", count), FormatShare(share));
     }
     html_ += "</div>\n";
   }
@@ -176,9 +218,10 @@ class Page {
 
   void AddNavigation() {
     html_ += "<nav><div><a href=\"#verdict\">Verdict</a>";
-    if (!run_.checks().empty()) html_ += "<a href=\"#checks\">Checks</a>";
-    html_ += "<a href=\"#plots\">Plots</a>";
+    if (content_.scene.replay) html_ += "<a href=\"#replay\">Replay</a>";
     if (!content_.video.empty()) html_ += "<a href=\"#video\">Video</a>";
+    html_ += "<a href=\"#plots\">Plots</a>";
+    if (!run_.checks().empty()) html_ += "<a href=\"#checks\">Checks</a>";
     html_ += "<a href=\"#figures\">Figures</a><a href=\"#inputs\">Inputs</a></div></nav>\n";
   }
 
@@ -187,53 +230,66 @@ class Page {
     std::string where = check.where;
     if (!check.constant) where += fmt::format("{}{:.3f} s", where.empty() ? "" : ", ", check.at_time);
     const std::string unit = check.unit == "1" ? "" : " " + check.unit;
-    const std::string verdict = check.pass       ? "holds"
-                                : check.constant ? "differs"
-                                                 : fmt::format("fails from {:.3f} s", check.failed_at);
+    const Html verdict = check.pass || check.constant
+                             ? FormatHtml("<span class=\"badge\">{}</span>", check.pass ? "holds" : "differs")
+                             : MakeTimeButton("badge", "fails from", check.failed_at);
     const std::string cause = [&]() -> std::string {
       const nlohmann::json& summary = run_.summary();
       if (check.pass || !summary.contains("attribution")) return "";
       const nlohmann::json& causes = summary["attribution"];
       return causes.contains("checks") ? causes["checks"].value(check.name, "") : "";
     }();
-    Add("<tr class=\"{}\"><td><code>{}</code><small>{}</small></td><td><span class=\"badge\">{}</span>{}</td>"
-        "<td data-label=\"question\">{}</td><td class=\"value number\" data-label=\"worst\">{}{}</td>"
+    Add("<tr class=\"{}\"><td><code>{}</code><small>{}</small></td><td>{}{}</td><td class=\"value number\" "
+        "data-label=\"worst\">{}{}</td>"
         "<td class=\"value number\" data-label=\"bound\">{}{}</td>"
         "<td data-label=\"of bound\"><span class=\"number\">{}</span><span class=\"meter\"><i "
         "style=\"width:{:.1f}%\">"
         "</i></span></td><td class=\"where\" data-label=\"{}\"><small>{}</small></td></tr>\n",
         check.pass ? "pass" : "fail", check.name, check.description, verdict,
-        cause.empty() ? Html() : FormatHtml("<small>cause: {}</small>", cause), NameOf(check.kind),
-        FormatShort(check.max), check.max == 0.0 ? "" : unit, FormatShort(check.bound),
-        check.bound == 0.0 ? "" : unit, FormatShare(share),
-        100.0 * std::clamp(std::isfinite(share) ? share : 1.0, 0.0, 1.0), where.empty() ? "" : "at", where);
+        cause.empty() ? Html() : FormatHtml("<small>cause: {}</small>", cause), FormatShort(check.max),
+        check.max == 0.0 ? "" : unit, FormatShort(check.bound), check.bound == 0.0 ? "" : unit,
+        FormatShare(share), 100.0 * std::clamp(std::isfinite(share) ? share : 1.0, 0.0, 1.0),
+        where.empty() ? "" : "at", where);
   }
 
   void AddCheckTable(const std::vector<const CheckLine*>& checks) {
     html_ +=
-        "<table class=\"checks\"><thead><tr><th>check</th><th></th><th>question</th><th "
+        "<table class=\"checks\"><thead><tr><th>check</th><th>verdict</th><th "
         "class=\"value\">worst</th>"
         "<th class=\"value\">bound</th><th>of bound</th><th>where, when</th></tr></thead><tbody>\n";
     for (const CheckLine* check : checks) AddCheckRow(*check);
     html_ += "</tbody></table>\n";
   }
 
-  void AddChecks() {
-    if (run_.checks().empty()) return;
+  /// The checks of a question, folded unless one fails.
+  void AddAnswer(const Question& question, const Answer& answer) {
     std::vector<const CheckLine*> shown;
     std::vector<const CheckLine*> equal_constants;
-    for (const CheckLine& check : run_.checks()) {
-      (check.constant && check.pass ? equal_constants : shown).push_back(&check);
+    for (const CheckLine* check : answer.checks) {
+      (check->constant && check->pass ? equal_constants : shown).push_back(check);
     }
-    html_ +=
-        "<h2 id=\"checks\">Checks</h2>\n<p class=\"soft\">What failed first, then by share of the bound. A "
-        "bound is "
-        "what rounding, or the tolerance of the assumption, can explain.</p>\n<div class=\"card\">\n";
-    AddCheckTable(shown);
+    Add("<details class=\"answer {}\" id=\"checks-{}\"{}><summary><b>{}</b> <span class=\"badge\">{}</span> "
+        "{}: {}</summary>\n",
+        answer.tone, NameOf(question.kind), answer.fails ? " open" : "", question.name, answer.word,
+        question.text, answer.extent);
+    if (!shown.empty()) AddCheckTable(shown);
     if (!equal_constants.empty()) {
       Add("<details><summary>{} constants of both descriptions agree</summary>\n", equal_constants.size());
       AddCheckTable(equal_constants);
       html_ += "</details>\n";
+    }
+    html_ += "</details>\n";
+  }
+
+  void AddChecks() {
+    if (run_.checks().empty()) return;
+    html_ +=
+        "<h2 id=\"checks\">Checks</h2>\n<p class=\"soft\">What failed first, then by share of the bound. A "
+        "bound is "
+        "what rounding, or the tolerance of the assumption, can explain.</p>\n<div class=\"card\">\n";
+    for (const Question& question : kQuestions) {
+      const Answer answer = FindAnswer(question);
+      if (!answer.checks.empty()) AddAnswer(question, answer);
     }
     html_ += "</div>\n";
   }
@@ -262,7 +318,7 @@ class Page {
         "<h2 id=\"figures\">Figures</h2>\n<p class=\"soft\">Numbers are those of the paper's figures; SVG "
         "and PNG "
         "files lie in the run's folder <code>figures</code>.</p>\n<div class=\"grid\">\n";
-    for (const Picture& picture : content_.pictures) {
+    for (const Picture& picture : content_.scene.pictures) {
       html_ += "<figure class=\"card\">";
       AddCaption(picture.panel, picture.title);
       Add("<img alt=\"{}\" src=\"data:image/png;base64,{}\"></figure>\n", picture.title,
@@ -317,9 +373,11 @@ class Page {
   void AddFooter() {
     Add("<footer>Made by dexcheck {} from the run's log, which holds every number, and the inputs to repeat "
         "the run bit "
-        "for bit: <code>dexcheck run --replay RUN_DIR</code>. Plots by dygraphs (MIT license).</footer>\n",
+        "for bit: <code>dexcheck run --replay RUN_DIR</code>. Plots by dygraphs, replay by three.js "
+        "(copyright 2010-2019 three.js authors; both MIT license).</footer>\n",
         Text("dexcheck_version"));
-    html_ += EndPage(content_.figures, run_.time());
+    html_ +=
+        EndPage(content_.figures, run_.time(), content_.scene.replay ? &*content_.scene.replay : nullptr);
   }
 
   const RunData& run_;

@@ -6,6 +6,9 @@ namespace dexcheck {
 
 extern const char* const kPageCss;
 extern const char* const kPageJs;
+extern const char* const kReplayHtml;
+extern const char* const kReplayJs;
+extern const char* const kThreeJs;
 extern const char* const kDygraphCss;
 extern const char* const kDygraphJs;
 

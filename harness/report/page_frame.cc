@@ -40,13 +40,24 @@ Html MakePlotSection(const std::vector<Figure>& figures) {
   return html;
 }
 
-Html EndPage(const std::vector<Figure>& figures, const VectorXd& time) {
+Html MakeReplaySection() { return Html::Raw(kReplayHtml); }
+
+Html EndPage(const std::vector<Figure>& figures, const VectorXd& time, const ReplayData* replay) {
   const PlotData data = MakePlotData(figures, time);
-  return FormatHtml(
+  Html html = FormatHtml(
       "<script type=\"application/json\" id=\"run-plots\">{}</script>\n"
       "<script type=\"text/plain\" id=\"run-values\">{}</script>\n"
-      "<script>\n{}\n</script>\n<script>\n{}</script>\n</body>\n</html>\n",
+      "<script>\n{}\n</script>\n<script>\n{}</script>\n",
       Html::Raw(data.json), Html::Raw(data.values), Html::Raw(kDygraphJs), Html::Raw(kPageJs));
+  if (replay != nullptr) {
+    html += FormatHtml(
+        "<script type=\"application/json\" id=\"replay-scene\">{}</script>\n"
+        "<script type=\"text/plain\" id=\"replay-values\">{}</script>\n"
+        "<script>\n{}\n</script>\n<script>\n{}</script>\n",
+        Html::Raw(replay->json), Html::Raw(replay->values), Html::Raw(kThreeJs), Html::Raw(kReplayJs));
+  }
+  html += "</body>\n</html>\n";
+  return html;
 }
 
 }  // namespace dexcheck

@@ -7,16 +7,20 @@
 
 #include "harness/report/figure.h"
 #include "harness/report/html.h"
+#include "harness/report/replay.h"
 
 namespace dexcheck {
 
 /// From the document's beginning to the beginning of its body, styles included.
 Html BeginPage(const std::string& title);
 
+/// The section that shows a replay; EndPage brings its scene.
+Html MakeReplaySection();
+
 /// The section with a plot for each figure; EndPage brings their numbers.
 Html MakePlotSection(const std::vector<Figure>& figures);
 
 /// The plots' numbers and scripts, and the document's end. @param time of the curves' values, s.
-Html EndPage(const std::vector<Figure>& figures, const VectorXd& time);
+Html EndPage(const std::vector<Figure>& figures, const VectorXd& time, const ReplayData* replay = nullptr);
 
 }  // namespace dexcheck

@@ -11,7 +11,7 @@ namespace dexcheck {
 
 /// In the form that the page's script reads.
 struct PlotData {
-  std::string json;    ///< Times, plots, curves; safe between <script> tags.
+  std::string json;    ///< Times, plots, curves; safe inside a script element.
   std::string values;  ///< Base64 of the curves' values as 4-byte floats, curve by curve.
 };
 

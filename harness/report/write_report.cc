@@ -87,7 +87,7 @@ ReportFiles MakeReportFiles(const fs::path& run_dir) {
   return {run_dir / "report.html", run_dir / "figures"};
 }
 
-void WriteRunReport(const fs::path& run_dir, const ReportFiles& files, const PictureMaker& make_pictures) {
+void WriteRunReport(const fs::path& run_dir, const ReportFiles& files, const SceneMaker& make_scene) {
   const RunData run(run_dir);
   PartialFile page(files.page);
   std::optional<FigureFolder> folder;
@@ -103,12 +103,12 @@ void WriteRunReport(const fs::path& run_dir, const ReportFiles& files, const Pic
   std::copy_if(content.figures.begin(), content.figures.end(), std::back_inserter(printed),
                [](const Figure& figure) { return figure.printed; });
   DrawFigures(printed, run.time(), drawings.path());
-  if (make_pictures) content.pictures = make_pictures(drawings.path());
+  content.scene = make_scene(run_dir, drawings.path());
   AddVideo(run_dir, files.page, &content);
   WriteText(MakePage(run, content), page);
 
   if (folder) {
-    for (const Picture& picture : content.pictures) folder->Add(picture.file);
+    for (const Picture& picture : content.scene.pictures) folder->Add(picture.file);
     for (const Figure& figure : printed) {
       folder->Add(drawings.path() / (figure.name + ".svg"));
       folder->Add(drawings.path() / (figure.name + ".png"));

@@ -23,8 +23,8 @@ class Runner {
   [[nodiscard]] const RunResult& result() const { return result_; }
 
   /// Settles, steps to the end or to a failure, and judges.
-  /// @param after_step(const StepRecord&) called after each step, also after one that failed; its time counts
-  /// as recording.
+  /// @param after_step called with the step's record after each step, also after one that failed; its time
+  /// counts as recording.
   /// @param should_stop asked before each step, of settling too; true ends the run as interrupted.
   template <typename AfterStep, typename ShouldStop>
   const RunResult& Run(const AfterStep& after_step, const ShouldStop& should_stop) {

@@ -11,6 +11,29 @@
   const plots = [];
   let shown = [first, last];
 
+  /** The page's one time: what the line in the plots, their values and the replay show. */
+  const clock = {
+    time: first,
+    listeners: [],
+    isPlaying: () => false,
+    set(time) {
+      clock.time = Math.min(Math.max(time, first), last);
+      for (const listener of clock.listeners) listener(clock.time);
+    },
+  };
+  window.runClock = clock;
+
+  /** The row nearest a time. */
+  const findRow = time => {
+    let low = 0;
+    let high = count - 1;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (run.times[middle] <= time) low = middle; else high = middle;
+    }
+    return time - run.times[low] <= run.times[high] - time ? low : high;
+  };
+
   const format = value => {
     if (!Number.isFinite(value)) return '–';
     if (value === 0) return '0';
@@ -160,20 +183,34 @@
       axisLineColor: dark.matches ? '#55616c' : '#9aa3ad',
       interactionModel: makeInteraction(),
       underlayCallback: drawBound(plot),
-      highlightCallback: (event, t, points, row) => {
-        values.forEach((value, k) => { value.textContent = format(rows[row][k + 1] ?? NaN); });
-        box.querySelector('.time').textContent = `t = ${t.toFixed(3)} s`;
+      highlightCallback: (event, t) => {
+        if (event && !clock.isPlaying()) clock.set(t);
       },
-      unhighlightCallback: () => {
-        for (const value of values) value.textContent = '';
-        box.querySelector('.time').textContent = '';
-      },
+      clickCallback: (event, t) => clock.set(t),
       drawCallback: (drawn, initial) => {
         if (initial) return;
+        placeLine();
         const window = drawn.xAxisRange();
         if (window[0] !== shown[0] || window[1] !== shown[1]) showTogether(window);
       },
     });
+    const line = document.createElement('i');
+    line.className = 'now';
+    box.querySelector('.plot').append(line);
+    const placeLine = () => {
+      const area = graph.getArea();
+      const x = graph.toDomXCoord(clock.time);
+      line.hidden = !(x >= area.x && x <= area.x + area.w);
+      line.style.cssText = `left: ${x}px; top: ${area.y}px; height: ${area.h}px`;
+    };
+    const showValues = () => {
+      placeLine();
+      const row = findRow(clock.time);
+      values.forEach((value, k) => { value.textContent = format(rows[row][k + 1] ?? NaN); });
+      box.querySelector('.time').textContent = `t = ${run.times[row].toFixed(3)} s`;
+    };
+    clock.listeners.push(showValues);
+    showValues();
     box.graph = graph;
     box.ranges = [range, plot.right ? rightRange : null];
     plots.push(graph);
@@ -196,6 +233,18 @@
     }
   }, {rootMargin: '400px'});
   for (const box of boxes) watcher.observe(box);
+  for (const button of document.querySelectorAll('[data-time]')) {
+    button.addEventListener('click', () => {
+      clock.set(Number(button.dataset.time));
+      (document.getElementById('replay') || document.getElementById('plots')).scrollIntoView();
+    });
+  }
+  const unfold = () => {
+    const named = location.hash.length > 1 && document.getElementById(location.hash.slice(1));
+    if (named && named.tagName === 'DETAILS') named.open = true;
+  };
+  addEventListener('hashchange', unfold);
+  unfold();
   document.getElementById('show-all')?.addEventListener('click', showAll);
   dark.addEventListener('change', () => {
     for (const plot of plots) {

@@ -168,9 +168,9 @@ TEST_F(WriteReportTest, EmbedsASmallVideoAndLinksToALargeOne) {
 
 TEST_F(WriteReportTest, AddsPicturesFromElsewhere) {
   WriteReportRun(run_dir());
-  WriteRunReport(run_dir(), MakeReportFiles(run_dir()), [](const fs::path& folder) {
+  WriteRunReport(run_dir(), MakeReportFiles(run_dir()), [](const fs::path&, const fs::path& folder) {
     testing::WriteText(folder / "fig11a.png", "foobar");
-    return std::vector<Picture>{{folder / "fig11a.png", "11 (a)", "Beginning"}};
+    return RunScene{{{folder / "fig11a.png", "11 (a)", "Beginning"}}, {}};
   });
   EXPECT_THAT(ReadText(run_dir() / "report.html"), HasSubstr("src=\"data:image/png;base64,Zm9vYmFy\""));
   EXPECT_EQ(ReadText(run_dir() / "figures/fig11a.png"), "foobar");
@@ -179,7 +179,9 @@ TEST_F(WriteReportTest, AddsPicturesFromElsewhere) {
 TEST_F(WriteReportTest, KeepsWhatWasThereWhenPicturesFail) {
   WriteReportRun(run_dir());
   testing::WriteText(run_dir() / "report.html", "old");
-  const PictureMaker fail = [](const fs::path&) -> std::vector<Picture> { throw InputError("no pictures"); };
+  const SceneMaker fail = [](const fs::path&, const fs::path&) -> RunScene {
+    throw InputError("no pictures");
+  };
   EXPECT_THROW(WriteRunReport(run_dir(), MakeReportFiles(run_dir()), fail), InputError);
   EXPECT_EQ(ReadText(run_dir() / "report.html"), "old");
   EXPECT_THAT(ListFiles(), ElementsAre("log.h5", "report.html"));

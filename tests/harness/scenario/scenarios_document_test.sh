@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Holds harness/shipped/scenarios/README.md against the reader of scenarios: scenarios_document_test.sh DEXCHECK.
-# The program must accept each key of the document's tables with its example, and the document must have each key and
-# choice that the reader's sources name; so must that of studies.
+# The keys of each of the document's tables must be those that the reader knows there, the program must accept each with
+# its example, and the document must have each choice that the reader's sources name; so must that of studies. That the
+# defaults are the reader's is seen to by scenario_defaults_test.cc.
 set -euo pipefail
 
 dexcheck=$1
@@ -49,7 +50,37 @@ trap 'rm -r "$PWD"' EXIT
 if accepts paper --set plant.no_such_key=1 >refusal; then fail "an unknown key is accepted"; fi
 grep -q no_such_key refusal || fail "an unknown key is not named: $(cat refusal)"
 
-declare -A batches
+# The keys that the reader knows in a section, one a line: known_keys SECTION START BASE [ARGUMENT...].
+known_keys() {
+  local section=$1 start=$2 base=$3 prefix=
+  shift 3
+  [[ $section == - ]] || prefix=$section.
+  [[ $start == - ]] || set -- --set "$start" "$@"
+  ask "$base" "$@" --set "${prefix}surely_unknown_to_all=1" | told_keys
+}
+told_keys() { sed -nE 's/.*known here are (.*)$/\1/p' | tr -d ' ' | tr ',' '\n'; }
+# The same for all that a section can be, less what is not in its table: types that head a table, and other tables.
+all_known_keys() {
+  local section=$1 start=$2
+  case $section in
+    -) known_keys - - paper | grep -vxE 'start_error|model|plant|grasp|trajectory|task|control|sensing|actuation|disturbance|mismatch|expect|bounds' ;;
+    task) known_keys task - lift ;;
+    # Keys that begin with model. are the parameter file's.
+    model) ask paper --set 'model={ surely_unknown_to_all = 1 }' | told_keys ;;
+    control)
+      known_keys control - paper
+      known_keys control 'control={ K_p = 1, K_v = 1, f_max = 50, mu = 0.6 }' paper
+      ;;
+    disturbance.0)
+      known_keys disturbance.0 "$start" paper
+      known_keys disturbance.0 'disturbance=[{ type = "sine", body = "object", frequency = 1 }]' paper
+      ;;
+    trajectory) known_keys trajectory "$start" paper | grep -vx type ;;
+    *) known_keys "$section" "$start" paper ;;
+  esac | sort -u
+}
+
+declare -A batches sections
 count=0
 while IFS=$'\t' read -r section start keys example; do
   prefix=$section.
@@ -59,6 +90,7 @@ while IFS=$'\t' read -r section start keys example; do
     number=$((number + 1))
     count=$((count + 1))
     batches["$section|$start|$number"]+="$prefix$key=$example"$'\n'
+    sections["$section|$start"]+=$key$'\n'
   done
 done < <(list_keys)
 [[ $count -ge 80 ]] || fail "only $count keys are found in $document"
@@ -75,6 +107,13 @@ for batch in "${!batches[@]}"; do
     [[ -z $assignment ]] || arguments+=(--set "$assignment")
   done <<<"${batches[$batch]}"
   accepts "$base" "${arguments[@]}" || fail "[$section] is refused with the examples of $document"
+done
+
+for section in "${!sections[@]}"; do
+  all_known_keys "${section%%|*}" "${section#*|}" >known
+  [[ -s known ]] || fail "the reader tells no keys of [${section%%|*}]"
+  sort -u <<<"${sections[$section]%$'\n'}" | diff - known >difference ||
+    fail "[${section%%|*}] has other keys in $document (<) and in the reader (>):"$'\n'"$(cat difference)"
 done
 
 # Keys and choices are texts of letters and _ in the reader's sources: explain_all DOCUMENT LEAST SOURCE...

@@ -1,4 +1,4 @@
-#include "harness/cli/run_frames_reader.h"
+#include "harness/report/recorded_frames.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,10 +11,10 @@
 #include "controller/common/text.h"
 #include "controller/handling/pick_and_place.h"
 #include "harness/base/files.h"
-#include "harness/cli/run_folder.h"
+#include "harness/engine/mjcf_files.h"
 #include "harness/log/log_reader.h"
 
-namespace dexcheck::cli {
+namespace dexcheck {
 namespace {
 
 constexpr const char* kCheckPrefix = "check/";
@@ -53,6 +53,7 @@ class FramesReader {
     run.contact_normals = ReadMatrix("contact/normal");
     const RowMatrixXd desired = ReadMatrix("object/X_d");
     if (desired.cols() >= 3) run.desired_positions = desired.leftCols<3>();
+    if (desired.cols() >= 6) run.desired_angles = desired.middleCols<3>(3);
     if (const SignalInfo* forces = Find(kForces)) {
       const auto mu = forces->attributes.find("mu");
       if (mu != forces->attributes.end()) run.friction = mu->second;
@@ -120,6 +121,14 @@ class FramesReader {
 
 }  // namespace
 
+std::filesystem::path FindEmbedded(const LogReader& log, const std::string& kind,
+                                   const std::filesystem::path& unpacked) {
+  const std::string name = kind + "/" + log.ReadText(kind);
+  (void)log.ReadFile("inputs", name);  // which is an error unless the log has it
+  if (kind == "mjcf") (void)ListMjcfFiles(unpacked / name);
+  return unpacked / name;
+}
+
 RecordedFrames ReadRecordedFrames(const std::filesystem::path& run_folder) {
   const FramesReader reader(run_folder / "log.h5");
   RecordedFrames recorded{reader.ReadModel(), reader.ReadFrames()};
@@ -127,4 +136,4 @@ RecordedFrames ReadRecordedFrames(const std::filesystem::path& run_folder) {
   return recorded;
 }
 
-}  // namespace dexcheck::cli
+}  // namespace dexcheck

@@ -1,11 +1,18 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "harness/engine/engine.h"
+#include "harness/log/log_reader.h"
 #include "renders/run_frames.h"
 
-namespace dexcheck::cli {
+namespace dexcheck {
+
+/// Where the robot ("robot") or the model ("mjcf") that a log names lies, once its files are unpacked.
+/// @throws InputError when the log holds no such file, or the model names files outside its folder.
+std::filesystem::path FindEmbedded(const LogReader& log, const std::string& kind,
+                                   const std::filesystem::path& unpacked);
 
 /// A recorded run, ready to be drawn.
 struct RecordedFrames {
@@ -18,4 +25,4 @@ struct RecordedFrames {
 /// @throws InputError that names the log and what is wrong with it.
 RecordedFrames ReadRecordedFrames(const std::filesystem::path& run_folder);
 
-}  // namespace dexcheck::cli
+}  // namespace dexcheck

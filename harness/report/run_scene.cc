@@ -1,27 +1,24 @@
-#include "harness/cli/make_report.h"
+#include "harness/report/run_scene.h"
 
 #include <algorithm>
 #include <array>
-#include <vector>
 
-#include "harness/cli/run_frames_reader.h"
 #include "harness/log/log_reader.h"
+#include "harness/report/recorded_frames.h"
 #include "renders/movie.h"
 #include "renders/png_file.h"
 #include "renders/renderer.h"
 
-namespace dexcheck::cli {
+namespace dexcheck {
 namespace {
 
-/// None when the log has no positions to draw.
-std::vector<Picture> DrawConfigurations(const std::filesystem::path& run_folder,
-                                        const std::filesystem::path& folder) {
-  const LogReader log(run_folder / "log.h5");
-  const bool has_positions =
-      std::any_of(log.signals().begin(), log.signals().end(),
-                  [](const SignalInfo& signal) { return signal.name == "engine/qpos"; });
-  if (!has_positions) return {};
-  const RecordedFrames run = ReadRecordedFrames(run_folder);
+bool HasPositions(const std::filesystem::path& run_dir) {
+  const LogReader log(run_dir / "log.h5");
+  return std::any_of(log.signals().begin(), log.signals().end(),
+                     [](const SignalInfo& signal) { return signal.name == "engine/qpos"; });
+}
+
+std::vector<Picture> DrawConfigurations(const RecordedFrames& run, const std::filesystem::path& folder) {
   const std::array<RunView, 1> views = {{{run.model.get(), &run.frames}}};
   MovieOptions options;
   options.width = 960;
@@ -41,9 +38,10 @@ std::vector<Picture> DrawConfigurations(const std::filesystem::path& run_folder,
 
 }  // namespace
 
-void MakeReport(const std::filesystem::path& run_folder, const ReportFiles& files) {
-  WriteRunReport(run_folder, files,
-                 [&](const std::filesystem::path& folder) { return DrawConfigurations(run_folder, folder); });
+RunScene MakeRunScene(const std::filesystem::path& run_dir, const std::filesystem::path& folder) {
+  if (!HasPositions(run_dir)) return {};
+  const RecordedFrames run = ReadRecordedFrames(run_dir);
+  return {DrawConfigurations(run, folder), MakeReplayData(*run.model, run.frames)};
 }
 
-}  // namespace dexcheck::cli
+}  // namespace dexcheck

@@ -1,0 +1,32 @@
+#pragma once
+
+// The scene and motion of a run, for the replay in its page (page/replay.js).
+
+#include <mujoco/mujoco.h>
+
+#include <string>
+
+#include "renders/run_frames.h"
+
+namespace dexcheck {
+
+/// Most instants whose poses are kept; the page interpolates between them. With 10 s of the shipped robot and
+/// its hand they are about 1 MB of base64.
+inline constexpr long kMostReplayFrames = 601;
+/// And at most so many a second.
+inline constexpr double kReplayRate = 60.0;
+/// Most triangles of all meshes together; finer ones are simplified.
+inline constexpr int kMostReplayTriangles = 60'000;
+
+struct ReplayData {
+  std::string json;    ///< Ready to stand in a script element: it has no "<".
+  std::string values;  ///< base64 of little-endian numbers; the JSON says where each array begins.
+};
+
+/// Everything that the engine shows by default: geoms of groups 0 to 2 that are not wholly transparent,
+/// height fields left out. What is welded together is one part, and each part's pose is kept, with contact
+/// forces and the desired pose of the object, at evenly spread rows.
+/// @param run as CheckRunFrames accepts it.
+ReplayData MakeReplayData(const mjModel& model, const RunFrames& run);
+
+}  // namespace dexcheck
