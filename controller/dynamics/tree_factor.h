@@ -20,7 +20,7 @@ class TreeFactor {
  public:
   explicit TreeFactor(const RobotModel& model);
 
-  /// M = L^T L; the lower triangle of M (n x n) is read, at the tree's entries.
+  /// M = L^T L; the upper triangle of M (n x n) is read, at the tree's entries.
   /// @throws std::invalid_argument when the size differs or M is not positive definite.
   void Compute(const Eigen::Ref<const MatrixXd>& M);
 

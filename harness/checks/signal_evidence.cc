@@ -58,7 +58,16 @@ SignalEvidence::SignalEvidence(Eigen::Index size) {
 }
 
 void SignalEvidence::Add(const VectorXd& meant, const VectorXd& got, const VectorXd& rate) {
-  // Arrays, entry by entry, since this is done at every step for all readings and torques.
+  // Until something differs there is nothing to explain, and what was right before says nothing of how.
+  const bool is_right = steps_ == 0 && got == meant;
+  if (!is_right) Compare(meant, got, rate);
+  history_.col(seen_ % (kMostDelay + 1)) = meant;
+  before_ = got;
+  ++seen_;
+  if (seen_ <= kMostDelay) squares_before_.col(seen_) = squares_;
+}
+
+void SignalEvidence::Compare(const VectorXd& meant, const VectorXd& got, const VectorXd& rate) {
   const Eigen::Map<const Eigen::ArrayXd> m(meant.data(), meant.size()), g(got.data(), got.size());
   Eigen::ArrayXd& d = step_difference_;
   d = g - m;
@@ -72,19 +81,13 @@ void SignalEvidence::Add(const VectorXd& meant, const VectorXd& got, const Vecto
     by_rate_.array() += d * rate.array();
     rate_squares_.array() += rate.array().square();
   }
-  const long column = steps_ % (kMostDelay + 1);
-  history_.col(column) = meant;
-  for (long k = 1; k <= std::min(steps_, kMostDelay); ++k) {
-    const long then = (column - k + kMostDelay + 1) % (kMostDelay + 1);
-    delay_left_.col(k) += (g - history_.col(then).array()).square();
-  }
-  if (steps_ < kMostDelay) squares_before_.col(steps_ + 1) = squares_;
-  if (steps_ > 0) {
+  for (long k = 1; k <= std::min(seen_, kMostDelay); ++k)
+    delay_left_.col(k) += (g - history_.col((seen_ - k) % (kMostDelay + 1)).array()).square();
+  if (seen_ > 0) {
     lag_by_.array() += (m - before_.array()) * (g - before_.array());
     lag_squares_.array() += (m - before_.array()).square();
     lag_change_.array() += (g - before_.array()).square();
   }
-  before_ = got;
   ++steps_;
 }
 
@@ -122,7 +125,7 @@ SignalFinding SignalEvidence::Fit(Eigen::Index begin, Eigen::Index count) const 
   for (long k = 1; k <= kMostDelay; ++k) {
     // Of steps whose delayed value is known.
     const double square =
-        (squares_.array() - squares_before_.col(std::min(k, steps_))).segment(begin, count).sum();
+        (squares_.array() - squares_before_.col(std::min(k, seen_))).segment(begin, count).sum();
     if (square > 0.0) {
       offer(Kind::kDelay, static_cast<double>(k),
             1.0 - delay_left_.col(k).segment(begin, count).sum() / square);

@@ -41,11 +41,13 @@ class SignalEvidence {
   [[nodiscard]] double largest(Eigen::Index entry) const { return largest_[entry]; }
 
  private:
+  void Compare(const VectorXd& meant, const VectorXd& got, const VectorXd& rate);
   [[nodiscard]] SignalFinding Fit(Eigen::Index begin, Eigen::Index count) const;
 
   /// One column for each delay from 0 on, one row for each entry.
   using Delays = Eigen::Array<double, Eigen::Dynamic, kMostDelay + 1>;
-  long steps_ = 0;
+  long seen_ = 0;                            // steps
+  long steps_ = 0;                           // of these, from the first on at which something differed
   Eigen::ArrayXd step_difference_;           // got - meant
   VectorXd difference_, squares_, largest_;  // of that: sum, sum of squares, largest
   VectorXd by_meant_, meant_squares_;
