@@ -44,18 +44,4 @@ inline void CalcGramMatrix(const RowMatrixXd& H, std::span<const int> rows, Matr
   CalcGramMatrix(H, H, rows, A);
 }
 
-/// L_inv (k x k) = L^-1 of a lower triangle L, for the few columns of contacts: below some tens of columns
-/// the general solver's preparations take longer than this.
-inline void InvertLowerTriangle(const Eigen::Ref<const MatrixXd>& L, MatrixXd* L_inv) {
-  const Eigen::Index k = L.rows();
-  L_inv->setIdentity();
-  for (Eigen::Index col = 0; col < k; ++col) {
-    for (Eigen::Index i = col; i < k; ++i) {
-      double& entry = (*L_inv)(i, col);
-      entry /= L(i, i);
-      L_inv->col(col).tail(k - i - 1) -= entry * L.col(i).tail(k - i - 1);
-    }
-  }
-}
-
 }  // namespace dexcheck

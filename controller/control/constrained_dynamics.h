@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "controller/common/block_cholesky.h"
 #include "controller/common/types.h"
 #include "controller/control/grasp_terms.h"
 #include "controller/control/pseudoinverse.h"
@@ -71,7 +72,7 @@ class ConstrainedDynamics {
   std::vector<int> rows_;
   RowMatrixXd half_;  // n + 6 x k, padded: [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G]
   MatrixXd schur_;    // k x k, padded
-  Eigen::LLT<MatrixXd> schur_llt_;
+  BlockCholesky schur_factor_;
   VectorXd motion_;  // n + 6, M^-1/2 of the forces without contact, then without those of contacts
   VectorXd bias_;    // n
   Prediction prediction_;

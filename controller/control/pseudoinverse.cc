@@ -28,9 +28,8 @@ Pseudoinverse::Pseudoinverse(std::string name, Eigen::Index rows, Eigen::Index c
       W_inv_J_T_(J_T_),
       W_solution_(columns, rows),
       gram_(J_T_.cols(), J_T_.cols()),
-      L_inv_(rows, rows),
       work_(rows),
-      gram_llt_(rows),
+      gram_factor_(rows),
       W_llt_(columns) {
   std::iota(all_columns_.begin(), all_columns_.end(), 0);
   columns_ = all_columns_;
@@ -87,12 +86,10 @@ void Pseudoinverse::SetEntries(const std::vector<int>& entries) {
 void Pseudoinverse::FactorGram() {
   // J W^-1 J^T = L L^T
   CalcGramMatrix(J_T_, W_inv_J_T_, columns_, &gram_);
-  gram_llt_.compute(gram_.topLeftCorner(work_.size(), work_.size()));
   condition_number_ = std::numeric_limits<double>::infinity();
-  if (gram_llt_.info() == Eigen::Success) {
+  if (gram_factor_.Factor(gram_)) {
     // cond_2(J W^-1/2)^2 = cond_2(L L^T) <= tr(L L^T) tr((L L^T)^-1) = |L|^2 |L^-1|^2
-    InvertLowerTriangle(gram_llt_.matrixLLT(), &L_inv_);
-    condition_number_ = std::sqrt(gram_.diagonal().head(work_.size()).sum()) * L_inv_.norm();
+    condition_number_ = std::sqrt(gram_.diagonal().head(work_.size()).sum()) * gram_factor_.CalcInverseNorm();
   }
   if (condition_number_ <= kMaxConditionNumber) return;
   throw SingularityError(
@@ -102,26 +99,28 @@ void Pseudoinverse::FactorGram() {
 
 void Pseudoinverse::Apply(const Eigen::Ref<const VectorXd>& y, Eigen::Ref<VectorXd> x) {
   work_ = y;
-  gram_llt_.solveInPlace(work_);
+  gram_factor_.Solve(work_);
   x.setZero();
   for (const int i : entries_) x[i] = W_inv_J_T_.row(i).head(work_.size()).dot(work_);
 }
 
 void Pseudoinverse::ApplyTransposed(const Eigen::Ref<const VectorXd>& x, Eigen::Ref<VectorXd> y) {
   y.noalias() = W_inv_J_T_.leftCols(work_.size()).transpose() * x;
-  gram_llt_.solveInPlace(y);
+  gram_factor_.Solve(y);
 }
 
 void Pseudoinverse::Project(Eigen::Ref<VectorXd> x) {
   // N x = x - J^+ (J x)
   work_.setZero();
   for (const int i : columns_) work_ += x[i] * J_T_.row(i).head(work_.size()).transpose();
-  gram_llt_.solveInPlace(work_);
+  gram_factor_.Solve(work_);
   for (const int i : entries_) x[i] -= W_inv_J_T_.row(i).head(work_.size()).dot(work_);
 }
 
 MatrixXd Pseudoinverse::CalcMatrix() const {
-  return gram_llt_.solve(W_inv_J_T_.leftCols(work_.size()).transpose()).transpose();
+  const Eigen::Index k = work_.size();
+  const MatrixXd gram = gram_.topLeftCorner(k, k).selfadjointView<Eigen::Lower>();
+  return gram.llt().solve(W_inv_J_T_.leftCols(k).transpose()).transpose();
 }
 
 MatrixXd Pseudoinverse::CalcProjector() const {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "controller/common/block_cholesky.h"
 #include "controller/common/types.h"
 
 namespace dexcheck {
@@ -65,9 +66,8 @@ class Pseudoinverse {
   RowMatrixXd J_T_, W_inv_J_T_;  // n x k, padded for CalcGramMatrix; zero but in columns_ and entries_
   MatrixXd W_solution_;          // n x k, of any W
   MatrixXd gram_;                // k x k, padded: J W^-1 J^T, lower triangle
-  MatrixXd L_inv_;               // k x k
   VectorXd work_;                // k
-  Eigen::LLT<MatrixXd> gram_llt_;
+  BlockCholesky gram_factor_;
   Eigen::LLT<MatrixXd> W_llt_;
   double condition_number_ = 0.0;
 };

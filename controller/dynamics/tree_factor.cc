@@ -62,13 +62,22 @@ void TreeFactor::Compute(const Eigen::Ref<const MatrixXd>& M) {
   }
 }
 
+double TreeFactor::Dot(size_t begin, size_t end, const Eigen::Ref<const VectorXd>& x) const {
+  // Two sums, so that neither waits for the other.
+  double even = 0.0, odd = 0.0;
+  for (; begin + 1 < end; begin += 2) {
+    even += L_[begin] * x[path_[begin]];
+    odd += L_[begin + 1] * x[path_[begin + 1]];
+  }
+  if (begin < end) even += L_[begin] * x[path_[begin]];
+  return even + odd;
+}
+
 void TreeFactor::Multiply(Eigen::Ref<VectorXd> x) const {
   // Rows use entries above themselves only.
   for (auto i = static_cast<Eigen::Index>(rows_.size()) - 1; i >= 0; --i) {
     const Row row = rows_[static_cast<size_t>(i)];
-    double sum = 0.0;
-    for (size_t k = row.begin + row.size; k-- > row.begin;) sum += L_[k] * x[path_[k]];
-    x[i] = sum;
+    x[i] = Dot(row.begin, row.begin + row.size, x);
   }
 }
 
@@ -76,9 +85,7 @@ void TreeFactor::Solve(Eigen::Ref<VectorXd> x) const {
   for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows_.size()); ++i) {
     const Row row = rows_[static_cast<size_t>(i)];
     const size_t last = row.begin + row.size - 1;
-    double sum = x[i];
-    for (size_t k = last; k-- > row.begin;) sum -= L_[k] * x[path_[k]];
-    x[i] = sum / L_[last];
+    x[i] = (x[i] - Dot(row.begin, last, x)) / L_[last];
   }
 }
 

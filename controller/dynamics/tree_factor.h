@@ -48,6 +48,9 @@ class TreeFactor {
     size_t size;
   };
 
+  /// Sum of L's entries from begin to end, each times its coordinate's of x.
+  [[nodiscard]] double Dot(size_t begin, size_t end, const Eigen::Ref<const VectorXd>& x) const;
+
   std::vector<Row> rows_;
   std::vector<int> all_rows_;
   std::vector<int> path_;  // coordinates from the root, row by row

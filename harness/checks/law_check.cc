@@ -155,7 +155,7 @@ void LawCheck::CompareDemand(const StepFindings& findings) {
   const double apart = std::max(motion, forces) / kappa - kSlipShare * difference_.norm() / scale_;
   const bool slip_explains = apart <= 0.0;
   errors_.demand =
-      slip_explains ? 0.0 : std::max(0.0, apart - kSlipShare * Norm(reference_.slip_coriolis()) / scale_);
+      slip_explains ? 0.0 : std::max(apart - kSlipShare * Norm(reference_.slip_coriolis()) / scale_, 0.0);
 }
 
 void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms, const VectorXd& f_c) {

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "controller/common/gram_matrix.h"
 #include "controller/object/so3.h"
 
 namespace dexcheck {
@@ -112,7 +111,8 @@ bool LawReference::FactorJacobian(const LawSpec& spec, const LawTerms& terms) {
   A_.noalias() = terms.J * W_inv_J_T_;
   llt_.compute(A_);
   if (llt_.info() != Eigen::Success) return false;
-  InvertLowerTriangle(llt_.matrixLLT(), &L_inv_);
+  L_inv_.setIdentity();
+  llt_.matrixL().solveInPlace(L_inv_);
   condition_number_ = std::sqrt(A_.trace()) * L_inv_.norm();
   G_ = terms.G;
   G_llt_.compute(G_ * G_.transpose());

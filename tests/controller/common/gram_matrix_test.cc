@@ -2,16 +2,20 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <limits>
 #include <numeric>
 #include <random>
 #include <vector>
 
+#include "controller/common/block_cholesky.h"
 #include "tests/common/matrix_near.h"
 
 namespace dexcheck::testing {
 namespace {
 
-// Sums of some tens of products of numbers below 3, and inverses of triangles that are near the identity.
+// Sums of some tens of products of numbers below 3, and condition numbers of some tens.
 constexpr double kRounding = 1e-13;
 
 RowMatrixXd DrawPadded(Eigen::Index rows, Eigen::Index width, std::mt19937* random) {
@@ -49,16 +53,38 @@ TEST(GramMatrix, IsTheDenseProductOfTheListedRows) {
   }
 }
 
-TEST(GramMatrix, InvertsLowerTriangles) {
+TEST(BlockCholesky, SolvesAndKnowsTheInversesNorm) {
   std::mt19937 random(2);
   for (Eigen::Index k = 1; k <= 13; ++k) {
-    // Above the diagonal is what must not be read.
-    MatrixXd L = 0.3 * MatrixXd(DrawPadded(k, k, &random).leftCols(k));
-    L.diagonal().array() += 3.0;
-    MatrixXd L_inv = MatrixXd::Constant(k, k, 7.0);
-    InvertLowerTriangle(L, &L_inv);
-    const MatrixXd product = L.triangularView<Eigen::Lower>() * L_inv;
-    EXPECT_TRUE(MatrixNear(product, MatrixXd::Identity(k, k), kRounding));
+    const MatrixXd half = DrawPadded(k + 5, k, &random).leftCols(k);
+    const MatrixXd A = half.transpose() * half + MatrixXd::Identity(k, k);
+    // Above the diagonal, and in rows and columns behind k, is what must not be read.
+    MatrixXd padded = MatrixXd::Constant(PadToGramBlock(k), PadToGramBlock(k), 7.0);
+    padded.topLeftCorner(k, k).triangularView<Eigen::Lower>() = A;
+    BlockCholesky factor(k);
+    ASSERT_TRUE(factor.Factor(padded));
+    VectorXd x = DrawPadded(k, 1, &random).col(0);
+    const VectorXd expected = A.llt().solve(x);
+    factor.Solve(x);
+    EXPECT_TRUE(MatrixNear(x, expected, kRounding));
+    const MatrixXd L = A.llt().matrixL();
+    for (Eigen::Index i = 0; i < k; ++i) EXPECT_NEAR(factor.pivot(i), L(i, i), kRounding * L(i, i));
+    EXPECT_NEAR(factor.CalcInverseNorm(), MatrixXd(L.inverse()).norm(), kRounding);
+    // As by Factor anew.
+    ASSERT_TRUE(factor.Factor(A));
+    EXPECT_NEAR(factor.CalcInverseNorm(), MatrixXd(L.inverse()).norm(), kRounding);
+  }
+}
+
+TEST(BlockCholesky, RefusesWhatIsNotPositiveDefinite) {
+  for (const Eigen::Index bad : {0, 3, 4, 8}) {
+    MatrixXd A = MatrixXd::Identity(9, 9);
+    BlockCholesky factor(9);
+    ASSERT_TRUE(factor.Factor(A));
+    for (const double entry : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+      A(bad, bad) = entry;
+      EXPECT_FALSE(factor.Factor(A)) << bad << " " << entry;
+    }
   }
 }
 
