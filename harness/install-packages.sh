@@ -16,8 +16,8 @@ packages=(
   liburdfdom-dev libtinyxml2-dev
   # the run's log
   libhdf5-dev zlib1g-dev
-  # studies' databases
-  libsqlite3-dev
+  # studies: databases, searches, samples (Boost.Random)
+  libsqlite3-dev libpagmo-dev libnlopt-dev libnlopt-cxx-dev libboost-dev
   # the command line
   libcli11-dev libfmt-dev nlohmann-json3-dev
   # off-screen drawing and video
@@ -34,10 +34,16 @@ esac
 if [[ $purpose != program ]]; then
   # tests and benchmarks, and the programs they take as oracles
   packages+=(
-    libgtest-dev libgmock-dev libbenchmark-dev liborocos-kdl-dev coinor-csdp hdf5-tools ffmpeg
+    libgtest-dev libgmock-dev libbenchmark-dev coinor-csdp hdf5-tools ffmpeg
     sqlite3 slurm-wlm munge
     chromium chromium-driver python3-numpy doxygen
+    # the Python module
+    pybind11-dev python3-dev python3-pytest
+    # other physics engines
+    libbullet-dev liborocos-kdl-dev libsimbody-dev
   )
+  # Node's package manager installs MuJoCo 3; whoever has Node from elsewhere has npm with it.
+  command -v npm >/dev/null || packages+=(nodejs npm)
 fi
 if [[ $purpose == development ]]; then
   # sanitizers and libFuzzer, coverage, static analysis

@@ -57,6 +57,7 @@ class MoviePainter::RunPainter {
         run_(*view.frames),
         options_(options),
         width_(width),
+        camera_(ChooseCamera()),
         data_(MakeData(model_)),
         renderer_(model_, MakeRenderOptions()),
         decorator_(model_, run_, {options.forces, options.tracks, options.frames}, data_.get()),
@@ -80,18 +81,24 @@ class MoviePainter::RunPainter {
   }
 
  private:
+  [[nodiscard]] std::string ChooseCamera() const {
+    constexpr const char* kUsual = "overview";
+    if (!options_.camera.empty()) return options_.camera;
+    return mj_name2id(&model_, mjOBJ_CAMERA, kUsual) >= 0 ? kUsual : kCourseCamera;
+  }
+
   [[nodiscard]] RenderOptions MakeRenderOptions() {
     RenderOptions render;
     render.width = width_;
     render.height = options_.height;
-    render.camera = options_.camera;
+    render.camera = camera_;
     render.samples = options_.samples;
     render.shadow_size = options_.shadow_size;
     // In a narrow picture the panel would cover the robot.
     if (options_.panel && width_ < options_.height * 5 / 4) render.shift_right = kNarrowShift;
     // Forces point into the object.
     if (options_.forces && run_.contacts() > 0) render.translucent_body = run_.object_body;
-    if (options_.camera == kCourseCamera || options_.inset == kCourseCamera) {
+    if (camera_ == kCourseCamera || options_.inset == kCourseCamera) {
       render.course = FindCourse(model_, run_, MakeEdges(), data_.get());
     }
     return render;
@@ -102,9 +109,8 @@ class MoviePainter::RunPainter {
     const double top = std::tan(0.5 * DegToRad(model_.vis.global.fovy));
     const double side = top * width_ / options_.height;
     const double margin = 2.0 * kCourseMargin * side;
-    const double covered = options_.panel && options_.camera == kCourseCamera
-                               ? Overlay::CalcCoveredWidth(width_, options_.height)
-                               : 0.0;
+    const double covered =
+        options_.panel && camera_ == kCourseCamera ? Overlay::CalcCoveredWidth(width_, options_.height) : 0.0;
     return {side * (1.0 - 2.0 * covered / width_) - margin, side - margin, top - margin, top - margin};
   }
 
@@ -119,6 +125,7 @@ class MoviePainter::RunPainter {
     if (!run_.phases.empty()) state.title += ": " + run_.phases[static_cast<size_t>(row)];
     state.time = run_.times[at];
     if (!run_.position_errors.empty()) state.position_error = run_.position_errors[at];
+    if (!run_.joint_errors.empty()) state.joint_error = run_.joint_errors[at];
     if (!run_.orientation_errors.empty()) state.orientation_error = run_.orientation_errors[at];
     state.history_span = kHistorySpan;
     state.history = MakeHistory(at);
@@ -162,6 +169,7 @@ class MoviePainter::RunPainter {
   const RunFrames& run_;
   MovieOptions options_;
   int width_;
+  std::string camera_;
   int inset_width_ = 0;
   int inset_height_ = 0;
   MjDataPtr data_;

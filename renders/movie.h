@@ -20,7 +20,7 @@ struct MovieOptions {
   int width = 1280;
   int height = 720;
   int fps = 30;
-  std::string camera = "overview";
+  std::string camera;   ///< Empty for "overview", or where the model has none for the course's.
   std::string inset;    ///< A second camera, shown in the lower right corner; none when empty.
   bool forces = false;  ///< Contact forces with their friction cones.
   bool tracks =

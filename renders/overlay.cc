@@ -107,7 +107,8 @@ double Overlay::CalcCoveredWidth(int width, int height) {
 void Overlay::Draw(const OverlayState& state, Image* image) {
   const double s = CalcScale(image->width, image->height);
   const bool has_plot = !state.history.empty();
-  const int errors = (state.position_error ? 1 : 0) + (state.orientation_error ? 1 : 0);
+  const int errors =
+      (state.position_error ? 1 : 0) + (state.orientation_error ? 1 : 0) + (state.joint_error ? 1 : 0);
   const auto rows = static_cast<double>(state.questions.size());
   const auto keys = static_cast<double>(state.legend.size());
   double height = 2.0 * kPadding + kLine;
@@ -147,6 +148,10 @@ void Overlay::Draw(const OverlayState& state, Image* image) {
     if (state.orientation_error) {
       y += kLine * s;
       draw_row(left, "orientation error", FormatSi(*state.orientation_error, "rad"));
+    }
+    if (state.joint_error) {
+      y += kLine * s;
+      draw_row(left, "joint error", FormatSi(*state.joint_error, "rad"));
     }
   }
   if (has_plot) {

@@ -36,6 +36,7 @@ struct OverlayState {
   double time = 0.0;                        ///< s.
   std::optional<double> position_error;     ///< m.
   std::optional<double> orientation_error;  ///< rad.
+  std::optional<double> joint_error;        ///< Of the joint that is farthest off, rad.
   /// (time in s, position error in m) of the span that the plot shows, oldest first.
   std::vector<Vector2d> history;
   double history_span = 3.0;  ///< s; the plot ends now and began so long ago.

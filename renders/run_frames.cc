@@ -51,6 +51,7 @@ void CheckRunFrames(const mjModel& model, const RunFrames& run) {
   if (!run.qpos.allFinite()) fail("qpos: is not finite");
   check_series("position error", run.position_errors);
   check_series("orientation error", run.orientation_errors);
+  check_series("joint error", run.joint_errors);
   for (const CheckSeries& check : run.checks) {
     check_size("check " + check.name, static_cast<long>(check.residuals.size()), 1, 1);
   }

@@ -31,6 +31,7 @@ struct RunFrames {
 
   std::vector<double> position_errors;     ///< Of the object, m; n.
   std::vector<double> orientation_errors;  ///< rad; n.
+  std::vector<double> joint_errors;        ///< Of the joint that is farthest off, rad; n.
   std::vector<CheckSeries> checks;
 
   RowMatrixXd contact_positions;  ///< n x 3N, m, world; NaN where a contact is open.

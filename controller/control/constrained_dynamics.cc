@@ -38,7 +38,7 @@ Vector6d CalcCoordinateAcceleration(const GraspTerms& grasp, const Vector6d& V_B
 
 ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contacts)
     : factor_(model), schur_factor_(std::max(Eigen::Index{3} * num_contacts, Eigen::Index{0})) {
-  Require(num_contacts > 0, "number of contacts", "must be positive", num_contacts);
+  Require(num_contacts >= 0, "number of contacts", "must not be negative", num_contacts);
   const Eigen::Index n = model.num_velocities();
   const Eigen::Index k = Eigen::Index{3} * num_contacts;
   rows_.reserve(static_cast<size_t>(n + 6));
@@ -57,7 +57,8 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
   Require(robot.size() == n && force.size() == n, "length of force", "must be that of xi",
           static_cast<double>(force.size()));
   const Eigen::Index k = prediction_.f_c.size();
-  Require(grasp.num_forces() == k, "number of contact forces", "must be as constructed", grasp.num_forces());
+  Require(grasp.num_forces() == k && k > 0, "number of contact forces", "must be as constructed and positive",
+          grasp.num_forces());
   const ObjectBodyTerms& body = grasp.body();
   factor_.Compute(robot.M());
   const Eigen::LLT<Matrix6d> M_hat_llt(body.M_hat);

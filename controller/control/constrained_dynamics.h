@@ -35,7 +35,8 @@ enum class ObjectSupport {
 /// rigid and nothing slipped. Sized by the constructor; nothing else allocates.
 class ConstrainedDynamics {
  public:
-  /// @throws std::invalid_argument unless num_contacts > 0.
+  /// @param num_contacts 0 for a robot that holds nothing, for which there is PredictFree alone.
+  /// @throws std::invalid_argument when it is negative.
   ConstrainedDynamics(const RobotModel& model, int num_contacts);
 
   /// One solve of the saddle-point system
@@ -49,7 +50,7 @@ class ConstrainedDynamics {
   /// its Sigma_cf, for whoever stabilises the constraint; null for zero.
   /// @param push wrench on the object by others than contacts, Sigma_o, N, N m; null for none.
   /// @throws SingularityError when the contacts' constraints depend on each other; std::invalid_argument when
-  /// sizes differ.
+  /// sizes differ or there are no contacts.
   const Prediction& Predict(const ModelTerms& robot, const GraspTerms& grasp,
                             const Eigen::Ref<const VectorXd>& force,
                             ObjectSupport object = ObjectSupport::kHand,

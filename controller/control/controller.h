@@ -7,6 +7,7 @@
 #include "controller/common/types.h"
 #include "controller/control/contact_set.h"
 #include "controller/control/desired_motion.h"
+#include "controller/control/joint_motion.h"
 #include "controller/control/measured_state.h"
 #include "controller/control/trajectory.h"
 
@@ -52,6 +53,9 @@ struct Command {
   VectorXd tau;           ///< tau' (n), N m: of the right and left wheel, then of the joints.
   DesiredMotion desired;  ///< Of the object; where it is, when it need not move.
   bool tracks = true;     ///< Whether the object should follow `desired`.
+  /// Of the joints, for a robot that holds nothing and follows a motion of them; empty otherwise.
+  DesiredJoints joints;
+  bool computes_joints = false;  ///< Whether `tau` was computed for them at this instant.
   LawDemand demand;
   Handling handling;
   TaskProgress task;

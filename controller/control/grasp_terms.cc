@@ -29,7 +29,6 @@ GraspTerms::GraspTerms(const RobotModel& model, std::span<const int> fingertips,
       object_(object),
       gravity_(model.gravity()),
       surface_(&surface) {
-  Require(!fingertips_.empty(), "number of fingertips", "must be positive", 0.0);
   for (const int frame : fingertips_) {
     const Frame& tip = model.frames().at(static_cast<size_t>(frame));
     if (!tip.sphere_radius) throw std::invalid_argument("fingertips: " + tip.name + " carries no sphere");

@@ -29,7 +29,8 @@ class GraspTerms {
   /// @param fingertips frames of the model that carry spheres, one contact each.
   /// @param object mass properties in Sigma_o, com zero. @param surface of the object, in Sigma_o; must
   /// outlive this.
-  /// @throws std::invalid_argument when there is no fingertip, or a frame carries no sphere.
+  /// None for a robot that holds nothing.
+  /// @throws std::invalid_argument when a frame carries no sphere.
   GraspTerms(const RobotModel& model, std::span<const int> fingertips, const MassProperties& object,
              const Surface& surface);
 

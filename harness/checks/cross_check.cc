@@ -35,9 +35,16 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
       actuation_(setup.model()),
       meant_force_(VectorXd::Zero(setup.model().num_velocities())) {
   if (!setup.bonds().empty()) model_.LeaveOutContacts();
-  if (!setup.scenario().task && knows_law) law_.emplace(setup);
+  if (setup.joint_motion() != nullptr) {
+    joint_law_.emplace(setup);
+  } else if (!setup.scenario().task && knows_law) {
+    law_.emplace(setup);
+  }
   if (!setup.scenario().imperfections.is_ideal()) known_.emplace(setup, motors);
   using enum StepCheck;
+  if (joint_law_ && !joint_law_->has_error_dynamics()) motion_.LeaveOut(kGains);
+  if (joint_law_ && !joint_law_->follows_error()) motion_.LeaveOut(kJointDynamics);
+  if (joint_law_) return;
   if (!law_) {
     for (const StepCheck check : {kGains, kLawTorque, kLawDemand, kGraspForce}) motion_.LeaveOut(check);
   }
@@ -91,7 +98,9 @@ double CrossCheck::CompareTold(const StepRecord& step) {
 
 void CrossCheck::FindMeant(const StepRecord& step) {
   actuation_.CalcForce(step.command.tau, meant_force_);
-  const Prediction& meant = meant_dynamics_.Predict(step.model->robot(), step.model->grasp(), meant_force_);
+  const Prediction& meant =
+      joint_law_ ? meant_dynamics_.PredictFree(step.model->robot(), meant_force_)
+                 : meant_dynamics_.Predict(step.model->robot(), step.model->grasp(), meant_force_);
   meant_.xi_dot_model = meant.xi_dot;
   meant_.V_Bo_dot_model = meant.V_Bo_dot;
   meant_.f_c_model = meant.f_c;
@@ -113,6 +122,13 @@ const LawErrors& CrossCheck::CompareControl(const StepRecord& step) {
 }
 
 void CrossCheck::CompareUnsent(const StepRecord& step) {
+  if (joint_law_ && step.command.computes_joints) {
+    CompareModel(step);
+    motion_.Add(StepCheck::kTold, CompareTold(step), step.time);
+    sensors_.Add(step.told.state, ToldOf(step));
+    ReadControllersTerms(step);
+    motion_.Add(StepCheck::kLawTorque, joint_law_->CompareUnsent(step, law_terms_), step.time);
+  }
   if (!law_ || !LawCheck::IsJudged(step)) return;
   CompareModel(step);
   motion_.Add(StepCheck::kTold, CompareTold(step), step.time);
@@ -124,6 +140,7 @@ void CrossCheck::CompareUnsent(const StepRecord& step) {
 MeasuredCauses CrossCheck::Tell() const {
   MeasuredCauses measured;
   if (law_) measured.law = law_->attribution().Tell();
+  if (joint_law_) measured.law = joint_law_->Tell();
   measured.motors = motors_.Tell();
   measured.sensors = sensors_.Tell();
   measured.wheels = motion_.wheels().Tell();
@@ -132,6 +149,19 @@ MeasuredCauses CrossCheck::Tell() const {
   measured.force = forces.Tell();
   measured.is_slope = ForceEvidence::IsSlope(forces.Find(), setup_->model().gravity());
   return measured;
+}
+
+void CrossCheck::CompareJointLaw(const StepRecord& step) {
+  const double t = step.time;
+  motion_.Add(StepCheck::kGains, joint_law_->sampled_radius(), t);
+  if (!step.command.computes_joints) return;
+  ReadControllersTerms(step);
+  const bool is_ideal = !known_ && step.drive.tau == step.command.tau;
+  if (!is_ideal) FindMeant(step);
+  const VectorXd& meant = is_ideal ? motion_.findings().xi_dot_model : meant_.xi_dot_model;
+  const JointLawErrors& errors = joint_law_->Compare(step, meant, law_terms_);
+  motion_.Add(StepCheck::kLawTorque, errors.torque, t);
+  motion_.Add(StepCheck::kJointDynamics, errors.error_dynamics, t);
 }
 
 void CrossCheck::CompareLaw(const StepRecord& step) {
@@ -146,6 +176,10 @@ void CrossCheck::CompareLaw(const StepRecord& step) {
     motion_.Add(StepCheck::kExpectPosition, step.error.position.norm(), t);
     motion_.Add(StepCheck::kExpectOrientation, step.error.orientation, t);
   }
+  if (step.command.joints.q.size() > 0 && t >= expect.from) {
+    motion_.Add(StepCheck::kExpectJoints, step.error.joints, t);
+  }
+  if (joint_law_) return CompareJointLaw(step);
   if (!law_) return;
   motion_.Add(StepCheck::kGains, law_->sampled_radius(), t);
   if (!LawCheck::IsJudged(step)) return;

@@ -9,6 +9,7 @@
 
 #include "controller/control/constrained_dynamics.h"
 #include "harness/checks/attribution.h"
+#include "harness/checks/joint_law_check.h"
 #include "harness/checks/known_plant.h"
 #include "harness/checks/law_check.h"
 #include "harness/checks/signal_evidence.h"
@@ -77,13 +78,15 @@ class CrossCheck {
   void FindMeant(const StepRecord& step);
   /// Of torques that the controller computed at this step.
   const LawErrors& CompareControl(const StepRecord& step);
+  void CompareJointLaw(const StepRecord& step);
 
   const Setup* setup_;
   StepModelCheck model_;
   StepChecks motion_;
   std::optional<NotIdeal> known_;
-  std::optional<LawCheck> law_;  // none for a task, or an unknown law
-  LawTerms law_terms_;           // the engine's
+  std::optional<LawCheck> law_;  // none for a task, an unknown law, or a motion of joints
+  std::optional<JointLawCheck> joint_law_;
+  LawTerms law_terms_;  // the engine's
   std::vector<CheckRecord> settling_failures_;
   MotorEvidence motors_;
   SensorEvidence sensors_;

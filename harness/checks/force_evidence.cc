@@ -89,6 +89,8 @@ void ForceEvidence::Add(const VectorXd& f, const Vector6d& w, const GraspModel& 
   const Eigen::Index n = f.size();
   RowMatrixXd half_inverse = RowMatrixXd::Identity(n, n);
   mass_factor.SolveTransposedColumns(half_inverse);  // L^-T
+  // Without an object there is no weight of one.
+  const double object_mass = model_->object() ? model.grasp().object().mass : 0.0;
   const Eigen::LLT<Matrix6d> M_hat(model.grasp().body().M_hat);
   const VectorXd y = half_inverse * f;
   const Vector6d y_o = M_hat.matrixL().solve(w);
@@ -110,7 +112,7 @@ void ForceEvidence::Add(const VectorXd& f, const Vector6d& w, const GraspModel& 
     weights += mass * link_jacobians_[static_cast<size_t>(link + 1)].transpose();
   }
   Eigen::Matrix<double, 6, 3> object = Eigen::Matrix<double, 6, 3>::Zero();
-  object.topRows<3>() = model.grasp().object().mass * model.grasp().X_Bo().linear().transpose();
+  object.topRows<3>() = object_mass * model.grasp().X_Bo().linear().transpose();
   const MatrixXd columns = half_inverse * weights;
   const Eigen::Matrix<double, 6, 3> object_columns = M_hat.matrixL().solve(object);
   gravity_normal_ += weight * (columns.transpose() * columns + object_columns.transpose() * object_columns);

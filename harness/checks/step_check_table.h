@@ -23,6 +23,8 @@ enum class StepCheck {
   kOrientationDynamics,
   kExpectPosition,
   kExpectOrientation,
+  kJointDynamics,
+  kExpectJoints,
   kBalanceRobot,
   kBalanceObject,
   kReducedAcceleration,
@@ -107,6 +109,8 @@ inline constexpr double kBalanceRobotBound = 1e-6;
 // What law_demand leaves, over K_p: measured 1.2e-9 m in `curve`.
 inline constexpr double kErrorDynamicsBound = 1e-8;
 inline constexpr double kOrientationDynamicsBound = 1e-7;
+// Rounding of torques, over the least inertia that they drive and over K_p: measured 1e-14 for the Panda.
+inline constexpr double kJointDynamicsBound = 1e-11;
 
 /// What explains what: of the failed checks, those of the first of these ranks tell why, however late they
 /// failed.
@@ -230,6 +234,21 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .bound = 0.0,
      .description = "object's orientation error, against what the scenario expects",
      .meaning = {.cause = Cause::kControlLaw, .precedence = 22, .rank = Rank::kResidual}},
+    {.check = StepCheck::kJointDynamics,
+     .name = "joint_dynamics",
+     .kind = CheckKind::kLaw,
+     .unit = "rad",
+     .bound = kJointDynamicsBound,
+     .description = "joints against e_ddot + K_v e_dot + K_p e = 0 integrated beside the run, driven by the "
+                    "accelerations that the prediction missed",
+     .meaning = {.cause = Cause::kUnexplained, .precedence = 29, .rank = Rank::kResidual}},
+    {.check = StepCheck::kExpectJoints,
+     .name = "expect_joints",
+     .kind = CheckKind::kLaw,
+     .unit = "rad",
+     .bound = 0.0,
+     .description = "largest error of a joint (rad or m), against what the scenario expects",
+     .meaning = {.cause = Cause::kControlLaw, .precedence = 30, .rank = Rank::kResidual}},
     {.check = StepCheck::kBalanceRobot,
      .name = "balance_robot",
      .kind = CheckKind::kBalance,

@@ -102,6 +102,8 @@ void StepChecks::DefineChecks() {
   check(StepCheck::kExpectPosition).applies = expect.position.has_value();
   check(StepCheck::kExpectOrientation).bound = expect.orientation.value_or(0.0);
   check(StepCheck::kExpectOrientation).applies = expect.orientation.has_value();
+  check(StepCheck::kExpectJoints).bound = expect.joints.value_or(0.0);
+  check(StepCheck::kExpectJoints).applies = expect.joints.has_value();
   RequireKnownBounds(setup_->scenario());
   for (const auto& [name, bound] : setup_->scenario().bounds) check(FindStepCheck(name)->check).bound = bound;
 }
@@ -115,6 +117,11 @@ void StepChecks::SetApplying() {
   leave_out(!setup_->scenario().task, {kUnjudged});
   leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kRolling, kTractionUse});
   leave_out(setup_->model().base().type == BaseType::kFixed, {kBaseTilt});
+  const bool joints = setup_->joint_motion() != nullptr;
+  leave_out(joints, {kLawDemand, kGraspForce, kErrorDynamics, kOrientationDynamics, kContactForce,
+                     kFingertipSlip, kFingertipSlipRate, kConeUse, kContactsLost, kPenetration, kKappa});
+  leave_out(!joints, {kJointDynamics});
+  leave_out(!setup_->has_object(), {kBalanceObject});
   // Nothing but stiffness holds them: whatever is not ideal moves them.
   leave_out(setup_->idle_joints().empty() || !setup_->scenario().imperfections.is_ideal(), {kIdleJoints});
   // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
@@ -235,7 +242,9 @@ void StepChecks::Predict(const StepRecord& step) {
   const bool whole = touching_ == AllContacts(grasp.num_contacts());
   if (handling_.partial && !whole && touching_ != 0) return PredictPart(step);
   const Prediction* prediction = nullptr;
-  if (!handling_.partial || (whole && !supported_)) {
+  if (grasp.num_contacts() == 0) {
+    prediction = &dynamics_.PredictFree(robot, force_);
+  } else if (!handling_.partial || (whole && !supported_)) {
     prediction = &dynamics_.Predict(robot, grasp, force_, ObjectSupport::kHand, nullptr, PushOf(step));
   } else if (whole) {
     prediction = &dynamics_.Predict(robot, grasp, force_, ObjectSupport::kAtRest);
@@ -343,11 +352,15 @@ void StepChecks::AddLessGive(StepCheck which, double residual, double give) {
 double StepChecks::Weight() const { return setup_->object().body.mass * setup_->model().gravity().norm(); }
 
 void StepChecks::CompareObject(const StepRecord& step) {
+  if (!setup_->has_object()) return Add(StepCheck::kSolver, solver_of_robot_);
   // (19), as forces at the contacts' arm
   const GraspTerms& grasp = ModelAtTruth(step).grasp();
   const PlantResponse& response = step.response;
   const ObjectBodyTerms& body = grasp.body();
-  const double arm = grasp.contacts()[0].geometry.g_o_cf.translation().norm();
+  // Of an object that is not held, its radius of gyration.
+  const double arm = grasp.num_contacts() > 0
+                         ? grasp.contacts()[0].geometry.g_o_cf.translation().norm()
+                         : std::sqrt(body.M_hat.bottomRightCorner<3, 3>().trace() / body.M_hat(0, 0));
   const Vector6d push = step.known != nullptr ? step.known->object_wrench : Vector6d(Vector6d::Zero());
   const auto relative = [&](const Vector6d& wrench) {
     return std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) /

@@ -1,20 +1,43 @@
 #include "harness/checks/step_model_check.h"
 
+#include <numeric>
+
 #include "controller/object/object_dynamics.h"
 
 namespace dexcheck {
+namespace {
+
+/// The engine's terms for a grasp, or of a robot that holds nothing, whose frames are all of interest.
+EngineTerms MakeTerms(const Adapter& adapter, std::span<const int> fingertips) {
+  return fingertips.empty() ? EngineTerms(adapter, Coordinates::kReduced) : EngineTerms(adapter, fingertips);
+}
+
+}  // namespace
 
 StepModelCheck::StepModelCheck(const Adapter& adapter, std::span<const int> fingertips,
                                OrientationFeedback orientation)
     : TermComparison(adapter),
       has_coordinates_(orientation == OrientationFeedback::kAngles),
-      engine_(adapter, fingertips) {
+      has_object_(adapter.model().object().has_value()),
+      engine_(MakeTerms(adapter, fingertips)) {
   context_.engine = &engine_;
-  SetFrames(fingertips, /*contacts=*/true);
+  if (fingertips.empty()) {
+    if (has_object_) engine_.RequireObject();
+    std::vector<int> all(adapter.model().frames().size());
+    std::iota(all.begin(), all.end(), 0);
+    SetFrames(all, /*contacts=*/false);
+    const int n = engine_.size();
+    frame_jacobians_.assign(all.size(), {Matrix6Xd::Zero(6, n), Matrix6Xd::Zero(6, n)});
+  } else {
+    SetFrames(fingertips, /*contacts=*/true);
+  }
   J_B_dot_xi_.setZero(3 * static_cast<Eigen::Index>(fingertips.size()));
   context_.xi.setZero(engine_.size());
-  constexpr TermGroup kCoordinates[] = {TermGroup::kObjectCoordinates};
-  Ask(kAskedByRun, has_coordinates_ ? std::span<const TermGroup>() : kCoordinates);
+  std::vector<TermGroup> left_out;
+  if (!has_coordinates_) left_out.push_back(TermGroup::kObjectCoordinates);
+  if (!has_object_) left_out.push_back(TermGroup::kObject);
+  if (fingertips.empty()) left_out.push_back(TermGroup::kContact);
+  Ask(kAskedByRun, left_out);
 }
 
 void StepModelCheck::Merge(const StepModelCheck& other) {
@@ -38,11 +61,17 @@ void StepModelCheck::Compare(const ModelTerms& robot, const GraspTerms& grasp, c
   context_.xi = state.xi;
   context_.energy = robot.CalcEnergyAndMomentum();
   for (size_t i = 0; i < context_.jacobians.size(); ++i) {
-    const auto finger = static_cast<int>(i);
-    context_.jacobians[i] = {&grasp.J_f(finger), &grasp.J_f_dot(finger)};
+    const auto index = static_cast<int>(i);
+    if (frame_jacobians_.empty()) {
+      context_.jacobians[i] = {&grasp.J_f(index), &grasp.J_f_dot(index)};
+      continue;
+    }
+    auto& [J, J_dot] = frame_jacobians_[i];
+    robot.CalcFrameJacobian(context_.frames[i], J, J_dot);
+    context_.jacobians[i] = {&J, &J_dot};
   }
   if (with_contacts_) ReadContacts(grasp, state, X_W0);
-  ReadObject(grasp);
+  if (has_object_) ReadObject(grasp);
   TermComparison::Compare(when, with_contacts_);
 }
 

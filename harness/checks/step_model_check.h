@@ -3,6 +3,8 @@
 // The first of the harness's questions at every step of a run: are the controller's terms the engine's?
 
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "controller/control/grasp_controller.h"
 #include "harness/checks/term_comparison.h"
@@ -14,7 +16,8 @@ namespace dexcheck {
 /// matrix C_bar', link inertias) needs no run.
 class StepModelCheck : public TermComparison {
  public:
-  /// @param fingertips frames of the grasp. @param orientation kAngles when the grasp's state is set by X_o,
+  /// @param fingertips frames of the grasp; none for a robot that holds nothing, all of whose frames are then
+  /// compared. @param orientation kAngles when the grasp's state is set by X_o,
   /// whose terms are then compared besides.
   /// @throws InputError as EngineTerms.
   StepModelCheck(const Adapter& adapter, std::span<const int> fingertips, OrientationFeedback orientation);
@@ -39,7 +42,9 @@ class StepModelCheck : public TermComparison {
 
   bool has_coordinates_;
   bool with_contacts_ = true;
+  bool has_object_;
   EngineTerms engine_;
+  std::vector<std::pair<Matrix6Xd, Matrix6Xd>> frame_jacobians_;  // J, J_dot; without fingertips
   VectorXd J_B_dot_xi_;
 };
 

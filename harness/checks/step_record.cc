@@ -25,8 +25,10 @@ Vector6d CalcX_o(const StepRecord& step) {
 TrackingError CalcTrackingError(const StepRecord& step) {
   const Pose& X_Bo = step.reading.state.X_Bo;
   const Vector6d& X_d = step.command.desired.X_d;
+  const VectorXd& q_d = step.command.joints.q;
   return {X_d.head<3>() - X_Bo.translation(),
-          LogSo3(X_Bo.linear().transpose() * CalcRotationZyz(X_d.tail<3>())).norm()};
+          LogSo3(X_Bo.linear().transpose() * CalcRotationZyz(X_d.tail<3>())).norm(),
+          q_d.size() > 0 ? (q_d - step.reading.state.q.tail(q_d.size())).cwiseAbs().maxCoeff() : 0.0};
 }
 
 }  // namespace dexcheck

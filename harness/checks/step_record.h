@@ -18,6 +18,7 @@ struct KnownStep;
 struct TrackingError {
   Vector3d position = Vector3d::Zero();  ///< X_d - X_o, world, m.
   double orientation = 0.0;              ///< Angle between R_Bo and R_Bd, rad.
+  double joints = 0.0;                   ///< Largest of a joint that follows a motion of its own, rad or m.
 };
 
 /// Slip of one contact, from the plant's own velocities.
@@ -70,7 +71,7 @@ struct StepRecord {
 /// Pose of the object, whose angles are on the controller's branch where it uses them.
 [[nodiscard]] Vector6d CalcX_o(const StepRecord& step);
 
-/// How far the object is from where the command wants it.
+/// How far object, or joints, are from where the command wants them.
 [[nodiscard]] TrackingError CalcTrackingError(const StepRecord& step);
 
 }  // namespace dexcheck

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -9,6 +10,7 @@
 
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
 #include "harness/sides/audit.h"
 #include "harness/sides/read_description.h"
@@ -22,6 +24,7 @@ struct Request {
   std::filesystem::path robot;
   std::vector<std::string> packages;
   std::string json_file;
+  std::string junit_file;
   bool floating = false;
   bool quiet = false;
 };
@@ -80,6 +83,22 @@ void Print(const Request& request, const RobotDescription& robot, const AuditRes
   }
 }
 
+/// A case for each kind of check, which fails with all that it found.
+std::string WriteJUnit(const Request& request, const AuditResult& result) {
+  std::vector<JUnitCase> cases;
+  for (const char* check : {"mass", "inertia", "density", "com", "mirror", "load", "range", "axis", "name"}) {
+    cases.push_back({"audit", check, "", ""});
+  }
+  for (const AuditFinding& finding : result.findings) {
+    auto test = std::find_if(cases.begin(), cases.end(),
+                             [&](const JUnitCase& candidate) { return candidate.name == finding.check; });
+    if (test == cases.end()) test = cases.insert(test, {"audit", finding.check, "", ""});
+    std::string& text = finding.level == AuditLevel::kNote ? test->output : test->failure;
+    text += (text.empty() ? "" : "\n") + finding.where + " " + finding.text;
+  }
+  return dexcheck::cli::WriteJUnit("dexcheck.audit." + request.robot.stem().string(), cases, 0.0);
+}
+
 int Run(const Request& request) {
   std::optional<OutputFile> json;
   UrdfOptions options;
@@ -88,8 +107,11 @@ int Run(const Request& request) {
   options.floating = request.floating;
   const RobotDescription robot = ReadDescription(request.robot, options);
   if (!request.json_file.empty()) json.emplace(request.json_file);
+  std::optional<OutputFile> junit;
+  if (!request.junit_file.empty()) junit.emplace(request.junit_file);
   const AuditResult result = AuditRobot(robot);
   if (json) json->Write(ToText(request, result));
+  if (junit) junit->Write(WriteJUnit(request, result));
   if (request.json_file != "-") Print(request, robot, result);
   return result.IsGood() ? kSuccess : kDisagreement;
 }
@@ -111,6 +133,10 @@ void AddAuditCommand(Command app) {
       .AddOption("--json", &request->json_file,
                  "Write the findings to this file (- for standard output, then without the table)")
       .TypeName("FILE.json");
+  command
+      .AddOption("--junit", &request->junit_file,
+                 "Write each check as a test case of JUnit's XML to this file")
+      .TypeName("FILE.xml");
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

@@ -46,6 +46,7 @@ void AddRunCommand(Command app, const std::string& command_line);
 void AddBudgetCommand(Command app);
 void AddCompareCommand(Command app);
 void AddExportCommand(Command app);
+void AddRefereeCommand(Command app);
 void AddRenderCommand(Command app);
 void AddReportCommand(Command app);
 void AddStatesCommand(Command app);

@@ -13,35 +13,28 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/interrupts.h"
-#include "harness/checks/consistency.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
-#include "harness/engine/engine.h"
 #include "harness/sides/answer_files.h"
 #include "harness/sides/answers_comparison.h"
-#include "harness/sides/complete_description.h"
-#include "harness/sides/description_check.h"
-#include "harness/sides/description_match.h"
-#include "harness/sides/model_comparison.h"
 #include "harness/sides/program_side.h"
 #include "harness/sides/read_description.h"
-#include "harness/sides/robot_file.h"
 #include "harness/sides/tolerance.h"
 
 namespace dexcheck::cli {
 namespace {
 
-ConsistencyResult Compare(const ConsistencyRequest& request,
-                          const std::function<ConsistencyResult(const std::function<bool(long)>&)>& check) {
+/// Calls `check` with what it tells its progress.
+void ShowProgress(const ConsistencyRequest& request,
+                  const std::function<void(const std::function<bool(long)>&)>& check) {
   ProgressBar bar("comparing", request.options.samples, request.quiet);
-  ConsistencyResult result = check([&](long samples) {
+  check([&](long samples) {
     bar.Update(samples);
     return !IsInterrupted();
   });
   bar.Finish();
-  return result;
 }
 
 UrdfOptions MakeUrdfOptions(const ConsistencyRequest& request) {
@@ -69,58 +62,6 @@ std::string PositiveNumber(const std::string& text) {
   return "must be a number above 0, got " + Quote(text);
 }
 
-void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& more) {
-  notes->insert(notes->end(), more.begin(), more.end());
-}
-
-/// A parameter file against the engine.
-void CompareTableWithEngine(const ConsistencyRequest& request, Comparison* comparison) {
-  const RobotDescription table = ReadDescription(request.files.robot);
-  comparison->model.emplace(table.spec);
-  const MjModelPtr engine = LoadMjcf(request.files.mjcf);
-  const Adapter adapter(*comparison->model, *engine, request.files.mjcf.string());
-  comparison->result = Compare(request, [&](const std::function<bool(long)>& progress) {
-    return CheckConsistency(adapter, request.options, progress);
-  });
-  AppendTo(&comparison->notes, CheckDescription(table, adapter, &comparison->result.gate));
-  AppendTo(&comparison->notes, DescribeBaseCoordinates(table));
-}
-
-/// A URDF, or another MJCF, against the engine.
-void CompareDescriptionWithEngine(const ConsistencyRequest& request, Comparison* comparison) {
-  RobotDescription robot = ReadDescription(request.files.robot, MakeUrdfOptions(request));
-  const MjModelPtr engine = LoadMjcf(request.files.mjcf);
-  Completion completion = CompleteFromEngine(*engine, FileName(request.files.mjcf), &robot);
-  comparison->model.emplace(robot.spec);
-  const Adapter adapter(*comparison->model, *engine, request.files.mjcf.string());
-  comparison->result = Compare(request, [&](const std::function<bool(long)>& progress) {
-    return CheckConsistency(adapter, request.options, progress);
-  });
-  GateResult& gate = comparison->result.gate;
-  std::erase_if(gate.records, [&](const CheckRecord& record) {
-    return !record.failed && std::find(completion.unstated.begin(), completion.unstated.end(), record.name) !=
-                                 completion.unstated.end();
-  });
-  const std::vector<std::string> others = CheckDescription(robot, adapter, &gate);
-  for (const auto& notes : {robot.notes, completion.notes, others, DescribeBaseCoordinates(robot)}) {
-    AppendTo(&comparison->notes, notes);
-  }
-}
-
-/// Two descriptions without the engine.
-void CompareTwoDescriptions(const ConsistencyRequest& request, Comparison* comparison) {
-  RobotDescription a = ReadDescription(request.files.robot, MakeUrdfOptions(request));
-  RobotDescription b = ReadDescription(request.files.mjcf, MakeUrdfOptions(request));
-  const std::vector<std::string> taken = CompleteEachOther(&a, &b);
-  for (const auto& notes : {a.notes, b.notes, taken, DescribeBaseCoordinates(a)}) {
-    AppendTo(&comparison->notes, notes);
-  }
-  comparison->model.emplace(a.spec);
-  comparison->result = Compare(request, [&](const std::function<bool(long)>& progress) {
-    return CompareDescriptions(a, b, request.options, progress);
-  });
-}
-
 /// A description against what a program answers, or has answered; of an MJCF the engine is the other side.
 void CompareWithAnswers(const ConsistencyRequest& request, Comparison* comparison) {
   const RobotDescription robot = ReadDescription(request.files.robot, MakeUrdfOptions(request));
@@ -137,20 +78,15 @@ void CompareWithAnswers(const ConsistencyRequest& request, Comparison* compariso
     make_feed = [&feed = *answers] { return feed.MakeFeed(); };
     side = std::move(answers);
   }
-  for (const auto& notes : {robot.notes, DescribeBaseCoordinates(robot)}) AppendTo(&comparison->notes, notes);
-  comparison->result = Compare(request, [&](const std::function<bool(long)>& progress) {
-    return CompareAnswers(robot, reference.get(), side.get(), make_feed, progress, &comparison->notes);
+  comparison->notes = robot.notes;
+  for (const std::string& note : DescribeBaseCoordinates(robot)) comparison->notes.push_back(note);
+  ShowProgress(request, [&](const std::function<bool(long)>& progress) {
+    comparison->result =
+        CompareAnswers(robot, reference.get(), side.get(), make_feed, progress, &comparison->notes);
   });
 }
 
-/// Why the two differ: of a parameter file or URDF against an MJCF the latter is read as a description.
-void Explain(const ConsistencyRequest& request, Comparison* comparison) {
-  if (comparison->result.Agrees() || request.has_answers()) return;
-  comparison->hypotheses =
-      ExplainDifference(request.files.robot, request.files.mjcf, MakeUrdfOptions(request));
-}
-
-/// Puts A and B where --robot and --mjcf would stand: an MJCF second, if there is one.
+/// Puts A and B where --robot and --mjcf would stand.
 void SortSides(ConsistencyRequest* request) {
   if (request->a.empty() && !request->has_answers()) return;
   if (request->has_answers()) {
@@ -160,18 +96,12 @@ void SortSides(ConsistencyRequest* request) {
     }
     request->files.robot = request->a;
     request->files.mjcf = request->answers.empty() ? std::filesystem::path("the program") : request->answers;
-    request->with_engine = false;
     return;
   }
   if (request->b.empty()) {
     throw InputError("consistency: two files must be given, got " + Quote(request->a));
   }
   request->files = {request->a, request->b};
-  const bool engine_first = FindFormat(request->files.robot) == RobotFormat::kMjcf;
-  if (engine_first && FindFormat(request->files.mjcf) != RobotFormat::kMjcf) {
-    std::swap(request->files.robot, request->files.mjcf);
-  }
-  request->with_engine = FindFormat(request->files.mjcf) == RobotFormat::kMjcf;
 }
 
 int Run(ConsistencyRequest request) {
@@ -179,25 +109,29 @@ int Run(ConsistencyRequest request) {
   CatchInterrupts();
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
+  std::optional<OutputFile> junit;
+  if (!request.junit_file.empty()) junit.emplace(request.junit_file);
   Comparison comparison;
   if (request.has_answers()) {
+    comparison.first = request.files.robot;
+    comparison.second = request.files.mjcf;
     CompareWithAnswers(request, &comparison);
-  } else if (!request.with_engine) {
-    CompareTwoDescriptions(request, &comparison);
-  } else if (FindFormat(request.files.robot) == RobotFormat::kToml) {
-    CompareTableWithEngine(request, &comparison);
   } else {
-    CompareDescriptionWithEngine(request, &comparison);
+    ShowProgress(request, [&](const std::function<bool(long)>& progress) {
+      comparison = CompareFiles(request.files.robot, request.files.mjcf, MakeUrdfOptions(request),
+                                request.options, progress);
+    });
   }
   if (const std::optional<double> tolerance = request.FindTolerance()) {
     JudgeByTolerance(*tolerance, &comparison.result);
   }
-  Explain(request, &comparison);
+  if (!request.has_answers()) ExplainComparison(MakeUrdfOptions(request), &comparison);
   const ConsistencyResult& result = comparison.result;
   const bool is_whole = result.samples >= request.options.samples || !request.answers.empty();
   ExitCode code = is_whole ? kSuccess : kFailure;
   if (!result.Agrees()) code = kDisagreement;
   if (json) json->Write(ToText(request, comparison, code));
+  if (junit) junit->Write(WriteJUnit(request, comparison));
   if (!request.PrintsJson()) {
     if (!request.quiet) PrintTable(request, comparison);
     PrintVerdict(request, comparison);
@@ -243,6 +177,10 @@ void AddConsistencyCommand(Command app) {
       .AddOption("--json", &request->json_file,
                  "Write the results to this file (- for standard output, then without the table)")
       .TypeName("FILE.json");
+  command
+      .AddOption("--junit", &request->junit_file,
+                 "Write each check as a test case of JUnit's XML to this file")
+      .TypeName("FILE.xml");
   constexpr int kMostDigits = 15;
   const Option digits = command
                             .AddOption("--digits", &request->digits,

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "controller/common/text.h"
+#include "harness/cli/junit_file.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/tolerance.h"
 
@@ -36,8 +38,6 @@ const char* Judge(ExitCode code) {
 
 }  // namespace
 
-std::string FileName(const std::filesystem::path& path) { return path.filename().string(); }
-
 Json ListHypotheses(const std::vector<Hypothesis>& hypotheses) {
   Json list = Json::array();
   for (const Hypothesis& hypothesis : hypotheses) {
@@ -61,8 +61,8 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
   const ConsistencyResult& result = comparison.result;
   const int base = model.num_base_velocities();
   fmt::print("{}: {} against {}{}\n{} random states (seed {}), {:.1f} s\n\n", model.name(),
-             FileName(request.files.robot), FileName(request.files.mjcf),
-             request.with_engine ? std::string(", MuJoCo ") + mj_versionString() : "", result.samples,
+             comparison.first.filename().string(), comparison.second.filename().string(),
+             comparison.with_engine ? std::string(", MuJoCo ") + mj_versionString() : "", result.samples,
              request.options.seed, result.seconds);
 
   if (!comparison.notes.empty()) {
@@ -96,34 +96,21 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
 }
 
 void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison) {
-  const RobotModel& model = *comparison.model;
   const ConsistencyResult& result = comparison.result;
-  const int base = model.num_base_velocities();
   if (result.samples < request.options.samples && request.answers.empty()) {
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
   }
   if (result.Agrees()) {
     const std::optional<double> tolerance = request.FindTolerance();
     fmt::print("AGREE: {} agree to {} in all {} terms.\n",
-               request.with_engine     ? "the analytic model and MuJoCo"
+               comparison.with_engine  ? "the analytic model and MuJoCo"
                : request.has_answers() ? "the description and the answers"
                                        : "the two descriptions",
                tolerance ? fmt::format("{:g}", *tolerance) : "rounding", result.terms.size());
     return;
   }
   fmt::print("DISAGREE:\n");
-  for (const GateFinding& finding : result.gate.findings) {
-    fmt::print("  {}: {}: {:.12g} in {}, {:.12g} in {}\n", finding.check, finding.where, finding.model,
-               FileName(request.files.robot), finding.engine, FileName(request.files.mjcf));
-  }
-  for (const CheckRecord& record : result.terms) {
-    if (!record.failed) continue;
-    fmt::print("  {}: nearest the base: {}; worst: {}: {:.12g} in {}, {:.12g} in {} (sample {})\n",
-               record.name, Describe(record.first_failure, model, base), Describe(record.where, model, base),
-               record.model_value, request.with_engine ? "the model" : FileName(request.files.robot),
-               record.engine_value, request.with_engine ? "MuJoCo" : FileName(request.files.mjcf),
-               static_cast<long>(record.at));
-  }
+  for (const std::string& line : ListDifferences(comparison)) fmt::print("  {}\n", line);
   PrintHypotheses(comparison.hypotheses);
   // Inertias printed with six digits, 1.5708 for pi / 2, a "fullinertia" that the engine diagonalises to
   // 1e-6.
@@ -139,8 +126,8 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
 std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code) {
   const RobotModel& model = *comparison.model;
   const ConsistencyResult& result = comparison.result;
-  Json json = {{"robot", request.files.robot.string()},
-               {"mjcf", request.files.mjcf.string()},
+  Json json = {{"robot", comparison.first.string()},
+               {"mjcf", comparison.second.string()},
                {"mujoco", mj_versionString()},
                {"samples", result.samples},
                {"samples_requested", request.options.samples},
@@ -164,6 +151,31 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
     json["engine_notes"].push_back({{"kind", note.kind}, {"text", note.text}});
   json["hypotheses"] = ListHypotheses(comparison.hypotheses);
   return json.dump(2) + "\n";
+}
+
+std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comparison) {
+  const RobotModel& model = *comparison.model;
+  const ConsistencyResult& result = comparison.result;
+  std::vector<JUnitCase> cases;
+  const auto add = [&](const std::string& group, const CheckRecord& record) {
+    cases.push_back(MakeJUnitCase(group, record, Describe(record.where, model, model.num_base_velocities())));
+  };
+  for (const CheckRecord& record : result.gate.records) add("constant", record);
+  for (const CheckRecord& record : result.terms) add("term", record);
+  // What the engine's model alone has belongs to no check of its own.
+  for (const GateFinding& finding : result.gate.findings) {
+    const bool has_case = std::any_of(cases.begin(), cases.end(),
+                                      [&](const JUnitCase& test) { return test.name == finding.check; });
+    if (!has_case) cases.push_back({"constant", finding.check, finding.where, ""});
+  }
+  std::string likely;
+  for (const Hypothesis& hypothesis : comparison.hypotheses) likely += "\nlikely: " + hypothesis.text;
+  for (JUnitCase& test : cases) {
+    if (!test.failure.empty()) test.failure += likely;
+  }
+  const bool is_whole = result.samples >= request.options.samples || !request.answers.empty();
+  return WriteJUnit("dexcheck.consistency." + comparison.first.stem().string(), cases, result.seconds,
+                    is_whole ? "" : "interrupted");
 }
 
 }  // namespace dexcheck::cli

@@ -10,7 +10,7 @@
 
 #include "harness/checks/consistency.h"
 #include "harness/cli/commands.h"
-#include "harness/sides/hypotheses.h"
+#include "harness/sides/file_comparison.h"
 #include "harness/sides/program_side.h"
 
 namespace dexcheck::cli {
@@ -24,9 +24,9 @@ struct ConsistencyRequest {
   ProgramOptions program_options;
   std::vector<std::string> packages;
   bool floating = false;
-  bool with_engine = true;  ///< files.mjcf is an MJCF; otherwise any other description.
   ConsistencyOptions options;
   std::string json_file;
+  std::string junit_file;
   bool quiet = false;
   int digits = 0;                   ///< 0: not given.
   std::optional<double> tolerance;  ///< Relative, wider than rounding.
@@ -43,23 +43,15 @@ struct ConsistencyRequest {
   [[nodiscard]] bool PrintsJson() const { return json_file == "-"; }
 };
 
-/// What was compared: the model that locations belong to, and the results.
-struct Comparison {
-  std::optional<RobotModel> model;
-  std::vector<std::string> notes;
-  ConsistencyResult result;
-  std::vector<Hypothesis> hypotheses;  ///< Mistakes that would explain what differs.
-};
-
-/// The file's name without its folder.
-std::string FileName(const std::filesystem::path& path);
-
 /// Large results first fail, then where to look: what a person reads.
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison);
 /// Whether the two agree, and if not, in what and why.
 void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison);
 /// The same as JSON.
 std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
+
+/// The same as a JUnit document.
+std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comparison);
 
 /// Their lines, shares and values.
 nlohmann::ordered_json ListHypotheses(const std::vector<Hypothesis>& hypotheses);

@@ -35,7 +35,8 @@ void PrintRemaining(const Request& request, const RobotModel& model, const Diagn
   fmt::print("What remains after these repairs:\n");
   for (const GateFinding& finding : diagnosis.remaining_constants) {
     fmt::print("  {}: {}: {:.10g} in {}, {:.10g} in {}\n", finding.check, finding.where, finding.model,
-               FileName(request.files.robot), finding.engine, FileName(request.files.mjcf));
+               request.files.robot.filename().string(), finding.engine,
+               request.files.mjcf.filename().string());
   }
   for (const CheckRecord& record : diagnosis.remaining_terms) {
     fmt::print("  {}: nearest the base: {}; worst relative error {:.1e}\n", record.name,
@@ -45,13 +46,13 @@ void PrintRemaining(const Request& request, const RobotModel& model, const Diagn
 
 void Print(const Request& request, const RobotModel& model, const Diagnosis& diagnosis,
            const std::vector<Hypothesis>& hypotheses) {
-  const std::string file = FileName(request.files.robot);
+  const std::string file = request.files.robot.filename().string();
   if (diagnosis.agrees) {
     fmt::print("AGREE: nothing to explain: {} and {} agree to rounding at {} random states.\n", file,
-               FileName(request.files.mjcf), request.options.samples);
+               request.files.mjcf.filename().string(), request.options.samples);
     return;
   }
-  fmt::print("DISAGREE: {} against {}.\n", file, FileName(request.files.mjcf));
+  fmt::print("DISAGREE: {} against {}.\n", file, request.files.mjcf.filename().string());
   PrintHypotheses(hypotheses);
   if (diagnosis.causes.empty()) fmt::print("No change of single numbers explains it.\n");
   int number = 0;
@@ -98,7 +99,7 @@ Json ToJson(const Repair& cause, const RobotSpec& spec, const std::string& file)
 
 std::string ToText(const Request& request, const RobotModel& model, const Diagnosis& diagnosis,
                    const std::vector<Hypothesis>& hypotheses) {
-  const std::string file = FileName(request.files.robot);
+  const std::string file = request.files.robot.filename().string();
   Json json = {
       {"robot", request.files.robot.string()}, {"mjcf", request.files.mjcf.string()},
       {"mujoco", mj_versionString()},          {"samples", request.options.samples},

@@ -46,6 +46,7 @@ int Run(int argc, char** argv) {
   AddEvalCommand(app);
   AddImportCommand(app);
   AddStatesCommand(app);
+  AddRefereeCommand(app);
   AddPlanCommand(app);
   AddRunCommand(app, JoinArguments(argc, argv));
   AddBudgetCommand(app);

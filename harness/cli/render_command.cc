@@ -121,10 +121,9 @@ void AddRenderCommand(Command app) {
   command.AddOption("--still", &request->still, "One picture at this time of the run, s").TypeName("T");
   command
       .AddOption("--camera", &request->movie.camera,
-                 "overview, follow, grasp, top, or another of the MJCF's; course stands still "
+                 "overview (the default), follow, grasp, top, or another of the MJCF's; course stands still "
                  "and sees the whole way")
-      .TypeName("NAME")
-      .ShowDefault();
+      .TypeName("NAME");
   command.AddOption("--inset", &request->movie.inset, "A second camera in the lower right corner")
       .TypeName("NAME");
   command.AddOption("--beside", &request->beside, "Another run, shown at the right").TypeName("RUN_DIR");

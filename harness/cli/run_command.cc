@@ -39,6 +39,7 @@ struct Request {
   bool quiet = false;
   bool list = false;
   std::string replay;
+  std::string junit_file;
   std::string controller;  // of the user's own
   double controller_time_limit = 1.0;
   std::string command;  // as typed
@@ -91,6 +92,8 @@ LoopParts MakeParts(const Request& request, const Setup& setup, const std::files
 
 int RunScenario(const Request& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides, request.seed);
+  std::optional<OutputFile> junit;
+  if (!request.junit_file.empty()) junit.emplace(request.junit_file);
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
   Runner runner(setup, !request.no_check, MakeParts(request, setup, files.robot));
@@ -113,6 +116,7 @@ int RunScenario(const Request& request) {
   const std::string summary = MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n";
   if (recorder) recorder->Close(summary);
   if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
+  if (junit) junit->Write(WriteJUnit(setup, runner.loop(), runner.result()));
   const ExitCode verdict = ToExitCode(runner.result());
   std::exception_ptr unprinted;
   try {
@@ -237,6 +241,10 @@ void AddRunCommand(Command app, const std::string& command_line) {
   Option video = command.AddFlag("--video", &request->video, "Draw the run as a video, video.mp4");
   Option no_report =
       command.AddFlag("--no-report", &request->no_report, "Write the log and the summary only");
+  Option junit = command
+                     .AddOption("--junit", &request->junit_file,
+                                "Write each check as a test case of JUnit's XML to this file")
+                     .TypeName("FILE.xml");
   Option no_log = command.AddFlag("--no-log", &request->no_log, "Write no files");
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   controller.Excludes(list);
@@ -244,7 +252,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
   list.Excludes(replay);
   // What would be ignored is refused.
   no_log.Excludes(video).Excludes(out);
-  for (Option option : {out, set, seed, no_check, video, no_report, no_log}) {
+  for (Option option : {out, set, seed, no_check, video, no_report, no_log, junit}) {
     option.Excludes(replay).Excludes(list);
   }
   command.SetAction([=] {

@@ -3,6 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
+#include <vector>
+
+#include "harness/cli/junit_file.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -41,6 +45,16 @@ void PrintTask(const ClosedLoop& loop) {
              task.push(), loop.task()->torque_jump());
 }
 
+void PrintTracking(const Scenario& scenario, const TrackingStatistics& tracking) {
+  if (scenario.joint_motion) {
+    fmt::print("joints: largest error {:.2e} rad (rms {:.2e})\n", tracking.joints_max(),
+               tracking.joints_rms());
+    return;
+  }
+  fmt::print("object: position error {:.2e} m (rms {:.2e}), orientation error {:.2e} rad\n",
+             tracking.position_max(), tracking.position_rms(), tracking.orientation_max());
+}
+
 void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
   const LoopTimes& times = loop.times();
   const double scale = 1e6 / static_cast<double>(std::max(loop.record().step, 1L));
@@ -63,9 +77,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     if (!scenario.imperfections.is_ideal()) {
       for (const std::string& key : scenario.imperfections.asked) fmt::print("asked for: {}\n", key);
     }
-    fmt::print("object: position error {:.2e} m (rms {:.2e}), orientation error {:.2e} rad\n",
-               result.tracking.position_max(), result.tracking.position_rms(),
-               result.tracking.orientation_max());
+    PrintTracking(scenario, result.tracking);
     if (loop.task() != nullptr) PrintTask(loop);
     if (loop.is_checking()) PrintChecks(setup, loop);
     PrintSpeed(loop, result);
@@ -95,6 +107,26 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     fmt::print("  {}: {}: {:.12g} in the model, {:.12g} in the MJCF\n", finding.check, finding.where,
                finding.model, finding.engine);
   }
+}
+
+std::string WriteJUnit(const Setup& setup, const ClosedLoop& loop, const RunResult& result) {
+  std::vector<JUnitCase> cases;
+  if (loop.is_checking()) {
+    for (const CheckRecord& check : setup.gate().records) {
+      cases.push_back(MakeJUnitCase("constant", check, ""));
+    }
+    for (const std::span<const CheckRecord> checks :
+         {loop.checks().model_checks(), loop.checks().motion_checks()}) {
+      for (const CheckRecord& check : checks) {
+        if (check.applies) cases.push_back(MakeJUnitCase(NameOf(check.kind), check, check.part));
+      }
+    }
+  }
+  const bool disagrees = result.verdict == Verdict::kDisagreement;
+  const std::string cause =
+      fmt::format("cause: {} ({})", NameOf(result.attribution.cause), result.attribution.evidence);
+  cases.push_back({"run", "verdict", disagrees ? cause : "", ""});
+  return WriteJUnit("dexcheck.run." + setup.scenario().name, cases, result.wall_seconds, result.failure);
 }
 
 }  // namespace dexcheck::cli

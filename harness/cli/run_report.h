@@ -11,4 +11,7 @@ namespace dexcheck::cli {
 void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result,
                     const std::string& folder, bool quiet);
 
+/// Its checks as a JUnit document; an unfinished run is an error.
+std::string WriteJUnit(const Setup& setup, const ClosedLoop& loop, const RunResult& result);
+
 }  // namespace dexcheck::cli

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <charconv>
-#include <deque>
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -21,10 +19,10 @@
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/slurm_script.h"
 #include "harness/cli/study_files.h"
-#include "harness/engine/machine.h"
+#include "harness/study/study_answer.h"
 #include "harness/study/study_report.h"
+#include "harness/study/study_runner.h"
 #include "harness/study/study_store.h"
-#include "harness/study/trial_pool.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -37,9 +35,6 @@ struct Request {
   bool retry_failed = false;
   bool quiet = false;
 };
-
-/// So often a trial is begun whose process is killed from outside every time.
-constexpr int kMostTries = 3;
 
 /// The trials of one of N shards; "" is all.
 std::vector<Trial> SelectShard(const std::vector<Trial>& trials, const std::string& text) {
@@ -80,92 +75,102 @@ std::string ListNumbers(const std::vector<long>& numbers) {
   return text;
 }
 
-/// Numbers of the trials that have no row.
-std::vector<long> FindMissing(const std::vector<Trial>& trials, const std::vector<TrialRow>& rows) {
-  std::set<long> done;
-  for (const TrialRow& row : rows) done.insert(row.trial.number);
+/// Numbers from 0 to `count` that are not among `done`, which ascends.
+std::vector<long> FindMissing(long count, const std::vector<long>& done) {
   std::vector<long> missing;
-  for (const Trial& trial : trials) {
-    if (done.count(trial.number) == 0) missing.push_back(trial.number);
+  auto next = done.begin();
+  for (long number = 0; number < count; ++number) {
+    while (next != done.end() && *next < number) ++next;
+    if (next == done.end() || *next != number) missing.push_back(number);
   }
   return missing;
 }
 
 void PrintStudy(const Study& study, const std::string& database, const std::vector<TrialRow>& rows) {
-  fmt::print("{}: {} of {} trials in {}\n", study.name, rows.size(), ListTrials(study).size(), database);
+  fmt::print("{}: {} of {}{} trials in {}\n", study.name, rows.size(), study.is_search() ? "at most " : "",
+             CountTrials(study), database);
   PrintOutcomes(rows);
+  for (const std::string& answer : AnswerStudy(study, rows)) fmt::print("{}\n", answer);
 }
 
-/// Makes the trials that are missing.
-void RunMissing(const StudyInputs& inputs, const std::vector<Trial>& trials, const Request& request,
-                StudyStore* store) {
-  std::deque<Trial> waiting;
-  const std::vector<long> missing = FindMissing(trials, store->ReadRows());
-  for (const Trial& trial : trials) {
-    if (std::binary_search(missing.begin(), missing.end(), trial.number)) waiting.push_back(trial);
-  }
-  const long total = static_cast<long>(trials.size());
-  long finished = total - static_cast<long>(waiting.size());
-  std::map<long, int> tries;
-  const std::string machine = DescribeMachine();
-  ProgressBar bar(inputs.study.name, total, request.quiet);
-  const auto jobs =
+RunOptions MakeRunOptions(const Request& request, ProgressBar* bar) {
+  RunOptions options;
+  options.jobs =
       static_cast<int>(request.jobs > 0 ? request.jobs : std::max(std::thread::hardware_concurrency(), 1U));
-  TrialPool pool(jobs, inputs.study.trial_time_limit,
-                 [&](const Trial& trial) { return RunTrial(inputs, trial); });
-  const auto release = [&] {
-    for (const long trial : pool.ListRunning()) store->Release(trial);
-  };
-  try {
-    while (!IsInterrupted() && (!waiting.empty() || !pool.IsEmpty())) {
-      while (!pool.IsFull() && !waiting.empty()) {
-        const Trial trial = waiting.front();
-        waiting.pop_front();
-        if (store->Claim(trial.number)) pool.Start(trial);
-      }
-      auto ended = pool.Wait();
-      if (!ended) continue;
-      const Trial& trial = ended->row.trial;
-      if (ended->killed_from_outside) {
-        // With all others when it is this program that is ended; else once more, when others are done.
-        const bool again = ++tries[trial.number] < kMostTries;
-        if (again || IsInterrupted()) store->Release(trial.number);
-        if (again) waiting.push_back(trial);
-        if (again || IsInterrupted()) continue;
-        ended->row.result.failure += fmt::format(", {} times", kMostTries);
-      }
-      ended->row.machine = machine;
-      store->Add(ended->row);
-      bar.Update(++finished);
-    }
-  } catch (const InputError&) {
-    throw;  // the database takes no more; nothing can be released in it
-  } catch (const Error&) {
-    release();
-    throw;
+  options.is_interrupted = IsInterrupted;
+  options.tell = [bar](long finished) { bar->Update(finished); };
+  return options;
+}
+
+/// Forgets trials that failed; of a search also what followed from them.
+void RemoveFailed(const Study& study, StudyStore* store) {
+  if (!study.is_search()) {
+    store->RemoveFailed(store->ListNumbers());
+    return;
   }
-  release();
+  for (const TrialRow& row : store->ReadRows()) {
+    if (!IsFailed(row.result.outcome)) continue;
+    store->RemoveFrom(row.trial.number);
+    return;
+  }
+}
+
+/// Makes the trials that are missing. @return the numbers of those that still are.
+std::vector<long> MakeTrials(const StudyInputs& inputs, const std::vector<Trial>& trials,
+                             const Request& request, StudyStore* store) {
+  ProgressBar bar(inputs.study.name, static_cast<long>(trials.size()), request.quiet);
+  RunTrials(inputs, trials, MakeRunOptions(request, &bar), store);
+  // From the file that is there now under this name: what another program removed is not done.
+  const std::vector<long> done = StudyStore::Open(request.database).ListNumbers();
+  std::vector<long> missing;
+  for (const Trial& trial : trials) {
+    if (!std::binary_search(done.begin(), done.end(), trial.number)) missing.push_back(trial.number);
+  }
+  return missing;
+}
+
+/// The same for a search, of which only the batch at hand is known.
+std::vector<long> MakeSearch(const StudyInputs& inputs, const Request& request, StudyStore* store) {
+  ProgressBar bar(inputs.study.name, CountTrials(inputs.study), request.quiet);
+  RunSearch(inputs, MakeRunOptions(request, &bar), store);
+  SearchHistory history(inputs.study, FindSearchStart(inputs));
+  for (const TrialRow& row : StudyStore::Open(request.database).ReadRows()) history.Add(row);
+  std::vector<long> missing;
+  for (const Trial& trial : history.ListMissing()) missing.push_back(trial.number);
+  return missing;
 }
 
 int RunStudy(const Request& request) {
   StudyInputs inputs = FindStudy(request.study);
-  const std::vector<Trial> trials = SelectShard(ListTrials(inputs.study), request.shard);
+  const Study& study = inputs.study;
+  if (study.is_search() && !request.shard.empty()) {
+    throw InputError(
+        "--shard: the trials of a search follow from one another; --jobs makes several at a time, and "
+        "several "
+        "processes may work on one database");
+  }
+  const std::vector<Trial> trials =
+      study.is_search() ? std::vector<Trial>() : SelectShard(ListTrials(study), request.shard);
   CheckTrials(&inputs);
-  StudyStore store = StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), inputs.study);
+  const auto makes_same_rows = [&](const std::vector<TrialRow>& rows) {
+    return MakesRowsAgain(inputs, rows);
+  };
+  StudyStore store =
+      StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), study, makes_same_rows);
+  if (!request.quiet && !store.change().empty()) fmt::print("{}: {}\n", request.database, store.change());
   CatchInterrupts();
-  if (request.retry_failed) store.RemoveFailed(trials);
-  RunMissing(inputs, trials, request, &store);
-  // From the file that is there now under this name: what another program removed is not done.
-  const std::vector<TrialRow> rows = StudyStore::Open(request.database).ReadRows();
-  const std::vector<long> missing = FindMissing(trials, rows);
+  if (request.retry_failed) RemoveFailed(study, &store);
+  const std::vector<long> missing =
+      study.is_search() ? MakeSearch(inputs, request, &store) : MakeTrials(inputs, trials, request, &store);
   if (!missing.empty()) {
-    throw Error(fmt::format("{}: {} of {} trials are missing ({}): {}; the same command goes on with them",
-                            request.database, missing.size(), trials.size(),
-                            IsInterrupted() ? "interrupted" : "another process has them",
-                            ListNumbers(missing)));
+    throw Error(fmt::format(
+        "{}: {} of {} trials are missing ({}): {}; the same command goes on with them", request.database,
+        missing.size(), study.is_search() ? CountTrials(study) : static_cast<long>(trials.size()),
+        IsInterrupted() ? "interrupted" : "another process has them", ListNumbers(missing)));
   }
   if (request.quiet) return kSuccess;
-  PrintStudy(inputs.study, request.database, rows);
+  const std::vector<TrialRow> rows = StudyStore::Open(request.database).ReadRows();
+  PrintStudy(study, request.database, rows);
   if (std::any_of(rows.begin(), rows.end(),
                   [](const TrialRow& row) { return IsFailed(row.result.outcome); })) {
     fmt::print("Trials that crashed or timed out are made again with --retry-failed.\n");
@@ -202,11 +207,15 @@ int MergeStudies(const std::string& out, const std::vector<std::string>& databas
   }
   const std::vector<TrialRow> all = AddToDatabase(out, first, sources);
   if (!quiet) PrintStudy(first.study(), out, all);
-  const std::vector<Trial> trials = ListTrials(first.study());
-  const std::vector<long> missing = FindMissing(trials, all);
+  if (first.study().is_search()) return kSuccess;
+  const long count = CountTrials(first.study());
+  std::vector<long> done;
+  done.reserve(all.size());
+  for (const TrialRow& row : all) done.push_back(row.trial.number);
+  const std::vector<long> missing = FindMissing(count, done);
   if (missing.empty()) return kSuccess;
   throw Error(fmt::format("{}: {} of {} trials are missing: {}; merge again when they are done", out,
-                          missing.size(), trials.size(), ListNumbers(missing)));
+                          missing.size(), count, ListNumbers(missing)));
 }
 
 }  // namespace
@@ -277,6 +286,11 @@ void AddStudyCommand(Command app) {
       .Check(CheckSlurmMemory);
   slurm.SetAction([=] {
     StudyInputs inputs = FindStudy(request->study);
+    if (inputs.study.is_search()) {
+      throw InputError(inputs.study.source +
+                       ": search: the trials of a search follow from one another, an array job makes "
+                       "parts that do not; run it on one node with --jobs");
+    }
     CheckTrials(&inputs);  // what study run would refuse, must not be queued
     fmt::print("{}", MakeSlurmScript(inputs, request->study, *job));
     return kSuccess;

@@ -6,6 +6,7 @@ configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/dexcheckConfig.cmake.in
   ${PROJECT_BINARY_DIR}/dexcheckConfig.cmake INSTALL_DESTINATION ${package_folder})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/dexcheckConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/dexcheckConfig.cmake ${PROJECT_BINARY_DIR}/dexcheckConfigVersion.cmake
+  ${CMAKE_CURRENT_LIST_DIR}/dexcheckConsistencyTest.cmake
   DESTINATION ${package_folder} COMPONENT development)
 install(EXPORT dexcheckController NAMESPACE dexcheck:: DESTINATION ${package_folder} COMPONENT development)
 if(DEXCHECK_BUILD_HARNESS)
@@ -38,5 +39,13 @@ if(DEXCHECK_BUILD_RENDERS)
   # Which libraries the program needs is read from it; what it runs and reads besides is this.
   set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "gnuplot-nox, fonts-dejavu-core")
+endif()
+if(DEXCHECK_ENGINES)
+  list(APPEND CPACK_COMPONENTS_ALL engines)
+  set(CPACK_DEBIAN_ENGINES_PACKAGE_NAME dexcheck-engines)
+  set(CPACK_DEBIAN_ENGINES_PACKAGE_SECTION science)
+  set(CPACK_COMPONENT_ENGINES_DESCRIPTION "physics engines that dexcheck referee asks")
+  set(CPACK_DEBIAN_ENGINES_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_DEBIAN_ENGINES_PACKAGE_SUGGESTS "nodejs")
 endif()
 include(CPack)

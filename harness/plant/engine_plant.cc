@@ -35,10 +35,12 @@ void EnginePlant::Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) {
   state.qvel.setZero();
   state.qacc_warmstart.setZero();
   adapter_->SetPositions(q, state.qpos.data());
-  const Eigen::Quaterniond rotation(X_Bo.linear());
-  const int joint = m.body_jntadr[adapter_->object_body()];
-  state.qpos.segment<7>(m.jnt_qposadr[joint]) << X_Bo.translation(), rotation.w(), rotation.x(), rotation.y(),
-      rotation.z();
+  if (adapter_->object_body() >= 0) {
+    const Eigen::Quaterniond rotation(X_Bo.linear());
+    const int joint = m.body_jntadr[adapter_->object_body()];
+    state.qpos.segment<7>(m.jnt_qposadr[joint]) << X_Bo.translation(), rotation.w(), rotation.x(),
+        rotation.y(), rotation.z();
+  }
   simulation_.SetState(state);
 }
 

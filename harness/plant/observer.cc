@@ -139,15 +139,16 @@ void Observer::ReadState(const mjData& data, MeasuredState* state) {
   const std::vector<int>& dofs = adapter_->joint_dofs();
   for (size_t i = 0; i < dofs.size(); ++i) state->xi[base + static_cast<int>(i)] = data.qvel[dofs[i]];
 
-  const int body = adapter_->object_body();
-  const mjModel& m = adapter_->engine();
-  const int joint = m.body_jntadr[body];
-  const mjtNum* const pose = data.qpos + m.jnt_qposadr[joint];
-  const mjtNum* const rate = data.qvel + m.jnt_dofadr[joint];
-  state->X_Bo.linear() =
-      Eigen::Quaterniond(pose[3], pose[4], pose[5], pose[6]).normalized().toRotationMatrix();
-  state->X_Bo.translation() = MapVector(pose);
-  state->V_Bo << state->X_Bo.linear().transpose() * MapVector(rate), MapVector(rate + 3);
+  if (const int body = adapter_->object_body(); body >= 0) {
+    const mjModel& m = adapter_->engine();
+    const int joint = m.body_jntadr[body];
+    const mjtNum* const pose = data.qpos + m.jnt_qposadr[joint];
+    const mjtNum* const rate = data.qvel + m.jnt_dofadr[joint];
+    state->X_Bo.linear() =
+        Eigen::Quaterniond(pose[3], pose[4], pose[5], pose[6]).normalized().toRotationMatrix();
+    state->X_Bo.translation() = MapVector(pose);
+    state->V_Bo << state->X_Bo.linear().transpose() * MapVector(rate), MapVector(rate + 3);
+  }
 
   q_ = state->q;
   xi_ = state->xi;
@@ -206,6 +207,7 @@ void Observer::ReadAccelerations(const mjModel& m, const mjData& d, PlantRespons
   const std::vector<int>& dofs = adapter_->joint_dofs();
   for (size_t i = 0; i < dofs.size(); ++i) xi_dot[base + static_cast<int>(i)] = d.qacc[dofs[i]];
 
+  if (adapter_->object_body() < 0) return;
   const int joint = m.body_jntadr[adapter_->object_body()];
   const mjtNum* const rate = d.qacc + m.jnt_dofadr[joint];
   // v = R^T p_dot, hence v_dot = R^T p_ddot - omega x v
@@ -292,10 +294,11 @@ void Observer::ReadSolverResidual(const mjModel& m, const mjData& d, PlantRespon
   mj_mulM(&m, &d, M_qacc_.data(), d.qacc);
   // Not qfrc_constraint, which the engine makes fit. The call uses the data's scratch space alone.
   mj_mulJacTVec(&m, const_cast<mjData*>(&d), constraint_force_.data(), d.efc_force);
-  const int dof = m.jnt_dofadr[m.body_jntadr[adapter_->object_body()]];
   departure_ = M_qacc_ - Eigen::Map<const VectorXd>(d.qfrc_smooth, m.nv) - constraint_force_;
   response->solver_force.resize(response->xi_dot.size());
   map_.ProjectForce(departure_.data(), response->solver_force);
+  if (adapter_->object_body() < 0) return;
+  const int dof = m.jnt_dofadr[m.body_jntadr[adapter_->object_body()]];
   // The free joint's forces: in the world, then about the body's axes.
   response->solver_residual << X_Bo_.linear().transpose() * departure_.segment<3>(dof),
       departure_.segment<3>(dof + 3);

@@ -17,7 +17,8 @@ namespace dexcheck {
 /// after construction, once the values that are read into have their sizes.
 class Observer {
  public:
-  /// @param fingertips frames of the grasp. @param surface of the object; outlives this.
+  /// @param fingertips frames of the grasp, if any. @param surface of the object; outlives this.
+  /// Without an object its pose is the identity, at rest.
   /// @throws InputError when a fingertip or the object has no geom that touches.
   Observer(const Adapter& adapter, std::span<const int> fingertips, const Surface& surface);
 

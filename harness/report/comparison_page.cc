@@ -136,6 +136,7 @@ class Page {
   std::vector<Figure> MakeFigures() const {
     std::vector<Figure> figures;
     AddOverlay("object/position_error", 0, "position error of the object", "m", /*log=*/true, &figures);
+    AddOverlay("joints/largest_error", 0, "largest error of a joint", "rad", /*log=*/true, &figures);
     std::vector<std::string> drawn;
     for (const SignalDifference& signal : comparison_.signals) {
       if (drawn.size() == kMostPlots || signal.share() < kLeastShare) break;

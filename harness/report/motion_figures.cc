@@ -17,6 +17,7 @@ class MotionFigures {
 
   std::vector<Figure> Make() {
     AddObject();
+    AddJoints();
     AddPlatform();
     AddTorques();
     AddForces();
@@ -62,6 +63,31 @@ class MotionFigures {
       b.curves.push_back({std::string(names[k]) + " desired", X_d.col(k), k - 1, 2, k >= 3});
     }
     Add(b);
+  }
+
+  /// Of a robot that holds nothing: where its joints are, should be, and how far they are from there.
+  void AddJoints() {
+    const SignalInfo* const desired = run_.Find("joints/q_d");
+    const SignalInfo* const error = run_.Find("joints/error");
+    const SignalInfo* const actual = run_.Find("q");
+    if (desired == nullptr || error == nullptr || actual == nullptr) return;
+    if (desired->width != actual->width || error->width != actual->width) return;
+    const RowMatrixXd q = run_.log().ReadSignal("q");
+    const RowMatrixXd q_d = run_.log().ReadSignal("joints/q_d");
+    const RowMatrixXd e = run_.log().ReadSignal("joints/error");
+    Figure motion{"joints", "",   "Motion of the joints", "position (rad, m)", "", false, kLeastSpan, {}, {},
+                  "",       false};
+    Figure errors{"joint_errors", "", "Errors of the joints", "error (rad, m)", "", true, 0.0, {}, {}, "",
+                  false};
+    for (int k = 0; k < desired->width; ++k) {
+      motion.curves.push_back({RunData::NameColumn(*desired, k), q.col(k), k, 0, false});
+      errors.curves.push_back({RunData::NameColumn(*desired, k), e.col(k).cwiseAbs(), k, 0, false});
+    }
+    for (int k = 0; k < desired->width; ++k) {
+      motion.curves.push_back({RunData::NameColumn(*desired, k) + " desired", q_d.col(k), k, 1, false});
+    }
+    Add(motion);
+    Add(errors);
   }
 
   void AddPlatform() {

@@ -201,8 +201,12 @@ class Page {
       const double value = FindNumber(summary, "tracking", key);
       return std::isfinite(value) ? FormatShort(value) + unit : std::string("–");
     };
-    AddTile(tracking("position_error_max_m", " m"), "largest position error of the object");
-    AddTile(tracking("orientation_error_max_rad", " rad"), "largest orientation error");
+    if (std::isfinite(FindNumber(summary, "tracking", "joint_error_max_rad"))) {
+      AddTile(tracking("joint_error_max_rad", " rad"), "largest error of a joint");
+    } else {
+      AddTile(tracking("position_error_max_m", " m"), "largest position error of the object");
+      AddTile(tracking("orientation_error_max_rad", " rad"), "largest orientation error");
+    }
     const double simulated =
         summary.is_null() ? run_.time()[run_.time().size() - 1] : summary.value("simulated_s", 0.0);
     AddTile(fmt::format("{:.4g} s", simulated),

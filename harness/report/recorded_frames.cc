@@ -48,6 +48,7 @@ class FramesReader {
     }
     run.position_errors = ReadSeries("object/position_error");
     run.orientation_errors = ReadSeries("object/orientation_error");
+    run.joint_errors = ReadSeries("joints/largest_error");
     run.contact_positions = ReadMatrix("contact/position");
     run.contact_forces = ReadMatrix(kForces);
     run.contact_normals = ReadMatrix("contact/normal");

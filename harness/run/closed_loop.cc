@@ -42,7 +42,7 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
   record_.model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);
-  if (scenario.task) return;
+  if (!scenario.trajectory) return;
   trajectory_ = scenario.trajectory(setup.X_start() + scenario.start_error);
   if (scenario.start == Start::kMoving) CheckMovingStart();
 }

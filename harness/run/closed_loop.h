@@ -94,7 +94,7 @@ class ClosedLoop {
   MotorDrive drive_;
   Disturbances disturbances_;
   std::optional<CrossCheck> checks_;
-  std::unique_ptr<Trajectory> trajectory_;  // null for a task
+  std::unique_ptr<Trajectory> trajectory_;  // null for a task or a motion of joints
   StepRecord record_;
   long num_steps_ = 0;
   bool is_running_ = false;  // all has settled

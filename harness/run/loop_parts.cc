@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "controller/common/toml_reader.h"
+#include "controller/control/joint_controller.h"
 #include "controller/control/trajectory_controller.h"
 #include "harness/plant/engine_plant.h"
 #include "harness/plant/rigid_plant.h"
@@ -63,6 +64,12 @@ std::unique_ptr<Controller> MakeTrajectoryController(const Setup& setup) {
                                                 MakeSampling(setup));
 }
 
+std::unique_ptr<Controller> MakeJointController(const Setup& setup) {
+  return std::make_unique<JointController>(setup.model(), setup.object().body, setup.surface(),
+                                           setup.scenario().control.law, setup.joint_gains(),
+                                           *setup.joint_motion(), MakeSampling(setup));
+}
+
 std::unique_ptr<PickAndPlaceController> MakeTaskController(const Setup& setup) {
   const Scenario& scenario = setup.scenario();
   return std::make_unique<PickAndPlaceController>(
@@ -79,6 +86,8 @@ LoopParts MakeLoopParts(const Setup& setup) {
     std::unique_ptr<PickAndPlaceController> task = MakeTaskController(setup);
     parts.task = task.get();
     parts.controller = std::move(task);
+  } else if (setup.joint_motion() != nullptr) {
+    parts.controller = MakeJointController(setup);
   } else {
     parts.controller = MakeTrajectoryController(setup);
   }
@@ -95,6 +104,10 @@ LoopParts MakeLoopParts(const Setup& setup, const std::string& what, const std::
                         double time_limit) {
   const Scenario& scenario = setup.scenario();
   if (scenario.task) throw InputError(scenario.source + ": task: is done by no other controller");
+  if (scenario.joint_motion) {
+    throw InputError(scenario.source +
+                     ": joint_motion: is followed by no other controller, which are told of an object");
+  }
   LoopParts parts = MakeLoopParts(setup);
   parts.controller = MakeOwnController(
       what, OwnControllerSetup{&setup.model(), setup.fingertips(), setup.object().body, &setup.surface(),

@@ -43,7 +43,8 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
   log_.SetText("seed", std::to_string(scenario.seed));
   log_.SetText("robot", inputs.robot.filename().string());
   log_.SetText("mjcf", inputs.mjcf.filename().string());
-  log_.SetText("object_body", NameOf(setup.engine(), mjOBJ_BODY, setup.adapter().object_body()));
+  const int object = setup.adapter().object_body();
+  log_.SetText("object_body", object >= 0 ? NameOf(setup.engine(), mjOBJ_BODY, object) : "");
   log_.SetText("mujoco_version", mj_versionString());
   log_.SetText("dexcheck_version", Version());
   log_.SetText("machine", DescribeMachine());
@@ -53,8 +54,12 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
     log_.EmbedFile("inputs", "mjcf/" + file, ReadBytes(inputs.mjcf.parent_path() / file));
   }
   AddStateSignals();
-  AddObjectSignals();
-  AddContactSignals();
+  if (setup.joint_motion() != nullptr) {
+    AddJointSignals();
+  } else {
+    AddObjectSignals();
+    AddContactSignals();
+  }
   if (loop.task() != nullptr) AddTaskSignals();
   if (checks_ != nullptr) AddCheckSignals();
   log_.StartRows();
@@ -111,6 +116,20 @@ void RunRecorder::AddStateSignals() {
       [](const StepRecord& step, std::span<double> row) { Copy(step.response.xi_dot, row); });
   Add({"model/xi_dot", "m/s^2, rad/s^2", "reduced acceleration that (46), (48) predict", n, xi_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.findings.xi_dot_model, row); });
+}
+
+void RunRecorder::AddJointSignals() {
+  const RobotModel& model = setup_->model();
+  const int n = model.num_joints();
+  std::vector<std::string> names;
+  for (const Joint& joint : model.joints()) names.push_back(joint.name);
+  Add({"joints/q_d", "rad, m", "desired positions of the joints", n, names, {}},
+      [](const StepRecord& step, std::span<double> row) { Copy(step.command.joints.q, row); });
+  Add({"joints/error", "rad, m", "q_d - q", n, names, {}}, [](const StepRecord& step, std::span<double> row) {
+    Copy(step.command.joints.q - step.reading.state.q, row);
+  });
+  Add({"joints/largest_error", "rad, m", "largest of joints/error", 1, {}, {}},
+      [](const StepRecord& step, std::span<double> row) { row[0] = step.error.joints; });
 }
 
 void RunRecorder::AddObjectSignals() {

@@ -36,6 +36,7 @@ class RunRecorder {
   using Source = std::function<void(const StepRecord& step, std::span<double> row)>;
   void Add(const SignalInfo& signal, Source source);
   void AddStateSignals();
+  void AddJointSignals();
   void AddObjectSignals();
   void AddContactSignals();
   void AddTaskSignals();

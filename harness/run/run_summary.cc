@@ -33,6 +33,14 @@ Json ConstantToJson(const CheckRecord& record) {
           {"pass", !record.failed}};
 }
 
+/// Of the object.
+Json TrackingToJson(const TrackingStatistics& tracking) {
+  return {{"position_error_max_m", tracking.position_max()},
+          {"position_error_rms_m", tracking.position_rms()},
+          {"orientation_error_max_rad", tracking.orientation_max()},
+          {"orientation_error_rms_rad", tracking.orientation_rms()}};
+}
+
 Json TaskToJson(const ClosedLoop& loop) {
   const PickAndPlace& task = loop.task()->task();
   Json json = {{"done", task.is_done()},
@@ -63,11 +71,14 @@ void TrackingStatistics::Add(const TrackingError& error) {
   position_squares_ += error.position.squaredNorm();
   orientation_max_ = std::max(orientation_max_, error.orientation);
   orientation_squares_ += error.orientation * error.orientation;
+  joints_max_ = std::max(joints_max_, error.joints);
+  joints_squares_ += error.joints * error.joints;
   ++count_;
 }
 
 double TrackingStatistics::position_rms() const { return Rms(position_squares_, count_); }
 double TrackingStatistics::orientation_rms() const { return Rms(orientation_squares_, count_); }
+double TrackingStatistics::joints_rms() const { return Rms(joints_squares_, count_); }
 
 void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   if (loop.is_checking()) {
@@ -86,10 +97,12 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
                {"interrupted", result.interrupted}, {"seed", scenario.seed},
                {"overrides", scenario.overrides},   {"duration_s", scenario.duration},
                {"simulated_s", loop.time()},        {"time_step_s", scenario.plant.time_step}};
-  json["tracking"] = {{"position_error_max_m", result.tracking.position_max()},
-                      {"position_error_rms_m", result.tracking.position_rms()},
-                      {"orientation_error_max_rad", result.tracking.orientation_max()},
-                      {"orientation_error_rms_rad", result.tracking.orientation_rms()}};
+  if (scenario.joint_motion) {
+    json["tracking"] = {{"joint_error_max_rad", result.tracking.joints_max()},
+                        {"joint_error_rms_rad", result.tracking.joints_rms()}};
+  } else {
+    json["tracking"] = TrackingToJson(result.tracking);
+  }
   if (loop.task() != nullptr) json["task"] = TaskToJson(loop);
   if (!scenario.imperfections.is_ideal()) json["plant_asked_for"] = scenario.imperfections.asked;
   json["attribution"] = {{"cause", NameOf(result.attribution.cause)},

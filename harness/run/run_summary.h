@@ -24,12 +24,17 @@ class TrackingStatistics {
   [[nodiscard]] double position_rms() const;
   [[nodiscard]] double orientation_max() const { return orientation_max_; }
   [[nodiscard]] double orientation_rms() const;
+  /// Of the joint that is farthest from where it should be.
+  [[nodiscard]] double joints_max() const { return joints_max_; }
+  [[nodiscard]] double joints_rms() const;
 
  private:
   double position_max_ = 0.0;
   double position_squares_ = 0.0;
   double orientation_max_ = 0.0;
   double orientation_squares_ = 0.0;
+  double joints_max_ = 0.0;
+  double joints_squares_ = 0.0;
   long count_ = 0;
 };
 

@@ -41,7 +41,8 @@ class Runner {
       }
       Guard([&] { loop_.Step(); }, /*settling=*/false);
       if (loop_.record().step == 0) break;
-      if (loop_.record().command.tracks) result_.tracking.Add(loop_.record().error);
+      const Command& command = loop_.record().command;
+      if (command.tracks || command.joints.q.size() > 0) result_.tracking.Add(loop_.record().error);
       const Clock::time_point recording = Clock::now();
       after_step(loop_.record());
       result_.recording_seconds += SecondsSince(recording);

@@ -7,6 +7,7 @@
 #include "controller/common/errors.h"
 #include "controller/object/euler_zyz.h"
 #include "harness/scenario/scenario_imperfections.h"
+#include "harness/scenario/scenario_joints.h"
 
 namespace dexcheck {
 namespace {
@@ -261,8 +262,26 @@ void ReadExpectation(const TomlValue& value, Expectation* expect) {
   if (const auto [orientation, unit] = table.FindWithAngleUnit("orientation"); orientation) {
     expect->orientation = unit * orientation->AsPositive();
   }
+  if (const auto [joints, unit] = table.FindWithAngleUnit("joints"); joints) {
+    expect->joints = unit * joints->AsPositive();
+  }
   expect->from = ReadOr(table, "from", 0.0, &TomlValue::AsNotNegative);
   table.RejectUnused();
+}
+
+/// @throws InputError when more is expected than the run has: of an object, or of joints.
+void RequireExpectation(const Scenario& scenario) {
+  const Expectation& expect = scenario.expect;
+  const auto reject = [&](bool given, const char* key, const char* what) {
+    if (given)
+      throw InputError(scenario.source + ": expect." + key + ": no motion of " + what + " is followed");
+  };
+  if (scenario.joint_motion) {
+    reject(expect.position.has_value(), "position", "an object");
+    reject(expect.orientation.has_value(), "orientation", "an object");
+  } else {
+    reject(expect.joints.has_value(), "joints", "joints");
+  }
 }
 
 }  // namespace
@@ -277,8 +296,8 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   const TomlDocument document = OpenDocument(text, source, overrides, &model_overrides);
   TomlTable root = document.Open();
   root.RejectOthersThan({"name", "description", "duration", "settle", "start", "start_error", "model",
-                         "plant", "grasp", "task", "trajectory", "control", "sensing", "actuation",
-                         "disturbance", "mismatch", "bounds", "expect"});
+                         "plant", "grasp", "task", "trajectory", "joint_motion", "control", "sensing",
+                         "actuation", "disturbance", "mismatch", "bounds", "expect"});
   scenario.name = root.Get("name").AsName();
   if (const auto description = root.Find("description")) scenario.description = description->AsText();
   scenario.duration = root.Get("duration").AsPositive();
@@ -297,8 +316,15 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   if (const auto plant = root.Find("plant")) ReadPlant(*plant, folder, &scenario);
   root.RejectTogether("task", {"trajectory", "start_error"});
   if (const auto task = root.Find("task")) ReadTask(*task, &scenario);
-  ReadGrasp(root.Get("grasp"), scenario.task.has_value(), &scenario);
-  ReadControl(root.Get("control"), &scenario);
+  root.RejectTogether("joint_motion", {"grasp", "task", "trajectory", "start_error"});
+  if (const auto motion = root.Find("joint_motion")) {
+    scenario.joint_motion = ReadJointMotion(*motion);
+    ReadJointControl(root.Get("control"), &scenario);
+    RequireJointMotion(scenario);
+  } else {
+    ReadGrasp(root.Get("grasp"), scenario.task.has_value(), &scenario);
+    ReadControl(root.Get("control"), &scenario);
+  }
   if (scenario.task) FinishTask(&scenario);
   scenario.imperfections = ReadImperfections(&root, scenario.plant.time_step);
   if (scenario.plant.type == PlantType::kRigid && !scenario.imperfections.disturbances.empty()) {
@@ -310,6 +336,7 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
     }
   }
   if (const auto expect = root.Find("expect")) ReadExpectation(*expect, &scenario.expect);
+  RequireExpectation(scenario);
   if (scenario.duration < scenario.plant.time_step)
     root.Get("duration").Fail("must be at least one time step");
   if (scenario.duration / scenario.plant.time_step > kMaxSteps) {
@@ -319,7 +346,7 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
     if (const auto settle = root.Find("settle")) settle->Fail("must be at most 1e8 time steps");
     root.Get("plant").AsTable().Get("time_step").Fail("is too small to settle in 1e8 time steps");
   }
-  if (scenario.task) return scenario;
+  if (scenario.task || scenario.joint_motion) return scenario;
   TomlTable trajectory = root.Get("trajectory").AsTable();
   scenario.trajectory = ReadTrajectory(trajectory);
   return scenario;

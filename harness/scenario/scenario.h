@@ -91,10 +91,43 @@ struct TaskOptions {
   PickAndPlaceOptions pick_and_place;
 };
 
+/// A number for each of several joints, as the file has it.
+struct JointNumbers {
+  std::vector<std::pair<std::string, double>> by_name;  ///< rad or m.
+  bool in_degrees = false;                              ///< As the file wrote them; they are in rad here.
+  std::string key;                                      ///< For messages.
+};
+
+/// The joints of a robot that holds nothing follow a motion of their own.
+struct JointMotionOptions {
+  struct Point {
+    double time = 0.0;   ///< s.
+    JointNumbers where;  ///< Joints that it does not name stay where the point before has them.
+  };
+  struct Oscillation {
+    std::string joint;
+    double amplitude = 0.0;  ///< rad or m.
+    bool in_degrees = false;
+    double frequency = 0.0;  ///< 1/s.
+    double ramp_time = 0.0;  ///< s.
+    std::string key;
+  };
+  JointNumbers start;  ///< Others begin at 0.
+  std::vector<Point> points;
+  std::vector<Oscillation> oscillations;
+};
+
+/// Gains of a law for joints: by joint, or for all.
+struct JointControlOptions {
+  ByName natural_frequency, damping_ratio;  ///< rad/s and 1.
+  ByName stiffness, damping;                ///< N m/rad and N m s/rad; without a key, as the gains above.
+};
+
 /// How well the object must follow, which belongs to what the scenario means. From `from` on, s.
 struct Expectation {
   std::optional<double> position;     ///< Largest position error, m.
   std::optional<double> orientation;  ///< Largest orientation error, rad.
+  std::optional<double> joints;       ///< Largest error of a joint, rad or m.
   double from = 0.0;
 };
 
@@ -115,8 +148,10 @@ struct Scenario {
   std::string mjcf_file;                     ///< Empty for the shipped one.
   PlantOptions plant;
   GraspOptions grasp;
-  TrajectoryMaker trajectory;       ///< None for a task.
+  TrajectoryMaker trajectory;       ///< None for a task or a motion of joints.
   std::optional<TaskOptions> task;  ///< Instead of a trajectory; the grasp's contacts are then planned.
+  std::optional<JointMotionOptions> joint_motion;  ///< Instead of both, and of a grasp.
+  JointControlOptions joint_control;               ///< Gains of its law.
   ControlOptions control;
   Imperfections imperfections;
   std::vector<BoundOverride> bounds;

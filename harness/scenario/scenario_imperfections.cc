@@ -28,20 +28,6 @@ void ReadFlag(TomlTable& table, std::string_view key, bool* target) {
   if (const auto value = table.Find(key)) *target = value->AsFlag();
 }
 
-/// A number, or a table of numbers by name.
-void ReadByName(TomlTable& table, const std::string& key, Read read, ByName* target) {
-  const auto value = table.Find(key);
-  if (!value) return;
-  target->key = value->path();
-  if (!value->IsTable()) {
-    target->all = ((*value).*read)();
-    return;
-  }
-  for (const auto& [name, entry] : value->AsTable().GetEntries()) {
-    target->groups.emplace_back(name, (entry.*read)());
-  }
-}
-
 /// A time of at most kMaxDelaySteps steps.
 void ReadDelay(TomlTable& table, std::string_view key, double time_step, bool whole, double* target) {
   const auto value = table.Find(key);
@@ -202,6 +188,19 @@ void ListKeys(const TomlValue& value, std::vector<std::string>* asked) {
 }
 
 }  // namespace
+
+void ReadByName(TomlTable& table, const std::string& key, double (TomlValue::*read)() const, ByName* target) {
+  const auto value = table.Find(key);
+  if (!value) return;
+  target->key = value->path();
+  if (!value->IsTable()) {
+    target->all = ((*value).*read)();
+    return;
+  }
+  for (const auto& [name, entry] : value->AsTable().GetEntries()) {
+    target->groups.emplace_back(name, (entry.*read)());
+  }
+}
 
 Imperfections ReadImperfections(TomlTable* root, double time_step) {
   Imperfections all;

@@ -8,6 +8,7 @@
 #include "controller/common/text.h"
 #include "controller/contact/find_contact.h"
 #include "controller/contact/object_surface.h"
+#include "controller/contact/shapes.h"
 #include "controller/model/parameter_reader.h"
 #include "controller/object/euler_zyz.h"
 #include "harness/engine/remove_looks.h"
@@ -71,18 +72,25 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
   if (model_.base().type == BaseType::kFloating) {
     throw InputError(robot + ": base.type: must not be \"floating\" in a run, whose law drives the base");
   }
-  if (!model_.object()) throw InputError(robot + ": object: is missing, and the scenario holds one");
+  if (!model_.object() && !scenario_.joint_motion) {
+    throw InputError(robot + ": object: is missing, and the scenario holds one");
+  }
   RemoveLooks(engine_.get());
   adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
   gate_ = RunStaticGate(*adapter_);
   ApplyPlantOptions();
   try {
-    surface_ = MakeSurface(model_.object()->shape);
+    // What holds nothing needs no surface.
+    surface_ = scenario_.joint_motion ? std::make_unique<Sphere>(1.0) : MakeSurface(model_.object()->shape);
   } catch (const std::invalid_argument& error) {
     throw InputError(robot + ": " + error.what());
   }
   FindFingertips();
-  FindGrasp();
+  if (scenario_.joint_motion) {
+    PlaceJoints();
+  } else {
+    FindGrasp();
+  }
   if (scenario_.plant.bonded) MakeBonds();
   if (!scenario_.imperfections.mismatch.is_none()) MakeMismatch(mjcf.string());
 }
@@ -146,7 +154,7 @@ void Setup::FindFingertips() {
     }
   }
   for (int i = 0; i < model_.num_joints(); ++i) {
-    if (users[static_cast<size_t>(i)] == 0) idle_joints_.push_back(i);
+    if (users[static_cast<size_t>(i)] == 0 && !scenario_.joint_motion) idle_joints_.push_back(i);
     if (users[static_cast<size_t>(i)] > 1) arm_joints_.push_back(i);
   }
 }
@@ -304,7 +312,7 @@ GraspControllerOptions Setup::MakeControllerOptions() const {
   options.mu = control.mu;
   options.f_min = control.f_min;
   options.f_max = control.f_max;
-  if (HasStiffness(control.law)) options.stiffness = FindStiffness(options);
+  if (HasStiffness(control.law) && !scenario_.joint_motion) options.stiffness = FindStiffness(options);
   return options;
 }
 

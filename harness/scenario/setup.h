@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "controller/control/grasp_controller.h"
+#include "controller/control/joint_law.h"
 #include "controller/control/trajectory.h"
 #include "controller/grasp/contact_plan.h"
 #include "controller/grasp/finger_placement.h"
@@ -52,9 +53,15 @@ class Setup {
   }
   /// What the two descriptions disagree on before anything moves, the scenario's changes to the plant aside.
   [[nodiscard]] const GateResult& gate() const { return gate_; }
-  [[nodiscard]] const ObjectModel& object() const { return *model_.object(); }
+  /// Whether there is one; otherwise object() stands for it where terms of one are evaluated.
+  [[nodiscard]] bool has_object() const { return model_.object().has_value(); }
+  [[nodiscard]] const ObjectModel& object() const { return model_.object() ? *model_.object() : no_object_; }
+  /// That of known_model().
+  [[nodiscard]] const ObjectModel& known_object() const {
+    return has_object() ? *known_model().object() : no_object_;
+  }
   [[nodiscard]] const Surface& surface() const { return *surface_; }
-  /// Frames of the grasp.
+  /// Frames of the grasp; none for a robot that holds nothing.
   [[nodiscard]] const std::vector<int>& fingertips() const { return fingertips_; }
   /// Joints that lie on no chain from the base to a fingertip of the grasp: they should stay still.
   [[nodiscard]] const std::vector<int>& idle_joints() const { return idle_joints_; }
@@ -79,6 +86,9 @@ class Setup {
   [[nodiscard]] PartContext MakePartContext() const;
   /// Options of the law, with the posture and the angles' branch of the start.
   [[nodiscard]] GraspControllerOptions MakeControllerOptions() const;
+  /// The motion of the joints that the scenario asks for, and its law's gains; null, and none.
+  [[nodiscard]] const JointMotion* joint_motion() const { return joint_motion_ ? &*joint_motion_ : nullptr; }
+  [[nodiscard]] const JointGains& joint_gains() const { return joint_gains_; }
 
  private:
   void ApplyPlantOptions();
@@ -88,6 +98,13 @@ class Setup {
   [[nodiscard]] int FindGraspFrame() const;
   /// The grasp as given, or varied at random until the fingertips reach their contacts.
   void FindGrasp();
+  /// Start, way points and gains of a scenario that moves joints.
+  void PlaceJoints();
+  void FindJointGains();
+  /// Writes numbers by joint into q (joints alone). @throws InputError that names the key.
+  void SetJoints(const JointNumbers& numbers, VectorXd* q) const;
+  [[nodiscard]] int FindJointOf(const std::string& key, const std::string& name, bool in_degrees) const;
+  void RequireInRange(const std::string& key, const VectorXd& q) const;
   void VaryGrasp(std::mt19937_64* random);
   FingerPlacement SolveGrasp();
   void MakeBonds();
@@ -112,6 +129,11 @@ class Setup {
   std::vector<Bond> bonds_;
   std::vector<int> bond_constraints_;
   std::vector<ContactCoordinates> kappa_start_;
+  /// What the terms of an object are evaluated of where there is none: numbers that nobody reads.
+  ObjectModel no_object_{
+      .name = "", .shape = SolidSphere{1.0}, .body = {1.0, Vector3d::Zero(), Matrix3d::Identity()}};
+  std::optional<JointMotion> joint_motion_;
+  JointGains joint_gains_;
   VectorXd q_start_;
   Pose X_Bo_start_ = Pose::Identity();
   Vector6d X_start_ = Vector6d::Zero();

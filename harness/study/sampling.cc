@@ -1,54 +1,33 @@
 #include "harness/study/sampling.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
+#include <boost/random/sobol.hpp>
+#include <limits>
 #include <numeric>
 #include <random>
 
 #include "controller/common/errors.h"
+#include "harness/study/sensitivity.h"
 
 namespace dexcheck {
 namespace {
 
-constexpr int kSobolBits = 32;
+std::uint32_t ReverseBits(std::uint32_t x) {
+  x = ((x >> 1U) & 0x55555555U) | ((x & 0x55555555U) << 1U);
+  x = ((x >> 2U) & 0x33333333U) | ((x & 0x33333333U) << 2U);
+  x = ((x >> 4U) & 0x0f0f0f0fU) | ((x & 0x0f0f0f0fU) << 4U);
+  return __builtin_bswap32(x);
+}
 
-/// Primitive polynomial and first direction numbers of one dimension after the first.
-struct SobolDimension {
-  int degree;
-  std::uint32_t coefficients;  // of the polynomial, without the first and the last
-  std::array<std::uint32_t, 5> m;
-};
-
-constexpr std::array<SobolDimension, kMaxSobolDimensions - 1> kSobol = {{{1, 0, {1}},
-                                                                         {2, 1, {1, 3}},
-                                                                         {3, 1, {1, 3, 1}},
-                                                                         {3, 2, {1, 1, 1}},
-                                                                         {4, 1, {1, 1, 3, 3}},
-                                                                         {4, 4, {1, 3, 5, 13}},
-                                                                         {5, 2, {1, 1, 5, 5, 17}}}};
-
-/// v_1 ... v_32 as binary fractions of 32 bits.
-std::array<std::uint32_t, kSobolBits> MakeDirections(int dimension) {
-  std::array<std::uint32_t, kSobolBits> v{};
-  if (dimension == 0) {
-    for (int i = 0; i < kSobolBits; ++i) v[static_cast<size_t>(i)] = 1U << (kSobolBits - 1 - i);
-    return v;
-  }
-  const SobolDimension& row = kSobol[static_cast<size_t>(dimension - 1)];
-  const auto s = static_cast<size_t>(row.degree);
-  for (size_t i = 0; i < kSobolBits; ++i) {
-    if (i < s) {
-      v[i] = row.m[i] << (kSobolBits - 1 - i);
-      continue;
-    }
-    // m_i = 2 a_1 m_(i-1) ^ 4 a_2 m_(i-2) ^ ... ^ 2^s m_(i-s) ^ m_(i-s)
-    v[i] = v[i - s] ^ (v[i - s] >> s);
-    for (size_t k = 1; k < s; ++k) {
-      if (((row.coefficients >> (s - 1 - k)) & 1U) != 0) v[i] ^= v[i - k];
-    }
-  }
-  return v;
+/// Flips each binary digit by a hash of the digits before it [Burley 2020, with Vegdahl's constants].
+std::uint32_t ScrambleDigits(std::uint32_t x, std::uint32_t seed) {
+  x = ReverseBits(x);
+  x ^= x * 0x3d20adeaU;
+  x += seed;
+  x *= (seed >> 16U) | 1U;
+  x ^= x * 0x05526c56U;
+  x ^= x * 0x53a22864U;
+  return ReverseBits(x);
 }
 
 }  // namespace
@@ -69,20 +48,62 @@ std::vector<UnitPoint> MakeLatinHypercube(int dimensions, long count, std::uint6
   return points;
 }
 
-std::vector<UnitPoint> MakeSobol(int dimensions, long count) {
-  Require(dimensions >= 1 && dimensions <= kMaxSobolDimensions, "dimensions", "must be from 1 to 8",
+std::vector<UnitPoint> MakeSobol(int dimensions, long count, std::optional<std::uint64_t> scramble) {
+  Require(dimensions >= 1 && dimensions <= kMaxSobolDimensions, "dimensions", "must be from 1 to 64",
           dimensions);
+  using Engine = boost::random::sobol_engine<std::uint32_t, 32>;
+  Engine engine(static_cast<size_t>(dimensions));
+  std::vector<std::uint32_t> seeds(static_cast<size_t>(dimensions));
+  std::mt19937_64 random(scramble.value_or(0));
+  for (std::uint32_t& seed : seeds) seed = static_cast<std::uint32_t>(random() >> 32U);
   std::vector<UnitPoint> points(static_cast<size_t>(count), UnitPoint(static_cast<size_t>(dimensions)));
-  for (int d = 0; d < dimensions; ++d) {
-    const std::array<std::uint32_t, kSobolBits> v = MakeDirections(d);
-    std::uint32_t x = 0;
-    for (size_t i = 0; i < points.size(); ++i) {
-      // Gray code: from point i - 1 to i one direction changes.
-      if (i > 0) x ^= v[static_cast<size_t>(std::countr_zero(i))];
-      points[i][static_cast<size_t>(d)] = static_cast<double>(x) * 0x1p-32;
+  for (size_t i = 0; i < points.size(); ++i) {
+    for (size_t d = 0; d < points[i].size(); ++d) {
+      // Boost's sequence leaves the origin out.
+      const std::uint32_t x = i == 0 ? 0 : engine();
+      points[i][d] = static_cast<double>(scramble ? ScrambleDigits(x, seeds[d]) : x) * 0x1p-32;
     }
   }
   return points;
+}
+
+std::vector<UnitPoint> MakeRandom(int dimensions, long count, std::uint64_t seed) {
+  std::vector<UnitPoint> points(static_cast<size_t>(count), UnitPoint(static_cast<size_t>(dimensions)));
+  std::mt19937_64 random(seed);
+  for (UnitPoint& point : points) {
+    for (double& x : point) x = static_cast<double>(random() >> 11U) * 0x1p-53;
+  }
+  return points;
+}
+
+std::vector<UnitPoint> MakeUnitPoints(const Sample& sample, int dimensions) {
+  switch (sample.method) {
+    case Sampling::kSobol:
+      return MakeSobol(dimensions, sample.count,
+                       sample.scramble ? std::optional<std::uint64_t>(sample.seed) : std::nullopt);
+    case Sampling::kRandom:
+      return MakeRandom(dimensions, sample.count, sample.seed);
+    case Sampling::kSaltelli:
+      return MakeSaltelli(dimensions, sample.count, sample.seed);
+    case Sampling::kMorris:
+      return MakeMorris(dimensions, sample.count, sample.seed);
+    case Sampling::kLatinHypercube:
+    case Sampling::kGrid:
+      break;
+  }
+  return MakeLatinHypercube(dimensions, sample.count, sample.seed);
+}
+
+long CountUnitPoints(const Sample& sample, int dimensions) {
+  if (sample.method == Sampling::kSaltelli) return sample.count * (dimensions + 2);
+  if (sample.method == Sampling::kMorris) return sample.count * (dimensions + 1);
+  return sample.count;
+}
+
+int CountMostDimensions(const Sample& sample) {
+  if (sample.method == Sampling::kSobol) return kMaxSobolDimensions;
+  if (sample.method == Sampling::kSaltelli) return kMaxSobolDimensions / 2;
+  return std::numeric_limits<int>::max();
 }
 
 }  // namespace dexcheck

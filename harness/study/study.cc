@@ -4,121 +4,17 @@
 #include <cmath>
 
 #include "controller/common/text.h"
-#include "controller/common/toml_reader.h"
 #include "harness/study/sampling.h"
-#include "harness/study/trial_result.h"
 
 namespace dexcheck {
 namespace {
 
-constexpr long kMaxValues = 10000;
-constexpr long kMaxSeed = 1L << 53;  // whole numbers that a double holds
-
-double Interpolate(const Variation& variation, double share) {
-  const double value = variation.logarithmic ? variation.from * std::pow(variation.to / variation.from, share)
-                                             : variation.from + share * (variation.to - variation.from);
-  return std::clamp(value, variation.from, variation.to);
-}
-
-Variation ReadVariation(const TomlValue& value, Sampling sampling) {
-  TomlTable table = value.AsTable();
-  Variation variation;
-  const TomlValue key = table.Get("key");
-  variation.key = key.AsText();
-  if (variation.key.empty() || variation.key.find_first_of("= \t\r\n\"") != std::string::npos) {
-    key.Fail("must be a key as --set takes it");
-  }
-  if (sampling == Sampling::kGrid) table.RejectTogether("values", {"from", "to", "count", "spacing"});
-  if (const auto list = sampling == Sampling::kGrid ? table.Find("values") : std::nullopt) {
-    for (const TomlValue& entry : list->AsList()) {
-      const bool are_texts = !variation.labels.empty();
-      if (are_texts || (variation.values.empty() && entry.IsText())) {
-        variation.values.push_back(static_cast<double>(variation.labels.size()));
-        variation.labels.push_back(entry.AsText());
-      } else {
-        variation.values.push_back(entry.AsNumber());
-      }
-    }
-    if (variation.values.empty()) list->Reject("needs at least one value");
-    const auto [least, most] = std::minmax_element(variation.values.begin(), variation.values.end());
-    variation.from = *least;
-    variation.to = *most;
-    table.RejectUnused();
-    return variation;
-  }
-  variation.from = table.Get("from").AsNumber();
-  variation.to = table.Get("to").AsNumber();
-  if (variation.to <= variation.from) table.Get("to").Fail("must be greater than from");
-  if (const auto spacing = table.Find("spacing")) {
-    variation.logarithmic = spacing->AsChoice<bool>({{"linear", false}, {"log", true}});
-    if (variation.logarithmic) variation.from = table.Get("from").AsPositive();
-  }
-  const double span = variation.logarithmic ? variation.to / variation.from : variation.to - variation.from;
-  if (!std::isfinite(span)) table.Get("to").Fail("must not be so far from from");
-  if (sampling == Sampling::kGrid) {
-    const long count = table.Get("count").AsWhole(2, kMaxValues);
-    for (long i = 0; i < count; ++i) {
-      variation.values.push_back(
-          Interpolate(variation, static_cast<double>(i) / static_cast<double>(count - 1)));
-    }
-    variation.values.back() = variation.to;
-  }
-  table.RejectUnused();
-  return variation;
-}
-
-void ReadSample(const TomlValue& value, Study* study) {
-  TomlTable table = value.AsTable();
-  study->sampling = table.Get("method").AsChoice<Sampling>(
-      {{"latin_hypercube", Sampling::kLatinHypercube}, {"sobol", Sampling::kSobol}});
-  study->samples = table.Get("count").AsWhole(1, kMaxTrials);
-  if (const auto seed = table.Find("seed")) {
-    study->sample_seed = static_cast<std::uint64_t>(seed->AsWhole(0, kMaxSeed));
-  }
-  table.RejectUnused();
-}
-
-void ReadMetrics(const TomlValue& value, Study* study) {
-  std::vector<std::string> known;
-  known.reserve(kMetrics.size());
-  for (const MetricInfo& metric : kMetrics) known.emplace_back(metric.name);
-  for (const TomlValue& entry : value.AsList()) {
-    const std::string name = entry.AsName();
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      const std::string nearest = FindNearest(name, known);
-      entry.Reject("no metric is called " + Quote(name) +
-                   (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?"));
-    }
-    study->metrics.push_back(name);
-  }
-}
-
-void ReadVariations(const TomlValue& value, Study* study) {
-  double trials = static_cast<double>(study->seeds.size());
-  if (study->sampling != Sampling::kGrid) trials *= static_cast<double>(study->samples);
-  for (const TomlValue& entry : value.AsList()) {
-    study->variations.push_back(ReadVariation(entry, study->sampling));
-    const Variation& added = study->variations.back();
-    if (study->sampling == Sampling::kGrid) trials *= static_cast<double>(added.values.size());
-    for (size_t i = 0; i + 1 < study->variations.size(); ++i) {
-      if (study->variations[i].key == added.key) entry.Reject(Quote(added.key) + " is varied twice");
-    }
-  }
-  if (study->variations.empty()) value.Reject("needs at least one key");
-  if (study->sampling == Sampling::kSobol && study->variations.size() > kMaxSobolDimensions) {
-    value.Reject("a Sobol sequence varies at most " + std::to_string(kMaxSobolDimensions) + " keys");
-  }
-  if (trials > static_cast<double>(kMaxTrials)) {
-    value.Reject("makes " + FormatNumber(trials) + " trials; at most " + std::to_string(kMaxTrials) +
-                 " can be made");
-  }
-}
-
 /// Points of the variations' product, the last one fastest.
-std::vector<std::vector<double>> MakeGrid(const Study& study) {
+std::vector<std::vector<double>> MakeGrid(std::span<const Variation> variations) {
   std::vector<std::vector<double>> points = {{}};
-  for (const Variation& variation : study.variations) {
+  for (const Variation& variation : variations) {
     std::vector<std::vector<double>> longer;
+    longer.reserve(points.size() * variation.values.size());
     for (const std::vector<double>& point : points) {
       for (const double value : variation.values) {
         longer.push_back(point);
@@ -130,60 +26,89 @@ std::vector<std::vector<double>> MakeGrid(const Study& study) {
   return points;
 }
 
-std::vector<std::vector<double>> MakePoints(const Study& study) {
-  if (study.sampling == Sampling::kGrid) return MakeGrid(study);
-  const int dimensions = static_cast<int>(study.variations.size());
-  std::vector<UnitPoint> points = study.sampling == Sampling::kSobol
-                                      ? MakeSobol(dimensions, study.samples)
-                                      : MakeLatinHypercube(dimensions, study.samples, study.sample_seed);
+std::vector<std::vector<double>> MakePoints(const Sample& sample, std::span<const Variation> variations) {
+  if (sample.method == Sampling::kGrid) return MakeGrid(variations);
+  const int dimensions = static_cast<int>(variations.size());
+  std::vector<UnitPoint> points = MakeUnitPoints(sample, dimensions);
   for (UnitPoint& point : points) {
-    for (size_t i = 0; i < point.size(); ++i) point[i] = Interpolate(study.variations[i], point[i]);
+    for (size_t i = 0; i < point.size(); ++i) point[i] = ValueAt(variations[i], point[i]);
   }
   return points;
 }
 
+std::span<const Variation> KeysOf(const Study& study) { return {study.variations.data(), study.num_keys()}; }
+
+std::span<const Variation> NestedOf(const Study& study) {
+  return {study.variations.data() + study.num_keys(), study.num_nested};
+}
+
 }  // namespace
 
-Study ParseStudy(const std::string& text, const std::string& source) {
-  Study study;
-  study.text = text;
-  study.source = source;
-  const TomlDocument document(text, source);
-  TomlTable root = document.Open();
-  root.RejectOthersThan({"name", "description", "scenario", "set", "seeds", "check", "trial_time_limit",
-                         "metrics", "sample", "vary"});
-  study.name = root.Get("name").AsName();
-  if (const auto description = root.Find("description")) study.description = description->AsText();
-  study.scenario = root.Get("scenario").AsText();
-  if (const auto list = root.Find("set")) {
-    for (const TomlValue& entry : list->AsList()) {
-      study.overrides.push_back(entry.AsText());
-      if (study.overrides.back().find('=') == std::string::npos) entry.Fail("must be KEY=VALUE");
-    }
+double ValueAt(const Variation& variation, double share) {
+  if (!variation.values.empty()) {
+    const auto count = static_cast<double>(variation.values.size());
+    return variation.values[static_cast<size_t>(std::clamp(std::floor(share * count), 0.0, count - 1.0))];
   }
-  if (const auto list = root.Find("seeds")) {
-    study.seeds.clear();
-    for (const TomlValue& entry : list->AsList()) {
-      study.seeds.push_back(static_cast<std::uint64_t>(entry.AsWhole(0, kMaxSeed)));
-    }
-    if (study.seeds.empty()) list->Reject("needs at least one seed");
+  const double value = variation.logarithmic ? variation.from * std::pow(variation.to / variation.from, share)
+                                             : variation.from + share * (variation.to - variation.from);
+  return std::clamp(value, variation.from, variation.to);
+}
+
+double ShareOf(const Variation& variation, double value) {
+  if (!variation.values.empty()) {
+    const auto found = std::find(variation.values.begin(), variation.values.end(), value);
+    return (static_cast<double>(found - variation.values.begin()) + 0.5) /
+           static_cast<double>(variation.values.size());
   }
-  if (const auto check = root.Find("check")) study.check = check->AsFlag();
-  if (const auto limit = root.Find("trial_time_limit")) study.trial_time_limit = limit->AsPositive();
-  if (const auto metrics = root.Find("metrics")) ReadMetrics(*metrics, &study);
-  if (const auto sample = root.Find("sample")) ReadSample(*sample, &study);
-  ReadVariations(root.Get("vary"), &study);
-  return study;
+  const double share = variation.logarithmic
+                           ? std::log(value / variation.from) / std::log(variation.to / variation.from)
+                           : (value - variation.from) / (variation.to - variation.from);
+  return std::clamp(share, 0.0, 1.0);
+}
+
+std::vector<std::vector<double>> ListDraws(const Study& study) {
+  return MakePoints(study.nested, NestedOf(study));
+}
+
+long CountTrialsOfPoint(const Study& study) {
+  const long draws = study.num_nested == 0 ? 1 : study.nested.count;
+  return draws * static_cast<long>(study.seeds.size());
+}
+
+long CountTrials(const Study& study) {
+  long points = 1;
+  if (study.is_search()) {
+    points = study.search.count;
+  } else if (study.sample.method != Sampling::kGrid) {
+    points = CountUnitPoints(study.sample, static_cast<int>(study.num_keys()));
+  } else {
+    for (const Variation& variation : KeysOf(study)) points *= static_cast<long>(variation.values.size());
+  }
+  return points * CountTrialsOfPoint(study);
+}
+
+std::vector<Trial> ListTrialsOfPoint(const Study& study, long number, const std::vector<double>& point,
+                                     const std::vector<std::vector<double>>& draws) {
+  std::vector<Trial> trials;
+  long next = number * CountTrialsOfPoint(study);
+  for (const std::vector<double>& draw : draws) {
+    std::vector<double> parameters = point;
+    parameters.insert(parameters.end(), draw.begin(), draw.end());
+    for (const std::uint64_t seed : study.seeds) trials.push_back({next++, seed, parameters});
+  }
+  return trials;
 }
 
 std::vector<Trial> ListTrials(const Study& study) {
-  std::vector<Trial> trials;
-  for (const std::vector<double>& point : MakePoints(study)) {
-    for (const std::uint64_t seed : study.seeds) {
-      trials.push_back({static_cast<long>(trials.size()), seed, point});
-    }
+  const std::vector<std::vector<double>> draws = ListDraws(study);
+  std::vector<Trial> all;
+  all.reserve(static_cast<size_t>(CountTrials(study)));
+  long number = 0;
+  for (const std::vector<double>& point : MakePoints(study.sample, KeysOf(study))) {
+    std::vector<Trial> trials = ListTrialsOfPoint(study, number++, point, draws);
+    std::move(trials.begin(), trials.end(), std::back_inserter(all));
   }
-  return trials;
+  return all;
 }
 
 std::string FormatValue(const Variation& variation, double value) {

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/study/objective.h"
+
 namespace dexcheck {
 
 /// One varied key of the scenario.
@@ -21,7 +23,32 @@ struct Variation {
   bool logarithmic = false;  ///< Even in the logarithm.
 };
 
-enum class Sampling { kGrid, kLatinHypercube, kSobol };
+enum class Sampling { kGrid, kLatinHypercube, kSobol, kRandom, kSaltelli, kMorris };
+
+/// Points of the ranges of some keys.
+struct Sample {
+  Sampling method = Sampling::kGrid;
+  long count = 0;  ///< Points; of a grid its keys say how many. Blocks and walks of kSaltelli and kMorris.
+  std::uint64_t seed = 0;  ///< Of all but a grid and a Sobol sequence that is not scrambled.
+  bool scramble = false;   ///< A Sobol sequence.
+};
+
+enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kBobyqa, kMargins };
+enum class SearchStart { kMiddle, kTheory, kValues };
+
+/// How a study looks for the best point.
+struct Search {
+  SearchMethod method = SearchMethod::kNone;
+  long count = 0;           ///< Points at most.
+  long population = 0;      ///< Points of a generation, of kCmaEs and kNsga2.
+  long starts = 1;          ///< Local searches at a time, of kNelderMead and kBobyqa.
+  long directions = 0;      ///< Random ones, of kMargins.
+  double step = 0.25;       ///< First step relative to the ranges.
+  double tolerance = 1e-3;  ///< Relative to the ranges: where a local search or a bisection ends.
+  std::uint64_t seed = 0;
+  SearchStart start = SearchStart::kMiddle;
+  std::vector<double> start_values;  ///< Of kValues, one for each key.
+};
 
 /// A study file.
 struct Study {
@@ -29,17 +56,25 @@ struct Study {
   std::string description;
   std::string scenario;                ///< Shipped name, or file relative to the study's.
   std::vector<std::string> overrides;  ///< "PATH=VALUE", the same for all trials.
-  std::vector<Variation> variations;   ///< The last varies fastest.
-  Sampling sampling = Sampling::kGrid;
-  long samples = 0;                        ///< Of sampled studies.
-  std::uint64_t sample_seed = 0;           ///< Of a Latin hypercube.
+  std::vector<Variation> variations;   ///< The last varies fastest; behind a point's own, those of its draws.
+  size_t num_nested = 0;  ///< Of the variations at the end: every point is tried with the same draws.
+  Sample sample;          ///< Of the points.
+  Sample nested;          ///< Of the draws.
+  Search search;
+  std::vector<Objective> objectives;
+  std::vector<Constraint> constraints;
   std::vector<std::uint64_t> seeds = {0};  ///< Of the grasp; every point is tried with each.
   bool check = false;                      ///< Cross-check the trials.
   double trial_time_limit = 0.0;           ///< Most processor time of a trial, s; 0 for any.
+  double stop_error = 0.0;                 ///< Position error that ends a trial, m; 0 for none.
   std::vector<std::string> metrics;        ///< That the report shows.
 
   std::string text;    ///< The file.
   std::string source;  ///< Its name, for messages.
+
+  /// Keys that make a point, without those of the draws.
+  [[nodiscard]] size_t num_keys() const { return variations.size() - num_nested; }
+  [[nodiscard]] bool is_search() const { return search.method != SearchMethod::kNone; }
 };
 
 /// One run of a study.
@@ -55,8 +90,27 @@ constexpr long kMaxTrials = 1000000;
 /// Reads a study. @throws InputError, one line that names file, line, key and value.
 Study ParseStudy(const std::string& text, const std::string& source);
 
-/// All trials; the same list for the same file, always.
+/// All trials; the same list for the same file, always. Not of a search, whose points follow from results.
 std::vector<Trial> ListTrials(const Study& study);
+
+/// How many trials there are; of a search at most.
+long CountTrials(const Study& study);
+
+/// Trials of one point: draws times seeds.
+long CountTrialsOfPoint(const Study& study);
+
+/// The trials of a point: point `number` has those from number * CountTrialsOfPoint on.
+/// @param draws of the nested keys, as ListDraws gives them.
+std::vector<Trial> ListTrialsOfPoint(const Study& study, long number, const std::vector<double>& point,
+                                     const std::vector<std::vector<double>>& draws);
+
+/// Values of the nested keys, the same for each point; one empty draw when there are none.
+std::vector<std::vector<double>> ListDraws(const Study& study);
+
+/// A value of a range, or of a list of values: 0 is its beginning, 1 its end. @param share in [0, 1].
+double ValueAt(const Variation& variation, double share);
+/// The share at which ValueAt gives this value; of a list the middle of its part.
+double ShareOf(const Variation& variation, double value);
 
 /// A value of the key as --set takes it.
 std::string FormatValue(const Variation& variation, double value);

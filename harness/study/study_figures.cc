@@ -30,7 +30,9 @@ Axis AxisOf(const Variation& variation) {
   return axis;
 }
 
-bool IsGrid(const Study& study) { return study.sampling == Sampling::kGrid && study.variations.size() >= 2; }
+bool IsGrid(const Study& study) {
+  return study.sample.method == Sampling::kGrid && !study.is_search() && study.variations.size() >= 2;
+}
 
 /// A map over the first two keys of a grid.
 class Grid {
@@ -173,11 +175,6 @@ std::vector<const TrialRow*> StudyResults::ListTracked() const {
   return tracked;
 }
 
-bool IsHeld(Outcome outcome) {
-  return outcome == Outcome::kTracked || outcome == Outcome::kSlipped || outcome == Outcome::kWheelsSpun ||
-         outcome == Outcome::kChecksDisagreed;
-}
-
 std::string FindColor(Outcome outcome) { return kOutcomeColors[static_cast<size_t>(outcome)]; }
 
 std::string LabelOf(Metric metric) {
@@ -223,7 +220,7 @@ Html DrawMetrics(const StudyResults& results) {
 
 Html DrawLines(const StudyResults& results) {
   const Study& study = results.study;
-  if (study.sampling != Sampling::kGrid) return {};
+  if ((study.sample.method != Sampling::kGrid || study.is_search())) return {};
   const bool has_second = study.variations.size() > 1;
   const std::vector<double> chosen = ChooseLines(study);
   Html figures;

@@ -26,8 +26,6 @@ struct StudyResults {
 /// Overshoot that can be seen, relative to the start error; larger than what settling leaves.
 constexpr double kVisibleOvershoot = 0.01;
 
-/// Whether a run came to its end with the object in the hand.
-bool IsHeld(Outcome outcome);
 /// "#rrggbb".
 std::string FindColor(Outcome outcome);
 /// "position_error_rms, m".

@@ -87,7 +87,7 @@ class Report {
     const Study& study = results_.study;
     Html html = FormatHtml("<header>\n<h1><b>{}</b>{}{}</h1>\n<div class=\"tiles\">\n", study.name,
                            study.description.empty() ? "" : " – ", study.description);
-    const size_t count = ListTrials(study).size();
+    const long count = CountTrials(study);
     html += MakeTile(fmt::format("{} of {}", results_.rows.size(), count),
                      FormatHtml("trials of scenario {} are done", study.scenario));
     if (results_.rows.empty()) {
@@ -183,13 +183,13 @@ class Report {
     const Html outcomes = DrawOutcomes(results_);
     if (outcomes.empty()) return {};
     const Study& study = results_.study;
+    const bool is_grid = study.sample.method == Sampling::kGrid && !study.is_search();
     return FormatHtml(
         "<h2 id=\"maps\">Over {} and {}</h2>\n<p class=\"soft\">{}Each {} leads to its trial and the command "
         "that "
         "repeats it.</p>\n<div class=\"grid\">\n{}{}</div>\n",
-        study.variations[0].key, study.variations[1].key,
-        study.sampling == Sampling::kGrid ? ExplainMaps(outcomes) : Html(),
-        study.sampling == Sampling::kGrid ? "cell" : "point", outcomes, DrawMetrics(results_));
+        study.variations[0].key, study.variations[1].key, is_grid ? ExplainMaps(outcomes) : Html(),
+        is_grid ? "cell" : "point", outcomes, DrawMetrics(results_));
   }
 
   [[nodiscard]] Html Lines() const {

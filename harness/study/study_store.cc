@@ -1,46 +1,20 @@
 #include "harness/study/study_store.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
-#include <cstdint>
+#include <limits>
 #include <set>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/common/toml_reader.h"
-#include "harness/base/files.h"
-#include "harness/base/version.h"
-#include "harness/engine/engine.h"
-#include "harness/engine/machine.h"
-#include "harness/engine/mjcf_files.h"
-#include "harness/study/git_revision.h"
 #include "harness/study/process_name.h"
+#include "harness/study/study_change.h"
 
 namespace dexcheck {
 namespace {
 
 constexpr int kApplicationId = 0x44584353;  // "DXCS", tells a study from other databases
-constexpr const char* kLayout = "2";
+const std::string kLayout = kStudyLayout;
 constexpr const char* kLayoutWithoutMachine = "1";  // does not say which machine made a trial
-
-/// FNV-1a, 64 bits.
-std::string Hash(const std::string& text) {
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  constexpr const char* kDigits = "0123456789abcdef";
-  std::string digits;
-  for (int shift = 60; shift >= 0; shift -= 4) digits += kDigits[(hash >> shift) & 15U];
-  return digits;
-}
-
-std::string HashMjcf(const std::filesystem::path& mjcf) {
-  std::string all;
-  for (const std::string& file : ListMjcfFiles(mjcf)) {
-    all += file + "\n" + Hash(ReadBytes(mjcf.parent_path() / file)) + "\n";
-  }
-  return Hash(all);
-}
 
 std::string QuoteName(const std::string& name) {
   std::string quoted = "\"";
@@ -48,53 +22,17 @@ std::string QuoteName(const std::string& name) {
   return quoted + "\"";
 }
 
-bool IsSameNumber(double a, double b) {
-  return (std::isnan(a) && std::isnan(b)) ||
-         std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
-}
-
 }  // namespace
-
-bool IsSame(const TrialRow& a, const TrialRow& b) {
-  if (a.trial.seed != b.trial.seed || a.trial.parameters != b.trial.parameters ||
-      a.result.outcome != b.result.outcome) {
-    return false;
-  }
-  const bool exactly = a.machine == b.machine;
-  if (exactly && a.result.failure != b.result.failure) return false;
-  if (!exactly && !a.result.failure.empty() && !b.result.failure.empty()) return true;
-  for (size_t i = 0; i < a.result.metrics.size(); ++i) {
-    const double x = a.result.metrics[i];
-    const double y = b.result.metrics[i];
-    if (exactly ? !IsSameNumber(x, y)
-                : !IsSameWithin(kMetricTolerance, x, y, std::max(std::abs(x), std::abs(y)))) {
-      return false;
-    }
-  }
-  return a.result.failure == b.result.failure;
-}
-
-StudyIdentity IdentifyStudy(const StudyInputs& inputs) {
-  return {{"layout", kLayout},
-          {"name", inputs.study.name},
-          {"study", inputs.study.text},
-          {"scenario", inputs.scenario_text},
-          {"robot", ReadTextFile(inputs.robot.string())},
-          {"mjcf_hash", HashMjcf(inputs.mjcf)},
-          {"dexcheck_version", Version()},
-          {"git_revision", kGitRevision},
-          {"mujoco_version", mj_versionString()}};
-}
 
 StudyStore::StudyStore(const std::filesystem::path& path, Database::Mode mode)
     : database_(std::make_unique<Database>(path, mode)) {}
 
 StudyStore StudyStore::OpenOrCreate(const std::filesystem::path& path, const StudyIdentity& identity,
-                                    const Study& study) {
+                                    const Study& study, const MakesSameRows& makes_same_rows) {
   StudyStore store(path, Database::Mode::kCreate);
   store.Create(identity, study);
   store.Load();
-  store.RequireSame(identity);
+  store.Adopt(identity, study, makes_same_rows);
   return store;
 }
 
@@ -165,7 +103,7 @@ void StudyStore::Upgrade() {
     throw InputError(database_->name() + ": was written by another version of dexcheck");
   }
   database_->Execute("ALTER TABLE trials ADD COLUMN machine TEXT NOT NULL DEFAULT ''");
-  database_->Execute(std::string("UPDATE study SET layout = '") + kLayout + "'");
+  database_->Execute("UPDATE study SET layout = '" + kLayout + "'");
   transaction.Commit();
 }
 
@@ -176,11 +114,75 @@ const std::string& StudyStore::Identify(const std::string& column) const {
   throw std::invalid_argument("no column " + Quote(column));
 }
 
+bool StudyStore::IsInUse() const {
+  Statement claims(database_.get(), "SELECT process FROM claims");
+  bool in_use = false;
+  while (claims.Step()) in_use = in_use || IsRunningHere(claims.GetText(0));
+  return in_use;
+}
+
+void StudyStore::Update(const std::string& column, const std::string& value) {
+  Statement update(database_.get(), "UPDATE study SET " + column + " = ?");
+  update.Bind(1, value);
+  update.Step();
+  for (auto& [name, text] : identity_) {
+    if (name == column) text = value;
+  }
+}
+
+void StudyStore::Adopt(const StudyIdentity& identity, const Study& study,
+                       const MakesSameRows& makes_same_rows) {
+  // The texts of study and program may be others; what they mean decides.
+  StudyIdentity strict = identity;
+  std::erase_if(strict, [&](const auto& column) {
+    return column.first == "study" || (column.first == "name" && study.text != study_.text) ||
+           (makes_same_rows && column.first == "git_revision");
+  });
+  RequireSame(strict);
+  const auto find = [&](const std::string& column) {
+    const auto found = std::find_if(identity.begin(), identity.end(),
+                                    [&](const auto& entry) { return entry.first == column; });
+    return found == identity.end() ? Identify(column) : found->second;
+  };
+  const std::string difference = FindDifference(study_, study);
+  if (!difference.empty()) {
+    throw InputError(database_->name() + ": is of another study: study differs: " + difference +
+                     "; rows made otherwise cannot be kept, take another database");
+  }
+  if (find("git_revision") != Identify("git_revision")) {
+    if (!makes_same_rows(ReadRows())) RequireSame(identity);  // which throws
+    Update("git_revision", find("git_revision"));
+    change_ = "its rows are of another revision, which made the same ones";
+  }
+  if (study.text == study_.text) return;
+  if (!HasSameTrials(study_, study)) {
+    if (IsInUse())
+      throw InputError(database_->name() + ": another process makes trials of the study as it was");
+    Transaction transaction(database_.get());
+    StudyChange changed = ChangeStudy(study_, study, ReadRows(std::numeric_limits<long>::min()));
+    database_->Execute("DELETE FROM trials");
+    study_ = study;
+    for (const TrialRow& row : changed.rows) Insert(row);
+    Update("study", study.text);
+    Update("name", study.name);
+    transaction.Commit();
+    change_ += (change_.empty() ? "" : "; ") + ("the study was edited: " + Describe(changed));
+    return;
+  }
+  study_ = study;
+  Update("study", study.text);
+  Update("name", study.name);
+}
+
 void StudyStore::RequireSame(const StudyIdentity& other) const {
   constexpr size_t kReadable = 64;
   for (const auto& [column, value] : other) {
     const std::string& own = Identify(column);
     if (own == value) continue;
+    if (column == "study") {
+      const Study there = ParseStudy(value, database_->name());
+      if (HasSameTrials(study_, there)) continue;
+    }
     const bool is_short = own.size() < kReadable && value.size() < kReadable;
     throw InputError(database_->name() + ": is of another study: " + column + " differs" +
                      (is_short ? ", " + Quote(own) + " there and " + Quote(value) + " here" : ""));
@@ -195,8 +197,17 @@ std::string StudyStore::ListColumns() const {
   return columns + ", machine";
 }
 
-std::vector<TrialRow> StudyStore::ReadRows() const {
-  Statement select(database_.get(), "SELECT " + ListColumns() + " FROM trials ORDER BY trial");
+std::vector<long> StudyStore::ListNumbers() const {
+  Statement select(database_.get(), "SELECT trial FROM trials WHERE trial >= 0 ORDER BY trial");
+  std::vector<long> numbers;
+  while (select.Step()) numbers.push_back(static_cast<long>(select.GetWhole(0)));
+  return numbers;
+}
+
+std::vector<TrialRow> StudyStore::ReadRows(long first) const {
+  Statement select(database_.get(),
+                   "SELECT " + ListColumns() + " FROM trials WHERE trial >= ? ORDER BY trial");
+  select.Bind(1, static_cast<long long>(first));
   std::vector<TrialRow> rows;
   while (select.Step()) {
     TrialRow row;
@@ -306,16 +317,22 @@ void StudyStore::AddAll(const std::vector<TrialSource>& sources) {
   transaction.Commit();
 }
 
-long StudyStore::RemoveFailed(const std::vector<Trial>& trials) {
+void StudyStore::RemoveFrom(long first) {
+  Statement remove(database_.get(), "DELETE FROM trials WHERE trial >= ?");
+  remove.Bind(1, static_cast<long long>(first));
+  remove.Step();
+}
+
+long StudyStore::RemoveFailed(const std::vector<long>& trials) {
   Transaction transaction(database_.get());
   std::set<long> failed;
   for (const TrialRow& row : ReadRows()) {
     if (IsFailed(row.result.outcome)) failed.insert(row.trial.number);
   }
   long count = 0;
-  for (const Trial& trial : trials) {
-    if (failed.count(trial.number) == 0) continue;
-    Remove(trial.number);
+  for (const long trial : trials) {
+    if (failed.count(trial) == 0) continue;
+    Remove(trial);
     ++count;
   }
   transaction.Commit();

@@ -4,6 +4,7 @@
 // Each row is one transaction, so that the file is whole whenever a process is killed.
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -18,6 +19,9 @@ namespace dexcheck {
 
 /// What a study is, column by column. Rows of studies that differ in any of them do not belong together.
 using StudyIdentity = std::vector<std::pair<std::string, std::string>>;
+
+/// Of a database's tables.
+inline constexpr const char* kStudyLayout = "2";
 
 /// @throws InputError when a file cannot be read.
 StudyIdentity IdentifyStudy(const StudyInputs& inputs);
@@ -40,12 +44,18 @@ struct TrialSource {
 /// compared.
 bool IsSame(const TrialRow& a, const TrialRow& b);
 
+/// Whether this program gives the same rows as the one that made these.
+using MakesSameRows = std::function<bool(const std::vector<TrialRow>&)>;
+
 class StudyStore {
  public:
-  /// Opens a study's database, or makes it when there is none.
+  /// Opens a study's database, or makes it when there is none. A study that was edited keeps the rows that it
+  /// still means, and sets the others aside (ChangeStudy); another revision of this program goes on with the
+  /// rows when it makes the same ones.
+  /// @param makes_same_rows asked when the file was written by another revision; none for that it does not.
   /// @throws InputError, also when the file holds another study.
   static StudyStore OpenOrCreate(const std::filesystem::path& path, const StudyIdentity& identity,
-                                 const Study& study);
+                                 const Study& study, const MakesSameRows& makes_same_rows = {});
   /// Opens one that exists. @throws InputError.
   static StudyStore Open(const std::filesystem::path& path);
 
@@ -53,11 +63,16 @@ class StudyStore {
   [[nodiscard]] const std::string& Identify(const std::string& column) const;
   /// As the file has it.
   [[nodiscard]] const Study& study() const { return study_; }
-  /// Throws InputError that names the first column in which this study is another one.
+  /// Throws InputError that names the first column in which this study is another one; another text of the
+  /// same trials is the same study.
   void RequireSame(const StudyIdentity& other) const;
+  /// What was changed when the study was opened, in words; empty when nothing was.
+  [[nodiscard]] const std::string& change() const { return change_; }
 
-  /// By trial number.
-  [[nodiscard]] std::vector<TrialRow> ReadRows() const;
+  /// By trial number. @param first number that is read.
+  [[nodiscard]] std::vector<TrialRow> ReadRows(long first = 0) const;
+  /// Numbers of the trials that have a row, ascending.
+  [[nodiscard]] std::vector<long> ListNumbers() const;
   [[nodiscard]] bool Has(long trial) const;
 
   /// Takes a trial on for this process. False when it is done, or another living process of this machine has
@@ -71,12 +86,17 @@ class StudyStore {
   /// (IsFailed) give way to others. @throws InputError when one differs; then nothing is added.
   void AddAll(const std::vector<TrialSource>& sources);
   /// Forgets these trials where they failed (IsFailed). @return how many.
-  long RemoveFailed(const std::vector<Trial>& trials);
+  long RemoveFailed(const std::vector<long>& trials);
+  /// Forgets all trials from this number on.
+  void RemoveFrom(long first);
 
  private:
   StudyStore(const std::filesystem::path& path, Database::Mode mode);
   void Create(const StudyIdentity& identity, const Study& study);
   void Upgrade();
+  void Adopt(const StudyIdentity& identity, const Study& study, const MakesSameRows& makes_same_rows);
+  void Update(const std::string& column, const std::string& value);
+  [[nodiscard]] bool IsInUse() const;
   void Remove(long trial);
   void Load();
   void Insert(const TrialRow& row);
@@ -85,6 +105,7 @@ class StudyStore {
   std::unique_ptr<Database> database_;
   StudyIdentity identity_;
   Study study_;
+  std::string change_;
 };
 
 }  // namespace dexcheck

@@ -47,6 +47,15 @@ bool IsStableInTheory(const StudyInputs& inputs, const std::vector<double>& para
   });
 }
 
+double CalcRadiusInTheory(const StudyInputs& inputs, const std::vector<double>& parameters) {
+  const Scenario scenario = MakeTrialScenario(inputs, {0, 0, parameters});
+  const SampledLoop loop = MakeLoop(scenario);
+  double radius = 0.0;
+  for (int axis = 0; axis < 6; ++axis)
+    radius = std::max(radius, CalcSpectralRadius(loop, GainsOf(scenario, axis)));
+  return radius;
+}
+
 bool IsDampedInTheory(const StudyInputs& inputs, const std::vector<double>& parameters) {
   return TestAxes(inputs, parameters, [](const SampledLoop& loop, const AxisGains& gains) {
     return gains.K_v >= CalcCriticalDamping(loop, gains.K_p);

@@ -15,6 +15,9 @@ namespace dexcheck {
 /// MakeTrialScenario.
 bool IsStableInTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
 
+/// Largest |eigenvalue| of one sample of (57) of all axes.
+double CalcRadiusInTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
+
 /// Whether it is damped at least critically on all axes.
 bool IsDampedInTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
 

@@ -4,6 +4,7 @@
 #include <new>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "harness/engine/engine.h"
 #include "harness/run/runner.h"
 #include "harness/study/trial_monitor.h"
@@ -60,9 +61,14 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
     const Setup setup(scenario, inputs.robot, inputs.mjcf, MakeEngine(inputs));
     Runner runner(setup, inputs.study.check);
     TrialMonitor monitor(setup, runner.loop().num_steps());
-    const RunResult& run =
-        runner.Run([&](const StepRecord& step) { monitor.Record(step); }, [] { return false; });
+    const double limit = inputs.study.stop_error;
+    const auto is_lost = [&] { return limit > 0.0 && monitor.position_error() > limit; };
+    const RunResult& run = runner.Run([&](const StepRecord& step) { monitor.Record(step); }, is_lost);
     result.failure = run.failure;
+    if (run.interrupted) {
+      result.failure = "the position error is above stop_error, " + FormatNumber(limit) +
+                       " m at t = " + FormatNumber(runner.loop().record().time) + " s";
+    }
     result.metrics = monitor.CalcMetrics(run.tracking);
     result.outcome = Classify(setup, run, result);
   } catch (const InputError& error) {
@@ -75,7 +81,14 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
 
 void CheckTrials(StudyInputs* inputs) {
   const Study& study = inputs->study;
-  Trial trial = ListTrials(study).front();
+  Trial trial;
+  if (study.is_search()) {
+    std::vector<double> point;
+    for (size_t i = 0; i < study.num_keys(); ++i) point.push_back(ValueAt(study.variations[i], 0.5));
+    trial = ListTrialsOfPoint(study, 0, point, ListDraws(study)).front();
+  } else {
+    trial = ListTrials(study).front();
+  }
   const Scenario first = MakeTrialScenario(*inputs, trial);
   inputs->engine = LoadMjcf(inputs->mjcf);
   const Setup setup(first, inputs->robot, inputs->mjcf, MakeEngine(*inputs));

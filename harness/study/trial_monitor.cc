@@ -38,6 +38,7 @@ void TrialMonitor::Record(const StepRecord& step) {
 
 void TrialMonitor::RecordError(const StepRecord& step) {
   const TrackingError& error = step.error;
+  position_error_ = error.position.norm();
   const double size = by_position_ ? error.position.norm() : error.orientation;
   const bool inside = size <= kSettledShare * start_error_;
   if (inside && !settled_) settled_since_ = step.time;

@@ -23,6 +23,9 @@ class TrialMonitor {
   /// Takes in a step.
   void Record(const StepRecord& step);
 
+  /// Of the last step, m.
+  [[nodiscard]] double position_error() const { return position_error_; }
+
   /// All metrics of the steps so far, those of `tracking` included.
   [[nodiscard]] std::array<double, kNumMetrics> CalcMetrics(const TrackingStatistics& tracking) const;
 
@@ -36,6 +39,7 @@ class TrialMonitor {
   bool has_heading_;
   long steps_ = 0;                         // that were completed
   Vector3d direction_ = Vector3d::Zero();  // of the start error
+  double position_error_ = 0.0;            // m, of the last step
   double start_error_ = 0.0;               // m, or rad when the object is only turned
   bool by_position_ = true;
   double settled_since_ = 0.0;  // s

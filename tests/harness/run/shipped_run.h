@@ -25,7 +25,9 @@ class ShippedRun {
     Scenario scenario = ReadShippedScenario(name, overrides);
     scenario.seed = seed;
     setup_ = std::make_unique<Setup>(
-        scenario, testing::SourcePath("/controller/parameters/assistant_robot.toml"),
+        scenario,
+        scenario.model_file.empty() ? testing::SourcePath("/controller/parameters/assistant_robot.toml")
+                                    : scenario.model_file,
         scenario.mjcf_file.empty() ? testing::SourcePath("/mjcf/scene.xml") : scenario.mjcf_file);
     runner_ = std::make_unique<Runner>(*setup_, /*check=*/true);
   }

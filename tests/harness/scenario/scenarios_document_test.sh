@@ -98,6 +98,7 @@ for batch in "${!batches[@]}"; do
   IFS='|' read -r section start number <<<"$batch"
   base=paper
   [[ $section != task ]] || base=lift
+  [[ $section != joint_motion ]] || base=panda-reach
   arguments=()
   [[ $start == - ]] || arguments+=(--set "$start")
   # K_p and K_v, and an angle in degrees, stand in the place of what paper.toml has.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "controller/common/errors.h"
@@ -90,6 +91,114 @@ TEST(StudyReader, SamplesStayInTheirRanges) {
     }
     EXPECT_EQ(low_half, 32) << "even in the logarithm";
   }
+}
+
+TEST(StudyReader, TruthsAndListsAreValuesToo) {
+  const Study study =
+      ParseStudy(ReplaceOnce(kStudy, "values = [5, 4.5]", "values = [true, false, [1, 0, 0]]"), "study.toml");
+  EXPECT_EQ(study.variations[1].labels, (std::vector<std::string>{"true", "false", "[1, 0, 0]"}));
+  EXPECT_EQ(ListOverrides(study, ListTrials(study)[4]).back(), "control.K_v=[1, 0, 0]");
+}
+
+const std::string kSearch = R"(name = "best"
+scenario = "hold"
+constraints = ["peak_effort < 0.8", { require = "held", share = 0.9 }]
+[search]
+method = "cma_es"
+count = 100
+start = [20, "pd"]
+[[objective]]
+minimize = "energy + 2 * overshoot"
+aggregate = "quantile"
+quantile = 0.9
+[[vary]]
+key = "a"
+from = 10
+to = 30
+[[vary]]
+key = "b"
+from = 0
+to = 1
+[nested]
+method = "sobol"
+count = 4
+seed = 7
+scramble = true
+[[nested.vary]]
+key = "c"
+from = 1
+to = 2
+)";
+
+TEST(StudyReader, ReadsASearch) {
+  const Study study = ParseStudy(ReplaceOnce(kSearch, "\"pd\"", "0.25"), "study.toml");
+  EXPECT_EQ(study.search.method, SearchMethod::kCmaEs);
+  EXPECT_EQ(study.search.count, 96) << "whole generations of 16";
+  EXPECT_EQ(study.search.start_values, (std::vector<double>{20, 0.25}));
+  ASSERT_EQ(study.objectives.size(), 1U);
+  EXPECT_EQ(study.objectives[0].expression, "energy + 2 * overshoot");
+  EXPECT_EQ(study.objectives[0].quantile, 0.9);
+  ASSERT_EQ(study.constraints.size(), 2U);
+  EXPECT_EQ(study.constraints[1].share, 0.9);
+  EXPECT_EQ(study.num_keys(), 2U);
+  EXPECT_EQ(study.num_nested, 1U);
+  EXPECT_TRUE(study.nested.scramble);
+  EXPECT_EQ(CountTrials(study), 96 * 4);
+}
+
+TEST(StudyReader, MistakesOfASearchAreNamed) {
+  const std::string good = ReplaceOnce(kSearch, "\"pd\"", "0.25");
+  const auto fails = [&](const std::string& from, const std::string& to, const std::string& message) {
+    return Throws<InputError>([&] { return ParseStudy(ReplaceOnce(good, from, to), "study.toml"); }, message);
+  };
+  EXPECT_TRUE(fails("peak_effort < 0.8", "effort < 0.8", "study.toml:3: constraints[0]"));
+  EXPECT_TRUE(fails("share = 0.9", "share = 1.1", "share: must be at most 1, got 1.1"));
+  EXPECT_TRUE(fails("energy + 2", "energy + 2 *", "objective[0].minimize"));
+  EXPECT_TRUE(fails("minimize", "minimise", "minimise"));
+  EXPECT_TRUE(fails("quantile = 0.9", "quantile = 90", "quantile: must be at most 1, got 90"));
+  EXPECT_TRUE(fails("\"cma_es\"", "\"nsga2\"", "nsga2 needs two objectives at least"));
+  EXPECT_TRUE(fails("\"cma_es\"", "\"cmaes\"", "must be one of \"cma_es\""));
+  EXPECT_TRUE(fails("count = 100", "count = 10", "count: must be at least the population, 16, got 10"));
+  EXPECT_TRUE(
+      fails("count = 100", "count = 100\npopulation = 18", "population: must be a multiple of 4, got 18"));
+  EXPECT_TRUE(fails("start = [20, 0.25]", "start = [20]", "needs a value for each of the 2 keys"));
+  EXPECT_TRUE(fails("start = [20, 0.25]", "start = [40, 0.25]",
+                    "start[0]: must be from 10 to 30, as \"a\" is, got 40"));
+  EXPECT_TRUE(fails("key = \"c\"", "key = \"a\"", "\"a\" is varied twice"));
+  EXPECT_TRUE(fails("[search]", "[sample]\nmethod = \"sobol\"\ncount = 3\n[search]", "sample"));
+  EXPECT_TRUE(
+      fails("method = \"sobol\"", "method = \"latin_hypercube\"", "scramble: is for a Sobol sequence"));
+  EXPECT_TRUE(Throws<InputError>(
+      [&] {
+        return ParseStudy(
+            "name = \"s\"\nscenario = \"hold\"\n[search]\nmethod = \"cma_es\"\ncount = "
+            "32\n[[vary]]\nkey = \"a\"\nfrom = 0\nto = 1\n",
+            "study.toml");
+      },
+      "a search needs an [[objective]]"));
+}
+
+TEST(StudyReader, ReadsMargins) {
+  const std::string text =
+      "name = \"s\"\nscenario = \"hold\"\n[search]\nmethod = \"margins\"\nstart = [0.5]\ndirections = "
+      "3\ntolerance = "
+      "0.125\n[[vary]]\nkey = \"a\"\nfrom = 0\nto = 1\n";
+  EXPECT_EQ(CountTrials(ParseStudy(text, "study.toml")), 1 + 5 * (1 + 3))
+      << "the start, 5 directions, 3 bisections each";
+  EXPECT_TRUE(Throws<InputError>([&] { return ParseStudy(ReplaceOnce(text, "0.125", "0"), "study.toml"); },
+                                 "tolerance"));
+  EXPECT_TRUE(Throws<InputError>(
+      [&] { return ParseStudy(ReplaceOnce(text, "directions", "count"), "study.toml"); }, "search.count"));
+}
+
+TEST(StudyReader, SamplesChooseAmongValues) {
+  const Study study = ParseStudy(
+      "name = \"s\"\nscenario = \"hold\"\n[sample]\nmethod = \"sobol\"\ncount = 32\n[[vary]]\nkey = "
+      "\"a\"\nfrom = 0\nto = 1\n[[vary]]\nkey = \"law\"\nvalues = [\"x\", \"y\", \"z\", \"w\"]\n",
+      "study.toml");
+  std::array<int, 4> counts{};
+  for (const Trial& trial : ListTrials(study)) ++counts.at(static_cast<size_t>(trial.parameters[1]));
+  EXPECT_EQ(counts, (std::array<int, 4>{8, 8, 8, 8}));
 }
 
 TEST(StudyReader, MistakesAreNamed) {

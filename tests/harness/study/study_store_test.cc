@@ -170,8 +170,8 @@ TEST_F(StudyStoreTest, FailedTrialsGiveWay) {
 
     crashed.trial.number = 1;
     store.Add(crashed);
-    EXPECT_EQ(store.RemoveFailed({MakeRow(0).trial}), 0) << "not this one";
-    EXPECT_EQ(store.RemoveFailed({MakeRow(0).trial, crashed.trial}), 1);
+    EXPECT_EQ(store.RemoveFailed({0}), 0) << "not this one";
+    EXPECT_EQ(store.RemoveFailed({0, crashed.trial.number}), 1);
     EXPECT_TRUE(store.Has(0));
     EXPECT_FALSE(store.Has(1));
     EXPECT_TRUE(store.Claim(1));

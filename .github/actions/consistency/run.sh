@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# What action.yml runs: builds dexcheck, unless DEXCHECK names a program, and compares DEXCHECK_A with DEXCHECK_B. The
+# verdict goes into the job's summary; the exit code is dexcheck's.
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)
+if [[ -z ${DEXCHECK:-} ]]; then
+  "$root/harness/install-packages.sh"
+  (cd "$root" && cmake --preset program && cmake --build --preset program)
+  DEXCHECK=$root/build/release/bin/dexcheck
+fi
+summary=${GITHUB_STEP_SUMMARY:-/dev/null}
+worst=0
+
+# Run TITLE ARGUMENTS...: what dexcheck prints goes into the log and into the summary.
+Run() {
+  local title=$1 status=0 output
+  shift
+  output=$("$DEXCHECK" "$@" 2>&1) || status=$?
+  printf '%s\n' "$output"
+  printf '### %s\n\n```\n%s\n```\n' "$title" "$output" >>"$summary"
+  ((status <= worst)) || worst=$status
+}
+
+if [[ ${DEXCHECK_AUDIT:-false} == true ]]; then
+  Run "audit of $DEXCHECK_A" audit "$DEXCHECK_A"
+  Run "audit of $DEXCHECK_B" audit "$DEXCHECK_B"
+fi
+read -r -a arguments <<<"${DEXCHECK_ARGUMENTS:-}"
+Run "$DEXCHECK_A against $DEXCHECK_B" consistency "$DEXCHECK_A" "$DEXCHECK_B" --junit "${DEXCHECK_JUNIT:-dexcheck.xml}" \
+  "${arguments[@]}"
+[[ $worst -eq 0 ]] || echo "::error::$DEXCHECK_A and $DEXCHECK_B: dexcheck found a difference (exit code $worst)"
+exit "$worst"

@@ -1,0 +1,59 @@
+#include "controller/control/joint_controller.h"
+
+#include "controller/common/errors.h"
+#include "controller/object/euler_zyz.h"
+
+namespace dexcheck {
+namespace {
+
+GraspModelOptions WithoutCoordinates() {
+  GraspModelOptions options;
+  options.orientation = OrientationFeedback::kRotation;
+  return options;
+}
+
+}  // namespace
+
+JointController::JointController(const RobotModel& model, const MassProperties& object,
+                                 const Surface& surface, ControlLaw law, const JointGains& gains,
+                                 const JointMotion& motion, const Sampling& sampling)
+    : model_(model, {}, object, surface, WithoutCoordinates()),
+      law_(model, law, gains),
+      motion_(&motion),
+      sampling_(sampling) {
+  Require(sampling.hold > 0, "sampling.hold", "must be positive", static_cast<double>(sampling.hold));
+}
+
+void JointController::Follow(const Trajectory& /*motion*/) { steps_until_due_ = 0; }
+
+void JointController::Begin(double /*t*/, const Reading& /*reading*/) {
+  has_begun_ = true;
+  steps_until_due_ = 0;
+}
+
+void JointController::EvaluateDesired(const JointMotion& motion, double t, double time_step,
+                                      DesiredJoints* desired, DesiredJoints* half_step) {
+  motion.Evaluate(t, desired);
+  // Semi-implicit Euler steps like a leapfrog: velocities belong to the middle of the step before.
+  motion.Evaluate(t - 0.5 * time_step, half_step);
+  desired->q_dot = half_step->q_dot;
+}
+
+void JointController::Step(const Reading& reading, double t, Command* command) {
+  constexpr double kBefore = -1.0;  // s, when the motion is at its start
+  command->tracks = false;
+  command->handling.holding = false;
+  command->desired.X_d << reading.state.X_Bo.translation(), CalcAnyZyzAngles(reading.state.X_Bo.linear());
+  EvaluateDesired(*motion_, has_begun_ ? t : kBefore, sampling_.time_step, &command->joints, &half_step_);
+  model_.SetState(reading.state);
+  command->computes_joints = steps_until_due_ == 0;
+  if (steps_until_due_ > 0) {
+    --steps_until_due_;
+    return;
+  }
+  steps_until_due_ = sampling_.hold - 1;
+  command->tau = law_.CalcTorque(model_.robot(), reading.state.q, reading.state.xi, command->joints);
+  command->demand.xi_dot = law_.xi_dot_d();
+}
+
+}  // namespace dexcheck

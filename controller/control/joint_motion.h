@@ -1,0 +1,53 @@
+#pragma once
+
+// What the joints of a robot that holds nothing should do: q_d(t), with its first two derivatives.
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "controller/common/types.h"
+#include "controller/control/trajectory.h"
+
+namespace dexcheck {
+
+/// q_d and its derivatives at one instant, by joint: rad or m, and per s.
+struct DesiredJoints {
+  VectorXd q, q_dot, q_ddot;
+};
+
+/// A joint is somewhere at a time.
+struct JointWayPoint {
+  double time = 0.0;  ///< s, > 0.
+  VectorXd q;         ///< All joints, rad or m.
+};
+
+/// A joint swings: amplitude sin(2 pi frequency t), which grows with least jerk over ramp_time.
+struct JointOscillation {
+  int joint = 0;
+  double amplitude = 0.0;  ///< rad or m.
+  double frequency = 0.0;  ///< 1/s.
+  double ramp_time = 0.0;  ///< s.
+};
+
+/// q_d(t) of all joints: from where they start through way points, as WayPointTrajectory goes, with
+/// oscillations on top. Before t = 0 it is at rest at the start. Evaluation does not allocate once the result
+/// has its sizes.
+class JointMotion {
+ public:
+  /// @param q_start of all joints. @param points none to stay at the start.
+  /// @throws std::invalid_argument when a size differs, and as WayPointTrajectory, OscillationTrajectory.
+  JointMotion(const VectorXd& q_start, const std::vector<JointWayPoint>& points,
+              const std::vector<JointOscillation>& oscillations);
+
+  [[nodiscard]] const VectorXd& q_start() const { return q_start_; }
+  void Evaluate(double t, DesiredJoints* desired) const;
+
+ private:
+  VectorXd q_start_;
+  /// Displacements of six joints each; of the last, only as many as there are.
+  std::vector<std::unique_ptr<Trajectory>> ways_;
+  std::vector<std::pair<int, std::unique_ptr<Trajectory>>> oscillations_;  // by joint, in the first entry
+};
+
+}  // namespace dexcheck

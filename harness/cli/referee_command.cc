@@ -1,0 +1,243 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/common/text.h"
+#include "harness/base/interrupts.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/junit_file.h"
+#include "harness/cli/output_file.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/sides/join_names.h"
+#include "harness/sides/read_description.h"
+#include "harness/sides/referee.h"
+#include "harness/sides/tolerance.h"
+
+namespace dexcheck::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Request {
+  std::filesystem::path robot;
+  RefereeOptions options;
+  UrdfOptions urdf;
+  std::string json_file;
+  std::string junit_file;
+  int digits = 6;  ///< MuJoCo 2.2.2 diagonalises inertias to 1e-6 or better.
+  bool quiet = false;
+};
+
+/// Worst differences of a pair, by the names of terms; empty for those that one of the two does not have.
+std::string FormatCell(const ComparedPair& pair, const std::string& term) {
+  for (const CheckRecord& record : pair.terms) {
+    if (record.name == term) return fmt::format("{:.1e}{}", record.worst, record.failed ? "!" : " ");
+  }
+  return "- ";
+}
+
+const CheckRecord* FindWorst(const ComparedPair& pair) {
+  const auto by_bound = [](const CheckRecord& a, const CheckRecord& b) {
+    return a.worst / a.bound < b.worst / b.bound;
+  };
+  const auto worst = std::max_element(pair.terms.begin(), pair.terms.end(), by_bound);
+  return worst == pair.terms.end() ? nullptr : &*worst;
+}
+
+std::vector<std::string> NamesOf(const std::vector<size_t>& group, const RefereeResult& result) {
+  std::vector<std::string> names;
+  for (const size_t side : group) names.push_back(result.names[side]);
+  return names;
+}
+
+void PrintTable(const Request& request, const RobotModel& model, const RefereeResult& result) {
+  fmt::print("{}: {}\n{} random states (seed {}), {} engines\n\n", model.name(),
+             request.robot.filename().string(), result.samples, request.options.states.seed,
+             result.names.size());
+  for (const std::string& note : result.notes) fmt::print("  {}\n", note);
+  for (const std::string& absent : result.absent) fmt::print("  not compared: {}\n", absent);
+  if (!result.notes.empty() || !result.absent.empty()) fmt::print("\n");
+
+  std::vector<std::string> terms;
+  size_t width = 0;
+  for (const ComparedPair& pair : result.pairs) {
+    width = std::max(width, result.names[pair.first].size() + result.names[pair.second].size() + 3);
+    for (const CheckRecord& record : pair.terms) {
+      if (std::find(terms.begin(), terms.end(), record.name) == terms.end()) terms.push_back(record.name);
+    }
+  }
+  fmt::print("{:<{}}", "worst difference", width);
+  for (const std::string& term : terms) fmt::print("{:>18}", term + " ");
+  fmt::print("   where it is worst\n");
+  const int base = model.num_base_velocities();
+  for (const ComparedPair& pair : result.pairs) {
+    fmt::print("{:<{}}", result.names[pair.first] + " - " + result.names[pair.second], width);
+    for (const std::string& term : terms) fmt::print("{:>18}", FormatCell(pair, term));
+    const CheckRecord* const worst = FindWorst(pair);
+    if (worst == nullptr) {
+      fmt::print("   no term in common\n");
+    } else {
+      fmt::print("   {} {}, state {}\n", worst->name, Describe(worst->where, model, base),
+                 static_cast<long>(worst->at));
+    }
+  }
+  fmt::print("\nDifferences are relative to each term's own scale; those above {:g} are marked by \"!\".\n",
+             request.options.tolerance);
+}
+
+void PrintVerdict(const Request& request, const RefereeResult& result) {
+  if (result.samples < request.options.states.samples) {
+    fmt::print("INTERRUPTED after {} of {} states. So far:\n", result.samples,
+               request.options.states.samples);
+  }
+  if (result.Agrees()) {
+    fmt::print("AGREE: {} agree in all terms that they have in common.\n", JoinNames(result.names));
+    return;
+  }
+  fmt::print("DISAGREE:\n");
+  for (const std::vector<size_t>& group : result.groups) {
+    fmt::print("  {}{}\n", JoinNames(NamesOf(group, result)), group.size() > 1 ? " agree" : " stands alone");
+  }
+  for (const std::string& setting : result.settings) fmt::print("  {}\n", setting);
+}
+
+std::string ToText(const Request& request, const RobotModel& model, const RefereeResult& result) {
+  const int base = model.num_base_velocities();
+  Json json = {{"robot", request.robot.string()},
+               {"verdict", result.Agrees() ? "pass" : "disagreement"},
+               {"samples", result.samples},
+               {"seed", request.options.states.seed},
+               {"tolerance", request.options.tolerance},
+               {"engines", result.names},
+               {"absent", result.absent},
+               {"notes", result.notes},
+               {"settings", result.settings}};
+  json["groups"] = Json::array();
+  for (const std::vector<size_t>& group : result.groups) json["groups"].push_back(NamesOf(group, result));
+  json["pairs"] = Json::array();
+  for (const ComparedPair& pair : result.pairs) {
+    Json entry = {{"first", result.names[pair.first]}, {"second", result.names[pair.second]}};
+    entry["terms"] = Json::object();
+    for (const CheckRecord& record : pair.terms) {
+      entry["terms"][record.name] = {{"max", record.worst},
+                                     {"digits", CountDigits(record.worst)},
+                                     {"pass", !record.failed},
+                                     {"compared", record.comparisons},
+                                     {"where", Describe(record.where, model, base)},
+                                     {"sample", static_cast<long>(record.at)},
+                                     {"first", record.model_value},
+                                     {"second", record.engine_value}};
+    }
+    json["pairs"].push_back(entry);
+  }
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+/// A case for each pair and term.
+std::string WriteJUnit(const Request& request, const RobotModel& model, const RefereeResult& result) {
+  std::vector<JUnitCase> cases;
+  for (const ComparedPair& pair : result.pairs) {
+    for (const CheckRecord& record : pair.terms) {
+      cases.push_back(MakeJUnitCase(result.names[pair.first] + " - " + result.names[pair.second], record,
+                                    Describe(record.where, model, model.num_base_velocities())));
+    }
+  }
+  return dexcheck::cli::WriteJUnit("dexcheck.referee." + request.robot.stem().string(), cases, 0.0,
+                                   result.lacks_requested ? JoinNames(result.absent) : "");
+}
+
+/// What is shipped beside the program: ../libexec/dexcheck, in a build as when installed.
+std::filesystem::path FindProgramsFolder() {
+  std::error_code ignored;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", ignored);
+  return program.parent_path().parent_path() / "libexec/dexcheck";
+}
+
+int Run(Request request) {
+  CatchInterrupts();
+  request.options.tolerance = std::pow(10.0, -request.digits);
+  request.options.programs_folder = FindProgramsFolder();
+  std::optional<OutputFile> json;
+  if (!request.json_file.empty()) json.emplace(request.json_file);
+  std::optional<OutputFile> junit;
+  if (!request.junit_file.empty()) junit.emplace(request.junit_file);
+  const RobotDescription robot = ReadDescription(request.robot, request.urdf);
+  const RobotModel model(robot.spec);
+  ProgressBar bar("comparing", request.options.states.samples, request.quiet);
+  const RefereeResult result = RunReferee(robot, request.robot, request.options, [&](long samples) {
+    bar.Update(samples);
+    return !IsInterrupted();
+  });
+  bar.Finish();
+  const bool is_whole = result.samples >= request.options.states.samples && !result.lacks_requested;
+  ExitCode code = is_whole ? kSuccess : kFailure;
+  if (!result.Agrees()) code = kDisagreement;
+  if (json) json->Write(ToText(request, model, result));
+  if (junit) junit->Write(WriteJUnit(request, model, result));
+  if (request.json_file == "-") return code;
+  if (!request.quiet) PrintTable(request, model, result);
+  PrintVerdict(request, result);
+  return code;
+}
+
+}  // namespace
+
+void AddRefereeCommand(Command app) {
+  constexpr long kMaxSamples = 1000000;
+  constexpr int kMostDigits = 15;
+  const auto request = std::make_shared<Request>();
+  request->options.states.samples = 100;
+  Command command =
+      app.AddCommand("referee", "Compare one robot's terms in several physics engines, pair by pair");
+  command.AddOption("ROBOT", &request->robot, "URDF; with fewer engines an MJCF or a parameter file (TOML)")
+      .TypeName("FILE")
+      .Required();
+  std::string names;
+  for (const RefereeEngine& engine : ListRefereeEngines()) names += (names.empty() ? "" : ", ") + engine.name;
+  command
+      .AddOption("--engines", &request->options.engines,
+                 "Which of " + names + "; all that are there when none is named")
+      .TypeName("NAME,...")
+      .Delimiter(',');
+  command
+      .AddOption("--engine", &request->options.programs,
+                 "One more: a program of your own that answers terms (harness/sides/README.md)")
+      .TypeName("NAME=CMD")
+      .Repeatable();
+  command.AddOption("--mjcf", &request->options.mjcf, "What MuJoCo reads instead of ROBOT")
+      .TypeName("FILE.xml");
+  command
+      .AddOption("--node-modules", &request->options.node_modules,
+                 "Folder where npm installed @mujoco/mujoco")
+      .TypeName("FOLDER");
+  command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats");
+  command.AddOption("--samples", &request->options.states.samples, "Number of random states")
+      .TypeName("N")
+      .Check(WholeNumber(1, kMaxSamples))
+      .ShowDefault();
+  command.AddOption("--seed", &request->options.states.seed, "Of the random states")
+      .TypeName("N")
+      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
+      .ShowDefault();
+  command.AddOption("--digits", &request->digits, "Agreement to this many digits of a term's scale is enough")
+      .TypeName("N")
+      .Check(WholeNumber(1, kMostDigits))
+      .ShowDefault();
+  command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
+      .TypeName("FILE.json");
+  command
+      .AddOption("--junit", &request->junit_file,
+                 "Write each check as a test case of JUnit's XML to this file")
+      .TypeName("FILE.xml");
+  command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
+  command.SetAction([=] { return Run(*request); });
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,84 @@
+#include "harness/sides/engine_urdf.h"
+
+#include <tinyxml2.h>
+
+#include <set>
+
+#include "controller/common/errors.h"
+
+namespace dexcheck {
+namespace {
+
+using tinyxml2::XMLElement;
+
+void RemoveChildren(XMLElement* parent, const std::set<std::string>& names) {
+  for (XMLElement* child = parent->FirstChildElement(); child != nullptr;) {
+    XMLElement* const next = child->NextSiblingElement();
+    if (names.contains(child->Name())) parent->DeleteChild(child);
+    child = next;
+  }
+}
+
+/// The link that no joint carries.
+std::string FindRoot(XMLElement* robot) {
+  std::set<std::string> carried;
+  for (XMLElement* joint = robot->FirstChildElement("joint"); joint != nullptr;
+       joint = joint->NextSiblingElement("joint")) {
+    const XMLElement* child = joint->FirstChildElement("child");
+    const char* link = child == nullptr ? nullptr : child->Attribute("link");
+    if (link != nullptr) carried.insert(link);
+  }
+  for (XMLElement* link = robot->FirstChildElement("link"); link != nullptr;
+       link = link->NextSiblingElement("link")) {
+    const char* name = link->Attribute("name");
+    if (name != nullptr && !carried.contains(name)) return name;
+  }
+  return {};
+}
+
+/// MuJoCo lets move freely only what hangs on a link called "world".
+void LetFloat(XMLElement* robot) {
+  const std::string root = FindRoot(robot);
+  for (XMLElement* joint = robot->FirstChildElement("joint"); joint != nullptr;
+       joint = joint->NextSiblingElement("joint")) {
+    XMLElement* const parent = joint->FirstChildElement("parent");
+    if (parent == nullptr || joint->Attribute("type", "floating") == nullptr) continue;
+    if (parent->Attribute("link", root.c_str()) == nullptr) continue;
+    parent->SetAttribute("link", "world");
+    for (XMLElement* link = robot->FirstChildElement("link"); link != nullptr;
+         link = link->NextSiblingElement("link")) {
+      if (link->Attribute("name", root.c_str()) != nullptr) link->SetAttribute("name", "world");
+    }
+    return;
+  }
+  robot->InsertNewChildElement("link")->SetAttribute("name", "world");
+  XMLElement* const joint = robot->InsertNewChildElement("joint");
+  joint->SetAttribute("name", "dexcheck_floating_base");
+  joint->SetAttribute("type", "floating");
+  joint->InsertNewChildElement("parent")->SetAttribute("link", "world");
+  joint->InsertNewChildElement("child")->SetAttribute("link", root.c_str());
+}
+
+}  // namespace
+
+std::string WriteEngineUrdf(std::string_view text, const std::string& source, bool floats) {
+  tinyxml2::XMLDocument document;
+  document.Parse(text.data(), text.size());
+  XMLElement* const robot = document.Error() ? nullptr : document.FirstChildElement("robot");
+  if (robot == nullptr) throw InputError(source + ": must be a URDF");
+  RemoveChildren(robot, {"gazebo", "transmission", "material", "mujoco", "sensor"});
+  for (XMLElement* link = robot->FirstChildElement("link"); link != nullptr;
+       link = link->NextSiblingElement("link")) {
+    RemoveChildren(link, {"visual", "collision"});
+  }
+  XMLElement* const compiler = document.NewElement("mujoco")->InsertNewChildElement("compiler");
+  compiler->SetAttribute("fusestatic", "false");
+  compiler->SetAttribute("discardvisual", "true");
+  robot->InsertFirstChild(compiler->Parent());
+  if (floats) LetFloat(robot);
+  tinyxml2::XMLPrinter printer;
+  document.Print(&printer);
+  return printer.CStr();
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,118 @@
+#include "harness/sides/file_comparison.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "harness/engine/engine.h"
+#include "harness/sides/complete_description.h"
+#include "harness/sides/description_check.h"
+#include "harness/sides/description_match.h"
+#include "harness/sides/model_comparison.h"
+#include "harness/sides/read_description.h"
+#include "harness/sides/robot_file.h"
+
+namespace dexcheck {
+namespace {
+
+using Progress = std::function<bool(long)>;
+
+void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& more) {
+  notes->insert(notes->end(), more.begin(), more.end());
+}
+
+/// A parameter file against the engine.
+void CompareTableWithEngine(const ConsistencyOptions& options, const Progress& progress,
+                            Comparison* comparison) {
+  const RobotDescription table = ReadDescription(comparison->first);
+  comparison->model.emplace(table.spec);
+  const MjModelPtr engine = LoadMjcf(comparison->second);
+  const Adapter adapter(*comparison->model, *engine, comparison->second.string());
+  comparison->result = CheckConsistency(adapter, options, progress);
+  AppendTo(&comparison->notes, CheckDescription(table, adapter, &comparison->result.gate));
+  AppendTo(&comparison->notes, DescribeBaseCoordinates(table));
+}
+
+/// A URDF, or another MJCF, against the engine.
+void CompareDescriptionWithEngine(const UrdfOptions& urdf, const ConsistencyOptions& options,
+                                  const Progress& progress, Comparison* comparison) {
+  RobotDescription robot = ReadDescription(comparison->first, urdf);
+  const MjModelPtr engine = LoadMjcf(comparison->second);
+  Completion completion = CompleteFromEngine(*engine, comparison->second.filename().string(), &robot);
+  comparison->model.emplace(robot.spec);
+  const Adapter adapter(*comparison->model, *engine, comparison->second.string());
+  comparison->result = CheckConsistency(adapter, options, progress);
+  GateResult& gate = comparison->result.gate;
+  std::erase_if(gate.records, [&](const CheckRecord& record) {
+    return !record.failed && std::find(completion.unstated.begin(), completion.unstated.end(), record.name) !=
+                                 completion.unstated.end();
+  });
+  const std::vector<std::string> others = CheckDescription(robot, adapter, &gate);
+  for (const auto& notes : {robot.notes, completion.notes, others, DescribeBaseCoordinates(robot)}) {
+    AppendTo(&comparison->notes, notes);
+  }
+}
+
+/// Two descriptions without the engine.
+void CompareTwoDescriptions(const UrdfOptions& urdf, const ConsistencyOptions& options,
+                            const Progress& progress, Comparison* comparison) {
+  RobotDescription a = ReadDescription(comparison->first, urdf);
+  RobotDescription b = ReadDescription(comparison->second, urdf);
+  const std::vector<std::string> taken = CompleteEachOther(&a, &b);
+  for (const auto& notes : {a.notes, b.notes, taken, DescribeBaseCoordinates(a)}) {
+    AppendTo(&comparison->notes, notes);
+  }
+  comparison->model.emplace(a.spec);
+  comparison->result = CompareDescriptions(a, b, options, progress);
+}
+
+}  // namespace
+
+Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::path& b,
+                        const UrdfOptions& urdf, const ConsistencyOptions& options,
+                        const Progress& progress) {
+  Comparison comparison;
+  comparison.first = a;
+  comparison.second = b;
+  if (FindFormat(a) == RobotFormat::kMjcf && FindFormat(b) != RobotFormat::kMjcf) {
+    std::swap(comparison.first, comparison.second);
+  }
+  comparison.with_engine = FindFormat(comparison.second) == RobotFormat::kMjcf;
+  if (!comparison.with_engine) {
+    CompareTwoDescriptions(urdf, options, progress, &comparison);
+  } else if (FindFormat(comparison.first) == RobotFormat::kToml) {
+    CompareTableWithEngine(options, progress, &comparison);
+  } else {
+    CompareDescriptionWithEngine(urdf, options, progress, &comparison);
+  }
+  return comparison;
+}
+
+void ExplainComparison(const UrdfOptions& urdf, Comparison* comparison) {
+  if (comparison->result.Agrees()) return;
+  comparison->hypotheses = ExplainDifference(comparison->first, comparison->second, urdf);
+}
+
+std::vector<std::string> ListDifferences(const Comparison& comparison) {
+  const RobotModel& model = *comparison.model;
+  const int base = model.num_base_velocities();
+  const std::string first = comparison.first.filename().string();
+  const std::string second = comparison.second.filename().string();
+  std::vector<std::string> lines;
+  for (const GateFinding& finding : comparison.result.gate.findings) {
+    lines.push_back(fmt::format("{}: {}: {:.12g} in {}, {:.12g} in {}", finding.check, finding.where,
+                                finding.model, first, finding.engine, second));
+  }
+  for (const CheckRecord& record : comparison.result.terms) {
+    if (!record.failed) continue;
+    lines.push_back(fmt::format(
+        "{}: nearest the base: {}; worst: {}: {:.12g} in {}, {:.12g} in {} (sample {})", record.name,
+        Describe(record.first_failure, model, base), Describe(record.where, model, base), record.model_value,
+        comparison.with_engine ? "the model" : first, record.engine_value,
+        comparison.with_engine ? "MuJoCo" : second, static_cast<long>(record.at)));
+  }
+  return lines;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,41 @@
+#pragma once
+
+// Two files that describe one robot, compared: what `dexcheck consistency A B` does.
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/checks/consistency.h"
+#include "harness/sides/hypotheses.h"
+#include "harness/sides/urdf_reader.h"
+
+namespace dexcheck {
+
+/// What was compared: the model that locations belong to, and the results.
+struct Comparison {
+  std::filesystem::path first;  ///< An MJCF stands second, if there is one.
+  std::filesystem::path second;
+  bool with_engine = false;  ///< The second is an MJCF, whose terms are the engine's.
+  std::optional<RobotModel> model;
+  std::vector<std::string> notes;
+  ConsistencyResult result;
+  std::vector<Hypothesis> hypotheses;  ///< Mistakes that would explain what differs.
+};
+
+/// Compares constants and terms of two parameter files, URDFs or MJCFs. Of two MJCFs the second is the
+/// engine's.
+/// @throws InputError for files that cannot be read, and for robots of two mechanisms.
+Comparison CompareFiles(
+    const std::filesystem::path& a, const std::filesystem::path& b, const UrdfOptions& urdf,
+    const ConsistencyOptions& options, const std::function<bool(long)>& progress = [](long) { return true; });
+
+/// Tries the mistakes that people make on what differs, after any judgement by a tolerance.
+void ExplainComparison(const UrdfOptions& urdf, Comparison* comparison);
+
+/// One line for each constant and term that differs: where first, where worst, both values.
+std::vector<std::string> ListDifferences(const Comparison& comparison);
+
+}  // namespace dexcheck

@@ -1,0 +1,74 @@
+#pragma once
+
+// Matchers for GoogleTest and GoogleMock, for tests of somebody else's robot; the includer links both.
+//
+//   EXPECT_THAT("robot.urdf", dexcheck::testing::AgreesWith("robot.xml"));
+//   EXPECT_THAT(my_functions, dexcheck::testing::AgreesWith("robot.urdf", {.digits = 9}));
+//
+// (the second with dexcheck::TermFunctions). What differs is listed with its place and both values, and the
+// mistake that explains it is named.
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <filesystem>
+#include <ostream>
+#include <string>
+
+#include "harness/sides/file_comparison.h"
+#include "harness/sides/function_side.h"
+#include "harness/sides/tolerance.h"
+
+namespace dexcheck::testing {
+
+/// How two sides are compared.
+struct AgreementOptions {
+  long samples = 1000;  ///< Random states.
+  std::uint64_t seed = 1;
+  int digits = 0;  ///< Agreement to this many digits of a term's scale is enough; 0: to rounding.
+  UrdfOptions urdf;
+};
+
+/// Whether a description, or terms of one's own, agree with a parameter file, a URDF or an MJCF.
+class AgreesWithMatcher {
+ public:
+  AgreesWithMatcher(std::filesystem::path file, AgreementOptions options)
+      : file_(std::move(file)), options_(std::move(options)) {}
+
+  bool MatchAndExplain(const TermFunctions& functions, ::testing::MatchResultListener* listener) const {
+    return Judge(CompareFunctions(file_, functions, options_.urdf, MakeOptions()), /*explain=*/false,
+                 listener);
+  }
+  bool MatchAndExplain(const std::filesystem::path& other, ::testing::MatchResultListener* listener) const {
+    return Judge(CompareFiles(other, file_, options_.urdf, MakeOptions()), /*explain=*/true, listener);
+  }
+
+  void DescribeTo(std::ostream* os) const { *os << "agrees with " << file_; }
+  void DescribeNegationTo(std::ostream* os) const { *os << "differs from " << file_; }
+
+ private:
+  [[nodiscard]] ConsistencyOptions MakeOptions() const {
+    ConsistencyOptions options;
+    options.samples = options_.samples;
+    options.seed = options_.seed;
+    return options;
+  }
+
+  bool Judge(Comparison comparison, bool explain, ::testing::MatchResultListener* listener) const {
+    if (options_.digits > 0) JudgeByTolerance(std::pow(10.0, -options_.digits), &comparison.result);
+    for (const std::string& line : ListDifferences(comparison)) *listener << "\n  " << line;
+    if (explain) ExplainComparison(options_.urdf, &comparison);
+    for (const Hypothesis& likely : comparison.hypotheses) *listener << "\n  likely: " << likely.text;
+    return comparison.result.Agrees();
+  }
+
+  std::filesystem::path file_;
+  AgreementOptions options_;
+};
+
+inline ::testing::PolymorphicMatcher<AgreesWithMatcher> AgreesWith(const std::filesystem::path& file,
+                                                                   const AgreementOptions& options = {}) {
+  return ::testing::MakePolymorphicMatcher(AgreesWithMatcher(file, options));
+}
+
+}  // namespace dexcheck::testing

@@ -1,0 +1,79 @@
+#pragma once
+
+// What a study wants: objectives and constraints as expressions of metrics, judged over all trials of a
+// point.
+
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "harness/study/trial_result.h"
+
+namespace dexcheck {
+
+/// What becomes of an objective's values at the trials of one point (its seeds and nested draws).
+enum class Aggregate { kMean, kWorst, kQuantile };
+
+/// An expression of metrics that is to be small, or large.
+struct Objective {
+  std::string expression;  ///< Of names of metrics, as EvaluateExpression takes it.
+  bool maximize = false;
+  Aggregate aggregate = Aggregate::kMean;
+  double quantile = 0.5;  ///< Of kQuantile: this share of the trials is at least as good.
+};
+
+/// "position_error_rms, worst of its trials".
+std::string Describe(const Objective& objective);
+
+/// Something that must hold at a point's trials.
+struct Constraint {
+  enum class Kind { kLess, kOutcomeIs, kOutcomeIsNot, kHeld };
+  std::string text;  ///< As the study has it.
+  Kind kind = Kind::kHeld;
+  std::string less, more;  ///< Of kLess: expressions, less <= more.
+  Outcome outcome = Outcome::kTracked;
+  double share = 1.0;  ///< At this share of the trials at least.
+};
+
+/// "peak_effort < 0.8", "outcome == tracked", "verdict == pass" (which is the same), "held" (to its end, in
+/// the hand).
+/// @throws std::invalid_argument that says what is wrong.
+Constraint ParseConstraint(const std::string& text);
+
+/// @throws std::invalid_argument when this is no arithmetic of metrics.
+void RequireMetricExpression(const std::string& expression);
+
+/// Value of an expression; NaN where one of its metrics is.
+double EvaluateMetrics(const std::string& expression, const TrialResult& result);
+
+/// Whether a run came to its end with the object in the hand.
+bool IsHeld(Outcome outcome);
+
+/// How far one trial violates a constraint: 0 where it holds, at most 1, more for trials that were not held,
+/// the more the earlier they ended.
+double CalcViolation(const Constraint& constraint, const TrialResult& result);
+
+/// What a point comes to.
+struct Judgement {
+  std::vector<double>
+      objectives;  ///< To be minimised (of `maximize` with the other sign); infinite where a trial failed.
+  double violation = 0.0;  ///< 0 when all constraints hold.
+  [[nodiscard]] bool is_feasible() const { return violation <= 0.0; }
+};
+
+/// @param results of all trials of the point, in the order of their numbers. A point at which a trial was not
+/// held is
+///   not feasible unless a constraint of kind kHeld says which share may fail.
+Judgement JudgePoint(const std::vector<Objective>& objectives, const std::vector<Constraint>& constraints,
+                     std::span<const TrialResult> results);
+
+/// Whether `a` is to be preferred: feasible before not, less violation before more, then (one objective) the
+/// less.
+bool IsBetter(const Judgement& a, const Judgement& b);
+
+/// Whether `a` is feasible, nowhere worse than `b`, and somewhere better; or `b` is not feasible and `a` is.
+bool Dominates(const Judgement& a, const Judgement& b);
+
+}  // namespace dexcheck

@@ -1,0 +1,470 @@
+// The study's trials to look at: any two quantities, all keys, a table; each place leads to its trial.
+'use strict';
+(() => {
+  const source = document.getElementById('study-data');
+  if (!source) return;
+  const study = JSON.parse(source.textContent);
+  const bytes = Uint8Array.from(atob(document.getElementById('study-values').textContent), c => c.charCodeAt(0));
+  const numbers = new Float64Array(bytes.buffer);
+  const width = study.columns.length;
+  const count = numbers.length / width;
+  const value = (row, column) => numbers[row * width + column];
+  const kNumber = 0, kSeed = 1, kOutcome = 2, kFirstKey = 3;
+  const firstMetric = kFirstKey + study.keys.length;
+  const columns = study.columns;
+  const find = name => columns.findIndex(column => column.name === name);
+  const byId = id => document.getElementById('explore-' + id);
+  const style = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const held = row => study.held[value(row, kOutcome)];
+
+  const show = (x, column) => {
+    const labels = columns[column].labels;
+    if (labels) return labels[x] ?? '–';
+    if (column === kOutcome) return study.outcomes[x];
+    if (!Number.isFinite(x)) return '–';
+    return column <= kSeed ? String(x) : String(Number(x.toPrecision(5)));
+  };
+
+  // What is shown: rows that pass the filters.
+  let chosen = -1;
+  let rows = [];
+  const brushes = new Map();  // column: [least, most]
+  const Filter = () => {
+    const outcome = byId('outcome').value;
+    const text = byId('filter').value;
+    const tests = [];
+    for (const part of text.split(',')) {
+      const match = part.match(/^\s*([\w.[\]]+)\s*(<=|>=|<|>|=)\s*(\S+)\s*$/);
+      if (!match) continue;
+      const column = find(match[1]);
+      if (column < 0) continue;
+      const label = columns[column].labels ? columns[column].labels.indexOf(match[3]) : -1;
+      const limit = label >= 0 ? label : Number(match[3]);
+      const signs = {'<': x => x < limit, '<=': x => x <= limit, '>': x => x > limit, '>=': x => x >= limit,
+        '=': x => x === limit};
+      tests.push(row => signs[match[2]](value(row, column)));
+    }
+    for (const [column, [least, most]] of brushes) {
+      tests.push(row => value(row, column) >= least && value(row, column) <= most);
+    }
+    rows = [];
+    for (let row = 0; row < count; ++row) {
+      if (outcome !== '' && value(row, kOutcome) !== Number(outcome)) continue;
+      if (tests.every(test => test(row))) rows.push(row);
+    }
+    byId('count').textContent = rows.length + ' of ' + count + ' trials' +
+      (study.total > count ? ', a part of ' + study.total : '');
+  };
+
+  // Axes: a logarithm where a quantity spans decades.
+  const MakeAxis = (column, from, to) => {
+    let least = Infinity, most = -Infinity;
+    for (const row of rows) {
+      const x = value(row, column);
+      if (!Number.isFinite(x)) continue;
+      if (x < least) least = x;
+      if (x > most) most = x;
+    }
+    if (!(least <= most)) { least = 0; most = 1; }
+    const log = !columns[column].labels && least > 0 && most / least > 30;
+    const f = log ? Math.log10 : x => x;
+    const low = f(least), high = f(most), room = high > low ? 0.04 * (high - low) : 0.5;
+    const place = x => from + (f(x) - low + room) / (high - low + 2 * room) * (to - from);
+    const back = at => {
+      const y = low - room + (at - from) / (to - from) * (high - low + 2 * room);
+      return log ? 10 ** y : y;
+    };
+    return {column, least, most, log, place, back};
+  };
+  const Ticks = axis => {
+    const labels = columns[axis.column].labels;
+    if (labels) return labels.map((_, i) => i);
+    if (axis.log) {
+      const first = Math.ceil(Math.log10(axis.least)), last = Math.floor(Math.log10(axis.most));
+      if (last > first) {
+        const every = Math.ceil((last - first + 1) / 6);
+        return Array.from({length: Math.floor((last - first) / every) + 1}, (_, i) => 10 ** (first + i * every));
+      }
+      return [axis.least, axis.most];
+    }
+    const rough = (axis.most - axis.least) / 4;
+    if (!(rough > 0)) return [axis.least];
+    const decade = 10 ** Math.floor(Math.log10(rough));
+    const step = decade * [1, 2, 5, 10].find(digit => digit * decade >= rough);
+    const ticks = [];
+    for (let k = Math.ceil(axis.least / step); k * step <= axis.most; ++k) ticks.push(k * step);
+    return ticks;
+  };
+  const FormatTick = (x, column) => columns[column].labels ? columns[column].labels[x] : String(Number(x.toPrecision(3)));
+
+  const Begin = id => {
+    const canvas = byId(id);
+    const box = canvas.getBoundingClientRect();
+    canvas.width = Math.round(box.width * devicePixelRatio);
+    canvas.height = Math.round(box.height * devicePixelRatio);
+    const g = canvas.getContext('2d');
+    g.scale(devicePixelRatio, devicePixelRatio);
+    g.font = '11px sans-serif';
+    g.fillStyle = style('--ink') || '#222';
+    g.strokeStyle = style('--line') || '#ccc';
+    return {g, w: box.width, h: box.height, canvas};
+  };
+  const DrawAxes = (g, w, h, x, y) => {
+    g.strokeRect(60, 10, w - 70, h - 50);
+    g.textAlign = 'center';
+    for (const tick of Ticks(x)) g.fillText(FormatTick(tick, x.column), x.place(tick), h - 26);
+    g.fillText(columns[x.column].label, 60 + (w - 70) / 2, h - 8);
+    g.textAlign = 'right';
+    for (const tick of Ticks(y)) g.fillText(FormatTick(tick, y.column), 56, y.place(tick) + 4);
+    g.save();
+    g.translate(11, 10 + (h - 50) / 2);
+    g.rotate(-Math.PI / 2);
+    g.textAlign = 'center';
+    g.fillText(columns[y.column].label, 0, 0);
+    g.restore();
+  };
+  const Viridis = share => {
+    const mix = (a, b, c) => Math.round(share < 0.5 ? a + 2 * share * (b - a) : b + (2 * share - 1) * (c - b));
+    return `rgb(${mix(255, 65, 8)},${mix(255, 182, 29)},${mix(204, 196, 88)})`;
+  };
+  const ColorBy = column => {
+    if (column === kOutcome) return row => study.colors[value(row, kOutcome)];
+    const axis = MakeAxis(column, 0, 1);
+    return row => Number.isFinite(value(row, column)) ? Viridis(Math.min(Math.max(axis.place(value(row, column)), 0), 1)) : '#bbb';
+  };
+
+  // Places that can be chosen, by canvas.
+  const places = {};
+  const DrawScatter = () => {
+    const {g, w, h} = Begin('scatter');
+    const x = MakeAxis(Number(byId('x').value), 60, w - 10);
+    const y = MakeAxis(Number(byId('y').value), h - 40, 10);
+    DrawAxes(g, w, h, x, y);
+    const color = ColorBy(Number(byId('color').value));
+    const points = [];
+    for (const row of rows) {
+      const px = x.place(value(row, x.column)), py = y.place(value(row, y.column));
+      if (!Number.isFinite(px) || !Number.isFinite(py)) continue;
+      points.push([px, py, row]);
+      g.fillStyle = color(row);
+      g.fillRect(px - 2, py - 2, 4, 4);
+    }
+    places.scatter = points;
+    // Of two metrics: what no other held trial beats in both.
+    const isFront = x.column >= firstMetric && y.column >= firstMetric;
+    byId('front').textContent = '';
+    if (isFront) {
+      const sign = column => columns[column].larger ? -1 : 1;
+      const good = rows.filter(row => held(row) && Number.isFinite(value(row, x.column)) && Number.isFinite(value(row, y.column)));
+      good.sort((a, b) => sign(x.column) * (value(a, x.column) - value(b, x.column)) ||
+        sign(y.column) * (value(a, y.column) - value(b, y.column)));
+      let best = Infinity;
+      const front = good.filter(row => {
+        const better = sign(y.column) * value(row, y.column) < best;
+        if (better) best = sign(y.column) * value(row, y.column);
+        return better;
+      });
+      g.strokeStyle = '#9b2226';
+      g.lineWidth = 1.5;
+      g.beginPath();
+      front.forEach((row, i) => g[i ? 'lineTo' : 'moveTo'](x.place(value(row, x.column)), y.place(value(row, y.column))));
+      g.stroke();
+      byId('front').textContent = 'Pareto front: ' + front.length + ' trials';
+    }
+    Mark(g, points);
+  };
+  const Mark = (g, points) => {
+    const point = points.find(([, , row]) => row === chosen);
+    if (!point) return;
+    g.strokeStyle = style('--accent') || '#06c';
+    g.lineWidth = 2;
+    g.beginPath();
+    g.arc(point[0], point[1], 7, 0, 2 * Math.PI);
+    g.stroke();
+  };
+
+  // The mean of a quantity over the ranges of two keys, in cells as wide as there are trials for.
+  const DrawContour = () => {
+    if (study.keys.length < 2) return;
+    const {g, w, h} = Begin('contour');
+    const x = MakeAxis(Number(byId('cx').value), 60, w - 10);
+    const y = MakeAxis(Number(byId('cy').value), h - 40, 10);
+    const z = Number(byId('cz').value);
+    const n = Math.max(2, Math.min(40, Math.floor(Math.sqrt(rows.length / 2))));
+    const sums = new Map();
+    for (const row of rows) {
+      const v = value(row, z);
+      if (!held(row) || !Number.isFinite(v)) continue;
+      const i = Math.floor((x.place(value(row, x.column)) - 60) / (w - 70) * n);
+      const j = Math.floor((y.place(value(row, y.column)) - 10) / (h - 50) * n);
+      const cell = sums.get(i + n * j) ?? [0, 0, row];
+      cell[0] += v;
+      ++cell[1];
+      sums.set(i + n * j, cell);
+    }
+    const means = [...sums.values()].map(cell => cell[0] / cell[1]);
+    const least = means.reduce((a, b) => Math.min(a, b), Infinity), most = means.reduce((a, b) => Math.max(a, b), -Infinity);
+    const log = least > 0 && most / least > 30;
+    const f = log ? Math.log : v => v;
+    const points = [];
+    for (const [key, [sum, number, row]] of sums) {
+      const i = key % n, j = Math.floor(key / n);
+      const share = most > least ? (f(sum / number) - f(least)) / (f(most) - f(least)) : 0;
+      g.fillStyle = Viridis(share);
+      const cw = (w - 70) / n, ch = (h - 50) / n;
+      g.fillRect(60 + i * cw, 10 + j * ch, cw + 0.5, ch + 0.5);
+      points.push([60 + (i + 0.5) * cw, 10 + (j + 0.5) * ch, row]);
+    }
+    places.contour = points;
+    g.fillStyle = style('--ink') || '#222';
+    DrawAxes(g, w, h, x, y);
+    byId('range').textContent = means.length ? 'mean from ' + Number(least.toPrecision(3)) + ' to ' + Number(most.toPrecision(3)) : '';
+    Mark(g, points);
+  };
+
+  // All keys and the chosen quantity side by side; a line for each trial. A drag along an axis keeps what it covers.
+  let parallel = [];
+  const DrawParallel = () => {
+    const {g, w, h} = Begin('parallel');
+    const shown = [...study.keys.keys()].map(i => kFirstKey + i).slice(0, 12).concat(Number(byId('y').value));
+    parallel = shown.map((column, i) => ({...MakeAxis(column, h - 30, 24), at: 40 + (w - 80) * i / (shown.length - 1)}));
+    const color = ColorBy(Number(byId('color').value));
+    const every = Math.max(1, Math.ceil(rows.length / 1500));
+    g.globalAlpha = Math.max(0.15, Math.min(1, 60 / rows.length));
+    const Line = row => {
+      g.beginPath();
+      parallel.forEach((axis, i) => {
+        const at = axis.place(value(row, axis.column));
+        if (Number.isFinite(at)) g[i ? 'lineTo' : 'moveTo'](axis.at, at);
+      });
+      g.stroke();
+    };
+    for (let i = 0; i < rows.length; i += every) {
+      g.strokeStyle = color(rows[i]);
+      Line(rows[i]);
+    }
+    g.globalAlpha = 1;
+    if (chosen >= 0) {
+      g.strokeStyle = style('--accent') || '#06c';
+      g.lineWidth = 2.5;
+      Line(chosen);
+      g.lineWidth = 1;
+    }
+    g.textAlign = 'center';
+    parallel.forEach((axis, i) => {
+      g.strokeStyle = style('--soft') || '#888';
+      g.beginPath();
+      g.moveTo(axis.at, 24);
+      g.lineTo(axis.at, h - 30);
+      g.stroke();
+      g.fillStyle = style('--ink') || '#222';
+      const name = columns[axis.column].name.split('.').pop();
+      g.fillText(name.slice(0, Math.max(4, Math.floor((w - 80) / shown.length / 6))), axis.at, i % 2 ? h - 4 : h - 16);
+      g.fillText(FormatTick(axis.most, axis.column), axis.at, 18);
+      if (brushes.has(axis.column)) {
+        const [least, most] = brushes.get(axis.column).map(axis.place);
+        g.fillStyle = style('--accent') || '#06c';
+        g.globalAlpha = 0.35;
+        g.fillRect(axis.at - 6, Math.min(least, most), 12, Math.abs(most - least));
+        g.globalAlpha = 1;
+      }
+    });
+  };
+
+  // The value of each point of a search, and the best until then.
+  const DrawHistory = () => {
+    if (!study.history) return;
+    const {g, w, h} = Begin('history');
+    const points = study.history;
+    const finite = points.filter(p => p.feasible);
+    const values = finite.map(p => p.value);
+    const least = values.reduce((a, b) => Math.min(a, b), Infinity), most = values.reduce((a, b) => Math.max(a, b), -Infinity);
+    const log = least > 0 && most / least > 30;
+    const f = log ? Math.log10 : v => v;
+    const px = i => 60 + (w - 70) * (points.length > 1 ? i / (points.length - 1) : 0.5);
+    const py = v => h - 40 - (h - 50) * (most > least ? (f(v) - f(least)) / (f(most) - f(least)) : 0.5);
+    g.strokeRect(60, 10, w - 70, h - 50);
+    g.textAlign = 'right';
+    if (finite.length) for (const v of [least, most]) g.fillText(String(Number(v.toPrecision(3))), 56, py(v) + 4);
+    g.textAlign = 'center';
+    g.fillText('point 0 to ' + (points.length - 1) + (log ? ', values in their logarithm' : ''), 60 + (w - 70) / 2, h - 16);
+    let best = null;
+    g.fillStyle = '#9aa';
+    const line = [];
+    points.forEach((p, i) => {
+      if (!p.feasible) { g.fillRect(px(i) - 1, 14, 2, 5); return; }
+      g.fillRect(px(i) - 2, py(p.value) - 2, 4, 4);
+      if (best === null || (study.maximize ? p.value > best : p.value < best)) best = p.value;
+      line.push([px(i), py(best)]);
+    });
+    g.strokeStyle = style('--accent') || '#06c';
+    g.lineWidth = 2;
+    g.beginPath();
+    line.forEach(([a, b], i) => g[i ? 'lineTo' : 'moveTo'](a, b));
+    g.stroke();
+  };
+
+  // How a quantity goes with each key: the correlation of ranks, or what the study's own design tells.
+  const Ranks = values => {
+    const order = values.map((v, i) => [v, i]).sort((a, b) => a[0] - b[0]);
+    const ranks = new Float64Array(values.length);
+    for (let i = 0; i < order.length;) {
+      let j = i;
+      while (j < order.length && order[j][0] === order[i][0]) ++j;
+      for (let k = i; k < j; ++k) ranks[order[k][1]] = (i + j - 1) / 2;
+      i = j;
+    }
+    return ranks;
+  };
+  const Correlation = (a, b) => {
+    const n = a.length, mean = (n - 1) / 2;
+    let ab = 0, aa = 0, bb = 0;
+    for (let i = 0; i < n; ++i) {
+      ab += (a[i] - mean) * (b[i] - mean);
+      aa += (a[i] - mean) ** 2;
+      bb += (b[i] - mean) ** 2;
+    }
+    return aa > 0 && bb > 0 ? ab / Math.sqrt(aa * bb) : 0;
+  };
+  const DrawImportance = () => {
+    const column = Number(byId('y').value);
+    const good = rows.filter(row => held(row) && Number.isFinite(value(row, column)));
+    const ranks = Ranks(good.map(row => value(row, column)));
+    const list = study.keys.map((key, i) =>
+      [key, good.length > 2 ? Correlation(Ranks(good.map(row => value(row, kFirstKey + i))), ranks) : 0]);
+    list.sort((a, b) => Math.abs(b[1]) - Math.abs(a[1]));
+    byId('importance').replaceChildren(...list.map(([key, r]) => {
+      const tr = document.createElement('tr');
+      const name = document.createElement('td'), bar = document.createElement('td'), number = document.createElement('td');
+      name.textContent = key;
+      const div = document.createElement('div');
+      div.className = 'bar';
+      div.style.width = (8 * Math.abs(r)).toFixed(2) + 'rem';
+      bar.append(div);
+      number.textContent = r.toFixed(2);
+      number.className = 'value number';
+      tr.append(name, bar, number);
+      return tr;
+    }));
+    byId('importance-of').textContent = columns[column].label;
+  };
+
+  // The table: as many as one can read, sorted by any column.
+  let sorted = {column: kNumber, down: false};
+  const shownColumns = [...columns.keys()].filter(i => i !== kSeed || study.seeds > 1);
+  const DrawTable = () => {
+    const list = [...rows].sort((a, b) => {
+      const x = value(a, sorted.column), y = value(b, sorted.column);
+      if (!Number.isFinite(x) || !Number.isFinite(y)) return Number.isFinite(y) - Number.isFinite(x);
+      return sorted.down ? y - x : x - y;
+    }).slice(0, 50);
+    byId('head').replaceChildren(...shownColumns.map(column => {
+      const th = document.createElement('th');
+      th.textContent = columns[column].name;
+      if (sorted.column === column) th.setAttribute('aria-sort', sorted.down ? 'descending' : 'ascending');
+      th.onclick = () => {
+        sorted = {column, down: sorted.column === column && !sorted.down};
+        DrawTable();
+      };
+      return th;
+    }));
+    byId('body').replaceChildren(...list.map(row => {
+      const tr = document.createElement('tr');
+      tr.className = row === chosen ? 'chosen' : '';
+      for (const column of shownColumns) {
+        const td = document.createElement('td');
+        td.textContent = show(value(row, column), column);
+        td.className = 'number';
+        tr.append(td);
+      }
+      tr.onclick = () => Choose(row);
+      return tr;
+    }));
+  };
+
+  const Quote = text => /^[\w.,:=+[\]/-]+$/.test(text) && !/[[\]]/.test(text) ? text : "'" + text.replaceAll("'", "'\\''") + "'";
+  const ListSettings = row => study.overrides.concat(study.keys.map((key, i) => {
+    const labels = columns[kFirstKey + i].labels, x = value(row, kFirstKey + i);
+    return key + '=' + (labels ? labels[x] : String(x));
+  })).map(setting => ' --set ' + Quote(setting)).join('');
+  const Choose = row => {
+    chosen = row;
+    byId('chosen').hidden = row < 0;
+    if (row >= 0) {
+      const seed = value(row, kSeed);
+      const end = (seed ? ' --seed ' + seed : '') + (study.check ? '' : ' --no-check');
+      byId('which').textContent = 'Trial ' + value(row, kNumber) + ': ' + study.outcomes[value(row, kOutcome)];
+      byId('numbers').textContent = columns.slice(kFirstKey).map((column, i) =>
+        column.name + ' ' + show(value(row, kFirstKey + i), kFirstKey + i)).join('; ');
+      byId('command').textContent = 'dexcheck run ' + Quote(study.scenario) + ListSettings(row) + end +
+        ' --video --out trial-' + value(row, kNumber);
+      byId('budget').textContent = 'dexcheck budget ' + Quote(study.scenario) + ListSettings(row);
+    }
+    DrawScatter();
+    DrawContour();
+    DrawParallel();
+    DrawTable();
+  };
+
+  const Draw = () => {
+    Filter();
+    DrawHistory();
+    DrawScatter();
+    DrawContour();
+    DrawParallel();
+    DrawImportance();
+    DrawTable();
+  };
+  const Fill = (id, from, to, start) => {
+    for (let i = from; i < to; ++i) byId(id).append(new Option(columns[i].label, i));
+    byId(id).value = start;
+    byId(id).onchange = Draw;
+  };
+  const shown = study.shown.length ? study.shown.map(find) : [firstMetric];
+  Fill('x', kFirstKey, width, kFirstKey);
+  Fill('y', firstMetric, width, shown[0]);
+  Fill('color', kOutcome, width, kOutcome);
+  if (study.keys.length > 1) {
+    Fill('cx', kFirstKey, firstMetric, kFirstKey);
+    Fill('cy', kFirstKey, firstMetric, kFirstKey + 1);
+    Fill('cz', firstMetric, width, shown[0]);
+  }
+  byId('outcome').append(new Option('any outcome', ''));
+  study.outcomes.forEach((name, i) => byId('outcome').append(new Option(name, i)));
+  byId('outcome').onchange = Draw;
+  byId('filter').oninput = Draw;
+
+  const Nearest = (id, event) => {
+    const box = byId(id).getBoundingClientRect();
+    const x = event.clientX - box.x, y = event.clientY - box.y;
+    let best = -1, least = 20 ** 2;
+    for (const [px, py, row] of places[id] ?? []) {
+      const square = (px - x) ** 2 + (py - y) ** 2;
+      if (square < least) { least = square; best = row; }
+    }
+    return best;
+  };
+  for (const id of ['scatter', 'contour']) {
+    byId(id).onclick = event => { const row = Nearest(id, event); if (row >= 0) Choose(row); };
+  }
+  let begun = null;
+  byId('parallel').onpointerdown = event => {
+    const box = byId('parallel').getBoundingClientRect();
+    const x = event.clientX - box.x;
+    const axis = parallel.reduce((a, b) => Math.abs(b.at - x) < Math.abs(a.at - x) ? b : a);
+    begun = {axis, y: event.clientY - box.y};
+  };
+  byId('parallel').onpointerup = event => {
+    if (!begun) return;
+    const y = event.clientY - byId('parallel').getBoundingClientRect().y;
+    const ends = [begun.axis.back(begun.y), begun.axis.back(y)].sort((a, b) => a - b);
+    if (Math.abs(y - begun.y) < 4) brushes.delete(begun.axis.column);
+    else brushes.set(begun.axis.column, ends);
+    begun = null;
+    Draw();
+  };
+  let waiting = 0;
+  addEventListener('resize', () => { clearTimeout(waiting); waiting = setTimeout(Draw, 100); });
+  Draw();
+  document.getElementById('explore').dataset.ready = 'yes';
+})();

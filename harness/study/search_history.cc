@@ -1,0 +1,155 @@
+#include "harness/study/search_history.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "controller/common/errors.h"
+#include "harness/study/study_theory.h"
+
+namespace dexcheck {
+
+SearchHistory::SearchHistory(const Study& study, const UnitPoint& start)
+    : study_(study),
+      per_point_(CountTrialsOfPoint(study)),
+      draws_(ListDraws(study)),
+      searcher_(MakeSearcher(study, start)) {
+  AskNext();
+}
+
+long SearchHistory::first_of_batch() const { return static_cast<long>(points_.size()) * per_point_; }
+
+void SearchHistory::AskNext() {
+  batch_.clear();
+  for (const UnitPoint& point : searcher_->Ask()) {
+    if (static_cast<long>(points_.size() + batch_.size()) == study_.search.count) break;
+    batch_.emplace_back();
+    for (size_t i = 0; i < point.size(); ++i)
+      batch_.back().push_back(ValueAt(study_.variations[i], point[i]));
+  }
+}
+
+void SearchHistory::Add(const TrialRow& row) {
+  if (row.trial.number < first_of_batch()) return;
+  rows_.insert_or_assign(row.trial.number, row);
+  TellWhatIsDone();
+}
+
+void SearchHistory::TellWhatIsDone() {
+  // A batch that the limit cut short is not told: the search is over.
+  while (!batch_.empty()) {
+    std::vector<JudgedPoint> judged;
+    for (const std::vector<double>& values : batch_) {
+      const long number = static_cast<long>(points_.size() + judged.size());
+      std::vector<TrialResult> results;
+      for (const Trial& trial : ListTrialsOfPoint(study_, number, values, draws_)) {
+        const auto row = rows_.find(trial.number);
+        if (row == rows_.end()) return;
+        if (row->second.trial.parameters != trial.parameters || row->second.trial.seed != trial.seed) {
+          throw InputError(study_.source + ": trial " + std::to_string(trial.number) +
+                           " is not what this search makes of the trials before it");
+        }
+        results.push_back(row->second.result);
+      }
+      judged.push_back({number, values, JudgePoint(study_.objectives, study_.constraints, results)});
+    }
+    std::vector<Judgement> judgements;
+    for (JudgedPoint& point : judged) {
+      judgements.push_back(point.judgement);
+      points_.push_back(std::move(point));
+    }
+    rows_.erase(rows_.begin(), rows_.lower_bound(first_of_batch()));
+    if (static_cast<long>(points_.size()) >= study_.search.count) {
+      batch_.clear();
+      return;
+    }
+    searcher_->Tell(judgements);
+    AskNext();
+  }
+}
+
+std::vector<Trial> SearchHistory::ListMissing() const {
+  std::vector<Trial> missing;
+  long number = static_cast<long>(points_.size());
+  for (const std::vector<double>& values : batch_) {
+    for (Trial& trial : ListTrialsOfPoint(study_, number, values, draws_)) {
+      if (rows_.count(trial.number) == 0) missing.push_back(std::move(trial));
+    }
+    ++number;
+  }
+  return missing;
+}
+
+UnitPoint FindSearchStart(const StudyInputs& inputs) {
+  const Study& study = inputs.study;
+  const size_t keys = study.num_keys();
+  UnitPoint start(keys, 0.5);
+  if (study.search.start == SearchStart::kValues) {
+    for (size_t i = 0; i < keys; ++i) start[i] = ShareOf(study.variations[i], study.search.start_values[i]);
+  }
+  if (study.search.start != SearchStart::kTheory) return start;
+  constexpr long kPoints = 256;
+  const std::vector<double> draw = ListDraws(study).front();
+  double least = std::numeric_limits<double>::infinity();
+  for (const UnitPoint& point : MakeSobol(static_cast<int>(keys), kPoints)) {
+    std::vector<double> values;
+    for (size_t i = 0; i < keys; ++i) values.push_back(ValueAt(study.variations[i], point[i]));
+    values.insert(values.end(), draw.begin(), draw.end());
+    try {
+      const double radius = CalcRadiusInTheory(inputs, values);
+      if (radius < least && IsDampedInTheory(inputs, values)) {
+        least = radius;
+        start = point;
+      }
+    } catch (const InputError&) {  // values that make no scenario are no start
+    }
+  }
+  return start;
+}
+
+std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows) {
+  const long per_point = CountTrialsOfPoint(study);
+  std::vector<JudgedPoint> points;
+  for (size_t i = 0; i < rows.size();) {
+    const long number = rows[i].trial.number / per_point;
+    std::vector<TrialResult> results;
+    const size_t first = i;
+    for (; i < rows.size() && rows[i].trial.number / per_point == number; ++i)
+      results.push_back(rows[i].result);
+    if (static_cast<long>(results.size()) < per_point) continue;
+    const std::vector<double>& values = rows[first].trial.parameters;
+    points.push_back({number,
+                      {values.begin(), values.begin() + static_cast<std::ptrdiff_t>(study.num_keys())},
+                      JudgePoint(study.objectives, study.constraints, results)});
+  }
+  return points;
+}
+
+const JudgedPoint* FindBest(const std::vector<JudgedPoint>& points) {
+  const JudgedPoint* best = nullptr;
+  for (const JudgedPoint& point : points) {
+    if (point.judgement.is_feasible() && (best == nullptr || IsBetter(point.judgement, best->judgement)))
+      best = &point;
+  }
+  return best;
+}
+
+std::vector<const JudgedPoint*> FindFront(const std::vector<JudgedPoint>& points) {
+  std::vector<const JudgedPoint*> sorted;
+  for (const JudgedPoint& point : points) {
+    if (point.judgement.is_feasible()) sorted.push_back(&point);
+  }
+  std::stable_sort(sorted.begin(), sorted.end(), [](const JudgedPoint* a, const JudgedPoint* b) {
+    return a->judgement.objectives < b->judgement.objectives;
+  });
+  // In this order only a point before another one can dominate it.
+  std::vector<const JudgedPoint*> front;
+  for (const JudgedPoint* point : sorted) {
+    const bool dominated = std::any_of(front.begin(), front.end(), [&](const JudgedPoint* other) {
+      return Dominates(other->judgement, point->judgement);
+    });
+    if (!dominated) front.push_back(point);
+  }
+  return front;
+}
+
+}  // namespace dexcheck

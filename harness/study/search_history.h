@@ -1,0 +1,67 @@
+#pragma once
+
+// A search as its rows tell it: the points tried so far, and the trials that come next.
+
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "harness/study/search.h"
+#include "harness/study/study_store.h"
+
+namespace dexcheck {
+
+/// A point that a study tried, with all its trials done.
+struct JudgedPoint {
+  long number = 0;             ///< Its trials begin at number * CountTrialsOfPoint.
+  std::vector<double> values;  ///< Of the study's own keys.
+  Judgement judgement;
+};
+
+/// Follows a search through its rows. The same rows always lead to the same next trials, so that a search
+/// that was killed goes on as if nothing had happened.
+class SearchHistory {
+ public:
+  /// @param start as FindSearchStart.
+  SearchHistory(const Study& study, const UnitPoint& start);
+
+  /// Takes in a trial's row; rows may come in any order.
+  /// @throws InputError when the search would not have made this trial.
+  void Add(const TrialRow& row);
+
+  /// Trials of the batch at hand that have no row yet; none when the search is over.
+  [[nodiscard]] std::vector<Trial> ListMissing() const;
+  [[nodiscard]] bool is_over() const { return batch_.empty(); }
+  /// Number of the first trial of the batch at hand.
+  [[nodiscard]] long first_of_batch() const;
+  /// In the order of their numbers.
+  [[nodiscard]] const std::vector<JudgedPoint>& points() const { return points_; }
+
+ private:
+  void AskNext();
+  void TellWhatIsDone();
+
+  Study study_;
+  long per_point_;
+  std::vector<std::vector<double>> draws_;
+  std::unique_ptr<Searcher> searcher_;
+  std::vector<std::vector<double>> batch_;  // values of each of its points
+  std::map<long, TrialRow> rows_;           // of the batch and after it
+  std::vector<JudgedPoint> points_;
+};
+
+/// Where a search begins, as `[search] start` says. From theory: of some hundred points of the ranges the one
+/// at which (57), sampled as the plant steps it, is damped at least critically on all axes and decays
+/// fastest.
+UnitPoint FindSearchStart(const StudyInputs& inputs);
+
+/// Points of any study whose trials are all there, judged by its objectives.
+std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows);
+
+/// The best of one objective: feasible, and the first of equals; null when none is feasible.
+const JudgedPoint* FindBest(const std::vector<JudgedPoint>& points);
+
+/// Feasible points that none dominates, by the first objective.
+std::vector<const JudgedPoint*> FindFront(const std::vector<JudgedPoint>& points);
+
+}  // namespace dexcheck

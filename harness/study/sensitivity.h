@@ -1,0 +1,57 @@
+#pragma once
+
+// Which key matters: designs of points, and what follows from the values there.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "harness/study/sampling.h"
+
+namespace dexcheck {
+
+/// A number and the interval that holds it with 95 %.
+struct Estimate {
+  double value = 0.0;
+  double low = 0.0;
+  double high = 0.0;
+};
+
+/// Saltelli's design [Saltelli 2010]: `count` blocks of k + 2 points each: A, B, and for each key i the point
+/// AB_i, which is A with B's coordinate i. (A, B) are points of a scrambled Sobol sequence in 2 k dimensions.
+std::vector<UnitPoint> MakeSaltelli(int dimensions, long count, std::uint64_t seed);
+
+/// Shares of the variance of f over the cube.
+struct SobolIndex {
+  Estimate first;  ///< V(E(f | x_i)) / V(f): of key i alone.
+  Estimate total;  ///< E(V(f | all but x_i)) / V(f): of key i and all its interactions.
+};
+
+/// With f centred at its mean, from N blocks:
+///   S_i  = sum_j f(B_j) (f(AB_ij) - f(A_j)) / (N V)         [Saltelli 2010]
+///   ST_i = sum_j (f(A_j) - f(AB_ij))^2 / (2 N V)            [Jansen 1999]
+/// and V from all f(A_j), f(B_j). Intervals are percentiles of bootstrap samples of the blocks.
+/// @param values f at the points of MakeSaltelli, in their order. Blocks with a value that is not finite are
+/// left out.
+/// @returns one for each dimension; empty when fewer than two blocks are left or f does not vary.
+std::vector<SobolIndex> CalcSobolIndices(std::span<const double> values, int dimensions);
+
+/// Morris's design: `count` walks of k + 1 points; each step of a walk moves one key, in random order, by 2/3
+/// of its range between the levels 0, 1/3, 2/3, 1.
+std::vector<UnitPoint> MakeMorris(int dimensions, long count, std::uint64_t seed);
+
+/// Elementary effects of a key: differences of f over a step, as of a step through the whole range.
+struct MorrisEffect {
+  Estimate size;        ///< mu*, the mean of their magnitudes.
+  double mean = 0.0;    ///< mu.
+  double spread = 0.0;  ///< sigma: it is 0 where f is linear in this key and has no interaction.
+};
+
+/// @param points of MakeMorris. @param values f there. Steps with a value that is not finite are left out.
+std::vector<MorrisEffect> CalcMorrisEffects(std::span<const UnitPoint> points,
+                                            std::span<const double> values);
+
+/// Clopper and Pearson's interval for a probability, of `failures` in `trials` independent trials; 95 %.
+Estimate CalcProbability(long failures, long trials);
+
+}  // namespace dexcheck

@@ -1,0 +1,145 @@
+#include "harness/study/study_answer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "harness/study/margin_search.h"
+#include "harness/study/study_sensitivity.h"
+
+namespace dexcheck {
+namespace {
+
+std::string CountPoints(size_t count) { return fmt::format("{} point{}", count, count == 1 ? "" : "s"); }
+
+std::string DescribeBest(const Study& study, const std::vector<JudgedPoint>& points,
+                         const JudgedPoint& best) {
+  const Objective& objective = study.objectives.front();
+  const auto value = [&](const JudgedPoint& point) {
+    return ShowObjective(objective, point.judgement.objectives.front());
+  };
+  std::string text =
+      fmt::format("The {} {} of {} is {:.4g}, at {} (trial {}).", objective.maximize ? "largest" : "least",
+                  Describe(objective), CountPoints(points.size()), value(best),
+                  DescribeValues(study, best.values), best.number * CountTrialsOfPoint(study));
+  const JudgedPoint& first = points.front();
+  if (study.is_search() && first.number == 0 && first.number != best.number) {
+    text += first.judgement.is_feasible() ? fmt::format(" The search began with {:.4g}.", value(first))
+                                          : " The search began where a constraint does not hold.";
+  }
+  return text;
+}
+
+std::string DescribeFront(const Study& study, const std::vector<JudgedPoint>& points) {
+  const std::vector<const JudgedPoint*> front = FindFront(points);
+  std::string text =
+      fmt::format("Of {}, {} that no other one beats in everything:", CountPoints(points.size()),
+                  front.size() == 1 ? "there is 1" : fmt::format("there are {}", front.size()));
+  for (size_t i = 0; i < study.objectives.size(); ++i) {
+    const auto [least, most] =
+        std::minmax_element(front.begin(), front.end(), [&](const JudgedPoint* a, const JudgedPoint* b) {
+          return a->judgement.objectives[i] < b->judgement.objectives[i];
+        });
+    const auto show = [&](const JudgedPoint* point) {
+      return ShowObjective(study.objectives[i], point->judgement.objectives[i]);
+    };
+    text += fmt::format("{} {} from {:.4g} ({}) to {:.4g}", i == 0 ? "" : ";", Describe(study.objectives[i]),
+                        show(*least), DescribeValues(study, (*least)->values), show(*most));
+  }
+  return text + ".";
+}
+
+/// The key at a distance from the start along its own axis.
+std::string ShowKey(const Variation& variation, const UnitPoint& point, size_t key) {
+  return fmt::format("{:.4g}", ValueAt(variation, point[key]));
+}
+
+std::vector<std::string> DescribeMargins(const Study& study, const std::vector<JudgedPoint>& points) {
+  const std::vector<Margin> margins = FindMargins(study, points);
+  if (margins.empty()) return {"At the start itself a constraint does not hold: there is no margin."};
+  std::vector<std::string> answers;
+  const auto go = [&](const Margin& margin, size_t key) {
+    if (margin.bad.empty()) return std::string("to the end of its range");
+    const Variation& variation = study.variations[key];
+    return fmt::format("to {} and not to {}", ShowKey(variation, margin.good, key),
+                       ShowKey(variation, margin.bad, key));
+  };
+  for (size_t i = 0; i < study.num_keys(); ++i) {
+    answers.push_back(fmt::format("{} can go from {:.4g} down {}, and up {}.", study.variations[i].key,
+                                  points[0].values[i], go(margins[2 * i], i), go(margins[2 * i + 1], i)));
+  }
+  const Margin* nearest = nullptr;
+  for (const Margin& margin : margins) {
+    if (!margin.bad.empty() && (nearest == nullptr || margin.at_most < nearest->at_most)) nearest = &margin;
+  }
+  if (nearest == nullptr) {
+    answers.push_back(
+        fmt::format("In none of {} directions a constraint turns within the ranges.", margins.size()));
+    return answers;
+  }
+  std::vector<double> values;
+  for (size_t i = 0; i < study.num_keys(); ++i)
+    values.push_back(ValueAt(study.variations[i], nearest->bad[i]));
+  answers.push_back(fmt::format("Of {} directions the nearest failure is {:.3g} of the ranges away, at {}.",
+                                margins.size(), nearest->at_most, DescribeValues(study, values)));
+  return answers;
+}
+
+/// Of a sample with constraints: how probable a failure is.
+std::string DescribeFailures(const Study& study, const std::vector<TrialRow>& rows) {
+  long failures = 0;
+  for (const TrialRow& row : rows) {
+    if (!JudgePoint({}, study.constraints, {&row.result, 1}).is_feasible()) ++failures;
+  }
+  const Estimate estimate = CalcProbability(failures, static_cast<long>(rows.size()));
+  return fmt::format(
+      "{} of {} trials fail: {:.2g} %, with 95 % confidence between {:.2g} % and {:.2g} % "
+      "(Clopper-Pearson{}).",
+      failures, rows.size(), 100.0 * estimate.value, 100.0 * estimate.low, 100.0 * estimate.high,
+      study.sample.method == Sampling::kRandom
+          ? ""
+          : "; it holds for a random sample, a more even one scatters less");
+}
+
+}  // namespace
+
+std::string DescribeValues(const Study& study, const std::vector<double>& values) {
+  std::string text;
+  for (size_t i = 0; i < values.size(); ++i) {
+    const Variation& variation = study.variations[i];
+    text += fmt::format(
+        "{}{} = {}", i == 0 ? "" : ", ", variation.key,
+        variation.labels.empty() ? fmt::format("{:.6g}", values[i]) : FormatValue(variation, values[i]));
+  }
+  return text;
+}
+
+double ShowObjective(const Objective& objective, double value) { return objective.maximize ? -value : value; }
+
+std::vector<std::string> AnswerStudy(const Study& study, const std::vector<TrialRow>& rows) {
+  std::vector<std::string> answers;
+  if (rows.empty()) return answers;
+  if (study.search.method == SearchMethod::kMargins) return DescribeMargins(study, JudgePoints(study, rows));
+  const Sampling method = study.sample.method;
+  if (method == Sampling::kSaltelli || method == Sampling::kMorris) {
+    for (const std::string& quantity : ListQuantities(study)) {
+      answers.push_back(Describe(study, AnalyseSensitivity(study, rows, quantity)));
+    }
+    return answers;
+  }
+  if (method != Sampling::kGrid && !study.constraints.empty())
+    answers.push_back(DescribeFailures(study, rows));
+  if (study.objectives.empty()) return answers;
+  const std::vector<JudgedPoint> points = JudgePoints(study, rows);
+  if (points.empty()) return answers;
+  const JudgedPoint* const best = FindBest(points);
+  if (best == nullptr) {
+    answers.push_back(fmt::format("At none of {} all constraints hold.", CountPoints(points.size())));
+  } else {
+    answers.push_back(study.objectives.size() == 1 ? DescribeBest(study, points, *best)
+                                                   : DescribeFront(study, points));
+  }
+  return answers;
+}
+
+}  // namespace dexcheck

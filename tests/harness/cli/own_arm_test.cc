@@ -1,0 +1,135 @@
+// An arm of the user's own, from nothing but its MJCF: import, write a scenario, run.
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/harness/cli/dexcheck_program.h"
+
+namespace dexcheck::testing {
+namespace {
+
+using Json = nlohmann::json;
+using ::testing::HasSubstr;
+
+// A turning column, a lift that slides on it, an elbow; sizes and masses by geoms alone.
+constexpr const char* kArm = R"(<mujoco model="own arm">
+  <compiler angle="degree"/>
+  <option timestep="0.001" gravity="0 0 -9.81"/>
+  <default><geom contype="0" conaffinity="0"/></default>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <body name="column" pos="0 0 0.5">
+      <joint name="turn" type="hinge" axis="0 0 1" range="-170 170" limited="true" damping="0.1"/>
+      <geom type="cylinder" size="0.05 0.2" mass="3"/>
+      <body name="carriage" pos="0.1 0 0">
+        <joint name="lift" type="slide" axis="0 0 1" range="-0.2 0.3" limited="true" damping="2"/>
+        <geom type="box" size="0.1 0.04 0.04" mass="1.5" pos="0.1 0 0"/>
+        <body name="forearm" pos="0.25 0 0">
+          <joint name="elbow" type="hinge" axis="0 1 0" range="-120 120" limited="true" armature="0.01"/>
+          <geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0" mass="0.8"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor joint="turn"/><motor joint="lift"/><motor joint="elbow"/>
+  </actuator>
+</mujoco>
+)";
+
+constexpr const char* kScenario = R"(name = "own"
+duration = 1.0
+settle = 0.2
+start = "rest"
+[model]
+file = "arm.toml"
+[plant]
+mjcf = "arm.xml"
+[joint_motion]
+start = { lift = 0.1, elbow = 0.5 }
+points = [{ time = 1, joints = { turn = 1.0, lift = -0.1 } }]
+oscillations = [{ joint = "elbow", amplitude_deg = 10, frequency = 1, ramp_time = 0.5 }]
+[control]
+natural_frequency = { all = 15, elbow = 30 }
+damping_ratio = 1
+[expect]
+joints = 1e-3
+)";
+
+class OwnArm : public ::testing::Test {
+ protected:
+  OwnArm() {
+    WriteText(folder_.path() / "arm.xml", kArm);
+    WriteText(folder_.path() / "own.toml", kScenario);
+    const ProgramResult imported = Run({"import", "arm.xml", "--out", "arm.toml"});
+    EXPECT_EQ(imported.exit_code, 0) << imported.err;
+  }
+
+  [[nodiscard]] ProgramResult Run(const std::vector<std::string>& arguments) const {
+    return RunDexcheck(arguments, {.folder = folder_.path()});
+  }
+  [[nodiscard]] ProgramResult RunWith(const std::string& assignment) const {
+    return Run({"run", "own.toml", "--no-log", "--set", assignment});
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(OwnArm, IsRunReportedDrawnAndReplayed) {
+  const ProgramResult result = Run({"run", "own.toml", "--out", "run"});
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_THAT(result.out, HasSubstr("joints: largest error "));
+  EXPECT_THAT(result.out, HasSubstr("PASS"));
+  const Json summary = Json::parse(ReadText(folder_.path() / "run/summary.json"));
+  EXPECT_GT(summary.at("tracking").at("joint_error_max_rad").get<double>(), 0.0);
+  EXPECT_FALSE(summary.at("tracking").contains("position_error_max_m"));
+  EXPECT_TRUE(summary.at("checks").contains("joint_dynamics"));
+  EXPECT_FALSE(summary.at("checks").contains("contact_force"));
+  EXPECT_THAT(ReadText(folder_.path() / "run/report.html"), HasSubstr("largest error of a joint"));
+  const ProgramResult picture =
+      Run({"render", "run", "--still", "0.5", "--size", "320x240", "--out", "picture.png"});
+  EXPECT_EQ(picture.exit_code, 0) << picture.err;
+  EXPECT_EQ(Run({"run", "--replay", "run"}).exit_code, 0);
+}
+
+TEST_F(OwnArm, DoesNotPassWithAnotherMass) {
+  WriteText(folder_.path() / "arm.xml", ReplaceOnce(kArm, "mass=\"0.8\"", "mass=\"0.9\""));
+  const ProgramResult result = Run({"run", "own.toml", "--no-log"});
+  EXPECT_EQ(result.exit_code, 1) << result.out;
+  EXPECT_THAT(result.out, HasSubstr("forearm"));
+}
+
+TEST_F(OwnArm, WhatCannotBeIsOneLine) {
+  struct Case {
+    const char* assignment;
+    std::vector<std::string> parts;
+  };
+  const Case cases[] = {
+      {"joint_motion.start={ elbo = 1 }", {"joint_motion.start", "\"elbo\"", "\"elbow\"?"}},
+      {"joint_motion.start={ lift = 0.4 }",
+       {"joint_motion.start", "\"lift\" must be from -0.2 to 0.3 m", "0.4"}},
+      {"joint_motion.points=[{ time = 1, joints_deg = { elbow = 121 } }]",
+       {"joint_motion.points.0.joints_deg", "\"elbow\" must be from -120 to 120 degrees", "121"}},
+      {"joint_motion.points=[{ time = 1, joints_deg = { lift = 1 } }]", {"\"lift\" is prismatic", "_deg"}},
+      {"joint_motion.points=[{ time = 1, joints = { turn = 1 } }, { time = 1, joints = { turn = 0 } }]",
+       {"joint_motion.points.1.time", "greater"}},
+      {"joint_motion.points=[{ time = 1 }]", {"joint_motion.points.0.joints_deg", "missing"}},
+      {"joint_motion.oscillations=[{ joint = 'wrist', amplitude = 1, frequency = 1 }]",
+       {"oscillations.0.joint", "wrist"}},
+      {"joint_motion.oscillations=[{ joint = 'turn', amplitude = 1, frequency = -1 }]", {"frequency", "-1"}},
+      {"control.natural_frequency={ turn = 1, lift = 2 }", {"control.natural_frequency", "\"elbow\""}},
+      {"control.natural_frequency=-1", {"control.natural_frequency", "-1"}},
+      {"control.stiffness=100", {"control.stiffness", "computed_torque"}},
+      {"control.law=impedance", {"control.law", "impedance"}},
+      {"expect.position=1e-3", {"expect.position", "no motion of an object"}},
+      {"plant.type=rigid", {"plant.type", "engine"}},
+      {"start=moving", {"start", "rest"}},
+      {"grasp={ frame = 'x' }", {"joint_motion", "grasp"}},
+  };
+  for (const Case& one : cases) EXPECT_TRUE(IsRefused(RunWith(one.assignment), one.parts)) << one.assignment;
+  EXPECT_TRUE(IsRefused(Run({"run", "own.toml", "--no-log", "--controller", "true"}), {"joint_motion"}));
+}
+
+}  // namespace
+}  // namespace dexcheck::testing

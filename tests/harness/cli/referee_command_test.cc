@@ -1,0 +1,185 @@
+// One robot in several physics engines. MuJoCo 3 comes from npm's registry, without which its test is
+// skipped.
+
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "harness/base/shell.h"
+#include "tests/common/legged_robots.h"
+#include "tests/harness/cli/dexcheck_program.h"
+#include "tests/harness/sides/panda_urdf.h"
+
+namespace dexcheck {
+namespace {
+
+using Json = nlohmann::json;
+using ::testing::HasSubstr;
+using testing::IsRefused;
+using ::testing::Not;
+using testing::ProgramResult;
+using testing::ReadText;
+using testing::ReplaceOnce;
+using testing::RunDexcheck;
+using testing::TempFolder;
+using testing::WriteText;
+
+/// Pairs whose terms were all compared and agree, of this many engines.
+void ExpectAllPairsAgree(const Json& json, size_t engines, double tolerance) {
+  EXPECT_EQ(json.at("verdict"), "pass");
+  ASSERT_EQ(json.at("engines").size(), engines) << json.at("absent");
+  EXPECT_EQ(json.at("pairs").size(), engines * (engines - 1) / 2);
+  for (const Json& pair : json.at("pairs")) {
+    const std::string both =
+        pair.at("first").get<std::string>() + " - " + pair.at("second").get<std::string>();
+    for (const std::string term : {"M_bar", "C_bar_xi", "gravity", "bias"}) {
+      ASSERT_TRUE(pair.at("terms").contains(term)) << both;
+      const Json& record = pair.at("terms").at(term);
+      EXPECT_LE(record.at("max").get<double>(), tolerance)
+          << both << " " << term << " " << record.at("where");
+      EXPECT_GT(record.at("compared").get<long>(), 100) << both;
+      // What is zero on both sides says nothing; gravity has no part along x.
+      if (term == "M_bar" || term == "C_bar_xi") {
+        EXPECT_NE(record.at("first").get<double>(), 0.0) << both << " " << term;
+      }
+    }
+  }
+}
+
+class Referee : public ::testing::Test {
+ protected:
+  [[nodiscard]] ProgramResult Run(const std::vector<std::string>& arguments) const {
+    std::vector<std::string> words = {"referee"};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    return RunDexcheck(words, {folder_.path()});
+  }
+  [[nodiscard]] Json RunForJson(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.end(), {"--json", "out.json", "--quiet"});
+    const ProgramResult result = Run(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err << result.out;
+    return Json::parse(ReadText(folder_.path() / "out.json"));
+  }
+
+  TempFolder folder_;
+};
+
+// Measured: 3e-14 of the engines, of which Bullet inverts M; 2e-7 of MuJoCo 2.2.2, which diagonalises
+// inertias.
+constexpr double kOfEngines = 1e-12;
+constexpr double kOfCompiledInertias = 1e-6;
+
+TEST_F(Referee, FiveEnginesAgreeOnAnArm) {
+  WriteText(folder_.path() / "panda.urdf", testing::MakePandaUrdf());
+  const std::vector<std::string> arm = {"panda.urdf", "--samples", "20", "--engines"};
+  const auto with = [&](const std::string& engines) {
+    std::vector<std::string> words = arm;
+    words.push_back(engines);
+    return words;
+  };
+  ExpectAllPairsAgree(RunForJson(with("analytic,bullet,kdl,simbody")), 4, kOfEngines);
+  ExpectAllPairsAgree(RunForJson(with("analytic,mujoco,bullet,kdl,simbody")), 5, kOfCompiledInertias);
+}
+
+TEST_F(Referee, FourEnginesAgreeOnAFloatingBase) {
+  WriteText(folder_.path() / "dog.urdf", testing::WriteLeggedUrdf("dog", testing::ListQuadruped()));
+  ExpectAllPairsAgree(RunForJson({"dog.urdf", "--floating", "--samples", "10", "--engines",
+                                  "analytic,mujoco,bullet,simbody"}),
+                      4, kOfCompiledInertias);
+  // The file may let its root float itself.
+  WriteText(
+      folder_.path() / "own.urdf",
+      ReplaceOnce(ReadText(folder_.path() / "dog.urdf"), "<link name=\"trunk\"",
+                  "<link name=\"field\"/><joint name=\"free\" type=\"floating\"><parent link=\"field\"/>"
+                  "<child link=\"trunk\"/></joint><link name=\"trunk\""));
+  ExpectAllPairsAgree(RunForJson({"own.urdf", "--samples", "10", "--engines", "analytic,mujoco,simbody"}), 3,
+                      kOfCompiledInertias);
+  const ProgramResult kdl =
+      Run({"dog.urdf", "--floating", "--samples", "2", "--engines", "analytic,simbody,kdl"});
+  EXPECT_EQ(kdl.exit_code, 3) << kdl.out;
+  EXPECT_THAT(kdl.out, HasSubstr("not compared: kdl: "));
+  EXPECT_THAT(kdl.out, HasSubstr("KDL has no base that floats"));
+}
+
+TEST_F(Referee, TheTableHasEveryPair) {
+  const ProgramResult result = Run({testing::SourcePath("/harness/sides/examples/arm.urdf"), "--samples", "5",
+                                    "--engines", "analytic,bullet,kdl,simbody"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  for (const std::string pair :
+       {"analytic model - Bullet", "analytic model - KDL", "analytic model - Simbody", "Bullet 3.24 - KDL",
+        "Bullet 3.24 - Simbody", "KDL 1.5.1 - Simbody"}) {
+    EXPECT_THAT(result.out, HasSubstr(pair));
+  }
+  EXPECT_THAT(result.out, HasSubstr("agree in all terms that they have in common."));
+}
+
+/// A setting of one engine, made in a program of the user's own, and the words that name it.
+TEST_F(Referee, TheSettingThatExplainsIsNamed) {
+  const std::string examples = testing::SourcePath("/harness/sides/examples/");
+  const std::string program = ReadText(examples + "arm.py");
+  const auto expect = [&](const std::string& original, const std::string& changed, const std::string& words) {
+    WriteText(folder_.path() / "other.py", ReplaceOnce(program, original, changed));
+    const ProgramResult result = Run({examples + "arm.urdf", "--samples", "5", "--engines", "analytic,kdl",
+                                      "--engine", "other=" DEXCHECK_PYTHON " other.py"});
+    EXPECT_EQ(result.exit_code, 1) << result.err;
+    EXPECT_THAT(result.out, HasSubstr("analytic model, KDL 1.5.1 agree"));
+    EXPECT_THAT(result.out, HasSubstr(" stands alone"));
+    EXPECT_THAT(result.out, HasSubstr(words)) << result.out;
+  };
+  expect("-9.81", "9.81", "as with gravity upwards");
+  expect("-9.81", "0.0", "as with no gravity");
+  expect("-9.81", "-9.80665", "as with gravity of 9.80665");
+  expect("R @ inertia @ R.T", "R @ np.diag(np.diag(inertia)) @ R.T", "as with products of inertia left out");
+  expect("np.cross(omega, I @ omega))", "0 * omega)", "no setting that is known explains it");
+}
+
+/// What an MJCF adds to a URDF is named as the reason why MuJoCo stands apart.
+TEST_F(Referee, ArmatureOfTheMjcfIsNamed) {
+  WriteText(folder_.path() / "panda.urdf", testing::MakePandaUrdf());
+  const std::string mjcf = ReadText(testing::SourcePath("/mjcf/panda.xml"));
+  WriteText(folder_.path() / "panda.xml", ReplaceOnce(mjcf, "armature=\"0\"", "armature=\"0.1\""));
+  const ProgramResult result =
+      Run({"panda.urdf", "--mjcf", "panda.xml", "--samples", "5", "--engines", "analytic,mujoco,simbody"});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("as with what only panda.xml states: armature"));
+}
+
+TEST_F(Referee, BadInputIsRefused) {
+  const std::string arm = testing::SourcePath("/harness/sides/examples/arm.urdf");
+  EXPECT_TRUE(
+      IsRefused(Run({arm, "--engines", "kdl,gazebo"}),
+                {"--engines: must be of analytic, mujoco, mujoco3, bullet, kdl, simbody, got \"gazebo\""}));
+  EXPECT_TRUE(IsRefused(Run({arm, "--engine", "mine"}), {"--engine: must be NAME=COMMAND, got \"mine\""}));
+  EXPECT_TRUE(IsRefused(Run({arm, "--engines", "kdl"}), {"referee: two engines must be there, got 1"}));
+  EXPECT_TRUE(IsRefused(Run({"none.urdf"}), {"none.urdf"}));
+  const ProgramResult table =
+      Run({testing::SourcePath("/controller/parameters/panda.toml"), "--engines", "analytic,kdl,mujoco"});
+  EXPECT_TRUE(IsRefused(table, {"kdl: reads a URDF only", "--mjcf names what it reads instead"}));
+}
+
+/// MuJoCo 3 of npm, installed once for all builds' tests.
+TEST_F(Referee, MujocoThreeAgrees) {
+  const std::filesystem::path node = DEXCHECK_NODE_FOLDER;
+  if (!std::filesystem::exists(node / "node_modules/@mujoco/mujoco")) {
+    const std::string install = "timeout 120 npm install --no-audit --no-fund --prefix " +
+                                QuoteForShell(node.string()) + " @mujoco/mujoco@3.14.0 >/dev/null 2>&1";
+    if (std::system(install.c_str()) != 0) GTEST_SKIP() << "npm cannot install @mujoco/mujoco";
+  }
+  WriteText(folder_.path() / "panda.urdf", testing::MakePandaUrdf());
+  ExpectAllPairsAgree(RunForJson({"panda.urdf", "--samples", "20", "--node-modules", node.string(),
+                                  "--engines", "analytic,mujoco3,bullet,kdl,simbody"}),
+                      5, kOfEngines);
+  // Both read the MJCF.
+  const std::string mjcf = testing::SourcePath("/mjcf/panda.xml");
+  const Json json = RunForJson({mjcf, "--samples", "20", "--node-modules", node.string()});
+  EXPECT_THAT(json.at("engines").dump(), HasSubstr("MuJoCo 3."));
+  ExpectAllPairsAgree(json, 3, kOfEngines);
+  WriteText(folder_.path() / "dog.urdf", testing::WriteLeggedUrdf("dog", testing::ListQuadruped()));
+  ExpectAllPairsAgree(RunForJson({"dog.urdf", "--floating", "--samples", "10", "--node-modules",
+                                  node.string(), "--engines", "analytic,mujoco,mujoco3,bullet,simbody"}),
+                      5, kOfCompiledInertias);
+}
+
+}  // namespace
+}  // namespace dexcheck

@@ -1,0 +1,130 @@
+// dexcheck study on machines that fail: killed processes, time limits, full disks.
+
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "tests/harness/cli/study_command.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::DexcheckCommand;
+using testing::Dump;
+using ::testing::HasSubstr;
+using testing::IsRefused;
+using testing::ProgramOptions;
+using testing::ProgramResult;
+using testing::RunDexcheck;
+using testing::StudyCommand;
+using testing::WriteText;
+
+// One trial that takes about two seconds of processor time, and one that takes none to speak of.
+const std::string kSlowStudy = R"(name = "slow"
+scenario = "offset"
+set = ["settle=0.3"]
+[[vary]]
+key = "duration"
+values = [20, 0.02]
+)";
+
+TEST_F(StudyCommand, ATrialThatIsAlwaysKilledEndsNoStudyAndCanBeRetried) {
+  WriteText(folder_.path() / "tiny.toml", kSlowStudy);
+  std::vector<std::string> limited = DexcheckCommand(RunArguments("a.sqlite", {"--jobs", "2"}));
+  // With a hard limit of its processor time the system kills every process that takes more.
+  limited.insert(limited.begin(), {"prlimit", "--cpu=1:1"});
+  const ProgramResult result = testing::RunProgram(limited);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("--retry-failed"));
+  std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].result.outcome, Outcome::kCrashed);
+  EXPECT_EQ(rows[0].result.failure, "the process was killed from outside: Killed, 3 times");
+  EXPECT_EQ(rows[1].result.outcome, Outcome::kTracked);
+  const std::string before = Dump(Path("a.sqlite"));
+  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
+  EXPECT_EQ(Dump(Path("a.sqlite")), before) << "not unless told";
+  const ProgramResult retried = RunDexcheck(RunArguments("a.sqlite", {"--retry-failed"}));
+  EXPECT_EQ(retried.exit_code, 0) << retried.err;
+  rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].result.outcome, Outcome::kTracked) << rows[0].result.failure;
+  EXPECT_EQ(rows[0].result.metrics[kSimulatedTime], 20.0);
+}
+
+TEST_F(StudyCommand, TrialsHaveATimeLimit) {
+  WriteText(folder_.path() / "tiny.toml", "trial_time_limit = 0.5\n" + kSlowStudy);
+  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
+  const std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].result.outcome, Outcome::kTimedOut);
+  EXPECT_THAT(rows[0].result.failure, HasSubstr("trial_time_limit, 0.5 s"));
+  EXPECT_EQ(rows[1].result.outcome, Outcome::kTracked);
+  const ProgramResult report = RunDexcheck({"study", "report", Path("a.sqlite"), "--out", "-"});
+  EXPECT_EQ(report.exit_code, 0) << report.err;
+  EXPECT_THAT(report.out, HasSubstr("timed out"));
+}
+
+TEST_F(StudyCommand, AFullDiskLosesNothing) {
+#if defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+  GTEST_SKIP() << "the thread sanitizer itself needs files larger than this test allows";
+#endif
+#endif
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})).exit_code, 0);
+  const std::string before = Dump(Path("a.sqlite"));
+  ProgramOptions full;
+  full.largest_file = 4096;
+  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite"), full), {"a.sqlite: cannot be written"}));
+  EXPECT_EQ(Dump(Path("a.sqlite")), before);
+  EXPECT_EQ(RunDexcheck(RunArguments("a.sqlite")).exit_code, 0);
+  EXPECT_EQ(Dump(Path("a.sqlite")), Reference());
+}
+
+// On a file system of its own, which only a process in a name space of its own may mount.
+TEST_F(StudyCommand, AFullFileSystemLosesNothing) {
+  const std::vector<std::string> apart = {"unshare", "--map-root-user", "--mount", "sh", "-euc"};
+  const std::string mount = "mount -t tmpfs -o size=128k tmpfs \"$1\"";
+  const auto run = [&](const std::string& script) {
+    std::vector<std::string> command = apart;
+    command.insert(command.end(), {script, "sh", folder_.path() / "disk", folder_.path() / "tiny.toml",
+                                   folder_.path(), testing::ProgramPath()});
+    return testing::RunProgram(command);
+  };
+  std::filesystem::create_directory(folder_.path() / "disk");
+  if (run(mount).exit_code != 0) GTEST_SKIP() << "no file system may be mounted here";
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})).exit_code, 0);
+  const std::string before = Dump(Path("a.sqlite"));
+  const ProgramResult result = run(mount + R"(
+    cp "$3/a.sqlite" "$1"
+    dd if=/dev/zero of="$1/filler" bs=4k 2>"$3/dd.txt" && exit 99
+    code=0
+    "$4" study run "$2" --db "$1/a.sqlite" --jobs 1 || code=$?
+    ls "$1" >"$3/left.txt"
+    cp "$1/a.sqlite" "$3/full.sqlite"
+    rm "$1/filler"
+    "$4" study run "$2" --db "$1/a.sqlite" --quiet
+    cp "$1/a.sqlite" "$3/freed.sqlite"
+    exit $code)");
+  EXPECT_TRUE(IsRefused(result, {"disk/a.sqlite: cannot be written: database or disk is full"}));
+  EXPECT_EQ(testing::ReadText(Path("left.txt")), "a.sqlite\nfiller\n");
+  EXPECT_EQ(Dump(Path("full.sqlite")), before);
+  EXPECT_EQ(Dump(Path("freed.sqlite")), Reference());
+}
+
+TEST_F(StudyCommand, AReadOnlyDatabaseIsNamed) {
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})).exit_code, 0);
+  const std::string before = Dump(Path("a.sqlite"));
+  std::vector<std::string> command = DexcheckCommand(RunArguments("a.sqlite"));
+  ::chmod(Path("a.sqlite").c_str(), 0444);
+  if (::geteuid() == 0) {
+    // Root may write everything; nobody may not.
+    ::chmod(folder_.path().c_str(), 0755);
+    command.insert(command.begin(), {"setpriv", "--reuid=65534", "--clear-groups"});
+  }
+  EXPECT_TRUE(IsRefused(testing::RunProgram(command), {"a.sqlite: cannot be written: it is read-only"}));
+  EXPECT_EQ(Dump(Path("a.sqlite")), before);
+}
+
+}  // namespace
+}  // namespace dexcheck

@@ -1,0 +1,113 @@
+// dexcheck study run with a search: killed, and by several processes; the rows must come out the same.
+
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <random>
+#include <thread>
+
+#include "harness/study/search_history.h"
+#include "tests/harness/cli/study_command.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::DexcheckCommand;
+using testing::Dump;
+using ::testing::HasSubstr;
+using testing::IsRefused;
+using testing::Program;
+using testing::ProgramResult;
+using testing::RunDexcheck;
+using testing::WriteText;
+
+// Gains of a run so short that the error hardly moves: the object's own weight and the start error decide.
+const std::string kSearch = R"(name = "tiny"
+scenario = "offset"
+set = ["duration=0.02", "settle=0.3", "start_error.xyz=[1e-6, 0, 0]"]
+seeds = [0, 1]
+[search]
+method = "cma_es"
+count = 24
+population = 8
+[[objective]]
+minimize = "position_error_rms"
+aggregate = "worst"
+[[vary]]
+key = "control.K_p"
+from = 100
+to = 1e4
+spacing = "log"
+[[vary]]
+key = "control.K_v"
+from = 20
+to = 1500
+spacing = "log"
+)";
+
+class StudySearch : public testing::StudyCommand {
+ protected:
+  StudySearch() { WriteText(folder_.path() / "tiny.toml", kSearch); }
+};
+
+TEST_F(StudySearch, GivesTheSameRowsKilledOrSharedOrAlone) {
+  const ProgramResult whole = RunDexcheck(RunArguments("whole.sqlite", {"--jobs", "1"}));
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  EXPECT_THAT(whole.out, HasSubstr("tiny: 48 of at most 48 trials"));
+  EXPECT_THAT(whole.out, HasSubstr("The least position_error_rms, worst of its trials of 24 points is "));
+  const std::string reference = Dump(Path("whole.sqlite"));
+  // What it found is better than what it began with.
+  const Study study = ParseStudy(kSearch, "tiny.toml");
+  const auto points = JudgePoints(study, StudyStore::Open(Path("whole.sqlite")).ReadRows());
+  ASSERT_EQ(points.size(), 24U);
+  ASSERT_NE(FindBest(points), nullptr);
+  EXPECT_LT(FindBest(points)->judgement.objectives[0], points[0].judgement.objectives[0]);
+
+  std::mt19937 random(5);
+  std::uniform_int_distribution<int> milliseconds(100, 500);
+  constexpr int kKills = 8;
+  int unfinished = 0;
+  for (int i = 0; i < kKills; ++i) {
+    {
+      const Program killed(DexcheckCommand(RunArguments("killed.sqlite", {"--jobs", "2"})), {});
+      std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds(random)));
+    }
+    if (CountRows("killed.sqlite") < 48) ++unfinished;
+  }
+  EXPECT_GE(unfinished, 2) << "it was killed too late to matter";
+  ASSERT_EQ(RunDexcheck(RunArguments("killed.sqlite")).exit_code, 0);
+  EXPECT_EQ(Dump(Path("killed.sqlite")), reference);
+
+  Program one(DexcheckCommand(RunArguments("shared.sqlite", {"--jobs", "1"})), {});
+  Program other(DexcheckCommand(RunArguments("shared.sqlite", {"--jobs", "1"})), {});
+  for (const ProgramResult& result : {one.Wait(), other.Wait()}) EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(Dump(Path("shared.sqlite")), reference);
+}
+
+TEST_F(StudySearch, StopsTrialsThatAreLost) {
+  WriteText(folder_.path() / "tiny.toml", R"(name = "tiny"
+scenario = "offset"
+set = ["duration=0.02", "settle=0.3"]
+stop_error = 2e-6
+[[vary]]
+key = "start_error.xyz"
+values = [[1e-6, 0, 0], [3e-6, 0, 0]]
+)");
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--quiet"})).exit_code, 0);
+  const std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  ASSERT_EQ(rows.size(), 2U);
+  EXPECT_EQ(rows[0].result.outcome, Outcome::kTracked);
+  EXPECT_EQ(rows[1].result.outcome, Outcome::kDiverged);
+  EXPECT_EQ(rows[1].result.failure, "the position error is above stop_error, 2e-06 m at t = 0 s");
+  EXPECT_EQ(rows[1].result.metrics[kSimulatedTime], 0.001) << "it is kept, as far as it came";
+}
+
+TEST_F(StudySearch, HasNoShards) {
+  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})),
+                        {"--shard: the trials of a search"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "2"}),
+                        {"tiny.toml: search: the trials of a search follow from one another"}));
+}
+
+}  // namespace
+}  // namespace dexcheck

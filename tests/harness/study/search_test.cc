@@ -1,0 +1,294 @@
+// Searches on functions whose best points are known, and through the rows of a study.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "controller/common/errors.h"
+#include "harness/study/search_history.h"
+#include "tests/common/throws.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::Throws;
+using Function = std::function<std::vector<double>(const UnitPoint&)>;
+
+Search MakeSearch(SearchMethod method, long count) {
+  Search search;
+  search.method = method;
+  search.count = count;
+  search.population = 16;
+  search.seed = 3;
+  return search;
+}
+
+std::unique_ptr<Searcher> Make(const Search& search, size_t objectives, const UnitPoint& start) {
+  Study study;
+  study.search = search;
+  study.objectives.resize(objectives);
+  return MakeSearcher(study, start);
+}
+
+/// Values of all points that a search asks within its count, in their order.
+std::vector<JudgedPoint> RunSearch(const Search& search, const UnitPoint& start, const Function& function) {
+  const auto searcher = Make(search, function(start).size(), start);
+  std::vector<JudgedPoint> points;
+  while (static_cast<long>(points.size()) < search.count) {
+    const std::vector<UnitPoint> batch = searcher->Ask();
+    if (batch.empty()) break;
+    std::vector<Judgement> judgements;
+    for (const UnitPoint& point : batch) {
+      for (const double x : point) {
+        EXPECT_GE(x, 0.0);
+        EXPECT_LE(x, 1.0);
+      }
+      judgements.push_back({function(point), 0.0});
+      points.push_back({static_cast<long>(points.size()), point, judgements.back()});
+    }
+    searcher->Tell(judgements);
+  }
+  return points;
+}
+
+/// An ellipsoid of condition 100 around (0.3, 0.6, 0.45), turned against the axes.
+std::vector<double> Ellipsoid(const UnitPoint& x) {
+  const double a = x[0] - 0.3;
+  const double b = x[1] - 0.6;
+  const double c = x[2] - 0.45;
+  return {(a + b) * (a + b) + 10.0 * (b - c) * (b - c) + 100.0 * (a - c) * (a - c)};
+}
+
+constexpr double kFound = 1e-6;  // of the ellipsoid, 1e-3 of a range away from its middle
+
+TEST(Search, FindsTheMinimum) {
+  const UnitPoint start = {0.9, 0.1, 0.8};
+  ASSERT_GT(Ellipsoid(start)[0], 1e3 * kFound);
+  for (const auto& [method, count] : {std::pair{SearchMethod::kCmaEs, 800L},
+                                      {SearchMethod::kNelderMead, 300L},
+                                      {SearchMethod::kBobyqa, 100L}}) {
+    Search search = MakeSearch(method, count);
+    search.tolerance = 1e-5;
+    const auto points = RunSearch(search, start, Ellipsoid);
+    ASSERT_NE(FindBest(points), nullptr);
+    EXPECT_LT(FindBest(points)->judgement.objectives[0], kFound)
+        << static_cast<int>(method) << ": " << points.size();
+    EXPECT_EQ(points.front().values, start);
+  }
+}
+
+TEST(Search, LocalSearchesRunSideBySide) {
+  Search search = MakeSearch(SearchMethod::kNelderMead, 400);
+  search.starts = 5;
+  const auto searcher = Make(search, 1, {0.5, 0.5, 0.5});
+  EXPECT_EQ(searcher->Ask().size(), 5U);
+}
+
+// Two valleys: one local search ends in the nearer, worse one, several find the other.
+TEST(Search, SeveralStartsFindTheBetterValley) {
+  const Function valleys = [](const UnitPoint& x) {
+    const double near = std::hypot(x[0] - 0.2, x[1] - 0.2);
+    const double far = std::hypot(x[0] - 0.8, x[1] - 0.75);
+    return std::vector<double>{std::min(near + 0.3, far)};
+  };
+  Search search = MakeSearch(SearchMethod::kNelderMead, 100);
+  EXPECT_NEAR(FindBest(RunSearch(search, {0.3, 0.2}, valleys))->judgement.objectives[0], 0.3, 0.01);
+  search.count = 400;
+  search.starts = 4;
+  EXPECT_LT(FindBest(RunSearch(search, {0.3, 0.2}, valleys))->judgement.objectives[0], 0.01);
+}
+
+// A minimum on the edge of the range, where a search that knows no bounds would leave it.
+TEST(Search, FindsAMinimumOnTheEdge) {
+  const Function slope = [](const UnitPoint& x) {
+    return std::vector<double>{x[0] + (x[1] - 0.5) * (x[1] - 0.5)};
+  };
+  for (const SearchMethod method : {SearchMethod::kCmaEs, SearchMethod::kNelderMead, SearchMethod::kBobyqa}) {
+    EXPECT_LT(FindBest(RunSearch(MakeSearch(method, 480), {0.7, 0.2}, slope))->judgement.objectives[0], 1e-3)
+        << static_cast<int>(method);
+  }
+}
+
+/// Zitzler, Deb and Thiele's first problem with 4 keys: the front is f2 = 1 - sqrt(f1).
+std::vector<double> Zdt1(const UnitPoint& x) {
+  const double g = 1.0 + 3.0 * (x[1] + x[2] + x[3]);
+  return {x[0], g * (1.0 - std::sqrt(x[0] / g))};
+}
+
+/// Area between a front and the point (1.1, 1.1).
+double CalcHypervolume(const std::vector<const JudgedPoint*>& front) {
+  double volume = 0.0;
+  double height = 1.1;
+  for (const JudgedPoint* point : front) {
+    const double x = point->judgement.objectives[0];
+    const double y = point->judgement.objectives[1];
+    if (x >= 1.1 || y >= height) continue;
+    volume += (1.1 - x) * (height - y);
+    height = y;
+  }
+  return volume;
+}
+
+TEST(Search, Nsga2ApproachesTheFront) {
+  Search search = MakeSearch(SearchMethod::kNsga2, 960);
+  search.population = 24;
+  const auto points = RunSearch(search, {0.5, 0.5, 0.5, 0.5}, Zdt1);
+  // The whole front has 1.21 - 1/3; a sixteenth is left to its 24 points being apart and not quite there.
+  constexpr double kWhole = 1.21 - 1.0 / 3.0;
+  EXPECT_GT(CalcHypervolume(FindFront(points)), kWhole - 1.0 / 16.0);
+  // Points at random are far off: the measure can fail.
+  std::vector<JudgedPoint> random;
+  for (const UnitPoint& point : MakeSobol(4, search.count)) random.push_back({0, point, {Zdt1(point), 0.0}});
+  EXPECT_LT(CalcHypervolume(FindFront(random)), kWhole - 0.2);
+}
+
+TEST(Search, TheSeedDecides) {
+  for (const SearchMethod method : {SearchMethod::kCmaEs, SearchMethod::kNsga2}) {
+    Search search = MakeSearch(method, 64);
+    const Function function = [&](const UnitPoint& x) {
+      return method == SearchMethod::kNsga2 ? Zdt1(x) : Ellipsoid(x);
+    };
+    const UnitPoint start = {0.1, 0.2, 0.3, 0.4};
+    const auto values = [&] {
+      std::vector<std::vector<double>> all;
+      for (const JudgedPoint& point : RunSearch(search, start, function)) all.push_back(point.values);
+      return all;
+    };
+    const auto first = values();
+    EXPECT_EQ(first, values());
+    search.seed = 4;
+    EXPECT_NE(first, values());
+  }
+}
+
+// Where constraints do not hold, less violation leads back.
+TEST(Search, LeavesWhatIsForbidden) {
+  Search search = MakeSearch(SearchMethod::kCmaEs, 320);
+  const auto searcher = Make(search, 1, {0.9, 0.9});
+  double best = 1e9;
+  for (long i = 0; i < search.count; i += search.population) {
+    std::vector<Judgement> judgements;
+    for (const UnitPoint& x : searcher->Ask()) {
+      const double violation = std::max(x[0] + x[1] - 0.3, 0.0);  // a small corner is allowed
+      judgements.push_back({{-x[0]}, violation});
+      if (violation <= 0.0) best = std::min(best, -x[0]);
+    }
+    searcher->Tell(judgements);
+  }
+  EXPECT_LT(best, -0.28);
+}
+
+const std::string kStudy = R"(name = "s"
+scenario = "hold"
+seeds = [0, 1]
+[[objective]]
+minimize = "energy"
+[search]
+method = "cma_es"
+count = 50
+population = 8
+[[vary]]
+key = "a"
+from = 1
+to = 100
+spacing = "log"
+[[vary]]
+key = "b"
+from = -1
+to = 1
+[nested]
+method = "sobol"
+count = 3
+[[nested.vary]]
+key = "c"
+from = 0
+to = 1
+)";
+
+TrialRow MakeRow(const Trial& trial) {
+  TrialRow row;
+  row.trial = trial;
+  row.result.metrics.fill(0.0);
+  const double a = std::log(trial.parameters[0] / 20.0);
+  row.result.metrics[kEnergy] =
+      a * a + trial.parameters[1] * trial.parameters[1] + 0.01 * trial.parameters[2];
+  return row;
+}
+
+/// Makes the search's trials until `stop` have been made; the last batch in disorder.
+void Follow(SearchHistory* history, size_t stop, std::vector<TrialRow>* rows) {
+  std::mt19937 random(7);
+  while (!history->is_over()) {
+    std::vector<Trial> batch = history->ListMissing();
+    std::shuffle(batch.begin(), batch.end(), random);
+    for (const Trial& trial : batch) {
+      if (rows->size() == stop) return;
+      rows->push_back(MakeRow(trial));
+      history->Add(rows->back());
+    }
+  }
+}
+
+TEST(SearchHistory, GoesOnFromItsRowsWhereverItWasStopped) {
+  const Study study = ParseStudy(kStudy, "study.toml");
+  const UnitPoint start(2, 0.5);
+  SearchHistory whole(study, start);
+  std::vector<TrialRow> all;
+  Follow(&whole, SIZE_MAX, &all);
+  ASSERT_EQ(all.size(), 48U * 6U) << "whole generations of 8 within 50 points, 3 draws and 2 seeds of each";
+  EXPECT_EQ(static_cast<long>(all.size()), CountTrials(study));
+  ASSERT_EQ(whole.points().size(), 48U);
+  EXPECT_LT(FindBest(whole.points())->judgement.objectives[0], whole.points()[0].judgement.objectives[0]);
+  for (const size_t stop : {size_t{0}, size_t{1}, size_t{47}, size_t{48}, size_t{100}, all.size() - 1}) {
+    std::vector<TrialRow> rows;
+    {
+      SearchHistory stopped(study, start);
+      Follow(&stopped, stop, &rows);
+    }
+    SearchHistory again(study, start);
+    for (const TrialRow& row : std::vector<TrialRow>(rows)) again.Add(row);
+    Follow(&again, SIZE_MAX, &rows);
+    ASSERT_EQ(rows.size(), all.size()) << stop;
+    std::sort(rows.begin(), rows.end(),
+              [](const TrialRow& a, const TrialRow& b) { return a.trial.number < b.trial.number; });
+    std::vector<TrialRow> expected = all;
+    std::sort(expected.begin(), expected.end(),
+              [](const TrialRow& a, const TrialRow& b) { return a.trial.number < b.trial.number; });
+    for (size_t i = 0; i < rows.size(); ++i)
+      EXPECT_EQ(rows[i].trial.parameters, expected[i].trial.parameters) << i;
+  }
+}
+
+TEST(SearchHistory, EachPointHasTheSameDraws) {
+  const Study study = ParseStudy(kStudy, "study.toml");
+  SearchHistory history(study, UnitPoint(2, 0.5));
+  const std::vector<Trial> batch = history.ListMissing();
+  ASSERT_EQ(batch.size(), 48U);
+  for (size_t i = 0; i < batch.size(); ++i) {
+    EXPECT_EQ(batch[i].number, static_cast<long>(i));
+    EXPECT_EQ(batch[i].parameters[2], batch[i % 6].parameters[2]);
+    EXPECT_EQ(batch[i].seed, i % 2);
+    EXPECT_EQ(batch[i].parameters[0], batch[i - i % 6].parameters[0]);
+  }
+  EXPECT_NE(batch[0].parameters[2], batch[2].parameters[2]);
+}
+
+TEST(SearchHistory, RowsOfAnotherSearchAreRefused) {
+  const Study study = ParseStudy(kStudy, "study.toml");
+  SearchHistory history(study, UnitPoint(2, 0.5));
+  std::vector<TrialRow> rows;
+  Follow(&history, 100, &rows);
+  rows[60].trial.parameters[0] *= 1.0 + 1e-15;
+  EXPECT_TRUE(Throws<InputError>(
+      [&] {
+        SearchHistory again(study, UnitPoint(2, 0.5));
+        for (const TrialRow& row : rows) again.Add(row);
+        return 0;
+      },
+      "is not what this search makes of the trials before it"));
+}
+
+}  // namespace
+}  // namespace dexcheck

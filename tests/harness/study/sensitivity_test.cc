@@ -1,0 +1,189 @@
+// Which key matters: functions whose indices are known, through the study's own points and rows.
+
+#include "harness/study/sensitivity.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "harness/study/margin_search.h"
+#include "harness/study/study_answer.h"
+#include "harness/study/study_sensitivity.h"
+
+namespace dexcheck {
+namespace {
+
+/// A study of `keys` keys from 0 to 1, whose metric `energy` is a function of them.
+Study MakeStudy(const std::string& sample, size_t keys, const std::string& more = "") {
+  std::string text =
+      more + "\nname = \"s\"\nscenario = \"hold\"\nmetrics = [\"energy\"]\n[sample]\n" + sample + "\n";
+  for (size_t i = 0; i < keys; ++i) {
+    text += "[[vary]]\nkey = \"x" + std::to_string(i + 1) + "\"\nfrom = 0\nto = 1\n";
+  }
+  return ParseStudy(text, "study.toml");
+}
+
+std::vector<TrialRow> MakeRows(const Study& study,
+                               const std::function<double(const std::vector<double>&)>& function) {
+  std::vector<TrialRow> rows;
+  for (const Trial& trial : ListTrials(study)) {
+    TrialRow row;
+    row.trial = trial;
+    row.result.metrics.fill(0.0);
+    row.result.metrics[kEnergy] = function(trial.parameters);
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+/// Ishigami's function of x in [0, 1]^3, scaled to [-pi, pi].
+double Ishigami(const std::vector<double>& x) {
+  const auto scaled = [&](size_t i) { return M_PI * (2.0 * x[i] - 1.0); };
+  const double b = 0.1 * std::pow(scaled(2), 4) * std::sin(scaled(0));
+  return std::sin(scaled(0)) + 7.0 * std::pow(std::sin(scaled(1)), 2) + b;
+}
+
+// Closed forms, with V1 = (1 + b pi^4 / 5)^2 / 2, V2 = a^2 / 8, V13 = b^2 pi^8 (1/18 - 1/50), a = 7, b = 0.1.
+TEST(SobolIndices, OfIshigamiLieInTheirIntervals) {
+  const double pi4 = std::pow(M_PI, 4);
+  const double V1 = 0.5 * std::pow(1.0 + 0.1 * pi4 / 5.0, 2);
+  const double V2 = 49.0 / 8.0;
+  const double V13 = 0.01 * pi4 * pi4 * (1.0 / 18.0 - 1.0 / 50.0);
+  const double V = V1 + V2 + V13;
+  const std::array<double, 3> first = {V1 / V, V2 / V, 0.0};
+  const std::array<double, 3> total = {(V1 + V13) / V, V2 / V, V13 / V};
+  const Study study = MakeStudy("method = \"saltelli\"\ncount = 1024\nseed = 4", 3);
+  EXPECT_EQ(CountTrials(study), 1024 * 5);
+  const Sensitivity sensitivity = AnalyseSensitivity(study, MakeRows(study, Ishigami), "energy");
+  ASSERT_EQ(sensitivity.sobol.size(), 3U);
+  constexpr double kWidest = 0.15;  // an interval that holds everything would show nothing
+  for (size_t i = 0; i < 3; ++i) {
+    const SobolIndex& index = sensitivity.sobol[i];
+    EXPECT_LE(index.first.low, first[i]) << i;
+    EXPECT_GE(index.first.high, first[i]) << i;
+    EXPECT_LE(index.total.low, total[i]) << i;
+    EXPECT_GE(index.total.high, total[i]) << i;
+    EXPECT_LT(index.first.high - index.first.low, kWidest) << i;
+    EXPECT_LT(index.total.high - index.total.low, kWidest) << i;
+  }
+}
+
+// Sobol's g-function with a = 0, 1, 4.5, 9, 99, 99: V_i = 1 / (3 (1 + a_i)^2), V = prod(1 + V_i) - 1.
+TEST(SobolIndices, OfTheGFunctionLieInTheirIntervals) {
+  const std::vector<double> a = {0, 1, 4.5, 9, 99, 99};
+  const auto g = [&](const std::vector<double>& x) {
+    double product = 1.0;
+    for (size_t i = 0; i < a.size(); ++i) product *= (std::abs(4.0 * x[i] - 2.0) + a[i]) / (1.0 + a[i]);
+    return product;
+  };
+  double all = 1.0;
+  for (const double ai : a) all *= 1.0 + 1.0 / (3.0 * (1.0 + ai) * (1.0 + ai));
+  const Study study = MakeStudy("method = \"saltelli\"\ncount = 2048\nseed = 1", a.size());
+  const Sensitivity sensitivity = AnalyseSensitivity(study, MakeRows(study, g), "energy");
+  ASSERT_EQ(sensitivity.sobol.size(), a.size());
+  for (size_t i = 0; i < a.size(); ++i) {
+    const double Vi = 1.0 / (3.0 * (1.0 + a[i]) * (1.0 + a[i]));
+    const double first = Vi / (all - 1.0);
+    const double total = Vi * all / (1.0 + Vi) / (all - 1.0);
+    EXPECT_LE(sensitivity.sobol[i].first.low, first) << i;
+    EXPECT_GE(sensitivity.sobol[i].first.high, first) << i;
+    EXPECT_LE(sensitivity.sobol[i].total.low, total) << i;
+    EXPECT_GE(sensitivity.sobol[i].total.high, total) << i;
+  }
+}
+
+TEST(SobolIndices, LeaveOutWhatHasNoValueAndFindNothingInAConstant) {
+  const Study study = MakeStudy("method = \"saltelli\"\ncount = 256", 2);
+  std::vector<TrialRow> rows = MakeRows(study, [](const std::vector<double>& x) { return x[0]; });
+  for (size_t i = 0; i < rows.size(); i += 97) rows[i].result.outcome = Outcome::kLostContact;
+  const Sensitivity some = AnalyseSensitivity(study, rows, "energy");
+  ASSERT_EQ(some.sobol.size(), 2U);
+  constexpr double kTolerance = 0.1;  // of 253 blocks
+  EXPECT_NEAR(some.sobol[0].first.value, 1.0, kTolerance);
+  EXPECT_NEAR(some.sobol[1].total.value, 0.0, kTolerance);
+  EXPECT_EQ(some.left_out, 11);
+  const auto constant = MakeRows(study, [](const std::vector<double>&) { return 3.0; });
+  EXPECT_TRUE(AnalyseSensitivity(study, constant, "energy").sobol.empty());
+}
+
+TEST(MorrisEffects, TellLinearInteractingAndIdleKeysApart) {
+  const Study study = MakeStudy("method = \"morris\"\ncount = 20\nseed = 2", 4);
+  EXPECT_EQ(CountTrials(study), 20 * 5);
+  const auto rows =
+      MakeRows(study, [](const std::vector<double>& x) { return 3.0 * x[0] - x[1] + 4.0 * x[1] * x[2]; });
+  const std::vector<MorrisEffect> effects = AnalyseSensitivity(study, rows, "energy").morris;
+  ASSERT_EQ(effects.size(), 4U);
+  constexpr double kRounding = 1e-12;
+  EXPECT_NEAR(effects[0].size.value, 3.0, kRounding);
+  EXPECT_NEAR(effects[0].mean, 3.0, kRounding);
+  EXPECT_NEAR(effects[0].spread, 0.0, kRounding);
+  EXPECT_GT(effects[1].spread, 0.5) << "its effect depends on x3";
+  EXPECT_GT(effects[2].size.low, 0.5);
+  EXPECT_NEAR(effects[3].size.value, 0.0, kRounding);
+}
+
+// Tables of Clopper and Pearson's interval: 0 of 10, 1 of 20, 10 of 10.
+TEST(Probability, HasClopperAndPearsonsInterval) {
+  constexpr double kPrinted = 5e-5;
+  EXPECT_EQ(CalcProbability(0, 10).low, 0.0);
+  EXPECT_NEAR(CalcProbability(0, 10).high, 0.3085, kPrinted);
+  EXPECT_NEAR(CalcProbability(1, 20).low, 0.0013, kPrinted);
+  EXPECT_NEAR(CalcProbability(1, 20).high, 0.2487, kPrinted);
+  EXPECT_NEAR(CalcProbability(10, 10).low, 0.6915, kPrinted);
+  EXPECT_EQ(CalcProbability(10, 10).high, 1.0);
+}
+
+TEST(Probability, IsToldOfASampleWithConstraints) {
+  const Study study =
+      MakeStudy("method = \"random\"\ncount = 1000\nseed = 1", 2, "constraints = [\"energy < 0.9\"]");
+  const auto rows = MakeRows(study, [](const std::vector<double>& x) { return x[0]; });
+  long failures = 0;
+  for (const TrialRow& row : rows) failures += row.result.metrics[kEnergy] > 0.9 ? 1 : 0;
+  const Estimate estimate = CalcProbability(failures, 1000);
+  EXPECT_LT(estimate.low, 0.1);
+  EXPECT_GT(estimate.high, 0.1);
+  const std::vector<std::string> answers = AnswerStudy(study, rows);
+  ASSERT_FALSE(answers.empty());
+  EXPECT_NE(answers[0].find(std::to_string(failures) + " of 1000 trials"), std::string::npos) << answers[0];
+}
+
+/// A ball with radius 0.3 around (0.5, 0.4): the margins are known in every direction.
+TEST(Margins, AreFoundByBisection) {
+  Search search;
+  search.method = SearchMethod::kMargins;
+  search.directions = 6;
+  search.tolerance = 1e-3;
+  const UnitPoint start = {0.6, 0.2};
+  MarginSearcher searcher(search, start);
+  const auto distance = [](const UnitPoint& x) { return std::hypot(x[0] - 0.5, x[1] - 0.4); };
+  long count = 0;
+  for (std::vector<UnitPoint> batch = searcher.Ask(); !batch.empty(); batch = searcher.Ask()) {
+    std::vector<Judgement> judgements;
+    for (const UnitPoint& point : batch) judgements.push_back({{}, distance(point) < 0.3 ? 0.0 : 1.0});
+    count += static_cast<long>(batch.size());
+    searcher.Tell(judgements);
+  }
+  EXPECT_LE(count, MarginSearcher::CountPoints(search, 2));
+  ASSERT_EQ(searcher.margins().size(), 10U);
+  int turned = 0;
+  for (const Margin& margin : searcher.margins()) {
+    if (margin.bad.empty()) continue;
+    ++turned;
+    EXPECT_LT(distance(margin.good), 0.3);
+    EXPECT_GE(distance(margin.bad), 0.3);
+    EXPECT_LE(margin.at_most - margin.distance, search.tolerance);
+  }
+  EXPECT_GE(turned, 8) << "down along x2 the edge may come first";
+  // x1 from 0.6 up to 0.5 + sqrt(0.3^2 - 0.2^2).
+  EXPECT_NEAR(searcher.margins()[1].distance, std::sqrt(0.05) - 0.1, search.tolerance);
+  // Where the start does not hold there is no margin.
+  MarginSearcher none(search, {0.0, 0.0});
+  static_cast<void>(none.Ask());
+  none.Tell({{{}, 1.0}});
+  EXPECT_TRUE(none.Ask().empty());
+  EXPECT_TRUE(none.margins().empty());
+}
+
+}  // namespace
+}  // namespace dexcheck
