@@ -282,7 +282,12 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   if (mass_factor() == nullptr) return;
 
   // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
-  bias_ = robot.coriolis() + robot.gravity() + robot.friction();
+  if (is_unjudged_) {
+    bias_ = robot.gravity() + robot.friction();
+    bias_.noalias() += robot.C() * robot.velocity();
+  } else {
+    bias_ = predicted_by_->bias();
+  }
   residual_ = bias_ - force_;
   residual_.noalias() += robot.M() * xi_dot;
   residual_.noalias() += ModelAtTruth(step).grasp().J_B().transpose() * findings_.f_c;
