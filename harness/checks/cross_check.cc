@@ -56,6 +56,12 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
   }
 }
 
+void CrossCheck::Expect(const DisturbanceOptions& disturbance, std::span<const Motor> motors) {
+  if (!known_) known_.emplace(*setup_, motors);
+  known_->plant.Expect(disturbance, setup_->MakePartContext());
+  motion_.LeaveOut(StepCheck::kIdleJoints);
+}
+
 void CrossCheck::Reset() {
   for (const CheckRecord& check : motion_.checks()) {
     if (check.failed) settling_failures_.push_back(check);

@@ -31,6 +31,9 @@ class CrossCheck {
   /// What the scenario itself asks for; null for an ideal plant. Once at each step, before the questions,
   /// also of those steps that are not asked about.
   const KnownStep* Follow(const StepRecord& step) { return known_ ? &known_->plant.Follow(step) : nullptr; }
+  /// One more disturbance is known from now on; between steps. Of a plant that was ideal, joints that only
+  /// stiffness holds are not judged any more.
+  void Expect(const DisturbanceOptions& disturbance, std::span<const Motor> motors);
   /// Robot and object are elsewhere from now on, by `way` (m, world).
   void Translate(const Vector3d& way) {
     if (known_) known_->plant.Translate(way);

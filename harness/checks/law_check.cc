@@ -53,6 +53,7 @@ LawCheck::LawCheck(const Setup& setup)
       time_step_(setup.scenario().plant.time_step),
       velocity_age_(setup.scenario().plant.velocity_age()),
       hold_(std::max(1L, std::lround(setup.scenario().plant.control_step / time_step_))),
+      sampled_radius_(CalcSampledRadius(spec_.gains, time_step_, hold_, velocity_age_)),
       actuation_(setup.model()),
       reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())),
       own_factor_(setup.model()) {
@@ -73,10 +74,6 @@ LawCheck::LawCheck(const Setup& setup)
   force_.setZero(setup.model().num_velocities());
   difference_ = force_;
   slope_.setZero(3 * static_cast<Eigen::Index>(setup.fingertips().size()));
-}
-
-double LawCheck::sampled_radius() const {
-  return CalcSampledRadius(spec_.gains, time_step_, hold_, velocity_age_);
 }
 
 DesiredMotion LawCheck::EvaluateDesired(double t) const {
@@ -162,8 +159,10 @@ void LawCheck::CompareDemand(const StepFindings& findings) {
   const double kappa = reference_.condition_number();
   difference_ = reference_.slip_acceleration();
   mass_factor_->Multiply(difference_);
-  const double slip = (Norm(reference_.slip_coriolis()) + difference_.norm()) / scale_;
-  errors_.demand = std::max(0.0, std::max(motion, forces) / kappa - kSlipShare * slip);
+  const double apart = std::max(motion, forces) / kappa - kSlipShare * difference_.norm() / scale_;
+  const bool slip_explains = apart <= 0.0;
+  errors_.demand =
+      slip_explains ? 0.0 : std::max(apart - kSlipShare * Norm(reference_.slip_coriolis()) / scale_, 0.0);
 }
 
 void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms, const VectorXd& f_c) {

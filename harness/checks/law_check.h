@@ -55,7 +55,7 @@ class LawCheck {
     return !step.command.handling.partial && step.command.force_solves > 0;
   }
   /// Of the scenario's gains.
-  [[nodiscard]] double sampled_radius() const;
+  [[nodiscard]] double sampled_radius() const { return sampled_radius_; }
   /// Whether the law's closed loop is (57): that of the paper's, and by algebra that of operational space.
   [[nodiscard]] bool has_error_dynamics() const { return has_error_dynamics_; }
   /// Whether the rigid system answers with what the law demands of it: the paper's does.
@@ -96,6 +96,7 @@ class LawCheck {
   double velocity_age_;
   bool has_error_dynamics_ = true;
   long hold_;
+  double sampled_radius_;
   std::unique_ptr<Trajectory> trajectory_;
   ActuationMap actuation_;
   LawReference reference_;

@@ -255,7 +255,7 @@ void StepChecks::Predict(const StepRecord& step) {
   findings_.xi_dot_model = prediction->xi_dot;
   findings_.V_Bo_dot_model = prediction->V_Bo_dot;
   findings_.f_c_model = prediction->f_c;
-  mass_factor_ = &dynamics_.mass_factor();
+  predicted_by_ = &dynamics_;
 }
 
 void StepChecks::PredictPart(const StepRecord& step) {
@@ -269,7 +269,7 @@ void StepChecks::PredictPart(const StepRecord& step) {
   findings_.xi_dot_model = prediction.xi_dot;
   findings_.V_Bo_dot_model = prediction.V_Bo_dot;
   part->grasp.Scatter(prediction.f_c, findings_.f_c_model);
-  mass_factor_ = &part->dynamics.mass_factor();
+  predicted_by_ = &part->dynamics;
 }
 
 void StepChecks::CompareDynamics(const StepRecord& step) {
@@ -279,10 +279,15 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   if (step.known != nullptr) force_ += step.known->force;
   // Soft contacts become only in some milliseconds what rigid ones are at once.
   if (!is_unjudged_) Predict(step);
-  if (mass_factor_ == nullptr) return;
+  if (mass_factor() == nullptr) return;
 
   // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
-  bias_ = robot.coriolis() + robot.gravity() + robot.friction();
+  if (is_unjudged_) {
+    bias_ = robot.gravity() + robot.friction();
+    bias_.noalias() += robot.C() * robot.velocity();
+  } else {
+    bias_ = predicted_by_->bias();
+  }
   residual_ = bias_ - force_;
   residual_.noalias() += robot.M() * xi_dot;
   residual_.noalias() += ModelAtTruth(step).grasp().J_B().transpose() * findings_.f_c;
@@ -302,7 +307,7 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   if (is_unjudged_) return;
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
-  mass_factor_->Multiply(residual_);
+  mass_factor()->Multiply(residual_);
   AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale_, give_->motion() / scale_);
   double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
   // Fingertips that only touch push with less than what they will bear.
@@ -311,7 +316,7 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   AddLessGive(StepCheck::kContactForce, apart / force_scale, give_->force() / force_scale);
 }
 
-double StepChecks::Norm(const VectorXd& force) { return mass_factor_->CalcForceNorm(force, &work_); }
+double StepChecks::Norm(const VectorXd& force) { return mass_factor()->CalcForceNorm(force, &work_); }
 
 Vector2d StepChecks::ReadWheelRates(const StepRecord& step) const {
   const std::vector<EngineWheel>& wheels = setup_->adapter().wheels();
@@ -385,9 +390,9 @@ void StepChecks::KeepForces(const StepRecord& step) {
   const auto fails = [&](StepCheck which) {
     return check(which).applies && !(check(which).last <= check(which).bound);
   };
-  if (mass_factor_ == nullptr) return;
+  if (mass_factor() == nullptr) return;
   if (!fails(StepCheck::kBalanceRobot) && !fails(StepCheck::kBalanceObject)) return;
-  forces_.Add(left_of_robot_, left_of_object_, ModelAtTruth(step), step.reading.state.q, *mass_factor_,
+  forces_.Add(left_of_robot_, left_of_object_, ModelAtTruth(step), step.reading.state.q, *mass_factor(),
               scale_);
 }
 

@@ -49,7 +49,9 @@ class StepChecks {
   /// Takes checks out that this run cannot answer.
   void LeaveOut(StepCheck which) { check(which).applies = false; }
   /// M_bar' = L^T L of the last step that was judged; null before.
-  [[nodiscard]] const TreeFactor* mass_factor() const { return mass_factor_; }
+  [[nodiscard]] const TreeFactor* mass_factor() const {
+    return predicted_by_ != nullptr ? &predicted_by_->mass_factor() : nullptr;
+  }
 
   /// Adds the largest |tau'| / limit of a motor: before the step, which does not come when that is above 1.
   void JudgeEffort(double effort, double time) { check(StepCheck::kActuators).Add(effort, time); }
@@ -110,7 +112,7 @@ class StepChecks {
   StepFindings findings_;
   ConstrainedDynamics dynamics_;
   ActuationMap actuation_;
-  const TreeFactor* mass_factor_ = nullptr;
+  const ConstrainedDynamics* predicted_by_ = nullptr;  // of the last step that was judged
   std::map<ContactSet, std::unique_ptr<PartialDynamics>> parts_;
   Handling handling_;
   ContactSet touching_ = 0;
