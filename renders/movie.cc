@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "harness/engine/engine.h"
 #include "renders/compose.h"
 #include "renders/course.h"
@@ -64,6 +65,7 @@ class MoviePainter::RunPainter {
         checks_(run_),
         error_range_(ErrorRange(run_.position_errors)) {
     if (options.panel) overlay_.emplace();
+    if (options.free && (options.free->follow || !options.free->look_at)) FindObject();
     inset_height_ = static_cast<int>(std::lround(kInsetHeight * options.height));
     inset_width_ =
         static_cast<int>(std::lround(std::min(kInsetAspect * inset_height_, kWidestInset * width)));
@@ -74,7 +76,8 @@ class MoviePainter::RunPainter {
     const long row = run_.RowAt(run_.times.front() + time + kTimeRounding);
     SetRow(model_, run_, row, data_.get());
     const std::vector<Decoration> decorations = decorator_.Make(row, *data_);
-    Image image = renderer_.Render(*data_, decorations);
+    Image image = options_.free ? renderer_.Render(*data_, FindFreeView(row), decorations)
+                                : renderer_.Render(*data_, decorations);
     if (!options_.inset.empty()) PlaceInset(PaintInset(decorations), &image);
     if (overlay_) overlay_->Draw(MakeState(row), &image);
     return image;
@@ -112,6 +115,26 @@ class MoviePainter::RunPainter {
     const double covered =
         options_.panel && camera_ == kCourseCamera ? Overlay::CalcCoveredWidth(width_, options_.height) : 0.0;
     return {side * (1.0 - 2.0 * covered / width_) - margin, side - margin, top - margin, top - margin};
+  }
+
+  /// @param row whose kinematics data_ has.
+  [[nodiscard]] Viewpoint FindFreeView(long row) const {
+    const FreeCamera& free = *options_.free;
+    const Vector3d object = object_ < 0 ? object_start_ : Vector3d(BodyPose(*data_, object_).translation());
+    const Vector3d way = free.follow ? Vector3d(object - object_start_) : Vector3d(Vector3d::Zero());
+    const Vector3d target = free.look_at ? Vector3d(*free.look_at + way) : object;
+    const double angle = free.orbit * (run_.times[static_cast<size_t>(row)] - run_.times.front());
+    const Vector3d arm = free.from + way - target;
+    return LookFrom(target + Eigen::AngleAxisd(angle, Vector3d::UnitZ()) * arm, target);
+  }
+
+  /// Where the object is at the beginning, which a free camera needs.
+  void FindObject() {
+    object_ = mj_name2id(&model_, mjOBJ_BODY, run_.object_body.c_str());
+    if (object_ < 0)
+      throw InputError(run_.source + ": object: no body " + Quote(run_.object_body) + " in the model");
+    SetRow(model_, run_, 0, data_.get());
+    object_start_ = BodyPose(*data_, object_).translation();
   }
 
   Image PaintInset(std::span<const Decoration> decorations) {
@@ -166,6 +189,8 @@ class MoviePainter::RunPainter {
   }
 
   const mjModel& model_;
+  int object_ = -1;  // body; with a free camera
+  Vector3d object_start_ = Vector3d::Zero();
   const RunFrames& run_;
   MovieOptions options_;
   int width_;

@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -16,13 +17,22 @@
 
 namespace dexcheck {
 
+/// A camera that stands where one wants.
+struct FreeCamera {
+  Vector3d from = Vector3d::Zero();  ///< At the run's beginning, m, world.
+  std::optional<Vector3d> look_at;   ///< m, world; none for the object, wherever it is.
+  bool follow = false;               ///< Camera and fixed point move along with the object.
+  double orbit = 0.0;                ///< About the vertical through what it looks at, rad/s.
+};
+
 struct MovieOptions {
   int width = 1280;
   int height = 720;
   int fps = 30;
-  std::string camera;   ///< Empty for "overview", or where the model has none for the course's.
-  std::string inset;    ///< A second camera, shown in the lower right corner; none when empty.
-  bool forces = false;  ///< Contact forces with their friction cones.
+  std::string camera;              ///< Empty for "overview", or where the model has none for the course's.
+  std::optional<FreeCamera> free;  ///< Instead of `camera`.
+  std::string inset;               ///< A second camera, shown in the lower right corner; none when empty.
+  bool forces = false;             ///< Contact forces with their friction cones.
   bool tracks =
       false;  ///< Where the contacts have been on the object, and the object's path beside the desired one.
   bool frames = false;  ///< The object's axes.

@@ -125,6 +125,11 @@ class Renderer::Impl {
     return ReduceBottomUp(pixels_.data(), width, height, options_.samples);
   }
 
+  Image Render(mjData& data, const Viewpoint& from, std::span<const Decoration> decorations) {
+    options_.course = from;
+    return Render(data, kCourse, options_.width, options_.height, 0.0, decorations);
+  }
+
   Image Render(mjData& data, std::span<const Decoration> decorations) {
     return Render(data, camera_, options_.width, options_.height, options_.shift_right, decorations);
   }
@@ -180,6 +185,10 @@ Renderer::~Renderer() = default;
 
 Image Renderer::Render(mjData& data, std::span<const Decoration> decorations) {
   return impl_->Render(data, decorations);
+}
+
+Image Renderer::Render(mjData& data, const Viewpoint& from, std::span<const Decoration> decorations) {
+  return impl_->Render(data, from, decorations);
 }
 
 Image Renderer::Render(mjData& data, const std::string& camera, int width, int height,

@@ -59,6 +59,9 @@ class Renderer {
   /// Draws the state in `data`, whose kinematics, cameras and lights must be computed.
   Image Render(mjData& data, std::span<const Decoration> decorations = {});
 
+  /// The same from a camera that stands there.
+  Image Render(mjData& data, const Viewpoint& from, std::span<const Decoration> decorations = {});
+
   /// The same from another camera, at most as large as the options' picture.
   Image Render(mjData& data, const std::string& camera, int width, int height,
                std::span<const Decoration> decorations = {});

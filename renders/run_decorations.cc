@@ -89,7 +89,7 @@ RunDecorator::RunDecorator(const mjModel& model, const RunFrames& run, const Dec
 
 std::vector<Decoration> RunDecorator::Make(long row, const mjData& data) const {
   std::vector<Decoration> decorations;
-  if (options_.forces) AddForces(row, &decorations);
+  if (options_.forces) AddForces(run_, row, meters_per_newton_, &decorations);
   if (options_.tracks) {
     const Pose X_WO = BodyPose(data, object_);
     AddTracks(row, X_WO, &decorations);
@@ -99,17 +99,18 @@ std::vector<Decoration> RunDecorator::Make(long row, const mjData& data) const {
   return decorations;
 }
 
-void RunDecorator::AddForces(long row, std::vector<Decoration>* decorations) const {
-  if (run_.contact_forces.size() == 0) return;
-  for (long k = 0; k < run_.contacts(); ++k) {
-    const Vector3d p = ContactVector(run_.contact_positions, row, k);
-    const Vector3d force = ContactVector(run_.contact_forces, row, k);
+void AddForces(const RunFrames& run, long row, double meters_per_newton,
+               std::vector<Decoration>* decorations) {
+  if (run.contact_forces.size() == 0) return;
+  for (long k = 0; k < run.contacts(); ++k) {
+    const Vector3d p = ContactVector(run.contact_positions, row, k);
+    const Vector3d force = ContactVector(run.contact_forces, row, k);
     if (!p.allFinite() || !force.allFinite() || force.isZero()) continue;
-    decorations->emplace_back(Arrow{p, p + meters_per_newton_ * force, kForceRadius, kForce});
-    if (run_.contact_normals.size() == 0 || !(run_.friction > 0.0)) continue;
-    const Vector3d normal = ContactVector(run_.contact_normals, row, k);
+    decorations->emplace_back(Arrow{p, p + meters_per_newton * force, kForceRadius, kForce});
+    if (run.contact_normals.size() == 0 || !(run.friction > 0.0)) continue;
+    const Vector3d normal = ContactVector(run.contact_normals, row, k);
     if (!normal.allFinite() || normal.isZero()) continue;
-    decorations->emplace_back(Cone{p, normal.normalized(), kConeHeight, std::atan(run_.friction), kCone});
+    decorations->emplace_back(Cone{p, normal.normalized(), kConeHeight, std::atan(run.friction), kCone});
   }
 }
 

@@ -29,7 +29,6 @@ class RunDecorator {
   [[nodiscard]] std::vector<LegendEntry> MakeLegend() const;
 
  private:
-  void AddForces(long row, std::vector<Decoration>* decorations) const;
   void AddTracks(long row, const Pose& X_WO, std::vector<Decoration>* decorations) const;
   void AddPaths(long row, const Vector3d& p_WO, std::vector<Decoration>* decorations) const;
 
@@ -44,6 +43,10 @@ class RunDecorator {
 /// How long the arrow of 1 N is drawn: the run's largest contact force fits beside a hand. 1 when there is
 /// none.
 double CalcMetersPerNewton(const RunFrames& run);
+
+/// Contact forces of a row, each in its friction cone.
+void AddForces(const RunFrames& run, long row, double meters_per_newton,
+               std::vector<Decoration>* decorations);
 
 /// The pose of a body in computed kinematics.
 Pose BodyPose(const mjData& data, int body);

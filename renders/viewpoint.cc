@@ -32,6 +32,13 @@ struct Slab {
 
 }  // namespace
 
+Viewpoint LookFrom(const Vector3d& eye, const Vector3d& look_at) {
+  const Vector3d way = look_at - eye;
+  Require(way.norm() > 0.0, "distance of the camera", "must be positive", way.norm());
+  return {look_at, way.norm(), std::atan2(way.y(), way.x()),
+          std::asin(std::clamp(way.z() / way.norm(), -1.0, 1.0))};
+}
+
 Viewpoint FitViewpoint(std::span<const VisibleSphere> spheres, double azimuth, double elevation,
                        const ViewEdges& edges) {
   Require(!spheres.empty(), "spheres", "must be at least one", 0.0);

@@ -4,10 +4,12 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/common/toml_overrides.h"
 #include "controller/common/toml_reader.h"
 
 namespace dexcheck {
@@ -77,6 +79,71 @@ void CheckSize(size_t size, std::string_view source) {
                    " bytes long");
 }
 
+/// TomlDocument::Override. "PATH+=VALUE" adds an entry to a list, which is made when it is not there.
+void Assign(std::string_view assignment, toml::table* root) {
+  // As messages show it: of readable length, without control characters.
+  const std::string label = Abbreviate("--set " + std::string(assignment));
+  const auto fail = [&](const std::string& why) { throw InputError(label + ": " + why); };
+  CheckSize(assignment.size(), "--set");
+  const size_t equals = assignment.find('=');
+  if (equals == std::string_view::npos) fail("must be PATH=VALUE");
+  const bool appends = equals > 0 && assignment[equals - 1] == '+';
+  const std::string_view path = assignment.substr(0, appends ? equals - 1 : equals);
+  const std::string_view value = assignment.substr(equals + 1);
+  if (NestingScanner(value).FindTooDeep() > 0 || NestingScanner(path).FindTooDeep() > 0) {
+    fail("nested too deeply");
+  }
+  toml::table parsed;
+  const std::string text(value);
+  for (const std::string& form : {"value = " + text, "value = '''" + text + "'''"}) {
+    try {
+      parsed = toml::parse(form, label);
+    } catch (const toml::parse_error&) {
+      continue;
+    }
+    if (parsed.size() == 1) break;  // more keys mean that the value had a line break in it
+  }
+  if (parsed.size() != 1) fail("is not a value");
+
+  toml::node* at = root;
+  size_t begin = 0;
+  while (true) {
+    const size_t dot = path.find('.', begin);
+    const std::string_view key = path.substr(begin, dot - begin);
+    const bool is_last = dot == std::string_view::npos;
+    if (key.empty()) fail("its path has an empty part");
+    if (toml::array* const list = at->as_array()) {
+      size_t index = 0;
+      const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), index);
+      if (error != std::errc() || end != key.data() + key.size() || index >= list->size()) {
+        fail(Quote(key) + " is no entry of a list of " + std::to_string(list->size()));
+      }
+      if (is_last) {
+        list->replace(list->cbegin() + static_cast<std::ptrdiff_t>(index), std::move(*parsed.get("value")));
+        return;
+      }
+      at = list->get(index);
+    } else if (toml::table* const table = at->as_table()) {
+      if (is_last && appends) {
+        if (!table->contains(key)) table->insert(key, toml::array{});
+        toml::array* const list = table->get(key)->as_array();
+        if (list == nullptr) fail(Quote(path) + " is no list");
+        list->push_back(std::move(*parsed.get("value")));
+        return;
+      }
+      if (is_last) {
+        table->insert_or_assign(key, std::move(*parsed.get("value")));
+        return;
+      }
+      if (!table->contains(key)) table->insert(key, toml::table{});
+      at = table->get(key);
+    } else {
+      fail(Quote(path.substr(0, begin - 1)) + " is no table or list");
+    }
+    begin = dot + 1;
+  }
+}
+
 }  // namespace
 
 TomlDocument::TomlDocument(std::string_view text, std::string_view source)
@@ -97,60 +164,17 @@ TomlDocument::TomlDocument(std::string_view text, std::string_view source)
 
 TomlTable TomlDocument::Open() const { return {*context_, TomlValue(*context_, *root_, ""), *root_}; }
 
-void TomlDocument::Override(std::string_view assignment) {
-  // As messages show it: of readable length, without control characters.
-  const std::string label = Abbreviate("--set " + std::string(assignment));
-  const auto fail = [&](const std::string& why) { throw InputError(label + ": " + why); };
-  CheckSize(assignment.size(), "--set");
-  const size_t equals = assignment.find('=');
-  if (equals == std::string_view::npos) fail("must be PATH=VALUE");
-  const std::string_view path = assignment.substr(0, equals);
-  const std::string_view value = assignment.substr(equals + 1);
-  if (NestingScanner(value).FindTooDeep() > 0 || NestingScanner(path).FindTooDeep() > 0) {
-    fail("nested too deeply");
-  }
-  toml::table parsed;
-  const std::string text(value);
-  for (const std::string& form : {"value = " + text, "value = '''" + text + "'''"}) {
-    try {
-      parsed = toml::parse(form, label);
-    } catch (const toml::parse_error&) {
-      continue;
-    }
-    if (parsed.size() == 1) break;  // more keys mean that the value had a line break in it
-  }
-  if (parsed.size() != 1) fail("is not a value");
+void TomlDocument::Override(std::string_view assignment) { Assign(assignment, root_.get()); }
 
-  toml::node* at = root_.get();
-  size_t begin = 0;
-  while (true) {
-    const size_t dot = path.find('.', begin);
-    const std::string_view key = path.substr(begin, dot - begin);
-    const bool is_last = dot == std::string_view::npos;
-    if (key.empty()) fail("its path has an empty part");
-    if (toml::array* const list = at->as_array()) {
-      size_t index = 0;
-      const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), index);
-      if (error != std::errc() || end != key.data() + key.size() || index >= list->size()) {
-        fail(Quote(key) + " is no entry of a list of " + std::to_string(list->size()));
-      }
-      if (is_last) {
-        list->replace(list->cbegin() + static_cast<std::ptrdiff_t>(index), std::move(*parsed.get("value")));
-        return;
-      }
-      at = list->get(index);
-    } else if (toml::table* const table = at->as_table()) {
-      if (is_last) {
-        table->insert_or_assign(key, std::move(*parsed.get("value")));
-        return;
-      }
-      if (!table->contains(key)) table->insert(key, toml::table{});
-      at = table->get(key);
-    } else {
-      fail(Quote(path.substr(0, begin - 1)) + " is no table or list");
-    }
-    begin = dot + 1;
-  }
+std::string ApplyOverrides(const std::string& text, const std::string& source,
+                           const std::vector<std::string>& overrides) {
+  if (overrides.empty()) return text;
+  (void)TomlDocument(text, source);  // which says what is wrong with it
+  toml::table root = toml::parse(text);
+  for (const std::string& assignment : overrides) Assign(assignment, &root);
+  std::ostringstream stream;
+  stream << root << '\n';
+  return stream.str();
 }
 
 std::string ReadTextFile(const std::string& path) {

@@ -31,6 +31,9 @@ class CrossCheck {
   /// What the scenario itself asks for; null for an ideal plant. Once at each step, before the questions,
   /// also of those steps that are not asked about.
   const KnownStep* Follow(const StepRecord& step) { return known_ ? &known_->plant.Follow(step) : nullptr; }
+  /// One more disturbance is known from now on; between steps. Of a plant that was ideal, joints that only
+  /// stiffness holds are not judged any more.
+  void Expect(const DisturbanceOptions& disturbance, std::span<const Motor> motors);
   /// Robot and object are elsewhere from now on, by `way` (m, world).
   void Translate(const Vector3d& way) {
     if (known_) known_->plant.Translate(way);
@@ -86,7 +89,8 @@ class CrossCheck {
   std::optional<NotIdeal> known_;
   std::optional<LawCheck> law_;  // none for a task, an unknown law, or a motion of joints
   std::optional<JointLawCheck> joint_law_;
-  LawTerms law_terms_;  // the engine's
+  LawTerms law_terms_;                                         // the engine's
+  double position_by_law_ = -1.0, orientation_by_law_ = -1.0;  // largest; see MeasuredCauses
   std::vector<CheckRecord> settling_failures_;
   MotorEvidence motors_;
   SensorEvidence sensors_;

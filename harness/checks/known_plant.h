@@ -33,6 +33,10 @@ class KnownPlant {
 
   /// Once at each step, those while everything comes to rest included. @param step its command is set.
   const KnownStep& Follow(const StepRecord& step);
+  /// One more push is asked for from now on.
+  void Expect(const DisturbanceOptions& disturbance, const PartContext& context) {
+    disturbances_.Add(disturbance, context);
+  }
   /// Robot and object are elsewhere from now on, by `way` (m, world).
   void Translate(const Vector3d& way) { sensing_.Translate(way); }
 

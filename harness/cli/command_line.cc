@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <sstream>
 #include <system_error>
@@ -18,6 +19,16 @@ ValueCheck WholeNumber(std::uint64_t least, std::uint64_t most) {
     if (result.ec == std::errc() && result.ptr == end && least <= value && value <= most) return {};
     return "must be a whole number from " + std::to_string(least) + " to " + std::to_string(most) + ", got " +
            Quote(text);
+  };
+}
+
+ValueCheck PositiveNumber(const std::string& demand) {
+  return [demand](const std::string& text) -> std::string {
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const bool is_number = error == std::errc() && end == text.data() + text.size();
+    if (is_number && std::isfinite(value) && value > 0.0) return {};
+    return demand + ", got " + Quote(text);
   };
 }
 
@@ -131,6 +142,40 @@ CommandLine::CommandLine(const std::string& program, const std::string& help, co
 }
 
 CommandLine::~CommandLine() = default;
+
+namespace {
+
+void DescribeCommand(const CLI::App& app, const std::string& name, std::vector<CommandHelp>* all) {
+  CommandHelp help{name, app.get_description(), {}, {}};
+  for (const CLI::Option* option : app.get_options()) {
+    OptionHelp one;
+    one.is_positional = option->get_positional();
+    if (one.is_positional) {
+      one.names = {option->get_single_name()};
+    } else {
+      for (const std::string& word : option->get_snames()) one.names.push_back("-" + word);
+      for (const std::string& word : option->get_lnames()) one.names.push_back("--" + word);
+    }
+    // A flag takes no values.
+    if (option->get_items_expected_max() > 0) one.value = option->get_type_name();
+    one.text = option->get_description();
+    help.options.push_back(one);
+  }
+  const std::vector<const CLI::App*> commands = app.get_subcommands([](const CLI::App*) { return true; });
+  for (const CLI::App* command : commands) help.commands.push_back(command->get_name());
+  all->push_back(help);
+  for (const CLI::App* command : commands) {
+    DescribeCommand(*command, (name.empty() ? "" : name + " ") + command->get_name(), all);
+  }
+}
+
+}  // namespace
+
+std::vector<CommandHelp> CommandLine::Describe() const {
+  std::vector<CommandHelp> all;
+  DescribeCommand(*app_, "", &all);
+  return all;
+}
 
 int CommandLine::Run(int argc, char** argv) {
   try {

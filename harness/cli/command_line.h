@@ -35,6 +35,9 @@ using ValueCheck = std::function<std::string(const std::string& value)>;
 /// Accepts decimal whole numbers from `least` to `most`.
 ValueCheck WholeNumber(std::uint64_t least, std::uint64_t most);
 
+/// Accepts finite numbers above zero. @param demand what is said of others.
+ValueCheck PositiveNumber(const std::string& demand = "must be a positive number");
+
 /// An option, a flag or a positional argument.
 class Option {
  public:
@@ -95,12 +98,30 @@ class Command {
   int* exit_code_;
 };
 
+/// What the help says of an option or a positional argument.
+struct OptionHelp {
+  std::vector<std::string> names;  ///< "--out"; of a positional argument its one name.
+  std::string value;               ///< "DIR"; empty for flags.
+  std::string text;
+  bool is_positional = false;
+};
+
+/// And of a command.
+struct CommandHelp {
+  std::string name;  ///< "study run"; empty for the program itself.
+  std::string text;
+  std::vector<OptionHelp> options;
+  std::vector<std::string> commands;  ///< Next words.
+};
+
 /// The program's whole command line.
 class CommandLine {
  public:
   CommandLine(const std::string& program, const std::string& help, const std::string& version);
   ~CommandLine();
 
+  /// What --help says, by command: the program first, then all commands in order.
+  [[nodiscard]] std::vector<CommandHelp> Describe() const;
   [[nodiscard]] Command root() { return {app_.get(), &exit_code_}; }
   /// Reads the words and runs the command's action. @returns the program's exit code; --help and --version
   /// print and are a success. @throws UsageError, which for an unknown word names the nearest known one; what

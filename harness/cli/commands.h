@@ -50,6 +50,9 @@ void AddRefereeCommand(Command app);
 void AddRenderCommand(Command app);
 void AddReportCommand(Command app);
 void AddStatesCommand(Command app);
+/// @param line is described when the command runs.
+void AddHelpCommands(Command app, const CommandLine& line);
 void AddStudyCommand(Command app);
+void AddViewCommand(Command app, const std::string& command_line);
 
 }  // namespace dexcheck::cli

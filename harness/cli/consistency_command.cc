@@ -53,15 +53,6 @@ std::string Fraction(const std::string& text) {
   return "must be a number above 0 and below 1, got " + Quote(text);
 }
 
-/// Accepts a number above 0.
-std::string PositiveNumber(const std::string& text) {
-  double value = 0.0;
-  const char* const end = text.data() + text.size();
-  const std::from_chars_result read = std::from_chars(text.data(), end, value);
-  if (read.ec == std::errc() && read.ptr == end && value > 0.0 && std::isfinite(value)) return {};
-  return "must be a number above 0, got " + Quote(text);
-}
-
 /// A description against what a program answers, or has answered; of an MJCF the engine is the other side.
 void CompareWithAnswers(const ConsistencyRequest& request, Comparison* comparison) {
   const RobotDescription robot = ReadDescription(request.files.robot, MakeUrdfOptions(request));
@@ -166,7 +157,7 @@ void AddConsistencyCommand(Command app) {
       .Excludes(program);
   command.AddOption("--time-limit", &request->program_options.seconds, "For each answer of the program, s")
       .TypeName("S")
-      .Check(PositiveNumber)
+      .Check(PositiveNumber("must be a number above 0"))
       .ShowDefault();
   command.AddFlag("--floating", &request->floating, "The root of a URDF floats");
   command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")

@@ -113,18 +113,30 @@ void WriteCsv(const LogReader& log, const std::vector<SignalInfo>& signals, cons
   file.Finish();
 }
 
+/// "m, rad": each unit once.
+std::string ListDistinctUnits(const SignalInfo& signal) {
+  std::vector<std::string> seen;
+  std::string text;
+  for (const std::string& unit : ListUnits(signal)) {
+    if (std::find(seen.begin(), seen.end(), unit) != seen.end()) continue;
+    seen.push_back(unit);
+    text += (text.empty() ? "" : ", ") + unit;
+  }
+  return text;
+}
+
 void PrintList(const LogReader& log, const std::vector<SignalInfo>& signals) {
   size_t name_width = 0;
   size_t unit_width = 0;
   for (const SignalInfo& signal : signals) {
     name_width = std::max(name_width, signal.name.size());
-    unit_width = std::max(unit_width, signal.unit.size());
+    unit_width = std::max(unit_width, ListDistinctUnits(signal).size());
   }
   fmt::print("{} rows\n{:<{}}  {:>7}  {:<{}}  {}\n", log.rows(), "signal", name_width, "numbers", "unit",
              unit_width, "description");
   for (const SignalInfo& signal : signals) {
-    fmt::print("{:<{}}  {:>7}  {:<{}}  {}\n", signal.name, name_width, signal.width, signal.unit, unit_width,
-               signal.description);
+    fmt::print("{:<{}}  {:>7}  {:<{}}  {}\n", signal.name, name_width, signal.width,
+               ListDistinctUnits(signal), unit_width, signal.description);
   }
 }
 

@@ -55,6 +55,8 @@ int Run(int argc, char** argv) {
   AddRenderCommand(app);
   AddReportCommand(app);
   AddStudyCommand(app);
+  AddViewCommand(app, JoinArguments(argc, argv));
+  AddHelpCommands(app, line);
   try {
     const int exit_code = line.Run(argc, argv);
     FlushOutput();

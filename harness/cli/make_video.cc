@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <system_error>
 #include <thread>
 
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/progress_bar.h"
@@ -15,6 +18,18 @@
 namespace dexcheck::cli {
 
 int CountDrawers() { return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8); }
+
+void ReadSize(const std::string& text, int* width, int* height) {
+  const char* const end = text.data() + text.size();
+  const std::from_chars_result first = std::from_chars(text.data(), end, *width);
+  if (first.ec == std::errc() && first.ptr != end && *first.ptr == 'x') {
+    const std::from_chars_result second = std::from_chars(first.ptr + 1, end, *height);
+    const auto is_size = [](int value, int most) { return value >= 32 && value <= most && value % 2 == 0; };
+    if (second.ec == std::errc() && second.ptr == end && is_size(*width, 3840) && is_size(*height, 2160))
+      return;
+  }
+  throw InputError("--size: must be WIDTHxHEIGHT, even numbers from 32x32 to 3840x2160, got " + Quote(text));
+}
 
 bool WriteMovie(const std::vector<RunView>& views, const MovieOptions& options, const std::string& out,
                 bool quiet) {

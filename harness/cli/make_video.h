@@ -11,6 +11,9 @@ namespace dexcheck::cli {
 /// Processes that draw unless told otherwise: one for each processor, at most 8.
 int CountDrawers();
 
+/// Reads "1280x720". @throws InputError unless both are even numbers that a picture can have.
+void ReadSize(const std::string& text, int* width, int* height);
+
 /// Draws runs into a film, with a progress bar. @return false when the user stopped it; nothing is then
 /// written.
 /// @throws InputError when a camera is unknown or the file cannot be written.

@@ -3,30 +3,70 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <utility>
 
+#include "harness/cli/terminal.h"
+
 namespace dexcheck::cli {
+namespace {
+
+constexpr int kUsualColumns = 80;  // of a terminal that does not tell
+constexpr int kWidestBar = 40;
+constexpr int kNarrowestBar = 8;
+constexpr std::chrono::milliseconds kRedrawEvery(100);
+// Before, what is left is not estimated: the first steps touch memory for the first time.
+constexpr double kLeastElapsed = 0.5;  // s
+
+}  // namespace
+
 ProgressBar::ProgressBar(std::string label, long total, bool quiet)
     : label_(std::move(label)), total_(total), visible_(!quiet && ::isatty(STDERR_FILENO) != 0) {}
 
+std::string ProgressBar::MakeLine(long done, Clock::time_point now) const {
+  const int reported = CountColumns(STDERR_FILENO);
+  // The last column stays free: some terminals wrap when it is written.
+  const int columns = (reported > 0 ? reported : kUsualColumns) - 1;
+  const double fraction =
+      total_ > 0 ? std::clamp(static_cast<double>(done) / static_cast<double>(total_), 0.0, 1.0) : 1.0;
+  const double elapsed = std::chrono::duration<double>(now - *first_time_).count();
+  std::string end = fmt::format(" {:3.0f} %", 100.0 * fraction);
+  const std::string count = fmt::format(" ({} of {})", done, total_);
+  std::string left;
+  if (elapsed >= kLeastElapsed && done > first_done_) {
+    const double rate = static_cast<double>(done - first_done_) / elapsed;
+    left = fmt::format(", {:.0f} s left", static_cast<double>(total_ - done) / rate);
+  }
+  // What matters least goes first: the count, then the label's end, then the bar.
+  const auto room = [&](size_t used) { return columns - static_cast<int>(used) - 3; };  // " [" and "]"
+  std::string label = label_;
+  if (room(label.size() + end.size() + count.size() + left.size()) >= kNarrowestBar) end += count;
+  end += left;
+  if (room(label.size() + end.size()) < kNarrowestBar) {
+    const int shorter = static_cast<int>(label.size()) + room(label.size() + end.size()) - kNarrowestBar;
+    label.resize(static_cast<size_t>(std::max(shorter, 0)));
+  }
+  const int width = std::min(room(label.size() + end.size()), kWidestBar);
+  if (width < kNarrowestBar) return end.substr(0, static_cast<size_t>(std::max(columns, 0)));
+  const int filled = static_cast<int>(fraction * width);
+  return fmt::format("{} [{}{}]{}", label, std::string(static_cast<size_t>(filled), '#'),
+                     std::string(static_cast<size_t>(width - filled), '.'), end);
+}
+
 void ProgressBar::Update(long done) {
   if (!visible_) return;
-  constexpr std::chrono::milliseconds kRedrawEvery(100);
-  const auto now = std::chrono::steady_clock::now();
+  const Clock::time_point now = Clock::now();
+  if (!first_time_) {
+    first_time_ = now;
+    first_done_ = done;
+  }
   if (drawn_ && now - last_drawn_ < kRedrawEvery) return;
   last_drawn_ = now;
   drawn_ = true;
-  constexpr int kWidth = 40;
-  const double fraction = total_ > 0 ? static_cast<double>(done) / static_cast<double>(total_) : 1.0;
-  const int filled = static_cast<int>(fraction * kWidth);
-  const double elapsed = std::chrono::duration<double>(now - start_).count();
-  const double left = fraction > 0.0 ? elapsed * (1.0 - fraction) / fraction : 0.0;
-  const std::string line = fmt::format("\r{} [{}{}] {:3.0f} % ({} of {}), {:.0f} s left ", label_,
-                                       std::string(static_cast<size_t>(filled), '#'),
-                                       std::string(static_cast<size_t>(kWidth - filled), '.'),
-                                       100.0 * fraction, done, total_, left);
-  std::fputs(line.c_str(), stderr);  // a terminal that has gone does not matter
+  // Without the rest of an earlier, longer line.
+  std::fputs(("\r" + MakeLine(done, now) + "\033[K").c_str(),
+             stderr);  // a terminal that has gone does not matter
   std::fflush(stderr);
 }
 

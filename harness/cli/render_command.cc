@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -30,24 +30,13 @@ struct Request {
   std::optional<double> still;
   std::string out;
   MovieOptions movie;
+  std::vector<double> from;
+  std::string look_at;
+  bool follow = false;
+  double orbit = 0.0;  // degrees a second
   bool no_panel = false;
   bool quiet = false;
 };
-
-/// "1280x720" into the options.
-void ReadSize(const std::string& text, MovieOptions* movie) {
-  const char* const end = text.data() + text.size();
-  const std::from_chars_result width = std::from_chars(text.data(), end, movie->width);
-  if (width.ec == std::errc() && width.ptr != end && *width.ptr == 'x') {
-    const std::from_chars_result height = std::from_chars(width.ptr + 1, end, movie->height);
-    const auto is_size = [](int value, int most) { return value >= 32 && value <= most && value % 2 == 0; };
-    if (height.ec == std::errc() && height.ptr == end && is_size(movie->width, 3840) &&
-        is_size(movie->height, 2160)) {
-      return;
-    }
-  }
-  throw InputError("--size: must be WIDTHxHEIGHT, even numbers from 32x32 to 3840x2160, got " + Quote(text));
-}
 
 double Duration(const RunFrames& run) { return run.times.back() - run.times.front(); }
 
@@ -73,6 +62,26 @@ void WriteStill(const Request& request, const std::vector<RunView>& views, const
   }
 }
 
+/// The camera of --from and its companions; none without.
+std::optional<FreeCamera> MakeFreeCamera(const Request& request) {
+  if (request.from.empty()) return std::nullopt;
+  FreeCamera camera;
+  camera.from = {request.from[0], request.from[1], request.from[2]};
+  camera.follow = request.follow;
+  camera.orbit = DegToRad(request.orbit);
+  if (request.look_at.empty() || request.look_at == "object") return camera;
+  std::istringstream text(request.look_at);
+  Vector3d point;
+  char comma = ',';
+  char comma_after = ',';
+  text >> point.x() >> comma >> point.y() >> comma_after >> point.z();
+  if (!text || !(text >> std::ws).eof() || comma != ',' || comma_after != ',' || !point.allFinite()) {
+    throw InputError("--look-at: must be object or X,Y,Z in m, got " + Quote(request.look_at));
+  }
+  camera.look_at = point;
+  return camera;
+}
+
 /// What the name of the output says is what it gets.
 void CheckOutput(const Request& request, const std::string& out) {
   std::error_code ignored;
@@ -88,11 +97,12 @@ void CheckOutput(const Request& request, const std::string& out) {
 }
 
 ExitCode Run(Request request) {
-  ReadSize(request.size, &request.movie);
+  ReadSize(request.size, &request.movie.width, &request.movie.height);
   std::string out = request.out;
   if (out.empty()) out = (request.run_folder / (request.still ? "still.png" : "video.mp4")).string();
   CheckOutput(request, out);
   request.movie.panel = !request.no_panel;
+  request.movie.free = MakeFreeCamera(request);
   std::vector<RecordedFrames> runs;
   runs.push_back(ReadRecordedFrames(request.run_folder));
   if (!request.beside.empty()) runs.push_back(ReadRecordedFrames(request.beside));
@@ -119,11 +129,28 @@ void AddRenderCommand(Command app) {
                  "RUN_DIR)")
       .TypeName("FILE");
   command.AddOption("--still", &request->still, "One picture at this time of the run, s").TypeName("T");
+  Option camera =
+      command
+          .AddOption(
+              "--camera", &request->movie.camera,
+              "overview (the default), follow, grasp, top, or another of the MJCF's; course stands still "
+              "and sees the whole way")
+          .TypeName("NAME");
+  Option from =
+      command.AddOption("--from", &request->from, "Where a camera of your own stands at the beginning, m")
+          .TypeName("X,Y,Z")
+          .Delimiter(',')
+          .Takes(3)
+          .Excludes(camera);
   command
-      .AddOption("--camera", &request->movie.camera,
-                 "overview (the default), follow, grasp, top, or another of the MJCF's; course stands still "
-                 "and sees the whole way")
-      .TypeName("NAME");
+      .AddOption("--look-at", &request->look_at,
+                 "What it looks at: object, or a point, m (object by default)")
+      .TypeName("X,Y,Z")
+      .Needs(from);
+  command.AddFlag("--follow", &request->follow, "It moves along with the object").Needs(from);
+  command.AddOption("--orbit", &request->orbit, "It turns about what it looks at, degrees a second")
+      .TypeName("DEG")
+      .Needs(from);
   command.AddOption("--inset", &request->movie.inset, "A second camera in the lower right corner")
       .TypeName("NAME");
   command.AddOption("--beside", &request->beside, "Another run, shown at the right").TypeName("RUN_DIR");

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 #include <exception>
 #include <memory>
@@ -21,6 +20,7 @@
 #include "harness/cli/shipped_files.h"
 #include "harness/engine/machine.h"
 #include "harness/report/write_report.h"
+#include "harness/run/half_step.h"
 #include "harness/run/run_recorder.h"
 #include "harness/run/runner.h"
 
@@ -37,6 +37,8 @@ struct Request {
   bool no_report = false;
   bool video = false;
   bool quiet = false;
+  bool all = false;   // checks are printed
+  bool json = false;  // instead of text
   bool list = false;
   std::string replay;
   std::string junit_file;
@@ -44,17 +46,6 @@ struct Request {
   double controller_time_limit = 1.0;
   std::string command;  // as typed
 };
-
-/// Accepts a number of seconds above zero.
-ValueCheck PositiveNumber() {
-  return [](const std::string& text) -> std::string {
-    double value = 0.0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    const bool is_number = error == std::errc() && end == text.data() + text.size();
-    if (is_number && std::isfinite(value) && value > 0.0) return {};
-    return "must be a positive number, got " + Quote(text);
-  };
-}
 
 ExitCode ToExitCode(const RunResult& result) {
   if (result.verdict == Verdict::kFailed) return kFailure;
@@ -73,15 +64,16 @@ void TryToMake(const char* what, const Make& make) {
 
 /// Draws what was asked for into the run's folder, after the verdict.
 void DrawRun(const Request& request, const std::filesystem::path& folder, ExitCode verdict) {
+  const bool quiet = request.quiet || request.json;
   if (request.video) {
-    TryToMake("video", [&] { WriteRunMovie(folder, (folder / "video.mp4").string(), request.quiet); });
+    TryToMake("video", [&] { WriteRunMovie(folder, (folder / "video.mp4").string(), quiet); });
   }
   EndOnInterrupts(verdict);
   if (request.no_report || IsInterrupted()) return;
   TryToMake("report", [&] {
     const ReportFiles files = MakeReportFiles(folder);
     WriteRunReport(folder, files);
-    if (!request.quiet) fmt::print("report: {}\n", files.page.string());
+    if (!quiet) fmt::print("report: {}\n", files.page.string());
   });
 }
 
@@ -91,6 +83,7 @@ LoopParts MakeParts(const Request& request, const Setup& setup, const std::files
 }
 
 int RunScenario(const Request& request) {
+  const bool quiet = request.quiet || request.json;
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides, request.seed);
   std::optional<OutputFile> junit;
   if (!request.junit_file.empty()) junit.emplace(request.junit_file);
@@ -104,7 +97,7 @@ int RunScenario(const Request& request) {
     recorder.emplace(folder->path() / "log.h5", runner.loop(), setup,
                      RunInputs{files.robot, files.mjcf, request.command, request.controller});
   }
-  ProgressBar bar(setup.scenario().name, runner.loop().num_steps(), request.quiet);
+  ProgressBar bar(setup.scenario().name, runner.loop().num_steps(), quiet);
   runner.Run(
       [&](const StepRecord& step) {
         if (recorder) recorder->Record(step);
@@ -112,16 +105,26 @@ int RunScenario(const Request& request) {
       },
       IsInterrupted);
   bar.Finish();
+  RunResult result = runner.result();
+  if (request.controller.empty()) {
+    LookForIntegrator(setup, runner.loop(), files.robot, files.mjcf, IsInterrupted, &result);
+  }
 
-  const std::string summary = MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n";
+  const std::string summary = MakeSummary(setup, runner.loop(), result).dump(2) + "\n";
   if (recorder) recorder->Close(summary);
   if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
-  if (junit) junit->Write(WriteJUnit(setup, runner.loop(), runner.result()));
-  const ExitCode verdict = ToExitCode(runner.result());
+  if (junit) junit->Write(WriteJUnit(setup, runner.loop(), result));
+  const ExitCode verdict = ToExitCode(result);
   std::exception_ptr unprinted;
   try {
-    PrintRunReport(setup, runner.loop(), runner.result(), folder ? folder->path().string() : "",
-                   request.quiet);
+    if (request.json) {
+      fmt::print("{}", summary);
+    } else {
+      PrintRunReport(setup, runner.loop(), result, folder ? folder->path().string() : "",
+                     request.quiet ? Detail::kVerdict
+                     : request.all ? Detail::kAll
+                                   : Detail::kQuestions);
+    }
     FlushOutput();
   } catch (const std::exception&) {
     unprinted = std::current_exception();  // standard output takes nothing: told when all is done
@@ -246,13 +249,17 @@ void AddRunCommand(Command app, const std::string& command_line) {
                                 "Write each check as a test case of JUnit's XML to this file")
                      .TypeName("FILE.xml");
   Option no_log = command.AddFlag("--no-log", &request->no_log, "Write no files");
-  command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
+  Option quiet = command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
+  Option all = command.AddFlag("--all", &request->all, "Print each check, not only a line for each question");
+  Option json = command.AddFlag("--json", &request->json, "Print the summary as JSON, and nothing else");
   controller.Excludes(list);
   scenario.Excludes(list).Excludes(replay);
   list.Excludes(replay);
   // What would be ignored is refused.
   no_log.Excludes(video).Excludes(out);
-  for (Option option : {out, set, seed, no_check, video, no_report, no_log, junit}) {
+  all.Excludes(quiet).Excludes(json);
+  json.Excludes(quiet);
+  for (Option option : {out, set, seed, no_check, video, no_report, no_log, junit, all, json}) {
     option.Excludes(replay).Excludes(list);
   }
   command.SetAction([=] {

@@ -3,32 +3,81 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <span>
 #include <vector>
 
 #include "harness/cli/junit_file.h"
+#include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
 namespace {
 
-void PrintCheck(const CheckRecord& check) {
+std::string Tell(bool failed) { return failed ? Paint(Tone::kBad, "FAILS") : Paint(Tone::kGood, "ok"); }
+
+void PrintCheck(const CheckRecord& check, int width) {
   if (!check.applies) return;
-  fmt::print("  {:<12}{:<24}{:>10.2e}{:>10.1e}  {:<4} {}{}\n", NameOf(check.kind), check.name, check.worst,
-             check.bound, check.unit == "1" ? "" : check.unit, check.failed ? "FAILS" : "ok",
+  fmt::print("  {:<12}{:<{}}{:>10.2e}{:>10.1e}  {:<4} {}{}\n", NameOf(check.kind), check.name, width,
+             check.worst, check.bound, check.unit == "1" ? "" : check.unit, Tell(check.failed),
              check.failed ? fmt::format(" from t = {:.3f} s", check.failed_at) : "");
 }
 
-void PrintChecks(const Setup& setup, const ClosedLoop& loop) {
-  fmt::print("\n  {:<12}{:<24}{:>10}{:>10}\n", "question", "check", "worst", "bound");
+/// How near a check came to its bound.
+double CalcShare(const CheckRecord& check) {
+  if (check.bound > 0.0) return check.worst / check.bound;
+  return check.worst > 0.0 ? std::numeric_limits<double>::infinity() : 0.0;
+}
+
+/// One line for what passes of a question, with the check that came nearest to its bound, and each that
+/// fails.
+void PrintQuestion(CheckKind kind, const ClosedLoop& loop) {
+  const CheckRecord* nearest = nullptr;
+  long passed = 0;
+  const auto visit = [&](const auto& work) {
+    for (const std::span<const CheckRecord> records :
+         {loop.checks().model_checks(), std::span<const CheckRecord>(loop.checks().motion_checks())}) {
+      for (const CheckRecord& check : records) {
+        if (check.kind == kind && check.applies) work(check);
+      }
+    }
+  };
+  visit([&](const CheckRecord& check) {
+    if (check.failed) return;
+    ++passed;
+    if (nearest == nullptr || CalcShare(check) > CalcShare(*nearest)) nearest = &check;
+  });
+  if (nearest != nullptr) {
+    const std::string what =
+        passed == 1 ? nearest->name : fmt::format("{} checks: {}", passed, nearest->name);
+    fmt::print("  {:<12}{:<34}{:>10.2e}{:>10.1e}  {:<4} {}\n", NameOf(kind), what, nearest->worst,
+               nearest->bound, nearest->unit == "1" ? "" : nearest->unit, Tell(false));
+  }
+  visit([&](const CheckRecord& check) {
+    if (check.failed) PrintCheck(check, 34);
+  });
+}
+
+void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
+  const int width = detail == Detail::kAll ? 24 : 34;
+  fmt::print("\n  {:<12}{:<{}}{:>10}{:>10}\n", "question",
+             detail == Detail::kAll ? "check" : "nearest to its bound", width, "worst", "bound");
   const auto& gate = setup.gate().records;
   const auto differs = std::count_if(gate.begin(), gate.end(), [](const CheckRecord& r) { return r.failed; });
-  fmt::print("  {:<12}{:<24}{:>10}{:>10}       {}\n", "model", "constants", differs, 0,
-             differs > 0 ? "FAILS" : "ok");
-  for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check);
-  for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check);
+  fmt::print("  {:<12}{:<{}}{:>10}{:>10}       {}\n", "model", "constants", width, differs, 0,
+             Tell(differs > 0));
+  if (detail == Detail::kAll) {
+    for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check, width);
+    for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check, width);
+  } else {
+    for (const CheckKind kind : {CheckKind::kModel, CheckKind::kLaw, CheckKind::kBalance,
+                                 CheckKind::kPrediction, CheckKind::kAssumption}) {
+      PrintQuestion(kind, loop);
+    }
+    fmt::print("  (--all lists each check)\n");
+  }
   const std::span<const CheckRecord> settling = loop.checks().settling_failures();
   if (!settling.empty()) fmt::print("\n  while settling, before t = 0:\n");
-  for (const CheckRecord& check : settling) PrintCheck(check);
+  for (const CheckRecord& check : settling) PrintCheck(check, width);
 }
 
 /// "approach 0.0, close 3.4, ..." with the time each began.
@@ -68,9 +117,9 @@ void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
 }  // namespace
 
 void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result,
-                    const std::string& folder, bool quiet) {
+                    const std::string& folder, Detail detail) {
   const Scenario& scenario = setup.scenario();
-  if (!quiet) {
+  if (detail != Detail::kVerdict) {
     fmt::print("{}: {}\n", scenario.name, scenario.description);
     fmt::print("{:.3f} of {:.3f} s simulated, {} steps of {} ms\n", loop.time(), scenario.duration,
                loop.record().step, 1e3 * scenario.plant.time_step);
@@ -79,14 +128,14 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     }
     PrintTracking(scenario, result.tracking);
     if (loop.task() != nullptr) PrintTask(loop);
-    if (loop.is_checking()) PrintChecks(setup, loop);
+    if (loop.is_checking()) PrintChecks(setup, loop, detail);
     PrintSpeed(loop, result);
     if (!folder.empty()) fmt::print("log and summary in {}\n", folder);
     fmt::print("\n");
   }
   switch (result.verdict) {
     case Verdict::kPass:
-      fmt::print("PASS: {}\n",
+      fmt::print("{}: {}\n", Paint(Tone::kGood, "PASS"),
                  loop.is_checking()
                      ? scenario.imperfections.is_ideal()
                            ? "model, law, balance, prediction and assumptions hold at every step."
@@ -95,10 +144,10 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
                      : "the run completed; nothing was checked.");
       return;
     case Verdict::kFailed:
-      fmt::print("FAILED: {}.\n", result.failure);
+      fmt::print("{}: {}.\n", Paint(Tone::kBad, "FAILED"), result.failure);
       break;
     case Verdict::kDisagreement:
-      fmt::print("DISAGREEMENT:\n");
+      fmt::print("{}:\n", Paint(Tone::kBad, "DISAGREEMENT"));
       break;
   }
   if (result.attribution.cause == Cause::kNone) return;

@@ -181,6 +181,11 @@ void ClosedLoop::Step() {
   if (task_ != nullptr) CheckTask();
 }
 
+void ClosedLoop::Disturb(const DisturbanceOptions& disturbance) {
+  disturbances_.Add(disturbance, setup_->MakePartContext());
+  if (checks_) checks_->Expect(disturbance, plant_->motors());
+}
+
 void ClosedLoop::CheckTask() const {
   const PickAndPlace& task = task_->task();
   if (task.is_done() && !task.failure().empty()) throw RunFailure(task.failure());

@@ -1,11 +1,14 @@
 #include "harness/run/run_recorder.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "harness/base/files.h"
+#include "harness/base/git_revision.h"
 #include "harness/base/version.h"
 #include "harness/engine/machine.h"
 #include "harness/engine/mjcf_files.h"
+#include "harness/run/log_columns.h"
 
 namespace dexcheck {
 namespace {
@@ -26,6 +29,15 @@ std::vector<std::string> Expand(const std::vector<std::string>& names,
   return columns;
 }
 
+/// The law's demand, which a controller of the user's own need not tell.
+template <typename Derived>
+void CopyDemand(const Eigen::DenseBase<Derived>& from, std::span<double> to) {
+  if (from.size() == static_cast<Eigen::Index>(to.size())) return Copy(from, to);
+  std::fill(to.begin(), to.end(), std::numeric_limits<double>::quiet_NaN());
+}
+
+constexpr const char* kPoseUnits = "m, m, m, rad, rad, rad";
+
 int CountOf(const std::vector<std::string>& names) { return static_cast<int>(names.size()); }
 
 }  // namespace
@@ -34,12 +46,10 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
                          const RunInputs& inputs)
     : setup_(&setup), checks_(loop.is_checking() ? &loop.checks() : nullptr), log_(path, loop.num_steps()) {
   const Scenario& scenario = setup.scenario();
-  std::string overrides;
-  for (const std::string& assignment : scenario.overrides) overrides += assignment + "\n";
   log_.SetText("command", inputs.command);
   if (!inputs.controller.empty()) log_.SetText("controller", inputs.controller);
   log_.SetText("scenario", scenario.name);
-  log_.SetText("overrides", overrides);
+  SetOverrides(scenario.overrides);
   log_.SetText("seed", std::to_string(scenario.seed));
   log_.SetText("robot", inputs.robot.filename().string());
   log_.SetText("mjcf", inputs.mjcf.filename().string());
@@ -47,6 +57,8 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
   log_.SetText("object_body", object >= 0 ? NameOf(setup.engine(), mjOBJ_BODY, object) : "");
   log_.SetText("mujoco_version", mj_versionString());
   log_.SetText("dexcheck_version", Version());
+  log_.SetText("git_revision", kGitRevision);
+  log_.SetText("check_kinds", "0 model, 1 balance, 2 prediction, 3 assumption, 4 law");
   log_.SetText("machine", DescribeMachine());
   log_.EmbedFile("inputs", "scenario.toml", scenario.text);
   log_.EmbedFile("inputs", "robot/" + inputs.robot.filename().string(), ReadBytes(inputs.robot));
@@ -88,21 +100,43 @@ void RunRecorder::AddStateSignals() {
   for (const Joint& joint : model.joints()) {
     for (auto* names : {&q_names, &xi_names, &tau_names}) names->push_back(joint.name);
   }
-  Add({"engine/qpos", "m, rad, 1", "MuJoCo's positions, quaternions wxyz", m.nq, {}, {}},
+  // By the base's coordinates; a floating base's have no names of their own.
+  const std::vector<std::string> q_base = model.num_base_positions() == 3
+                                              ? std::vector<std::string>{"m", "m", "rad"}
+                                              : std::vector<std::string>();
+  const bool turns_wheels =
+      model.num_base_velocities() == 2 && model.base().velocity != DriveVelocity::kTwist;
+  const std::vector<std::string> xi_base = model.num_base_velocities() == 3 ? q_base
+                                           : turns_wheels ? std::vector<std::string>{"rad", "rad"}
+                                           : model.num_base_velocities() == 2
+                                               ? std::vector<std::string>{"m", "rad"}
+                                               : std::vector<std::string>();
+  const bool is_named = model.num_base_positions() == static_cast<int>(q_base.size()) &&
+                        model.num_base_velocities() == static_cast<int>(xi_base.size());
+  const std::string q_units = is_named ? ListJointUnits(model, q_base, "") : "m, rad";
+  const std::string xi_units = is_named ? ListJointUnits(model, xi_base, "/s") : "m/s, rad/s";
+  const std::string xi_dot_units = is_named ? ListJointUnits(model, xi_base, "/s^2") : "m/s^2, rad/s^2";
+  const LogColumns qpos = ListPositionColumns(m);
+  const LogColumns qvel = ListVelocityColumns(m);
+  Add({"engine/qpos", qpos.units, "MuJoCo's positions, quaternions wxyz", m.nq, qpos.names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.qpos, row); });
-  Add({"engine/qvel", "m/s, rad/s", "MuJoCo's velocities", m.nv, {}, {}},
+  Add({"engine/qvel", qvel.units, "MuJoCo's velocities", m.nv, qvel.names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.qvel, row); });
   const int n = model.num_velocities();
-  Add({"q", "m, rad", "q' as read from the plant", model.num_positions(), q_names, {}},
+  Add({"q", q_units, "q' as read from the plant", model.num_positions(), q_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.q, row); });
-  Add({"xi", "m/s, rad/s", "reduced velocity as read from the plant", n, xi_names, {}},
+  Add({"xi", xi_units, "reduced velocity as read from the plant", n, xi_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.xi, row); });
   Add({"tau", "N m", "tau' of the computed torque law (55)", n, tau_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.command.tau, row); });
+  if (!setup_->scenario().task) {
+    Add({"law/xi_dot_d", xi_dot_units, "xi_dot_d of (47), which the law demands", n, xi_names, {}},
+        [](const StepRecord& step, std::span<double> row) { CopyDemand(step.command.demand.xi_dot, row); });
+  }
   if (!setup_->scenario().imperfections.is_ideal()) {
-    Add({"told/q", "m, rad", "q' as the controller was told it", model.num_positions(), q_names, {}},
+    Add({"told/q", q_units, "q' as the controller was told it", model.num_positions(), q_names, {}},
         [](const StepRecord& step, std::span<double> row) { Copy(step.told.state.q, row); });
-    Add({"told/xi", "m/s, rad/s", "reduced velocity as the controller was told it", n, xi_names, {}},
+    Add({"told/xi", xi_units, "reduced velocity as the controller was told it", n, xi_names, {}},
         [](const StepRecord& step, std::span<double> row) { Copy(step.told.state.xi, row); });
     Add({"tau_given", "N m", "what the motors made of tau", n, tau_names, {}},
         [](const StepRecord& step, std::span<double> row) { Copy(step.drive.tau, row); });
@@ -112,9 +146,9 @@ void RunRecorder::AddStateSignals() {
   Add({"base/height", "m", "height of the axle's midpoint against the model's", 1, {}, {}},
       [](const StepRecord& step, std::span<double> row) { row[0] = step.reading.departure.height; });
   if (checks_ == nullptr) return;
-  Add({"engine/xi_dot", "m/s^2, rad/s^2", "reduced acceleration of the plant", n, xi_names, {}},
+  Add({"engine/xi_dot", xi_dot_units, "reduced acceleration of the plant", n, xi_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.response.xi_dot, row); });
-  Add({"model/xi_dot", "m/s^2, rad/s^2", "reduced acceleration that (46), (48) predict", n, xi_names, {}},
+  Add({"model/xi_dot", xi_dot_units, "reduced acceleration that (46), (48) predict", n, xi_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.findings.xi_dot_model, row); });
 }
 
@@ -123,23 +157,24 @@ void RunRecorder::AddJointSignals() {
   const int n = model.num_joints();
   std::vector<std::string> names;
   for (const Joint& joint : model.joints()) names.push_back(joint.name);
-  Add({"joints/q_d", "rad, m", "desired positions of the joints", n, names, {}},
+  Add({"joints/q_d", ListJointUnits(model, {}, ""), "desired positions of the joints", n, names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.command.joints.q, row); });
-  Add({"joints/error", "rad, m", "q_d - q", n, names, {}}, [](const StepRecord& step, std::span<double> row) {
-    Copy(step.command.joints.q - step.reading.state.q, row);
-  });
+  Add({"joints/error", ListJointUnits(model, {}, ""), "q_d - q", n, names, {}},
+      [](const StepRecord& step, std::span<double> row) {
+        Copy(step.command.joints.q - step.reading.state.q, row);
+      });
   Add({"joints/largest_error", "rad, m", "largest of joints/error", 1, {}, {}},
       [](const StepRecord& step, std::span<double> row) { row[0] = step.error.joints; });
 }
 
 void RunRecorder::AddObjectSignals() {
   const std::vector<std::string> columns = {"x", "y", "z", "alpha", "beta", "gamma"};
-  Add({"object/X_o", "m, rad", "pose of the object, ZYZ angles (8)", 6, columns, {}},
+  Add({"object/X_o", kPoseUnits, "pose of the object, ZYZ angles (8)", 6, columns, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(CalcX_o(step), row); });
-  Add({"object/X_d", "m, rad", "desired pose of the object", 6, columns, {}},
+  Add({"object/X_d", kPoseUnits, "desired pose of the object", 6, columns, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.command.desired.X_d, row); });
   const std::vector<std::string> twist = {"v_x", "v_y", "v_z", "w_x", "w_y", "w_z"};
-  Add({"object/V", "m/s, rad/s", "body velocity of the object", 6, twist, {}},
+  Add({"object/V", "m/s, m/s, m/s, rad/s, rad/s, rad/s", "body velocity of the object", 6, twist, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.V_Bo, row); });
   Add({"object/error", "m", "X_d - X_o, position", 3, {"x", "y", "z"}, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.error.position, row); });
@@ -182,6 +217,22 @@ void RunRecorder::AddContactSignals() {
       [](const StepRecord& step, std::span<double> row) {
         std::copy(step.reading.state.overlap.begin(), step.reading.state.overlap.end(), row.begin());
       });
+  if (!setup_->scenario().task) {
+    Add({"law/f_c",
+         "N",
+         "f_c of (49), which the law commands, each in its contact frame",
+         3 * count,
+         xyz,
+         {{"mu", mu}}},
+        [](const StepRecord& step, std::span<double> row) { CopyDemand(step.command.demand.f_c, row); });
+    Add({"law/F_N",
+         "N",
+         "internal part F_N of law/f_c, which the grasp-force problem chooses",
+         3 * count,
+         xyz,
+         {}},
+        [](const StepRecord& step, std::span<double> row) { CopyDemand(step.command.demand.F_N, row); });
+  }
   if (checks_ == nullptr) return;
   const auto each = [](Vector3d PlantContact::*member) {
     return [member](const StepRecord& step, std::span<double> row) {
@@ -272,6 +323,12 @@ void RunRecorder::Record(const StepRecord& step) {
   log_.Row(LogWriter::kTime)[0] = step.time;
   for (const Channel& channel : channels_) channel.source(step, log_.Row(channel.signal));
   log_.EndRow();
+}
+
+void RunRecorder::SetOverrides(const std::vector<std::string>& overrides) {
+  std::string lines;
+  for (const std::string& assignment : overrides) lines += assignment + "\n";
+  log_.SetText("overrides", lines);
 }
 
 void RunRecorder::Close(const std::string& summary) {

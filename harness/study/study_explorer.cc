@@ -38,7 +38,7 @@ Json ListColumns(const Study& study) {
   }
   for (int i = 0; i < kNumMetrics; ++i) {
     const auto metric = static_cast<Metric>(i);
-    columns.push_back({{"name", kMetrics[i].name}, {"label", LabelOf(metric)}});
+    columns.push_back({{"name", kMetrics[metric].name}, {"label", LabelOf(metric)}});
     if (metric == kConeMargin || metric == kSimulatedTime) columns.back()["larger"] = true;
   }
   return columns;

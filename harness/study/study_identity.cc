@@ -11,7 +11,7 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/machine.h"
 #include "harness/engine/mjcf_files.h"
-#include "harness/study/git_revision.h"
+#include "harness/base/git_revision.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck {

@@ -63,6 +63,37 @@ class MovieTest : public ::testing::Test {
   TempFolder folder_;
 };
 
+/// Where the torus is in a picture: the mean of its orange pixels, and how many there are.
+Vector3d FindTorus(const Image& image) {
+  Vector3d sum = Vector3d::Zero();
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      const std::uint8_t* const rgb = image.Pixel(x, y);
+      if (rgb[0] > 90 && rgb[0] > 1.5 * rgb[1] && rgb[0] > 2.2 * rgb[2])
+        sum += Vector3d(x + 0.5, y + 0.5, 1.0);
+    }
+  }
+  return {sum.x() / sum.z(), sum.y() / sum.z(), sum.z()};
+}
+
+TEST_F(MovieTest, AFreeCameraKeepsWhatItLooksAtInTheMiddle) {
+  MovieOptions options = MakeOptions();
+  options.panel = false;
+  options.free = FreeCamera{{0.9, -1.0, 1.0}, {}, /*follow=*/true, /*orbit=*/0.8};
+  MoviePainter orbiting({&view_, 1}, options);
+  constexpr double kPixels = 4.0;  // fingers hide parts of the torus
+  for (const double time : {0.0, 0.25, 0.5}) {
+    const Vector3d torus = FindTorus(orbiting.Paint(time));
+    ASSERT_GT(torus.z(), 8.0) << time;
+    EXPECT_NEAR(torus.x(), 0.5 * kWidth, kPixels) << time;
+    EXPECT_NEAR(torus.y(), 0.5 * kHeight, kPixels) << time;
+  }
+  // One that stands still and looks at a point sees the torus pass by.
+  options.free = FreeCamera{{0.9, -1.0, 1.0}, Vector3d(0.6, -0.22, 0.75), false, 0.0};
+  MoviePainter standing({&view_, 1}, options);
+  EXPECT_GT(std::abs(FindTorus(standing.Paint(0.5)).x() - FindTorus(standing.Paint(0.0)).x()), 30.0);
+}
+
 /// Mean difference of two frames over a rectangle given in hundredths of the picture.
 template <typename Byte>
 double Difference(const Byte* a, const Byte* b, int left, int right, int top, int bottom) {

@@ -1,0 +1,182 @@
+// The help in other forms: completion for shells, and a manual page.
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "harness/base/shell.h"
+#include "harness/base/version.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/run_folder.h"
+
+namespace dexcheck::cli {
+namespace {
+
+std::string Join(const std::vector<std::string>& words, const char* between) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : between) + word;
+  return text;
+}
+
+/// Text with each of some characters preceded by a backslash.
+std::string Escape(const std::string& text, const char* special) {
+  std::string escaped;
+  for (const char c : text) {
+    if (std::string_view(special).find(c) != std::string_view::npos) escaped += '\\';
+    escaped += c;
+  }
+  return escaped;
+}
+
+std::vector<std::string> ListScenarios() {
+  std::vector<std::string> names;
+  for (const ShippedScenario& scenario : ListShippedScenarios()) names.push_back(scenario.name);
+  return names;
+}
+
+bool TakesScenario(const CommandHelp& command) {
+  for (const OptionHelp& option : command.options) {
+    if (option.is_positional && option.names.front().find("SCENARIO") != std::string::npos) return true;
+  }
+  return false;
+}
+
+std::vector<std::string> ListOptionNames(const CommandHelp& command) {
+  std::vector<std::string> names;
+  for (const OptionHelp& option : command.options) {
+    if (!option.is_positional) names.insert(names.end(), option.names.begin(), option.names.end());
+  }
+  return names;
+}
+
+/// For bash: words before the cursor choose the command; then its options, its commands, scenarios and files.
+std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
+  std::string text =
+      "# bash completion for dexcheck: put it into /usr/share/bash-completion/completions/dexcheck, or "
+      "source it.\n"
+      "_dexcheck() {\n"
+      "  local cur=${COMP_WORDS[COMP_CWORD]} command= word\n"
+      "  for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n"
+      "    case \"$command $word\" in\n";
+  for (const CommandHelp& command : commands) {
+    if (command.name.empty()) continue;
+    const size_t space = command.name.rfind(' ');
+    const std::string before = space == std::string::npos ? "" : command.name.substr(0, space);
+    const std::string last = space == std::string::npos ? command.name : command.name.substr(space + 1);
+    text += fmt::format("      '{} {}') command='{}' ;;\n", before, last, command.name);
+  }
+  text += "    esac\n  done\n  local words= files=\n  case $command in\n";
+  for (const CommandHelp& command : commands) {
+    std::vector<std::string> words = command.commands;
+    if (TakesScenario(command)) {
+      const std::vector<std::string> scenarios = ListScenarios();
+      words.insert(words.end(), scenarios.begin(), scenarios.end());
+    }
+    text += fmt::format("    '{}') words='{}'; [[ $cur != -* ]] || words='{}'; files={} ;;\n", command.name,
+                        Join(words, " "), Join(ListOptionNames(command), " "),
+                        command.commands.empty() ? "1" : "");
+  }
+  text +=
+      "  esac\n"
+      "  mapfile -t COMPREPLY < <(compgen -W \"$words\" -- \"$cur\")\n"
+      "  [[ -z $files || $cur == -* ]] || { compopt -o filenames; mapfile -t -O \"${#COMPREPLY[@]}\" "
+      "COMPREPLY < <(compgen -f -- "
+      "\"$cur\"); }\n"
+      "}\n"
+      "complete -F _dexcheck dexcheck\n";
+  return text;
+}
+
+/// For zsh, with what each option means.
+std::string MakeZshCompletion(const std::vector<CommandHelp>& commands) {
+  std::string text =
+      "#compdef dexcheck\n# zsh completion for dexcheck: put it as _dexcheck into a folder of "
+      "$fpath.\n_dexcheck() {\n"
+      "  local command= word\n  for word in ${words[2,CURRENT-1]}; do\n    case \"$command $word\" in\n";
+  for (const CommandHelp& command : commands) {
+    if (command.name.empty()) continue;
+    const size_t space = command.name.rfind(' ');
+    const std::string before = space == std::string::npos ? "" : command.name.substr(0, space);
+    const std::string last = space == std::string::npos ? command.name : command.name.substr(space + 1);
+    text += fmt::format("      '{} {}') command='{}' ;;\n", before, last, command.name);
+  }
+  text += "    esac\n  done\n  local -a options next\n  local files=\n  case $command in\n";
+  for (const CommandHelp& command : commands) {
+    std::string options;
+    for (const OptionHelp& option : command.options) {
+      if (option.is_positional) continue;
+      for (const std::string& name : option.names) {
+        options += " " + QuoteForShell(name + ":" + Escape(option.text, ":"));
+      }
+    }
+    std::string next;
+    for (const std::string& word : command.commands) next += " '" + word + "'";
+    if (TakesScenario(command)) {
+      for (const std::string& name : ListScenarios()) next += " '" + name + "'";
+    }
+    text += fmt::format("    '{}') options=({}); next=({}); files={} ;;\n", command.name, options, next,
+                        command.commands.empty() ? "1" : "");
+  }
+  text +=
+      "  esac\n"
+      "  if [[ ${words[CURRENT]} == -* ]]; then\n    _describe option options\n  else\n"
+      "    (( ${#next} )) && _describe argument next\n    [[ -z $files ]] || _files\n  fi\n"
+      "}\n_dexcheck \"$@\"\n";
+  return text;
+}
+
+/// A manual page in man's macros.
+std::string MakeManualPage(const std::vector<CommandHelp>& commands) {
+  const auto clean = [](const std::string& text) {
+    const std::string escaped = Escape(text, "\\");
+    std::string hyphens;
+    for (const char c : escaped) hyphens += c == '-' ? std::string("\\-") : std::string(1, c);
+    // A line that begins with one of these would be a request.
+    return hyphens.starts_with(".") || hyphens.starts_with("'") ? "\\&" + hyphens : hyphens;
+  };
+  std::string text =
+      fmt::format(".TH DEXCHECK 1 \"\" \"dexcheck {}\" \"User Commands\"\n.SH NAME\ndexcheck \\- {}\n",
+                  Version(), clean(commands.front().text));
+  text += ".SH SYNOPSIS\n.B dexcheck\n.I COMMAND\n[\\fIOPTION\\fR]...\n.SH COMMANDS\n";
+  for (const CommandHelp& command : commands) {
+    if (command.name.empty()) continue;
+    text += fmt::format(".SS dexcheck {}", clean(command.name));
+    for (const OptionHelp& option : command.options) {
+      if (option.is_positional) text += " " + clean(option.names.front());
+    }
+    text += "\n" + clean(command.text) + ".\n";
+    for (const OptionHelp& option : command.options) {
+      text +=
+          fmt::format(".TP\n\\fB{}\\fR{}\n{}\n", clean(Join(option.names, ", ")),
+                      option.value.empty() ? "" : " \\fI" + clean(option.value) + "\\fR", clean(option.text));
+    }
+  }
+  text +=
+      ".SH EXIT STATUS\n.TP\n0\nall good\n.TP\n1\na disagreement was found\n.TP\n2\nwrong usage or "
+      "input\n.TP\n3\nthe run could not "
+      "be completed or was interrupted\n";
+  return text;
+}
+
+}  // namespace
+
+void AddHelpCommands(Command app, const CommandLine& line) {
+  Command completion = app.AddCommand("completion", "Print completion for a shell, made from the help");
+  const auto shell = std::make_shared<std::string>();
+  completion.AddOption("SHELL", shell.get(), "bash or zsh").Required().OneOf({"bash", "zsh"});
+  completion.SetAction([shell, &line] {
+    const std::vector<CommandHelp> commands = line.Describe();
+    fmt::print("{}", *shell == "bash" ? MakeBashCompletion(commands) : MakeZshCompletion(commands));
+    return kSuccess;
+  });
+  Command manual =
+      app.AddCommand("man", "Print the manual page, made from the help (dexcheck man | man -l -)");
+  manual.SetAction([&line] {
+    fmt::print("{}", MakeManualPage(line.Describe()));
+    return kSuccess;
+  });
+}
+
+}  // namespace dexcheck::cli

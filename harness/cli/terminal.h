@@ -1,0 +1,19 @@
+#pragma once
+
+// What standard output and standard error are: terminals, how wide, and whether they take colours.
+
+#include <string>
+#include <string_view>
+
+namespace dexcheck::cli {
+
+/// Columns of the terminal that a descriptor leads to, now; 0 when it is none or does not tell.
+int CountColumns(int descriptor);
+
+enum class Tone { kGood, kBad, kWarning, kFaint };
+
+/// The text in a colour when standard output is a terminal and the environment has no NO_COLOR (no-color.org)
+/// and no TERM=dumb; otherwise as it is.
+std::string Paint(Tone tone, std::string_view text);
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,142 @@
+#include "harness/view/controls.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace dexcheck {
+namespace {
+
+using Align = Canvas::Align;
+
+const Color kGround = MakeColor(0x0e141c, 0.78F);
+const Color kButton = MakeColor(0x2a3542, 0.95F);
+const Color kOn = MakeColor(0x1f6fc4, 0.95F);
+const Color kText = MakeColor(0xf2f5f8);
+const Color kFaint = MakeColor(0xa9b5c2);
+const Color kTrack = MakeColor(0x55616e);
+const Color kMark = MakeColor(0xff9a3d);
+
+// Pixels.
+constexpr double kBar = 74.0;
+constexpr double kMargin = 14.0;
+constexpr double kButtonHeight = 28.0;
+constexpr double kSliderWidth = 200.0;
+constexpr double kSliderLine = 40.0;
+
+struct Rectangle {
+  Vector2d corner;
+  Vector2d size;
+  [[nodiscard]] bool Contains(double x, double y) const {
+    return x >= corner.x() && y >= corner.y() && x <= corner.x() + size.x() && y <= corner.y() + size.y();
+  }
+};
+
+struct Button {
+  ControlId id;
+  std::string text;
+  bool on;
+  Rectangle place;
+};
+
+std::vector<Button> PlaceButtons(const ControlsState& state, int height) {
+  std::vector<Button> buttons;
+  double x = kMargin;
+  const auto add = [&](ControlId id, const std::string& text, bool on, double width) {
+    buttons.push_back({id, text, on, {{x, height - kButtonHeight - 8.0}, {width, kButtonHeight}}});
+    x += width + 8.0;
+  };
+  add(ControlId::kPlay, state.playing ? "Pause" : "Play", state.playing, 66.0);
+  add(ControlId::kStep, "Step", false, 52.0);
+  add(ControlId::kSlower, "-", false, 28.0);
+  add(ControlId::kFaster, "+", false, 28.0);
+  x += 76.0;  // the speed
+  add(ControlId::kFollow, "Follow", state.follow, 66.0);
+  add(ControlId::kForces, "Forces", state.forces, 66.0);
+  if (state.live) add(ControlId::kSave, "Save", false, 54.0);
+  return buttons;
+}
+
+Rectangle PlaceTime(int width, int height) {
+  return {{kMargin, height - kBar + 10.0}, {width - 2.0 * kMargin, 20.0}};
+}
+
+Rectangle PlaceSlider(size_t index, int width) {
+  return {{width - kSliderWidth - 2.0 * kMargin, 34.0 + kSliderLine * static_cast<double>(index)},
+          {kSliderWidth, 20.0}};
+}
+
+double ToShare(double factor) { return 0.5 + 0.5 * std::log(factor) / std::log(kSliderRange); }
+
+void DrawTrack(const Rectangle& place, double filled, double mark, Canvas* canvas) {
+  const double y = place.corner.y() + 0.5 * place.size.y();
+  const auto line = [&](double to, const Color& color) {
+    const std::array<Vector2d, 2> path = {Vector2d(place.corner.x(), y),
+                                          Vector2d(place.corner.x() + to * place.size.x(), y)};
+    canvas->StrokePath(path, 5.0, color);
+  };
+  line(1.0, kTrack);
+  if (filled > 0.0) line(filled, kOn);
+  canvas->FillCircle({place.corner.x() + mark * place.size.x(), y}, 8.0, kMark);
+}
+
+}  // namespace
+
+void Controls::Draw(const ControlsState& state, Image* image) {
+  const int width = image->width;
+  const int height = image->height;
+  Canvas canvas(image);
+  canvas.FillRoundedRectangle({0.0, height - kBar}, {static_cast<double>(width), kBar}, 0.0, kGround);
+  const double span = std::max(state.end - state.begin, 1e-9);
+  DrawTrack(PlaceTime(width, height), std::clamp((state.now - state.begin) / span, 0.0, 1.0),
+            std::clamp((state.time - state.begin) / span, 0.0, 1.0), &canvas);
+  double right = kMargin;
+  for (const Button& button : PlaceButtons(state, height)) {
+    canvas.FillRoundedRectangle(button.place.corner, button.place.size, 6.0, button.on ? kOn : kButton);
+    const Vector2d middle = button.place.corner + 0.5 * button.place.size;
+    canvas.DrawText(font_, 14.0, {middle.x(), middle.y() + 5.0}, button.text, kText, Align::kCenter);
+    if (button.id == ControlId::kFaster) {
+      canvas.DrawText(font_, 14.0, {button.place.corner.x() + 36.0, middle.y() + 5.0},
+                      fmt::format("{:g} x", state.speed), kFaint);
+    }
+    right = button.place.corner.x() + button.place.size.x();
+  }
+  canvas.DrawText(font_, 13.0, {right + 16.0, height - 17.0}, state.message, kFaint);
+  if (state.sliders.empty()) return;
+  const double lines = static_cast<double>(state.sliders.size());
+  canvas.FillRoundedRectangle({width - kSliderWidth - 3.0 * kMargin, 8.0},
+                              {kSliderWidth + 2.0 * kMargin, kSliderLine * lines + 12.0}, 10.0, kGround);
+  for (size_t i = 0; i < state.sliders.size(); ++i) {
+    const Rectangle place = PlaceSlider(i, width);
+    canvas.DrawText(font_, 12.5, {place.corner.x(), place.corner.y() - 3.0}, state.sliders[i].name, kFaint);
+    canvas.DrawText(font_, 12.5, {place.corner.x() + place.size.x(), place.corner.y() - 3.0},
+                    fmt::format("{:.2f} x", state.sliders[i].factor), kText, Align::kRight);
+    DrawTrack(place, 0.0, ToShare(state.sliders[i].factor), &canvas);
+  }
+}
+
+std::optional<ControlHit> Controls::Find(const ControlsState& state, int width, int height, double x,
+                                         double y, const std::optional<ControlHit>& held) {
+  const auto share = [&](const Rectangle& place) {
+    return std::clamp((x - place.corner.x()) / place.size.x(), 0.0, 1.0);
+  };
+  const Rectangle time = PlaceTime(width, height);
+  if (held ? held->id == ControlId::kTime : time.Contains(x, y)) {
+    return ControlHit{ControlId::kTime, 0, state.begin + share(time) * (state.end - state.begin)};
+  }
+  for (size_t i = 0; i < state.sliders.size(); ++i) {
+    const Rectangle place = PlaceSlider(i, width);
+    if (held ? held->id == ControlId::kSlider && held->slider == i : place.Contains(x, y)) {
+      return ControlHit{ControlId::kSlider, i, std::pow(kSliderRange, 2.0 * share(place) - 1.0)};
+    }
+  }
+  if (held) return held;
+  for (const Button& button : PlaceButtons(state, height)) {
+    if (button.place.Contains(x, y)) return ControlHit{button.id};
+  }
+  return std::nullopt;
+}
+
+}  // namespace dexcheck

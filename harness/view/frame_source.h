@@ -1,0 +1,47 @@
+#pragma once
+
+// What the window shows: a recorded run, or one that is going on.
+
+#include <mujoco/mujoco.h>
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "renders/overlay.h"
+#include "renders/run_frames.h"
+
+namespace dexcheck {
+
+/// The questions in the order in which they are shown.
+inline constexpr std::array<CheckKind, 5> kCheckKinds = {
+    CheckKind::kModel, CheckKind::kLaw, CheckKind::kBalance, CheckKind::kPrediction, CheckKind::kAssumption};
+
+/// One instant.
+struct ViewFrame {
+  RunFrames frame;                        ///< One row.
+  std::vector<QuestionStatus> questions;  ///< Up to this instant.
+  VectorXd q;                             ///< Of a live run: q' of the robot, and
+  Pose X_Bo = Pose::Identity();           ///< the object.
+};
+
+/// Instants of a run by number. For several threads.
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+  FrameSource(const FrameSource&) = delete;
+  FrameSource& operator=(const FrameSource&) = delete;
+
+  [[nodiscard]] virtual const mjModel& model() const = 0;
+  /// So far.
+  [[nodiscard]] virtual long rows() const = 0;
+  [[nodiscard]] virtual double TimeAt(long row) const = 0;
+  /// Time of the last row that there will be, s.
+  [[nodiscard]] virtual double end() const = 0;
+  [[nodiscard]] virtual ViewFrame Read(long row) const = 0;
+
+ protected:
+  FrameSource() = default;
+};
+
+}  // namespace dexcheck

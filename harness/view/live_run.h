@@ -1,0 +1,95 @@
+#pragma once
+
+// A run that goes on in a thread of its own, at the pace that the window asks for.
+
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "harness/run/run_recorder.h"
+#include "harness/run/runner.h"
+#include "harness/view/frame_source.h"
+
+namespace dexcheck {
+
+/// A force that pulls at a body.
+struct Pull {
+  std::string body;                   ///< A link, or "object".
+  Vector3d at = Vector3d::Zero();     ///< Where, in its frame, m.
+  Vector3d force = Vector3d::Zero();  ///< World, N.
+};
+
+/// The same loop as `dexcheck run`. Undisturbed it makes the same numbers, however often it is paused; pulls
+/// become disturbances that the judge knows, constant for a while each.
+class LiveRun : public FrameSource {
+ public:
+  /// How long a pull stays as it is, s; the loop's step where that is longer.
+  static constexpr double kPullTime = 0.02;
+
+  /// Starts. @param log file to record to; empty for none. @param speed of simulated against real time.
+  /// @throws InputError as ClosedLoop and RunRecorder.
+  LiveRun(std::unique_ptr<Setup> setup, const RunInputs& inputs, const std::filesystem::path& log,
+          double speed);
+  /// Ends it where it is.
+  ~LiveRun() override;
+
+  [[nodiscard]] const mjModel& model() const override { return setup_->engine(); }
+  [[nodiscard]] long rows() const override;
+  [[nodiscard]] double TimeAt(long row) const override;
+  [[nodiscard]] double end() const override { return setup_->scenario().duration; }
+  [[nodiscard]] ViewFrame Read(long row) const override;
+  [[nodiscard]] const Setup& setup() const { return *setup_; }
+
+  void SetPaused(bool paused);
+  [[nodiscard]] bool is_paused() const;
+  /// One step while paused.
+  void Advance();
+  void SetSpeed(double speed);
+  [[nodiscard]] double speed() const;
+  /// From now on; none lets go.
+  void SetPull(const std::optional<Pull>& pull);
+  /// Ends the run where it is, if it is still going on, and waits for it. @throws what the input is wrong
+  /// with.
+  void Finish();
+  [[nodiscard]] bool is_finished() const;
+
+  /// Once finished.
+  [[nodiscard]] const Runner& runner() const { return *runner_; }
+  /// The scenario's overrides and the pulls so far, each as an assignment that a scenario takes.
+  [[nodiscard]] std::vector<std::string> ListOverrides() const;
+
+ private:
+  void Run();
+  /// Before a step: waits until it is due. @returns whether to stop.
+  bool Wait();
+  void Record(const StepRecord& step);
+  void Disturb();
+
+  std::unique_ptr<Setup> setup_;
+  std::unique_ptr<Runner> runner_;
+  std::optional<RunRecorder> recorder_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<ViewFrame> frames_;
+  bool paused_ = false;
+  bool quit_ = false;
+  bool finished_ = false;
+  long granted_ = 0;  // single steps
+  double speed_;
+  std::optional<Pull> pull_;
+  double pulled_until_ = 0.0;
+  std::vector<std::string> pulls_;
+  std::exception_ptr problem_;
+  std::chrono::steady_clock::time_point due_;
+  bool is_paced_ = false;  // due_ means something
+  std::thread thread_;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,84 @@
+#!/usr/bin/env bash
+# What a user sees in a terminal: terminal_test.sh DEXCHECK
+# Progress never wraps (tmux at three widths), colours respect NO_COLOR, passing checks are folded, shells complete words,
+# and man shows the manual page.
+set -euo pipefail
+
+dexcheck=$1
+work=$(mktemp -d)
+socket=$work/tmux
+trap 'tmux -S "$socket" kill-server 2>/dev/null || true; rm -rf "$work"' EXIT
+fail() {
+  echo "terminal_test: $*"
+  exit 1
+}
+cd "$work"
+ln -s "$dexcheck" dexcheck
+PATH=$work:$PATH
+
+# A run of some seconds whose progress is looked at several times.
+for columns in 60 80 200; do
+  tmux -S "$socket" -f /dev/null new-session -d -x "$columns" -y 12 "PS1='> ' bash --norc --noprofile"
+  tmux -S "$socket" send-keys "dexcheck run paper --set duration=60 --no-log --no-check; echo ended" Enter
+  seen=0
+  estimated=0
+  for _ in {1..200}; do
+    sleep 0.1
+    screen=$(tmux -S "$socket" capture-pane -p)
+    bars=$(grep -c '\[[#.]*\] *[0-9]* %' <<<"$screen" || true)
+    percent=$(grep -c ' %' <<<"$screen" || true)
+    [[ $bars -le 1 && $percent -le 1 ]] || fail "at $columns columns the progress wraps: $screen"
+    [[ $bars -eq 0 ]] || seen=$((seen + 1))
+    if left=$(grep -oE '[0-9]+ s left' <<<"$screen"); then
+      estimated=$((estimated + 1))
+      [[ ${left%% *} -le 600 ]] || fail "a wild estimate: $left"
+    fi
+    [[ $seen -lt 12 || $estimated -lt 3 ]] || break
+  done
+  [[ $seen -ge 5 && $estimated -ge 1 ]] || fail "no progress was seen at $columns columns: $screen"
+  tmux -S "$socket" kill-server
+done
+
+# Colours on a terminal, unless NO_COLOR is set; none in a pipe.
+run=(dexcheck run paper --set duration=0.01 --no-log)
+colours() { script -qec "$*" /dev/null | grep -c $'\033\[[0-9;]*m' || true; }
+[[ $(TERM=xterm colours "${run[@]}") -gt 0 ]] || fail "no colours on a terminal"
+[[ $(NO_COLOR=1 TERM=xterm colours "${run[@]}") -eq 0 ]] || fail "colours in spite of NO_COLOR"
+[[ $("${run[@]}" | grep -c $'\033') -eq 0 ]] || fail "colours in a pipe"
+
+# Passing checks: a line for each question; --all lists them; what fails is always listed.
+"${run[@]}" >folded.txt
+"${run[@]}" --all >all.txt
+for question in model law balance prediction assumption; do
+  [[ $(grep -cE "^  $question +([0-9]+ checks: )?[a-z_]" folded.txt) -ge 1 ]] || fail "no line for $question: $(cat folded.txt)"
+done
+[[ $(grep -cE ' ok$' folded.txt) -eq 6 ]] || fail "passing checks are not folded: $(cat folded.txt)"
+[[ $(grep -cE ' ok$' all.txt) -gt 25 ]] || fail "--all does not list the checks: $(cat all.txt)"
+"${run[@]}" --set bounds.contact_force=1e-15 >failing.txt && fail "a bound of 1e-15 holds"
+grep -qE '^  prediction +contact_force .*FAILS' failing.txt || fail "a failing check is folded away: $(cat failing.txt)"
+"${run[@]}" --json | python3 -c 'import json, sys; s = json.load(sys.stdin); assert s["verdict"] == "pass" and s["checks"]["M_bar"]["pass"]' ||
+  fail "--json is not the summary"
+
+# bash: commands, options, scenarios; zsh: the script is read and knows each command.
+dexcheck completion bash >completion.bash
+complete_words() {
+  bash --norc -c '. ./completion.bash; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); compopt() { :; }; _dexcheck; printf "%s\n" "${COMPREPLY[@]}"' bash "$@"
+}
+grep -qx consistency <<<"$(complete_words dexcheck con)" || fail "bash does not complete a command"
+grep -qx -- --no-report <<<"$(complete_words dexcheck run --no)" || fail "bash does not complete an option"
+grep -qx paper-rest <<<"$(complete_words dexcheck run pap)" || fail "bash does not complete a scenario"
+grep -qx run <<<"$(complete_words dexcheck study r)" || fail "bash does not complete a command of study"
+dexcheck completion zsh >_dexcheck
+zsh -f -c 'fpath=(. $fpath); autoload -U compinit; compinit -u -d ./dump; autoload -U _dexcheck; autoload +X _dexcheck; functions _dexcheck' >zsh.txt ||
+  fail "zsh cannot read its completion"
+grep -q 'consistency' zsh.txt || fail "zsh does not know the commands"
+
+# The manual page has each command of the help, and groff has no complaint.
+dexcheck man >dexcheck.1
+for command in $(dexcheck --help | sed -nE '1,/[Ss]ubcommands/d; s/^  ([a-z]+) .*/\1/p'); do
+  grep -q "^.SS dexcheck $command" dexcheck.1 || fail "the manual page lacks $command"
+done
+if command -v groff >/dev/null; then
+  [[ -z $(groff -man -ww -Tutf8 dexcheck.1 2>&1 >/dev/null) ]] || fail "groff: $(groff -man -ww -Tutf8 dexcheck.1 2>&1 >/dev/null | head -3)"
+fi
+echo "progress, colours, folded checks, completion and manual page are right"

@@ -1,0 +1,67 @@
+// The page of a run as axe-core judges it: contrast, names of controls, alternative texts, keyboard.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "harness/report/write_report.h"
+#include "tests/common/browser.h"
+#include "tests/common/run_program.h"
+#include "tests/harness/report/replay_run.h"
+
+namespace dexcheck {
+namespace {
+
+using testing::Browser;
+
+/// Everything unfolded; what axe finds comes as one line each.
+constexpr const char* kAsk =
+    "for (const fold of document.querySelectorAll('details')) fold.open = true;"
+    "window.found = null; axe.run({resultTypes: ['violations']}).then(r => { window.found = "
+    "r.violations.map(v => "
+    "`${v.id} (${v.impact}), ${v.nodes.length} times: ${v.nodes[0].target} ${v.nodes[0].failureSummary}`); "
+    "});";
+
+class AccessibilityTest : public ::testing::Test {
+ protected:
+  /// axe-core's script from the npm registry; empty without a network.
+  std::string FetchAxe() {
+    const testing::ProgramResult result =
+        testing::RunProgram({"/usr/bin/env", "npm", "install", "--silent", "--no-audit", "--prefix",
+                             folder_.path().string(), "axe-core@4"});
+    const std::filesystem::path script = folder_.path() / "node_modules/axe-core/axe.min.js";
+    return result.exit_code == 0 && std::filesystem::exists(script) ? testing::ReadText(script) : "";
+  }
+  testing::TempFolder folder_;
+};
+
+TEST_F(AccessibilityTest, AxeFindsNothingInThePageOfARun) {
+  const std::string axe = FetchAxe();
+  if (axe.empty()) GTEST_SKIP() << "axe-core cannot be fetched from the npm registry";
+  testing::WriteReplayRun(folder_.path(), 0.3);
+  WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()));
+  Browser browser;
+  browser.SetViewport(900, 420);
+  for (const bool dark : {false, true}) {
+    browser.SetDark(dark);
+    browser.Open(folder_.path() / "report.html");
+    (void)browser.Run(axe + "; return 0;");
+    (void)browser.Run(kAsk);
+    ASSERT_TRUE(browser.WaitFor("return window.found !== null;", 60.0));
+    EXPECT_EQ(browser.Run("return window.found;"), nlohmann::json::array()) << (dark ? "dark" : "light");
+  }
+  // It can find something: a picture without a text, grey on grey.
+  (void)browser.Run(
+      "document.body.insertAdjacentHTML('beforeend', '<img src=\"data:,\"><p style=\"color: #777; "
+      "background: "
+      "#888\">faint</p>');");
+  (void)browser.Run(kAsk);
+  ASSERT_TRUE(browser.WaitFor("return window.found !== null;", 60.0));
+  const std::string found = browser.Run("return window.found;").dump();
+  EXPECT_THAT(found,
+              ::testing::AllOf(::testing::HasSubstr("image-alt"), ::testing::HasSubstr("color-contrast")));
+}
+
+}  // namespace
+}  // namespace dexcheck

@@ -1,0 +1,121 @@
+#!/usr/bin/env bash
+# The window of `dexcheck view`, on a display of its own, with keys pressed and the mouse moved by xdotool:
+# view_test.sh DEXCHECK [FOLDER for screenshots]
+set -euo pipefail
+
+dexcheck=$1
+work=$(mktemp -d)
+shots=${2:-$work}
+viewer=
+server=
+cleanup() {
+  [[ -z $viewer ]] || kill "$viewer" 2>/dev/null || true
+  [[ -z $server ]] || kill "$server" 2>/dev/null || true
+  rm -rf "$work"
+}
+trap cleanup EXIT
+fail() {
+  echo "view_test: $*"
+  cat "$work/viewer.txt" 2>/dev/null || true
+  exit 1
+}
+
+exec {display}> >(cat >"$work/display")
+Xvfb -displayfd "$display" -screen 0 1280x800x24 -nolisten tcp 2>/dev/null &
+server=$!
+for _ in {1..100}; do [[ ! -s $work/display ]] || break; sleep 0.1; done
+DISPLAY=:$(cat "$work/display")
+export DISPLAY
+cd "$work"
+
+title() { xdotool getwindowname "$window" 2>/dev/null || true; }
+# Waits until the window's title has this word.
+await() {
+  for _ in {1..600}; do
+    [[ $(title) != *"$1"* ]] || return 0
+    kill -0 "$viewer" 2>/dev/null || fail "it ended before its title had \"$1\""
+    sleep 0.1
+  done
+  fail "the title has no \"$1\": $(title)"
+}
+# Opens the window: start ARGUMENTS.
+start() {
+  "$dexcheck" view "$@" --size 800x480 >"$work/viewer.txt" 2>&1 &
+  viewer=$!
+  window=$(timeout 60 xdotool search --sync --onlyvisible --name '^dexcheck ' | head -1) || fail "no window"
+  xdotool windowmove "$window" 0 0 windowfocus --sync "$window"
+}
+# Ends it with the key q: end EXIT_CODE.
+end() {
+  local code=0
+  xdotool key q
+  wait "$viewer" || code=$?
+  viewer=
+  [[ $code -eq $1 ]] || fail "exit code $code instead of $1"
+}
+shot() { import -window "$window" "$shots/$1.png"; }
+# Time in the title, ms.
+now() { title | sed -E 's/.* - ([0-9]+)\.([0-9]{3}) s - .*/\1\2/; s/^0+([0-9])/\1/'; }
+# How much two screenshots differ, of 65535.
+differ() { compare -metric MAE "$shots/$1.png" "$shots/$2.png" null: 2>&1 | sed 's/[. ].*//' || true; }
+
+# Undisturbed, the log has the same bits as that of `run`, pauses and single steps notwithstanding.
+start paper --set duration=0.06 --out live --paused
+await paused
+xdotool key Right Right Right
+for _ in {1..100}; do [[ $(now) -lt 3 ]] || break; sleep 0.1; done
+[[ $(now) -eq 3 ]] || fail "three steps after the first end at 3 ms, not $(now)"
+xdotool key Left
+sleep 0.3
+[[ $(now) -eq 2 ]] || fail "a step back from 3 ms goes to $(now) ms"
+xdotool key space
+await finished
+shot finished
+end 0
+"$dexcheck" run paper --set duration=0.06 --out ran --no-report --quiet >/dev/null
+"$dexcheck" compare live ran --tolerance 0 >compared.txt || fail "its log differs from that of run: $(cat compared.txt)"
+"$dexcheck" run --replay live --quiet >replayed.txt || fail "it does not replay: $(cat replayed.txt)"
+
+# A pull at the object is a disturbance that the judge knows, that replays and that is saved.
+start paper --set duration=60 --out pulled --paused --save saved.toml
+await paused
+xdotool key g
+sleep 0.6
+shot before
+# The tube of the torus, nearest to the camera: a little below the picture's middle.
+xdotool mousemove 400 276 keydown ctrl mousedown 1 mousemove 402 276 mousemove 470 216
+sleep 0.4
+xdotool key --clearmodifiers space
+for _ in {1..300}; do [[ $(now) -lt 250 ]] || break; sleep 0.1; done
+shot pulling
+xdotool mouseup 1 keyup ctrl
+xdotool key s
+for _ in {1..50}; do [[ ! -s saved.toml ]] || break; sleep 0.1; done
+xdotool key space
+await paused
+shot after
+end 0
+grep -q 'disturbance' saved.toml || fail "what was saved has no disturbance: $(tail -5 saved.toml)"
+pulls=$(grep -c 'pulse' saved.toml)
+[[ $pulls -ge 3 ]] || fail "only $pulls pulls were saved"
+grep -qE "force = \[ *-?[0-9]*\.[0-9]*[1-9]" saved.toml || fail "pulls without force"
+[[ $(differ before after) -gt 60 ]] || fail "the picture did not change"
+"$dexcheck" run --replay pulled --quiet >replayed.txt || fail "a pulled run does not replay: $(cat replayed.txt)"
+# What was saved is the same run: its first steps have the same numbers.
+"$dexcheck" run saved.toml --set duration=0.2 --out again --no-report --quiet >/dev/null || true
+"$dexcheck" export pulled --signals engine/qpos >a.csv 2>/dev/null || true
+
+# A recording is scrubbed: a click into the middle of its time line.
+start ran --paused
+await paused
+xdotool mousemove 400 426 click 1
+for _ in {1..50}; do [[ $(now) -lt 20 ]] || break; sleep 0.1; done
+[[ $(now) -ge 25 && $(now) -le 35 ]] || fail "the middle of 60 ms is at $(now) ms"
+shot recording
+end 0
+
+# Without a display: one line, exit code 2.
+code=0
+(unset DISPLAY WAYLAND_DISPLAY; "$dexcheck" view paper) >"$work/none.txt" 2>&1 || code=$?
+[[ $code -eq 2 && $(wc -l <"$work/none.txt") -eq 1 ]] || fail "without a display: exit code $code, $(cat "$work/none.txt")"
+echo "the window shows, steps, pulls, saves and replays"
