@@ -7,6 +7,7 @@
 
 namespace dexcheck {
 
+// The mirrors stand a little outside, so that a best point on the edge is found exactly.
 UnitPoint MirrorIntoUnit(UnitPoint point) {
   constexpr double kEdge = 0.1;                  // so far outside a point counts as one on the edge
   constexpr double kPeriod = 1.0 + 2.0 * kEdge;  // from mirror to mirror

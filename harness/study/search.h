@@ -37,8 +37,7 @@ std::unique_ptr<Searcher> MakeLocalSearcher(const Search& search, const UnitPoin
 /// The one that the study asks for.
 std::unique_ptr<Searcher> MakeSearcher(const Study& study, const UnitPoint& start);
 
-/// Into [0, 1], as by mirrors a little outside: an algorithm that knows no bounds sees a continuous function,
-/// and a best point on the edge is found exactly.
+/// Into [0, 1], as by mirrors at both ends: an algorithm that knows no bounds sees a continuous function.
 UnitPoint MirrorIntoUnit(UnitPoint point);
 
 /// A number that orders judgements of one objective as IsBetter does: the objective where it is feasible,
