@@ -1,15 +1,19 @@
 #include "harness/study/search.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "harness/study/margin_search.h"
 
 namespace dexcheck {
 
+// The mirrors stand a little outside, so that a best point on the edge is found exactly.
 UnitPoint MirrorIntoUnit(UnitPoint point) {
+  constexpr double kEdge = 0.1;                  // so far outside a point counts as one on the edge
+  constexpr double kPeriod = 1.0 + 2.0 * kEdge;  // from mirror to mirror
   for (double& x : point) {
-    const double y = std::fmod(std::abs(x), 2.0);
-    x = y > 1.0 ? 2.0 - y : y;
+    const double y = std::fmod(std::abs(x + kEdge), 2.0 * kPeriod);
+    x = std::clamp((y > kPeriod ? 2.0 * kPeriod - y : y) - kEdge, 0.0, 1.0);
   }
   return point;
 }
