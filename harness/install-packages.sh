@@ -38,8 +38,8 @@ if [[ $purpose != program ]]; then
   packages+=(
     libgtest-dev libgmock-dev libbenchmark-dev coinor-csdp hdf5-tools ffmpeg
     sqlite3 slurm-wlm munge
-    chromium chromium-driver python3-numpy doxygen
-    xvfb xdotool imagemagick tmux zsh bash-completion python3-h5py
+    chromium chromium-driver python3-numpy python3-optuna python3-h5py doxygen
+    xvfb xdotool imagemagick tmux zsh bash-completion
     # the Python module
     pybind11-dev python3-dev python3-pytest
     # other physics engines

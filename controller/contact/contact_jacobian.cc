@@ -1,19 +1,36 @@
 #include "controller/contact/contact_jacobian.h"
 
+#include <stdexcept>
+#include <type_traits>
+
 #include "controller/common/errors.h"
 #include "controller/contact/adjoint.h"
 
 namespace dexcheck {
 namespace {
 
-// B_c^T A (m x 6), at most 4 x 6: no heap.
-using TransmittedRows = Eigen::Matrix<double, Eigen::Dynamic, 6, 0, 4, 6>;
-
-TransmittedRows SelectTransmittedRows(ContactType type, const Matrix6d& A) {
-  TransmittedRows selected(CountForces(type), 6);
+/// B_c^T A, kForces x 6.
+template <int kForces>
+Eigen::Matrix<double, kForces, 6> SelectTransmittedRows(ContactType type, const Matrix6d& A) {
+  Eigen::Matrix<double, kForces, 6> selected;
   Eigen::Index index = 0;
   for (const int row : ListTransmittedRows(type)) selected.row(index++) = A.row(row);
   return selected;
+}
+
+/// Calls calc(m) with the contact type's number of forces m as a constant, so that products have fixed sizes.
+template <typename Calc>
+void WithForceCount(ContactType type, const Calc& calc) {
+  switch (CountForces(type)) {
+    case 1:
+      return calc(std::integral_constant<int, 1>());
+    case 3:
+      return calc(std::integral_constant<int, 3>());
+    case 4:
+      return calc(std::integral_constant<int, 4>());
+    default:
+      throw std::logic_error("contact type: no such number of forces");
+  }
 }
 
 void RequireRowsShape(const Contact& contact, Eigen::Index columns, Eigen::Ref<MatrixXd> rows) {
@@ -30,25 +47,19 @@ void ForEachRun(std::span<const ColumnRun> columns, Eigen::Index all, const Visi
   for (const ColumnRun& run : columns) visit(run);
 }
 
-/// rows = A J, of some columns.
-void Multiply(const TransmittedRows& A, const Eigen::Ref<const Matrix6Xd>& J, Eigen::Ref<MatrixXd> rows) {
-  rows = A.lazyProduct(J);
-}
-
-/// rows += A J, of some columns.
-void AddProduct(const TransmittedRows& A, const Eigen::Ref<const Matrix6Xd>& J, Eigen::Ref<MatrixXd> rows) {
-  rows += A.lazyProduct(J);
-}
-
 }  // namespace
 
 void CalcContactJacobian(const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
                          Eigen::Ref<MatrixXd> rows, std::span<const ColumnRun> columns) {
   RequireRowsShape(contact, J_f.cols(), rows);
   // B_c^T Ad_{g_cf_f} J_f
-  const TransmittedRows A = SelectTransmittedRows(contact.type, CalcAdjointInverse(contact.geometry.g_f_cf));
-  ForEachRun(columns, J_f.cols(), [&](const ColumnRun& run) {
-    Multiply(A, J_f.middleCols(run.begin, run.count), rows.middleCols(run.begin, run.count));
+  WithForceCount(contact.type, [&](auto m) {
+    const Eigen::Matrix<double, m(), 6> A =
+        SelectTransmittedRows<m()>(contact.type, CalcAdjointInverse(contact.geometry.g_f_cf));
+    auto J = rows.topRows<m()>();
+    ForEachRun(columns, J_f.cols(), [&](const ColumnRun& run) {
+      for (Eigen::Index i = run.begin; i < run.begin + run.count; ++i) J.col(i).noalias() = A * J_f.col(i);
+    });
   });
 }
 
@@ -62,12 +73,14 @@ void CalcContactJacobianDot(const Contact& contact, const Eigen::Ref<const Matri
   const Matrix6d Ad = CalcAdjointInverse(contact.geometry.g_f_cf);
   const Matrix6d Ad_dot =
       -CalcTwistCross(CalcFrameTwistOnFingertip(contact.geometry, contact.kappa_dot)) * Ad;
-  const TransmittedRows A = SelectTransmittedRows(contact.type, Ad);
-  const TransmittedRows A_dot = SelectTransmittedRows(contact.type, Ad_dot);
-  ForEachRun(columns, J_f.cols(), [&](const ColumnRun& run) {
-    Eigen::Ref<MatrixXd> part = rows_dot.middleCols(run.begin, run.count);
-    Multiply(A, J_f_dot.middleCols(run.begin, run.count), part);
-    AddProduct(A_dot, J_f.middleCols(run.begin, run.count), part);
+  WithForceCount(contact.type, [&](auto m) {
+    const Eigen::Matrix<double, m(), 6> A = SelectTransmittedRows<m()>(contact.type, Ad);
+    const Eigen::Matrix<double, m(), 6> A_dot = SelectTransmittedRows<m()>(contact.type, Ad_dot);
+    auto J_dot = rows_dot.topRows<m()>();
+    ForEachRun(columns, J_f.cols(), [&](const ColumnRun& run) {
+      for (Eigen::Index i = run.begin; i < run.begin + run.count; ++i)
+        J_dot.col(i).noalias() = A * J_f_dot.col(i) + A_dot * J_f.col(i);
+    });
   });
 }
 

@@ -143,7 +143,7 @@ void BaselineLaw::SetOperationalSpace(const ModelTerms& robot, const GraspTerms&
   work_.noalias() = grasp.J_B().transpose() * rates_;
   force_ = work_ + robot.gravity() + robot.friction();
   force_.noalias() += robot.M() * sigma_prime;
-  force_ += robot.coriolis();
+  force_.noalias() += robot.C() * robot.velocity();
   // xi_dot_d = sigma' + M_bar'^-1 J^T F_c, M^-1 = L^-1 L^-T
   xi_dot_d_ = work_;
   inertia_.mass_factor().SolveTransposed(xi_dot_d_);

@@ -11,9 +11,9 @@ void FactorJacobian(const RedundancyWeight& weight, const ModelTerms& robot, con
                     Pseudoinverse* J_B_pinv) {
   switch (weight.kind) {
     case RedundancyWeight::Kind::kIdentity:
-      return J_B_pinv->Factor(grasp.J_B());
+      return J_B_pinv->Factor(grasp.J_B(), grasp.moving_entries());
     case RedundancyWeight::Kind::kDiagonal:
-      return J_B_pinv->FactorDiagonal(grasp.J_B(), weight.w);
+      return J_B_pinv->FactorDiagonal(grasp.J_B(), weight.w, grasp.moving_entries());
     case RedundancyWeight::Kind::kMass:
       return J_B_pinv->FactorWeighted(grasp.J_B(), robot.M());
   }

@@ -14,12 +14,13 @@ namespace {
 // which less than this is independent of the others loses half of its digits or more.
 constexpr double kMinPivotRatio = 1e-8;
 
-void RequireIndependentConstraints(const MatrixXd& schur, const Eigen::LLT<MatrixXd>& llt) {
+/// @param schur k x k, padded.
+void FactorIndependentConstraints(const MatrixXd& schur, Eigen::Index k, BlockCholesky* factor) {
   double smallest = 0.0;
-  if (llt.info() == Eigen::Success) {
+  if (factor->Factor(schur)) {
     smallest = 1.0;
-    for (Eigen::Index i = 0; i < llt.rows(); ++i) {
-      const double pivot = llt.matrixLLT()(i, i);
+    for (Eigen::Index i = 0; i < k; ++i) {
+      const double pivot = factor->pivot(i);
       smallest = std::min(smallest, pivot * pivot / schur(i, i));
     }
   }
@@ -35,15 +36,16 @@ Vector6d CalcCoordinateAcceleration(const GraspTerms& grasp, const Vector6d& V_B
   return CalcP(grasp.X_o()) * (V_Bo_dot - grasp.coordinates().P_inv_dot * grasp.X_o_dot());
 }
 
-ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contacts) : factor_(model) {
+ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contacts)
+    : factor_(model), schur_factor_(std::max(Eigen::Index{3} * num_contacts, Eigen::Index{0})) {
   Require(num_contacts >= 0, "number of contacts", "must not be negative", num_contacts);
   const Eigen::Index n = model.num_velocities();
   const Eigen::Index k = Eigen::Index{3} * num_contacts;
   rows_.reserve(static_cast<size_t>(n + 6));
   half_.setZero(n + 6, PadToGramBlock(k));
   schur_.setZero(half_.cols(), half_.cols());
-  schur_llt_ = Eigen::LLT<MatrixXd>(k);
   motion_.setZero(n + 6);
+  bias_.setZero(n);
   prediction_.xi_dot.setZero(n);
   prediction_.f_c.setZero(k);
 }
@@ -86,9 +88,8 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
   prediction_.f_c = grasp.slip_bias();
   if (contact_acceleration != nullptr) prediction_.f_c -= *contact_acceleration;
   for (const int i : rows_) prediction_.f_c += motion_[i] * half_.row(i).head(k).transpose();
-  schur_llt_.compute(schur_.topLeftCorner(k, k));
-  RequireIndependentConstraints(schur_, schur_llt_);
-  schur_llt_.solveInPlace(prediction_.f_c);
+  FactorIndependentConstraints(schur_, k, &schur_factor_);
+  schur_factor_.Solve(prediction_.f_c);
 
   // [xi_dot; V_Bo_dot] = M^-1/2 (M^-1/2 force - half f_c)
   for (const int i : rows_) motion_[i] -= half_.row(i).head(k).dot(prediction_.f_c);
@@ -116,7 +117,9 @@ const Prediction& ConstrainedDynamics::PredictFree(const ModelTerms& robot,
 
 void ConstrainedDynamics::CalcFreeForce(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force) {
   auto free = motion_.head(prediction_.xi_dot.size());
-  free = force - robot.gravity() - robot.friction() - robot.coriolis();
+  bias_ = robot.gravity() + robot.friction();
+  bias_.noalias() += robot.C() * robot.velocity();
+  free = force - bias_;
 }
 
 ObjectSpaceTerms CalcObjectSpaceTerms(const ModelTerms& robot, const GraspTerms& grasp,

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "controller/common/block_cholesky.h"
 #include "controller/common/types.h"
 #include "controller/control/grasp_terms.h"
 #include "controller/control/pseudoinverse.h"
@@ -58,6 +59,8 @@ class ConstrainedDynamics {
   /// The robot without contacts, (18): xi_dot; V_Bo_dot and f_c are zero.
   const Prediction& PredictFree(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& force);
 
+  /// C_bar' xi + F_bar' (n) of the last Predict.
+  [[nodiscard]] const VectorXd& bias() const { return bias_; }
   /// M_bar' = L^T L of the last Predict.
   [[nodiscard]] const TreeFactor& mass_factor() const { return factor_; }
 
@@ -70,8 +73,9 @@ class ConstrainedDynamics {
   std::vector<int> rows_;
   RowMatrixXd half_;  // n + 6 x k, padded: [M_bar'^-1/2 J_B'^T; -M_hat^-1/2 G]
   MatrixXd schur_;    // k x k, padded
-  Eigen::LLT<MatrixXd> schur_llt_;
+  BlockCholesky schur_factor_;
   VectorXd motion_;  // n + 6, M^-1/2 of the forces without contact, then without those of contacts
+  VectorXd bias_;    // n
   Prediction prediction_;
 };
 

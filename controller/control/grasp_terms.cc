@@ -8,6 +8,20 @@
 #include "controller/object/euler_zyz.h"
 
 namespace dexcheck {
+namespace {
+
+/// J xi of a J (kRows x n) that has other columns than these zero.
+template <int kRows, typename Matrix>
+Eigen::Matrix<double, kRows, 1> MultiplyColumns(const Matrix& J, std::span<const ColumnRun> columns,
+                                                const VectorXd& xi) {
+  Eigen::Matrix<double, kRows, 1> product = Eigen::Matrix<double, kRows, 1>::Zero();
+  for (const ColumnRun& run : columns) {
+    for (Eigen::Index i = run.begin; i < run.begin + run.count; ++i) product += xi[i] * J.col(i);
+  }
+  return product;
+}
+
+}  // namespace
 
 GraspTerms::GraspTerms(const RobotModel& model, std::span<const int> fingertips, const MassProperties& object,
                        const Surface& surface)
@@ -125,24 +139,31 @@ void GraspTerms::SetContacts(const ModelTerms& robot, std::span<const ContactCoo
     const Eigen::Index row = 3 * static_cast<Eigen::Index>(i);
     Contact& contact = contacts_[i];
     auto& [J_f, J_f_dot] = tip_jacobians_[i];
-    robot.CalcFrameJacobian(fingertips_[i], J_f, J_f_dot);
+    robot.CalcFrameColumns(fingertips_[i], J_f, J_f_dot);
+    const Vector6d V_f = MultiplyColumns<6>(J_f, chains_[i], robot.velocity());
     contact.geometry = CalcContactGeometry(tips_[i], *surface_, kappa[i], overlaps_[i]);
     if (!bonds_.empty()) {
-      SetBond(robot.CalcFramePose(fingertips_[i]), J_f * robot.velocity(), i);
+      SetBond(robot.CalcFramePose(fingertips_[i]), V_f, i);
       continue;
     }
-    const Vector6d V_f = J_f * robot.velocity();
     contact.kappa_dot = CalcKappaDot(contact.geometry, CalcRelativeTwist(contact.geometry, V_f, V_Bo_));
     CalcContactJacobian(contact, J_f, J_B_.middleRows(row, 3), chains_[i]);
     CalcContactJacobianDot(contact, J_f, J_f_dot, J_B_dot_.middleRows(row, 3), chains_[i]);
   }
+  if (fingertips_.empty()) return;  // nothing is held
   CalcGraspMap(contacts_, G_);
   CalcGraspMapDot(contacts_, G_dot_);
+  for (size_t i = 0; i < fingertips_.size(); ++i) CalcSlip(robot.velocity(), i);
+}
+
+void GraspTerms::CalcSlip(const VectorXd& xi, size_t finger) {
   // (45), (46)
-  slip_.noalias() = J_B_ * robot.velocity();
-  slip_.noalias() -= G_.transpose() * V_Bo_;
-  slip_bias_.noalias() = J_B_dot_ * robot.velocity();
-  slip_bias_.noalias() -= G_dot_.transpose() * V_Bo_;
+  const Eigen::Index row = 3 * static_cast<Eigen::Index>(finger);
+  const auto& chain = chains_[finger];
+  slip_.segment<3>(row) = MultiplyColumns<3>(J_B_.middleRows<3>(row), chain, xi);
+  slip_.segment<3>(row) -= G_.middleCols<3>(row).transpose() * V_Bo_;
+  slip_bias_.segment<3>(row) = MultiplyColumns<3>(J_B_dot_.middleRows<3>(row), chain, xi);
+  slip_bias_.segment<3>(row) -= G_dot_.middleCols<3>(row).transpose() * V_Bo_;
 }
 
 void GraspTerms::RequireCoordinates() const {

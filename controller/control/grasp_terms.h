@@ -101,10 +101,11 @@ class GraspTerms {
   void SetContacts(const ModelTerms& robot, std::span<const ContactCoordinates> kappa);
   void ListChains(const RobotModel& model);
   void SetBond(const Pose& X_Bf, const Vector6d& V_f, size_t finger);
+  void CalcSlip(const VectorXd& xi, size_t finger);
   void RequireCoordinates() const;
 
   struct TipJacobian {
-    Matrix6Xd J, J_dot;
+    Matrix6Xd J, J_dot;  // zero but for the columns of the fingertip's chain
   };
 
   std::vector<int> fingertips_;

@@ -1,10 +1,13 @@
 #include "controller/control/pseudoinverse.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "controller/common/gram_matrix.h"
 #include "controller/common/text.h"
 
 namespace dexcheck {
@@ -20,64 +23,73 @@ Eigen::Index CheckRows(const std::string& name, Eigen::Index rows, Eigen::Index 
 
 Pseudoinverse::Pseudoinverse(std::string name, Eigen::Index rows, Eigen::Index columns)
     : name_(std::move(name)),
-      J_(CheckRows(name_, rows, columns), columns),
-      W_inv_J_T_(columns, rows),
-      half_(columns, rows),
-      gram_(rows, rows),
-      L_inv_(rows, rows),
+      all_columns_(static_cast<size_t>(columns)),
+      J_T_(RowMatrixXd::Zero(columns, PadToGramBlock(CheckRows(name_, rows, columns)))),
+      W_inv_J_T_(J_T_),
+      W_solution_(columns, rows),
+      gram_(J_T_.cols(), J_T_.cols()),
       work_(rows),
-      gram_llt_(rows),
-      W_llt_(columns) {}
-
-void Pseudoinverse::Load(const Eigen::Ref<const MatrixXd>& J) {
-  Require(J.rows() == J_.rows(), "rows of J", "must be as constructed", static_cast<double>(J.rows()));
-  Require(J.cols() == J_.cols(), "columns of J", "must be as constructed", static_cast<double>(J.cols()));
-  J_ = J;
+      gram_factor_(rows),
+      W_llt_(columns) {
+  std::iota(all_columns_.begin(), all_columns_.end(), 0);
+  columns_ = all_columns_;
+  entries_ = all_columns_;
 }
 
-void Pseudoinverse::Factor(const Eigen::Ref<const MatrixXd>& J) {
-  Load(J);
-  half_ = J_.transpose();
-  W_inv_J_T_ = half_;
+void Pseudoinverse::Load(const Eigen::Ref<const MatrixXd>& J, std::span<const int> columns) {
+  Require(J.rows() == work_.size(), "rows of J", "must be as constructed", static_cast<double>(J.rows()));
+  Require(J.cols() == J_T_.rows(), "columns of J", "must be as constructed", static_cast<double>(J.cols()));
+  if (columns.empty()) columns = all_columns_;
+  if (!std::equal(columns.begin(), columns.end(), columns_.begin(), columns_.end())) {
+    columns_.assign(columns.begin(), columns.end());
+    J_T_.setZero();
+  }
+  for (const int i : columns_) J_T_.row(i).head(J.rows()) = J.col(i).transpose();
+}
+
+void Pseudoinverse::Factor(const Eigen::Ref<const MatrixXd>& J, std::span<const int> columns) {
+  Load(J, columns);
+  SetEntries(columns_);
+  for (const int i : columns_) W_inv_J_T_.row(i) = J_T_.row(i);
   FactorGram();
 }
 
-void Pseudoinverse::FactorDiagonal(const Eigen::Ref<const MatrixXd>& J, const Eigen::Ref<const VectorXd>& w) {
-  Load(J);
-  Require(w.size() == J_.cols(), "length of w", "must be the columns of J", static_cast<double>(w.size()));
+void Pseudoinverse::FactorDiagonal(const Eigen::Ref<const MatrixXd>& J, const Eigen::Ref<const VectorXd>& w,
+                                   std::span<const int> columns) {
+  Load(J, columns);
+  Require(w.size() == J.cols(), "length of w", "must be the columns of J", static_cast<double>(w.size()));
   for (Eigen::Index i = 0; i < w.size(); ++i) Require(w[i] > 0.0, "entry of w", "must be positive", w[i]);
-  half_ = w.cwiseSqrt().cwiseInverse().asDiagonal() * J_.transpose();
-  W_inv_J_T_ = w.cwiseInverse().asDiagonal() * J_.transpose();
+  SetEntries(columns_);
+  for (const int i : columns_) W_inv_J_T_.row(i) = J_T_.row(i) / w[i];
   FactorGram();
 }
 
 void Pseudoinverse::FactorWeighted(const Eigen::Ref<const MatrixXd>& J, const Eigen::Ref<const MatrixXd>& W) {
-  Load(J);
-  Require(W.rows() == J_.cols(), "rows of W", "must be the columns of J", static_cast<double>(W.rows()));
-  Require(W.cols() == J_.cols(), "columns of W", "must be the columns of J", static_cast<double>(W.cols()));
+  Load(J, {});
+  Require(W.rows() == J.cols(), "rows of W", "must be the columns of J", static_cast<double>(W.rows()));
+  Require(W.cols() == J.cols(), "columns of W", "must be the columns of J", static_cast<double>(W.cols()));
   W_llt_.compute(W);
   Require(W_llt_.info() == Eigen::Success, "W", "must be positive definite; trace", W.trace());
-  // W = L L^T, half = L^-1 J^T, W^-1 J^T = L^-T half
-  half_ = J_.transpose();
-  W_llt_.matrixL().solveInPlace(half_);
-  W_inv_J_T_ = half_;
-  W_llt_.matrixU().solveInPlace(W_inv_J_T_);
+  W_solution_ = J.transpose();
+  W_llt_.solveInPlace(W_solution_);
+  SetEntries(all_columns_);
+  W_inv_J_T_.leftCols(J.rows()) = W_solution_;
   FactorGram();
 }
 
+void Pseudoinverse::SetEntries(const std::vector<int>& entries) {
+  if (entries == entries_) return;
+  entries_ = entries;
+  W_inv_J_T_.setZero();
+}
+
 void Pseudoinverse::FactorGram() {
-  // J W^-1 J^T = half^T half = L L^T
-  for (Eigen::Index j = 0; j < gram_.cols(); ++j) {
-    const Eigen::Index rest = gram_.rows() - j;
-    gram_.col(j).tail(rest).noalias() = half_.rightCols(rest).transpose() * half_.col(j);
-  }
-  gram_llt_.compute(gram_);
+  // J W^-1 J^T = L L^T
+  CalcGramMatrix(J_T_, W_inv_J_T_, columns_, &gram_);
   condition_number_ = std::numeric_limits<double>::infinity();
-  if (gram_llt_.info() == Eigen::Success) {
+  if (gram_factor_.Factor(gram_)) {
     // cond_2(J W^-1/2)^2 = cond_2(L L^T) <= tr(L L^T) tr((L L^T)^-1) = |L|^2 |L^-1|^2
-    L_inv_.setIdentity();
-    gram_llt_.matrixL().solveInPlace(L_inv_);
-    condition_number_ = std::sqrt(gram_.trace()) * L_inv_.norm();
+    condition_number_ = std::sqrt(gram_.diagonal().head(work_.size()).sum()) * gram_factor_.CalcInverseNorm();
   }
   if (condition_number_ <= kMaxConditionNumber) return;
   throw SingularityError(
@@ -87,26 +99,33 @@ void Pseudoinverse::FactorGram() {
 
 void Pseudoinverse::Apply(const Eigen::Ref<const VectorXd>& y, Eigen::Ref<VectorXd> x) {
   work_ = y;
-  gram_llt_.solveInPlace(work_);
-  x.noalias() = W_inv_J_T_ * work_;
+  gram_factor_.Solve(work_);
+  x.setZero();
+  for (const int i : entries_) x[i] = W_inv_J_T_.row(i).head(work_.size()).dot(work_);
 }
 
 void Pseudoinverse::ApplyTransposed(const Eigen::Ref<const VectorXd>& x, Eigen::Ref<VectorXd> y) {
-  y.noalias() = W_inv_J_T_.transpose() * x;
-  gram_llt_.solveInPlace(y);
+  y.noalias() = W_inv_J_T_.leftCols(work_.size()).transpose() * x;
+  gram_factor_.Solve(y);
 }
 
 void Pseudoinverse::Project(Eigen::Ref<VectorXd> x) {
   // N x = x - J^+ (J x)
-  work_.noalias() = J_ * x;
-  gram_llt_.solveInPlace(work_);
-  x.noalias() -= W_inv_J_T_ * work_;
+  work_.setZero();
+  for (const int i : columns_) work_ += x[i] * J_T_.row(i).head(work_.size()).transpose();
+  gram_factor_.Solve(work_);
+  for (const int i : entries_) x[i] -= W_inv_J_T_.row(i).head(work_.size()).dot(work_);
 }
 
-MatrixXd Pseudoinverse::CalcMatrix() const { return gram_llt_.solve(W_inv_J_T_.transpose()).transpose(); }
+MatrixXd Pseudoinverse::CalcMatrix() const {
+  const Eigen::Index k = work_.size();
+  const MatrixXd gram = gram_.topLeftCorner(k, k).selfadjointView<Eigen::Lower>();
+  return gram.llt().solve(W_inv_J_T_.leftCols(k).transpose()).transpose();
+}
 
 MatrixXd Pseudoinverse::CalcProjector() const {
-  return MatrixXd::Identity(J_.cols(), J_.cols()) - CalcMatrix() * J_;
+  const Eigen::Index n = J_T_.rows();
+  return MatrixXd::Identity(n, n) - CalcMatrix() * J_T_.leftCols(work_.size()).transpose();
 }
 
 }  // namespace dexcheck

@@ -7,8 +7,11 @@
 // functions that return matrices.
 
 #include <Eigen/Cholesky>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "controller/common/block_cholesky.h"
 #include "controller/common/types.h"
 
 namespace dexcheck {
@@ -25,11 +28,13 @@ class Pseudoinverse {
   Pseudoinverse(std::string name, Eigen::Index rows, Eigen::Index columns);
 
   /// Factors J (k x n) with W = 1.
+  /// @param columns those that can differ from zero, ascending: no other is looked at. All when empty.
   /// @throws std::invalid_argument when the shape differs, SingularityError with the condition number when J
   /// has not full row rank, as far as double precision can tell.
-  void Factor(const Eigen::Ref<const MatrixXd>& J);
+  void Factor(const Eigen::Ref<const MatrixXd>& J, std::span<const int> columns = {});
   /// The same with W = diag(w). @throws std::invalid_argument also unless every entry of w (n) is positive.
-  void FactorDiagonal(const Eigen::Ref<const MatrixXd>& J, const Eigen::Ref<const VectorXd>& w);
+  void FactorDiagonal(const Eigen::Ref<const MatrixXd>& J, const Eigen::Ref<const VectorXd>& w,
+                      std::span<const int> columns = {});
   /// The same with any W (n x n); its lower triangle is read.
   /// @throws std::invalid_argument also when W is not positive definite.
   void FactorWeighted(const Eigen::Ref<const MatrixXd>& J, const Eigen::Ref<const MatrixXd>& W);
@@ -50,17 +55,19 @@ class Pseudoinverse {
   [[nodiscard]] MatrixXd CalcProjector() const;
 
  private:
-  void Load(const Eigen::Ref<const MatrixXd>& J);
+  void Load(const Eigen::Ref<const MatrixXd>& J, std::span<const int> columns);
+  void SetEntries(const std::vector<int>& entries);
   void FactorGram();
 
   std::string name_;
-  MatrixXd J_;          // k x n
-  MatrixXd W_inv_J_T_;  // n x k
-  MatrixXd half_;       // n x k, W^-1/2 J^T up to a rotation
-  MatrixXd gram_;       // k x k, J W^-1 J^T, lower triangle
-  MatrixXd L_inv_;      // k x k
-  VectorXd work_;       // k
-  Eigen::LLT<MatrixXd> gram_llt_;
+  std::vector<int> all_columns_;
+  std::vector<int> columns_;     // of J that can differ from zero
+  std::vector<int> entries_;     // of W^-1 J^T y that can
+  RowMatrixXd J_T_, W_inv_J_T_;  // n x k, padded for CalcGramMatrix; zero but in columns_ and entries_
+  MatrixXd W_solution_;          // n x k, of any W
+  MatrixXd gram_;                // k x k, padded: J W^-1 J^T, lower triangle
+  VectorXd work_;                // k
+  BlockCholesky gram_factor_;
   Eigen::LLT<MatrixXd> W_llt_;
   double condition_number_ = 0.0;
 };

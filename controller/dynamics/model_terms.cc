@@ -66,7 +66,6 @@ ModelTerms::ModelTerms(const RobotModel& model, Coordinates coordinates)
   path_C_row_.setZero(path_length);
   M_.setZero(size_, size_);
   C_.setZero(size_, size_);
-  coriolis_.setZero(size_);
   gravity_.setZero(size_);
   friction_.setZero(size_);
 }
@@ -242,6 +241,12 @@ Pose ModelTerms::CalcFramePose(int frame) const {
 }
 
 void ModelTerms::CalcFrameJacobian(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref<Matrix6Xd> J_dot) const {
+  J.setZero();
+  J_dot.setZero();
+  CalcFrameColumns(frame, J, J_dot);
+}
+
+void ModelTerms::CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref<Matrix6Xd> J_dot) const {
   CheckSize("J columns", size_, J.cols());
   CheckSize("J_dot columns", size_, J_dot.cols());
   const Frame& f = model_->frames().at(static_cast<size_t>(frame));
@@ -251,8 +256,6 @@ void ModelTerms::CalcFrameJacobian(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Re
   const Vector3d w = state.w;
   const Vector3d p_dot = state.v + w.cross(p);
 
-  J.setZero();
-  J_dot.setZero();
   // Column i of the body Jacobian: R_f^T [v_i + w_i x p; w_i]; R_f turns with w.
   const auto write = [&](int dof) {
     const Column& column = columns_[static_cast<size_t>(dof)];

@@ -60,8 +60,6 @@ class ModelTerms {
   [[nodiscard]] const MatrixXd& M() const { return M_; }
   /// C of (16), or C_bar' of (18): Christoffel choice, M_dot - 2 C is skew (Property 2).
   [[nodiscard]] const MatrixXd& C() const { return C_; }
-  /// C velocity, N m or N.
-  [[nodiscard]] const VectorXd& coriolis() const { return coriolis_; }
   /// Part of F due to gravity, N m or N.
   [[nodiscard]] const VectorXd& gravity() const { return gravity_; }
   /// Part of F due to viscous friction, N m or N.
@@ -75,6 +73,10 @@ class ModelTerms {
   /// J_f of (6) as a body Jacobian, and its time derivative: V^f_Bf = J velocity, in the frame's own axes,
   /// V = [linear; angular]. Both 6 x size; every entry is written.
   void CalcFrameJacobian(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref<Matrix6Xd> J_dot) const;
+
+  /// The same of those columns alone whose coordinates move the frame; the others, zero in J_f, are left as
+  /// they are.
+  void CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref<Matrix6Xd> J_dot) const;
 
   /// Velocity of a frame and J_dot xi (its acceleration when the velocity coordinates do not change), both
   /// [linear; angular] of the frame's origin in world axes.
@@ -173,8 +175,6 @@ class ModelTerms {
 
   MatrixXd M_;
   MatrixXd C_;
-  VectorXd coriolis_;
-  double kinetic_ = 0.0;  // velocity^T M velocity / 2
   VectorXd gravity_;
   VectorXd friction_;
 };

@@ -131,23 +131,13 @@ void ModelTerms::FillRowAndColumn(int depth, int dof, const Column& column, cons
                 path_C_column_.data(), path_C_row_.data());
   double* const M = M_.data();
   double* const C = C_.data();
-  // Meanwhile C velocity, and velocity^T M velocity / 2: here are all entries that are not zero.
-  const double rate = velocity_[dof];
-  double coriolis = path_C_row_[depth] * rate;
-  double momentum = 0.5 * path_M_[depth] * rate;
   for (int k = 0; k <= depth; ++k) {
     const int other = path_dofs_[static_cast<size_t>(k)];
     M[dof * size_ + other] = path_M_[k];
     M[other * size_ + dof] = path_M_[k];
     C[dof * size_ + other] = path_C_column_[k];
     C[other * size_ + dof] = path_C_row_[k];
-    if (k == depth) break;
-    coriolis += path_C_row_[k] * velocity_[other];
-    momentum += path_M_[k] * velocity_[other];
-    coriolis_[other] += path_C_column_[k] * rate;
   }
-  coriolis_[dof] += coriolis;
-  kinetic_ += rate * momentum;
 }
 
 void ModelTerms::CalcDynamics() {
@@ -161,8 +151,6 @@ void ModelTerms::CalcDynamics() {
         subtrees_[static_cast<size_t>(i + 1)];
   }
 
-  coriolis_.setZero();
-  kinetic_ = 0.0;
   // Gravity's generalised force on column i: -(w_i . integral p x g + v_i . integral g)
   const Vector3d g = base_R_.transpose() * model_->gravity();
   const auto fill = [&](int depth, int dof, const MassIntegrals& subtree) {
@@ -185,7 +173,6 @@ void ModelTerms::AddWheelsAndRotors() {
     const Joint& joint = model_->joints()[static_cast<size_t>(i)];
     const int dof = base_size_ + i;
     M_(dof, dof) += joint.armature;
-    kinetic_ += 0.5 * joint.armature * velocity_[dof] * velocity_[dof];
     friction_[dof] = joint.damping * velocity_[dof];
   }
   const Base& base = model_->base();
@@ -203,7 +190,6 @@ void ModelTerms::AddWheelsAndRotors() {
   }
   const Matrix3d K_spin_K = spin * K.transpose() * K;
   M_.topLeftCorner(base_size_, base_size_) += K_spin_K.topLeftCorner(base_size_, base_size_);
-  kinetic_ += 0.5 * spin * wheel_rates_.squaredNorm();
   friction_.head(base_size_) = (base.wheel.damping * K.transpose() * wheel_rates_).head(base_size_);
   if (base_size_ != 3) return;
 
@@ -217,9 +203,6 @@ void ModelTerms::AddWheelsAndRotors() {
   C_.topLeftCorner<2, 2>() += 0.5 * k * velocity_[2] * D;
   C_.block<2, 1>(0, 2) += cross;
   C_.block<1, 2>(2, 0) -= cross.transpose();
-  // All of it times velocity: D q_dot phi_dot is there twice, q_dot^T D q_dot once.
-  coriolis_.head<2>() += 2.0 * velocity_[2] * cross;
-  coriolis_[2] -= cross.dot(velocity_.head<2>());
 }
 
 EnergyAndMomentum ModelTerms::CalcEnergyAndMomentum() const {
@@ -229,7 +212,12 @@ EnergyAndMomentum ModelTerms::CalcEnergyAndMomentum() const {
   EnergyAndMomentum result;
   const Vector3d com = mp / all.m;
   result.com = base_position_ + base_R_ * com;
-  result.kinetic = kinetic_;
+  // T = 1/2 velocity^T M velocity, column by column below the diagonal: a product M velocity would allocate.
+  for (int i = 0; i < size_; ++i) {
+    const int below = size_ - i - 1;
+    result.kinetic +=
+        velocity_[i] * (0.5 * M_(i, i) * velocity_[i] + M_.col(i).tail(below).dot(velocity_.tail(below)));
+  }
   result.potential = -all.m * model_->gravity().dot(result.com);
   result.linear_momentum = base_R_ * h;
   // integral p x p_dot = [Q_zy - Q_yz; Q_xz - Q_zx; Q_yx - Q_xy]; then the wheels' spin about the axle.

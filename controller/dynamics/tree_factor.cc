@@ -6,6 +6,13 @@
 #include "controller/common/errors.h"
 
 namespace dexcheck {
+namespace {
+
+/// Short rows, of which there are hundreds: Eigen's loops take them two by two, where a compiler's own
+/// prepare for long ones.
+using Segment = Eigen::Map<VectorXd>;
+
+}  // namespace
 
 TreeFactor::TreeFactor(const RobotModel& model) {
   const int base = model.num_base_velocities();
@@ -33,35 +40,44 @@ void TreeFactor::Compute(const Eigen::Ref<const MatrixXd>& M) {
   Require(M.rows() == n && M.cols() == n, "rows of M", "must be those of xi", static_cast<double>(M.rows()));
   for (Eigen::Index i = 0; i < n; ++i) {
     const Row row = rows_[static_cast<size_t>(i)];
-    for (size_t k = row.begin; k < row.begin + row.size; ++k) L_[k] = M(i, path_[k]);
+    // A column, which is contiguous.
+    for (size_t k = row.begin; k < row.begin + row.size; ++k) L_[k] = M(path_[k], i);
   }
   // From the tips inward: a row is final, then its part is taken from the rows that it hangs on.
   for (auto i = rows_.rbegin(); i != rows_.rend(); ++i) {
     const Row row = *i;
-    double* const __restrict entries = L_.data() + row.begin;
+    double* const entries = L_.data() + row.begin;
     const size_t last = row.size - 1;
     const double pivot = entries[last];
     Require(pivot > 0.0, "M_bar'", "must be positive definite; pivot", pivot);
     const double root = std::sqrt(pivot);
     const double inverse = 1.0 / root;
     entries[last] = root;
-    for (size_t k = 0; k < last; ++k) entries[k] *= inverse;
+    Segment(entries, static_cast<Eigen::Index>(last)) *= inverse;
     for (size_t above = 0; above < last; ++above) {
-      const double factor = entries[above];
-      double* const __restrict others =
-          L_.data() + rows_[static_cast<size_t>(path_[row.begin + above])].begin;
-      for (size_t k = 0; k <= above; ++k) others[k] -= factor * entries[k];
+      const auto count = static_cast<Eigen::Index>(above) + 1;
+      double* const others = L_.data() + rows_[static_cast<size_t>(path_[row.begin + above])].begin;
+      Segment(others, count) -= entries[above] * Segment(entries, count);
     }
   }
+}
+
+double TreeFactor::Dot(size_t begin, size_t end, const Eigen::Ref<const VectorXd>& x) const {
+  // Two sums, so that neither waits for the other.
+  double even = 0.0, odd = 0.0;
+  for (; begin + 1 < end; begin += 2) {
+    even += L_[begin] * x[path_[begin]];
+    odd += L_[begin + 1] * x[path_[begin + 1]];
+  }
+  if (begin < end) even += L_[begin] * x[path_[begin]];
+  return even + odd;
 }
 
 void TreeFactor::Multiply(Eigen::Ref<VectorXd> x) const {
   // Rows use entries above themselves only.
   for (auto i = static_cast<Eigen::Index>(rows_.size()) - 1; i >= 0; --i) {
     const Row row = rows_[static_cast<size_t>(i)];
-    double sum = 0.0;
-    for (size_t k = row.begin + row.size; k-- > row.begin;) sum += L_[k] * x[path_[k]];
-    x[i] = sum;
+    x[i] = Dot(row.begin, row.begin + row.size, x);
   }
 }
 
@@ -69,9 +85,7 @@ void TreeFactor::Solve(Eigen::Ref<VectorXd> x) const {
   for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(rows_.size()); ++i) {
     const Row row = rows_[static_cast<size_t>(i)];
     const size_t last = row.begin + row.size - 1;
-    double sum = x[i];
-    for (size_t k = last; k-- > row.begin;) sum -= L_[k] * x[path_[k]];
-    x[i] = sum / L_[last];
+    x[i] = (x[i] - Dot(row.begin, last, x)) / L_[last];
   }
 }
 
@@ -96,20 +110,15 @@ void TreeFactor::SolveTransposedColumns(Eigen::Ref<RowMatrixXd> X) const {
 }
 
 void TreeFactor::SolveTransposedColumns(std::span<const int> rows, Eigen::Ref<RowMatrixXd> X) const {
-  // Plain loops: rows are short, and there are hundreds of them.
   const Eigen::Index width = X.cols();
   for (auto index = rows.rbegin(); index != rows.rend(); ++index) {
     const Eigen::Index i = *index;
     const Row row = rows_[static_cast<size_t>(i)];
     const size_t last = row.begin + row.size - 1;
-    double* const __restrict x_i = X.data() + i * X.outerStride();
-    const double inverse = 1.0 / L_[last];
-    for (Eigen::Index c = 0; c < width; ++c) x_i[c] *= inverse;
-    for (size_t k = last; k-- > row.begin;) {
-      double* const __restrict x_j = X.data() + path_[k] * X.outerStride();
-      const double factor = L_[k];
-      for (Eigen::Index c = 0; c < width; ++c) x_j[c] -= factor * x_i[c];
-    }
+    Segment x_i(X.data() + i * X.outerStride(), width);
+    x_i *= 1.0 / L_[last];
+    for (size_t k = last; k-- > row.begin;)
+      Segment(X.data() + path_[k] * X.outerStride(), width) -= L_[k] * x_i;
   }
 }
 

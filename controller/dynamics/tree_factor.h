@@ -20,7 +20,7 @@ class TreeFactor {
  public:
   explicit TreeFactor(const RobotModel& model);
 
-  /// M = L^T L; the lower triangle of M (n x n) is read, at the tree's entries.
+  /// M = L^T L; the upper triangle of M (n x n) is read, at the tree's entries.
   /// @throws std::invalid_argument when the size differs or M is not positive definite.
   void Compute(const Eigen::Ref<const MatrixXd>& M);
 
@@ -47,6 +47,9 @@ class TreeFactor {
     size_t begin;  // in L_ and path_
     size_t size;
   };
+
+  /// Sum of L's entries from begin to end, each times its coordinate's of x.
+  [[nodiscard]] double Dot(size_t begin, size_t end, const Eigen::Ref<const VectorXd>& x) const;
 
   std::vector<Row> rows_;
   std::vector<int> all_rows_;

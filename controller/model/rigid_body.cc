@@ -92,8 +92,10 @@ std::string FindPhysicalInconsistency(const MassProperties& body) {
   }
 
   // Rods and plates meet the inequalities with equality. Their entries, rounded when written down, rotated
-  // and summed (some ten roundings each), and the eigenvalues computed from them are off by a few eps |I|.
-  const double allowance = 64.0 * std::numeric_limits<double>::epsilon() * body.inertia.cwiseAbs().maxCoeff();
+  // and summed (some ten roundings each), and the eigenvalues computed from them are off by a few eps |I|. An
+  // inertia that was moved to the centre of mass is a difference of terms of the size m |c|^2.
+  const double size = body.inertia.cwiseAbs().maxCoeff() + body.mass * body.com.squaredNorm();
+  const double allowance = 64.0 * std::numeric_limits<double>::epsilon() * size;
   if ((body.inertia - body.inertia.transpose()).cwiseAbs().maxCoeff() > allowance) {
     return "inertia must be symmetric, got " + FormatNumbers(body.inertia.reshaped<Eigen::RowMajor>());
   }

@@ -57,6 +57,21 @@ const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
                         [&](const CheckRecord& check) { return check.name == name(StepCheck::kRolling); });
 }
 
+/// What an expectation that alone fails comes from: the gains, if (57) by itself leaves most of the error,
+/// and what drives it otherwise. By algebra that is what contacts give, or what the scenario asks for of the
+/// plant.
+Cause AttributeExpectation(const CheckRecord& check, const MeasuredCauses& measured, std::string* evidence) {
+  const bool position = check.name == kStepChecks[static_cast<size_t>(StepCheck::kExpectPosition)].name;
+  const double by_law = position ? measured.position_by_law : measured.orientation_by_law;
+  if (by_law < 0.0) return Cause::kControlLaw;
+  *evidence += "; (57) by itself leaves " + FormatNumber(by_law, 3) + " " + check.unit;
+  if (by_law >= 0.5 * check.worst) return Cause::kControlLaw;
+  *evidence += measured.is_ideal
+                   ? ", contacts that give the rest"
+                   : ", contacts that give and what the scenario asks for of the plant the rest";
+  return measured.is_ideal ? Cause::kContactSoftness : Cause::kControlLaw;
+}
+
 Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRecord> steps) {
   if (run == Cause::kModel || run == Cause::kSensing) return run;
   if (check.kind == CheckKind::kModel) return Cause::kModel;
@@ -153,8 +168,13 @@ AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord>
       result.cause = MeaningOf(*first).cause;
       result.evidence = Tell(*first);
       if (result.cause == Cause::kUnmodelledForce && measured.is_slope) result.cause = Cause::kSlope;
-      const std::string& how = FindMeasured(result.cause, measured);
-      if (!how.empty()) result.evidence += "; " + how;
+      result.check = first->name;
+      const FailureMeaning meaning = MeaningOf(*first);
+      if (meaning.rank == Rank::kResidual && meaning.cause == Cause::kControlLaw) {
+        result.cause = AttributeExpectation(*first, measured, &result.evidence);
+      } else if (const std::string& how = FindMeasured(result.cause, measured); !how.empty()) {
+        result.evidence += "; " + how;
+      }
     } else {
       result.cause = Cause::kUnexplained;
       const auto assumption = std::find_if(steps.begin(), steps.end(), [](const CheckRecord& check) {

@@ -26,11 +26,16 @@ struct MeasuredCauses {
   std::string force;      ///< On which joint or body, and how large.
   std::string wheels;     ///< Which radius or distance.
   bool is_slope = false;  ///< The force is gravity's, which does not point down.
+  /// Largest errors of the object that (57) by itself would leave while the expectations are asked, m and
+  /// rad: below zero where it is not integrated.
+  double position_by_law = -1.0, orientation_by_law = -1.0;
+  bool is_ideal = true;  ///< The scenario asks for no imperfection of the plant.
 };
 
 struct AttributionResult {
   Cause cause = Cause::kNone;             ///< Of the run: the one that the others follow from.
   std::string evidence;                   ///< In words: which check says so, with its value and time.
+  std::string check;                      ///< The check of a step that says so; empty for one of the model.
   std::vector<Attribution> attributions;  ///< Of each failed check.
 };
 

@@ -150,6 +150,9 @@ MeasuredCauses CrossCheck::Tell() const {
   measured.motors = motors_.Tell();
   measured.sensors = sensors_.Tell();
   measured.wheels = motion_.wheels().Tell();
+  measured.position_by_law = position_by_law_;
+  measured.orientation_by_law = orientation_by_law_;
+  measured.is_ideal = !known_;
   const ForceEvidence& forces = motion_.forces();
   if (!forces.has_any()) return measured;
   measured.force = forces.Tell();
@@ -195,6 +198,9 @@ void CrossCheck::CompareLaw(const StepRecord& step) {
   motion_.Add(StepCheck::kGraspForce, errors.grasp_force, t);
   motion_.Add(StepCheck::kErrorDynamics, errors.error_dynamics, t);
   motion_.Add(StepCheck::kOrientationDynamics, errors.orientation_dynamics, t);
+  if (!law_->follows_error() || t < expect.from) return;
+  position_by_law_ = std::max(position_by_law_, errors.position_by_law);
+  orientation_by_law_ = std::max(orientation_by_law_, errors.orientation_by_law);
 }
 
 }  // namespace dexcheck

@@ -89,7 +89,8 @@ class CrossCheck {
   std::optional<NotIdeal> known_;
   std::optional<LawCheck> law_;  // none for a task, an unknown law, or a motion of joints
   std::optional<JointLawCheck> joint_law_;
-  LawTerms law_terms_;  // the engine's
+  LawTerms law_terms_;                                         // the engine's
+  double position_by_law_ = -1.0, orientation_by_law_ = -1.0;  // largest; see MeasuredCauses
   std::vector<CheckRecord> settling_failures_;
   MotorEvidence motors_;
   SensorEvidence sensors_;

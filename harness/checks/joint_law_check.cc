@@ -21,8 +21,7 @@ JointLawCheck::JointLawCheck(const Setup& setup)
       factor_(setup.model()) {
   for (const Joint& joint : setup.model().joints()) names_.push_back(joint.name);
   const int n = setup.model().num_velocities();
-  for (VectorXd* vector : {&force_, &demand_, &true_demand_, &differed_}) vector->setZero(n);
-  column_.setZero(n, 1);
+  for (VectorXd* vector : {&force_, &demand_, &true_demand_, &differed_, &work_}) vector->setZero(n);
 }
 
 double JointLawCheck::sampled_radius() const {
@@ -44,12 +43,7 @@ void JointLawCheck::CalcDemand(const VectorXd& q, const VectorXd& xi, VectorXd* 
 
 void JointLawCheck::CompareTorque(const StepRecord& step, const LawTerms& terms) {
   JointController::EvaluateDesired(*motion_, step.time, 2.0 * velocity_age_, &desired_, &half_step_);
-  const auto norm = [&] {
-    // |f|_M^-1 = |L^-T f|
-    column_ = force_;
-    factor_.SolveTransposed(column_);
-    return column_.norm();
-  };
+  const auto norm = [&] { return factor_.CalcForceNorm(force_, &work_); };
   factor_.Compute(terms.M);
   force_ = terms.C_xi + terms.gravity + terms.friction;
   const double balanced = norm();
@@ -63,7 +57,7 @@ void JointLawCheck::CompareTorque(const StepRecord& step, const LawTerms& terms)
       force_ = terms.gravity;
     } else {
       force_.noalias() += terms.M * desired_.q_ddot;
-      force_.noalias() += terms.C * (desired_.q_dot - terms.xi);
+      force_.noalias() += *terms.C * (desired_.q_dot - terms.xi);
     }
     force_ += gains_.K.cwiseProduct(desired_.q - terms.q);
     force_ += gains_.D.cwiseProduct(desired_.q_dot - terms.xi);

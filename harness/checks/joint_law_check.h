@@ -61,7 +61,7 @@ class JointLawCheck {
   DesiredJoints desired_, half_step_;
   JointLawErrors errors_;
   VectorXd force_, demand_, true_demand_;  // n
-  RowMatrixXd column_;                     // n x 1
+  VectorXd work_;                          // n
   VectorXd differed_;                      // n, N m
   bool follows_ = false;                   // whether the two below are set
   VectorXd q_, xi_;

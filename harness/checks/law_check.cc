@@ -22,6 +22,13 @@ constexpr double kLeastNullTolerance = 1e-9;
 // changes.
 constexpr double kSlipShare = 10.0;
 
+/// Between two orientations, rad; good to rounding where it is small.
+double CalcAngle(const Matrix3d& a, const Matrix3d& b) {
+  const Matrix3d D = a.transpose() * b;
+  const Vector3d twice_sine(D(2, 1) - D(1, 2), D(0, 2) - D(2, 0), D(1, 0) - D(0, 1));
+  return std::atan2(0.5 * twice_sine.norm(), 0.5 * (D.trace() - 1.0));
+}
+
 }  // namespace
 
 double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold, double velocity_age) {
@@ -46,6 +53,7 @@ LawCheck::LawCheck(const Setup& setup)
       time_step_(setup.scenario().plant.time_step),
       velocity_age_(setup.scenario().plant.velocity_age()),
       hold_(std::max(1L, std::lround(setup.scenario().plant.control_step / time_step_))),
+      sampled_radius_(CalcSampledRadius(spec_.gains, time_step_, hold_, velocity_age_)),
       actuation_(setup.model()),
       reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())),
       own_factor_(setup.model()) {
@@ -66,10 +74,6 @@ LawCheck::LawCheck(const Setup& setup)
   force_.setZero(setup.model().num_velocities());
   difference_ = force_;
   slope_.setZero(3 * static_cast<Eigen::Index>(setup.fingertips().size()));
-}
-
-double LawCheck::sampled_radius() const {
-  return CalcSampledRadius(spec_.gains, time_step_, hold_, velocity_age_);
 }
 
 DesiredMotion LawCheck::EvaluateDesired(double t) const {
@@ -155,8 +159,10 @@ void LawCheck::CompareDemand(const StepFindings& findings) {
   const double kappa = reference_.condition_number();
   difference_ = reference_.slip_acceleration();
   mass_factor_->Multiply(difference_);
-  const double slip = (Norm(reference_.slip_coriolis()) + difference_.norm()) / scale_;
-  errors_.demand = std::max(0.0, std::max(motion, forces) / kappa - kSlipShare * slip);
+  const double apart = std::max(motion, forces) / kappa - kSlipShare * difference_.norm() / scale_;
+  const bool slip_explains = apart <= 0.0;
+  errors_.demand =
+      slip_explains ? 0.0 : std::max(apart - kSlipShare * Norm(reference_.slip_coriolis()) / scale_, 0.0);
 }
 
 void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms, const VectorXd& f_c) {
@@ -198,30 +204,37 @@ void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings,
       truth.X_o = CalcObjectCoordinates(truth.X_Bo, terms.X_o);
   }
   if (!follows_) {
-    followed_ = truth;
+    followed_ = undisturbed_ = truth;
     follows_ = true;
   }
   errors_.error_dynamics = (followed_.X_Bo.translation() - truth.X_Bo.translation()).norm();
-  const Matrix3d D = followed_.X_Bo.linear().transpose() * truth.X_Bo.linear();
-  const Vector3d twice_sine(D(2, 1) - D(1, 2), D(0, 2) - D(2, 0), D(1, 0) - D(0, 1));
-  errors_.orientation_dynamics = std::atan2(0.5 * twice_sine.norm(), 0.5 * (D.trace() - 1.0));
-  // Semi-implicit, as the plant: velocities first. v = R^T p_dot, hence p_ddot = R (v_dot + omega x v).
-  if (spec_.orientation == OrientationFeedback::kAngles)
+  errors_.orientation_dynamics = CalcAngle(followed_.X_Bo.linear(), truth.X_Bo.linear());
+  errors_.position_by_law = (undisturbed_.X_Bo.translation() - desired.X_d.head<3>()).norm();
+  errors_.orientation_by_law = CalcAngle(undisturbed_.X_Bo.linear(), CalcObjectPose(desired.X_d).linear());
+  if (spec_.orientation == OrientationFeedback::kAngles) {
     followed_.X_o = CalcObjectCoordinates(followed_.X_Bo, followed_.X_o);
+    undisturbed_.X_o = CalcObjectCoordinates(undisturbed_.X_Bo, undisturbed_.X_o);
+  }
   Vector6d V_dot = reference_.CalcDemand(spec_, followed_, desired);
   // What the engine's object did beyond the rigid prediction. Where it is told otherwise, given otherwise and
   // pushed, all of that drives (57) as well: what it did beyond what its true error demands.
   V_dot += step.response.V_Bo_dot -
            (step.known != nullptr ? reference_.CalcDemand(spec_, truth, desired) : findings.V_Bo_dot_model);
-  Matrix3d R = followed_.X_Bo.linear();
-  const Vector3d v = followed_.V_Bo.head<3>();
-  Vector3d omega = followed_.V_Bo.tail<3>();
+  Move(V_dot, &followed_);
+  Move(reference_.CalcDemand(spec_, undisturbed_, desired), &undisturbed_);
+}
+
+void LawCheck::Move(const Vector6d& V_dot, LawObject* object) const {
+  // v = R^T p_dot, hence p_ddot = R (v_dot + omega x v).
+  Matrix3d R = object->X_Bo.linear();
+  const Vector3d v = object->V_Bo.head<3>();
+  Vector3d omega = object->V_Bo.tail<3>();
   const Vector3d p_dot = R * (v + time_step_ * (V_dot.head<3>() + omega.cross(v)));
   omega += time_step_ * V_dot.tail<3>();
   R = R * ExpSo3(time_step_ * omega);
-  followed_.X_Bo.translation() += time_step_ * p_dot;
-  followed_.X_Bo.linear() = Eigen::Quaterniond(R).normalized().toRotationMatrix();
-  followed_.V_Bo << followed_.X_Bo.linear().transpose() * p_dot, omega;
+  object->X_Bo.translation() += time_step_ * p_dot;
+  object->X_Bo.linear() = Eigen::Quaterniond(R).normalized().toRotationMatrix();
+  object->V_Bo << object->X_Bo.linear().transpose() * p_dot, omega;
 }
 
 }  // namespace dexcheck

@@ -30,6 +30,9 @@ struct LawErrors {
   /// missed, m.
   double error_dynamics = 0.0;
   double orientation_dynamics = 0.0;  ///< Its orientation likewise, rad.
+  /// How far from its desired pose the object would be if (57) alone drove it, m and rad: what the gains
+  /// leave.
+  double position_by_law = 0.0, orientation_by_law = 0.0;
 };
 
 /// Largest magnitude of the eigenvalues of (57), per time step, when the command is held for `hold` steps: 1
@@ -52,7 +55,7 @@ class LawCheck {
     return !step.command.handling.partial && step.command.force_solves > 0;
   }
   /// Of the scenario's gains.
-  [[nodiscard]] double sampled_radius() const;
+  [[nodiscard]] double sampled_radius() const { return sampled_radius_; }
   /// Whether the law's closed loop is (57): that of the paper's, and by algebra that of operational space.
   [[nodiscard]] bool has_error_dynamics() const { return has_error_dynamics_; }
   /// Whether the rigid system answers with what the law demands of it: the paper's does.
@@ -84,6 +87,8 @@ class LawCheck {
   void FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                    const DesiredMotion& desired);
   double Norm(const VectorXd& force);
+  /// As the plant steps: velocities first.
+  void Move(const Vector6d& V_dot, LawObject* object) const;
 
   LawSpec spec_;
   double mu_, f_min_, f_max_, barrier_weight_, slack_tolerance_, residual_tolerance_;
@@ -91,6 +96,7 @@ class LawCheck {
   double velocity_age_;
   bool has_error_dynamics_ = true;
   long hold_;
+  double sampled_radius_;
   std::unique_ptr<Trajectory> trajectory_;
   ActuationMap actuation_;
   LawReference reference_;
@@ -102,8 +108,9 @@ class LawCheck {
   double scale_ = 1.0;
   VectorXd force_, difference_, work_;  // n
   VectorXd slope_;                      // k
-  bool follows_ = false;                // whether the one below is set
+  bool follows_ = false;                // whether those below are set
   LawObject followed_;                  // of (57); velocities half a step before
+  LawObject undisturbed_;               // the same, driven by nothing
 };
 
 }  // namespace dexcheck

@@ -52,39 +52,42 @@ SignalEvidence::SignalEvidence(Eigen::Index size) {
     vector->setZero(size);
   }
   history_.setZero(size, kMostDelay + 1);
-  delay_left_.setZero(kMostDelay + 1, size);
-  delay_squares_ = delay_left_;
+  delay_left_.setZero(size, kMostDelay + 1);
+  squares_before_ = delay_left_;
+  step_difference_.setZero(size);
 }
 
 void SignalEvidence::Add(const VectorXd& meant, const VectorXd& got, const VectorXd& rate) {
-  const long column = steps_ % (kMostDelay + 1);
-  history_.col(column) = meant;
-  for (Eigen::Index i = 0; i < meant.size(); ++i) {
-    const double d = got[i] - meant[i];
-    difference_[i] += d;
-    squares_[i] += d * d;
-    largest_[i] = std::max(largest_[i], std::abs(d));
-    by_meant_[i] += d * meant[i];
-    meant_squares_[i] += meant[i] * meant[i];
-    by_sign_[i] += meant[i] > 0.0 ? d : -d;
-    if (rate.size() > 0) {
-      by_rate_[i] += d * rate[i];
-      rate_squares_[i] += rate[i] * rate[i];
-    }
-    for (long k = 1; k <= std::min(steps_, kMostDelay); ++k) {
-      const double left = got[i] - history_(i, (column - k + kMostDelay + 1) % (kMostDelay + 1));
-      delay_left_(k, i) += left * left;
-      delay_squares_(k, i) += d * d;
-    }
-    if (steps_ > 0) {
-      const double by = meant[i] - before_[i];
-      const double change = got[i] - before_[i];
-      lag_by_[i] += by * change;
-      lag_squares_[i] += by * by;
-      lag_change_[i] += change * change;
-    }
-  }
+  // Until something differs there is nothing to explain, and what was right before says nothing of how.
+  const bool is_right = steps_ == 0 && got == meant;
+  if (!is_right) Compare(meant, got, rate);
+  history_.col(seen_ % (kMostDelay + 1)) = meant;
   before_ = got;
+  ++seen_;
+  if (seen_ <= kMostDelay) squares_before_.col(seen_) = squares_;
+}
+
+void SignalEvidence::Compare(const VectorXd& meant, const VectorXd& got, const VectorXd& rate) {
+  const Eigen::Map<const Eigen::ArrayXd> m(meant.data(), meant.size()), g(got.data(), got.size());
+  Eigen::ArrayXd& d = step_difference_;
+  d = g - m;
+  difference_.array() += d;
+  squares_.array() += d.square();
+  largest_ = largest_.array().max(d.abs());
+  by_meant_.array() += d * m;
+  meant_squares_.array() += m.square();
+  by_sign_.array() += (m > 0.0).select(d, -d);
+  if (rate.size() > 0) {
+    by_rate_.array() += d * rate.array();
+    rate_squares_.array() += rate.array().square();
+  }
+  for (long k = 1; k <= std::min(seen_, kMostDelay); ++k)
+    delay_left_.col(k) += (g - history_.col((seen_ - k) % (kMostDelay + 1)).array()).square();
+  if (seen_ > 0) {
+    lag_by_.array() += (m - before_.array()) * (g - before_.array());
+    lag_squares_.array() += (m - before_.array()).square();
+    lag_change_.array() += (g - before_.array()).square();
+  }
   ++steps_;
 }
 
@@ -120,10 +123,12 @@ SignalFinding SignalEvidence::Fit(Eigen::Index begin, Eigen::Index count) const 
   slope(Kind::kDryFriction, by_sign, steps, 0.0, -1.0);
   slope(Kind::kDamping, by_rate, rate_squares_.segment(begin, count).sum(), 0.0, -1.0);
   for (long k = 1; k <= kMostDelay; ++k) {
-    const double square = delay_squares_.row(k).segment(begin, count).sum();
+    // Of steps whose delayed value is known.
+    const double square =
+        (squares_.array() - squares_before_.col(std::min(k, seen_))).segment(begin, count).sum();
     if (square > 0.0) {
       offer(Kind::kDelay, static_cast<double>(k),
-            1.0 - delay_left_.row(k).segment(begin, count).sum() / square);
+            1.0 - delay_left_.col(k).segment(begin, count).sum() / square);
     }
   }
   const double by = lag_by_.segment(begin, count).sum();

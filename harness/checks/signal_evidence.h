@@ -41,18 +41,23 @@ class SignalEvidence {
   [[nodiscard]] double largest(Eigen::Index entry) const { return largest_[entry]; }
 
  private:
+  void Compare(const VectorXd& meant, const VectorXd& got, const VectorXd& rate);
   [[nodiscard]] SignalFinding Fit(Eigen::Index begin, Eigen::Index count) const;
 
-  using Delays = Eigen::Array<double, kMostDelay + 1, Eigen::Dynamic>;
-  long steps_ = 0;
-  VectorXd difference_, squares_, largest_;  // of got - meant: sum, sum of squares, largest
+  /// One column for each delay from 0 on, one row for each entry.
+  using Delays = Eigen::Array<double, Eigen::Dynamic, kMostDelay + 1>;
+  long seen_ = 0;                            // steps
+  long steps_ = 0;                           // of these, from the first on at which something differed
+  Eigen::ArrayXd step_difference_;           // got - meant
+  VectorXd difference_, squares_, largest_;  // of that: sum, sum of squares, largest
   VectorXd by_meant_, meant_squares_;
   VectorXd by_sign_;
   VectorXd by_rate_, rate_squares_;
   VectorXd lag_by_, lag_squares_, lag_change_;  // got_t - got_t-1 on meant_t - got_t-1
   VectorXd before_;                             // got
   MatrixXd history_;                            // meant of the last steps, one column each
-  Delays delay_left_, delay_squares_;           // (got_t - meant_t-k)^2 and (got - meant)^2 of the same steps
+  Delays delay_left_;                           // sum of (got_t - meant_t-k)^2
+  Delays squares_before_;                       // squares_ after the first k steps
 };
 
 /// Motors: which, and gain, delay, lag, offset, friction.

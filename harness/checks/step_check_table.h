@@ -8,6 +8,7 @@
 
 #include "harness/base/check_record.h"
 #include "harness/checks/failure_cause.h"
+#include "harness/checks/step_bounds.h"
 
 namespace dexcheck {
 
@@ -53,65 +54,6 @@ inline constexpr int kStepCheckCount = static_cast<int>(StepCheck::kCount);
 /// contacts need some milliseconds to become what rigid ones are at once. s.
 inline constexpr double kTransient = 0.05;
 
-// Contacts hold by soft constraints, so a fingertip that sticks still creeps. Along a tangent the engine lets
-//
-//   v_dot = -b v - R f_t + J_dot qvel,   hence after some 1/b   v = (J_dot qvel - R f_t) / b,
-//
-// with b = 2 / (tc d) = 1 / (d dt) of the time constant tc = 2 dt and the impedance d, and R = (1 - d) / (d m
-// impratio) of the mass m that the contact moves. J_dot qvel is what (46) has and the engine's constraint has
-// not: the model's J_B_dot' xi - G_dot^T V_Bo. So distances grow with time, at rates that do not: distances
-// are judged over the last kSlipWindow at most, and the rates besides:
-//
-//   fingertip_slip_rate   |v| - dt |J_B_dot' xi - G_dot^T V_Bo| <= (1 - d) dt / impratio * kTipLoad,
-//                         of d = 0.99, impratio = 100, whatever the plant has: 2e-5 m/s at 1 ms
-//   wheel_slip_rate       |v| <= dt * kSideways: tyres give by v w / b in a curve; 1e-4 m/s at 1 ms
-//
-// Up to kSlipWindow after the start the windows begin there. Joints that do not carry the object are held by
-// stiffness: what moves them does not add up.
-
-// When the forces change by a step, soft contacts first give: the engine lets J qacc = a_ref - R f with R =
-// (1 - d) / d times its estimate of what the contact moves, so about (1 - d) / d of the change is missing at
-// first and comes back within some of the contact's time constants, critically damped. At the start of
-// `offset` it is all of the residual: 1.33e-2, 1.33e-3, 1.33e-4 at d = 0.9, 0.99, 0.999, which is 5.5 (1 - d)
-// / d of the change of E_bar' tau' (the estimate for a wheel that carries the robot is that much too large).
-// kGive times (1 - d) / d is taken off the residuals.
-inline constexpr double kGive = 8.0;
-
-/// Distances are judged from a place between half of this and this ago, s.
-inline constexpr double kSlipWindow = 10.0;
-/// f_t / m up to which a fingertip may creep, m/s^2: 10 N on a phalanx of 50 g. `hold` has 6.
-inline constexpr double kTipLoad = 200.0;
-/// Its creep over the time step, m/s^2, with the shipped plant's impedance and impratio.
-inline constexpr double kTipCreep = (1.0 - 0.99) / 100.0 * kTipLoad;
-/// Acceleration v w in a curve up to which tyres may give, m/s^2. `curve` has 0.03.
-inline constexpr double kSideways = 0.1;
-// Bounds of the law. The engine's terms agree with the model's to some 1e-15 of their scales; the
-// pseudoinverses of (47), (49) multiply that by the condition number, which is divided out, and are formed
-// from Gram matrices, which have its square. Measured 6e-16 in `curve`, on a condition number of some tens.
-inline constexpr double kLawTorqueBound = 1e-12;
-// Where contacts slip, (47) plans for xi_c and the rigid system starts from xi: C_bar' (xi - xi_c) and
-// J_dot (xi - xi_c) stay, slip speeds of some 1e-6 m/s against rates of the order of 1/s: measured 8e-10 in
-// `curve`.
-inline constexpr double kLawDemandBound = 1e-8;
-// Slope of the grasp-force objective, relative: ten times the tolerance of the solver's slacks.
-inline constexpr double kGraspForceBound = 1e-4;
-// A torque goes through the gear's ratio once and back: two roundings.
-inline constexpr double kTorqueAppliedBound = 1e-14;
-// A wheel that rolls and does not slip has the speed of the platform above it, but for how fast the platform
-// tilts or sinks on soft tyres: its tilt of at most 1e-5 rad within some ms, at an arm of r. Softer tyres
-// sink farther: the bound is a multiple of this as their sinking is of the shipped plant's.
-inline constexpr double kRollingBound = 1e-5;
-// What is left of (48) is compared less the inertia of what the platform does on soft tyres besides rolling,
-// less what the solver left over, and less what tilt and slip can come to (StepChecks::CalcUnevenForce). Then
-// all of it is rounding of the engine's terms, 1e-14 of forces that cancel, and products of small departures:
-// 1e-5 rad of tilt times 1e-2 of the forces that change with it.
-inline constexpr double kBalanceRobotBound = 1e-6;
-// What law_demand leaves, over K_p: measured 1.2e-9 m in `curve`.
-inline constexpr double kErrorDynamicsBound = 1e-8;
-inline constexpr double kOrientationDynamicsBound = 1e-7;
-// Rounding of torques, over the least inertia that they drive and over K_p: measured 1e-14 for the Panda.
-inline constexpr double kJointDynamicsBound = 1e-11;
-
 /// What explains what: of the failed checks, those of the first of these ranks tell why, however late they
 /// failed.
 enum class Rank {
@@ -148,8 +90,11 @@ struct StepCheckInfo {
   const char* name;
   CheckKind kind;
   const char* unit;
-  double bound;
-  const char* description;
+  double bound;  ///< With the shipped plant and gains.
+  Scaling scaling = Scaling::kNone;
+  const char* formula = "";  ///< Of the bound, and why it is that; the table in README.md.
+  const char* reason = "";
+  const char* description = "";
   FailureMeaning meaning = {};
   /// The same for fingertips that hang on bonds; empty where that question has no meaning.
   const char* bonded_description = description;
@@ -162,6 +107,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "1",
      .bound = 1.0 - 1e-9,
+     .formula = "1 - 1e-9",
+     .reason = "an error that settles within 1e9 steps",
      .description = "largest eigenvalue of (57) with the scenario's gains, sampled as the controller does it",
      .meaning = {.cause = Cause::kControlLaw, .precedence = 14, .is_own = true, .rank = Rank::kLaw}},
     {.check = StepCheck::kTold,
@@ -169,6 +116,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "1",
      .bound = 0.0,
+     .formula = "0",
+     .reason = "copied, or computed twice from the same numbers",
      .description =
          "what the controller is told of the state against what is so, beyond what the scenario asks for",
      .meaning = {.cause = Cause::kSensing, .precedence = 15, .is_own = true, .rank = Rank::kTold}},
@@ -177,6 +126,9 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "1",
      .bound = kLawTorqueBound,
+     .formula = "1e-12",
+     .reason = "rounding of the terms, 1e-15, through Gram matrices of condition number^2; the condition "
+               "number is divided out",
      .description =
          "tau' sent against (53)-(55) computed from the engine's terms, relative to the forces balanced and "
          "to the condition number of J_B'",
@@ -186,6 +138,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "1",
      .bound = kLawDemandBound,
+     .formula = "1e-8 + 10 slip forces",
+     .reason = "C_bar' (xi - xi_c) and M_bar' J^+ J_dot (xi - xi_c), which slip makes, are taken off",
      .description = "accelerations and contact forces of the rigid system (46), (48) under tau' against "
                     "those that (47), "
                     "(49), (55) demand, likewise",
@@ -195,6 +149,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "1",
      .bound = kGraspForceBound,
+     .formula = "10 slack_tolerance",
+     .reason = "a barrier solution is optimal to the tolerance of the solver's slacks",
      .description = "F_N by its certificate: in null(G), in the cones, optimal; each over its tolerance",
      .meaning = {.cause = Cause::kControlLaw, .precedence = 18, .is_own = true, .rank = Rank::kLaw}},
     {.check = StepCheck::kTorqueApplied,
@@ -202,6 +158,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "1",
      .bound = kTorqueAppliedBound,
+     .formula = "1e-14",
+     .reason = "a gear's ratio, once and back: two roundings",
      .description = "torques that the joints received against those that were sent, relative to the largest",
      .meaning = {.cause = Cause::kActuator, .precedence = 19, .is_own = true, .rank = Rank::kActuator}},
     {.check = StepCheck::kErrorDynamics,
@@ -209,6 +167,9 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "m",
      .bound = kErrorDynamicsBound,
+     .scaling = Scaling::kPositionGain,
+     .formula = "4e-6 m/s^2 / K_p",
+     .reason = "what law_demand leaves is held by K_p alone",
      .description =
          "object's position against (57) integrated beside the run, driven by the accelerations that the "
          "prediction missed",
@@ -218,6 +179,9 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "rad",
      .bound = kOrientationDynamicsBound,
+     .scaling = Scaling::kOrientationGain,
+     .formula = "4e-5 rad/s^2 / K_p",
+     .reason = "likewise",
      .description = "object's orientation likewise",
      .meaning = {.cause = Cause::kUnexplained, .precedence = 28, .rank = Rank::kResidual}},
     {.check = StepCheck::kExpectPosition,
@@ -225,6 +189,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "m",
      .bound = 0.0,
+     .formula = "[expect] position",
+     .reason = "what the scenario means",
      .description = "object's position error, against what the scenario expects",
      .meaning = {.cause = Cause::kControlLaw, .precedence = 21, .rank = Rank::kResidual}},
     {.check = StepCheck::kExpectOrientation,
@@ -232,6 +198,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "rad",
      .bound = 0.0,
+     .formula = "[expect] orientation",
+     .reason = "what the scenario means",
      .description = "object's orientation error, against what the scenario expects",
      .meaning = {.cause = Cause::kControlLaw, .precedence = 22, .rank = Rank::kResidual}},
     {.check = StepCheck::kJointDynamics,
@@ -239,6 +207,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "rad",
      .bound = kJointDynamicsBound,
+     .formula = "1e-11",
+     .reason = "rounding of torques, over the least inertia that they drive and over K_p",
      .description = "joints against e_ddot + K_v e_dot + K_p e = 0 integrated beside the run, driven by the "
                     "accelerations that the prediction missed",
      .meaning = {.cause = Cause::kUnexplained, .precedence = 29, .rank = Rank::kResidual}},
@@ -247,6 +217,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "rad",
      .bound = 0.0,
+     .formula = "[expect] joints",
+     .reason = "what the scenario means",
      .description = "largest error of a joint (rad or m), against what the scenario expects",
      .meaning = {.cause = Cause::kControlLaw, .precedence = 30, .rank = Rank::kResidual}},
     {.check = StepCheck::kBalanceRobot,
@@ -254,6 +226,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kBalance,
      .unit = "1",
      .bound = kBalanceRobotBound,
+     .formula = "1e-6 + (g tilt + 2 slip w) sqrt(m) + f_t r_sunk / (2 r)",
+     .reason = "rounding of forces that cancel; the state that is judged is level and does not slip",
      .description = "what is left of (48) with the engine's accelerations and contact forces, less what the "
                     "platform does besides and its solver left over, against the forces balanced",
      .meaning = {.cause = Cause::kUnmodelledForce, .precedence = -1, .rank = Rank::kDecisive}},
@@ -265,6 +239,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kBalance,
      .unit = "1",
      .bound = 1e-9,
+     .formula = "1e-9",
+     .reason = "rounding of the object's terms",
      .description = "what is left of (19) with the engine's acceleration and contact forces, less what its "
                     "solver left over, against the contact forces",
      .meaning = {.cause = Cause::kUnmodelledForce, .precedence = 24, .rank = Rank::kObjectBalance}},
@@ -272,14 +248,19 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "reduced_acceleration",
      .kind = CheckKind::kPrediction,
      .unit = "1",
-     .bound = 1e-5,
+     .bound = 1e-6,
+     .formula = "1e-6 + give",
+     .reason = "what contacts hold back of forces that change, computed at each step; the rest is of second "
+               "order in tilt and slip",
      .description = "xi_dot of the rigid constrained system (46), (48) against the engine's",
      .meaning = {.cause = Cause::kContactSoftness, .precedence = 25, .rank = Rank::kPrediction}},
     {.check = StepCheck::kContactForce,
      .name = "contact_force",
      .kind = CheckKind::kPrediction,
      .unit = "1",
-     .bound = 1e-6,
+     .bound = 1e-7,
+     .formula = "1e-7 + give",
+     .reason = "likewise",
      .description = "f_c of the rigid constrained system against the engine's, relative to |f_c|",
      .meaning = {.cause = Cause::kContactSoftness, .precedence = 26, .rank = Rank::kPrediction}},
     // Slip and use of the cone tell sliding from contacts that merely give.
@@ -287,7 +268,10 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "fingertip_slip",
      .kind = CheckKind::kAssumption,
      .unit = "m",
-     .bound = 2e-4,
+     .bound = kSlipWindow * kShippedCreep,
+     .scaling = Scaling::kCreep,
+     .formula = "10 s (1 - d) dt 2 m/s^2",
+     .reason = "the rate below, over the window",
      .description = "how far a fingertip has slipped on the object in the last 5 to 10 s",
      .meaning =
          {.cause = Cause::kContactSoftness, .precedence = 6, .is_own = true, .sharper = StepCheck::kConeUse},
@@ -296,7 +280,10 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "fingertip_slip_rate",
      .kind = CheckKind::kAssumption,
      .unit = "m/s",
-     .bound = kTipCreep,  // times the time step
+     .bound = kShippedCreep,
+     .scaling = Scaling::kCreep,
+     .formula = "(1 - d) dt 2 m/s^2 + dt J_dot qvel",
+     .reason = "creep of a contact that sticks under f_t / m of 200 m/s^2, over an impratio of 100",
      .description =
          "how fast a fingertip slips on the object, less what (46) and the engine's constraint differ by",
      .meaning =
@@ -306,7 +293,10 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "wheel_slip",
      .kind = CheckKind::kAssumption,
      .unit = "m",
-     .bound = 1e-3,
+     .bound = kSlipWindow * kShippedLag,
+     .scaling = Scaling::kLag,
+     .formula = "10 s dt 0.1 m/s^2",
+     .reason = "the rate below, over the window",
      .description = "how far a wheel has slipped on the floor in the last 5 to 10 s, (1)",
      .meaning = {.cause = Cause::kContactSoftness,
                  .precedence = 8,
@@ -316,7 +306,10 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "wheel_slip_rate",
      .kind = CheckKind::kAssumption,
      .unit = "m/s",
-     .bound = kSideways,  // times the time step
+     .bound = kShippedLag,
+     .scaling = Scaling::kLag,
+     .formula = "dt 0.1 m/s^2",
+     .reason = "tyres give sideways by v w / b, of v w up to 0.1 m/s^2",
      .description = "how fast a wheel slips on the floor",
      .meaning = {.cause = Cause::kContactSoftness,
                  .precedence = 9,
@@ -326,7 +319,11 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "rolling",
      .kind = CheckKind::kAssumption,
      .unit = "m/s",
-     .bound = kRollingBound,
+     .bound = kShippedSoftness * kShippedTimeConstant * kRollLoad,
+     .scaling = Scaling::kSinkingRate,
+     .formula = "(1 - d) tc 0.5 m/s^2 + slip + sinking",
+     .reason =
+         "a platform that sinks or tilts on soft tyres; how fast it does under changing torques is computed",
      .description = "speed of a wheel's rim against that of the platform above it, less its slip, (1)",
      .meaning = {.cause = Cause::kWheelGeometry, .precedence = 27, .is_own = true, .rank = Rank::kDecisive}},
     {.check = StepCheck::kConeUse,
@@ -334,6 +331,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kAssumption,
      .unit = "1",
      .bound = 0.99,
+     .formula = "0.99",
+     .reason = "1 slides",
      .description = "tangential force over mu times normal force at a fingertip; 1 slides, (21)",
      .meaning = {.cause = Cause::kFingertipSlip, .precedence = 2, .is_own = true, .rank = Rank::kDecisive},
      .bonded_description = ""},
@@ -342,6 +341,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kAssumption,
      .unit = "1",
      .bound = 0.99,
+     .formula = "0.99",
+     .reason = "1 slides",
      .description = "tangential force over mu times normal force at a wheel; 1 spins or skids",
      .meaning = {.cause = Cause::kWheelSlip, .precedence = 3, .is_own = true, .rank = Rank::kDecisive}},
     {.check = StepCheck::kContactsLost,
@@ -349,6 +350,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kAssumption,
      .unit = "1",
      .bound = 0.0,
+     .formula = "0",
+     .reason = "none",
      .description = "fingertips that do not touch the object",
      .meaning = {.cause = Cause::kFingertipSlip, .precedence = 4, .is_own = true, .rank = Rank::kDecisive},
      .bonded_description = ""},
@@ -356,7 +359,10 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "penetration",
      .kind = CheckKind::kAssumption,
      .unit = "m",
-     .bound = 2e-5,
+     .bound = kShippedSinking * kTipPress,
+     .scaling = Scaling::kSinking,
+     .formula = "4 (1 - d) dt^2 500 m/s^2",
+     .reason = "the overlap at rest under f_n / m of 500 m/s^2",
      .description = "overlap of fingertip and object",
      .meaning = {.cause = Cause::kContactSoftness, .precedence = 5, .is_own = true},
      .bonded_description = ""},
@@ -364,16 +370,22 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "kappa",
      .kind = CheckKind::kAssumption,
      .unit = "m",
-     .bound = 2e-4,
-     .description =
-         "contact point on the object: kappa integrated by (40) over the last 5 to 10 s against the engine's",
+     .bound = kSlipWindow * kShippedCreep,
+     .scaling = Scaling::kCreep,
+     .formula = "as fingertip_slip",
+     .reason = "contact coordinates leave (40) by as much as fingertips slip",
+     .description = "kappa integrated by (40) over the last 5 to 10 s against the engine's: points on object "
+                    "and fingertip, psi at its radius",
      .meaning = {.cause = Cause::kContactSoftness, .precedence = 10},
      .bonded_description = ""},
     {.check = StepCheck::kBaseTilt,
      .name = "base_tilt",
      .kind = CheckKind::kAssumption,
      .unit = "rad",
-     .bound = 1e-5,
+     .bound = kShippedSinking * kTiltLoad,
+     .scaling = Scaling::kSinking,
+     .formula = "4 (1 - d) dt^2 250 / s^2",
+     .reason = "tyres that sink under loads of 100 m/s^2 at an arm of 0.4 m",
      .description = "angle of the platform against the vertical",
      .meaning = {.cause = Cause::kTilt, .precedence = 13}},
     {.check = StepCheck::kIdleJoints,
@@ -381,6 +393,9 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kAssumption,
      .unit = "rad",
      .bound = 1e-5,
+     .scaling = Scaling::kPosture,
+     .formula = "(1 - d) dt^2 1e5 rad/s^4 / omega_p^2",
+     .reason = "what the posture task's stiffness leaves of accelerations that soft contacts make",
      .description = "movement since t = 0 of joints that do not carry the object"},
     // As small as the discrepancies that the prediction is judged by. Forces that do not fit the motion
     // explain whatever
@@ -390,6 +405,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kAssumption,
      .unit = "1",
      .bound = 1e-5,
+     .formula = "1e-5",
+     .reason = "as small as what the prediction is judged by",
      .description = "what the engine's solver left over of its own equations of motion, of the object as "
                     "balance_object, of the robot as balance_robot",
      .meaning = {.cause = Cause::kSolver, .precedence = -4, .is_own = true, .rank = Rank::kDecisive}},
@@ -398,6 +415,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kAssumption,
      .unit = "rad",
      .bound = 0.0,
+     .formula = "0",
+     .reason = "a stop pushes",
      .description = "how far a joint is beyond its range, where a stop pushes that the model does not have",
      .meaning = {.cause = Cause::kJointStop, .precedence = -2, .is_own = true, .rank = Rank::kDecisive}},
     // The fingers of one hand touch within some hundredths of a second, kTransient each at the most.
@@ -406,14 +425,17 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kAssumption,
      .unit = "s",
      .bound = 5.0 * kTransient,
-     .description = "how long in one go contacts have come and gone, so that balance and prediction were not "
-                    "judged",
+     .formula = "0.25 s",
+     .reason = "five transients: the fingers of one hand touch within some hundredths of a second",
+     .description = "how long in one go contacts have come and gone, so that the prediction was not judged",
      .meaning = {.cause = Cause::kContactSoftness, .precedence = 11}},
     {.check = StepCheck::kActuators,
      .name = "actuator_effort",
      .kind = CheckKind::kAssumption,
      .unit = "1",
      .bound = 1.0,
+     .formula = "1",
+     .reason = "the motor's limit",
      .description = "|tau'| over the motor's limit",
      .meaning = {.cause = Cause::kActuatorLimit, .precedence = -3, .is_own = true, .rank = Rank::kDecisive}},
 };

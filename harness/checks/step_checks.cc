@@ -7,6 +7,8 @@
 
 #include "controller/common/text.h"
 #include "controller/contact/rolling.h"
+#include "harness/checks/bounds.h"
+#include "harness/checks/contact_give.h"
 #include "harness/checks/known_plant.h"
 
 namespace dexcheck {
@@ -31,20 +33,22 @@ void FollowCharts(const Surface& tip, const Surface& object, const ContactCoordi
   *integrated = ChangeCharts(tip, object, *integrated, tip_chart, object_chart);
 }
 
+/// How far integrated and measured contact are apart, m: the point on the object, the point on the fingertip,
+/// and psi at the fingertip's radius. The largest of them.
+double CalcDrift(const Surface& tip, const Surface& object, const ContactCoordinates& integrated,
+                 const ContactCoordinates& measured) {
+  const auto apart = [](const Surface& surface, const SurfacePoint& a, const SurfacePoint& b) {
+    return (surface.Evaluate(a).p - surface.Evaluate(b).p).norm();
+  };
+  const double turned = std::abs(std::remainder(integrated.psi - measured.psi, 2.0 * M_PI));
+  return std::max({apart(object, integrated.alpha_o, measured.alpha_o),
+                   apart(tip, integrated.alpha_f, measured.alpha_f),
+                   turned * tip.Evaluate(measured.alpha_f).p.norm()});
+}
+
 /// Null for none.
 const Vector6d* PushOf(const StepRecord& step) {
   return step.known != nullptr ? &step.known->object_wrench : nullptr;
-}
-
-/// How far tyres sink, as a multiple of what they do with the shipped plant's stiffness; at least 1. A
-/// contact of time constant tc and impedance d under a load f of mass m gives way by tc^2 (1 - d) / d f / m.
-double CalcSinking(const PlantOptions& plant) {
-  const PlantOptions shipped;
-  const auto sink = [](const PlantOptions& of) {
-    const double tc = of.contact_time_constant > 0.0 ? of.contact_time_constant : 2.0 * of.time_step;
-    return tc * tc * (1.0 - of.contact_impedance) / of.contact_impedance;
-  };
-  return std::max(1.0, sink(plant) / sink(shipped));
 }
 
 }  // namespace
@@ -59,6 +63,7 @@ StepChecks::StepChecks(const Setup& setup)
       dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())),
       actuation_(setup.model()),
       time_step_(setup.scenario().plant.time_step),
+      give_(std::make_unique<PredictionGive>(setup)),
       forces_(setup.model()),
       wheels_(setup.model().base()) {
   DefineChecks();
@@ -80,6 +85,8 @@ StepChecks::StepChecks(const Setup& setup)
   next_kappa_ = kappa_;
 }
 
+StepChecks::~StepChecks() = default;
+
 void StepChecks::DefineChecks() {
   const bool bonded = !setup_->bonds().empty();
   for (const StepCheckInfo& info : kStepChecks) {
@@ -87,15 +94,12 @@ void StepChecks::DefineChecks() {
     check.name = info.name;
     check.kind = info.kind;
     check.unit = info.unit;
-    check.bound = info.bound;
+    check.bound = CalcBound(info, setup_->scenario());
     check.description =
         bonded && *info.bonded_description != '\0' ? info.bonded_description : info.description;
     check.applies = !bonded || *info.bonded_description != '\0';
     checks_.push_back(check);
   }
-  check(StepCheck::kFingertipSlipRate).bound *= time_step_;
-  check(StepCheck::kWheelSlipRate).bound *= time_step_;
-  check(StepCheck::kRolling).bound *= CalcSinking(setup_->scenario().plant);
   SetApplying();
   const Expectation& expect = setup_->scenario().expect;
   check(StepCheck::kExpectPosition).bound = expect.position.value_or(0.0);
@@ -167,13 +171,10 @@ void StepChecks::Compare(const StepRecord& step) {
   if (unjudged && !is_unjudged_) unjudged_since_ = time_;
   is_unjudged_ = unjudged;
   Add(StepCheck::kUnjudged, unjudged ? time_ - unjudged_since_ : 0.0);
-  if (unjudged) {
-    ++findings_.unjudged_steps;
-  } else {
-    CompareDynamics(step);
-    CompareObject(step);
-    KeepForces(step);
-  }
+  if (unjudged) ++findings_.unjudged_steps;
+  CompareDynamics(step);
+  CompareObject(step);
+  KeepForces(step);
   if (handling.holding && !was_holding_) ForgetSlip();
   was_holding_ = handling.holding;
   MoveWindows(step.reading.state);
@@ -254,7 +255,7 @@ void StepChecks::Predict(const StepRecord& step) {
   findings_.xi_dot_model = prediction->xi_dot;
   findings_.V_Bo_dot_model = prediction->V_Bo_dot;
   findings_.f_c_model = prediction->f_c;
-  mass_factor_ = &dynamics_.mass_factor();
+  predicted_by_ = &dynamics_;
 }
 
 void StepChecks::PredictPart(const StepRecord& step) {
@@ -268,7 +269,7 @@ void StepChecks::PredictPart(const StepRecord& step) {
   findings_.xi_dot_model = prediction.xi_dot;
   findings_.V_Bo_dot_model = prediction.V_Bo_dot;
   part->grasp.Scatter(prediction.f_c, findings_.f_c_model);
-  mass_factor_ = &part->dynamics.mass_factor();
+  predicted_by_ = &part->dynamics;
 }
 
 void StepChecks::CompareDynamics(const StepRecord& step) {
@@ -276,52 +277,64 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   const VectorXd& xi_dot = step.response.xi_dot;
   actuation_.CalcForce(step.drive.tau, force_);
   if (step.known != nullptr) force_ += step.known->force;
-  Predict(step);
+  // Soft contacts become only in some milliseconds what rigid ones are at once.
+  if (!is_unjudged_) Predict(step);
+  if (mass_factor() == nullptr) return;
 
   // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
-  bias_ = robot.coriolis() + robot.gravity() + robot.friction();
+  if (is_unjudged_) {
+    bias_ = robot.gravity() + robot.friction();
+    bias_.noalias() += robot.C() * robot.velocity();
+  } else {
+    bias_ = predicted_by_->bias();
+  }
   residual_ = bias_ - force_;
   residual_.noalias() += robot.M() * xi_dot;
   residual_.noalias() += ModelAtTruth(step).grasp().J_B().transpose() * findings_.f_c;
   if (step.response.departure_force.size() > 0) residual_ += step.response.departure_force;
   if (step.response.solver_force.size() > 0) residual_ -= step.response.solver_force;
+  if (step.response.wheels.size() == 2) AddSpin(step);
   left_of_robot_ = residual_;
-  const auto norm = [&](const VectorXd& f) { return mass_factor_->CalcForceNorm(f, &work_); };
-  const double scale = std::max(norm(bias_), std::numeric_limits<double>::min());
-  scale_ = scale;
-  const double left = norm(residual_);
+  scale_ = std::max(Norm(bias_), std::numeric_limits<double>::min());
+  const double left = Norm(residual_);
   Add(StepCheck::kBalanceRobot,
-      std::isnan(left) ? left : std::max(0.0, left - CalcUnevenForce(step)) / scale);
-  solver_of_robot_ = step.response.solver_force.size() > 0 ? norm(step.response.solver_force) / scale : 0.0;
-  if (force_before_.size() == force_.size()) {
-    bias_ = force_ - force_before_;
-    AddGive(norm(bias_) / scale, &robot_give_);
-  }
-  force_before_ = force_;
+      std::isnan(left) ? left : std::max(0.0, left - CalcUnevenForce(step)) / scale_);
+  solver_of_robot_ = step.response.solver_force.size() > 0 ? Norm(step.response.solver_force) / scale_ : 0.0;
+  bias_ -= force_;
+  const double uneven = CalcUnevenForce(step);
+  give_->Follow(step, bias_, findings_.f_c_model, uneven, [this](const VectorXd& f) { return Norm(f); });
 
-  if (step.known != nullptr && f_c_before_.size() == findings_.f_c_model.size()) {
-    // A push changes contact forces without any torque, and wheels give to it as well.
-    const MatrixXd& J_B = ModelAtTruth(step).grasp().J_B();
-    bias_.noalias() = J_B.transpose() * findings_.f_c_model;
-    bias_.noalias() -= J_B.transpose() * f_c_before_;
-    AddGive(norm(bias_) / scale, &push_give_);
-    // What pushes sideways is held by tyres, and no part of a force on xi: |f|_M^-1 of a force on all masses.
-    AddGive((step.known->push - push_before_).norm() / std::sqrt(mass_) / scale, &edge_give_);
-    push_before_ = step.known->push;
-  }
-
+  if (is_unjudged_) return;
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
-  mass_factor_->Multiply(residual_);
-  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale,
-              robot_give_ + push_give_ + edge_give_);
+  mass_factor()->Multiply(residual_);
+  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale_, give_->motion() / scale_);
   double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) force_scale = std::max(force_scale, Weight());
-  const VectorXd& f_c = findings_.f_c_model;
-  if (f_c_before_.size() == f_c.size()) AddGive((f_c - f_c_before_).norm() / force_scale, &force_give_);
-  f_c_before_ = f_c;
-  AddLessGive(StepCheck::kContactForce, (f_c - findings_.f_c).norm() / force_scale, force_give_ + edge_give_);
+  const double apart = (findings_.f_c_model - findings_.f_c).norm();
+  AddLessGive(StepCheck::kContactForce, apart / force_scale, give_->force() / force_scale);
+}
+
+double StepChecks::Norm(const VectorXd& force) { return mass_factor()->CalcForceNorm(force, &work_); }
+
+Vector2d StepChecks::ReadWheelRates(const StepRecord& step) const {
+  const std::vector<EngineWheel>& wheels = setup_->adapter().wheels();
+  return {wheels[0].axis.y() * step.reading.qvel[wheels[0].dof],
+          wheels[1].axis.y() * step.reading.qvel[wheels[1].dof]};
+}
+
+void StepChecks::AddSpin(const StepRecord& step) {
+  // r (thetadot - thetadot of a wheel that rolls) is what is left of (1), the other way round.
+  const Vector2d mismatch = wheels_.CalcMismatch(step.reading.state.xi, ReadWheelRates(step));
+  left_of_robot_.setZero();
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    const double damping =
+        setup_->engine().dof_damping[setup_->adapter().wheels()[static_cast<size_t>(k)].dof];
+    left_of_robot_[k] = -damping * mismatch[k] / setup_->model().base().wheel_radius;
+  }
+  actuation_.CalcForce(left_of_robot_, left_of_robot_);
+  residual_ += left_of_robot_;
 }
 
 double StepChecks::CalcUnevenForce(const StepRecord& step) const {
@@ -332,15 +345,17 @@ double StepChecks::CalcUnevenForce(const StepRecord& step) const {
   const double turn = step.reading.state.q.size() > 0 && !step.response.wheels.empty()
                           ? std::abs(wheels_.CalcTurn(step.reading.state.xi))
                           : 0.0;
-  return (setup_->model().gravity().norm() * step.reading.departure.tilt + 2.0 * slip * turn) *
-         std::sqrt(mass_);
-}
-
-void StepChecks::AddGive(double change, double* give) const {
-  const PlantOptions& plant = setup_->scenario().plant;
-  const double constant = plant.contact_time_constant > 0.0 ? plant.contact_time_constant : 2.0 * time_step_;
-  *give *= std::exp(-0.5 * time_step_ / constant);
-  *give += kGive * (1.0 - plant.contact_impedance) / plant.contact_impedance * change;
+  const double g = setup_->model().gravity().norm();
+  // Traction acts in the middle of how far a tyre has sunk, and not at the whole radius: f_t / r times half
+  // of that, with the robot's weight on a floor of mu <= 1.
+  double sunk = 0.0;
+  for (const BodyContact& wheel : step.response.wheels)
+    sunk += std::max(0.0, -0.5 * wheel.distance) * wheel.cone_use;
+  if (sunk > 0.0) {
+    sunk *=
+        mass_ * g / setup_->model().base().wheel_radius / std::sqrt(setup_->model().base_with_wheels().mass);
+  }
+  return (g * step.reading.departure.tilt + 2.0 * slip * turn) * std::sqrt(mass_) + sunk;
 }
 
 void StepChecks::AddLessGive(StepCheck which, double residual, double give) {
@@ -375,17 +390,15 @@ void StepChecks::KeepForces(const StepRecord& step) {
   const auto fails = [&](StepCheck which) {
     return check(which).applies && !(check(which).last <= check(which).bound);
   };
+  if (mass_factor() == nullptr) return;
   if (!fails(StepCheck::kBalanceRobot) && !fails(StepCheck::kBalanceObject)) return;
-  forces_.Add(left_of_robot_, left_of_object_, ModelAtTruth(step), step.reading.state.q, *mass_factor_,
+  forces_.Add(left_of_robot_, left_of_object_, ModelAtTruth(step), step.reading.state.q, *mass_factor(),
               scale_);
 }
 
 void StepChecks::CompareRolling(const StepRecord& step) {
   const VectorXd& xi = step.reading.state.xi;
-  const std::vector<EngineWheel>& wheels = setup_->adapter().wheels();
-  Vector2d rates;
-  for (size_t k = 0; k < 2; ++k)
-    rates[static_cast<Eigen::Index>(k)] = wheels[k].axis.y() * step.reading.qvel[wheels[k].dof];
+  const Vector2d rates = ReadWheelRates(step);
   const Vector2d mismatch = wheels_.CalcMismatch(xi, rates);
   double beyond = 0.0;
   for (size_t k = 0; k < 2; ++k) {
@@ -394,6 +407,8 @@ void StepChecks::CompareRolling(const StepRecord& step) {
     const double sunk = std::max(0.0, -wheel.distance) * std::abs(rates[static_cast<Eigen::Index>(k)]);
     beyond = std::max(beyond, std::abs(mismatch[static_cast<Eigen::Index>(k)]) - wheel.slip.norm() - sunk);
   }
+  // So does one whose platform sinks or tilts while the tyres give to a force that changes.
+  beyond = std::max(0.0, beyond - give_->sinking());
   Add(StepCheck::kRolling, beyond);
   if (!(beyond <= check(StepCheck::kRolling).bound)) wheels_.Add(xi, rates);
 }
@@ -495,9 +510,7 @@ void StepChecks::CompareKappa(const StepRecord& step) {
       FollowCharts(tip, grasp.surface(), state.kappa[i], &kappa);
       kappa = NormalizeContact(tip, grasp.surface(), Displace(kappa, change));
     }
-    const Vector3d integrated = grasp.surface().Evaluate(kappa_[i].alpha_o).p;
-    const Vector3d measured = grasp.surface().Evaluate(state.kappa[i].alpha_o).p;
-    apart = std::max(apart, (integrated - measured).norm());
+    apart = std::max(apart, CalcDrift(tip, grasp.surface(), kappa_[i], state.kappa[i]));
   }
   has_kappa_ = true;
   Add(StepCheck::kKappa, apart);

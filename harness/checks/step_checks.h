@@ -24,16 +24,21 @@
 
 namespace dexcheck {
 
+class PredictionGive;
+
 /// Balance, prediction and assumptions. Nothing allocates after construction, except where a task's set of
 /// contacts comes up for the first time.
 ///
 /// Of a task each step is predicted with the contacts that it has: (46) for the fingertips that touch, and an
 /// object that does not move while it lies on something. For kTransient after a contact has come, gone or
-/// been let go, balance and prediction are not judged. How long that lasts in one go is a check itself.
+/// been let go, the prediction is not judged. How long that lasts in one go is a check itself.
 class StepChecks {
  public:
   /// @throws InputError when a bound of the scenario has the name of no check.
   explicit StepChecks(const Setup& setup);
+  ~StepChecks();
+  StepChecks(const StepChecks&) = delete;
+  StepChecks& operator=(const StepChecks&) = delete;
   /// Whether the scenario's bounds are those of checks, for a run that makes none. @throws InputError.
   static void RequireKnownBounds(const Scenario& scenario);
 
@@ -44,7 +49,9 @@ class StepChecks {
   /// Takes checks out that this run cannot answer.
   void LeaveOut(StepCheck which) { check(which).applies = false; }
   /// M_bar' = L^T L of the last step that was judged; null before.
-  [[nodiscard]] const TreeFactor* mass_factor() const { return mass_factor_; }
+  [[nodiscard]] const TreeFactor* mass_factor() const {
+    return predicted_by_ != nullptr ? &predicted_by_->mass_factor() : nullptr;
+  }
 
   /// Adds the largest |tau'| / limit of a motor: before the step, which does not come when that is above 1.
   void JudgeEffort(double effort, double time) { check(StepCheck::kActuators).Add(effort, time); }
@@ -78,12 +85,16 @@ class StepChecks {
   void Predict(const StepRecord& step);
   void PredictPart(const StepRecord& step);
   void CompareDynamics(const StepRecord& step);
+  /// Adds the friction of wheels that spin, which (48) has at the rates of (1).
+  void AddSpin(const StepRecord& step);
+  /// Rates of the right and left wheel, rad/s.
+  [[nodiscard]] Vector2d ReadWheelRates(const StepRecord& step) const;
   /// Largest force, in |.|_M^-1, that comes of the platform's tilt and of the tyres' slip.
   [[nodiscard]] double CalcUnevenForce(const StepRecord& step) const;
-  /// Adds a change, relative, to what contacts give; see kGive.
-  void AddGive(double change, double* give) const;
   /// The residual as it is up to the bound, and above it less what contacts give.
   void AddLessGive(StepCheck which, double residual, double give);
+  /// |f|_M^-1 = |L^-T f|
+  [[nodiscard]] double Norm(const VectorXd& force);
   void CompareObject(const StepRecord& step);
   /// Keeps what the balances leave, when one of them fails.
   void KeepForces(const StepRecord& step);
@@ -101,7 +112,7 @@ class StepChecks {
   StepFindings findings_;
   ConstrainedDynamics dynamics_;
   ActuationMap actuation_;
-  const TreeFactor* mass_factor_ = nullptr;
+  const ConstrainedDynamics* predicted_by_ = nullptr;  // of the last step that was judged
   std::map<ContactSet, std::unique_ptr<PartialDynamics>> parts_;
   Handling handling_;
   ContactSet touching_ = 0;
@@ -117,15 +128,9 @@ class StepChecks {
   long steps_ = 0;
   double time_step_ = 0.0;
   double time_ = 0.0;
-  VectorXd force_, bias_, residual_;    // n
-  VectorXd force_before_, f_c_before_;  // n, 3N: of the last step that was judged; empty before
-  double robot_give_ =
-      0.0;  // what contacts give for changes of E_bar' tau', relative as reduced_acceleration
-  // Likewise for changes of J_B'^T f_c, and of pushes on the robot; zero where the plant is ideal.
-  double push_give_ = 0.0, edge_give_ = 0.0;
-  Vector3d push_before_ = Vector3d::Zero();  // N
-  double force_give_ = 0.0;                  // likewise of f_c, relative as contact_force
-  VectorXd work_;                            // n
+  VectorXd force_, bias_, residual_;  // n
+  std::unique_ptr<PredictionGive> give_;
+  VectorXd work_;  // n
   ForceEvidence forces_;
   WheelEvidence wheels_;
   VectorXd left_of_robot_;  // n, of the step's balance

@@ -53,7 +53,7 @@ void AddEvalCommand(Command app) {
       .Needs(robot);
   command
       .AddOption("--state", &request->state_file,
-                 "JSON with q, xi; optionally object, kappa or contact_points, fingers, mu")
+                 "JSON with q, xi; optionally object, kappa or contact_points, fingers, mu, law")
       .TypeName("STATE.json")
       .Required();
   command.AddOption("--out", &request->out, "File to write (- for standard output)")

@@ -13,6 +13,7 @@
 #include "controller/contact/shapes.h"
 #include "controller/grasp/force_closure.h"
 #include "controller/object/euler_zyz.h"
+#include "harness/cli/eval_law.h"
 #include "harness/cli/json_matrix.h"
 
 namespace dexcheck::cli {
@@ -93,6 +94,7 @@ void AddContactTerms(const ModelTerms& terms, const State& state, Json* out) {
   const auto count = static_cast<Eigen::Index>(contacts.fingertips.size());
   const int n = terms.size();
   std::vector<Contact> grasp;
+  std::vector<ContactCoordinates> coordinates;
   MatrixXd J_B(3 * count, n);
   MatrixXd J_B_dot(3 * count, n);
   Matrix6Xd J_f(6, n);
@@ -134,6 +136,7 @@ void AddContactTerms(const ModelTerms& terms, const State& state, Json* out) {
     }
     list.push_back(described);
     grasp.push_back(contact);
+    coordinates.push_back(kappa);
   }
   Matrix6Xd G(6, 3 * count);
   Matrix6Xd G_dot(6, 3 * count);
@@ -145,6 +148,7 @@ void AddContactTerms(const ModelTerms& terms, const State& state, Json* out) {
   (*out)["J_B_dot"] = ToRows(J_B_dot);
   (*out)["contacts"] = list;
   AddForceClosure(G, contacts.friction, out);
+  if (state.law) AddLawTerms(terms, state, *object, coordinates, out);
 }
 
 }  // namespace dexcheck::cli

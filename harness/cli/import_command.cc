@@ -4,8 +4,11 @@
 
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
+#include "harness/base/console.h"
+#include "harness/base/files.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
+#include "harness/engine/newer_mjcf.h"
 #include "harness/sides/parameter_writer.h"
 #include "harness/sides/read_description.h"
 #include "harness/sides/robot_file.h"
@@ -18,6 +21,7 @@ struct Request {
   std::string out = "-";
   std::vector<std::string> packages;
   bool floating = false;
+  bool downgrade = false;
 };
 
 RobotDescription ReadSource(const Request& request) {
@@ -30,7 +34,20 @@ RobotDescription ReadSource(const Request& request) {
   return ReadDescription(request.source, options);
 }
 
+/// A copy of a newer MJCF for MuJoCo 2.2.2.
+int WriteDowngraded(const Request& request) {
+  const DowngradedMjcf copy = DowngradeMjcf(ReadBytes(request.source), request.source.string());
+  OutputFile file(request.out);
+  file.Write(copy.text);
+  for (const MjcfChange& change : copy.changes) {
+    Warn(request.source.filename().string() + ":" + std::to_string(change.line) + ": " + change.word + ": " +
+         change.what);
+  }
+  return kSuccess;
+}
+
 int Run(const Request& request) {
+  if (request.downgrade) return WriteDowngraded(request);
   const RobotDescription robot = ReadSource(request);
   const std::string text = WriteParameters(robot, request.source.filename().string());
   // What cannot be read back must not be written: a name that is too long, for example.
@@ -47,13 +64,17 @@ void AddImportCommand(Command app) {
   Command command =
       app.AddCommand("import", "Write a parameter file (TOML) from a URDF or an MJCF, to start from");
   command.AddOption("FILE", &request->source, "URDF or MJCF").Required();
-  command.AddOption("--out", &request->out, "Parameter file to write (- for standard output)")
+  command.AddOption("--out", &request->out, "File to write (- for standard output)")
       .TypeName("FILE.toml")
       .ShowDefault();
   command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
       .TypeName("PATH")
       .Repeatable();
   command.AddFlag("--floating", &request->floating, "The root of a URDF floats");
+  command.AddFlag(
+      "--downgrade", &request->downgrade,
+      "Write an MJCF instead: a copy of a newer one for MuJoCo 2.2.2, without what has no effect on the "
+      "dynamics");
   command.SetAction([=] { return Run(*request); });
 }
 

@@ -20,6 +20,7 @@
 #include "harness/cli/shipped_files.h"
 #include "harness/engine/machine.h"
 #include "harness/report/write_report.h"
+#include "harness/run/half_step.h"
 #include "harness/run/run_recorder.h"
 #include "harness/run/runner.h"
 
@@ -104,18 +105,22 @@ int RunScenario(const Request& request) {
       },
       IsInterrupted);
   bar.Finish();
+  RunResult result = runner.result();
+  if (request.controller.empty()) {
+    LookForIntegrator(setup, runner.loop(), files.robot, files.mjcf, IsInterrupted, &result);
+  }
 
-  const std::string summary = MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n";
+  const std::string summary = MakeSummary(setup, runner.loop(), result).dump(2) + "\n";
   if (recorder) recorder->Close(summary);
   if (folder) OutputFile(folder->path() / "summary.json").Write(summary);
-  if (junit) junit->Write(WriteJUnit(setup, runner.loop(), runner.result()));
-  const ExitCode verdict = ToExitCode(runner.result());
+  if (junit) junit->Write(WriteJUnit(setup, runner.loop(), result));
+  const ExitCode verdict = ToExitCode(result);
   std::exception_ptr unprinted;
   try {
     if (request.json) {
       fmt::print("{}", summary);
     } else {
-      PrintRunReport(setup, runner.loop(), runner.result(), folder ? folder->path().string() : "",
+      PrintRunReport(setup, runner.loop(), result, folder ? folder->path().string() : "",
                      request.quiet ? Detail::kVerdict
                      : request.all ? Detail::kAll
                                    : Detail::kQuestions);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
+#include <iostream>
 #include <map>
 #include <memory>
 #include <string>
@@ -15,13 +16,14 @@
 #include "harness/base/interrupts.h"
 #include "harness/base/partial_file.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/slurm_script.h"
 #include "harness/cli/study_files.h"
+#include "harness/cli/study_read_commands.h"
 #include "harness/study/study_answer.h"
-#include "harness/study/study_report.h"
+#include "harness/study/study_progress.h"
 #include "harness/study/study_runner.h"
+#include "harness/study/study_server.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck::cli {
@@ -53,12 +55,6 @@ std::vector<Trial> SelectShard(const std::vector<Trial>& trials, const std::stri
   return shard;
 }
 
-void PrintOutcomes(const std::vector<TrialRow>& rows) {
-  std::map<Outcome, long> counts;
-  for (const TrialRow& row : rows) ++counts[row.result.outcome];
-  for (const auto& [outcome, count] : counts) fmt::print("  {:<18}{:>7}\n", NameOf(outcome), count);
-}
-
 /// "0-3, 7, 9" of ascending numbers; a long list ends in "...".
 std::string ListNumbers(const std::vector<long>& numbers) {
   constexpr size_t kMostRanges = 20;
@@ -84,13 +80,6 @@ std::vector<long> FindMissing(long count, const std::vector<long>& done) {
     if (next == done.end() || *next != number) missing.push_back(number);
   }
   return missing;
-}
-
-void PrintStudy(const Study& study, const std::string& database, const std::vector<TrialRow>& rows) {
-  fmt::print("{}: {} of {}{} trials in {}\n", study.name, rows.size(), study.is_search() ? "at most " : "",
-             CountTrials(study), database);
-  PrintOutcomes(rows);
-  for (const std::string& answer : AnswerStudy(study, rows)) fmt::print("{}\n", answer);
 }
 
 RunOptions MakeRunOptions(const Request& request, ProgressBar* bar) {
@@ -140,9 +129,37 @@ std::vector<long> MakeSearch(const StudyInputs& inputs, const Request& request, 
   return missing;
 }
 
+StudyStore OpenDatabase(const StudyInputs& inputs, const Request& request) {
+  const auto makes_same_rows = [&](const std::vector<TrialRow>& rows) {
+    return MakesRowsAgain(inputs, rows);
+  };
+  return StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), inputs.study, makes_same_rows);
+}
+
+int ServeStudy(const Request& request) {
+  StudyInputs inputs = FindStudy(request.study);
+  if (!inputs.study.is_external()) {
+    throw InputError(inputs.study.source +
+                     ": search.method: must be \"external\" for points that another program chooses");
+  }
+  CheckTrials(&inputs);
+  StudyStore store = OpenDatabase(inputs, request);
+  CatchInterrupts();
+  ProgressBar bar(inputs.study.name, CountTrials(inputs.study), /*quiet=*/true);
+  ServePoints(inputs, MakeRunOptions(request, &bar), &store, std::cin, std::cout);
+  if (IsInterrupted())
+    throw Error(request.database + ": interrupted; the same points are answered from there again");
+  return kSuccess;
+}
+
 int RunStudy(const Request& request) {
   StudyInputs inputs = FindStudy(request.study);
   const Study& study = inputs.study;
+  if (study.is_external()) {
+    throw InputError(
+        study.source +
+        ": search.method: the points come from another program, which asks \"dexcheck study serve\"");
+  }
   if (study.is_search() && !request.shard.empty()) {
     throw InputError(
         "--shard: the trials of a search follow from one another; --jobs makes several at a time, and "
@@ -152,11 +169,7 @@ int RunStudy(const Request& request) {
   const std::vector<Trial> trials =
       study.is_search() ? std::vector<Trial>() : SelectShard(ListTrials(study), request.shard);
   CheckTrials(&inputs);
-  const auto makes_same_rows = [&](const std::vector<TrialRow>& rows) {
-    return MakesRowsAgain(inputs, rows);
-  };
-  StudyStore store =
-      StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), study, makes_same_rows);
+  StudyStore store = OpenDatabase(inputs, request);
   if (!request.quiet && !store.change().empty()) fmt::print("{}: {}\n", request.database, store.change());
   CatchInterrupts();
   if (request.retry_failed) RemoveFailed(study, &store);
@@ -169,50 +182,43 @@ int RunStudy(const Request& request) {
         IsInterrupted() ? "interrupted" : "another process has them", ListNumbers(missing)));
   }
   if (request.quiet) return kSuccess;
-  const std::vector<TrialRow> rows = StudyStore::Open(request.database).ReadRows();
-  PrintStudy(study, request.database, rows);
-  if (std::any_of(rows.begin(), rows.end(),
-                  [](const TrialRow& row) { return IsFailed(row.result.outcome); })) {
+  const StudyStore made = StudyStore::Open(request.database);
+  fmt::print("{}", FindProgress(made).text);
+  const std::map<Outcome, long> outcomes = made.CountOutcomes();
+  if (outcomes.count(Outcome::kCrashed) + outcomes.count(Outcome::kTimedOut) > 0) {
     fmt::print("Trials that crashed or timed out are made again with --retry-failed.\n");
   }
   return kSuccess;
 }
 
 /// Adds to a database that is there, or makes one under a temporary name that it loses when it is complete.
-/// @return all rows.
-std::vector<TrialRow> AddToDatabase(const std::string& path, const StudyStore& like,
-                                    const std::vector<TrialSource>& sources) {
+void AddToDatabase(const std::string& path, const StudyStore& like, const std::vector<std::string>& sources) {
   const auto add = [&](const std::filesystem::path& database) {
     StudyStore store = StudyStore::OpenOrCreate(database, like.identity(), like.study());
-    store.AddAll(sources);
-    return store.ReadRows();
+    std::vector<TrialSource> all;
+    for (const std::string& source : sources) {
+      all.push_back({source, [source] { return StudyStore::Open(source).ReadRows(); }});
+    }
+    store.AddAll(all);
   };
   RequirePlainFile(path);
   std::error_code error;
   if (std::filesystem::file_size(path, error) > 0 && !error) return add(path);
   PartialFile file(path);
-  std::vector<TrialRow> rows = add(file.partial());
+  add(file.partial());
   file.Commit();
-  return rows;
 }
 
 int MergeStudies(const std::string& out, const std::vector<std::string>& databases, bool quiet) {
   // All are looked at before anything is written.
-  std::vector<TrialSource> sources;
   const StudyStore first = StudyStore::Open(databases.front());
-  for (const std::string& database : databases) {
-    const StudyStore store = StudyStore::Open(database);
-    store.RequireSame(first.identity());
-    sources.push_back({database, store.ReadRows()});
-  }
-  const std::vector<TrialRow> all = AddToDatabase(out, first, sources);
-  if (!quiet) PrintStudy(first.study(), out, all);
+  for (const std::string& database : databases) StudyStore::Open(database).RequireSame(first.identity());
+  AddToDatabase(out, first, databases);
+  const StudyStore merged = StudyStore::Open(out);
+  if (!quiet) fmt::print("{}", FindProgress(merged).text);
   if (first.study().is_search()) return kSuccess;
   const long count = CountTrials(first.study());
-  std::vector<long> done;
-  done.reserve(all.size());
-  for (const TrialRow& row : all) done.push_back(row.trial.number);
-  const std::vector<long> missing = FindMissing(count, done);
+  const std::vector<long> missing = FindMissing(count, merged.ListNumbers());
   if (missing.empty()) return kSuccess;
   throw Error(fmt::format("{}: {} of {} trials are missing: {}; merge again when they are done", out,
                           missing.size(), count, ListNumbers(missing)));
@@ -243,24 +249,24 @@ void AddStudyCommand(Command app) {
   add_quiet(run);
   run.SetAction([=] { return RunStudy(*request); });
 
+  Command serve =
+      study.AddCommand("serve", "Make the points that another program's optimiser asks for, line by line");
+  serve.AddOption("STUDY", &request->study, "A TOML file with search.method = \"external\"").Required();
+  serve.AddOption("--db", &request->database, "The study's database (SQLite), made when there is none")
+      .TypeName("FILE.sqlite")
+      .Required();
+  serve.AddOption("--jobs", &request->jobs, "Trials at a time (all processors by default)")
+      .TypeName("N")
+      .Check(whole);
+  serve.SetAction([=] { return ServeStudy(*request); });
+
   Command merge = study.AddCommand("merge", "Put the databases of one study together");
   merge.AddOption("OUT", &request->database, "Database that gets all trials").Required();
   merge.AddOption("DB", databases.get(), "Databases of the same study").Required();
   add_quiet(merge);
   merge.SetAction([=] { return MergeStudies(request->database, *databases, request->quiet); });
 
-  Command report = study.AddCommand("report", "Write an HTML page of a study's results");
-  report.AddOption("DB", &request->database, "The study's database").Required();
-  const auto page = std::make_shared<std::string>();
-  report.AddOption("--out", page.get(), "The page (DB.html by default); - for standard output")
-      .TypeName("FILE.html");
-  report.SetAction([=] {
-    RequirePageName(*page);
-    const StudyStore store = StudyStore::Open(request->database);
-    OutputFile out(page->empty() ? request->database + ".html" : *page);
-    out.Write(MakeStudyReport(store));
-    return kSuccess;
-  });
+  AddStudyReadCommands(study);
 
   Command slurm = study.AddCommand("slurm", "Print an array job for Slurm that makes the study");
   slurm.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();

@@ -13,6 +13,7 @@
 #include "harness/base/temporary_path.h"
 #include "harness/engine/cylinder_collision.h"
 #include "harness/engine/finite_check.h"
+#include "harness/engine/newer_mjcf.h"
 #include "harness/engine/torus_collision.h"
 
 namespace dexcheck {
@@ -74,7 +75,9 @@ std::string OneLine(std::string text) {
 MjModelPtr Load(const std::string& path, const mjVFS* vfs, const std::string& source) {
   char message[1024] = "";
   MjModelPtr model(mj_loadXML(path.c_str(), vfs, message, sizeof(message)));
-  if (!model) throw InputError(source + ": not a valid MJCF model: " + OneLine(message));
+  if (!model) {
+    throw InputError(source + ": not a valid MJCF model: " + OneLine(message) + ExplainNewerMjcf(message));
+  }
   CheckFinite(*model, source);
   if (message[0] != '\0') {
     std::fprintf(stderr, "dexcheck: %s: %s\n", source.c_str(), OneLine(message).c_str());

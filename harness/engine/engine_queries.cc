@@ -69,20 +69,29 @@ std::vector<LinkInWorld> EngineTerms::links() const {
   return links;
 }
 
-void EngineTerms::CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J) {
-  mj_jacSite(engine_.get(), data_.get(), J_nv_.data(), J_nv_.data() + 3 * engine_->nv,
-             adapter_->frame_sites()[static_cast<size_t>(frame)]);
-  for (int col = 0; col < base_size_; ++col) {
-    J.col(col).setZero();
-    for (int k = 0; k < carrying_dofs_; ++k) {
-      J.col(col) += map_.base_columns()(k, col) * J_nv_.col(map_.base_dofs()[static_cast<size_t>(k)]);
-    }
-  }
-  Eigen::Index col = base_size_;
-  for (const int dof : chain_of(frame).dofs) J.col(col++) = J_nv_.col(dof);
+Vector6d EngineTerms::CalcPointColumn(int dof, const Vector3d& point) const {
+  // The engine's motion axes [omega; v] are about the centre of mass of the dof's tree; as in mj_jac.
+  const mjtNum* const axis = data_->cdof + 6 * dof;
+  const int root = engine_->body_rootid[engine_->dof_bodyid[dof]];
+  const Vector3d arm = point - MapVector(data_->subtree_com + 3 * root);
+  Vector6d column;
+  column << MapVector(axis + 3) + MapVector(axis).cross(arm), MapVector(axis);
+  return column;
 }
 
-Matrix6Xd EngineTerms::CalcFrameJacobian(int frame) {
+void EngineTerms::CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J) const {
+  const Vector3d point =
+      MapVector(data_->site_xpos + 3 * adapter_->frame_sites()[static_cast<size_t>(frame)]);
+  J.leftCols(base_size_).setZero();
+  for (int k = 0; k < carrying_dofs_; ++k) {
+    const Vector6d column = CalcPointColumn(map_.base_dofs()[static_cast<size_t>(k)], point);
+    for (int col = 0; col < base_size_; ++col) J.col(col) += map_.base_columns()(k, col) * column;
+  }
+  Eigen::Index col = base_size_;
+  for (const int dof : chain_of(frame).dofs) J.col(col++) = CalcPointColumn(dof, point);
+}
+
+Matrix6Xd EngineTerms::CalcFrameJacobian(int frame) const {
   const std::vector<int>& coordinates = chain(frame);
   Matrix6Xd columns(6, static_cast<Eigen::Index>(coordinates.size()));
   CalcFrameColumns(frame, columns);
@@ -149,9 +158,9 @@ Vector6d EngineTerms::ObjectGravity() const {
   return wrench;
 }
 
-Eigen::Matrix<double, 3, 6> EngineTerms::CalcObjectJacobian(const Vector3d& point) {
-  mj_jac(engine_.get(), data_.get(), J_nv_.data(), nullptr, point.data(), object_body_);
-  Eigen::Matrix<double, 3, 6> J = J_nv_.block<3, 6>(0, object_dof_);
+Eigen::Matrix<double, 3, 6> EngineTerms::CalcObjectJacobian(const Vector3d& point) const {
+  Eigen::Matrix<double, 3, 6> J;
+  for (int i = 0; i < 6; ++i) J.col(i) = CalcPointColumn(object_dof_ + i, point).head<3>();
   J.leftCols<3>() *= ObjectRotation();
   return J;
 }

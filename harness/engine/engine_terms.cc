@@ -72,7 +72,6 @@ EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates, std::s
   friction_.setZero(n);
   other_velocity_.setZero(n);
   other_force_.setZero(n);
-  J_nv_.setZero(6, nv);
   FindObject();
   ListMassEntries();
   ListChains(frames);

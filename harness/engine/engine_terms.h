@@ -101,9 +101,9 @@ class EngineTerms {
   /// Velocity coordinates that move a frame, ascending, by the engine's own tree.
   [[nodiscard]] const std::vector<int>& chain(int frame) const { return chain_of(frame).coordinates; }
   /// Jacobian of a frame's origin, [linear; angular] in world axes: 6 x chain columns.
-  void CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J);
+  void CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J) const;
   /// The whole Jacobian of a frame's origin, 6 x n.
-  [[nodiscard]] Matrix6Xd CalcFrameJacobian(int frame);
+  [[nodiscard]] Matrix6Xd CalcFrameJacobian(int frame) const;
   /// Motion of a frame's origin.
   [[nodiscard]] EngineMotion FrameMotion(int frame) const;
 
@@ -118,7 +118,7 @@ class EngineTerms {
   /// N_o.
   [[nodiscard]] Vector6d ObjectGravity() const;
   /// Rows of a point's velocity by V_Bo, world axes.
-  [[nodiscard]] Eigen::Matrix<double, 3, 6> CalcObjectJacobian(const Vector3d& point);
+  [[nodiscard]] Eigen::Matrix<double, 3, 6> CalcObjectJacobian(const Vector3d& point) const;
 
   /// The narrow phase on a fingertip's frame and the object, with the robot carried by `shift` from where it
   /// is.
@@ -135,6 +135,8 @@ class EngineTerms {
   EngineTerms(const Adapter& adapter, Coordinates coordinates, std::span<const int> frames);
   [[nodiscard]] const Chain& chain_of(int frame) const { return chains_[static_cast<size_t>(frame)]; }
   [[nodiscard]] int body_of(int frame) const;
+  /// Motion of a point that a dof moves, per its rate: [linear; angular], world axes.
+  [[nodiscard]] Vector6d CalcPointColumn(int dof, const Vector3d& point) const;
   void FindObject();
   void FindTouchingGeoms(std::span<const int> fingertips);
   /// Keeps the engine from placing geoms in every state, unless a force depends on them.
@@ -182,7 +184,6 @@ class EngineTerms {
   std::vector<int> robot_bodies_;
   std::vector<int> moving_bodies_;  // those whose accelerations are needed, parents first
   std::vector<Chain> chains_;       // by frame; empty unless asked for
-  RowMatrixXd J_nv_;
 
   int object_body_;
   bool has_object_ = false;

@@ -24,6 +24,29 @@ int FindTipGeom(const mjModel& model, int site, const std::string& name) {
   throw InputError("MJCF: fingertip " + Quote(name) + ": its body needs a sphere that can touch");
 }
 
+/// result = M a of an a that is zero but on the base's dofs: `carrying` at the root, one after the other, and
+/// wheels that hang on these.
+void MultiplyBaseInertia(const mjModel& m, const mjData& d, std::span<const int> base_dofs, int carrying,
+                         const VectorXd& a, VectorXd* result) {
+  result->setZero();
+  if (base_dofs.empty()) return;
+  const int first = base_dofs.front();
+  const int root = m.body_rootid[m.dof_bodyid[first]];
+  for (int i = first; i < m.nv; ++i) {
+    if (m.body_rootid[m.dof_bodyid[i]] != root) continue;
+    // A row of qM goes from the diagonal to the root.
+    const int diagonal = m.dof_Madr[i];
+    const int end = i + 1 < m.nv ? m.dof_Madr[i + 1] : m.nM;
+    const int above = std::min(carrying, end - 1 - diagonal);
+    (*result)[i] += d.qM[diagonal] * a[i];
+    for (int k = 0; k < above; ++k) {
+      const double entry = d.qM[end - 1 - k];
+      (*result)[i] += entry * a[first + k];
+      (*result)[first + k] += entry * a[i];
+    }
+  }
+}
+
 }  // namespace
 
 Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, const Surface& surface)
@@ -255,22 +278,21 @@ Vector6d Observer::ReadSupportWrench(const mjModel& m, const mjData& d) const {
 }
 
 void Observer::ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* response) {
-  // On the robot's dofs qacc - T xi_dot - T_dot xi; on all others zero.
+  // On the base's dofs qacc - T xi_dot - T_dot xi; on its joints' that is zero, as on all others.
+  map_.ExpandBias(constraint_force_.data());
   departure_.setZero();
-  map_.ExpandBias(departure_.data());
-  constraint_force_.setZero();
+  for (const int dof : map_.base_dofs()) departure_[dof] = d.qacc[dof] - constraint_force_[dof];
   map_.Expand(response->xi_dot, constraint_force_.data());
-  departure_ += constraint_force_;
-  const auto subtract = [&](int dof) { departure_[dof] = d.qacc[dof] - departure_[dof]; };
-  for (const int dof : map_.base_dofs()) subtract(dof);
-  for (const int dof : adapter_->joint_dofs()) subtract(dof);
-  mj_mulM(&m, &d, M_qacc_.data(), departure_.data());
+  for (const int dof : map_.base_dofs()) departure_[dof] -= constraint_force_[dof];
+  const auto carrying = static_cast<int>(map_.base_dofs().size() - adapter_->wheels().size());
+  MultiplyBaseInertia(m, d, map_.base_dofs(), carrying, departure_, &M_qacc_);
   response->departure_force.resize(response->xi_dot.size());
   map_.ProjectForce(M_qacc_.data(), response->departure_force);
 }
 
 void Observer::ReadSolverResidual(const mjModel& m, const mjData& d, PlantResponse* response) {
   mj_mulM(&m, &d, M_qacc_.data(), d.qacc);
+  constraint_force_.setZero();  // the engine leaves it alone where nothing is constrained
   // Not qfrc_constraint, which the engine makes fit. The call uses the data's scratch space alone.
   mj_mulJacTVec(&m, const_cast<mjData*>(&d), constraint_force_.data(), d.efc_force);
   departure_ = M_qacc_ - Eigen::Map<const VectorXd>(d.qfrc_smooth, m.nv) - constraint_force_;

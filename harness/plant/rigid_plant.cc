@@ -10,6 +10,7 @@
 #include "controller/model/platform.h"
 #include "controller/object/object_dynamics.h"
 #include "controller/object/so3.h"
+#include "harness/plant/disturbances.h"
 
 namespace dexcheck {
 namespace {
@@ -153,7 +154,11 @@ void RigidPlant::Evaluate(const State& state, const Vector3d& turn, Rate* rate) 
   for (size_t i = 0; i < gaps_.size(); ++i) {
     stabilisation_[3 * static_cast<Eigen::Index>(i) + 2] += w * w * gaps_[i];
   }
-  const Prediction& motion = dynamics_.Predict(robot_, grasp_, force_, ObjectSupport::kHand, &stabilisation_);
+  pushed_ = force_;
+  AddRobotForce(wrenches_, robot_, pushed_);
+  const Vector6d on_object = CalcObjectWrench(wrenches_, state.X_Bo);
+  const Prediction& motion =
+      dynamics_.Predict(robot_, grasp_, pushed_, ObjectSupport::kHand, &stabilisation_, &on_object);
   CalcCoordinateRates(state.q, state.xi, &rate->q_dot);
   rate->xi_dot = motion.xi_dot;
   rate->V_Bo_dot = motion.V_Bo_dot;
@@ -164,7 +169,7 @@ void RigidPlant::Evaluate(const State& state, const Vector3d& turn, Rate* rate) 
   for (size_t i = 0; i < gaps_.size(); ++i) {
     rate->kappa_dot.segment<5>(5 * static_cast<Eigen::Index>(i)) = grasp_.contacts()[i].kappa_dot;
   }
-  rate->power = state.xi.dot(force_) - state.xi.dot(robot_.friction());
+  rate->power = state.xi.dot(pushed_) + state.V_Bo.dot(on_object) - state.xi.dot(robot_.friction());
 }
 
 void RigidPlant::KeepResponse() {

@@ -3,7 +3,7 @@
 // The paper's own simulation: (46) and (48) integrated, without an engine.
 //
 //   q_dot' = S' xi,  p_dot = R_Bo v,  R_dot = R_Bo [omega]x,  kappa_dot by (40)
-//   [xi_dot; V_o_dot; f_c] by ConstrainedDynamics under E_bar' tau', tau' held during a time step
+//   [xi_dot; V_o_dot; f_c] by ConstrainedDynamics under E_bar' tau' and pushes, both held during a time step
 //
 // Bodies are rigid, wheels roll and fingertips stick and stay closed, whatever the forces are: friction
 // cones, normal forces and traction are reported and limit nothing. Where integration drifts off the
@@ -49,6 +49,7 @@ class RigidPlant final : public Plant {
 
   void BeginStep() override;
   void Read(PlantReading* reading) override;
+  void Push(std::span<const Wrench> wrenches) override { wrenches_.assign(wrenches.begin(), wrenches.end()); }
   void EndStep(const Eigen::Ref<const VectorXd>& tau) override;
   void Read(PlantResponse* response) override;
 
@@ -58,7 +59,7 @@ class RigidPlant final : public Plant {
 
   /// Kinetic and potential energy of robot and object at the state, J.
   [[nodiscard]] double CalcEnergy();
-  /// Work of the motors less what friction took, over all steps, J; to the integrator's order.
+  /// Work of motors and pushes less what friction took, over all steps, J; to the integrator's order.
   [[nodiscard]] double work() const { return work_; }
 
  private:
@@ -108,7 +109,8 @@ class RigidPlant final : public Plant {
   bool has_contacts_ = false;     // whether kappa is near the contacts
   std::vector<double> gaps_;      // m, at the step's beginning
   std::vector<double> overlaps_;  // their opposites
-  VectorXd force_;                // E_bar' tau' (n)
+  VectorXd force_, pushed_;       // E_bar' tau' (n), and with the pushes on the robot
+  std::vector<Wrench> wrenches_;  // held during a step
   VectorXd tau_;                  // n
   VectorXd stabilisation_;        // k, m/s^2
   double work_ = 0.0;

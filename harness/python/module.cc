@@ -7,6 +7,7 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/base/version.h"
 #include "harness/sides/audit.h"
@@ -111,21 +113,20 @@ class Robot {
     return {energy.kinetic, energy.potential};
   }
   MatrixXd PoseOf(const std::string& name, const Input& q) {
-    SetState(q, still_);
-    const int frame = model_->FindFrame(name);
-    if (frame >= 0) return terms_->CalcFramePose(frame).matrix();
-    const int link = FindLink(name);
-    return link < 0
-               ? terms_->CalcLinkPose(-1).matrix()
-               : (terms_->CalcLinkPose(link) * description_.joints[static_cast<size_t>(link)].X_iL).matrix();
+    const auto& frames = model_->frames();
+    const bool is_frame =
+        std::any_of(frames.begin(), frames.end(), [&](const Frame& frame) { return frame.name == name; });
+    const int link = is_frame ? -1 : FindLink(name);
+    terms_->SetState(q, still_);
+    if (is_frame) return terms_->CalcFramePose(model_->FindFrame(name)).matrix();
+    const Pose X_iL = link < 0 ? Pose::Identity() : description_.joints[static_cast<size_t>(link)].X_iL;
+    return (terms_->CalcLinkPose(link) * X_iL).matrix();
   }
   MatrixXd Jacobian(const std::string& frame, const Input& q) {
-    const int index = model_->FindFrame(frame);
-    if (index < 0) throw py::key_error(file_.string() + " has no frame " + frame);
-    SetState(q, still_);
+    terms_->SetState(q, still_);
     Matrix6Xd J = Matrix6Xd::Zero(6, model_->num_velocities());
     Matrix6Xd J_dot = J;
-    terms_->CalcFrameJacobian(index, J, J_dot);
+    terms_->CalcFrameJacobian(model_->FindFrame(frame), J, J_dot);
     return J;
   }
 
@@ -159,10 +160,8 @@ class Robot {
   }
 
  private:
-  void SetState(const Input& q, const Input& v) { terms_->SetState(q, v); }
-
   const ModelTerms& Evaluate(const Input& q, const Input& v) {
-    SetState(q, v);
+    terms_->SetState(q, v);
     terms_->CalcDynamics();
     return *terms_;
   }
@@ -173,7 +172,7 @@ class Robot {
     for (size_t i = 0; i < description_.spec.joints.size(); ++i) {
       if (description_.spec.joints[i].link == name) return static_cast<int>(i);
     }
-    throw py::key_error(file_.string() + " has no frame or link " + name);
+    throw std::invalid_argument(file_.string() + ": must have a frame or link " + Quote(name));
   }
 
   /// The functions M(q), c(q, v), g(q), h(q, v), friction(q, v) of an object or a dictionary.

@@ -175,6 +175,9 @@ class MotionFigures {
     if (f_c == nullptr || f_c->width % 3 != 0) return;
     const auto mu = f_c->attributes.find("mu");
     const RowMatrixXd forces = run_.log().ReadSignal("contact/f_c");
+    const SignalInfo* const commanded = run_.Find("law/f_c");
+    RowMatrixXd optimal;
+    if (commanded != nullptr && commanded->width == f_c->width) optimal = run_.log().ReadSignal("law/f_c");
     for (int i = 0; i < f_c->width / 3; ++i) {
       const std::string column = RunData::NameColumn(*f_c, 3 * i);
       const std::string tip = column.substr(0, column.find('.'));
@@ -191,10 +194,18 @@ class MotionFigures {
                     "",
                     true};
       const VectorXd normal = forces.col(3 * i + 2);
-      figure.curves = {{"normal", normal, 0, 0, false},
-                       {"tangential", forces.middleCols<2>(3 * i).rowwise().norm(), 1, 0, false}};
+      const bool has_optimal = optimal.size() > 0 && optimal.allFinite();
+      const char* const what = has_optimal ? ", measured" : "";
+      figure.curves = {
+          {std::string("normal") + what, normal, 0, 0, false},
+          {std::string("tangential") + what, forces.middleCols<2>(3 * i).rowwise().norm(), 1, 0, false}};
+      if (has_optimal) {
+        figure.curves.push_back({"normal, optimal (49)", optimal.col(3 * i + 2), 0, 1, false});
+        figure.curves.push_back(
+            {"tangential, optimal (49)", optimal.middleCols<2>(3 * i).rowwise().norm(), 1, 1, false});
+      }
       if (mu != f_c->attributes.end()) {
-        figure.curves.push_back({"friction cone: μ × normal", mu->second * normal, 2, 1, false});
+        figure.curves.push_back({"friction cone: μ × normal", mu->second * normal, 2, 2, false});
       }
       Add(figure);
     }

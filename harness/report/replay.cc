@@ -241,7 +241,8 @@ class ReplayMaker {
   }
 
   void AddObject() {
-    const int body = mj_name2id(&model_, mjOBJ_BODY, run_.object_body.c_str());
+    const int body =
+        run_.object_body.empty() ? -1 : mj_name2id(&model_, mjOBJ_BODY, run_.object_body.c_str());
     const auto part = body < 0 ? part_of_.end() : part_of_.find(model_.body_weldid[body]);
     if (part == part_of_.end()) return;
     Json& object = json_["object"];

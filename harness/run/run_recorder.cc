@@ -1,6 +1,7 @@
 #include "harness/run/run_recorder.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "harness/base/files.h"
 #include "harness/base/git_revision.h"
@@ -26,6 +27,13 @@ std::vector<std::string> Expand(const std::vector<std::string>& names,
     for (const char* part : parts) columns.push_back(name + "." + part);
   }
   return columns;
+}
+
+/// The law's demand, which a controller of the user's own need not tell.
+template <typename Derived>
+void CopyDemand(const Eigen::DenseBase<Derived>& from, std::span<double> to) {
+  if (from.size() == static_cast<Eigen::Index>(to.size())) return Copy(from, to);
+  std::fill(to.begin(), to.end(), std::numeric_limits<double>::quiet_NaN());
 }
 
 constexpr const char* kPoseUnits = "m, m, m, rad, rad, rad";
@@ -121,6 +129,10 @@ void RunRecorder::AddStateSignals() {
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.xi, row); });
   Add({"tau", "N m", "tau' of the computed torque law (55)", n, tau_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.command.tau, row); });
+  if (!setup_->scenario().task) {
+    Add({"law/xi_dot_d", xi_dot_units, "xi_dot_d of (47), which the law demands", n, xi_names, {}},
+        [](const StepRecord& step, std::span<double> row) { CopyDemand(step.command.demand.xi_dot, row); });
+  }
   if (!setup_->scenario().imperfections.is_ideal()) {
     Add({"told/q", q_units, "q' as the controller was told it", model.num_positions(), q_names, {}},
         [](const StepRecord& step, std::span<double> row) { Copy(step.told.state.q, row); });
@@ -205,6 +217,22 @@ void RunRecorder::AddContactSignals() {
       [](const StepRecord& step, std::span<double> row) {
         std::copy(step.reading.state.overlap.begin(), step.reading.state.overlap.end(), row.begin());
       });
+  if (!setup_->scenario().task) {
+    Add({"law/f_c",
+         "N",
+         "f_c of (49), which the law commands, each in its contact frame",
+         3 * count,
+         xyz,
+         {{"mu", mu}}},
+        [](const StepRecord& step, std::span<double> row) { CopyDemand(step.command.demand.f_c, row); });
+    Add({"law/F_N",
+         "N",
+         "internal part F_N of law/f_c, which the grasp-force problem chooses",
+         3 * count,
+         xyz,
+         {}},
+        [](const StepRecord& step, std::span<double> row) { CopyDemand(step.command.demand.F_N, row); });
+  }
   if (checks_ == nullptr) return;
   const auto each = [](Vector3d PlantContact::*member) {
     return [member](const StepRecord& step, std::span<double> row) {

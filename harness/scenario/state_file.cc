@@ -27,7 +27,7 @@ class StateReader {
 
   State Read(std::string_view text, const RobotModel& model) {
     const Json json = Parse(text);
-    CheckKeys(json, "", {"q", "xi", "object", "kappa", "contact_points", "fingers", "mu"});
+    CheckKeys(json, "", {"q", "xi", "object", "kappa", "contact_points", "fingers", "mu", "law"});
     State state;
     state.q = ReadVector(Get(json, "", "q"), "q", model.num_positions());
     state.xi = ReadVector(Get(json, "", "xi"), "xi", model.num_velocities());
@@ -40,6 +40,10 @@ class StateReader {
       if (json.contains(key) && !has_contacts) Fail(key, "needs kappa or contact_points");
     }
     if (has_contacts) state.contacts = ReadContacts(json, model);
+    if (json.contains("law")) {
+      if (!state.object || !state.contacts) Fail("law", "needs object, and kappa or contact_points");
+      state.law = ReadLaw(json.at("law"), model.num_velocities());
+    }
     return state;
   }
 
@@ -102,6 +106,29 @@ class StateReader {
     CheckKeys(object, "object.", {"X_o", "X_o_dot"});
     return {ReadVector(Get(object, "object.", "X_o"), "object.X_o", 6),
             ReadVector(Get(object, "object.", "X_o_dot"), "object.X_o_dot", 6)};
+  }
+
+  [[nodiscard]] LawState ReadLaw(const Json& law, int velocities) const {
+    CheckKeys(law, "law.", {"X_d", "X_d_dot", "X_d_ddot", "K_p", "K_v", "f_min", "f_max", "sigma_prime"});
+    const auto six = [&](const char* key) -> Vector6d {
+      return ReadVector(Get(law, "law.", key), std::string("law.") + key, 6);
+    };
+    const auto number = [&](const char* key) {
+      const Json& value = Get(law, "law.", key);
+      if (!value.is_number())
+        Fail(std::string("law.") + key, "must be a number, got " + Abbreviate(value.dump()));
+      return value.get<double>();
+    };
+    LawState state{six("X_d"), six("X_d_dot"),  six("X_d_ddot"), six("K_p"),
+                   six("K_v"), number("f_min"), number("f_max"), VectorXd::Zero(velocities)};
+    if (!(state.f_min >= 0.0)) Fail("law.f_min", "must not be negative, got " + FormatNumber(state.f_min));
+    if (!(state.f_max > state.f_min)) {
+      Fail("law.f_max",
+           "must be above f_min = " + FormatNumber(state.f_min) + ", got " + FormatNumber(state.f_max));
+    }
+    if (law.contains("sigma_prime"))
+      state.sigma_prime = ReadVector(law.at("sigma_prime"), "law.sigma_prime", velocities);
+    return state;
   }
 
   [[nodiscard]] ContactState ReadContacts(const Json& json, const RobotModel& model) const {

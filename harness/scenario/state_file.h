@@ -27,15 +27,25 @@ struct ContactState {
   double friction = 0.0;  ///< mu of (21).
 };
 
+/// What the law (47) to (57) is asked to do at that state.
+struct LawState {
+  Vector6d X_d, X_d_dot, X_d_ddot;  ///< Desired motion of the object, m and rad.
+  Vector6d K_p, K_v;                ///< 1/s^2, 1/s.
+  double f_min = 0.0, f_max = 0.0;  ///< Of the normal forces, N.
+  VectorXd sigma_prime;             ///< sigma' of (47) (n).
+};
+
 /// One state of a robot, as the JSON object {"q": [...], "xi": [...]} gives it. Optional: "object": {"X_o":
 /// [...], "X_o_dot": [...]}; contacts by "kappa" (a list of five numbers each) or by "contact_points" (three
 /// each, with an object); then also "fingers" (names of their frames; by default the model's first
-/// fingertips) and "mu" (by default the object's).
+/// fingertips) and "mu" (by default the object's). With object and contacts also "law": {"X_d", "X_d_dot",
+/// "X_d_ddot", "K_p", "K_v": six numbers each, "f_min", "f_max", and, by default zero, "sigma_prime"}.
 struct State {
   VectorXd q;   ///< q', rad and m.
   VectorXd xi;  ///< Reduced velocity, rad/s and m/s.
   std::optional<ObjectState> object;
   std::optional<ContactState> contacts;
+  std::optional<LawState> law;
 };
 
 /// @throws InputError, one line that names file, key and value: also for unknown keys, so that a misspelt one

@@ -1,12 +1,15 @@
 #include "harness/sides/answer_files.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/files.h"
 #include "harness/checks/random_states.h"
+#include "harness/sides/npz_file.h"
 
 namespace dexcheck {
 namespace {
@@ -85,10 +88,22 @@ AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescrip
   if (count == 0) throw InputError((folder / "q.npy").string() + ": must have states, got none");
   q_ = Read("q.npy", {count, static_cast<size_t>(model.num_positions())});
   v_ = Read("v.npy", {count, static_cast<size_t>(model.num_velocities())});
+  if (std::filesystem::exists(folder_ / "answers.jsonl")) {
+    ReadLines(folder_ / "answers.jsonl");
+    return;
+  }
+  std::map<std::string, std::string> archive;
+  if (std::filesystem::exists(folder_ / "answers.npz")) {
+    archive = ReadNpz(ReadBytes(folder_ / "answers.npz"), (folder_ / "answers.npz").string());
+  }
   const auto n = static_cast<size_t>(layout().size());
   const auto find = [&](const std::string& term, const std::vector<size_t>& shape) {
     const std::string file = term + ".npy";
     if (std::filesystem::exists(folder_ / file)) terms_.emplace(term, Read(file, shape));
+    const auto packed = archive.find(file);
+    if (packed == archive.end()) return;
+    const std::string source = (folder_ / "answers.npz").string() + ": " + file;
+    terms_.insert_or_assign(term, Check(ParseNpy(packed->second, source), source, shape));
   };
   for (const char* term : {"M", "C"}) find(term, {count, n, n});
   for (const char* term : {"c", "g", "h", "friction"}) find(term, {count, n});
@@ -97,7 +112,35 @@ AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescrip
   throw InputError(
       folder.string() +
       ": must have answers: M.npy, C.npy, c.npy, g.npy, h.npy, friction.npy, kinetic_energy.npy or "
-      "potential_energy.npy, got none");
+      "potential_energy.npy, the same in answers.npz, or answers.jsonl, got none");
+}
+
+void AnswerFiles::ReadLines(const std::filesystem::path& path) {
+  lines_.resize(static_cast<size_t>(count_));
+  std::vector<bool> seen(lines_.size(), false);
+  std::istringstream text(ReadBytes(path));
+  long number = 0;
+  for (std::string line; std::getline(text, line);) {
+    const std::string source = path.string() + ":" + std::to_string(++number);
+    if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
+    const Json json = Json::parse(line, nullptr, /*allow_exceptions=*/false);
+    if (!json.is_object()) throw InputError(source + ": must be a JSON object (NaN and Infinity are none)");
+    // Without ids the lines are in the order of the states.
+    const Json id = json.value("id", Json(number - 1));
+    if (!id.is_number_integer() || id < 0 || id >= count_) {
+      throw InputError(source + ": id: must be a number of a state below " + std::to_string(count_) +
+                       ", got " + Abbreviate(id.dump()));
+    }
+    const auto sample = id.get<size_t>();
+    const auto state = static_cast<long>(sample);
+    lines_[sample] =
+        ReadSideTerms(json, layout(), layout().WriteVelocities(positions(state), velocities(state)), source);
+    seen[sample] = true;
+  }
+  const auto missing = std::find(seen.begin(), seen.end(), false);
+  if (missing == seen.end()) return;
+  throw InputError(path.string() + ": must have a line for each state, got none for state " +
+                   std::to_string(missing - seen.begin()));
 }
 
 StateFeed AnswerFiles::MakeFeed() const {
@@ -111,15 +154,19 @@ StateFeed AnswerFiles::MakeFeed() const {
 
 NpyArray AnswerFiles::Read(const std::string& file, const std::vector<size_t>& shape) const {
   const std::string source = (folder_ / file).string();
-  NpyArray array = ParseNpy(ReadBytes(folder_ / file), source);
-  if (array.shape != shape) {
-    throw InputError(source + ": must be " + DescribeShape(shape) + ", got " + DescribeShape(array.shape));
-  }
+  NpyArray array = Check(ParseNpy(ReadBytes(folder_ / file), source), source, shape);
   if (file != "q.npy" && file != "v.npy") return array;
   for (size_t i = 0; i < array.values.size(); ++i) {
     if (std::isfinite(array.values[i])) continue;
     throw InputError(source + ": must have finite numbers, got " + FormatNumber(array.values[i]) +
                      " in state " + std::to_string(i / shape[1]));
+  }
+  return array;
+}
+
+NpyArray AnswerFiles::Check(NpyArray array, const std::string& source, const std::vector<size_t>& shape) {
+  if (array.shape != shape) {
+    throw InputError(source + ": must be " + DescribeShape(shape) + ", got " + DescribeShape(array.shape));
   }
   return array;
 }
@@ -133,6 +180,11 @@ VectorXd AnswerFiles::FindRow(const std::string& term, long sample) const {
 
 SideTerms AnswerFiles::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
   SideTerms terms;
+  if (!lines_.empty()) {
+    terms = lines_[static_cast<size_t>(sample)];
+    layout().ReadTerms(q, xi, &terms);
+    return terms;
+  }
   const Eigen::Index n = layout().size();
   const auto matrix = [&](const char* term) {
     // Rows as NumPy has them.

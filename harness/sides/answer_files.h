@@ -30,7 +30,8 @@ std::string WriteLayout(const RobotDescription& robot, const std::string& origin
 /// Answers in a folder beside the states they belong to: q.npy (N x num_positions) and v.npy (N x n) in the
 /// robot's own layout; M.npy, C.npy (N x n x n), c.npy, g.npy, h.npy, friction.npy (N x n),
 /// kinetic_energy.npy, potential_energy.npy (N), each of which may be missing, in the layout of layout.json,
-/// or in the robot's own without such a file.
+/// or in the robot's own without such a file. Instead of them the same arrays may stand in answers.npz, or
+/// the answers in answers.jsonl, a line for each state as a program gives it.
 class AnswerFiles : public AnsweringSide {
  public:
   /// @throws InputError, one line that names the file.
@@ -48,6 +49,9 @@ class AnswerFiles : public AnsweringSide {
 
  private:
   [[nodiscard]] NpyArray Read(const std::string& file, const std::vector<size_t>& shape) const;
+  [[nodiscard]] static NpyArray Check(NpyArray array, const std::string& source,
+                                      const std::vector<size_t>& shape);
+  void ReadLines(const std::filesystem::path& path);
   [[nodiscard]] static VectorXd Row(const NpyArray& array, long sample);
   [[nodiscard]] VectorXd FindRow(const std::string& term, long sample) const;
 
@@ -56,6 +60,7 @@ class AnswerFiles : public AnsweringSide {
   long count_ = 0;
   NpyArray q_, v_;
   std::map<std::string, NpyArray> terms_;
+  std::vector<SideTerms> lines_;  // of answers.jsonl, by state
 };
 
 }  // namespace dexcheck

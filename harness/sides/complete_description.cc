@@ -5,6 +5,7 @@
 
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
+#include "harness/sides/alike_names.h"
 #include "harness/sides/join_names.h"
 #include "harness/sides/mjcf_reader.h"
 
@@ -18,6 +19,7 @@ class EngineCompletion {
       : engine_(engine), engine_source_(std::move(engine_source)), robot_(*robot) {}
 
   Completion Run() {
+    TakeNamesOfJoints();
     TakeBase();
     TakeGravity();
     TakeNames();
@@ -29,6 +31,14 @@ class EngineCompletion {
  private:
   [[nodiscard]] int FindEngineJoint(const Joint& joint) const {
     return mj_name2id(&engine_, mjOBJ_JOINT, joint.name.c_str());
+  }
+
+  void TakeNamesOfJoints() {
+    std::vector<std::string> names;
+    for (int id = 0; id < engine_.njnt; ++id) {
+      if (engine_.jnt_type[id] != mjJNT_FREE) names.push_back(NameOf(engine_, mjOBJ_JOINT, id));
+    }
+    result_.notes = TakeJointNames(names, engine_source_, &robot_);
   }
 
   /// A base that the file does not state floats if the engine's does, in the frame of the body of one name.

@@ -6,6 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/sides/alike_names.h"
 #include "harness/sides/join_names.h"
 
 namespace dexcheck {
@@ -172,7 +173,12 @@ std::vector<int> MatchJoints(const RobotSpec& a, const RobotSpec& b) {
 }
 
 std::vector<std::string> CompleteEachOther(RobotDescription* a, RobotDescription* b) {
-  return Completion(a, b).Run();
+  std::vector<std::string> names;
+  for (const Joint& joint : a->spec.joints) names.push_back(joint.name);
+  std::vector<std::string> notes = TakeJointNames(names, a->spec.source, b);
+  const std::vector<std::string> others = Completion(a, b).Run();
+  notes.insert(notes.end(), others.begin(), others.end());
+  return notes;
 }
 
 }  // namespace dexcheck

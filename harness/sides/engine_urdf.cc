@@ -37,6 +37,29 @@ std::string FindRoot(XMLElement* robot) {
 }
 
 /// MuJoCo lets move freely only what hangs on a link called "world".
+/// Removes the inertials of what never moves: published robots have such that the engine refuses.
+void RemoveFixedInertials(XMLElement* robot) {
+  std::set<std::string> standing = {FindRoot(robot)};
+  for (bool has_grown = true; has_grown;) {
+    has_grown = false;
+    for (XMLElement* joint = robot->FirstChildElement("joint"); joint != nullptr;
+         joint = joint->NextSiblingElement("joint")) {
+      const XMLElement* parent = joint->FirstChildElement("parent");
+      const XMLElement* child = joint->FirstChildElement("child");
+      if (parent == nullptr || child == nullptr || joint->Attribute("type", "fixed") == nullptr) continue;
+      const char* carrier = parent->Attribute("link");
+      const char* carried = child->Attribute("link");
+      if (carrier == nullptr || carried == nullptr || !standing.contains(carrier)) continue;
+      has_grown = standing.insert(carried).second || has_grown;
+    }
+  }
+  for (XMLElement* link = robot->FirstChildElement("link"); link != nullptr;
+       link = link->NextSiblingElement("link")) {
+    const char* name = link->Attribute("name");
+    if (name != nullptr && standing.contains(name)) RemoveChildren(link, {"inertial"});
+  }
+}
+
 void LetFloat(XMLElement* robot) {
   const std::string root = FindRoot(robot);
   for (XMLElement* joint = robot->FirstChildElement("joint"); joint != nullptr;
@@ -75,7 +98,7 @@ std::string WriteEngineUrdf(std::string_view text, const std::string& source, bo
   compiler->SetAttribute("fusestatic", "false");
   compiler->SetAttribute("discardvisual", "true");
   robot->InsertFirstChild(compiler->Parent());
-  if (floats) LetFloat(robot);
+  floats ? LetFloat(robot) : RemoveFixedInertials(robot);
   tinyxml2::XMLPrinter printer;
   document.Print(&printer);
   return printer.CStr();

@@ -6,8 +6,8 @@
 namespace dexcheck {
 
 /// A URDF as the engine's own importer should read it: without looks and collision shapes, whose meshes
-/// nobody needs, each link a body of its own (<compiler fusestatic="false"/>), and the root on a floating
-/// joint when it floats.
+/// nobody needs, without inertials of what is fixed to the world, each link a body of its own (<compiler
+/// fusestatic="false"/>), and the root on a floating joint when it floats.
 /// @throws InputError "SOURCE: ..." when it is no URDF.
 std::string WriteEngineUrdf(std::string_view text, const std::string& source, bool floats);
 

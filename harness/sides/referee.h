@@ -21,7 +21,7 @@ struct RefereeOptions {
   std::vector<std::string> programs;
   std::filesystem::path mjcf;             ///< What MuJoCo reads instead of the robot's file; may be empty.
   std::filesystem::path programs_folder;  ///< With the programs that come with dexcheck.
-  std::filesystem::path node_modules;     ///< Folder in which npm installed @mujoco/mujoco; may be empty.
+  std::filesystem::path node_modules;     ///< Folder in which npm installed MuJoCo 3; may be empty.
   ProgramOptions program_options;
   ConsistencyOptions states;
   /// Relative difference at which two engines still agree. They have algorithms of their own: one that

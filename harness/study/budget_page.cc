@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kLabelWidth = 250.0;  // px
 constexpr double kBarWidth = 420.0;
+constexpr double kRightMargin = 40.0;  // half of the last decade's "1e-3 m"
 constexpr double kRowHeight = 34.0;
 
 /// A logarithmic axis of errors.
@@ -54,7 +55,7 @@ Html DrawChart(const ErrorBudget& budget) {
   const LogAxis axis(budget);
   const double height = kRowHeight * static_cast<double>(budget.entries.size() + 2) + 24.0;
   Html chart = FormatHtml("<svg viewBox='0 0 {:.0f} {:.0f}' role='img' aria-label='error budget'>",
-                          kLabelWidth + kBarWidth + 20.0, height);
+                          kLabelWidth + kBarWidth + kRightMargin, height);
   for (double decade = axis.least; decade <= axis.most; decade += 1.0) {
     const double x = kLabelWidth + axis.Place(std::pow(10.0, decade));
     chart += FormatHtml(

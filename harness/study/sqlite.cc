@@ -101,6 +101,8 @@ bool Statement::Step() {
   return false;
 }
 
+void Statement::Reset() { sqlite3_reset(handle_); }
+
 long long Statement::GetWhole(int column) const { return sqlite3_column_int64(handle_, column); }
 
 double Statement::GetNumber(int column) const {

@@ -52,6 +52,8 @@ class Statement {
   void Bind(int parameter, std::string_view text);
   /// True with a row, false at the end; then the statement can be used again.
   bool Step();
+  /// Lets go of its row, so that it can be used again.
+  void Reset();
 
   [[nodiscard]] long long GetWhole(int column) const;
   /// NaN for NULL.

@@ -33,7 +33,7 @@ struct Sample {
   bool scramble = false;   ///< A Sobol sequence.
 };
 
-enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kBobyqa, kMargins };
+enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kBobyqa, kMargins, kExternal };
 enum class SearchStart { kMiddle, kTheory, kValues };
 
 /// How a study looks for the best point.
@@ -75,6 +75,8 @@ struct Study {
   /// Keys that make a point, without those of the draws.
   [[nodiscard]] size_t num_keys() const { return variations.size() - num_nested; }
   [[nodiscard]] bool is_search() const { return search.method != SearchMethod::kNone; }
+  /// Its points come from another program.
+  [[nodiscard]] bool is_external() const { return search.method == SearchMethod::kExternal; }
 };
 
 /// One run of a study.

@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
+#include "harness/base/files.h"
 #include "harness/report/html.h"
+#include "renders/png_file.h"
 
 namespace dexcheck {
 namespace {
@@ -212,6 +215,39 @@ std::string ColorOf(double value, double least, double most) {
   return fmt::format("#{:02x}{:02x}{:02x}", mix(255, 65, 8), mix(255, 182, 29), mix(204, 196, 88));
 }
 
+namespace {
+
+/// "#rrggbb"; white for none.
+std::array<std::uint8_t, 3> ReadColor(const std::string& color) {
+  if (color.empty()) return {255, 255, 255};
+  const auto part = [&](size_t at) {
+    return static_cast<std::uint8_t>(std::stoi(color.substr(at, 2), nullptr, 16));
+  };
+  return {part(1), part(3), part(5)};
+}
+
+/// The cells as a picture that stands in the page, over the whole frame.
+Html DrawCells(const HeatMap& map) {
+  const auto columns = static_cast<int>(map.x.values.size());
+  const auto rows = static_cast<int>(map.y.values.size());
+  Image image(columns, rows);
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) {
+      const auto color =
+          ReadColor(map.cells[static_cast<size_t>(j) * map.x.values.size() + static_cast<size_t>(i)].color);
+      std::copy(color.begin(), color.end(), image.Pixel(i, rows - 1 - j));
+    }
+  }
+  const TemporaryFolder folder;
+  WritePng(folder.path() / "map.png", image);
+  return FormatHtml(
+      "<image x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" preserveAspectRatio=\"none\" "
+      "style=\"image-rendering:pixelated\" href=\"data:image/png;base64,{}\"/>\n",
+      kLeft, kTop, kInnerWidth, kInnerHeight, Html::Raw(EncodeBase64(ReadBytes(folder.path() / "map.png"))));
+}
+
+}  // namespace
+
 Html DrawHeatMap(const HeatMap& map) {
   const size_t columns = map.x.values.size();
   const size_t rows = map.y.values.size();
@@ -221,7 +257,8 @@ Html DrawHeatMap(const HeatMap& map) {
   const auto top = [&](double row) { return kTop + kInnerHeight - h * (row + 1.0); };
   Html svg = Open(map.title, kWidth + (map.range ? kScaleRoom : 0.0), kHeight);
   Html edges;
-  for (size_t j = 0; j < rows; ++j) {
+  if (map.as_image) svg += DrawCells(map);
+  for (size_t j = 0; j < rows && !map.as_image; ++j) {
     for (size_t i = 0; i < columns; ++i) {
       const HeatCell& cell = map.cells[j * columns + i];
       if (cell.color.empty()) continue;

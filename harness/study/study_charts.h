@@ -39,6 +39,7 @@ struct HeatMap {
   bool with_boundary = false;
   std::optional<std::array<double, 2>> range;  ///< Of the values that colours stand for; none for no scale.
   std::vector<Dots> overlays;
+  bool as_image = false;  ///< A picture with a pixel for each cell, without titles and links.
 };
 Html DrawHeatMap(const HeatMap& map);
 

@@ -17,7 +17,8 @@ using Json = nlohmann::ordered_json;
 std::vector<const TrialRow*> ChooseRows(const StudyResults& results) {
   std::vector<const TrialRow*> chosen;
   const size_t every = (results.rows.size() + kMostExplored - 1) / kMostExplored;
-  for (size_t i = 0; i < results.rows.size(); i += std::max(every, size_t{1})) chosen.push_back(&results.rows[i]);
+  for (size_t i = 0; i < results.rows.size(); i += std::max(every, size_t{1}))
+    chosen.push_back(&results.rows[i]);
   if (every <= 1) return chosen;
   chosen.insert(chosen.end(), results.listed.begin(), results.listed.end());
   std::sort(chosen.begin(), chosen.end(),
@@ -37,7 +38,7 @@ Json ListColumns(const Study& study) {
   }
   for (int i = 0; i < kNumMetrics; ++i) {
     const auto metric = static_cast<Metric>(i);
-    columns.push_back({{"name", kMetrics[i].name}, {"label", LabelOf(metric)}});
+    columns.push_back({{"name", kMetrics[metric].name}, {"label", LabelOf(metric)}});
     if (metric == kConeMargin || metric == kSimulatedTime) columns.back()["larger"] = true;
   }
   return columns;
@@ -55,7 +56,8 @@ Json ListHistory(const StudyResults& results) {
 /// For a script element: "</script>" must not be in it.
 std::string Dump(const Json& json) {
   std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-  for (size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at)) text.replace(at, 1, "\\u003c");
+  for (size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at))
+    text.replace(at, 1, "\\u003c");
   return text;
 }
 
@@ -66,36 +68,50 @@ Html MakeExplorerStyle() { return Html::Raw(kExplorerCss); }
 Html MakeExplorer(const StudyResults& results) {
   const bool has_history = results.study.is_search() && !results.study.objectives.empty();
   Html html(
-      "<section id=\"explore\"><h2>Look closer</h2>\n<div class=\"tools\"><label>of <select id=\"explore-outcome\">"
-      "</select></label><label>where <input id=\"explore-filter\" placeholder=\"energy &lt; 3, control.K_p &gt; 10\">"
+      "<section id=\"explore\"><h2>Look closer</h2>\n<div class=\"tools\"><label>of <select "
+      "id=\"explore-outcome\">"
+      "</select></label><label>where <input id=\"explore-filter\" placeholder=\"energy &lt; 3, control.K_p "
+      "&gt; 10\">"
       "</label><span id=\"explore-count\" class=\"soft\"></span></div>\n<div class=\"grid\">\n");
   if (has_history) {
     html +=
-        "<section class=\"card\"><h3>The best so far</h3><canvas id=\"explore-history\" class=\"wide\"></canvas>"
-        "<p class=\"soft\">Each point of the search, and the best until then; strokes at the top do not fulfil the "
+        "<section class=\"card\"><h3>The best so far</h3><canvas id=\"explore-history\" "
+        "class=\"wide\"></canvas>"
+        "<p class=\"soft\">Each point of the search, and the best until then; strokes at the top do not "
+        "fulfil the "
         "constraints.</p></section>\n";
   }
   html +=
-      "<section class=\"card\"><h3>Any two</h3><div class=\"tools\"><label>along <select id=\"explore-x\"></select>"
-      "</label><label>up <select id=\"explore-y\"></select></label><label>colour <select id=\"explore-color\"></select>"
-      "</label></div><canvas id=\"explore-scatter\"></canvas><p class=\"soft\" id=\"explore-front\"></p></section>\n";
+      "<section class=\"card\"><h3>Any two</h3><div class=\"tools\"><label>along <select "
+      "id=\"explore-x\"></select>"
+      "</label><label>up <select id=\"explore-y\"></select></label><label>colour <select "
+      "id=\"explore-color\"></select>"
+      "</label></div><canvas id=\"explore-scatter\"></canvas><p class=\"soft\" "
+      "id=\"explore-front\"></p></section>\n";
   if (results.study.variations.size() > 1) {
     html +=
-        "<section class=\"card\"><h3>Over two keys</h3><div class=\"tools\"><label>along <select id=\"explore-cx\">"
-        "</select></label><label>up <select id=\"explore-cy\"></select></label><label>mean of <select id=\"explore-cz\">"
-        "</select></label></div><canvas id=\"explore-contour\"></canvas><p class=\"soft\" id=\"explore-range\"></p>"
+        "<section class=\"card\"><h3>Over two keys</h3><div class=\"tools\"><label>along <select "
+        "id=\"explore-cx\">"
+        "</select></label><label>up <select id=\"explore-cy\"></select></label><label>mean of <select "
+        "id=\"explore-cz\">"
+        "</select></label></div><canvas id=\"explore-contour\"></canvas><p class=\"soft\" "
+        "id=\"explore-range\"></p>"
         "</section>\n";
   }
   html +=
       "<section class=\"card\"><h3>All keys</h3><canvas id=\"explore-parallel\" class=\"wide\"></canvas><p "
       "class=\"soft\">Drag along an axis to keep a part of it, click on it to keep all.</p></section>\n"
-      "<section class=\"card\"><h3>Which key goes with <span id=\"explore-importance-of\"></span></h3><table><tbody "
-      "id=\"explore-importance\"></tbody></table><p class=\"soft\">Correlation of ranks over the trials that were "
+      "<section class=\"card\"><h3>Which key goes with <span "
+      "id=\"explore-importance-of\"></span></h3><table><tbody "
+      "id=\"explore-importance\"></tbody></table><p class=\"soft\">Correlation of ranks over the trials that "
+      "were "
       "held.</p></section>\n</div>\n"
       "<section class=\"card\" id=\"explore-chosen\" hidden><h3 id=\"explore-which\"></h3><p class=\"soft\" "
-      "id=\"explore-numbers\"></p><p>Its run, with its film:</p><pre id=\"explore-command\"></pre><p>What its errors are "
+      "id=\"explore-numbers\"></p><p>Its run, with its film:</p><pre id=\"explore-command\"></pre><p>What "
+      "its errors are "
       "made of:</p><pre id=\"explore-budget\"></pre></section>\n"
-      "<div class=\"card scroll\"><table><thead><tr id=\"explore-head\"></tr></thead><tbody id=\"explore-body\"></tbody>"
+      "<div class=\"card scroll\"><table><thead><tr id=\"explore-head\"></tr></thead><tbody "
+      "id=\"explore-body\"></tbody>"
       "</table></div>\n</section>\n";
   return html;
 }
@@ -103,8 +119,9 @@ Html MakeExplorer(const StudyResults& results) {
 Html MakeExplorerScript(const StudyResults& results) {
   const Study& study = results.study;
   const std::vector<const TrialRow*> rows = ChooseRows(results);
-  Json data = {{"scenario", study.scenario}, {"overrides", study.overrides}, {"check", study.check},
-               {"seeds", study.seeds.size()}, {"total", results.rows.size()}, {"columns", ListColumns(study)}};
+  Json data = {{"scenario", study.scenario},   {"overrides", study.overrides},
+               {"check", study.check},         {"seeds", study.seeds.size()},
+               {"total", results.rows.size()}, {"columns", ListColumns(study)}};
   data["keys"] = Json::array();
   for (const Variation& variation : study.variations) data["keys"].push_back(variation.key);
   data["shown"] = Json::array();

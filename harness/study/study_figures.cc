@@ -19,6 +19,9 @@ constexpr std::array<const char*, kNumOutcomes> kOutcomeColors = {
 constexpr const char* kStabilityColor = "#0b3c8c";
 constexpr const char* kDampingColor = "#ffffff";
 constexpr size_t kMostLines = 6;
+constexpr size_t kMostListed = 2000;       // trials that a page has one by one
+constexpr size_t kMostOfALine = 500;       // points
+constexpr double kMostLinkedCells = 2500;  // of a map; one with more is an image
 
 using IsWorse = std::function<bool(const TrialRow&, const TrialRow&)>;
 
@@ -53,8 +56,8 @@ class Grid {
         continue;
       }
       const Outcome outcome = row->result.outcome;
-      map.cells.push_back(
-          {FindColor(outcome), Describe(results_.study, *row), LinkTo(*row), IsHeld(outcome)});
+      map.cells.push_back({FindColor(outcome), map.as_image ? "" : Describe(results_.study, *row),
+                           map.as_image ? "" : LinkTo(*row), IsHeld(outcome)});
     }
     map.overlays = {FindBoundary(kStabilityColor, IsStableInTheory),
                     FindBoundary(kDampingColor, IsDampedInTheory)};
@@ -81,8 +84,9 @@ class Grid {
     if (least <= most) map.range = {least, most};
     for (const TrialRow* row : cells) {
       const double value = find_value(row);
-      map.cells.push_back(row == nullptr
-                              ? HeatCell{}
+      map.cells.push_back(row == nullptr ? HeatCell{}
+                          : map.as_image
+                              ? HeatCell{ColorOf(value, least, most), "", "", !(value > kVisibleOvershoot)}
                               : HeatCell{ColorOf(value, least, most),
                                          fmt::format("{:.4g}; {}", value, Describe(results_.study, *row)),
                                          LinkTo(*row), !(value > kVisibleOvershoot)});
@@ -98,7 +102,12 @@ class Grid {
   }
 
  private:
-  [[nodiscard]] HeatMap MakeMap(const std::string& title) const { return {title, x_, y_, {}, false, {}, {}}; }
+  [[nodiscard]] HeatMap MakeMap(const std::string& title) const {
+    HeatMap map{title, x_, y_, {}, false, {}, {}};
+    map.as_image =
+        static_cast<double>(x_.values.size()) * static_cast<double>(y_.values.size()) > kMostLinkedCells;
+    return map;
+  }
 
   [[nodiscard]] Dots FindBoundary(const char* color, const TheoryTest& test) const {
     return {color, FindTurns(results_.inputs, results_.rows.front().trial.parameters, test)};
@@ -139,6 +148,16 @@ std::vector<double> ChooseLines(const Study& study) {
   return chosen;
 }
 
+/// Every so many points of a long line.
+void Thin(std::vector<std::pair<double, double>>* points) {
+  const size_t every = (points->size() + kMostOfALine - 1) / kMostOfALine;
+  if (every <= 1) return;
+  std::vector<std::pair<double, double>> fewer;
+  for (size_t i = 0; i < points->size(); i += every) fewer.push_back((*points)[i]);
+  fewer.push_back(points->back());
+  *points = std::move(fewer);
+}
+
 /// From the least error on, those that need less work than all before.
 std::vector<const TrialRow*> ListFront(const std::vector<const TrialRow*>& tracked) {
   std::vector<const TrialRow*> front;
@@ -152,7 +171,8 @@ std::vector<const TrialRow*> ListFront(const std::vector<const TrialRow*>& track
 
 }  // namespace
 
-StudyResults::StudyResults(const StudyStore& store) : study(store.study()), rows(store.ReadRows()) {
+StudyResults::StudyResults(const StudyStore& store)
+    : study(store.study()), rows(store.ReadRows(0, /*with_machine=*/false)) {
   inputs.study = study;
   inputs.scenario_text = store.Identify("scenario");
   inputs.scenario_source = study.scenario;
@@ -162,6 +182,17 @@ StudyResults::StudyResults(const StudyStore& store) : study(store.study()), rows
     }
   }
   if (metrics.empty()) metrics = {kPositionErrorRms, kPeakEffort, kConeMargin};
+  const size_t every = (rows.size() + kMostListed - 1) / kMostListed;
+  for (size_t i = 0; i < rows.size(); i += std::max(every, size_t{1})) listed.push_back(&rows[i]);
+  if (every <= 1) return;
+  const std::vector<const TrialRow*> tracked = ListTracked();
+  listed.insert(listed.end(), tracked.begin(),
+                tracked.begin() + static_cast<std::ptrdiff_t>(std::min(tracked.size(), kMostBest)));
+  const std::vector<const TrialRow*> front = ListFront(tracked);
+  listed.insert(listed.end(), front.begin(), front.end());
+  std::sort(listed.begin(), listed.end(),
+            [](const TrialRow* a, const TrialRow* b) { return a->trial.number < b->trial.number; });
+  listed.erase(std::unique(listed.begin(), listed.end()), listed.end());
 }
 
 std::vector<const TrialRow*> StudyResults::ListTracked() const {
@@ -204,9 +235,9 @@ Html DrawOutcomes(const StudyResults& results) {
   if (IsGrid(study)) return Grid(results).DrawOutcomes();
   // Samples: where they lie.
   Chart chart = MakeChart("outcome", study.variations[0].key, study.variations[1].key);
-  for (const TrialRow& row : results.rows) {
-    chart.points.push_back({row.trial.parameters[0], row.trial.parameters[1], FindColor(row.result.outcome),
-                            Describe(study, row), LinkTo(row)});
+  for (const TrialRow* row : results.listed) {
+    chart.points.push_back({row->trial.parameters[0], row->trial.parameters[1],
+                            FindColor(row->result.outcome), Describe(study, *row), LinkTo(*row)});
   }
   return DrawChart(chart);
 }
@@ -247,6 +278,7 @@ Html DrawLines(const StudyResults& results) {
                                 Describe(study, row), LinkTo(row)});
       }
       std::sort(line.points.begin(), line.points.end());
+      Thin(&line.points);
       if (line.points.empty()) continue;
       // Between texts there is no line.
       if (!chart.x.labels.empty()) line.points.clear();
@@ -265,7 +297,8 @@ Html DrawErrorAgainstEffort(const StudyResults& results) {
   for (const TrialRow* row : ListFront(tracked)) {
     line.points.emplace_back(row->result.metrics[kEnergy], row->result.metrics[kPositionErrorRms]);
   }
-  for (const TrialRow* row : tracked) {
+  for (const TrialRow* row : results.listed) {
+    if (row->result.outcome != Outcome::kTracked) continue;
     chart.points.push_back({row->result.metrics[kEnergy], row->result.metrics[kPositionErrorRms],
                             FindColor(Outcome::kTracked), Describe(results.study, *row), LinkTo(*row)});
   }

@@ -13,15 +13,24 @@ namespace dexcheck {
 /// A study and what came of it.
 struct StudyResults {
   explicit StudyResults(const StudyStore& store);
+  StudyResults(const StudyResults&) = delete;  // `listed` points into `rows`
+  StudyResults& operator=(const StudyResults&) = delete;
 
   Study study;
   StudyInputs inputs;  ///< As far as the database keeps them: for scenarios of trials.
   std::vector<TrialRow> rows;
   std::vector<Metric> metrics;  ///< To be shown.
+  /// Trials that the page has one by one: all of a small study, else an even part, the best and the front; by
+  /// number.
+  std::vector<const TrialRow*> listed;
+  [[nodiscard]] bool lists_all() const { return listed.size() == rows.size(); }
 
   /// Trials that tracked, least rms position error first.
   [[nodiscard]] std::vector<const TrialRow*> ListTracked() const;
 };
+
+/// Trials in the table of the best.
+constexpr size_t kMostBest = 20;
 
 /// Overshoot that can be seen, relative to the start error; larger than what settling leaves.
 constexpr double kVisibleOvershoot = 0.01;

@@ -239,13 +239,19 @@ void ReadSearch(const TomlValue& value, Study* study) {
                                                  {"nsga2", SearchMethod::kNsga2},
                                                  {"nelder_mead", SearchMethod::kNelderMead},
                                                  {"bobyqa", SearchMethod::kBobyqa},
-                                                 {"margins", SearchMethod::kMargins}});
+                                                 {"margins", SearchMethod::kMargins},
+                                                 {"external", SearchMethod::kExternal}});
   if (search.method == SearchMethod::kMargins) {
     ReadMargins(&table, study);
     return;
   }
   const TomlValue count = table.Get("count");
   search.count = count.AsWhole(1, kMaxTrials);
+  if (search.method == SearchMethod::kExternal) {
+    table.RejectUnused();
+    if (study->objectives.empty()) method.Reject("a search needs an [[objective]]");
+    return;
+  }
   if (search.method == SearchMethod::kCmaEs || search.method == SearchMethod::kNsga2) {
     search.population = 16;
     if (const auto population = table.Find("population")) {

@@ -9,14 +9,17 @@
 #include "harness/base/shell.h"
 #include "harness/report/html.h"
 #include "harness/report/page_assets.h"
+#include "harness/study/study_answer.h"
+#include "harness/study/study_explorer.h"
 #include "harness/study/study_figures.h"
 #include "harness/study/study_theory.h"
 
 namespace dexcheck {
 namespace {
 
-constexpr size_t kMostBest = 20;
-constexpr const char* kContentPolicy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'";
+constexpr size_t kMostAsked = 2000;  // trials that theory is asked about
+constexpr const char* kContentPolicy =
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
 // On top of what pages of runs look like.
 constexpr const char* kStyle = R"(
@@ -57,23 +60,28 @@ class Report {
   explicit Report(const StudyStore& store)
       : store_(store), results_(store), tracked_(results_.ListTracked()) {}
 
-  std::string Make() {
-    Html html = FormatHtml(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+  std::string Make(double renew) {
+    Html html("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
+    if (renew > 0.0)
+      html += FormatHtml("<meta http-equiv=\"refresh\" content=\"{:.0f}\">\n", std::ceil(renew));
+    html += FormatHtml(
+        "<meta name=\"viewport\" "
         "content=\"width=device-width, initial-scale=1\">\n<meta http-equiv=\"Content-Security-Policy\" "
         "content=\"{}\">\n<title>{} – dexcheck study</title>\n<link rel=\"icon\" "
-        "href=\"data:,\">\n<style>\n{}{}</style>\n</head>\n<body>\n",
-        kContentPolicy, results_.study.name, Html::Raw(kPageCss), Html(kStyle));
+        "href=\"data:,\">\n<style>\n{}{}{}</style>\n</head>\n<body>\n",
+        kContentPolicy, results_.study.name, Html::Raw(kPageCss), Html(kStyle), MakeExplorerStyle());
     html += Head();
     html += "<main>\n";
     if (results_.rows.empty()) {
       html += "<p>No trial is done yet.</p>\n";
     } else {
-      for (const Html& part : {Outcomes(), Maps(), Lines(), ErrorAgainstEffort(), Best(), Trials()})
+      for (const Html& part : {Answers(), Outcomes(), Maps(), Lines(), ErrorAgainstEffort(),
+                               MakeExplorer(results_), Best(), Trials()})
         html += part;
     }
     html += "</main>\n";
     html += Footer();
+    if (!results_.rows.empty()) html += MakeExplorerScript(results_);
     html += "</body>\n</html>\n";
     return html.markup();
   }
@@ -102,8 +110,19 @@ class Report {
     }
     html +=
         "</div>\n</header>\n<nav><div><a href=\"#outcomes\">Outcomes</a><a href=\"#maps\">Maps</a><a "
-        "href=\"#lines\">Lines</a><a href=\"#effort\">Effort</a><a href=\"#best\">Best</a><a "
+        "href=\"#lines\">Lines</a><a href=\"#effort\">Effort</a><a href=\"#explore\">Look closer</a><a "
+        "href=\"#best\">Best</a><a "
         "href=\"#trials\">Trials</a></div></nav>\n";
+    return html;
+  }
+
+  /// What the study answers, first of all.
+  [[nodiscard]] Html Answers() const {
+    const std::vector<std::string> answers = AnswerStudy(results_.study, results_.rows);
+    if (answers.empty()) return {};
+    Html html("<section class=\"card answers\" id=\"answers\">\n");
+    for (const std::string& answer : answers) html += FormatHtml("<p>{}</p>\n", answer);
+    html += "</section>\n";
     return html;
   }
 
@@ -133,7 +152,9 @@ class Report {
     std::map<std::string, long> reasons;
     long agree = 0;
     long asked = 0;
-    for (const TrialRow& row : results_.rows) {
+    const size_t every = (results_.rows.size() + kMostAsked - 1) / kMostAsked;
+    for (size_t i = 0; i < results_.rows.size(); i += every) {
+      const TrialRow& row = results_.rows[i];
       if (row.result.outcome == Outcome::kRefused) continue;
       ++asked;
       const bool stable = IsStableInTheory(results_.inputs, row.trial.parameters);
@@ -250,9 +271,16 @@ class Report {
   [[nodiscard]] Html Trials() const {
     Html html(
         "<h2 id=\"trials\">Trials</h2>\n<p class=\"soft\">Each command repeats one trial, with its log, "
-        "report and "
-        "video.</p>\n<div class=\"card trials\">\n");
-    for (const TrialRow& row : results_.rows) {
+        "report and video.");
+    if (!results_.lists_all()) {
+      html += FormatHtml(
+          " Here are {} of {} trials; <code>dexcheck study show DB NUMBER</code> tells of any other, "
+          "<code>dexcheck study export DB</code> writes all as CSV.",
+          results_.listed.size(), results_.rows.size());
+    }
+    html += "</p>\n<div class=\"card trials\">\n";
+    for (const TrialRow* listed : results_.listed) {
+      const TrialRow& row = *listed;
       std::string metrics;
       for (size_t i = 0; i < kMetrics.size(); ++i) {
         const double value = row.result.metrics[i];
@@ -296,6 +324,6 @@ std::string MakeReplayCommand(const Study& study, const Trial& trial) {
   return command + fmt::format(" --video --out trial-{}", trial.number);
 }
 
-std::string MakeStudyReport(const StudyStore& store) { return Report(store).Make(); }
+std::string MakeStudyReport(const StudyStore& store, double renew) { return Report(store).Make(renew); }
 
 }  // namespace dexcheck

@@ -19,7 +19,8 @@ namespace {
 /// So often a trial is begun whose process is killed from outside every time.
 constexpr int kMostTries = 3;
 
-/// A pool that stores what its trials come to.
+/// A pool that stores what its trials come to. Claims and rows go into the database together, as many as fall
+/// into kTogether: a transaction waits for the disk, which costs more than a short trial.
 class TrialMaker {
  public:
   TrialMaker(const StudyInputs& inputs, const RunOptions& options, StudyStore* store)
@@ -31,21 +32,18 @@ class TrialMaker {
 
   /// Makes those of the trials that nobody else has. @param done is called with each row.
   void Run(const std::vector<Trial>& trials, const std::function<void(const TrialRow&)>& done) {
-    std::deque<Trial> waiting(trials.begin(), trials.end());
+    waiting_.assign(trials.begin(), trials.end());
     try {
-      while (!options_.is_interrupted() && (!waiting.empty() || !pool_.IsEmpty())) {
-        while (!pool_.IsFull() && !waiting.empty()) {
-          const Trial trial = waiting.front();
-          waiting.pop_front();
-          if (store_->Claim(trial.number)) pool_.Start(trial);
+      while (!options_.is_interrupted() && (!waiting_.empty() || !claimed_.empty() || !pool_.IsEmpty())) {
+        ClaimSome();
+        while (!pool_.IsFull() && !claimed_.empty()) {
+          pool_.Start(claimed_.front());
+          claimed_.pop_front();
         }
-        auto ended = pool_.Wait();
-        if (!ended) continue;
-        if (ended->killed_from_outside && !Bury(&*ended, &waiting)) continue;
-        ended->row.machine = machine_;
-        store_->Add(ended->row);
-        done(ended->row);
+        if (auto ended = pool_.Wait()) Take(&*ended);
+        if (Clock::now() - stored_ > kTogether || pool_.IsEmpty()) Store(done);
       }
+      Store(done);
     } catch (const InputError&) {
       throw;  // the database takes no more; nothing can be released in it
     } catch (const Error&) {
@@ -56,13 +54,44 @@ class TrialMaker {
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds kTogether{200};
+
+  /// As many as were done since the last time, and one for each job.
+  void ClaimSome() {
+    if (pool_.IsFull() || !claimed_.empty() || waiting_.empty()) return;
+    std::map<long, Trial> some;
+    while (!waiting_.empty() && some.size() < recent_ + static_cast<size_t>(options_.jobs)) {
+      some.emplace(waiting_.front().number, waiting_.front());
+      waiting_.pop_front();
+    }
+    std::vector<long> numbers;
+    for (const auto& [number, trial] : some) numbers.push_back(number);
+    for (const long number : store_->Claim(numbers)) claimed_.push_back(some.at(number));
+  }
+
+  void Take(EndedTrial* ended) {
+    if (ended->killed_from_outside && !Bury(ended)) return;
+    ended->row.machine = machine_;
+    rows_.push_back(std::move(ended->row));
+  }
+
+  void Store(const std::function<void(const TrialRow&)>& done) {
+    stored_ = Clock::now();
+    if (rows_.empty()) return;
+    store_->Add(rows_);
+    for (const TrialRow& row : rows_) done(row);
+    recent_ = rows_.size();
+    rows_.clear();
+  }
+
   /// Whether a trial whose process was killed from outside is given up. With all others when it is this
   /// program that is ended; else it is tried once more, when others are done.
-  bool Bury(EndedTrial* ended, std::deque<Trial>* waiting) {
+  bool Bury(EndedTrial* ended) {
     const Trial& trial = ended->row.trial;
     const bool again = ++tries_[trial.number] < kMostTries;
     if (again || options_.is_interrupted()) store_->Release(trial.number);
-    if (again) waiting->push_back(trial);
+    if (again) waiting_.push_back(trial);
     if (again || options_.is_interrupted()) return false;
     ended->row.result.failure += ", " + std::to_string(kMostTries) + " times";
     return true;
@@ -70,12 +99,18 @@ class TrialMaker {
 
   void Release() {
     for (const long trial : pool_.ListRunning()) store_->Release(trial);
+    for (const Trial& trial : claimed_) store_->Release(trial.number);
+    claimed_.clear();
   }
 
   const RunOptions& options_;
   StudyStore* store_;
   std::string machine_;
   std::map<long, int> tries_;
+  std::deque<Trial> waiting_, claimed_;
+  std::vector<TrialRow> rows_;  // not stored yet
+  size_t recent_ = 0;           // rows that were stored last
+  Clock::time_point stored_ = Clock::now();
   TrialPool pool_;
 };
 

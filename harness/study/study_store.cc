@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <set>
+#include <unordered_map>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -162,6 +163,8 @@ void StudyStore::Adopt(const StudyIdentity& identity, const Study& study,
     StudyChange changed = ChangeStudy(study_, study, ReadRows(std::numeric_limits<long>::min()));
     database_->Execute("DELETE FROM trials");
     study_ = study;
+    insert_.reset();  // their columns' order
+    find_.reset();
     for (const TrialRow& row : changed.rows) Insert(row);
     Update("study", study.text);
     Update("name", study.name);
@@ -204,31 +207,60 @@ std::vector<long> StudyStore::ListNumbers() const {
   return numbers;
 }
 
-std::vector<TrialRow> StudyStore::ReadRows(long first) const {
+std::map<Outcome, long> StudyStore::CountOutcomes() const {
+  Statement select(database_.get(), "SELECT outcome, count(*) FROM trials WHERE trial >= 0 GROUP BY outcome");
+  std::map<Outcome, long> counts;
+  while (select.Step()) {
+    const auto outcome = FindOutcome(select.GetText(0));
+    if (outcome) counts[*outcome] = static_cast<long>(select.GetWhole(1));
+  }
+  return counts;
+}
+
+std::vector<TrialRow> StudyStore::ReadRows(long first, bool with_machine) const {
+  std::vector<TrialRow> rows;
+  ForEachRow([&](TrialRow&& row) { rows.push_back(std::move(row)); }, first, with_machine);
+  return rows;
+}
+
+void StudyStore::ForEachRow(const std::function<void(TrialRow&&)>& take, long first,
+                            bool with_machine) const {
   Statement select(database_.get(),
                    "SELECT " + ListColumns() + " FROM trials WHERE trial >= ? ORDER BY trial");
   select.Bind(1, static_cast<long long>(first));
-  std::vector<TrialRow> rows;
-  while (select.Step()) {
-    TrialRow row;
-    int column = 0;
-    row.trial.number = static_cast<long>(select.GetWhole(column++));
-    row.trial.seed = static_cast<std::uint64_t>(select.GetWhole(column++));
-    for (size_t i = 0; i < study_.variations.size(); ++i) {
-      row.trial.parameters.push_back(select.GetNumber(column++));
-    }
-    const std::string outcome = select.GetText(column++);
-    if (!FindOutcome(outcome)) {
-      throw InputError(database_->name() + ": trial " + std::to_string(row.trial.number) +
-                       ": outcome: unknown, got " + Quote(outcome));
-    }
-    row.result.outcome = *FindOutcome(outcome);
-    row.result.failure = select.GetText(column++);
-    for (double& metric : row.result.metrics) metric = select.GetNumber(column++);
-    row.machine = select.GetText(column++);
-    rows.push_back(row);
+  while (select.Step()) take(ReadRow(select, with_machine));
+}
+
+TrialRow StudyStore::ReadRow(const Statement& select, bool with_machine) const {
+  TrialRow row;
+  int column = 0;
+  row.trial.number = static_cast<long>(select.GetWhole(column++));
+  row.trial.seed = static_cast<std::uint64_t>(select.GetWhole(column++));
+  row.trial.parameters.reserve(study_.variations.size());
+  for (size_t i = 0; i < study_.variations.size(); ++i)
+    row.trial.parameters.push_back(select.GetNumber(column++));
+  const std::string outcome = select.GetText(column++);
+  if (!FindOutcome(outcome)) {
+    throw InputError(database_->name() + ": trial " + std::to_string(row.trial.number) +
+                     ": outcome: unknown, got " + Quote(outcome));
   }
-  return rows;
+  row.result.outcome = *FindOutcome(outcome);
+  row.result.failure = select.GetText(column++);
+  for (double& metric : row.result.metrics) metric = select.GetNumber(column++);
+  if (with_machine) row.machine = select.GetText(column);
+  return row;
+}
+
+std::optional<TrialRow> StudyStore::FindRow(long trial) const {
+  if (!find_) {
+    find_ = std::make_unique<Statement>(database_.get(),
+                                        "SELECT " + ListColumns() + " FROM trials WHERE trial = ?");
+  }
+  find_->Bind(1, static_cast<long long>(trial));
+  std::optional<TrialRow> row;
+  if (find_->Step()) row = ReadRow(*find_, /*with_machine=*/true);
+  find_->Reset();
+  return row;
 }
 
 bool StudyStore::Has(long trial) const {
@@ -237,18 +269,25 @@ bool StudyStore::Has(long trial) const {
   return select.Step();
 }
 
-bool StudyStore::Claim(long trial) {
+std::vector<long> StudyStore::Claim(const std::vector<long>& trials) {
   Transaction transaction(database_.get());
-  if (Has(trial)) return false;
   Statement owner(database_.get(), "SELECT process FROM claims WHERE trial = ?");
-  owner.Bind(1, static_cast<long long>(trial));
-  if (owner.Step() && IsRunningHere(owner.GetText(0))) return false;
   Statement claim(database_.get(), "INSERT OR REPLACE INTO claims VALUES (?, ?)");
-  claim.Bind(1, static_cast<long long>(trial));
-  claim.Bind(2, NameThisProcess());
-  claim.Step();
+  const std::string self = NameThisProcess();
+  std::vector<long> claimed;
+  for (const long trial : trials) {
+    if (Has(trial)) continue;
+    owner.Bind(1, static_cast<long long>(trial));
+    const bool taken = owner.Step() && IsRunningHere(owner.GetText(0));
+    owner.Reset();
+    if (taken) continue;
+    claim.Bind(1, static_cast<long long>(trial));
+    claim.Bind(2, self);
+    claim.Step();
+    claimed.push_back(trial);
+  }
   transaction.Commit();
-  return true;
+  return claimed;
 }
 
 void StudyStore::Release(long trial) {
@@ -259,10 +298,13 @@ void StudyStore::Release(long trial) {
 }
 
 void StudyStore::Insert(const TrialRow& row) {
-  std::string marks = "?, ?, ?, ?, ?";
-  for (size_t i = 0; i < study_.variations.size() + kNumMetrics; ++i) marks += ", ?";
-  Statement insert(database_.get(),
-                   "INSERT OR IGNORE INTO trials (" + ListColumns() + ") VALUES (" + marks + ")");
+  if (!insert_) {
+    std::string marks = "?, ?, ?, ?, ?";
+    for (size_t i = 0; i < study_.variations.size() + kNumMetrics; ++i) marks += ", ?";
+    insert_ = std::make_unique<Statement>(
+        database_.get(), "INSERT OR IGNORE INTO trials (" + ListColumns() + ") VALUES (" + marks + ")");
+  }
+  Statement& insert = *insert_;
   int parameter = 1;
   insert.Bind(parameter++, static_cast<long long>(row.trial.number));
   insert.Bind(parameter++, static_cast<long long>(row.trial.seed));
@@ -274,10 +316,12 @@ void StudyStore::Insert(const TrialRow& row) {
   insert.Step();
 }
 
-void StudyStore::Add(const TrialRow& row) {
+void StudyStore::Add(const std::vector<TrialRow>& rows) {
   Transaction transaction(database_.get());
-  Insert(row);
-  Release(row.trial.number);
+  for (const TrialRow& row : rows) {
+    Insert(row);
+    Release(row.trial.number);
+  }
   transaction.Commit();
 }
 
@@ -289,29 +333,25 @@ void StudyStore::Remove(long trial) {
 
 void StudyStore::AddAll(const std::vector<TrialSource>& sources) {
   Transaction transaction(database_.get());
-  struct Known {
-    TrialRow row;
-    const std::string* source;
-  };
-  std::map<long, Known> known;
-  for (const TrialRow& row : ReadRows()) known.insert({row.trial.number, {row, &database_->name()}});
+  std::unordered_map<long, const std::string*> added;  // from which source
   for (const TrialSource& source : sources) {
-    for (const TrialRow& row : source.rows) {
-      const auto found = known.find(row.trial.number);
-      if (found != known.end()) {
-        const Known& other = found->second;
+    for (const TrialRow& row : source.read()) {
+      const long number = row.trial.number;
+      if (const auto other = FindRow(number)) {
         if (IsFailed(row.result.outcome)) continue;
-        if (IsFailed(other.row.result.outcome)) {
-          Remove(row.trial.number);
-        } else if (IsSame(other.row, row)) {
+        if (IsFailed(other->result.outcome)) {
+          Remove(number);
+        } else if (IsSame(*other, row)) {
           continue;
         } else {
-          throw InputError(source.name + ": trial " + std::to_string(row.trial.number) +
-                           " has another result than in " + *other.source);
+          const auto from = added.find(number);
+          throw InputError(source.name + ": trial " + std::to_string(number) +
+                           " has another result than in " +
+                           (from == added.end() ? database_->name() : *from->second));
         }
       }
       Insert(row);
-      known.insert_or_assign(row.trial.number, Known{row, &source.name});
+      added[number] = &source.name;
     }
   }
   transaction.Commit();

@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -36,7 +37,8 @@ struct TrialRow {
 /// Rows and where they are from, for messages.
 struct TrialSource {
   std::string name;
-  std::vector<TrialRow> rows;
+  std::function<std::vector<TrialRow>()>
+      read;  ///< Called once, when its turn comes: not all need be in memory.
 };
 
 /// Whether two rows of one trial are the same: bit for bit when one machine made both, else within rounding
@@ -59,6 +61,8 @@ class StudyStore {
   /// Opens one that exists. @throws InputError.
   static StudyStore Open(const std::filesystem::path& path);
 
+  /// The file, as it was named.
+  [[nodiscard]] const std::string& name() const { return database_->name(); }
   [[nodiscard]] const StudyIdentity& identity() const { return identity_; }
   [[nodiscard]] const std::string& Identify(const std::string& column) const;
   /// As the file has it.
@@ -69,19 +73,28 @@ class StudyStore {
   /// What was changed when the study was opened, in words; empty when nothing was.
   [[nodiscard]] const std::string& change() const { return change_; }
 
-  /// By trial number. @param first number that is read.
-  [[nodiscard]] std::vector<TrialRow> ReadRows(long first = 0) const;
+  /// By trial number. @param first number that is read. @param with_machine whether rows say which machine
+  /// made them.
+  [[nodiscard]] std::vector<TrialRow> ReadRows(long first = 0, bool with_machine = true) const;
+  /// How many trials have a row, by outcome.
+  [[nodiscard]] std::map<Outcome, long> CountOutcomes() const;
+  /// Calls `take` with each row, by trial number.
+  void ForEachRow(const std::function<void(TrialRow&&)>& take, long first = 0,
+                  bool with_machine = true) const;
+  [[nodiscard]] std::optional<TrialRow> FindRow(long trial) const;
   /// Numbers of the trials that have a row, ascending.
   [[nodiscard]] std::vector<long> ListNumbers() const;
   [[nodiscard]] bool Has(long trial) const;
 
-  /// Takes a trial on for this process. False when it is done, or another living process of this machine has
-  /// it.
-  bool Claim(long trial);
+  /// Takes trials on for this process. @return those of them that are not done, and that no other living
+  /// process of this machine has.
+  std::vector<long> Claim(const std::vector<long>& trials);
+  bool Claim(long trial) { return !Claim(std::vector<long>{trial}).empty(); }
   /// Gives a claimed trial back undone.
   void Release(long trial);
-  /// Stores a trial and ends its claim. A row that is already there stays.
-  void Add(const TrialRow& row);
+  /// Stores trials and ends their claims, in one transaction. A row that is already there stays.
+  void Add(const std::vector<TrialRow>& rows);
+  void Add(const TrialRow& row) { Add(std::vector<TrialRow>{row}); }
   /// All rows in one transaction. Those that are the same as one that is there may be, and failed ones
   /// (IsFailed) give way to others. @throws InputError when one differs; then nothing is added.
   void AddAll(const std::vector<TrialSource>& sources);
@@ -100,9 +113,12 @@ class StudyStore {
   void Remove(long trial);
   void Load();
   void Insert(const TrialRow& row);
+  [[nodiscard]] TrialRow ReadRow(const Statement& select, bool with_machine) const;
   [[nodiscard]] std::string ListColumns() const;
 
   std::unique_ptr<Database> database_;
+  std::unique_ptr<Statement> insert_;        // prepared once
+  mutable std::unique_ptr<Statement> find_;  // likewise
   StudyIdentity identity_;
   Study study_;
   std::string change_;

@@ -1,6 +1,8 @@
 #pragma once
 
-// Trials in processes of their own: one that crashes costs no other.
+// Trials in processes of their own: one that crashes costs no other. A process makes one trial after another
+// and keeps its memory between them; nothing else is left of a trial, so that rows do not depend on who made
+// them.
 
 #include <functional>
 #include <optional>
@@ -20,7 +22,7 @@ struct EndedTrial {
   bool killed_from_outside = false;
 };
 
-/// Processes that each make one trial. They end with the pool.
+/// Processes that each make one trial at a time, begun when they are first needed. They end with the pool.
 class TrialPool {
  public:
   /// @param run makes a trial; called in the trial's process.
@@ -28,8 +30,8 @@ class TrialPool {
   ///   Outcome::kTimedOut.
   TrialPool(int size, double time_limit, std::function<TrialResult(const Trial&)> run);
 
-  [[nodiscard]] bool IsFull() const { return workers_.size() >= size_; }
-  [[nodiscard]] bool IsEmpty() const { return workers_.empty(); }
+  [[nodiscard]] bool IsFull() const { return CountBusy() >= size_; }
+  [[nodiscard]] bool IsEmpty() const { return CountBusy() == 0; }
   /// Trials that run now.
   [[nodiscard]] std::vector<long> ListRunning() const;
 
@@ -41,15 +43,19 @@ class TrialPool {
 
  private:
   struct Worker {
-    Trial trial;
     WorkerProcess process;
-    FileDescriptor messages;  // its standard error
+    FileDescriptor messages;     // its standard error
+    std::optional<Trial> trial;  // that it makes now
     std::string received;
+    double begun = 0.0;  // its processor time when the trial began, s
     bool timed_out = false;
   };
-  bool Work(const Trial& trial, int channel, int messages) const;
+  [[nodiscard]] size_t CountBusy() const;
+  bool Work(int channel, int messages) const;
+  Worker MakeWorker() const;
   void EndSlowTrials();
-  EndedTrial Finish(size_t index);
+  std::optional<EndedTrial> TakeResult(Worker* worker) const;
+  EndedTrial Bury(size_t index);
 
   size_t size_;
   double time_limit_;

@@ -6,6 +6,7 @@
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/object_tracking.h"
 #include "controller/control/posture_task.h"
+#include "tests/common/paper_robot.h"
 #include "tests/controller/control/grasp_scene.h"
 
 namespace dexcheck {
@@ -56,24 +57,6 @@ void ContactAndObjectTerms(benchmark::State& state) {
 }
 BENCHMARK(ContactAndObjectTerms)->Unit(benchmark::kMicrosecond);
 
-/// The same of a growing number of contacts, on the robot's eight fingertips in turn.
-void GrowingGrasp(benchmark::State& state) {
-  Step step;
-  GraspScene& scene = step.scene;
-  std::vector<int> fingertips;
-  std::vector<ContactCoordinates> kappa;
-  for (size_t i = 0; i < static_cast<size_t>(state.range(0)); ++i) {
-    fingertips.push_back(scene.model.fingertips()[i % scene.model.fingertips().size()]);
-    kappa.push_back(scene.kappa[i % scene.kappa.size()]);
-  }
-  GraspTerms grasp(scene.model, fingertips, scene.model.object()->body, scene.grasp.surface());
-  for (auto _ : state) {
-    grasp.SetState(scene.robot, scene.X_o, scene.X_o_dot, kappa);
-    benchmark::ClobberMemory();
-  }
-}
-BENCHMARK(GrowingGrasp)->Arg(1)->Arg(2)->Arg(4)->Arg(8)->Arg(12)->Unit(benchmark::kMicrosecond);
-
 void CalcLaw(Step* step) {
   const GraspScene& scene = step->scene;
   step->task.CalcAcceleration(scene.q, scene.xi, step->sigma_prime);
@@ -117,6 +100,110 @@ void ControlStep(benchmark::State& state) {
   }
 }
 BENCHMARK(ControlStep)->Unit(benchmark::kMicrosecond);
+
+/// The paper's robot with six fingers a hand: copies of two, aside of them.
+RobotModel MakeTwelveFingers() {
+  RobotSpec spec = testing::ReadPaperRobot(DriveVelocity::kTwist).spec();
+  const RobotModel eight(spec);
+  constexpr double kAside = 0.02;  // m
+  for (const int original : {0, 1, 4, 5}) {
+    Frame tip = spec.frames[static_cast<size_t>(eight.fingertips()[static_cast<size_t>(original)])];
+    std::vector<int> chain;
+    for (int i = tip.link; chain.size() < 4; i = spec.joints[static_cast<size_t>(i)].parent)
+      chain.insert(chain.begin(), i);
+    int parent = spec.joints[static_cast<size_t>(chain.front())].parent;
+    for (const int i : chain) {
+      Joint joint = spec.joints[static_cast<size_t>(i)];
+      joint.name += "_more";
+      joint.link += "_more";
+      joint.parent = parent;
+      if (i == chain.front()) joint.X_PB.translation().y() += kAside;
+      parent = static_cast<int>(spec.joints.size());
+      spec.joints.push_back(joint);
+    }
+    tip.name += "_more";
+    tip.link = parent;
+    spec.frames.push_back(tip);
+  }
+  return RobotModel(spec);
+}
+
+/// A grasp of as many contacts as fingertips, on a robot of twelve: places on the torus for the time that
+/// they take, not for a grasp that could be.
+struct Growing {
+  explicit Growing(size_t count)
+      : model(MakeTwelveFingers()),
+        surface(0.035, 0.011),
+        fingertips(model.fingertips().begin(),
+                   model.fingertips().begin() + static_cast<std::ptrdiff_t>(count)),
+        robot(model),
+        grasp(model, fingertips, model.object()->body, surface),
+        law(model, static_cast<int>(count)),
+        dynamics(model, static_cast<int>(count)),
+        force(VectorXd::Zero(model.num_velocities())) {
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> uniform(-0.5, 0.5);
+    VectorXd q(model.num_positions()), xi(model.num_velocities());
+    for (VectorXd* vector : {&q, &xi}) {
+      for (double& entry : *vector) entry = uniform(random);
+    }
+    X_o << 0.3, 0.2, 0.9, 0.1, 1.2, 0.3;
+    for (double& rate : X_o_dot) rate = uniform(random);
+    for (size_t i = 0; i < count; ++i)
+      kappa.push_back(
+          {{uniform(random), uniform(random), 0}, {6.0 * uniform(random), uniform(random), 0}, 0.2});
+    robot.SetState(q, xi);
+    robot.CalcDynamics();
+    SetGrasp();
+  }
+  void SetGrasp() { grasp.SetState(robot, X_o, X_o_dot, kappa); }
+
+  RobotModel model;
+  Torus surface;
+  std::vector<int> fingertips;
+  ModelTerms robot;
+  GraspTerms grasp;
+  ComputedTorque law;
+  ConstrainedDynamics dynamics;
+  VectorXd force;
+  Vector6d X_o, X_o_dot;
+  std::vector<ContactCoordinates> kappa;
+};
+
+void GrowingTerms(benchmark::State& state) {
+  Growing growing(static_cast<size_t>(state.range(0)));
+  for (auto _ : state) {
+    growing.SetGrasp();
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(GrowingTerms)->DenseRange(1, 4)->Arg(6)->Arg(8)->Arg(10)->Arg(12)->Unit(benchmark::kMicrosecond);
+
+/// (47) and the torques without contact forces, which any number of contacts has.
+void GrowingLaw(benchmark::State& state) {
+  Growing growing(static_cast<size_t>(state.range(0)));
+  for (auto _ : state) {
+    growing.law.SetMotion(growing.robot, growing.grasp, growing.X_o_dot, growing.force);
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(GrowingLaw)->DenseRange(1, 4)->Arg(6)->Arg(8)->Arg(10)->Arg(12)->Unit(benchmark::kMicrosecond);
+
+void GrowingPrediction(benchmark::State& state) {
+  Growing growing(static_cast<size_t>(state.range(0)));
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        growing.dynamics.Predict(growing.robot, growing.grasp, growing.force).f_c.data());
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(GrowingPrediction)
+    ->DenseRange(1, 4)
+    ->Arg(6)
+    ->Arg(8)
+    ->Arg(10)
+    ->Arg(12)
+    ->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace dexcheck

@@ -55,6 +55,9 @@ class Session {
   Json Evaluate(const Json& request) {
     if (!robot_) throw std::runtime_error("no hello came before");
     const EngineTerms terms = robot_->Evaluate(ReadVector(request.at("q")), ReadVector(request.at("v")));
+    if (!terms.M.allFinite() || !terms.c.allFinite() || !terms.g.allFinite()) {
+      throw std::runtime_error(name_ + ": its terms are no numbers; a joint may move no mass");
+    }
     Json answer = {{"id", request.at("id")}};
     if (terms.M.size() > 0) answer["M"] = ToJson(terms.M);
     if (terms.c.size() > 0) answer["c"] = ToJson(terms.c);

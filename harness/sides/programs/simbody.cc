@@ -35,7 +35,7 @@ class SimbodyRobot : public EngineRobot {
  public:
   SimbodyRobot(const std::vector<UrdfBody>& bodies, const RobotFacts& facts)
       : matter_(system_), forces_(system_), gravity_(forces_, matter_, ToVec3(facts.gravity)) {
-    for (const UrdfBody& body : bodies) Add(body, facts.floats);
+    for (const UrdfBody& body : FuseFixedLinks(bodies)) Add(body, facts.floats);
     state_ = system_.realizeTopology();
   }
 
@@ -65,19 +65,17 @@ class SimbodyRobot : public EngineRobot {
 
  private:
   void Add(const UrdfBody& body, bool floats) {
-    const SimTK::Body::Rigid own = MakeBody(body);
     if (body.motion == Motion::kRoot) {
+      // What stands still needs no mass.
       SimTK::MobilizedBody& ground = matter_.updGround();
-      mobilized_.push_back(floats ? SimTK::MobilizedBody(SimTK::MobilizedBody::Free(ground, own))
-                                  : SimTK::MobilizedBody(SimTK::MobilizedBody::Weld(ground, own)));
+      mobilized_.push_back(
+          floats ? SimTK::MobilizedBody(SimTK::MobilizedBody::Free(ground, MakeBody(body)))
+                 : SimTK::MobilizedBody(SimTK::MobilizedBody::Weld(ground, SimTK::Body::Massless())));
       return;
     }
+    const SimTK::Body::Rigid own = MakeBody(body);
     SimTK::MobilizedBody& parent = mobilized_[static_cast<size_t>(body.parent)];
     const SimTK::Transform X_PL = ToTransform(body.X_PL);
-    if (body.motion == Motion::kFixed) {
-      mobilized_.push_back(SimTK::MobilizedBody::Weld(parent, X_PL, own, SimTK::Transform()));
-      return;
-    }
     const bool turns = body.motion == Motion::kTurns;
     const SimTK::Transform X_LM =
         turns ? MakeJointFrame(body.axis, SimTK::ZAxis) : MakeJointFrame(body.axis, SimTK::XAxis);

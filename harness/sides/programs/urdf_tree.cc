@@ -89,4 +89,53 @@ std::vector<std::string> ListJoints(const std::vector<UrdfBody>& bodies) {
   return names;
 }
 
+std::vector<UrdfBody> FuseFixedLinks(const std::vector<UrdfBody>& bodies) {
+  std::vector<UrdfBody> fused;
+  std::vector<int> index;                // of each link's body in `fused`
+  std::vector<Eigen::Isometry3d> poses;  // of each link in that body's frame
+  std::vector<Eigen::Vector3d> moments;  // of `fused`, mass times centre of mass
+  for (const UrdfBody& body : bodies) {
+    const bool is_fixed = body.motion == Motion::kFixed;
+    Eigen::Isometry3d X_BL = Eigen::Isometry3d::Identity();
+    if (body.parent >= 0) {
+      const auto parent = static_cast<size_t>(body.parent);
+      const Eigen::Isometry3d X_BP = poses[parent];
+      if (is_fixed) {
+        X_BL = X_BP * body.X_PL;
+        index.push_back(index[parent]);
+      } else {
+        UrdfBody& own = fused.emplace_back(body);
+        own.parent = index[parent];
+        own.X_PL = X_BP * body.X_PL;
+      }
+    } else {
+      fused.push_back(body);
+    }
+    if (!is_fixed) {
+      index.push_back(static_cast<int>(fused.size()) - 1);
+      fused.back().mass = 0.0;
+      fused.back().inertia.setZero();  // about the body's origin, until all is summed
+      fused.back().X_LC.setIdentity();
+      moments.push_back(Eigen::Vector3d::Zero());
+    }
+    poses.push_back(X_BL);
+    const auto place = static_cast<size_t>(index.back());
+    const Eigen::Matrix3d R = X_BL.linear();
+    const Eigen::Vector3d com = X_BL * body.X_LC.translation();
+    fused[place].mass += body.mass;
+    moments[place] += body.mass * com;
+    fused[place].inertia +=
+        R * body.CalcInertiaInLink() * R.transpose() +
+        body.mass * (com.squaredNorm() * Eigen::Matrix3d::Identity() - com * com.transpose());
+  }
+  for (size_t i = 0; i < fused.size(); ++i) {
+    if (fused[i].mass <= 0.0) continue;
+    const Eigen::Vector3d com = moments[i] / fused[i].mass;
+    fused[i].X_LC.translation() = com;
+    fused[i].inertia -=
+        fused[i].mass * (com.squaredNorm() * Eigen::Matrix3d::Identity() - com * com.transpose());
+  }
+  return fused;
+}
+
 }  // namespace dexcheck::engines

@@ -38,4 +38,8 @@ std::vector<UrdfBody> ReadUrdfTree(const std::string& path);
 /// Names of the joints that move, in the order of the links.
 std::vector<std::string> ListJoints(const std::vector<UrdfBody>& bodies);
 
+/// The same robot with each link on a fixed joint counted in the link that it stands on: for engines that
+/// judge every inertia by itself, and refuse the small parts of published robots that no body can be.
+std::vector<UrdfBody> FuseFixedLinks(const std::vector<UrdfBody>& bodies);
+
 }  // namespace dexcheck::engines

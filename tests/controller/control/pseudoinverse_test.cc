@@ -107,6 +107,43 @@ TEST(Pseudoinverse, FunctionsApplyTheMatrices) {
   }
 }
 
+// Columns that are zero need not be looked at, also when they are others than before.
+TEST(Pseudoinverse, ColumnsThatAreNotListedAreZero) {
+  std::mt19937 random(12);
+  const MatrixXd whole = DrawMatrix(kRows, kColumns, &random);
+  const VectorXd w = DrawMatrix(kColumns, 1, &random).cwiseAbs() + VectorXd::Constant(kColumns, 0.1);
+  const VectorXd y = DrawMatrix(kRows, 1, &random);
+  const VectorXd z = DrawMatrix(kColumns, 1, &random);
+  Pseudoinverse listed("J", kRows, kColumns), all("J", kRows, kColumns);
+  for (const int first : {0, 17}) {
+    std::vector<int> columns;
+    for (int i = first; i < kColumns; i += 2) columns.push_back(i);
+    MatrixXd J = MatrixXd::Zero(kRows, kColumns);
+    for (const int i : columns) J.col(i) = whole.col(i);
+    for (const bool diagonal : {false, true}) {
+      if (diagonal) {
+        listed.FactorDiagonal(J, w, columns);
+        all.FactorDiagonal(J, w);
+      } else {
+        listed.Factor(J, columns);
+        all.Factor(J);
+      }
+      const MatrixXd expected = all.CalcMatrix();
+      ASSERT_GT(expected.norm(), 0.1);
+      EXPECT_TRUE(MatrixNear(listed.CalcMatrix(), expected, kRounding));
+      EXPECT_TRUE(MatrixNear(listed.CalcProjector(), all.CalcProjector(), kRounding));
+      VectorXd x(kColumns), projected = z;
+      listed.Apply(y, x);
+      EXPECT_TRUE(MatrixNear(x, expected * y, kRounding));
+      listed.Project(projected);
+      EXPECT_TRUE(MatrixNear(projected, all.CalcProjector() * z, kRounding));
+    }
+    // All columns, after some.
+    listed.Factor(whole);
+    EXPECT_TRUE(MatrixNear(whole * listed.CalcMatrix(), MatrixXd::Identity(kRows, kRows), kRounding));
+  }
+}
+
 TEST(Pseudoinverse, UnweightedIsTheMoorePenroseInverse) {
   std::mt19937 random(3);
   Case c(0, &random);

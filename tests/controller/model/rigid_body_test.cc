@@ -151,6 +151,15 @@ TEST(Combine, NothingWeighsNothing) {
 
 MassProperties MakeBody(const Vector3d& moments) { return {1.0, Vector3d::Zero(), moments.asDiagonal()}; }
 
+// A point mass whose inertia was moved to its centre of mass: what rounding leaves may be negative.
+TEST(PhysicalInconsistency, ForgivesWhatMovingAnInertiaLeaves) {
+  MassProperties body{0.526, Vector3d(0.0, 0.0, 0.03), Matrix3d::Zero()};
+  body.inertia.diagonal() = Vector3d(-5.42101e-20, -5.42101e-20, 0.0);
+  EXPECT_EQ(FindPhysicalInconsistency(body), "");
+  body.inertia *= 1e4;
+  EXPECT_NE(FindPhysicalInconsistency(body), "");
+}
+
 TEST(PhysicalInconsistency, NamesWhatIsWrong) {
   MassProperties body = MakeBody({1.0, 2.0, 2.5});
   EXPECT_EQ(FindPhysicalInconsistency(body), "");

@@ -21,7 +21,8 @@ struct Step {
   const char* name;
   CheckKind kind = CheckKind::kAssumption;
 };
-constexpr Step kSteps[] = {{"balance_object", CheckKind::kBalance},
+constexpr Step kSteps[] = {{"expect_position", CheckKind::kLaw},
+                           {"balance_object", CheckKind::kBalance},
                            {"balance_robot", CheckKind::kBalance},
                            {"rolling"},
                            {"reduced_acceleration", CheckKind::kPrediction},
@@ -221,6 +222,28 @@ TEST(Attribute, EvidenceEndsWithWhatWasMeasured) {
   const AttributionResult slope = run.Explain(measured);
   EXPECT_EQ(slope.cause, Cause::kSlope);
   EXPECT_EQ(FindCause(slope, "balance_robot"), "slope");
+}
+
+// An expectation that alone fails: what (57) by itself leaves are the gains, the rest is what drives it.
+TEST(Attribute, AnExpectationThatFailsHasAMeasuredCause) {
+  FakeRun run;
+  run.Fail("expect_position", 1.0);
+  MeasuredCauses measured;
+  measured.position_by_law = 1.5;
+  AttributionResult result = run.Explain(measured);
+  EXPECT_EQ(result.cause, Cause::kControlLaw);
+  EXPECT_EQ(result.check, "expect_position");
+  EXPECT_THAT(result.evidence, HasSubstr("(57) by itself leaves 1.5"));
+  measured.position_by_law = 0.1;
+  result = run.Explain(measured);
+  EXPECT_EQ(result.cause, Cause::kContactSoftness);
+  EXPECT_THAT(result.evidence, HasSubstr("contacts that give the rest"));
+  measured.is_ideal = false;
+  result = run.Explain(measured);
+  EXPECT_EQ(result.cause, Cause::kControlLaw);
+  EXPECT_THAT(result.evidence, HasSubstr("what the scenario asks for"));
+  // Not known, for a law that is not followed.
+  EXPECT_EQ(run.Explain().cause, Cause::kControlLaw);
 }
 
 TEST(Attribute, TheSolverIsBlamedForWhatItLeftOver) {

@@ -260,7 +260,7 @@ INSTANTIATE_TEST_SUITE_P(
         {"MissingKey", R"({"q": [0, 1]})", {"xi: missing key"}},
         {"UnknownKey",
          kGoodStart + R"("qdot": [0, 1]})",
-         {"qdot: unknown key, known here are q, xi, object, kappa, contact_points, fingers, mu"}},
+         {"qdot: unknown key, known here are q, xi, object, kappa, contact_points, fingers, mu, law"}},
         {"NotAnObject", "[0, 1]", {"must be a JSON object, got [0,1]"}},
         {"NotJson", "q = [0, 1]\n", {"not valid JSON: ", "line 1, column 1"}},
         {"Empty", "", {"not valid JSON: ", "unexpected end of input"}},

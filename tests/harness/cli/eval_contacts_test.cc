@@ -123,6 +123,98 @@ TEST_F(EvalContacts, CoordinatesGiveTheSameTermsAsPoints) {
   }
 }
 
+// Sections 4.4 and 5 as they are printed, from the other terms.
+TEST_F(EvalContacts, LawIsThePrintedOne) {
+  Json state = MakeState();
+  state["contact_points"] = EquatorPoints();
+  state["mu"] = 0.8;
+  std::vector<double> sigma_prime(50);
+  for (size_t i = 0; i < sigma_prime.size(); ++i) sigma_prime[i] = std::sin(3.0 + static_cast<double>(i));
+  state["law"] = {{"X_d", {0.41, -0.2, 0.7, 0.3, 1.12, -0.5}},
+                  {"X_d_dot", {0.1, 0.3, -0.3, 0.4, 0.5, 0.5}},
+                  {"X_d_ddot", {0.5, 0.1, 0.2, -0.1, 0.3, 0.2}},
+                  {"K_p", {400, 400, 400, 300, 300, 300}},
+                  {"K_v", {40, 40, 40, 30, 30, 30}},
+                  {"f_min", 1.0},
+                  {"f_max", 200.0},
+                  {"sigma_prime", sigma_prime}};
+  const Json terms = Evaluate(state);
+  const Json& law = terms.at("law");
+  const auto vector = [](const Json& list) {
+    const std::vector<double> values = list;
+    return VectorXd(Eigen::Map<const VectorXd>(values.data(), static_cast<Eigen::Index>(values.size())));
+  };
+  const auto expect_near = [](const MatrixXd& actual, const MatrixXd& expected, const char* what) {
+    ASSERT_GT(expected.norm(), 1e-3) << what;
+    // Gram matrices have the square of a condition number of some hundreds.
+    EXPECT_TRUE(MatrixNear(actual, expected, 1e-9 * expected.norm())) << what;
+  };
+  const MatrixXd J = ToMatrix(terms.at("J_B")), G = ToMatrix(terms.at("G")),
+                 P_inv = ToMatrix(terms.at("P_inv"));
+  const MatrixXd M_o = ToMatrix(terms.at("M_o")), M_bar = ToMatrix(terms.at("M_bar"));
+  const MatrixXd J_pinv = J.transpose() * (J * J.transpose()).inverse();
+  const MatrixXd N = MatrixXd::Identity(50, 50) - J_pinv * J;
+  expect_near(ToMatrix(law.at("J_B_pinv")), J_pinv, "J_B_pinv");
+  expect_near(ToMatrix(law.at("N")), N, "N");
+
+  const Json& given = state.at("law");
+  const VectorXd X_o = vector(state.at("object").at("X_o")),
+                 X_o_dot = vector(state.at("object").at("X_o_dot"));
+  const VectorXd V_o = P_inv * X_o_dot, xi = vector(state.at("xi"));
+  // (55): X_o_ddot = X_d_ddot + K_v E_dot + K_p E
+  const VectorXd X_o_ddot = vector(given.at("X_d_ddot")) +
+                            vector(given.at("K_v")).cwiseProduct(vector(given.at("X_d_dot")) - X_o_dot) +
+                            vector(given.at("K_p")).cwiseProduct(vector(given.at("X_d")) - X_o);
+  const VectorXd V_o_dot = P_inv * X_o_ddot + ToMatrix(terms.at("P_inv_dot")) * X_o_dot;
+  expect_near(vector(law.at("V_o_dot")), V_o_dot, "V_o_dot");
+  const VectorXd xi_c = J_pinv * G.transpose() * V_o + N * xi;
+  expect_near(vector(law.at("xi_c")), xi_c, "xi_c");
+  const VectorXd xi_dot_d = J_pinv * (ToMatrix(terms.at("G_dot")).transpose() * V_o +
+                                      G.transpose() * V_o_dot - ToMatrix(terms.at("J_B_dot")) * xi_c) +
+                            N * vector(given.at("sigma_prime"));
+  expect_near(vector(law.at("xi_dot_d")), xi_dot_d, "xi_dot_d");
+  // (19), in X_o
+  const VectorXd F_o = M_o * X_o_ddot + ToMatrix(terms.at("C_o")) * X_o_dot + vector(terms.at("N_o"));
+  expect_near(vector(law.at("F_o")), F_o, "F_o");
+  const VectorXd f_c = vector(law.at("f_c")), F_N = vector(law.at("F_N"));
+  expect_near(G * f_c, F_o, "G f_c");
+  EXPECT_LE((G * F_N).norm(), 1e-9 * f_c.norm());
+  EXPECT_GT(F_N.norm(), 1.0);
+  for (Eigen::Index i = 0; i < f_c.size(); i += 3)
+    EXPECT_LT(std::hypot(f_c[i], f_c[i + 1]), 0.8 * f_c[i + 2]) << i;
+  VectorXd force =
+      M_bar * xi_dot_d + ToMatrix(terms.at("C_bar")) * xi_c + vector(terms.at("F_bar")) + J.transpose() * f_c;
+  const MatrixXd S_v_T_E_v = ToMatrix(terms.at("S_v_T_E_v"));
+  const VectorXd wheels = S_v_T_E_v.inverse() * force.head<2>();
+  force.head<2>() = wheels;
+  expect_near(vector(law.at("tau")), force, "tau");
+  const MatrixXd G_pinv = G.transpose() * (G * G.transpose()).inverse();
+  expect_near(ToMatrix(law.at("A")), M_bar * J_pinv * G.transpose() * P_inv + J.transpose() * G_pinv * M_o,
+              "A");
+}
+
+TEST_F(EvalContacts, RefusesImpossibleLaws) {
+  Json state = MakeState();
+  const Json six = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+  const Json law = {{"X_d", six}, {"X_d_dot", six}, {"X_d_ddot", six}, {"K_p", six},
+                    {"K_v", six}, {"f_min", 1.0},   {"f_max", 50.0}};
+  state["law"] = law;
+  EXPECT_TRUE(IsRefused(Run(state), {"law: needs object, and kappa or contact_points"}));
+  state["contact_points"] = EquatorPoints();
+  const auto expect_refused = [&](const char* key, const Json& value, const std::string& message) {
+    Json changed = state;
+    changed["law"][key] = value;
+    EXPECT_TRUE(IsRefused(Run(changed), {message}));
+  };
+  expect_refused("f_max", 0.5, "law.f_max: must be above f_min = 1, got 0.5");
+  expect_refused("f_min", -1.0, "law.f_min: must not be negative");
+  expect_refused("X_d", {1.0}, "law.X_d: must be a list of 6 numbers, got 1");
+  expect_refused("gain", 1.0, "law.gain: unknown key");
+  // Without friction to speak of no forces hold the object.
+  state["mu"] = 1e-6;
+  EXPECT_TRUE(IsRefused(Run(state), {"law: no contact forces inside the friction cones hold the object"}));
+}
+
 TEST_F(EvalContacts, ForceClosureNeedsFriction) {
   Json state = MakeState();
   state["contact_points"] = EquatorPoints();

@@ -70,8 +70,9 @@ TEST_F(JUnit, OfAComparison) {
 }
 
 TEST_F(JUnit, OfAnAudit) {
-  EXPECT_THAT(Run({"audit", mjcf_}, 0).failures, ::testing::IsEmpty());
-  const std::string arm = ReadText(testing::SourcePath("/harness/sides/examples/arm.urdf"));
+  const std::string path = testing::SourcePath("/harness/sides/examples/arm.urdf");
+  EXPECT_THAT(Run({"audit", path}, 0).failures, ::testing::IsEmpty());
+  const std::string arm = ReadText(path);
   WriteText(folder_.path() / "arm.urdf", ReplaceOnce(arm, "izz=\"0.008\"", "izz=\"0.8\""));
   const JUnitFile bad = Run({"audit", "arm.urdf"}, 1);
   EXPECT_THAT(bad.failures, ::testing::Contains(HasSubstr("dexcheck.audit.arm.audit inertia: ")));

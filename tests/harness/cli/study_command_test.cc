@@ -107,6 +107,25 @@ TEST_F(StudyCommand, CtrlCEndsItInGoodOrder) {
   EXPECT_EQ(Dump(Path("a.sqlite")), Reference());
 }
 
+TEST_F(StudyCommand, AnEditedStudyKeepsItsRows) {
+  ASSERT_EQ(RunDexcheck(RunArguments("reference.sqlite", {"--quiet"})).exit_code, 0);
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--quiet"})).exit_code, 0);
+  // One value goes, one comes.
+  WriteText(folder_.path() / "tiny.toml", testing::ReplaceOnce(kStudy, "[20, 200, 2100]", "[300, 20, 200]"));
+  const ProgramResult edited = RunDexcheck(RunArguments("a.sqlite"));
+  EXPECT_EQ(edited.exit_code, 0) << edited.err;
+  EXPECT_THAT(edited.out, HasSubstr("the study was edited: 4 trials are kept, 2 are set aside"));
+  EXPECT_THAT(edited.out, HasSubstr("tiny: 6 of 6 trials"));
+  // Back again, with a comment: nothing is left to be made, and the rows are those of the study as it was.
+  WriteText(folder_.path() / "tiny.toml", "# back\n" + kStudy);
+  const ProgramResult back = RunDexcheck(RunArguments("a.sqlite"));
+  EXPECT_THAT(back.out, HasSubstr("4 trials are kept, 2 are brought back, 2 are set aside"));
+  const auto rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  const auto expected = StudyStore::Open(Path("reference.sqlite")).ReadRows();
+  ASSERT_EQ(rows.size(), expected.size());
+  for (size_t i = 0; i < rows.size(); ++i) EXPECT_TRUE(IsSame(rows[i], expected[i])) << i;
+}
+
 TEST_F(StudyCommand, MistakesAreNamed) {
   EXPECT_TRUE(IsRefused(RunDexcheck({"study", "run", "gain", "--db", Path("a.sqlite")}),
                         {"study \"gain\"", "did you mean \"gains\"?"}));

@@ -2,7 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <random>
 #include <thread>
 
@@ -100,6 +102,34 @@ values = [[1e-6, 0, 0], [3e-6, 0, 0]]
   EXPECT_EQ(rows[1].result.outcome, Outcome::kDiverged);
   EXPECT_EQ(rows[1].result.failure, "the position error is above stop_error, 2e-06 m at t = 0 s");
   EXPECT_EQ(rows[1].result.metrics[kSimulatedTime], 0.001) << "it is kept, as far as it came";
+}
+
+TEST_F(StudySearch, IsWatchedShownAndExported) {
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--quiet"})).exit_code, 0);
+  const ProgramResult watched =
+      RunDexcheck({"study", "watch", Path("a.sqlite"), "--interval", "0.1", "--page", Path("a.html")});
+  EXPECT_EQ(watched.exit_code, 0) << watched.err;
+  EXPECT_THAT(watched.out, HasSubstr("tiny: 48 of at most 48 trials"));
+  EXPECT_THAT(watched.out, HasSubstr("The least position_error_rms"));
+  EXPECT_THAT(testing::ReadText(Path("a.html")), ::testing::Not(HasSubstr("http-equiv=\"refresh\"")))
+      << "it is over";
+  const std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
+  const ProgramResult shown = RunDexcheck({"study", "show", Path("a.sqlite"), "17"});
+  EXPECT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_THAT(shown.out, HasSubstr("trial 17, seed 1: tracked"));
+  EXPECT_THAT(shown.out, HasSubstr("dexcheck run offset --set duration=0.02"));
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck({"study", "show", Path("a.sqlite"), "48"}), {"a.sqlite: trial 48: has no row"}));
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck({"study", "watch", Path("a.sqlite"), "--interval", "0"}), {"--interval"}));
+  const ProgramResult csv = RunDexcheck({"study", "export", Path("a.sqlite"), "--out", "-"});
+  EXPECT_EQ(csv.exit_code, 0) << csv.err;
+  EXPECT_EQ(std::count(csv.out.begin(), csv.out.end(), '\n'), 49);
+  EXPECT_THAT(csv.out, ::testing::StartsWith(
+                           "trial,seed,control.K_p,control.K_v,outcome,failure,position_error_rms,"));
+  // Numbers read back as they were.
+  size_t at = csv.out.find("\n17,1,") + 6;
+  EXPECT_EQ(std::strtod(csv.out.c_str() + at, nullptr), rows[17].trial.parameters[0]);
 }
 
 TEST_F(StudySearch, HasNoShards) {

@@ -226,6 +226,31 @@ TEST(RigidRun, ErrorFollowsEquation57ToTheOrderOfTheHold) {
   EXPECT_NEAR(coarse / fine, 2.0, 0.15);
 }
 
+// A push on a link and one on the object: known to the checks, and the engine's robot goes where the rigid
+// one does.
+TEST(RigidRun, PushesMoveItAsTheEngine) {
+  const auto finish = [](const std::string& plant, bool pushed) {
+    const std::string pushes =
+        "disturbance=[{ type = 'step', body = 'r_forearm', force = [0, 3, 1] }, { type = 'pulse', body = "
+        "'object', "
+        "force = [0, 0, 0.5], torque = [0, 0.01, 0], begin = 0.1, duration = 0.1 }]";
+    ShippedRun run("hold",
+                   {plant, "duration=0.3", "settle=0.3", "expect={}", pushed ? pushes : "disturbance=[]"});
+    const RunResult& result = run.Run();
+    if (plant != "plant.type=engine") {
+      EXPECT_EQ(result.verdict, Verdict::kPass) << plant << result.failure << result.attribution.evidence;
+      EXPECT_LE(run.Worst("balance_robot"), 1e-10);
+      EXPECT_LE(run.Worst("balance_object"), 1e-10);
+    }
+    return VectorXd(run.step().reading.state.q);
+  };
+  const VectorXd rigid = finish(kEuler, true);
+  const double moved = (rigid - finish(kEuler, false)).norm();
+  EXPECT_GT(moved, 1e-4);
+  EXPECT_LT((rigid - finish("plant.type=engine", true)).norm(), 0.02 * moved);
+  EXPECT_LT((rigid - finish(kRigid, true)).norm(), 0.02 * moved);
+}
+
 /// Where the object and the robot are at the end of a run.
 VectorXd Finish(std::vector<std::string> overrides) {
   overrides.insert(overrides.end(), {"duration=1.0", "settle=0.5"});

@@ -19,6 +19,7 @@ inline constexpr double kReportStep = 1e-3;  // s
 struct ReportRun {
   long rows = 400;
   bool has_summary = true;
+  bool has_law = false;  ///< Whether it tells the forces that the law commands.
   std::string verdict = "disagreement";
   std::string scenario = "sample";
   std::string description = "made <by> hand & \"quoted\"";
@@ -88,6 +89,9 @@ inline void WriteReportRun(const std::filesystem::path& folder, const ReportRun&
   const int overlap = log.AddSignal({"contact/overlap", "m", "overlap", 1, {"rf1_tip"}, {}});
   const int f_c = log.AddSignal(
       {"contact/f_c", "N", "forces", 3, {"rf1_tip.x", "rf1_tip.y", "rf1_tip.z"}, {{"mu", 0.5}}});
+  const int commanded =
+      run.has_law ? log.AddSignal({"law/f_c", "N", "forces", 3, {"rf1_tip.x", "rf1_tip.y", "rf1_tip.z"}, {}})
+                  : -1;
   std::vector<int> checks;
   const std::vector<std::pair<const char*, std::map<std::string, double>>> names = {
       {"M_bar", {{"bound", 1e-13}, {"kind", 0.0}}},
@@ -114,6 +118,7 @@ inline void WriteReportRun(const std::filesystem::path& folder, const ReportRun&
     log.Row(f_c)[0] = 0.3;
     log.Row(f_c)[1] = 0.4;
     log.Row(f_c)[2] = 2.0;
+    if (run.has_law) log.Row(commanded)[2] = 2.5;
     const double values[] = {row % 50 == 7 ? 0.0 : 1e-16, 5e-6, 1e-9, ReportSlip(row, run.rows)};
     for (size_t k = 0; k < checks.size(); ++k) log.Row(checks[k])[0] = values[k];
     log.EndRow();

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -82,6 +83,23 @@ TEST_F(WriteReportTest, HasThePapersPanelsFromTheRightSignals) {
     EXPECT_EQ(figure.curves[2].values[3], 1.0);         // mu 0.5
   }
   EXPECT_EQ(labels["fig13a"].size(), 3U);
+}
+
+TEST_F(WriteReportTest, ShowsTheOptimalForcesBesideTheMeasuredOnes) {
+  ReportRun with_law;
+  with_law.has_law = true;
+  WriteReportRun(run_dir(), with_law);
+  const std::vector<Figure> figures = MakeMotionFigures(RunData(run_dir()));
+  const auto figure =
+      std::find_if(figures.begin(), figures.end(), [](const Figure& f) { return f.name == "fig13a"; });
+  ASSERT_NE(figure, figures.end());
+  std::vector<std::string> labels;
+  for (const Curve& curve : figure->curves) labels.push_back(curve.label);
+  EXPECT_THAT(labels, ElementsAre("normal, measured", "tangential, measured", "normal, optimal (49)",
+                                  "tangential, optimal (49)", "friction cone: μ × normal"));
+  EXPECT_EQ(figure->curves[0].values[3], 2.0);
+  EXPECT_EQ(figure->curves[2].values[3], 2.5);
+  EXPECT_EQ(figure->curves[3].values[3], 0.0);
 }
 
 TEST_F(WriteReportTest, DrawsResidualsAsSharesOfTheirBounds) {

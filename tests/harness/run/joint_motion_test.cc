@@ -60,7 +60,7 @@ TEST(JointMotionRun, WrongNumbersOfTheModelAreFound) {
 
 TEST(JointMotionRun, AForceThatNobodyKnowsIsNamed) {
   ShippedRun run("panda-reach", {"duration=0.2"});
-  Setup& setup = const_cast<Setup&>(run.setup());
+  const auto& setup = run.setup();
   LoopParts parts = MakeLoopParts(setup);
   // A push that the scenario does not ask for.
   DisturbanceOptions push;
@@ -77,11 +77,12 @@ TEST(JointMotionRun, AForceThatNobodyKnowsIsNamed) {
 }
 
 TEST(JointMotionRun, WhatTheScenarioAsksForCriesNoWolf) {
-  ShippedRun run("panda-reach", {"duration=1", "expect.joints=0.1",
-                                 "sensing={ joint_counts = 4096, velocity = 'differenced', "
-                                 "velocity_cutoff = 60 }",
-                                 "actuation={ delay = 0.002, coulomb = 0.1 }", "mismatch={ mass = 1.05 }",
-                                 "disturbance=[{ type = 'step', body = 'panda_link5', force = [0, 2, 0] }]"});
+  ShippedRun run("panda-reach",
+                 {"duration=1", "expect.joints=0.1",
+                  "sensing={ joint_counts = 4096, velocity = 'differenced', "
+                  "velocity_cutoff = 60 }",
+                  "actuation={ delay = 0.002, torque_step = 0.01 }", "mismatch={ mass = 1.05 }",
+                  "disturbance=[{ type = 'step', body = 'panda_link5', force = [0, 2, 0] }]"});
   const RunResult& result = run.Run();
   EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
   EXPECT_GT(result.tracking.joints_max(), 1e-5);

@@ -2,11 +2,13 @@
 
 #include "harness/run/run_mutation.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "harness/run/detectability.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing {
@@ -92,6 +94,46 @@ TEST(RunCampaign, ARunThatDoesNotPassIsNoPlaceForMistakes) {
                            kScene, options, kGoOn),
                InputError);
   EXPECT_THROW(RunCampaign(ReadShippedScenario("lift"), kRobot, kScene, options, kGoOn), InputError);
+}
+
+/// The largest residual of a balance in a run with this robot.
+double FindWorst(const char* check, const std::vector<std::string>& overrides) {
+  ShippedRun run("exercise", overrides);
+  run.Run();
+  return run.Worst(check);
+}
+
+// An error twice the smallest that is said to show fails the balance, half of it does not.
+TEST(Detectability, TellsTheErrorThatFailsABalance) {
+  const std::vector<std::string> shorter = {"duration=0.3", "settle=0.3"};
+  const ShippedRun right("exercise", shorter);
+  const DetectabilityResult result =
+      FindDetectability(right.setup(), 3, [](size_t /*done*/, size_t /*all*/) { return true; });
+  const size_t count = ListParameters(right.setup().model().spec()).size();
+  EXPECT_GT(result.numbers.size(), count / 2);
+  EXPECT_GT(result.rank, 20);
+  EXPECT_LE(result.rank, static_cast<int>(count));
+  EXPECT_GT(result.smallest_singular_value, 0.0);
+  EXPECT_GT(result.largest_singular_value, result.smallest_singular_value);
+  const auto mass = std::find_if(result.numbers.begin(), result.numbers.end(),
+                                 [](const Detectability& number) { return number.quantity == "mass" && number.name.starts_with("object"); });
+  ASSERT_NE(mass, result.numbers.end());
+  ASSERT_LT(mass->object, 1e-3);
+  const double bound = kStepChecks[static_cast<size_t>(StepCheck::kBalanceObject)].bound;
+  for (const double factor : {0.5, 2.0}) {
+    std::vector<std::string> overrides = shorter;
+    overrides.push_back(fmt::format("model.object.mass={:.17g}", 0.2 * (1.0 + factor * mass->object)));
+    const double worst = FindWorst("balance_object", overrides);
+    EXPECT_EQ(worst > bound, factor > 1.0) << factor << " " << worst;
+    EXPECT_NEAR(worst / bound, factor, 0.5 * factor);
+  }
+}
+
+TEST(Detectability, StopsEarly) {
+  const ShippedRun run("exercise", {"duration=0.02", "settle=0.3"});
+  const DetectabilityResult result =
+      FindDetectability(run.setup(), 1, [](size_t done, size_t /*all*/) { return done < 3; });
+  EXPECT_LE(result.numbers.size(), 3U);
 }
 
 TEST(RunCampaign, WhatIsStoppedIsNotDone) {

@@ -12,14 +12,10 @@
 #include <ostream>
 
 #include "controller/model/body_frame.h"
-#include "harness/engine/engine.h"
-#include "harness/sides/mjcf_reader.h"
 #include "harness/sides/read_description.h"
 #include "tests/common/legged_robots.h"
 #include "tests/common/paths.h"
-#include "tests/common/random_robot.h"
-#include "tests/common/urdf_text.h"
-#include "tests/harness/sides/panda_urdf.h"
+#include "tests/harness/sides/robot_pairs.h"
 
 namespace dexcheck {
 namespace {
@@ -27,41 +23,8 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// A robot twice: as the description that may be wrong, and as it should be.
-struct Pair {
-  std::string name;
-  RobotDescription a, b;
-};
-
-Pair MakeRandomPair(int seed, BaseType base) {
-  std::mt19937 random(static_cast<unsigned>(seed));
-  testing::RandomRobotOptions options;
-  options.base = base;
-  options.joints = 6;
-  options.branching = 0.2;
-  options.prismatic = 0.1;
-  RobotSpec spec = testing::MakeRandomRobot(options, &random);
-  RobotDescription a = ParseUrdf(testing::WriteUrdf(&spec, &random), "a.urdf");
-  return {"random" + std::to_string(seed), a,
-          ReadMjcfDescription(*LoadMjcfText(testing::WriteMjcf(spec), "b.xml"), "b.xml")};
-}
-
-const std::vector<Pair>& ListRobots() {
-  static const std::vector<Pair> robots = [] {
-    const std::vector<testing::LeggedLink> humanoid = testing::ListHumanoid();
-    std::vector<Pair> list;
-    list.push_back({"panda", ParseUrdf(testing::MakePandaUrdf(), "panda.urdf"),
-                    ReadDescription(testing::SourcePath("/mjcf/panda.xml"))});
-    list.push_back(
-        {"humanoid", ParseUrdf(testing::WriteLeggedUrdf("humanoid", humanoid), "humanoid.urdf"),
-         ReadMjcfDescription(*LoadMjcfText(testing::WriteLeggedMjcf("humanoid", humanoid), "humanoid.xml"),
-                             "humanoid.xml")});
-    list.push_back(MakeRandomPair(1730, BaseType::kFixed));
-    list.push_back(MakeRandomPair(1731, BaseType::kFloating));
-    return list;
-  }();
-  return robots;
-}
+using Pair = testing::RobotPair;
+const std::vector<Pair>& ListRobots() { return testing::ListRobotPairs(); }
 
 /// What a person may have done to a body, in the link's own frame.
 struct BodyMistake {

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
+#include "harness/sides/alike_names.h"
 #include "harness/sides/description_match.h"
 #include "harness/sides/read_description.h"
 #include "tests/common/paths.h"
@@ -148,6 +149,33 @@ TEST(ModelComparison, RefusesOtherMechanisms) {
       problem(other),
       "other.urdf: joint \"panda_joint3\": must come after \"panda_joint2\" as in panda.urdf, comes after "
       "\"panda_joint1\"");
+}
+
+TEST(AlikeNames, HaveOnePartnerEach) {
+  using Names = std::vector<std::string>;
+  const Names numbered = {"joint1", "joint2", "joint3"};
+  EXPECT_EQ(FindAlikeNames(numbered, {"joint3", "joint1", "joint2"}), numbered);
+  EXPECT_EQ(FindAlikeNames(numbered, {"panda_joint3", "panda_joint2", "panda_joint1"}),
+            Names({"panda_joint1", "panda_joint2", "panda_joint3"}));
+  EXPECT_EQ(FindAlikeNames({"LeftKnee", "RightKnee"}, {"right_knee", "left_knee"}),
+            Names({"left_knee", "right_knee"}));
+  EXPECT_EQ(FindAlikeNames({"hip_joint", "knee_joint"}, {"knee", "hip"}), Names({"hip", "knee"}));
+  EXPECT_EQ(FindAlikeNames(numbered, {"joint1", "joint2", "joint4"}), Names());
+  EXPECT_EQ(FindAlikeNames(numbered, {"joint1", "joint2"}), Names());
+  EXPECT_EQ(FindAlikeNames({"a.b", "ab"}, {"ab", "A_B"}), Names());  // which is which?
+  EXPECT_EQ(FindAlikeNames({}, {}), Names());
+}
+
+TEST(AlikeNames, AreTakenAndNoted) {
+  const RobotDescription urdf = ParseUrdf(testing::MakePandaUrdf(), "panda.urdf");
+  RobotDescription other = ReadDescription(testing::SourcePath("/mjcf/panda.xml"));
+  for (size_t i = 0; i < other.spec.joints.size(); ++i)
+    other.spec.joints[i].name = "Joint " + std::to_string(i + 1);
+  EXPECT_EQ(ListFailures(urdf, other), "");
+  RobotDescription own = urdf;
+  EXPECT_THAT(CompleteEachOther(&own, &other),
+              ::testing::Contains(HasSubstr("joints by other names: \"Joint 1\" is "
+                                            "\"panda_joint1\"")));
 }
 
 }  // namespace

@@ -44,6 +44,36 @@ double Ishigami(const std::vector<double>& x) {
   return std::sin(scaled(0)) + 7.0 * std::pow(std::sin(scaled(1)), 2) + b;
 }
 
+struct Index {
+  double first, total;
+};
+
+/// Share of the intervals, of studies with ten seeds, that hold the indices known.
+double CalcCoverage(long blocks, const std::vector<Index>& known,
+                    const std::function<double(const std::vector<double>&)>& function) {
+  constexpr int kSeeds = 10;
+  long covered = 0;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const Study study = MakeStudy(
+        "method = \"saltelli\"\ncount = " + std::to_string(blocks) + "\nseed = " + std::to_string(seed),
+        known.size());
+    const Sensitivity sensitivity = AnalyseSensitivity(study, MakeRows(study, function), "energy");
+    EXPECT_EQ(sensitivity.sobol.size(), known.size());
+    for (size_t i = 0; i < sensitivity.sobol.size(); ++i) {
+      const SobolIndex& index = sensitivity.sobol[i];
+      covered += index.first.low <= known[i].first && known[i].first <= index.first.high ? 1 : 0;
+      covered += index.total.low <= known[i].total && known[i].total <= index.total.high ? 1 : 0;
+      // An interval that holds everything would show nothing.
+      constexpr double kWidest = 0.2;
+      EXPECT_LT(index.first.high - index.first.low, kWidest);
+      EXPECT_LT(index.total.high - index.total.low, kWidest);
+    }
+  }
+  return static_cast<double>(covered) / static_cast<double>(2 * kSeeds * known.size());
+}
+
+constexpr double kLeastCoverage = 0.9;  // of intervals of 95 %: 60 and 120 of them scatter by 3 and 2 %
+
 // Closed forms, with V1 = (1 + b pi^4 / 5)^2 / 2, V2 = a^2 / 8, V13 = b^2 pi^8 (1/18 - 1/50), a = 7, b = 0.1.
 TEST(SobolIndices, OfIshigamiLieInTheirIntervals) {
   const double pi4 = std::pow(M_PI, 4);
@@ -51,22 +81,8 @@ TEST(SobolIndices, OfIshigamiLieInTheirIntervals) {
   const double V2 = 49.0 / 8.0;
   const double V13 = 0.01 * pi4 * pi4 * (1.0 / 18.0 - 1.0 / 50.0);
   const double V = V1 + V2 + V13;
-  const std::array<double, 3> first = {V1 / V, V2 / V, 0.0};
-  const std::array<double, 3> total = {(V1 + V13) / V, V2 / V, V13 / V};
-  const Study study = MakeStudy("method = \"saltelli\"\ncount = 1024\nseed = 4", 3);
-  EXPECT_EQ(CountTrials(study), 1024 * 5);
-  const Sensitivity sensitivity = AnalyseSensitivity(study, MakeRows(study, Ishigami), "energy");
-  ASSERT_EQ(sensitivity.sobol.size(), 3U);
-  constexpr double kWidest = 0.15;  // an interval that holds everything would show nothing
-  for (size_t i = 0; i < 3; ++i) {
-    const SobolIndex& index = sensitivity.sobol[i];
-    EXPECT_LE(index.first.low, first[i]) << i;
-    EXPECT_GE(index.first.high, first[i]) << i;
-    EXPECT_LE(index.total.low, total[i]) << i;
-    EXPECT_GE(index.total.high, total[i]) << i;
-    EXPECT_LT(index.first.high - index.first.low, kWidest) << i;
-    EXPECT_LT(index.total.high - index.total.low, kWidest) << i;
-  }
+  EXPECT_GE(CalcCoverage(1024, {{V1 / V, (V1 + V13) / V}, {V2 / V, V2 / V}, {0.0, V13 / V}}, Ishigami),
+            kLeastCoverage);
 }
 
 // Sobol's g-function with a = 0, 1, 4.5, 9, 99, 99: V_i = 1 / (3 (1 + a_i)^2), V = prod(1 + V_i) - 1.
@@ -79,18 +95,15 @@ TEST(SobolIndices, OfTheGFunctionLieInTheirIntervals) {
   };
   double all = 1.0;
   for (const double ai : a) all *= 1.0 + 1.0 / (3.0 * (1.0 + ai) * (1.0 + ai));
-  const Study study = MakeStudy("method = \"saltelli\"\ncount = 2048\nseed = 1", a.size());
-  const Sensitivity sensitivity = AnalyseSensitivity(study, MakeRows(study, g), "energy");
-  ASSERT_EQ(sensitivity.sobol.size(), a.size());
-  for (size_t i = 0; i < a.size(); ++i) {
-    const double Vi = 1.0 / (3.0 * (1.0 + a[i]) * (1.0 + a[i]));
-    const double first = Vi / (all - 1.0);
-    const double total = Vi * all / (1.0 + Vi) / (all - 1.0);
-    EXPECT_LE(sensitivity.sobol[i].first.low, first) << i;
-    EXPECT_GE(sensitivity.sobol[i].first.high, first) << i;
-    EXPECT_LE(sensitivity.sobol[i].total.low, total) << i;
-    EXPECT_GE(sensitivity.sobol[i].total.high, total) << i;
+  std::vector<Index> known;
+  for (const double ai : a) {
+    const double Vi = 1.0 / (3.0 * (1.0 + ai) * (1.0 + ai));
+    known.push_back({Vi / (all - 1.0), Vi * all / (1.0 + Vi) / (all - 1.0)});
   }
+  EXPECT_GE(CalcCoverage(1024, known, g), kLeastCoverage);
+  // The intervals do not hold what is wrong.
+  for (Index& index : known) std::swap(index.first, index.total);
+  EXPECT_LT(CalcCoverage(1024, known, g), kLeastCoverage);
 }
 
 TEST(SobolIndices, LeaveOutWhatHasNoValueAndFindNothingInAConstant) {

@@ -106,8 +106,50 @@ TEST_F(StudyPageTest, DrawsMeasuredAndTheoreticalBoundaries) {
               HasSubstr("tell 12 of 12 trials rightly"));
 }
 
+// The part with a script: what it draws, how it filters, sorts and leads to a trial.
+TEST_F(StudyPageTest, LooksCloserAtItsTrials) {
+  Open(1300, 900, false);
+  ASSERT_TRUE(browser_.WaitFor("return document.getElementById('explore').dataset.ready === 'yes';"));
+  const auto ask = [&](const std::string& body) { return browser_.Run(body); };
+  EXPECT_EQ(ask("return document.getElementById('explore-count').textContent;"), "12 of 12 trials");
+  // Something is painted on each canvas.
+  EXPECT_EQ(ask("return [...document.querySelectorAll('#explore canvas')].filter(c => "
+                "c.getContext('2d').getImageData(0, 0, "
+                "c.width, c.height).data.some(v => v !== 0)).length;"),
+            3);
+  // A filter leaves what it says.
+  const std::string type = "const f = document.getElementById('explore-filter'); f.value = '";
+  ask(type + "control.K_v < 1000, control.K_p >= 1e3'; f.dispatchEvent(new Event('input'));");
+  EXPECT_EQ(ask("return document.getElementById('explore-count').textContent;"), "4 of 12 trials");
+  ask(type + "'; f.dispatchEvent(new Event('input'));");
+  ask("const o = document.getElementById('explore-outcome'); o.value = '4'; o.dispatchEvent(new "
+      "Event('change'));");
+  EXPECT_EQ(ask("return document.getElementById('explore-count').textContent;"), "6 of 12 trials")
+      << "that diverged";
+  ask("const o = document.getElementById('explore-outcome'); o.value = ''; o.dispatchEvent(new "
+      "Event('change'));");
+  // Sorted by energy, the largest first: trial 0 has 1, trial 11 a twelfth.
+  const std::string energy =
+      "[...document.querySelectorAll('#explore-head th')].find(t => t.textContent === 'energy')";
+  ask(energy + ".click();");
+  EXPECT_EQ(ask("return document.querySelector('#explore-body td').textContent;"), "11");
+  ask(energy + ".click();");
+  EXPECT_EQ(ask("return document.querySelector('#explore-body td').textContent;"), "0");
+  EXPECT_EQ(ask("return " + energy + ".getAttribute('aria-sort');"), "descending");
+  // A trial that is chosen shows its command, with the numbers exactly.
+  ask("document.querySelectorAll('#explore-body tr')[5].click();");
+  EXPECT_EQ(
+      ask("return document.getElementById('explore-command').textContent;"),
+      "dexcheck run offset --set control.K_p=1000 --set control.K_v=200 --no-check --video --out trial-5");
+  EXPECT_THAT(ask("return document.getElementById('explore-budget').textContent;").get<std::string>(),
+              HasSubstr("dexcheck budget offset --set control.K_p=1000"));
+  EXPECT_EQ(ask("return document.querySelectorAll('#explore-importance tr').length;"), 2);
+  EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty());
+}
+
 TEST_F(StudyPageTest, FitsAPhone) {
   Open(390, 844, true);
+  ASSERT_TRUE(browser_.WaitFor("return document.getElementById('explore').dataset.ready === 'yes';"));
   EXPECT_LE(browser_.Run("return document.documentElement.scrollWidth - innerWidth;"), 0);
   EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty());
 }

@@ -39,13 +39,15 @@ class StudyReportTest : public ::testing::Test {
     identity[2].second = study_.text;
     identity[3].second = ReadTextFile(testing::SourcePath("/harness/shipped/scenarios/offset.toml"));
     StudyStore store = StudyStore::OpenOrCreate(folder_.path() / "s.sqlite", identity, study_);
+    std::vector<TrialRow> rows;
     for (const Trial& trial : ListTrials(study_)) {
       TrialRow row;
       row.trial = trial;
       row.result.outcome = trial.number % 2 == 0 ? Outcome::kTracked : Outcome::kDiverged;
       if (trial.number % 2 == 1) row.result.failure = text;
-      store.Add(row);
+      rows.push_back(row);
     }
+    store.Add(rows);
     return MakeStudyReport(store);
   }
 
@@ -69,6 +71,22 @@ TEST_F(StudyReportTest, TextsMayHaveAnyLength) {
   constexpr size_t kLength = 1000000;
   const std::string page = Report(std::string(kLength, 'x') + " at t = 1 s");
   EXPECT_THAT(page, HasSubstr(std::string(kLength, 'x')));
+}
+
+// Of many trials the page has pictures of the maps and an even part of the trials.
+TEST_F(StudyReportTest, ManyTrialsMakeASmallPage) {
+  study_ = ParseStudy(
+      "name = \"many\"\nscenario = \"offset\"\n[[vary]]\nkey = 'control.K_p'\nfrom = 1\nto = 100\ncount = "
+      "150\n[[vary]]\nkey = 'control.K_v'\nfrom = 1\nto = 100\ncount = 150\n",
+      "study.toml");
+  const std::string page = Report("why");
+  constexpr size_t kMost = 10U << 20U;
+  EXPECT_LT(page.size(), kMost);
+  EXPECT_THAT(page, HasSubstr("<image "));
+  EXPECT_THAT(page, HasSubstr("data:image/png;base64,iVBORw0KGgo"));
+  EXPECT_THAT(page, Not(HasSubstr("<rect x=\"70.00\" y=\"30.00\" width=\"2.90\"")));
+  EXPECT_THAT(page, HasSubstr("of 22500 trials; <code>dexcheck study show DB NUMBER</code>"));
+  EXPECT_THAT(page, HasSubstr("id=\"trial-0\""));
 }
 
 }  // namespace

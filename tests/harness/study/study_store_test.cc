@@ -46,6 +46,10 @@ class StudyStoreTest : public ::testing::Test {
     return row;
   }
 
+  static TrialSource MakeSource(const std::string& name, const std::vector<TrialRow>& rows) {
+    return {name, [rows] { return rows; }};
+  }
+
   TempFolder folder_;
   Study study_;
   StudyIdentity identity_;
@@ -102,14 +106,14 @@ TEST_F(StudyStoreTest, OtherFilesAreRefused) {
 
 TEST_F(StudyStoreTest, DifferentResultsOfOneTrialAreRefused) {
   StudyStore store = Open();
-  store.AddAll({{"a.sqlite", {MakeRow(0), MakeRow(1)}}});
-  store.AddAll({{"b.sqlite", {MakeRow(1), MakeRow(2)}}});
+  store.AddAll({MakeSource("a.sqlite", {MakeRow(0), MakeRow(1)})});
+  store.AddAll({MakeSource("b.sqlite", {MakeRow(1), MakeRow(2)})});
   EXPECT_EQ(store.ReadRows().size(), 3u);
   TrialRow other = MakeRow(2);
   other.result.metrics[kEnergy] = std::nextafter(other.result.metrics[kEnergy], 1.0);
   EXPECT_TRUE(Throws<InputError>(
       [&] {
-        store.AddAll({{"c.sqlite", {MakeRow(5)}}, {"d.sqlite", {MakeRow(6), other}}});
+        store.AddAll({MakeSource("c.sqlite", {MakeRow(5)}), MakeSource("d.sqlite", {MakeRow(6), other})});
         return 0;
       },
       "d.sqlite: trial 2 has another result"));
@@ -117,7 +121,7 @@ TEST_F(StudyStoreTest, DifferentResultsOfOneTrialAreRefused) {
       [&] {
         TrialRow third = MakeRow(7);
         third.result.outcome = Outcome::kTracked;
-        store.AddAll({{"c.sqlite", {MakeRow(7)}}, {"d.sqlite", {third}}});
+        store.AddAll({MakeSource("c.sqlite", {MakeRow(7)}), MakeSource("d.sqlite", {third})});
         return 0;
       },
       "d.sqlite: trial 7 has another result than in c.sqlite"));
@@ -164,7 +168,8 @@ TEST_F(StudyStoreTest, FailedTrialsGiveWay) {
     crashed.result.outcome = failed;
     std::filesystem::remove(folder_.path() / "s.sqlite");
     StudyStore store = Open();
-    store.AddAll({{"a.sqlite", {crashed}}, {"b.sqlite", {MakeRow(0)}}, {"c.sqlite", {crashed}}});
+    store.AddAll({MakeSource("a.sqlite", {crashed}), MakeSource("b.sqlite", {MakeRow(0)}),
+                  MakeSource("c.sqlite", {crashed})});
     ASSERT_EQ(store.ReadRows().size(), 1u);
     EXPECT_EQ(store.ReadRows()[0].result.outcome, Outcome::kSlipped);
 

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <map>
 #include <stdexcept>
@@ -72,6 +73,40 @@ TEST(TrialPool, ACrashCostsNoOtherTrial) {
   EXPECT_NE(results.at(1).failure.find("Segmentation fault"), std::string::npos) << results.at(1).failure;
   EXPECT_NE(results.at(2).failure.find("no such thing"), std::string::npos) << results.at(2).failure;
   EXPECT_NE(results.at(3).failure.find("thrown"), std::string::npos) << results.at(3).failure;
+}
+
+// A process makes one trial after another; who made them does not show.
+TEST(TrialPool, AProcessMakesManyTrialsAndACrashBringsANewOne) {
+  TrialPool pool(2, 0.0, [](const Trial& trial) {
+    if (trial.number == 9) ::_exit(1);
+    TrialResult result = MakeResult(trial);
+    result.metrics[kPeakTorque] = static_cast<double>(::getpid());
+    return result;
+  });
+  const auto results = RunAll(&pool, 40);
+  ASSERT_EQ(results.size(), 40U);
+  std::map<double, int> by_process;
+  for (const auto& [trial, result] : results) {
+    if (trial == 9) {
+      EXPECT_EQ(result.outcome, Outcome::kCrashed);
+      continue;
+    }
+    EXPECT_EQ(result.metrics[kEnergy], 0.1 * static_cast<double>(trial));
+    ++by_process[result.metrics[kPeakTorque]];
+  }
+  EXPECT_LE(by_process.size(), 3U) << "two, and one in the place of the one that ended";
+}
+
+// A message of an earlier trial is not taken for that of a later one.
+TEST(TrialPool, MessagesBelongToTheirTrial) {
+  TrialPool pool(1, 0.0, [](const Trial& trial) {
+    if (trial.number == 0) std::fprintf(stderr, "a warning that is long ago\n");
+    if (trial.number == 1) std::raise(SIGKILL);
+    return MakeResult(trial);
+  });
+  const auto results = RunAll(&pool, 2);
+  EXPECT_EQ(results.at(1).outcome, Outcome::kCrashed);
+  EXPECT_EQ(results.at(1).failure.find("long ago"), std::string::npos) << results.at(1).failure;
 }
 
 TEST(TrialPool, TellsWhatWasKilledFromOutside) {

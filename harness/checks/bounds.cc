@@ -1,0 +1,56 @@
+#include "harness/checks/bounds.h"
+
+#include <cmath>
+
+namespace dexcheck {
+namespace {
+
+// Those of the shipped scenarios.
+constexpr double kShippedGain = 400.0;    // K_p, 1/s^2
+constexpr double kShippedPosture = 10.0;  // rad/s
+
+double Square(double x) { return x * x; }
+
+/// By the numbers of the engine's contacts, which a rigid plant has not.
+double CalcContactScale(Scaling scaling, const PlantOptions& plant) {
+  const double dt = plant.time_step;
+  const double softness = 1.0 - plant.contact_impedance;
+  switch (scaling) {
+    case Scaling::kCreep:
+      return softness * dt;
+    case Scaling::kLag:
+      return dt;
+    case Scaling::kSinking:
+    case Scaling::kPosture:
+      return softness * dt * dt;
+    case Scaling::kSinkingRate:
+      return softness * FindContactTimeConstant(plant);
+    default:
+      return 1.0;
+  }
+}
+
+double CalcGainScale(const Vector3d& K_p) {
+  // Gains that do not settle fail a check of their own.
+  return K_p.minCoeff() > 0.0 ? kShippedGain / K_p.minCoeff() : 1.0;
+}
+
+}  // namespace
+
+double FindContactTimeConstant(const PlantOptions& plant) {
+  return plant.contact_time_constant > 0.0 ? plant.contact_time_constant : 2.0 * plant.time_step;
+}
+
+double CalcScale(Scaling scaling, const Scenario& scenario) {
+  const ControlOptions& control = scenario.control;
+  if (scaling == Scaling::kPositionGain) return CalcGainScale(control.gains.K_p.head<3>());
+  if (scaling == Scaling::kOrientationGain) return CalcGainScale(control.gains.K_p.tail<3>());
+  double scale = scaling == Scaling::kPosture && control.posture_frequency > 0.0
+                     ? Square(kShippedPosture / control.posture_frequency)
+                     : 1.0;
+  if (scenario.plant.type == PlantType::kEngine)
+    scale *= CalcContactScale(scaling, scenario.plant) / CalcContactScale(scaling, PlantOptions{});
+  return scale;
+}
+
+}  // namespace dexcheck

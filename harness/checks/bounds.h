@@ -1,0 +1,22 @@
+#pragma once
+
+// The bounds of questions two to five: one number each for the shipped plant and gains, in
+// step_check_table.h, and how it scales with what a scenario changes.
+
+#include "harness/checks/step_check_table.h"
+#include "harness/scenario/scenario.h"
+
+namespace dexcheck {
+
+/// tc of the scenario's contacts, s: twice the time step unless it says otherwise.
+[[nodiscard]] double FindContactTimeConstant(const PlantOptions& plant);
+
+/// What a bound is proportional to, over what that is for the shipped plant and gains.
+[[nodiscard]] double CalcScale(Scaling scaling, const Scenario& scenario);
+
+/// The bound of a check in that scenario, but for what the scenario itself says under [bounds] and [expect].
+[[nodiscard]] inline double CalcBound(const StepCheckInfo& info, const Scenario& scenario) {
+  return info.bound * CalcScale(info.scaling, scenario);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,91 @@
+#pragma once
+
+// What soft contacts hold back of a force that changes.
+
+#include <functional>
+
+#include "controller/common/types.h"
+#include "harness/checks/step_record.h"
+#include "harness/checks/wheel_evidence.h"
+#include "harness/engine/contact_softness.h"
+#include "harness/scenario/setup.h"
+
+namespace dexcheck {
+
+/// One soft contact under a vector of forces F(t). The engine lets J qacc = a_ref - R f, of a contact that
+/// forces move by A: where it holds back a share s = R / (A + R) of a force that changes, along a normal
+///
+///   r_ddot = (1 - s) (-b r_dot - k r) - s F,   b = 2 / (tc d),  k = 1 / (d tc^2),
+///
+/// of time constant tc and impedance d, and along a tangent v_dot = -(1 - s) b v - s F. Under a constant
+/// force the contact comes to rest and holds as a rigid one does; what it holds back is r_ddot, or v_dot.
+/// Both are stepped as the engine steps: velocities first.
+class ContactGive {
+ public:
+  /// s, and 1 - s.
+  struct Share {
+    double force = 0.0, contact = 1.0;
+    static Share Of(double share) { return {share, 1.0 - share}; }
+    /// Of an acceleration instead of a force: it is held back whole.
+    static Share Whole() { return {1.0, 1.0}; }
+  };
+  ContactGive(const PlantOptions& plant, const Share& normal, const Share& tangential);
+
+  /// The next step's force. The first one finds the contact at rest.
+  void Add(const Eigen::Ref<const VectorXd>& force);
+
+  [[nodiscard]] bool has_any() const { return depth_.size() > 0; }
+  /// r_ddot and v_dot of that step.
+  [[nodiscard]] const VectorXd& along_normal() const { return normal_acceleration_; }
+  [[nodiscard]] const VectorXd& along_tangent() const { return tangent_acceleration_; }
+  /// The sum of their magnitudes.
+  [[nodiscard]] double size() const { return normal_acceleration_.norm() + tangent_acceleration_.norm(); }
+  /// By which share a step's give is still there at the next: contacts have several modes of that time
+  /// constant, of which one is followed.
+  [[nodiscard]] double memory() const { return memory_; }
+  /// r_dot at its end.
+  [[nodiscard]] const VectorXd& rate() const { return depth_rate_; }
+
+ private:
+  double time_step_, b_, k_, memory_;
+  Share normal_, tangential_;
+  VectorXd depth_, depth_rate_, slip_;
+  VectorXd normal_acceleration_, tangent_acceleration_;
+};
+
+/// By how much soft contacts change what the rigid system (46), (48) predicts; formulas in
+/// step_check_table.h.
+class PredictionGive {
+ public:
+  explicit PredictionGive(const Setup& setup);
+
+  /// The next step that is judged. @param uneven what comes of tilt and slip, in |.|_M^-1. @param norm
+  /// |f|_M^-1 of this step. @param force C_bar' xi + F_bar' - E_bar' tau' (n). @param f_c (3N) predicted.
+  void Follow(const StepRecord& step, const Eigen::Ref<const VectorXd>& force,
+              const Eigen::Ref<const VectorXd>& f_c, double uneven,
+              const std::function<double(const VectorXd&)>& norm);
+  /// Of xi_dot, in |.|_M.
+  [[nodiscard]] double motion() const { return motion_; }
+  /// Of f_c, N.
+  [[nodiscard]] double force() const { return contact_force_; }
+  /// Of the platform's velocity, m/s: how fast it sinks and tilts.
+  [[nodiscard]] double sinking() const { return sinking_; }
+
+ private:
+  PredictionGive(const Setup& setup, const ContactSoftness& softness);
+
+  const Setup* setup_;
+  WheelEvidence wheels_;
+  double mass_ = 0.0;  // of the robot, kg
+  /// Of the force on the robot (n), of f_c (3N), and, of a plant that is not ideal, of pushes (3) and of
+  /// J_B'^T f_c (n).
+  ContactGive force_, f_c_, push_, grasp_;
+  /// Likewise of the accelerations that (46) has and the engine's constraints have not, m/s^2: of fingertips
+  /// (3N), of the wheels sideways (1).
+  ContactGive tips_, tyres_;
+  VectorXd sideways_, grasp_force_;        // 1, n
+  double held_ = 0.0, held_of_f_c_ = 0.0;  // with what is left of former steps
+  double motion_ = 0.0, contact_force_ = 0.0, sinking_ = 0.0;
+};
+
+}  // namespace dexcheck

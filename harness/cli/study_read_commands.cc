@@ -1,0 +1,129 @@
+#include "harness/cli/study_read_commands.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/base/interrupts.h"
+#include "harness/cli/output_file.h"
+#include "harness/study/study_csv.h"
+#include "harness/study/study_progress.h"
+#include "harness/study/study_report.h"
+#include "harness/study/study_store.h"
+
+namespace dexcheck::cli {
+namespace {
+
+std::string CheckInterval(const std::string& text) {
+  constexpr double kLeast = 0.1;
+  constexpr double kMost = 86400.0;
+  char* end = nullptr;
+  const double seconds = std::strtod(text.c_str(), &end);
+  const bool good = end != text.c_str() && *end == 0 && seconds >= kLeast && seconds <= kMost;
+  return good ? "" : "must be from 0.1 to 86400 s, got " + Quote(text);
+}
+
+int ShowTrial(const std::string& database, long number) {
+  const StudyStore store = StudyStore::Open(database);
+  const Study& study = store.study();
+  const std::optional<TrialRow> found = store.FindRow(number);
+  if (!found) throw InputError(fmt::format("{}: trial {}: has no row", database, number));
+  const TrialRow& row = *found;
+  fmt::print("trial {}, seed {}: {}{}{}\n", row.trial.number, row.trial.seed, NameOf(row.result.outcome),
+             row.result.failure.empty() ? "" : ": ", row.result.failure);
+  for (size_t i = 0; i < study.variations.size(); ++i) {
+    fmt::print("  {:<24}{}\n", study.variations[i].key,
+               FormatValue(study.variations[i], row.trial.parameters[i]));
+  }
+  for (size_t i = 0; i < kMetrics.size(); ++i) {
+    const double value = row.result.metrics[i];
+    const std::string unit = kMetrics[i].unit;
+    if (std::isfinite(value))
+      fmt::print("  {:<24}{:.6g}{}\n", kMetrics[i].name, value, unit == "1" ? "" : " " + unit);
+  }
+  fmt::print("{}\n", MakeReplayCommand(study, row.trial));
+  return kSuccess;
+}
+
+int WatchStudy(const std::string& database, double interval, const std::string& page) {
+  CatchInterrupts();
+  while (true) {
+    const StudyStore store = StudyStore::Open(database);
+    const StudyProgress progress = FindProgress(store);
+    fmt::print("{}\n", progress.text);
+    std::fflush(stdout);
+    if (!page.empty()) {
+      OutputFile out(page);
+      out.Write(MakeStudyReport(store, progress.is_over ? 0.0 : interval));
+    }
+    if (progress.is_over) return kSuccess;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(interval);
+    constexpr auto kNap = std::chrono::milliseconds(50);
+    while (std::chrono::steady_clock::now() < end && !IsInterrupted()) std::this_thread::sleep_for(kNap);
+    if (IsInterrupted()) throw Error(database + ": no longer watched: interrupted");
+  }
+}
+
+}  // namespace
+
+void AddStudyReadCommands(Command study) {
+  const auto database = std::make_shared<std::string>();
+  const auto out = std::make_shared<std::string>();
+  const auto add_database = [&](Command command) {
+    command.AddOption("DB", database.get(), "The study's database").Required();
+  };
+
+  Command report = study.AddCommand("report", "Write an HTML page of a study's results");
+  add_database(report);
+  report.AddOption("--out", out.get(), "The page (DB.html by default); - for standard output")
+      .TypeName("FILE.html");
+  report.SetAction([=] {
+    RequirePageName(*out);
+    const StudyStore store = StudyStore::Open(*database);
+    OutputFile file(out->empty() ? *database + ".html" : *out);
+    file.Write(MakeStudyReport(store));
+    return kSuccess;
+  });
+
+  Command show = study.AddCommand("show", "Print one trial and the command that repeats it");
+  add_database(show);
+  const auto number = std::make_shared<long>(0);
+  show.AddOption("TRIAL", number.get(), "Its number").Required();
+  show.SetAction([=] { return ShowTrial(*database, *number); });
+
+  Command csv = study.AddCommand("export", "Write all trials as CSV");
+  add_database(csv);
+  csv.AddOption("--out", out.get(), "The file (DB.csv by default); - for standard output")
+      .TypeName("FILE.csv");
+  csv.SetAction([=] {
+    const StudyStore store = StudyStore::Open(*database);
+    OutputFile file(out->empty() ? *database + ".csv" : *out);
+    WriteStudyCsv(store, [&](std::string_view text) { file.Append(std::string(text)); });
+    file.Finish();
+    return kSuccess;
+  });
+
+  Command watch = study.AddCommand("watch", "Tell how far a study has come, until it is done");
+  add_database(watch);
+  const auto interval = std::make_shared<double>(5.0);
+  watch.AddOption("--interval", interval.get(), "Seconds between two looks")
+      .TypeName("S")
+      .Check(CheckInterval)
+      .ShowDefault();
+  watch.AddOption("--page", out.get(), "Write the study's page at each look; it renews itself")
+      .TypeName("FILE.html");
+  watch.SetAction([=] {
+    RequirePageName(*out);
+    return WatchStudy(*database, *interval, *out);
+  });
+}
+
+}  // namespace dexcheck::cli

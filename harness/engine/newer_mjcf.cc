@@ -1,0 +1,254 @@
+#include "harness/engine/newer_mjcf.h"
+
+#include <mujoco/mujoco.h>
+#include <tinyxml2.h>
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <sstream>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+
+namespace dexcheck {
+namespace {
+
+using tinyxml2::XMLElement;
+
+/// An element of the engine's own schema.
+struct SchemaElement {
+  std::set<std::string, std::less<>> attributes;
+  std::map<std::string, SchemaElement*, std::less<>> children;
+};
+
+/// The schema of the engine that is linked, as mj_printSchema prints it: three blanks a level, the element's
+/// name with how often it may stand there, and its attributes, which may take further lines.
+class Schema {
+ public:
+  Schema() {
+    std::vector<char> text(1 << 18);
+    mj_printSchema(nullptr, text.data(), static_cast<int>(text.size()), /*flg_html=*/0, /*flg_pad=*/0);
+    std::istringstream lines(text.data());
+    std::vector<SchemaElement*> path;
+    for (std::string line; std::getline(lines, line);) ReadLine(line, &path);
+  }
+  [[nodiscard]] const SchemaElement& root() const { return *elements_.front(); }
+
+ private:
+  void ReadLine(const std::string& line, std::vector<SchemaElement*>* path) {
+    std::istringstream words(line);
+    // " (?)", with one of !, ?, *, R between the brackets; "(world)body (R)" has others before.
+    size_t kind = line.find(" (");
+    while (kind != std::string::npos && !(kind + 3 < line.size() && line[kind + 3] == ')')) {
+      kind = line.find(" (", kind + 1);
+    }
+    if (kind != std::string::npos) {
+      const size_t indent = line.find_first_not_of(' ');
+      std::string name;
+      words >> name;
+      std::string skipped;
+      words >> skipped;
+      Add(indent / 3, name, line[kind + 2] == 'R', path);
+    }
+    if (path->empty()) return;
+    for (std::string attribute; words >> attribute;) path->back()->attributes.insert(attribute);
+  }
+
+  void Add(size_t level, std::string name, bool is_recursive, std::vector<SchemaElement*>* path) {
+    const bool is_body = name == "(world)body";
+    if (is_body) name = "body";
+    SchemaElement* const element = elements_.emplace_back(std::make_unique<SchemaElement>()).get();
+    if (path->size() > level) path->resize(level);
+    if (!path->empty()) {
+      path->back()->children[name] = element;
+      if (is_body) path->back()->children["worldbody"] = element;
+    }
+    if (is_recursive) element->children[name] = element;
+    // Understood by the reader before the schema.
+    element->children["include"] = &include_;
+    path->push_back(element);
+  }
+
+  std::vector<std::unique_ptr<SchemaElement>> elements_;
+  SchemaElement include_{{"file"}, {}};
+};
+
+bool IsZero(std::string_view text) { return text.find_first_of("123456789") == std::string_view::npos; }
+
+class Downgrade {
+ public:
+  explicit Downgrade(const std::string& source) : source_(source) {}
+
+  DowngradedMjcf Run(std::string_view text) {
+    tinyxml2::XMLDocument document;
+    if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
+      throw InputError(source_ + ":" + std::to_string(document.ErrorLineNum()) + ": is not XML");
+    }
+    XMLElement* const root = document.RootElement();
+    if (root == nullptr || std::string_view(root->Name()) != "mujoco") {
+      throw InputError(source_ + ": must be an MJCF, its root element <mujoco>");
+    }
+    Walk(root, schema_.root());
+    TakeNewDefaults(root);
+    tinyxml2::XMLPrinter printer;
+    document.Print(&printer);
+    result_.text = printer.CStr();
+    return std::move(result_);
+  }
+
+ private:
+  [[noreturn]] void Refuse(const XMLElement& element, const std::string& word, const NewerWord* known) const {
+    std::string why = "is neither in " + std::string(mj_versionString()) + " nor known to be newer";
+    if (known != nullptr) {
+      why = "acts on the dynamics, since MuJoCo " + std::string(known->since) + ": " +
+            std::string(known->advice);
+    }
+    throw InputError(source_ + ":" + std::to_string(element.GetLineNum()) + ": " + word + ": " + why);
+  }
+
+  void Note(const XMLElement& element, const std::string& word, const std::string& what) {
+    result_.changes.push_back({element.GetLineNum(), word, what});
+  }
+
+  static std::string DescribeLoss(const NewerWord& word) {
+    return "left out: " + std::string(NameOf(word.effect)) + ", since MuJoCo " + std::string(word.since);
+  }
+
+  void Walk(XMLElement* element, const SchemaElement& schema) {
+    ReplaceValues(element);
+    RemoveAttributes(element, schema);
+    for (XMLElement* child = element->FirstChildElement(); child != nullptr;) {
+      XMLElement* const next = child->NextSiblingElement();
+      const auto known = schema.children.find(std::string_view(child->Name()));
+      if (known != schema.children.end()) {
+        Walk(child, *known->second);
+      } else {
+        const std::string word = "<" + std::string(child->Name()) + ">";
+        const NewerWord* const newer = FindNewerWord(child->Name(), "");
+        if (newer == nullptr || newer->effect == MjcfEffect::kDynamics) Refuse(*child, word, newer);
+        Note(*child, word, DescribeLoss(*newer));
+        element->DeleteChild(child);
+      }
+      child = next;
+    }
+  }
+
+  void RemoveAttributes(XMLElement* element, const SchemaElement& schema) {
+    for (const tinyxml2::XMLAttribute* attribute = element->FirstAttribute(); attribute != nullptr;) {
+      const tinyxml2::XMLAttribute* const next = attribute->Next();
+      const std::string name = attribute->Name();
+      if (!schema.attributes.contains(name)) {
+        const std::string word = "<" + std::string(element->Name()) + " " + name + ">";
+        const NewerWord* const newer = FindNewerWord(element->Name(), name);
+        if (newer == nullptr) Refuse(*element, word, newer);
+        const bool is_neutral =
+            !newer->neutral.empty() &&
+            (newer->neutral == attribute->Value() || (newer->neutral == "0" && IsZero(attribute->Value())));
+        if (newer->effect == MjcfEffect::kDynamics && !is_neutral) Refuse(*element, word, newer);
+        Note(*element, word, DescribeLoss(*newer));
+        element->DeleteAttribute(name.c_str());
+      }
+      attribute = next;
+    }
+  }
+
+  /// Values of attributes that 2.2.2 has with other meanings.
+  void ReplaceValues(XMLElement* element) {
+    const std::string_view name = element->Name();
+    if (name == "compiler") {
+      // Both directories at once.
+      if (const char* folder = element->Attribute("assetdir")) {
+        const std::string assets = folder;
+        for (const char* each : {"meshdir", "texturedir"}) {
+          if (element->Attribute(each) == nullptr) element->SetAttribute(each, assets.c_str());
+        }
+        element->DeleteAttribute("assetdir");
+        Note(*element, "<compiler assetdir>", "written as meshdir and texturedir");
+      }
+    }
+    if (name == "option") {
+      for (const auto& [value, other] :
+           {std::pair("implicitfast", "implicit"), std::pair("discrete", "Euler")}) {
+        if (element->Attribute("integrator", value) == nullptr) continue;
+        element->SetAttribute("integrator", other);
+        Note(*element, "<option integrator>",
+             std::string(value) + " written as " + other + ", which no term depends on");
+      }
+    }
+    if (name == "joint") {
+      TakePolynomial(element, "damping");
+      TakePolynomial(element, "stiffness");
+    }
+  }
+
+  /// Forces that are polynomials of the velocity or position: 2.2.2 has the first coefficient.
+  void TakePolynomial(XMLElement* joint, const char* attribute) {
+    const char* const value = joint->Attribute(attribute);
+    if (value == nullptr) return;
+    std::istringstream numbers(value);
+    std::string first;
+    std::string rest;
+    numbers >> first;
+    std::getline(numbers, rest);
+    if (rest.find_first_not_of(" \t") == std::string::npos) return;
+    const std::string word = "<joint " + std::string(attribute) + ">";
+    if (!IsZero(rest)) {
+      throw InputError(source_ + ":" + std::to_string(joint->GetLineNum()) + ": " + word +
+                       ": acts on the dynamics: 2.2.2 has the first coefficient only, got " + Quote(value));
+    }
+    joint->SetAttribute(attribute, first.c_str());
+    Note(*joint, word, "its zero coefficients left out");
+  }
+
+  /// Since 3.0.0 a range alone limits.
+  void TakeNewDefaults(XMLElement* root) {
+    XMLElement* compiler = root->FirstChildElement("compiler");
+    if (compiler == nullptr) {
+      compiler = root->GetDocument()->NewElement("compiler");
+      root->InsertFirstChild(compiler);
+    }
+    if (compiler->Attribute("autolimits") != nullptr) return;
+    compiler->SetAttribute("autolimits", "true");
+    Note(*compiler, "<compiler autolimits>", "stated: true by default since MuJoCo 3.0.0");
+  }
+
+  const std::string& source_;
+  Schema schema_;
+  DowngradedMjcf result_;
+};
+
+/// What stands between quotes behind `before`.
+std::optional<std::string> FindQuoted(const std::string& message, const std::string& before) {
+  const size_t start = message.find(before + "'");
+  if (start == std::string::npos) return std::nullopt;
+  const size_t first = start + before.size() + 1;
+  const size_t end = message.find('\'', first);
+  if (end == std::string::npos) return std::nullopt;
+  return message.substr(first, end - first);
+}
+
+}  // namespace
+
+DowngradedMjcf DowngradeMjcf(std::string_view text, const std::string& source) {
+  return Downgrade(source).Run(text);
+}
+
+std::string ExplainNewerMjcf(const std::string& message) {
+  const std::optional<std::string> element = FindQuoted(message, "Element ");
+  if (!element) return {};
+  const std::optional<std::string> attribute = FindQuoted(message, "unrecognized attribute: ");
+  if (!attribute && message.find("unrecognized element") == std::string::npos) return {};
+  const NewerWord* const word = FindNewerWord(*element, attribute.value_or(""));
+  if (word == nullptr) return {};
+  const std::string since =
+      "; it is new since MuJoCo " + std::string(word->since) + " and acts on " + NameOf(word->effect);
+  if (word->effect == MjcfEffect::kDynamics && word->neutral.empty())
+    return since + ": " + std::string(word->advice);
+  return since +
+         "; dexcheck import FILE --downgrade --out COPY.xml writes a copy without what has no effect on the "
+         "dynamics";
+}
+
+}  // namespace dexcheck

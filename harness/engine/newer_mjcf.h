@@ -1,0 +1,58 @@
+#pragma once
+
+// What releases of MuJoCo after 2.2.2 added to MJCF, and copies of newer files that 2.2.2 reads.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace dexcheck {
+
+/// What a newer element or attribute acts on.
+enum class MjcfEffect {
+  kNone,       ///< Looks, sensors, memory, names.
+  kContacts,   ///< Contacts, solver, integration in time: no term of the free robot.
+  kActuators,  ///< Forces of motors.
+  kDynamics,   ///< M, C v, gravity, friction, or the mechanism itself.
+};
+
+/// "looks, sensors or memory", "contacts, solver or time steps", "forces of actuators", "dynamics".
+const char* NameOf(MjcfEffect effect);
+
+/// An element (`attribute` is empty) or an attribute that 2.2.2 does not have.
+struct NewerWord {
+  std::string_view element;
+  std::string_view attribute;
+  std::string_view since;  ///< Release, "3.1.4".
+  MjcfEffect effect;
+  std::string_view neutral;  ///< Value with which it acts on nothing; empty: none is known.
+  std::string_view advice;   ///< What to do, when it acts on the dynamics.
+};
+
+/// The word's entry; nullptr when it is not known. @param attribute empty for the element itself.
+const NewerWord* FindNewerWord(std::string_view element, std::string_view attribute);
+
+/// What was done with one word of a file.
+struct MjcfChange {
+  int line = 0;
+  std::string word;  ///< "<joint actuatorfrcrange>"
+  std::string what;  ///< "left out: forces of actuators, since MuJoCo 3.0.0"
+};
+
+/// A copy of an MJCF for 2.2.2.
+struct DowngradedMjcf {
+  std::string text;
+  std::vector<MjcfChange> changes;
+};
+
+/// Leaves out what this program's engine does not know and what has no effect on the dynamics, and states
+/// what later releases take by default (autolimits).
+/// @throws InputError "FILE:LINE: <joint damping>: ...", which says since which release and what to do, for
+/// what acts on the dynamics or is not known at all.
+DowngradedMjcf DowngradeMjcf(std::string_view text, const std::string& source);
+
+/// Of what the engine said of an MJCF that it cannot load, the explanation when a newer release is the
+/// reason: "; since MuJoCo 3.0.0, ..."; empty otherwise.
+std::string ExplainNewerMjcf(const std::string& message);
+
+}  // namespace dexcheck

@@ -1,0 +1,18 @@
+#pragma once
+
+// A study's rows for other programs.
+
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "harness/study/study_store.h"
+
+namespace dexcheck {
+
+/// Comma-separated values with a head: trial, seed, the keys, outcome, failure, the metrics, machine. Numbers
+/// read back as the same doubles; what does not exist is empty.
+/// @param write takes the text piece by piece.
+void WriteStudyCsv(const StudyStore& store, const std::function<void(std::string_view)>& write);
+
+}  // namespace dexcheck

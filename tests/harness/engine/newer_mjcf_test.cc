@@ -1,0 +1,157 @@
+// Files for releases of MuJoCo after 2.2.2.
+
+#include "harness/engine/newer_mjcf.h"
+
+#include <gmock/gmock.h>
+
+#include "controller/common/errors.h"
+#include "harness/engine/engine.h"
+#include "tests/common/files.h"
+#include "tests/common/paths.h"
+#include "tests/common/throws.h"
+
+namespace dexcheck {
+namespace {
+
+using ::testing::Contains;
+using ::testing::Field;
+using ::testing::HasSubstr;
+
+/// A pendulum with these words added at the places that their names say.
+struct Words {
+  std::string compiler, option, flag, root, joint, geom, body, in_body, actuator, tendon, sensor;
+};
+
+void PrintTo(const Words& words, std::ostream* out) {
+  for (const std::string* word :
+       {&words.compiler, &words.option, &words.flag, &words.root, &words.joint, &words.geom, &words.body,
+        &words.in_body, &words.actuator, &words.tendon, &words.sensor}) {
+    *out << *word;
+  }
+}
+
+std::string WriteMjcf(const Words& words) {
+  return "<mujoco>\n<compiler angle=\"radian\" autolimits=\"true\" " + words.compiler + "/>\n<option " +
+         words.option + "><flag " + words.flag + "/></option>\n" + words.root +
+         "<worldbody>\n<body name=\"arm\" " + words.body +
+         ">\n<joint name=\"swing\" axis=\"0 1 0\" range=\"-1 1\" damping=\"0.1\" " + words.joint +
+         "/>\n<geom type=\"capsule\" size=\"0.02 0.2\" pos=\"0 0 0.2\" " + words.geom +
+         "/>\n<site name=\"tip\"/>" + words.in_body +
+         "\n</body>\n</worldbody>\n<tendon><fixed name=\"pull\" " + words.tendon +
+         "><joint joint=\"swing\" coef=\"1\"/></fixed></tendon>\n<actuator><position joint=\"swing\" " +
+         words.actuator + "/></actuator>\n<sensor><jointpos joint=\"swing\" " + words.sensor +
+         "/></sensor>\n</mujoco>\n";
+}
+
+const std::string kPlain = WriteMjcf({});
+
+/// Inertia about the joint, bias, and passive force at one state.
+std::vector<double> CalcTerms(const std::string& text) {
+  const MjModelPtr model = LoadMjcfText(text, "test");
+  const MjDataPtr data = MakeData(*model);
+  data->qpos[0] = 0.3;
+  data->qvel[0] = 0.7;
+  mj_forward(model.get(), data.get());
+  return {data->qM[0], data->qfrc_bias[0], data->qfrc_passive[0]};
+}
+
+class LeftOut : public ::testing::TestWithParam<Words> {};
+
+TEST_P(LeftOut, ThePendulumStays) {
+  const std::string newer = WriteMjcf(GetParam());
+  EXPECT_THROW(LoadMjcfText(newer, "newer"), InputError);
+  const DowngradedMjcf copy = DowngradeMjcf(newer, "newer");
+  EXPECT_FALSE(copy.changes.empty());
+  const std::vector<double> terms = CalcTerms(copy.text);
+  EXPECT_EQ(terms, CalcTerms(kPlain));
+  for (const double term : terms) EXPECT_NE(term, 0.0);
+  // The copy is for 2.2.2 already.
+  EXPECT_TRUE(DowngradeMjcf(copy.text, "copy").changes.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    NewerMjcf, LeftOut,
+    ::testing::Values(
+        Words{.joint = "actuatorfrcrange=\"-5 5\""}, Words{.joint = "actuatorgravcomp=\"true\""},
+        Words{.joint = "stiffness=\"0 0 0\""}, Words{.option = "integrator=\"implicitfast\""},
+        Words{.option = "ls_iterations=\"20\" ccd_iterations=\"30\""},
+        Words{.flag = "eulerdamp=\"disable\" nativeccd=\"enable\""}, Words{.flag = "damper=\"enable\""},
+        Words{.compiler = "saveinertial=\"true\" alignfree=\"false\""},
+        Words{.root = "<size memory=\"1M\"/>\n"},
+        Words{.root = "<visual><global bvactive=\"false\"/></visual>\n"},
+        Words{.root = "<default><camera resolution=\"64 48\"/></default>\n"},
+        Words{.geom = "surfacevel=\"1 0 0\""}, Words{.body = "gravcomp=\"0\""},
+        Words{.in_body = "<light intensity=\"2\"/>"}, Words{.in_body = "<body name=\"b\" sleep=\"never\"/>"},
+        Words{.actuator = "kv=\"3\" dampratio=\"1\" inheritrange=\"0\""},
+        Words{.actuator = "armature=\"0.0\""}, Words{.tendon = "armature=\"0\" actuatorfrcrange=\"-1 1\""},
+        Words{.sensor = "delay=\"0.1\" nsample=\"3\""}, Words{.root = "<sensor><e_kinetic/></sensor>\n"}));
+
+/// What acts on the dynamics is refused in one line, with its place, since when it is, and what to do.
+struct Refused {
+  Words words;
+  std::string message;
+};
+void PrintTo(const Refused& refused, std::ostream* out) { PrintTo(refused.words, out); }
+class NotLeftOut : public ::testing::TestWithParam<Refused> {};
+
+TEST_P(NotLeftOut, IsNamed) {
+  EXPECT_TRUE(testing::Throws<InputError>([] { DowngradeMjcf(WriteMjcf(GetParam().words), "newer.xml"); },
+                                          GetParam().message));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    NewerMjcf, NotLeftOut,
+    ::testing::Values(
+        Refused{{.body = "gravcomp=\"1\""},
+                "newer.xml:5: <body gravcomp>: acts on the dynamics, since MuJoCo 2.3.1: it "
+                "holds a part of the weight"},
+        Refused{{.tendon = "armature=\"0.1\""}, "<fixed armature>: acts on the dynamics, since MuJoCo 3.3.1"},
+        Refused{{.actuator = "armature=\"0.1\""},
+                "<position armature>: acts on the dynamics, since MuJoCo 3.7.0"},
+        Refused{{.flag = "damper=\"disable\""}, "<flag damper>: acts on the dynamics, since MuJoCo 3.3.6"},
+        Refused{{.joint = "stiffness=\"0 1\""},
+                "<joint stiffness>: acts on the dynamics: 2.2.2 has the first"},
+        Refused{{.in_body = "<frame pos=\"0 0 1\"/>"},
+                "<frame>: acts on the dynamics, since MuJoCo 3.1.0: load the file"},
+        Refused{{.in_body = "<replicate count=\"2\"/>"}, "<replicate>: acts on the dynamics"},
+        Refused{{.joint = "springiness=\"1\""},
+                "<joint springiness>: is neither in 2.2.2 nor known to be newer"},
+        Refused{{.in_body = "<wing/>"}, "<wing>: is neither in 2.2.2 nor known to be newer"}));
+
+TEST(NewerMjcf, TheNewDefaultIsStated) {
+  const DowngradedMjcf copy = DowngradeMjcf("<mujoco><worldbody/></mujoco>", "newer");
+  EXPECT_THAT(copy.text, HasSubstr("<compiler autolimits=\"true\"/>"));
+  EXPECT_THAT(copy.changes, Contains(Field(&MjcfChange::word, "<compiler autolimits>")));
+  EXPECT_TRUE(DowngradeMjcf(kPlain, "plain").changes.empty());
+}
+
+TEST(NewerMjcf, AssetsHaveTheirFolders) {
+  const DowngradedMjcf copy =
+      DowngradeMjcf("<mujoco><compiler assetdir=\"a\" meshdir=\"m\"/></mujoco>", "newer");
+  EXPECT_THAT(copy.text, HasSubstr("meshdir=\"m\" texturedir=\"a\""));
+}
+
+/// The shipped robots and scenes have nothing that the engine does not know.
+TEST(NewerMjcf, ShippedFilesNeedNoCopy) {
+  for (const std::string name : {"panda.xml", "robot.xml", "scene.xml", "contacts.xml"}) {
+    const std::string path = testing::SourcePath("/mjcf/" + name);
+    for (const MjcfChange& change : DowngradeMjcf(testing::ReadText(path), path).changes) {
+      EXPECT_EQ(change.word, "<compiler autolimits>") << name;
+    }
+  }
+}
+
+TEST(NewerMjcf, WhatTheEngineDoesNotLoadIsExplained) {
+  EXPECT_TRUE(testing::Throws<InputError>(
+      [] { LoadMjcfText(WriteMjcf({.joint = "actuatorfrcrange=\"-5 5\""}), "f"); },
+      "it is new since MuJoCo 3.0.0 and acts on forces of actuators; dexcheck "
+      "import FILE --downgrade"));
+  EXPECT_TRUE(
+      testing::Throws<InputError>([] { LoadMjcfText(WriteMjcf({.in_body = "<frame/>"}), "f"); },
+                                  "it is new since MuJoCo 3.1.0 and acts on dynamics: load the file in"));
+  EXPECT_TRUE(testing::Throws<InputError>([] { DowngradeMjcf("<mujoco>", "f"); }, "f:1: is not XML"));
+  EXPECT_TRUE(testing::Throws<InputError>([] { DowngradeMjcf("<robot/>", "f"); }, "f: must be an MJCF"));
+}
+
+}  // namespace
+}  // namespace dexcheck

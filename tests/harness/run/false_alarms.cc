@@ -1,0 +1,163 @@
+// Does a right robot with a right law ever raise an alarm? Runs the shipped scenarios over seeds, time steps
+// and impedances of the contacts, and tells how much of its bound each check takes.
+//
+//   false_alarms [--scenarios A,B] [--seeds N] [--steps MS,MS] [--impedances D,D] [--duration S] [--set
+//   KEY=VALUE]
+//
+// Seeds are tried with the scenario's own plant, steps and impedances in all combinations with seed 0. A
+// duration of 0 is the scenario's own. Exit code 1 after an alarm.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <iostream>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/harness/run/shipped_run.h"
+
+namespace dexcheck::testing {
+namespace {
+
+/// What a scenario is expected to come to: "none" but where an assumption breaks on purpose.
+const std::map<std::string, std::string> kExpectedCause = {{"paper-rest", "wheel slip"}};
+/// A share of the bound from which on a check is told, below an alarm.
+constexpr double kTold = 0.5;
+
+struct Options {
+  std::vector<std::string> scenarios = {"bonded",      "curve",    "curve-real", "exercise",   "hold",
+                                        "lift",        "offset",   "paper",      "paper-ramp", "paper-rest",
+                                        "paper-rigid", "reorient", "two-hands"};
+  int seeds = 20;
+  std::vector<std::string> steps = {"0.25", "0.5", "1", "2"};  // ms
+  std::vector<std::string> impedances = {"0.9", "0.99", "0.999"};
+  std::string duration = "0.5";
+  std::vector<std::string> overrides;
+};
+
+/// One run's choices.
+struct Choice {
+  std::string scenario;
+  std::uint64_t seed = 0;
+  std::vector<std::string> overrides;
+  [[nodiscard]] std::string Describe() const {
+    std::string text = fmt::format("{} --seed {}", scenario, seed);
+    for (const std::string& assignment : overrides) text += " --set " + assignment;
+    return text;
+  }
+};
+
+struct Largest {
+  double share = 0.0;
+  std::string where;
+};
+
+std::vector<std::string> Split(const std::string& list) {
+  std::vector<std::string> parts;
+  std::istringstream stream(list);
+  for (std::string part; std::getline(stream, part, ',');) parts.push_back(part);
+  return parts;
+}
+
+Options ReadOptions(int argc, char** argv) {
+  Options options;
+  for (int i = 1; i + 1 < argc; i += 2) {
+    const std::string key = argv[i], value = argv[i + 1];
+    if (key == "--scenarios")
+      options.scenarios = Split(value);
+    else if (key == "--seeds")
+      options.seeds = std::stoi(value);
+    else if (key == "--steps")
+      options.steps = Split(value);
+    else if (key == "--impedances")
+      options.impedances = Split(value);
+    else if (key == "--duration")
+      options.duration = value;
+    else if (key == "--set")
+      options.overrides.push_back(value);
+    else
+      throw InputError("unknown option " + key);
+  }
+  if (argc % 2 == 0) throw InputError("every option has a value");
+  return options;
+}
+
+std::vector<Choice> ListChoices(const Options& options) {
+  std::vector<Choice> choices;
+  for (const std::string& scenario : options.scenarios) {
+    std::vector<std::string> always = options.overrides;
+    if (std::stod(options.duration) > 0.0) always.push_back("duration=" + options.duration);
+    for (int seed = 1; seed <= options.seeds; ++seed)
+      choices.push_back({scenario, static_cast<std::uint64_t>(seed), always});
+    for (const std::string& step : options.steps) {
+      for (const std::string& impedance : options.impedances) {
+        Choice choice{scenario, 0, always};
+        choice.overrides.push_back(fmt::format("plant.time_step={}", 1e-3 * std::stod(step)));
+        choice.overrides.push_back("plant.contact_impedance=" + impedance);
+        choices.push_back(choice);
+      }
+    }
+  }
+  return choices;
+}
+
+/// @return whether the run came to what it should.
+bool Try(const Choice& choice, std::map<std::string, Largest>* largest) {
+  ShippedRun run(choice.scenario, choice.overrides, choice.seed);
+  const RunResult& result = run.Run();
+  const auto expected = kExpectedCause.find(choice.scenario);
+  const std::string cause = NameOf(result.attribution.cause);
+  const bool cut = run.loop().task() != nullptr;  // a task that is cut short has failed, and nothing is wrong
+  const bool right = expected == kExpectedCause.end() ? cause == "none" && (cut || result.failure.empty())
+                                                      : cause == expected->second;
+  if (!right) {
+    fmt::print("ALARM {}: {}: {} {}\n", choice.Describe(), cause, result.attribution.evidence,
+               result.failure);
+  }
+  std::string told;
+  for (const CheckRecord& check : run.loop().checks().motion_checks()) {
+    if (!check.applies || check.bound <= 0.0 || check.name == "gain_stability") continue;
+    const double share = check.worst / check.bound;
+    if (expected == kExpectedCause.end() && share > (*largest)[check.name].share)
+      (*largest)[check.name] = {share, choice.Describe()};
+    if (share > kTold) told += fmt::format(" {} {:.2g} of {:.2g}", check.name, check.worst, check.bound);
+  }
+  if (!right || (!told.empty() && expected == kExpectedCause.end()))
+    fmt::print("  {}:{}\n", choice.Describe(), told);
+  std::cout.flush();
+  return right;
+}
+
+int RunCampaign(const Options& options) {
+  std::map<std::string, Largest> largest;
+  long runs = 0, alarms = 0;
+  for (const Choice& choice : ListChoices(options)) {
+    // A variation that no run can be made of, such as a grasp that is out of reach, raises no alarm.
+    try {
+      ++runs;
+      alarms += Try(choice, &largest) ? 0 : 1;
+    } catch (const InputError& error) {
+      fmt::print("refused {}: {}\n", choice.Describe(), error.what());
+    }
+  }
+  fmt::print("\n{:<24}{:>16}  in\n", "check", "share of bound");
+  for (const auto& [name, at] : largest) fmt::print("{:<24}{:>16.3g}  {}\n", name, at.share, at.where);
+  fmt::print("{} false alarms in {} runs\n", alarms, runs);
+  return alarms == 0 ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace dexcheck::testing
+
+int main(int argc, char** argv) {
+  try {
+    return dexcheck::testing::RunCampaign(dexcheck::testing::ReadOptions(argc, argv));
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "false_alarms: {}\n", error.what());
+    return 2;
+  }
+}
