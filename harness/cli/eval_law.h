@@ -4,6 +4,7 @@
 
 #include <span>
 
+#include "controller/contact/contact_geometry.h"
 #include "controller/contact/surface.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/cli/json_matrix.h"
