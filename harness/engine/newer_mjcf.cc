@@ -3,6 +3,7 @@
 #include <mujoco/mujoco.h>
 #include <tinyxml2.h>
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <optional>
@@ -109,7 +110,7 @@ class Downgrade {
   }
 
   void Note(const XMLElement& element, const std::string& word, const std::string& what) {
-    result_.changes.push_back({element.GetLineNum(), word, what});
+    result_.changes.push_back({std::max(element.GetLineNum(), 1), word, what});
   }
 
   static std::string DescribeLoss(const NewerWord& word) {
