@@ -25,7 +25,7 @@ cut() {
 x=14:y=h-32:fontsize=16:fontcolor=white:box=1:boxcolor=black@0.55:boxborderw=7" "$work/$1.mp4"
 }
 cut 1 wide 1.4 6.5 1.7 'The hand comes near'
-cut 2 near 5.4 9.9 0.9 'Four fingertips take hold, forces stay in their friction cones'
+cut 2 near 5.4 9.9 0.9 'Four fingertips take hold, forces in their cones'
 cut 3 wide 9.5 16.5 1.75 'It lifts and carries'
 cut 4 curve 2 12 2 'It drives a curve, wheels rolling, fingers holding'
 verdict=$("$dexcheck" run --replay "$runs/curve" --quiet | head -1)

@@ -73,10 +73,12 @@ RunDecorator::RunDecorator(const mjModel& model, const RunFrames& run, const Dec
       options_(options),
       object_(mj_name2id(&model, mjOBJ_BODY, run.object_body.c_str())),
       meters_per_newton_(CalcMetersPerNewton(run)) {
-  if ((options.tracks || options.frames) && object_ < 0) {
+  // A robot that holds nothing leaves no tracks.
+  if (run.object_body.empty()) options_.tracks = options_.frames = false;
+  if ((options_.tracks || options_.frames) && object_ < 0) {
     throw InputError(run.source + ": object: no body " + Quote(run.object_body) + " in the model");
   }
-  if (!options.tracks) return;
+  if (!options_.tracks) return;
   const long stride = (run.rows() + kMostSamples - 1) / kMostSamples;
   for (long row = 0; row < run.rows(); row += stride) {
     SetRow(model, run, row, data);

@@ -24,6 +24,30 @@ bool FactorBlock(const Matrix4d& S, Matrix4d* L) {
   return true;
 }
 
+/// S becomes S L^-T, column by column: products with L^-1 would lose more digits.
+void SolveOnTheRight(const Matrix4d& L, Matrix4d* S) {
+  for (int col = 0; col < 4; ++col) {
+    for (int k = 0; k < col; ++k) S->col(col) -= L(col, k) * S->col(k);
+    S->col(col) /= L(col, col);
+  }
+}
+
+/// x becomes L^-1 x.
+void SolveLower(const Matrix4d& L, Eigen::Vector4d* x) {
+  for (int i = 0; i < 4; ++i) {
+    for (int k = 0; k < i; ++k) (*x)[i] -= L(i, k) * (*x)[k];
+    (*x)[i] /= L(i, i);
+  }
+}
+
+/// x becomes L^-T x.
+void SolveUpper(const Matrix4d& L, Eigen::Vector4d* x) {
+  for (int i = 3; i >= 0; --i) {
+    for (int k = i + 1; k < 4; ++k) (*x)[i] -= L(k, i) * (*x)[k];
+    (*x)[i] /= L(i, i);
+  }
+}
+
 Matrix4d InvertLower(const Matrix4d& L) {
   Matrix4d inverse = Matrix4d::Zero();
   for (int col = 0; col < 4; ++col) {
@@ -63,7 +87,8 @@ bool BlockCholesky::Factor(const Eigen::Ref<const MatrixXd>& A) {
         if (!FactorBlock(S, &L_[Index(row, row)])) return false;
         L_inv_[Index(row, row)] = InvertLower(at(row, row));
       } else {
-        L_[Index(row, col)].noalias() = S * L_inv_[Index(col, col)].transpose();
+        SolveOnTheRight(at(col, col), &S);
+        L_[Index(row, col)] = S;
       }
     }
   }
@@ -76,13 +101,15 @@ void BlockCholesky::Solve(Eigen::Ref<VectorXd> x) {
     const Eigen::Index height = std::min(kBlock, size_ - kBlock * row);
     sum.head(height) = x.segment(kBlock * row, height);
     for (Eigen::Index k = 0; k < row; ++k) sum.noalias() -= at(row, k) * vector_[static_cast<size_t>(k)];
-    vector_[static_cast<size_t>(row)].noalias() = L_inv_[Index(row, row)] * sum;
+    SolveLower(at(row, row), &sum);
+    vector_[static_cast<size_t>(row)] = sum;
   }
   for (Eigen::Index row = blocks_ - 1; row >= 0; --row) {
     BlockVector sum = vector_[static_cast<size_t>(row)];
     for (Eigen::Index k = row + 1; k < blocks_; ++k)
       sum.noalias() -= at(k, row).transpose() * vector_[static_cast<size_t>(k)];
-    vector_[static_cast<size_t>(row)].noalias() = L_inv_[Index(row, row)].transpose() * sum;
+    SolveUpper(at(row, row), &sum);
+    vector_[static_cast<size_t>(row)] = sum;
     const Eigen::Index height = std::min(kBlock, size_ - kBlock * row);
     x.segment(kBlock * row, height) = vector_[static_cast<size_t>(row)].head(height);
   }

@@ -51,6 +51,7 @@ void Pseudoinverse::Factor(const Eigen::Ref<const MatrixXd>& J, std::span<const 
   Load(J, columns);
   SetEntries(columns_);
   for (const int i : columns_) W_inv_J_T_.row(i) = J_T_.row(i);
+  CalcGramMatrix(J_T_, columns_, &gram_);
   FactorGram();
 }
 
@@ -61,6 +62,7 @@ void Pseudoinverse::FactorDiagonal(const Eigen::Ref<const MatrixXd>& J, const Ei
   for (Eigen::Index i = 0; i < w.size(); ++i) Require(w[i] > 0.0, "entry of w", "must be positive", w[i]);
   SetEntries(columns_);
   for (const int i : columns_) W_inv_J_T_.row(i) = J_T_.row(i) / w[i];
+  CalcGramMatrix(J_T_, W_inv_J_T_, columns_, &gram_);
   FactorGram();
 }
 
@@ -70,9 +72,13 @@ void Pseudoinverse::FactorWeighted(const Eigen::Ref<const MatrixXd>& J, const Ei
   Require(W.cols() == J.cols(), "columns of W", "must be the columns of J", static_cast<double>(W.cols()));
   W_llt_.compute(W);
   Require(W_llt_.info() == Eigen::Success, "W", "must be positive definite; trace", W.trace());
-  W_solution_ = J.transpose();
-  W_llt_.solveInPlace(W_solution_);
   SetEntries(all_columns_);
+  // W = L L^T. J W^-1 J^T is formed of half = L^-1 J^T, which loses half of the digits that W^-1 J^T loses.
+  W_solution_ = J.transpose();
+  W_llt_.matrixL().solveInPlace(W_solution_);
+  W_inv_J_T_.leftCols(J.rows()) = W_solution_;
+  CalcGramMatrix(W_inv_J_T_, all_columns_, &gram_);
+  W_llt_.matrixU().solveInPlace(W_solution_);
   W_inv_J_T_.leftCols(J.rows()) = W_solution_;
   FactorGram();
 }
@@ -85,7 +91,6 @@ void Pseudoinverse::SetEntries(const std::vector<int>& entries) {
 
 void Pseudoinverse::FactorGram() {
   // J W^-1 J^T = L L^T
-  CalcGramMatrix(J_T_, W_inv_J_T_, columns_, &gram_);
   condition_number_ = std::numeric_limits<double>::infinity();
   if (gram_factor_.Factor(gram_)) {
     // cond_2(J W^-1/2)^2 = cond_2(L L^T) <= tr(L L^T) tr((L L^T)^-1) = |L|^2 |L^-1|^2

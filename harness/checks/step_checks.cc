@@ -383,6 +383,9 @@ void StepChecks::CompareObject(const StepRecord& step) {
   left_of_object_ = body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
                     grasp.G() * findings_.f_c - response.support_wrench - response.solver_residual - push;
   Add(StepCheck::kBalanceObject, relative(left_of_object_));
+  // What the solver leaves over while contacts come and go is taken off the balances, and is gone some steps
+  // later.
+  if (is_unjudged_) return;
   Add(StepCheck::kSolver, std::max(relative(response.solver_residual), solver_of_robot_));
 }
 

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <limits>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/log/log_reader.h"
+#include "harness/log/mcap_writer.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -24,6 +26,7 @@ constexpr size_t kChunk = size_t{1} << 20;
 struct Request {
   std::filesystem::path run_folder;
   std::string csv_file;
+  std::string mcap_file;
   std::vector<std::string> patterns;
   long every = 1;
   bool list = false;
@@ -113,6 +116,61 @@ void WriteCsv(const LogReader& log, const std::vector<SignalInfo>& signals, cons
   file.Finish();
 }
 
+/// A column's name in a message; numbers without one are a list.
+nlohmann::json MakeSchema(const SignalInfo& signal) {
+  const std::vector<std::string> units = ListUnits(signal);
+  nlohmann::json properties;
+  if (signal.columns.empty() && signal.width > 1) {
+    properties["values"] = {{"type", "array"}, {"items", {{"type", "number"}}}, {"description", signal.unit}};
+  } else {
+    for (size_t k = 0; k < units.size(); ++k) {
+      const std::string name = signal.columns.empty() ? "value" : signal.columns[k];
+      properties[name] = {{"type", "number"}, {"description", units[k]}};
+    }
+  }
+  return {{"type", "object"},
+          {"title", signal.name},
+          {"description", signal.description},
+          {"properties", properties}};
+}
+
+/// A row as JSON, which has no number for what is not finite: null.
+nlohmann::json MakeMessage(const SignalInfo& signal, const Eigen::Ref<const Eigen::RowVectorXd>& row) {
+  nlohmann::json message;
+  const auto number = [](double value) {
+    return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json();
+  };
+  for (long k = 0; k < row.size(); ++k) {
+    if (!signal.columns.empty()) {
+      message[signal.columns[static_cast<size_t>(k)]] = number(row[k]);
+    } else if (row.size() > 1) {
+      message["values"].push_back(number(row[k]));
+    } else {
+      message["value"] = number(row[k]);
+    }
+  }
+  return message;
+}
+
+/// A topic for each signal: "/object/X_o". Times count from the log's first row, for none may be below zero.
+void WriteMcap(const LogReader& log, const std::vector<SignalInfo>& signals, const Request& request) {
+  McapWriter file(request.mcap_file);
+  const VectorXd time = log.ReadSignal("time").col(0);
+  std::vector<RowMatrixXd> values;
+  std::vector<std::uint16_t> channels;
+  for (size_t i = 1; i < signals.size(); ++i) {
+    const SignalInfo& signal = signals[i];
+    values.push_back(log.ReadSignal(signal.name));
+    channels.push_back(file.AddChannel("/" + signal.name, signal.name, MakeSchema(signal).dump()));
+  }
+  for (long row = 0; row < log.rows(); row += request.every) {
+    for (size_t i = 0; i < values.size(); ++i) {
+      file.Write(channels[i], time[row] - time[0], MakeMessage(signals[i + 1], values[i].row(row)).dump());
+    }
+  }
+  file.Finish();
+}
+
 /// "m, rad": each unit once.
 std::string ListDistinctUnits(const SignalInfo& signal) {
   std::vector<std::string> seen;
@@ -141,16 +199,17 @@ void PrintList(const LogReader& log, const std::vector<SignalInfo>& signals) {
 }
 
 int Run(const Request& request) {
-  if (!request.list && request.csv_file.empty()) {
-    throw InputError("export: --csv FILE.csv or --list is required (see dexcheck export --help)");
+  if (!request.list && request.csv_file.empty() && request.mcap_file.empty()) {
+    throw InputError(
+        "export: --csv FILE.csv or --list is required, or --mcap FILE.mcap (see dexcheck export --help)");
   }
   const LogReader log(request.run_folder / "log.h5");
   const std::vector<SignalInfo> signals = ChooseSignals(log, request);
   if (request.list) {
     PrintList(log, signals);
-  } else {
-    WriteCsv(log, signals, request);
   }
+  if (!request.csv_file.empty()) WriteCsv(log, signals, request);
+  if (!request.mcap_file.empty()) WriteMcap(log, signals, request);
   return kSuccess;
 }
 
@@ -158,10 +217,15 @@ int Run(const Request& request) {
 
 void AddExportCommand(Command app) {
   const auto request = std::make_shared<Request>();
-  Command command = app.AddCommand("export", "Write a run's log as a table of numbers (CSV)");
+  Command command =
+      app.AddCommand("export", "Write a run's log as a table of numbers (CSV) or as messages (MCAP)");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run, with its log.h5").Required();
   Option csv = command.AddOption("--csv", &request->csv_file, "File to write (- for standard output)")
                    .TypeName("FILE.csv");
+  Option mcap = command
+                    .AddOption("--mcap", &request->mcap_file,
+                               "File of messages for Foxglove or PlotJuggler, a topic for each signal")
+                    .TypeName("FILE.mcap");
   command
       .AddOption("--signals", &request->patterns,
                  "Only time and these signals; * stands for any text: time,object/*,check/M_bar")
@@ -172,7 +236,9 @@ void AddExportCommand(Command app) {
       .TypeName("N")
       .Check(WholeNumber(1, std::numeric_limits<int>::max()))
       .ShowDefault();
-  command.AddFlag("--list", &request->list, "Print the signals, their units and descriptions").Excludes(csv);
+  command.AddFlag("--list", &request->list, "Print the signals, their units and descriptions")
+      .Excludes(csv)
+      .Excludes(mcap);
   command.SetAction([=] { return Run(*request); });
 }
 

@@ -15,6 +15,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
+#include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
 #include "harness/view/recording.h"
@@ -36,18 +37,64 @@ struct Request {
 };
 
 /// A user who closes the window early is content, unless a check has failed by then.
-ExitCode ToExitCode(const LiveRun& run) {
-  const RunResult& result = run.runner().result();
+ExitCode ToExitCode(const Runner& runner) {
+  const RunResult& result = runner.result();
   if (result.verdict == Verdict::kPass) return kSuccess;
   if (result.verdict == Verdict::kDisagreement) return kDisagreement;
   if (!result.interrupted) return kFailure;
-  const CrossCheck& checks = run.runner().loop().checks();
+  const CrossCheck& checks = runner.loop().checks();
   for (const std::span<const CheckRecord> records : {checks.model_checks(), checks.motion_checks()}) {
     for (const CheckRecord& check : records) {
       if (check.applies && check.failed) return kDisagreement;
     }
   }
   return kSuccess;
+}
+
+/// The part of a scenario that a session went through, once more and without a window: with pulls in the
+/// scenario from the beginning, log and verdict are those of `dexcheck run`.
+class Rerun {
+ public:
+  Rerun(const Request& request, const std::vector<std::string>& overrides,
+        const std::filesystem::path& folder, long rows)
+      : files_(FindScenario(request.what, overrides, request.seed)),
+        setup_(files_.scenario, files_.robot, files_.mjcf),
+        runner_(setup_, /*check=*/true) {
+    const std::filesystem::path log = folder / "log.h5";
+    std::error_code ignored;
+    std::filesystem::remove(log, ignored);  // of the session, in which pulls came as they came
+    RunRecorder recorder(log, runner_.loop(), setup_,
+                         RunInputs{files_.robot, files_.mjcf, request.command, ""});
+    ProgressBar bar("recording", rows, /*quiet=*/false);
+    long done = 0;
+    runner_.Run(
+        [&](const StepRecord& step) {
+          recorder.Record(step);
+          bar.Update(++done);
+        },
+        [&] { return IsInterrupted() || done >= rows; });
+    bar.Finish();
+    recorder.Close(MakeSummary(setup_, runner_.loop(), runner_.result()).dump(2) + "\n");
+  }
+  [[nodiscard]] const Setup& setup() const { return setup_; }
+  [[nodiscard]] const Runner& runner() const { return runner_; }
+
+ private:
+  ScenarioFiles files_;
+  Setup setup_;
+  Runner runner_;
+};
+
+/// Tells and writes what a session came to.
+ExitCode Conclude(const Setup& setup, const Runner& runner, const std::filesystem::path& folder) {
+  if (!folder.empty()) {
+    OutputFile(folder / "summary.json")
+        .Write(MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n");
+  }
+  if (runner.loop().record().step > 0) {
+    PrintRunReport(setup, runner.loop(), runner.result(), folder.string(), Detail::kQuestions);
+  }
+  return ToExitCode(runner);
 }
 
 int ViewScenario(const Request& request) {
@@ -77,16 +124,11 @@ int ViewScenario(const Request& request) {
   };
   CatchInterrupts();
   const std::unique_ptr<LiveRun> run = ViewLive(make, "dexcheck " + request.what, request.viewer, save);
-  const ExitCode code = ToExitCode(*run);
-  if (folder) {
-    OutputFile(folder->path() / "summary.json")
-        .Write(MakeSummary(run->setup(), run->runner().loop(), run->runner().result()).dump(2) + "\n");
+  if (!folder || !run->was_pulled()) {
+    return Conclude(run->setup(), run->runner(), folder ? folder->path() : std::filesystem::path());
   }
-  if (run->rows() > 0) {
-    PrintRunReport(run->setup(), run->runner().loop(), run->runner().result(),
-                   folder ? folder->path().string() : "", Detail::kQuestions);
-  }
-  return code;
+  const Rerun again(request, run->ListOverrides(), folder->path(), run->rows());
+  return Conclude(again.setup(), again.runner(), folder->path());
 }
 
 int View(const Request& request) {

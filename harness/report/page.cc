@@ -342,8 +342,8 @@ class Page {
   void AddFile(const std::string& name, const std::string& title, bool open) {
     const std::vector<std::string> files = run_.log().ListFiles("inputs");
     if (std::find(files.begin(), files.end(), name) == files.end()) return;
-    Add("<details{}><summary>{}</summary><pre tabindex=\"0\">{}</pre></details>\n", open ? " open" : "", title,
-        run_.log().ReadFile("inputs", name));
+    Add("<details{}><summary>{}</summary><pre tabindex=\"0\">{}</pre></details>\n", open ? " open" : "",
+        title, run_.log().ReadFile("inputs", name));
   }
 
   void AddInputs() {

@@ -46,10 +46,12 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
                          const RunInputs& inputs)
     : setup_(&setup), checks_(loop.is_checking() ? &loop.checks() : nullptr), log_(path, loop.num_steps()) {
   const Scenario& scenario = setup.scenario();
+  std::string overrides;
+  for (const std::string& assignment : scenario.overrides) overrides += assignment + "\n";
   log_.SetText("command", inputs.command);
   if (!inputs.controller.empty()) log_.SetText("controller", inputs.controller);
   log_.SetText("scenario", scenario.name);
-  SetOverrides(scenario.overrides);
+  log_.SetText("overrides", overrides);
   log_.SetText("seed", std::to_string(scenario.seed));
   log_.SetText("robot", inputs.robot.filename().string());
   log_.SetText("mjcf", inputs.mjcf.filename().string());
@@ -323,12 +325,6 @@ void RunRecorder::Record(const StepRecord& step) {
   log_.Row(LogWriter::kTime)[0] = step.time;
   for (const Channel& channel : channels_) channel.source(step, log_.Row(channel.signal));
   log_.EndRow();
-}
-
-void RunRecorder::SetOverrides(const std::vector<std::string>& overrides) {
-  std::string lines;
-  for (const std::string& assignment : overrides) lines += assignment + "\n";
-  log_.SetText("overrides", lines);
 }
 
 void RunRecorder::Close(const std::string& summary) {

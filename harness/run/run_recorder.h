@@ -29,8 +29,6 @@ class RunRecorder {
 
   /// Records a step; allocates nothing.
   void Record(const StepRecord& step);
-  /// What the scenario's file has to be changed by to give this run, when that became clear on the way.
-  void SetOverrides(const std::vector<std::string>& overrides);
   /// Adds the summary and finishes the file.
   void Close(const std::string& summary);
 

@@ -7,11 +7,11 @@
 
 #include "controller/common/toml_reader.h"
 #include "harness/base/files.h"
+#include "harness/base/git_revision.h"
 #include "harness/base/version.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/machine.h"
 #include "harness/engine/mjcf_files.h"
-#include "harness/base/git_revision.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck {

@@ -39,10 +39,7 @@ LiveRun::~LiveRun() {
 void LiveRun::Run() {
   try {
     runner_->Run([this](const StepRecord& step) { Record(step); }, [this] { return Wait(); });
-    if (recorder_) {
-      recorder_->SetOverrides(ListOverrides());
-      recorder_->Close(MakeSummary(*setup_, runner_->loop(), runner_->result()).dump(2) + "\n");
-    }
+    if (recorder_) recorder_->Close(MakeSummary(*setup_, runner_->loop(), runner_->result()).dump(2) + "\n");
   } catch (...) {
     problem_ = std::current_exception();
   }
@@ -213,7 +210,13 @@ void LiveRun::Finish() {
   if (problem_) std::rethrow_exception(problem_);
 }
 
+bool LiveRun::was_pulled() const {
+  const std::lock_guard lock(mutex_);
+  return !pulls_.empty();
+}
+
 std::vector<std::string> LiveRun::ListOverrides() const {
+  const std::lock_guard lock(mutex_);
   std::vector<std::string> overrides = setup_->scenario().overrides;
   overrides.insert(overrides.end(), pulls_.begin(), pulls_.end());
   return overrides;

@@ -60,6 +60,7 @@ class LiveRun : public FrameSource {
   void Finish();
   [[nodiscard]] bool is_finished() const;
 
+  [[nodiscard]] bool was_pulled() const;
   /// Once finished.
   [[nodiscard]] const Runner& runner() const { return *runner_; }
   /// The scenario's overrides and the pulls so far, each as an assignment that a scenario takes.

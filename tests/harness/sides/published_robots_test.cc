@@ -102,7 +102,8 @@ void AddLeg(const std::string& prefix, const std::string& xyz, const std::string
 }
 
 std::vector<PublishedRobot> ListPublishedRobots() {
-  const LeggedLink stand = MakeLink("stand", "", "0 0 0.2", "0 0 0", "", 4.0, 0.2);
+  // A URDF has no place for its root.
+  const LeggedLink stand = MakeLink("stand", "", "0 0 0", "0 0 0", "", 4.0, 0.2);
   std::vector<PublishedRobot> robots;
   robots.push_back({"SixAxisArm", false, {stand}});
   AddSixAxisArm("", "stand", "0 0 0.163", &robots.back().links);
@@ -184,8 +185,10 @@ TEST_P(PublishedRobots, AreTheSameInEachFormat) {
 TEST_P(PublishedRobots, DifferWhenOneNumberDoes) {
   std::vector<LeggedLink> links = GetParam().links;
   Write("right", links);
-  LeggedLink& link = links[links.size() / 2];
-  link.mass *= 1000.0;
+  size_t changed = links.size() / 2;
+  while (!links[changed].has_joint) ++changed;
+  const LeggedLink& link = links[changed];
+  links[changed].mass *= 1000.0;
   Write("wrong", links);
   const Comparison comparison = Compare("wrong.urdf", "right.xml", 5);
   EXPECT_FALSE(comparison.result.Agrees());
