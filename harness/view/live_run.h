@@ -40,7 +40,8 @@ class LiveRun : public FrameSource {
   /// Ends it where it is.
   ~LiveRun() override;
 
-  [[nodiscard]] const mjModel& model() const override { return setup_->engine(); }
+  /// With its looks, which the loop steps without: the same bodies and positions.
+  [[nodiscard]] const mjModel& model() const override { return *looks_; }
   [[nodiscard]] long rows() const override;
   [[nodiscard]] double TimeAt(long row) const override;
   [[nodiscard]] double end() const override { return setup_->scenario().duration; }
@@ -74,6 +75,7 @@ class LiveRun : public FrameSource {
   void Disturb();
 
   std::unique_ptr<Setup> setup_;
+  MjModelPtr looks_;
   std::unique_ptr<Runner> runner_;
   std::optional<RunRecorder> recorder_;
   mutable std::mutex mutex_;

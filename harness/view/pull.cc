@@ -36,8 +36,9 @@ Ray CalcRay(const Viewpoint& view, double fovy, double x, double y) {
   return {view.look_at - view.distance * forward, (forward + slope * (x * right + y * up)).normalized()};
 }
 
-std::optional<MousePull> MousePull::Grab(const Setup& setup, const ViewFrame& frame, const Ray& ray) {
-  const mjModel& m = setup.engine();
+std::optional<MousePull> MousePull::Grab(const Setup& setup, const mjModel& looks, const ViewFrame& frame,
+                                         const Ray& ray) {
+  const mjModel& m = looks;
   const MjDataPtr data = MakeData(m);
   SetRow(m, frame.frame, 0, data.get());
   int geom = -1;

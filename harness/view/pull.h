@@ -28,7 +28,9 @@ Ray CalcRay(const Viewpoint& view, double fovy, double x, double y);
 class MousePull {
  public:
   /// Takes hold of what the ray meets first. None when that is neither the object nor a link.
-  static std::optional<MousePull> Grab(const Setup& setup, const ViewFrame& frame, const Ray& ray);
+  /// @param looks the model as it is seen, with the bodies of the setup's.
+  static std::optional<MousePull> Grab(const Setup& setup, const mjModel& looks, const ViewFrame& frame,
+                                       const Ray& ray);
 
   /// The pull when the mouse is on this ray and the run at this frame.
   [[nodiscard]] Pull Find(const ViewFrame& frame, const Ray& ray) const;

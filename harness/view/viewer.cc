@@ -309,8 +309,8 @@ class Viewer {
       Click(*held_, save);
     } else if (event.control && live_ != nullptr && source_.rows() > 0 && !live_->is_finished()) {
       looks_back_ = false;
-      mouse_pull_ =
-          MousePull::Grab(live_->setup(), source_.Read(source_.rows() - 1), FindRay(event.x, event.y));
+      mouse_pull_ = MousePull::Grab(live_->setup(), live_->model(), source_.Read(source_.rows() - 1),
+                                    FindRay(event.x, event.y));
       state_.message = mouse_pull_ ? "" : "nothing to pull at here";
     } else {
       turning_ = true;
