@@ -52,16 +52,28 @@ TEST_P(ErrorDynamics, FollowTheClosedFormOfEquation57) {
 INSTANTIATE_TEST_SUITE_P(GainSets, ErrorDynamics,
                          ::testing::Values(Gains{20.0, 1.0}, Gains{10.0, 0.7}, Gains{6.0, 1.5}));
 
+/// What the engine does besides what the rigid model predicts, the largest of a run. The checks compare it
+/// less what soft contacts are known to hold back.
 struct Discrepancies {
-  double acceleration, force, slip, position;
+  double acceleration = 0.0;  ///< |xi_dot - prediction|, m/s^2 and rad/s^2.
+  double force = 0.0;         ///< |f_c - prediction| / |f_c|.
+  double slip = 0.0;          ///< m
+  double position = 0.0;      ///< Of the object from its trajectory, m.
 };
 
 Discrepancies Measure(const std::string& scenario, const std::vector<std::string>& overrides) {
   ShippedRun run(scenario, overrides);
-  const RunResult& result = run.Run();
+  Discrepancies worst;
+  const RunResult& result = run.Run([&] {
+    const StepFindings& findings = run.loop().checks().findings();
+    worst.acceleration =
+        std::max(worst.acceleration, (findings.xi_dot_model - run.step().response.xi_dot).norm());
+    worst.force = std::max(worst.force, (findings.f_c_model - findings.f_c).norm() / findings.f_c.norm());
+  });
   EXPECT_TRUE(result.failure.empty()) << result.failure;
-  return {run.Worst("reduced_acceleration"), run.Worst("contact_force"), run.Worst("fingertip_slip"),
-          result.tracking.position_max()};
+  worst.slip = run.Worst("fingertip_slip");
+  worst.position = result.tracking.position_max();
+  return worst;
 }
 
 TEST(Convergence, HalvingTheTimeStepHalvesTheDiscrepanciesOrBetter) {
@@ -78,6 +90,7 @@ TEST(Convergence, HalvingTheTimeStepHalvesTheDiscrepanciesOrBetter) {
 TEST(Convergence, StifferContactsReduceTheDiscrepancies) {
   const Discrepancies soft = Measure("curve", {"duration=1.5", "plant.contact_time_constant=4e-3"});
   const Discrepancies stiff = Measure("curve", {"duration=1.5", "plant.contact_time_constant=2e-3"});
+  // Measured: 3.0, 2.0.
   EXPECT_GE(soft.acceleration / stiff.acceleration, 2.0);
   EXPECT_GE(soft.slip / stiff.slip, 1.5);
 }
