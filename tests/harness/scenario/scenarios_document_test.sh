@@ -65,7 +65,7 @@ all_known_keys() {
   case $section in
     -) known_keys - - paper | grep -vxE 'start_error|model|plant|grasp|trajectory|task|joint_motion|control|sensing|actuation|disturbance|mismatch|expect|bounds' ;;
     task) known_keys task - lift ;;
-    joint_motion) known_keys joint_motion - panda-reach ;;
+    joint_motion) known_keys joint_motion 'joint_motion={}' panda-reach ;;
     # Keys that begin with model. are the parameter file's.
     model) ask paper --set 'model={ surely_unknown_to_all = 1 }' | told_keys ;;
     control)
