@@ -118,7 +118,10 @@ inline void WriteReportRun(const std::filesystem::path& folder, const ReportRun&
     log.Row(f_c)[0] = 0.3;
     log.Row(f_c)[1] = 0.4;
     log.Row(f_c)[2] = 2.0;
-    if (run.has_law) log.Row(commanded)[2] = 2.5;
+    if (run.has_law) {
+      log.Row(commanded)[0] = log.Row(commanded)[1] = 0.0;
+      log.Row(commanded)[2] = 2.5;
+    }
     const double values[] = {row % 50 == 7 ? 0.0 : 1e-16, 5e-6, 1e-9, ReportSlip(row, run.rows)};
     for (size_t k = 0; k < checks.size(); ++k) log.Row(checks[k])[0] = values[k];
     log.EndRow();

@@ -95,7 +95,7 @@ TEST_F(WriteReportTest, ShowsTheOptimalForcesBesideTheMeasuredOnes) {
   ASSERT_NE(figure, figures.end());
   std::vector<std::string> labels;
   for (const Curve& curve : figure->curves) labels.push_back(curve.label);
-  EXPECT_THAT(labels, ElementsAre("normal, measured", "tangential, measured", "normal, optimal (49)",
+  ASSERT_THAT(labels, ElementsAre("normal, measured", "tangential, measured", "normal, optimal (49)",
                                   "tangential, optimal (49)", "friction cone: μ × normal"));
   EXPECT_EQ(figure->curves[0].values[3], 2.0);
   EXPECT_EQ(figure->curves[2].values[3], 2.5);
