@@ -22,7 +22,7 @@ struct RefereeOptions {
   std::filesystem::path mjcf;             ///< What MuJoCo reads instead of the robot's file; may be empty.
   std::filesystem::path programs_folder;  ///< With the programs that come with dexcheck.
   std::filesystem::path node_modules;     ///< Folder in which npm installed MuJoCo 3; may be empty.
-  ProgramOptions program_options;
+  ProgramOptions program_options = {.seconds = 60.0};  ///< Node and large engines start slowly.
   ConsistencyOptions states;
   /// Relative difference at which two engines still agree. They have algorithms of their own: one that
   /// inverts M loses as many digits as M's condition number has, and MuJoCo 2.2.2 diagonalises inertias to
