@@ -83,19 +83,19 @@ xdotool key g
 sleep 0.6
 shot before
 # The tube of the torus, nearest to the camera: a little below the picture's middle.
-xdotool mousemove 400 276 keydown ctrl mousedown 1 mousemove 402 276 mousemove 470 216
+xdotool mousemove 400 276 keydown ctrl mousedown 1 sleep 0.3 keyup ctrl mousemove 402 276 mousemove 470 216
 sleep 0.4
-xdotool key --clearmodifiers space
+xdotool key space
 for _ in {1..300}; do [[ $(now) -lt 250 ]] || break; sleep 0.1; done
 shot pulling
-xdotool mouseup 1 keyup ctrl
+xdotool mouseup 1
 xdotool key s
 for _ in {1..50}; do [[ ! -s saved.toml ]] || break; sleep 0.1; done
 xdotool key space
 await paused
 shot after
 end 0 1  # a strong pull may break an assumption
-pulls=$(grep -o 'pulse' saved.toml | wc -l)
+pulls=$(grep -o 'pulse' saved.toml | wc -l) || true
 [[ $pulls -ge 3 ]] || fail "only $pulls pulls were saved: $(head -c 2000 saved.toml)"
 grep -qE "force = \[ *-?[0-9.e-]*[1-9]" saved.toml || fail "pulls without force: $(head -c 2000 saved.toml)"
 [[ $(differ before after) -gt 60 ]] || fail "the picture did not change"
