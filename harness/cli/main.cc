@@ -35,7 +35,7 @@ std::string JoinArguments(int argc, char** argv) {
   return text;
 }
 
-int Run(int argc, char** argv) {
+int RunCommandLine(int argc, char** argv) {
   CommandLine line("dexcheck", "Validates analytic robot models and controllers against MuJoCo.", Version());
   Command app = line.root();
   app.RequireCommand();
@@ -57,8 +57,12 @@ int Run(int argc, char** argv) {
   AddStudyCommand(app);
   AddViewCommand(app, JoinArguments(argc, argv));
   AddHelpCommands(app, line);
+  return line.Run(argc, argv);
+}
+
+int Run(int argc, char** argv) {
   try {
-    const int exit_code = line.Run(argc, argv);
+    const int exit_code = RunCommandLine(argc, argv);
     FlushOutput();
     return exit_code;
   } catch (const UsageError& error) {
