@@ -46,7 +46,12 @@ RobotFormat FindFormat(std::string_view text, const std::string& source) {
 }
 
 RobotFormat FindFormat(const std::filesystem::path& path) {
-  return FindFormat(ReadBytes(path), path.string());
+  const std::string text = ReadBytes(path);
+  if (FindRootElement(text).empty()) {
+    if (path.extension() == ".xml") return RobotFormat::kMjcf;
+    if (path.extension() == ".urdf") return RobotFormat::kUrdf;
+  }
+  return FindFormat(text, path.string());
 }
 
 }  // namespace dexcheck

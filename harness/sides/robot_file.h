@@ -14,7 +14,8 @@ enum class RobotFormat { kToml, kUrdf, kMjcf };
 /// @throws InputError "FILE: must be ..." for other XML.
 RobotFormat FindFormat(std::string_view text, const std::string& source);
 
-/// The format of a file. @throws InputError also when it cannot be read.
+/// The format of a file; without a root element it is that of the name's end, so that an empty .xml is no
+/// parameter file. @throws InputError also when it cannot be read.
 RobotFormat FindFormat(const std::filesystem::path& path);
 
 }  // namespace dexcheck

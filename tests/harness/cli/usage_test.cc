@@ -73,9 +73,10 @@ TEST(Usage, HelpMentionsEveryCommandAndOption) {
   for (const char* word : {"RUN_DIR", "--csv FILE.csv", "--signals A,B,...", "--every N=1", "--list"}) {
     EXPECT_THAT(help({"export", "--help"}), HasSubstr(word));
   }
-  for (const char* word : {"RUN_DIR REQUIRED", "--out FILE", "--still T", "--camera NAME=overview",
-                           "--inset NAME", "--beside RUN_DIR", "--size WxH=1280x720", "--fps N=30",
-                           "--jobs N", "--forces", "--tracks", "--frames", "--no-panel", "--quiet"}) {
+  for (const char* word :
+       {"RUN_DIR REQUIRED", "--out FILE", "--still T", "--camera NAME", "overview (the default)",
+        "--inset NAME", "--beside RUN_DIR", "--size WxH=1280x720", "--fps N=30", "--jobs N", "--forces",
+        "--tracks", "--frames", "--no-panel", "--quiet"}) {
     EXPECT_THAT(help({"render", "--help"}), HasSubstr(word));
   }
   EXPECT_THAT(help({"--version"}), ::testing::MatchesRegex("[0-9]+\\.[0-9]+\\.[0-9]+\n"));

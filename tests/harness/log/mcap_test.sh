@@ -15,7 +15,7 @@ timeout 60 npm install --silent --no-audit @mcap/core@2 >npm.txt 2>&1 || { echo 
 cat >read.mjs <<'E2'
 import {open} from 'node:fs/promises';
 import {readFileSync} from 'node:fs';
-import core from '@mcap/core';
+import * as core from '@mcap/core';
 const file = await open('run.mcap');
 const readable = {
   size: async () => BigInt((await file.stat()).size),
