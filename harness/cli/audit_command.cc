@@ -133,10 +133,7 @@ void AddAuditCommand(Command app) {
       .AddOption("--json", &request->json_file,
                  "Write the findings to this file (- for standard output, then without the table)")
       .TypeName("FILE.json");
-  command
-      .AddOption("--junit", &request->junit_file,
-                 "Write each check as a test case of JUnit's XML to this file")
-      .TypeName("FILE.xml");
+  AddJUnitOption(command, &request->junit_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

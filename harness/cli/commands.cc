@@ -16,4 +16,9 @@ Option AddRobotOptions(Command command, RobotFiles* files) {
   return robot;
 }
 
+Option AddJUnitOption(Command command, std::string* file) {
+  return command.AddOption("--junit", file, "Write each check as a test case of JUnit's XML to this file")
+      .TypeName("FILE.xml");
+}
+
 }  // namespace dexcheck::cli

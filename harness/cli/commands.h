@@ -33,6 +33,9 @@ void AddSampleOptions(Command command, std::uint64_t most, Count* samples, std::
       .ShowDefault();
 }
 
+/// Adds --junit.
+Option AddJUnitOption(Command command, std::string* file);
+
 /// Each adds its command to `app`.
 void AddAuditCommand(Command app);
 void AddConsistencyCommand(Command app);

@@ -168,10 +168,7 @@ void AddConsistencyCommand(Command app) {
       .AddOption("--json", &request->json_file,
                  "Write the results to this file (- for standard output, then without the table)")
       .TypeName("FILE.json");
-  command
-      .AddOption("--junit", &request->junit_file,
-                 "Write each check as a test case of JUnit's XML to this file")
-      .TypeName("FILE.xml");
+  AddJUnitOption(command, &request->junit_file);
   constexpr int kMostDigits = 15;
   const Option digits = command
                             .AddOption("--digits", &request->digits,

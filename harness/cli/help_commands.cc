@@ -51,6 +51,19 @@ std::vector<std::string> ListOptionNames(const CommandHelp& command) {
   return names;
 }
 
+/// Cases of a shell's `case "$command $word"`, which make "study" and then "run" the command "study run".
+std::string ListCommandCases(const std::vector<CommandHelp>& commands) {
+  std::string text;
+  for (const CommandHelp& command : commands) {
+    if (command.name.empty()) continue;
+    const size_t space = command.name.rfind(' ');
+    const std::string before = space == std::string::npos ? "" : command.name.substr(0, space);
+    const std::string last = space == std::string::npos ? command.name : command.name.substr(space + 1);
+    text += fmt::format("      '{} {}') command='{}' ;;\n", before, last, command.name);
+  }
+  return text;
+}
+
 /// For bash: words before the cursor choose the command; then its options, its commands, scenarios and files.
 std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
   std::string text =
@@ -60,14 +73,7 @@ std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
       "  local cur=${COMP_WORDS[COMP_CWORD]} command= word\n"
       "  for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n"
       "    case \"$command $word\" in\n";
-  for (const CommandHelp& command : commands) {
-    if (command.name.empty()) continue;
-    const size_t space = command.name.rfind(' ');
-    const std::string before = space == std::string::npos ? "" : command.name.substr(0, space);
-    const std::string last = space == std::string::npos ? command.name : command.name.substr(space + 1);
-    text += fmt::format("      '{} {}') command='{}' ;;\n", before, last, command.name);
-  }
-  text += "    esac\n  done\n  local words= files=\n  case $command in\n";
+  text += ListCommandCases(commands) + "    esac\n  done\n  local words= files=\n  case $command in\n";
   for (const CommandHelp& command : commands) {
     std::vector<std::string> words = command.commands;
     if (TakesScenario(command)) {
@@ -95,14 +101,8 @@ std::string MakeZshCompletion(const std::vector<CommandHelp>& commands) {
       "#compdef dexcheck\n# zsh completion for dexcheck: put it as _dexcheck into a folder of "
       "$fpath.\n_dexcheck() {\n"
       "  local command= word\n  for word in ${words[2,CURRENT-1]}; do\n    case \"$command $word\" in\n";
-  for (const CommandHelp& command : commands) {
-    if (command.name.empty()) continue;
-    const size_t space = command.name.rfind(' ');
-    const std::string before = space == std::string::npos ? "" : command.name.substr(0, space);
-    const std::string last = space == std::string::npos ? command.name : command.name.substr(space + 1);
-    text += fmt::format("      '{} {}') command='{}' ;;\n", before, last, command.name);
-  }
-  text += "    esac\n  done\n  local -a options next\n  local files=\n  case $command in\n";
+  text += ListCommandCases(commands) +
+          "    esac\n  done\n  local -a options next\n  local files=\n  case $command in\n";
   for (const CommandHelp& command : commands) {
     std::string options;
     for (const OptionHelp& option : command.options) {

@@ -190,7 +190,7 @@ int Run(Request request) {
 }  // namespace
 
 void AddRefereeCommand(Command app) {
-  constexpr long kMaxSamples = 1000000;
+  constexpr std::uint64_t kMaxSamples = 1000000;
   constexpr int kMostDigits = 15;
   const auto request = std::make_shared<Request>();
   request->options.states.samples = 100;
@@ -218,24 +218,14 @@ void AddRefereeCommand(Command app) {
                  "Folder where npm installed @mujoco/mujoco")
       .TypeName("FOLDER");
   command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats");
-  command.AddOption("--samples", &request->options.states.samples, "Number of random states")
-      .TypeName("N")
-      .Check(WholeNumber(1, kMaxSamples))
-      .ShowDefault();
-  command.AddOption("--seed", &request->options.states.seed, "Of the random states")
-      .TypeName("N")
-      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
-      .ShowDefault();
+  AddSampleOptions(command, kMaxSamples, &request->options.states.samples, &request->options.states.seed);
   command.AddOption("--digits", &request->digits, "Agreement to this many digits of a term's scale is enough")
       .TypeName("N")
       .Check(WholeNumber(1, kMostDigits))
       .ShowDefault();
   command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
       .TypeName("FILE.json");
-  command
-      .AddOption("--junit", &request->junit_file,
-                 "Write each check as a test case of JUnit's XML to this file")
-      .TypeName("FILE.xml");
+  AddJUnitOption(command, &request->junit_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

@@ -244,10 +244,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
   Option video = command.AddFlag("--video", &request->video, "Draw the run as a video, video.mp4");
   Option no_report =
       command.AddFlag("--no-report", &request->no_report, "Write the log and the summary only");
-  Option junit = command
-                     .AddOption("--junit", &request->junit_file,
-                                "Write each check as a test case of JUnit's XML to this file")
-                     .TypeName("FILE.xml");
+  Option junit = AddJUnitOption(command, &request->junit_file);
   Option no_log = command.AddFlag("--no-log", &request->no_log, "Write no files");
   Option quiet = command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   Option all = command.AddFlag("--all", &request->all, "Print each check, not only a line for each question");
