@@ -18,11 +18,16 @@
  * units:
  *
  *   t                          1     s, since the run, or the rest before it, began
- *   X_d, X_d_dot, X_d_ddot     18    desired motion, ZYZ angles; X_d_dot at the time that velocities belong
- * to q', xi                     p, n R_Bo, p_Bo                 9, 3  pose of the object V_Bo 6     its body
- * velocity X_o                        6     its coordinates, on one branch of the angles; zero with
- * control.orientation "rotation" kappa                      5 N   u_f v_f u_o v_o psi of each contact overlap
- * N     m touching                   N     1 or 0 for each fingertip support force              1     N
+ *   X_d, X_d_dot, X_d_ddot     18    desired motion, ZYZ angles; X_d_dot at the velocities' own time
+ *   q', xi                     p, n
+ *   R_Bo, p_Bo                 9, 3  pose of the object
+ *   V_Bo                       6     its body velocity
+ *   X_o                        6     its coordinates, on one branch of the angles; zero with
+ *                                    control.orientation = "rotation"
+ *   kappa                      5 N   u_f v_f u_o v_o psi of each contact
+ *   overlap                    N     m
+ *   touching                   N     1 or 0 for each fingertip
+ *   support force              1     N
  *
  * and, when the program wants DEXCHECK_TERMS, the model's terms at that state (controller/NOTATION.md):
  *
