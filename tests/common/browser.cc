@@ -74,9 +74,9 @@ Browser::Browser() {
     if (std::regex_search(text, match, started)) port_ = std::stoi(match[1]);
     if (Clock::now() > deadline) throw std::runtime_error("chromedriver did not start");
   }
-  const Json chromium = {
-      {"args", {"--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-angle=swiftshader",
-                 "--enable-unsafe-swiftshader"}}};
+  const Json chromium = {{"args",
+                          {"--headless=new", "--no-sandbox", "--disable-dev-shm-usage",
+                           "--use-angle=swiftshader", "--enable-unsafe-swiftshader"}}};
   const Json wanted = {{"goog:chromeOptions", chromium}, {"goog:loggingPrefs", {{"browser", "ALL"}}}};
   const Json session = Call("POST", "/session", {{"capabilities", {{"alwaysMatch", wanted}}}});
   session_ = "/session/" + session.at("sessionId").get<std::string>();
