@@ -26,7 +26,6 @@ std::vector<int> ChainTo(const RobotModel& model, int joint) {
 
 ModelTerms::ModelTerms(const RobotModel& model, Coordinates coordinates)
     : model_(&model),
-      coordinates_(coordinates),
       base_size_(coordinates == Coordinates::kReduced ? model.num_base_velocities()
                                                       : model.num_unreduced_base_velocities()),
       size_(base_size_ + model.num_joints()) {

@@ -149,7 +149,6 @@ class ModelTerms {
   [[nodiscard]] const LinkState& link(int joint) const { return links_[static_cast<size_t>(joint + 1)]; }
 
   const RobotModel* model_;
-  Coordinates coordinates_;
   int base_size_;  // velocity coordinates of the base
   int size_;
 

@@ -14,11 +14,11 @@ namespace {
 using Kind = ParameterKind;
 
 // Residuals are relative to their own sizes. Rounding leaves some 1e-12 of a finger's forces.
-constexpr double kRounding = 1e-10;
+constexpr double kFitRounding = 1e-10;
 constexpr int kMaxNumbers = 24;
 constexpr size_t kRanked = 5;
 
-size_t At(int link) { return static_cast<size_t>(link + 1); }
+size_t SlotOf(int link) { return static_cast<size_t>(link + 1); }
 
 double Positive(double size) { return size > 0.0 ? size : 1.0; }
 
@@ -46,14 +46,6 @@ RobotSpec Add(RobotSpec spec, const BodyPads& pads) {
   }
   spec.base.body.inertia += pads.inertia[0] * Matrix3d::Identity();
   return spec;
-}
-
-std::optional<RobotModel> TryModel(const RobotSpec& spec) {
-  try {
-    return RobotModel(spec);
-  } catch (const InputError&) {
-    return std::nullopt;
-  }
 }
 
 /// Places of the largest entries, the largest first.
@@ -94,7 +86,7 @@ void BodyFit::MakePads() {
   const size_t joints = spec_.joints.size();
   for (int link = -1; link < static_cast<int>(joints); ++link) {
     const MassProperties& body = BodyOf(spec_, link);
-    pads_.inertia.push_back(body.mass > 0.0 ? body.inertia.trace() + at.links[At(link)].inertia.trace()
+    pads_.inertia.push_back(body.mass > 0.0 ? body.inertia.trace() + at.links[SlotOf(link)].inertia.trace()
                                             : 0.0);
   }
   for (const Joint& joint : spec_.joints) {
@@ -116,14 +108,14 @@ void BodyFit::SetTarget(const mjModel& engine) {
   const Adapter adapter(model, engine, spec_.source);
   ModelTerms terms(model);
   terms.SetState(at.q, at.xi);
-  body_scales_.resize(At(joints));
+  body_scales_.resize(SlotOf(joints));
   joint_scales_.resize(2 * joints);
   std::vector<double> rows;
   for (int link = -1; link < joints; ++link) {
     const MassProperties& body =
         link < 0 ? model.base_with_wheels() : model.joints()[static_cast<size_t>(link)].body;
-    const LinkInWorld& there = at.links[At(link)];
-    BodyScale& scale = body_scales_[At(link)];
+    const LinkInWorld& there = at.links[SlotOf(link)];
+    BodyScale& scale = body_scales_[SlotOf(link)];
     scale.mass = Positive(std::max(body.mass, there.mass));
     scale.inertia = Positive(std::max(body.inertia.trace(), there.inertia.trace()));
     scale.length = Positive(std::sqrt(scale.inertia / scale.mass));
@@ -162,7 +154,7 @@ VectorXd BodyFit::CalcRows(const RobotModel& model) const {
   for (int link = model.base().type == BaseType::kFixed ? 0 : -1; link < joints; ++link) {
     const MassProperties& body =
         link < 0 ? model.base_with_wheels() : model.joints()[static_cast<size_t>(link)].body;
-    const BodyScale& scale = body_scales_[At(link)];
+    const BodyScale& scale = body_scales_[SlotOf(link)];
     rows[row++] = body.mass / scale.mass;
     for (const double entry : body.com) rows[row++] = entry / scale.length;
     for (const int entry : {0, 4, 8, 3, 6, 7}) rows[row++] = body.inertia.data()[entry] / scale.inertia;
@@ -243,7 +235,7 @@ VectorXd BodyFit::CalcGains(const VectorXd& residual, const VectorXd* first) con
 
 bool BodyFit::Linearise() {
   residual_ = CalcResidual(spec_);
-  if (!(residual_.cwiseAbs().maxCoeff() > kRounding)) return false;
+  if (!(residual_.cwiseAbs().maxCoeff() > kFitRounding)) return false;
   columns_ = CalcColumns(spec_, candidates_);
   for (size_t i = 0; i < candidates_.size(); ++i)
     columns_.col(static_cast<Eigen::Index>(i)) *= GetScale(spec_, candidates_[i]);
@@ -268,7 +260,7 @@ bool BodyFit::FindSolution(std::vector<Solution>* solutions) {
     for (const std::vector<Parameter>& set : sets) {
       Solution solution = Solve(set);
       DropUnchanged(&solution);
-      if (solution.worst <= kRounding) solutions->push_back(std::move(solution));
+      if (solution.worst <= kFitRounding) solutions->push_back(std::move(solution));
     }
     return !solutions->empty();
   };
@@ -337,7 +329,7 @@ BodyFit::Solution BodyFit::Grow() const {
   solution.worst = residual_.cwiseAbs().maxCoeff();
   solution.squared = residual_.squaredNorm();
   std::vector<Parameter> chosen;
-  while (chosen.size() < kMaxNumbers && solution.worst > kRounding) {
+  while (chosen.size() < kMaxNumbers && solution.worst > kFitRounding) {
     const VectorXd residual = CalcResidual(solution.repaired);
     VectorXd gains = (columns_.transpose() * residual).cwiseAbs2();
     for (Eigen::Index i = 0; i < gains.size(); ++i) {
@@ -417,7 +409,7 @@ std::vector<Repair> BodyFit::Run() {
   std::stable_sort(order.begin(), order.end(),
                    [&](size_t a, size_t b) { return IsLikelier(whole[a], whole[b], spec_); });
   const Solution& chosen = solutions[order.front()];
-  if (!(chosen.worst <= kRounding)) return {};
+  if (!(chosen.worst <= kFitRounding)) return {};
 
   // One cause for each thing that is changed.
   std::vector<Repair> causes;

@@ -13,16 +13,6 @@ namespace {
 
 using Kind = ParameterKind;
 
-Joint& JointOf(RobotSpec* spec, int joint) { return spec->joints[static_cast<size_t>(joint)]; }
-
-std::optional<RobotModel> TryModel(const RobotSpec& spec) {
-  try {
-    return RobotModel(spec);
-  } catch (const InputError&) {
-    return std::nullopt;
-  }
-}
-
 class MutantList {
  public:
   explicit MutantList(const RobotSpec& spec) : spec_(spec) {}

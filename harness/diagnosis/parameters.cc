@@ -4,6 +4,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "controller/common/errors.h"
+
 namespace dexcheck {
 namespace {
 
@@ -216,6 +218,16 @@ void SetValue(RobotSpec* spec, const Parameter& parameter, double value) {
   Vector3d rpy = ToRpy(X.linear());
   rpy[parameter.component] = value;
   X.linear() = FromRpy(rpy);
+}
+
+Joint& JointOf(RobotSpec* spec, int joint) { return spec->joints[static_cast<size_t>(joint)]; }
+
+std::optional<RobotModel> TryModel(const RobotSpec& spec) {
+  try {
+    return RobotModel(spec);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
 }
 
 bool IsAngle(const RobotSpec& spec, const Parameter& parameter) {

@@ -2,6 +2,7 @@
 
 // Every scalar parameter of the analytic model by itself: to change it, to compare it, to name it.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -59,6 +60,11 @@ std::vector<Parameter> ListParameters(const RobotSpec& spec);
 /// In the units above. The setter leaves the specification unchecked; RobotModel's constructor checks it.
 double GetValue(const RobotSpec& spec, const Parameter& parameter);
 void SetValue(RobotSpec* spec, const Parameter& parameter, double value);
+
+/// The joint of a specification that is changed.
+Joint& JointOf(RobotSpec* spec, int joint);
+/// The model of a changed specification; none when there is no such robot.
+std::optional<RobotModel> TryModel(const RobotSpec& spec);
 
 /// Whether the value is an angle, which is printed in degrees.
 bool IsAngle(const RobotSpec& spec, const Parameter& parameter);

@@ -6,14 +6,12 @@
 namespace dexcheck {
 namespace {
 
-using Kind = PlacedItem::Kind;
-
 // Three states tell a wrong place from a right one that is seen along its axis.
 constexpr size_t kSnapshots = 3;
 
 // Both sides chain some dozen rotations: 1e-14 of the robot's size. A file's numbers have fewer digits than
 // this leaves.
-constexpr double kRounding = 1e-11;
+constexpr double kPlaceRounding = 1e-11;
 
 size_t At(int link) { return static_cast<size_t>(link + 1); }
 
@@ -40,15 +38,15 @@ Placement::Placement(const RobotSpec& spec, const EngineEvidence& evidence, bool
   rows_ = poses_;
   for (int i = 0; i < joints; ++i) {
     const Joint& joint = spec.joints[static_cast<size_t>(i)];
-    items_.push_back({Kind::kAxisDirection, i, i});
-    if (joint.type == JointType::kRevolute) items_.push_back({Kind::kAxisLine, i, i});
+    items_.push_back({PlacedItem::Kind::kAxisDirection, i, i});
+    if (joint.type == JointType::kRevolute) items_.push_back({PlacedItem::Kind::kAxisLine, i, i});
     if (!bodies) continue;
-    if (joint.body.mass > 0.0) items_.push_back({Kind::kCom, i, i});
-    if (joint.body.inertia.trace() > 0.0) items_.push_back({Kind::kInertia, i, i});
+    if (joint.body.mass > 0.0) items_.push_back({PlacedItem::Kind::kCom, i, i});
+    if (joint.body.inertia.trace() > 0.0) items_.push_back({PlacedItem::Kind::kInertia, i, i});
   }
   for (size_t i = 0; i < spec.frames.size(); ++i) {
-    items_.push_back({Kind::kFramePosition, static_cast<int>(i), spec.frames[i].link});
-    items_.push_back({Kind::kFrameRotation, static_cast<int>(i), spec.frames[i].link});
+    items_.push_back({PlacedItem::Kind::kFramePosition, static_cast<int>(i), spec.frames[i].link});
+    items_.push_back({PlacedItem::Kind::kFrameRotation, static_cast<int>(i), spec.frames[i].link});
   }
   beyond_.resize(At(joints));
   for (size_t item = 0; item < items_.size(); ++item) {
@@ -168,25 +166,25 @@ void Placement::AppendResidual(int index, std::vector<double>* rows) const {
     const Snapshot& engine = evidence_->snapshots()[sample];
     const Pose& X = poses_[sample][At(item.link)];
     switch (item.kind) {
-      case Kind::kAxisDirection:
+      case PlacedItem::Kind::kAxisDirection:
         append(engine.axes[i] - X.linear().col(2));
         break;
-      case Kind::kAxisLine: {
+      case PlacedItem::Kind::kAxisLine: {
         // Where along the axis the anchor stands is a choice of frames.
         const Vector3d apart = engine.anchors[i] - X.translation();
         append(((apart - engine.axes[i].dot(apart) * engine.axes[i]) / length).eval());
         break;
       }
-      case Kind::kFramePosition:
+      case PlacedItem::Kind::kFramePosition:
         append(((engine.frames[i].translation() - X * trial_.frames[i].X_LF.translation()) / length).eval());
         break;
-      case Kind::kFrameRotation:
+      case PlacedItem::Kind::kFrameRotation:
         append((engine.frames[i].linear() - X.linear() * trial_.frames[i].X_LF.linear()).eval());
         break;
-      case Kind::kCom:
+      case PlacedItem::Kind::kCom:
         append(((engine.links[i + 1].com - X * trial_.joints[i].body.com) / length).eval());
         break;
-      case Kind::kInertia: {
+      case PlacedItem::Kind::kInertia: {
         const Matrix3d& inertia = trial_.joints[i].body.inertia;
         append(
             ((engine.links[i + 1].inertia - X.linear() * inertia * X.linear().transpose()) / inertia.trace())
@@ -208,22 +206,23 @@ double Placement::CalcError(int item) const {
 int Placement::CountWrongNumbers(int index) const {
   if (!Fails(index)) return 0;
   const PlacedItem& item = items_[static_cast<size_t>(index)];
-  if (item.kind != Kind::kCom && item.kind != Kind::kInertia) return 3;
+  if (item.kind != PlacedItem::Kind::kCom && item.kind != PlacedItem::Kind::kInertia) return 3;
   const Pose& X = poses_[0][At(item.link)];
   const MassProperties& body = trial_.joints[static_cast<size_t>(item.index)].body;
   const LinkInWorld& engine = evidence_->snapshots()[0].links[static_cast<size_t>(item.index + 1)];
   int wrong = 0;
-  if (item.kind == Kind::kCom) {
+  if (item.kind == PlacedItem::Kind::kCom) {
     const Vector3d difference = X.inverse() * engine.com - body.com;
-    for (const double entry : difference) wrong += std::abs(entry) > kRounding * evidence_->length() ? 1 : 0;
+    for (const double entry : difference)
+      wrong += std::abs(entry) > kPlaceRounding * evidence_->length() ? 1 : 0;
   } else {
     const Matrix3d difference = X.linear().transpose() * engine.inertia * X.linear() - body.inertia;
     for (const int entry : {0, 3, 6, 4, 7, 8})
-      wrong += std::abs(difference.data()[entry]) > kRounding * body.inertia.trace() ? 1 : 0;
+      wrong += std::abs(difference.data()[entry]) > kPlaceRounding * body.inertia.trace() ? 1 : 0;
   }
   return std::max(wrong, 1);
 }
 
-bool Placement::Fails(int item) const { return !(CalcError(item) <= kRounding); }
+bool Placement::Fails(int item) const { return !(CalcError(item) <= kPlaceRounding); }
 
 }  // namespace dexcheck

@@ -15,8 +15,6 @@ constexpr int kManyDigits = 9;
 // What both sides keep after some dozen rotations; what is printed must repair.
 constexpr int kPrintedDigits = 13;
 
-Joint& JointOf(RobotSpec* spec, int joint) { return spec->joints[static_cast<size_t>(joint)]; }
-
 /// A mass, and with it the inertia: the only causes of several kinds.
 bool IsBodyScaled(const Repair& cause) {
   return cause.parameters.size() > 1 && cause.parameters[0].kind == ParameterKind::kMass;

@@ -8,11 +8,10 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/map_vector.h"
 
 namespace dexcheck {
 namespace {
-
-Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
 Pose BodyPose(const mjData& data, int body) {
   Pose X = Pose::Identity();

@@ -1,6 +1,7 @@
 // What the engine has at the state set: poses, Jacobians, motions, object, contacts.
 
 #include "harness/engine/engine_terms.h"
+#include "harness/engine/map_vector.h"
 
 namespace dexcheck {
 namespace {
@@ -10,8 +11,6 @@ using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 /// Gap up to which CalcTouch looks for the nearest points, m: much more than contacts are compared at, and
 /// not more than the engine's general method for convex bodies bears.
 constexpr double kTouchMargin = 0.1;
-
-Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
 Pose MakePose(const mjtNum* rotation, const mjtNum* position) {
   Pose X = Pose::Identity();

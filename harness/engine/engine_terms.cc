@@ -5,14 +5,13 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/passive_forces.h"
 
 namespace dexcheck {
 namespace {
 
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
-Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
 int FindTipGeom(const mjModel& model, int site) {
   const int body = model.site_bodyid[site];

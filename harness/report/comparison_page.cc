@@ -22,10 +22,10 @@ std::string NameColumn(const SignalDifference& signal) {
   return signal.column.empty() ? signal.name : signal.name + "." + signal.column;
 }
 
-class Page {
+class ComparisonPage {
  public:
-  Page(const std::vector<const RunData*>& runs, const std::vector<std::string>& names,
-       const RunComparison& comparison)
+  ComparisonPage(const std::vector<const RunData*>& runs, const std::vector<std::string>& names,
+                 const RunComparison& comparison)
       : runs_(runs), names_(names), comparison_(comparison) {}
 
   std::string Make() {
@@ -195,7 +195,7 @@ class Page {
 
 std::string MakeComparisonPage(const std::vector<const RunData*>& runs, const std::vector<std::string>& names,
                                const RunComparison& comparison) {
-  return Page(runs, names, comparison).Make();
+  return ComparisonPage(runs, names, comparison).Make();
 }
 
 std::string DescribeComparison(const RunComparison& comparison, double tolerance) {

@@ -10,7 +10,7 @@
 namespace dexcheck {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 constexpr const char* kCheckPrefix = "check/";
 
 CheckKind ReadKind(const std::string& name) {
@@ -25,14 +25,14 @@ CheckKind ReadKind(const std::string& name) {
 double ReadNumber(const nlohmann::json& json, const char* key) {
   const auto value = json.find(key);
   if (value == json.end()) return 0.0;
-  return value->is_number() ? value->get<double>() : kInfinity;
+  return value->is_number() ? value->get<double>() : kUnbounded;
 }
 
 }  // namespace
 
 double CheckLine::share() const {
   if (bound > 0.0) return max / bound;
-  return max == 0.0 ? 0.0 : kInfinity;
+  return max == 0.0 ? 0.0 : kUnbounded;
 }
 
 RunData::RunData(const std::filesystem::path& run_dir) : path_(run_dir / "log.h5"), log_(path_) {
@@ -127,7 +127,7 @@ void RunData::ReadChecksOfSignals() {
       }
       if (value <= line.max) continue;
       line.max = value;
-      if (std::isnan(value)) line.max = kInfinity;
+      if (std::isnan(value)) line.max = kUnbounded;
       line.at_time = time_[row];
     }
     checks_.push_back(line);

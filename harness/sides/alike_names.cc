@@ -12,17 +12,6 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-/// Letters and digits, in small letters.
-std::string Simplify(const std::string& name) {
-  std::string simple;
-  for (const char c : name) {
-    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
-      simple += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    }
-  }
-  return simple;
-}
-
 size_t CountCommonPrefix(const Names& names) {
   if (names.size() < 2) return 0;
   size_t length = names[0].size();
@@ -47,13 +36,23 @@ Names DropCommonPrefix(Names names) {
 /// The names as they are, and without what all begin with, or end with, or both.
 std::vector<Names> ListVariants(const Names& names) {
   Names simple;
-  for (const std::string& name : names) simple.push_back(Simplify(name));
+  for (const std::string& name : names) simple.push_back(SimplifyName(name));
   const Names without_prefix = DropCommonPrefix(simple);
   const auto drop_suffix = [](const Names& some) { return Reverse(DropCommonPrefix(Reverse(some))); };
   return {simple, without_prefix, drop_suffix(simple), drop_suffix(without_prefix)};
 }
 
 }  // namespace
+
+std::string SimplifyName(const std::string& name) {
+  std::string simple;
+  for (const char c : name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
+      simple += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+  }
+  return simple;
+}
 
 Names FindAlikeNames(const Names& names, const Names& others) {
   if (names.size() != others.size()) return {};

@@ -9,6 +9,9 @@
 
 namespace dexcheck {
 
+/// Its letters and digits, in small letters.
+std::string SimplifyName(const std::string& name);
+
 /// The name in `others` of each name: the same but for what all names of one file begin or end with, capitals
 /// and punctuation. Empty unless each name has one partner of its own.
 std::vector<std::string> FindAlikeNames(const std::vector<std::string>& names,

@@ -11,6 +11,7 @@
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/checks/random_states.h"
+#include "harness/sides/alike_names.h"
 
 namespace dexcheck {
 namespace {
@@ -88,17 +89,6 @@ double CalcCondition(const RobotDescription& robot, const RobotSpec& spec) {
   }
   std::nth_element(conditions.begin(), conditions.begin() + kStates / 2, conditions.end());
   return conditions[kStates / 2];
-}
-
-/// The text in small letters without separators.
-std::string Simplify(const std::string& name) {
-  std::string simple;
-  for (const char c : name) {
-    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
-      simple += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    }
-  }
-  return simple;
 }
 
 class JointAudit {
@@ -197,8 +187,8 @@ class JointAudit {
         finding.text = "its name begins or ends with a blank";
         findings_.push_back(finding);
       }
-      const auto [other, is_new] = known->emplace(Simplify(name), name);
-      if (is_new || Simplify(name).empty()) return;
+      const auto [other, is_new] = known->emplace(SimplifyName(name), name);
+      if (is_new || SimplifyName(name).empty()) return;
       finding.text = "its name is that of " + Quote(other->second) + " but for case and punctuation";
       findings_.push_back(finding);
     };

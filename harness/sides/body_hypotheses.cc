@@ -262,7 +262,7 @@ void AddMassMistakes(std::vector<BodyMistake>* mistakes) {
        }});
 }
 
-std::vector<BodyMistake> ListMistakes() {
+std::vector<BodyMistake> ListBodyMistakes() {
   std::vector<BodyMistake> mistakes;
   AddInertiaMistakes(&mistakes);
   AddComMistakes(&mistakes);
@@ -287,7 +287,7 @@ class BodySearch {
     // One mistake of many links is likelier than many exchanges: left and right are mirrored, and a wrong
     // sign makes one of the other.
     constexpr size_t kMany = 3;
-    const std::vector<BodyMistake> mistakes = ListMistakes();
+    const std::vector<BodyMistake> mistakes = ListBodyMistakes();
     FindMistakes(mistakes, kMany);
     FindExchanges();
     FindMistakes(mistakes, 1);
@@ -437,7 +437,7 @@ class BodySearch {
 }  // namespace
 
 bool IsExplainedAlone(const ComparedBody& body, double length, double tolerance) {
-  const std::vector<BodyMistake> mistakes = ListMistakes();
+  const std::vector<BodyMistake> mistakes = ListBodyMistakes();
   return std::any_of(mistakes.begin(), mistakes.end(), [&](const BodyMistake& mistake) {
     const std::optional<MassProperties> undone = mistake.undo(body);
     return undone && Compare(*undone, body.right, length).largest() <= tolerance;

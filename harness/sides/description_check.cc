@@ -13,7 +13,7 @@ namespace dexcheck {
 namespace {
 
 // Both sides read decimal numbers and form at most short sums and products of them.
-constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
+constexpr double kRowRounding = 64.0 * std::numeric_limits<double>::epsilon();
 
 class DescriptionCheck {
  public:
@@ -33,7 +33,7 @@ class DescriptionCheck {
     if (old != gate_.records.end()) return &*old;
     CheckRecord record;
     record.name = name;
-    record.bound = kRounding;
+    record.bound = kRowRounding;
     gate_.records.push_back(record);
     return &gate_.records.back();
   }
@@ -53,7 +53,7 @@ class DescriptionCheck {
     const Location where{Location::Kind::kJoint, joint, -1};
     const double size = std::max(std::abs(model), std::abs(engine));
     const double error = record->Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
-    if (error <= kRounding) return;
+    if (error <= kRowRounding) return;
     const RobotModel& described = adapter_.model();
     gate_.findings.push_back({record->name, Describe(where, described, described.num_base_velocities()),
                               model, engine, where, entry});

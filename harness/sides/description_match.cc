@@ -13,9 +13,9 @@ namespace dexcheck {
 namespace {
 
 /// What each of the two takes from the other.
-class Completion {
+class Matching {
  public:
-  Completion(RobotDescription* a, RobotDescription* b)
+  Matching(RobotDescription* a, RobotDescription* b)
       : a_(*a), b_(*b), b_of_a_(MatchJoints(a_.spec, b_.spec)), a_of_b_(MatchJoints(b_.spec, a_.spec)) {}
 
   std::vector<std::string> Run() {
@@ -176,7 +176,7 @@ std::vector<std::string> CompleteEachOther(RobotDescription* a, RobotDescription
   std::vector<std::string> names;
   for (const Joint& joint : a->spec.joints) names.push_back(joint.name);
   std::vector<std::string> notes = TakeJointNames(names, a->spec.source, b);
-  const std::vector<std::string> others = Completion(a, b).Run();
+  const std::vector<std::string> others = Matching(a, b).Run();
   notes.insert(notes.end(), others.begin(), others.end());
   return notes;
 }

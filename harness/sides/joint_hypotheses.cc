@@ -28,7 +28,7 @@ struct JointMistake {
   std::function<OwnRow(const OwnRow&)> undo;
 };
 
-std::vector<JointMistake> ListMistakes() {
+std::vector<JointMistake> ListJointMistakes() {
   std::vector<JointMistake> mistakes;
   const auto add = [&](const std::string& noun, const std::string& plural, const std::string& text,
                        const std::function<OwnRow(const OwnRow&)>& undo) {
@@ -97,10 +97,10 @@ std::vector<JointMistake> ListMistakes() {
 }
 
 /// Compares rows at a few positions; what stands in the world is the same for both when they agree.
-class Comparison {
+class RowComparison {
  public:
-  Comparison(const Pose& X_W0_a, const Pose& X_W0_b, const std::vector<OwnRow>& right, double length,
-             double tolerance)
+  RowComparison(const Pose& X_W0_a, const Pose& X_W0_b, const std::vector<OwnRow>& right, double length,
+                double tolerance)
       : X_W0_(X_W0_a), right_(right), length_(length), tolerance_(tolerance) {
     std::mt19937 bits(1);
     constexpr int kStates = 2;
@@ -254,13 +254,13 @@ std::vector<OwnRow> Reread(const RobotDescription& a, const std::function<MdhRow
 
 class JointSearch {
  public:
-  JointSearch(const RobotDescription& a, const Comparison& comparison, std::vector<OwnRow>* rows)
+  JointSearch(const RobotDescription& a, const RowComparison& comparison, std::vector<OwnRow>* rows)
       : a_(a), comparison_(comparison), rows_(*rows), wrong_(comparison.CountWrong(*rows)) {}
 
   std::vector<Hypothesis> Run() {
     if (wrong_ == 0) return {};
     if (FindMisreadTable() || FindExchange()) return std::move(found_);
-    const std::vector<JointMistake> mistakes = ListMistakes();
+    const std::vector<JointMistake> mistakes = ListJointMistakes();
     for (size_t i = 0; i < rows_.size(); ++i) JudgeJoint(i, mistakes);
     Report();
     return std::move(found_);
@@ -416,7 +416,7 @@ class JointSearch {
   }
 
   const RobotDescription& a_;
-  const Comparison& comparison_;
+  const RowComparison& comparison_;
   std::vector<OwnRow>& rows_;
   size_t wrong_;
   std::map<std::string, std::vector<std::pair<size_t, std::string>>> by_mistake_;
@@ -469,7 +469,7 @@ std::vector<Pose> CalcOwnPoses(const Pose& X_W0, const std::vector<OwnRow>& rows
 std::vector<Hypothesis> FindJointHypotheses(const RobotDescription& a, const Pose& X_W0_a, const Pose& X_W0_b,
                                             const std::vector<OwnRow>& right, double length, double tolerance,
                                             std::vector<OwnRow>* rows) {
-  const Comparison comparison(X_W0_a, X_W0_b, right, length, tolerance);
+  const RowComparison comparison(X_W0_a, X_W0_b, right, length, tolerance);
   return JointSearch(a, comparison, rows).Run();
 }
 

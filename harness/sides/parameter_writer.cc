@@ -15,16 +15,16 @@ namespace {
 
 // Products of a few rotations leave zeros and decimal numbers beside themselves by this much of their
 // vector's size.
-constexpr double kRounding = 8.0 * std::numeric_limits<double>::epsilon();
+constexpr double kPrintedRounding = 8.0 * std::numeric_limits<double>::epsilon();
 
 /// The shortest decimal number within rounding of `value`, which is part of something of size `scale`.
 std::string FormatTidy(double value, double scale) {
   constexpr int kMaxDigits = 17;
-  if (std::abs(value) <= kRounding * scale) return "0";
+  if (std::abs(value) <= kPrintedRounding * scale) return "0";
   for (int digits = 1; digits < kMaxDigits; ++digits) {
     const std::string text = fmt::format("{:.{}g}", value, digits);
     const double read = std::strtod(text.c_str(), nullptr);
-    if (std::abs(read - value) <= kRounding * scale) return FormatNumber(read);
+    if (std::abs(read - value) <= kPrintedRounding * scale) return FormatNumber(read);
   }
   return FormatNumber(value);
 }
@@ -41,7 +41,7 @@ std::string FormatAngles(const Vector3d& angles) {
   const auto format = [](double angle) -> std::string {
     for (const int parts : {1, 2, 3, 4, 6}) {
       const double count = std::round(angle * parts / kPi);
-      if (count == 0.0 || std::abs(angle - count * kPi / parts) > kRounding * kPi) continue;
+      if (count == 0.0 || std::abs(angle - count * kPi / parts) > kPrintedRounding * kPi) continue;
       const std::string factor = count == 1.0 ? "" : count == -1.0 ? "-" : FormatNumber(count) + " * ";
       return "\"" + factor + "pi" + (parts == 1 ? "" : " / " + std::to_string(parts)) + "\"";
     }
@@ -71,7 +71,7 @@ std::string FormatPose(const Pose& X, bool always) {
   // Lengths of a robot are of size 1 m; smaller ones keep their digits.
   const double length = xyz.norm();
   if (always || length > 0.0) text += ", xyz = " + FormatTidyList(xyz, length);
-  if (rpy.norm() > kRounding) text += ", rpy = " + FormatAngles(rpy);
+  if (rpy.norm() > kPrintedRounding) text += ", rpy = " + FormatAngles(rpy);
   return text;
 }
 
@@ -196,7 +196,7 @@ class ParameterWriter {
         "[[frame]]\nname = " + QuoteToml(frame.name) + "\nlink = " + QuoteToml(LinkName(frame.link)) + "\n";
     const Vector3d rpy = CalcRollPitchYaw(X_WF.linear());
     text_ += "xyz = " + FormatTidyList(X_WF.translation(), X_WF.translation().norm()) + "\n";
-    if (rpy.norm() > kRounding) text_ += "rpy = " + FormatAngles(rpy) + "\n";
+    if (rpy.norm() > kPrintedRounding) text_ += "rpy = " + FormatAngles(rpy) + "\n";
     if (frame.sphere_radius) text_ += "sphere_radius = " + FormatNumber(*frame.sphere_radius) + "\n";
     text_ += "\n";
   }
@@ -211,7 +211,7 @@ class ParameterWriter {
 Vector3d CalcRollPitchYaw(const Matrix3d& R) {
   // At pitch = +-90 degrees the first column stands along z, and any yaw will do: zero.
   const double horizontal = std::hypot(R(0, 0), R(1, 0));
-  const double yaw = horizontal > kRounding ? std::atan2(R(1, 0), R(0, 0)) : 0.0;
+  const double yaw = horizontal > kPrintedRounding ? std::atan2(R(1, 0), R(0, 0)) : 0.0;
   // Rz(yaw)^T R = Ry(pitch) Rx(roll), whose middle row is [0, cos(roll), -sin(roll)].
   const Matrix3d rest = Eigen::AngleAxisd(-yaw, Vector3d::UnitZ()).toRotationMatrix() * R;
   return {std::atan2(-rest(1, 2), rest(1, 1)), std::atan2(-rest(2, 0), rest(0, 0)), yaw};
