@@ -6,8 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <cmath>
 #include <random>
 
@@ -15,6 +13,7 @@
 #include "controller/object/euler_zyz.h"
 #include "controller/object/so3.h"
 #include "tests/common/allocation_counter.h"
+#include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/controller/control/grasp_scene.h"
 
@@ -101,7 +100,8 @@ class BaselineLawTest : public ::testing::Test {
     const MatrixXd& J = scene_.grasp.J_B();
     const MatrixXd& G = scene_.grasp.G();
     return object * scene_.grasp.body().M_hat +
-           robot * G * (J * scene_.robot.M().inverse() * J.transpose()).inverse() * G.transpose();
+           robot * G * testing::CalcInverse(J * testing::CalcInverse(scene_.robot.M()) * J.transpose()) *
+               G.transpose();
   }
 
   std::mt19937 random_{7};
@@ -221,8 +221,7 @@ TEST_F(BaselineLawTest, ImpedanceDampsEveryModeAlike) {
   A.topRightCorner<6, 6>().setIdentity();
   A.bottomLeftCorner<6, 6>() = -Lambda.inverse() * K;
   A.bottomRightCorner<6, 6>() = -Lambda.inverse() * D;
-  const Eigen::EigenSolver<Matrix12d> eigen(A);
-  for (const std::complex<double>& s : eigen.eigenvalues()) {
+  for (const std::complex<double>& s : testing::CalcEigenvalues(A)) {
     EXPECT_NEAR(-s.real() / std::abs(s), 0.7, 1e-7);  // measured 1e-10
   }
 }

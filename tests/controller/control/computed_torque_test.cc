@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/SVD>
 #include <cmath>
 #include <random>
 
@@ -14,6 +13,7 @@
 #include "controller/control/posture_task.h"
 #include "controller/object/so3.h"
 #include "tests/common/allocation_counter.h"
+#include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
 #include "tests/controller/control/printed_law.h"
@@ -146,7 +146,7 @@ TEST_P(LawTest, WholeSystemFollowsTheErrorDynamics) {
     EXPECT_TRUE(MatrixNear(law_.F_o(), F_o, kPredictedWrenchRounding));
     EXPECT_TRUE(MatrixNear(scene_.grasp.G() * p.f_c, F_o, kForceRounding));
     const MatrixXd G_plus =
-        scene_.grasp.G().transpose() * (scene_.grasp.G() * scene_.grasp.G().transpose()).inverse();
+        scene_.grasp.G().transpose() * testing::CalcInverse(scene_.grasp.G() * scene_.grasp.G().transpose());
     EXPECT_TRUE(MatrixNear(p.f_c, G_plus * F_o + F_N, kForceRounding));
   }
 }
@@ -159,7 +159,7 @@ TEST_P(LawTest, AHasFullColumnRank) {
   const VectorXd F_N = VectorXd::Zero(scene_.num_forces());
   const PrintedLaw printed(scene_, FactorJacobian(scene_, weight_), MakeGains(), desired, zero, F_N);
   // Columns for translation and rotation differ in unit: compare their directions.
-  const VectorXd sigma = printed.A_transposed.rowwise().normalized().jacobiSvd().singularValues();
+  const VectorXd sigma = testing::CalcSingularValues(printed.A_transposed.rowwise().normalized());
   EXPECT_GT(sigma[5], 1e-4 * sigma[0]);  // measured 8e-4
   const VectorXd force = CalcForce(CalcTrackingAcceleration(MakeGains(), scene_.grasp, desired), zero, F_N);
   const Vector6d X_o_ddot =

@@ -2,8 +2,6 @@
 
 // The law (55) as printed, with matrices in X_o, and faulty versions of it.
 
-#include <Eigen/LU>
-
 #include "controller/contact/adjoint.h"
 #include "controller/contact/contact_jacobian.h"
 #include "controller/control/grasp_terms.h"
@@ -11,6 +9,7 @@
 #include "controller/control/pseudoinverse.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/platform.h"
+#include "tests/common/linear_algebra.h"
 #include "tests/controller/control/grasp_scene.h"
 
 namespace dexcheck::testing {
@@ -51,7 +50,7 @@ struct PrintedLaw {
     const MatrixXd J_plus = J_B_pinv.CalcMatrix();
     const MatrixXd N = J_B_pinv.CalcProjector();
     const MatrixXd J_T = grasp.J_B().transpose();
-    const MatrixXd G_plus = G.transpose() * (G * G.transpose()).inverse();
+    const MatrixXd G_plus = G.transpose() * testing::CalcInverse(G * G.transpose());
     const VectorXd sigma = scene.xi;
     const Vector6d& X_dot = scene.X_o_dot;
     const Vector6d command = desired.X_d_ddot + gains.K_v.cwiseProduct(desired.X_d_dot - X_dot) +

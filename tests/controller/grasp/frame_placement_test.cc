@@ -5,12 +5,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <random>
 
 #include "controller/dynamics/model_terms.h"
 #include "controller/grasp/contact_plan.h"
+#include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
@@ -116,7 +116,7 @@ TEST_F(FramePlacementTest, StaysNearTheNominalPosture) {
     Matrix6Xd J_dot(6, terms_.size());
     terms_.CalcFrameJacobian(palm, J, J_dot);
     const Matrix6Xd J_arm = J.middleCols(model_.num_base_velocities() + joints.front(), 7);
-    const MatrixXd J_pinv = J_arm.completeOrthogonalDecomposition().pseudoInverse();
+    const MatrixXd J_pinv = testing::CalcPseudoinverse(J_arm);
     const VectorXd away = (nominal - placement.q).segment(3 + joints.front(), 7);
     const VectorXd free = away - J_pinv * (J_arm * away);
     farthest = std::max(farthest, away.norm());

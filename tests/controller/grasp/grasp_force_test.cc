@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -12,6 +10,7 @@
 #include <string>
 
 #include "controller/common/errors.h"
+#include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/controller/grasp/random_grasp.h"
 
@@ -74,8 +73,7 @@ double CalcBarrierObjective(const GraspForceProblem& problem, double rho, const 
 // Minimum of the barrier objective from a feasible interior point, by damped Newton steps in null(G) (27)
 // with derivatives of log det written out: shares nothing with the solver.
 VectorXd MinimiseBarrier(const GraspForceProblem& problem, double rho, VectorXd f_c) {
-  const MatrixXd Q = MatrixXd(problem.G.transpose()).householderQr().householderQ();
-  const MatrixXd Z = Q.rightCols(Q.cols() - 6);
+  const MatrixXd Z = testing::CalcNullspace(problem.G);
   for (int iteration = 0; iteration < 100; ++iteration) {
     VectorXd gradient = VectorXd::Zero(f_c.size());
     MatrixXd hessian = MatrixXd::Zero(f_c.size(), f_c.size());
@@ -93,7 +91,7 @@ VectorXd MinimiseBarrier(const GraspForceProblem& problem, double rho, VectorXd 
       gradient[3 * i + 2] += problem.weight[i] - rho * (1.0 / lower - 1.0 / upper);
       hessian.block<3, 3>(3 * i, 3 * i) = rho * H;
     }
-    const VectorXd step = -Z * (Z.transpose() * hessian * Z).ldlt().solve(Z.transpose() * gradient);
+    const VectorXd step = -Z * testing::SolveDense(Z.transpose() * hessian * Z, Z.transpose() * gradient);
     const double value = CalcBarrierObjective(problem, rho, f_c);
     double length = 1.0;
     while (CalcBarrierObjective(problem, rho, f_c + length * step) > value && length > kEps) length *= 0.5;
@@ -387,7 +385,7 @@ TEST(CalcInternalForce, IsWhatTheWrenchDoesNotNeed) {
   // (27), to the residual tolerance of 1e-10 relative to |F_o| <= 20 N; (49) with the Moore-Penrose inverse
   // of an independent factorisation.
   EXPECT_TRUE(MatrixNear(problem.G * F_N, Vector6d::Zero(), 2e-9));
-  const VectorXd least = problem.G.completeOrthogonalDecomposition().solve(problem.F_o);
+  const VectorXd least = testing::CalcPseudoinverse(problem.G) * problem.F_o;
   EXPECT_TRUE(MatrixNear(F_N + least, f_c, 10.0 * kConeTolerance));
   EXPECT_GT((f_c - least).norm(), 1.0) << "with no internal force there would be nothing to compute";
 }

@@ -1,11 +1,11 @@
 #include "tests/controller/grasp/sdp_oracle.h"
 
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
 #include <string>
+
+#include "tests/common/linear_algebra.h"
 
 namespace dexcheck::testing {
 namespace {
@@ -18,9 +18,8 @@ struct ForceSpace {
 
 ForceSpace CalcForceSpace(const GraspForceProblem& problem) {
   ForceSpace space;
-  space.offset = problem.G.completeOrthogonalDecomposition().solve(problem.F_o);
-  const MatrixXd Q = MatrixXd(problem.G.transpose()).householderQr().householderQ();
-  space.basis = Q.rightCols(Q.cols() - 6);
+  space.offset = testing::CalcPseudoinverse(problem.G) * problem.F_o;
+  space.basis = testing::CalcNullspace(problem.G);
   return space;
 }
 

@@ -2,12 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 
 namespace dexcheck {
@@ -128,7 +128,7 @@ TEST(PlatformByHand, FacingYWithWheelRates) {
 TEST_P(PlatformTest, SSpansTheNullSpaceOfA) {
   for (const State& state : states_) {
     const PlatformConstraint platform = CalcPlatformConstraint(base_, state.q_v, state.v);
-    ASSERT_EQ(Eigen::FullPivLU<MatrixXd>(platform.S_v).rank(), 2);
+    ASSERT_EQ(testing::CalcRank(platform.S_v), 2);
     EXPECT_NEAR(platform.A_v.norm(), 1.0, kRounding * TolScale());
     EXPECT_TRUE(MatrixNear(platform.S_v.transpose() * platform.A_v.transpose(), Vector2d::Zero(), kRounding));
   }

@@ -15,6 +15,7 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/velocity_map.h"
 #include "tests/common/files.h"
+#include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
@@ -305,7 +306,7 @@ TEST_P(AdapterTest, ProjectionsAreProductsWithTheDenseMap) {
     VelocityMap map(adapter(), coordinates);
     map.SetState(DrawPositions(), DrawVelocities(map.size()));
     const MatrixXd T = CalcDenseMap(map);
-    ASSERT_EQ(Eigen::FullPivLU<MatrixXd>(T).rank(), map.size());
+    ASSERT_EQ(testing::CalcRank(T), map.size());
 
     const VectorXd force = DrawVelocities(m()->nv);
     VectorXd projected_force(map.size());

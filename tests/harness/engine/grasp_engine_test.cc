@@ -15,6 +15,7 @@
 #include "harness/engine/adapter.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/velocity_map.h"
+#include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 
@@ -92,7 +93,7 @@ class RandomGrasp : public ::testing::Test {
       normal_rows.row(i) = G_.col(3 * i + 2).transpose();
       approach[i] = J_B_.row(3 * i + 2) * xi_;
     }
-    V_o_ += normal_rows.completeOrthogonalDecomposition().solve(approach - normal_rows * V_o_);
+    V_o_ += testing::CalcPseudoinverse(normal_rows) * (approach - normal_rows * V_o_);
     CalcModelContacts();
     SetEngineState();
   }
