@@ -1,6 +1,7 @@
 #include "renders/canvas.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -94,6 +95,11 @@ void Canvas::StrokePath(std::span<const Vector2d> points, double width, const Co
   for (int y = box.y_begin; y < box.y_end; ++y) {
     for (int x = box.x_begin; x < box.x_end; ++x) Blend(x, y, color, static_cast<double>(at(x, y)));
   }
+}
+
+void Canvas::StrokeLine(const Vector2d& from, const Vector2d& to, double width, const Color& color) {
+  const std::array<Vector2d, 2> ends = {from, to};
+  StrokePath(ends, width, color);
 }
 
 void Canvas::DrawText(Font& font, double size, const Vector2d& baseline, const std::string& text,

@@ -24,6 +24,7 @@ class Canvas {
   void FillRoundedRectangle(const Vector2d& corner, const Vector2d& size, double radius, const Color& color);
   void FillCircle(const Vector2d& center, double radius, const Color& color);
   void StrokePath(std::span<const Vector2d> points, double width, const Color& color);
+  void StrokeLine(const Vector2d& from, const Vector2d& to, double width, const Color& color);
 
   enum class Align { kLeft, kCenter, kRight };
   /// @param baseline where the text's line stands, at its left end, centre, or right end.

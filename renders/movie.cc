@@ -8,6 +8,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
+#include "renders/canvas.h"
 #include "renders/compose.h"
 #include "renders/course.h"
 #include "renders/frame_line.h"
@@ -23,6 +24,12 @@ constexpr size_t kMostHistory = 240;
 constexpr double kInsetHeight = 0.36;  // of the picture's
 constexpr double kInsetAspect = 16.0 / 9.0;
 constexpr double kWidestInset = 0.45;  // of the picture's width
+constexpr double kDown = -0.5;         // of a look at the object, against 1 along the floor
+
+const Color kGhostLine = MakeColor(0x3d7dff);
+const Color kGhost = MakeColor(0x3d7dff, 0.45F);
+constexpr double kLeastLine = 1e-3;    // m between the objects of two runs, from which on a line is drawn
+constexpr double kLineRadius = 0.003;  // m
 
 constexpr double kNarrowShift = 0.15;   // of the picture's width
 constexpr double kCourseMargin = 0.03;  // likewise
@@ -53,8 +60,10 @@ std::array<double, 2> ErrorRange(const std::vector<double>& errors) {
 /// Draws one run.
 class MoviePainter::RunPainter {
  public:
-  RunPainter(const RunView& view, const MovieOptions& options, int width)
+  /// @param ghost a run that is drawn into the same scene; null for none.
+  RunPainter(const RunView& view, const RunView* ghost, const MovieOptions& options, int width)
       : model_((CheckRunFrames(*view.model, *view.frames), *view.model)),
+        ghost_(ghost != nullptr ? std::make_unique<GhostRun>(*ghost) : nullptr),
         run_(*view.frames),
         options_(options),
         width_(width),
@@ -66,24 +75,57 @@ class MoviePainter::RunPainter {
         error_range_(ErrorRange(run_.position_errors)) {
     if (options.panel) overlay_.emplace();
     if (options.free && (options.free->follow || !options.free->look_at)) FindObject();
+    for (const std::string& camera : {camera_, options.inset}) {
+      if (IsOwn(camera, kObjectCamera)) FindObject();
+    }
+    bearing_ = FindWay(model_, run_, data_.get()).bearing;
     inset_height_ = static_cast<int>(std::lround(kInsetHeight * options.height));
     inset_width_ =
         static_cast<int>(std::lround(std::min(kInsetAspect * inset_height_, kWidestInset * width)));
-    if (!options.inset.empty()) CheckCamera(model_, options.inset);
+    if (!options.inset.empty() && !IsOwn(options.inset, kRobotCamera) && !IsOwn(options.inset, kObjectCamera))
+      CheckCamera(model_, options.inset);
   }
 
   Image Paint(double time) {
     const long row = run_.RowAt(run_.times.front() + time + kTimeRounding);
     SetRow(model_, run_, row, data_.get());
-    const std::vector<Decoration> decorations = decorator_.Make(row, *data_);
-    Image image = options_.free ? renderer_.Render(*data_, FindFreeView(row), decorations)
-                                : renderer_.Render(*data_, decorations);
+    std::vector<Decoration> decorations = decorator_.Make(row, *data_);
+    if (ghost_) AddGhost(time, &decorations);
+    const std::optional<Viewpoint> view =
+        options_.free ? FindFreeView(row) : FindOwnView(camera_, MakeEdges());
+    Image image = view ? renderer_.Render(*data_, *view, decorations) : renderer_.Render(*data_, decorations);
     if (!options_.inset.empty()) PlaceInset(PaintInset(decorations), &image);
     if (overlay_) overlay_->Draw(MakeState(row), &image);
     return image;
   }
 
  private:
+  /// The other run of a comparison.
+  struct GhostRun {
+    explicit GhostRun(const RunView& view)
+        : model((CheckRunFrames(*view.model, *view.frames), *view.model)),
+          run(*view.frames),
+          data(MakeData(model)),
+          object(mj_name2id(&model, mjOBJ_BODY, run.object_body.c_str())) {}
+    const mjModel& model;
+    const RunFrames& run;
+    MjDataPtr data;
+    int object;  // body, -1 for none
+  };
+
+  /// Puts the other run to the same time, and a line between the two objects.
+  void AddGhost(double time, std::vector<Decoration>* decorations) {
+    const RunFrames& run = ghost_->run;
+    SetRow(ghost_->model, run, run.RowAt(run.times.front() + time + kTimeRounding), ghost_->data.get());
+    const int object = mj_name2id(&model_, mjOBJ_BODY, run_.object_body.c_str());
+    if (object < 0 || ghost_->object < 0) return;
+    const Vector3d here = BodyPose(*data_, object).translation();
+    const Vector3d there = BodyPose(*ghost_->data, ghost_->object).translation();
+    apart_ = (there - here).norm();
+    if (*apart_ < kLeastLine) return;
+    decorations->emplace_back(Polyline{{here, there}, kLineRadius, kGhostLine});
+  }
+
   [[nodiscard]] std::string ChooseCamera() const {
     constexpr const char* kUsual = "overview";
     if (!options_.camera.empty()) return options_.camera;
@@ -94,9 +136,11 @@ class MoviePainter::RunPainter {
     RenderOptions render;
     render.width = width_;
     render.height = options_.height;
-    render.camera = camera_;
+    const bool is_own = IsOwn(camera_, kRobotCamera) || IsOwn(camera_, kObjectCamera);
+    render.camera = is_own ? kCourseCamera : camera_;
     render.samples = options_.samples;
     render.shadow_size = options_.shadow_size;
+    if (ghost_) render.ghost = Ghost{&ghost_->model, ghost_->data.get(), kGhost};
     // In a narrow picture the panel would cover the robot.
     if (options_.panel && width_ < options_.height * 5 / 4) render.shift_right = kNarrowShift;
     // Forces point into the object.
@@ -112,8 +156,9 @@ class MoviePainter::RunPainter {
     const double top = std::tan(0.5 * DegToRad(model_.vis.global.fovy));
     const double side = top * width_ / options_.height;
     const double margin = 2.0 * kCourseMargin * side;
-    const double covered =
-        options_.panel && camera_ == kCourseCamera ? Overlay::CalcCoveredWidth(width_, options_.height) : 0.0;
+    const double covered = options_.panel && (camera_ == kCourseCamera || IsOwn(camera_, kRobotCamera))
+                               ? Overlay::CalcCoveredWidth(width_, options_.height)
+                               : 0.0;
     return {side * (1.0 - 2.0 * covered / width_) - margin, side - margin, top - margin, top - margin};
   }
 
@@ -137,7 +182,31 @@ class MoviePainter::RunPainter {
     object_start_ = BodyPose(*data_, object_).translation();
   }
 
+  /// Whether a name means one of the cameras below: an MJCF's camera of this name comes first.
+  [[nodiscard]] bool IsOwn(const std::string& name, const char* own) const {
+    return name == own && mj_name2id(&model_, mjOBJ_CAMERA, own) < 0;
+  }
+
+  /// What the camera "robot" or "object" sees; none for others.
+  /// @param edges of the picture. data_ has the row's kinematics.
+  [[nodiscard]] std::optional<Viewpoint> FindOwnView(const std::string& camera,
+                                                     const ViewEdges& edges) const {
+    if (IsOwn(camera, kRobotCamera)) return FindInstant(model_, bearing_, edges, *data_);
+    if (!IsOwn(camera, kObjectCamera)) return std::nullopt;
+    // From where a camera of the hand's stands, and otherwise from where one sees the robot.
+    const int hand = mj_name2id(&model_, mjOBJ_CAMERA, "grasp");
+    const Vector3d from =
+        hand >= 0 ? Vector3d(data_->cam_xpos + 3 * hand)
+                  : Vector3d(BodyPose(*data_, object_).translation() -
+                             Vector3d(std::cos(bearing_), std::sin(bearing_), kDown).normalized());
+    return FindCloseUp(model_, object_, from, *data_);
+  }
+
   Image PaintInset(std::span<const Decoration> decorations) {
+    const double top = std::tan(0.5 * DegToRad(model_.vis.global.fovy));
+    const double side = top * inset_width_ / inset_height_;
+    if (const std::optional<Viewpoint> view = FindOwnView(options_.inset, {side, side, top, top}))
+      return renderer_.Render(*data_, *view, inset_width_, inset_height_, decorations);
     return renderer_.Render(*data_, options_.inset, inset_width_, inset_height_, decorations);
   }
 
@@ -154,20 +223,13 @@ class MoviePainter::RunPainter {
     state.history = MakeHistory(at);
     state.error_low = error_range_[0];
     state.error_high = error_range_[1];
-    if (!run_.checks.empty()) {
-      for (const CheckKind kind :
-           {CheckKind::kModel, CheckKind::kBalance, CheckKind::kPrediction, CheckKind::kAssumption}) {
-        const CheckHistory::Standing standing = checks_.At(kind, row);
-        QuestionStatus& question = state.questions.emplace_back();
-        question.name = NameOf(kind);
-        question.asked = standing.check != nullptr;
-        if (!question.asked) continue;
-        question.check = standing.check->name;
-        question.worst = standing.worst;
-        question.bound = standing.check->bound;
-      }
-    }
+    state.questions = checks_.ListQuestions(row);
     state.legend = decorator_.MakeLegend();
+    state.apart = apart_;
+    if (ghost_) {
+      const bool same_title = ghost_->run.title == run_.title;
+      state.legend.push_back({same_title ? "the other run" : ghost_->run.title, kGhostLine});
+    }
     return state;
   }
 
@@ -189,7 +251,10 @@ class MoviePainter::RunPainter {
   }
 
   const mjModel& model_;
-  int object_ = -1;  // body; with a free camera
+  std::unique_ptr<GhostRun> ghost_;
+  std::optional<double> apart_;  // objects of the two runs, m
+  double bearing_ = 0.0;         // of views that the run's way asks for, rad
+  int object_ = -1;              // body; for cameras that look at it
   Vector3d object_start_ = Vector3d::Zero();
   const RunFrames& run_;
   MovieOptions options_;
@@ -208,8 +273,14 @@ class MoviePainter::RunPainter {
 MoviePainter::MoviePainter(std::span<const RunView> runs, const MovieOptions& options) {
   Require(runs.size() == 1 || runs.size() == 2, "runs", "must be one or two",
           static_cast<double>(runs.size()));
+  if (runs.size() == 2 && options.ghost) {
+    painters_.push_back(std::make_unique<RunPainter>(runs[0], &runs[1], options, options.width));
+    return;
+  }
   const int width = options.width / static_cast<int>(runs.size());
-  for (const RunView& run : runs) painters_.push_back(std::make_unique<RunPainter>(run, options, width));
+  for (const RunView& run : runs) {
+    painters_.push_back(std::make_unique<RunPainter>(run, nullptr, options, width));
+  }
 }
 
 MoviePainter::~MoviePainter() = default;

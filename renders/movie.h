@@ -25,17 +25,25 @@ struct FreeCamera {
   double orbit = 0.0;                ///< About the vertical through what it looks at, rad/s.
 };
 
+/// Cameras that move along: near to all that moves, and near to the object. An MJCF's cameras of these names
+/// come first.
+inline constexpr const char* kRobotCamera = "robot";
+inline constexpr const char* kObjectCamera = "object";
+
 struct MovieOptions {
   int width = 1280;
   int height = 720;
   int fps = 30;
-  std::string camera;              ///< Empty for "overview", or where the model has none for the course's.
+  /// One of the model's, kCourseCamera, kRobotCamera or kObjectCamera; empty for "overview", or where the
+  /// model has none for the course's.
+  std::string camera;
   std::optional<FreeCamera> free;  ///< Instead of `camera`.
   std::string inset;               ///< A second camera, shown in the lower right corner; none when empty.
   bool forces = false;             ///< Contact forces with their friction cones.
   bool tracks =
       false;  ///< Where the contacts have been on the object, and the object's path beside the desired one.
   bool frames = false;  ///< The object's axes.
+  bool ghost = false;   ///< Of two runs, the second one in the first one's scene and not beside it.
   bool panel = true;    ///< Scenario, time, errors and checks.
   int workers = 2;      ///< Processes that draw, each a frame of its own.
   int samples = 2;      ///< See RenderOptions.
@@ -48,7 +56,8 @@ struct RunView {
   const RunFrames* frames;
 };
 
-/// Draws the instants of one run, or of two side by side. For the thread that made it.
+/// Draws the instants of one run, or of two: side by side, each seen by cameras of its own, or in one scene.
+/// For the thread that made it.
 class MoviePainter {
  public:
   /// @param runs one or two.

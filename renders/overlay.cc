@@ -6,16 +6,17 @@
 #include <array>
 #include <cmath>
 
+#include "renders/panel_colors.h"
+
 namespace dexcheck {
 namespace {
 
 using Align = Canvas::Align;
+using panel::kFaint;
+using panel::kText;
 
-const Color kPanel = MakeColor(0x0e141c, 0.72F);
+const Color kPanel = panel::MakeGround(0.72F);
 const Color kRule = MakeColor(0xffffff, 0.14F);
-const Color kText = MakeColor(0xf2f5f8);
-const Color kFaint = MakeColor(0xa9b5c2);
-const Color kCurve = MakeColor(0xff9a3d);
 const Color kGood = MakeColor(0x3ddc84);
 const Color kBad = MakeColor(0xff5a52);
 const Color kUnknown = MakeColor(0x6b7785);
@@ -82,8 +83,7 @@ void Overlay::DrawPlot(const OverlayState& state, const Vector2d& corner, const 
   const int decades = static_cast<int>(std::floor(high) - std::ceil(low)) + 1;
   const int every = std::max(1, (decades + 2) / 3);
   for (int decade = static_cast<int>(std::ceil(low)); decade <= std::floor(high); decade += every) {
-    const std::array<Vector2d, 2> line = {Vector2d(left, row(decade)), Vector2d(left + width, row(decade))};
-    canvas->StrokePath(line, 1.0 * s, kRule);
+    canvas->StrokeLine({left, row(decade)}, {left + width, row(decade)}, 1.0 * s, kRule);
     std::string label = FormatSi(std::pow(10.0, decade), "m");
     label =
         fmt::format("{:.0f} {}", std::pow(10.0, ((decade % 3) + 3) % 3), label.substr(label.find(' ') + 1));
@@ -96,8 +96,8 @@ void Overlay::DrawPlot(const OverlayState& state, const Vector2d& corner, const 
     const double error = std::isfinite(sample.y()) ? std::max(sample.y(), state.error_low) : state.error_high;
     if (x >= left - 1e-9) path.emplace_back(x, row(std::log10(error)));
   }
-  canvas->StrokePath(path, 1.8 * s, kCurve);
-  if (!path.empty()) canvas->FillCircle(path.back(), 3.2 * s, kCurve);
+  canvas->StrokePath(path, 1.8 * s, panel::kMark);
+  if (!path.empty()) canvas->FillCircle(path.back(), 3.2 * s, panel::kMark);
 }
 
 double Overlay::CalcCoveredWidth(int width, int height) {
@@ -107,8 +107,8 @@ double Overlay::CalcCoveredWidth(int width, int height) {
 void Overlay::Draw(const OverlayState& state, Image* image) {
   const double s = CalcScale(image->width, image->height);
   const bool has_plot = !state.history.empty();
-  const int errors =
-      (state.position_error ? 1 : 0) + (state.orientation_error ? 1 : 0) + (state.joint_error ? 1 : 0);
+  const int errors = (state.position_error ? 1 : 0) + (state.orientation_error ? 1 : 0) +
+                     (state.joint_error ? 1 : 0) + (state.apart ? 1 : 0);
   const auto rows = static_cast<double>(state.questions.size());
   const auto keys = static_cast<double>(state.legend.size());
   double height = 2.0 * kPadding + kLine;
@@ -124,10 +124,7 @@ void Overlay::Draw(const OverlayState& state, Image* image) {
   const double right = corner.x() + (kWidth - kPadding) * s;
   double y = corner.y() + (kPadding + 15.0) * s;
 
-  const auto draw_rule = [&] {
-    const std::array<Vector2d, 2> line = {Vector2d(left, y), Vector2d(right, y)};
-    canvas.StrokePath(line, s, kRule);
-  };
+  const auto draw_rule = [&] { canvas.StrokeLine({left, y}, {right, y}, s, kRule); };
   const auto draw_row = [&](double x, const std::string& name, const std::string& value) {
     canvas.DrawText(regular_, kTextSize * s, {x, y}, name, kFaint);
     canvas.DrawText(regular_, kTextSize * s, {right, y}, value, kText, Align::kRight);
@@ -152,6 +149,10 @@ void Overlay::Draw(const OverlayState& state, Image* image) {
     if (state.joint_error) {
       y += kLine * s;
       draw_row(left, "joint error", FormatSi(*state.joint_error, "rad"));
+    }
+    if (state.apart) {
+      y += kLine * s;
+      draw_row(left, "objects apart", FormatSi(*state.apart, "m"));
     }
   }
   if (has_plot) {
@@ -179,9 +180,7 @@ void Overlay::Draw(const OverlayState& state, Image* image) {
     draw_rule();
     for (const LegendEntry& entry : state.legend) {
       y += kLine * s;
-      const std::array<Vector2d, 2> mark = {Vector2d(left, y - 5.0 * s),
-                                            Vector2d(left + 14.0 * s, y - 5.0 * s)};
-      canvas.StrokePath(mark, 4.0 * s, entry.color);
+      canvas.StrokeLine({left, y - 5.0 * s}, {left + 14.0 * s, y - 5.0 * s}, 4.0 * s, entry.color);
       canvas.DrawText(regular_, kTextSize * s, {left + 24.0 * s, y}, entry.text, kFaint);
     }
   }

@@ -1,6 +1,6 @@
 #pragma once
 
-// The panel that tells on each frame how the run stands: scenario, time, tracking error, and the four
+// The panel that tells on each frame how the run stands: scenario, time, tracking error, and the five
 // questions of the cross-check.
 
 #include <optional>
@@ -11,19 +11,9 @@
 #include "renders/canvas.h"
 #include "renders/font.h"
 #include "renders/image.h"
+#include "renders/question_status.h"
 
 namespace dexcheck {
-
-/// Where one of the four questions stands.
-struct QuestionStatus {
-  std::string name;
-  std::string check;   ///< The check that came nearest to its bound, or farthest beyond.
-  double worst = 0.0;  ///< Its largest residual so far.
-  double bound = 0.0;
-  bool asked = false;  ///< False when the run has no check of this kind.
-
-  [[nodiscard]] bool Passes() const { return worst <= bound; }
-};
 
 /// A line of the key to what is drawn in the scene.
 struct LegendEntry {
@@ -37,6 +27,7 @@ struct OverlayState {
   std::optional<double> position_error;     ///< m.
   std::optional<double> orientation_error;  ///< rad.
   std::optional<double> joint_error;        ///< Of the joint that is farthest off, rad.
+  std::optional<double> apart;              ///< How far the objects of two runs are from each other, m.
   /// (time in s, position error in m) of the span that the plot shows, oldest first.
   std::vector<Vector2d> history;
   double history_span = 3.0;  ///< s; the plot ends now and began so long ago.

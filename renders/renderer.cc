@@ -45,7 +45,8 @@ int FindCamera(const mjModel& model, const std::string& name) {
   std::string known;
   for (const std::string& camera : ListCameras(model)) known += (known.empty() ? "" : ", ") + camera;
   throw InputError("camera: no " + Quote(name) + " in the model, which has " +
-                   (known.empty() ? "no cameras" : known) + "; besides there is " + kCourseCamera);
+                   (known.empty() ? "no cameras" : known) + "; besides there is " + kCourseCamera +
+                   ", and for a run robot and object");
 }
 
 int FindBody(const mjModel& model, const std::string& name) {
@@ -53,6 +54,14 @@ int FindBody(const mjModel& model, const std::string& name) {
   const int id = mj_name2id(&model, mjOBJ_BODY, name.c_str());
   if (id < 0) throw InputError("body: no " + Quote(name) + " in the model");
   return id;
+}
+
+/// Only one model's meshes can be loaded to be drawn.
+void RequireSameMeshes(const mjModel& model, const mjModel& ghost) {
+  const bool same = model.nmesh == ghost.nmesh && model.nmeshvert == ghost.nmeshvert &&
+                    model.nmeshface == ghost.nmeshface &&
+                    std::equal(model.mesh_vert, model.mesh_vert + 3 * model.nmeshvert, ghost.mesh_vert);
+  if (!same) throw InputError("the two runs have other meshes and cannot be drawn into one scene");
 }
 
 }  // namespace
@@ -72,12 +81,14 @@ class Renderer::Impl {
       : model_(model), options_(options), camera_(FindCamera(model, options.camera)) {
     CheckOptions(options);
     translucent_body_ = FindBody(model, options.translucent_body);
+    if (options.ghost) RequireSameMeshes(model, *options.ghost->model);
     const std::lock_guard lock(context_mutex);
     gl_.emplace();
     mjv_defaultOption(&visible_);
     mjv_defaultPerturb(&perturb_);
     mjv_defaultScene(&scene_);
-    mjv_makeScene(&model, &scene_, model.ngeom + kMostDecorations);
+    const int ghost_geoms = options.ghost ? options.ghost->model->ngeom : 0;
+    mjv_makeScene(&model, &scene_, model.ngeom + ghost_geoms + kMostDecorations);
     mjr_defaultContext(&context_);
     // The context takes its sizes from the model's visual section.
     const MjModelPtr sized(mj_copyModel(nullptr, &model));
@@ -106,17 +117,18 @@ class Renderer::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  Image Render(mjData& data, int camera, int width, int height, double shift_right,
+  Image Render(mjData& data, mjvCamera view, int width, int height, double shift_right,
                std::span<const Decoration> decorations) {
+    RequireRoom(width, height);
     gl_->MakeCurrent();
-    mjvCamera view = MakeCamera(camera);
     mjv_updateScene(&model_, &data, &visible_, &perturb_, &view, mjCAT_ALL, &scene_);
-    if (camera == kCourse) shift_right = 0.0;
+    if (view.type == mjCAMERA_FREE) shift_right = 0.0;
     for (mjvGLCamera& eye : scene_.camera) {
       const double visible = static_cast<double>(eye.frustum_top - eye.frustum_bottom) * width / height;
       eye.frustum_center -= static_cast<float>(shift_right * visible);
     }
     FadeBody();
+    if (options_.ghost) AddGhost(*options_.ghost);
     meshes_->ClearTubes();
     AddDecorations(decorations, &*meshes_, &scene_);
     const mjrRect viewport = {0, 0, options_.samples * width, options_.samples * height};
@@ -125,34 +137,50 @@ class Renderer::Impl {
     return ReduceBottomUp(pixels_.data(), width, height, options_.samples);
   }
 
+  Image Render(mjData& data, const Viewpoint& from, int width, int height,
+               std::span<const Decoration> decorations) {
+    return Render(data, MakeFreeCamera(from), width, height, 0.0, decorations);
+  }
+
   Image Render(mjData& data, const Viewpoint& from, std::span<const Decoration> decorations) {
-    options_.course = from;
-    return Render(data, kCourse, options_.width, options_.height, 0.0, decorations);
+    return Render(data, from, options_.width, options_.height, decorations);
   }
 
   Image Render(mjData& data, std::span<const Decoration> decorations) {
-    return Render(data, camera_, options_.width, options_.height, options_.shift_right, decorations);
+    return Render(data, MakeCamera(camera_), options_.width, options_.height, options_.shift_right,
+                  decorations);
   }
 
   Image Render(mjData& data, const std::string& camera, int width, int height,
                std::span<const Decoration> decorations) {
+    return Render(data, MakeCamera(FindCamera(model_, camera)), width, height, 0.0, decorations);
+  }
+
+ private:
+  void RequireRoom(int width, int height) const {
     Require(kSmallest <= width && width <= options_.width, "width", "must fit into the renderer's picture",
             width);
     Require(kSmallest <= height && height <= options_.height, "height",
             "must fit into the renderer's picture", height);
-    return Render(data, FindCamera(model_, camera), width, height, 0.0, decorations);
   }
 
- private:
-  [[nodiscard]] mjvCamera MakeCamera(int camera) const {
+  static mjvCamera MakeFreeCamera(const Viewpoint& from) {
     mjvCamera view;
     mjv_defaultCamera(&view);
-    view.type = camera == kCourse ? mjCAMERA_FREE : mjCAMERA_FIXED;
+    view.type = mjCAMERA_FREE;
+    std::copy_n(from.look_at.data(), 3, view.lookat);
+    view.distance = from.distance;
+    view.azimuth = RadToDeg(from.azimuth);
+    view.elevation = RadToDeg(from.elevation);
+    return view;
+  }
+
+  [[nodiscard]] mjvCamera MakeCamera(int camera) const {
+    if (camera == kCourse) return MakeFreeCamera(options_.course);
+    mjvCamera view;
+    mjv_defaultCamera(&view);
+    view.type = mjCAMERA_FIXED;
     view.fixedcamid = camera;
-    std::copy_n(options_.course.look_at.data(), 3, view.lookat);
-    view.distance = options_.course.distance;
-    view.azimuth = RadToDeg(options_.course.azimuth);
-    view.elevation = RadToDeg(options_.course.elevation);
     return view;
   }
 
@@ -162,6 +190,17 @@ class Renderer::Impl {
       mjvGeom& geom = scene_.geoms[i];
       if (geom.objtype != mjOBJ_GEOM || model_.geom_bodyid[geom.objid] != translucent_body_) continue;
       geom.rgba[3] = std::min(geom.rgba[3], static_cast<float>(options_.translucent_opacity));
+    }
+  }
+
+  void AddGhost(const Ghost& ghost) {
+    const int first = scene_.ngeom;
+    mjv_addGeoms(ghost.model, ghost.data, &visible_, &perturb_, mjCAT_DYNAMIC, &scene_);
+    for (int i = first; i < scene_.ngeom; ++i) {
+      mjvGeom& geom = scene_.geoms[i];
+      std::copy(ghost.color.begin(), ghost.color.end(), geom.rgba);
+      geom.texid = -1;
+      geom.reflectance = 0.0F;
     }
   }
 
@@ -189,6 +228,11 @@ Image Renderer::Render(mjData& data, std::span<const Decoration> decorations) {
 
 Image Renderer::Render(mjData& data, const Viewpoint& from, std::span<const Decoration> decorations) {
   return impl_->Render(data, from, decorations);
+}
+
+Image Renderer::Render(mjData& data, const Viewpoint& from, int width, int height,
+                       std::span<const Decoration> decorations) {
+  return impl_->Render(data, from, width, height, decorations);
 }
 
 Image Renderer::Render(mjData& data, const std::string& camera, int width, int height,

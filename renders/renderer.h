@@ -3,6 +3,7 @@
 #include <mujoco/mujoco.h>
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,6 +16,13 @@ namespace dexcheck {
 
 /// A camera that stands still where RenderOptions::course says; an MJCF's camera of this name comes first.
 inline constexpr const char* kCourseCamera = "course";
+
+/// A second robot in the scene: all that moves of it, in one translucent colour.
+struct Ghost {
+  const mjModel* model;  ///< With the meshes of the renderer's model.
+  mjData* data;          ///< Its state; kinematics must be computed before each picture.
+  Color color;
+};
 
 struct RenderOptions {
   int width = 1280;
@@ -36,6 +44,7 @@ struct RenderOptions {
   double shift_right = 0.0;
   std::string translucent_body;  ///< Its geoms are drawn with this opacity; none when empty.
   double translucent_opacity = 0.35;
+  std::optional<Ghost> ghost;  ///< What it points at must outlive the renderer.
 };
 
 /// Names of the cameras of a model, in its order.
@@ -49,7 +58,8 @@ void CheckCamera(const mjModel& model, const std::string& name);
 class Renderer {
  public:
   /// @param model must outlive the renderer.
-  /// @throws InputError when the model has no such camera (the message lists those that exist) or body.
+  /// @throws InputError when the model has no such camera (the message lists those that exist) or body, or a
+  /// ghost other meshes.
   /// @throws std::invalid_argument for sizes that cannot be drawn.
   Renderer(const mjModel& model, const RenderOptions& options);
   ~Renderer();
@@ -61,6 +71,8 @@ class Renderer {
 
   /// The same from a camera that stands there.
   Image Render(mjData& data, const Viewpoint& from, std::span<const Decoration> decorations = {});
+  Image Render(mjData& data, const Viewpoint& from, int width, int height,
+               std::span<const Decoration> decorations);
 
   /// The same from another camera, at most as large as the options' picture.
   Image Render(mjData& data, const std::string& camera, int width, int height,

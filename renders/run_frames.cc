@@ -90,4 +90,20 @@ CheckHistory::Standing CheckHistory::At(CheckKind kind, long row) const {
   return standing;
 }
 
+std::vector<QuestionStatus> CheckHistory::ListQuestions(long row) const {
+  std::vector<QuestionStatus> questions;
+  if (run_.checks.empty()) return questions;
+  for (const CheckKind kind : kCheckKinds) {
+    const Standing standing = At(kind, row);
+    QuestionStatus& question = questions.emplace_back();
+    question.name = NameOf(kind);
+    question.asked = standing.check != nullptr;
+    if (!question.asked) continue;
+    question.check = standing.check->name;
+    question.worst = standing.worst;
+    question.bound = standing.check->bound;
+  }
+  return questions;
+}
+
 }  // namespace dexcheck

@@ -7,6 +7,7 @@
 
 #include "controller/common/types.h"
 #include "harness/base/check_record.h"
+#include "renders/question_status.h"
 
 namespace dexcheck {
 
@@ -63,6 +64,9 @@ class CheckHistory {
   };
   /// The check of a kind with the largest residual per bound up to and including `row`.
   [[nodiscard]] Standing At(CheckKind kind, long row) const;
+
+  /// Where each question stands at `row`, in the order of kCheckKinds; none of a run without checks.
+  [[nodiscard]] std::vector<QuestionStatus> ListQuestions(long row) const;
 
  private:
   const RunFrames& run_;

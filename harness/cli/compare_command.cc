@@ -11,9 +11,11 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
 #include "harness/report/comparison_page.h"
 #include "harness/report/html.h"
+#include "renders/video_writer.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -29,6 +31,7 @@ struct Request {
   bool quiet = false;
   std::string page;
   std::string json;
+  std::string video;
 };
 
 std::string Show(const std::optional<double>& value) { return value ? FormatShort(*value) : "-"; }
@@ -127,6 +130,10 @@ int Run(const Request& request) {
     throw InputError("--tolerance: must not be negative, got " + FormatNumber(*request.tolerance));
   if (request.run_folders.size() < 2) throw InputError("compare: at least two runs are needed");
   if (request.run_folders.size() > 26) throw InputError("compare: at most 26 runs are compared");
+  if (!request.video.empty()) {
+    if (request.run_folders.size() != 2) throw InputError("--video: needs two runs");
+    FindVideoFormat(request.video);
+  }
   std::vector<std::unique_ptr<RunData>> runs;
   std::vector<const RunData*> pointers;
   for (const std::string& folder : request.run_folders) {
@@ -142,6 +149,10 @@ int Run(const Request& request) {
   if (!request.json.empty()) json.emplace(request.json);
   const RunComparison comparison = CompareRuns(pointers, request.options);
   const bool prints = !json || !json->is_stdout();
+  const bool is_filmed =
+      request.video.empty() || WriteComparisonMovie(request.run_folders[0], request.run_folders[1],
+                                                    request.video, request.quiet || !prints);
+  if (!is_filmed) return kFailure;
   if (prints && !request.quiet) Print(request, comparison);
   if (prints)
     fmt::print("{}{}\n", request.quiet ? "" : "\n",
@@ -177,6 +188,10 @@ void AddCompareCommand(Command app) {
       .Repeatable();
   command.AddOption("--out", &request->page, "Write a page with the signals overlaid and subtracted")
       .TypeName("FILE.html");
+  command
+      .AddOption("--video", &request->video,
+                 "Film two runs in one scene, the second as a ghost (.mp4, .webm or .gif)")
+      .TypeName("FILE");
   command.AddOption("--json", &request->json, "Write the numbers (- for standard output)")
       .TypeName("FILE.json");
   command.AddFlag("--all", &request->all, "Print all checks and signals");

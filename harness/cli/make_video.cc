@@ -70,4 +70,15 @@ bool WriteRunMovie(const std::filesystem::path& run_folder, const std::string& o
   return WriteMovie({{run.model.get(), &run.frames}}, options, out, quiet);
 }
 
+bool WriteComparisonMovie(const std::filesystem::path& run_folder, const std::filesystem::path& other_folder,
+                          const std::string& out, bool quiet) {
+  const RecordedFrames run = ReadRecordedFrames(run_folder);
+  const RecordedFrames other = ReadRecordedFrames(other_folder);
+  MovieOptions options;
+  options.ghost = true;
+  options.workers = CountDrawers();
+  return WriteMovie({{run.model.get(), &run.frames}, {other.model.get(), &other.frames}}, options, out,
+                    quiet);
+}
+
 }  // namespace dexcheck::cli

@@ -23,4 +23,8 @@ bool WriteMovie(const std::vector<RunView>& views, const MovieOptions& options, 
 /// The film of one run as `dexcheck run --video` makes it: with contact forces.
 bool WriteRunMovie(const std::filesystem::path& run_folder, const std::string& out, bool quiet);
 
+/// The film of a comparison: both runs in one scene, the second one as a ghost.
+bool WriteComparisonMovie(const std::filesystem::path& run_folder, const std::filesystem::path& other_folder,
+                          const std::string& out, bool quiet);
+
 }  // namespace dexcheck::cli

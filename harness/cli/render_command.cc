@@ -26,6 +26,7 @@ namespace {
 struct Request {
   std::filesystem::path run_folder;
   std::string beside;
+  std::string ghost;
   std::string size = "1280x720";
   std::optional<double> still;
   std::string out;
@@ -105,7 +106,10 @@ ExitCode Run(Request request) {
   request.movie.free = MakeFreeCamera(request);
   std::vector<RecordedFrames> runs;
   runs.push_back(ReadRecordedFrames(request.run_folder));
-  if (!request.beside.empty()) runs.push_back(ReadRecordedFrames(request.beside));
+  request.movie.ghost = !request.ghost.empty();
+  for (const std::string& other : {request.beside, request.ghost}) {
+    if (!other.empty()) runs.push_back(ReadRecordedFrames(other));
+  }
   std::vector<RunView> views;
   views.reserve(runs.size());
   for (const RecordedFrames& run : runs) views.push_back({run.model.get(), &run.frames});
@@ -129,13 +133,12 @@ void AddRenderCommand(Command app) {
                  "RUN_DIR)")
       .TypeName("FILE");
   command.AddOption("--still", &request->still, "One picture at this time of the run, s").TypeName("T");
-  Option camera =
-      command
-          .AddOption(
-              "--camera", &request->movie.camera,
-              "overview (the default), follow, grasp, top, or another of the MJCF's; course stands still "
-              "and sees the whole way")
-          .TypeName("NAME");
+  Option camera = command
+                      .AddOption("--camera", &request->movie.camera,
+                                 "overview (the default), follow, grasp, top, or another of the MJCF's; "
+                                 "robot and object are near "
+                                 "to those; course stands still and sees the whole way")
+                      .TypeName("NAME");
   Option from =
       command.AddOption("--from", &request->from, "Where a camera of your own stands at the beginning, m")
           .TypeName("X,Y,Z")
@@ -153,7 +156,11 @@ void AddRenderCommand(Command app) {
       .Needs(from);
   command.AddOption("--inset", &request->movie.inset, "A second camera in the lower right corner")
       .TypeName("NAME");
-  command.AddOption("--beside", &request->beside, "Another run, shown at the right").TypeName("RUN_DIR");
+  Option beside =
+      command.AddOption("--beside", &request->beside, "Another run, shown at the right").TypeName("RUN_DIR");
+  command.AddOption("--ghost", &request->ghost, "Another run, as a ghost in the same scene")
+      .TypeName("RUN_DIR")
+      .Excludes(beside);
   command.AddOption("--size", &request->size, "Of the picture in pixels").TypeName("WxH").ShowDefault();
   command.AddOption("--fps", &request->movie.fps, "Frames a second")
       .TypeName("N")

@@ -14,8 +14,16 @@ namespace {
 struct Request {
   std::filesystem::path run_folder;
   std::string out;
+  bool no_replay = false;
   bool quiet = false;
 };
+
+/// Pictures alone.
+RunScene MakeStillScene(const std::filesystem::path& run_dir, const std::filesystem::path& folder) {
+  RunScene scene = MakeRunScene(run_dir, folder);
+  scene.replay.reset();
+  return scene;
+}
 
 }  // namespace
 
@@ -27,12 +35,13 @@ void AddReportCommand(Command app) {
       .AddOption("--out", &request->out,
                  "Write only the page, here (default: report.html and figures/ in RUN_DIR)")
       .TypeName("FILE.html");
+  command.AddFlag("--no-replay", &request->no_replay, "Leave out the replay in three dimensions");
   command.AddFlag("--quiet", &request->quiet, "Print nothing");
   command.SetAction([=] {
     RequirePageName(request->out);
     ReportFiles files = MakeReportFiles(request->run_folder);
     if (!request->out.empty()) files = {request->out, {}};
-    WriteRunReport(request->run_folder, files);
+    WriteRunReport(request->run_folder, files, request->no_replay ? MakeStillScene : MakeRunScene);
     if (!request->quiet) fmt::print("{}\n", files.page.string());
     return kSuccess;
   });

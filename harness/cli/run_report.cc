@@ -9,6 +9,7 @@
 
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
+#include "renders/question_status.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -69,8 +70,7 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
     for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check, width);
     for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check, width);
   } else {
-    for (const CheckKind kind : {CheckKind::kModel, CheckKind::kLaw, CheckKind::kBalance,
-                                 CheckKind::kPrediction, CheckKind::kAssumption}) {
+    for (const CheckKind kind : kCheckKinds) {
       PrintQuestion(kind, loop);
     }
     fmt::print("  (--all lists each check)\n");

@@ -62,18 +62,8 @@ std::array<double, 2> FindRange(const Figure& figure, bool right_axis) {
 }
 
 std::string SetRange(const Figure& figure, bool right_axis) {
-  const char* const axis = right_axis ? "y2" : "y";
-  std::array<double, 2> range = FindRange(figure, right_axis);
-  if (range[0] > range[1]) range = {1.0, 1.0};
-  if (figure.log) {
-    return fmt::format("set {}range [{:.3g}:{:.3g}]\n", axis,
-                       std::pow(10.0, std::floor(std::log10(range[0]))),
-                       std::pow(10.0, std::ceil(std::log10(range[1]) + 0.15)));
-  }
-  const double middle = 0.5 * (range[0] + range[1]);
-  const double half =
-      0.5 * std::max({range[1] - range[0], figure.least_span, 1e-9 * std::abs(middle), 1e-12});
-  return fmt::format("set {}range [{:.9g}:{:.9g}]\n", axis, middle - 1.08 * half, middle + 1.08 * half);
+  const std::array<double, 2> range = CalcAxisRange(figure, right_axis);
+  return fmt::format("set {}range [{:.9g}:{:.9g}]\n", right_axis ? "y2" : "y", range[0], range[1]);
 }
 
 /// The data block $NAME: time, then each curve.
@@ -95,9 +85,13 @@ std::string PlotCurves(const Figure& figure) {
   std::string plot = "plot ";
   for (size_t i = 0; i < figure.curves.size(); ++i) {
     const Curve& curve = figure.curves[i];
+    std::string color = FindColor(curve.color);
+    if (curve.wide) color.insert(1, "a0");  // gnuplot's transparency stands first
     plot += fmt::format("{}${} using 1:{} axes x1{} with lines lc rgb '{}' lw {} dt ", i > 0 ? ", " : "",
-                        figure.name, i + 2, curve.right_axis ? "y2" : "y1", FindColor(curve.color),
-                        curve.color == kGrey ? "0.8" : "1.5");
+                        figure.name, i + 2, curve.right_axis ? "y2" : "y1", color,
+                        curve.wide             ? "6"
+                        : curve.color == kGrey ? "0.8"
+                                               : "1.5");
     const std::vector<int> dashes = FindDashes(curve.dash);
     plot += dashes.empty() ? "1" : fmt::format("({})", fmt::join(dashes, ","));
     plot += !curve.in_key ? " notitle" : " title " + QuoteText(curve.label);
@@ -173,6 +167,28 @@ std::string FindColor(int color) {
 std::vector<int> FindDashes(int dash) {
   static const std::array<std::vector<int>, 4> kDashes = {{{}, {7, 4}, {2, 3}, {9, 3, 2, 3}}};
   return kDashes[static_cast<size_t>(dash) % kDashes.size()];
+}
+
+std::array<double, 2> CalcAxisRange(const Figure& figure, bool right_axis) {
+  constexpr double kShareOfTwo = 0.52;  // of the height, for each of two axes' curves
+  std::array<double, 2> range = FindRange(figure, right_axis);
+  if (range[0] > range[1]) range = {1.0, 1.0};
+  if (figure.log) {
+    return {std::pow(10.0, std::floor(std::log10(range[0]))),
+            std::pow(10.0, std::ceil(std::log10(range[1]) + 0.15))};
+  }
+  const double middle = 0.5 * (range[0] + range[1]);
+  const double half =
+      0.54 * std::max({range[1] - range[0], figure.least_span, 1e-9 * std::abs(middle), 1e-12});
+  range = {middle - half, middle + half};
+  if (figure.right_label.empty()) return range;
+  const double room = 2.0 * half * (1.0 / kShareOfTwo - 1.0);
+  if (right_axis) {
+    range[1] += room;
+  } else {
+    range[0] -= room;
+  }
+  return range;
 }
 
 void DrawFigures(const std::vector<Figure>& figures, const VectorXd& time,

@@ -2,6 +2,7 @@
 
 // Line plots over the time of a run.
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -19,6 +20,7 @@ struct Curve {
   int dash = 0;             ///< 0 solid; 1, 2, 3 dashes of their own.
   bool right_axis = false;  ///< Belongs to the axis on the right.
   bool in_key = true;       ///< Named in the picture's key.
+  bool wide = false;        ///< A pale band, for what should be: a line that lies on it is still seen.
 };
 
 inline constexpr int kGrey = -1;
@@ -43,6 +45,10 @@ struct Figure {
   std::string note;      ///< What the reader has to know; may be empty.
   bool printed = false;  ///< Drawn as a picture, too.
 };
+
+/// What an axis shows, from below to above. With two axes the curves of the left one are in the upper half
+/// and those of the right one in the lower half, so that none hides another by chance.
+std::array<double, 2> CalcAxisRange(const Figure& figure, bool right_axis);
 
 /// Draws figures as FOLDER/NAME.svg and FOLDER/NAME.png, with gnuplot.
 /// @param time of the curves' values, s.

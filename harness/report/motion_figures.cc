@@ -42,7 +42,7 @@ class MotionFigures {
     const RowMatrixXd X_d = run_.log().ReadSignal("object/X_d");
     Figure a{"fig12a", "12 (a)", "Motion of the object along x", "x (m)", "", false, kLeastSpan, {}, {},
              "",       true};
-    a.curves = {{"x actual", X_o.col(0), 0, 0, false}, {"x desired", X_d.col(0), 1, 1, false}};
+    a.curves = {{"x actual", X_o.col(0), 0, 0, false}, {"x desired", X_d.col(0), 0, 0, false, true, true}};
     Add(a);
     Figure b{"fig12b",
              "12 (b)",
@@ -60,7 +60,7 @@ class MotionFigures {
       b.curves.push_back({std::string(names[k]) + (k < 3 ? " (m)" : " (rad)"), X_o.col(k), k - 1, 0, k >= 3});
     }
     for (int k = 1; k < 6; ++k) {
-      b.curves.push_back({std::string(names[k]) + " desired", X_d.col(k), k - 1, 2, k >= 3});
+      b.curves.push_back({std::string(names[k]) + " desired", X_d.col(k), k - 1, 0, k >= 3, true, true});
     }
     Add(b);
   }
@@ -84,7 +84,8 @@ class MotionFigures {
       errors.curves.push_back({RunData::NameColumn(*desired, k), e.col(k).cwiseAbs(), k, 0, false});
     }
     for (int k = 0; k < desired->width; ++k) {
-      motion.curves.push_back({RunData::NameColumn(*desired, k) + " desired", q_d.col(k), k, 1, false});
+      motion.curves.push_back(
+          {RunData::NameColumn(*desired, k) + " desired", q_d.col(k), k, 0, false, true, true});
     }
     Add(motion);
     Add(errors);
@@ -200,9 +201,9 @@ class MotionFigures {
           {std::string("normal") + what, normal, 0, 0, false},
           {std::string("tangential") + what, forces.middleCols<2>(3 * i).rowwise().norm(), 1, 0, false}};
       if (has_optimal) {
-        figure.curves.push_back({"normal, optimal (49)", optimal.col(3 * i + 2), 0, 1, false});
-        figure.curves.push_back(
-            {"tangential, optimal (49)", optimal.middleCols<2>(3 * i).rowwise().norm(), 1, 1, false});
+        figure.curves.push_back({"normal, optimal (49)", optimal.col(3 * i + 2), 0, 0, false, true, true});
+        figure.curves.push_back({"tangential, optimal (49)", optimal.middleCols<2>(3 * i).rowwise().norm(), 1,
+                                 0, false, true, true});
       }
       if (mu != f_c->attributes.end()) {
         figure.curves.push_back({"friction cone: μ × normal", mu->second * normal, 2, 2, false});

@@ -45,6 +45,7 @@ PlotData MakePlotData(const std::vector<Figure>& figures, const VectorXd& time) 
                                 {"background", curve.color == kGrey},
                                 {"dashes", FindDashes(curve.dash)},
                                 {"right", curve.right_axis},
+                                {"wide", curve.wide},
                                 {"series", series}});
       ++series;
       for (const double value : thinning.Apply(curve.values)) {

@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "harness/report/run_figures.h"
+#include "renders/question_status.h"
 
 namespace dexcheck {
 namespace {
@@ -58,8 +59,7 @@ Figure MakeFigure(const RunData& run, CheckKind kind) {
 
 std::vector<Figure> MakeResidualFigures(const RunData& run) {
   std::vector<Figure> figures;
-  for (const CheckKind kind : {CheckKind::kModel, CheckKind::kLaw, CheckKind::kBalance,
-                               CheckKind::kPrediction, CheckKind::kAssumption}) {
+  for (const CheckKind kind : kCheckKinds) {
     Figure figure = MakeFigure(run, kind);
     if (!figure.curves.empty()) figures.push_back(std::move(figure));
   }

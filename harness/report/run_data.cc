@@ -6,6 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "renders/question_status.h"
 
 namespace dexcheck {
 namespace {
@@ -14,8 +15,7 @@ constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 constexpr const char* kCheckPrefix = "check/";
 
 CheckKind ReadKind(const std::string& name) {
-  for (const CheckKind kind :
-       {CheckKind::kModel, CheckKind::kLaw, CheckKind::kBalance, CheckKind::kPrediction}) {
+  for (const CheckKind kind : kCheckKinds) {
     if (name == NameOf(kind)) return kind;
   }
   return CheckKind::kAssumption;

@@ -5,6 +5,7 @@
 
 #include "harness/log/log_reader.h"
 #include "harness/report/recorded_frames.h"
+#include "renders/course.h"
 #include "renders/movie.h"
 #include "renders/png_file.h"
 #include "renders/renderer.h"
@@ -23,7 +24,10 @@ std::vector<Picture> DrawConfigurations(const RecordedFrames& run, const std::fi
   MovieOptions options;
   options.width = 960;
   options.height = 600;
-  options.camera = kCourseCamera;  // so that one sees how far it came
+  options.camera = kRobotCamera;
+  constexpr double kLongWay = 1.0;  // m, on which one wants to see how far it came
+  const MjDataPtr data = MakeData(*run.model);
+  if (FindWay(*run.model, run.frames, data.get()).length > kLongWay) options.inset = kCourseCamera;
   options.tracks = true;
   options.panel = false;
   MoviePainter painter(views, options);

@@ -3,21 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+
+#include "renders/panel_colors.h"
 
 namespace dexcheck {
 namespace {
 
 using Align = Canvas::Align;
+using panel::kFaint;
+using panel::kText;
 
-const Color kGround = MakeColor(0x0e141c, 0.78F);
+const Color kGround = panel::MakeGround(0.78F);
 const Color kButton = MakeColor(0x2a3542, 0.95F);
 const Color kOn = MakeColor(0x1f6fc4, 0.95F);
-const Color kText = MakeColor(0xf2f5f8);
-const Color kFaint = MakeColor(0xa9b5c2);
 const Color kTrack = MakeColor(0x55616e);
-const Color kMark = MakeColor(0xff9a3d);
 
 // Pixels.
 constexpr double kBar = 74.0;
@@ -73,13 +73,11 @@ double ToShare(double factor) { return 0.5 + 0.5 * std::log(factor) / std::log(k
 void DrawTrack(const Rectangle& place, double filled, double mark, Canvas* canvas) {
   const double y = place.corner.y() + 0.5 * place.size.y();
   const auto line = [&](double to, const Color& color) {
-    const std::array<Vector2d, 2> path = {Vector2d(place.corner.x(), y),
-                                          Vector2d(place.corner.x() + to * place.size.x(), y)};
-    canvas->StrokePath(path, 5.0, color);
+    canvas->StrokeLine({place.corner.x(), y}, {place.corner.x() + to * place.size.x(), y}, 5.0, color);
   };
   line(1.0, kTrack);
   if (filled > 0.0) line(filled, kOn);
-  canvas->FillCircle({place.corner.x() + mark * place.size.x(), y}, 8.0, kMark);
+  canvas->FillCircle({place.corner.x() + mark * place.size.x(), y}, 8.0, panel::kMark);
 }
 
 }  // namespace

@@ -4,18 +4,12 @@
 
 #include <mujoco/mujoco.h>
 
-#include <array>
-#include <string>
 #include <vector>
 
-#include "renders/overlay.h"
+#include "renders/question_status.h"
 #include "renders/run_frames.h"
 
 namespace dexcheck {
-
-/// The questions in the order in which they are shown.
-inline constexpr std::array<CheckKind, 5> kCheckKinds = {
-    CheckKind::kModel, CheckKind::kLaw, CheckKind::kBalance, CheckKind::kPrediction, CheckKind::kAssumption};
 
 /// One instant.
 struct ViewFrame {

@@ -29,17 +29,7 @@ ViewFrame Recording::Read(long row) const {
   take(all.contact_forces, &one.contact_forces);
   take(all.contact_normals, &one.contact_normals);
   take(all.desired_positions, &one.desired_positions);
-  if (all.checks.empty()) return view;
-  for (const CheckKind kind : kCheckKinds) {
-    const CheckHistory::Standing standing = checks_.At(kind, row);
-    QuestionStatus& question = view.questions.emplace_back();
-    question.name = NameOf(kind);
-    question.asked = standing.check != nullptr;
-    if (!question.asked) continue;
-    question.check = standing.check->name;
-    question.worst = standing.worst;
-    question.bound = standing.check->bound;
-  }
+  view.questions = checks_.ListQuestions(row);
   return view;
 }
 

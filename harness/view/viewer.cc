@@ -4,20 +4,18 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "harness/base/interrupts.h"
 #include "harness/view/controls.h"
+#include "harness/view/gain_sliders.h"
+#include "harness/view/object_camera.h"
 #include "harness/view/pull.h"
-#include "harness/view/scene_painter.h"
+#include "harness/view/studio.h"
 #include "harness/view/window.h"
-#include "renders/run_decorations.h"
 
 namespace dexcheck {
 namespace {
@@ -25,75 +23,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::array<double, 7> kSpeeds = {0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0};
-constexpr double kTurn = 0.006;         // rad a pixel
-constexpr double kZoom = 0.88;          // a notch
-constexpr double kFrameTime = 0.02;     // s: at most so many pictures are drawn
-constexpr double kNearest = 0.1;        // m
-constexpr double kFarthest = 30.0;      // m
 constexpr double kForceLength = 0.042;  // m, of the largest contact force so far
 constexpr double kPullRadius = 0.006;   // m
-
-/// A picture drawn elsewhere: the newest one is what counts.
-class Studio {
- public:
-  Studio(const FrameSource& source, int width, int height)
-      : source_(source), thread_([this, width, height] { Work(width, height); }) {}
-  ~Studio() {
-    quit_ = true;
-    thread_.join();
-  }
-  Studio(const Studio&) = delete;
-  Studio& operator=(const Studio&) = delete;
-
-  struct Order {
-    long row = 0;
-    SceneLook look;
-    ControlsState controls;
-  };
-  void Ask(const Order& order) {
-    const std::lock_guard lock(mutex_);
-    order_ = order;
-  }
-  /// None when there is none since the last call. @throws what drawing threw.
-  std::optional<Image> Take() {
-    const std::lock_guard lock(mutex_);
-    if (problem_) std::rethrow_exception(problem_);
-    return std::exchange(image_, std::nullopt);
-  }
-
- private:
-  void Work(int width, int height) {
-    try {
-      ScenePainter painter(source_.model(), width, height);
-      Controls controls;
-      while (!quit_) {
-        const auto begin = Clock::now();
-        if (std::optional<Order> order = TakeOrder()) {
-          Image image = painter.Paint(source_.Read(order->row), order->look);
-          controls.Draw(order->controls, &image);
-          const std::lock_guard lock(mutex_);
-          image_ = std::move(image);
-        }
-        std::this_thread::sleep_until(begin + std::chrono::duration<double>(kFrameTime));
-      }
-    } catch (...) {
-      const std::lock_guard lock(mutex_);
-      problem_ = std::current_exception();
-    }
-  }
-  std::optional<Order> TakeOrder() {
-    const std::lock_guard lock(mutex_);
-    return std::exchange(order_, std::nullopt);
-  }
-
-  const FrameSource& source_;
-  std::mutex mutex_;
-  std::optional<Order> order_;
-  std::optional<Image> image_;
-  std::exception_ptr problem_;
-  std::atomic<bool> quit_ = false;
-  std::thread thread_;
-};
 
 /// One window on one source.
 class Viewer {
@@ -105,12 +36,10 @@ class Viewer {
         window_(*window),
         options_(options),
         state_(std::move(controls)),
+        camera_(source, options.width, options.height),
         studio_(source, options.width, options.height) {
     state_.live = live != nullptr;
     state_.end = source.end();
-    view_.azimuth = DegToRad(143.0);
-    view_.elevation = DegToRad(-14.0);
-    view_.distance = 2.3;
   }
 
   /// Until the window is closed, or sliders were moved. @returns whether it was the sliders.
@@ -138,7 +67,7 @@ class Viewer {
   void Move() {
     const long rows = source_.rows();
     if (rows == 0) return;
-    if (row_ < 0) AimAt(0);
+    if (row_ < 0) camera_.AimAt(row_ = 0);
     state_.begin = source_.TimeAt(0);
     state_.now = source_.TimeAt(rows - 1);
     const auto wall = Clock::now();
@@ -149,10 +78,10 @@ class Viewer {
     } else if (state_.playing) {
       PlayOn(passed, rows);
     }
-    Follow();
+    camera_.Follow(row_, state_.follow);
     const ViewFrame frame = source_.Read(row_);
     if (mouse_pull_) UpdatePull(frame);
-    Studio::Order order{row_, {view_, state_.forces, MeasureForces(frame), pull_arrow_}, state_};
+    Studio::Order order{row_, {camera_.view(), state_.forces, MeasureForces(frame), pull_arrow_}, state_};
     studio_.Ask(order);
   }
 
@@ -217,31 +146,6 @@ class Viewer {
     if (live_ != nullptr) live_->SetSpeed(state_.speed);
   }
 
-  // Camera.
-
-  /// Where the object is, or else the model's middle.
-  [[nodiscard]] Vector3d FindObject(long row) {
-    const ViewFrame frame = source_.Read(row);
-    const mjModel& model = source_.model();
-    const int body = mj_name2id(&model, mjOBJ_BODY, frame.frame.object_body.c_str());
-    if (body < 0) return Vector3d(model.stat.center);
-    if (!data_) data_ = MakeData(model);
-    SetRow(model, frame.frame, 0, data_.get());
-    return BodyPose(*data_, body).translation();
-  }
-
-  void AimAt(long row) {
-    row_ = row;
-    followed_ = FindObject(row);
-    view_.look_at = followed_ + Vector3d(-0.15, 0.05, 0.02);
-  }
-
-  void Follow() {
-    const Vector3d now = FindObject(row_);
-    if (state_.follow) view_.look_at += now - followed_;
-    followed_ = now;
-  }
-
   [[nodiscard]] double MeasureForces(const ViewFrame& frame) {
     const RowMatrixXd& forces = frame.frame.contact_forces;
     for (long k = 0; k < forces.cols() / 3; ++k) {
@@ -253,14 +157,8 @@ class Viewer {
 
   // Mouse and keys.
 
-  [[nodiscard]] Ray FindRay(double x, double y) const {
-    const double half = 0.5 * options_.height;
-    return CalcRay(view_, DegToRad(source_.model().vis.global.fovy), (x - 0.5 * options_.width) / half,
-                   (half - y) / half);
-  }
-
   void UpdatePull(const ViewFrame& frame) {
-    const Pull pull = mouse_pull_->Find(frame, FindRay(mouse_.x, mouse_.y));
+    const Pull pull = mouse_pull_->Find(frame, camera_.FindRay(mouse_.x, mouse_.y));
     live_->SetPull(pull);
     const Vector3d point = mouse_pull_->FindPoint(frame);
     pull_arrow_ = Arrow{point,
@@ -291,7 +189,7 @@ class Viewer {
         Drag(event);
         break;
       case Kind::kScroll:
-        view_.distance = std::clamp(view_.distance * std::pow(kZoom, event.scroll), kNearest, kFarthest);
+        camera_.Zoom(event.scroll);
         break;
       case Kind::kKey:
         PressKey(event.key, save);
@@ -310,7 +208,7 @@ class Viewer {
     } else if (event.control && live_ != nullptr && source_.rows() > 0 && !live_->is_finished()) {
       looks_back_ = false;
       mouse_pull_ = MousePull::Grab(live_->setup(), live_->model(), source_.Read(source_.rows() - 1),
-                                    FindRay(event.x, event.y));
+                                    camera_.FindRay(event.x, event.y));
       state_.message = mouse_pull_ ? "" : "nothing to pull at here";
     } else {
       turning_ = true;
@@ -331,11 +229,9 @@ class Viewer {
       held_ = Controls::Find(state_, options_.width, options_.height, event.x, event.y, held_);
       Slide(*held_);
     } else if (turning_ && button_ == InputEvent::Button::kLeft) {
-      view_.azimuth -= kTurn * x;
-      view_.elevation = std::clamp(view_.elevation - kTurn * y, DegToRad(-89.0), DegToRad(80.0));
+      camera_.Turn(x, y);
     } else if (turning_) {
-      const Vector3d right(std::sin(view_.azimuth), -std::cos(view_.azimuth), 0.0);
-      view_.look_at += view_.distance / options_.height * (-x * right + y * Vector3d::UnitZ());
+      camera_.Move(x, y);
     }
   }
 
@@ -399,9 +295,7 @@ class Viewer {
         state_.forces = !state_.forces;
         break;
       case 'G':
-        AimAt(std::max(row_, 0L));
-        view_.look_at = followed_;
-        view_.distance = 0.4;
+        if (source_.rows() > 0) camera_.AimAtObject(std::max(row_, 0L));
         break;
       case 'S':
         if (live_ != nullptr) state_.message = save();
@@ -423,16 +317,14 @@ class Viewer {
   Window& window_;
   ViewerOptions options_;
   ControlsState state_;
-  Viewpoint view_;
+  ObjectCamera camera_;
   long row_ = -1;
   bool looks_back_ = false;
   bool closed_ = false;
   bool restart_ = false;
   double played_ = 0.0;  // time that playing has come to, s
   Clock::time_point last_ = Clock::now();
-  Vector3d followed_ = Vector3d::Zero();
   double largest_force_ = 0.0;
-  MjDataPtr data_;
   InputEvent mouse_;
   InputEvent::Button button_ = InputEvent::Button::kLeft;
   bool turning_ = false;
@@ -442,34 +334,6 @@ class Viewer {
   std::string title_;
   Studio studio_;
 };
-
-/// Assignments that multiply a scenario's gains.
-std::vector<std::string> MakeGainOverrides(const Scenario& scenario, const std::vector<Slider>& sliders) {
-  std::vector<std::string> overrides;
-  const auto vector = [](const Vector6d& v) {
-    return fmt::format("[{}, {}, {}, {}, {}, {}]", v[0], v[1], v[2], v[3], v[4], v[5]);
-  };
-  const ObjectGains& gains = scenario.control.gains;
-  const double stiffness = sliders[0].factor;
-  const double damping = sliders[1].factor;
-  if (stiffness != 1.0 || damping != 1.0) {
-    const Vector6d K_p = stiffness * gains.K_p;
-    const Vector6d K_v = damping * gains.K_v;
-    const bool has_frequency = scenario.text.find("natural_frequency") != std::string::npos;
-    if (has_frequency) {
-      const Vector6d omega = K_p.cwiseSqrt();
-      overrides.push_back("control.natural_frequency=" + vector(omega));
-      overrides.push_back("control.damping_ratio=" + vector(0.5 * K_v.cwiseQuotient(omega)));
-    } else {
-      overrides.push_back("control.K_p=" + vector(K_p));
-      overrides.push_back("control.K_v=" + vector(K_v));
-    }
-  }
-  if (sliders[2].factor != 1.0) {
-    overrides.push_back(fmt::format("control.f_min={}", sliders[2].factor * scenario.control.f_min));
-  }
-  return overrides;
-}
 
 }  // namespace
 
@@ -489,7 +353,7 @@ std::unique_ptr<LiveRun> ViewLive(const LiveRunMaker& make, const std::string& t
   ControlsState controls;
   controls.playing = !options.paused;
   controls.speed = options.speed;
-  controls.sliders = {{"stiffness K_p"}, {"damping K_v"}, {"squeeze f_min"}};
+  controls.sliders = MakeGainSliders();
   controls.message =
       "Ctrl-drag: pull, drag: turn, space: pause, arrows: step, G: grasp, R: anew, S: save, Q: quit";
   std::unique_ptr<LiveRun> run = make({});

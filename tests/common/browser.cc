@@ -5,9 +5,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cctype>
 #include <chrono>
 #include <csignal>
-#include <regex>
+#include <optional>
 #include <stdexcept>
 #include <thread>
 
@@ -17,17 +18,27 @@ namespace {
 using Json = nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-constexpr int kMaxSeconds = 60;
+constexpr int kMaxSeconds = 60;  // of one answer
+constexpr int kMaxLife = 600;    // s, of a browser
 constexpr auto kPause = std::chrono::milliseconds(50);
+
+/// The number that stands behind a text and any spaces.
+std::optional<size_t> ReadNumberAfter(const std::string& text, const std::string& mark) {
+  size_t at = text.find(mark);
+  if (at == std::string::npos) return std::nullopt;
+  at = text.find_first_not_of(' ', at + mark.size());
+  if (at == std::string::npos || text[at] < '0' || text[at] > '9') return std::nullopt;
+  return std::stoul(text.substr(at));
+}
 
 /// Whether an HTTP answer has as many bytes as it says.
 bool IsWhole(const std::string& answer) {
-  static const std::regex length("content-length: *([0-9]+)", std::regex::icase);
   const size_t head = answer.find("\r\n\r\n");
-  std::smatch match;
   if (head == std::string::npos) return false;
-  const std::string headers = answer.substr(0, head);
-  return std::regex_search(headers, match, length) && answer.size() >= head + 4 + std::stoul(match[1]);
+  std::string headers = answer.substr(0, head);
+  for (char& c : headers) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::optional<size_t> length = ReadNumberAfter(headers, "content-length:");
+  return length && answer.size() >= head + 4 + *length;
 }
 
 /// Sends an HTTP request to this machine and returns the answer's body.
@@ -65,13 +76,16 @@ Browser::Browser() {
   const std::filesystem::path out = folder_.path() / "chromedriver.txt";
   ProgramOptions options;
   options.out = out;
-  options.seconds = 2 * kMaxSeconds;
+  options.seconds = kMaxLife;
   driver_ = std::make_unique<Program>(std::vector<std::string>{DEXCHECK_CHROMEDRIVER, "--port=0"}, options);
-  const std::regex started("started successfully on port ([0-9]+)");
   const auto deadline = Clock::now() + std::chrono::seconds(30);
-  for (std::smatch match; port_ == 0; std::this_thread::sleep_for(kPause)) {
+  for (; port_ == 0; std::this_thread::sleep_for(kPause)) {
     const std::string text = std::filesystem::exists(out) ? ReadText(out) : "";
-    if (std::regex_search(text, match, started)) port_ = std::stoi(match[1]);
+    // The whole line is there when the full stop at its end is.
+    const auto port = ReadNumberAfter(text, "started successfully on port");
+    if (port && text.find('.', text.find("successfully on port")) != std::string::npos) {
+      port_ = static_cast<int>(*port);
+    }
     if (Clock::now() > deadline) throw std::runtime_error("chromedriver did not start");
   }
   const Json chromium = {{"args",
@@ -80,6 +94,14 @@ Browser::Browser() {
   const Json wanted = {{"goog:chromeOptions", chromium}, {"goog:loggingPrefs", {{"browser", "ALL"}}}};
   const Json session = Call("POST", "/session", {{"capabilities", {{"alwaysMatch", wanted}}}});
   session_ = "/session/" + session.at("sessionId").get<std::string>();
+}
+
+Browser& Browser::Share() {
+  static Browser shared;
+  shared.Command("Emulation.clearDeviceMetricsOverride", Json::object());
+  shared.SetDark(false);
+  (void)shared.TakeConsole();
+  return shared;
 }
 
 Browser::~Browser() {

@@ -17,6 +17,8 @@ class Browser {
   /// @throws std::runtime_error when it cannot be started.
   Browser();
   ~Browser();
+  /// One for all tests of a process, which takes its time to start: as new, but for what was open.
+  static Browser& Share();
   Browser(const Browser&) = delete;
   Browser& operator=(const Browser&) = delete;
 

@@ -134,6 +134,78 @@ TEST_F(MovieTest, DecodedFramesDifferWhereTheRobotMoved) {
   EXPECT_LT(Difference(first, last, 75, 100, 0, 100), 2.0) << "floor and sky";
 }
 
+TEST_F(MovieTest, CamerasOfItsOwnAreNearToRobotAndObject) {
+  run_ = testing::MakeKinematicRun(*model_, 6.0, 0.1);
+  MovieOptions options = MakeOptions();
+  options.panel = false;
+  const auto find = [&](const char* camera, double time) {
+    options.camera = camera;
+    return FindTorus(MoviePainter({&view_, 1}, options).Paint(time));
+  };
+  const double far = find(kCourseCamera, 0.0).z();
+  for (const double time : {0.0, 6.0}) {
+    EXPECT_GT(find(kRobotCamera, time).z(), 3.0 * far) << time;
+    const Vector3d torus = find(kObjectCamera, time);
+    EXPECT_GT(torus.z(), 0.02 * kWidth * kHeight) << time;
+    EXPECT_NEAR(torus.x(), 0.5 * kWidth, 0.08 * kWidth) << "fingers hide parts of it";
+    EXPECT_NEAR(torus.y(), 0.5 * kHeight, 0.1 * kHeight);
+  }
+  // As an inset, too, without moving the picture's own camera.
+  options.camera = kCourseCamera;
+  const Image plain = MoviePainter({&view_, 1}, options).Paint(6.0);
+  options.inset = kObjectCamera;
+  const Image with_inset = MoviePainter({&view_, 1}, options).Paint(6.0);
+  EXPECT_EQ(Difference(plain.rgb.data(), with_inset.rgb.data(), 0, 50, 0, 100), 0.0);
+  EXPECT_GT(FindTorus(with_inset).z(), FindTorus(plain).z() + 0.001 * kWidth * kHeight);
+}
+
+TEST_F(MovieTest, TheGhostOfAnotherRunStandsWhereThatRunIs) {
+  constexpr double kOff = 0.236;  // m, to the robot's left
+  RunFrames other = run_;
+  for (const char* joint : {"base", "torus_free"}) {
+    const int address = model_->jnt_qposadr[mj_name2id(model_.get(), mjOBJ_JOINT, joint)];
+    other.qpos.col(address + 1).array() += kOff;
+  }
+  MovieOptions options = MakeOptions();
+  options.panel = false;
+  options.free = FreeCamera{{2.6, -2.2, 1.4}, Vector3d(0.9, 0.0, 0.7), false, 0.0};
+  const RunView other_view = {model_.get(), &other};
+  const Image here = MoviePainter({&view_, 1}, options).Paint(0.2);
+  const Image there = MoviePainter({&other_view, 1}, options).Paint(0.2);
+  options.ghost = true;
+  const std::array<RunView, 2> both = {view_, other_view};
+  const Image ghost = MoviePainter(both, options).Paint(0.2);
+  const Image coincident = MoviePainter(std::array<RunView, 2>{view_, view_}, options).Paint(0.2);
+  // Where the other run differs from an empty scene, the ghost is seen, and nowhere else.
+  const auto pixels = [](const Image& a, const Image& b) {
+    std::vector<Vector2d> different;
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        int sum = 0;
+        for (int c = 0; c < 3; ++c) sum += std::abs(a.Pixel(x, y)[c] - b.Pixel(x, y)[c]);
+        if (sum > 24) different.emplace_back(x, y);
+      }
+    }
+    return different;
+  };
+  const auto right_end = [](const std::vector<Vector2d>& some) {
+    double right = 0.0;
+    for (const Vector2d& pixel : some) right = std::max(right, pixel.x());
+    return right;
+  };
+  const std::vector<Vector2d> moved = pixels(here, there);
+  const std::vector<Vector2d> seen = pixels(here, ghost);
+  ASSERT_GT(moved.size(), 1000U);
+  EXPECT_GT(seen.size(), moved.size() / 3);
+  EXPECT_LT(seen.size(), moved.size());
+  EXPECT_NEAR(right_end(seen), right_end(moved), 3.0);
+  EXPECT_LT(right_end(pixels(here, coincident)), right_end(moved) - 5.0)
+      << "not beside a run that is the same";
+  // Still where it was, and told how far apart.
+  EXPECT_NEAR((FindTorus(ghost) - FindTorus(here)).head<2>().norm(), 0.0, 3.0);
+  EXPECT_EQ(ghost.width, kWidth);
+}
+
 TEST_F(MovieTest, TheCourseCameraStandsStill) {
   run_ = testing::MakeKinematicRun(*model_, 3.0);
   MovieOptions options = MakeOptions();

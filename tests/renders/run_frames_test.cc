@@ -85,5 +85,28 @@ TEST_F(RunFramesTest, CheckHistoryKeepsTheWorstPerBound) {
   EXPECT_EQ(history.At(CheckKind::kPrediction, 10).check, nullptr);
 }
 
+TEST_F(RunFramesTest, AllFiveQuestionsAreListed) {
+  run_.checks = {{"law_torque", CheckKind::kLaw, 1e-9, std::vector<double>(11, 1e-10)},
+                 {"cone_use", CheckKind::kAssumption, 0.9, std::vector<double>(11, 0.2)}};
+  run_.checks[0].residuals[4] = 2e-9;
+  const auto names = [](const std::vector<QuestionStatus>& questions) {
+    std::string text;
+    for (const QuestionStatus& question : questions) text += question.name + " ";
+    return text;
+  };
+  const CheckHistory history(run_);
+  const std::vector<QuestionStatus> questions = history.ListQuestions(10);
+  EXPECT_EQ(names(questions), "model law balance prediction assumption ");
+  ASSERT_EQ(questions.size(), 5U);
+  EXPECT_FALSE(questions[0].asked);
+  EXPECT_EQ(questions[1].check, "law_torque");
+  EXPECT_DOUBLE_EQ(questions[1].worst, 2e-9);
+  EXPECT_FALSE(questions[1].Passes());
+  EXPECT_TRUE(history.ListQuestions(3)[1].Passes());
+  EXPECT_TRUE(questions[4].Passes());
+  run_.checks.clear();
+  EXPECT_TRUE(CheckHistory(run_).ListQuestions(3).empty());
+}
+
 }  // namespace
 }  // namespace dexcheck

@@ -75,7 +75,9 @@
     if (plot.log) return [low / 2, high * 3];
     const middle = (low + high) / 2;
     const half = 0.54 * Math.max(high - low, plot.span, 1e-9 * Math.abs(middle), 1e-12);
-    return [middle - half, middle + half];
+    // With two axes the left one's curves are in the upper half, the right one's in the lower half.
+    const room = plot.right ? 2 * half * (1 / 0.52 - 1) : 0;
+    return [middle - half - (right ? 0 : room), middle + half + (right ? room : 0)];
   };
 
   const showTogether = range => {
@@ -130,7 +132,8 @@
   const makeKeys = (plot, box, getGraph) => plot.curves.map((curve, k) => {
     const key = document.createElement('button');
     const line = `<svg viewBox="0 0 22 8"><line x1="0" y1="4" x2="22" y2="4" stroke="${curve.color}" ` +
-        `stroke-width="2.5" stroke-dasharray="${curve.dashes.join(' ')}"/></svg>`;
+        `stroke-width="${curve.wide ? 7 : 2.5}" stroke-opacity="${curve.wide ? 0.4 : 1}" ` +
+        `stroke-dasharray="${curve.dashes.join(' ')}"/></svg>`;
     key.innerHTML = line;
     key.append(curve.label);
     const value = document.createElement('span');
@@ -153,9 +156,9 @@
     plot.curves.forEach(curve => {
       series[curve.id] = {
         axis: curve.right ? 'y2' : 'y',
-        color: curve.color,
+        color: curve.color + (curve.wide ? '66' : ''),
         strokePattern: curve.dashes.length > 0 ? curve.dashes : null,
-        strokeWidth: curve.background ? 0.8 : 1.5,
+        strokeWidth: curve.wide ? 6 : curve.background ? 0.8 : 1.5,
       };
     });
     let graph = null;

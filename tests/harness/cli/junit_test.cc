@@ -9,13 +9,7 @@ namespace dexcheck {
 namespace {
 
 using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::ProgramResult;
-using testing::ReadText;
-using testing::ReplaceOnce;
 using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 /// The test cases of a JUnit file, whose counts must be those that it states.
 struct JUnitFile {
@@ -45,12 +39,18 @@ class JUnit : public ::testing::Test {
  protected:
   [[nodiscard]] JUnitFile Run(std::vector<std::string> arguments, int exit_code) const {
     arguments.insert(arguments.end(), {"--junit", "junit.xml", "--quiet"});
-    const ProgramResult result = RunDexcheck(arguments, {folder_.path()});
+    const testing::ProgramResult result = RunDexcheck(arguments, {folder_.path()});
     EXPECT_EQ(result.exit_code, exit_code) << result.err << result.out;
     return JUnitFile(folder_.path() / "junit.xml");
   }
+  /// Writes a file into the folder that differs from another in one place.
+  void Spoil(const std::string& original, const std::string& right, const std::string& wrong,
+             const std::string& name) const {
+    testing::WriteText(folder_.path() / name,
+                       testing::ReplaceOnce(testing::ReadText(original), right, wrong));
+  }
 
-  TempFolder folder_;
+  testing::TempFolder folder_;
   std::string toml_ = testing::kParameters + "panda.toml";
   std::string mjcf_ = testing::kMjcf + "panda.xml";
 };
@@ -61,7 +61,7 @@ TEST_F(JUnit, OfAComparison) {
   EXPECT_THAT(good.cases, ::testing::Contains("dexcheck.consistency.panda.term M_bar"));
   EXPECT_THAT(good.failures, ::testing::IsEmpty());
 
-  WriteText(folder_.path() / "bad <&>.toml", ReplaceOnce(ReadText(toml_), "3.228604", "3.3"));
+  Spoil(toml_, "3.228604", "3.3", "bad <&>.toml");
   const JUnitFile bad = Run({"consistency", "bad <&>.toml", mjcf_, "--samples", "20"}, 1);
   EXPECT_EQ(bad.cases.size(), good.cases.size());
   EXPECT_THAT(bad.failures,
@@ -72,8 +72,7 @@ TEST_F(JUnit, OfAComparison) {
 TEST_F(JUnit, OfAnAudit) {
   const std::string path = testing::SourcePath("/harness/sides/examples/arm.urdf");
   EXPECT_THAT(Run({"audit", path}, 0).failures, ::testing::IsEmpty());
-  const std::string arm = ReadText(path);
-  WriteText(folder_.path() / "arm.urdf", ReplaceOnce(arm, "izz=\"0.008\"", "izz=\"0.8\""));
+  Spoil(path, "izz=\"0.008\"", "izz=\"0.8\"", "arm.urdf");
   const JUnitFile bad = Run({"audit", "arm.urdf"}, 1);
   EXPECT_THAT(bad.failures, ::testing::Contains(HasSubstr("dexcheck.audit.arm.audit inertia: ")));
   EXPECT_GE(bad.cases.size(), 9U);
@@ -94,7 +93,7 @@ TEST_F(JUnit, ABadPathIsRefusedBeforeTheWork) {
                                                   {"run", "paper", "--no-log"}}) {
     std::vector<std::string> arguments = command;
     arguments.insert(arguments.end(), {"--junit", "no/such/folder.xml"});
-    EXPECT_TRUE(IsRefused(RunDexcheck(arguments, {folder_.path()}), {"no/such/folder.xml"}));
+    EXPECT_TRUE(testing::IsRefused(RunDexcheck(arguments, {folder_.path()}), {"no/such/folder.xml"}));
   }
 }
 

@@ -132,6 +132,39 @@ TEST_F(RenderCommandTest, WritesAStillOfTwoRuns) {
   EXPECT_EQ(image.height, 90);
 }
 
+TEST_F(RenderCommandTest, TwoRunsInOneScene) {
+  WriteRun(run_, 0.1);
+  const std::string other = folder_.path() / "other";
+  WriteRun(other, 0.1);
+  const std::string still = folder_.path() / "a.png";
+  EXPECT_EQ(RunDexcheck({"render", run_, "--ghost", other, "--still", "0.1", "--out", still, "--size",
+                         "160x90", "--camera", "robot", "--inset", "object"})
+                .exit_code,
+            0);
+  EXPECT_EQ(ReadPng(still).width, 160) << "not two pictures";
+  const std::string film = folder_.path() / "film.gif";
+  const testing::ProgramResult result = RunDexcheck({"compare", run_, other, "--video", film});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr(film + ": 3 frames"));
+  EXPECT_THAT(testing::ReadText(film), ::testing::StartsWith("GIF89a"));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"render", run_, "--ghost", other, "--beside", other}), {"--beside"}));
+}
+
+TEST_F(RenderCommandTest, AReportWithoutItsReplayIsSmaller) {
+  WriteRun(run_, 0.1);
+  const auto write = [&](std::vector<std::string> options) {
+    const std::string page = folder_.path() / "page.html";
+    options.insert(options.begin(), {"report", run_, "--out", page});
+    EXPECT_EQ(RunDexcheck(options).exit_code, 0);
+    return testing::ReadText(page);
+  };
+  const std::string page = write({});
+  const std::string without = write({"--no-replay"});
+  EXPECT_THAT(page, HasSubstr("id=\"replay-scene\""));
+  EXPECT_THAT(without, ::testing::Not(HasSubstr("replay-scene")));
+  EXPECT_GT(page.size(), without.size() + 500'000) << "three.js and the robot's shapes";
+}
+
 TEST_F(RenderCommandTest, WritesWhatTheNameSays) {
   WriteRun(run_, 0.2);
   struct Output {

@@ -90,7 +90,7 @@ class PageBrowserTest : public ::testing::Test {
   }
 
   testing::TempFolder folder_;
-  Browser browser_;
+  Browser& browser_ = Browser::Share();
 };
 
 TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {

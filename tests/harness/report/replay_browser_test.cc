@@ -82,7 +82,7 @@ class ReplayBrowserTest : public ::testing::Test {
   RunFrames run_;
   MjModelPtr model_ = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   MjDataPtr data_ = MakeData(*model_);
-  Browser browser_;
+  Browser& browser_ = Browser::Share();
 };
 
 /// Each body that moves is where a bone is.

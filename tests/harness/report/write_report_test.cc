@@ -211,5 +211,26 @@ TEST_F(WriteReportTest, StaysSmallForALongRun) {
   EXPECT_LT(Report(run).size(), 6'000'000U);
 }
 
+TEST(Figures, CurvesOfTwoAxesDoNotLieOnOneAnother) {
+  Figure figure;
+  figure.least_span = 0.02;
+  figure.label = "position (m)";
+  figure.curves = {{"y", VectorXd::Constant(3, -0.22)}, {"z", VectorXd::Constant(3, 0.73)}};
+  const auto share = [&](double value, bool right) {
+    const std::array<double, 2> range = CalcAxisRange(figure, right);
+    return (value - range[0]) / (range[1] - range[0]);
+  };
+  EXPECT_LT(share(-0.22, false), 0.1) << "one axis is filled";
+  EXPECT_GT(share(0.73, false), 0.9);
+  figure.right_label = "angle (rad)";
+  for (const double angle : {-1.57, 0.0, 1.83}) {
+    figure.curves.push_back({"angle", VectorXd::Constant(3, angle), 2, 0, true});
+  }
+  EXPECT_GT(share(-0.22, false), 0.5);
+  EXPECT_LT(share(0.73, false), 1.0);
+  EXPECT_GT(share(-1.57, true), 0.0);
+  EXPECT_LT(share(1.83, true), 0.5);
+}
+
 }  // namespace
 }  // namespace dexcheck

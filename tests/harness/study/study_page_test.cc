@@ -21,7 +21,7 @@ using ::testing::HasSubstr;
 const std::string kSource = testing::SourcePath();
 constexpr double kLimit = 2000.0;  // 1/s: of K_v at steps of 1 ms
 
-class StudyPageTest : public ::testing::Test {
+class StudyPageBrowserTest : public ::testing::Test {
  protected:
   void SetUp() override {
     StudyInputs inputs;
@@ -58,10 +58,10 @@ class StudyPageTest : public ::testing::Test {
   }
 
   testing::TempFolder folder_;
-  Browser browser_;
+  Browser& browser_ = Browser::Share();
 };
 
-TEST_F(StudyPageTest, ACellShowsTheCommandThatRepeatsItsTrial) {
+TEST_F(StudyPageBrowserTest, ACellShowsTheCommandThatRepeatsItsTrial) {
   Open(1280, 900, false);
   // A cell for each trial in each of the maps: the outcome and two metrics.
   EXPECT_EQ(browser_.Run("return document.querySelectorAll('svg a rect').length;"), 3 * 12);
@@ -88,7 +88,7 @@ TEST_F(StudyPageTest, ACellShowsTheCommandThatRepeatsItsTrial) {
   EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty());
 }
 
-TEST_F(StudyPageTest, DrawsMeasuredAndTheoreticalBoundaries) {
+TEST_F(StudyPageBrowserTest, DrawsMeasuredAndTheoreticalBoundaries) {
   Open(1280, 900, false);
   const std::string map = "const map = document.querySelector('main figure');";
   // Three columns, in each the measured boundary runs between 200 and 2100.
@@ -107,7 +107,7 @@ TEST_F(StudyPageTest, DrawsMeasuredAndTheoreticalBoundaries) {
 }
 
 // The part with a script: what it draws, how it filters, sorts and leads to a trial.
-TEST_F(StudyPageTest, LooksCloserAtItsTrials) {
+TEST_F(StudyPageBrowserTest, LooksCloserAtItsTrials) {
   Open(1300, 900, false);
   ASSERT_TRUE(browser_.WaitFor("return document.getElementById('explore').dataset.ready === 'yes';"));
   const auto ask = [&](const std::string& body) { return browser_.Run(body); };
@@ -147,7 +147,7 @@ TEST_F(StudyPageTest, LooksCloserAtItsTrials) {
   EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty());
 }
 
-TEST_F(StudyPageTest, FitsAPhone) {
+TEST_F(StudyPageBrowserTest, FitsAPhone) {
   Open(390, 844, true);
   ASSERT_TRUE(browser_.WaitFor("return document.getElementById('explore').dataset.ready === 'yes';"));
   EXPECT_LE(browser_.Run("return document.documentElement.scrollWidth - innerWidth;"), 0);

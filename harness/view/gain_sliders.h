@@ -1,0 +1,19 @@
+#pragma once
+
+// The sliders of a live run: factors of a scenario's gains.
+
+#include <string>
+#include <vector>
+
+#include "harness/scenario/scenario.h"
+#include "harness/view/controls.h"
+
+namespace dexcheck {
+
+/// Of K_p, K_v and f_min, each at the scenario's own.
+std::vector<Slider> MakeGainSliders();
+
+/// Assignments that multiply a scenario's gains. @param sliders as MakeGainSliders made them, moved since.
+std::vector<std::string> MakeGainOverrides(const Scenario& scenario, const std::vector<Slider>& sliders);
+
+}  // namespace dexcheck

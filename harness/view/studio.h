@@ -1,0 +1,49 @@
+#pragma once
+
+// Draws the window's pictures in a thread of its own.
+
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "harness/view/controls.h"
+#include "harness/view/frame_source.h"
+#include "harness/view/scene_painter.h"
+#include "renders/image.h"
+
+namespace dexcheck {
+
+/// Of the pictures that it was asked for, the newest one is what counts.
+class Studio {
+ public:
+  /// @param source must outlive it. @param width, height in pixels.
+  Studio(const FrameSource& source, int width, int height);
+  ~Studio();
+  Studio(const Studio&) = delete;
+  Studio& operator=(const Studio&) = delete;
+
+  struct Order {
+    long row = 0;
+    SceneLook look;
+    ControlsState controls;
+  };
+  void Ask(const Order& order);
+  /// None when there is none since the last call. @throws what drawing threw.
+  std::optional<Image> Take();
+
+ private:
+  void Work(int width, int height);
+  std::optional<Order> TakeOrder();
+
+  const FrameSource& source_;
+  std::mutex mutex_;
+  std::optional<Order> order_;
+  std::optional<Image> image_;
+  std::exception_ptr problem_;
+  std::atomic<bool> quit_ = false;
+  std::thread thread_;
+};
+
+}  // namespace dexcheck
