@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "harness/study/search.h"
@@ -34,6 +35,8 @@ class SearchHistory {
   [[nodiscard]] bool is_over() const { return batch_.empty(); }
   /// Number of the first trial of the batch at hand.
   [[nodiscard]] long first_of_batch() const;
+  /// How many trials the batch at hand has, with those that are made.
+  [[nodiscard]] long size_of_batch() const { return static_cast<long>(batch_.size()) * per_point_; }
   /// In the order of their numbers.
   [[nodiscard]] const std::vector<JudgedPoint>& points() const { return points_; }
 
@@ -57,6 +60,14 @@ UnitPoint FindSearchStart(const StudyInputs& inputs);
 
 /// Points of any study whose trials are all there, judged by its objectives.
 std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows);
+
+/// What many points of one objective come to, without all of them being in memory.
+struct PointSummary {
+  size_t count = 0;
+  std::optional<JudgedPoint> first;
+  std::optional<JudgedPoint> best;  ///< As FindBest.
+};
+PointSummary SummarisePoints(const Study& study, const std::vector<TrialRow>& rows);
 
 /// The best of one objective: feasible, and the first of equals; null when none is feasible.
 const JudgedPoint* FindBest(const std::vector<JudgedPoint>& points);

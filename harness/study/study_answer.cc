@@ -12,17 +12,17 @@ namespace {
 
 std::string CountPoints(size_t count) { return fmt::format("{} point{}", count, count == 1 ? "" : "s"); }
 
-std::string DescribeBest(const Study& study, const std::vector<JudgedPoint>& points,
-                         const JudgedPoint& best) {
+std::string DescribeBest(const Study& study, const PointSummary& points) {
+  const JudgedPoint& best = *points.best;
   const Objective& objective = study.objectives.front();
   const auto value = [&](const JudgedPoint& point) {
     return ShowObjective(objective, point.judgement.objectives.front());
   };
   std::string text =
       fmt::format("The {} {} of {} is {:.4g}, at {} (trial {}).", objective.maximize ? "largest" : "least",
-                  Describe(objective), CountPoints(points.size()), value(best),
+                  Describe(objective), CountPoints(points.count), value(best),
                   DescribeValues(study, best.values), best.number * CountTrialsOfPoint(study));
-  const JudgedPoint& first = points.front();
+  const JudgedPoint& first = *points.first;
   if (study.is_search() && first.number == 0 && first.number != best.number) {
     text += first.judgement.is_feasible() ? fmt::format(" The search began with {:.4g}.", value(first))
                                           : " The search began where a constraint does not hold.";
@@ -130,14 +130,13 @@ std::vector<std::string> AnswerStudy(const Study& study, const std::vector<Trial
   if (method != Sampling::kGrid && !study.constraints.empty())
     answers.push_back(DescribeFailures(study, rows));
   if (study.objectives.empty()) return answers;
-  const std::vector<JudgedPoint> points = JudgePoints(study, rows);
-  if (points.empty()) return answers;
-  const JudgedPoint* const best = FindBest(points);
-  if (best == nullptr) {
-    answers.push_back(fmt::format("At none of {} all constraints hold.", CountPoints(points.size())));
+  const PointSummary points = SummarisePoints(study, rows);
+  if (points.count == 0) return answers;
+  if (!points.best) {
+    answers.push_back(fmt::format("At none of {} all constraints hold.", CountPoints(points.count)));
   } else {
-    answers.push_back(study.objectives.size() == 1 ? DescribeBest(study, points, *best)
-                                                   : DescribeFront(study, points));
+    answers.push_back(study.objectives.size() == 1 ? DescribeBest(study, points)
+                                                   : DescribeFront(study, JudgePoints(study, rows)));
   }
   return answers;
 }
