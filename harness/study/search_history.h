@@ -17,6 +17,7 @@ struct JudgedPoint {
   long number = 0;             ///< Its trials begin at number * CountTrialsOfPoint.
   std::vector<double> values;  ///< Of the study's own keys.
   Judgement judgement;
+  bool is_shortened = false;  ///< It was tried for less than the whole duration (successive halving).
 };
 
 /// Follows a search through its rows. The same rows always lead to the same next trials, so that a search
@@ -69,10 +70,11 @@ struct PointSummary {
 };
 PointSummary SummarisePoints(const Study& study, const std::vector<TrialRow>& rows);
 
-/// The best of one objective: feasible, and the first of equals; null when none is feasible.
+/// The best of one objective: feasible, tried for the whole duration, and the first of equals; null when
+/// there is none.
 const JudgedPoint* FindBest(const std::vector<JudgedPoint>& points);
 
-/// Feasible points that none dominates, by the first objective.
+/// Feasible points of the whole duration that none dominates, by the first objective.
 std::vector<const JudgedPoint*> FindFront(const std::vector<JudgedPoint>& points);
 
 }  // namespace dexcheck

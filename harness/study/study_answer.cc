@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "harness/study/halving_search.h"
 #include "harness/study/margin_search.h"
 #include "harness/study/study_sensitivity.h"
 
@@ -23,11 +24,27 @@ std::string DescribeBest(const Study& study, const PointSummary& points) {
                   Describe(objective), CountPoints(points.count), value(best),
                   DescribeValues(study, best.values), best.number * CountTrialsOfPoint(study));
   const JudgedPoint& first = *points.first;
-  if (study.is_search() && first.number == 0 && first.number != best.number) {
+  if (study.is_search() && !first.is_shortened && first.number == 0 && first.number != best.number) {
     text += first.judgement.is_feasible() ? fmt::format(" The search began with {:.4g}.", value(first))
                                           : " The search began where a constraint does not hold.";
   }
   return text;
+}
+
+/// What successive halving stopped.
+std::string DescribeStopped(const Study& study, size_t tried) {
+  const std::vector<long> counts = CountPointsOfRounds(study.search);
+  std::string text;
+  long before = 0;
+  for (size_t round = 0; round + 1 < counts.size(); ++round) {
+    before += counts[round];
+    if (static_cast<long>(tried) < before + counts[round + 1]) break;  // the next round is not done
+    text += fmt::format("{}{} after {:g} s", text.empty() ? "" : ", ", counts[round] - counts[round + 1],
+                        study.search.durations[round]);
+  }
+  if (text.empty()) return {};
+  return fmt::format("Of {} that were begun, others were better than {}: these were stopped, and are kept.",
+                     CountPoints(static_cast<size_t>(counts.front())), text);
 }
 
 std::string DescribeFront(const Study& study, const std::vector<JudgedPoint>& points) {
@@ -77,9 +94,7 @@ std::vector<std::string> DescribeMargins(const Study& study, const std::vector<J
         fmt::format("In none of {} directions a constraint turns within the ranges.", margins.size()));
     return answers;
   }
-  std::vector<double> values;
-  for (size_t i = 0; i < study.num_keys(); ++i)
-    values.push_back(ValueAt(study.variations[i], nearest->bad[i]));
+  const std::vector<double> values = ValuesAt(study.keys(), nearest->bad);
   answers.push_back(fmt::format("Of {} directions the nearest failure is {:.3g} of the ranges away, at {}.",
                                 margins.size(), nearest->at_most, DescribeValues(study, values)));
   return answers;
@@ -132,6 +147,8 @@ std::vector<std::string> AnswerStudy(const Study& study, const std::vector<Trial
   if (study.objectives.empty()) return answers;
   const PointSummary points = SummarisePoints(study, rows);
   if (points.count == 0) return answers;
+  const std::string stopped = DescribeStopped(study, points.count);
+  if (!stopped.empty()) answers.push_back(stopped);
   if (!points.best) {
     answers.push_back(fmt::format("At none of {} all constraints hold.", CountPoints(points.count)));
   } else {

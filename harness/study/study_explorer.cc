@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "harness/study/explorer_assets.h"
+#include "harness/study/halving_search.h"
 #include "harness/study/search_history.h"
 #include "harness/study/study_answer.h"
 #include "harness/study/study_theory.h"
@@ -49,7 +50,7 @@ Json ListHistory(const StudyResults& results) {
   Json history = Json::array();
   for (const JudgedPoint& point : JudgePoints(results.study, results.rows)) {
     const double value = ShowObjective(results.study.objectives.front(), point.judgement.objectives.front());
-    history.push_back({{"value", value}, {"feasible", point.judgement.is_feasible()}});
+    history.push_back({{"value", value}, {"feasible", point.judgement.is_feasible() && !point.is_shortened}});
   }
   return history;
 }
@@ -160,6 +161,14 @@ Html MakeExplorerScript(const StudyResults& results) {
     data["held"].push_back(IsHeld(outcome));
   }
   data["theory"] = ListTheory(results);
+  // Of successive halving: from which trial on they last how long.
+  data["rounds"] = Json::array();
+  long first = 0;
+  const std::vector<long> counts = CountPointsOfRounds(study.search);
+  for (size_t round = 0; round < counts.size(); ++round) {
+    data["rounds"].push_back({{"first", first}, {"duration", study.search.durations[round]}});
+    first += counts[round] * CountTrialsOfPoint(study);
+  }
   if (study.is_search() && !study.objectives.empty()) {
     data["history"] = ListHistory(results);
     data["maximize"] = study.objectives.front().maximize;
