@@ -76,7 +76,10 @@ class ErrorChain {
 
   /// y' = (u - y) / lag, its mean over the step.
   double Lag(double u) {
-    if (!(loop_.lag > 0.0)) return u;
+    if (!(loop_.lag > 0.0)) {
+      state_[kLagging] = 0.0;  // a state that stays as it is would be an eigenvalue of 1
+      return u;
+    }
     const double away = state_[kLagging] - u;
     const double decay = std::exp(-loop_.time_step / loop_.lag);
     state_[kLagging] = u + away * decay;

@@ -336,7 +336,8 @@ void ReadHalving(TomlTable* table, Study* study) {
 }
 
 void ReadSearch(const TomlValue& value, Study* study) {
-  constexpr long kLeastPopulation = 8;  // of which CMA-ES and NSGA-II take the better half
+  constexpr long kLeastOfCmaEs = 5;  // of which it takes the better half
+  constexpr long kLeastOfNsga2 = 8;  // which it pairs twice
   constexpr long kMaxPopulation = 10000;
   constexpr long kMaxStarts = 1000;
   TomlTable table = value.AsTable();
@@ -363,8 +364,9 @@ void ReadSearch(const TomlValue& value, Study* study) {
   if (search.method == SearchMethod::kCmaEs || search.method == SearchMethod::kNsga2) {
     search.population = 16;
     if (const auto population = table.Find("population")) {
-      search.population = population->AsWhole(kLeastPopulation, kMaxPopulation);
-      if (search.population % 4 != 0) population->Fail("must be a multiple of 4");
+      const bool pairs = search.method == SearchMethod::kNsga2;
+      search.population = population->AsWhole(pairs ? kLeastOfNsga2 : kLeastOfCmaEs, kMaxPopulation);
+      if (pairs && search.population % 4 != 0) population->Fail("must be a multiple of 4");
     }
     if (search.count < search.population)
       count.Fail("must be at least the population, " + std::to_string(search.population));

@@ -234,7 +234,9 @@
   const DrawParallel = () => {
     const {g, w, h} = Begin('parallel');
     const shown = [...study.keys.keys()].map(i => kFirstKey + i).slice(0, 12).concat(Number(byId('y').value));
-    parallel = shown.map((column, i) => ({...MakeAxis(column, h - 30, 24), at: 40 + (w - 80) * i / (shown.length - 1)}));
+    const bottom = h - 66, left = 96;
+    parallel = shown.map((column, i) =>
+      ({...MakeAxis(column, bottom, 24), at: left + (w - left - 24) * i / (shown.length - 1)}));
     const color = ColorBy(Number(byId('color').value));
     const every = Math.max(1, Math.ceil(rows.length / 1500));
     g.globalAlpha = Math.max(0.15, Math.min(1, 60 / rows.length));
@@ -262,15 +264,20 @@
       g.strokeStyle = style('--soft') || '#888';
       g.beginPath();
       g.moveTo(axis.at, 24);
-      g.lineTo(axis.at, h - 30);
+      g.lineTo(axis.at, bottom);
       g.stroke();
       g.fillStyle = style('--ink') || '#222';
-      const name = columns[axis.column].name.split('.').pop();
-      g.fillText(name.slice(0, Math.max(4, Math.floor((w - 80) / shown.length / 6))), axis.at, i % 2 ? h - 4 : h - 16);
+      // Slanted, so that many names fit; without the section that most keys share.
+      g.save();
+      g.translate(axis.at + 4, bottom + 12);
+      g.rotate(-0.55);
+      g.textAlign = 'right';
+      g.fillText(columns[axis.column].name.replace(/^[^.]*\./, '').slice(-20), 0, 0);
+      g.restore();
       g.fillText(FormatTick(axis.most, axis.column), axis.at, 18);
       for (const turn of theory.turns.filter(turn => turn.key === axis.column - kFirstKey)) {
         const at = axis.place(turn.value);
-        if (at >= 24 && at <= h - 30) Stroke(g, turn.stability, () => { g.moveTo(axis.at - 9, at); g.lineTo(axis.at + 9, at); });
+        if (at >= 24 && at <= bottom) Stroke(g, turn.stability, () => { g.moveTo(axis.at - 9, at); g.lineTo(axis.at + 9, at); });
       }
       if (brushes.has(axis.column)) {
         const [least, most] = brushes.get(axis.column).map(axis.place);

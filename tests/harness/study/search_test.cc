@@ -82,6 +82,38 @@ TEST(Search, FindsAMinimumOnTheEdge) {
   }
 }
 
+// Two keys, a dense grid of 400 points against a tenth of it: corner, valley along an edge, and what error
+// and effort of a loop look like.
+TEST(Search, ATenthOfAGridsTrialsIsEnough) {
+  const std::vector<Function> functions = {
+      [](const UnitPoint& x) { return std::vector<double>{1.0 + 3.0 * (1.0 - x[0]) + 2.0 * (1.0 - x[1])}; },
+      [](const UnitPoint& x) {
+        const double off = x[1] - 0.3 - 0.5 * x[0];
+        return std::vector<double>{0.1 + 20.0 * off * off + 1.0 - x[0]};
+      },
+      [](const UnitPoint& x) {
+        const double w = 5.0 * std::pow(30.0, x[0]);
+        const double z = 0.3 * std::pow(10.0, x[1]);
+        return std::vector<double>{400.0 / (w * w) * (1.0 + 0.2 * z * z) + 0.01 * w * z +
+                                   std::exp(std::min(50.0, (w * z - 260.0) / 20.0))};
+      }};
+  for (const Function& function : functions) {
+    double grid = 1e300;
+    for (int i = 0; i < 400; ++i) grid = std::min(grid, function({i % 20 / 19.0, i / 20 / 19.0})[0]);
+    for (const SearchMethod method : {SearchMethod::kNelderMead, SearchMethod::kBobyqa}) {
+      for (const std::uint64_t seed : {1U, 2U, 3U}) {
+        Search search = MakeSearch(method, 40);
+        search.seed = seed;
+        search.starts = method == SearchMethod::kNelderMead ? 2 : 1;
+        std::vector<JudgedPoint> points = RunSearch(search, {0.5, 0.5}, function);
+        points.resize(std::min(points.size(), size_t{40}));
+        EXPECT_LT(FindBest(points)->judgement.objectives[0], 1.05 * grid) << static_cast<int>(method);
+        EXPECT_GT(points.front().judgement.objectives[0], 1.05 * grid) << "it did not begin there";
+      }
+    }
+  }
+}
+
 TEST(Search, Nsga2ApproachesTheFront) {
   Search search = MakeSearch(SearchMethod::kNsga2, 960);
   search.population = 24;
