@@ -33,14 +33,15 @@ struct Request {
   std::string study;
   std::string database;
   std::string shard;
+  std::string exchange;
   std::uint64_t jobs = 0;
   bool retry_failed = false;
   bool quiet = false;
 };
 
-/// The trials of one of N shards; "" is all.
-std::vector<Trial> SelectShard(const std::vector<Trial>& trials, const std::string& text) {
-  if (text.empty()) return trials;
+/// "I/N"; "" is all.
+SearchPart ParseShard(const std::string& text) {
+  if (text.empty()) return {};
   long index = 0;
   long count = 0;
   const char* const end = text.data() + text.size();
@@ -48,11 +49,14 @@ std::vector<Trial> SelectShard(const std::vector<Trial>& trials, const std::stri
   const bool good = error == std::errc() && slash != end && *slash == '/' &&
                     std::from_chars(slash + 1, end, count).ptr == end && 1 <= index && index <= count;
   if (!good) throw InputError("--shard: must be I/N with 1 <= I <= N, got " + Quote(text));
-  std::vector<Trial> shard;
-  for (const Trial& trial : trials) {
-    if (trial.number % count == index - 1) shard.push_back(trial);
-  }
-  return shard;
+  return {index - 1, count, {}};
+}
+
+/// The trials of the shard.
+std::vector<Trial> SelectShard(std::vector<Trial> trials, const std::string& text) {
+  const SearchPart part = ParseShard(text);
+  if (part.count > 1) std::erase_if(trials, [&](const Trial& trial) { return !part.is_mine(trial.number); });
+  return trials;
 }
 
 /// "0-3, 7, 9" of ascending numbers; a long list ends in "...".
@@ -121,7 +125,13 @@ std::vector<long> MakeTrials(const StudyInputs& inputs, const std::vector<Trial>
 /// The same for a search, of which only the batch at hand is known.
 std::vector<long> MakeSearch(const StudyInputs& inputs, const Request& request, StudyStore* store) {
   ProgressBar bar(inputs.study.name, CountTrials(inputs.study), request.quiet);
-  RunSearch(inputs, MakeRunOptions(request, &bar), store);
+  SearchPart part = ParseShard(request.shard);
+  part.exchange = request.exchange;
+  if (part.count == 1) {
+    RunSearch(inputs, MakeRunOptions(request, &bar), store);
+  } else {
+    RunSearchPart(inputs, MakeRunOptions(request, &bar), part, store);
+  }
   SearchHistory history(inputs.study, FindSearchStart(inputs));
   for (const TrialRow& row : StudyStore::Open(request.database).ReadRows()) history.Add(row);
   std::vector<long> missing;
@@ -160,12 +170,14 @@ int RunStudy(const Request& request) {
         study.source +
         ": search.method: the points come from another program, which asks \"dexcheck study serve\"");
   }
-  if (study.is_search() && !request.shard.empty()) {
+  if (study.is_search() && !request.shard.empty() && request.exchange.empty()) {
     throw InputError(
-        "--shard: the trials of a search follow from one another; --jobs makes several at a time, and "
-        "several "
-        "processes may work on one database");
+        "--shard: the trials of a search follow from one another: its parts need --exchange FOLDER, which "
+        "all of "
+        "them see");
   }
+  if (!request.exchange.empty() && (!study.is_search() || request.shard.empty()))
+    throw InputError("--exchange: is for the parts of a search, with --shard");
   const std::vector<Trial> trials =
       study.is_search() ? std::vector<Trial>() : SelectShard(ListTrials(study), request.shard);
   CheckTrials(&inputs);
@@ -197,7 +209,7 @@ void AddToDatabase(const std::string& path, const StudyStore& like, const std::v
     StudyStore store = StudyStore::OpenOrCreate(database, like.identity(), like.study());
     std::vector<TrialSource> all;
     for (const std::string& source : sources) {
-      all.push_back({source, [source] { return StudyStore::Open(source).ReadRows(); }});
+      all.push_back({source, [source](const auto& take) { StudyStore::Open(source).ForEachRow(take); }});
     }
     store.AddAll(all);
   };
@@ -245,6 +257,9 @@ void AddStudyCommand(Command app) {
       .TypeName("N")
       .Check(whole);
   run.AddOption("--shard", &request->shard, "Only the I-th of N parts of the study").TypeName("I/N");
+  run.AddOption("--exchange", &request->exchange,
+                "Folder in which the parts of a search find each other's trials")
+      .TypeName("FOLDER");
   run.AddFlag("--retry-failed", &request->retry_failed, "Make trials again that crashed or timed out");
   add_quiet(run);
   run.SetAction([=] { return RunStudy(*request); });
@@ -292,11 +307,11 @@ void AddStudyCommand(Command app) {
       .Check(CheckSlurmMemory);
   slurm.SetAction([=] {
     StudyInputs inputs = FindStudy(request->study);
-    if (inputs.study.is_search()) {
+    if (inputs.study.is_external())
       throw InputError(inputs.study.source +
-                       ": search: the trials of a search follow from one another, an array job makes "
-                       "parts that do not; run it on one node with --jobs");
-    }
+                       ": search.method: an external search asks \"dexcheck study serve\"");
+    if (inputs.study.is_search() && job->tasks > job->array_size)
+      throw InputError("--tasks: the parts of a search wait for each other: at most --array-size of them");
     CheckTrials(&inputs);  // what study run would refuse, must not be queued
     fmt::print("{}", MakeSlurmScript(inputs, request->study, *job));
     return kSuccess;

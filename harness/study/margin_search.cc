@@ -101,9 +101,7 @@ void MarginSearcher::Tell(const std::vector<Judgement>& judgements) {
 
 std::vector<Margin> FindMargins(const Study& study, const std::vector<JudgedPoint>& points) {
   if (points.empty()) return {};
-  UnitPoint start;
-  for (size_t i = 0; i < study.num_keys(); ++i)
-    start.push_back(ShareOf(study.variations[i], points[0].values[i]));
+  const UnitPoint start = SharesOf(study.keys(), points[0].values);
   MarginSearcher searcher(study.search, start);
   for (size_t next = 0;;) {
     const size_t count = searcher.Ask().size();

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "controller/common/errors.h"
+#include "harness/study/halving_search.h"
 #include "harness/study/study_theory.h"
 
 namespace dexcheck {
@@ -22,9 +23,7 @@ void SearchHistory::AskNext() {
   batch_.clear();
   for (const UnitPoint& point : searcher_->Ask()) {
     if (static_cast<long>(points_.size() + batch_.size()) == study_.search.count) break;
-    batch_.emplace_back();
-    for (size_t i = 0; i < point.size(); ++i)
-      batch_.back().push_back(ValueAt(study_.variations[i], point[i]));
+    batch_.push_back(ValuesAt(study_.keys(), point));
   }
 }
 
@@ -50,7 +49,8 @@ void SearchHistory::TellWhatIsDone() {
         }
         results.push_back(row->second.result);
       }
-      judged.push_back({number, values, JudgePoint(study_.objectives, study_.constraints, results)});
+      judged.push_back({number, values, JudgePoint(study_.objectives, study_.constraints, results),
+                        IsShortened(study_.search, number)});
     }
     std::vector<Judgement> judgements;
     for (JudgedPoint& point : judged) {
@@ -84,15 +84,14 @@ UnitPoint FindSearchStart(const StudyInputs& inputs) {
   const size_t keys = study.num_keys();
   UnitPoint start(keys, 0.5);
   if (study.search.start == SearchStart::kValues) {
-    for (size_t i = 0; i < keys; ++i) start[i] = ShareOf(study.variations[i], study.search.start_values[i]);
+    start = SharesOf(study.keys(), study.search.start_values);
   }
   if (study.search.start != SearchStart::kTheory) return start;
   constexpr long kPoints = 256;
   const std::vector<double> draw = ListDraws(study).front();
   double least = std::numeric_limits<double>::infinity();
   for (const UnitPoint& point : MakeSobol(static_cast<int>(keys), kPoints)) {
-    std::vector<double> values;
-    for (size_t i = 0; i < keys; ++i) values.push_back(ValueAt(study.variations[i], point[i]));
+    std::vector<double> values = ValuesAt(study.keys(), point);
     values.insert(values.end(), draw.begin(), draw.end());
     try {
       const double radius = CalcRadiusInTheory(inputs, values);
@@ -106,28 +105,51 @@ UnitPoint FindSearchStart(const StudyInputs& inputs) {
   return start;
 }
 
-std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows) {
+namespace {
+
+/// Calls `take` with each point whose trials are all there.
+template <typename Take>
+void ForEachPoint(const Study& study, const std::vector<TrialRow>& rows, const Take& take) {
   const long per_point = CountTrialsOfPoint(study);
-  std::vector<JudgedPoint> points;
+  std::vector<TrialResult> results;
   for (size_t i = 0; i < rows.size();) {
     const long number = rows[i].trial.number / per_point;
-    std::vector<TrialResult> results;
+    results.clear();
     const size_t first = i;
     for (; i < rows.size() && rows[i].trial.number / per_point == number; ++i)
       results.push_back(rows[i].result);
     if (static_cast<long>(results.size()) < per_point) continue;
     const std::vector<double>& values = rows[first].trial.parameters;
-    points.push_back({number,
-                      {values.begin(), values.begin() + static_cast<std::ptrdiff_t>(study.num_keys())},
-                      JudgePoint(study.objectives, study.constraints, results)});
+    take(JudgedPoint{number,
+                     {values.begin(), values.begin() + static_cast<std::ptrdiff_t>(study.num_keys())},
+                     JudgePoint(study.objectives, study.constraints, results),
+                     IsShortened(study.search, number)});
   }
+}
+
+}  // namespace
+
+std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows) {
+  std::vector<JudgedPoint> points;
+  ForEachPoint(study, rows, [&](JudgedPoint&& point) { points.push_back(std::move(point)); });
   return points;
+}
+
+PointSummary SummarisePoints(const Study& study, const std::vector<TrialRow>& rows) {
+  PointSummary summary;
+  ForEachPoint(study, rows, [&](JudgedPoint&& point) {
+    if (summary.count++ == 0) summary.first = point;
+    const bool better = !summary.best || IsBetter(point.judgement, summary.best->judgement);
+    if (point.judgement.is_feasible() && !point.is_shortened && better) summary.best = std::move(point);
+  });
+  return summary;
 }
 
 const JudgedPoint* FindBest(const std::vector<JudgedPoint>& points) {
   const JudgedPoint* best = nullptr;
   for (const JudgedPoint& point : points) {
-    if (point.judgement.is_feasible() && (best == nullptr || IsBetter(point.judgement, best->judgement)))
+    if (point.judgement.is_feasible() && !point.is_shortened &&
+        (best == nullptr || IsBetter(point.judgement, best->judgement)))
       best = &point;
   }
   return best;
@@ -136,7 +158,7 @@ const JudgedPoint* FindBest(const std::vector<JudgedPoint>& points) {
 std::vector<const JudgedPoint*> FindFront(const std::vector<JudgedPoint>& points) {
   std::vector<const JudgedPoint*> sorted;
   for (const JudgedPoint& point : points) {
-    if (point.judgement.is_feasible()) sorted.push_back(&point);
+    if (point.judgement.is_feasible() && !point.is_shortened) sorted.push_back(&point);
   }
   std::stable_sort(sorted.begin(), sorted.end(), [](const JudgedPoint* a, const JudgedPoint* b) {
     return a->judgement.objectives < b->judgement.objectives;

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "harness/study/search.h"
@@ -16,6 +17,7 @@ struct JudgedPoint {
   long number = 0;             ///< Its trials begin at number * CountTrialsOfPoint.
   std::vector<double> values;  ///< Of the study's own keys.
   Judgement judgement;
+  bool is_shortened = false;  ///< It was tried for less than the whole duration (successive halving).
 };
 
 /// Follows a search through its rows. The same rows always lead to the same next trials, so that a search
@@ -34,6 +36,8 @@ class SearchHistory {
   [[nodiscard]] bool is_over() const { return batch_.empty(); }
   /// Number of the first trial of the batch at hand.
   [[nodiscard]] long first_of_batch() const;
+  /// How many trials the batch at hand has, with those that are made.
+  [[nodiscard]] long size_of_batch() const { return static_cast<long>(batch_.size()) * per_point_; }
   /// In the order of their numbers.
   [[nodiscard]] const std::vector<JudgedPoint>& points() const { return points_; }
 
@@ -58,10 +62,19 @@ UnitPoint FindSearchStart(const StudyInputs& inputs);
 /// Points of any study whose trials are all there, judged by its objectives.
 std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows);
 
-/// The best of one objective: feasible, and the first of equals; null when none is feasible.
+/// What many points of one objective come to, without all of them being in memory.
+struct PointSummary {
+  size_t count = 0;
+  std::optional<JudgedPoint> first;
+  std::optional<JudgedPoint> best;  ///< As FindBest.
+};
+PointSummary SummarisePoints(const Study& study, const std::vector<TrialRow>& rows);
+
+/// The best of one objective: feasible, tried for the whole duration, and the first of equals; null when
+/// there is none.
 const JudgedPoint* FindBest(const std::vector<JudgedPoint>& points);
 
-/// Feasible points that none dominates, by the first objective.
+/// Feasible points of the whole duration that none dominates, by the first objective.
 std::vector<const JudgedPoint*> FindFront(const std::vector<JudgedPoint>& points);
 
 }  // namespace dexcheck

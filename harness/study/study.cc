@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/common/expression.h"
 #include "controller/common/text.h"
+#include "harness/study/halving_search.h"
 #include "harness/study/sampling.h"
 
 namespace dexcheck {
@@ -31,12 +33,10 @@ std::vector<std::vector<double>> MakePoints(const Sample& sample, std::span<cons
   const int dimensions = static_cast<int>(variations.size());
   std::vector<UnitPoint> points = MakeUnitPoints(sample, dimensions);
   for (UnitPoint& point : points) {
-    for (size_t i = 0; i < point.size(); ++i) point[i] = ValueAt(variations[i], point[i]);
+    point = ValuesAt(variations, point);
   }
   return points;
 }
-
-std::span<const Variation> KeysOf(const Study& study) { return {study.variations.data(), study.num_keys()}; }
 
 std::span<const Variation> NestedOf(const Study& study) {
   return {study.variations.data() + study.num_keys(), study.num_nested};
@@ -66,6 +66,33 @@ double ShareOf(const Variation& variation, double value) {
   return std::clamp(share, 0.0, 1.0);
 }
 
+Variation FixRange(std::span<const Variation> variations, size_t index, const std::vector<double>& values) {
+  Variation fixed = variations[index];
+  if (!fixed.depends_on_others()) return fixed;
+  SymbolTable symbols;
+  for (size_t i = 0; i < index; ++i) symbols["key" + std::to_string(i)] = values[i];
+  if (!fixed.from_expression.empty()) fixed.from = EvaluateExpression(fixed.from_expression, symbols);
+  if (!fixed.to_expression.empty()) fixed.to = EvaluateExpression(fixed.to_expression, symbols);
+  return fixed;
+}
+
+std::vector<double> ValuesAt(std::span<const Variation> variations, const std::vector<double>& shares) {
+  std::vector<double> values;
+  values.reserve(shares.size());
+  for (size_t i = 0; i < shares.size(); ++i) {
+    values.push_back(variations[i].depends_on_others() ? ValueAt(FixRange(variations, i, values), shares[i])
+                                                       : ValueAt(variations[i], shares[i]));
+  }
+  return values;
+}
+
+std::vector<double> SharesOf(std::span<const Variation> variations, const std::vector<double>& values) {
+  std::vector<double> shares;
+  for (size_t i = 0; i < values.size(); ++i)
+    shares.push_back(ShareOf(FixRange(variations, i, values), values[i]));
+  return shares;
+}
+
 std::vector<std::vector<double>> ListDraws(const Study& study) {
   return MakePoints(study.nested, NestedOf(study));
 }
@@ -82,7 +109,7 @@ long CountTrials(const Study& study) {
   } else if (study.sample.method != Sampling::kGrid) {
     points = CountUnitPoints(study.sample, static_cast<int>(study.num_keys()));
   } else {
-    for (const Variation& variation : KeysOf(study)) points *= static_cast<long>(variation.values.size());
+    for (const Variation& variation : study.keys()) points *= static_cast<long>(variation.values.size());
   }
   return points * CountTrialsOfPoint(study);
 }
@@ -104,7 +131,7 @@ std::vector<Trial> ListTrials(const Study& study) {
   std::vector<Trial> all;
   all.reserve(static_cast<size_t>(CountTrials(study)));
   long number = 0;
-  for (const std::vector<double>& point : MakePoints(study.sample, KeysOf(study))) {
+  for (const std::vector<double>& point : MakePoints(study.sample, study.keys())) {
     std::vector<Trial> trials = ListTrialsOfPoint(study, number++, point, draws);
     std::move(trials.begin(), trials.end(), std::back_inserter(all));
   }
@@ -121,6 +148,11 @@ std::vector<std::string> ListOverrides(const Study& study, const Trial& trial) {
   for (size_t i = 0; i < study.variations.size(); ++i) {
     overrides.push_back(study.variations[i].key + "=" +
                         FormatValue(study.variations[i], trial.parameters[i]));
+  }
+  const std::vector<double>& durations = study.search.durations;
+  if (!durations.empty()) {
+    const size_t round = FindRound(study.search, trial.number / CountTrialsOfPoint(study));
+    overrides.push_back("duration=" + FormatNumber(durations[round]));
   }
   return overrides;
 }

@@ -3,6 +3,7 @@
 // What a study is: a scenario, the keys that are varied, and the list of trials that follows from both.
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,8 +19,12 @@ struct Variation {
   /// Of a key whose values are texts: values and parameters are then their numbers, from 0. Empty for
   /// numbers.
   std::vector<std::string> labels;
-  double from = 0.0;  ///< Ends of the range.
+  double from = 0.0;  ///< Ends of the range; of one that depends on other keys the widest.
   double to = 0.0;
+  /// Of a range that depends on keys before it: its ends as expressions of them, in which `key0` is the first
+  /// of the variations that the range stands among, and so on. Empty for numbers.
+  std::string from_expression, to_expression;
+  [[nodiscard]] bool depends_on_others() const { return !from_expression.empty() || !to_expression.empty(); }
   bool logarithmic = false;  ///< Even in the logarithm.
 };
 
@@ -33,18 +38,20 @@ struct Sample {
   bool scramble = false;   ///< A Sobol sequence.
 };
 
-enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kBobyqa, kMargins, kExternal };
+enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kBobyqa, kMargins, kHalving, kExternal };
 enum class SearchStart { kMiddle, kTheory, kValues };
 
 /// How a study looks for the best point.
 struct Search {
   SearchMethod method = SearchMethod::kNone;
-  long count = 0;           ///< Points at most.
-  long population = 0;      ///< Points of a generation, of kCmaEs and kNsga2.
-  long starts = 1;          ///< Local searches at a time, of kNelderMead and kBobyqa.
-  long directions = 0;      ///< Random ones, of kMargins.
-  double step = 0.25;       ///< First step relative to the ranges.
-  double tolerance = 1e-3;  ///< Relative to the ranges: where a local search or a bisection ends.
+  long count = 0;       ///< Points at most.
+  long population = 0;  ///< Points of a generation, of kCmaEs and kNsga2; of the first round of kHalving.
+  long keep = 3;        ///< Of kHalving: one of so many points goes on.
+  std::vector<double> durations;  ///< Of kHalving: of the trials of each round, s, ascending.
+  long starts = 1;                ///< Local searches at a time, of kNelderMead and kBobyqa.
+  long directions = 0;            ///< Random ones, of kMargins.
+  double step = 0.25;             ///< First step relative to the ranges.
+  double tolerance = 1e-3;        ///< Relative to the ranges: where a local search or a bisection ends.
   std::uint64_t seed = 0;
   SearchStart start = SearchStart::kMiddle;
   std::vector<double> start_values;  ///< Of kValues, one for each key.
@@ -74,6 +81,7 @@ struct Study {
 
   /// Keys that make a point, without those of the draws.
   [[nodiscard]] size_t num_keys() const { return variations.size() - num_nested; }
+  [[nodiscard]] std::span<const Variation> keys() const { return {variations.data(), num_keys()}; }
   [[nodiscard]] bool is_search() const { return search.method != SearchMethod::kNone; }
   /// Its points come from another program.
   [[nodiscard]] bool is_external() const { return search.method == SearchMethod::kExternal; }
@@ -113,6 +121,13 @@ std::vector<std::vector<double>> ListDraws(const Study& study);
 double ValueAt(const Variation& variation, double share);
 /// The share at which ValueAt gives this value; of a list the middle of its part.
 double ShareOf(const Variation& variation, double value);
+
+/// Values of a point at these shares, each range as the values before it make it.
+std::vector<double> ValuesAt(std::span<const Variation> variations, const std::vector<double>& shares);
+/// The shares of a point's values, likewise.
+std::vector<double> SharesOf(std::span<const Variation> variations, const std::vector<double>& values);
+/// The range of one of them beside these values of the others.
+Variation FixRange(std::span<const Variation> variations, size_t index, const std::vector<double>& values);
 
 /// A value of the key as --set takes it.
 std::string FormatValue(const Variation& variation, double value);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "harness/study/halving_search.h"
 #include "harness/study/margin_search.h"
 #include "harness/study/study_sensitivity.h"
 
@@ -12,22 +13,38 @@ namespace {
 
 std::string CountPoints(size_t count) { return fmt::format("{} point{}", count, count == 1 ? "" : "s"); }
 
-std::string DescribeBest(const Study& study, const std::vector<JudgedPoint>& points,
-                         const JudgedPoint& best) {
+std::string DescribeBest(const Study& study, const PointSummary& points) {
+  const JudgedPoint& best = *points.best;
   const Objective& objective = study.objectives.front();
   const auto value = [&](const JudgedPoint& point) {
     return ShowObjective(objective, point.judgement.objectives.front());
   };
   std::string text =
       fmt::format("The {} {} of {} is {:.4g}, at {} (trial {}).", objective.maximize ? "largest" : "least",
-                  Describe(objective), CountPoints(points.size()), value(best),
+                  Describe(objective), CountPoints(points.count), value(best),
                   DescribeValues(study, best.values), best.number * CountTrialsOfPoint(study));
-  const JudgedPoint& first = points.front();
-  if (study.is_search() && first.number == 0 && first.number != best.number) {
+  const JudgedPoint& first = *points.first;
+  if (study.is_search() && !first.is_shortened && first.number == 0 && first.number != best.number) {
     text += first.judgement.is_feasible() ? fmt::format(" The search began with {:.4g}.", value(first))
                                           : " The search began where a constraint does not hold.";
   }
   return text;
+}
+
+/// What successive halving stopped.
+std::string DescribeStopped(const Study& study, size_t tried) {
+  const std::vector<long> counts = CountPointsOfRounds(study.search);
+  std::string text;
+  long before = 0;
+  for (size_t round = 0; round + 1 < counts.size(); ++round) {
+    before += counts[round];
+    if (static_cast<long>(tried) < before + counts[round + 1]) break;  // the next round is not done
+    text += fmt::format("{}{} after {:g} s", text.empty() ? "" : ", ", counts[round] - counts[round + 1],
+                        study.search.durations[round]);
+  }
+  if (text.empty()) return {};
+  return fmt::format("Of {} that were begun, others were better than {}: these were stopped, and are kept.",
+                     CountPoints(static_cast<size_t>(counts.front())), text);
 }
 
 std::string DescribeFront(const Study& study, const std::vector<JudgedPoint>& points) {
@@ -77,9 +94,7 @@ std::vector<std::string> DescribeMargins(const Study& study, const std::vector<J
         fmt::format("In none of {} directions a constraint turns within the ranges.", margins.size()));
     return answers;
   }
-  std::vector<double> values;
-  for (size_t i = 0; i < study.num_keys(); ++i)
-    values.push_back(ValueAt(study.variations[i], nearest->bad[i]));
+  const std::vector<double> values = ValuesAt(study.keys(), nearest->bad);
   answers.push_back(fmt::format("Of {} directions the nearest failure is {:.3g} of the ranges away, at {}.",
                                 margins.size(), nearest->at_most, DescribeValues(study, values)));
   return answers;
@@ -130,14 +145,15 @@ std::vector<std::string> AnswerStudy(const Study& study, const std::vector<Trial
   if (method != Sampling::kGrid && !study.constraints.empty())
     answers.push_back(DescribeFailures(study, rows));
   if (study.objectives.empty()) return answers;
-  const std::vector<JudgedPoint> points = JudgePoints(study, rows);
-  if (points.empty()) return answers;
-  const JudgedPoint* const best = FindBest(points);
-  if (best == nullptr) {
-    answers.push_back(fmt::format("At none of {} all constraints hold.", CountPoints(points.size())));
+  const PointSummary points = SummarisePoints(study, rows);
+  if (points.count == 0) return answers;
+  const std::string stopped = DescribeStopped(study, points.count);
+  if (!stopped.empty()) answers.push_back(stopped);
+  if (!points.best) {
+    answers.push_back(fmt::format("At none of {} all constraints hold.", CountPoints(points.count)));
   } else {
-    answers.push_back(study.objectives.size() == 1 ? DescribeBest(study, points, *best)
-                                                   : DescribeFront(study, points));
+    answers.push_back(study.objectives.size() == 1 ? DescribeBest(study, points)
+                                                   : DescribeFront(study, JudgePoints(study, rows)));
   }
   return answers;
 }

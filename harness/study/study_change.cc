@@ -31,7 +31,8 @@ std::vector<size_t> FindPlaces(const Study& before, const Study& now) {
 
 bool IsSameVariation(const Variation& a, const Variation& b) {
   return a.key == b.key && a.values == b.values && a.labels == b.labels && a.from == b.from && a.to == b.to &&
-         a.logarithmic == b.logarithmic;
+         a.logarithmic == b.logarithmic && a.from_expression == b.from_expression &&
+         a.to_expression == b.to_expression;
 }
 
 bool IsSameSample(const Sample& a, const Sample& b) {
@@ -43,7 +44,8 @@ std::string FindSearchDifference(const Study& before, const Study& now) {
   const Search& b = now.search;
   if (a.method != b.method || a.population != b.population || a.starts != b.starts ||
       a.directions != b.directions || a.step != b.step || a.tolerance != b.tolerance || a.seed != b.seed ||
-      a.start != b.start || a.start_values != b.start_values) {
+      a.start != b.start || a.start_values != b.start_values || a.keep != b.keep ||
+      a.durations != b.durations) {
     return "search";
   }
   if (!now.is_search()) return {};

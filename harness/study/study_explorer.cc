@@ -5,8 +5,10 @@
 #include <nlohmann/json.hpp>
 
 #include "harness/study/explorer_assets.h"
+#include "harness/study/halving_search.h"
 #include "harness/study/search_history.h"
 #include "harness/study/study_answer.h"
+#include "harness/study/study_theory.h"
 
 namespace dexcheck {
 namespace {
@@ -48,9 +50,34 @@ Json ListHistory(const StudyResults& results) {
   Json history = Json::array();
   for (const JudgedPoint& point : JudgePoints(results.study, results.rows)) {
     const double value = ShowObjective(results.study.objectives.front(), point.judgement.objectives.front());
-    history.push_back({{"value", value}, {"feasible", point.judgement.is_feasible()}});
+    history.push_back({{"value", value}, {"feasible", point.judgement.is_feasible() && !point.is_shortened}});
   }
   return history;
+}
+
+/// What (57) says beside the point that the study is about: the best one, else the first.
+Json ListTheory(const StudyResults& results) {
+  const TrialRow* at = &results.rows.front();
+  std::string place = "the first trial";
+  if (!results.study.objectives.empty()) {
+    if (const auto best = SummarisePoints(results.study, results.rows).best) {
+      const long number = best->number * CountTrialsOfPoint(results.study);
+      const auto row =
+          std::lower_bound(results.rows.begin(), results.rows.end(), number,
+                           [](const TrialRow& a, long wanted) { return a.trial.number < wanted; });
+      if (row != results.rows.end()) at = &*row;
+      place = "trial " + std::to_string(number) + ", the best";
+    }
+  }
+  const KeyTheory theory = FindKeyTheory(results.inputs, at->trial.parameters);
+  Json turns = Json::array();
+  for (const KeyTheory::Turn& turn : theory.turns)
+    turns.push_back({{"key", turn.key}, {"stability", turn.is_stability}, {"value", turn.value}});
+  Json curves = Json::array();
+  for (const KeyTheory::Curve& curve : theory.curves)
+    curves.push_back(
+        {{"x", curve.x}, {"y", curve.y}, {"stability", curve.is_stability}, {"points", curve.points}});
+  return {{"knows", theory.knows}, {"turns", turns}, {"curves", curves}, {"place", place}};
 }
 
 /// For a script element: "</script>" must not be in it.
@@ -87,7 +114,7 @@ Html MakeExplorer(const StudyResults& results) {
       "</label><label>up <select id=\"explore-y\"></select></label><label>colour <select "
       "id=\"explore-color\"></select>"
       "</label></div><canvas id=\"explore-scatter\"></canvas><p class=\"soft\" "
-      "id=\"explore-front\"></p></section>\n";
+      "id=\"explore-front\"></p><p class=\"soft\" id=\"explore-theory\"></p></section>\n";
   if (results.study.variations.size() > 1) {
     html +=
         "<section class=\"card\"><h3>Over two keys</h3><div class=\"tools\"><label>along <select "
@@ -95,17 +122,18 @@ Html MakeExplorer(const StudyResults& results) {
         "</select></label><label>up <select id=\"explore-cy\"></select></label><label>mean of <select "
         "id=\"explore-cz\">"
         "</select></label></div><canvas id=\"explore-contour\"></canvas><p class=\"soft\" "
-        "id=\"explore-range\"></p>"
+        "id=\"explore-range\"></p><p class=\"soft\" id=\"explore-theory-over\"></p>"
         "</section>\n";
   }
   html +=
       "<section class=\"card\"><h3>All keys</h3><canvas id=\"explore-parallel\" class=\"wide\"></canvas><p "
-      "class=\"soft\">Drag along an axis to keep a part of it, click on it to keep all.</p></section>\n"
+      "class=\"soft\">Drag along an axis to keep a part of it, click on it to keep all.<span "
+      "id=\"explore-theory-beside\"></span></p></section>\n"
       "<section class=\"card\"><h3>Which key goes with <span "
       "id=\"explore-importance-of\"></span></h3><table><tbody "
       "id=\"explore-importance\"></tbody></table><p class=\"soft\">Correlation of ranks over the trials that "
       "were "
-      "held.</p></section>\n</div>\n"
+      "held. The error dynamics have the keys that are marked with (57).</p></section>\n</div>\n"
       "<section class=\"card\" id=\"explore-chosen\" hidden><h3 id=\"explore-which\"></h3><p class=\"soft\" "
       "id=\"explore-numbers\"></p><p>Its run, with its film:</p><pre id=\"explore-command\"></pre><p>What "
       "its errors are "
@@ -131,6 +159,15 @@ Html MakeExplorerScript(const StudyResults& results) {
     data["outcomes"].push_back(NameOf(outcome));
     data["colors"].push_back(FindColor(outcome));
     data["held"].push_back(IsHeld(outcome));
+  }
+  data["theory"] = ListTheory(results);
+  // Of successive halving: from which trial on they last how long.
+  data["rounds"] = Json::array();
+  long first = 0;
+  const std::vector<long> counts = CountPointsOfRounds(study.search);
+  for (size_t round = 0; round < counts.size(); ++round) {
+    data["rounds"].push_back({{"first", first}, {"duration", study.search.durations[round]}});
+    first += counts[round] * CountTrialsOfPoint(study);
   }
   if (study.is_search() && !study.objectives.empty()) {
     data["history"] = ListHistory(results);

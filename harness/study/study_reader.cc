@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
+#include "controller/common/expression.h"
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
+#include "harness/study/halving_search.h"
 #include "harness/study/margin_search.h"
 #include "harness/study/sampling.h"
 #include "harness/study/study.h"
@@ -39,7 +42,88 @@ void ReadValues(const TomlValue& list, Variation* variation) {
   variation->to = *most;
 }
 
-void ReadRange(TomlTable* table, bool is_grid, Variation* variation) {
+bool IsOfKey(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '.';
+}
+
+/// The expression with `key0`, `key1`, ... for the keys before it. @throws InputError when it is no
+/// arithmetic of them.
+std::string ReadEnd(const TomlValue& end, std::span<const Variation> before) {
+  const std::string text = end.AsText();
+  std::string expression;
+  for (size_t i = 0; i < text.size();) {
+    size_t last = i;
+    while (last < text.size() && IsOfKey(text[last])) ++last;
+    const std::string word = text.substr(i, std::max(last, i + 1) - i);
+    const auto found =
+        std::find_if(before.begin(), before.end(), [&](const Variation& other) { return other.key == word; });
+    if (found != before.end() && !found->labels.empty()) end.Reject(Quote(word) + " has no numbers");
+    expression += found == before.end() ? word : "key" + std::to_string(found - before.begin());
+    i += word.size();
+  }
+  SymbolTable symbols;
+  for (size_t i = 0; i < before.size(); ++i) symbols["key" + std::to_string(i)] = before[i].from;
+  try {
+    EvaluateExpression(expression, symbols);
+  } catch (const std::invalid_argument& error) {
+    end.Reject(std::string("must be a number or arithmetic of keys that are varied before it: ") +
+               error.what());
+  }
+  return expression;
+}
+
+/// The widest range over all corners of the keys before it, at each of which it must be one.
+void WidenRange(const TomlValue& end, std::span<const Variation> before, Variation* variation) {
+  constexpr size_t kMostKeys = 12;  // 4096 corners
+  if (before.size() > kMostKeys)
+    end.Reject("a range may depend on keys among the first " + std::to_string(kMostKeys));
+  std::vector<Variation> all(before.begin(), before.end());
+  all.push_back(*variation);
+  double least = std::numeric_limits<double>::infinity();
+  double most = -least;
+  for (size_t corner = 0; corner < size_t{1} << before.size(); ++corner) {
+    std::vector<double> shares;
+    for (size_t i = 0; i < before.size(); ++i) shares.push_back((corner >> i & 1U) != 0 ? 1.0 : 0.0);
+    const std::vector<double> values = ValuesAt({all.data(), before.size()}, shares);
+    const Variation fixed = FixRange(all, before.size(), values);
+    const bool good = std::isfinite(fixed.from) && std::isfinite(fixed.to) && fixed.from < fixed.to &&
+                      (!fixed.logarithmic || fixed.from > 0.0);
+    if (!good) {
+      std::string where;
+      for (size_t i = 0; i < before.size(); ++i)
+        where += (i == 0 ? "" : ", ") + before[i].key + " = " + FormatValue(before[i], values[i]);
+      end.Reject("the range is from " + FormatNumber(fixed.from) + " to " + FormatNumber(fixed.to) +
+                 " where " + where);
+    }
+    least = std::min(least, fixed.from);
+    most = std::max(most, fixed.to);
+  }
+  variation->from = least;
+  variation->to = most;
+}
+
+/// Ends of which at least one is a text: they depend on keys before this one.
+void ReadDependentRange(TomlTable* table, std::span<const Variation> before, Variation* variation) {
+  const TomlValue from = table->Get("from");
+  const TomlValue to = table->Get("to");
+  if (from.IsText()) {
+    variation->from_expression = ReadEnd(from, before);
+  } else {
+    variation->from = from.AsNumber();
+  }
+  if (to.IsText()) {
+    variation->to_expression = ReadEnd(to, before);
+  } else {
+    variation->to = to.AsNumber();
+  }
+  if (const auto spacing = table->Find("spacing"))
+    variation->logarithmic = spacing->AsChoice<bool>({{"linear", false}, {"log", true}});
+  WidenRange(from.IsText() ? from : to, before, variation);
+}
+
+void ReadRange(TomlTable* table, bool is_grid, std::span<const Variation> before, Variation* variation) {
+  if (!is_grid && (table->Get("from").IsText() || table->Get("to").IsText()))
+    return ReadDependentRange(table, before, variation);
   variation->from = table->Get("from").AsNumber();
   variation->to = table->Get("to").AsNumber();
   if (variation->to <= variation->from) table->Get("to").Fail("must be greater than from");
@@ -60,7 +144,8 @@ void ReadRange(TomlTable* table, bool is_grid, Variation* variation) {
   variation->values = std::move(values);
 }
 
-Variation ReadVariation(const TomlValue& value, bool is_grid) {
+/// @param before the variations that it stands among, without those after it.
+Variation ReadVariation(const TomlValue& value, bool is_grid, std::span<const Variation> before) {
   TomlTable table = value.AsTable();
   Variation variation;
   const TomlValue key = table.Get("key");
@@ -72,15 +157,17 @@ Variation ReadVariation(const TomlValue& value, bool is_grid) {
   if (const auto list = table.Find("values")) {
     ReadValues(*list, &variation);
   } else {
-    ReadRange(&table, is_grid, &variation);
+    ReadRange(&table, is_grid, before, &variation);
   }
   table.RejectUnused();
   return variation;
 }
 
 void ReadVariations(const TomlValue& value, bool is_grid, Study* study) {
+  const size_t first = study->variations.size();
   for (const TomlValue& entry : value.AsList()) {
-    study->variations.push_back(ReadVariation(entry, is_grid));
+    study->variations.push_back(
+        ReadVariation(entry, is_grid, std::span<const Variation>(study->variations).subspan(first)));
     const Variation& added = study->variations.back();
     for (size_t i = 0; i + 1 < study->variations.size(); ++i) {
       if (study->variations[i].key == added.key) entry.Reject(Quote(added.key) + " is varied twice");
@@ -228,8 +315,29 @@ void ReadMargins(TomlTable* table, Study* study) {
   search.count = MarginSearcher::CountPoints(search, study->num_keys());
 }
 
+/// Keys of `method = "halving"`, without those of all searches.
+void ReadHalving(TomlTable* table, Study* study) {
+  Search& search = study->search;
+  const TomlValue durations = table->Get("durations");
+  for (const TomlValue& entry : durations.AsList()) {
+    search.durations.push_back(entry.AsPositive());
+    const size_t count = search.durations.size();
+    if (count > 1 && search.durations[count - 2] >= search.durations.back())
+      entry.Fail("must be longer than the one before it");
+  }
+  if (search.durations.size() < 2) durations.Reject("needs at least two durations");
+  if (const auto keep = table->Find("keep")) search.keep = keep->AsWhole(2, kMaxValues);
+  const auto is_duration = [](const std::string& key) { return key.starts_with("duration="); };
+  if (std::any_of(study->overrides.begin(), study->overrides.end(), is_duration))
+    durations.Reject("set has a duration, too");
+  search.population = search.count;
+  search.count = 0;
+  for (const long count : CountPointsOfRounds(search)) search.count += count;
+}
+
 void ReadSearch(const TomlValue& value, Study* study) {
-  constexpr long kLeastPopulation = 8;  // of which CMA-ES and NSGA-II take the better half
+  constexpr long kLeastOfCmaEs = 5;  // of which it takes the better half
+  constexpr long kLeastOfNsga2 = 8;  // which it pairs twice
   constexpr long kMaxPopulation = 10000;
   constexpr long kMaxStarts = 1000;
   TomlTable table = value.AsTable();
@@ -240,6 +348,7 @@ void ReadSearch(const TomlValue& value, Study* study) {
                                                  {"nelder_mead", SearchMethod::kNelderMead},
                                                  {"bobyqa", SearchMethod::kBobyqa},
                                                  {"margins", SearchMethod::kMargins},
+                                                 {"halving", SearchMethod::kHalving},
                                                  {"external", SearchMethod::kExternal}});
   if (search.method == SearchMethod::kMargins) {
     ReadMargins(&table, study);
@@ -255,12 +364,15 @@ void ReadSearch(const TomlValue& value, Study* study) {
   if (search.method == SearchMethod::kCmaEs || search.method == SearchMethod::kNsga2) {
     search.population = 16;
     if (const auto population = table.Find("population")) {
-      search.population = population->AsWhole(kLeastPopulation, kMaxPopulation);
-      if (search.population % 4 != 0) population->Fail("must be a multiple of 4");
+      const bool pairs = search.method == SearchMethod::kNsga2;
+      search.population = population->AsWhole(pairs ? kLeastOfNsga2 : kLeastOfCmaEs, kMaxPopulation);
+      if (pairs && search.population % 4 != 0) population->Fail("must be a multiple of 4");
     }
     if (search.count < search.population)
       count.Fail("must be at least the population, " + std::to_string(search.population));
     search.count -= search.count % search.population;  // whole generations
+  } else if (search.method == SearchMethod::kHalving) {
+    ReadHalving(&table, study);
   } else {
     if (const auto starts = table.Find("starts")) search.starts = starts->AsWhole(1, kMaxStarts);
     if (const auto tolerance = table.Find("tolerance")) search.tolerance = tolerance->AsPositive();
@@ -268,7 +380,7 @@ void ReadSearch(const TomlValue& value, Study* study) {
   }
   if (search.method == SearchMethod::kBobyqa && study->num_keys() < 2)
     method.Reject("bobyqa needs two keys at least");
-  if (search.method != SearchMethod::kNsga2) {
+  if (search.method != SearchMethod::kNsga2 && search.method != SearchMethod::kHalving) {
     if (const auto step = table.Find("step")) {
       search.step = step->AsPositive();
       if (search.step > 1.0) step->Fail("must be at most 1, the whole range");
@@ -354,6 +466,15 @@ Study ParseStudy(const std::string& text, const std::string& source) {
     for (const TomlValue& entry : list->AsList()) study.constraints.push_back(ReadConstraint(entry));
   }
   if (search) ReadSearch(*search, &study);
+  const bool moves_one_key = study.sample.method == Sampling::kSaltelli ||
+                             study.sample.method == Sampling::kMorris ||
+                             study.search.method == SearchMethod::kMargins || study.is_external();
+  for (const Variation& variation : study.variations) {
+    if (moves_one_key && variation.depends_on_others())
+      vary.Reject(Quote(variation.key) +
+                  " has a range that depends on other keys, which is for points of a "
+                  "sample or a search for the best");
+  }
   if (const auto nested = root.Find("nested")) ReadNested(*nested, &study);
   RequireFewTrials(vary, study);
   return study;

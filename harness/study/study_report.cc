@@ -12,6 +12,7 @@
 #include "harness/study/study_answer.h"
 #include "harness/study/study_explorer.h"
 #include "harness/study/study_figures.h"
+#include "harness/study/study_tables.h"
 #include "harness/study/study_theory.h"
 
 namespace dexcheck {
@@ -34,6 +35,13 @@ svg .dot { stroke: #333; stroke-width: .5; }
 .dot { border-radius: 50%; width: .6em; height: .6em; vertical-align: 0; border: 1px solid var(--soft); }
 .rule { height: 4px; vertical-align: 3px; background: #000; border-radius: 0; outline: 1px solid var(--line); }
 .counts { width: auto; }
+.effects th.wide { width: 45%; min-width: 7rem; }
+.track { position: relative; height: 1em; background: color-mix(in srgb, var(--line) 45%, transparent); border-radius: 3px; }
+.track i { position: absolute; top: 0; height: 100%; }
+.track .fill { background: var(--accent); border-radius: 3px; opacity: .75; }
+.track .span { top: 45%; height: 2px; background: var(--ink); }
+.track .start { width: 2px; background: var(--ink); }
+.track .mark { width: 0; border-left: 2px dashed #9b2226; }
 .trials { max-height: 36rem; overflow-y: auto; }
 .trial { border-bottom: 1px solid var(--line); padding: .6rem 0; }
 .trial pre { white-space: pre-wrap; overflow-wrap: anywhere; user-select: all; }
@@ -75,8 +83,9 @@ class Report {
     if (results_.rows.empty()) {
       html += "<p>No trial is done yet.</p>\n";
     } else {
-      for (const Html& part : {Answers(), Outcomes(), Maps(), Lines(), ErrorAgainstEffort(),
-                               MakeExplorer(results_), Best(), Trials()})
+      for (const Html& part :
+           {Answers(), MakeMarginTable(results_), MakeSensitivityTables(results_), Outcomes(), Maps(),
+            Lines(), ErrorAgainstEffort(), MakeExplorer(results_), Best(), Trials()})
         html += part;
     }
     html += "</main>\n";

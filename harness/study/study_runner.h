@@ -5,6 +5,7 @@
 #include <functional>
 #include <vector>
 
+#include "harness/study/search_exchange.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck {
@@ -27,5 +28,11 @@ bool MakesRowsAgain(const StudyInputs& inputs, const std::vector<TrialRow>& rows
 /// Makes a search's trials, batch by batch, until it is over or interrupted. Several processes may work on
 /// one database: each waits for the others' part of a batch.
 void RunSearch(const StudyInputs& inputs, const RunOptions& options, StudyStore* store);
+
+/// The same by one of several processes that have a database each and a folder together. Each makes its share
+/// of a batch and takes the others' rows into its own database. Shares that stay away for as long as its own
+/// took, because their process has ended or not begun, it makes itself: the rows are the same.
+void RunSearchPart(const StudyInputs& inputs, const RunOptions& options, const SearchPart& part,
+                   StudyStore* store);
 
 }  // namespace dexcheck

@@ -79,7 +79,15 @@ std::string Describe(const Study& study, const Sensitivity& sensitivity) {
     }
     ++named;
   }
-  if (!sensitivity.sobol.empty()) {
+  if (sensitivity.sobol.empty()) {
+    constexpr double kSmall = 0.1;
+    const double largest = sensitivity.morris[keys.front()].size.value;
+    const auto idle = std::count_if(keys.begin(), keys.end(), [&](size_t i) {
+      return sensitivity.morris[i].size.high < kSmall * largest;
+    });
+    if (idle > 0)
+      text += fmt::format("; {} of {} keys move it by less than a tenth of the first", idle, keys.size());
+  } else {
     const auto idle = std::count_if(keys.begin(), keys.end(),
                                     [&](size_t i) { return sensitivity.sobol[i].total.high < kMatters; });
     if (idle > 0) text += fmt::format("; {} of {} keys explain less than 1 %", idle, keys.size());

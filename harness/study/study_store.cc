@@ -218,7 +218,12 @@ std::map<Outcome, long> StudyStore::CountOutcomes() const {
 }
 
 std::vector<TrialRow> StudyStore::ReadRows(long first, bool with_machine) const {
+  // A vector that grows holds its rows twice for a moment.
+  Statement count(database_.get(), "SELECT count(*) FROM trials WHERE trial >= ?");
+  count.Bind(1, static_cast<long long>(first));
+  count.Step();
   std::vector<TrialRow> rows;
+  rows.reserve(static_cast<size_t>(count.GetWhole(0)));
   ForEachRow([&](TrialRow&& row) { rows.push_back(std::move(row)); }, first, with_machine);
   return rows;
 }
@@ -335,14 +340,14 @@ void StudyStore::AddAll(const std::vector<TrialSource>& sources) {
   Transaction transaction(database_.get());
   std::unordered_map<long, const std::string*> added;  // from which source
   for (const TrialSource& source : sources) {
-    for (const TrialRow& row : source.read()) {
+    source.read([&](TrialRow&& row) {
       const long number = row.trial.number;
       if (const auto other = FindRow(number)) {
-        if (IsFailed(row.result.outcome)) continue;
+        if (IsFailed(row.result.outcome)) return;
         if (IsFailed(other->result.outcome)) {
           Remove(number);
         } else if (IsSame(*other, row)) {
-          continue;
+          return;
         } else {
           const auto from = added.find(number);
           throw InputError(source.name + ": trial " + std::to_string(number) +
@@ -352,7 +357,7 @@ void StudyStore::AddAll(const std::vector<TrialSource>& sources) {
       }
       Insert(row);
       added[number] = &source.name;
-    }
+    });
   }
   transaction.Commit();
 }

@@ -37,8 +37,8 @@ struct TrialRow {
 /// Rows and where they are from, for messages.
 struct TrialSource {
   std::string name;
-  std::function<std::vector<TrialRow>()>
-      read;  ///< Called once, when its turn comes: not all need be in memory.
+  /// Gives its rows one by one; called once, when its turn comes: not all need be in memory.
+  std::function<void(const std::function<void(TrialRow&&)>& take)> read;
 };
 
 /// Whether two rows of one trial are the same: bit for bit when one machine made both, else within rounding

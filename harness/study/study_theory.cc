@@ -1,8 +1,12 @@
 #include "harness/study/study_theory.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+
+#include "controller/common/errors.h"
+#include "harness/plant/velocity_filter.h"
 
 namespace dexcheck {
 namespace {
@@ -11,10 +15,20 @@ constexpr int kColumns = 60;
 constexpr int kRows = 40;
 constexpr int kBisections = 8;
 
+/// The faults of sensing and motors that all axes have alike.
 SampledLoop MakeLoop(const Scenario& scenario) {
   SampledLoop loop;
   loop.time_step = scenario.plant.time_step;
   loop.hold = std::max(1L, std::lround(scenario.plant.control_step / scenario.plant.time_step));
+  const SensingOptions& sensing = scenario.imperfections.sensing;
+  const ActuationOptions& actuation = scenario.imperfections.actuation;
+  loop.delay = actuation.delay;
+  loop.latency =
+      CountSteps(sensing.latency, loop.time_step) + CountSteps(sensing.object_latency, loop.time_step);
+  if (sensing.object_velocity == VelocitySource::kDifferenced) {
+    loop.low_pass = CalcLowPassGain(sensing.object_velocity_cutoff, loop.time_step);
+  }
+  if (actuation.lag.groups.empty()) loop.lag = actuation.lag.all;
   return loop;
 }
 
@@ -57,9 +71,7 @@ double CalcRadiusInTheory(const StudyInputs& inputs, const std::vector<double>& 
 }
 
 bool IsDampedInTheory(const StudyInputs& inputs, const std::vector<double>& parameters) {
-  return TestAxes(inputs, parameters, [](const SampledLoop& loop, const AxisGains& gains) {
-    return gains.K_v >= CalcCriticalDamping(loop, gains.K_p);
-  });
+  return TestAxes(inputs, parameters, IsDamped);
 }
 
 double CalcOvershootInTheory(const StudyInputs& inputs, const std::vector<double>& parameters) {
@@ -105,6 +117,118 @@ std::vector<std::pair<double, double>> FindTurns(const StudyInputs& inputs,
     }
   }
   return turns;
+}
+
+namespace {
+
+/// (57) of all axes at some values of the keys.
+struct Axes {
+  SampledLoop loop;
+  std::array<AxisGains, 6> gains;
+};
+
+Axes FindAxes(const StudyInputs& inputs, const std::vector<double>& parameters) {
+  const Scenario scenario = MakeTrialScenario(inputs, {0, 0, parameters});
+  Axes axes{MakeLoop(scenario), {}};
+  for (int axis = 0; axis < 6; ++axis) axes.gains[static_cast<size_t>(axis)] = GainsOf(scenario, axis);
+  return axes;
+}
+
+bool Holds(const Axes& axes, unsigned which, bool is_stability) {
+  for (size_t axis = 0; axis < axes.gains.size(); ++axis) {
+    if ((which >> axis & 1U) == 0) continue;
+    const bool holds = is_stability ? CalcSpectralRadius(axes.loop, axes.gains[axis]) < 1.0
+                                    : IsDamped(axes.loop, axes.gains[axis]);
+    if (!holds) return false;
+  }
+  return true;
+}
+
+/// Calls `found` with each value of the key at which the axes `which` turn.
+void FindTurnsAlong(const StudyInputs& inputs, std::vector<double> parameters, size_t key, unsigned which,
+                    int rows, const std::function<void(bool is_stability, double value)>& found) {
+  constexpr int kBisect = 10;
+  const Variation& variation = inputs.study.variations[key];
+  const auto at = [&](double share) {
+    parameters[key] = Interpolate(variation, share);
+    return FindAxes(inputs, parameters);
+  };
+  Axes before = at(0.0);
+  for (int j = 1; j <= rows; ++j) {
+    const Axes after = at(static_cast<double>(j) / rows);
+    for (const bool is_stability : {true, false}) {
+      const bool held = Holds(before, which, is_stability);
+      if (held == Holds(after, which, is_stability)) continue;
+      double low = static_cast<double>(j - 1) / rows;
+      double high = static_cast<double>(j) / rows;
+      for (int k = 0; k < kBisect; ++k) {
+        const double middle = 0.5 * (low + high);
+        (Holds(at(middle), which, is_stability) == held ? low : high) = middle;
+      }
+      found(is_stability, Interpolate(variation, high));
+    }
+    before = after;
+  }
+}
+
+/// Axes, as bits, on which (57) is another one at the key's other end.
+unsigned FindChangedAxes(const StudyInputs& inputs, std::vector<double> parameters, size_t key) {
+  const Variation& variation = inputs.study.variations[key];
+  if (!variation.labels.empty()) return 0;
+  parameters[key] = variation.from;
+  const Axes from = FindAxes(inputs, parameters);
+  parameters[key] = variation.to;
+  const Axes to = FindAxes(inputs, parameters);
+  unsigned which = 0;
+  for (size_t axis = 0; axis < from.gains.size(); ++axis) {
+    if (!(from.loop == to.loop) || !(from.gains[axis] == to.gains[axis])) which |= 1U << axis;
+  }
+  return which;
+}
+
+}  // namespace
+
+KeyTheory FindKeyTheory(const StudyInputs& inputs, const std::vector<double>& parameters) {
+  constexpr int kRowsAlong = 32;
+  constexpr int kRowsOfCurve = 12;
+  constexpr int kColumnsOfCurve = 24;
+  constexpr size_t kMostPairs = 4;
+  const size_t keys = inputs.study.num_keys();
+  KeyTheory theory;
+  std::vector<unsigned> axes;
+  try {
+    for (size_t key = 0; key < keys; ++key) {
+      axes.push_back(FindChangedAxes(inputs, parameters, key));
+      theory.knows.push_back(axes.back() != 0);
+      if (axes.back() == 0) continue;
+      FindTurnsAlong(inputs, parameters, key, axes.back(), kRowsAlong, [&](bool is_stability, double value) {
+        theory.turns.push_back({key, is_stability, value});
+      });
+    }
+    size_t pairs = 0;
+    for (size_t x = 0; x < keys; ++x) {
+      for (size_t y = x + 1; y < keys && pairs < kMostPairs; ++y) {
+        if ((axes[x] & axes[y]) == 0) continue;
+        ++pairs;
+        KeyTheory::Curve stability{x, y, true, {}};
+        KeyTheory::Curve damping{x, y, false, {}};
+        std::vector<double> point = parameters;
+        for (int i = 0; i <= kColumnsOfCurve; ++i) {
+          point[x] = Interpolate(inputs.study.variations[x], static_cast<double>(i) / kColumnsOfCurve);
+          FindTurnsAlong(inputs, point, y, axes[x] & axes[y], kRowsOfCurve,
+                         [&](bool is_stability, double value) {
+                           (is_stability ? stability : damping).points.emplace_back(point[x], value);
+                         });
+        }
+        for (KeyTheory::Curve* curve : {&stability, &damping}) {
+          if (!curve->points.empty()) theory.curves.push_back(std::move(*curve));
+        }
+      }
+    }
+  } catch (const InputError&) {  // values that make no scenario: there is no more to say
+  }
+  theory.knows.resize(keys, false);
+  return theory;
 }
 
 }  // namespace dexcheck

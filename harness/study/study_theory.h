@@ -2,6 +2,7 @@
 
 // What the sampled error dynamics say of a study's trials.
 
+#include <cstddef>
 #include <functional>
 #include <utility>
 #include <vector>
@@ -18,7 +19,7 @@ bool IsStableInTheory(const StudyInputs& inputs, const std::vector<double>& para
 /// Largest |eigenvalue| of one sample of (57) of all axes.
 double CalcRadiusInTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
 
-/// Whether it is damped at least critically on all axes.
+/// Whether it is damped at least critically on all axes (IsDamped).
 bool IsDampedInTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
 
 /// Overshoot of the step response to the start error within the run, relative to it; 0 when there is none.
@@ -32,5 +33,29 @@ using TheoryTest = std::function<bool(const StudyInputs&, const std::vector<doub
 std::vector<std::pair<double, double>> FindTurns(const StudyInputs& inputs,
                                                  const std::vector<double>& parameters,
                                                  const TheoryTest& holds);
+
+/// What (57) says along the keys of a study, each of them on the axes that it changes.
+struct KeyTheory {
+  /// A value of one key at which (57) turns from stable to unstable, or (not `is_stability`) from damped to
+  /// overshooting.
+  struct Turn {
+    size_t key = 0;
+    bool is_stability = true;
+    double value = 0.0;
+  };
+  /// Values of two keys at which it turns.
+  struct Curve {
+    size_t x = 0;  ///< Key.
+    size_t y = 0;
+    bool is_stability = true;
+    std::vector<std::pair<double, double>> points;
+  };
+  std::vector<bool> knows;  ///< By key: whether (57) has it at all.
+  std::vector<Turn> turns;
+  std::vector<Curve> curves;  ///< Of the first pairs of keys that both change one axis.
+};
+
+/// @param parameters values of the other keys.
+KeyTheory FindKeyTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
 
 }  // namespace dexcheck

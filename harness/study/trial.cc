@@ -45,6 +45,15 @@ Outcome Classify(const Setup& setup, const RunResult& run, const TrialResult& re
   return Outcome::kTracked;
 }
 
+/// The range of a key beside these values of the others of its table.
+Variation FindRange(const Study& study, size_t index, const std::vector<double>& values) {
+  const std::span<const Variation> all(study.variations);
+  const size_t keys = study.num_keys();
+  if (index < keys) return FixRange(all.first(keys), index, values);
+  return FixRange(all.subspan(keys), index - keys,
+                  {values.begin() + static_cast<std::ptrdiff_t>(keys), values.end()});
+}
+
 }  // namespace
 
 Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial) {
@@ -83,8 +92,7 @@ void CheckTrials(StudyInputs* inputs) {
   const Study& study = inputs->study;
   Trial trial;
   if (study.is_search()) {
-    std::vector<double> point;
-    for (size_t i = 0; i < study.num_keys(); ++i) point.push_back(ValueAt(study.variations[i], 0.5));
+    const std::vector<double> point = ValuesAt(study.keys(), std::vector<double>(study.num_keys(), 0.5));
     trial = ListTrialsOfPoint(study, 0, point, ListDraws(study)).front();
   } else {
     trial = ListTrials(study).front();
@@ -92,13 +100,18 @@ void CheckTrials(StudyInputs* inputs) {
   const Scenario first = MakeTrialScenario(*inputs, trial);
   inputs->engine = LoadMjcf(inputs->mjcf);
   const Setup setup(first, inputs->robot, inputs->mjcf, MakeEngine(*inputs));
+  const std::vector<double> parameters = trial.parameters;
   for (size_t i = 0; i < study.variations.size(); ++i) {
-    const double value = trial.parameters[i];
-    for (const double end : {study.variations[i].from, study.variations[i].to}) {
+    const Variation range = FindRange(study, i, parameters);
+    for (const double end : {range.from, range.to}) {
+      trial.parameters = parameters;
       trial.parameters[i] = end;
+      for (size_t j = i + 1; j < parameters.size(); ++j) {
+        if (study.variations[j].depends_on_others())
+          trial.parameters[j] = ValueAt(FindRange(study, j, trial.parameters), 0.5);
+      }
       MakeTrialScenario(*inputs, trial);
     }
-    trial.parameters[i] = value;
   }
 }
 

@@ -3,12 +3,22 @@
 // that others' work falls on both alike. Then how much faster two at a time are than one after the other.
 //
 // study_benchmark [REPETITIONS]
+//
+// With rows, what many of them cost: the page, a merge of four parts, and a resumption with nothing to do,
+// each by the program itself; wall time, processor time and most memory.
+//
+// study_benchmark rows N DEXCHECK
 
 #include <fmt/format.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
+#include <filesystem>
+#include <string_view>
 #include <vector>
 
 #include "controller/common/toml_reader.h"
@@ -30,12 +40,12 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-StudyInputs MakeInputs() {
+StudyInputs MakeInputs(const std::string& more) {
   StudyInputs inputs;
   inputs.study = ParseStudy(
       "name = \"s\"\nscenario = \"offset\"\nset = [\"duration=3\", \"start_error.xyz=[1e-5, 0, "
-      "0]\"]\n[[vary]]\nkey = "
-      "\"control.K_v\"\nfrom = 20\nto = 60\ncount = 1000\n",
+      "0]\"]\n" +
+          more,
       "study.toml");
   inputs.scenario_folder = kSource + "/harness/shipped/scenarios";
   inputs.scenario_text = ReadTextFile(inputs.scenario_folder / "offset.toml");
@@ -46,7 +56,7 @@ StudyInputs MakeInputs() {
 }
 
 void Compare(int repetitions) {
-  StudyInputs inputs = MakeInputs();
+  StudyInputs inputs = MakeInputs("[[vary]]\nkey = \"control.K_v\"\nfrom = 20\nto = 60\ncount = 1000\n");
   const std::vector<Trial> trials = ListTrials(inputs.study);
   CheckTrials(&inputs);
   const testing::TempFolder folder;
@@ -94,10 +104,85 @@ void Compare(int repetitions) {
              ratios.size(), Median(ratios));
 }
 
+/// Runs the program and prints what it took.
+void Time(const std::string& what, std::vector<std::string> arguments) {
+  const auto start = std::chrono::steady_clock::now();
+  const pid_t child = ::fork();
+  if (child == 0) {
+    std::vector<char*> pointers;
+    for (std::string& argument : arguments) pointers.push_back(argument.data());
+    pointers.push_back(nullptr);
+    ::execv(pointers.front(), pointers.data());
+    ::_exit(127);
+  }
+  int status = 0;
+  rusage usage{};
+  ::wait4(child, &status, 0, &usage);
+  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double processor = static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+                           1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+  fmt::print("{:<28}{:8.1f} s of wall time {:8.1f} s of processor time {:8.0f} MB of memory{}\n", what, wall,
+             processor, static_cast<double>(usage.ru_maxrss) / 1024.0, status == 0 ? "" : ", FAILED");
+  std::fflush(stdout);
+}
+
+/// Rows as trials would have left them: the numbers are made up.
+void MakeParts(const std::filesystem::path& folder, const StudyInputs& inputs, long parts) {
+  const StudyIdentity identity = IdentifyStudy(inputs);
+  const std::vector<Trial> trials = ListTrials(inputs.study);
+  for (long part = 0; part < parts; ++part) {
+    StudyStore store =
+        StudyStore::OpenOrCreate(folder / fmt::format("part-{}.sqlite", part), identity, inputs.study);
+    std::vector<TrialRow> rows;
+    for (auto i = static_cast<size_t>(part); i < trials.size(); i += static_cast<size_t>(parts)) {
+      TrialRow row;
+      row.trial = trials[i];
+      row.machine = "a machine that made this row";
+      for (size_t k = 0; k < row.result.metrics.size(); ++k)
+        row.result.metrics[k] = 1.0 + std::sin(static_cast<double>(i * (k + 1)));
+      rows.push_back(std::move(row));
+      constexpr size_t kTogether = 10000;
+      if (rows.size() < kTogether) continue;
+      store.Add(rows);
+      rows.clear();
+    }
+    store.Add(rows);
+  }
+}
+
+void MeasureRows(long count, const std::string& program) {
+  const long side = std::lround(std::sqrt(static_cast<double>(count)));
+  const std::string text = fmt::format(
+      "[[objective]]\nminimize = \"energy\"\n[[vary]]\nkey = \"control.K_p\"\nfrom = 100\nto = 1e4\n"
+      "count = {0}\n[[vary]]\nkey = \"control.K_v\"\nfrom = 20\nto = 60\ncount = {0}\n",
+      side);
+  const StudyInputs inputs = MakeInputs(text);
+  const testing::TempFolder folder;
+  const auto file = [&](const std::string& name) { return (folder.path() / name).string(); };
+  testing::WriteText(file("study.toml"), inputs.study.text);
+  constexpr long kParts = 4;
+  MakeParts(folder.path(), inputs, kParts);
+  std::vector<std::string> merge = {program, "study", "merge", "--quiet", file("all.sqlite")};
+  for (long part = 0; part < kParts; ++part) merge.push_back(file(fmt::format("part-{}.sqlite", part)));
+  fmt::print("{} rows\n", side * side);
+  Time("merge of 4 parts", merge);
+  fmt::print("  database of {:.0f} MB\n",
+             1e-6 * static_cast<double>(std::filesystem::file_size(file("all.sqlite"))));
+  Time("resume with nothing to do",
+       {program, "study", "run", file("study.toml"), "--db", file("all.sqlite"), "--quiet"});
+  Time("page", {program, "study", "report", file("all.sqlite"), "--out", file("page.html")});
+  fmt::print("  page of {:.1f} MB\n",
+             1e-6 * static_cast<double>(std::filesystem::file_size(file("page.html"))));
+}
+
 }  // namespace
 }  // namespace dexcheck
 
 int main(int argc, char** argv) {
+  if (argc == 4 && std::string_view(argv[1]) == "rows") {
+    dexcheck::MeasureRows(std::clamp(std::atol(argv[2]), 4L, dexcheck::kMaxTrials), argv[3]);
+    return 0;
+  }
   dexcheck::Compare(argc > 1 ? std::clamp(std::atoi(argv[1]), 1, 100) : 15);
   return 0;
 }

@@ -82,6 +82,62 @@
     return row => Number.isFinite(value(row, column)) ? Viridis(Math.min(Math.max(axis.place(value(row, column)), 0), 1)) : '#bbb';
   };
 
+  // What (57) says: where its error dynamics turn unstable (a line), or overshoot (dashes).
+  const theory = study.theory;
+  const Stroke = (g, isStability, draw) => {
+    g.save();
+    g.strokeStyle = style('--ink') || '#222';
+    g.lineWidth = 1.6;
+    g.setLineDash(isStability ? [] : [5, 4]);
+    g.beginPath();
+    draw();
+    g.stroke();
+    g.restore();
+  };
+  const DrawTheory = (g, w, h, x, y, id) => {
+    const kx = x.column - kFirstKey, ky = y.column - kFirstKey;
+    const isKey = k => k >= 0 && k < study.keys.length;
+    const kinds = new Set();
+    g.save();
+    g.beginPath();
+    g.rect(60, 10, w - 70, h - 50);
+    g.clip();
+    if (isKey(kx) && isKey(ky)) {
+      for (const curve of theory.curves) {
+        const turned = curve.x === ky && curve.y === kx;
+        if (!turned && !(curve.x === kx && curve.y === ky)) continue;
+        kinds.add(curve.stability);
+        // A key may turn more than once: the points are dots, and a line only where the next one is near.
+        Stroke(g, curve.stability, () => {
+          let last = null;
+          for (const point of curve.points) {
+            const [a, b] = turned ? [point[1], point[0]] : point;
+            const px = x.place(a), py = y.place(b);
+            const near = last && Math.hypot(px - last[0], py - last[1]) < 0.25 * Math.max(w, h);
+            g[near ? 'lineTo' : 'moveTo'](px, py);
+            last = [px, py];
+          }
+        });
+      }
+    } else {
+      for (const [k, axis] of [[kx, x], [ky, y]]) {
+        if (!isKey(k)) continue;
+        for (const turn of theory.turns.filter(turn => turn.key === k)) {
+          kinds.add(turn.stability);
+          const at = axis.place(turn.value);
+          Stroke(g, turn.stability, () => {
+            g.moveTo(axis === x ? at : 60, axis === x ? 10 : at);
+            g.lineTo(axis === x ? at : w - 10, axis === x ? h - 40 : at);
+          });
+        }
+      }
+    }
+    g.restore();
+    const names = [...kinds].sort().reverse().map(kind =>
+      kind ? 'line: where the error dynamics (57) turn unstable' : 'dashes: where they are damped critically');
+    byId(id).textContent = names.length ? 'Theory, ' + names.join('; ') + '; other keys as in ' + theory.place + '.' : '';
+  };
+
   // Places that can be chosen, by canvas.
   const places = {};
   const DrawScatter = () => {
@@ -120,6 +176,7 @@
       g.stroke();
       byId('front').textContent = 'Pareto front: ' + front.length + ' trials';
     }
+    DrawTheory(g, w, h, x, y, 'theory');
     Mark(g, points);
   };
   const Mark = (g, points) => {
@@ -168,6 +225,7 @@
     g.fillStyle = style('--ink') || '#222';
     DrawAxes(g, w, h, x, y);
     byId('range').textContent = means.length ? 'mean from ' + Number(least.toPrecision(3)) + ' to ' + Number(most.toPrecision(3)) : '';
+    DrawTheory(g, w, h, x, y, 'theory-over');
     Mark(g, points);
   };
 
@@ -176,7 +234,9 @@
   const DrawParallel = () => {
     const {g, w, h} = Begin('parallel');
     const shown = [...study.keys.keys()].map(i => kFirstKey + i).slice(0, 12).concat(Number(byId('y').value));
-    parallel = shown.map((column, i) => ({...MakeAxis(column, h - 30, 24), at: 40 + (w - 80) * i / (shown.length - 1)}));
+    const bottom = h - 66, left = 96;
+    parallel = shown.map((column, i) =>
+      ({...MakeAxis(column, bottom, 24), at: left + (w - left - 24) * i / (shown.length - 1)}));
     const color = ColorBy(Number(byId('color').value));
     const every = Math.max(1, Math.ceil(rows.length / 1500));
     g.globalAlpha = Math.max(0.15, Math.min(1, 60 / rows.length));
@@ -204,12 +264,21 @@
       g.strokeStyle = style('--soft') || '#888';
       g.beginPath();
       g.moveTo(axis.at, 24);
-      g.lineTo(axis.at, h - 30);
+      g.lineTo(axis.at, bottom);
       g.stroke();
       g.fillStyle = style('--ink') || '#222';
-      const name = columns[axis.column].name.split('.').pop();
-      g.fillText(name.slice(0, Math.max(4, Math.floor((w - 80) / shown.length / 6))), axis.at, i % 2 ? h - 4 : h - 16);
+      // Slanted, so that many names fit; without the section that most keys share.
+      g.save();
+      g.translate(axis.at + 4, bottom + 12);
+      g.rotate(-0.55);
+      g.textAlign = 'right';
+      g.fillText(columns[axis.column].name.replace(/^[^.]*\./, '').slice(-20), 0, 0);
+      g.restore();
       g.fillText(FormatTick(axis.most, axis.column), axis.at, 18);
+      for (const turn of theory.turns.filter(turn => turn.key === axis.column - kFirstKey)) {
+        const at = axis.place(turn.value);
+        if (at >= 24 && at <= bottom) Stroke(g, turn.stability, () => { g.moveTo(axis.at - 9, at); g.lineTo(axis.at + 9, at); });
+      }
       if (brushes.has(axis.column)) {
         const [least, most] = brushes.get(axis.column).map(axis.place);
         g.fillStyle = style('--accent') || '#06c';
@@ -219,6 +288,8 @@
       }
     });
   };
+
+  byId('theory-beside').textContent = theory.turns.length ? ' Bars across an axis: where (57) turns, as in the charts above.' : '';
 
   // The value of each point of a search, and the best until then.
   const DrawHistory = () => {
@@ -264,7 +335,7 @@
     byId('importance').replaceChildren(...list.map(([key, r]) => {
       const tr = document.createElement('tr');
       const name = document.createElement('td'), bar = document.createElement('td'), number = document.createElement('td');
-      name.textContent = key;
+      name.textContent = key + (theory.knows[study.keys.indexOf(key)] ? ' (57)' : '');
       const div = document.createElement('div');
       div.className = 'bar';
       div.style.width = (8 * Math.abs(r)).toFixed(2) + 'rem';
@@ -313,7 +384,8 @@
   const ListSettings = row => study.overrides.concat(study.keys.map((key, i) => {
     const labels = columns[kFirstKey + i].labels, x = value(row, kFirstKey + i);
     return key + '=' + (labels ? labels[x] : String(x));
-  })).map(setting => ' --set ' + Quote(setting)).join('');
+  })).concat(study.rounds.filter(round => round.first <= value(row, kNumber)).slice(-1)
+    .map(round => 'duration=' + round.duration)).map(setting => ' --set ' + Quote(setting)).join('');
   const Choose = row => {
     chosen = row;
     byId('chosen').hidden = row < 0;

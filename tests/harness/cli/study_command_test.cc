@@ -11,21 +11,10 @@
 #include <random>
 #include <thread>
 
-namespace dexcheck {
+namespace dexcheck::testing {
 namespace {
 
-using testing::DexcheckCommand;
-using testing::Dump;
 using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::kNumTrials;
-using testing::kStudy;
-using testing::Program;
-using testing::ProgramOptions;
-using testing::ProgramResult;
-using testing::RunDexcheck;
-using testing::StudyCommand;
-using testing::WriteText;
 
 /// Where settling leaves the object, m; a twentieth of the start error, measured 5e-9.
 constexpr double kSettled = 5e-8;
@@ -111,7 +100,7 @@ TEST_F(StudyCommand, AnEditedStudyKeepsItsRows) {
   ASSERT_EQ(RunDexcheck(RunArguments("reference.sqlite", {"--quiet"})).exit_code, 0);
   ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--quiet"})).exit_code, 0);
   // One value goes, one comes.
-  WriteText(folder_.path() / "tiny.toml", testing::ReplaceOnce(kStudy, "[20, 200, 2100]", "[300, 20, 200]"));
+  WriteText(folder_.path() / "tiny.toml", ReplaceOnce(kStudy, "[20, 200, 2100]", "[300, 20, 200]"));
   const ProgramResult edited = RunDexcheck(RunArguments("a.sqlite"));
   EXPECT_EQ(edited.exit_code, 0) << edited.err;
   EXPECT_THAT(edited.out, HasSubstr("the study was edited: 4 trials are kept, 2 are set aside"));
@@ -152,7 +141,7 @@ TEST_F(StudyCommand, MistakesAreNamed) {
     EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite", {"--shard", shard})),
                           {"--shard: must be I/N with 1 <= I <= N, got \"" + std::string(shard) + "\""}));
   }
-  WriteText(folder_.path() / "tiny.toml", testing::ReplaceOnce(kStudy, "control.K_v", "control.K_w"));
+  WriteText(folder_.path() / "tiny.toml", ReplaceOnce(kStudy, "control.K_v", "control.K_w"));
   EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite")), {"control.K_w: unknown key, did you mean"}));
   EXPECT_FALSE(std::filesystem::exists(Path("a.sqlite"))) << "nothing was begun";
 }
@@ -173,19 +162,19 @@ TEST_F(StudyCommand, TheReportsCommandsRepeatTheTrials) {
     shown.replace(at, quote.size(), "'");
   }
   EXPECT_THAT(shown, HasSubstr("--set control.K_p=10000 --set control.K_v=200"));
-  const std::filesystem::path program = testing::ProgramPath();
+  const std::filesystem::path program = ProgramPath();
   ProgramOptions options;
   options.folder = folder_.path();
   options.environment = {{"PATH", program.parent_path().string() + ":" + ::getenv("PATH")}};
-  const ProgramResult replay = testing::RunProgram({"sh", "-c", shown}, options);
+  const ProgramResult replay = RunProgram({"sh", "-c", shown}, options);
   EXPECT_EQ(replay.exit_code, 0) << replay.err;
-  EXPECT_EQ(testing::ReadText(folder_.path() / "trial-4/video.mp4").substr(4, 4), "ftyp");
+  EXPECT_EQ(ReadText(folder_.path() / "trial-4/video.mp4").substr(4, 4), "ftyp");
   // The same number, bit for bit.
-  const auto summary = nlohmann::json::parse(testing::ReadText(folder_.path() / "trial-4/summary.json"));
+  const auto summary = nlohmann::json::parse(ReadText(folder_.path() / "trial-4/summary.json"));
   const std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
   EXPECT_EQ(summary["tracking"]["position_error_rms_m"].get<double>(),
             rows[4].result.metrics[kPositionErrorRms]);
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::testing

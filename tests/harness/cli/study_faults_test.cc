@@ -6,18 +6,10 @@
 
 #include "tests/harness/cli/study_command.h"
 
-namespace dexcheck {
+namespace dexcheck::testing {
 namespace {
 
-using testing::DexcheckCommand;
-using testing::Dump;
 using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::ProgramOptions;
-using testing::ProgramResult;
-using testing::RunDexcheck;
-using testing::StudyCommand;
-using testing::WriteText;
 
 // One trial that takes about two seconds of processor time, and one that takes none to speak of.
 const std::string kSlowStudy = R"(name = "slow"
@@ -33,7 +25,7 @@ TEST_F(StudyCommand, ATrialThatIsAlwaysKilledEndsNoStudyAndCanBeRetried) {
   std::vector<std::string> limited = DexcheckCommand(RunArguments("a.sqlite", {"--jobs", "2"}));
   // With a hard limit of its processor time the system kills every process that takes more.
   limited.insert(limited.begin(), {"prlimit", "--cpu=1:1"});
-  const ProgramResult result = testing::RunProgram(limited);
+  const ProgramResult result = RunProgram(limited);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("--retry-failed"));
   std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
@@ -88,8 +80,8 @@ TEST_F(StudyCommand, AFullFileSystemLosesNothing) {
   const auto run = [&](const std::string& script) {
     std::vector<std::string> command = apart;
     command.insert(command.end(), {script, "sh", folder_.path() / "disk", folder_.path() / "tiny.toml",
-                                   folder_.path(), testing::ProgramPath()});
-    return testing::RunProgram(command);
+                                   folder_.path(), ProgramPath()});
+    return RunProgram(command);
   };
   std::filesystem::create_directory(folder_.path() / "disk");
   if (run(mount).exit_code != 0) GTEST_SKIP() << "no file system may be mounted here";
@@ -107,7 +99,7 @@ TEST_F(StudyCommand, AFullFileSystemLosesNothing) {
     cp "$1/a.sqlite" "$3/freed.sqlite"
     exit $code)");
   EXPECT_TRUE(IsRefused(result, {"disk/a.sqlite: cannot be written: database or disk is full"}));
-  EXPECT_EQ(testing::ReadText(Path("left.txt")), "a.sqlite\nfiller\n");
+  EXPECT_EQ(ReadText(Path("left.txt")), "a.sqlite\nfiller\n");
   EXPECT_EQ(Dump(Path("full.sqlite")), before);
   EXPECT_EQ(Dump(Path("freed.sqlite")), Reference());
 }
@@ -122,9 +114,9 @@ TEST_F(StudyCommand, AReadOnlyDatabaseIsNamed) {
     ::chmod(folder_.path().c_str(), 0755);
     command.insert(command.begin(), {"setpriv", "--reuid=65534", "--clear-groups"});
   }
-  EXPECT_TRUE(IsRefused(testing::RunProgram(command), {"a.sqlite: cannot be written: it is read-only"}));
+  EXPECT_TRUE(IsRefused(RunProgram(command), {"a.sqlite: cannot be written: it is read-only"}));
   EXPECT_EQ(Dump(Path("a.sqlite")), before);
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::testing

@@ -6,18 +6,10 @@
 
 #include "tests/harness/cli/study_command.h"
 
-namespace dexcheck {
+namespace dexcheck::testing {
 namespace {
 
-using testing::Dump;
 using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::kStudy;
-using testing::ProgramOptions;
-using testing::ProgramResult;
-using testing::RunDexcheck;
-using testing::StudyCommand;
-using testing::WriteText;
 
 TEST_F(StudyCommand, MergedShardsAreTheStudy) {
   const std::string reference = Reference();
@@ -31,7 +23,7 @@ TEST_F(StudyCommand, MergedShardsAreTheStudy) {
   EXPECT_THAT(merged.out, HasSubstr("tiny: 6 of 6 trials"));
   EXPECT_EQ(Dump(Path("all.sqlite")), reference);
 
-  WriteText(folder_.path() / "tiny.toml", testing::ReplaceOnce(kStudy, "duration=0.02", "duration=0.03"));
+  WriteText(folder_.path() / "tiny.toml", ReplaceOnce(kStudy, "duration=0.02", "duration=0.03"));
   EXPECT_TRUE(
       IsRefused(RunDexcheck(RunArguments("1.sqlite")), {"1.sqlite: is of another study: study differs"}));
   ASSERT_EQ(RunDexcheck(RunArguments("other.sqlite", {"--shard", "1/6"})).exit_code, 0);
@@ -115,4 +107,4 @@ TEST_F(StudyCommand, RowsOfOtherMachinesAreMergedWithinRounding) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::testing

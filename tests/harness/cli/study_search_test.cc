@@ -11,17 +11,10 @@
 #include "harness/study/search_history.h"
 #include "tests/harness/cli/study_command.h"
 
-namespace dexcheck {
+namespace dexcheck::testing {
 namespace {
 
-using testing::DexcheckCommand;
-using testing::Dump;
 using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::Program;
-using testing::ProgramResult;
-using testing::RunDexcheck;
-using testing::WriteText;
 
 // Gains of a run so short that the error hardly moves: the object's own weight and the start error decide.
 const std::string kSearch = R"(name = "tiny"
@@ -47,7 +40,7 @@ to = 1500
 spacing = "log"
 )";
 
-class StudySearch : public testing::StudyCommand {
+class StudySearch : public StudyCommand {
  protected:
   StudySearch() { WriteText(folder_.path() / "tiny.toml", kSearch); }
 };
@@ -111,8 +104,7 @@ TEST_F(StudySearch, IsWatchedShownAndExported) {
   EXPECT_EQ(watched.exit_code, 0) << watched.err;
   EXPECT_THAT(watched.out, HasSubstr("tiny: 48 of at most 48 trials"));
   EXPECT_THAT(watched.out, HasSubstr("The least position_error_rms"));
-  EXPECT_THAT(testing::ReadText(Path("a.html")), ::testing::Not(HasSubstr("http-equiv=\"refresh\"")))
-      << "it is over";
+  EXPECT_THAT(ReadText(Path("a.html")), ::testing::Not(HasSubstr("http-equiv=\"refresh\""))) << "it is over";
   const std::vector<TrialRow> rows = StudyStore::Open(Path("a.sqlite")).ReadRows();
   const ProgramResult shown = RunDexcheck({"study", "show", Path("a.sqlite"), "17"});
   EXPECT_EQ(shown.exit_code, 0) << shown.err;
@@ -132,12 +124,54 @@ TEST_F(StudySearch, IsWatchedShownAndExported) {
   EXPECT_EQ(std::strtod(csv.out.c_str() + at, nullptr), rows[17].trial.parameters[0]);
 }
 
-TEST_F(StudySearch, HasNoShards) {
+// Parts with a database each, which share a folder: whatever happens to them, their rows are the search's.
+TEST_F(StudySearch, PartsMakeTheSearchTogether) {
+  const auto part = [&](const std::string& shard) {
+    return RunArguments(shard.substr(0, 1) + ".sqlite",
+                        {"--shard", shard, "--exchange", Path("rows"), "--jobs", "1"});
+  };
+  ASSERT_EQ(RunDexcheck(RunArguments("whole.sqlite", {"--quiet"})).exit_code, 0);
+  const std::string reference = Dump(Path("whole.sqlite"));
+  Program one(DexcheckCommand(part("1/2")), {});
+  {
+    const Program killed(DexcheckCommand(part("2/2")), {});
+    std::this_thread::sleep_for(std::chrono::milliseconds(700));
+  }
+  EXPECT_LT(CountRows("2.sqlite"), 48) << "it was killed too late to matter";
+  Program two(DexcheckCommand(part("2/2")), {});
+  for (const ProgramResult& result : {one.Wait(), two.Wait()}) EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(Dump(Path("1.sqlite")), reference);
+  EXPECT_EQ(Dump(Path("2.sqlite")), reference);
+  EXPECT_FALSE(std::filesystem::is_empty(Path("rows")));
+}
+
+TEST_F(StudySearch, APartWhoseOthersStayAwayMakesTheSearchAlone) {
+  WriteText(folder_.path() / "tiny.toml", ReplaceOnce(kSearch, "count = 24", "count = 8"));
+  ASSERT_EQ(RunDexcheck(RunArguments("whole.sqlite", {"--quiet"})).exit_code, 0);
+  const ProgramResult alone =
+      RunDexcheck(RunArguments("a.sqlite", {"--shard", "2/3", "--exchange", Path("rows"), "--quiet"}));
+  EXPECT_EQ(alone.exit_code, 0) << alone.err;
+  EXPECT_EQ(Dump(Path("a.sqlite")), Dump(Path("whole.sqlite")));
+  // Rows of a machine whose bits are others cannot lead on.
+  for (const auto& file : std::filesystem::directory_iterator(Path("rows"))) {
+    Database(file.path(), Database::Mode::kExisting).Execute("UPDATE trials SET machine = 'abacus'");
+  }
+  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("b.sqlite", {"--shard", "1/3", "--exchange", Path("rows")})),
+                        {"another kind of machine, \"abacus\""}));
+}
+
+TEST_F(StudySearch, PartsNeedAFolder) {
   EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})),
-                        {"--shard: the trials of a search"}));
-  EXPECT_TRUE(IsRefused(RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "2"}),
-                        {"tiny.toml: search: the trials of a search follow from one another"}));
+                        {"--shard: the trials of a search follow from one another"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite", {"--exchange", Path("rows")})),
+                        {"--exchange: is for the parts of a search"}));
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "3", "--array-size", "2"}),
+                {"--tasks: the parts of a search wait for each other"}));
+  const ProgramResult script = RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "2"});
+  EXPECT_EQ(script.exit_code, 0) << script.err;
+  EXPECT_THAT(script.out, HasSubstr("--exchange \"tiny-of-2-exchange\""));
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::testing

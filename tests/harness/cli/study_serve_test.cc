@@ -7,15 +7,10 @@
 
 #include "tests/harness/cli/study_command.h"
 
-namespace dexcheck {
+namespace dexcheck::testing {
 namespace {
 
-using testing::Dump;
 using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::ProgramResult;
-using testing::RunDexcheck;
-using testing::WriteText;
 
 const std::string kExternal = R"(name = "tiny"
 scenario = "offset"
@@ -35,7 +30,7 @@ from = 20
 to = 1500
 )";
 
-class StudyServe : public testing::StudyCommand {
+class StudyServe : public StudyCommand {
  protected:
   StudyServe() { WriteText(folder_.path() / "tiny.toml", kExternal); }
 
@@ -44,8 +39,8 @@ class StudyServe : public testing::StudyCommand {
                                                   const std::string& database) const {
     WriteText(folder_.path() / "lines.txt", lines);
     const ProgramResult result =
-        testing::RunProgram({"sh", "-c", "\"$0\" study serve \"$1\" --db \"$2\" --jobs 2 < \"$3\"",
-                             testing::ProgramPath(), Path("tiny.toml"), Path(database), Path("lines.txt")});
+        RunProgram({"sh", "-c", "\"$0\" study serve \"$1\" --db \"$2\" --jobs 2 < \"$3\"", ProgramPath(),
+                    Path("tiny.toml"), Path(database), Path("lines.txt")});
     EXPECT_EQ(result.exit_code, 0) << result.err;
     std::vector<nlohmann::json> answers;
     std::istringstream out(result.out);
@@ -91,8 +86,8 @@ server.stdin.close()
 print(server.wait(), study.best_value, study.trials[0].value)
 )";
   const ProgramResult result =
-      testing::RunProgram({"/usr/bin/python3", "-W", "ignore", "-c", script, testing::ProgramPath(), "study",
-                           "serve", Path("tiny.toml"), "--db", Path("b.sqlite"), "--jobs", "1"});
+      RunProgram({"/usr/bin/python3", "-W", "ignore", "-c", script, ProgramPath(), "study", "serve",
+                  Path("tiny.toml"), "--db", Path("b.sqlite"), "--jobs", "1"});
   if (result.err.find("No module named 'optuna'") != std::string::npos) GTEST_SKIP() << "no Optuna here";
   ASSERT_EQ(result.exit_code, 0) << result.err;
   std::istringstream numbers(result.out);
@@ -108,4 +103,4 @@ print(server.wait(), study.best_value, study.trials[0].value)
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::testing

@@ -4,18 +4,10 @@
 
 #include "tests/harness/cli/study_command.h"
 
-namespace dexcheck {
+namespace dexcheck::testing {
 namespace {
 
-using testing::Dump;
 using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::kStudy;
-using testing::ProgramOptions;
-using testing::ProgramResult;
-using testing::RunDexcheck;
-using testing::StudyCommand;
-using testing::WriteText;
 
 TEST_F(StudyCommand, TheBatchScriptIsReady) {
   const ProgramResult result = RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "7"});
@@ -46,7 +38,7 @@ TEST_F(StudyCommand, TheBatchScriptMakesTheStudyInFewElements) {
   options.folder = folder_.path();
   for (const char* element : {"1", "2"}) {
     options.environment = {{"SLURM_ARRAY_TASK_ID", element}, {"SLURM_CPUS_PER_TASK", "2"}};
-    const ProgramResult result = testing::RunProgram({"bash", "job.sh"}, options);
+    const ProgramResult result = RunProgram({"bash", "job.sh"}, options);
     EXPECT_EQ(result.exit_code, 0) << result.err;
   }
   const ProgramResult merged = RunDexcheck({"study", "merge", Path("all.sqlite"), Path("tiny-1-of-3.sqlite"),
@@ -75,7 +67,7 @@ TEST_F(StudyCommand, NoJobIsPrintedThatCannotRun) {
                                  {"settle=0.3", "settle=-1"},
                                  {"\"offset\"", "\"offsett\""},
                                  {"settle=0.3", "grasp.xyz=[0, 0, 9]"}}) {
-    WriteText(folder_.path() / "tiny.toml", testing::ReplaceOnce(kStudy, from, to));
+    WriteText(folder_.path() / "tiny.toml", ReplaceOnce(kStudy, from, to));
     const ProgramResult run = RunDexcheck(RunArguments("a.sqlite"));
     const ProgramResult printed = slurm({});
     EXPECT_TRUE(IsRefused(printed, {}));
@@ -84,4 +76,4 @@ TEST_F(StudyCommand, NoJobIsPrintedThatCannotRun) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::testing

@@ -110,3 +110,36 @@ Dump() { sqlite3 "$1" '.mode quote' 'SELECT * FROM study' 'SELECT * FROM trials 
 [[ $(sqlite3 single.sqlite 'SELECT count(*) FROM trials') -eq 12 ]]
 diff <(Dump merged.sqlite) <(Dump single.sqlite)
 echo "four tasks on two nodes, one requeued: 12 trials equal to those of one process"
+
+# A search by two tasks that share nothing but a folder.
+cat >search.toml <<'END'
+name = "search"
+scenario = "offset"
+set = ["duration=0.05", "settle=0.3"]
+[search]
+method = "cma_es"
+count = 24
+population = 8
+[[objective]]
+minimize = "position_error_rms"
+[[vary]]
+key = "control.K_p"
+from = 100
+to = 1e4
+spacing = "log"
+[[vary]]
+key = "control.K_v"
+from = 20
+to = 1500
+spacing = "log"
+END
+"$dexcheck" study slurm search.toml --tasks 2 >search.sh
+job=$(sbatch --parsable search.sh)
+WaitFor 180 IsDone
+scontrol show job "$job" | grep -E '^ *JobState=' | grep -qv COMPLETED && { scontrol show job "$job" >&2; exit 1; }
+[[ $(scontrol show job "$job" | grep -oE ' NodeList=n[12]' | sort -u | wc -l) -eq 2 ]]
+"$dexcheck" study run search.toml --db search.sqlite --quiet
+[[ $(sqlite3 search.sqlite 'SELECT count(*) FROM trials') -eq 24 ]]
+for part in 1 2; do diff <(Dump search-$part-of-2.sqlite) <(Dump search.sqlite); done
+[[ $(find search-of-2-exchange -name '*.sqlite' | wc -l) -ge 4 ]]
+echo "two tasks on two nodes: the 24 trials of a search equal to those of one process"

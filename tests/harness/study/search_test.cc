@@ -8,6 +8,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/study/search_history.h"
+#include "harness/study/study_answer.h"
 #include "tests/common/throws.h"
 #include "tests/harness/study/search_functions.h"
 
@@ -81,6 +82,38 @@ TEST(Search, FindsAMinimumOnTheEdge) {
   }
 }
 
+// Two keys, a dense grid of 400 points against a tenth of it: corner, valley along an edge, and what error
+// and effort of a loop look like.
+TEST(Search, ATenthOfAGridsTrialsIsEnough) {
+  const std::vector<Function> functions = {
+      [](const UnitPoint& x) { return std::vector<double>{1.0 + 3.0 * (1.0 - x[0]) + 2.0 * (1.0 - x[1])}; },
+      [](const UnitPoint& x) {
+        const double off = x[1] - 0.3 - 0.5 * x[0];
+        return std::vector<double>{0.1 + 20.0 * off * off + 1.0 - x[0]};
+      },
+      [](const UnitPoint& x) {
+        const double w = 5.0 * std::pow(30.0, x[0]);
+        const double z = 0.3 * std::pow(10.0, x[1]);
+        return std::vector<double>{400.0 / (w * w) * (1.0 + 0.2 * z * z) + 0.01 * w * z +
+                                   std::exp(std::min(50.0, (w * z - 260.0) / 20.0))};
+      }};
+  for (const Function& function : functions) {
+    double grid = 1e300;
+    for (int i = 0; i < 400; ++i) grid = std::min(grid, function({i % 20 / 19.0, i / 20 / 19.0})[0]);
+    for (const SearchMethod method : {SearchMethod::kNelderMead, SearchMethod::kBobyqa}) {
+      for (const std::uint64_t seed : {1U, 2U, 3U}) {
+        Search search = MakeSearch(method, 40);
+        search.seed = seed;
+        search.starts = method == SearchMethod::kNelderMead ? 2 : 1;
+        std::vector<JudgedPoint> points = RunSearch(search, {0.5, 0.5}, function);
+        points.resize(std::min(points.size(), size_t{40}));
+        EXPECT_LT(FindBest(points)->judgement.objectives[0], 1.05 * grid) << static_cast<int>(method);
+        EXPECT_GT(points.front().judgement.objectives[0], 1.05 * grid) << "it did not begin there";
+      }
+    }
+  }
+}
+
 TEST(Search, Nsga2ApproachesTheFront) {
   Search search = MakeSearch(SearchMethod::kNsga2, 960);
   search.population = 24;
@@ -128,6 +161,66 @@ TEST(Search, LeavesWhatIsForbidden) {
     searcher->Tell(judgements);
   }
   EXPECT_LT(best, -0.28);
+}
+
+// Rounds of 27, 9, 3 and 1 points; what is best in each goes on, and only the last can be the best.
+TEST(Search, HalvingGoesOnWithTheBest) {
+  const Study study = ParseStudy(R"(name = "s"
+scenario = "hold"
+[[objective]]
+minimize = "energy"
+[search]
+method = "halving"
+count = 27
+durations = [0.5, 1, 2, 4]
+[[vary]]
+key = "a"
+from = 0
+to = 1
+[[vary]]
+key = "b"
+from = 0
+to = 1
+)",
+                                 "study.toml");
+  EXPECT_EQ(CountTrials(study), 27 + 9 + 3 + 1);
+  SearchHistory history(study, {0.5, 0.5});
+  std::vector<TrialRow> rows;
+  std::vector<std::string> last;
+  while (!history.is_over()) {
+    for (const Trial& trial : history.ListMissing()) {
+      TrialRow row;
+      row.trial = trial;
+      row.result.metrics.fill(0.0);
+      // Short trials are a little better, and so never the answer.
+      const double round = trial.number < 27 ? 0 : trial.number < 36 ? 1 : trial.number < 39 ? 2 : 3;
+      row.result.metrics[kEnergy] =
+          std::hypot(trial.parameters[0] - 0.2, trial.parameters[1] - 0.7) + 0.1 * round;
+      last = ListOverrides(study, trial);
+      const std::string duration = round == 0 ? "0.5" : round == 1 ? "1" : round == 2 ? "2" : "4";
+      EXPECT_EQ(last.back(), "duration=" + duration) << trial.number;
+      rows.push_back(row);
+      history.Add(row);
+    }
+  }
+  ASSERT_EQ(rows.size(), 40U);
+  double nearest = 1e9;
+  size_t which = 0;
+  for (size_t i = 0; i < 27; ++i) {
+    if (rows[i].result.metrics[kEnergy] >= nearest) continue;
+    nearest = rows[i].result.metrics[kEnergy];
+    which = i;
+  }
+  EXPECT_EQ(rows[39].trial.parameters, rows[which].trial.parameters);
+  ASSERT_NE(FindBest(history.points()), nullptr);
+  EXPECT_EQ(FindBest(history.points())->number, 39);
+  EXPECT_EQ(SummarisePoints(study, rows).best->number, 39);
+  const std::vector<std::string> answers = AnswerStudy(study, rows);
+  ASSERT_EQ(answers.size(), 2U);
+  EXPECT_EQ(
+      answers[0],
+      "Of 27 points that were begun, others were better than 18 after 0.5 s, 6 after 1 s, 2 after 2 s: these "
+      "were stopped, and are kept.");
 }
 
 const std::string kStudy = R"(name = "s"

@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "harness/study/margin_search.h"
+#include "harness/study/sampled_stability.h"
 #include "harness/study/study_answer.h"
 #include "harness/study/study_sensitivity.h"
 
@@ -104,6 +105,50 @@ TEST(SobolIndices, OfTheGFunctionLieInTheirIntervals) {
   // The intervals do not hold what is wrong.
   for (Index& index : known) std::swap(index.first, index.total);
   EXPECT_LT(CalcCoverage(1024, known, g), kLeastCoverage);
+}
+
+// The squared error of a step response, J = e0^2 (K_v^2 + K_p) / (2 K_v K_p), the integral of (57)'s solution
+// from e0 at rest: with K_p = w^2 and K_v = 2 z w it is e0^2 (4 z^2 + 1) / (4 z w), a product of functions of
+// one key each, so that V = prod(1 + v_i) - 1, S_i = v_i / V and ST_i = v_i prod_{j != i}(1 + v_j) / V with
+// v_i = Var f_i / (E f_i)^2.
+TEST(SobolIndices, OfTheLinearLoopLieInTheirIntervals) {
+  constexpr double kError0 = 0.5e-3, kError1 = 1.5e-3;  // m
+  constexpr double kSlow = 10.0, kFast = 30.0;          // rad/s
+  constexpr double kLoose = 0.5, kStiff = 2.0;          // damping ratios
+  const auto relative_variance = [](const std::function<double(double)>& f, double from, double to) {
+    constexpr int kSteps = 20000;
+    double sum = 0.0;
+    double squares = 0.0;
+    for (int i = 0; i < kSteps; ++i) {
+      const double y = f(from + (i + 0.5) / kSteps * (to - from));
+      sum += y / kSteps;
+      squares += y * y / kSteps;
+    }
+    return squares / (sum * sum) - 1.0;
+  };
+  const std::vector<double> v = {
+      relative_variance([](double e0) { return e0 * e0; }, kError0, kError1),
+      relative_variance([](double w) { return 1.0 / w; }, kSlow, kFast),
+      relative_variance([](double z) { return (4.0 * z * z + 1.0) / z; }, kLoose, kStiff)};
+  double all = 1.0;
+  for (const double vi : v) all *= 1.0 + vi;
+  std::vector<Index> known;
+  for (const double vi : v) known.push_back({vi / (all - 1.0), vi * all / (1.0 + vi) / (all - 1.0)});
+  // What a trial of `offset` measures, stepped as the plant steps it.
+  constexpr double kStep = 5e-4;  // s
+  constexpr long kSteps = 2400;
+  const auto measured = [&](const std::vector<double>& x) {
+    const double e0 = kError0 + x[0] * (kError1 - kError0);
+    const double w = kSlow + x[1] * (kFast - kSlow);
+    const double z = kLoose + x[2] * (kStiff - kLoose);
+    double J = 0.0;
+    for (const double e : CalcStepResponse({kStep, 1}, {w * w, 2.0 * z * w}, kSteps))
+      J += kStep * e0 * e0 * e * e;
+    return J;
+  };
+  EXPECT_GE(CalcCoverage(256, known, measured), kLeastCoverage);
+  for (Index& index : known) std::swap(index.first, index.total);
+  EXPECT_LT(CalcCoverage(256, known, measured), kLeastCoverage);
 }
 
 TEST(SobolIndices, LeaveOutWhatHasNoValueAndFindNothingInAConstant) {

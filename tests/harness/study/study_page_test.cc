@@ -147,6 +147,42 @@ TEST_F(StudyPageBrowserTest, LooksCloserAtItsTrials) {
   EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty());
 }
 
+// Where (57) turns stands in the charts: a line across the axis of a key, a curve over two keys.
+TEST_F(StudyPageBrowserTest, DrawsTheoryIntoTheChartsThatAreChosen) {
+  Open(1300, 900, false);
+  ASSERT_TRUE(browser_.WaitFor("return document.getElementById('explore').dataset.ready === 'yes';"));
+  const nlohmann::json theory =
+      browser_.Run("return JSON.parse(document.getElementById('study-data').textContent).theory;");
+  EXPECT_EQ(theory["knows"], (std::vector<bool>{true, true}));
+  double limit = 0.0;
+  for (const nlohmann::json& turn : theory["turns"]) {
+    if (turn["key"] == 1 && turn["stability"] == true) limit = turn["value"];
+  }
+  constexpr double kBisected = 2.0;  // of 2980 in 32 parts, halved ten times
+  EXPECT_NEAR(limit, kLimit - 0.5e-3 * 100.0, kBisected)
+      << "K_v < 2 / h - h K_p / 2 at the first trial's K_p";
+  // Dark pixels of a chart along K_v, in a column at the limit and in one beside it.
+  const std::string count =
+      "const s = document.getElementById('explore-x'); s.value = '4'; s.dispatchEvent(new Event('change'));"
+      "const c = document.getElementById('explore-scatter'), g = c.getContext('2d');"
+      "const w = c.getBoundingClientRect().width, low = Math.log10(20), high = Math.log10(3000);"
+      "const room = 0.04 * (high - low);"
+      "const place = v => (60 + (Math.log10(v) - low + room) / (high - low + 2 * room) * (w - 70)) * "
+      "devicePixelRatio;"
+      "const dark = x => { const d = g.getImageData(Math.round(x) - 2, 20, 5, 200).data; let n = 0;"
+      "  for (let i = 0; i < d.length; i += 4) if (d[i + 3] > 100) ++n; return n; };";
+  const nlohmann::json pixels = browser_.Run(count + "return [dark(place(2000)), dark(place(1200))];");
+  EXPECT_GT(pixels[0].get<int>(), 150);
+  EXPECT_LT(pixels[1].get<int>(), 50);
+  EXPECT_THAT(
+      browser_.Run("return document.getElementById('explore-theory').textContent;").get<std::string>(),
+      HasSubstr("turn unstable"));
+  EXPECT_THAT(
+      browser_.Run("return document.getElementById('explore-theory-over').textContent;").get<std::string>(),
+      HasSubstr("other keys as in the first trial"));
+  EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty());
+}
+
 TEST_F(StudyPageBrowserTest, FitsAPhone) {
   Open(390, 844, true);
   ASSERT_TRUE(browser_.WaitFor("return document.getElementById('explore').dataset.ready === 'yes';"));

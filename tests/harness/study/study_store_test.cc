@@ -47,7 +47,9 @@ class StudyStoreTest : public ::testing::Test {
   }
 
   static TrialSource MakeSource(const std::string& name, const std::vector<TrialRow>& rows) {
-    return {name, [rows] { return rows; }};
+    return {name, [rows](const std::function<void(TrialRow &&)>& take) {
+              for (const TrialRow& row : rows) take(TrialRow(row));
+            }};
   }
 
   TempFolder folder_;
