@@ -38,10 +38,9 @@ ModelTerms::ModelTerms(const RobotModel& model, Coordinates coordinates)
   };
   add_mass(model.base().type == BaseType::kFixed ? MassProperties{} : model.base_with_wheels());
   for (const Joint& joint : model.joints()) {
-    places_.push_back({joint.parent, joint.type == JointType::kRevolute,
-                       !joint.X_PB.isApprox(Pose::Identity(), 0.0), std::cos(joint.mdh.alpha),
-                       std::sin(joint.mdh.alpha), joint.mdh.a, joint.mdh.q, joint.mdh.d, joint.X_PB.linear(),
-                       joint.X_PB.translation()});
+    places_.push_back({joint.parent, joint.type, !joint.X_PB.isApprox(Pose::Identity(), 0.0),
+                       std::cos(joint.mdh.alpha), std::sin(joint.mdh.alpha), joint.mdh.a, joint.mdh.q,
+                       joint.mdh.d, joint.X_PB.linear(), joint.X_PB.translation()});
     add_mass(joint.body);
   }
   for (const Frame& frame : model.frames()) frame_chains_.push_back(ChainTo(model, frame.link));
@@ -75,8 +74,16 @@ void ModelTerms::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<
   velocity_ = velocity;
   SetBaseState(q, velocity);
   const int joints = model_->num_joints();
-  const int q_offset = model_->num_base_positions();
-  for (int i = 0; i < joints; ++i) SetJointState(i, q[q_offset + i], velocity[base_size_ + i]);
+  for (int i = 0; i < joints; ++i) {
+    const int at = model_->position_index(i);
+    if (places_[static_cast<size_t>(i)].type != JointType::kBall) {
+      SetJointState(i, q[at], velocity[base_size_ + i]);
+      continue;
+    }
+    const Eigen::Quaterniond turn(q[at], q[at + 1], q[at + 2], q[at + 3]);
+    SetBallState(i, turn.normalized(), velocity.segment<3>(base_size_ + i));
+    i += 2;
+  }
 }
 
 void ModelTerms::SetBaseState(const Eigen::Ref<const VectorXd>& q,
@@ -186,8 +193,9 @@ void ModelTerms::SetJointState(int joint, double q, double rate) {
     p_B += parent.R * place.p_offset;
   }
   // ^{i-1}T_i of (4), column by column: the row's y and z axes after Rot(x, alpha), then Rot(z, theta).
-  const double theta = place.revolute ? place.q + q : place.q;
-  const double d = place.revolute ? place.d : place.d + q;
+  const bool revolute = place.type == JointType::kRevolute;
+  const double theta = revolute ? place.q + q : place.q;
+  const double d = revolute ? place.d : place.d + q;
   const double c = std::cos(theta);
   const double s = std::sin(theta);
   const Vector3d x = R_B.col(0);
@@ -200,7 +208,7 @@ void ModelTerms::SetJointState(int joint, double q, double rate) {
 
   // The joint's column rides on the parent: S_dot = V_parent x S.
   Column& column = columns_[static_cast<size_t>(base_size_ + joint)];
-  if (place.revolute) {
+  if (revolute) {
     column.w = z;
     column.v = state.p.cross(z);
     column.w_dot = parent.w.cross(z);
@@ -215,6 +223,31 @@ void ModelTerms::SetJointState(int joint, double q, double rate) {
   state.v = parent.v + rate * column.v;
   state.w_dot = parent.w_dot + rate * column.w_dot;
   state.v_dot = parent.v_dot + rate * column.v_dot;
+}
+
+void ModelTerms::SetBallState(int joint, const Eigen::Quaterniond& turn, const Vector3d& rates) {
+  const JointPlace& place = places_[static_cast<size_t>(joint)];
+  const LinkState& parent = link(place.parent);
+  LinkState state;
+  state.R = parent.R * place.R_offset * turn.toRotationMatrix();
+  state.p = parent.p + parent.R * place.p_offset;
+  // The columns ride on the link itself: S_dot = V x S with V = V_parent + sum of rate_k S_k.
+  const Vector3d w = state.R * rates;
+  state.w = parent.w + w;
+  state.v = parent.v + state.p.cross(w);
+  state.w_dot = parent.w_dot;
+  state.v_dot = parent.v_dot;
+  for (int k = 0; k < 3; ++k) {
+    Column& column = columns_[static_cast<size_t>(base_size_ + joint + k)];
+    column.w = state.R.col(k);
+    column.v = state.p.cross(column.w);
+    column.w_dot = state.w.cross(column.w);
+    column.v_dot = state.w.cross(column.v) + state.v.cross(column.w);
+    state.w_dot += rates[k] * column.w_dot;
+    state.v_dot += rates[k] * column.v_dot;
+  }
+  // The links of the first two entries have no mass, and nothing hangs on them.
+  for (int k = 1; k <= 3; ++k) links_[static_cast<size_t>(joint + k)] = state;
 }
 
 Pose ModelTerms::CalcLinkPose(int joint) const {

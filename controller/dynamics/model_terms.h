@@ -127,7 +127,7 @@ class ModelTerms {
   /// Constants of a joint's place in the tree.
   struct JointPlace {
     int parent;
-    bool revolute;
+    JointType type;
     bool has_offset;
     double cos_alpha, sin_alpha, a, q, d;
     Matrix3d R_offset;
@@ -142,6 +142,8 @@ class ModelTerms {
   void SetBaseColumns(const Vector3d& base_linear_velocity);
   void SetFloatingColumns();
   void SetJointState(int joint, double q, double rate);
+  /// Of a ball joint's three entries, from its first one on.
+  void SetBallState(int joint, const Eigen::Quaterniond& turn, const Vector3d& rates);
   static MassIntegrals CalcLinkIntegrals(const LinkMass& mass, const LinkState& state);
   void PushColumn(int depth, const Column& column, int dof);
   void FillRowAndColumn(int depth, int dof, const Column& column, const MassIntegrals& subtree);

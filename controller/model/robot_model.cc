@@ -119,6 +119,10 @@ class SpecChecker {
     CheckFinite(key + "d", joint.mdh.d);
     CheckFinite(key + "range", joint.lower);
     CheckFinite(key + "range", joint.upper);
+    if (joint.type == JointType::kBall) CheckBall(key, joint, index);
+    Check(joint.parent < 0 || IsEndOfJoint(spec_.joints[static_cast<size_t>(joint.parent)]) ||
+              (joint.type == JointType::kBall && joint.ball_axis > 0),
+          key + "parent", "must not be within a ball joint, index", joint.parent);
     Check(joint.lower <= joint.upper, key + "range",
           "lower limit must not exceed upper limit " + FormatNumber(joint.upper), joint.lower);
     CheckNotNegative(key + "damping", joint.damping);
@@ -128,9 +132,43 @@ class SpecChecker {
     CheckBody("link " + Quote(joint.link), joint.body);
   }
 
+  static bool IsEndOfJoint(const Joint& joint) {
+    return joint.type != JointType::kBall || joint.ball_axis == 2;
+  }
+
+  void CheckBall(const std::string& key, const Joint& joint, int index) const {
+    Check(0 <= joint.ball_axis && joint.ball_axis <= 2, key + "axis", "must be 0, 1 or 2", joint.ball_axis);
+    Check(joint.lower == 0.0, key + "range", "must begin at 0 for a ball joint", joint.lower);
+    const MdhRow& row = joint.mdh;
+    Check(row.alpha == 0.0 && row.a == 0.0 && row.q == 0.0 && row.d == 0.0, key + "row",
+          "must be a plain transform for a ball joint, zeros", row.alpha + row.a + row.q + row.d);
+    if (joint.coupling) Fail(key + "mimic", "must not be given for a ball joint");
+    const auto has_axis = [&](int other, int axis) {
+      const auto count = static_cast<int>(spec_.joints.size());
+      return other >= 0 && other < count &&
+             spec_.joints[static_cast<size_t>(other)].type == JointType::kBall &&
+             spec_.joints[static_cast<size_t>(other)].ball_axis == axis;
+    };
+    if (joint.ball_axis < 2) {
+      Check(has_axis(index + 1, joint.ball_axis + 1), key + "axis",
+            "must be followed by the ball's next axis", joint.ball_axis);
+      Check(joint.body.mass == 0.0, key + "mass", "must be that of the ball's last entry alone, 0 here",
+            joint.body.mass);
+    }
+    if (joint.ball_axis == 0) return;
+    Check(has_axis(index - 1, joint.ball_axis - 1) && joint.parent == index - 1, key + "parent",
+          "must be the ball's axis before", joint.parent);
+    Check(joint.X_PB.isApprox(Pose::Identity(), 0.0), key + "pose", "must be that of the ball's first entry",
+          joint.X_PB.translation().norm());
+  }
+
   void CheckCoupling(const std::string& key, const JointCoupling& coupling, int index) const {
     const bool is_joint = 0 <= coupling.leader && coupling.leader < static_cast<int>(spec_.joints.size());
     Check(is_joint && coupling.leader != index, key, "must be another joint, index of one", coupling.leader);
+    if (spec_.joints[static_cast<size_t>(coupling.leader)].type == JointType::kBall) {
+      Fail(key,
+           "must be no ball joint, got " + Quote(spec_.joints[static_cast<size_t>(coupling.leader)].name));
+    }
     if (spec_.joints[static_cast<size_t>(coupling.leader)].coupling) {
       Fail(key, "must be a joint that follows none, got " +
                     Quote(spec_.joints[static_cast<size_t>(coupling.leader)].name));
@@ -187,12 +225,39 @@ int FindByName(const std::vector<T>& entries, std::string T::*member, std::strin
 
 }  // namespace
 
+const char* NameOf(JointType type) {
+  if (type == JointType::kBall) return "ball";
+  return type == JointType::kPrismatic ? "prismatic" : "revolute";
+}
+
+std::string NameInFile(const Joint& joint) {
+  constexpr size_t kSuffix = 2;  // ":x"
+  return joint.type == JointType::kBall ? joint.name.substr(0, joint.name.size() - kSuffix) : joint.name;
+}
+
+Joint MakeBallEntry(const Joint& ball, int axis, int parent) {
+  Joint entry = ball;
+  entry.type = JointType::kBall;
+  entry.ball_axis = axis;
+  entry.name += std::string(":") + "xyz"[axis];
+  entry.parent = parent;
+  if (axis < 2) entry.link = ball.link + ":" + entry.name;
+  if (axis < 2) entry.body = MassProperties{};
+  if (axis > 0) entry.X_PB = Pose::Identity();
+  return entry;
+}
+
 RobotModel::RobotModel(RobotSpec spec) : spec_(std::move(spec)) {
   SpecChecker(spec_).CheckAll();
   depth_first_ = SortDepthFirst(spec_.joints);
   for (const Joint& joint : spec_.joints) {
     depth_.push_back(joint.parent < 0 ? 1 : depth(joint.parent) + 1);
     max_depth_ = std::max(max_depth_, depth_.back());
+    // A ball's second and third entry have the quaternion of the first.
+    const bool shares = joint.type == JointType::kBall && joint.ball_axis > 0;
+    const int after = num_base_positions() + static_cast<int>(position_indices_.size()) + num_balls_;
+    position_indices_.push_back(shares ? position_indices_.back() : after);
+    if (joint.type == JointType::kBall && joint.ball_axis == 2) ++num_balls_;
   }
   for (size_t i = 0; i < spec_.frames.size(); ++i) {
     if (spec_.frames[i].sphere_radius) fingertips_.push_back(static_cast<int>(i));
@@ -253,6 +318,14 @@ int RobotModel::FindFrame(std::string_view name) const {
 
 const std::string& RobotModel::link_name(int joint) const {
   return joint < 0 ? spec_.base.link : spec_.joints.at(static_cast<size_t>(joint)).link;
+}
+
+void RequireNoBalls(const RobotModel& model, const std::string& where) {
+  for (const Joint& joint : model.joints()) {
+    if (joint.type != JointType::kBall) continue;
+    throw InputError(model.spec().source + ": joint " + Quote(NameInFile(joint)) +
+                     ": must not be a ball joint " + where);
+  }
 }
 
 }  // namespace dexcheck

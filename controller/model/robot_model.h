@@ -57,7 +57,18 @@ struct Base {
   std::string wheel_joint_left;
 };
 
-enum class JointType { kRevolute, kPrismatic };
+enum class JointType {
+  kRevolute,
+  kPrismatic,
+  /// A third of a ball joint, whose three entries follow each other (ball_axis 0, 1, 2), each the next one's
+  /// parent; the first two have links without mass. All share one quaternion of q', which turns the third
+  /// one's frame i from the first one's X_PB; their rates are the components of the link's angular velocity
+  /// against the parent, along the link's own axes. Range: of the angle of that turn, from 0.
+  kBall,
+};
+
+/// "revolute", "prismatic", "ball": as files and programs say it.
+const char* NameOf(JointType type);
 
 /// A joint that follows another one: q_i = multiplier q_leader + offset (rad or m).
 struct JointCoupling {
@@ -73,6 +84,7 @@ struct Joint {
   std::string link;
   int parent = -1;  ///< Index of the joint that moves the parent link; -1 is the base.
   JointType type = JointType::kRevolute;
+  int ball_axis = 0;             ///< Of a kBall alone: x, y or z of frame i.
   Pose X_PB = Pose::Identity();  ///< Where the MDH row starts, in the parent link's frame.
   MdhRow mdh;
   double lower = 0.0;  ///< Range of q_i, rad or m.
@@ -86,6 +98,13 @@ struct Joint {
   double dry_friction = 0.0;  ///< Coulomb friction, N m or N.
   std::optional<JointCoupling> coupling;
 };
+
+/// What a file calls the joint: of a ball joint's entries "name:x", "name:y", "name:z" the name.
+std::string NameInFile(const Joint& joint);
+
+/// The entry of a ball joint about one of its axes, by the joint's name, as a file has it, and its link's. It
+/// gets the place and the body that `ball` has where they belong.
+Joint MakeBallEntry(const Joint& ball, int axis, int parent);
 
 /// A frame fixed to a link; a fingertip when it carries a sphere.
 struct Frame {
@@ -136,8 +155,11 @@ class RobotModel {
   [[nodiscard]] int num_base_velocities() const;
   /// Entries of the base's velocity in unreduced coordinates: of q_v_dot, or of v for a floating base.
   [[nodiscard]] int num_unreduced_base_velocities() const;
-  /// p', entries of q': 51 for the paper's robot.
-  [[nodiscard]] int num_positions() const { return num_base_positions() + num_joints(); }
+  /// p', entries of q': 51 for the paper's robot. A ball joint has four, qw qx qy qz.
+  [[nodiscard]] int num_positions() const { return num_base_positions() + num_joints() + num_balls_; }
+  [[nodiscard]] int num_balls() const { return num_balls_; }
+  /// Where q' has a joint's position: q_i, or the quaternion that a ball joint's entries share.
+  [[nodiscard]] int position_index(int joint) const { return position_indices_[static_cast<size_t>(joint)]; }
   /// p' - r, entries of xi: 50 for the paper's robot.
   [[nodiscard]] int num_velocities() const { return num_base_velocities() + num_joints(); }
 
@@ -172,7 +194,13 @@ class RobotModel {
   std::vector<int> depth_first_;
   std::vector<int> depth_;
   int max_depth_ = 0;
+  int num_balls_ = 0;
+  std::vector<int> position_indices_;
   MassProperties base_with_wheels_;
 };
+
+/// @param where "in a run, ...": what does not know ball joints.
+/// @throws InputError "FILE: joint NAME: must not be a ball joint WHERE" when the model has one.
+void RequireNoBalls(const RobotModel& model, const std::string& where);
 
 }  // namespace dexcheck

@@ -39,8 +39,15 @@ SegmentRow ReadRow(const TomlValue& value, Convention convention) {
                  {},
                  Pose::Identity()};
   if (const std::optional<TomlValue> type = table.Find("type")) {
-    row.type =
-        type->AsChoice<JointType>({{"revolute", JointType::kRevolute}, {"prismatic", JointType::kPrismatic}});
+    row.type = type->AsChoice<JointType>({{"revolute", JointType::kRevolute},
+                                          {"prismatic", JointType::kPrismatic},
+                                          {"ball", JointType::kBall}});
+  }
+  // A ball turns about all axes of the link's own frame, whose place is told by a plain transform.
+  if (row.type == JointType::kBall) {
+    row.X_before = ReadPose(table);
+    table.RejectUnused();
+    return row;
   }
   bool is_plain = false;
   for (const char* key : {"xyz", "rpy", "rpy_deg", "axis"}) {

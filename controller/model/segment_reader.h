@@ -13,7 +13,8 @@
 namespace dexcheck {
 
 /// A row of a table of joints, with the names of the joint and of the link that it moves. It is a row of MDH
-/// parameters, of classic Denavit-Hartenberg parameters, or a plain transform with an axis.
+/// parameters, of classic Denavit-Hartenberg parameters, or a plain transform with an axis. A ball joint's
+/// row is a plain transform.
 struct SegmentRow {
   TomlValue value;
   std::string joint;

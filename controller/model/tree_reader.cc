@@ -216,10 +216,17 @@ class TreeReader {
     if (row.type == JointType::kPrismatic && entry.range_is_angle) {
       entry.range.Fail("must be in m for a prismatic joint, not in degrees");
     }
+    if (row.type == JointType::kBall && entry.lower != 0.0) {
+      entry.range.Fail("must begin at 0 for a ball joint, whose range is of the angle of its turn");
+    }
+    if (row.type == JointType::kBall && entry.mimic) {
+      entry.mimic->joint.Fail("must not be given for a ball joint");
+    }
+    if (row.type == JointType::kBall) return BuildBall(chain, row, parent, X_LB, entry, link);
     const int index = static_cast<int>(spec_.joints.size());
     const bool is_plain = !row.X_before.isApprox(Pose::Identity(), 0.0);
     const bool has_own_frame = !row.X_iL.isApprox(Pose::Identity(), 0.0);
-    spec_.joints.push_back({chain.prefix + row.joint, chain.prefix + row.link, parent, row.type,
+    spec_.joints.push_back({chain.prefix + row.joint, chain.prefix + row.link, parent, row.type, 0,
                             FromOwnFrame(parent, is_plain ? X_LB * row.X_before : X_LB), row.mdh, entry.lower,
                             entry.upper, entry.damping, entry.armature,
                             has_own_frame ? ExpressIn(link.body, row.X_iL) : link.body, entry.dry_friction,
@@ -228,6 +235,27 @@ class TreeReader {
     own_frames_.push_back(row.X_iL);
     joint_of_link_[chain.prefix + row.link] = index;
     return index;
+  }
+
+  /// The three entries of a ball joint. @return the last one's index.
+  int BuildBall(const Chain& chain, const SegmentRow& row, int parent, const Pose& X_LB,
+                const JointEntry& entry, const LinkEntry& link) {
+    Joint ball;
+    ball.name = chain.prefix + row.joint;
+    ball.link = chain.prefix + row.link;
+    ball.X_PB = FromOwnFrame(parent, X_LB * row.X_before);
+    ball.upper = entry.upper;
+    ball.damping = entry.damping;
+    ball.armature = entry.armature;
+    ball.dry_friction = entry.dry_friction;
+    ball.body = link.body;
+    for (int axis = 0; axis < 3; ++axis) {
+      spec_.joints.push_back(MakeBallEntry(ball, axis, parent));
+      own_frames_.push_back(Pose::Identity());
+      parent = static_cast<int>(spec_.joints.size()) - 1;
+    }
+    joint_of_link_[ball.link] = parent;
+    return parent;
   }
 
   /// The joint that one follows in the end, by its chain's own names or by whole ones.

@@ -1,5 +1,6 @@
 #include "harness/checks/random_states.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace dexcheck {
@@ -10,6 +11,16 @@ StateSource::StateSource(const RobotModel& model, const StateRange& range, std::
 double StateSource::Draw(double low, double high) {
   constexpr double kUnit = 0x1.0p-53;
   return low + (high - low) * static_cast<double>(bits_() >> 11) * kUnit;
+}
+
+Eigen::Vector4d StateSource::DrawTurn(double widest) {
+  // A direction by its height and longitude, all alike.
+  const double z = Draw(-1.0, 1.0);
+  const double longitude = Draw(-kPi, kPi);
+  const double half = 0.5 * Draw(0.0, widest);
+  const double level = std::sqrt(1.0 - z * z);
+  return {std::cos(half), std::sin(half) * level * std::cos(longitude),
+          std::sin(half) * level * std::sin(longitude), std::sin(half) * z};
 }
 
 void StateSource::DrawPositions(VectorXd* q) {
@@ -29,7 +40,12 @@ void StateSource::DrawPositions(VectorXd* q) {
   }
   for (int i = 0; i < model_->num_joints(); ++i) {
     const Joint& joint = model_->joints()[static_cast<size_t>(i)];
-    (*q)[offset + i] = Draw(joint.lower, joint.upper);
+    const int at = model_->position_index(i);
+    if (joint.type != JointType::kBall) {
+      (*q)[at] = Draw(joint.lower, joint.upper);
+    } else if (joint.ball_axis == 0) {
+      q->segment<4>(at) = DrawTurn(std::min(joint.upper, kPi));
+    }
   }
 }
 
@@ -47,8 +63,8 @@ void StateSource::DrawVelocity(VectorXd* xi) {
     (*xi)[1] = forward - turn;
   }
   for (int i = 0; i < model_->num_joints(); ++i) {
-    const bool revolute = model_->joints()[static_cast<size_t>(i)].type == JointType::kRevolute;
-    (*xi)[base + i] = draw(revolute ? range_.joint_speed : range_.linear_speed);
+    const bool slides = model_->joints()[static_cast<size_t>(i)].type == JointType::kPrismatic;
+    (*xi)[base + i] = draw(slides ? range_.linear_speed : range_.joint_speed);
   }
 }
 

@@ -23,7 +23,8 @@ class StateSource {
   /// The model must outlive this.
   StateSource(const RobotModel& model, const StateRange& range, std::uint64_t seed);
 
-  /// q': joints within their ranges, any heading, any attitude of a floating base. `q` has the right size.
+  /// q': joints within their ranges, balls turned within theirs about any direction, any heading, any
+  /// attitude of a floating base. `q` has the right size.
   void DrawPositions(VectorXd* q);
   /// xi.
   void DrawVelocity(VectorXd* xi);
@@ -33,6 +34,9 @@ class StateSource {
   double Draw(double low, double high);
 
  private:
+  /// Quaternion w, x, y, z of a turn by up to `widest`, rad, about a direction of any kind.
+  Eigen::Vector4d DrawTurn(double widest);
+
   const RobotModel* model_;
   StateRange range_;
   std::mt19937_64 bits_;

@@ -41,7 +41,7 @@ Items ListVelocities(const C& c) {
 Items ListAxes(const C& c) {
   Items items;
   for (int i = 0; i < ModelOf(c).num_joints(); ++i)
-    items.push_back(MakeItem(i, JointOf(c, i).type == JointType::kRevolute ? 6 : 3, {Kind::kJoint, i, -1}));
+    items.push_back(MakeItem(i, JointOf(c, i).type == JointType::kPrismatic ? 3 : 6, {Kind::kJoint, i, -1}));
   return items;
 }
 /// Links that move, the base as -1. @param massive only those with mass on either side.
@@ -180,9 +180,14 @@ constexpr TermEntry kTerms[] =
         {"joint_axis", "joint_axis", "z_i", "(3), (4)", kRobot, kOnce, 1.0, ListAxes,
          [](const C& c, int joint, N out) {
            const Pose X = c.robot->CalcLinkPose(joint);
-           const Vector3d axis = X.linear().col(2);
+           const bool is_ball = JointOf(c, joint).type == JointType::kBall;
+           const Vector3d axis = X.linear().col(is_ball ? JointOf(c, joint).ball_axis : 2);
            out.head<3>() = axis;
            if (out.size() == 3) return;
+           if (is_ball) {
+             out.tail<3>() = X.translation();
+             return;
+           }
            out.tail<3>() = X.translation() + axis.dot(c.engine->JointAnchor(joint) - X.translation()) * axis;
          },
          [](const C& c, int joint, N out) {

@@ -70,7 +70,7 @@ void RoundingScales::SetState(const ModelTerms& terms, const Eigen::Ref<const Ve
     const double squared = xi[base_velocities_ + i] * xi[base_velocities_ + i];
     double& rate = squared_rate_[static_cast<size_t>(i + 1)];
     rate = squared_rate_[static_cast<size_t>(joint.parent + 1)];
-    (joint.type == JointType::kRevolute ? rate : sliding) += squared;
+    (joint.type == JointType::kPrismatic ? sliding : rate) += squared;
     fastest = std::max(fastest, rate);
   }
   angular_rate_ = std::sqrt(fastest);
@@ -79,9 +79,9 @@ void RoundingScales::SetState(const ModelTerms& terms, const Eigen::Ref<const Ve
 
 double RoundingScales::CalcVelocityScale(int coordinate) const {
   if (coordinate >= base_velocities_) {
-    const bool revolute =
-        model_->joints()[static_cast<size_t>(coordinate - base_velocities_)].type == JointType::kRevolute;
-    return revolute ? reach_ : 1.0;
+    const bool slides =
+        model_->joints()[static_cast<size_t>(coordinate - base_velocities_)].type == JointType::kPrismatic;
+    return slides ? 1.0 : reach_;
   }
   if (base_velocities_ == 6) return coordinate < 3 ? 1.0 : reach_;
   if (base_velocities_ == 3) return coordinate < 2 ? 1.0 : reach_;

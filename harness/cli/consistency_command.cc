@@ -70,7 +70,7 @@ void CompareWithAnswers(const ConsistencyRequest& request, Comparison* compariso
     side = std::move(answers);
   }
   comparison->notes = robot.notes;
-  for (const std::string& note : DescribeBaseCoordinates(robot)) comparison->notes.push_back(note);
+  for (const std::string& note : DescribeCoordinates(robot)) comparison->notes.push_back(note);
   ShowProgress(request, [&](const std::function<bool(long)>& progress) {
     comparison->result =
         CompareAnswers(robot, reference.get(), side.get(), make_feed, progress, &comparison->notes);

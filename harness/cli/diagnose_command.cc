@@ -116,6 +116,7 @@ std::string ToText(const Request& request, const RobotModel& model, const Diagno
 
 int Run(const Request& request) {
   const RobotModel model = ReadRobotModel(request.files.robot);
+  RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely mistakes)");
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
   CatchInterrupts();
   std::optional<OutputFile> json;

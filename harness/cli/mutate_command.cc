@@ -213,6 +213,7 @@ int Run(Request request) {
   }
   request.options.diagnose = !request.no_diagnosis;
   const RobotModel model = ReadRobotModel(request.files.robot);
+  RequireNoBalls(model, "when each number is changed on purpose");
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
   const std::string source = request.files.mjcf.string();
   const Adapter adapter(model, *engine, source);

@@ -237,6 +237,7 @@ std::string ToText(const Request& request, const ContactPlan& plan, const std::o
 
 int Run(Request request) {
   const RobotModel model = ReadRobotModel(request.robot);
+  RequireNoBalls(model, "in a plan, whose postures have one number for each joint");
   if (!model.object())
     throw InputError(request.robot.string() + ": object: is missing, and a plan holds one");
   std::unique_ptr<Surface> surface;

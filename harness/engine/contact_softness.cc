@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "harness/engine/engine.h"
+#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
@@ -80,7 +81,7 @@ ContactSoftness FindContactSoftness(const Adapter& adapter, const Eigen::Ref<con
   const auto nv = static_cast<Eigen::Index>(model->nv);
   const auto count = static_cast<Eigen::Index>(rows.size());
   RowMatrixXd M(nv, nv);
-  mj_fullM(model.get(), M.data(), data->qM);
+  ExpandMass(*model, *data, M.data());
   MatrixXd J(count, nv);
   VectorXd R(count);
   for (Eigen::Index i = 0; i < count; ++i) {

@@ -3,12 +3,14 @@
 #include <cmath>
 #include <mutex>
 
+#include "harness/engine/mujoco_release.h"
+
 namespace dexcheck {
 namespace {
 
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-int CollideGeoms(const mjModel* m, const mjData* d, mjContact* con, int g1, int g2, mjtNum margin) {
+int CollideGeoms(const mjModel* m, CollisionData* d, CollisionContact* con, int g1, int g2, mjtNum margin) {
   const Eigen::Map<const RowMatrix3d> R(d->geom_xmat + 9 * g2);
   const Eigen::Map<const Vector3d> origin(d->geom_xpos + 3 * g2);
   const Eigen::Map<const Vector3d> sphere(d->geom_xpos + 3 * g1);
@@ -16,10 +18,9 @@ int CollideGeoms(const mjModel* m, const mjData* d, mjContact* con, int g1, int 
       CollideSphereCylinder(R.transpose() * (sphere - origin), m->geom_size[3 * g1], m->geom_size[3 * g2],
                             m->geom_size[3 * g2 + 1]);
   if (contact.distance > margin) return 0;
-  con->dist = contact.distance;
-  Eigen::Map<Vector3d>(con->pos) = origin + R * contact.position;
-  Eigen::Map<Vector3d>(con->frame) = R * contact.normal;
-  mju_zero3(con->frame + 3);
+  const Vector3d position = origin + R * contact.position;
+  const Vector3d normal = R * contact.normal;
+  FillContact(contact.distance, position.data(), normal.data(), con);
   return 1;
 }
 

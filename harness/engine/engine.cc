@@ -13,13 +13,12 @@
 #include "harness/base/temporary_path.h"
 #include "harness/engine/cylinder_collision.h"
 #include "harness/engine/finite_check.h"
+#include "harness/engine/mujoco_release.h"
 #include "harness/engine/newer_mjcf.h"
 #include "harness/engine/torus_collision.h"
 
 namespace dexcheck {
 namespace {
-
-static_assert(mjVERSION_HEADER == 222, "dexcheck is written for MuJoCo 2.2.2");
 
 constexpr int kEngineFailureExitCode = 3;
 
@@ -37,16 +36,10 @@ void InstallMessageHandlers() {
   };
 }
 
-/// "2.2.2" of 222.
-std::string FormatVersion(int version) {
-  return std::to_string(version / 100) + "." + std::to_string(version / 10 % 10) + "." +
-         std::to_string(version % 10);
-}
-
 void CheckVersion() {
   if (mj_version() == mjVERSION_HEADER) return;
-  throw InputError("libmujoco: version must be " + FormatVersion(mjVERSION_HEADER) + ", got " +
-                   FormatVersion(mj_version()));
+  throw InputError("libmujoco: version must be " + FormatRelease(mjVERSION_HEADER) + ", got " +
+                   FormatRelease(mj_version()));
 }
 
 void CheckReadable(const std::filesystem::path& path) {
@@ -98,9 +91,7 @@ MjModelPtr LoadMjcfText(const std::string& text, const std::string& source) {
   const auto vfs = std::make_unique<mjVFS>();
   mj_defaultVFS(vfs.get());
   constexpr const char* kName = "model.xml";
-  mj_makeEmptyFileVFS(vfs.get(), kName, static_cast<int>(text.size()));
-  void* const file = vfs->filedata[mj_findFileVFS(vfs.get(), kName)];
-  std::copy(text.begin(), text.end(), static_cast<char*>(file));
+  AddFile(kName, text, vfs.get());
   try {
     MjModelPtr model = Load(kName, vfs.get(), source);
     mj_deleteVFS(vfs.get());

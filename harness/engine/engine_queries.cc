@@ -2,6 +2,7 @@
 
 #include "harness/engine/engine_terms.h"
 #include "harness/engine/map_vector.h"
+#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
@@ -40,7 +41,12 @@ int EngineTerms::body_of(int frame) const {
 }
 
 Vector3d EngineTerms::JointAxis(int joint) const {
-  return MapVector(data_->xaxis + 3 * adapter_->joint_ids()[static_cast<size_t>(joint)]);
+  const Joint& entry = adapter_->model().joints()[static_cast<size_t>(joint)];
+  const int id = adapter_->joint_ids()[static_cast<size_t>(joint)];
+  if (entry.type != JointType::kBall) return MapVector(data_->xaxis + 3 * id);
+  // Its body's own axis: a ball's dofs turn about them.
+  const mjtNum* const R = data_->xmat + 9 * engine_->jnt_bodyid[id];
+  return {R[entry.ball_axis], R[3 + entry.ball_axis], R[6 + entry.ball_axis]};
 }
 
 Vector3d EngineTerms::JointAnchor(int joint) const {
@@ -138,7 +144,10 @@ Matrix6d EngineTerms::ObjectInertia() const {
   const mjModel& m = *engine_;
   Matrix6d M;
   for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j <= i; ++j) M(i, j) = M(j, i) = data_->qM[m.dof_Madr[object_dof_ + i] + i - j];
+    for (int j = 0; j <= i; ++j) {
+      const int at = FindMassEntry(m, object_dof_ + i, i - j);
+      M(i, j) = M(j, i) = at < 0 ? 0.0 : GetMassEntries(*data_)[at];
+    }
   }
   Matrix6d B = Matrix6d::Identity();
   B.topLeftCorner<3, 3>() = ObjectRotation();
@@ -183,14 +192,14 @@ EngineTouch EngineTerms::CalcTouch(int frame, const Pose& shift) {
     const int second = tip_first ? geom : tip;
     const mjfCollision collide = mjCOLLISIONFUNC[m->geom_type[first]][m->geom_type[second]];
     if (collide == nullptr) continue;
-    mjContact contacts[mjMAXCONPAIR];
+    CollisionContact contacts[mjMAXCONPAIR];
     const int count = collide(m, d, contacts, first, second, kTouchMargin);
     for (int i = 0; i < count; ++i) {
       if (touch.found && contacts[i].dist >= touch.distance) continue;
       touch.found = true;
       touch.distance = contacts[i].dist;
       touch.position = MapVector(contacts[i].pos);
-      touch.normal = (tip_first ? 1.0 : -1.0) * MapVector(contacts[i].frame);
+      touch.normal = (tip_first ? 1.0 : -1.0) * MapVector(NormalOf(contacts + i));
     }
   }
   return touch;

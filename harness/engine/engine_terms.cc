@@ -6,6 +6,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/engine/map_vector.h"
+#include "harness/engine/mujoco_release.h"
 #include "harness/engine/passive_forces.h"
 
 namespace dexcheck {
@@ -140,13 +141,14 @@ void EngineTerms::ListMassEntries() {
   address.topLeftCorner(base_size_, base_size_).setConstant(kOfBase);
   for (const int dof : dofs) {
     const int row = coordinate[static_cast<size_t>(dof)];
-    // A row of qM goes from the diagonal to the root, where the base's dofs are.
-    const int root = m.dof_Madr[dof] + CountAncestors(m, dof) - 1;
-    address.row(row).head(base_size_).setConstant(root);
-    int at = m.dof_Madr[dof];
-    for (int other = dof; other >= 0; other = m.dof_parentid[other], ++at) {
+    // The base's dofs are at the root.
+    const int root = FindMassEntry(m, dof, CountAncestors(m, dof) - 1);
+    if (root >= 0) address.row(row).head(base_size_).setConstant(root);
+    int steps = 0;
+    for (int other = dof; other >= 0; other = m.dof_parentid[other], ++steps) {
       const int col = coordinate[static_cast<size_t>(other)];
-      if (col >= 0) address(std::max(row, col), std::min(row, col)) = at;
+      const int at = FindMassEntry(m, dof, steps);
+      if (col >= 0 && at >= 0) address(std::max(row, col), std::min(row, col)) = at;
     }
   }
   Eigen::MatrixXi place = Eigen::MatrixXi::Constant(n, n, -1);
@@ -218,7 +220,7 @@ void EngineTerms::SetPositions(const Eigen::Ref<const VectorXd>& q, const Pose& 
   }
   mj_kinematics(m, d);
   mj_comPos(m, d);
-  mj_crb(m, d);
+  MakeMass(*m, d);
 }
 
 void EngineTerms::SetVelocities(const Eigen::Ref<const VectorXd>& q,
@@ -242,16 +244,17 @@ void EngineTerms::SetVelocities(const Eigen::Ref<const VectorXd>& q,
 
 void EngineTerms::CalcMass() {
   const mjModel& m = *engine_;
-  const mjtNum* const qM = data_->qM;
+  const mjtNum* const entries = GetMassEntries(*data_);
   const MatrixXd& T = map_.base_columns();
   const std::vector<int>& dofs = map_.base_dofs();
   // T^T M T among the base and the wheels, which hang on it.
   for (Eigen::Index i = 0; i < base_mass_.rows(); ++i) {
     const int dof = dofs[static_cast<size_t>(i)];
-    int address = m.dof_Madr[dof];
-    for (int other = dof; other >= 0; other = m.dof_parentid[other], ++address) {
+    int steps = 0;
+    for (int other = dof; other >= 0; other = m.dof_parentid[other], ++steps) {
       const Eigen::Index j = other == dof ? i : other - dofs[0];
-      base_mass_(i, j) = base_mass_(j, i) = qM[address];
+      const int at = FindMassEntry(m, dof, steps);
+      base_mass_(i, j) = base_mass_(j, i) = at < 0 ? 0.0 : entries[at];
     }
   }
   auto place = base_places_.begin();
@@ -263,10 +266,11 @@ void EngineTerms::CalcMass() {
     }
   }
   for (const MassSource& source : mass_sources_) {
-    double entry = qM[source.address];
+    double entry = entries[source.address];
     if (source.column >= 0) {
       entry = 0.0;
-      for (int k = 0; k < carrying_dofs_; ++k) entry += qM[source.address - k] * T(k, source.column);
+      for (int k = 0; k < carrying_dofs_; ++k)
+        entry += entries[source.address - kTowardRoot * k] * T(k, source.column);
     }
     mass_[source.place] = mass_[source.mirror] = entry;
   }

@@ -164,8 +164,8 @@ class EngineTerms {
   VectorXd q_;
 
   /// An entry of M_bar' among the joints (column -1) or with a column of the base, at two places in mass_:
-  /// its own and its mirror image's. The address in qM is that of the entry, or of the joint's with the
-  /// base's first dof; the following dofs' are before it.
+  /// its own and its mirror image's. The address (FindMassEntry) is that of the entry, or of the joint's with
+  /// the base's first dof; the following dofs' are before it.
   struct MassSource {
     int address;
     int column;

@@ -5,6 +5,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
@@ -15,7 +16,7 @@ struct Attribute {
   mjtObj type;
   const char* name;
   const mjtNum* values;
-  int count;
+  EngineSize count;
   int width;
   const int* owner = nullptr;  ///< Element of each entry where they are not the same.
 };
@@ -23,8 +24,8 @@ struct Attribute {
 }  // namespace
 
 void CheckFinite(const mjModel& model, const std::string& source) {
-  const auto check = [&](const mjtNum* values, int count, const auto& describe) {
-    for (int i = 0; i < count; ++i) {
+  const auto check = [&](const mjtNum* values, EngineSize count, const auto& describe) {
+    for (EngineSize i = 0; i < count; ++i) {
       if (std::isfinite(values[i])) continue;
       throw InputError(source + ": " + describe(i) + " must be finite, got " + FormatNumber(values[i]));
     }

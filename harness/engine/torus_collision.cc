@@ -4,6 +4,8 @@
 #include <mutex>
 #include <utility>
 
+#include "harness/engine/mujoco_release.h"
+
 namespace dexcheck {
 namespace {
 
@@ -25,7 +27,16 @@ Pose BodyPose(const mjModel& m, const mjData& d, int geom) {
   return X;
 }
 
-int CollideSphereMesh(const mjModel* m, const mjData* d, mjContact* con, int g1, int g2, mjtNum margin) {
+/// @param X where the contact's numbers stand in the world.
+template <typename Contact>
+void PlaceContact(const Pose& X, const Contact& contact, CollisionContact* found) {
+  const Vector3d position = X * contact.position;
+  const Vector3d normal = X.linear() * contact.normal;
+  FillContact(contact.distance, position.data(), normal.data(), found);
+}
+
+int CollideSphereMesh(const mjModel* m, CollisionData* d, CollisionContact* con, int g1, int g2,
+                      mjtNum margin) {
   double ring_radius = 0.0;
   double tube_radius = 0.0;
   if (!GetTorusRadii(*m, g2, &ring_radius, &tube_radius))
@@ -38,15 +49,12 @@ int CollideSphereMesh(const mjModel* m, const mjData* d, mjContact* con, int g1,
   const int count =
       CollideSphereTorus(center, m->geom_size[3 * g1], ring_radius, tube_radius, margin, contacts);
   for (int i = 0; i < count; ++i) {
-    con[i].dist = contacts[i].distance;
-    Eigen::Map<Vector3d>(con[i].pos) = X_BT * contacts[i].position;
-    Eigen::Map<Vector3d>(con[i].frame) = X_BT.linear() * contacts[i].normal;
-    mju_zero3(con[i].frame + 3);
+    PlaceContact(X_BT, contacts[i], con + i);
   }
   return count;
 }
 
-int CollideBoxMesh(const mjModel* m, const mjData* d, mjContact* con, int g1, int g2, mjtNum margin) {
+int CollideBoxMesh(const mjModel* m, CollisionData* d, CollisionContact* con, int g1, int g2, mjtNum margin) {
   double ring_radius = 0.0;
   double tube_radius = 0.0;
   if (!GetTorusRadii(*m, g2, &ring_radius, &tube_radius)) return original_box_mesh(m, d, con, g1, g2, margin);
@@ -58,10 +66,7 @@ int CollideBoxMesh(const mjModel* m, const mjData* d, mjContact* con, int g1, in
   const Pose X_BT = X_WB.inverse(Eigen::Isometry) * BodyPose(*m, *d, g2);
   const int count = CollideBoxTorus(X_BT, ring_radius, tube_radius, half_size, margin, contacts);
   for (int i = 0; i < count; ++i) {
-    con[i].dist = contacts[i].distance;
-    Eigen::Map<Vector3d>(con[i].pos) = X_WB * contacts[i].position;
-    Eigen::Map<Vector3d>(con[i].frame) = X_WB.linear() * contacts[i].normal;
-    mju_zero3(con[i].frame + 3);
+    PlaceContact(X_WB, contacts[i], con + i);
   }
   return count;
 }

@@ -112,7 +112,17 @@ void VelocityMap::ExpandBracket(const Eigen::Ref<const VectorXd>& q, const Eigen
   }
   for (Eigen::Index row = 0; row < bracket_.size(); ++row)
     qacc[base_dofs_[static_cast<size_t>(row)]] = bracket_[row];
-  for (const int dof : adapter_->joint_dofs()) qacc[dof] = 0.0;
+  const std::vector<Joint>& joints = adapter_->model().joints();
+  for (size_t i = 0; i < joints.size(); ++i) {
+    mjtNum* const rate = qacc + adapter_->joint_dofs()[i];
+    const Eigen::Index at = base_size_ + static_cast<Eigen::Index>(i);
+    if (joints[i].type != JointType::kBall) {
+      *rate = 0.0;
+    } else if (joints[i].ball_axis == 0) {
+      const Vector3d bracket = Vector3d(a.segment<3>(at)).cross(Vector3d(b.segment<3>(at)));
+      mju_copy3(rate, bracket.data());
+    }
+  }
 }
 
 void VelocityMap::ProjectForce(const mjtNum* force, Eigen::Ref<VectorXd> result) const {

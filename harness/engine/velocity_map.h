@@ -35,8 +35,8 @@ class VelocityMap {
   void ExpandBias(mjtNum* qacc) const;
   /// Writes T_dot(a) b - T_dot(b) a at q', T_dot(a) being T's rate at velocity a, on the robot's dofs of an
   /// nv-vector. It is zero where velocities are rates of coordinates; reduced columns turn with the heading,
-  /// and it points sideways. The angular velocity of a floating base is no rate of coordinates, whose T has
-  /// the bracket [0; omega_a x omega_b].
+  /// and it points sideways. The angular velocity of a floating base or of a ball joint is no rate of
+  /// coordinates, whose T has the bracket [0; omega_a x omega_b], or omega_a x omega_b.
   void ExpandBracket(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& a,
                      const Eigen::Ref<const VectorXd>& b, mjtNum* qacc);
   /// result = T^T force.

@@ -5,6 +5,7 @@
 
 #include "controller/common/text.h"
 #include "controller/contact/find_contact.h"
+#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
@@ -34,13 +35,14 @@ void MultiplyBaseInertia(const mjModel& m, const mjData& d, std::span<const int>
   const int root = m.body_rootid[m.dof_bodyid[first]];
   for (int i = first; i < m.nv; ++i) {
     if (m.body_rootid[m.dof_bodyid[i]] != root) continue;
-    // A row of qM goes from the diagonal to the root.
-    const int diagonal = m.dof_Madr[i];
-    const int end = i + 1 < m.nv ? m.dof_Madr[i + 1] : m.nM;
-    const int above = std::min(carrying, end - 1 - diagonal);
-    (*result)[i] += d.qM[diagonal] * a[i];
+    const mjtNum* const entries = GetMassEntries(d);
+    (*result)[i] += entries[FindMassEntry(m, i, 0)] * a[i];
+    int depth = 0;  // dofs that this one hangs on
+    for (int other = m.dof_parentid[i]; other >= 0; other = m.dof_parentid[other]) ++depth;
+    const int root = FindMassEntry(m, i, depth);
+    const int above = root < 0 ? 0 : std::min(carrying, depth);
     for (int k = 0; k < above; ++k) {
-      const double entry = d.qM[end - 1 - k];
+      const double entry = entries[root - kTowardRoot * k];
       (*result)[i] += entry * a[first + k];
       (*result)[first + k] += entry * a[i];
     }

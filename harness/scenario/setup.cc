@@ -72,6 +72,7 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
   if (model_.base().type == BaseType::kFloating) {
     throw InputError(robot + ": base.type: must not be \"floating\" in a run, whose law drives the base");
   }
+  RequireNoBalls(model_, "in a run, whose law has one number for each joint");
   if (!model_.object() && !scenario_.joint_motion) {
     throw InputError(robot + ": object: is missing, and the scenario holds one");
   }

@@ -109,15 +109,16 @@ class JointAudit {
   AuditFinding& Add(AuditLevel level, const std::string& check, size_t joint, const std::string& text) {
     const int line = robot_.joints[joint].line;
     findings_.push_back(
-        {level, check, "joint " + spec_.joints[joint].name, line, text, {}, AuditFinding::kNoBody});
+        {level, check, "joint " + NameInFile(spec_.joints[joint]), line, text, {}, AuditFinding::kNoBody});
     return findings_.back();
   }
 
   void AuditRange(size_t i) {
     const Joint& joint = spec_.joints[i];
     if (!robot_.joints[i].states_range) return;
+    if (joint.type == JointType::kBall && joint.ball_axis > 0) return;  // told of the first entry
     const std::string range = FormatNumbers(Vector2d(joint.lower, joint.upper));
-    const bool is_revolute = joint.type == JointType::kRevolute;
+    const bool is_revolute = joint.type != JointType::kPrismatic;
     const double widest = std::max(std::abs(joint.lower), std::abs(joint.upper));
     constexpr double kMostTurns = 8.0 * kPi;  // four turns either way; 30 degrees are more
     constexpr double kLongest = 10.0;         // m
@@ -139,6 +140,15 @@ class JointAudit {
     Add(AuditLevel::kOdd, "axis", i, "axis of length " + FormatNumber(length) + ": must be a unit vector");
   }
 
+  /// About an axis through the frame's origin, the one about which it is least, kg m^2.
+  static double CalcLeastInertia(const MassProperties& body) {
+    const Matrix3d about_origin = body.inertia + body.mass * (body.com.squaredNorm() * Matrix3d::Identity() -
+                                                              body.com * body.com.transpose());
+    return Eigen::SelfAdjointEigenSolver<Matrix3d>(about_origin, Eigen::EigenvaluesOnly)
+        .eigenvalues()
+        .minCoeff();
+  }
+
   /// What each joint moves, in the end.
   void AuditLoads() {
     const size_t count = spec_.joints.size();
@@ -157,22 +167,24 @@ class JointAudit {
     }
     for (size_t i = 0; i < count; ++i) {
       const Joint& joint = spec_.joints[i];
-      if (joint.armature > 0.0) continue;
+      const bool is_ball = joint.type == JointType::kBall;
+      if (joint.armature > 0.0 || (is_ball && joint.ball_axis < 2)) continue;
       const std::string end = is_end[i] ? ", the end of a chain" : "";
       if (mass[i] <= 0.0) {
         Add(AuditLevel::kOdd, "load", i, "moves no mass" + end + ": M is singular").body =
             static_cast<int>(i);
         continue;
       }
-      if (joint.type != JointType::kRevolute || !is_end[i]) continue;
-      // About the axis, z of frame i: I_zz + m (x^2 + y^2).
+      if (joint.type == JointType::kPrismatic || !is_end[i]) continue;
+      // About the axis, z of frame i: I_zz + m (x^2 + y^2). A ball turns about any axis: the least of all.
       const MassProperties& body = joint.body;
-      const double about_axis = body.inertia(2, 2) + body.mass * body.com.head<2>().squaredNorm();
+      const double about_axis = is_ball ? CalcLeastInertia(body)
+                                        : body.inertia(2, 2) + body.mass * body.com.head<2>().squaredNorm();
       constexpr double kNothing = 1e-12;  // kg m^2: a sphere of 0.1 g with a radius of 0.2 mm
       if (about_axis > kNothing) continue;
       Add(AuditLevel::kOdd, "load", i,
-          "turns " + FormatNumber(body.mass) + " kg without inertia about its axis" + end +
-              ": M is singular or nearly so")
+          "turns " + FormatNumber(body.mass) + " kg without inertia about " +
+              (is_ball ? "one of its axes" : "its axis") + end + ": M is singular or nearly so")
           .body = static_cast<int>(i);
     }
   }

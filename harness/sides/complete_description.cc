@@ -30,13 +30,18 @@ class EngineCompletion {
 
  private:
   [[nodiscard]] int FindEngineJoint(const Joint& joint) const {
-    return mj_name2id(&engine_, mjOBJ_JOINT, joint.name.c_str());
+    return mj_name2id(&engine_, mjOBJ_JOINT, NameInFile(joint).c_str());
   }
 
   void TakeNamesOfJoints() {
     std::vector<std::string> names;
     for (int id = 0; id < engine_.njnt; ++id) {
-      if (engine_.jnt_type[id] != mjJNT_FREE) names.push_back(NameOf(engine_, mjOBJ_JOINT, id));
+      const int type = engine_.jnt_type[id];
+      Joint joint;
+      joint.name = NameOf(engine_, mjOBJ_JOINT, id);
+      for (int axis = 0; type == mjJNT_BALL && axis < 3; ++axis)
+        names.push_back(MakeBallEntry(joint, axis, -1).name);
+      if (type == mjJNT_HINGE || type == mjJNT_SLIDE) names.push_back(joint.name);
     }
     result_.notes = TakeJointNames(names, engine_source_, &robot_);
   }
@@ -65,6 +70,14 @@ class EngineCompletion {
                             FormatNumbers(robot_.spec.gravity));
   }
 
+  /// Whether the base carries the joint; of a ball, its first entry hangs there.
+  [[nodiscard]] bool IsOnBase(const Joint& joint) const {
+    int parent = joint.parent;
+    if (joint.type == JointType::kBall) parent = FirstOfBall(joint).parent;
+    return parent < 0;
+  }
+  [[nodiscard]] const Joint& FirstOfBall(const Joint& last) const { return *(&last - last.ball_axis); }
+
   /// Bodies that joints of one name move are the same one.
   void TakeNames() {
     Base& base = robot_.spec.base;
@@ -78,11 +91,12 @@ class EngineCompletion {
     for (Joint& joint : robot_.spec.joints) {
       const int id = FindEngineJoint(joint);
       if (id < 0) continue;
+      if (joint.type == JointType::kBall && joint.ball_axis < 2) continue;
       const int body = engine_.jnt_bodyid[id];
       // Of several joints of one body the last moves it; the links between them have no body.
       if (id + 1 < engine_.body_jntadr[body] + engine_.body_jntnum[body]) continue;
       rename(&joint.link, body);
-      if (joint.parent < 0 && mj_name2id(&engine_, mjOBJ_BODY, base.link.c_str()) < 0) {
+      if (IsOnBase(joint) && mj_name2id(&engine_, mjOBJ_BODY, base.link.c_str()) < 0) {
         rename(&base.link, engine_.body_weldid[engine_.body_parentid[body]]);
       }
     }

@@ -49,8 +49,7 @@ class Matching {
       const Joint& other = b_.spec.joints[static_cast<size_t>(b_of_a_[i])];
       const std::string key = b_.spec.source + ": joint " + Quote(joint.name) + ": ";
       if (joint.type != other.type) {
-        throw InputError(key + "must be " + (joint.type == JointType::kRevolute ? "revolute" : "prismatic") +
-                         " as in " + a_.spec.source);
+        throw InputError(key + "must be " + NameOf(joint.type) + " as in " + a_.spec.source);
       }
       const int parent = joint.parent < 0 ? -1 : b_of_a_[static_cast<size_t>(joint.parent)];
       if (other.parent == parent) continue;

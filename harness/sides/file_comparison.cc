@@ -31,7 +31,7 @@ void CompareTableWithEngine(const ConsistencyOptions& options, const Progress& p
   const Adapter adapter(*comparison->model, *engine, comparison->second.string());
   comparison->result = CheckConsistency(adapter, options, progress);
   AppendTo(&comparison->notes, CheckDescription(table, adapter, &comparison->result.gate));
-  AppendTo(&comparison->notes, DescribeBaseCoordinates(table));
+  AppendTo(&comparison->notes, DescribeCoordinates(table));
 }
 
 /// A URDF, or another MJCF, against the engine.
@@ -49,7 +49,7 @@ void CompareDescriptionWithEngine(const UrdfOptions& urdf, const ConsistencyOpti
                                  completion.unstated.end();
   });
   const std::vector<std::string> others = CheckDescription(robot, adapter, &gate);
-  for (const auto& notes : {robot.notes, completion.notes, others, DescribeBaseCoordinates(robot)}) {
+  for (const auto& notes : {robot.notes, completion.notes, others, DescribeCoordinates(robot)}) {
     AppendTo(&comparison->notes, notes);
   }
 }
@@ -60,7 +60,7 @@ void CompareTwoDescriptions(const UrdfOptions& urdf, const ConsistencyOptions& o
   RobotDescription a = ReadDescription(comparison->first, urdf);
   RobotDescription b = ReadDescription(comparison->second, urdf);
   const std::vector<std::string> taken = CompleteEachOther(&a, &b);
-  for (const auto& notes : {a.notes, b.notes, taken, DescribeBaseCoordinates(a)}) {
+  for (const auto& notes : {a.notes, b.notes, taken, DescribeCoordinates(a)}) {
     AppendTo(&comparison->notes, notes);
   }
   comparison->model.emplace(a.spec);

@@ -80,7 +80,7 @@ std::vector<Hypothesis> FindConstantHypotheses(const RobotDescription& a, const 
       const Joint& own = a.spec.joints[i];
       const Joint& other = b.spec.joints[j];
       if (!constant.states(a.joints[i]) || !constant.states(b.joints[j])) continue;
-      if (constant.only_revolute && own.type != JointType::kRevolute) continue;
+      if (constant.only_revolute && own.type == JointType::kPrismatic) continue;
       bool explains = false;
       bool fits = true;
       for (int k = 0; k < constant.count; ++k) {
@@ -101,6 +101,26 @@ std::vector<Hypothesis> FindConstantHypotheses(const RobotDescription& a, const 
     found.push_back(hypothesis);
   }
   return found;
+}
+
+/// Parts with mass of a joint's link, in the link's own frame of the other description.
+/// @param X_ab the own frame of `robot` in that of the other description.
+std::vector<DescribedPart> ListParts(const RobotDescription& robot, int joint, const Pose& X_ab) {
+  std::vector<DescribedPart> parts;
+  for (const DescribedPart& part : robot.parts) {
+    if (part.joint != joint || !part.states_inertial) continue;
+    // From the part's own frame by frame i to its row's place, and from there to that of the other.
+    Pose X_RL = part.X_iL;
+    if (joint >= 0) {
+      const Pose& X_iL = robot.joints[static_cast<size_t>(joint)].X_iL;
+      X_RL = Eigen::Translation3d(-X_iL.inverse().translation()) * X_iL.inverse() * part.X_iL;
+    }
+    DescribedPart& own = parts.emplace_back(part);
+    own.X_iL = X_ab * X_RL;
+    own.body = ExpressIn(part.body, own.X_iL);
+    own.X_LC = own.X_iL * part.X_LC;
+  }
+  return parts;
 }
 
 }  // namespace
@@ -160,26 +180,9 @@ std::vector<Hypothesis> FindHypotheses(const RobotDescription& a, const RobotDes
     body.given = given;
     body.right = ExpressIn(other, X_ab);
     if (joint >= 0) body.X_PL = rows[static_cast<size_t>(joint)].X_PL;
-    size_t count = 0;
-    for (const DescribedPart& part : a.parts) {
-      if (part.joint != joint || !part.states_inertial) continue;
-      ++count;
-      body.R_LC = part.X_LC.linear();
-    }
-    if (count != 1) body.R_LC.setIdentity();
-    for (const DescribedPart& part : b.parts) {
-      if (part.joint != joint_b || !part.states_inertial) continue;
-      // From the part's own frame by frame i of `b` to its row's place, and from there to that of `a`.
-      Pose X_RL = part.X_iL;
-      if (joint_b >= 0) {
-        const Pose& X_iL = b.joints[static_cast<size_t>(joint_b)].X_iL;
-        X_RL = Eigen::Translation3d(-X_iL.inverse().translation()) * X_iL.inverse() * part.X_iL;
-      }
-      DescribedPart own = part;
-      own.body = ExpressIn(part.body, X_ab * X_RL);
-      own.X_LC = X_ab * X_RL * part.X_LC;
-      body.parts.push_back(own);
-    }
+    body.given_parts = ListParts(a, joint, Pose::Identity());
+    body.parts = ListParts(b, joint_b, X_ab);
+    if (body.given_parts.size() == 1) body.R_LC = body.given_parts[0].X_LC.linear();
   };
   if (floats) add(-1, a.spec.base.link, a.spec.base.body, b.spec.base.body, -1);
   for (size_t i = 0; i < rows.size(); ++i) {

@@ -47,8 +47,10 @@ struct ComparedBody {
   MassProperties right;
   /// Axes along which the file gives the inertia, when the body is one part; the identity otherwise.
   Matrix3d R_LC = Matrix3d::Identity();
-  Pose X_PL = Pose::Identity();      ///< The link's own frame in its parent's, at q = 0.
-  std::vector<DescribedPart> parts;  ///< Of the right body, in the link's own frame of `a`.
+  Pose X_PL = Pose::Identity();  ///< The link's own frame in its parent's, at q = 0.
+  // With `body`, X_LC and, as X_iL, the part's own frame in the link's own frame of `a`.
+  std::vector<DescribedPart> given_parts;  ///< Of the given body, where they have mass.
+  std::vector<DescribedPart> parts;        ///< Of the right body.
 };
 
 /// Mistakes of single bodies, of lists of bodies, and of their units.

@@ -158,9 +158,9 @@ class MjcfDescriptionReader {
   Place AddJoint(int id, bool is_last, const Place& place) {
     const std::string name = NameOf(engine_, mjOBJ_JOINT, id);
     const int type = engine_.jnt_type[id];
-    if (type != mjJNT_HINGE && type != mjJNT_SLIDE) {
-      throw InputError(source_ + ": joint " + Quote(name) + ": must be a hinge or a slide, got a " +
-                       (type == mjJNT_FREE ? "free" : "ball") + " joint");
+    if (type == mjJNT_FREE) {
+      throw InputError(source_ + ": joint " + Quote(name) +
+                       ": must be a hinge, a slide or a ball, got a free joint");
     }
     const std::string body = NameOf(engine_, mjOBJ_BODY, engine_.jnt_bodyid[id]);
     const Vector3d anchor = MapVector(engine_.jnt_pos + 3 * id);
@@ -171,10 +171,13 @@ class MjcfDescriptionReader {
     joint.name = name;
     joint.link = is_last ? body : body + ":" + name;
     joint.parent = place.joint;
-    joint.type = type == mjJNT_HINGE ? JointType::kRevolute : JointType::kPrismatic;
-    // Frame i: z along the axis, at the anchor; the body stands as the file says at q = reference.
+    joint.type = type == mjJNT_SLIDE  ? JointType::kPrismatic
+                 : type == mjJNT_BALL ? JointType::kBall
+                                      : JointType::kRevolute;
+    // Frame i: z along the axis, at the anchor; the body stands as the file says at q = reference. A ball's
+    // has the body's own axes.
     Pose X_Li = Pose::Identity();
-    if (axis != Vector3d::UnitZ()) X_Li.linear() = MakeRotationFromZ(axis);
+    if (type != mjJNT_BALL && axis != Vector3d::UnitZ()) X_Li.linear() = MakeRotationFromZ(axis);
     X_Li.translation() = anchor;
     stated.X_iL = X_Li.inverse();
     joint.X_PB = place.X_iL * X_Li;
@@ -187,11 +190,25 @@ class MjcfDescriptionReader {
     stated.states_range = engine_.jnt_limited[id] != 0;
     joint.lower = stated.states_range ? engine_.jnt_range[2 * id] : -kPi;
     joint.upper = stated.states_range ? engine_.jnt_range[2 * id + 1] : kPi;
+    if (type == mjJNT_BALL) {
+      joint.lower = 0.0;
+      for (int axis_index = 0; axis_index < 2; ++axis_index) {
+        DescribedJoint within = stated;
+        within.X_iL = Pose::Identity();
+        AddEntry(id, MakeBallEntry(joint, axis_index, joint.parent), within);
+        joint.parent = static_cast<int>(robot_.spec.joints.size()) - 1;
+      }
+      joint = MakeBallEntry(joint, 2, joint.parent);
+    }
+    AddEntry(id, joint, stated);
+    return {static_cast<int>(robot_.spec.joints.size()) - 1, stated.X_iL};
+  }
+
+  void AddEntry(int id, const Joint& joint, const DescribedJoint& stated) {
     robot_.spec.joints.push_back(joint);
     robot_.joints.push_back(stated);
     joint_ids_.push_back(id);
     parts_.emplace_back();
-    return {static_cast<int>(robot_.spec.joints.size()) - 1, stated.X_iL};
   }
 
   void AddSites() {

@@ -35,7 +35,10 @@ class ModelComparison {
     for (int i = 0; i < offset_a; ++i) position_of_[static_cast<size_t>(i)] = i;
     for (int i = 0; i < base_; ++i) velocity_of_[static_cast<size_t>(i)] = i;
     for (size_t i = 0; i < b_of_a_.size(); ++i) {
-      position_of_[static_cast<size_t>(offset_a) + i] = offset_a + b_of_a_[i];
+      const auto at = static_cast<size_t>(model_a_.position_index(static_cast<int>(i)));
+      const int count = a_.spec.joints[i].type == JointType::kBall ? 4 : 1;
+      for (int k = 0; k < count; ++k)
+        position_of_[at + static_cast<size_t>(k)] = model_b_.position_index(b_of_a_[i]) + k;
       velocity_of_[static_cast<size_t>(base_) + i] = base_ + b_of_a_[i];
     }
     q_b_.setZero(model_a_.num_positions());
@@ -187,11 +190,15 @@ class ModelComparison {
       const Pose X_a = terms_a_.CalcLinkPose(static_cast<int>(i));
       const Pose X_b = terms_b_.CalcLinkPose(static_cast<int>(j));
       const Location at_joint{Location::Kind::kJoint, static_cast<int>(i), -1};
-      const Vector3d axis = X_a.linear().col(2);
-      for (int k = 0; k < 3; ++k) Add(kJointAxis, axis[k], X_b.linear()(k, 2), 1.0, at_joint);
-      if (joint.type == JointType::kRevolute) {
+      const bool is_ball = joint.type == JointType::kBall;
+      const int col = is_ball ? joint.ball_axis : 2;
+      const Vector3d axis = X_a.linear().col(col);
+      for (int k = 0; k < 3; ++k) Add(kJointAxis, axis[k], X_b.linear()(k, col), 1.0, at_joint);
+      if (joint.type != JointType::kPrismatic) {
         const Vector3d anchor = X_b.translation();
-        const Vector3d foot = X_a.translation() + axis.dot(anchor - X_a.translation()) * axis;
+        // A ball has one place, a hinge any along its axis.
+        const double along = is_ball ? 0.0 : axis.dot(anchor - X_a.translation());
+        const Vector3d foot = X_a.translation() + along * axis;
         for (int k = 0; k < 3; ++k) Add(kJointAxis, foot[k], anchor[k], length, at_joint);
       }
       CompareBody({Location::Kind::kLink, static_cast<int>(i), -1}, joint.body, X_a, other.body, X_b);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <vector>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -115,7 +116,8 @@ class ParameterWriter {
         "Rz(yaw)\n"
         "# Ry(pitch) Rx(roll)) in its parent's frame when the joint is at zero, and turns about, or moves "
         "along, axis\n"
-        "# ([0, 0, 1] unless given). A link's com (m) is the centre of mass from its frame's origin; its "
+        "# ([0, 0, 1] unless given; a ball turns about all). A link's com (m) is the centre of mass from its "
+        "frame's origin; its "
         "inertia\n"
         "# [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] (kg m^2) is about the centre of mass, along its frame's axes. "
         "Damping is in\n"
@@ -135,20 +137,33 @@ class ParameterWriter {
 
   void WriteChain(size_t begin, size_t end) {
     text_ += "[[chain]]\nparent = " + QuoteToml(LinkName(spec_.joints[begin].parent)) + "\nrows = [\n";
-    for (size_t i = begin; i < end; ++i) WriteRow(spec_.joints[i], static_cast<int>(i));
+    // A ball joint is one row: that of its last entry, which moves the link.
+    std::vector<size_t> rows;
+    for (size_t i = begin; i < end; ++i) {
+      const Joint& joint = spec_.joints[i];
+      if (joint.type != JointType::kBall || joint.ball_axis == 2) rows.push_back(i);
+    }
+    for (const size_t i : rows) WriteRow(spec_.joints[i], static_cast<int>(i));
     text_ += "]\n\n[chain.joints]\n";
-    for (size_t i = begin; i < end; ++i) WriteJoint(spec_.joints[i], robot_.joints[i]);
+    for (const size_t i : rows) WriteJoint(spec_.joints[i], robot_.joints[i]);
     text_ += "\n";
-    for (size_t i = begin; i < end; ++i) WriteLink(spec_.joints[i], WrittenFrame(static_cast<int>(i)));
+    for (const size_t i : rows) WriteLink(spec_.joints[i], WrittenFrame(static_cast<int>(i)));
     text_ += "\n";
   }
 
   void WriteRow(const Joint& joint, int index) {
+    text_ += "  { joint = " + QuoteToml(NameInFile(joint)) + ", link = " + QuoteToml(joint.link);
+    if (joint.type == JointType::kBall) {
+      const Joint& first = spec_.joints[static_cast<size_t>(index - 2)];
+      text_ += ", type = \"ball\"";
+      text_ +=
+          FormatPose(WrittenFrame(first.parent).inverse() * first.X_PB * WrittenFrame(index), true) + " },\n";
+      return;
+    }
     const Pose home = CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d);
     const Pose X_iW = WrittenFrame(index);
     const Pose X_PW = WrittenFrame(joint.parent).inverse() * joint.X_PB * home * X_iW;
     const Vector3d axis = X_iW.linear().row(2).transpose();
-    text_ += "  { joint = " + QuoteToml(joint.name) + ", link = " + QuoteToml(joint.link);
     if (joint.type == JointType::kPrismatic) text_ += ", type = \"prismatic\"";
     text_ += FormatPose(X_PW, true);
     if (axis != Vector3d::UnitZ()) text_ += ", axis = " + FormatTidyList(axis, 1.0);
@@ -156,7 +171,8 @@ class ParameterWriter {
   }
 
   void WriteJoint(const Joint& joint, const DescribedJoint& stated) {
-    text_ += QuoteToml(joint.name) + " = { range = " + FormatNumbers(Vector2d(joint.lower, joint.upper)) +
+    text_ += QuoteToml(NameInFile(joint)) +
+             " = { range = " + FormatNumbers(Vector2d(joint.lower, joint.upper)) +
              ", damping = " + FormatNumber(joint.damping) + ", armature = " + FormatNumber(joint.armature);
     if (joint.dry_friction != 0.0) text_ += ", dry_friction = " + FormatNumber(joint.dry_friction);
     if (joint.coupling) {

@@ -23,6 +23,7 @@ RobotDescription ReadTable(const std::filesystem::path& path) {
     AddPart(robot.spec.base.link, robot.spec.base.body, -1, &robot);
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
+    if (joint.type == JointType::kBall && joint.ball_axis < 2) continue;  // its link is no part of the file
     AddPart(joint.link, joint.body, static_cast<int>(i), &robot);
   }
   return robot;

@@ -4,6 +4,7 @@
 
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
+#include "harness/sides/join_names.h"
 
 namespace dexcheck {
 
@@ -55,7 +56,9 @@ bool MoveBaseTo(const std::string& frame, RobotDescription* robot) {
   return true;
 }
 
-std::vector<std::string> DescribeBaseCoordinates(const RobotDescription& robot) {
+namespace {
+
+std::vector<std::string> DescribeBase(const RobotDescription& robot) {
   if (robot.spec.base.type != BaseType::kFloating) return {};
   return {
       "base " + Quote(robot.spec.base.link) +
@@ -67,6 +70,35 @@ std::vector<std::string> DescribeBaseCoordinates(const RobotDescription& robot) 
       "in Drake's convention q = [qw qx qy qz, x y z, joints], xi = [angular velocity, velocity of its "
       "origin, "
       "both in world axes, joints]"};
+}
+
+/// Ball joints: where each one's entries are, and what others have in their place.
+std::vector<std::string> DescribeBalls(const RobotDescription& robot) {
+  const RobotModel model(robot.spec);
+  std::vector<std::string> places;
+  for (int i = 0; i < model.num_joints(); ++i) {
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    if (joint.type != JointType::kBall || joint.ball_axis > 0) continue;
+    const auto range = [](int first, int count) {
+      return "[" + std::to_string(first) + ".." + std::to_string(first + count - 1) + "]";
+    };
+    places.push_back(Quote(NameInFile(joint)) + " has q" + range(model.position_index(i), 4) + " and xi" +
+                     range(model.num_base_velocities() + i, 3));
+  }
+  if (places.empty()) return {};
+  return {"ball joints: " + JoinNames(places) +
+              ": q = [qw qx qy qz] turns the link against its parent, xi = its angular velocity against the "
+              "parent in the link's own axes, as MuJoCo has them",
+          "a ball joint in Pinocchio's convention has qx qy qz qw and the same velocity; in Simbody's, qw qx "
+          "qy qz and the angular velocity in the parent's axes: xi' = R xi"};
+}
+
+}  // namespace
+
+std::vector<std::string> DescribeCoordinates(const RobotDescription& robot) {
+  std::vector<std::string> notes = DescribeBase(robot);
+  for (const std::string& note : DescribeBalls(robot)) notes.push_back(note);
+  return notes;
 }
 
 }  // namespace dexcheck

@@ -65,7 +65,8 @@ void LetBaseFloat(RobotDescription* robot);
 /// base's link becomes a frame. @return false when the base has no such frame.
 bool MoveBaseTo(const std::string& frame, RobotDescription* robot);
 
-/// What q' and xi of a floating base are, in this convention and in that of other libraries: notes.
-std::vector<std::string> DescribeBaseCoordinates(const RobotDescription& robot);
+/// What q' and xi of a floating base and of ball joints are, in this convention and in that of other
+/// libraries: notes.
+std::vector<std::string> DescribeCoordinates(const RobotDescription& robot);
 
 }  // namespace dexcheck

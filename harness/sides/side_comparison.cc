@@ -63,12 +63,12 @@ int SideComparison::CoordinateOf(Eigen::Index entry) const {
 
 void SideComparison::Follow(VectorXd* q, VectorXd* xi) const {
   if (!is_reduced_) return;
-  const Eigen::Index offset = model_.num_base_positions();
   for (size_t i = 0; i < robot_.spec.joints.size(); ++i) {
     const std::optional<JointCoupling>& coupling = robot_.spec.joints[i].coupling;
     if (!coupling) continue;
     const auto own = static_cast<Eigen::Index>(i);
-    (*q)[offset + own] = coupling->multiplier * (*q)[offset + coupling->leader] + coupling->offset;
+    (*q)[model_.position_index(static_cast<int>(i))] =
+        coupling->multiplier * (*q)[model_.position_index(coupling->leader)] + coupling->offset;
     (*xi)[base_ + own] = coupling->multiplier * (*xi)[base_ + coupling->leader];
   }
 }

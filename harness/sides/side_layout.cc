@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <numeric>
 #include <utility>
 
 #include "controller/common/errors.h"
@@ -96,11 +97,33 @@ SideLayout::SideLayout(const RobotDescription& robot)
   if (base_ == 0 && robot.spec.base.type != BaseType::kFixed) {
     throw InputError(robot.spec.source + ": base: must be fixed or floating to be compared with a program");
   }
-  for (const Joint& joint : robot.spec.joints) {
-    names_.push_back(joint.name);
-    joints_.push_back(static_cast<int>(joints_.size()));
+  const RobotModel model(robot.spec);
+  for (int i = 0; i < model.num_joints(); ++i) {
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    const bool is_ball = joint.type == JointType::kBall;
+    if (is_ball && joint.ball_axis > 0) continue;
+    robot_joints_.push_back({NameInFile(joint), model.position_index(i), is_ball ? 4 : 1, i, is_ball ? 3 : 1,
+                             joint.coupling.has_value()});
   }
-  places_ = joints_;
+  std::vector<int> all(robot_joints_.size());
+  std::iota(all.begin(), all.end(), 0);
+  SetJoints(std::move(all));
+}
+
+void SideLayout::SetJoints(std::vector<int> joints) {
+  joints_ = std::move(joints);
+  velocities_.clear();
+  num_positions_ = base_positions_;
+  for (const int index : joints_) {
+    const NamedJoint& joint = robot_joints_[static_cast<size_t>(index)];
+    num_positions_ += joint.num_positions;
+    for (int k = 0; k < joint.num_velocities; ++k) velocities_.push_back(joint.velocity + k);
+  }
+  places_.resize(velocities_.size());
+  std::iota(places_.begin(), places_.end(), 0);
+  std::sort(places_.begin(), places_.end(), [this](int a, int b) {
+    return velocities_[static_cast<size_t>(a)] < velocities_[static_cast<size_t>(b)];
+  });
 }
 
 SideLayout::SideLayout(const RobotDescription& robot, const Json& json, const std::string& source)
@@ -112,39 +135,38 @@ SideLayout::SideLayout(const RobotDescription& robot, const Json& json, const st
   if (!json.contains("joints")) return;
   const Json& list = json.at("joints");
   if (!list.is_array()) Fail(source, "joints", "must be a list of names, got " + Abbreviate(list.dump()));
-  joints_.clear();
-  std::vector<int> place(names_.size(), -1);
+  std::vector<std::string> names;
+  for (const NamedJoint& joint : robot_joints_) names.push_back(joint.name);
+  std::vector<int> joints;
+  std::vector<bool> is_named(names.size(), false);
   for (size_t i = 0; i < list.size(); ++i) {
     const std::string key = "joints[" + std::to_string(i) + "]";
     if (!list[i].is_string()) Fail(source, key, "must be a name, got " + Abbreviate(list[i].dump()));
     const std::string name = list[i].get<std::string>();
-    const auto found = std::find(names_.begin(), names_.end(), name);
-    if (found == names_.end()) {
-      const std::string nearest = FindNearest(name, names_);
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end()) {
+      const std::string nearest = FindNearest(name, names);
       Fail(source, key,
            "must be a joint of " + robot.spec.source +
                (nearest.empty() ? "" : " (did you mean " + Quote(nearest) + "?)") + ", got " + Quote(name));
     }
-    const auto joint = static_cast<size_t>(found - names_.begin());
-    if (place[joint] >= 0) Fail(source, key, "must be named once, got " + Quote(name) + " again");
-    place[joint] = static_cast<int>(i);
-    joints_.push_back(static_cast<int>(joint));
+    const auto joint = static_cast<size_t>(found - names.begin());
+    if (is_named[joint]) Fail(source, key, "must be named once, got " + Quote(name) + " again");
+    is_named[joint] = true;
+    joints.push_back(static_cast<int>(joint));
   }
+  SetJoints(std::move(joints));
   std::vector<std::string> missing;
+  size_t followers = 0;
   bool only_followers = true;
-  places_.clear();
-  for (size_t joint = 0; joint < place.size(); ++joint) {
-    if (place[joint] >= 0) {
-      places_.push_back(place[joint]);
-      continue;
-    }
-    missing.push_back(names_[joint]);
-    only_followers = only_followers && robot.spec.joints[joint].coupling.has_value();
+  for (size_t joint = 0; joint < names.size(); ++joint) {
+    followers += robot_joints_[joint].follows ? 1 : 0;
+    if (is_named[joint]) continue;
+    missing.push_back(names[joint]);
+    only_followers = only_followers && robot_joints_[joint].follows;
   }
   is_reduced_ = !missing.empty();
   if (!is_reduced_) return;
-  size_t followers = 0;
-  for (const Joint& joint : robot.spec.joints) followers += joint.coupling ? 1 : 0;
   if (!only_followers || missing.size() != followers) {
     Fail(source, "joints", "must be all joints, or all that follow no other; missing: " + JoinNames(missing));
   }
@@ -153,7 +175,7 @@ SideLayout::SideLayout(const RobotDescription& robot, const Json& json, const st
 nlohmann::ordered_json SideLayout::ToJson() const {
   nlohmann::ordered_json json;
   json["joints"] = nlohmann::ordered_json::array();
-  for (const int joint : joints_) json["joints"].push_back(names_[static_cast<size_t>(joint)]);
+  for (const int joint : joints_) json["joints"].push_back(robot_joints_[static_cast<size_t>(joint)].name);
   if (base_ == 0) return json;
   const auto position = std::find_if(std::begin(kPositions), std::end(kPositions),
                                      [&](const auto& entry) { return entry.second == convention_.position; });
@@ -167,8 +189,11 @@ nlohmann::ordered_json SideLayout::ToJson() const {
 VectorXd SideLayout::WritePositions(const VectorXd& q) const {
   VectorXd written(num_positions());
   if (base_ > 0) written.head<7>() = BaseConversion(convention_).ConvertPositions(q).head<7>();
-  for (size_t i = 0; i < joints_.size(); ++i) {
-    written[base_positions_ + static_cast<int>(i)] = q[base_positions_ + joints_[i]];
+  Eigen::Index at = base_positions_;
+  for (const int index : joints_) {
+    const NamedJoint& joint = robot_joints_[static_cast<size_t>(index)];
+    written.segment(at, joint.num_positions) = q.segment(joint.position, joint.num_positions);
+    at += joint.num_positions;
   }
   return written;
 }
@@ -176,7 +201,8 @@ VectorXd SideLayout::WritePositions(const VectorXd& q) const {
 VectorXd SideLayout::WriteVelocities(const VectorXd& q, const VectorXd& xi) const {
   VectorXd written(size());
   if (base_ > 0) written.head<6>() = BaseConversion(convention_).ConvertVelocities(q, xi).head<6>();
-  for (size_t i = 0; i < joints_.size(); ++i) written[base_ + static_cast<int>(i)] = xi[base_ + joints_[i]];
+  for (size_t i = 0; i < velocities_.size(); ++i)
+    written[base_ + static_cast<int>(i)] = xi[base_ + velocities_[i]];
   return written;
 }
 

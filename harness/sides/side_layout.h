@@ -11,7 +11,8 @@
 
 namespace dexcheck {
 
-/// How one side writes q', xi and terms. Coordinates are the base's, if it floats, then one for each joint.
+/// How one side writes q', xi and terms. Coordinates are the base's, if it floats, then one for each joint; a
+/// ball joint has a quaternion qw qx qy qz in q' and three entries in xi, in the robot's own convention.
 class SideLayout {
  public:
   /// The robot's own: all joints, in its order.
@@ -33,8 +34,8 @@ class SideLayout {
   [[nodiscard]] const BaseConvention& convention() const { return convention_; }
   void set_convention(const BaseConvention& convention) { convention_ = convention; }
   /// Entries of q' and xi as the side has them.
-  [[nodiscard]] int num_positions() const { return size() + (base_ > 0 ? 1 : 0); }
-  [[nodiscard]] int size() const { return base_ + static_cast<int>(joints_.size()); }
+  [[nodiscard]] int num_positions() const { return num_positions_; }
+  [[nodiscard]] int size() const { return base_ + static_cast<int>(velocities_.size()); }
 
   /// q' and xi as the side writes them. q', xi: the robot's own.
   [[nodiscard]] VectorXd WritePositions(const VectorXd& q) const;
@@ -44,11 +45,22 @@ class SideLayout {
   void ReadTerms(const VectorXd& q, const VectorXd& xi, SideTerms* terms) const;
 
  private:
-  std::vector<std::string> names_;  // of all joints
-  int base_;                        // entries of xi before the joints'
+  /// A joint as files have it: a ball's entries are one.
+  struct NamedJoint {
+    std::string name;
+    int position, num_positions;   // the robot's q'
+    int velocity, num_velocities;  // the robot's xi, without the base's entries
+    bool follows;
+  };
+  void SetJoints(std::vector<int> joints);
+
+  std::vector<NamedJoint> robot_joints_;
+  int base_;  // entries of xi before the joints'
   int base_positions_;
-  std::vector<int> joints_;  // the robot's index of each of the side's joints
-  std::vector<int> places_;  // where the side has the robot's free joints, in the robot's order
+  int num_positions_ = 0;
+  std::vector<int> joints_;      // the robot's index of each of the side's joints
+  std::vector<int> velocities_;  // the robot's of each of the side's velocities, without the base's
+  std::vector<int> places_;      // where the side has the robot's velocities, in the robot's order
   bool is_reduced_ = false;
   BaseConvention convention_;
 };

@@ -50,22 +50,29 @@ std::string WriteInertial(const MassProperties& body) {
                      WritePose(X), body.mass, moments[0], moments[1], moments[2]);
 }
 
+int CountJoints(const RobotSpec& spec) { return static_cast<int>(spec.joints.size()); }
+
 void WriteLinkContent(const RobotSpec& spec, int link, std::string* text);
 
 void WriteJoint(const RobotSpec& spec, int index, std::string* text) {
   const Joint& joint = spec.joints[static_cast<size_t>(index)];
+  const bool is_ball = joint.type == JointType::kBall;
+  const Joint& last = spec.joints[static_cast<size_t>(index + (is_ball ? 2 : 0))];
   const Pose X = joint.X_PB * Eigen::AngleAxisd(joint.mdh.alpha, Vector3d::UnitX()) *
                  Eigen::Translation3d(joint.mdh.a, 0.0, 0.0) *
                  Eigen::AngleAxisd(joint.mdh.q, Vector3d::UnitZ()) *
                  Eigen::Translation3d(0.0, 0.0, joint.mdh.d);
-  *text += fmt::format("<body name=\"{}\" {}>\n", joint.link, WritePose(X));
+  *text += fmt::format("<body name=\"{}\" {}>\n", last.link, WritePose(X));
   *text += fmt::format(
       "<joint name=\"{}\" type=\"{}\" axis=\"0 0 1\" damping=\"{:.17g}\" armature=\"{:.17g}\" "
       "limited=\"true\" range=\"{:.17g} {:.17g}\"/>\n",
-      joint.name, joint.type == JointType::kRevolute ? "hinge" : "slide", joint.damping, joint.armature,
-      joint.lower, joint.upper);
-  *text += WriteInertial(joint.body);
-  WriteLinkContent(spec, index, text);
+      NameInFile(joint),
+      is_ball                              ? "ball"
+      : joint.type == JointType::kRevolute ? "hinge"
+                                           : "slide",
+      joint.damping, joint.armature, joint.lower, joint.upper);
+  *text += WriteInertial(last.body);
+  WriteLinkContent(spec, index + (is_ball ? 2 : 0), text);
   *text += "</body>\n";
 }
 
@@ -118,15 +125,17 @@ RobotSpec MakeRandomRobot(const RandomRobotOptions& options, std::mt19937* rando
     base.wheel_joint_left = "wheel_left";
   }
   std::vector<bool> is_leaf;
+  std::vector<int> ends = {-1};  // the base and each joint's last entry
   for (int i = 0; i < options.joints; ++i) {
     Joint joint;
     joint.name = fmt::format("joint_{}", i);
     joint.link = fmt::format("link_{}", i);
-    joint.parent = i - 1;
+    joint.parent = ends.back();
     if (i > 0 && Draw(random, 0.0, 1.0) < options.branching) {
-      joint.parent = std::uniform_int_distribution<int>(-1, i - 1)(*random);
+      joint.parent = ends[static_cast<size_t>(std::uniform_int_distribution<int>(0, i)(*random))];
     }
     if (Draw(random, 0.0, 1.0) < options.prismatic) joint.type = JointType::kPrismatic;
+    const bool is_ball = options.ball > 0.0 && Draw(random, 0.0, 1.0) < options.ball;
     if (Draw(random, 0.0, 1.0) < options.offset) {
       joint.X_PB.linear() = DrawRotation(random);
       joint.X_PB.translation() = DrawVector(random, 0.1);
@@ -140,8 +149,20 @@ RobotSpec MakeRandomRobot(const RandomRobotOptions& options, std::mt19937* rando
     joint.armature = Draw(random, 0.001, 0.05);
     joint.body = DrawBody(random);
     if (joint.parent >= 0) is_leaf[static_cast<size_t>(joint.parent)] = false;
+    if (is_ball) {
+      joint.lower = 0.0;
+      joint.X_PB.linear() = DrawRotation(random);
+      joint.X_PB.translation() = DrawVector(random, 0.3);
+      joint.mdh = MdhRow{};
+      for (int axis = 0; axis < 2; ++axis) {
+        spec.joints.push_back(MakeBallEntry(joint, axis, axis == 0 ? joint.parent : CountJoints(spec) - 1));
+        is_leaf.push_back(false);
+      }
+      joint = MakeBallEntry(joint, 2, CountJoints(spec) - 1);
+    }
     is_leaf.push_back(true);
     spec.joints.push_back(joint);
+    ends.push_back(CountJoints(spec) - 1);
   }
   for (size_t i = 0; i < is_leaf.size(); ++i) {
     if (!is_leaf[i]) continue;
@@ -187,7 +208,14 @@ VectorXd DrawPositions(const RobotModel& model, std::mt19937* random) {
   if (offset == 3) q.head<3>() << Draw(random, -2, 2), Draw(random, -2, 2), Draw(random, -kPi, kPi);
   for (int i = 0; i < model.num_joints(); ++i) {
     const Joint& joint = model.joints()[static_cast<size_t>(i)];
-    q[offset + i] = Draw(random, joint.lower, joint.upper);
+    const int at = model.position_index(i);
+    if (joint.type != JointType::kBall) {
+      q[at] = Draw(random, joint.lower, joint.upper);
+    } else if (joint.ball_axis == 0) {
+      const Vector3d axis = DrawVector(random, 1.0).normalized();
+      const Eigen::Quaterniond turn(Eigen::AngleAxisd(Draw(random, 0.0, joint.upper), axis));
+      q.segment<4>(at) << turn.w(), turn.x(), turn.y(), turn.z();
+    }
   }
   return q;
 }

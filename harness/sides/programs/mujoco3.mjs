@@ -10,6 +10,7 @@ import {createInterface} from 'node:readline';
 import {fileURLToPath, pathToFileURL} from 'node:url';
 
 const kFree = 0;
+const kBall = 1;
 const kHinge = 3;
 const kSlide = 2;
 
@@ -63,10 +64,10 @@ class Robot {
     const answer = {dexcheck_protocol: 1, name: `MuJoCo ${this.mujoco.mj_versionString()}`, joints: []};
     for (let i = 0; i < model.njnt; ++i) {
       const type = model.jnt_type[i];
-      if (type === kHinge || type === kSlide) {
+      if (type === kHinge || type === kSlide || type === kBall) {
         answer.joints.push(model.jnt(i).name);
       } else if (type !== kFree || i > 0) {
-        throw new Error(`joint ${model.jnt(i).name}: neither hinge, slide nor the base's free joint`);
+        throw new Error(`joint ${model.jnt(i).name}: neither hinge, slide, ball nor the base's free joint`);
       }
     }
     const floats = model.njnt > 0 && model.jnt_type[0] === kFree;

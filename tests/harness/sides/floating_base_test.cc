@@ -178,7 +178,7 @@ TEST_P(LeggedRobots, FixedInOneFileAndFloatingInTheOtherIsSaid) {
               Contains(HasSubstr("base: robot.urdf does not say how its root moves; it floats as that of "
                                  "robot.xml")));
   EXPECT_THAT(
-      DescribeBaseCoordinates(urdf),
+      DescribeCoordinates(urdf),
       Contains(HasSubstr("q = [x y z, qw qx qy qz, joints from q[7]], xi = [velocity of its origin in world "
                          "axes, angular velocity in its own axes, joints from xi[6]]")));
 }

@@ -261,6 +261,118 @@ TEST(Hypotheses, ALostPartIsNamed) {
             "link FR_calf: the mass of \"FR_foot\", which is welded to it, looks lost\n");
 }
 
+/// A quadruped whose feet, welded to the calves, have generic bodies.
+RobotDescription ReadWeldedRobot() {
+  std::vector<testing::LeggedLink> links = testing::ListQuadruped();
+  for (testing::LeggedLink& link : links) {
+    if (link.has_joint) continue;
+    link.com = "0.01 0.02 -0.015";
+    link.com_rpy = "0.3 -0.2 0.5";
+    link.moments = "0.00003 0.00005 0.00006";
+    link.rpy = "0.2 0.4 -0.3";
+    link.xyz = "0.01 -0.02 -0.213";
+  }
+  return ParseUrdf(testing::WriteLeggedUrdf("quadruped", links), "robot.urdf");
+}
+
+/// What a file says of its parts makes the bodies.
+void CombineParts(RobotDescription* robot) {
+  for (int i = -1; i < static_cast<int>(robot->spec.joints.size()); ++i) {
+    std::vector<MassProperties> parts;
+    for (const DescribedPart& part : robot->parts) {
+      if (part.joint == i && part.states_inertial) parts.push_back(ExpressIn(part.body, part.X_iL));
+    }
+    (i < 0 ? robot->spec.base.body : robot->spec.joints[static_cast<size_t>(i)].body) = Combine(parts);
+  }
+}
+
+DescribedPart& FindPart(const std::string& name, RobotDescription* robot) {
+  return *std::find_if(robot->parts.begin(), robot->parts.end(),
+                       [&](const DescribedPart& part) { return part.name == name; });
+}
+
+TEST(Hypotheses, MistakesOfOneWeldedPartAreNamed) {
+  const RobotDescription right = ReadWeldedRobot();
+  RobotDescription fused = right;  // the other file may have one body in the place of the parts
+  fused.parts.clear();
+  const auto rotation = [](DescribedPart& part, const Matrix3d& R) { part.X_iL.linear() = R; };
+  const struct {
+    std::string text;
+    std::function<void(DescribedPart&)> make;
+    bool of_place = false;
+  } kCases[] = {
+      {"the inertia of its part \"FR_foot\" looks as if given about the link's origin",
+       [](DescribedPart& part) { part.body.inertia += CalcOffset(part.body); }},
+      {"the inertia of its part \"FR_foot\" looks as if given about the origin of the link that carries it",
+       [](DescribedPart& part) {
+         MassProperties in_link = ExpressIn(part.body, part.X_iL);
+         in_link.inertia += CalcOffset(in_link);
+         part.body = ExpressIn(in_link, part.X_iL.inverse());
+       }},
+      {"the mass of its part \"FR_foot\" looks as if in g",
+       [](DescribedPart& part) { part.body.mass *= 1e3; }},
+      {"the mass with its inertia of its part \"FR_foot\" looks doubled",
+       [](DescribedPart& part) {
+         part.body.mass *= 2.0;
+         part.body.inertia *= 2.0;
+       }},
+      {"the inertia of its part \"FR_foot\" looks as if in kg mm^2",
+       [](DescribedPart& part) { part.body.inertia *= 1e6; }},
+      {"the centre of mass of its part \"FR_foot\" looks as if in mm",
+       [](DescribedPart& part) { part.body.com *= 1e3; }},
+      {"the centre of mass of its part \"FR_foot\" looks as if given in the parent's frame",
+       [](DescribedPart& part) { part.body.com = part.X_iL * part.body.com; }},
+      {"its part \"FR_foot\" looks as if it stood at the origin of the link",
+       [](DescribedPart& part) { part.X_iL.setIdentity(); }, true},
+      {"its part \"FR_foot\" looks as if it were welded on without the rotation of its weld",
+       [&](DescribedPart& part) { rotation(part, Matrix3d::Identity()); }, true},
+      {"its part \"FR_foot\" looks as if it were welded on with the rotation transposed",
+       [&](DescribedPart& part) { rotation(part, Matrix3d(part.X_iL.linear().transpose())); }, true},
+      {"its part \"FR_foot\" looks as if it were welded on without the translation of its weld",
+       [](DescribedPart& part) { part.X_iL.translation().setZero(); }, true}};
+  // A part is placed in frame i; its weld stands in the link's own frame.
+  for (const auto& one : kCases) {
+    RobotDescription wrong = right;
+    DescribedPart& part = FindPart("FR_foot", &wrong);
+    const Pose X_iL = FindPart("FR_calf", &wrong).X_iL;
+    part.X_iL = X_iL.inverse() * part.X_iL;
+    one.make(part);
+    part.X_iL = X_iL * part.X_iL;
+    CombineParts(&wrong);
+    const std::string found = List(ExplainDifference(wrong, right));
+    EXPECT_THAT(found, StartsWith("link FR_calf: " + one.text));
+    EXPECT_EQ(std::count(found.begin(), found.end(), '\n'), 1) << found;
+    if (!one.of_place) {
+      EXPECT_THAT(List(ExplainDifference(wrong, fused)), StartsWith("link FR_calf: " + one.text));
+    }
+  }
+}
+
+// Each file's parts are given about their own links' origins: one sentence says it of all.
+TEST(Hypotheses, AMistakeInAllPartsIsOneMistake) {
+  const RobotDescription right = ReadWeldedRobot();
+  RobotDescription wrong = right;
+  for (DescribedPart& part : wrong.parts) part.body.inertia += CalcOffset(part.body);
+  CombineParts(&wrong);
+  LetBaseFloat(&wrong);
+  RobotDescription floating = right;
+  LetBaseFloat(&floating);
+  EXPECT_EQ(List(ExplainDifference(wrong, floating)),
+            "all inertias look as if given about the link's origin instead of the centre of mass: 13 of 13 "
+            "links\n");
+}
+
+TEST(Hypotheses, NothingIsSaidOfOtherNumbersOfAPart) {
+  const RobotDescription right = ReadWeldedRobot();
+  RobotDescription wrong = right;
+  DescribedPart& part = FindPart("FR_foot", &wrong);
+  part.body.mass *= 1.2345;
+  part.body.inertia *= 1.321;
+  part.body.com += Vector3d(0.0123, -0.0456, 0.0789);
+  CombineParts(&wrong);
+  EXPECT_EQ(List(ExplainDifference(wrong, right)), "");
+}
+
 /// What a person may have done to a joint.
 struct JointMistakeCase {
   std::string name;

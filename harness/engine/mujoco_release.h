@@ -1,0 +1,142 @@
+#pragma once
+
+// What differs between MuJoCo's releases, as far as dexcheck's code touches it: everything that must be
+// written in two ways stands here. dexcheck is built and tested with 2.2.2, which Debian 12 has. The other
+// branches are written for 3.x and compile against the declarations of 3.12.
+//
+// | since | what |
+// |---|---|
+// | 3.2  | files in memory by mj_addBufferVFS; mj_makeEmptyFileVFS and the tables of mjVFS are gone |
+// | 3.3  | mj_makeM makes the mass matrix, rotors of tendons included |
+// | 3.5  | version numbers have three digits for minor and patch: 3005000; sizes are mjtSize |
+// | 3.6  | the tendons' Jacobian is sparse in any case, and its rows are the model's |
+// | 3.7  | collision functions get data that they may write |
+// | 3.9  | they fill mjPreContact (distance, position, normal, tangent) in the place of mjContact |
+// | 3.11 | mj_fullM(m, d, M); qM is gone: M has compressed rows of the lower triangle |
+//
+// What an MJCF says in another way since a release (limits by default, ...) is told by newer_mjcf.h.
+
+#include <mujoco/mujoco.h>
+
+#include <algorithm>
+#include <string>
+
+namespace dexcheck {
+
+static_assert(mjVERSION_HEADER == 222 || mjVERSION_HEADER >= 320,
+              "dexcheck is written for MuJoCo 2.2.2 and 3.2 or newer");
+
+/// How many elements a model has.
+#if mjVERSION_HEADER >= 3005000
+using EngineSize = mjtSize;
+#else
+using EngineSize = int;
+#endif
+
+/// "2.2.2" of 222, "3.12.1" of 3012001.
+inline std::string FormatRelease(int version) {
+  const int base = version < 1000 ? 10 : 1000;
+  return std::to_string(version / (base * base)) + "." + std::to_string(version / base % base) + "." +
+         std::to_string(version % base);
+}
+
+/// Puts a text as a file of that name into an empty file system in memory.
+inline void AddFile(const char* name, const std::string& text, mjVFS* vfs) {
+  const auto size = static_cast<int>(text.size());
+#if mjVERSION_HEADER >= 320
+  mj_addBufferVFS(vfs, name, text.data(), size);
+#else
+  mj_makeEmptyFileVFS(vfs, name, size);
+  std::copy(text.begin(), text.end(), static_cast<char*>(vfs->filedata[mj_findFileVFS(vfs, name)]));
+#endif
+}
+
+/// The mass matrix at the positions that mj_kinematics and mj_comPos have placed.
+inline void MakeMass(const mjModel& m, mjData* d) {
+#if mjVERSION_HEADER >= 330
+  mj_makeM(&m, d);
+#else
+  mj_crb(&m, d);
+#endif
+}
+
+/// Its entries that can differ from zero: of each dof with itself and those that it hangs on.
+inline const mjtNum* GetMassEntries(const mjData& d) {
+#if mjVERSION_HEADER >= 3011000
+  return d.M;
+#else
+  return d.qM;
+#endif
+}
+
+/// How an address among them changes from a dof to the one that it hangs on, in the row of one dof.
+inline constexpr int kTowardRoot = mjVERSION_HEADER >= 3011000 ? -1 : 1;
+
+/// Where the entry of a dof and the one `steps` toward the root stands among them; -1 when it is always zero.
+inline int FindMassEntry(const mjModel& m, int dof, int steps) {
+#if mjVERSION_HEADER >= 3011000
+  return steps < m.M_rownnz[dof] ? m.M_rowadr[dof] + m.M_rownnz[dof] - 1 - steps : -1;
+#else
+  return m.dof_Madr[dof] + steps;
+#endif
+}
+
+/// The whole mass matrix, nv x nv.
+inline void ExpandMass(const mjModel& m, const mjData& d, mjtNum* M) {
+#if mjVERSION_HEADER >= 3010000
+  mj_fullM(&m, &d, M);
+#else
+  mj_fullM(&m, M, d.qM);
+#endif
+}
+
+/// ten_velocity = ten_J qvel, as mj_tendon left the Jacobian.
+inline void CalcTendonVelocities(const mjModel& m, mjData* d) {
+#if mjVERSION_HEADER >= 3006000
+  const int* const starts = m.ten_J_rowadr;
+  const int* const counts = m.ten_J_rownnz;
+  const int* const columns = m.ten_J_colind;
+#else
+  if (mj_isSparse(&m) == 0) {
+    mju_mulMatVec(d->ten_velocity, d->ten_J, d->qvel, m.ntendon, m.nv);
+    return;
+  }
+  const int* const starts = d->ten_J_rowadr;
+  const int* const counts = d->ten_J_rownnz;
+  const int* const columns = d->ten_J_colind;
+#endif
+  for (int i = 0; i < m.ntendon; ++i) {
+    d->ten_velocity[i] = 0.0;
+    for (int k = starts[i]; k < starts[i] + counts[i]; ++k)
+      d->ten_velocity[i] += d->ten_J[k] * d->qvel[columns[k]];
+  }
+}
+
+// What collision functions get and fill.
+#if mjVERSION_HEADER >= 3009000
+using CollisionData = mjData;
+using CollisionContact = mjPreContact;
+inline mjtNum* NormalOf(CollisionContact* contact) { return contact->normal; }
+inline mjtNum* TangentOf(CollisionContact* contact) { return contact->tangent; }
+#else
+#if mjVERSION_HEADER >= 3007000
+using CollisionData = mjData;
+#else
+using CollisionData = const mjData;
+#endif
+using CollisionContact = mjContact;
+inline mjtNum* NormalOf(CollisionContact* contact) { return contact->frame; }
+inline mjtNum* TangentOf(CollisionContact* contact) { return contact->frame + 3; }
+#endif
+
+/// Fills what a collision function says of a contact; the engine completes the tangents.
+/// @param position, normal x, y, z in the world; the normal points from the first geom to the second.
+inline void FillContact(mjtNum distance, const mjtNum* position, const mjtNum* normal,
+                        CollisionContact* contact) {
+  contact->dist = distance;
+  mju_copy3(contact->pos, position);
+  mju_copy3(NormalOf(contact), normal);
+  mju_zero3(TangentOf(contact));
+}
+
+}  // namespace dexcheck
