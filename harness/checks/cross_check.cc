@@ -27,6 +27,7 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
     : setup_(&setup),
       model_(setup.plant_side(), setup.fingertips(), setup.scenario().control.orientation),
       motion_(setup),
+      clearance_(setup.engine(), setup.plant_side(), setup.solids(), setup.watched_pairs()),
       law_terms_(setup.model().num_positions(), setup.model().num_velocities(),
                  3 * static_cast<int>(setup.fingertips().size())),
       motors_(setup.model(), setup.scenario().plant.time_step),
@@ -79,10 +80,21 @@ void CrossCheck::CompareModel(const StepRecord& step) {
   }
   const GraspModel& plant = ModelAtTruth(step);
   model_.Compare(plant.robot(), plant.grasp(), state, step.reading.X_W0, step.time);
+  CheckClearance(step);
   if (!known_) return;
   StepModelCheck& controller = known_->controller;
   controller.Compare(step.model->robot(), step.model->grasp(), step.told.state, step.reading.X_W0, step.time);
   model_.Merge(controller);
+}
+
+void CrossCheck::CheckClearance(const StepRecord& step) {
+  if (clearance_.pairs().empty()) return;
+  clearance_.Update(model_.context().engine->data(), step.time);
+  const auto [depth, pair] = clearance_.FindDeepest();
+  motion_.Add(StepCheck::kClearance, depth, step.time, [&] { return clearance_.Describe(pair); });
+  const Collision& collision = step.response.collision;
+  motion_.Add(StepCheck::kCollision, collision.force, step.time,
+              [&] { return clearance_.DescribeGeoms(collision.geom1, collision.geom2); });
 }
 
 double CrossCheck::CompareTold(const StepRecord& step) {

@@ -104,6 +104,18 @@ void PrintTracking(const Scenario& scenario, const TrackingStatistics& tracking)
              tracking.position_max(), tracking.position_rms(), tracking.orientation_max());
 }
 
+/// Which bodies came nearest to each other that are not meant to touch.
+void PrintClearance(const Clearance& clearance) {
+  const Clearance::Nearest* nearest = nullptr;
+  for (int i = 0; i < kPairClassCount; ++i) {
+    const Clearance::Nearest& one = clearance.nearest(static_cast<PairClass>(i));
+    if (one.pair >= 0 && (nearest == nullptr || one.distance < nearest->distance)) nearest = &one;
+  }
+  if (nearest == nullptr) return;
+  fmt::print("clear of each other by {:.1f} mm or more: {}, at t = {:.3f} s\n", 1e3 * nearest->distance,
+             clearance.Describe(nearest->pair), nearest->time);
+}
+
 void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
   const LoopTimes& times = loop.times();
   const double scale = 1e6 / static_cast<double>(std::max(loop.record().step, 1L));
@@ -128,6 +140,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     }
     PrintTracking(scenario, result.tracking);
     if (loop.task() != nullptr) PrintTask(loop);
+    if (loop.is_checking()) PrintClearance(loop.checks().clearance());
     if (loop.is_checking()) PrintChecks(setup, loop, detail);
     PrintSpeed(loop, result);
     if (!folder.empty()) fmt::print("log and summary in {}\n", folder);
