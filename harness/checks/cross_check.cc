@@ -90,8 +90,9 @@ void CrossCheck::CompareModel(const StepRecord& step) {
 void CrossCheck::CheckClearance(const StepRecord& step) {
   if (clearance_.pairs().empty()) return;
   clearance_.Update(model_.context().engine->data(), step.time);
-  const auto [depth, pair] = clearance_.FindDeepest();
-  motion_.Add(StepCheck::kClearance, depth, step.time, [&] { return clearance_.Describe(pair); });
+  const std::pair<double, int> deepest = clearance_.FindDeepest();
+  motion_.Add(StepCheck::kClearance, deepest.first, step.time,
+              [&] { return clearance_.Describe(deepest.second); });
   const Collision& collision = step.response.collision;
   motion_.Add(StepCheck::kCollision, collision.force, step.time,
               [&] { return clearance_.DescribeGeoms(collision.geom1, collision.geom2); });

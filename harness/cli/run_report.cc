@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <vector>
@@ -112,8 +113,9 @@ void PrintClearance(const Clearance& clearance) {
     if (one.pair >= 0 && (nearest == nullptr || one.distance < nearest->distance)) nearest = &one;
   }
   if (nearest == nullptr) return;
-  fmt::print("clear of each other by {:.1f} mm or more: {}, at t = {:.3f} s\n", 1e3 * nearest->distance,
-             clearance.Describe(nearest->pair), nearest->time);
+  fmt::print("nearest of what is not meant to touch: {}, {:.1f} mm {} at t = {:.3f} s\n",
+             clearance.Describe(nearest->pair), 1e3 * std::abs(nearest->distance),
+             nearest->distance < 0.0 ? "into each other" : "apart", nearest->time);
 }
 
 void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {

@@ -12,6 +12,7 @@
 #include "controller/common/errors.h"
 #include "harness/base/temporary_path.h"
 #include "harness/engine/cylinder_collision.h"
+#include "harness/engine/ellipsoid_collision.h"
 #include "harness/engine/finite_check.h"
 #include "harness/engine/newer_mjcf.h"
 #include "harness/engine/torus_collision.h"
@@ -63,6 +64,7 @@ void PrepareEngine() {
   InstallMessageHandlers();
   CheckVersion();
   InstallCylinderCollision();
+  InstallEllipsoidCollision();
   InstallTorusCollision();
 }
 
