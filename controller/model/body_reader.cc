@@ -71,13 +71,6 @@ SolidBox ReadBox(TomlTable& table) {
   return box;
 }
 
-SolidEllipsoid ReadEllipsoid(TomlTable& table) {
-  const TomlValue axes = table.Get("semi_axes");
-  SolidEllipsoid ellipsoid{axes.AsVector<3>()};
-  if (ellipsoid.semi_axes.minCoeff() <= 0.0) axes.Fail("must be positive");
-  return ellipsoid;
-}
-
 }  // namespace
 
 Vector3d ReadAxis(const TomlValue& value) {
@@ -104,13 +97,12 @@ Pose ReadPose(const TomlValue& value) {
 }
 
 Shape ReadShape(TomlTable& table) {
-  enum class Kind { kSphere, kCylinder, kCapsule, kBox, kTorus, kEllipsoid };
+  enum class Kind { kSphere, kCylinder, kCapsule, kBox, kTorus };
   switch (table.Get("shape").AsChoice<Kind>({{"sphere", Kind::kSphere},
                                              {"cylinder", Kind::kCylinder},
                                              {"capsule", Kind::kCapsule},
                                              {"box", Kind::kBox},
-                                             {"torus", Kind::kTorus},
-                                             {"ellipsoid", Kind::kEllipsoid}})) {
+                                             {"torus", Kind::kTorus}})) {
     case Kind::kCylinder:
       return SolidCylinder{table.Get("radius").AsPositive(), table.Get("length").AsPositive()};
     case Kind::kCapsule:
@@ -119,8 +111,6 @@ Shape ReadShape(TomlTable& table) {
       return ReadBox(table);
     case Kind::kTorus:
       return ReadTorus(table);
-    case Kind::kEllipsoid:
-      return ReadEllipsoid(table);
     case Kind::kSphere:
       break;
   }

@@ -92,6 +92,7 @@ class CrossCheck {
   StepModelCheck model_;
   StepChecks motion_;
   Clearance clearance_;
+  MjDataPtr kinematics_;  // of a plant that has no bodies of the engine's
   std::optional<NotIdeal> known_;
   std::optional<LawCheck> law_;  // none for a task, an unknown law, or a motion of joints
   std::optional<JointLawCheck> joint_law_;

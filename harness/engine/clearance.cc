@@ -11,10 +11,10 @@ namespace {
 
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-Pose ReadBody(const mjData& d, int body) {
+Pose ReadBody(const BodyPoses& bodies, int body) {
   Pose X = Pose::Identity();
-  X.linear() = Eigen::Map<const RowMatrix3d>(d.xmat + 9 * body);
-  X.translation() = Eigen::Map<const Vector3d>(d.xpos + 3 * body);
+  X.linear() = Eigen::Map<const RowMatrix3d>(bodies.rotations + 9 * body);
+  X.translation() = Eigen::Map<const Vector3d>(bodies.positions + 3 * body);
   return X;
 }
 
@@ -54,16 +54,16 @@ Clearance::Clearance(const mjModel& engine, const Adapter& adapter, const Solids
   overlapping_.reserve(pairs_.size());
 }
 
-Pose Clearance::PoseOf(int index, const mjData& data) const {
+Pose Clearance::PoseOf(int index, const BodyPoses& bodies) const {
   const Solid& s = solid(index);
-  return ReadBody(data, s.body) * s.X_BG;
+  return ReadBody(bodies, s.body) * s.X_BG;
 }
 
-void Clearance::FollowBodies(const mjData& data) {
-  const Pose X_0W = ReadBody(data, base_body_).inverse(Eigen::Isometry);
+void Clearance::FollowBodies(const BodyPoses& bodies) {
+  const Pose X_0W = ReadBody(bodies, base_body_).inverse(Eigen::Isometry);
   std::array<double, kFrameCount> most = {};
   for (MovingBody& body : bodies_) {
-    const Pose X_WB = ReadBody(data, body.body);
+    const Pose X_WB = ReadBody(bodies, body.body);
     for (const Frame frame : {kOfBase, kOfWorld}) {
       if (!body.counts[frame]) continue;
       const Pose X = frame == kOfBase ? X_0W * X_WB : X_WB;
@@ -76,8 +76,8 @@ void Clearance::FollowBodies(const mjData& data) {
   has_begun_ = true;
 }
 
-void Clearance::Update(const mjData& data, double time) {
-  FollowBodies(data);
+void Clearance::Update(const BodyPoses& bodies, double time) {
+  FollowBodies(bodies);
   const auto later = [](const Due& x, const Due& y) { return x.travel > y.travel; };
   for (const Frame frame : {kOfBase, kOfWorld}) {
     std::vector<Due>& due = due_[frame];
@@ -85,14 +85,14 @@ void Clearance::Update(const mjData& data, double time) {
       std::pop_heap(due.begin(), due.end(), later);
       Due& next = due.back();
       // Of one that overlaps by rounding alone the budget may be less than what travel_ resolves.
-      next.travel = std::nextafter(travel_[frame] + CalcBudget(next.pair, data, time),
+      next.travel = std::nextafter(travel_[frame] + CalcBudget(next.pair, bodies, time),
                                    std::numeric_limits<double>::infinity());
       std::push_heap(due.begin(), due.end(), later);
     }
   }
 }
 
-double Clearance::CalcBudget(int index, const mjData& data, double time) {
+double Clearance::CalcBudget(int index, const BodyPoses& bodies, double time) {
   const WatchedPair& pair = pairs_[static_cast<size_t>(index)];
   State& state = states_[static_cast<size_t>(index)];
   const double smallest = nearest_[static_cast<size_t>(pair.pairs)].distance;
@@ -100,8 +100,8 @@ double Clearance::CalcBudget(int index, const mjData& data, double time) {
   double level = std::max(0.0, smallest - kResolution);
   const Solid& a = solid(pair.a);
   const Solid& b = solid(pair.b);
-  const Pose X_WA = PoseOf(pair.a, data);
-  const Pose X_WB = PoseOf(pair.b, data);
+  const Pose X_WA = PoseOf(pair.a, bodies);
+  const Pose X_WB = PoseOf(pair.b, bodies);
   const Pose X_AB = X_WA.inverse(Eigen::Isometry) * X_WB;
   if (state.is_measured) {
     // Of a pair with a plane the plane is seen from the other, whose reach is finite.

@@ -46,6 +46,12 @@ using AllowedPair = std::pair<std::string, std::string>;
 std::vector<WatchedPair> ListWatchedPairs(const mjModel& engine, const Adapter& adapter, const Solids& solids,
                                           const std::vector<AllowedPair>& allowed, const std::string& source);
 
+/// Where the engine's bodies are, as mjData has it (xpos, xmat).
+struct BodyPoses {
+  const double* positions;  ///< Origins, 3 each, m.
+  const double* rotations;  ///< Row by row, 9 each.
+};
+
 /// Follows how far the solids of watched pairs are apart while bodies move. A pair is measured again when its
 /// bodies may have come near enough to matter: at what they moved at the most, of all bodies, since it was
 /// measured. So most steps measure nothing, no overlap is missed in any of them, and the smallest distance of
@@ -66,8 +72,8 @@ class Clearance {
   Clearance(const mjModel& engine, const Adapter& adapter, const Solids& solids,
             std::vector<WatchedPair> pairs);
 
-  /// The bodies are where `data` has them (xpos, xmat).
-  void Update(const mjData& data, double time);
+  /// The bodies are there.
+  void Update(const BodyPoses& bodies, double time);
 
   [[nodiscard]] const std::vector<WatchedPair>& pairs() const { return pairs_; }
   [[nodiscard]] const Solid& solid(int index) const { return solids_->list[static_cast<size_t>(index)]; }
@@ -103,10 +109,10 @@ class Clearance {
     int pair = 0;
   };
 
-  void FollowBodies(const mjData& data);
+  void FollowBodies(const BodyPoses& bodies);
   /// How far the pair may come nearer before it matters.
-  [[nodiscard]] double CalcBudget(int pair, const mjData& data, double time);
-  [[nodiscard]] Pose PoseOf(int solid, const mjData& data) const;
+  [[nodiscard]] double CalcBudget(int pair, const BodyPoses& bodies, double time);
+  [[nodiscard]] Pose PoseOf(int solid, const BodyPoses& bodies) const;
   void Note(int pair, double distance, double time);
 
   const Solids* solids_;

@@ -12,7 +12,6 @@
 #include "controller/common/errors.h"
 #include "harness/base/temporary_path.h"
 #include "harness/engine/cylinder_collision.h"
-#include "harness/engine/ellipsoid_collision.h"
 #include "harness/engine/finite_check.h"
 #include "harness/engine/newer_mjcf.h"
 #include "harness/engine/torus_collision.h"
@@ -64,7 +63,6 @@ void PrepareEngine() {
   InstallMessageHandlers();
   CheckVersion();
   InstallCylinderCollision();
-  InstallEllipsoidCollision();
   InstallTorusCollision();
 }
 

@@ -66,8 +66,6 @@ class EngineTerms {
   void SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity,
                 const Pose& X_Bo = Pose::Identity(), const Vector6d& V_Bo = Vector6d::Zero());
 
-  /// The engine's own data at that state.
-  [[nodiscard]] const mjData& data() const { return *data_; }
   /// n, entries of the velocity.
   [[nodiscard]] int size() const { return map_.size(); }
   /// T^T M T: entries that can differ from zero, column by column, and their values.

@@ -16,6 +16,9 @@ EnginePlant::EnginePlant(const Adapter& adapter, std::span<const int> fingertips
 
 void EnginePlant::Read(PlantReading* reading) {
   observer_.Read(simulation_, reading);
+  const Eigen::Index bodies = simulation_.model().nbody;
+  reading->body_positions = Eigen::Map<const VectorXd>(simulation_.data().xpos, 3 * bodies);
+  reading->body_rotations = Eigen::Map<const VectorXd>(simulation_.data().xmat, 9 * bodies);
   reading->touch.support_force = support_force_;
 }
 

@@ -28,6 +28,8 @@ struct PlantReading {
   Pose X_W0 = Pose::Identity();  ///< Pose of Sigma_0 in the world, tilt and height included.
   VectorXd qpos;                 ///< MuJoCo's positions (nq), which draw the scene.
   VectorXd qvel;                 ///< MuJoCo's velocities (nv).
+  /// Of MuJoCo's bodies: origin (3) and rotation, row by row (9), each; empty for a plant that has none.
+  VectorXd body_positions, body_rotations;
 
   /// Gap between fingertip and object from which on they are just far apart, m.
   static constexpr double kFar = 5e-3;

@@ -104,9 +104,7 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
 }
 
 SurfacePoint ReadContact(const TomlValue& value) {
-  // On the torus: u around its axis, v around its tube. What they mean on the object is found with its
-  // surface.
-  const Vector2d degrees = value.AsVector<2>();
+  // On the torus: u around its axis, v around its tube.
   return {DegToRad(degrees[0]), DegToRad(degrees[1]), 0};
 }
 

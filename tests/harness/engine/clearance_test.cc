@@ -199,7 +199,7 @@ TEST_F(ClearanceTest, MissesNoOverlapAndMeasuresFew) {
     mj_integratePos(engine_.get(), data->qpos, rate.data(), 1.0);
     mj_kinematics(engine_.get(), data.get());
     const AllocationCounter counter;
-    clearance.Update(*data, step);
+    clearance.Update({data->xpos, data->xmat}, step);
     EXPECT_EQ(counter.count(), 0);
     if (step == 0) before = clearance.measured();
     if (step % 20 != 0 && clearance.FindDeepest().second < 0) continue;
