@@ -113,7 +113,7 @@ double Clearance::CalcBudget(int index, const BodyPoses& bodies, double time) {
   }
   const double between = X_AB.translation().norm() - a.reach - b.reach;
   if (between > level && std::isfinite(smallest)) {
-    Note(index, between, time);
+    SetOverlap(index, false);
     return between - level;
   }
 
@@ -128,11 +128,13 @@ double Clearance::CalcBudget(int index, const BodyPoses& bodies, double time) {
 }
 
 void Clearance::Note(int index, double distance, double time) {
-  // A bound is above the smallest distance so far.
-  State& state = states_[static_cast<size_t>(index)];
   Nearest& nearest = nearest_[static_cast<size_t>(pairs_[static_cast<size_t>(index)].pairs)];
   if (distance < nearest.distance) nearest = {distance, time, index};
-  const bool overlaps = distance < 0.0;
+  SetOverlap(index, distance < 0.0);
+}
+
+void Clearance::SetOverlap(int index, bool overlaps) {
+  State& state = states_[static_cast<size_t>(index)];
   if (overlaps == state.overlaps) return;
   state.overlaps = overlaps;
   if (overlaps) {

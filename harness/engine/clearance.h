@@ -114,6 +114,7 @@ class Clearance {
   [[nodiscard]] double CalcBudget(int pair, const BodyPoses& bodies, double time);
   [[nodiscard]] Pose PoseOf(int solid, const BodyPoses& bodies) const;
   void Note(int pair, double distance, double time);
+  void SetOverlap(int pair, bool overlaps);
 
   const Solids* solids_;
   std::vector<WatchedPair> pairs_;

@@ -18,6 +18,8 @@ constexpr double kAccuracy = 1e-7;
 constexpr int kMostIterations = 64;
 /// The difference's corners are of this order at least, m: smaller simplices are points.
 constexpr double kFlat = 1e-20;
+/// A tetrahedron that is lower has no inside, m.
+constexpr double kFlatHeight = 1e-10;
 /// Places of a torus's ring where the search for the nearest one starts.
 constexpr int kRingPlaces = 32;
 constexpr int kRingSearch = 30;  // halves a place's width to 1e-6 of it by golden sections
@@ -130,9 +132,11 @@ struct Simplex {
     for (const auto& face : kFaces) {
       const Vector3d& p = corner[face[0]];
       const Vector3d normal = (corner[face[1]] - p).cross(corner[face[2]] - p);
-      // On the other side of the face than the fourth corner, or nowhere at all in a flat tetrahedron.
+      // The face counts unless the origin is on the same side of it as the fourth corner. A flat tetrahedron
+      // has no such side.
       const double of_fourth = normal.dot(corner[face[3]] - p);
-      if (-normal.dot(p) * of_fourth > 0.0) continue;
+      const bool is_flat = of_fourth * of_fourth <= kFlatHeight * kFlatHeight * normal.squaredNorm();
+      if (!is_flat && -normal.dot(p) * of_fourth > 0.0) continue;
       Simplex triangle;
       for (int i = 0; i < 3; ++i) triangle.corner[i] = corner[face[i]];
       triangle.count = 3;
@@ -217,7 +221,8 @@ double CalcCoreDepth(const Difference& difference) {
     if (across.norm() < kAccuracy) break;
     if (!consider((best - step * across.normalized()).normalized())) step *= 0.5;
   }
-  return std::max(depth, 0.0);
+  // Of bodies that are apart the opposite of their distance.
+  return depth;
 }
 
 double CalcConvexDistance(const Solid& a, const Pose& X_WA, const Solid& b, const Pose& X_WB) {
