@@ -105,6 +105,7 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
 
 SurfacePoint ReadContact(const TomlValue& value) {
   // On the torus: u around its axis, v around its tube.
+  const Vector2d degrees = value.AsVector<2>();
   return {DegToRad(degrees[0]), DegToRad(degrees[1]), 0};
 }
 
