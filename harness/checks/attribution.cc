@@ -137,6 +137,8 @@ const char* NameOf(Cause cause) {
       return "slope";
     case Cause::kWheelGeometry:
       return "wheel geometry";
+    case Cause::kCollision:
+      return "collision";
     case Cause::kUnexplained:
       return "unexplained";
   }

@@ -27,6 +27,8 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
     : setup_(&setup),
       model_(setup.plant_side(), setup.fingertips(), setup.scenario().control.orientation),
       motion_(setup),
+      clearance_(setup.engine(), setup.plant_side(), setup.solids(), setup.watched_pairs()),
+      kinematics_(MakeData(setup.engine())),
       law_terms_(setup.model().num_positions(), setup.model().num_velocities(),
                  3 * static_cast<int>(setup.fingertips().size())),
       motors_(setup.model(), setup.scenario().plant.time_step),
@@ -79,10 +81,29 @@ void CrossCheck::CompareModel(const StepRecord& step) {
   }
   const GraspModel& plant = ModelAtTruth(step);
   model_.Compare(plant.robot(), plant.grasp(), state, step.reading.X_W0, step.time);
+  CheckClearance(step);
   if (!known_) return;
   StepModelCheck& controller = known_->controller;
   controller.Compare(step.model->robot(), step.model->grasp(), step.told.state, step.reading.X_W0, step.time);
   model_.Merge(controller);
+}
+
+void CrossCheck::CheckClearance(const StepRecord& step) {
+  if (clearance_.pairs().empty()) return;
+  const PlantReading& reading = step.reading;
+  if (reading.body_positions.size() > 0) {
+    clearance_.Update({reading.body_positions.data(), reading.body_rotations.data()}, step.time);
+  } else {
+    std::copy_n(reading.qpos.data(), reading.qpos.size(), kinematics_->qpos);
+    mj_kinematics(&setup_->engine(), kinematics_.get());
+    clearance_.Update({kinematics_->xpos, kinematics_->xmat}, step.time);
+  }
+  const std::pair<double, int> deepest = clearance_.FindDeepest();
+  motion_.Add(StepCheck::kClearance, deepest.first, step.time,
+              [&] { return clearance_.Describe(deepest.second); });
+  const Collision& collision = step.response.collision;
+  motion_.Add(StepCheck::kCollision, collision.force, step.time,
+              [&] { return clearance_.DescribeGeoms(collision.geom1, collision.geom2); });
 }
 
 double CrossCheck::CompareTold(const StepRecord& step) {

@@ -16,6 +16,7 @@
 #include "harness/checks/step_checks.h"
 #include "harness/checks/step_model_check.h"
 #include "harness/checks/step_record.h"
+#include "harness/engine/clearance.h"
 
 namespace dexcheck {
 
@@ -65,6 +66,8 @@ class CrossCheck {
   [[nodiscard]] const CheckRecord& Find(std::string_view name) const { return motion_.Find(name); }
   /// Of the last step.
   [[nodiscard]] const StepFindings& findings() const { return motion_.findings(); }
+  /// Of the bodies that are not meant to touch.
+  [[nodiscard]] const Clearance& clearance() const { return clearance_; }
 
  private:
   /// What a plant that is not ideal needs besides.
@@ -74,6 +77,8 @@ class CrossCheck {
     /// Of the controller's terms at what it was told, by an engine without the scenario's mismatch.
     StepModelCheck controller;
   };
+  /// Are bodies apart that are not meant to touch? At the state that the engine's terms were evaluated at.
+  void CheckClearance(const StepRecord& step);
   static double CompareTold(const StepRecord& step);
   /// The engine's at what the controller was told; contacts that need not fit together are the controller's.
   void ReadControllersTerms(const StepRecord& step);
@@ -86,6 +91,8 @@ class CrossCheck {
   const Setup* setup_;
   StepModelCheck model_;
   StepChecks motion_;
+  Clearance clearance_;
+  MjDataPtr kinematics_;  // of a plant that has no bodies of the engine's
   std::optional<NotIdeal> known_;
   std::optional<LawCheck> law_;  // none for a task, an unknown law, or a motion of joints
   std::optional<JointLawCheck> joint_law_;

@@ -21,6 +21,7 @@ enum class Cause {
   kIntegrator,       ///< What time stepping leaves: half the step leaves less.
   kSlope,            ///< The floor is not level: gravity points elsewhere.
   kWheelGeometry,    ///< The wheels' radius or distance is another.
+  kCollision,        ///< Two bodies touch that are not meant to.
   kUnexplained,      ///< None of these was seen.
 };
 

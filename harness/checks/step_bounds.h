@@ -73,6 +73,9 @@ inline constexpr double kOrientationDynamicsBound = 1e-7;
 // Rounding of torques, over the least inertia that they drive and over K_p: measured 1e-14 for the Panda.
 inline constexpr double kJointDynamicsBound = 1e-11;
 
+// Ten times the accuracy of distances between bodies that are apart (solid.h).
+inline constexpr double kClearanceBound = 1e-6;
+
 /// What a bound is proportional to; none of them for one that is rounding, or a share.
 enum class Scaling {
   kNone,

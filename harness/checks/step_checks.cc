@@ -98,6 +98,8 @@ void StepChecks::SetApplying() {
   // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
   leave_out(setup_->scenario().plant.type == PlantType::kRigid,
             {kWheelSlip, kRolling, kWheelSlipRate, kTractionUse, kBaseTilt, kSolver});
+  leave_out(setup_->watched_pairs().empty(), {kClearance, kCollision});
+  leave_out(!setup_->scenario().plant.collide, {kCollision});
   const mjModel& engine = setup_->engine();
   const mjtByte* const limited = engine.actuator_ctrllimited;
   leave_out(std::none_of(limited, limited + engine.nu, [](mjtByte flag) { return flag != 0; }), {kActuators});

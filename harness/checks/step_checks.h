@@ -46,6 +46,13 @@ class StepChecks {
   void Compare(const StepRecord& step);
   /// Adds the value of a check that others measure.
   void Add(StepCheck which, double value, double time) { check(which).Add(value, time); }
+  /// The same of a check that has parts: `describe` tells the one of a first failure, in words.
+  template <typename Describe>
+  void Add(StepCheck which, double value, double time, const Describe& describe) {
+    CheckRecord& record = check(which);
+    if (record.applies && !record.failed && !(value <= record.bound)) record.part = describe();
+    record.Add(value, time);
+  }
   /// Takes checks out that this run cannot answer.
   void LeaveOut(StepCheck which) { check(which).applies = false; }
   /// M_bar' = L^T L of the last step that was judged; null before.

@@ -24,6 +24,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
+#include "harness/cli/plan_clearance.h"
 #include "harness/cli/shipped_files.h"
 
 namespace dexcheck::cli {
@@ -40,6 +41,7 @@ struct Request {
   std::vector<double> lift;              // m
   std::optional<double> support_height;  // m
   ContactPlanOptions options;
+  std::string mjcf;  // empty: the shipped scene for the shipped robot
   std::string json_file;
 };
 
@@ -176,8 +178,20 @@ std::optional<double> CalcHandPickedMargin(const Surface& surface, const Hand& h
   return CalcForceClosure(G, VectorXd::Constant(kDegrees.size(), request.options.mu), options).margin_lower;
 }
 
+using Clearances = std::array<PlanClearance, kPairClassCount>;
+
+/// The smallest of all; null when nothing is watched.
+const PlanClearance* FindSmallest(const Clearances& clearances) {
+  const PlanClearance* smallest = nullptr;
+  for (const PlanClearance& one : clearances) {
+    if (!one.bodies.empty() && (smallest == nullptr || one.distance < smallest->distance)) smallest = &one;
+  }
+  return smallest;
+}
+
 void PrintText(const Request& request, const ContactPlan& plan, const GraspBlock& block,
-               const std::optional<double>& hand_picked, double seconds) {
+               const std::optional<double>& hand_picked, const std::optional<Clearances>& clearances,
+               double seconds) {
   fmt::print("# {} contacts for the object at {} m, {} degrees (ZYZ); {} palm poses tried in {:.2f} s\n",
              block.contacts_deg.size(), FormatNumbers(request.xyz), FormatNumbers(request.zyz_deg),
              plan.palm_poses, seconds);
@@ -187,6 +201,11 @@ void PrintText(const Request& request, const ContactPlan& plan, const GraspBlock
     fmt::print("; contacts at 125, 90, 55, -90 degrees have {:.3f}", *hand_picked);
   }
   fmt::print("\n# every joint stays {:.3f} or more from the ends of its range\n", plan.joint_margin);
+  if (const PlanClearance* nearest = clearances ? FindSmallest(*clearances) : nullptr) {
+    fmt::print("# nearest of what is not meant to touch, hand open or closed: {}, {:.1f} mm {}\n",
+               nearest->bodies, 1e3 * std::abs(nearest->distance),
+               nearest->distance < 0.0 ? "into each other" : "apart");
+  }
   if (std::abs(std::sin(DegToRad(request.zyz_deg[1]))) < kMinSinBeta) {
     fmt::print("# ZYZ angles are singular at this pose: in [control], orientation = \"rotation\"\n");
   }
@@ -213,12 +232,22 @@ void PrintText(const Request& request, const ContactPlan& plan, const GraspBlock
 }
 
 std::string ToText(const Request& request, const ContactPlan& plan, const std::optional<GraspBlock>& block,
-                   const std::optional<double>& hand_picked, double seconds) {
+                   const std::optional<double>& hand_picked, const std::optional<Clearances>& clearances,
+                   double seconds) {
   Json json = {
       {"found", plan.found},      {"object_xyz", request.xyz},     {"object_zyz_deg", request.zyz_deg},
       {"mu", request.options.mu}, {"palm_poses", plan.palm_poses}, {"seconds", seconds}};
   if (!plan.found) json["problem"] = plan.problem;
   if (hand_picked) json["hand_picked_margin"] = *hand_picked;
+  if (clearances) {
+    json["clearance"] = Json::object();
+    for (size_t i = 0; i < clearances->size(); ++i) {
+      const PlanClearance& one = (*clearances)[i];
+      if (one.bodies.empty()) continue;
+      json["clearance"][NameOf(static_cast<PairClass>(i))] = {{"smallest_m", one.distance},
+                                                              {"bodies", one.bodies}};
+    }
+  }
   if (block) {
     json["margin"] = plan.margin;
     json["joint_margin"] = plan.joint_margin;
@@ -236,6 +265,10 @@ std::string ToText(const Request& request, const ContactPlan& plan, const std::o
 }
 
 int Run(Request request) {
+  const std::filesystem::path shipped = FindShippedFile("controller/parameters/assistant_robot.toml");
+  if (request.mjcf.empty() && request.robot == shipped) {
+    request.mjcf = FindShippedFile("mjcf/scene.xml").string();
+  }
   const RobotModel model = ReadRobotModel(request.robot);
   RequireNoBalls(model, "in a plan, whose postures have one number for each joint");
   if (!model.object())
@@ -275,11 +308,18 @@ int Run(Request request) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const std::optional<double> hand_picked = CalcHandPickedMargin(*surface, hand, request);
   std::optional<GraspBlock> block;
-  if (plan.found) block = MakeGraspBlock(model, hand, *surface, plan);
-  if (json) json->Write(ToText(request, plan, block, hand_picked, seconds));
+  std::optional<Clearances> clearances;
+  if (plan.found) {
+    block = MakeGraspBlock(model, hand, *surface, plan);
+    if (!request.mjcf.empty()) {
+      clearances = FindPlanClearance(model, request.mjcf, CalcObjectPose(X_o), plan.q, plan.q_open);
+    }
+  }
+  if (json) json->Write(ToText(request, plan, block, hand_picked, clearances, seconds));
   if (!plan.found) throw Error("no plan: " + plan.problem);
-  if (request.json_file != "-") PrintText(request, plan, *block, hand_picked, seconds);
-  return kSuccess;
+  if (request.json_file != "-") PrintText(request, plan, *block, hand_picked, clearances, seconds);
+  const PlanClearance* nearest = clearances ? FindSmallest(*clearances) : nullptr;
+  return nearest != nullptr && nearest->distance < 0.0 ? kDisagreement : kSuccess;
 }
 
 }  // namespace
@@ -326,6 +366,11 @@ void AddPlanCommand(Command app) {
       .TypeName("NAME");
   command.AddOption("--robot", &request->robot, "Parameter file (TOML) with fingertips and an object")
       .TypeName("FILE.toml");
+  command
+      .AddOption("--mjcf", &request->mjcf,
+                 "Scene in which the robot's bodies must be clear of each other, the object and what stands "
+                 "there (default: the shipped one for the shipped robot)")
+      .TypeName("FILE.xml");
   command
       .AddOption("--json", &request->json_file,
                  "Write the plan to this file (- for standard output, then without the [grasp])")

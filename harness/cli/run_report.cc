@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <vector>
@@ -104,6 +105,19 @@ void PrintTracking(const Scenario& scenario, const TrackingStatistics& tracking)
              tracking.position_max(), tracking.position_rms(), tracking.orientation_max());
 }
 
+/// Which bodies came nearest to each other that are not meant to touch.
+void PrintClearance(const Clearance& clearance) {
+  const Clearance::Nearest* nearest = nullptr;
+  for (int i = 0; i < kPairClassCount; ++i) {
+    const Clearance::Nearest& one = clearance.nearest(static_cast<PairClass>(i));
+    if (one.pair >= 0 && (nearest == nullptr || one.distance < nearest->distance)) nearest = &one;
+  }
+  if (nearest == nullptr) return;
+  fmt::print("nearest of what is not meant to touch: {}, {:.1f} mm {} at t = {:.3f} s\n",
+             clearance.Describe(nearest->pair), 1e3 * std::abs(nearest->distance),
+             nearest->distance < 0.0 ? "into each other" : "apart", nearest->time);
+}
+
 void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
   const LoopTimes& times = loop.times();
   const double scale = 1e6 / static_cast<double>(std::max(loop.record().step, 1L));
@@ -128,6 +142,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     }
     PrintTracking(scenario, result.tracking);
     if (loop.task() != nullptr) PrintTask(loop);
+    if (loop.is_checking()) PrintClearance(loop.checks().clearance());
     if (loop.is_checking()) PrintChecks(setup, loop, detail);
     PrintSpeed(loop, result);
     if (!folder.empty()) fmt::print("log and summary in {}\n", folder);

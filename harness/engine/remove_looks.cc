@@ -85,10 +85,11 @@ void LayOut(mjModel* m) {
 
 }  // namespace
 
-int RemoveLooks(mjModel* m) {
+int RemoveLooks(mjModel* m, std::span<const int> wanted) {
   std::vector<bool> keep(static_cast<size_t>(m->ngeom), false);
+  for (const int geom : wanted) keep[static_cast<size_t>(geom)] = true;
   for (int geom = 0; geom < m->ngeom; ++geom) {
-    keep[static_cast<size_t>(geom)] = CanTouch(*m, geom) || m->geom_fluid[mjNFLUID * geom] != 0.0;
+    if (CanTouch(*m, geom) || m->geom_fluid[mjNFLUID * geom] != 0.0) keep[static_cast<size_t>(geom)] = true;
   }
   ForEachReference(m, [&](const int* geom) {
     if (*geom >= 0) keep[static_cast<size_t>(*geom)] = true;

@@ -2,6 +2,8 @@
 
 #include <mujoco/mujoco.h>
 
+#include <span>
+
 namespace dexcheck {
 
 /// Removes from a compiled model the geoms that are only looked at: those that cannot touch anything and that
@@ -9,7 +11,7 @@ namespace dexcheck {
 /// so that a robot with fine looks costs more to simulate; without them it moves bit for bit the same.
 /// Bodies, joints and sites keep their numbers, the geoms that stay get new ones in the old order. Draw
 /// another model of the same file.
-/// @return the number of geoms removed.
-int RemoveLooks(mjModel* model);
+/// @param wanted geoms that stay besides. @return the number of geoms removed.
+int RemoveLooks(mjModel* model, std::span<const int> wanted = {});
 
 }  // namespace dexcheck

@@ -1,5 +1,6 @@
 #include "harness/plant/engine_plant.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "harness/engine/velocity_map.h"
@@ -15,6 +16,9 @@ EnginePlant::EnginePlant(const Adapter& adapter, std::span<const int> fingertips
 
 void EnginePlant::Read(PlantReading* reading) {
   observer_.Read(simulation_, reading);
+  const Eigen::Index bodies = simulation_.model().nbody;
+  reading->body_positions = Eigen::Map<const VectorXd>(simulation_.data().xpos, 3 * bodies);
+  reading->body_rotations = Eigen::Map<const VectorXd>(simulation_.data().xmat, 9 * bodies);
   reading->touch.support_force = support_force_;
 }
 
@@ -27,6 +31,29 @@ void EnginePlant::Read(PlantResponse* response) {
   observer_.Read(simulation_, response);
   simulation_.ReadMotorTorques(&response->motor_torques);
   support_force_ = response->support_force;
+  response->collision = FindCollision();
+}
+
+void EnginePlant::WatchCollisions(std::span<const std::pair<int, int>> geoms) {
+  colliding_.clear();
+  for (const auto& [a, b] : geoms) colliding_.emplace_back(std::min(a, b), std::max(a, b));
+  std::sort(colliding_.begin(), colliding_.end());
+}
+
+Collision EnginePlant::FindCollision() const {
+  Collision largest;
+  if (colliding_.empty()) return largest;
+  const mjData& d = simulation_.data();
+  for (int i = 0; i < d.ncon; ++i) {
+    const mjContact& contact = d.contact[i];
+    const std::pair<int, int> geoms = std::minmax(contact.geom1, contact.geom2);
+    if (!std::binary_search(colliding_.begin(), colliding_.end(), geoms)) continue;
+    mjtNum force[6];
+    mj_contactForce(&simulation_.model(), &d, i, force);
+    const double size = mju_norm3(force);
+    if (size > largest.force) largest = {size, geoms.first, geoms.second};
+  }
+  return largest;
 }
 
 void EnginePlant::Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) {

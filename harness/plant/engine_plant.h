@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "harness/plant/engine_simulation.h"
@@ -22,6 +24,9 @@ class EnginePlant final : public Plant {
     observer_.SetBonds(kappa, constraints);
   }
 
+  /// Geoms that are not meant to touch, and that do push: what they push with is read.
+  void WatchCollisions(std::span<const std::pair<int, int>> geoms);
+
   [[nodiscard]] double time_step() const override { return simulation_.time_step(); }
   [[nodiscard]] std::span<const Motor> motors() const override { return motors_; }
 
@@ -39,11 +44,14 @@ class EnginePlant final : public Plant {
   void Translate(const Vector3d& way) override;
 
  private:
+  [[nodiscard]] Collision FindCollision() const;
+
   const Adapter* adapter_;
   EngineSimulation simulation_;
   Observer observer_;
   std::vector<Motor> motors_;
-  double support_force_ = 0.0;  // of the last response
+  std::vector<std::pair<int, int>> colliding_;  // the smaller number first, sorted
+  double support_force_ = 0.0;                  // of the last response
 };
 
 }  // namespace dexcheck

@@ -28,6 +28,8 @@ struct PlantReading {
   Pose X_W0 = Pose::Identity();  ///< Pose of Sigma_0 in the world, tilt and height included.
   VectorXd qpos;                 ///< MuJoCo's positions (nq), which draw the scene.
   VectorXd qvel;                 ///< MuJoCo's velocities (nv).
+  /// Of MuJoCo's bodies: origin (3) and rotation, row by row (9), each; empty for a plant that has none.
+  VectorXd body_positions, body_rotations;
 
   /// Gap between fingertip and object from which on they are just far apart, m.
   static constexpr double kFar = 5e-3;
@@ -42,6 +44,12 @@ struct PlantContact {
   Vector3d force = Vector3d::Zero();     ///< World, N, of finger on object.
 };
 
+/// What two bodies push each other with that are not meant to touch.
+struct Collision {
+  double force = 0.0;          ///< N
+  int geom1 = -1, geom2 = -1;  ///< The engine's.
+};
+
 /// Accelerations and forces of the same step, for the torques that were applied.
 struct PlantResponse {
   VectorXd xi_dot;                       ///< n.
@@ -54,6 +62,7 @@ struct PlantResponse {
   double support_force = 0.0;  ///< Its upward part, N.
   /// What the plant's solver left over of its own equation of motion of the object, as such a wrench.
   Vector6d solver_residual = Vector6d::Zero();
+  Collision collision;     ///< The largest; of a plant whose bodies push, see Clearance.
   VectorXd motor_torques;  ///< n, N m: what wheels and joints received from their motors, as tau'.
   /// n, N and N m: T^T M (qacc - T xi_dot - T_dot xi), the inertia of what xi_dot leaves out, a platform that
   /// tilts or sinks and wheels that slip, on soft contacts. Empty for a plant that has nothing of the kind.

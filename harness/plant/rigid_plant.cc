@@ -7,6 +7,7 @@
 #include "controller/contact/find_contact.h"
 #include "controller/contact/object_surface.h"
 #include "controller/contact/rolling.h"
+#include "controller/contact/shapes.h"
 #include "controller/model/platform.h"
 #include "controller/object/object_dynamics.h"
 #include "controller/object/so3.h"
@@ -19,17 +20,27 @@ namespace {
 /// grew as the step shrinks would cost two orders.
 constexpr double kStabilisationRate = 20.0;
 
+std::unique_ptr<Surface> MakeHeldSurface(const RobotModel& model, bool holds) {
+  // What is not held needs a surface only to have one.
+  return holds ? MakeSurface(model.object()->shape) : std::make_unique<Sphere>(1.0);
+}
+
+MassProperties FindHeldBody(const RobotModel& model, bool holds) {
+  return holds ? model.object()->body : MassProperties{1.0, Vector3d::Zero(), Matrix3d::Identity()};
+}
+
 }  // namespace
 
 RigidPlant::RigidPlant(const RobotModel& model, const Adapter& adapter, std::span<const int> fingertips,
                        std::span<const Motor> motors, const RigidPlantOptions& options)
     : model_(&model),
       adapter_(&adapter),
-      surface_(MakeSurface(model.object().value().shape)),
+      holds_(!fingertips.empty()),
+      surface_(MakeHeldSurface(model, holds_)),
       motors_(motors.begin(), motors.end()),
       options_(options),
       robot_(model, Coordinates::kReduced),
-      grasp_(model, fingertips, model.object()->body, *surface_),
+      grasp_(model, fingertips, FindHeldBody(model, holds_), *surface_),
       dynamics_(model, static_cast<int>(fingertips.size())),
       actuation_(model),
       velocity_map_(adapter, Coordinates::kReduced) {
@@ -95,6 +106,7 @@ void RigidPlant::Read(PlantReading* reading) {
   reading->qvel.setZero(m.nv);
   velocity_map_.SetState(state_.q, state_.xi);
   velocity_map_.Expand(state_.xi, reading->qvel.data());
+  if (!holds_) return;
   const int joint = m.body_jntadr[adapter_->object_body()];
   const Eigen::Quaterniond rotation(state_.X_Bo.linear());
   reading->qpos.segment<7>(m.jnt_qposadr[joint]) << state_.X_Bo.translation(), rotation.w(), rotation.x(),
@@ -143,6 +155,7 @@ void RigidPlant::CalcCoordinateRates(const Eigen::Ref<const VectorXd>& q,
 void RigidPlant::Evaluate(const State& state, const Vector3d& turn, Rate* rate) {
   robot_.SetState(state.q, state.xi);
   robot_.CalcDynamics();
+  if (!holds_) return EvaluateFree(state, rate);
   grasp_.SetPose(robot_, state.X_Bo, state.V_Bo, state.kappa);
   // d/dt r = -2 w r + [0; 0; w^2 g]
   const double h = options_.time_step;
@@ -172,7 +185,16 @@ void RigidPlant::Evaluate(const State& state, const Vector3d& turn, Rate* rate) 
   rate->power = state.xi.dot(pushed_) + state.V_Bo.dot(on_object) - state.xi.dot(robot_.friction());
 }
 
+void RigidPlant::EvaluateFree(const State& state, Rate* rate) {
+  pushed_ = force_;
+  AddRobotForce(wrenches_, robot_, pushed_);
+  CalcCoordinateRates(state.q, state.xi, &rate->q_dot);
+  rate->xi_dot = dynamics_.PredictFree(robot_, pushed_).xi_dot;
+  rate->power = state.xi.dot(pushed_) - state.xi.dot(robot_.friction());
+}
+
 void RigidPlant::KeepResponse() {
+  if (!holds_) return;
   X_Bo_before_ = state_.X_Bo;
   for (size_t i = 0; i < gaps_.size(); ++i) {
     g_o_cf_before_[i] = grasp_.contacts()[i].geometry.g_o_cf;
@@ -305,6 +327,7 @@ double RigidPlant::CalcEnergy() {
   robot_.SetState(state_.q, state_.xi);
   robot_.CalcDynamics();
   const EnergyAndMomentum energy = robot_.CalcEnergyAndMomentum();
+  if (!holds_) return energy.kinetic + energy.potential;
   return energy.kinetic + energy.potential + CalcObjectKineticEnergy(grasp_.object(), state_.V_Bo) +
          CalcObjectPotentialEnergy(grasp_.object(), grasp_.gravity(), state_.X_Bo.translation());
 }

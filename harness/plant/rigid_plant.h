@@ -39,8 +39,8 @@ struct RigidPlantOptions {
 class RigidPlant final : public Plant {
  public:
   /// @param model of robot and object. @param adapter for the engine's coordinates, which draw the scene;
-  /// both outlive this. @param fingertips frames of the grasp. @param motors by entry of tau'. @throws as
-  /// GraspTerms and MakeSurface.
+  /// both outlive this. @param fingertips frames of the grasp; none for a robot that holds nothing. @param
+  /// motors by entry of tau'. @throws as GraspTerms and MakeSurface.
   RigidPlant(const RobotModel& model, const Adapter& adapter, std::span<const int> fingertips,
              std::span<const Motor> motors, const RigidPlantOptions& options);
 
@@ -85,6 +85,8 @@ class RigidPlant final : public Plant {
                            VectorXd* q_dot) const;
   /// Terms and rates at a state whose object has turned by `turn` since the step's beginning.
   void Evaluate(const State& state, const Vector3d& turn, Rate* rate);
+  /// The same of a robot that holds nothing, whose terms are evaluated.
+  void EvaluateFree(const State& state, Rate* rate);
   /// Keeps what Evaluate has found for the response.
   void KeepResponse();
   void StepRungeKutta();
@@ -95,6 +97,7 @@ class RigidPlant final : public Plant {
 
   const RobotModel* model_;
   const Adapter* adapter_;
+  bool holds_;  // an object
   std::unique_ptr<Surface> surface_;
   std::vector<Motor> motors_;
   RigidPlantOptions options_;

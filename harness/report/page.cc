@@ -215,9 +215,22 @@ class Page {
       if (check.name == "cone_use")
         AddTile(FormatShare(check.max), "of the fingertips' friction used, at most");
     }
+    AddClearanceTiles();
     const double factor = FindNumber(summary, "speed", "real_time_factor");
     if (std::isfinite(factor)) AddTile(fmt::format("{:.2g} ×", factor), "real time");
     html_ += "</div>\n";
+  }
+
+  /// By class of bodies that are not meant to touch.
+  void AddClearanceTiles() {
+    if (run_.summary().is_null() || !run_.summary().contains("clearance")) return;
+    for (const auto& [pairs, nearest] : run_.summary()["clearance"].items()) {
+      std::string name = pairs;
+      std::replace(name.begin(), name.end(), '_', ' ');
+      const double distance = nearest.value("smallest_m", std::nan(""));
+      AddTile(fmt::format("{:.1f} mm", 1e3 * distance),
+              fmt::format("{}: nearest are {}", name, nearest.value("bodies", "")).c_str());
+    }
   }
 
   void AddNavigation() {

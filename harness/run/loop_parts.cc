@@ -47,6 +47,14 @@ std::unique_ptr<Plant> MakePlant(const Setup& setup) {
   if (setup.scenario().plant.type == PlantType::kRigid) return MakeRigidPlant(setup);
   auto plant = std::make_unique<EnginePlant>(setup.adapter(), setup.fingertips(), setup.surface(),
                                              setup.scenario().plant.implicit_damping);
+  if (setup.scenario().plant.collide) {
+    std::vector<std::pair<int, int>> geoms;
+    for (const WatchedPair& pair : setup.watched_pairs()) {
+      geoms.emplace_back(setup.solids().list[static_cast<size_t>(pair.a)].geom,
+                         setup.solids().list[static_cast<size_t>(pair.b)].geom);
+    }
+    plant->WatchCollisions(geoms);
+  }
   if (!setup.bonds().empty()) plant->SetBonds(setup.kappa_start(), setup.bond_constraints());
   plant->Place(setup.q_start(), setup.X_Bo_start());
   return plant;

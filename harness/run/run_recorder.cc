@@ -75,6 +75,7 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
     AddContactSignals();
   }
   if (loop.task() != nullptr) AddTaskSignals();
+  if (checks_ != nullptr) AddClearanceSignals();
   if (checks_ != nullptr) AddCheckSignals();
   log_.StartRows();
 }
@@ -304,6 +305,28 @@ void RunRecorder::AddTaskSignals() {
   if (checks_ == nullptr) return;
   Add({"task/support_force", "N", "upward force on the object by what it lies on", 1, {}, {}},
       [](const StepRecord& step, std::span<double> row) { row[0] = step.response.support_force; });
+}
+
+void RunRecorder::AddClearanceSignals() {
+  std::vector<PairClass> classes;
+  std::vector<std::string> names;
+  for (const WatchedPair& pair : checks_->clearance().pairs()) {
+    if (std::find(classes.begin(), classes.end(), pair.pairs) == classes.end()) classes.push_back(pair.pairs);
+  }
+  std::sort(classes.begin(), classes.end());
+  for (const PairClass pairs : classes) names.emplace_back(NameOf(pairs));
+  if (classes.empty()) return;
+  Add({"clearance/smallest",
+       "m",
+       "smallest distance so far of bodies that are not meant to touch",
+       static_cast<int>(classes.size()),
+       names,
+       {}},
+      [this, classes](const StepRecord& /*step*/, std::span<double> row) {
+        for (size_t i = 0; i < classes.size(); ++i) {
+          row[i] = checks_->clearance().nearest(classes[i]).distance;
+        }
+      });
 }
 
 void RunRecorder::AddCheckSignals() {

@@ -40,6 +40,7 @@ class RunRecorder {
   void AddObjectSignals();
   void AddContactSignals();
   void AddTaskSignals();
+  void AddClearanceSignals();
   void AddCheckSignals();
 
   const Setup* setup_;

@@ -59,6 +59,20 @@ Json TaskToJson(const ClosedLoop& loop) {
   return json;
 }
 
+/// By class of pairs that there are: the smallest distance, of which bodies, and when.
+Json ClearanceToJson(const Clearance& clearance) {
+  Json json = Json::object();
+  for (int i = 0; i < kPairClassCount; ++i) {
+    const auto pairs = static_cast<PairClass>(i);
+    const Clearance::Nearest& nearest = clearance.nearest(pairs);
+    if (nearest.pair < 0) continue;
+    json[NameOf(pairs)] = {{"smallest_m", nearest.distance},
+                           {"bodies", clearance.Describe(nearest.pair)},
+                           {"at_time_s", nearest.time}};
+  }
+  return json;
+}
+
 }  // namespace
 
 const char* NameOf(Verdict verdict) {
@@ -132,6 +146,7 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
                            {"cone_margin_min", findings.least_cone_margin},
                            {"contacts_lost", findings.contacts_lost}};
   }
+  if (loop.is_checking()) json["clearance"] = ClearanceToJson(loop.checks().clearance());
   const LoopTimes& times = loop.times();
   const double steps = static_cast<double>(std::max(loop.record().step, 1L));
   const double microseconds = 1e6 / steps;

@@ -65,8 +65,17 @@ void ReadPlantType(TomlTable& table, PlantOptions* plant) {
   plant->type = PlantType::kRigid;
   if (choice == Choice::kRigidEuler) plant->integrator = Integrator::kSemiImplicitEuler;
   for (const char* key : {"contact_time_constant", "contact_impedance", "impratio", "noslip_iterations",
-                          "bonded", "implicit_damping", "floor_friction"}) {
+                          "bonded", "implicit_damping", "floor_friction", "collide"}) {
     if (const auto value = table.Find(key)) value->Reject("has no meaning for a rigid plant");
+  }
+}
+
+/// [["BODY", "BODY"], ...]
+void ReadMayTouch(const TomlValue& value, PlantOptions* plant) {
+  for (const TomlValue& entry : value.AsList()) {
+    const std::vector<TomlValue> bodies = entry.AsList();
+    if (bodies.size() != 2) entry.Reject("must name two bodies");
+    plant->may_touch.emplace_back(bodies[0].AsName(), bodies[1].AsName());
   }
 }
 
@@ -89,6 +98,8 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
   if (const auto flag = table.Find("implicit_damping")) plant.implicit_damping = flag->AsFlag();
   if (const auto mu = table.Find("floor_friction")) plant.floor_friction = mu->AsPositive();
   if (const auto mu = table.Find("finger_friction")) plant.finger_friction = mu->AsPositive();
+  if (const auto flag = table.Find("collide")) plant.collide = flag->AsFlag();
+  if (const auto pairs = table.Find("may_touch")) ReadMayTouch(*pairs, &plant);
   table.RejectUnused();
 }
 

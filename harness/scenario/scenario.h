@@ -49,6 +49,9 @@ struct PlantOptions {
   bool implicit_damping = false;  ///< The engine's own treatment of joint damping.
   std::optional<double> floor_friction;   ///< mu of wheels on the floor.
   std::optional<double> finger_friction;  ///< mu of fingertips on the object.
+  bool collide = false;                   ///< Bodies that are not meant to touch push each other.
+  /// Two bodies each that may touch, or pass through each other, without being told.
+  std::vector<std::pair<std::string, std::string>> may_touch;
 
   /// By how much velocities are older than positions, s.
   [[nodiscard]] double velocity_age() const {

@@ -115,8 +115,6 @@ void RequireJointMotion(const Scenario& scenario) {
     if (!holds) throw InputError(scenario.source + ": " + problem);
   };
   require(scenario.start == Start::kRest, "start: must be \"rest\" for a motion of joints");
-  require(scenario.plant.type == PlantType::kEngine,
-          "plant.type: must be \"engine\" for a motion of joints; the rigid plant holds an object");
   require(!scenario.plant.bonded, "plant.bonded: a motion of joints has no contacts");
 }
 

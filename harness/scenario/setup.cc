@@ -11,6 +11,7 @@
 #include "controller/contact/shapes.h"
 #include "controller/model/parameter_reader.h"
 #include "controller/object/euler_zyz.h"
+#include "harness/engine/add_contact_pairs.h"
 #include "harness/engine/remove_looks.h"
 #include "harness/scenario/mismatch.h"
 
@@ -76,9 +77,15 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
   if (!model_.object() && !scenario_.joint_motion) {
     throw InputError(robot + ": object: is missing, and the scenario holds one");
   }
-  RemoveLooks(engine_.get());
+  solids_ = ListSolids(*engine_);
+  std::vector<int> pushing;
+  if (scenario_.plant.collide) {
+    for (const Solid& solid : solids_.list) pushing.push_back(solid.geom);
+  }
+  RemoveLooks(engine_.get(), pushing);
   adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
   gate_ = RunStaticGate(*adapter_);
+  WatchSolids(mjcf.string());
   ApplyPlantOptions();
   try {
     // What holds nothing needs no surface.
@@ -94,6 +101,20 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
   }
   if (scenario_.plant.bonded) MakeBonds();
   if (!scenario_.imperfections.mismatch.is_none()) MakeMismatch(mjcf.string());
+}
+
+void Setup::WatchSolids(const std::string& mjcf) {
+  watched_pairs_ =
+      ListWatchedPairs(*engine_, *adapter_, solids_, scenario_.plant.may_touch, scenario_.source);
+  if (!scenario_.plant.collide) return;
+  solids_ = ListSolids(*engine_);  // the same, with the numbers that their geoms have now
+  std::vector<std::pair<int, int>> geoms;
+  for (const WatchedPair& pair : watched_pairs_) {
+    geoms.emplace_back(solids_.list[static_cast<size_t>(pair.a)].geom,
+                       solids_.list[static_cast<size_t>(pair.b)].geom);
+  }
+  engine_ = AddContactPairs(*engine_, geoms);
+  adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf);
 }
 
 void Setup::MakeMismatch(const std::string& mjcf) {

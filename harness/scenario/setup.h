@@ -15,6 +15,7 @@
 #include "controller/grasp/finger_placement.h"
 #include "controller/model/robot_model.h"
 #include "harness/engine/adapter.h"
+#include "harness/engine/clearance.h"
 #include "harness/gate/static_gate.h"
 #include "harness/plant/observer.h"
 #include "harness/plant/part_context.h"
@@ -86,11 +87,16 @@ class Setup {
   [[nodiscard]] PartContext MakePartContext() const;
   /// Options of the law, with the posture and the angles' branch of the start.
   [[nodiscard]] GraspControllerOptions MakeControllerOptions() const;
+  /// The shapes of all bodies, and those pairs that are not meant to touch.
+  [[nodiscard]] const Solids& solids() const { return solids_; }
+  [[nodiscard]] const std::vector<WatchedPair>& watched_pairs() const { return watched_pairs_; }
   /// The motion of the joints that the scenario asks for, and its law's gains; null, and none.
   [[nodiscard]] const JointMotion* joint_motion() const { return joint_motion_ ? &*joint_motion_ : nullptr; }
   [[nodiscard]] const JointGains& joint_gains() const { return joint_gains_; }
 
  private:
+  /// Lists the pairs, and lets them push when the scenario says so.
+  void WatchSolids(const std::string& mjcf);
   void ApplyPlantOptions();
   void FindFingertips();
   void PlaceTask(std::mt19937_64* random);
@@ -121,6 +127,8 @@ class Setup {
   MjModelPtr controller_engine_;
   std::unique_ptr<Adapter> plant_side_, controller_side_;
   GateResult gate_;
+  Solids solids_;
+  std::vector<WatchedPair> watched_pairs_;
   std::unique_ptr<Surface> surface_;
   std::vector<int> fingertips_;
   Hand hand_;

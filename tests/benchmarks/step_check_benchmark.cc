@@ -2,8 +2,11 @@
 
 #include <benchmark/benchmark.h>
 
+#include <cmath>
 #include <optional>
+#include <vector>
 
+#include "harness/engine/clearance.h"
 #include "harness/plant/engine_simulation.h"
 #include "tests/harness/checks/step_check_scene.h"
 
@@ -85,6 +88,36 @@ void Compare(benchmark::State& state) {
   }
 }
 BENCHMARK(Compare)->Unit(benchmark::kMicrosecond);
+
+/// Which bodies come near each other, while the robot drives at 1 m/s with the object in its hand and fingers
+/// move.
+void FollowClearance(benchmark::State& state) {
+  const Adapter& adapter = SharedStates().controller->adapter;
+  const mjModel& model = adapter.engine();
+  const Solids solids = ListSolids(model);
+  Clearance clearance(model, adapter, solids, ListWatchedPairs(model, adapter, solids, {}, "benchmark"));
+  const MjDataPtr data = MakeData(model);
+  const int key = mj_name2id(&model, mjOBJ_KEY, "grasp_ready");
+  mju_copy(data->qpos, model.key_qpos + key * model.nq, model.nq);
+  const int finger = model.jnt_qposadr[mj_name2id(&model, mjOBJ_JOINT, "rf1_2")];
+  constexpr int kPeriod = 1000;
+  std::vector<VectorXd> positions, rotations;
+  for (int i = 0; i < kPeriod; ++i) {
+    data->qpos[0] += 1e-3;
+    data->qpos[model.nq - 7] += 1e-3;
+    data->qpos[finger] += 1e-4 * std::sin(2.0 * M_PI * i / kPeriod);
+    mj_kinematics(&model, data.get());
+    positions.emplace_back(Eigen::Map<const VectorXd>(data->xpos, 3 * model.nbody));
+    rotations.emplace_back(Eigen::Map<const VectorXd>(data->xmat, 9 * model.nbody));
+  }
+  int step = 0;
+  for (auto _ : state) {
+    const auto k = static_cast<size_t>(step % kPeriod);
+    clearance.Update({positions[k].data(), rotations[k].data()}, 1e-3 * step++);
+  }
+  state.counters["measured a step"] = static_cast<double>(clearance.measured()) / step;
+}
+BENCHMARK(FollowClearance)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace dexcheck

@@ -143,5 +143,30 @@ TEST(PlanCommand, RefusesWhatCannotBeUsed) {
   EXPECT_TRUE(IsRefused(plan({"--json", "/nowhere/plan.json"}), {"/nowhere/plan.json: cannot be written"}));
 }
 
+// The hand comes from above onto a table, and through one that is 10 cm higher.
+TEST(PlanCommand, TellsWhichBodiesMeet) {
+  const TempFolder folder;
+  std::filesystem::copy(testing::SourcePath("/mjcf"), folder.path() / "mjcf",
+                        std::filesystem::copy_options::recursive);
+  const std::filesystem::path scene = folder.path() / "mjcf/bench_scene.xml";
+  const auto plan = [&] {
+    return RunDexcheck(
+        PlanArguments({"--object-xyz", "0.3", "-0.5", "0.631", "--support-height", "0.62", "--mjcf",
+                       scene.string(), "--json", (folder.path() / "plan.json").string()}));
+  };
+  const ProgramResult clear = plan();
+  EXPECT_EQ(clear.exit_code, 0) << clear.err;
+  EXPECT_THAT(clear.out, HasSubstr("mm apart"));
+  const auto read = [&] { return Json::parse(ReadText(folder.path() / "plan.json"))["clearance"]; };
+  EXPECT_GT(read()["robot_surroundings"]["smallest_m"].get<double>(), 1e-3);
+
+  WriteText(scene, ReplaceOnce(ReadText(scene), "pos=\"0.9 -0.62 0\"", "pos=\"0.9 -0.62 0.1\""));
+  const ProgramResult meets = plan();
+  EXPECT_EQ(meets.exit_code, 1) << meets.out;
+  EXPECT_THAT(meets.out, HasSubstr("mm into each other"));
+  EXPECT_LT(read()["robot_surroundings"]["smallest_m"].get<double>(), -1e-2);
+  EXPECT_THAT(read()["robot_surroundings"]["bodies"].get<std::string>(), HasSubstr("bench"));
+}
+
 }  // namespace
 }  // namespace dexcheck

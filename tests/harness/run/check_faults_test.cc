@@ -60,6 +60,8 @@ const CheckFault kFaults[] = {
     {"idle_joints", "paper-rest", kShort},
     {"solver", "hold", {"duration=0.02"}, StopSolverEarly},
     {"joint_stop", "hold", {"duration=0.02", "model.template.arm.joints.elbow.range=[-0.1, 1.4]"}},
+    {"clearance", "hold", {"duration=0.02", "grasp.joints_deg.l_shoulder_roll=-20"}},
+    {"collision", "hold", {"duration=0.02", "plant.collide=true", "grasp.joints_deg.l_shoulder_roll=-20"}},
     {"unjudged",
      "lift",
      {"duration=0.6", "settle=0.01", "task.xyz=[0.25, -0.5, 0.6335]", "plant.contact_time_constant=0.02"},

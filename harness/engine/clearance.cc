@@ -1,0 +1,171 @@
+#include "harness/engine/clearance.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "controller/common/text.h"
+#include "harness/engine/engine.h"
+
+namespace dexcheck {
+namespace {
+
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+Pose ReadBody(const BodyPoses& bodies, int body) {
+  Pose X = Pose::Identity();
+  X.linear() = Eigen::Map<const RowMatrix3d>(bodies.rotations + 9 * body);
+  X.translation() = Eigen::Map<const Vector3d>(bodies.positions + 3 * body);
+  return X;
+}
+
+/// How far a point within `reach` of the frame's origin moved at the most: a rotation's difference from
+/// another stretches by its Frobenius norm over sqrt(2).
+double BoundMotion(const Pose& from, const Pose& to, double reach) {
+  return (to.translation() - from.translation()).norm() +
+         std::sqrt(0.5) * (to.linear() - from.linear()).norm() * reach;
+}
+
+}  // namespace
+
+Clearance::Clearance(const mjModel& engine, const Adapter& adapter, const Solids& solids,
+                     std::vector<WatchedPair> pairs)
+    : solids_(&solids), pairs_(std::move(pairs)), states_(pairs_.size()) {
+  // Of a base that does not move the two frames are one.
+  const int base = adapter.link_bodies().front();
+  base_body_ = base > 0 && engine.body_weldid[base] != 0 ? base : 0;
+  std::vector<MovingBody> moving(static_cast<size_t>(engine.nbody));
+  for (size_t i = 0; i < pairs_.size(); ++i) {
+    const WatchedPair& pair = pairs_[i];
+    const bool with_robot = pair.pairs == PairClass::kRobotItself || pair.pairs == PairClass::kRobotObject;
+    states_[i].frame = with_robot && base_body_ > 0 ? kOfBase : kOfWorld;
+    for (const int index : {pair.a, pair.b}) {
+      const Solid& s = solid(index);
+      if (engine.body_weldid[s.body] == 0) continue;
+      MovingBody& body = moving[static_cast<size_t>(s.body)];
+      body.body = s.body;
+      body.reach = std::max(body.reach, s.X_BG.translation().norm() + s.reach);
+      body.counts[states_[i].frame] = true;
+    }
+    due_[states_[i].frame].push_back({0.0, static_cast<int>(i)});
+  }
+  for (const MovingBody& body : moving) {
+    if (body.body > 0) bodies_.push_back(body);
+  }
+  overlapping_.reserve(pairs_.size());
+}
+
+Pose Clearance::PoseOf(int index, const BodyPoses& bodies) const {
+  const Solid& s = solid(index);
+  return ReadBody(bodies, s.body) * s.X_BG;
+}
+
+void Clearance::FollowBodies(const BodyPoses& bodies) {
+  const Pose X_0W = ReadBody(bodies, base_body_).inverse(Eigen::Isometry);
+  std::array<double, kFrameCount> most = {};
+  for (MovingBody& body : bodies_) {
+    const Pose X_WB = ReadBody(bodies, body.body);
+    for (const Frame frame : {kOfBase, kOfWorld}) {
+      if (!body.counts[frame]) continue;
+      const Pose X = frame == kOfBase ? X_0W * X_WB : X_WB;
+      if (has_begun_) most[frame] = std::max(most[frame], BoundMotion(body.last[frame], X, body.reach));
+      body.last[frame] = X;
+    }
+  }
+  // Both bodies of a pair may move.
+  for (const Frame frame : {kOfBase, kOfWorld}) travel_[frame] += 2.0 * most[frame];
+  has_begun_ = true;
+}
+
+void Clearance::Update(const BodyPoses& bodies, double time) {
+  FollowBodies(bodies);
+  const auto later = [](const Due& x, const Due& y) { return x.travel > y.travel; };
+  for (const Frame frame : {kOfBase, kOfWorld}) {
+    std::vector<Due>& due = due_[frame];
+    while (!due.empty() && due.front().travel <= travel_[frame]) {
+      std::pop_heap(due.begin(), due.end(), later);
+      Due& next = due.back();
+      // Of one that overlaps by rounding alone the budget may be less than what travel_ resolves.
+      next.travel = std::nextafter(travel_[frame] + CalcBudget(next.pair, bodies, time),
+                                   std::numeric_limits<double>::infinity());
+      std::push_heap(due.begin(), due.end(), later);
+    }
+  }
+}
+
+double Clearance::CalcBudget(int index, const BodyPoses& bodies, double time) {
+  const WatchedPair& pair = pairs_[static_cast<size_t>(index)];
+  State& state = states_[static_cast<size_t>(index)];
+  const double smallest = nearest_[static_cast<size_t>(pair.pairs)].distance;
+  // What need not be known of a pair that stays above it.
+  double level = std::max(0.0, smallest - kResolution);
+  const Solid& a = solid(pair.a);
+  const Solid& b = solid(pair.b);
+  const Pose X_WA = PoseOf(pair.a, bodies);
+  const Pose X_WB = PoseOf(pair.b, bodies);
+  const Pose X_AB = X_WA.inverse(Eigen::Isometry) * X_WB;
+  if (state.is_measured) {
+    // Of a pair with a plane the plane is seen from the other, whose reach is finite.
+    const double moved = std::isinf(b.reach) ? BoundMotion(state.X_AB.inverse(Eigen::Isometry),
+                                                           X_AB.inverse(Eigen::Isometry), a.reach)
+                                             : BoundMotion(state.X_AB, X_AB, b.reach);
+    const double left = state.overlaps ? kResolution - moved : state.distance - moved - level;
+    if (left > 0.0) return left;
+  }
+  const double between = X_AB.translation().norm() - a.reach - b.reach;
+  if (between > level && std::isfinite(smallest)) {
+    SetOverlap(index, false);
+    return between - level;
+  }
+
+  const double distance = CalcDistance(a, X_WA, b, X_WB);
+  ++measured_;
+  state.distance = distance;
+  state.X_AB = X_AB;
+  state.is_measured = true;
+  Note(index, distance, time);
+  level = std::max(0.0, nearest_[static_cast<size_t>(pair.pairs)].distance - kResolution);
+  return state.overlaps ? kResolution : distance - level;
+}
+
+void Clearance::Note(int index, double distance, double time) {
+  Nearest& nearest = nearest_[static_cast<size_t>(pairs_[static_cast<size_t>(index)].pairs)];
+  if (distance < nearest.distance) nearest = {distance, time, index};
+  SetOverlap(index, distance < 0.0);
+}
+
+void Clearance::SetOverlap(int index, bool overlaps) {
+  State& state = states_[static_cast<size_t>(index)];
+  if (overlaps == state.overlaps) return;
+  state.overlaps = overlaps;
+  if (overlaps) {
+    overlapping_.push_back(index);
+  } else {
+    overlapping_.erase(std::find(overlapping_.begin(), overlapping_.end(), index));
+  }
+}
+
+std::pair<double, int> Clearance::FindDeepest() const {
+  std::pair<double, int> deepest = {0.0, -1};
+  for (const int index : overlapping_) {
+    const double depth = -states_[static_cast<size_t>(index)].distance;
+    if (depth > deepest.first) deepest = {depth, index};
+  }
+  return deepest;
+}
+
+std::string Clearance::Describe(int index) const {
+  const WatchedPair& pair = pairs_[static_cast<size_t>(index)];
+  return solid(pair.a).name + " and " + solid(pair.b).name;
+}
+
+std::string Clearance::DescribeGeoms(int geom1, int geom2) const {
+  const auto name_of = [&](int geom) {
+    for (const Solid& s : solids_->list) {
+      if (s.geom == geom) return s.name;
+    }
+    return "#" + std::to_string(geom);
+  };
+  return name_of(geom1) + " and " + name_of(geom2);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,125 @@
+#include "harness/engine/solid.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "harness/engine/engine.h"
+#include "harness/engine/torus_collision.h"
+
+namespace dexcheck {
+namespace {
+
+/// MJCFs keep the geoms that collide in this group, which viewers do not show.
+constexpr int kCollisionGroup = 3;
+
+/// Pose of a geom in its body.
+Pose ReadPose(const mjModel& m, int geom) {
+  const mjtNum* const q = m.geom_quat + 4 * geom;
+  Pose X = Pose::Identity();
+  X.linear() = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+  X.translation() = Eigen::Map<const Vector3d>(m.geom_pos + 3 * geom);
+  return X;
+}
+
+void ReadHull(const mjModel& m, int geom, Solid* solid) {
+  const int mesh = m.geom_dataid[geom];
+  const float* const first = m.mesh_vert + 3 * m.mesh_vertadr[mesh];
+  for (int i = 0; i < m.mesh_vertnum[mesh]; ++i) {
+    solid->vertices.push_back(Eigen::Map<const Eigen::Vector3f>(first + 3 * i).cast<double>());
+    solid->reach = std::max(solid->reach, solid->vertices.back().norm());
+  }
+}
+
+/// False for what has no shape here.
+bool ReadShape(const mjModel& m, int geom, Solid* solid) {
+  using enum Solid::Shape;
+  const Vector3d& size = solid->size;
+  double ring = 0.0;
+  double tube = 0.0;
+  switch (m.geom_type[geom]) {
+    case mjGEOM_PLANE:
+      solid->shape = kPlane;
+      solid->reach = std::numeric_limits<double>::infinity();
+      return true;
+    case mjGEOM_SPHERE:
+      solid->shape = kSphere;
+      solid->reach = size[0];
+      return true;
+    case mjGEOM_CAPSULE:
+      solid->shape = kCapsule;
+      solid->reach = size[0] + size[1];
+      return true;
+    case mjGEOM_CYLINDER:
+      solid->shape = kCylinder;
+      solid->reach = size.head<2>().norm();
+      return true;
+    case mjGEOM_ELLIPSOID:
+      solid->shape = kEllipsoid;
+      solid->reach = size.maxCoeff();
+      return true;
+    case mjGEOM_BOX:
+      solid->shape = kBox;
+      solid->reach = size.norm();
+      return true;
+    case mjGEOM_MESH:
+      if (!GetTorusRadii(m, geom, &ring, &tube)) {
+        solid->shape = kHull;
+        ReadHull(m, geom, solid);
+        return true;
+      }
+      // About the body's own axis; see InstallTorusCollision.
+      solid->shape = kTorus;
+      solid->X_BG = Pose::Identity();
+      solid->size = Vector3d(ring, tube, 0.0);
+      solid->reach = ring + tube;
+      return true;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+Solids ListSolids(const mjModel& m) {
+  std::vector<bool> has_collision_geoms(static_cast<size_t>(m.nbody), false);
+  for (int geom = 0; geom < m.ngeom; ++geom) {
+    if (m.geom_group[geom] == kCollisionGroup) {
+      has_collision_geoms[static_cast<size_t>(m.geom_bodyid[geom])] = true;
+    }
+  }
+  Solids solids;
+  std::vector<int> index(static_cast<size_t>(m.ngeom), -1);
+  for (int geom = 0; geom < m.ngeom; ++geom) {
+    const int body = m.geom_bodyid[geom];
+    if (has_collision_geoms[static_cast<size_t>(body)] && m.geom_group[geom] != kCollisionGroup) continue;
+    Solid solid{.name = body > 0 ? NameOf(m, mjOBJ_BODY, body) : NameOf(m, mjOBJ_GEOM, geom),
+                .body = body,
+                .geom = geom,
+                .size = Eigen::Map<const Vector3d>(m.geom_size + 3 * geom),
+                .X_BG = ReadPose(m, geom)};
+    if (!ReadShape(m, geom, &solid)) continue;
+    index[static_cast<size_t>(geom)] = static_cast<int>(solids.list.size());
+    solids.list.push_back(std::move(solid));
+  }
+  for (int pair = 0; pair < m.npair; ++pair) {
+    const int a = index[static_cast<size_t>(m.pair_geom1[pair])];
+    const int b = index[static_cast<size_t>(m.pair_geom2[pair])];
+    if (a >= 0 && b >= 0) solids.declared.emplace_back(std::min(a, b), std::max(a, b));
+  }
+  if (m.opt.collision == mjCOL_PAIR) return solids;
+  const int count = static_cast<int>(solids.list.size());
+  for (int a = 0; a < count; ++a) {
+    const int g = solids.list[static_cast<size_t>(a)].geom;
+    if (m.geom_contype[g] == 0 && m.geom_conaffinity[g] == 0) continue;
+    for (int b = a + 1; b < count; ++b) {
+      const int h = solids.list[static_cast<size_t>(b)].geom;
+      if ((m.geom_contype[g] & m.geom_conaffinity[h]) != 0 ||
+          (m.geom_contype[h] & m.geom_conaffinity[g]) != 0) {
+        solids.by_type.emplace_back(a, b);
+      }
+    }
+  }
+  return solids;
+}
+
+}  // namespace dexcheck

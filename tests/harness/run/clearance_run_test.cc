@@ -1,0 +1,160 @@
+// Bodies that are not meant to touch, in runs: found when they overlap, clear in shipped scenarios, pushing
+// when asked to.
+
+#include <gmock/gmock.h>
+
+#include <memory>
+
+#include "tests/harness/run/shipped_run.h"
+
+namespace dexcheck::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+const std::string kRobot = SourcePath("/controller/parameters/assistant_robot.toml");
+
+/// `hold` beside a bench that is a cube of 4 cm, which is as deep in the right palm as asked, from below.
+class HoldAtATable {
+ public:
+  explicit HoldAtATable(double depth, std::vector<std::string> overrides = {}) {
+    overrides.insert(overrides.end(), {"duration=0.02", "settle=0.2"});
+    const Scenario scenario = ReadShippedScenario("hold", overrides);
+    const std::string mjcf = SourcePath("/mjcf/bench_scene.xml");
+    MjModelPtr engine = LoadMjcf(mjcf);
+    const int bench = mj_name2id(engine.get(), mjOBJ_BODY, "bench");
+    const int top = mj_name2id(engine.get(), mjOBJ_GEOM, "bench_top");
+    const Pose X_WP = FindPalm();
+    // The palm's box is 24 mm thick about 38 mm along its fingers, which is its frame's z; its wide side is
+    // below while the hand is level.
+    for (int i = 0; i < engine->body_geomnum[bench]; ++i) {
+      const int geom = engine->body_geomadr[bench] + i;
+      mju_zero3(engine->geom_pos + 3 * geom);
+      engine->geom_size[3 * geom] = engine->geom_size[3 * geom + 1] = engine->geom_size[3 * geom + 2] =
+          geom == top ? kHalf : 1e-3;
+    }
+    const Vector3d middle = X_WP * Vector3d(0.0, 0.0, -0.038);
+    // Along the palm's side that points to the robot's right.
+    const Vector3d side = X_WP.linear().col(1);
+    const Vector3d place = middle + (0.042 + kHalf - depth) * side;
+    std::copy_n(place.data(), 3, engine->body_pos + 3 * bench);
+    const Eigen::Quaterniond turn(X_WP.linear());
+    const double quaternion[4] = {turn.w(), turn.x(), turn.y(), turn.z()};
+    std::copy_n(quaternion, 4, engine->body_quat + 4 * bench);
+    setup_ = std::make_unique<dexcheck::Setup>(scenario, kRobot, mjcf, std::move(engine));
+    runner_ = std::make_unique<Runner>(*setup_, /*check=*/true);
+    result_ = &runner_->Run([](const StepRecord&) {}, [] { return false; });
+  }
+
+  [[nodiscard]] const RunResult& result() const { return *result_; }
+  [[nodiscard]] const CrossCheck& checks() const { return runner_->loop().checks(); }
+  [[nodiscard]] nlohmann::ordered_json summary() const {
+    return MakeSummary(*setup_, runner_->loop(), *result_);
+  }
+
+ private:
+  static constexpr double kHalf = 0.02;  // m
+
+  /// Where the palm's body is while the object is held.
+  static Pose FindPalm() {
+    const ShippedRun run("hold");
+    const mjModel& m = run.setup().engine();
+    const MjDataPtr data = MakeData(m);
+    run.setup().adapter().SetPositions(run.setup().q_start(), data->qpos);
+    mj_kinematics(&m, data.get());
+    const int palm = mj_name2id(&m, mjOBJ_BODY, "r_palm");
+    Pose X = Pose::Identity();
+    X.linear() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(data->xmat + 9 * palm);
+    X.translation() = Eigen::Map<const Vector3d>(data->xpos + 3 * palm);
+    return X;
+  }
+
+  std::unique_ptr<dexcheck::Setup> setup_;
+  std::unique_ptr<Runner> runner_;
+  const RunResult* result_ = nullptr;
+};
+
+TEST(ClearanceOfARun, APalmInTheTableIsFound) {
+  const HoldAtATable run(0.005);
+  EXPECT_EQ(run.result().verdict, Verdict::kDisagreement) << run.result().failure;
+  EXPECT_EQ(run.result().attribution.cause, Cause::kCollision) << run.result().attribution.evidence;
+  EXPECT_THAT(run.result().attribution.evidence, HasSubstr("r_palm"));
+  EXPECT_THAT(run.result().attribution.evidence, HasSubstr("bench"));
+  EXPECT_THAT(run.result().attribution.evidence, HasSubstr("t = 0 s"));
+  EXPECT_NEAR(run.checks().Find("clearance").worst, 0.005, 1e-4);
+  // It passes through, and pushes nothing.
+  EXPECT_FALSE(run.checks().Find("collision").applies);
+  EXPECT_FALSE(run.checks().Find("balance_robot").failed);
+  const auto there = run.summary()["clearance"]["robot_surroundings"];
+  EXPECT_NEAR(there["smallest_m"].get<double>(), -0.005, 1e-4);
+  EXPECT_THAT(there["bodies"].get<std::string>(), HasSubstr("r_palm"));
+}
+
+TEST(ClearanceOfARun, ATableBesideThePalmIsNot) {
+  const HoldAtATable run(-0.001);
+  EXPECT_EQ(run.result().verdict, Verdict::kPass)
+      << run.result().failure << run.result().attribution.evidence;
+  EXPECT_NEAR(run.checks().clearance().nearest(PairClass::kRobotSurroundings).distance, 0.001, 1e-4);
+  EXPECT_EQ(run.checks().Find("clearance").worst, 0.0);
+}
+
+TEST(ClearanceOfARun, WhatMayTouchIsNotTold) {
+  const HoldAtATable run(0.005, {"plant.may_touch=[['r_palm', 'bench']]"});
+  EXPECT_EQ(run.result().verdict, Verdict::kPass)
+      << run.result().failure << run.result().attribution.evidence;
+}
+
+TEST(ClearanceOfARun, BodiesThatCollidePush) {
+  const HoldAtATable run(1e-5, {"plant.collide=true"});
+  const CheckRecord& collision = run.checks().Find("collision");
+  EXPECT_TRUE(collision.failed);
+  EXPECT_GT(collision.worst, 0.01);  // N
+  EXPECT_LT(collision.worst, 1e4);
+  EXPECT_THAT(collision.part, HasSubstr("r_palm"));
+  // The model has no such force.
+  EXPECT_TRUE(run.checks().Find("balance_robot").failed);
+  EXPECT_EQ(run.result().attribution.cause, Cause::kCollision) << run.result().attribution.evidence;
+  // The same plant with the table out of reach is the plant that it was.
+  const HoldAtATable apart(-0.01, {"plant.collide=true"});
+  EXPECT_EQ(apart.result().verdict, Verdict::kPass)
+      << apart.result().failure << apart.result().attribution.evidence;
+  EXPECT_EQ(apart.checks().Find("collision").count, 20);
+}
+
+TEST(ClearanceOfARun, UnknownBodiesAreRefused) {
+  try {
+    const HoldAtATable run(0.0, {"plant.may_touch=[['r_plam', 'bench']]"});
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("plant.may_touch: \"r_plam\" is no body with a shape in the MJCF"));
+  }
+  EXPECT_THROW(ReadShippedScenario("hold", {"plant.may_touch=[['r_palm']]"}), InputError);
+  EXPECT_THROW(ReadShippedScenario("hold", {"plant={ type = 'rigid', collide = true }"}), InputError);
+}
+
+class ClearScenarios : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(ClearScenarios, KeepTheirBodiesApart) {
+  ShippedRun run(GetParam(), {"duration=0.02", "settle=0.2"});
+  const RunResult& result = run.Run();
+  const Clearance& clearance = run.loop().checks().clearance();
+  EXPECT_GT(run.loop().checks().Find("clearance").count, 0);
+  for (int i = 0; i < kPairClassCount; ++i) {
+    const Clearance::Nearest& nearest = clearance.nearest(static_cast<PairClass>(i));
+    if (nearest.pair < 0) continue;
+    EXPECT_GT(nearest.distance, 0.0) << NameOf(static_cast<PairClass>(i)) << ": "
+                                     << clearance.Describe(nearest.pair);
+  }
+  EXPECT_TRUE(result.failure.empty()) << result.failure;
+}
+
+INSTANTIATE_TEST_SUITE_P(ClearanceOfARun, ClearScenarios,
+                         ::testing::Values("hold", "two-hands", "hand-hold", "panda-reach", "paper-rigid"),
+                         [](const auto& info) {
+                           std::string name = info.param;
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace dexcheck::testing
