@@ -18,7 +18,9 @@ void TrajectoryController::Follow(const Trajectory& motion) {
   steps_until_due_ = 0;
 }
 
-void TrajectoryController::Begin(double /*t*/, const Reading& /*reading*/) {}
+void TrajectoryController::Begin(double /*t*/, const Reading& /*reading*/) {
+  if (sampling_.contacts) law_.FollowContacts(*sampling_.contacts);
+}
 
 DesiredMotion TrajectoryController::EvaluateDesired(const Trajectory& motion, double t, double time_step) {
   DesiredMotion desired = motion.Evaluate(t);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "controller/control/controller.h"
 #include "controller/control/grasp_controller.h"
 
@@ -9,6 +11,9 @@ namespace dexcheck {
 struct Sampling {
   double time_step = 0.0;  ///< Velocities belong to the middle of the step before (leapfrog), s; 0 for none.
   long hold = 1;           ///< Torques are computed at every hold-th Step and kept in between.
+  /// Where contacts are followed by (40) from the run's beginning on: how Steps follow each other. Otherwise
+  /// they are where the reading has them.
+  std::optional<StateTiming> contacts = std::nullopt;
 };
 
 /// Computed torque (55) along a trajectory X_d(t).

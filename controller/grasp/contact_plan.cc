@@ -237,7 +237,10 @@ class Planner {
     if (tally.blocked + tally.missed + tally.arm_blocked == tally.tried) {
       return "the arm reaches the object only through the support" + tried;
     }
-    if (!is_mapped) return "not all fingertips find a place on the object" + tried;
+    if (!is_mapped) {
+      return std::string("not all fingertips find a place on the object") +
+             (reach_.has_rims() ? " within the rims of their hemispheres" : "") + tried;
+    }
     if (is_short && best_margin <= 0.0) {
       return "the arm reaches the object but cannot make all the displacements from there" + tried;
     }

@@ -62,6 +62,9 @@ class HandReach {
   [[nodiscard]] const Vector3d& center() const { return center_; }
   [[nodiscard]] double length() const { return length_; }
 
+  /// Whether any fingertip is a hemisphere, which touches within its rim alone.
+  [[nodiscard]] bool has_rims() const { return has_rims_; }
+
   /// The finger's touch at a point of the object, if it reaches and stays clear. @param X_Po object in the
   /// palm frame. @param q_start of the finger's own joints.
   [[nodiscard]] std::optional<Touch> FindTouch(size_t finger, const Surface& object, const Pose& X_Po,
@@ -79,6 +82,7 @@ class HandReach {
  private:
   struct Finger {
     SerialChain chain;  // rooted in the palm frame
+    Frame frame;
     double radius;
     VectorXd lower, upper;  // ranges less the margin
     VectorXd middle;
@@ -90,6 +94,7 @@ class HandReach {
   std::vector<Vector3d> bases_;
   Vector3d center_;
   double length_ = 0.0;
+  bool has_rims_ = false;
 };
 
 /// Distance of a point (object frame) from the object, m; also where the closest point is not unique.

@@ -59,6 +59,7 @@ struct FrameEntry {
   TomlValue link;
   Pose X_LF;
   std::optional<double> sphere_radius;
+  std::optional<Vector3d> hemisphere;
 };
 
 struct Segment {

@@ -292,7 +292,8 @@ class TreeReader {
       if (found == joint_of_link_.end()) frame.link.Fail("must be a link" + SuggestLink(own_link, prefix));
       joint = found->second;
     }
-    spec_.frames.push_back({name, joint, FromOwnFrame(joint, frame.X_LF), frame.sphere_radius});
+    spec_.frames.push_back(
+        {name, joint, FromOwnFrame(joint, frame.X_LF), frame.sphere_radius, frame.hemisphere});
   }
 
   void RejectUnused() const {

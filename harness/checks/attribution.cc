@@ -137,6 +137,8 @@ const char* NameOf(Cause cause) {
       return "slope";
     case Cause::kWheelGeometry:
       return "wheel geometry";
+    case Cause::kFingertipRim:
+      return "fingertip rim";
     case Cause::kUnexplained:
       return "unexplained";
   }

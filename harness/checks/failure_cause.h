@@ -21,6 +21,7 @@ enum class Cause {
   kIntegrator,       ///< What time stepping leaves: half the step leaves less.
   kSlope,            ///< The floor is not level: gravity points elsewhere.
   kWheelGeometry,    ///< The wheels' radius or distance is another.
+  kFingertipRim,     ///< A contact has rolled past the rim of a hemispherical fingertip.
   kUnexplained,      ///< None of these was seen.
 };
 

@@ -6,44 +6,18 @@
 #include <stdexcept>
 
 #include "controller/common/text.h"
-#include "controller/contact/rolling.h"
+#include "controller/contact/fingertip_rim.h"
 #include "harness/checks/bounds.h"
+#include "harness/checks/contact_drift.h"
 #include "harness/checks/contact_give.h"
 #include "harness/checks/known_plant.h"
 
 namespace dexcheck {
 namespace {
 
-/// Integrated and measured contact farther apart than this have nothing to do with each other any more, and
-/// one may lie at the pole of the other's chart, m. Less than from a chart's margin to its pole, 4 mm on a
-/// fingertip of 9 mm.
-constexpr double kStray = 1e-3;
-
-/// Writes the integrated contact in the charts of the measured one, which kappa_dot is in.
-void FollowCharts(const Surface& tip, const Surface& object, const ContactCoordinates& measured,
-                  ContactCoordinates* integrated) {
-  const int tip_chart = measured.alpha_f.chart;
-  const int object_chart = measured.alpha_o.chart;
-  if (integrated->alpha_f.chart == tip_chart && integrated->alpha_o.chart == object_chart) return;
-  const auto is_near = [](const Surface& surface, const SurfacePoint& a, const SurfacePoint& b) {
-    return (surface.Evaluate(a).p - surface.Evaluate(b).p).norm() < kStray;
-  };
-  if (!is_near(tip, integrated->alpha_f, measured.alpha_f)) return;
-  if (!is_near(object, integrated->alpha_o, measured.alpha_o)) return;
-  *integrated = ChangeCharts(tip, object, *integrated, tip_chart, object_chart);
-}
-
-/// How far integrated and measured contact are apart, m: the point on the object, the point on the fingertip,
-/// and psi at the fingertip's radius. The largest of them.
-double CalcDrift(const Surface& tip, const Surface& object, const ContactCoordinates& integrated,
-                 const ContactCoordinates& measured) {
-  const auto apart = [](const Surface& surface, const SurfacePoint& a, const SurfacePoint& b) {
-    return (surface.Evaluate(a).p - surface.Evaluate(b).p).norm();
-  };
-  const double turned = std::abs(std::remainder(integrated.psi - measured.psi, 2.0 * M_PI));
-  return std::max({apart(object, integrated.alpha_o, measured.alpha_o),
-                   apart(tip, integrated.alpha_f, measured.alpha_f),
-                   turned * tip.Evaluate(measured.alpha_f).p.norm()});
+/// The largest of them as a length, m: psi at the fingertip's radius.
+double CalcLength(const ContactDrift& drift, double radius) {
+  return std::max({drift.object, drift.fingertip, drift.psi * radius});
 }
 
 /// Null for none.
@@ -125,6 +99,11 @@ void StepChecks::SetApplying() {
   leave_out(joints, {kLawDemand, kGraspForce, kErrorDynamics, kOrientationDynamics, kContactForce,
                      kFingertipSlip, kFingertipSlipRate, kConeUse, kContactsLost, kPenetration, kKappa});
   leave_out(!joints, {kJointDynamics});
+  leave_out(std::none_of(setup_->fingertips().begin(), setup_->fingertips().end(),
+                         [&](int tip) {
+                           return setup_->model().frames()[static_cast<size_t>(tip)].hemisphere.has_value();
+                         }),
+            {kFingertipRim});
   leave_out(!setup_->has_object(), {kBalanceObject});
   // Nothing but stiffness holds them: whatever is not ideal moves them.
   leave_out(setup_->idle_joints().empty() || !setup_->scenario().imperfections.is_ideal(), {kIdleJoints});
@@ -181,6 +160,7 @@ void StepChecks::Compare(const StepRecord& step) {
   ReadSlip(step);
   if (step.response.wheels.size() == 2) CompareRolling(step);
   if (handling.holding) CompareKappa(step);
+  if (handling.holding && check(StepCheck::kFingertipRim).applies) CheckRims(step);
 
   Add(StepCheck::kBaseTilt, step.reading.departure.tilt);
   CheckIdleJoints(step.reading.state);
@@ -302,18 +282,21 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   solver_of_robot_ = step.response.solver_force.size() > 0 ? Norm(step.response.solver_force) / scale_ : 0.0;
   bias_ -= force_;
   const double uneven = CalcUnevenForce(step);
+  findings_.uneven = uneven / scale_;
   give_->Follow(step, bias_, findings_.f_c_model, uneven, [this](const VectorXd& f) { return Norm(f); });
 
   if (is_unjudged_) return;
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
   mass_factor()->Multiply(residual_);
-  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale_, give_->motion() / scale_);
+  findings_.motion_give = give_->motion() / scale_;
+  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale_, findings_.motion_give);
   double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) force_scale = std::max(force_scale, Weight());
   const double apart = (findings_.f_c_model - findings_.f_c).norm();
-  AddLessGive(StepCheck::kContactForce, apart / force_scale, give_->force() / force_scale);
+  findings_.force_give = give_->force() / force_scale;
+  AddLessGive(StepCheck::kContactForce, apart / force_scale, findings_.force_give);
 }
 
 double StepChecks::Norm(const VectorXd& force) { return mass_factor()->CalcForceNorm(force, &work_); }
@@ -496,6 +479,21 @@ void StepChecks::CheckJointStops(const MeasuredState& state) {
   Add(StepCheck::kJointStop, beyond);
 }
 
+void StepChecks::CheckRims(const StepRecord& step) {
+  const GraspTerms& grasp = ModelAtTruth(step).grasp();
+  CheckRecord& rim = check(StepCheck::kFingertipRim);
+  double beyond = 0.0;
+  for (size_t i = 0; i < grasp.fingertips().size(); ++i) {
+    const Frame& tip = setup_->model().frames()[static_cast<size_t>(grasp.fingertips()[i])];
+    const double past =
+        -CalcRimDistance(tip, grasp.tip(static_cast<int>(i)).Evaluate(step.reading.state.kappa[i].alpha_f).p);
+    if (past <= beyond) continue;
+    beyond = past;
+    if (!rim.failed) rim.part = "fingertip " + Quote(tip.name);
+  }
+  Add(StepCheck::kFingertipRim, beyond);
+}
+
 void StepChecks::CompareKappa(const StepRecord& step) {
   const GraspTerms& grasp = ModelAtTruth(step).grasp();
   const MeasuredState& state = step.reading.state;
@@ -513,7 +511,8 @@ void StepChecks::CompareKappa(const StepRecord& step) {
       FollowCharts(tip, grasp.surface(), state.kappa[i], &kappa);
       kappa = NormalizeContact(tip, grasp.surface(), Displace(kappa, change));
     }
-    apart = std::max(apart, CalcDrift(tip, grasp.surface(), kappa_[i], state.kappa[i]));
+    const ContactDrift drift = CalcContactDrift(tip, grasp.surface(), kappa_[i], state.kappa[i]);
+    apart = std::max(apart, CalcLength(drift, tip.Evaluate(state.kappa[i].alpha_f).p.norm()));
   }
   has_kappa_ = true;
   Add(StepCheck::kKappa, apart);

@@ -168,6 +168,8 @@ void ClosedLoop::Step() {
   record_.time = time();
   ControlStep(record_.time);
   record_.error = CalcTrackingError(record_);
+  CalcContactDrifts(record_, &record_.drift);
+  for (const ContactDrift& drift : record_.drift) largest_drift_.Raise(drift);
   ++record_.step;
   if (checks_) {
     const auto begin = Clock::now();

@@ -78,6 +78,8 @@ class ClosedLoop {
   /// The controller of a task; null unless the scenario is one.
   [[nodiscard]] const PickAndPlaceController* task() const { return task_; }
   [[nodiscard]] const LoopTimes& times() const { return times_; }
+  /// Of a controller that follows its contacts, over all of them and all steps.
+  [[nodiscard]] const ContactDrift& largest_drift() const { return largest_drift_; }
 
  private:
   void CheckMovingStart() const;
@@ -105,6 +107,7 @@ class ClosedLoop {
   bool is_running_ = false;  // all has settled
   long steps_without_grasp_ = 0;
   LoopTimes times_;
+  ContactDrift largest_drift_;
 };
 
 }  // namespace dexcheck

@@ -250,6 +250,14 @@ void ReadControl(const TomlValue& value, Scenario* scenario) {
   control.f_max = table.Get("f_max").AsPositive();
   if (control.f_max <= control.f_min) table.Get("f_max").Fail("must be greater than f_min");
   control.mu = table.Get("mu").AsPositive();
+  if (const auto choice = table.Find("kappa")) {
+    control.kappa = choice->AsChoice<ContactSource>(
+        {{"exact", ContactSource::kExact}, {"integrated", ContactSource::kIntegrated}});
+    if (control.kappa == ContactSource::kIntegrated) {
+      if (scenario->task) choice->Reject("contacts of a task come and go");
+      if (scenario->plant.bonded) choice->Reject("bonds do not roll");
+    }
+  }
   if (const auto [error, unit] = table.FindWithAngleUnit("contact_error"); error) {
     control.contact_error = unit * error->AsNumber();
   }

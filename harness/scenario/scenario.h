@@ -65,6 +65,12 @@ struct GraspOptions {
   std::vector<std::pair<std::string, double>> joints;  ///< Posture, rad; other joints are 0.
 };
 
+/// Where the controller's contact coordinates (39) come from.
+enum class ContactSource {
+  kExact,       ///< From the geometry of fingertips and object at each step.
+  kIntegrated,  ///< From (40), integrated since t = 0.
+};
+
 /// Law, gains and forces.
 struct ControlOptions {
   ControlLaw law = ControlLaw::kComputedTorque;
@@ -80,7 +86,8 @@ struct ControlOptions {
   double f_min = 0.0;               ///< Least normal force (squeeze), N.
   double f_max = 0.0;               ///< Largest, N.
   double mu = 0.0;                  ///< Friction that the grasp force counts on.
-  double contact_error = 0.0;       ///< By how much kappa is told wrongly, rad: a fault to be found.
+  ContactSource kappa = ContactSource::kExact;
+  double contact_error = 0.0;  ///< By how much kappa is told wrongly, rad: a fault to be found.
 };
 
 /// Take the object from a support, carry it, put it down.

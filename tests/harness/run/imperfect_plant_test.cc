@@ -34,6 +34,7 @@ const Known kKnown[] = {
     {"camera",
      {"sensing.object_rate=500", "sensing.object_latency=0.002", "sensing.object_velocity=kalman",
       "sensing.object_acceleration=5", "sensing.object_position_noise=1e-6"}},
+    {"followed_contacts", {"control.kappa=integrated"}},
     {"sensing_latency", {"sensing.latency=0.002"}},
     {"torque_step", {"actuation.torque_step=1e-3"}},
     {"gain_error", {"actuation.gain_error={ r_elbow = 0.02 }"}},

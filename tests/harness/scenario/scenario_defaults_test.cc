@@ -159,12 +159,12 @@ std::string Show(const GraspOptions& grasp) {
 }
 
 std::string Show(const ControlOptions& control) {
-  return fmt::format("{} {} {} | {} | {} | {} {} {} {} {} {} {} {} {}", static_cast<int>(control.law),
+  return fmt::format("{} {} {} | {} | {} | {} {} {} {} {} {} {} {} {} {}", static_cast<int>(control.law),
                      Show(control.gains.K_p), Show(control.gains.K_v), Show(control.stiffness),
                      Show(control.damping), static_cast<int>(control.orientation),
                      static_cast<int>(control.weight), control.platform_weight, control.arm_weight,
                      control.posture_frequency, control.f_min, control.f_max, control.mu,
-                     control.contact_error);
+                     static_cast<int>(control.kappa), control.contact_error);
 }
 
 std::string Show(const TaskOptions& task) {
