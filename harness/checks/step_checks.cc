@@ -83,7 +83,10 @@ void StepChecks::DefineChecks() {
   check(StepCheck::kExpectJoints).bound = expect.joints.value_or(0.0);
   check(StepCheck::kExpectJoints).applies = expect.joints.has_value();
   RequireKnownBounds(setup_->scenario());
-  for (const auto& [name, bound] : setup_->scenario().bounds) check(FindStepCheck(name)->check).bound = bound;
+  for (const BoundOverride& stated : setup_->scenario().bounds) {
+    const StepCheckInfo& info = *FindStepCheck(stated.first);
+    check(info.check).bound = CalcStatedBound(info, stated, setup_->scenario());
+  }
 }
 
 void StepChecks::SetApplying() {

@@ -281,6 +281,16 @@ void ReadExpectation(const TomlValue& value, bool joints, Expectation* expect) {
   table.RejectUnused();
 }
 
+/// The file by itself; null when it needs overrides to be a scenario.
+std::shared_ptr<const Scenario> ReadWritten(const std::string& text, const std::string& source,
+                                            const std::filesystem::path& folder) {
+  try {
+    return std::make_shared<const Scenario>(ParseScenario(text, source, folder, {}));
+  } catch (const InputError&) {
+    return nullptr;
+  }
+}
+
 }  // namespace
 
 Scenario ParseScenario(const std::string& text, const std::string& source,
@@ -328,6 +338,7 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
     for (const auto& [name, value] : bounds->AsTable().GetEntries()) {
       scenario.bounds.emplace_back(name, value.AsNotNegative());
     }
+    if (!overrides.empty()) scenario.written = ReadWritten(text, source, folder);
   }
   if (const auto expect = root.Find("expect"))
     ReadExpectation(*expect, scenario.joint_motion.has_value(), &scenario.expect);

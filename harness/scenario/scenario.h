@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -162,6 +163,9 @@ struct Scenario {
   ControlOptions control;
   Imperfections imperfections;
   std::vector<BoundOverride> bounds;
+  /// The file without overrides, whose plant and gains its bounds were stated for; null where it has none, or
+  /// says nothing without them.
+  std::shared_ptr<const Scenario> written;
   Expectation expect;
   std::uint64_t seed = 0;  ///< Of random changes to posture and grasp; 0 for none.
 
