@@ -1,16 +1,12 @@
 #include "controller/contact/fingertip_rim.h"
 
 #include <cmath>
-#include <limits>
 
 namespace dexcheck {
 
-double CalcRimDistance(const Frame& fingertip, const Vector3d& p) {
-  if (!fingertip.hemisphere) return std::numeric_limits<double>::infinity();
-  // pi/2 - angle = atan2 of the height above the rim's plane and the distance from the axis
-  const double height = fingertip.hemisphere->dot(p);
-  const double aside = fingertip.hemisphere->cross(p).norm();
-  return fingertip.sphere_radius.value() * std::atan2(height, aside);
+double CalcRimDistance(double radius, const Vector3d& pole, const Vector3d& p) {
+  // pi/2 - angle, of the height above the rim's plane and the distance from the axis
+  return radius * std::atan2(pole.dot(p), pole.cross(p).norm());
 }
 
 }  // namespace dexcheck

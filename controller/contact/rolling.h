@@ -31,13 +31,12 @@ ContactCoordinates Displace(const ContactCoordinates& kappa, const Vector5d& cha
 /// Integrates (40) over one step dt (s) from time t with the classical fourth-order Runge-Kutta method.
 /// `twist(t, contact)` returns V_co_cf^cf (6x1) at time t for the ContactGeometry given. The result is
 /// normalized. Throws what CalcKappaDot and CalcContactGeometry throw. FindContact removes the drift.
-/// @param overlap as CalcContactGeometry.
 template <typename TwistFunction>
 ContactCoordinates IntegrateKappa(const Surface& fingertip, const Surface& object,
                                   const ContactCoordinates& kappa, double t, double dt,
-                                  const TwistFunction& twist, double overlap = 0.0) {
+                                  const TwistFunction& twist) {
   const auto rate = [&](double time, const ContactCoordinates& at) -> Vector5d {
-    const ContactGeometry contact = CalcContactGeometry(fingertip, object, at, overlap);
+    const ContactGeometry contact = CalcContactGeometry(fingertip, object, at);
     return CalcKappaDot(contact, twist(time, contact));
   };
   const Vector5d k1 = rate(t, kappa);

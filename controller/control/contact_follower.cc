@@ -7,7 +7,8 @@ namespace dexcheck {
 
 ContactFollower::ContactFollower(const RobotModel& model, std::span<const int> fingertips,
                                  const Surface& surface, const StateTiming& timing)
-    : fingertips_(fingertips.begin(), fingertips.end()),
+    : robot_(model, Coordinates::kReduced),
+      fingertips_(fingertips.begin(), fingertips.end()),
       surface_(&surface),
       timing_(timing),
       kappa_(fingertips.size()),
@@ -20,9 +21,8 @@ ContactFollower::ContactFollower(const RobotModel& model, std::span<const int> f
   J_f_dot_ = J_f_;
 }
 
-ContactFollower::Velocities ContactFollower::CalcVelocities(const ModelTerms& robot,
-                                                            const MeasuredState& state, size_t finger) {
-  robot.CalcFrameJacobian(fingertips_[finger], J_f_, J_f_dot_);
+ContactFollower::Velocities ContactFollower::CalcVelocities(const MeasuredState& state, size_t finger) {
+  robot_.CalcFrameJacobian(fingertips_[finger], J_f_, J_f_dot_);
   Velocities now;
   now.V_f.noalias() = J_f_ * state.xi;
   now.V_Bo = state.V_Bo;
@@ -39,10 +39,10 @@ ContactFollower::Velocities ContactFollower::CalcVelocities(const ModelTerms& ro
   return middle;
 }
 
-std::span<const ContactCoordinates> ContactFollower::Follow(const ModelTerms& robot,
-                                                            const MeasuredState& state) {
+const std::vector<ContactCoordinates>& ContactFollower::Follow(const MeasuredState& state) {
+  robot_.SetState(state.q, state.xi);
   for (size_t i = 0; i < kappa_.size(); ++i) {
-    const Velocities middle = CalcVelocities(robot, state, i);
+    const Velocities middle = CalcVelocities(state, i);
     if (!has_begun_) {
       kappa_[i] = state.kappa[i];
       continue;
@@ -50,8 +50,7 @@ std::span<const ContactCoordinates> ContactFollower::Follow(const ModelTerms& ro
     const auto twist = [&](double /*t*/, const ContactGeometry& contact) {
       return CalcRelativeTwist(contact, middle.V_f, middle.V_Bo);
     };
-    kappa_[i] =
-        IntegrateKappa(tips_[i], *surface_, kappa_[i], 0.0, timing_.time_step, twist, state.overlap[i]);
+    kappa_[i] = IntegrateKappa(tips_[i], *surface_, kappa_[i], 0.0, timing_.time_step, twist);
   }
   has_begun_ = true;
   return kappa_;

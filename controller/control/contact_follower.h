@@ -31,8 +31,9 @@ class ContactFollower {
   ///
   /// with both body velocities those of the middle of the step: J_f xi - dt/2 J_f_dot xi where velocities are
   /// half a step old, otherwise the mean of both ends. Slip is part of them.
-  /// @param robot with the state's q' and xi set. @throws what CalcKappaDot throws.
-  std::span<const ContactCoordinates> Follow(const ModelTerms& robot, const MeasuredState& state);
+  /// @throws what CalcKappaDot throws.
+  const std::vector<ContactCoordinates>& Follow(const MeasuredState& state);
+  [[nodiscard]] const std::vector<ContactCoordinates>& kappa() const { return kappa_; }
 
  private:
   /// Body velocities of one contact's bodies.
@@ -40,8 +41,9 @@ class ContactFollower {
     Vector6d V_f = Vector6d::Zero();   // of the fingertip, in its frame
     Vector6d V_Bo = Vector6d::Zero();  // of the object, Sigma_o
   };
-  [[nodiscard]] Velocities CalcVelocities(const ModelTerms& robot, const MeasuredState& state, size_t finger);
+  [[nodiscard]] Velocities CalcVelocities(const MeasuredState& state, size_t finger);
 
+  ModelTerms robot_;
   std::vector<int> fingertips_;
   std::vector<Sphere> tips_;
   const Surface* surface_;

@@ -51,8 +51,6 @@ class GraspController {
 
   /// Evaluates the model at a state: M_bar', C_bar', F_bar', G, J_B' and their rates.
   void SetState(const MeasuredState& state);
-  /// As GraspModel::FollowContacts.
-  void FollowContacts(const StateTiming& timing) { model_.FollowContacts(timing); }
 
   /// tau' (n), N m, for the state set and the desired motion at that instant.
   /// @throws SingularityError as ComputedTorque; GraspForceError when no contact force inside the friction

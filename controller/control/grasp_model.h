@@ -2,19 +2,15 @@
 
 // Everything that the paper's laws need of robot, object and contacts at one state.
 
-#include <optional>
 #include <span>
 #include <vector>
 
-#include "controller/control/contact_follower.h"
 #include "controller/control/grasp_terms.h"
 #include "controller/control/measured_state.h"
 #include "controller/control/object_tracking.h"
 #include "controller/dynamics/model_terms.h"
 
 namespace dexcheck {
-
-class SpoiledTerms;
 
 struct GraspModelOptions {
   /// kAngles evaluates the object's terms in X_o besides, on one branch of the angles.
@@ -34,27 +30,15 @@ class GraspModel {
   /// Evaluates all terms at a state. @throws what GraspTerms and CalcP throw.
   void SetState(const MeasuredState& state);
 
-  /// From the next state on, where the contacts are as told, they are followed by (40) and told no more; the
-  /// states to come are then a time step apart. @throws std::invalid_argument unless that is positive.
-  void FollowContacts(const StateTiming& timing);
-  /// kappa (39) of each contact that the terms are evaluated at.
-  [[nodiscard]] std::span<const ContactCoordinates> kappa() const { return kappa_; }
-  /// Whether the contacts are followed.
-  [[nodiscard]] bool follows_contacts() const { return follower_.has_value(); }
-
   [[nodiscard]] const ModelTerms& robot() const { return robot_; }
   [[nodiscard]] const GraspTerms& grasp() const { return grasp_; }
   /// Whether X_o and the terms in it are evaluated.
   [[nodiscard]] bool has_coordinates() const { return orientation_ == OrientationFeedback::kAngles; }
 
  private:
-  friend class SpoiledTerms;  // changes them on purpose (harness/diagnosis)
-
   OrientationFeedback orientation_;
   ModelTerms robot_;
   GraspTerms grasp_;
-  std::optional<ContactFollower> follower_;
-  std::vector<ContactCoordinates> kappa_;
   Vector6d X_o_;  // of the last state, to stay on one branch of the angles
 };
 

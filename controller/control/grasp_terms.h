@@ -16,8 +16,6 @@
 
 namespace dexcheck {
 
-class SpoiledTerms;
-
 /// A contact point that is fixed on fingertip and object, as by a ball joint: the paper's contacts
 /// before 4.3, and a reference without rolling and slip.
 struct Bond {
@@ -100,8 +98,6 @@ class GraspTerms {
   [[nodiscard]] const VectorXd& slip_bias() const { return slip_bias_; }
 
  private:
-  friend class SpoiledTerms;  // changes them on purpose (harness/diagnosis)
-
   void SetContacts(const ModelTerms& robot, std::span<const ContactCoordinates> kappa);
   void ListChains(const RobotModel& model);
   void SetBond(const Pose& X_Bf, const Vector6d& V_f, size_t finger);

@@ -9,8 +9,6 @@
 
 namespace dexcheck {
 
-class SpoiledTerms;
-
 /// Which velocities the terms refer to.
 enum class Coordinates {
   kReduced,  ///< xi = [v; joint rates], equation (18): M_bar', C_bar', F_bar'.
@@ -92,8 +90,6 @@ class ModelTerms {
   [[nodiscard]] EnergyAndMomentum CalcEnergyAndMomentum() const;
 
  private:
-  friend class SpoiledTerms;  // changes them on purpose (harness/diagnosis)
-
   /// Motion of one coordinate's column or of one link: (w, v) and its derivative's columns (w_dot, v_dot).
   struct Column {
     Vector3d w = Vector3d::Zero();

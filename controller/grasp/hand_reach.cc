@@ -70,9 +70,7 @@ HandReach::HandReach(const RobotModel& model, std::span<const int> fingertips, i
     if (!on_palm || !is_free) {
       throw std::invalid_argument("fingertips: " + frame.name + " does not hang on the palm with the others");
     }
-    Finger finger{
-        SerialChain(model, fingertips[i], own[i], q), frame, *frame.sphere_radius, {}, {}, {}, {}, {}};
-    has_rims_ = has_rims_ || frame.hemisphere.has_value();
+    Finger finger{SerialChain(model, fingertips[i], own[i], q), *frame.sphere_radius, {}, {}, {}, {}, {}};
     finger.chain.SetRoot(X_PB);
     finger.lower = finger.chain.lower().array() + joint_margin;
     finger.upper = finger.chain.upper().array() - joint_margin;
@@ -134,8 +132,8 @@ std::optional<Touch> HandReach::FindTouch(size_t finger_index, const Surface& ob
   finger.chain.CalcPoses(solution.q, &poses);
   touch.points = ListPoints(poses);
   // The object's outward normal points into the fingertip.
-  const Vector3d p_f = -finger.radius * (poses.frame.linear().transpose() * (X_Po.linear() * n));
-  if (CalcRimDistance(finger.frame, p_f) < 0.0) return {};
+  const Vector3d p_f = -(poses.frame.linear().transpose() * (X_Po.linear() * n));
+  if (clearance.hemisphere && CalcRimDistance(finger.radius, *clearance.hemisphere, p_f) < 0.0) return {};
   const Pose X_oP = X_Po.inverse();
   const double thick = clearance.thickness * finger.radius;
   for (size_t k = 0; k < touch.points.size(); ++k) {

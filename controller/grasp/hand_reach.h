@@ -34,6 +34,8 @@ struct HandClearance {
   double support = 0.0;                                          // m, between fingers and the support
   double steepest = 0.0;           // rad, of contacts' normals above the support
   std::optional<HalfSpace> above;  // in the palm frame
+  /// Of hemispherical fingertips, in their frames: they touch within the rim alone.
+  std::optional<Vector3d> hemisphere;
 };
 
 /// One way in which a finger can touch the object.
@@ -62,9 +64,6 @@ class HandReach {
   [[nodiscard]] const Vector3d& center() const { return center_; }
   [[nodiscard]] double length() const { return length_; }
 
-  /// Whether any fingertip is a hemisphere, which touches within its rim alone.
-  [[nodiscard]] bool has_rims() const { return has_rims_; }
-
   /// The finger's touch at a point of the object, if it reaches and stays clear. @param X_Po object in the
   /// palm frame. @param q_start of the finger's own joints.
   [[nodiscard]] std::optional<Touch> FindTouch(size_t finger, const Surface& object, const Pose& X_Po,
@@ -82,7 +81,6 @@ class HandReach {
  private:
   struct Finger {
     SerialChain chain;  // rooted in the palm frame
-    Frame frame;
     double radius;
     VectorXd lower, upper;  // ranges less the margin
     VectorXd middle;
@@ -94,7 +92,6 @@ class HandReach {
   std::vector<Vector3d> bases_;
   Vector3d center_;
   double length_ = 0.0;
-  bool has_rims_ = false;
 };
 
 /// Distance of a point (object frame) from the object, m; also where the closest point is not unique.

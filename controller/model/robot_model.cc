@@ -146,11 +146,6 @@ class SpecChecker {
           "must be -1 (the base) or the index of a joint", frame.link);
     CheckPose(key + "pose", frame.X_LF);
     if (frame.sphere_radius) CheckPositive(key + "sphere_radius", *frame.sphere_radius);
-    if (!frame.hemisphere) return;
-    if (!frame.sphere_radius) Fail(key + "hemisphere", "needs a sphere_radius");
-    constexpr double kUnit = 1e-9;
-    Check(std::abs(frame.hemisphere->norm() - 1.0) < kUnit, key + "hemisphere", "must have length 1",
-          frame.hemisphere->norm());
   }
 
   void CheckObject(const ObjectModel& object) const {

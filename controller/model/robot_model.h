@@ -93,9 +93,6 @@ struct Frame {
   int link = -1;  ///< Index of the joint that moves the link; -1 is the base.
   Pose X_LF = Pose::Identity();
   std::optional<double> sphere_radius;  ///< Of the fingertip's sphere, centred at the frame's origin, m.
-  /// Out of the pole, in the frame's axes, of length 1, where the fingertip is the half of that sphere around
-  /// it; none where it is the whole one.
-  std::optional<Vector3d> hemisphere = std::nullopt;
 };
 
 /// The manipulated object (section 3.3), a free rigid body. Its frame Sigma_o stands at its centre of mass.

@@ -147,15 +147,9 @@ std::string ReadPartName(const TomlValue& value) {
 
 FrameEntry ReadFrameEntry(const TomlValue& value) {
   TomlTable table = value.AsTable();
-  FrameEntry frame{value, table.Get("name"), table.Get("link"), ReadPose(table), std::nullopt, std::nullopt};
+  FrameEntry frame{value, table.Get("name"), table.Get("link"), ReadPose(table), std::nullopt};
   if (const std::optional<TomlValue> radius = table.Find("sphere_radius")) {
     frame.sphere_radius = radius->AsPositive();
-  }
-  if (const std::optional<TomlValue> pole = table.Find("hemisphere")) {
-    if (!frame.sphere_radius) pole->Reject("needs a sphere_radius beside it");
-    const Vector3d axis = pole->AsVector<3>();
-    if (!(axis.norm() > 0.0)) pole->Fail("must have a direction");
-    frame.hemisphere = axis.normalized();
   }
   table.RejectUnused();
   return frame;

@@ -59,7 +59,6 @@ struct FrameEntry {
   TomlValue link;
   Pose X_LF;
   std::optional<double> sphere_radius;
-  std::optional<Vector3d> hemisphere;
 };
 
 struct Segment {

@@ -292,8 +292,7 @@ class TreeReader {
       if (found == joint_of_link_.end()) frame.link.Fail("must be a link" + SuggestLink(own_link, prefix));
       joint = found->second;
     }
-    spec_.frames.push_back(
-        {name, joint, FromOwnFrame(joint, frame.X_LF), frame.sphere_radius, frame.hemisphere});
+    spec_.frames.push_back({name, joint, FromOwnFrame(joint, frame.X_LF), frame.sphere_radius});
   }
 
   void RejectUnused() const {

@@ -102,11 +102,7 @@ void StepChecks::SetApplying() {
   leave_out(joints, {kLawDemand, kGraspForce, kErrorDynamics, kOrientationDynamics, kContactForce,
                      kFingertipSlip, kFingertipSlipRate, kConeUse, kContactsLost, kPenetration, kKappa});
   leave_out(!joints, {kJointDynamics});
-  leave_out(std::none_of(setup_->fingertips().begin(), setup_->fingertips().end(),
-                         [&](int tip) {
-                           return setup_->model().frames()[static_cast<size_t>(tip)].hemisphere.has_value();
-                         }),
-            {kFingertipRim});
+  leave_out(!setup_->scenario().grasp.hemisphere, {kFingertipRim});
   leave_out(!setup_->has_object(), {kBalanceObject});
   // Nothing but stiffness holds them: whatever is not ideal moves them.
   leave_out(setup_->idle_joints().empty() || !setup_->scenario().imperfections.is_ideal(), {kIdleJoints});
@@ -484,15 +480,17 @@ void StepChecks::CheckJointStops(const MeasuredState& state) {
 
 void StepChecks::CheckRims(const StepRecord& step) {
   const GraspTerms& grasp = ModelAtTruth(step).grasp();
+  const Vector3d& pole = *setup_->scenario().grasp.hemisphere;
   CheckRecord& rim = check(StepCheck::kFingertipRim);
   double beyond = 0.0;
   for (size_t i = 0; i < grasp.fingertips().size(); ++i) {
-    const Frame& tip = setup_->model().frames()[static_cast<size_t>(grasp.fingertips()[i])];
-    const double past =
-        -CalcRimDistance(tip, grasp.tip(static_cast<int>(i)).Evaluate(step.reading.state.kappa[i].alpha_f).p);
+    const Vector3d p = grasp.tip(static_cast<int>(i)).Evaluate(step.reading.state.kappa[i].alpha_f).p;
+    const double past = -CalcRimDistance(p.norm(), pole, p);
     if (past <= beyond) continue;
     beyond = past;
-    if (!rim.failed) rim.part = "fingertip " + Quote(tip.name);
+    if (rim.failed) continue;
+    rim.part =
+        "fingertip " + Quote(setup_->model().frames()[static_cast<size_t>(grasp.fingertips()[i])].name);
   }
   Add(StepCheck::kFingertipRim, beyond);
 }

@@ -23,9 +23,8 @@ Vector6d CalcX_o(const StepRecord& step) {
 }
 
 void CalcContactDrifts(const StepRecord& step, std::vector<ContactDrift>* drift) {
-  if (!step.model->follows_contacts()) return;
   const GraspTerms& grasp = step.model->grasp();
-  const std::span<const ContactCoordinates> followed = step.model->kappa();
+  const std::vector<ContactCoordinates>& followed = step.followed_kappa;
   drift->resize(followed.size());
   for (size_t i = 0; i < followed.size(); ++i) {
     (*drift)[i] = CalcContactDrift(grasp.tip(static_cast<int>(i)), grasp.surface(), followed[i],

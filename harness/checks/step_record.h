@@ -67,7 +67,9 @@ struct StepRecord {
   const GraspModel* model = nullptr;
   /// What the scenario itself asks for beyond an ideal plant; null without cross-check or where it is ideal.
   const KnownStep* known = nullptr;
-  /// Of a controller that follows its contacts: how far each is from where it is. Otherwise empty.
+  /// Of a controller that follows its contacts: kappa (39) as it has them, and how far each is from where it
+  /// is. Otherwise empty.
+  std::vector<ContactCoordinates> followed_kappa;
   std::vector<ContactDrift> drift;
   StepFindings findings;  ///< Without cross-check empty.
 };

@@ -37,7 +37,8 @@ struct Request {
   std::string palm;                     // overrides `hand`
   std::vector<std::string> joints_deg;  // NAME=VALUE
   std::vector<std::string> arm_joints;
-  std::vector<double> lift;              // m
+  std::vector<double> lift;  // m
+  std::vector<double> hemisphere;
   std::optional<double> support_height;  // m
   ContactPlanOptions options;
   std::string json_file;
@@ -254,6 +255,11 @@ int Run(Request request) {
   if (request.support_height) {
     request.options.support = SupportPlane{Vector3d::UnitZ(), *request.support_height};
   }
+  if (!request.hemisphere.empty()) {
+    const Vector3d pole(request.hemisphere[0], request.hemisphere[1], request.hemisphere[2]);
+    if (!(pole.norm() > 0.0) || !pole.allFinite()) Fail("--hemisphere", "must be a direction");
+    request.options.hemisphere = pole.normalized();
+  }
   if (!request.lift.empty()) {
     request.options.reaches.emplace_back(request.lift[0], request.lift[1], request.lift[2]);
   }
@@ -308,6 +314,12 @@ void AddPlanCommand(Command app) {
       .AddOption("--support-height", &request->support_height,
                  "Height of the table that the object lies on, m: the hand comes from above")
       .TypeName("Z");
+  command
+      .AddOption(
+          "--hemisphere", &request->hemisphere,
+          "Fingertips are hemispheres around this direction of their frames: contacts within their rims")
+      .TypeName("X Y Z")
+      .Takes(3);
   command
       .AddOption("--lift", &request->lift, "Displacement, m, that the arm must be able to make while holding")
       .TypeName("X Y Z")

@@ -157,27 +157,25 @@ void AddObject(bool coordinates, std::vector<EquationMistake>* list) {
 
 }  // namespace
 
-SpoiledTerms::SpoiledTerms(GraspModel* model, const MeasuredState& state)
-    : robot_(model->robot_), grasp_(model->grasp_), state_(state) {}
-
 const ContactGeometry& SpoiledTerms::geometry(int contact) const {
-  return grasp_.contacts_[static_cast<size_t>(contact)].geometry;
+  return grasp().contacts()[static_cast<size_t>(contact)].geometry;
 }
 
 Vector6d SpoiledTerms::CalcTwist(int contact) const {
-  return CalcRelativeTwist(geometry(contact), J_f(contact) * state_.xi, grasp_.V_Bo_);
+  return CalcRelativeTwist(geometry(contact), J_f(contact) * state_.xi, grasp().V_Bo());
 }
 
 void SpoiledTerms::SetKappaDot(int contact, const Vector5d& kappa_dot) const {
-  const auto index = static_cast<size_t>(contact);
-  grasp_.contacts_[index].kappa_dot = kappa_dot;
-  CalcContactJacobianDot(grasp_.contacts_[index], grasp_.J_f(contact), grasp_.J_f_dot(contact),
-                         grasp_.J_B_dot_.middleRows(3 * contact, 3), grasp_.chains_[index]);
-  CalcGraspMapDot(grasp_.contacts_, grasp_.G_dot_);
+  const Contact& shown = grasp().contacts()[static_cast<size_t>(contact)];
+  Open(shown).kappa_dot = kappa_dot;
+  CalcContactJacobianDot(shown, grasp().J_f(contact), grasp().J_f_dot(contact),
+                         Open(grasp().J_B_dot()).middleRows(3 * contact, 3));
+  CalcGraspMapDot(grasp().contacts(), Open(grasp().G_dot()));
 }
 
 void SpoiledTerms::Finish() const {
-  for (size_t i = 0; i < grasp_.contacts_.size(); ++i) grasp_.CalcSlip(state_.xi, i);
+  Open(grasp().slip()) = grasp().J_B() * state_.xi - grasp().G().transpose() * grasp().V_Bo();
+  Open(grasp().slip_bias()) = grasp().J_B_dot() * state_.xi - grasp().G_dot().transpose() * grasp().V_Bo();
 }
 
 std::vector<EquationMistake> ListEquationMistakes(const RobotModel& model, bool coordinates) {

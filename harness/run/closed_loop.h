@@ -97,7 +97,8 @@ class ClosedLoop {
   Sensing sensing_;
   std::function<void(double t, MeasuredState* told)> hidden_sensor_fault_;
   std::unique_ptr<Controller> controller_;
-  const PickAndPlaceController* task_ = nullptr;  // is controller_, or null
+  const PickAndPlaceController* task_ = nullptr;    // is controller_, or null
+  const TrajectoryController* follower_ = nullptr;  // likewise
   MotorDrive drive_;
   Disturbances disturbances_;
   std::optional<CrossCheck> checks_;

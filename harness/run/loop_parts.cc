@@ -61,7 +61,7 @@ Sampling MakeSampling(const Setup& setup) {
   return sampling;
 }
 
-std::unique_ptr<Controller> MakeTrajectoryController(const Setup& setup) {
+std::unique_ptr<TrajectoryController> MakeTrajectoryController(const Setup& setup) {
   return std::make_unique<TrajectoryController>(setup.model(), setup.fingertips(), setup.object().body,
                                                 setup.surface(), setup.MakeControllerOptions(),
                                                 MakeSampling(setup));
@@ -92,7 +92,9 @@ LoopParts MakeLoopParts(const Setup& setup) {
   } else if (setup.joint_motion() != nullptr) {
     parts.controller = MakeJointController(setup);
   } else {
-    parts.controller = MakeTrajectoryController(setup);
+    std::unique_ptr<TrajectoryController> controller = MakeTrajectoryController(setup);
+    if (setup.scenario().control.kappa == ContactSource::kIntegrated) parts.follower = controller.get();
+    parts.controller = std::move(controller);
   }
   const Imperfections& imperfections = setup.scenario().imperfections;
   parts.sensing = imperfections.sensing;

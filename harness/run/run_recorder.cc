@@ -301,12 +301,12 @@ void RunRecorder::AddFollowedContacts() {
        Expand(tips, {"u_f", "v_f", "u_o", "v_o", "psi"}),
        {}},
       [](const StepRecord& step, std::span<double> row) {
-        const std::span<const ContactCoordinates> kappa = step.model->kappa();
+        const std::vector<ContactCoordinates>& kappa = step.followed_kappa;
         for (size_t i = 0; i < kappa.size(); ++i) Copy(kappa[i].CalcVector(), row.subspan(5 * i, 5));
       });
   Add({"law/chart", "1", "charts of law/kappa, as contact/chart", 2 * count, Expand(tips, {"f", "o"}), {}},
       [](const StepRecord& step, std::span<double> row) {
-        const std::span<const ContactCoordinates> kappa = step.model->kappa();
+        const std::vector<ContactCoordinates>& kappa = step.followed_kappa;
         for (size_t i = 0; i < kappa.size(); ++i) {
           row[2 * i] = kappa[i].alpha_f.chart;
           row[2 * i + 1] = kappa[i].alpha_o.chart;

@@ -118,6 +118,11 @@ void ReadGrasp(const TomlValue& value, bool planned, Scenario* scenario) {
   if (grasp.fingertips.size() < 3) fingertips.Reject("needs at least three fingertips to hold an object");
   if (!planned) ReadContacts(table, &grasp);
   grasp.frame = table.Get("frame").AsName();
+  if (const auto pole = table.Find("hemisphere")) {
+    grasp.hemisphere = pole->AsVector<3>();
+    if (!(grasp.hemisphere->norm() > 0.0)) pole->Fail("must have a direction");
+    grasp.hemisphere->normalize();
+  }
   if (const auto joints = table.Find("joints_deg")) {
     for (const auto& [name, angle] : joints->AsTable().GetEntries()) {
       grasp.joints.emplace_back(name, DegToRad(angle.AsNumber()));
@@ -181,6 +186,7 @@ void FinishTask(Scenario* scenario) {
   pick.f_min = scenario->control.f_min;
   pick.posture_frequency = scenario->control.posture_frequency;
   pick.plan.mu = scenario->control.mu;
+  pick.plan.hemisphere = scenario->grasp.hemisphere;
 }
 
 /// K_p and K_v, or natural frequency and damping ratio of (57).

@@ -61,8 +61,10 @@ struct PlantOptions {
 struct GraspOptions {
   std::vector<std::string> fingertips;  ///< Frames.
   std::vector<SurfacePoint> contacts;   ///< Of the object, one for each fingertip; none for a task.
-  std::string frame;                    ///< Frame that the object is placed in; of a task: the palm.
-  Pose X_FO = Pose::Identity();         ///< Object in it.
+  /// Out of the pole, in the fingertips' frames, where fingertips are hemispheres; none for whole spheres.
+  std::optional<Vector3d> hemisphere;
+  std::string frame;             ///< Frame that the object is placed in; of a task: the palm.
+  Pose X_FO = Pose::Identity();  ///< Object in it.
   std::vector<std::pair<std::string, double>> joints;  ///< Posture, rad; other joints are 0.
 };
 

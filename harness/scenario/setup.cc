@@ -183,14 +183,16 @@ void Setup::FindGrasp() {
 }
 
 std::string Setup::FindContactPastRim() const {
+  const GraspOptions& grasp = scenario_.grasp;
+  if (!grasp.hemisphere) return "";
   ModelTerms kinematics(model_, Coordinates::kReduced);
   kinematics.SetState(q_start_, VectorXd::Zero(model_.num_velocities()));
   for (size_t i = 0; i < fingertips_.size(); ++i) {
     // The object's outward normal points into the fingertip.
-    const Vector3d n = surface_->Evaluate(scenario_.grasp.contacts[i]).R.col(2);
+    const Vector3d n = X_Bo_start_.linear() * surface_->Evaluate(grasp.contacts[i]).R.col(2);
     const Matrix3d R_Bf = kinematics.CalcFramePose(fingertips_[i]).linear();
     const Frame& tip = model_.frames()[static_cast<size_t>(fingertips_[i])];
-    const double distance = CalcRimDistance(tip, -(R_Bf.transpose() * X_Bo_start_.linear() * n));
+    const double distance = CalcRimDistance(*tip.sphere_radius, *grasp.hemisphere, -(R_Bf.transpose() * n));
     if (distance >= 0.0) continue;
     return "the contact of " + Quote(tip.name) + " lies " + FormatNumber(-1e3 * distance, 3) +
            " mm past the rim of its hemisphere";

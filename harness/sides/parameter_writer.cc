@@ -198,7 +198,6 @@ class ParameterWriter {
     text_ += "xyz = " + FormatTidyList(X_WF.translation(), X_WF.translation().norm()) + "\n";
     if (rpy.norm() > kRounding) text_ += "rpy = " + FormatAngles(rpy) + "\n";
     if (frame.sphere_radius) text_ += "sphere_radius = " + FormatNumber(*frame.sphere_radius) + "\n";
-    if (frame.hemisphere) text_ += "hemisphere = " + FormatTidyList(*frame.hemisphere, 1.0) + "\n";
     text_ += "\n";
   }
 

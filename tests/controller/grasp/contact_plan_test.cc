@@ -205,16 +205,14 @@ TEST_F(ContactPlanTest, TouchesWithinTheRimsOfHemispheres) {
     for (size_t i = 0; i < hand.fingertips.size(); ++i) {
       const Pose X_of = X_Bo.inverse() * terms.CalcFramePose(hand.fingertips[i]);
       const SurfacePoint touch = FindContact(Sphere(0.009), GetTorus(), X_of).kappa.alpha_f;
-      Frame tip = model_.frames()[static_cast<size_t>(hand.fingertips[i])];
-      tip.hemisphere = pole;
-      least = std::min(least, CalcRimDistance(tip, Sphere(0.009).Evaluate(touch).p));
+      least = std::min(least, CalcRimDistance(0.009, pole, Sphere(0.009).Evaluate(touch).p));
     }
     return least;
   };
   const auto plan_with = [&](const Vector3d& pole) {
-    RobotSpec spec = model_.spec();
-    for (const int tip : hand.fingertips) spec.frames[static_cast<size_t>(tip)].hemisphere = pole;
-    return PlanContacts(RobotModel(spec), hand, GetTorus(), X_Bo, MakeNominal(), options);
+    ContactPlanOptions with_pole = options;
+    with_pole.hemisphere = pole;
+    return PlanContacts(model_, hand, GetTorus(), X_Bo, MakeNominal(), with_pole);
   };
   const ContactPlan whole = PlanContacts(model_, hand, GetTorus(), X_Bo, MakeNominal(), options);
   ASSERT_TRUE(whole.found) << whole.problem;

@@ -155,6 +155,7 @@ std::string Show(const GraspOptions& grasp) {
   std::string text = fmt::format("{} {}", fmt::join(grasp.fingertips, " "), grasp.frame);
   for (const SurfacePoint& contact : grasp.contacts) text += fmt::format(" {} {}", contact.u, contact.v);
   for (const auto& [joint, angle] : grasp.joints) text += fmt::format(" {} {}", joint, angle);
+  if (grasp.hemisphere) text += Show(*grasp.hemisphere);
   return text + Show(MatrixXd(grasp.X_FO.matrix()));
 }
 
