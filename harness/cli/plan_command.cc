@@ -197,8 +197,10 @@ void PrintText(const Request& request, const ContactPlan& plan, const GraspBlock
     fmt::print("{}\"{}\"", separator, name);
     separator = ", ";
   }
-  fmt::print("]\nframe = \"{}\"\nxyz = {}\nzyz_deg = {}\ncontacts_deg = [", block.frame,
-             FormatRounded(block.xyz), FormatRounded(block.zyz_deg));
+  if (!request.hemisphere.empty()) fmt::print("]\nhemisphere = {}", FormatNumbers(request.hemisphere));
+  fmt::print("{}\nframe = \"{}\"\nxyz = {}\nzyz_deg = {}\ncontacts_deg = [",
+             request.hemisphere.empty() ? "]" : "", block.frame, FormatRounded(block.xyz),
+             FormatRounded(block.zyz_deg));
   separator = "";
   for (const std::array<double, 2>& contact : block.contacts_deg) {
     fmt::print("{}{}", separator, FormatRounded({contact[0], contact[1]}));
@@ -231,6 +233,7 @@ std::string ToText(const Request& request, const ContactPlan& plan, const std::o
                      {"zyz_deg", block->zyz_deg},
                      {"contacts_deg", block->contacts_deg},
                      {"joints_deg", Json::object()}};
+    if (!request.hemisphere.empty()) json["grasp"]["hemisphere"] = request.hemisphere;
     for (const auto& [name, degrees] : block->joints_deg) json["grasp"]["joints_deg"][name] = degrees;
   }
   return json.dump(2) + "\n";
