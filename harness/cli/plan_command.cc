@@ -197,10 +197,10 @@ void PrintText(const Request& request, const ContactPlan& plan, const GraspBlock
     fmt::print("{}\"{}\"", separator, name);
     separator = ", ";
   }
-  if (!request.hemisphere.empty()) fmt::print("]\nhemisphere = {}", FormatNumbers(request.hemisphere));
-  fmt::print("{}\nframe = \"{}\"\nxyz = {}\nzyz_deg = {}\ncontacts_deg = [",
-             request.hemisphere.empty() ? "]" : "", block.frame, FormatRounded(block.xyz),
-             FormatRounded(block.zyz_deg));
+  fmt::print("]\n");
+  if (!request.hemisphere.empty()) fmt::print("hemisphere = {}\n", FormatNumbers(request.hemisphere));
+  fmt::print("frame = \"{}\"\nxyz = {}\nzyz_deg = {}\ncontacts_deg = [", block.frame,
+             FormatRounded(block.xyz), FormatRounded(block.zyz_deg));
   separator = "";
   for (const std::array<double, 2>& contact : block.contacts_deg) {
     fmt::print("{}{}", separator, FormatRounded({contact[0], contact[1]}));
