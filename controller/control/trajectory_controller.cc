@@ -10,6 +10,7 @@ TrajectoryController::TrajectoryController(const RobotModel& model, std::span<co
                                            const MassProperties& object, const Surface& surface,
                                            const GraspControllerOptions& options, const Sampling& sampling)
     : law_(model, fingertips, object, surface, options), sampling_(sampling) {
+  if (sampling.contacts) follower_.emplace(model, fingertips, surface, *sampling.contacts);
   Require(sampling.hold > 0, "sampling.hold", "must be positive", static_cast<double>(sampling.hold));
 }
 
@@ -18,7 +19,7 @@ void TrajectoryController::Follow(const Trajectory& motion) {
   steps_until_due_ = 0;
 }
 
-void TrajectoryController::Begin(double /*t*/, const Reading& /*reading*/) {}
+void TrajectoryController::Begin(double /*t*/, const Reading& /*reading*/) { has_begun_ = true; }
 
 DesiredMotion TrajectoryController::EvaluateDesired(const Trajectory& motion, double t, double time_step) {
   DesiredMotion desired = motion.Evaluate(t);
@@ -34,7 +35,13 @@ void TrajectoryController::Step(const Reading& reading, double t, Command* comma
   command->force_seconds = 0.0;
   command->force_solves = 0;
   command->desired = EvaluateDesired(*motion_, t, sampling_.time_step);
-  law_.SetState(reading.state);
+  if (follower_ && has_begun_) {
+    followed_ = reading.state;
+    followed_.kappa = follower_->Follow(reading.state);
+    law_.SetState(followed_);
+  } else {
+    law_.SetState(reading.state);
+  }
   if (steps_until_due_ > 0) {
     --steps_until_due_;
     return;

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <optional>
+
+#include "controller/control/contact_follower.h"
 #include "controller/control/controller.h"
 #include "controller/control/grasp_controller.h"
 
@@ -9,6 +12,9 @@ namespace dexcheck {
 struct Sampling {
   double time_step = 0.0;  ///< Velocities belong to the middle of the step before (leapfrog), s; 0 for none.
   long hold = 1;           ///< Torques are computed at every hold-th Step and kept in between.
+  /// Where contacts are followed by (40) from the run's beginning on: how Steps follow each other. Otherwise
+  /// they are where the reading has them.
+  std::optional<StateTiming> contacts = std::nullopt;
 };
 
 /// Computed torque (55) along a trajectory X_d(t).
@@ -24,6 +30,8 @@ class TrajectoryController final : public Controller {
   /// @throws std::logic_error before Follow; else as GraspController.
   void Step(const Reading& reading, double t, Command* command) override;
   [[nodiscard]] const GraspModel& model() const override { return law_.model(); }
+  /// kappa (39) of each contact that is followed; empty before Begin, and where contacts are told.
+  [[nodiscard]] const std::vector<ContactCoordinates>& followed_kappa() const { return followed_.kappa; }
 
   /// X_d, X_d_ddot at t, and X_d_dot half a time step before.
   [[nodiscard]] static DesiredMotion EvaluateDesired(const Trajectory& motion, double t, double time_step);
@@ -31,6 +39,9 @@ class TrajectoryController final : public Controller {
  private:
   GraspController law_;
   Sampling sampling_;
+  std::optional<ContactFollower> follower_;
+  bool has_begun_ = false;
+  MeasuredState followed_;  // the last reading with contacts as they were followed
   const Trajectory* motion_ = nullptr;
   long steps_until_due_ = 0;
 };

@@ -53,6 +53,7 @@ HandClearance MakeClearance(const ContactPlanOptions& options, const Pose& X_BP)
   clearance.half_length = options.half_length;
   clearance.support = options.clearance;
   clearance.steepest = options.steepest;
+  clearance.hemisphere = options.hemisphere;
   if (options.support) {
     clearance.above = HalfSpace{options.support->normal, options.support->height}.Transform(X_BP.inverse());
   }
@@ -237,7 +238,10 @@ class Planner {
     if (tally.blocked + tally.missed + tally.arm_blocked == tally.tried) {
       return "the arm reaches the object only through the support" + tried;
     }
-    if (!is_mapped) return "not all fingertips find a place on the object" + tried;
+    if (!is_mapped) {
+      return std::string("not all fingertips find a place on the object") +
+             (options_.hemisphere ? " within the rims of their hemispheres" : "") + tried;
+    }
     if (is_short && best_margin <= 0.0) {
       return "the arm reaches the object but cannot make all the displacements from there" + tried;
     }

@@ -42,6 +42,10 @@ struct ContactPlanOptions {
   /// Contacts have |z| up to this in the object, m: for cylinders, whose surface has no end.
   double half_length = std::numeric_limits<double>::infinity();
 
+  /// Out of the pole, in the fingertips' frames, where fingertips are hemispheres: contacts stay within their
+  /// rims. None for whole spheres.
+  std::optional<Vector3d> hemisphere;
+
   std::optional<SupportPlane> support;
   /// With a support: largest angle between a contact's normal and the support plane, rad. A steeper contact
   /// would press the object down.

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "controller/common/errors.h"
+#include "controller/contact/fingertip_rim.h"
 #include "controller/grasp/own_joints.h"
 #include "controller/grasp/spread_points.h"
 
@@ -130,6 +131,9 @@ std::optional<Touch> HandReach::FindTouch(size_t finger_index, const Surface& ob
   SerialChain::Poses poses;
   finger.chain.CalcPoses(solution.q, &poses);
   touch.points = ListPoints(poses);
+  // The object's outward normal points into the fingertip.
+  const Vector3d p_f = -(poses.frame.linear().transpose() * (X_Po.linear() * n));
+  if (clearance.hemisphere && CalcRimDistance(finger.radius, *clearance.hemisphere, p_f) < 0.0) return {};
   const Pose X_oP = X_Po.inverse();
   const double thick = clearance.thickness * finger.radius;
   for (size_t k = 0; k < touch.points.size(); ++k) {

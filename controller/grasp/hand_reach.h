@@ -34,6 +34,8 @@ struct HandClearance {
   double support = 0.0;                                          // m, between fingers and the support
   double steepest = 0.0;           // rad, of contacts' normals above the support
   std::optional<HalfSpace> above;  // in the palm frame
+  /// Of hemispherical fingertips, in their frames: they touch within the rim alone.
+  std::optional<Vector3d> hemisphere;
 };
 
 /// One way in which a finger can touch the object.

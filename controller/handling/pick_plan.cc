@@ -45,6 +45,7 @@ PickPlan MakePickPlan(const RobotModel& model, const Hand& hand, const Surface& 
   ContactPlanOptions contact_options;
   contact_options.mu = options.mu;
   contact_options.room = options.opening;
+  contact_options.hemisphere = options.hemisphere;
   contact_options.support = SupportPlane{Vector3d::UnitZ(), options.support};
   contact_options.reaches = {Vector3d(0.0, 0.0, options.raise)};
   PickPlan plan;

@@ -17,6 +17,7 @@ struct PickPlanOptions {
   double nearness = 0.002;  ///< Gap from which the fingertips go on slowly, m.
   double depth = 0.004;     ///< How far beyond the surface they go when they find nothing, m.
   double support = 0.0;     ///< Height of what the object lies on, m.
+  std::optional<Vector3d> hemisphere = std::nullopt;  ///< As ContactPlanOptions.
 };
 
 /// Joint positions (rad), in the model's order.

@@ -139,6 +139,8 @@ const char* NameOf(Cause cause) {
       return "wheel geometry";
     case Cause::kCollision:
       return "collision";
+    case Cause::kFingertipRim:
+      return "fingertip rim";
     case Cause::kUnexplained:
       return "unexplained";
   }

@@ -1,5 +1,6 @@
 #include "harness/checks/bounds.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace dexcheck {
@@ -51,6 +52,14 @@ double CalcScale(Scaling scaling, const Scenario& scenario) {
   if (scenario.plant.type == PlantType::kEngine)
     scale *= CalcContactScale(scaling, scenario.plant) / CalcContactScale(scaling, PlantOptions{});
   return scale;
+}
+
+double CalcStatedBound(const StepCheckInfo& info, const BoundOverride& stated, const Scenario& scenario) {
+  const Scenario* const written = scenario.written.get();
+  const bool is_written = written != nullptr && std::find(written->bounds.begin(), written->bounds.end(),
+                                                          stated) != written->bounds.end();
+  if (!is_written) return stated.second;
+  return stated.second * CalcScale(info.scaling, scenario) / CalcScale(info.scaling, *written);
 }
 
 }  // namespace dexcheck

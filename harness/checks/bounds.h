@@ -19,4 +19,9 @@ namespace dexcheck {
   return info.bound * CalcScale(info.scaling, scenario);
 }
 
+/// A bound that the scenario itself states: for the plant and the gains of its file. Where these are set
+/// otherwise the bound follows by its formula, unless it is set, too.
+[[nodiscard]] double CalcStatedBound(const StepCheckInfo& info, const BoundOverride& stated,
+                                     const Scenario& scenario);
+
 }  // namespace dexcheck

@@ -42,7 +42,9 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
   } else if (!setup.scenario().task && knows_law) {
     law_.emplace(setup);
   }
-  if (!setup.scenario().imperfections.is_ideal()) known_.emplace(setup, motors);
+  // A controller that follows its contacts has others than the truth, too.
+  const bool follows = setup.scenario().control.kappa == ContactSource::kIntegrated;
+  if (follows || !setup.scenario().imperfections.is_ideal()) known_.emplace(setup, motors);
   using enum StepCheck;
   if (joint_law_ && !joint_law_->has_error_dynamics()) motion_.LeaveOut(kGains);
   if (joint_law_ && !joint_law_->follows_error()) motion_.LeaveOut(kJointDynamics);
@@ -125,9 +127,16 @@ double CrossCheck::CompareTold(const StepRecord& step) {
 
 void CrossCheck::FindMeant(const StepRecord& step) {
   actuation_.CalcForce(step.command.tau, meant_force_);
-  const Prediction& meant =
-      joint_law_ ? meant_dynamics_.PredictFree(step.model->robot(), meant_force_)
-                 : meant_dynamics_.Predict(step.model->robot(), step.model->grasp(), meant_force_);
+  if (joint_law_) {
+    meant_.xi_dot_model = meant_dynamics_.PredictFree(step.model->robot(), meant_force_).xi_dot;
+    return;
+  }
+  // Rates that are told need not fit together: what (47), (55) plan for is xi_c, nearest to xi without slip.
+  // With C_bar' xi_c and J_dot xi_c in (48), (46) the rigid system does exactly what is demanded.
+  meant_force_ -= law_->reference().slip_coriolis();
+  slip_acceleration_ = -law_->reference().slip_rates();
+  const Prediction& meant = meant_dynamics_.Predict(step.model->robot(), step.model->grasp(), meant_force_,
+                                                    ObjectSupport::kHand, &slip_acceleration_);
   meant_.xi_dot_model = meant.xi_dot;
   meant_.V_Bo_dot_model = meant.V_Bo_dot;
   meant_.f_c_model = meant.f_c;
@@ -141,11 +150,12 @@ void CrossCheck::ReadControllersTerms(const StepRecord& step) {
 
 const LawErrors& CrossCheck::CompareControl(const StepRecord& step) {
   ReadControllersTerms(step);
+  law_->Evaluate(step, law_terms_);
   if (!known_ && step.drive.tau == step.command.tau) {
-    return law_->Compare(step, motion_.findings(), law_terms_, *motion_.mass_factor());
+    return law_->Compare(step, motion_.findings(), law_terms_, *motion_.mass_factor(), /*knows_slip=*/false);
   }
   FindMeant(step);
-  return law_->Compare(step, meant_, law_terms_, meant_dynamics_.mass_factor());
+  return law_->Compare(step, meant_, law_terms_, meant_dynamics_.mass_factor(), /*knows_slip=*/true);
 }
 
 void CrossCheck::CompareUnsent(const StepRecord& step) {

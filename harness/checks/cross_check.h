@@ -103,8 +103,8 @@ class CrossCheck {
   SensorEvidence sensors_;
   ConstrainedDynamics meant_dynamics_;
   ActuationMap actuation_;
-  VectorXd meant_force_;  // n
-  StepFindings meant_;    // by FindMeant
+  VectorXd meant_force_, slip_acceleration_;  // n
+  StepFindings meant_;                        // by FindMeant
 };
 
 }  // namespace dexcheck

@@ -22,6 +22,7 @@ enum class Cause {
   kSlope,            ///< The floor is not level: gravity points elsewhere.
   kWheelGeometry,    ///< The wheels' radius or distance is another.
   kCollision,        ///< Two bodies touch that are not meant to.
+  kFingertipRim,     ///< A contact has rolled past the rim of a hemispherical fingertip.
   kUnexplained,      ///< None of these was seen.
 };
 

@@ -34,7 +34,9 @@ class JointLawCheck {
   /// Whether the closed loop is e_ddot + K_v e_dot + K_p e = 0.
   [[nodiscard]] bool has_error_dynamics() const { return law_ == ControlLaw::kComputedTorque; }
   /// Whether it can be integrated beside the run, which a plant of another integrator leaves at each step.
-  [[nodiscard]] bool follows_error() const { return has_error_dynamics() && hold_ == 1 && velocity_age_ > 0.0; }
+  [[nodiscard]] bool follows_error() const {
+    return has_error_dynamics() && hold_ == 1 && velocity_age_ > 0.0;
+  }
 
   /// @param terms the engine's, at the state that the controller was told.
   /// @param xi_dot_model what the rigid robot does under its torques.

@@ -85,13 +85,18 @@ DesiredMotion LawCheck::EvaluateDesired(double t) const {
 
 double LawCheck::Norm(const VectorXd& force) { return mass_factor_->CalcForceNorm(force, &work_); }
 
+void LawCheck::Evaluate(const StepRecord& step, const LawTerms& terms) {
+  desired_ = EvaluateDesired(step.time);
+  is_evaluated_ = reference_.Evaluate(spec_, terms, desired_, step.command.demand.F_N);
+}
+
 const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& findings,
-                                   const LawTerms& terms, const TreeFactor& mass_factor) {
+                                   const LawTerms& terms, const TreeFactor& mass_factor, bool knows_slip) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   mass_factor_ = &mass_factor;
-  const DesiredMotion desired = EvaluateDesired(step.time);
+  const DesiredMotion& desired = desired_;
   errors_ = LawErrors{};
-  if (!reference_.Evaluate(spec_, terms, desired, step.command.demand.F_N)) {
+  if (!is_evaluated_) {
     errors_ = {kInfinity, kInfinity, kInfinity, kInfinity};
     return errors_;
   }
@@ -107,7 +112,7 @@ const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& f
     CompareGraspForce(step, terms, baseline_->f_c());
   } else {
     CompareTorque(step, terms, reference_.force());
-    CompareDemand(findings);
+    CompareDemand(findings, knows_slip);
     CompareGraspForce(step, terms, reference_.f_c());
   }
   if (follows_error()) FollowError(step, findings, terms, desired);
@@ -118,11 +123,10 @@ double LawCheck::CompareUnsent(const StepRecord& step, const LawTerms& terms) {
   own_factor_.Compute(terms.M);
   mass_factor_ = &own_factor_;
   errors_ = LawErrors{};
-  const DesiredMotion desired = EvaluateDesired(step.time);
   const VectorXd& F_N = step.command.demand.F_N;
-  if (!reference_.Evaluate(spec_, terms, desired, F_N) ||
-      (baseline_ &&
-       !baseline_->Evaluate(spec_, reference_, terms, step.model->grasp().G_dot(), desired, F_N))) {
+  Evaluate(step, terms);
+  if (!is_evaluated_ || (baseline_ && !baseline_->Evaluate(spec_, reference_, terms,
+                                                           step.model->grasp().G_dot(), desired_, F_N))) {
     return std::numeric_limits<double>::infinity();
   }
   force_ = terms.C_xi + terms.gravity + terms.friction;
@@ -147,7 +151,7 @@ void LawCheck::CompareTorque(const StepRecord& step, const LawTerms& terms, cons
     attribution_.Add(difference_, reference_.CalcParts(terms, step.command.demand.F_N), 1.0 / scale_);
 }
 
-void LawCheck::CompareDemand(const StepFindings& findings) {
+void LawCheck::CompareDemand(const StepFindings& findings, bool knows_slip) {
   // |a|_M = |L a|
   difference_ = findings.xi_dot_model - reference_.xi_dot_d();
   mass_factor_->Multiply(difference_);
@@ -155,8 +159,12 @@ void LawCheck::CompareDemand(const StepFindings& findings) {
   const VectorXd& f_c = reference_.f_c();
   const double forces =
       (findings.f_c_model - f_c).norm() / std::max(f_c.norm(), std::numeric_limits<double>::min());
-  // Where contacts slip, (47) plans for xi_c and the rigid system starts from xi.
   const double kappa = reference_.condition_number();
+  if (knows_slip) {
+    errors_.demand = std::max(motion, forces) / kappa;
+    return;
+  }
+  // Where contacts slip, (47) plans for xi_c and the rigid system starts from xi.
   difference_ = reference_.slip_acceleration();
   mass_factor_->Multiply(difference_);
   const double apart = std::max(motion, forces) / kappa - kSlipShare * difference_.norm() / scale_;

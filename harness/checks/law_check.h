@@ -66,11 +66,17 @@ class LawCheck {
     return has_error_dynamics_ && hold_ == 1 && velocity_age_ > 0.0;
   }
 
-  /// @param terms the engine's, at the state that the controller was told.
+  /// The law at the state that the controller was told, before Compare. @param terms the engine's there.
+  void Evaluate(const StepRecord& step, const LawTerms& terms);
+  [[nodiscard]] const LawReference& reference() const { return reference_; }
+
+  /// @param terms as Evaluate.
   /// @param findings of the same step: what the rigid system does under its torques.
+  /// @param knows_slip whether that starts from xi_c, as (47) plans, and not from xi: where contacts are told
+  /// to slip the two differ, by what is otherwise taken off the demand.
   /// @param mass_factor of M_bar' = L^T L: the check measures in |f|_M^-1 = |L^-T f|.
   const LawErrors& Compare(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
-                           const TreeFactor& mass_factor);
+                           const TreeFactor& mass_factor, bool knows_slip);
   /// The torques alone, for a step that the motors refuse: nothing is known of what they would do.
   double CompareUnsent(const StepRecord& step, const LawTerms& terms);
   /// Largest |tau' received - tau' sent| over the largest |tau'|.
@@ -82,7 +88,7 @@ class LawCheck {
  private:
   [[nodiscard]] DesiredMotion EvaluateDesired(double t) const;
   void CompareTorque(const StepRecord& step, const LawTerms& terms, const VectorXd& force);
-  void CompareDemand(const StepFindings& findings);
+  void CompareDemand(const StepFindings& findings, bool knows_slip);
   void CompareGraspForce(const StepRecord& step, const LawTerms& terms, const VectorXd& f_c);
   void FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                    const DesiredMotion& desired);
@@ -100,6 +106,8 @@ class LawCheck {
   std::unique_ptr<Trajectory> trajectory_;
   ActuationMap actuation_;
   LawReference reference_;
+  DesiredMotion desired_;
+  bool is_evaluated_ = false;                    // J_B' and G had full row rank
   std::unique_ptr<BaselineReference> baseline_;  // null for the paper's law
   LawAttribution attribution_;
   LawErrors errors_;

@@ -136,6 +136,8 @@ class LawReference {
   /// (47), (55) where contacts slip.
   [[nodiscard]] const VectorXd& slip_coriolis() const { return slip_coriolis_; }
   [[nodiscard]] const VectorXd& slip_acceleration() const { return slip_acceleration_; }
+  /// J_dot (xi_c - xi) (k).
+  [[nodiscard]] const VectorXd& slip_rates() const { return slip_rates_; }
   /// x (n) = J^+ y of (47); y (k) is lost.
   void ApplyPseudoinverse(VectorXd* y, VectorXd* x) const;
   /// Adds G^+ F_o (k) to contact forces.

@@ -76,7 +76,10 @@ void StepChecks::DefineChecks() {
   check(StepCheck::kExpectJoints).bound = expect.joints.value_or(0.0);
   check(StepCheck::kExpectJoints).applies = expect.joints.has_value();
   RequireKnownBounds(setup_->scenario());
-  for (const auto& [name, bound] : setup_->scenario().bounds) check(FindStepCheck(name)->check).bound = bound;
+  for (const BoundOverride& stated : setup_->scenario().bounds) {
+    const StepCheckInfo& info = *FindStepCheck(stated.first);
+    check(info.check).bound = CalcStatedBound(info, stated, setup_->scenario());
+  }
 }
 
 void StepChecks::SetApplying() {
@@ -92,6 +95,7 @@ void StepChecks::SetApplying() {
   leave_out(joints, {kLawDemand, kGraspForce, kErrorDynamics, kOrientationDynamics, kContactForce,
                      kFingertipSlip, kFingertipSlipRate, kConeUse, kContactsLost, kPenetration, kKappa});
   leave_out(!joints, {kJointDynamics});
+  leave_out(!setup_->scenario().grasp.hemisphere, {kFingertipRim});
   leave_out(!setup_->has_object(), {kBalanceObject});
   // Nothing but stiffness holds them: whatever is not ideal moves them.
   leave_out(setup_->idle_joints().empty() || !setup_->scenario().imperfections.is_ideal(), {kIdleJoints});
@@ -150,6 +154,7 @@ void StepChecks::Compare(const StepRecord& step) {
   ReadSlip(step);
   if (step.response.wheels.size() == 2) CompareRolling(step);
   if (handling.holding) CompareKappa(step);
+  if (handling.holding && check(StepCheck::kFingertipRim).applies) CheckRims(step);
 
   Add(StepCheck::kBaseTilt, step.reading.departure.tilt);
   CheckIdleJoints(step.reading.state);
@@ -249,18 +254,21 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   solver_of_robot_ = step.response.solver_force.size() > 0 ? Norm(step.response.solver_force) / scale_ : 0.0;
   bias_ -= force_;
   const double uneven = CalcUnevenForce(step);
+  findings_.uneven = uneven / scale_;
   give_->Follow(step, bias_, findings_.f_c_model, uneven, [this](const VectorXd& f) { return Norm(f); });
 
   if (is_unjudged_) return;
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
   mass_factor()->Multiply(residual_);
-  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale_, give_->motion() / scale_);
+  findings_.motion_give = give_->motion() / scale_;
+  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale_, findings_.motion_give);
   double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) force_scale = std::max(force_scale, Weight());
   const double apart = (findings_.f_c_model - findings_.f_c).norm();
-  AddLessGive(StepCheck::kContactForce, apart / force_scale, give_->force() / force_scale);
+  findings_.force_give = give_->force() / force_scale;
+  AddLessGive(StepCheck::kContactForce, apart / force_scale, findings_.force_give);
 }
 
 double StepChecks::Norm(const VectorXd& force) { return mass_factor()->CalcForceNorm(force, &work_); }

@@ -113,6 +113,8 @@ class StepChecks {
   void CheckIdleJoints(const MeasuredState& state);
   void CheckJointStops(const MeasuredState& state);
   void CompareKappa(const StepRecord& step);
+  /// Whether contacts are within the rims of hemispherical fingertips.
+  void CheckRims(const StepRecord& step);
 
   const Setup* setup_;
   std::vector<CheckRecord> checks_;

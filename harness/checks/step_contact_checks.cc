@@ -1,44 +1,20 @@
-// Contacts of fingertips and wheels: what touches, slips, rolls and sinks in.
+// Contacts of fingertips and wheels: what touches, slips, rolls, sinks in and passes a rim.
 
 #include <algorithm>
 #include <cmath>
 
+#include "controller/common/text.h"
+#include "controller/contact/fingertip_rim.h"
 #include "controller/contact/rolling.h"
+#include "harness/checks/contact_drift.h"
 #include "harness/checks/step_checks.h"
 
 namespace dexcheck {
 namespace {
 
-/// Integrated and measured contact farther apart than this have nothing to do with each other any more, and
-/// one may lie at the pole of the other's chart, m. Less than from a chart's margin to its pole, 4 mm on a
-/// fingertip of 9 mm.
-constexpr double kStray = 1e-3;
-
-/// Writes the integrated contact in the charts of the measured one, which kappa_dot is in.
-void FollowCharts(const Surface& tip, const Surface& object, const ContactCoordinates& measured,
-                  ContactCoordinates* integrated) {
-  const int tip_chart = measured.alpha_f.chart;
-  const int object_chart = measured.alpha_o.chart;
-  if (integrated->alpha_f.chart == tip_chart && integrated->alpha_o.chart == object_chart) return;
-  const auto is_near = [](const Surface& surface, const SurfacePoint& a, const SurfacePoint& b) {
-    return (surface.Evaluate(a).p - surface.Evaluate(b).p).norm() < kStray;
-  };
-  if (!is_near(tip, integrated->alpha_f, measured.alpha_f)) return;
-  if (!is_near(object, integrated->alpha_o, measured.alpha_o)) return;
-  *integrated = ChangeCharts(tip, object, *integrated, tip_chart, object_chart);
-}
-
-/// How far integrated and measured contact are apart, m: the point on the object, the point on the fingertip,
-/// and psi at the fingertip's radius. The largest of them.
-double CalcDrift(const Surface& tip, const Surface& object, const ContactCoordinates& integrated,
-                 const ContactCoordinates& measured) {
-  const auto apart = [](const Surface& surface, const SurfacePoint& a, const SurfacePoint& b) {
-    return (surface.Evaluate(a).p - surface.Evaluate(b).p).norm();
-  };
-  const double turned = std::abs(std::remainder(integrated.psi - measured.psi, 2.0 * M_PI));
-  return std::max({apart(object, integrated.alpha_o, measured.alpha_o),
-                   apart(tip, integrated.alpha_f, measured.alpha_f),
-                   turned * tip.Evaluate(measured.alpha_f).p.norm()});
+/// The largest of them as a length, m: psi at the fingertip's radius.
+double CalcLength(const ContactDrift& drift, double radius) {
+  return std::max({drift.object, drift.fingertip, drift.psi * radius});
 }
 
 }  // namespace
@@ -127,6 +103,23 @@ void StepChecks::ReadSlip(const StepRecord& step) {
   Add(StepCheck::kTractionUse, cone_use);
 }
 
+void StepChecks::CheckRims(const StepRecord& step) {
+  const GraspTerms& grasp = ModelAtTruth(step).grasp();
+  const Vector3d& pole = *setup_->scenario().grasp.hemisphere;
+  CheckRecord& rim = check(StepCheck::kFingertipRim);
+  double beyond = 0.0;
+  for (size_t i = 0; i < grasp.fingertips().size(); ++i) {
+    const Vector3d p = grasp.tip(static_cast<int>(i)).Evaluate(step.reading.state.kappa[i].alpha_f).p;
+    const double past = -CalcRimDistance(p.norm(), pole, p);
+    if (past <= beyond) continue;
+    beyond = past;
+    if (rim.failed) continue;
+    rim.part =
+        "fingertip " + Quote(setup_->model().frames()[static_cast<size_t>(grasp.fingertips()[i])].name);
+  }
+  Add(StepCheck::kFingertipRim, beyond);
+}
+
 void StepChecks::CompareKappa(const StepRecord& step) {
   const GraspTerms& grasp = ModelAtTruth(step).grasp();
   const MeasuredState& state = step.reading.state;
@@ -144,7 +137,8 @@ void StepChecks::CompareKappa(const StepRecord& step) {
       FollowCharts(tip, grasp.surface(), state.kappa[i], &kappa);
       kappa = NormalizeContact(tip, grasp.surface(), Displace(kappa, change));
     }
-    apart = std::max(apart, CalcDrift(tip, grasp.surface(), kappa_[i], state.kappa[i]));
+    const ContactDrift drift = CalcContactDrift(tip, grasp.surface(), kappa_[i], state.kappa[i]);
+    apart = std::max(apart, CalcLength(drift, tip.Evaluate(state.kappa[i].alpha_f).p.norm()));
   }
   has_kappa_ = true;
   Add(StepCheck::kKappa, apart);

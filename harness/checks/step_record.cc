@@ -22,6 +22,16 @@ Vector6d CalcX_o(const StepRecord& step) {
   return X_o;
 }
 
+void CalcContactDrifts(const StepRecord& step, std::vector<ContactDrift>* drift) {
+  const GraspTerms& grasp = step.model->grasp();
+  const std::vector<ContactCoordinates>& followed = step.followed_kappa;
+  drift->resize(followed.size());
+  for (size_t i = 0; i < followed.size(); ++i) {
+    (*drift)[i] = CalcContactDrift(grasp.tip(static_cast<int>(i)), grasp.surface(), followed[i],
+                                   step.reading.state.kappa[i]);
+  }
+}
+
 TrackingError CalcTrackingError(const StepRecord& step) {
   const Pose& X_Bo = step.reading.state.X_Bo;
   const Vector6d& X_d = step.command.desired.X_d;

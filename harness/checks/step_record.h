@@ -7,6 +7,7 @@
 
 #include "controller/control/controller.h"
 #include "controller/control/grasp_model.h"
+#include "harness/checks/contact_drift.h"
 #include "harness/plant/motor_drive.h"
 #include "harness/plant/plant_reading.h"
 
@@ -41,6 +42,10 @@ struct StepFindings {
   Vector6d V_Bo_dot_model = Vector6d::Zero();  ///< Likewise of the object, Sigma_o.
   std::vector<SlipState> fingertip_slip, wheel_slip;
 
+  /// What tilt, slip and contacts that give are allowed above the bounds of balance_robot,
+  /// reduced_acceleration and contact_force, relative as those are.
+  double uneven = 0.0, motion_give = 0.0, force_give = 0.0;
+
   // Of all steps so far.
   long unjudged_steps = 0;  ///< Whose balance and prediction were not judged: contacts had just changed.
   long contacts_lost = 0;   ///< Contacts of fingertips that broke.
@@ -62,6 +67,10 @@ struct StepRecord {
   const GraspModel* model = nullptr;
   /// What the scenario itself asks for beyond an ideal plant; null without cross-check or where it is ideal.
   const KnownStep* known = nullptr;
+  /// Of a controller that follows its contacts: kappa (39) as it has them, and how far each is from where it
+  /// is. Otherwise empty.
+  std::vector<ContactCoordinates> followed_kappa;
+  std::vector<ContactDrift> drift;
   StepFindings findings;  ///< Without cross-check empty.
 };
 
@@ -70,6 +79,9 @@ struct StepRecord {
 
 /// Pose of the object, whose angles are on the controller's branch where it uses them.
 [[nodiscard]] Vector6d CalcX_o(const StepRecord& step);
+
+/// How far contacts are from where the controller followed them to; none unless it does.
+void CalcContactDrifts(const StepRecord& step, std::vector<ContactDrift>* drift);
 
 /// How far object, or joints, are from where the command wants them.
 [[nodiscard]] TrackingError CalcTrackingError(const StepRecord& step);

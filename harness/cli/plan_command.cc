@@ -38,7 +38,8 @@ struct Request {
   std::string palm;                     // overrides `hand`
   std::vector<std::string> joints_deg;  // NAME=VALUE
   std::vector<std::string> arm_joints;
-  std::vector<double> lift;              // m
+  std::vector<double> lift;  // m
+  std::vector<double> hemisphere;
   std::optional<double> support_height;  // m
   ContactPlanOptions options;
   std::string mjcf;  // empty: the shipped scene for the shipped robot
@@ -215,7 +216,9 @@ void PrintText(const Request& request, const ContactPlan& plan, const GraspBlock
     fmt::print("{}\"{}\"", separator, name);
     separator = ", ";
   }
-  fmt::print("]\nframe = \"{}\"\nxyz = {}\nzyz_deg = {}\ncontacts_deg = [", block.frame,
+  fmt::print("]\n");
+  if (!request.hemisphere.empty()) fmt::print("hemisphere = {}\n", FormatNumbers(request.hemisphere));
+  fmt::print("frame = \"{}\"\nxyz = {}\nzyz_deg = {}\ncontacts_deg = [", block.frame,
              FormatRounded(block.xyz), FormatRounded(block.zyz_deg));
   separator = "";
   for (const std::array<double, 2>& contact : block.contacts_deg) {
@@ -259,6 +262,7 @@ std::string ToText(const Request& request, const ContactPlan& plan, const std::o
                      {"zyz_deg", block->zyz_deg},
                      {"contacts_deg", block->contacts_deg},
                      {"joints_deg", Json::object()}};
+    if (!request.hemisphere.empty()) json["grasp"]["hemisphere"] = request.hemisphere;
     for (const auto& [name, degrees] : block->joints_deg) json["grasp"]["joints_deg"][name] = degrees;
   }
   return json.dump(2) + "\n";
@@ -287,6 +291,11 @@ int Run(Request request) {
   }
   if (request.support_height) {
     request.options.support = SupportPlane{Vector3d::UnitZ(), *request.support_height};
+  }
+  if (!request.hemisphere.empty()) {
+    const Vector3d pole(request.hemisphere[0], request.hemisphere[1], request.hemisphere[2]);
+    if (!(pole.norm() > 0.0) || !pole.allFinite()) Fail("--hemisphere", "must be a direction");
+    request.options.hemisphere = pole.normalized();
   }
   if (!request.lift.empty()) {
     request.options.reaches.emplace_back(request.lift[0], request.lift[1], request.lift[2]);
@@ -349,6 +358,12 @@ void AddPlanCommand(Command app) {
       .AddOption("--support-height", &request->support_height,
                  "Height of the table that the object lies on, m: the hand comes from above")
       .TypeName("Z");
+  command
+      .AddOption(
+          "--hemisphere", &request->hemisphere,
+          "Fingertips are hemispheres around this direction of their frames: contacts within their rims")
+      .TypeName("X Y Z")
+      .Takes(3);
   command
       .AddOption("--lift", &request->lift, "Displacement, m, that the arm must be able to make while holding")
       .TypeName("X Y Z")

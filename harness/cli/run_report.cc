@@ -141,6 +141,13 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
       for (const std::string& key : scenario.imperfections.asked) fmt::print("asked for: {}\n", key);
     }
     PrintTracking(scenario, result.tracking);
+    if (scenario.control.kappa == ContactSource::kIntegrated) {
+      const ContactDrift& drift = loop.largest_drift();
+      fmt::print(
+          "contacts followed by (40): off by {:.2e} m on the object, {:.2e} m on the fingertip, "
+          "{:.2e} rad in psi\n",
+          drift.object, drift.fingertip, drift.psi);
+    }
     if (loop.task() != nullptr) PrintTask(loop);
     if (loop.is_checking()) PrintClearance(loop.checks().clearance());
     if (loop.is_checking()) PrintChecks(setup, loop, detail);

@@ -23,6 +23,7 @@ class MotionFigures {
     AddForces();
     AddErrors();
     AddFrictionUse();
+    AddContactDrift();
     return std::move(figures_);
   }
 
@@ -169,6 +170,34 @@ class MotionFigures {
     add("other_torques", "", "Torques of other joints", [&](const std::string& joint) {
       return !grasps(joint) && !idle(joint) && !left(joint) && !trunk(joint);
     });
+  }
+
+  /// How far contacts that the law follows by (40) are from where they are.
+  void AddContactDrift() {
+    Figure figure{"contact_drift",
+                  "",
+                  "Contacts followed by (40) against where they are",
+                  "points on object and fingertip (m)",
+                  "psi (rad)",
+                  true,
+                  0.0,
+                  {},
+                  {},
+                  "",
+                  false};
+    int dash = 0;
+    for (const auto& [name, what] : {std::pair{"contact/drift_object", " on the object"},
+                                     std::pair{"contact/drift_fingertip", " on the fingertip"},
+                                     std::pair{"contact/drift_psi", " psi"}}) {
+      const SignalInfo* const drift = run_.Find(name);
+      if (drift == nullptr) continue;
+      const RowMatrixXd values = run_.log().ReadSignal(name);
+      for (int k = 0; k < drift->width; ++k)
+        figure.curves.push_back(
+            {RunData::NameColumn(*drift, k) + what, values.col(k), k, dash, /*right_axis=*/dash == 2});
+      ++dash;
+    }
+    Add(std::move(figure));
   }
 
   void AddForces() {

@@ -33,6 +33,7 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
       hidden_sensor_fault_(std::move(parts.hidden_sensor_fault)),
       controller_(std::move(parts.controller)),
       task_(parts.task),
+      follower_(parts.follower),
       drive_(plant_->motors(), parts.actuation, setup.MakePartContext()),
       disturbances_(parts.disturbances, setup.MakePartContext()),
       num_steps_(std::lround(setup.scenario().duration / setup.scenario().plant.time_step)) {
@@ -168,6 +169,9 @@ void ClosedLoop::Step() {
   record_.time = time();
   ControlStep(record_.time);
   record_.error = CalcTrackingError(record_);
+  if (follower_ != nullptr) record_.followed_kappa = follower_->followed_kappa();
+  CalcContactDrifts(record_, &record_.drift);
+  for (const ContactDrift& drift : record_.drift) largest_drift_.Raise(drift);
   ++record_.step;
   if (checks_) {
     const auto begin = Clock::now();

@@ -78,6 +78,8 @@ class ClosedLoop {
   /// The controller of a task; null unless the scenario is one.
   [[nodiscard]] const PickAndPlaceController* task() const { return task_; }
   [[nodiscard]] const LoopTimes& times() const { return times_; }
+  /// Of a controller that follows its contacts, over all of them and all steps.
+  [[nodiscard]] const ContactDrift& largest_drift() const { return largest_drift_; }
 
  private:
   void CheckMovingStart() const;
@@ -95,7 +97,8 @@ class ClosedLoop {
   Sensing sensing_;
   std::function<void(double t, MeasuredState* told)> hidden_sensor_fault_;
   std::unique_ptr<Controller> controller_;
-  const PickAndPlaceController* task_ = nullptr;  // is controller_, or null
+  const PickAndPlaceController* task_ = nullptr;    // is controller_, or null
+  const TrajectoryController* follower_ = nullptr;  // likewise
   MotorDrive drive_;
   Disturbances disturbances_;
   std::optional<CrossCheck> checks_;
@@ -105,6 +108,7 @@ class ClosedLoop {
   bool is_running_ = false;  // all has settled
   long steps_without_grasp_ = 0;
   LoopTimes times_;
+  ContactDrift largest_drift_;
 };
 
 }  // namespace dexcheck

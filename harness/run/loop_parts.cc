@@ -62,11 +62,14 @@ std::unique_ptr<Plant> MakePlant(const Setup& setup) {
 
 Sampling MakeSampling(const Setup& setup) {
   const PlantOptions& plant = setup.scenario().plant;
-  return {.time_step = 2.0 * plant.velocity_age(),
-          .hold = std::max(1L, std::lround(plant.control_step / plant.time_step))};
+  Sampling sampling{.time_step = 2.0 * plant.velocity_age(),
+                    .hold = std::max(1L, std::lround(plant.control_step / plant.time_step))};
+  if (setup.scenario().control.kappa == ContactSource::kIntegrated)
+    sampling.contacts = {plant.time_step, plant.velocity_age()};
+  return sampling;
 }
 
-std::unique_ptr<Controller> MakeTrajectoryController(const Setup& setup) {
+std::unique_ptr<TrajectoryController> MakeTrajectoryController(const Setup& setup) {
   return std::make_unique<TrajectoryController>(setup.model(), setup.fingertips(), setup.object().body,
                                                 setup.surface(), setup.MakeControllerOptions(),
                                                 MakeSampling(setup));
@@ -97,7 +100,9 @@ LoopParts MakeLoopParts(const Setup& setup) {
   } else if (setup.joint_motion() != nullptr) {
     parts.controller = MakeJointController(setup);
   } else {
-    parts.controller = MakeTrajectoryController(setup);
+    std::unique_ptr<TrajectoryController> controller = MakeTrajectoryController(setup);
+    if (setup.scenario().control.kappa == ContactSource::kIntegrated) parts.follower = controller.get();
+    parts.controller = std::move(controller);
   }
   const Imperfections& imperfections = setup.scenario().imperfections;
   parts.sensing = imperfections.sensing;
@@ -115,6 +120,9 @@ LoopParts MakeLoopParts(const Setup& setup, const std::string& what, const std::
   if (scenario.joint_motion) {
     throw InputError(scenario.source +
                      ": joint_motion: is followed by no other controller, which are told of an object");
+  }
+  if (scenario.control.kappa == ContactSource::kIntegrated) {
+    throw InputError(scenario.source + ": control.kappa: other controllers are told where contacts are");
   }
   LoopParts parts = MakeLoopParts(setup);
   parts.controller = MakeOwnController(

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "controller/control/controller.h"
+#include "controller/control/trajectory_controller.h"
 #include "controller/handling/pick_and_place_controller.h"
 #include "harness/plant/imperfections.h"
 #include "harness/plant/plant.h"
@@ -21,8 +22,9 @@ namespace dexcheck {
 struct LoopParts {
   std::unique_ptr<Plant> plant;
   std::unique_ptr<Controller> controller;
-  const PickAndPlaceController* task = nullptr;  ///< The controller, when it does a task.
-  bool knows_law = true;                         ///< Whether the controller's law is the scenario's.
+  const PickAndPlaceController* task = nullptr;    ///< The controller, when it does a task.
+  const TrajectoryController* follower = nullptr;  ///< The controller, when it follows its contacts by (40).
+  bool knows_law = true;                           ///< Whether the controller's law is the scenario's.
   SensingOptions sensing;
   ActuationOptions actuation;
   std::vector<DisturbanceOptions> disturbances;

@@ -216,6 +216,7 @@ void RunRecorder::AddContactSignals() {
           row[2 * i + 1] = kappa.alpha_o.chart;
         }
       });
+  if (setup_->scenario().control.kappa == ContactSource::kIntegrated) AddFollowedContacts();
   Add({"contact/overlap", "m", "depth to which fingertip and object overlap", count, tips, {}},
       [](const StepRecord& step, std::span<double> row) {
         std::copy(step.reading.state.overlap.begin(), step.reading.state.overlap.end(), row.begin());
@@ -289,6 +290,38 @@ void RunRecorder::AddContactSignals() {
     wheels.push_back(NameOf(setup_->engine(), mjOBJ_JOINT, wheel.joint));
   }
   if (!wheels.empty()) add_slip("wheel", "wheel", wheels, &StepFindings::wheel_slip);
+}
+
+void RunRecorder::AddFollowedContacts() {
+  const std::vector<std::string>& tips = setup_->scenario().grasp.fingertips;
+  const int count = CountOf(tips);
+  Add({"law/kappa",
+       "rad",
+       "contact coordinates (39) that the law follows by (40) from t = 0",
+       5 * count,
+       Expand(tips, {"u_f", "v_f", "u_o", "v_o", "psi"}),
+       {}},
+      [](const StepRecord& step, std::span<double> row) {
+        const std::vector<ContactCoordinates>& kappa = step.followed_kappa;
+        for (size_t i = 0; i < kappa.size(); ++i) Copy(kappa[i].CalcVector(), row.subspan(5 * i, 5));
+      });
+  Add({"law/chart", "1", "charts of law/kappa, as contact/chart", 2 * count, Expand(tips, {"f", "o"}), {}},
+      [](const StepRecord& step, std::span<double> row) {
+        const std::vector<ContactCoordinates>& kappa = step.followed_kappa;
+        for (size_t i = 0; i < kappa.size(); ++i) {
+          row[2 * i] = kappa[i].alpha_f.chart;
+          row[2 * i + 1] = kappa[i].alpha_o.chart;
+        }
+      });
+  const auto add = [&](const char* name, const char* unit, const char* what, double ContactDrift::*member) {
+    Add({name, unit, what, count, tips, {}}, [member](const StepRecord& step, std::span<double> row) {
+      for (size_t i = 0; i < step.drift.size(); ++i) row[i] = step.drift[i].*member;
+    });
+  };
+  add("contact/drift_object", "m", "distance of law/kappa's points on the object from contact/kappa's",
+      &ContactDrift::object);
+  add("contact/drift_fingertip", "m", "likewise of the points on the fingertips", &ContactDrift::fingertip);
+  add("contact/drift_psi", "rad", "psi of law/kappa against contact/kappa's", &ContactDrift::psi);
 }
 
 void RunRecorder::AddTaskSignals() {

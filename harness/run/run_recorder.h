@@ -39,6 +39,7 @@ class RunRecorder {
   void AddJointSignals();
   void AddObjectSignals();
   void AddContactSignals();
+  void AddFollowedContacts();
   void AddTaskSignals();
   void AddClearanceSignals();
   void AddCheckSignals();

@@ -117,6 +117,11 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
   } else {
     json["tracking"] = TrackingToJson(result.tracking);
   }
+  if (scenario.control.kappa == ContactSource::kIntegrated) {
+    const ContactDrift& drift = loop.largest_drift();
+    json["contact_drift"] = {
+        {"object_max_m", drift.object}, {"fingertip_max_m", drift.fingertip}, {"psi_max_rad", drift.psi}};
+  }
   if (loop.task() != nullptr) json["task"] = TaskToJson(loop);
   if (!scenario.imperfections.is_ideal()) json["plant_asked_for"] = scenario.imperfections.asked;
   json["attribution"] = {{"cause", NameOf(result.attribution.cause)},

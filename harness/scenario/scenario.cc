@@ -129,6 +129,11 @@ void ReadGrasp(const TomlValue& value, bool planned, Scenario* scenario) {
   if (grasp.fingertips.size() < 3) fingertips.Reject("needs at least three fingertips to hold an object");
   if (!planned) ReadContacts(table, &grasp);
   grasp.frame = table.Get("frame").AsName();
+  if (const auto pole = table.Find("hemisphere")) {
+    grasp.hemisphere = pole->AsVector<3>();
+    if (!(grasp.hemisphere->norm() > 0.0)) pole->Fail("must have a direction");
+    grasp.hemisphere->normalize();
+  }
   if (const auto joints = table.Find("joints_deg")) {
     for (const auto& [name, angle] : joints->AsTable().GetEntries()) {
       grasp.joints.emplace_back(name, DegToRad(angle.AsNumber()));
@@ -192,6 +197,7 @@ void FinishTask(Scenario* scenario) {
   pick.f_min = scenario->control.f_min;
   pick.posture_frequency = scenario->control.posture_frequency;
   pick.plan.mu = scenario->control.mu;
+  pick.plan.hemisphere = scenario->grasp.hemisphere;
 }
 
 /// K_p and K_v, or natural frequency and damping ratio of (57).
@@ -261,6 +267,14 @@ void ReadControl(const TomlValue& value, Scenario* scenario) {
   control.f_max = table.Get("f_max").AsPositive();
   if (control.f_max <= control.f_min) table.Get("f_max").Fail("must be greater than f_min");
   control.mu = table.Get("mu").AsPositive();
+  if (const auto choice = table.Find("kappa")) {
+    control.kappa = choice->AsChoice<ContactSource>(
+        {{"exact", ContactSource::kExact}, {"integrated", ContactSource::kIntegrated}});
+    if (control.kappa == ContactSource::kIntegrated) {
+      if (scenario->task) choice->Reject("contacts of a task come and go");
+      if (scenario->plant.bonded) choice->Reject("bonds do not roll");
+    }
+  }
   if (const auto [error, unit] = table.FindWithAngleUnit("contact_error"); error) {
     control.contact_error = unit * error->AsNumber();
   }
@@ -282,6 +296,16 @@ void ReadExpectation(const TomlValue& value, bool joints, Expectation* expect) {
     expect->orientation = unit * orientation->AsPositive();
   }
   table.RejectUnused();
+}
+
+/// The file by itself; null when it needs overrides to be a scenario.
+std::shared_ptr<const Scenario> ReadWritten(const std::string& text, const std::string& source,
+                                            const std::filesystem::path& folder) {
+  try {
+    return std::make_shared<const Scenario>(ParseScenario(text, source, folder, {}));
+  } catch (const InputError&) {
+    return nullptr;
+  }
 }
 
 }  // namespace
@@ -331,6 +355,7 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
     for (const auto& [name, value] : bounds->AsTable().GetEntries()) {
       scenario.bounds.emplace_back(name, value.AsNotNegative());
     }
+    if (!overrides.empty()) scenario.written = ReadWritten(text, source, folder);
   }
   if (const auto expect = root.Find("expect"))
     ReadExpectation(*expect, scenario.joint_motion.has_value(), &scenario.expect);

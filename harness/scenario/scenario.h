@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -63,9 +64,17 @@ struct PlantOptions {
 struct GraspOptions {
   std::vector<std::string> fingertips;  ///< Frames.
   std::vector<SurfacePoint> contacts;   ///< Of the object, one for each fingertip; none for a task.
-  std::string frame;                    ///< Frame that the object is placed in; of a task: the palm.
-  Pose X_FO = Pose::Identity();         ///< Object in it.
+  /// Out of the pole, in the fingertips' frames, where fingertips are hemispheres; none for whole spheres.
+  std::optional<Vector3d> hemisphere;
+  std::string frame;             ///< Frame that the object is placed in; of a task: the palm.
+  Pose X_FO = Pose::Identity();  ///< Object in it.
   std::vector<std::pair<std::string, double>> joints;  ///< Posture, rad; other joints are 0.
+};
+
+/// Where the controller's contact coordinates (39) come from.
+enum class ContactSource {
+  kExact,       ///< From the geometry of fingertips and object at each step.
+  kIntegrated,  ///< From (40), integrated since t = 0.
 };
 
 /// Law, gains and forces.
@@ -83,7 +92,8 @@ struct ControlOptions {
   double f_min = 0.0;               ///< Least normal force (squeeze), N.
   double f_max = 0.0;               ///< Largest, N.
   double mu = 0.0;                  ///< Friction that the grasp force counts on.
-  double contact_error = 0.0;       ///< By how much kappa is told wrongly, rad: a fault to be found.
+  ContactSource kappa = ContactSource::kExact;
+  double contact_error = 0.0;  ///< By how much kappa is told wrongly, rad: a fault to be found.
 };
 
 /// Take the object from a support, carry it, put it down.
@@ -158,6 +168,9 @@ struct Scenario {
   ControlOptions control;
   Imperfections imperfections;
   std::vector<BoundOverride> bounds;
+  /// The file without overrides, whose plant and gains its bounds were stated for; null where it has none, or
+  /// says nothing without them.
+  std::shared_ptr<const Scenario> written;
   Expectation expect;
   std::uint64_t seed = 0;  ///< Of random changes to posture and grasp; 0 for none.
 

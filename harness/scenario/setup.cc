@@ -7,6 +7,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/contact/find_contact.h"
+#include "controller/contact/fingertip_rim.h"
 #include "controller/contact/object_surface.h"
 #include "controller/contact/shapes.h"
 #include "controller/model/parameter_reader.h"
@@ -186,17 +187,39 @@ void Setup::FindGrasp() {
   if (scenario_.task) return PlaceTask(&random);
   const GraspOptions given = scenario_.grasp;
   double residual = 0.0;
+  std::string past_rim;
   for (int i = 0; i < (scenario_.seed == 0 ? 1 : kMostDraws); ++i) {
     scenario_.grasp = given;
     if (scenario_.seed != 0) VaryGrasp(&random);
     const FingerPlacement placement = SolveGrasp();
     q_start_ = placement.q;
-    if (placement.reached) return;
     residual = placement.residual;
+    if (!placement.reached) continue;
+    past_rim = FindContactPastRim();
+    if (past_rim.empty()) return;
   }
+  if (!past_rim.empty()) Fail(scenario_, "grasp.contacts_deg", past_rim);
   Fail(scenario_, "grasp.contacts_deg",
        "the fingertips do not reach their contacts within the joint ranges; the farthest stays " +
            FormatNumber(residual) + " m away");
+}
+
+std::string Setup::FindContactPastRim() const {
+  const GraspOptions& grasp = scenario_.grasp;
+  if (!grasp.hemisphere) return "";
+  ModelTerms kinematics(model_, Coordinates::kReduced);
+  kinematics.SetState(q_start_, VectorXd::Zero(model_.num_velocities()));
+  for (size_t i = 0; i < fingertips_.size(); ++i) {
+    // The object's outward normal points into the fingertip.
+    const Vector3d n = X_Bo_start_.linear() * surface_->Evaluate(grasp.contacts[i]).R.col(2);
+    const Matrix3d R_Bf = kinematics.CalcFramePose(fingertips_[i]).linear();
+    const Frame& tip = model_.frames()[static_cast<size_t>(fingertips_[i])];
+    const double distance = CalcRimDistance(*tip.sphere_radius, *grasp.hemisphere, -(R_Bf.transpose() * n));
+    if (distance >= 0.0) continue;
+    return "the contact of " + Quote(tip.name) + " lies " + FormatNumber(-1e3 * distance, 3) +
+           " mm past the rim of its hemisphere";
+  }
+  return "";
 }
 
 void Setup::VaryGrasp(std::mt19937_64* random) {

@@ -111,6 +111,8 @@ class Setup {
   void SetJoints(const JointNumbers& numbers, VectorXd* q) const;
   [[nodiscard]] int FindJointOf(const std::string& key, const std::string& name, bool in_degrees) const;
   void RequireInRange(const std::string& key, const VectorXd& q) const;
+  /// Says which contact of the posture found lies past its fingertip's rim; empty for none.
+  [[nodiscard]] std::string FindContactPastRim() const;
   void VaryGrasp(std::mt19937_64* random);
   FingerPlacement SolveGrasp();
   void MakeBonds();

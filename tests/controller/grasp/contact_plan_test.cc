@@ -10,6 +10,7 @@
 #include <random>
 
 #include "controller/contact/find_contact.h"
+#include "controller/contact/fingertip_rim.h"
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/shapes.h"
 #include "controller/dynamics/model_terms.h"
@@ -188,6 +189,50 @@ TEST_F(ContactPlanTest, FindsAGraspWhereverTheTorusLiesOnATable) {
     // From above.
     EXPECT_LT((X_Bo.linear() * plan.X_oP.linear().col(2)).z(), -0.6);
   }
+}
+
+TEST_F(ContactPlanTest, TouchesWithinTheRimsOfHemispheres) {
+  constexpr double kTable = 0.62;  // m
+  const Pose X_Bo = MakePose({0.30, -0.50, kTable + 0.011}, Vector3d::UnitZ(), 0.3);
+  ContactPlanOptions options;
+  options.support = SupportPlane{Vector3d::UnitZ(), kTable};
+  const Hand hand = MakeHand('r');
+  /// Least distance of the plan's contacts from the rims around `pole`, m.
+  const auto find_least = [&](const ContactPlan& plan, const Vector3d& pole) {
+    ModelTerms terms(model_);
+    terms.SetState(plan.q, VectorXd::Zero(terms.size()));
+    double least = 1.0;
+    for (size_t i = 0; i < hand.fingertips.size(); ++i) {
+      const Pose X_of = X_Bo.inverse() * terms.CalcFramePose(hand.fingertips[i]);
+      const SurfacePoint touch = FindContact(Sphere(0.009), GetTorus(), X_of).kappa.alpha_f;
+      least = std::min(least, CalcRimDistance(0.009, pole, Sphere(0.009).Evaluate(touch).p));
+    }
+    return least;
+  };
+  const auto plan_with = [&](const Vector3d& pole) {
+    ContactPlanOptions with_pole = options;
+    with_pole.hemisphere = pole;
+    return PlanContacts(model_, hand, GetTorus(), X_Bo, MakeNominal(), with_pole);
+  };
+  const ContactPlan whole = PlanContacts(model_, hand, GetTorus(), X_Bo, MakeNominal(), options);
+  ASSERT_TRUE(whole.found) << whole.problem;
+  // A pole with which the whole spheres' plan is past a rim.
+  const Vector3d pole(0.6, 0.8, 0.0);
+  ASSERT_LT(find_least(whole, pole), 0.0);
+  const ContactPlan within = plan_with(pole);
+  if (within.found) {
+    EXPECT_GE(find_least(within, pole), 0.0);
+  } else {
+    EXPECT_THAT(within.problem, HasSubstr("within the rims"));
+  }
+  // Fingertips that point back into their fingers touch nothing.
+  const ContactPlan none = plan_with(-Vector3d::UnitX());
+  EXPECT_FALSE(none.found);
+  EXPECT_THAT(none.problem, HasSubstr("within the rims of their hemispheres"));
+  // Along the fingers, as the paper's: found.
+  const ContactPlan along = plan_with(Vector3d::UnitX());
+  ASSERT_TRUE(along.found) << along.problem;
+  EXPECT_GE(find_least(along, Vector3d::UnitX()), 0.0);
 }
 
 TEST_F(ContactPlanTest, ReachesOnFromWhereItHolds) {

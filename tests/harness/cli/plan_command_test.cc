@@ -44,7 +44,8 @@ std::vector<std::string> PlanArguments(std::vector<std::string> more) {
 TEST(PlanCommand, PrintsAGraspThatHoldsTheTorus) {
   const std::vector<std::vector<std::string>> requests = {
       {"--object-xyz", "0.3", "-0.5", "0.631", "--support-height", "0.62"},
-      {"--object-xyz", "0.35", "0.25", "0.85", "--object-zyz-deg", "20", "70", "-30", "--hand", "left"}};
+      {"--object-xyz", "0.35", "0.25", "0.85", "--object-zyz-deg", "20", "70", "-30", "--hand", "left",
+       "--hemisphere", "1", "0", "0"}};
   for (const std::vector<std::string>& request : requests) {
     const TempFolder folder;
     const bool is_flat = request.size() == 6;
@@ -112,6 +113,12 @@ TEST(PlanCommand, SaysWhyThereIsNoPlan) {
       RunDexcheck(PlanArguments({"--object-xyz", "0.35", "-0.25", "0.85", "--mu", "0.001"}));
   EXPECT_EQ(slippery.exit_code, 3);
   EXPECT_THAT(slippery.err, HasSubstr("no force closure with mu = 0.001"));
+
+  // Hemispheres that point back into their fingers.
+  const ProgramResult rims =
+      RunDexcheck(PlanArguments({"--object-xyz", "0.35", "-0.25", "0.85", "--hemisphere", "-1", "0", "0"}));
+  EXPECT_EQ(rims.exit_code, 3);
+  EXPECT_THAT(rims.err, HasSubstr("no plan: not all fingertips find a place on the object within the rims"));
 }
 
 TEST(PlanCommand, RefusesWhatCannotBeUsed) {
@@ -127,6 +134,7 @@ TEST(PlanCommand, RefusesWhatCannotBeUsed) {
   EXPECT_TRUE(IsRefused(plan({"--joint-margin", "-1"}), {"joint_margin: must not be negative, got -1"}));
   EXPECT_TRUE(IsRefused(plan({"--support-height", "inf"}), {"support: must be finite, got inf"}));
   EXPECT_TRUE(IsRefused(plan({"--lift", "0", "0", "nan"}), {"reaches: must be finite, got nan"}));
+  EXPECT_TRUE(IsRefused(plan({"--hemisphere", "0", "0", "0"}), {"--hemisphere: must be a direction"}));
   EXPECT_TRUE(IsRefused(plan({"--hand", "up"}), {"--hand", "up"}));
   EXPECT_TRUE(IsRefused(plan({"--palm", "hand"}), {"--palm: \"hand\" is no frame of the model"}));
   EXPECT_TRUE(IsRefused(plan({"--palm", "base_frame"}), {"--palm: no joint moves \"base_frame\" alone"}));

@@ -67,6 +67,25 @@ TEST(Bounds, FollowStepStiffnessAndGains) {
   EXPECT_DOUBLE_EQ(CalcRatio(kErrorDynamics, {"control.natural_frequency=0"}), 1.0);
 }
 
+TEST(Bounds, OfAScenarioFollowWhatIsSet) {
+  const auto find = [](const char* check, const std::vector<std::string>& overrides) {
+    const Scenario scenario = ReadShippedScenario("curve-real", overrides);
+    for (const BoundOverride& stated : scenario.bounds) {
+      if (stated.first == check) return CalcStatedBound(*FindStepCheck(check), stated, scenario);
+    }
+    ADD_FAILURE() << check;
+    return 0.0;
+  };
+  const std::string soft = "plant.contact_impedance=0.9", step = "plant.time_step=0.002";
+  const double slip = find("fingertip_slip_rate", {}), force = find("contact_force", {});
+  EXPECT_NEAR(find("fingertip_slip_rate", {soft}), 10.0 * slip, 1e-9 * slip);
+  EXPECT_NEAR(find("fingertip_slip_rate", {soft, step}), 20.0 * slip, 1e-9 * slip);
+  // Whoever sets the bound means it.
+  EXPECT_EQ(find("fingertip_slip_rate", {soft, "bounds.fingertip_slip_rate=3e-3"}), 3e-3);
+  // One that is a share scales with nothing.
+  EXPECT_EQ(find("contact_force", {soft, step}), force);
+}
+
 TEST(ContactGive, ConstantForcesAreHeldWhole) {
   PlantOptions plant;
   ContactGive give(plant, ContactGive::Share::Of(0.2), ContactGive::Share::Of(0.1));

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "harness/diagnosis/spoiled_law.h"
 #include "harness/run/runner.h"
 #include "tests/harness/run/shipped_run.h"
 
@@ -30,10 +31,16 @@ const Known kKnown[] = {
     {"differenced", {"sensing.velocity=differenced", "sensing.velocity_cutoff=50"}},
     {"kalman", {"sensing.velocity=kalman", "sensing.kalman_acceleration=20", "sensing.joint_noise=1e-6"}},
     {"velocity_noise", {"sensing.velocity_noise=1e-4"}},
+    {"noisy_rates_at_the_contacts", {"sensing.velocity_noise=1e-2"}},
+    {"noisy_rates_of_the_object",
+     {"sensing.object_velocity=kalman", "sensing.object_acceleration=5", "sensing.object_position_noise=1e-5",
+      "sensing.velocity_noise=1e-3"}},
+    {"noisy_rates_of_followed_contacts", {"control.kappa=integrated", "sensing.velocity_noise=1e-3"}},
     {"odometry", {"sensing.odometry=true"}},
     {"camera",
      {"sensing.object_rate=500", "sensing.object_latency=0.002", "sensing.object_velocity=kalman",
       "sensing.object_acceleration=5", "sensing.object_position_noise=1e-6"}},
+    {"followed_contacts", {"control.kappa=integrated"}},
     {"sensing_latency", {"sensing.latency=0.002"}},
     {"torque_step", {"actuation.torque_step=1e-3"}},
     {"gain_error", {"actuation.gain_error={ r_elbow = 0.02 }"}},
@@ -76,6 +83,31 @@ TEST_P(KnownCauses, CryNoWolf) {
 
 INSTANTIATE_TEST_SUITE_P(All, KnownCauses, ::testing::ValuesIn(kKnown),
                          [](const ::testing::TestParamInfo<Known>& info) { return info.param.name; });
+
+/// Rates that are told need not fit together, and what the law demands is still known to rounding: a
+/// thousandth of one of its parts fails law_demand under noise as it does without.
+TEST(KnownNoise, DoesNotBlindTheDemandOfTheLaw) {
+  size_t parts = 0;
+  for (const LawMistake& mistake : ListLawMistakes()) {
+    if (mistake.factor != 1.001) continue;
+    const std::string name = ListLawParts()[mistake.part].name;
+    if (name != "mass matrix M_bar'" && name != "velocity feedback K_v" && name != "object's wrench G^+ F_o")
+      continue;
+    ++parts;
+    for (const char* noise : {"sensing.velocity_noise=1e-2", "sensing.object_position_noise=1e-5"}) {
+      SCOPED_TRACE(mistake.name + " " + noise);
+      ShippedRun run("curve", {"duration=0.02", "settle=0.3", "expect={}", noise}, 1);
+      LoopParts wrong = MakeLoopParts(run.setup());
+      wrong.controller = std::make_unique<SpoiledLaw>(run.setup(), mistake);
+      Runner runner(run.setup(), /*check=*/true, std::move(wrong));
+      runner.Run([](const StepRecord&) {}, [] { return false; });
+      EXPECT_TRUE(runner.loop().checks().Find("law_demand").failed)
+          << runner.loop().checks().Find("law_demand").worst;
+      EXPECT_FALSE(runner.loop().checks().Find("told").failed);
+    }
+  }
+  EXPECT_EQ(parts, 3U);
+}
 
 /// A loop with the imperfections of one scenario in it, judged by another that does not have them.
 RunResult RunHidden(const std::vector<std::string>& hidden) {

@@ -155,16 +155,17 @@ std::string Show(const GraspOptions& grasp) {
   std::string text = fmt::format("{} {}", fmt::join(grasp.fingertips, " "), grasp.frame);
   for (const SurfacePoint& contact : grasp.contacts) text += fmt::format(" {} {}", contact.u, contact.v);
   for (const auto& [joint, angle] : grasp.joints) text += fmt::format(" {} {}", joint, angle);
+  if (grasp.hemisphere) text += Show(*grasp.hemisphere);
   return text + Show(MatrixXd(grasp.X_FO.matrix()));
 }
 
 std::string Show(const ControlOptions& control) {
-  return fmt::format("{} {} {} | {} | {} | {} {} {} {} {} {} {} {} {}", static_cast<int>(control.law),
+  return fmt::format("{} {} {} | {} | {} | {} {} {} {} {} {} {} {} {} {}", static_cast<int>(control.law),
                      Show(control.gains.K_p), Show(control.gains.K_v), Show(control.stiffness),
                      Show(control.damping), static_cast<int>(control.orientation),
                      static_cast<int>(control.weight), control.platform_weight, control.arm_weight,
                      control.posture_frequency, control.f_min, control.f_max, control.mu,
-                     control.contact_error);
+                     static_cast<int>(control.kappa), control.contact_error);
 }
 
 std::string Show(const TaskOptions& task) {

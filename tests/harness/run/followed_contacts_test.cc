@@ -1,0 +1,77 @@
+// control.kappa = "integrated": contacts that the law follows by (40) from their start, as in the paper.
+
+#include <gtest/gtest.h>
+
+#include "tests/harness/run/shipped_run.h"
+
+namespace dexcheck::testing {
+namespace {
+
+/// Fingers roll the torus: rolling contact is the whole motion.
+std::vector<std::string> Roll(const std::vector<std::string>& more) {
+  std::vector<std::string> overrides = {"duration=0.4", "settle=0.3", "expect={}",
+                                        "control.kappa=integrated"};
+  overrides.insert(overrides.end(), more.begin(), more.end());
+  return overrides;
+}
+
+/// Where contacts really roll, without slip, all that is left is the integrator's error, of second order.
+TEST(FollowedContacts, DriftWithTheSquareOfTheStepWhereNothingSlips) {
+  const auto drift = [](const char* step) {
+    ShippedRun run("reorient", Roll({"plant.type=rigid", std::string("plant.time_step=") + step}));
+    const RunResult& result = run.Run();
+    EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+    return run.loop().largest_drift();
+  };
+  const ContactDrift whole = drift("4e-3"), half = drift("2e-3");
+  EXPECT_GT(half.object, 1e-12);
+  EXPECT_NEAR(whole.object / half.object, 4.0, 0.4);
+  EXPECT_NEAR(whole.fingertip / half.fingertip, 4.0, 0.4);
+  EXPECT_NEAR(whole.psi / half.psi, 4.0, 0.4);
+}
+
+/// Soft contacts slip and sink, which the law is told as motion: they drift, no check alarms, and the drift
+/// is told of each coordinate.
+TEST(FollowedContacts, DriftIsToldAndCriesNoWolf) {
+  ShippedRun run("reorient", Roll({}));
+  ContactDrift largest;
+  const RunResult& result = run.Run([&] {
+    ASSERT_EQ(run.step().drift.size(), 4U);
+    for (const ContactDrift& drift : run.step().drift) largest.Raise(drift);
+  });
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  const auto summary = MakeSummary(run.setup(), run.loop(), result);
+  const auto& told = summary.at("contact_drift");
+  EXPECT_EQ(told.at("object_max_m"), largest.object);
+  EXPECT_EQ(told.at("fingertip_max_m"), largest.fingertip);
+  EXPECT_EQ(told.at("psi_max_rad"), largest.psi);
+  EXPECT_GT(largest.object, 1e-9);
+  EXPECT_GT(largest.fingertip, 1e-9);
+  EXPECT_GT(largest.psi, 1e-9);
+  EXPECT_LT(largest.object, 1e-4);
+}
+
+/// The exact geometry stays what it was, and says nothing of drift.
+TEST(FollowedContacts, AreNotTheDefault) {
+  ShippedRun run("reorient", {"duration=0.01", "settle=0.3"});
+  const auto summary = MakeSummary(run.setup(), run.loop(), run.Run());
+  EXPECT_FALSE(summary.contains("contact_drift"));
+  EXPECT_TRUE(run.step().drift.empty());
+}
+
+TEST(FollowedContacts, AreRefusedWhereNothingRolls) {
+  const auto refuse = [](const char* scenario, const std::string& why) {
+    try {
+      ReadShippedScenario(scenario, {"control.kappa=integrated"});
+      ADD_FAILURE() << scenario << " is accepted";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("control.kappa"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
+    }
+  };
+  refuse("lift", "contacts of a task come and go");
+  refuse("bonded", "bonds do not roll");
+}
+
+}  // namespace
+}  // namespace dexcheck::testing
