@@ -170,7 +170,6 @@ std::vector<int> FindDashes(int dash) {
 }
 
 std::array<double, 2> CalcAxisRange(const Figure& figure, bool right_axis) {
-  constexpr double kShareOfTwo = 0.52;  // of the height, for each of two axes' curves
   std::array<double, 2> range = FindRange(figure, right_axis);
   if (range[0] > range[1]) range = {1.0, 1.0};
   if (figure.log) {
@@ -182,7 +181,7 @@ std::array<double, 2> CalcAxisRange(const Figure& figure, bool right_axis) {
       0.54 * std::max({range[1] - range[0], figure.least_span, 1e-9 * std::abs(middle), 1e-12});
   range = {middle - half, middle + half};
   if (figure.right_label.empty()) return range;
-  const double room = 2.0 * half * (1.0 / kShareOfTwo - 1.0);
+  const double room = 2.0 * half;  // for the other axis
   if (right_axis) {
     range[1] += room;
   } else {

