@@ -163,6 +163,13 @@ TEST(SobolIndices, LeaveOutWhatHasNoValueAndFindNothingInAConstant) {
   EXPECT_EQ(some.left_out, 11);
   const auto constant = MakeRows(study, [](const std::vector<double>&) { return 3.0; });
   EXPECT_TRUE(AnalyseSensitivity(study, constant, "energy").sobol.empty());
+  // Of Morris's walks, too: when nothing was held, nothing is said.
+  const Study walks = MakeStudy("method = \"morris\"\ncount = 4", 2);
+  std::vector<TrialRow> lost = MakeRows(walks, [](const std::vector<double>& x) { return x[0]; });
+  EXPECT_FALSE(AnalyseSensitivity(walks, lost, "energy").empty());
+  for (TrialRow& row : lost) row.result.outcome = Outcome::kRefused;
+  const Sensitivity nothing = AnalyseSensitivity(walks, lost, "energy");
+  EXPECT_EQ(Describe(walks, nothing), "energy does not vary, or too few trials were held.");
 }
 
 TEST(MorrisEffects, TellLinearInteractingAndIdleKeysApart) {
