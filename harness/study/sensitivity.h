@@ -48,7 +48,6 @@ struct MorrisEffect {
 };
 
 /// @param points of MakeMorris. @param values f there. Steps with a value that is not finite are left out.
-/// @returns one for each dimension; empty when no step is left.
 std::vector<MorrisEffect> CalcMorrisEffects(std::span<const UnitPoint> points,
                                             std::span<const double> values);
 
