@@ -142,6 +142,7 @@ std::vector<MorrisEffect> CalcMorrisEffects(std::span<const UnitPoint> points,
       }
     }
   }
+  if (std::all_of(effects.begin(), effects.end(), [](const auto& all) { return all.empty(); })) return {};
   std::vector<MorrisEffect> result;
   std::mt19937_64 random(kBootstrapSeed);
   for (const std::vector<double>& all : effects) {

@@ -100,6 +100,7 @@ void CheckTrials(StudyInputs* inputs) {
   const Scenario first = MakeTrialScenario(*inputs, trial);
   inputs->engine = LoadMjcf(inputs->mjcf);
   const Setup setup(first, inputs->robot, inputs->mjcf, MakeEngine(*inputs));
+  const Runner runner(setup, study.check);  // sensors and motors know more names than the setup
   const std::vector<double> parameters = trial.parameters;
   for (size_t i = 0; i < study.variations.size(); ++i) {
     const Variation range = FindRange(study, i, parameters);

@@ -87,7 +87,7 @@ TEST(StudyReader, ARangeMayDependOnAKeyBeforeIt) {
                               message);
   };
   EXPECT_TRUE(
-      refused("2 * control.f_min", "2 * control.f_mim", "study.toml:11: vary[1].from: must be a number or "));
+      refused("2 * control.f_min", "2 * control.f_mim", "study.toml:12: vary[1].from: must be a number or "));
   EXPECT_TRUE(refused("2 * control.f_min", "2 * control.f_max", "must be a number or arithmetic of keys"));
   EXPECT_TRUE(refused("2 * control.f_min", "12 * control.f_min - 2",
                       "the range is from 46 to 45 where control.f_min = 4"));
