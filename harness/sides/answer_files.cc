@@ -31,9 +31,9 @@ Eigen::Map<const VectorXd> MapRow(const NpyArray& array, long sample) {
 
 SideLayout ReadLayout(const std::filesystem::path& path, const RobotDescription& robot) {
   if (!std::filesystem::exists(path)) return SideLayout(robot);
-  const Json json = Json::parse(ReadBytes(path), nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object()) throw InputError(path.string() + ": must be a JSON object");
-  return {robot, json, path.string()};
+  const std::optional<Json> json = ParseAnswer(ReadBytes(path));
+  if (!json) throw InputError(path.string() + ": must be a JSON object");
+  return {robot, *json, path.string()};
 }
 
 }  // namespace
@@ -123,8 +123,9 @@ void AnswerFiles::ReadLines(const std::filesystem::path& path) {
   for (std::string line; std::getline(text, line);) {
     const std::string source = path.string() + ":" + std::to_string(++number);
     if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
-    const Json json = Json::parse(line, nullptr, /*allow_exceptions=*/false);
-    if (!json.is_object()) throw InputError(source + ": must be a JSON object (NaN and Infinity are none)");
+    const std::optional<Json> parsed = ParseAnswer(line);
+    if (!parsed) throw InputError(source + ": must be a JSON object (NaN and Infinity are none)");
+    const Json& json = *parsed;
     // Without ids the lines are in the order of the states.
     const Json id = json.value("id", Json(number - 1));
     if (!id.is_number_integer() || id < 0 || id >= count_) {

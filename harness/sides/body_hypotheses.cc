@@ -64,11 +64,12 @@ class BodySearch {
     return CompareBodies(body, bodies_[i].right, length_).largest() <= tolerance_;
   }
 
-  /// Whether the link is right with the mistake undone, as a whole or in each of its parts.
-  [[nodiscard]] bool Explains(const BodyMistake& mistake, size_t i) const {
+  /// Whether the link is right with the mistake undone, as a whole or in each of its parts, of which as many
+  /// must show it: what one link's one part explains is a mistake of that part.
+  [[nodiscard]] bool Explains(const BodyMistake& mistake, size_t i, int fewest_parts) const {
     const std::optional<MassProperties> undone = mistake.undo(bodies_[i]);
     if (undone && IsRight(i, *undone)) return true;
-    const std::optional<MassProperties> in_parts = UndoInAllParts(mistake, bodies_[i]);
+    const std::optional<MassProperties> in_parts = UndoInAllParts(mistake, bodies_[i], fewest_parts);
     return in_parts && IsRight(i, *in_parts);
   }
 
@@ -113,7 +114,7 @@ class BodySearch {
       for (const BodyMistake& mistake : mistakes) {
         std::vector<size_t> links;
         for (const size_t i : open) {
-          if (Explains(mistake, i)) links.push_back(i);
+          if (Explains(mistake, i, fewest > 1 ? 1 : 2)) links.push_back(i);
         }
         if (links.size() <= best.size()) continue;
         best = links;

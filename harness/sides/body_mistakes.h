@@ -43,7 +43,9 @@ std::vector<BodyMistake> ListBodyMistakes();
 /// its part "hand" looks as if given about the link's origin ...'. Nothing when none does.
 std::optional<std::string> DescribePartMistake(const ComparedBody& body, double length, double tolerance);
 
-/// The body when the mistake was made in each of its parts; nothing when it is not several parts.
-std::optional<MassProperties> UndoInAllParts(const BodyMistake& mistake, const ComparedBody& body);
+/// The body when the mistake was made in each of its parts; nothing when it is not several parts, or when it
+/// shows in fewer of them.
+std::optional<MassProperties> UndoInAllParts(const BodyMistake& mistake, const ComparedBody& body,
+                                             int fewest_parts);
 
 }  // namespace dexcheck

@@ -129,17 +129,21 @@ std::optional<std::string> DescribePartMistake(const ComparedBody& body, double 
   return std::nullopt;
 }
 
-std::optional<MassProperties> UndoInAllParts(const BodyMistake& mistake, const ComparedBody& body) {
-  if (body.given_parts.size() < 2) return std::nullopt;
-  std::vector<MassProperties> undone;
+std::optional<MassProperties> UndoInAllParts(const BodyMistake& mistake, const ComparedBody& body,
+                                             int fewest_parts) {
   std::vector<ComparedPart> parts;
   AddParts(body, /*of_given=*/true, &parts);
-  if (parts.size() != body.given_parts.size()) return std::nullopt;
+  if (parts.empty() || parts.size() != body.given_parts.size()) return std::nullopt;
+  constexpr double kVisible = 1e-9;
+  std::vector<MassProperties> undone;
+  int changed = 0;
   for (const ComparedPart& part : parts) {
     const std::optional<MassProperties> one = mistake.undo(part.body);
     if (!one) return std::nullopt;
+    changed += CompareBodies(*one, part.body.given, 1.0).largest() > kVisible ? 1 : 0;
     undone.push_back(ExpressIn(*one, part.body.X_PL));
   }
+  if (changed < fewest_parts) return std::nullopt;
   return Combine(undone);
 }
 

@@ -57,19 +57,13 @@ ProgramSide::ProgramSide(const std::string& command, const RobotDescription& rob
 
 Json ProgramSide::Ask(const OrderedJson& request) {
   const std::string line = process_.Ask(request.dump(-1, ' ', false, OrderedJson::error_handler_t::replace));
-  // Answers have three brackets inside each other; what nests deeper would be freed by recursion.
-  constexpr int kMaxDepth = 32;
-  bool is_deep = false;
-  const auto check = [&](int depth, Json::parse_event_t, const Json&) {
-    is_deep = is_deep || depth > kMaxDepth;
-    return !is_deep;
-  };
-  Json answer = Json::parse(line, check, /*allow_exceptions=*/false);
-  if (is_deep || answer.is_discarded() || !answer.is_object()) {
+  const std::optional<Json> parsed = ParseAnswer(line);
+  if (!parsed) {
     throw InputError(source_ +
                      ": must answer with a JSON object on one line (NaN and Infinity are none), got " +
                      Quote(line));
   }
+  const Json& answer = *parsed;
   if (answer.contains("error")) {
     const Json& error = answer.at("error");
     throw ProgramError(source_ +

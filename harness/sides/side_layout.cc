@@ -221,6 +221,19 @@ void SideLayout::ReadTerms(const VectorXd& q, const VectorXd& xi, SideTerms* ter
   BaseConversion(convention_).Restore(q, own, terms);
 }
 
+std::optional<Json> ParseAnswer(std::string_view text) {
+  // Answers have three brackets inside each other; what nests deeper would be freed by recursion.
+  constexpr int kMaxDepth = 32;
+  bool is_deep = false;
+  const auto check = [&](int depth, Json::parse_event_t, const Json&) {
+    is_deep = is_deep || depth > kMaxDepth;
+    return !is_deep;
+  };
+  Json answer = Json::parse(text, check, /*allow_exceptions=*/false);
+  if (is_deep || !answer.is_object()) return std::nullopt;
+  return answer;
+}
+
 SideTerms ReadSideTerms(const Json& json, const SideLayout& layout, const VectorXd& v,
                         const std::string& source) {
   const Eigen::Index n = layout.size();

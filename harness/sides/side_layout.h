@@ -3,7 +3,9 @@
 // In which order, and by which convention, another program writes the coordinates of a robot.
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -80,6 +82,10 @@ class AnsweringSide : public TermSide {
  private:
   SideLayout layout_;
 };
+
+/// A program's answer, which is one JSON object; none where the text is anything else or nests deeper than
+/// answers do.
+std::optional<nlohmann::json> ParseAnswer(std::string_view text);
 
 /// Terms from the keys M (n x n), C (n x n) or c = C v (n), g (n), h = c + g (n), friction (n),
 /// kinetic_energy, potential_energy; at least one. n is the layout's size, v the velocity as the side has it.

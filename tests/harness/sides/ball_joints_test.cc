@@ -31,7 +31,7 @@ using testing::MatrixNear;
 
 ConsistencyOptions Few() {
   ConsistencyOptions options;
-  options.samples = 20;
+  options.samples = 10;
   return options;
 }
 
@@ -71,7 +71,7 @@ RobotSpec MakeRobot(BaseType base, std::mt19937* random) {
 TEST(BallJoints, RandomRobotsAgree) {
   std::mt19937 random(17);
   for (const BaseType base : {BaseType::kFixed, BaseType::kFloating, BaseType::kPlanar}) {
-    for (int index = 0; index < 4; ++index) {
+    for (int index = 0; index < 2; ++index) {
       const RobotSpec spec = MakeRobot(base, &random);
       const RobotModel model(spec);
       EXPECT_EQ(model.num_positions(), model.num_base_positions() + model.num_joints() + model.num_balls());
@@ -266,7 +266,7 @@ TEST(BallJoints, ALayoutHasFourPositionsAndThreeVelocities) {
   terms.gravity = layout.WriteVelocities(q, xi);
   layout.ReadTerms(q, xi, &terms);
   EXPECT_EQ(terms.gravity, xi);
-  EXPECT_EQ(layout.ToJson().at("joints"), json.at("joints"));
+  EXPECT_EQ(layout.ToJson().at("joints").dump(), json.at("joints").dump());
 }
 
 TEST(BallJoints, TablesAreRefusedWithAReason) {

@@ -1,0 +1,62 @@
+// What programs answer: any bytes are arrays, terms of the right sizes, or an InputError that names the file.
+
+#include "controller/common/errors.h"
+#include "harness/sides/npy_file.h"
+#include "harness/sides/npz_file.h"
+#include "harness/sides/side_layout.h"
+#include "harness/sides/urdf_reader.h"
+#include "tests/fuzz/fuzz_target.h"
+
+namespace dexcheck::fuzz {
+namespace {
+
+constexpr std::string_view kArm = R"(<robot name="arm"><link name="stand"/>
+<link name="upper"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="lower"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="a" type="continuous"><parent link="stand"/><child link="upper"/><axis xyz="0 0 1"/></joint>
+<joint name="b" type="continuous"><parent link="upper"/><child link="lower"/><axis xyz="0 1 0"/></joint></robot>)";
+
+void ExpectWhole(const NpyArray& array) {
+  size_t count = 1;
+  for (const size_t size : array.shape) count *= size;
+  Expect(count == array.values.size(), "an array without all its numbers");
+}
+
+/// Reads with `read`, whose errors must name `source`.
+template <typename Read>
+void Try(std::string_view source, const Read& read) {
+  try {
+    read();
+  } catch (const InputError& error) {
+    ExpectGoodMessage(error.what(), source);
+  }
+}
+
+void ReadTerms(std::string_view text) {
+  static const RobotDescription robot = ParseUrdf(kArm, "arm.urdf");
+  const std::optional<nlohmann::json> answer = ParseAnswer(text);
+  if (!answer) return;
+  Try("answer:", [&] {
+    const SideLayout layout(robot, *answer, "answer");
+    SideTerms terms = ReadSideTerms(*answer, layout, VectorXd::Ones(layout.size()), "answer");
+    layout.ReadTerms(VectorXd::Zero(2), VectorXd::Zero(2), &terms);
+    Expect(terms.M.size() == 0 || (terms.M.rows() == 2 && terms.M.cols() == 2), "M");
+    for (const VectorXd* force : {&terms.coriolis, &terms.gravity, &terms.bias, &terms.friction})
+      Expect(force->size() == 0 || force->size() == 2, "forces");
+  });
+}
+
+}  // namespace
+}  // namespace dexcheck::fuzz
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace dexcheck::fuzz;
+  const std::string_view bytes = AsText(data, size);
+  Try("M.npy:", [&] { ExpectWhole(dexcheck::ParseNpy(bytes, "M.npy")); });
+  Try("answers.npz:", [&] {
+    for (const auto& [name, member] : dexcheck::ReadNpz(bytes, "answers.npz"))
+      Try("M.npy:", [&] { ExpectWhole(dexcheck::ParseNpy(member, "M.npy")); });
+  });
+  ReadTerms(bytes);
+  return 0;
+}

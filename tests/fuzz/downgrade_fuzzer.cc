@@ -1,0 +1,18 @@
+// DowngradeMjcf: any text becomes a copy that needs no further change, or an InputError that names the file.
+
+#include "controller/common/errors.h"
+#include "harness/engine/newer_mjcf.h"
+#include "tests/fuzz/fuzz_target.h"
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace dexcheck::fuzz;
+  try {
+    const dexcheck::DowngradedMjcf once = dexcheck::DowngradeMjcf(AsText(data, size), "robot.xml");
+    for (const dexcheck::MjcfChange& change : once.changes) Expect(change.line >= 0, "a line below zero");
+    const dexcheck::DowngradedMjcf twice = dexcheck::DowngradeMjcf(once.text, "robot.xml");
+    Expect(twice.changes.empty(), "a copy that is not for 2.2.2", once.text);
+  } catch (const dexcheck::InputError& error) {
+    ExpectGoodMessage(error.what(), "robot.xml");
+  }
+  return 0;
+}
