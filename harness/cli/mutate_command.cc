@@ -259,10 +259,11 @@ void AddMutateCommand(Command app) {
                      .TypeName("X")
                      .Check(CheckScale)
                      .ShowDefault();
-  Option run = command
-                   .AddOption("--run", &request->run.scenario,
-                              "Make mistakes in a run of this scenario instead: numbers, laws, plants")
-                   .TypeName("SCENARIO");
+  Option run =
+      command
+          .AddOption("--run", &request->run.scenario,
+                     "Make mistakes in a run of this scenario instead: numbers, equations, laws, plants")
+          .TypeName("SCENARIO");
   command.AddOption("--set", &request->run.overrides, "Set a key of the scenario, as `dexcheck run` does")
       .TypeName("KEY=VALUE")
       .Repeatable()
@@ -295,7 +296,8 @@ void AddMutateCommand(Command app) {
   robot.Excludes(run);
   Option smallest = command.AddFlag(
       "--smallest", &request->run.smallest,
-      "In a run: how small an error of each number the balances find, and how well it moves everything");
+      "In a run: how small an error of each number balance, prediction and law find, and how well it moves "
+      "everything");
   smallest.Needs(run);
   for (Option option : {from, duration, mistakes, scale}) option.Excludes(smallest);
   samples.Excludes(run);

@@ -19,34 +19,48 @@ namespace {
 constexpr int kStates = 24;
 constexpr double kGood = 1e-3;  // an error that should be found
 
-/// A line of the table: the numbers of one quantity.
+/// One question's column: what of the numbers it finds.
+struct Column {
+  const char* name;
+  double (*smallest)(const Detectability&);
+};
+
+constexpr Column kColumns[] = {
+    {"balance", [](const Detectability& number) { return std::min(number.robot, number.object); }},
+    {"prediction", [](const Detectability& number) { return number.prediction; }},
+    {"law", [](const Detectability& number) { return number.law; }},
+};
+
+/// A line of the table: the numbers of one quantity, by one question.
 struct Row {
-  std::string quantity;
   int numbers = 0, shown = 0, good = 0;
-  double median = 0.0;
   std::vector<double> errors;
 };
 
-double Smallest(const Detectability& number) { return std::min(number.robot, number.object); }
-
-std::vector<Row> SumUp(const DetectabilityResult& result) {
-  std::vector<Row> rows;
+/// By quantity, in the order in which they come.
+std::vector<std::string> ListQuantities(const DetectabilityResult& result) {
+  std::vector<std::string> quantities;
   for (const Detectability& number : result.numbers) {
-    auto row =
-        std::find_if(rows.begin(), rows.end(), [&](const Row& r) { return r.quantity == number.quantity; });
-    if (row == rows.end()) {
-      row = rows.insert(rows.end(), Row{});
-      row->quantity = number.quantity;
-    }
-    ++row->numbers;
-    const double error = Smallest(number);
-    if (!std::isfinite(error)) continue;
-    ++row->shown;
-    row->good += error <= kGood ? 1 : 0;
-    row->errors.push_back(error);
+    if (std::find(quantities.begin(), quantities.end(), number.quantity) == quantities.end())
+      quantities.push_back(number.quantity);
   }
-  for (Row& row : rows) std::sort(row.errors.begin(), row.errors.end());
-  return rows;
+  return quantities;
+}
+
+/// @param quantity empty for all.
+Row SumUp(const DetectabilityResult& result, const std::string& quantity, const Column& column) {
+  Row row;
+  for (const Detectability& number : result.numbers) {
+    if (!quantity.empty() && number.quantity != quantity) continue;
+    ++row.numbers;
+    const double error = column.smallest(number);
+    if (!std::isfinite(error)) continue;
+    ++row.shown;
+    row.good += error <= kGood ? 1 : 0;
+    row.errors.push_back(error);
+  }
+  std::sort(row.errors.begin(), row.errors.end());
+  return row;
 }
 
 Json ToJson(double error) { return std::isfinite(error) ? Json(error) : Json(nullptr); }
@@ -64,29 +78,33 @@ std::string ToText(const MutateRunRequest& request, const DetectabilityResult& r
     json["numbers"].push_back({{"name", number.name},
                                {"quantity", number.quantity},
                                {"balance_robot", ToJson(number.robot)},
-                               {"balance_object", ToJson(number.object)}});
+                               {"balance_object", ToJson(number.object)},
+                               {"prediction", ToJson(number.prediction)},
+                               {"law", ToJson(number.law)}});
   }
   return json.dump(2) + "\n";
 }
 
 void Print(const DetectabilityResult& result) {
-  fmt::print("smallest relative error that fails a balance\n\n{:<24}{:>9}{:>9}{:>11}{:>12}{:>12}{:>12}\n",
-             "quantity", "numbers", "shown", "to 0.1 %", "best", "median", "worst");
-  int numbers = 0, shown = 0, good = 0;
-  for (const Row& row : SumUp(result)) {
-    numbers += row.numbers;
-    shown += row.shown;
-    good += row.good;
-    fmt::print("{:<24}{:>9}{:>9}{:>11}", row.quantity, row.numbers, row.shown, row.good);
-    if (!row.errors.empty()) {
-      fmt::print("{:>12.1e}{:>12.1e}{:>12.1e}", row.errors.front(), row.errors[row.errors.size() / 2],
-                 row.errors.back());
+  std::vector<std::string> quantities = ListQuantities(result);
+  quantities.emplace_back();  // all
+  for (const Column& column : kColumns) {
+    fmt::print("smallest relative error that fails by {} alone\n\n{:<24}{:>9}{:>9}{:>11}{:>12}{:>12}{:>12}\n",
+               column.name, "quantity", "numbers", "shown", "to 0.1 %", "best", "median", "worst");
+    for (const std::string& quantity : quantities) {
+      const Row row = SumUp(result, quantity, column);
+      fmt::print("{:<24}{:>9}{:>9}{:>11}", quantity.empty() ? "all" : quantity, row.numbers, row.shown,
+                 row.good);
+      if (!row.errors.empty() && !quantity.empty()) {
+        fmt::print("{:>12.1e}{:>12.1e}{:>12.1e}", row.errors.front(), row.errors[row.errors.size() / 2],
+                   row.errors.back());
+      }
+      fmt::print("\n");
     }
     fmt::print("\n");
   }
-  fmt::print("{:<24}{:>9}{:>9}{:>11}\n\n", "all", numbers, shown, good);
-  fmt::print("{} combinations of numbers show; singular values from {:.2e} to {:.2e}.\n", result.rank,
-             result.smallest_singular_value, result.largest_singular_value);
+  fmt::print("{} combinations of numbers show in the balances; singular values from {:.2e} to {:.2e}.\n",
+             result.rank, result.smallest_singular_value, result.largest_singular_value);
 }
 
 }  // namespace

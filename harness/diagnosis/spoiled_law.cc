@@ -128,6 +128,11 @@ void SpoiledLaw::Step(const Reading& reading, double t, Command* command) {
   command->force_solves = 0;
   command->desired = TrajectoryController::EvaluateDesired(*motion_, t, time_step_);
   model_.SetState(reading.state);
+  if (has_begun_ && spoil_ != nullptr) {
+    const SpoiledTerms terms(&model_, reading.state);
+    spoil_(terms);
+    terms.Finish();
+  }
   if (steps_until_due_ > 0) {
     --steps_until_due_;
     return;

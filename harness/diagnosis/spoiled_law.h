@@ -11,6 +11,7 @@
 #include "controller/control/grasp_controller.h"
 #include "controller/control/pseudoinverse.h"
 #include "harness/checks/law_reference.h"
+#include "harness/diagnosis/spoiled_terms.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
@@ -53,6 +54,10 @@ class SpoiledLaw final : public Controller {
  public:
   /// @param setup of a scenario that is no task; outlives this.
   SpoiledLaw(const Setup& setup, LawMistake mistake);
+  /// The right law, from terms of which one equation is wrong.
+  SpoiledLaw(const Setup& setup, const EquationMistake& mistake) : SpoiledLaw(setup, LawMistake{}) {
+    spoil_ = mistake.spoil;
+  }
 
   void Follow(const Trajectory& motion) override;
   void Begin(double t, const Reading& reading) override;
@@ -74,6 +79,7 @@ class SpoiledLaw final : public Controller {
 
   GraspControllerOptions options_;
   LawMistake mistake_;
+  void (*spoil_)(const SpoiledTerms&) = nullptr;
   GraspModel model_;
   ActuationMap actuation_;
   Pseudoinverse J_pinv_, G_pinv_;

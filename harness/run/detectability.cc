@@ -5,9 +5,16 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <utility>
 
 #include "controller/common/text.h"
 #include "controller/contact/object_surface.h"
+#include "controller/control/computed_torque.h"
+#include "controller/control/constrained_dynamics.h"
+#include "controller/control/joint_law.h"
+#include "harness/checks/bounds.h"
+#include "harness/checks/contact_give.h"
 
 namespace dexcheck {
 namespace {
@@ -22,37 +29,112 @@ struct Sample {
   MeasuredState state;
   VectorXd xi_dot, f_c;
   Vector6d V_Bo_dot;
-  double scale = 1.0;         // |C_bar' xi + F_bar'|_M^-1
-  double object_scale = 1.0;  // N
-  RowMatrixXd half_inverse;   // L^-T
+  VectorXd tau, F_N;
+  DesiredMotion desired;
+  DesiredJoints joints;
+  double scale = 1.0;                          // |C_bar' xi + F_bar'|_M^-1
+  double object_scale = 1.0;                   // N
+  double motion_give = 0.0, force_give = 0.0;  // what contacts that give are allowed above the bounds
+  RowMatrixXd half_inverse;                    // L^-T
+  MatrixXd M;
 };
 
-/// What is left of (48) and (19).
-struct Residual {
-  VectorXd robot;
-  Vector6d object;
+/// What a model says at that instant.
+struct Answer {
+  VectorXd robot;          // left of (48)
+  Vector6d object;         // left of (19)
+  VectorXd xi_dot, f_c;    // predicted
+  VectorXd law;            // E_bar' tau' of the law
+  double condition = 1.0;  // number of J_B'
 };
 
-Residual CalcResidual(GraspModel* model, const Sample& sample) {
-  model->SetState(sample.state);
-  const ModelTerms& robot = model->robot();
-  const GraspTerms& grasp = model->grasp();
-  const ObjectBodyTerms& body = grasp.body();
-  return {robot.M() * sample.xi_dot + robot.C() * sample.state.xi + robot.gravity() + robot.friction() +
-              grasp.J_B().transpose() * sample.f_c,
-          body.M_hat * sample.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o - grasp.G() * sample.f_c};
-}
-
-/// A model with its own grasp.
-struct ChangedModel {
+/// A model with all that a run makes of it.
+class Asked {
+ public:
   /// @throws InputError when there is no such robot.
-  ChangedModel(const Setup& setup, RobotSpec spec)
-      : robot(std::move(spec)),
-        surface(MakeSurface(robot.object()->shape)),
-        grasp(robot, setup.fingertips(), robot.object()->body, *surface, setup.MakeControllerOptions()) {}
-  RobotModel robot;
-  std::unique_ptr<Surface> surface;
-  GraspModel grasp;
+  Asked(const Setup& setup, RobotSpec spec)
+      : robot_(std::move(spec)),
+        surface_(robot_.object() ? MakeSurface(robot_.object()->shape) : nullptr),
+        options_(setup.MakeControllerOptions()),
+        grasp_(robot_, setup.fingertips(), robot_.object() ? robot_.object()->body : setup.object().body,
+               surface_ ? *surface_ : setup.surface(), MakeOptions(setup)),
+        dynamics_(robot_, static_cast<int>(setup.fingertips().size())),
+        actuation_(robot_) {
+    if (setup.joint_motion() != nullptr) {
+      joint_law_.emplace(robot_, setup.scenario().control.law, setup.joint_gains());
+    } else if (options_.law == ControlLaw::kComputedTorque) {
+      law_.emplace(robot_, static_cast<int>(setup.fingertips().size()), options_.weight);
+    }
+  }
+
+  [[nodiscard]] const GraspTerms& grasp() const { return grasp_.grasp(); }
+
+  Answer Ask(const Sample& sample) {
+    grasp_.SetState(sample.state);
+    const ModelTerms& robot = grasp_.robot();
+    const GraspTerms& grasp = grasp_.grasp();
+    const ObjectBodyTerms& body = grasp.body();
+    Answer answer;
+    answer.robot = robot.M() * sample.xi_dot + robot.C() * sample.state.xi + robot.gravity() +
+                   robot.friction() - Push(sample.tau);
+    answer.object = body.M_hat * sample.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o;
+    if (grasp.num_contacts() > 0) {
+      answer.robot += grasp.J_B().transpose() * sample.f_c;
+      answer.object -= grasp.G() * sample.f_c;
+      const Prediction& prediction = dynamics_.Predict(robot, grasp, Push(sample.tau));
+      answer.xi_dot = prediction.xi_dot;
+      answer.f_c = prediction.f_c;
+    } else {
+      answer.xi_dot = dynamics_.PredictFree(robot, Push(sample.tau)).xi_dot;
+    }
+    if (joint_law_) {
+      answer.law = Push(joint_law_->CalcTorque(robot, sample.state.q, sample.state.xi, sample.joints));
+    } else if (law_) {
+      VectorXd sigma_prime(robot.size());
+      options_.posture.CalcAcceleration(sample.state.q, sample.state.xi, sigma_prime);
+      law_->SetDemand(robot, grasp,
+                      CalcTrackingAcceleration(options_.gains, options_.orientation, grasp, sample.desired),
+                      sigma_prime);
+      answer.law = Push(law_->CalcTorque(grasp, sample.F_N));
+      answer.condition = CalcConditionNumber();
+    }
+    return answer;
+  }
+
+ private:
+  /// Of a robot that holds nothing, without X_o.
+  static GraspModelOptions MakeOptions(const Setup& setup) {
+    GraspModelOptions options = setup.MakeControllerOptions();
+    if (setup.joint_motion() != nullptr) options.orientation = OrientationFeedback::kRotation;
+    return options;
+  }
+  /// E_bar' tau' (n).
+  [[nodiscard]] VectorXd Push(const VectorXd& tau) const {
+    VectorXd force(tau.size());
+    actuation_.CalcForce(tau, force);
+    return force;
+  }
+  /// As LawReference: sqrt(trace A) |A^-1/2| of A = J_B' W^-1 J_B'^T.
+  [[nodiscard]] double CalcConditionNumber() const {
+    const MatrixXd& J = grasp_.grasp().J_B();
+    MatrixXd W_inv_J_T = J.transpose();
+    if (options_.weight.kind == RedundancyWeight::Kind::kDiagonal) {
+      W_inv_J_T = options_.weight.w.cwiseInverse().asDiagonal() * W_inv_J_T;
+    } else if (options_.weight.kind == RedundancyWeight::Kind::kMass) {
+      W_inv_J_T = grasp_.robot().M().llt().solve(W_inv_J_T);
+    }
+    const MatrixXd A = J * W_inv_J_T;
+    return std::sqrt(A.trace() * A.llt().solve(MatrixXd::Identity(A.rows(), A.cols())).trace());
+  }
+
+  RobotModel robot_;
+  std::unique_ptr<Surface> surface_;
+  GraspControllerOptions options_;
+  GraspModel grasp_;
+  ConstrainedDynamics dynamics_;
+  ActuationMap actuation_;
+  std::optional<ComputedTorque> law_;
+  std::optional<JointLaw> joint_law_;
 };
 
 std::vector<Sample> TakeSamples(const Setup& setup, int states) {
@@ -60,33 +142,76 @@ std::vector<Sample> TakeSamples(const Setup& setup, int states) {
   Runner runner(setup, /*check=*/true);
   const long every = std::max(1L, runner.loop().num_steps() / states);
   TreeFactor factor(setup.model());
+  PredictionGive give(setup);
+  const ActuationMap actuation(setup.model());
+  VectorXd force(setup.model().num_velocities()), work;
   const double weight = setup.object().body.mass * setup.model().gravity().norm();
   const RunResult& result = runner.Run(
       [&](const StepRecord& step) {
+        // What contacts give is followed from step to step, as StepChecks does.
+        const ModelTerms& robot = step.model->robot();
+        factor.Compute(robot.M());
+        const VectorXd balanced = robot.C() * step.reading.state.xi + robot.gravity() + robot.friction();
+        actuation.CalcForce(step.command.tau, force);
+        force = balanced - force;
+        const auto norm = [&](const VectorXd& f) { return factor.CalcForceNorm(f, &work); };
+        give.Follow(step, force, step.findings.f_c_model, /*uneven=*/0.0, norm);
         if (step.step % every != 0) return;
         Sample& sample = samples.emplace_back();
         sample.state = step.reading.state;
         sample.xi_dot = step.response.xi_dot;
         sample.V_Bo_dot = step.response.V_Bo_dot;
         sample.f_c = step.findings.f_c;
-        const ModelTerms& robot = step.model->robot();
-        factor.Compute(robot.M());
+        sample.tau = step.command.tau;
+        sample.F_N = step.command.demand.F_N;
+        sample.desired = step.command.desired;
+        sample.joints = step.command.joints;
+        sample.M = robot.M();
         const Eigen::Index n = sample.xi_dot.size();
         sample.half_inverse = RowMatrixXd::Identity(n, n);
         factor.SolveTransposedColumns(sample.half_inverse);
-        sample.scale =
-            (sample.half_inverse * (robot.C() * sample.state.xi + robot.gravity() + robot.friction())).norm();
+        sample.scale = norm(balanced);
         sample.object_scale = std::max(weight, sample.f_c.norm());
+        sample.motion_give = give.motion() / sample.scale;
+        sample.force_give = sample.f_c.size() > 0 ? give.force() / sample.f_c.norm() : 0.0;
       },
       [] { return false; });
   if (!result.failure.empty()) throw InputError(setup.scenario().source + ": " + result.failure);
   return samples;
 }
 
-/// Bound over what a whole unit of error leaves; infinity where that is rounding.
-double SmallestError(double bound, double left) {
-  constexpr double kNothing = 1e-9;
-  return left > kNothing ? bound / left : std::numeric_limits<double>::infinity();
+/// Makes `smallest` the error of which `bound` is left, where that is less; `left` of a whole unit of error.
+void Lower(double bound, double left, double* smallest) {
+  constexpr double kNothing = 1e-9;  // what rounding leaves
+  if (left > kNothing) *smallest = std::min(*smallest, bound / left);
+}
+
+/// What is compared with the bounds of the questions.
+struct Bounds {
+  double robot, object, motion, force, law;
+};
+
+/// To first order, what an error that changes the answers so at one instant fails. @param share of a unit of
+/// error that was made. @param arm m. @param left robot's residual, |.|_M^-1 relative.
+void LowerAll(const Sample& sample, const Answer& right, const Answer& wrong, const Bounds& bounds,
+              double share, double arm, Detectability* number, VectorXd* left) {
+  *left = sample.half_inverse * (wrong.robot - right.robot) / (share * sample.scale);
+  Lower(bounds.robot, left->norm(), &number->robot);
+  const Vector6d wrench = wrong.object - right.object;
+  Lower(bounds.object,
+        std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) / (share * sample.object_scale),
+        &number->object);
+  // |a|_M
+  const VectorXd apart = wrong.xi_dot - right.xi_dot;
+  const double motion = std::sqrt(std::max(0.0, apart.dot(sample.M * apart))) / (share * sample.scale);
+  Lower(bounds.motion + sample.motion_give, motion, &number->prediction);
+  if (right.f_c.size() > 0) {
+    const double force = (wrong.f_c - right.f_c).norm() / (share * sample.f_c.norm());
+    Lower(bounds.force + sample.force_give, force, &number->prediction);
+  }
+  if (right.law.size() == 0) return;
+  const double torque = (sample.half_inverse * (wrong.law - right.law)).norm() / (share * sample.scale);
+  Lower(bounds.law, torque / right.condition, &number->law);
 }
 
 }  // namespace
@@ -97,48 +222,45 @@ DetectabilityResult FindDetectability(const Setup& setup, int states,
   const std::vector<Sample> samples = TakeSamples(setup, states);
   const RobotSpec& spec = setup.model().spec();
   const std::vector<Parameter> numbers = ListParameters(spec);
-  GraspModel right(setup.model(), setup.fingertips(), setup.object().body, setup.surface(),
-                   setup.MakeControllerOptions());
-  std::vector<Residual> residuals;
-  for (const Sample& sample : samples) residuals.push_back(CalcResidual(&right, sample));
-  const double arm = right.grasp().contacts()[0].geometry.g_o_cf.translation().norm();
+  Asked right(setup, spec);
+  std::vector<Answer> answers;
+  for (const Sample& sample : samples) answers.push_back(right.Ask(sample));
+  const bool holds = right.grasp().num_contacts() > 0;
+  const double arm = holds ? right.grasp().contacts()[0].geometry.g_o_cf.translation().norm() : 1.0;
 
   DetectabilityResult result;
-  const auto bound = [](StepCheck which) { return kStepChecks[static_cast<size_t>(which)].bound; };
+  const auto bound = [&](StepCheck which) {
+    return CalcBound(kStepChecks[static_cast<size_t>(which)], setup.scenario());
+  };
+  const Bounds bounds{bound(StepCheck::kBalanceRobot), bound(StepCheck::kBalanceObject),
+                      bound(StepCheck::kReducedAcceleration), bound(StepCheck::kContactForce),
+                      bound(StepCheck::kLawTorque)};
   const auto rows = static_cast<Eigen::Index>(samples.size()) * setup.model().num_velocities();
   MatrixXd regressor = MatrixXd::Zero(rows, static_cast<Eigen::Index>(numbers.size()));
   for (size_t k = 0; k < numbers.size(); ++k) {
     if (!go_on(k, numbers.size())) break;
     const double value = GetValue(spec, numbers[k]);
     double change = kStep * GetScale(spec, numbers[k]);
-    std::unique_ptr<ChangedModel> changed;
+    std::unique_ptr<Asked> changed;
     for (int side = 0; side < 2 && !changed; ++side) {
       RobotSpec wrong = spec;
       SetValue(&wrong, numbers[k], value + change);
       try {
-        changed = std::make_unique<ChangedModel>(setup, std::move(wrong));
+        changed = std::make_unique<Asked>(setup, std::move(wrong));
       } catch (const InputError&) {
         change = -change;
       }
     }
     if (!changed) continue;
-    double robot = 0.0, object = 0.0;
+    Detectability number{DescribePart(spec, numbers[k]) + ": " + DescribeQuantity(numbers[k]),
+                         DescribeGroup(numbers[k])};
+    VectorXd left;
     for (size_t i = 0; i < samples.size(); ++i) {
-      const Sample& sample = samples[i];
-      const Residual residual = CalcResidual(&changed->grasp, sample);
-      const VectorXd left =
-          sample.half_inverse * (residual.robot - residuals[i].robot) / (kStep * sample.scale);
+      LowerAll(samples[i], answers[i], changed->Ask(samples[i]), bounds, kStep, arm, &number, &left);
       const auto n = left.size();
       regressor.col(static_cast<Eigen::Index>(k)).segment(static_cast<Eigen::Index>(i) * n, n) = left;
-      robot = std::max(robot, left.norm());
-      const Vector6d wrench = residual.object - residuals[i].object;
-      object = std::max(object, std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) /
-                                    (kStep * sample.object_scale));
     }
-    result.numbers.push_back({DescribePart(spec, numbers[k]) + ": " + DescribeQuantity(numbers[k]),
-                              DescribeGroup(numbers[k]),
-                              SmallestError(bound(StepCheck::kBalanceRobot), robot),
-                              SmallestError(bound(StepCheck::kBalanceObject), object)});
+    result.numbers.push_back(std::move(number));
   }
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(regressor.transpose() * regressor,
                                                       Eigen::EigenvaluesOnly);

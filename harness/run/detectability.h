@@ -1,9 +1,11 @@
 #pragma once
 
 // How small an error of each number of the model may be and still be found in a run, without looking at the
-// model itself: by what it leaves of the balances.
+// model itself: by what it leaves of the balances, by what it predicts, by the torques that it makes of the
+// law.
 
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -16,9 +18,13 @@ namespace dexcheck {
 struct Detectability {
   std::string name;      ///< "link r_forearm: mass".
   std::string quantity;  ///< "mass".
-  double robot =
-      0.0;  ///< Smallest error that fails balance_robot, relative to GetScale; infinity where none does.
-  double object = 0.0;  ///< Likewise balance_object.
+  // Smallest error that fails each question by itself, relative to GetScale; infinity where none does.
+  double robot = kNever;       ///< balance_robot.
+  double object = kNever;      ///< balance_object.
+  double prediction = kNever;  ///< reduced_acceleration or contact_force.
+  double law = kNever;         ///< law_torque.
+
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
 };
 
 /// What a run says of the model's numbers.
@@ -31,8 +37,10 @@ struct DetectabilityResult {
   int rank = 0;
 };
 
-/// Runs a scenario and changes every number of the model at some of its states: what is left of (48) and (19)
-/// with the plant's accelerations and forces, to first order, against the bounds of the balances.
+/// Runs a scenario and changes every number of the model at some of its states: to first order, what is left
+/// of (48) and (19) with the plant's accelerations and forces; what (46), (48) predict under its torques; and
+/// what the law's torques are; each against the bound at that state, with what tilt and contacts that give
+/// are allowed there.
 /// @param states how many are looked at, evenly over the run.
 /// @throws InputError for a task; when the run fails. Stops early, with fewer numbers, when `go_on` says so
 /// after one.

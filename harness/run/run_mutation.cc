@@ -97,6 +97,13 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
                         .expected = Cause::kControlLaw,
                         .part = law.part == SIZE_MAX ? "" : ListLawParts()[law.part].name});
   }
+  if (options.equations && scenario.control.law == ControlLaw::kComputedTorque) {
+    equations_ = ListEquationMistakes(model, scenario.control.orientation == OrientationFeedback::kAngles);
+  }
+  for (const EquationMistake& equation : equations_) {
+    mutants_.push_back(
+        {.kind = "equation", .name = equation.name, .expected = Cause::kModel, .part = equation.check});
+  }
   if (options.plants) plants_ = ListPlantFaults();
   for (const PlantFault& fault : plants_)
     mutants_.push_back({.kind = fault.kind, .name = fault.name, .expected = fault.cause, .part = fault.part});
@@ -170,6 +177,24 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   return true;
 }
 
+bool RunCampaign::RunPlant(const PlantFault& fault, RunMutant* mutant,
+                           const std::function<bool()>& should_stop) {
+  std::unique_ptr<Setup> whole;
+  if (fault.from_start) {
+    Scenario scenario = MakeScenario(0.0, options_.from + options_.duration, 0.0);
+    scenario.settle = std::min(scenario.settle, kSettle);
+    whole = MakeSetup(scenario, nullptr);
+  }
+  const Setup& setup = fault.from_start ? *whole : *setup_;
+  LoopParts parts = MakeLoopParts(setup);
+  EnginePlant* const engine = FindEngine(parts);
+  if (!fault.from_start) engine->simulation().SetState(start_);
+  parts.plant.release();
+  parts.plant = std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault);
+  if (fault.sensors) parts.hidden_sensor_fault = fault.sensors(setup);
+  return RunLoop(setup, std::move(parts), mutant, should_stop);
+}
+
 bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
   RunMutant& mutant = mutants_[index];
   try {
@@ -182,24 +207,16 @@ bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
     }
     index -= parameters_.size();
     const bool is_law = index < laws_.size();
-    const bool from_start = !is_law && plants_[index - laws_.size()].from_start;
-    std::unique_ptr<Setup> whole;
-    if (from_start) {
-      Scenario scenario = MakeScenario(0.0, options_.from + options_.duration, 0.0);
-      scenario.settle = std::min(scenario.settle, kSettle);
-      whole = MakeSetup(scenario, nullptr);
-    }
-    const Setup& setup = from_start ? *whole : is_law ? *nudged_ : *setup_;
+    if (!is_law) index -= laws_.size();
+    const bool is_equation = !is_law && index < equations_.size();
+    if (!is_law && !is_equation) return RunPlant(plants_[index - equations_.size()], &mutant, should_stop);
+    const Setup& setup = is_law ? *nudged_ : *setup_;
     LoopParts parts = MakeLoopParts(setup);
-    EnginePlant* const engine = FindEngine(parts);
-    if (!from_start) engine->simulation().SetState(start_);
+    FindEngine(parts)->simulation().SetState(start_);
     if (is_law) {
       parts.controller = std::make_unique<SpoiledLaw>(setup, laws_[index]);
     } else {
-      const PlantFault& fault = plants_[index - laws_.size()];
-      parts.plant.release();
-      parts.plant = std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault);
-      if (fault.sensors) parts.hidden_sensor_fault = fault.sensors(setup);
+      parts.controller = std::make_unique<SpoiledLaw>(setup, equations_[index]);
     }
     return RunLoop(setup, std::move(parts), &mutant, should_stop);
   } catch (const InputError& error) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// Mistakes made on purpose in a run: wrong numbers of the model, wrong laws, wrong plants. Which of them do
-// the questions of a run find, and which cause do they name?
+// Mistakes made on purpose in a run: wrong numbers and equations of the model, wrong laws, wrong plants.
+// Which of them do the questions of a run find, and which cause do they name?
 
 #include <filesystem>
 #include <memory>
@@ -58,6 +58,7 @@ class RunCampaign {
   [[nodiscard]] std::unique_ptr<Setup> MakeSetup(const Scenario& scenario, const RobotModel* model) const;
   bool RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant,
                const std::function<bool()>& should_stop);
+  bool RunPlant(const PlantFault& fault, RunMutant* mutant, const std::function<bool()>& should_stop);
   void RequireNoMistakeToPass(const std::function<bool()>& should_stop);
 
   Scenario scenario_;
@@ -69,6 +70,7 @@ class RunCampaign {
   std::unique_ptr<Setup> nudged_;      // the same with an error that feedback has to answer
   std::vector<Parameter> parameters_;  // by mutant, those of numbers first
   std::vector<LawMistake> laws_;
+  std::vector<EquationMistake> equations_;
   std::vector<PlantFault> plants_;
   std::vector<RunMutant> mutants_;
 };

@@ -9,6 +9,7 @@ struct RunMutationOptions {
   int parameters = 40;    ///< Numbers of the model that are changed, evenly out of all of them.
   double scale = 1e-3;    ///< By how much, relative to GetScale.
   bool laws = true;
+  bool equations = true;
   bool plants = true;
 };
 

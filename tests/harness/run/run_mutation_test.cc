@@ -58,6 +58,7 @@ TEST(RunCampaign, FindsEveryWrongLawAndNamesThePart) {
   options.duration = 0.02;
   options.parameters = 0;
   options.plants = false;
+  options.equations = false;
   for (const char* scenario : {"curve", "exercise"}) {
     SCOPED_TRACE(scenario);
     RunCampaign campaign = MakeCampaign(options, scenario);
@@ -70,12 +71,31 @@ TEST(RunCampaign, FindsEveryWrongLawAndNamesThePart) {
   }
 }
 
+TEST(RunCampaign, FindsEveryWrongEquationAndNamesTheTerm) {
+  RunMutationOptions options;
+  options.from = 1.0;
+  options.duration = 0.01;
+  options.parameters = 0;
+  options.laws = false;
+  options.plants = false;
+  RunCampaign campaign = MakeCampaign(options, "exercise");
+  const Count equations = RunSome(&campaign, [](const RunMutant&) { return true; });
+  EXPECT_GE(equations.made, 28);
+  EXPECT_EQ(equations.killed, equations.made);
+  // With three wrong G's no contact forces hold the object: the law itself ends the run, before its terms are
+  // compared.
+  constexpr int kEndAtOnce = 3;
+  EXPECT_EQ(equations.cause, equations.made - kEndAtOnce);
+  EXPECT_EQ(equations.part, equations.made - kEndAtOnce);
+}
+
 TEST(RunCampaign, FindsFaultsOfPlantsAndTheirCauses) {
   RunMutationOptions options;
   options.from = 0.6;
   options.duration = 0.05;
   options.parameters = 3;
   options.laws = false;
+  options.equations = false;
   RunCampaign campaign = MakeCampaign(options);
   // Those that are there from the beginning take longest.
   const Count faults = RunSome(&campaign, [](const RunMutant& mutant) { return mutant.kind != "wheels"; });
