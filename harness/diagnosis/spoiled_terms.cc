@@ -106,25 +106,25 @@ void AddContacts(std::vector<EquationMistake>* list) {
   list->push_back({"G_dot with the wrong sign", "G_dot_T_V", [](const Terms& t) {
                      for (int i = 0; i < t.num_contacts(); ++i) t.G_dot(i) *= -1.0;
                    }});
-  list->push_back({"spin term dropped in (40)", "J_B_dot_xi", [](const Terms& t) {
+  list->push_back({"spin term dropped in (40)", "G_dot_T_V", [](const Terms& t) {
                      Roll(t, [](const ContactGeometry& contact, Vector6d V) {
                        V[5] = 0.0;
                        return CalcKappaDot(contact, V);
                      });
                    }});
-  list->push_back({"rolling about the wrong axis in (40)", "J_B_dot_xi", [](const Terms& t) {
+  list->push_back({"rolling about the wrong axis in (40)", "G_dot_T_V", [](const Terms& t) {
                      Roll(t, [](const ContactGeometry& contact, Vector6d V) {
                        std::swap(V[3], V[4]);
                        return CalcKappaDot(contact, V);
                      });
                    }});
-  list->push_back({"object's curvature not turned by psi in (40)", "J_B_dot_xi", [](const Terms& t) {
+  list->push_back({"object's curvature not turned by psi in (40)", "G_dot_T_V", [](const Terms& t) {
                      Roll(t, [](ContactGeometry contact, const Vector6d& V) {
                        contact.object.K = contact.R_psi * contact.object.K * contact.R_psi;
                        return CalcKappaDot(contact, V);
                      });
                    }});
-  list->push_back({"fingertip's torsion dropped in (40)", "J_B_dot_xi", [](const Terms& t) {
+  list->push_back({"fingertip's torsion dropped in (40)", "G_dot_T_V", [](const Terms& t) {
                      Roll(t, [](ContactGeometry contact, const Vector6d& V) {
                        contact.fingertip.T.setZero();
                        return CalcKappaDot(contact, V);

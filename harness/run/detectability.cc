@@ -14,6 +14,7 @@
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/joint_law.h"
 #include "harness/checks/bounds.h"
+#include "harness/checks/contact_give.h"
 
 namespace dexcheck {
 namespace {
@@ -31,10 +32,10 @@ struct Sample {
   VectorXd tau, F_N;
   DesiredMotion desired;
   DesiredJoints joints;
-  double scale = 1.0;         // |C_bar' xi + F_bar'|_M^-1
-  double object_scale = 1.0;  // N
-  double uneven = 0.0, motion_give = 0.0, force_give = 0.0;
-  RowMatrixXd half_inverse;  // L^-T
+  double scale = 1.0;                          // |C_bar' xi + F_bar'|_M^-1
+  double object_scale = 1.0;                   // N
+  double motion_give = 0.0, force_give = 0.0;  // what contacts that give are allowed above the bounds
+  RowMatrixXd half_inverse;                    // L^-T
   MatrixXd M;
 };
 
@@ -141,9 +142,20 @@ std::vector<Sample> TakeSamples(const Setup& setup, int states) {
   Runner runner(setup, /*check=*/true);
   const long every = std::max(1L, runner.loop().num_steps() / states);
   TreeFactor factor(setup.model());
+  PredictionGive give(setup);
+  const ActuationMap actuation(setup.model());
+  VectorXd force(setup.model().num_velocities()), work;
   const double weight = setup.object().body.mass * setup.model().gravity().norm();
   const RunResult& result = runner.Run(
       [&](const StepRecord& step) {
+        // What contacts give is followed from step to step, as StepChecks does.
+        const ModelTerms& robot = step.model->robot();
+        factor.Compute(robot.M());
+        const VectorXd balanced = robot.C() * step.reading.state.xi + robot.gravity() + robot.friction();
+        actuation.CalcForce(step.command.tau, force);
+        force = balanced - force;
+        const auto norm = [&](const VectorXd& f) { return factor.CalcForceNorm(f, &work); };
+        give.Follow(step, force, step.findings.f_c_model, /*uneven=*/0.0, norm);
         if (step.step % every != 0) return;
         Sample& sample = samples.emplace_back();
         sample.state = step.reading.state;
@@ -154,18 +166,14 @@ std::vector<Sample> TakeSamples(const Setup& setup, int states) {
         sample.F_N = step.command.demand.F_N;
         sample.desired = step.command.desired;
         sample.joints = step.command.joints;
-        sample.uneven = step.findings.uneven;
-        sample.motion_give = step.findings.motion_give;
-        sample.force_give = step.findings.force_give;
-        const ModelTerms& robot = step.model->robot();
         sample.M = robot.M();
-        factor.Compute(robot.M());
         const Eigen::Index n = sample.xi_dot.size();
         sample.half_inverse = RowMatrixXd::Identity(n, n);
         factor.SolveTransposedColumns(sample.half_inverse);
-        sample.scale =
-            (sample.half_inverse * (robot.C() * sample.state.xi + robot.gravity() + robot.friction())).norm();
+        sample.scale = norm(balanced);
         sample.object_scale = std::max(weight, sample.f_c.norm());
+        sample.motion_give = give.motion() / sample.scale;
+        sample.force_give = sample.f_c.size() > 0 ? give.force() / sample.f_c.norm() : 0.0;
       },
       [] { return false; });
   if (!result.failure.empty()) throw InputError(setup.scenario().source + ": " + result.failure);
@@ -188,7 +196,7 @@ struct Bounds {
 void LowerAll(const Sample& sample, const Answer& right, const Answer& wrong, const Bounds& bounds,
               double share, double arm, Detectability* number, VectorXd* left) {
   *left = sample.half_inverse * (wrong.robot - right.robot) / (share * sample.scale);
-  Lower(bounds.robot + sample.uneven, left->norm(), &number->robot);
+  Lower(bounds.robot, left->norm(), &number->robot);
   const Vector6d wrench = wrong.object - right.object;
   Lower(bounds.object,
         std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) / (share * sample.object_scale),
