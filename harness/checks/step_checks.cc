@@ -254,21 +254,18 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   solver_of_robot_ = step.response.solver_force.size() > 0 ? Norm(step.response.solver_force) / scale_ : 0.0;
   bias_ -= force_;
   const double uneven = CalcUnevenForce(step);
-  findings_.uneven = uneven / scale_;
   give_->Follow(step, bias_, findings_.f_c_model, uneven, [this](const VectorXd& f) { return Norm(f); });
 
   if (is_unjudged_) return;
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
   mass_factor()->Multiply(residual_);
-  findings_.motion_give = give_->motion() / scale_;
-  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale_, findings_.motion_give);
+  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale_, give_->motion() / scale_);
   double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) force_scale = std::max(force_scale, Weight());
   const double apart = (findings_.f_c_model - findings_.f_c).norm();
-  findings_.force_give = give_->force() / force_scale;
-  AddLessGive(StepCheck::kContactForce, apart / force_scale, findings_.force_give);
+  AddLessGive(StepCheck::kContactForce, apart / force_scale, give_->force() / force_scale);
 }
 
 double StepChecks::Norm(const VectorXd& force) { return mass_factor()->CalcForceNorm(force, &work_); }

@@ -42,10 +42,6 @@ struct StepFindings {
   Vector6d V_Bo_dot_model = Vector6d::Zero();  ///< Likewise of the object, Sigma_o.
   std::vector<SlipState> fingertip_slip, wheel_slip;
 
-  /// What tilt, slip and contacts that give are allowed above the bounds of balance_robot,
-  /// reduced_acceleration and contact_force, relative as those are.
-  double uneven = 0.0, motion_give = 0.0, force_give = 0.0;
-
   // Of all steps so far.
   long unjudged_steps = 0;  ///< Whose balance and prediction were not judged: contacts had just changed.
   long contacts_lost = 0;   ///< Contacts of fingertips that broke.
