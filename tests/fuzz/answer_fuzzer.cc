@@ -54,8 +54,8 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view bytes = AsText(data, size);
   Try("M.npy:", [&] { ExpectWhole(dexcheck::ParseNpy(bytes, "M.npy")); });
   Try("answers.npz:", [&] {
-    for (const auto& [name, member] : dexcheck::ReadNpz(bytes, "answers.npz"))
-      Try("M.npy:", [&] { ExpectWhole(dexcheck::ParseNpy(member, "M.npy")); });
+    for (const auto& member : dexcheck::ReadNpz(bytes, "answers.npz"))
+      Try("M.npy:", [&] { ExpectWhole(dexcheck::ParseNpy(member.second, "M.npy")); });
   });
   ReadTerms(bytes);
   return 0;

@@ -168,18 +168,17 @@ TEST(MjcfDescription, IsTheEnginesModel) {
   ExpectSameModel(model, ParseRobotModel(WriteParameters(robot, "odd.xml"), "odd.toml"), &random);
 }
 
-TEST(MjcfDescription, RefusesBallJoints) {
+TEST(MjcfDescription, RefusesFreeJointsWithinARobot) {
   const MjModelPtr engine = LoadMjcfText(
-      "<mujoco><worldbody><body name=\"b\"><joint name=\"j\" type=\"ball\"/><geom "
-      "size=\"1\"/></body></worldbody>"
-      "</mujoco>",
+      "<mujoco><worldbody><body name=\"a\"><joint name=\"h\"/><geom size=\"1\"/></body><body "
+      "name=\"b\"><joint name=\"j\" type=\"free\"/><geom size=\"1\"/></body></worldbody></mujoco>",
       "text");
   try {
     ReadMjcfDescription(*engine, "robot.xml");
     FAIL();
   } catch (const InputError& error) {
     EXPECT_EQ(std::string(error.what()),
-              "robot.xml: joint \"j\": must be a hinge or a slide, got a ball joint");
+              "robot.xml: joint \"j\": must be a hinge, a slide or a ball, got a free joint");
   }
 }
 
