@@ -78,31 +78,31 @@ std::vector<UnitPoint> MakeRandom(int dimensions, long count, std::uint64_t seed
 
 std::vector<UnitPoint> MakeUnitPoints(const Sample& sample, int dimensions) {
   switch (sample.method) {
-    case Sampling::kSobol:
+    case SamplingMethod::kSobol:
       return MakeSobol(dimensions, sample.count,
                        sample.scramble ? std::optional<std::uint64_t>(sample.seed) : std::nullopt);
-    case Sampling::kRandom:
+    case SamplingMethod::kRandom:
       return MakeRandom(dimensions, sample.count, sample.seed);
-    case Sampling::kSaltelli:
+    case SamplingMethod::kSaltelli:
       return MakeSaltelli(dimensions, sample.count, sample.seed);
-    case Sampling::kMorris:
+    case SamplingMethod::kMorris:
       return MakeMorris(dimensions, sample.count, sample.seed);
-    case Sampling::kLatinHypercube:
-    case Sampling::kGrid:
+    case SamplingMethod::kLatinHypercube:
+    case SamplingMethod::kGrid:
       break;
   }
   return MakeLatinHypercube(dimensions, sample.count, sample.seed);
 }
 
 long CountUnitPoints(const Sample& sample, int dimensions) {
-  if (sample.method == Sampling::kSaltelli) return sample.count * (dimensions + 2);
-  if (sample.method == Sampling::kMorris) return sample.count * (dimensions + 1);
+  if (sample.method == SamplingMethod::kSaltelli) return sample.count * (dimensions + 2);
+  if (sample.method == SamplingMethod::kMorris) return sample.count * (dimensions + 1);
   return sample.count;
 }
 
 int CountMostDimensions(const Sample& sample) {
-  if (sample.method == Sampling::kSobol) return kMaxSobolDimensions;
-  if (sample.method == Sampling::kSaltelli) return kMaxSobolDimensions / 2;
+  if (sample.method == SamplingMethod::kSobol) return kMaxSobolDimensions;
+  if (sample.method == SamplingMethod::kSaltelli) return kMaxSobolDimensions / 2;
   return std::numeric_limits<int>::max();
 }
 

@@ -29,7 +29,7 @@ std::vector<std::vector<double>> MakeGrid(std::span<const Variation> variations)
 }
 
 std::vector<std::vector<double>> MakePoints(const Sample& sample, std::span<const Variation> variations) {
-  if (sample.method == Sampling::kGrid) return MakeGrid(variations);
+  if (sample.method == SamplingMethod::kGrid) return MakeGrid(variations);
   const int dimensions = static_cast<int>(variations.size());
   std::vector<UnitPoint> points = MakeUnitPoints(sample, dimensions);
   for (UnitPoint& point : points) {
@@ -106,7 +106,7 @@ long CountTrials(const Study& study) {
   long points = 1;
   if (study.is_search()) {
     points = study.search.count;
-  } else if (study.sample.method != Sampling::kGrid) {
+  } else if (study.sample.method != SamplingMethod::kGrid) {
     points = CountUnitPoints(study.sample, static_cast<int>(study.num_keys()));
   } else {
     for (const Variation& variation : study.keys()) points *= static_cast<long>(variation.values.size());

@@ -28,11 +28,11 @@ struct Variation {
   bool logarithmic = false;  ///< Even in the logarithm.
 };
 
-enum class Sampling { kGrid, kLatinHypercube, kSobol, kRandom, kSaltelli, kMorris };
+enum class SamplingMethod { kGrid, kLatinHypercube, kSobol, kRandom, kSaltelli, kMorris };
 
 /// Points of the ranges of some keys.
 struct Sample {
-  Sampling method = Sampling::kGrid;
+  SamplingMethod method = SamplingMethod::kGrid;
   long count = 0;  ///< Points; of a grid its keys say how many. Blocks and walks of kSaltelli and kMorris.
   std::uint64_t seed = 0;  ///< Of all but a grid and a Sobol sequence that is not scrambled.
   bool scramble = false;   ///< A Sobol sequence.

@@ -111,7 +111,7 @@ std::string DescribeFailures(const Study& study, const std::vector<TrialRow>& ro
       "{} of {} trials fail: {:.2g} %, with 95 % confidence between {:.2g} % and {:.2g} % "
       "(Clopper-Pearson{}).",
       failures, rows.size(), 100.0 * estimate.value, 100.0 * estimate.low, 100.0 * estimate.high,
-      study.sample.method == Sampling::kRandom
+      study.sample.method == SamplingMethod::kRandom
           ? ""
           : "; it holds for a random sample, a more even one scatters less");
 }
@@ -135,14 +135,14 @@ std::vector<std::string> AnswerStudy(const Study& study, const std::vector<Trial
   std::vector<std::string> answers;
   if (rows.empty()) return answers;
   if (study.search.method == SearchMethod::kMargins) return DescribeMargins(study, JudgePoints(study, rows));
-  const Sampling method = study.sample.method;
-  if (method == Sampling::kSaltelli || method == Sampling::kMorris) {
+  const SamplingMethod method = study.sample.method;
+  if (method == SamplingMethod::kSaltelli || method == SamplingMethod::kMorris) {
     for (const std::string& quantity : ListQuantities(study)) {
       answers.push_back(Describe(study, AnalyseSensitivity(study, rows, quantity)));
     }
     return answers;
   }
-  if (method != Sampling::kGrid && !study.constraints.empty())
+  if (method != SamplingMethod::kGrid && !study.constraints.empty())
     answers.push_back(DescribeFailures(study, rows));
   if (study.objectives.empty()) return answers;
   const PointSummary points = SummarisePoints(study, rows);

@@ -35,7 +35,7 @@ Axis AxisOf(const Variation& variation) {
 }
 
 bool IsGrid(const Study& study) {
-  return study.sample.method == Sampling::kGrid && !study.is_search() && study.variations.size() >= 2;
+  return study.sample.method == SamplingMethod::kGrid && !study.is_search() && study.variations.size() >= 2;
 }
 
 /// A map over the first two keys of a grid.
@@ -256,7 +256,7 @@ Html DrawMetrics(const StudyResults& results) {
 
 Html DrawLines(const StudyResults& results) {
   const Study& study = results.study;
-  if ((study.sample.method != Sampling::kGrid || study.is_search())) return {};
+  if ((study.sample.method != SamplingMethod::kGrid || study.is_search())) return {};
   const bool has_second = study.variations.size() > 1;
   const std::vector<double> chosen = ChooseLines(study);
   Html figures;

@@ -21,7 +21,8 @@ StudyProgress FindProgress(const StudyStore& store) {
                   outcomes;
   progress.is_over = progress.done >= progress.total;
   const bool asks = study.is_search() || !study.objectives.empty() || !study.constraints.empty() ||
-                    study.sample.method == Sampling::kSaltelli || study.sample.method == Sampling::kMorris;
+                    study.sample.method == SamplingMethod::kSaltelli ||
+                    study.sample.method == SamplingMethod::kMorris;
   if (!asks) return progress;
   const std::vector<TrialRow> rows = store.ReadRows(0, /*with_machine=*/false);
   for (const std::string& answer : AnswerStudy(study, rows)) progress.text += answer + "\n";

@@ -178,18 +178,19 @@ void ReadVariations(const TomlValue& value, bool is_grid, Study* study) {
 /// Keys "method", "count", "seed" and "scramble".
 Sample ReadSample(TomlTable* table) {
   Sample sample;
-  sample.method = table->Get("method").AsChoice<Sampling>({{"latin_hypercube", Sampling::kLatinHypercube},
-                                                           {"sobol", Sampling::kSobol},
-                                                           {"random", Sampling::kRandom},
-                                                           {"saltelli", Sampling::kSaltelli},
-                                                           {"morris", Sampling::kMorris}});
+  sample.method =
+      table->Get("method").AsChoice<SamplingMethod>({{"latin_hypercube", SamplingMethod::kLatinHypercube},
+                                                     {"sobol", SamplingMethod::kSobol},
+                                                     {"random", SamplingMethod::kRandom},
+                                                     {"saltelli", SamplingMethod::kSaltelli},
+                                                     {"morris", SamplingMethod::kMorris}});
   sample.count = table->Get("count").AsWhole(1, kMaxTrials);
   if (const auto seed = table->Find("seed")) {
     sample.seed = static_cast<std::uint64_t>(seed->AsWhole(0, kMaxSeed));
   }
   if (const auto scramble = table->Find("scramble")) {
     sample.scramble = scramble->AsFlag();
-    if (sample.method != Sampling::kSobol) scramble->Fail("is for a Sobol sequence");
+    if (sample.method != SamplingMethod::kSobol) scramble->Fail("is for a Sobol sequence");
   }
   return sample;
 }
@@ -202,7 +203,7 @@ void RequireDimensions(const TomlValue& where, const Sample& sample, size_t keys
 void ReadNested(const TomlValue& value, Study* study) {
   TomlTable table = value.AsTable();
   study->nested = ReadSample(&table);
-  if (study->nested.method == Sampling::kSaltelli || study->nested.method == Sampling::kMorris) {
+  if (study->nested.method == SamplingMethod::kSaltelli || study->nested.method == SamplingMethod::kMorris) {
     table.Get("method").Fail("must be one of \"latin_hypercube\", \"sobol\", \"random\"");
   }
   const TomlValue vary = table.Get("vary");
@@ -405,7 +406,7 @@ void RequireFewTrials(const TomlValue& where, const Study& study) {
   if (study.num_nested > 0) trials *= static_cast<double>(study.nested.count);
   if (study.is_search()) {
     trials *= static_cast<double>(study.search.count);
-  } else if (study.sample.method != Sampling::kGrid) {
+  } else if (study.sample.method != SamplingMethod::kGrid) {
     trials *= static_cast<double>(CountUnitPoints(study.sample, static_cast<int>(study.num_keys())));
   } else {
     for (size_t i = 0; i < study.num_keys(); ++i)
@@ -456,7 +457,7 @@ Study ParseStudy(const std::string& text, const std::string& source) {
     table.RejectUnused();
   }
   const TomlValue vary = root.Get("vary");
-  ReadVariations(vary, study.sample.method == Sampling::kGrid && !search, &study);
+  ReadVariations(vary, study.sample.method == SamplingMethod::kGrid && !search, &study);
   if (study.variations.empty()) vary.Reject("needs at least one key");
   RequireDimensions(vary, study.sample, study.variations.size());
   if (const auto list = root.Find("objective")) {
@@ -466,8 +467,8 @@ Study ParseStudy(const std::string& text, const std::string& source) {
     for (const TomlValue& entry : list->AsList()) study.constraints.push_back(ReadConstraint(entry));
   }
   if (search) ReadSearch(*search, &study);
-  const bool moves_one_key = study.sample.method == Sampling::kSaltelli ||
-                             study.sample.method == Sampling::kMorris ||
+  const bool moves_one_key = study.sample.method == SamplingMethod::kSaltelli ||
+                             study.sample.method == SamplingMethod::kMorris ||
                              study.search.method == SearchMethod::kMargins || study.is_external();
   for (const Variation& variation : study.variations) {
     if (moves_one_key && variation.depends_on_others())

@@ -213,7 +213,7 @@ class Report {
     const Html outcomes = DrawOutcomes(results_);
     if (outcomes.empty()) return {};
     const Study& study = results_.study;
-    const bool is_grid = study.sample.method == Sampling::kGrid && !study.is_search();
+    const bool is_grid = study.sample.method == SamplingMethod::kGrid && !study.is_search();
     return FormatHtml(
         "<h2 id=\"maps\">Over {} and {}</h2>\n<p class=\"soft\">{}Each {} leads to its trial and the command "
         "that "

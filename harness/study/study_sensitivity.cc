@@ -38,7 +38,7 @@ Sensitivity AnalyseSensitivity(const Study& study, const std::vector<TrialRow>& 
     values[i] = done[i] == per_point ? values[i] / static_cast<double>(per_point) : std::nan("");
     if (!std::isfinite(values[i])) ++sensitivity.left_out;
   }
-  if (study.sample.method == Sampling::kSaltelli) {
+  if (study.sample.method == SamplingMethod::kSaltelli) {
     sensitivity.sobol = CalcSobolIndices(values, dimensions);
   } else {
     sensitivity.morris = CalcMorrisEffects(MakeUnitPoints(study.sample, dimensions), values);

@@ -56,8 +56,9 @@ Html MakeSensitivityTable(const StudyResults& results, const std::string& quanti
 }  // namespace
 
 Html MakeSensitivityTables(const StudyResults& results) {
-  const Sampling method = results.study.sample.method;
-  if (results.study.is_search() || (method != Sampling::kSaltelli && method != Sampling::kMorris)) return {};
+  const SamplingMethod method = results.study.sample.method;
+  if (results.study.is_search() || (method != SamplingMethod::kSaltelli && method != SamplingMethod::kMorris))
+    return {};
   const KeyTheory theory = FindKeyTheory(results.inputs, results.rows.front().trial.parameters);
   Html tables;
   for (const std::string& quantity : ListQuantities(results.study))
@@ -67,7 +68,7 @@ Html MakeSensitivityTables(const StudyResults& results) {
       "<h2 id=\"effects\">Which key matters</h2>\n<p class=\"soft\">The line over a bar is the interval that "
       "holds the value with 95 %.{} The error dynamics have the keys that are marked with (57).</p>\n<div "
       "class=\"grid\">\n{}</div>\n",
-      method == Sampling::kMorris
+      method == SamplingMethod::kMorris
           ? " Spread is 0 where the quantity is linear in the key and the others do not matter to its effect."
           : "",
       tables);
