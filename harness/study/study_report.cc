@@ -105,8 +105,9 @@ class Report {
     Html html = FormatHtml("<header>\n<h1><b>{}</b>{}{}</h1>\n<div class=\"tiles\">\n", study.name,
                            study.description.empty() ? "" : " – ", study.description);
     const long count = CountTrials(study);
-    html += MakeTile(fmt::format("{} of {}", results_.rows.size(), count),
-                     FormatHtml("trials of scenario {} are done", study.scenario));
+    html +=
+        MakeTile(fmt::format("{} of {}{}", results_.rows.size(), study.is_search() ? "at most " : "", count),
+                 FormatHtml("trials of scenario {} are done", study.scenario));
     if (results_.rows.empty()) {
       html += "</div>\n</header>\n";
       return html;
