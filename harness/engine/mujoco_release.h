@@ -2,7 +2,7 @@
 
 // What differs between MuJoCo's releases, as far as dexcheck's code touches it: everything that must be
 // written in two ways stands here. dexcheck is built and tested with 2.2.2, which Debian 12 has. The other
-// branches are written for 3.x and compile against the declarations of 3.12.
+// branches are written for 3.x after its public headers up to 3.12; no build with 3.x has been made.
 //
 // | since | what |
 // |---|---|
