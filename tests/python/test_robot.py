@@ -138,11 +138,16 @@ def raise_mistake(_):
 
 
 def test_a_call_costs_little():
-    """Of an arm of three joints the whole call, term included, is below what a call may cost on top: 5 us."""
+    """Of an arm of three joints the whole call, term included, costs less than NumPy's inverse of such a matrix, which is
+    13 us where a call is 3 to 5: a ratio of one run, since machines differ and are busy."""
+
+    def measure(call, calls=1000):
+        return min(timeit.repeat(call, number=calls, repeat=30)) / calls
+
     robot = dexcheck.load(ARM)
     q, v = np.array([0.1, 0.2, 0.3]), np.array([1.0, 2.0, 3.0])
+    inverse = measure(lambda: np.linalg.inv(np.eye(3)))
     for call in (lambda: robot.M(q), lambda: robot.c(q, v), lambda: robot.g(q)):
-        calls = 2000
-        seconds = min(timeit.repeat(call, number=calls, repeat=30)) / calls
-        print(f"{1e6 * seconds:.2f} us")
-        assert seconds < 5e-6
+        seconds = measure(call)
+        print(f"{1e6 * seconds:.2f} us, {1e6 * inverse:.2f} us")
+        assert seconds < inverse
