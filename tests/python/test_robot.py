@@ -146,7 +146,8 @@ def test_a_call_costs_little():
 
     robot = dexcheck.load(ARM)
     q, v = np.array([0.1, 0.2, 0.3]), np.array([1.0, 2.0, 3.0])
-    inverse = measure(lambda: np.linalg.inv(np.eye(3)))
+    identity = np.eye(3)
+    inverse = measure(lambda: np.linalg.inv(identity))
     for call in (lambda: robot.M(q), lambda: robot.c(q, v), lambda: robot.g(q)):
         seconds = measure(call)
         print(f"{1e6 * seconds:.2f} us, {1e6 * inverse:.2f} us")
