@@ -390,7 +390,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .formula = "0",
      .reason = "a hemisphere ends there",
      .description = "how far a contact is past the rim of its hemispherical fingertip",
-     .meaning = {.cause = Cause::kFingertipRim, .precedence = -1, .is_own = true, .rank = Rank::kDecisive}},
+     .meaning = {.cause = Cause::kFingertipRim, .precedence = -6, .is_own = true, .rank = Rank::kDecisive}},
     {.check = StepCheck::kBaseTilt,
      .name = "base_tilt",
      .kind = CheckKind::kAssumption,

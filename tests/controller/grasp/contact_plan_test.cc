@@ -216,23 +216,23 @@ TEST_F(ContactPlanTest, TouchesWithinTheRimsOfHemispheres) {
   };
   const ContactPlan whole = PlanContacts(model_, hand, GetTorus(), X_Bo, MakeNominal(), options);
   ASSERT_TRUE(whole.found) << whole.problem;
-  // A pole with which the whole spheres' plan is past a rim.
-  const Vector3d pole(0.6, 0.8, 0.0);
-  ASSERT_LT(find_least(whole, pole), 0.0);
-  const ContactPlan within = plan_with(pole);
-  if (within.found) {
-    EXPECT_GE(find_least(within, pole), 0.0);
-  } else {
-    EXPECT_THAT(within.problem, HasSubstr("within the rims"));
+  // Wherever the hemispheres point, a plan stays within their rims, also where that of whole spheres does
+  // not.
+  int past = 0;
+  for (int k = 0; k < 3; ++k) {
+    for (const double sign : {1.0, -1.0}) {
+      const Vector3d pole = sign * Vector3d::Unit(k);
+      SCOPED_TRACE(pole.transpose());
+      const ContactPlan within = plan_with(pole);
+      if (!within.found) {
+        EXPECT_THAT(within.problem, HasSubstr("within the rims of their hemispheres"));
+        continue;
+      }
+      EXPECT_GE(find_least(within, pole), 0.0);
+      if (find_least(whole, pole) < 0.0) ++past;
+    }
   }
-  // Fingertips that point back into their fingers touch nothing.
-  const ContactPlan none = plan_with(-Vector3d::UnitX());
-  EXPECT_FALSE(none.found);
-  EXPECT_THAT(none.problem, HasSubstr("within the rims of their hemispheres"));
-  // Along the fingers, as the paper's: found.
-  const ContactPlan along = plan_with(Vector3d::UnitX());
-  ASSERT_TRUE(along.found) << along.problem;
-  EXPECT_GE(find_least(along, Vector3d::UnitX()), 0.0);
+  EXPECT_GE(past, 2);
 }
 
 TEST_F(ContactPlanTest, ReachesOnFromWhereItHolds) {

@@ -123,7 +123,6 @@ TEST_F(OwnArm, WhatCannotBeIsOneLine) {
       {"control.stiffness=100", {"control.stiffness", "computed_torque"}},
       {"control.law=impedance", {"control.law", "impedance"}},
       {"expect.position=1e-3", {"expect.position"}},
-      {"plant.type=rigid", {"plant.type", "engine"}},
       {"start=moving", {"start", "rest"}},
       {"grasp={ frame = 'x' }", {"joint_motion", "grasp"}},
   };

@@ -40,7 +40,7 @@ const Known kKnown[] = {
     {"camera",
      {"sensing.object_rate=500", "sensing.object_latency=0.002", "sensing.object_velocity=kalman",
       "sensing.object_acceleration=5", "sensing.object_position_noise=1e-6"}},
-    {"followed_contacts", {"control.kappa=integrated"}},
+    {"followed_contacts", {"duration=0.4", "control.kappa=integrated"}},
     {"sensing_latency", {"sensing.latency=0.002"}},
     {"torque_step", {"actuation.torque_step=1e-3"}},
     {"gain_error", {"actuation.gain_error={ r_elbow = 0.02 }"}},
@@ -85,14 +85,13 @@ INSTANTIATE_TEST_SUITE_P(All, KnownCauses, ::testing::ValuesIn(kKnown),
                          [](const ::testing::TestParamInfo<Known>& info) { return info.param.name; });
 
 /// Rates that are told need not fit together, and what the law demands is still known to rounding: a
-/// thousandth of one of its parts fails law_demand under noise as it does without.
+/// thousandth of a part that does not vanish with the errors fails law_demand under noise as it does without.
 TEST(KnownNoise, DoesNotBlindTheDemandOfTheLaw) {
   size_t parts = 0;
   for (const LawMistake& mistake : ListLawMistakes()) {
     if (mistake.factor != 1.001) continue;
     const std::string name = ListLawParts()[mistake.part].name;
-    if (name != "mass matrix M_bar'" && name != "velocity feedback K_v" && name != "object's wrench G^+ F_o")
-      continue;
+    if (name != "mass matrix M_bar'" && name != "object's wrench G^+ F_o") continue;
     ++parts;
     for (const char* noise : {"sensing.velocity_noise=1e-2", "sensing.object_position_noise=1e-5"}) {
       SCOPED_TRACE(mistake.name + " " + noise);
@@ -106,7 +105,7 @@ TEST(KnownNoise, DoesNotBlindTheDemandOfTheLaw) {
       EXPECT_FALSE(runner.loop().checks().Find("told").failed);
     }
   }
-  EXPECT_EQ(parts, 3U);
+  EXPECT_EQ(parts, 2U);
 }
 
 /// A loop with the imperfections of one scenario in it, judged by another that does not have them.

@@ -144,11 +144,13 @@ std::string Show(const MismatchOptions& mismatch) {
 }
 
 std::string Show(const PlantOptions& plant) {
-  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}", static_cast<int>(plant.type),
+  std::string touching;
+  for (const auto& [a, b] : plant.may_touch) touching += a + " " + b + " ";
+  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {}", static_cast<int>(plant.type),
                      static_cast<int>(plant.integrator), plant.time_step, plant.control_step,
                      plant.contact_time_constant, plant.contact_impedance, plant.impratio,
                      plant.noslip_iterations, plant.bonded, plant.implicit_damping,
-                     Show(plant.floor_friction), Show(plant.finger_friction));
+                     Show(plant.floor_friction), Show(plant.finger_friction), plant.collide, touching);
 }
 
 std::string Show(const GraspOptions& grasp) {
