@@ -12,7 +12,8 @@
 // | 3.6  | the tendons' Jacobian is sparse in any case, and its rows are the model's |
 // | 3.7  | collision functions get data that they may write |
 // | 3.9  | they fill mjPreContact (distance, position, normal, tangent) in the place of mjContact |
-// | 3.11 | mj_fullM(m, d, M); qM is gone: M has compressed rows of the lower triangle |
+// | 3.10 | mj_fullM(m, d, M) |
+// | 3.11 | qM is gone: M has compressed rows of the lower triangle |
 //
 // What an MJCF says in another way since a release (limits by default, ...) is told by newer_mjcf.h.
 
@@ -20,6 +21,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 namespace dexcheck {
 
@@ -49,6 +51,12 @@ inline void AddFile(const char* name, const std::string& text, mjVFS* vfs) {
   mj_makeEmptyFileVFS(vfs, name, size);
   std::copy(text.begin(), text.end(), static_cast<char*>(vfs->filedata[mj_findFileVFS(vfs, name)]));
 #endif
+}
+
+/// How pairs and exclusions name their two bodies, which 2.2.2 counts from 1.
+inline int MakeSignature(int body1, int body2) { return ((body1 + 1) << 16) + body2 + 1; }
+inline std::pair<int, int> ReadSignature(int signature) {
+  return {(signature >> 16) - 1, (signature & 0xffff) - 1};
 }
 
 /// The mass matrix at the positions that mj_kinematics and mj_comPos have placed.

@@ -1,12 +1,10 @@
 #include "harness/engine/remove_looks.h"
 
-#include <mujoco/mjxmacro.h>
-
 #include <cstring>
-#include <string_view>
 #include <vector>
 
 #include "harness/engine/engine.h"
+#include "harness/engine/model_arrays.h"
 
 namespace dexcheck {
 namespace {
@@ -39,30 +37,11 @@ void KeepRows(const std::vector<int>& stay, size_t columns, Number* rows) {
   }
 }
 
-// All arrays of a model, as the engine lists them: visit(type, array, bytes of a row, rows, whether one for
-// each geom).
-#undef MJ_M
-#define MJ_M(size) m->size
-#define DEXCHECK_VISIT(type, name, rows, columns)                            \
-  visit(m->name, static_cast<size_t>(m->rows), static_cast<size_t>(columns), \
-        std::string_view(#rows) == "ngeom");
-template <typename Visit>
-void ForEachArray(mjModel* m, const Visit& visit) {
-#define X DEXCHECK_VISIT
-  MJMODEL_POINTERS
-#undef X
-}
-
-/// The engine lays them out one after the other, each at a multiple of this.
-constexpr size_t kAlignment = 64;
-
-size_t RoundUp(size_t offset) { return (offset + kAlignment - 1) / kAlignment * kAlignment; }
-
 bool HasKnownLayout(mjModel* m) {
   bool known = true;
   size_t offset = 0;
   ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
-    offset = RoundUp(offset);
+    offset = AlignArray(offset);
     known = known && reinterpret_cast<char*>(array) == static_cast<char*>(m->buffer) + offset;
     offset += sizeof(Number) * rows * columns;
   });
@@ -73,7 +52,7 @@ bool HasKnownLayout(mjModel* m) {
 void LayOut(mjModel* m) {
   size_t offset = 0;
   ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
-    offset = RoundUp(offset);
+    offset = AlignArray(offset);
     char* const place = static_cast<char*>(m->buffer) + offset;
     const size_t bytes = sizeof(Number) * rows * columns;
     std::memmove(place, array, bytes);

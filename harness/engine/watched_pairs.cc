@@ -5,6 +5,7 @@
 #include "controller/common/text.h"
 #include "harness/engine/clearance.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
@@ -87,8 +88,8 @@ class PairLister {
     return anchor_a == anchor_b || AnchorBefore(a) == anchor_b || AnchorBefore(b) == anchor_a;
   }
   [[nodiscard]] bool AreExcluded(int a, int b) const {
-    const int signature = ((a + 1) << 16) + b + 1;
-    const int other = ((b + 1) << 16) + a + 1;
+    const int signature = MakeSignature(a, b);
+    const int other = MakeSignature(b, a);
     return std::any_of(m_.exclude_signature, m_.exclude_signature + m_.nexclude,
                        [&](int excluded) { return excluded == signature || excluded == other; });
   }

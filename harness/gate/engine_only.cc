@@ -11,6 +11,7 @@
 #include <string>
 
 #include "harness/engine/engine.h"
+#include "harness/engine/mujoco_release.h"
 #include "harness/engine/torus_collision.h"
 
 namespace dexcheck {
@@ -272,10 +273,9 @@ class EngineOnly {
                        List(engine_.geom_solimp + mjNIMP * geom, mjNIMP)));
     }
     for (int i = 0; i < engine_.nexclude; ++i) {
-      const int signature = engine_.exclude_signature[i];  // (body1 << 16) + body2
-      Note("contacts_by_type",
-           fmt::format("excluded: {} and {}", NameOf(engine_, mjOBJ_BODY, signature >> 16),
-                       NameOf(engine_, mjOBJ_BODY, signature & 0xffff)));
+      const auto [body1, body2] = ReadSignature(engine_.exclude_signature[i]);
+      Note("contacts_by_type", fmt::format("excluded: {} and {}", NameOf(engine_, mjOBJ_BODY, body1),
+                                           NameOf(engine_, mjOBJ_BODY, body2)));
     }
   }
 

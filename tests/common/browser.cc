@@ -91,7 +91,11 @@ Browser::Browser() {
   const Json chromium = {{"args",
                           {"--headless=new", "--no-sandbox", "--disable-dev-shm-usage",
                            "--use-angle=swiftshader", "--enable-unsafe-swiftshader"}}};
-  const Json wanted = {{"goog:chromeOptions", chromium}, {"goog:loggingPrefs", {{"browser", "ALL"}}}};
+  // A page that draws in software beside other tests may keep a script waiting for longer than the usual 30
+  // s.
+  const Json wanted = {{"goog:chromeOptions", chromium},
+                       {"goog:loggingPrefs", {{"browser", "ALL"}}},
+                       {"timeouts", {{"script", 120000}}}};
   const Json session = Call("POST", "/session", {{"capabilities", {{"alwaysMatch", wanted}}}});
   session_ = "/session/" + session.at("sessionId").get<std::string>();
 }

@@ -93,6 +93,23 @@ TEST_F(OwnArm, IsRunReportedDrawnAndReplayed) {
   EXPECT_EQ(Run({"run", "--replay", "run"}).exit_code, 0);
 }
 
+TEST_F(OwnArm, RunsWithoutTheEngine) {
+  const ProgramResult result = RunWith("plant.type=rigid");
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_THAT(result.out, HasSubstr("joints: largest error "));
+}
+
+TEST_F(OwnArm, WithABallJointIsComparedButNotRun) {
+  WriteText(
+      folder_.path() / "arm.xml",
+      ReplaceOnce(kArm,
+                  R"(name="turn" type="hinge" axis="0 0 1" range="-170 170" limited="true" damping="0.1")",
+                  R"(name="turn" type="ball")"));
+  ASSERT_EQ(Run({"import", "arm.xml", "--out", "ball.toml"}).exit_code, 0);
+  EXPECT_EQ(Run({"consistency", "ball.toml", "arm.xml", "--samples", "20"}).exit_code, 0);
+  EXPECT_TRUE(IsRefused(RunWith("model.file=ball.toml"), {"ball.toml", "ball", "turn", "run"}));
+}
+
 TEST_F(OwnArm, DoesNotPassWithAnotherMass) {
   WriteText(folder_.path() / "arm.xml", ReplaceOnce(kArm, "mass=\"0.8\"", "mass=\"0.9\""));
   const ProgramResult result = Run({"run", "own.toml", "--no-log"});

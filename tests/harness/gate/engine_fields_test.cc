@@ -3,6 +3,7 @@
 #include "harness/gate/engine_fields.h"
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,6 +24,8 @@
 namespace dexcheck {
 namespace {
 
+using ::testing::Contains;
+using ::testing::HasSubstr;
 using testing::TempFolder;
 using testing::WriteText;
 
@@ -403,6 +406,8 @@ TEST_F(EngineFields, ChangedAreNamedOrMoveNothing) {
   <contact><exclude body1="panda_link1" body2="panda_link3"/></contact></mujoco>)");
   WriteText(folder_.path() / "rich_panda.xml", text);
   const Subject panda(testing::ReadPanda(), folder_.path() / "rich_panda.xml", "");
+  EXPECT_THAT(panda.Judge(*panda.Copy(), false).notes,
+              Contains(HasSubstr("excluded: panda_link1 and panda_link3")));
   FieldCheck(panda).Run(&named, &tried);
   for (const EngineField& field : ListEngineFields()) {
     const bool needs_naming = field.fate == FieldClass::kCompared || field.fate == FieldClass::kReported ||

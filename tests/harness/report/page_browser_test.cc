@@ -171,7 +171,7 @@ TEST_F(PageBrowserTest, PlaysTheVideo) {
   const std::string paint =
       video +
       "const canvas = document.createElement('canvas'); canvas.width = 160; canvas.height = 90;"
-      "const context = canvas.getContext('2d'); context.drawImage(video, 0, 0);"
+      "const context = canvas.getContext('2d', {willReadFrequently: true}); context.drawImage(video, 0, 0);"
       "const pixel = context.getImageData(80, 45, 1, 1).data;";
   EXPECT_TRUE(browser_.WaitFor(paint + "return pixel[0] > 150 && pixel[2] < 80;"))
       << "red at first, not " << browser_.Run(paint + "return [...pixel];");

@@ -18,6 +18,7 @@
 #include "harness/sides/model_comparison.h"
 #include "harness/sides/parameter_writer.h"
 #include "harness/sides/side_layout.h"
+#include "tests/common/list_failures.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/random_robot.h"
 
@@ -37,17 +38,6 @@ ConsistencyOptions Few() {
 
 ConsistencyResult CompareWithEngine(const RobotModel& model, const mjModel& engine) {
   return CheckConsistency(Adapter(model, engine, "robot.xml"), Few(), [](long) { return true; });
-}
-
-std::string ListFailures(const ConsistencyResult& result) {
-  EXPECT_GE(result.terms.size(), 12U);
-  std::string failures;
-  for (const std::vector<CheckRecord>* records : {&result.gate.records, &result.terms}) {
-    for (const CheckRecord& record : *records) {
-      if (record.failed) failures += record.name + " ";
-    }
-  }
-  return failures;
 }
 
 RobotDescription ReadTable(const std::string& text) {
@@ -76,10 +66,10 @@ TEST(BallJoints, RandomRobotsAgree) {
       const RobotModel model(spec);
       EXPECT_EQ(model.num_positions(), model.num_base_positions() + model.num_joints() + model.num_balls());
       const MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "text");
-      EXPECT_EQ(ListFailures(CompareWithEngine(model, *engine)), "");
+      EXPECT_EQ(testing::ListFailures(CompareWithEngine(model, *engine)), "");
       if (base == BaseType::kPlanar) continue;  // an MJCF's description has none
       RobotDescription mjcf = ReadMjcfDescription(*engine, "robot.xml");
-      EXPECT_EQ(ListFailures(CompareWithEngine(RobotModel(mjcf.spec), *engine)), "");
+      EXPECT_EQ(testing::ListFailures(CompareWithEngine(RobotModel(mjcf.spec), *engine)), "");
       // Angles of a table are rounded twice: when they are written, and when they are read.
       constexpr double kWritten = 1e-13;
       RobotDescription table = ReadTable(WriteParameters(mjcf, "robot.xml"));
@@ -202,7 +192,7 @@ constexpr const char* kArm = R"(<mujoco model="arm"><compiler angle="radian"/><w
 TEST(BallJoints, MjcfIsImportedAndAgrees) {
   const MjModelPtr engine = LoadMjcfText(kArm, "arm.xml");
   const RobotDescription mjcf = ReadMjcfDescription(*engine, "arm.xml");
-  EXPECT_EQ(ListFailures(CompareWithEngine(RobotModel(mjcf.spec), *engine)), "");
+  EXPECT_EQ(testing::ListFailures(CompareWithEngine(RobotModel(mjcf.spec), *engine)), "");
   const std::string text = WriteParameters(mjcf, "arm.xml");
   EXPECT_THAT(text, HasSubstr("{ joint = \"shoulder\", link = \"upper\", type = \"ball\", xyz = "));
   EXPECT_THAT(text, HasSubstr("\"shoulder\" = { range = [0, 1.5], damping = 0.2, armature = 0.01"));
@@ -225,7 +215,7 @@ TEST(BallJoints, MistakesAreFound) {
   const auto compare = [&](const auto& change) {
     RobotSpec spec = mjcf.spec;
     change(&spec);
-    return ListFailures(CompareWithEngine(RobotModel(spec), *engine));
+    return testing::ListFailures(CompareWithEngine(RobotModel(spec), *engine));
   };
   // The frame in whose axes the velocity is told, the point about which the link turns, damping, range.
   const auto turn = [](RobotSpec* spec) {

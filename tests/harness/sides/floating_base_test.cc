@@ -15,6 +15,7 @@
 #include "harness/sides/parameter_writer.h"
 #include "harness/sides/urdf_reader.h"
 #include "tests/common/legged_robots.h"
+#include "tests/common/list_failures.h"
 #include "tests/common/random_robot.h"
 #include "tests/common/urdf_text.h"
 
@@ -23,17 +24,6 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
-
-std::string ListFailures(const ConsistencyResult& result) {
-  EXPECT_GE(result.terms.size(), 12U);
-  std::string failures;
-  for (const std::vector<CheckRecord>* records : {&result.gate.records, &result.terms}) {
-    for (const CheckRecord& record : *records) {
-      if (record.failed) failures += record.name + " ";
-    }
-  }
-  return failures;
-}
 
 ConsistencyOptions Few(long samples = 20) {
   ConsistencyOptions options;
@@ -44,13 +34,13 @@ ConsistencyOptions Few(long samples = 20) {
 std::string CompareWithEngine(RobotDescription robot, const mjModel& engine) {
   CompleteFromEngine(engine, "robot.xml", &robot);
   const RobotModel model(robot.spec);
-  return ListFailures(
+  return testing::ListFailures(
       CheckConsistency(Adapter(model, engine, "robot.xml"), Few(), [](long) { return true; }));
 }
 
 std::string CompareBoth(RobotDescription a, RobotDescription b) {
   CompleteEachOther(&a, &b);
-  return ListFailures(CompareDescriptions(a, b, Few(), [](long) { return true; }));
+  return testing::ListFailures(CompareDescriptions(a, b, Few(), [](long) { return true; }));
 }
 
 RobotDescription ReadTable(const std::string& text) {

@@ -19,6 +19,7 @@
 #include "harness/sides/description_check.h"
 #include "harness/sides/parameter_writer.h"
 #include "tests/common/files.h"
+#include "tests/common/list_failures.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
@@ -46,13 +47,7 @@ std::string ListFailures(const std::string& urdf, const mjModel& engine, long sa
   const Adapter adapter(model, engine, "robot.xml");
   ConsistencyResult result = CheckConsistency(adapter, options, [](long) { return true; });
   CheckDescription(robot, adapter, &result.gate);
-  std::string failures;
-  for (const std::vector<CheckRecord>* records : {&result.gate.records, &result.terms}) {
-    for (const CheckRecord& record : *records) {
-      if (record.failed) failures += record.name + " ";
-    }
-  }
-  return failures;
+  return testing::ListFailures(result);
 }
 
 TEST(Urdf, PandaAgreesWithTheMjcf) {
