@@ -86,6 +86,22 @@ SurfaceJet CalcLatitudeJet(const Vector3d& semi_axes, const SurfacePoint& alpha)
           .c_vv = scale(-cv * cu, -cv * su, -sv)};
 }
 
+// A face of a box: its normal's axis and side, and the axes of u and v, of which c_u x c_v points outwards.
+struct Face {
+  int axis, u, v;
+  double side;
+};
+
+Face FaceOf(int chart) {
+  const int axis = chart / 2;
+  const int next = (axis + 1) % 3;
+  const int last = (axis + 2) % 3;
+  return chart % 2 == 0 ? Face{axis, next, last, 1.0} : Face{axis, last, next, -1.0};
+}
+
+// How far rounding may carry a contact beyond an edge, relative to the face.
+constexpr double kEdgeRounding = 1e-9;
+
 }  // namespace
 
 SurfaceProjection Plane::Project(const Vector3d& p) const { return {{p.x(), p.y(), 0}, p.z()}; }
@@ -192,6 +208,59 @@ SurfacePoint Ellipsoid::DoToChart(const SurfacePoint& alpha, int chart) const {
 }
 
 bool Ellipsoid::DoHasMargin(const SurfacePoint& alpha) const { return HasLatitudeMargin(alpha); }
+
+Box::Box(const Vector3d& half_size) : half_size_(half_size) {
+  for (const double half : half_size) RequirePositive(half, "box half length [m]");
+}
+
+SurfaceProjection Box::Project(const Vector3d& p) const {
+  const Vector3d beyond = p.cwiseAbs() - half_size_;
+  Eigen::Index axis = 0;
+  beyond.maxCoeff(&axis);
+  const int chart = static_cast<int>(2 * axis) + (p[axis] < 0.0 ? 1 : 0);
+  const Face face = FaceOf(chart);
+  const auto clamp = [&](int i) { return std::clamp(p[i], -half_size_[i], half_size_[i]); };
+  const double outside = beyond.cwiseMax(0.0).norm();
+  return {{clamp(face.u), clamp(face.v), chart}, outside > 0.0 ? outside : beyond[axis]};
+}
+
+bool Box::Contains(const SurfacePoint& alpha, double margin) const {
+  const Face face = FaceOf(alpha.chart);
+  return std::abs(alpha.u) + margin <= half_size_[face.u] && std::abs(alpha.v) + margin <= half_size_[face.v];
+}
+
+SurfaceJet Box::DoCalcJet(const SurfacePoint& alpha) const {
+  const Face face = FaceOf(alpha.chart);
+  const double over =
+      std::max(std::abs(alpha.u) / half_size_[face.u], std::abs(alpha.v) / half_size_[face.v]);
+  if (over > 1.0 + kEdgeRounding) {
+    throw SingularityError("contact is beyond the edge of the box's face " + std::to_string(alpha.chart) +
+                               ", at (u, v) [m]: " + std::to_string(alpha.u) + ", " + std::to_string(alpha.v),
+                           over);
+  }
+  SurfaceJet jet{.c = Vector3d::Zero(),
+                 .c_u = Vector3d::Unit(face.u),
+                 .c_v = Vector3d::Unit(face.v),
+                 .c_uu = Vector3d::Zero(),
+                 .c_uv = Vector3d::Zero(),
+                 .c_vv = Vector3d::Zero()};
+  jet.c[face.axis] = face.side * half_size_[face.axis];
+  jet.c[face.u] = alpha.u;
+  jet.c[face.v] = alpha.v;
+  return jet;
+}
+
+SurfacePoint Box::DoToChart(const SurfacePoint& alpha, int chart) const {
+  if (chart == alpha.chart) return alpha;
+  const Face from = FaceOf(alpha.chart);
+  Vector3d p;
+  p[from.axis] = from.side * half_size_[from.axis];
+  p[from.u] = alpha.u;
+  p[from.v] = alpha.v;
+  const Face to = FaceOf(chart);
+  const auto clamp = [&](int i) { return std::clamp(p[i], -half_size_[i], half_size_[i]); };
+  return {clamp(to.u), clamp(to.v), chart};
+}
 
 Torus::Torus(double ring_radius, double tube_radius) : ring_radius_(ring_radius), tube_radius_(tube_radius) {
   RequirePositive(tube_radius, "torus tube radius [m]");

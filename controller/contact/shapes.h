@@ -68,6 +68,28 @@ class Ellipsoid final : public Surface {
   Vector3d semi_axes_;
 };
 
+/// Box about the origin, its faces across x, y, z. Each face is a chart, which ends at its edges: chart 2 i
+/// is the face on the positive side of axis i, c(u, v) = (h_i, u, v) in the axes i, i + 1, i + 2; chart 2 i +
+/// 1 the one opposite, c(u, v) = (-h_i, v, u). A contact does not roll over an edge, where the normal jumps.
+class Box final : public Surface {
+ public:
+  /// Throws std::invalid_argument unless all half lengths (3x1, m) are positive.
+  explicit Box(const Vector3d& half_size);
+  [[nodiscard]] const Vector3d& half_size() const { return half_size_; }
+  [[nodiscard]] int num_charts() const override { return 6; }
+  /// Of a point that is nearest to an edge, the point of that edge on the face from which it is farther.
+  [[nodiscard]] SurfaceProjection Project(const Vector3d& p) const override;
+  [[nodiscard]] bool Contains(const SurfacePoint& alpha, double margin) const override;
+
+ private:
+  /// Throws SingularityError beyond an edge.
+  [[nodiscard]] SurfaceJet DoCalcJet(const SurfacePoint& alpha) const override;
+  /// Nearest point of the other face.
+  [[nodiscard]] SurfacePoint DoToChart(const SurfacePoint& alpha, int chart) const override;
+
+  Vector3d half_size_;
+};
+
 /// Torus about z: c(u, v) = ((R + r cos v) cos u, (R + r cos v) sin u, r sin v), u along the ring and v
 /// around the tube, v = 0 on the outer equator. The chart is regular everywhere; both coordinates are
 /// periodic.

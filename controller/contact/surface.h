@@ -86,6 +86,10 @@ class Surface {
   /// chart's edge, otherwise in one that does. Changing charts turns the Gauss frame about the normal.
   [[nodiscard]] SurfacePoint Normalize(const SurfacePoint& alpha) const;
 
+  /// Whether the chart holds these coordinates, and an edge at which it ends is `margin` (m) away or more. A
+  /// surface without edges holds all.
+  [[nodiscard]] virtual bool Contains(const SurfacePoint& /*alpha*/, double /*margin*/) const { return true; }
+
  protected:
   Surface() = default;
   Surface(const Surface&) = default;

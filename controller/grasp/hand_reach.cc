@@ -101,6 +101,7 @@ std::optional<Touch> HandReach::FindTouch(size_t finger_index, const Surface& ob
                                           const VectorXd& q_start) const {
   constexpr double kNearlyAll = 0.999;
   const Finger& finger = fingers_[finger_index];
+  if (!object.Contains(alpha, finger.radius)) return {};
   const SurfaceGeometry surface = object.Evaluate(alpha);
   const Vector3d n = surface.R.col(2);
   if (std::abs(surface.p.z()) > clearance.half_length) return {};

@@ -71,6 +71,13 @@ SolidBox ReadBox(TomlTable& table) {
   return box;
 }
 
+SolidEllipsoid ReadEllipsoid(TomlTable& table) {
+  const TomlValue axes = table.Get("semi_axes");
+  SolidEllipsoid ellipsoid{axes.AsVector<3>()};
+  if (ellipsoid.semi_axes.minCoeff() <= 0.0) axes.Fail("must be positive");
+  return ellipsoid;
+}
+
 }  // namespace
 
 Vector3d ReadAxis(const TomlValue& value) {
@@ -97,12 +104,13 @@ Pose ReadPose(const TomlValue& value) {
 }
 
 Shape ReadShape(TomlTable& table) {
-  enum class Kind { kSphere, kCylinder, kCapsule, kBox, kTorus };
+  enum class Kind { kSphere, kCylinder, kCapsule, kBox, kTorus, kEllipsoid };
   switch (table.Get("shape").AsChoice<Kind>({{"sphere", Kind::kSphere},
                                              {"cylinder", Kind::kCylinder},
                                              {"capsule", Kind::kCapsule},
                                              {"box", Kind::kBox},
-                                             {"torus", Kind::kTorus}})) {
+                                             {"torus", Kind::kTorus},
+                                             {"ellipsoid", Kind::kEllipsoid}})) {
     case Kind::kCylinder:
       return SolidCylinder{table.Get("radius").AsPositive(), table.Get("length").AsPositive()};
     case Kind::kCapsule:
@@ -111,6 +119,8 @@ Shape ReadShape(TomlTable& table) {
       return ReadBox(table);
     case Kind::kTorus:
       return ReadTorus(table);
+    case Kind::kEllipsoid:
+      return ReadEllipsoid(table);
     case Kind::kSphere:
       break;
   }

@@ -50,6 +50,12 @@ Matrix3d CalcInertia(const SolidTorus& torus, double m) {
   return Diagonal(Ix, Ix, m * (R * R + 0.75 * r * r));
 }
 
+Matrix3d CalcInertia(const SolidEllipsoid& ellipsoid, double m) {
+  // I_x = m (b^2 + c^2) / 5 and cyclic
+  const Vector3d a2 = ellipsoid.semi_axes.array().square();
+  return Diagonal(a2.y() + a2.z(), a2.z() + a2.x(), a2.x() + a2.y()) * (m / 5.0);
+}
+
 }  // namespace
 
 Matrix3d CalcUniformInertia(const Shape& shape, double mass) {

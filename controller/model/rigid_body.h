@@ -17,7 +17,8 @@ struct MassProperties {
   Matrix3d inertia = Matrix3d::Zero();  ///< About the centre of mass, in the body's axes, kg m^2.
 };
 
-/// Solid of revolution or box with uniform density. Its own frame has the origin at the centre of mass.
+/// Solid of revolution, box or ellipsoid with uniform density. Its own frame has the origin at the centre of
+/// mass.
 struct SolidSphere {
   double radius;  ///< m
 };
@@ -36,7 +37,10 @@ struct SolidTorus {
   double ring_radius;  ///< Centre to the middle of the tube, m. The ring lies in the shape's x-y plane.
   double tube_radius;  ///< m
 };
-using Shape = std::variant<SolidSphere, SolidCylinder, SolidCapsule, SolidBox, SolidTorus>;
+struct SolidEllipsoid {
+  Vector3d semi_axes;  ///< Along the shape's x, y, z, m.
+};
+using Shape = std::variant<SolidSphere, SolidCylinder, SolidCapsule, SolidBox, SolidTorus, SolidEllipsoid>;
 
 /// Rotational inertia of a uniform solid about its centre of mass, in its own axes, kg m^2.
 Matrix3d CalcUniformInertia(const Shape& shape, double mass);

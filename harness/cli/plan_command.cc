@@ -150,8 +150,8 @@ GraspBlock MakeGraspBlock(const RobotModel& model, const Hand& hand, const Surfa
     block.zyz_deg.push_back(RadToDeg(zyz[i]));
   }
   for (const SurfacePoint& contact : plan.contacts) {
-    const SurfacePoint point = surface.ToChart(contact, 0);
-    block.contacts_deg.push_back({RadToDeg(point.u), RadToDeg(point.v)});
+    const Vector2d angles = AnglesOfPoint(surface, contact);
+    block.contacts_deg.push_back({RadToDeg(angles.x()), RadToDeg(angles.y())});
   }
   for (int joint = 0; joint < model.num_joints(); ++joint) {
     const double position = plan.q[model.num_base_positions() + joint];

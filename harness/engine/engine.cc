@@ -12,6 +12,7 @@
 #include "controller/common/errors.h"
 #include "harness/base/temporary_path.h"
 #include "harness/engine/cylinder_collision.h"
+#include "harness/engine/ellipsoid_collision.h"
 #include "harness/engine/finite_check.h"
 #include "harness/engine/mujoco_release.h"
 #include "harness/engine/newer_mjcf.h"
@@ -56,6 +57,7 @@ void PrepareEngine() {
   InstallMessageHandlers();
   CheckVersion();
   InstallCylinderCollision();
+  InstallEllipsoidCollision();
   InstallTorusCollision();
 }
 

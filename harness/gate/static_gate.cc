@@ -209,6 +209,9 @@ class StaticGate {
     } else if (const auto* box = std::get_if<SolidBox>(&shape)) {
       type = mjGEOM_BOX;
       sizes = {0.5 * box->size.x(), 0.5 * box->size.y(), 0.5 * box->size.z()};
+    } else if (const auto* ellipsoid = std::get_if<SolidEllipsoid>(&shape)) {
+      type = mjGEOM_ELLIPSOID;
+      sizes = {ellipsoid->semi_axes.x(), ellipsoid->semi_axes.y(), ellipsoid->semi_axes.z()};
     } else {
       return;
     }
@@ -228,7 +231,7 @@ class StaticGate {
     mjtNum R[9];
     mju_quat2Mat(R, engine_.geom_quat + 4 * found);
     Compare("object_shape", where, 1.0, std::abs(R[8]));  // the axis, or a box's z
-    if (type == mjGEOM_BOX) Compare("object_shape", where, 1.0, std::abs(R[0]));
+    if (type == mjGEOM_BOX || type == mjGEOM_ELLIPSOID) Compare("object_shape", where, 1.0, std::abs(R[0]));
   }
 
   /// Sliding friction of the explicit contact pairs between a fingertip and the object. Without a pair the

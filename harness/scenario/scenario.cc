@@ -104,7 +104,8 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
 }
 
 SurfacePoint ReadContact(const TomlValue& value) {
-  // On the torus: u around its axis, v around its tube.
+  // On the torus: u around its axis, v around its tube. What they mean on the object is found with its
+  // surface.
   const Vector2d degrees = value.AsVector<2>();
   return {DegToRad(degrees[0]), DegToRad(degrees[1]), 0};
 }

@@ -185,6 +185,9 @@ void Setup::FindFingertips() {
 void Setup::FindGrasp() {
   std::mt19937_64 random(scenario_.seed);
   if (scenario_.task) return PlaceTask(&random);
+  for (SurfacePoint& contact : scenario_.grasp.contacts) {
+    contact = PointAtAngles(*surface_, contact.u, contact.v);
+  }
   const GraspOptions given = scenario_.grasp;
   double residual = 0.0;
   std::string past_rim;
@@ -228,8 +231,10 @@ void Setup::VaryGrasp(std::mt19937_64* random) {
   for (auto& [name, angle] : grasp.joints) angle += draw(kVariedJoint);
   for (SurfacePoint& contact : grasp.contacts) {
     const Matrix2d M = surface_->Evaluate(contact).M;
-    contact.u += draw(std::min(kVariedContact, kFarthestContact / M.col(0).norm()));
-    contact.v += draw(std::min(kVariedContact, kFarthestContact / M.col(1).norm()));
+    SurfacePoint varied = contact;
+    varied.u += draw(std::min(kVariedContact, kFarthestContact / M.col(0).norm()));
+    varied.v += draw(std::min(kVariedContact, kFarthestContact / M.col(1).norm()));
+    if (surface_->Contains(varied, 0.0)) contact = varied;
   }
   for (double& x : grasp.X_FO.translation()) x += draw(kVariedPlace);
 }

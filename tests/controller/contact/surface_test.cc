@@ -284,5 +284,52 @@ TEST(SurfaceTest, BadInputIsAClearError) {
   EXPECT_EQ(sphere.Locate({0.0, 0.0, 0.02001}, 1e-4).chart, 1);
 }
 
+// A box: six flat charts that end at its edges.
+TEST(BoxTest, HasAFlatChartOnEachFaceThatEndsAtItsEdges) {
+  const Vector3d h(0.03, 0.04, 0.05);
+  const Box box(h);
+  std::mt19937 random(5);
+  std::vector<Vector3d> normals;
+  for (int chart = 0; chart < 6; ++chart) {
+    SCOPED_TRACE(chart);
+    for (int sample = 0; sample < kSamples; ++sample) {
+      const SurfacePoint alpha{0.029 * DrawVector(random, 1)[0], 0.029 * DrawVector(random, 1)[0], chart};
+      ASSERT_TRUE(box.Contains(alpha, 0.001));
+      const SurfaceGeometry geometry = box.Evaluate(alpha);
+      const Vector3d n = geometry.R.col(2);
+      EXPECT_TRUE(MatrixNear(geometry.R.transpose() * geometry.R, Matrix3d::Identity().eval(), kRounding));
+      EXPECT_NEAR(geometry.R.determinant(), 1.0, kRounding);
+      EXPECT_NEAR((geometry.p.cwiseAbs() - h).maxCoeff(), 0.0, kRounding);
+      EXPECT_NEAR(n.dot(geometry.p), n.cwiseAbs().dot(h), kRounding);
+      EXPECT_TRUE(MatrixNear(geometry.M, Matrix2d::Identity().eval(), kRounding));
+      EXPECT_TRUE(MatrixNear(geometry.K, Matrix2d::Zero().eval(), 0.0));
+      EXPECT_EQ(geometry.T.norm(), 0.0);
+      const Vector3d moved = box.Evaluate({alpha.u + 1e-3, alpha.v + 2e-3, chart}).p - geometry.p;
+      EXPECT_TRUE(MatrixNear(Vector3d(geometry.R.transpose() * moved), Vector3d(1e-3, 2e-3, 0.0), kRounding));
+      // Back from a point above and one below.
+      for (const double height : {0.01, -0.001}) {
+        const SurfaceProjection back = box.Project(geometry.p + height * n);
+        EXPECT_EQ(back.alpha.chart, chart);
+        EXPECT_NEAR(back.alpha.u, alpha.u, kRounding);
+        EXPECT_NEAR(back.alpha.v, alpha.v, kRounding);
+        EXPECT_NEAR(back.distance, height, kRounding);
+      }
+      if (sample == 0) normals.push_back(n);
+    }
+  }
+  for (size_t i = 0; i < normals.size(); ++i) {
+    for (size_t j = 0; j < i; ++j) EXPECT_LT(normals[i].dot(normals[j]), 0.5);
+  }
+  // Face +x is (u, v) = (y, z).
+  EXPECT_TRUE(box.Contains({0.04, 0.05, 0}, 0.0));
+  EXPECT_FALSE(box.Contains({0.04, 0.05, 0}, 1e-6));
+  EXPECT_FALSE(box.Contains({0.041, 0.0, 0}, 0.0));
+  EXPECT_NO_THROW(box.Evaluate({0.04, 0.05, 0}));
+  EXPECT_TRUE(Throws<SingularityError>([&] { box.Evaluate({0.041, 0.0, 0}); }, "beyond the edge"));
+  EXPECT_TRUE(Throws<std::invalid_argument>([] { Box(Vector3d(0.1, 0.0, 0.1)); }, "box half length"));
+  // Farther from an edge than from a face.
+  EXPECT_NEAR(box.Project({0.06, 0.08, 0.0}).distance, 0.05, kRounding);
+}
+
 }  // namespace
 }  // namespace dexcheck

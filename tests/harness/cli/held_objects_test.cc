@@ -25,6 +25,10 @@ const HeldObject kObjects[] = {
     {"ball", R"(type="sphere" size="0.046" mass="0.2")", "", "shape = \"sphere\"\nradius = 0.046"},
     {"can", R"(type="cylinder" size="0.046 0.03" mass="0.2")", "",
      "shape = \"cylinder\"\nradius = 0.046\nlength = 0.06"},
+    {"egg", R"(type="ellipsoid" size="0.05 0.046 0.06" mass="0.2")", "",
+     "shape = \"ellipsoid\"\nsemi_axes = [0.05, 0.046, 0.06]"},
+    {"brick", R"(type="box" size="0.06 0.046 0.05" mass="0.2")", "",
+     "shape = \"box\"\nsize = [0.12, 0.092, 0.1]"},
     {"doughnut", R"(type="mesh" mesh="torus" user="0.035 0.011" mass="0")",
      R"(<size nuser_geom="2"/><asset><mesh name="torus" file="torus.msh"/></asset>)",
      "shape = \"torus\"\nring_radius = 0.035\ntube_radius = 0.011"}};

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "controller/contact/shapes.h"
+#include "harness/engine/ellipsoid_collision.h"
 #include "harness/engine/engine.h"
 #include "tests/common/matrix_near.h"
 
@@ -96,6 +97,28 @@ TEST(CylinderCollision, IsTheEnginesToRounding) {
   data->qpos[7] = 0.0602 + 0.001;
   mj_fwdPosition(model.get(), data.get());
   EXPECT_EQ(data->ncon, 0);
+}
+
+// The nearest point, against the controller's side, which finds it by another method.
+TEST(EllipsoidCollision, FindsTheNearestPointsOutsideAndIn) {
+  const Vector3d axes(0.05, 0.03, 0.04);
+  const Ellipsoid surface(axes);
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> draw(-0.1, 0.1);
+  int inside = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Vector3d center(draw(random), draw(random), draw(random));
+    const SphereEllipsoidContact contact = CollideSphereEllipsoid(center, kBall, axes);
+    const SurfaceProjection projection = surface.Project(center);
+    const SurfaceGeometry place = surface.Evaluate(projection.alpha);
+    ASSERT_NEAR(contact.distance, projection.distance - kBall, 10.0 * kRounding);
+    ASSERT_TRUE(MatrixNear(contact.normal, Vector3d(-place.R.col(2)), 1e-12));
+    const Vector3d on_ellipsoid = contact.position + 0.5 * contact.distance * contact.normal;
+    ASSERT_NEAR(on_ellipsoid.cwiseQuotient(axes).norm(), 1.0, 1e-12);
+    inside += projection.distance < 0.0 ? 1 : 0;
+  }
+  EXPECT_GT(inside, 20);
+  EXPECT_NEAR(CollideSphereEllipsoid(Vector3d::Zero(), kBall, axes).distance, -0.03 - kBall, kRounding);
 }
 
 }  // namespace

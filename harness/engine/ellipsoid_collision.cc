@@ -1,0 +1,80 @@
+#include "harness/engine/ellipsoid_collision.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+namespace dexcheck {
+namespace {
+
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+int CollideGeoms(const mjModel* m, const mjData* d, mjContact* con, int g1, int g2, mjtNum margin) {
+  const Eigen::Map<const RowMatrix3d> R(d->geom_xmat + 9 * g2);
+  const Eigen::Map<const Vector3d> origin(d->geom_xpos + 3 * g2);
+  const Eigen::Map<const Vector3d> sphere(d->geom_xpos + 3 * g1);
+  const Eigen::Map<const Vector3d> semi_axes(m->geom_size + 3 * g2);
+  const Vector3d center = R.transpose() * (sphere - origin);
+  const double radius = m->geom_size[3 * g1];
+  if (center.norm() > semi_axes.maxCoeff() + radius + margin) return 0;
+  const SphereEllipsoidContact contact = CollideSphereEllipsoid(center, radius, semi_axes);
+  if (contact.distance > margin) return 0;
+  con->dist = contact.distance;
+  Eigen::Map<Vector3d>(con->pos) = origin + R * contact.position;
+  Eigen::Map<Vector3d>(con->frame) = R * contact.normal;
+  mju_zero3(con->frame + 3);
+  return 1;
+}
+
+}  // namespace
+
+SphereEllipsoidContact CollideSphereEllipsoid(const Vector3d& center, double sphere_radius,
+                                              const Vector3d& semi_axes) {
+  // The nearest point x has p - x = t grad, so x_i = a_i^2 p_i / (a_i^2 + t) with sum (x_i / a_i)^2 = 1. The
+  // sum falls from infinity at t = -a_min^2; halving finds where it is 1, to the last bit. In s = t +
+  // a_min^2.
+  const Vector3d a2 = semi_axes.array().square();
+  const Vector3d beyond = a2.array() - a2.minCoeff();
+  const Vector3d weighted = semi_axes.cwiseProduct(center.cwiseAbs());
+  const auto excess = [&](double s) {
+    double sum = -1.0;
+    for (int i = 0; i < 3; ++i) {
+      if (weighted[i] == 0.0) continue;
+      const double ratio = weighted[i] / (s + beyond[i]);
+      sum += ratio * ratio;
+    }
+    return sum;
+  };
+  double low = 0.0;
+  double high = weighted.norm();
+  while (true) {
+    const double middle = 0.5 * (low + high);
+    if (!(middle > low && middle < high)) break;
+    (excess(middle) > 0.0 ? low : high) = middle;
+  }
+  Vector3d on_sphere;  // x_i / a_i
+  for (int i = 0; i < 3; ++i) {
+    on_sphere[i] = weighted[i] == 0.0 ? 0.0 : std::copysign(weighted[i] / (high + beyond[i]), center[i]);
+  }
+  const double left = 1.0 - on_sphere.squaredNorm();
+  if (left > 1e-8) {
+    // In the plane of the longer axes: the shortest one's part is what is left.
+    Eigen::Index shortest = 0;
+    a2.minCoeff(&shortest);
+    on_sphere[shortest] = std::sqrt(left);
+  }
+  on_sphere.normalize();
+  const Vector3d outward = on_sphere.cwiseQuotient(semi_axes).normalized();
+  SphereEllipsoidContact contact;
+  contact.normal = -outward;
+  contact.distance = outward.dot(center - semi_axes.cwiseProduct(on_sphere)) - sphere_radius;
+  contact.position = center + (sphere_radius + 0.5 * contact.distance) * contact.normal;
+  return contact;
+}
+
+void InstallEllipsoidCollision() {
+  static std::once_flag once;
+  std::call_once(once, [] { mjCOLLISIONFUNC[mjGEOM_SPHERE][mjGEOM_ELLIPSOID] = CollideGeoms; });
+}
+
+}  // namespace dexcheck
