@@ -147,7 +147,7 @@ void Assign(std::string_view assignment, toml::table* root) {
 }  // namespace
 
 TomlDocument::TomlDocument(std::string_view text, std::string_view source)
-    : context_(std::make_unique<TomlContext>(TomlContext{std::string(source), {}})) {
+    : context_(std::make_unique<TomlContext>(TomlContext{std::string(source), {}, {}})) {
   CheckSize(text.size(), source);
   if (const int line = NestingScanner(text).FindTooDeep(); line > 0) {
     throw InputError(context_->source + ":" + std::to_string(line) + ": nested too deeply, more than " +

@@ -60,8 +60,42 @@ std::string Format(const toml::node& node) {
 
 }  // namespace
 
+void TomlContext::RejectMissing() const {
+  constexpr size_t kMostTables = 20;  // that one line tells of
+  if (missing.empty()) return;
+  // In the file's order; what does not come from the file is last.
+  std::vector<MissingKeys> sorted = missing;
+  std::stable_sort(sorted.begin(), sorted.end(), [](const MissingKeys& a, const MissingKeys& b) {
+    return a.line != 0 && (b.line == 0 || a.line < b.line);
+  });
+  std::string text;
+  for (const MissingKeys& keys : sorted) {
+    if (&keys - sorted.data() == kMostTables) {
+      text += "; and more in " + std::to_string(sorted.size() - kMostTables) + " other places";
+      break;
+    }
+    const bool is_first = text.empty();
+    const std::string where = is_first || keys.line == 0 ? keys.where : "line " + std::to_string(keys.line);
+    text += (is_first ? "" : "; ") + where + ": " + (keys.path.empty() ? "" : Abbreviate(keys.path) + ": ");
+    if (keys.names.empty()) {
+      text += keys.problem;
+      continue;
+    }
+    text += "missing key ";
+    for (const std::string& name : keys.names)
+      text += (&name == &keys.names.front() ? "" : ", ") + Quote(name);
+  }
+  throw InputError(text);
+}
+
 TomlValue::TomlValue(const TomlContext& context, const toml::node& node, std::string path)
     : context_(&context), node_(&node), path_(std::move(path)) {}
+
+TomlValue TomlValue::StandIn(const TomlContext& context, const toml::node& node, std::string path) {
+  TomlValue value(context, node, std::move(path));
+  value.is_missing_ = true;
+  return value;
+}
 
 std::string TomlValue::Show() const {
   const toml::table* table = node_->as_table();
@@ -80,15 +114,47 @@ void TomlValue::Fail(std::string_view requirement) const {
   Reject(std::string(requirement) + ", got " + Abbreviate(Format(*node_)));
 }
 
-void TomlValue::Reject(std::string_view problem) const {
-  const std::string key = path_.empty() ? "" : Abbreviate(path_) + ": ";
+std::string TomlValue::Locate() const {
   // A value that was overridden has its own source, which says where it comes from better than a line does.
   const toml::source_path_ptr& own_source = node_->source().path;
-  const std::string where = own_source ? *own_source : context_->source + ":" + std::to_string(line());
-  throw InputError(where + ": " + key + std::string(problem));
+  return own_source ? *own_source : context_->source + ":" + std::to_string(line());
+}
+
+void TomlValue::Reject(std::string_view problem) const {
+  context_->RejectMissing();
+  const std::string key = path_.empty() ? "" : Abbreviate(path_) + ": ";
+  throw InputError(Locate() + ": " + key + std::string(problem));
+}
+
+void TomlValue::NoteMissing(const std::string& key) const {
+  const bool is_own = node_->source().path != nullptr;
+  MissingKeys keys{Locate(), is_own ? 0 : line(), path_, {}, ""};
+  std::vector<MissingKeys>& all = context_->missing;
+  // What two arms are made from is read twice.
+  const auto same = std::find_if(all.begin(), all.end(), [&](const MissingKeys& other) {
+    return other.where == keys.where && other.path == keys.path && !other.names.empty();
+  });
+  if (same == all.end()) {
+    keys.names = {key};
+    all.push_back(std::move(keys));
+  } else if (std::find(same->names.begin(), same->names.end(), key) == same->names.end()) {
+    same->names.push_back(key);
+  }
+}
+
+void TomlValue::NoteMisspelt(const std::string& key) const {
+  const bool is_own = node_->source().path != nullptr;
+  const MissingKeys note{
+      Locate(), is_own ? 0 : line(), path_, {}, "unknown key, did you mean " + Quote(key) + "?"};
+  std::vector<MissingKeys>& all = context_->missing;
+  const bool is_new = std::none_of(all.begin(), all.end(), [&](const MissingKeys& other) {
+    return other.where == note.where && other.path == note.path && other.problem == note.problem;
+  });
+  if (is_new) all.push_back(note);
 }
 
 double TomlValue::AsNumber() const {
+  if (is_missing_) return 1.0;
   if (!node_->is_number() && !node_->is_string()) Fail("must be a number");
   if (node_->is_number()) {
     // value<double>() has none where a whole number does not fit a double exactly.
@@ -119,6 +185,7 @@ double TomlValue::AsNotNegative() const {
 }
 
 long TomlValue::AsWhole(long least, long most) const {
+  if (is_missing_) return std::clamp(1L, least, most);
   const auto value = node_->value_exact<int64_t>();
   if (!value || *value < least || *value > most) {
     Fail("must be a whole number from " + std::to_string(least) + " to " + std::to_string(most));
@@ -127,12 +194,14 @@ long TomlValue::AsWhole(long least, long most) const {
 }
 
 bool TomlValue::AsFlag() const {
+  if (is_missing_) return false;
   const auto value = node_->value_exact<bool>();
   if (!value) Fail("must be true or false");
   return *value;
 }
 
 std::string TomlValue::AsText() const {
+  if (is_missing_) return "missing";
   if (!IsText()) Fail("must be text");
   return **node_->as_string();
 }
@@ -144,6 +213,7 @@ std::string TomlValue::AsName() const {
 }
 
 std::vector<TomlValue> TomlValue::AsList() const {
+  if (is_missing_) return {};
   const toml::array* list = node_->as_array();
   if (list == nullptr) Fail("must be a list");
   std::vector<TomlValue> entries;
@@ -154,12 +224,18 @@ std::vector<TomlValue> TomlValue::AsList() const {
 }
 
 TomlTable TomlValue::AsTable() const {
+  static const toml::table kNothing;
+  if (is_missing_) return {*context_, *this, kNothing, /*is_missing=*/true};
   const toml::table* table = node_->as_table();
   if (table == nullptr) Fail("must be a table");
   return {*context_, *this, *table};
 }
 
 void TomlValue::CopyNumbers(double* target, int count) const {
+  if (is_missing_) {
+    std::fill_n(target, count, 1.0);
+    return;
+  }
   const std::vector<TomlValue> entries = AsList();
   if (entries.size() != static_cast<size_t>(count)) {
     Fail("must be a list of " + std::to_string(count) + " numbers");
@@ -167,12 +243,15 @@ void TomlValue::CopyNumbers(double* target, int count) const {
   for (const TomlValue& entry : entries) *target++ = entry.AsNumber();
 }
 
-TomlTable::TomlTable(const TomlContext& context, TomlValue self, const toml::table& table)
-    : context_(&context), self_(std::move(self)), table_(&table) {}
+TomlTable::TomlTable(const TomlContext& context, TomlValue self, const toml::table& table, bool is_missing)
+    : context_(&context), self_(std::move(self)), table_(&table), is_missing_(is_missing) {}
+
+std::string TomlTable::MakePath(std::string_view key) const {
+  return (self_.path().empty() ? "" : self_.path() + ".") + std::string(key);
+}
 
 TomlValue TomlTable::MakeValue(std::string_view key, const toml::node& node) const {
-  const std::string prefix = self_.path().empty() ? "" : self_.path() + ".";
-  return {*context_, node, prefix + std::string(key)};
+  return {*context_, node, MakePath(key)};
 }
 
 std::optional<TomlValue> TomlTable::Find(std::string_view key) {
@@ -184,8 +263,7 @@ std::optional<TomlValue> TomlTable::Find(std::string_view key) {
 
 TomlValue TomlTable::Get(std::string_view key) {
   std::optional<TomlValue> value = Find(key);
-  if (!value) FailMissing(key);
-  return *std::move(value);
+  return value ? *std::move(value) : Miss(key);
 }
 
 std::vector<std::pair<std::string, TomlValue>> TomlTable::ListInFileOrder() const {
@@ -213,8 +291,7 @@ std::pair<std::optional<TomlValue>, double> TomlTable::FindWithAngleUnit(const s
 
 double TomlTable::GetAngle(const std::string& key) {
   const auto [value, unit] = FindWithAngleUnit(key);
-  if (!value) FailMissing(key + "_deg");
-  return unit * value->AsNumber();
+  return unit * (value ? *value : Miss(key + "_deg")).AsNumber();
 }
 
 void TomlTable::RejectUnknown(const TomlValue& value, const std::string& nearest) const {
@@ -244,12 +321,18 @@ void TomlTable::RejectOthersThan(std::initializer_list<std::string_view> keys) {
   RejectUnused();
 }
 
-void TomlTable::FailMissing(std::string_view key) const {
+TomlValue TomlTable::Miss(std::string_view key) {
   const std::string missing(key);
+  TomlValue stand_in = TomlValue::StandIn(*context_, *table_, MakePath(key));
+  if (is_missing_) return stand_in;
   for (const auto& [unused, value] : ListInFileOrder()) {
-    if (!asked_.contains(unused) && !FindNearest(unused, {missing}).empty()) RejectUnknown(value, missing);
+    if (asked_.contains(unused) || FindNearest(unused, {missing}).empty()) continue;
+    value.NoteMisspelt(missing);
+    asked_.insert(unused);
+    return stand_in;
   }
-  self_.Reject("missing key " + Quote(missing));
+  self_.NoteMissing(missing);
+  return stand_in;
 }
 
 }  // namespace dexcheck

@@ -6,9 +6,13 @@
 //   TomlTable root = document.Open();
 //   const double radius = root.Get("radius").AsPositive();
 //   root.RejectUnused();  // A key that nobody asked for is misspelt.
+//
+// A key that is missing does not end the reading: something stands in for it, so that TomlDocument::Read can
+// tell all that are missing at once.
 
 #include <toml++/toml.h>
 
+#include <exception>
 #include <initializer_list>
 #include <memory>
 #include <optional>
@@ -23,19 +27,36 @@
 
 namespace dexcheck {
 
+/// Keys that one table does not have, or has misspelt.
+struct MissingKeys {
+  std::string where;               ///< "FILE:LINE".
+  int line = 0;                    ///< 0 for what does not come from the file.
+  std::string path;                ///< Of the table; empty at the top.
+  std::vector<std::string> names;  ///< Empty for a misspelt key, of which `problem` tells.
+  std::string problem;
+};
+
 /// What all values of one file share.
 struct TomlContext {
-  std::string source;   ///< The file, for messages.
-  SymbolTable symbols;  ///< For quoted arithmetic.
+  std::string source;                        ///< The file, for messages.
+  SymbolTable symbols;                       ///< For quoted arithmetic.
+  mutable std::vector<MissingKeys> missing;  ///< So far.
+
+  /// Throws InputError, one line with all keys that are missing so far; without any it does nothing.
+  void RejectMissing() const;
 };
 
 class TomlTable;
 
 /// One value of a file and the dotted path that leads to it. Lives as long as its document.
-/// Every function that cannot deliver throws InputError, one line "FILE:LINE: PATH: what, got VALUE".
+/// Every function that cannot deliver throws InputError, one line "FILE:LINE: PATH: what, got VALUE"; when
+/// keys have been found missing before, the line tells of those instead.
 class TomlValue {
  public:
   TomlValue(const TomlContext& context, const toml::node& node, std::string path);
+  /// Stands in for a key that is missing in the table at `node`: 1, false, "missing", the first choice, or
+  /// an empty list or table.
+  static TomlValue StandIn(const TomlContext& context, const toml::node& node, std::string path);
 
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] int line() const;
@@ -76,6 +97,7 @@ class TomlValue {
   /// What stands beside the text in the list of choices.
   template <typename T>
   [[nodiscard]] T AsChoice(std::initializer_list<std::pair<std::string_view, T>> choices) const {
+    if (is_missing_) return choices.begin()->second;
     const std::string text = AsText();
     std::string known;
     for (const auto& [name, choice] : choices) {
@@ -92,19 +114,27 @@ class TomlValue {
   [[noreturn]] void Fail(std::string_view requirement) const;
   /// Throws "FILE:LINE: PATH: problem".
   [[noreturn]] void Reject(std::string_view problem) const;
+  /// Of this table: that it does not have a key.
+  void NoteMissing(const std::string& key) const;
+  /// That it stands under a key which looks like another one.
+  void NoteMisspelt(const std::string& key) const;
 
  private:
   void CopyNumbers(double* target, int count) const;
+  /// "FILE:LINE", or where the value was set.
+  [[nodiscard]] std::string Locate() const;
 
   const TomlContext* context_;
   const toml::node* node_;
   std::string path_;
+  bool is_missing_ = false;
 };
 
 /// A table that keeps track of the keys that were asked for.
 class TomlTable {
  public:
-  TomlTable(const TomlContext& context, TomlValue self, const toml::table& table);
+  /// @param is_missing the table is not there, so that nothing is missing in it.
+  TomlTable(const TomlContext& context, TomlValue self, const toml::table& table, bool is_missing = false);
 
   /// The value under a key that must be there.
   TomlValue Get(std::string_view key);
@@ -131,10 +161,12 @@ class TomlTable {
   void RejectUnused() const;
   /// Throws at the first key that is not one of these.
   void RejectOthersThan(std::initializer_list<std::string_view> keys);
-  /// Throws that a key is missing, unless an unused key looks like a misspelling of it.
-  [[noreturn]] void FailMissing(std::string_view key) const;
+  /// Notes that a key is missing, or that an unused key looks like a misspelling of it. @return what stands
+  /// in for it.
+  TomlValue Miss(std::string_view key);
 
  private:
+  [[nodiscard]] std::string MakePath(std::string_view key) const;
   [[nodiscard]] TomlValue MakeValue(std::string_view key, const toml::node& node) const;
   [[nodiscard]] std::vector<std::pair<std::string, TomlValue>> ListInFileOrder() const;
   [[noreturn]] void RejectUnknown(const TomlValue& value, const std::string& nearest) const;
@@ -142,6 +174,7 @@ class TomlTable {
   const TomlContext* context_;
   TomlValue self_;
   const toml::table* table_;
+  bool is_missing_;
   std::set<std::string, std::less<>> asked_;
 };
 
@@ -156,6 +189,20 @@ class TomlDocument {
   TomlDocument(std::string_view text, std::string_view source);
 
   [[nodiscard]] TomlTable Open() const;
+  /// What a function makes of the whole file. Whatever it throws, keys that are missing come first.
+  template <typename Function>
+  auto Read(const Function& function) const {
+    try {
+      auto result = function(Open());
+      context_->RejectMissing();
+      return result;
+    } catch (const std::exception&) {
+      context_->RejectMissing();
+      throw;
+    }
+  }
+  /// Throws when keys were missing so far.
+  void RejectMissing() const { context_->RejectMissing(); }
   /// Sets a value in place of the file's by an assignment "PATH=VALUE"; tables on the way are made. Whole
   /// numbers in the path count the entries of lists, from 0. A value that is not TOML is taken as text.
   /// @throws InputError when this is no assignment, or its path leads through what is no table or list.

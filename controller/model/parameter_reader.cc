@@ -93,13 +93,7 @@ ObjectModel ReadObject(const TomlValue& value) {
   return object;
 }
 
-}  // namespace
-
-RobotModel ParseRobotModel(std::string_view text, std::string_view source,
-                           std::span<const std::string> overrides) {
-  TomlDocument document(text, source);
-  for (const std::string& assignment : overrides) document.Override(assignment);
-  TomlTable root = document.Open();
+RobotModel ReadRobot(TomlTable& root, std::string_view source, TomlDocument& document) {
   // First of all, since a misspelt section makes others look wrong.
   root.RejectOthersThan({"name", "gravity", "lengths", "base", "chain", "template", "frame", "object"});
   DefineLengths(root, document);
@@ -111,7 +105,17 @@ RobotModel ParseRobotModel(std::string_view text, std::string_view source,
   spec.base = ReadBase(root.Get("base"));
   ReadTree(root, spec);
   if (const std::optional<TomlValue> object = root.Find("object")) spec.object = ReadObject(*object);
+  document.RejectMissing();
   return RobotModel(std::move(spec));
+}
+
+}  // namespace
+
+RobotModel ParseRobotModel(std::string_view text, std::string_view source,
+                           std::span<const std::string> overrides) {
+  TomlDocument document(text, source);
+  for (const std::string& assignment : overrides) document.Override(assignment);
+  return document.Read([&](TomlTable root) { return ReadRobot(root, source, document); });
 }
 
 RobotModel ReadRobotModel(const std::filesystem::path& path) {

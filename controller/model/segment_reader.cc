@@ -93,8 +93,8 @@ MimicEntry ReadMimic(const TomlValue& value) {
 
 JointEntry ReadJointEntry(const TomlValue& value) {
   TomlTable table = value.AsTable();
-  const auto [range, unit] = table.FindWithAngleUnit("range");
-  if (!range) table.FailMissing("range");
+  auto [range, unit] = table.FindWithAngleUnit("range");
+  if (!range) range = table.Miss("range");
   const Vector2d limits = unit * range->AsVector<2>();
   if (limits[0] > limits[1]) range->Fail("lower limit must not exceed upper limit");
   const std::optional<TomlValue> dry_friction = table.Find("dry_friction");

@@ -309,17 +309,9 @@ std::shared_ptr<const Scenario> ReadWritten(const std::string& text, const std::
   }
 }
 
-}  // namespace
-
-Scenario ParseScenario(const std::string& text, const std::string& source,
-                       const std::filesystem::path& folder, const std::vector<std::string>& overrides) {
-  Scenario scenario;
-  scenario.text = text;
-  scenario.source = source;
-  scenario.overrides = overrides;
-  std::vector<std::string> model_overrides;
-  const TomlDocument document = OpenDocument(text, source, overrides, &model_overrides);
-  TomlTable root = document.Open();
+/// @param scenario what is known of it before its file is read.
+Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
+                      const std::vector<std::string>& model_overrides, Scenario scenario) {
   root.RejectOthersThan({"name", "description", "duration", "settle", "start", "start_error", "model",
                          "plant", "grasp", "task", "trajectory", "joint_motion", "control", "sensing",
                          "actuation", "disturbance", "mismatch", "bounds", "expect"});
@@ -356,7 +348,7 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
     for (const auto& [name, value] : bounds->AsTable().GetEntries()) {
       scenario.bounds.emplace_back(name, value.AsNotNegative());
     }
-    if (!overrides.empty()) scenario.written = ReadWritten(text, source, folder);
+    if (!scenario.overrides.empty()) scenario.written = ReadWritten(scenario.text, scenario.source, folder);
   }
   if (const auto expect = root.Find("expect"))
     ReadExpectation(*expect, scenario.joint_motion.has_value(), &scenario.expect);
@@ -373,6 +365,19 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   TomlTable trajectory = root.Get("trajectory").AsTable();
   scenario.trajectory = ReadTrajectory(trajectory);
   return scenario;
+}
+
+}  // namespace
+
+Scenario ParseScenario(const std::string& text, const std::string& source,
+                       const std::filesystem::path& folder, const std::vector<std::string>& overrides) {
+  Scenario scenario;
+  scenario.text = text;
+  scenario.source = source;
+  scenario.overrides = overrides;
+  std::vector<std::string> model_overrides;
+  const TomlDocument document = OpenDocument(text, source, overrides, &model_overrides);
+  return document.Read([&](TomlTable root) { return ReadScenario(root, folder, model_overrides, scenario); });
 }
 
 }  // namespace dexcheck

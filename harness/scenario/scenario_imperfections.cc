@@ -128,8 +128,8 @@ void ReadWrench(TomlTable& table, DisturbanceOptions::Kind kind, double time_ste
 
 /// A number or a list of two, in rad.
 void ReadSlope(TomlTable& table, Vector2d* slope) {
-  const auto [value, unit] = table.FindWithAngleUnit("slope");
-  if (!value) table.FailMissing("slope");
+  auto [value, unit] = table.FindWithAngleUnit("slope");
+  if (!value) value = table.Miss("slope");
   *slope = unit * value->AsVector<2>();
   if (slope->cwiseAbs().maxCoeff() > kLargestSlope) value->Fail("must be at most 30 degrees");
 }

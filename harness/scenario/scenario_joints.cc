@@ -31,7 +31,7 @@ JointMotionOptions::Point ReadPoint(const TomlValue& value, double time_before) 
   point.time = time.AsPositive();
   if (point.time <= time_before) time.Fail("must be greater than the time before");
   point.where = ReadNumbers(table, "joints");
-  if (point.where.key.empty()) table.FailMissing("joints_deg");
+  if (point.where.key.empty()) table.Miss("joints_deg");
   table.RejectUnused();
   return point;
 }
@@ -42,8 +42,8 @@ JointMotionOptions::Oscillation ReadOscillation(const TomlValue& value) {
   const TomlValue joint = table.Get("joint");
   one.joint = joint.AsName();
   one.key = value.path();
-  const auto [amplitude, unit] = table.FindWithAngleUnit("amplitude");
-  if (!amplitude) table.FailMissing("amplitude_deg");
+  auto [amplitude, unit] = table.FindWithAngleUnit("amplitude");
+  if (!amplitude) amplitude = table.Miss("amplitude_deg");
   one.amplitude = unit * amplitude->AsNumber();
   one.in_degrees = unit != 1.0;
   const TomlValue frequency = table.Get("frequency");

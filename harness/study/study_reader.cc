@@ -418,14 +418,8 @@ void RequireFewTrials(const TomlValue& where, const Study& study) {
   }
 }
 
-}  // namespace
-
-Study ParseStudy(const std::string& text, const std::string& source) {
-  Study study;
-  study.text = text;
-  study.source = source;
-  const TomlDocument document(text, source);
-  TomlTable root = document.Open();
+/// @param study what is known of it before its file is read.
+Study ReadStudy(TomlTable& root, Study study) {
   root.RejectOthersThan({"name", "description", "scenario", "set", "seeds", "check", "trial_time_limit",
                          "stop_error", "metrics", "sample", "search", "objective", "constraints", "vary",
                          "nested"});
@@ -479,6 +473,16 @@ Study ParseStudy(const std::string& text, const std::string& source) {
   if (const auto nested = root.Find("nested")) ReadNested(*nested, &study);
   RequireFewTrials(vary, study);
   return study;
+}
+
+}  // namespace
+
+Study ParseStudy(const std::string& text, const std::string& source) {
+  Study study;
+  study.text = text;
+  study.source = source;
+  const TomlDocument document(text, source);
+  return document.Read([&](TomlTable root) { return ReadStudy(root, study); });
 }
 
 }  // namespace dexcheck

@@ -327,7 +327,27 @@ TEST(ParameterTexts, OfExcessiveSizeOrDepthAreRefused) {
   // Brackets and dots in text and comments do not count.
   EXPECT_EQ(CatchProblem(ShippedText() + "\n# " + Repeat("[.", 100) + "\n"), "accepted");
   EXPECT_EQ(CatchProblem("name = \"\\\"" + Repeat("[.", 100) + "\""),
-            "robot.toml:1: missing key \"gravity\"");
+            "robot.toml:1: missing key \"gravity\", \"base\", \"chain\"");
+}
+
+TEST(ParameterTexts, AllMissingKeysAreToldAtOnce) {
+  std::string text = ShippedText();
+  const auto change = [&](const std::string& from, const std::string& to) {
+    ASSERT_NE(text.find(from), std::string::npos) << from;
+    text.replace(text.find(from), from.size(), to);
+  };
+  change("gravity = [0.0, 0.0, -9.81]\n", "\n");
+  change("friction = 0.8\n", "\n");
+  change(kWaistRow, R"(link = "waist", alpha_dge = 0, a = 0,)");
+  // Of a template that two arms are made from.
+  change(kElbow, "elbow = { damping = 0.2 }");
+  EXPECT_EQ(
+      CatchProblem(text),
+      FillInLines("robot.toml:1: missing key \"gravity\"; line {alpha_dge}: chain[0].rows[0].alpha_dge: "
+                  "unknown key, did you mean \"alpha_deg\"?; line {alpha_dge}: chain[0].rows[0]: "
+                  "missing key \"q_deg\"; line {elbow = {}: template.arm.joints.elbow: missing key "
+                  "\"range\", \"armature\"; line {[object]}: object: missing key \"friction\"",
+                  text));
 }
 
 TEST(ParameterTexts, CannotAskForMillionsOfJoints) {

@@ -62,6 +62,22 @@ TEST(ReadScenario, ReadsWhatIsNotIdeal) {
   EXPECT_TRUE(ReadShippedScenario("curve").imperfections.is_ideal());
 }
 
+TEST(Scenario, AllMissingKeysAreToldAtOnce) {
+  const auto problem = [](const std::string& text) {
+    try {
+      ParseScenario(text, "new.toml", "", {});
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_EQ(problem("description = \"mine\""),
+            "new.toml:1: missing key \"name\", \"duration\", \"start\", \"grasp\", \"control\", "
+            "\"trajectory\"");
+  // A value that is wrong as well is told when nothing is missing any more.
+  EXPECT_EQ(problem("name = \"mine\"\nsettle = 1e9"), "new.toml:1: missing key \"duration\"");
+}
+
 struct BadInput {
   const char* name;
   std::vector<std::string> overrides;

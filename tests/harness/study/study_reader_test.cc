@@ -255,6 +255,9 @@ TEST(StudyReader, MistakesAreNamed) {
                               message);
   };
   EXPECT_TRUE(fails("scenario =", "scenaro =", "study.toml:3: scenaro"));
+  EXPECT_TRUE(Throws<InputError>(
+      [] { return ParseStudy("check = true\n[search]\nmethod = \"directions\"\n", "study.toml"); },
+      "study.toml:1: missing key \"name\", \"scenario\", \"vary\""));
   EXPECT_TRUE(fails("\"energy\"", "\"enrgy\"", "did you mean \"energy\"?"));
   EXPECT_TRUE(fails("to = 100", "to = 1", "study.toml:12: vary[0].to: must be greater than from, got 1"));
   EXPECT_TRUE(fails("from = 1", "from = 0", "from: must be positive, got 0"));
