@@ -339,8 +339,12 @@ Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
     ReadJointControl(root.Get("control"), &scenario);
     RequireJointMotion(scenario);
   } else {
-    ReadGrasp(root.Get("grasp"), scenario.task.has_value(), &scenario);
-    ReadControl(root.Get("control"), &scenario);
+    // First, so that all that are missing are told together.
+    const TomlValue grasp = root.Get("grasp");
+    const TomlValue control = root.Get("control");
+    if (!scenario.task) (void)root.Get("trajectory");
+    ReadGrasp(grasp, scenario.task.has_value(), &scenario);
+    ReadControl(control, &scenario);
   }
   if (scenario.task) FinishTask(&scenario);
   scenario.imperfections = ReadImperfections(&root, scenario.plant.time_step);
