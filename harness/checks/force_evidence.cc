@@ -11,7 +11,7 @@ namespace dexcheck {
 namespace {
 
 // A candidate that explains this much of the squares is the force; what soft contacts add is less.
-constexpr double kExplains = 0.95;
+constexpr double kForceExplains = 0.95;
 // A joint is preferred to a body that explains hardly more: a body has three numbers each step.
 constexpr double kSimpler = 0.02;
 // The first steps are looked at, then every one that is a power of two away.
@@ -154,7 +154,7 @@ ForceFinding ForceEvidence::Find() const {
 }
 
 bool ForceEvidence::IsSlope(const ForceFinding& finding, const Vector3d& gravity) {
-  if (finding.gravity_share < kExplains || gravity.isZero(0.0)) return false;
+  if (finding.gravity_share < kForceExplains || gravity.isZero(0.0)) return false;
   const double along = std::abs(finding.gravity.dot(gravity.normalized()));
   return along < kTilted * finding.gravity.norm();
 }
@@ -169,7 +169,7 @@ std::string ForceEvidence::Tell() const {
            Short(finding.gravity.x()) + ", " + Short(finding.gravity.y()) + ", " +
            Short(finding.gravity.z()) + ") m/s^2; explains " + Percent(finding.gravity_share);
   }
-  if (finding.gravity_share >= kExplains) {
+  if (finding.gravity_share >= kForceExplains) {
     return "gravity differs by (" + Short(finding.gravity.x()) + ", " + Short(finding.gravity.y()) + ", " +
            Short(finding.gravity.z()) + ") m/s^2; explains " + Percent(finding.gravity_share);
   }
@@ -178,12 +178,14 @@ std::string ForceEvidence::Tell() const {
     return "on body " + model_->object()->name + ", up to " + Short(finding.object_force) + " N, " +
            Short(finding.object_moment) + " N m; " + Percent(finding.object_share) + " of what is left";
   }
-  const bool joint = finding.joint_share >= kExplains || finding.joint_share + kSimpler >= finding.link_share;
+  const bool joint =
+      finding.joint_share >= kForceExplains || finding.joint_share + kSimpler >= finding.link_share;
   if (joint) {
-    return std::string(finding.joint_share >= kExplains ? "at" : "nearest:") + " joint " + finding.joint +
-           ", up to " + Short(std::abs(finding.torque)) + " N m; explains " + Percent(finding.joint_share);
+    return std::string(finding.joint_share >= kForceExplains ? "at" : "nearest:") + " joint " +
+           finding.joint + ", up to " + Short(std::abs(finding.torque)) + " N m; explains " +
+           Percent(finding.joint_share);
   }
-  return std::string(finding.link_share >= kExplains ? "on" : "nearest:") + " body " + finding.link +
+  return std::string(finding.link_share >= kForceExplains ? "on" : "nearest:") + " body " + finding.link +
          ", up to " + Short(finding.link_force) + " N at its centre of mass; explains " +
          Percent(finding.link_share);
 }

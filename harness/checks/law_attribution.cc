@@ -7,7 +7,7 @@ namespace dexcheck {
 namespace {
 
 // What a summand explains less well than this is not its doing.
-constexpr double kExplains = 0.98;
+constexpr double kPartExplains = 0.98;
 // A factor nearer to zero than this is one of a part that is missing.
 constexpr double kZero = 1e-6;
 // Two explanations that differ by less are equally good.
@@ -46,7 +46,7 @@ std::string LawAttribution::Tell() const {
   LawFinding found = FindOne();
   if (std::abs(found.factor) < kZero) found.factor = 0.0;
   char text[256];
-  if (found.explained < kExplains) {
+  if (found.explained < kPartExplains) {
     std::snprintf(text, sizeof(text),
                   "no single part of (55) explains the torque difference; nearest: %s, %.0f %%",
                   found.name.c_str(), 100.0 * found.explained);

@@ -11,33 +11,33 @@ namespace dexcheck {
 namespace {
 
 // One number that explains this much of the squares says all; what is left is rounding, or the first steps.
-constexpr double kExplains = 0.98;
+constexpr double kNumberExplains = 0.98;
 // Readings' differences below this are rounding of packing them.
 constexpr double kRounding = 1e-15;
 // Of entries that differ, this share is "all" of them.
 constexpr double kMost = 0.5;
 
-std::string Short(double value) { return FormatNumber(value, 4); }
+std::string FourDigits(double value) { return FormatNumber(value, 4); }
 
 /// In words, of a signal in `unit`. Empty when no single number explains it.
 std::string Describe(const SignalFinding& finding, const std::string& unit, double time_step) {
   using Kind = SignalFinding::Kind;
   switch (finding.kind) {
     case Kind::kGain:
-      return Short(finding.value) + " times";
+      return FourDigits(finding.value) + " times";
     case Kind::kOffset:
-      return Short(std::abs(finding.value)) + " " + unit +
+      return FourDigits(std::abs(finding.value)) + " " + unit +
              (finding.value > 0.0 ? " more than" : " less than");
     case Kind::kDelay:
-      return Short(finding.value) + (finding.value == 1.0 ? " step (" : " steps (") +
-             Short(1e3 * finding.value * time_step) + " ms) after";
+      return FourDigits(finding.value) + (finding.value == 1.0 ? " step (" : " steps (") +
+             FourDigits(1e3 * finding.value * time_step) + " ms) after";
     case Kind::kLag:
-      return Short(finding.value) + " of the way a step (" +
-             Short(-1e3 * time_step / std::log1p(-std::min(finding.value, 0.999999))) + " ms) towards";
+      return FourDigits(finding.value) + " of the way a step (" +
+             FourDigits(-1e3 * time_step / std::log1p(-std::min(finding.value, 0.999999))) + " ms) towards";
     case Kind::kDryFriction:
-      return Short(finding.value) + " " + unit + " of dry friction less than";
+      return FourDigits(finding.value) + " " + unit + " of dry friction less than";
     case Kind::kDamping:
-      return Short(finding.value) + " " + unit + " s/rad of damping less than";
+      return FourDigits(finding.value) + " " + unit + " s/rad of damping less than";
     case Kind::kNone:
       break;
   }
@@ -138,7 +138,7 @@ SignalFinding SignalEvidence::Fit(Eigen::Index begin, Eigen::Index count) const 
     const double left = lag_change_.segment(begin, count).sum() - share * by;
     if (0.0 < share && share < 1.0) offer(Kind::kLag, share, 1.0 - left / all);
   }
-  if (best.explained < kExplains) best.kind = Kind::kNone;
+  if (best.explained < kNumberExplains) best.kind = Kind::kNone;
   return best;
 }
 
@@ -164,16 +164,17 @@ std::string MotorEvidence::Tell() const {
     const std::string how = Describe(evidence_.FindCommon(), "N m", time_step_);
     const std::string& worst = names_[static_cast<size_t>(different.front())];
     return how.empty() ? "most motors differ, motor " + worst + " by up to " +
-                             Short(evidence_.largest(different.front())) + " N m"
+                             FourDigits(evidence_.largest(different.front())) + " N m"
                        : "all motors give " + how + " what was sent";
   }
   std::string text;
   constexpr size_t kMostNamed = 3;
   for (size_t i = 0; i < std::min(different.size(), kMostNamed); ++i) {
     const std::string how = Describe(evidence_.Find(different[i]), "N m", time_step_);
-    text += (i == 0 ? "motor " : ", motor ") + names_[static_cast<size_t>(different[i])] +
-            (how.empty() ? " is up to " + Short(evidence_.largest(different[i])) + " N m off what was sent"
-                         : " gives " + how + " what was sent");
+    text +=
+        (i == 0 ? "motor " : ", motor ") + names_[static_cast<size_t>(different[i])] +
+        (how.empty() ? " is up to " + FourDigits(evidence_.largest(different[i])) + " N m off what was sent"
+                     : " gives " + how + " what was sent");
   }
   if (different.size() > kMostNamed)
     text += " and " + std::to_string(different.size() - kMostNamed) + " more";
@@ -248,9 +249,9 @@ std::string SensorEvidence::Tell() const {
     const auto entry = static_cast<size_t>(different[i]);
     const std::string how = Describe(evidence_.Find(different[i]), units_[entry], time_step_);
     text += (i == 0 ? "" : ", ") + names_[entry] + " is told " +
-            (how.empty()
-                 ? "up to " + Short(evidence_.largest(different[i])) + " " + units_[entry] + " off what it is"
-                 : how + " what it is");
+            (how.empty() ? "up to " + FourDigits(evidence_.largest(different[i])) + " " + units_[entry] +
+                               " off what it is"
+                         : how + " what it is");
   }
   if (different.size() > kMostNamed)
     text += " and " + std::to_string(different.size() - kMostNamed) + " more";

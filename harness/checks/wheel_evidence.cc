@@ -6,7 +6,7 @@
 namespace dexcheck {
 namespace {
 
-constexpr double kExplains = 0.95;
+constexpr double kWheelExplains = 0.95;
 // A wheel with less than this share of the larger mismatch has none of its own.
 constexpr double kOwn = 0.05;
 constexpr std::array<double, 2> kSide = {1.0, -1.0};  // right, left
@@ -41,7 +41,7 @@ std::string WheelEvidence::Tell() const {
   if (!has_any()) return {};
   // The distance is one number, the radii are two: what it explains needs no other.
   const double by_distance = turn_squares_ > 0.0 ? by_turn_ * by_turn_ / turn_squares_ / squares_.sum() : 0.0;
-  if (by_distance >= kExplains) {
+  if (by_distance >= kWheelExplains) {
     return "the wheels are " + Metres(base_->wheel_distance + by_turn_ / turn_squares_) +
            " apart instead of " + Metres(base_->wheel_distance);
   }

@@ -10,7 +10,8 @@ namespace {
 
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-int CollideGeoms(const mjModel* m, CollisionData* d, CollisionContact* con, int g1, int g2, mjtNum margin) {
+int CollideCylinderGeom(const mjModel* m, CollisionData* d, CollisionContact* con, int g1, int g2,
+                        mjtNum margin) {
   const Eigen::Map<const RowMatrix3d> R(d->geom_xmat + 9 * g2);
   const Eigen::Map<const Vector3d> origin(d->geom_xpos + 3 * g2);
   const Eigen::Map<const Vector3d> sphere(d->geom_xpos + 3 * g1);
@@ -51,7 +52,7 @@ SphereCylinderContact CollideSphereCylinder(const Vector3d& center, double spher
 
 void InstallCylinderCollision() {
   static std::once_flag once;
-  std::call_once(once, [] { mjCOLLISIONFUNC[mjGEOM_SPHERE][mjGEOM_CYLINDER] = CollideGeoms; });
+  std::call_once(once, [] { mjCOLLISIONFUNC[mjGEOM_SPHERE][mjGEOM_CYLINDER] = CollideCylinderGeom; });
 }
 
 }  // namespace dexcheck

@@ -4,12 +4,15 @@
 #include <cmath>
 #include <mutex>
 
+#include "harness/engine/mujoco_release.h"
+
 namespace dexcheck {
 namespace {
 
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-int CollideGeoms(const mjModel* m, const mjData* d, mjContact* con, int g1, int g2, mjtNum margin) {
+int CollideEllipsoidGeom(const mjModel* m, CollisionData* d, CollisionContact* con, int g1, int g2,
+                         mjtNum margin) {
   const Eigen::Map<const RowMatrix3d> R(d->geom_xmat + 9 * g2);
   const Eigen::Map<const Vector3d> origin(d->geom_xpos + 3 * g2);
   const Eigen::Map<const Vector3d> sphere(d->geom_xpos + 3 * g1);
@@ -19,10 +22,9 @@ int CollideGeoms(const mjModel* m, const mjData* d, mjContact* con, int g1, int 
   if (center.norm() > semi_axes.maxCoeff() + radius + margin) return 0;
   const SphereEllipsoidContact contact = CollideSphereEllipsoid(center, radius, semi_axes);
   if (contact.distance > margin) return 0;
-  con->dist = contact.distance;
-  Eigen::Map<Vector3d>(con->pos) = origin + R * contact.position;
-  Eigen::Map<Vector3d>(con->frame) = R * contact.normal;
-  mju_zero3(con->frame + 3);
+  const Vector3d position = origin + R * contact.position;
+  const Vector3d normal = R * contact.normal;
+  FillContact(contact.distance, position.data(), normal.data(), con);
   return 1;
 }
 
@@ -74,7 +76,7 @@ SphereEllipsoidContact CollideSphereEllipsoid(const Vector3d& center, double sph
 
 void InstallEllipsoidCollision() {
   static std::once_flag once;
-  std::call_once(once, [] { mjCOLLISIONFUNC[mjGEOM_SPHERE][mjGEOM_ELLIPSOID] = CollideGeoms; });
+  std::call_once(once, [] { mjCOLLISIONFUNC[mjGEOM_SPHERE][mjGEOM_ELLIPSOID] = CollideEllipsoidGeom; });
 }
 
 }  // namespace dexcheck

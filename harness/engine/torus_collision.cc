@@ -15,11 +15,11 @@ mjfCollision original_sphere_mesh = nullptr;
 mjfCollision original_box_mesh = nullptr;
 
 /// Tilt of a torus that lies flat, rad.
-constexpr double kFlat = 1e-3;
+constexpr double kLyingFlat = 1e-3;
 
 /// Pose of the body, which is a torus's frame: the engine turns a mesh geom's own frame to the mesh's
 /// principal axes.
-Pose BodyPose(const mjModel& m, const mjData& d, int geom) {
+Pose GeomPose(const mjModel& m, const mjData& d, int geom) {
   const int body = m.geom_bodyid[geom];
   Pose X = Pose::Identity();
   X.linear() = Eigen::Map<const RowMatrix3d>(d.xmat + 9 * body);
@@ -42,7 +42,7 @@ int CollideSphereMesh(const mjModel* m, CollisionData* d, CollisionContact* con,
   if (!GetTorusRadii(*m, g2, &ring_radius, &tube_radius))
     return original_sphere_mesh(m, d, con, g1, g2, margin);
 
-  const Pose X_BT = BodyPose(*m, *d, g2);
+  const Pose X_BT = GeomPose(*m, *d, g2);
   const Eigen::Map<const Vector3d> sphere(d->geom_xpos + 3 * g1);
   const Vector3d center = X_BT.linear().transpose() * (sphere - X_BT.translation());
   SphereTorusContact contacts[2];
@@ -63,7 +63,7 @@ int CollideBoxMesh(const mjModel* m, CollisionData* d, CollisionContact* con, in
   X_WB.translation() = Eigen::Map<const Vector3d>(d->geom_xpos + 3 * g1);
   const Eigen::Map<const Vector3d> half_size(m->geom_size + 3 * g1);
   BoxTorusContact contacts[kRingPlaces];
-  const Pose X_BT = X_WB.inverse(Eigen::Isometry) * BodyPose(*m, *d, g2);
+  const Pose X_BT = X_WB.inverse(Eigen::Isometry) * GeomPose(*m, *d, g2);
   const int count = CollideBoxTorus(X_BT, ring_radius, tube_radius, half_size, margin, contacts);
   for (int i = 0; i < count; ++i) {
     PlaceContact(X_WB, contacts[i], con + i);
@@ -122,7 +122,7 @@ int CollideBoxTorus(const Pose& X_BT, double ring_radius, double tube_radius, co
   Vector3d normal;
   MeasureBox(X_BT.translation(), half_size, &normal);
   const Vector3d down = -(X_BT.linear().transpose() * normal);
-  const double first = down.head<2>().norm() > kFlat ? std::atan2(down.y(), down.x()) : 0.0;
+  const double first = down.head<2>().norm() > kLyingFlat ? std::atan2(down.y(), down.x()) : 0.0;
   int count = 0;
   for (int i = 0; i < kRingPlaces; ++i) {
     const double u = first + 2.0 * kPi * i / kRingPlaces;
