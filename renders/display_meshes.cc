@@ -1,12 +1,11 @@
 #include "renders/display_meshes.h"
 
-#include <GL/gl.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "controller/common/errors.h"
+#include "renders/mesa.h"
 
 namespace dexcheck {
 namespace {
@@ -15,16 +14,16 @@ constexpr int kConeSides = 48;
 constexpr int kTubeSides = 8;
 
 unsigned BeginList() {
-  const unsigned list = glGenLists(1);
+  const unsigned list = LoadMesa().glGenLists(1);
   if (list == 0) throw Error("OpenGL: cannot make a display list");
-  glNewList(list, GL_COMPILE);
+  LoadMesa().glNewList(list, GL_COMPILE);
   return list;
 }
 
 /// Seen from both sides.
 unsigned MakeCone() {
   const unsigned list = BeginList();
-  glBegin(GL_TRIANGLES);
+  LoadMesa().glBegin(GL_TRIANGLES);
   for (const bool outside : {true, false}) {
     const float sign = outside ? 1.0F : -1.0F;
     for (int k = 0; k < kConeSides; ++k) {
@@ -32,16 +31,16 @@ unsigned MakeCone() {
         const double angle = 2.0 * kPi * i / kConeSides;
         const auto c = static_cast<float>(std::cos(angle));
         const auto s = static_cast<float>(std::sin(angle));
-        glNormal3f(sign * c, sign * s, -sign);
-        glVertex3f(z * c, z * s, z);
+        LoadMesa().glNormal3f(sign * c, sign * s, -sign);
+        LoadMesa().glVertex3f(z * c, z * s, z);
       };
       vertex(k, 0.0F);
       vertex(outside ? k + 1 : k, 1.0F);
       vertex(outside ? k : k + 1, 1.0F);
     }
   }
-  glEnd();
-  glEndList();
+  LoadMesa().glEnd();
+  LoadMesa().glEndList();
   return list;
 }
 
@@ -51,7 +50,7 @@ DisplayMeshes::DisplayMeshes(const mjrContext& context) : context_(context), con
 
 DisplayMeshes::~DisplayMeshes() {
   ClearTubes();
-  glDeleteLists(cone_, 1);
+  LoadMesa().glDeleteLists(cone_, 1);
 }
 
 int DisplayMeshes::ToMesh(unsigned list) const {
@@ -59,7 +58,7 @@ int DisplayMeshes::ToMesh(unsigned list) const {
 }
 
 void DisplayMeshes::ClearTubes() {
-  for (const unsigned list : tubes_) glDeleteLists(list, 1);
+  for (const unsigned list : tubes_) LoadMesa().glDeleteLists(list, 1);
   tubes_.clear();
 }
 
@@ -85,20 +84,20 @@ int DisplayMeshes::AddTube(std::span<const Vector3d> points, double radius) {
     if (i > 0) {
       const auto vertex = [&](size_t point, const Vector3d& normal) {
         const Vector3d p = points[point] + radius * normal;
-        glNormal3dv(normal.data());
-        glVertex3dv(p.data());
+        LoadMesa().glNormal3dv(normal.data());
+        LoadMesa().glVertex3dv(p.data());
       };
-      glBegin(GL_TRIANGLE_STRIP);
+      LoadMesa().glBegin(GL_TRIANGLE_STRIP);
       for (int k = 0; k <= kTubeSides; ++k) {
         const auto side = static_cast<size_t>(k % kTubeSides);
         vertex(i, outward[side]);
         vertex(i - 1, previous[side]);
       }
-      glEnd();
+      LoadMesa().glEnd();
     }
     previous = outward;
   }
-  glEndList();
+  LoadMesa().glEndList();
   return ToMesh(list);
 }
 

@@ -1,11 +1,10 @@
 #include "renders/offscreen_context.h"
 
-#include <GL/osmesa.h>
-
 #include <cstdlib>
 #include <mutex>
 
 #include "controller/common/errors.h"
+#include "renders/mesa.h"
 
 namespace dexcheck {
 namespace {
@@ -25,16 +24,17 @@ void KeepToCallingThread() {
 
 OffscreenContext::OffscreenContext() : buffer_(4 * kSurfaceSize * kSurfaceSize) {
   KeepToCallingThread();
-  context_ = OSMesaCreateContextExt(OSMESA_RGBA, kDepthBits, kStencilBits, 0, nullptr);
+  context_ = LoadMesa().OSMesaCreateContextExt(OSMESA_RGBA, kDepthBits, kStencilBits, 0, nullptr);
   if (context_ == nullptr) throw Error("OSMesa: cannot make an OpenGL context");
   MakeCurrent();
 }
 
-OffscreenContext::~OffscreenContext() { OSMesaDestroyContext(context_); }
+OffscreenContext::~OffscreenContext() { LoadMesa().OSMesaDestroyContext(context_); }
 
 void OffscreenContext::MakeCurrent() {
-  if (OSMesaGetCurrentContext() == context_) return;
-  if (OSMesaMakeCurrent(context_, buffer_.data(), GL_UNSIGNED_BYTE, kSurfaceSize, kSurfaceSize) != GL_TRUE) {
+  if (LoadMesa().OSMesaGetCurrentContext() == context_) return;
+  if (LoadMesa().OSMesaMakeCurrent(context_, buffer_.data(), GL_UNSIGNED_BYTE, kSurfaceSize, kSurfaceSize) !=
+      GL_TRUE) {
     throw Error("OSMesa: cannot make an OpenGL context current");
   }
 }

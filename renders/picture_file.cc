@@ -26,10 +26,10 @@ std::string EncodeJpeg(const Image& image, const PartialFile& file) {
   const auto check = [&](int result) {
     if (result < 0) file.Fail(libav::Explain(result));
   };
-  av_log_set_level(AV_LOG_QUIET);
-  const AVCodec* const codec = avcodec_find_encoder(AV_CODEC_ID_MJPEG);
+  const libav::Functions& av = libav::Load();
+  const AVCodec* const codec = av.avcodec_find_encoder(AV_CODEC_ID_MJPEG);
   if (codec == nullptr) file.Fail("libavcodec was built without JPEG");
-  const libav::CodecPtr encoder(avcodec_alloc_context3(codec));
+  const libav::CodecPtr encoder(av.avcodec_alloc_context3(codec));
   encoder->width = image.width;
   encoder->height = image.height;
   encoder->pix_fmt = AV_PIX_FMT_YUVJ444P;
@@ -39,26 +39,26 @@ std::string EncodeJpeg(const Image& image, const PartialFile& file) {
   constexpr int kQuality = 2;  // 1 best, 31 worst
   encoder->flags |= AV_CODEC_FLAG_QSCALE | AV_CODEC_FLAG_BITEXACT;
   encoder->global_quality = FF_QP2LAMBDA * kQuality;
-  check(avcodec_open2(encoder.get(), codec, nullptr));
+  check(av.avcodec_open2(encoder.get(), codec, nullptr));
 
-  const libav::FramePtr frame(av_frame_alloc());
+  const libav::FramePtr frame(av.av_frame_alloc());
   frame->format = encoder->pix_fmt;
   frame->width = image.width;
   frame->height = image.height;
   frame->quality = encoder->global_quality;
   frame->pts = 0;
-  check(av_frame_get_buffer(frame.get(), 0));
-  const libav::SwsPtr converter(sws_getContext(image.width, image.height, AV_PIX_FMT_RGB24, image.width,
-                                               image.height, encoder->pix_fmt, SWS_BILINEAR, nullptr, nullptr,
-                                               nullptr));
+  check(av.av_frame_get_buffer(frame.get(), 0));
+  const libav::SwsPtr converter(av.sws_getContext(image.width, image.height, AV_PIX_FMT_RGB24, image.width,
+                                                  image.height, encoder->pix_fmt, SWS_BILINEAR, nullptr,
+                                                  nullptr, nullptr));
   if (!converter) file.Fail("no colour conversion");
   const std::uint8_t* source[1] = {image.rgb.data()};
   const int stride[1] = {3 * image.width};
-  sws_scale(converter.get(), source, stride, 0, image.height, frame->data, frame->linesize);
+  av.sws_scale(converter.get(), source, stride, 0, image.height, frame->data, frame->linesize);
 
-  check(avcodec_send_frame(encoder.get(), frame.get()));
-  const libav::PacketPtr packet(av_packet_alloc());
-  check(avcodec_receive_packet(encoder.get(), packet.get()));
+  check(av.avcodec_send_frame(encoder.get(), frame.get()));
+  const libav::PacketPtr packet(av.av_packet_alloc());
+  check(av.avcodec_receive_packet(encoder.get(), packet.get()));
   return {reinterpret_cast<const char*>(packet->data), static_cast<size_t>(packet->size)};
 }
 

@@ -1,9 +1,5 @@
 #include "renders/video_writer.h"
 
-extern "C" {
-#include <libavutil/opt.h>
-}
-
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -58,27 +54,25 @@ class VideoWriter::Impl {
         kind_(FindVideoFormat(path)),
         recipe_(kRecipes[static_cast<size_t>(kind_)]),
         options_((CheckOptions(options, kind_), options)) {
-    // Messages come as exceptions instead.
-    av_log_set_level(AV_LOG_QUIET);
     OpenEncoder();
     OpenFile();
     if (kind_ != VideoFormat::kGif) MakeConverter();
-    frame_.reset(av_frame_alloc());
+    frame_.reset(av_.av_frame_alloc());
     frame_->format = recipe_.pixels;
     frame_->width = options.width;
     frame_->height = options.height;
-    Check(av_frame_get_buffer(frame_.get(), 0));
-    packet_.reset(av_packet_alloc());
+    Check(av_.av_frame_get_buffer(frame_.get(), 0));
+    packet_.reset(av_.av_packet_alloc());
   }
 
   void Write(const Image& image) {
     Require(image.width == options_.width, "frame width", "must be the video's", image.width);
     Require(image.height == options_.height, "frame height", "must be the video's", image.height);
-    Check(av_frame_make_writable(frame_.get()));
+    Check(av_.av_frame_make_writable(frame_.get()));
     if (converter_) {
       const std::uint8_t* source[1] = {image.rgb.data()};
       const int stride[1] = {3 * image.width};
-      sws_scale(converter_.get(), source, stride, 0, image.height, frame_->data, frame_->linesize);
+      av_.sws_scale(converter_.get(), source, stride, 0, image.height, frame_->data, frame_->linesize);
     } else {
       PaintWithPalette(image);
     }
@@ -89,8 +83,8 @@ class VideoWriter::Impl {
   void Finish() {
     if (frames_ == 0) file_.Fail("there are no frames");
     Encode(nullptr);
-    Check(av_write_trailer(format_.get()));
-    Check(avio_closep(&format_->pb));
+    Check(av_.av_write_trailer(format_.get()));
+    Check(av_.avio_closep(&format_->pb));
     file_.Commit();
   }
 
@@ -103,13 +97,13 @@ class VideoWriter::Impl {
 
   /// RGB to YUV as high-definition video has it.
   void MakeConverter() {
-    converter_.reset(sws_getContext(options_.width, options_.height, AV_PIX_FMT_RGB24, options_.width,
-                                    options_.height, recipe_.pixels, SWS_BILINEAR, nullptr, nullptr,
-                                    nullptr));
+    converter_.reset(av_.sws_getContext(options_.width, options_.height, AV_PIX_FMT_RGB24, options_.width,
+                                        options_.height, recipe_.pixels, SWS_BILINEAR, nullptr, nullptr,
+                                        nullptr));
     if (!converter_) file_.Fail("no colour conversion");
-    const int* to_bt709 = sws_getCoefficients(SWS_CS_ITU709);
+    const int* to_bt709 = av_.sws_getCoefficients(SWS_CS_ITU709);
     constexpr int kUnity = 1 << 16;
-    sws_setColorspaceDetails(converter_.get(), to_bt709, 1, to_bt709, 0, 0, kUnity, kUnity);
+    av_.sws_setColorspaceDetails(converter_.get(), to_bt709, 1, to_bt709, 0, 0, kUnity, kUnity);
   }
 
   /// Fills the frame with numbers of colours; the first picture decides which colours there are.
@@ -130,9 +124,9 @@ class VideoWriter::Impl {
   }
 
   void OpenEncoder() {
-    const AVCodec* codec = avcodec_find_encoder_by_name(recipe_.encoder);
+    const AVCodec* codec = av_.avcodec_find_encoder_by_name(recipe_.encoder);
     if (codec == nullptr) file_.Fail(std::string("libavcodec was built without ") + recipe_.encoder);
-    encoder_.reset(avcodec_alloc_context3(codec));
+    encoder_.reset(av_.avcodec_alloc_context3(codec));
     encoder_->width = options_.width;
     encoder_->height = options_.height;
     encoder_->pix_fmt = recipe_.pixels;
@@ -150,60 +144,61 @@ class VideoWriter::Impl {
     encoder_->flags |= AV_CODEC_FLAG_BITEXACT;
     if (kind_ == VideoFormat::kMp4) encoder_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
     SetQuality();
-    Check(avcodec_open2(encoder_.get(), codec, nullptr));
+    Check(av_.avcodec_open2(encoder_.get(), codec, nullptr));
   }
 
   void SetQuality() {
     void* const options = encoder_->priv_data;
     if (kind_ == VideoFormat::kMp4) {
-      Check(av_opt_set(options, "preset", options_.preset.c_str(), 0));
+      Check(av_.av_opt_set(options, "preset", options_.preset.c_str(), 0));
       // Otherwise x264 picks code by processor, and its AVX-512 code gives varying bytes for the same frames.
-      Check(av_opt_set(options, "x264-params", "cpu-independent=1", 0));
-      Check(av_opt_set_int(options, "crf", options_.quality, 0));
+      Check(av_.av_opt_set(options, "x264-params", "cpu-independent=1", 0));
+      Check(av_.av_opt_set_int(options, "crf", options_.quality, 0));
     } else if (kind_ == VideoFormat::kWebm) {
       // VP9's scale goes to 63, and looks the same some ten later.
       constexpr int kOffset = 10;
       encoder_->bit_rate = 0;
-      Check(av_opt_set_int(options, "crf", options_.quality + kOffset, 0));
-      Check(av_opt_set(options, "deadline", "good", 0));
-      Check(av_opt_set_int(options, "cpu-used", 5, 0));
+      Check(av_.av_opt_set_int(options, "crf", options_.quality + kOffset, 0));
+      Check(av_.av_opt_set(options, "deadline", "good", 0));
+      Check(av_.av_opt_set_int(options, "cpu-used", 5, 0));
     }
   }
 
   void OpenFile() {
     const std::string url = "file:" + file_.partial().string();
     AVFormatContext* format = nullptr;
-    Check(avformat_alloc_output_context2(&format, nullptr, recipe_.muxer, url.c_str()));
+    Check(av_.avformat_alloc_output_context2(&format, nullptr, recipe_.muxer, url.c_str()));
     format_.reset(format);
     format_->flags |= AVFMT_FLAG_BITEXACT;
-    stream_ = avformat_new_stream(format_.get(), nullptr);
+    stream_ = av_.avformat_new_stream(format_.get(), nullptr);
     if (stream_ == nullptr) file_.Fail("no stream");
     stream_->time_base = encoder_->time_base;
     stream_->avg_frame_rate = encoder_->framerate;
-    Check(avcodec_parameters_from_context(stream_->codecpar, encoder_.get()));
-    Check(avio_open(&format_->pb, url.c_str(), AVIO_FLAG_WRITE));
+    Check(av_.avcodec_parameters_from_context(stream_->codecpar, encoder_.get()));
+    Check(av_.avio_open(&format_->pb, url.c_str(), AVIO_FLAG_WRITE));
     AVDictionary* options = nullptr;
-    if (kind_ == VideoFormat::kMp4) av_dict_set(&options, "movflags", "+faststart", 0);
-    const int result = avformat_write_header(format_.get(), &options);
-    av_dict_free(&options);
+    if (kind_ == VideoFormat::kMp4) av_.av_dict_set(&options, "movflags", "+faststart", 0);
+    const int result = av_.avformat_write_header(format_.get(), &options);
+    av_.av_dict_free(&options);
     Check(result);
   }
 
   /// @param frame null when there are no more.
   void Encode(const AVFrame* frame) {
-    Check(avcodec_send_frame(encoder_.get(), frame));
+    Check(av_.avcodec_send_frame(encoder_.get(), frame));
     for (;;) {
-      const int result = avcodec_receive_packet(encoder_.get(), packet_.get());
+      const int result = av_.avcodec_receive_packet(encoder_.get(), packet_.get());
       if (result == AVERROR(EAGAIN) || result == AVERROR_EOF) return;
       Check(result);
-      av_packet_rescale_ts(packet_.get(), encoder_->time_base, stream_->time_base);
+      av_.av_packet_rescale_ts(packet_.get(), encoder_->time_base, stream_->time_base);
       packet_->stream_index = stream_->index;
-      packet_->duration = av_rescale_q(1, encoder_->time_base, stream_->time_base);
-      Check(av_interleaved_write_frame(format_.get(), packet_.get()));
+      packet_->duration = av_.av_rescale_q(1, encoder_->time_base, stream_->time_base);
+      Check(av_.av_interleaved_write_frame(format_.get(), packet_.get()));
       Check(format_->pb->error);
     }
   }
 
+  const libav::Functions& av_ = libav::Load();
   PartialFile file_;
   VideoFormat kind_;
   const Recipe& recipe_;

@@ -152,9 +152,14 @@ void WriteFilm(const std::filesystem::path& path) {
   video.Finish();
 }
 
+// Of a page without the replay, which would compete for the processor.
+RunScene MakeNoScene(const std::filesystem::path& /*run_dir*/, const std::filesystem::path& /*folder*/) {
+  return {};
+}
+
 TEST_F(PageBrowserTest, PlaysTheVideo) {
   WriteFilm(folder_.path() / "video.mp4");
-  WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()));
+  WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()), MakeNoScene);
   browser_.SetViewport(1280, 720);
   browser_.Open(folder_.path() / "report.html");
   const std::string video = "const video = document.querySelector('video');";
@@ -183,7 +188,7 @@ TEST_F(PageBrowserTest, PlaysTheVideo) {
 
 TEST_F(PageBrowserTest, WouldNoticeAVideoThatCannotBePlayed) {
   testing::WriteText(folder_.path() / "video.mp4", "no video");
-  WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()));
+  WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()), MakeNoScene);
   browser_.Open(folder_.path() / "report.html");
   EXPECT_TRUE(
       browser_.WaitFor("const video = document.querySelector('video');"
