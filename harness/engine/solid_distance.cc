@@ -21,7 +21,7 @@ constexpr double kFlat = 1e-20;
 /// A tetrahedron that is lower has no inside, m.
 constexpr double kFlatHeight = 1e-10;
 /// Places of a torus's ring where the search for the nearest one starts.
-constexpr int kRingPlaces = 32;
+constexpr int kNearPlaces = 32;
 constexpr int kRingSearch = 30;  // halves a place's width to 1e-6 of it by golden sections
 constexpr int kDescent = 60;
 
@@ -245,10 +245,10 @@ double CalcTorusDistance(const Solid& torus, const Pose& X_WT, const Solid& othe
     X_WB.translation() = X_WT * Vector3d(torus.size[0] * std::cos(u), torus.size[0] * std::sin(u), 0.0);
     return CalcConvexDistance(ball, X_WB, other, X_WO);
   };
-  constexpr double kWidth = 2.0 * kPi / kRingPlaces;
+  constexpr double kWidth = 2.0 * kPi / kNearPlaces;
   double nearest = 0.0;
   double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < kRingPlaces; ++i) {
+  for (int i = 0; i < kNearPlaces; ++i) {
     const double distance = measure(kWidth * i);
     if (distance >= least) continue;
     least = distance;
