@@ -20,7 +20,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Request {
+struct AuditRequest {
   std::filesystem::path robot;
   std::vector<std::string> packages;
   std::string json_file;
@@ -29,12 +29,12 @@ struct Request {
   bool quiet = false;
 };
 
-Json ToJson(double value) { return std::isfinite(value) ? Json(value) : Json("infinity"); }
+Json ConditionToJson(double value) { return std::isfinite(value) ? Json(value) : Json("infinity"); }
 
-std::string ToText(const Request& request, const AuditResult& result) {
+std::string ToText(const AuditRequest& request, const AuditResult& result) {
   Json json = {{"robot", request.robot.string()},
                {"verdict", result.IsGood() ? "pass" : "disagreement"},
-               {"condition_number", ToJson(result.condition)}};
+               {"condition_number", ConditionToJson(result.condition)}};
   json["findings"] = Json::array();
   for (const AuditFinding& finding : result.findings) {
     Json entry = {{"level", NameOf(finding.level)},
@@ -42,7 +42,8 @@ std::string ToText(const Request& request, const AuditResult& result) {
                   {"where", finding.where},
                   {"line", finding.line},
                   {"text", finding.text}};
-    if (finding.condition_without) entry["condition_number_without"] = ToJson(*finding.condition_without);
+    if (finding.condition_without)
+      entry["condition_number_without"] = ConditionToJson(*finding.condition_without);
     json["findings"].push_back(entry);
   }
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
@@ -52,7 +53,7 @@ std::string FormatCondition(double condition) {
   return std::isfinite(condition) ? fmt::format("{:.2g}", condition) : "infinite";
 }
 
-void Print(const Request& request, const RobotDescription& robot, const AuditResult& result) {
+void Print(const AuditRequest& request, const RobotDescription& robot, const AuditResult& result) {
   const std::string file = request.robot.filename().string();
   if (!request.quiet) {
     fmt::print("{}: {}, {} joints, {} links\ncondition number of M: {} (median of random states)\n\n",
@@ -84,7 +85,7 @@ void Print(const Request& request, const RobotDescription& robot, const AuditRes
 }
 
 /// A case for each kind of check, which fails with all that it found.
-std::string WriteJUnit(const Request& request, const AuditResult& result) {
+std::string WriteJUnit(const AuditRequest& request, const AuditResult& result) {
   std::vector<JUnitCase> cases;
   for (const char* check : {"mass", "inertia", "density", "com", "mirror", "load", "range", "axis", "name"}) {
     cases.push_back({"audit", check, "", ""});
@@ -99,7 +100,7 @@ std::string WriteJUnit(const Request& request, const AuditResult& result) {
   return dexcheck::cli::WriteJUnit("dexcheck.audit." + request.robot.stem().string(), cases, 0.0);
 }
 
-int Run(const Request& request) {
+int Run(const AuditRequest& request) {
   std::optional<OutputFile> json;
   UrdfOptions options;
   options.packages.assign(request.packages.begin(), request.packages.end());
@@ -119,7 +120,7 @@ int Run(const Request& request) {
 }  // namespace
 
 void AddAuditCommand(Command app) {
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<AuditRequest>();
   Command command =
       app.AddCommand("audit", "Look for what cannot be, or is odd, in one description of a robot");
   command.AddOption("FILE", &request->robot, "Parameter file (TOML), URDF or MJCF")

@@ -17,7 +17,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct BudgetRequest {
   std::string scenario;
   std::vector<std::string> overrides;
   std::uint64_t seed = 0;
@@ -49,7 +49,7 @@ void Print(const ErrorBudget& budget) {
   fmt::print("\n");
 }
 
-int Run(const Request& request) {
+int Run(const BudgetRequest& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides, request.seed);
   CatchInterrupts();
   std::optional<OutputFile> json, page;
@@ -84,7 +84,7 @@ int Run(const Request& request) {
 }  // namespace
 
 void AddBudgetCommand(Command app) {
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<BudgetRequest>();
   Command command = app.AddCommand(
       "budget", "Which part of a plant that is not ideal costs the accuracy: each alone, all but each, all");
   command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();

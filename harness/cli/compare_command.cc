@@ -23,7 +23,7 @@ namespace {
 /// Signals that are printed unless --all is given.
 constexpr size_t kMostPrinted = 10;
 
-struct Request {
+struct CompareRequest {
   std::vector<std::string> run_folders;
   RunComparisonOptions options;
   std::optional<double> tolerance;  ///< With it, a difference is exit code 1.
@@ -71,7 +71,7 @@ void PrintSignals(const RunComparison& comparison, bool all) {
     fmt::print("  {} signals are not in all runs\n", comparison.not_compared.size());
 }
 
-void Print(const Request& request, const RunComparison& comparison) {
+void Print(const CompareRequest& request, const RunComparison& comparison) {
   for (size_t i = 0; i < request.run_folders.size(); ++i) {
     fmt::print("{}  {}: {}\n", static_cast<char>('A' + i), request.run_folders[i], comparison.verdicts[i]);
   }
@@ -90,7 +90,7 @@ void Print(const Request& request, const RunComparison& comparison) {
   PrintSignals(comparison, request.all);
 }
 
-nlohmann::ordered_json ToJson(const Request& request, const RunComparison& comparison) {
+nlohmann::ordered_json ToJson(const CompareRequest& request, const RunComparison& comparison) {
   nlohmann::ordered_json json;
   json["runs"] = request.run_folders;
   json["verdicts"] = comparison.verdicts;
@@ -125,7 +125,7 @@ nlohmann::ordered_json ToJson(const Request& request, const RunComparison& compa
   return json;
 }
 
-int Run(const Request& request) {
+int Run(const CompareRequest& request) {
   if (request.tolerance && !(*request.tolerance >= 0.0 && std::isfinite(*request.tolerance)))
     throw InputError("--tolerance: must not be negative, got " + FormatNumber(*request.tolerance));
   if (request.run_folders.size() < 2) throw InputError("compare: at least two runs are needed");
@@ -168,7 +168,7 @@ int Run(const Request& request) {
 }  // namespace
 
 void AddCompareCommand(Command app) {
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<CompareRequest>();
   Command command = app.AddCommand("compare", "Compare recorded runs: inputs, results, checks and signals");
   command
       .AddOption("RUN_DIR", &request->run_folders,

@@ -20,7 +20,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct DiagnoseRequest {
   RobotFiles files;
   DiagnosisOptions options;
   std::string json_file;
@@ -31,7 +31,7 @@ bool IsRepairedWholly(const Diagnosis& diagnosis) {
   return diagnosis.remaining_terms.empty() && diagnosis.remaining_constants.empty();
 }
 
-void PrintRemaining(const Request& request, const RobotModel& model, const Diagnosis& diagnosis) {
+void PrintRemaining(const DiagnoseRequest& request, const RobotModel& model, const Diagnosis& diagnosis) {
   fmt::print("What remains after these repairs:\n");
   for (const GateFinding& finding : diagnosis.remaining_constants) {
     fmt::print("  {}: {}: {:.10g} in {}, {:.10g} in {}\n", finding.check, finding.where, finding.model,
@@ -44,7 +44,7 @@ void PrintRemaining(const Request& request, const RobotModel& model, const Diagn
   }
 }
 
-void Print(const Request& request, const RobotModel& model, const Diagnosis& diagnosis,
+void Print(const DiagnoseRequest& request, const RobotModel& model, const Diagnosis& diagnosis,
            const std::vector<Hypothesis>& hypotheses) {
   const std::string file = request.files.robot.filename().string();
   if (diagnosis.agrees) {
@@ -97,7 +97,7 @@ Json ToJson(const Repair& cause, const RobotSpec& spec, const std::string& file)
   return json;
 }
 
-std::string ToText(const Request& request, const RobotModel& model, const Diagnosis& diagnosis,
+std::string ToText(const DiagnoseRequest& request, const RobotModel& model, const Diagnosis& diagnosis,
                    const std::vector<Hypothesis>& hypotheses) {
   const std::string file = request.files.robot.filename().string();
   Json json = {
@@ -114,7 +114,7 @@ std::string ToText(const Request& request, const RobotModel& model, const Diagno
   return json.dump(2) + "\n";
 }
 
-int Run(const Request& request) {
+int Run(const DiagnoseRequest& request) {
   const RobotModel model = ReadRobotModel(request.files.robot);
   RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely mistakes)");
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
@@ -147,7 +147,7 @@ int Run(const Request& request) {
 
 void AddDiagnoseCommand(Command app) {
   constexpr std::uint64_t kMaxSamples = 1000;
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<DiagnoseRequest>();
   Command command = app.AddCommand("diagnose", "Say why model and engine disagree, and what would repair it");
   AddRobotOptions(command, &request->files);
   AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);

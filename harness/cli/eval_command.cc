@@ -12,14 +12,14 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct EvalRequest {
   std::filesystem::path robot = FindShippedFile("controller/parameters/assistant_robot.toml");
   std::filesystem::path mjcf;
   std::string state_file;
   std::string out = "-";
 };
 
-int Run(const Request& request) {
+int Run(const EvalRequest& request) {
   const RobotModel model = ReadRobotModel(request.robot);
   const State state = ReadState(request.state_file, model);
   Json out = {{"robot", model.name()},
@@ -42,7 +42,7 @@ int Run(const Request& request) {
 }  // namespace
 
 void AddEvalCommand(Command app) {
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<EvalRequest>();
   Command command = app.AddCommand("eval", "Print every term at one state, as JSON");
   Option robot = command.AddOption("--robot", &request->robot, "Parameter file (TOML) of the analytic model")
                      .TypeName("FILE.toml");

@@ -23,7 +23,7 @@ namespace {
 /// Text is handed on in pieces of this size.
 constexpr size_t kChunk = size_t{1} << 20;
 
-struct Request {
+struct ExportRequest {
   std::filesystem::path run_folder;
   std::string csv_file;
   std::string mcap_file;
@@ -37,7 +37,7 @@ bool Matches(const std::string& pattern, const SignalInfo& signal) {
 }
 
 /// The signals that match, in the log's order; all of them without patterns. Time is always among them.
-std::vector<SignalInfo> ChooseSignals(const LogReader& log, const Request& request) {
+std::vector<SignalInfo> ChooseSignals(const LogReader& log, const ExportRequest& request) {
   std::vector<std::string> names;
   for (const SignalInfo& signal : log.signals()) names.push_back(signal.name);
   for (const std::string& pattern : request.patterns) {
@@ -97,7 +97,7 @@ void AddNumber(double value, std::string* text) {
   }
 }
 
-void WriteCsv(const LogReader& log, const std::vector<SignalInfo>& signals, const Request& request) {
+void WriteCsv(const LogReader& log, const std::vector<SignalInfo>& signals, const ExportRequest& request) {
   OutputFile file(request.csv_file);
   std::vector<RowMatrixXd> values;
   values.reserve(signals.size());
@@ -153,7 +153,7 @@ nlohmann::json MakeMessage(const SignalInfo& signal, const Eigen::Ref<const Eige
 }
 
 /// A topic for each signal: "/object/X_o". Times count from the log's first row, for none may be below zero.
-void WriteMcap(const LogReader& log, const std::vector<SignalInfo>& signals, const Request& request) {
+void WriteMcap(const LogReader& log, const std::vector<SignalInfo>& signals, const ExportRequest& request) {
   McapWriter file(request.mcap_file);
   const VectorXd time = log.ReadSignal("time").col(0);
   std::vector<RowMatrixXd> values;
@@ -198,7 +198,7 @@ void PrintList(const LogReader& log, const std::vector<SignalInfo>& signals) {
   }
 }
 
-int Run(const Request& request) {
+int Run(const ExportRequest& request) {
   if (!request.list && request.csv_file.empty() && request.mcap_file.empty()) {
     throw InputError(
         "export: --csv FILE.csv or --list is required, or --mcap FILE.mcap (see dexcheck export --help)");
@@ -216,7 +216,7 @@ int Run(const Request& request) {
 }  // namespace
 
 void AddExportCommand(Command app) {
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<ExportRequest>();
   Command command =
       app.AddCommand("export", "Write a run's log as a table of numbers (CSV) or as messages (MCAP)");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run, with its log.h5").Required();

@@ -16,7 +16,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct ImportRequest {
   std::filesystem::path source;
   std::string out = "-";
   std::vector<std::string> packages;
@@ -24,7 +24,7 @@ struct Request {
   bool downgrade = false;
 };
 
-RobotDescription ReadSource(const Request& request) {
+RobotDescription ReadSource(const ImportRequest& request) {
   if (FindFormat(request.source) == RobotFormat::kToml) {
     throw InputError(request.source.string() + ": must be a URDF or an MJCF, is a parameter file already");
   }
@@ -35,7 +35,7 @@ RobotDescription ReadSource(const Request& request) {
 }
 
 /// A copy of a newer MJCF for MuJoCo 2.2.2.
-int WriteDowngraded(const Request& request) {
+int WriteDowngraded(const ImportRequest& request) {
   const DowngradedMjcf copy = DowngradeMjcf(ReadBytes(request.source), request.source.string());
   OutputFile file(request.out);
   file.Write(copy.text);
@@ -46,7 +46,7 @@ int WriteDowngraded(const Request& request) {
   return kSuccess;
 }
 
-int Run(const Request& request) {
+int Run(const ImportRequest& request) {
   if (request.downgrade) return WriteDowngraded(request);
   const RobotDescription robot = ReadSource(request);
   const std::string text = WriteParameters(robot, request.source.filename().string());
@@ -60,7 +60,7 @@ int Run(const Request& request) {
 }  // namespace
 
 void AddImportCommand(Command app) {
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<ImportRequest>();
   Command command =
       app.AddCommand("import", "Write a parameter file (TOML) from a URDF or an MJCF, to start from");
   command.AddOption("FILE", &request->source, "URDF or MJCF").Required();

@@ -23,7 +23,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct MutateRequest {
   MutateRunRequest run;  // with a scenario, mistakes are made in its run
   RobotFiles files;
   MutationOptions options;
@@ -42,7 +42,7 @@ struct Campaign {
 };
 
 /// A line of the table.
-struct Row {
+struct MutationRow {
   std::string kind;
   int mutants = 0;
   int killed = 0;
@@ -75,12 +75,12 @@ const char* NameOf(MutantFate fate) {
   return "survived";
 }
 
-std::vector<Row> SumUp(const Campaign& campaign) {
-  std::vector<Row> rows;
+std::vector<MutationRow> SumUp(const Campaign& campaign) {
+  std::vector<MutationRow> rows;
   const auto add = [&](const std::string& kind, MutantFate fate, bool named) {
-    auto row = std::find_if(rows.begin(), rows.end(), [&](const Row& r) { return r.kind == kind; });
+    auto row = std::find_if(rows.begin(), rows.end(), [&](const MutationRow& r) { return r.kind == kind; });
     if (row == rows.end()) {
-      row = rows.insert(rows.end(), Row{});
+      row = rows.insert(rows.end(), MutationRow{});
       row->kind = kind;
     }
     row->Add(fate, named);
@@ -92,10 +92,10 @@ std::vector<Row> SumUp(const Campaign& campaign) {
   return rows;
 }
 
-Row Total(const std::vector<Row>& rows) {
-  Row total;
+MutationRow Total(const std::vector<MutationRow>& rows) {
+  MutationRow total;
   total.kind = "all";
-  for (const Row& row : rows) {
+  for (const MutationRow& row : rows) {
     total.mutants += row.mutants;
     total.killed += row.killed;
     total.refused += row.refused;
@@ -106,17 +106,17 @@ Row Total(const std::vector<Row>& rows) {
   return total;
 }
 
-void Print(const Request& request, const Campaign& campaign) {
-  const auto line = [](const Row& row) {
+void Print(const MutateRequest& request, const Campaign& campaign) {
+  const auto line = [](const MutationRow& row) {
     fmt::print("{:<34}{:>8}{:>8}{:>9}{:>11}{:>10}{:>13}\n", row.kind, row.mutants, row.killed, row.refused,
                row.no_effect, row.survived, row.named_first);
   };
-  const std::vector<Row> rows = SumUp(campaign);
-  const Row total = Total(rows);
+  const std::vector<MutationRow> rows = SumUp(campaign);
+  const MutationRow total = Total(rows);
   if (!request.quiet) {
     fmt::print("{:<34}{:>8}{:>8}{:>9}{:>11}{:>10}{:>13}\n", "what was changed", "mutants", "killed",
                "refused", "no effect", "survived", "named first");
-    for (const Row& row : rows) line(row);
+    for (const MutationRow& row : rows) line(row);
     line(total);
     for (size_t i = 0; i < campaign.done; ++i) {
       const Mutant& mutant = campaign.mutants[i];
@@ -148,13 +148,13 @@ void Print(const Request& request, const Campaign& campaign) {
   fmt::print(".\n");
 }
 
-std::string ToText(const Request& request, const Campaign& campaign) {
+std::string ToText(const MutateRequest& request, const Campaign& campaign) {
   Json json = {{"robot", request.files.robot.string()}, {"mjcf", request.files.mjcf.string()},
                {"mujoco", mj_versionString()},          {"scale", request.options.scale},
                {"samples", request.options.samples},    {"seed", request.options.seed},
                {"complete", campaign.IsComplete()}};
   json["kinds"] = Json::object();
-  for (const Row& row : SumUp(campaign)) {
+  for (const MutationRow& row : SumUp(campaign)) {
     json["kinds"][row.kind] = {{"mutants", row.mutants},   {"killed", row.killed},
                                {"refused", row.refused},   {"no_effect", row.no_effect},
                                {"survived", row.survived}, {"named_first", row.named_first}};
@@ -204,7 +204,7 @@ ValueCheck Seconds(double least, double most) {
   };
 }
 
-int Run(Request request) {
+int Run(MutateRequest request) {
   if (!request.run.scenario.empty()) {
     request.run.options.scale = request.options.scale;
     request.run.json_file = request.json_file;
@@ -251,7 +251,7 @@ int Run(Request request) {
 }  // namespace
 
 void AddMutateCommand(Command app) {
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<MutateRequest>();
   Command command = app.AddCommand(
       "mutate",
       "Change every number and equation of the model on purpose: which mistakes are found and named?");

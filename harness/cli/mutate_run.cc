@@ -17,7 +17,7 @@ namespace dexcheck::cli {
 namespace {
 
 /// A line of the table.
-struct Row {
+struct RunRow {
   std::string kind;
   int mutants = 0, refused = 0, killed = 0, survived = 0, cause = 0, with_part = 0, part = 0;
 
@@ -34,15 +34,15 @@ struct Row {
   }
 };
 
-std::vector<Row> SumUp(const std::vector<RunMutant>& mutants, size_t done) {
-  std::vector<Row> rows;
-  Row all;
+std::vector<RunRow> SumUp(const std::vector<RunMutant>& mutants, size_t done) {
+  std::vector<RunRow> rows;
+  RunRow all;
   all.kind = "all";
   for (size_t i = 0; i < done; ++i) {
     auto row =
-        std::find_if(rows.begin(), rows.end(), [&](const Row& r) { return r.kind == mutants[i].kind; });
+        std::find_if(rows.begin(), rows.end(), [&](const RunRow& r) { return r.kind == mutants[i].kind; });
     if (row == rows.end()) {
-      row = rows.insert(rows.end(), Row{});
+      row = rows.insert(rows.end(), RunRow{});
       row->kind = mutants[i].kind;
     }
     row->Add(mutants[i]);
@@ -78,12 +78,12 @@ void PrintExceptions(const std::vector<RunMutant>& mutants, size_t done) {
 }
 
 void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t done) {
-  const std::vector<Row> rows = SumUp(campaign.mutants(), done);
-  const Row& all = rows.back();
+  const std::vector<RunRow> rows = SumUp(campaign.mutants(), done);
+  const RunRow& all = rows.back();
   if (!request.quiet) {
     fmt::print("{:<18}{:>9}{:>9}{:>9}{:>10}{:>13}{:>12}\n", "what was wrong", "mistakes", "found", "refused",
                "survived", "cause right", "part named");
-    for (const Row& row : rows) {
+    for (const RunRow& row : rows) {
       fmt::print("{:<18}{:>9}{:>9}{:>9}{:>10}{:>13}{:>12}\n", row.kind, row.mutants, row.killed, row.refused,
                  row.survived, row.cause,
                  row.with_part > 0 ? fmt::format("{} of {}", row.part, row.with_part) : "");
@@ -105,7 +105,7 @@ std::string ToText(const MutateRunRequest& request, const RunCampaign& campaign,
                {"from_s", request.options.from}, {"duration_s", request.options.duration},
                {"scale", request.options.scale}, {"complete", done == campaign.mutants().size()}};
   json["kinds"] = Json::object();
-  for (const Row& row : SumUp(campaign.mutants(), done)) {
+  for (const RunRow& row : SumUp(campaign.mutants(), done)) {
     json["kinds"][row.kind] = {{"mistakes", row.mutants},     {"found", row.killed},
                                {"refused", row.refused},      {"survived", row.survived},
                                {"cause_right", row.cause},    {"part_named", row.part},

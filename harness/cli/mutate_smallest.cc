@@ -32,7 +32,7 @@ constexpr Column kColumns[] = {
 };
 
 /// A line of the table: the numbers of one quantity, by one question.
-struct Row {
+struct SmallestRow {
   int numbers = 0, shown = 0, good = 0;
   std::vector<double> errors;
 };
@@ -48,8 +48,8 @@ std::vector<std::string> ListQuantities(const DetectabilityResult& result) {
 }
 
 /// @param quantity empty for all.
-Row SumUp(const DetectabilityResult& result, const std::string& quantity, const Column& column) {
-  Row row;
+SmallestRow SumUp(const DetectabilityResult& result, const std::string& quantity, const Column& column) {
+  SmallestRow row;
   for (const Detectability& number : result.numbers) {
     if (!quantity.empty() && number.quantity != quantity) continue;
     ++row.numbers;
@@ -63,7 +63,7 @@ Row SumUp(const DetectabilityResult& result, const std::string& quantity, const 
   return row;
 }
 
-Json ToJson(double error) { return std::isfinite(error) ? Json(error) : Json(nullptr); }
+Json ErrorToJson(double error) { return std::isfinite(error) ? Json(error) : Json(nullptr); }
 
 std::string ToText(const MutateRunRequest& request, const DetectabilityResult& result, bool complete) {
   Json json = {{"scenario", request.scenario},
@@ -77,10 +77,10 @@ std::string ToText(const MutateRunRequest& request, const DetectabilityResult& r
   for (const Detectability& number : result.numbers) {
     json["numbers"].push_back({{"name", number.name},
                                {"quantity", number.quantity},
-                               {"balance_robot", ToJson(number.robot)},
-                               {"balance_object", ToJson(number.object)},
-                               {"prediction", ToJson(number.prediction)},
-                               {"law", ToJson(number.law)}});
+                               {"balance_robot", ErrorToJson(number.robot)},
+                               {"balance_object", ErrorToJson(number.object)},
+                               {"prediction", ErrorToJson(number.prediction)},
+                               {"law", ErrorToJson(number.law)}});
   }
   return json.dump(2) + "\n";
 }
@@ -92,7 +92,7 @@ void Print(const DetectabilityResult& result) {
     fmt::print("smallest relative error that fails by {} alone\n\n{:<24}{:>9}{:>9}{:>11}{:>12}{:>12}{:>12}\n",
                column.name, "quantity", "numbers", "shown", "to 0.1 %", "best", "median", "worst");
     for (const std::string& quantity : quantities) {
-      const Row row = SumUp(result, quantity, column);
+      const SmallestRow row = SumUp(result, quantity, column);
       fmt::print("{:<24}{:>9}{:>9}{:>11}", quantity.empty() ? "all" : quantity, row.numbers, row.shown,
                  row.good);
       if (!row.errors.empty() && !quantity.empty()) {

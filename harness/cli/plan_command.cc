@@ -30,7 +30,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct PlanRequest {
   std::filesystem::path robot = FindShippedFile("controller/parameters/assistant_robot.toml");
   std::vector<double> xyz;  // m
   std::vector<double> zyz_deg = {0, 0, 0};
@@ -57,7 +57,7 @@ int FindJoint(const RobotModel& model, const std::string& option, const std::str
 }
 
 /// The palm's frame and the fingertips that hang on its link.
-Hand FindHand(const RobotModel& model, const Request& request) {
+Hand FindHand(const RobotModel& model, const PlanRequest& request) {
   const bool by_palm = !request.palm.empty();
   const std::string name = by_palm ? request.palm : request.hand == "right" ? "r_palm_frame" : "l_palm_frame";
   Hand hand;
@@ -88,7 +88,7 @@ Hand FindHand(const RobotModel& model, const Request& request) {
 }
 
 /// Arm joints in the middle of their ranges, all others 0, but for what the command line says.
-VectorXd MakeNominalPosture(const RobotModel& model, const Hand& hand, const Request& request) {
+VectorXd MakeNominalPosture(const RobotModel& model, const Hand& hand, const PlanRequest& request) {
   VectorXd q = VectorXd::Zero(model.num_positions());
   for (const int index : hand.arm_joints) {
     const Joint& joint = model.joints()[static_cast<size_t>(index)];
@@ -163,7 +163,8 @@ GraspBlock MakeGraspBlock(const RobotModel& model, const Hand& hand, const Surfa
 }
 
 /// The margin of the contacts that the shipped scenarios use: four fingertips on the torus's outer equator.
-std::optional<double> CalcHandPickedMargin(const Surface& surface, const Hand& hand, const Request& request) {
+std::optional<double> CalcHandPickedMargin(const Surface& surface, const Hand& hand,
+                                           const PlanRequest& request) {
   constexpr std::array<double, 4> kDegrees = {125.0, 90.0, 55.0, -90.0};
   if (dynamic_cast<const Torus*>(&surface) == nullptr || hand.fingertips.size() != kDegrees.size()) return {};
   const Sphere any_fingertip(1.0);  // m; forces on the object do not depend on it
@@ -190,7 +191,7 @@ const PlanClearance* FindSmallest(const Clearances& clearances) {
   return smallest;
 }
 
-void PrintText(const Request& request, const ContactPlan& plan, const GraspBlock& block,
+void PrintText(const PlanRequest& request, const ContactPlan& plan, const GraspBlock& block,
                const std::optional<double>& hand_picked, const std::optional<Clearances>& clearances,
                double seconds) {
   fmt::print("# {} contacts for the object at {} m, {} degrees (ZYZ); {} palm poses tried in {:.2f} s\n",
@@ -234,9 +235,9 @@ void PrintText(const Request& request, const ContactPlan& plan, const GraspBlock
   fmt::print(" }}\n");
 }
 
-std::string ToText(const Request& request, const ContactPlan& plan, const std::optional<GraspBlock>& block,
-                   const std::optional<double>& hand_picked, const std::optional<Clearances>& clearances,
-                   double seconds) {
+std::string ToText(const PlanRequest& request, const ContactPlan& plan,
+                   const std::optional<GraspBlock>& block, const std::optional<double>& hand_picked,
+                   const std::optional<Clearances>& clearances, double seconds) {
   Json json = {
       {"found", plan.found},      {"object_xyz", request.xyz},     {"object_zyz_deg", request.zyz_deg},
       {"mu", request.options.mu}, {"palm_poses", plan.palm_poses}, {"seconds", seconds}};
@@ -268,7 +269,7 @@ std::string ToText(const Request& request, const ContactPlan& plan, const std::o
   return json.dump(2) + "\n";
 }
 
-int Run(Request request) {
+int Run(PlanRequest request) {
   const std::filesystem::path shipped = FindShippedFile("controller/parameters/assistant_robot.toml");
   if (request.mjcf.empty() && request.robot == shipped) {
     request.mjcf = FindShippedFile("mjcf/scene.xml").string();
@@ -334,7 +335,7 @@ int Run(Request request) {
 }  // namespace
 
 void AddPlanCommand(Command app) {
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<PlanRequest>();
   Command command = app.AddCommand("plan", "Choose where a hand should hold the object");
   command.AddFlag("--contacts", "Contact points, posture and margin, as a scenario's [grasp]").Required();
   command.AddOption("--object-xyz", &request->xyz, "Object in the world, m")

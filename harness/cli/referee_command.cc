@@ -25,7 +25,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Request {
+struct RefereeRequest {
   std::filesystem::path robot;
   RefereeOptions options;
   UrdfOptions urdf;
@@ -57,7 +57,7 @@ std::vector<std::string> NamesOf(const std::vector<size_t>& group, const Referee
   return names;
 }
 
-void PrintTable(const Request& request, const RobotModel& model, const RefereeResult& result) {
+void PrintTable(const RefereeRequest& request, const RobotModel& model, const RefereeResult& result) {
   fmt::print("{}: {}\n{} random states (seed {}), {} engines\n\n", model.name(),
              request.robot.filename().string(), result.samples, request.options.states.seed,
              result.names.size());
@@ -92,7 +92,7 @@ void PrintTable(const Request& request, const RobotModel& model, const RefereeRe
              request.options.tolerance);
 }
 
-void PrintVerdict(const Request& request, const RefereeResult& result) {
+void PrintVerdict(const RefereeRequest& request, const RefereeResult& result) {
   if (result.samples < request.options.states.samples) {
     fmt::print("INTERRUPTED after {} of {} states. So far:\n", result.samples,
                request.options.states.samples);
@@ -108,7 +108,7 @@ void PrintVerdict(const Request& request, const RefereeResult& result) {
   for (const std::string& setting : result.settings) fmt::print("  {}\n", setting);
 }
 
-std::string ToText(const Request& request, const RobotModel& model, const RefereeResult& result) {
+std::string ToText(const RefereeRequest& request, const RobotModel& model, const RefereeResult& result) {
   const int base = model.num_base_velocities();
   Json json = {{"robot", request.robot.string()},
                {"verdict", result.Agrees() ? "pass" : "disagreement"},
@@ -141,7 +141,7 @@ std::string ToText(const Request& request, const RobotModel& model, const Refere
 }
 
 /// A case for each pair and term.
-std::string WriteJUnit(const Request& request, const RobotModel& model, const RefereeResult& result) {
+std::string WriteJUnit(const RefereeRequest& request, const RobotModel& model, const RefereeResult& result) {
   std::vector<JUnitCase> cases;
   for (const ComparedPair& pair : result.pairs) {
     for (const CheckRecord& record : pair.terms) {
@@ -160,7 +160,7 @@ std::filesystem::path FindProgramsFolder() {
   return program.parent_path().parent_path() / "libexec/dexcheck";
 }
 
-int Run(Request request) {
+int Run(RefereeRequest request) {
   CatchInterrupts();
   request.options.tolerance = std::pow(10.0, -request.digits);
   request.options.programs_folder = FindProgramsFolder();
@@ -192,7 +192,7 @@ int Run(Request request) {
 void AddRefereeCommand(Command app) {
   constexpr std::uint64_t kMaxSamples = 1000000;
   constexpr int kMostDigits = 15;
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<RefereeRequest>();
   request->options.states.samples = 100;
   Command command =
       app.AddCommand("referee", "Compare one robot's terms in several physics engines, pair by pair");

@@ -23,7 +23,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct RenderRequest {
   std::filesystem::path run_folder;
   std::string beside;
   std::string ghost;
@@ -44,7 +44,7 @@ double Duration(const RunFrames& run) { return run.times.back() - run.times.fron
 /// Of the last step, whose end is no row of its own, s.
 double LastStep(const RunFrames& run) { return run.times.back() - run.times[run.times.size() - 2]; }
 
-void WriteStill(const Request& request, const std::vector<RunView>& views, const std::string& out) {
+void WriteStill(const RenderRequest& request, const std::vector<RunView>& views, const std::string& out) {
   double longest = 0.0;
   double end = 0.0;
   for (const RunView& view : views) {
@@ -64,7 +64,7 @@ void WriteStill(const Request& request, const std::vector<RunView>& views, const
 }
 
 /// The camera of --from and its companions; none without.
-std::optional<FreeCamera> MakeFreeCamera(const Request& request) {
+std::optional<FreeCamera> MakeFreeCamera(const RenderRequest& request) {
   if (request.from.empty()) return std::nullopt;
   FreeCamera camera;
   camera.from = {request.from[0], request.from[1], request.from[2]};
@@ -84,7 +84,7 @@ std::optional<FreeCamera> MakeFreeCamera(const Request& request) {
 }
 
 /// What the name of the output says is what it gets.
-void CheckOutput(const Request& request, const std::string& out) {
+void CheckOutput(const RenderRequest& request, const std::string& out) {
   std::error_code ignored;
   if (std::filesystem::is_directory(out, ignored)) {
     throw InputError(out + ": cannot be written: " + std::strerror(EISDIR));
@@ -97,7 +97,7 @@ void CheckOutput(const Request& request, const std::string& out) {
   }
 }
 
-ExitCode Run(Request request) {
+ExitCode Run(RenderRequest request) {
   ReadSize(request.size, &request.movie.width, &request.movie.height);
   std::string out = request.out;
   if (out.empty()) out = (request.run_folder / (request.still ? "still.png" : "video.mp4")).string();
@@ -123,7 +123,7 @@ ExitCode Run(Request request) {
 void AddRenderCommand(Command app) {
   constexpr int kMostFramesPerSecond = 120;
   constexpr int kMostJobs = 64;
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<RenderRequest>();
   request->movie.workers = CountDrawers();
   Command command = app.AddCommand("render", "Draw a recorded run as a video, or one instant of it");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");

@@ -11,7 +11,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct ReportRequest {
   std::filesystem::path run_folder;
   std::string out;
   bool no_replay = false;
@@ -28,7 +28,7 @@ RunScene MakeStillScene(const std::filesystem::path& run_dir, const std::filesys
 }  // namespace
 
 void AddReportCommand(Command app) {
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<ReportRequest>();
   Command command = app.AddCommand("report", "Write a recorded run's report: one page and its figures");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
   command

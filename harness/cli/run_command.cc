@@ -27,7 +27,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct RunRequest {
   std::string scenario;
   std::string out;
   std::vector<std::string> overrides;
@@ -63,7 +63,7 @@ void TryToMake(const char* what, const Make& make) {
 }
 
 /// Draws what was asked for into the run's folder, after the verdict.
-void DrawRun(const Request& request, const std::filesystem::path& folder, ExitCode verdict) {
+void DrawRun(const RunRequest& request, const std::filesystem::path& folder, ExitCode verdict) {
   const bool quiet = request.quiet || request.json;
   if (request.video) {
     TryToMake("video", [&] { WriteRunMovie(folder, (folder / "video.mp4").string(), quiet); });
@@ -77,12 +77,12 @@ void DrawRun(const Request& request, const std::filesystem::path& folder, ExitCo
   });
 }
 
-LoopParts MakeParts(const Request& request, const Setup& setup, const std::filesystem::path& robot) {
+LoopParts MakeParts(const RunRequest& request, const Setup& setup, const std::filesystem::path& robot) {
   if (request.controller.empty()) return MakeLoopParts(setup);
   return MakeLoopParts(setup, request.controller, robot, request.controller_time_limit);
 }
 
-int RunScenario(const Request& request) {
+int RunScenario(const RunRequest& request) {
   const bool quiet = request.quiet || request.json;
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides, request.seed);
   std::optional<OutputFile> junit;
@@ -141,7 +141,7 @@ int RunScenario(const Request& request) {
 }
 
 /// Repeats a recorded run from what its log keeps, and compares every number bit for bit.
-int ReplayRun(const Request& request) {
+int ReplayRun(const RunRequest& request) {
   const RecordedRun recorded(request.replay);
   const std::string controller = recorded.controller();
   if (!controller.empty() && request.controller.empty()) {
@@ -191,7 +191,7 @@ int ReplayRun(const Request& request) {
   return expected ? kSuccess : kDisagreement;
 }
 
-int Run(const Request& request) {
+int Run(const RunRequest& request) {
   if (request.list) {
     for (const ShippedScenario& scenario : ListShippedScenarios()) {
       fmt::print("{:<14} {}\n", scenario.name, scenario.description);
@@ -205,7 +205,7 @@ int Run(const Request& request) {
 }  // namespace
 
 void AddRunCommand(Command app, const std::string& command_line) {
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<RunRequest>();
   request->command = command_line;
   Command command = app.AddCommand("run", "Simulate a scenario, cross-checked at every step");
   Option scenario = command.AddOption("SCENARIO", &request->scenario,

@@ -14,7 +14,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct StatesRequest {
   std::filesystem::path robot;
   std::filesystem::path out;
   long count = 1000;
@@ -22,7 +22,7 @@ struct Request {
   UrdfOptions urdf;
 };
 
-int Run(const Request& request) {
+int Run(const StatesRequest& request) {
   const RobotDescription robot = ReadDescription(request.robot, request.urdf);
   const StateTable states = DrawStates(robot, request.count, request.options);
   std::error_code error;
@@ -43,7 +43,7 @@ int Run(const Request& request) {
 
 void AddStatesCommand(Command app) {
   constexpr long kMaxCount = 1000000;
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<StatesRequest>();
   Command command = app.AddCommand(
       "states", "Write random states of a robot, for a program whose answers consistency --answers reads");
   command.AddOption("ROBOT", &request->robot, "Parameter file (TOML), URDF or MJCF")

@@ -29,7 +29,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct StudyRequest {
   std::string study;
   std::string database;
   std::string shard;
@@ -86,7 +86,7 @@ std::vector<long> FindMissing(long count, const std::vector<long>& done) {
   return missing;
 }
 
-RunOptions MakeRunOptions(const Request& request, ProgressBar* bar) {
+RunOptions MakeRunOptions(const StudyRequest& request, ProgressBar* bar) {
   RunOptions options;
   options.jobs =
       static_cast<int>(request.jobs > 0 ? request.jobs : std::max(std::thread::hardware_concurrency(), 1U));
@@ -110,7 +110,7 @@ void RemoveFailed(const Study& study, StudyStore* store) {
 
 /// Makes the trials that are missing. @return the numbers of those that still are.
 std::vector<long> MakeTrials(const StudyInputs& inputs, const std::vector<Trial>& trials,
-                             const Request& request, StudyStore* store) {
+                             const StudyRequest& request, StudyStore* store) {
   ProgressBar bar(inputs.study.name, static_cast<long>(trials.size()), request.quiet);
   RunTrials(inputs, trials, MakeRunOptions(request, &bar), store);
   // From the file that is there now under this name: what another program removed is not done.
@@ -123,7 +123,7 @@ std::vector<long> MakeTrials(const StudyInputs& inputs, const std::vector<Trial>
 }
 
 /// The same for a search, of which only the batch at hand is known.
-std::vector<long> MakeSearch(const StudyInputs& inputs, const Request& request, StudyStore* store) {
+std::vector<long> MakeSearch(const StudyInputs& inputs, const StudyRequest& request, StudyStore* store) {
   ProgressBar bar(inputs.study.name, CountTrials(inputs.study), request.quiet);
   SearchPart part = ParseShard(request.shard);
   part.exchange = request.exchange;
@@ -139,14 +139,14 @@ std::vector<long> MakeSearch(const StudyInputs& inputs, const Request& request, 
   return missing;
 }
 
-StudyStore OpenDatabase(const StudyInputs& inputs, const Request& request) {
+StudyStore OpenDatabase(const StudyInputs& inputs, const StudyRequest& request) {
   const auto makes_same_rows = [&](const std::vector<TrialRow>& rows) {
     return MakesRowsAgain(inputs, rows);
   };
   return StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), inputs.study, makes_same_rows);
 }
 
-int ServeStudy(const Request& request) {
+int ServeStudy(const StudyRequest& request) {
   StudyInputs inputs = FindStudy(request.study);
   if (!inputs.study.is_external()) {
     throw InputError(inputs.study.source +
@@ -162,7 +162,7 @@ int ServeStudy(const Request& request) {
   return kSuccess;
 }
 
-int RunStudy(const Request& request) {
+int RunStudy(const StudyRequest& request) {
   StudyInputs inputs = FindStudy(request.study);
   const Study& study = inputs.study;
   if (study.is_external()) {
@@ -241,7 +241,7 @@ int MergeStudies(const std::string& out, const std::vector<std::string>& databas
 void AddStudyCommand(Command app) {
   Command study = app.AddCommand("study", "Vary a scenario's gains, models or plant over many runs");
   study.RequireCommand();
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<StudyRequest>();
   const auto databases = std::make_shared<std::vector<std::string>>();
   const auto whole = WholeNumber(1, 1000000);
   const auto add_quiet = [&](Command command) {

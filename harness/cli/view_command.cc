@@ -25,7 +25,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct ViewRequest {
   std::string what;  // scenario or folder of a run
   std::string out;
   std::string save;
@@ -55,7 +55,7 @@ ExitCode ToExitCode(const Runner& runner) {
 /// scenario from the beginning, log and verdict are those of `dexcheck run`.
 class Rerun {
  public:
-  Rerun(const Request& request, const std::vector<std::string>& overrides,
+  Rerun(const ViewRequest& request, const std::vector<std::string>& overrides,
         const std::filesystem::path& folder, long rows)
       : files_(FindScenario(request.what, overrides, request.seed)),
         setup_(files_.scenario, files_.robot, files_.mjcf),
@@ -97,7 +97,7 @@ ExitCode Conclude(const Setup& setup, const Runner& runner, const std::filesyste
   return ToExitCode(runner);
 }
 
-int ViewScenario(const Request& request) {
+int ViewScenario(const ViewRequest& request) {
   std::optional<RunFolder> folder;
   const auto make = [&](const std::vector<std::string>& more) {
     std::vector<std::string> overrides = request.overrides;
@@ -131,7 +131,7 @@ int ViewScenario(const Request& request) {
   return Conclude(again.setup(), again.runner(), folder->path());
 }
 
-int View(const Request& request) {
+int View(const ViewRequest& request) {
   if (std::filesystem::exists(std::filesystem::path(request.what) / "log.h5")) {
     if (!request.out.empty() || !request.overrides.empty() || !request.save.empty() || request.seed != 0) {
       throw UsageError("--out, --set, --seed and --save belong to a scenario; " + Quote(request.what) +
@@ -148,7 +148,7 @@ int View(const Request& request) {
 }  // namespace
 
 void AddViewCommand(Command app, const std::string& command_line) {
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<ViewRequest>();
   request->command = command_line;
   Command command = app.AddCommand("view", "Show a run while it goes on, or a recorded one, in a window");
   command.AddOption("SCENARIO|RUN_DIR", &request->what, "Scenario to run, or folder of a recorded run")
