@@ -85,7 +85,7 @@ void Print(const AuditRequest& request, const RobotDescription& robot, const Aud
 }
 
 /// A case for each kind of check, which fails with all that it found.
-std::string WriteJUnit(const AuditRequest& request, const AuditResult& result) {
+std::string WriteAuditJUnit(const AuditRequest& request, const AuditResult& result) {
   std::vector<JUnitCase> cases;
   for (const char* check : {"mass", "inertia", "density", "com", "mirror", "load", "range", "axis", "name"}) {
     cases.push_back({"audit", check, "", ""});
@@ -97,7 +97,7 @@ std::string WriteJUnit(const AuditRequest& request, const AuditResult& result) {
     std::string& text = finding.level == AuditLevel::kNote ? test->output : test->failure;
     text += (text.empty() ? "" : "\n") + finding.where + " " + finding.text;
   }
-  return dexcheck::cli::WriteJUnit("dexcheck.audit." + request.robot.stem().string(), cases, 0.0);
+  return WriteJUnit("dexcheck.audit." + request.robot.stem().string(), cases, 0.0);
 }
 
 int Run(const AuditRequest& request) {
@@ -112,7 +112,7 @@ int Run(const AuditRequest& request) {
   if (!request.junit_file.empty()) junit.emplace(request.junit_file);
   const AuditResult result = AuditRobot(robot);
   if (json) json->Write(ToText(request, result));
-  if (junit) junit->Write(WriteJUnit(request, result));
+  if (junit) junit->Write(WriteAuditJUnit(request, result));
   if (request.json_file != "-") Print(request, robot, result);
   return result.IsGood() ? kSuccess : kDisagreement;
 }

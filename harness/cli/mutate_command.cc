@@ -238,7 +238,7 @@ int Run(MutateRequest request) {
     bar.Update(static_cast<long>(campaign.formulas_done));
   }
   while (campaign.done < campaign.mutants.size() && !IsInterrupted()) {
-    RunMutant(model, *engine, source, request.options, &campaign.mutants[campaign.done++]);
+    TryMutant(model, *engine, source, request.options, &campaign.mutants[campaign.done++]);
     bar.Update(static_cast<long>(campaign.formulas_done + campaign.done));
   }
   bar.Finish();

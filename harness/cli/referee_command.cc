@@ -141,7 +141,8 @@ std::string ToText(const RefereeRequest& request, const RobotModel& model, const
 }
 
 /// A case for each pair and term.
-std::string WriteJUnit(const RefereeRequest& request, const RobotModel& model, const RefereeResult& result) {
+std::string WriteRefereeJUnit(const RefereeRequest& request, const RobotModel& model,
+                              const RefereeResult& result) {
   std::vector<JUnitCase> cases;
   for (const ComparedPair& pair : result.pairs) {
     for (const CheckRecord& record : pair.terms) {
@@ -149,8 +150,8 @@ std::string WriteJUnit(const RefereeRequest& request, const RobotModel& model, c
                                     Describe(record.where, model, model.num_base_velocities())));
     }
   }
-  return dexcheck::cli::WriteJUnit("dexcheck.referee." + request.robot.stem().string(), cases, 0.0,
-                                   result.lacks_requested ? JoinNames(result.absent) : "");
+  return WriteJUnit("dexcheck.referee." + request.robot.stem().string(), cases, 0.0,
+                    result.lacks_requested ? JoinNames(result.absent) : "");
 }
 
 /// What is shipped beside the program: ../libexec/dexcheck, in a build as when installed.
@@ -180,7 +181,7 @@ int Run(RefereeRequest request) {
   ExitCode code = is_whole ? kSuccess : kFailure;
   if (!result.Agrees()) code = kDisagreement;
   if (json) json->Write(ToText(request, model, result));
-  if (junit) junit->Write(WriteJUnit(request, model, result));
+  if (junit) junit->Write(WriteRefereeJUnit(request, model, result));
   if (request.json_file == "-") return code;
   if (!request.quiet) PrintTable(request, model, result);
   PrintVerdict(request, result);

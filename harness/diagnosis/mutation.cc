@@ -181,7 +181,7 @@ bool IsNamedBy(const Mutant& mutant, const Repair& cause) {
          (!several || cause.parameters.size() > 1);
 }
 
-void RunMutant(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
+void TryMutant(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
                const MutationOptions& options, Mutant* mutant) {
   RobotSpec spec = model.spec();
   mutant->change(&spec);

@@ -55,7 +55,7 @@ std::vector<Mutant> ListMutants(const RobotSpec& spec, double scale);
 bool IsNamedBy(const Mutant& mutant, const Repair& cause);
 
 /// Runs the checks, and the diagnosis, on a mutant.
-void RunMutant(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
+void TryMutant(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
                const MutationOptions& options, Mutant* mutant);
 
 }  // namespace dexcheck

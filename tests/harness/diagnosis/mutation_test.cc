@@ -128,18 +128,18 @@ TEST(Mutants, WithoutEffectAreShownToHaveNone) {
   for (Mutant& mutant : ListMutants(model.spec(), 1e-3)) {
     if (mutant.name != "joint panda_joint2: upper limit") continue;
     ++limits;
-    RunMutant(model, *engine, "mjcf", {}, &mutant);
+    TryMutant(model, *engine, "mjcf", {}, &mutant);
     EXPECT_EQ(mutant.fate, MutantFate::kKilled);
     EXPECT_EQ(mutant.failed_checks, "joint_range");
     EXPECT_TRUE(mutant.named_first);
     Mutant unlimited = mutant;
     engine->jnt_limited[joint] = 0;
-    RunMutant(model, *engine, "mjcf", {}, &unlimited);
+    TryMutant(model, *engine, "mjcf", {}, &unlimited);
     EXPECT_EQ(unlimited.fate, MutantFate::kNoEffect);
     // A change that has an effect but is too small to be found is a survivor.
     Mutant tiny = mutant;
     tiny.change = [](RobotSpec* spec) { spec->joints[0].mdh.d *= 1.0 + 1e-13; };
-    RunMutant(model, *engine, "mjcf", {}, &tiny);
+    TryMutant(model, *engine, "mjcf", {}, &tiny);
     EXPECT_NE(tiny.fate, MutantFate::kKilled);
   }
   EXPECT_EQ(limits, 1);
@@ -150,7 +150,7 @@ TEST(Mutants, ThatAreNoRobotAreRefused) {
   const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/panda.xml"));
   Mutant mutant = ListMutants(model.spec(), 1e-3).front();
   mutant.change = [](RobotSpec* spec) { spec->joints[1].body.mass = -1.0; };
-  RunMutant(model, *engine, "mjcf", {}, &mutant);
+  TryMutant(model, *engine, "mjcf", {}, &mutant);
   EXPECT_EQ(mutant.fate, MutantFate::kRefused);
 }
 
