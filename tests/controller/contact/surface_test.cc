@@ -324,8 +324,8 @@ TEST(BoxTest, HasAFlatChartOnEachFaceThatEndsAtItsEdges) {
   EXPECT_TRUE(box.Contains({0.04, 0.05, 0}, 0.0));
   EXPECT_FALSE(box.Contains({0.04, 0.05, 0}, 1e-6));
   EXPECT_FALSE(box.Contains({0.041, 0.0, 0}, 0.0));
-  EXPECT_NO_THROW(box.Evaluate({0.04, 0.05, 0}));
-  EXPECT_TRUE(Throws<SingularityError>([&] { box.Evaluate({0.041, 0.0, 0}); }, "beyond the edge"));
+  EXPECT_NO_THROW((void)box.Evaluate({0.04, 0.05, 0}));
+  EXPECT_TRUE(Throws<SingularityError>([&] { (void)box.Evaluate({0.041, 0.0, 0}); }, "beyond the edge"));
   EXPECT_TRUE(Throws<std::invalid_argument>([] { Box(Vector3d(0.1, 0.0, 0.1)); }, "box half length"));
   // Farther from an edge than from a face.
   EXPECT_NEAR(box.Project({0.06, 0.08, 0.0}).distance, 0.05, kRounding);
