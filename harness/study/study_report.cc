@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -79,15 +80,18 @@ class Report {
         "href=\"data:,\">\n<style>\n{}{}{}</style>\n</head>\n<body>\n",
         kContentPolicy, results_.study.name, Html::Raw(kPageCss), Html(kStyle), MakeExplorerStyle());
     html += Head();
-    html += "<main>\n";
+    Html body;
     if (results_.rows.empty()) {
-      html += "<p>No trial is done yet.</p>\n";
+      body += "<p>No trial is done yet.</p>\n";
     } else {
       for (const Html& part :
            {Answers(), MakeMarginTable(results_), MakeSensitivityTables(results_), Outcomes(), Maps(),
             Lines(), ErrorAgainstEffort(), MakeExplorer(results_), Best(), Trials()})
-        html += part;
+        body += part;
+      html += LinkParts(body);
     }
+    html += "<main>\n";
+    html += body;
     html += "</main>\n";
     html += Footer();
     if (!results_.rows.empty()) html += MakeExplorerScript(results_);
@@ -118,11 +122,27 @@ class Report {
                        FormatHtml("least rms position error, <a href=\"{}\">trial {}</a>",
                                   LinkTo(*tracked_.front()), tracked_.front()->trial.number));
     }
-    html +=
-        "</div>\n</header>\n<nav><div><a href=\"#outcomes\">Outcomes</a><a href=\"#maps\">Maps</a><a "
-        "href=\"#lines\">Lines</a><a href=\"#effort\">Effort</a><a href=\"#explore\">Look closer</a><a "
-        "href=\"#best\">Best</a><a "
-        "href=\"#trials\">Trials</a></div></nav>\n";
+    html += "</div>\n</header>\n";
+    return html;
+  }
+
+  /// A link to each part that the page has, in its order.
+  [[nodiscard]] static Html LinkParts(const Html& body) {
+    constexpr std::array<std::pair<const char*, const char*>, 9> kParts = {{{"margins", "Margins"},
+                                                                            {"effects", "Which key matters"},
+                                                                            {"outcomes", "Outcomes"},
+                                                                            {"maps", "Maps"},
+                                                                            {"lines", "Lines"},
+                                                                            {"effort", "Effort"},
+                                                                            {"explore", "Look closer"},
+                                                                            {"best", "Best"},
+                                                                            {"trials", "Trials"}}};
+    Html html("<nav><div>");
+    for (const auto& [id, name] : kParts) {
+      if (body.markup().find(fmt::format("id=\"{}\"", id)) == std::string::npos) continue;
+      html += FormatHtml("<a href=\"#{}\">{}</a>", id, name);
+    }
+    html += "</div></nav>\n";
     return html;
   }
 

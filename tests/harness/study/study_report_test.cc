@@ -67,6 +67,21 @@ TEST_F(StudyReportTest, NoTextBecomesMarkup) {
   EXPECT_GE(count, 6U) << "description, scenario, two versions, revision, failures: all are shown";
 }
 
+TEST_F(StudyReportTest, LinksToThePartsThatItHas) {
+  const std::string page = Report("why");
+  const std::string links = page.substr(page.find("<nav>"), page.find("</nav>") - page.find("<nav>"));
+  const std::string kLink = "href=\"#";
+  int count = 0;
+  for (size_t at = links.find(kLink); at != std::string::npos; at = links.find(kLink, at + 1), ++count) {
+    const size_t begin = at + kLink.size();
+    const std::string id = links.substr(begin, links.find('"', begin) - begin);
+    EXPECT_THAT(page, HasSubstr("id=\"" + id + "\"")) << "a link that leads nowhere";
+  }
+  EXPECT_GE(count, 4);
+  EXPECT_THAT(links, HasSubstr("#maps"));
+  EXPECT_THAT(links, Not(HasSubstr("#margins"))) << "a study of a grid has none";
+}
+
 TEST_F(StudyReportTest, TextsMayHaveAnyLength) {
   constexpr size_t kLength = 1000000;
   const std::string page = Report(std::string(kLength, 'x') + " at t = 1 s");
