@@ -11,9 +11,6 @@ namespace dexcheck {
 namespace {
 
 constexpr int kMaxSteps = 50;
-// Misalignment of the normals (rad), and offset relative to the lengths involved, at which Newton's method
-// stops: a few hundred rounding errors.
-constexpr double kConvergence = 1e-13;
 // Largest turn of either normal in one Newton step, rad.
 constexpr double kMaxTurn = 0.5;
 
@@ -45,7 +42,7 @@ Pair EvaluatePair(const Surface& fingertip, const Surface& object, const Pose& X
 
 bool HasConverged(const Pair& pair, const Pose& X_OF) {
   const double length = pair.o.p.norm() + pair.f.p.norm() + X_OF.translation().norm();
-  return pair.n_xy.norm() <= kConvergence && pair.e_xy.norm() <= kConvergence * length;
+  return pair.n_xy.norm() <= kContactConvergence && pair.e_xy.norm() <= kContactConvergence * length;
 }
 
 // Newton step [s_f; s_o] = [M_f dalpha_f; M_o dalpha_o] (m) for e_xy = 0, n_xy = 0. To first order

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/contact/find_contact.h"
 #include "controller/contact/rolling.h"
 #include "harness/checks/term_table.h"
 
@@ -25,7 +26,9 @@ void CalcPlaceScales(const RoundingScales& robot, const ContactGeometry& contact
   const double least = 0.5 * sum.trace() - std::hypot(half, 0.5 * (sum(0, 1) + sum(1, 0)));
   const double moved = contact.fingertip.K.norm() / least;
   const double length = robot.world_length();
-  scales->normal = 1.0 + contact.object.K.norm() * moved * length;
+  // On a flat object hardly anything turns the normal but what the search for the contact leaves.
+  const double left = kContactConvergence / CalcRoundingBound(robot.depth(), 1.0);
+  scales->normal = std::max(1.0 + contact.object.K.norm() * moved * length, left);
   scales->position = (1.0 + moved) * length;
   scales->moment = scales->position + contact.g_o_cf.translation().norm() * scales->normal;
   scales->J_B = scales->normal + scales->position / robot.length();

@@ -26,6 +26,8 @@ class RoundingScales {
                 const Eigen::Ref<const VectorXd>& xi);
 
   // At every state.
+  /// Of the longest chain of joints.
+  [[nodiscard]] int depth() const { return model_->max_depth(); }
   /// Of the robot's points' distances from the base, m.
   [[nodiscard]] double length() const { return reach_; }
   /// Length (or 1) by which a velocity coordinate moves points.

@@ -300,8 +300,7 @@ TEST(Trajectory, EvaluationDoesNotAllocate) {
 
 std::unique_ptr<Trajectory> Parse(const std::string& text) {
   const TomlDocument document(text, "scenario.toml");
-  TomlTable table = document.Open();
-  return ReadTrajectory(table)(MakeStart());
+  return document.Read([](TomlTable table) { return ReadTrajectory(table); })(MakeStart());
 }
 
 TEST(TrajectoryReader, ReadsEveryType) {
