@@ -96,7 +96,7 @@ ObjectModel ReadObject(const TomlValue& value) {
 }  // namespace
 
 RobotModel ParseRobotModel(std::string_view text, std::string_view source,
-                           std::span<const std::string> overrides) {
+                           std::span<const std::string> overrides, std::vector<WrittenRow>* rows) {
   TomlDocument document(text, source);
   for (const std::string& assignment : overrides) document.Override(assignment);
   TomlTable root = document.Open();
@@ -109,13 +109,14 @@ RobotModel ParseRobotModel(std::string_view text, std::string_view source,
   spec.name = root.Get("name").AsText();
   spec.gravity = root.Get("gravity").AsVector<3>();
   spec.base = ReadBase(root.Get("base"));
-  ReadTree(root, spec);
+  std::vector<WrittenRow> written = ReadTree(root, spec);
+  if (rows != nullptr) *rows = std::move(written);
   if (const std::optional<TomlValue> object = root.Find("object")) spec.object = ReadObject(*object);
   return RobotModel(std::move(spec));
 }
 
-RobotModel ReadRobotModel(const std::filesystem::path& path) {
-  return ParseRobotModel(ReadTextFile(path.string()), path.string());
+RobotModel ReadRobotModel(const std::filesystem::path& path, std::vector<WrittenRow>* rows) {
+  return ParseRobotModel(ReadTextFile(path.string()), path.string(), {}, rows);
 }
 
 }  // namespace dexcheck
