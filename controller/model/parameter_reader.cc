@@ -93,7 +93,8 @@ ObjectModel ReadObject(const TomlValue& value) {
   return object;
 }
 
-RobotModel ReadRobot(TomlTable& root, std::string_view source, TomlDocument& document) {
+RobotModel ReadRobot(TomlTable& root, std::string_view source, TomlDocument& document,
+                     std::vector<WrittenRow>* rows) {
   // First of all, since a misspelt section makes others look wrong.
   root.RejectOthersThan({"name", "gravity", "lengths", "base", "chain", "template", "frame", "object"});
   DefineLengths(root, document);
@@ -103,7 +104,8 @@ RobotModel ReadRobot(TomlTable& root, std::string_view source, TomlDocument& doc
   spec.name = root.Get("name").AsText();
   spec.gravity = root.Get("gravity").AsVector<3>();
   spec.base = ReadBase(root.Get("base"));
-  ReadTree(root, spec);
+  std::vector<WrittenRow> written = ReadTree(root, spec);
+  if (rows != nullptr) *rows = std::move(written);
   if (const std::optional<TomlValue> object = root.Find("object")) spec.object = ReadObject(*object);
   document.RejectMissing();
   return RobotModel(std::move(spec));
@@ -112,14 +114,14 @@ RobotModel ReadRobot(TomlTable& root, std::string_view source, TomlDocument& doc
 }  // namespace
 
 RobotModel ParseRobotModel(std::string_view text, std::string_view source,
-                           std::span<const std::string> overrides) {
+                           std::span<const std::string> overrides, std::vector<WrittenRow>* rows) {
   TomlDocument document(text, source);
   for (const std::string& assignment : overrides) document.Override(assignment);
-  return document.Read([&](TomlTable root) { return ReadRobot(root, source, document); });
+  return document.Read([&](TomlTable root) { return ReadRobot(root, source, document, rows); });
 }
 
-RobotModel ReadRobotModel(const std::filesystem::path& path) {
-  return ParseRobotModel(ReadTextFile(path.string()), path.string());
+RobotModel ReadRobotModel(const std::filesystem::path& path, std::vector<WrittenRow>* rows) {
+  return ParseRobotModel(ReadTextFile(path.string()), path.string(), {}, rows);
 }
 
 }  // namespace dexcheck

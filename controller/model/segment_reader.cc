@@ -13,7 +13,8 @@ enum class Convention { kModified, kClassic };
 /// Rot(z, q) Trans(z, d) Trans(x, a) Rot(x, alpha): frame i turns with the joint about its z axis, and the
 /// link's own frame, whose z axis is the next joint's, stands at a and alpha in it.
 void MakeClassic(SegmentRow& row) {
-  row.X_iL = Eigen::Translation3d(row.mdh.a, 0.0, 0.0) * Eigen::AngleAxisd(row.mdh.alpha, Vector3d::UnitX());
+  row.written.X_iL =
+      Eigen::Translation3d(row.mdh.a, 0.0, 0.0) * Eigen::AngleAxisd(row.mdh.alpha, Vector3d::UnitX());
   row.mdh.a = 0.0;
   row.mdh.alpha = 0.0;
 }
@@ -23,11 +24,12 @@ void ReadPlainTransform(TomlTable& table, SegmentRow& row) {
   const Pose X_PL = ReadPose(table);
   const std::optional<TomlValue> axis = table.Find("axis");
   const Vector3d z = axis ? ReadAxis(*axis) : Vector3d::UnitZ();
+  row.written.is_plain = true;
   row.X_before = X_PL;
   if (z == Vector3d::UnitZ()) return;
   const Matrix3d R = MakeRotationFromZ(z);
   row.X_before.linear() = X_PL.linear() * R;
-  row.X_iL.linear() = R.transpose();
+  row.written.X_iL.linear() = R.transpose();
 }
 
 SegmentRow ReadRow(const TomlValue& value, Convention convention) {
@@ -37,7 +39,8 @@ SegmentRow ReadRow(const TomlValue& value, Convention convention) {
                  ReadPartName(table.Get("link")),
                  JointType::kRevolute,
                  {},
-                 Pose::Identity()};
+                 Pose::Identity(),
+                 {}};
   if (const std::optional<TomlValue> type = table.Find("type")) {
     row.type = type->AsChoice<JointType>({{"revolute", JointType::kRevolute},
                                           {"prismatic", JointType::kPrismatic},
@@ -46,6 +49,7 @@ SegmentRow ReadRow(const TomlValue& value, Convention convention) {
   // A ball turns about all axes of the link's own frame, whose place is told by a plain transform.
   if (row.type == JointType::kBall) {
     row.X_before = ReadPose(table);
+    row.written.is_plain = true;
     table.RejectUnused();
     return row;
   }

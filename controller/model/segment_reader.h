@@ -9,6 +9,7 @@
 
 #include "controller/common/toml_reader.h"
 #include "controller/model/robot_model.h"
+#include "controller/model/written_row.h"
 
 namespace dexcheck {
 
@@ -22,7 +23,7 @@ struct SegmentRow {
   JointType type;
   MdhRow mdh;     ///< Of frame i; zeros for a plain transform.
   Pose X_before;  ///< Comes before the MDH row: a plain transform and the turn of z to its axis.
-  Pose X_iL = Pose::Identity();  ///< The link's own frame in frame i.
+  WrittenRow written;
 };
 
 /// The joint that another one follows: q = multiplier q_leader + offset.

@@ -84,7 +84,7 @@ class TreeReader {
     }
   }
 
-  void Read(TomlTable& root) {
+  std::vector<WrittenRow> Read(TomlTable& root) {
     if (const std::optional<TomlValue> templates = root.Find("template")) ReadTemplates(*templates);
     for (const TomlValue& value : root.Get("chain").AsList()) ReadChain(value);
     for (size_t i = 0; i < chains_.size(); ++i) BuildChain(i);
@@ -94,6 +94,7 @@ class TreeReader {
       for (const TomlValue& value : frames->AsList()) BuildFrame(ReadFrameEntry(value), value, "");
     }
     RejectUnused();
+    return std::move(rows_);
   }
 
  private:
@@ -204,7 +205,7 @@ class TreeReader {
   /// they coincide.
   [[nodiscard]] Pose FromOwnFrame(int joint, const Pose& X) const {
     if (joint < 0) return X;
-    const Pose& X_iL = own_frames_[static_cast<size_t>(joint)];
+    const Pose& X_iL = rows_[static_cast<size_t>(joint)].X_iL;
     return X_iL.isApprox(Pose::Identity(), 0.0) ? X : X_iL * X;
   }
 
@@ -225,14 +226,14 @@ class TreeReader {
     if (row.type == JointType::kBall) return BuildBall(chain, row, parent, X_LB, entry, link);
     const int index = static_cast<int>(spec_.joints.size());
     const bool is_plain = !row.X_before.isApprox(Pose::Identity(), 0.0);
-    const bool has_own_frame = !row.X_iL.isApprox(Pose::Identity(), 0.0);
+    const bool has_own_frame = !row.written.X_iL.isApprox(Pose::Identity(), 0.0);
     spec_.joints.push_back({chain.prefix + row.joint, chain.prefix + row.link, parent, row.type, 0,
                             FromOwnFrame(parent, is_plain ? X_LB * row.X_before : X_LB), row.mdh, entry.lower,
                             entry.upper, entry.damping, entry.armature,
-                            has_own_frame ? ExpressIn(link.body, row.X_iL) : link.body, entry.dry_friction,
-                            std::nullopt});
+                            has_own_frame ? ExpressIn(link.body, row.written.X_iL) : link.body,
+                            entry.dry_friction, std::nullopt});
     if (entry.mimic) mimics_.emplace(index, Mimic{&*entry.mimic, chain.prefix});
-    own_frames_.push_back(row.X_iL);
+    rows_.push_back(row.written);
     joint_of_link_[chain.prefix + row.link] = index;
     return index;
   }
@@ -251,7 +252,7 @@ class TreeReader {
     ball.body = link.body;
     for (int axis = 0; axis < 3; ++axis) {
       spec_.joints.push_back(MakeBallEntry(ball, axis, parent));
-      own_frames_.push_back(Pose::Identity());
+      rows_.push_back(row.written);
       parent = static_cast<int>(spec_.joints.size()) - 1;
     }
     joint_of_link_[ball.link] = parent;
@@ -341,8 +342,8 @@ class TreeReader {
   }
 
   RobotSpec& spec_;
-  std::map<int, Mimic> mimics_;   // by joint
-  std::vector<Pose> own_frames_;  // X_iL: each link's own frame, in which the file gives masses, in frame i
+  std::map<int, Mimic> mimics_;  // by joint
+  std::vector<WrittenRow> rows_;
   std::map<std::string, Template> templates_;
   std::vector<Chain> chains_;
   NameRegistry joint_names_{"joint"};
@@ -354,6 +355,6 @@ class TreeReader {
 
 }  // namespace
 
-void ReadTree(TomlTable& root, RobotSpec& spec) { TreeReader(spec).Read(root); }
+std::vector<WrittenRow> ReadTree(TomlTable& root, RobotSpec& spec) { return TreeReader(spec).Read(root); }
 
 }  // namespace dexcheck

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <vector>
+
 #include "controller/common/toml_reader.h"
 #include "controller/model/robot_model.h"
+#include "controller/model/written_row.h"
 
 namespace dexcheck {
 
@@ -9,7 +12,7 @@ namespace dexcheck {
 inline constexpr size_t kMaxJoints = 1000;
 
 /// Reads the keys `chain`, `template` and `frame` of a parameter file into the specification's joints and
-/// frames. Its base must have been read. @throws InputError.
-void ReadTree(TomlTable& root, RobotSpec& spec);
+/// frames. Its base must have been read. @return the rows as they are written, by joint. @throws InputError.
+std::vector<WrittenRow> ReadTree(TomlTable& root, RobotSpec& spec);
 
 }  // namespace dexcheck

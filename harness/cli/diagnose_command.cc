@@ -6,7 +6,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
@@ -15,12 +18,17 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/diagnosis/diagnose.h"
+#include "harness/diagnosis/file_terms.h"
 #include "harness/engine/engine.h"
+#include "harness/sides/complete_description.h"
+#include "harness/sides/read_description.h"
+#include "harness/sides/robot_file.h"
 
 namespace dexcheck::cli {
 namespace {
 
 struct DiagnoseRequest {
+  std::string a, b;  ///< Instead of --robot and --mjcf.
   RobotFiles files;
   DiagnosisOptions options;
   std::string json_file;
@@ -44,8 +52,9 @@ void PrintRemaining(const DiagnoseRequest& request, const RobotModel& model, con
   }
 }
 
-void Print(const DiagnoseRequest& request, const RobotModel& model, const Diagnosis& diagnosis,
-           const std::vector<Hypothesis>& hypotheses) {
+/// @param written the model's numbers as they stand in its file.
+void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotSpec& written,
+           const Diagnosis& diagnosis, const std::vector<Hypothesis>& hypotheses) {
   const std::string file = request.files.robot.filename().string();
   if (diagnosis.agrees) {
     fmt::print("AGREE: nothing to explain: {} and {} agree to rounding at {} random states.\n", file,
@@ -57,20 +66,20 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const Diagno
   if (diagnosis.causes.empty()) fmt::print("No change of single numbers explains it.\n");
   int number = 0;
   for (const Repair& cause : diagnosis.causes) {
-    fmt::print("{}. {}", ++number, Describe(cause, model.spec(), file));
+    fmt::print("{}. {}", ++number, Describe(cause, written, file));
     if (cause.kind == RepairKind::kEngineOnly) {
       fmt::print("\n");
       continue;
     }
     fmt::print("; explains {:.4g} % of the residual\n", 100.0 * cause.explained);
     for (const Repair& equal : cause.equivalents)
-      fmt::print("   or, just as well: {}\n", Describe(equal, model.spec(), file));
+      fmt::print("   or, just as well: {}\n", Describe(equal, written, file));
   }
   if (number > 1) fmt::print("Together: {:.4g} %.\n", 100.0 * diagnosis.explained);
   if (!request.quiet && diagnosis.causes.size() > 1 && diagnosis.ranking.size() > 1) {
     fmt::print("One number alone (masses, inertias, joint constants, gravity) would explain at most:\n");
     for (const auto& [cause, share] : diagnosis.ranking)
-      fmt::print("  {:5.2g} %  {}\n", 100.0 * share, DescribeShort(cause, model.spec()));
+      fmt::print("  {:5.2g} %  {}\n", 100.0 * share, DescribeShort(cause, written));
   }
   if (IsRepairedWholly(diagnosis)) {
     fmt::print("With {} the two agree to rounding.\n", number == 1 ? "it repaired" : "these repaired");
@@ -97,7 +106,7 @@ Json ToJson(const Repair& cause, const RobotSpec& spec, const std::string& file)
   return json;
 }
 
-std::string ToText(const DiagnoseRequest& request, const RobotModel& model, const Diagnosis& diagnosis,
+std::string ToText(const DiagnoseRequest& request, const RobotSpec& written, const Diagnosis& diagnosis,
                    const std::vector<Hypothesis>& hypotheses) {
   const std::string file = request.files.robot.filename().string();
   Json json = {
@@ -107,37 +116,68 @@ std::string ToText(const DiagnoseRequest& request, const RobotModel& model, cons
       {"explained", diagnosis.explained},      {"explained_of_forces", diagnosis.explained_of_forces}};
   json["hypotheses"] = ListHypotheses(hypotheses);
   json["causes"] = Json::array();
-  for (const Repair& cause : diagnosis.causes) json["causes"].push_back(ToJson(cause, model.spec(), file));
+  for (const Repair& cause : diagnosis.causes) json["causes"].push_back(ToJson(cause, written, file));
   json["remaining"] = Json::array();
   for (const GateFinding& finding : diagnosis.remaining_constants) json["remaining"].push_back(finding.check);
   for (const CheckRecord& record : diagnosis.remaining_terms) json["remaining"].push_back(record.name);
   return json.dump(2) + "\n";
 }
 
-int Run(const DiagnoseRequest& request) {
-  const RobotModel model = ReadRobotModel(request.files.robot);
-  RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely mistakes)");
+/// Puts A and B where --robot and --mjcf would stand.
+void SortFiles(DiagnoseRequest* request) {
+  if (!request->a.empty()) {
+    if (request->b.empty()) throw InputError("diagnose: two files must be given, got " + Quote(request->a));
+    request->files = {request->a, request->b};
+  }
+  const auto require = [](bool is_right, const std::filesystem::path& file, const char* expected) {
+    if (!is_right) throw InputError(file.string() + ": " + expected);
+  };
+  require(FindFormat(request->files.robot) != RobotFormat::kMjcf, request->files.robot,
+          "must be a parameter file or a URDF to be repaired, is an MJCF (dexcheck import writes a parameter "
+          "file from it)");
+  require(FindFormat(request->files.mjcf) == RobotFormat::kMjcf, request->files.mjcf,
+          "must be an MJCF, which is taken to be right (dexcheck consistency compares any two files)");
+}
+
+/// What is to be repaired, completed by what only the MJCF states when it is a URDF.
+/// @param rows filled with how its joints' rows are written.
+RobotModel ReadGiven(const RobotFiles& files, const mjModel& engine, std::vector<WrittenRow>* rows) {
+  if (FindFormat(files.robot) == RobotFormat::kToml) return ReadRobotModel(files.robot, rows);
+  RobotDescription robot = ReadDescription(files.robot);
+  CompleteFromEngine(engine, files.mjcf.filename().string(), &robot);
+  for (const DescribedJoint& joint : robot.joints) rows->push_back({joint.X_iL, true});
+  return RobotModel(robot.spec);
+}
+
+int Run(DiagnoseRequest request) {
+  SortFiles(&request);
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
+  std::vector<WrittenRow> rows;
+  const RobotModel model = ReadGiven(request.files, *engine, &rows);
+  RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely mistakes)");
   CatchInterrupts();
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
   constexpr long kStages = 4;
   long stage = 0;
   ProgressBar bar("diagnosing", kStages, request.quiet);
-  const Diagnosis diagnosis =
+  Diagnosis diagnosis =
       Diagnose(model, *engine, request.files.mjcf.string(), request.options, [&](const char*) {
         bar.Update(stage++);
         return !IsInterrupted();
       });
   bar.Finish();
+  const FileTerms terms(model.spec(), std::move(rows));
+  diagnosis.causes = terms.Convert(diagnosis.causes);
+  for (auto& [cause, share] : diagnosis.ranking) cause = terms.ConvertPart(cause);
   // Mistakes of conventions first; what can only be moved shows no bodies to compare.
   const bool is_open = !diagnosis.agrees && !request.options.by_motion;
   const std::vector<Hypothesis> hypotheses =
       is_open ? ExplainDifference(request.files.robot, request.files.mjcf) : std::vector<Hypothesis>();
-  if (json) json->Write(ToText(request, model, diagnosis, hypotheses));
+  if (json) json->Write(ToText(request, terms.written(), diagnosis, hypotheses));
   if (request.json_file != "-") {
     if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");
-    Print(request, model, diagnosis, hypotheses);
+    Print(request, model, terms.written(), diagnosis, hypotheses);
   }
   if (IsInterrupted()) return kFailure;
   return diagnosis.agrees ? kSuccess : kDisagreement;
@@ -149,7 +189,13 @@ void AddDiagnoseCommand(Command app) {
   constexpr std::uint64_t kMaxSamples = 1000;
   const auto request = std::make_shared<DiagnoseRequest>();
   Command command = app.AddCommand("diagnose", "Say why model and engine disagree, and what would repair it");
-  AddRobotOptions(command, &request->files);
+  const Option robot = AddRobotOptions(command, &request->files);
+  command
+      .AddOption("A", &request->a,
+                 "What may be wrong, instead of --robot and --mjcf: parameter file (TOML) or URDF")
+      .TypeName("FILE")
+      .Excludes(robot);
+  command.AddOption("B", &request->b, "What is right: MJCF").TypeName("FILE");
   AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
   command.AddFlag("--by-motion", &request->options.by_motion,
                   "Use axes, frames and forces only, not the bodies' masses and inertias in the MJCF");

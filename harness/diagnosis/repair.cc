@@ -40,10 +40,15 @@ std::string FormatValue(const RobotSpec& spec, const Parameter& parameter, doubl
 
 std::string FormatValues(const RobotSpec& spec, const std::vector<Parameter>& parameters,
                          const std::vector<double>& values) {
+  if (parameters.size() == 1) return FormatValue(spec, parameters[0], values[0]);
   std::string text;
   for (size_t i = 0; i < parameters.size(); ++i) {
-    text += (i == 0 ? "" : ", ") + (parameters.size() > 1 ? DescribeQuantity(parameters[i]) + " " : "") +
-            FormatValue(spec, parameters[i], values[i]);
+    // "x", behind "centre of mass" of the line.
+    const std::string group = DescribeGroup(parameters[i]) + " ";
+    std::string quantity = DescribeQuantity(parameters[i]);
+    const bool is_said = i == 0 || parameters[i].kind == parameters[0].kind;
+    if (is_said && quantity.starts_with(group)) quantity = quantity.substr(group.size());
+    text += (i == 0 ? "" : ", ") + quantity + " " + FormatValue(spec, parameters[i], values[i]);
   }
   return text;
 }

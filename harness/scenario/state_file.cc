@@ -29,8 +29,12 @@ class StateReader {
     const Json json = Parse(text);
     CheckKeys(json, "", {"q", "xi", "object", "kappa", "contact_points", "fingers", "mu", "law"});
     State state;
-    state.q = ReadVector(Get(json, "", "q"), "q", model.num_positions());
-    state.xi = ReadVector(Get(json, "", "xi"), "xi", model.num_velocities());
+    const std::string balls = ListBalls(model);
+    state.q =
+        ReadVector(Get(json, "", "q"), "q", model.num_positions(), balls.empty() ? "" : balls + " four");
+    state.xi =
+        ReadVector(Get(json, "", "xi"), "xi", model.num_velocities(), balls.empty() ? "" : balls + " three");
+    CheckQuaternions(model, state.q);
     if (json.contains("object")) {
       if (!model.object()) Fail("object", "the robot of " + model.spec().source + " has no [object]");
       state.object = ReadObject(json.at("object"));
@@ -90,8 +94,35 @@ class StateReader {
     if (list.size() != static_cast<size_t>(size)) Fail(key, expected + std::to_string(list.size()));
   }
 
-  [[nodiscard]] VectorXd ReadVector(const Json& list, const std::string& key, int size) const {
-    CheckList(list, key, size, "numbers");
+  /// "of which the ball joint "hip" has"; empty without ball joints.
+  static std::string ListBalls(const RobotModel& model) {
+    std::string names;
+    for (const Joint& joint : model.joints()) {
+      if (joint.type == JointType::kBall && joint.ball_axis == 0)
+        names += (names.empty() ? "" : ", ") + Quote(NameInFile(joint));
+    }
+    return names.empty() ? "" : " (of which each ball joint, " + Abbreviate(names) + ", has";
+  }
+
+  /// Of a floating base and of ball joints: any length but zero will do, since they are normalised.
+  void CheckQuaternions(const RobotModel& model, const VectorXd& q) const {
+    const auto check = [&](int first, const std::string& owner) {
+      if (q.segment<4>(first).norm() > 0.0) return;
+      Fail("q[" + std::to_string(first) + ".." + std::to_string(first + 3) + "]",
+           "must be a quaternion qw qx qy qz of " + owner + ", got zeros");
+    };
+    if (model.base().type == BaseType::kFloating) check(3, "the base " + Quote(model.base().link));
+    for (int i = 0; i < model.num_joints(); ++i) {
+      const Joint& joint = model.joints()[static_cast<size_t>(i)];
+      if (joint.type == JointType::kBall && joint.ball_axis == 0)
+        check(model.position_index(i), "joint " + Quote(NameInFile(joint)));
+    }
+  }
+
+  /// @param of_balls what is said of ball joints when the size is wrong.
+  [[nodiscard]] VectorXd ReadVector(const Json& list, const std::string& key, int size,
+                                    const std::string& of_balls = "") const {
+    CheckList(list, key, size, "numbers" + of_balls + (of_balls.empty() ? "" : ")"));
     VectorXd values(size);
     for (int i = 0; i < size; ++i) {
       const Json& value = list[static_cast<size_t>(i)];

@@ -1,5 +1,6 @@
 #include "harness/sides/read_description.h"
 
+#include "controller/model/body_frame.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/mjcf_reader.h"
@@ -8,23 +9,28 @@
 namespace dexcheck {
 namespace {
 
-void AddPart(const std::string& name, const MassProperties& body, int joint, RobotDescription* robot) {
+/// @param X_iL the link's own frame, in which its file gives the body.
+void AddPart(const std::string& name, const MassProperties& body, int joint, const Pose& X_iL,
+             RobotDescription* robot) {
   DescribedPart& part = robot->parts.emplace_back();
   part.name = name;
-  part.body = body;
+  part.body = X_iL.isApprox(Pose::Identity(), 0.0) ? body : ExpressIn(body, X_iL.inverse());
   part.joint = joint;
+  part.X_iL = X_iL;
 }
 
 RobotDescription ReadTable(const std::filesystem::path& path) {
   RobotDescription robot;
-  robot.spec = ReadRobotModel(path).spec();
+  std::vector<WrittenRow> rows;
+  robot.spec = ReadRobotModel(path, &rows).spec();
   robot.joints.resize(robot.spec.joints.size());
   if (robot.spec.base.type != BaseType::kFixed)
-    AddPart(robot.spec.base.link, robot.spec.base.body, -1, &robot);
+    AddPart(robot.spec.base.link, robot.spec.base.body, -1, Pose::Identity(), &robot);
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
+    robot.joints[i].X_iL = rows[i].X_iL;
     if (joint.type == JointType::kBall && joint.ball_axis < 2) continue;  // its link is no part of the file
-    AddPart(joint.link, joint.body, static_cast<int>(i), &robot);
+    AddPart(joint.link, joint.body, static_cast<int>(i), rows[i].X_iL, &robot);
   }
   return robot;
 }

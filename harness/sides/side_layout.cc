@@ -176,6 +176,16 @@ nlohmann::ordered_json SideLayout::ToJson() const {
   nlohmann::ordered_json json;
   json["joints"] = nlohmann::ordered_json::array();
   for (const int joint : joints_) json["joints"].push_back(robot_joints_[static_cast<size_t>(joint)].name);
+  // Only where a number of entries does not follow from the number of names.
+  const auto is_ball = [this](int joint) {
+    return robot_joints_[static_cast<size_t>(joint)].num_positions > 1;
+  };
+  if (std::any_of(joints_.begin(), joints_.end(), is_ball)) {
+    json["balls"] = nlohmann::ordered_json::array();
+    for (const int joint : joints_) {
+      if (is_ball(joint)) json["balls"].push_back(robot_joints_[static_cast<size_t>(joint)].name);
+    }
+  }
   if (base_ == 0) return json;
   const auto position = std::find_if(std::begin(kPositions), std::end(kPositions),
                                      [&](const auto& entry) { return entry.second == convention_.position; });

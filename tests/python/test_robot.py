@@ -117,6 +117,41 @@ def test_floating_base():
     np.testing.assert_allclose(M[6:, 6:], dexcheck.load(ARM).M(q[7:]), atol=1e-13)
 
 
+BALL = """<mujoco><worldbody><body name="stand"><body name="upper"><joint name="shoulder" type="ball"/>
+<inertial pos="0.1 0.2 0.3" mass="2" diaginertia="0.04 0.05 0.06"/><site name="tip" pos="0.2 0 0.1"/>
+<body name="lower" pos="0.3 0 0"><joint name="elbow" axis="0 1 0"/>
+<inertial pos="0.1 0 0.01" mass="1" diaginertia="0.004 0.006 0.008"/></body></body></body></worldbody></mujoco>"""
+
+
+def test_ball_joints(tmp_path):
+    """Four numbers in q and three in v for a ball; the engine itself answers for the MJCF."""
+    file = tmp_path / "ball.xml"
+    file.write_text(BALL)
+    robot = dexcheck.load(file)
+    assert (robot.nq, robot.nv) == (5, 4)
+    assert robot.joints == ["shoulder:x", "shoulder:y", "shoulder:z", "elbow"]
+    q = np.array([0.8, 0.3, -0.4, 0.2, 0.7])
+    q[:4] /= np.linalg.norm(q[:4])
+    v = np.array([1.0, -2.0, 0.5, 1.5])
+    h = 1e-6
+
+    def moved(step):
+        """q after the ball has turned by step along its own axes: q_dot = q (0, v) / 2."""
+        w, x, y, z = q[:4]
+        rate = 0.5 * np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
+        return np.concatenate([q[:4] + rate @ step[:3], q[4:] + step[3:]])
+
+    slope = [(robot.energy(moved(h * e), 0 * v)[1] - robot.energy(moved(-h * e), 0 * v)[1]) / (2 * h) for e in np.eye(4)]
+    np.testing.assert_allclose(robot.g(q), slope, atol=1e-6)
+    twist = robot.jacobian("tip", q) @ v
+    rate = (robot.pose("tip", moved(h * v)) - robot.pose("tip", moved(-h * v))) / (2 * h)
+    np.testing.assert_allclose(robot.pose("tip", q)[:3, :3].T @ rate[:3, 3], twist[:3], atol=1e-8)
+    assert robot.compare({"M": robot.M, "c": robot.c, "g": robot.g, "h": robot.h}, samples=20)
+    assert not robot.compare({"M": lambda q: robot.M(q).T + np.eye(4) * 1e-9}, samples=2)
+    with pytest.raises(ValueError):
+        robot.M(np.zeros(4))
+
+
 def test_bad_input_is_refused(panda, tmp_path):
     for bad in [tmp_path / "none.urdf", ARM.replace(".urdf", ".py")]:
         with pytest.raises(dexcheck.InputError):

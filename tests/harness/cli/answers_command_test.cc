@@ -274,5 +274,57 @@ TEST_F(Answers, FloatingBasesSayTheirConvention) {
   EXPECT_TRUE(testing::IsRefused(run, {"robot.toml: base.type: must not be \"floating\" in a run"}));
 }
 
+// A body on a ball joint at the world's origin, as a program and as files: M = I - m c x c x, C w = w x M w
+// and gravity -c x R^T m g along the body's axes.
+TEST_F(Answers, OfABallJointAgree) {
+  WriteText(folder_.path() / "top.xml", R"(<mujoco model="top"><worldbody><body name="stand"><body name="top">
+<joint name="pivot" type="ball"/><inertial pos="0.1 0.2 0.3" mass="2" diaginertia="0.04 0.05 0.06"/>
+</body></body></worldbody></mujoco>)");
+  const std::string program = R"(import json, sys
+m, c, I, g = 2.0, [0.1, 0.2, 0.3], [0.04, 0.05, 0.06], [0.0, 0.0, -9.81]
+cross = lambda a, b: [a[1]*b[2] - a[2]*b[1], a[2]*b[0] - a[0]*b[2], a[0]*b[1] - a[1]*b[0]]
+M = [[m*(sum(x*x for x in c)*(i == j) - c[i]*c[j]) + (I[i] if i == j else 0.0) for j in range(3)] for i in range(3)]
+def answer(q, v):
+  w, x, y, z = q
+  down = [2*(x*z - w*y)*m*g[2], 2*(y*z + w*x)*m*g[2], (w*w - x*x - y*y + z*z)*m*g[2]]  # R^T m g
+  momentum = [sum(M[i][j]*v[j] for j in range(3)) for i in range(3)]
+  return {"M": M, "c": cross(v, momentum), "g": [-f for f in cross(c, down)]}
+if len(sys.argv) > 1:
+  with open(sys.argv[1] + "/states.jsonl") as states, open(sys.argv[1] + "/answers.jsonl", "w") as answers:
+    for line in states:
+      state = json.loads(line)
+      answers.write(json.dumps({"id": state["id"], **answer(state["q"], state["v"])}) + "\n")
+  sys.exit()
+for line in sys.stdin:
+  r = json.loads(line)
+  if r["request"] == "hello":
+    assert r["layout"] == {"joints": ["pivot"], "balls": ["pivot"]} and r["robot"]["joints"][0]["type"] == "ball"
+    print(json.dumps({"dexcheck_protocol": 1, "name": "top"}), flush=True)
+  else:
+    print(json.dumps({"id": r["id"], **answer(r["q"], r["v"])}), flush=True)
+)";
+  WriteText(folder_.path() / "top.py", program);
+  const std::vector<std::string> compare = {"consistency",       "top.xml",   "--program",
+                                            kPython + " top.py", "--samples", "50"};
+  const ProgramResult asked = Run(compare);
+  EXPECT_EQ(asked.exit_code, 0) << asked.err << asked.out;
+  EXPECT_THAT(asked.out, HasSubstr("agree to rounding in all 4 terms."));
+  EXPECT_THAT(asked.out, HasSubstr("\"pivot\" has q[0..3] and xi[0..2]"));
+
+  ASSERT_EQ(Run({"states", "top.xml", "--count", "20", "--out", "states"}).exit_code, 0);
+  const Json layout = Json::parse(ReadText(folder_.path() / "states/layout.json"));
+  EXPECT_EQ(layout.at("balls"), Json({"pivot"}));
+  ASSERT_EQ(testing::RunProgram({kPython, "top.py", "states"}, {folder_.path()}).exit_code, 0);
+  const ProgramResult written = Run({"consistency", "top.xml", "--answers", "states"});
+  EXPECT_EQ(written.exit_code, 0) << written.err << written.out;
+
+  // The angular velocity along the parent's axes is what others have.
+  WriteText(folder_.path() / "top.py", ReplaceOnce(program, "2*(x*z - w*y)", "2*(x*z + w*y)"));
+  EXPECT_EQ(Run(compare).exit_code, 1);
+  // Another number of entries is refused by name.
+  WriteText(folder_.path() / "top.py", ReplaceOnce(program, "cross(v, momentum)", "momentum + [0.0]"));
+  EXPECT_TRUE(IsRefused(Run(compare), {"c: must be a list of 3 numbers, got 4"}));
+}
+
 }  // namespace
 }  // namespace dexcheck

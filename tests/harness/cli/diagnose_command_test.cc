@@ -70,6 +70,52 @@ TEST(DiagnoseCommand, ListsRepairsThatDoAsWell) {
   EXPECT_THAT(result.out, HasSubstr("or, just as well: joint panda_joint4: roll"));
 }
 
+// A robot whose base floats, as a table that `import` wrote and as a URDF: what is wrong is said as it stands
+// in the file, though the joint's axis is not z.
+constexpr const char* kHopperMjcf = R"(<mujoco model="hopper"><compiler angle="radian"/><worldbody>
+<body name="trunk" pos="0 0 1"><freejoint/><inertial pos="0.01 0.02 0.03" mass="5" diaginertia="0.05 0.06 0.07"/>
+<body name="leg" pos="0.1 0.2 -0.1"><joint name="hip" axis="0 1 0" limited="true" range="-1 1"/>
+<inertial pos="0.01 0.02 -0.2" mass="2" diaginertia="0.02 0.03 0.01"/></body></body></worldbody></mujoco>
+)";
+constexpr const char* kHopperUrdf = R"(<robot name="hopper">
+<link name="trunk"><inertial><origin xyz="0.01 0.02 0.03"/><mass value="5"/>
+<inertia ixx="0.05" iyy="0.06" izz="0.07" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="leg"><inertial><origin xyz="0.01 0.02 -0.2"/><mass value="2"/>
+<inertia ixx="0.02" iyy="0.03" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="hip" type="revolute"><origin xyz="0.1 0.2 -0.1"/><parent link="trunk"/><child link="leg"/>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>
+)";
+
+TEST(DiagnoseCommand, SpeaksOfAFloatingRobotInItsFilesTerms) {
+  const TempFolder folder;
+  WriteText(folder.path() / "hopper.xml", kHopperMjcf);
+  ASSERT_EQ(RunDexcheck({"import", "hopper.xml", "--out", "hopper.toml"}, {folder.path()}).exit_code, 0);
+  const std::string table = ReadText(folder.path() / "hopper.toml");
+  const auto expect = [&](const std::string& file, const std::string& text, const std::string& line) {
+    WriteText(folder.path() / file, text);
+    const ProgramResult result = RunDexcheck({"diagnose", file, "hopper.xml"}, {folder.path()});
+    EXPECT_EQ(result.exit_code, 1) << result.err;
+    EXPECT_EQ(result.out, "DISAGREE: " + file + " against hopper.xml.\n1. " + line +
+                              "; explains 100 % of the residual\n"
+                              "With it repaired the two agree to rounding.\n");
+  };
+  expect("bad.toml", ReplaceOnce(table, "com = [0.01, 0.02, -0.2]", "com = [0.04, 0.02, -0.2]"),
+         "link leg: centre of mass x 0.04 m in bad.toml, 0.01 m repairs it");
+  expect("bad.toml", ReplaceOnce(table, "xyz = [0.1, 0.2, -0.1]", "xyz = [0.1, 0.2, -0.12]"),
+         "joint hip: position z -0.12 m in bad.toml, -0.1 m repairs it");
+  expect("bad.toml", ReplaceOnce(table, "mass = 5", "mass = 5.2"),
+         "link trunk: mass 5.2 kg in bad.toml, 5 kg repairs it");
+  expect("bad.urdf", ReplaceOnce(kHopperUrdf, "izz=\"0.01\"", "izz=\"0.015\""),
+         "link leg: Izz 0.015 kg m^2 in bad.urdf, 0.01 kg m^2 repairs it");
+  expect("bad.urdf", ReplaceOnce(kHopperUrdf, "xyz=\"0.01 0.02 0.03\"", "xyz=\"0.01 0.02 0.05\""),
+         "link trunk: centre of mass z 0.05 m in bad.urdf, 0.03 m repairs it");
+  EXPECT_TRUE(IsRefused(RunDexcheck({"diagnose", "hopper.xml", "hopper.xml"}, {folder.path()}),
+                        {"hopper.xml: must be a parameter file or a URDF", "dexcheck import"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"diagnose", "hopper.toml", "bad.urdf"}, {folder.path()}),
+                        {"bad.urdf: must be an MJCF", "dexcheck consistency"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"diagnose", "hopper.toml"}, {folder.path()}), {"two files"}));
+}
+
 TEST(DiagnoseCommand, RefusesBadOptions) {
   EXPECT_TRUE(IsRefused(RunDexcheck({"diagnose", "--samples", "0"}), {"--samples", "0"}));
   EXPECT_TRUE(

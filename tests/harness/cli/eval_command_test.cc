@@ -300,5 +300,36 @@ TEST_F(EvalCommand, RefusesAnObjectThatTheRobotDoesNotKnow) {
                         {".: cannot be read: is a directory"}));
 }
 
+// A ball joint has four positions and three velocities; model and engine have the same terms there.
+TEST_F(EvalCommand, BallJointsHaveQuaternions) {
+  WriteText(folder_.path() / "arm.xml",
+            R"(<mujoco model="arm"><compiler angle="radian"/><worldbody><body name="stand">
+<body name="upper" pos="0 0 1"><joint name="shoulder" type="ball" damping="0.2" armature="0.01" limited="true" range="0 1.5"/>
+<inertial pos="0.1 0.02 0" mass="2" diaginertia="0.01 0.02 0.025"/>
+<body name="lower" pos="0.3 0 0"><joint name="elbow" axis="0 1 0"/>
+<inertial pos="0.1 0 0.01" mass="1" diaginertia="0.004 0.006 0.008"/></body></body></body></worldbody></mujoco>)");
+  ASSERT_EQ(RunDexcheck({"import", "arm.xml", "--out", "arm.toml"}, {folder_.path()}).exit_code, 0);
+  const std::vector<std::string> files = {"--robot", "arm.toml", "--mjcf", "arm.xml"};
+  const Json terms = Evaluate({{"q", {0.8, 0.3, -0.4, 0.2, 0.7}}, {"xi", {1.0, -2.0, 0.5, 1.5}}}, files);
+  const Json& engine = terms.at("engine");
+  constexpr double kRounding = 1e-14;  // of 2 kg over 1 m
+  EXPECT_TRUE(MatrixNear(ToMatrix(terms.at("M_bar")), ToMatrix(engine.at("M_bar")), kRounding));
+  for (const char* force : {"C_bar_xi", "gravity", "friction", "bias"}) {
+    const MatrixXd values = ToMatrix(terms.at(force));
+    EXPECT_GT(values.topRows(3).cwiseAbs().maxCoeff(), 0.01) << force;
+    EXPECT_TRUE(MatrixNear(values, ToMatrix(engine.at(force)), 100.0 * kRounding)) << force;
+  }
+  const auto refuse = [&](const Json& state, const std::vector<std::string>& parts) {
+    WriteText(folder_.path() / "state.json", state.dump());
+    std::vector<std::string> arguments = {"eval", "--state", "state.json"};
+    arguments.insert(arguments.end(), files.begin(), files.end());
+    EXPECT_TRUE(IsRefused(RunDexcheck(arguments, {folder_.path()}), parts));
+  };
+  refuse({{"q", {0.1, 0.2}}, {"xi", {1.0, -2.0, 0.5, 1.5}}},
+         {"state.json: q: must be a list of 5 numbers", "ball joint, \"shoulder\", has four", "got 2"});
+  refuse({{"q", {0, 0, 0, 0, 0.7}}, {"xi", {1.0, -2.0, 0.5, 1.5}}},
+         {"state.json: q[0..3]: must be a quaternion", "joint \"shoulder\""});
+}
+
 }  // namespace
 }  // namespace dexcheck

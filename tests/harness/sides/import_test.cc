@@ -4,6 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
 #include <string>
 
 #include "controller/common/errors.h"
@@ -11,10 +15,12 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
 #include "harness/engine/engine.h"
+#include "harness/sides/complete_description.h"
 #include "harness/sides/description_check.h"
 #include "harness/sides/mjcf_reader.h"
 #include "harness/sides/parameter_writer.h"
 #include "harness/sides/urdf_reader.h"
+#include "tests/benchmarks/measured_time.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
@@ -180,6 +186,46 @@ TEST(MjcfDescription, RefusesFreeJointsWithinARobot) {
     EXPECT_EQ(std::string(error.what()),
               "robot.xml: joint \"j\": must be a hinge, a slide or a ball, got a free joint");
   }
+}
+
+// What is in a URDF costs no more than what is in a table: both become the same analytic model.
+TEST(ReadingTime, UrdfOfFiftyJointsIsComparedInTheTablesTime) {
+  constexpr double kMost = 1.2;
+  const char* const wanted = std::getenv("DEXCHECK_TIMED_SAMPLES");
+  ConsistencyOptions options;
+  options.samples = wanted == nullptr ? 200 : std::atol(wanted);
+  std::mt19937 random(50);
+  testing::RandomRobotOptions robot;
+  robot.base = BaseType::kFixed;
+  robot.joints = 50;
+  RobotSpec spec = testing::MakeRandomRobot(robot, &random);
+  const std::string urdf = testing::WriteUrdf(&spec, &random);
+  const MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "robot.xml");
+  const auto read_urdf = [&] {
+    RobotDescription description = ParseUrdf(urdf, "robot.urdf");
+    CompleteFromEngine(*engine, "robot.xml", &description);
+    return description;
+  };
+  const std::string table = WriteParameters(read_urdf(), "robot.urdf");
+  const auto compare = [&](const RobotModel& model) {
+    const Adapter adapter(model, *engine, "robot.xml");
+    EXPECT_EQ(CheckConsistency(adapter, options, [](long) { return true; }).samples, options.samples);
+  };
+  // By turns, the least of each: the machine is busy with other work.
+  double of_urdf = std::numeric_limits<double>::infinity();
+  double of_table = of_urdf;
+  constexpr int kTurns = 3;
+  for (int turn = 0; turn < kTurns; ++turn) {
+    const double start = ProcessorSeconds();
+    compare(ParseRobotModel(table, "robot.toml"));
+    const double middle = ProcessorSeconds();
+    compare(RobotModel(read_urdf().spec));
+    of_table = std::min(of_table, middle - start);
+    of_urdf = std::min(of_urdf, ProcessorSeconds() - middle);
+  }
+  std::printf("%ld states of 50 joints: %.3f s by URDF, %.3f s by table, ratio %.2f\n", options.samples,
+              of_urdf, of_table, of_urdf / of_table);
+  EXPECT_LE(of_urdf, kMost * of_table);
 }
 
 }  // namespace

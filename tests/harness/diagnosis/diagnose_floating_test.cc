@@ -1,0 +1,177 @@
+// Robots whose base floats, from a table as `dexcheck import` writes it: a wrong number is named as it stands
+// in the file, where axes are x, y or slanted, with the value that was there.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "controller/model/parameter_reader.h"
+#include "harness/diagnosis/diagnose.h"
+#include "harness/diagnosis/file_terms.h"
+#include "harness/engine/engine.h"
+#include "harness/sides/mjcf_reader.h"
+#include "harness/sides/parameter_writer.h"
+#include "tests/common/legged_robots.h"
+#include "tests/common/random_robot.h"
+
+namespace dexcheck {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A number of a table's text, found by what stands before its list.
+struct Place {
+  std::string section;  ///< Text before the key, such as the link's heading.
+  std::string key;      ///< "com = ["
+  size_t component;
+};
+
+/// The list of numbers behind a key; `end` is where it ends in the text.
+std::vector<double> ReadNumbers(const std::string& text, size_t begin, size_t* end) {
+  *end = text.find_first_of("]\n", begin);
+  std::istringstream in(text.substr(begin, *end - begin));
+  std::vector<double> numbers;
+  for (double number = 0.0; in >> number; in.ignore(1)) numbers.push_back(number);
+  return numbers;
+}
+
+/// The text with a change of one number. @param right the number as it was.
+std::string Change(const std::string& text, const Place& place, double change, double* right) {
+  const size_t section = text.find(place.section);
+  const size_t key = section == std::string::npos ? section : text.find(place.key, section);
+  if (key == std::string::npos) throw std::invalid_argument(place.section + " " + place.key);
+  const size_t begin = key + place.key.size();
+  size_t end = 0;
+  std::vector<double> numbers = ReadNumbers(text, begin, &end);
+  *right = numbers.at(place.component);
+  numbers[place.component] += change;
+  std::string list;
+  for (const double number : numbers) list += fmt::format("{}{:.15g}", list.empty() ? "" : ", ", number);
+  return text.substr(0, begin) + list + text.substr(end);
+}
+
+/// Diagnoses the table and looks for one repair: of this part and quantity, to this value.
+void ExpectNamed(const std::string& text, const mjModel& engine, const std::string& part,
+                 const std::string& quantity, double right, const DiagnosisOptions& options = {}) {
+  SCOPED_TRACE(part + ": " + quantity);
+  std::vector<WrittenRow> rows;
+  const RobotModel model = ParseRobotModel(text, "robot.toml", {}, &rows);
+  const Diagnosis diagnosis = Diagnose(model, engine, "robot.xml", options, [](const char*) { return true; });
+  EXPECT_FALSE(diagnosis.agrees);
+  EXPECT_TRUE(diagnosis.remaining_constants.empty());
+  EXPECT_TRUE(diagnosis.remaining_terms.empty());
+  const FileTerms terms(model.spec(), rows);
+  const std::vector<Repair> causes = terms.Convert(diagnosis.causes);
+  ASSERT_EQ(causes.size(), 1U) << Describe(causes.back(), terms.written(), "FILE");
+  ASSERT_EQ(causes[0].parameters.size(), 1U) << Describe(causes[0], terms.written(), "FILE");
+  EXPECT_EQ(DescribeShort(causes[0], terms.written()), part + ": " + quantity);
+  const bool is_angle = IsAngle(terms.written(), causes[0].parameters[0]);
+  // Thirteen digits are printed, of angles in degrees.
+  EXPECT_NEAR(causes[0].values[0], right, (is_angle ? 1e-12 : 1e-13) * std::max(1.0, std::abs(right)));
+}
+
+class LeggedDiagnosis : public ::testing::TestWithParam<std::string> {
+ protected:
+  LeggedDiagnosis()
+      : links_(GetParam() == "quadruped" ? testing::ListQuadruped() : testing::ListHumanoid()),
+        engine_(LoadMjcfText(testing::WriteLeggedMjcf(GetParam(), links_), "robot.xml")),
+        text_(WriteParameters(ReadMjcfDescription(*engine_, "robot.xml"), "robot.xml")) {}
+
+  void Try(const Place& place, double change, const std::string& part, const std::string& quantity,
+           const DiagnosisOptions& options = {}) {
+    double right = 0.0;
+    const std::string text = Change(text_, place, change, &right);
+    ExpectNamed(text, *engine_, part, quantity, right, options);
+  }
+
+  std::vector<testing::LeggedLink> links_;
+  MjModelPtr engine_;
+  std::string text_;
+};
+
+TEST_P(LeggedDiagnosis, NamesTheBase) {
+  const std::string part = "link " + links_[0].name;
+  DiagnosisOptions by_motion;
+  by_motion.by_motion = true;
+  for (const DiagnosisOptions& options : {DiagnosisOptions{}, by_motion}) {
+    if (options.by_motion && GetParam() == "humanoid") continue;  // 2 s
+    Try({"[base]", "mass = ", 0}, 0.5, part, "mass", options);
+    Try({"[base]", "com = [", 1}, 0.01, part, "centre of mass y", options);
+    Try({"[base]", "inertia = [", 2}, 0.002, part, "Izz", options);
+    Try({"[base]", "inertia = [", 4}, 0.001, part, "Ixz", options);
+  }
+}
+
+TEST_P(LeggedDiagnosis, NamesOneLinkInTheFilesTerms) {
+  const char* const axes[] = {"x", "y", "z"};
+  const char* const turns[] = {"roll", "pitch", "yaw"};
+  const char* const entries[] = {"Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"};
+  const size_t every = GetParam() == "quadruped" ? 3 : 8;  // links with axes of each kind
+  size_t tried = 0;
+  for (size_t i = 1; i < links_.size(); ++i) {
+    const testing::LeggedLink& link = links_[i];
+    if (!link.has_joint || i % every != 1) continue;
+    const std::string heading = "[chain.links.\"" + link.name + "\"]";
+    const std::string row = "joint = \"" + link.name + "_joint\"";
+    const std::string part = "link " + link.name;
+    const std::string joint = "joint " + link.name + "_joint";
+    const size_t k = tried % 3;
+    const size_t entry = tried % 6;
+    Try({heading, "com = [", k}, 0.004, part, std::string("centre of mass ") + axes[k]);
+    Try({row, "xyz = [", k}, 0.02, joint, std::string("position ") + axes[k]);
+    Try({heading, "inertia = [", entry}, 1e-5, part, entries[entry]);
+    if (tried % 2 == 0) Try({heading, "mass = ", 0}, 0.1, part, "mass");
+    if (link.rpy != "0 0 0") {
+      const size_t turn = link.rpy.starts_with("0 ") ? 1 : 0;
+      Try({row, "rpy = [", turn}, 0.05, joint, turns[turn]);
+    }
+    ++tried;
+  }
+  EXPECT_GE(tried, 4U);
+}
+
+INSTANTIATE_TEST_SUITE_P(FloatingBase, LeggedDiagnosis, ::testing::Values("quadruped", "humanoid"));
+
+// Axes of any direction: no number of frame i, whose z axis is the joint's, stands in the file.
+TEST(FileTermsTest, SlantedAxesAreTurnedBack) {
+  constexpr const char* kArm = R"(<mujoco><worldbody><body name="trunk"><freejoint/>
+<inertial mass="3" pos="0.01 0.02 0" diaginertia="0.02 0.03 0.04"/>
+<body name="upper" pos="0.1 0.2 0.3"><joint name="shoulder" axis="1 2 3"/>
+<inertial mass="2" pos="0.1 0.02 0.03" diaginertia="0.01 0.02 0.025"/>
+<body name="lower" pos="0.3 0 0.1" euler="10 20 0"><joint name="elbow" axis="-1 0.5 0.25"/>
+<inertial mass="1" pos="0.15 0 0.01" diaginertia="0.004 0.006 0.008"/><site name="tip" pos="0.2 0.01 0"/>
+</body></body></body></worldbody></mujoco>)";
+  const MjModelPtr engine = LoadMjcfText(kArm, "arm.xml");
+  const std::string text = WriteParameters(ReadMjcfDescription(*engine, "arm.xml"), "arm.xml");
+  const auto expect = [&](const Place& place, double change, const std::string& part,
+                          const std::string& quantity) {
+    double right = 0.0;
+    const std::string changed = Change(text, place, change, &right);
+    ExpectNamed(changed, *engine, part, quantity, right);
+  };
+  expect({"[chain.links.\"upper\"]", "com = [", 1}, 0.01, "link upper", "centre of mass y");
+  expect({"[chain.links.\"lower\"]", "inertia = [", 0}, 0.001, "link lower", "Ixx");
+  expect({"joint = \"elbow\"", "xyz = [", 0}, 0.05, "joint elbow", "position x");
+  expect({"joint = \"elbow\"", "rpy = [", 0}, 0.1, "joint elbow", "roll");
+  expect({"name = \"tip\"", "xyz = [", 2}, 0.03, "frame tip", "position z");
+}
+
+// Rows of modified parameters stand in the file as in the specification.
+TEST(FileTermsTest, RowsOfModifiedParametersStay) {
+  std::mt19937 random(12);
+  const RobotSpec spec = testing::MakeRandomRobot({}, &random);
+  const FileTerms terms(spec, {});
+  Repair cause;
+  cause.parameters = {{ParameterKind::kAlpha, 1, 0}};
+  cause.values = {0.1};
+  EXPECT_EQ(terms.Convert({cause}).at(0).parameters, cause.parameters);
+  for (const Parameter& parameter : ListParameters(spec))
+    EXPECT_EQ(GetValue(terms.written(), parameter), GetValue(spec, parameter));
+}
+
+}  // namespace
+}  // namespace dexcheck
