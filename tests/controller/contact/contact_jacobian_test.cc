@@ -7,6 +7,7 @@
 
 #include "controller/contact/adjoint.h"
 #include "tests/common/allocation_counter.h"
+#include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
 #include "tests/controller/contact/test_finger.h"
@@ -90,7 +91,7 @@ TEST_F(ContactJacobianTest, RollingSatisfiesTheGraspConstraint) {
 
     const Vector6d V_f = motion.CalcBodyJacobian(0.0) * motion.q_dot();
     const Matrix6d Ad = CalcAdjointInverse(contact.geometry.g_f_cf);
-    for (const Matrix6d& wrong : {Matrix6d(Ad.transpose()), Matrix6d(Ad.inverse())}) {
+    for (const Matrix6d& wrong : {Matrix6d(Ad.transpose()), Matrix6d(testing::CalcInverse(Ad))}) {
       EXPECT_GT(((wrong * V_f).head<3>() - object_side).norm(), 1e-3);
     }
   }

@@ -7,6 +7,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/contact/adjoint.h"
+#include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
 #include "tests/controller/contact/test_finger.h"
@@ -60,7 +61,8 @@ TEST(AdjointTest, IsTheBodyTwistOfTheMovedFrame) {
   const Pose g = CalcScrewMotion(DrawVector(random, 6), 1.0);
   const Vector6d V = DrawVector(random, 6);
   EXPECT_TRUE(MatrixNear(CalcAdjoint(g) * CalcAdjointInverse(g), Matrix6d::Identity(), kRounding));
-  EXPECT_TRUE(MatrixNear(CalcWrenchTransform(g), CalcAdjoint(g).inverse().transpose(), kRounding));
+  EXPECT_TRUE(MatrixNear(CalcWrenchTransform(g), Matrix6d(testing::CalcInverse(CalcAdjoint(g)).transpose()),
+                         kRounding));
   // Seen in a frame moved by g, the motion exp(V t) is g exp(V t) g^-1, whose twist is Ad_g V.
   const auto moved = [&](double t) { return Pose(g * CalcScrewMotion(V, t) * g.inverse()); };
   EXPECT_TRUE(MatrixNear(testing::DifferentiatePose(moved), CalcAdjoint(g) * V, kDifference));
@@ -126,8 +128,8 @@ TEST(GraspMapTest, TransposedAdjointFailsTheHandWorkedCase) {
   const MatrixXd G = CalcG({contact});
   const MatrixXd B_c = CalcWrenchBasis(contact.type);
   const Matrix6d Ad = CalcAdjoint(contact.geometry.g_o_cf);
-  EXPECT_TRUE(MatrixNear(G, Ad.inverse().transpose() * B_c, kRounding));
-  for (const Matrix6d& wrong : {Ad, Matrix6d(Ad.transpose()), Matrix6d(Ad.inverse())}) {
+  EXPECT_TRUE(MatrixNear(G, Matrix6d(testing::CalcInverse(Ad)).transpose() * B_c, kRounding));
+  for (const Matrix6d& wrong : {Ad, Matrix6d(Ad.transpose()), Matrix6d(testing::CalcInverse(Ad))}) {
     EXPECT_GT((wrong * B_c - G).norm(), 0.05);
   }
 }

@@ -7,6 +7,7 @@
 #include <ostream>
 
 #include "controller/common/types.h"
+#include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
@@ -152,7 +153,7 @@ TEST_F(EvalContacts, LawIsThePrintedOne) {
   const MatrixXd J = ToMatrix(terms.at("J_B")), G = ToMatrix(terms.at("G")),
                  P_inv = ToMatrix(terms.at("P_inv"));
   const MatrixXd M_o = ToMatrix(terms.at("M_o")), M_bar = ToMatrix(terms.at("M_bar"));
-  const MatrixXd J_pinv = J.transpose() * (J * J.transpose()).inverse();
+  const MatrixXd J_pinv = J.transpose() * testing::CalcInverse(J * J.transpose());
   const MatrixXd N = MatrixXd::Identity(50, 50) - J_pinv * J;
   expect_near(ToMatrix(law.at("J_B_pinv")), J_pinv, "J_B_pinv");
   expect_near(ToMatrix(law.at("N")), N, "N");
@@ -188,7 +189,7 @@ TEST_F(EvalContacts, LawIsThePrintedOne) {
   const VectorXd wheels = S_v_T_E_v.inverse() * force.head<2>();
   force.head<2>() = wheels;
   expect_near(vector(law.at("tau")), force, "tau");
-  const MatrixXd G_pinv = G.transpose() * (G * G.transpose()).inverse();
+  const MatrixXd G_pinv = G.transpose() * testing::CalcInverse(G * G.transpose());
   expect_near(ToMatrix(law.at("A")), M_bar * J_pinv * G.transpose() * P_inv + J.transpose() * G_pinv * M_o,
               "A");
 }

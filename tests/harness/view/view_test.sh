@@ -63,7 +63,7 @@ differ() { compare -metric MAE "$shots/$1.png" "$shots/$2.png" null: 2>&1 | sed 
 start paper --set duration=0.06 --out live --paused
 await paused
 xdotool key Right Right Right
-for _ in {1..100}; do [[ $(now) -lt 3 ]] || break; sleep 0.1; done
+for _ in {1..300}; do [[ $(now) -lt 3 ]] || break; sleep 0.1; done
 [[ $(now) -eq 3 ]] || fail "three steps after the first end at 3 ms, not $(now)"
 xdotool key Left
 sleep 0.3
@@ -76,6 +76,7 @@ end 0
 "$dexcheck" compare live ran --tolerance 0 >compared.txt || fail "its log differs from that of run: $(cat compared.txt)"
 "$dexcheck" run --replay live --quiet >replayed.txt || fail "it does not replay: $(cat replayed.txt)"
 
+platform=(393 325)  # where it is seen
 # A pull at the object is a disturbance that the judge knows, that replays and that is saved.
 start paper --set duration=60 --set expect.position=1 --set expect.orientation=1 --out pulled --paused --save saved.toml
 await paused
@@ -89,15 +90,37 @@ xdotool key space
 for _ in {1..300}; do [[ $(now) -lt 250 ]] || break; sleep 0.1; done
 shot pulling
 xdotool mouseup 1
-xdotool key s
-for _ in {1..50}; do [[ ! -s saved.toml ]] || break; sleep 0.1; done
 xdotool key space
 await paused
 shot after
+# The wheel brings the camera away; then a link, the platform at the picture's lower middle, is pulled.
+for _ in {1..16}; do xdotool click 5; done
+sleep 0.6
+shot away
+[[ $(differ after away) -gt 60 ]] || fail "the wheel does not move the camera"
+xdotool mousemove "${platform[@]}" keydown ctrl mousedown 1 sleep 0.3 keyup ctrl mousemove_relative -- 1 0 mousemove_relative -- 3 -1
+begin=$(now)
+xdotool key space
+for _ in {1..300}; do [[ $(now) -lt $((begin + 100)) ]] || break; sleep 0.1; done
+shot link
+xdotool mouseup 1 key s
+for _ in {1..300}; do [[ ! -s saved.toml ]] || break; sleep 0.1; done
+xdotool key space
+await paused
+# Back to what was: a live run is scrubbed, and goes on at its end.
+end=$(now)
+xdotool key Left Left Left
+for _ in {1..300}; do [[ $(now) -gt $((end - 3)) ]] || break; sleep 0.1; done
+[[ $(now) -eq $((end - 3)) ]] || fail "three steps back from $end ms go to $(now) ms"
+xdotool key Right Right Right Right Right
+for _ in {1..300}; do [[ $(now) -lt $((end + 2)) ]] || break; sleep 0.1; done
+[[ $(now) -eq $((end + 2)) ]] || fail "five steps on from there go to $(now) ms instead of $((end + 2))"
 end 0 1  # a strong pull may break an assumption
 pulls=$(grep -o 'pulse' saved.toml | wc -l) || true
 [[ $pulls -ge 3 ]] || fail "only $pulls pulls were saved: $(head -c 2000 saved.toml)"
 grep -qE "force = \[ *-?[0-9.e-]*[1-9]" saved.toml || fail "pulls without force: $(head -c 2000 saved.toml)"
+grep -q "body = 'object'" saved.toml || fail "the object was not pulled: $(head -c 2000 saved.toml)"
+grep 'body = ' saved.toml | grep -qv "body = 'object'" || fail "no link was pulled: $(head -c 2000 saved.toml)"
 [[ $(differ before after) -gt 60 ]] || fail "the picture did not change"
 # The judge knows the pulls: without that, the balances would be off by far more than their bounds.
 for balance in balance_robot balance_object; do
@@ -112,11 +135,36 @@ rows=$("$dexcheck" export pulled --signals time --csv - | wc -l)
 head -n "$(wc -l <again.csv)" pulled.csv | cmp - again.csv || fail "the saved scenario gives other numbers"
 [[ $(wc -l <again.csv) -gt 200 ]] || fail "the saved scenario is short"
 
+# A slider gives other gains: the run begins anew with them, and is saved with them.
+start paper --set duration=60 --out slid --save slid.toml --paused
+await paused
+xdotool mousemove 672 44 mousedown 1 mousemove 700 44 mousemove 722 44 sleep 0.3
+shot slider
+xdotool mouseup 1
+await running
+for _ in {1..300}; do [[ $(now) -lt 20 ]] || break; sleep 0.1; done
+xdotool key space
+await paused
+xdotool key s
+for _ in {1..300}; do [[ ! -s slid.toml ]] || break; sleep 0.1; done
+end 0
+# A quarter of the slider's way to the right is twice the stiffness: omega' = sqrt(2) omega, and the damping K_v stays.
+python3 - slid.toml <<'PYTHON' || fail "the slider's gains were not saved: $(cat slid.toml)"
+import re, sys
+text = open(sys.argv[1]).read()
+def first(key):
+    return float(re.search(key + r"\s*=\s*\[?\s*([0-9.e-]+)", text).group(1))
+omega, zeta = first("natural_frequency"), first("damping_ratio")
+assert abs(omega / 20 - 2 ** 0.5) < 0.02, omega
+assert abs(omega * zeta - 20) < 1e-6, (omega, zeta)
+PYTHON
+"$dexcheck" run --replay slid --quiet >replayed.txt || fail "a run with other gains does not replay: $(cat replayed.txt)"
+
 # A recording is scrubbed: a click into the middle of its time line.
 start ran --paused
 await paused
 xdotool mousemove 400 426 click 1
-for _ in {1..50}; do [[ $(now) -lt 20 ]] || break; sleep 0.1; done
+for _ in {1..300}; do [[ $(now) -lt 20 ]] || break; sleep 0.1; done
 [[ $(now) -ge 25 && $(now) -le 35 ]] || fail "the middle of 60 ms is at $(now) ms"
 shot recording
 end 0
