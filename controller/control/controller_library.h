@@ -15,6 +15,7 @@
 
 #include "controller/control/controller.h"
 #include "controller/control/grasp_controller.h"
+#include "controller/control/joint_law.h"
 #include "controller/control/trajectory_controller.h"
 
 namespace dexcheck {
@@ -28,10 +29,14 @@ struct ControllerContext {
   /// Gains, weights, posture and forces of the scenario, and where the object starts.
   const GraspControllerOptions& options;
   Sampling sampling;
+  /// In a scenario that moves joints, the gains of its law; null otherwise. There the robot holds nothing: no
+  /// fingertips, an object that stands for none, no coordinates of it, and no motion of it that Follow could
+  /// mean. What the joints should do is in command->joints when Step is called.
+  const JointGains* joint_gains = nullptr;
 };
 
 /// Number of the interface: it changes with what the classes mean.
-inline constexpr int kControllerInterface = 1;
+inline constexpr int kControllerInterface = 2;
 
 /// What both sides must have in common, as text: the interface, and how the compiler lays out what is handed
 /// over.

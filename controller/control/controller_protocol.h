@@ -8,6 +8,7 @@
  * turns:
  *
  *   dexcheck  hello, the parameter file's text, the scenario's text
+ *   dexcheck  K_p, K_v                   only without contacts: n doubles each, gains of the joints
  *   program   answer to it: what it wants and tells
  *   dexcheck  message STEP, doubles      |
  *   program   message STEP, doubles      | at each time step
@@ -28,6 +29,10 @@
  *   overlap                    N     m
  *   touching                   N     1 or 0 for each fingertip
  *   support force              1     N
+ *
+ * and without contacts, in a scenario that moves joints, where what is said of an object means nothing:
+ *
+ *   q_d, q_d_dot, q_d_ddot     3 n   desired motion of the joints; q_d_dot at the velocities' own time
  *
  * and, when the program wants DEXCHECK_TERMS, the model's terms at that state (controller/NOTATION.md):
  *

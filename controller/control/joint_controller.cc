@@ -19,7 +19,7 @@ JointController::JointController(const RobotModel& model, const MassProperties& 
                                  const JointMotion& motion, const Sampling& sampling)
     : model_(model, {}, object, surface, WithoutCoordinates()),
       law_(model, law, gains),
-      motion_(&motion),
+      demand_(motion, sampling.time_step),
       sampling_(sampling) {
   Require(sampling.hold > 0, "sampling.hold", "must be positive", static_cast<double>(sampling.hold));
 }
@@ -27,24 +27,28 @@ JointController::JointController(const RobotModel& model, const MassProperties& 
 void JointController::Follow(const Trajectory& /*motion*/) { steps_until_due_ = 0; }
 
 void JointController::Begin(double /*t*/, const Reading& /*reading*/) {
-  has_begun_ = true;
+  demand_.Begin();
   steps_until_due_ = 0;
 }
 
-void JointController::EvaluateDesired(const JointMotion& motion, double t, double time_step,
-                                      DesiredJoints* desired, DesiredJoints* half_step) {
+void JointDemand::EvaluateDesired(const JointMotion& motion, double t, double time_step,
+                                  DesiredJoints* desired, DesiredJoints* half_step) {
   motion.Evaluate(t, desired);
   // Semi-implicit Euler steps like a leapfrog: velocities belong to the middle of the step before.
   motion.Evaluate(t - 0.5 * time_step, half_step);
   desired->q_dot = half_step->q_dot;
 }
 
-void JointController::Step(const Reading& reading, double t, Command* command) {
+void JointDemand::Fill(const Reading& reading, double t, Command* command) {
   constexpr double kBefore = -1.0;  // s, when the motion is at its start
   command->tracks = false;
   command->handling.holding = false;
   command->desired.X_d << reading.state.X_Bo.translation(), CalcAnyZyzAngles(reading.state.X_Bo.linear());
-  EvaluateDesired(*motion_, has_begun_ ? t : kBefore, sampling_.time_step, &command->joints, &half_step_);
+  EvaluateDesired(*motion_, has_begun_ ? t : kBefore, time_step_, &command->joints, &half_step_);
+}
+
+void JointController::Step(const Reading& reading, double t, Command* command) {
+  demand_.Fill(reading, t, command);
   model_.SetState(reading.state);
   command->computes_joints = steps_until_due_ == 0;
   if (steps_until_due_ > 0) {

@@ -8,6 +8,27 @@
 
 namespace dexcheck {
 
+/// What a motion of joints asks of a controller: the start until Begin, then q_d(t).
+class JointDemand {
+ public:
+  /// @param motion outlives this.
+  JointDemand(const JointMotion& motion, double time_step) : motion_(&motion), time_step_(time_step) {}
+
+  void Begin() { has_begun_ = true; }
+  /// Fills `joints` as EvaluateDesired does, and says that nothing is held or carried.
+  void Fill(const Reading& reading, double t, Command* command);
+
+  /// q_d, q_d_ddot at t, and q_d_dot half a time step before. @param half_step scratch.
+  static void EvaluateDesired(const JointMotion& motion, double t, double time_step, DesiredJoints* desired,
+                              DesiredJoints* half_step);
+
+ private:
+  const JointMotion* motion_;
+  double time_step_;
+  bool has_begun_ = false;
+  DesiredJoints half_step_;
+};
+
 /// A joint law along q_d(t), for a robot that holds nothing. It keeps the start until Begin.
 class JointController final : public Controller {
  public:
@@ -23,18 +44,12 @@ class JointController final : public Controller {
   void Step(const Reading& reading, double t, Command* command) override;
   [[nodiscard]] const GraspModel& model() const override { return model_; }
 
-  /// q_d, q_d_ddot at t, and q_d_dot half a time step before. @param half_step scratch.
-  static void EvaluateDesired(const JointMotion& motion, double t, double time_step, DesiredJoints* desired,
-                              DesiredJoints* half_step);
-
  private:
   GraspModel model_;
   JointLaw law_;
-  const JointMotion* motion_;
+  JointDemand demand_;
   Sampling sampling_;
-  bool has_begun_ = false;
   long steps_until_due_ = 0;
-  DesiredJoints half_step_;
 };
 
 }  // namespace dexcheck

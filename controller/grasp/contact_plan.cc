@@ -301,6 +301,13 @@ void RequireUsable(const Hand& hand, const Pose& X_Bo, const ContactPlanOptions&
 
 }  // namespace
 
+double CalcContactHalfLength(const Shape& shape, double tip_radius) {
+  if (const auto* cylinder = std::get_if<SolidCylinder>(&shape)) {
+    return std::max(0.5 * cylinder->length - tip_radius, 0.0);
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
 std::vector<int> ListArmJoints(const RobotModel& model, std::span<const int> fingertips, int palm_frame) {
   std::vector<int> joints = grasp_internal::ListChain(model, palm_frame);
   for (const int tip : model.fingertips()) {

@@ -23,8 +23,11 @@ struct SupportPlane {
 /// The hand that is to hold the object.
 struct Hand {
   std::vector<int> fingertips;  ///< Frames that carry spheres, three or more, all on one palm.
-  int palm_frame = -1;          ///< Its z axis points out of the palm along the fingers.
+  int palm_frame = -1;          ///< Its z axis points at what the palm takes.
   std::vector<int> arm_joints;  ///< On the chain to the palm, to be moved; see ListArmJoints.
+  /// Where in the palm frame the object's centre is held, m: the search begins there. None: on the axis along
+  /// z through the middle of the fingers' bases, which suits fingers that stand around the palm.
+  std::optional<Vector3d> hold_at;
 };
 
 struct ContactPlanOptions {
@@ -69,6 +72,9 @@ struct ContactPlan {
   Pose X_oP = Pose::Identity();  ///< Palm frame in the object.
   int palm_poses = 0;            ///< Tried.
 };
+
+/// Largest |z| of contacts in an object of this shape, m: a fingertip stays off the ends of a cylinder.
+double CalcContactHalfLength(const Shape& shape, double tip_radius);
 
 /// Joints that move a frame but none of the model's fingertips beyond the given ones: the hand's own arm.
 std::vector<int> ListArmJoints(const RobotModel& model, std::span<const int> fingertips, int palm_frame);

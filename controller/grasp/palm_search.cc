@@ -11,7 +11,8 @@ namespace dexcheck::grasp_internal {
 namespace {
 
 constexpr int kRolls = 12;
-constexpr std::array<double, 5> kDistances = {0.7, 0.55, 0.62, 0.78, 0.86};  // of the fingers' length
+// Of the object from the fingers' bases, over the fingers' length; of a given place, the first stands for it.
+constexpr std::array<double, 5> kDistances = {0.7, 0.55, 0.62, 0.78, 0.86};
 
 double CalcHeight(const SupportPlane& support, const Vector3d& p) {
   return support.normal.dot(p) - support.height;
@@ -58,12 +59,13 @@ PalmSearch::PalmSearch(const RobotModel& model, const Hand& hand, const HandReac
       arm_(model, hand.palm_frame, hand.arm_joints, q_nominal),
       lower_(arm_.lower().array() + options.joint_margin),
       upper_(arm_.upper().array() - options.joint_margin),
-      nominal_(arm_.Gather(q_nominal)) {
+      nominal_(arm_.Gather(q_nominal)),
+      p_Po_(hand.hold_at.value_or(reach.center() + kDistances.front() * reach.length() * Vector3d::UnitZ())) {
   Require((lower_.array() <= upper_.array()).all(), "joint_margin", "must leave each joint a range",
           options.joint_margin);
 }
 
-Pose PalmSearch::CalcPalmPose(const Vector3d& direction, double roll, double distance) const {
+Pose PalmSearch::CalcPalmPose(const Vector3d& direction, double roll) const {
   // From the nominal orientation by the shortest way to the direction, then about it.
   SerialChain::Poses poses;
   arm_.CalcPoses(nominal_, &poses);
@@ -71,9 +73,7 @@ Pose PalmSearch::CalcPalmPose(const Vector3d& direction, double roll, double dis
   const Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(R_nominal.col(2), direction).toRotationMatrix();
   Pose X_BP = Pose::Identity();
   X_BP.linear() = Eigen::AngleAxisd(roll, direction) * turn * R_nominal;
-  const Vector3d& center = reach_.center();
-  const Vector3d p_Po(center.x(), center.y(), center.z() + distance * reach_.length());
-  X_BP.translation() = X_Bo_.translation() - X_BP.linear() * p_Po;
+  X_BP.translation() = X_Bo_.translation() - X_BP.linear() * p_Po_;
   return X_BP;
 }
 
@@ -138,7 +138,7 @@ std::vector<PalmPose> PalmSearch::List() {
       if (!poses.empty()) starts.push_back(poses.back().q_arm);
       starts.push_back(nominal_);
       for (int k = 1; k <= kExtraStarts; ++k) starts.push_back(CalcSpreadPoint(k, lower_, upper_));
-      Try(CalcPalmPose(direction, 2.0 * kPi * roll / kRolls, kDistances.front()), starts, &poses);
+      Try(CalcPalmPose(direction, 2.0 * kPi * roll / kRolls), starts, &poses);
     }
   }
   return poses;

@@ -48,7 +48,7 @@ class PalmSearch {
   [[nodiscard]] bool ReachesBeyond(const PalmPose& pose) const;
 
  private:
-  [[nodiscard]] Pose CalcPalmPose(const Vector3d& direction, double roll, double distance) const;
+  [[nodiscard]] Pose CalcPalmPose(const Vector3d& direction, double roll) const;
   [[nodiscard]] bool IsPalmClear(const Pose& X_BP) const;
   [[nodiscard]] bool IsArmClear(const VectorXd& q_arm) const;
   [[nodiscard]] ChainSolution SolveArm(const Pose& X_BP, const VectorXd& q_start) const;
@@ -62,6 +62,7 @@ class PalmSearch {
   SerialChain arm_;
   VectorXd lower_, upper_;  // of the arm, less the margin
   VectorXd nominal_;        // of the arm
+  Vector3d p_Po_;           // where the hand holds the object
   PalmTally tally_;
 };
 

@@ -81,6 +81,7 @@ void PickAndPlace::PlanAttempt(double t, const MeasuredState& state) {
   // From the posture of the start, where the platform is now.
   VectorXd q = start_;
   q.head(model_->num_base_positions()) = state.q.head(model_->num_base_positions());
+  carried_over_ = false;
   plan_ = MakePickPlan(*model_, hand_, *surface_, state.X_Bo, q, options_.plan);
   lay_at_ = state.X_Bo.translation();
   push_ = 0.0;
@@ -89,10 +90,17 @@ void PickAndPlace::PlanAttempt(double t, const MeasuredState& state) {
   const auto last = [](double least, const VectorXd& from, const VectorXd& to, double rate) {
     return std::max(least, (to - from).cwiseAbs().maxCoeff() / rate);
   };
-  raise_time_ = last(options_.raise_time, plan_.q_open, above, options_.arm_rate);
-  lower_time_ = last(options_.lower_time, plan_.q_open, above, kFreeRate);
   const VectorXd from = move_.to;
   approach_time_ = last(options_.approach_time, from, above, kFreeRate);
+  raise_time_ = last(options_.raise_time, plan_.q_open, above, options_.arm_rate);
+  transport_time_ = options_.transport_time;
+  if (plan_.along.size() > 0) {
+    const VectorXd there = plan_.along.Evaluate(1.0);
+    raise_time_ = last(raise_time_, there, plan_.landing.Evaluate(0.0), options_.arm_rate);
+    transport_time_ = last(transport_time_, above, there, options_.arm_rate);
+    approach_time_ = last(approach_time_, there, start_.tail(there.size()), kFreeRate);
+  }
+  lower_time_ = last(options_.lower_time, plan_.q_open, above, kFreeRate);
   Enter(Phase::kApproach, t);
   StartMove(from, above, t, approach_time_);
 }
@@ -111,15 +119,17 @@ void PickAndPlace::StartMove(const VectorXd& from, const VectorXd& to, double t,
   move_.begin = t;
   move_.duration = duration;
   move_.steady = steady;
-  move_.way = Move::kStraight;
+  move_.path = nullptr;
 }
 
-void PickAndPlace::StartRise(const VectorXd& from, bool up, double t, double duration) {
-  const VectorXd low = plan_.rise.Evaluate(0.0);
-  const VectorXd high = plan_.rise.Evaluate(1.0);
-  move_.offset = from - (up ? low : high);
-  StartMove(from, move_.offset + (up ? high : low), t, duration);
-  move_.way = up ? Move::kUp : Move::kDown;
+void PickAndPlace::StartPath(const VectorXd& from, const PosturePath& path, bool backwards, double t,
+                             double duration) {
+  const VectorXd begin = path.Evaluate(backwards ? 1.0 : 0.0);
+  const VectorXd end = path.Evaluate(backwards ? 0.0 : 1.0);
+  move_.offset = from - begin;
+  StartMove(from, move_.offset + end, t, duration);
+  move_.path = &path;
+  move_.backwards = backwards;
 }
 
 void PickAndPlace::HoldPosture(const VectorXd& q_joints) { StartMove(q_joints, q_joints, begin_, 0.0); }
@@ -138,15 +148,14 @@ ScalarMotion PickAndPlace::EvaluateMove(double t) const {
 }
 
 void PickAndPlace::EvaluateWay(double s) {
-  if (move_.way == Move::kStraight) {
+  if (move_.path == nullptr) {
     way_s_ = move_.to - move_.from;
     way_ = move_.from + s * way_s_;
     way_ss_.setZero(way_.size());
     return;
   }
-  const bool up = move_.way == Move::kUp;
-  plan_.rise.Evaluate(up ? s : 1.0 - s, &way_, &way_s_, &way_ss_);
-  if (!up) way_s_ = -way_s_;
+  move_.path->Evaluate(move_.backwards ? 1.0 - s : s, &way_, &way_s_, &way_ss_);
+  if (move_.backwards) way_s_ = -way_s_;
   way_ += move_.offset;
 }
 
@@ -222,7 +231,7 @@ void PickAndPlace::UpdateApproach(double t) {
   if (!MoveDone(t)) return;
   if (stage_ == 0) {
     stage_ = 1;
-    StartRise(move_.to, /*up=*/false, t, lower_time_);
+    StartPath(move_.to, plan_.rise, /*backwards=*/true, t, lower_time_);
   } else if (t >= move_.begin + move_.duration + kPause) {
     Enter(Phase::kClose, t);
     demand_.by_inertia = true;
@@ -344,9 +353,9 @@ DesiredMotion PickAndPlace::EvaluateCarry(double t) const {
     desired.X_d_ddot.head<3>() += now.s_ddot * way;
   };
   const double raised = begin_ + raise_time_;
-  const double there = raised + options_.transport_time;
+  const double there = raised + transport_time_;
   add(options_.raise, begin_, raise_time_);
-  add(options_.transport, raised, options_.transport_time);
+  add(options_.transport, raised, transport_time_);
   add(-options_.raise, there, raise_time_);
   return desired;
 }
@@ -355,12 +364,22 @@ void PickAndPlace::UpdateCarry(double t) {
   demand_.weight = demand_.scale;
   demand_.desired = EvaluateCarry(t);
   // The arm bends as the plan has it, so that fingers need not.
-  const double lower = begin_ + raise_time_ + options_.transport_time;
-  if (stage_ == 0 || (stage_ == 1 && t >= lower)) {
-    StartRise(move_.to, /*up=*/stage_ == 0, stage_ == 0 ? begin_ : lower, raise_time_);
-    ++stage_;
+  const double raised = begin_ + raise_time_;
+  const double there = raised + transport_time_;
+  if (stage_ == 0) {
+    StartPath(move_.to, plan_.rise, /*backwards=*/false, begin_, raise_time_);
+    stage_ = 1;
+  } else if (stage_ == 1 && t >= raised) {
+    if (plan_.along.size() > 0) {
+      StartPath(move_.to, plan_.along, /*backwards=*/false, raised, transport_time_);
+    }
+    stage_ = 2;
+  } else if (stage_ == 2 && t >= there) {
+    carried_over_ = true;
+    StartPath(move_.to, rise(), /*backwards=*/true, there, raise_time_);
+    stage_ = 3;
   }
-  if (t < begin_ + 2.0 * raise_time_ + options_.transport_time + kPause) return;
+  if (t < begin_ + 2.0 * raise_time_ + transport_time_ + kPause) return;
   lowering_from_ = demand_.weight;
   Enter(Phase::kHandOver, t);
 }
@@ -397,7 +416,7 @@ void PickAndPlace::UpdateRelease(double t, const MeasuredState& state) {
     StartMove(Joints(state), to, t, kOpenTime);
   } else if (t >= move_.begin + move_.duration + kPause) {
     Enter(Phase::kWithdraw, t);
-    StartRise(move_.to, /*up=*/true, t, lower_time_);
+    StartPath(move_.to, rise(), /*backwards=*/false, t, lower_time_);
   }
 }
 

@@ -101,15 +101,18 @@ class PickAndPlace {
     VectorXd from, to;
     double begin = 0.0;
     double duration = 0.0;
-    bool steady = false;                             // at constant speed after a short ramp
-    enum { kStraight, kUp, kDown } way = kStraight;  // or along the plan's rise,
-    VectorXd offset;                                 // this far from it
+    bool steady = false;                // at constant speed after a short ramp
+    const PosturePath* path = nullptr;  // of the plan, instead of the straight way,
+    bool backwards = false;
+    VectorXd offset;  // and this far from it
   };
 
   void Enter(Phase phase, double t);
   void StartMove(const VectorXd& from, const VectorXd& to, double t, double duration, bool steady = false);
-  /// Along the plan's rise, up or down.
-  void StartRise(const VectorXd& from, bool up, double t, double duration);
+  /// Along a path of the plan, or back.
+  void StartPath(const VectorXd& from, const PosturePath& path, bool backwards, double t, double duration);
+  /// Where the hand stands above the object: as planned, or where it is to be put down.
+  [[nodiscard]] const PosturePath& rise() const { return carried_over_ ? plan_.landing : plan_.rise; }
   [[nodiscard]] bool MoveDone(double t) const { return t >= move_.begin + move_.duration; }
   [[nodiscard]] ScalarMotion EvaluateMove(double t) const;
   /// Sets way_ and its derivatives.
@@ -157,6 +160,8 @@ class PickAndPlace {
   double approach_time_ = 0.0;  // s
   double lower_time_ = 0.0;
   double raise_time_ = 0.0;
+  double transport_time_ = 0.0;
+  bool carried_over_ = false;   // to the end of its way
   double borne_ = 0.0;          // weight of the step before
   double lowering_from_ = 1.0;  // weight at the beginning of the hand-over
   bool refused_ = false;

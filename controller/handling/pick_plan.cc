@@ -1,5 +1,7 @@
 #include "controller/handling/pick_plan.h"
 
+#include <algorithm>
+
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/grasp/frame_placement.h"
@@ -11,31 +13,64 @@ constexpr int kKnots = 9;
 // Largest change of a joint from one knot to the next; more is another branch of the arm's postures, rad.
 constexpr double kLargestChange = 0.5;
 
-/// The palm goes straight up, the fingers stay open.
-void PlanRise(const RobotModel& model, const Hand& hand, double raise, double joint_margin, PickPlan* plan) {
-  const VectorXd& q_open = plan->contacts.q_open;
-  ModelTerms kinematics(model, Coordinates::kReduced);
-  kinematics.SetState(q_open, VectorXd::Zero(model.num_velocities()));
-  const Pose X_BP = kinematics.CalcFramePose(hand.palm_frame);
-  std::vector<VectorXd> knots = {plan->q_open};
-  VectorXd q = q_open;
-  for (int i = 1; i < kKnots; ++i) {
-    const double height = raise * PosturePath::KnotPlace(i, kKnots);
-    Pose X_goal = X_BP;
-    X_goal.pretranslate(Vector3d(0.0, 0.0, height));
-    const FramePlacement placement =
-        SolveFramePlacement(model, hand.palm_frame, X_goal, hand.arm_joints, q, q_open,
-                            {.num_starts = 1, .joint_margin = joint_margin});
-    const double change = (placement.q - q).cwiseAbs().maxCoeff();
-    if (!placement.reached || change > kLargestChange) {
-      plan->problem =
-          "the arm cannot go straight up from the object by more than " + FormatNumber(height) + " m";
-      return;
-    }
-    q = placement.q;
-    knots.emplace_back(q.tail(model.num_joints()));
+/// Moves the palm, with the fingers open.
+class PathPlanner {
+ public:
+  PathPlanner(const RobotModel& model, const Hand& hand, const VectorXd& q_open, double joint_margin)
+      : model_(&model), hand_(&hand), q_open_(q_open), q_(q_open), joint_margin_(joint_margin) {
+    ModelTerms kinematics(model, Coordinates::kReduced);
+    kinematics.SetState(q_open, VectorXd::Zero(model.num_velocities()));
+    X_BP_ = kinematics.CalcFramePose(hand.palm_frame);
   }
-  plan->rise = PosturePath(knots);
+
+  /// Knots straight on by a displacement from where the path before ended, without turning.
+  /// @param problem says how far it goes when that is not all the way.
+  std::vector<VectorXd> Plan(const Vector3d& displacement, const std::string& where, std::string* problem) {
+    std::vector<VectorXd> knots = {q_.tail(model_->num_joints())};
+    for (int i = 1; i < kKnots; ++i) {
+      const Vector3d way = PosturePath::KnotPlace(i, kKnots) * displacement;
+      Pose X_goal = X_BP_;
+      X_goal.pretranslate(way);
+      const FramePlacement placement =
+          SolveFramePlacement(*model_, hand_->palm_frame, X_goal, hand_->arm_joints, q_, q_open_,
+                              {.num_starts = 1, .joint_margin = joint_margin_});
+      const double change = (placement.q - q_).cwiseAbs().maxCoeff();
+      if (!placement.reached || change > kLargestChange) {
+        *problem = "the arm cannot go straight " + where + " by more than " + FormatNumber(way.norm()) + " m";
+        return {};
+      }
+      q_ = placement.q;
+      knots.emplace_back(q_.tail(model_->num_joints()));
+    }
+    X_BP_.pretranslate(displacement);
+    return knots;
+  }
+
+ private:
+  const RobotModel* model_;
+  const Hand* hand_;
+  VectorXd q_open_, q_;
+  double joint_margin_;
+  Pose X_BP_;
+};
+
+/// Up, along and down, as far as the arm has to do it.
+void PlanPaths(const RobotModel& model, const Hand& hand, const PickPlanOptions& options, double joint_margin,
+               PickPlan* plan) {
+  PathPlanner planner(model, hand, plan->contacts.q_open, joint_margin);
+  const Vector3d raise(0.0, 0.0, options.raise);
+  const std::vector<VectorXd> rise = planner.Plan(raise, "up from the object", &plan->problem);
+  if (!plan->problem.empty()) return;
+  plan->rise = plan->landing = PosturePath(rise);
+  if (model.base().type != BaseType::kFixed) return;
+  const std::vector<VectorXd> along =
+      planner.Plan(options.transport, "along with the object", &plan->problem);
+  if (!plan->problem.empty()) return;
+  plan->along = PosturePath(along);
+  std::vector<VectorXd> down = planner.Plan(-raise, "down where it puts the object", &plan->problem);
+  if (!plan->problem.empty()) return;
+  std::reverse(down.begin(), down.end());
+  plan->landing = PosturePath(down);
 }
 
 }  // namespace
@@ -47,7 +82,13 @@ PickPlan MakePickPlan(const RobotModel& model, const Hand& hand, const Surface& 
   contact_options.room = options.opening;
   contact_options.hemisphere = options.hemisphere;
   contact_options.support = SupportPlane{Vector3d::UnitZ(), options.support};
-  contact_options.reaches = {Vector3d(0.0, 0.0, options.raise)};
+  contact_options.half_length = options.half_length;
+  const Vector3d raise(0.0, 0.0, options.raise);
+  contact_options.reaches = {raise};
+  if (model.base().type == BaseType::kFixed) {
+    contact_options.reaches.insert(contact_options.reaches.end(),
+                                   {options.transport + raise, options.transport});
+  }
   PickPlan plan;
   plan.contacts = PlanContacts(model, hand, object, X_Bo, q, contact_options);
   if (!plan.contacts.found) {
@@ -62,7 +103,7 @@ PickPlan MakePickPlan(const RobotModel& model, const Hand& hand, const Surface& 
   plan.q_near = q_touch + options.nearness * off;
   plan.q_deep = q_touch - options.depth * off;
 
-  PlanRise(model, hand, options.raise, contact_options.joint_margin, &plan);
+  PlanPaths(model, hand, options, contact_options.joint_margin, &plan);
   plan.found = plan.problem.empty();
   return plan;
 }

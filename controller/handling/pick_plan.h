@@ -2,6 +2,7 @@
 
 // The postures of a grasp from above: over the object, around it, at its surface.
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,11 @@ struct PickPlanOptions {
   double nearness = 0.002;  ///< Gap from which the fingertips go on slowly, m.
   double depth = 0.004;     ///< How far beyond the surface they go when they find nothing, m.
   double support = 0.0;     ///< Height of what the object lies on, m.
+  /// How far the object is to be carried, m. A robot whose base is fixed needs arm postures for it; otherwise
+  /// the base drives, and the arm keeps its posture.
+  Vector3d transport = Vector3d::Zero();
+  /// As ContactPlanOptions.
+  double half_length = std::numeric_limits<double>::infinity();
   std::optional<Vector3d> hemisphere = std::nullopt;  ///< As ContactPlanOptions.
 };
 
@@ -27,6 +33,8 @@ struct PickPlan {
   ContactPlan contacts;  ///< Where the fingertips go.
   VectorXd q_open;       ///< The hand is open around the object.
   PosturePath rise;      ///< From there straight up by `raise`.
+  PosturePath along;     ///< From there straight along `transport`; empty where the base drives.
+  PosturePath landing;   ///< As `rise`, from where the object is put down.
   VectorXd q_near;       ///< Just off the contacts.
   VectorXd q_deep;       ///< Fingertips in the object.
 };

@@ -37,7 +37,7 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
       actuation_(setup.model()),
       meant_force_(VectorXd::Zero(setup.model().num_velocities())) {
   if (!setup.bonds().empty()) model_.LeaveOutContacts();
-  if (setup.joint_motion() != nullptr) {
+  if (setup.joint_motion() != nullptr && knows_law) {
     joint_law_.emplace(setup);
   } else if (!setup.scenario().task && knows_law) {
     law_.emplace(setup);
@@ -50,7 +50,9 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
   if (joint_law_ && !joint_law_->follows_error()) motion_.LeaveOut(kJointDynamics);
   if (joint_law_) return;
   if (!law_) {
-    for (const StepCheck check : {kGains, kLawTorque, kLawDemand, kGraspForce}) motion_.LeaveOut(check);
+    for (const StepCheck check : {kGains, kLawTorque, kLawDemand, kGraspForce, kJointDynamics}) {
+      motion_.LeaveOut(check);
+    }
   }
   if (law_ && !law_->has_error_dynamics()) motion_.LeaveOut(kGains);
   if (law_ && !law_->has_demand()) motion_.LeaveOut(kLawDemand);

@@ -42,7 +42,7 @@ void JointLawCheck::CalcDemand(const VectorXd& q, const VectorXd& xi, VectorXd* 
 }
 
 void JointLawCheck::CompareTorque(const StepRecord& step, const LawTerms& terms) {
-  JointController::EvaluateDesired(*motion_, step.time, 2.0 * velocity_age_, &desired_, &half_step_);
+  JointDemand::EvaluateDesired(*motion_, step.time, 2.0 * velocity_age_, &desired_, &half_step_);
   const auto norm = [&] { return factor_.CalcForceNorm(force_, &work_); };
   factor_.Compute(terms.M);
   force_ = terms.C_xi + terms.gravity + terms.friction;

@@ -38,7 +38,8 @@ struct PlanRequest {
   std::string palm;                     // overrides `hand`
   std::vector<std::string> joints_deg;  // NAME=VALUE
   std::vector<std::string> arm_joints;
-  std::vector<double> lift;  // m
+  std::vector<double> lift;     // m
+  std::vector<double> hold_at;  // m
   std::vector<double> hemisphere;
   std::optional<double> support_height;  // m
   ContactPlanOptions options;
@@ -284,12 +285,14 @@ int Run(PlanRequest request) {
   } catch (const std::invalid_argument& error) {
     throw InputError(request.robot.string() + ": " + error.what());
   }
-  const Hand hand = FindHand(model, request);
+  Hand hand = FindHand(model, request);
+  if (!request.hold_at.empty()) {
+    hand.hold_at = Vector3d(request.hold_at[0], request.hold_at[1], request.hold_at[2]);
+    if (!hand.hold_at->allFinite()) Fail("--hold-at", "must be finite");
+  }
   const VectorXd nominal = MakeNominalPosture(model, hand, request);
   const double tip_radius = *model.frames()[static_cast<size_t>(hand.fingertips.front())].sphere_radius;
-  if (const auto* cylinder = std::get_if<SolidCylinder>(&model.object()->shape)) {
-    request.options.half_length = std::max(0.5 * cylinder->length - tip_radius, 0.0);
-  }
+  request.options.half_length = CalcContactHalfLength(model.object()->shape, tip_radius);
   if (request.support_height) {
     request.options.support = SupportPlane{Vector3d::UnitZ(), *request.support_height};
   }
@@ -351,7 +354,7 @@ void AddPlanCommand(Command app) {
                     .ShowDefault();
   command
       .AddOption("--palm", &request->palm,
-                 "Frame of a palm, z along the fingers; the fingertips are those on its link")
+                 "Frame of a palm, z at what it takes; the fingertips are those on its link")
       .TypeName("FRAME")
       .Excludes(hand);
   command.AddOption("--mu", &request->options.mu, "Friction counted on").TypeName("MU").ShowDefault();
@@ -363,6 +366,13 @@ void AddPlanCommand(Command app) {
       .AddOption(
           "--hemisphere", &request->hemisphere,
           "Fingertips are hemispheres around this direction of their frames: contacts within their rims")
+      .TypeName("X Y Z")
+      .Takes(3);
+  command
+      .AddOption(
+          "--hold-at", &request->hold_at,
+          "Where in the palm's frame the object is held, m: the search begins there; before the fingers "
+          "when not given")
       .TypeName("X Y Z")
       .Takes(3);
   command

@@ -37,8 +37,15 @@ LibraryController::LibraryController(const std::string& library, const OwnContro
     throw InputError("--controller: " + library + ": was built for interface " + Quote(built_for) +
                      ", this program has " + Quote(DescribeControllerInterface()));
   }
-  const ControllerContext context{*setup_.model,   setup_.fingertips, setup_.object,
-                                  *setup_.surface, setup_.options,    setup_.sampling};
+  const bool moves_joints = setup_.joint_motion != nullptr;
+  if (moves_joints) joints_.emplace(*setup_.joint_motion, setup_.sampling.time_step);
+  const ControllerContext context{*setup_.model,
+                                  setup_.fingertips,
+                                  setup_.object,
+                                  *setup_.surface,
+                                  setup_.options,
+                                  setup_.sampling,
+                                  moves_joints ? &setup_.joint_gains : nullptr};
   Guard([&] { controller_.reset(make(&context)); });
   if (controller_ == nullptr) throw RunFailure(name_ + ": made no controller");
 }
@@ -61,10 +68,15 @@ void LibraryController::Follow(const Trajectory& motion) {
 }
 
 void LibraryController::Begin(double t, const Reading& reading) {
+  if (joints_) joints_->Begin();
   Guard([&] { controller_->Begin(t, reading); });
 }
 
 void LibraryController::Step(const Reading& reading, double t, Command* command) {
+  if (joints_) {
+    joints_->Fill(reading, t, command);
+    command->computes_joints = true;
+  }
   Guard([&] { controller_->Step(reading, t, command); });
   RequireTorques(name_, *command, setup_.model->num_velocities());
 }

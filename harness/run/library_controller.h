@@ -3,9 +3,11 @@
 // A controller of the user's own from a shared library.
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "controller/control/controller.h"
+#include "controller/control/joint_controller.h"
 #include "harness/run/own_controller.h"
 
 namespace dexcheck {
@@ -35,6 +37,7 @@ class LibraryController final : public Controller {
 
   std::string name_;
   OwnControllerSetup setup_;
+  std::optional<JointDemand> joints_;
   std::unique_ptr<void, CloseLibrary> handle_;  // outlives the controller
   std::unique_ptr<Controller> controller_;
 };

@@ -117,18 +117,22 @@ LoopParts MakeLoopParts(const Setup& setup, const std::string& what, const std::
                         double time_limit) {
   const Scenario& scenario = setup.scenario();
   if (scenario.task) throw InputError(scenario.source + ": task: is done by no other controller");
-  if (scenario.joint_motion) {
-    throw InputError(scenario.source +
-                     ": joint_motion: is followed by no other controller, which are told of an object");
-  }
   if (scenario.control.kappa == ContactSource::kIntegrated) {
     throw InputError(scenario.source + ": control.kappa: other controllers are told where contacts are");
   }
   LoopParts parts = MakeLoopParts(setup);
-  parts.controller = MakeOwnController(
-      what, OwnControllerSetup{&setup.model(), setup.fingertips(), setup.object().body, &setup.surface(),
-                               setup.MakeControllerOptions(), MakeSampling(setup),
-                               ReadTextFile(robot.string()), scenario.text, time_limit});
+  const OwnControllerSetup own{&setup.model(),
+                               setup.fingertips(),
+                               setup.object().body,
+                               &setup.surface(),
+                               setup.MakeControllerOptions(),
+                               MakeSampling(setup),
+                               setup.joint_motion(),
+                               setup.joint_gains(),
+                               ReadTextFile(robot.string()),
+                               scenario.text,
+                               time_limit};
+  parts.controller = MakeOwnController(what, own);
   parts.knows_law = scenario.control.names_law;
   return parts;
 }

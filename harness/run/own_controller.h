@@ -19,9 +19,11 @@ struct OwnControllerSetup {
   const Surface* surface = nullptr;
   GraspControllerOptions options;
   Sampling sampling;
-  std::string robot_text;     ///< The parameter file.
-  std::string scenario_text;  ///< The scenario.
-  double time_limit = 1.0;    ///< For each answer of a program, s; ten times that to start.
+  const JointMotion* joint_motion = nullptr;  ///< Of a scenario that moves joints,
+  JointGains joint_gains;                     ///< and its law's gains.
+  std::string robot_text;                     ///< The parameter file.
+  std::string scenario_text;                  ///< The scenario.
+  double time_limit = 1.0;                    ///< For each answer of a program, s; ten times that to start.
 };
 
 /// @param what a shared library (a name that ends in .so), or else a command for the shell.

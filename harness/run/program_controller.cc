@@ -49,6 +49,7 @@ ProgramController::ProgramController(const std::string& command, const OwnContro
   if (setup.model->base().type == BaseType::kDifferentialDrive) {
     wheels_inverse_ = CalcWheelRateMap(setup.model->base()).transpose().inverse();
   }
+  if (setup.joint_motion != nullptr) joints_.emplace(*setup.joint_motion, setup.sampling.time_step);
   Start(command);
   try {
     Greet();
@@ -115,6 +116,11 @@ void ProgramController::Greet() {
   Send(&hello, sizeof(hello));
   Send(setup_.robot_text.data(), setup_.robot_text.size());
   Send(setup_.scenario_text.data(), setup_.scenario_text.size());
+  if (joints_) {
+    for (const VectorXd* gain : {&setup_.joint_gains.K_p, &setup_.joint_gains.K_v}) {
+      Send(gain->data(), static_cast<size_t>(gain->size()) * sizeof(double));
+    }
+  }
 
   dexcheck_hello_answer answer{};
   Receive(&answer, sizeof(answer));
@@ -129,6 +135,7 @@ void ProgramController::Greet() {
   tells_F_N_ = (answer.flags & DEXCHECK_TELLS_F_N) != 0;
   const size_t p = hello.positions, n = hello.velocities, N = count, k = 3 * N;
   size_t doubles = 1 + 18 + p + n + 12 + 6 + 6 + 5 * N + N + N + 1;
+  if (joints_) doubles += 3 * n;
   if (wants_terms_) doubles += 2 * n * n + 2 * n + 2 * k * n + 12 * k + 36 + 12 + n + 4;
   request_.assign(1 + doubles, 0.0);
   SetTimeLimit(setup_.time_limit);
@@ -198,7 +205,7 @@ void ProgramController::Receive(void* data, size_t size) {
   }
 }
 
-void ProgramController::FillRequest(const Reading& reading, double t, const DesiredMotion& desired) {
+void ProgramController::FillRequest(const Reading& reading, double t, const Command& command) {
   filled_ = 1;
   const auto add = [&](const auto& matrix) {
     for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
@@ -207,9 +214,9 @@ void ProgramController::FillRequest(const Reading& reading, double t, const Desi
   };
   const MeasuredState& state = reading.state;
   request_[filled_++] = t;
-  add(desired.X_d);
-  add(desired.X_d_dot);
-  add(desired.X_d_ddot);
+  add(command.desired.X_d);
+  add(command.desired.X_d_dot);
+  add(command.desired.X_d_ddot);
   add(state.q);
   add(state.xi);
   add(state.X_Bo.linear());
@@ -226,6 +233,11 @@ void ProgramController::FillRequest(const Reading& reading, double t, const Desi
     request_[filled_++] = Contains(reading.touch.fingertips, i) ? 1.0 : 0.0;
   }
   request_[filled_++] = reading.touch.support_force;
+  if (joints_) {
+    add(command.joints.q);
+    add(command.joints.q_dot);
+    add(command.joints.q_ddot);
+  }
   if (!wants_terms_) return;
   const ModelTerms& robot = model_.robot();
   const GraspTerms& grasp = model_.grasp();
@@ -246,6 +258,7 @@ void ProgramController::FillRequest(const Reading& reading, double t, const Desi
 }
 
 void ProgramController::Begin(double /*t*/, const Reading& /*reading*/) {
+  if (joints_) joints_->Begin();
   const dexcheck_message begin{DEXCHECK_BEGIN, 0};
   Send(&begin, sizeof(begin));
 }
@@ -256,9 +269,14 @@ void ProgramController::Step(const Reading& reading, double t, Command* command)
   command->handling = Handling{};
   command->force_seconds = 0.0;
   command->force_solves = 0;
-  command->desired = TrajectoryController::EvaluateDesired(*motion_, t, setup_.sampling.time_step);
+  if (joints_) {
+    joints_->Fill(reading, t, command);
+    command->computes_joints = true;
+  } else {
+    command->desired = TrajectoryController::EvaluateDesired(*motion_, t, setup_.sampling.time_step);
+  }
   model_.SetState(reading.state);
-  FillRequest(reading, t, command->desired);
+  FillRequest(reading, t, *command);
   dexcheck_message message{DEXCHECK_STEP, static_cast<uint32_t>(filled_ - 1)};
   static_assert(sizeof(message) == sizeof(double));
   std::memcpy(request_.data(), &message, sizeof(message));

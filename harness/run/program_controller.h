@@ -4,10 +4,12 @@
 
 #include <sys/types.h>
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "controller/control/controller.h"
+#include "controller/control/joint_controller.h"
 #include "harness/run/own_controller.h"
 
 namespace dexcheck {
@@ -35,7 +37,7 @@ class ProgramController final : public Controller {
   void Stop();
   void Send(const void* data, size_t size);
   void Receive(void* data, size_t size);
-  void FillRequest(const Reading& reading, double t, const DesiredMotion& desired);
+  void FillRequest(const Reading& reading, double t, const Command& command);
   /// What became of the program, in words; waits for it a little.
   [[nodiscard]] std::string TellEnd();
 
@@ -45,6 +47,7 @@ class ProgramController final : public Controller {
   VectorXd sigma_prime_;                            // n
   Matrix2d wheels_inverse_ = Matrix2d::Identity();  // of E_bar'
   const Trajectory* motion_ = nullptr;
+  std::optional<JointDemand> joints_;
   int socket_ = -1;
   double time_limit_ = 0.0;  // s
   pid_t process_ = -1;

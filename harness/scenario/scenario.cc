@@ -128,7 +128,11 @@ void ReadGrasp(const TomlValue& value, bool planned, Scenario* scenario) {
   const TomlValue fingertips = table.Get("fingertips");
   for (const TomlValue& entry : fingertips.AsList()) grasp.fingertips.push_back(entry.AsName());
   if (grasp.fingertips.size() < 3) fingertips.Reject("needs at least three fingertips to hold an object");
-  if (!planned) ReadContacts(table, &grasp);
+  if (!planned) {
+    ReadContacts(table, &grasp);
+  } else if (const auto xyz = table.Find("xyz")) {
+    grasp.hold_at = xyz->AsVector<3>();
+  }
   grasp.frame = table.Get("frame").AsName();
   if (const auto pole = table.Find("hemisphere")) {
     grasp.hemisphere = pole->AsVector<3>();
@@ -153,7 +157,7 @@ void ReadTask(const TomlValue& value, Scenario* scenario) {
     for (const TomlValue& entry : joints->AsList()) task.arm_joints.push_back(entry.AsName());
   }
   pick.raise.z() = pick.plan.raise = table.Get("raise").AsPositive();
-  pick.transport = table.Get("transport").AsVector<3>();
+  pick.transport = pick.plan.transport = table.Get("transport").AsVector<3>();
   pick.plan.support = table.Get("support_height").AsNumber();
   constexpr std::pair<const char*, double PickAndPlaceOptions::*> kNumbers[] = {
       {"approach_time", &PickAndPlaceOptions::approach_time},

@@ -66,8 +66,9 @@ struct GraspOptions {
   std::vector<SurfacePoint> contacts;   ///< Of the object, one for each fingertip; none for a task.
   /// Out of the pole, in the fingertips' frames, where fingertips are hemispheres; none for whole spheres.
   std::optional<Vector3d> hemisphere;
-  std::string frame;             ///< Frame that the object is placed in; of a task: the palm.
-  Pose X_FO = Pose::Identity();  ///< Object in it.
+  std::string frame;                ///< Frame that the object is placed in; of a task: the palm.
+  Pose X_FO = Pose::Identity();     ///< Object in it; not for a task.
+  std::optional<Vector3d> hold_at;  ///< Of a task: where in the frame the search for a grasp begins, m.
   std::vector<std::pair<std::string, double>> joints;  ///< Posture, rad; other joints are 0.
 };
 

@@ -266,6 +266,9 @@ void Setup::PlaceTask(std::mt19937_64* random) {
   }
   hand_.fingertips = fingertips_;
   hand_.palm_frame = FindGraspFrame();
+  hand_.hold_at = scenario_.grasp.hold_at;
+  const double tip_radius = *model_.frames()[static_cast<size_t>(fingertips_.front())].sphere_radius;
+  scenario_.task->pick_and_place.plan.half_length = CalcContactHalfLength(model_.object()->shape, tip_radius);
   for (const std::string& name : scenario_.task->arm_joints) {
     const int joint = model_.FindJoint(name);
     if (joint < 0) Fail(scenario_, "task.arm_joints", Quote(name) + " is no joint of the model");

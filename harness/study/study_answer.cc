@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "harness/study/halving_search.h"
 #include "harness/study/margin_search.h"
@@ -100,6 +102,44 @@ std::vector<std::string> DescribeMargins(const Study& study, const std::vector<J
   return answers;
 }
 
+/// "0.000302 (0.00029 to 0.00034)": the median and the range. @param values not empty.
+std::string ShowSpread(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const size_t half = values.size() / 2;
+  const double median = values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+  return fmt::format("{:.3g} ({:.3g} to {:.3g})", median, values.front(), values.back());
+}
+
+/// Of a study that compares what has no order, laws for example, each in several trials: what came of each.
+std::vector<std::string> DescribeSpreads(const Study& study, const std::vector<TrialRow>& rows) {
+  std::vector<std::string> answers;
+  if (study.is_search() || study.variations.size() != 1 || CountTrialsOfPoint(study) < 2) return answers;
+  const std::vector<double>& values = study.variations.front().values;
+  for (size_t i = 0; i < study.variations.front().labels.size(); ++i) {
+    long all = 0, held = 0;
+    std::array<std::vector<double>, kNumMetrics> metrics;
+    for (const TrialRow& row : rows) {
+      if (row.trial.parameters.front() != values[i]) continue;
+      ++all;
+      if (!IsHeld(row.result.outcome)) continue;
+      ++held;
+      for (size_t k = 0; k < metrics.size(); ++k) {
+        if (std::isfinite(row.result.metrics[k])) metrics[k].push_back(row.result.metrics[k]);
+      }
+    }
+    std::string text =
+        fmt::format("{}: held in {} of {} trials", DescribeValues(study, {values[i]}), held, all);
+    for (const std::string& name : study.metrics) {
+      for (size_t k = 0; k < metrics.size(); ++k) {
+        if (kMetrics[k].name == name && !metrics[k].empty())
+          text += fmt::format("; {} {}", name, ShowSpread(metrics[k]));
+      }
+    }
+    answers.push_back(text + (held > 0 ? ", medians and ranges." : "."));
+  }
+  return answers;
+}
+
 /// Of a sample with constraints: how probable a failure is.
 std::string DescribeFailures(const Study& study, const std::vector<TrialRow>& rows) {
   long failures = 0;
@@ -135,6 +175,7 @@ std::vector<std::string> AnswerStudy(const Study& study, const std::vector<Trial
   std::vector<std::string> answers;
   if (rows.empty()) return answers;
   if (study.search.method == SearchMethod::kMargins) return DescribeMargins(study, JudgePoints(study, rows));
+  answers = DescribeSpreads(study, rows);
   const SamplingMethod method = study.sample.method;
   if (method == SamplingMethod::kSaltelli || method == SamplingMethod::kMorris) {
     for (const std::string& quantity : ListQuantities(study)) {

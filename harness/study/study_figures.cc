@@ -159,6 +159,23 @@ void Thin(std::vector<std::pair<double, double>>* points) {
   *points = std::move(fewer);
 }
 
+/// A bar from the least to the largest of each group of points with one x, and a dash at its median.
+void AddSpreads(const std::vector<std::pair<double, double>>& points, const std::string& color,
+                std::vector<ChartLine>* lines) {
+  constexpr double kHalfDash = 0.12;  // of the distance between two texts
+  for (auto from = points.begin(); from != points.end();) {
+    const double x = from->first;
+    const auto to = std::find_if(from, points.end(), [&](const auto& point) { return point.first != x; });
+    const auto count = to - from;
+    const double median = 0.5 * (from[(count - 1) / 2].second + from[count / 2].second);
+    if (count > 1) {
+      lines->push_back({"", color, {*from, *(to - 1)}});
+      lines->push_back({"", color, {{x - kHalfDash, median}, {x + kHalfDash, median}}});
+    }
+    from = to;
+  }
+}
+
 /// From the least error on, those that need less work than all before.
 std::vector<const TrialRow*> ListFront(const std::vector<const TrialRow*>& tracked) {
   std::vector<const TrialRow*> front;
@@ -286,7 +303,10 @@ Html DrawLines(const StudyResults& results) {
       Thin(&line.points);
       if (line.points.empty()) continue;
       // Between texts there is no line.
-      if (!chart.x.labels.empty()) line.points.clear();
+      if (!chart.x.labels.empty()) {
+        if (!has_second) AddSpreads(line.points, line.color, &chart.lines);
+        line.points.clear();
+      }
       chart.lines.push_back(line);
     }
     if (!chart.lines.empty()) figures += DrawChart(chart);

@@ -4,11 +4,13 @@
 
 #include <cmath>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "harness/engine/clearance.h"
 #include "harness/plant/engine_simulation.h"
 #include "tests/harness/checks/step_check_scene.h"
+#include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck {
 namespace {
@@ -118,6 +120,30 @@ void FollowClearance(benchmark::State& state) {
   state.counters["measured a step"] = static_cast<double>(clearance.measured()) / step;
 }
 BENCHMARK(FollowClearance)->Unit(benchmark::kMicrosecond);
+
+/// The same along a shipped scenario.
+void FollowClearanceOf(benchmark::State& state, const std::string& scenario, const std::string& duration) {
+  const testing::ShippedRun shipped(scenario, {"duration=" + duration});
+  const Setup& setup = shipped.setup();
+  std::vector<VectorXd> positions, rotations;
+  Runner runner(setup, /*check=*/false);
+  runner.Run(
+      [&](const StepRecord& step) {
+        positions.push_back(step.reading.body_positions);
+        rotations.push_back(step.reading.body_rotations);
+      },
+      [] { return false; });
+  Clearance clearance(setup.engine(), setup.plant_side(), setup.solids(), setup.watched_pairs());
+  int step = 0;
+  for (auto _ : state) {
+    const auto k = static_cast<size_t>(step) % positions.size();
+    clearance.Update({positions[k].data(), rotations[k].data()}, 1e-3 * step++);
+  }
+  state.counters["measured a step"] = static_cast<double>(clearance.measured()) / step;
+  state.counters["steps"] = static_cast<double>(positions.size());
+}
+BENCHMARK_CAPTURE(FollowClearanceOf, paper, "paper", "2")->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(FollowClearanceOf, lift, "lift", "40")->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace dexcheck

@@ -58,6 +58,47 @@ TEST(OwnController, TheLawRewrittenInNumPyIsTheLaw) {
   ExpectThePapersLaw("/usr/bin/python3 " + testing::SourcePath("/controller/examples/numpy_law.py"));
 }
 
+/// The law of the joints rewritten outside, with gains that differ from joint to joint.
+class OwnJointLaw : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(OwnJointLaw, IsTheLaw) {
+  constexpr double kRounding = 1e-13;  // measured 1.3e-15
+  const TempFolder folder;
+  const std::filesystem::path own = folder.path() / "own";
+  const std::vector<std::string> reach = {
+      "run",        "panda-reach",  "--no-report",
+      "--set",      "duration=0.3", "--set",
+      "settle=0.1", "--set",        "control.natural_frequency={ all = 20, panda_joint4 = 30 }"};
+  std::vector<std::string> arguments = reach;
+  arguments.insert(arguments.end(), {"--controller", GetParam(), "--out", own.string()});
+  const ProgramResult result = RunDexcheck(arguments);
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  const nlohmann::json summary = ReadSummary(own);
+  EXPECT_EQ(summary["verdict"], "pass");
+  const nlohmann::json& checks = summary["checks"];
+  EXPECT_LE(checks["law_torque"]["max"], kRounding);
+  EXPECT_GT(checks["law_torque"]["max"], 0.0);
+  EXPECT_TRUE(checks["joint_dynamics"]["pass"]);
+  EXPECT_TRUE(checks["expect_joints"]["pass"]);
+  // The scenario's law is another: the same torques are not its.
+  arguments = reach;
+  arguments.insert(arguments.end(), {"--controller", GetParam(), "--no-log", "--set",
+                                     "control.law=feedforward_pd", "--set", "expect.joints=0.01"});
+  const ProgramResult other = RunDexcheck(arguments);
+  EXPECT_EQ(other.exit_code, 1) << other.out << other.err;
+  EXPECT_NE(other.out.find("control law"), std::string::npos) << other.out;
+}
+
+INSTANTIATE_TEST_SUITE_P(OwnController, OwnJointLaw,
+                         ::testing::Values(JOINT_LAW_LIBRARY,
+                                           "/usr/bin/python3 " +
+                                               SourcePath("/controller/examples/numpy_joint_law.py")),
+                         [](const auto& info) { return info.index == 0 ? "Library" : "NumPy"; });
+
+TEST(OwnController, AJointLawIsNoneForAGrasp) {
+  EXPECT_TRUE(HasFailed(RunWith(JOINT_LAW_LIBRARY), "this law is for a [joint_motion]"));
+}
+
 TEST(OwnController, AnUnknownLawIsNotAsked) {
   const TempFolder folder;
   const std::filesystem::path own = folder.path() / "own";

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <memory>
+#include <tuple>
 
 #include "tests/harness/run/shipped_run.h"
 
@@ -116,6 +117,50 @@ TEST(ClearanceOfARun, BodiesThatCollidePush) {
   EXPECT_EQ(apart.result().verdict, Verdict::kPass)
       << apart.result().failure << apart.result().attribution.evidence;
   EXPECT_EQ(apart.checks().Find("collision").count, 20);
+}
+
+// A ball that lies on the floor, beside an arm that rests: with their declared contact taken away the ball
+// falls through, or, when bodies collide, pushes by its weight.
+TEST(ClearanceOfARun, ABodyAtRestPushesByItsWeight) {
+  constexpr double kTolerance = 1e-6;  // of the weight; measured 1e-9
+  const auto run = [](const std::string& collide) {
+    const Scenario scenario = ParseScenario(
+        "name = 'rest'\nduration = 0.05\nsettle = 0.2\nstart = 'rest'\nplant.collide = " + collide +
+            "\n[joint_motion]\nstart_deg = { panda_joint4 = -90, panda_joint6 = 90, h4_1 = 30 }\n[control]\n"
+            "natural_frequency = 20\ndamping_ratio = 1\n",
+        "rest.toml", SourcePath(), {});
+    const std::string mjcf = SourcePath("/mjcf/panda_hand_scene.xml");
+    MjModelPtr engine = LoadMjcf(mjcf);
+    const auto geom = [&](const char* name) { return mj_name2id(engine.get(), mjOBJ_GEOM, name); };
+    const int tip = geom("h1_tip_geom");
+    bool is_found = false;
+    for (int i = 0; i < engine->npair; ++i) {
+      if (engine->pair_geom1[i] != geom("floor") && engine->pair_geom2[i] != geom("floor")) continue;
+      is_found = true;
+      engine->pair_geom1[i] = geom("floor");
+      engine->pair_geom2[i] = tip;
+      engine->pair_signature[i] = ((engine->geom_bodyid[tip] + 1) << 16) + 1;
+    }
+    EXPECT_TRUE(is_found);
+    const dexcheck::Setup setup(scenario, SourcePath("/controller/parameters/panda_hand.toml"), mjcf,
+                                std::move(engine));
+    Runner runner(setup, /*check=*/true);
+    runner.Run([](const StepRecord&) {}, [] { return false; });
+    const Collision collision = runner.loop().record().response.collision;
+    const CheckRecord check = runner.loop().checks().Find("collision");
+    const double fallen = -runner.loop().record().reading.state.X_Bo.translation().z();
+    return std::tuple(collision.force, check, fallen);
+  };
+  const auto [force, check, fallen] = run("true");
+  const double weight = 0.15 * 9.81;
+  EXPECT_NEAR(force, weight, kTolerance * weight);
+  EXPECT_EQ(check.count, 50);
+  EXPECT_TRUE(check.failed);
+  EXPECT_NEAR(fallen, -0.035, 1e-5);
+  const auto [none, unasked, through] = run("false");
+  EXPECT_EQ(none, 0.0);
+  EXPECT_FALSE(unasked.applies);
+  EXPECT_GT(through, 0.1);
 }
 
 TEST(ClearanceOfARun, UnknownBodiesAreRefused) {

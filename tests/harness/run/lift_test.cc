@@ -163,6 +163,46 @@ TEST_F(LiftTest, SucceedsFromOtherPlaces) {
   }
 }
 
+// Another robot: a fixed base, so that the arm carries the object, and fingers that do not stand around the
+// palm. In haste and not far; the scenario takes 26 s.
+TEST(HandLiftScenario, TheArmCarriesWhereNoPlatformDrives) {
+  ShippedRun run("hand-lift", {"settle=0.1", "task.raise=0.03", "task.transport=[0, 0.05, 0]",
+                               "task.approach_time=0.8", "task.lower_time=0.6", "task.close_time=0.3",
+                               "task.search_speed=0.01", "task.grip_time=0.5", "task.take_over_time=0.6",
+                               "task.raise_time=1", "task.arm_rate=0.5", "task.transport_time=1"});
+  const Vector3d start = run.setup().X_Bo_start().translation();
+  double highest = 0.0;
+  const RunResult& result =
+      run.Run([&] { highest = std::max(highest, run.loop().record().reading.state.X_Bo.translation().z()); });
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+  const PickAndPlace& task = run.loop().task()->task();
+  EXPECT_EQ(ListPhases(task), kWholeTask);
+  EXPECT_NEAR(highest - start.z(), 0.03, 1e-4);
+  const Vector3d way = run.step().reading.state.X_Bo.translation() - start;
+  EXPECT_NEAR((way - Vector3d(0.0, 0.05, 0.0)).norm(), 0.0, 1e-4);
+  EXPECT_LE(result.tracking.position_max(), 1e-5);  // measured 2.5e-7
+  EXPECT_GT(run.loop().checks().Find("fingertip_rim").count, 0);
+  // The arm's way is planned from where it takes to where it puts down, and it comes back to where it began.
+  const PickPlan& plan = task.plan();
+  EXPECT_EQ(plan.along.size(), 23);
+  EXPECT_GT((plan.landing.Evaluate(0.0) - plan.q_open).cwiseAbs().maxCoeff(), 0.01);
+  EXPECT_LE((plan.rise.Evaluate(1.0) - plan.along.Evaluate(0.0)).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LE((plan.landing.Evaluate(1.0) - plan.along.Evaluate(1.0)).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LE((run.step().reading.state.q - run.setup().q_start()).cwiseAbs().maxCoeff(), 1e-3);
+}
+
+TEST(HandLiftScenario, SaysWhenTheArmDoesNotReachWhereTheObjectGoes) {
+  ShippedRun run("hand-lift", {"settle=0.1", "task.transport=[0.6, 0, 0]"});
+  try {
+    run.Run();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("hand-lift.toml: task: "), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("palm poses tried"), std::string::npos) << error.what();
+    return;
+  }
+  FAIL() << "accepted";
+}
+
 TEST(LiftScenario, AllocatesOnlyWherePhasesChange) {
   const ShippedRun run("lift", {kCoarse});
   ClosedLoop loop(run.setup(), /*check=*/false);

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "controller/common/toml_reader.h"
+#include "harness/study/study_answer.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
 
@@ -80,6 +81,29 @@ TEST_F(StudyReportTest, LinksToThePartsThatItHas) {
   EXPECT_GE(count, 4);
   EXPECT_THAT(links, HasSubstr("#maps"));
   EXPECT_THAT(links, Not(HasSubstr("#margins"))) << "a study of a grid has none";
+}
+
+TEST(StudyAnswer, TellsTheSpreadOfWhatHasNoOrder) {
+  const Study study = ParseStudy(
+      "name = 'laws'\nscenario = 'curve'\nseeds = [1, 2, 3, 4]\nmetrics = ['position_error_rms']\n"
+      "[[vary]]\nkey = 'control.law'\nvalues = ['computed_torque', 'pd_gravity']\n",
+      "study.toml");
+  std::vector<TrialRow> rows;
+  for (const Trial& trial : ListTrials(study)) {
+    TrialRow row;
+    row.trial = trial;
+    const bool second = trial.parameters.front() != ListTrials(study).front().parameters.front();
+    // 1, 4, 9, 16; the other law loses the grasp in all trials but the third.
+    row.result.metrics[kPositionErrorRms] = static_cast<double>(trial.seed * trial.seed);
+    if (second && trial.seed != 3) row.result.outcome = Outcome::kLostContact;
+    rows.push_back(row);
+  }
+  ASSERT_EQ(rows.size(), 8U);
+  EXPECT_THAT(AnswerStudy(study, rows),
+              ::testing::ElementsAre("control.law = computed_torque: held in 4 of 4 trials; "
+                                     "position_error_rms 6.5 (1 to 16), medians and ranges.",
+                                     "control.law = pd_gravity: held in 1 of 4 trials; "
+                                     "position_error_rms 9 (9 to 9), medians and ranges."));
 }
 
 TEST_F(StudyReportTest, TextsMayHaveAnyLength) {
