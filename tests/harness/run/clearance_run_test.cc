@@ -122,7 +122,7 @@ TEST(ClearanceOfARun, BodiesThatCollidePush) {
 // A ball that lies on the floor, beside an arm that rests: with their declared contact taken away the ball
 // falls through, or, when bodies collide, pushes by its weight.
 TEST(ClearanceOfARun, ABodyAtRestPushesByItsWeight) {
-  constexpr double kTolerance = 1e-6;  // of the weight; measured 1e-9
+  constexpr double kTolerance = 1e-6;  // of the weight
   const auto run = [](const std::string& collide) {
     const Scenario scenario = ParseScenario(
         "name = 'rest'\nduration = 0.05\nsettle = 0.2\nstart = 'rest'\nplant.collide = " + collide +
