@@ -1,6 +1,7 @@
 #include "harness/checks/contact_give.h"
 
 #include <cmath>
+#include <vector>
 
 #include "harness/checks/bounds.h"
 #include "harness/checks/known_plant.h"
@@ -8,9 +9,12 @@
 namespace dexcheck {
 namespace {
 
-// Contacts have several modes, of which the softest is followed: together at most this much. Measured 1.6
-// with d = 0.9 and torques that change at random.
-constexpr double kModes = 2.0;
+// The largest theta (1 - theta).
+constexpr double kStiffModes = 0.25;
+// What a straight line leaves of the answers of modes is followed over this many steps, some tens of their
+// time constants of about two steps, and looked for at this many shares.
+constexpr Eigen::Index kBendSteps = 64;
+constexpr int kBendShares = 8;
 
 /// A rigid plant's contacts are not soft.
 ContactSoftness FindSoftness(const Setup& setup) {
@@ -42,16 +46,61 @@ void ContactGive::Add(const Eigen::Ref<const VectorXd>& force) {
   slip_ += time_step_ * tangent_acceleration_;
 }
 
+ModesGive::ModesGive(const PlantOptions& plant, double normal_share, double tangential_share)
+    : softest_(plant, ContactGive::Share::Of(normal_share), ContactGive::Share::Of(tangential_share)),
+      stiffest_(plant, {normal_share, 1.0}, {tangential_share, 1.0}),
+      bends_(VectorXd::Zero(kBendSteps)),
+      changes_(VectorXd::Zero(kBendSteps)) {
+  // h of the shares theta s, in columns: along the normal, along the tangent
+  std::vector<MatrixXd> answers;
+  for (int i = 0; i <= kBendShares; ++i) {
+    const double theta = static_cast<double>(i) / kBendShares;
+    ContactGive mode(plant, {1.0, 1.0 - theta * normal_share}, {1.0, 1.0 - theta * tangential_share});
+    mode.Add(VectorXd::Zero(1));
+    MatrixXd& h = answers.emplace_back(kBendSteps, 2);
+    for (Eigen::Index k = 0; k < kBendSteps; ++k) {
+      mode.Add(VectorXd::Ones(1));
+      h.row(k) << mode.along_normal()[0], mode.along_tangent()[0];
+    }
+  }
+  MatrixXd largest = MatrixXd::Zero(kBendSteps, 2);
+  for (int i = 1; i < kBendShares; ++i) {
+    const double theta = static_cast<double>(i) / kBendShares;
+    const MatrixXd bend =
+        theta * (answers[static_cast<size_t>(i)] - (1.0 - theta) * answers.front() - theta * answers.back());
+    largest = largest.cwiseMax(bend.cwiseAbs());
+  }
+  bends_ = largest * Vector2d(normal_share, tangential_share);
+}
+
+void ModesGive::Add(const Eigen::Ref<const VectorXd>& force) {
+  softest_.Add(force);
+  stiffest_.Add(force);
+  if (force_.size() != force.size()) force_ = force;
+  change_ = force - force_;
+  force_ = force;
+}
+
+double ModesGive::CalcSize(const std::function<double(const VectorXd&)>& norm) {
+  newest_ = (newest_ + kBendSteps - 1) % kBendSteps;
+  changes_[newest_] = norm(change_);
+  double bent = 0.0;
+  for (Eigen::Index k = 0; k < kBendSteps; ++k) bent += bends_[k] * changes_[(newest_ + k) % kBendSteps];
+  const auto both = [&](const VectorXd& softest, const VectorXd& stiffest) {
+    return norm(softest) + kStiffModes * norm(stiffest);
+  };
+  return both(softest_.along_normal(), stiffest_.along_normal()) +
+         both(softest_.along_tangent(), stiffest_.along_tangent()) + bent;
+}
+
 PredictionGive::PredictionGive(const Setup& setup) : PredictionGive(setup, FindSoftness(setup)) {}
 
 PredictionGive::PredictionGive(const Setup& setup, const ContactSoftness& softness)
     : setup_(&setup),
       wheels_(setup.model().base()),
       mass_(setup.model().base_with_wheels().mass),
-      force_(setup.scenario().plant, ContactGive::Share::Of(softness.share),
-             ContactGive::Share::Of(softness.tangential_share)),
-      f_c_(setup.scenario().plant, ContactGive::Share::Of(softness.object_share),
-           ContactGive::Share::Of(softness.object_tangential_share)),
+      force_(setup.scenario().plant, softness.share, softness.tangential_share),
+      f_c_(setup.scenario().plant, softness.object_share, softness.object_tangential_share),
       push_(force_),
       grasp_(force_),
       tips_(setup.scenario().plant, ContactGive::Share::Of(0.0), ContactGive::Share::Whole()),
@@ -75,7 +124,8 @@ void PredictionGive::Follow(const StepRecord& step, const Eigen::Ref<const Vecto
     sideways_[0] = turn * (forward + 0.5 * setup_->model().base().wheel_distance * turn);
     tyres_.Add(sideways_);
   }
-  double held = norm(force_.along_normal()) + norm(force_.along_tangent());
+  double held = force_.CalcSize(norm);
+  const auto length = [](const VectorXd& f) { return f.norm(); };
   // |f|_M^-1 of a force on all masses is |f| / sqrt(m), |a|_M of their acceleration |a| sqrt(m).
   const double root = std::sqrt(mass_);
   if (step.known != nullptr) {
@@ -84,13 +134,13 @@ void PredictionGive::Follow(const StepRecord& step, const Eigen::Ref<const Vecto
     push_.Add(step.known->push);
     grasp_force_.noalias() = grasp.J_B().transpose() * f_c;
     grasp_.Add(grasp_force_);
-    held += norm(grasp_.along_normal()) + norm(grasp_.along_tangent()) + push_.size() / root;
+    held += grasp_.CalcSize(norm) + push_.CalcSize(length) / root;
   }
-  held_ = std::max(kModes * held, force_.memory() * held_);
-  held_of_f_c_ = std::max(kModes * f_c_.size(), f_c_.memory() * held_of_f_c_);
+  held_ = std::max(held, force_.softest().memory() * held_);
+  held_of_f_c_ = std::max(f_c_.CalcSize(length), f_c_.softest().memory() * held_of_f_c_);
   motion_ = held_ + root * (tips_.size() + tyres_.size()) + uneven;
   contact_force_ = held_of_f_c_ + setup_->object().body.mass * (tips_.size() + motion_ / root);
-  sinking_ = norm(force_.rate()) / root;
+  sinking_ = norm(force_.softest().rate()) / root;
 }
 
 }  // namespace dexcheck

@@ -40,8 +40,7 @@ class ContactGive {
   [[nodiscard]] const VectorXd& along_tangent() const { return tangent_acceleration_; }
   /// The sum of their magnitudes.
   [[nodiscard]] double size() const { return normal_acceleration_.norm() + tangent_acceleration_.norm(); }
-  /// By which share a step's give is still there at the next: contacts have several modes of that time
-  /// constant, of which one is followed.
+  /// By which share a step's give is still there at the next: modes do not pass through zero together.
   [[nodiscard]] double memory() const { return memory_; }
   /// r_dot at its end.
   [[nodiscard]] const VectorXd& rate() const { return depth_rate_; }
@@ -51,6 +50,38 @@ class ContactGive {
   Share normal_, tangential_;
   VectorXd depth_, depth_rate_, slip_;
   VectorXd normal_acceleration_, tangent_acceleration_;
+};
+
+/// All modes of soft contacts under one vector of forces. The modes are orthogonal in |.|_M, and each holds
+/// back a share s_i of its part of the force, from nothing up to the softest one's s. With theta = s_i / s
+/// and h_theta the answer of r_ddot to a step of the force, over s_i, a mode is at theta between contacts
+/// that hold back next to nothing, a = h_0 * F, and the softest, b = h_1 * F, but for what a straight line
+/// leaves of h_theta:
+///
+///   |r_ddot_i| / s = theta |(1 - theta) a_i + theta b_i + (e_theta * dF)_i|,
+///   e_theta = h_theta - (1 - theta) h_0 - theta h_1.
+///
+/// theta (1 - theta) is 1/4 at most, and norms of sums are less than sums of norms:
+///
+///   |r_ddot| <= s (|a| / 4 + |b| + sum_k max_theta |theta e_theta(k)| |F_n-k - F_n-k-1|).
+///
+/// Likewise along tangents.
+class ModesGive {
+ public:
+  ModesGive(const PlantOptions& plant, double normal_share, double tangential_share);
+
+  /// As ContactGive.
+  void Add(const Eigen::Ref<const VectorXd>& force);
+  /// Bound of what is held back; once after each force. @param norm of a vector.
+  double CalcSize(const std::function<double(const VectorXd&)>& norm);
+  [[nodiscard]] const ContactGive& softest() const { return softest_; }
+
+ private:
+  ContactGive softest_, stiffest_;
+  VectorXd bends_;    // s max_theta |theta e_theta(k)| by k
+  VectorXd changes_;  // |F_k - F_k-1| of as many steps, the one of this step at newest_
+  Eigen::Index newest_ = 0;
+  VectorXd force_, change_;
 };
 
 /// By how much soft contacts change what the rigid system (46), (48) predicts; formulas in
@@ -79,7 +110,7 @@ class PredictionGive {
   double mass_ = 0.0;  // of the robot, kg
   /// Of the force on the robot (n), of f_c (3N), and, of a plant that is not ideal, of pushes (3) and of
   /// J_B'^T f_c (n).
-  ContactGive force_, f_c_, push_, grasp_;
+  ModesGive force_, f_c_, push_, grasp_;
   /// Likewise of the accelerations that (46) has and the engine's constraints have not, m/s^2: of fingertips
   /// (3N), of the wheels sideways (1).
   ContactGive tips_, tyres_;

@@ -18,6 +18,23 @@ const Vector6d* PushOf(const StepRecord& step) {
   return step.known != nullptr ? &step.known->object_wrench : nullptr;
 }
 
+/// A platform that tilts at a rate gives all that turns with it, or moves on it, at v a Coriolis acceleration
+/// of at most twice that rate times |v|. Over all masses |v| is |.|_M of xi without the way forward, sqrt(2
+/// E) of its kinetic energy. @param v, momentum (n) scratch.
+double CalcSwingForce(const Setup& setup, const StepRecord& step, VectorXd* v, VectorXd* momentum) {
+  if (step.response.wheels.size() != 2) return 0.0;
+  *v = step.reading.state.xi;
+  if (setup.model().base().velocity == DriveVelocity::kTwist) {
+    (*v)[0] = 0.0;
+  } else {
+    v->head<2>().array() -= v->head<2>().mean();
+  }
+  momentum->noalias() = ModelAtTruth(step).robot().M() * *v;
+  Vector3d velocity, omega;
+  setup.adapter().GetBaseMotion(step.reading.qpos.data(), step.reading.qvel.data(), &velocity, &omega);
+  return 2.0 * omega.head<2>().norm() * std::sqrt(std::max(0.0, v->dot(*momentum)));
+}
+
 }  // namespace
 
 StepChecks::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)
@@ -249,11 +266,10 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   left_of_robot_ = residual_;
   scale_ = std::max(Norm(bias_), std::numeric_limits<double>::min());
   const double left = Norm(residual_);
-  Add(StepCheck::kBalanceRobot,
-      std::isnan(left) ? left : std::max(0.0, left - CalcUnevenForce(step)) / scale_);
+  const double uneven = CalcUnevenForce(step) + CalcSwingForce(*setup_, step, &work_, &residual_);
+  Add(StepCheck::kBalanceRobot, std::isnan(left) ? left : std::max(0.0, left - uneven) / scale_);
   solver_of_robot_ = step.response.solver_force.size() > 0 ? Norm(step.response.solver_force) / scale_ : 0.0;
   bias_ -= force_;
-  const double uneven = CalcUnevenForce(step);
   give_->Follow(step, bias_, findings_.f_c_model, uneven, [this](const VectorXd& f) { return Norm(f); });
 
   if (is_unjudged_) return;

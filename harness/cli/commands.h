@@ -48,6 +48,7 @@ void AddPlanCommand(Command app);
 void AddRunCommand(Command app, const std::string& command_line);
 void AddBudgetCommand(Command app);
 void AddCompareCommand(Command app);
+void AddExciteCommand(Command app);
 void AddExportCommand(Command app);
 void AddRefereeCommand(Command app);
 void AddRenderCommand(Command app);

@@ -48,6 +48,7 @@ int RunCommandLine(int argc, char** argv) {
   AddStatesCommand(app);
   AddRefereeCommand(app);
   AddPlanCommand(app);
+  AddExciteCommand(app);
   AddRunCommand(app, JoinArguments(argc, argv));
   AddBudgetCommand(app);
   AddCompareCommand(app);

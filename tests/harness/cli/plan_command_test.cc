@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -113,6 +114,27 @@ TEST(PlanCommand, SaysWhyThereIsNoPlan) {
       RunDexcheck(PlanArguments({"--object-xyz", "0.35", "-0.25", "0.85", "--mu", "0.001"}));
   EXPECT_EQ(slippery.exit_code, 3);
   EXPECT_THAT(slippery.err, HasSubstr("no force closure with mu = 0.001"));
+}
+
+// From above a table, with the halves of the fingertips that point back along the fingers: fingertips, 9 mm
+// and 3 mm above the table, stand higher than the middle of the tube, 11 mm, and so touch it with their lower
+// halves, unless a finger comes from over the torus and leans outward. With the other halves it is held.
+TEST(PlanCommand, SaysThatNoPlaceIsWithinTheRims) {
+  const TempFolder folder;
+  const std::filesystem::path file = folder.path() / "plan.json";
+  const ProgramResult back =
+      RunDexcheck(PlanArguments({"--object-xyz", "0.3", "-0.5", "0.631", "--support-height", "0.62",
+                                 "--hemisphere", "-1", "0", "0", "--json", file.string()}));
+  EXPECT_EQ(back.exit_code, 3);
+  EXPECT_EQ(back.out, "");
+  EXPECT_EQ(std::count(back.err.begin(), back.err.end(), '\n'), 1) << back.err;
+  const char* const reason =
+      "not all fingertips find a place on the object within the rims of their hemispheres";
+  EXPECT_THAT(back.err, HasSubstr(std::string("dexcheck: no plan: ") + reason));
+  const Json json = Json::parse(ReadText(file));
+  EXPECT_FALSE(json["found"].get<bool>());
+  EXPECT_THAT(json["problem"].get<std::string>(), HasSubstr(reason));
+  EXPECT_FALSE(json.contains("grasp"));
 }
 
 TEST(PlanCommand, RefusesWhatCannotBeUsed) {

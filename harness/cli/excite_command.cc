@@ -1,0 +1,115 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/base/interrupts.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/json_matrix.h"
+#include "harness/cli/output_file.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/cli/run_folder.h"
+#include "harness/run/excitation.h"
+#include "harness/study/exciting_motion.h"
+
+namespace dexcheck::cli {
+namespace {
+
+struct Request {
+  std::string scenario;
+  std::vector<std::string> overrides;
+  ExcitingMotionOptions options;
+  std::string json_file;
+  bool quiet = false;
+};
+
+std::string Head(const ExcitingMotion& motion) {
+  return fmt::format("{} numbers of the motion, {} runs", motion.keys.size(), motion.runs);
+}
+
+void Print(const Scenario& scenario, const ExcitingMotion& motion) {
+  fmt::print("{}: {}\n\n{:<44}{:>12}{:>12}\n", scenario.name, Head(motion), "regressor of (48) along the run",
+             "given", "found");
+  const auto row = [](const std::string& what, const std::string& given, const std::string& found) {
+    fmt::print("{:<44}{:>12}{:>12}\n", what, given, found);
+  };
+  const auto both = [&](const std::string& what, const char* format, const auto& calc) {
+    row(what, fmt::format(fmt::runtime(format), calc(motion.given)),
+        fmt::format(fmt::runtime(format), calc(motion.found)));
+  };
+  both("largest singular value", "{:.3e}", [](const JudgedMotion& m) { return m.singular_values[0]; });
+  both(fmt::format("smallest of {} that show", motion.rank), "{:.3e}",
+       [](const JudgedMotion& m) { return m.smallest; });
+  both("condition number of these", "{:.3e}", [](const JudgedMotion& m) { return m.condition(); });
+  both(fmt::format("combinations above the floor of {:.0e}", motion.floor), "{}",
+       [&](const JudgedMotion& m) { return CountAbove(m.singular_values, motion.floor); });
+  fmt::print("nearest to what it may take: {}\n\n", motion.found.nearest);
+  for (const std::string& line : ShowMotion(scenario, motion.overrides)) fmt::print("{}\n", line);
+}
+
+std::string ToText(const Scenario& scenario, const ExcitingMotion& motion, bool complete) {
+  const auto judged = [&](const JudgedMotion& m) {
+    return Json{{"smallest_singular_value", m.smallest},
+                {"condition_number", m.condition()},
+                {"above_floor", CountAbove(m.singular_values, motion.floor)},
+                {"singular_values", ToList(m.singular_values)}};
+  };
+  Json json = {{"scenario", scenario.name},     {"complete", complete},
+               {"runs", motion.runs},           {"floor", motion.floor},
+               {"rank", motion.rank},           {"given", judged(motion.given)},
+               {"found", judged(motion.found)}, {"overrides", motion.overrides}};
+  return json.dump(2) + "\n";
+}
+
+int Run(const Request& request) {
+  const ScenarioFiles files = FindScenario(request.scenario, request.overrides, /*seed=*/0);
+  CatchInterrupts();
+  std::optional<OutputFile> json;
+  if (!request.json_file.empty()) json.emplace(request.json_file);
+  ProgressBar bar("running", request.options.runs, request.quiet);
+  const ExcitingMotion motion =
+      FindExcitingMotion(files.scenario, files.robot, files.mjcf, request.options, [&](int runs) {
+        bar.Update(runs);
+        return !IsInterrupted();
+      });
+  bar.Finish();
+  const bool complete = !IsInterrupted();
+  if (json) json->Write(ToText(files.scenario, motion, complete));
+  if (request.json_file != "-") {
+    if (!request.quiet) Print(files.scenario, motion);
+    fmt::print("{}{}: smallest singular value {:.2e}, {:.3g} times the given motion's.\n",
+               request.quiet ? "" : "\n", complete ? "FOUND" : "INTERRUPTED, so far", motion.found.smallest,
+               motion.found.smallest / motion.given.smallest);
+  }
+  return complete ? kSuccess : kFailure;
+}
+
+}  // namespace
+
+void AddExciteCommand(Command app) {
+  const auto request = std::make_shared<Request>();
+  Command command = app.AddCommand(
+      "excite", "Change a scenario's oscillations so that the model's numbers show best within all limits");
+  command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();
+  command.AddOption("--set", &request->overrides, "Set a key of the scenario, as for run")
+      .TypeName("KEY=VALUE")
+      .Repeatable();
+  command.AddOption("--runs", &request->options.runs, "How many runs to make")
+      .TypeName("N")
+      .Check(WholeNumber(1, 100000))
+      .ShowDefault();
+  command
+      .AddOption("--share", &request->options.share,
+                 "What each check may take of its bound, or as much as before where that is more")
+      .TypeName("X")
+      .Check(PositiveNumber())
+      .ShowDefault();
+  command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
+      .TypeName("FILE.json");
+  command.AddFlag("--quiet", &request->quiet, "Print the last line only");
+  command.SetAction([=] { return Run(*request); });
+}
+
+}  // namespace dexcheck::cli
