@@ -17,7 +17,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct Request {
+struct ExciteRequest {
   std::string scenario;
   std::vector<std::string> overrides;
   ExcitingMotionOptions options;
@@ -63,7 +63,7 @@ std::string ToText(const Scenario& scenario, const ExcitingMotion& motion, bool 
   return json.dump(2) + "\n";
 }
 
-int Run(const Request& request) {
+int Run(const ExciteRequest& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides, /*seed=*/0);
   CatchInterrupts();
   std::optional<OutputFile> json;
@@ -89,7 +89,7 @@ int Run(const Request& request) {
 }  // namespace
 
 void AddExciteCommand(Command app) {
-  const auto request = std::make_shared<Request>();
+  const auto request = std::make_shared<ExciteRequest>();
   Command command = app.AddCommand(
       "excite", "Change a scenario's oscillations so that the model's numbers show best within all limits");
   command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();

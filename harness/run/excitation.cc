@@ -14,7 +14,7 @@ namespace {
 
 // Of a number's size: forces are linear in all but centres of mass, and rounding of theirs, 1e-15, stays at
 // 1e-9.
-constexpr double kStep = 1e-6;
+constexpr double kDifference = 1e-6;
 
 /// What the robot's motion takes, M_bar' xi_dot + C_bar' xi + F_bar' (n).
 VectorXd CalcForce(const MotionSample& sample, ModelTerms* terms) {
@@ -65,7 +65,7 @@ VectorXd CalcSingularValues(const RobotSpec& robot, const std::vector<MotionSamp
                               static_cast<Eigen::Index>(numbers.size()));
   for (size_t k = 0; k < numbers.size(); ++k) {
     const double size = GetScale(robot, numbers[k]);
-    double change = kStep * size;
+    double change = kDifference * size;
     const std::optional<RobotModel> changed = Change(robot, numbers[k], &change);
     if (!changed) continue;
     ModelTerms wrong(*changed);
