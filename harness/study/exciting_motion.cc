@@ -82,10 +82,10 @@ struct Taken {
   double worst = 0.0, bound = 0.0;
 };
 
-class Search {
+class MotionSearch {
  public:
-  Search(const Scenario& scenario, std::filesystem::path robot, std::filesystem::path mjcf,
-         const ExcitingMotionOptions& options, const std::function<bool(int runs)>& go_on)
+  MotionSearch(const Scenario& scenario, std::filesystem::path robot, std::filesystem::path mjcf,
+               const ExcitingMotionOptions& options, const std::function<bool(int runs)>& go_on)
       : scenario_(scenario),
         robot_(std::move(robot)),
         mjcf_(std::move(mjcf)),
@@ -110,7 +110,7 @@ class Search {
     method.set_initial_step(kStep);
     method.set_xtol_abs(kClose);
     method.set_max_objective([](const std::vector<double>& at, std::vector<double>& /*gradient*/,
-                                void* self) { return static_cast<Search*>(self)->CalcObjective(at); },
+                                void* self) { return static_cast<MotionSearch*>(self)->CalcObjective(at); },
                              this);
     method.add_inequality_mconstraint(CalcConstraints, this, std::vector<double>(limits_.size() + 1, 1e-6));
     double value = 0.0;
@@ -233,7 +233,7 @@ class Search {
 
   static void CalcConstraints(unsigned /*m*/, double* values, unsigned n, const double* x,
                               double* /*gradient*/, void* self) {
-    auto* const search = static_cast<Search*>(self);
+    auto* const search = static_cast<MotionSearch*>(self);
     search->Evaluate({x, x + n});
     std::copy(search->constraints_.begin(), search->constraints_.end(), values);
   }
@@ -272,7 +272,7 @@ std::vector<MotionKey> ListMotionKeys(const Scenario& scenario) {
 ExcitingMotion FindExcitingMotion(const Scenario& scenario, const std::filesystem::path& robot,
                                   const std::filesystem::path& mjcf, const ExcitingMotionOptions& options,
                                   const std::function<bool(int runs)>& go_on) {
-  return Search(scenario, robot, mjcf, options, go_on).Run();
+  return MotionSearch(scenario, robot, mjcf, options, go_on).Run();
 }
 
 std::vector<std::string> ShowMotion(const Scenario& scenario, const std::vector<std::string>& overrides) {
