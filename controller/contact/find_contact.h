@@ -8,8 +8,8 @@
 
 namespace dexcheck {
 
-/// Misalignment of the normals (rad), and offset relative to the lengths involved, at which FindContact stops:
-/// a few hundred rounding errors.
+/// Misalignment of the normals (rad), and offset relative to the lengths involved, at which FindContact
+/// stops: a few hundred rounding errors.
 inline constexpr double kContactConvergence = 1e-13;
 
 /// Where two surfaces meet.
