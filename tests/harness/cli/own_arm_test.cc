@@ -144,7 +144,6 @@ TEST_F(OwnArm, WhatCannotBeIsOneLine) {
       {"grasp={ frame = 'x' }", {"joint_motion", "grasp"}},
   };
   for (const Case& one : cases) EXPECT_TRUE(IsRefused(RunWith(one.assignment), one.parts)) << one.assignment;
-  EXPECT_TRUE(IsRefused(Run({"run", "own.toml", "--no-log", "--controller", "true"}), {"joint_motion"}));
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ TEST(Usage, UnknownWordsAreNamed) {
   EXPECT_TRUE(IsRefused(RunDexcheck({"consistancy"}), {"\"consistancy\"", "did you mean \"consistency\"?"}));
   EXPECT_TRUE(IsRefused(RunDexcheck({"consistency", "--sample", "3"}),
                         {"unknown option \"--sample\"", "did you mean \"--samples\"?"}));
-  EXPECT_TRUE(IsRefused(RunDexcheck({"diagnose", "panda.toml"}), {"unknown argument \"panda.toml\""}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "panda.toml"}), {"unknown argument \"panda.toml\""}));
   EXPECT_TRUE(IsRefused(RunDexcheck({"consistency", "--quiet=maybe"}), {"quiet", "maybe"}));
 }
 
