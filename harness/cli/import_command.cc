@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "harness/base/files.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
+#include "harness/engine/mjcf_files.h"
 #include "harness/engine/newer_mjcf.h"
 #include "harness/sides/parameter_writer.h"
 #include "harness/sides/read_description.h"
@@ -36,7 +38,12 @@ RobotDescription ReadSource(const ImportRequest& request) {
 
 /// A copy of a newer MJCF for MuJoCo 2.2.2.
 int WriteDowngraded(const ImportRequest& request) {
-  const DowngradedMjcf copy = DowngradeMjcf(ReadBytes(request.source), request.source.string());
+  DowngradedMjcf copy = DowngradeMjcf(ReadBytes(request.source), request.source.string());
+  const std::filesystem::path from = std::filesystem::absolute(request.source).parent_path();
+  const std::filesystem::path to = std::filesystem::absolute(request.out).parent_path();
+  std::error_code error;
+  if (request.out != "-" && !std::filesystem::equivalent(from, to, error))
+    copy.text = MoveMjcf(copy.text, request.source.string(), from, to);
   OutputFile file(request.out);
   file.Write(copy.text);
   for (const MjcfChange& change : copy.changes) {

@@ -28,15 +28,18 @@ struct MjcfReferences {
 
 /// Reads an XML document as the engine does, with the same parser.
 /// @param shown the file in messages. @throws InputError.
+void ParseXml(const std::string& text, const std::string& shown, tinyxml2::XMLDocument* document) {
+  if (document->Parse(text.data(), text.size()) == tinyxml2::XML_SUCCESS) return;
+  throw InputError(shown + ": line " + std::to_string(document->ErrorLineNum()) +
+                   ": is not well-formed XML: " + document->ErrorName());
+}
+
 void ReadXml(const std::filesystem::path& path, const std::string& shown, tinyxml2::XMLDocument* document) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) throw InputError(shown + ": cannot be read: is a folder");
   std::ifstream file(path, std::ios::binary);
   if (!file) throw InputError(shown + ": cannot be read");
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (document->Parse(text.data(), text.size()) == tinyxml2::XML_SUCCESS) return;
-  throw InputError(shown + ": line " + std::to_string(document->ErrorLineNum()) +
-                   ": is not well-formed XML: " + document->ErrorName());
+  ParseXml({std::istreambuf_iterator<char>(file), {}}, shown, document);
 }
 
 void AddAttribute(const XMLElement& element, const char* name, std::vector<std::string>* values) {
@@ -60,12 +63,13 @@ void ReadElement(const XMLElement& element, MjcfReferences* found) {
 }
 
 /// All elements below the document, without recursion: the depth is the file's choice.
-void ReadElements(const tinyxml2::XMLDocument& document, MjcfReferences* found) {
-  const XMLElement* const root = document.RootElement();
-  const XMLElement* element = root;
+template <typename Document, typename Visit>
+void VisitElements(Document* document, const Visit& visit) {
+  auto* const root = document->RootElement();
+  auto* element = root;
   while (element != nullptr) {
-    ReadElement(*element, found);
-    if (const XMLElement* child = element->FirstChildElement()) {
+    visit(element);
+    if (auto* child = element->FirstChildElement()) {
       element = child;
       continue;
     }
@@ -104,7 +108,7 @@ std::vector<std::string> ListMjcfFiles(const std::filesystem::path& mjcf) {
     tinyxml2::XMLDocument document;
     const bool is_included = files.size() > 1;
     ReadXml(folder / name, is_included ? mjcf.string() + ": file " + Quote(name) : mjcf.string(), &document);
-    ReadElements(document, &found);
+    VisitElements(&document, [&](const XMLElement* element) { ReadElement(*element, &found); });
   }
   const auto add_assets = [&](const std::vector<std::string>& names, const std::string& asset_folder) {
     for (const std::string& given : names) {
@@ -117,6 +121,42 @@ std::vector<std::string> ListMjcfFiles(const std::filesystem::path& mjcf) {
   std::sort(files.begin() + 1, files.end());
   files.erase(std::unique(files.begin(), files.end()), files.end());
   return files;
+}
+
+std::string MoveMjcf(const std::string& text, const std::string& source, const std::filesystem::path& from,
+                     const std::filesystem::path& to) {
+  tinyxml2::XMLDocument document;
+  ParseXml(text, source, &document);
+  XMLElement* const root = document.RootElement();
+  if (root == nullptr) throw InputError(source + ": must be an MJCF");
+  const auto move = [&](const char* name, XMLElement* element, const char* otherwise) {
+    const char* const given = element->Attribute(name);
+    if (given == nullptr && otherwise == nullptr) return false;
+    const std::filesystem::path old(given != nullptr ? given : otherwise);
+    if (!old.is_absolute()) {
+      std::error_code error;
+      const std::filesystem::path moved = std::filesystem::proximate(from / old, to, error);
+      element->SetAttribute(name, moved.string().c_str());
+    }
+    return true;
+  };
+  bool has_mesh_folder = false;
+  bool has_texture_folder = false;
+  VisitElements(&document, [&](XMLElement* element) {
+    const std::string_view kind = element->Name();
+    if (kind == "include") move("file", element, nullptr);
+    if (kind != "compiler") return;
+    has_mesh_folder |= move("meshdir", element, nullptr);
+    has_texture_folder |= move("texturedir", element, nullptr);
+  });
+  // Without such folders, files are looked for in the MJCF's own.
+  XMLElement* compiler = root->FirstChildElement("compiler");
+  if (compiler == nullptr) compiler = root->InsertFirstChild(document.NewElement("compiler"))->ToElement();
+  if (!has_mesh_folder) move("meshdir", compiler, "");
+  if (!has_texture_folder) move("texturedir", compiler, "");
+  tinyxml2::XMLPrinter printer;
+  document.Print(&printer);
+  return printer.CStr();
 }
 
 }  // namespace dexcheck

@@ -70,7 +70,7 @@ void AddInertiaMistakes(std::vector<BodyMistake>* mistakes) {
         const Eigen::SelfAdjointEigenSolver<Matrix3d> right(body.right.inertia);
         Vector3d moments = I.diagonal();
         std::sort(moments.begin(), moments.end());
-        const Matrix3d axes = right.eigenvectors();
+        const Matrix3d& axes = right.eigenvectors();
         return WithInertia(body, axes * moments.asDiagonal() * axes.transpose());
       });
   // The right one's frame is turned, and the given one has its numbers without that.

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "tests/harness/cli/dexcheck_program.h"
@@ -139,6 +140,30 @@ TEST_F(TwoDescriptions, AreRefusedInOneLineWhenTheyCannotBeRead) {
   expect_refused({"import", "broken.urdf", "--out", "x.toml"}, "broken.urdf:2: is not XML");
   expect_refused({"import", table_}, table_ + ": must be a URDF or an MJCF, is a parameter file already");
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "x.toml"));
+}
+
+TEST_F(TwoDescriptions, ACopyForAnOlderEngineFindsItsFilesFromAnotherFolder) {
+  namespace fs = std::filesystem;
+  const fs::path robot = folder_.path() / "robot";
+  fs::create_directories(robot / "shapes");
+  fs::create_directories(folder_.path() / "copies/old");
+  fs::copy(testing::kMjcf + "assets/torus.msh", robot / "shapes/ring.msh");
+  WriteText(robot / "arm.xml",
+            "<mujoco><worldbody><body name='arm'><joint name='turn' axis='0 0 1'/><geom size='0.1'/>"
+            "</body></worldbody></mujoco>");
+  for (const char* shapes : {"meshdir='shapes'", "meshdir='./shapes/'", ""}) {
+    const std::string file = *shapes == '\0' ? "shapes/ring.msh" : "ring.msh";
+    WriteText(robot / "robot.xml", "<mujoco><compiler " + std::string(shapes) +
+                                       "/><asset><mesh name='ring' file='" + file +
+                                       "'/></asset><include file='arm.xml'/><worldbody><geom type='mesh' "
+                                       "mesh='ring'/></worldbody></mujoco>");
+    const ProgramResult copied =
+        Run({"import", "robot/robot.xml", "--downgrade", "--out", "copies/old/robot.xml"});
+    EXPECT_EQ(copied.exit_code, 0) << copied.err;
+    const ProgramResult read = Run({"import", "copies/old/robot.xml", "--out", "table.toml"});
+    EXPECT_EQ(read.exit_code, 0) << shapes << ": " << read.err;
+    EXPECT_THAT(ReadText(folder_.path() / "table.toml"), HasSubstr("turn"));
+  }
 }
 
 }  // namespace
