@@ -104,7 +104,8 @@ class Asked {
  private:
   /// Of a robot that holds nothing, without X_o.
   static GraspModelOptions MakeOptions(const Setup& setup) {
-    GraspModelOptions options = setup.MakeControllerOptions();
+    const GraspControllerOptions given = setup.MakeControllerOptions();
+    GraspModelOptions options = static_cast<const GraspModelOptions&>(given);
     if (setup.joint_motion() != nullptr) options.orientation = OrientationFeedback::kRotation;
     return options;
   }
@@ -224,6 +225,7 @@ DetectabilityResult FindDetectability(const Setup& setup, int states,
   const std::vector<Parameter> numbers = ListParameters(spec);
   Asked right(setup, spec);
   std::vector<Answer> answers;
+  answers.reserve(samples.size());
   for (const Sample& sample : samples) answers.push_back(right.Ask(sample));
   const bool holds = right.grasp().num_contacts() > 0;
   const double arm = holds ? right.grasp().contacts()[0].geometry.g_o_cf.translation().norm() : 1.0;

@@ -58,6 +58,7 @@ VectorXd CalcSingularValues(const RobotSpec& robot, const std::vector<MotionSamp
   const RobotModel right(robot);
   ModelTerms terms(right);
   std::vector<VectorXd> forces;
+  forces.reserve(samples.size());
   for (const MotionSample& sample : samples) forces.push_back(CalcForce(sample, &terms));
 
   const Eigen::Index n = samples[0].xi.size();
