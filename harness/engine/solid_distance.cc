@@ -3,7 +3,6 @@
 // the algorithm sees has few corners.
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -85,7 +84,7 @@ struct Difference {
 /// Point of a segment, triangle or tetrahedron nearest to the origin, by its corners that matter, which are
 /// kept: count becomes how many.
 struct Simplex {
-  std::array<Vector3d, 4> corner;
+  Vector3d corner[4];
   int count = 0;
 
   Vector3d Keep(std::initializer_list<int> which) {
