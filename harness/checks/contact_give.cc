@@ -24,6 +24,21 @@ ContactSoftness FindSoftness(const Setup& setup) {
 
 }  // namespace
 
+void CalcContactBias(const Setup& setup, const StepRecord& step, VectorXd* bias) {
+  const GraspModel& model = ModelAtTruth(step);
+  const GraspTerms& grasp = model.grasp();
+  *bias = grasp.slip_bias();
+  if (setup.scenario().plant.type == PlantType::kRigid) return;
+  const Matrix3d& R_Bo = step.reading.state.X_Bo.linear();
+  const Vector6d& V_Bo = grasp.V_Bo();
+  Vector3d turning = V_Bo.tail<3>().cross(V_Bo.head<3>());
+  if (setup.model().base().type == BaseType::kDifferentialDrive) {
+    const Vector6d V_B0 = model.robot().CalcLinkVelocity(-1);
+    turning -= R_Bo.transpose() * V_B0.tail<3>().cross(V_B0.head<3>());
+  }
+  bias->noalias() += grasp.G().topRows<3>().transpose() * turning;
+}
+
 ContactGive::ContactGive(const PlantOptions& plant, const Share& normal, const Share& tangential)
     : time_step_(plant.time_step), normal_(normal), tangential_(tangential) {
   const double tc = FindContactTimeConstant(plant);
@@ -118,7 +133,8 @@ void PredictionGive::Follow(const StepRecord& step, const Eigen::Ref<const Vecto
   const GraspTerms& grasp = ModelAtTruth(step).grasp();
   force_.Add(force);
   f_c_.Add(f_c);
-  tips_.Add(grasp.slip_bias());
+  CalcContactBias(*setup_, step, &tip_bias_);
+  tips_.Add(tip_bias_);
   if (!step.response.wheels.empty()) {
     const VectorXd& xi = step.reading.state.xi;
     const double turn = std::abs(wheels_.CalcTurn(xi));

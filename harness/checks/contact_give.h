@@ -12,6 +12,11 @@
 
 namespace dexcheck {
 
+/// J_dot qvel of the plant's constraints at the fingertips (3N), m/s^2, each in its Sigma_cf: the model's
+/// slip_bias(), and the w x v of object and platform, which the model's rates of velocities that turn along
+/// have not and the engine's have.
+void CalcContactBias(const Setup& setup, const StepRecord& step, VectorXd* bias);
+
 /// One soft contact under a vector of forces F(t). The engine lets J qacc = a_ref - R f, of a contact that
 /// forces move by A: where it holds back a share s = R / (A + R) of a force that changes, along a normal
 ///
@@ -114,7 +119,8 @@ class PredictionGive {
   /// Likewise of the accelerations that (46) has and the engine's constraints have not, m/s^2: of fingertips
   /// (3N), of the wheels sideways (1).
   ContactGive tips_, tyres_;
-  VectorXd sideways_, grasp_force_;        // 1, n
+  VectorXd tip_bias_, sideways_;           // 3N, 1
+  VectorXd grasp_force_;                   // n
   double held_ = 0.0, held_of_f_c_ = 0.0;  // with what is left of former steps
   double motion_ = 0.0, contact_force_ = 0.0, sinking_ = 0.0;
 };

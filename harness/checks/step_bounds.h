@@ -14,8 +14,9 @@ namespace dexcheck {
 //   along a tangent  v_dot = -b v - R f_t / impratio + J_dot qvel
 //                    at rest: v = tc d / 2 J_dot qvel - (1 - d) tc / 2 / impratio f_t / m
 //
-// J_dot qvel is what (46) has and the engine's constraint has not: the model's J_B_dot' xi - G_dot^T V_Bo at
-// a fingertip, v w in a curve at a tyre. So fingertips that stick creep, tyres give sideways, the platform
+// J_dot qvel is what (46) has and the engine's constraint has not: at a fingertip the model's J_B_dot' xi -
+// G_dot^T V_Bo, and the w x v of object and platform, whose velocities the model takes along axes that turn;
+// v w in a curve at a tyre. So fingertips that stick creep, tyres give sideways, the platform
 // sinks and tilts, each by a load f / m or an acceleration that is the same whatever the step is; each bound
 // below is that of the shipped plant (dt = 1 ms, d = 0.99, impratio = 100) and scales as its formula says
 // (bounds.h). Where the paper's assumptions are judged, tc is 2 dt, the least that the engine can step, and

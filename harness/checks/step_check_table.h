@@ -274,7 +274,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .bound = kSlipWindow * kShippedCreep,
      .scaling = Scaling::kCreep,
      .formula = "10 s (1 - d) dt 2 m/s^2",
-     .reason = "the rate below, over the window",
+     .reason = "the rate below, over the window, less the same",
      .description = "how far a fingertip has slipped on the object in the last 5 to 10 s",
      .meaning =
          {.cause = Cause::kContactSoftness, .precedence = 6, .is_own = true, .sharper = StepCheck::kConeUse},
@@ -285,8 +285,9 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .unit = "m/s",
      .bound = kShippedCreep,
      .scaling = Scaling::kCreep,
-     .formula = "(1 - d) dt 2 m/s^2 + dt J_dot qvel",
-     .reason = "creep of a contact that sticks under f_t / m of 200 m/s^2, over an impratio of 100",
+     .formula = "(1 - d) dt 2 m/s^2",
+     .reason = "besides dt J_dot qvel, which is known and taken off: creep of a contact that sticks under "
+               "f_t / m of 200 m/s^2, over an impratio of 100",
      .description =
          "how fast a fingertip slips on the object, less what (46) and the engine's constraint differ by",
      .meaning =

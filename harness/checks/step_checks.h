@@ -139,7 +139,8 @@ class StepChecks {
   double time_ = 0.0;
   VectorXd force_, bias_, residual_;  // n
   std::unique_ptr<PredictionGive> give_;
-  VectorXd work_;  // n
+  VectorXd work_;          // n
+  VectorXd contact_bias_;  // 3N, m/s^2, each in its Sigma_cf
   ForceEvidence forces_;
   WheelEvidence wheels_;
   VectorXd left_of_robot_;  // n, of the step's balance

@@ -7,6 +7,7 @@
 #include "controller/contact/fingertip_rim.h"
 #include "controller/contact/rolling.h"
 #include "harness/checks/contact_drift.h"
+#include "harness/checks/contact_give.h"
 #include "harness/checks/step_checks.h"
 
 namespace dexcheck {
@@ -47,7 +48,7 @@ void StepChecks::MoveWindows(const MeasuredState& state) {
   for (std::vector<SlipState>* slips : {&findings_.fingertip_slip, &findings_.wheel_slip}) {
     for (SlipState& slip : *slips) {
       slip.window = slip.next_window;
-      slip.next_window = slip.distance;
+      slip.next_window = slip.distance - slip.creep;
     }
   }
   if (!has_kappa_) return;
@@ -59,6 +60,7 @@ void StepChecks::ReadSlip(const StepRecord& step) {
   const bool holding = step.command.handling.holding;
   const MeasuredState& state = step.reading.state;
   const PlantResponse& response = step.response;
+  CalcContactBias(*setup_, step, &contact_bias_);
   double slipped = 0.0;
   double rate = 0.0;
   double cone_use = 0.0;
@@ -68,15 +70,17 @@ void StepChecks::ReadSlip(const StepRecord& step) {
     slip->cone_margin = contact.cone_margin;
     slip->velocity = R.transpose() * contact.slip;
     slip->distance += time_step_ * slip->velocity;
-    slipped = std::max(slipped, (slip->distance - slip->window).norm());
+    slipped = std::max(slipped, (slip->distance - slip->creep - slip->window).norm());
     cone_use = std::max(cone_use, contact.cone_use);
   };
   for (size_t i = 0; i < response.fingertips.size(); ++i) {
     SlipState& slip = findings_.fingertip_slip[i];
+    const Matrix3d& R_o_cf = ModelAtTruth(step).grasp().contacts()[i].geometry.g_o_cf.linear();
+    const Vector3d creep =
+        time_step_ * R_o_cf.leftCols<2>() * contact_bias_.segment<2>(3 * static_cast<Eigen::Index>(i));
+    slip.creep += time_step_ * creep;
     update(&slip, response.fingertips[i], state.X_Bo.linear());
-    const Vector2d unasked =
-        ModelAtTruth(step).grasp().slip_bias().segment<2>(3 * static_cast<Eigen::Index>(i));
-    rate = std::max(rate, slip.velocity.norm() - time_step_ * unasked.norm());
+    rate = std::max(rate, (slip.velocity - creep).norm());
     if (slip.touching && holding) {
       findings_.least_cone_margin = std::min(findings_.least_cone_margin, slip.cone_margin);
     }

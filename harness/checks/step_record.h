@@ -27,7 +27,8 @@ struct SlipState {
   bool touching = false;
   Vector3d velocity = Vector3d::Zero();  ///< Tangential, in the frame of the body that is slipped on, m/s.
   Vector3d distance = Vector3d::Zero();  ///< Its integral, m.
-  /// The distance where the window begins that slip is judged over, and where the next one will.
+  Vector3d creep = Vector3d::Zero();     ///< The part of it that is dt J_dot qvel (step_bounds.h), m.
+  /// The rest of the distance where the window begins that slip is judged over, and where the next one will.
   Vector3d window = Vector3d::Zero(), next_window = Vector3d::Zero();
   double cone_use = 0.0;     ///< |tangential force| / (mu normal force); 1 slides.
   double cone_margin = 0.0;  ///< mu normal force - |tangential force|, N.

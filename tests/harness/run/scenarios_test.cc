@@ -86,6 +86,20 @@ TEST(ShippedScenarios, AHandOnThePandaHoldsTurnsAndCarriesABall) {
   }
 }
 
+// What is left of slip is the softness of contacts alone, where the object moves along and turns (w x v).
+TEST(ShippedScenarios, SlipOfAMovedObjectGoesWithSoftness) {
+  const auto slip = [](const std::string& impedance) {
+    ShippedRun run("hand-curve", {"duration=1.5", "settle=0.5", "plant.time_step=0.002",
+                                  "plant.contact_impedance=" + impedance});
+    const RunResult& result = run.Run();
+    EXPECT_EQ(result.verdict, Verdict::kPass) << impedance << ": " << result.attribution.evidence;
+    return Eigen::Vector2d(run.Worst("fingertip_slip"), run.Worst("fingertip_slip_rate"));
+  };
+  const Eigen::Vector2d ratio = slip("0.99").cwiseQuotient(slip("0.999"));
+  EXPECT_NEAR(ratio[0], 10.0, 0.5);
+  EXPECT_NEAR(ratio[1], 10.0, 0.5);
+}
+
 TEST(ShippedScenarios, PaperRampFollowsTheLine) {
   ShippedRun run("paper-ramp", {"duration=5"});
   const RunResult& result = run.Run();
