@@ -18,8 +18,8 @@ namespace {
 using Json = nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-constexpr int kMaxSeconds = 60;  // of one answer
-constexpr int kMaxLife = 600;    // s, of a browser
+constexpr int kMaxSeconds = 150;  // of one answer, above the time that a script may take
+constexpr int kMaxLife = 1200;    // s, of a browser
 constexpr auto kPause = std::chrono::milliseconds(50);
 
 /// The number that stands behind a text and any spaces.

@@ -29,7 +29,7 @@ class Browser {
   /// What the body of a function returns.
   [[nodiscard]] nlohmann::json Run(const std::string& body) const;
   /// Runs the body until it returns true; false after `seconds`.
-  [[nodiscard]] bool WaitFor(const std::string& body, double seconds = 60.0) const;
+  [[nodiscard]] bool WaitFor(const std::string& body, double seconds = 120.0) const;
   /// Presses the mouse's button at the first place and lets it go at the second, in viewport coordinates.
   void Drag(int from_x, int from_y, int to_x, int to_y) const;
   void DoubleClick(int x, int y) const;
