@@ -229,14 +229,13 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kBalance,
      .unit = "1",
      .bound = kBalanceRobotBound,
-     .formula = "1e-6 + (g tilt + 2 slip w) sqrt(m) + f_t r_sunk / (2 r)",
+     .formula = "1e-6 + (g tilt + 2 slip w) sqrt(m) + f_t r_sunk / (2 r) + 2 tilt_rate sqrt(2 E)",
      .reason = "rounding of forces that cancel; the state that is judged is level and does not slip",
      .description = "what is left of (48) with the engine's accelerations and contact forces, less what the "
                     "platform does besides and its solver left over, against the forces balanced",
      .meaning = {.cause = Cause::kUnmodelledForce, .precedence = -1, .rank = Rank::kDecisive}},
     // The object's balance has no other unknowns than its inertia and the contacts' geometry, which the first
-    // question
-    // compares: where that holds, a force acts on the object that nobody has.
+    // question compares: where that holds, a force acts on the object that nobody has.
     {.check = StepCheck::kBalanceObject,
      .name = "balance_object",
      .kind = CheckKind::kBalance,
