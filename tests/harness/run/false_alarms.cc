@@ -1,8 +1,8 @@
-// Does a right robot with a right law ever raise an alarm? Runs the shipped scenarios over seeds, time steps
-// and impedances of the contacts, and tells how much of its bound each check takes.
+// Does a right robot with a right law ever raise an alarm? Runs shipped scenarios, by default all of them,
+// over seeds, time steps and impedances of the contacts, and tells how much of its bound each check takes.
 //
-//   false_alarms [--scenarios A,B] [--seeds N] [--steps MS,MS] [--impedances D,D] [--duration S] [--set
-//   KEY=VALUE]
+//   false_alarms [--scenarios A,B] [--seeds N] [--steps MS,MS] [--impedances D,D] [--duration S]
+//                [--set KEY=VALUE]
 //
 // Seeds are tried with the scenario's own plant, steps and impedances in all combinations with seed 0. A
 // duration of 0 is the scenario's own. Exit code 1 after an alarm.
@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <iostream>
 #include <map>
 #include <sstream>
@@ -28,10 +29,17 @@ const std::map<std::string, std::string> kExpectedCause = {{"paper-rest", "wheel
 /// A share of the bound from which on a check is told, below an alarm.
 constexpr double kTold = 0.5;
 
+std::vector<std::string> ListShipped() {
+  std::vector<std::string> names;
+  for (const auto& file : std::filesystem::directory_iterator(SourcePath("/harness/shipped/scenarios"))) {
+    if (file.path().extension() == ".toml") names.push_back(file.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 struct Options {
-  std::vector<std::string> scenarios = {"bonded",      "curve",    "curve-real", "exercise",   "hold",
-                                        "lift",        "offset",   "paper",      "paper-ramp", "paper-rest",
-                                        "paper-rigid", "reorient", "two-hands"};
+  std::vector<std::string> scenarios = ListShipped();
   int seeds = 20;
   std::vector<std::string> steps = {"0.25", "0.5", "1", "2"};  // ms
   std::vector<std::string> impedances = {"0.9", "0.99", "0.999"};
