@@ -14,7 +14,7 @@
   const columns = study.columns;
   const find = name => columns.findIndex(column => column.name === name);
   const byId = id => document.getElementById('explore-' + id);
-  const {style, Ticks, FormatTick, Begin, DrawAxes, Viridis, Ranks, Correlation, Quote} = MakeChartTools(columns, byId);
+  const {style, Ticks, FormatTick, Begin, DrawAxes, Viridis, Ranks, Correlation, FindFront, Quote} = MakeChartTools(columns, byId);
   const held = row => study.held[value(row, kOutcome)];
 
   const show = (x, column) => {
@@ -138,6 +138,42 @@
     byId(id).textContent = names.length ? 'Theory, ' + names.join('; ') + '; other keys as in ' + theory.place + '.' : '';
   };
 
+  // What (57) makes of metrics: a curve along a key, the front of two of them.
+  const DrawPrediction = (g, w, h, x, y) => {
+    const predicted = theory.predicted;
+    if (!predicted) return;
+    const place = axis => predicted.metrics.indexOf(columns[axis.column].name);
+    const mx = place(x), my = place(y);
+    let line = [], name = '';
+    if (mx >= 0 && my >= 0) {
+      line = FindFront(predicted.sampled.map(v => [v[mx], v[my]]).filter(v => v.every(Number.isFinite)),
+        ([a]) => a, ([, b]) => b, x.column, y.column);
+      name = 'the Pareto front of the error dynamics (57), over ' + predicted.sampled.length + ' points of the ranges';
+    } else {
+      const turned = my < 0, metric = turned ? mx : my, key = (turned ? y : x).column - kFirstKey;
+      const along = predicted.along.find(a => a.key === key);
+      if (metric < 0 || !along) return;
+      line = along.values.map((v, i) => turned ? [along.metrics[i][metric], v] : [v, along.metrics[i][metric]]);
+      name = 'what the error dynamics (57) make of it, other keys as in ' + theory.place;
+    }
+    if (!line.length) return;
+    g.save();
+    g.beginPath();
+    g.rect(60, 10, w - 70, h - 50);
+    g.clip();
+    g.strokeStyle = '#005f73';
+    g.lineWidth = 1.8;
+    g.setLineDash([2, 3]);
+    g.beginPath();
+    let open = false;
+    for (const [a, b] of line) {
+      if (Number.isFinite(a) && Number.isFinite(b)) g[open ? 'lineTo' : 'moveTo'](x.place(a), y.place(b));
+      open = Number.isFinite(a) && Number.isFinite(b);
+    }
+    g.stroke();
+    g.restore();
+    byId('theory').textContent += (byId('theory').textContent ? ' ' : 'Theory, ') + 'dots: ' + name + '.';
+  };
   // Places that can be chosen, by canvas.
   const places = {};
   const DrawScatter = () => {
@@ -159,16 +195,8 @@
     const isFront = x.column >= firstMetric && y.column >= firstMetric;
     byId('front').textContent = '';
     if (isFront) {
-      const sign = column => columns[column].larger ? -1 : 1;
       const good = rows.filter(row => held(row) && Number.isFinite(value(row, x.column)) && Number.isFinite(value(row, y.column)));
-      good.sort((a, b) => sign(x.column) * (value(a, x.column) - value(b, x.column)) ||
-        sign(y.column) * (value(a, y.column) - value(b, y.column)));
-      let best = Infinity;
-      const front = good.filter(row => {
-        const better = sign(y.column) * value(row, y.column) < best;
-        if (better) best = sign(y.column) * value(row, y.column);
-        return better;
-      });
+      const front = FindFront(good, row => value(row, x.column), row => value(row, y.column), x.column, y.column);
       g.strokeStyle = '#9b2226';
       g.lineWidth = 1.5;
       g.beginPath();
@@ -177,6 +205,7 @@
       byId('front').textContent = 'Pareto front: ' + front.length + ' trials';
     }
     DrawTheory(g, w, h, x, y, 'theory');
+    DrawPrediction(g, w, h, x, y);
     Mark(g, points);
   };
   const Mark = (g, points) => {
@@ -297,7 +326,8 @@
     const {g, w, h} = Begin('history');
     const points = study.history;
     const finite = points.filter(p => p.feasible);
-    const values = finite.map(p => p.value);
+    const values = finite.flatMap(p => p.theory === undefined ? [p.value] : [p.value, p.theory]);
+    if (theory.least !== undefined) values.push(theory.least);
     const least = values.reduce((a, b) => Math.min(a, b), Infinity), most = values.reduce((a, b) => Math.max(a, b), -Infinity);
     const log = least > 0 && most / least > 30;
     const f = log ? Math.log10 : v => v;
@@ -308,6 +338,26 @@
     if (finite.length) for (const v of [least, most]) g.fillText(String(Number(v.toPrecision(3))), 56, py(v) + 4);
     g.textAlign = 'center';
     g.fillText('point 0 to ' + (points.length - 1) + (log ? ', values in their logarithm' : ''), 60 + (w - 70) / 2, h - 16);
+    // In theory: a ring for each point, and the best that there can be.
+    g.save();
+    g.strokeStyle = '#005f73';
+    for (const [i, p] of points.entries()) {
+      if (!p.feasible || p.theory === undefined) continue;
+      g.beginPath();
+      g.arc(px(i), py(p.theory), 3.5, 0, 2 * Math.PI);
+      g.stroke();
+    }
+    if (theory.least !== undefined) {
+      g.lineWidth = 1.6;
+      g.setLineDash([5, 4]);
+      g.beginPath();
+      g.moveTo(60, py(theory.least));
+      g.lineTo(w - 10, py(theory.least));
+      g.stroke();
+      byId('theory-best').textContent = ' Theory: rings, what the error dynamics (57) make of each point; dashes, the best ' +
+        'that they have within the ranges, ' + Number(theory.least.toPrecision(3)) + ', whatever the constraints.';
+    }
+    g.restore();
     let best = null;
     g.fillStyle = '#9aa';
     const line = [];
