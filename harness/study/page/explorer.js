@@ -56,8 +56,8 @@
       (study.total > count ? ', a part of ' + study.total : '');
   };
 
-  // Axes: a logarithm where a quantity spans decades.
-  const MakeAxis = (column, from, to) => {
+  // Axes: a logarithm where a quantity spans decades. Of what else is drawn it has room for what is near the trials.
+  const MakeAxis = (column, from, to, beside = []) => {
     let least = Infinity, most = -Infinity;
     for (const row of rows) {
       const x = value(row, column);
@@ -65,6 +65,9 @@
       if (x < least) least = x;
       if (x > most) most = x;
     }
+    const near = beside.filter(x => x > least / 3 && x < 3 * most);
+    least = Math.min(least, ...near);
+    most = Math.max(most, ...near);
     if (!(least <= most)) { least = 0; most = 1; }
     const log = !columns[column].labels && least > 0 && most / least > 30;
     const f = log ? Math.log10 : x => x;
@@ -138,48 +141,50 @@
     byId(id).textContent = names.length ? 'Theory, ' + names.join('; ') + '; other keys as in ' + theory.place + '.' : '';
   };
 
-  // What (57) makes of metrics: a curve along a key, the front of two of them.
-  const DrawPrediction = (g, w, h, x, y) => {
+  // What (57) makes of metrics: a curve along a key, the front of two of them. A point may have no value.
+  const Predict = (x, y) => {
     const predicted = theory.predicted;
-    if (!predicted) return;
-    const place = axis => predicted.metrics.indexOf(columns[axis.column].name);
-    const mx = place(x), my = place(y);
-    let line = [], name = '';
+    if (!predicted) return null;
+    const mx = predicted.metrics.indexOf(columns[x].name), my = predicted.metrics.indexOf(columns[y].name);
     if (mx >= 0 && my >= 0) {
-      line = FindFront(predicted.sampled.map(v => [v[mx], v[my]]).filter(v => v.every(Number.isFinite)),
-        ([a]) => a, ([, b]) => b, x.column, y.column);
-      name = 'the Pareto front of the error dynamics (57), over ' + predicted.sampled.length + ' points of the ranges';
-    } else {
-      const turned = my < 0, metric = turned ? mx : my, key = (turned ? y : x).column - kFirstKey;
-      const along = predicted.along.find(a => a.key === key);
-      if (metric < 0 || !along) return;
-      line = along.values.map((v, i) => turned ? [along.metrics[i][metric], v] : [v, along.metrics[i][metric]]);
-      name = 'what the error dynamics (57) make of it, other keys as in ' + theory.place;
+      const points = predicted.sampled.map(v => [v[mx], v[my]]).filter(point => point.every(Number.isFinite));
+      return {points: FindFront(points, ([a]) => a, ([, b]) => b, x, y),
+        name: 'the Pareto front of the error dynamics (57), over ' + predicted.sampled.length + ' points of the ranges'};
     }
-    if (!line.length) return;
+    const turned = my < 0, metric = turned ? mx : my;
+    const along = predicted.along.find(a => a.key === (turned ? y : x) - kFirstKey);
+    if (metric < 0 || !along) return null;
+    const points = along.values.map((v, i) => turned ? [along.metrics[i][metric], v] : [v, along.metrics[i][metric]]);
+    return {points, name: 'what the error dynamics (57) make of it, other keys as in ' + theory.place};
+  };
+  const DrawPrediction = (g, w, h, x, y, prediction) => {
+    if (!prediction) return;
     g.save();
     g.beginPath();
     g.rect(60, 10, w - 70, h - 50);
     g.clip();
     g.strokeStyle = '#005f73';
-    g.lineWidth = 1.8;
+    g.lineWidth = 2;
     g.setLineDash([2, 3]);
     g.beginPath();
     let open = false;
-    for (const [a, b] of line) {
-      if (Number.isFinite(a) && Number.isFinite(b)) g[open ? 'lineTo' : 'moveTo'](x.place(a), y.place(b));
-      open = Number.isFinite(a) && Number.isFinite(b);
+    for (const point of prediction.points) {
+      const known = point.every(Number.isFinite);
+      if (known) g[open ? 'lineTo' : 'moveTo'](x.place(point[0]), y.place(point[1]));
+      open = known;
     }
     g.stroke();
     g.restore();
-    byId('theory').textContent += (byId('theory').textContent ? ' ' : 'Theory, ') + 'dots: ' + name + '.';
+    byId('theory').textContent += (byId('theory').textContent ? ' D' : 'Theory, d') + 'ots: ' + prediction.name + '.';
   };
+
   // Places that can be chosen, by canvas.
   const places = {};
   const DrawScatter = () => {
     const {g, w, h} = Begin('scatter');
-    const x = MakeAxis(Number(byId('x').value), 60, w - 10);
-    const y = MakeAxis(Number(byId('y').value), h - 40, 10);
+    const prediction = Predict(Number(byId('x').value), Number(byId('y').value));
+    const x = MakeAxis(Number(byId('x').value), 60, w - 10, prediction?.points.map(point => point[0]));
+    const y = MakeAxis(Number(byId('y').value), h - 40, 10, prediction?.points.map(point => point[1]));
     DrawAxes(g, w, h, x, y);
     const color = ColorBy(Number(byId('color').value));
     const points = [];
@@ -205,7 +210,7 @@
       byId('front').textContent = 'Pareto front: ' + front.length + ' trials';
     }
     DrawTheory(g, w, h, x, y, 'theory');
-    DrawPrediction(g, w, h, x, y);
+    DrawPrediction(g, w, h, x, y, prediction);
     Mark(g, points);
   };
   const Mark = (g, points) => {

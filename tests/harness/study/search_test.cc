@@ -150,7 +150,7 @@ TEST(QuadraticModel, IsLeastWhereTheFunctionIs) {
   const auto slope = [](const UnitPoint& x) { return x[0] - 2.0 * x[1]; };
   std::vector<TriedPoint> on_bowl, on_slope;
   for (const UnitPoint& point : MakeSobol(2, 12)) {
-    const UnitPoint x = {0.2 + 0.6 * point[0], 0.2 + 0.6 * point[1]};
+    const UnitPoint x = {0.1 + 0.85 * point[0], 0.1 + 0.85 * point[1]};
     on_bowl.push_back(MakeTried(x, bowl(x)));
     on_slope.push_back(MakeTried(x, slope(x)));
   }
