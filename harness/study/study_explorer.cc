@@ -1,9 +1,11 @@
 #include "harness/study/study_explorer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "controller/common/errors.h"
 #include "harness/study/explorer_assets.h"
 #include "harness/study/halving_search.h"
 #include "harness/study/search_history.h"
@@ -46,16 +48,80 @@ Json ListColumns(const Study& study) {
   return columns;
 }
 
-Json ListHistory(const StudyResults& results) {
+/// Whether (57) knows the metrics of this trial.
+bool IsPredicted(const StudyResults& results, const TrialRow& row) {
+  try {
+    return std::isfinite(PredictInTheory(results.inputs, row.trial.parameters).metrics[kPositionErrorRms]);
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+/// The points of a search; with their first objective in theory where (57) knows it.
+Json ListHistory(const StudyResults& results, bool is_predicted) {
+  constexpr size_t kMostAsked = 2000;  // trials that theory is asked about
+  const Objective& objective = results.study.objectives.front();
+  const std::vector<JudgedPoint> points = JudgePoints(results.study, results.rows);
+  const bool asks = is_predicted && points.size() * ListDraws(results.study).size() <= kMostAsked;
   Json history = Json::array();
-  for (const JudgedPoint& point : JudgePoints(results.study, results.rows)) {
-    const double value = ShowObjective(results.study.objectives.front(), point.judgement.objectives.front());
-    history.push_back({{"value", value}, {"feasible", point.judgement.is_feasible() && !point.is_shortened}});
+  for (const JudgedPoint& point : points) {
+    Json entry = {{"value", ShowObjective(objective, point.judgement.objectives.front())},
+                  {"feasible", point.judgement.is_feasible() && !point.is_shortened}};
+    if (asks) {
+      const Judgement theory = JudgeInTheory(results.inputs, point.values);
+      if (theory.is_feasible()) entry["theory"] = ShowObjective(objective, theory.objectives.front());
+    }
+    history.push_back(std::move(entry));
   }
   return history;
 }
 
-/// What (57) says beside the point that the study is about: the best one, else the first.
+/// Metrics that (57) predicts: at points all over the ranges, and along each key that it knows.
+Json ListPredictions(const StudyResults& results, const std::vector<bool>& knows, std::vector<double> at) {
+  constexpr long kPoints = 256;
+  constexpr int kAlong = 32;
+  constexpr size_t kMostKeys = 12;
+  const Study& study = results.study;
+  const auto predict = [&](const std::vector<double>& parameters) {
+    Json values = Json::array();
+    try {
+      const TrialResult result = PredictInTheory(results.inputs, parameters);
+      for (const Metric metric : kPredictedMetrics) values.push_back(result.metrics[metric]);
+    } catch (const InputError&) {  // values that make no scenario
+      values = Json(kPredictedMetrics.size(), nullptr);
+    }
+    return values;
+  };
+  Json sampled = Json::array();
+  const std::vector<double> draw = ListDraws(study).front();
+  const int keys = static_cast<int>(study.num_keys());
+  if (keys <= kMaxSobolDimensions) {
+    for (const UnitPoint& point : MakeSobol(keys, kPoints)) {
+      std::vector<double> parameters = ValuesAt(study.keys(), point);
+      parameters.insert(parameters.end(), draw.begin(), draw.end());
+      sampled.push_back(predict(parameters));
+    }
+  }
+  Json along = Json::array();
+  for (size_t key = 0; key < knows.size() && along.size() < kMostKeys; ++key) {
+    if (!knows[key]) continue;
+    const double own = at[key];
+    Json values = Json::array();
+    Json metrics = Json::array();
+    for (int i = 0; i <= kAlong; ++i) {
+      at[key] = ValueAt(study.variations[key], static_cast<double>(i) / kAlong);
+      values.push_back(at[key]);
+      metrics.push_back(predict(at));
+    }
+    at[key] = own;
+    along.push_back({{"key", key}, {"values", values}, {"metrics", metrics}});
+  }
+  Json names = Json::array();
+  for (const Metric metric : kPredictedMetrics) names.push_back(kMetrics[metric].name);
+  return {{"metrics", names}, {"sampled", sampled}, {"along", along}};
+}
+
+/// What (57) says, and what it says beside the point that the study is about: the best one, else the first.
 Json ListTheory(const StudyResults& results) {
   const TrialRow* at = &results.rows.front();
   std::string place = "the first trial";
@@ -77,7 +143,15 @@ Json ListTheory(const StudyResults& results) {
   for (const KeyTheory::Curve& curve : theory.curves)
     curves.push_back(
         {{"x", curve.x}, {"y", curve.y}, {"stability", curve.is_stability}, {"points", curve.points}});
-  return {{"knows", theory.knows}, {"turns", turns}, {"curves", curves}, {"place", place}};
+  Json list = {{"knows", theory.knows}, {"turns", turns}, {"curves", curves}, {"place", place}};
+  if (IsPredicted(results, *at)) {
+    list["predicted"] = ListPredictions(results, theory.knows, at->trial.parameters);
+    if (results.study.is_search()) {
+      if (const auto least = FindLeastInTheory(results.inputs))
+        list["least"] = ShowObjective(results.study.objectives.front(), *least);
+    }
+  }
+  return list;
 }
 
 /// For a script element: "</script>" must not be in it.
@@ -106,7 +180,7 @@ Html MakeExplorer(const StudyResults& results) {
         "class=\"wide\"></canvas>"
         "<p class=\"soft\">Each point of the search, and the best until then; strokes at the top do not "
         "fulfil the "
-        "constraints.</p></section>\n";
+        "constraints.<span id=\"explore-theory-best\"></span></p></section>\n";
   }
   html +=
       "<section class=\"card\"><h3>Any two</h3><div class=\"tools\"><label>along <select "
@@ -170,7 +244,7 @@ Html MakeExplorerScript(const StudyResults& results) {
     first += counts[round] * CountTrialsOfPoint(study);
   }
   if (study.is_search() && !study.objectives.empty()) {
-    data["history"] = ListHistory(results);
+    data["history"] = ListHistory(results, data["theory"].contains("predicted"));
     data["maximize"] = study.objectives.front().maximize;
   }
   std::string bytes;

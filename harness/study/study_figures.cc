@@ -149,13 +149,14 @@ std::vector<double> ChooseLines(const Study& study) {
   return chosen;
 }
 
-/// Every so many points of a long line.
-void Thin(std::vector<std::pair<double, double>>* points) {
+/// Every so many points of a long line, and its end.
+template <typename Point>
+void Thin(std::vector<Point>* points) {
   const size_t every = (points->size() + kMostOfALine - 1) / kMostOfALine;
   if (every <= 1) return;
-  std::vector<std::pair<double, double>> fewer;
+  std::vector<Point> fewer;
   for (size_t i = 0; i < points->size(); i += every) fewer.push_back((*points)[i]);
-  fewer.push_back(points->back());
+  if ((points->size() - 1) % every != 0) fewer.push_back(points->back());
   *points = std::move(fewer);
 }
 
@@ -176,7 +177,7 @@ void AddSpreads(const std::vector<std::pair<double, double>>& points, const std:
   }
 }
 
-/// From the least error on, those that need less work than all before.
+/// From the least error on, those that need less work than all before; of many an even part.
 std::vector<const TrialRow*> ListFront(const std::vector<const TrialRow*>& tracked) {
   std::vector<const TrialRow*> front;
   for (const TrialRow* row : tracked) {
@@ -184,6 +185,7 @@ std::vector<const TrialRow*> ListFront(const std::vector<const TrialRow*>& track
       front.push_back(row);
     }
   }
+  Thin(&front);
   return front;
 }
 

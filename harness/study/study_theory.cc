@@ -7,6 +7,8 @@
 
 #include "controller/common/errors.h"
 #include "harness/plant/velocity_filter.h"
+#include "harness/study/search.h"
+#include "harness/study/trial_monitor.h"
 
 namespace dexcheck {
 namespace {
@@ -87,6 +89,112 @@ double CalcOvershootInTheory(const StudyInputs& inputs, const std::vector<double
     }
   }
   return overshoot;
+}
+
+namespace {
+
+/// Whether the object's position follows (57), with what MakeLoop takes into account and nothing besides.
+bool FollowsErrorDynamics(const Scenario& scenario) {
+  Imperfections rest = scenario.imperfections;
+  rest.actuation.delay = rest.actuation.lag.all = 0.0;
+  rest.actuation.saturate = false;
+  rest.sensing.latency = rest.sensing.object_latency = 0.0;
+  if (rest.sensing.object_velocity == VelocitySource::kDifferenced) {
+    rest.sensing.object_velocity = VelocitySource::kMeasured;
+    rest.sensing.object_velocity_cutoff = 0.0;
+  }
+  return rest.is_ideal() && scenario.control.law == ControlLaw::kComputedTorque &&
+         scenario.control.contact_error == 0.0 && scenario.trajectory &&
+         scenario.start_error.head<3>().norm() > 0.0;
+}
+
+}  // namespace
+
+TrialResult PredictInTheory(const StudyInputs& inputs, const std::vector<double>& parameters) {
+  TrialResult result;
+  result.metrics.fill(std::numeric_limits<double>::quiet_NaN());
+  const Scenario scenario = MakeTrialScenario(inputs, {0, 0, parameters});
+  if (!FollowsErrorDynamics(scenario)) return result;
+  const SampledLoop loop = MakeLoop(scenario);
+  const auto steps = static_cast<size_t>(std::lround(scenario.duration / loop.time_step));
+  const Vector3d start = scenario.start_error.head<3>();
+  std::vector<Vector3d> errors(steps, Vector3d::Zero());
+  for (int axis = 0; axis < 3; ++axis) {
+    if (start[axis] == 0.0) continue;
+    const AxisGains gains = GainsOf(scenario, axis);
+    if (!(CalcSpectralRadius(loop, gains) < 1.0)) return result;
+    const std::vector<double> response = CalcStepResponse(loop, gains, static_cast<long>(steps));
+    for (size_t k = 0; k < steps; ++k) errors[k][axis] = start[axis] * response[k];
+  }
+  // As TrialMonitor does.
+  double squares = 0.0, largest = 0.0, overshoot = 0.0, settled_since = 0.0;
+  std::array<double, 4> quarters{};
+  bool settled = false;
+  for (size_t k = 0; k < steps; ++k) {
+    const double size = errors[k].norm();
+    squares += size * size;
+    quarters[4 * k / steps] += size * size;
+    largest = std::max(largest, size);
+    overshoot = std::max(overshoot, -errors[k].dot(start) / start.squaredNorm());
+    const bool inside = size <= kSettledShare * start.norm();
+    if (inside && !settled) settled_since = static_cast<double>(k) * loop.time_step;
+    settled = inside;
+  }
+  result.metrics[kPositionErrorRms] = std::sqrt(squares / static_cast<double>(steps));
+  result.metrics[kPositionErrorMax] = largest;
+  if (settled) result.metrics[kSettlingTime] = settled_since;
+  result.metrics[kOvershoot] = overshoot;
+  result.metrics[kErrorGrowth] = std::sqrt(quarters[3] / quarters[0]);
+  return result;
+}
+
+Judgement JudgeInTheory(const StudyInputs& inputs, const std::vector<double>& values) {
+  std::vector<TrialResult> results;
+  for (const std::vector<double>& draw : ListDraws(inputs.study)) {
+    std::vector<double> parameters = values;
+    parameters.insert(parameters.end(), draw.begin(), draw.end());
+    results.push_back(PredictInTheory(inputs, parameters));
+  }
+  return JudgePoint(inputs.study.objectives, {}, results);
+}
+
+std::optional<double> FindLeastInTheory(const StudyInputs& inputs) {
+  const Study& study = inputs.study;
+  if (study.objectives.empty()) return std::nullopt;
+  const auto judge = [&](const UnitPoint& point) {
+    try {
+      return JudgeInTheory(inputs, ValuesAt(study.keys(), point));
+    } catch (const InputError&) {  // values that make no scenario
+      return Judgement{{std::numeric_limits<double>::infinity()}, 1.0};
+    }
+  };
+  constexpr long kPoints = 128;
+  const int keys = static_cast<int>(study.num_keys());
+  if (keys > kMaxSobolDimensions) return std::nullopt;
+  UnitPoint best;
+  Judgement least;
+  for (const UnitPoint& point : MakeSobol(keys, kPoints)) {
+    const Judgement judgement = judge(point);
+    if (best.empty() || IsBetter(judgement, least)) {
+      best = point;
+      least = judgement;
+    }
+  }
+  if (!least.is_feasible()) return std::nullopt;
+  // From there downhill.
+  Search search;
+  search.method = SearchMethod::kNelderMead;
+  search.step = 0.1;
+  constexpr int kSteps = 80;
+  const auto descent = MakeLocalSearcher(search, best);
+  for (int i = 0; i < kSteps; ++i) {
+    const std::vector<UnitPoint> asked = descent->Ask();
+    if (asked.empty()) break;
+    const Judgement judgement = judge(asked.front());
+    if (IsBetter(judgement, least)) least = judgement;
+    descent->Tell({judgement});
+  }
+  return least.objectives.front();
 }
 
 std::vector<std::pair<double, double>> FindTurns(const StudyInputs& inputs,

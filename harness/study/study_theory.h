@@ -2,8 +2,10 @@
 
 // What the sampled error dynamics say of a study's trials.
 
+#include <array>
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -25,6 +27,27 @@ bool IsDampedInTheory(const StudyInputs& inputs, const std::vector<double>& para
 /// Overshoot of the step response to the start error within the run, relative to it; 0 when there is none.
 /// The largest of the axes on which the object starts beside its place.
 double CalcOvershootInTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
+
+/// Metrics of the object's position as (57) alone makes them of the start error: rms, maximum, settling time,
+/// overshoot, growth, over the steps of the run. In a loop that is not sampled, and a run of time T that is
+/// long enough, rms^2 T = sum over the axes of e0^2 (K_v^2 + K_p) / (2 K_v K_p).
+/// @returns NaN for all other metrics, and for these too where the object does not start beside its place,
+/// where
+///   (57) is unstable, or where more than it moves the object: another law, a plant that is not ideal in
+///   anything but delay, latency, the filter of the object's velocity and lag.
+TrialResult PredictInTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
+
+/// Metrics that PredictInTheory knows.
+inline constexpr std::array kPredictedMetrics = {kPositionErrorRms, kPositionErrorMax, kSettlingTime,
+                                                 kOvershoot, kErrorGrowth};
+
+/// Objectives of a point in theory, over the study's draws; infeasible where (57) does not know one of them.
+/// Constraints do not count. @param values of the study's own keys.
+Judgement JudgeInTheory(const StudyInputs& inputs, const std::vector<double>& values);
+
+/// The least first objective that (57) has within the ranges of the keys, whatever the constraints; none
+/// where it does not know it.
+std::optional<double> FindLeastInTheory(const StudyInputs& inputs);
 
 using TheoryTest = std::function<bool(const StudyInputs&, const std::vector<double>&)>;
 

@@ -7,7 +7,6 @@
 namespace dexcheck {
 namespace {
 
-constexpr double kSettledShare = 0.02;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace

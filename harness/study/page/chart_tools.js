@@ -75,7 +75,17 @@ const MakeChartTools = (columns, byId) => {
     }
     return aa > 0 && bb > 0 ? ab / Math.sqrt(aa * bb) : 0;
   };
+  // Of points with two quantities, those that no other one beats in both, by the first quantity.
+  const FindFront = (points, a, b, xColumn, yColumn) => {
+    const sx = columns[xColumn].larger ? -1 : 1, sy = columns[yColumn].larger ? -1 : 1;
+    let best = Infinity;
+    return points.sort((p, q) => sx * (a(p) - a(q)) || sy * (b(p) - b(q))).filter(point => {
+      const better = sy * b(point) < best;
+      if (better) best = sy * b(point);
+      return better;
+    });
+  };
   // For a shell.
   const Quote = text => /^[\w.,:=+[\]/-]+$/.test(text) && !/[[\]]/.test(text) ? text : "'" + text.replaceAll("'", "'\\''") + "'";
-  return {style, Ticks, FormatTick, Begin, DrawAxes, Viridis, Ranks, Correlation, Quote};
+  return {style, Ticks, FormatTick, Begin, DrawAxes, Viridis, Ranks, Correlation, FindFront, Quote};
 };

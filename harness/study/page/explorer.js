@@ -14,7 +14,7 @@
   const columns = study.columns;
   const find = name => columns.findIndex(column => column.name === name);
   const byId = id => document.getElementById('explore-' + id);
-  const {style, Ticks, FormatTick, Begin, DrawAxes, Viridis, Ranks, Correlation, Quote} = MakeChartTools(columns, byId);
+  const {style, Ticks, FormatTick, Begin, DrawAxes, Viridis, Ranks, Correlation, FindFront, Quote} = MakeChartTools(columns, byId);
   const held = row => study.held[value(row, kOutcome)];
 
   const show = (x, column) => {
@@ -56,8 +56,8 @@
       (study.total > count ? ', a part of ' + study.total : '');
   };
 
-  // Axes: a logarithm where a quantity spans decades.
-  const MakeAxis = (column, from, to) => {
+  // Axes: a logarithm where a quantity spans decades. Of what else is drawn it has room for what is near the trials.
+  const MakeAxis = (column, from, to, beside = []) => {
     let least = Infinity, most = -Infinity;
     for (const row of rows) {
       const x = value(row, column);
@@ -65,6 +65,9 @@
       if (x < least) least = x;
       if (x > most) most = x;
     }
+    const near = beside.filter(x => x > least / 3 && x < 3 * most);
+    least = Math.min(least, ...near);
+    most = Math.max(most, ...near);
     if (!(least <= most)) { least = 0; most = 1; }
     const log = !columns[column].labels && least > 0 && most / least > 30;
     const f = log ? Math.log10 : x => x;
@@ -138,12 +141,50 @@
     byId(id).textContent = names.length ? 'Theory, ' + names.join('; ') + '; other keys as in ' + theory.place + '.' : '';
   };
 
+  // What (57) makes of metrics: a curve along a key, the front of two of them. A point may have no value.
+  const Predict = (x, y) => {
+    const predicted = theory.predicted;
+    if (!predicted) return null;
+    const mx = predicted.metrics.indexOf(columns[x].name), my = predicted.metrics.indexOf(columns[y].name);
+    if (mx >= 0 && my >= 0) {
+      const points = predicted.sampled.map(v => [v[mx], v[my]]).filter(point => point.every(Number.isFinite));
+      return {points: FindFront(points, ([a]) => a, ([, b]) => b, x, y),
+        name: 'the Pareto front of the error dynamics (57), over ' + predicted.sampled.length + ' points of the ranges'};
+    }
+    const turned = my < 0, metric = turned ? mx : my;
+    const along = predicted.along.find(a => a.key === (turned ? y : x) - kFirstKey);
+    if (metric < 0 || !along) return null;
+    const points = along.values.map((v, i) => turned ? [along.metrics[i][metric], v] : [v, along.metrics[i][metric]]);
+    return {points, name: 'what the error dynamics (57) make of it, other keys as in ' + theory.place};
+  };
+  const DrawPrediction = (g, w, h, x, y, prediction) => {
+    if (!prediction) return;
+    g.save();
+    g.beginPath();
+    g.rect(60, 10, w - 70, h - 50);
+    g.clip();
+    g.strokeStyle = '#005f73';
+    g.lineWidth = 2;
+    g.setLineDash([2, 3]);
+    g.beginPath();
+    let open = false;
+    for (const point of prediction.points) {
+      const known = point.every(Number.isFinite);
+      if (known) g[open ? 'lineTo' : 'moveTo'](x.place(point[0]), y.place(point[1]));
+      open = known;
+    }
+    g.stroke();
+    g.restore();
+    byId('theory').textContent += (byId('theory').textContent ? ' D' : 'Theory, d') + 'ots: ' + prediction.name + '.';
+  };
+
   // Places that can be chosen, by canvas.
   const places = {};
   const DrawScatter = () => {
     const {g, w, h} = Begin('scatter');
-    const x = MakeAxis(Number(byId('x').value), 60, w - 10);
-    const y = MakeAxis(Number(byId('y').value), h - 40, 10);
+    const prediction = Predict(Number(byId('x').value), Number(byId('y').value));
+    const x = MakeAxis(Number(byId('x').value), 60, w - 10, prediction?.points.map(point => point[0]));
+    const y = MakeAxis(Number(byId('y').value), h - 40, 10, prediction?.points.map(point => point[1]));
     DrawAxes(g, w, h, x, y);
     const color = ColorBy(Number(byId('color').value));
     const points = [];
@@ -159,16 +200,8 @@
     const isFront = x.column >= firstMetric && y.column >= firstMetric;
     byId('front').textContent = '';
     if (isFront) {
-      const sign = column => columns[column].larger ? -1 : 1;
       const good = rows.filter(row => held(row) && Number.isFinite(value(row, x.column)) && Number.isFinite(value(row, y.column)));
-      good.sort((a, b) => sign(x.column) * (value(a, x.column) - value(b, x.column)) ||
-        sign(y.column) * (value(a, y.column) - value(b, y.column)));
-      let best = Infinity;
-      const front = good.filter(row => {
-        const better = sign(y.column) * value(row, y.column) < best;
-        if (better) best = sign(y.column) * value(row, y.column);
-        return better;
-      });
+      const front = FindFront(good, row => value(row, x.column), row => value(row, y.column), x.column, y.column);
       g.strokeStyle = '#9b2226';
       g.lineWidth = 1.5;
       g.beginPath();
@@ -177,6 +210,7 @@
       byId('front').textContent = 'Pareto front: ' + front.length + ' trials';
     }
     DrawTheory(g, w, h, x, y, 'theory');
+    DrawPrediction(g, w, h, x, y, prediction);
     Mark(g, points);
   };
   const Mark = (g, points) => {
@@ -297,7 +331,8 @@
     const {g, w, h} = Begin('history');
     const points = study.history;
     const finite = points.filter(p => p.feasible);
-    const values = finite.map(p => p.value);
+    const values = finite.flatMap(p => p.theory === undefined ? [p.value] : [p.value, p.theory]);
+    if (theory.least !== undefined) values.push(theory.least);
     const least = values.reduce((a, b) => Math.min(a, b), Infinity), most = values.reduce((a, b) => Math.max(a, b), -Infinity);
     const log = least > 0 && most / least > 30;
     const f = log ? Math.log10 : v => v;
@@ -308,6 +343,26 @@
     if (finite.length) for (const v of [least, most]) g.fillText(String(Number(v.toPrecision(3))), 56, py(v) + 4);
     g.textAlign = 'center';
     g.fillText('point 0 to ' + (points.length - 1) + (log ? ', values in their logarithm' : ''), 60 + (w - 70) / 2, h - 16);
+    // In theory: a ring for each point, and the best that there can be.
+    g.save();
+    g.strokeStyle = '#005f73';
+    for (const [i, p] of points.entries()) {
+      if (!p.feasible || p.theory === undefined) continue;
+      g.beginPath();
+      g.arc(px(i), py(p.theory), 3.5, 0, 2 * Math.PI);
+      g.stroke();
+    }
+    if (theory.least !== undefined) {
+      g.lineWidth = 1.6;
+      g.setLineDash([5, 4]);
+      g.beginPath();
+      g.moveTo(60, py(theory.least));
+      g.lineTo(w - 10, py(theory.least));
+      g.stroke();
+      byId('theory-best').textContent = ' Theory: rings, what the error dynamics (57) make of each point; dashes, the best ' +
+        'that they have within the ranges, ' + Number(theory.least.toPrecision(3)) + ', whatever the constraints.';
+    }
+    g.restore();
     let best = null;
     g.fillStyle = '#9aa';
     const line = [];

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <random>
 #include <thread>
 
@@ -46,7 +48,9 @@ class StudySearch : public StudyCommand {
 };
 
 TEST_F(StudySearch, GivesTheSameRowsKilledOrSharedOrAlone) {
+  const auto begun = std::chrono::steady_clock::now();
   const ProgramResult whole = RunDexcheck(RunArguments("whole.sqlite", {"--jobs", "1"}));
+  const auto time = std::chrono::steady_clock::now() - begun;
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
   EXPECT_THAT(whole.out, HasSubstr("tiny: 48 of at most 48 trials"));
   EXPECT_THAT(whole.out, HasSubstr("The least position_error_rms, worst of its trials of 24 points is "));
@@ -58,18 +62,32 @@ TEST_F(StudySearch, GivesTheSameRowsKilledOrSharedOrAlone) {
   ASSERT_NE(FindBest(points), nullptr);
   EXPECT_LT(FindBest(points)->judgement.objectives[0], points[0].judgement.objectives[0]);
 
+  // Killed again and again, at any time of a search; one that came to its end is begun anew.
+  // DEXCHECK_KILLS=200 kills it so often.
+  const char* const more = std::getenv("DEXCHECK_KILLS");
+  const long kills = more == nullptr ? 4 : std::clamp(std::atol(more), 1L, 100000L);
   std::mt19937 random(5);
-  std::uniform_int_distribution<int> milliseconds(100, 500);
-  constexpr int kKills = 8;
-  int unfinished = 0;
-  for (int i = 0; i < kKills; ++i) {
+  std::uniform_real_distribution<double> share(0.1, 0.8);
+  long midway = 0;
+  long searches = 1;
+  for (long made = 0; made < kills;) {
     {
       const Program killed(DexcheckCommand(RunArguments("killed.sqlite", {"--jobs", "2"})), {});
-      std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds(random)));
+      std::this_thread::sleep_for(share(random) * time);
     }
-    if (CountRows("killed.sqlite") < 48) ++unfinished;
+    const long rows = CountRows("killed.sqlite");
+    if (rows < 48) {
+      ++made;
+      if (rows > 0) ++midway;
+      continue;
+    }
+    EXPECT_EQ(Dump(Path("killed.sqlite")), reference) << "after " << made << " kills";
+    for (const char* const part : {"", "-journal", "-wal", "-shm"})
+      std::filesystem::remove(Path(std::string("killed.sqlite") + part));
+    ++searches;
   }
-  EXPECT_GE(unfinished, 2) << "it was killed too late to matter";
+  EXPECT_GT(midway, 0) << "it was killed too early to matter";
+  std::printf("%ld kills, %ld of them midway, in %ld searches\n", kills, midway, searches);
   ASSERT_EQ(RunDexcheck(RunArguments("killed.sqlite")).exit_code, 0);
   EXPECT_EQ(Dump(Path("killed.sqlite")), reference);
 

@@ -16,6 +16,7 @@
 #include "controller/common/toml_reader.h"
 #include "harness/plant/velocity_filter.h"
 #include "harness/run/runner.h"
+#include "harness/study/study_theory.h"
 #include "harness/study/trial.h"
 #include "tests/common/paths.h"
 
@@ -358,6 +359,65 @@ TEST(SampledStability, TheRobotIsStableWhereItIsPredictedWithDelayAndFilter) {
           RunTrial(MakeInputs(MakeOverrides(loop, w * w, 0.6, 1e-6)), {0, 0, {2.0 * w}}).outcome;
       EXPECT_EQ(outcome, share < 1.0 ? Outcome::kTracked : Outcome::kDiverged) << limit << ", " << share;
     }
+  }
+}
+
+// Metrics of the run against those of the step response: direct and overshooting, and with torques that come
+// late.
+TEST(Theory, PredictsTheMetricsOfARun) {
+  constexpr double kSettling = 3e-3;  // s: the error creeps through the threshold
+  for (const SampledLoop& loop : {SampledLoop{1e-3, 1}, SampledLoop{1e-3, 1, 2e-3}}) {
+    const StudyInputs inputs = MakeInputs(MakeOverrides(loop, 400.0, 0.6, kStep));
+    const std::vector<double> parameters = {16.0};
+    const TrialResult measured = RunTrial(inputs, {0, 0, parameters});
+    const TrialResult predicted = PredictInTheory(inputs, parameters);
+    ASSERT_TRUE(IsHeld(measured.outcome)) << measured.failure;
+    for (const Metric metric : {kPositionErrorRms, kPositionErrorMax, kOvershoot, kErrorGrowth}) {
+      ASSERT_GT(predicted.metrics[metric], 0.0) << kMetrics[metric].name;
+      EXPECT_NEAR(measured.metrics[metric] / predicted.metrics[metric], 1.0, 10.0 * kLate)
+          << kMetrics[metric].name;
+    }
+    EXPECT_NEAR(measured.metrics[kSettlingTime], predicted.metrics[kSettlingTime], kSettling);
+    EXPECT_TRUE(std::isnan(predicted.metrics[kEnergy])) << "which (57) does not know";
+  }
+}
+
+// The integral of the squared error is e0^2 (K_v^2 + K_p) / (2 K_v K_p), least at K_v = sqrt(K_p).
+TEST(Theory, TheLeastErrorIsThatOfTheClosedForm) {
+  constexpr double kSampling =
+      0.02;  // relative: h / 2 beside an integral of 0.05 s, and as much for the steps
+  StudyInputs inputs = MakeInputs(MakeOverrides({1e-3, 1}, 400.0, 2.0, kStep));
+  inputs.study.variations = {{.key = "control.K_v", .from = 5.0, .to = 200.0}};
+  inputs.study.objectives = {{"position_error_rms"}};
+  const auto rms = [](double K_v) {
+    return kStep * std::sqrt((K_v * K_v + 400.0) / (2.0 * K_v * 400.0) / 2.0);
+  };
+  for (const double K_v : {10.0, 40.0, 150.0}) {
+    EXPECT_NEAR(PredictInTheory(inputs, {K_v}).metrics[kPositionErrorRms] / rms(K_v), 1.0, kSampling) << K_v;
+  }
+  const std::optional<double> least = FindLeastInTheory(inputs);
+  ASSERT_TRUE(least.has_value());
+  EXPECT_NEAR(*least / rms(20.0), 1.0, kSampling);
+  EXPECT_LE(*least, PredictInTheory(inputs, {20.0}).metrics[kPositionErrorRms] * (1.0 + 1e-3));
+  EXPECT_GT(rms(10.0), (1.0 + 2.0 * kSampling) * rms(20.0)) << "the minimum can be told";
+  inputs.study.objectives = {{"energy"}};
+  EXPECT_EQ(FindLeastInTheory(inputs), std::nullopt);
+}
+
+TEST(Theory, IsSilentWhereMoreThanTheErrorDynamicsActs) {
+  const std::vector<std::string> known = MakeOverrides({1e-3, 1}, 400.0, 0.2, kStep);
+  const auto is_known = [&](const std::string& setting, double K_v) {
+    std::vector<std::string> overrides = known;
+    if (!setting.empty()) overrides.push_back(setting);
+    return std::isfinite(PredictInTheory(MakeInputs(overrides), {K_v}).metrics[kPositionErrorRms]);
+  };
+  EXPECT_TRUE(is_known("", 40.0));
+  EXPECT_TRUE(is_known("actuation.delay=0.002", 40.0));
+  EXPECT_FALSE(is_known("", 3000.0)) << "unstable";
+  for (const char* const setting :
+       {"start_error.xyz=[0, 0, 0]", "mismatch.mass.object=1.1", "sensing.object_position_noise=1e-5",
+        "actuation.coulomb.wheel=0.1", "control.law=pd_gravity"}) {
+    EXPECT_FALSE(is_known(setting, 40.0)) << setting;
   }
 }
 

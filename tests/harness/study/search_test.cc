@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <functional>
 #include <random>
 
 #include "controller/common/errors.h"
+#include "harness/study/quadratic_model.h"
 #include "harness/study/search_history.h"
 #include "harness/study/study_answer.h"
 #include "tests/common/throws.h"
@@ -82,8 +85,9 @@ TEST(Search, FindsAMinimumOnTheEdge) {
   }
 }
 
-// Two keys, a dense grid of 400 points against a tenth of it: corner, valley along an edge, and what error
-// and effort of a loop look like.
+// Two keys, a dense grid of 400 points against a tenth of it: corner, valley along an edge, what error and
+// effort of a loop look like, a turned valley inside, an edge. DEXCHECK_SEARCH_SEEDS=40 tries that many
+// seeds.
 TEST(Search, ATenthOfAGridsTrialsIsEnough) {
   const std::vector<Function> functions = {
       [](const UnitPoint& x) { return std::vector<double>{1.0 + 3.0 * (1.0 - x[0]) + 2.0 * (1.0 - x[1])}; },
@@ -96,22 +100,83 @@ TEST(Search, ATenthOfAGridsTrialsIsEnough) {
         const double z = 0.3 * std::pow(10.0, x[1]);
         return std::vector<double>{400.0 / (w * w) * (1.0 + 0.2 * z * z) + 0.01 * w * z +
                                    std::exp(std::min(50.0, (w * z - 260.0) / 20.0))};
-      }};
-  for (const Function& function : functions) {
+      },
+      [](const UnitPoint& x) {
+        const double a = x[0] - 0.3;
+        const double b = x[1] - 0.65;
+        return std::vector<double>{0.1 + a * a + 10.0 * (a - b) * (a - b)};
+      },
+      [](const UnitPoint& x) { return std::vector<double>{0.2 + x[0] + 4.0 * (x[1] - 0.4) * (x[1] - 0.4)}; }};
+  const char* const more = std::getenv("DEXCHECK_SEARCH_SEEDS");
+  const long seeds = more == nullptr ? 3 : std::clamp(std::atol(more), 1L, 1000L);
+  for (size_t i = 0; i < functions.size(); ++i) {
+    const Function& function = functions[i];
     double grid = 1e300;
-    for (int i = 0; i < 400; ++i) grid = std::min(grid, function({i % 20 / 19.0, i / 20 / 19.0})[0]);
-    for (const SearchMethod method : {SearchMethod::kNelderMead, SearchMethod::kBobyqa}) {
-      for (const std::uint64_t seed : {1U, 2U, 3U}) {
-        Search search = MakeSearch(method, 40);
-        search.seed = seed;
-        search.starts = method == SearchMethod::kNelderMead ? 2 : 1;
-        std::vector<JudgedPoint> points = RunSearch(search, {0.5, 0.5}, function);
-        points.resize(std::min(points.size(), size_t{40}));
-        EXPECT_LT(FindBest(points)->judgement.objectives[0], 1.05 * grid) << static_cast<int>(method);
-        EXPECT_GT(points.front().judgement.objectives[0], 1.05 * grid) << "it did not begin there";
+    for (int j = 0; j < 400; ++j) grid = std::min(grid, function({j % 20 / 19.0, j / 20 / 19.0})[0]);
+    for (const SearchMethod method :
+         {SearchMethod::kCmaEs, SearchMethod::kNelderMead, SearchMethod::kBobyqa}) {
+      for (const long population :
+           method == SearchMethod::kCmaEs ? std::vector{5L, 8L, 16L} : std::vector{1L}) {
+        long found = 0;
+        for (long seed = 1; seed <= seeds; ++seed) {
+          Search search = MakeSearch(method, 40);
+          search.seed = static_cast<std::uint64_t>(seed);
+          search.starts = method == SearchMethod::kNelderMead ? 2 : 1;
+          search.population = population;
+          std::vector<JudgedPoint> points = RunSearch(search, {0.5, 0.5}, function);
+          points.resize(std::min(points.size(), size_t{40}));
+          EXPECT_GT(points.front().judgement.objectives[0], 1.05 * grid) << "it did not begin there";
+          if (FindBest(points)->judgement.objectives[0] < 1.05 * grid) ++found;
+        }
+        EXPECT_EQ(found, seeds) << "function " << i << ", method " << static_cast<int>(method)
+                                << ", population " << population;
       }
     }
   }
+}
+
+TriedPoint MakeTried(const UnitPoint& point, double value, double violation = 0.0) {
+  return {point, {{value}, violation}};
+}
+
+// A quadratic is found again, turned and inside or falling towards a corner; of too few points there is none.
+TEST(QuadraticModel, IsLeastWhereTheFunctionIs) {
+  constexpr double kRounding = 1e-6;  // of a ridge of 1e-10
+  const auto bowl = [](const UnitPoint& x) {
+    const double a = x[0] - 0.4;
+    const double b = x[1] - 0.7;
+    return 3.0 + a * a + a * b + 2.0 * b * b;
+  };
+  const auto slope = [](const UnitPoint& x) { return x[0] - 2.0 * x[1]; };
+  std::vector<TriedPoint> on_bowl, on_slope;
+  for (const UnitPoint& point : MakeSobol(2, 12)) {
+    const UnitPoint x = {0.1 + 0.85 * point[0], 0.1 + 0.85 * point[1]};
+    on_bowl.push_back(MakeTried(x, bowl(x)));
+    on_slope.push_back(MakeTried(x, slope(x)));
+  }
+  const auto least = FindModelMinimum(on_bowl);
+  ASSERT_TRUE(least.has_value());
+  EXPECT_NEAR((*least)[0], 0.4, kRounding);
+  EXPECT_NEAR((*least)[1], 0.7, kRounding);
+  EXPECT_EQ(FindModelMinimum(on_slope), (UnitPoint{0.0, 1.0})) << "the box reaches the cube's corner";
+  on_bowl.push_back(MakeTried(*least, bowl(*least)));
+  EXPECT_EQ(FindModelMinimum(on_bowl), std::nullopt) << "it was tried";
+  on_slope.resize(3);
+  EXPECT_EQ(FindModelMinimum(on_slope), std::nullopt) << "three coefficients of three points";
+  EXPECT_EQ(FindModelMinimum({}), std::nullopt);
+}
+
+// What is forbidden lies higher than all that is not, whatever its objective says.
+TEST(QuadraticModel, LeavesWhatIsForbidden) {
+  std::vector<TriedPoint> tried;
+  for (const UnitPoint& x : MakeSobol(2, 12)) tried.push_back(MakeTried(x, -x[0], std::max(x[0] - 0.5, 0.0)));
+  const auto least = FindModelMinimum(tried);
+  ASSERT_TRUE(least.has_value());
+  EXPECT_LT((*least)[0], 0.75);
+  EXPECT_GT((*least)[0], 0.25);
+  // All of them forbidden: less violation leads back.
+  for (TriedPoint& point : tried) point.judgement.violation = 0.1 + point.point[0];
+  EXPECT_LT(FindModelMinimum(tried).value()[0], 0.1);
 }
 
 TEST(Search, Nsga2ApproachesTheFront) {
@@ -280,7 +345,7 @@ TEST(SearchHistory, GoesOnFromItsRowsWhereverItWasStopped) {
   SearchHistory whole(study, start);
   std::vector<TrialRow> all;
   Follow(&whole, SIZE_MAX, &all);
-  ASSERT_EQ(all.size(), 48U * 6U) << "whole generations of 8 within 50 points, 3 draws and 2 seeds of each";
+  ASSERT_EQ(all.size(), 48U * 6U) << "six times 8 within 50 points, 3 draws and 2 seeds of each";
   EXPECT_EQ(static_cast<long>(all.size()), CountTrials(study));
   ASSERT_EQ(whole.points().size(), 48U);
   EXPECT_LT(FindBest(whole.points())->judgement.objectives[0], whole.points()[0].judgement.objectives[0]);

@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <string>
 
 #include "controller/common/toml_reader.h"
 #include "harness/study/study_report.h"
+#include "harness/study/study_theory.h"
 #include "tests/common/browser.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
@@ -21,20 +23,24 @@ using ::testing::HasSubstr;
 const std::string kSource = testing::SourcePath();
 constexpr double kLimit = 2000.0;  // 1/s: of K_v at steps of 1 ms
 
+StudyInputs MakeInputs(const std::string& study) {
+  StudyInputs inputs;
+  inputs.study = ParseStudy(study, "study.toml");
+  inputs.scenario_text = ReadTextFile(kSource + "/harness/shipped/scenarios/offset.toml");
+  inputs.scenario_source = "offset";
+  inputs.robot = kSource + "/controller/parameters/assistant_robot.toml";
+  inputs.mjcf = kSource + "/mjcf/scene.xml";
+  return inputs;
+}
+
 class StudyPageBrowserTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    StudyInputs inputs;
-    inputs.study = ParseStudy(
+    const StudyInputs inputs = MakeInputs(
         "name = \"page\"\ndescription = \"a <small> study\"\nscenario = \"offset\"\nmetrics = "
         "[\"overshoot\", "
         "\"energy\"]\n[[vary]]\nkey = \"control.K_p\"\nvalues = [100, 1e3, 1e4]\n[[vary]]\nkey = "
-        "\"control.K_v\"\nvalues = [20, 200, 2100, 3000]\n",
-        "study.toml");
-    inputs.scenario_text = ReadTextFile(kSource + "/harness/shipped/scenarios/offset.toml");
-    inputs.scenario_source = "offset";
-    inputs.robot = kSource + "/controller/parameters/assistant_robot.toml";
-    inputs.mjcf = kSource + "/mjcf/scene.xml";
+        "\"control.K_v\"\nvalues = [20, 200, 2100, 3000]\n");
     StudyStore store =
         StudyStore::OpenOrCreate(folder_.path() / "page.sqlite", IdentifyStudy(inputs), inputs.study);
     for (const Trial& trial : ListTrials(inputs.study)) store.Add(MakeRow(trial));
@@ -182,6 +188,66 @@ TEST_F(StudyPageBrowserTest, DrawsTheoryIntoTheChartsThatAreChosen) {
   EXPECT_THAT(
       browser_.Run("return document.getElementById('explore-theory-over').textContent;").get<std::string>(),
       HasSubstr("other keys as in the first trial"));
+}
+
+// Of a search whose objective (57) knows: the least that it has, what it makes of each point, its Pareto
+// front and its curve along a key.
+TEST_F(StudyPageBrowserTest, DrawsTheoryOfWhatIsSearched) {
+  StudyInputs inputs = MakeInputs(
+      "name = \"search\"\nscenario = \"offset\"\nset = [\"duration=0.4\"]\nmetrics = "
+      "[\"position_error_rms\"]\n[[objective]]\nminimize = \"position_error_rms\"\n[search]\nmethod = "
+      "\"nelder_mead\"\ncount = 8\n[[vary]]\nkey = \"control.K_p\"\nfrom = 100\nto = 1000\n[[vary]]\nkey = "
+      "\"control.K_v\"\nfrom = 10\nto = 100\n");
+  StudyStore store =
+      StudyStore::OpenOrCreate(folder_.path() / "search.sqlite", IdentifyStudy(inputs), inputs.study);
+  constexpr double kPlant = 1.1;  // what the rows have of theory's values
+  for (long i = 0; i < 8; ++i) {
+    const auto at = static_cast<double>(i);
+    TrialRow row;
+    row.trial = {i, 0, {200.0 + 100.0 * at, 20.0 + 10.0 * at}};
+    row.result = PredictInTheory(inputs, row.trial.parameters);
+    for (double& metric : row.result.metrics) metric = std::isfinite(metric) ? kPlant * metric : 1.0;
+    store.Add(row);
+  }
+  testing::WriteText(folder_.path() / "search.html", MakeStudyReport(store));
+  browser_.SetViewport(1300, 900, false);
+  browser_.Open(folder_.path() / "search.html");
+  ASSERT_TRUE(browser_.WaitFor("return document.getElementById('explore').dataset.ready === 'yes';"));
+  const nlohmann::json data =
+      browser_.Run("return JSON.parse(document.getElementById('study-data').textContent);");
+  ASSERT_EQ(data["history"].size(), 8U);
+  constexpr double kRounding = 1e-12;
+  for (const nlohmann::json& point : data["history"]) {
+    EXPECT_NEAR(point["value"].get<double>() / point["theory"].get<double>(), kPlant, kRounding);
+    EXPECT_LT(data["theory"]["least"].get<double>(), point["theory"].get<double>());
+  }
+  EXPECT_THAT(
+      browser_.Run("return document.getElementById('explore-theory-best').textContent;").get<std::string>(),
+      HasSubstr("the best that they have within the ranges"));
+  // Pixels of the colour of theory.
+  const std::string count =
+      "const count = id => { const c = document.getElementById('explore-' + id);"
+      "  const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;"
+      "  for (let i = 0; i < d.length; i += 4) if (d[i] < 40 && Math.abs(d[i + 1] - 95) < 25 &&"
+      "    Math.abs(d[i + 2] - 115) < 25 && d[i + 3] > 100) ++n; return n; };"
+      "const select = (id, name) => { const s = document.getElementById('explore-' + id);"
+      "  s.value = [...s.options].find(o => o.text.startsWith(name)).value; s.dispatchEvent(new "
+      "Event('change')); };";
+  EXPECT_GT(browser_.Run(count + "return count('history');").get<int>(), 200);
+  const auto draw = [&](const std::string& x, const std::string& y) {
+    return browser_.Run(count + "select('x', '" + x + "'); select('y', '" + y +
+                        "'); return {pixels: count('scatter'), "
+                        "text: document.getElementById('explore-theory').textContent};");
+  };
+  const nlohmann::json along = draw("control.K_v", "position_error_rms");
+  EXPECT_GT(along["pixels"].get<int>(), 100);
+  EXPECT_THAT(along["text"].get<std::string>(), HasSubstr("what the error dynamics (57) make of it"));
+  const nlohmann::json front = draw("settling_time", "position_error_rms");
+  EXPECT_GT(front["pixels"].get<int>(), 20);
+  EXPECT_THAT(front["text"].get<std::string>(), HasSubstr("the Pareto front of the error dynamics (57)"));
+  const nlohmann::json unknown = draw("energy", "position_error_rms");
+  EXPECT_EQ(unknown["pixels"].get<int>(), 0) << "which (57) does not know";
+  EXPECT_EQ(unknown["text"], "");
 }
 
 TEST_F(StudyPageBrowserTest, FitsAPhone) {

@@ -45,6 +45,9 @@ class StudyReportTest : public ::testing::Test {
       TrialRow row;
       row.trial = trial;
       row.result.outcome = trial.number % 2 == 0 ? Outcome::kTracked : Outcome::kDiverged;
+      // All that tracked are on the front: the less error, the more work.
+      row.result.metrics[kPositionErrorRms] = 1.0 + static_cast<double>(trial.number);
+      row.result.metrics[kEnergy] = 1.0 / row.result.metrics[kPositionErrorRms];
       if (trial.number % 2 == 1) row.result.failure = text;
       rows.push_back(row);
     }
