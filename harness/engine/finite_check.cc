@@ -30,7 +30,7 @@ void CheckFinite(const mjModel& model, const std::string& source) {
       throw InputError(source + ": " + describe(i) + " must be finite, got " + FormatNumber(values[i]));
     }
   };
-  const auto option = [](const char* name) { return [name](int) { return std::string("option ") + name; }; };
+  const auto option = [](const char* name) { return [name](EngineSize) { return std::string("option ") + name; }; };
   check(&model.opt.timestep, 1, option("timestep"));
   check(model.opt.gravity, 3, option("gravity"));
   check(&model.opt.density, 1, option("density"));

@@ -35,6 +35,42 @@ using EngineSize = mjtSize;
 using EngineSize = int;
 #endif
 
+/// Whether geoms may collide by their masks (contype, conaffinity), and whether those of <pair>s may. An
+/// option of 2.2.2 excludes one of them; 3.x has no such option, and masks of zero say the same as
+/// "predefined".
+inline bool CollidesByType(const mjModel& m) {
+#if mjVERSION_HEADER >= 320
+  return std::any_of(m.geom_contype, m.geom_contype + m.ngeom, [](int mask) { return mask != 0; }) ||
+         std::any_of(m.geom_conaffinity, m.geom_conaffinity + m.ngeom, [](int mask) { return mask != 0; });
+#else
+  return m.opt.collision != mjCOL_PAIR;
+#endif
+}
+/// The option's value; 0, both, where there is none.
+inline int GetCollisionOption([[maybe_unused]] const mjModel& m) {
+#if mjVERSION_HEADER >= 320
+  return 0;
+#else
+  return m.opt.collision;
+#endif
+}
+inline bool CollidesByPair([[maybe_unused]] const mjModel& m) {
+#if mjVERSION_HEADER >= 320
+  return true;
+#else
+  return m.opt.collision != mjCOL_DYNAMIC;
+#endif
+}
+
+/// By equality constraint: whether it acts, at the start of a run.
+#if mjVERSION_HEADER >= 320
+inline auto* GetEqualityActive(const mjModel& m) { return m.eq_active0; }
+inline constexpr int kSensorNoiseFlag = 0;  // there is none
+#else
+inline auto* GetEqualityActive(const mjModel& m) { return m.eq_active; }
+inline constexpr int kSensorNoiseFlag = mjENBL_SENSORNOISE;
+#endif
+
 /// "2.2.2" of 222, "3.12.1" of 3012001.
 inline std::string FormatRelease(int version) {
   const int base = version < 1000 ? 10 : 1000;
