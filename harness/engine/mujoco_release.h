@@ -6,13 +6,13 @@
 //
 // | since | what |
 // |---|---|
-// | 3.2  | files in memory by mj_addBufferVFS; mj_makeEmptyFileVFS and the tables of mjVFS are gone |
-// | 3.3  | mj_makeM makes the mass matrix, rotors of tendons included |
-// | 3.5  | version numbers have three digits for minor and patch: 3005000; sizes are mjtSize |
-// | 3.6  | the tendons' Jacobian is sparse in any case, and its rows are the model's |
-// | 3.7  | collision functions get data that they may write |
-// | 3.9  | they fill mjPreContact (distance, position, normal, tangent) in the place of mjContact |
-// | 3.10 | mj_fullM(m, d, M) |
+// | 3.0  | option collision is gone; eq_active is what acts now, and eq_active0 what acts at first |
+// | 3.2  | sensors have no noise; files in memory by mj_addBufferVFS; mj_makeEmptyFileVFS and the tables of
+// mjVFS are gone | | 3.2.3 | mpr_iterations, mpr_tolerance are ccd_iterations, ccd_tolerance | | 3.3  |
+// mj_makeM makes the mass matrix, rotors of tendons included | | 3.5  | version numbers have three digits for
+// minor and patch: 3005000; sizes are mjtSize | | 3.6  | the tendons' Jacobian is sparse in any case, and its
+// rows are the model's | | 3.7  | collision functions get data that they may write | | 3.9  | they fill
+// mjPreContact (distance, position, normal, tangent) in the place of mjContact | | 3.10 | mj_fullM(m, d, M) |
 // | 3.11 | qM is gone: M has compressed rows of the lower triangle |
 //
 // What an MJCF says in another way since a release (limits by default, ...) is told by newer_mjcf.h.
@@ -36,39 +36,43 @@ using EngineSize = int;
 #endif
 
 /// Whether geoms may collide by their masks (contype, conaffinity), and whether those of <pair>s may. An
-/// option of 2.2.2 excludes one of them; 3.x has no such option, and masks of zero say the same as
-/// "predefined".
+/// option of 2.2.2 excludes one of them; in 3.x both may, and geoms whose masks are zero do not collide.
+#if mjVERSION_HEADER >= 300
 inline bool CollidesByType(const mjModel& m) {
-#if mjVERSION_HEADER >= 320
-  return std::any_of(m.geom_contype, m.geom_contype + m.ngeom, [](int mask) { return mask != 0; }) ||
-         std::any_of(m.geom_conaffinity, m.geom_conaffinity + m.ngeom, [](int mask) { return mask != 0; });
-#else
-  return m.opt.collision != mjCOL_PAIR;
-#endif
+  const auto is_set = [](int mask) { return mask != 0; };
+  return std::any_of(m.geom_contype, m.geom_contype + m.ngeom, is_set) ||
+         std::any_of(m.geom_conaffinity, m.geom_conaffinity + m.ngeom, is_set);
 }
-/// The option's value; 0, both, where there is none.
-inline int GetCollisionOption([[maybe_unused]] const mjModel& m) {
-#if mjVERSION_HEADER >= 320
-  return 0;
+inline bool CollidesByPair(const mjModel& /*m*/) { return true; }
+/// The option's value; that of "all" where there is none.
+inline int GetCollisionOption(const mjModel& /*m*/) { return 0; }
 #else
-  return m.opt.collision;
+inline bool CollidesByType(const mjModel& m) { return m.opt.collision != mjCOL_PAIR; }
+inline bool CollidesByPair(const mjModel& m) { return m.opt.collision != mjCOL_DYNAMIC; }
+inline int GetCollisionOption(const mjModel& m) { return m.opt.collision; }
 #endif
-}
-inline bool CollidesByPair([[maybe_unused]] const mjModel& m) {
-#if mjVERSION_HEADER >= 320
-  return true;
-#else
-  return m.opt.collision != mjCOL_DYNAMIC;
-#endif
-}
 
-/// By equality constraint: whether it acts, at the start of a run.
-#if mjVERSION_HEADER >= 320
+/// By equality constraint: whether it acts when a run starts.
+#if mjVERSION_HEADER >= 300
 inline auto* GetEqualityActive(const mjModel& m) { return m.eq_active0; }
-inline constexpr int kSensorNoiseFlag = 0;  // there is none
 #else
 inline auto* GetEqualityActive(const mjModel& m) { return m.eq_active; }
+#endif
+
+/// Enable flag that adds noise to sensors; 0 where there is none.
+#if mjVERSION_HEADER >= 320
+inline constexpr int kSensorNoiseFlag = 0;
+#else
 inline constexpr int kSensorNoiseFlag = mjENBL_SENSORNOISE;
+#endif
+
+/// How the general collider of convex bodies ends: most iterations, and tolerance, m.
+#if mjVERSION_HEADER >= 323
+inline int GetColliderIterations(const mjOption& option) { return option.ccd_iterations; }
+inline mjtNum GetColliderTolerance(const mjOption& option) { return option.ccd_tolerance; }
+#else
+inline int GetColliderIterations(const mjOption& option) { return option.mpr_iterations; }
+inline mjtNum GetColliderTolerance(const mjOption& option) { return option.mpr_tolerance; }
 #endif
 
 /// "2.2.2" of 222, "3.12.1" of 3012001.

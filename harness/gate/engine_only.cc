@@ -285,12 +285,13 @@ class EngineOnly {
              "a run sets the time step ({:.17g} s here), impratio ({:.17g}), noslip iterations ({}) and "
              "the stiffness of all contact pairs; joint damping acts as an explicit force",
              option.timestep, option.impratio, option.noslip_iterations));
-    Note("solver", fmt::format("integrator {}, cone {}, jacobian {}, solver {}, iterations {}, tolerance "
-                               "{:.17g}, noslip tolerance {:.17g}, "
-                               "mpr iterations {}, mpr tolerance {:.17g}, mean inertia {:.17g}",
-                               option.integrator, option.cone, option.jacobian, option.solver,
-                               option.iterations, option.tolerance, option.noslip_tolerance,
-                               option.mpr_iterations, option.mpr_tolerance, engine_.stat.meaninertia));
+    Note("solver",
+         fmt::format("integrator {}, cone {}, jacobian {}, solver {}, iterations {}, tolerance "
+                     "{:.17g}, noslip tolerance {:.17g}, "
+                     "mpr iterations {}, mpr tolerance {:.17g}, mean inertia {:.17g}",
+                     option.integrator, option.cone, option.jacobian, option.solver, option.iterations,
+                     option.tolerance, option.noslip_tolerance, GetColliderIterations(option),
+                     GetColliderTolerance(option), engine_.stat.meaninertia));
   }
 
   const Adapter& adapter_;
