@@ -61,14 +61,14 @@ std::vector<Repair> Neutralise(const Adapter& adapter, const GateResult& gate, m
   joints.insert(joints.end(), adapter.base_joints().begin(), adapter.base_joints().end());
   for (const EngineWheel& wheel : adapter.wheels()) joints.push_back(wheel.joint);
   for (const int joint : joints) engine->jnt_stiffness[joint] = 0.0;
-  mju_zero(engine->dof_frictionloss, engine->nv);
+  std::fill_n(engine->dof_frictionloss, engine->nv, 0.0);
   for (const int joint : adapter.base_joints()) {
     const int dofs = engine->jnt_type[joint] == mjJNT_FREE ? 6 : 1;
     mju_zero(engine->dof_damping + engine->jnt_dofadr[joint], dofs);
     mju_zero(engine->dof_armature + engine->jnt_dofadr[joint], dofs);
   }
-  mju_zero(engine->tendon_stiffness, engine->ntendon);
-  mju_zero(engine->tendon_damping, engine->ntendon);
+  std::fill_n(engine->tendon_stiffness, engine->ntendon, 0.0);
+  std::fill_n(engine->tendon_damping, engine->ntendon, 0.0);
   engine->opt.disableflags = 0;
   engine->opt.density = 0.0;
   engine->opt.viscosity = 0.0;

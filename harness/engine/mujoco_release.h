@@ -75,6 +75,14 @@ inline int GetColliderIterations(const mjOption& option) { return option.mpr_ite
 inline mjtNum GetColliderTolerance(const mjOption& option) { return option.mpr_tolerance; }
 #endif
 
+/// What the engine warned of. Its information is an int, or in later releases a size.
+inline std::string DescribeWarning(const mjData& d, int warning) {
+  const auto describe = [&]<typename Info>(const char* (*text)(int, Info)) {
+    return std::string(text(warning, static_cast<Info>(d.warning[warning].lastinfo)));
+  };
+  return describe(mju_warningText);
+}
+
 /// "2.2.2" of 222, "3.12.1" of 3012001.
 inline std::string FormatRelease(int version) {
   const int base = version < 1000 ? 10 : 1000;
