@@ -2,18 +2,21 @@
 
 // What differs between MuJoCo's releases, as far as dexcheck's code touches it: everything that must be
 // written in two ways stands here. dexcheck is built and tested with 2.2.2, which Debian 12 has. The other
-// branches are written for 3.x after its public headers up to 3.12; no build with 3.x has been made.
+// branches are written for 3.x: those of 3.12.1's public headers are compiled, and nothing was linked or run.
 //
 // | since | what |
 // |---|---|
-// | 3.0  | option collision is gone; eq_active is what acts now, and eq_active0 what acts at first |
-// | 3.2  | sensors have no noise; files in memory by mj_addBufferVFS; mj_makeEmptyFileVFS and the tables of
-// mjVFS are gone | | 3.2.3 | mpr_iterations, mpr_tolerance are ccd_iterations, ccd_tolerance | | 3.3  |
-// mj_makeM makes the mass matrix, rotors of tendons included | | 3.5  | version numbers have three digits for
-// minor and patch: 3005000; sizes are mjtSize | | 3.6  | the tendons' Jacobian is sparse in any case, and its
-// rows are the model's | | 3.7  | collision functions get data that they may write | | 3.9  | they fill
-// mjPreContact (distance, position, normal, tangent) in the place of mjContact | | 3.10 | mj_fullM(m, d, M) |
-// | 3.11 | qM is gone: M has compressed rows of the lower triangle |
+// | 3.0   | option collision is gone; eq_active is what acts now, eq_active0 what acts at first |
+// | 3.2   | files in memory by mj_addBufferVFS; mj_makeEmptyFileVFS and the tables of mjVFS are gone |
+// | 3.2   | (or before) mjv_connector takes points; sensors have no noise |
+// | 3.2.3 | mpr_iterations, mpr_tolerance are ccd_iterations, ccd_tolerance |
+// | 3.3   | mj_makeM makes the mass matrix, rotors of tendons included |
+// | 3.5   | version numbers have three digits for minor and patch: 3005000; sizes are mjtSize |
+// | 3.6   | the tendons' Jacobian is sparse in any case, and its rows are the model's |
+// | 3.7   | collision functions get data that they may write |
+// | 3.9   | they fill mjPreContact (distance, position, normal, tangent) in the place of mjContact |
+// | 3.10  | mj_fullM(m, d, M) |
+// | 3.11  | qM is gone: M has compressed rows of the lower triangle |
 //
 // What an MJCF says in another way since a release (limits by default, ...) is told by newer_mjcf.h.
 
@@ -81,6 +84,15 @@ inline std::string DescribeWarning(const mjData& d, int warning) {
     return std::string(text(warning, static_cast<Info>(d.warning[warning].lastinfo)));
   };
   return describe(mju_warningText);
+}
+
+/// Lets a drawn geom reach from one point to another.
+inline void MakeConnector(int type, mjtNum width, const mjtNum* from, const mjtNum* to, mjvGeom* geom) {
+#if mjVERSION_HEADER >= 320
+  mjv_connector(geom, type, width, from, to);
+#else
+  mjv_makeConnector(geom, type, width, from[0], from[1], from[2], to[0], to[1], to[2]);
+#endif
 }
 
 /// "2.2.2" of 222, "3.12.1" of 3012001.
