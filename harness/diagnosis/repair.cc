@@ -154,10 +154,10 @@ std::string Describe(const Repair& cause, const RobotSpec& spec, const std::stri
 namespace {
 
 // What solving leaves open, relative.
-constexpr double kSolved = 1e-10;
+constexpr double kSolvedAccuracy = 1e-10;
 
 /// The number with the fewest digits within an accuracy, and how many it has.
-std::pair<double, int> Round(double number, double accuracy = kSolved) {
+std::pair<double, int> Round(double number, double accuracy = kSolvedAccuracy) {
   for (int digits = 1; digits < kManyDigits; ++digits) {
     const double rounded = std::stod(fmt::format("{:.{}e}", number, digits - 1));
     if (std::abs(rounded - number) < accuracy * std::abs(number)) return {rounded, digits};
@@ -165,7 +165,8 @@ std::pair<double, int> Round(double number, double accuracy = kSolved) {
   return {number, kManyDigits};
 }
 
-bool IsNothing(const RobotSpec& spec, const Parameter& parameter, double value, double accuracy = kSolved) {
+bool IsNothing(const RobotSpec& spec, const Parameter& parameter, double value,
+               double accuracy = kSolvedAccuracy) {
   return std::abs(value) < 0.1 * accuracy * GetScale(spec, parameter);
 }
 
@@ -177,7 +178,7 @@ int CountDigits(const RobotSpec& spec, const Parameter& parameter, double value)
 }
 
 double RoundSolved(const RobotSpec& spec, const Parameter& parameter, double value) {
-  return RoundWithin(spec, parameter, value, kSolved);
+  return RoundWithin(spec, parameter, value, kSolvedAccuracy);
 }
 
 double RoundWithin(const RobotSpec& spec, const Parameter& parameter, double value, double accuracy) {
