@@ -87,8 +87,8 @@ class Renderer::Impl {
     mjv_defaultOption(&visible_);
     mjv_defaultPerturb(&perturb_);
     mjv_defaultScene(&scene_);
-    const int ghost_geoms = options.ghost ? options.ghost->model->ngeom : 0;
-    mjv_makeScene(&model, &scene_, model.ngeom + ghost_geoms + kMostDecorations);
+    const auto ghost_geoms = options.ghost ? static_cast<int>(options.ghost->model->ngeom) : 0;
+    mjv_makeScene(&model, &scene_, static_cast<int>(model.ngeom) + ghost_geoms + kMostDecorations);
     mjr_defaultContext(&context_);
     // The context takes its sizes from the model's visual section.
     const MjModelPtr sized(mj_copyModel(nullptr, &model));

@@ -50,7 +50,7 @@ Pose BodyPose(const mjData& data, int body) {
 }
 
 void SetRow(const mjModel& model, const RunFrames& run, long row, mjData* data) {
-  mju_copy(data->qpos, run.qpos.row(row).data(), model.nq);
+  mju_copy(data->qpos, run.qpos.row(row).data(), static_cast<int>(model.nq));
   mj_kinematics(&model, data);
   mj_comPos(&model, data);
   mj_camlight(&model, data);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "controller/common/errors.h"
+#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
@@ -19,8 +20,7 @@ class GeomAdder {
     mjvGeom& geom = Add(mjGEOM_ARROW, arrow.color);
     // The engine draws arrows half as long as it is told.
     const Vector3d end = arrow.from + 2.0 * along;
-    mjv_makeConnector(&geom, mjGEOM_ARROW, arrow.radius, arrow.from.x(), arrow.from.y(), arrow.from.z(),
-                      end.x(), end.y(), end.z());
+    MakeConnector(mjGEOM_ARROW, arrow.radius, arrow.from.data(), end.data(), &geom);
   }
 
   void operator()(const Cone& cone) {

@@ -122,8 +122,8 @@ void StepChecks::SetApplying() {
   leave_out(setup_->watched_pairs().empty(), {kClearance, kCollision});
   leave_out(!setup_->scenario().plant.collide, {kCollision});
   const mjModel& engine = setup_->engine();
-  const mjtByte* const limited = engine.actuator_ctrllimited;
-  leave_out(std::none_of(limited, limited + engine.nu, [](mjtByte flag) { return flag != 0; }), {kActuators});
+  const auto* const limited = engine.actuator_ctrllimited;
+  leave_out(std::none_of(limited, limited + engine.nu, [](auto flag) { return flag != 0; }), {kActuators});
 }
 
 void StepChecks::RequireKnownBounds(const Scenario& scenario) {

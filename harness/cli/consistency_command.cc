@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -13,6 +12,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/interrupts.h"
+#include "harness/checks/tolerance.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/output_file.h"
@@ -21,7 +21,6 @@
 #include "harness/sides/answers_comparison.h"
 #include "harness/sides/program_side.h"
 #include "harness/sides/read_description.h"
-#include "harness/sides/tolerance.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -42,15 +41,6 @@ UrdfOptions MakeUrdfOptions(const ConsistencyRequest& request) {
   options.packages.assign(request.packages.begin(), request.packages.end());
   options.floating = request.floating;
   return options;
-}
-
-/// Accepts a number above 0 and below 1.
-std::string Fraction(const std::string& text) {
-  double value = 0.0;
-  const char* const end = text.data() + text.size();
-  const std::from_chars_result read = std::from_chars(text.data(), end, value);
-  if (read.ec == std::errc() && read.ptr == end && 0.0 < value && value < 1.0) return {};
-  return "must be a number above 0 and below 1, got " + Quote(text);
 }
 
 /// A description against what a program answers, or has answered; of an MJCF the engine is the other side.
@@ -113,7 +103,7 @@ int Run(ConsistencyRequest request) {
                                 request.options, progress);
     });
   }
-  if (const std::optional<double> tolerance = request.FindTolerance()) {
+  if (const std::optional<double> tolerance = request.judging.Find()) {
     JudgeByTolerance(*tolerance, &comparison.result);
   }
   if (!request.has_answers()) ExplainComparison(MakeUrdfOptions(request), &comparison);
@@ -169,16 +159,7 @@ void AddConsistencyCommand(Command app) {
                  "Write the results to this file (- for standard output, then without the table)")
       .TypeName("FILE.json");
   AddJUnitOption(command, &request->junit_file);
-  constexpr int kMostDigits = 15;
-  const Option digits = command
-                            .AddOption("--digits", &request->digits,
-                                       "Agreement to this many digits of a term's scale is enough")
-                            .TypeName("N")
-                            .Check(WholeNumber(1, kMostDigits));
-  command.AddOption("--tolerance", &request->tolerance, "The same as a relative tolerance")
-      .TypeName("REL")
-      .Check(Fraction)
-      .Excludes(digits);
+  AddToleranceOptions(command, &request->judging);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

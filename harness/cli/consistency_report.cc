@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "controller/common/text.h"
+#include "harness/checks/tolerance.h"
 #include "harness/cli/junit_file.h"
 #include "harness/engine/engine.h"
-#include "harness/sides/tolerance.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -90,7 +90,7 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
                static_cast<long>(record.at));
   }
   fmt::print("\nErrors are relative to each term's own scale; {} (README.md).\n",
-             request.FindTolerance()
+             request.judging.Find()
                  ? "bounds are those of rounding or the tolerance given, whichever is wider"
                  : "bounds follow from rounding");
 }
@@ -101,7 +101,7 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
   }
   if (result.Agrees()) {
-    const std::optional<double> tolerance = request.FindTolerance();
+    const std::optional<double> tolerance = request.judging.Find();
     fmt::print("AGREE: {} agree to {} in all {} terms.\n",
                comparison.with_engine  ? "the analytic model and MuJoCo"
                : request.has_answers() ? "the description and the answers"
@@ -135,7 +135,7 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
                {"seconds", result.seconds},
                {"verdict", Judge(code)}};
   json["notes"] = comparison.notes;
-  if (const std::optional<double> tolerance = request.FindTolerance()) json["tolerance"] = *tolerance;
+  if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
   json["checks"] = Json::object();
   for (const CheckRecord& record : result.gate.records) json["checks"][record.name] = ToJson(record, model);
   for (const CheckRecord& record : result.terms) json["checks"][record.name] = ToJson(record, model);

@@ -10,6 +10,7 @@
 
 #include "harness/checks/consistency.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/tolerance_options.h"
 #include "harness/sides/file_comparison.h"
 #include "harness/sides/program_side.h"
 
@@ -28,13 +29,7 @@ struct ConsistencyRequest {
   std::string json_file;
   std::string junit_file;
   bool quiet = false;
-  int digits = 0;                   ///< 0: not given.
-  std::optional<double> tolerance;  ///< Relative, wider than rounding.
-
-  /// By which published numbers are judged; none: by rounding.
-  [[nodiscard]] std::optional<double> FindTolerance() const {
-    return digits > 0 ? std::pow(10.0, -digits) : tolerance;
-  }
+  ToleranceOptions judging;
 
   /// What stands for B answers terms, and is no description.
   [[nodiscard]] bool has_answers() const { return !program.empty() || !answers.empty(); }

@@ -17,6 +17,7 @@
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
+#include "harness/cli/tolerance_options.h"
 #include "harness/diagnosis/diagnose.h"
 #include "harness/diagnosis/file_terms.h"
 #include "harness/engine/engine.h"
@@ -31,9 +32,16 @@ struct DiagnoseRequest {
   std::string a, b;  ///< Instead of --robot and --mjcf.
   RobotFiles files;
   DiagnosisOptions options;
+  ToleranceOptions judging;
   std::string json_file;
   bool quiet = false;
 };
+
+/// To what two files agree.
+std::string DescribeAgreement(const DiagnoseRequest& request) {
+  const std::optional<double> tolerance = request.judging.Find();
+  return tolerance ? fmt::format("{:g}", *tolerance) : "rounding";
+}
 
 bool IsRepairedWholly(const Diagnosis& diagnosis) {
   return diagnosis.remaining_terms.empty() && diagnosis.remaining_constants.empty();
@@ -57,8 +65,8 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotS
            const Diagnosis& diagnosis, const std::vector<Hypothesis>& hypotheses) {
   const std::string file = request.files.robot.filename().string();
   if (diagnosis.agrees) {
-    fmt::print("AGREE: nothing to explain: {} and {} agree to rounding at {} random states.\n", file,
-               request.files.mjcf.filename().string(), request.options.samples);
+    fmt::print("AGREE: nothing to explain: {} and {} agree to {} at {} random states.\n", file,
+               request.files.mjcf.filename().string(), DescribeAgreement(request), request.options.samples);
     return;
   }
   fmt::print("DISAGREE: {} against {}.\n", file, request.files.mjcf.filename().string());
@@ -82,7 +90,8 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotS
       fmt::print("  {:5.2g} %  {}\n", 100.0 * share, DescribeShort(cause, written));
   }
   if (IsRepairedWholly(diagnosis)) {
-    fmt::print("With {} the two agree to rounding.\n", number == 1 ? "it repaired" : "these repaired");
+    fmt::print("With {} the two agree to {}.\n", number == 1 ? "it repaired" : "these repaired",
+               DescribeAgreement(request));
   } else {
     PrintRemaining(request, model, diagnosis);
   }
@@ -114,6 +123,7 @@ std::string ToText(const DiagnoseRequest& request, const RobotSpec& written, con
       {"mujoco", mj_versionString()},          {"samples", request.options.samples},
       {"seed", request.options.seed},          {"verdict", diagnosis.agrees ? "pass" : "disagreement"},
       {"explained", diagnosis.explained},      {"explained_of_forces", diagnosis.explained_of_forces}};
+  if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
   json["hypotheses"] = ListHypotheses(hypotheses);
   json["causes"] = Json::array();
   for (const Repair& cause : diagnosis.causes) json["causes"].push_back(ToJson(cause, written, file));
@@ -151,6 +161,7 @@ RobotModel ReadGiven(const RobotFiles& files, const mjModel& engine, std::vector
 
 int Run(DiagnoseRequest request) {
   SortFiles(&request);
+  request.options.tolerance = request.judging.Find().value_or(0.0);
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
   std::vector<WrittenRow> rows;
   const RobotModel model = ReadGiven(request.files, *engine, &rows);
@@ -199,6 +210,7 @@ void AddDiagnoseCommand(Command app) {
   AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
   command.AddFlag("--by-motion", &request->options.by_motion,
                   "Use axes, frames and forces only, not the bodies' masses and inertias in the MJCF");
+  AddToleranceOptions(command, &request->judging);
   command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
       .TypeName("FILE.json");
   command.AddFlag("--quiet", &request->quiet, "No progress, and causes only");

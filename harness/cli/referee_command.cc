@@ -11,6 +11,7 @@
 
 #include "controller/common/text.h"
 #include "harness/base/interrupts.h"
+#include "harness/checks/tolerance.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
@@ -18,7 +19,6 @@
 #include "harness/sides/join_names.h"
 #include "harness/sides/read_description.h"
 #include "harness/sides/referee.h"
-#include "harness/sides/tolerance.h"
 
 namespace dexcheck::cli {
 namespace {

@@ -58,7 +58,7 @@ void BodyComparison::Compare(const std::vector<Parameter>& parameters, const std
   for (size_t i = 0; i < parameters.size(); ++i) {
     const double value = GetValue(spec_, parameters[i]);
     const double size = scale > 0.0 ? scale : std::max(std::abs(value), std::abs(values[i]));
-    if (!(std::abs(value - values[i]) > kSame * size)) continue;
+    if (!(std::abs(value - values[i]) > evidence_.Widen(kSame) * size)) continue;
     cause.parameters.push_back(parameters[i]);
     cause.values.push_back(values[i]);
   }
@@ -116,11 +116,11 @@ void BodyComparison::CompareBody(int link, std::vector<Repair>* causes) const {
   Compare(entries, values, std::max(here.inertia.trace(), there.inertia.trace()), causes);
 
   // A solid of another mass: both grow alike.
-  constexpr double kAlike = 1e-8;
+  const double alike = evidence_.Widen(1e-8);
   const bool mass = causes->size() > first && (*causes)[first].parameters.front().kind == Kind::kMass;
   if (!mass || causes->back().parameters.front().kind != Kind::kInertia) return;
   const Matrix3d expected = there.mass / here.mass * here.inertia;
-  if ((there.inertia - expected).norm() > kAlike * expected.norm()) return;
+  if ((there.inertia - expected).norm() > alike * expected.norm()) return;
   const Repair inertia = causes->back();
   causes->pop_back();
   Repair& whole = (*causes)[first];
@@ -138,7 +138,7 @@ void BodyComparison::CompareJoints(std::vector<Repair>* causes) const {
     double transverse[2];
     for (size_t k = 0; k < 2; ++k) transverse[k] = CalcWheelInertia(engine_, adapter_.wheels()[k]).transverse;
     // Wheels that differ from each other are no single number of the model.
-    if (std::abs(transverse[0] - transverse[1]) <= kSame * std::abs(transverse[0]))
+    if (std::abs(transverse[0] - transverse[1]) <= evidence_.Widen(kSame) * std::abs(transverse[0]))
       Compare({{Kind::kWheelTransverseInertia, -1, 0}}, {transverse[0]}, 0.0, causes);
   }
   const Vector3d there = MapVector(engine_.opt.gravity);

@@ -235,7 +235,7 @@ VectorXd BodyFit::CalcGains(const VectorXd& residual, const VectorXd* first) con
 
 bool BodyFit::Linearise() {
   residual_ = CalcResidual(spec_);
-  if (!(residual_.cwiseAbs().maxCoeff() > kFitRounding)) return false;
+  if (!(residual_.cwiseAbs().maxCoeff() > evidence_->Widen(kFitRounding))) return false;
   columns_ = CalcColumns(spec_, candidates_);
   for (size_t i = 0; i < candidates_.size(); ++i)
     columns_.col(static_cast<Eigen::Index>(i)) *= GetScale(spec_, candidates_[i]);
@@ -260,7 +260,7 @@ bool BodyFit::FindSolution(std::vector<Solution>* solutions) {
     for (const std::vector<Parameter>& set : sets) {
       Solution solution = Solve(set);
       DropUnchanged(&solution);
-      if (solution.worst <= kFitRounding) solutions->push_back(std::move(solution));
+      if (solution.worst <= evidence_->Widen(kFitRounding)) solutions->push_back(std::move(solution));
     }
     return !solutions->empty();
   };
@@ -329,7 +329,7 @@ BodyFit::Solution BodyFit::Grow() const {
   solution.worst = residual_.cwiseAbs().maxCoeff();
   solution.squared = residual_.squaredNorm();
   std::vector<Parameter> chosen;
-  while (chosen.size() < kMaxNumbers && solution.worst > kFitRounding) {
+  while (chosen.size() < kMaxNumbers && solution.worst > evidence_->Widen(kFitRounding)) {
     const VectorXd residual = CalcResidual(solution.repaired);
     VectorXd gains = (columns_.transpose() * residual).cwiseAbs2();
     for (Eigen::Index i = 0; i < gains.size(); ++i) {
@@ -353,27 +353,30 @@ BodyFit::Solution BodyFit::Grow() const {
 }
 
 void BodyFit::DropUnchanged(Solution* solution) const {
-  constexpr double kUnchanged = 1e-9;
+  const double few = evidence_->Widen(1e-9);
   std::erase_if(solution->parameters, [&](const Parameter& parameter) {
     const double change = GetValue(solution->repaired, parameter) - GetValue(spec_, parameter);
     const double size = parameter.kind == Kind::kInertia ? BodyOf(spec_, parameter.index).inertia.trace()
                                                          : GetScale(spec_, parameter);
-    const bool unchanged = std::abs(change) <= kUnchanged * size;
+    const bool unchanged = std::abs(change) <= few * size;
     if (unchanged) SetValue(&solution->repaired, parameter, GetValue(spec_, parameter));
     return unchanged;
   });
 }
 
+double BodyFit::Read(const Solution& solution, const Parameter& parameter) const {
+  return RoundWithin(spec_, parameter, GetValue(solution.repaired, parameter), evidence_->CalcSolvedDigits());
+}
+
 Repair BodyFit::ToCause(const Solution& solution) const {
   Repair cause;
   cause.parameters = solution.parameters;
-  for (const Parameter& parameter : solution.parameters)
-    cause.values.push_back(GetValue(solution.repaired, parameter));
+  for (const Parameter& parameter : solution.parameters) cause.values.push_back(Read(solution, parameter));
   return cause;
 }
 
 void BodyFit::MergeScaledBodies(std::vector<Repair>* causes) const {
-  constexpr double kSame = 1e-8;
+  const double same = evidence_->Widen(1e-8);
   for (size_t i = 0; i < causes->size(); ++i) {
     const Parameter mass = (*causes)[i].parameters.front();
     if (mass.kind != Kind::kMass || !(GetValue(spec_, mass) > 0.0)) continue;
@@ -385,7 +388,7 @@ void BodyFit::MergeScaledBodies(std::vector<Repair>* causes) const {
     RobotSpec scaled = spec_;
     Apply(*inertia, &scaled);
     const Matrix3d expected = ratio * BodyOf(spec_, mass.index).inertia;
-    if ((BodyOf(scaled, mass.index).inertia - expected).norm() > kSame * expected.norm()) continue;
+    if ((BodyOf(scaled, mass.index).inertia - expected).norm() > same * expected.norm()) continue;
     Repair& whole = (*causes)[i];
     whole.parameters.insert(whole.parameters.end(), inertia->parameters.begin(), inertia->parameters.end());
     whole.values.insert(whole.values.end(), inertia->values.begin(), inertia->values.end());
@@ -409,7 +412,7 @@ std::vector<Repair> BodyFit::Run() {
   std::stable_sort(order.begin(), order.end(),
                    [&](size_t a, size_t b) { return IsLikelier(whole[a], whole[b], spec_); });
   const Solution& chosen = solutions[order.front()];
-  if (!(chosen.worst <= kFitRounding)) return {};
+  if (!(chosen.worst <= evidence_->Widen(kFitRounding))) return {};
 
   // One cause for each thing that is changed.
   std::vector<Repair> causes;
@@ -420,7 +423,7 @@ std::vector<Repair> BodyFit::Run() {
     });
     Repair& cause = same == causes.end() ? causes.emplace_back() : *same;
     cause.parameters.push_back(parameter);
-    cause.values.push_back(GetValue(chosen.repaired, parameter));
+    cause.values.push_back(Read(chosen, parameter));
   }
   MergeScaledBodies(&causes);
   if (causes.size() == 1) {

@@ -68,6 +68,8 @@ class BodyFit {
   void DropUnchanged(Solution* solution) const;
   /// Makes one cause of a mass and an inertia that grow alike: a solid of another mass.
   void MergeScaledBodies(std::vector<Repair>* causes) const;
+  /// A number of a solution, to the digits that are solved for.
+  [[nodiscard]] double Read(const Solution& solution, const Parameter& parameter) const;
   [[nodiscard]] Repair ToCause(const Solution& solution) const;
 
   RobotSpec spec_;

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "controller/common/errors.h"
+#include "harness/checks/tolerance.h"
 #include "harness/diagnosis/body_comparison.h"
 #include "harness/diagnosis/body_fit.h"
 #include "harness/diagnosis/geometry_walk.h"
@@ -60,14 +61,14 @@ std::vector<Repair> Neutralise(const Adapter& adapter, const GateResult& gate, m
   joints.insert(joints.end(), adapter.base_joints().begin(), adapter.base_joints().end());
   for (const EngineWheel& wheel : adapter.wheels()) joints.push_back(wheel.joint);
   for (const int joint : joints) engine->jnt_stiffness[joint] = 0.0;
-  mju_zero(engine->dof_frictionloss, engine->nv);
+  std::fill_n(engine->dof_frictionloss, engine->nv, 0.0);
   for (const int joint : adapter.base_joints()) {
     const int dofs = engine->jnt_type[joint] == mjJNT_FREE ? 6 : 1;
     mju_zero(engine->dof_damping + engine->jnt_dofadr[joint], dofs);
     mju_zero(engine->dof_armature + engine->jnt_dofadr[joint], dofs);
   }
-  mju_zero(engine->tendon_stiffness, engine->ntendon);
-  mju_zero(engine->tendon_damping, engine->ntendon);
+  std::fill_n(engine->tendon_stiffness, engine->ntendon, 0.0);
+  std::fill_n(engine->tendon_damping, engine->ntendon, 0.0);
   engine->opt.disableflags = 0;
   engine->opt.density = 0.0;
   engine->opt.viscosity = 0.0;
@@ -104,14 +105,15 @@ class Diagnostician {
     progress("verdict");
     WithdrawWhatFails();
     const ConsistencyResult after = Compare(RobotModel(result_.repaired));
+    const double solved = std::max(kSolved, options_.tolerance);
     std::copy_if(after.gate.findings.begin(), after.gate.findings.end(),
-                 std::back_inserter(result_.remaining_constants), [](const GateFinding& finding) {
+                 std::back_inserter(result_.remaining_constants), [&](const GateFinding& finding) {
                    if (finding.engine_only) return false;  // named already
                    const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
-                   return !(std::abs(finding.model - finding.engine) <= kSolved * size);
+                   return !(std::abs(finding.model - finding.engine) <= solved * size);
                  });
     std::copy_if(after.terms.begin(), after.terms.end(), std::back_inserter(result_.remaining_terms),
-                 [](const CheckRecord& record) { return record.failed && !(record.worst <= kSolved); });
+                 [&](const CheckRecord& record) { return record.failed && !(record.worst <= solved); });
     Weigh();
     return std::move(result_);
   }
@@ -121,11 +123,14 @@ class Diagnostician {
     ConsistencyOptions options;
     options.samples = options_.samples;
     options.seed = options_.seed;
-    return CheckConsistency(Adapter(model, *engine_, source_), options, [](long) { return true; });
+    ConsistencyResult result =
+        CheckConsistency(Adapter(model, *engine_, source_), options, [](long) { return true; });
+    if (options_.tolerance > 0.0) JudgeByTolerance(options_.tolerance, &result);
+    return result;
   }
 
   [[nodiscard]] EngineEvidence Collect(const RobotModel& model) const {
-    return {model, *engine_, source_, options_.samples, options_.seed};
+    return {model, *engine_, source_, options_.samples, options_.seed, options_.tolerance};
   }
 
   /// Takes repairs with values as they will be printed, unless the result cannot be a robot; another repair
@@ -247,7 +252,7 @@ class Diagnostician {
   /// Withdraws what does not repair: nothing wrong is printed, however many numbers are wrong at once.
   void WithdrawWhatFails() {
     const RepairCheck check(model_.spec(), *engine_, source_, options_.samples, options_.seed,
-                            !options_.by_motion);
+                            !options_.by_motion, options_.tolerance);
     check.KeepWhatRepairs(&result_.causes);
     result_.repaired = model_.spec();
     for (const Repair& cause : result_.causes) Apply(cause, &result_.repaired);

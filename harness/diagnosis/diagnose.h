@@ -18,6 +18,9 @@ struct DiagnosisOptions {
   /// Use axes, frames and forces alone, not the engine's masses, centres of mass, inertias and joint
   /// constants: what would be known of a robot that can only be moved.
   bool by_motion = false;
+  /// Relative difference that is no mistake, since published numbers are rounded; 0: what rounding of doubles
+  /// leaves.
+  double tolerance = 0.0;
 };
 
 struct Diagnosis {

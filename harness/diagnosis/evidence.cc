@@ -15,7 +15,9 @@ constexpr int kBlocks = kProbes + 3;  // M times each probe, C xi, gravity, fric
 }  // namespace
 
 EngineEvidence::EngineEvidence(const RobotModel& model, const mjModel& engine,
-                               const std::string& engine_source, int samples, std::uint64_t seed) {
+                               const std::string& engine_source, int samples, std::uint64_t seed,
+                               double tolerance)
+    : tolerance_(tolerance) {
   const Adapter adapter(model, engine, engine_source);
   EngineTerms terms(adapter, Coordinates::kReduced);
   StateSource source(model, {}, seed);

@@ -3,6 +3,7 @@
 // What the engine says of the robot at a few random states, kept so that many variants of the analytic model
 // can be held against it.
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -26,13 +27,20 @@ struct Snapshot {
 /// Snapshots at random states, and the analytic model's forces in the same order and scale.
 class EngineEvidence {
  public:
+  /// @param tolerance relative difference that is no mistake: of published numbers, which are rounded.
   /// @throws InputError when model and engine do not match.
   EngineEvidence(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
-                 int samples, std::uint64_t seed);
+                 int samples, std::uint64_t seed, double tolerance = 0.0);
 
   [[nodiscard]] const std::vector<Snapshot>& snapshots() const { return snapshots_; }
   /// Largest distance of a point of the robot from its base, m.
   [[nodiscard]] double length() const { return length_; }
+
+  /// What a relative difference may be: what rounding leaves, or the tolerance when that is wider.
+  [[nodiscard]] double Widen(double rounding) const { return std::max(rounding, tolerance_); }
+  /// What solving for a number beside others that are rounded leaves open, relative: a tenth of the
+  /// tolerance, so that the number stays within it when it is rounded so.
+  [[nodiscard]] double CalcSolvedDigits() const { return 0.1 * tolerance_; }
 
   /// Forces that a variant of the model needs at the states: for each, M times the probes, C xi, gravity,
   /// friction. Each is divided by the root of the engine's M_ii and by the block's size, friction by the
@@ -52,6 +60,7 @@ class EngineEvidence {
   VectorXd engine_forces_;            // scaled
   VectorXd scale_;                    // what CalcRawForces is multiplied by
   double length_ = 0.0;
+  double tolerance_ = 0.0;
 };
 
 }  // namespace dexcheck

@@ -155,7 +155,7 @@ bool GeometryWalk::FindCause(int first, Repair* cause) {
     }
     constexpr double kSame = 1.0 + 1e-6;
     const double least = *std::min_element(errors.begin(), errors.end());
-    const double rounding = 1e-9;
+    const double rounding = placement_.evidence().Widen(1e-9);
     std::vector<Repair> kept;
     for (size_t i = 0; i < equal.size(); ++i) {
       if (errors[i] <= least * kSame + rounding) kept.push_back(equal[i]);
@@ -257,9 +257,10 @@ bool GeometryWalk::Iterate(const std::vector<Parameter>& parameters, const std::
   constexpr int kMaxIterations = 30;
   constexpr double kStep = 1e-6;
   constexpr double kConverged = 1e-14;
-  constexpr double kZero = 1e-9;       // far above what is left of a right solution, far below any mistake
-  constexpr double kExplained = 1e-3;  // of the residual, by a step
-  constexpr double kFar = 10.0;        // of the robot's size: no length is that long
+  const double zero =
+      placement_.evidence().Widen(1e-9);  // far above what is left of a right solution, far below any mistake
+  constexpr double kExplained = 1e-3;     // of the residual, by a step
+  constexpr double kFar = 10.0;           // of the robot's size: no length is that long
   constexpr double kLongestTurn =
       0.7;  // rad; Gauss-Newton steps that stay where the linearisation means something
   const auto count = static_cast<Eigen::Index>(parameters.size());
@@ -279,7 +280,7 @@ bool GeometryWalk::Iterate(const std::vector<Parameter>& parameters, const std::
     if (slope.colwise().norm().minCoeff() < 1e-9) return false;  // moves nothing of the target
     VectorXd step = -slope.colPivHouseholderQr().solve(residual);
     // Where the residual is least and not zero, a step explains next to nothing of it.
-    const bool is_zero = residual.cwiseAbs().maxCoeff() < kZero;
+    const bool is_zero = residual.cwiseAbs().maxCoeff() < zero;
     if (!is_zero && (slope * step).norm() < kExplained * residual.norm()) return false;
     double change = 0.0;
     for (size_t i = 0; i < parameters.size(); ++i) {
@@ -355,8 +356,9 @@ void GeometryWalk::TryParameters(int link, const std::vector<Parameter>& paramet
   for (const Parameter& parameter : parameters) placement_.Restore(spec_, parameter);
   if (!found) return;
   for (size_t i = 0; i < parameters.size(); ++i) {
-    if (IsRotation(parameters[i].kind))
-      best.cause.values[i] = std::remainder(best.cause.values[i], 2.0 * kPi);
+    double& value = best.cause.values[i];
+    if (IsRotation(parameters[i].kind)) value = std::remainder(value, 2.0 * kPi);
+    value = RoundWithin(spec_, parameters[i], value, placement_.evidence().CalcSolvedDigits());
   }
   candidates->push_back(best);
 }

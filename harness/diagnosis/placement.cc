@@ -210,19 +210,19 @@ int Placement::CountWrongNumbers(int index) const {
   const Pose& X = poses_[0][At(item.link)];
   const MassProperties& body = trial_.joints[static_cast<size_t>(item.index)].body;
   const LinkInWorld& engine = evidence_->snapshots()[0].links[static_cast<size_t>(item.index + 1)];
+  const double rounding = evidence_->Widen(kPlaceRounding);
   int wrong = 0;
   if (item.kind == PlacedItem::Kind::kCom) {
     const Vector3d difference = X.inverse() * engine.com - body.com;
-    for (const double entry : difference)
-      wrong += std::abs(entry) > kPlaceRounding * evidence_->length() ? 1 : 0;
+    for (const double entry : difference) wrong += std::abs(entry) > rounding * evidence_->length() ? 1 : 0;
   } else {
     const Matrix3d difference = X.linear().transpose() * engine.inertia * X.linear() - body.inertia;
     for (const int entry : {0, 3, 6, 4, 7, 8})
-      wrong += std::abs(difference.data()[entry]) > kPlaceRounding * body.inertia.trace() ? 1 : 0;
+      wrong += std::abs(difference.data()[entry]) > rounding * body.inertia.trace() ? 1 : 0;
   }
   return std::max(wrong, 1);
 }
 
-bool Placement::Fails(int item) const { return !(CalcError(item) <= kPlaceRounding); }
+bool Placement::Fails(int item) const { return !(CalcError(item) <= evidence_->Widen(kPlaceRounding)); }
 
 }  // namespace dexcheck

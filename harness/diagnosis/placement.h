@@ -29,6 +29,7 @@ class Placement {
 
   [[nodiscard]] const std::vector<PlacedItem>& items() const { return items_; }
   [[nodiscard]] const RobotSpec& trial() const { return trial_; }
+  [[nodiscard]] const EngineEvidence& evidence() const { return *evidence_; }
   /// Size of the robot, m.
   [[nodiscard]] double length() const { return evidence_->length(); }
   /// Items on links that move with a joint, by index in items(); -1: all.
@@ -54,7 +55,7 @@ class Placement {
   /// The item's differences over all snapshots, engine minus trial: lengths by the robot's, inertias by their
   /// trace, directions as they are. All zero when both agree.
   void AppendResidual(int item, std::vector<double>* rows) const;
-  /// Whether the largest of them is more than rounding.
+  /// Whether the largest of them is more than rounding, or the evidence's tolerance, leaves.
   [[nodiscard]] bool Fails(int item) const;
   /// How many numbers of the model would have to change to put it right by itself: components in the link's
   /// frame of what a body has wrong, three for an axis or a frame, none for what is right.

@@ -153,18 +153,21 @@ std::string Describe(const Repair& cause, const RobotSpec& spec, const std::stri
 
 namespace {
 
-/// The number with the fewest digits within what solving leaves open, and how many it has.
-std::pair<double, int> Round(double number) {
-  constexpr double kSolved = 1e-10;
+// What solving leaves open, relative.
+constexpr double kSolvedAccuracy = 1e-10;
+
+/// The number with the fewest digits within an accuracy, and how many it has.
+std::pair<double, int> Round(double number, double accuracy = kSolvedAccuracy) {
   for (int digits = 1; digits < kManyDigits; ++digits) {
     const double rounded = std::stod(fmt::format("{:.{}e}", number, digits - 1));
-    if (std::abs(rounded - number) < kSolved * std::abs(number)) return {rounded, digits};
+    if (std::abs(rounded - number) < accuracy * std::abs(number)) return {rounded, digits};
   }
   return {number, kManyDigits};
 }
 
-bool IsNothing(const RobotSpec& spec, const Parameter& parameter, double value) {
-  return std::abs(value) < 1e-11 * GetScale(spec, parameter);
+bool IsNothing(const RobotSpec& spec, const Parameter& parameter, double value,
+               double accuracy = kSolvedAccuracy) {
+  return std::abs(value) < 0.1 * accuracy * GetScale(spec, parameter);
 }
 
 }  // namespace
@@ -175,10 +178,15 @@ int CountDigits(const RobotSpec& spec, const Parameter& parameter, double value)
 }
 
 double RoundSolved(const RobotSpec& spec, const Parameter& parameter, double value) {
-  if (IsNothing(spec, parameter, value)) return 0.0;
-  const auto [rounded, digits] = Round(value);
+  return RoundWithin(spec, parameter, value, kSolvedAccuracy);
+}
+
+double RoundWithin(const RobotSpec& spec, const Parameter& parameter, double value, double accuracy) {
+  if (accuracy == 0.0) return value;
+  if (IsNothing(spec, parameter, value, accuracy)) return 0.0;
+  const auto [rounded, digits] = Round(value, accuracy);
   if (!IsAngle(spec, parameter)) return rounded;
-  const auto [degrees, degree_digits] = Round(RadToDeg(value));
+  const auto [degrees, degree_digits] = Round(RadToDeg(value), accuracy);
   return degree_digits <= digits && degree_digits < kManyDigits ? DegToRad(degrees) : rounded;
 }
 

@@ -53,6 +53,8 @@ double ReadBackPrinted(const RobotSpec& spec, const Parameter& parameter, double
 /// A solved value as a person would have written it, when that is within the accuracy of solving; else as it
 /// is.
 double RoundSolved(const RobotSpec& spec, const Parameter& parameter, double value);
+/// The same within a wider accuracy, relative; the value as it is when that is 0.
+double RoundWithin(const RobotSpec& spec, const Parameter& parameter, double value, double accuracy);
 
 /// Of repairs that remove as much, the likelier: whose numbers are rounder, then whose numbers are not zero
 /// in the file, then the earlier kind.

@@ -58,23 +58,23 @@ std::optional<Parameter> FindParameter(const RobotSpec& spec, const GateFinding&
 /// A repaired model and what is still wrong with it.
 struct RepairCheck::Trial {
   Trial(RobotSpec repaired, const mjModel& engine, const std::string& source, int samples, std::uint64_t seed,
-        bool bodies)
+        bool bodies, double tolerance)
       : spec(std::move(repaired)),
         model(spec),
-        evidence(model, engine, source, samples, seed),
+        evidence(model, engine, source, samples, seed, tolerance),
         placement(spec, evidence, bodies) {
     for (const GateFinding& finding : RunStaticGate(Adapter(model, engine, source)).findings) {
       const std::optional<Parameter> parameter = FindParameter(spec, finding);
       const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
-      const bool same = std::abs(finding.model - finding.engine) <= kSame * size;
+      const bool same = std::abs(finding.model - finding.engine) <= evidence.Widen(kSame) * size;
       if (parameter && !same) wrong.push_back(*parameter);
     }
-    axle_right = IsAxleRight(Adapter(model, engine, source), kSame * evidence.length());
+    axle_right = IsAxleRight(Adapter(model, engine, source), evidence.Widen(kSame) * evidence.length());
     if (bodies) {
       for (const Repair& cause : BodyComparison(spec, evidence, engine).Run())
         wrong.insert(wrong.end(), cause.parameters.begin(), cause.parameters.end());
     } else {
-      forces_agree = evidence.CalcForceResidual(model).cwiseAbs().maxCoeff() <= kSameForces;
+      forces_agree = evidence.CalcForceResidual(model).cwiseAbs().maxCoeff() <= evidence.Widen(kSameForces);
     }
   }
 
@@ -98,13 +98,14 @@ struct RepairCheck::Trial {
 };
 
 RepairCheck::RepairCheck(RobotSpec original, const mjModel& engine, std::string engine_source, int samples,
-                         std::uint64_t seed, bool bodies)
+                         std::uint64_t seed, bool bodies, double tolerance)
     : original_(std::move(original)),
       engine_(engine),
       source_(std::move(engine_source)),
       samples_(samples),
       seed_(seed),
-      bodies_(bodies) {}
+      bodies_(bodies),
+      tolerance_(tolerance) {}
 
 std::optional<RobotSpec> RepairCheck::MakeRepaired(std::span<const Repair> causes) const {
   RobotSpec spec = original_;
@@ -147,7 +148,7 @@ bool RepairCheck::Repairs(const Repair& cause, const Trial& trial) const {
 
 void RepairCheck::KeepWhatRepairs(std::vector<Repair>* causes) const {
   const auto make_trial = [&](const RobotSpec& spec) {
-    return Trial(spec, engine_, source_, samples_, seed_, bodies_);
+    return Trial(spec, engine_, source_, samples_, seed_, bodies_, tolerance_);
   };
   while (!causes->empty()) {
     const std::optional<RobotSpec> spec = MakeRepaired(*causes);

@@ -19,8 +19,9 @@ std::optional<Parameter> FindParameter(const RobotSpec& spec, const GateFinding&
 class RepairCheck {
  public:
   /// @param original the model as it is in the file. @param bodies whether the engine's bodies may be read.
+  /// @param tolerance relative difference that is no mistake.
   RepairCheck(RobotSpec original, const mjModel& engine, std::string engine_source, int samples,
-              std::uint64_t seed, bool bodies);
+              std::uint64_t seed, bool bodies, double tolerance = 0.0);
 
   /// Takes out the causes whose part (joint row, frame, body, constant) does not agree after all of them are
   /// applied, until all that stay do; and equivalents that do not do as well.
@@ -39,6 +40,7 @@ class RepairCheck {
   int samples_;
   std::uint64_t seed_;
   bool bodies_;
+  double tolerance_;
 };
 
 }  // namespace dexcheck

@@ -19,7 +19,7 @@ struct Rows {
 
 void FillPair(mjModel* m, int pair, const std::pair<int, int>& geoms) {
   const auto [a, b] = geoms;
-  m->name_pairadr[pair] = m->nnames - 1;  // no name
+  m->name_pairadr[pair] = static_cast<int>(m->nnames - 1);  // no name
   m->pair_dim[pair] = 3;
   m->pair_geom1[pair] = a;
   m->pair_geom2[pair] = b;
@@ -40,7 +40,7 @@ void FillPair(mjModel* m, int pair, const std::pair<int, int>& geoms) {
 }  // namespace
 
 MjModelPtr AddContactPairs(const mjModel& model, std::span<const std::pair<int, int>> geoms) {
-  if (model.opt.collision != mjCOL_PAIR) {
+  if (CollidesByType(model)) {
     throw InputError("MJCF: option collision: must be \"predefined\" for plant.collide");
   }
   auto* m = static_cast<mjModel*>(mju_malloc(sizeof(mjModel)));
@@ -50,7 +50,7 @@ MjModelPtr AddContactPairs(const mjModel& model, std::span<const std::pair<int, 
   ForEachArray(m, [&](auto* array, size_t rows, size_t columns, bool) {
     old.push_back({array, sizeof(*array) * rows * columns});
   });
-  const int first = m->npair;
+  const auto first = static_cast<int>(m->npair);
   m->npair += static_cast<int>(geoms.size());
   size_t bytes = 0;
   ForEachArray(m, [&](auto* array, size_t rows, size_t columns, bool) {

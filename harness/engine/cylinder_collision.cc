@@ -3,26 +3,17 @@
 #include <cmath>
 #include <mutex>
 
-#include "harness/engine/mujoco_release.h"
+#include "harness/engine/sphere_collision.h"
 
 namespace dexcheck {
 namespace {
 
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
 int CollideCylinderGeom(const mjModel* m, CollisionData* d, CollisionContact* con, int g1, int g2,
                         mjtNum margin) {
-  const Eigen::Map<const RowMatrix3d> R(d->geom_xmat + 9 * g2);
-  const Eigen::Map<const Vector3d> origin(d->geom_xpos + 3 * g2);
-  const Eigen::Map<const Vector3d> sphere(d->geom_xpos + 3 * g1);
-  const SphereCylinderContact contact =
-      CollideSphereCylinder(R.transpose() * (sphere - origin), m->geom_size[3 * g1], m->geom_size[3 * g2],
-                            m->geom_size[3 * g2 + 1]);
-  if (contact.distance > margin) return 0;
-  const Vector3d position = origin + R * contact.position;
-  const Vector3d normal = R * contact.normal;
-  FillContact(contact.distance, position.data(), normal.data(), con);
-  return 1;
+  const auto collide = [](const Vector3d& center, double radius, const Vector3d& size) {
+    return CollideSphereCylinder(center, radius, size[0], size[1]);
+  };
+  return CollideSphereGeom(*m, *d, g1, g2, margin, collide, con);
 }
 
 }  // namespace

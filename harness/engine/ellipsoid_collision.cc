@@ -2,30 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <mutex>
 
-#include "harness/engine/mujoco_release.h"
+#include "harness/engine/sphere_collision.h"
 
 namespace dexcheck {
 namespace {
 
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
 int CollideEllipsoidGeom(const mjModel* m, CollisionData* d, CollisionContact* con, int g1, int g2,
                          mjtNum margin) {
-  const Eigen::Map<const RowMatrix3d> R(d->geom_xmat + 9 * g2);
-  const Eigen::Map<const Vector3d> origin(d->geom_xpos + 3 * g2);
-  const Eigen::Map<const Vector3d> sphere(d->geom_xpos + 3 * g1);
-  const Eigen::Map<const Vector3d> semi_axes(m->geom_size + 3 * g2);
-  const Vector3d center = R.transpose() * (sphere - origin);
-  const double radius = m->geom_size[3 * g1];
-  if (center.norm() > semi_axes.maxCoeff() + radius + margin) return 0;
-  const SphereEllipsoidContact contact = CollideSphereEllipsoid(center, radius, semi_axes);
-  if (contact.distance > margin) return 0;
-  const Vector3d position = origin + R * contact.position;
-  const Vector3d normal = R * contact.normal;
-  FillContact(contact.distance, position.data(), normal.data(), con);
-  return 1;
+  const auto collide = [&](const Vector3d& center, double radius, const Vector3d& semi_axes) {
+    // Out of reach the nearest point need not be found.
+    if (center.norm() > semi_axes.maxCoeff() + radius + margin) {
+      return SphereEllipsoidContact{std::numeric_limits<double>::infinity(), Vector3d::Zero(),
+                                    Vector3d::Zero()};
+    }
+    return CollideSphereEllipsoid(center, radius, semi_axes);
+  };
+  return CollideSphereGeom(*m, *d, g1, g2, margin, collide, con);
 }
 
 }  // namespace

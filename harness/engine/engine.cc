@@ -67,11 +67,22 @@ std::string OneLine(std::string text) {
   return text;
 }
 
+/// What to do about a body that the engine's compiler refuses.
+std::string AdviseOnBody(const std::string& message) {
+  if (message.find("mass and inertia of moving bodies") != std::string::npos)
+    return "; what a joint moves needs a mass and an inertia about all three axes, in that body or in one "
+           "that is fixed to it";
+  if (message.find("A + B >= C") != std::string::npos)
+    return "; no body has such principal moments: the inertia of that one is wrong, or its unit is";
+  return {};
+}
+
 MjModelPtr Load(const std::string& path, const mjVFS* vfs, const std::string& source) {
   char message[1024] = "";
   MjModelPtr model(mj_loadXML(path.c_str(), vfs, message, sizeof(message)));
   if (!model) {
-    throw InputError(source + ": not a valid MJCF model: " + OneLine(message) + ExplainNewerMjcf(message));
+    throw InputError(source + ": not a valid MJCF model: " + OneLine(message) + ExplainNewerMjcf(message) +
+                     AdviseOnBody(message));
   }
   CheckFinite(*model, source);
   if (message[0] != '\0') {

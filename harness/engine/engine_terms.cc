@@ -57,7 +57,7 @@ EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates, std::s
       base_size_(static_cast<int>(map_.base_columns().cols())),
       carrying_dofs_(static_cast<int>(map_.base_dofs().size() - adapter.wheels().size())),
       object_body_(adapter.object_body()) {
-  const int nv = engine_->nv;
+  const auto nv = static_cast<int>(engine_->nv);
   const int n = map_.size();
   for (const std::vector<int>& welded : adapter.welded_bodies()) {
     robot_bodies_.insert(robot_bodies_.end(), welded.begin(), welded.end());

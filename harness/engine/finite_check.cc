@@ -30,7 +30,9 @@ void CheckFinite(const mjModel& model, const std::string& source) {
       throw InputError(source + ": " + describe(i) + " must be finite, got " + FormatNumber(values[i]));
     }
   };
-  const auto option = [](const char* name) { return [name](int) { return std::string("option ") + name; }; };
+  const auto option = [](const char* name) {
+    return [name](EngineSize) { return std::string("option ") + name; };
+  };
   check(&model.opt.timestep, 1, option("timestep"));
   check(model.opt.gravity, 3, option("gravity"));
   check(&model.opt.density, 1, option("density"));
@@ -59,8 +61,8 @@ void CheckFinite(const mjModel& model, const std::string& source) {
       {"pair", mjOBJ_PAIR, "friction", model.pair_friction, model.npair, 5},
   };
   for (const Attribute& attribute : attributes) {
-    check(attribute.values, attribute.count * attribute.width, [&](int i) {
-      const int entry = i / attribute.width;
+    check(attribute.values, attribute.count * attribute.width, [&](EngineSize i) {
+      const auto entry = static_cast<int>(i / attribute.width);
       const int element = attribute.owner == nullptr ? entry : attribute.owner[entry];
       return std::string(attribute.kind) + " " + Quote(NameOf(model, attribute.type, element)) + ": " +
              attribute.name;

@@ -2,18 +2,21 @@
 
 // What differs between MuJoCo's releases, as far as dexcheck's code touches it: everything that must be
 // written in two ways stands here. dexcheck is built and tested with 2.2.2, which Debian 12 has. The other
-// branches are written for 3.x after its public headers up to 3.12; no build with 3.x has been made.
+// branches are written for 3.x: those of 3.12.1's public headers are compiled, and nothing was linked or run.
 //
 // | since | what |
 // |---|---|
-// | 3.2  | files in memory by mj_addBufferVFS; mj_makeEmptyFileVFS and the tables of mjVFS are gone |
-// | 3.3  | mj_makeM makes the mass matrix, rotors of tendons included |
-// | 3.5  | version numbers have three digits for minor and patch: 3005000; sizes are mjtSize |
-// | 3.6  | the tendons' Jacobian is sparse in any case, and its rows are the model's |
-// | 3.7  | collision functions get data that they may write |
-// | 3.9  | they fill mjPreContact (distance, position, normal, tangent) in the place of mjContact |
-// | 3.10 | mj_fullM(m, d, M) |
-// | 3.11 | qM is gone: M has compressed rows of the lower triangle |
+// | 3.0   | option collision is gone; eq_active is what acts now, eq_active0 what acts at first |
+// | 3.2   | files in memory by mj_addBufferVFS; mj_makeEmptyFileVFS and the tables of mjVFS are gone |
+// | 3.2   | (or before) mjv_connector takes points; sensors have no noise |
+// | 3.2.3 | mpr_iterations, mpr_tolerance are ccd_iterations, ccd_tolerance |
+// | 3.3   | mj_makeM makes the mass matrix, rotors of tendons included |
+// | 3.5   | version numbers have three digits for minor and patch: 3005000; sizes are mjtSize |
+// | 3.6   | the tendons' Jacobian is sparse in any case, and its rows are the model's |
+// | 3.7   | collision functions get data that they may write |
+// | 3.9   | they fill mjPreContact (distance, position, normal, tangent) in the place of mjContact |
+// | 3.10  | mj_fullM(m, d, M) |
+// | 3.11  | qM is gone: M has compressed rows of the lower triangle |
 //
 // What an MJCF says in another way since a release (limits by default, ...) is told by newer_mjcf.h.
 
@@ -34,6 +37,63 @@ using EngineSize = mjtSize;
 #else
 using EngineSize = int;
 #endif
+
+/// Whether geoms may collide by their masks (contype, conaffinity), and whether those of <pair>s may. An
+/// option of 2.2.2 excludes one of them; in 3.x both may, and geoms whose masks are zero do not collide.
+#if mjVERSION_HEADER >= 300
+inline bool CollidesByType(const mjModel& m) {
+  const auto is_set = [](int mask) { return mask != 0; };
+  return std::any_of(m.geom_contype, m.geom_contype + m.ngeom, is_set) ||
+         std::any_of(m.geom_conaffinity, m.geom_conaffinity + m.ngeom, is_set);
+}
+inline bool CollidesByPair(const mjModel& /*m*/) { return true; }
+/// The option's value; that of "all" where there is none.
+inline int GetCollisionOption(const mjModel& /*m*/) { return 0; }
+#else
+inline bool CollidesByType(const mjModel& m) { return m.opt.collision != mjCOL_PAIR; }
+inline bool CollidesByPair(const mjModel& m) { return m.opt.collision != mjCOL_DYNAMIC; }
+inline int GetCollisionOption(const mjModel& m) { return m.opt.collision; }
+#endif
+
+/// By equality constraint: whether it acts when a run starts.
+#if mjVERSION_HEADER >= 300
+inline auto* GetEqualityActive(const mjModel& m) { return m.eq_active0; }
+#else
+inline auto* GetEqualityActive(const mjModel& m) { return m.eq_active; }
+#endif
+
+/// Enable flag that adds noise to sensors; 0 where there is none.
+#if mjVERSION_HEADER >= 320
+inline constexpr int kSensorNoiseFlag = 0;
+#else
+inline constexpr int kSensorNoiseFlag = mjENBL_SENSORNOISE;
+#endif
+
+/// How the general collider of convex bodies ends: most iterations, and tolerance, m.
+#if mjVERSION_HEADER >= 323
+inline int GetColliderIterations(const mjOption& option) { return option.ccd_iterations; }
+inline mjtNum GetColliderTolerance(const mjOption& option) { return option.ccd_tolerance; }
+#else
+inline int GetColliderIterations(const mjOption& option) { return option.mpr_iterations; }
+inline mjtNum GetColliderTolerance(const mjOption& option) { return option.mpr_tolerance; }
+#endif
+
+/// What the engine warned of. Its information is an int, or in later releases a size.
+inline std::string DescribeWarning(const mjData& d, int warning) {
+  const auto describe = [&]<typename Info>(const char* (*text)(int, Info)) {
+    return std::string(text(warning, static_cast<Info>(d.warning[warning].lastinfo)));
+  };
+  return describe(mju_warningText);
+}
+
+/// Lets a drawn geom reach from one point to another.
+inline void MakeConnector(int type, mjtNum width, const mjtNum* from, const mjtNum* to, mjvGeom* geom) {
+#if mjVERSION_HEADER >= 320
+  mjv_connector(geom, type, width, from, to);
+#else
+  mjv_makeConnector(geom, type, width, from[0], from[1], from[2], to[0], to[1], to[2]);
+#endif
+}
 
 /// "2.2.2" of 222, "3.12.1" of 3012001.
 inline std::string FormatRelease(int version) {

@@ -80,7 +80,7 @@ int RemoveLooks(mjModel* m, std::span<const int> wanted) {
     new_id[static_cast<size_t>(geom)] = static_cast<int>(stay.size());
     stay.push_back(geom);
   }
-  const int removed = m->ngeom - static_cast<int>(stay.size());
+  const auto removed = static_cast<int>(m->ngeom) - static_cast<int>(stay.size());
   if (removed == 0 || !HasKnownLayout(m)) return 0;
 
   const auto renumber = [&](int* geom) {

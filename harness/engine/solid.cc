@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "harness/engine/engine.h"
+#include "harness/engine/mujoco_release.h"
 #include "harness/engine/torus_collision.h"
 
 namespace dexcheck {
@@ -106,7 +107,7 @@ Solids ListSolids(const mjModel& m) {
     const int b = index[static_cast<size_t>(m.pair_geom2[pair])];
     if (a >= 0 && b >= 0) solids.declared.emplace_back(std::min(a, b), std::max(a, b));
   }
-  if (m.opt.collision == mjCOL_PAIR) return solids;
+  if (!CollidesByType(m)) return solids;
   const int count = static_cast<int>(solids.list.size());
   for (int a = 0; a < count; ++a) {
     const int g = solids.list[static_cast<size_t>(a)].geom;

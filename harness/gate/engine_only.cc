@@ -85,7 +85,7 @@ class EngineOnly {
   void FindConstraints() {
     for (int i = 0; i < engine_.neq; ++i) {
       Expect("equality_constraint", Name(mjOBJ_EQUALITY, "constraint", i), 0.0,
-             engine_.eq_active[i] != 0 ? 1.0 : 0.0);
+             GetEqualityActive(engine_)[i] != 0 ? 1.0 : 0.0);
     }
   }
 
@@ -114,7 +114,7 @@ class EngineOnly {
   void FindFlags() {
     // Sensors measure only; so do the energy, the comparison with the inverse dynamics and sensors' noise.
     constexpr int kHarmlessToDisable = mjDSBL_SENSOR;
-    constexpr int kHarmlessToEnable = mjENBL_ENERGY | mjENBL_FWDINV | mjENBL_SENSORNOISE;
+    constexpr int kHarmlessToEnable = mjENBL_ENERGY | mjENBL_FWDINV | kSensorNoiseFlag;
     const auto find = [&](const char* check, std::span<const char* const> names, int flags, int harmless) {
       for (size_t i = 0; i < names.size(); ++i) {
         const int flag = 1 << i;
@@ -238,8 +238,7 @@ class EngineOnly {
     for (int pair = 0; pair < engine_.npair; ++pair)
       touches |= engine_.pair_geom1[pair] == geom || engine_.pair_geom2[pair] == geom;
     const bool by_type = engine_.geom_contype[geom] != 0 || engine_.geom_conaffinity[geom] != 0;
-    return (touches && engine_.opt.collision != mjCOL_DYNAMIC) ||
-           (by_type && engine_.opt.collision != mjCOL_PAIR);
+    return (touches && CollidesByPair(engine_)) || (by_type && CollidesByType(engine_));
   }
 
   /// Planes that a geom has a contact pair with.
@@ -255,10 +254,10 @@ class EngineOnly {
   }
 
   void NoteContactsByType() {
-    if (engine_.opt.collision == mjCOL_PAIR) return;
+    if (!CollidesByType(engine_)) return;
     Note("contacts_by_type",
          fmt::format("option collision {}: geoms touch by contype and conaffinity, but {} pairs of bodies",
-                     engine_.opt.collision, engine_.nexclude));
+                     GetCollisionOption(engine_), engine_.nexclude));
     for (int geom = 0; geom < engine_.ngeom; ++geom) {
       if (engine_.geom_contype[geom] == 0 && engine_.geom_conaffinity[geom] == 0) continue;
       Note("contacts_by_type",
@@ -286,12 +285,13 @@ class EngineOnly {
              "a run sets the time step ({:.17g} s here), impratio ({:.17g}), noslip iterations ({}) and "
              "the stiffness of all contact pairs; joint damping acts as an explicit force",
              option.timestep, option.impratio, option.noslip_iterations));
-    Note("solver", fmt::format("integrator {}, cone {}, jacobian {}, solver {}, iterations {}, tolerance "
-                               "{:.17g}, noslip tolerance {:.17g}, "
-                               "mpr iterations {}, mpr tolerance {:.17g}, mean inertia {:.17g}",
-                               option.integrator, option.cone, option.jacobian, option.solver,
-                               option.iterations, option.tolerance, option.noslip_tolerance,
-                               option.mpr_iterations, option.mpr_tolerance, engine_.stat.meaninertia));
+    Note("solver",
+         fmt::format("integrator {}, cone {}, jacobian {}, solver {}, iterations {}, tolerance "
+                     "{:.17g}, noslip tolerance {:.17g}, "
+                     "mpr iterations {}, mpr tolerance {:.17g}, mean inertia {:.17g}",
+                     option.integrator, option.cone, option.jacobian, option.solver, option.iterations,
+                     option.tolerance, option.noslip_tolerance, GetColliderIterations(option),
+                     GetColliderTolerance(option), engine_.stat.meaninertia));
   }
 
   const Adapter& adapter_;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "controller/common/text.h"
+#include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
@@ -26,7 +27,7 @@ int FindMotor(const mjModel& model, int joint) {
   return found;
 }
 
-VectorXd Copy(const mjtNum* values, int count) { return Eigen::Map<const VectorXd>(values, count); }
+VectorXd Copy(const mjtNum* values, EngineSize count) { return Eigen::Map<const VectorXd>(values, count); }
 
 }  // namespace
 
@@ -41,8 +42,8 @@ EngineSimulation::EngineSimulation(const Adapter& adapter, bool implicit_damping
     damping.setZero();
   }
   // Whoever commands torques keeps to the limits; friction comes on top.
-  std::fill_n(model_->actuator_ctrllimited, model_->nu, mjtByte{0});
-  std::fill_n(model_->actuator_forcelimited, model_->nu, mjtByte{0});
+  std::fill_n(model_->actuator_ctrllimited, model_->nu, 0);
+  std::fill_n(model_->actuator_forcelimited, model_->nu, 0);
   for (const EngineWheel& wheel : adapter.wheels()) motors_.push_back(FindMotor(*model_, wheel.joint));
   for (const int joint : adapter.joint_ids()) motors_.push_back(FindMotor(*model_, joint));
   for (const int motor : motors_) dofs_.push_back(model_->jnt_dofadr[model_->actuator_trnid[2 * motor]]);
@@ -85,7 +86,7 @@ std::vector<Motor> EngineSimulation::ListMotors() const {
     const double gear = std::abs(model_->actuator_gear[6 * motor]);
     double limit = std::numeric_limits<double>::infinity();
     // The engine cuts off the control and, of a motor with gain 1, the force alike.
-    const auto cut = [&](mjtByte limited, const mjtNum* range) {
+    const auto cut = [&](auto limited, const mjtNum* range) {
       if (limited != 0) limit = std::min(limit, gear * std::min(-range[0], range[1]));
     };
     cut(adapter_->engine().actuator_ctrllimited[motor], model_->actuator_ctrlrange + 2 * motor);
@@ -107,8 +108,7 @@ void EngineSimulation::CheckHealth(double expected_time) const {
   // After a bad position, velocity or acceleration the engine warns and starts over, at time zero.
   for (int i = 0; i < mjNWARNING; ++i) {
     if (data_->warning[i].number == 0) continue;
-    throw DivergenceError("MuJoCo at t = " + FormatNumber(data_->time) +
-                          " s: " + mju_warningText(i, data_->warning[i].lastinfo));
+    throw DivergenceError("MuJoCo at t = " + FormatNumber(data_->time) + " s: " + DescribeWarning(*data_, i));
   }
   const bool finite = Eigen::Map<const VectorXd>(data_->qpos, model_->nq).allFinite() &&
                       Eigen::Map<const VectorXd>(data_->qvel, model_->nv).allFinite();

@@ -20,11 +20,11 @@
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/base/version.h"
+#include "harness/checks/tolerance.h"
 #include "harness/sides/audit.h"
 #include "harness/sides/file_comparison.h"
 #include "harness/sides/function_side.h"
 #include "harness/sides/read_description.h"
-#include "harness/sides/tolerance.h"
 
 namespace py = pybind11;
 

@@ -121,9 +121,14 @@ void RunRecorder::AddStateSignals() {
   const std::string xi_dot_units = is_named ? ListJointUnits(model, xi_base, "/s^2") : "m/s^2, rad/s^2";
   const LogColumns qpos = ListPositionColumns(m);
   const LogColumns qvel = ListVelocityColumns(m);
-  Add({"engine/qpos", qpos.units, "MuJoCo's positions, quaternions wxyz", m.nq, qpos.names, {}},
+  Add({"engine/qpos",
+       qpos.units,
+       "MuJoCo's positions, quaternions wxyz",
+       static_cast<int>(m.nq),
+       qpos.names,
+       {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.qpos, row); });
-  Add({"engine/qvel", qvel.units, "MuJoCo's velocities", m.nv, qvel.names, {}},
+  Add({"engine/qvel", qvel.units, "MuJoCo's velocities", static_cast<int>(m.nv), qvel.names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.qvel, row); });
   const int n = model.num_velocities();
   Add({"q", q_units, "q' as read from the plant", model.num_positions(), q_names, {}},

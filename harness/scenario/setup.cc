@@ -13,6 +13,7 @@
 #include "controller/model/parameter_reader.h"
 #include "controller/object/euler_zyz.h"
 #include "harness/engine/add_contact_pairs.h"
+#include "harness/engine/mujoco_release.h"
 #include "harness/engine/remove_looks.h"
 #include "harness/scenario/mismatch.h"
 
@@ -324,7 +325,7 @@ void Setup::MakeBonds() {
                        Quote(NameOf(m, mjOBJ_BODY, object)));
     }
     bond_constraints_.push_back(found);
-    m.eq_active[found] = 1;
+    GetEqualityActive(m)[found] = 1;
     SetStiffness(m.pair_solref[0], scenario_.plant.contact_impedance, m.eq_solref + mjNREF * found,
                  m.eq_solimp + mjNIMP * found);
     // The same point in both bodies.

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "harness/engine/engine.h"
+#include "harness/engine/mujoco_release.h"
 #include "harness/sides/engine_coupling.h"
 #include "harness/sides/join_names.h"
 
@@ -111,7 +112,7 @@ class DescriptionCheck {
 
 int FindCouplingConstraint(const mjModel& engine, int joint) {
   for (int eq = 0; eq < engine.neq; ++eq) {
-    if (engine.eq_type[eq] != mjEQ_JOINT || engine.eq_active[eq] == 0) continue;
+    if (engine.eq_type[eq] != mjEQ_JOINT || GetEqualityActive(engine)[eq] == 0) continue;
     if (engine.eq_obj1id[eq] != joint || engine.eq_obj2id[eq] < 0) continue;
     const mjtNum* a = engine.eq_data + mjNEQDATA * eq;
     if (a[2] == 0.0 && a[3] == 0.0 && a[4] == 0.0) return eq;

@@ -36,7 +36,6 @@ std::string FindRoot(XMLElement* robot) {
   return {};
 }
 
-/// MuJoCo lets move freely only what hangs on a link called "world".
 /// Removes the inertials of what never moves: published robots have such that the engine refuses.
 void RemoveFixedInertials(XMLElement* robot) {
   std::set<std::string> standing = {FindRoot(robot)};
@@ -60,6 +59,7 @@ void RemoveFixedInertials(XMLElement* robot) {
   }
 }
 
+/// MuJoCo lets move freely only what hangs on a link called "world".
 void LetFloat(XMLElement* robot) {
   const std::string root = FindRoot(robot);
   for (XMLElement* joint = robot->FirstChildElement("joint"); joint != nullptr;
@@ -82,13 +82,30 @@ void LetFloat(XMLElement* robot) {
   joint->InsertNewChildElement("child")->SetAttribute("link", root.c_str());
 }
 
+XMLElement* ParseRobot(std::string_view text, const std::string& source, tinyxml2::XMLDocument* document) {
+  document->Parse(text.data(), text.size());
+  XMLElement* const robot = document->Error() ? nullptr : document->FirstChildElement("robot");
+  if (robot == nullptr) throw InputError(source + ": must be a URDF");
+  return robot;
+}
+
+std::string Print(const tinyxml2::XMLDocument& document) {
+  tinyxml2::XMLPrinter printer;
+  document.Print(&printer);
+  return printer.CStr();
+}
+
 }  // namespace
+
+std::string RemoveMaterials(std::string_view text, const std::string& source) {
+  tinyxml2::XMLDocument document;
+  RemoveChildren(ParseRobot(text, source, &document), {"material"});
+  return Print(document);
+}
 
 std::string WriteEngineUrdf(std::string_view text, const std::string& source, bool floats) {
   tinyxml2::XMLDocument document;
-  document.Parse(text.data(), text.size());
-  XMLElement* const robot = document.Error() ? nullptr : document.FirstChildElement("robot");
-  if (robot == nullptr) throw InputError(source + ": must be a URDF");
+  XMLElement* const robot = ParseRobot(text, source, &document);
   RemoveChildren(robot, {"gazebo", "transmission", "material", "mujoco", "sensor"});
   for (XMLElement* link = robot->FirstChildElement("link"); link != nullptr;
        link = link->NextSiblingElement("link")) {
@@ -99,9 +116,7 @@ std::string WriteEngineUrdf(std::string_view text, const std::string& source, bo
   compiler->SetAttribute("discardvisual", "true");
   robot->InsertFirstChild(compiler->Parent());
   floats ? LetFloat(robot) : RemoveFixedInertials(robot);
-  tinyxml2::XMLPrinter printer;
-  document.Print(&printer);
-  return printer.CStr();
+  return Print(document);
 }
 
 }  // namespace dexcheck

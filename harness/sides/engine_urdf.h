@@ -11,4 +11,7 @@ namespace dexcheck {
 /// @throws InputError "SOURCE: ..." when it is no URDF.
 std::string WriteEngineUrdf(std::string_view text, const std::string& source, bool floats);
 
+/// A URDF without the robot's materials. @throws InputError "SOURCE: ..." when it is no URDF.
+std::string RemoveMaterials(std::string_view text, const std::string& source);
+
 }  // namespace dexcheck

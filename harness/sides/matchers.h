@@ -15,9 +15,9 @@
 #include <ostream>
 #include <string>
 
+#include "harness/checks/tolerance.h"
 #include "harness/sides/file_comparison.h"
 #include "harness/sides/function_side.h"
-#include "harness/sides/tolerance.h"
 
 namespace dexcheck::testing {
 

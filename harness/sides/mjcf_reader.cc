@@ -28,7 +28,7 @@ Pose MapPose(const mjtNum* position, const mjtNum* quaternion) {
 class MjcfDescriptionReader {
  public:
   MjcfDescriptionReader(const mjModel& engine, std::string source)
-      : engine_(engine), source_(std::move(source)), other_equalities_(engine.neq) {}
+      : engine_(engine), source_(std::move(source)), other_equalities_(static_cast<int>(engine.neq)) {}
 
   RobotDescription Read() {
     robot_.spec.name = *engine_.names == '\0' ? source_ : engine_.names;
@@ -241,7 +241,7 @@ class MjcfDescriptionReader {
       if (engine_.jnt_stiffness[id] != 0.0) springs.push_back(NameOf(engine_, mjOBJ_JOINT, id));
     }
     if (!springs.empty()) left.push_back("springs of " + JoinNames(springs));
-    const auto count = [&](int number, const std::string& what) {
+    const auto count = [&](auto number, const std::string& what) {
       if (number > 0) left.push_back(std::to_string(number) + " " + what);
     };
     count(engine_.ntendon, "tendons");

@@ -1,5 +1,6 @@
 #include "harness/sides/read_description.h"
 
+#include "controller/common/errors.h"
 #include "controller/model/body_frame.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/engine/engine.h"
@@ -35,12 +36,30 @@ RobotDescription ReadTable(const std::filesystem::path& path) {
   return robot;
 }
 
+/// A URDF. When a body that no robot can have is all that stands against it, the audit reads it.
+RobotDescription ReadUrdfOrPointToAudit(const std::filesystem::path& path, const UrdfOptions& options) {
+  try {
+    return ReadUrdf(path, options);
+  } catch (const InputError& error) {
+    if (options.keep_impossible) throw;
+    UrdfOptions kept = options;
+    kept.keep_impossible = true;
+    try {
+      static_cast<void>(ReadUrdf(path, kept));
+    } catch (const InputError&) {
+      throw error;
+    }
+    throw InputError(std::string(error.what()) + " (dexcheck audit " + path.string() +
+                     " reads it all the same, and lists all that is impossible or odd)");
+  }
+}
+
 }  // namespace
 
 RobotDescription ReadDescription(const std::filesystem::path& path, const UrdfOptions& options) {
   switch (FindFormat(path)) {
     case RobotFormat::kUrdf:
-      return ReadUrdf(path, options);
+      return ReadUrdfOrPointToAudit(path, options);
     case RobotFormat::kMjcf:
       return ReadMjcfDescription(*LoadMjcf(path), path.string());
     case RobotFormat::kToml:

@@ -12,6 +12,7 @@
 #include "controller/model/body_frame.h"
 #include "harness/base/files.h"
 #include "harness/base/shell.h"
+#include "harness/gate/static_gate.h"
 #include "harness/sides/complete_description.h"
 #include "harness/sides/engine_settings.h"
 #include "harness/sides/engine_urdf.h"
@@ -43,8 +44,9 @@ class RefereeRun {
       Add(program.substr(0, equals), [&] { return MakeProgram(program.substr(equals + 1)); });
     }
     if (sides_.size() < 2) {
-      throw InputError("referee: two engines must be there, got " + std::to_string(sides_.size()) +
-                       (result_.absent.empty() ? "" : "; " + JoinNames(result_.absent)));
+      std::string text = "referee: two engines must be there, got " + std::to_string(sides_.size());
+      for (const std::string& absent : result_.absent) text += "; " + absent;
+      throw InputError(text);
     }
     Compare(progress);
     FormGroups();
@@ -134,9 +136,21 @@ class RefereeRun {
     return mujoco_file_;
   }
 
+  /// What MuJoCo makes of a file; a refusal speaks of the file that the user knows.
+  [[nodiscard]] MjModelPtr Load(const std::filesystem::path& path) const {
+    try {
+      return LoadMjcf(path);
+    } catch (const InputError& error) {
+      std::string text = error.what();
+      const size_t at = text.find(path.string());
+      if (folder_ && at != std::string::npos) text.replace(at, path.string().size(), file_.string());
+      throw InputError(text);
+    }
+  }
+
   SidePtr MakeMujoco() {
     const std::filesystem::path path = MujocoFile();
-    MjModelPtr engine = LoadMjcf(path);
+    MjModelPtr engine = Load(path);
     if (FindFormat(path) == RobotFormat::kUrdf) {
       for (int k = 0; k < 3; ++k) engine->opt.gravity[k] = robot_.spec.gravity[k];
     }
@@ -159,6 +173,7 @@ class RefereeRun {
       others_.push_back({"as with what only " + file + " states: armature, damping, gravity", completed});
     }
     NoteCompiledInertias(*engine, path.string(), completed);
+    NoteOtherForces(Adapter(RobotModel(completed.spec), *engine, path.string()));
     return std::make_unique<EngineSide>(completed, std::move(engine), path.string(),
                                         std::string("MuJoCo ") + mj_versionString());
   }
@@ -183,6 +198,20 @@ class RefereeRun {
     others_.push_back(
         {fmt::format("as with the inertias that its compiler made of the file, up to {:.0e} off", largest),
          completed});
+  }
+
+  /// What the engine counts among its passive forces, as friction, and no description has.
+  void NoteOtherForces(const Adapter& adapter) {
+    constexpr const char* kChecks[] = {"joint_spring", "tendon_spring", "tendon_damping", "fluid"};
+    std::vector<std::string> parts;
+    for (const GateFinding& finding : RunStaticGate(adapter).findings) {
+      if (std::find(std::begin(kChecks), std::end(kChecks), finding.check) == std::end(kChecks)) continue;
+      std::string part = finding.check;
+      std::replace(part.begin(), part.end(), '_', ' ');
+      parts.push_back(part + (finding.where.empty() ? "" : " of " + finding.where));
+    }
+    if (!parts.empty())
+      other_forces_ = "its friction has forces that no description has: " + JoinNames(parts);
   }
 
   [[nodiscard]] StateFeed MakeFeed() const { return FeedRandomStates(model_, options_.states); }
@@ -241,6 +270,8 @@ class RefereeRun {
             [&](const BaseConvention& convention) { answering->set_convention(convention); }, make_feed);
         if (other) setting = "as with its base in " + Describe(*other);
       }
+      const bool is_mujoco = dynamic_cast<EngineSide*>(side) != nullptr;
+      if (!setting && is_mujoco && !other_forces_.empty()) setting = other_forces_;
       result_.settings.push_back(side->name() + ": " +
                                  setting.value_or("no setting that is known explains it"));
     }
@@ -254,6 +285,7 @@ class RefereeRun {
   std::optional<TemporaryFolder> folder_;
   std::filesystem::path mujoco_file_;
   std::vector<OtherDescription> others_;
+  std::string other_forces_;  // of the engine that is linked, in words
   std::vector<SidePtr> sides_;
   RefereeResult result_;
 };

@@ -14,6 +14,7 @@
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
 #include "harness/base/files.h"
+#include "harness/sides/engine_urdf.h"
 #include "harness/sides/join_names.h"
 #include "harness/sides/urdf_outline.h"
 
@@ -32,6 +33,9 @@ class MessageCollector : public console_bridge::OutputHandler {
     if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) errors_.push_back(text);
   }
 
+  /// Whether materials are what was found first.
+  [[nodiscard]] bool IsAboutLooks() const { return !errors_.empty() && errors_[0].starts_with("material "); }
+
   /// What was found first and where: urdfdom reports from the inside out.
   [[nodiscard]] std::string Describe() const {
     if (errors_.empty()) return "cannot be parsed";
@@ -44,11 +48,16 @@ class MessageCollector : public console_bridge::OutputHandler {
   std::vector<std::string> errors_;
 };
 
-urdf::ModelInterfaceSharedPtr ParseWithUrdfdom(const std::string& text, const std::string& source) {
+/// @param has_bad_looks set when materials had to be left out.
+urdf::ModelInterfaceSharedPtr ParseWithUrdfdom(const std::string& text, const std::string& source,
+                                               bool* has_bad_looks) {
   const MessageCollector messages;
   urdf::ModelInterfaceSharedPtr model;
   try {
     model = urdf::parseURDF(text);
+    // Dynamics need no materials.
+    *has_bad_looks = !model && messages.IsAboutLooks();
+    if (*has_bad_looks) model = urdf::parseURDF(RemoveMaterials(text, source));
   } catch (const std::exception& error) {
     throw InputError(source + ": " + error.what());
   }
@@ -419,7 +428,8 @@ std::filesystem::path FindMesh(const std::string& name, const std::filesystem::p
 RobotDescription ParseUrdf(std::string_view text, const std::string& source, const UrdfOptions& options) {
   UrdfOutline outline = ReadUrdfOutline(text, source);
   const std::vector<std::string> meshes = outline.meshes;
-  urdf::ModelInterfaceSharedPtr model = ParseWithUrdfdom(std::string(text), source);
+  bool has_bad_looks = false;
+  urdf::ModelInterfaceSharedPtr model = ParseWithUrdfdom(std::string(text), source, &has_bad_looks);
   for (const UrdfLink& link : outline.links) {
     if (!model->getLink(link.name))
       throw InputError(source + ": link " + Quote(link.name) + ": cannot be parsed");
@@ -429,6 +439,10 @@ RobotDescription ParseUrdf(std::string_view text, const std::string& source, con
       throw InputError(source + ": joint " + Quote(joint.name) + ": cannot be parsed");
   }
   RobotDescription robot = UrdfReader(source, std::move(outline), std::move(model), options).Read();
+  if (has_bad_looks) {
+    robot.notes.emplace_back(
+        "materials that other readers of URDFs refuse, such as two of one name (dynamics need none)");
+  }
   if (options.packages.empty()) return robot;
   std::vector<std::string> missing;
   for (const std::string& mesh : meshes) {

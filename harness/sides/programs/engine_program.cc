@@ -25,6 +25,20 @@ Eigen::VectorXd ReadVector(const Json& json) {
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
+/// The first joint behind which no link has a mass; empty when there is none.
+std::string FindJointWithoutMass(const std::vector<UrdfBody>& bodies) {
+  std::vector<double> carried(bodies.size(), 0.0);
+  for (size_t i = bodies.size(); i-- > 0;) {  // children stand behind their parents
+    carried[i] += bodies[i].mass;
+    if (bodies[i].parent >= 0) carried[static_cast<size_t>(bodies[i].parent)] += carried[i];
+  }
+  for (size_t i = 0; i < bodies.size(); ++i) {
+    const bool moves = bodies[i].motion == Motion::kTurns || bodies[i].motion == Motion::kSlides;
+    if (moves && carried[i] == 0.0) return bodies[i].joint;
+  }
+  return {};
+}
+
 /// The robot that the first request speaks of, and the first answer.
 class Session {
  public:
@@ -56,7 +70,11 @@ class Session {
     if (!robot_) throw std::runtime_error("no hello came before");
     const EngineTerms terms = robot_->Evaluate(ReadVector(request.at("q")), ReadVector(request.at("v")));
     if (!terms.M.allFinite() || !terms.c.allFinite() || !terms.g.allFinite()) {
-      throw std::runtime_error(name_ + ": its terms are no numbers; a joint may move no mass");
+      const std::string joint = FindJointWithoutMass(bodies_);
+      throw std::runtime_error(
+          name_ + ": its terms are no numbers" +
+          (joint.empty() ? "; a joint may move no inertia" : "; joint " + joint + " moves no mass") +
+          " (dexcheck audit ROBOT lists such joints)");
     }
     Json answer = {{"id", request.at("id")}};
     if (terms.M.size() > 0) answer["M"] = ToJson(terms.M);

@@ -16,6 +16,7 @@ using Json = nlohmann::json;
 using testing::DexcheckCommand;
 using ::testing::HasSubstr;
 using testing::IsRefused;
+using ::testing::Not;
 using testing::ProgramResult;
 using testing::ReadText;
 using testing::ReplaceOnce;
@@ -55,6 +56,34 @@ TEST(DiagnoseCommand, NamesTheCauseWithItsRepair) {
   EXPECT_EQ(change.at("unit"), "kg");
   EXPECT_EQ(change.at("value"), 3.3);
   EXPECT_EQ(change.at("repair"), 3.228604);
+  EXPECT_TRUE(results.at("remaining").empty());
+}
+
+TEST(DiagnoseCommand, JudgesPublishedNumbersByTheirDigits) {
+  const TempFolder folder;
+  std::string text = ReadText(testing::kParameters + "panda.toml");
+  text = ReplaceOnce(text, "mass = 3.228604", "mass = 3.2286");
+  WriteText(folder.path() / "rounded.toml", text);
+  WriteText(folder.path() / "bad.toml", ReplaceOnce(text, "mass = 4.970684", "mass = 4.98"));
+  const auto run = [&](const std::string& file, std::vector<std::string> more) {
+    std::vector<std::string> words = {"diagnose", file, testing::kMjcf + "panda.xml", "--quiet"};
+    words.insert(words.end(), more.begin(), more.end());
+    return RunDexcheck(words, {folder.path()});
+  };
+  const ProgramResult by_rounding = run("rounded.toml", {});
+  EXPECT_EQ(by_rounding.exit_code, 1) << by_rounding.err;
+  EXPECT_THAT(by_rounding.out, HasSubstr("mass 3.2286 kg in rounded.toml, 3.228604 kg repairs it"));
+  const ProgramResult by_digits = run("rounded.toml", {"--digits", "5"});
+  EXPECT_EQ(by_digits.exit_code, 0) << by_digits.err << by_digits.out;
+  EXPECT_EQ(by_digits.out,
+            "AGREE: nothing to explain: rounded.toml and panda.xml agree to 1e-05 at 6 random states.\n");
+  const ProgramResult bad = run("bad.toml", {"--tolerance", "1e-5", "--json", "out.json"});
+  EXPECT_EQ(bad.exit_code, 1) << bad.err;
+  EXPECT_THAT(bad.out, HasSubstr("1. link panda_link1: mass 4.98 kg in bad.toml, 4.970684 kg repairs it"));
+  EXPECT_THAT(bad.out, Not(HasSubstr("panda_link3")));
+  EXPECT_THAT(bad.out, HasSubstr("With it repaired the two agree to 1e-05.\n"));
+  const Json results = Json::parse(ReadText(folder.path() / "out.json"));
+  EXPECT_EQ(results.at("tolerance"), 1e-5);
   EXPECT_TRUE(results.at("remaining").empty());
 }
 
@@ -120,6 +149,10 @@ TEST(DiagnoseCommand, RefusesBadOptions) {
   EXPECT_TRUE(IsRefused(RunDexcheck({"diagnose", "--samples", "0"}), {"--samples", "0"}));
   EXPECT_TRUE(
       IsRefused(RunDexcheck({"diagnose", "--robot", "none.toml", "--mjcf", "none.xml"}), {"none.toml"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"diagnose", "--digits", "16"}), {"--digits", "16"}));
+  EXPECT_TRUE(
+      IsRefused(RunDexcheck({"diagnose", "--tolerance", "2"}), {"--tolerance", "above 0 and below 1"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"diagnose", "--tolerance", "1e-3", "--digits", "3"}), {"--tolerance"}));
   EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "--scale", "2"}), {"--scale", "2"}));
   EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "--scale", "nan"}), {"--scale"}));
 }

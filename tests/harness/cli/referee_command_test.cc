@@ -145,6 +145,42 @@ TEST_F(Referee, ArmatureOfTheMjcfIsNamed) {
   EXPECT_THAT(result.out, HasSubstr("as with what only panda.xml states: armature"));
 }
 
+/// Forces that only the MJCF has, and that MuJoCo counts among friction, are named.
+TEST_F(Referee, SpringsOfTheMjcfAreNamed) {
+  WriteText(folder_.path() / "arm.xml",
+            R"(<mujoco><worldbody><body name="arm"><joint name="elbow" axis="0 1 0"
+stiffness="3"/><inertial mass="1" pos="0 0 0.1" diaginertia="0.01 0.02 0.025"/></body></worldbody></mujoco>)");
+  const ProgramResult result = Run({"arm.xml", "--samples", "3", "--engines", "analytic,mujoco"});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("its friction has forces that no description has: joint spring of joint "
+                                    "elbow"));
+}
+
+TEST_F(Referee, BallJointsOnAFloatingBaseAgree) {
+  WriteText(folder_.path() / "doll.xml", R"(<mujoco><worldbody><body name="trunk"><freejoint/>
+<inertial mass="3" pos="0.01 0.02 0" diaginertia="0.02 0.03 0.04"/>
+<body name="upper" pos="0.1 0.2 0.3"><joint name="shoulder" type="ball" damping="0.1"/>
+<inertial mass="2" pos="0.1 0.02 0.03" diaginertia="0.01 0.02 0.025"/>
+<body name="lower" pos="0.3 0 0.1"><joint name="elbow" axis="-1 0.5 0.25"/>
+<inertial mass="1" pos="0.15 0 0.01" diaginertia="0.004 0.006 0.008"/></body></body></body></worldbody></mujoco>)");
+  ExpectAllPairsAgree(RunForJson({"doll.xml", "--samples", "20", "--engines", "analytic,mujoco"}), 2,
+                      kOfEngines);
+}
+
+/// What an engine refuses is named by file and link, with what to do.
+TEST_F(Referee, ALinkThatAnEngineRefusesIsNamed) {
+  WriteText(folder_.path() / "light.urdf",
+            R"(<robot name="light"><link name="foot"/><link name="leg"><inertial>
+<mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="toe"/><joint name="knee" type="continuous"><parent link="foot"/><child link="leg"/></joint>
+<joint name="tap" type="continuous"><parent link="leg"/><child link="toe"/></joint></robot>)");
+  const ProgramResult result = Run({"light.urdf", "--engines", "analytic,mujoco"});
+  EXPECT_TRUE(IsRefused(result, {"mujoco: light.urdf: ", "name = toe", "needs a mass and an inertia"}));
+  EXPECT_THAT(result.err, Not(HasSubstr("/tmp/")));
+  const ProgramResult bullet = Run({"light.urdf", "--engines", "analytic,bullet"});
+  EXPECT_TRUE(IsRefused(bullet, {"joint tap moves no mass", "dexcheck audit"}));
+}
+
 TEST_F(Referee, BadInputIsRefused) {
   const std::string arm = testing::SourcePath("/harness/sides/examples/arm.urdf");
   EXPECT_TRUE(

@@ -150,6 +150,60 @@ TEST(Diagnose, NamesAMassWithTheValueThatRepairsIt) {
   EXPECT_FALSE(diagnosis.ranking.empty());
 }
 
+/// Numbers as they are published: each is off by up to `error` of itself.
+RobotSpec Publish(const RobotSpec& spec, double error) {
+  std::mt19937 random(17);
+  std::uniform_real_distribution<double> draw(-error, error);
+  RobotSpec published = spec;
+  for (const Parameter& parameter : ListParameters(spec))
+    SetValue(&published, parameter, GetValue(spec, parameter) * (1.0 + draw(random)));
+  return published;
+}
+
+// Rounded numbers are no mistakes when so many digits are asked for; what differs by more is named alone,
+// within those digits, and printed with hardly more.
+TEST(Diagnose, NamesWhatDiffersBeyondTheDigitsOfPublishedNumbers) {
+  constexpr double kPublished = 3e-7;
+  DiagnosisOptions options;
+  options.tolerance = 1e-5;  // seven joints' errors add up
+  const Robot robot = LoadPanda();
+  const RobotSpec published = Publish(robot.spec, kPublished);
+  EXPECT_FALSE(Explain(robot, published).agrees);
+  const Diagnosis nothing = Explain(robot, published, options);
+  EXPECT_TRUE(nothing.agrees);
+  EXPECT_TRUE(nothing.causes.empty());
+
+  struct Mistake {
+    Parameter parameter;
+    double factor;
+    bool by_motion;
+  };
+  for (const Mistake& mistake : {Mistake{{ParameterKind::kMass, 2, 0}, 1.01, false},
+                                 {{ParameterKind::kInertia, 4, 0}, 1.2, false},
+                                 {{ParameterKind::kCom, 5, 1}, 1.3, false},
+                                 {{ParameterKind::kD, 2, 0}, 1.02, false},
+                                 {{ParameterKind::kA, 3, 0}, 0.9, false},
+                                 {{ParameterKind::kAlpha, 3, 0}, 1.01, false},
+                                 {{ParameterKind::kMass, 2, 0}, 1.01, true}}) {
+    RobotSpec wrong = published;
+    const double right = GetValue(robot.spec, mistake.parameter);
+    ASSERT_NE(right, 0.0);
+    SetValue(&wrong, mistake.parameter, mistake.factor * right);
+    options.by_motion = mistake.by_motion;
+    const Diagnosis diagnosis = Explain(robot, wrong, options);
+    const std::string name =
+        DescribePart(robot.spec, mistake.parameter) + ": " + DescribeQuantity(mistake.parameter);
+    ASSERT_EQ(diagnosis.causes.size(), 1U) << name;
+    const Repair& cause = diagnosis.causes.front();
+    ASSERT_EQ(cause.parameters.size(), 1U) << name;
+    EXPECT_EQ(cause.parameters.front(), mistake.parameter) << Describe(cause, wrong, "FILE");
+    EXPECT_NEAR(cause.values.front(), right, options.tolerance * std::abs(right)) << name;
+    EXPECT_LE(CountDigits(wrong, mistake.parameter, cause.values.front()), 7) << name;
+    EXPECT_TRUE(diagnosis.remaining_constants.empty()) << name;
+    EXPECT_TRUE(diagnosis.remaining_terms.empty()) << name;
+  }
+}
+
 // Every mutant of the Panda; what is repaired agrees.
 TEST(Diagnose, NamesEverySingleMistakeOfThePanda) {
   const Robot robot = LoadPanda();

@@ -18,6 +18,7 @@
 #include "harness/sides/complete_description.h"
 #include "harness/sides/description_check.h"
 #include "harness/sides/parameter_writer.h"
+#include "harness/sides/read_description.h"
 #include "tests/common/files.h"
 #include "tests/common/list_failures.h"
 #include "tests/common/matrix_near.h"
@@ -243,6 +244,41 @@ TEST(Urdf, TakesPartsThatNoBodyCanBe) {
   EXPECT_THAT(hand.notes, ::testing::Contains(
                               "inertials that no body can have, counted in what they are welded to: tip"));
   EXPECT_NEAR(hand.spec.joints[1].body.inertia.trace(), 3.1e-5, 1e-18);
+}
+
+// Colours are nothing that dynamics need, and other readers refuse two of one name.
+TEST(Urdf, LeavesOutMaterialsThatAreNotUnique) {
+  std::string text = kHand;
+  const std::string material = "<material name=\"white\"><color rgba=\"1 1 1 1\"/></material>";
+  text.insert(text.find("</robot>"), material);
+  const RobotDescription once = ParseUrdf(text, "hand.urdf");
+  text.insert(text.find("</robot>"), material);
+  const RobotDescription twice = ParseUrdf(text, "hand.urdf");
+  EXPECT_EQ(twice.notes.size(), once.notes.size() + 1);
+  EXPECT_THAT(twice.notes, ::testing::Contains(HasSubstr("materials")));
+  EXPECT_EQ(WriteParameters(twice, "hand.urdf"), WriteParameters(once, "hand.urdf"));
+}
+
+// What only a body that no robot can have stands against is still read by the audit.
+TEST(Urdf, ARefusalOfABodyPointsToTheAudit) {
+  const testing::TempFolder folder;
+  const auto read = [&](const std::string& original, const std::string& changed) -> std::string {
+    std::string text = kHand;
+    text.replace(text.find(original), original.size(), changed);
+    testing::WriteText(folder.path() / "hand.urdf", text);
+    try {
+      ReadDescription(folder.path() / "hand.urdf");
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  const std::string file = (folder.path() / "hand.urdf").string();
+  const std::string impossible = read("<mass value=\"0.1\"/>", "<mass value=\"-0.1\"/>");
+  EXPECT_THAT(impossible, StartsWith(file + ":5: link \"finger 1\": inertial: mass must be"));
+  EXPECT_THAT(impossible, HasSubstr("(dexcheck audit " + file));
+  EXPECT_THAT(read("child link=\"tip\"", "child link=\"tipp\""),
+              ::testing::AllOf(HasSubstr("must be a link"), Not(HasSubstr("audit"))));
 }
 
 TEST(Urdf, FollowsAFollowerToItsLeader) {

@@ -1,4 +1,4 @@
-#include "harness/sides/tolerance.h"
+#include "harness/checks/tolerance.h"
 
 #include <algorithm>
 #include <cmath>

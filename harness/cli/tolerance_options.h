@@ -1,0 +1,47 @@
+#pragma once
+
+// --digits and --tolerance: how published numbers, which are rounded when printed, are judged.
+
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "controller/common/text.h"
+#include "harness/cli/command_line.h"
+
+namespace dexcheck::cli {
+
+/// What was given of them.
+struct ToleranceOptions {
+  int digits = 0;                   ///< 0: not given.
+  std::optional<double> tolerance;  ///< Relative, wider than rounding.
+
+  /// The relative tolerance; none: by rounding.
+  [[nodiscard]] std::optional<double> Find() const {
+    return digits > 0 ? std::pow(10.0, -digits) : tolerance;
+  }
+};
+
+/// Adds the two options, of which one may be given.
+inline void AddToleranceOptions(Command command, ToleranceOptions* options) {
+  constexpr int kMostDigits = 15;
+  const auto fraction = [](const std::string& text) {
+    double value = 0.0;
+    const char* const end = text.data() + text.size();
+    const std::from_chars_result read = std::from_chars(text.data(), end, value);
+    if (read.ec == std::errc() && read.ptr == end && 0.0 < value && value < 1.0) return std::string();
+    return "must be a number above 0 and below 1, got " + Quote(text);
+  };
+  const Option digits = command
+                            .AddOption("--digits", &options->digits,
+                                       "Agreement to this many digits of a term's scale is enough")
+                            .TypeName("N")
+                            .Check(WholeNumber(1, kMostDigits));
+  command.AddOption("--tolerance", &options->tolerance, "The same as a relative tolerance")
+      .TypeName("REL")
+      .Check(fraction)
+      .Excludes(digits);
+}
+
+}  // namespace dexcheck::cli
