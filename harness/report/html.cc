@@ -75,7 +75,10 @@ std::string FormatShare(double share) {
   if (share == 0.0) return "0";
   if (share > 10.0) return FormatShort(share) + " ×";
   const double percent = 100.0 * share;
-  return percent < 0.01 ? "< 0.01 %" : fmt::format("{:.2g} %", percent);
+  if (percent < 0.01) return "< 0.01 %";
+  // Two digits, but 99.7 % is not yet the whole bound, and 150 % is no power of ten.
+  if (percent >= 99.5) return fmt::format("{:.{}f} %", percent, percent < 100.0 ? 1 : 0);
+  return fmt::format("{:.2g} %", percent);
 }
 
 Html MakeInlineSvg(std::string svg, const std::string& title) {

@@ -92,12 +92,36 @@ std::vector<double> ListRoundValues(double from, double to, bool logarithmic) {
   return ticks;
 }
 
-Html DrawTick(bool horizontal, double at, const std::string& label) {
+/// A text in two lines, broken behind the sign nearest its middle, when it is wider than its room.
+std::vector<std::string> BreakLabel(const std::string& label, double room) {
+  constexpr double kLetter = 6.6;  // mean width of a letter of class "tick", a little more than measured
+  if (kLetter * static_cast<double>(label.size()) <= room) return {label};
+  const auto distance = [&](size_t at) {
+    return std::abs(2.0 * static_cast<double>(at + 1) - static_cast<double>(label.size()));
+  };
+  size_t best = std::string::npos;
+  for (size_t at = label.find_first_of("_ .,-"); at != std::string::npos;
+       at = label.find_first_of("_ .,-", at + 1)) {
+    if (at + 1 < label.size() && (best == std::string::npos || distance(at) < distance(best))) best = at;
+  }
+  if (best == std::string::npos) return {label};
+  return {label.substr(0, best + 1), label.substr(best + 1)};
+}
+
+/// @param room between two ticks' texts, in which one that stands below the chart is to find place.
+Html DrawTick(bool horizontal, double at, const std::string& label, double room = kInnerWidth) {
   if (horizontal) {
-    return FormatHtml(
-        "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\" class=\"mark\"/>"
-        "<text x=\"{0:.1f}\" y=\"{3:.1f}\" text-anchor=\"middle\" class=\"tick\">{4}</text>\n",
-        at, kTop + kInnerHeight, kTop + kInnerHeight + 4.0, kTop + kInnerHeight + 17.0, label);
+    constexpr double kLine = 11.0;
+    Html svg =
+        FormatHtml("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\" class=\"mark\"/>", at,
+                   kTop + kInnerHeight, kTop + kInnerHeight + 4.0);
+    double y = kTop + kInnerHeight + 17.0;
+    for (const std::string& line : BreakLabel(label, room)) {
+      svg += FormatHtml("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\" class=\"tick\">{}</text>\n",
+                        at, y, line);
+      y += kLine;
+    }
+    return svg;
   }
   return FormatHtml(
       "<line x1=\"{0:.1f}\" x2=\"{1:.1f}\" y1=\"{2:.1f}\" y2=\"{2:.1f}\" class=\"mark\"/>"
@@ -281,8 +305,10 @@ Html DrawHeatMap(const HeatMap& map) {
                         left(FindPlace(map.x, x) + 0.5), top(FindPlace(map.y, y) - 0.5), dots.color);
     }
   }
-  for (const double value : ListCellTicks(map.x))
-    svg += DrawTick(true, left(FindPlace(map.x, value) + 0.5), LabelTick(map.x, value, 3));
+  for (const double value : ListCellTicks(map.x)) {
+    svg += DrawTick(true, left(FindPlace(map.x, value) + 0.5), LabelTick(map.x, value, 3),
+                    map.x.labels.empty() ? kInnerWidth : w);
+  }
   for (const double value : ListCellTicks(map.y))
     svg += DrawTick(false, top(FindPlace(map.y, value) - 0.5), LabelTick(map.y, value, 3));
   if (map.range) svg += DrawScale((*map.range)[0], (*map.range)[1]);
@@ -304,6 +330,9 @@ Html DrawChart(Chart chart) {
       ys.push_back(y);
     }
   }
+  // Texts have their place whether there are points above them or not.
+  const std::vector<double> labelled = ListLabelled(chart.x);
+  xs.insert(xs.end(), labelled.begin(), labelled.end());
   Fit(&chart.x, xs);
   Fit(&chart.y, ys);
   const auto place_x = [&](double x) { return kLeft + kInnerWidth * FindPlace(chart.x, x); };
@@ -318,8 +347,9 @@ Html DrawChart(Chart chart) {
     if (!axis.labels.empty()) return ListLabelled(axis);
     return ListRoundValues(axis.values[0], axis.values[1], axis.logarithmic);
   };
+  const double room = chart.x.labels.size() < 2 ? kInnerWidth : place_x(1.0) - place_x(0.0);
   for (const double value : list(chart.x))
-    svg += DrawTick(true, place_x(value), LabelTick(chart.x, value, kRoundDigits));
+    svg += DrawTick(true, place_x(value), LabelTick(chart.x, value, kRoundDigits), room);
   for (const double value : list(chart.y))
     svg += DrawTick(false, place_y(value), LabelTick(chart.y, value, kRoundDigits));
   int key = 0;

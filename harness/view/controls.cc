@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "renders/panel_colors.h"
@@ -25,6 +26,25 @@ constexpr double kMargin = 14.0;
 constexpr double kButtonHeight = 28.0;
 constexpr double kSliderWidth = 200.0;
 constexpr double kSliderLine = 40.0;
+
+/// Keys and mouse; those that MuJoCo's own `simulate` has do the same there.
+constexpr std::array<std::array<const char*, 2>, 15> kHelp = {{
+    {"space", "pause, go on"},
+    {"right, left", "one step, one step back"},
+    {"- +", "slower, faster"},
+    {"Backspace, R", "begins a live run anew"},
+    {"drag", "turns the camera"},
+    {"right drag", "moves it"},
+    {"middle drag, wheel", "brings it nearer"},
+    {"Ctrl and drag", "pulls at the object or a link"},
+    {"Esc", "a free camera, which follows nothing"},
+    {"F", "follows the object, or does not"},
+    {"G", "goes to the grasp"},
+    {"C", "forces on, off"},
+    {"S", "saves a live run as a scenario"},
+    {"Tab, F1", "controls, this list: on, off"},
+    {"Q", "closes the window"},
+}};
 
 struct Rectangle {
   Vector2d corner;
@@ -80,12 +100,30 @@ void DrawTrack(const Rectangle& place, double filled, double mark, Canvas* canva
   canvas->FillCircle({place.corner.x() + mark * place.size.x(), y}, 8.0, panel::kMark);
 }
 
+void DrawHelp(int height, Font* font, Canvas* canvas) {
+  constexpr double kLine = 19.0;
+  constexpr double kWidth = 410.0;
+  constexpr double kKeys = 145.0;
+  const double lines = static_cast<double>(kHelp.size());
+  const Vector2d corner(kMargin, height - kBar - kLine * lines - 3.0 * kMargin);
+  canvas->FillRoundedRectangle(corner, {kWidth, kLine * lines + 1.2 * kMargin}, 10.0,
+                               panel::MakeGround(0.93F));
+  double y = corner.y() + 1.5 * kMargin;
+  for (const auto& [keys, action] : kHelp) {
+    canvas->DrawText(*font, 13.0, {corner.x() + kMargin, y}, keys, kFaint);
+    canvas->DrawText(*font, 13.0, {corner.x() + kMargin + kKeys, y}, action, kText);
+    y += kLine;
+  }
+}
+
 }  // namespace
 
 void Controls::Draw(const ControlsState& state, Image* image) {
   const int width = image->width;
   const int height = image->height;
   Canvas canvas(image);
+  if (state.help) DrawHelp(height, &font_, &canvas);
+  if (!state.shown) return;
   canvas.FillRoundedRectangle({0.0, height - kBar}, {static_cast<double>(width), kBar}, 0.0, kGround);
   const double span = std::max(state.end - state.begin, 1e-9);
   DrawTrack(PlaceTime(width, height), std::clamp((state.now - state.begin) / span, 0.0, 1.0),
@@ -117,6 +155,7 @@ void Controls::Draw(const ControlsState& state, Image* image) {
 
 std::optional<ControlHit> Controls::Find(const ControlsState& state, int width, int height, double x,
                                          double y, const std::optional<ControlHit>& held) {
+  if (!state.shown) return std::nullopt;
   const auto share = [&](const Rectangle& place) {
     return std::clamp((x - place.corner.x()) / place.size.x(), 0.0, 1.0);
   };

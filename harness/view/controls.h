@@ -25,6 +25,8 @@ struct ControlsState {
   bool playing = true;
   bool forces = true;
   bool follow = true;
+  bool shown = true;                         ///< Else there are no controls, and only keys work.
+  bool help = false;                         ///< The list of keys.
   double time = 0.0;                         ///< Shown, s.
   double begin = 0.0, now = 0.0, end = 1.0;  ///< First recorded, last recorded so far, last at all, s.
   double speed = 1.0;

@@ -23,8 +23,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::array<double, 7> kSpeeds = {0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0};
-constexpr double kForceLength = 0.042;  // m, of the largest contact force so far
-constexpr double kPullRadius = 0.006;   // m
+constexpr double kForceLength = 0.042;    // m, of the largest contact force so far
+constexpr double kPullRadius = 0.006;     // m
+constexpr double kPixelsOfANotch = 32.0;  // of the middle button's way, as `simulate` has it at 640 pixels
 
 /// One window on one source.
 class Viewer {
@@ -230,6 +231,8 @@ class Viewer {
       Slide(*held_);
     } else if (turning_ && button_ == InputEvent::Button::kLeft) {
       camera_.Turn(x, y);
+    } else if (turning_ && button_ == InputEvent::Button::kMiddle) {
+      camera_.Zoom(y / kPixelsOfANotch);
     } else if (turning_) {
       camera_.Move(x, y);
     }
@@ -301,10 +304,19 @@ class Viewer {
         if (live_ != nullptr) state_.message = save();
         break;
       case 'R':
+      case kKeyBackspace:
         restart_ = live_ != nullptr;
         break;
-      case 'Q':
       case kKeyEscape:
+        state_.follow = false;
+        break;
+      case kKeyTab:
+        state_.shown = !state_.shown;
+        break;
+      case kKeyF1:
+        state_.help = !state_.help;
+        break;
+      case 'Q':
         closed_ = true;
         break;
       default:
@@ -342,7 +354,7 @@ void ViewRecording(const FrameSource& recording, const std::string& title, const
   ControlsState controls;
   controls.playing = !options.paused;
   controls.speed = options.speed;
-  controls.message = "drag: turn, wheel: nearer, space: play, arrows: step, G: grasp, Q: quit";
+  controls.message = "F1: keys, drag: turn, wheel: nearer, space: play, arrows: step, Q: quit";
   Viewer(recording, nullptr, &window, options, controls).Show(title, [] { return std::string(); });
 }
 
@@ -354,8 +366,7 @@ std::unique_ptr<LiveRun> ViewLive(const LiveRunMaker& make, const std::string& t
   controls.playing = !options.paused;
   controls.speed = options.speed;
   controls.sliders = MakeGainSliders();
-  controls.message =
-      "Ctrl-drag: pull, drag: turn, space: pause, arrows: step, G: grasp, R: anew, S: save, Q: quit";
+  controls.message = "F1: keys, Ctrl-drag: pull, drag: turn, space: pause, arrows: step, S: save, Q: quit";
   std::unique_ptr<LiveRun> run = make({});
   const Scenario first = run->setup().scenario();  // of whose gains the sliders are factors
   while (true) {

@@ -23,6 +23,25 @@ Function Load(const char* name) {
   return reinterpret_cast<Function>(glfwGetProcAddress(name));
 }
 
+int NameKey(int key) {
+  switch (key) {
+    case GLFW_KEY_LEFT:
+      return kKeyLeft;
+    case GLFW_KEY_RIGHT:
+      return kKeyRight;
+    case GLFW_KEY_ESCAPE:
+      return kKeyEscape;
+    case GLFW_KEY_BACKSPACE:
+      return kKeyBackspace;
+    case GLFW_KEY_TAB:
+      return kKeyTab;
+    case GLFW_KEY_F1:
+      return kKeyF1;
+    default:
+      return key;
+  }
+}
+
 std::string TellError() {
   const char* text = nullptr;
   glfwGetError(&text);
@@ -98,10 +117,7 @@ struct Window::Impl {
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int /*scancode*/, int action, int /*mods*/) {
       if (action == GLFW_RELEASE) return;
       InputEvent event = Of(w).MakeEvent(InputEvent::Kind::kKey);
-      event.key = key == GLFW_KEY_LEFT     ? kKeyLeft
-                  : key == GLFW_KEY_RIGHT  ? kKeyRight
-                  : key == GLFW_KEY_ESCAPE ? kKeyEscape
-                                           : key;
+      event.key = NameKey(key);
       Of(w).events.push_back(event);
     });
   }

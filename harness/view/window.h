@@ -19,11 +19,14 @@ struct InputEvent {
   bool control = false;  ///< The key was down.
   double x = 0.0, y = 0.0;
   double scroll = 0.0;  ///< Notches, away from the user.
-  int key = 0;          ///< A capital letter, a sign, or one of kKeyLeft, kKeyRight.
+  int key = 0;          ///< A capital letter, a sign, or one of the keys below.
 };
 inline constexpr int kKeyLeft = -1;
 inline constexpr int kKeyRight = -2;
 inline constexpr int kKeyEscape = -3;
+inline constexpr int kKeyBackspace = -4;
+inline constexpr int kKeyTab = -5;
+inline constexpr int kKeyF1 = -6;
 
 /// One at a time, in the program's first thread.
 class Window {

@@ -22,6 +22,7 @@ using ::testing::HasSubstr;
 
 const std::string kSource = testing::SourcePath();
 constexpr double kLimit = 2000.0;  // 1/s: of K_v at steps of 1 ms
+constexpr double kLastLaw = 4.0;   // the fifth
 
 StudyInputs MakeInputs(const std::string& study) {
   StudyInputs inputs;
@@ -36,22 +37,29 @@ StudyInputs MakeInputs(const std::string& study) {
 class StudyPageBrowserTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    const StudyInputs inputs = MakeInputs(
+    WritePage(
         "name = \"page\"\ndescription = \"a <small> study\"\nscenario = \"offset\"\nmetrics = "
         "[\"overshoot\", "
         "\"energy\"]\n[[vary]]\nkey = \"control.K_p\"\nvalues = [100, 1e3, 1e4]\n[[vary]]\nkey = "
-        "\"control.K_v\"\nvalues = [20, 200, 2100, 3000]\n");
+        "\"control.K_v\"\nvalues = [20, 200, 2100, 3000]\n",
+        "page");
+  }
+
+  /// NAME.html of a study's trials.
+  void WritePage(const std::string& study, const std::string& name) const {
+    const StudyInputs inputs = MakeInputs(study);
     StudyStore store =
-        StudyStore::OpenOrCreate(folder_.path() / "page.sqlite", IdentifyStudy(inputs), inputs.study);
+        StudyStore::OpenOrCreate(folder_.path() / (name + ".sqlite"), IdentifyStudy(inputs), inputs.study);
     for (const Trial& trial : ListTrials(inputs.study)) store.Add(MakeRow(trial));
-    testing::WriteText(folder_.path() / "page.html", MakeStudyReport(store));
+    testing::WriteText(folder_.path() / (name + ".html"), MakeStudyReport(store));
   }
 
   static TrialRow MakeRow(const Trial& trial) {
     TrialRow row;
     row.trial = trial;
     row.result.metrics.fill(1.0 / static_cast<double>(trial.number + 1));
-    if (trial.parameters[1] > kLimit) {
+    // The last number, of K_v or of a law.
+    if (trial.parameters.back() > kLimit || trial.parameters.back() == kLastLaw) {
       row.result.outcome = Outcome::kDiverged;
       row.result.failure = "motor \"wheel_left\" is at its limit, 30 N m at t = 0.01 s";
     }
@@ -248,6 +256,31 @@ TEST_F(StudyPageBrowserTest, DrawsTheoryOfWhatIsSearched) {
   const nlohmann::json unknown = draw("energy", "position_error_rms");
   EXPECT_EQ(unknown["pixels"].get<int>(), 0) << "which (57) does not know";
   EXPECT_EQ(unknown["text"], "");
+}
+
+// Long texts below a chart, the last of which has no trial that held above it.
+TEST_F(StudyPageBrowserTest, TextsBelowAChartDoNotTouch) {
+  WritePage(
+      "name = \"laws\"\ndescription = \"laws\"\nscenario = \"offset\"\nmetrics = [\"energy\"]\nseeds = [1, "
+      "2]\n"
+      "[[vary]]\nkey = \"control.law\"\nvalues = [\"computed_torque\", \"operational_space\", "
+      "\"feedforward_pd\", \"impedance\", \"pd_gravity\"]\n",
+      "laws");
+  browser_.SetViewport(1280, 900, false);
+  browser_.Open(folder_.path() / "laws.html");
+  const nlohmann::json found = browser_.Run(
+      "const svg = document.querySelector('figure svg'), all = svg.getBoundingClientRect();"
+      "const texts = [...svg.querySelectorAll('.tick[text-anchor=\"middle\"]')].map(t => [t.textContent, "
+      "  t.getBoundingClientRect()]);"
+      "const touching = [];"
+      "for (const [a, r] of texts) for (const [b, s] of texts)"
+      "  if (a !== b && Math.abs(r.top - s.top) < 2 && r.left <= s.left && s.left < r.right + 3)"
+      "    touching.push(a + ' ' + b);"
+      "return {count: texts.length, touching: touching, outside: texts.filter(([, r]) =>"
+      "  r.left < all.left || r.right > all.right || r.bottom > all.bottom).map(([t]) => t)};");
+  EXPECT_GE(found["count"], 7) << "five texts, two of them in two lines";
+  EXPECT_EQ(found["touching"], nlohmann::json::array());
+  EXPECT_EQ(found["outside"], nlohmann::json::array());
 }
 
 TEST_F(StudyPageBrowserTest, FitsAPhone) {

@@ -147,6 +147,9 @@ xdotool key space
 await paused
 xdotool key s
 for _ in {1..300}; do [[ ! -s slid.toml ]] || break; sleep 0.1; done
+# As in MuJoCo's simulate, Backspace begins anew.
+xdotool key BackSpace
+await running
 end 0
 # A quarter of the slider's way to the right is twice the stiffness: omega' = sqrt(2) omega, and the damping K_v stays.
 python3 - slid.toml <<'PYTHON' || fail "the slider's gains were not saved: $(cat slid.toml)"
@@ -166,7 +169,17 @@ await paused
 xdotool mousemove 400 426 click 1
 for _ in {1..300}; do [[ $(now) -lt 20 ]] || break; sleep 0.1; done
 [[ $(now) -ge 25 && $(now) -le 35 ]] || fail "the middle of 60 ms is at $(now) ms"
+sleep 0.3
 shot recording
+# As in simulate, F1 shows the keys, Tab hides the controls, and Esc closes nothing.
+xdotool key Escape F1
+sleep 0.6
+shot help
+[[ $(differ recording help) -gt 1000 ]] || fail "F1 shows no help"
+xdotool key F1 Tab
+sleep 0.6
+shot bare
+[[ $(differ recording bare) -gt 300 && $(differ help bare) -gt 1000 ]] || fail "Tab does not hide the controls"
 end 0
 
 # Without a display: one line, exit code 2.
