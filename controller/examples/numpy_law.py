@@ -1,27 +1,12 @@
 #!/usr/bin/env python3
 """The paper's law (55) in NumPy, as a program that dexcheck asks at each step (controller_protocol.h)."""
 
-import struct
 import sys
 
 import numpy as np
 
-MAGIC, PROTOCOL = b"DEXCTRL\0", 1
-TERMS, TELLS_F_N = 1, 2
-STEP, BEGIN, END = 1, 2, 3
-HELLO = struct.Struct("=8s6I17d")
-
-
-def read(size):
-    data = sys.stdin.buffer.read(size)
-    if len(data) < size:
-        sys.exit(0)
-    return data
-
-
-def write(data):
-    sys.stdout.buffer.write(data)
-    sys.stdout.buffer.flush()
+sys.dont_write_bytecode = True
+from protocol import TELLS_F_N, TERMS, answer, answer_hello, read, read_hello, states  # noqa: E402
 
 
 class Fields:
@@ -79,24 +64,16 @@ def grasp_force(G, F_o, mu, f_min, f_max, rho, f):
 
 
 def main():
-    hello = HELLO.unpack(read(HELLO.size))
-    if hello[0] != MAGIC or hello[1] != PROTOCOL:
-        sys.exit("this is another protocol")
-    p, n, N, robot_bytes, scenario_bytes = hello[2:7]
-    K_v, K_p = np.array(hello[8:14]), np.array(hello[14:20])
-    mu, f_min, f_max, rho = hello[20:24]
+    (p, n, N, robot_bytes, scenario_bytes), numbers = read_hello()
+    K_v, K_p = np.array(numbers[1:7]), np.array(numbers[7:13])
+    mu, f_min, f_max, rho = numbers[13:17]
     read(robot_bytes), read(scenario_bytes)
-    write(struct.pack("=8sII", MAGIC, PROTOCOL, TERMS | TELLS_F_N))
+    answer_hello(TERMS | TELLS_F_N)
     k = 3 * N
     f_c = np.tile([0.0, 0.0, min(f_min + 5.0, 0.5 * (f_min + f_max))], N)
 
-    while True:
-        kind, doubles = struct.unpack("=II", read(8))
-        if kind == END:
-            return
-        if kind == BEGIN:
-            continue
-        s = Fields(read(8 * doubles))
+    for state in states():
+        s = Fields(state)
         t = s.take(1)[0]
         X_d, X_d_dot, X_d_ddot = s.take(6), s.take(6), s.take(6)
         q, xi = s.take(p), s.take(n)
@@ -125,7 +102,7 @@ def main():
         F_N = f_c - G.T @ np.linalg.solve(G @ G.T, F_o)
         tau = M @ xi_dot_d + C @ xi_c + gravity + friction + J.T @ f_c
         tau[:2] = E_inv @ tau[:2]
-        write(struct.pack("=II", STEP, n + k) + tau.tobytes() + F_N.tobytes())
+        answer(tau, F_N)
 
 
 main()
