@@ -13,6 +13,11 @@ namespace {
 
 using Kind = ParameterKind;
 
+/// The body of a link, by its joint; -1: of the base.
+MassProperties& LinkBody(RobotSpec* spec, int link) {
+  return link < 0 ? spec->base.body : JointOf(spec, link).body;
+}
+
 class MutantList {
  public:
   explicit MutantList(const RobotSpec& spec) : spec_(spec) {}
@@ -49,21 +54,9 @@ class MutantList {
       }
       AddShift("armature missing", {Kind::kArmature, i, 0}, -joint.armature);
       AddShift("damping missing", {Kind::kDamping, i, 0}, -joint.damping);
-      AddScaledBody(i);
-      AddBody("inertia about the frame's origin", i, [](MassProperties* body) {
-        const Matrix3d c = Skew(body->com);
-        body->inertia -= body->mass * c * c;
-      });
-      AddBody("products of inertia negated", i, [](MassProperties* body) {
-        const Matrix3d moments = body->inertia.diagonal().asDiagonal();
-        body->inertia = 2.0 * moments - body->inertia;
-      });
-      AddBody("inertia with x and z exchanged", i, [](MassProperties* body) {
-        Matrix3d exchange;
-        exchange << 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0;
-        body->inertia = exchange * body->inertia * exchange;
-      });
+      AddBodies(i);
     }
+    if (spec_.base.type == BaseType::kFloating) AddBodies(-1);
     for (int k = 0; k < 3; ++k)
       AddShift("gravity reversed", {Kind::kGravity, -1, k}, -2.0 * spec_.gravity[k]);
   }
@@ -71,6 +64,24 @@ class MutantList {
   std::vector<Mutant> Take() { return std::move(mutants_); }
 
  private:
+  /// What is mistaken of a link's body as a whole. @param link by its joint; -1: the base.
+  void AddBodies(int link) {
+    AddScaledBody(link);
+    AddBody("inertia about the frame's origin", link, [](MassProperties* body) {
+      const Matrix3d c = Skew(body->com);
+      body->inertia -= body->mass * c * c;
+    });
+    AddBody("products of inertia negated", link, [](MassProperties* body) {
+      const Matrix3d moments = body->inertia.diagonal().asDiagonal();
+      body->inertia = 2.0 * moments - body->inertia;
+    });
+    AddBody("inertia with x and z exchanged", link, [](MassProperties* body) {
+      Matrix3d exchange;
+      exchange << 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0;
+      body->inertia = exchange * body->inertia * exchange;
+    });
+  }
+
   Mutant& Add(const std::string& kind, const std::vector<Parameter>& parameters) {
     Mutant& mutant = mutants_.emplace_back();
     mutant.kind = kind;
@@ -88,17 +99,21 @@ class MutantList {
 
   /// A solid taken for one of a tenth more mass.
   void AddScaledBody(int link) {
-    if (!(spec_.joints[static_cast<size_t>(link)].body.mass > 0.0)) return;
+    if (!(ReadBody(link).mass > 0.0)) return;
     std::vector<Parameter> numbers = {{Kind::kMass, link, 0}, {Kind::kInertia, link, 0}};
     Add("solid of another mass", numbers).change = [link](RobotSpec* spec) {
       constexpr double kRatio = 1.1;
-      JointOf(spec, link).body.mass *= kRatio;
-      JointOf(spec, link).body.inertia *= kRatio;
+      LinkBody(spec, link).mass *= kRatio;
+      LinkBody(spec, link).inertia *= kRatio;
     };
   }
 
+  [[nodiscard]] MassProperties ReadBody(int link) const {
+    return link < 0 ? spec_.base.body : spec_.joints[static_cast<size_t>(link)].body;
+  }
+
   void AddBody(const std::string& kind, int link, void (*change)(MassProperties*)) {
-    MassProperties changed = spec_.joints[static_cast<size_t>(link)].body;
+    MassProperties changed = ReadBody(link);
     const Matrix3d before = changed.inertia;
     change(&changed);
     constexpr double kSame = 1e-9;  // of the trace: a tensor that the mistake leaves as it is
@@ -107,7 +122,7 @@ class MutantList {
     entries.reserve(6);
     for (int k = 0; k < 6; ++k) entries.push_back({Kind::kInertia, link, k});
     Mutant& mutant = Add(kind, entries);
-    mutant.change = [link, change](RobotSpec* spec) { change(&JointOf(spec, link).body); };
+    mutant.change = [link, change](RobotSpec* spec) { change(&LinkBody(spec, link)); };
   }
 
   void AddStructural(const std::string& kind, RepairKind cause_kind, int joint, int other) {

@@ -7,11 +7,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <sstream>
 
 #include "controller/model/parameter_reader.h"
 #include "harness/diagnosis/diagnose.h"
 #include "harness/diagnosis/file_terms.h"
+#include "harness/diagnosis/mutation.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/mjcf_reader.h"
 #include "harness/sides/parameter_writer.h"
@@ -132,6 +134,27 @@ TEST_P(LeggedDiagnosis, NamesOneLinkInTheFilesTerms) {
     ++tried;
   }
   EXPECT_GE(tried, 4U);
+}
+
+// What floats has a body like any link's: each of its numbers, and it as a whole.
+TEST_P(LeggedDiagnosis, MutantsOfTheBaseAreKilledAndNamed) {
+  const RobotModel model = ParseRobotModel(text_, "robot.toml");
+  std::set<std::string> kinds;
+  for (Mutant& mutant : ListMutants(model.spec(), 1e-3)) {
+    const std::vector<Parameter>& changed = mutant.expected.parameters;
+    if (changed.empty() || changed.front().index >= 0 || changed.front().kind == ParameterKind::kGravity)
+      continue;
+    if (GetParam() == "humanoid" && changed.size() == 1) continue;  // as the quadruped's, in 3 s
+    kinds.insert(mutant.kind);
+    TryMutant(model, *engine_, "robot.xml", {}, &mutant);
+    EXPECT_EQ(mutant.fate, MutantFate::kKilled) << mutant.name;
+    EXPECT_TRUE(mutant.named_first) << mutant.kind << ": " << mutant.named;
+  }
+  EXPECT_THAT(kinds, ::testing::IsSupersetOf({"solid of another mass", "inertia about the frame's origin",
+                                              "inertia with x and z exchanged"}));
+  if (GetParam() == "quadruped") {
+    EXPECT_THAT(kinds, ::testing::IsSupersetOf({"mass", "centre of mass", "inertia"}));
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(FloatingBase, LeggedDiagnosis, ::testing::Values("quadruped", "humanoid"));
