@@ -22,7 +22,11 @@ const MakeChartTools = (columns, byId) => {
     for (let k = Math.ceil(axis.least / step); k * step <= axis.most; ++k) ticks.push(k * step);
     return ticks;
   };
-  const FormatTick = (x, column) => columns[column].labels ? columns[column].labels[x] : String(Number(x.toPrecision(3)));
+  const FormatTick = (x, column) => {
+    if (columns[column].labels) return columns[column].labels[x];
+    const rounded = Number(x.toPrecision(3));
+    return rounded !== 0 && (Math.abs(rounded) < 1e-3 || Math.abs(rounded) >= 1e6) ? rounded.toExponential() : String(rounded);
+  };
 
   const Begin = id => {
     const canvas = byId(id);
