@@ -158,9 +158,9 @@ RunScene MakeNoScene(const std::filesystem::path& /*run_dir*/, const std::filesy
 }
 
 TEST_F(PageBrowserTest, NoTileIsNarrowerThanItsWords) {
+  browser_.Open(folder_.path() / "report.html");
   for (const int width : {360, 641, 850, 1300, 2560}) {
     browser_.SetViewport(width, 900, false);
-    browser_.Open(folder_.path() / "report.html");
     ASSERT_GE(browser_.Run("return document.querySelectorAll('.question b').length;"), 1);
     EXPECT_EQ(browser_.Run("return [...document.querySelectorAll('.tiles b')]"
                            "  .filter(b => b.scrollWidth > b.clientWidth).map(b => b.textContent);"),

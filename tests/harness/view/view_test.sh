@@ -188,7 +188,11 @@ shows() {
 xdotool key Escape F1
 shows help 1000 "F1 shows no help"
 xdotool key F1
-sleep 0.6
+for _ in {1..100}; do
+  shot closed
+  [[ $(differ recording closed) -gt 300 ]] || break
+  sleep 0.1
+done
 shot recording
 xdotool key Tab
 shows bare 300 "Tab does not hide the controls"
