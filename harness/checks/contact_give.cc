@@ -27,8 +27,12 @@ ContactSoftness FindSoftness(const Setup& setup) {
 void CalcContactBias(const Setup& setup, const StepRecord& step, VectorXd* bias) {
   const GraspModel& model = ModelAtTruth(step);
   const GraspTerms& grasp = model.grasp();
+  const PlantOptions& plant = setup.scenario().plant;
   *bias = grasp.slip_bias();
-  if (setup.scenario().plant.type == PlantType::kRigid) return;
+  if (plant.type == PlantType::kRigid) {
+    *bias *= plant.integrator == Integrator::kSemiImplicitEuler ? 0.5 : 0.0;
+    return;
+  }
   const Matrix3d& R_Bo = step.reading.state.X_Bo.linear();
   const Vector6d& V_Bo = grasp.V_Bo();
   Vector3d turning = V_Bo.tail<3>().cross(V_Bo.head<3>());

