@@ -79,11 +79,12 @@ inline mjtNum GetColliderTolerance(const mjOption& option) { return option.mpr_t
 #endif
 
 /// What the engine warned of. Its information is an int, or in later releases a size.
+template <typename Info>
+std::string DescribeWarning(const char* (*text)(int, Info), const mjData& d, int warning) {
+  return text(warning, static_cast<Info>(d.warning[warning].lastinfo));
+}
 inline std::string DescribeWarning(const mjData& d, int warning) {
-  const auto describe = [&]<typename Info>(const char* (*text)(int, Info)) {
-    return std::string(text(warning, static_cast<Info>(d.warning[warning].lastinfo)));
-  };
-  return describe(mju_warningText);
+  return DescribeWarning(mju_warningText, d, warning);
 }
 
 /// Lets a drawn geom reach from one point to another.

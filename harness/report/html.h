@@ -29,7 +29,7 @@ class Html {
  public:
   Html() = default;
   // NOLINTNEXTLINE(google-explicit-constructor)
-  Html(HtmlLiteral literal) : markup_(literal.markup()) {}
+  Html(const HtmlLiteral& literal) : markup_(literal.markup()) {}
   /// @param markup is markup already, and no text from files.
   static Html Raw(std::string markup) {
     Html html;
@@ -43,7 +43,7 @@ class Html {
     markup_ += more.markup_;
     return *this;
   }
-  Html& operator+=(HtmlLiteral more) {
+  Html& operator+=(const HtmlLiteral& more) {
     markup_ += more.markup();
     return *this;
   }
