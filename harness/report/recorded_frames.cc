@@ -53,8 +53,9 @@ class FramesReader {
     run.contact_forces = ReadMatrix(kForces);
     run.contact_normals = ReadMatrix("contact/normal");
     const RowMatrixXd desired = ReadMatrix("object/X_d");
-    if (desired.cols() >= 3) run.desired_positions = desired.leftCols<3>();
-    if (desired.cols() >= 6) run.desired_angles = desired.middleCols<3>(3);
+    const bool has_rows = desired.rows() > 0;
+    if (has_rows && desired.cols() >= 3) run.desired_positions = desired.leftCols<3>();
+    if (has_rows && desired.cols() >= 6) run.desired_angles = desired.middleCols<3>(3);
     if (const SignalInfo* forces = Find(kForces)) {
       const auto mu = forces->attributes.find("mu");
       if (mu != forces->attributes.end()) run.friction = mu->second;
