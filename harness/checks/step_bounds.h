@@ -16,13 +16,13 @@ namespace dexcheck {
 //
 // J_dot qvel is what (46) has and the engine's constraint has not: at a fingertip the model's J_B_dot' xi -
 // G_dot^T V_Bo, and the w x v of object and platform, whose velocities the model takes along axes that turn;
-// v w in a curve at a tyre. So fingertips that stick creep, tyres give sideways, the platform
-// sinks and tilts, each by a load f / m or an acceleration that is the same whatever the step is; each bound
-// below is that of the shipped plant (dt = 1 ms, d = 0.99, impratio = 100) and scales as its formula says
-// (bounds.h). Where the paper's assumptions are judged, tc is 2 dt, the least that the engine can step, and
-// impratio 100: contacts that a scenario makes softer than that need not be, and are told. Distances grow
-// with time, at rates that do not: distances are judged over the last kSlipWindow at most, with kSlipWindow
-// times the rate's bound.
+// v w in a curve at a tyre. So fingertips that stick creep, tyres give sideways, the platform sinks and
+// tilts, each by a load f / m or an acceleration that is the same whatever the step is; each bound below is
+// that of the shipped plant (dt = 1 ms, d = 0.99, impratio = 100) and scales as its formula says (bounds.h).
+// Where the paper's assumptions are judged, tc is 2 dt, the least that the engine can step, and impratio 100:
+// contacts that a scenario makes softer than that need not be, and are told. Distances grow with time, at
+// rates that do not: distances are judged over the last kSlipWindow at most, with kSlipWindow times the
+// rate's bound.
 //
 // The prediction differs from the engine's motion by r_ddot and v_dot, which die out under a constant force,
 // and by what tilt leaves. What they come to is computed at each step, from the engine's own A = J M^-1 J^T

@@ -32,9 +32,8 @@ double CalcOvershootInTheory(const StudyInputs& inputs, const std::vector<double
 /// overshoot, growth, over the steps of the run. In a loop that is not sampled, and a run of time T that is
 /// long enough, rms^2 T = sum over the axes of e0^2 (K_v^2 + K_p) / (2 K_v K_p).
 /// @returns NaN for all other metrics, and for these too where the object does not start beside its place,
-/// where
-///   (57) is unstable, or where more than it moves the object: another law, a plant that is not ideal in
-///   anything but delay, latency, the filter of the object's velocity and lag.
+/// where (57) is unstable, or where more than it moves the object: another law, a plant that is not ideal in
+/// anything but delay, latency, the filter of the object's velocity and lag.
 TrialResult PredictInTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
 
 /// Metrics that PredictInTheory knows.

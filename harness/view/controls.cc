@@ -27,7 +27,7 @@ constexpr double kButtonHeight = 28.0;
 constexpr double kSliderWidth = 200.0;
 constexpr double kSliderLine = 40.0;
 
-/// Keys and mouse; those that MuJoCo's own `simulate` has do the same there.
+/// Keys and mouse, after those of MuJoCo's own `simulate`.
 constexpr std::array<std::array<const char*, 2>, 15> kHelp = {{
     {"space", "pause, go on"},
     {"right, left", "one step, one step back"},

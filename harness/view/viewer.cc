@@ -25,7 +25,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::array<double, 7> kSpeeds = {0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0};
 constexpr double kForceLength = 0.042;    // m, of the largest contact force so far
 constexpr double kPullRadius = 0.006;     // m
-constexpr double kPixelsOfANotch = 32.0;  // of the middle button's way, as `simulate` has it at 640 pixels
+constexpr double kPixelsOfANotch = 32.0;  // of the middle button's way that count as one notch of the wheel
 
 /// One window on one source.
 class Viewer {
