@@ -9,13 +9,12 @@
 namespace dexcheck::testing {
 namespace {
 
-double Draw(std::mt19937* random, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(*random);
-}
-
-Matrix3d DrawRotation(std::mt19937* random) {
+Matrix3d DrawRollPitchYaw(std::mt19937* random) {
+  const auto draw = [random](double size) {
+    return std::uniform_real_distribution<double>(-size, size)(*random);
+  };
   // Away from pitch = 90 degrees, where roll and yaw lose digits.
-  const Vector3d rpy(Draw(random, -3.0, 3.0), Draw(random, -1.2, 1.2), Draw(random, -3.0, 3.0));
+  const Vector3d rpy(draw(3.0), draw(1.2), draw(3.0));
   return (Eigen::AngleAxisd(rpy.z(), Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vector3d::UnitY()) *
           Eigen::AngleAxisd(rpy.x(), Vector3d::UnitX()))
       .toRotationMatrix();
@@ -58,7 +57,7 @@ class UrdfWriter {
     // Frames turned about the joint's axis point stay on the axis, as the joint's own frame must.
     for (size_t i = 0; i < spec_.joints.size(); ++i) {
       Pose X_iL = Pose::Identity();
-      if (random_ != nullptr) X_iL.linear() = DrawRotation(random_);
+      if (random_ != nullptr) X_iL.linear() = DrawRollPitchYaw(random_);
       own_frames_.push_back(X_iL);
     }
     for (size_t i = 0; i < spec_.joints.size(); ++i) AddMovingJoint(i);
@@ -101,7 +100,7 @@ class UrdfWriter {
     const MassProperties own = ExpressIn(body, X_iL.inverse());
     Pose X_LC = Pose::Identity();
     X_LC.translation() = own.com;
-    if (random_ != nullptr) X_LC.linear() = DrawRotation(random_);
+    if (random_ != nullptr) X_LC.linear() = DrawRollPitchYaw(random_);
     text_ += fmt::format("<link name=\"{}\">{}</link>\n", name, WriteInertial(own, X_LC));
   }
 
@@ -112,7 +111,7 @@ class UrdfWriter {
     tool.com += Vector3d(0.05, -0.02, 0.03);
     tool.inertia *= 0.2;
     Pose X_LT = Pose::Identity();
-    X_LT.linear() = DrawRotation(random_);
+    X_LT.linear() = DrawRollPitchYaw(random_);
     X_LT.translation() = Vector3d(0.1, 0.02, -0.04);
     AddBody(joint.link + "_tool", tool, own_frames_[index] * X_LT);
     AddJoint(joint.name + "_weld", "fixed", joint.link, joint.link + "_tool", X_LT, "");

@@ -11,7 +11,7 @@
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::canvas_test {
 namespace {
 
 using testing::Throws;
@@ -122,4 +122,4 @@ TEST(Font, NamesAFileThatIsNone) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::canvas_test

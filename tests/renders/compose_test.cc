@@ -7,7 +7,7 @@
 
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::compose_test {
 namespace {
 
 using testing::Throws;
@@ -56,4 +56,4 @@ TEST(PlaceInset, RefusesWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::compose_test

@@ -18,7 +18,7 @@
 #include "controller/common/errors.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::frame_line_test {
 namespace {
 
 using testing::Throws;
@@ -200,4 +200,4 @@ TEST(FrameLineTest, RefusesWhatCannotBeDrawn) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::frame_line_test

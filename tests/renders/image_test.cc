@@ -7,7 +7,7 @@
 
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::image_test {
 namespace {
 
 using testing::Throws;
@@ -35,4 +35,4 @@ TEST(Image, RefusesEmptyPictures) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::image_test

@@ -23,7 +23,7 @@
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"
 
-namespace dexcheck {
+namespace dexcheck::movie_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -348,4 +348,4 @@ TEST_F(MovieTest, CountsTheFramesOfTheLongestRun) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::movie_test

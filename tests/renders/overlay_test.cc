@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-namespace dexcheck {
+namespace dexcheck::overlay_test {
 namespace {
 
 TEST(FormatSi, KeepsOneToThreeDigitsBeforeThePoint) {
@@ -132,4 +132,4 @@ TEST(Overlay, ShortensATitleThatIsTooLong) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::overlay_test

@@ -10,7 +10,7 @@
 #include "tests/common/run_program.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::picture_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -61,4 +61,4 @@ TEST(PictureFile, WritesWhatTheNameSaysOrNothing) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::picture_file_test

@@ -9,7 +9,7 @@
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::png_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -57,4 +57,4 @@ TEST(PngFile, NamesTheFileThatIsNoPicture) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::png_file_test

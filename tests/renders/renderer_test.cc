@@ -18,7 +18,7 @@
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"
 
-namespace dexcheck {
+namespace dexcheck::renderer_test {
 namespace {
 
 using testing::Throws;
@@ -272,4 +272,4 @@ TEST_F(RendererTest, StillLooksAsItDid) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::renderer_test

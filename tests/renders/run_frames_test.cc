@@ -12,7 +12,7 @@
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"
 
-namespace dexcheck {
+namespace dexcheck::run_frames_test {
 namespace {
 
 using testing::Throws;
@@ -109,4 +109,4 @@ TEST_F(RunFramesTest, AllFiveQuestionsAreListed) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::run_frames_test

@@ -19,7 +19,7 @@
 #include "tests/common/run_program.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::video_writer_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -282,4 +282,4 @@ TEST(VideoWriter, RefusesWhatH264CannotTake) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::video_writer_test

@@ -12,7 +12,7 @@
 #include "controller/common/block_cholesky.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::gram_matrix_test {
 namespace {
 
 // Sums of some tens of products of numbers below 3, and condition numbers of some tens.
@@ -89,4 +89,4 @@ TEST(BlockCholesky, RefusesWhatIsNotPositiveDefinite) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::gram_matrix_test

@@ -12,7 +12,7 @@
 #include "tests/common/throws.h"
 #include "tests/controller/contact/test_finger.h"
 
-namespace dexcheck {
+namespace dexcheck::contact_jacobian_test {
 namespace {
 
 using testing::Differentiate;
@@ -237,4 +237,4 @@ TEST_F(ContactJacobianTest, ChainsColumnsHaveTheBitsOfTheWholeProduct) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::contact_jacobian_test

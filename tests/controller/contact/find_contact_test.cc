@@ -8,7 +8,7 @@
 #include "tests/common/throws.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
-namespace dexcheck {
+namespace dexcheck::find_contact_test {
 namespace {
 
 using testing::CalcTouchingPose;
@@ -111,4 +111,4 @@ TEST(FindContactTest, ImpossibleInputIsAClearError) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::find_contact_test

@@ -12,7 +12,7 @@
 #include "tests/common/throws.h"
 #include "tests/controller/contact/test_finger.h"
 
-namespace dexcheck {
+namespace dexcheck::grasp_map_test {
 namespace {
 
 using testing::CalcScrewMotion;
@@ -258,4 +258,4 @@ TEST(GraspMapTest, WrongSizesAreAClearError) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::grasp_map_test

@@ -7,7 +7,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
-namespace dexcheck {
+namespace dexcheck::kappa_integration_test {
 namespace {
 
 using testing::CalcTouchingPose;
@@ -172,4 +172,4 @@ TEST_F(GreatCircleTest, FindContactRemovesTheDrift) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::kappa_integration_test

@@ -10,7 +10,7 @@
 #include "tests/common/throws.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
-namespace dexcheck {
+namespace dexcheck::projection_test {
 namespace {
 
 using testing::DrawPoint;
@@ -124,4 +124,4 @@ TEST(ProjectionTest, PointsWithoutAUniqueFootAreAnError) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::projection_test

@@ -7,7 +7,7 @@
 #include "tests/common/throws.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
-namespace dexcheck {
+namespace dexcheck::rolling_test {
 namespace {
 
 using testing::CalcScrewMotion;
@@ -338,4 +338,4 @@ TEST(KappaDotTest, ContactsThatAreNotPointsAreAnError) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::rolling_test

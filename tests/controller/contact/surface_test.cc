@@ -10,7 +10,7 @@
 #include "tests/common/throws.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
-namespace dexcheck {
+namespace dexcheck::surface_test {
 namespace {
 
 using testing::Differentiate;
@@ -332,4 +332,4 @@ TEST(BoxTest, HasAFlatChartOnEachFaceThatEndsAtItsEdges) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::surface_test

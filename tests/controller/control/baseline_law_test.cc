@@ -17,7 +17,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/control/grasp_scene.h"
 
-namespace dexcheck {
+namespace dexcheck::baseline_law_test {
 namespace {
 
 using testing::AllocationCounter;
@@ -290,4 +290,4 @@ TEST_F(BaselineLawTest, DemandsWithoutAllocation) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::baseline_law_test

@@ -12,7 +12,7 @@
 #include "tests/controller/control/ideal_simulation.h"
 #include "tests/controller/control/printed_law.h"
 
-namespace dexcheck {
+namespace dexcheck::closed_loop_test {
 namespace {
 
 using testing::Fault;
@@ -234,4 +234,4 @@ TEST(ClosedLoop, PostureTaskKeepsTheLeftArmStill) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::closed_loop_test

@@ -18,7 +18,7 @@
 #include "tests/common/throws.h"
 #include "tests/controller/control/printed_law.h"
 
-namespace dexcheck {
+namespace dexcheck::computed_torque_test {
 namespace {
 
 using testing::AllocationCounter;
@@ -435,4 +435,4 @@ TEST(ComputedTorque, OneControlStepDoesNotAllocate) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::computed_torque_test

@@ -15,7 +15,7 @@
 #include "tests/common/throws.h"
 #include "tests/controller/control/grasp_scene.h"
 
-namespace dexcheck {
+namespace dexcheck::constrained_dynamics_test {
 namespace {
 
 using testing::AllocationCounter;
@@ -308,4 +308,4 @@ TEST(ActuationMap, IsEBar) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::constrained_dynamics_test

@@ -21,7 +21,7 @@
 #include "tests/common/throws.h"
 #include "tests/controller/control/grasp_scene.h"
 
-namespace dexcheck {
+namespace dexcheck::grasp_terms_test {
 namespace {
 
 using testing::AllocationCounter;
@@ -266,4 +266,4 @@ TEST_F(Misuse, FingertipsMustBeThereAndCarrySpheres) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::grasp_terms_test

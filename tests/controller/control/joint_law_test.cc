@@ -13,7 +13,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::joint_law_test {
 namespace {
 
 using testing::AllocationCounter;
@@ -148,4 +148,4 @@ TEST(JointMotion, HasTheDerivativesOfItsPositions) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::joint_law_test

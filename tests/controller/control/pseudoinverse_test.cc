@@ -12,7 +12,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::pseudoinverse_test {
 namespace {
 
 using testing::AllocationCounter;
@@ -254,4 +254,4 @@ TEST(Pseudoinverse, DoesNotAllocate) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::pseudoinverse_test

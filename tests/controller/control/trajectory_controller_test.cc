@@ -12,7 +12,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/control/grasp_scene.h"
 
-namespace dexcheck {
+namespace dexcheck::trajectory_controller_test {
 namespace {
 
 using testing::AllocationCounter;
@@ -152,4 +152,4 @@ TEST_F(TrajectoryControllerTest, StepsWithoutAllocation) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::trajectory_controller_test

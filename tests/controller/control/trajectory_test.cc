@@ -17,7 +17,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::trajectory_test {
 namespace {
 
 using testing::AllocationCounter;
@@ -361,4 +361,4 @@ TEST(TrajectoryReader, RejectsWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::trajectory_test

@@ -13,7 +13,7 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::allocation_test {
 namespace {
 
 using testing::AllocationCounter;
@@ -145,4 +145,4 @@ TEST_P(Allocation, AllocationsInTheLibraryAreSeen) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::allocation_test

@@ -14,7 +14,7 @@
 #include "tests/common/random_robot.h"
 #include "tests/common/reduction_map.h"
 
-namespace dexcheck {
+namespace dexcheck::block_structure_test {
 namespace {
 
 using testing::DrawPositions;
@@ -201,4 +201,4 @@ TEST_P(ReducedBlocks, AreThoseOfEquation17) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::block_structure_test

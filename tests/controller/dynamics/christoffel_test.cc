@@ -15,7 +15,7 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::christoffel_test {
 namespace {
 
 using testing::DrawPositions;
@@ -203,4 +203,4 @@ TEST_P(Christoffel, MutatedModelsAndWrongSymbolsAreSeen) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::christoffel_test

@@ -10,7 +10,7 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::fingertip_pose_test {
 namespace {
 
 using testing::MatrixNear;
@@ -147,4 +147,4 @@ TEST_F(FingertipPose, AtHomeIsUprightWithArmsHanging) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::fingertip_pose_test

@@ -9,7 +9,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::floating_test {
 namespace {
 
 using testing::MatrixNear;
@@ -191,4 +191,4 @@ l = { mass = 1, com = [0, 0, 0], inertia = [1, 1, 1, 0, 0, 0] }
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::floating_test

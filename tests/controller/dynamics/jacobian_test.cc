@@ -16,7 +16,7 @@
 #include "tests/common/random_robot.h"
 #include "tests/common/reduction_map.h"
 
-namespace dexcheck {
+namespace dexcheck::jacobian_test {
 namespace {
 
 using testing::CalcReductionMap;
@@ -280,4 +280,4 @@ TEST(BasePose, OfAMobileBaseIsNotTurned) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::jacobian_test

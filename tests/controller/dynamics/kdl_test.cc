@@ -15,7 +15,7 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::kdl_test {
 namespace {
 
 using testing::MatrixNear;
@@ -177,4 +177,4 @@ TEST_F(PandaAgainstKdl, MutationsAreSeen) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::kdl_test

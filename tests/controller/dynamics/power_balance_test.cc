@@ -18,7 +18,7 @@
 #include "tests/common/random_robot.h"
 #include "tests/common/reduction_map.h"
 
-namespace dexcheck {
+namespace dexcheck::power_balance_test {
 namespace {
 
 using testing::CalcReductionMap;
@@ -244,4 +244,4 @@ TEST(Momentum, IsKeptByAFreePlanarRobot) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::power_balance_test

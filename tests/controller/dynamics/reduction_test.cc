@@ -17,7 +17,7 @@
 #include "tests/common/random_robot.h"
 #include "tests/common/reduction_map.h"
 
-namespace dexcheck {
+namespace dexcheck::reduction_test {
 namespace {
 
 using testing::CalcReductionMap;
@@ -227,4 +227,4 @@ TEST_P(Reduction, MassMatrixRateMinusTwiceCIsSkew) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::reduction_test

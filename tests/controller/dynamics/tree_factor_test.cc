@@ -8,7 +8,7 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::tree_factor_test {
 namespace {
 
 // Rounding: some n eps times the condition of M, about 1e6 with phalanges beside the platform.
@@ -102,4 +102,4 @@ TEST(TreeFactor, RefusesMatricesThatAreNotPositiveDefinite) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::tree_factor_test

@@ -9,7 +9,7 @@
 #include "controller/dynamics/model_terms.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck {
+namespace dexcheck::worked_examples_test {
 namespace {
 
 using testing::MatrixNear;
@@ -255,4 +255,4 @@ TEST(Platform, WheelRatesAreAnotherBasis) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::worked_examples_test

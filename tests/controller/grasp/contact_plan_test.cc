@@ -19,7 +19,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::contact_plan_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -338,4 +338,4 @@ TEST_F(ContactPlanTest, RejectsWhatCannotBeUsed) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::contact_plan_test

@@ -11,7 +11,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/grasp/random_grasp.h"
 
-namespace dexcheck {
+namespace dexcheck::force_closure_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -280,4 +280,4 @@ TEST(ForceClosureErrors, NameTheValue) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::force_closure_test

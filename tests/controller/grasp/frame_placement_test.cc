@@ -15,7 +15,7 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::frame_placement_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -217,4 +217,4 @@ TEST_F(FramePlacementTest, RejectsWhatCannotBeUsed) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::frame_placement_test

@@ -11,7 +11,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/grasp/random_grasp.h"
 
-namespace dexcheck {
+namespace dexcheck::grasp_force_random_test {
 namespace {
 
 using testing::MakeRandomGraspForceProblem;
@@ -152,4 +152,4 @@ TEST(RandomGraspsOracle, NoSampledForceGivesMore) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::grasp_force_random_test

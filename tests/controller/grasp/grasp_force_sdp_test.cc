@@ -13,7 +13,7 @@
 #include "tests/controller/grasp/random_grasp.h"
 #include "tests/controller/grasp/sdp_oracle.h"
 
-namespace dexcheck {
+namespace dexcheck::grasp_force_sdp_test {
 namespace {
 
 using testing::MakeRandomGraspForceProblem;
@@ -106,4 +106,4 @@ TEST_F(GraspForceSdp, ThirteenContacts) { Compare(13, 0, 10); }
 TEST_F(GraspForceSdp, FourContactsWithSixteenLimits) { Compare(4, 16, 20); }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::grasp_force_sdp_test

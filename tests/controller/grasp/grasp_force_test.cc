@@ -14,7 +14,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/grasp/random_grasp.h"
 
-namespace dexcheck {
+namespace dexcheck::grasp_force_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -474,4 +474,4 @@ TEST(GraspForceErrors, ContactsOnOneLineAreSingular) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::grasp_force_test

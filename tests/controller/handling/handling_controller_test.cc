@@ -13,7 +13,7 @@
 #include "tests/common/throws.h"
 #include "tests/controller/control/grasp_scene.h"
 
-namespace dexcheck {
+namespace dexcheck::handling_controller_test {
 namespace {
 
 using testing::AllocationCounter;
@@ -206,4 +206,4 @@ TEST_F(HandlingControllerTest, AllocatesForNewSetsOfContactsOnly) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::handling_controller_test

@@ -15,7 +15,7 @@
 #include "controller/model/parameter_reader.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck {
+namespace dexcheck::parameter_errors_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -387,4 +387,4 @@ TEST(ParameterTexts, DamagedAtRandomAreReadOrRefusedInOneLine) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::parameter_errors_test

@@ -13,7 +13,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck {
+namespace dexcheck::parameter_reader_test {
 namespace {
 
 using dexcheck::testing::MatrixNear;
@@ -284,4 +284,4 @@ TEST(OtherForms, AreRead) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::parameter_reader_test

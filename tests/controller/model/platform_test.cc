@@ -10,7 +10,7 @@
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck {
+namespace dexcheck::platform_test {
 namespace {
 
 using testing::MatrixNear;
@@ -226,4 +226,4 @@ TEST_P(PlatformTest, RejectsWhatIsNotADifferentialDrive) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::platform_test

@@ -10,7 +10,7 @@
 
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck {
+namespace dexcheck::rigid_body_test {
 namespace {
 
 using dexcheck::testing::MatrixNear;
@@ -212,4 +212,4 @@ TEST(PhysicalInconsistency, AllowsForRoundingAndNoMore) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::rigid_body_test

@@ -12,7 +12,7 @@
 #include "controller/common/errors.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck {
+namespace dexcheck::robot_model_test {
 namespace {
 
 using dexcheck::testing::MatrixNear;
@@ -197,4 +197,4 @@ INSTANTIATE_TEST_SUITE_P(RobotModel, RobotModelRejects,
                          [](const auto& info) { return info.param.name; });
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::robot_model_test

@@ -10,7 +10,7 @@
 #include "controller/model/parameter_reader.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck {
+namespace dexcheck::row_forms_test {
 namespace {
 
 using testing::MatrixNear;
@@ -175,4 +175,4 @@ TEST(OtherForms, AreRefusedInOneLine) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::row_forms_test

@@ -12,7 +12,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/object/object_states.h"
 
-namespace dexcheck {
+namespace dexcheck::euler_zyz_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -214,4 +214,4 @@ TEST(EulerZyz, RejectsTheCallersMistakes) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::euler_zyz_test

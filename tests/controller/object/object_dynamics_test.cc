@@ -12,7 +12,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/object/object_states.h"
 
-namespace dexcheck {
+namespace dexcheck::object_dynamics_test {
 namespace {
 
 using testing::kGravity;
@@ -354,4 +354,4 @@ TEST(ObjectDynamics, RejectsABodyThatIsNotAnObject) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::object_dynamics_test

@@ -10,7 +10,7 @@
 
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck {
+namespace dexcheck::so3_test {
 namespace {
 
 using testing::MatrixNear;
@@ -318,4 +318,4 @@ TEST(OrientationError, ClosedLoopFollowsTheLinearSolution) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::so3_test

@@ -18,7 +18,7 @@
 #include "harness/base/partial_file.h"
 #include "tests/common/files.h"
 
-namespace dexcheck {
+namespace dexcheck::temporary_path_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -154,4 +154,4 @@ TEST(HandleSignals, AFileThatGrowsBeyondItsLimitIsAnError) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::temporary_path_test

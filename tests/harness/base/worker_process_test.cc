@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace dexcheck {
+namespace dexcheck::worker_process_test {
 namespace {
 
 std::string ReceiveAll(int channel) {
@@ -77,4 +77,4 @@ TEST(WorkerProcess, OneThatHasEndedIsToldNothing) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::worker_process_test

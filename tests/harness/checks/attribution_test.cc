@@ -11,7 +11,7 @@
 
 #include "harness/checks/step_check_table.h"
 
-namespace dexcheck {
+namespace dexcheck::attribution_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -328,4 +328,4 @@ TEST(NameOf, CausesHaveDifferentNames) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::attribution_test

@@ -9,7 +9,7 @@
 #include "harness/checks/step_check_table.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::baseline_reference_test {
 namespace {
 
 /// Away from the trajectory, so that every term works.
@@ -111,4 +111,4 @@ TEST(BaselineRun, OperationalSpaceDoesWhatTheInertiaAsWeightDoes) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::baseline_reference_test

@@ -17,7 +17,7 @@
 #include "tests/common/random_robot.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck {
+namespace dexcheck::consistency_test {
 namespace {
 
 using testing::RandomRobotOptions;
@@ -191,4 +191,4 @@ TEST(Consistency, StopsWhenToldTo) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::consistency_test

@@ -9,7 +9,7 @@
 #include "harness/diagnosis/spoiled_law.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::law_check_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -186,4 +186,4 @@ TEST(LawCheck, SampledRadiusIsThatOfTheRecursion) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::law_check_test

@@ -9,7 +9,7 @@
 #include "controller/object/euler_zyz.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck {
+namespace dexcheck::object_rates_test {
 namespace {
 
 using testing::MatrixNear;
@@ -35,4 +35,4 @@ TEST(ObjectRates, AreThoseOfTheModelToRounding) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::object_rates_test

@@ -16,7 +16,7 @@
 #include "tests/common/paths.h"
 #include "tests/harness/checks/step_check_scene.h"
 
-namespace dexcheck {
+namespace dexcheck::step_model_check_test {
 namespace {
 
 using testing::AllocationCounter;
@@ -357,4 +357,4 @@ TEST(TermTable, IsSound) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::step_model_check_test

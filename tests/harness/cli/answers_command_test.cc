@@ -7,7 +7,7 @@
 #include "tests/common/legged_robots.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::answers_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -327,4 +327,4 @@ for line in sys.stdin:
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::answers_command_test

@@ -5,7 +5,7 @@
 #include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::bad_input_test {
 namespace {
 
 using testing::IsRefused;
@@ -260,4 +260,4 @@ TEST_F(BadFiles, AnotherMujocoVersionIsNamed) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::bad_input_test

@@ -7,7 +7,7 @@
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/report/report_run.h"
 
-namespace dexcheck {
+namespace dexcheck::compare_command_test {
 namespace {
 
 using testing::ProgramResult;
@@ -58,4 +58,4 @@ TEST(CompareCommand, BadInputIsOneLine) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::compare_command_test

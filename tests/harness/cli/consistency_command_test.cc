@@ -9,7 +9,7 @@
 
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::consistency_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -206,4 +206,4 @@ INSTANTIATE_TEST_SUITE_P(Signals, Interruption, ::testing::Values(SIGINT, SIGTER
                          [](const auto& info) { return info.param == SIGINT ? "SigInt" : "SigTerm"; });
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::consistency_command_test

@@ -12,7 +12,7 @@
 #include "tests/common/paper_robot.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::contact_log_test {
 namespace {
 
 constexpr int kFingers = 4;
@@ -74,4 +74,4 @@ TEST(ContactLog, GivesTheContactPointsBackWhileFingersGraspTheObject) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::contact_log_test

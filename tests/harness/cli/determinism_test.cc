@@ -11,7 +11,7 @@
 #include "harness/log/log_reader.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::determinism_test {
 namespace {
 
 using testing::DexcheckCommand;
@@ -88,4 +88,4 @@ TEST(Determinism, ComparisonsGiveTheSameNumbers) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::determinism_test

@@ -9,7 +9,7 @@
 
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::diagnose_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -252,4 +252,4 @@ TEST(MutateRunCommand, InterruptedTellsWhatWasDone) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::diagnose_command_test

@@ -14,7 +14,7 @@
 #include "tests/common/random_robot.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::eval_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -332,4 +332,4 @@ TEST_F(EvalCommand, BallJointsHaveQuaternions) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::eval_command_test

@@ -11,7 +11,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::eval_contacts_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -261,4 +261,4 @@ TEST_F(EvalContacts, RefusesImpossibleContacts) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::eval_contacts_test

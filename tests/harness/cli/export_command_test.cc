@@ -10,7 +10,7 @@
 #include "harness/log/log_writer.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::export_command_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -215,4 +215,4 @@ TEST_F(ExportTest, OutputsThatCannotBeWrittenAreNamed) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::export_command_test

@@ -16,7 +16,7 @@
 #include "harness/log/log_reader.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::fault_injection_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -344,4 +344,4 @@ TEST_F(DamagedLogs, WithImpossibleNumbersAreRefusedOrReadToTheEnd) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::fault_injection_test

@@ -6,7 +6,7 @@
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/log/forge.h"
 
-namespace dexcheck {
+namespace dexcheck::forged_log_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -98,4 +98,4 @@ TEST_F(ForgedLog, ASeedThatIsNoNumberIsNamed) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::forged_log_test

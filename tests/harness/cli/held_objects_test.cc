@@ -6,7 +6,7 @@
 
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::held_objects_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -117,4 +117,4 @@ INSTANTIATE_TEST_SUITE_P(Surfaces, HeldObjects, ::testing::ValuesIn(kObjects),
                          [](const auto& info) { return std::string(info.param.body); });
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::held_objects_test

@@ -8,7 +8,7 @@
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/sides/panda_urdf.h"
 
-namespace dexcheck {
+namespace dexcheck::import_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -167,4 +167,4 @@ TEST_F(TwoDescriptions, ACopyForAnOlderEngineFindsItsFilesFromAnotherFolder) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::import_command_test

@@ -7,7 +7,7 @@
 #include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::install_test {
 namespace {
 
 using testing::ProgramResult;
@@ -40,4 +40,4 @@ TEST(InstalledProgram, UsesTheFilesBesideIt) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::install_test

@@ -10,7 +10,7 @@
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/report/report_run.h"
 
-namespace dexcheck {
+namespace dexcheck::interruption_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -132,4 +132,4 @@ TEST_F(Interruption, OfADiagnosisIsNoVerdict) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::interruption_test

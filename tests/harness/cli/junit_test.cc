@@ -5,7 +5,7 @@
 
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::junit_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -98,4 +98,4 @@ TEST_F(JUnit, ABadPathIsRefusedBeforeTheWork) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::junit_test

@@ -6,7 +6,7 @@
 
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::own_arm_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -147,4 +147,4 @@ TEST_F(OwnArm, WhatCannotBeIsOneLine) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::own_arm_test

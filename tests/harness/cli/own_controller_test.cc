@@ -6,7 +6,7 @@
 
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::own_controller_test {
 namespace {
 
 const std::vector<std::string> kShort = {"run",          "curve", "--no-report", "--set",
@@ -194,4 +194,4 @@ TEST(OwnController, TheEchoAnswersAndTheRobotFalls) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::own_controller_test

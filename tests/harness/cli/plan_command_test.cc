@@ -13,7 +13,7 @@
 #include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::plan_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -193,4 +193,4 @@ TEST(PlanCommand, TellsWhichBodiesMeet) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::plan_command_test

@@ -5,7 +5,7 @@
 #include "tests/common/paths.h"
 #include "tests/common/run_program.h"
 
-namespace dexcheck {
+namespace dexcheck::quickstart_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -55,4 +55,4 @@ TEST_F(Quickstart, RunsThePapersExperimentUnlessToldOtherwise) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::quickstart_test

@@ -12,7 +12,7 @@
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/sides/panda_urdf.h"
 
-namespace dexcheck {
+namespace dexcheck::referee_command_test {
 namespace {
 
 using Json = nlohmann::json;
@@ -218,4 +218,4 @@ TEST_F(Referee, MujocoThreeAgrees) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::referee_command_test

@@ -20,7 +20,7 @@
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/renders/kinematic_run.h"
 
-namespace dexcheck {
+namespace dexcheck::render_command_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -258,4 +258,4 @@ TEST_F(RenderCommandTest, StoppedItLeavesNothing) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::render_command_test

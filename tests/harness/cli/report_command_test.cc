@@ -10,7 +10,7 @@
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/report/report_run.h"
 
-namespace dexcheck {
+namespace dexcheck::report_command_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -99,4 +99,4 @@ TEST_F(ReportCommandTest, SaysThatGnuplotIsMissing) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::report_command_test

@@ -11,7 +11,7 @@
 #include "harness/log/log_writer.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::run_command_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -277,4 +277,4 @@ TEST(RunCommand, RefusesBadInputInOneLine) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::run_command_test

@@ -11,7 +11,7 @@
 #include <random>
 #include <thread>
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::study_command_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -177,4 +177,4 @@ TEST_F(StudyCommand, TheReportsCommandsRepeatTheTrials) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::study_command_test

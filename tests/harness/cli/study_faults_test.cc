@@ -6,7 +6,7 @@
 
 #include "tests/harness/cli/study_command.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::study_faults_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -119,4 +119,4 @@ TEST_F(StudyCommand, AReadOnlyDatabaseIsNamed) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::study_faults_test

@@ -6,7 +6,7 @@
 
 #include "tests/harness/cli/study_command.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::study_merge_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -107,4 +107,4 @@ TEST_F(StudyCommand, RowsOfOtherMachinesAreMergedWithinRounding) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::study_merge_test

@@ -13,7 +13,7 @@
 #include "harness/study/search_history.h"
 #include "tests/harness/cli/study_command.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::study_search_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -192,4 +192,4 @@ TEST_F(StudySearch, PartsNeedAFolder) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::study_search_test

@@ -7,7 +7,7 @@
 
 #include "tests/harness/cli/study_command.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::study_serve_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -103,4 +103,4 @@ print(server.wait(), study.best_value, study.trials[0].value)
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::study_serve_test

@@ -4,7 +4,7 @@
 
 #include "tests/harness/cli/study_command.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::study_slurm_script_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -76,4 +76,4 @@ TEST_F(StudyCommand, NoJobIsPrintedThatCannotRun) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::study_slurm_script_test

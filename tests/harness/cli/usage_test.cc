@@ -5,7 +5,7 @@
 
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::usage_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -160,4 +160,4 @@ INSTANTIATE_TEST_SUITE_P(Commands, Outputs,
                          [](const auto& info) { return info.param.front(); });
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::usage_test

@@ -7,7 +7,7 @@
 #include "harness/log/log_reader.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck {
+namespace dexcheck::verdict_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -129,4 +129,4 @@ TEST_F(Verdict, OptionsThatWouldBeIgnoredAreRefused) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::verdict_test

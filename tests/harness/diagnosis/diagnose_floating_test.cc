@@ -20,7 +20,7 @@
 #include "tests/common/legged_robots.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::diagnose_floating_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -197,4 +197,4 @@ TEST(FileTermsTest, RowsOfModifiedParametersStay) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::diagnose_floating_test

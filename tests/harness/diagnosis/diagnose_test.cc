@@ -16,7 +16,7 @@
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::diagnose_test {
 namespace {
 
 constexpr double kScale = 1e-3;
@@ -354,4 +354,4 @@ TEST(Diagnose, StopsWhenToldTo) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::diagnose_test

@@ -20,7 +20,7 @@
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::adapter_test {
 namespace {
 
 using testing::MatrixNear;
@@ -406,4 +406,4 @@ TEST(ShippedAdapter, LeavesTheObjectAlone) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::adapter_test

@@ -15,7 +15,7 @@
 #include "tests/common/allocation_counter.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck {
+namespace dexcheck::clearance_test {
 namespace {
 
 using testing::AllocationCounter;
@@ -235,4 +235,4 @@ TEST_F(ClearanceTest, MissesNoOverlapAndMeasuresFew) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::clearance_test

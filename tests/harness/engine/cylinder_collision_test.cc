@@ -13,7 +13,7 @@
 #include "harness/engine/engine.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck {
+namespace dexcheck::cylinder_collision_test {
 namespace {
 
 using testing::MatrixNear;
@@ -122,4 +122,4 @@ TEST(EllipsoidCollision, FindsTheNearestPointsOutsideAndIn) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::cylinder_collision_test

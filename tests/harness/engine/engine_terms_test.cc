@@ -11,7 +11,7 @@
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::engine_terms_test {
 namespace {
 
 using testing::DrawPositions;
@@ -341,4 +341,4 @@ TEST(EngineTerms, FrictionHasTheForcesOfTendonsAroundGeoms) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::engine_terms_test

@@ -19,7 +19,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck {
+namespace dexcheck::grasp_engine_test {
 namespace {
 
 using testing::MatrixNear;
@@ -282,4 +282,4 @@ TEST_F(RandomGrasp, RatesAreTheEnginesAccelerations) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::grasp_engine_test

@@ -10,7 +10,7 @@
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::newer_mjcf_test {
 namespace {
 
 using ::testing::Contains;
@@ -154,4 +154,4 @@ TEST(NewerMjcf, WhatTheEngineDoesNotLoadIsExplained) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::newer_mjcf_test

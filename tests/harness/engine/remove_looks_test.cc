@@ -11,7 +11,7 @@
 #include "harness/engine/engine.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck {
+namespace dexcheck::remove_looks_test {
 namespace {
 
 /// Whether two arrays have the same bits.
@@ -119,4 +119,4 @@ TEST(RemoveLooks, KeepsWhatAnythingRefersTo) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::remove_looks_test

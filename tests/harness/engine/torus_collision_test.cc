@@ -15,7 +15,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck {
+namespace dexcheck::torus_collision_test {
 namespace {
 
 using testing::MatrixNear;
@@ -290,4 +290,4 @@ TEST(TorusInTheEngine, LiesStillOnABox) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::torus_collision_test

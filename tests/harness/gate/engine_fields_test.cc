@@ -21,7 +21,7 @@
 #include "tests/common/paper_robot.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck {
+namespace dexcheck::engine_fields_test {
 namespace {
 
 using ::testing::Contains;
@@ -418,4 +418,4 @@ TEST_F(EngineFields, ChangedAreNamedOrMoveNothing) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::engine_fields_test

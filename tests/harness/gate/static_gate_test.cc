@@ -14,7 +14,7 @@
 #include "tests/common/paths.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck {
+namespace dexcheck::static_gate_test {
 namespace {
 
 using testing::ReadText;
@@ -184,4 +184,4 @@ TEST(StaticGate, TellsTheRingFromTheTorus) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::static_gate_test

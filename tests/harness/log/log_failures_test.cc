@@ -11,7 +11,7 @@
 #include "tests/common/files.h"
 #include "tests/harness/log/sample_log_check.h"
 
-namespace dexcheck {
+namespace dexcheck::log_failures_test {
 namespace {
 
 using ::testing::EndsWith;
@@ -315,4 +315,4 @@ TEST_F(Misuse, CallsMustComeInOrder) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::log_failures_test

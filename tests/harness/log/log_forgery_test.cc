@@ -10,7 +10,7 @@
 #include "tests/harness/log/forge.h"
 #include "tests/harness/log/sample_log_check.h"
 
-namespace dexcheck {
+namespace dexcheck::log_forgery_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -243,4 +243,4 @@ TEST_F(LogForgeryTest, LinksInTheFolderAreNotFollowed) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::log_forgery_test

@@ -16,7 +16,7 @@
 #include "tests/common/run_program.h"
 #include "tests/harness/log/sample_log_check.h"
 
-namespace dexcheck {
+namespace dexcheck::log_kill_test {
 namespace {
 
 using testing::TempFolder;
@@ -208,4 +208,4 @@ TEST_F(KilledWriter, WhileClosing) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::log_kill_test

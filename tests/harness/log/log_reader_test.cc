@@ -12,7 +12,7 @@
 #include "tests/harness/log/forge.h"
 #include "tests/harness/log/sample_log_check.h"
 
-namespace dexcheck {
+namespace dexcheck::log_reader_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -193,4 +193,4 @@ TEST_F(LogReaderTest, EveryDamageIsNoticed) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::log_reader_test

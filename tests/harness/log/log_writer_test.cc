@@ -11,7 +11,7 @@
 #include "tests/common/run_program.h"
 #include "tests/harness/log/sample_log_check.h"
 
-namespace dexcheck {
+namespace dexcheck::log_writer_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -252,4 +252,4 @@ TEST_F(LogWriterTest, AnOtherProgramReadsIt) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::log_writer_test

@@ -8,7 +8,7 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::disturbances_test {
 namespace {
 
 constexpr double kDt = 1e-3;
@@ -154,4 +154,4 @@ TEST_F(DisturbancesTest, AnUnknownBodyIsRefused) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::disturbances_test

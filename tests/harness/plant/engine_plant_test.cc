@@ -12,7 +12,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::engine_plant_test {
 namespace {
 
 class EnginePlantTest : public ::testing::Test {
@@ -165,4 +165,4 @@ TEST_F(EnginePlantTest, APushIsItsImpulse) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::engine_plant_test

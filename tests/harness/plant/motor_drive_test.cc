@@ -11,7 +11,7 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::motor_drive_test {
 namespace {
 
 constexpr double kDt = 1e-3;
@@ -180,4 +180,4 @@ TEST_F(MotorDriveTest, FrictionWithoutArmatureIsRefused) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::motor_drive_test

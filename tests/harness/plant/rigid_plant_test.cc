@@ -16,7 +16,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::rigid_plant_test {
 namespace {
 
 const std::string kRigid = "plant.type=rigid";
@@ -281,4 +281,4 @@ TEST(RigidRun, TheEngineComesToItAsItsContactsBecomeStiff) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::rigid_plant_test

@@ -11,7 +11,7 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::sensing_test {
 namespace {
 
 constexpr double kDt = 1e-3;
@@ -281,4 +281,4 @@ TEST_F(SensingTest, AGroupThatIsNoJointIsRefused) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::sensing_test

@@ -10,7 +10,7 @@
 #include "tests/common/run_program.h"
 #include "tests/harness/report/replay_run.h"
 
-namespace dexcheck {
+namespace dexcheck::accessibility_test {
 namespace {
 
 using testing::Browser;
@@ -64,4 +64,4 @@ TEST_F(AccessibilityTest, AxeFindsNothingInThePageOfARun) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::accessibility_test

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-namespace dexcheck {
+namespace dexcheck::html_test {
 namespace {
 
 // Texts are no markup: what forgets to escape them does not compile.
@@ -53,4 +53,4 @@ TEST(Html, SharesOfABoundAreNoPowersOfTen) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::html_test

@@ -12,7 +12,7 @@
 #include "tests/common/files.h"
 #include "tests/harness/report/report_run.h"
 
-namespace dexcheck {
+namespace dexcheck::page_browser_test {
 namespace {
 
 using testing::Browser;
@@ -218,4 +218,4 @@ TEST_F(PageBrowserTest, WouldNoticeErrors) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::page_browser_test

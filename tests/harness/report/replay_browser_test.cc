@@ -14,7 +14,7 @@
 #include "tests/common/browser.h"
 #include "tests/harness/report/replay_run.h"
 
-namespace dexcheck {
+namespace dexcheck::replay_browser_test {
 namespace {
 
 using testing::Browser;
@@ -239,4 +239,4 @@ TEST_F(ReplayBrowserTest, PlaysTurnsHidesAndFits) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::replay_browser_test

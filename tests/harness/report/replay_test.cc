@@ -14,7 +14,7 @@
 #include "harness/report/simplify_mesh.h"
 #include "tests/harness/report/replay_run.h"
 
-namespace dexcheck {
+namespace dexcheck::replay_test {
 namespace {
 
 constexpr size_t kMostBytes = 3'000'000;  // that the replay of 10 s may add to a page
@@ -107,4 +107,4 @@ TEST(SimplifyMesh, LeavesAMeshThatIsSmallEnough) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::replay_test

@@ -8,7 +8,7 @@
 #include "tests/common/files.h"
 #include "tests/harness/report/report_run.h"
 
-namespace dexcheck {
+namespace dexcheck::run_comparison_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -158,4 +158,4 @@ TEST_F(RunComparisonTest, ChecksOfARunWithoutSummaryKeepTheirQuestion) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::run_comparison_test

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <limits>
 
-namespace dexcheck {
+namespace dexcheck::thinning_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -70,4 +70,4 @@ TEST(Thinning, LeavesOutWhatIsNotANumberUnlessThereIsNothingElse) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::thinning_test

@@ -18,7 +18,7 @@
 #include "tests/common/files.h"
 #include "tests/harness/report/report_run.h"
 
-namespace dexcheck {
+namespace dexcheck::write_report_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -233,4 +233,4 @@ TEST(Figures, CurvesOfTwoAxesDoNotLieOnOneAnother) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::write_report_test

@@ -4,7 +4,7 @@
 
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::attribution_test {
 namespace {
 
 struct Fault {
@@ -93,4 +93,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const ::testing::TestParamInfo<Failure>& info) { return info.param.name; });
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::attribution_test

@@ -15,7 +15,7 @@
 #include "harness/engine/contact_softness.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::bounds_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -226,4 +226,4 @@ TEST(Balance, KnowsTheFrictionOfWheelsThatSpin) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::bounds_test

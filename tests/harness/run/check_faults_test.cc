@@ -8,7 +8,7 @@
 #include "harness/plant/engine_plant.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::check_faults_test {
 namespace {
 
 const std::string kRobot = SourcePath("/controller/parameters/assistant_robot.toml");
@@ -161,4 +161,4 @@ TEST(SlipWindow, ForgetsWhatWasLongAgo) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::check_faults_test

@@ -8,7 +8,7 @@
 
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::clearance_run_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -199,4 +199,4 @@ INSTANTIATE_TEST_SUITE_P(ClearanceOfARun, ClearScenarios,
                          });
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::clearance_run_test

@@ -7,7 +7,7 @@
 #include "tests/common/allocation_counter.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::closed_loop_test {
 namespace {
 
 /// E(t) / E(0) of E_ddot + 2 zeta omega E_dot + omega^2 E = 0 from rest.
@@ -146,4 +146,4 @@ TEST(ClosedLoop, TorquesCanBeHeldForSeveralSteps) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::closed_loop_test

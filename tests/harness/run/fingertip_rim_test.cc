@@ -11,7 +11,7 @@
 
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::fingertip_rim_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -102,4 +102,4 @@ TEST(FingertipRim, IsNotAskedOfWholeSpheres) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::fingertip_rim_test

@@ -4,7 +4,7 @@
 
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::followed_contacts_test {
 namespace {
 
 /// Fingers roll the torus: rolling contact is the whole motion.
@@ -74,4 +74,4 @@ TEST(FollowedContacts, AreRefusedWhereNothingRolls) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::followed_contacts_test

@@ -7,7 +7,7 @@
 
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::half_step_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -49,4 +49,4 @@ TEST(HalfStep, RepeatsNothingWhereAnotherCauseWasFound) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::half_step_test

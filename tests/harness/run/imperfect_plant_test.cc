@@ -8,7 +8,7 @@
 #include "harness/run/runner.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::imperfect_plant_test {
 namespace {
 
 const std::vector<std::string> kShort = {"duration=0.2", "settle=0.3", "expect={}"};
@@ -212,4 +212,4 @@ TEST(ImperfectPlant, AMotorThatSaturatesGoesOnAndIsReported) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::imperfect_plant_test

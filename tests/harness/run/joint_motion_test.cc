@@ -6,7 +6,7 @@
 #include "controller/control/joint_controller.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::joint_motion_test {
 namespace {
 
 // Rounding of torques against bounds of 1e-13 and more: what each check of a run without contacts leaves.
@@ -125,4 +125,4 @@ TEST(JointMotionRun, TorquesMayBeHeld) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::joint_motion_test

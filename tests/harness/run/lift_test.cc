@@ -10,7 +10,7 @@
 #include "tests/common/allocation_counter.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::lift_test {
 namespace {
 
 std::vector<std::string> ListPhases(const PickAndPlace& task) {
@@ -254,4 +254,4 @@ TEST(LiftScenario, SaysWhyThereIsNoPlan) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::lift_test

@@ -7,7 +7,7 @@
 #include "harness/run/runner.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::loop_parts_test {
 namespace {
 
 /// A plant whose motors give another torque than they say.
@@ -107,4 +107,4 @@ TEST_F(LoopPartsTest, TheRecordHasWhatTheLawDemandedAndWhatCameOfIt) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::loop_parts_test

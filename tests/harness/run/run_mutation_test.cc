@@ -11,7 +11,7 @@
 #include "harness/run/detectability.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::run_mutation_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -167,4 +167,4 @@ TEST(RunCampaign, WhatIsStoppedIsNotDone) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::run_mutation_test

@@ -7,7 +7,7 @@
 #include "controller/object/so3.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::scenarios_test {
 namespace {
 
 // Rounding: the terms' own bounds are a hundred times smaller.
@@ -235,4 +235,4 @@ TEST(ShippedScenarios, WheelRatesServeAsWell) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::scenarios_test

@@ -10,7 +10,7 @@
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::scenario_defaults_test {
 namespace {
 
 /// Only what a scenario must have, so that every other key has its default.
@@ -219,4 +219,4 @@ TEST(ScenarioDefaults, AreThoseOfTheDocument) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::scenario_defaults_test

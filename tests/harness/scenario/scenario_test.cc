@@ -9,7 +9,7 @@
 #include "tests/common/throws.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::scenario_test {
 namespace {
 
 TEST(ReadScenario, ReadsEveryPart) {
@@ -270,4 +270,4 @@ TEST(ListMjcfFiles, ReadsAnyXml) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::scenario_test

@@ -15,7 +15,7 @@
 #include "tests/common/paths.h"
 #include "tests/harness/sides/panda_urdf.h"
 
-namespace dexcheck {
+namespace dexcheck::audit_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -168,4 +168,4 @@ TEST(Audit, CountsImpossibleInertiaAsTheFileHasIt) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::audit_test

@@ -22,7 +22,7 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck {
+namespace dexcheck::ball_joints_test {
 namespace {
 
 using ::testing::Contains;
@@ -282,4 +282,4 @@ TEST(BallJoints, TablesAreRefusedWithAReason) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::ball_joints_test

@@ -13,7 +13,7 @@
 #include "tests/common/legged_robots.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck {
+namespace dexcheck::base_convention_test {
 namespace {
 
 using testing::MatrixNear;
@@ -181,4 +181,4 @@ TEST(NpyFile, IsReadBack) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::base_convention_test

@@ -17,7 +17,7 @@
 #include "tests/common/files.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck {
+namespace dexcheck::coupled_joints_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -251,4 +251,4 @@ TEST(SeveralJointsOfABody, AgreeWithAChainOfMasslessLinks) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::coupled_joints_test

@@ -19,7 +19,7 @@
 #include "tests/common/random_robot.h"
 #include "tests/common/urdf_text.h"
 
-namespace dexcheck {
+namespace dexcheck::floating_base_test {
 namespace {
 
 using ::testing::Contains;
@@ -185,4 +185,4 @@ TEST(FloatingBase, OneBodyMustCarryAll) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::floating_base_test

@@ -17,7 +17,7 @@
 #include "tests/common/paths.h"
 #include "tests/harness/sides/robot_pairs.h"
 
-namespace dexcheck {
+namespace dexcheck::hypotheses_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -490,4 +490,4 @@ TEST(Hypotheses, TablesThatAreMisread) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::hypotheses_test

@@ -26,7 +26,7 @@
 #include "tests/common/random_robot.h"
 #include "tests/common/urdf_text.h"
 
-namespace dexcheck {
+namespace dexcheck::import_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -229,4 +229,4 @@ TEST(ReadingTime, UrdfOfFiftyJointsIsComparedInTheTablesTime) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::import_test

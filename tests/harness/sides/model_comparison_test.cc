@@ -16,7 +16,7 @@
 #include "tests/common/urdf_text.h"
 #include "tests/harness/sides/panda_urdf.h"
 
-namespace dexcheck {
+namespace dexcheck::model_comparison_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -172,4 +172,4 @@ TEST(AlikeNames, AreTakenAndNoted) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::model_comparison_test

@@ -12,7 +12,7 @@
 #include "tests/common/files.h"
 #include "tests/common/legged_robots.h"
 
-namespace dexcheck {
+namespace dexcheck::published_robots_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -199,4 +199,4 @@ INSTANTIATE_TEST_SUITE_P(Sides, PublishedRobots, ::testing::ValuesIn(ListPublish
                          [](const auto& tried) { return tried.param.name; });
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::published_robots_test

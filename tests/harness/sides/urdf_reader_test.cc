@@ -27,7 +27,7 @@
 #include "tests/common/urdf_text.h"
 #include "tests/harness/sides/panda_urdf.h"
 
-namespace dexcheck {
+namespace dexcheck::urdf_reader_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -414,4 +414,4 @@ TEST(Urdf, RefusesWhatIsTooLargeOrEmpty) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::urdf_reader_test

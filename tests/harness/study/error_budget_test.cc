@@ -9,7 +9,7 @@
 #include "tests/common/throws.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::error_budget_test {
 namespace {
 
 const std::string kRobot = SourcePath("/controller/parameters/assistant_robot.toml");
@@ -67,4 +67,4 @@ TEST(ErrorBudget, IdealPlantsAndTasksAreRefused) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::error_budget_test

@@ -9,7 +9,7 @@
 #include "controller/common/errors.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::testing {
+namespace dexcheck::testing::exciting_motion_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -77,4 +77,4 @@ TEST(ExcitingMotion, RefusesWhatDoesNotOscillate) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing
+}  // namespace dexcheck::testing::exciting_motion_test

@@ -10,7 +10,7 @@
 
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::objective_test {
 namespace {
 
 using testing::Throws;
@@ -129,4 +129,4 @@ TEST(Judgement, DominatesWhereItIsNowhereWorse) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::objective_test

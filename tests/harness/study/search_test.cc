@@ -15,7 +15,7 @@
 #include "tests/common/throws.h"
 #include "tests/harness/study/search_functions.h"
 
-namespace dexcheck {
+namespace dexcheck::search_test {
 namespace {
 
 using testing::CalcHypervolume;
@@ -399,4 +399,4 @@ TEST(SearchHistory, RowsOfAnotherSearchAreRefused) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::search_test

@@ -8,7 +8,7 @@
 #include "harness/study/trial.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck {
+namespace dexcheck::shipped_studies_test {
 namespace {
 
 TEST(ShippedStudies, AreAccepted) {
@@ -32,4 +32,4 @@ TEST(ShippedStudies, AreAccepted) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::shipped_studies_test

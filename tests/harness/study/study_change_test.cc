@@ -8,7 +8,7 @@
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::study_change_test {
 namespace {
 
 using testing::ReplaceOnce;
@@ -162,4 +162,4 @@ TEST_F(StudyChangeTest, AnotherRevisionGoesOnWhenItMakesTheSameRows) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::study_change_test

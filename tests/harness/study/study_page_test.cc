@@ -14,7 +14,7 @@
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck {
+namespace dexcheck::study_page_test {
 namespace {
 
 using testing::Browser;
@@ -291,4 +291,4 @@ TEST_F(StudyPageBrowserTest, FitsAPhone) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::study_page_test

@@ -10,7 +10,7 @@
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::study_reader_test {
 namespace {
 
 using testing::ReplaceOnce;
@@ -290,4 +290,4 @@ TEST(StudyReader, MistakesAreNamed) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::study_reader_test

@@ -12,7 +12,7 @@
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck {
+namespace dexcheck::study_report_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -132,4 +132,4 @@ TEST_F(StudyReportTest, ManyTrialsMakeASmallPage) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::study_report_test

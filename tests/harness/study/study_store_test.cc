@@ -14,7 +14,7 @@
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck {
+namespace dexcheck::study_store_test {
 namespace {
 
 using testing::TempFolder;
@@ -248,4 +248,4 @@ TEST(ProcessName, KnowsTheLiving) {
 }
 
 }  // namespace
-}  // namespace dexcheck
+}  // namespace dexcheck::study_store_test
