@@ -30,7 +30,7 @@ list_faults() {
 # knows the releases. (Names of fields in a table begin their line with {".)
 list_releases() {
   local members='qM|dof_Madr|eq_active|ten_J|mpr_iterations|mpr_tolerance'
-  local names='mj_fullM|mj_crb|mju_warningText|mj_makeEmptyFileVFS|mj_addBufferVFS|mjv_makeConnector|mjv_connector|mjCOL_[A-Z]+'
+  local names='mj_fullM|mj_crb|mju_warningText|mj_makeEmptyFileVFS|mj_addBufferVFS|mjv_makeConnector|mjv_connector|mj_ray|mjCOL_[A-Z]+'
   (cd "$1" && grep -rnE "(->|\.)($members)\>|opt\.collision|mjENBL_SENSORNOISE|\<($names)\>" harness renders tests \
     --include='*.h' --include='*.cc' | grep -vE '^harness/engine/mujoco_release\.h:|^[^:]+:[0-9]+: *\{"') || true
 }
