@@ -136,7 +136,7 @@ TEST_F(StudyReportTest, TellsWhatIsWantedWithItsUnitAndItsEdge) {
       "'control.K_p'\nvalues = [1, 2, 3]\n",
       "study.toml");
   const std::string page = Report("why");
-  EXPECT_THAT(page, HasSubstr("<b>0.33 J</b><span>least energy</span>"));
+  EXPECT_THAT(page, HasSubstr("<b>0.333 J</b><span>least energy</span>"));
   EXPECT_THAT(page, Not(HasSubstr("least rms position error")));
 }
 
