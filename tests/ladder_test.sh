@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Fails when folders of the sources include one another in a cycle, or when a folder of harness/ includes a header of one
-# that harness/CMakeLists.txt adds later: ladder_test.sh ROOT
+# that harness/CMakeLists.txt adds later, or when sources or tests use what differs between MuJoCo's releases by
+# themselves: ladder_test.sh ROOT
 # Exit code: 0 a ladder, 1 not, 2 nothing to look at.
 set -euo pipefail
 
@@ -25,6 +26,15 @@ list_faults() {
     <(printf '%s\n' "$order") - <<<"$includes"
 }
 
+# Prints the lines of the tree ROOT that use what another release of MuJoCo says otherwise, but for the one header that
+# knows the releases. (Names of fields in a table begin their line with {".)
+list_releases() {
+  local members='qM|dof_Madr|eq_active|ten_J|mpr_iterations|mpr_tolerance'
+  local names='mj_fullM|mj_crb|mju_warningText|mj_makeEmptyFileVFS|mj_addBufferVFS|mjv_makeConnector|mjv_connector|mj_ray|mjCOL_[A-Z]+'
+  (cd "$1" && grep -rnE "(->|\.)($members)\>|opt\.collision|mjENBL_SENSORNOISE|\<($names)\>" harness renders tests \
+    --include='*.h' --include='*.cc' | grep -vE '^harness/engine/mujoco_release\.h:|^[^:]+:[0-9]+: *\{"') || true
+}
+
 root=$1
 [[ $(list_includes "$root" | wc -l) -gt 100 ]] || { echo "no sources in $root"; exit 2; }
 
@@ -39,6 +49,10 @@ echo '#include "harness/log/writer.h"' >"$scratch/harness/base/files.cc"
 [[ $(list_faults "$scratch" | grep -c 'include one another.*harness/log\|files.cc: includes a header of harness/log') -eq 2 ]] ||
   { echo "a cycle is not found"; exit 1; }
 
-faults=$(list_faults "$root")
+mkdir "$scratch/tests"
+echo 'mj_fullM(m, M, d->qM);' >"$scratch/tests/terms_test.cc"
+[[ $(list_releases "$scratch" | wc -l) -eq 1 ]] || { echo "what differs between releases is not found"; exit 1; }
+
+faults=$(list_faults "$root"; list_releases "$root")
 [[ -z $faults ]] || { echo "$faults"; exit 1; }
 echo "$(list_includes "$root" | wc -l) includes between folders, no cycle"

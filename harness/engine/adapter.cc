@@ -7,6 +7,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/engine/data_without_contacts.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 
@@ -210,7 +211,7 @@ void Adapter::MatchBase(const std::string& engine_source) {
   }
   if (!base_is_free_ && !planar) fail("must move by a free joint, or by two slides and a hinge");
 
-  const MjDataPtr data = MakeData(engine);
+  const MjDataPtr data = MakeDataWithoutContacts(engine);
   mj_kinematics(&engine, data.get());
   const Pose& X_B0 = model_->base().X_B0;
   if (base_is_free_) {

@@ -12,6 +12,7 @@
 // | 3.2.3 | mpr_iterations, mpr_tolerance are ccd_iterations, ccd_tolerance |
 // | 3.3   | mj_makeM makes the mass matrix, rotors of tendons included |
 // | 3.5   | version numbers have three digits for minor and patch: 3005000; sizes are mjtSize |
+// | 3.5   | mj_ray gives the normal of what it meets |
 // | 3.6   | the tendons' Jacobian is sparse in any case, and its rows are the model's |
 // | 3.7   | collision functions get data that they may write |
 // | 3.9   | they fill mjPreContact (distance, position, normal, tangent) in the place of mjContact |
@@ -179,6 +180,18 @@ inline void CalcTendonVelocities(const mjModel& m, mjData* d) {
     for (int k = starts[i]; k < starts[i] + counts[i]; ++k)
       d->ten_velocity[i] += d->ten_J[k] * d->qvel[columns[k]];
   }
+}
+
+/// How far a ray goes until it meets a geom, -1 when it meets none; static geoms and all bodies count.
+/// @param from x, y, z. @param along the direction. @param groups mjNGROUP flags. @param geom the one it
+/// meets, or -1.
+inline mjtNum CastRay(const mjModel& m, const mjData& d, const mjtNum* from, const mjtNum* along,
+                      const mjtByte* groups, int* geom) {
+#if mjVERSION_HEADER >= 3005000
+  return mj_ray(&m, &d, from, along, groups, 1, -1, geom, nullptr);
+#else
+  return mj_ray(&m, &d, from, along, groups, 1, -1, geom);
+#endif
 }
 
 // What collision functions get and fill.

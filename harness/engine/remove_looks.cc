@@ -1,6 +1,8 @@
 #include "harness/engine/remove_looks.h"
 
+#include <algorithm>
 #include <cstring>
+#include <type_traits>
 #include <vector>
 
 #include "harness/engine/engine.h"
@@ -105,6 +107,20 @@ int RemoveLooks(mjModel* m, std::span<const int> wanted) {
     m->body_geomadr[body] = next > first ? first : -1;
   }
   return removed;
+}
+
+size_t RemovePictures(mjModel* m) {
+  if (m->ntex == 0 || !HasKnownLayout(m)) return 0;
+  const auto before = static_cast<size_t>(m->nbuffer);
+  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
+    if constexpr (std::is_same_v<Number, int>) {
+      if (array == m->mat_texid) std::fill_n(array, rows * columns, -1);
+    }
+  });
+  m->ntex = 0;
+  m->ntexdata = 0;
+  LayOut(m);
+  return before - static_cast<size_t>(m->nbuffer);
 }
 
 }  // namespace dexcheck

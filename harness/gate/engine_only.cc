@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 
+#include "harness/engine/data_without_contacts.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mujoco_release.h"
 #include "harness/engine/torus_collision.h"
@@ -207,7 +208,7 @@ class EngineOnly {
 
   /// The wheels are round about the axle and stand on a level floor.
   void CompareFloor() {
-    const MjDataPtr data = MakeData(engine_);
+    const MjDataPtr data = MakeDataWithoutContacts(engine_);
     mj_kinematics(&engine_, data.get());
     const auto place = [&](int geom) {
       return Vector3d(Eigen::Map<const Vector3d>(data->geom_xpos + 3 * geom));

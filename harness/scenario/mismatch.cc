@@ -7,6 +7,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/dynamics/model_terms.h"
+#include "harness/engine/data_without_contacts.h"
 #include "harness/engine/engine.h"
 #include "harness/plant/random_stream.h"
 
@@ -138,7 +139,7 @@ class Bodies {
     const VectorXd q = VectorXd::Zero(model.num_positions());
     ModelTerms kinematics(model, Coordinates::kReduced);
     kinematics.SetState(q, VectorXd::Zero(model.num_velocities()));
-    reference_ = MakeData(*engine_);
+    reference_ = MakeDataWithoutContacts(*engine_);
     adapter_->SetPositions(q, reference_->qpos);
     mj_kinematics(engine_, reference_.get());
     for (int i = -1; i < model.num_joints(); ++i) {

@@ -13,6 +13,7 @@
 #include "controller/model/parameter_reader.h"
 #include "controller/object/euler_zyz.h"
 #include "harness/engine/add_contact_pairs.h"
+#include "harness/engine/data_without_contacts.h"
 #include "harness/engine/mujoco_release.h"
 #include "harness/engine/remove_looks.h"
 #include "harness/scenario/mismatch.h"
@@ -302,7 +303,7 @@ FingerPlacement Setup::SolveGrasp() {
 void Setup::MakeBonds() {
   mjModel& m = *engine_;
   const int object = adapter_->object_body();
-  const MjDataPtr data = MakeData(m);
+  const MjDataPtr data = MakeDataWithoutContacts(m);
   adapter_->SetPositions(q_start_, data->qpos);
   mj_kinematics(&m, data.get());
   ModelTerms kinematics(model_, Coordinates::kReduced);

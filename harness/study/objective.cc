@@ -68,6 +68,13 @@ std::string Describe(const Objective& objective) {
   return objective.expression + which;
 }
 
+std::string ShowUnit(const std::string& expression) {
+  for (const MetricInfo& metric : kMetrics) {
+    if (expression == metric.name && metric.unit != std::string("1")) return std::string(" ") + metric.unit;
+  }
+  return "";
+}
+
 Constraint ParseConstraint(const std::string& text) {
   Constraint constraint;
   constraint.text = Trim(text);

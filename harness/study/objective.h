@@ -27,6 +27,10 @@ struct Objective {
 /// "position_error_rms, worst of its trials".
 std::string Describe(const Objective& objective);
 
+/// " m" of a metric in metres; nothing of one without a unit, and of an expression that is no metric by
+/// itself.
+std::string ShowUnit(const std::string& expression);
+
 /// Something that must hold at a point's trials.
 struct Constraint {
   enum class Kind { kLess, kOutcomeIs, kOutcomeIsNot, kHeld };

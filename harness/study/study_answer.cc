@@ -15,22 +15,43 @@ namespace {
 
 std::string CountPoints(size_t count) { return fmt::format("{} point{}", count, count == 1 ? "" : "s"); }
 
+/// Of a point that is the best: which of its keys would go on past their ranges.
+std::string DescribeEdges(const Study& study, const std::vector<double>& values) {
+  constexpr double kAtEnd = 1e-3;  // of the range
+  std::string text;
+  for (size_t i = 0; i < study.num_keys(); ++i) {
+    const Variation& variation = study.variations[i];
+    if (!variation.values.empty() || variation.depends_on_others() || variation.from == variation.to)
+      continue;
+    const double share = ShareOf(variation, values[i]);
+    if (share > kAtEnd && share < 1.0 - kAtEnd) continue;
+    text += (text.empty() ? " At an end of its range is " : ", ") + variation.key;
+  }
+  return text.empty() ? "" : text + ": a wider range may give a better one.";
+}
+
 std::string DescribeBest(const Study& study, const PointSummary& points) {
   const JudgedPoint& best = *points.best;
   const Objective& objective = study.objectives.front();
   const auto value = [&](const JudgedPoint& point) {
     return ShowObjective(objective, point.judgement.objectives.front());
   };
+  const std::string unit = ShowUnit(objective.expression);
   std::string text =
-      fmt::format("The {} {} of {} is {:.4g}, at {} (trial {}).", objective.maximize ? "largest" : "least",
-                  Describe(objective), CountPoints(points.count), value(best),
+      fmt::format("The {} {} of {} is {:.4g}{}, at {} (trial {}).", objective.maximize ? "largest" : "least",
+                  Describe(objective), CountPoints(points.count), value(best), unit,
                   DescribeValues(study, best.values), best.number * CountTrialsOfPoint(study));
   const JudgedPoint& first = *points.first;
   if (study.is_search() && !first.is_shortened && first.number == 0 && first.number != best.number) {
-    text += first.judgement.is_feasible() ? fmt::format(" The search began with {:.4g}.", value(first))
-                                          : " The search began where a constraint does not hold.";
+    if (!std::isfinite(value(first))) {
+      text += " The search began where it has no value.";
+    } else {
+      text += first.judgement.is_feasible()
+                  ? fmt::format(" The search began with {:.4g}{}.", value(first), unit)
+                  : " The search began where a constraint does not hold.";
+    }
   }
-  return text;
+  return text + DescribeEdges(study, best.values);
 }
 
 /// What successive halving stopped.
@@ -62,8 +83,9 @@ std::string DescribeFront(const Study& study, const std::vector<JudgedPoint>& po
     const auto show = [&](const JudgedPoint* point) {
       return ShowObjective(study.objectives[i], point->judgement.objectives[i]);
     };
-    text += fmt::format("{} {} from {:.4g} ({}) to {:.4g}", i == 0 ? "" : ";", Describe(study.objectives[i]),
-                        show(*least), DescribeValues(study, (*least)->values), show(*most));
+    text += fmt::format("{} {} from {:.4g} ({}) to {:.4g}{}", i == 0 ? "" : ";",
+                        Describe(study.objectives[i]), show(*least), DescribeValues(study, (*least)->values),
+                        show(*most), ShowUnit(study.objectives[i].expression));
   }
   return text + ".";
 }
@@ -132,7 +154,7 @@ std::vector<std::string> DescribeSpreads(const Study& study, const std::vector<T
     for (const std::string& name : study.metrics) {
       for (size_t k = 0; k < metrics.size(); ++k) {
         if (kMetrics[k].name == name && !metrics[k].empty())
-          text += fmt::format("; {} {}", name, ShowSpread(metrics[k]));
+          text += fmt::format("; {} {}{}", name, ShowSpread(metrics[k]), ShowUnit(name));
       }
     }
     answers.push_back(text + (held > 0 ? ", medians and ranges." : "."));

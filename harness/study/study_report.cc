@@ -6,10 +6,12 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "harness/base/shell.h"
 #include "harness/report/html.h"
 #include "harness/report/page_assets.h"
+#include "harness/study/search_history.h"
 #include "harness/study/study_answer.h"
 #include "harness/study/study_explorer.h"
 #include "harness/study/study_figures.h"
@@ -36,7 +38,7 @@ svg .dot { stroke: #333; stroke-width: .5; }
 .dot { border-radius: 50%; width: .6em; height: .6em; vertical-align: 0; border: 1px solid var(--soft); }
 .rule { height: 4px; vertical-align: 3px; background: #000; border-radius: 0; outline: 1px solid var(--line); }
 .counts { width: auto; }
-.effects th.wide { width: 45%; min-width: 7rem; }
+.effects th.wide { width: 30%; min-width: 6rem; } .effects td { overflow-wrap: anywhere; min-width: 4.5rem; }
 .track { position: relative; height: 1em; background: color-mix(in srgb, var(--line) 45%, transparent); border-radius: 3px; }
 .track i { position: absolute; top: 0; height: 100%; }
 .track .fill { background: var(--accent); border-radius: 3px; opacity: .75; }
@@ -117,7 +119,15 @@ class Report {
       return html;
     }
     html += MakeTile(fmt::format("{}", tracked_.size()), Html("tracked to their end, without slip"));
-    if (!tracked_.empty()) {
+    if (study.objectives.size() == 1) {
+      const Objective& objective = study.objectives.front();
+      const std::optional<JudgedPoint> best = SummarisePoints(study, results_.rows).best;
+      if (best) {
+        html += MakeTile(FormatShort(ShowObjective(objective, best->judgement.objectives.front())) +
+                             ShowUnit(objective.expression),
+                         FormatHtml("{} {}", objective.maximize ? "largest" : "least", Describe(objective)));
+      }
+    } else if (!tracked_.empty()) {
       html += MakeTile(FormatShort(tracked_.front()->result.metrics[kPositionErrorRms]) + " m",
                        FormatHtml("least rms position error, <a href=\"{}\">trial {}</a>",
                                   LinkTo(*tracked_.front()), tracked_.front()->trial.number));

@@ -41,7 +41,7 @@ class TrialMaker {
           claimed_.pop_front();
         }
         if (auto ended = pool_.Wait()) Take(&*ended);
-        if (Clock::now() - stored_ > kTogether || pool_.IsEmpty()) Store(done);
+        if (Clock::now() - stored_ > kTogether) Store(done);
       }
       Store(done);
     } catch (const InputError&) {
@@ -57,11 +57,12 @@ class TrialMaker {
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds kTogether{200};
 
-  /// As many as were done since the last time, and one for each job.
+  /// As many as end in kTogether, by what is known of it, and one for each job.
   void ClaimSome() {
     if (pool_.IsFull() || !claimed_.empty() || waiting_.empty()) return;
     std::map<long, Trial> some;
-    while (!waiting_.empty() && some.size() < recent_ + static_cast<size_t>(options_.jobs)) {
+    const size_t most = std::max(recent_, rows_.size()) + static_cast<size_t>(options_.jobs);
+    while (!waiting_.empty() && some.size() < most) {
       some.emplace(waiting_.front().number, waiting_.front());
       waiting_.pop_front();
     }
@@ -90,7 +91,7 @@ class TrialMaker {
   bool Bury(EndedTrial* ended) {
     const Trial& trial = ended->row.trial;
     const bool again = ++tries_[trial.number] < kMostTries;
-    if (again || options_.is_interrupted()) store_->Release(trial.number);
+    if (again || options_.is_interrupted()) store_->Release({trial.number});
     if (again) waiting_.push_back(trial);
     if (again || options_.is_interrupted()) return false;
     ended->row.result.failure += ", " + std::to_string(kMostTries) + " times";
@@ -98,8 +99,9 @@ class TrialMaker {
   }
 
   void Release() {
-    for (const long trial : pool_.ListRunning()) store_->Release(trial);
-    for (const Trial& trial : claimed_) store_->Release(trial.number);
+    std::vector<long> trials = pool_.ListRunning();
+    for (const Trial& trial : claimed_) trials.push_back(trial.number);
+    store_->Release(trials);
     claimed_.clear();
   }
 

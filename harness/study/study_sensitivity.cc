@@ -69,8 +69,9 @@ std::string Describe(const Study& study, const Sensitivity& sensitivity) {
                                                                                : ", ";
     if (sensitivity.sobol.empty()) {
       const MorrisEffect& effect = sensitivity.morris[i];
-      text += fmt::format("{}{} moves it by {:.3g} ({:.3g} to {:.3g}) over its range", separator, key,
-                          effect.size.value, effect.size.low, effect.size.high);
+      text +=
+          fmt::format("{}{} moves it by {:.3g} ({:.3g} to {:.3g}){} over its range", separator, key,
+                      effect.size.value, effect.size.low, effect.size.high, ShowUnit(sensitivity.expression));
     } else {
       const SobolIndex& index = sensitivity.sobol[i];
       text += fmt::format("{}{} explains {:.0f} % ({:.0f} to {:.0f}) of its variance, {:.0f} % alone",

@@ -295,11 +295,13 @@ std::vector<long> StudyStore::Claim(const std::vector<long>& trials) {
   return claimed;
 }
 
-void StudyStore::Release(long trial) {
+void StudyStore::Release(const std::vector<long>& trials) {
   Statement release(database_.get(), "DELETE FROM claims WHERE trial = ? AND process = ?");
-  release.Bind(1, static_cast<long long>(trial));
   release.Bind(2, NameThisProcess());
-  release.Step();
+  for (const long trial : trials) {
+    release.Bind(1, static_cast<long long>(trial));
+    release.Step();
+  }
 }
 
 void StudyStore::Insert(const TrialRow& row) {
@@ -323,10 +325,12 @@ void StudyStore::Insert(const TrialRow& row) {
 
 void StudyStore::Add(const std::vector<TrialRow>& rows) {
   Transaction transaction(database_.get());
+  std::vector<long> numbers;
   for (const TrialRow& row : rows) {
     Insert(row);
-    Release(row.trial.number);
+    numbers.push_back(row.trial.number);
   }
+  Release(numbers);
   transaction.Commit();
 }
 

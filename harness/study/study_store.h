@@ -90,8 +90,8 @@ class StudyStore {
   /// process of this machine has.
   std::vector<long> Claim(const std::vector<long>& trials);
   bool Claim(long trial) { return !Claim(std::vector<long>{trial}).empty(); }
-  /// Gives a claimed trial back undone.
-  void Release(long trial);
+  /// Gives claimed trials back undone.
+  void Release(const std::vector<long>& trials);
   /// Stores trials and ends their claims, in one transaction. A row that is already there stays.
   void Add(const std::vector<TrialRow>& rows);
   void Add(const TrialRow& row) { Add(std::vector<TrialRow>{row}); }

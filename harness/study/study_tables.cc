@@ -37,7 +37,8 @@ Html MakeSensitivityTable(const StudyResults& results, const std::string& quanti
   Html html = FormatHtml(
       "<section class=\"card scroll\"><h3>{}</h3>\n<table class=\"effects\"><tr><th>key</th><th "
       "class=\"wide\">{}</th><th class=\"value\"></th><th class=\"value\">{}</th></tr>\n",
-      quantity, is_sobol ? "share of the variance, with interactions" : "moves it over its range by",
+      quantity + (ShowUnit(quantity).empty() ? "" : "," + ShowUnit(quantity)),
+      is_sobol ? "share of the variance, with interactions" : "moves it over its range by",
       is_sobol ? "alone" : "spread");
   for (const size_t key : keys) {
     const Estimate estimate = find(key);

@@ -2,10 +2,12 @@
 
 #include <limits>
 #include <new>
+#include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/remove_looks.h"
 #include "harness/run/runner.h"
 #include "harness/study/trial_monitor.h"
 
@@ -28,6 +30,12 @@ MjModelPtr MakeEngine(const StudyInputs& inputs) {
   MjModelPtr copy(mj_copyModel(nullptr, inputs.engine.get()));
   if (!copy) throw std::bad_alloc();
   return copy;
+}
+
+Setup MakeSetup(const StudyInputs& inputs, const Scenario& scenario) {
+  if (!inputs.model || scenario.model_overrides != inputs.model_overrides)
+    return Setup(scenario, inputs.robot, inputs.mjcf, MakeEngine(inputs));
+  return Setup(scenario, *inputs.model, inputs.mjcf, MakeEngine(inputs));
 }
 
 bool HasDiverged(const Setup& setup, const TrialResult& result) {
@@ -67,7 +75,7 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
   TrialResult result;
   try {
     const Scenario scenario = MakeTrialScenario(inputs, trial);
-    const Setup setup(scenario, inputs.robot, inputs.mjcf, MakeEngine(inputs));
+    const Setup setup = MakeSetup(inputs, scenario);
     Runner runner(setup, inputs.study.check);
     TrialMonitor monitor(setup, runner.loop().num_steps());
     const double limit = inputs.study.stop_error;
@@ -98,8 +106,12 @@ void CheckTrials(StudyInputs* inputs) {
     trial = ListTrials(study).front();
   }
   const Scenario first = MakeTrialScenario(*inputs, trial);
-  inputs->engine = LoadMjcf(inputs->mjcf);
-  const Setup setup(first, inputs->robot, inputs->mjcf, MakeEngine(*inputs));
+  MjModelPtr engine = LoadMjcf(inputs->mjcf);
+  RemovePictures(engine.get());
+  inputs->engine = std::move(engine);
+  const Setup setup = MakeSetup(*inputs, first);
+  inputs->model = std::make_shared<const RobotModel>(setup.model());
+  inputs->model_overrides = first.model_overrides;
   const Runner runner(setup, study.check);  // sensors and motors know more names than the setup
   const std::vector<double> parameters = trial.parameters;
   for (size_t i = 0; i < study.variations.size(); ++i) {

@@ -3,7 +3,9 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "controller/model/robot_model.h"
 #include "harness/engine/engine.h"
 #include "harness/scenario/scenario.h"
 #include "harness/study/study.h"
@@ -20,6 +22,9 @@ struct StudyInputs {
   std::filesystem::path robot;
   std::filesystem::path mjcf;
   std::shared_ptr<const mjModel> engine;  ///< The MJCF compiled, for all trials; none before CheckTrials.
+  /// The parameter file read with these overrides, for the trials that have no others; likewise.
+  std::shared_ptr<const RobotModel> model;
+  std::vector<std::string> model_overrides;
 };
 
 /// A run without a start error diverged when its error is above this, rms, m.
@@ -32,7 +37,7 @@ Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial);
 TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial);
 
 /// Parses what the ends of all ranges make of the scenario, and sets up the first trial, so that a mistake is
-/// found before anything runs. Compiles the MJCF once, for all. @throws InputError.
+/// found before anything runs. Compiles the MJCF and reads the robot once, for all. @throws InputError.
 void CheckTrials(StudyInputs* inputs);
 
 }  // namespace dexcheck

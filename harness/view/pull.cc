@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/engine/mujoco_release.h"
 #include "renders/run_decorations.h"
 
 namespace dexcheck {
@@ -43,8 +44,7 @@ std::optional<MousePull> MousePull::Grab(const Setup& setup, const mjModel& look
   SetRow(m, frame.frame, 0, data.get());
   int geom = -1;
   const mjtByte groups[mjNGROUP] = {1, 1, 1, 0, 0, 0};
-  const double distance = mj_ray(&m, data.get(), ray.from.data(), ray.along.data(), groups, /*flg_static=*/1,
-                                 /*bodyexclude=*/-1, &geom);
+  const double distance = CastRay(m, *data, ray.from.data(), ray.along.data(), groups, &geom);
   if (geom < 0 || distance < 0.0) return std::nullopt;
   const std::optional<int> link = FindLink(setup, m.geom_bodyid[geom]);
   if (!link) return std::nullopt;

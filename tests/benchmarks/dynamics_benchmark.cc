@@ -9,6 +9,7 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/engine/adapter.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/mujoco_release.h"
 #include "harness/engine/velocity_map.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
@@ -114,8 +115,8 @@ void EngineTermsMujoco(benchmark::State& state) {
     mjData* d = robot.data[k].get();
     mj_kinematics(m, d);
     mj_comPos(m, d);
-    mj_crb(m, d);
-    mj_fullM(m, M.data(), d->qM);
+    MakeMass(*m, d);
+    ExpandMass(*m, *d, M.data());
     mj_comVel(m, d);
     mj_rne(m, d, 0, bias.data());
     for (int i = 0; i < kFingertips; ++i) {

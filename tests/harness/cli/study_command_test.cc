@@ -5,8 +5,10 @@
 #include <gmock/gmock.h>
 
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <thread>
@@ -43,6 +45,36 @@ TEST_F(StudyCommand, TheNumberOfProcessesDoesNotMatter) {
     ASSERT_EQ(RunDexcheck(RunArguments(jobs + ".sqlite", {"--jobs", jobs})).exit_code, 0);
     EXPECT_EQ(Dump(Path(jobs + ".sqlite")), Reference()) << jobs;
   }
+}
+
+/// How many transactions changed a database file since it was made.
+long CountTransactions(const std::string& path) {
+  constexpr std::streamoff kChangeCounter = 24;  // in the file's header, 4 bytes, the highest first
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(kChangeCounter);
+  long count = 0;
+  for (int i = 0; i < 4; ++i) count = 256 * count + file.get();
+  return count;
+}
+
+TEST_F(StudyCommand, ShortTrialsShareTransactionsWithOneJobToo) {
+  constexpr long kTrials = 100;
+  WriteText(Path("tiny.toml"), R"(name = "tiny"
+scenario = "hold"
+set = ["duration=0.001", "settle=0.001"]
+[[vary]]
+key = "control.natural_frequency"
+from = 5
+to = 50
+count = 100
+)");
+  const auto begun = std::chrono::steady_clock::now();
+  ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--jobs", "1"})).exit_code, 0);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  ASSERT_EQ(CountRows("a.sqlite"), kTrials);
+  // One to store and one to claim in 0.2 s; some more at first, when it is not known how many 0.2 s take.
+  constexpr long kFirst = 20;
+  EXPECT_LE(CountTransactions(Path("a.sqlite")), kFirst + std::lround(2.0 * seconds / 0.2));
 }
 
 TEST_F(StudyCommand, GivesTheSameRowsHoweverOftenItIsKilled) {

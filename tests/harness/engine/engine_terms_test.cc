@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
+#include "harness/engine/mujoco_release.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
 #include "tests/common/paths.h"
@@ -135,9 +136,9 @@ class DenseEngine {
     adapter.SetPositions(q, d->qpos);
     mj_kinematics(m, d);
     mj_comPos(m, d);
-    mj_crb(m, d);
+    MakeMass(*m, d);
     MatrixXd M_nv(m->nv, m->nv);
-    mj_fullM(m, M_nv.data(), d->qM);
+    ExpandMass(*m, *d, M_nv.data());
     M = T.transpose() * M_nv * T;
     VectorXd force(m->nv);
     mj_comVel(m, d);

@@ -6,6 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/mujoco_release.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
@@ -52,7 +53,7 @@ std::vector<double> CalcTerms(const std::string& text) {
   data->qpos[0] = 0.3;
   data->qvel[0] = 0.7;
   mj_forward(model.get(), data.get());
-  return {data->qM[0], data->qfrc_bias[0], data->qfrc_passive[0]};
+  return {*GetMassEntries(*data), data->qfrc_bias[0], data->qfrc_passive[0]};
 }
 
 class LeftOut : public ::testing::TestWithParam<Words> {};

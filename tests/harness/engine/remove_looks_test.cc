@@ -32,6 +32,11 @@ TEST_P(SameMotion, WithAndWithoutLooks) {
   EXPECT_GT(removed, 10);
   EXPECT_EQ(bare->ngeom + removed, full->ngeom);
   EXPECT_EQ(RemoveLooks(bare.get()), 0) << "nothing is left to remove";
+  const size_t pictures = RemovePictures(bare.get());
+  EXPECT_GE(pictures, static_cast<size_t>(full->ntexdata));
+  EXPECT_EQ(pictures > 0, full->ntex > 0);
+  EXPECT_EQ(RemovePictures(bare.get()), 0U) << "likewise";
+  for (int i = 0; i < bare->nmat; ++i) EXPECT_EQ(bare->mat_texid[i], -1);
   const MjModelPtr copy(mj_copyModel(nullptr, bare.get()));  // as the plant does
   const MjDataPtr a = MakeData(*full);
   const MjDataPtr b = MakeData(*copy);

@@ -17,6 +17,7 @@
 
 #include "harness/checks/consistency.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/mujoco_release.h"
 #include "tests/common/files.h"
 #include "tests/common/paper_robot.h"
 #include "tests/harness/run/shipped_run.h"
@@ -186,7 +187,9 @@ class Subject {
     Motion motion;
     mj_step1(m, d);
     contacts_ = d->ncon;
-    motion.Add(d->qM, m->nM);
+    std::vector<mjtNum> M(static_cast<size_t>(m->nv) * static_cast<size_t>(m->nv));
+    ExpandMass(*m, *d, M.data());
+    motion.Add(M.data(), m->nv * m->nv);
     motion.Add(d->qfrc_bias, m->nv);
     motion.Add(d->qfrc_passive, m->nv);
     std::vector<mjtNum> J(6 * static_cast<size_t>(m->nv));

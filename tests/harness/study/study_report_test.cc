@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 
 #include "controller/common/toml_reader.h"
@@ -104,9 +105,39 @@ TEST(StudyAnswer, TellsTheSpreadOfWhatHasNoOrder) {
   ASSERT_EQ(rows.size(), 8U);
   EXPECT_THAT(AnswerStudy(study, rows),
               ::testing::ElementsAre("control.law = computed_torque: held in 4 of 4 trials; "
-                                     "position_error_rms 6.5 (1 to 16), medians and ranges.",
+                                     "position_error_rms 6.5 (1 to 16) m, medians and ranges.",
                                      "control.law = pd_gravity: held in 1 of 4 trials; "
-                                     "position_error_rms 9 (9 to 9), medians and ranges."));
+                                     "position_error_rms 9 (9 to 9) m, medians and ranges."));
+}
+
+// The best of a search that presses against its range, in the quantity's unit; the page's first words are
+// about it.
+TEST_F(StudyReportTest, TellsWhatIsWantedWithItsUnitAndItsEdge) {
+  study_ = ParseStudy(
+      "name = 'wanted'\nscenario = 'offset'\n[[objective]]\nminimize = 'settling_time'\n[search]\nmethod = "
+      "'cma_es'\ncount = 24\npopulation = 8\nseed = 1\n[[vary]]\nkey = 'control.K_p'\nfrom = 1\nto = 100\n"
+      "[[vary]]\nkey = 'control.K_v'\nfrom = 1\nto = 100\n",
+      "study.toml");
+  std::vector<TrialRow> rows;
+  const std::vector<std::vector<double>> points = {{50, 50}, {100, 30}, {20, 30}};
+  for (size_t i = 0; i < points.size(); ++i) {
+    TrialRow row;
+    row.trial = {static_cast<long>(i), 0, points[i]};
+    row.result.metrics[kSettlingTime] = i == 0 ? std::nan("") : 0.01 * static_cast<double>(i);
+    rows.push_back(row);
+  }
+  const std::string kAnswer =
+      "The least settling_time of 3 points is 0.01 s, at control.K_p = 100, control.K_v = 30 (trial 1). The "
+      "search began where it has no value. At an end of its range is control.K_p: a wider range may give a "
+      "better one.";
+  EXPECT_THAT(AnswerStudy(study_, rows), ::testing::ElementsAre(kAnswer));
+  study_ = ParseStudy(
+      "name = 'wanted'\nscenario = 'offset'\n[[objective]]\nminimize = 'energy'\n[[vary]]\nkey = "
+      "'control.K_p'\nvalues = [1, 2, 3]\n",
+      "study.toml");
+  const std::string page = Report("why");
+  EXPECT_THAT(page, HasSubstr("<b>0.333 J</b><span>least energy</span>"));
+  EXPECT_THAT(page, Not(HasSubstr("least rms position error")));
 }
 
 TEST_F(StudyReportTest, TextsMayHaveAnyLength) {

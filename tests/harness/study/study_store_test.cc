@@ -227,7 +227,7 @@ TEST_F(StudyStoreTest, AClaimHoldsAsLongAsItsProcessLives) {
   StudyStore store = Open();
   EXPECT_TRUE(store.Claim(1));
   EXPECT_FALSE(Open().Claim(1));
-  store.Release(1);
+  store.Release({1});
   EXPECT_TRUE(store.Claim(1));
   store.Add(MakeRow(1));
   EXPECT_FALSE(store.Claim(1)) << "done";
