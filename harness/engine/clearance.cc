@@ -33,6 +33,35 @@ double CalcTurningReach(const Solid& s) {
   return s.reach;
 }
 
+bool IsRoundAboutZ(const Solid& s) {
+  return s.shape != Solid::Shape::kBox && s.shape != Solid::Shape::kEllipsoid;
+}
+
+/// BoundMotion of what is round about the axis through the frame's origin: turning about it moves nothing.
+double BoundRoundMotion(const Pose& from, const Pose& to, const Vector3d& axis, double reach) {
+  return (to.translation() - from.translation()).norm() +
+         ((to.linear() - from.linear()) * axis).norm() * reach;
+}
+
+/// BoundMotion of the solid. @param from, to frame G, which is round about z or not at all.
+double BoundSolid(const Solid& s, const Pose& from, const Pose& to) {
+  const double reach = CalcTurningReach(s);
+  return IsRoundAboutZ(s) ? BoundRoundMotion(from, to, Vector3d::UnitZ(), reach)
+                          : BoundMotion(from, to, reach);
+}
+
+/// The axis through the body's origin that the solid is round about; zero when there is none. All axes suit a
+/// ball there: then `any` is set.
+Vector3d FindAxis(const Solid& s, bool* any) {
+  constexpr double kOnAxis = 1e-9;  // m
+  const Vector3d p = s.X_BG.translation();
+  const bool is_ball = s.shape == Solid::Shape::kSphere;
+  *any = is_ball && p.norm() < kOnAxis;
+  if (is_ball) return *any ? Vector3d::Zero() : Vector3d(p.normalized());
+  const Vector3d z = s.X_BG.linear().col(2);
+  return IsRoundAboutZ(s) && z.cross(p).norm() < kOnAxis ? z : Vector3d(Vector3d::Zero());
+}
+
 /// How far the heights of points within `reach` of the frame's origin changed at the most.
 double BoundRise(const Pose& from, const Pose& to, const Vector3d& normal, double reach) {
   return std::abs(normal.dot(to.translation() - from.translation())) +
@@ -68,6 +97,7 @@ Clearance::Clearance(const mjModel& engine, const Adapter& adapter, const Solids
         continue;
       }
       MovingBody& body = moving[static_cast<size_t>(s.body)];
+      if (body.body == 0) body.axis = CalcAxisOfAll(s.body);
       body.body = s.body;
       body.reach = std::max(body.reach, s.X_BG.translation().norm() + CalcTurningReach(s));
       body.counts[states_[i].frame] = true;
@@ -79,6 +109,20 @@ Clearance::Clearance(const mjModel& engine, const Adapter& adapter, const Solids
   }
   overlapping_.reserve(pairs_.size());
   normals_.resize(planes_.size());
+}
+
+Vector3d Clearance::CalcAxisOfAll(int body) const {
+  constexpr double kParallel = 1e-9;
+  Vector3d axis = Vector3d::Zero();
+  for (const Solid& s : solids_->list) {
+    bool any = false;
+    if (s.body != body) continue;
+    const Vector3d own = FindAxis(s, &any);
+    if (any) continue;
+    if (own.isZero() || own.cross(axis).norm() > kParallel) return Vector3d::Zero();
+    axis = own;
+  }
+  return axis;
 }
 
 Pose Clearance::PoseOf(int index, const BodyPoses& bodies) const {
@@ -93,7 +137,10 @@ void Clearance::FollowBodies(const BodyPoses& bodies) {
   }
   std::array<double, kFrameCount> most = {};
   const auto bound = [&](const MovingBody& body, Frame frame, const Pose& X) {
-    if (frame != kOverPlanes) return BoundMotion(body.last[frame], X, body.reach);
+    if (frame != kOverPlanes) {
+      return body.axis.isZero() ? BoundMotion(body.last[frame], X, body.reach)
+                                : BoundRoundMotion(body.last[frame], X, body.axis, body.reach);
+    }
     double rise = 0.0;
     for (const Vector3d& normal : normals_) {
       rise = std::max(rise, BoundRise(body.last[frame], X, normal, body.reach));
@@ -151,11 +198,9 @@ double Clearance::BoundChange(int index, const Pose& X_AB) const {
   if (a.shape == Solid::Shape::kPlane) {
     return BoundRise(before, X_AB, Vector3d::UnitZ(), CalcTurningReach(b));
   }
-  // A ball that spins, as a wheel does, must not seem to swing the other around it.
-  if (a.shape == Solid::Shape::kSphere) {
-    return BoundMotion(before.inverse(Eigen::Isometry), X_AB.inverse(Eigen::Isometry), 0.0);
-  }
-  return BoundMotion(before, X_AB, CalcTurningReach(b));
+  // Either is seen from the other: so a wheel that spins does not seem to swing the other around it.
+  return std::min(BoundSolid(b, before, X_AB),
+                  BoundSolid(a, before.inverse(Eigen::Isometry), X_AB.inverse(Eigen::Isometry)));
 }
 
 double Clearance::BoundDistance(const Solid& a, const Solid& b, const Pose& X_AB) {

@@ -100,6 +100,7 @@ class Clearance {
   struct MovingBody {
     int body = 0;
     double reach = 0.0;  // from the body's origin to the farthest point that turning it moves, m
+    Vector3d axis = Vector3d::Zero();  // through its origin, that all of its solids are round about, if any
     std::array<Pose, kFrameCount> last;
     std::array<bool, kFrameCount> counts = {};
   };
@@ -116,6 +117,7 @@ class Clearance {
   };
 
   [[nodiscard]] Frame FrameOf(const mjModel& engine, const WatchedPair& pair) const;
+  [[nodiscard]] Vector3d CalcAxisOfAll(int body) const;
   void FollowBodies(const BodyPoses& bodies);
   /// By how much a pair's distance can have changed since it was measured, m.
   [[nodiscard]] double BoundChange(int pair, const Pose& X_AB) const;
