@@ -118,9 +118,12 @@ class Report {
     }
     html += MakeTile(fmt::format("{}", tracked_.size()), Html("tracked to their end, without slip"));
     if (!tracked_.empty()) {
-      html += MakeTile(FormatShort(tracked_.front()->result.metrics[kPositionErrorRms]) + " m",
-                       FormatHtml("least rms position error, <a href=\"{}\">trial {}</a>",
-                                  LinkTo(*tracked_.front()), tracked_.front()->trial.number));
+      const Metric error = FindErrorMetric(results_.rows);
+      const bool of_joints = error == kJointErrorRms;
+      html += MakeTile(FormatShort(tracked_.front()->result.metrics[error]) + (of_joints ? " rad" : " m"),
+                       FormatHtml("least rms {} error, <a href=\"{}\">trial {}</a>",
+                                  std::string(of_joints ? "joint" : "position"), LinkTo(*tracked_.front()),
+                                  tracked_.front()->trial.number));
     }
     html += "</div>\n</header>\n";
     return html;
@@ -174,6 +177,10 @@ class Report {
 
   [[nodiscard]] static std::string ExplainDivergence(const TrialRow& row) {
     if (row.result.metrics[kErrorGrowth] > 1.0) return "the error grew";
+    if (std::isfinite(row.result.metrics[kJointErrorRms]) &&
+        !std::isfinite(row.result.metrics[kPositionErrorRms])) {
+      return fmt::format("the rms error is above {} rad", kLostTrackOfJoints);
+    }
     return fmt::format("the rms error is above {} m", kLostTrack);
   }
 
@@ -271,7 +278,7 @@ class Report {
       html += FormatHtml("<th class=\"value\">{}</th>", text);
     };
     for (const Variation& variation : results_.study.variations) add_head(variation.key);
-    std::vector<Metric> shown = {kPositionErrorRms, kEnergy};
+    std::vector<Metric> shown = {FindErrorMetric(results_.rows), kEnergy};
     for (const Metric metric : results_.metrics) {
       if (std::find(shown.begin(), shown.end(), metric) == shown.end()) shown.push_back(metric);
     }

@@ -22,8 +22,9 @@ struct StudyInputs {
   std::shared_ptr<const mjModel> engine;  ///< The MJCF compiled, for all trials; none before CheckTrials.
 };
 
-/// A run without a start error diverged when its error is above this, rms, m.
+/// A run without a start error diverged when its error is above this, rms, m; of joints rad.
 constexpr double kLostTrack = 0.01;
+constexpr double kLostTrackOfJoints = 0.1;
 
 /// The scenario of one trial. @throws InputError as ParseScenario.
 Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial);
