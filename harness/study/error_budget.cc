@@ -81,18 +81,23 @@ void ListSensing(const SensingOptions& s, std::vector<ErrorSource>* list) {
   const auto add = [&](bool given, const char* name, auto drop) {
     if (given) list->push_back(ByKey(name, drop));
   };
+  // What the first step draws is no error that lasts.
+  const auto add_noise = [&](bool given, const char* name, auto drop) {
+    if (given) list->push_back({name, drop, /*acts_at_rest=*/false});
+  };
   add(!s.joint_counts.Is(0.0), "sensing.joint_counts",
       [](Imperfections* i) { i->sensing.joint_counts = {}; });
-  add(!s.joint_noise.Is(0.0), "sensing.joint_noise", [](Imperfections* i) { i->sensing.joint_noise = {}; });
+  add_noise(!s.joint_noise.Is(0.0), "sensing.joint_noise",
+            [](Imperfections* i) { i->sensing.joint_noise = {}; });
   add(s.velocity != VelocitySource::kMeasured, "sensing.velocity",
       [](Imperfections* i) { i->sensing.velocity = VelocitySource::kMeasured; });
-  add(!s.velocity_noise.Is(0.0), "sensing.velocity_noise",
-      [](Imperfections* i) { i->sensing.velocity_noise = {}; });
+  add_noise(!s.velocity_noise.Is(0.0), "sensing.velocity_noise",
+            [](Imperfections* i) { i->sensing.velocity_noise = {}; });
   add(s.odometry, "sensing.odometry", [](Imperfections* i) { i->sensing.odometry = false; });
-  add(s.object_position_noise > 0.0, "sensing.object_position_noise",
-      [](Imperfections* i) { i->sensing.object_position_noise = 0.0; });
-  add(s.object_orientation_noise > 0.0, "sensing.object_orientation_noise",
-      [](Imperfections* i) { i->sensing.object_orientation_noise = 0.0; });
+  add_noise(s.object_position_noise > 0.0, "sensing.object_position_noise",
+            [](Imperfections* i) { i->sensing.object_position_noise = 0.0; });
+  add_noise(s.object_orientation_noise > 0.0, "sensing.object_orientation_noise",
+            [](Imperfections* i) { i->sensing.object_orientation_noise = 0.0; });
   add(s.object_rate > 0.0, "sensing.object_rate", [](Imperfections* i) { i->sensing.object_rate = 0.0; });
   add(s.object_latency > 0.0, "sensing.object_latency",
       [](Imperfections* i) { i->sensing.object_latency = 0.0; });

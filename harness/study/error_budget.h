@@ -17,7 +17,7 @@ struct ErrorSource {
   std::string name;  ///< Its key: "sensing.joint_counts", "disturbance.0".
   /// Takes it out. The random numbers of the others stay as they are.
   std::function<void(Imperfections*)> drop;
-  bool acts_at_rest = true;  ///< Whether its error is there before t = 0: all but pushes.
+  bool acts_at_rest = true;  ///< Whether its error is there before t = 0: all but pushes and noise.
 };
 
 /// Those that do something. `actuation.saturate` is no source: it says what becomes of a limit.

@@ -64,6 +64,20 @@ TEST(ErrorBudget, PartsOfAMotionOfJointsAddUpAndArePredicted) {
   }
 }
 
+// A run begins with no lasting error of what noise its first step has.
+TEST(ErrorBudget, NoiseIsPredictedToItsSize) {
+  constexpr double kFewPeriods = 0.3;  // what the rms of a second of filtered noise is known to
+  const Scenario scenario =
+      ReadShippedScenario("panda-reach", {"duration=1", "settle=0.2", "sensing.joint_noise=1e-5"});
+  const ErrorBudget budget =
+      CalcErrorBudget(scenario, SourcePath("/controller/parameters/panda.toml"),
+                      SourcePath("/mjcf/panda_scene.xml"), [](long, long) { return true; });
+  ASSERT_EQ(budget.entries.size(), 1U);
+  const BudgetEntry& entry = budget.entries[0];
+  EXPECT_GT(entry.alone.rms, 10.0 * budget.ideal.rms);
+  EXPECT_NEAR(entry.predicted.rms, entry.alone.rms, kFewPeriods * entry.alone.rms);
+}
+
 // At rest, motors that give 1 + g of what they are sent bear what weighs 1 + m of what is known with an error
 // of (1 + m) / (1 + g) - 1 of the weight: that is more than m and 1 / (1 + g) - 1 by their product.
 TEST(ErrorBudget, SourcesThatInteractAreMarked) {
