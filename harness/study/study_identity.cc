@@ -44,7 +44,8 @@ bool IsSameNumber(double a, double b) {
 
 Metric FindErrorMetric(const std::vector<TrialRow>& rows) {
   const bool of_joints = std::any_of(rows.begin(), rows.end(), [](const TrialRow& row) {
-    return std::isfinite(row.result.metrics[kJointErrorRms]);
+    return std::isfinite(row.result.metrics[kJointErrorRms]) &&
+           !std::isfinite(row.result.metrics[kPositionErrorRms]);
   });
   return of_joints ? kJointErrorRms : kPositionErrorRms;
 }

@@ -171,7 +171,10 @@ class Report {
           "number\">{}</td></tr>\n",
           FindColor(outcome), NameOf(outcome), count);
     }
-    html += FormatHtml("</table>\n</div>\n<div class=\"card\">\n{}</div>\n</div>\n", Departures());
+    html += Html("</table>\n</div>\n");
+    const Html departures = Departures();
+    if (!departures.empty()) html += FormatHtml("<div class=\"card\">\n{}</div>\n", departures);
+    html += Html("</div>\n");
     return html;
   }
 
@@ -184,8 +187,9 @@ class Report {
     return fmt::format("the rms error is above {} m", kLostTrack);
   }
 
-  /// Where theory is stable and the run was not held to its end, by reason.
+  /// Where theory is stable and the run was not held to its end, by reason. Theory is that of an object.
   [[nodiscard]] Html Departures() const {
+    if (FindErrorMetric(results_.rows) == kJointErrorRms) return {};
     std::map<std::string, long> reasons;
     long agree = 0;
     long asked = 0;
@@ -271,9 +275,10 @@ class Report {
 
   [[nodiscard]] Html Best() const {
     if (tracked_.empty()) return {};
-    Html html(
-        "<h2 id=\"best\">Best</h2>\n<p class=\"soft\">By rms position error, of the trials that "
-        "tracked.</p>\n<div class=\"card scroll\"><table>\n<tr><th class=\"value\">trial</th>");
+    Html html = FormatHtml(
+        "<h2 id=\"best\">Best</h2>\n<p class=\"soft\">By rms {} error, of the trials that "
+        "tracked.</p>\n<div class=\"card scroll\"><table>\n<tr><th class=\"value\">trial</th>",
+        std::string(FindErrorMetric(results_.rows) == kJointErrorRms ? "joint" : "position"));
     const auto add_head = [&](const std::string& text) {
       html += FormatHtml("<th class=\"value\">{}</th>", text);
     };
