@@ -73,6 +73,12 @@ void CrossCheck::Reset() {
     if (check.failed) settling_failures_.push_back(check);
   }
   motion_.Reset();
+  clearance_.Restart();
+}
+
+void CrossCheck::CompareSettling(const StepRecord& step) {
+  CompareMotion(step);
+  CheckClearance(step);
 }
 
 void CrossCheck::Forget() { motion_.Reset(); }

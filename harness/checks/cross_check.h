@@ -44,6 +44,8 @@ class CrossCheck {
   void CompareModel(const StepRecord& step);
   /// The others, which compare motion and forces.
   void CompareMotion(const StepRecord& step) { motion_.Compare(step); }
+  /// What is asked while everything settles: questions 3 and 4, and whether bodies are apart.
+  void CompareSettling(const StepRecord& step);
   /// The law's question: are the torques those of (53)-(55), and do they do what is expected? After the other
   /// two.
   void CompareLaw(const StepRecord& step);

@@ -5,31 +5,28 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
+#include "harness/cli/shared_request.h"
 #include "harness/study/error_budget.h"
 
 namespace dexcheck::cli {
 namespace {
 
-struct BudgetRequest {
-  std::string scenario;
-  std::vector<std::string> overrides;
+struct BudgetRequest : ScenarioRequest {
   std::uint64_t seed = 0;
-  std::string json_file;
   std::string page;
-  bool quiet = false;
 };
 
 void Print(const ErrorBudget& budget) {
-  fmt::print("{}: RMS and largest position error of the object, m\n\n", budget.scenario);
-  fmt::print("  {:<34}{:>10}{:>10}{:>11}{:>12}{:>13}\n", "source", "alone", "largest", "by (57)",
-             "without it", "interaction");
+  fmt::print("{}: RMS and largest {}, {}\n\n", budget.scenario,
+             budget.of_joints ? "error of a joint" : "position error of the object", budget.unit);
+  fmt::print("  {:<34}{:>10}{:>10}{:>11}{:>12}{:>13}\n", "source", "alone", "largest",
+             budget.of_joints ? "predicted" : "by (57)", "without it", "interaction");
   for (const BudgetEntry& e : budget.entries) {
     if (!e.failure.empty()) {
       fmt::print("  {:<34}{}\n", e.name, e.failure);
@@ -72,8 +69,8 @@ int Run(const BudgetRequest& request) {
   if (!to_stdout) {
     if (!request.quiet) Print(budget);
     if (budget.is_complete()) {
-      fmt::print("{} sources: their errors add up to {:.2e} m, all together make {:.2e} m.\n",
-                 budget.entries.size(), budget.sum.rms, budget.all.rms);
+      fmt::print("{} sources: their errors add up to {:.2e} {}, all together make {:.2e} {}.\n",
+                 budget.entries.size(), budget.sum.rms, budget.unit, budget.all.rms, budget.unit);
     } else {
       fmt::print("INCOMPLETE: {}\n", budget.failure.empty() ? "a run ended early" : budget.failure);
     }
@@ -87,17 +84,12 @@ void AddBudgetCommand(Command app) {
   const auto request = std::make_shared<BudgetRequest>();
   Command command = app.AddCommand(
       "budget", "Which part of a plant that is not ideal costs the accuracy: each alone, all but each, all");
-  command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();
-  command.AddOption("--set", &request->overrides, "Set a key of the scenario, as for run")
-      .TypeName("KEY=VALUE")
-      .Repeatable();
+  AddScenarioOptions(command, request.get());
   command.AddOption("--seed", &request->seed, "Seed of all that is random")
       .TypeName("N")
       .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
-  command.AddOption("--json", &request->json_file, "Write the budget to this file (- for standard output)")
-      .TypeName("FILE.json");
   command.AddOption("--page", &request->page, "Write table and bar chart as a page").TypeName("FILE.html");
-  command.AddFlag("--quiet", &request->quiet, "Print the last line only");
+  AddResultOptions(command, "the budget", request.get());
   command.SetAction([=] { return Run(*request); });
 }
 

@@ -11,18 +11,15 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
+#include "harness/cli/shared_request.h"
 #include "harness/run/excitation.h"
 #include "harness/study/exciting_motion.h"
 
 namespace dexcheck::cli {
 namespace {
 
-struct ExciteRequest {
-  std::string scenario;
-  std::vector<std::string> overrides;
+struct ExciteRequest : ScenarioRequest {
   ExcitingMotionOptions options;
-  std::string json_file;
-  bool quiet = false;
 };
 
 std::string Head(const ExcitingMotion& motion) {
@@ -92,10 +89,7 @@ void AddExciteCommand(Command app) {
   const auto request = std::make_shared<ExciteRequest>();
   Command command = app.AddCommand(
       "excite", "Change a scenario's oscillations so that the model's numbers show best within all limits");
-  command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();
-  command.AddOption("--set", &request->overrides, "Set a key of the scenario, as for run")
-      .TypeName("KEY=VALUE")
-      .Repeatable();
+  AddScenarioOptions(command, request.get());
   command.AddOption("--runs", &request->options.runs, "How many runs to make")
       .TypeName("N")
       .Check(WholeNumber(1, 100000))
@@ -106,9 +100,7 @@ void AddExciteCommand(Command app) {
       .TypeName("X")
       .Check(PositiveNumber())
       .ShowDefault();
-  command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
-      .TypeName("FILE.json");
-  command.AddFlag("--quiet", &request->quiet, "Print the last line only");
+  AddResultOptions(command, "the results", request.get());
   command.SetAction([=] { return Run(*request); });
 }
 

@@ -74,6 +74,8 @@ class Clearance {
 
   /// The bodies are there.
   void Update(const BodyPoses& bodies, double time);
+  /// Forgets the smallest distances so far: time begins anew.
+  void Restart();
 
   [[nodiscard]] const std::vector<WatchedPair>& pairs() const { return pairs_; }
   [[nodiscard]] const Solid& solid(int index) const { return solids_->list[static_cast<size_t>(index)]; }
@@ -83,17 +85,22 @@ class Clearance {
   [[nodiscard]] std::pair<double, int> FindDeepest() const;
   /// Distances that were measured, so far.
   [[nodiscard]] long measured() const { return measured_; }
+  /// Pairs that were looked at, so far: measured, or found to be far enough apart still.
+  [[nodiscard]] long looked_at() const { return looked_at_; }
   /// "r_palm and bench".
   [[nodiscard]] std::string Describe(int pair) const;
   /// The same of the engine's geoms.
   [[nodiscard]] std::string DescribeGeoms(int geom1, int geom2) const;
 
  private:
-  /// In which frame the motion of a pair's bodies is bounded.
-  enum Frame { kOfBase, kOfWorld, kFrameCount };
+  /// In which frame the motion of a pair's bodies is bounded: where the robot itself is concerned, that of
+  /// its base, so that driving changes nothing; over planes that stand still, along their normals alone.
+  enum Frame { kOfBase, kOfWorld, kOverPlanes, kFrameCount };
+  static constexpr std::array<Frame, kFrameCount> kFrames = {kOfBase, kOfWorld, kOverPlanes};
   struct MovingBody {
     int body = 0;
-    double reach = 0.0;  // from the body's origin to the farthest point of its solids, m
+    double reach = 0.0;  // from the body's origin to the farthest point that turning it moves, m
+    Vector3d axis = Vector3d::Zero();  // through its origin, that all of its solids are round about, if any
     std::array<Pose, kFrameCount> last;
     std::array<bool, kFrameCount> counts = {};
   };
@@ -109,7 +116,13 @@ class Clearance {
     int pair = 0;
   };
 
+  [[nodiscard]] Frame FrameOf(const mjModel& engine, const WatchedPair& pair) const;
+  [[nodiscard]] Vector3d CalcAxisOfAll(int body) const;
   void FollowBodies(const BodyPoses& bodies);
+  /// By how much a pair's distance can have changed since it was measured, m.
+  [[nodiscard]] double BoundChange(int pair, const Pose& X_AB) const;
+  /// What their distance is not less than, from their origins and reaches, m.
+  [[nodiscard]] static double BoundDistance(const Solid& a, const Solid& b, const Pose& X_AB);
   /// How far the pair may come nearer before it matters.
   [[nodiscard]] double CalcBudget(int pair, const BodyPoses& bodies, double time);
   [[nodiscard]] Pose PoseOf(int solid, const BodyPoses& bodies) const;
@@ -120,13 +133,15 @@ class Clearance {
   std::vector<WatchedPair> pairs_;
   std::vector<State> states_;
   std::vector<MovingBody> bodies_;
+  std::vector<int> planes_;        // solids that are planes and stand still
+  std::vector<Vector3d> normals_;  // theirs, world
   int base_body_ = 0;
   std::array<double, kFrameCount> travel_ = {};
   std::array<std::vector<Due>, kFrameCount> due_;  // heaps, the next on top
   std::array<Nearest, kPairClassCount> nearest_;
   std::vector<int> overlapping_;
   bool has_begun_ = false;
-  long measured_ = 0;
+  long measured_ = 0, looked_at_ = 0;
 };
 
 }  // namespace dexcheck

@@ -100,7 +100,7 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
     ControlStep(t);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
     if (checks_ && i == grip) checks_->Forget();
-    if (checks_ && t >= kRoughTime) checks_->CompareMotion(record_);
+    if (checks_ && t >= kRoughTime) checks_->CompareSettling(record_);
     try {
       CheckGrasp();
     } catch (const RunFailure&) {

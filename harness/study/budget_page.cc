@@ -37,17 +37,18 @@ struct LogAxis {
 };
 
 Html DrawBar(const LogAxis& axis, double y, const std::string& name, double measured, double predicted,
-             bool interacts) {
+             const std::string& unit, bool interacts) {
   Html bar = FormatHtml("<text x='{:.0f}' y='{:.0f}' text-anchor='end'>{}</text>", kLabelWidth - 8.0,
                         y + 15.0, name);
   bar += FormatHtml(
-      "<rect x='{:.0f}' y='{:.0f}' width='{:.1f}' height='13' class='{}'><title>measured {} m</title></rect>",
+      "<rect x='{:.0f}' y='{:.0f}' width='{:.1f}' height='13' class='{}'><title>measured {} "
+      "{}</title></rect>",
       kLabelWidth, y + 2.0, std::max(1.0, axis.Place(measured)),
-      std::string(interacts ? "interacts" : "measured"), FormatShort(measured));
+      std::string(interacts ? "interacts" : "measured"), FormatShort(measured), unit);
   bar += FormatHtml(
       "<rect x='{:.0f}' y='{:.0f}' width='{:.1f}' height='7' class='predicted'><title>predicted {} "
-      "m</title></rect>",
-      kLabelWidth, y + 16.0, std::max(1.0, axis.Place(predicted)), FormatShort(predicted));
+      "{}</title></rect>",
+      kLabelWidth, y + 16.0, std::max(1.0, axis.Place(predicted)), FormatShort(predicted), unit);
   return bar;
 }
 
@@ -60,16 +61,18 @@ Html DrawChart(const ErrorBudget& budget) {
     const double x = kLabelWidth + axis.Place(std::pow(10.0, decade));
     chart += FormatHtml(
         "<line x1='{:.1f}' x2='{:.1f}' y1='0' y2='{:.0f}' class='grid'/>"
-        "<text x='{:.1f}' y='{:.0f}' text-anchor='middle'>1e{:.0f} m</text>",
-        x, x, height - 18.0, x, height - 4.0, decade);
+        "<text x='{:.1f}' y='{:.0f}' text-anchor='middle'>1e{:.0f} {}</text>",
+        x, x, height - 18.0, x, height - 4.0, decade, budget.unit);
   }
   double y = 0.0;
   for (const BudgetEntry& entry : budget.entries) {
-    chart += DrawBar(axis, y, entry.name, entry.alone.rms, entry.predicted.rms, entry.interacts());
+    chart +=
+        DrawBar(axis, y, entry.name, entry.alone.rms, entry.predicted.rms, budget.unit, entry.interacts());
     y += kRowHeight;
   }
-  chart += DrawBar(axis, y, "sum of the above", budget.sum.rms, budget.predicted.rms, false);
-  chart += DrawBar(axis, y + kRowHeight, "all together", budget.all.rms, budget.predicted.rms, false);
+  chart += DrawBar(axis, y, "sum of the above", budget.sum.rms, budget.predicted.rms, budget.unit, false);
+  chart +=
+      DrawBar(axis, y + kRowHeight, "all together", budget.all.rms, budget.predicted.rms, budget.unit, false);
   chart += "</svg>";
   return chart;
 }
@@ -112,10 +115,11 @@ std::string MakeBudgetPage(const ErrorBudget& budget) {
       "td,th{padding:.25rem .5rem;border-bottom:1px solid #d9dee4;text-align:right}"
       "td:first-child,th:first-child{text-align:left}</style></head><body>";
   page += FormatHtml("<h1>Error budget of {}</h1>", budget.scenario);
-  page +=
-      "<p>RMS of the object's position error with each source alone (blue; orange where it makes another "
-      "error in "
-      "company than alone), and what (57) predicts of it to first order (grey).</p>";
+  page += FormatHtml(
+      "<p>RMS of {} with each source alone (blue; orange where it makes another error in company than "
+      "alone), "
+      "and what is predicted of it to first order (grey).</p>",
+      std::string(budget.of_joints ? "the largest error of a joint" : "the object's position error"));
   if (!budget.failure.empty()) page += FormatHtml("<p><strong>{}</strong></p>", budget.failure);
   page += DrawChart(budget);
   page += MakeTable(budget);

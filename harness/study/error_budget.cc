@@ -13,7 +13,14 @@
 namespace dexcheck {
 namespace {
 
-using Errors = std::vector<Vector3d>;  // by step
+/// By step: of the object's position, or of each joint that follows a motion of its own.
+using Errors = std::vector<VectorXd>;
+
+VectorXd CalcError(const StepRecord& step) {
+  const VectorXd& q_d = step.command.joints.q;
+  if (q_d.size() > 0) return q_d - step.reading.state.q.tail(q_d.size());
+  return step.error.position;
+}
 
 /// What one run came to.
 struct Measured {
@@ -25,7 +32,7 @@ Measured RunOnce(const Setup& setup) {
   Measured measured;
   Runner runner(setup, /*check=*/false);
   const RunResult& result = runner.Run(
-      [&](const StepRecord& step) { measured.errors.push_back(step.error.position); }, [] { return false; });
+      [&](const StepRecord& step) { measured.errors.push_back(CalcError(step)); }, [] { return false; });
   measured.failure = result.failure;
   return measured;
 }
@@ -37,8 +44,8 @@ Measured RunIdeal(const Setup& setup, const std::vector<std::unique_ptr<ErrorPre
   Runner runner(setup, /*check=*/false);
   const RunResult& result = runner.Run(
       [&](const StepRecord& step) {
-        measured.errors.push_back(step.error.position);
-        const Vector3d ideal = reference.CalcAcceleration(step);
+        measured.errors.push_back(CalcError(step));
+        const VectorXd ideal = reference.CalcAcceleration(step);
         for (const auto& prediction : predictions)
           prediction->Step(prediction->CalcAcceleration(step) - ideal);
       },
@@ -47,12 +54,13 @@ Measured RunIdeal(const Setup& setup, const std::vector<std::unique_ptr<ErrorPre
   return measured;
 }
 
-ErrorSize CalcSize(const Errors& errors, size_t from) {
+ErrorSize CalcSize(const Errors& errors, size_t from, bool of_joints) {
   ErrorSize size;
   double squares = 0.0;
   for (size_t i = from; i < errors.size(); ++i) {
-    squares += errors[i].squaredNorm();
-    size.max = std::max(size.max, errors[i].norm());
+    const double length = of_joints ? errors[i].cwiseAbs().maxCoeff() : errors[i].norm();
+    squares += length * length;
+    size.max = std::max(size.max, length);
   }
   if (errors.size() > from) size.rms = std::sqrt(squares / static_cast<double>(errors.size() - from));
   return size;
@@ -73,18 +81,23 @@ void ListSensing(const SensingOptions& s, std::vector<ErrorSource>* list) {
   const auto add = [&](bool given, const char* name, auto drop) {
     if (given) list->push_back(ByKey(name, drop));
   };
+  // What the first step draws is no error that lasts.
+  const auto add_noise = [&](bool given, const char* name, auto drop) {
+    if (given) list->push_back({name, drop, /*acts_at_rest=*/false});
+  };
   add(!s.joint_counts.Is(0.0), "sensing.joint_counts",
       [](Imperfections* i) { i->sensing.joint_counts = {}; });
-  add(!s.joint_noise.Is(0.0), "sensing.joint_noise", [](Imperfections* i) { i->sensing.joint_noise = {}; });
+  add_noise(!s.joint_noise.Is(0.0), "sensing.joint_noise",
+            [](Imperfections* i) { i->sensing.joint_noise = {}; });
   add(s.velocity != VelocitySource::kMeasured, "sensing.velocity",
       [](Imperfections* i) { i->sensing.velocity = VelocitySource::kMeasured; });
-  add(!s.velocity_noise.Is(0.0), "sensing.velocity_noise",
-      [](Imperfections* i) { i->sensing.velocity_noise = {}; });
+  add_noise(!s.velocity_noise.Is(0.0), "sensing.velocity_noise",
+            [](Imperfections* i) { i->sensing.velocity_noise = {}; });
   add(s.odometry, "sensing.odometry", [](Imperfections* i) { i->sensing.odometry = false; });
-  add(s.object_position_noise > 0.0, "sensing.object_position_noise",
-      [](Imperfections* i) { i->sensing.object_position_noise = 0.0; });
-  add(s.object_orientation_noise > 0.0, "sensing.object_orientation_noise",
-      [](Imperfections* i) { i->sensing.object_orientation_noise = 0.0; });
+  add_noise(s.object_position_noise > 0.0, "sensing.object_position_noise",
+            [](Imperfections* i) { i->sensing.object_position_noise = 0.0; });
+  add_noise(s.object_orientation_noise > 0.0, "sensing.object_orientation_noise",
+            [](Imperfections* i) { i->sensing.object_orientation_noise = 0.0; });
   add(s.object_rate > 0.0, "sensing.object_rate", [](Imperfections* i) { i->sensing.object_rate = 0.0; });
   add(s.object_latency > 0.0, "sensing.object_latency",
       [](Imperfections* i) { i->sensing.object_latency = 0.0; });
@@ -145,6 +158,13 @@ class SetupMaker {
   MjModelPtr engine_;
 };
 
+/// Of the joints' errors.
+std::string NameUnit(const RobotModel& model) {
+  const bool slides = std::any_of(model.joints().begin(), model.joints().end(),
+                                  [](const Joint& joint) { return joint.type == JointType::kPrismatic; });
+  return slides ? "rad or m" : "rad";
+}
+
 }  // namespace
 
 std::vector<ErrorSource> ListErrorSources(const Imperfections& imperfections) {
@@ -163,13 +183,15 @@ std::vector<ErrorSource> ListErrorSources(const Imperfections& imperfections) {
 }
 
 nlohmann::ordered_json ToJson(const ErrorBudget& budget) {
-  const auto size = [](const ErrorSize& error) {
-    return nlohmann::ordered_json{{"rms_m", error.rms}, {"max_m", error.max}};
+  const std::string suffix = budget.of_joints ? "" : "_m";
+  const auto size = [&](const ErrorSize& error) {
+    return nlohmann::ordered_json{{"rms" + suffix, error.rms}, {"max" + suffix, error.max}};
   };
   nlohmann::ordered_json json = {
       {"scenario", budget.scenario},        {"complete", budget.is_complete()}, {"failure", budget.failure},
       {"ideal", size(budget.ideal)},        {"all", size(budget.all)},          {"sum", size(budget.sum)},
       {"predicted", size(budget.predicted)}};
+  if (budget.of_joints) json["unit"] = budget.unit;
   json["sources"] = nlohmann::ordered_json::array();
   for (const BudgetEntry& entry : budget.entries) {
     json["sources"].push_back({{"name", entry.name},
@@ -204,6 +226,8 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
   long done = 0;
   ErrorBudget budget;
   budget.scenario = scenario.name;
+  budget.of_joints = scenario.joint_motion.has_value();
+  const auto size_of = [&](const Errors& errors) { return CalcSize(errors, from, budget.of_joints); };
   const auto stop = [&] {
     if (progress(done++, total)) return false;
     budget.failure = "interrupted";
@@ -225,15 +249,16 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
     predictions.push_back(std::make_unique<ErrorPrediction>(*alone[i], sources[i].acts_at_rest));
   }
   const std::unique_ptr<Setup> ideal_setup = without([](size_t) { return true; });
+  if (budget.of_joints) budget.unit = NameUnit(ideal_setup->model());
   const Measured ideal = RunIdeal(*ideal_setup, predictions);
   if (stop()) return budget;
   const Measured all = RunOnce(*without([](size_t) { return false; }));
   budget.failure = ideal.failure.empty() ? all.failure : ideal.failure;
-  budget.ideal = CalcSize(ideal.errors, from);
-  budget.all = CalcSize(all.errors, from);
+  budget.ideal = size_of(ideal.errors);
+  budget.all = size_of(all.errors);
   Errors all_added = all.errors;
   Add(ideal.errors, -1.0, &all_added);
-  const double scale = std::max(CalcSize(all_added, from).rms, std::numeric_limits<double>::min());
+  const double scale = std::max(size_of(all_added).rms, std::numeric_limits<double>::min());
 
   Errors sum = ideal.errors, predicted = ideal.errors;
   for (size_t i = 0; i < sources.size(); ++i) {
@@ -245,21 +270,21 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
     if (stop()) return budget;
     const Measured others = RunOnce(*without([&](size_t other) { return other == i; }));
     entry.failure = one.failure.empty() ? others.failure : one.failure;
-    entry.alone = CalcSize(one.errors, from);
-    entry.without = CalcSize(others.errors, from);
-    entry.predicted = CalcSize(predictions[i]->errors(), from);
+    entry.alone = size_of(one.errors);
+    entry.without = size_of(others.errors);
+    entry.predicted = size_of(predictions[i]->errors());
     Errors alone_added = one.errors;
     Add(ideal.errors, -1.0, &alone_added);
     Errors company = all.errors;
     Add(others.errors, -1.0, &company);
     Add(alone_added, -1.0, &company);
-    entry.interaction = CalcSize(company, from).rms / scale;
+    entry.interaction = size_of(company).rms / scale;
     Add(alone_added, 1.0, &sum);
     Add(predictions[i]->errors(), 1.0, &predicted);
     budget.entries.push_back(entry);
   }
-  budget.sum = CalcSize(sum, from);
-  budget.predicted = CalcSize(predicted, from);
+  budget.sum = size_of(sum);
+  budget.predicted = size_of(predicted);
   return budget;
 }
 

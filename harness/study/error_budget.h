@@ -17,13 +17,14 @@ struct ErrorSource {
   std::string name;  ///< Its key: "sensing.joint_counts", "disturbance.0".
   /// Takes it out. The random numbers of the others stay as they are.
   std::function<void(Imperfections*)> drop;
-  bool acts_at_rest = true;  ///< Whether its error is there before t = 0: all but pushes.
+  bool acts_at_rest = true;  ///< Whether its error is there before t = 0: all but pushes and noise.
 };
 
 /// Those that do something. `actuation.saturate` is no source: it says what becomes of a limit.
 std::vector<ErrorSource> ListErrorSources(const Imperfections& imperfections);
 
-/// Size of a position error over a run, m.
+/// Size of an error over a run: of the object's position, m; of a motion of joints at each step the joint
+/// that is farthest from its place, rad or m.
 struct ErrorSize {
   double rms = 0.0;
   double max = 0.0;
@@ -34,7 +35,7 @@ struct BudgetEntry {
   std::string name;
   ErrorSize alone;      ///< With this source only.
   ErrorSize without;    ///< With all others.
-  ErrorSize predicted;  ///< By (57), see ErrorPrediction.
+  ErrorSize predicted;  ///< To first order, see ErrorPrediction.
   /// RMS of what it adds in company less what it adds alone, relative to the RMS of all.
   double interaction = 0.0;
   std::string failure;  ///< Why one of its two runs ended early; empty when none did.
@@ -47,11 +48,13 @@ struct BudgetEntry {
 /// All sources of a scenario. Errors are judged from `expect.from` on.
 struct ErrorBudget {
   std::string scenario;
-  ErrorSize ideal;      ///< With no source.
-  ErrorSize all;        ///< With every source.
-  ErrorSize sum;        ///< Errors of the runs with one source each, added as functions of time.
-  ErrorSize predicted;  ///< Likewise of the predictions.
-  std::string failure;  ///< Why the ideal run or that with all ended early; empty when none did.
+  bool of_joints = false;  ///< The errors are those of a motion of joints.
+  std::string unit = "m";  ///< Or "rad", "rad or m".
+  ErrorSize ideal;         ///< With no source.
+  ErrorSize all;           ///< With every source.
+  ErrorSize sum;           ///< Errors of the runs with one source each, added as functions of time.
+  ErrorSize predicted;     ///< Likewise of the predictions.
+  std::string failure;     ///< Why the ideal run or that with all ended early; empty when none did.
   std::vector<BudgetEntry> entries;
 
   /// Whether every run came to its end.

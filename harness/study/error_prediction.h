@@ -16,24 +16,29 @@
 
 namespace dexcheck {
 
-/// What a plant that is not ideal makes of the object's position, to first order: along the run of an ideal
-/// one it asks at each step what would be told, what the law would send then, what the motors would give, and
-/// how the rigid system (19), (46), (48) with the plant's own masses and pushes would accelerate. By that
-/// acceleration less the ideal one, d, (57) is driven:
+/// What a plant that is not ideal makes of the tracking error, to first order: along the run of an ideal one
+/// it asks at each step what would be told, what the law would send then, what the motors would give, and how
+/// the rigid system (19), (46), (48) with the plant's own masses and pushes would accelerate. That
+/// acceleration less the ideal one, d, drives the error. Of the object's position, with the gains of (57),
 ///
 ///   e_ddot + K_v e_dot + K_p e = -d,   e = X_d - X_o
+///
+/// and likewise of the joints that follow a motion of their own, e = q_d - q, by computed torque. The other
+/// laws of joints leave e_ddot = -d - M^-1 (K e + D e_dot).
 class ErrorPrediction {
  public:
   /// @param setup of the scenario with its imperfections; outlives this.
   /// @param acts_at_rest whether the run begins with the error that the first d has in the end.
   ErrorPrediction(const Setup& setup, bool acts_at_rest);
 
-  /// Acceleration of the object's origin at a step of the ideal run, world, m/s^2. Once at each step.
-  Vector3d CalcAcceleration(const StepRecord& ideal);
-  /// One step of (57). @param d m/s^2.
-  void Step(const Vector3d& d);
-  /// X_d - X_o at each step, less that of the ideal run, m.
-  [[nodiscard]] const std::vector<Vector3d>& errors() const { return errors_; }
+  /// Acceleration at a step of the ideal run: of the object's origin, world (3), m/s^2, or of the joints (n).
+  /// Once at each step.
+  const VectorXd& CalcAcceleration(const StepRecord& ideal);
+  /// One step of the error. @param d as CalcAcceleration.
+  void Step(const VectorXd& d);
+  /// The error at each step, less that of the ideal run: of the object's position, m, or of the joints, rad
+  /// or m.
+  [[nodiscard]] const std::vector<VectorXd>& errors() const { return errors_; }
 
  private:
   Sensing sensing_;
@@ -44,14 +49,17 @@ class ErrorPrediction {
   GraspModel model_;
   ConstrainedDynamics dynamics_;
   ActuationMap actuation_;
+  const JointMotion* joint_motion_;  // null of an object
+  bool is_decoupled_ = true;         // the error's dynamics have gains of their own
   Reading told_;
   Command command_;
-  VectorXd tau_, force_;  // n
-  Eigen::Array3d K_p_, K_v_;
+  VectorXd tau_, force_;      // n
+  Eigen::ArrayXd K_p_, K_v_;  // or K, D
   double time_step_;
   bool acts_at_rest_;
-  Vector3d e_ = Vector3d::Zero(), e_dot_ = Vector3d::Zero();
-  std::vector<Vector3d> errors_;
+  bool has_begun_ = false;
+  VectorXd acceleration_, e_, e_dot_, e_ddot_;
+  std::vector<VectorXd> errors_;
 };
 
 }  // namespace dexcheck

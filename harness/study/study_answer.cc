@@ -200,7 +200,7 @@ std::vector<std::string> AnswerStudy(const Study& study, const std::vector<Trial
   answers = DescribeSpreads(study, rows);
   const SamplingMethod method = study.sample.method;
   if (method == SamplingMethod::kSaltelli || method == SamplingMethod::kMorris) {
-    for (const std::string& quantity : ListQuantities(study)) {
+    for (const std::string& quantity : ListQuantities(study, rows)) {
       answers.push_back(Describe(study, AnalyseSensitivity(study, rows, quantity)));
     }
     return answers;

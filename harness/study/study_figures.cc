@@ -201,6 +201,8 @@ StudyResults::StudyResults(const StudyStore& store)
       if (kMetrics[i].name == name) metrics.push_back(static_cast<Metric>(i));
     }
   }
+  if (metrics.empty() && FindErrorMetric(rows) == kJointErrorRms)
+    metrics = {kJointErrorRms, kPeakEffort, kEnergy};
   if (metrics.empty()) metrics = {kPositionErrorRms, kPeakEffort, kConeMargin};
   const size_t every = (rows.size() + kMostListed - 1) / kMostListed;
   for (size_t i = 0; i < rows.size(); i += std::max(every, size_t{1})) listed.push_back(&rows[i]);
@@ -221,9 +223,10 @@ std::vector<const TrialRow*> StudyResults::ListTracked() const {
     const bool shortened = IsShortened(study.search, row.trial.number / CountTrialsOfPoint(study));
     if (row.result.outcome == Outcome::kTracked && !shortened) tracked.push_back(&row);
   }
-  std::stable_sort(tracked.begin(), tracked.end(), [](const TrialRow* a, const TrialRow* b) {
-    return a->result.metrics[kPositionErrorRms] < b->result.metrics[kPositionErrorRms];
-  });
+  std::stable_sort(tracked.begin(), tracked.end(),
+                   [metric = FindErrorMetric(rows)](const TrialRow* a, const TrialRow* b) {
+                     return a->result.metrics[metric] < b->result.metrics[metric];
+                   });
   return tracked;
 }
 
@@ -319,14 +322,15 @@ Html DrawLines(const StudyResults& results) {
 Html DrawErrorAgainstEffort(const StudyResults& results) {
   const std::vector<const TrialRow*> tracked = results.ListTracked();
   if (tracked.empty()) return {};
-  Chart chart = MakeChart("error against effort", LabelOf(kEnergy), LabelOf(kPositionErrorRms));
+  const Metric error = FindErrorMetric(results.rows);
+  Chart chart = MakeChart("error against effort", LabelOf(kEnergy), LabelOf(error));
   ChartLine line{"Pareto front", "#9b2226", {}};
   for (const TrialRow* row : ListFront(tracked)) {
-    line.points.emplace_back(row->result.metrics[kEnergy], row->result.metrics[kPositionErrorRms]);
+    line.points.emplace_back(row->result.metrics[kEnergy], row->result.metrics[error]);
   }
   for (const TrialRow* row : results.listed) {
     if (row->result.outcome != Outcome::kTracked) continue;
-    chart.points.push_back({row->result.metrics[kEnergy], row->result.metrics[kPositionErrorRms],
+    chart.points.push_back({row->result.metrics[kEnergy], row->result.metrics[error],
                             FindColor(Outcome::kTracked), Describe(results.study, *row), LinkTo(*row)});
   }
   chart.lines.push_back(line);

@@ -25,7 +25,7 @@ struct StudyResults {
   std::vector<const TrialRow*> listed;
   [[nodiscard]] bool lists_all() const { return listed.size() == rows.size(); }
 
-  /// Trials that tracked, least rms position error first.
+  /// Trials that tracked, least rms error first.
   [[nodiscard]] std::vector<const TrialRow*> ListTracked() const;
 };
 

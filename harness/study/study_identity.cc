@@ -42,6 +42,14 @@ bool IsSameNumber(double a, double b) {
 
 }  // namespace
 
+Metric FindErrorMetric(const std::vector<TrialRow>& rows) {
+  const bool of_joints = std::any_of(rows.begin(), rows.end(), [](const TrialRow& row) {
+    return std::isfinite(row.result.metrics[kJointErrorRms]) &&
+           !std::isfinite(row.result.metrics[kPositionErrorRms]);
+  });
+  return of_joints ? kJointErrorRms : kPositionErrorRms;
+}
+
 bool IsSame(const TrialRow& a, const TrialRow& b) {
   if (a.trial.seed != b.trial.seed || a.trial.parameters != b.trial.parameters ||
       a.result.outcome != b.result.outcome) {

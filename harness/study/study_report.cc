@@ -128,9 +128,12 @@ class Report {
                          FormatHtml("{} {}", objective.maximize ? "largest" : "least", Describe(objective)));
       }
     } else if (!tracked_.empty()) {
-      html += MakeTile(FormatShort(tracked_.front()->result.metrics[kPositionErrorRms]) + " m",
-                       FormatHtml("least rms position error, <a href=\"{}\">trial {}</a>",
-                                  LinkTo(*tracked_.front()), tracked_.front()->trial.number));
+      const Metric error = FindErrorMetric(results_.rows);
+      const bool of_joints = error == kJointErrorRms;
+      html += MakeTile(FormatShort(tracked_.front()->result.metrics[error]) + (of_joints ? " rad" : " m"),
+                       FormatHtml("least rms {} error, <a href=\"{}\">trial {}</a>",
+                                  std::string(of_joints ? "joint" : "position"), LinkTo(*tracked_.front()),
+                                  tracked_.front()->trial.number));
     }
     html += "</div>\n</header>\n";
     return html;
@@ -178,17 +181,25 @@ class Report {
           "number\">{}</td></tr>\n",
           FindColor(outcome), NameOf(outcome), count);
     }
-    html += FormatHtml("</table>\n</div>\n<div class=\"card\">\n{}</div>\n</div>\n", Departures());
+    html += Html("</table>\n</div>\n");
+    const Html departures = Departures();
+    if (!departures.empty()) html += FormatHtml("<div class=\"card\">\n{}</div>\n", departures);
+    html += Html("</div>\n");
     return html;
   }
 
   [[nodiscard]] static std::string ExplainDivergence(const TrialRow& row) {
     if (row.result.metrics[kErrorGrowth] > 1.0) return "the error grew";
+    if (std::isfinite(row.result.metrics[kJointErrorRms]) &&
+        !std::isfinite(row.result.metrics[kPositionErrorRms])) {
+      return fmt::format("the rms error is above {} rad", kLostTrackOfJoints);
+    }
     return fmt::format("the rms error is above {} m", kLostTrack);
   }
 
-  /// Where theory is stable and the run was not held to its end, by reason.
+  /// Where theory is stable and the run was not held to its end, by reason. Theory is that of an object.
   [[nodiscard]] Html Departures() const {
+    if (FindErrorMetric(results_.rows) == kJointErrorRms) return {};
     std::map<std::string, long> reasons;
     long agree = 0;
     long asked = 0;
@@ -274,14 +285,15 @@ class Report {
 
   [[nodiscard]] Html Best() const {
     if (tracked_.empty()) return {};
-    Html html(
-        "<h2 id=\"best\">Best</h2>\n<p class=\"soft\">By rms position error, of the trials that "
-        "tracked.</p>\n<div class=\"card scroll\"><table>\n<tr><th class=\"value\">trial</th>");
+    Html html = FormatHtml(
+        "<h2 id=\"best\">Best</h2>\n<p class=\"soft\">By rms {} error, of the trials that "
+        "tracked.</p>\n<div class=\"card scroll\"><table>\n<tr><th class=\"value\">trial</th>",
+        std::string(FindErrorMetric(results_.rows) == kJointErrorRms ? "joint" : "position"));
     const auto add_head = [&](const std::string& text) {
       html += FormatHtml("<th class=\"value\">{}</th>", text);
     };
     for (const Variation& variation : results_.study.variations) add_head(variation.key);
-    std::vector<Metric> shown = {kPositionErrorRms, kEnergy};
+    std::vector<Metric> shown = {FindErrorMetric(results_.rows), kEnergy};
     for (const Metric metric : results_.metrics) {
       if (std::find(shown.begin(), shown.end(), metric) == shown.end()) shown.push_back(metric);
     }

@@ -46,11 +46,11 @@ Sensitivity AnalyseSensitivity(const Study& study, const std::vector<TrialRow>& 
   return sensitivity;
 }
 
-std::vector<std::string> ListQuantities(const Study& study) {
+std::vector<std::string> ListQuantities(const Study& study, const std::vector<TrialRow>& rows) {
   std::vector<std::string> quantities;
   for (const Objective& objective : study.objectives) quantities.push_back(objective.expression);
   if (quantities.empty()) quantities = study.metrics;
-  if (quantities.empty()) quantities.emplace_back(kMetrics[kPositionErrorRms].name);
+  if (quantities.empty()) quantities.emplace_back(kMetrics[FindErrorMetric(rows)].name);
   return quantities;
 }
 

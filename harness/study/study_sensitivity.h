@@ -26,8 +26,8 @@ struct Sensitivity {
 Sensitivity AnalyseSensitivity(const Study& study, const std::vector<TrialRow>& rows,
                                const std::string& expression);
 
-/// What a study of this kind asks about: its objectives, else its metrics.
-std::vector<std::string> ListQuantities(const Study& study);
+/// What a study of this kind asks about: its objectives, else its metrics, else the error of its trials.
+std::vector<std::string> ListQuantities(const Study& study, const std::vector<TrialRow>& rows);
 
 /// "energy: x1 explains 62 % of the variance, 55 to 70 %, with its interactions; then ...".
 std::string Describe(const Study& study, const Sensitivity& sensitivity);

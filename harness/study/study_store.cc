@@ -82,6 +82,7 @@ void StudyStore::Load() {
     throw InputError(database_->name() + ": is not the database of a study");
   }
   Upgrade();
+  AddMissingMetrics();
   identity_.clear();
   for (const char* column : {"layout", "name", "study", "scenario", "robot", "mjcf_hash", "dexcheck_version",
                              "git_revision", "mujoco_version"}) {
@@ -105,6 +106,26 @@ void StudyStore::Upgrade() {
   }
   database_->Execute("ALTER TABLE trials ADD COLUMN machine TEXT NOT NULL DEFAULT ''");
   database_->Execute("UPDATE study SET layout = '" + kLayout + "'");
+  transaction.Commit();
+}
+
+void StudyStore::AddMissingMetrics() {
+  const auto list_missing = [&] {
+    std::set<std::string> there;
+    Statement columns(database_.get(), "SELECT name FROM pragma_table_info('trials')");
+    while (columns.Step()) there.insert(columns.GetText(0));
+    std::vector<std::string> missing;
+    for (const MetricInfo& metric : kMetrics) {
+      if (!there.contains(metric.name)) missing.emplace_back(metric.name);
+    }
+    return missing;
+  };
+  if (list_missing().empty()) return;
+  Transaction transaction(database_.get());
+  // Another process may have been faster.
+  for (const std::string& name : list_missing()) {
+    database_->Execute("ALTER TABLE trials ADD COLUMN " + name + " REAL");
+  }
   transaction.Commit();
 }
 

@@ -34,6 +34,9 @@ struct TrialRow {
   std::string machine;  ///< That made it, as DescribeMachine says; empty when that was not recorded.
 };
 
+/// The rms error that says how good the trials are: of the object's position, or of a motion of joints.
+Metric FindErrorMetric(const std::vector<TrialRow>& rows);
+
 /// Rows and where they are from, for messages.
 struct TrialSource {
   std::string name;
@@ -107,6 +110,8 @@ class StudyStore {
   StudyStore(const std::filesystem::path& path, Database::Mode mode);
   void Create(const StudyIdentity& identity, const Study& study);
   void Upgrade();
+  /// Columns of metrics that the program which wrote the file did not have; its trials have none of these.
+  void AddMissingMetrics();
   void Adopt(const StudyIdentity& identity, const Study& study, const MakesSameRows& makes_same_rows);
   void Update(const std::string& column, const std::string& value);
   [[nodiscard]] bool IsInUse() const;

@@ -62,7 +62,7 @@ Html MakeSensitivityTables(const StudyResults& results) {
     return {};
   const KeyTheory theory = FindKeyTheory(results.inputs, results.rows.front().trial.parameters);
   Html tables;
-  for (const std::string& quantity : ListQuantities(results.study))
+  for (const std::string& quantity : ListQuantities(results.study, results.rows))
     tables += MakeSensitivityTable(results, quantity, theory.knows);
   if (tables.empty()) return {};
   return FormatHtml(

@@ -41,6 +41,7 @@ Setup MakeSetup(const StudyInputs& inputs, const Scenario& scenario) {
 bool HasDiverged(const Setup& setup, const TrialResult& result) {
   if (!result.failure.empty()) return true;
   if (setup.scenario().start_error.norm() > 0.0) return !(result.metrics[kErrorGrowth] <= 1.0);
+  if (setup.joint_motion() != nullptr) return !(result.metrics[kJointErrorRms] <= kLostTrackOfJoints);
   return !(result.metrics[kPositionErrorRms] <= kLostTrack);
 }
 
@@ -79,12 +80,15 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
     Runner runner(setup, inputs.study.check);
     TrialMonitor monitor(setup, runner.loop().num_steps());
     const double limit = inputs.study.stop_error;
-    const auto is_lost = [&] { return limit > 0.0 && monitor.position_error() > limit; };
+    const auto is_lost = [&] { return limit > 0.0 && monitor.error() > limit; };
     const RunResult& run = runner.Run([&](const StepRecord& step) { monitor.Record(step); }, is_lost);
     result.failure = run.failure;
     if (run.interrupted) {
-      result.failure = "the position error is above stop_error, " + FormatNumber(limit) +
-                       " m at t = " + FormatNumber(runner.loop().record().time) + " s";
+      const bool of_joints = setup.joint_motion() != nullptr;
+      result.failure = std::string(of_joints ? "an error of a joint" : "the position error") +
+                       " is above stop_error, " + FormatNumber(limit) +
+                       (of_joints ? " rad at t = " : " m at t = ") +
+                       FormatNumber(runner.loop().record().time) + " s";
     }
     result.metrics = monitor.CalcMetrics(run.tracking);
     result.outcome = Classify(setup, run, result);

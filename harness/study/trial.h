@@ -27,8 +27,9 @@ struct StudyInputs {
   std::vector<std::string> model_overrides;
 };
 
-/// A run without a start error diverged when its error is above this, rms, m.
+/// A run without a start error diverged when its error is above this, rms, m; of joints rad.
 constexpr double kLostTrack = 0.01;
+constexpr double kLostTrackOfJoints = 0.1;
 
 /// The scenario of one trial. @throws InputError as ParseScenario.
 Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial);

@@ -14,6 +14,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 TrialMonitor::TrialMonitor(const Setup& setup, long num_steps)
     : num_steps_(num_steps),
       time_step_(setup.scenario().plant.time_step),
+      of_joints_(setup.joint_motion() != nullptr),
       has_heading_(setup.model().num_base_positions() == 3),
       fingertip_slips_(setup.fingertips().size(), Vector3d::Zero()),
       wheel_slips_(setup.adapter().wheels().size(), Vector3d::Zero()),
@@ -37,8 +38,8 @@ void TrialMonitor::Record(const StepRecord& step) {
 
 void TrialMonitor::RecordError(const StepRecord& step) {
   const TrackingError& error = step.error;
-  position_error_ = error.position.norm();
-  const double size = by_position_ ? error.position.norm() : error.orientation;
+  error_ = of_joints_ ? error.joints : error.position.norm();
+  const double size = by_position_ ? error_ : error.orientation;
   const bool inside = size <= kSettledShare * start_error_;
   if (inside && !settled_) settled_since_ = step.time;
   settled_ = inside;
@@ -86,10 +87,15 @@ std::array<double, kNumMetrics> TrialMonitor::CalcMetrics(const TrackingStatisti
   metrics.fill(kNone);
   metrics[kSimulatedTime] = static_cast<double>(steps_) * time_step_;
   if (steps_ == 0) return metrics;
-  metrics[kPositionErrorRms] = tracking.position_rms();
-  metrics[kPositionErrorMax] = tracking.position_max();
-  metrics[kOrientationErrorRms] = tracking.orientation_rms();
-  metrics[kOrientationErrorMax] = tracking.orientation_max();
+  if (of_joints_) {
+    metrics[kJointErrorRms] = tracking.joints_rms();
+    metrics[kJointErrorMax] = tracking.joints_max();
+  } else {
+    metrics[kPositionErrorRms] = tracking.position_rms();
+    metrics[kPositionErrorMax] = tracking.position_max();
+    metrics[kOrientationErrorRms] = tracking.orientation_rms();
+    metrics[kOrientationErrorMax] = tracking.orientation_max();
+  }
   if (start_error_ > 0.0 && settled_) metrics[kSettlingTime] = settled_since_;
   if (start_error_ > 0.0 && by_position_) metrics[kOvershoot] = overshoot_;
   if (quarter_steps_[1] > 0 && quarter_squares_[0] > 0.0) {

@@ -25,8 +25,8 @@ class TrialMonitor {
   /// Takes in a step.
   void Record(const StepRecord& step);
 
-  /// Of the last step, m.
-  [[nodiscard]] double position_error() const { return position_error_; }
+  /// Of the last step: of the object's position, m, or of a motion of joints the largest, rad or m.
+  [[nodiscard]] double error() const { return error_; }
 
   /// All metrics of the steps so far, those of `tracking` included.
   [[nodiscard]] std::array<double, kNumMetrics> CalcMetrics(const TrackingStatistics& tracking) const;
@@ -38,10 +38,11 @@ class TrialMonitor {
 
   long num_steps_;
   double time_step_;
+  bool of_joints_;
   bool has_heading_;
   long steps_ = 0;                         // that were completed
   Vector3d direction_ = Vector3d::Zero();  // of the start error
-  double position_error_ = 0.0;            // m, of the last step
+  double error_ = 0.0;                     // of the last step
   double start_error_ = 0.0;               // m, or rad when the object is only turned
   bool by_position_ = true;
   double settled_since_ = 0.0;  // s

@@ -46,6 +46,8 @@ enum Metric {
   kFingertipSlip,
   kWheelSlip,
   kSimulatedTime,
+  kJointErrorRms,
+  kJointErrorMax,
   kNumMetrics
 };
 
@@ -71,6 +73,9 @@ inline constexpr std::array<MetricInfo, kNumMetrics> kMetrics = {{
     {"fingertip_slip", "m", "how far a fingertip slid"},
     {"wheel_slip", "m", "how far a wheel slid"},
     {"simulated_time", "s", "how far the run came"},
+    {"joint_error_rms", "rad",
+     "of a motion of joints: at each step the joint that is farthest from its place"},
+    {"joint_error_max", "rad", "the largest"},
 }};
 
 /// Outcome and metrics; NaN where a metric does not exist.

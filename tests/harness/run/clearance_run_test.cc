@@ -83,6 +83,10 @@ TEST(ClearanceOfARun, APalmInTheTableIsFound) {
   EXPECT_THAT(run.result().attribution.evidence, HasSubstr("bench"));
   EXPECT_THAT(run.result().attribution.evidence, HasSubstr("t = 0 s"));
   EXPECT_NEAR(run.checks().Find("clearance").worst, 0.005, 1e-4);
+  // Before the run, too.
+  const std::span<const CheckRecord> settling = run.checks().settling_failures();
+  EXPECT_TRUE(std::any_of(settling.begin(), settling.end(),
+                          [](const CheckRecord& check) { return check.name == "clearance"; }));
   // It passes through, and pushes nothing.
   EXPECT_FALSE(run.checks().Find("collision").applies);
   EXPECT_FALSE(run.checks().Find("balance_robot").failed);

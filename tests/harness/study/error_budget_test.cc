@@ -36,6 +36,68 @@ TEST(ErrorBudget, PartsThatDoNotInteractAddUpAndArePredicted) {
   EXPECT_NEAR(budget.sum.rms, budget.all.rms, 0.1 * budget.all.rms);
 }
 
+// Also of an arm that holds nothing, whatever its law: by computed torque, and by springs.
+TEST(ErrorBudget, PartsOfAMotionOfJointsAddUpAndArePredicted) {
+  for (const std::string law : {"computed_torque", "feedforward_pd"}) {
+    SCOPED_TRACE(law);
+    const Scenario scenario = ReadShippedScenario(
+        "panda-reach",
+        {"duration=0.8", "settle=0.2", "control.law='" + law + "'", "mismatch.mass={ panda_link4 = 1.02 }",
+         "actuation.gain_error={ panda_joint2 = 2e-3 }", "sensing.latency=0.001",
+         "disturbance=[{ type = 'step', body = 'panda_link5', force = [0, 2, 0], begin = 0.2 }]"});
+    const ErrorBudget budget =
+        CalcErrorBudget(scenario, SourcePath("/controller/parameters/panda.toml"),
+                        SourcePath("/mjcf/panda_scene.xml"), [](long, long) { return true; });
+    EXPECT_TRUE(budget.is_complete()) << budget.failure;
+    EXPECT_TRUE(budget.of_joints);
+    EXPECT_EQ(budget.unit, "rad");
+    ASSERT_EQ(budget.entries.size(), 4U);
+    for (const BudgetEntry& entry : budget.entries) {
+      SCOPED_TRACE(entry.name);
+      EXPECT_GT(entry.alone.rms, 1e-7);
+      EXPECT_FALSE(entry.interacts()) << entry.interaction;
+      EXPECT_NEAR(entry.predicted.rms, entry.alone.rms, 0.1 * entry.alone.rms);
+    }
+    EXPECT_NEAR(budget.sum.rms, budget.all.rms, 0.1 * budget.all.rms);
+    EXPECT_EQ(ToJson(budget).at("unit"), "rad");
+    EXPECT_EQ(ToJson(budget).at("all").at("rms"), budget.all.rms);
+  }
+}
+
+// A run begins with no lasting error of what noise its first step has.
+TEST(ErrorBudget, NoiseIsPredictedToItsSize) {
+  constexpr double kFewPeriods = 0.3;  // what the rms of a second of filtered noise is known to
+  const Scenario scenario =
+      ReadShippedScenario("panda-reach", {"duration=1", "settle=0.2", "sensing.joint_noise=1e-5"});
+  const ErrorBudget budget =
+      CalcErrorBudget(scenario, SourcePath("/controller/parameters/panda.toml"),
+                      SourcePath("/mjcf/panda_scene.xml"), [](long, long) { return true; });
+  ASSERT_EQ(budget.entries.size(), 1U);
+  const BudgetEntry& entry = budget.entries[0];
+  EXPECT_GT(entry.alone.rms, 10.0 * budget.ideal.rms);
+  EXPECT_NEAR(entry.predicted.rms, entry.alone.rms, kFewPeriods * entry.alone.rms);
+}
+
+// At rest, motors that give 1 + g of what they are sent bear what weighs 1 + m of what is known with an error
+// of (1 + m) / (1 + g) - 1 of the weight: that is more than m and 1 / (1 + g) - 1 by their product.
+TEST(ErrorBudget, SourcesThatInteractAreMarked) {
+  constexpr double kMass = 0.5, kGain = -0.3;
+  const Scenario scenario = ReadShippedScenario(
+      "panda-reach", {"duration=0.5", "settle=0.5", "actuation.gain_error=-0.3", "mismatch.mass=1.5"});
+  const ErrorBudget budget =
+      CalcErrorBudget(scenario, SourcePath("/controller/parameters/panda.toml"),
+                      SourcePath("/mjcf/panda_scene.xml"), [](long, long) { return true; });
+  EXPECT_TRUE(budget.is_complete()) << budget.failure;
+  const double of_gain = 1.0 / (1.0 + kGain) - 1.0;
+  const double expected = kMass * of_gain / ((1.0 + kMass) / (1.0 + kGain) - 1.0);
+  ASSERT_EQ(budget.entries.size(), 2U);
+  for (const BudgetEntry& entry : budget.entries) {
+    EXPECT_TRUE(entry.interacts()) << entry.name << " " << entry.interaction;
+    EXPECT_NEAR(entry.interaction, expected, 0.2 * expected) << entry.name;
+  }
+  EXPECT_GT(budget.all.rms, 1.1 * budget.sum.rms);
+}
+
 TEST(ErrorBudget, EverySourceOfAScenarioIsListedAndDropped) {
   const Scenario scenario = ReadShippedScenario(
       "curve",
@@ -64,6 +126,12 @@ TEST(ErrorBudget, EverySourceOfAScenarioIsListedAndDropped) {
 
 TEST(ErrorBudget, IdealPlantsAndTasksAreRefused) {
   EXPECT_TRUE(Throws<InputError>([] { return Calc({"duration=0.1"}); }, "asks for nothing of [sensing]"));
+  EXPECT_TRUE(Throws<InputError>(
+      [] {
+        return CalcErrorBudget(ReadShippedScenario("lift", {"mismatch.mass=1.01"}), kRobot, kScene,
+                               [](long, long) { return true; });
+      },
+      "task: a budget needs a trajectory"));
 }
 
 }  // namespace

@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <string>
+#include <utility>
 
 #include "controller/common/toml_reader.h"
 #include "harness/study/study_answer.h"
@@ -19,6 +21,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
+const std::string kTheory = "The sampled error dynamics";
 const std::string kMarkup = "<img src=x onerror=\"alert(1)\">";
 
 class StudyReportTest : public ::testing::Test {
@@ -31,7 +34,8 @@ class StudyReportTest : public ::testing::Test {
   }
 
   /// The page of a database with one text in all columns, the study itself and its scenario excepted.
-  std::string Report(const std::string& text) {
+  /// @param of_joints its trials have errors of joints, and none of an object.
+  std::string Report(const std::string& text, bool of_joints = false) {
     StudyIdentity identity;
     for (const char* column : {"layout", "name", "study", "scenario", "robot", "mjcf_hash",
                                "dexcheck_version", "git_revision", "mujoco_version"}) {
@@ -49,6 +53,8 @@ class StudyReportTest : public ::testing::Test {
       // All that tracked are on the front: the less error, the more work.
       row.result.metrics[kPositionErrorRms] = 1.0 + static_cast<double>(trial.number);
       row.result.metrics[kEnergy] = 1.0 / row.result.metrics[kPositionErrorRms];
+      row.result.metrics[kJointErrorRms] = std::numeric_limits<double>::quiet_NaN();
+      if (of_joints) std::swap(row.result.metrics[kPositionErrorRms], row.result.metrics[kJointErrorRms]);
       if (trial.number % 2 == 1) row.result.failure = text;
       rows.push_back(row);
     }
@@ -74,6 +80,8 @@ TEST_F(StudyReportTest, NoTextBecomesMarkup) {
 
 TEST_F(StudyReportTest, LinksToThePartsThatItHas) {
   const std::string page = Report("why");
+  EXPECT_THAT(page, HasSubstr(kTheory));
+  EXPECT_THAT(page, HasSubstr("By rms position error"));
   const std::string links = page.substr(page.find("<nav>"), page.find("</nav>") - page.find("<nav>"));
   const std::string kLink = "href=\"#";
   int count = 0;
@@ -85,6 +93,15 @@ TEST_F(StudyReportTest, LinksToThePartsThatItHas) {
   EXPECT_GE(count, 4);
   EXPECT_THAT(links, HasSubstr("#maps"));
   EXPECT_THAT(links, Not(HasSubstr("#margins"))) << "a study of a grid has none";
+}
+
+// Theory is that of an object, which an arm that holds nothing has not.
+TEST_F(StudyReportTest, OfJointsHasTheirErrorAndNoTheoryOfAnObject) {
+  const std::string page = Report("why", /*of_joints=*/true);
+  EXPECT_THAT(page, Not(HasSubstr(kTheory)));
+  EXPECT_THAT(page, HasSubstr("1 rad<"));
+  EXPECT_THAT(page, HasSubstr("least rms joint error"));
+  EXPECT_THAT(page, HasSubstr("By rms joint error"));
 }
 
 TEST(StudyAnswer, TellsTheSpreadOfWhatHasNoOrder) {

@@ -208,6 +208,23 @@ TEST_F(StudyStoreTest, DatabasesThatDoNotTellTheMachineAreReadAndContinued) {
   EXPECT_TRUE(Throws<InputError>([&] { return StudyStore::Open(path); }, "another version of dexcheck"));
 }
 
+TEST_F(StudyStoreTest, DatabasesWithoutTheNewestMetricsAreReadAndContinued) {
+  const std::filesystem::path path = folder_.path() / "s.sqlite";
+  Open().Add(MakeRow(0));
+  {
+    Database database(path, Database::Mode::kExisting);
+    for (const char* name : {"joint_error_rms", "joint_error_max"}) {
+      database.Execute(std::string("ALTER TABLE trials DROP COLUMN ") + name);
+    }
+  }
+  Open().Add(MakeRow(1));
+  const std::vector<TrialRow> rows = StudyStore::Open(path).ReadRows();
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_TRUE(std::isnan(rows[0].result.metrics[kJointErrorRms]));
+  EXPECT_EQ(rows[0].result.metrics[kSimulatedTime], MakeRow(0).result.metrics[kSimulatedTime]);
+  EXPECT_EQ(rows[1].result.metrics[kJointErrorRms], MakeRow(1).result.metrics[kJointErrorRms]);
+}
+
 // Rows in what SQLite keeps in memory, or in a temporary file, are gone with the process.
 TEST_F(StudyStoreTest, OnlyPlainFilesAreDatabases) {
   std::filesystem::create_directory(folder_.path() / "folder");
