@@ -158,12 +158,29 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(ImperfectPlant, ZeroSettingsGiveTheSameBits) {
   ShippedRun without("curve", kShort);
-  ShippedRun with("curve",
-                  With(kShort, {"sensing.joint_counts=0", "sensing.joint_noise=0", "sensing.latency=0",
-                                "sensing.object_rate=0", "sensing.velocity_cutoff=30", "actuation.delay=0",
-                                "actuation.lag={ rf = 0 }", "actuation.coulomb=0", "actuation.torque_step=0",
-                                "mismatch.mass=1", "mismatch.mass_within=0",
-                                "mismatch.com={ r_forearm = [0, 0, 0] }", "disturbance=[]"}));
+  ShippedRun with("curve", With(kShort, {"sensing.joint_counts=0",
+                                         "sensing.joint_noise=0",
+                                         "sensing.latency=0",
+                                         "sensing.object_rate=0",
+                                         "sensing.velocity_cutoff=30",
+                                         "sensing.velocity_noise=0",
+                                         "sensing.object_position_noise=0",
+                                         "sensing.object_orientation_noise=0",
+                                         "sensing.object_latency=0",
+                                         "sensing.contact_force_noise=0",
+                                         "sensing.odometry=false",
+                                         "actuation.delay=0",
+                                         "actuation.gain_error=0",
+                                         "actuation.backlash=0",
+                                         "actuation.stribeck=0",
+                                         "mismatch.damping=1",
+                                         "actuation.lag={ rf = 0 }",
+                                         "actuation.coulomb=0",
+                                         "actuation.torque_step=0",
+                                         "mismatch.mass=1",
+                                         "mismatch.mass_within=0",
+                                         "mismatch.com={ r_forearm = [0, 0, 0] }",
+                                         "disturbance=[]"}));
   EXPECT_EQ(without.Run().verdict, Verdict::kPass);
   EXPECT_EQ(with.Run().verdict, Verdict::kPass);
   EXPECT_EQ(with.step().reading.qpos, without.step().reading.qpos);
