@@ -35,8 +35,8 @@ class ComparisonPage {
     AddHeader();
     html_ += "<main>\n";
     AddInputs();
-    AddNumbers("Results", "results", comparison_.results);
-    AddNumbers("Checks", "checks", comparison_.checks);
+    AddResults();
+    AddChecks();
     AddSignals();
     const std::vector<Figure> figures = MakeFigures();
     html_ += MakePlotSection(figures);
@@ -70,7 +70,7 @@ class ComparisonPage {
   }
 
   void AddInputs() {
-    html_ += "<h2 id=\"inputs\">Inputs that differ</h2>\n<div class=\"card\">\n";
+    html_ += "<h2 id=\"inputs\">Inputs that differ</h2>\n<div class=\"card scroll\">\n";
     if (comparison_.inputs.empty()) {
       html_ +=
           "<p>None: scenario, overrides, parameters, MJCF, versions and machine are the same.</p></div>\n";
@@ -87,9 +87,37 @@ class ComparisonPage {
     html_ += "</tbody></table></div>\n";
   }
 
-  void AddNumbers(const char* title, const char* id, const std::vector<ComparedNumber>& numbers) {
-    if (numbers.empty()) return;
-    Add("<h2 id=\"{}\">{}</h2>\n<div class=\"card\">\n<table><thead><tr><th></th>", id, title);
+  void AddResults() {
+    if (comparison_.results.empty()) return;
+    html_ += "<h2 id=\"results\">Results</h2>\n<div class=\"card scroll\">\n";
+    AddNumbers(comparison_.results);
+    html_ += "</div>\n";
+  }
+
+  /// Those that fail first; constants that agree exactly in all runs are folded.
+  void AddChecks() {
+    std::vector<ComparedNumber> failing, others, zeros;
+    for (const ComparedNumber& check : comparison_.checks) {
+      const auto is_zero = [](const std::optional<double>& value) { return value == 0.0; };
+      const bool fails = std::find(check.fails.begin(), check.fails.end(), true) != check.fails.end();
+      const bool all_zero = std::all_of(check.values.begin(), check.values.end(), is_zero);
+      (fails ? failing : all_zero ? zeros : others).push_back(check);
+    }
+    failing.insert(failing.end(), others.begin(), others.end());
+    if (failing.empty() && zeros.empty()) return;
+    html_ += "<h2 id=\"checks\">Checks</h2>\n<div class=\"card scroll\">\n";
+    if (!failing.empty()) AddNumbers(failing);
+    if (!zeros.empty()) {
+      Add("<details><summary>{} check{} 0 in all runs</summary>\n", zeros.size(),
+          zeros.size() == 1 ? " is" : "s are");
+      AddNumbers(zeros);
+      html_ += "</details>\n";
+    }
+    html_ += "</div>\n";
+  }
+
+  void AddNumbers(const std::vector<ComparedNumber>& numbers) {
+    html_ += "<table><thead><tr><th></th>";
     for (size_t i = 0; i < runs_.size(); ++i) Add("<th class=\"value\">{}</th>", Letter(i));
     for (size_t i = 1; i < runs_.size(); ++i) Add("<th class=\"value\">{} / A</th>", Letter(i));
     html_ += "</tr></thead><tbody>\n";
@@ -109,12 +137,13 @@ class ComparisonPage {
       }
       html_ += "</tr>\n";
     }
-    html_ += "</tbody></table></div>\n";
+    html_ += "</tbody></table>\n";
   }
 
   void AddSignals() {
     html_ +=
-        "<h2 id=\"signals\">Signals</h2>\n<div class=\"card\">\n<table><thead><tr><th>signal</th><th></th>"
+        "<h2 id=\"signals\">Signals</h2>\n<div class=\"card "
+        "scroll\">\n<table><thead><tr><th>signal</th><th></th>"
         "<th class=\"value\">largest difference</th><th class=\"value\">of its size</th>"
         "<th class=\"value\">at</th></tr></thead><tbody>\n";
     for (const SignalDifference& signal : comparison_.signals) {

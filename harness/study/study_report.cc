@@ -31,7 +31,6 @@ figure svg { filter: none; font: 12px sans-serif; color: var(--ink); fill: curre
 svg .title { font-weight: 600; font-size: 14px; } svg .tick { font-size: 11px; fill: var(--soft); }
 svg .mark { stroke: var(--soft); } svg .frame { fill: none; stroke: var(--line); } svg .edge { stroke: #000; stroke-width: 3; }
 svg a:hover > *, svg a:focus > * { stroke: var(--accent); stroke-width: 2.5; }
-.scroll { overflow-x: auto; }
 svg .dot { stroke: #333; stroke-width: .5; }
 .grid > figure { max-width: 640px; }
 .key { display: inline-block; width: 1em; height: 1em; vertical-align: -2px; border-radius: 3px; }

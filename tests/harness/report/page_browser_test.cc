@@ -4,8 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <string>
 
+#include "harness/report/comparison_page.h"
+#include "harness/report/run_comparison.h"
+#include "harness/report/run_data.h"
 #include "harness/report/write_report.h"
 #include "renders/video_writer.h"
 #include "tests/common/browser.h"
@@ -167,6 +172,25 @@ TEST_F(PageBrowserTest, NoTileIsNarrowerThanItsWords) {
               nlohmann::json::array())
         << width;
   }
+}
+
+// What a table has beyond its card can be scrolled to.
+TEST_F(PageBrowserTest, AComparisonsTablesStayInTheirCards) {
+  const RunData run(folder_.path());
+  const std::filesystem::path file = folder_.path() / "comparison.html";
+  std::ofstream(file) << MakeComparisonPage({&run, &run}, {"one", "another"}, CompareRuns({&run, &run}, {}));
+  browser_.Open(file);
+  for (const int width : {360, 800, 1300}) {
+    browser_.SetViewport(width, 900, false);
+    ASSERT_GE(browser_.Run("return document.querySelectorAll('.card table').length;"), 2);
+    EXPECT_EQ(browser_.Run("return [...document.querySelectorAll('.card')]"
+                           "  .filter(c => c.scrollWidth > c.clientWidth && "
+                           "getComputedStyle(c).overflowX !== 'auto').map(c => c.innerText.slice(0, 40));"),
+              nlohmann::json::array())
+        << width;
+  }
+  EXPECT_GE(browser_.Run("return document.querySelectorAll('#checks + .card details tr').length;"), 2)
+      << "constants that agree are folded";
 }
 
 TEST_F(PageBrowserTest, PlaysTheVideo) {
