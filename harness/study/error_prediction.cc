@@ -6,7 +6,10 @@ namespace dexcheck {
 namespace {
 
 GraspModelOptions MakeModelOptions(const Setup& setup) {
-  if (setup.joint_motion() == nullptr) return setup.MakeControllerOptions();
+  if (setup.joint_motion() == nullptr) {
+    const GraspControllerOptions controller = setup.MakeControllerOptions();
+    return static_cast<const GraspModelOptions&>(controller);
+  }
   GraspModelOptions options;
   options.orientation = OrientationFeedback::kRotation;
   return options;
