@@ -50,7 +50,7 @@ class StudySearch : public StudyCommand {
 TEST_F(StudySearch, GivesTheSameRowsKilledOrSharedOrAlone) {
   const auto begun = std::chrono::steady_clock::now();
   const ProgramResult whole = RunDexcheck(RunArguments("whole.sqlite", {"--jobs", "1"}));
-  const auto time = std::chrono::steady_clock::now() - begun;
+  std::chrono::duration<double> time = std::chrono::steady_clock::now() - begun;
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
   EXPECT_THAT(whole.out, HasSubstr("tiny: 48 of at most 48 trials"));
   EXPECT_THAT(whole.out, HasSubstr("The least position_error_rms, worst of its trials of 24 points is "));
@@ -70,6 +70,7 @@ TEST_F(StudySearch, GivesTheSameRowsKilledOrSharedOrAlone) {
   std::uniform_real_distribution<double> share(0.1, 0.8);
   long midway = 0;
   long searches = 1;
+  long made_before = 0;  // kills of earlier searches
   for (long made = 0; made < kills;) {
     {
       const Program killed(DexcheckCommand(RunArguments("killed.sqlite", {"--jobs", "2"})), {});
@@ -85,6 +86,9 @@ TEST_F(StudySearch, GivesTheSameRowsKilledOrSharedOrAlone) {
     for (const char* const part : {"", "-journal", "-wal", "-shm"})
       std::filesystem::remove(Path(std::string("killed.sqlite") + part));
     ++searches;
+    // On a machine that was busy and is so no longer each would come to its end.
+    if (made == made_before) time *= 0.8;
+    made_before = made;
   }
   EXPECT_GT(midway, 0) << "it was killed too early to matter";
   std::printf("%ld kills, %ld of them midway, in %ld searches\n", kills, midway, searches);
