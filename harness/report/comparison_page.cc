@@ -142,8 +142,8 @@ class ComparisonPage {
 
   void AddSignals() {
     html_ +=
-        "<h2 id=\"signals\">Signals</h2>\n<div class=\"card "
-        "scroll\">\n<table><thead><tr><th>signal</th><th></th>"
+        "<h2 id=\"signals\">Signals</h2>\n<div class=\"card scroll\">\n"
+        "<table><thead><tr><th>signal</th><th></th>"
         "<th class=\"value\">largest difference</th><th class=\"value\">of its size</th>"
         "<th class=\"value\">at</th></tr></thead><tbody>\n";
     for (const SignalDifference& signal : comparison_.signals) {

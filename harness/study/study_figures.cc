@@ -192,7 +192,7 @@ std::vector<const TrialRow*> ListFront(const std::vector<const TrialRow*>& track
 }  // namespace
 
 StudyResults::StudyResults(const StudyStore& store)
-    : study(store.study()), rows(store.ReadRows(0, /*with_machine=*/false)) {
+    : study(store.study()), rows(store.ReadRows(0, /*with_machine=*/false)), error(FindErrorMetric(rows)) {
   inputs.study = study;
   inputs.scenario_text = store.Identify("scenario");
   inputs.scenario_source = study.scenario;
@@ -201,9 +201,7 @@ StudyResults::StudyResults(const StudyStore& store)
       if (kMetrics[i].name == name) metrics.push_back(static_cast<Metric>(i));
     }
   }
-  if (metrics.empty() && FindErrorMetric(rows) == kJointErrorRms)
-    metrics = {kJointErrorRms, kPeakEffort, kEnergy};
-  if (metrics.empty()) metrics = {kPositionErrorRms, kPeakEffort, kConeMargin};
+  if (metrics.empty()) metrics = {error, kPeakEffort, of_joints() ? kEnergy : kConeMargin};
   const size_t every = (rows.size() + kMostListed - 1) / kMostListed;
   for (size_t i = 0; i < rows.size(); i += std::max(every, size_t{1})) listed.push_back(&rows[i]);
   if (every <= 1) return;
@@ -223,10 +221,9 @@ std::vector<const TrialRow*> StudyResults::ListTracked() const {
     const bool shortened = IsShortened(study.search, row.trial.number / CountTrialsOfPoint(study));
     if (row.result.outcome == Outcome::kTracked && !shortened) tracked.push_back(&row);
   }
-  std::stable_sort(tracked.begin(), tracked.end(),
-                   [metric = FindErrorMetric(rows)](const TrialRow* a, const TrialRow* b) {
-                     return a->result.metrics[metric] < b->result.metrics[metric];
-                   });
+  std::stable_sort(tracked.begin(), tracked.end(), [this](const TrialRow* a, const TrialRow* b) {
+    return a->result.metrics[error] < b->result.metrics[error];
+  });
   return tracked;
 }
 
@@ -322,7 +319,7 @@ Html DrawLines(const StudyResults& results) {
 Html DrawErrorAgainstEffort(const StudyResults& results) {
   const std::vector<const TrialRow*> tracked = results.ListTracked();
   if (tracked.empty()) return {};
-  const Metric error = FindErrorMetric(results.rows);
+  const Metric error = results.error;
   Chart chart = MakeChart("error against effort", LabelOf(kEnergy), LabelOf(error));
   ChartLine line{"Pareto front", "#9b2226", {}};
   for (const TrialRow* row : ListFront(tracked)) {

@@ -19,10 +19,12 @@ struct StudyResults {
   Study study;
   StudyInputs inputs;  ///< As far as the database keeps them: for scenarios of trials.
   std::vector<TrialRow> rows;
-  std::vector<Metric> metrics;  ///< To be shown.
+  Metric error = kPositionErrorRms;  ///< That says how good the trials are, see FindErrorMetric.
+  std::vector<Metric> metrics;       ///< To be shown.
   /// Trials that the page has one by one: all of a small study, else an even part, the best and the front; by
   /// number.
   std::vector<const TrialRow*> listed;
+  [[nodiscard]] bool of_joints() const { return error == kJointErrorRms; }
   [[nodiscard]] bool lists_all() const { return listed.size() == rows.size(); }
 
   /// Trials that tracked, least rms error first.

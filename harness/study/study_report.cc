@@ -127,12 +127,10 @@ class Report {
                          FormatHtml("{} {}", objective.maximize ? "largest" : "least", Describe(objective)));
       }
     } else if (!tracked_.empty()) {
-      const Metric error = FindErrorMetric(results_.rows);
-      const bool of_joints = error == kJointErrorRms;
-      html += MakeTile(FormatShort(tracked_.front()->result.metrics[error]) + (of_joints ? " rad" : " m"),
-                       FormatHtml("least rms {} error, <a href=\"{}\">trial {}</a>",
-                                  std::string(of_joints ? "joint" : "position"), LinkTo(*tracked_.front()),
-                                  tracked_.front()->trial.number));
+      html += MakeTile(FormatShort(tracked_.front()->result.metrics[results_.error]) +
+                           (results_.of_joints() ? " rad" : " m"),
+                       FormatHtml("least rms {} error, <a href=\"{}\">trial {}</a>", NameOfError(),
+                                  LinkTo(*tracked_.front()), tracked_.front()->trial.number));
     }
     html += "</div>\n</header>\n";
     return html;
@@ -187,18 +185,16 @@ class Report {
     return html;
   }
 
+  [[nodiscard]] std::string NameOfError() const { return results_.of_joints() ? "joint" : "position"; }
+
   [[nodiscard]] static std::string ExplainDivergence(const TrialRow& row) {
     if (row.result.metrics[kErrorGrowth] > 1.0) return "the error grew";
-    if (std::isfinite(row.result.metrics[kJointErrorRms]) &&
-        !std::isfinite(row.result.metrics[kPositionErrorRms])) {
-      return fmt::format("the rms error is above {} rad", kLostTrackOfJoints);
-    }
     return fmt::format("the rms error is above {} m", kLostTrack);
   }
 
   /// Where theory is stable and the run was not held to its end, by reason. Theory is that of an object.
   [[nodiscard]] Html Departures() const {
-    if (FindErrorMetric(results_.rows) == kJointErrorRms) return {};
+    if (results_.of_joints()) return {};
     std::map<std::string, long> reasons;
     long agree = 0;
     long asked = 0;
@@ -287,12 +283,12 @@ class Report {
     Html html = FormatHtml(
         "<h2 id=\"best\">Best</h2>\n<p class=\"soft\">By rms {} error, of the trials that "
         "tracked.</p>\n<div class=\"card scroll\"><table>\n<tr><th class=\"value\">trial</th>",
-        std::string(FindErrorMetric(results_.rows) == kJointErrorRms ? "joint" : "position"));
+        NameOfError());
     const auto add_head = [&](const std::string& text) {
       html += FormatHtml("<th class=\"value\">{}</th>", text);
     };
     for (const Variation& variation : results_.study.variations) add_head(variation.key);
-    std::vector<Metric> shown = {FindErrorMetric(results_.rows), kEnergy};
+    std::vector<Metric> shown = {results_.error, kEnergy};
     for (const Metric metric : results_.metrics) {
       if (std::find(shown.begin(), shown.end(), metric) == shown.end()) shown.push_back(metric);
     }
