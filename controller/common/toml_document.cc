@@ -162,6 +162,10 @@ TomlDocument::TomlDocument(std::string_view text, std::string_view source)
   }
 }
 
+TomlDocument::TomlDocument(const TomlDocument& other)
+    : context_(std::make_unique<TomlContext>(*other.context_)),
+      root_(std::make_unique<toml::table>(*other.root_)) {}
+
 TomlTable TomlDocument::Open() const { return {*context_, TomlValue(*context_, *root_, ""), *root_}; }
 
 void TomlDocument::Override(std::string_view assignment) { Assign(assignment, root_.get()); }

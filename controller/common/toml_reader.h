@@ -187,6 +187,12 @@ class TomlDocument {
   /// @param source the file's name, for messages.
   /// @throws InputError for text that is not TOML, is too long, or is nested too deeply.
   TomlDocument(std::string_view text, std::string_view source);
+  /// A copy has the same values, but knows the lines of none.
+  TomlDocument(const TomlDocument& other);
+  TomlDocument& operator=(const TomlDocument&) = delete;
+  TomlDocument(TomlDocument&&) = default;
+  TomlDocument& operator=(TomlDocument&&) = default;
+  ~TomlDocument() = default;
 
   [[nodiscard]] TomlTable Open() const;
   /// What a function makes of the whole file. Whatever it throws, keys that are missing come first.

@@ -115,7 +115,11 @@ RobotModel ReadRobot(TomlTable& root, std::string_view source, TomlDocument& doc
 
 RobotModel ParseRobotModel(std::string_view text, std::string_view source,
                            std::span<const std::string> overrides, std::vector<WrittenRow>* rows) {
-  TomlDocument document(text, source);
+  return ParseRobotModel(TomlDocument(text, source), source, overrides, rows);
+}
+
+RobotModel ParseRobotModel(TomlDocument document, std::string_view source,
+                           std::span<const std::string> overrides, std::vector<WrittenRow>* rows) {
   for (const std::string& assignment : overrides) document.Override(assignment);
   return document.Read([&](TomlTable root) { return ReadRobot(root, source, document, rows); });
 }

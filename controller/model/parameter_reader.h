@@ -11,6 +11,8 @@
 
 namespace dexcheck {
 
+class TomlDocument;
+
 /// Reads a robot from a parameter file; controller/parameters/assistant_robot.toml shows every key.
 /// @throws InputError, one line that names file, line, key and value, for anything that is not a robot: also
 /// for unknown keys, so that a misspelt one is never ignored.
@@ -22,5 +24,9 @@ RobotModel ReadRobotModel(const std::filesystem::path& path, std::vector<Written
 RobotModel ParseRobotModel(std::string_view text, std::string_view source,
                            std::span<const std::string> overrides = {},
                            std::vector<WrittenRow>* rows = nullptr);
+
+/// The same for a text that is parsed already, which is half of the work.
+RobotModel ParseRobotModel(TomlDocument document, std::string_view source,
+                           std::span<const std::string> overrides, std::vector<WrittenRow>* rows = nullptr);
 
 }  // namespace dexcheck

@@ -11,6 +11,19 @@ namespace {
 
 constexpr double kLeastSpan = 0.02;  // m, rad
 
+/// Where the sine of beta is less than this, a rotation by 1e-4 rad can turn alpha and gamma by 1e-2 rad and
+/// more.
+constexpr double kSingularSine = 0.01;
+
+/// What a reader of ZYZ angles has to know; nothing while beta keeps away from 0 and pi.
+/// @param beta the second ZYZ angle at each row, rad.
+std::string NoteOnAngles(const VectorXd& beta) {
+  if (beta.size() == 0 || beta.array().sin().abs().minCoeff() >= kSingularSine) return "";
+  return "Where β is near 0 or π, only the sum or the difference of α and γ is an orientation: either may "
+         "jump while "
+         "the object is at rest.";
+}
+
 class MotionFigures {
  public:
   explicit MotionFigures(const RunData& run) : run_(run) {}
@@ -63,6 +76,7 @@ class MotionFigures {
     for (int k = 1; k < 6; ++k) {
       b.curves.push_back({std::string(names[k]) + " desired", X_d.col(k), k - 1, 0, k >= 3, true, true});
     }
+    b.note = NoteOnAngles(X_o.col(4));
     Add(b);
   }
 

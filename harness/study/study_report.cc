@@ -37,7 +37,7 @@ svg .dot { stroke: #333; stroke-width: .5; }
 .dot { border-radius: 50%; width: .6em; height: .6em; vertical-align: 0; border: 1px solid var(--soft); }
 .rule { height: 4px; vertical-align: 3px; background: #000; border-radius: 0; outline: 1px solid var(--line); }
 .counts { width: auto; }
-.effects th.wide { width: 30%; min-width: 6rem; } .effects td { overflow-wrap: anywhere; min-width: 4.5rem; }
+.effects th.wide { width: 30%; min-width: 6rem; } .effects td { min-width: 4.5rem; } .effects td:first-child { white-space: nowrap; }
 .track { position: relative; height: 1em; background: color-mix(in srgb, var(--line) 45%, transparent); border-radius: 3px; }
 .track i { position: absolute; top: 0; height: 100%; }
 .track .fill { background: var(--accent); border-radius: 3px; opacity: .75; }
@@ -228,20 +228,18 @@ class Report {
   }
 
   /// What is drawn over the maps.
-  [[nodiscard]] static Html ExplainMaps(const Html& figure) {
+  [[nodiscard]] Html ExplainMaps(const Html& figure) const {
     Html text(
         "<span class=\"key rule\"></span> Measured boundary between runs that were held to their end and "
-        "others; in "
-        "the map of overshoot, between less and more than 1 %. ");
-    text += figure.markup().find("class=\"dot\"") == std::string::npos
-                ? Html("The theoretical boundary of stability does not run through this range. ")
-                : Html(
-                      "Dots are theory: <span class=\"key dot\" style=\"background:#0b3c8c\"></span> the "
-                      "boundary of "
-                      "stability, <span class=\"key dot\" style=\"background:#fff\"></span> critical "
-                      "damping; in the "
-                      "map "
-                      "of overshoot, 1 %. ");
+        "others; in the map of overshoot, between less and more than 1 %. ");
+    if (figure.markup().find("class=\"dot\"") != std::string::npos) {
+      text += Html(
+          "Dots are theory: <span class=\"key dot\" style=\"background:#0b3c8c\"></span> the boundary of "
+          "stability, <span class=\"key dot\" style=\"background:#fff\"></span> critical damping; in the map "
+          "of overshoot, 1 %. ");
+    } else if (!results_.of_joints()) {
+      text += "The theoretical boundary of stability does not run through this range. ";
+    }
     text += "Of several trials in one cell the worst is shown; grey: no value. ";
     return text;
   }
@@ -253,8 +251,7 @@ class Report {
     const bool is_grid = study.sample.method == SamplingMethod::kGrid && !study.is_search();
     return FormatHtml(
         "<h2 id=\"maps\">Over {} and {}</h2>\n<p class=\"soft\">{}Each {} leads to its trial and the command "
-        "that "
-        "repeats it.</p>\n<div class=\"grid\">\n{}{}</div>\n",
+        "that repeats it.</p>\n<div class=\"grid\">\n{}{}</div>\n",
         study.variations[0].key, study.variations[1].key, is_grid ? ExplainMaps(outcomes) : Html(),
         is_grid ? "cell" : "point", outcomes, DrawMetrics(results_));
   }

@@ -6,6 +6,8 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/common/toml_reader.h"
+#include "controller/model/parameter_reader.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/remove_looks.h"
 #include "harness/run/runner.h"
@@ -32,10 +34,20 @@ MjModelPtr MakeEngine(const StudyInputs& inputs) {
   return copy;
 }
 
+/// What is wrong with the robot is told from its text, which has lines.
+RobotModel MakeModel(const StudyInputs& inputs, const Scenario& scenario) {
+  if (inputs.model && scenario.model_overrides == inputs.model_overrides) return *inputs.model;
+  const std::string source = inputs.robot.string();
+  try {
+    if (inputs.model_document)
+      return ParseRobotModel(*inputs.model_document, source, scenario.model_overrides);
+  } catch (const InputError&) {
+  }
+  return ParseRobotModel(ReadTextFile(source), source, scenario.model_overrides);
+}
+
 Setup MakeSetup(const StudyInputs& inputs, const Scenario& scenario) {
-  if (!inputs.model || scenario.model_overrides != inputs.model_overrides)
-    return Setup(scenario, inputs.robot, inputs.mjcf, MakeEngine(inputs));
-  return Setup(scenario, *inputs.model, inputs.mjcf, MakeEngine(inputs));
+  return Setup(scenario, MakeModel(inputs, scenario), inputs.mjcf, MakeEngine(inputs));
 }
 
 bool HasDiverged(const Setup& setup, const TrialResult& result) {
@@ -116,6 +128,8 @@ void CheckTrials(StudyInputs* inputs) {
   const Setup setup = MakeSetup(*inputs, first);
   inputs->model = std::make_shared<const RobotModel>(setup.model());
   inputs->model_overrides = first.model_overrides;
+  const std::string robot = inputs->robot.string();
+  inputs->model_document = std::make_shared<const TomlDocument>(ReadTextFile(robot), robot);
   const Runner runner(setup, study.check);  // sensors and motors know more names than the setup
   const std::vector<double> parameters = trial.parameters;
   for (size_t i = 0; i < study.variations.size(); ++i) {

@@ -13,6 +13,8 @@
 
 namespace dexcheck {
 
+class TomlDocument;
+
 /// A study with the files that its trials take.
 struct StudyInputs {
   Study study;
@@ -25,6 +27,8 @@ struct StudyInputs {
   /// The parameter file read with these overrides, for the trials that have no others; likewise.
   std::shared_ptr<const RobotModel> model;
   std::vector<std::string> model_overrides;
+  std::shared_ptr<const TomlDocument>
+      model_document;  ///< The parameter file parsed, for the others; likewise.
 };
 
 /// A run without a start error diverged when its error is above this, rms, m; of joints rad.

@@ -193,15 +193,23 @@ TEST(TorusCollision, ShippedMeshesShowTheSurface) {
   }
 }
 
-/// Every ball of the ring against the box, far more of them than the contacts.
+/// Every ball of the ring against the box, far more of them than the contacts. In plain numbers, since there
+/// are millions.
 double MeasureGap(const Pose& X_BT, const Vector3d& half_size) {
   double gap = 1.0;
   for (int i = 0; i < 7200; ++i) {
     const double u = 2.0 * kPi * i / 7200;
-    const Vector3d p = X_BT * Vector3d(kRing * std::cos(u), kRing * std::sin(u), 0.0);
-    const Vector3d beyond = (p.cwiseAbs() - half_size).cwiseMax(0.0);
-    const double inside = std::min(0.0, (p.cwiseAbs() - half_size).maxCoeff());
-    gap = std::min(gap, beyond.norm() + inside - kTube);
+    const double x = kRing * std::cos(u);
+    const double y = kRing * std::sin(u);
+    double beyond = 0.0;
+    double inside = -1.0;
+    for (int k = 0; k < 3; ++k) {
+      const double* const row = X_BT.data() + k;  // of a matrix stored by columns of four
+      const double past = std::abs(row[0] * x + row[4] * y + row[12]) - half_size.data()[k];
+      if (past > 0.0) beyond += past * past;
+      if (past > inside) inside = past;
+    }
+    gap = std::min(gap, std::sqrt(beyond) + std::min(0.0, inside) - kTube);
   }
   return gap;
 }
