@@ -236,7 +236,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
           .TypeName("LIBRARY.so|COMMAND");
   command
       .AddOption("--controller-time-limit", &request->controller_time_limit,
-                 "For each answer of the command, s (1 by default), and ten times that for its start")
+                 "For each answer of the controller, s (1 by default), and ten times that for its start")
       .TypeName("SECONDS")
       .Check(PositiveNumber())
       .Needs(controller);

@@ -4,12 +4,16 @@
 
 #include <exception>
 #include <filesystem>
+#include <utility>
 
 #include "controller/common/text.h"
 #include "harness/plant/plant.h"
 
 namespace dexcheck {
 namespace {
+
+/// Making a controller and its first look at the robot may take this many times the limit of a step.
+constexpr int kPatience = 10;
 
 template <typename Function>
 Function* FindFunction(void* handle, const char* name) {
@@ -21,7 +25,7 @@ Function* FindFunction(void* handle, const char* name) {
 void LibraryController::CloseLibrary::operator()(void* handle) const { dlclose(handle); }
 
 LibraryController::LibraryController(const std::string& library, const OwnControllerSetup& setup)
-    : name_("controller " + library), setup_(setup) {
+    : name_("controller " + library), setup_(setup), foreign_code_(setup.time_limit) {
   // A bare name would be searched for among the system's libraries.
   const std::string path = std::filesystem::absolute(library).string();
   handle_.reset(dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL));
@@ -46,21 +50,30 @@ LibraryController::LibraryController(const std::string& library, const OwnContro
                                   setup_.options,
                                   setup_.sampling,
                                   moves_joints ? &setup_.joint_gains : nullptr};
-  Guard([&] { controller_.reset(make(&context)); });
+  Guard([&] { controller_.reset(make(&context)); }, kPatience);
   if (controller_ == nullptr) throw RunFailure(name_ + ": made no controller");
 }
 
-LibraryController::~LibraryController() = default;
+LibraryController::~LibraryController() {
+  if (!is_broken_) return;
+  // It stays in memory as it is.
+  static std::pair<void*, Controller*> abandoned;
+  abandoned = {handle_.release(), controller_.release()};
+}
 
 template <typename Work>
-void LibraryController::Guard(const Work& work) const {
+void LibraryController::Guard(const Work& work, int patience) {
+  std::string trouble;
   try {
-    work();
+    trouble = foreign_code_.Call(work, patience);
   } catch (const std::exception& error) {
     throw RunFailure(name_ + ": " + error.what());
   } catch (...) {
     throw RunFailure(name_ + ": threw something that is no std::exception");
   }
+  if (trouble.empty()) return;
+  is_broken_ = true;
+  throw RunFailure(name_ + ": " + trouble);
 }
 
 void LibraryController::Follow(const Trajectory& motion) {
@@ -69,7 +82,7 @@ void LibraryController::Follow(const Trajectory& motion) {
 
 void LibraryController::Begin(double t, const Reading& reading) {
   if (joints_) joints_->Begin();
-  Guard([&] { controller_->Begin(t, reading); });
+  Guard([&] { controller_->Begin(t, reading); }, kPatience);
 }
 
 void LibraryController::Step(const Reading& reading, double t, Command* command) {

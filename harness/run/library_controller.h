@@ -8,12 +8,13 @@
 
 #include "controller/control/controller.h"
 #include "controller/control/joint_controller.h"
+#include "harness/run/foreign_code.h"
 #include "harness/run/own_controller.h"
 
 namespace dexcheck {
 
 /// Loads a library (controller/control/controller_library.h). What it throws ends the run, with its words; a
-/// torque of the wrong size likewise.
+/// crash, a call that does not return in time and a torque of the wrong size likewise.
 class LibraryController final : public Controller {
  public:
   /// @throws InputError when the library cannot be loaded, names no controller or was built for another
@@ -28,8 +29,9 @@ class LibraryController final : public Controller {
   [[nodiscard]] const GraspModel& model() const override { return controller_->model(); }
 
  private:
+  /// @param patience how many times the time limit the work may take.
   template <typename Work>
-  void Guard(const Work& work) const;
+  void Guard(const Work& work, int patience = 1);
 
   struct CloseLibrary {
     void operator()(void* handle) const;
@@ -38,6 +40,8 @@ class LibraryController final : public Controller {
   std::string name_;
   OwnControllerSetup setup_;
   std::optional<JointDemand> joints_;
+  ForeignCode foreign_code_;
+  bool is_broken_ = false;                      // a call ended in its middle
   std::unique_ptr<void, CloseLibrary> handle_;  // outlives the controller
   std::unique_ptr<Controller> controller_;
 };

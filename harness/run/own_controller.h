@@ -23,7 +23,7 @@ struct OwnControllerSetup {
   JointGains joint_gains;                     ///< and its law's gains.
   std::string robot_text;                     ///< The parameter file.
   std::string scenario_text;                  ///< The scenario.
-  double time_limit = 1.0;                    ///< For each answer of a program, s; ten times that to start.
+  double time_limit = 1.0;                    ///< For each answer, s; ten times that to start.
 };
 
 /// @param what a shared library (a name that ends in .so), or else a command for the shell.

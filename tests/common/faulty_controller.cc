@@ -1,16 +1,23 @@
-// A controller's library with a fault that the environment chooses: FAULT is throw, throw_number, nan, size
-// or none.
+// A controller's library with a fault that the environment chooses: FAULT is throw, throw_number, nan, size,
+// crash, abort, overflow, hang or none.
 
 #include <cstdlib>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 #include "controller/control/controller_library.h"
 
 namespace {
 
 using namespace dexcheck;  // NOLINT: it stands for a user's code
+
+/// Calls itself until the stack is full.
+int Overflow(int depth) {
+  volatile char room[4096] = {};
+  return depth < 0 ? room[1] : Overflow(depth + 1) + room[0];
+}
 
 class FaultyController final : public Controller {
  public:
@@ -31,9 +38,17 @@ class FaultyController final : public Controller {
     if (fault_ == "throw_number") throw 7;
     if (fault_ == "nan") command->tau[3] = std::numeric_limits<double>::quiet_NaN();
     if (fault_ == "size") command->tau.setZero(3);
+    if (fault_ == "crash") Crash();
+    if (fault_ == "abort") std::abort();
+    if (fault_ == "overflow") command->tau[0] = Overflow(0);
+    if (fault_ == "hang") {
+      while (has_begun_) std::this_thread::yield();
+    }
   }
 
  private:
+  static void Crash() { *reinterpret_cast<volatile int*>(8) = 1; }  // NOLINT
+
   TrajectoryController law_;
   std::string fault_;
   bool has_begun_ = false;

@@ -128,6 +128,27 @@ TEST(OwnController, WhatALibraryThrowsEndsTheRunWithItsWords) {
   EXPECT_TRUE(HasFailed(run("size"), "sent 3 torques, must be 50 at t = 0.01 s"));
 }
 
+// And leaves a log that ends before it, and nothing else.
+TEST(OwnController, ACrashOrAHangOfALibraryEndsTheRunInOneLine) {
+  const TempFolder folder;
+  const auto run = [&](const std::string& fault) {
+    return RunWith(FAULTY_LIBRARY,
+                   {"--controller-time-limit", "0.4", "--out", (folder.path() / fault).string()},
+                   {.environment = {{"FAULT", fault}}});
+  };
+  EXPECT_TRUE(HasFailed(run("crash"), "crashed (Segmentation fault) at t = 0.01 s"));
+  EXPECT_TRUE(HasFailed(run("abort"), "crashed (Aborted) at t = 0.01 s"));
+  EXPECT_TRUE(HasFailed(run("overflow"), "crashed (Segmentation fault) at t = 0.01 s"));
+  EXPECT_TRUE(HasFailed(run("hang"), "did not return within 0.4 s at t = 0.01 s"));
+  for (const char* fault : {"crash", "abort", "overflow", "hang"}) {
+    EXPECT_EQ(ReadSummary(folder.path() / fault)["speed"]["steps"], 10) << fault;
+    EXPECT_TRUE(std::filesystem::exists(folder.path() / fault / "log.h5")) << fault;
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path() / fault)) {
+      EXPECT_NE(entry.path().extension(), ".partial") << entry.path();
+    }
+  }
+}
+
 TEST(OwnController, LibrariesThatAreNoneAreRefused) {
   const TempFolder folder;
   EXPECT_TRUE(IsRefused(RunWith("/nowhere/law.so"), {"--controller", "/nowhere/law.so"}));
