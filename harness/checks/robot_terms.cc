@@ -212,8 +212,8 @@ constexpr TermEntry kTerms[] =
          },
          [](const C& c, int link, N out) { Eigen::Map<Matrix3d>(out.data()) = EngineLink(c, link).inertia; },
          [](const C& c, int link, N weight) {
-           const double by_model = BodyOf(c, link).inertia.trace();
-           weight.setConstant(1.0 / Positive(std::max(by_model, EngineLink(c, link).inertia.trace())));
+           const MassProperties& body = BodyOf(c, link);
+           weight.setConstant(1.0 / CalcInertiaScale(body.mass, body.inertia, EngineLink(c, link).inertia));
          }},
         {"frame_pose", "frame_pose", "^B T_f", "(5)", kRobot, kBoth, 1.0, ListFramePoses,
          [](const C& c, int frame, N out) {

@@ -42,6 +42,11 @@ double CalcRoundingBound(int depth, double factors) {
   return factors * kErrorsPerJoint * (depth + 1) * std::numeric_limits<double>::epsilon();
 }
 
+double CalcInertiaScale(double mass, const Matrix3d& a, const Matrix3d& b) {
+  constexpr double kPoint = 1e-9;  // m
+  return Positive(std::max({a.trace(), b.trace(), mass * kPoint * kPoint}));
+}
+
 RoundingScales::RoundingScales(const RobotModel& model)
     : model_(&model), base_velocities_(model.num_base_velocities()), reach_(CalcReach(model)) {
   squared_rate_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);

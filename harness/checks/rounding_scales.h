@@ -15,6 +15,10 @@ double CalcRoundingBound(int depth, double factors);
 /// A scale of zero (a model without mass, a state at rest) leaves an absolute comparison.
 inline double Positive(double scale) { return scale > 0.0 ? scale : 1.0; }
 
+/// Scale of a body's inertia by two descriptions, kg m^2. A body smaller than 1 nm is a point: what inertia a
+/// file has for it is what rounding left there.
+double CalcInertiaScale(double mass, const Matrix3d& a, const Matrix3d& b);
+
 /// Sizes of the state and the robot that rounding errors are relative to. An error of a term is divided by
 /// the size of what is summed up to form it, so that one bound holds for every entry, large or small.
 class RoundingScales {

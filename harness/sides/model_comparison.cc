@@ -217,7 +217,7 @@ class ModelComparison {
     }
     const Matrix3d I_a = X_a.linear() * a.inertia * X_a.linear().transpose();
     const Matrix3d I_b = X_b.linear() * b.inertia * X_b.linear().transpose();
-    const double scale = Positive(std::max(I_a.trace(), I_b.trace()));
+    const double scale = CalcInertiaScale(a.mass, I_a, I_b);
     for (int k = 0; k < 9; ++k) Add(kLinkInertia, I_a.data()[k], I_b.data()[k], scale, where);
   }
 

@@ -125,9 +125,10 @@ class UrdfReader {
     robot_.states_gravity = false;
     PlaceBase();
     ReadTree();
-    if (robot_.spec.joints.empty()) {
+    if (robot_.spec.joints.empty() && robot_.spec.base.type != BaseType::kFloating) {
       Fail(outline_.links[static_cast<size_t>(outline_.root)].line,
-           "no joint moves, got " + std::to_string(outline_.joints.size()) + " joints");
+           "no joint moves and the root is fixed (--floating lets it float), got " +
+               std::to_string(outline_.joints.size()) + " joints");
     }
     FinishBodies();
     ReadCouplings();

@@ -10,7 +10,7 @@ namespace dexcheck::testing {
 
 /// The names of the checks that failed, each followed by a space. All terms must have been compared.
 inline std::string ListFailures(const ConsistencyResult& result) {
-  EXPECT_GE(result.terms.size(), 12U);
+  EXPECT_GE(result.terms.size(), 11U);  // as many has a body that floats alone
   std::string failures;
   for (const auto* records : {&result.gate.records, &result.terms}) {
     for (const CheckRecord& record : *records) {

@@ -54,6 +54,40 @@ TEST(ModelComparison, RandomUrdfsWithOtherFramesAgree) {
   }
 }
 
+// A published humanoid's head has the inertia ixz = 2.4e-35 kg m^2 alone, in a frame that another file turns.
+TEST(ModelComparison, WhatRoundingLeftOfAPointsInertiaIsNone) {
+  const auto parse = [](const std::string& inertia) {
+    return ParseUrdf(
+        "<robot name=\"point\"><link name=\"base\"/><link name=\"head\"><inertial><mass value=\"1.3\"/>" +
+            std::string("<origin xyz=\"0.0185 -0.1108 0\"/>") + inertia +
+            "</inertial></link><joint name=\"neck\" type=\"revolute\"><parent link=\"base\"/>"
+            "<child link=\"head\"/><axis xyz=\"0 0 1\"/>"
+            "<limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/></joint></robot>",
+        "point.urdf");
+  };
+  const RobotDescription point = parse(R"(<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="2.4e-35" iyz="0"/>)");
+  const RobotDescription other = parse(R"(<inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="1e-35"/>)");
+  EXPECT_EQ(ListFailures(point, other), "");
+  const RobotDescription small =
+      parse(R"(<inertia ixx="1e-9" iyy="1e-9" izz="1e-9" ixy="0" ixz="0" iyz="0"/>)");
+  EXPECT_THAT(ListFailures(point, small), HasSubstr("link_inertia"));
+}
+
+// A quadrotor whose propellers are fixed.
+TEST(ModelComparison, OneBodyThatFloatsIsARobot) {
+  const auto parse = [](const std::string& mass) {
+    UrdfOptions options;
+    options.floating = true;
+    return ParseUrdf(
+        "<robot name=\"drone\"><link name=\"body\"><inertial><mass value=\"" + mass +
+            R"("/><origin xyz="0.01 0 0"/><inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0" ixz="0"
+                         iyz="0"/></inertial></link></robot>)",
+        "drone.urdf", options);
+  };
+  EXPECT_EQ(ListFailures(parse("1.5"), parse("1.5")), "");
+  EXPECT_THAT(ListFailures(parse("1.5"), parse("1.6")), HasSubstr("M"));
+}
+
 /// Two arms on one base; the order of joints is the file's.
 std::string MakeTwoArms(bool left_first) {
   const auto arm = [](const std::string& name, const std::string& y) {

@@ -405,7 +405,7 @@ TEST(Urdf, RefusesWhatIsTooLargeOrEmpty) {
   EXPECT_THAT(CatchProblem("<robot name=\"none\"/>"), HasSubstr("must have links"));
   EXPECT_THAT(CatchProblem("<mujoco/>"), HasSubstr("must have the root element <robot>, got \"<mujoco>\""));
   EXPECT_THAT(CatchProblem("<robot name=\"r\"><link name=\"a\"/></robot>"),
-              HasSubstr("no joint moves, got 0 joints"));
+              HasSubstr("no joint moves and the root is fixed (--floating lets it float), got 0 joints"));
   EXPECT_THAT(
       CatchProblem(
           "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><joint name=\"j\" type=\"continuous\">"
