@@ -2,6 +2,7 @@
 
 #include <pthread.h>
 
+#include <array>
 #include <chrono>
 #include <cstring>
 
@@ -10,25 +11,44 @@
 namespace dexcheck {
 namespace {
 
-constexpr size_t kStackSize = size_t{1} << 16U;
 /// In a time limit. Looks are counted, not time, so that a process that was stopped for a while hangs in
 /// nothing.
 constexpr int kLooks = 8;
 
-/// The one that exists. Handlers have no other way to it.
+constexpr std::array<int, 6> kSignals = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM};
+
+/// What the process has once, however many objects there are.
+struct Handlers {
+  int users = 0;
+  std::array<char, size_t{1} << 16U> stack{};  // since the caller's may be full
+  stack_t old_stack{};
+  std::array<struct sigaction, kSignals.size()> old_actions{};
+};
+Handlers handlers;
+
+/// The one that made the last call. Handlers have no other way to it.
 ForeignCode* the_one = nullptr;
+
+void InstallHandlers(void (*handle)(int)) {
+  if (handlers.users++ > 0) return;
+  const stack_t stack{.ss_sp = handlers.stack.data(), .ss_flags = 0, .ss_size = handlers.stack.size()};
+  ::sigaltstack(&stack, &handlers.old_stack);
+  struct sigaction action {};
+  action.sa_handler = handle;
+  action.sa_flags = SA_ONSTACK | SA_NODEFER;  // since a handler may never return
+  for (size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &action, &handlers.old_actions[i]);
+}
+
+void RestoreHandlers() {
+  if (--handlers.users > 0) return;
+  for (size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &handlers.old_actions[i], nullptr);
+  ::sigaltstack(&handlers.old_stack, nullptr);
+}
 
 }  // namespace
 
-ForeignCode::ForeignCode(double time_limit)
-    : time_limit_(time_limit), caller_(pthread_self()), stack_(kStackSize) {
-  const stack_t stack{.ss_sp = stack_.data(), .ss_flags = 0, .ss_size = stack_.size()};
-  ::sigaltstack(&stack, &old_stack_);
-  the_one = this;
-  struct sigaction action {};
-  action.sa_handler = &ForeignCode::Handle;
-  action.sa_flags = SA_ONSTACK | SA_NODEFER;  // since a handler may never return
-  for (size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &action, &old_actions_[i]);
+ForeignCode::ForeignCode(double time_limit) : time_limit_(time_limit), caller_(pthread_self()) {
+  InstallHandlers(&ForeignCode::Handle);
   watch_ = std::thread([this] { Watch(); });
 }
 
@@ -39,12 +59,12 @@ ForeignCode::~ForeignCode() {
   }
   ends_.notify_one();
   watch_.join();
-  for (size_t i = 0; i < kSignals.size(); ++i) ::sigaction(kSignals[i], &old_actions_[i], nullptr);
-  ::sigaltstack(&old_stack_, nullptr);
-  the_one = nullptr;
+  RestoreHandlers();
+  if (the_one == this) the_one = nullptr;
 }
 
 void ForeignCode::Enter(int patience) {
+  the_one = this;
   patience_.store(patience, std::memory_order_relaxed);
   call_.fetch_add(1, std::memory_order_release);
 }
@@ -52,22 +72,22 @@ void ForeignCode::Enter(int patience) {
 void ForeignCode::Leave() { call_.fetch_add(1, std::memory_order_release); }
 
 void ForeignCode::Handle(int signal) {
-  ForeignCode& one = *the_one;
-  const long call = one.call_.load(std::memory_order_relaxed);
-  const bool in_call = call % 2 == 1 && ::pthread_equal(::pthread_self(), one.caller_) != 0;
+  ForeignCode* const one = the_one;
+  const long call = one == nullptr ? 0 : one->call_.load(std::memory_order_relaxed);
+  const bool in_call = call % 2 == 1 && ::pthread_equal(::pthread_self(), one->caller_) != 0;
   if (signal == SIGALRM) {
     // It may come when the call is over.
-    if (!in_call || one.stuck_.load(std::memory_order_relaxed) != call) return;
+    if (!in_call || one->stuck_.load(std::memory_order_relaxed) != call) return;
   } else if (!in_call) {
     for (size_t i = 0; i < kSignals.size(); ++i) {
-      if (kSignals[i] == signal) ::sigaction(signal, &one.old_actions_[i], nullptr);
+      if (kSignals[i] == signal) ::sigaction(signal, &handlers.old_actions[i], nullptr);
     }
     ::raise(signal);
     return;
   }
-  one.signal_ = signal;
-  one.Leave();
-  siglongjmp(one.return_, 1);
+  one->signal_ = signal;
+  one->Leave();
+  siglongjmp(one->return_, 1);
 }
 
 std::string ForeignCode::Explain() const {

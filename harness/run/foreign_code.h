@@ -5,20 +5,18 @@
 #include <setjmp.h>
 #include <signal.h>
 
-#include <array>
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
 #include <string>
 #include <thread>
-#include <vector>
 
 namespace dexcheck {
 
-/// While it exists, SIGSEGV and its like, and SIGALRM, are taken for the thread that made it; those that do
-/// not come from a call go where they went before. After a call that crashed or hung nothing of what was
-/// called may be used again, not even its destructor: it was left in the middle, with its locks and its
-/// half-made objects. A call costs some 20 ns. One at a time in a process.
+/// While one exists, SIGSEGV and its like, and SIGALRM, are taken; those that do not come from a call go
+/// where they went before. After a call that crashed or hung nothing of what was called may be used again,
+/// not even its destructor: it was left in the middle, with its locks and its half-made objects. Calls are
+/// made by the thread that made the object, one at a time in a process, and cost some 20 ns.
 class ForeignCode {
  public:
   /// @param time_limit of a call, s.
@@ -44,8 +42,6 @@ class ForeignCode {
   }
 
  private:
-  static constexpr std::array<int, 6> kSignals = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM};
-
   static void Handle(int signal);
   void Enter(int patience);
   void Leave();
@@ -57,9 +53,6 @@ class ForeignCode {
   sigjmp_buf return_{};
   volatile sig_atomic_t signal_ = 0;  // that ended the call
   pthread_t caller_;
-  std::vector<char> stack_;  // of the handler, since the caller's may be full
-  stack_t old_stack_{};
-  std::array<struct sigaction, kSignals.size()> old_actions_{};
 
   std::atomic<long> call_{0};   // 1, 3, ... while one is made
   std::atomic<long> stuck_{0};  // the call that takes too long
