@@ -79,8 +79,9 @@ void Print(const AuditRequest& request, const RobotDescription& robot, const Aud
   if (counted == 0) {
     fmt::print("{}GOOD: nothing that a robot cannot have, and nothing odd.\n", request.quiet ? "" : "\n");
   } else {
-    fmt::print("{}FOUND: {} {} a robot cannot have or that look like mistakes.\n", request.quiet ? "" : "\n",
-               counted, counted == 1 ? "thing that" : "things that");
+    const char* const things = counted == 1 ? "thing that a robot cannot have or that looks like a mistake"
+                                            : "things that a robot cannot have or that look like mistakes";
+    fmt::print("{}FOUND: {} {}.\n", request.quiet ? "" : "\n", counted, things);
   }
 }
 

@@ -247,15 +247,19 @@ void AuditJoints(const RobotDescription& robot, std::vector<AuditFinding>* findi
 
 void AuditCondition(const RobotDescription& robot, AuditResult* result) {
   result->condition = CalcCondition(robot, robot.spec);
+  std::map<int, double> without;  // by body
   for (AuditFinding& finding : result->findings) {
     const bool is_moving =
         finding.body >= 0 || (finding.body == -1 && robot.spec.base.type != BaseType::kFixed);
     if (!is_moving || finding.level == AuditLevel::kNote) continue;
-    RobotSpec spec = robot.spec;
-    MassProperties* body =
-        finding.body < 0 ? &spec.base.body : &spec.joints[static_cast<size_t>(finding.body)].body;
-    *body = MakePlausibleBody(*body);
-    finding.condition_without = CalcCondition(robot, spec);
+    if (!without.contains(finding.body)) {
+      RobotSpec spec = robot.spec;
+      MassProperties* body =
+          finding.body < 0 ? &spec.base.body : &spec.joints[static_cast<size_t>(finding.body)].body;
+      *body = MakePlausibleBody(*body);
+      without[finding.body] = CalcCondition(robot, spec);
+    }
+    finding.condition_without = without[finding.body];
   }
 }
 
