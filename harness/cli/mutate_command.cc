@@ -270,7 +270,9 @@ void AddMutateCommand(Command app) {
       .Repeatable()
       .Needs(run);
   Option from =
-      command.AddOption("--from", &request->run.options.from, "In a run: when the mistake begins, s")
+      command
+          .AddOption("--from", &request->run.options.from,
+                     "In a run: when the mistake begins, s; in a motion of joints it is there from the first")
           .TypeName("T")
           .Check(Seconds(0.0, 1e4))
           .Needs(run)

@@ -19,12 +19,14 @@ namespace {
 /// A line of the table.
 struct RunRow {
   std::string kind;
-  int mutants = 0, refused = 0, killed = 0, survived = 0, cause = 0, with_part = 0, part = 0;
+  int mutants = 0, refused = 0, killed = 0, no_effect = 0, survived = 0, cause = 0, with_part = 0, part = 0;
 
   void Add(const RunMutant& mutant) {
     ++mutants;
     refused += mutant.refused ? 1 : 0;
     if (mutant.refused) return;
+    no_effect += mutant.no_effect ? 1 : 0;
+    if (mutant.no_effect) return;
     killed += mutant.killed ? 1 : 0;
     survived += mutant.killed ? 0 : 1;
     cause += mutant.has_right_cause() ? 1 : 0;
@@ -54,6 +56,7 @@ std::vector<RunRow> SumUp(const std::vector<RunMutant>& mutants, size_t done) {
 
 const char* FateOf(const RunMutant& mutant) {
   if (mutant.refused) return "refused";
+  if (mutant.no_effect) return "no effect";
   return mutant.killed ? "killed" : "survived";
 }
 
@@ -63,6 +66,8 @@ void PrintExceptions(const std::vector<RunMutant>& mutants, size_t done) {
     const RunMutant& mutant = mutants[i];
     if (mutant.refused) {
       fmt::print("refused: {}: {}\n", mutant.name, mutant.failure);
+    } else if (mutant.no_effect) {
+      fmt::print("no effect: {}\n", mutant.name);
     } else if (!mutant.killed) {
       fmt::print("survived: {}{}\n", mutant.name,
                  mutant.is_as_expected
@@ -81,11 +86,11 @@ void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t 
   const std::vector<RunRow> rows = SumUp(campaign.mutants(), done);
   const RunRow& all = rows.back();
   if (!request.quiet) {
-    fmt::print("{:<18}{:>9}{:>9}{:>9}{:>10}{:>13}{:>12}\n", "what was wrong", "mistakes", "found", "refused",
-               "survived", "cause right", "part named");
+    fmt::print("{:<18}{:>9}{:>9}{:>9}{:>11}{:>10}{:>13}{:>12}\n", "what was wrong", "mistakes", "found",
+               "refused", "no effect", "survived", "cause right", "part named");
     for (const RunRow& row : rows) {
-      fmt::print("{:<18}{:>9}{:>9}{:>9}{:>10}{:>13}{:>12}\n", row.kind, row.mutants, row.killed, row.refused,
-                 row.survived, row.cause,
+      fmt::print("{:<18}{:>9}{:>9}{:>9}{:>11}{:>10}{:>13}{:>12}\n", row.kind, row.mutants, row.killed,
+                 row.refused, row.no_effect, row.survived, row.cause,
                  row.with_part > 0 ? fmt::format("{} of {}", row.part, row.with_part) : "");
     }
     PrintExceptions(campaign.mutants(), done);
@@ -93,9 +98,10 @@ void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t 
   }
   if (done < campaign.mutants().size())
     fmt::print("INTERRUPTED after {} of {} mistakes. So far:\n", done, campaign.mutants().size());
-  const int possible = all.mutants - all.refused;
+  const int possible = all.mutants - all.refused - all.no_effect;
   fmt::print(
-      "{}: {} of {} mistakes that are possible were found; the cause is right in {}, the part in {} of {}.\n",
+      "{}: {} of {} mistakes that are possible and have an effect were found; the cause is right in {}, the "
+      "part in {} of {}.\n",
       all.survived == 0 ? "ALL FOUND" : "SURVIVORS", all.killed, possible, all.cause, all.part,
       all.with_part);
 }
@@ -106,10 +112,10 @@ std::string ToText(const MutateRunRequest& request, const RunCampaign& campaign,
                {"scale", request.options.scale}, {"complete", done == campaign.mutants().size()}};
   json["kinds"] = Json::object();
   for (const RunRow& row : SumUp(campaign.mutants(), done)) {
-    json["kinds"][row.kind] = {{"mistakes", row.mutants},     {"found", row.killed},
-                               {"refused", row.refused},      {"survived", row.survived},
-                               {"cause_right", row.cause},    {"part_named", row.part},
-                               {"with_a_part", row.with_part}};
+    json["kinds"][row.kind] = {{"mistakes", row.mutants},  {"found", row.killed},
+                               {"refused", row.refused},   {"no_effect", row.no_effect},
+                               {"survived", row.survived}, {"cause_right", row.cause},
+                               {"part_named", row.part},   {"with_a_part", row.with_part}};
   }
   json["mistakes"] = Json::array();
   for (size_t i = 0; i < done; ++i) {

@@ -34,8 +34,8 @@ struct PlantFault {
 };
 
 /// Faults of motors, of joints, links and object, of floor, wheels and contacts, of sensors and of the
-/// solver, for the assistant robot with an object in its right hand.
-std::vector<PlantFault> ListPlantFaults();
+/// solver: those that there can be of the scenario's robot, at joints and links along its arm and fingers.
+std::vector<PlantFault> ListPlantFaults(const Setup& setup);
 
 /// The engine's simulation with a fault.
 class FaultyPlant final : public Plant {

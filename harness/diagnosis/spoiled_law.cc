@@ -78,7 +78,7 @@ GraspControllerOptions SpoilOptions(GraspControllerOptions options, LawSlip slip
 
 }  // namespace
 
-std::vector<LawMistake> ListLawMistakes() {
+std::vector<LawMistake> ListLawMistakes(bool has_wheels) {
   std::vector<LawMistake> mistakes;
   const std::span<const LawPartName> parts = ListLawParts();
   for (size_t i = 0; i < parts.size(); ++i) {
@@ -88,7 +88,10 @@ std::vector<LawMistake> ListLawMistakes() {
     }
   }
   mistakes.push_back({"gravity in F_bar' upside down", AllParts().gravity, -1.0});
-  for (const auto& [slip, name] : kSlips) mistakes.push_back({name, SIZE_MAX, 1.0, slip});
+  for (const auto& [slip, name] : kSlips) {
+    const bool of_wheels = slip == LawSlip::kWheelsExchanged || slip == LawSlip::kNoActuationMap;
+    if (has_wheels || !of_wheels) mistakes.push_back({name, SIZE_MAX, 1.0, slip});
+  }
   return mistakes;
 }
 

@@ -43,8 +43,9 @@ struct LawMistake {
   LawSlip slip = LawSlip::kNone;
 };
 
-/// Each part of the law a thousandth too large and left out, then gravity upside down and the slips.
-std::vector<LawMistake> ListLawMistakes();
+/// Each part of the law a thousandth too large and left out, then gravity upside down and the slips, those of
+/// wheels where there are any.
+std::vector<LawMistake> ListLawMistakes(bool has_wheels);
 
 /// The law (55) as controller/control computes it, once more with a place for each mistake: from the
 /// controller's own terms, by its vectors and its pseudoinverses, and not by the formulas that judge it.

@@ -1,21 +1,13 @@
 #include "harness/engine/add_contact_pairs.h"
 
 #include <algorithm>
-#include <cstring>
-#include <new>
-#include <vector>
 
 #include "controller/common/errors.h"
-#include "harness/engine/model_arrays.h"
+#include "harness/engine/grown_copy.h"
 #include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
-
-struct Rows {
-  const void* data;
-  size_t bytes;
-};
 
 void FillPair(mjModel* m, int pair, const std::pair<int, int>& geoms) {
   const auto [a, b] = geoms;
@@ -43,35 +35,9 @@ MjModelPtr AddContactPairs(const mjModel& model, std::span<const std::pair<int, 
   if (CollidesByType(model)) {
     throw InputError("MJCF: option collision: must be \"predefined\" for plant.collide");
   }
-  auto* m = static_cast<mjModel*>(mju_malloc(sizeof(mjModel)));
-  if (m == nullptr) throw std::bad_alloc();
-  *m = model;
-  std::vector<Rows> old;
-  ForEachArray(m, [&](auto* array, size_t rows, size_t columns, bool) {
-    old.push_back({array, sizeof(*array) * rows * columns});
-  });
-  const auto first = static_cast<int>(m->npair);
-  m->npair += static_cast<int>(geoms.size());
-  size_t bytes = 0;
-  ForEachArray(m, [&](auto* array, size_t rows, size_t columns, bool) {
-    bytes = AlignArray(bytes) + sizeof(*array) * rows * columns;
-  });
-  m->buffer = mju_malloc(bytes);
-  m->nbuffer = static_cast<decltype(m->nbuffer)>(bytes);
-  MjModelPtr grown(m);
-  if (m->buffer == nullptr) throw std::bad_alloc();
-  size_t offset = 0;
-  size_t i = 0;
-  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
-    offset = AlignArray(offset);
-    const size_t size = sizeof(Number) * rows * columns;
-    array = reinterpret_cast<Number*>(static_cast<char*>(m->buffer) + offset);
-    std::memset(array, 0, size);
-    std::memcpy(array, old[i].data, old[i].bytes);
-    offset += size;
-    ++i;
-  });
-  for (size_t k = 0; k < geoms.size(); ++k) FillPair(m, first + static_cast<int>(k), geoms[k]);
+  const auto first = static_cast<int>(model.npair);
+  MjModelPtr grown = MakeGrownCopy(model, [&](mjModel* m) { m->npair += static_cast<int>(geoms.size()); });
+  for (size_t k = 0; k < geoms.size(); ++k) FillPair(grown.get(), first + static_cast<int>(k), geoms[k]);
   return grown;
 }
 

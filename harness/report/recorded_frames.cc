@@ -12,6 +12,7 @@
 #include "controller/handling/pick_and_place.h"
 #include "harness/base/files.h"
 #include "harness/engine/mjcf_files.h"
+#include "harness/engine/skeleton.h"
 #include "harness/log/log_reader.h"
 
 namespace dexcheck {
@@ -29,7 +30,7 @@ class FramesReader {
     log_.ExtractFiles("inputs", folder.path());
     const std::filesystem::path mjcf = FindEmbedded(log_, "mjcf", folder.path());
     try {
-      return LoadMjcf(mjcf);
+      return MakeVisible(LoadMjcf(mjcf));
     } catch (const InputError& error) {
       throw InputError(path_.string() + ": " + error.what());
     }

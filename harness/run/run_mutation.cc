@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "controller/common/text.h"
-#include "controller/model/parameter_reader.h"
 
 namespace dexcheck {
 namespace {
@@ -32,6 +31,8 @@ class LaterTrajectory final : public Trajectory {
   double from_, nudge_;
 };
 
+// Positions and rates that differ by less are the same, m, rad and s.
+constexpr double kSameMotion = 1e-12;
 // Mistakes that are there from the beginning settle so long at the most, s.
 constexpr double kSettle = 0.3;
 
@@ -76,11 +77,17 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
       compiled_(LoadMjcf(mjcf_)) {
   if (scenario.task)
     throw InputError(scenario.source + ": task: mistakes are made in runs along a trajectory");
-  const RobotModel model =
-      ParseRobotModel(ReadTextFile(robot_.string()), robot_.string(), scenario.model_overrides);
-  if (options.parameters > 0) {
+  MoveToStart(should_stop);
+  if (setup_ == nullptr) return;
+  ListMistakes();
+  if (!should_stop()) RequireNoMistakeToPass(should_stop);
+}
+
+void RunCampaign::ListMistakes() {
+  const RobotModel& model = setup_->model();
+  if (options_.parameters > 0) {
     const std::vector<Parameter> numbers = ListParameters(model.spec());
-    const size_t count = std::min(numbers.size(), static_cast<size_t>(options.parameters));
+    const size_t count = std::min(numbers.size(), static_cast<size_t>(options_.parameters));
     for (size_t i = 0; i < count; ++i) {
       parameters_.push_back(numbers[i * numbers.size() / count]);
       mutants_.push_back({.kind = "number",
@@ -90,25 +97,24 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
     }
   }
   // Those of another law are not known.
-  if (options.laws && scenario.control.law == ControlLaw::kComputedTorque) laws_ = ListLawMistakes();
+  const bool knows_law = scenario_.control.law == ControlLaw::kComputedTorque && !scenario_.joint_motion;
+  if (options_.laws && knows_law) laws_ = ListLawMistakes(!setup_->adapter().wheels().empty());
   for (const LawMistake& law : laws_) {
     mutants_.push_back({.kind = law.part == SIZE_MAX ? "law, otherwise" : "law, one part",
                         .name = law.name,
                         .expected = Cause::kControlLaw,
                         .part = law.part == SIZE_MAX ? "" : ListLawParts()[law.part].name});
   }
-  if (options.equations && scenario.control.law == ControlLaw::kComputedTorque) {
-    equations_ = ListEquationMistakes(model, scenario.control.orientation == OrientationFeedback::kAngles);
+  if (options_.equations && knows_law) {
+    equations_ = ListEquationMistakes(model, scenario_.control.orientation == OrientationFeedback::kAngles);
   }
   for (const EquationMistake& equation : equations_) {
     mutants_.push_back(
         {.kind = "equation", .name = equation.name, .expected = Cause::kModel, .part = equation.check});
   }
-  if (options.plants) plants_ = ListPlantFaults();
+  if (options_.plants) plants_ = ListPlantFaults(*setup_);
   for (const PlantFault& fault : plants_)
     mutants_.push_back({.kind = fault.kind, .name = fault.name, .expected = fault.cause, .part = fault.part});
-  MoveToStart(should_stop);
-  if (!should_stop()) RequireNoMistakeToPass(should_stop);
 }
 
 std::unique_ptr<Setup> RunCampaign::MakeSetup(const Scenario& scenario, const RobotModel* model) const {
@@ -131,7 +137,20 @@ Scenario RunCampaign::MakeScenario(double from, double duration, double nudge) c
   return scenario;
 }
 
+void RunCampaign::GoToStart(const LoopParts& parts) const {
+  EnginePlant* const plant = FindEngine(parts);
+  if (start_) plant->simulation().SetState(*start_);
+}
+
 void RunCampaign::MoveToStart(const std::function<bool()>& should_stop) {
+  if (scenario_.joint_motion) {
+    // Arms settle fast, and a motion of joints has no later beginning: mistakes are there from the first.
+    Scenario scenario = scenario_;
+    scenario.duration = options_.from + options_.duration;
+    scenario.settle = std::min(scenario.settle, kSettle);
+    setup_ = MakeSetup(scenario, nullptr);
+    return;
+  }
   // Even a run that is looked at from its beginning starts settled, one step in.
   const double from = std::max(options_.from, scenario_.plant.time_step);
   options_.from = from;
@@ -148,10 +167,12 @@ void RunCampaign::MoveToStart(const std::function<bool()>& should_stop) {
 
 void RunCampaign::RequireNoMistakeToPass(const std::function<bool()>& should_stop) {
   for (const Setup* setup : {setup_.get(), nudged_.get()}) {
+    if (setup == nullptr) continue;
     RunMutant none;
     LoopParts parts = MakeLoopParts(*setup);
-    FindEngine(parts)->simulation().SetState(start_);
-    if (!RunLoop(*setup, std::move(parts), &none, should_stop)) return;
+    GoToStart(parts);
+    VectorXd* const end = setup == setup_.get() ? &end_ : &nudged_end_;
+    if (!RunLoop(*setup, std::move(parts), &none, end, should_stop)) return;
     if (!none.killed) continue;
     throw InputError(
         scenario_.source + ": must pass before mistakes are made in it, got " +
@@ -159,11 +180,14 @@ void RunCampaign::RequireNoMistakeToPass(const std::function<bool()>& should_sto
   }
 }
 
-bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant,
+bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant, VectorXd* end,
                           const std::function<bool()>& should_stop) {
   Runner runner(setup, /*check=*/true, std::move(parts));
   const RunResult& result = runner.Run([](const StepRecord&) {}, should_stop);
   if (result.interrupted) return false;
+  const PlantReading& reading = runner.loop().record().reading;
+  end->resize(reading.qpos.size() + reading.qvel.size());
+  *end << reading.qpos, reading.qvel;
   mutant->killed = result.verdict != Verdict::kPass;
   mutant->cause = result.attribution.cause;
   mutant->evidence = result.attribution.evidence;
@@ -177,7 +201,7 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   return true;
 }
 
-bool RunCampaign::RunPlant(const PlantFault& fault, RunMutant* mutant,
+bool RunCampaign::RunPlant(const PlantFault& fault, RunMutant* mutant, VectorXd* end,
                            const std::function<bool()>& should_stop) {
   std::unique_ptr<Setup> whole;
   if (fault.from_start) {
@@ -188,37 +212,48 @@ bool RunCampaign::RunPlant(const PlantFault& fault, RunMutant* mutant,
   const Setup& setup = fault.from_start ? *whole : *setup_;
   LoopParts parts = MakeLoopParts(setup);
   EnginePlant* const engine = FindEngine(parts);
-  if (!fault.from_start) engine->simulation().SetState(start_);
+  if (!fault.from_start) GoToStart(parts);
   parts.plant.release();
   parts.plant = std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault);
   if (fault.sensors) parts.hidden_sensor_fault = fault.sensors(setup);
-  return RunLoop(setup, std::move(parts), mutant, should_stop);
+  return RunLoop(setup, std::move(parts), mutant, end, should_stop);
 }
 
 bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
+  RunMutant& mutant = mutants_[index];
+  VectorXd end;
+  if (!RunMistake(index, &end, should_stop)) return false;
+  const VectorXd& right = IsLaw(index) ? nudged_end_ : end_;
+  mutant.no_effect = !mutant.killed && end.size() == right.size() && right.size() > 0 &&
+                     (end - right).lpNorm<Eigen::Infinity>() < kSameMotion;
+  return true;
+}
+
+bool RunCampaign::RunMistake(size_t index, VectorXd* end, const std::function<bool()>& should_stop) {
   RunMutant& mutant = mutants_[index];
   try {
     if (index < parameters_.size()) {
       const RobotModel model = ChangeNumber(setup_->model().spec(), parameters_[index], options_.scale);
       const std::unique_ptr<Setup> setup = MakeSetup(setup_->scenario(), &model);
       LoopParts parts = MakeLoopParts(*setup);
-      FindEngine(parts)->simulation().SetState(start_);
-      return RunLoop(*setup, std::move(parts), &mutant, should_stop);
+      GoToStart(parts);
+      return RunLoop(*setup, std::move(parts), &mutant, end, should_stop);
     }
+    const bool is_law = IsLaw(index);
     index -= parameters_.size();
-    const bool is_law = index < laws_.size();
     if (!is_law) index -= laws_.size();
     const bool is_equation = !is_law && index < equations_.size();
-    if (!is_law && !is_equation) return RunPlant(plants_[index - equations_.size()], &mutant, should_stop);
+    if (!is_law && !is_equation)
+      return RunPlant(plants_[index - equations_.size()], &mutant, end, should_stop);
     const Setup& setup = is_law ? *nudged_ : *setup_;
     LoopParts parts = MakeLoopParts(setup);
-    FindEngine(parts)->simulation().SetState(start_);
+    GoToStart(parts);
     if (is_law) {
       parts.controller = std::make_unique<SpoiledLaw>(setup, laws_[index]);
     } else {
       parts.controller = std::make_unique<SpoiledLaw>(setup, equations_[index]);
     }
-    return RunLoop(setup, std::move(parts), &mutant, should_stop);
+    return RunLoop(setup, std::move(parts), &mutant, end, should_stop);
   } catch (const InputError& error) {
     mutant.refused = true;
     mutant.failure = error.what();

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,9 @@ struct RunMutant {
 
   bool refused = false;  ///< There is no such robot, or the scenario cannot be run with it.
   bool killed = false;   ///< The verdict is not "pass".
+  /// Not killed, and what moves is at the end where it is without the mistake, to 1e-12: a push that bearings
+  /// hold, a number that no motion shows.
+  bool no_effect = false;
   Cause cause = Cause::kNone;
   bool names_part = false;  ///< The evidence has `part` in it.
   std::string evidence;
@@ -53,21 +57,31 @@ class RunCampaign {
 
  private:
   void MoveToStart(const std::function<bool()>& should_stop);
+  void ListMistakes();
+  void GoToStart(const LoopParts& parts) const;
   /// @param nudge by which X_d jumps at the beginning, m and rad.
   [[nodiscard]] Scenario MakeScenario(double from, double duration, double nudge) const;
   [[nodiscard]] std::unique_ptr<Setup> MakeSetup(const Scenario& scenario, const RobotModel* model) const;
-  bool RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant,
+  /// @param end gets the engine's positions and rates at the end.
+  bool RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant, VectorXd* end,
                const std::function<bool()>& should_stop);
-  bool RunPlant(const PlantFault& fault, RunMutant* mutant, const std::function<bool()>& should_stop);
+  bool RunPlant(const PlantFault& fault, RunMutant* mutant, VectorXd* end,
+                const std::function<bool()>& should_stop);
+  /// Of the mistake with this index. @returns as Run.
+  bool RunMistake(size_t index, VectorXd* end, const std::function<bool()>& should_stop);
+  [[nodiscard]] bool IsLaw(size_t index) const {
+    return index >= parameters_.size() && index < parameters_.size() + laws_.size();
+  }
   void RequireNoMistakeToPass(const std::function<bool()>& should_stop);
 
   Scenario scenario_;
   std::filesystem::path robot_, mjcf_;
   RunMutationOptions options_;
   MjModelPtr compiled_;
-  EngineState start_;
+  std::optional<EngineState> start_;   // of a trajectory; joints begin at their beginning
   std::unique_ptr<Setup> setup_;       // of the right robot, from the start
   std::unique_ptr<Setup> nudged_;      // the same with an error that feedback has to answer
+  VectorXd end_, nudged_end_;          // where they come to without a mistake
   std::vector<Parameter> parameters_;  // by mutant, those of numbers first
   std::vector<LawMistake> laws_;
   std::vector<EquationMistake> equations_;

@@ -4,7 +4,9 @@ namespace dexcheck {
 
 /// Which mistakes are made in a run, and how long each is looked at.
 struct RunMutationOptions {
-  double from = 0.5;      ///< The mistake begins at this time of the scenario, s.
+  /// The mistake begins at this time of the scenario, s. In a motion of joints it is there from the first,
+  /// and this is added to `duration`.
+  double from = 0.5;
   double duration = 0.1;  ///< How long it is looked at, s.
   int parameters = 40;    ///< Numbers of the model that are changed, evenly out of all of them.
   double scale = 1e-3;    ///< By how much, relative to GetScale.

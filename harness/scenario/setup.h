@@ -64,6 +64,8 @@ class Setup {
   [[nodiscard]] const Surface& surface() const { return *surface_; }
   /// Frames of the grasp; none for a robot that holds nothing.
   [[nodiscard]] const std::vector<int>& fingertips() const { return fingertips_; }
+  /// Joints that lie on the chains to several fingertips of the grasp, from the base outward.
+  [[nodiscard]] const std::vector<int>& arm_joints() const { return arm_joints_; }
   /// Joints that lie on no chain from the base to a fingertip of the grasp: they should stay still.
   [[nodiscard]] const std::vector<int>& idle_joints() const { return idle_joints_; }
 
@@ -134,7 +136,7 @@ class Setup {
   std::unique_ptr<Surface> surface_;
   std::vector<int> fingertips_;
   Hand hand_;
-  std::vector<int> arm_joints_;  // on the chains of several fingertips
+  std::vector<int> arm_joints_;
   std::vector<int> idle_joints_;
   std::vector<Bond> bonds_;
   std::vector<int> bond_constraints_;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "controller/handling/pick_and_place.h"
+#include "harness/engine/skeleton.h"
 
 namespace dexcheck {
 namespace {
@@ -23,7 +24,7 @@ std::string Print(const Vector3d& v) { return fmt::format("[{}, {}, {}]", v.x(),
 LiveRun::LiveRun(std::unique_ptr<Setup> setup, const RunInputs& inputs, const std::filesystem::path& log,
                  double speed)
     : setup_(std::move(setup)),
-      looks_(LoadMjcf(inputs.mjcf)),
+      looks_(MakeVisible(LoadMjcf(inputs.mjcf))),
       runner_(std::make_unique<Runner>(*setup_, /*check=*/true)),
       speed_(speed) {
   if (!log.empty()) recorder_.emplace(log, runner_->loop(), *setup_, inputs);

@@ -93,6 +93,25 @@ TEST_F(OwnArm, IsRunReportedDrawnAndReplayed) {
   EXPECT_EQ(Run({"run", "--replay", "run"}).exit_code, 0);
 }
 
+// As descriptions that were made for dynamics often are.
+TEST_F(OwnArm, WithoutShapesHasAPageToo) {
+  std::string text = kArm;
+  for (const char* geom : {R"(<geom type="cylinder" size="0.05 0.2" mass="3"/>)",
+                           R"(<geom type="box" size="0.1 0.04 0.04" mass="1.5" pos="0.1 0 0"/>)",
+                           R"(<geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0" mass="0.8"/>)"}) {
+    text = ReplaceOnce(text, geom, R"(<inertial pos="0.1 0 0.05" mass="1" diaginertia="0.02 0.02 0.02"/>)");
+  }
+  WriteText(folder_.path() / "arm.xml", text);
+  ASSERT_EQ(Run({"import", "arm.xml", "--out", "arm.toml"}).exit_code, 0);
+  const ProgramResult result = Run({"run", "own.toml", "--out", "run"});
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_EQ(result.err, "");
+  EXPECT_THAT(ReadText(folder_.path() / "run/report.html"), HasSubstr("Robot and object at the end"));
+  const ProgramResult picture =
+      Run({"render", "run", "--still", "0.5", "--size", "320x240", "--out", "picture.png"});
+  EXPECT_EQ(picture.exit_code, 0) << picture.err;
+}
+
 TEST_F(OwnArm, RunsWithoutTheEngine) {
   const ProgramResult result = RunWith("plant.type=rigid");
   EXPECT_EQ(result.exit_code, 0) << result.out << result.err;

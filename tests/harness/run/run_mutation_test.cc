@@ -107,6 +107,52 @@ TEST(RunCampaign, FindsFaultsOfPlantsAndTheirCauses) {
     EXPECT_NE(mutant.cause, Cause::kIntegrator) << mutant.name;
 }
 
+// A hand on the Panda that holds a ball, and the Panda with nothing: what can be wrong is looked for in the
+// robot, and no name is known beforehand.
+TEST(RunCampaign, MakesItsMistakesInOtherRobotsToo) {
+  RunMutationOptions options;
+  options.parameters = 12;
+  for (const char* name : {"hand-curve", "panda-reach"}) {
+    SCOPED_TRACE(name);
+    const Scenario scenario = ReadShippedScenario(name);
+    RunCampaign campaign(scenario, scenario.model_file, scenario.mjcf_file, options, kGoOn);
+    const auto is_of_plant = [](const RunMutant& mutant) {
+      return mutant.kind != "equation" && mutant.kind != "law, one part" && mutant.kind != "law, otherwise";
+    };
+    const Count faults = RunSome(&campaign, is_of_plant);
+    EXPECT_GE(faults.made, 40);
+    EXPECT_GE(20 * faults.cause, 18 * faults.made);
+    bool has_laws = false;
+    for (const RunMutant& mutant : campaign.mutants()) {
+      if (!is_of_plant(mutant)) has_laws = true;
+      EXPECT_FALSE(mutant.refused) << mutant.name << ": " << mutant.failure;
+      if (is_of_plant(mutant)) EXPECT_TRUE(mutant.killed || mutant.no_effect) << mutant.name;
+      EXPECT_EQ(mutant.name.find("wheel"), std::string::npos) << mutant.name;
+    }
+    EXPECT_EQ(has_laws, scenario.joint_motion == std::nullopt);
+  }
+}
+
+TEST(RunCampaign, AnUprightAxisHoldsWhatPushesAlongIt) {
+  RunMutationOptions options;
+  options.laws = options.equations = false;
+  options.plants = false;
+  options.parameters = 1000;
+  const Scenario scenario = ReadShippedScenario("panda-reach");
+  RunCampaign campaign(scenario, scenario.model_file, scenario.mjcf_file, options, kGoOn);
+  int without = 0;
+  for (size_t i = 0; i < campaign.mutants().size(); ++i) {
+    const RunMutant& mutant = campaign.mutants()[i];
+    const bool shows_never = mutant.name == "link panda_link1: Ixx" || mutant.name == "link panda_link1: Ixy";
+    if (!shows_never && mutant.name != "link panda_link2: mass") continue;
+    ASSERT_TRUE(campaign.Run(i, kGoOn));
+    EXPECT_EQ(mutant.no_effect, shows_never) << mutant.name;
+    EXPECT_EQ(mutant.killed, !shows_never) << mutant.name;
+    without += mutant.no_effect ? 1 : 0;
+  }
+  EXPECT_EQ(without, 2);
+}
+
 TEST(RunCampaign, ARunThatDoesNotPassIsNoPlaceForMistakes) {
   RunMutationOptions options;
   options.from = 0.01;
