@@ -78,6 +78,7 @@ void CrossCheck::Reset() {
 
 void CrossCheck::CompareSettling(const StepRecord& step) {
   CompareMotion(step);
+  CompareMotors(step);
   CheckClearance(step);
 }
 
@@ -212,13 +213,17 @@ void CrossCheck::CompareJointLaw(const StepRecord& step) {
   motion_.Add(StepCheck::kJointDynamics, errors.error_dynamics, t);
 }
 
+void CrossCheck::CompareMotors(const StepRecord& step) {
+  motion_.Add(StepCheck::kTorqueApplied, LawCheck::CompareApplied(step), step.time);
+  motors_.Add(step.known != nullptr ? step.known->tau : step.command.tau, step.response.motor_torques,
+              step.reading.state.xi);
+}
+
 void CrossCheck::CompareLaw(const StepRecord& step) {
   const double t = step.time;
   const Expectation& expect = setup_->scenario().expect;
   motion_.Add(StepCheck::kTold, CompareTold(step), t);
-  motion_.Add(StepCheck::kTorqueApplied, LawCheck::CompareApplied(step), t);
-  motors_.Add(step.known != nullptr ? step.known->tau : step.command.tau, step.response.motor_torques,
-              step.reading.state.xi);
+  CompareMotors(step);
   sensors_.Add(step.told.state, ToldOf(step));
   if (step.command.tracks && t >= expect.from) {
     motion_.Add(StepCheck::kExpectPosition, step.error.position.norm(), t);

@@ -44,7 +44,8 @@ class CrossCheck {
   void CompareModel(const StepRecord& step);
   /// The others, which compare motion and forces.
   void CompareMotion(const StepRecord& step) { motion_.Compare(step); }
-  /// What is asked while everything settles: questions 3 and 4, and whether bodies are apart.
+  /// What is asked while everything settles: questions 3 and 4, whether motors give what they are sent, and
+  /// whether bodies are apart.
   void CompareSettling(const StepRecord& step);
   /// The law's question: are the torques those of (53)-(55), and do they do what is expected? After the other
   /// two.
@@ -85,6 +86,8 @@ class CrossCheck {
   /// The engine's at what the controller was told; contacts that need not fit together are the controller's.
   void ReadControllersTerms(const StepRecord& step);
   /// What the controller's rigid system does under the torques that were sent.
+  /// Did the joints get what was sent?
+  void CompareMotors(const StepRecord& step);
   void FindMeant(const StepRecord& step);
   /// Of torques that the controller computed at this step.
   const LawErrors& CompareControl(const StepRecord& step);

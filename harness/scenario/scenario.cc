@@ -50,6 +50,7 @@ void ReadModel(const TomlValue& value, const std::filesystem::path& folder, Scen
   scenario->model_file = ReadPath(table, "file", folder);
   if (const auto list = table.Find("overrides")) {
     for (const TomlValue& entry : list->AsList()) scenario->model_overrides.push_back(entry.AsText());
+    scenario->own_model_overrides = scenario->model_overrides.size();
   }
   table.RejectUnused();
 }

@@ -159,6 +159,9 @@ struct Scenario {
 
   std::string model_file;                    ///< Empty for the shipped one.
   std::vector<std::string> model_overrides;  ///< "PATH=VALUE" of the parameter file.
+  /// How many of them, the first, stand in the scenario itself: they make the parameter file's robot that of
+  /// the scene. The others change what the controller believes alone.
+  size_t own_model_overrides = 0;
   std::string mjcf_file;                     ///< Empty for the shipped one.
   PlantOptions plant;
   GraspOptions grasp;

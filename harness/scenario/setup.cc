@@ -44,11 +44,13 @@ void SetStiffness(double time_constant, double impedance, mjtNum* solref, mjtNum
   std::copy_n(constant, mjNIMP, solimp);
 }
 
-/// The robot that a rigid plant moves: the parameter file's, whatever the scenario makes the controller
-/// believe.
+/// The robot that a rigid plant moves: the scenario's, whatever the controller is made to believe.
 std::unique_ptr<RobotModel> ReadPlantModel(const Scenario& scenario, const std::filesystem::path& robot) {
   if (scenario.plant.type != PlantType::kRigid) return nullptr;
-  return std::make_unique<RobotModel>(ParseRobotModel(ReadTextFile(robot.string()), robot.string(), {}));
+  const std::vector<std::string>& all = scenario.model_overrides;
+  const std::vector<std::string> own(all.begin(),
+                                     all.begin() + static_cast<std::ptrdiff_t>(scenario.own_model_overrides));
+  return std::make_unique<RobotModel>(ParseRobotModel(ReadTextFile(robot.string()), robot.string(), own));
 }
 
 /// From -1 to 1.

@@ -40,7 +40,8 @@ class Setup {
 
   [[nodiscard]] const Scenario& scenario() const { return scenario_; }
   [[nodiscard]] const RobotModel& model() const { return model_; }
-  /// The robot that a rigid plant moves, without the scenario's changes to the model; null for the engine.
+  /// The robot that a rigid plant moves, without what the controller alone is made to believe; null for the
+  /// engine.
   [[nodiscard]] const RobotModel* plant_model() const { return plant_model_.get(); }
   /// With the scenario's changes.
   [[nodiscard]] const mjModel& engine() const { return *engine_; }

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 #include "controller/control/trajectory_controller.h"
@@ -278,6 +279,40 @@ TEST(RigidRun, TheEngineComesToItAsItsContactsBecomeStiff) {
   EXPECT_GT(soft, 1e-9);
   // (1 - d) / d is 11 times smaller.
   EXPECT_GT(soft / stiff, 5.0);
+}
+
+// Whatever a scenario holds and with which robot; those that the plant refuses say why.
+TEST(RigidRun, EveryScenarioThatItTakesPasses) {
+  int passed = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(SourcePath("/harness/shipped/scenarios"))) {
+    if (entry.path().extension() != ".toml") continue;
+    const std::string name = entry.path().stem().string();
+    if (name == "paper-rest") continue;  // whose wheels are asked for more than they can give
+    SCOPED_TRACE(name);
+    std::unique_ptr<ShippedRun> run;
+    try {
+      run =
+          std::make_unique<ShippedRun>(name, std::vector<std::string>{kEuler, "duration=0.05", "settle=0.1"});
+    } catch (const InputError& error) {
+      const std::string why = error.what();
+      EXPECT_TRUE(why.find("bonded") != std::string::npos || why.find("task") != std::string::npos) << why;
+      continue;
+    }
+    const RunResult& result = run->Run();
+    EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
+    ++passed;
+  }
+  EXPECT_GE(passed, 12);
+}
+
+// What a scenario changes in the parameter file makes it the scene's robot; what --set changes, the
+// controller's alone.
+TEST(RigidRun, IsOfTheScenariosRobot) {
+  const ShippedRun ring("two-hands", {kRigid, "model.object.mass=1.1"});
+  EXPECT_EQ(ring.setup().plant_model()->object()->body.mass, 1.0);
+  EXPECT_EQ(ring.setup().model().object()->body.mass, 1.1);
+  const ShippedRun believed("hold", {kRigid, "model.object.mass=0.21"});
+  EXPECT_EQ(believed.setup().plant_model()->object()->body.mass, 0.2);
 }
 
 }  // namespace
