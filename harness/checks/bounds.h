@@ -3,6 +3,8 @@
 // The bounds of questions two to five: one number each for the shipped plant and gains, in
 // step_check_table.h, and how it scales with what a scenario changes.
 
+#include <algorithm>
+
 #include "harness/checks/step_check_table.h"
 #include "harness/scenario/scenario.h"
 
@@ -16,7 +18,8 @@ namespace dexcheck {
 
 /// The bound of a check in that scenario, but for what the scenario itself says under [bounds] and [expect].
 [[nodiscard]] inline double CalcBound(const StepCheckInfo& info, const Scenario& scenario) {
-  return info.bound * CalcScale(info.scaling, scenario);
+  const double bound = info.bound * CalcScale(info.scaling, scenario);
+  return info.is_relative ? std::max(bound, scenario.tolerance) : bound;
 }
 
 /// A bound that the scenario itself states: for the plant and the gains of its file. Where these are set

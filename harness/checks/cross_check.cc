@@ -21,6 +21,7 @@ CrossCheck::NotIdeal::NotIdeal(const Setup& setup, std::span<const Motor> motors
       controller(setup.controller_side(), setup.fingertips(), setup.scenario().control.orientation) {
   // What is told of robot, object and contacts need not fit together: contacts are compared at the truth.
   controller.LeaveOutContacts();
+  controller.RaiseBounds(setup.scenario().tolerance);
 }
 
 CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool knows_law)
@@ -37,6 +38,7 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
       actuation_(setup.model()),
       meant_force_(VectorXd::Zero(setup.model().num_velocities())) {
   if (!setup.bonds().empty()) model_.LeaveOutContacts();
+  model_.RaiseBounds(setup.scenario().tolerance);
   if (setup.joint_motion() != nullptr && knows_law) {
     joint_law_.emplace(setup);
   } else if (!setup.scenario().task && knows_law) {

@@ -93,6 +93,8 @@ struct StepCheckInfo {
   const char* name;
   CheckKind kind;
   const char* unit;
+  /// Compares model and engine relative to their own size: a scenario's tolerance holds where it is wider.
+  bool is_relative = false;
   double bound;  ///< With the shipped plant and gains.
   Scaling scaling = Scaling::kNone;
   const char* formula = "";  ///< Of the bound, and why it is that; the table in README.md.
@@ -128,6 +130,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "law_torque",
      .kind = CheckKind::kLaw,
      .unit = "1",
+     .is_relative = true,
      .bound = kLawTorqueBound,
      .formula = "1e-12",
      .reason = "rounding of the terms, 1e-15, through Gram matrices of condition number^2; the condition "
@@ -140,6 +143,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "law_demand",
      .kind = CheckKind::kLaw,
      .unit = "1",
+     .is_relative = true,
      .bound = kLawDemandBound,
      .formula = "1e-8 + 10 slip forces",
      .reason = "C_bar' (xi - xi_c) and M_bar' J^+ J_dot (xi - xi_c), which slip makes, are taken off",
@@ -228,6 +232,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "balance_robot",
      .kind = CheckKind::kBalance,
      .unit = "1",
+     .is_relative = true,
      .bound = kBalanceRobotBound,
      .formula = "1e-6 + (g tilt + 2 slip w) sqrt(m) + f_t r_sunk / (2 r) + 2 tilt_rate sqrt(2 E)",
      .reason = "rounding of forces that cancel; the state that is judged is level and does not slip",
@@ -240,6 +245,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "balance_object",
      .kind = CheckKind::kBalance,
      .unit = "1",
+     .is_relative = true,
      .bound = 1e-9,
      .formula = "1e-9",
      .reason = "rounding of the object's terms",
@@ -250,6 +256,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "reduced_acceleration",
      .kind = CheckKind::kPrediction,
      .unit = "1",
+     .is_relative = true,
      .bound = 1e-6,
      .formula = "1e-6 + give",
      .reason = "what contacts hold back of forces that change, computed at each step; the rest is of second "
@@ -260,6 +267,7 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "contact_force",
      .kind = CheckKind::kPrediction,
      .unit = "1",
+     .is_relative = true,
      .bound = 1e-7,
      .formula = "1e-7 + give",
      .reason = "likewise",

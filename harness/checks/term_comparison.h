@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <vector>
@@ -14,6 +15,10 @@ class TermComparison {
  public:
   /// One for each term asked, in the table's order.
   [[nodiscard]] std::span<const CheckRecord> records() const { return records_; }
+  /// Every bound is at least this: what a scenario's tolerance asks for.
+  void RaiseBounds(double least) {
+    for (CheckRecord& record : records_) record.bound = std::max(record.bound, least);
+  }
   /// Both sides' numbers at the last state.
   [[nodiscard]] const TermContext& context() const { return context_; }
 

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <exception>
 #include <memory>
@@ -18,6 +19,7 @@
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
 #include "harness/cli/shipped_files.h"
+#include "harness/cli/tolerance_options.h"
 #include "harness/engine/machine.h"
 #include "harness/report/write_report.h"
 #include "harness/run/half_step.h"
@@ -31,6 +33,7 @@ struct RunRequest {
   std::string scenario;
   std::string out;
   std::vector<std::string> overrides;
+  ToleranceOptions judging;
   std::uint64_t seed = 0;
   bool no_check = false;
   bool no_log = false;
@@ -84,7 +87,11 @@ LoopParts MakeParts(const RunRequest& request, const Setup& setup, const std::fi
 
 int RunScenario(const RunRequest& request) {
   const bool quiet = request.quiet || request.json;
-  const ScenarioFiles files = FindScenario(request.scenario, request.overrides, request.seed);
+  std::vector<std::string> overrides = request.overrides;
+  if (const std::optional<double> tolerance = request.judging.Find()) {
+    overrides.push_back("tolerance=" + FormatNumber(*tolerance));
+  }
+  const ScenarioFiles files = FindScenario(request.scenario, overrides, request.seed);
   std::optional<OutputFile> junit;
   if (!request.junit_file.empty()) junit.emplace(request.junit_file);
   const Setup setup(files.scenario, files.robot, files.mjcf);
@@ -224,6 +231,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
                               "Set a key of the scenario, or with model. before it one of the parameter file")
                    .TypeName("KEY=VALUE")
                    .Repeatable();
+  const std::array<Option, 2> judging = AddToleranceOptions(command, &request->judging);
   Option seed = command.AddOption("--seed", &request->seed, "Vary posture and grasp at random; 0 does not")
                     .TypeName("N")
                     .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
@@ -253,6 +261,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
   scenario.Excludes(list).Excludes(replay);
   list.Excludes(replay);
   // What would be ignored is refused.
+  for (Option option : judging) option.Excludes(list).Excludes(replay);
   no_log.Excludes(video).Excludes(out);
   all.Excludes(quiet).Excludes(json);
   json.Excludes(quiet);

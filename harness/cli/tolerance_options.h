@@ -2,6 +2,7 @@
 
 // --digits and --tolerance: how published numbers, which are rounded when printed, are judged.
 
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <optional>
@@ -23,8 +24,8 @@ struct ToleranceOptions {
   }
 };
 
-/// Adds the two options, of which one may be given.
-inline void AddToleranceOptions(Command command, ToleranceOptions* options) {
+/// Adds the two options, of which one may be given. @returns them.
+inline std::array<Option, 2> AddToleranceOptions(Command command, ToleranceOptions* options) {
   constexpr int kMostDigits = 15;
   const auto fraction = [](const std::string& text) {
     double value = 0.0;
@@ -38,10 +39,12 @@ inline void AddToleranceOptions(Command command, ToleranceOptions* options) {
                                        "Agreement to this many digits of a term's scale is enough")
                             .TypeName("N")
                             .Check(WholeNumber(1, kMostDigits));
-  command.AddOption("--tolerance", &options->tolerance, "The same as a relative tolerance")
-      .TypeName("REL")
-      .Check(fraction)
-      .Excludes(digits);
+  const Option tolerance =
+      command.AddOption("--tolerance", &options->tolerance, "The same as a relative tolerance")
+          .TypeName("REL")
+          .Check(fraction)
+          .Excludes(digits);
+  return {digits, tolerance};
 }
 
 }  // namespace dexcheck::cli

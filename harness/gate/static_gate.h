@@ -41,4 +41,9 @@ struct GateResult {
 /// analytic model lacks. engine_fields.h says of each field of the engine's model how it is seen.
 GateResult RunStaticGate(const Adapter& adapter);
 
+/// Judges checks by a relative tolerance where that is wider than their bound.
+void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records);
+/// The same of a result, whose findings are then those that the tolerance leaves.
+void JudgeByTolerance(double tolerance, GateResult* gate);
+
 }  // namespace dexcheck

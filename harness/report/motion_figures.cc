@@ -151,22 +151,44 @@ class MotionFigures {
     Add(std::move(figure));
   }
 
-  static bool IsFinger(const std::string& joint) {
+  /// By name, as the paper's robot has them: "rf1_2".
+  static bool IsPapersFinger(const std::string& joint) {
     return joint.size() > 3 && (joint[0] == 'r' || joint[0] == 'l') && joint[1] == 'f' &&
            joint.find('_') != std::string::npos;
   }
 
-  void AddTorques() {
+  /// Whether it is one of the fingers that hold the object. They are told apart by what stands before the
+  /// underscore, unless that is the same of all fingertips.
+  [[nodiscard]] bool Grasps(const std::string& joint) const {
     const SignalInfo* const contacts = run_.Find("contact/overlap");
-    const auto grasps = [&](const std::string& joint) {
-      return IsFinger(joint) && contacts != nullptr &&
-             std::any_of(contacts->columns.begin(), contacts->columns.end(),
-                         [&](const std::string& tip) { return NameFinger(tip) == NameFinger(joint); });
+    if (contacts == nullptr || contacts->columns.empty()) return false;
+    const std::vector<std::string>& tips = contacts->columns;
+    const auto is_of = [](const std::string& finger) {
+      return [finger](const std::string& part) { return NameFinger(part) == finger; };
     };
-    const auto idle = [&](const std::string& joint) { return IsFinger(joint) && !grasps(joint); };
-    const auto left = [](const std::string& joint) { return joint.starts_with("l_"); };
-    const auto trunk = [](const std::string& joint) {
-      return joint.starts_with("wheel") || joint.starts_with("waist") || joint.starts_with("r_");
+    if (std::all_of(tips.begin(), tips.end(), is_of(NameFinger(tips.front())))) return false;
+    return std::any_of(tips.begin(), tips.end(), is_of(NameFinger(joint)));
+  }
+
+  [[nodiscard]] bool IsFinger(const std::string& joint) const {
+    return IsPapersFinger(joint) || Grasps(joint);
+  }
+
+  /// Whether the torques are those of the paper's robot, whose arms and trunk have figures of their own.
+  [[nodiscard]] bool IsPapersRobot() const {
+    const SignalInfo* const tau = run_.Find("tau");
+    return tau != nullptr && std::any_of(tau->columns.begin(), tau->columns.end(),
+                                         [](const std::string& name) { return name.starts_with("waist"); });
+  }
+
+  void AddTorques() {
+    const bool is_papers = IsPapersRobot();
+    const auto grasps = [&](const std::string& joint) { return Grasps(joint); };
+    const auto idle = [&](const std::string& joint) { return IsFinger(joint) && !Grasps(joint); };
+    const auto left = [&](const std::string& joint) { return is_papers && joint.starts_with("l_"); };
+    const auto trunk = [&](const std::string& joint) {
+      return is_papers &&
+             (joint.starts_with("wheel") || joint.starts_with("waist") || joint.starts_with("r_"));
     };
     Figure figure;
     figure.printed = true;
@@ -181,9 +203,11 @@ class MotionFigures {
     add("fig12f", "12 (f)", "Torques of wheels, waist and right arm", trunk);
     figure.printed = false;
     add("idle_finger_torques", "", "Torques of the other fingers' joints", idle);
-    add("other_torques", "", "Torques of other joints", [&](const std::string& joint) {
-      return !grasps(joint) && !idle(joint) && !left(joint) && !trunk(joint);
-    });
+    const bool are_all = run_.Find("contact/overlap") == nullptr && !is_papers;
+    add("other_torques", "", are_all ? "Torques of the joints" : "Torques of other joints",
+        [&](const std::string& joint) {
+          return !grasps(joint) && !idle(joint) && !left(joint) && !trunk(joint);
+        });
   }
 
   /// How far contacts that the law follows by (40) are from where they are.

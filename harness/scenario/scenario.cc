@@ -317,9 +317,10 @@ std::shared_ptr<const Scenario> ReadWritten(const std::string& text, const std::
 /// @param scenario what is known of it before its file is read.
 Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
                       const std::vector<std::string>& model_overrides, Scenario scenario) {
-  root.RejectOthersThan({"name", "description", "duration", "settle", "start", "start_error", "model",
-                         "plant", "grasp", "task", "trajectory", "joint_motion", "control", "sensing",
-                         "actuation", "disturbance", "mismatch", "bounds", "expect"});
+  root.RejectOthersThan({"name",        "description", "duration",     "settle",  "start",
+                         "start_error", "tolerance",   "model",        "plant",   "grasp",
+                         "task",        "trajectory",  "joint_motion", "control", "sensing",
+                         "actuation",   "disturbance", "mismatch",     "bounds",  "expect"});
   scenario.name = root.Get("name").AsName();
   if (const auto description = root.Find("description")) scenario.description = description->AsText();
   scenario.duration = root.Get("duration").AsPositive();
@@ -331,6 +332,10 @@ Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
     if (const auto xyz = table.Find("xyz")) scenario.start_error.head<3>() = xyz->AsVector<3>();
     if (const auto zyz = table.FindAngles<3>("zyz")) scenario.start_error.tail<3>() = *zyz;
     table.RejectUnused();
+  }
+  if (const auto tolerance = root.Find("tolerance")) {
+    scenario.tolerance = tolerance->AsNotNegative();
+    if (scenario.tolerance >= 1.0) tolerance->Fail("must be below 1");
   }
   if (const auto model = root.Find("model")) ReadModel(*model, folder, &scenario);
   scenario.model_overrides.insert(scenario.model_overrides.end(), model_overrides.begin(),

@@ -156,13 +156,14 @@ struct Scenario {
   double settle = 0.0;    ///< Before t = 0, s.
   Start start = Start::kRest;
   Vector6d start_error = Vector6d::Zero();  ///< X_d - X_o at t = 0: m, rad.
+  double tolerance = 0.0;  ///< Relative, of what model and engine are compared by where it is wider.
 
   std::string model_file;                    ///< Empty for the shipped one.
   std::vector<std::string> model_overrides;  ///< "PATH=VALUE" of the parameter file.
   /// How many of them, the first, stand in the scenario itself: they make the parameter file's robot that of
   /// the scene. The others change what the controller believes alone.
   size_t own_model_overrides = 0;
-  std::string mjcf_file;                     ///< Empty for the shipped one.
+  std::string mjcf_file;  ///< Empty for the shipped one.
   PlantOptions plant;
   GraspOptions grasp;
   TrajectoryMaker trajectory;       ///< None for a task or a motion of joints.

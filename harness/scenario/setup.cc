@@ -90,6 +90,7 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
   RemoveLooks(engine_.get(), pushing);
   adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
   gate_ = RunStaticGate(*adapter_);
+  if (scenario_.tolerance > 0.0) JudgeByTolerance(scenario_.tolerance, &gate_);
   WatchSolids(mjcf.string());
   ApplyPlantOptions();
   try {

@@ -136,6 +136,26 @@ TEST_F(OwnArm, DoesNotPassWithAnotherMass) {
   EXPECT_THAT(result.out, HasSubstr("forearm"));
 }
 
+// A number that was rounded when it was printed.
+TEST_F(OwnArm, PassesToTheDigitsThatItsNumbersHave) {
+  WriteText(folder_.path() / "arm.xml", ReplaceOnce(kArm, "mass=\"0.8\"", "mass=\"0.800004\""));
+  const auto run = [&](std::vector<std::string> options) {
+    options.insert(options.begin(), {"run", "own.toml", "--quiet"});
+    return Run(options);
+  };
+  EXPECT_EQ(run({"--no-log"}).exit_code, 1);
+  EXPECT_EQ(run({"--no-log", "--digits", "6"}).exit_code, 1);
+  const ProgramResult judged = run({"--digits", "5", "--out", "judged"});
+  EXPECT_EQ(judged.exit_code, 0) << judged.out << judged.err;
+  EXPECT_EQ(run({"--no-log", "--tolerance", "2e-5"}).exit_code, 0);
+  EXPECT_EQ(run({"--no-log", "--set", "tolerance=2e-5"}).exit_code, 0);
+  const Json summary = Json::parse(ReadText(folder_.path() / "judged/summary.json"));
+  EXPECT_EQ(summary.at("checks").at("M_bar").at("bound").get<double>(), 1e-5);
+  EXPECT_EQ(Run({"run", "--replay", "judged"}).exit_code, 0);
+  EXPECT_TRUE(IsRefused(run({"--no-log", "--set", "tolerance=1"}), {"tolerance", "below 1", "1"}));
+  EXPECT_EQ(Run({"run", "--replay", "judged", "--digits", "5"}).exit_code, 2);
+}
+
 TEST_F(OwnArm, WhatCannotBeIsOneLine) {
   struct Case {
     const char* assignment;
