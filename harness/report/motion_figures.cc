@@ -158,7 +158,7 @@ class MotionFigures {
   }
 
   /// Whether it is one of the fingers that hold the object. They are told apart by what stands before the
-  /// underscore, unless that is the same of all fingertips.
+  /// underscore; another robot's, if that is not the same of all fingertips.
   [[nodiscard]] bool Grasps(const std::string& joint) const {
     const SignalInfo* const contacts = run_.Find("contact/overlap");
     if (contacts == nullptr || contacts->columns.empty()) return false;
@@ -166,7 +166,8 @@ class MotionFigures {
     const auto is_of = [](const std::string& finger) {
       return [finger](const std::string& part) { return NameFinger(part) == finger; };
     };
-    if (std::all_of(tips.begin(), tips.end(), is_of(NameFinger(tips.front())))) return false;
+    const bool are_alike = std::all_of(tips.begin(), tips.end(), is_of(NameFinger(tips.front())));
+    if (are_alike && !IsPapersFinger(joint)) return false;
     return std::any_of(tips.begin(), tips.end(), is_of(NameFinger(joint)));
   }
 

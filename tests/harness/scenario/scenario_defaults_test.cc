@@ -189,8 +189,9 @@ std::string Show(const TrajectoryMaker& make) {
 
 /// All that the reader made of a scenario's keys.
 std::string Show(const Scenario& scenario) {
-  std::string text = fmt::format("{} {} {} {} {}\n", scenario.description, scenario.duration, scenario.settle,
-                                 static_cast<int>(scenario.start), Show(scenario.start_error));
+  std::string text =
+      fmt::format("{} {} {} {} {} {}\n", scenario.description, scenario.duration, scenario.settle,
+                  static_cast<int>(scenario.start), Show(scenario.start_error), scenario.tolerance);
   text += Show(scenario.plant) + "\n" + Show(scenario.grasp) + "\n" + Show(scenario.control) + "\n";
   text += Show(scenario.imperfections.sensing) + "\n" + Show(scenario.imperfections.actuation) + "\n";
   for (const auto& push : scenario.imperfections.disturbances) text += Show(push) + "\n";
