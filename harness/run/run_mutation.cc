@@ -77,10 +77,25 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
       compiled_(LoadMjcf(mjcf_)) {
   if (scenario.task)
     throw InputError(scenario.source + ": task: mistakes are made in runs along a trajectory");
-  MoveToStart(should_stop);
-  if (setup_ == nullptr) return;
+  MakeSetups();
   ListMistakes();
+  if (!scenario.joint_motion) MoveToStart(should_stop);
   if (!should_stop()) RequireNoMistakeToPass(should_stop);
+}
+
+void RunCampaign::MakeSetups() {
+  if (scenario_.joint_motion) {
+    // Arms settle fast, and a motion of joints has no later beginning: mistakes are there from the first.
+    Scenario scenario = scenario_;
+    scenario.duration = options_.from + options_.duration;
+    scenario.settle = std::min(scenario.settle, kSettle);
+    setup_ = MakeSetup(scenario, nullptr);
+    return;
+  }
+  // Even a run that is looked at from its beginning starts settled, one step in.
+  options_.from = std::max(options_.from, scenario_.plant.time_step);
+  setup_ = MakeSetup(MakeScenario(options_.from, options_.duration, 0.0), nullptr);
+  nudged_ = MakeSetup(MakeScenario(options_.from, options_.duration, kNudge), nullptr);
 }
 
 void RunCampaign::ListMistakes() {
@@ -143,26 +158,13 @@ void RunCampaign::GoToStart(const LoopParts& parts) const {
 }
 
 void RunCampaign::MoveToStart(const std::function<bool()>& should_stop) {
-  if (scenario_.joint_motion) {
-    // Arms settle fast, and a motion of joints has no later beginning: mistakes are there from the first.
-    Scenario scenario = scenario_;
-    scenario.duration = options_.from + options_.duration;
-    scenario.settle = std::min(scenario.settle, kSettle);
-    setup_ = MakeSetup(scenario, nullptr);
-    return;
-  }
-  // Even a run that is looked at from its beginning starts settled, one step in.
-  const double from = std::max(options_.from, scenario_.plant.time_step);
-  options_.from = from;
-  const std::unique_ptr<Setup> whole = MakeSetup(MakeScenario(0.0, from, 0.0), nullptr);
+  const std::unique_ptr<Setup> whole = MakeSetup(MakeScenario(0.0, options_.from, 0.0), nullptr);
   LoopParts parts = MakeLoopParts(*whole);
   EnginePlant* const plant = FindEngine(parts);
   ClosedLoop loop(*whole, /*check=*/false, std::move(parts));
   if (!loop.Settle(should_stop)) return;
   while (!loop.is_finished() && !should_stop()) loop.Step();
   start_ = plant->simulation().GetState();
-  setup_ = MakeSetup(MakeScenario(from, options_.duration, 0.0), nullptr);
-  nudged_ = MakeSetup(MakeScenario(from, options_.duration, kNudge), nullptr);
 }
 
 void RunCampaign::RequireNoMistakeToPass(const std::function<bool()>& should_stop) {

@@ -56,8 +56,9 @@ class RunCampaign {
   bool Run(size_t index, const std::function<bool()>& should_stop);
 
  private:
-  void MoveToStart(const std::function<bool()>& should_stop);
+  void MakeSetups();
   void ListMistakes();
+  void MoveToStart(const std::function<bool()>& should_stop);
   void GoToStart(const LoopParts& parts) const;
   /// @param nudge by which X_d jumps at the beginning, m and rad.
   [[nodiscard]] Scenario MakeScenario(double from, double duration, double nudge) const;
