@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "controller/common/text.h"
@@ -39,7 +40,7 @@ constexpr double kSettle = 0.3;
 /// The engine's simulation among the parts.
 EnginePlant* FindEngine(const LoopParts& parts) {
   auto* const plant = dynamic_cast<EnginePlant*>(parts.plant.get());
-  if (plant == nullptr) throw InputError("mistakes are made in a run of the engine's plant alone");
+  if (plant == nullptr) throw std::logic_error("a campaign has the engine's plant");
   return plant;
 }
 
@@ -77,6 +78,8 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
       compiled_(LoadMjcf(mjcf_)) {
   if (scenario.task)
     throw InputError(scenario.source + ": task: mistakes are made in runs along a trajectory");
+  if (scenario.plant.type == PlantType::kRigid)
+    throw InputError(scenario.source + ": plant.type: mistakes are made in a run of the engine's plant");
   MakeSetups();
   ListMistakes();
   if (!scenario.joint_motion) MoveToStart(should_stop);

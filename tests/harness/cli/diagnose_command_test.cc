@@ -234,6 +234,7 @@ TEST(MutateRunCommand, RefusesWhatHasNoMeaning) {
   EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "--run", "hold", "--from", "-1"}), {"--from", "-1"}));
   EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "--run", "hold", "--samples", "5"}), {"--samples", "--run"}));
   EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "--run", "lift"}), {"lift.toml", "task"}));
+  EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "--run", "paper-rigid"}), {"paper-rigid.toml", "plant.type"}));
   EXPECT_TRUE(IsRefused(RunDexcheck({"mutate", "--run", "nowhere"}), {"nowhere"}));
 }
 
