@@ -137,6 +137,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     fmt::print("{}: {}\n", scenario.name, scenario.description);
     fmt::print("{:.3f} of {:.3f} s simulated, {} steps of {} ms\n", loop.time(), scenario.duration,
                loop.record().step, 1e3 * scenario.plant.time_step);
+    if (scenario.tolerance > 0.0) fmt::print("judged to a relative tolerance of {:g}\n", scenario.tolerance);
     if (!scenario.imperfections.is_ideal()) {
       for (const std::string& key : scenario.imperfections.asked) fmt::print("asked for: {}\n", key);
     }

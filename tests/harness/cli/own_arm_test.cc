@@ -147,6 +147,8 @@ TEST_F(OwnArm, PassesToTheDigitsThatItsNumbersHave) {
   EXPECT_EQ(run({"--no-log", "--digits", "6"}).exit_code, 1);
   const ProgramResult judged = run({"--digits", "5", "--out", "judged"});
   EXPECT_EQ(judged.exit_code, 0) << judged.out << judged.err;
+  EXPECT_THAT(Run({"run", "own.toml", "--no-log", "--digits", "5"}).out,
+              HasSubstr("judged to a relative tolerance of 1e-05\n"));
   EXPECT_EQ(run({"--no-log", "--tolerance", "2e-5"}).exit_code, 0);
   EXPECT_EQ(run({"--no-log", "--set", "tolerance=2e-5"}).exit_code, 0);
   const Json summary = Json::parse(ReadText(folder_.path() / "judged/summary.json"));
