@@ -4,6 +4,7 @@
 
 #include <array>
 #include <chrono>
+#include <cstddef>
 #include <cstring>
 
 #include "controller/common/text.h"
@@ -20,7 +21,7 @@ constexpr std::array<int, 6> kSignals = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABR
 /// What the process has once, however many objects there are.
 struct Handlers {
   int users = 0;
-  std::array<char, size_t{1} << 16U> stack{};  // since the caller's may be full
+  alignas(std::max_align_t) std::array<char, size_t{1} << 16U> stack{};  // since the caller's may be full
   stack_t old_stack{};
   std::array<struct sigaction, kSignals.size()> old_actions{};
 };
