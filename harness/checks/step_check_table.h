@@ -93,8 +93,8 @@ struct StepCheckInfo {
   const char* name;
   CheckKind kind;
   const char* unit;
-  /// Compares model and engine relative to their own size: ten times a scenario's tolerance hold where that is
-  /// wider.
+  /// Compares model and engine relative to their own size: ten times a scenario's tolerance hold where that
+  /// is wider.
   bool is_relative = false;
   double bound;  ///< With the shipped plant and gains.
   Scaling scaling = Scaling::kNone;
