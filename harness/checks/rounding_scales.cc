@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "harness/checks/random_states.h"
+
 namespace dexcheck {
 namespace {
 
@@ -36,6 +38,15 @@ double CalcReach(const RobotModel& model) {
   return farthest;
 }
 
+/// An arm is the difference of points in the world, with a few rounding errors of their coordinates' size
+/// however short it is; a bound allows as many of the arm's own for each joint of a chain.
+double CalcArm(const RobotModel& model, double reach) {
+  constexpr double kErrorsOfWorld = 4.0;
+  double world = reach + model.base().X_B0.translation().norm();
+  if (model.base().type != BaseType::kFixed) world += std::sqrt(3.0) * StateRange{}.area;
+  return std::max(reach, kErrorsOfWorld * world / (kErrorsPerJoint * (model.max_depth() + 1)));
+}
+
 }  // namespace
 
 double CalcRoundingBound(int depth, double factors) {
@@ -48,7 +59,10 @@ double CalcInertiaScale(double mass, const Matrix3d& a, const Matrix3d& b) {
 }
 
 RoundingScales::RoundingScales(const RobotModel& model)
-    : model_(&model), base_velocities_(model.num_base_velocities()), reach_(CalcReach(model)) {
+    : model_(&model),
+      base_velocities_(model.num_base_velocities()),
+      reach_(CalcReach(model)),
+      arm_(CalcArm(model, reach_)) {
   squared_rate_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
   subtree_mass_.assign(static_cast<size_t>(model.num_joints()) + 1, 0.0);
   subtree_mass_[0] = model.base().type == BaseType::kFixed ? 0.0 : model.base_with_wheels().mass;
@@ -79,20 +93,20 @@ void RoundingScales::SetState(const ModelTerms& terms, const Eigen::Ref<const Ve
     fastest = std::max(fastest, rate);
   }
   angular_rate_ = std::sqrt(fastest);
-  linear_rate_ = std::sqrt(sliding) + angular_rate_ * reach_;
+  linear_rate_ = std::sqrt(sliding) + angular_rate_ * arm_;
 }
 
 double RoundingScales::CalcVelocityScale(int coordinate) const {
   if (coordinate >= base_velocities_) {
     const bool slides =
         model_->joints()[static_cast<size_t>(coordinate - base_velocities_)].type == JointType::kPrismatic;
-    return slides ? 1.0 : reach_;
+    return slides ? 1.0 : arm_;
   }
-  if (base_velocities_ == 6) return coordinate < 3 ? 1.0 : reach_;
-  if (base_velocities_ == 3) return coordinate < 2 ? 1.0 : reach_;
-  if (model_->base().velocity == DriveVelocity::kTwist) return coordinate == 0 ? 1.0 : reach_;
+  if (base_velocities_ == 6) return coordinate < 3 ? 1.0 : arm_;
+  if (base_velocities_ == 3) return coordinate < 2 ? 1.0 : arm_;
+  if (model_->base().velocity == DriveVelocity::kTwist) return coordinate == 0 ? 1.0 : arm_;
   return 0.5 * model_->base().wheel_radius +
-         model_->base().wheel_radius / model_->base().wheel_distance * reach_;
+         model_->base().wheel_radius / model_->base().wheel_distance * arm_;
 }
 
 double RoundingScales::GetSubtreeMass(int coordinate) const {
@@ -112,7 +126,7 @@ double RoundingScales::CalcGravityScale(int coordinate) const {
 }
 
 double RoundingScales::acceleration() const {
-  const double straight = reach_ > 0.0 ? linear_rate_ / reach_ : 0.0;
+  const double straight = arm_ > 0.0 ? linear_rate_ / arm_ : 0.0;
   return linear_rate_ * std::max(angular_rate_, straight);
 }
 

@@ -33,7 +33,7 @@ class RoundingScales {
   /// Of the longest chain of joints.
   [[nodiscard]] int depth() const { return model_->max_depth(); }
   /// Of the robot's points' distances from the base, m.
-  [[nodiscard]] double length() const { return reach_; }
+  [[nodiscard]] double length() const { return arm_; }
   /// Length (or 1) by which a velocity coordinate moves points.
   [[nodiscard]] double CalcVelocityScale(int coordinate) const;
   /// Mass that a velocity coordinate moves, kg.
@@ -64,6 +64,8 @@ class RoundingScales {
   const RobotModel* model_;
   int base_velocities_;
   double reach_;
+  /// The reach, or the shortest arm that rounding of coordinates in the world leaves its bounds, m.
+  double arm_;
   double rotors_ = 0.0;               // sum of the joints' armature, kg m^2
   std::vector<double> subtree_mass_;  // base first
   std::vector<double> squared_rate_;  // scratch of SetState, base first

@@ -179,6 +179,12 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     fmt::print("  {}: {}: {:.12g} in the model, {:.12g} in the MJCF\n", finding.check, finding.where,
                finding.model, finding.engine);
   }
+  const std::vector<GateFinding>& findings = setup.gate().findings;
+  const bool has_servos = std::any_of(findings.begin(), findings.end(), [](const GateFinding& finding) {
+    return finding.check.starts_with("motor_");
+  });
+  if (has_servos)
+    fmt::print("  A run sends torques: each actuator must be a <motor>, not a servo or a muscle.\n");
 }
 
 std::string WriteJUnit(const Setup& setup, const ClosedLoop& loop, const RunResult& result) {

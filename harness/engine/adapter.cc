@@ -10,6 +10,7 @@
 #include "harness/engine/data_without_contacts.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
+#include "harness/engine/robot_tree.h"
 
 namespace dexcheck {
 namespace {
@@ -80,7 +81,7 @@ int FindLinkBody(const mjModel& engine, const Joint& joint, int joint_id, const 
 std::set<int> ListBaseJoints(const RobotModel& model, const mjModel& engine) {
   std::set<int> joints;
   const auto add_joints_of = [&](const std::string& body_name) {
-    const int body = mj_name2id(&engine, mjOBJ_BODY, body_name.c_str());
+    const int body = FindByName(engine, mjOBJ_BODY, body_name);
     if (body < 0) return;
     for (int k = 0; k < engine.body_jntnum[body]; ++k) joints.insert(engine.body_jntadr[body] + k);
   };
@@ -88,7 +89,7 @@ std::set<int> ListBaseJoints(const RobotModel& model, const mjModel& engine) {
   if (model.object()) add_joints_of(model.object()->name);
   if (model.base().type == BaseType::kDifferentialDrive) {
     for (const std::string& name : {model.base().wheel_joint_right, model.base().wheel_joint_left}) {
-      joints.insert(mj_name2id(&engine, mjOBJ_JOINT, name.c_str()));
+      joints.insert(FindByName(engine, mjOBJ_JOINT, name));
     }
   }
   return joints;
@@ -110,7 +111,7 @@ void Adapter::MatchJoints(const std::string& engine_source) {
   std::vector<std::string> only_in_model;
   std::set<int> known = ListBaseJoints(*model_, engine);
   const auto need = [&](mjtObj type, const std::string& kind, const std::string& name) {
-    const int id = mj_name2id(&engine, type, name.c_str());
+    const int id = FindByName(engine, type, name);
     if (id < 0) only_in_model.push_back(kind + " " + Quote(name));
     return id;
   };
@@ -128,8 +129,16 @@ void Adapter::MatchJoints(const std::string& engine_source) {
   for (const Frame& frame : model_->frames()) frame_sites_.push_back(need(mjOBJ_SITE, "site", frame.name));
   if (model_->object()) object_body_ = need(mjOBJ_BODY, "body", model_->object()->name);
   std::vector<std::string> only_in_engine;
+  const BaseType base = model_->base().type;
+  const std::set<int> trees = FindTrees();
   for (int id = 0; id < engine.njnt; ++id) {
-    if (!known.contains(id)) only_in_engine.push_back("joint " + Quote(NameOf(engine, mjOBJ_JOINT, id)));
+    if (known.contains(id)) continue;
+    const bool may_stand_apart = base == BaseType::kFixed || base == BaseType::kFloating;
+    if (may_stand_apart && !trees.empty() && !trees.contains(FindTree(engine, id))) {
+      other_joints_.push_back(id);
+      continue;
+    }
+    only_in_engine.push_back("joint " + Quote(NameOf(engine, mjOBJ_JOINT, id)));
   }
   if (!only_in_model.empty() || !only_in_engine.empty()) {
     std::string problem = "does not match " + model_->spec().source;
@@ -176,6 +185,16 @@ void Adapter::MatchJoints(const std::string& engine_source) {
            Quote(NameOf(engine, mjOBJ_BODY, parent)));
     }
   }
+}
+
+std::set<int> Adapter::FindTrees() const {
+  std::set<int> trees;
+  for (const int joint : joint_ids_) {
+    if (joint >= 0) trees.insert(FindTree(*engine_, joint));
+  }
+  const bool floats = model_->base().type == BaseType::kFloating;
+  if (floats && link_bodies_[0] > 0) trees.insert(engine_->body_rootid[link_bodies_[0]]);
+  return trees;
 }
 
 void Adapter::MatchBase(const std::string& engine_source) {
@@ -234,7 +253,7 @@ void Adapter::MatchWheels(const mjData& reference, const std::string& engine_sou
   for (const std::string& name : {model_->base().wheel_joint_right, model_->base().wheel_joint_left}) {
     const std::string key = engine_source + ": wheel joint " + Quote(name) + ": ";
     EngineWheel wheel;
-    wheel.joint = mj_name2id(engine_, mjOBJ_JOINT, name.c_str());
+    wheel.joint = FindByName(*engine_, mjOBJ_JOINT, name);
     const int body = engine_->jnt_bodyid[wheel.joint];
     if (engine_->jnt_type[wheel.joint] != mjJNT_HINGE ||
         MovingBody(*engine_, engine_->body_parentid[body]) != link_bodies_[0]) {

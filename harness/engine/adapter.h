@@ -6,6 +6,7 @@
 #include <mujoco/mujoco.h>
 
 #include <array>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -57,6 +58,10 @@ class Adapter {
   /// Right and left wheel; empty unless the base is a differential drive.
   [[nodiscard]] const std::vector<EngineWheel>& wheels() const { return wheels_; }
 
+  /// Engine's joints that are no part of the robot, since nothing joins them to it (robot_tree.h): objects in
+  /// the scene beside a robot whose base is fixed or floats. Terms leave them out.
+  [[nodiscard]] const std::vector<int>& other_joints() const { return other_joints_; }
+
   /// Engine's joints that move the base: none, a free joint, or slide, slide, hinge.
   [[nodiscard]] const std::vector<int>& base_joints() const { return base_joints_; }
   /// Rates of those joints' dofs when the base yaws and its anchor (the point whose velocity the joints have:
@@ -79,6 +84,8 @@ class Adapter {
 
  private:
   void MatchJoints(const std::string& engine_source);
+  /// The trees of the engine's model in which the robot has joints; none when no joint is found.
+  [[nodiscard]] std::set<int> FindTrees() const;
   void MatchBase(const std::string& engine_source);
   void MatchWheels(const mjData& reference, const std::string& engine_source);
   [[nodiscard]] double GetHingeYaw(const mjtNum* qpos) const;
@@ -94,6 +101,7 @@ class Adapter {
   std::vector<EngineWheel> wheels_;
   int object_body_ = -1;
 
+  std::vector<int> other_joints_;
   std::vector<int> base_joints_;
   bool base_is_free_ = false;
   Pose X_0b_ = Pose::Identity();                  // body of the free joint, or the hinge's anchor

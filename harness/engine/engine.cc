@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -124,6 +125,34 @@ MjDataPtr MakeData(const mjModel& model) {
 std::string NameOf(const mjModel& model, mjtObj type, int id) {
   const char* name = mj_id2name(&model, type, id);
   return name == nullptr || *name == '\0' ? "#" + std::to_string(id) : name;
+}
+
+namespace {
+
+EngineSize CountElements(const mjModel& model, mjtObj type) {
+  switch (type) {
+    case mjOBJ_BODY:
+      return model.nbody;
+    case mjOBJ_JOINT:
+      return model.njnt;
+    case mjOBJ_SITE:
+      return model.nsite;
+    default:
+      return 0;
+  }
+}
+
+}  // namespace
+
+int FindByName(const mjModel& model, mjtObj type, const std::string& name) {
+  const int id = mj_name2id(&model, type, name.c_str());
+  if (id >= 0 || !name.starts_with('#')) return id;
+  int number = -1;
+  const char* const end = name.data() + name.size();
+  const std::from_chars_result read = std::from_chars(name.data() + 1, end, number);
+  if (read.ec != std::errc() || read.ptr != end || number < 0) return -1;
+  const char* const own = mj_id2name(&model, type, number);
+  return number < CountElements(model, type) && (own == nullptr || *own == '\0') ? number : -1;
 }
 
 bool CanTouch(const mjModel& model, int geom) {

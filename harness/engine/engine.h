@@ -34,6 +34,9 @@ MjDataPtr MakeData(const mjModel& model);
 /// Name of an element, or "#ID" when it has none.
 std::string NameOf(const mjModel& model, mjtObj type, int id);
 
+/// The body, joint or site of a name as NameOf gives it: "#ID" is one that has none. -1 when there is none.
+int FindByName(const mjModel& model, mjtObj type, const std::string& name);
+
 /// Whether a geom takes part in contacts at all: by an explicit pair, or by its contype or conaffinity.
 bool CanTouch(const mjModel& model, int geom);
 

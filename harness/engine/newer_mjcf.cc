@@ -239,7 +239,14 @@ DowngradedMjcf DowngradeMjcf(std::string_view text, const std::string& source) {
 std::string ExplainNewerMjcf(const std::string& message) {
   const std::optional<std::string> element = FindQuoted(message, "Element ");
   if (!element) return {};
+  const std::string downgrade = "; dexcheck import FILE --downgrade --out COPY.xml writes a copy ";
+  // What the copy says in the older way, of two words.
+  const std::optional<std::string> keyword = FindQuoted(message, "invalid keyword: ");
+  if (keyword && *element == "option" && *keyword == "implicitfast")
+    return "; it is new since MuJoCo 2.3.3 and acts on the integrator" + downgrade + "with \"implicit\"";
   const std::optional<std::string> attribute = FindQuoted(message, "unrecognized attribute: ");
+  if (attribute && *element == "compiler" && *attribute == "assetdir")
+    return "; it is new since MuJoCo 2.3.0" + downgrade + "with meshdir and texturedir";
   if (!attribute && message.find("unrecognized element") == std::string::npos) return {};
   const NewerWord* const word = FindNewerWord(*element, attribute.value_or(""));
   if (word == nullptr) return {};
@@ -247,9 +254,7 @@ std::string ExplainNewerMjcf(const std::string& message) {
       "; it is new since MuJoCo " + std::string(word->since) + " and acts on " + NameOf(word->effect);
   if (word->effect == MjcfEffect::kDynamics && word->neutral.empty())
     return since + ": " + std::string(word->advice);
-  return since +
-         "; dexcheck import FILE --downgrade --out COPY.xml writes a copy without what has no effect on the "
-         "dynamics";
+  return since + downgrade + "without what has no effect on the dynamics";
 }
 
 }  // namespace dexcheck

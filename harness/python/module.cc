@@ -144,8 +144,9 @@ class Robot {
       is_file = false;
       result.comparison = CompareFunctions(file_, TakeFunctions(other), urdf_, options);
     }
-    if (digits > 0) JudgeByTolerance(std::pow(10.0, -digits), &result.comparison.result);
-    if (is_file) ExplainComparison(urdf_, &result.comparison);
+    const double tolerance = digits > 0 ? std::pow(10.0, -digits) : 0.0;
+    if (tolerance > 0.0) JudgeByTolerance(tolerance, &result.comparison.result);
+    if (is_file) ExplainComparison(urdf_, &result.comparison, tolerance);
     return result;
   }
 

@@ -21,6 +21,13 @@
 namespace dexcheck {
 namespace {
 
+/// Nothing moves in a run but the robot, its base and its object.
+void RequireNothingElse(const Adapter& adapter, const std::string& mjcf) {
+  if (adapter.other_joints().empty()) return;
+  throw InputError(mjcf + ": must have nothing that moves but the robot and its object, has joint " +
+                   Quote(NameOf(adapter.engine(), mjOBJ_JOINT, adapter.other_joints().front())));
+}
+
 /// Deep enough that the engine sees a contact, less than any grasp force makes it, m.
 constexpr double kStartPenetration = 1e-6;
 
@@ -89,6 +96,7 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
   }
   RemoveLooks(engine_.get(), pushing);
   adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
+  RequireNothingElse(*adapter_, mjcf.string());
   gate_ = RunStaticGate(*adapter_);
   if (scenario_.tolerance > 0.0) JudgeByTolerance(scenario_.tolerance, &gate_);
   WatchSolids(mjcf.string());

@@ -5,6 +5,7 @@
 
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/robot_tree.h"
 #include "harness/sides/alike_names.h"
 #include "harness/sides/join_names.h"
 #include "harness/sides/mjcf_reader.h"
@@ -30,7 +31,7 @@ class EngineCompletion {
 
  private:
   [[nodiscard]] int FindEngineJoint(const Joint& joint) const {
-    return mj_name2id(&engine_, mjOBJ_JOINT, NameInFile(joint).c_str());
+    return FindByName(engine_, mjOBJ_JOINT, NameInFile(joint));
   }
 
   void TakeNamesOfJoints() {
@@ -48,8 +49,8 @@ class EngineCompletion {
 
   /// A base that the file does not state floats if the engine's does, in the frame of the body of one name.
   void TakeBase() {
-    const int body = FindFloatingBase(engine_);
-    if (body < 0) return;
+    const int body = FindRobotTree(engine_, engine_source_).floating_body;
+    if (body == 0) return;
     if (!robot_.states_base) {
       LetBaseFloat(&robot_);
       result_.notes.push_back("base: " + robot_.spec.source +
@@ -96,7 +97,7 @@ class EngineCompletion {
       // Of several joints of one body the last moves it; the links between them have no body.
       if (id + 1 < engine_.body_jntadr[body] + engine_.body_jntnum[body]) continue;
       rename(&joint.link, body);
-      if (IsOnBase(joint) && mj_name2id(&engine_, mjOBJ_BODY, base.link.c_str()) < 0) {
+      if (IsOnBase(joint) && FindByName(engine_, mjOBJ_BODY, base.link) < 0) {
         rename(&base.link, engine_.body_weldid[engine_.body_parentid[body]]);
       }
     }
@@ -152,7 +153,7 @@ class EngineCompletion {
   void DropFrames() {
     std::vector<std::string> dropped;
     const auto has_no_site = [&](const Frame& frame) {
-      const bool lacks = mj_name2id(&engine_, mjOBJ_SITE, frame.name.c_str()) < 0;
+      const bool lacks = FindByName(engine_, mjOBJ_SITE, frame.name) < 0;
       if (lacks) dropped.push_back(frame.name);
       return lacks;
     };

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "harness/engine/engine.h"
 #include "harness/sides/complete_description.h"
 #include "harness/sides/description_check.h"
 #include "harness/sides/description_match.h"
+#include "harness/sides/engine_extras.h"
+#include "harness/sides/join_names.h"
 #include "harness/sides/model_comparison.h"
 #include "harness/sides/read_description.h"
 #include "harness/sides/robot_file.h"
@@ -22,6 +25,15 @@ void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& m
   notes->insert(notes->end(), more.begin(), more.end());
 }
 
+/// What moves in a scene and is no part of the robot.
+void NoteOthers(const Adapter& adapter, std::vector<std::string>* notes) {
+  std::vector<std::string> names;
+  for (const int joint : adapter.other_joints())
+    names.push_back(NameOf(adapter.engine(), mjOBJ_JOINT, joint));
+  if (!names.empty())
+    notes->push_back("no part of the robot, since nothing joins them to it: joints " + JoinNames(names));
+}
+
 /// A parameter file against the engine.
 void CompareTableWithEngine(const ConsistencyOptions& options, const Progress& progress,
                             Comparison* comparison) {
@@ -31,6 +43,7 @@ void CompareTableWithEngine(const ConsistencyOptions& options, const Progress& p
   const Adapter adapter(*comparison->model, *engine, comparison->second.string());
   comparison->result = CheckConsistency(adapter, options, progress);
   AppendTo(&comparison->notes, CheckDescription(table, adapter, &comparison->result.gate));
+  NoteOthers(adapter, &comparison->notes);
   AppendTo(&comparison->notes, DescribeCoordinates(table));
 }
 
@@ -38,10 +51,19 @@ void CompareTableWithEngine(const ConsistencyOptions& options, const Progress& p
 void CompareDescriptionWithEngine(const UrdfOptions& urdf, const ConsistencyOptions& options,
                                   const Progress& progress, Comparison* comparison) {
   RobotDescription robot = ReadDescription(comparison->first, urdf);
+  const RobotDescription written = robot;
   const MjModelPtr engine = LoadMjcf(comparison->second);
+  const bool is_mjcf = FindFormat(comparison->first) == RobotFormat::kMjcf;
+  if (!is_mjcf) {
+    const std::optional<std::string> motors =
+        SetAsideMotors(comparison->second.filename().string(), engine.get());
+    if (motors) robot.notes.push_back(*motors);
+  }
   Completion completion = CompleteFromEngine(*engine, comparison->second.filename().string(), &robot);
   comparison->model.emplace(robot.spec);
   const Adapter adapter(*comparison->model, *engine, comparison->second.string());
+  std::optional<Extras> extras;
+  if (is_mjcf) extras = CompareExtras(written, comparison->first, adapter, engine.get());
   comparison->result = CheckConsistency(adapter, options, progress);
   GateResult& gate = comparison->result.gate;
   std::erase_if(gate.records, [&](const CheckRecord& record) {
@@ -49,9 +71,11 @@ void CompareDescriptionWithEngine(const UrdfOptions& urdf, const ConsistencyOpti
                                  completion.unstated.end();
   });
   const std::vector<std::string> others = CheckDescription(robot, adapter, &gate);
-  for (const auto& notes : {robot.notes, completion.notes, others, DescribeCoordinates(robot)}) {
+  if (extras) AddExtras(*extras, &gate);
+  if (!is_mjcf) AppendTo(&comparison->notes, robot.notes);  // an MJCF's are about what CompareExtras compares
+  for (const auto& notes : {completion.notes, others, DescribeCoordinates(robot)})
     AppendTo(&comparison->notes, notes);
-  }
+  NoteOthers(adapter, &comparison->notes);
 }
 
 /// Two descriptions without the engine.
@@ -89,9 +113,10 @@ Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::p
   return comparison;
 }
 
-void ExplainComparison(const UrdfOptions& urdf, Comparison* comparison) {
+void ExplainComparison(const UrdfOptions& urdf, Comparison* comparison, double tolerance) {
   if (comparison->result.Agrees()) return;
-  comparison->hypotheses = ExplainDifference(comparison->first, comparison->second, urdf);
+  comparison->hypotheses = ExplainDifference(comparison->first, comparison->second, urdf,
+                                             std::max(tolerance, kHypothesisTolerance));
 }
 
 std::vector<std::string> ListDifferences(const Comparison& comparison) {

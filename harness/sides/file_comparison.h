@@ -32,8 +32,9 @@ Comparison CompareFiles(
     const std::filesystem::path& a, const std::filesystem::path& b, const UrdfOptions& urdf,
     const ConsistencyOptions& options, const std::function<bool(long)>& progress = [](long) { return true; });
 
-/// Tries the mistakes that people make on what differs, after any judgement by a tolerance.
-void ExplainComparison(const UrdfOptions& urdf, Comparison* comparison);
+/// Tries the mistakes that people make on what differs, after any judgement by a tolerance, which is given
+/// again: what agrees to it is no mistake.
+void ExplainComparison(const UrdfOptions& urdf, Comparison* comparison, double tolerance = 0.0);
 
 /// One line for each constant and term that differs: where first, where worst, both values.
 std::vector<std::string> ListDifferences(const Comparison& comparison);

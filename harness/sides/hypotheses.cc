@@ -125,19 +125,19 @@ std::vector<DescribedPart> ListParts(const RobotDescription& robot, int joint, c
 
 }  // namespace
 
-std::vector<Hypothesis> ExplainDifference(RobotDescription a, RobotDescription b) {
+std::vector<Hypothesis> ExplainDifference(RobotDescription a, RobotDescription b, double tolerance) {
   try {
     CompleteEachOther(&a, &b);
   } catch (const InputError&) {
     return {};
   }
-  return FindHypotheses(a, b);
+  return FindHypotheses(a, b, tolerance);
 }
 
 std::vector<Hypothesis> ExplainDifference(const std::filesystem::path& a, const std::filesystem::path& b,
-                                          const UrdfOptions& options) {
+                                          const UrdfOptions& options, double tolerance) {
   try {
-    return ExplainDifference(ReadDescription(a, options), ReadDescription(b, options));
+    return ExplainDifference(ReadDescription(a, options), ReadDescription(b, options), tolerance);
   } catch (const InputError&) {
     return {};
   }

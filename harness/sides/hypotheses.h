@@ -22,20 +22,25 @@ struct Hypothesis {
   double explained = 0.0;
 };
 
+/// To what numbers agree once a mistake is undone, relative: published ones have some seven digits.
+inline constexpr double kHypothesisTolerance = 1e-6;
+
 /// Tries the mistakes that are known, each on all parts and on each part, and says which explain why `a`
 /// differs from `b`; those of geometry first, then gravity, then those of bodies, each at most once per part.
 /// A mistake is named only when what it is about agrees to `tolerance` (relative) with the mistake undone,
 /// and did not before.
 /// @param a, b as CompleteEachOther left them; `a` is the one that may be wrong.
 std::vector<Hypothesis> FindHypotheses(const RobotDescription& a, const RobotDescription& b,
-                                       double tolerance = 1e-6);
+                                       double tolerance = kHypothesisTolerance);
 
 /// The same of two descriptions as they were read; nothing when they are of two mechanisms.
-std::vector<Hypothesis> ExplainDifference(RobotDescription a, RobotDescription b);
+std::vector<Hypothesis> ExplainDifference(RobotDescription a, RobotDescription b,
+                                          double tolerance = kHypothesisTolerance);
 
 /// The same of two files; nothing when one of them can be no description (an MJCF with several free bodies).
 std::vector<Hypothesis> ExplainDifference(const std::filesystem::path& a, const std::filesystem::path& b,
-                                          const UrdfOptions& options = {});
+                                          const UrdfOptions& options = {},
+                                          double tolerance = kHypothesisTolerance);
 
 // The parts of the search.
 

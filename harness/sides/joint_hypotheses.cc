@@ -17,6 +17,9 @@
 namespace dexcheck {
 namespace {
 
+constexpr const char* kZerosOffset = "zeros look offset";
+constexpr const char* kZerosRounded = "zeros differ as rounded numbers do";
+
 Matrix3d MakeRotation(const Vector3d& axis, double angle) {
   return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
 }
@@ -366,18 +369,20 @@ class JointSearch {
     };
     for (const double offset : comparison_.ListOffsets(rows_, i)) {
       OwnRow row = given;
+      constexpr double kRounded = 1e-5;  // rad or m: numbers printed with six digits are off by as much
+      const char* const many = std::abs(offset) < kRounded ? kZerosRounded : kZerosOffset;
       if (row.is_revolute) {
         row.X_PL = row.X_PL * Eigen::AngleAxisd(offset, row.axis);
         constexpr double kDigits = 1e6;
         judge(row,
               "zero looks offset by " + FormatNumber(std::round(RadToDeg(-offset) * kDigits) / kDigits) +
                   " deg",
-              "zeros look offset");
+              many);
       } else {
         row.X_PL = row.X_PL * Eigen::Translation3d(offset * row.axis);
         constexpr double kDigits = 1e9;
         judge(row, "zero looks offset by " + FormatNumber(std::round(-offset * kDigits) / kDigits) + " m",
-              "zeros look offset");
+              many);
       }
     }
     for (const JointMistake& mistake : mistakes) judge(mistake.undo(given), mistake.text, mistake.plural);
@@ -405,7 +410,7 @@ class JointSearch {
         std::vector<std::string> names;
         for (const auto& [i, text] : joints) {
           names.push_back(Name(i));
-          if (plural == "zeros look offset")
+          if (plural == kZerosOffset || plural == kZerosRounded)
             hypothesis.values.push_back("joint " + Name(i) + ": its " + text);
         }
         hypothesis.text = plural + ": " + std::to_string(joints.size()) + " of " +

@@ -8,6 +8,7 @@
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/robot_tree.h"
 #include "harness/sides/engine_coupling.h"
 #include "harness/sides/join_names.h"
 
@@ -36,6 +37,8 @@ class MjcfDescriptionReader {
     robot_.spec.gravity = MapVector(engine_.opt.gravity);
     PlaceBase();
     for (int body = 1; body < engine_.nbody; ++body) AddBody(body);
+    if (robot_.spec.joints.empty() && floating_ <= 0)
+      throw InputError(source_ + ": must have a joint: nothing in it moves");
     robot_.spec.base.body = Combine(base_parts_);
     for (size_t i = 0; i < robot_.spec.joints.size(); ++i) robot_.spec.joints[i].body = Combine(parts_[i]);
     AddSites();
@@ -53,11 +56,22 @@ class MjcfDescriptionReader {
 
   [[nodiscard]] bool IsBase(int body) const { return engine_.body_weldid[body] == 0; }
 
+  /// Of a floating robot the bodies that it carries; otherwise all but those that float.
+  [[nodiscard]] bool IsOfRobot(int body) const {
+    const int root = engine_.body_rootid[body];
+    if (floating_ > 0) return root == floating_;
+    const int count = engine_.body_jntnum[root];
+    return count == 0 || engine_.jnt_type[engine_.body_jntadr[root]] != mjJNT_FREE;
+  }
+
   /// The base's link is the floating body, or the fixed body that everything hangs on; several such bodies
   /// are the world.
   void PlaceBase() {
     places_.resize(static_cast<size_t>(engine_.nbody));
-    floating_ = FindFloatingBase(engine_);
+    const RobotTree robot = FindRobotTree(engine_, source_);
+    floating_ = robot.floating_body;
+    if (!robot.others.empty())
+      robot_.notes.push_back("no part of the robot, which has the most joints: " + JoinNames(robot.others));
     if (floating_ > 0) {
       robot_.spec.base.link = NameOf(engine_, mjOBJ_BODY, floating_);
       LetBaseFloat(&robot_);
@@ -81,7 +95,7 @@ class MjcfDescriptionReader {
   }
 
   void AddBody(int body) {
-    if (floating_ > 0 && engine_.body_rootid[body] != floating_) return;  // stands in the world
+    if (!IsOfRobot(body)) return;
     const Place& parent = places_[static_cast<size_t>(engine_.body_parentid[body])];
     Place place = {parent.joint,
                    parent.X_iL * MapPose(engine_.body_pos + 3 * body, engine_.body_quat + 4 * body)};
@@ -214,7 +228,7 @@ class MjcfDescriptionReader {
   void AddSites() {
     for (int site = 0; site < engine_.nsite; ++site) {
       if (engine_.names[engine_.name_siteadr[site]] == '\0') continue;
-      if (floating_ > 0 && engine_.body_rootid[engine_.site_bodyid[site]] != floating_) continue;
+      if (!IsOfRobot(engine_.site_bodyid[site])) continue;
       const Place& place = places_[static_cast<size_t>(engine_.site_bodyid[site])];
       const Pose X_LF = MapPose(engine_.site_pos + 3 * site, engine_.site_quat + 4 * site);
       robot_.spec.frames.push_back({NameOf(engine_, mjOBJ_SITE, site), place.joint, place.X_iL * X_LF, {}});
@@ -254,7 +268,7 @@ class MjcfDescriptionReader {
   const mjModel& engine_;
   std::string source_;
   RobotDescription robot_;
-  int floating_ = -1;          // the base's body, when it floats
+  int floating_ = 0;           // the base's body, when it floats
   std::vector<Place> places_;  // by body
   std::vector<int> joint_ids_;
   std::vector<MassProperties> base_parts_;
@@ -263,19 +277,6 @@ class MjcfDescriptionReader {
 };
 
 }  // namespace
-
-int FindFloatingBase(const mjModel& engine) {
-  int base = -1;
-  for (int id = 0; id < engine.njnt; ++id) {
-    const int body = engine.jnt_bodyid[id];
-    if (engine.jnt_type[id] == mjJNT_FREE) base = base < 0 ? body : 0;
-  }
-  if (base <= 0) return -1;
-  for (int id = 0; id < engine.njnt; ++id) {
-    if (engine.body_rootid[engine.jnt_bodyid[id]] != base) return -1;
-  }
-  return base;
-}
 
 RobotDescription ReadMjcfDescription(const mjModel& engine, const std::string& source) {
   return MjcfDescriptionReader(engine, source).Read();

@@ -14,10 +14,8 @@ namespace dexcheck {
 /// joint, masses, couplings by equality/joint, named sites. A body's own frame is kept
 /// (DescribedJoint::X_iL); frame i stands at the joint's anchor. A body with several joints becomes as many
 /// links, of which the last carries the mass. What a table has no place for is noted.
-/// @throws InputError for ball joints, and for free joints but one that carries all that moves.
+/// Of several trees, the robot is the one with the most joints (robot_tree.h).
+/// @throws InputError for free joints within it, and where nothing moves.
 RobotDescription ReadMjcfDescription(const mjModel& engine, const std::string& source);
-
-/// The body that a free joint moves and that carries all other joints; -1 when there is none.
-int FindFloatingBase(const mjModel& engine);
 
 }  // namespace dexcheck

@@ -150,6 +150,12 @@ TEST(NewerMjcf, WhatTheEngineDoesNotLoadIsExplained) {
   EXPECT_TRUE(
       testing::Throws<InputError>([] { LoadMjcfText(WriteMjcf({.in_body = "<frame/>"}), "f"); },
                                   "it is new since MuJoCo 3.1.0 and acts on dynamics: load the file in"));
+  EXPECT_TRUE(testing::Throws<InputError>(
+      [] { LoadMjcfText(WriteMjcf({.option = "integrator=\"implicitfast\""}), "f"); },
+      "it is new since MuJoCo 2.3.3 and acts on the integrator; dexcheck import FILE --downgrade"));
+  EXPECT_TRUE(testing::Throws<InputError>(
+      [] { LoadMjcfText("<mujoco><compiler assetdir=\"meshes\"/></mujoco>", "f"); },
+      "it is new since MuJoCo 2.3.0; dexcheck import FILE --downgrade"));
   EXPECT_TRUE(testing::Throws<InputError>([] { DowngradeMjcf("<mujoco>", "f"); }, "f:1: is not XML"));
   EXPECT_TRUE(testing::Throws<InputError>([] { DowngradeMjcf("<robot/>", "f"); }, "f: must be an MJCF"));
 }

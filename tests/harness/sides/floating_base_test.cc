@@ -10,13 +10,17 @@
 #include "harness/engine/engine.h"
 #include "harness/sides/complete_description.h"
 #include "harness/sides/description_match.h"
+#include "harness/sides/file_comparison.h"
 #include "harness/sides/mjcf_reader.h"
 #include "harness/sides/model_comparison.h"
 #include "harness/sides/parameter_writer.h"
+#include "harness/sides/read_description.h"
 #include "harness/sides/urdf_reader.h"
+#include "tests/common/files.h"
 #include "tests/common/legged_robots.h"
 #include "tests/common/list_failures.h"
 #include "tests/common/random_robot.h"
+#include "tests/common/throws.h"
 #include "tests/common/urdf_text.h"
 
 namespace dexcheck::floating_base_test {
@@ -24,6 +28,8 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using testing::TempFolder;
+using testing::WriteText;
 
 ConsistencyOptions Few(long samples = 20) {
   ConsistencyOptions options;
@@ -175,13 +181,59 @@ TEST_P(LeggedRobots, FixedInOneFileAndFloatingInTheOtherIsSaid) {
 
 INSTANTIATE_TEST_SUITE_P(FloatingBase, LeggedRobots, ::testing::Values("quadruped", "humanoid"));
 
-TEST(FloatingBase, OneBodyMustCarryAll) {
+// A scene has objects beside the robot, and published files have parts parked in the world.
+TEST(FloatingBase, TheRobotIsTheTreeWithTheMostJoints) {
+  const auto make = [](const std::string& more) {
+    return "<mujoco><worldbody><body name=\"trunk\"><freejoint/><geom size=\"1\"/><body name=\"leg\"><joint "
+           "name=\"j\"/><geom size=\"1\"/><body name=\"foot\"><joint name=\"k\"/><geom "
+           "size=\"1\"/></body></body></body>" +
+           more + "</worldbody></mujoco>";
+  };
+  const TempFolder folder;
+  const std::filesystem::path alone = folder.path() / "alone.xml";
+  const std::filesystem::path scene = folder.path() / "scene.xml";
+  WriteText(alone, make(""));
+  WriteText(scene,
+            make("<body name=\"ball\"><freejoint name=\"b\"/><geom size=\"1\"/></body><body name=\"spare\">"
+                 "<joint name=\"s\"/><geom size=\"1\"/></body>"));
+  const RobotDescription robot = ReadDescription(scene);
+  EXPECT_EQ(robot.spec.base.link, "trunk");
+  EXPECT_EQ(robot.spec.joints.size(), 2U);
+  EXPECT_EQ(robot.notes,
+            std::vector<std::string>{"no part of the robot, which has the most joints: ball, spare"});
+  ConsistencyOptions options;
+  options.samples = 10;
+  for (const auto& [a, b] : {std::pair(alone, scene), std::pair(scene, alone), std::pair(scene, scene)}) {
+    const Comparison comparison = CompareFiles(a, b, {}, options);
+    EXPECT_TRUE(comparison.result.Agrees()) << ::testing::PrintToString(ListDifferences(comparison));
+    const bool is_said = std::find(comparison.notes.begin(), comparison.notes.end(),
+                                   "no part of the robot, since nothing joins them to it: joints b, s") !=
+                         comparison.notes.end();
+    EXPECT_EQ(is_said, b == scene);
+  }
+}
+
+TEST(FloatingBase, TwoRobotsAreRefused) {
   const MjModelPtr two = LoadMjcfText(
-      "<mujoco><worldbody><body name=\"a\"><freejoint/><geom size=\"1\"/><body><joint name=\"j\"/><geom "
-      "size=\"1\"/></body></body><body name=\"b\"><freejoint/><geom size=\"1\"/></body></worldbody></mujoco>",
+      "<mujoco><worldbody><body name=\"a\"><freejoint/><geom size=\"1\"/></body><body name=\"b\"><freejoint/>"
+      "<geom size=\"1\"/></body></worldbody></mujoco>",
       "two.xml");
-  EXPECT_EQ(FindFloatingBase(*two), -1);
-  EXPECT_THROW(ReadMjcfDescription(*two, "two.xml"), InputError);
+  EXPECT_TRUE(
+      testing::Throws<InputError>([&] { ReadMjcfDescription(*two, "two.xml"); },
+                                  {"two.xml: must have one robot; \"a\" and \"b\" carry as many joints"}));
+}
+
+// The engine's coordinates are the world's, and round by the world's size.
+TEST(FloatingBase, SmallRobotsAgreeToRounding) {
+  const TempFolder folder;
+  const std::filesystem::path file = folder.path() / "bug.xml";
+  WriteText(
+      file,
+      R"(<mujoco><worldbody><body name="bug"><freejoint/><geom size="0.02 0.01 0.005" type="box" pos="0.01 0 0"/>
+    <body name="leg" pos="0.01 0 0"><joint name="hip" axis="0 1 0"/><geom size="0.004" pos="0.01 0 0"/></body></body>
+    </worldbody></mujoco>)");
+  const Comparison comparison = CompareFiles(file, file, {}, {});
+  EXPECT_TRUE(comparison.result.Agrees()) << ::testing::PrintToString(ListDifferences(comparison));
 }
 
 }  // namespace

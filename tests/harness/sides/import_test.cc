@@ -17,13 +17,17 @@
 #include "harness/engine/engine.h"
 #include "harness/sides/complete_description.h"
 #include "harness/sides/description_check.h"
+#include "harness/sides/file_comparison.h"
 #include "harness/sides/mjcf_reader.h"
 #include "harness/sides/parameter_writer.h"
+#include "harness/sides/read_description.h"
 #include "harness/sides/urdf_reader.h"
 #include "tests/benchmarks/measured_time.h"
+#include "tests/common/files.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
+#include "tests/common/throws.h"
 #include "tests/common/urdf_text.h"
 
 namespace dexcheck::import_test {
@@ -33,6 +37,8 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::MatrixNear;
+using testing::TempFolder;
+using testing::WriteText;
 
 // Numbers are written to 8 eps of their vector's size; chains of at most 13 joints and a few kg.
 constexpr double kRounding = 1e-12;
@@ -174,18 +180,32 @@ TEST(MjcfDescription, IsTheEnginesModel) {
   ExpectSameModel(model, ParseRobotModel(WriteParameters(robot, "odd.xml"), "odd.toml"), &random);
 }
 
-TEST(MjcfDescription, RefusesFreeJointsWithinARobot) {
-  const MjModelPtr engine = LoadMjcfText(
-      "<mujoco><worldbody><body name=\"a\"><joint name=\"h\"/><geom size=\"1\"/></body><body "
-      "name=\"b\"><joint name=\"j\" type=\"free\"/><geom size=\"1\"/></body></worldbody></mujoco>",
-      "text");
-  try {
-    ReadMjcfDescription(*engine, "robot.xml");
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_EQ(std::string(error.what()),
-              "robot.xml: joint \"j\": must be a hinge, a slide or a ball, got a free joint");
-  }
+TEST(MjcfDescription, RefusesWhatDoesNotMove) {
+  const MjModelPtr engine =
+      LoadMjcfText("<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>", "text");
+  EXPECT_TRUE(testing::Throws<InputError>([&] { ReadMjcfDescription(*engine, "scene.xml"); },
+                                          {"scene.xml: must have a joint: nothing in it moves"}));
+}
+
+// As `dexcheck` names them: "#" and the number in the engine's model.
+TEST(MjcfDescription, JointsAndBodiesWithoutNamesAreCounted) {
+  const TempFolder folder;
+  const std::filesystem::path file = folder.path() / "arm.xml";
+  WriteText(
+      file,
+      "<mujoco><worldbody><body><joint axis=\"0 1 0\"/><geom size=\"0.1\" pos=\"0.1 0 0\"/><body "
+      "pos=\"0.2 0 0\"><joint axis=\"0 1 0\"/><geom size=\"0.1\" pos=\"0.1 0 0\"/></body></body></worldbody>"
+      "</mujoco>");
+  const RobotDescription robot = ReadDescription(file);
+  EXPECT_EQ(robot.spec.joints[1].name, "#1");
+  EXPECT_EQ(robot.spec.joints[1].link, "#2");
+  ConsistencyOptions options;
+  options.samples = 10;
+  const Comparison same = CompareFiles(file, file, {}, options);
+  EXPECT_TRUE(same.result.Agrees()) << ::testing::PrintToString(ListDifferences(same));
+  const std::filesystem::path table = folder.path() / "arm.toml";
+  WriteText(table, WriteParameters(robot, "arm.xml"));
+  EXPECT_TRUE(CompareFiles(table, file, {}, options).result.Agrees());
 }
 
 // What is in a URDF costs no more than what is in a table: both become the same analytic model.

@@ -1,0 +1,47 @@
+#include "harness/engine/robot_tree.h"
+
+#include <map>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/engine/engine.h"
+
+namespace dexcheck {
+
+int FindTree(const mjModel& engine, int joint) {
+  const int root = engine.body_rootid[engine.jnt_bodyid[joint]];
+  const bool floats = engine.body_jntnum[root] > 0 && engine.jnt_type[engine.body_jntadr[root]] == mjJNT_FREE;
+  return floats ? root : 0;
+}
+
+RobotTree FindRobotTree(const mjModel& engine, const std::string& source) {
+  std::map<int, int> joints;  // by tree: how many, free ones not counted
+  for (int id = 0; id < engine.njnt; ++id) joints[FindTree(engine, id)] += engine.jnt_type[id] != mjJNT_FREE;
+  RobotTree robot;
+  int most = -1;
+  for (const auto& [tree, count] : joints) {
+    if (count > most) {
+      most = count;
+      robot.floating_body = tree;
+    }
+  }
+  const auto name = [&](int tree) { return tree == 0 ? "world" : NameOf(engine, mjOBJ_BODY, tree); };
+  for (const auto& [tree, count] : joints) {
+    if (tree == robot.floating_body) continue;
+    if (count == most) {
+      throw InputError(source + ": must have one robot; " + Quote(name(robot.floating_body)) + " and " +
+                       Quote(name(tree)) + " carry as many joints");
+    }
+    if (tree != 0) robot.others.push_back(name(tree));
+  }
+  if (robot.floating_body == 0) return robot;
+  for (int body = 1; body < engine.nbody; ++body) {
+    const bool stands_on_world = engine.body_rootid[body] == body && body != robot.floating_body;
+    const int count = engine.body_jntnum[body];
+    const bool moves = count > 0 && engine.jnt_type[engine.body_jntadr[body]] != mjJNT_FREE;
+    if (stands_on_world && moves) robot.others.push_back(name(body));
+  }
+  return robot;
+}
+
+}  // namespace dexcheck
