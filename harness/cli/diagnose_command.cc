@@ -22,6 +22,8 @@
 #include "harness/diagnosis/file_terms.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/complete_description.h"
+#include "harness/sides/engine_extras.h"
+#include "harness/sides/join_names.h"
 #include "harness/sides/read_description.h"
 #include "harness/sides/robot_file.h"
 
@@ -60,6 +62,20 @@ void PrintRemaining(const DiagnoseRequest& request, const RobotModel& model, con
   }
 }
 
+/// Causes that a rounded number explains, when they are several and there are others: these come first to a
+/// reader.
+std::vector<const Repair*> FindRounded(const Diagnosis& diagnosis, const RobotSpec& written) {
+  constexpr size_t kSeveral = 3;
+  std::vector<const Repair*> rounded;
+  for (const Repair& cause : diagnosis.causes) {
+    const bool stands_alone = cause.kind == RepairKind::kParameters || cause.kind == RepairKind::kEngineOnly;
+    if (!stands_alone) return {};  // numbers are as they were before this one
+    if (LooksRounded(cause, written)) rounded.push_back(&cause);
+  }
+  if (rounded.size() < kSeveral || rounded.size() == diagnosis.causes.size()) return {};
+  return rounded;
+}
+
 /// @param written the model's numbers as they stand in its file.
 void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotSpec& written,
            const Diagnosis& diagnosis, const std::vector<Hypothesis>& hypotheses) {
@@ -72,8 +88,10 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotS
   fmt::print("DISAGREE: {} against {}.\n", file, request.files.mjcf.filename().string());
   PrintHypotheses(hypotheses);
   if (diagnosis.causes.empty()) fmt::print("No change of single numbers explains it.\n");
+  const std::vector<const Repair*> rounded = FindRounded(diagnosis, written);
   int number = 0;
   for (const Repair& cause : diagnosis.causes) {
+    if (std::find(rounded.begin(), rounded.end(), &cause) != rounded.end()) continue;
     fmt::print("{}. {}", ++number, Describe(cause, written, file));
     if (cause.kind == RepairKind::kEngineOnly) {
       fmt::print("\n");
@@ -82,6 +100,13 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotS
     fmt::print("; explains {:.4g} % of the residual\n", 100.0 * cause.explained);
     for (const Repair& equal : cause.equivalents)
       fmt::print("   or, just as well: {}\n", Describe(equal, written, file));
+  }
+  if (!rounded.empty()) {
+    std::vector<std::string> names;
+    for (const Repair* const cause : rounded) names.push_back(DescribeShort(*cause, written));
+    fmt::print("And {} that agree to 4 digits, as rounded numbers do (--digits 4 judges by that): {}\n",
+               rounded.size(), JoinNames(names));
+    number += static_cast<int>(rounded.size());
   }
   if (number > 1) fmt::print("Together: {:.4g} %.\n", 100.0 * diagnosis.explained);
   if (!request.quiet && diagnosis.causes.size() > 1 && diagnosis.ranking.size() > 1) {
@@ -149,12 +174,14 @@ void SortFiles(DiagnoseRequest* request) {
           "must be an MJCF, which is taken to be right (dexcheck consistency compares any two files)");
 }
 
-/// What is to be repaired, completed by what only the MJCF states when it is a URDF.
+/// What is to be repaired, completed by what only the MJCF states when it is a URDF. What a URDF has no place
+/// for is taken out of the engine's model.
 /// @param rows filled with how its joints' rows are written.
-RobotModel ReadGiven(const RobotFiles& files, const mjModel& engine, std::vector<WrittenRow>* rows) {
+RobotModel ReadGiven(const RobotFiles& files, mjModel* engine, std::vector<WrittenRow>* rows) {
   if (FindFormat(files.robot) == RobotFormat::kToml) return ReadRobotModel(files.robot, rows);
   RobotDescription robot = ReadDescription(files.robot);
-  CompleteFromEngine(engine, files.mjcf.filename().string(), &robot);
+  SetAsideMotors(files.mjcf.filename().string(), engine);
+  CompleteFromEngine(*engine, files.mjcf.filename().string(), &robot);
   for (const DescribedJoint& joint : robot.joints) rows->push_back({joint.X_iL, true});
   return RobotModel(robot.spec);
 }
@@ -164,7 +191,7 @@ int Run(DiagnoseRequest request) {
   request.options.tolerance = request.judging.Find().value_or(0.0);
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
   std::vector<WrittenRow> rows;
-  const RobotModel model = ReadGiven(request.files, *engine, &rows);
+  const RobotModel model = ReadGiven(request.files, engine.get(), &rows);
   RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely mistakes)");
   CatchInterrupts();
   std::optional<OutputFile> json;
@@ -183,8 +210,11 @@ int Run(DiagnoseRequest request) {
   for (auto& [cause, share] : diagnosis.ranking) cause = terms.ConvertPart(cause);
   // Mistakes of conventions first; what can only be moved shows no bodies to compare.
   const bool is_open = !diagnosis.agrees && !request.options.by_motion;
-  const std::vector<Hypothesis> hypotheses =
-      is_open ? ExplainDifference(request.files.robot, request.files.mjcf) : std::vector<Hypothesis>();
+  std::vector<Hypothesis> hypotheses;
+  if (is_open) {
+    const double tolerance = std::max(request.options.tolerance, kHypothesisTolerance);
+    hypotheses = ExplainDifference(request.files.robot, request.files.mjcf, {}, tolerance);
+  }
   if (json) json->Write(ToText(request, terms.written(), diagnosis, hypotheses));
   if (request.json_file != "-") {
     if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");

@@ -53,20 +53,22 @@ std::vector<Repair> Neutralise(const Adapter& adapter, const GateResult& gate, m
     causes.push_back(cause);
   };
   for (const GateFinding& finding : gate.findings) {
-    if (finding.engine_only)
-      report(fmt::format("{}: {} of {:.9g}", finding.where, InWords(finding.check), finding.engine));
+    if (!finding.engine_only) continue;
+    report(fmt::format("{}: {} of {:.9g}", finding.where, InWords(finding.check), finding.engine));
+    if (finding.where.starts_with("free joint of "))
+      causes.back().note += " (<joint type=\"free\"> takes the defaults of <joint>, <freejoint> does not)";
   }
   if (causes.empty()) return causes;
   std::vector<int> joints = adapter.joint_ids();
   joints.insert(joints.end(), adapter.base_joints().begin(), adapter.base_joints().end());
   for (const EngineWheel& wheel : adapter.wheels()) joints.push_back(wheel.joint);
   for (const int joint : joints) engine->jnt_stiffness[joint] = 0.0;
-  std::fill_n(engine->dof_frictionloss, engine->nv, 0.0);
   for (const int joint : adapter.base_joints()) {
     const int dofs = engine->jnt_type[joint] == mjJNT_FREE ? 6 : 1;
-    mju_zero(engine->dof_damping + engine->jnt_dofadr[joint], dofs);
-    mju_zero(engine->dof_armature + engine->jnt_dofadr[joint], dofs);
+    for (mjtNum* const values : {engine->dof_damping, engine->dof_armature, engine->dof_frictionloss})
+      mju_zero(values + engine->jnt_dofadr[joint], dofs);
   }
+  for (const EngineWheel& wheel : adapter.wheels()) engine->dof_frictionloss[wheel.dof] = 0.0;
   std::fill_n(engine->tendon_stiffness, engine->ntendon, 0.0);
   std::fill_n(engine->tendon_damping, engine->ntendon, 0.0);
   engine->opt.disableflags = 0;

@@ -26,6 +26,7 @@ constexpr KindText kTexts[] = {
     {"rotation", "deg"},
     {"damping", "N m s/rad"},
     {"armature", "kg m^2"},
+    {"dry friction", "N m"},
     {"lower limit", "m"},
     {"upper limit", "m"},
     {"mass", "kg"},
@@ -97,6 +98,8 @@ auto FindNumber(Spec& spec, const Parameter& p) -> decltype(&spec.base.wheel_rad
       return &joint().damping;
     case Kind::kArmature:
       return &joint().armature;
+    case Kind::kDryFriction:
+      return &joint().dry_friction;
     case Kind::kLowerLimit:
       return &joint().lower;
     case Kind::kUpperLimit:
@@ -165,6 +168,7 @@ std::vector<Parameter> ListParameters(const RobotSpec& spec) {
     for (const Kind kind : {Kind::kAlpha, Kind::kA, Kind::kHomeAngle, Kind::kD}) add(kind, i);
     add(Kind::kPosition, i, 3);
     add(Kind::kRotation, i, 3);
+    if (spec.joints[static_cast<size_t>(i)].dry_friction > 0.0) add(Kind::kDryFriction, i);
     for (const Kind kind :
          {Kind::kDamping, Kind::kArmature, Kind::kLowerLimit, Kind::kUpperLimit, Kind::kMass})
       add(kind, i);
@@ -348,9 +352,10 @@ std::string DescribeQuantity(const Parameter& p) {
 
 std::string UnitOf(const RobotSpec& spec, const Parameter& parameter) {
   if (IsAngle(spec, parameter)) return "deg";
-  const bool of_joint = parameter.kind == Kind::kDamping || parameter.kind == Kind::kArmature;
+  const Kind kind = parameter.kind;
+  const bool of_joint = kind == Kind::kDamping || kind == Kind::kArmature || kind == Kind::kDryFriction;
   if (of_joint && spec.joints[static_cast<size_t>(parameter.index)].type == JointType::kPrismatic)
-    return parameter.kind == Kind::kDamping ? "N s/m" : "kg";
+    return kind == Kind::kDamping ? "N s/m" : kind == Kind::kArmature ? "kg" : "N";
   return TextOf(parameter).unit;
 }
 

@@ -19,6 +19,7 @@ enum class ParameterKind {
   kRotation,       ///< The same as roll, pitch, yaw, rad.
   kDamping,        ///< Of a joint, N m s/rad or N s/m.
   kArmature,       ///< kg m^2 or kg
+  kDryFriction,    ///< N m or N
   kLowerLimit,     ///< rad or m
   kUpperLimit,     ///< rad or m
   kMass,           ///< Of a link, kg.
@@ -54,7 +55,8 @@ struct Parameter {
 };
 
 /// All of them: joints first, in the file's order. What the model ignores (the body of a fixed base, the
-/// rotation of a moving one) is not among them.
+/// rotation of a moving one) is not among them, nor is dry
+/// friction where there is none.
 std::vector<Parameter> ListParameters(const RobotSpec& spec);
 
 /// In the units above. The setter leaves the specification unchecked; RobotModel's constructor checks it.

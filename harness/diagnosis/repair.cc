@@ -195,6 +195,31 @@ double ReadBackPrinted(const RobotSpec& spec, const Parameter& parameter, double
   return IsAngle(spec, parameter) ? DegToRad(printed) : printed;
 }
 
+bool LooksRounded(const Repair& cause, const RobotSpec& spec) {
+  if (cause.kind != RepairKind::kParameters) return false;
+  constexpr double kFourDigits = 1e-4;
+  constexpr double kAngle = 1e-5;  // rad
+  for (size_t i = 0; i < cause.parameters.size(); ++i) {
+    const Parameter& parameter = cause.parameters[i];
+    const double change = std::abs(cause.values[i] - GetValue(spec, parameter));
+    if (IsAngle(spec, parameter)) {
+      if (change > kAngle) return false;
+      continue;
+    }
+    // Entries of a vector or tensor by the largest of it.
+    double size = 0.0;
+    const bool is_tensor = parameter.kind == ParameterKind::kInertia;
+    const bool is_vector =
+        parameter.kind == ParameterKind::kCom || parameter.kind == ParameterKind::kPosition;
+    for (int k = 0; k < (is_tensor || is_vector ? 3 : 1); ++k) {
+      const int component = is_tensor || is_vector ? k : parameter.component;
+      size = std::max(size, std::abs(GetValue(spec, {parameter.kind, parameter.index, component})));
+    }
+    if (change > kFourDigits * size) return false;
+  }
+  return true;
+}
+
 bool IsLikelier(const Repair& a, const Repair& b, const RobotSpec& spec) {
   const auto rank = [&](const Repair& cause) {
     int digits = 0;

@@ -56,6 +56,9 @@ double RoundSolved(const RobotSpec& spec, const Parameter& parameter, double val
 /// The same within a wider accuracy, relative; the value as it is when that is 0.
 double RoundWithin(const RobotSpec& spec, const Parameter& parameter, double value, double accuracy);
 
+/// Whether all numbers of a cause agree to four digits: published numbers are rounded.
+bool LooksRounded(const Repair& cause, const RobotSpec& spec);
+
 /// Of repairs that remove as much, the likelier: whose numbers are rounder, then whose numbers are not zero
 /// in the file, then the earlier kind.
 bool IsLikelier(const Repair& a, const Repair& b, const RobotSpec& spec);

@@ -37,6 +37,7 @@ std::optional<Parameter> FindParameter(const RobotSpec& spec, const GateFinding&
   const int part = finding.location.first;
   if (check == "joint_range")
     return Parameter{finding.entry == 0 ? Kind::kLowerLimit : Kind::kUpperLimit, part, 0};
+  if (check == "joint_dry_friction") return Parameter{Kind::kDryFriction, part, 0};
   if (check == "fingertip_radius") return Parameter{Kind::kSphereRadius, part, 0};
   if (check == "object_mass") return Parameter{Kind::kObjectMass, -1, 0};
   if (check == "object_shape" && std::holds_alternative<SolidTorus>(spec.object->shape))

@@ -317,9 +317,31 @@ class StaticGate {
     }
     Compare("fluid", {}, 0.0, engine_.opt.density);
     Compare("fluid", {}, 0.0, engine_.opt.viscosity);
+    NameBaseJoints(first_finding);
     for (size_t i = first_finding; i < result_.findings.size(); ++i) {
       GateFinding& finding = result_.findings[i];
-      finding.engine_only = finding.check != "joint_dry_friction" || finding.model == 0.0;
+      finding.engine_only =
+          finding.check != "joint_dry_friction" || finding.location.kind != Location::Kind::kJoint;
+    }
+  }
+
+  /// Says of findings at the base that they are about the joints that carry it, and says once what the six
+  /// coordinates of a free joint have in common.
+  void NameBaseJoints(size_t first_finding) {
+    if (adapter_.base_joints().empty()) return;
+    const int type = engine_.jnt_type[adapter_.base_joints().front()];
+    const std::string joint = type == mjJNT_FREE ? "free joint of " : "joints of ";
+    std::vector<GateFinding> findings;
+    findings.swap(result_.findings);
+    for (size_t i = 0; i < findings.size(); ++i) {
+      GateFinding& finding = findings[i];
+      const bool is_of_base = i >= first_finding && finding.location == AtLink(-1);
+      if (is_of_base) finding.where = joint + finding.where;
+      const auto is_same = [&](const GateFinding& other) {
+        return other.check == finding.check && other.where == finding.where && other.engine == finding.engine;
+      };
+      if (is_of_base && std::any_of(result_.findings.begin(), result_.findings.end(), is_same)) continue;
+      result_.findings.push_back(finding);
     }
   }
 

@@ -59,6 +59,55 @@ TEST(DiagnoseCommand, NamesTheCauseWithItsRepair) {
   EXPECT_TRUE(results.at("remaining").empty());
 }
 
+// As a published humanoid has it: the joint of its base takes what was meant for the motors' joints.
+TEST(DiagnoseCommand, TellsWhatActsOnTheJointOfAFloatingBase) {
+  const TempFolder folder;
+  const std::string inertial =
+      "<inertial><origin xyz='0.1 0 0'/><mass value='2'/>"
+      "<inertia ixx='0.01' iyy='0.02' izz='0.02' ixy='0' ixz='0' iyz='0'/></inertial>";
+  WriteText(folder.path() / "robot.urdf",
+            "<robot name='robot'><link name='base'>" + inertial + "</link><link name='leg'>" + inertial +
+                "</link><joint name='hip' type='revolute'><parent link='base'/><child link='leg'/>"
+                "<axis xyz='0 1 0'/><limit lower='-1' upper='1' effort='1' velocity='1'/></joint></robot>");
+  WriteText(folder.path() / "robot.xml", R"(<mujoco><compiler angle="radian"/>
+  <default><joint damping="0.001" armature="0.01" frictionloss="0.1"/></default>
+  <worldbody><body name="base"><joint type="free"/>
+    <inertial pos="0.1 0 0" mass="2" diaginertia="0.01 0.02 0.02"/>
+    <body name="leg"><joint name="hip" axis="0 1 0" limited="true" range="-1 1"/>
+      <inertial pos="0.1 0 0" mass="2.5" diaginertia="0.01 0.02 0.02"/></body></body></worldbody></mujoco>)");
+  const ProgramResult result = RunDexcheck({"diagnose", "robot.urdf", "robot.xml"}, {folder.path()});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  const std::string why =
+      " only in the MJCF: the analytic model has none (<joint type=\"free\"> takes the defaults of <joint>, "
+      "<freejoint> does not)\n";
+  EXPECT_THAT(result.out, HasSubstr("1. link leg: mass 2 kg in robot.urdf, 2.5 kg repairs it"));
+  EXPECT_THAT(result.out, HasSubstr("2. free joint of link base: damping of 0.001" + why +
+                                    "3. free joint of link base: armature of 0.01" + why +
+                                    "4. free joint of link base: dry friction of 0.1" + why));
+  EXPECT_THAT(result.out, HasSubstr("With these repaired the two agree to rounding."));
+}
+
+// Numbers that were rounded stand behind those that are wrong.
+TEST(DiagnoseCommand, RoundedNumbersAreOneLine) {
+  const TempFolder folder;
+  std::string text = ReadText(testing::kParameters + "panda.toml");
+  for (const auto& [number, rounded] :
+       {std::pair("3.228604", "3.2286"), {"3.587895", "3.5879"}, {"1.225946", "1.2259"}}) {
+    text = ReplaceOnce(text, std::string("mass = ") + number, std::string("mass = ") + rounded);
+  }
+  WriteText(folder.path() / "bad.toml", ReplaceOnce(text, "mass = 4.970684", "mass = 5.2"));
+  const ProgramResult result =
+      RunDexcheck({"diagnose", "bad.toml", testing::kMjcf + "panda.xml", "--quiet", "--json", "out.json"},
+                  {folder.path()});
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  EXPECT_THAT(result.out, HasSubstr(": mass 5.2 kg in bad.toml, 4.970684 kg repairs it"));
+  EXPECT_THAT(result.out,
+              HasSubstr("\nAnd 3 that agree to 4 digits, as rounded numbers do (--digits 4 judges "
+                        "by that): "));
+  EXPECT_THAT(result.out, Not(HasSubstr("\n2. ")));
+  EXPECT_EQ(Json::parse(ReadText(folder.path() / "out.json")).at("causes").size(), 4U);
+}
+
 TEST(DiagnoseCommand, JudgesPublishedNumbersByTheirDigits) {
   const TempFolder folder;
   std::string text = ReadText(testing::kParameters + "panda.toml");

@@ -128,7 +128,7 @@ INSTANTIATE_TEST_SUITE_P(
          "damping=\"0.02\" armature=\"0.004\" frictionloss=\"0.1\"", "joint_dry_friction", kWheel},
         {"BaseDryFriction", "robot.xml", "<freejoint name=\"base\"/>",
          "<joint name=\"base\" type=\"free\" limited=\"false\" frictionloss=\"0.1\"/>", "joint_dry_friction",
-         "link platform"},
+         "free joint of link platform"},
         {"FingertipRadius", "robot.xml", "<default class=\"tip\"> <geom size=\"0.009\"",
          "<default class=\"tip\"> <geom size=\"0.0091\"", "fingertip_radius", kFingertip},
         {"FingertipPlace", "robot.xml", "<default class=\"tip\"> <geom size=\"0.009\" pos=\"0 0 -0.0185\"/>",
