@@ -86,7 +86,11 @@ class TreeReader {
 
   std::vector<WrittenRow> Read(TomlTable& root) {
     if (const std::optional<TomlValue> templates = root.Find("template")) ReadTemplates(*templates);
-    for (const TomlValue& value : root.Get("chain").AsList()) ReadChain(value);
+    // One body that floats is a robot.
+    const bool floats = spec_.base.type == BaseType::kFloating;
+    if (const std::optional<TomlValue> chains = floats ? root.Find("chain") : root.Get("chain")) {
+      for (const TomlValue& value : chains->AsList()) ReadChain(value);
+    }
     for (size_t i = 0; i < chains_.size(); ++i) BuildChain(i);
     for (const auto& [joint, mimic] : mimics_)
       spec_.joints[static_cast<size_t>(joint)].coupling = Resolve(joint, mimic);

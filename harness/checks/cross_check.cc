@@ -46,7 +46,11 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
   }
   // A controller that follows its contacts has others than the truth, too.
   const bool follows = setup.scenario().control.kappa == ContactSource::kIntegrated;
-  if (follows || !setup.scenario().imperfections.is_ideal()) known_.emplace(setup, motors);
+  // And joints with dry friction do not do what any law here plans.
+  const std::vector<Joint>& joints = setup.model().joints();
+  const bool has_friction =
+      std::any_of(joints.begin(), joints.end(), [](const Joint& joint) { return joint.dry_friction > 0.0; });
+  if (follows || has_friction || !setup.scenario().imperfections.is_ideal()) known_.emplace(setup, motors);
   using enum StepCheck;
   if (joint_law_ && !joint_law_->has_error_dynamics()) motion_.LeaveOut(kGains);
   if (joint_law_ && !joint_law_->follows_error()) motion_.LeaveOut(kJointDynamics);

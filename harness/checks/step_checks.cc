@@ -246,6 +246,7 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   const VectorXd& xi_dot = step.response.xi_dot;
   actuation_.CalcForce(step.drive.tau, force_);
   if (step.known != nullptr) force_ += step.known->force;
+  AddDryFriction(step.response.dry_friction);
   // Soft contacts become only in some milliseconds what rigid ones are at once.
   if (!is_unjudged_) Predict(step);
   if (mass_factor() == nullptr) return;
@@ -282,6 +283,17 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   if (handling_.partial) force_scale = std::max(force_scale, Weight());
   const double apart = (findings_.f_c_model - findings_.f_c).norm();
   AddLessGive(StepCheck::kContactForce, apart / force_scale, give_->force() / force_scale);
+}
+
+void StepChecks::AddDryFriction(const VectorXd& friction) {
+  if (friction.size() == 0) return;
+  const RobotModel& model = setup_->model();
+  for (int i = 0; i < model.num_joints(); ++i) {
+    // No more than the parameters say: what else is there stays to be found.
+    const double limit = model.joints()[static_cast<size_t>(i)].dry_friction;
+    const Eigen::Index entry = model.num_base_velocities() + i;
+    force_[entry] += std::clamp(friction[entry], -limit, limit);
+  }
 }
 
 double StepChecks::Norm(const VectorXd& force) { return mass_factor()->CalcForceNorm(force, &work_); }

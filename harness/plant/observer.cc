@@ -122,6 +122,7 @@ void Observer::Read(const EngineSimulation& simulation, PlantResponse* response)
   response->support_wrench = ReadSupportWrench(m, d);
   response->support_force = (X_Bo_.linear() * response->support_wrench.head<3>()).z();
   map_.SetState(q_, xi_);
+  ReadDryFriction(d, &response->dry_friction);
   ReadSolverResidual(m, d, response);
   ReadDeparture(m, d, response);
 }
@@ -290,6 +291,18 @@ void Observer::ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* r
   MultiplyBaseInertia(m, d, map_.base_dofs(), carrying, departure_, &M_qacc_);
   response->departure_force.resize(response->xi_dot.size());
   map_.ProjectForce(M_qacc_.data(), response->departure_force);
+}
+
+void Observer::ReadDryFriction(const mjData& d, VectorXd* friction) const {
+  if (d.nf == 0) return friction->resize(0);
+  const std::vector<int>& dofs = adapter_->joint_dofs();
+  const int base = adapter_->model().num_base_velocities();
+  friction->setZero(base + static_cast<Eigen::Index>(dofs.size()));
+  for (int row = d.ne; row < d.ne + d.nf; ++row) {
+    if (d.efc_type[row] != mjCNSTR_FRICTION_DOF) continue;  // of a tendon
+    const auto joint = std::find(dofs.begin(), dofs.end(), d.efc_id[row]);
+    if (joint != dofs.end()) (*friction)[base + (joint - dofs.begin())] = d.efc_force[row];
+  }
 }
 
 void Observer::ReadSolverResidual(const mjModel& m, const mjData& d, PlantResponse* response) {

@@ -44,6 +44,7 @@ class Observer {
   void ReadContacts(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const;
   void ReadBonds(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const;
   [[nodiscard]] Vector6d ReadSupportWrench(const mjModel& m, const mjData& d) const;
+  void ReadDryFriction(const mjData& d, VectorXd* friction) const;
   void ReadSolverResidual(const mjModel& m, const mjData& d, PlantResponse* response);
   [[nodiscard]] int FindFingertip(int geom) const;
   void ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* response);

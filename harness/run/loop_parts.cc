@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "controller/control/joint_controller.h"
 #include "controller/control/trajectory_controller.h"
@@ -35,6 +37,11 @@ double FindFingerFriction(const Setup& setup) {
 
 std::unique_ptr<Plant> MakeRigidPlant(const Setup& setup) {
   const PlantOptions& options = setup.scenario().plant;
+  for (const Joint& joint : setup.plant_model()->joints()) {
+    if (joint.dry_friction > 0.0)
+      throw InputError(setup.scenario().source + ": plant.type: a rigid plant has no dry friction, joint " +
+                       Quote(joint.name) + " has some");
+  }
   const EngineSimulation engine(setup.adapter(), /*implicit_damping=*/false);
   auto plant = std::make_unique<RigidPlant>(
       *setup.plant_model(), setup.adapter(), setup.fingertips(), engine.ListMotors(),

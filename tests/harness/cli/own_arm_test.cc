@@ -129,6 +129,23 @@ TEST_F(OwnArm, WithABallJointIsComparedButNotRun) {
   EXPECT_TRUE(IsRefused(RunWith("model.file=ball.toml"), {"ball.toml", "ball", "turn", "run"}));
 }
 
+// The engine's friction that holds a joint, or lets it slide, is known when the parameters state it.
+TEST_F(OwnArm, WithDryFrictionIsRun) {
+  const std::string with = ReplaceOnce(kArm, "damping=\"0.1\"", "damping=\"0.1\" frictionloss=\"0.5\"");
+  WriteText(folder_.path() / "arm.xml", ReplaceOnce(with, "armature=\"0.01\"", "frictionloss=\"0.2\""));
+  const ProgramResult hidden = Run({"run", "own.toml", "--no-log"});
+  EXPECT_EQ(hidden.exit_code, 1) << hidden.out;
+  EXPECT_THAT(hidden.out, HasSubstr("joint_dry_friction: joint turn on link world: 0 in the model, 0.5 in"));
+  EXPECT_THAT(hidden.out, HasSubstr("balance_robot"));
+  EXPECT_THAT(hidden.out, HasSubstr("FAILS"));
+
+  ASSERT_EQ(Run({"import", "arm.xml", "--out", "arm.toml"}).exit_code, 0);
+  const ProgramResult result = Run({"run", "own.toml", "--out", "run", "--set", "expect.joints=0.05"});
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_EQ(Run({"run", "--replay", "run"}).exit_code, 0);
+  EXPECT_TRUE(IsRefused(RunWith("plant.type=rigid"), {"plant.type", "dry friction", "\"turn\""}));
+}
+
 TEST_F(OwnArm, DoesNotPassWithAnotherMass) {
   WriteText(folder_.path() / "arm.xml", ReplaceOnce(kArm, "mass=\"0.8\"", "mass=\"0.9\""));
   const ProgramResult result = Run({"run", "own.toml", "--no-log"});

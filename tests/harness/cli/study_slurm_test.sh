@@ -26,7 +26,7 @@ chmod 755 .
 cat >study.toml <<'END'
 name = "tiny"
 scenario = "offset"
-set = ["duration=0.05", "settle=0.3"]
+set = ["duration=6", "settle=0.3"]
 [[vary]]
 key = "control.K_p"
 values = [100, 1000, 1e4, 1e6]
@@ -37,7 +37,9 @@ END
 
 # A cluster: its own munge key and socket, three ports by the process id, below those that the system gives out.
 host=$(hostname -s)
+Listens() { (: <>/dev/tcp/127.0.0.1/"$1") 2>/dev/null; }
 port=$((10000 + 4 * ($$ % 5000)))
+while Listens $port || Listens $((port + 1)) || Listens $((port + 2)); do port=$((port + 4)); done
 export SLURM_CONF=$folder/slurm.conf
 cat >slurm.conf <<END
 ClusterName=test
@@ -85,7 +87,7 @@ WaitFor() {
   shift
   until "$@"; do
     if ((SECONDS >= end)); then echo "waited in vain for: $*" >&2; return 1; fi
-    sleep 0.3
+    sleep 0.1
   done
 }
 NodesAreIdle() { [[ $(sinfo --noheader --Node --format=%t 2>/dev/null | grep -c idle) -eq 2 ]]; }
@@ -93,21 +95,35 @@ WaitFor 60 NodesAreIdle
 
 "$dexcheck" study slurm study.toml --tasks 4 >job.sh
 job=$(sbatch --parsable job.sh)
-HasRow() { [[ $(sqlite3 "file:tiny-2-of-4.sqlite?mode=ro" 'SELECT count(*) FROM trials' 2>/dev/null) -ge 1 ]]; }
+# The first task has two trials that take their time and one that diverges at once: its first row comes halfway.
+HasRow() { [[ $(sqlite3 "file:tiny-1-of-4.sqlite?mode=ro" 'SELECT count(*) FROM trials' 2>/dev/null) -ge 1 ]]; }
 WaitFor 60 HasRow
-scontrol requeue "${job}_2"
-IsDone() { [[ -z $(squeue --noheader --jobs="$job" 2>/dev/null) ]]; }
-Requeued() { scontrol show job "${job}_2" | grep -q 'Restarts=1'; }
+# A task that is just ending is refused ("in transitional state"): asked again, it has ended, and is done once more.
+Requeue() { scontrol requeue "${job}_1"; }
+WaitFor 30 Requeue
+# A controller that does not answer is not an empty queue.
+IsDone() {
+  local left
+  left=$(squeue --noheader --jobs="$job" 2>/dev/null) && [[ -z $left ]]
+}
+Requeued() { scontrol show job "${job}_1" | grep -q 'Restarts=1'; }
 WaitFor 30 Requeued
 WaitFor 180 IsDone
 nodes=$(scontrol show job "$job" | grep -oE ' NodeList=n[12]' | sort -u | wc -l)
-[[ $nodes -eq 2 ]] || { echo "tasks ran on $nodes nodes, not 2" >&2; exit 1; }
-scontrol show job "$job" | grep -E '^ *JobState=' | grep -qv COMPLETED && { scontrol show job "$job" >&2; exit 1; }
+[[ $nodes -eq 2 ]] || { scontrol show job "$job" >&2; echo "tasks ran on $nodes nodes, not 2" >&2; exit 1; }
+EachCompleted() {
+  scontrol show job "$job" >states.txt
+  if grep -E '^ *JobState=' states.txt | grep -v COMPLETED; then
+    cat states.txt ./*-of-*.log >&2
+    return 1
+  fi
+}
+EachCompleted
 
 "$dexcheck" study merge --quiet merged.sqlite tiny-*-of-4.sqlite
 "$dexcheck" study run study.toml --db single.sqlite --quiet
 Dump() { sqlite3 "$1" '.mode quote' 'SELECT * FROM study' 'SELECT * FROM trials ORDER BY trial'; }
-[[ $(sqlite3 single.sqlite 'SELECT count(*) FROM trials') -eq 12 ]]
+[[ $(sqlite3 single.sqlite 'SELECT count(*) FROM trials') -eq 12 ]] || { echo "not 12 trials" >&2; exit 1; }
 diff <(Dump merged.sqlite) <(Dump single.sqlite)
 echo "four tasks on two nodes, one requeued: 12 trials equal to those of one process"
 
@@ -136,8 +152,8 @@ END
 "$dexcheck" study slurm search.toml --tasks 2 >search.sh
 job=$(sbatch --parsable search.sh)
 WaitFor 180 IsDone
-scontrol show job "$job" | grep -E '^ *JobState=' | grep -qv COMPLETED && { scontrol show job "$job" >&2; exit 1; }
-[[ $(scontrol show job "$job" | grep -oE ' NodeList=n[12]' | sort -u | wc -l) -eq 2 ]]
+EachCompleted
+[[ $(grep -oE ' NodeList=n[12]' states.txt | sort -u | wc -l) -eq 2 ]] || { cat states.txt >&2; echo "not on two nodes" >&2; exit 1; }
 "$dexcheck" study run search.toml --db search.sqlite --quiet
 [[ $(sqlite3 search.sqlite 'SELECT count(*) FROM trials') -eq 24 ]]
 for part in 1 2; do diff <(Dump search-$part-of-2.sqlite) <(Dump search.sqlite); done

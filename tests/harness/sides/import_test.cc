@@ -187,6 +187,19 @@ TEST(MjcfDescription, RefusesWhatDoesNotMove) {
                                           {"scene.xml: must have a joint: nothing in it moves"}));
 }
 
+TEST(MjcfDescription, OneBodyThatFloatsIsARobot) {
+  const TempFolder folder;
+  const std::filesystem::path file = folder.path() / "ball.xml";
+  WriteText(
+      file,
+      "<mujoco><worldbody><body name=\"ball\"><freejoint/><geom size=\"0.1\"/></body></worldbody></mujoco>");
+  const std::filesystem::path table = folder.path() / "ball.toml";
+  WriteText(table, WriteParameters(ReadDescription(file), "ball.xml"));
+  ConsistencyOptions options;
+  options.samples = 10;
+  EXPECT_TRUE(CompareFiles(table, file, {}, options).result.Agrees());
+}
+
 // As `dexcheck` names them: "#" and the number in the engine's model.
 TEST(MjcfDescription, JointsAndBodiesWithoutNamesAreCounted) {
   const TempFolder folder;
