@@ -34,7 +34,7 @@ list_broken_links() {
     [[ $link != *'#'* ]] || anchor=${link#*#}
     if [[ ! -e $file ]]; then
       echo "$document: $link: no such file"
-    elif [[ -n $anchor ]] && ! list_anchors "$file" | grep -qxF -- "$anchor"; then
+    elif [[ -n $anchor ]] && ! list_anchors "$file" | grep -xF -- "$anchor" >/dev/null; then
       echo "$document: $link: no such heading"
     fi
   done < <(list_links "$document")

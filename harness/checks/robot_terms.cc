@@ -70,7 +70,7 @@ Items ListFrames(const C& c, bool chains) {
 /// Rows of the angular part are pure numbers.
 double ScaleJacobian(const C& c, Eigen::Index row, Eigen::Index col) {
   const double velocity = c.scales->CalcVelocityScale(static_cast<int>(col));
-  return row < 3 ? velocity : Positive(velocity / c.scales->length());
+  return Positive(row < 3 ? velocity : velocity / c.scales->length());
 }
 std::vector<ZeroPattern> ListJacobianZeros(const C& c) {
   std::vector<ZeroPattern> zeros;

@@ -79,6 +79,7 @@ void RoundingScales::SetState(const ModelTerms& terms, const Eigen::Ref<const Ve
   world_length_ = reach_ + model_->base().X_B0.translation().norm();
   if (model_->num_base_positions() == 3) world_length_ += q.head<2>().norm();
   if (model_->base().type == BaseType::kFloating) world_length_ += q.head<3>().norm();
+  world_length_ = Positive(world_length_);  // all may lie at the origin
 
   base_velocity_ = terms.CalcLinkVelocity(-1);
   double sliding = base_velocity_.head<3>().squaredNorm();

@@ -9,6 +9,7 @@
 #include "harness/base/files.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
+#include "harness/engine/give_motors.h"
 #include "harness/engine/mjcf_files.h"
 #include "harness/engine/newer_mjcf.h"
 #include "harness/sides/parameter_writer.h"
@@ -24,6 +25,7 @@ struct ImportRequest {
   std::vector<std::string> packages;
   bool floating = false;
   bool downgrade = false;
+  bool motors = false;
 };
 
 RobotDescription ReadSource(const ImportRequest& request) {
@@ -36,25 +38,28 @@ RobotDescription ReadSource(const ImportRequest& request) {
   return ReadDescription(request.source, options);
 }
 
-/// A copy of a newer MJCF for MuJoCo 2.2.2.
-int WriteDowngraded(const ImportRequest& request) {
-  DowngradedMjcf copy = DowngradeMjcf(ReadBytes(request.source), request.source.string());
+/// A copy of an MJCF, for MuJoCo 2.2.2 or with motors.
+int WriteCopy(const ImportRequest& request) {
+  JoinedMjcf mjcf(request.source);
   const std::filesystem::path from = std::filesystem::absolute(request.source).parent_path();
+  if (request.downgrade) DowngradeMjcf(&mjcf);
+  if (request.motors) GiveMotors(from, &mjcf);
+  std::string copy = mjcf.Print();
   const std::filesystem::path to = std::filesystem::absolute(request.out).parent_path();
   std::error_code error;
   if (request.out != "-" && !std::filesystem::equivalent(from, to, error))
-    copy.text = MoveMjcf(copy.text, request.source.string(), from, to);
+    copy = MoveMjcf(copy, request.source.string(), from, to);
   OutputFile file(request.out);
-  file.Write(copy.text);
-  for (const MjcfChange& change : copy.changes) {
-    Warn(request.source.filename().string() + ":" + std::to_string(change.line) + ": " + change.word + ": " +
-         change.what);
+  file.Write(copy);
+  for (const MjcfChange& change : mjcf.changes()) {
+    Warn(std::filesystem::path(change.file).filename().string() + ":" + std::to_string(change.line) + ": " +
+         change.word + ": " + change.what);
   }
   return kSuccess;
 }
 
 int Run(const ImportRequest& request) {
-  if (request.downgrade) return WriteDowngraded(request);
+  if (request.downgrade || request.motors) return WriteCopy(request);
   const RobotDescription robot = ReadSource(request);
   const std::string text = WriteParameters(robot, request.source.filename().string());
   // What cannot be read back must not be written: a name that is too long, for example.
@@ -82,6 +87,9 @@ void AddImportCommand(Command app) {
       "--downgrade", &request->downgrade,
       "Write an MJCF instead: a copy of a newer one for MuJoCo 2.2.2, without what has no effect on the "
       "dynamics");
+  command.AddFlag("--motors", &request->motors,
+                  "Write an MJCF instead: a copy with a torque motor for each joint, as run needs it, in the "
+                  "place of all actuators");
   command.SetAction([=] { return Run(*request); });
 }
 

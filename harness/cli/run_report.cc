@@ -184,7 +184,9 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
     return finding.check.starts_with("motor_");
   });
   if (has_servos)
-    fmt::print("  A run sends torques: each actuator must be a <motor>, not a servo or a muscle.\n");
+    fmt::print(
+        "  A run sends torques: each actuator must be a <motor>, not a servo or a muscle; dexcheck import "
+        "FILE.xml --motors --out COPY.xml writes such a copy.\n");
 }
 
 std::string WriteJUnit(const Setup& setup, const ClosedLoop& loop, const RunResult& result) {

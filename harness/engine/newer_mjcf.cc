@@ -80,23 +80,11 @@ bool IsZero(std::string_view text) { return text.find_first_of("123456789") == s
 
 class Downgrade {
  public:
-  explicit Downgrade(const std::string& source) : source_(source) {}
+  explicit Downgrade(JoinedMjcf* mjcf) : mjcf_(*mjcf) {}
 
-  DowngradedMjcf Run(std::string_view text) {
-    tinyxml2::XMLDocument document;
-    if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
-      throw InputError(source_ + ":" + std::to_string(document.ErrorLineNum()) + ": is not XML");
-    }
-    XMLElement* const root = document.RootElement();
-    if (root == nullptr || std::string_view(root->Name()) != "mujoco") {
-      throw InputError(source_ + ": must be an MJCF, its root element <mujoco>");
-    }
-    Walk(root, schema_.root());
-    TakeNewDefaults(root);
-    tinyxml2::XMLPrinter printer;
-    document.Print(&printer);
-    result_.text = printer.CStr();
-    return std::move(result_);
+  void Run() {
+    Walk(mjcf_.root(), schema_.root());
+    TakeNewDefaults(mjcf_.root());
   }
 
  private:
@@ -106,11 +94,11 @@ class Downgrade {
       why = "acts on the dynamics, since MuJoCo " + std::string(known->since) + ": " +
             std::string(known->advice);
     }
-    throw InputError(source_ + ":" + std::to_string(element.GetLineNum()) + ": " + word + ": " + why);
+    throw InputError(mjcf_.FindPlace(element) + ": " + word + ": " + why);
   }
 
   void Note(const XMLElement& element, const std::string& word, const std::string& what) {
-    result_.changes.push_back({std::max(element.GetLineNum(), 1), word, what});
+    mjcf_.Note(element, word, what);
   }
 
   static std::string DescribeLoss(const NewerWord& word) {
@@ -196,7 +184,7 @@ class Downgrade {
     if (rest.find_first_not_of(" \t") == std::string::npos) return;
     const std::string word = "<joint " + std::string(attribute) + ">";
     if (!IsZero(rest)) {
-      throw InputError(source_ + ":" + std::to_string(joint->GetLineNum()) + ": " + word +
+      throw InputError(mjcf_.FindPlace(*joint) + ": " + word +
                        ": acts on the dynamics: 2.2.2 has the first coefficient only, got " + Quote(value));
     }
     joint->SetAttribute(attribute, first.c_str());
@@ -215,9 +203,8 @@ class Downgrade {
     Note(*compiler, "<compiler autolimits>", "stated: true by default since MuJoCo 3.0.0");
   }
 
-  const std::string& source_;
+  JoinedMjcf& mjcf_;
   Schema schema_;
-  DowngradedMjcf result_;
 };
 
 /// What stands between quotes behind `before`.
@@ -232,9 +219,7 @@ std::optional<std::string> FindQuoted(const std::string& message, const std::str
 
 }  // namespace
 
-DowngradedMjcf DowngradeMjcf(std::string_view text, const std::string& source) {
-  return Downgrade(source).Run(text);
-}
+void DowngradeMjcf(JoinedMjcf* mjcf) { Downgrade(mjcf).Run(); }
 
 std::string ExplainNewerMjcf(const std::string& message) {
   const std::optional<std::string> element = FindQuoted(message, "Element ");

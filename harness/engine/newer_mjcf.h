@@ -4,7 +4,8 @@
 
 #include <string>
 #include <string_view>
-#include <vector>
+
+#include "harness/engine/joined_mjcf.h"
 
 namespace dexcheck {
 
@@ -32,24 +33,11 @@ struct NewerWord {
 /// The word's entry; nullptr when it is not known. @param attribute empty for the element itself.
 const NewerWord* FindNewerWord(std::string_view element, std::string_view attribute);
 
-/// What was done with one word of a file.
-struct MjcfChange {
-  int line = 0;
-  std::string word;  ///< "<joint actuatorfrcrange>"
-  std::string what;  ///< "left out: forces of actuators, since MuJoCo 3.0.0"
-};
-
-/// A copy of an MJCF for 2.2.2.
-struct DowngradedMjcf {
-  std::string text;
-  std::vector<MjcfChange> changes;
-};
-
 /// Leaves out what this program's engine does not know and what has no effect on the dynamics, and states
 /// what later releases take by default (autolimits).
 /// @throws InputError "FILE:LINE: <joint damping>: ...", which says since which release and what to do, for
 /// what acts on the dynamics or is not known at all.
-DowngradedMjcf DowngradeMjcf(std::string_view text, const std::string& source);
+void DowngradeMjcf(JoinedMjcf* mjcf);
 
 /// Of what the engine said of an MJCF that it cannot load, the explanation when a newer release is the
 /// reason: "; since MuJoCo 3.0.0, ..."; empty otherwise.

@@ -11,19 +11,18 @@ namespace dexcheck {
 namespace {
 
 int FindMotor(const mjModel& model, int joint) {
+  const auto refuse = [&](const std::string& got) {
+    throw InputError("MJCF: joint " + Quote(NameOf(model, mjOBJ_JOINT, joint)) +
+                     ": must have one motor, got " + got +
+                     "; dexcheck import FILE.xml --motors --out COPY.xml writes a copy with one each");
+  };
   int found = -1;
   for (int i = 0; i < model.nu; ++i) {
     if (model.actuator_trntype[i] != mjTRN_JOINT || model.actuator_trnid[2 * i] != joint) continue;
-    if (found >= 0) {
-      throw InputError("MJCF: joint " + Quote(NameOf(model, mjOBJ_JOINT, joint)) +
-                       ": must have one motor, got several");
-    }
+    if (found >= 0) refuse("several");
     found = i;
   }
-  if (found < 0) {
-    throw InputError("MJCF: joint " + Quote(NameOf(model, mjOBJ_JOINT, joint)) +
-                     ": must have one motor, got none");
-  }
+  if (found < 0) refuse("none");
   return found;
 }
 
@@ -40,6 +39,7 @@ EngineSimulation::EngineSimulation(const Adapter& adapter, bool implicit_damping
     Eigen::Map<VectorXd> damping(model_->dof_damping, model_->nv);
     damping_ = damping;
     damping.setZero();
+    model_->opt.integrator = mjINT_EULER;
   }
   // Whoever commands torques keeps to the limits; friction comes on top.
   std::fill_n(model_->actuator_ctrllimited, model_->nu, 0);

@@ -27,8 +27,8 @@ struct EngineState {
 /// After EndStep, data() still has accelerations, contacts and forces of the step, at the state before it.
 class EngineSimulation {
  public:
-  /// @param implicit_damping integrate joint damping as the engine's Euler does, which changes velocities by
-  /// other than dt qacc; otherwise it acts as an explicit force, as in (48).
+  /// @param implicit_damping integrate as the MJCF says, and joint damping as the engine's Euler does, which
+  /// changes velocities by other than dt qacc; otherwise by Euler with explicit forces, as in (48).
   /// @throws InputError when a joint or wheel has no motor or several.
   EngineSimulation(const Adapter& adapter, bool implicit_damping);
 

@@ -243,7 +243,7 @@ class ModelComparison {
         for (Eigen::Index col = 0; col < xi.size(); ++col) {
           const double scale = scales_.CalcVelocityScale(static_cast<int>(col));
           Add(kJ, J_a_(row, col), J_b_(row, velocity_of_[static_cast<size_t>(col)]),
-              linear ? scale : Positive(scale / scales_.length()), where);
+              Positive(linear ? scale : scale / scales_.length()), where);
         }
         Add(kJDotXi, bias_a[row], bias_b[row], linear ? acceleration : angular_acceleration, where);
       }

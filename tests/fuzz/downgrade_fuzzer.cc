@@ -7,10 +7,12 @@
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace dexcheck::fuzz;
   try {
-    const dexcheck::DowngradedMjcf once = dexcheck::DowngradeMjcf(AsText(data, size), "robot.xml");
-    for (const dexcheck::MjcfChange& change : once.changes) Expect(change.line >= 0, "a line below zero");
-    const dexcheck::DowngradedMjcf twice = dexcheck::DowngradeMjcf(once.text, "robot.xml");
-    Expect(twice.changes.empty(), "a copy that is not for 2.2.2", once.text);
+    dexcheck::JoinedMjcf once(AsText(data, size), "robot.xml");
+    dexcheck::DowngradeMjcf(&once);
+    for (const dexcheck::MjcfChange& change : once.changes()) Expect(change.line >= 0, "a line below zero");
+    dexcheck::JoinedMjcf twice(once.Print(), "robot.xml");
+    dexcheck::DowngradeMjcf(&twice);
+    Expect(twice.changes().empty(), "a copy that is not for 2.2.2", once.Print());
   } catch (const dexcheck::InputError& error) {
     ExpectGoodMessage(error.what(), "robot.xml");
   }

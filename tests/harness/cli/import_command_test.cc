@@ -166,5 +166,98 @@ TEST_F(TwoDescriptions, ACopyForAnOlderEngineFindsItsFilesFromAnotherFolder) {
   }
 }
 
+// What is included is copied too, and told by its own file and line.
+TEST_F(TwoDescriptions, ACopyIsOfOnePiece) {
+  const auto write = [&](const std::string& name, const std::string& text) {
+    WriteText(folder_.path() / name, "<mujoco>\n" + text + "</mujoco>");
+  };
+  write("scene.xml", "<include file='arm.xml'/><worldbody><light/></worldbody>");
+  write("arm.xml",
+        "<default><joint damping='0.1'/></default><worldbody><include file='link.xml'/></worldbody>");
+  write("link.xml",
+        "<body name='arm'>\n<joint name='turn' axis='0 1 0' actuatorfrcrange='-1 1'/><geom "
+        "size='0.1'/></body>");
+  const ProgramResult copied = Run({"import", "scene.xml", "--downgrade", "--out", "copy.xml"});
+  EXPECT_EQ(copied.exit_code, 0);
+  EXPECT_THAT(copied.err, HasSubstr("link.xml:3: <joint actuatorfrcrange>: left out"));
+  EXPECT_THAT(ReadText(folder_.path() / "copy.xml"), ::testing::Not(HasSubstr("include")));
+  EXPECT_EQ(Run({"consistency", "copy.xml", "copy.xml", "--samples", "5"}).exit_code, 0);
+
+  const auto expect_refused = [&](const std::string& message) {
+    const ProgramResult result = Run({"import", "scene.xml", "--downgrade", "--out", "other.xml"});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(message));
+    EXPECT_FALSE(std::filesystem::exists(folder_.path() / "other.xml"));
+  };
+  write("link.xml", "\n<include file='arm.xml'/>");
+  expect_refused("link.xml:3: <include>: file \"arm.xml\": must be included once only");
+  write("link.xml", "<include file='scene.xml'/>");
+  expect_refused("link.xml:2: <include>: file \"scene.xml\": must be included once only");
+  write("link.xml", "<include file='none.xml'/>");
+  expect_refused("link.xml:2: file \"none.xml\": cannot be read");
+  write("link.xml", "<include/>");
+  expect_refused("link.xml:2: <include>: must have a file");
+  write("link.xml", "<body>");
+  expect_refused("link.xml:2: is not XML");
+}
+
+// As published robots have them: servos, a tendon, two actuators at one joint, defaults, key frames, sensors.
+TEST_F(TwoDescriptions, ACopyWithMotorsIsRun) {
+  WriteText(folder_.path() / "servos.xml", R"(<mujoco>
+  <compiler angle="radian"/>
+  <default>
+    <general gear="7" biastype="affine" ctrllimited="true" ctrlrange="-3 3" forcelimited="true" forcerange="-1 1"/>
+    <default class="servo"><position kp="200" forcerange="-80 60" gear="2"/></default>
+  </default>
+  <worldbody><light pos="0 0 3"/>
+    <body name="a"><joint name="turn" axis="0 0 1"/><geom size="0.1" pos="0.2 0 0"/>
+      <body name="b" pos="0.4 0 0"><joint name="lift" axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/>
+        <body name="c" pos="0.4 0 0"><joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1"/></body>
+      </body>
+    </body>
+  </worldbody>
+  <tendon><fixed name="pull"><joint joint="slide" coef="1"/></fixed></tendon>
+  <actuator>
+    <position class="servo" name="p" joint="turn"/><velocity name="v" joint="turn" gear="1" forcelimited="false"/>
+    <motor name="m" joint="lift" gear="50" forcelimited="false"/>
+    <general name="t" tendon="pull"/>
+  </actuator>
+  <sensor><actuatorfrc actuator="p"/><jointpos joint="turn"/></sensor>
+  <keyframe><key qpos="0 0 0" ctrl="1 2 3 1"/></keyframe>
+</mujoco>)");
+  const ProgramResult copied = Run({"import", "servos.xml", "--motors", "--out", "motors.xml"});
+  ASSERT_EQ(copied.exit_code, 0) << copied.err;
+  EXPECT_THAT(copied.err, HasSubstr("servos.xml:1: <actuator>: 4 actuators replaced by 3 motors"));
+  const std::string copy = ReadText(folder_.path() / "motors.xml");
+  EXPECT_THAT(copy, HasSubstr("joint=\"turn\" gear=\"1 0 0 0 0 0\" forcelimited=\"false\" "
+                              "ctrllimited=\"true\" ctrlrange=\"-160 160\""));
+  EXPECT_THAT(copy, HasSubstr("ctrlrange=\"-150 150\""));
+  EXPECT_THAT(copy,
+              HasSubstr("joint=\"slide\" gear=\"1 0 0 0 0 0\" forcelimited=\"false\" ctrllimited=\"false\""));
+  EXPECT_THAT(copy, HasSubstr("<jointpos"));
+
+  ASSERT_EQ(Run({"import", "motors.xml", "--out", "robot.toml"}).exit_code, 0);
+  WriteText(folder_.path() / "move.toml", R"(name = "move"
+duration = 0.5
+start = "rest"
+[model]
+file = "robot.toml"
+[plant]
+mjcf = "motors.xml"
+[joint_motion]
+points = [{ time = 0.5, joints = { turn = 0.3, lift = -0.2, slide = 0.1 } }]
+[control]
+natural_frequency = 20
+damping_ratio = 1
+)");
+  const ProgramResult ran = Run({"run", "move.toml", "--no-log"});
+  EXPECT_EQ(ran.exit_code, 0) << ran.out << ran.err;
+  const ProgramResult servos = Run({"run", "move.toml", "--no-log", "--set", "plant.mjcf=servos.xml"});
+  EXPECT_EQ(servos.exit_code, 2);
+  EXPECT_THAT(servos.err,
+              HasSubstr("joint \"turn\": must have one motor, got several; dexcheck import FILE.xml "
+                        "--motors --out COPY.xml writes"));
+}
+
 }  // namespace
 }  // namespace dexcheck::import_command_test

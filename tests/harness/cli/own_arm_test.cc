@@ -146,6 +146,19 @@ TEST_F(OwnArm, WithDryFrictionIsRun) {
   EXPECT_TRUE(IsRefused(RunWith("plant.type=rigid"), {"plant.type", "dry friction", "\"turn\""}));
 }
 
+// Most of the MJCFs that are published name one; by it velocities change by other than dt qacc.
+TEST_F(OwnArm, IsSteppedByEulerWhateverItsMjcfSays) {
+  for (const char* integrator : {"implicit", "RK4"}) {
+    WriteText(folder_.path() / "arm.xml",
+              ReplaceOnce(kArm, "<worldbody>",
+                          "<option integrator=\"" + std::string(integrator) + "\"/><worldbody>"));
+    const ProgramResult result = Run({"run", "own.toml", "--no-log"});
+    EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  }
+  const ProgramResult own = RunWith("plant.implicit_damping=true");
+  EXPECT_THAT(own.out, HasSubstr("cause: integrator"));
+}
+
 TEST_F(OwnArm, DoesNotPassWithAnotherMass) {
   WriteText(folder_.path() / "arm.xml", ReplaceOnce(kArm, "mass=\"0.8\"", "mass=\"0.9\""));
   const ProgramResult result = Run({"run", "own.toml", "--no-log"});

@@ -106,7 +106,7 @@ IsDone() {
   local left
   left=$(squeue --noheader --jobs="$job" 2>/dev/null) && [[ -z $left ]]
 }
-Requeued() { scontrol show job "${job}_1" | grep -q 'Restarts=1'; }
+Requeued() { scontrol show job "${job}_1" | grep 'Restarts=1' >/dev/null; }
 WaitFor 30 Requeued
 WaitFor 180 IsDone
 nodes=$(scontrol show job "$job" | grep -oE ' NodeList=n[12]' | sort -u | wc -l)

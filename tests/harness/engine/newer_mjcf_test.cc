@@ -46,6 +46,17 @@ std::string WriteMjcf(const Words& words) {
 
 const std::string kPlain = WriteMjcf({});
 
+struct Copy {
+  std::string text;
+  std::vector<MjcfChange> changes;
+};
+
+Copy Downgrade(const std::string& text, const std::string& source) {
+  JoinedMjcf mjcf(text, source);
+  DowngradeMjcf(&mjcf);
+  return {mjcf.Print(), mjcf.changes()};
+}
+
 /// Inertia about the joint, bias, and passive force at one state.
 std::vector<double> CalcTerms(const std::string& text) {
   const MjModelPtr model = LoadMjcfText(text, "test");
@@ -61,13 +72,13 @@ class LeftOut : public ::testing::TestWithParam<Words> {};
 TEST_P(LeftOut, ThePendulumStays) {
   const std::string newer = WriteMjcf(GetParam());
   EXPECT_THROW(LoadMjcfText(newer, "newer"), InputError);
-  const DowngradedMjcf copy = DowngradeMjcf(newer, "newer");
+  const Copy copy = Downgrade(newer, "newer");
   EXPECT_FALSE(copy.changes.empty());
   const std::vector<double> terms = CalcTerms(copy.text);
   EXPECT_EQ(terms, CalcTerms(kPlain));
   for (const double term : terms) EXPECT_NE(term, 0.0);
   // The copy is for 2.2.2 already.
-  EXPECT_TRUE(DowngradeMjcf(copy.text, "copy").changes.empty());
+  EXPECT_TRUE(Downgrade(copy.text, "copy").changes.empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -96,7 +107,7 @@ void PrintTo(const Refused& refused, std::ostream* out) { PrintTo(refused.words,
 class NotLeftOut : public ::testing::TestWithParam<Refused> {};
 
 TEST_P(NotLeftOut, IsNamed) {
-  EXPECT_TRUE(testing::Throws<InputError>([] { DowngradeMjcf(WriteMjcf(GetParam().words), "newer.xml"); },
+  EXPECT_TRUE(testing::Throws<InputError>([] { Downgrade(WriteMjcf(GetParam().words), "newer.xml"); },
                                           GetParam().message));
 }
 
@@ -120,15 +131,14 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{{.in_body = "<wing/>"}, "<wing>: is neither in 2.2.2 nor known to be newer"}));
 
 TEST(NewerMjcf, TheNewDefaultIsStated) {
-  const DowngradedMjcf copy = DowngradeMjcf("<mujoco><worldbody/></mujoco>", "newer");
+  const Copy copy = Downgrade("<mujoco><worldbody/></mujoco>", "newer");
   EXPECT_THAT(copy.text, HasSubstr("<compiler autolimits=\"true\"/>"));
   EXPECT_THAT(copy.changes, Contains(Field(&MjcfChange::word, "<compiler autolimits>")));
-  EXPECT_TRUE(DowngradeMjcf(kPlain, "plain").changes.empty());
+  EXPECT_TRUE(Downgrade(kPlain, "plain").changes.empty());
 }
 
 TEST(NewerMjcf, AssetsHaveTheirFolders) {
-  const DowngradedMjcf copy =
-      DowngradeMjcf("<mujoco><compiler assetdir=\"a\" meshdir=\"m\"/></mujoco>", "newer");
+  const Copy copy = Downgrade("<mujoco><compiler assetdir=\"a\" meshdir=\"m\"/></mujoco>", "newer");
   EXPECT_THAT(copy.text, HasSubstr("meshdir=\"m\" texturedir=\"a\""));
 }
 
@@ -136,7 +146,7 @@ TEST(NewerMjcf, AssetsHaveTheirFolders) {
 TEST(NewerMjcf, ShippedFilesNeedNoCopy) {
   for (const std::string name : {"panda.xml", "robot.xml", "scene.xml", "contacts.xml"}) {
     const std::string path = testing::SourcePath("/mjcf/" + name);
-    for (const MjcfChange& change : DowngradeMjcf(testing::ReadText(path), path).changes) {
+    for (const MjcfChange& change : Downgrade(testing::ReadText(path), path).changes) {
       EXPECT_EQ(change.word, "<compiler autolimits>") << name;
     }
   }
@@ -156,8 +166,8 @@ TEST(NewerMjcf, WhatTheEngineDoesNotLoadIsExplained) {
   EXPECT_TRUE(testing::Throws<InputError>(
       [] { LoadMjcfText("<mujoco><compiler assetdir=\"meshes\"/></mujoco>", "f"); },
       "it is new since MuJoCo 2.3.0; dexcheck import FILE --downgrade"));
-  EXPECT_TRUE(testing::Throws<InputError>([] { DowngradeMjcf("<mujoco>", "f"); }, "f:1: is not XML"));
-  EXPECT_TRUE(testing::Throws<InputError>([] { DowngradeMjcf("<robot/>", "f"); }, "f: must be an MJCF"));
+  EXPECT_TRUE(testing::Throws<InputError>([] { Downgrade("<mujoco>", "f"); }, "f:1: is not XML"));
+  EXPECT_TRUE(testing::Throws<InputError>([] { Downgrade("<robot/>", "f"); }, "f: must be an MJCF"));
 }
 
 }  // namespace
