@@ -140,6 +140,10 @@ double CrossCheck::CompareTold(const StepRecord& step) {
   return apart;
 }
 
+bool CrossCheck::MovedAsMeant(const StepRecord& step) const {
+  return !known_ && step.drive.tau == step.command.tau && step.response.stop_force.size() == 0;
+}
+
 void CrossCheck::FindMeant(const StepRecord& step) {
   actuation_.CalcForce(step.command.tau, meant_force_);
   if (joint_law_) {
@@ -166,7 +170,7 @@ void CrossCheck::ReadControllersTerms(const StepRecord& step) {
 const LawErrors& CrossCheck::CompareControl(const StepRecord& step) {
   ReadControllersTerms(step);
   law_->Evaluate(step, law_terms_);
-  if (!known_ && step.drive.tau == step.command.tau) {
+  if (MovedAsMeant(step)) {
     return law_->Compare(step, motion_.findings(), law_terms_, *motion_.mass_factor(), /*knows_slip=*/false);
   }
   FindMeant(step);
@@ -211,9 +215,9 @@ void CrossCheck::CompareJointLaw(const StepRecord& step) {
   motion_.Add(StepCheck::kGains, joint_law_->sampled_radius(), t);
   if (!step.command.computes_joints) return;
   ReadControllersTerms(step);
-  const bool is_ideal = !known_ && step.drive.tau == step.command.tau;
-  if (!is_ideal) FindMeant(step);
-  const VectorXd& meant = is_ideal ? motion_.findings().xi_dot_model : meant_.xi_dot_model;
+  const bool as_meant = MovedAsMeant(step);
+  if (!as_meant) FindMeant(step);
+  const VectorXd& meant = as_meant ? motion_.findings().xi_dot_model : meant_.xi_dot_model;
   const JointLawErrors& errors = joint_law_->Compare(step, meant, law_terms_);
   motion_.Add(StepCheck::kLawTorque, errors.torque, t);
   motion_.Add(StepCheck::kJointDynamics, errors.error_dynamics, t);

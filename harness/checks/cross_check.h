@@ -85,9 +85,11 @@ class CrossCheck {
   static double CompareTold(const StepRecord& step);
   /// The engine's at what the controller was told; contacts that need not fit together are the controller's.
   void ReadControllersTerms(const StepRecord& step);
-  /// What the controller's rigid system does under the torques that were sent.
   /// Did the joints get what was sent?
   void CompareMotors(const StepRecord& step);
+  /// Whether nothing but the torques that were sent moved the plant: its prediction is then what was meant.
+  [[nodiscard]] bool MovedAsMeant(const StepRecord& step) const;
+  /// What the controller's rigid system does under the torques that were sent.
   void FindMeant(const StepRecord& step);
   /// Of torques that the controller computed at this step.
   const LawErrors& CompareControl(const StepRecord& step);

@@ -74,6 +74,9 @@ inline constexpr double kOrientationDynamicsBound = 1e-7;
 // Rounding of torques, over the least inertia that they drive and over K_p: measured 1e-14 for the Panda.
 inline constexpr double kJointDynamicsBound = 1e-11;
 
+// rad, m: rounding of a joint that rests exactly at the end of its range, as fingers of a closed gripper do.
+inline constexpr double kJointStopBound = 1e-12;
+
 // Ten times the accuracy of distances between bodies that are apart (solid.h).
 inline constexpr double kClearanceBound = 1e-6;
 

@@ -211,12 +211,11 @@ void StepChecks::Predict(const StepRecord& step) {
   const GraspTerms& grasp = ModelAtTruth(step).grasp();
   const bool whole = touching_ == AllContacts(grasp.num_contacts());
   if (handling_.partial && !whole && touching_ != 0) return PredictPart(step);
+  const bool in_hand = grasp.num_contacts() > 0 && (!handling_.partial || (whole && !supported_));
   const Prediction* prediction = nullptr;
-  if (grasp.num_contacts() == 0) {
-    prediction = &dynamics_.PredictFree(robot, force_);
-  } else if (!handling_.partial || (whole && !supported_)) {
+  if (in_hand) {
     prediction = &dynamics_.Predict(robot, grasp, force_, ObjectSupport::kHand, nullptr, PushOf(step));
-  } else if (whole) {
+  } else if (grasp.num_contacts() > 0 && whole) {
     prediction = &dynamics_.Predict(robot, grasp, force_, ObjectSupport::kAtRest);
   } else {
     prediction = &dynamics_.PredictFree(robot, force_);
@@ -246,7 +245,7 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   const VectorXd& xi_dot = step.response.xi_dot;
   actuation_.CalcForce(step.drive.tau, force_);
   if (step.known != nullptr) force_ += step.known->force;
-  AddDryFriction(step.response.dry_friction);
+  AddFrictionAndStops(step);
   // Soft contacts become only in some milliseconds what rigid ones are at once.
   if (!is_unjudged_) Predict(step);
   if (mass_factor() == nullptr) return;
@@ -285,14 +284,20 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   AddLessGive(StepCheck::kContactForce, apart / force_scale, give_->force() / force_scale);
 }
 
-void StepChecks::AddDryFriction(const VectorXd& friction) {
-  if (friction.size() == 0) return;
+void StepChecks::AddFrictionAndStops(const StepRecord& step) {
+  const VectorXd& friction = step.response.dry_friction;
+  const VectorXd& stops = step.response.stop_force;
+  if (friction.size() == 0 && stops.size() == 0) return;
   const RobotModel& model = setup_->model();
+  const int offset = model.num_base_positions();
   for (int i = 0; i < model.num_joints(); ++i) {
-    // No more than the parameters say: what else is there stays to be found.
-    const double limit = model.joints()[static_cast<size_t>(i)].dry_friction;
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
     const Eigen::Index entry = model.num_base_velocities() + i;
-    force_[entry] += std::clamp(friction[entry], -limit, limit);
+    // No more than the parameters say, and where they say: what else is there stays to be found.
+    if (friction.size() > 0)
+      force_[entry] += std::clamp(friction[entry], -joint.dry_friction, joint.dry_friction);
+    const double q = step.reading.state.q[offset + i];
+    if (stops.size() > 0 && (q < joint.lower || q > joint.upper)) force_[entry] += stops[entry];
   }
 }
 
@@ -408,7 +413,7 @@ void StepChecks::CheckJointStops(const MeasuredState& state) {
     beyond = over;
     farthest = i;
   }
-  if (beyond > 0.0 && !check(StepCheck::kJointStop).failed) {
+  if (beyond > check(StepCheck::kJointStop).bound && !check(StepCheck::kJointStop).failed) {
     check(StepCheck::kJointStop).part = "joint " + Quote(joints[farthest].name);
   }
   Add(StepCheck::kJointStop, beyond);

@@ -92,7 +92,7 @@ class StepChecks {
   void Predict(const StepRecord& step);
   void PredictPart(const StepRecord& step);
   /// To the forces that are known.
-  void AddDryFriction(const VectorXd& friction);
+  void AddFrictionAndStops(const StepRecord& step);
   void CompareDynamics(const StepRecord& step);
   /// Adds the friction of wheels that spin, which (48) has at the rates of (1).
   void AddSpin(const StepRecord& step);

@@ -103,6 +103,7 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotS
   }
   if (!rounded.empty()) {
     std::vector<std::string> names;
+    names.reserve(rounded.size());
     for (const Repair* const cause : rounded) names.push_back(DescribeShort(*cause, written));
     fmt::print("And {} that agree to 4 digits, as rounded numbers do (--digits 4 judges by that): {}\n",
                rounded.size(), JoinNames(names));

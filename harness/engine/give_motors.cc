@@ -1,5 +1,6 @@
 #include "harness/engine/give_motors.h"
 
+#include <fmt/format.h>
 #include <tinyxml2.h>
 
 #include <algorithm>
@@ -94,7 +95,7 @@ void GiveMotors(const std::filesystem::path& folder, JoinedMjcf* mjcf) {
     const std::optional<double> limit = FindJointLimit(m, joint);
     motor->SetAttribute("ctrllimited", limit ? "true" : "false");
     const std::string number = FormatNumber(limit.value_or(0.0));
-    if (limit) motor->SetAttribute("ctrlrange", ("-" + number + " " + number).c_str());
+    if (limit) motor->SetAttribute("ctrlrange", fmt::format("-{0} {0}", number).c_str());
     ++motors;
   }
   mjcf->Note(*root, "<actuator>",

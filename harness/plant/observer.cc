@@ -123,6 +123,7 @@ void Observer::Read(const EngineSimulation& simulation, PlantResponse* response)
   response->support_force = (X_Bo_.linear() * response->support_wrench.head<3>()).z();
   map_.SetState(q_, xi_);
   ReadDryFriction(d, &response->dry_friction);
+  ReadStops(m, d, &response->stop_force);
   ReadSolverResidual(m, d, response);
   ReadDeparture(m, d, response);
 }
@@ -295,14 +296,33 @@ void Observer::ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* r
 
 void Observer::ReadDryFriction(const mjData& d, VectorXd* friction) const {
   if (d.nf == 0) return friction->resize(0);
-  const std::vector<int>& dofs = adapter_->joint_dofs();
-  const int base = adapter_->model().num_base_velocities();
-  friction->setZero(base + static_cast<Eigen::Index>(dofs.size()));
+  friction->setZero(adapter_->model().num_velocities());
   for (int row = d.ne; row < d.ne + d.nf; ++row) {
     if (d.efc_type[row] != mjCNSTR_FRICTION_DOF) continue;  // of a tendon
-    const auto joint = std::find(dofs.begin(), dofs.end(), d.efc_id[row]);
-    if (joint != dofs.end()) (*friction)[base + (joint - dofs.begin())] = d.efc_force[row];
+    const Eigen::Index entry = FindEntry(d.efc_id[row]);
+    if (entry >= 0) (*friction)[entry] = d.efc_force[row];
   }
+}
+
+void Observer::ReadStops(const mjModel& m, const mjData& d, VectorXd* force) const {
+  force->resize(0);
+  // Limits come behind friction, and before contacts.
+  for (int row = d.ne + d.nf; row < d.nefc && d.efc_type[row] <= mjCNSTR_LIMIT_TENDON; ++row) {
+    if (d.efc_type[row] != mjCNSTR_LIMIT_JOINT) continue;
+    const int joint = d.efc_id[row];
+    const Eigen::Index entry = FindEntry(m.jnt_dofadr[joint]);
+    if (entry < 0) continue;
+    if (force->size() == 0) force->setZero(adapter_->model().num_velocities());
+    const mjtNum q = d.qpos[m.jnt_qposadr[joint]];
+    const bool is_lower = q - m.jnt_range[2 * joint] < m.jnt_range[2 * joint + 1] - q;
+    (*force)[entry] = is_lower ? d.efc_force[row] : -d.efc_force[row];
+  }
+}
+
+Eigen::Index Observer::FindEntry(int dof) const {
+  const std::vector<int>& dofs = adapter_->joint_dofs();
+  const auto joint = std::find(dofs.begin(), dofs.end(), dof);
+  return joint == dofs.end() ? -1 : adapter_->model().num_base_velocities() + (joint - dofs.begin());
 }
 
 void Observer::ReadSolverResidual(const mjModel& m, const mjData& d, PlantResponse* response) {

@@ -64,8 +64,8 @@ struct PlantResponse {
   Vector6d solver_residual = Vector6d::Zero();
   Collision collision;     ///< The largest; of a plant whose bodies push, see Clearance.
   VectorXd motor_torques;  ///< n, N m: what wheels and joints received from their motors, as tau'.
-  /// n, N and N m: dry friction of the joints, as forces on xi; empty where there is none.
-  VectorXd dry_friction;
+  /// n, N and N m, as forces on xi, empty where there are none: dry friction of the joints, and their stops.
+  VectorXd dry_friction, stop_force;
   /// n, N and N m: T^T M (qacc - T xi_dot - T_dot xi), the inertia of what xi_dot leaves out, a platform that
   /// tilts or sinks and wheels that slip, on soft contacts. Empty for a plant that has nothing of the kind.
   VectorXd departure_force;

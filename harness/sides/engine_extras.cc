@@ -243,7 +243,7 @@ class ExtrasComparison {
       const std::string name = NameOf(a_, type, i);
       const int other = FindByName(type, name);
       if (other < 0) continue;
-      Compare(kind + " " + name, read(a_, i), read(b_, other));
+      Compare(fmt::format("{} {}", kind, name), read(a_, i), read(b_, other));
       make_idle(i, &a_);
       make_idle(other, &b_);
     }

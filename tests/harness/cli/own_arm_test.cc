@@ -146,6 +146,16 @@ TEST_F(OwnArm, WithDryFrictionIsRun) {
   EXPECT_TRUE(IsRefused(RunWith("plant.type=rigid"), {"plant.type", "dry friction", "\"turn\""}));
 }
 
+// As the fingers of a closed gripper do: rounding puts it beyond its range, by 2e-19 m here.
+TEST_F(OwnArm, AJointMayRestAtTheEndOfItsRange) {
+  WriteText(folder_.path() / "arm.xml", ReplaceOnce(kArm, "range=\"-0.2 0.3\"", "range=\"0 0.3\""));
+  ASSERT_EQ(Run({"import", "arm.xml", "--out", "arm.toml"}).exit_code, 0);
+  const std::string rests = ReplaceOnce(kScenario, "lift = 0.1, ", "");
+  WriteText(folder_.path() / "own.toml", ReplaceOnce(rests, ", lift = -0.1", ""));
+  const ProgramResult result = Run({"run", "own.toml", "--no-log"});
+  EXPECT_EQ(result.exit_code, 0) << result.out;
+}
+
 // Most of the MJCFs that are published name one; by it velocities change by other than dt qacc.
 TEST_F(OwnArm, IsSteppedByEulerWhateverItsMjcfSays) {
   for (const char* integrator : {"implicit", "RK4"}) {
