@@ -46,6 +46,7 @@ double CalcScale(Scaling scaling, const Scenario& scenario) {
   const ControlOptions& control = scenario.control;
   if (scaling == Scaling::kPositionGain) return CalcGainScale(control.gains.K_p.head<3>());
   if (scaling == Scaling::kOrientationGain) return CalcGainScale(control.gains.K_p.tail<3>());
+  if (scaling == Scaling::kSquaredStep) return Square(scenario.plant.time_step / PlantOptions{}.time_step);
   double scale = scaling == Scaling::kPosture && control.posture_frequency > 0.0
                      ? Square(kShippedPosture / control.posture_frequency)
                      : 1.0;

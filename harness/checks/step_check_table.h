@@ -382,12 +382,12 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .name = "kappa",
      .kind = CheckKind::kAssumption,
      .unit = "m",
-     .bound = kSlipWindow * kShippedCreep,
-     .scaling = Scaling::kCreep,
-     .formula = "as fingertip_slip",
-     .reason = "contact coordinates leave (40) by as much as fingertips slip",
-     .description = "kappa integrated by (40) over the last 5 to 10 s against the engine's: points on object "
-                    "and fingertip, psi at its radius",
+     .bound = kKappaBound,
+     .scaling = Scaling::kSquaredStep,
+     .formula = "0.1 m (10 rad/s dt)^2 / 12",
+     .reason = "the trapezoidal rule, of contacts that roll 0.1 m within the window and turn at 10 rad/s",
+     .description = "kappa integrated by (40) over the last 5 to 10 s, as fingertip and object moved, slip "
+                    "included, against the engine's: points on object and fingertip, psi at its radius",
      .meaning = {.cause = Cause::kContactSoftness, .precedence = 10},
      .bonded_description = ""},
     // On the sphere that the plant has, contacts roll on; the paper's fingertip ends.

@@ -67,6 +67,7 @@ StepChecks::StepChecks(const Setup& setup)
   idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
   kappa_.resize(setup.fingertips().size());
   next_kappa_ = kappa_;
+  last_contacts_.resize(kappa_.size());
 }
 
 StepChecks::~StepChecks() = default;
@@ -167,10 +168,10 @@ void StepChecks::Compare(const StepRecord& step) {
   KeepForces(step);
   if (handling.holding && !was_holding_) ForgetSlip();
   was_holding_ = handling.holding;
-  MoveWindows(step.reading.state);
   ReadSlip(step);
   if (step.response.wheels.size() == 2) CompareRolling(step);
   if (handling.holding) CompareKappa(step);
+  MoveWindows(step.reading.state);
   if (handling.holding && check(StepCheck::kFingertipRim).applies) CheckRims(step);
 
   Add(StepCheck::kBaseTilt, step.reading.departure.tilt);

@@ -87,6 +87,12 @@ class StepChecks {
     PartialGrasp grasp;
     ConstrainedDynamics dynamics;
   };
+  /// A contact one step ago.
+  struct LastContact {
+    ContactCoordinates kappa;
+    ContactGeometry geometry;
+    Pose X_of = Pose::Identity();  // of the fingertip to the object
+  };
   void CompareContacts(const StepRecord& step);
   void FindContacts(const StepRecord& step);
   void Predict(const StepRecord& step);
@@ -115,6 +121,8 @@ class StepChecks {
   void CheckIdleJoints(const MeasuredState& state);
   void CheckJointStops(const MeasuredState& state);
   void CompareKappa(const StepRecord& step);
+  /// By (40), from how fingertip and object have moved since the last step, in the charts of now.
+  Vector5d CalcKappaChange(const StepRecord& step, size_t finger);
   /// Whether contacts are within the rims of hemispherical fingertips.
   void CheckRims(const StepRecord& step);
 
@@ -134,6 +142,7 @@ class StepChecks {
   bool is_unjudged_ = false;
   /// Integrated from (40) since the window's beginning, and since the next one's.
   std::vector<ContactCoordinates> kappa_, next_kappa_;
+  std::vector<LastContact> last_contacts_;
   VectorXd idle_start_;
   bool has_kappa_ = false;
   long steps_ = 0;

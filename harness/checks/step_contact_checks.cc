@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "controller/common/text.h"
 #include "controller/contact/fingertip_rim.h"
@@ -16,6 +17,17 @@ namespace {
 /// The largest of them as a length, m: psi at the fingertip's radius.
 double CalcLength(const ContactDrift& drift, double radius) {
   return std::max({drift.object, drift.fingertip, drift.psi * radius});
+}
+
+/// What moves a body from one pose to the next, in the middle of the way, as a body twist times the time it
+/// takes; to the second order of the angle.
+Vector6d CalcDisplacement(const Pose& from, const Pose& to) {
+  const Pose X = from.inverse(Eigen::Isometry) * to;
+  const Matrix3d& R = X.linear();
+  const Vector3d angle = 0.5 * Vector3d(R(2, 1) - R(1, 2), R(0, 2) - R(2, 0), R(1, 0) - R(0, 1));
+  Vector6d moved;
+  moved << X.translation() - 0.5 * angle.cross(X.translation()), angle;
+  return moved;
 }
 
 }  // namespace
@@ -51,7 +63,6 @@ void StepChecks::MoveWindows(const MeasuredState& state) {
       slip.next_window = slip.distance - slip.creep;
     }
   }
-  if (!has_kappa_) return;
   kappa_ = next_kappa_;
   next_kappa_ = state.kappa;
 }
@@ -124,17 +135,42 @@ void StepChecks::CheckRims(const StepRecord& step) {
   Add(StepCheck::kFingertipRim, beyond);
 }
 
+Vector5d StepChecks::CalcKappaChange(const StepRecord& step, size_t finger) {
+  const ModelTerms& robot = ModelAtTruth(step).robot();
+  const GraspTerms& grasp = ModelAtTruth(step).grasp();
+  const MeasuredState& state = step.reading.state;
+  const ContactGeometry& contact = grasp.contacts()[finger].geometry;
+  const Pose X_0f =
+      robot.CalcLinkPose(-1).inverse(Eigen::Isometry) * robot.CalcFramePose(grasp.fingertips()[finger]);
+  const Pose X_of = state.X_Bo.inverse(Eigen::Isometry) * step.reading.X_W0 * X_0f;
+  const LastContact last = std::exchange(last_contacts_[finger], {state.kappa[finger], contact, X_of});
+  if (!has_kappa_) return Vector5d::Zero();
+  const Vector6d moved = CalcDisplacement(last.X_of, X_of);
+  const auto change = [&](const ContactGeometry& at) {
+    return CalcKappaDot(at, CalcRelativeTwist(at, moved, Vector6d::Zero()));
+  };
+  // By one end of the step alone the error would be of the order of dt, as large as what contacts creep.
+  const SurfacePoint& alpha_f = state.kappa[finger].alpha_f;
+  const SurfacePoint& alpha_o = state.kappa[finger].alpha_o;
+  if (last.kappa.alpha_f.chart == alpha_f.chart && last.kappa.alpha_o.chart == alpha_o.chart)
+    return 0.5 * (change(contact) + change(last.geometry));
+  const Surface& tip = grasp.tip(static_cast<int>(finger));
+  const ContactCoordinates began =
+      ChangeCharts(tip, grasp.surface(), last.kappa, alpha_f.chart, alpha_o.chart);
+  return 0.5 *
+         (change(contact) + change(CalcContactGeometry(tip, grasp.surface(), began, state.overlap[finger])));
+}
+
 void StepChecks::CompareKappa(const StepRecord& step) {
   const GraspTerms& grasp = ModelAtTruth(step).grasp();
   const MeasuredState& state = step.reading.state;
   double apart = 0.0;
   for (size_t i = 0; i < kappa_.size(); ++i) {
+    const Vector5d change = CalcKappaChange(step, i);
     if (!has_kappa_) {
       kappa_[i] = next_kappa_[i] = state.kappa[i];
       continue;
     }
-    // The velocity at hand led from the last state to this one.
-    const Vector5d change = time_step_ * grasp.contacts()[i].kappa_dot;
     const Surface& tip = grasp.tip(static_cast<int>(i));
     for (std::vector<ContactCoordinates>* integrated : {&kappa_, &next_kappa_}) {
       ContactCoordinates& kappa = (*integrated)[i];

@@ -66,7 +66,7 @@ const CheckFault kFaults[] = {
     {"traction_use", "paper-rest", kShort},
     {"contacts_lost", "hold", kSlippery},
     {"penetration", "hold", kSoft},
-    {"kappa", "paper-rest", {"duration=0.05", "plant.contact_impedance=0.999"}},
+    {"kappa", "hold", kSoft},
     {"base_tilt", "paper-rest", kShort},
     {"idle_joints", "paper-rest", kShort},
     {"solver", "hold", {"duration=0.02"}, StopSolverEarly},
