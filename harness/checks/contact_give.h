@@ -71,7 +71,8 @@ class ContactGive {
 ///
 ///   |r_ddot| <= s (|a| / 4 + |b| + sum_k max_theta |theta e_theta(k)| |F_n-k - F_n-k-1|).
 ///
-/// Likewise along tangents.
+/// Likewise along tangents. Modes in which normals and tangents take part are orthogonal but for what is of
+/// the order of s, which is added: 1 + s times the sum.
 class ModesGive {
  public:
   ModesGive(const PlantOptions& plant, double normal_share, double tangential_share);
@@ -83,6 +84,7 @@ class ModesGive {
   [[nodiscard]] const ContactGive& softest() const { return softest_; }
 
  private:
+  double share_;  // the largest s
   ContactGive softest_, stiffest_;
   VectorXd bends_;    // s max_theta |theta e_theta(k)| by k
   VectorXd changes_;  // |F_k - F_k-1| of as many steps, the one of this step at newest_

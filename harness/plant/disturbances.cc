@@ -91,6 +91,16 @@ std::span<const Wrench> Disturbances::Evaluate(double t, const MeasuredState& st
   return wrenches_;
 }
 
+std::span<const Wrench> Disturbances::Evaluate(double t, const PlantReading& reading) {
+  Evaluate(t, reading.state);
+  if (!on_robot_) return wrenches_;
+  const Pose shift = reading.X_W0 * robot_.CalcLinkPose(-1).inverse(Eigen::Isometry);
+  for (Wrench& w : wrenches_) {
+    if (w.body != Wrench::kObject) w.point = shift * w.point;
+  }
+  return wrenches_;
+}
+
 void AddRobotForce(std::span<const Wrench> wrenches, const ModelTerms& robot, Eigen::Ref<VectorXd> force) {
   const RobotModel& model = robot.model();
   const Base& base = model.base();

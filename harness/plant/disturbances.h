@@ -9,6 +9,7 @@
 #include "controller/dynamics/model_terms.h"
 #include "harness/plant/imperfections.h"
 #include "harness/plant/part_context.h"
+#include "harness/plant/plant_reading.h"
 #include "harness/plant/random_stream.h"
 #include "harness/plant/wrench.h"
 
@@ -24,8 +25,10 @@ class Disturbances {
   void Add(const DisturbanceOptions& one, const PartContext& context);
 
   [[nodiscard]] bool empty() const { return sources_.empty(); }
-  /// Those that act from t on, s. @param state the plant's.
+  /// Those that act from t on, s, in the model's pose of each body. @param state the plant's.
   std::span<const Wrench> Evaluate(double t, const MeasuredState& state);
+  /// The same at the same points of the plant's bodies, which tilt and sink with its platform.
+  std::span<const Wrench> Evaluate(double t, const PlantReading& reading);
   /// By which factor a disturbance's wrench acts at t.
   [[nodiscard]] double CalcSize(size_t disturbance, double t) const;
 

@@ -137,7 +137,7 @@ void ClosedLoop::ControlStep(double t) {
   controller_->Step(record_.told, t, &record_.command);
   DriveMotors(t);
   if (!disturbances_.empty()) {
-    plant_->Push(disturbances_.Evaluate(record_.time, record_.reading.state));
+    plant_->Push(disturbances_.Evaluate(record_.time, record_.reading));
   }
   const auto control = Clock::now();
   plant_->EndStep(record_.drive.tau);

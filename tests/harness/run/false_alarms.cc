@@ -43,7 +43,7 @@ struct Options {
   int seeds = 20;
   std::vector<std::string> steps = {"0.25", "0.5", "1", "2"};  // ms
   std::vector<std::string> impedances = {"0.9", "0.99", "0.999"};
-  std::string duration = "0.5";
+  std::string duration = "4";
   std::vector<std::string> overrides;
 };
 
