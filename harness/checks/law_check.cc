@@ -211,25 +211,35 @@ void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings,
     if (spec_.orientation == OrientationFeedback::kAngles)
       truth.X_o = CalcObjectCoordinates(truth.X_Bo, terms.X_o);
   }
-  if (!follows_) {
-    followed_ = undisturbed_ = truth;
+  if (follows_) {
+    // Under torques that are held the acceleration goes from that of the step's beginning to that of its end:
+    // half of the change is in its mean.
+    Vector6d hold = Vector6d::Zero();
+    if (holds_torques()) hold = 0.5 * (held_acceleration_ - acceleration_);
+    Move(followed_.V_dot + hold, &followed_.object);
+    Move(undisturbed_.V_dot, &undisturbed_.object);
+    Move(held_.V_dot + hold, &held_.object);
+  } else {
+    followed_.object = undisturbed_.object = held_.object = truth;
     follows_ = true;
   }
-  errors_.error_dynamics = (followed_.X_Bo.translation() - truth.X_Bo.translation()).norm();
-  errors_.orientation_dynamics = CalcAngle(followed_.X_Bo.linear(), truth.X_Bo.linear());
-  errors_.position_by_law = (undisturbed_.X_Bo.translation() - desired.X_d.head<3>()).norm();
-  errors_.orientation_by_law = CalcAngle(undisturbed_.X_Bo.linear(), CalcObjectPose(desired.X_d).linear());
-  if (spec_.orientation == OrientationFeedback::kAngles) {
-    followed_.X_o = CalcObjectCoordinates(followed_.X_Bo, followed_.X_o);
-    undisturbed_.X_o = CalcObjectCoordinates(undisturbed_.X_Bo, undisturbed_.X_o);
+  acceleration_ = step.response.V_Bo_dot;
+  const Pose& X_Bo = undisturbed_.object.X_Bo;
+  errors_.error_dynamics = (followed_.object.X_Bo.translation() - truth.X_Bo.translation()).norm();
+  errors_.orientation_dynamics = CalcAngle(followed_.object.X_Bo.linear(), truth.X_Bo.linear());
+  errors_.position_by_law = (X_Bo.translation() - desired.X_d.head<3>()).norm();
+  errors_.orientation_by_law = CalcAngle(X_Bo.linear(), CalcObjectPose(desired.X_d).linear());
+  errors_.position_by_hold = (held_.object.X_Bo.translation() - X_Bo.translation()).norm();
+  errors_.orientation_by_hold = CalcAngle(held_.object.X_Bo.linear(), X_Bo.linear());
+  for (Followed* one : {&followed_, &undisturbed_, &held_}) {
+    if (spec_.orientation == OrientationFeedback::kAngles)
+      one->object.X_o = CalcObjectCoordinates(one->object.X_Bo, one->object.X_o);
+    one->V_dot = reference_.CalcDemand(spec_, one->object, desired);
   }
-  Vector6d V_dot = reference_.CalcDemand(spec_, followed_, desired);
   // What the engine's object did beyond the rigid prediction. Where it is told otherwise, given otherwise and
   // pushed, all of that drives (57) as well: what it did beyond what its true error demands.
-  V_dot += step.response.V_Bo_dot -
-           (step.known != nullptr ? reference_.CalcDemand(spec_, truth, desired) : findings.V_Bo_dot_model);
-  Move(V_dot, &followed_);
-  Move(reference_.CalcDemand(spec_, undisturbed_, desired), &undisturbed_);
+  followed_.V_dot += acceleration_ - (step.known != nullptr ? reference_.CalcDemand(spec_, truth, desired)
+                                                            : findings.V_Bo_dot_model);
 }
 
 void LawCheck::Move(const Vector6d& V_dot, LawObject* object) const {
@@ -237,10 +247,13 @@ void LawCheck::Move(const Vector6d& V_dot, LawObject* object) const {
   Matrix3d R = object->X_Bo.linear();
   const Vector3d v = object->V_Bo.head<3>();
   Vector3d omega = object->V_Bo.tail<3>();
-  const Vector3d p_dot = R * (v + time_step_ * (V_dot.head<3>() + omega.cross(v)));
+  const Vector3d p_ddot = V_dot.head<3>() + omega.cross(v);
+  const Vector3d p_dot = R * (v + time_step_ * p_ddot);
   omega += time_step_ * V_dot.tail<3>();
-  R = R * ExpSo3(time_step_ * omega);
-  object->X_Bo.translation() += time_step_ * p_dot;
+  // Positions go by the velocity of the step's middle, which is dt / 2 - age before the new one.
+  const double before = 0.5 * time_step_ - velocity_age_;
+  object->X_Bo.translation() += time_step_ * (p_dot - before * (R * p_ddot));
+  R = R * ExpSo3(time_step_ * (omega - before * V_dot.tail<3>()));
   object->X_Bo.linear() = Eigen::Quaterniond(R).normalized().toRotationMatrix();
   object->V_Bo << object->X_Bo.linear().transpose() * p_dot, omega;
 }

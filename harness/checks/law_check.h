@@ -33,6 +33,8 @@ struct LawErrors {
   /// How far from its desired pose the object would be if (57) alone drove it, m and rad: what the gains
   /// leave.
   double position_by_law = 0.0, orientation_by_law = 0.0;
+  /// How much farther it would be if nothing but torques that are held during a step drove (57), m and rad.
+  double position_by_hold = 0.0, orientation_by_hold = 0.0;
 };
 
 /// Largest magnitude of the eigenvalues of (57), per time step, when the command is held for `hold` steps: 1
@@ -61,10 +63,13 @@ class LawCheck {
   /// Whether the rigid system answers with what the law demands of it: the paper's does.
   [[nodiscard]] bool has_demand() const { return baseline_ == nullptr; }
   /// Whether the controller computes anew at every step, so that (57) can be integrated beside it.
-  /// in the way that its velocities need: those of the middle of the step before.
-  [[nodiscard]] bool follows_error() const {
-    return has_error_dynamics_ && hold_ == 1 && velocity_age_ > 0.0;
-  }
+  [[nodiscard]] bool follows_error() const { return has_error_dynamics_ && hold_ == 1; }
+  /// Whether the plant moves on under torques that are held during a step. One that steps by Euler's method
+  /// has their acceleration at the step's beginning alone.
+  [[nodiscard]] bool holds_torques() const { return follows_error() && velocity_age_ == 0.0; }
+  /// V_o_dot of the plant at this step's state under the torques of the step before, for Compare; asked for
+  /// where holds_torques.
+  void SetHeldAcceleration(const Vector6d& V_Bo_dot) { held_acceleration_ = V_Bo_dot; }
 
   /// The law at the state that the controller was told, before Compare. @param terms the engine's there.
   void Evaluate(const StepRecord& step, const LawTerms& terms);
@@ -93,7 +98,7 @@ class LawCheck {
   void FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                    const DesiredMotion& desired);
   double Norm(const VectorXd& force);
-  /// As the plant steps: velocities first.
+  /// As the plant steps, to the next step.
   void Move(const Vector6d& V_dot, LawObject* object) const;
 
   LawSpec spec_;
@@ -117,8 +122,12 @@ class LawCheck {
   VectorXd force_, difference_, work_;  // n
   VectorXd slope_;                      // k
   bool follows_ = false;                // whether those below are set
-  LawObject followed_;                  // of (57); velocities half a step before
-  LawObject undisturbed_;               // the same, driven by nothing
+  struct Followed {
+    LawObject object;                       // of (57); velocities as old as the plant's
+    Vector6d V_dot = Vector6d::Zero();      // from this step to the next
+  };
+  Followed followed_, undisturbed_, held_;  // driven by all, by nothing, by torques that are held
+  Vector6d acceleration_ = Vector6d::Zero(), held_acceleration_ = Vector6d::Zero();  // of the plant
 };
 
 }  // namespace dexcheck
