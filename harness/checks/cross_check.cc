@@ -56,7 +56,8 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
   if (joint_law_ && !joint_law_->follows_error()) motion_.LeaveOut(kJointDynamics);
   if (joint_law_) return;
   if (!law_) {
-    for (const StepCheck check : {kGains, kLawTorque, kLawDemand, kGraspForce, kJointDynamics}) {
+    for (const StepCheck check :
+         {kGains, kLawTorque, kLawDemand, kGraspNullSpace, kGraspCone, kGraspOptimality, kJointDynamics}) {
       motion_.LeaveOut(check);
     }
   }
@@ -167,22 +168,7 @@ void CrossCheck::ReadControllersTerms(const StepRecord& step) {
   ReadEngineTerms(controller.context(), *step.model, step.told.state, contacts, &law_terms_);
 }
 
-void CrossCheck::FindHeld(const StepRecord& step) {
-  const GraspModel& model = ModelAtTruth(step);
-  if (held_force_.size() > 0) {
-    const Vector6d* const push = step.known != nullptr ? &step.known->object_wrench : nullptr;
-    law_->SetHeldAcceleration(
-        meant_dynamics_
-            .Predict(model.robot(), model.grasp(), held_force_, ObjectSupport::kHand, nullptr, push)
-            .V_Bo_dot);
-  }
-  held_force_.resize(setup_->model().num_velocities());
-  actuation_.CalcForce(step.drive.tau, held_force_);
-  if (step.known != nullptr) held_force_ += step.known->force;
-}
-
 const LawErrors& CrossCheck::CompareControl(const StepRecord& step) {
-  if (law_->holds_torques()) FindHeld(step);
   ReadControllersTerms(step);
   law_->Evaluate(step, law_terms_);
   if (MovedAsMeant(step)) {
@@ -267,7 +253,9 @@ void CrossCheck::CompareObjectLaw(const StepRecord& step) {
   const LawErrors& errors = CompareControl(step);
   motion_.Add(StepCheck::kLawTorque, errors.torque, t);
   motion_.Add(StepCheck::kLawDemand, errors.demand, t);
-  motion_.Add(StepCheck::kGraspForce, errors.grasp_force, t);
+  motion_.Add(StepCheck::kGraspNullSpace, errors.grasp_null_space, t);
+  motion_.Add(StepCheck::kGraspCone, errors.grasp_cone, t);
+  motion_.Add(StepCheck::kGraspOptimality, errors.grasp_optimality, t);
   motion_.Add(StepCheck::kErrorDynamics, errors.error_dynamics, t);
   motion_.Add(StepCheck::kOrientationDynamics, errors.orientation_dynamics, t);
   position_by_hold_ = errors.position_by_hold;

@@ -95,8 +95,6 @@ class CrossCheck {
   [[nodiscard]] bool MovedAsMeant(const StepRecord& step) const;
   /// What the controller's rigid system does under the torques that were sent.
   void FindMeant(const StepRecord& step);
-  /// What the plant does at this step's state under the torques of the step before.
-  void FindHeld(const StepRecord& step);
   /// Of torques that the controller computed at this step.
   const LawErrors& CompareControl(const StepRecord& step);
   void CompareJointLaw(const StepRecord& step);
@@ -119,7 +117,6 @@ class CrossCheck {
   ConstrainedDynamics meant_dynamics_;
   ActuationMap actuation_;
   VectorXd meant_force_, slip_acceleration_;  // n
-  VectorXd held_force_;                       // n: what acted at the step before
   StepFindings meant_;                        // by FindMeant
 };
 

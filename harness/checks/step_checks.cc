@@ -110,8 +110,9 @@ void StepChecks::SetApplying() {
   leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kRolling, kTractionUse});
   leave_out(setup_->model().base().type == BaseType::kFixed, {kBaseTilt});
   const bool joints = setup_->joint_motion() != nullptr;
-  leave_out(joints, {kLawDemand, kGraspForce, kErrorDynamics, kOrientationDynamics, kContactForce,
-                     kFingertipSlip, kFingertipSlipRate, kConeUse, kContactsLost, kPenetration, kKappa});
+  leave_out(joints, {kLawDemand, kGraspNullSpace, kGraspCone, kGraspOptimality, kErrorDynamics,
+                     kOrientationDynamics, kContactForce, kFingertipSlip, kFingertipSlipRate, kConeUse,
+                     kContactsLost, kPenetration, kKappa});
   leave_out(!joints, {kJointDynamics});
   leave_out(!setup_->scenario().grasp.hemisphere, {kFingertipRim});
   leave_out(!setup_->has_object(), {kBalanceObject});
