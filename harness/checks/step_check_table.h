@@ -223,8 +223,10 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "m",
      .bound = 0.0,
-     .formula = "[expect] position",
-     .reason = "what the scenario means",
+     .formula = "[expect] position + hold",
+     .reason =
+         "what the scenario means; hold is where (57) is led by what a rigid plant accelerates within a "
+         "step",
      .description = "object's position error, against what the scenario expects",
      .meaning = {.cause = Cause::kControlLaw, .precedence = 21, .rank = Rank::kResidual}},
     {.check = StepCheck::kExpectOrientation,
@@ -232,8 +234,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .kind = CheckKind::kLaw,
      .unit = "rad",
      .bound = 0.0,
-     .formula = "[expect] orientation",
-     .reason = "what the scenario means",
+     .formula = "[expect] orientation + hold",
+     .reason = "likewise",
      .description = "object's orientation error, against what the scenario expects",
      .meaning = {.cause = Cause::kControlLaw, .precedence = 22, .rank = Rank::kResidual}},
     {.check = StepCheck::kJointDynamics,

@@ -153,7 +153,7 @@ INSTANTIATE_TEST_SUITE_P(
         {"FingertipRadius", "robot.xml", "<default class=\"tip\"> <geom size=\"0.009\"",
          "<default class=\"tip\"> <geom size=\"0.0091\"", "fingertip_radius", kFingertip},
         {"FingertipPlace", "robot.xml", "<default class=\"tip\"> <geom size=\"0.009\" pos=\"0 0 -0.0185\"/>",
-         "<default class=\"tip\"> <geom size=\"0.008\" pos=\"0 0 -0.0195\"/>", "contact_friction",
+         "<default class=\"tip\"> <geom size=\"0.008\" pos=\"0 0 -0.0195\"/>", "fingertip_radius",
          kFingertip},
         {"PairFriction", "contacts.xml",
          "<default class=\"fingertip\"> <pair condim=\"3\" friction=\"0.8 0.8",
