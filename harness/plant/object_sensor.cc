@@ -109,7 +109,10 @@ void ObjectSensor::Filter(const Pose& seen, bool is_new) {
   const Vector3d e_R = LogSo3(estimate_.linear().transpose() * seen.linear());
   estimate_.translation() += position_gains_.k_x() * e_p;
   p_dot_ += position_gains_.k_v() * e_p;
-  estimate_.linear() = estimate_.linear() * ExpSo3(orientation_gains_.k_x() * e_R);
+  // Products of rotations leave the group by rounding.
+  estimate_.linear() = Eigen::Quaterniond(estimate_.linear() * ExpSo3(orientation_gains_.k_x() * e_R))
+                           .normalized()
+                           .toRotationMatrix();
   omega_ += orientation_gains_.k_v() * e_R;
 }
 

@@ -167,8 +167,7 @@ void Sensing::AddVelocity(const Vector3d& v) {
     if (base_positions_ > 0) {
       const Vector3d heading(std::cos(state.q[2]), std::sin(state.q[2]), 0.0);
       state.q.head<2>() -= age * time_step_ * v.head<2>();
-      state.xi.head<2>() +=
-          CalcDriveVelocity(base_, Vector2d::Constant(v.dot(heading) / base_.wheel_radius));
+      state.xi.head<2>() += CalcDriveVelocity(base_, Vector2d::Constant(v.dot(heading) / base_.wheel_radius));
     }
     state.X_Bo.translation() -= (age + object_.FindAge(j)) * time_step_ * v;
     state.V_Bo.head<3>() += state.X_Bo.linear().transpose() * v;
