@@ -117,9 +117,12 @@ void StepChecks::SetApplying() {
   leave_out(!setup_->scenario().grasp.hemisphere, {kFingertipRim});
   leave_out(!setup_->has_object(), {kBalanceObject});
   // Nothing but stiffness holds them: whatever is not ideal moves them, and so do the Coriolis forces and the
-  // friction that kPdGravity leaves to it.
-  leave_out(setup_->idle_joints().empty() || !setup_->scenario().imperfections.is_ideal() ||
-                setup_->scenario().control.law == ControlLaw::kPdGravity,
+  // friction that kPdGravity leaves to it. The least motion in the metric of M_bar' has them in it.
+  const ControlOptions& control = setup_->scenario().control;
+  const bool moves_idle = control.law == ControlLaw::kPdGravity ||
+                          control.law == ControlLaw::kOperationalSpace ||
+                          control.weight == RedundancyWeight::Kind::kMass;
+  leave_out(setup_->idle_joints().empty() || !setup_->scenario().imperfections.is_ideal() || moves_idle,
             {kIdleJoints});
   // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
   leave_out(setup_->scenario().plant.type == PlantType::kRigid,
