@@ -14,12 +14,16 @@
 
 namespace dexcheck {
 
+/// Constants of joints that two descriptions need not share.
+inline constexpr const char* kIgnorable[] = {"armature", "damping", "friction"};
+
 struct ConsistencyOptions {
   long samples = 10000;
   std::uint64_t seed = 1;
   StateRange range;
   ModelViewFactory make_view = MakeModelView;  ///< What stands for the model.
   ObjectFormulas object;                       ///< What stands for the object's equations.
+  std::vector<std::string> ignore;  ///< Constants of joints that two files need not share: kIgnorable.
 };
 
 struct ConsistencyResult {

@@ -1,5 +1,6 @@
 #include "harness/cli/commands.h"
 
+#include "harness/checks/consistency.h"
 #include "harness/cli/shipped_files.h"
 
 namespace dexcheck::cli {
@@ -19,6 +20,15 @@ Option AddRobotOptions(Command command, RobotFiles* files) {
 Option AddJUnitOption(Command command, std::string* file) {
   return command.AddOption("--junit", file, "Write each check as a test case of JUnit's XML to this file")
       .TypeName("FILE.xml");
+}
+
+Option AddIgnoreOption(Command command, std::vector<std::string>* ignore) {
+  return command
+      .AddOption("--ignore", ignore,
+                 "Constants of joints that the two need not share: armature, damping, friction")
+      .TypeName("WORD,...")
+      .Delimiter(',')
+      .OneOf({kIgnorable[0], kIgnorable[1], kIgnorable[2]});
 }
 
 }  // namespace dexcheck::cli

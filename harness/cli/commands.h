@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "harness/cli/command_line.h"
 
@@ -35,6 +36,9 @@ void AddSampleOptions(Command command, std::uint64_t most, Count* samples, std::
 
 /// Adds --junit.
 Option AddJUnitOption(Command command, std::string* file);
+
+/// Adds --ignore: constants of joints that two descriptions need not share.
+Option AddIgnoreOption(Command command, std::vector<std::string>* ignore);
 
 /// Each adds its command to `app`.
 void AddAuditCommand(Command app);

@@ -161,6 +161,7 @@ void AddConsistencyCommand(Command app) {
       .TypeName("FILE.json");
   AddJUnitOption(command, &request->junit_file);
   AddToleranceOptions(command, &request->judging);
+  AddIgnoreOption(command, &request->options.ignore);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

@@ -21,7 +21,7 @@
 #include "harness/diagnosis/diagnose.h"
 #include "harness/diagnosis/file_terms.h"
 #include "harness/engine/engine.h"
-#include "harness/sides/complete_description.h"
+#include "harness/sides/description_match.h"
 #include "harness/sides/engine_extras.h"
 #include "harness/sides/join_names.h"
 #include "harness/sides/read_description.h"
@@ -35,6 +35,7 @@ struct DiagnoseRequest {
   RobotFiles files;
   DiagnosisOptions options;
   ToleranceOptions judging;
+  std::vector<std::string> ignore;
   std::string json_file;
   bool quiet = false;
 };
@@ -178,11 +179,18 @@ void SortFiles(DiagnoseRequest* request) {
 /// What is to be repaired, completed by what only the MJCF states when it is a URDF. What a URDF has no place
 /// for is taken out of the engine's model.
 /// @param rows filled with how its joints' rows are written.
-RobotModel ReadGiven(const RobotFiles& files, mjModel* engine, std::vector<WrittenRow>* rows) {
-  if (FindFormat(files.robot) == RobotFormat::kToml) return ReadRobotModel(files.robot, rows);
+RobotModel ReadGiven(const DiagnoseRequest& request, mjModel* engine, std::vector<WrittenRow>* rows) {
+  const RobotFiles& files = request.files;
+  const bool is_table = FindFormat(files.robot) == RobotFormat::kToml;
   RobotDescription robot = ReadDescription(files.robot);
-  SetAsideMotors(files.mjcf.filename().string(), engine);
-  CompleteFromEngine(*engine, files.mjcf.filename().string(), &robot);
+  if (!is_table) SetAsideMotors(files.mjcf.filename().string(), engine);
+  const Completion completion =
+      CompleteFromEngine(*engine, files.mjcf.filename().string(), &robot, request.ignore, is_table);
+  UndoOneSided(completion.one_sided, &robot.spec);
+  if (is_table) {
+    static_cast<void>(ReadRobotModel(files.robot, rows));
+    return RobotModel(robot.spec);
+  }
   for (const DescribedJoint& joint : robot.joints) rows->push_back({joint.X_iL, true});
   return RobotModel(robot.spec);
 }
@@ -192,7 +200,7 @@ int Run(DiagnoseRequest request) {
   request.options.tolerance = request.judging.Find().value_or(0.0);
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
   std::vector<WrittenRow> rows;
-  const RobotModel model = ReadGiven(request.files, engine.get(), &rows);
+  const RobotModel model = ReadGiven(request, engine.get(), &rows);
   RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely mistakes)");
   CatchInterrupts();
   std::optional<OutputFile> json;
@@ -242,6 +250,7 @@ void AddDiagnoseCommand(Command app) {
   command.AddFlag("--by-motion", &request->options.by_motion,
                   "Use axes, frames and forces only, not the bodies' masses and inertias in the MJCF");
   AddToleranceOptions(command, &request->judging);
+  AddIgnoreOption(command, &request->ignore);
   command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
       .TypeName("FILE.json");
   command.AddFlag("--quiet", &request->quiet, "No progress, and causes only");

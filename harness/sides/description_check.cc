@@ -27,18 +27,6 @@ class DescriptionCheck {
   }
 
  private:
-  /// The check of that name, a new one when there is none.
-  CheckRecord* Define(const std::string& name) {
-    const auto old = std::find_if(gate_.records.begin(), gate_.records.end(),
-                                  [&](const CheckRecord& one) { return one.name == name; });
-    if (old != gate_.records.end()) return &*old;
-    CheckRecord record;
-    record.name = name;
-    record.bound = kRowRounding;
-    gate_.records.push_back(record);
-    return &gate_.records.back();
-  }
-
   /// Takes back findings of the gate about what it believes that only the engine has. The check goes with the
   /// last of them.
   void TakeBack(const std::string& check, const std::function<bool(const GateFinding&)>& is_known) {
@@ -79,7 +67,7 @@ class DescriptionCheck {
       if (own && !other) only_here.push_back(name);
       if (!own && other) only_there.push_back(name);
       if (!own || !other) continue;
-      if (record == nullptr) record = Define("joint_coupling");
+      if (record == nullptr) record = gate_.Define("joint_coupling");
       constraints.push_back("constraint " + NameOf(engine_, mjOBJ_EQUALITY,
                                                    FindCouplingConstraint(engine_, adapter_.joint_ids()[i])));
       const int joint = static_cast<int>(i);

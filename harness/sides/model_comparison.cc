@@ -166,14 +166,8 @@ class ModelComparison {
 
   void AddConstant(GateResult* gate, const std::string& name, const Location& where, double a, double b,
                    int entry, double scale = 0.0) {
-    if (gate->records.empty() || gate->records.back().name != name) {
-      CheckRecord record;
-      record.name = name;
-      record.bound = kRounding;
-      gate->records.push_back(record);
-    }
     const double size = std::max({std::abs(a), std::abs(b), scale});
-    if (gate->records.back().Compare(a, b, size > 0.0 ? size : 1.0, where, -1) <= kRounding) return;
+    if (gate->Define(name)->Compare(a, b, size > 0.0 ? size : 1.0, where, -1) <= kRounding) return;
     gate->findings.push_back({name, Describe(where, model_a_, base_), a, b, where, entry});
   }
 

@@ -8,7 +8,6 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
 #include "harness/engine/engine.h"
-#include "harness/sides/complete_description.h"
 #include "harness/sides/description_match.h"
 #include "harness/sides/file_comparison.h"
 #include "harness/sides/mjcf_reader.h"
