@@ -161,7 +161,7 @@ MassProperties ReadBody(TomlTable& table) {
 }
 
 void CheckBody(const TomlValue& value, const MassProperties& body) {
-  const std::string problem = FindPhysicalInconsistency(body);
+  const std::string problem = FindUndefinedDynamics(body);
   if (!problem.empty()) value.Reject(problem);
 }
 

@@ -69,7 +69,7 @@ class SpecChecker {
   }
 
   void CheckBody(const std::string& key, const MassProperties& body) const {
-    const std::string problem = FindPhysicalInconsistency(body);
+    const std::string problem = FindUndefinedDynamics(body);
     if (!problem.empty()) Fail(key, problem);
   }
 

@@ -17,6 +17,13 @@ Option AddRobotOptions(Command command, RobotFiles* files) {
   return robot;
 }
 
+Option AddJsonOption(Command command, const std::string& what, std::string* file) {
+  return command
+      .AddOption("--json", file,
+                 "Write " + what + " to this file; without one, or with -, print them and nothing else")
+      .TypeName("[FILE.json]");
+}
+
 Option AddJUnitOption(Command command, std::string* file) {
   return command.AddOption("--junit", file, "Write each check as a test case of JUnit's XML to this file")
       .TypeName("FILE.xml");

@@ -34,6 +34,10 @@ void AddSampleOptions(Command command, std::uint64_t most, Count* samples, std::
       .ShowDefault();
 }
 
+/// Adds --json [FILE]: JSON to this file; without a file, or with "-", to standard output and nothing else.
+/// @param what the file gets: "the findings".
+Option AddJsonOption(Command command, const std::string& what, std::string* file);
+
 /// Adds --junit.
 Option AddJUnitOption(Command command, std::string* file);
 

@@ -168,7 +168,7 @@ TEST_P(LeggedRobots, FixedInOneFileAndFloatingInTheOtherIsSaid) {
   EXPECT_THROW(CompareWithEngine(ParseUrdf(urdf_, "robot.urdf", floating), *fixed), InputError);
   RobotDescription urdf = ParseUrdf(urdf_, "robot.urdf");
   RobotDescription mjcf = ReadMjcfDescription(*engine_, "robot.xml");
-  const std::vector<std::string> notes = CompleteEachOther(&urdf, &mjcf);
+  const std::vector<std::string> notes = CompleteEachOther(&urdf, &mjcf).notes;
   EXPECT_THAT(notes,
               Contains(HasSubstr("base: robot.urdf does not say how its root moves; it floats as that of "
                                  "robot.xml")));
