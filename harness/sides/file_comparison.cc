@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "controller/common/errors.h"
 #include "harness/checks/tolerance.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/compiled_inertias.h"
@@ -70,10 +71,38 @@ void CountRoundings(int imported, bool has_link_frames, std::vector<CheckRecord>
   }
 }
 
-/// Whether an MJCF can be read as a description of this robot.
-bool IsDescribable(const RobotDescription& robot) {
-  const BaseType base = robot.spec.base.type;
-  return (base == BaseType::kFixed || base == BaseType::kFloating) && !robot.spec.object;
+/// What brings a description and an engine's model together.
+struct EngineCompletion {
+  Completion completion;
+  bool has_link_frames = false;
+};
+
+/// Completes a description, and gives it frames of links and the inertias that the engine compiled. A robot
+/// on wheels, one with an object, and a parameter file of another mechanism are left for the adapter to
+/// match.
+EngineCompletion Complete(const ConsistencyOptions& options, const mjModel& engine, Comparison* comparison,
+                          RobotDescription* robot) {
+  const std::string file = comparison->second.filename().string();
+  const bool is_table = FindFormat(comparison->first) == RobotFormat::kToml;
+  const BaseType base = robot->spec.base.type;
+  EngineCompletion result;
+  if ((base == BaseType::kFixed || base == BaseType::kFloating) && !robot->spec.object) {
+    RobotDescription completed = *robot;
+    try {
+      result.completion = CompleteFromEngine(engine, file, &completed, options.ignore);
+      RobotDescription compiled = ReadMjcfDescription(engine, file);
+      result.has_link_frames = AddLinkFrames(&completed, &compiled);
+      const std::optional<std::string> inertias =
+          TakeCompiledInertias(comparison->second, engine, &completed);
+      if (inertias) comparison->notes.push_back(*inertias);
+      *robot = std::move(completed);
+      return result;
+    } catch (const InputError&) {
+      if (!is_table) throw;
+    }
+  }
+  result.completion = CompleteFromEngine(engine, file, robot, options.ignore, is_table);
+  return result;
 }
 
 /// A description against the engine.
@@ -88,21 +117,14 @@ void CompareWithEngine(const UrdfOptions& urdf, const ConsistencyOptions& option
     const std::optional<std::string> motors = SetAsideMotors(file, engine.get());
     if (motors) comparison->not_compared.push_back(*motors);
   }
-  const Completion completion =
-      CompleteFromEngine(*engine, file, &robot, options.ignore, format == RobotFormat::kToml);
-  bool has_link_frames = false;
-  if (IsDescribable(robot)) {
-    RobotDescription compiled = ReadMjcfDescription(*engine, file);
-    has_link_frames = AddLinkFrames(&robot, &compiled);
-    const std::optional<std::string> inertias = TakeCompiledInertias(comparison->second, *engine, &robot);
-    if (inertias) comparison->notes.push_back(*inertias);
-  }
+  const EngineCompletion completed = Complete(options, *engine, comparison, &robot);
+  const Completion& completion = completed.completion;
   comparison->model.emplace(robot.spec);
   const Adapter adapter(*comparison->model, *engine, comparison->second.string());
   std::optional<Extras> extras;
   if (format == RobotFormat::kMjcf) extras = CompareExtras(written, comparison->first, adapter, engine.get());
   comparison->result = CheckConsistency(adapter, options, progress);
-  CountRoundings(robot.is_imported ? 1 : 0, has_link_frames, &comparison->result.terms);
+  CountRoundings(robot.is_imported ? 1 : 0, completed.has_link_frames, &comparison->result.terms);
   GateResult& gate = comparison->result.gate;
   std::erase_if(gate.records, [&](const CheckRecord& record) {
     return !record.failed && std::find(completion.unstated.begin(), completion.unstated.end(), record.name) !=

@@ -205,9 +205,9 @@ TEST(FloatingBase, TheRobotIsTheTreeWithTheMostJoints) {
   for (const auto& [a, b] : {std::pair(alone, scene), std::pair(scene, alone), std::pair(scene, scene)}) {
     const Comparison comparison = CompareFiles(a, b, {}, options);
     EXPECT_TRUE(comparison.result.Agrees()) << ::testing::PrintToString(ListDifferences(comparison));
-    const bool is_said = std::find(comparison.notes.begin(), comparison.notes.end(),
+    const bool is_said = std::find(comparison.not_compared.begin(), comparison.not_compared.end(),
                                    "no part of the robot, since nothing joins them to it: joints b, s") !=
-                         comparison.notes.end();
+                         comparison.not_compared.end();
     EXPECT_EQ(is_said, b == scene);
   }
 }
