@@ -14,8 +14,8 @@
 
 namespace dexcheck {
 
-/// Constants of joints that two descriptions need not share.
-inline constexpr const char* kIgnorable[] = {"armature", "damping", "friction"};
+/// What two descriptions need not share: constants of joints, and that joints follow others.
+inline constexpr const char* kIgnorable[] = {"armature", "damping", "friction", "coupling"};
 
 struct ConsistencyOptions {
   long samples = 10000;
@@ -23,7 +23,7 @@ struct ConsistencyOptions {
   StateRange range;
   ModelViewFactory make_view = MakeModelView;  ///< What stands for the model.
   ObjectFormulas object;                       ///< What stands for the object's equations.
-  std::vector<std::string> ignore;  ///< Constants of joints that two files need not share: kIgnorable.
+  std::vector<std::string> ignore;             ///< What two files need not share: kIgnorable.
 };
 
 struct ConsistencyResult {

@@ -32,10 +32,10 @@ Option AddJUnitOption(Command command, std::string* file) {
 Option AddIgnoreOption(Command command, std::vector<std::string>* ignore) {
   return command
       .AddOption("--ignore", ignore,
-                 "Constants of joints that the two need not share: armature, damping, friction")
+                 "What the two need not share of joints: armature, damping, friction, coupling to others")
       .TypeName("WORD,...")
       .Delimiter(',')
-      .OneOf({kIgnorable[0], kIgnorable[1], kIgnorable[2]});
+      .OneOf({kIgnorable[0], kIgnorable[1], kIgnorable[2], kIgnorable[3]});
 }
 
 }  // namespace dexcheck::cli

@@ -45,10 +45,9 @@ class Matching {
     RequireSameMechanism();
     TakeGravity();
     TakeNames();
-    for (const JointConstant& constant : kJointConstants) {
-      const bool is_ignored = std::find(ignore_.begin(), ignore_.end(), constant.word) != ignore_.end();
-      is_ignored ? Ignore(constant) : Take(constant);
-    }
+    for (const JointConstant& constant : kJointConstants)
+      Ignores(constant.word, ignore_) ? Ignore(constant) : Take(constant);
+    if (Ignores("coupling", ignore_)) IgnoreCouplings();
     TakeRanges();
     DropFrames();
     return std::move(result_);
@@ -177,6 +176,13 @@ class Matching {
                                                         "; terms are with that of " + a_.spec.source));
   }
 
+  void IgnoreCouplings() {
+    for (RobotDescription* const robot : {&a_, &b_}) {
+      for (Joint& joint : robot->spec.joints) joint.coupling.reset();
+    }
+    result_.not_compared.emplace_back("coupling: ignored");
+  }
+
   void TakeRanges() {
     std::map<std::string, std::vector<std::string>> taken;  // by the source that states it
     ForJoints([&](size_t i, size_t j) {
@@ -231,6 +237,10 @@ std::vector<int> MatchJoints(const RobotSpec& a, const RobotSpec& b) {
     match.push_back(found == index_of.end() ? -1 : found->second);
   }
   return match;
+}
+
+bool Ignores(const std::string& word, const std::vector<std::string>& ignore) {
+  return std::find(ignore.begin(), ignore.end(), word) != ignore.end();
 }
 
 Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,

@@ -15,6 +15,9 @@ namespace dexcheck {
 /// Index in `b` of each joint of `a`, by name; -1 where there is none.
 std::vector<int> MatchJoints(const RobotSpec& a, const RobotSpec& b);
 
+/// Whether a word of kIgnorable is among them.
+bool Ignores(const std::string& word, const std::vector<std::string>& ignore);
+
 /// What one of two descriptions took from the other.
 struct Completion {
   std::vector<std::string> notes;         ///< One line each: what was done.
@@ -29,7 +32,7 @@ struct Completion {
 /// Gives the joints of `b` the names of `a` when they are alike, and completes either description by what
 /// only the other one states: gravity, constants of joints, names of links whose joints have one name; frames
 /// that only one has are dropped.
-/// @param ignore constants that need not agree, of kIgnorable: `b` takes those of `a`.
+/// @param ignore what need not agree, of kIgnorable: `b` takes those of `a`.
 /// @throws InputError that lists the joints that one lacks, or names one whose kind or parent differs.
 Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,
                              const std::vector<std::string>& ignore = {});

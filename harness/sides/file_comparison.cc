@@ -131,7 +131,8 @@ void CompareWithEngine(const UrdfOptions& urdf, const ConsistencyOptions& option
                                  completion.unstated.end();
   });
   AddOneSided(*comparison->model, completion.one_sided, &gate);
-  AppendTo(&comparison->not_compared, CheckDescription(robot, adapter, &gate));
+  AppendTo(&comparison->not_compared,
+           CheckDescription(robot, adapter, &gate, Ignores("coupling", options.ignore)));
   if (extras) AddExtras(*extras, &gate);
   // An MJCF's notes are about what CompareExtras compares.
   if (format != RobotFormat::kMjcf) AppendTo(&comparison->notes, robot.notes);

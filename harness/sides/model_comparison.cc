@@ -93,9 +93,11 @@ class ModelComparison {
     ForJoints([&](size_t i, size_t j) {
       const std::optional<JointCoupling>& own = a_.spec.joints[i].coupling;
       const std::optional<JointCoupling>& other = b_.spec.joints[j].coupling;
-      if (!own || !other) return;
       const Location where{Location::Kind::kJoint, static_cast<int>(i), -1};
       const std::string name = "joint_coupling";
+      if (own.has_value() != other.has_value())
+        AddConstant(&gate, name, where, own ? own->multiplier : 0.0, other ? other->multiplier : 0.0, 1);
+      if (!own || !other) return;
       AddConstant(&gate, name, where, b_of_a_[static_cast<size_t>(own->leader)], other->leader, 0);
       AddConstant(&gate, name, where, own->multiplier, other->multiplier, 1);
       AddConstant(&gate, name, where, own->offset, other->offset, 2);

@@ -113,6 +113,24 @@ TEST_F(CompareFiles, WhatOneAloneHasIsADisagreementUnlessItIsIgnored) {
   EXPECT_EQ(Run({"consistency", "a.urdf", "b.xml", "--ignore", "gravity"}).exit_code, 2);
 }
 
+TEST_F(CompareFiles, AJointThatFollowsAnotherIsADisagreementUnlessItIsIgnored) {
+  Write("mimic.urdf", ReplaceOnce(kUrdf, "<origin xyz=\"0.3 0 0\"/>",
+                                  "<origin xyz=\"0.3 0 0\"/><mimic joint=\"shoulder\" multiplier=\"0.5\"/>"));
+  Write("tied.xml", ReplaceOnce(kMjcf, "</worldbody>",
+                                "</worldbody><equality><joint joint1=\"elbow\" joint2=\"shoulder\" "
+                                "polycoef=\"0 0.5 0 0 0\"/></equality>"));
+  Compare("mimic.urdf", "tied.xml", 0);
+  for (const auto& [a, b, check] : {std::tuple("mimic.urdf", "b.xml", "joint_coupling"),
+                                    {"mimic.urdf", "a.urdf", "joint_coupling"},
+                                    {"a.urdf", "tied.xml", "equality_constraint"}}) {
+    const Json results = Compare(a, b, 1);
+    ASSERT_EQ(results.at("findings").size(), 1U) << a << b;
+    EXPECT_EQ(results.at("findings").front().at("check"), check);
+    EXPECT_THAT(Compare(a, b, 0, {"--ignore", "coupling"}).at("not_compared"),
+                ::testing::Contains("coupling: ignored"));
+  }
+}
+
 // Both ways to name two files, in both orders, are one.
 TEST_F(CompareFiles, OneWayLeadsToEachAnswer) {
   ASSERT_EQ(Run({"import", "a.urdf", "--out", "a.toml"}).exit_code, 0);
