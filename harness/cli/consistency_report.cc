@@ -122,10 +122,10 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
     return;
   }
   const Differences differences = SortDifferences(comparison);
-  const std::string to_digits = fmt::format("agrees to {} digits, as rounded numbers do", differences.digits);
-  const std::string how_to_judge = fmt::format("--digits {} judges by that", differences.digits);
+  const std::string to_digits = fmt::format("agrees to {} digits", differences.digits);
   if (differences.real.empty()) {
-    fmt::print("DISAGREE: everything {}; {}{}.\n", to_digits, how_to_judge, left_out);
+    fmt::print("DISAGREE: everything {}, as rounded numbers do; --digits {} judges by that{}.\n", to_digits,
+               differences.digits, left_out);
   } else {
     fmt::print("DISAGREE: {}", differences.real.front());
     if (differences.real.size() > 1) fmt::print("; and in {} more", differences.real.size() - 1);
@@ -137,7 +137,7 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   constexpr size_t kMostShown = 10;
   const size_t shown = std::min(differences.rounded.size(), kMostShown);
   if (shown > 0 && !differences.real.empty())
-    fmt::print("As rounded numbers do, {} differ ({}):\n", differences.rounded.size(), how_to_judge);
+    fmt::print("To {} digits agree {} more:\n", differences.digits, differences.rounded.size());
   for (size_t i = 0; i < shown; ++i) fmt::print("  {}\n", differences.rounded[i]);
   if (shown < differences.rounded.size())
     fmt::print("  and {} more (--json)\n", differences.rounded.size() - shown);
