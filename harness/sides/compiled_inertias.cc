@@ -105,8 +105,9 @@ std::optional<std::string> TakeCompiledInertias(const std::filesystem::path& mjc
   }
   if (names.empty()) return std::nullopt;
   return fmt::format(
-      "inertias: MuJoCo's compiler diagonalises fullinertia, which leaves up to {:.0e} of it: that is the "
-      "engine's, and terms are with what it made of {}",
+      "inertias: MuJoCo's compiler diagonalises fullinertia and is up to {:.0e} off what the file states: "
+      "that "
+      "difference is the engine's, and terms are with what it made of {}",
       largest, JoinNames(names));
 }
 
