@@ -98,8 +98,7 @@ TEST(ConsistencyCommand, ChangedNumberIsADisagreement) {
                                            {folder.path()});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(result.err, "");
-  EXPECT_THAT(result.out,
-              HasSubstr("\nDISAGREE: link_mass: link panda_link3: 3.3 in bad.toml, 3.228604 in"));
+  EXPECT_THAT(result.out, HasSubstr("\nDISAGREE: link_mass: link panda_link3: 3.3 in bad.toml, 3.228604 in"));
   EXPECT_THAT(result.out, HasSubstr("  gravity: nearest the base: panda_joint2;"));
 
   const Json results = Json::parse(ReadText(folder.path() / "out.json"));
