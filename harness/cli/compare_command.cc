@@ -192,8 +192,7 @@ void AddCompareCommand(Command app) {
       .AddOption("--video", &request->video,
                  "Film two runs in one scene, the second as a ghost (.mp4, .webm or .gif)")
       .TypeName("FILE");
-  command.AddOption("--json", &request->json, "Write the numbers (- for standard output)")
-      .TypeName("FILE.json");
+  AddJsonOption(command, "the numbers", &request->json);
   command.AddFlag("--all", &request->all, "Print all checks and signals");
   command.AddFlag("--quiet", &request->quiet, "Print the last line only");
   command.SetAction([=] {

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -74,6 +75,8 @@ int Run(int argc, char** argv) {
     return Report(error.what(), kInputError);
   } catch (const std::system_error& error) {
     return Report(Explain(error), kInputError);
+  } catch (const std::bad_alloc&) {
+    return Report("not enough memory, or the limit of this process's (ulimit -v) is too small", kFailure);
   } catch (const std::exception& error) {
     return Report(error.what(), kFailure);
   }

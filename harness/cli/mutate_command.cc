@@ -305,8 +305,7 @@ void AddMutateCommand(Command app) {
   for (Option option : {from, duration, mistakes, scale}) option.Excludes(smallest);
   samples.Excludes(run);
   no_diagnosis.Excludes(run);
-  command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
-      .TypeName("FILE.json");
+  AddJsonOption(command, "the results", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

@@ -397,10 +397,7 @@ void AddPlanCommand(Command app) {
                  "Scene in which the robot's bodies must be clear of each other, the object and what stands "
                  "there (default: the shipped one for the shipped robot)")
       .TypeName("FILE.xml");
-  command
-      .AddOption("--json", &request->json_file,
-                 "Write the plan to this file (- for standard output, then without the [grasp])")
-      .TypeName("FILE.json");
+  AddJsonOption(command, "the plan", &request->json_file);
   command.SetAction([=] { return Run(*request); });
 }
 

@@ -224,8 +224,7 @@ void AddRefereeCommand(Command app) {
       .TypeName("N")
       .Check(WholeNumber(1, kMostDigits))
       .ShowDefault();
-  command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
-      .TypeName("FILE.json");
+  AddJsonOption(command, "the results", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });

@@ -40,8 +40,8 @@ struct RunRequest {
   bool no_report = false;
   bool video = false;
   bool quiet = false;
-  bool all = false;   // checks are printed
-  bool json = false;  // instead of text
+  bool all = false;  // checks are printed
+  std::string json_file;
   bool list = false;
   std::string replay;
   std::string junit_file;
@@ -67,7 +67,7 @@ void TryToMake(const char* what, const Make& make) {
 
 /// Draws what was asked for into the run's folder, after the verdict.
 void DrawRun(const RunRequest& request, const std::filesystem::path& folder, ExitCode verdict) {
-  const bool quiet = request.quiet || request.json;
+  const bool quiet = request.quiet || request.json_file == "-";
   if (request.video) {
     TryToMake("video", [&] { WriteRunMovie(folder, (folder / "video.mp4").string(), quiet); });
   }
@@ -86,7 +86,7 @@ LoopParts MakeParts(const RunRequest& request, const Setup& setup, const std::fi
 }
 
 int RunScenario(const RunRequest& request) {
-  const bool quiet = request.quiet || request.json;
+  const bool quiet = request.quiet || request.json_file == "-";
   std::vector<std::string> overrides = request.overrides;
   if (const std::optional<double> tolerance = request.judging.Find()) {
     overrides.push_back("tolerance=" + FormatNumber(*tolerance));
@@ -124,9 +124,8 @@ int RunScenario(const RunRequest& request) {
   const ExitCode verdict = ToExitCode(result);
   std::exception_ptr unprinted;
   try {
-    if (request.json) {
-      fmt::print("{}", summary);
-    } else {
+    if (!request.json_file.empty()) OutputFile(request.json_file).Write(summary);
+    if (request.json_file != "-") {
       PrintRunReport(setup, runner.loop(), result, folder ? folder->path().string() : "",
                      request.quiet ? Detail::kVerdict
                      : request.all ? Detail::kAll
@@ -256,21 +255,23 @@ void AddRunCommand(Command app, const std::string& command_line) {
   Option no_log = command.AddFlag("--no-log", &request->no_log, "Write no files");
   Option quiet = command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   Option all = command.AddFlag("--all", &request->all, "Print each check, not only a line for each question");
-  Option json = command.AddFlag("--json", &request->json, "Print the summary as JSON, and nothing else");
+  Option json = AddJsonOption(command, "the summary", &request->json_file);
   controller.Excludes(list);
   scenario.Excludes(list).Excludes(replay);
   list.Excludes(replay);
   // What would be ignored is refused.
   for (Option option : judging) option.Excludes(list).Excludes(replay);
   no_log.Excludes(video).Excludes(out);
-  all.Excludes(quiet).Excludes(json);
-  json.Excludes(quiet);
+  all.Excludes(quiet);
   for (Option option : {out, set, seed, no_check, video, no_report, no_log, junit, all, json}) {
     option.Excludes(replay).Excludes(list);
   }
   command.SetAction([=] {
     if (request->scenario.empty() && !request->list && request->replay.empty()) {
       throw UsageError("SCENARIO (or --list, or --replay) is required");
+    }
+    if (request->json_file == "-" && (request->quiet || request->all)) {
+      throw UsageError("--json without a file excludes --quiet and --all");
     }
     return Run(*request);
   });

@@ -1,5 +1,7 @@
 #include "harness/cli/shared_request.h"
 
+#include "harness/cli/commands.h"
+
 namespace dexcheck::cli {
 
 void AddScenarioOptions(Command command, ScenarioRequest* request) {
@@ -10,8 +12,7 @@ void AddScenarioOptions(Command command, ScenarioRequest* request) {
 }
 
 void AddResultOptions(Command command, const std::string& what, ScenarioRequest* request) {
-  command.AddOption("--json", &request->json_file, "Write " + what + " to this file (- for standard output)")
-      .TypeName("FILE.json");
+  AddJsonOption(command, what, &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the last line only");
 }
 

@@ -126,7 +126,12 @@ void Adapter::MatchJoints(const std::string& engine_source) {
     link_bodies_.push_back(FindLinkBody(engine, joint, joint_ids_.back(), need));
     known.insert(joint_ids_.back());
   }
-  for (const Frame& frame : model_->frames()) frame_sites_.push_back(need(mjOBJ_SITE, "site", frame.name));
+  for (const Frame& frame : model_->frames()) {
+    const bool is_body =
+        frame.name == model_->link_name(frame.link) && link_bodies_[static_cast<size_t>(frame.link + 1)] >= 0;
+    frame_sites_.push_back(is_body ? mj_name2id(&engine, mjOBJ_SITE, frame.name.c_str())
+                                   : need(mjOBJ_SITE, "site", frame.name));
+  }
   if (model_->object()) object_body_ = need(mjOBJ_BODY, "body", model_->object()->name);
   std::vector<std::string> only_in_engine;
   const BaseType base = model_->base().type;

@@ -82,6 +82,7 @@ MjModelPtr Load(const std::string& path, const mjVFS* vfs, const std::string& so
   char message[1024] = "";
   MjModelPtr model(mj_loadXML(path.c_str(), vfs, message, sizeof(message)));
   if (!model) {
+    if (std::strstr(message, "Could not allocate memory") != nullptr) throw std::bad_alloc();
     throw InputError(source + ": not a valid MJCF model: " + OneLine(message) + ExplainNewerMjcf(message) +
                      AdviseOnBody(message));
   }

@@ -42,13 +42,7 @@ class StaticGate {
   /// Compares relative to the larger of the two, or to `scale` where zero is a proper value.
   void Compare(const std::string& check, const Location& where, double model, double engine,
                double scale = 0.0) {
-    auto record = std::find_if(result_.records.begin(), result_.records.end(),
-                               [&](const CheckRecord& one) { return one.name == check; });
-    if (record == result_.records.end()) {
-      record = result_.records.insert(record, CheckRecord{});
-      record->name = check;
-      record->bound = kRounding;
-    }
+    CheckRecord* const record = result_.Define(check);
     entry_ = check == last_check_ && where == last_location_ ? entry_ + 1 : 0;
     last_check_ = check;
     last_location_ = where;
@@ -350,6 +344,24 @@ class StaticGate {
 };
 
 }  // namespace
+
+CheckRecord* GateResult::Define(const std::string& check) {
+  auto record =
+      std::find_if(records.begin(), records.end(), [&](const CheckRecord& one) { return one.name == check; });
+  if (record == records.end()) {
+    record = records.insert(record, CheckRecord{});
+    record->name = check;
+    record->bound = kRounding;
+  }
+  return &*record;
+}
+
+void GateResult::Add(GateFinding finding) {
+  const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
+  Define(finding.check)
+      ->Compare(finding.model, finding.engine, size > 0.0 ? size : 1.0, finding.location, -1);
+  findings.push_back(std::move(finding));
+}
 
 GateResult RunStaticGate(const Adapter& adapter) { return StaticGate(adapter).Run(); }
 
