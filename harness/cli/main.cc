@@ -70,10 +70,10 @@ int Run(int argc, char** argv) {
     return Report(std::string(error.what()) + " (see dexcheck --help)", kInputError);
   } catch (const InputError& error) {
     return Report(error.what(), kInputError);
-  } catch (const std::invalid_argument& error) {
-    return Report(error.what(), kInputError);
   } catch (const std::system_error& error) {
     return Report(Explain(error), kInputError);
+  } catch (const std::logic_error& error) {  // readers throw InputError: this is a mistake of the program
+    return Report(std::string("internal error: ") + error.what(), kFailure);
   } catch (const std::exception& error) {
     return Report(error.what(), kFailure);
   }

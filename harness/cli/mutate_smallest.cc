@@ -67,7 +67,7 @@ Json ErrorToJson(double error) { return std::isfinite(error) ? Json(error) : Jso
 
 std::string ToText(const MutateRunRequest& request, const DetectabilityResult& result, bool complete) {
   Json json = {{"scenario", request.scenario},
-               {"overrides", request.overrides},
+               {"overrides", request.overrides.List()},
                {"states", kStates},
                {"complete", complete},
                {"rank", result.rank},
@@ -110,7 +110,7 @@ void Print(const DetectabilityResult& result) {
 }  // namespace
 
 int PrintSmallestErrors(const MutateRunRequest& request) {
-  const ScenarioFiles files = FindScenario(request.scenario, request.overrides, /*seed=*/0);
+  const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), /*seed=*/0);
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
   std::optional<OutputFile> json;
@@ -128,7 +128,7 @@ int PrintSmallestErrors(const MutateRunRequest& request) {
   if (json) json->Write(ToText(request, result, complete));
   if (request.json_file != "-") Print(result);
   if (!complete) fmt::print("INTERRUPTED after {} of {} numbers.\n", result.numbers.size(), total);
-  return complete ? kSuccess : kFailure;
+  return complete ? kSuccess : ReportFailure("interrupted");
 }
 
 }  // namespace dexcheck::cli

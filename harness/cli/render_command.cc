@@ -15,6 +15,7 @@
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/make_video.h"
+#include "harness/cli/run_folder.h"
 #include "harness/report/recorded_frames.h"
 #include "renders/movie.h"
 #include "renders/picture_file.h"
@@ -106,6 +107,7 @@ ExitCode Run(RenderRequest request) {
   request.movie.free = MakeFreeCamera(request);
   std::vector<RecordedFrames> runs;
   runs.push_back(ReadRecordedFrames(request.run_folder));
+  WarnOfCut(request.run_folder, LogReader(request.run_folder / "log.h5"));
   request.movie.ghost = !request.ghost.empty();
   for (const std::string& other : {request.beside, request.ghost}) {
     if (!other.empty()) runs.push_back(ReadRecordedFrames(other));
