@@ -89,8 +89,10 @@ void Print(const DetectabilityResult& result) {
   std::vector<std::string> quantities = ListQuantities(result);
   quantities.emplace_back();  // all
   for (const Column& column : kColumns) {
-    fmt::print("smallest relative error that fails by {} alone\n\n{:<24}{:>9}{:>9}{:>11}{:>12}{:>12}{:>12}\n",
-               column.name, "quantity", "numbers", "shown", "to 0.1 %", "best", "median", "worst");
+    fmt::print(
+        "smallest relative error that fails by {} alone, to first "
+        "order\n\n{:<24}{:>9}{:>9}{:>11}{:>12}{:>12}{:>12}\n",
+        column.name, "quantity", "numbers", "shown", "to 0.1 %", "best", "median", "worst");
     for (const std::string& quantity : quantities) {
       const SmallestRow row = SumUp(result, quantity, column);
       fmt::print("{:<24}{:>9}{:>9}{:>11}", quantity.empty() ? "all" : quantity, row.numbers, row.shown,
