@@ -206,10 +206,10 @@ int Run(const ExportRequest& request) {
   }
   const LogReader log(request.run_folder / "log.h5");
   const std::vector<SignalInfo> signals = ChooseSignals(log, request);
-  WarnOfCut(request.run_folder, log);
   if (request.list) PrintList(log, signals);
   if (!request.csv_file.empty()) WriteCsv(log, signals, request);
   if (!request.mcap_file.empty()) WriteMcap(log, signals, request);
+  WarnOfCut(request.run_folder, log);
   return kSuccess;
 }
 

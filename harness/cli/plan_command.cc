@@ -401,7 +401,13 @@ void AddPlanCommand(Command app) {
       .AddOption("--json", &request->json_file,
                  "Write the plan to this file (- for standard output, then without the [grasp])")
       .TypeName("FILE.json");
-  command.SetAction([=] { return Run(*request); });
+  command.SetAction([=] {
+    try {
+      return Run(*request);
+    } catch (const std::invalid_argument& error) {  // the planner itself judges the options' values
+      throw InputError(error.what());
+    }
+  });
 }
 
 }  // namespace dexcheck::cli

@@ -107,7 +107,6 @@ ExitCode Run(RenderRequest request) {
   request.movie.free = MakeFreeCamera(request);
   std::vector<RecordedFrames> runs;
   runs.push_back(ReadRecordedFrames(request.run_folder));
-  WarnOfCut(request.run_folder, LogReader(request.run_folder / "log.h5"));
   request.movie.ghost = !request.ghost.empty();
   for (const std::string& other : {request.beside, request.ghost}) {
     if (!other.empty()) runs.push_back(ReadRecordedFrames(other));
@@ -115,8 +114,9 @@ ExitCode Run(RenderRequest request) {
   std::vector<RunView> views;
   views.reserve(runs.size());
   for (const RecordedFrames& run : runs) views.push_back({run.model.get(), &run.frames});
-  if (!request.still) return WriteMovie(views, request.movie, out, request.quiet) ? kSuccess : kFailure;
-  WriteStill(request, views, out);
+  if (!request.still && !WriteMovie(views, request.movie, out, request.quiet)) return kFailure;
+  if (request.still) WriteStill(request, views, out);
+  if (!request.quiet) WarnOfCut(request.run_folder, LogReader(request.run_folder / "log.h5"));
   return kSuccess;
 }
 

@@ -36,7 +36,8 @@ double CheckLine::share() const {
 }
 
 RunData::RunData(const std::filesystem::path& run_dir) : path_(run_dir / "log.h5"), log_(path_) {
-  if (log_.rows() == 0) throw InputError(path_.string() + ": " + DescribeCut(log_) + " (rows: 0)");
+  if (log_.rows() == 0)
+    throw InputError(path_.string() + ": the run has no steps (rows: 0), " + DescribeCut(log_));
   time_ = log_.ReadSignal("time").col(0);
   for (Eigen::Index row = 0; row < time_.size(); ++row) {
     const bool advances = row == 0 || time_[row] > time_[row - 1];
