@@ -80,6 +80,8 @@ std::optional<FreeCamera> MakeFreeCamera(const RenderRequest& request) {
   if (!text || !(text >> std::ws).eof() || comma != ',' || comma_after != ',' || !point.allFinite()) {
     throw InputError("--look-at: must be object or X,Y,Z in m, got " + Quote(request.look_at));
   }
+  if (point == camera.from)
+    throw InputError("--look-at: must be elsewhere than --from, got " + request.look_at);
   camera.look_at = point;
   return camera;
 }

@@ -205,6 +205,7 @@ TEST_F(RenderCommandTest, RefusesBadRequestsAndLeavesNothing) {
     return IsRefused(RunDexcheck(arguments), parts);
   };
   EXPECT_TRUE(refused({"--camera", "sideways"}, {"camera: no \"sideways\"", "overview, follow, top, grasp"}));
+  EXPECT_TRUE(refused({"--from", "1,2,3", "--look-at", "1,2,3"}, {"--look-at", "--from"}));
   EXPECT_TRUE(refused({"--inset", "sideways"}, {"camera: no \"sideways\""}));
   EXPECT_TRUE(refused({"--out", "/nowhere/a.mp4"}, {"/nowhere/a.mp4: cannot be written: No such file"}));
   EXPECT_TRUE(refused({"--out", run_}, {"cannot be written: Is a directory"}));
