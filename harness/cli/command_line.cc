@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "controller/common/text.h"
+#include "harness/base/console.h"
 
 namespace dexcheck::cli {
 
@@ -170,6 +171,12 @@ void DescribeCommand(const CLI::App& app, const std::string& name, std::vector<C
 }
 
 }  // namespace
+
+ExitCode ReportFailure(const std::string& why) {
+  std::fflush(stdout);
+  Warn(why);
+  return kFailure;
+}
 
 std::vector<CommandHelp> CommandLine::Describe() const {
   std::vector<CommandHelp> all;

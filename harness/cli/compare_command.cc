@@ -162,7 +162,9 @@ int Run(const CompareRequest& request) {
     page->Write(MakeComparisonPage(pointers, request.run_folders, comparison));
     if (prints && !request.quiet) fmt::print("page: {}\n", request.page);
   }
-  return request.tolerance && !comparison.IsSame() ? kDisagreement : kSuccess;
+  if (!request.tolerance || comparison.IsSame()) return kSuccess;
+  if (comparison.signals.empty()) throw InputError("--tolerance: no signal was compared");
+  return kDisagreement;
 }
 
 }  // namespace

@@ -118,6 +118,9 @@ int Run(ConsistencyRequest request) {
     if (!request.quiet) PrintTable(request, comparison);
     PrintVerdict(request, comparison);
   }
+  if (code == kFailure)
+    return ReportFailure(
+        fmt::format("only {} of {} states were compared", result.samples, request.options.samples));
   return code;
 }
 

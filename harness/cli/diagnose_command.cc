@@ -241,7 +241,7 @@ int Run(DiagnoseRequest request) {
     if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");
     Print(request, model, terms.written(), diagnosis, hypotheses);
   }
-  if (IsInterrupted()) return kFailure;
+  if (IsInterrupted()) return ReportFailure("interrupted");
   return diagnosis.agrees ? kSuccess : kDisagreement;
 }
 

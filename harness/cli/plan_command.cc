@@ -398,7 +398,13 @@ void AddPlanCommand(Command app) {
                  "there (default: the shipped one for the shipped robot)")
       .TypeName("FILE.xml");
   AddJsonOption(command, "the plan", &request->json_file);
-  command.SetAction([=] { return Run(*request); });
+  command.SetAction([=] {
+    try {
+      return Run(*request);
+    } catch (const std::invalid_argument& error) {  // the planner itself judges the options' values
+      throw InputError(error.what());
+    }
+  });
 }
 
 }  // namespace dexcheck::cli

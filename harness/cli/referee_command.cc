@@ -182,9 +182,15 @@ int Run(RefereeRequest request) {
   if (!result.Agrees()) code = kDisagreement;
   if (json) json->Write(ToText(request, model, result));
   if (junit) junit->Write(WriteRefereeJUnit(request, model, result));
-  if (request.json_file == "-") return code;
-  if (!request.quiet) PrintTable(request, model, result);
-  PrintVerdict(request, result);
+  if (request.json_file != "-") {
+    if (!request.quiet) PrintTable(request, model, result);
+    PrintVerdict(request, result);
+  }
+  if (code == kFailure)
+    return ReportFailure(result.lacks_requested
+                             ? "a library that was asked for is not there"
+                             : fmt::format("only {} of {} states were compared", result.samples,
+                                           request.options.states.samples));
   return code;
 }
 

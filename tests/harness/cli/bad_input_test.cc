@@ -247,5 +247,14 @@ TEST_F(BadFiles, AnotherMujocoVersionIsNamed) {
                         {"libmujoco: version must be 2.2.2, got 2.3.1"}));
 }
 
+TEST_F(BadFiles, AMistakeOfTheProgramIsNoBadInput) {
+  testing::ProgramOptions options;
+  options.environment = {{"LD_PRELOAD", testing::BuildPath("/tests/libother_mujoco_version.so")},
+                         {"TEST_MISTAKE", "1"}};
+  const testing::ProgramResult result = RunDexcheck({"consistency", "--samples", "1"}, options);
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_EQ(result.err, "dexcheck: internal error: size: must be positive, got -1\n");
+}
+
 }  // namespace
 }  // namespace dexcheck::bad_input_test
