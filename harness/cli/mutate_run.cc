@@ -11,6 +11,7 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
+#include "harness/cli/terminal.h"
 #include "harness/run/run_mutation.h"
 
 namespace dexcheck::cli {
@@ -86,10 +87,10 @@ void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t 
   const std::vector<RunRow> rows = SumUp(campaign.mutants(), done);
   const RunRow& all = rows.back();
   if (!request.quiet) {
-    fmt::print("{:<18}{:>9}{:>9}{:>9}{:>11}{:>10}{:>13}{:>12}\n", "what was wrong", "mistakes", "found",
-               "refused", "no effect", "survived", "cause right", "part named");
+    fmt::print("{:<16}{:>9}{:>6}{:>8}{:>10}{:>9}{:>12}{:>10}\n", "what was wrong", "mistakes", "found",
+               "refused", "no effect", "survived", "cause right", "part");
     for (const RunRow& row : rows) {
-      fmt::print("{:<18}{:>9}{:>9}{:>9}{:>11}{:>10}{:>13}{:>12}\n", row.kind, row.mutants, row.killed,
+      fmt::print("{:<16}{:>9}{:>6}{:>8}{:>10}{:>9}{:>12}{:>10}\n", row.kind, row.mutants, row.killed,
                  row.refused, row.no_effect, row.survived, row.cause,
                  row.with_part > 0 ? fmt::format("{} of {}", row.part, row.with_part) : "");
     }
@@ -99,11 +100,12 @@ void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t 
   if (done < campaign.mutants().size())
     fmt::print("INTERRUPTED after {} of {} mistakes. So far:\n", done, campaign.mutants().size());
   const int possible = all.mutants - all.refused - all.no_effect;
-  fmt::print(
+  const std::string verdict = fmt::format(
       "{}: {} of {} mistakes that are possible and have an effect were found; the cause is right in {}, the "
-      "part in {} of {}.\n",
+      "part in {} of {}.",
       all.survived == 0 ? "ALL FOUND" : "SURVIVORS", all.killed, possible, all.cause, all.part,
       all.with_part);
+  fmt::print("{}\n", Wrap(verdict, 2));
 }
 
 std::string ToText(const MutateRunRequest& request, const RunCampaign& campaign, size_t done) {

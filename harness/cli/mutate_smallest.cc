@@ -91,14 +91,14 @@ void Print(const DetectabilityResult& result) {
   for (const Column& column : kColumns) {
     fmt::print(
         "smallest relative error that fails by {} alone, to first "
-        "order\n\n{:<24}{:>9}{:>9}{:>11}{:>12}{:>12}{:>12}\n",
+        "order\n\n{:<24}{:>8}{:>7}{:>10}{:>10}{:>10}{:>10}\n",
         column.name, "quantity", "numbers", "shown", "to 0.1 %", "best", "median", "worst");
     for (const std::string& quantity : quantities) {
       const SmallestRow row = SumUp(result, quantity, column);
-      fmt::print("{:<24}{:>9}{:>9}{:>11}", quantity.empty() ? "all" : quantity, row.numbers, row.shown,
+      fmt::print("{:<24}{:>8}{:>7}{:>10}", quantity.empty() ? "all" : quantity, row.numbers, row.shown,
                  row.good);
       if (!row.errors.empty() && !quantity.empty()) {
-        fmt::print("{:>12.1e}{:>12.1e}{:>12.1e}", row.errors.front(), row.errors[row.errors.size() / 2],
+        fmt::print("{:>10.1e}{:>10.1e}{:>10.1e}", row.errors.front(), row.errors[row.errors.size() / 2],
                    row.errors.back());
       }
       fmt::print("\n");

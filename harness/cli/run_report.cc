@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "harness/base/interrupts.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
 #include "renders/question_status.h"
@@ -88,7 +89,7 @@ void PrintTask(const ClosedLoop& loop) {
   for (const PhaseEntry& entry : task.history()) {
     line += fmt::format("{}{} {:.1f}", line.empty() ? "" : ", ", NameOf(entry.phase), entry.time);
   }
-  fmt::print("phases, s: {}\n", line);
+  fmt::print("{}\n", Wrap("phases, s: " + line, 2));
   if (!task.first_failure().empty()) fmt::print("first attempt: {}\n", task.first_failure());
   if (task.scale() != 1.0) fmt::print("weighed: {:.3f} of the stated mass\n", task.scale());
   fmt::print("object pushed by {:.1e} m before it was held; largest step of a torque {:.1e} N m\n",
@@ -113,28 +114,30 @@ void PrintClearance(const Clearance& clearance) {
     if (one.pair >= 0 && (nearest == nullptr || one.distance < nearest->distance)) nearest = &one;
   }
   if (nearest == nullptr) return;
-  fmt::print("nearest of what is not meant to touch: {}, {:.1f} mm {} at t = {:.3f} s\n",
-             clearance.Describe(nearest->pair), 1e3 * std::abs(nearest->distance),
-             nearest->distance < 0.0 ? "into each other" : "apart", nearest->time);
+  fmt::print("not meant to touch: {}, {:.1f} mm {} at t = {:.3f} s\n", clearance.Describe(nearest->pair),
+             1e3 * std::abs(nearest->distance), nearest->distance < 0.0 ? "into each other" : "apart",
+             nearest->time);
 }
 
 void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
   const LoopTimes& times = loop.times();
   const double scale = 1e6 / static_cast<double>(std::max(loop.record().step, 1L));
   fmt::print(
-      "\n{:.1f} x real time. Microseconds a step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, "
-      "recording {:.0f}\n",
+      "\n{:.1f} x real time; us a step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, recording "
+      "{:.0f}\n",
       result.wall_seconds > 0.0 ? loop.time() / result.wall_seconds : 0.0, scale * times.plant,
       scale * times.controller, scale * times.cross_check, scale * result.recording_seconds);
 }
 
 }  // namespace
 
+bool WasClosed(const RunResult& result) { return result.interrupted && !IsInterrupted(); }
+
 void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result,
                     const std::string& folder, Detail detail) {
   const Scenario& scenario = setup.scenario();
   if (detail != Detail::kVerdict) {
-    fmt::print("{}: {}\n", scenario.name, scenario.description);
+    fmt::print("{}\n", Wrap(scenario.name + ": " + scenario.description, 2));
     fmt::print("{:.3f} of {:.3f} s simulated, {} steps of {} ms\n", loop.time(), scenario.duration,
                loop.record().step, 1e3 * scenario.plant.time_step);
     if (scenario.tolerance > 0.0) fmt::print("judged to a relative tolerance of {:g}\n", scenario.tolerance);
@@ -167,7 +170,13 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
                      : "the run completed; nothing was checked.");
       return;
     case Verdict::kFailed:
-      fmt::print("{}: {}.\n", Paint(Tone::kBad, "FAILED"), result.failure);
+      if (WasClosed(result)) {
+        const bool holds = result.attribution.cause == Cause::kNone;
+        fmt::print("{} at t = {:.3f} s: {}\n", Paint(holds ? Tone::kGood : Tone::kBad, "CLOSED"), loop.time(),
+                   holds ? "no check has failed so far." : "DISAGREEMENT:");
+      } else {
+        fmt::print("{}: {}.\n", Paint(Tone::kBad, "FAILED"), result.failure);
+      }
       break;
     case Verdict::kDisagreement:
       fmt::print("{}:\n", Paint(Tone::kBad, "DISAGREEMENT"));
