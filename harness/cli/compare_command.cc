@@ -59,7 +59,7 @@ void PrintNumbers(const std::vector<ComparedNumber>& numbers, bool all) {
 void PrintSignals(const RunComparison& comparison, bool all) {
   const auto equal = std::count_if(comparison.signals.begin(), comparison.signals.end(),
                                    [](const SignalDifference& signal) { return signal.difference == 0.0; });
-  fmt::print("\nsignals: {} of {} are equal bit for bit; the others' differences, over their sizes\n", equal,
+  fmt::print("\nsignals: {} of {} are equal bit for bit; differences, over sizes\n", equal,
              comparison.signals.size());
   size_t printed = 0;
   for (const SignalDifference& signal : comparison.signals) {

@@ -209,8 +209,9 @@ int ReplayRun(const RunRequest& request) {
 int Run(const RunRequest& request) {
   if (request.list) {
     for (const ShippedScenario& scenario : ListShippedScenarios()) {
-      const std::string why = scenario.is_readable ? "" : "unreadable: ";
-      fmt::print("{}\n", Wrap(fmt::format("{:<14} {}", scenario.name, why + scenario.description), 15));
+      const std::string line = fmt::format("{:<14} {}{}", scenario.name,
+                                           scenario.is_readable ? "" : "unreadable: ", scenario.description);
+      fmt::print("{}\n", scenario.is_readable ? Wrap(line, 15) : line);
     }
     fmt::print(
         "\nTo change one, copy its file with the folders that it names, or --set its keys:\n  cp {} "

@@ -18,11 +18,15 @@ namespace {
 
 std::string Tell(bool failed) { return failed ? Paint(Tone::kBad, "FAILS") : Paint(Tone::kGood, "ok"); }
 
-void PrintCheck(const CheckRecord& check, int width) {
+void PrintRow(CheckKind kind, const std::string& what, const CheckRecord& check) {
+  fmt::print("  {:<12}{:<34}{:>9.2e}{:>9.1e}  {:<4} {}\n", NameOf(kind), what, check.worst, check.bound,
+             check.unit == "1" ? "" : check.unit, Tell(check.failed));
+}
+
+void PrintCheck(const CheckRecord& check) {
   if (!check.applies) return;
-  fmt::print("  {:<12}{:<{}}{:>10.2e}{:>10.1e}  {:<4} {}{}\n", NameOf(check.kind), check.name, width,
-             check.worst, check.bound, check.unit == "1" ? "" : check.unit, Tell(check.failed),
-             check.failed ? fmt::format(" from t = {:.3f} s", check.failed_at) : "");
+  PrintRow(check.kind,
+           check.failed ? fmt::format("{} from {:.3f} s", check.name, check.failed_at) : check.name, check);
 }
 
 /// How near a check came to its bound.
@@ -52,25 +56,22 @@ void PrintQuestion(CheckKind kind, const ClosedLoop& loop) {
   if (nearest != nullptr) {
     const std::string what =
         passed == 1 ? nearest->name : fmt::format("{} checks: {}", passed, nearest->name);
-    fmt::print("  {:<12}{:<34}{:>10.2e}{:>10.1e}  {:<4} {}\n", NameOf(kind), what, nearest->worst,
-               nearest->bound, nearest->unit == "1" ? "" : nearest->unit, Tell(false));
+    PrintRow(kind, what, *nearest);
   }
   visit([&](const CheckRecord& check) {
-    if (check.failed) PrintCheck(check, 34);
+    if (check.failed) PrintCheck(check);
   });
 }
 
 void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
-  const int width = detail == Detail::kAll ? 24 : 34;
-  fmt::print("\n  {:<12}{:<{}}{:>10}{:>10}\n", "question",
-             detail == Detail::kAll ? "check" : "nearest to its bound", width, "worst", "bound");
+  fmt::print("\n  {:<12}{:<34}{:>9}{:>9}\n", "question",
+             detail == Detail::kAll ? "check" : "nearest to its bound", "worst", "bound");
   const auto& gate = setup.gate().records;
   const auto differs = std::count_if(gate.begin(), gate.end(), [](const CheckRecord& r) { return r.failed; });
-  fmt::print("  {:<12}{:<{}}{:>10}{:>10}       {}\n", "model", "constants", width, differs, 0,
-             Tell(differs > 0));
+  fmt::print("  {:<12}{:<34}{:>9}{:>9}       {}\n", "model", "constants", differs, 0, Tell(differs > 0));
   if (detail == Detail::kAll) {
-    for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check, width);
-    for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check, width);
+    for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check);
+    for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check);
   } else {
     for (const CheckKind kind : kCheckKinds) {
       PrintQuestion(kind, loop);
@@ -79,7 +80,7 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
   }
   const std::span<const CheckRecord> settling = loop.checks().settling_failures();
   if (!settling.empty()) fmt::print("\n  while settling, before t = 0:\n");
-  for (const CheckRecord& check : settling) PrintCheck(check, width);
+  for (const CheckRecord& check : settling) PrintCheck(check);
 }
 
 /// "approach 0.0, close 3.4, ..." with the time each began.
@@ -123,7 +124,7 @@ void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
   const LoopTimes& times = loop.times();
   const double scale = 1e6 / static_cast<double>(std::max(loop.record().step, 1L));
   fmt::print(
-      "\n{:.1f} x real time; us a step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, recording "
+      "\n{:.1f} x real time; us/step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, recording "
       "{:.0f}\n",
       result.wall_seconds > 0.0 ? loop.time() / result.wall_seconds : 0.0, scale * times.plant,
       scale * times.controller, scale * times.cross_check, scale * result.recording_seconds);
