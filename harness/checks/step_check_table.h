@@ -471,7 +471,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .reason = "as small as what the prediction is judged by",
      .description = "what the engine's solver left over of its own equations of motion, of the object as "
                     "balance_object, of the robot as balance_robot",
-     .meaning = {.cause = Cause::kSolver, .precedence = -4, .is_own = true, .rank = Rank::kDecisive}},
+     .meaning = {.cause = Cause::kSolver, .precedence = -4, .is_own = true, .rank = Rank::kDecisive},
+     .joint_description = "what the engine's solver left over of its own equations of motion"},
     {.check = StepCheck::kJointStop,
      .name = "joint_stop",
      .kind = CheckKind::kAssumption,

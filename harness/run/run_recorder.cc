@@ -167,7 +167,13 @@ void RunRecorder::AddStateSignals() {
   if (checks_ == nullptr) return;
   Add({"engine/xi_dot", xi_dot_units, "reduced acceleration of the plant", n, xi_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.response.xi_dot, row); });
-  Add({"model/xi_dot", xi_dot_units, "reduced acceleration that (46), (48) predict", n, xi_names, {}},
+  Add({"model/xi_dot",
+       xi_dot_units,
+       setup_->joint_motion() != nullptr ? "accelerations that the equations of motion predict"
+                                         : "reduced acceleration that (46), (48) predict",
+       n,
+       xi_names,
+       {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.findings.xi_dot_model, row); });
 }
 
