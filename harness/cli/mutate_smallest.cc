@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "controller/common/errors.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/command_line.h"
 #include "harness/cli/json_matrix.h"
@@ -83,8 +84,16 @@ std::vector<RetriedMedian> RetryMedians(const DetectabilityResult& result, const
                                         bool quiet) {
   const std::vector<std::string> quantities = ListQuantities(result);
   std::vector<RetriedMedian> medians;
+  if (result.numbers.empty()) return medians;
   ProgressBar bar("trying again", static_cast<long>(ListColumns().size() * quantities.size()), quiet);
   for (const Column& column : ListColumns()) {
+    // Without an error none may fail.
+    const Parameter& any = result.numbers.front().parameter;
+    if (RetryError(files.scenario, files.robot, files.mjcf, any, 0.0, column.checks, IsInterrupted).found >
+        0) {
+      throw InputError(files.scenario.source + ": must pass with seeds 1 to " + std::to_string(kRetrySeeds) +
+                       " before mistakes are made in it, fails by " + column.name);
+    }
     for (const std::string& quantity : quantities) {
       bar.Update(static_cast<long>(medians.size()));
       const SmallestRow row = SumUp(result, quantity, column);

@@ -306,7 +306,7 @@ RetriedError RetryError(const Scenario& scenario, const std::filesystem::path& r
         continue;
       }
     }
-    if (retried.found == retried.runs) break;
+    if (retried.found == retried.runs || error == 0.0) break;
   }
   return retried;
 }
