@@ -108,13 +108,13 @@ MutationRow Total(const std::vector<MutationRow>& rows) {
 
 void Print(const MutateRequest& request, const Campaign& campaign) {
   const auto line = [](const MutationRow& row) {
-    fmt::print("{:<27}{:>8}{:>7}{:>8}{:>10}{:>9}{:>11}\n", row.kind, row.mutants, row.killed, row.refused,
+    fmt::print("{:<32}{:>8}{:>7}{:>8}{:>10}{:>9}{:>6}\n", row.kind, row.mutants, row.killed, row.refused,
                row.no_effect, row.survived, row.named_first);
   };
   const std::vector<MutationRow> rows = SumUp(campaign);
   const MutationRow total = Total(rows);
   if (!request.quiet) {
-    fmt::print("{:<27}{:>8}{:>7}{:>8}{:>10}{:>9}{:>11}\n", "what was changed", "mutants", "killed", "refused",
+    fmt::print("{:<32}{:>8}{:>7}{:>8}{:>10}{:>9}{:>6}\n", "what was changed", "mutants", "killed", "refused",
                "no effect", "survived", "first");
     for (const MutationRow& row : rows) line(row);
     line(total);

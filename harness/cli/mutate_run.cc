@@ -75,10 +75,13 @@ void PrintExceptions(const std::vector<RunMutant>& mutants, size_t done) {
                      ? ""
                      : fmt::format(", though the object is {:.1e} m off", mutant.position_error));
     } else if (!mutant.has_right_cause()) {
-      fmt::print("cause: {}: expected {}, told {} ({})\n", mutant.name, NameOf(mutant.expected),
-                 NameOf(mutant.cause), mutant.evidence);
+      fmt::print("{}\n", Wrap(fmt::format("cause: {}: expected {}, told {} ({})", mutant.name,
+                                          NameOf(mutant.expected), NameOf(mutant.cause), mutant.evidence),
+                              2));
     } else if (!mutant.names_part) {
-      fmt::print("part: {}: expected {}, told {}\n", mutant.name, mutant.part, mutant.evidence);
+      fmt::print(
+          "{}\n",
+          Wrap(fmt::format("part: {}: expected {}, told {}", mutant.name, mutant.part, mutant.evidence), 2));
     }
   }
 }
