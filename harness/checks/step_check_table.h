@@ -106,6 +106,8 @@ struct StepCheckInfo {
   FailureMeaning meaning = {};
   /// The same for fingertips that hang on bonds; empty where that question has no meaning.
   const char* bonded_description = description;
+  /// The same for a robot that holds nothing, whose law is that of its joints.
+  const char* joint_description = description;
 };
 
 inline constexpr StepCheckInfo kStepChecks[] = {
@@ -118,7 +120,10 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .formula = "1 - 1e-9",
      .reason = "an error that settles within 1e9 steps",
      .description = "largest eigenvalue of (57) with the scenario's gains, sampled as the controller does it",
-     .meaning = {.cause = Cause::kControlLaw, .precedence = 14, .is_own = true, .rank = Rank::kLaw}},
+     .meaning = {.cause = Cause::kControlLaw, .precedence = 14, .is_own = true, .rank = Rank::kLaw},
+     .joint_description =
+         "largest eigenvalue of the errors of the joints under the scenario's gains, sampled as "
+         "the controller does it"},
     {.check = StepCheck::kTold,
      .name = "told",
      .kind = CheckKind::kLaw,
@@ -141,7 +146,10 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .description =
          "tau' sent against (53)-(55) computed from the engine's terms, relative to the forces balanced and "
          "to the condition number of J_B'",
-     .meaning = {.cause = Cause::kControlLaw, .precedence = 16, .is_own = true, .rank = Rank::kLaw}},
+     .meaning = {.cause = Cause::kControlLaw, .precedence = 16, .is_own = true, .rank = Rank::kLaw},
+     .joint_description =
+         "torques sent against the law of the joints computed from the engine's terms, relative "
+         "to the forces balanced"},
     {.check = StepCheck::kLawDemand,
      .name = "law_demand",
      .kind = CheckKind::kLaw,
@@ -267,7 +275,10 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .reason = "rounding of forces that cancel; the state that is judged is level and does not slip",
      .description = "what is left of (48) with the engine's accelerations and contact forces, less what the "
                     "platform does besides and its solver left over, against the forces balanced",
-     .meaning = {.cause = Cause::kUnmodelledForce, .precedence = -1, .rank = Rank::kDecisive}},
+     .meaning = {.cause = Cause::kUnmodelledForce, .precedence = -1, .rank = Rank::kDecisive},
+     .joint_description =
+         "what is left of the equations of motion with the engine's accelerations, against the "
+         "forces balanced"},
     // The object's balance has no other unknowns than its inertia and the contacts' geometry, which the first
     // question compares: where that holds, a force acts on the object that nobody has.
     {.check = StepCheck::kBalanceObject,
@@ -291,7 +302,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .reason = "what contacts hold back of forces that change, computed at each step; the rest is of second "
                "order in tilt and slip",
      .description = "xi_dot of the rigid constrained system (46), (48) against the engine's",
-     .meaning = {.cause = Cause::kContactSoftness, .precedence = 25, .rank = Rank::kPrediction}},
+     .meaning = {.cause = Cause::kContactSoftness, .precedence = 25, .rank = Rank::kPrediction},
+     .joint_description = "accelerations of the joints that the torques mean, against the engine's"},
     {.check = StepCheck::kContactForce,
      .name = "contact_force",
      .kind = CheckKind::kPrediction,
@@ -459,7 +471,8 @@ inline constexpr StepCheckInfo kStepChecks[] = {
      .reason = "as small as what the prediction is judged by",
      .description = "what the engine's solver left over of its own equations of motion, of the object as "
                     "balance_object, of the robot as balance_robot",
-     .meaning = {.cause = Cause::kSolver, .precedence = -4, .is_own = true, .rank = Rank::kDecisive}},
+     .meaning = {.cause = Cause::kSolver, .precedence = -4, .is_own = true, .rank = Rank::kDecisive},
+     .joint_description = "what the engine's solver left over of its own equations of motion"},
     {.check = StepCheck::kJointStop,
      .name = "joint_stop",
      .kind = CheckKind::kAssumption,

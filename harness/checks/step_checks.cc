@@ -74,14 +74,16 @@ StepChecks::~StepChecks() = default;
 
 void StepChecks::DefineChecks() {
   const bool bonded = !setup_->bonds().empty();
+  const bool moves_joints = setup_->scenario().joint_motion.has_value();
   for (const StepCheckInfo& info : kStepChecks) {
     CheckRecord check;
     check.name = info.name;
     check.kind = info.kind;
     check.unit = info.unit;
     check.bound = CalcBound(info, setup_->scenario());
-    check.description =
-        bonded && *info.bonded_description != '\0' ? info.bonded_description : info.description;
+    check.description = moves_joints                                 ? info.joint_description
+                        : bonded && *info.bonded_description != '\0' ? info.bonded_description
+                                                                     : info.description;
     check.applies = !bonded || *info.bonded_description != '\0';
     checks_.push_back(check);
   }

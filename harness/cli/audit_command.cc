@@ -12,6 +12,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
+#include "harness/cli/terminal.h"
 #include "harness/sides/audit.h"
 #include "harness/sides/read_description.h"
 
@@ -64,17 +65,17 @@ void Print(const AuditRequest& request, const RobotDescription& robot, const Aud
   for (const AuditFinding& finding : result.findings) {
     if (finding.level != AuditLevel::kNote) ++counted;
     if (request.quiet) continue;
-    fmt::print("{:<11}{}: {} {}", NameOf(finding.level),
-               finding.line > 0 ? fmt::format("{}:{}", file, finding.line) : file, Abbreviate(finding.where),
-               finding.text);
+    std::string line = fmt::format("{:<11}{}: {} {}", NameOf(finding.level),
+                                   finding.line > 0 ? fmt::format("{}:{}", file, finding.line) : file,
+                                   Abbreviate(finding.where), finding.text);
     if (finding.condition_without) {
-      fmt::print("; with a plausible body there M's condition number is {}",
-                 FormatCondition(*finding.condition_without));
+      line += "; with a plausible body there M's condition number is " +
+              FormatCondition(*finding.condition_without);
     }
-    fmt::print("\n");
+    fmt::print("{}\n", Wrap(line, 11));
   }
   for (const std::string& note : robot.notes) {
-    if (!request.quiet) fmt::print("{:<11}{}: {}\n", "note", file, note);
+    if (!request.quiet) fmt::print("{}\n", Wrap(fmt::format("{:<11}{}: {}", "note", file, note), 11));
   }
   if (counted == 0) {
     fmt::print("{}GOOD: nothing that a robot cannot have, and nothing odd.\n", request.quiet ? "" : "\n");

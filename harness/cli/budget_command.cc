@@ -12,6 +12,7 @@
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/shared_request.h"
+#include "harness/cli/terminal.h"
 #include "harness/study/error_budget.h"
 
 namespace dexcheck::cli {
@@ -25,22 +26,21 @@ struct BudgetRequest : ScenarioRequest {
 void Print(const ErrorBudget& budget) {
   fmt::print("{}: RMS and largest {}, {}\n\n", budget.scenario,
              budget.of_joints ? "error of a joint" : "position error of the object", budget.unit);
-  fmt::print("  {:<34}{:>10}{:>10}{:>11}{:>12}{:>13}\n", "source", "alone", "largest",
+  fmt::print("  {:<27}{:>9}{:>9}{:>10}{:>11}{:>12}\n", "source", "alone", "largest",
              budget.of_joints ? "predicted" : "by (57)", "without it", "interaction");
   for (const BudgetEntry& e : budget.entries) {
     if (!e.failure.empty()) {
-      fmt::print("  {:<34}{}\n", e.name, e.failure);
+      fmt::print("  {:<27}{}\n", e.name, e.failure);
       continue;
     }
-    fmt::print("  {:<34}{:>10.2e}{:>10.2e}{:>11.2e}{:>12.2e}{:>11.0f} % {}\n", e.name, e.alone.rms,
-               e.alone.max, e.predicted.rms, e.without.rms, 100.0 * e.interaction,
-               e.interacts() ? "interacts" : "");
+    fmt::print("  {:<27}{:>9.2e}{:>9.2e}{:>10.2e}{:>11.2e}{:>9.0f} %{}\n", e.name, e.alone.rms, e.alone.max,
+               e.predicted.rms, e.without.rms, 100.0 * e.interaction, e.interacts() ? "!" : "");
   }
   const auto row = [](const char* name, const ErrorSize& size) {
-    fmt::print("  {:<34}{:>10.2e}{:>10.2e}\n", name, size.rms, size.max);
+    fmt::print("  {:<27}{:>9.2e}{:>9.2e}\n", name, size.rms, size.max);
   };
   row("none of them", budget.ideal);
-  fmt::print("  {:<34}{:>10.2e}{:>10.2e}{:>11.2e}\n", "sum of the above", budget.sum.rms, budget.sum.max,
+  fmt::print("  {:<27}{:>9.2e}{:>9.2e}{:>10.2e}\n", "sum of the above", budget.sum.rms, budget.sum.max,
              budget.predicted.rms);
   row("all together", budget.all);
   fmt::print("\n");

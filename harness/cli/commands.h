@@ -2,6 +2,7 @@
 
 // The commands of the program dexcheck.
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -23,15 +24,16 @@ Option AddRobotOptions(Command command, RobotFiles* files);
 
 /// Adds --samples, of at most `most`, and --seed: the random states at which two sides are compared.
 template <typename Count>
-void AddSampleOptions(Command command, std::uint64_t most, Count* samples, std::uint64_t* seed) {
-  command.AddOption("--samples", samples, "Number of random states")
-      .TypeName("N")
-      .Check(WholeNumber(1, most))
-      .ShowDefault();
-  command.AddOption("--seed", seed, "Of the random states")
-      .TypeName("N")
-      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
-      .ShowDefault();
+std::array<Option, 2> AddSampleOptions(Command command, std::uint64_t most, Count* samples,
+                                       std::uint64_t* seed, const char* word = "--samples") {
+  return {command.AddOption(word, samples, "Number of random states")
+              .TypeName("N")
+              .Check(WholeNumber(1, most))
+              .ShowDefault(),
+          command.AddOption("--seed", seed, "Of the random states")
+              .TypeName("N")
+              .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
+              .ShowDefault()};
 }
 
 /// Adds --json [FILE]: JSON to this file; without a file, or with "-", to standard output and nothing else.

@@ -13,6 +13,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
+#include "harness/cli/terminal.h"
 #include "harness/report/comparison_page.h"
 #include "harness/report/html.h"
 #include "renders/video_writer.h"
@@ -51,21 +52,24 @@ void PrintNumbers(const std::vector<ComparedNumber>& numbers, bool all) {
     line += fmt::format("  {:<4}", number.unit == "1" ? "" : number.unit);
     for (size_t i = 1; i < number.values.size(); ++i)
       line += fmt::format("  x {:<8}", Show(number.CalcRatio(i)));
-    fmt::print("{}\n", line.substr(0, line.find_last_not_of(' ') + 1));
+    fmt::print("{}\n", Wrap(line, width + 4));
   }
 }
 
 void PrintSignals(const RunComparison& comparison, bool all) {
   const auto equal = std::count_if(comparison.signals.begin(), comparison.signals.end(),
                                    [](const SignalDifference& signal) { return signal.difference == 0.0; });
-  fmt::print("\nsignals: {} of {} are equal bit for bit\n", equal, comparison.signals.size());
+  fmt::print("\nsignals: {} of {} are equal bit for bit; differences, over sizes\n", equal,
+             comparison.signals.size());
   size_t printed = 0;
   for (const SignalDifference& signal : comparison.signals) {
     if (!all && (signal.difference == 0.0 || printed++ == kMostPrinted)) break;
     const std::string name = signal.column.empty() ? signal.name : signal.name + "." + signal.column;
-    fmt::print("  {} - A  {:<32}  {:>9} {:<6}  {:>9} of its size, at {:.3f} s\n",
-               static_cast<char>('A' + signal.run), name, FormatShort(signal.difference),
-               signal.unit == "1" ? "" : signal.unit, FormatShort(signal.share()), signal.at_time);
+    const std::string line =
+        fmt::format("  {} - A  {:<28} {:>9} {:<7} {:>9}  at {:.3f} s", static_cast<char>('A' + signal.run),
+                    name, FormatShort(signal.difference), signal.unit == "1" ? "" : signal.unit,
+                    FormatShort(signal.share()), signal.at_time);
+    fmt::print("{}\n", Wrap(line, 9));
   }
   if (!comparison.not_compared.empty())
     fmt::print("  {} signals are not in all runs\n", comparison.not_compared.size());

@@ -8,6 +8,7 @@
 #include "controller/common/text.h"
 #include "harness/checks/tolerance.h"
 #include "harness/cli/junit_file.h"
+#include "harness/cli/terminal.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck::cli {
@@ -73,7 +74,7 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
   const auto list = [](const char* title, const std::vector<std::string>& lines) {
     if (lines.empty()) return;
     fmt::print("{}:\n", title);
-    for (const std::string& line : lines) fmt::print("  {}\n", line);
+    for (const std::string& line : lines) fmt::print("{}\n", Wrap("  " + line, 4));
     fmt::print("\n");
   };
   list("not compared", comparison.not_compared);
@@ -84,23 +85,25 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
                record.bound, CountDigits(record.worst), record.failed ? "DIFFERS" : "ok");
   }
   if (!result.gate.notes.empty()) {
-    fmt::print(
-        "{} notes on what only a run has (contacts, solver, limits of motors, what a scenario overrides): "
-        "--json\n",
-        result.gate.notes.size());
+    fmt::print("{} notes on what only a run has (contacts, solver, motors' limits): --json\n",
+               result.gate.notes.size());
   }
-  fmt::print("\n{:<24}{:>9}  {:>12}  {:>9}  {:>6}           {}\n", "term", "compared", "worst error", "bound",
-             "digits", "where it is worst");
+  fmt::print("\n{:<24}{:>9}  {:>12}  {:>9}  {:>6}\n", "term", "compared", "worst error", "bound", "digits");
   for (const CheckRecord& record : result.terms) {
-    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {:<7}  {}, sample {}\n", record.name,
-               record.comparisons, record.worst, record.bound, CountDigits(record.worst),
-               record.failed ? "DIFFERS" : "ok", Describe(record.where, model, base),
-               static_cast<long>(record.at));
+    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {}\n", record.name, record.comparisons, record.worst,
+               record.bound, CountDigits(record.worst), record.failed ? "DIFFERS" : "ok");
+    if (record.failed) {
+      fmt::print("{}\n", Wrap(fmt::format("    worst at {}, sample {}", Describe(record.where, model, base),
+                                          static_cast<long>(record.at)),
+                              6));
+    }
   }
-  fmt::print("\nErrors are relative to each term's own scale; {} (README.md).\n",
-             request.judging.Find()
-                 ? "bounds are those of rounding or the tolerance given, whichever is wider"
-                 : "bounds follow from rounding");
+  const std::string bounds = request.judging.Find()
+                                 ? "bounds are those of rounding or the tolerance given, whichever is wider"
+                                 : "bounds follow from rounding";
+  fmt::print("\n{}\n", Wrap("Errors are relative to each term's own scale; " + bounds +
+                                " (README.md). --json tells where each is worst.",
+                            0));
 }
 
 void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison) {

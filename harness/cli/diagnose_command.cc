@@ -17,6 +17,7 @@
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
+#include "harness/cli/terminal.h"
 #include "harness/cli/tolerance_options.h"
 #include "harness/diagnosis/diagnose.h"
 #include "harness/diagnosis/file_terms.h"
@@ -83,8 +84,11 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotS
            const Diagnosis& diagnosis, const std::vector<Hypothesis>& hypotheses) {
   const std::string file = request.files.robot.filename().string();
   if (diagnosis.agrees) {
-    fmt::print("AGREE: nothing to explain: {} and {} agree to {} at {} random states.\n", file,
-               request.files.mjcf.filename().string(), DescribeAgreement(request), request.options.samples);
+    fmt::print("{}\n",
+               Wrap(fmt::format("AGREE: nothing to explain: {} and {} agree to {} at {} random states.", file,
+                                request.files.mjcf.filename().string(), DescribeAgreement(request),
+                                request.options.samples),
+                    2));
     return;
   }
   fmt::print("DISAGREE: {} against {}.\n", file, request.files.mjcf.filename().string());

@@ -56,9 +56,10 @@ void AddEvalCommand(Command app) {
                  "JSON with q, xi; optionally object, kappa or contact_points, fingers, mu, law")
       .TypeName("STATE.json")
       .Required();
-  command.AddOption("--out", &request->out, "File to write (- for standard output)")
-      .TypeName("FILE.json")
-      .ShowDefault();
+  Option out = command.AddOption("--out", &request->out, "File to write (- for standard output)")
+                   .TypeName("FILE.json")
+                   .ShowDefault();
+  AddJsonOption(command, "the terms", &request->out).Excludes(out);
   command.SetAction([=] { return Run(*request); });
 }
 

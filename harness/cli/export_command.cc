@@ -15,6 +15,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
+#include "harness/cli/terminal.h"
 #include "harness/log/log_reader.h"
 #include "harness/log/mcap_writer.h"
 
@@ -185,17 +186,13 @@ std::string ListDistinctUnits(const SignalInfo& signal) {
 }
 
 void PrintList(const LogReader& log, const std::vector<SignalInfo>& signals) {
-  size_t name_width = 0;
-  size_t unit_width = 0;
+  size_t width = 0;
+  for (const SignalInfo& signal : signals) width = std::max(width, signal.name.size());
+  fmt::print("{} rows\n{:<{}}  {:>7}  {}\n", log.rows(), "signal", width, "numbers", "[unit] description");
   for (const SignalInfo& signal : signals) {
-    name_width = std::max(name_width, signal.name.size());
-    unit_width = std::max(unit_width, ListDistinctUnits(signal).size());
-  }
-  fmt::print("{} rows\n{:<{}}  {:>7}  {:<{}}  {}\n", log.rows(), "signal", name_width, "numbers", "unit",
-             unit_width, "description");
-  for (const SignalInfo& signal : signals) {
-    fmt::print("{:<{}}  {:>7}  {:<{}}  {}\n", signal.name, name_width, signal.width,
-               ListDistinctUnits(signal), unit_width, signal.description);
+    const std::string line = fmt::format("{:<{}}  {:>7}  [{}] {}", signal.name, width, signal.width,
+                                         ListDistinctUnits(signal), signal.description);
+    fmt::print("{}\n", Wrap(line, width + 11));
   }
 }
 

@@ -30,12 +30,6 @@ std::string Escape(const std::string& text, const char* special) {
   return escaped;
 }
 
-std::vector<std::string> ListScenarios() {
-  std::vector<std::string> names;
-  for (const ShippedScenario& scenario : ListShippedScenarios()) names.push_back(scenario.name);
-  return names;
-}
-
 bool TakesScenario(const CommandHelp& command) {
   for (const OptionHelp& option : command.options) {
     if (option.is_positional && option.names.front().find("SCENARIO") != std::string::npos) return true;
@@ -77,7 +71,7 @@ std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
   for (const CommandHelp& command : commands) {
     std::vector<std::string> words = command.commands;
     if (TakesScenario(command)) {
-      const std::vector<std::string> scenarios = ListScenarios();
+      const std::vector<std::string> scenarios = ListShippedNames();
       words.insert(words.end(), scenarios.begin(), scenarios.end());
     }
     text += fmt::format("    '{}') words='{}'; [[ $cur != -* ]] || words='{}'; files={} ;;\n", command.name,
@@ -114,7 +108,7 @@ std::string MakeZshCompletion(const std::vector<CommandHelp>& commands) {
     std::string next;
     for (const std::string& word : command.commands) next += " '" + word + "'";
     if (TakesScenario(command)) {
-      for (const std::string& name : ListScenarios()) next += " '" + name + "'";
+      for (const std::string& name : ListShippedNames()) next += " '" + name + "'";
     }
     text += fmt::format("    '{}') options=({}); next=({}); files={} ;;\n", command.name, options, next,
                         command.commands.empty() ? "1" : "");

@@ -108,14 +108,14 @@ MutationRow Total(const std::vector<MutationRow>& rows) {
 
 void Print(const MutateRequest& request, const Campaign& campaign) {
   const auto line = [](const MutationRow& row) {
-    fmt::print("{:<34}{:>8}{:>8}{:>9}{:>11}{:>10}{:>13}\n", row.kind, row.mutants, row.killed, row.refused,
+    fmt::print("{:<32}{:>8}{:>7}{:>8}{:>10}{:>9}{:>6}\n", row.kind, row.mutants, row.killed, row.refused,
                row.no_effect, row.survived, row.named_first);
   };
   const std::vector<MutationRow> rows = SumUp(campaign);
   const MutationRow total = Total(rows);
   if (!request.quiet) {
-    fmt::print("{:<34}{:>8}{:>8}{:>9}{:>11}{:>10}{:>13}\n", "what was changed", "mutants", "killed",
-               "refused", "no effect", "survived", "named first");
+    fmt::print("{:<32}{:>8}{:>7}{:>8}{:>10}{:>9}{:>6}\n", "what was changed", "mutants", "killed", "refused",
+               "no effect", "survived", "first");
     for (const MutationRow& row : rows) line(row);
     line(total);
     for (size_t i = 0; i < campaign.done; ++i) {
@@ -287,10 +287,7 @@ void AddMutateCommand(Command app) {
                         .Check(WholeNumber(0, 100000))
                         .Needs(run)
                         .ShowDefault();
-  Option samples = command.AddOption("--samples", &request->options.samples, "Random states per mutant")
-                       .TypeName("N")
-                       .Check(WholeNumber(1, 1000))
-                       .ShowDefault();
+  const auto states = AddSampleOptions(command, 1000, &request->options.samples, &request->options.seed);
   Option no_diagnosis = command.AddFlag("--no-diagnosis", &request->no_diagnosis,
                                         "Only whether each is found, not what is named");
   robot.Excludes(run);
@@ -300,7 +297,7 @@ void AddMutateCommand(Command app) {
       "everything");
   smallest.Needs(run);
   for (Option option : {from, duration, mistakes, scale}) option.Excludes(smallest);
-  samples.Excludes(run);
+  for (Option option : states) option.Excludes(run);
   no_diagnosis.Excludes(run);
   AddJsonOption(command, "the results", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");

@@ -11,6 +11,7 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
+#include "harness/cli/terminal.h"
 #include "harness/run/run_mutation.h"
 
 namespace dexcheck::cli {
@@ -74,10 +75,13 @@ void PrintExceptions(const std::vector<RunMutant>& mutants, size_t done) {
                      ? ""
                      : fmt::format(", though the object is {:.1e} m off", mutant.position_error));
     } else if (!mutant.has_right_cause()) {
-      fmt::print("cause: {}: expected {}, told {} ({})\n", mutant.name, NameOf(mutant.expected),
-                 NameOf(mutant.cause), mutant.evidence);
+      fmt::print("{}\n", Wrap(fmt::format("cause: {}: expected {}, told {} ({})", mutant.name,
+                                          NameOf(mutant.expected), NameOf(mutant.cause), mutant.evidence),
+                              2));
     } else if (!mutant.names_part) {
-      fmt::print("part: {}: expected {}, told {}\n", mutant.name, mutant.part, mutant.evidence);
+      fmt::print(
+          "{}\n",
+          Wrap(fmt::format("part: {}: expected {}, told {}", mutant.name, mutant.part, mutant.evidence), 2));
     }
   }
 }
@@ -86,10 +90,10 @@ void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t 
   const std::vector<RunRow> rows = SumUp(campaign.mutants(), done);
   const RunRow& all = rows.back();
   if (!request.quiet) {
-    fmt::print("{:<18}{:>9}{:>9}{:>9}{:>11}{:>10}{:>13}{:>12}\n", "what was wrong", "mistakes", "found",
-               "refused", "no effect", "survived", "cause right", "part named");
+    fmt::print("{:<16}{:>9}{:>6}{:>8}{:>10}{:>9}{:>12}{:>10}\n", "what was wrong", "mistakes", "found",
+               "refused", "no effect", "survived", "cause right", "part");
     for (const RunRow& row : rows) {
-      fmt::print("{:<18}{:>9}{:>9}{:>9}{:>11}{:>10}{:>13}{:>12}\n", row.kind, row.mutants, row.killed,
+      fmt::print("{:<16}{:>9}{:>6}{:>8}{:>10}{:>9}{:>12}{:>10}\n", row.kind, row.mutants, row.killed,
                  row.refused, row.no_effect, row.survived, row.cause,
                  row.with_part > 0 ? fmt::format("{} of {}", row.part, row.with_part) : "");
     }
@@ -99,11 +103,12 @@ void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t 
   if (done < campaign.mutants().size())
     fmt::print("INTERRUPTED after {} of {} mistakes. So far:\n", done, campaign.mutants().size());
   const int possible = all.mutants - all.refused - all.no_effect;
-  fmt::print(
+  const std::string verdict = fmt::format(
       "{}: {} of {} mistakes that are possible and have an effect were found; the cause is right in {}, the "
-      "part in {} of {}.\n",
+      "part in {} of {}.",
       all.survived == 0 ? "ALL FOUND" : "SURVIVORS", all.killed, possible, all.cause, all.part,
       all.with_part);
+  fmt::print("{}\n", Wrap(verdict, 2));
 }
 
 std::string ToText(const MutateRunRequest& request, const RunCampaign& campaign, size_t done) {

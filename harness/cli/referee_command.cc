@@ -16,6 +16,7 @@
 #include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
+#include "harness/cli/terminal.h"
 #include "harness/sides/join_names.h"
 #include "harness/sides/read_description.h"
 #include "harness/sides/referee.h"
@@ -61,35 +62,48 @@ void PrintTable(const RefereeRequest& request, const RobotModel& model, const Re
   fmt::print("{}: {}\n{} random states (seed {}), {} engines\n\n", model.name(),
              request.robot.filename().string(), result.samples, request.options.states.seed,
              result.names.size());
-  for (const std::string& note : result.notes) fmt::print("  {}\n", note);
-  for (const std::string& absent : result.absent) fmt::print("  not compared: {}\n", absent);
+  for (const std::string& note : result.notes) fmt::print("{}\n", Wrap("  " + note, 4));
+  for (const std::string& absent : result.absent) fmt::print("{}\n", Wrap("  not compared: " + absent, 4));
   if (!result.notes.empty() || !result.absent.empty()) fmt::print("\n");
 
+  const auto letter = [](size_t side) { return std::string(1, static_cast<char>('A' + side)); };
+  const auto name = [&](const ComparedPair& pair) {
+    return letter(pair.first) + " - " + letter(pair.second);
+  };
+  for (size_t side = 0; side < result.names.size(); ++side)
+    fmt::print("{}  {}\n", letter(side), result.names[side]);
   std::vector<std::string> terms;
-  size_t width = 0;
   for (const ComparedPair& pair : result.pairs) {
-    width = std::max(width, result.names[pair.first].size() + result.names[pair.second].size() + 3);
     for (const CheckRecord& record : pair.terms) {
       if (std::find(terms.begin(), terms.end(), record.name) == terms.end()) terms.push_back(record.name);
     }
   }
-  fmt::print("{:<{}}", "worst difference", width);
-  for (const std::string& term : terms) fmt::print("{:>18}", term + " ");
-  fmt::print("   where it is worst\n");
-  const int base = model.num_base_velocities();
-  for (const ComparedPair& pair : result.pairs) {
-    fmt::print("{:<{}}", result.names[pair.first] + " - " + result.names[pair.second], width);
-    for (const std::string& term : terms) fmt::print("{:>18}", FormatCell(pair, term));
-    const CheckRecord* const worst = FindWorst(pair);
-    if (worst == nullptr) {
-      fmt::print("   no term in common\n");
-    } else {
-      fmt::print("   {} {}, state {}\n", worst->name, Describe(worst->where, model, base),
-                 static_cast<long>(worst->at));
+  constexpr size_t kPairsInARow = 6;
+  for (size_t begin = 0; begin < result.pairs.size(); begin += kPairsInARow) {
+    const size_t end = std::min(begin + kPairsInARow, result.pairs.size());
+    fmt::print("\n{:<18}", "worst difference");
+    for (size_t i = begin; i < end; ++i) fmt::print("{:>10}", name(result.pairs[i]) + " ");
+    fmt::print("\n");
+    for (const std::string& term : terms) {
+      fmt::print("{:<18}", term);
+      for (size_t i = begin; i < end; ++i) fmt::print("{:>10}", FormatCell(result.pairs[i], term));
+      fmt::print("\n");
     }
   }
-  fmt::print("\nDifferences are relative to each term's own scale; those above {:g} are marked by \"!\".\n",
-             request.options.tolerance);
+  fmt::print("\nwhere it is worst\n");
+  const int base = model.num_base_velocities();
+  for (const ComparedPair& pair : result.pairs) {
+    const CheckRecord* const worst = FindWorst(pair);
+    const std::string where =
+        worst == nullptr ? "no term in common"
+                         : fmt::format("{} {}, state {}", worst->name, Describe(worst->where, model, base),
+                                       static_cast<long>(worst->at));
+    fmt::print("{}\n", Wrap(name(pair) + "  " + where, 7));
+  }
+  const std::string legend =
+      fmt::format("Differences are relative to each term's own scale; those above {:g} are marked by \"!\".",
+                  request.options.tolerance);
+  fmt::print("\n{}\n", Wrap(legend, 0));
 }
 
 void PrintVerdict(const RefereeRequest& request, const RefereeResult& result) {
@@ -232,6 +246,7 @@ void AddRefereeCommand(Command app) {
       .ShowDefault();
   AddJsonOption(command, "the results", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
+  AddIgnoreOption(command, &request->options.states.ignore);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

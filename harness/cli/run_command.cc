@@ -12,6 +12,7 @@
 #include "controller/common/text.h"
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
+#include "harness/base/shell.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/make_video.h"
 #include "harness/cli/output_file.h"
@@ -20,6 +21,7 @@
 #include "harness/cli/run_report.h"
 #include "harness/cli/shared_request.h"
 #include "harness/cli/shipped_files.h"
+#include "harness/cli/terminal.h"
 #include "harness/cli/tolerance_options.h"
 #include "harness/engine/machine.h"
 #include "harness/report/run_data.h"
@@ -207,8 +209,14 @@ int ReplayRun(const RunRequest& request) {
 int Run(const RunRequest& request) {
   if (request.list) {
     for (const ShippedScenario& scenario : ListShippedScenarios()) {
-      fmt::print("{:<14} {}\n", scenario.name, scenario.description);
+      const std::string line = fmt::format("{:<14} {}{}", scenario.name,
+                                           scenario.is_readable ? "" : "unreadable: ", scenario.description);
+      fmt::print("{}\n", scenario.is_readable ? Wrap(line, 15) : line);
     }
+    fmt::print(
+        "\nTo change one, copy its file with the folders that it names, or --set its keys:\n  cp {} "
+        "my.toml\n",
+        QuoteForShell((FindScenarioFolder() / "paper.toml").string()));
     return kSuccess;
   }
   if (!request.replay.empty()) return ReplayRun(request);

@@ -108,16 +108,29 @@ double CalcLargest(const RowMatrixXd& values) {
 
 }  // namespace
 
+std::filesystem::path FindScenarioFolder() { return FindShippedFile(kScenarioFolder); }
+
+std::vector<std::string> ListShippedNames() {
+  std::vector<std::string> names;
+  for (const std::filesystem::directory_entry& entry :
+       std::filesystem::directory_iterator(FindScenarioFolder())) {
+    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 std::vector<ShippedScenario> ListShippedScenarios() {
   std::vector<ShippedScenario> scenarios;
-  const std::filesystem::path folder = FindShippedFile(kScenarioFolder);
-  for (const std::filesystem::directory_entry& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.path().extension() != ".toml") continue;
-    const Scenario scenario =
-        ParseScenario(ReadTextFile(entry.path().string()), entry.path().string(), folder, {});
-    scenarios.push_back({scenario.name, scenario.description});
+  const std::filesystem::path folder = FindScenarioFolder();
+  for (const std::string& name : ListShippedNames()) {
+    const std::string file = (folder / (name + ".toml")).string();
+    try {
+      scenarios.push_back({name, ParseScenario(ReadTextFile(file), file, folder, {}).description});
+    } catch (const InputError& error) {
+      scenarios.push_back({name, error.what(), /*is_readable=*/false});
+    }
   }
-  std::sort(scenarios.begin(), scenarios.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
   return scenarios;
 }
 
@@ -126,16 +139,14 @@ ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<st
   if (name_or_file.ends_with(".toml") || name_or_file.find('/') != std::string::npos) {
     return OpenWhole(name_or_file, overrides, seed);
   }
-  std::vector<std::string> known;
-  for (const ShippedScenario& scenario : ListShippedScenarios()) known.push_back(scenario.name);
+  const std::vector<std::string> known = ListShippedNames();
   if (std::find(known.begin(), known.end(), name_or_file) == known.end()) {
     const std::string nearest = FindNearest(name_or_file, known);
     throw InputError("scenario " + Quote(name_or_file) +
                      ": is neither shipped (dexcheck run --list) nor a TOML file" +
                      (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?"));
   }
-  return OpenWhole(FindShippedFile(std::string(kScenarioFolder) + "/" + name_or_file + ".toml"), overrides,
-                   seed);
+  return OpenWhole(FindScenarioFolder() / (name_or_file + ".toml"), overrides, seed);
 }
 
 RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(path) {

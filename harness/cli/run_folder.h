@@ -21,17 +21,20 @@ struct ScenarioFiles {
   std::filesystem::path mjcf;
 };
 
-/// A shipped scenario by name, or a TOML file. @throws InputError.
+/// A shipped scenario by its file's name without .toml, or a TOML file; no other is read. @throws InputError.
 ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<std::string>& overrides,
                            std::uint64_t seed);
 
 struct ShippedScenario {
-  std::string name;
-  std::string description;
+  std::string name;         ///< Its file's, without .toml.
+  std::string description;  ///< Of one that cannot be read: why not.
+  bool is_readable = true;
 };
 
-/// In alphabetic order.
+/// In alphabetic order. None is read.
+std::vector<std::string> ListShippedNames();
 std::vector<ShippedScenario> ListShippedScenarios();
+std::filesystem::path FindScenarioFolder();
 
 /// A folder for the results of one run, made new.
 class RunFolder {

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "harness/base/interrupts.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
 #include "renders/question_status.h"
@@ -17,11 +18,15 @@ namespace {
 
 std::string Tell(bool failed) { return failed ? Paint(Tone::kBad, "FAILS") : Paint(Tone::kGood, "ok"); }
 
-void PrintCheck(const CheckRecord& check, int width) {
+void PrintRow(CheckKind kind, const std::string& what, const CheckRecord& check) {
+  fmt::print("  {:<12}{:<34}{:>9.2e}{:>9.1e}  {:<4} {}\n", NameOf(kind), what, check.worst, check.bound,
+             check.unit == "1" ? "" : check.unit, Tell(check.failed));
+}
+
+void PrintCheck(const CheckRecord& check) {
   if (!check.applies) return;
-  fmt::print("  {:<12}{:<{}}{:>10.2e}{:>10.1e}  {:<4} {}{}\n", NameOf(check.kind), check.name, width,
-             check.worst, check.bound, check.unit == "1" ? "" : check.unit, Tell(check.failed),
-             check.failed ? fmt::format(" from t = {:.3f} s", check.failed_at) : "");
+  PrintRow(check.kind,
+           check.failed ? fmt::format("{} from {:.3f} s", check.name, check.failed_at) : check.name, check);
 }
 
 /// How near a check came to its bound.
@@ -51,25 +56,22 @@ void PrintQuestion(CheckKind kind, const ClosedLoop& loop) {
   if (nearest != nullptr) {
     const std::string what =
         passed == 1 ? nearest->name : fmt::format("{} checks: {}", passed, nearest->name);
-    fmt::print("  {:<12}{:<34}{:>10.2e}{:>10.1e}  {:<4} {}\n", NameOf(kind), what, nearest->worst,
-               nearest->bound, nearest->unit == "1" ? "" : nearest->unit, Tell(false));
+    PrintRow(kind, what, *nearest);
   }
   visit([&](const CheckRecord& check) {
-    if (check.failed) PrintCheck(check, 34);
+    if (check.failed) PrintCheck(check);
   });
 }
 
 void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
-  const int width = detail == Detail::kAll ? 24 : 34;
-  fmt::print("\n  {:<12}{:<{}}{:>10}{:>10}\n", "question",
-             detail == Detail::kAll ? "check" : "nearest to its bound", width, "worst", "bound");
+  fmt::print("\n  {:<12}{:<34}{:>9}{:>9}\n", "question",
+             detail == Detail::kAll ? "check" : "nearest to its bound", "worst", "bound");
   const auto& gate = setup.gate().records;
   const auto differs = std::count_if(gate.begin(), gate.end(), [](const CheckRecord& r) { return r.failed; });
-  fmt::print("  {:<12}{:<{}}{:>10}{:>10}       {}\n", "model", "constants", width, differs, 0,
-             Tell(differs > 0));
+  fmt::print("  {:<12}{:<34}{:>9}{:>9}       {}\n", "model", "constants", differs, 0, Tell(differs > 0));
   if (detail == Detail::kAll) {
-    for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check, width);
-    for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check, width);
+    for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check);
+    for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check);
   } else {
     for (const CheckKind kind : kCheckKinds) {
       PrintQuestion(kind, loop);
@@ -78,7 +80,7 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
   }
   const std::span<const CheckRecord> settling = loop.checks().settling_failures();
   if (!settling.empty()) fmt::print("\n  while settling, before t = 0:\n");
-  for (const CheckRecord& check : settling) PrintCheck(check, width);
+  for (const CheckRecord& check : settling) PrintCheck(check);
 }
 
 /// "approach 0.0, close 3.4, ..." with the time each began.
@@ -88,7 +90,7 @@ void PrintTask(const ClosedLoop& loop) {
   for (const PhaseEntry& entry : task.history()) {
     line += fmt::format("{}{} {:.1f}", line.empty() ? "" : ", ", NameOf(entry.phase), entry.time);
   }
-  fmt::print("phases, s: {}\n", line);
+  fmt::print("{}\n", Wrap("phases, s: " + line, 2));
   if (!task.first_failure().empty()) fmt::print("first attempt: {}\n", task.first_failure());
   if (task.scale() != 1.0) fmt::print("weighed: {:.3f} of the stated mass\n", task.scale());
   fmt::print("object pushed by {:.1e} m before it was held; largest step of a torque {:.1e} N m\n",
@@ -113,28 +115,30 @@ void PrintClearance(const Clearance& clearance) {
     if (one.pair >= 0 && (nearest == nullptr || one.distance < nearest->distance)) nearest = &one;
   }
   if (nearest == nullptr) return;
-  fmt::print("nearest of what is not meant to touch: {}, {:.1f} mm {} at t = {:.3f} s\n",
-             clearance.Describe(nearest->pair), 1e3 * std::abs(nearest->distance),
-             nearest->distance < 0.0 ? "into each other" : "apart", nearest->time);
+  fmt::print("not meant to touch: {}, {:.1f} mm {} at t = {:.3f} s\n", clearance.Describe(nearest->pair),
+             1e3 * std::abs(nearest->distance), nearest->distance < 0.0 ? "into each other" : "apart",
+             nearest->time);
 }
 
 void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
   const LoopTimes& times = loop.times();
   const double scale = 1e6 / static_cast<double>(std::max(loop.record().step, 1L));
   fmt::print(
-      "\n{:.1f} x real time. Microseconds a step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, "
-      "recording {:.0f}\n",
+      "\n{:.1f} x real time; us/step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, recording "
+      "{:.0f}\n",
       result.wall_seconds > 0.0 ? loop.time() / result.wall_seconds : 0.0, scale * times.plant,
       scale * times.controller, scale * times.cross_check, scale * result.recording_seconds);
 }
 
 }  // namespace
 
+bool WasClosed(const RunResult& result) { return result.interrupted && !IsInterrupted(); }
+
 void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result,
                     const std::string& folder, Detail detail) {
   const Scenario& scenario = setup.scenario();
   if (detail != Detail::kVerdict) {
-    fmt::print("{}: {}\n", scenario.name, scenario.description);
+    fmt::print("{}\n", Wrap(scenario.name + ": " + scenario.description, 2));
     fmt::print("{:.3f} of {:.3f} s simulated, {} steps of {} ms\n", loop.time(), scenario.duration,
                loop.record().step, 1e3 * scenario.plant.time_step);
     if (scenario.tolerance > 0.0) fmt::print("judged to a relative tolerance of {:g}\n", scenario.tolerance);
@@ -167,7 +171,13 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
                      : "the run completed; nothing was checked.");
       return;
     case Verdict::kFailed:
-      fmt::print("{}: {}.\n", Paint(Tone::kBad, "FAILED"), result.failure);
+      if (WasClosed(result)) {
+        const bool holds = result.attribution.cause == Cause::kNone;
+        fmt::print("{} at t = {:.3f} s: {}\n", Paint(holds ? Tone::kGood : Tone::kBad, "CLOSED"), loop.time(),
+                   holds ? "no check has failed so far." : "DISAGREEMENT:");
+      } else {
+        fmt::print("{}: {}.\n", Paint(Tone::kBad, "FAILED"), result.failure);
+      }
       break;
     case Verdict::kDisagreement:
       fmt::print("{}:\n", Paint(Tone::kBad, "DISAGREEMENT"));

@@ -50,16 +50,9 @@ void AddStatesCommand(Command app) {
       .TypeName("FILE")
       .Required();
   command.AddOption("--out", &request->out, "Folder for layout.json, states.jsonl, q.npy and v.npy")
-      .TypeName("FOLDER")
+      .TypeName("DIR")
       .Required();
-  command.AddOption("--samples,--count", &request->count, "Number of random states")
-      .TypeName("N")
-      .Check(WholeNumber(1, kMaxCount))
-      .ShowDefault();
-  command.AddOption("--seed", &request->options.seed, "Of the random states")
-      .TypeName("N")
-      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
-      .ShowDefault();
+  AddSampleOptions(command, kMaxCount, &request->count, &request->options.seed, "--samples,--count");
   command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats");
   command.SetAction([=] { return Run(*request); });
 }

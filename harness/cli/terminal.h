@@ -10,6 +10,13 @@ namespace dexcheck::cli {
 /// Columns of the terminal that a descriptor leads to, now; 0 when it is none or does not tell.
 int CountColumns(int descriptor);
 
+/// What every line of a table, and of text without long paths, fits.
+inline constexpr size_t kColumns = 80;
+
+/// Lines of at most kColumns, broken at blanks; those after the first of each are indented. A word that is
+/// longer stays whole.
+std::string Wrap(std::string_view text, size_t indent);
+
 enum class Tone { kGood, kBad, kWarning, kFaint };
 
 /// The text in a colour when standard output is a terminal and the environment has no NO_COLOR (no-color.org)

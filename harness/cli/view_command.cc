@@ -42,14 +42,8 @@ ExitCode ToExitCode(const Runner& runner) {
   const RunResult& result = runner.result();
   if (result.verdict == Verdict::kPass) return kSuccess;
   if (result.verdict == Verdict::kDisagreement) return kDisagreement;
-  if (!result.interrupted) return ReportFailure(result.failure);
-  const CrossCheck& checks = runner.loop().checks();
-  for (const std::span<const CheckRecord> records : {checks.model_checks(), checks.motion_checks()}) {
-    for (const CheckRecord& check : records) {
-      if (check.applies && check.failed) return kDisagreement;
-    }
-  }
-  return kSuccess;
+  if (!WasClosed(result)) return ReportFailure(result.failure);
+  return result.attribution.cause == Cause::kNone ? kSuccess : kDisagreement;
 }
 
 /// The part of a scenario that a session went through, once more and without a window: with pulls in the

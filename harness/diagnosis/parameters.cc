@@ -363,4 +363,16 @@ double ToPrinted(const RobotSpec& spec, const Parameter& parameter, double value
   return IsAngle(spec, parameter) ? RadToDeg(value) : value;
 }
 
+RobotModel ChangeNumber(RobotSpec spec, const Parameter& number, double scale) {
+  const double value = GetValue(spec, number);
+  const double change = scale * GetScale(spec, number);
+  SetValue(&spec, number, value + change);
+  try {
+    return RobotModel(spec);
+  } catch (const InputError&) {
+    SetValue(&spec, number, value - change);
+    return RobotModel(spec);
+  }
+}
+
 }  // namespace dexcheck

@@ -79,6 +79,11 @@ bool IsDynamic(ParameterKind kind);
 /// value of zero what stands beside it (the tensor's trace, the link's length, a radian).
 double GetScale(const RobotSpec& spec, const Parameter& parameter);
 
+/// The robot with a number changed by `scale` times GetScale, or by as much less where there is no such
+/// robot.
+/// @throws InputError when there is neither.
+RobotModel ChangeNumber(RobotSpec spec, const Parameter& number, double scale);
+
 /// The part of the robot: "joint r_elbow", "link r_forearm", "frame rf1_tip", "base platform", "object
 /// torus", "gravity".
 std::string DescribePart(const RobotSpec& spec, const Parameter& parameter);

@@ -15,6 +15,7 @@
 #include "controller/control/joint_law.h"
 #include "harness/checks/bounds.h"
 #include "harness/checks/contact_give.h"
+#include "harness/engine/engine.h"
 
 namespace dexcheck {
 namespace {
@@ -254,7 +255,7 @@ DetectabilityResult FindDetectability(const Setup& setup, int states,
       }
     }
     if (!changed) continue;
-    Detectability number{DescribePart(spec, numbers[k]) + ": " + DescribeQuantity(numbers[k]),
+    Detectability number{numbers[k], DescribePart(spec, numbers[k]) + ": " + DescribeQuantity(numbers[k]),
                          DescribeGroup(numbers[k])};
     VectorXd left;
     for (size_t i = 0; i < samples.size(); ++i) {
@@ -275,6 +276,39 @@ DetectabilityResult FindDetectability(const Setup& setup, int states,
     ++result.rank;
   }
   return result;
+}
+
+RetriedError RetryError(const Scenario& scenario, const std::filesystem::path& robot,
+                        const std::filesystem::path& mjcf, const Parameter& parameter, double error,
+                        const std::vector<std::string>& checks, const std::function<bool()>& should_stop) {
+  constexpr int kDoublings = 2;
+  RetriedError retried;
+  for (int doubling = 0; doubling <= kDoublings; ++doubling) {
+    retried = {error * std::exp2(doubling)};
+    for (int seed = 1; seed <= kRetrySeeds && !should_stop(); ++seed) {
+      Scenario varied = scenario;
+      varied.seed = static_cast<std::uint64_t>(seed);
+      try {
+        const Setup right(varied, robot, mjcf);
+        const Setup wrong(right.scenario(), ChangeNumber(right.model().spec(), parameter, retried.error),
+                          mjcf, LoadMjcf(mjcf));
+        Runner runner(wrong, /*check=*/true);
+        const auto fails = [&] {
+          return std::any_of(checks.begin(), checks.end(), [&](const std::string& name) {
+            const CheckRecord& check = runner.loop().checks().Find(name);
+            return check.applies && check.failed;
+          });
+        };
+        runner.Run([](const StepRecord&) {}, [&] { return should_stop() || fails(); });
+        ++retried.runs;
+        retried.found += fails() ? 1 : 0;
+      } catch (const InputError&) {
+        continue;
+      }
+    }
+    if (retried.found == retried.runs || error == 0.0) break;
+  }
+  return retried;
 }
 
 }  // namespace dexcheck

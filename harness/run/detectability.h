@@ -4,6 +4,7 @@
 // model itself: by what it leaves of the balances, by what it predicts, by the torques that it makes of the
 // law.
 
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <string>
@@ -16,6 +17,7 @@ namespace dexcheck {
 
 /// One number of the model.
 struct Detectability {
+  Parameter parameter;
   std::string name;      ///< "link r_forearm: mass".
   std::string quantity;  ///< "mass".
   // Smallest error that fails each question by itself, relative to GetScale; infinity where none does.
@@ -46,5 +48,20 @@ struct DetectabilityResult {
 /// after one.
 DetectabilityResult FindDetectability(const Setup& setup, int states,
                                       const std::function<bool(size_t done, size_t all)>& go_on);
+
+/// A question's claim, made in a run as it is: this error of one number, in runs that differ by their seeds.
+struct RetriedError {
+  double error = 0.0;  ///< Relative to GetScale: as claimed, or twice or four times that when fewer found it.
+  int found = 0;       ///< Runs in which one of the checks failed,
+  int runs = 0;        ///< of these.
+};
+inline constexpr int kRetrySeeds = 5;
+
+/// Runs the scenario with the error until one of `checks` fails, with each seed from 1 to kRetrySeeds; when
+/// not all runs find it, with twice the error, and once more. A seed without such a robot or grasp has no
+/// run.
+RetriedError RetryError(const Scenario& scenario, const std::filesystem::path& robot,
+                        const std::filesystem::path& mjcf, const Parameter& parameter, double error,
+                        const std::vector<std::string>& checks, const std::function<bool()>& should_stop);
 
 }  // namespace dexcheck

@@ -50,19 +50,6 @@ void InjectFault(const Setup& setup, const PlantFault& fault, LoopParts* parts) 
   parts->plant = std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault);
 }
 
-/// The robot with one number changed by `scale` times its size, up or, where that is no robot, down.
-RobotModel ChangeNumber(RobotSpec spec, const Parameter& number, double scale) {
-  const double value = GetValue(spec, number);
-  const double change = scale * GetScale(spec, number);
-  SetValue(&spec, number, value + change);
-  try {
-    return RobotModel(spec);
-  } catch (const InputError&) {
-    SetValue(&spec, number, value - change);
-    return RobotModel(spec);
-  }
-}
-
 std::string JoinFailed(const CrossCheck& checks) {
   std::string names;
   for (const std::span<const CheckRecord> records : {checks.model_checks(), checks.motion_checks()}) {

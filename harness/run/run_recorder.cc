@@ -131,14 +131,25 @@ void RunRecorder::AddStateSignals() {
   Add({"engine/qvel", qvel.units, "MuJoCo's velocities", static_cast<int>(m.nv), qvel.names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.qvel, row); });
   const int n = model.num_velocities();
+  const bool moves_joints = setup_->joint_motion() != nullptr;
   Add({"q", q_units, "q' as read from the plant", model.num_positions(), q_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.q, row); });
   Add({"xi", xi_units, "reduced velocity as read from the plant", n, xi_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.xi, row); });
-  Add({"tau", "N m", "tau' of the computed torque law (55)", n, tau_names, {}},
+  Add({"tau",
+       "N m",
+       moves_joints ? "torques of the joints' law" : "tau' of the computed torque law (55)",
+       n,
+       tau_names,
+       {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.command.tau, row); });
   if (!setup_->scenario().task) {
-    Add({"law/xi_dot_d", xi_dot_units, "xi_dot_d of (47), which the law demands", n, xi_names, {}},
+    Add({"law/xi_dot_d",
+         xi_dot_units,
+         moves_joints ? "accelerations that the law demands" : "xi_dot_d of (47), which the law demands",
+         n,
+         xi_names,
+         {}},
         [](const StepRecord& step, std::span<double> row) { CopyDemand(step.command.demand.xi_dot, row); });
   }
   if (!setup_->scenario().imperfections.is_ideal()) {
@@ -156,7 +167,13 @@ void RunRecorder::AddStateSignals() {
   if (checks_ == nullptr) return;
   Add({"engine/xi_dot", xi_dot_units, "reduced acceleration of the plant", n, xi_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.response.xi_dot, row); });
-  Add({"model/xi_dot", xi_dot_units, "reduced acceleration that (46), (48) predict", n, xi_names, {}},
+  Add({"model/xi_dot",
+       xi_dot_units,
+       setup_->joint_motion() != nullptr ? "accelerations that the equations of motion predict"
+                                         : "reduced acceleration that (46), (48) predict",
+       n,
+       xi_names,
+       {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.findings.xi_dot_model, row); });
 }
 

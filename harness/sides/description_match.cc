@@ -276,6 +276,20 @@ Completion CompleteFromEngine(const mjModel& engine, const std::string& source, 
   return completion;
 }
 
+void TakeIgnored(const RobotSpec& robot, const std::vector<std::string>& ignore, mjModel* engine) {
+  for (const JointConstant& constant : kJointConstants) {
+    mjtNum* const values = constant.value == &Joint::armature       ? engine->dof_armature
+                           : constant.value == &Joint::damping      ? engine->dof_damping
+                           : constant.value == &Joint::dry_friction ? engine->dof_frictionloss
+                                                                    : nullptr;
+    if (values == nullptr || !Ignores(constant.word, ignore)) continue;
+    for (const Joint& joint : robot.joints) {
+      const int id = FindByName(*engine, mjOBJ_JOINT, NameInFile(joint));
+      if (id >= 0) values[engine->jnt_dofadr[id]] = joint.*constant.value;
+    }
+  }
+}
+
 void UndoOneSided(const std::vector<GateFinding>& one_sided, RobotSpec* spec) {
   for (const GateFinding& finding : one_sided) {
     for (const JointConstant& constant : kJointConstants) {

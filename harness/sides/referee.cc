@@ -98,6 +98,10 @@ class RefereeRun {
     if (name == "mujoco3") {
       const std::filesystem::path script = options_.programs_folder / "mujoco3.mjs";
       RequireProgram(script);
+      if (!options_.states.ignore.empty() && !options_.mjcf.empty()) {
+        throw InputError("reads " + options_.mjcf.filename().string() +
+                         " with its own constants of joints, which --ignore cannot change");
+      }
       std::string command =
           "node " + QuoteForShell(script.string()) + " " + QuoteForShell(MujocoFile().string());
       if (!options_.node_modules.empty()) command += " " + QuoteForShell(options_.node_modules.string());
@@ -154,6 +158,7 @@ class RefereeRun {
     if (FindFormat(path) == RobotFormat::kUrdf) {
       for (int k = 0; k < 3; ++k) engine->opt.gravity[k] = robot_.spec.gravity[k];
     }
+    TakeIgnored(robot_.spec, options_.states.ignore, engine.get());
     RobotDescription completed = robot_;
     const std::string file = options_.mjcf.empty() ? file_.filename().string() : path.filename().string();
     const Completion completion = CompleteFromEngine(*engine, file, &completed);

@@ -133,7 +133,7 @@ const std::string& StudyStore::Identify(const std::string& column) const {
   for (const auto& [name, value] : identity_) {
     if (name == column) return value;
   }
-  throw std::invalid_argument("no column " + Quote(column));
+  throw InputError(database_->name() + ": no column " + Quote(column));
 }
 
 bool StudyStore::IsInUse() const {

@@ -2,33 +2,67 @@
 
 #include <fmt/format.h>
 
-namespace dexcheck {
+#include <cmath>
 
-std::vector<Slider> MakeGainSliders() { return {{"stiffness K_p"}, {"damping K_v"}, {"squeeze f_min"}}; }
+#include "controller/common/text.h"
+
+namespace dexcheck {
+namespace {
+
+/// Ten digits: 0.6 for 3 times 0.2, and not 0.6000000000000001.
+std::string Print(double number) { return FormatNumber(number, 10); }
+
+std::string Print(const Vector6d& v) {
+  return fmt::format("[{}, {}, {}, {}, {}, {}]", Print(v[0]), Print(v[1]), Print(v[2]), Print(v[3]),
+                     Print(v[4]), Print(v[5]));
+}
+
+/// A key with numbers by joint, each times a factor; nothing when the scenario does not have it.
+void Multiply(const ByName& numbers, double factor, std::vector<std::string>* overrides) {
+  if (numbers.key.empty() || factor == 1.0) return;
+  std::string text = std::isnan(numbers.all) ? "" : ", all = " + Print(factor * numbers.all);
+  for (const auto& [name, number] : numbers.groups) {
+    text += ", " + Quote(name) + " = " + Print(factor * number);
+  }
+  overrides->push_back(numbers.key + "={" + text.substr(1) + " }");
+}
+
+}  // namespace
+
+std::vector<Slider> MakeGainSliders(const Scenario& scenario) {
+  std::vector<Slider> sliders = {{"stiffness K_p"}, {"damping K_v"}};
+  if (!scenario.joint_motion) sliders.push_back({"squeeze f_min"});
+  return sliders;
+}
 
 std::vector<std::string> MakeGainOverrides(const Scenario& scenario, const std::vector<Slider>& sliders) {
   std::vector<std::string> overrides;
-  const auto vector = [](const Vector6d& v) {
-    return fmt::format("[{}, {}, {}, {}, {}, {}]", v[0], v[1], v[2], v[3], v[4], v[5]);
-  };
-  const ObjectGains& gains = scenario.control.gains;
   const double stiffness = sliders[0].factor;
   const double damping = sliders[1].factor;
+  if (scenario.joint_motion) {
+    const JointControlOptions& joints = scenario.joint_control;
+    Multiply(joints.natural_frequency, std::sqrt(stiffness), &overrides);
+    Multiply(joints.damping_ratio, damping / std::sqrt(stiffness), &overrides);
+    Multiply(joints.stiffness, stiffness, &overrides);
+    Multiply(joints.damping, damping, &overrides);
+    return overrides;
+  }
+  const ObjectGains& gains = scenario.control.gains;
   if (stiffness != 1.0 || damping != 1.0) {
     const Vector6d K_p = stiffness * gains.K_p;
     const Vector6d K_v = damping * gains.K_v;
     const bool has_frequency = scenario.text.find("natural_frequency") != std::string::npos;
     if (has_frequency) {
       const Vector6d omega = K_p.cwiseSqrt();
-      overrides.push_back("control.natural_frequency=" + vector(omega));
-      overrides.push_back("control.damping_ratio=" + vector(0.5 * K_v.cwiseQuotient(omega)));
+      overrides.push_back("control.natural_frequency=" + Print(omega));
+      overrides.push_back("control.damping_ratio=" + Print(0.5 * K_v.cwiseQuotient(omega)));
     } else {
-      overrides.push_back("control.K_p=" + vector(K_p));
-      overrides.push_back("control.K_v=" + vector(K_v));
+      overrides.push_back("control.K_p=" + Print(K_p));
+      overrides.push_back("control.K_v=" + Print(K_v));
     }
   }
   if (sliders[2].factor != 1.0) {
-    overrides.push_back(fmt::format("control.f_min={}", sliders[2].factor * scenario.control.f_min));
+    overrides.push_back("control.f_min=" + Print(sliders[2].factor * scenario.control.f_min));
   }
   return overrides;
 }

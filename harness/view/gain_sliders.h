@@ -10,8 +10,8 @@
 
 namespace dexcheck {
 
-/// Of K_p, K_v and f_min, each at the scenario's own.
-std::vector<Slider> MakeGainSliders();
+/// Of K_p, K_v and, where an object is held, f_min, each at the scenario's own.
+std::vector<Slider> MakeGainSliders(const Scenario& scenario);
 
 /// Assignments that multiply a scenario's gains. @param sliders as MakeGainSliders made them, moved since.
 std::vector<std::string> MakeGainOverrides(const Scenario& scenario, const std::vector<Slider>& sliders);

@@ -105,9 +105,13 @@ void LiveRun::Record(const StepRecord& step) {
   if (runner_->loop().task() != nullptr) {
     frame.phases = {NameOf(static_cast<Phase>(static_cast<int>(step.command.task.phase)))};
   }
-  frame.position_errors = {step.error.position.norm()};
-  frame.orientation_errors = {step.error.orientation};
-  frame.desired_positions = step.command.desired.X_d.head<3>().transpose();
+  if (step.command.joints.q.size() > 0) {
+    frame.joint_errors = {step.error.joints};
+  } else {
+    frame.position_errors = {step.error.position.norm()};
+    frame.orientation_errors = {step.error.orientation};
+    frame.desired_positions = step.command.desired.X_d.head<3>().transpose();
+  }
   const auto count = static_cast<long>(step.response.contacts.size());
   for (RowMatrixXd* matrix : {&frame.contact_positions, &frame.contact_forces, &frame.contact_normals}) {
     matrix->resize(1, 3 * count);

@@ -25,6 +25,7 @@ ViewFrame Recording::Read(long row) const {
   if (!all.phases.empty()) one.phases = {all.phases[at]};
   take_number(all.position_errors, &one.position_errors);
   take_number(all.orientation_errors, &one.orientation_errors);
+  take_number(all.joint_errors, &one.joint_errors);
   take(all.contact_positions, &one.contact_positions);
   take(all.contact_forces, &one.contact_forces);
   take(all.contact_normals, &one.contact_normals);

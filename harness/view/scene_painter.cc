@@ -33,6 +33,7 @@ Image ScenePainter::Paint(const ViewFrame& frame, const SceneLook& look) {
   if (!frame.frame.phases.empty()) state.title += ": " + frame.frame.phases.front();
   state.time = frame.frame.times.front();
   if (!frame.frame.position_errors.empty()) state.position_error = frame.frame.position_errors.front();
+  if (!frame.frame.joint_errors.empty()) state.joint_error = frame.frame.joint_errors.front();
   if (!frame.frame.orientation_errors.empty())
     state.orientation_error = frame.frame.orientation_errors.front();
   state.questions = frame.questions;

@@ -365,10 +365,10 @@ std::unique_ptr<LiveRun> ViewLive(const LiveRunMaker& make, const std::string& t
   ControlsState controls;
   controls.playing = !options.paused;
   controls.speed = options.speed;
-  controls.sliders = MakeGainSliders();
   controls.message = "F1: keys, Ctrl-drag: pull, drag: turn, space: pause, arrows: step, S: save, Q: quit";
   std::unique_ptr<LiveRun> run = make({});
   const Scenario first = run->setup().scenario();  // of whose gains the sliders are factors
+  controls.sliders = MakeGainSliders(first);
   while (true) {
     run->SetPaused(!controls.playing);
     Viewer viewer(*run, run.get(), &window, options, controls);

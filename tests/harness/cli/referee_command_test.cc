@@ -70,6 +70,21 @@ class Referee : public ::testing::Test {
 constexpr double kOfEngines = 1e-12;
 constexpr double kOfCompiledInertias = 1e-6;
 
+// As of consistency: what is ignored the engine takes over from the robot.
+TEST_F(Referee, WhatIsIgnoredNeedNotBeShared) {
+  WriteText(folder_.path() / "robot.xml", testing::kTwoLinksMjcf);
+  std::string other = ReplaceOnce(testing::kTwoLinksMjcf, "armature=\"0.02\"", "armature=\"0.05\"");
+  other = ReplaceOnce(other, "damping=\"0.05\"", "damping=\"0.3\"");
+  WriteText(folder_.path() / "other.xml", other);
+  std::vector<std::string> words = {"robot.xml",  "--mjcf",          "other.xml", "--samples", "5",
+                                    "--engines", "analytic,mujoco", "--quiet",   "--ignore",  "armature,damping"};
+  EXPECT_EQ(Run(words).exit_code, 0) << Run(words).out;
+  words.back() = "armature";
+  EXPECT_EQ(Run(words).exit_code, 1);
+  words.resize(words.size() - 2);
+  EXPECT_EQ(Run(words).exit_code, 1);
+}
+
 TEST_F(Referee, FiveEnginesAgreeOnAnArm) {
   WriteText(folder_.path() / "panda.urdf", testing::MakePandaUrdf());
   const std::vector<std::string> arm = {"panda.urdf", "--samples", "20", "--engines"};

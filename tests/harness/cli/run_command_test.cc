@@ -321,6 +321,49 @@ TEST(RunCommand, ListsScenarios) {
   }
 }
 
+// The program beside a copy of the scenarios, one of them broken: the others run, and it is listed as what it
+// is.
+TEST(RunCommand, ABrokenShippedScenarioStopsNoOther) {
+  const TempFolder folder;
+  const std::filesystem::path shipped = folder.path() / "share/dexcheck/harness/shipped/scenarios";
+  std::filesystem::create_directories(folder.path() / "bin");
+  std::filesystem::create_directories(shipped);
+  const std::filesystem::path program = folder.path() / "bin/dexcheck";
+  std::filesystem::copy_file(testing::ProgramPath(), program);
+  std::filesystem::copy_file(testing::SourcePath("/harness/shipped/scenarios/hold.toml"),
+                             shipped / "hold.toml");
+  WriteText(shipped / "broken.toml", "name = [");
+
+  const ProgramResult run =
+      testing::RunProgram({program.string(), "run", "hold", "--set", "duration=0.002", "--set",
+                           "settle=0.002", "--no-check", "--no-log", "--quiet"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_TRUE(IsRefused(testing::RunProgram({program.string(), "run", "broken"}), {"broken.toml:1"}));
+  EXPECT_TRUE(
+      IsRefused(testing::RunProgram({program.string(), "run", "brokem"}), {"did you mean \"broken\"?"}));
+  const ProgramResult list = testing::RunProgram({program.string(), "run", "--list"});
+  EXPECT_EQ(list.exit_code, 0);
+  EXPECT_THAT(list.out, HasSubstr("unreadable: "));
+  EXPECT_THAT(list.out, HasSubstr("hold "));
+  EXPECT_THAT(list.out, HasSubstr("\n  cp "));
+}
+
+// Equations (46) to (57) are of a robot that holds an object.
+TEST(RunCommand, AnArmsPageHasNoEquationOfThePaper) {
+  const TempFolder folder;
+  const std::filesystem::path out = folder.path() / "out";
+  ASSERT_EQ(RunDexcheck({"run", "panda-reach", "--set", "duration=0.02", "--quiet", "--out", out.string()})
+                .exit_code,
+            0);
+  const std::string page = testing::ReadText(out / "report.html");
+  const std::string list = RunDexcheck({"export", out.string(), "--list"}).out;
+  EXPECT_THAT(page, HasSubstr("law_torque"));
+  for (const char* equation : {"(46)", "(47)", "(48)", "(53)", "(55)", "(57)"}) {
+    EXPECT_THAT(page, ::testing::Not(HasSubstr(equation)));
+    EXPECT_THAT(list, ::testing::Not(HasSubstr(equation)));
+  }
+}
+
 TEST(RunCommand, RefusesBadInputInOneLine) {
   const TempFolder folder;
   EXPECT_TRUE(IsRefused(RunDexcheck({"run"}), {"SCENARIO"}));

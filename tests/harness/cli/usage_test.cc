@@ -3,6 +3,11 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
+#include <algorithm>
+#include <map>
+#include <regex>
+#include <sstream>
+
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::usage_test {
@@ -80,6 +85,99 @@ TEST(Usage, HelpMentionsEveryCommandAndOption) {
     EXPECT_THAT(help({"render", "--help"}), HasSubstr(word));
   }
   EXPECT_THAT(help({"--version"}), ::testing::MatchesRegex("[0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+/// The words of a command that --help lists under a title.
+std::vector<std::string> ListCommands(const std::vector<std::string>& command) {
+  std::vector<std::string> arguments = command;
+  arguments.emplace_back("--help");
+  std::istringstream help(RunDexcheck(arguments).out);
+  std::vector<std::string> names;
+  bool listed = false;
+  for (std::string line; std::getline(help, line);) {
+    if (listed && line.starts_with("  ") && line[2] != ' ')
+      names.push_back(line.substr(2, line.find(' ', 2) - 2));
+    listed = listed || line == "Subcommands:";
+  }
+  return names;
+}
+
+// One option, one meaning: in every command that has it, a word takes the same kind of value and says the
+// same.
+TEST(Usage, AnOptionMeansOneThing) {
+  std::vector<std::vector<std::string>> commands;
+  for (const std::string& name : ListCommands({})) {
+    commands.push_back({name});
+    for (const std::string& next : ListCommands({name})) commands.push_back({name, next});
+  }
+  ASSERT_GE(commands.size(), 25U);
+  const std::map<std::string, std::string> meanings = {
+      {"--json",
+       R"(\[FILE\.json\].*Write .* to this file; without one, or with -, print them and nothing else)"},
+      {"--junit", R"(FILE\.xml.*as a test case of JUnit's XML to this file)"},
+      {"--samples", "N=.*Number of random states"},
+      {"--out", R"((DIR|FILE)[ .=].*)"},
+      {"--ignore", "WORD,.*What the two need not share of joints.*"},
+      {"--floating", "The root of a URDF floats"},
+      {"--digits", "N.*"},
+      {"--tolerance", ".*REL.*"}};
+  std::map<std::string, int> seen;
+  for (std::vector<std::string> command : commands) {
+    command.emplace_back("--help");
+    const std::string help = RunDexcheck(command).out;
+    for (const auto& [word, meaning] : meanings) {
+      const size_t at = help.find("\n  " + word);
+      if (at == std::string::npos) continue;
+      ++seen[word];
+      const size_t end = help.find("\n  -", at + 4);
+      std::string text =
+          help.substr(at + 3 + word.size(), end == std::string::npos ? end : end - at - 3 - word.size());
+      std::replace(text.begin(), text.end(), '\n', ' ');
+      EXPECT_TRUE(std::regex_search(text, std::regex(meaning))) << command[0] << " " << word << text;
+    }
+  }
+  EXPECT_GE(seen["--json"], 10);
+  EXPECT_GE(seen["--out"], 9);
+  EXPECT_GE(seen["--samples"], 5);
+  EXPECT_EQ(seen["--ignore"], 3);
+}
+
+// What a terminal shows of 80 columns. Names of files may be longer.
+TEST(Usage, TablesFitEightyColumns) {
+  const TempFolder folder;
+  const std::string panda = testing::kMjcf + "panda.xml";
+  const std::string a = (folder.path() / "a").string();
+  const std::string b = (folder.path() / "b").string();
+  const auto run = [](const std::string& scenario, const std::string& out) {
+    return std::vector<std::string>{"run",        scenario, "--set",       "duration=0.02", "--set",
+                                    "settle=0.1", "--all",  "--no-report", "--out",         out};
+  };
+  std::vector<std::vector<std::string>> commands = {
+      run("paper", a),
+      run("panda-reach", b),
+      {"run", "--list"},
+      {"consistency", "--samples", "2"},
+      {"audit", panda},
+      {"referee", panda, "--samples", "2", "--engines", "analytic,mujoco"},
+      {"compare", a, b, "--all"},
+      {"export", a, "--list"},
+      {"export", b, "--list"}};
+  for (const char* command : {"consistency", "diagnose"}) {
+    std::vector<std::string> words = {command, "--samples", "2"};
+    words.insert(words.end(), testing::kPandaFiles.begin(), testing::kPandaFiles.end());
+    commands.push_back(words);
+  }
+  for (const std::vector<std::string>& command : commands) {
+    const testing::ProgramResult result = RunDexcheck(command);
+    EXPECT_LE(result.exit_code, 1) << command[0] << result.err;
+    EXPECT_NE(result.out, "");
+    std::istringstream lines(result.out);
+    for (std::string line; std::getline(lines, line);) {
+      EXPECT_TRUE(line.size() <= 80 || line.find(folder.path().string()) != std::string::npos ||
+                  line.find("cp ") != std::string::npos)
+          << command[0] << ": " << line;
+    }
+  }
 }
 
 /// The same checks for the two commands that write a file.

@@ -210,6 +210,29 @@ TEST(Detectability, TellsTheErrorThatFailsABalance) {
   }
 }
 
+// A claim that is too small is raised, what no run can find is not claimed.
+TEST(Detectability, AClaimIsTriedAgainInRuns) {
+  const Scenario scenario = ReadShippedScenario("exercise", {"duration=0.1", "settle=0.3"});
+  const ShippedRun right("exercise", {"duration=0.02", "settle=0.3"});
+  const RobotSpec& spec = right.setup().model().spec();
+  const std::vector<Parameter> numbers = ListParameters(spec);
+  const auto mass = std::find_if(numbers.begin(), numbers.end(), [&](const Parameter& number) {
+    return DescribePart(spec, number).starts_with("object") && DescribeQuantity(number) == "mass";
+  });
+  ASSERT_NE(mass, numbers.end());
+  const auto retry = [&](double error) {
+    return RetryError(scenario, kRobot, kScene, *mass, error, {"balance_object"}, [] { return false; });
+  };
+  const RetriedError large = retry(1e-3);
+  EXPECT_EQ(large.error, 1e-3);
+  EXPECT_EQ(large.runs, kRetrySeeds);
+  EXPECT_EQ(large.found, kRetrySeeds);
+  const RetriedError small = retry(1e-14);
+  EXPECT_EQ(small.error, 4e-14);
+  EXPECT_EQ(small.runs, kRetrySeeds);
+  EXPECT_EQ(small.found, 0);
+}
+
 TEST(Detectability, StopsEarly) {
   const ShippedRun run("exercise", {"duration=0.02", "settle=0.3"});
   const DetectabilityResult result =

@@ -168,6 +168,26 @@ assert abs(omega * zeta - 20) < 1e-6, (omega, zeta)
 PYTHON
 "$dexcheck" run --replay slid --quiet >replayed.txt || fail "a run with other gains does not replay: $(cat replayed.txt)"
 
+# An arm holds nothing: a place where there was a slider for f_min has none, and what is saved has short numbers.
+start panda-reach --set duration=60 --save arm.toml --paused
+await paused
+xdotool mousemove 672 124 mousedown 1 mousemove 722 124 sleep 0.3 mouseup 1
+sleep 0.5
+[[ $(title) == *paused* ]] || fail "an arm has a slider for f_min"
+xdotool mousemove 672 44 mousedown 1 mousemove 700 44 mousemove 722 44 sleep 0.3 mouseup 1
+await running
+for _ in {1..300}; do [[ $(now) -lt 20 ]] || break; sleep 0.1; done
+xdotool key space
+await paused
+xdotool key s
+for _ in {1..300}; do [[ ! -s arm.toml ]] || break; sleep 0.1; done
+end 0
+grep -q FAILED viewer.txt && fail "closed early is no failure, and exit code 0 none either"
+grep -q "CLOSED at" viewer.txt || fail "what was closed early does not say so"
+grep -qE 'natural_frequency = .*28\.[0-9]+' arm.toml || fail "the arm's gains were not saved: $(cat arm.toml)"
+! grep -E '[0-9]{16}' arm.toml || fail "long numbers were saved"
+"$dexcheck" run arm.toml --set duration=0.02 --no-log --quiet >/dev/null || fail "the saved arm does not run"
+
 # A recording is scrubbed: a click into the middle of its time line.
 start ran --paused
 await paused
