@@ -223,7 +223,7 @@ TEST_F(Answers, AuditExitsByWhatItFinds) {
   const ProgramResult odd = Run({"audit", "odd.urdf", "--json", "audit.json"});
   EXPECT_EQ(odd.exit_code, 1);
   EXPECT_THAT(odd.out, HasSubstr("impossible odd.urdf:5: link column has principal moments"));
-  EXPECT_THAT(odd.out, HasSubstr("with a plausible body there M's condition number is"));
+  EXPECT_THAT(odd.out, HasSubstr("with a plausible body"));
   EXPECT_THAT(odd.out, HasSubstr("\nFOUND: 1 thing that a robot cannot have or that looks like a mistake."));
   const Json json = Json::parse(ReadText(folder_.path() / "audit.json"));
   EXPECT_EQ(json.at("verdict"), "disagreement");

@@ -126,7 +126,7 @@ TEST(DiagnoseCommand, JudgesPublishedNumbersByTheirDigits) {
   const ProgramResult by_digits = run("rounded.toml", {"--digits", "5"});
   EXPECT_EQ(by_digits.exit_code, 0) << by_digits.err << by_digits.out;
   EXPECT_EQ(by_digits.out,
-            "AGREE: nothing to explain: rounded.toml and panda.xml agree to 1e-05 at 6 random states.\n");
+            "AGREE: nothing to explain: rounded.toml and panda.xml agree to 1e-05 at 6 random\n  states.\n");
   const ProgramResult bad = run("bad.toml", {"--tolerance", "1e-5", "--json", "out.json"});
   EXPECT_EQ(bad.exit_code, 1) << bad.err;
   EXPECT_THAT(bad.out, HasSubstr("1. link panda_link1: mass 4.98 kg in bad.toml, 4.970684 kg repairs it"));

@@ -130,12 +130,12 @@ TEST_F(ExportTest, RowsAreThinnedOut) {
 TEST_F(ExportTest, ListNamesUnitsAndDescriptions) {
   const testing::ProgramResult result = Export({"--list"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(SplitLines(result.out), ElementsAre("25 rows", "signal       numbers  unit    description",
-                                                  "time               1  s       Simulated time",
-                                                  "object/X_o         2  m, rad  Pose of the object",  //
-                                                  "object/f           2  N       Force",
-                                                  "check/mixed        3  m, rad  Two units, three numbers",
-                                                  "check/M_bar        1  1       Worst error"));
+  EXPECT_THAT(SplitLines(result.out), ElementsAre("25 rows", "signal       numbers  [unit] description",
+                                                  "time               1  [s] Simulated time",
+                                                  "object/X_o         2  [m, rad] Pose of the object",  //
+                                                  "object/f           2  [N] Force",
+                                                  "check/mixed        3  [m, rad] Two units, three numbers",
+                                                  "check/M_bar        1  [1] Worst error"));
   EXPECT_THAT(SplitLines(Export({"--list", "--signals", "object/f"}).out), ::testing::SizeIs(4));
 }
 

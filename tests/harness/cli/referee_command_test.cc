@@ -76,8 +76,9 @@ TEST_F(Referee, WhatIsIgnoredNeedNotBeShared) {
   std::string other = ReplaceOnce(testing::kTwoLinksMjcf, "armature=\"0.02\"", "armature=\"0.05\"");
   other = ReplaceOnce(other, "damping=\"0.05\"", "damping=\"0.3\"");
   WriteText(folder_.path() / "other.xml", other);
-  std::vector<std::string> words = {"robot.xml",  "--mjcf",          "other.xml", "--samples", "5",
-                                    "--engines", "analytic,mujoco", "--quiet",   "--ignore",  "armature,damping"};
+  std::vector<std::string> words = {"robot.xml", "--mjcf",          "other.xml",       "--samples",
+                                    "5",         "--engines",       "analytic,mujoco", "--quiet",
+                                    "--ignore",  "armature,damping"};
   EXPECT_EQ(Run(words).exit_code, 0) << Run(words).out;
   words.back() = "armature";
   EXPECT_EQ(Run(words).exit_code, 1);
@@ -121,9 +122,8 @@ TEST_F(Referee, TheTableHasEveryPair) {
   const ProgramResult result = Run({testing::SourcePath("/harness/sides/examples/arm.urdf"), "--samples", "5",
                                     "--engines", "analytic,bullet,kdl,simbody"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  for (const std::string pair :
-       {"analytic model - Bullet", "analytic model - KDL", "analytic model - Simbody", "Bullet 3.24 - KDL",
-        "Bullet 3.24 - Simbody", "KDL 1.5.1 - Simbody"}) {
+  for (const std::string pair : {"A  analytic model\nB  Bullet", "\nC  KDL", "\nD  Simbody", " A - B ",
+                                 " A - C ", " A - D ", " B - C ", " B - D ", " C - D "}) {
     EXPECT_THAT(result.out, HasSubstr(pair));
   }
   EXPECT_THAT(result.out, HasSubstr("agree in all terms that they have in common."));
