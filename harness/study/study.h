@@ -38,7 +38,7 @@ struct Sample {
   bool scramble = false;   ///< A Sobol sequence.
 };
 
-enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kBobyqa, kMargins, kHalving, kExternal };
+enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kBobyqa, kMargins, kHalving };
 enum class SearchStart { kMiddle, kTheory, kValues };
 
 /// How a study looks for the best point.
@@ -84,7 +84,6 @@ struct Study {
   [[nodiscard]] std::span<const Variation> keys() const { return {variations.data(), num_keys()}; }
   [[nodiscard]] bool is_search() const { return search.method != SearchMethod::kNone; }
   /// Its points come from another program.
-  [[nodiscard]] bool is_external() const { return search.method == SearchMethod::kExternal; }
 };
 
 /// One run of a study.

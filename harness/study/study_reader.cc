@@ -349,19 +349,13 @@ void ReadSearch(const TomlValue& value, Study* study) {
                                                  {"nelder_mead", SearchMethod::kNelderMead},
                                                  {"bobyqa", SearchMethod::kBobyqa},
                                                  {"margins", SearchMethod::kMargins},
-                                                 {"halving", SearchMethod::kHalving},
-                                                 {"external", SearchMethod::kExternal}});
+                                                 {"halving", SearchMethod::kHalving}});
   if (search.method == SearchMethod::kMargins) {
     ReadMargins(&table, study);
     return;
   }
   const TomlValue count = table.Get("count");
   search.count = count.AsWhole(1, kMaxTrials);
-  if (search.method == SearchMethod::kExternal) {
-    table.RejectUnused();
-    if (study->objectives.empty()) method.Reject("a search needs an [[objective]]");
-    return;
-  }
   if (search.method == SearchMethod::kCmaEs || search.method == SearchMethod::kNsga2) {
     search.population = 16;
     if (const auto population = table.Find("population")) {
@@ -463,7 +457,7 @@ Study ReadStudy(TomlTable& root, Study study) {
   if (search) ReadSearch(*search, &study);
   const bool moves_one_key = study.sample.method == SamplingMethod::kSaltelli ||
                              study.sample.method == SamplingMethod::kMorris ||
-                             study.search.method == SearchMethod::kMargins || study.is_external();
+                             study.search.method == SearchMethod::kMargins;
   for (const Variation& variation : study.variations) {
     if (moves_one_key && variation.depends_on_others())
       vary.Reject(Quote(variation.key) +
