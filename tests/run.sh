@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds everything and runs all tests: tests/run.sh [PRESET], by default release.
+# Installs what is missing, builds and runs tests: tests/run.sh [PRESET], by default release, which builds everything and runs
+# all tests. `fast` is for whoever works on the code: only the tests that start no process and take under a second each.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)

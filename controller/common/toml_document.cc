@@ -79,16 +79,20 @@ void CheckSize(size_t size, std::string_view source) {
                    " bytes long");
 }
 
-/// TomlDocument::Override. "PATH+=VALUE" adds an entry to a list, which is made when it is not there.
+/// TomlDocument::Override. "PATH+=VALUE" adds an entry to a list, which is made when it is not there;
+/// "PATH-=" removes a key that is there.
 void Assign(std::string_view assignment, toml::table* root) {
   // As messages show it: of readable length, without control characters.
-  const std::string label = Abbreviate("--set " + std::string(assignment));
+  const bool removes = assignment.ends_with("-=");
+  const std::string label =
+      Abbreviate(removes ? "--unset " + std::string(assignment.substr(0, assignment.size() - 2))
+                         : "--set " + std::string(assignment));
   const auto fail = [&](const std::string& why) { throw InputError(label + ": " + why); };
   CheckSize(assignment.size(), "--set");
   const size_t equals = assignment.find('=');
   if (equals == std::string_view::npos) fail("must be PATH=VALUE");
   const bool appends = equals > 0 && assignment[equals - 1] == '+';
-  const std::string_view path = assignment.substr(0, appends ? equals - 1 : equals);
+  const std::string_view path = assignment.substr(0, appends || removes ? equals - 1 : equals);
   const std::string_view value = assignment.substr(equals + 1);
   if (NestingScanner(value).FindTooDeep() > 0 || NestingScanner(path).FindTooDeep() > 0) {
     fail("nested too deeply");
@@ -118,6 +122,10 @@ void Assign(std::string_view assignment, toml::table* root) {
       if (error != std::errc() || end != key.data() + key.size() || index >= list->size()) {
         fail(Quote(key) + " is no entry of a list of " + std::to_string(list->size()));
       }
+      if (is_last && removes) {
+        list->erase(list->cbegin() + static_cast<std::ptrdiff_t>(index));
+        return;
+      }
       if (is_last) {
         list->replace(list->cbegin() + static_cast<std::ptrdiff_t>(index), std::move(*parsed.get("value")));
         return;
@@ -129,6 +137,11 @@ void Assign(std::string_view assignment, toml::table* root) {
         toml::array* const list = table->get(key)->as_array();
         if (list == nullptr) fail(Quote(path) + " is no list");
         list->push_back(std::move(*parsed.get("value")));
+        return;
+      }
+      if (removes && !table->contains(key)) fail(Quote(path.substr(0, dot)) + " is not there");
+      if (is_last && removes) {
+        table->erase(key);
         return;
       }
       if (is_last) {

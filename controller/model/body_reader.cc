@@ -43,6 +43,12 @@ MassProperties ReadSolid(const TomlValue& value) {
   return solid;
 }
 
+/// Links of published robots break the triangle inequality; their dynamics are well defined.
+void CheckLink(const TomlValue& value, const MassProperties& body) {
+  const std::string problem = FindUndefinedDynamics(body);
+  if (!problem.empty()) value.Reject(problem);
+}
+
 /// An entry of `bodies`: its frame stands at `xyz`, `rpy` in the link's frame.
 MassProperties ReadPart(const TomlValue& value) {
   TomlTable table = value.AsTable();
@@ -51,7 +57,7 @@ MassProperties ReadPart(const TomlValue& value) {
   const TomlValue inertia = table.Get("inertia");
   const MassProperties body{table.Get("mass").AsNotNegative(),
                             com ? com->AsVector<3>() : Vector3d(Vector3d::Zero()), ReadInertia(inertia)};
-  CheckBody(inertia, body);
+  CheckLink(inertia, body);
   table.RejectUnused();
   return ExpressIn(body, X_LB);
 }
@@ -156,7 +162,7 @@ MassProperties ReadBody(TomlTable& table) {
   const TomlValue inertia = table.Get("inertia");
   MassProperties body{table.Get("mass").AsNotNegative(), table.Get("com").AsVector<3>(),
                       ReadInertia(inertia)};
-  CheckBody(inertia, body);
+  CheckLink(inertia, body);
   return body;
 }
 

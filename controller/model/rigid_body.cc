@@ -83,7 +83,34 @@ MassProperties Combine(const std::vector<MassProperties>& parts) {
   return whole;
 }
 
+namespace {
+
+/// Rods and plates meet the inequalities with equality. Their entries, rounded when written down, rotated and
+/// summed (some ten roundings each), and the eigenvalues computed from them are off by a few eps |I|. An
+/// inertia that was moved to the centre of mass is a difference of terms of the size m |c|^2.
+double CalcAllowance(const MassProperties& body) {
+  const double size = body.inertia.cwiseAbs().maxCoeff() + body.mass * body.com.squaredNorm();
+  return 64.0 * std::numeric_limits<double>::epsilon() * size;
+}
+
+/// Ascending.
+Vector3d CalcPrincipalMoments(const Matrix3d& inertia) {
+  return Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
+}
+
+}  // namespace
+
 std::string FindPhysicalInconsistency(const MassProperties& body) {
+  std::string problem = FindUndefinedDynamics(body);
+  if (!problem.empty()) return problem;
+  const Vector3d moments = CalcPrincipalMoments(body.inertia);
+  if (moments[0] + moments[1] < moments[2] - CalcAllowance(body)) {
+    return "principal moments of inertia must satisfy the triangle inequality, got " + FormatNumbers(moments);
+  }
+  return {};
+}
+
+std::string FindUndefinedDynamics(const MassProperties& body) {
   if (!std::isfinite(body.mass) || body.mass < 0.0) {
     return "mass must be finite and not negative, got " + FormatNumber(body.mass);
   }
@@ -97,21 +124,13 @@ std::string FindPhysicalInconsistency(const MassProperties& body) {
     return "a massless body has no inertia, got " + FormatNumbers(body.inertia.diagonal());
   }
 
-  // Rods and plates meet the inequalities with equality. Their entries, rounded when written down, rotated
-  // and summed (some ten roundings each), and the eigenvalues computed from them are off by a few eps |I|. An
-  // inertia that was moved to the centre of mass is a difference of terms of the size m |c|^2.
-  const double size = body.inertia.cwiseAbs().maxCoeff() + body.mass * body.com.squaredNorm();
-  const double allowance = 64.0 * std::numeric_limits<double>::epsilon() * size;
+  const double allowance = CalcAllowance(body);
   if ((body.inertia - body.inertia.transpose()).cwiseAbs().maxCoeff() > allowance) {
     return "inertia must be symmetric, got " + FormatNumbers(body.inertia.reshaped<Eigen::RowMajor>());
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(body.inertia, Eigen::EigenvaluesOnly);
-  const Vector3d& moments = solver.eigenvalues();  // Ascending.
+  const Vector3d moments = CalcPrincipalMoments(body.inertia);
   if (moments[0] < -allowance) {
     return "principal moments of inertia must not be negative, got " + FormatNumbers(moments);
-  }
-  if (moments[0] + moments[1] < moments[2] - allowance) {
-    return "principal moments of inertia must satisfy the triangle inequality, got " + FormatNumbers(moments);
   }
   return {};
 }

@@ -56,4 +56,8 @@ MassProperties Combine(const std::vector<MassProperties>& parts);
 /// value.
 std::string FindPhysicalInconsistency(const MassProperties& body);
 
+/// The same without the triangle inequality, which the dynamics do not need: M is positive definite without
+/// it.
+std::string FindUndefinedDynamics(const MassProperties& body);
+
 }  // namespace dexcheck

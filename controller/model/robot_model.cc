@@ -68,6 +68,11 @@ class SpecChecker {
           X.linear().determinant());
   }
 
+  /// Links come from published descriptions, some of which break the triangle inequality.
+  void CheckLink(const std::string& key, const MassProperties& body) const {
+    const std::string problem = FindUndefinedDynamics(body);
+    if (!problem.empty()) Fail(key, problem);
+  }
   void CheckBody(const std::string& key, const MassProperties& body) const {
     const std::string problem = FindPhysicalInconsistency(body);
     if (!problem.empty()) Fail(key, problem);
@@ -86,7 +91,7 @@ class SpecChecker {
       Check(base.X_B0.linear().isIdentity(0.0), "base.pose",
             "must not be turned unless the base is fixed, angle 0",
             Eigen::AngleAxisd(base.X_B0.linear()).angle());
-      CheckBody("base", base.body);
+      CheckLink("base", base.body);
     }
     if (base.type == BaseType::kFloating) {
       Check(base.X_B0.translation().isZero(0.0), "base.pose",
@@ -101,7 +106,7 @@ class SpecChecker {
     CheckNotNegative("base.wheels.armature", base.wheel.armature);
     CheckNotNegative("base.wheels.damping", base.wheel.damping);
     CheckBody("base.wheels", CalcWheel(base.wheel, 0.0));
-    CheckBody("base with wheels", CalcBaseWithWheels(base));
+    CheckLink("base with wheels", CalcBaseWithWheels(base));
     CheckUnique(joint_names_, "base.wheels.right", base.wheel_joint_right);
     CheckUnique(joint_names_, "base.wheels.left", base.wheel_joint_left);
   }
@@ -129,7 +134,7 @@ class SpecChecker {
     CheckNotNegative(key + "armature", joint.armature);
     CheckNotNegative(key + "dry_friction", joint.dry_friction);
     if (joint.coupling) CheckCoupling(key + "mimic", *joint.coupling, index);
-    CheckBody("link " + Quote(joint.link), joint.body);
+    CheckLink("link " + Quote(joint.link), joint.body);
   }
 
   static bool IsEndOfJoint(const Joint& joint) {

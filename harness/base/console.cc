@@ -20,8 +20,30 @@ void OccupyStandardStreams() {
   }
 }
 
+namespace {
+
+/// Names that no file can have (4095 bytes are the most) and attributes of a megabyte, shortened.
+std::string Shorten(const std::string& text) {
+  constexpr size_t kHead = 400;
+  constexpr size_t kTail = 100;
+  constexpr size_t kMost = 4095;
+  const auto shorten = [](const std::string& part) {
+    return part.size() <= kMost ? part : part.substr(0, kHead) + "..." + part.substr(part.size() - kTail);
+  };
+  std::string shown;
+  for (size_t start = 0; start < text.size();) {
+    const size_t end = std::min(text.find(' ', start), text.size() - 1) + 1;
+    shown += shorten(text.substr(start, end - start));
+    start = end;
+  }
+  return shown.size() <= 2 * kMost ? shown
+                                   : shown.substr(0, kMost) + "..." + shown.substr(shown.size() - kMost);
+}
+
+}  // namespace
+
 void Warn(const std::string& text) {
-  std::string line = "dexcheck: " + text;
+  std::string line = "dexcheck: " + Shorten(text);
   std::replace_if(
       line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
   line += '\n';

@@ -10,8 +10,8 @@ namespace dexcheck {
 /// otherwise the next file to be opened, such as a log, would get its number and what is printed.
 void OccupyStandardStreams();
 
-/// One line on standard error, "dexcheck: " and the text, whatever control characters stand in file names.
-/// Whether it can be written does not matter.
+/// One line on standard error, "dexcheck: " and the text, whatever control characters stand in file names;
+/// words longer than any file name (4095 bytes) are shortened. Whether it can be written does not matter.
 void Warn(const std::string& text);
 
 /// Writes what was printed. @throws InputError "standard output: cannot be written: reason".

@@ -14,12 +14,16 @@
 
 namespace dexcheck {
 
+/// What two descriptions need not share: constants of joints, and that joints follow others.
+inline constexpr const char* kIgnorable[] = {"armature", "damping", "friction", "coupling"};
+
 struct ConsistencyOptions {
   long samples = 10000;
   std::uint64_t seed = 1;
   StateRange range;
   ModelViewFactory make_view = MakeModelView;  ///< What stands for the model.
   ObjectFormulas object;                       ///< What stands for the object's equations.
+  std::vector<std::string> ignore;             ///< What two files need not share: kIgnorable.
 };
 
 struct ConsistencyResult {

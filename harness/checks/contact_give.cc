@@ -23,6 +23,20 @@ ContactSoftness FindSoftness(const Setup& setup) {
   return FindContactSoftness(setup.adapter(), setup.q_start(), setup.X_Bo_start());
 }
 
+/// |d/dt r| of the rigid plant by Euler's method, which leads contacts back to the constraints
+/// (rigid_plant.h), beyond what (46) has; 0 of other plants.
+double CalcLeadingBack(const PlantOptions& plant, const StepRecord& step, const GraspTerms& grasp) {
+  if (plant.type != PlantType::kRigid || plant.integrator != Integrator::kSemiImplicitEuler) return 0.0;
+  const double w = 0.5 / plant.time_step;
+  double squared = 0.0;
+  for (int i = 0; i < grasp.num_contacts(); ++i) {
+    Vector3d rate = -2.0 * w * grasp.slip().segment<3>(3 * i) + 0.5 * grasp.slip_bias().segment<3>(3 * i);
+    rate.z() += w * w * step.response.contacts[static_cast<size_t>(i)].distance;
+    squared += rate.squaredNorm();
+  }
+  return std::sqrt(squared);
+}
+
 }  // namespace
 
 void CalcContactBias(const Setup& setup, const StepRecord& step, VectorXd* bias) {
@@ -163,8 +177,9 @@ void PredictionGive::Follow(const StepRecord& step, const Eigen::Ref<const Vecto
   }
   held_ = std::max(held, force_.softest().memory() * held_);
   held_of_f_c_ = std::max(f_c_.CalcSize(length), f_c_.softest().memory() * held_of_f_c_);
-  motion_ = held_ + root * (tips_.size() + tyres_.size()) + uneven;
-  contact_force_ = held_of_f_c_ + setup_->object().body.mass * (tips_.size() + motion_ / root);
+  const double tips = std::max(tips_.size(), CalcLeadingBack(setup_->scenario().plant, step, grasp));
+  motion_ = held_ + root * (tips + tyres_.size()) + uneven;
+  contact_force_ = held_of_f_c_ + setup_->object().body.mass * (tips + motion_ / root);
   sinking_ = norm(force_.softest().rate()) / root;
 }
 

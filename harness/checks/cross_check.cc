@@ -56,7 +56,8 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
   if (joint_law_ && !joint_law_->follows_error()) motion_.LeaveOut(kJointDynamics);
   if (joint_law_) return;
   if (!law_) {
-    for (const StepCheck check : {kGains, kLawTorque, kLawDemand, kGraspForce, kJointDynamics}) {
+    for (const StepCheck check :
+         {kGains, kLawTorque, kLawDemand, kGraspNullSpace, kGraspCone, kGraspOptimality, kJointDynamics}) {
       motion_.LeaveOut(check);
     }
   }
@@ -235,24 +236,31 @@ void CrossCheck::CompareLaw(const StepRecord& step) {
   motion_.Add(StepCheck::kTold, CompareTold(step), t);
   CompareMotors(step);
   sensors_.Add(step.told.state, ToldOf(step));
+  if (law_) motion_.Add(StepCheck::kGains, law_->sampled_radius(), t);
+  if (law_ && LawCheck::IsJudged(step)) CompareObjectLaw(step);
   if (step.command.tracks && t >= expect.from) {
-    motion_.Add(StepCheck::kExpectPosition, step.error.position.norm(), t);
-    motion_.Add(StepCheck::kExpectOrientation, step.error.orientation, t);
+    motion_.AddLess(StepCheck::kExpectPosition, step.error.position.norm(), position_by_hold_, t);
+    motion_.AddLess(StepCheck::kExpectOrientation, step.error.orientation, orientation_by_hold_, t);
   }
   if (step.command.joints.q.size() > 0 && t >= expect.from) {
     motion_.Add(StepCheck::kExpectJoints, step.error.joints, t);
   }
-  if (joint_law_) return CompareJointLaw(step);
-  if (!law_) return;
-  motion_.Add(StepCheck::kGains, law_->sampled_radius(), t);
-  if (!LawCheck::IsJudged(step)) return;
+  if (joint_law_) CompareJointLaw(step);
+}
+
+void CrossCheck::CompareObjectLaw(const StepRecord& step) {
+  const double t = step.time;
   const LawErrors& errors = CompareControl(step);
   motion_.Add(StepCheck::kLawTorque, errors.torque, t);
   motion_.Add(StepCheck::kLawDemand, errors.demand, t);
-  motion_.Add(StepCheck::kGraspForce, errors.grasp_force, t);
+  motion_.Add(StepCheck::kGraspNullSpace, errors.grasp_null_space, t);
+  motion_.Add(StepCheck::kGraspCone, errors.grasp_cone, t);
+  motion_.Add(StepCheck::kGraspOptimality, errors.grasp_optimality, t);
   motion_.Add(StepCheck::kErrorDynamics, errors.error_dynamics, t);
   motion_.Add(StepCheck::kOrientationDynamics, errors.orientation_dynamics, t);
-  if (!law_->follows_error() || t < expect.from) return;
+  position_by_hold_ = errors.position_by_hold;
+  orientation_by_hold_ = errors.orientation_by_hold;
+  if (!law_->follows_error() || t < setup_->scenario().expect.from) return;
   position_by_law_ = std::max(position_by_law_, errors.position_by_law);
   orientation_by_law_ = std::max(orientation_by_law_, errors.orientation_by_law);
 }

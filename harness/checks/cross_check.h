@@ -39,6 +39,10 @@ class CrossCheck {
   void Translate(const Vector3d& way) {
     if (known_) known_->plant.Translate(way);
   }
+  /// They move at `v` (m/s, world) more from now on.
+  void AddVelocity(const Vector3d& v) {
+    if (known_) known_->plant.AddVelocity(v);
+  }
 
   /// The first question: are the terms that the controller used the engine's?
   void CompareModel(const StepRecord& step);
@@ -94,6 +98,7 @@ class CrossCheck {
   /// Of torques that the controller computed at this step.
   const LawErrors& CompareControl(const StepRecord& step);
   void CompareJointLaw(const StepRecord& step);
+  void CompareObjectLaw(const StepRecord& step);
 
   const Setup* setup_;
   StepModelCheck model_;
@@ -105,6 +110,7 @@ class CrossCheck {
   std::optional<JointLawCheck> joint_law_;
   LawTerms law_terms_;                                         // the engine's
   double position_by_law_ = -1.0, orientation_by_law_ = -1.0;  // largest; see MeasuredCauses
+  double position_by_hold_ = 0.0, orientation_by_hold_ = 0.0;  // of the last step judged; see LawErrors
   std::vector<CheckRecord> settling_failures_;
   MotorEvidence motors_;
   SensorEvidence sensors_;

@@ -39,6 +39,8 @@ class KnownPlant {
   }
   /// Robot and object are elsewhere from now on, by `way` (m, world).
   void Translate(const Vector3d& way) { sensing_.Translate(way); }
+  /// They move at `v` (m/s, world) more from now on.
+  void AddVelocity(const Vector3d& v) { sensing_.AddVelocity(v); }
 
  private:
   Sensing sensing_;

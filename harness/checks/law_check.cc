@@ -13,11 +13,9 @@
 namespace dexcheck {
 namespace {
 
-// A barrier solution is optimal to the solver's tolerance of the slacks; near a cone's edge its slope follows
-// with ten times that.
-constexpr double kSlopePerSlack = 10.0;
-// F_N = f_c - G^+ F_o has the residual of f_c and the rounding of G^+.
-constexpr double kLeastNullTolerance = 1e-9;
+// What F_N is judged by follows from the solver's options, which no scenario changes.
+static_assert(kGraspNullBound >= 10.0 * GraspForceOptions{}.residual_tolerance);
+static_assert(kGraspOptimalityBound == 10.0 * GraspForceOptions{}.slack_tolerance);
 // What slip changes in accelerations and forces, over the condition number, against the forces that it
 // changes.
 constexpr double kSlipShare = 10.0;
@@ -62,8 +60,6 @@ LawCheck::LawCheck(const Setup& setup)
   f_min_ = options.f_min;
   f_max_ = options.f_max;
   barrier_weight_ = options.force.barrier_weight;
-  slack_tolerance_ = options.force.slack_tolerance;
-  residual_tolerance_ = options.force.residual_tolerance;
   const int n = setup.model().num_velocities();
   const int k = 3 * static_cast<int>(setup.fingertips().size());
   if (options.law != ControlLaw::kComputedTorque) {
@@ -97,7 +93,7 @@ const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& f
   const DesiredMotion& desired = desired_;
   errors_ = LawErrors{};
   if (!is_evaluated_) {
-    errors_ = {kInfinity, kInfinity, kInfinity, kInfinity};
+    errors_ = {kInfinity, kInfinity, kInfinity, kInfinity, kInfinity, kInfinity};
     return errors_;
   }
   force_ = terms.C_xi + terms.gravity + terms.friction;
@@ -105,7 +101,7 @@ const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& f
   if (baseline_) {
     const Matrix6Xd& G_dot = step.model->grasp().G_dot();
     if (!baseline_->Evaluate(spec_, reference_, terms, G_dot, desired, step.command.demand.F_N)) {
-      errors_ = {kInfinity, kInfinity, kInfinity, kInfinity};
+      errors_ = {kInfinity, kInfinity, kInfinity, kInfinity, kInfinity, kInfinity};
       return errors_;
     }
     CompareTorque(step, terms, baseline_->force());
@@ -115,7 +111,7 @@ const LawErrors& LawCheck::Compare(const StepRecord& step, const StepFindings& f
     CompareDemand(findings, knows_slip);
     CompareGraspForce(step, terms, reference_.f_c());
   }
-  if (follows_error()) FollowError(step, findings, terms, desired);
+  if (has_error_dynamics_ && hold_ == 1) FollowError(step, findings, terms, desired);
   return errors_;
 }
 
@@ -176,8 +172,7 @@ void LawCheck::CompareDemand(const StepFindings& findings, bool knows_slip) {
 void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms, const VectorXd& f_c) {
   const VectorXd& F_N = step.command.demand.F_N;
   const double size = std::max(1.0, f_c.norm());
-  const double null =
-      (terms.G * F_N).cwiseAbs().maxCoeff() / size / std::max(residual_tolerance_, kLeastNullTolerance);
+  errors_.grasp_null_space = (terms.G * F_N).cwiseAbs().maxCoeff() / size;
 
   // Slope of sum f_i3 - rho [sum log det P_i + sum log slack]: at the optimum it is in the range of G^T, so
   // that no internal force improves on F_N.
@@ -190,15 +185,13 @@ void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms, 
     slope_.segment<3>(i) << 2.0 * rho * x / det, 2.0 * rho * y / det,
         1.0 - 2.0 * rho * mu_ * mu_ * z / det - rho / (z - f_min_) + rho / (f_max_ - z);
   }
-  double slope = 0.0;
+  errors_.grasp_cone = outside / size;
   if (outside <= 0.0) {
     const double whole = slope_.norm();
     const Vector6d y = reference_.SolveGrasp(slope_);
     slope_.noalias() -= terms.G.transpose() * y;
-    slope = slope_.norm() / std::max(whole, 1.0) / (kSlopePerSlack * slack_tolerance_);
+    errors_.grasp_optimality = slope_.norm() / std::max(whole, 1.0);
   }
-  // All in units of the slope's tolerance, so that one bound holds.
-  errors_.grasp_force = kGraspForceBound * std::max({null, outside / size / kLeastNullTolerance, slope});
 }
 
 void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
@@ -212,35 +205,74 @@ void LawCheck::FollowError(const StepRecord& step, const StepFindings& findings,
       truth.X_o = CalcObjectCoordinates(truth.X_Bo, terms.X_o);
   }
   if (!follows_) {
-    followed_ = undisturbed_ = truth;
+    followed_.object = undisturbed_.object = held_.object = truth;
     follows_ = true;
+  } else if (accelerates_within_step()) {
+    FollowHeld(truth, desired);
+  } else {
+    Move(Vector6d::Zero(), &followed_);
+    Move(Vector6d::Zero(), &undisturbed_);
   }
-  errors_.error_dynamics = (followed_.X_Bo.translation() - truth.X_Bo.translation()).norm();
-  errors_.orientation_dynamics = CalcAngle(followed_.X_Bo.linear(), truth.X_Bo.linear());
-  errors_.position_by_law = (undisturbed_.X_Bo.translation() - desired.X_d.head<3>()).norm();
-  errors_.orientation_by_law = CalcAngle(undisturbed_.X_Bo.linear(), CalcObjectPose(desired.X_d).linear());
-  if (spec_.orientation == OrientationFeedback::kAngles) {
-    followed_.X_o = CalcObjectCoordinates(followed_.X_Bo, followed_.X_o);
-    undisturbed_.X_o = CalcObjectCoordinates(undisturbed_.X_Bo, undisturbed_.X_o);
+  before_ = {truth, step.response.V_Bo_dot};
+  const Pose& X_Bo = undisturbed_.object.X_Bo;
+  errors_.error_dynamics = (followed_.object.X_Bo.translation() - truth.X_Bo.translation()).norm();
+  errors_.orientation_dynamics = CalcAngle(followed_.object.X_Bo.linear(), truth.X_Bo.linear());
+  errors_.position_by_law = (X_Bo.translation() - desired.X_d.head<3>()).norm();
+  errors_.orientation_by_law = CalcAngle(X_Bo.linear(), CalcObjectPose(desired.X_d).linear());
+  if (accelerates_within_step()) {
+    errors_.position_by_hold = (held_.object.X_Bo.translation() - X_Bo.translation()).norm();
+    errors_.orientation_by_hold = CalcAngle(held_.object.X_Bo.linear(), X_Bo.linear());
   }
-  Vector6d V_dot = reference_.CalcDemand(spec_, followed_, desired);
+  for (Followed* one : {accelerates_within_step() ? &held_ : &followed_, &undisturbed_}) {
+    if (spec_.orientation == OrientationFeedback::kAngles)
+      one->object.X_o = CalcObjectCoordinates(one->object.X_Bo, one->object.X_o);
+    one->V_dot = reference_.CalcDemand(spec_, one->object, desired);
+  }
   // What the engine's object did beyond the rigid prediction. Where it is told otherwise, given otherwise and
   // pushed, all of that drives (57) as well: what it did beyond what its true error demands.
-  V_dot += step.response.V_Bo_dot -
-           (step.known != nullptr ? reference_.CalcDemand(spec_, truth, desired) : findings.V_Bo_dot_model);
-  Move(V_dot, &followed_);
-  Move(reference_.CalcDemand(spec_, undisturbed_, desired), &undisturbed_);
+  followed_.V_dot +=
+      step.response.V_Bo_dot -
+      (step.known != nullptr ? reference_.CalcDemand(spec_, truth, desired) : findings.V_Bo_dot_model);
 }
 
-void LawCheck::Move(const Vector6d& V_dot, LawObject* object) const {
+void LawCheck::FollowHeld(const LawObject& truth, const DesiredMotion& desired) {
+  // (57) itself does not stand still within a step: Heun's method.
+  Followed end = undisturbed_;
+  Move(Vector6d::Zero(), &end);
+  if (spec_.orientation == OrientationFeedback::kAngles)
+    end.object.X_o = CalcObjectCoordinates(end.object.X_Bo, end.object.X_o);
+  end.V_dot = reference_.CalcDemand(spec_, end.object, desired);
+  Move(0.5 * (CalcWorldAcceleration(end) - CalcWorldAcceleration(undisturbed_)), &undisturbed_);
+  // Mean acceleration of the plant, less that of the step's beginning.
+  const LawObject& from = before_.object;
+  Vector6d change = truth.V_Bo - from.V_Bo;
+  change.head<3>() = truth.X_Bo.linear() * truth.V_Bo.head<3>() - from.X_Bo.linear() * from.V_Bo.head<3>();
+  Move(change / time_step_ - CalcWorldAcceleration(before_), &held_);
+}
+
+Vector6d LawCheck::CalcWorldAcceleration(const Followed& one) {
   // v = R^T p_dot, hence p_ddot = R (v_dot + omega x v).
+  Vector6d acceleration = one.V_dot;
+  acceleration.head<3>() += one.object.V_Bo.tail<3>().cross(one.object.V_Bo.head<3>());
+  acceleration.head<3>() = one.object.X_Bo.linear() * acceleration.head<3>().eval();
+  return acceleration;
+}
+
+void LawCheck::Move(const Vector6d& change, Followed* one) const {
+  const Vector6d& V_dot = one->V_dot;
+  LawObject* const object = &one->object;
   Matrix3d R = object->X_Bo.linear();
   const Vector3d v = object->V_Bo.head<3>();
   Vector3d omega = object->V_Bo.tail<3>();
-  const Vector3d p_dot = R * (v + time_step_ * (V_dot.head<3>() + omega.cross(v)));
-  omega += time_step_ * V_dot.tail<3>();
-  R = R * ExpSo3(time_step_ * omega);
-  object->X_Bo.translation() += time_step_ * p_dot;
+  const Vector3d p_ddot = V_dot.head<3>() + omega.cross(v);
+  const Vector3d p_dot = R * (v + time_step_ * p_ddot) + time_step_ * change.head<3>();
+  omega += time_step_ * (V_dot.tail<3>() + change.tail<3>());
+  // Velocities v_0 + dt (a + c) of positions x_0 + dt v_0 + dt^2 (a / 2 + c / 3), where the acceleration
+  // goes from a to a + 2 c; by Euler's method c is zero and positions go by the new velocity.
+  const double before = 0.5 * time_step_ - velocity_age_;
+  constexpr double kShare = 4.0 / 3.0;
+  object->X_Bo.translation() += time_step_ * (p_dot - before * (R * p_ddot + kShare * change.head<3>()));
+  R = R * ExpSo3(time_step_ * (omega - before * (V_dot.tail<3>() + kShare * change.tail<3>())));
   object->X_Bo.linear() = Eigen::Quaterniond(R).normalized().toRotationMatrix();
   object->V_Bo << object->X_Bo.linear().transpose() * p_dot, omega;
 }

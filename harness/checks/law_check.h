@@ -23,9 +23,9 @@ struct LawErrors {
   /// xi_dot, V_o_dot and f_c of the rigid system (46), (48) under tau' against what (47), (49), (55) demand,
   /// likewise; forces relative to |f_c|. The largest of them.
   double demand = 0.0;
-  /// F_N by its certificate: the largest of |G F_N|, of what f_c is outside its cones and bounds, and of the
-  /// slope that the objective has left within null(G), each over its own tolerance.
-  double grasp_force = 0.0;
+  /// F_N by its certificate: the largest entry of G F_N, and how far f_c is outside its cones and bounds,
+  /// both over max(1 N, |f_c|); the slope that the objective has left within null(G), over max(1, all of it).
+  double grasp_null_space = 0.0, grasp_cone = 0.0, grasp_optimality = 0.0;
   /// Object's position against (57) integrated from t = 0 and driven by the accelerations that the prediction
   /// missed, m.
   double error_dynamics = 0.0;
@@ -33,6 +33,9 @@ struct LawErrors {
   /// How far from its desired pose the object would be if (57) alone drove it, m and rad: what the gains
   /// leave.
   double position_by_law = 0.0, orientation_by_law = 0.0;
+  /// How far what the plant accelerates within a step, while torques and demand are held, leads away from
+  /// (57), m and rad.
+  double position_by_hold = 0.0, orientation_by_hold = 0.0;
 };
 
 /// Largest magnitude of the eigenvalues of (57), per time step, when the command is held for `hold` steps: 1
@@ -60,10 +63,10 @@ class LawCheck {
   [[nodiscard]] bool has_error_dynamics() const { return has_error_dynamics_; }
   /// Whether the rigid system answers with what the law demands of it: the paper's does.
   [[nodiscard]] bool has_demand() const { return baseline_ == nullptr; }
-  /// Whether the controller computes anew at every step, so that (57) can be integrated beside it.
-  /// in the way that its velocities need: those of the middle of the step before.
+  /// Whether the controller computes anew at every step, so that (57) can be integrated beside it in the way
+  /// that its velocities need: those of the middle of the step before.
   [[nodiscard]] bool follows_error() const {
-    return has_error_dynamics_ && hold_ == 1 && velocity_age_ > 0.0;
+    return has_error_dynamics_ && hold_ == 1 && !accelerates_within_step();
   }
 
   /// The law at the state that the controller was told, before Compare. @param terms the engine's there.
@@ -86,6 +89,10 @@ class LawCheck {
   [[nodiscard]] const LawAttribution& attribution() const { return attribution_; }
 
  private:
+  struct Followed {
+    LawObject object;                   // velocities as old as the plant's
+    Vector6d V_dot = Vector6d::Zero();  // from this step to the next
+  };
   [[nodiscard]] DesiredMotion EvaluateDesired(double t) const;
   void CompareTorque(const StepRecord& step, const LawTerms& terms, const VectorXd& force);
   void CompareDemand(const StepFindings& findings, bool knows_slip);
@@ -93,11 +100,18 @@ class LawCheck {
   void FollowError(const StepRecord& step, const StepFindings& findings, const LawTerms& terms,
                    const DesiredMotion& desired);
   double Norm(const VectorXd& force);
-  /// As the plant steps: velocities first.
-  void Move(const Vector6d& V_dot, LawObject* object) const;
+  /// Whether a plant that does not step by Euler's method.
+  [[nodiscard]] bool accelerates_within_step() const { return velocity_age_ == 0.0; }
+  /// (57) by itself, and driven by what is held during a step, from the step before to this one.
+  void FollowHeld(const LawObject& truth, const DesiredMotion& desired);
+  /// As the plant steps, to the next step. @param change half of the change of p_ddot (world) and omega_dot
+  /// within the step.
+  void Move(const Vector6d& change, Followed* one) const;
+  /// p_ddot (world) and omega_dot.
+  static Vector6d CalcWorldAcceleration(const Followed& one);
 
   LawSpec spec_;
-  double mu_, f_min_, f_max_, barrier_weight_, slack_tolerance_, residual_tolerance_;
+  double mu_, f_min_, f_max_, barrier_weight_;
   double time_step_;
   double velocity_age_;
   bool has_error_dynamics_ = true;
@@ -114,11 +128,11 @@ class LawCheck {
   const TreeFactor* mass_factor_ = nullptr;
   TreeFactor own_factor_;  // of a step without prediction
   double scale_ = 1.0;
-  VectorXd force_, difference_, work_;  // n
-  VectorXd slope_;                      // k
-  bool follows_ = false;                // whether those below are set
-  LawObject followed_;                  // of (57); velocities half a step before
-  LawObject undisturbed_;               // the same, driven by nothing
+  VectorXd force_, difference_, work_;      // n
+  VectorXd slope_;                          // k
+  bool follows_ = false;                    // whether those below are set
+  Followed followed_, undisturbed_, held_;  // (57) driven by all, by nothing, by what is held
+  Followed before_;                         // the plant's object, a step before
 };
 
 }  // namespace dexcheck

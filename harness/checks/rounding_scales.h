@@ -2,6 +2,8 @@
 
 // What rounding can explain: bounds and scales of the robot's terms.
 
+#include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "controller/dynamics/model_terms.h"
@@ -12,8 +14,13 @@ namespace dexcheck {
 /// are one), on chains of `depth` joints.
 double CalcRoundingBound(int depth, double factors);
 
-/// A scale of zero (a model without mass, a state at rest) leaves an absolute comparison.
-inline double Positive(double scale) { return scale > 0.0 ? scale : 1.0; }
+/// A scale of zero (a model without mass, a state at rest) leaves an absolute comparison. Below the smallest
+/// normal number rounding errors no longer shrink with what is rounded, so a scale is at least that over eps:
+/// what a filter leaves of a rate long after it has stopped.
+inline double Positive(double scale) {
+  constexpr double kLeast = std::numeric_limits<double>::min() / std::numeric_limits<double>::epsilon();
+  return scale > 0.0 ? std::max(scale, kLeast) : 1.0;
+}
 
 /// Scale of a body's inertia by two descriptions, kg m^2. A body smaller than 1 nm is a point: what inertia a
 /// file has for it is what rounding left there.

@@ -58,8 +58,12 @@ inline constexpr double kLawTorqueBound = 1e-12;
 // J_dot (xi - xi_c) stay, slip speeds of some 1e-6 m/s against rates of the order of 1/s: measured 8e-10 in
 // `curve`.
 inline constexpr double kLawDemandBound = 1e-8;
-// Slope of the grasp-force objective, relative: ten times the tolerance of the solver's slacks.
-inline constexpr double kGraspForceBound = 1e-4;
+// The solver's f_c has a residual of 1e-10 (GraspForceOptions::residual_tolerance), and F_N = f_c - G^+ F_o
+// the rounding of G^+ besides.
+inline constexpr double kGraspNullBound = 1e-9;
+inline constexpr double kGraspConeBound = 1e-9;
+// Slope of the grasp-force objective, relative: ten times the tolerance of the solver's slacks, 1e-5.
+inline constexpr double kGraspOptimalityBound = 1e-4;
 // A torque goes through the gear's ratio once and back: two roundings.
 inline constexpr double kTorqueAppliedBound = 1e-14;
 // What is left of (48) is compared less the inertia of what the platform does on soft tyres besides rolling,

@@ -110,13 +110,20 @@ void StepChecks::SetApplying() {
   leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kRolling, kTractionUse});
   leave_out(setup_->model().base().type == BaseType::kFixed, {kBaseTilt});
   const bool joints = setup_->joint_motion() != nullptr;
-  leave_out(joints, {kLawDemand, kGraspForce, kErrorDynamics, kOrientationDynamics, kContactForce,
-                     kFingertipSlip, kFingertipSlipRate, kConeUse, kContactsLost, kPenetration, kKappa});
+  leave_out(joints, {kLawDemand, kGraspNullSpace, kGraspCone, kGraspOptimality, kErrorDynamics,
+                     kOrientationDynamics, kContactForce, kFingertipSlip, kFingertipSlipRate, kConeUse,
+                     kContactsLost, kPenetration, kKappa});
   leave_out(!joints, {kJointDynamics});
   leave_out(!setup_->scenario().grasp.hemisphere, {kFingertipRim});
   leave_out(!setup_->has_object(), {kBalanceObject});
-  // Nothing but stiffness holds them: whatever is not ideal moves them.
-  leave_out(setup_->idle_joints().empty() || !setup_->scenario().imperfections.is_ideal(), {kIdleJoints});
+  // Nothing but stiffness holds them: whatever is not ideal moves them, and so do the Coriolis forces and the
+  // friction that kPdGravity leaves to it. The least motion in the metric of M_bar' has them in it.
+  const ControlOptions& control = setup_->scenario().control;
+  const bool moves_idle = control.law == ControlLaw::kPdGravity ||
+                          control.law == ControlLaw::kOperationalSpace ||
+                          control.weight == RedundancyWeight::Kind::kMass;
+  leave_out(setup_->idle_joints().empty() || !setup_->scenario().imperfections.is_ideal() || moves_idle,
+            {kIdleJoints});
   // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
   leave_out(setup_->scenario().plant.type == PlantType::kRigid,
             {kWheelSlip, kRolling, kWheelSlipRate, kTractionUse, kBaseTilt, kSolver});
@@ -277,12 +284,12 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
   mass_factor()->Multiply(residual_);
-  AddLessGive(StepCheck::kReducedAcceleration, residual_.norm() / scale_, give_->motion() / scale_);
+  AddLess(StepCheck::kReducedAcceleration, residual_.norm() / scale_, give_->motion() / scale_, time_);
   double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) force_scale = std::max(force_scale, Weight());
   const double apart = (findings_.f_c_model - findings_.f_c).norm();
-  AddLessGive(StepCheck::kContactForce, apart / force_scale, give_->force() / force_scale);
+  AddLess(StepCheck::kContactForce, apart / force_scale, give_->force() / force_scale, time_);
 }
 
 void StepChecks::AddFrictionAndStops(const StepRecord& step) {
@@ -344,9 +351,9 @@ double StepChecks::CalcUnevenForce(const StepRecord& step) const {
   return (g * step.reading.departure.tilt + 2.0 * slip * turn) * std::sqrt(mass_) + sunk;
 }
 
-void StepChecks::AddLessGive(StepCheck which, double residual, double give) {
-  Add(which,
-      std::isnan(residual) ? residual : std::max(std::min(residual, check(which).bound), residual - give));
+void StepChecks::AddLess(StepCheck which, double residual, double known, double time) {
+  const double most = std::min(residual, check(which).bound);
+  Add(which, std::isnan(residual) ? residual : std::max(most, residual - known), time);
 }
 
 double StepChecks::Weight() const { return setup_->object().body.mass * setup_->model().gravity().norm(); }

@@ -53,6 +53,8 @@ class StepChecks {
     if (record.applies && !record.failed && !(value <= record.bound)) record.part = describe();
     record.Add(value, time);
   }
+  /// Adds a residual: as it is up to the bound, and above it less what is known to be in it.
+  void AddLess(StepCheck which, double residual, double known, double time);
   /// Takes checks out that this run cannot answer.
   void LeaveOut(StepCheck which) { check(which).applies = false; }
   /// M_bar' = L^T L of the last step that was judged; null before.
@@ -106,8 +108,6 @@ class StepChecks {
   [[nodiscard]] Vector2d ReadWheelRates(const StepRecord& step) const;
   /// Largest force, in |.|_M^-1, that comes of the platform's tilt and of the tyres' slip.
   [[nodiscard]] double CalcUnevenForce(const StepRecord& step) const;
-  /// The residual as it is up to the bound, and above it less what contacts give.
-  void AddLessGive(StepCheck which, double residual, double give);
   /// |f|_M^-1 = |L^-T f|
   [[nodiscard]] double Norm(const VectorXd& force);
   void CompareObject(const StepRecord& step);

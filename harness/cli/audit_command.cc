@@ -131,10 +131,7 @@ void AddAuditCommand(Command app) {
       .TypeName("PATH")
       .Repeatable();
   command.AddFlag("--floating", &request->floating, "The root of a URDF floats");
-  command
-      .AddOption("--json", &request->json_file,
-                 "Write the findings to this file (- for standard output, then without the table)")
-      .TypeName("FILE.json");
+  AddJsonOption(command, "the findings", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });

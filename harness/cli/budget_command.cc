@@ -47,7 +47,7 @@ void Print(const ErrorBudget& budget) {
 }
 
 int Run(const BudgetRequest& request) {
-  const ScenarioFiles files = FindScenario(request.scenario, request.overrides, request.seed);
+  const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), request.seed);
   CatchInterrupts();
   std::optional<OutputFile> json, page;
   if (!request.json_file.empty()) json.emplace(request.json_file);
@@ -75,7 +75,8 @@ int Run(const BudgetRequest& request) {
       fmt::print("INCOMPLETE: {}\n", budget.failure.empty() ? "a run ended early" : budget.failure);
     }
   }
-  return budget.is_complete() ? kSuccess : kFailure;
+  if (budget.is_complete()) return kSuccess;
+  return ReportFailure("incomplete: " + (budget.failure.empty() ? "a run ended early" : budget.failure));
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "controller/common/text.h"
+#include "harness/base/console.h"
 
 namespace dexcheck::cli {
 
@@ -171,15 +172,44 @@ void DescribeCommand(const CLI::App& app, const std::string& name, std::vector<C
 
 }  // namespace
 
+ExitCode ReportFailure(const std::string& why) {
+  std::fflush(stdout);
+  Warn(why);
+  return kFailure;
+}
+
 std::vector<CommandHelp> CommandLine::Describe() const {
   std::vector<CommandHelp> all;
   DescribeCommand(*app_, "", &all);
   return all;
 }
 
+namespace {
+
+/// Words with the "-" of a --json that names no file. The next word is none when it is an option, a
+/// description of a robot, or what a command reads: a scenario's name or a folder.
+std::vector<std::string> CompleteJson(int argc, char** argv) {
+  std::vector<std::string> words(argv, argv + argc);
+  const auto is_file = [&](const std::string& word) {
+    if (word == "-" || word.ends_with(".json") || word.starts_with("/dev/")) return true;
+    const bool is_read = word.ends_with(".urdf") || word.ends_with(".xml") || word.ends_with(".toml");
+    const bool is_of_run = words.size() > 1 && words[1] == "run";
+    return !word.empty() && !word.starts_with("-") && !is_read && !is_of_run;
+  };
+  for (size_t i = 0; i < words.size(); ++i) {
+    if (words[i] == "--json" && !(i + 1 < words.size() && is_file(words[i + 1]))) words[i] = "--json=-";
+  }
+  return words;
+}
+
+}  // namespace
+
 int CommandLine::Run(int argc, char** argv) {
   try {
-    app_->parse(argc, argv);
+    const std::vector<std::string> words = CompleteJson(argc, argv);
+    std::vector<const char*> pointers;
+    for (const std::string& word : words) pointers.push_back(word.c_str());
+    app_->parse(argc, pointers.data());
     return exit_code_;
   } catch (const CLI::Success& success) {
     // By way of a text: whether standard output takes it is the caller's to see.

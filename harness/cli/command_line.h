@@ -23,6 +23,9 @@ namespace dexcheck::cli {
 /// 0 all good, 1 the check found a disagreement, 2 usage or input error, 3 the run could not be completed.
 enum ExitCode { kSuccess = 0, kDisagreement = 1, kInputError = 2, kFailure = 3 };
 
+/// A failure always has its line on standard error, whatever is printed. @returns kFailure.
+ExitCode ReportFailure(const std::string& why);
+
 /// The words cannot be understood; what() says why.
 class UsageError : public std::runtime_error {
  public:

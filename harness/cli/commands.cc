@@ -1,5 +1,6 @@
 #include "harness/cli/commands.h"
 
+#include "harness/checks/consistency.h"
 #include "harness/cli/shipped_files.h"
 
 namespace dexcheck::cli {
@@ -16,9 +17,25 @@ Option AddRobotOptions(Command command, RobotFiles* files) {
   return robot;
 }
 
+Option AddJsonOption(Command command, const std::string& what, std::string* file) {
+  return command
+      .AddOption("--json", file,
+                 "Write " + what + " to this file; without one, or with -, print them and nothing else")
+      .TypeName("[FILE.json]");
+}
+
 Option AddJUnitOption(Command command, std::string* file) {
   return command.AddOption("--junit", file, "Write each check as a test case of JUnit's XML to this file")
       .TypeName("FILE.xml");
+}
+
+Option AddIgnoreOption(Command command, std::vector<std::string>* ignore) {
+  return command
+      .AddOption("--ignore", ignore,
+                 "What the two need not share of joints: armature, damping, friction, coupling to others")
+      .TypeName("WORD,...")
+      .Delimiter(',')
+      .OneOf({kIgnorable[0], kIgnorable[1], kIgnorable[2], kIgnorable[3]});
 }
 
 }  // namespace dexcheck::cli

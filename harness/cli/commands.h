@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "harness/cli/command_line.h"
 
@@ -33,8 +34,15 @@ void AddSampleOptions(Command command, std::uint64_t most, Count* samples, std::
       .ShowDefault();
 }
 
+/// Adds --json [FILE]: JSON to this file; without a file, or with "-", to standard output and nothing else.
+/// @param what the file gets: "the findings".
+Option AddJsonOption(Command command, const std::string& what, std::string* file);
+
 /// Adds --junit.
 Option AddJUnitOption(Command command, std::string* file);
+
+/// Adds --ignore: constants of joints that two descriptions need not share.
+Option AddIgnoreOption(Command command, std::vector<std::string>* ignore);
 
 /// Each adds its command to `app`.
 void AddAuditCommand(Command app);

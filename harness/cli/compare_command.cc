@@ -162,7 +162,9 @@ int Run(const CompareRequest& request) {
     page->Write(MakeComparisonPage(pointers, request.run_folders, comparison));
     if (prints && !request.quiet) fmt::print("page: {}\n", request.page);
   }
-  return request.tolerance && !comparison.IsSame() ? kDisagreement : kSuccess;
+  if (!request.tolerance || comparison.IsSame()) return kSuccess;
+  if (comparison.signals.empty()) throw InputError("--tolerance: no signal was compared");
+  return kDisagreement;
 }
 
 }  // namespace
@@ -192,8 +194,7 @@ void AddCompareCommand(Command app) {
       .AddOption("--video", &request->video,
                  "Film two runs in one scene, the second as a ghost (.mp4, .webm or .gif)")
       .TypeName("FILE");
-  command.AddOption("--json", &request->json, "Write the numbers (- for standard output)")
-      .TypeName("FILE.json");
+  AddJsonOption(command, "the numbers", &request->json);
   command.AddFlag("--all", &request->all, "Print all checks and signals");
   command.AddFlag("--quiet", &request->quiet, "Print the last line only");
   command.SetAction([=] {

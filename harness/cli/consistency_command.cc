@@ -62,8 +62,8 @@ void CompareWithAnswers(const ConsistencyRequest& request, Comparison* compariso
   comparison->notes = robot.notes;
   for (const std::string& note : DescribeCoordinates(robot)) comparison->notes.push_back(note);
   ShowProgress(request, [&](const std::function<bool(long)>& progress) {
-    comparison->result =
-        CompareAnswers(robot, reference.get(), side.get(), make_feed, progress, &comparison->notes);
+    comparison->result = CompareAnswers(robot, reference.get(), side.get(), make_feed, progress,
+                                        &comparison->notes, &comparison->not_compared);
   });
 }
 
@@ -118,6 +118,9 @@ int Run(ConsistencyRequest request) {
     if (!request.quiet) PrintTable(request, comparison);
     PrintVerdict(request, comparison);
   }
+  if (code == kFailure)
+    return ReportFailure(
+        fmt::format("only {} of {} states were compared", result.samples, request.options.samples));
   return code;
 }
 
@@ -155,12 +158,10 @@ void AddConsistencyCommand(Command app) {
       .TypeName("PATH")
       .Repeatable();
   AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
-  command
-      .AddOption("--json", &request->json_file,
-                 "Write the results to this file (- for standard output, then without the table)")
-      .TypeName("FILE.json");
+  AddJsonOption(command, "the results", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
   AddToleranceOptions(command, &request->judging);
+  AddIgnoreOption(command, &request->options.ignore);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

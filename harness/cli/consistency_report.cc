@@ -36,6 +36,11 @@ const char* Judge(ExitCode code) {
   return code == kDisagreement ? "disagreement" : "failed";
 }
 
+std::string DescribeTolerance(const ConsistencyRequest& request) {
+  const std::optional<double> tolerance = request.judging.Find();
+  return tolerance ? fmt::format("{:g}", *tolerance) : "rounding";
+}
+
 }  // namespace
 
 Json ListHypotheses(const std::vector<Hypothesis>& hypotheses) {
@@ -65,11 +70,14 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
              comparison.with_engine ? std::string(", MuJoCo ") + mj_versionString() : "", result.samples,
              request.options.seed, result.seconds);
 
-  if (!comparison.notes.empty()) {
-    fmt::print("not compared, or worth knowing:\n");
-    for (const std::string& note : comparison.notes) fmt::print("  {}\n", note);
+  const auto list = [](const char* title, const std::vector<std::string>& lines) {
+    if (lines.empty()) return;
+    fmt::print("{}:\n", title);
+    for (const std::string& line : lines) fmt::print("  {}\n", line);
     fmt::print("\n");
-  }
+  };
+  list("not compared", comparison.not_compared);
+  list("worth knowing", comparison.notes);
   fmt::print("{:<24}{:>9}  {:>12}  {:>9}  {:>6}\n", "constant", "compared", "worst error", "bound", "digits");
   for (const CheckRecord& record : result.gate.records) {
     fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {}\n", record.name, record.comparisons, record.worst,
@@ -100,27 +108,39 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
   if (result.samples < request.options.samples && request.answers.empty()) {
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
   }
+  std::string left_out;
+  for (const std::string& note : comparison.not_compared)
+    left_out += (left_out.empty() ? "" : ", ") + note.substr(0, note.find(':'));
+  if (!left_out.empty())
+    left_out = fmt::format("; {} not compared ({})", comparison.not_compared.size(), Abbreviate(left_out));
   if (result.Agrees()) {
-    const std::optional<double> tolerance = request.judging.Find();
-    fmt::print("AGREE: {} agree to {} in all {} terms.\n",
+    fmt::print("AGREE: {} agree to {} in all {} terms{}.\n",
                comparison.with_engine  ? "the analytic model and MuJoCo"
                : request.has_answers() ? "the description and the answers"
                                        : "the two descriptions",
-               tolerance ? fmt::format("{:g}", *tolerance) : "rounding", result.terms.size());
+               DescribeTolerance(request), result.terms.size(), left_out);
     return;
   }
-  fmt::print("DISAGREE:\n");
-  for (const std::string& line : ListDifferences(comparison)) fmt::print("  {}\n", line);
+  const Differences differences = SortDifferences(comparison);
+  const std::string to_digits = fmt::format("agrees to {} digits", differences.digits);
+  if (differences.real.empty()) {
+    fmt::print("DISAGREE: everything {}, as rounded numbers do; --digits {} judges by that{}.\n", to_digits,
+               differences.digits, left_out);
+  } else {
+    fmt::print("DISAGREE: {}", differences.real.front());
+    if (differences.real.size() > 1) fmt::print("; and in {} more", differences.real.size() - 1);
+    fmt::print("; everything else {}{}.\n",
+               differences.rounded.empty() ? "agrees to " + DescribeTolerance(request) : to_digits, left_out);
+    for (size_t i = 1; i < differences.real.size(); ++i) fmt::print("  {}\n", differences.real[i]);
+  }
   PrintHypotheses(comparison.hypotheses);
-  // Inertias printed with six digits, 1.5708 for pi / 2, a "fullinertia" that the engine diagonalises to
-  // 1e-6.
-  constexpr int kDigitsOfRoundedInput = 4;
-  const int digits = CountDigits(result);
-  if (digits < kDigitsOfRoundedInput) return;
-  fmt::print(
-      "All checks agree to {} digits, as they would with rounded numbers on one side; --digits {} judges by "
-      "that.\n",
-      digits, digits);
+  constexpr size_t kMostShown = 10;
+  const size_t shown = std::min(differences.rounded.size(), kMostShown);
+  if (shown > 0 && !differences.real.empty())
+    fmt::print("To {} digits agree {} more:\n", differences.digits, differences.rounded.size());
+  for (size_t i = 0; i < shown; ++i) fmt::print("  {}\n", differences.rounded[i]);
+  if (shown < differences.rounded.size())
+    fmt::print("  and {} more (--json)\n", differences.rounded.size() - shown);
 }
 
 std::string ToText(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code) {
@@ -135,6 +155,8 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
                {"seconds", result.seconds},
                {"verdict", Judge(code)}};
   json["notes"] = comparison.notes;
+  for (const std::string& note : comparison.not_compared) json["notes"].push_back(note);
+  json["not_compared"] = comparison.not_compared;
   if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
   json["checks"] = Json::object();
   for (const CheckRecord& record : result.gate.records) json["checks"][record.name] = ToJson(record, model);
@@ -145,6 +167,7 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
                                 {"where", finding.where},
                                 {"model", finding.model},
                                 {"engine", finding.engine}});
+    if (!finding.effect.empty()) json["findings"].back()["effect"] = finding.effect;
   }
   json["engine_notes"] = Json::array();
   for (const GateNote& note : result.gate.notes)

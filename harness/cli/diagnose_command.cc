@@ -21,7 +21,8 @@
 #include "harness/diagnosis/diagnose.h"
 #include "harness/diagnosis/file_terms.h"
 #include "harness/engine/engine.h"
-#include "harness/sides/complete_description.h"
+#include "harness/sides/compiled_inertias.h"
+#include "harness/sides/description_match.h"
 #include "harness/sides/engine_extras.h"
 #include "harness/sides/join_names.h"
 #include "harness/sides/read_description.h"
@@ -35,6 +36,7 @@ struct DiagnoseRequest {
   RobotFiles files;
   DiagnosisOptions options;
   ToleranceOptions judging;
+  std::vector<std::string> ignore;
   std::string json_file;
   bool quiet = false;
 };
@@ -142,7 +144,7 @@ Json ToJson(const Repair& cause, const RobotSpec& spec, const std::string& file)
 }
 
 std::string ToText(const DiagnoseRequest& request, const RobotSpec& written, const Diagnosis& diagnosis,
-                   const std::vector<Hypothesis>& hypotheses) {
+                   const std::vector<Hypothesis>& hypotheses, const std::vector<std::string>& notes) {
   const std::string file = request.files.robot.filename().string();
   Json json = {
       {"robot", request.files.robot.string()}, {"mjcf", request.files.mjcf.string()},
@@ -150,6 +152,7 @@ std::string ToText(const DiagnoseRequest& request, const RobotSpec& written, con
       {"seed", request.options.seed},          {"verdict", diagnosis.agrees ? "pass" : "disagreement"},
       {"explained", diagnosis.explained},      {"explained_of_forces", diagnosis.explained_of_forces}};
   if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
+  json["notes"] = notes;
   json["hypotheses"] = ListHypotheses(hypotheses);
   json["causes"] = Json::array();
   for (const Repair& cause : diagnosis.causes) json["causes"].push_back(ToJson(cause, written, file));
@@ -177,12 +180,25 @@ void SortFiles(DiagnoseRequest* request) {
 
 /// What is to be repaired, completed by what only the MJCF states when it is a URDF. What a URDF has no place
 /// for is taken out of the engine's model.
-/// @param rows filled with how its joints' rows are written.
-RobotModel ReadGiven(const RobotFiles& files, mjModel* engine, std::vector<WrittenRow>* rows) {
-  if (FindFormat(files.robot) == RobotFormat::kToml) return ReadRobotModel(files.robot, rows);
+/// @param rows filled with how its joints' rows are written. @param notes on what is the engine's.
+RobotModel ReadGiven(const DiagnoseRequest& request, mjModel* engine, std::vector<WrittenRow>* rows,
+                     std::vector<std::string>* notes) {
+  const RobotFiles& files = request.files;
+  const bool is_table = FindFormat(files.robot) == RobotFormat::kToml;
   RobotDescription robot = ReadDescription(files.robot);
-  SetAsideMotors(files.mjcf.filename().string(), engine);
-  CompleteFromEngine(*engine, files.mjcf.filename().string(), &robot);
+  if (!is_table) SetAsideMotors(files.mjcf.filename().string(), engine);
+  const Completion completion =
+      CompleteFromEngine(*engine, files.mjcf.filename().string(), &robot, request.ignore, is_table);
+  UndoOneSided(completion.one_sided, &robot.spec);
+  const BaseType base = robot.spec.base.type;
+  if (base == BaseType::kFixed || base == BaseType::kFloating) {
+    if (const std::optional<std::string> inertias = TakeCompiledInertias(files.mjcf, *engine, &robot))
+      notes->push_back(*inertias);
+  }
+  if (is_table) {
+    static_cast<void>(ReadRobotModel(files.robot, rows));
+    return RobotModel(robot.spec);
+  }
   for (const DescribedJoint& joint : robot.joints) rows->push_back({joint.X_iL, true});
   return RobotModel(robot.spec);
 }
@@ -192,7 +208,8 @@ int Run(DiagnoseRequest request) {
   request.options.tolerance = request.judging.Find().value_or(0.0);
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
   std::vector<WrittenRow> rows;
-  const RobotModel model = ReadGiven(request.files, engine.get(), &rows);
+  std::vector<std::string> notes;
+  const RobotModel model = ReadGiven(request, engine.get(), &rows, &notes);
   RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely mistakes)");
   CatchInterrupts();
   std::optional<OutputFile> json;
@@ -216,12 +233,15 @@ int Run(DiagnoseRequest request) {
     const double tolerance = std::max(request.options.tolerance, kHypothesisTolerance);
     hypotheses = ExplainDifference(request.files.robot, request.files.mjcf, {}, tolerance);
   }
-  if (json) json->Write(ToText(request, terms.written(), diagnosis, hypotheses));
+  if (json) json->Write(ToText(request, terms.written(), diagnosis, hypotheses, notes));
   if (request.json_file != "-") {
+    if (!request.quiet) {
+      for (const std::string& note : notes) fmt::print("{}\n", note);
+    }
     if (IsInterrupted()) fmt::print("INTERRUPTED. So far:\n");
     Print(request, model, terms.written(), diagnosis, hypotheses);
   }
-  if (IsInterrupted()) return kFailure;
+  if (IsInterrupted()) return ReportFailure("interrupted");
   return diagnosis.agrees ? kSuccess : kDisagreement;
 }
 
@@ -242,8 +262,8 @@ void AddDiagnoseCommand(Command app) {
   command.AddFlag("--by-motion", &request->options.by_motion,
                   "Use axes, frames and forces only, not the bodies' masses and inertias in the MJCF");
   AddToleranceOptions(command, &request->judging);
-  command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
-      .TypeName("FILE.json");
+  AddIgnoreOption(command, &request->ignore);
+  AddJsonOption(command, "the results", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "No progress, and causes only");
   command.SetAction([=] { return Run(*request); });
 }

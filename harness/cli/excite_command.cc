@@ -61,7 +61,7 @@ std::string ToText(const Scenario& scenario, const ExcitingMotion& motion, bool 
 }
 
 int Run(const ExciteRequest& request) {
-  const ScenarioFiles files = FindScenario(request.scenario, request.overrides, /*seed=*/0);
+  const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), /*seed=*/0);
   CatchInterrupts();
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
@@ -80,7 +80,7 @@ int Run(const ExciteRequest& request) {
                request.quiet ? "" : "\n", complete ? "FOUND" : "INTERRUPTED, so far", motion.found.smallest,
                motion.found.smallest / motion.given.smallest);
   }
-  return complete ? kSuccess : kFailure;
+  return complete ? kSuccess : ReportFailure("interrupted");
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
+#include "harness/cli/run_folder.h"
 #include "harness/log/log_reader.h"
 #include "harness/log/mcap_writer.h"
 
@@ -205,11 +206,10 @@ int Run(const ExportRequest& request) {
   }
   const LogReader log(request.run_folder / "log.h5");
   const std::vector<SignalInfo> signals = ChooseSignals(log, request);
-  if (request.list) {
-    PrintList(log, signals);
-  }
+  if (request.list) PrintList(log, signals);
   if (!request.csv_file.empty()) WriteCsv(log, signals, request);
   if (!request.mcap_file.empty()) WriteMcap(log, signals, request);
+  WarnOfCut(request.run_folder, log);
   return kSuccess;
 }
 

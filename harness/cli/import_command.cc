@@ -9,7 +9,9 @@
 #include "harness/base/files.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
+#include "harness/engine/engine.h"
 #include "harness/engine/give_motors.h"
+#include "harness/engine/mjcf_assets.h"
 #include "harness/engine/mjcf_files.h"
 #include "harness/engine/newer_mjcf.h"
 #include "harness/sides/parameter_writer.h"
@@ -42,9 +44,15 @@ RobotDescription ReadSource(const ImportRequest& request) {
 int WriteCopy(const ImportRequest& request) {
   JoinedMjcf mjcf(request.source);
   const std::filesystem::path from = std::filesystem::absolute(request.source).parent_path();
-  if (request.downgrade) DowngradeMjcf(&mjcf);
+  if (request.downgrade) {
+    AdaptMjcf(from, &mjcf);
+    StateNewDefaults(&mjcf);
+  }
   if (request.motors) GiveMotors(from, &mjcf);
   std::string copy = mjcf.Print();
+  // What cannot be loaded must not be written.
+  LoadMjcfText(MoveMjcf(copy, request.source.string(), from, std::filesystem::current_path()),
+               request.source.string());
   const std::filesystem::path to = std::filesystem::absolute(request.out).parent_path();
   std::error_code error;
   if (request.out != "-" && !std::filesystem::equivalent(from, to, error))

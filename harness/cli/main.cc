@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -70,10 +71,12 @@ int Run(int argc, char** argv) {
     return Report(std::string(error.what()) + " (see dexcheck --help)", kInputError);
   } catch (const InputError& error) {
     return Report(error.what(), kInputError);
-  } catch (const std::invalid_argument& error) {
-    return Report(error.what(), kInputError);
   } catch (const std::system_error& error) {
     return Report(Explain(error), kInputError);
+  } catch (const std::bad_alloc&) {
+    return Report("not enough memory, or the limit of this process's (ulimit -v) is too small", kFailure);
+  } catch (const std::logic_error& error) {  // readers throw InputError: this is a mistake of the program
+    return Report(std::string("internal error: ") + error.what(), kFailure);
   } catch (const std::exception& error) {
     return Report(error.what(), kFailure);
   }

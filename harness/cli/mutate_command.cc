@@ -245,7 +245,7 @@ int Run(MutateRequest request) {
   if (json) json->Write(ToText(request, campaign));
   if (request.json_file != "-") Print(request, campaign);
   if (Total(SumUp(campaign)).survived > 0) return kDisagreement;
-  return campaign.IsComplete() ? kSuccess : kFailure;
+  return campaign.IsComplete() ? kSuccess : ReportFailure("interrupted");
 }
 
 }  // namespace
@@ -265,10 +265,7 @@ void AddMutateCommand(Command app) {
           .AddOption("--run", &request->run.scenario,
                      "Make mistakes in a run of this scenario instead: numbers, equations, laws, plants")
           .TypeName("SCENARIO");
-  command.AddOption("--set", &request->run.overrides, "Set a key of the scenario, as `dexcheck run` does")
-      .TypeName("KEY=VALUE")
-      .Repeatable()
-      .Needs(run);
+  for (Option option : AddOverrideOptions(command, &request->run.overrides)) option.Needs(run);
   Option from =
       command
           .AddOption("--from", &request->run.options.from,
@@ -305,8 +302,7 @@ void AddMutateCommand(Command app) {
   for (Option option : {from, duration, mistakes, scale}) option.Excludes(smallest);
   samples.Excludes(run);
   no_diagnosis.Excludes(run);
-  command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
-      .TypeName("FILE.json");
+  AddJsonOption(command, "the results", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });
 }

@@ -107,7 +107,7 @@ void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t 
 }
 
 std::string ToText(const MutateRunRequest& request, const RunCampaign& campaign, size_t done) {
-  Json json = {{"scenario", request.scenario},   {"overrides", request.overrides},
+  Json json = {{"scenario", request.scenario},   {"overrides", request.overrides.List()},
                {"from_s", request.options.from}, {"duration_s", request.options.duration},
                {"scale", request.options.scale}, {"complete", done == campaign.mutants().size()}};
   json["kinds"] = Json::object();
@@ -138,7 +138,7 @@ std::string ToText(const MutateRunRequest& request, const RunCampaign& campaign,
 }  // namespace
 
 int MutateRun(const MutateRunRequest& request) {
-  const ScenarioFiles files = FindScenario(request.scenario, request.overrides, /*seed=*/0);
+  const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), /*seed=*/0);
   CatchInterrupts();
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
@@ -153,7 +153,7 @@ int MutateRun(const MutateRunRequest& request) {
   bar.Finish();
   if (json) json->Write(ToText(request, campaign, done));
   if (request.json_file != "-") Print(request, campaign, done);
-  if (done < total) return kFailure;
+  if (done < total) return ReportFailure(fmt::format("interrupted after {} of {} mistakes", done, total));
   return SumUp(campaign.mutants(), done).back().survived > 0 ? kDisagreement : kSuccess;
 }
 

@@ -5,13 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "harness/cli/shared_request.h"
 #include "harness/run/run_mutation_options.h"
 
 namespace dexcheck::cli {
 
 struct MutateRunRequest {
   std::string scenario;
-  std::vector<std::string> overrides;
+  Overrides overrides;
   RunMutationOptions options;
   std::string json_file;
   bool quiet = false;

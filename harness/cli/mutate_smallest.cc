@@ -67,7 +67,7 @@ Json ErrorToJson(double error) { return std::isfinite(error) ? Json(error) : Jso
 
 std::string ToText(const MutateRunRequest& request, const DetectabilityResult& result, bool complete) {
   Json json = {{"scenario", request.scenario},
-               {"overrides", request.overrides},
+               {"overrides", request.overrides.List()},
                {"states", kStates},
                {"complete", complete},
                {"rank", result.rank},
@@ -89,8 +89,10 @@ void Print(const DetectabilityResult& result) {
   std::vector<std::string> quantities = ListQuantities(result);
   quantities.emplace_back();  // all
   for (const Column& column : kColumns) {
-    fmt::print("smallest relative error that fails by {} alone\n\n{:<24}{:>9}{:>9}{:>11}{:>12}{:>12}{:>12}\n",
-               column.name, "quantity", "numbers", "shown", "to 0.1 %", "best", "median", "worst");
+    fmt::print(
+        "smallest relative error that fails by {} alone, to first "
+        "order\n\n{:<24}{:>9}{:>9}{:>11}{:>12}{:>12}{:>12}\n",
+        column.name, "quantity", "numbers", "shown", "to 0.1 %", "best", "median", "worst");
     for (const std::string& quantity : quantities) {
       const SmallestRow row = SumUp(result, quantity, column);
       fmt::print("{:<24}{:>9}{:>9}{:>11}", quantity.empty() ? "all" : quantity, row.numbers, row.shown,
@@ -110,7 +112,7 @@ void Print(const DetectabilityResult& result) {
 }  // namespace
 
 int PrintSmallestErrors(const MutateRunRequest& request) {
-  const ScenarioFiles files = FindScenario(request.scenario, request.overrides, /*seed=*/0);
+  const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), /*seed=*/0);
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
   std::optional<OutputFile> json;
@@ -128,7 +130,7 @@ int PrintSmallestErrors(const MutateRunRequest& request) {
   if (json) json->Write(ToText(request, result, complete));
   if (request.json_file != "-") Print(result);
   if (!complete) fmt::print("INTERRUPTED after {} of {} numbers.\n", result.numbers.size(), total);
-  return complete ? kSuccess : kFailure;
+  return complete ? kSuccess : ReportFailure("interrupted");
 }
 
 }  // namespace dexcheck::cli

@@ -397,11 +397,14 @@ void AddPlanCommand(Command app) {
                  "Scene in which the robot's bodies must be clear of each other, the object and what stands "
                  "there (default: the shipped one for the shipped robot)")
       .TypeName("FILE.xml");
-  command
-      .AddOption("--json", &request->json_file,
-                 "Write the plan to this file (- for standard output, then without the [grasp])")
-      .TypeName("FILE.json");
-  command.SetAction([=] { return Run(*request); });
+  AddJsonOption(command, "the plan", &request->json_file);
+  command.SetAction([=] {
+    try {
+      return Run(*request);
+    } catch (const std::invalid_argument& error) {  // the planner itself judges the options' values
+      throw InputError(error.what());
+    }
+  });
 }
 
 }  // namespace dexcheck::cli

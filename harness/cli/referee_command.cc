@@ -182,9 +182,15 @@ int Run(RefereeRequest request) {
   if (!result.Agrees()) code = kDisagreement;
   if (json) json->Write(ToText(request, model, result));
   if (junit) junit->Write(WriteRefereeJUnit(request, model, result));
-  if (request.json_file == "-") return code;
-  if (!request.quiet) PrintTable(request, model, result);
-  PrintVerdict(request, result);
+  if (request.json_file != "-") {
+    if (!request.quiet) PrintTable(request, model, result);
+    PrintVerdict(request, result);
+  }
+  if (code == kFailure)
+    return ReportFailure(result.lacks_requested
+                             ? "a library that was asked for is not there"
+                             : fmt::format("only {} of {} states were compared", result.samples,
+                                           request.options.states.samples));
   return code;
 }
 
@@ -224,8 +230,7 @@ void AddRefereeCommand(Command app) {
       .TypeName("N")
       .Check(WholeNumber(1, kMostDigits))
       .ShowDefault();
-  command.AddOption("--json", &request->json_file, "Write the results to this file (- for standard output)")
-      .TypeName("FILE.json");
+  AddJsonOption(command, "the results", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });

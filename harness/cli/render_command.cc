@@ -15,6 +15,7 @@
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/make_video.h"
+#include "harness/cli/run_folder.h"
 #include "harness/report/recorded_frames.h"
 #include "renders/movie.h"
 #include "renders/picture_file.h"
@@ -79,6 +80,8 @@ std::optional<FreeCamera> MakeFreeCamera(const RenderRequest& request) {
   if (!text || !(text >> std::ws).eof() || comma != ',' || comma_after != ',' || !point.allFinite()) {
     throw InputError("--look-at: must be object or X,Y,Z in m, got " + Quote(request.look_at));
   }
+  if (point == camera.from)
+    throw InputError("--look-at: must be elsewhere than --from, got " + request.look_at);
   camera.look_at = point;
   return camera;
 }
@@ -113,8 +116,9 @@ ExitCode Run(RenderRequest request) {
   std::vector<RunView> views;
   views.reserve(runs.size());
   for (const RecordedFrames& run : runs) views.push_back({run.model.get(), &run.frames});
-  if (!request.still) return WriteMovie(views, request.movie, out, request.quiet) ? kSuccess : kFailure;
-  WriteStill(request, views, out);
+  if (!request.still && !WriteMovie(views, request.movie, out, request.quiet)) return kFailure;
+  if (request.still) WriteStill(request, views, out);
+  if (!request.quiet) WarnOfCut(request.run_folder, LogReader(request.run_folder / "log.h5"));
   return kSuccess;
 }
 

@@ -18,9 +18,11 @@
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
+#include "harness/cli/shared_request.h"
 #include "harness/cli/shipped_files.h"
 #include "harness/cli/tolerance_options.h"
 #include "harness/engine/machine.h"
+#include "harness/report/run_data.h"
 #include "harness/report/write_report.h"
 #include "harness/run/half_step.h"
 #include "harness/run/run_recorder.h"
@@ -32,7 +34,7 @@ namespace {
 struct RunRequest {
   std::string scenario;
   std::string out;
-  std::vector<std::string> overrides;
+  Overrides overrides;
   ToleranceOptions judging;
   std::uint64_t seed = 0;
   bool no_check = false;
@@ -40,8 +42,8 @@ struct RunRequest {
   bool no_report = false;
   bool video = false;
   bool quiet = false;
-  bool all = false;   // checks are printed
-  bool json = false;  // instead of text
+  bool all = false;  // checks are printed
+  std::string json_file;
   bool list = false;
   std::string replay;
   std::string junit_file;
@@ -67,7 +69,7 @@ void TryToMake(const char* what, const Make& make) {
 
 /// Draws what was asked for into the run's folder, after the verdict.
 void DrawRun(const RunRequest& request, const std::filesystem::path& folder, ExitCode verdict) {
-  const bool quiet = request.quiet || request.json;
+  const bool quiet = request.quiet || request.json_file == "-";
   if (request.video) {
     TryToMake("video", [&] { WriteRunMovie(folder, (folder / "video.mp4").string(), quiet); });
   }
@@ -86,8 +88,8 @@ LoopParts MakeParts(const RunRequest& request, const Setup& setup, const std::fi
 }
 
 int RunScenario(const RunRequest& request) {
-  const bool quiet = request.quiet || request.json;
-  std::vector<std::string> overrides = request.overrides;
+  const bool quiet = request.quiet || request.json_file == "-";
+  std::vector<std::string> overrides = request.overrides.List();
   if (const std::optional<double> tolerance = request.judging.Find()) {
     overrides.push_back("tolerance=" + FormatNumber(*tolerance));
   }
@@ -124,9 +126,8 @@ int RunScenario(const RunRequest& request) {
   const ExitCode verdict = ToExitCode(result);
   std::exception_ptr unprinted;
   try {
-    if (request.json) {
-      fmt::print("{}", summary);
-    } else {
+    if (!request.json_file.empty()) OutputFile(request.json_file).Write(summary);
+    if (request.json_file != "-") {
       PrintRunReport(setup, runner.loop(), result, folder ? folder->path().string() : "",
                      request.quiet ? Detail::kVerdict
                      : request.all ? Detail::kAll
@@ -144,12 +145,14 @@ int RunScenario(const RunRequest& request) {
     }
   }
   if (unprinted) std::rethrow_exception(unprinted);
-  return verdict;
+  return verdict == kFailure ? ReportFailure(result.failure) : verdict;
 }
 
 /// Repeats a recorded run from what its log keeps, and compares every number bit for bit.
 int ReplayRun(const RunRequest& request) {
   const RecordedRun recorded(request.replay);
+  const std::string cut = DescribeCut(recorded.log());
+  if (recorded.rows() == 0) throw InputError(request.replay + "/log.h5: nothing to compare: " + cut);
   const std::string controller = recorded.controller();
   if (!controller.empty() && request.controller.empty()) {
     throw InputError(request.replay + ": its controller is not in the log; give it again: --controller " +
@@ -177,6 +180,9 @@ int ReplayRun(const RunRequest& request) {
   EndOnInterrupts(kFailure);
   recorder.Close("");
   const ReplayDifference difference = recorded.Compare(log);
+  if (!cut.empty()) {
+    fmt::print("Not the whole run, {} steps, is compared: {}.\n", runner.loop().num_steps(), cut);
+  }
   if (difference.signal.empty()) {
     fmt::print("IDENTICAL: {} steps of {} signals, bit for bit.\n", difference.rows, difference.signals);
     return kSuccess;
@@ -226,11 +232,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
                    .AddOption("--out", &request->out,
                               "Folder for the results, made by the run (runs/SCENARIO by default)")
                    .TypeName("DIR");
-  Option set = command
-                   .AddOption("--set", &request->overrides,
-                              "Set a key of the scenario, or with model. before it one of the parameter file")
-                   .TypeName("KEY=VALUE")
-                   .Repeatable();
+  const auto [set, unset] = AddOverrideOptions(command, &request->overrides);
   const std::array<Option, 2> judging = AddToleranceOptions(command, &request->judging);
   Option seed = command.AddOption("--seed", &request->seed, "Vary posture and grasp at random; 0 does not")
                     .TypeName("N")
@@ -256,21 +258,23 @@ void AddRunCommand(Command app, const std::string& command_line) {
   Option no_log = command.AddFlag("--no-log", &request->no_log, "Write no files");
   Option quiet = command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   Option all = command.AddFlag("--all", &request->all, "Print each check, not only a line for each question");
-  Option json = command.AddFlag("--json", &request->json, "Print the summary as JSON, and nothing else");
+  Option json = AddJsonOption(command, "the summary", &request->json_file);
   controller.Excludes(list);
   scenario.Excludes(list).Excludes(replay);
   list.Excludes(replay);
   // What would be ignored is refused.
   for (Option option : judging) option.Excludes(list).Excludes(replay);
   no_log.Excludes(video).Excludes(out);
-  all.Excludes(quiet).Excludes(json);
-  json.Excludes(quiet);
-  for (Option option : {out, set, seed, no_check, video, no_report, no_log, junit, all, json}) {
+  all.Excludes(quiet);
+  for (Option option : {out, set, unset, seed, no_check, video, no_report, no_log, junit, all, json}) {
     option.Excludes(replay).Excludes(list);
   }
   command.SetAction([=] {
     if (request->scenario.empty() && !request->list && request->replay.empty()) {
       throw UsageError("SCENARIO (or --list, or --replay) is required");
+    }
+    if (request->json_file == "-" && (request->quiet || request->all)) {
+      throw UsageError("--json without a file excludes --quiet and --all");
     }
     return Run(*request);
   });

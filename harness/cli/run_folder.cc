@@ -1,18 +1,26 @@
 #include "harness/cli/run_folder.h"
 
+#include <fmt/format.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <bit>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstring>
+#include <optional>
 #include <sstream>
 #include <system_error>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
+#include "harness/base/console.h"
 #include "harness/cli/shipped_files.h"
 #include "harness/engine/machine.h"
 #include "harness/report/recorded_frames.h"
+#include "harness/report/run_data.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -44,6 +52,47 @@ std::uint64_t ReadSeed(const LogReader& log, const std::filesystem::path& path) 
   throw InputError(path.string() + ": seed: must be a whole number, got " + Quote(text));
 }
 
+/// The overrides, with the removal of each key of the file that says in another word what one of them sets.
+std::vector<std::string> Supersede(const std::filesystem::path& file, std::vector<std::string> overrides) {
+  static constexpr std::pair<const char*, const char*> kWords[] = {{"K_p", "natural_frequency"},
+                                                                   {"K_v", "damping_ratio"}};
+  const TomlDocument document(ReadTextFile(file.string()), file.string());
+  const std::optional<TomlValue> control = document.Open().Find("control");
+  if (!control || !control->IsTable()) return overrides;
+  const auto is_changed = [&](const std::string& key) {
+    return std::any_of(overrides.begin(), overrides.end(), [&](const std::string& assignment) {
+      return assignment.starts_with("control." + key + "=") || assignment == "control." + key + "-=";
+    });
+  };
+  const auto prefer = [&](const std::string& key, const std::string& other) {
+    const std::optional<TomlValue> replaced = control->AsTable().Find(other);
+    if (!replaced || !is_changed(key) || is_changed(other)) return;
+    overrides.push_back("control." + other + "-=");
+    Warn(fmt::format("note: {}:{}: control.{} has no effect, control.{} is set instead", file.string(),
+                     replaced->line(), other, key));
+  };
+  for (const auto& [gain, word] : kWords) {
+    prefer(gain, word);
+    prefer(word, gain);
+  }
+  return overrides;
+}
+
+/// What a scenario asks for. @throws InputError that names the scenario and its key, when it is not there.
+void RequireFile(const Scenario& scenario, const char* key, const std::string& file) {
+  if (file.empty() || ::access(file.c_str(), R_OK) == 0) return;
+  throw InputError(
+      fmt::format("{}: {}: {}: cannot be read: {}", scenario.source, key, file, std::strerror(errno)));
+}
+
+ScenarioFiles OpenWhole(const std::filesystem::path& path, const std::vector<std::string>& overrides,
+                        std::uint64_t seed) {
+  ScenarioFiles files = Open(path, Supersede(path, overrides), seed);
+  RequireFile(files.scenario, "model.file", files.scenario.model_file);
+  RequireFile(files.scenario, "plant.mjcf", files.scenario.mjcf_file);
+  return files;
+}
+
 /// The largest finite value, without its sign.
 double CalcLargest(const RowMatrixXd& values) {
   double largest = 0.0;
@@ -71,7 +120,7 @@ std::vector<ShippedScenario> ListShippedScenarios() {
 ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<std::string>& overrides,
                            std::uint64_t seed) {
   if (name_or_file.ends_with(".toml") || name_or_file.find('/') != std::string::npos) {
-    return Open(name_or_file, overrides, seed);
+    return OpenWhole(name_or_file, overrides, seed);
   }
   std::vector<std::string> known;
   for (const ShippedScenario& scenario : ListShippedScenarios()) known.push_back(scenario.name);
@@ -81,7 +130,8 @@ ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<st
                      ": is neither shipped (dexcheck run --list) nor a TOML file" +
                      (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?"));
   }
-  return Open(FindShippedFile(std::string(kScenarioFolder) + "/" + name_or_file + ".toml"), overrides, seed);
+  return OpenWhole(FindShippedFile(std::string(kScenarioFolder) + "/" + name_or_file + ".toml"), overrides,
+                   seed);
 }
 
 RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(path) {
@@ -97,6 +147,11 @@ RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(p
   if (!std::filesystem::is_empty(path_, error) || error) {
     throw InputError(path_.string() + ": already holds files; give a new folder with --out");
   }
+}
+
+void WarnOfCut(const std::filesystem::path& run_folder, const LogReader& log) {
+  if (const std::string cut = DescribeCut(log); !cut.empty())
+    Warn("note: " + run_folder.string() + ": " + cut);
 }
 
 RecordedRun::RecordedRun(const std::filesystem::path& folder) : log_(folder / "log.h5") {
@@ -117,15 +172,6 @@ bool RecordedRun::was_checked() const {
   return std::any_of(log_.signals().begin(), log_.signals().end(),
                      [](const SignalInfo& signal) { return signal.name.starts_with("check/"); });
 }
-
-std::string RecordedRun::ReadTextIfThere(const std::string& name) const {
-  const std::vector<std::string> texts = log_.ListTexts();
-  return std::find(texts.begin(), texts.end(), name) != texts.end() ? log_.ReadText(name) : "";
-}
-
-std::string RecordedRun::machine() const { return ReadTextIfThere("machine"); }
-
-std::string RecordedRun::controller() const { return ReadTextIfThere("controller"); }
 
 ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) const {
   const LogReader other(other_log);

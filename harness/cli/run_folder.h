@@ -56,6 +56,9 @@ struct ReplayDifference {
   size_t signals = 0;
 };
 
+/// A line on standard error when the log does not hold a whole run.
+void WarnOfCut(const std::filesystem::path& run_folder, const LogReader& log);
+
 /// A run as its log keeps it, unpacked.
 class RecordedRun {
  public:
@@ -65,15 +68,13 @@ class RecordedRun {
   [[nodiscard]] long rows() const { return log_.rows(); }
   [[nodiscard]] bool was_checked() const;
   /// What the bits depended on, as DescribeMachine says; empty when the log does not tell.
-  [[nodiscard]] std::string machine() const;
+  [[nodiscard]] std::string machine() const { return log_.FindText("machine"); }
   /// The controller that the user brought along; empty for the scenario's.
-  [[nodiscard]] std::string controller() const;
+  [[nodiscard]] std::string controller() const { return log_.FindText("controller"); }
   [[nodiscard]] ReplayDifference Compare(const std::filesystem::path& other_log) const;
   [[nodiscard]] const LogReader& log() const { return log_; }
 
  private:
-  [[nodiscard]] std::string ReadTextIfThere(const std::string& name) const;
-
   LogReader log_;
   TemporaryFolder unpacked_;
   ScenarioFiles files_;

@@ -1,17 +1,41 @@
 #include "harness/cli/shared_request.h"
 
+#include "controller/common/text.h"
+#include "harness/cli/commands.h"
+
 namespace dexcheck::cli {
+
+std::vector<std::string> Overrides::List() const {
+  std::vector<std::string> list;
+  for (const std::string& key : unset) list.push_back(key + "-=");
+  list.insert(list.end(), set.begin(), set.end());
+  return list;
+}
+
+std::array<Option, 2> AddOverrideOptions(Command command, Overrides* overrides) {
+  const auto is_key = [](const std::string& text) {
+    return text.find('=') == std::string::npos ? std::string() : "must be a key, got " + Quote(text);
+  };
+  const Option set =
+      command
+          .AddOption("--set", &overrides->set,
+                     "Set a key of the scenario, or with model. before it one of the parameter file")
+          .TypeName("KEY=VALUE")
+          .Repeatable();
+  const Option unset = command.AddOption("--unset", &overrides->unset, "Remove such a key, before any is set")
+                           .TypeName("KEY")
+                           .Check(is_key)
+                           .Repeatable();
+  return {set, unset};
+}
 
 void AddScenarioOptions(Command command, ScenarioRequest* request) {
   command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();
-  command.AddOption("--set", &request->overrides, "Set a key of the scenario, as for run")
-      .TypeName("KEY=VALUE")
-      .Repeatable();
+  AddOverrideOptions(command, &request->overrides);
 }
 
 void AddResultOptions(Command command, const std::string& what, ScenarioRequest* request) {
-  command.AddOption("--json", &request->json_file, "Write " + what + " to this file (- for standard output)")
-      .TypeName("FILE.json");
+  AddJsonOption(command, what, &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the last line only");
 }
 

@@ -2,6 +2,7 @@
 
 // What commands ask for that make many runs of one scenario and print one result.
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -9,14 +10,26 @@
 
 namespace dexcheck::cli {
 
+/// What is changed in a scenario.
+struct Overrides {
+  std::vector<std::string> set;    ///< "KEY=VALUE"
+  std::vector<std::string> unset;  ///< "KEY"
+  [[nodiscard]] bool empty() const { return set.empty() && unset.empty(); }
+  /// As ParseScenario takes them: what is removed first.
+  [[nodiscard]] std::vector<std::string> List() const;
+};
+
+/// Adds --set and --unset. @returns them.
+std::array<Option, 2> AddOverrideOptions(Command command, Overrides* overrides);
+
 struct ScenarioRequest {
   std::string scenario;
-  std::vector<std::string> overrides;
+  Overrides overrides;
   std::string json_file;
   bool quiet = false;
 };
 
-/// Adds SCENARIO and --set.
+/// Adds SCENARIO, --set and --unset.
 void AddScenarioOptions(Command command, ScenarioRequest* request);
 /// Adds --json and --quiet. @param what the file gets: "the budget".
 void AddResultOptions(Command command, const std::string& what, ScenarioRequest* request);

@@ -52,7 +52,7 @@ void AddStatesCommand(Command app) {
   command.AddOption("--out", &request->out, "Folder for layout.json, states.jsonl, q.npy and v.npy")
       .TypeName("FOLDER")
       .Required();
-  command.AddOption("--count", &request->count, "Number of random states")
+  command.AddOption("--samples,--count", &request->count, "Number of random states")
       .TypeName("N")
       .Check(WholeNumber(1, kMaxCount))
       .ShowDefault();

@@ -18,6 +18,7 @@
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
+#include "harness/cli/shared_request.h"
 #include "harness/view/recording.h"
 #include "harness/view/save_scenario.h"
 #include "harness/view/viewer.h"
@@ -29,7 +30,7 @@ struct ViewRequest {
   std::string what;  // scenario or folder of a run
   std::string out;
   std::string save;
-  std::vector<std::string> overrides;
+  Overrides overrides;
   std::uint64_t seed = 0;
   std::string size = "1120x640";
   ViewerOptions viewer;
@@ -41,7 +42,7 @@ ExitCode ToExitCode(const Runner& runner) {
   const RunResult& result = runner.result();
   if (result.verdict == Verdict::kPass) return kSuccess;
   if (result.verdict == Verdict::kDisagreement) return kDisagreement;
-  if (!result.interrupted) return kFailure;
+  if (!result.interrupted) return ReportFailure(result.failure);
   const CrossCheck& checks = runner.loop().checks();
   for (const std::span<const CheckRecord> records : {checks.model_checks(), checks.motion_checks()}) {
     for (const CheckRecord& check : records) {
@@ -100,7 +101,7 @@ ExitCode Conclude(const Setup& setup, const Runner& runner, const std::filesyste
 int ViewScenario(const ViewRequest& request) {
   std::optional<RunFolder> folder;
   const auto make = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> overrides = request.overrides;
+    std::vector<std::string> overrides = request.overrides.List();
     overrides.insert(overrides.end(), more.begin(), more.end());
     const ScenarioFiles files = FindScenario(request.what, overrides, request.seed);
     auto setup = std::make_unique<Setup>(files.scenario, files.robot, files.mjcf);
@@ -156,11 +157,7 @@ void AddViewCommand(Command app, const std::string& command_line) {
       .TypeName("");
   command.AddOption("--out", &request->out, "Folder for log and summary, made by the run (none by default)")
       .TypeName("DIR");
-  command
-      .AddOption("--set", &request->overrides,
-                 "Set a key of the scenario, or with model. before it one of the parameter file")
-      .TypeName("KEY=VALUE")
-      .Repeatable();
+  AddOverrideOptions(command, &request->overrides);
   command.AddOption("--seed", &request->seed, "Vary posture and grasp at random; 0 does not")
       .TypeName("N")
       .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));

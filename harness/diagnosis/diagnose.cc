@@ -77,6 +77,18 @@ std::vector<Repair> Neutralise(const Adapter& adapter, const GateResult& gate, m
   return causes;
 }
 
+/// Whether a body that can be has become one that no robot can have.
+bool MakesImpossible(const RobotSpec& before, const RobotSpec& after) {
+  const auto makes = [](const MassProperties& from, const MassProperties& to) {
+    return FindPhysicalInconsistency(from).empty() && !FindPhysicalInconsistency(to).empty();
+  };
+  if (makes(before.base.body, after.base.body)) return true;
+  for (size_t i = 0; i < before.joints.size(); ++i) {
+    if (makes(before.joints[i].body, after.joints[i].body)) return true;
+  }
+  return false;
+}
+
 /// Takes numbers out of a cause; what remains of it has no equivalents that are known.
 void ForgetNumbers(const std::vector<Parameter>& numbers, Repair* cause) {
   for (size_t i = cause->parameters.size(); i-- > 0;) {
@@ -169,6 +181,7 @@ class Diagnostician {
     } catch (const InputError&) {
       return false;
     }
+    if (MakesImpossible(model_.spec(), repaired)) return false;
     result_.repaired = std::move(repaired);
     // Of a number that is repaired again, the last value holds, in whatever order the repairs are printed.
     for (Repair& earlier : result_.causes) ForgetNumbers(cause.parameters, &earlier);

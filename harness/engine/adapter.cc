@@ -126,7 +126,12 @@ void Adapter::MatchJoints(const std::string& engine_source) {
     link_bodies_.push_back(FindLinkBody(engine, joint, joint_ids_.back(), need));
     known.insert(joint_ids_.back());
   }
-  for (const Frame& frame : model_->frames()) frame_sites_.push_back(need(mjOBJ_SITE, "site", frame.name));
+  for (const Frame& frame : model_->frames()) {
+    const bool is_body =
+        frame.name == model_->link_name(frame.link) && link_bodies_[static_cast<size_t>(frame.link + 1)] >= 0;
+    frame_sites_.push_back(is_body ? mj_name2id(&engine, mjOBJ_SITE, frame.name.c_str())
+                                   : need(mjOBJ_SITE, "site", frame.name));
+  }
   if (model_->object()) object_body_ = need(mjOBJ_BODY, "body", model_->object()->name);
   std::vector<std::string> only_in_engine;
   const BaseType base = model_->base().type;
@@ -343,6 +348,29 @@ Pose Adapter::GetBasePose(const mjtNum* qpos) const {
   X_W0.linear() = Eigen::AngleAxisd(GetHingeYaw(qpos), Vector3d::UnitZ()).toRotationMatrix();
   X_W0.translation() = anchor - X_W0.linear() * X_0b_.translation();
   return X_W0;
+}
+
+int Adapter::FindTipGeom(int frame) const {
+  const int site = frame_sites_[static_cast<size_t>(frame)];
+  const auto distance = [&](int geom) {
+    return (MapVector(engine_->geom_pos + 3 * geom) - MapVector(engine_->site_pos + 3 * site)).norm();
+  };
+  int found = -1;
+  for (int geom = 0; geom < engine_->ngeom; ++geom) {
+    if (engine_->geom_bodyid[geom] != engine_->site_bodyid[site]) continue;
+    if (engine_->geom_type[geom] != mjGEOM_SPHERE) continue;
+    const bool touches = CanTouch(*engine_, geom);
+    const bool found_touches = found >= 0 && CanTouch(*engine_, found);
+    if (found < 0 || (touches == found_touches ? distance(geom) < distance(found) : touches)) found = geom;
+  }
+  return found;
+}
+
+int Adapter::RequireTipGeom(int frame) const {
+  const int geom = FindTipGeom(frame);
+  if (geom >= 0 && CanTouch(*engine_, geom)) return geom;
+  throw InputError("MJCF: fingertip " + Quote(model_->frames()[static_cast<size_t>(frame)].name) +
+                   ": its body needs a sphere that can touch");
 }
 
 void Adapter::GetPositions(const mjtNum* qpos, Eigen::Ref<VectorXd> q) const {

@@ -7,14 +7,21 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <map>
+#include <mutex>
 #include <new>
+#include <set>
 #include <system_error>
 
 #include "controller/common/errors.h"
+#include "harness/base/console.h"
 #include "harness/base/temporary_path.h"
 #include "harness/engine/cylinder_collision.h"
 #include "harness/engine/ellipsoid_collision.h"
 #include "harness/engine/finite_check.h"
+#include "harness/engine/joined_mjcf.h"
+#include "harness/engine/mjcf_assets.h"
+#include "harness/engine/mjcf_files.h"
 #include "harness/engine/mujoco_release.h"
 #include "harness/engine/newer_mjcf.h"
 #include "harness/engine/torus_collision.h"
@@ -62,14 +69,27 @@ void PrepareEngine() {
   InstallTorusCollision();
 }
 
+/// Commands load a file more than once.
+void WarnOnce(const std::string& text) {
+  static std::mutex mutex;
+  static std::set<std::string> told;
+  const std::scoped_lock lock(mutex);
+  if (told.insert(text).second) Warn(text);
+}
+
 std::string OneLine(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   while (!text.empty() && text.back() == ' ') text.pop_back();
   return text;
 }
 
-/// What to do about a body that the engine's compiler refuses.
-std::string AdviseOnBody(const std::string& message) {
+/// What to do about what the engine's compiler refuses.
+std::string Advise(const std::string& message) {
+  for (const char* unresolved :
+       {"not found in", "unrecognized name", "unknown default", "invalid qpos size"}) {
+    if (message.find(unresolved) != std::string::npos)
+      return "; if this is a part for <include>, give the file that includes it";
+  }
   if (message.find("mass and inertia of moving bodies") != std::string::npos)
     return "; what a joint moves needs a mass and an inertia about all three axes, in that body or in one "
            "that is fixed to it";
@@ -82,26 +102,15 @@ MjModelPtr Load(const std::string& path, const mjVFS* vfs, const std::string& so
   char message[1024] = "";
   MjModelPtr model(mj_loadXML(path.c_str(), vfs, message, sizeof(message)));
   if (!model) {
-    throw InputError(source + ": not a valid MJCF model: " + OneLine(message) + ExplainNewerMjcf(message) +
-                     AdviseOnBody(message));
+    if (std::strstr(message, "Could not allocate memory") != nullptr) throw std::bad_alloc();
+    throw InputError(source + ": not a valid MJCF model: " + OneLine(message) + Advise(message));
   }
   CheckFinite(*model, source);
-  if (message[0] != '\0') {
-    std::fprintf(stderr, "dexcheck: %s: %s\n", source.c_str(), OneLine(message).c_str());
-  }
+  if (message[0] != '\0') WarnOnce(source + ": " + OneLine(message));
   return model;
 }
 
-}  // namespace
-
-MjModelPtr LoadMjcf(const std::filesystem::path& path) {
-  PrepareEngine();
-  CheckReadable(path);
-  return Load(path.string(), nullptr, path.string());
-}
-
-MjModelPtr LoadMjcfText(const std::string& text, const std::string& source) {
-  PrepareEngine();
+MjModelPtr LoadText(const std::string& text, const std::string& source) {
   const auto vfs = std::make_unique<mjVFS>();
   mj_defaultVFS(vfs.get());
   constexpr const char* kName = "model.xml";
@@ -114,6 +123,64 @@ MjModelPtr LoadMjcfText(const std::string& text, const std::string& source) {
     mj_deleteVFS(vfs.get());
     throw;
   }
+}
+
+/// One line: "robot.xml: left out: forces of actuators: <joint kv> (7), ...; left out: ...".
+std::string Summarize(const JoinedMjcf& mjcf) {
+  constexpr size_t kMostWords = 4;
+  std::map<std::string, std::map<std::string, int>> groups;
+  for (const MjcfChange& change : mjcf.changes())
+    ++groups[change.what.substr(0, change.what.find(", since"))][change.word];
+  std::string line = mjcf.source() + ":";
+  for (const auto& [what, words] : groups) {
+    line += (line.back() == ':' ? " " : "; ") + what + ": ";
+    size_t count = 0;
+    for (const auto& [word, times] : words) {
+      if (count++ >= kMostWords) continue;
+      line += (count > 1 ? ", " : "") + word + (times > 1 ? " (" + std::to_string(times) + ")" : "");
+    }
+    if (count > kMostWords) line += " and " + std::to_string(count - kMostWords) + " more";
+  }
+  return line;
+}
+
+/// @param load what loads it when nothing need be changed.
+template <typename Load>
+MjModelPtr LoadAdapted(const std::filesystem::path& folder, JoinedMjcf* mjcf, const Load& load) {
+  AdaptMjcf(folder, mjcf);
+  if (mjcf->changes().empty()) {
+    try {
+      return load();
+    } catch (const InputError& error) {
+      // A range without "limited", which this release asks about.
+      if (std::strstr(error.what(), "autolimits") == nullptr) throw;
+    }
+  }
+  StateNewDefaults(mjcf);
+  MjModelPtr model = LoadText(
+      MoveMjcf(mjcf->Print(), mjcf->source(), folder, std::filesystem::current_path()), mjcf->source());
+  WarnOnce(Summarize(*mjcf));
+  return model;
+}
+
+}  // namespace
+
+MjModelPtr LoadMjcf(const std::filesystem::path& path) {
+  PrepareEngine();
+  CheckReadable(path);
+  JoinedMjcf mjcf(path);
+  if (!mjcf.HasWorld()) {
+    throw InputError(path.string() +
+                     ": has no <worldbody>: it is a part for <include>; give the file that includes it");
+  }
+  return LoadAdapted(std::filesystem::absolute(path).parent_path(), &mjcf,
+                     [&] { return Load(path.string(), nullptr, path.string()); });
+}
+
+MjModelPtr LoadMjcfText(const std::string& text, const std::string& source) {
+  PrepareEngine();
+  JoinedMjcf mjcf(text, source);
+  return LoadAdapted(std::filesystem::current_path(), &mjcf, [&] { return LoadText(text, source); });
 }
 
 MjDataPtr MakeData(const mjModel& model) {

@@ -33,11 +33,20 @@ EngineMotion EngineMotion::MoveTo(const Vector3d& point) const {
 
 Pose EngineTerms::FramePose(int frame) const {
   const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
+  if (site < 0) return MakePose(data_->xmat + 9 * body_of(frame), data_->xpos + 3 * body_of(frame));
   return MakePose(data_->site_xmat + 9 * site, data_->site_xpos + 3 * site);
 }
 
 int EngineTerms::body_of(int frame) const {
-  return engine_->site_bodyid[adapter_->frame_sites()[static_cast<size_t>(frame)]];
+  const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
+  if (site >= 0) return engine_->site_bodyid[site];
+  const int link = adapter_->model().frames()[static_cast<size_t>(frame)].link;
+  return adapter_->link_bodies()[static_cast<size_t>(link + 1)];
+}
+
+const mjtNum* EngineTerms::PlaceOf(int frame) const {
+  const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
+  return site < 0 ? data_->xpos + 3 * body_of(frame) : data_->site_xpos + 3 * site;
 }
 
 Vector3d EngineTerms::JointAxis(int joint) const {
@@ -85,8 +94,7 @@ Vector6d EngineTerms::CalcPointColumn(int dof, const Vector3d& point) const {
 }
 
 void EngineTerms::CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J) const {
-  const Vector3d point =
-      MapVector(data_->site_xpos + 3 * adapter_->frame_sites()[static_cast<size_t>(frame)]);
+  const Vector3d point = MapVector(PlaceOf(frame));
   J.leftCols(base_size_).setZero();
   for (int k = 0; k < carrying_dofs_; ++k) {
     const Vector6d column = CalcPointColumn(map_.base_dofs()[static_cast<size_t>(k)], point);
@@ -117,7 +125,8 @@ EngineMotion EngineTerms::ReadMotion(mjtObj type, int id, const mjtNum* place) c
 
 EngineMotion EngineTerms::FrameMotion(int frame) const {
   const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
-  return ReadMotion(mjOBJ_SITE, site, data_->site_xpos + 3 * site);
+  return site < 0 ? ReadMotion(mjOBJ_XBODY, body_of(frame), PlaceOf(frame))
+                  : ReadMotion(mjOBJ_SITE, site, PlaceOf(frame));
 }
 
 Matrix3d EngineTerms::ObjectRotation() const {

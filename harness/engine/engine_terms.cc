@@ -14,15 +14,6 @@ namespace {
 
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-int FindTipGeom(const mjModel& model, int site) {
-  const int body = model.site_bodyid[site];
-  for (int g = 0; g < model.ngeom; ++g) {
-    if (model.geom_bodyid[g] == body && model.geom_type[g] == mjGEOM_SPHERE && CanTouch(model, g)) return g;
-  }
-  throw InputError("MJCF: site " + Quote(NameOf(model, mjOBJ_SITE, site)) +
-                   ": its body needs a sphere that can touch");
-}
-
 std::vector<int> ListAll(size_t count) {
   std::vector<int> all(count);
   std::iota(all.begin(), all.end(), 0);
@@ -113,10 +104,8 @@ void EngineTerms::RequireObject() const {
 }
 
 void EngineTerms::FindTouchingGeoms(std::span<const int> fingertips) {
-  for (const int frame : fingertips) {
-    chains_[static_cast<size_t>(frame)].tip_geom =
-        FindTipGeom(*engine_, adapter_->frame_sites()[static_cast<size_t>(frame)]);
-  }
+  for (const int frame : fingertips)
+    chains_[static_cast<size_t>(frame)].tip_geom = adapter_->RequireTipGeom(frame);
   for (int g = 0; g < engine_->ngeom; ++g) {
     if (engine_->geom_bodyid[g] == object_body_ && CanTouch(*engine_, g)) object_geoms_.push_back(g);
   }

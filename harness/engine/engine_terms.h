@@ -135,6 +135,8 @@ class EngineTerms {
   EngineTerms(const Adapter& adapter, Coordinates coordinates, std::span<const int> frames);
   [[nodiscard]] const Chain& chain_of(int frame) const { return chains_[static_cast<size_t>(frame)]; }
   [[nodiscard]] int body_of(int frame) const;
+  /// A frame's origin in the world.
+  [[nodiscard]] const mjtNum* PlaceOf(int frame) const;
   /// Motion of a point that a dof moves, per its rate: [linear; angular], world axes.
   [[nodiscard]] Vector6d CalcPointColumn(int dof, const Vector3d& point) const;
   void FindObject();

@@ -59,6 +59,8 @@ void JoinedMjcf::Parse(std::string_view text) {
   }
 }
 
+bool JoinedMjcf::HasWorld() const { return root_->FirstChildElement("worldbody") != nullptr; }
+
 void JoinedMjcf::Join(const std::filesystem::path& folder) {
   while (XMLElement* const include = FindInclude(root_)) Splice(include, folder);
 }

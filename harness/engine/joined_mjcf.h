@@ -38,6 +38,8 @@ class JoinedMjcf {
 
   /// The element `mujoco`.
   [[nodiscard]] tinyxml2::XMLElement* root() { return root_; }
+  /// Whether it has a `worldbody`: parts that are meant for `include` have none.
+  [[nodiscard]] bool HasWorld() const;
   [[nodiscard]] const std::string& source() const { return source_; }
   /// "FILE:LINE" of an element; that of the root for one that was added since.
   [[nodiscard]] std::string FindPlace(const tinyxml2::XMLElement& element) const;

@@ -21,9 +21,7 @@ struct MjcfReferences {
   std::vector<std::string> includes;
   std::vector<std::string> meshes;  ///< Height fields and skins too: they share the meshes' folder.
   std::vector<std::string> textures;
-  std::string mesh_folder;
-  std::string texture_folder;
-  bool strips_paths = false;  ///< The engine then takes a file's name only, without its folder.
+  AssetFolders folders;
 };
 
 /// Reads an XML document as the engine does, with the same parser.
@@ -56,20 +54,31 @@ void ReadElement(const XMLElement& element, MjcfReferences* found) {
       AddAttribute(element, side, &found->textures);
     }
   }
-  if (kind != "compiler") return;
-  if (const char* folder = element.Attribute("meshdir")) found->mesh_folder = folder;
-  if (const char* folder = element.Attribute("texturedir")) found->texture_folder = folder;
-  if (const char* strip = element.Attribute("strippath")) found->strips_paths = std::string(strip) == "true";
+  if (kind == "compiler") found->folders.Read(element);
 }
 
-/// All elements below the document, without recursion: the depth is the file's choice.
-template <typename Document, typename Visit>
-void VisitElements(Document* document, const Visit& visit) {
-  auto* const root = document->RootElement();
-  auto* element = root;
+bool LiesInside(const std::filesystem::path& file) {
+  return !file.is_absolute() && (file.empty() || *file.begin() != "..");
+}
+
+}  // namespace
+
+void AssetFolders::Read(const XMLElement& compiler) {
+  if (const char* folder = compiler.Attribute("meshdir")) meshes = folder;
+  if (const char* folder = compiler.Attribute("texturedir")) textures = folder;
+  if (const char* strip = compiler.Attribute("strippath")) strips_paths = std::string(strip) == "true";
+}
+
+std::filesystem::path AssetFolders::Find(const std::string& folder, const std::string& name) const {
+  const std::filesystem::path path(name);
+  return std::filesystem::path(folder) / (strips_paths ? path.filename() : path);
+}
+
+void VisitElements(XMLElement* root, const std::function<void(XMLElement*)>& visit) {
+  XMLElement* element = root;
   while (element != nullptr) {
     visit(element);
-    if (auto* child = element->FirstChildElement()) {
+    if (XMLElement* child = element->FirstChildElement()) {
       element = child;
       continue;
     }
@@ -79,12 +88,6 @@ void VisitElements(Document* document, const Visit& visit) {
     element = element == root ? nullptr : element->NextSiblingElement();
   }
 }
-
-bool LiesInside(const std::filesystem::path& file) {
-  return !file.is_absolute() && (file.empty() || *file.begin() != "..");
-}
-
-}  // namespace
 
 std::vector<std::string> ListMjcfFiles(const std::filesystem::path& mjcf) {
   const std::filesystem::path folder = mjcf.parent_path();
@@ -108,16 +111,17 @@ std::vector<std::string> ListMjcfFiles(const std::filesystem::path& mjcf) {
     tinyxml2::XMLDocument document;
     const bool is_included = files.size() > 1;
     ReadXml(folder / name, is_included ? mjcf.string() + ": file " + Quote(name) : mjcf.string(), &document);
-    VisitElements(&document, [&](const XMLElement* element) { ReadElement(*element, &found); });
+    VisitElements(document.RootElement(), [&](const XMLElement* element) { ReadElement(*element, &found); });
   }
   const auto add_assets = [&](const std::vector<std::string>& names, const std::string& asset_folder) {
-    for (const std::string& given : names) {
-      const std::filesystem::path name(given);
-      add(std::filesystem::path(asset_folder) / (found.strips_paths ? name.filename() : name));
+    for (const std::string& name : names) {
+      const std::filesystem::path file = found.folders.Find(asset_folder, name);
+      std::error_code error;
+      if (!LiesInside(file.lexically_normal()) || std::filesystem::exists(folder / file, error)) add(file);
     }
   };
-  add_assets(found.meshes, found.mesh_folder);
-  add_assets(found.textures, found.texture_folder);
+  add_assets(found.meshes, found.folders.meshes);
+  add_assets(found.textures, found.folders.textures);
   std::sort(files.begin() + 1, files.end());
   files.erase(std::unique(files.begin(), files.end()), files.end());
   return files;
@@ -142,7 +146,7 @@ std::string MoveMjcf(const std::string& text, const std::string& source, const s
   };
   bool has_mesh_folder = false;
   bool has_texture_folder = false;
-  VisitElements(&document, [&](XMLElement* element) {
+  VisitElements(root, [&](XMLElement* element) {
     const std::string_view kind = element->Name();
     if (kind == "include") move("file", element, nullptr);
     if (kind != "compiler") return;

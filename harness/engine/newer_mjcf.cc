@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <map>
 #include <memory>
-#include <optional>
 #include <set>
 #include <sstream>
 
@@ -83,8 +82,8 @@ class Downgrade {
   explicit Downgrade(JoinedMjcf* mjcf) : mjcf_(*mjcf) {}
 
   void Run() {
-    Walk(mjcf_.root(), schema_.root());
-    TakeNewDefaults(mjcf_.root());
+    static const Schema schema;
+    Walk(mjcf_.root(), schema.root());
   }
 
  private:
@@ -115,7 +114,8 @@ class Downgrade {
         Walk(child, *known->second);
       } else {
         const std::string word = "<" + std::string(child->Name()) + ">";
-        const NewerWord* const newer = FindNewerWord(child->Name(), "");
+        const NewerWord* newer = FindNewerWord(element->Name() + ("/" + std::string(child->Name())), "");
+        if (newer == nullptr) newer = FindNewerWord(child->Name(), "");
         if (newer == nullptr || newer->effect == MjcfEffect::kDynamics) Refuse(*child, word, newer);
         Note(*child, word, DescribeLoss(*newer));
         element->DeleteChild(child);
@@ -191,55 +191,25 @@ class Downgrade {
     Note(*joint, word, "its zero coefficients left out");
   }
 
-  /// Since 3.0.0 a range alone limits.
-  void TakeNewDefaults(XMLElement* root) {
-    XMLElement* compiler = root->FirstChildElement("compiler");
-    if (compiler == nullptr) {
-      compiler = root->GetDocument()->NewElement("compiler");
-      root->InsertFirstChild(compiler);
-    }
-    if (compiler->Attribute("autolimits") != nullptr) return;
-    compiler->SetAttribute("autolimits", "true");
-    Note(*compiler, "<compiler autolimits>", "stated: true by default since MuJoCo 3.0.0");
-  }
-
   JoinedMjcf& mjcf_;
-  Schema schema_;
 };
-
-/// What stands between quotes behind `before`.
-std::optional<std::string> FindQuoted(const std::string& message, const std::string& before) {
-  const size_t start = message.find(before + "'");
-  if (start == std::string::npos) return std::nullopt;
-  const size_t first = start + before.size() + 1;
-  const size_t end = message.find('\'', first);
-  if (end == std::string::npos) return std::nullopt;
-  return message.substr(first, end - first);
-}
 
 }  // namespace
 
-void DowngradeMjcf(JoinedMjcf* mjcf) { Downgrade(mjcf).Run(); }
+void LeaveOutNewerWords(JoinedMjcf* mjcf) { Downgrade(mjcf).Run(); }
 
-std::string ExplainNewerMjcf(const std::string& message) {
-  const std::optional<std::string> element = FindQuoted(message, "Element ");
-  if (!element) return {};
-  const std::string downgrade = "; dexcheck import FILE --downgrade --out COPY.xml writes a copy ";
-  // What the copy says in the older way, of two words.
-  const std::optional<std::string> keyword = FindQuoted(message, "invalid keyword: ");
-  if (keyword && *element == "option" && *keyword == "implicitfast")
-    return "; it is new since MuJoCo 2.3.3 and acts on the integrator" + downgrade + "with \"implicit\"";
-  const std::optional<std::string> attribute = FindQuoted(message, "unrecognized attribute: ");
-  if (attribute && *element == "compiler" && *attribute == "assetdir")
-    return "; it is new since MuJoCo 2.3.0" + downgrade + "with meshdir and texturedir";
-  if (!attribute && message.find("unrecognized element") == std::string::npos) return {};
-  const NewerWord* const word = FindNewerWord(*element, attribute.value_or(""));
-  if (word == nullptr) return {};
-  const std::string since =
-      "; it is new since MuJoCo " + std::string(word->since) + " and acts on " + NameOf(word->effect);
-  if (word->effect == MjcfEffect::kDynamics && word->neutral.empty())
-    return since + ": " + std::string(word->advice);
-  return since + downgrade + "without what has no effect on the dynamics";
+void StateNewDefaults(JoinedMjcf* mjcf) {
+  XMLElement* const root = mjcf->root();
+  XMLElement* compiler = root->FirstChildElement("compiler");
+  for (XMLElement* each = compiler; each != nullptr; each = each->NextSiblingElement("compiler")) {
+    if (each->Attribute("autolimits") != nullptr) return;
+  }
+  if (compiler == nullptr) {
+    compiler = root->GetDocument()->NewElement("compiler");
+    root->InsertFirstChild(compiler);
+  }
+  compiler->SetAttribute("autolimits", "true");
+  mjcf->Note(*compiler, "<compiler autolimits>", "stated: true by default since MuJoCo 3.0.0");
 }
 
 }  // namespace dexcheck

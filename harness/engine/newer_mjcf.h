@@ -22,7 +22,7 @@ const char* NameOf(MjcfEffect effect);
 
 /// An element (`attribute` is empty) or an attribute that 2.2.2 does not have.
 struct NewerWord {
-  std::string_view element;
+  std::string_view element;  ///< Or "PARENT/ELEMENT".
   std::string_view attribute;
   std::string_view since;  ///< Release, "3.1.4".
   MjcfEffect effect;
@@ -33,14 +33,12 @@ struct NewerWord {
 /// The word's entry; nullptr when it is not known. @param attribute empty for the element itself.
 const NewerWord* FindNewerWord(std::string_view element, std::string_view attribute);
 
-/// Leaves out what this program's engine does not know and what has no effect on the dynamics, and states
-/// what later releases take by default (autolimits).
+/// Leaves out what this program's engine does not know and what has no effect on the dynamics.
 /// @throws InputError "FILE:LINE: <joint damping>: ...", which says since which release and what to do, for
 /// what acts on the dynamics or is not known at all.
-void DowngradeMjcf(JoinedMjcf* mjcf);
+void LeaveOutNewerWords(JoinedMjcf* mjcf);
 
-/// Of what the engine said of an MJCF that it cannot load, the explanation when a newer release is the
-/// reason: "; since MuJoCo 3.0.0, ..."; empty otherwise.
-std::string ExplainNewerMjcf(const std::string& message);
+/// States what later releases take by default, and 2.2.2 refuses to guess: a range alone limits (autolimits).
+void StateNewDefaults(JoinedMjcf* mjcf);
 
 }  // namespace dexcheck

@@ -18,7 +18,7 @@ constexpr std::string_view kActuatorInertia = "give it to the joint, as armature
 /// Of what acts on no term, or on motors and contacts alone: elements, or attributes that each of the
 /// elements has.
 struct PlainWords {
-  std::string_view elements;    ///< Separated by blanks; "*" stands for all.
+  std::string_view elements;    ///< Separated by blanks; "*" stands for all, "a/b" for b in a.
   std::string_view attributes;  ///< Empty for the elements themselves.
   std::string_view since;
   MjcfEffect effect;
@@ -35,7 +35,9 @@ constexpr PlainWords kPlainWords[] = {
     {"camprojection", "", "3.0.0", kNone},
     {"distance normal fromto", "", "3.1.6", kNone},
     {"e_potential e_kinetic", "", "3.3.0", kNone},
-    {"insidesite tactile", "", "3.3.5", kNone},
+    {"insidesite tactile sensor/contact", "", "3.3.5", kNone},
+    {"extension sensor/plugin", "", "2.3.0", kNone},
+    {"actuator/plugin", "", "2.3.0", kActuators},
     {"compiler", "saveinertial", "3.3.1", kNone},
     {"compiler", "conflict", "3.10.0", kNone},
     {"size", "memory", "2.3.0", kNone},
@@ -100,7 +102,8 @@ constexpr NewerWord kWords[] = {
     {"flex", "", "3.0.0", kDynamics, "", "deformable bodies are not in 2.2.2"},
     {"flexvert", "", "3.5.0", kDynamics, "", "deformable bodies are not in 2.2.2"},
     {"flexstrain", "", "3.6.0", kDynamics, "", "deformable bodies are not in 2.2.2"},
-    {"extension", "", "2.3.0", kDynamics, "", "plugins may apply forces; remove them by hand"},
+    {"composite", "initial", "2.3.0", kDynamics, "", kExpand},
+    {"composite", "curve", "2.3.0", kDynamics, "", kExpand},
     {"plugin", "", "2.3.0", kDynamics, "", "plugins may apply forces; remove them by hand"},
     {"compiler", "alignfree", "3.2.3", kDynamics, "false", "it moves frames of free bodies; set it to false"},
     {"freejoint", "align", "3.2.3", kDynamics, "false",

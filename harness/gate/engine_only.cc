@@ -50,14 +50,7 @@ class EngineOnly {
   /// A number that must be `neutral`.
   void Expect(const std::string& check, const std::string& where, double neutral, double engine,
               double tolerance = 0.0) {
-    auto& records = result_->records;
-    auto record = std::find_if(records.begin(), records.end(),
-                               [&](const CheckRecord& one) { return one.name == check; });
-    if (record == records.end()) {
-      record = records.insert(record, CheckRecord{});
-      record->name = check;
-      record->bound = kUnmodelledRounding;
-    }
+    CheckRecord* const record = result_->Define(check);
     double error = std::abs(engine - neutral);
     if (error <= tolerance) error = 0.0;
     // How large a force may be that should not be there is nothing that a relative tolerance says.

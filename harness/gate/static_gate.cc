@@ -42,13 +42,7 @@ class StaticGate {
   /// Compares relative to the larger of the two, or to `scale` where zero is a proper value.
   void Compare(const std::string& check, const Location& where, double model, double engine,
                double scale = 0.0) {
-    auto record = std::find_if(result_.records.begin(), result_.records.end(),
-                               [&](const CheckRecord& one) { return one.name == check; });
-    if (record == result_.records.end()) {
-      record = result_.records.insert(record, CheckRecord{});
-      record->name = check;
-      record->bound = kRounding;
-    }
+    CheckRecord* const record = result_.Define(check);
     entry_ = check == last_check_ && where == last_location_ ? entry_ + 1 : 0;
     last_check_ = check;
     last_location_ = where;
@@ -137,25 +131,20 @@ class StaticGate {
     });
   }
 
-  /// The sphere at a frame's site, the one that can touch when there are several; -1 when there is none.
-  [[nodiscard]] int FindTipGeom(int site) const {
+  /// The fingertip's sphere if it is at the frame's site; otherwise -1.
+  [[nodiscard]] int FindTipGeom(int frame) const {
     constexpr double kSamePlace = 1e-9;  // m; two decimal numbers for one point
-    int found = -1;
-    for (int geom = 0; geom < engine_.ngeom; ++geom) {
-      if (engine_.geom_bodyid[geom] != engine_.site_bodyid[site]) continue;
-      if (engine_.geom_type[geom] != mjGEOM_SPHERE) continue;
-      const Vector3d apart = MapVector(engine_.geom_pos + 3 * geom) - MapVector(engine_.site_pos + 3 * site);
-      if (apart.norm() >= kSamePlace) continue;
-      if (CanTouch(engine_, geom)) return geom;
-      if (found < 0) found = geom;
-    }
-    return found;
+    const int geom = adapter_.FindTipGeom(frame);
+    if (geom < 0) return -1;
+    const int site = adapter_.frame_sites()[static_cast<size_t>(frame)];
+    const Vector3d apart = MapVector(engine_.geom_pos + 3 * geom) - MapVector(engine_.site_pos + 3 * site);
+    return apart.norm() < kSamePlace ? geom : -1;
   }
 
   void CompareFingertips() {
     for (const int frame : model_.fingertips()) {
       const Location where{Location::Kind::kFrame, frame, -1};
-      const int geom = FindTipGeom(adapter_.frame_sites()[static_cast<size_t>(frame)]);
+      const int geom = FindTipGeom(frame);
       const double radius = geom < 0 ? kMissing : engine_.geom_size[3 * geom];
       Compare("fingertip_radius", where, *model_.frames()[static_cast<size_t>(frame)].sphere_radius, radius);
     }
@@ -238,7 +227,7 @@ class StaticGate {
   /// two touch by their contype and conaffinity, or not at all.
   void CompareFriction(const ObjectModel& object, int frame) {
     const Location where{Location::Kind::kFrame, frame, -1};
-    const int tip = FindTipGeom(adapter_.frame_sites()[static_cast<size_t>(frame)]);
+    const int tip = FindTipGeom(frame);
     if (tip < 0) return;  // a finding of its own
     bool touches = false;
     for (int pair = 0; pair < engine_.npair; ++pair) {
@@ -355,6 +344,24 @@ class StaticGate {
 };
 
 }  // namespace
+
+CheckRecord* GateResult::Define(const std::string& check) {
+  auto record =
+      std::find_if(records.begin(), records.end(), [&](const CheckRecord& one) { return one.name == check; });
+  if (record == records.end()) {
+    record = records.insert(record, CheckRecord{});
+    record->name = check;
+    record->bound = kRounding;
+  }
+  return &*record;
+}
+
+void GateResult::Add(GateFinding finding) {
+  const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
+  Define(finding.check)
+      ->Compare(finding.model, finding.engine, size > 0.0 ? size : 1.0, finding.location, -1);
+  findings.push_back(std::move(finding));
+}
 
 GateResult RunStaticGate(const Adapter& adapter) { return StaticGate(adapter).Run(); }
 

@@ -20,6 +20,7 @@ struct GateFinding {
   Location location;
   int entry = 0;  ///< Which of the numbers that the check compares there: of a vector, a range, a 3x3 tensor.
   bool engine_only = false;  ///< The analytic model has no such number: it takes the neutral value.
+  std::string effect{};      ///< What it does to the motion, when one of the two leaves it out.
 };
 
 /// Something that the MJCF sets and the analytic model has no number for, and that is no disagreement: it
@@ -33,6 +34,11 @@ struct GateResult {
   std::vector<CheckRecord> records;
   std::vector<GateFinding> findings;  ///< Every disagreement, in the file's order.
   std::vector<GateNote> notes;
+
+  /// The check of that name, a new one when there is none.
+  CheckRecord* Define(const std::string& check);
+  /// Adds a disagreement, and its error to its check.
+  void Add(GateFinding finding);
 };
 
 /// Compares constants: mass of each link; damping, armature and range of each joint; gravity; the wheels'

@@ -93,6 +93,11 @@ std::string LogReader::ReadText(const std::string& name) const {
   return text.substr(0, text.find('\0'));
 }
 
+std::string LogReader::FindText(const std::string& name) const {
+  const bool has = structure_.texts.count(name) != 0 || Find(structure_.reserved_texts, name) != nullptr;
+  return has ? ReadText(name) : "";
+}
+
 std::vector<std::string> LogReader::ListFiles(const std::string& group) const {
   const std::string prefix = group + "/";
   std::vector<std::string> names;

@@ -32,6 +32,8 @@ class LogReader {
   /// Names of the texts, sorted.
   [[nodiscard]] std::vector<std::string> ListTexts() const;
   [[nodiscard]] std::string ReadText(const std::string& name) const;
+  /// Likewise; empty when there is none of that name.
+  [[nodiscard]] std::string FindText(const std::string& name) const;
 
   /// Relative names of the files embedded under a group, sorted; none is an error.
   [[nodiscard]] std::vector<std::string> ListFiles(const std::string& group) const;

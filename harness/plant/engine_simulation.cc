@@ -119,8 +119,11 @@ void EngineSimulation::CheckHealth(double expected_time) const {
 
 void EngineSimulation::Change(const std::function<void(mjModel*)>& change) {
   change(model_.get());
+  // mj_setConst would join bodies where they touch at qpos0, not where they were joined.
+  const VectorXd joined = Copy(model_->eq_data, mjNEQDATA * model_->neq);
   const MjDataPtr scratch = MakeData(*model_);
   mj_setConst(model_.get(), scratch.get());
+  std::copy_n(joined.data(), joined.size(), model_->eq_data);
 }
 
 EngineState EngineSimulation::GetState() const {

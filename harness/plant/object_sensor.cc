@@ -109,8 +109,36 @@ void ObjectSensor::Filter(const Pose& seen, bool is_new) {
   const Vector3d e_R = LogSo3(estimate_.linear().transpose() * seen.linear());
   estimate_.translation() += position_gains_.k_x() * e_p;
   p_dot_ += position_gains_.k_v() * e_p;
-  estimate_.linear() = estimate_.linear() * ExpSo3(orientation_gains_.k_x() * e_R);
+  // Products of rotations leave the group by rounding.
+  estimate_.linear() = Eigen::Quaterniond(estimate_.linear() * ExpSo3(orientation_gains_.k_x() * e_R))
+                           .normalized()
+                           .toRotationMatrix();
   omega_ += orientation_gains_.k_v() * e_R;
+}
+
+double ObjectSensor::FindAge(std::uint64_t k) const {
+  // The filter makes up for the latency.
+  if (is_exact_ || options_.object_velocity == VelocitySource::kKalman) return 0.0;
+  const std::uint64_t age = delayed_.size() - 1;
+  return static_cast<double>(k < age ? k : age + (k - age) % static_cast<std::uint64_t>(period_));
+}
+
+void ObjectSensor::AddVelocity(const Vector3d& v, std::uint64_t k) {
+  if (!has_seen_) return;
+  const auto size = static_cast<std::uint64_t>(delayed_.size());
+  const auto period = static_cast<std::uint64_t>(period_);
+  const auto add = [&](double age, ObjectMotion* motion) {
+    motion->X_Bo.translation() -= age * time_step_ * v;
+    motion->V_Bo.head<3>() += motion->X_Bo.linear().transpose() * v;
+  };
+  for (std::uint64_t j = k - std::min(k, size); j < k; ++j)
+    add(static_cast<double>(k - j + j % period), &delayed_[j % size]);
+  add(static_cast<double>(1 + (k - 1) % period), &seen_);
+  // The filter's estimate is that of the step before, but for the latency.
+  const bool filters = options_.object_velocity == VelocitySource::kKalman;
+  const double late = filters ? static_cast<double>(size - 1) : FindAge(k - 1);
+  estimate_.translation() -= (1.0 + late) * time_step_ * v;
+  p_dot_ += v;
 }
 
 void ObjectSensor::Translate(const Vector3d& way) {

@@ -25,6 +25,11 @@ class ObjectSensor {
   ObjectMotion Tell(const ObjectMotion& truth, std::uint64_t k);
   /// Everything is elsewhere from now on, by `way` (m, world).
   void Translate(const Vector3d& way);
+  /// The object moves at `v` (m/s, world) more from step k on: what is remembered becomes as if it always
+  /// had.
+  void AddVelocity(const Vector3d& v, std::uint64_t k);
+  /// By how many steps the pose is old that is told at step k.
+  [[nodiscard]] double FindAge(std::uint64_t k) const;
 
  private:
   [[nodiscard]] ObjectMotion Measure(const ObjectMotion& truth, std::uint64_t k) const;

@@ -16,15 +16,6 @@ constexpr int kWorldBody = 0;
 
 Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
-/// The geom on the fingertip's body that can touch, by its site: the sphere at the site's place.
-int FindTipGeom(const mjModel& model, int site, const std::string& name) {
-  const int body = model.site_bodyid[site];
-  for (int g = 0; g < model.ngeom; ++g) {
-    if (model.geom_bodyid[g] == body && model.geom_type[g] == mjGEOM_SPHERE && CanTouch(model, g)) return g;
-  }
-  throw InputError("MJCF: fingertip " + Quote(name) + ": its body needs a sphere that can touch");
-}
-
 /// result = M a of an a that is zero but on the base's dofs: `carrying` at the root, one after the other, and
 /// wheels that hang on these.
 void MultiplyBaseInertia(const mjModel& m, const mjData& d, std::span<const int> base_dofs, int carrying,
@@ -60,7 +51,7 @@ Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, cons
     const Frame& tip = adapter.model().frames()[static_cast<size_t>(frame)];
     tips_.emplace_back(tip.sphere_radius.value());
     tip_sites_.push_back(adapter.frame_sites()[static_cast<size_t>(frame)]);
-    tip_geoms_.push_back(FindTipGeom(adapter.engine(), tip_sites_.back(), tip.name));
+    tip_geoms_.push_back(adapter.RequireTipGeom(frame));
   }
   for (const int site : tip_sites_) tip_bodies_.push_back(adapter.engine().site_bodyid[site]);
   for (const EngineWheel& wheel : adapter.wheels()) {

@@ -1,6 +1,9 @@
 #include "harness/plant/sensing.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "controller/model/platform.h"
 
 namespace dexcheck {
 namespace {
@@ -154,6 +157,22 @@ void Sensing::TellBase(const MeasuredState& truth, MeasuredState* told) {
     odometry_ += time_step_ * Vector3d(v * std::cos(phi), v * std::sin(phi), w);
   }
   told->q.head<3>() = odometry_;
+}
+
+void Sensing::AddVelocity(const Vector3d& v) {
+  const auto size = static_cast<std::uint64_t>(delayed_.size());
+  for (std::uint64_t j = k_ - std::min(k_, size); j < k_; ++j) {
+    MeasuredState& state = delayed_[j % size].state;
+    const double age = static_cast<double>(k_ - j);  // steps
+    if (base_positions_ > 0) {
+      const Vector3d heading(std::cos(state.q[2]), std::sin(state.q[2]), 0.0);
+      state.q.head<2>() -= age * time_step_ * v.head<2>();
+      state.xi.head<2>() += CalcDriveVelocity(base_, Vector2d::Constant(v.dot(heading) / base_.wheel_radius));
+    }
+    state.X_Bo.translation() -= (age + object_.FindAge(j)) * time_step_ * v;
+    state.V_Bo.head<3>() += state.X_Bo.linear().transpose() * v;
+  }
+  object_.AddVelocity(v, k_);
 }
 
 void Sensing::Translate(const Vector3d& way) {

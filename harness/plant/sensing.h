@@ -26,6 +26,9 @@ class Sensing {
   void Tell(const PlantReading& truth, Reading* told);
   /// Robot and object are elsewhere from now on, by `way` (m, world): what is remembered moves along.
   void Translate(const Vector3d& way);
+  /// Platform and object move at `v` (m/s, world) more from now on, as a run that starts moving does: what is
+  /// remembered becomes as if they always had.
+  void AddVelocity(const Vector3d& v);
 
  private:
   void TellJoints(MeasuredState* told);

@@ -130,8 +130,10 @@ class Robot {
     return J;
   }
 
-  ComparisonResult Compare(const py::object& other, long samples, std::uint64_t seed, int digits) const {
+  ComparisonResult Compare(const py::object& other, long samples, std::uint64_t seed, int digits,
+                           const std::vector<std::string>& ignore) const {
     ConsistencyOptions options;
+    options.ignore = ignore;
     options.samples = samples;
     options.seed = seed;
     ComparisonResult result;
@@ -256,10 +258,12 @@ PYBIND11_MODULE(dexcheck, m) {
            "Body Jacobian of a frame, 6 x nv: [linear; angular] along the frame's axes.")
       .def("audit", &Robot::Audit, "What cannot be, or is odd, one line each.")
       .def("compare", &Robot::Compare, py::arg("other"), py::arg("samples") = 1000, py::arg("seed") = 1,
-           py::arg("digits") = 0,
+           py::arg("digits") = 0, py::arg("ignore") = std::vector<std::string>(),
            "Compares with another robot or file (TOML, URDF, MJCF), or with functions M(q), c(q, v), g(q), "
            "h(q, v), "
-           "friction(q, v) of an object or a dictionary; to rounding, or to a number of digits.")
+           "friction(q, v) of an object or a dictionary; to rounding, or to a number of digits; without the "
+           "constants of joints in "
+           "ignore (armature, damping, friction).")
       .def("__repr__", [](const Robot& robot) {
         return fmt::format("<dexcheck.Robot {} of {}: {} joints>", robot.model().name(),
                            robot.file().string(), robot.model().joints().size());

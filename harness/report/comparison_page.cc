@@ -228,6 +228,7 @@ std::string MakeComparisonPage(const std::vector<const RunData*>& runs, const st
 }
 
 std::string DescribeComparison(const RunComparison& comparison, double tolerance) {
+  if (comparison.signals.empty()) return "NOT COMPARED: no signal but time and checks is in all runs.";
   if (comparison.IsSame()) {
     return tolerance == 0.0
                ? fmt::format("SAME: {} signals are equal bit for bit.", comparison.signals.size())

@@ -86,14 +86,14 @@ class MotionFigures {
     const SignalInfo* const error = run_.Find("joints/error");
     const SignalInfo* const actual = run_.Find("q");
     if (desired == nullptr || error == nullptr || actual == nullptr) return;
-    if (desired->width != actual->width || error->width != actual->width) return;
-    const RowMatrixXd q = run_.log().ReadSignal("q");
+    if (desired->width > actual->width || error->width != desired->width) return;
+    const RowMatrixXd q = run_.log().ReadSignal("q").rightCols(desired->width);  // without the base's
     const RowMatrixXd q_d = run_.log().ReadSignal("joints/q_d");
     const RowMatrixXd e = run_.log().ReadSignal("joints/error");
-    Figure motion{"joints", "",   "Motion of the joints", "position (rad, m)", "", false, kLeastSpan, {}, {},
-                  "",       false};
-    Figure errors{"joint_errors", "", "Errors of the joints", "error (rad, m)", "", true, 0.0, {}, {}, "",
-                  false};
+    Figure motion{"joints", "",  "Motion of the joints", "position (rad, m)", "", false, kLeastSpan, {}, {},
+                  "",       true};
+    Figure errors{
+        "joint_errors", "", "Errors of the joints", "error (rad, m)", "", true, 0.0, {}, {}, "", true};
     for (int k = 0; k < desired->width; ++k) {
       motion.curves.push_back({RunData::NameColumn(*desired, k), q.col(k), k, 0, false});
       errors.curves.push_back({RunData::NameColumn(*desired, k), e.col(k).cwiseAbs(), k, 0, false});
@@ -205,6 +205,7 @@ class MotionFigures {
     figure.printed = false;
     add("idle_finger_torques", "", "Torques of the other fingers' joints", idle);
     const bool are_all = run_.Find("contact/overlap") == nullptr && !is_papers;
+    figure.printed = are_all;
     add("other_torques", "", are_all ? "Torques of the joints" : "Torques of other joints",
         [&](const std::string& joint) {
           return !grasps(joint) && !idle(joint) && !left(joint) && !trunk(joint);

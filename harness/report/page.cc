@@ -62,14 +62,16 @@ struct Question {
   CheckKind kind;
   const char* name;
   const char* text;
+  const char* of_joints = text;  ///< The same of a robot that holds nothing.
 };
 
 constexpr std::array<Question, 5> kQuestions = {
     {{CheckKind::kModel, "Model", "same state, both descriptions"},
-     {CheckKind::kLaw, "Law", "torques against (53)-(55)"},
+     {CheckKind::kLaw, "Law", "torques against (53)-(55)", "torques against the law of the joints"},
      {CheckKind::kBalance, "Balance", "engine's motion in the model's equations"},
-     {CheckKind::kPrediction, "Prediction", "accelerations and contact forces"},
-     {CheckKind::kAssumption, "Assumptions", "no slip, level base, forces in cones"}}};
+     {CheckKind::kPrediction, "Prediction", "accelerations and contact forces", "accelerations"},
+     {CheckKind::kAssumption, "Assumptions", "no slip, level base, forces in cones",
+      "joints within their ranges, motors within their limits, bodies apart"}}};
 
 /// A button that brings the page to a time. @param words before the time.
 Html MakeTimeButton(const char* style, const std::string& words, double time) {
@@ -144,6 +146,12 @@ class Page {
     return first;
   }
 
+  /// Whether the robot holds nothing, and its joints follow a motion of their own.
+  [[nodiscard]] bool MovesJoints() const { return run_.Find("joints/q_d") != nullptr; }
+  [[nodiscard]] const char* TextOf(const Question& question) const {
+    return MovesJoints() ? question.of_joints : question.text;
+  }
+
   /// What the checks of a question say together.
   struct Answer {
     std::vector<const CheckLine*> checks;
@@ -179,7 +187,7 @@ class Page {
     for (const Question& question : kQuestions) {
       const Answer answer = FindAnswer(question);
       const Html text = FormatHtml("<b>{}: {}</b><span>{}</span><span>{}</span>", question.name, answer.word,
-                                   question.text, answer.extent);
+                                   TextOf(question), answer.extent);
       if (answer.checks.empty()) {
         Add("<div class=\"card question {}\">{}</div>\n", answer.tone, text);
       } else {
@@ -288,7 +296,7 @@ class Page {
     Add("<details class=\"answer {}\" id=\"checks-{}\"{}><summary><b>{}</b> <span class=\"badge\">{}</span> "
         "{}: {}</summary>\n",
         answer.tone, NameOf(question.kind), answer.fails ? " open" : "", question.name, answer.word,
-        question.text, answer.extent);
+        TextOf(question), answer.extent);
     if (!shown.empty()) AddCheckTable(shown);
     if (!equal_constants.empty()) {
       Add("<details><summary>{} constants of both descriptions agree</summary>\n", equal_constants.size());
@@ -331,10 +339,9 @@ class Page {
   }
 
   void AddFigures() {
-    html_ +=
-        "<h2 id=\"figures\">Figures</h2>\n<p class=\"soft\">Numbers are those of the paper's figures; SVG "
-        "and PNG "
-        "files lie in the run's folder <code>figures</code>.</p>\n<div class=\"grid\">\n";
+    Add("<h2 id=\"figures\">Figures</h2>\n<p class=\"soft\">{}SVG and PNG files lie in the run's folder "
+        "<code>figures</code>.</p>\n<div class=\"grid\">\n",
+        MovesJoints() ? "" : "Numbers are those of the paper's figures. ");
     for (const Picture& picture : content_.scene.pictures) {
       html_ += "<figure class=\"card\">";
       AddCaption(picture.panel, picture.title);

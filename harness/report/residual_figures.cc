@@ -9,16 +9,19 @@ namespace {
 
 constexpr int kNamedCurves = 8;  // as many as there are colors
 
-const char* AskQuestion(CheckKind kind) {
+/// @param joints whether the robot holds nothing, and its joints follow a motion of their own.
+const char* AskQuestion(CheckKind kind, bool joints) {
   switch (kind) {
     case CheckKind::kModel:
       return "Model: both descriptions at the same state";
     case CheckKind::kLaw:
-      return "Law: torques against (53)-(55), and what they do";
+      return joints ? "Law: torques against the law of the joints, and what they do"
+                    : "Law: torques against (53)-(55), and what they do";
     case CheckKind::kBalance:
       return "Balance: the engine's motion and forces in the model's equations";
     case CheckKind::kPrediction:
-      return "Prediction: accelerations and contact forces against the engine's";
+      return joints ? "Prediction: accelerations against the engine's"
+                    : "Prediction: accelerations and contact forces against the engine's";
     case CheckKind::kAssumption:
       return "Assumptions: what the equations take for granted";
   }
@@ -28,7 +31,7 @@ const char* AskQuestion(CheckKind kind) {
 Figure MakeFigure(const RunData& run, CheckKind kind) {
   Figure figure;
   figure.name = std::string("residual_") + NameOf(kind);
-  figure.title = AskQuestion(kind);
+  figure.title = AskQuestion(kind, run.Find("joints/q_d") != nullptr);
   figure.label = "value / bound";
   figure.log = true;
   figure.bound = 1.0;

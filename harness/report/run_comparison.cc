@@ -20,6 +20,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr const char* kInputTexts[] = {"scenario",         "seed",           "overrides", "robot", "mjcf",
                                        "dexcheck_version", "mujoco_version", "machine"};
 
+constexpr const char* kSimulated = "simulated_s";
+
 std::string DescribeVerdict(const RunData& run) {
   const nlohmann::json& summary = run.summary();
   if (summary.is_null()) return "cut off";
@@ -79,7 +81,9 @@ std::vector<InputDifference> CompareInputs(const std::vector<const RunData*>& ru
 
 std::optional<double> FindResult(const RunData& run, const char* group, const char* key) {
   const nlohmann::json& summary = run.summary();
-  if (summary.is_null()) return {};
+  if (summary.is_null()) {  // runs that were cut off are as long as their rows
+    return key == kSimulated ? std::optional(run.time()[run.time().size() - 1]) : std::nullopt;
+  }
   const nlohmann::json* json = &summary;
   if (group != nullptr) {
     const auto found = summary.find(group);
@@ -99,7 +103,7 @@ std::vector<ComparedNumber> CompareResults(const std::vector<const RunData*>& ru
     const char* unit;
   };
   static constexpr Result kResults[] = {
-      {nullptr, "simulated_s", "simulated", "s"},
+      {nullptr, kSimulated, "simulated", "s"},
       {"tracking", "position_error_max_m", "position error, largest", "m"},
       {"tracking", "position_error_rms_m", "position error, rms", "m"},
       {"tracking", "orientation_error_max_rad", "orientation error, largest", "rad"},
@@ -225,7 +229,7 @@ std::optional<double> ComparedNumber::CalcRatio(size_t run) const {
 double SignalDifference::share() const { return ShareOf(difference, size); }
 
 bool RunComparison::IsSame() const {
-  if (!AllEqual(verdicts)) return false;
+  if (!AllEqual(verdicts) || signals.empty()) return false;
   for (const ComparedNumber& result : results) {
     if (result.name == "simulated" &&
         !std::all_of(result.values.begin(), result.values.end(),

@@ -36,7 +36,8 @@ double CheckLine::share() const {
 }
 
 RunData::RunData(const std::filesystem::path& run_dir) : path_(run_dir / "log.h5"), log_(path_) {
-  if (log_.rows() == 0) throw InputError(path_.string() + ": the run has no steps (rows: 0)");
+  if (log_.rows() == 0)
+    throw InputError(path_.string() + ": the run has no steps (rows: 0), " + DescribeCut(log_));
   time_ = log_.ReadSignal("time").col(0);
   for (Eigen::Index row = 0; row < time_.size(); ++row) {
     const bool advances = row == 0 || time_[row] > time_[row - 1];
@@ -67,13 +68,18 @@ std::string RunData::NameColumn(const SignalInfo& signal, int column) {
   return index < signal.columns.size() ? signal.columns[index] : std::to_string(column + 1);
 }
 
-std::string RunData::FindText(const std::string& name) const {
-  const std::vector<std::string> names = log_.ListTexts();
-  return std::find(names.begin(), names.end(), name) == names.end() ? "" : log_.ReadText(name);
+std::string DescribeCut(const LogReader& log) {
+  const std::string text = log.FindText("summary");
+  const nlohmann::json summary = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+  const bool stopped = summary.is_object() && summary.value("interrupted", nlohmann::json()) == true;
+  if (!text.empty() && !stopped && log.rows() > 0) return "";
+  const std::string how = text.empty() ? "was cut off" : stopped ? "was stopped by hand" : "ended";
+  return "the run " + how +
+         (log.rows() > 0 ? " after " + std::to_string(log.rows()) + " steps" : " before its first step");
 }
 
 void RunData::ReadSummary() {
-  const std::string text = FindText("summary");
+  const std::string text = log_.FindText("summary");
   if (text.empty()) return;
   summary_ = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (!summary_.is_object() || !summary_.contains("verdict") || !summary_.contains("checks")) {

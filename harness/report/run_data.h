@@ -46,7 +46,7 @@ class RunData {
   /// Name of a column: its own, or its number.
   [[nodiscard]] static std::string NameColumn(const SignalInfo& signal, int column);
   /// Empty when it is not in the log.
-  [[nodiscard]] std::string FindText(const std::string& name) const;
+  [[nodiscard]] std::string FindText(const std::string& name) const { return log_.FindText(name); }
   /// Null when the run was cut off before its end.
   [[nodiscard]] const nlohmann::json& summary() const { return summary_; }
   /// Failed ones first, then by share of the bound, largest first.
@@ -63,5 +63,9 @@ class RunData {
   nlohmann::json summary_;
   std::vector<CheckLine> checks_;
 };
+
+/// "the run was cut off after 120 steps" of a log without a summary, "the run was stopped by hand after ...",
+/// "the run ended before its first step"; empty for a log that holds a whole run.
+std::string DescribeCut(const LogReader& log);
 
 }  // namespace dexcheck

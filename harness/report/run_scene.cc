@@ -13,13 +13,15 @@
 namespace dexcheck {
 namespace {
 
-bool HasPositions(const std::filesystem::path& run_dir) {
+bool HasSignal(const std::filesystem::path& run_dir, const char* name) {
   const LogReader log(run_dir / "log.h5");
   return std::any_of(log.signals().begin(), log.signals().end(),
-                     [](const SignalInfo& signal) { return signal.name == "engine/qpos"; });
+                     [&](const SignalInfo& signal) { return signal.name == name; });
 }
 
-std::vector<Picture> DrawConfigurations(const RecordedFrames& run, const std::filesystem::path& folder) {
+/// @param holds whether an object, as in the paper's figures.
+std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds,
+                                        const std::filesystem::path& folder) {
   const std::array<RunView, 1> views = {{{run.model.get(), &run.frames}}};
   MovieOptions options;
   options.width = 960;
@@ -31,9 +33,10 @@ std::vector<Picture> DrawConfigurations(const RecordedFrames& run, const std::fi
   options.tracks = true;
   options.panel = false;
   MoviePainter painter(views, options);
+  const std::string who = holds ? "Robot and object" : "Robot";
   const std::array<Picture, 2> pictures = {
-      {{folder / "fig11a.png", "11 (a)", "Robot and object at the beginning"},
-       {folder / "fig11b.png", "11 (b)", "Robot and object at the end"}}};
+      {{folder / "fig11a.png", holds ? "11 (a)" : "", who + " at the beginning"},
+       {folder / "fig11b.png", holds ? "11 (b)" : "", who + " at the end"}}};
   const double duration = run.frames.times.back() - run.frames.times.front();
   WritePng(pictures[0].file, painter.Paint(0.0));
   WritePng(pictures[1].file, painter.Paint(duration));
@@ -43,9 +46,10 @@ std::vector<Picture> DrawConfigurations(const RecordedFrames& run, const std::fi
 }  // namespace
 
 RunScene MakeRunScene(const std::filesystem::path& run_dir, const std::filesystem::path& folder) {
-  if (!HasPositions(run_dir)) return {};
+  if (!HasSignal(run_dir, "engine/qpos")) return {};
   const RecordedFrames run = ReadRecordedFrames(run_dir);
-  return {DrawConfigurations(run, folder), MakeReplayData(*run.model, run.frames)};
+  return {DrawConfigurations(run, !HasSignal(run_dir, "joints/q_d"), folder),
+          MakeReplayData(*run.model, run.frames)};
 }
 
 }  // namespace dexcheck

@@ -114,6 +114,8 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
 
 bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& should_stop) {
   plant_->AddVelocity(record_.reading.state, v);
+  sensing_.AddVelocity(v);
+  if (checks_) checks_->AddVelocity(v);
   Vector6d velocity = Vector6d::Zero();
   velocity.head<3>() = v;
   if (!SettleOn(LineTrajectory(setup_->X_start(), velocity, 0.0), kSettleMoving, should_stop)) return false;

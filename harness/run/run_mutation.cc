@@ -44,6 +44,12 @@ EnginePlant* FindEngine(const LoopParts& parts) {
   return plant;
 }
 
+void InjectFault(const Setup& setup, const PlantFault& fault, LoopParts* parts) {
+  EnginePlant* const engine = FindEngine(*parts);
+  parts->plant.release();
+  parts->plant = std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault);
+}
+
 /// The robot with one number changed by `scale` times its size, up or, where that is no robot, down.
 RobotModel ChangeNumber(RobotSpec spec, const Parameter& number, double scale) {
   const double value = GetValue(spec, number);
@@ -174,8 +180,12 @@ void RunCampaign::RequireNoMistakeToPass(const std::function<bool()>& should_sto
   for (const Setup* setup : {setup_.get(), nudged_.get()}) {
     if (setup == nullptr) continue;
     RunMutant none;
+    // With the injector in place, and nothing injected.
+    PlantFault nothing;
+    nothing.engine = [](const Setup&, mjModel*) {};
     LoopParts parts = MakeLoopParts(*setup);
     GoToStart(parts);
+    InjectFault(*setup, nothing, &parts);
     VectorXd* const end = setup == setup_.get() ? &end_ : &nudged_end_;
     if (!RunLoop(*setup, std::move(parts), &none, end, should_stop)) return;
     if (!none.killed) continue;
@@ -216,10 +226,8 @@ bool RunCampaign::RunPlant(const PlantFault& fault, RunMutant* mutant, VectorXd*
   }
   const Setup& setup = fault.from_start ? *whole : *setup_;
   LoopParts parts = MakeLoopParts(setup);
-  EnginePlant* const engine = FindEngine(parts);
   if (!fault.from_start) GoToStart(parts);
-  parts.plant.release();
-  parts.plant = std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault);
+  InjectFault(setup, fault, &parts);
   if (fault.sensors) parts.hidden_sensor_fault = fault.sensors(setup);
   return RunLoop(setup, std::move(parts), mutant, end, should_stop);
 }

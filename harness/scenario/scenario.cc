@@ -206,20 +206,26 @@ void FinishTask(Scenario* scenario) {
   pick.plan.hemisphere = scenario->grasp.hemisphere;
 }
 
-/// K_p and K_v, or natural frequency and damping ratio of (57).
+/// K_p or the natural frequency of (57), and K_v or the damping ratio.
 void ReadGains(TomlTable& table, ObjectGains* gains) {
   table.RejectTogether("K_p", {"natural_frequency"});
   table.RejectTogether("K_v", {"damping_ratio"});
-  if (const auto frequency = table.Find("natural_frequency")) {
-    const Vector6d omega = frequency->AsVectorOrNumber<6>();
-    const Vector6d zeta = table.Get("damping_ratio").AsVectorOrNumber<6>();
+  Vector6d omega;
+  const auto frequency = table.Find("natural_frequency");
+  if (frequency) {
+    omega = frequency->AsVectorOrNumber<6>();
     gains->K_p = omega.cwiseAbs2();
-    gains->K_v = 2.0 * zeta.cwiseProduct(omega);
     if ((omega.array() < 0.0).any()) frequency->Fail("must not be negative");
-    return;
+  } else {
+    gains->K_p = table.Get("K_p").AsVectorOrNumber<6>();
+    omega = gains->K_p.cwiseMax(0.0).cwiseSqrt();
   }
-  gains->K_p = table.Get("K_p").AsVectorOrNumber<6>();
-  gains->K_v = table.Get("K_v").AsVectorOrNumber<6>();
+  const auto K_v = table.Find("K_v");
+  const auto zeta = K_v || !(frequency || table.Find("damping_ratio"))
+                        ? std::nullopt
+                        : std::optional(table.Get("damping_ratio"));
+  gains->K_v = zeta ? Vector6d(2.0 * zeta->AsVectorOrNumber<6>().cwiseProduct(omega))
+                    : table.Get("K_v").AsVectorOrNumber<6>();
 }
 
 /// "identity", "mass", or { platform, arm }: a diagonal with 1 for all other joints.

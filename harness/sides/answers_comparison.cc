@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "harness/sides/join_names.h"
 #include "harness/sides/robot_file.h"
 
 namespace dexcheck {
@@ -15,11 +16,14 @@ std::unique_ptr<TermSide> MakeReferenceSide(const RobotDescription& robot, const
 
 ConsistencyResult CompareAnswers(const RobotDescription& robot, TermSide* reference, AnsweringSide* side,
                                  const std::function<StateFeed()>& make_feed,
-                                 const std::function<bool(long)>& progress, std::vector<std::string>* notes) {
+                                 const std::function<bool(long)>& progress, std::vector<std::string>* notes,
+                                 std::vector<std::string>* not_compared) {
   ConsistencyResult result;
   SideComparison comparison(robot, {reference, side});
   result.samples = CompareAtStates(make_feed(), progress, &comparison);
   result.terms = comparison.TakePairs().front().terms;
+  const std::vector<std::string> unanswered = comparison.ListUnanswered();
+  if (!unanswered.empty()) not_compared->push_back("terms that are not answered: " + JoinNames(unanswered));
   if (side->is_reduced()) {
     notes->push_back(
         "joints that follow others have no coordinate there: compared are T^T M T and T^T of the "

@@ -20,6 +20,7 @@ std::unique_ptr<TermSide> MakeReferenceSide(const RobotDescription& robot, const
 /// @param make_feed makes a feed that begins with the first state. @param notes gets what is worth knowing.
 ConsistencyResult CompareAnswers(const RobotDescription& robot, TermSide* reference, AnsweringSide* side,
                                  const std::function<StateFeed()>& make_feed,
-                                 const std::function<bool(long)>& progress, std::vector<std::string>* notes);
+                                 const std::function<bool(long)>& progress, std::vector<std::string>* notes,
+                                 std::vector<std::string>* not_compared);
 
 }  // namespace dexcheck

@@ -18,8 +18,13 @@ constexpr double kRowRounding = 64.0 * std::numeric_limits<double>::epsilon();
 
 class DescriptionCheck {
  public:
-  DescriptionCheck(const RobotDescription& robot, const Adapter& adapter, GateResult* gate)
-      : robot_(robot), adapter_(adapter), engine_(adapter.engine()), gate_(*gate) {}
+  DescriptionCheck(const RobotDescription& robot, const Adapter& adapter, bool ignores_couplings,
+                   GateResult* gate)
+      : robot_(robot),
+        adapter_(adapter),
+        engine_(adapter.engine()),
+        ignores_couplings_(ignores_couplings),
+        gate_(*gate) {}
 
   std::vector<std::string> Run() {
     CheckCouplings();
@@ -27,18 +32,6 @@ class DescriptionCheck {
   }
 
  private:
-  /// The check of that name, a new one when there is none.
-  CheckRecord* Define(const std::string& name) {
-    const auto old = std::find_if(gate_.records.begin(), gate_.records.end(),
-                                  [&](const CheckRecord& one) { return one.name == name; });
-    if (old != gate_.records.end()) return &*old;
-    CheckRecord record;
-    record.name = name;
-    record.bound = kRowRounding;
-    gate_.records.push_back(record);
-    return &gate_.records.back();
-  }
-
   /// Takes back findings of the gate about what it believes that only the engine has. The check goes with the
   /// last of them.
   void TakeBack(const std::string& check, const std::function<bool(const GateFinding&)>& is_known) {
@@ -68,21 +61,33 @@ class DescriptionCheck {
   }
 
   void CheckCouplings() {
-    CheckRecord* record = nullptr;
-    std::vector<std::string> only_here;
     std::vector<std::string> only_there;
     std::vector<std::string> constraints;
     for (size_t i = 0; i < robot_.joints.size(); ++i) {
-      const std::string& name = robot_.spec.joints[i].name;
-      const std::optional<JointCoupling>& own = robot_.spec.joints[i].coupling;
+      const Joint& described = robot_.spec.joints[i];
+      const std::optional<JointCoupling>& own = described.coupling;
       const std::optional<JointCoupling> other = FindEngineCoupling(engine_, adapter_.joint_ids()[i]);
-      if (own && !other) only_here.push_back(name);
-      if (!own && other) only_there.push_back(name);
-      if (!own || !other) continue;
-      if (record == nullptr) record = Define("joint_coupling");
-      constraints.push_back("constraint " + NameOf(engine_, mjOBJ_EQUALITY,
-                                                   FindCouplingConstraint(engine_, adapter_.joint_ids()[i])));
       const int joint = static_cast<int>(i);
+      if (other && (own || ignores_couplings_)) {
+        constraints.push_back(
+            "constraint " +
+            NameOf(engine_, mjOBJ_EQUALITY, FindCouplingConstraint(engine_, adapter_.joint_ids()[i])));
+      }
+      if (ignores_couplings_) continue;
+      if (own && !other) {
+        const std::string leader = robot_.spec.joints[static_cast<size_t>(own->leader)].name;
+        gate_.Add({"joint_coupling",
+                   Describe({Location::Kind::kJoint, joint, -1}, adapter_.model(), 0),
+                   own->multiplier,
+                   0.0,
+                   {Location::Kind::kJoint, joint, -1},
+                   1,
+                   false,
+                   "only " + robot_.spec.source + " states it: it follows " + leader});
+      }
+      if (!own && other) only_there.push_back(described.name);
+      if (!own || !other) continue;
+      CheckRecord* const record = gate_.Define("joint_coupling");
       Compare(record, joint, own->leader, FindIndex(other->leader), 0);
       Compare(record, joint, own->multiplier, other->multiplier, 1);
       Compare(record, joint, own->offset, other->offset, 2);
@@ -92,18 +97,15 @@ class DescriptionCheck {
         return std::find(constraints.begin(), constraints.end(), finding.where) != constraints.end();
       });
     }
-    const auto note = [&](const std::vector<std::string>& names, const std::string& side) {
-      if (names.empty()) return;
-      notes_.push_back("coupled joints: only the " + side + " couples " + JoinNames(names) +
-                       "; terms are compared with all joints free");
-    };
-    note(only_here, "description");
-    note(only_there, "MJCF");
+    if (only_there.empty()) return;
+    notes_.push_back("coupled joints: only the MJCF couples " + JoinNames(only_there) +
+                     "; terms are compared with all joints free");
   }
 
   const RobotDescription& robot_;
   const Adapter& adapter_;
   const mjModel& engine_;
+  bool ignores_couplings_;
   GateResult& gate_;
   std::vector<std::string> notes_;
 };
@@ -132,8 +134,8 @@ std::optional<JointCoupling> FindEngineCoupling(const mjModel& engine, int joint
 }
 
 std::vector<std::string> CheckDescription(const RobotDescription& robot, const Adapter& adapter,
-                                          GateResult* gate) {
-  return DescriptionCheck(robot, adapter, gate).Run();
+                                          GateResult* gate, bool ignores_couplings) {
+  return DescriptionCheck(robot, adapter, ignores_couplings, gate).Run();
 }
 
 }  // namespace dexcheck

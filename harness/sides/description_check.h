@@ -12,8 +12,9 @@ namespace dexcheck {
 
 /// Compares couplings of joints with those of the engine's model, in the place of the gate's findings that
 /// the engine has them.
-/// @return notes on what one side lacks, and is not compared.
+/// @param ignores_couplings none is a disagreement. @return notes on what one side lacks, and is not
+/// compared.
 std::vector<std::string> CheckDescription(const RobotDescription& robot, const Adapter& adapter,
-                                          GateResult* gate);
+                                          GateResult* gate, bool ignores_couplings = false);
 
 }  // namespace dexcheck

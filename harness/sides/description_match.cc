@@ -1,31 +1,56 @@
 #include "harness/sides/description_match.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <functional>
+#include <cmath>
 #include <map>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/dynamics/model_terms.h"
+#include "harness/checks/random_states.h"
+#include "harness/engine/engine.h"
 #include "harness/sides/alike_names.h"
 #include "harness/sides/join_names.h"
+#include "harness/sides/mjcf_reader.h"
 
 namespace dexcheck {
 namespace {
 
+/// A constant of joints that acts on the motion.
+struct JointConstant {
+  const char* word;  ///< Of --ignore, and in notes.
+  const char* check;
+  bool DescribedJoint::*states;
+  double Joint::*value;
+};
+constexpr JointConstant kJointConstants[] = {
+    {"armature", "joint_armature", &DescribedJoint::states_armature, &Joint::armature},
+    {"damping", "joint_damping", &DescribedJoint::states_damping, &Joint::damping},
+    {"friction", "joint_dry_friction", &DescribedJoint::states_dry_friction, &Joint::dry_friction}};
+
 /// What each of the two takes from the other.
 class Matching {
  public:
-  Matching(RobotDescription* a, RobotDescription* b)
-      : a_(*a), b_(*b), b_of_a_(MatchJoints(a_.spec, b_.spec)), a_of_b_(MatchJoints(b_.spec, a_.spec)) {}
+  Matching(RobotDescription* a, RobotDescription* b, const std::vector<std::string>& ignore)
+      : a_(*a),
+        b_(*b),
+        ignore_(ignore),
+        b_of_a_(MatchJoints(a_.spec, b_.spec)),
+        a_of_b_(MatchJoints(b_.spec, a_.spec)) {}
 
-  std::vector<std::string> Run() {
+  Completion Run() {
     TakeBase();
     RequireSameMechanism();
     TakeGravity();
     TakeNames();
-    TakeConstants();
+    for (const JointConstant& constant : kJointConstants)
+      Ignores(constant.word, ignore_) ? Ignore(constant) : Take(constant);
+    if (Ignores("coupling", ignore_)) IgnoreCouplings();
+    TakeRanges();
     DropFrames();
-    return notes_;
+    return std::move(result_);
   }
 
  private:
@@ -67,8 +92,8 @@ class Matching {
     const auto take = [this](RobotDescription* robot, const RobotDescription& other) {
       if (robot->states_base || other.spec.base.type != BaseType::kFloating) return;
       LetBaseFloat(robot);
-      notes_.push_back("base: " + robot->spec.source +
-                       " does not say how its root moves; it floats as that of " + other.spec.source);
+      result_.notes.push_back("base: " + robot->spec.source +
+                              " does not say how its root moves; it floats as that of " + other.spec.source);
     };
     take(&a_, b_);
     take(&b_, a_);
@@ -79,8 +104,9 @@ class Matching {
   void TakeGravity() {
     if (a_.states_gravity == b_.states_gravity) return;
     (a_.states_gravity ? b_ : a_).spec.gravity = (a_.states_gravity ? a_ : b_).spec.gravity;
-    notes_.push_back("gravity: only " + (a_.states_gravity ? a_ : b_).spec.source + " states it, " +
-                     FormatNumbers(a_.spec.gravity));
+    result_.unstated.emplace_back("gravity_vector");
+    result_.not_compared.push_back("gravity: only " + (a_.states_gravity ? a_ : b_).spec.source +
+                                   " states it, " + FormatNumbers(a_.spec.gravity));
   }
 
   /// Links that joints of one name move are the same one.
@@ -95,44 +121,85 @@ class Matching {
     for (size_t i = 0; i < b_of_a_.size(); ++i) {
       rename(a_.spec.joints[i].link, &b_.spec.joints[static_cast<size_t>(b_of_a_[i])].link);
     }
-    if (!renamed.empty()) notes_.push_back("links by other names: " + JoinNames(renamed));
+    if (!renamed.empty()) result_.notes.push_back("links by other names: " + JoinNames(renamed));
   }
 
-  void TakeConstants() {
-    Take("armature", &DescribedJoint::states_armature, [](RobotDescription& robot, size_t i) {
-      return std::vector<double*>{&robot.spec.joints[i].armature};
-    });
-    Take("damping", &DescribedJoint::states_damping, [](RobotDescription& robot, size_t i) {
-      return std::vector<double*>{&robot.spec.joints[i].damping};
-    });
-    Take("dry friction", &DescribedJoint::states_dry_friction, [](RobotDescription& robot, size_t i) {
-      return std::vector<double*>{&robot.spec.joints[i].dry_friction};
-    });
-    Take("range", &DescribedJoint::states_range, [](RobotDescription& robot, size_t i) {
-      return std::vector<double*>{&robot.spec.joints[i].lower, &robot.spec.joints[i].upper};
-    });
+  template <typename Visit>
+  void ForJoints(const Visit& visit) {
+    for (size_t i = 0; i < b_of_a_.size(); ++i) visit(i, static_cast<size_t>(b_of_a_[i]));
   }
 
-  void Take(const std::string& what, bool DescribedJoint::*states,
-            const std::function<std::vector<double*>(RobotDescription&, size_t)>& numbers) {
-    std::map<std::string, std::vector<std::string>> taken;  // by the source that states it
-    for (size_t i = 0; i < b_of_a_.size(); ++i) {
-      const auto j = static_cast<size_t>(b_of_a_[i]);
-      const bool in_a = a_.joints[i].*states;
-      const bool in_b = b_.joints[j].*states;
-      if (in_a == in_b) continue;
-      const std::vector<double*> own = numbers(a_, i);
-      const std::vector<double*> other = numbers(b_, j);
-      bool differs = false;
-      for (size_t k = 0; k < own.size(); ++k) {
-        differs = differs || *own[k] != *other[k];
-        *(in_a ? other[k] : own[k]) = *(in_a ? own[k] : other[k]);
+  /// The check has nothing to say when one of the two states the constant nowhere.
+  void NoteUnstated(const char* check, bool DescribedJoint::*states) {
+    for (const RobotDescription* const robot : {&a_, &b_}) {
+      if (std::any_of(robot->joints.begin(), robot->joints.end(),
+                      [&](const DescribedJoint& joint) { return joint.*states; })) {
+        continue;
       }
-      if (differs) taken[(in_a ? a_ : b_).spec.source].push_back(a_.spec.joints[i].name);
+      result_.unstated.emplace_back(check);
+      return;
     }
-    for (const auto& [source, names] : taken) {
-      notes_.push_back(what + ": only " + source + " states it, for " + JoinNames(names));
+  }
+
+  void Take(const JointConstant& constant) {
+    ForJoints([&](size_t i, size_t j) {
+      const bool in_a = a_.joints[i].*constant.states;
+      if (in_a == b_.joints[j].*constant.states) return;
+      double& own = a_.spec.joints[i].*constant.value;
+      double& other = b_.spec.joints[j].*constant.value;
+      if (own != other) {
+        GateFinding& finding = result_.one_sided.emplace_back();
+        finding.check = constant.check;
+        finding.location = {Location::Kind::kJoint, static_cast<int>(i), -1};
+        finding.model = own;
+        finding.engine = other;
+        finding.effect = "only " + (in_a ? a_ : b_).spec.source + " states it";
+      }
+      (in_a ? other : own) = in_a ? own : other;
+    });
+    NoteUnstated(constant.check, constant.states);
+  }
+
+  void Ignore(const JointConstant& constant) {
+    std::vector<std::string> names;
+    ForJoints([&](size_t i, size_t j) {
+      const double own = a_.spec.joints[i].*constant.value;
+      double& other = b_.spec.joints[j].*constant.value;
+      if (own != other) names.push_back(a_.spec.joints[i].name);
+      other = own;
+      a_.joints[i].*constant.states = b_.joints[j].*constant.states = false;
+    });
+    result_.unstated.emplace_back(constant.check);
+    result_.not_compared.push_back(std::string(constant.word) + ": ignored" +
+                                   (names.empty() ? ""
+                                                  : ", though it differs at " + JoinNames(names) +
+                                                        "; terms are with that of " + a_.spec.source));
+  }
+
+  void IgnoreCouplings() {
+    for (RobotDescription* const robot : {&a_, &b_}) {
+      for (Joint& joint : robot->spec.joints) joint.coupling.reset();
     }
+    result_.not_compared.emplace_back("coupling: ignored");
+  }
+
+  void TakeRanges() {
+    std::map<std::string, std::vector<std::string>> taken;  // by the source that states it
+    ForJoints([&](size_t i, size_t j) {
+      const bool in_a = a_.joints[i].states_range;
+      if (in_a == b_.joints[j].states_range) return;
+      Joint& own = a_.spec.joints[i];
+      Joint& other = b_.spec.joints[j];
+      if (own.lower != other.lower || own.upper != other.upper)
+        taken[(in_a ? a_ : b_).spec.source].push_back(own.name);
+      const Joint& stated = in_a ? own : other;
+      Joint& silent = in_a ? other : own;
+      silent.lower = stated.lower;
+      silent.upper = stated.upper;
+    });
+    NoteUnstated("joint_range", &DescribedJoint::states_range);
+    for (const auto& [source, names] : taken)
+      result_.not_compared.push_back("range: only " + source + " states it, for " + JoinNames(names));
   }
 
   void DropFrames() {
@@ -145,7 +212,7 @@ class Matching {
         return lacks;
       });
       if (!dropped.empty())
-        notes_.push_back("frames only in " + robot->spec.source + ": " + JoinNames(dropped));
+        result_.not_compared.push_back("frames only in " + robot->spec.source + ": " + JoinNames(dropped));
     };
     drop(&a_, b_);
     drop(&b_, a_);
@@ -153,9 +220,10 @@ class Matching {
 
   RobotDescription& a_;
   RobotDescription& b_;
+  const std::vector<std::string>& ignore_;
   std::vector<int> b_of_a_;
   std::vector<int> a_of_b_;
-  std::vector<std::string> notes_;
+  Completion result_;
 };
 
 }  // namespace
@@ -171,13 +239,85 @@ std::vector<int> MatchJoints(const RobotSpec& a, const RobotSpec& b) {
   return match;
 }
 
-std::vector<std::string> CompleteEachOther(RobotDescription* a, RobotDescription* b) {
+bool Ignores(const std::string& word, const std::vector<std::string>& ignore) {
+  return std::find(ignore.begin(), ignore.end(), word) != ignore.end();
+}
+
+Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,
+                             const std::vector<std::string>& ignore) {
   std::vector<std::string> names;
   for (const Joint& joint : a->spec.joints) names.push_back(joint.name);
-  std::vector<std::string> notes = TakeJointNames(names, a->spec.source, b);
-  const std::vector<std::string> others = Matching(a, b).Run();
-  notes.insert(notes.end(), others.begin(), others.end());
-  return notes;
+  const std::vector<std::string> renamed = TakeJointNames(names, a->spec.source, b);
+  Completion completion = Matching(a, b, ignore).Run();
+  completion.notes.insert(completion.notes.begin(), renamed.begin(), renamed.end());
+  return completion;
+}
+
+Completion CompleteFromEngine(const mjModel& engine, const std::string& source, RobotDescription* robot,
+                              const std::vector<std::string>& ignore, bool is_table) {
+  RobotDescription other = is_table ? *robot : ReadMjcfDescription(engine, source);
+  if (is_table) {
+    other.spec.source = source;
+    for (Joint& joint : other.spec.joints) {
+      const int id = FindByName(engine, mjOBJ_JOINT, NameInFile(joint));
+      if (id < 0) continue;
+      const int dof = engine.jnt_dofadr[id];
+      joint.armature = engine.dof_armature[dof];
+      joint.damping = engine.dof_damping[dof];
+      joint.dry_friction = engine.dof_frictionloss[dof];
+    }
+  }
+  Completion completion = CompleteEachOther(&other, robot, ignore);
+  const std::vector<int> own = MatchJoints(other.spec, robot->spec);
+  for (GateFinding& finding : completion.one_sided) {
+    std::swap(finding.model, finding.engine);
+    finding.location.first = own[static_cast<size_t>(finding.location.first)];
+  }
+  return completion;
+}
+
+void UndoOneSided(const std::vector<GateFinding>& one_sided, RobotSpec* spec) {
+  for (const GateFinding& finding : one_sided) {
+    for (const JointConstant& constant : kJointConstants) {
+      if (finding.check == constant.check)
+        spec->joints[static_cast<size_t>(finding.location.first)].*constant.value = finding.model;
+    }
+  }
+}
+
+void AddOneSided(const RobotModel& model, const std::vector<GateFinding>& one_sided, GateResult* gate) {
+  if (one_sided.empty()) return;
+  // An effect is largest where least inertia is moved: the least of M_jj over some states.
+  constexpr int kStates = 20;
+  const int base = model.num_base_velocities();
+  ModelTerms terms(model);
+  StateSource source(model, {}, 1);
+  VectorXd q = VectorXd::Zero(model.num_positions());
+  VectorXd inertia;
+  for (int i = 0; i < kStates; ++i) {
+    source.DrawPositions(&q);
+    terms.SetState(q, VectorXd::Zero(model.num_velocities()));
+    terms.CalcDynamics();
+    const VectorXd diagonal = terms.M().diagonal();
+    inertia = i == 0 ? diagonal : inertia.cwiseMin(diagonal).eval();
+  }
+  for (GateFinding finding : one_sided) {
+    const Joint& joint = model.joints()[static_cast<size_t>(finding.location.first)];
+    const double M_jj = inertia[base + finding.location.first];
+    const double value = std::max(finding.model, finding.engine);
+    const bool turns = joint.type != JointType::kPrismatic;
+    if (finding.check == "joint_armature") {
+      finding.effect +=
+          fmt::format(": M of {} by up to {:.2g} %", joint.name, 100.0 * value / (M_jj - value));
+    } else if (finding.check == "joint_damping") {
+      finding.effect += fmt::format(": rates of {} decay within {:.2g} s", joint.name, M_jj / value);
+    } else {
+      finding.effect += fmt::format(": {} is slowed by up to {:.2g} {}", joint.name, value / M_jj,
+                                    turns ? "rad/s^2" : "m/s^2");
+    }
+    finding.where = Describe(finding.location, model, base);
+    gate->Add(std::move(finding));
+  }
 }
 
 }  // namespace dexcheck

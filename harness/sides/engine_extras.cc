@@ -186,18 +186,6 @@ void FreeBaseJoint(int joint, mjModel* m) {
   m->jnt_limited[joint] = 0;
 }
 
-/// The check of that name, a new one when there is none.
-CheckRecord* FindRecord(const std::string& check, GateResult* gate) {
-  auto record = std::find_if(gate->records.begin(), gate->records.end(),
-                             [&](const CheckRecord& one) { return one.name == check; });
-  if (record == gate->records.end()) {
-    record = gate->records.insert(record, CheckRecord{});
-    record->name = check;
-    record->bound = kRounding;
-  }
-  return &*record;
-}
-
 class ExtrasComparison {
  public:
   ExtrasComparison(const Adapter& a, mjModel* engine_a, const Adapter& b, mjModel* engine_b, GateResult* gate)
@@ -322,12 +310,6 @@ Extras CompareExtras(const RobotDescription& first, const std::filesystem::path&
 }
 
 void AddExtras(const Extras& extras, GateResult* gate) {
-  const auto add = [&](const GateFinding& finding) {
-    gate->findings.push_back(finding);
-    const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
-    FindRecord(finding.check, gate)
-        ->Compare(finding.model, finding.engine, size > 0.0 ? size : 1.0, finding.location, -1);
-  };
   std::vector<GateFinding> missing;
   for (GateFinding finding : extras.of_first.findings) {
     const size_t in_both = std::erase_if(gate->findings, [&](const GateFinding& other) {
@@ -343,8 +325,8 @@ void AddExtras(const Extras& extras, GateResult* gate) {
            std::none_of(gate->findings.begin(), gate->findings.end(),
                         [&](const GateFinding& finding) { return finding.check == record.name; });
   });
-  for (const GateFinding& finding : extras.differences.findings) add(finding);
-  for (const GateFinding& finding : missing) add(finding);
+  for (const GateFinding& finding : extras.differences.findings) gate->Add(finding);
+  for (const GateFinding& finding : missing) gate->Add(finding);
 }
 
 }  // namespace dexcheck

@@ -103,6 +103,17 @@ std::string RemoveMaterials(std::string_view text, const std::string& source) {
   return Print(document);
 }
 
+std::string NameJoints(std::string_view text, const std::string& source) {
+  tinyxml2::XMLDocument document;
+  int number = 0;
+  for (XMLElement* joint = ParseRobot(text, source, &document)->FirstChildElement("joint"); joint != nullptr;
+       joint = joint->NextSiblingElement("joint"), ++number) {
+    const char* const name = joint->Attribute("name");
+    if (name == nullptr || *name == '\0') joint->SetAttribute("name", ("#" + std::to_string(number)).c_str());
+  }
+  return Print(document);
+}
+
 std::string WriteEngineUrdf(std::string_view text, const std::string& source, bool floats) {
   tinyxml2::XMLDocument document;
   XMLElement* const robot = ParseRobot(text, source, &document);

@@ -14,4 +14,8 @@ std::string WriteEngineUrdf(std::string_view text, const std::string& source, bo
 /// A URDF without the robot's materials. @throws InputError "SOURCE: ..." when it is no URDF.
 std::string RemoveMaterials(std::string_view text, const std::string& source);
 
+/// A URDF whose joints without a name are called "#" and their number in the file, as UrdfJoint::name.
+/// @throws InputError "SOURCE: ..." when it is no URDF.
+std::string NameJoints(std::string_view text, const std::string& source);
+
 }  // namespace dexcheck

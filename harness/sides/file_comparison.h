@@ -20,7 +20,8 @@ struct Comparison {
   std::filesystem::path second;
   bool with_engine = false;  ///< The second is an MJCF, whose terms are the engine's.
   std::optional<RobotModel> model;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes;         ///< What its reader may not expect.
+  std::vector<std::string> not_compared;  ///< What only one of them has and no term depends on.
   ConsistencyResult result;
   std::vector<Hypothesis> hypotheses;  ///< Mistakes that would explain what differs.
 };
@@ -36,7 +37,18 @@ Comparison CompareFiles(
 /// again: what agrees to it is no mistake.
 void ExplainComparison(const UrdfOptions& urdf, Comparison* comparison, double tolerance = 0.0);
 
+/// Numbers that were rounded when they were printed agree to so many digits at least.
+inline constexpr int kDigitsOfRoundedInput = 4;
+
 /// One line for each constant and term that differs: where first, where worst, both values.
+struct Differences {
+  std::vector<std::string> real;
+  std::vector<std::string> rounded;  ///< Those that agree to kDigitsOfRoundedInput digits or more.
+  int digits = 16;                   ///< To which all of `rounded` and what does not differ agree.
+};
+Differences SortDifferences(const Comparison& comparison);
+
+/// Both kinds in one list.
 std::vector<std::string> ListDifferences(const Comparison& comparison);
 
 }  // namespace dexcheck

@@ -27,6 +27,7 @@ struct AgreementOptions {
   std::uint64_t seed = 1;
   int digits = 0;  ///< Agreement to this many digits of a term's scale is enough; 0: to rounding.
   UrdfOptions urdf;
+  std::vector<std::string> ignore;  ///< Constants that the two need not share: kIgnorable.
 };
 
 /// Whether a description, or terms of one's own, agree with a parameter file, a URDF or an MJCF.
@@ -51,6 +52,7 @@ class AgreesWithMatcher {
     ConsistencyOptions options;
     options.samples = options_.samples;
     options.seed = options_.seed;
+    options.ignore = options_.ignore;
     return options;
   }
 

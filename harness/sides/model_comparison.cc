@@ -93,9 +93,11 @@ class ModelComparison {
     ForJoints([&](size_t i, size_t j) {
       const std::optional<JointCoupling>& own = a_.spec.joints[i].coupling;
       const std::optional<JointCoupling>& other = b_.spec.joints[j].coupling;
-      if (!own || !other) return;
       const Location where{Location::Kind::kJoint, static_cast<int>(i), -1};
       const std::string name = "joint_coupling";
+      if (own.has_value() != other.has_value())
+        AddConstant(&gate, name, where, own ? own->multiplier : 0.0, other ? other->multiplier : 0.0, 1);
+      if (!own || !other) return;
       AddConstant(&gate, name, where, b_of_a_[static_cast<size_t>(own->leader)], other->leader, 0);
       AddConstant(&gate, name, where, own->multiplier, other->multiplier, 1);
       AddConstant(&gate, name, where, own->offset, other->offset, 2);
@@ -166,14 +168,8 @@ class ModelComparison {
 
   void AddConstant(GateResult* gate, const std::string& name, const Location& where, double a, double b,
                    int entry, double scale = 0.0) {
-    if (gate->records.empty() || gate->records.back().name != name) {
-      CheckRecord record;
-      record.name = name;
-      record.bound = kRounding;
-      gate->records.push_back(record);
-    }
     const double size = std::max({std::abs(a), std::abs(b), scale});
-    if (gate->records.back().Compare(a, b, size > 0.0 ? size : 1.0, where, -1) <= kRounding) return;
+    if (gate->Define(name)->Compare(a, b, size > 0.0 ? size : 1.0, where, -1) <= kRounding) return;
     gate->findings.push_back({name, Describe(where, model_a_, base_), a, b, where, entry});
   }
 

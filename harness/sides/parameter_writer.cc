@@ -108,7 +108,7 @@ class ParameterWriter {
   }
 
   void WriteHead(const std::string& origin) {
-    text_ += "# Parameters of one robot, written by dexcheck import from " + FormatComment(origin) + ".\n";
+    text_ += kImportMark + FormatComment(origin) + ".\n";
     for (const std::string& note : robot_.notes) text_ += "# Note: " + FormatComment(note) + ".\n";
     text_ +=
         "#\n"

@@ -49,22 +49,23 @@ void SetNonBlocking(int descriptor) {
 
 ProgramProcess::ProgramProcess(std::string command, double seconds)
     : command_(std::move(command)), seconds_(seconds) {
-  int in[2];
+  int in[2] = {-1, -1};
   int out[2] = {-1, -1};
   int err[2] = {-1, -1};
-  const auto fail = [&] {
-    throw ProgramError("program " + Quote(command_) +
-                       ": cannot be started: " + std::generic_category().message(errno));
-  };
-  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) != 0) fail();
-  if (::pipe2(out, O_CLOEXEC) != 0 || ::pipe2(err, O_CLOEXEC) != 0) fail();
-  child_ = ::fork();
+  const bool piped = ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) == 0 &&
+                     ::pipe2(out, O_CLOEXEC) == 0 && ::pipe2(err, O_CLOEXEC) == 0;
+  if (piped) child_ = ::fork();
   if (child_ == 0) BecomeProgram(command_.c_str(), in[1], out[1], err[1]);
-  for (const int end : {in[1], out[1], err[1]}) ::close(end);
+  const int error = errno;
+  for (int* const end : {&in[1], &out[1], &err[1]}) Close(end);
   input_ = in[0];
   output_ = out[0];
   messages_ = err[0];
-  if (child_ < 0) fail();
+  if (child_ < 0) {
+    for (int* const end : {&input_, &output_, &messages_}) Close(end);
+    throw ProgramError("program " + Quote(command_) +
+                       ": cannot be started: " + std::generic_category().message(error));
+  }
   ::setpgid(child_, child_);
   for (const int descriptor : {input_, output_, messages_}) SetNonBlocking(descriptor);
 }

@@ -3,8 +3,10 @@
 #include "controller/common/errors.h"
 #include "controller/model/body_frame.h"
 #include "controller/model/parameter_reader.h"
+#include "harness/base/files.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/mjcf_reader.h"
+#include "harness/sides/parameter_writer.h"
 #include "harness/sides/robot_file.h"
 
 namespace dexcheck {
@@ -22,6 +24,7 @@ void AddPart(const std::string& name, const MassProperties& body, int joint, con
 
 RobotDescription ReadTable(const std::filesystem::path& path) {
   RobotDescription robot;
+  robot.is_imported = ReadBytes(path).find(kImportMark) != std::string::npos;
   std::vector<WrittenRow> rows;
   robot.spec = ReadRobotModel(path, &rows).spec();
   robot.joints.resize(robot.spec.joints.size());
@@ -33,6 +36,7 @@ RobotDescription ReadTable(const std::filesystem::path& path) {
     if (joint.type == JointType::kBall && joint.ball_axis < 2) continue;  // its link is no part of the file
     AddPart(joint.link, joint.body, static_cast<int>(i), rows[i].X_iL, &robot);
   }
+  NoteImpossibleBodies(&robot);
   return robot;
 }
 

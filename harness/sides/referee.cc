@@ -13,7 +13,7 @@
 #include "harness/base/files.h"
 #include "harness/base/shell.h"
 #include "harness/gate/static_gate.h"
-#include "harness/sides/complete_description.h"
+#include "harness/sides/description_match.h"
 #include "harness/sides/engine_settings.h"
 #include "harness/sides/engine_urdf.h"
 #include "harness/sides/join_names.h"
@@ -169,7 +169,9 @@ class RefereeRun {
                        Quote(robot_.spec.base.link) + " belongs to");
     }
     if (!options_.mjcf.empty()) {
-      for (const std::string& note : completion.notes) result_.notes.push_back("MuJoCo: " + note);
+      for (const auto& notes : {completion.notes, completion.not_compared}) {
+        for (const std::string& note : notes) result_.notes.push_back("MuJoCo: " + note);
+      }
       others_.push_back({"as with what only " + file + " states: armature, damping, gravity", completed});
     }
     NoteCompiledInertias(*engine, path.string(), completed);

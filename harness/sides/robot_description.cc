@@ -27,6 +27,22 @@ MatrixXd CalcCouplingMap(const RobotDescription& robot) {
   return T;
 }
 
+void NoteImpossibleBodies(RobotDescription* robot) {
+  std::vector<std::string> names;
+  const auto check = [&](const std::string& link, const MassProperties& body) {
+    if (!FindPhysicalInconsistency(body).empty()) names.push_back(link);
+  };
+  if (robot->spec.base.type != BaseType::kFixed) check(robot->spec.base.link, robot->spec.base.body);
+  for (const Joint& joint : robot->spec.joints) check(joint.link, joint.body);
+  if (names.empty()) return;
+  robot->notes.push_back(
+      "bodies that none can be, since their principal moments break the triangle inequality (dexcheck audit "
+      "has them): " +
+      JoinNames(names) +
+      ". The dynamics are well defined and are compared. MuJoCo's compiler refuses such a body, or with "
+      "balanceinertia gives it the mean of its moments: its copy differs there");
+}
+
 void LetBaseFloat(RobotDescription* robot) {
   robot->spec.base.type = BaseType::kFloating;
   robot->spec.base.X_B0 = Pose::Identity();

@@ -52,7 +52,11 @@ struct RobotDescription {
   std::vector<DescribedPart> parts;
   std::vector<std::string> unused;  ///< "mesh hand": what the file defines and nothing uses.
   std::vector<std::string> notes;   ///< What was done with the file that its reader may not expect.
+  bool is_imported = false;         ///< A parameter file that dexcheck import wrote.
 };
+
+/// Notes bodies whose principal moments no body can have. Their dynamics are well defined all the same.
+void NoteImpossibleBodies(RobotDescription* robot);
 
 /// T with xi = T xi_free, size joints x (joints - coupled joints): the rates that the couplings leave free. T
 /// is constant, so T^T M T, T^T C T, T^T F are the terms of the coupled robot.

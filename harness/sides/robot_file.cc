@@ -40,6 +40,8 @@ RobotFormat FindFormat(std::string_view text, const std::string& source) {
   if (root == "robot") return RobotFormat::kUrdf;
   if (root == "mujoco") return RobotFormat::kMjcf;
   if (root.empty()) return RobotFormat::kToml;
+  if (root == "mujocoinclude")
+    throw InputError(source + ": is a part for <include> (<mujocoinclude>); give the file that includes it");
   throw InputError(source +
                    ": must be a parameter file (TOML), a URDF (<robot>) or an MJCF (<mujoco>), got " +
                    Quote("<" + std::string(root) + ">"));

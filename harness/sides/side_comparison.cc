@@ -161,6 +161,16 @@ std::vector<ComparedPair> SideComparison::TakePairs() const {
   return pairs;
 }
 
+std::vector<std::string> SideComparison::ListUnanswered() const {
+  std::vector<std::string> names;
+  for (size_t term = 0; term < kTermCount; ++term) {
+    if (std::all_of(pairs_.begin(), pairs_.end(),
+                    [&](const Pair& pair) { return pair.records[term].comparisons == 0; }))
+      names.emplace_back(kNames[term]);
+  }
+  return names;
+}
+
 StateFeed FeedRandomStates(const RobotModel& model, const ConsistencyOptions& options) {
   const auto source = std::make_shared<StateSource>(model, options.range, options.seed);
   return [source, samples = options.samples](long sample, VectorXd* q, VectorXd* xi) {

@@ -34,6 +34,8 @@ class SideComparison {
   [[nodiscard]] const RobotModel& model() const { return model_; }
   /// All pairs that have terms in common; (0, 1), (0, 2), ..., (1, 2), ...
   [[nodiscard]] std::vector<ComparedPair> TakePairs() const;
+  /// Terms that no pair has in common.
+  [[nodiscard]] std::vector<std::string> ListUnanswered() const;
 
  private:
   enum Term { kMass, kCoriolis, kGravity, kBias, kFriction, kKinetic, kPotential, kTermCount };

@@ -56,14 +56,14 @@ class OutlineReader {
     throw InputError(source_ + ":" + std::to_string(std::max(line, 1)) + ": " + problem);
   }
 
-  std::string ReadName(const Element& element, const std::string& kind) const {
+  std::string ReadLinkName(const Element& element) const {
     const char* name = element.Attribute("name");
-    if (name == nullptr || *name == '\0') Fail(element.GetLineNum(), kind + ": must have a name");
+    if (name == nullptr || *name == '\0') Fail(element.GetLineNum(), "link: must have a name");
     return name;
   }
 
   void AddLink(const Element& element) {
-    const std::string name = ReadName(element, "link");
+    const std::string name = ReadLinkName(element);
     const auto [known, is_new] = link_of_.emplace(name, static_cast<int>(outline_.links.size()));
     if (!is_new) {
       Fail(element.GetLineNum(), "link " + Quote(name) + ": names must be unique, taken on line " +
@@ -122,7 +122,10 @@ class OutlineReader {
   }
 
   void AddJoint(const Element& element) {
-    const std::string name = ReadName(element, "joint");
+    const char* const given = element.Attribute("name");
+    const bool has_name = given != nullptr && *given != '\0';
+    const std::string name = has_name ? given : "#" + std::to_string(outline_.joints.size());
+    outline_.has_nameless_joints |= !has_name;
     if (!joint_names_.insert(name).second) {
       Fail(element.GetLineNum(), "joint " + Quote(name) + ": names must be unique");
     }

@@ -20,7 +20,7 @@ struct UrdfLink {
 
 /// A joint element.
 struct UrdfJoint {
-  std::string name;
+  std::string name;  ///< "#" and its number in the file when it has none.
   int line = 0;
   int parent = -1;  ///< Index in UrdfOutline::links.
   int child = -1;
@@ -31,6 +31,7 @@ struct UrdfOutline {
   std::vector<UrdfLink> links;
   std::vector<UrdfJoint> joints;
   int root = -1;
+  bool has_nameless_joints = false;
   std::vector<std::string> meshes;  ///< File names, each once.
 };
 

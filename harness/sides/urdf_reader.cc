@@ -132,7 +132,9 @@ class UrdfReader {
     }
     FinishBodies();
     ReadCouplings();
+    NoteNames();
     NoteInertials();
+    if (!options_.keep_impossible) NoteImpossibleBodies(&robot_);
     return std::move(robot_);
   }
 
@@ -315,7 +317,8 @@ class UrdfReader {
       if (moves) {
         const MassProperties& whole =
             part.joint < 0 ? robot_.spec.base.body : robot_.spec.joints[static_cast<size_t>(part.joint)].body;
-        if (!FindPhysicalInconsistency(whole).empty()) FailInertial(*part.link, part.problem);
+        if (!FindUndefinedDynamics(whole).empty()) FailInertial(*part.link, part.problem);
+        if (!FindPhysicalInconsistency(whole).empty()) continue;  // a note on bodies tells
       }
       names.push_back(part.link->name);
     }
@@ -358,6 +361,17 @@ class UrdfReader {
       }
       robot_.spec.joints[static_cast<size_t>(own->second)].coupling = coupling;
     }
+  }
+
+  void NoteNames() {
+    std::vector<std::string> named;
+    for (const UrdfJoint& joint : outline_.joints) {
+      if (joint.name.starts_with('#'))
+        named.push_back(Quote(joint.name) + " moves " + Quote(Link(joint.child).name));
+    }
+    if (!named.empty())
+      robot_.notes.push_back("joints without a name, called by their number in the file: " +
+                             JoinNames(named));
   }
 
   void NoteInertials() {
@@ -430,7 +444,8 @@ RobotDescription ParseUrdf(std::string_view text, const std::string& source, con
   UrdfOutline outline = ReadUrdfOutline(text, source);
   const std::vector<std::string> meshes = outline.meshes;
   bool has_bad_looks = false;
-  urdf::ModelInterfaceSharedPtr model = ParseWithUrdfdom(std::string(text), source, &has_bad_looks);
+  urdf::ModelInterfaceSharedPtr model = ParseWithUrdfdom(
+      outline.has_nameless_joints ? NameJoints(text, source) : std::string(text), source, &has_bad_looks);
   for (const UrdfLink& link : outline.links) {
     if (!model->getLink(link.name))
       throw InputError(source + ": link " + Quote(link.name) + ": cannot be parsed");

@@ -18,7 +18,7 @@ struct UrdfOptions {
   /// The root link moves freely. Otherwise it is fixed when it is called "world", floats when the only joint
   /// on it is of the type "floating", and of others the file does not say: RobotDescription::states_base.
   bool floating = false;
-  /// Bodies that no robot can have are kept for an audit; a RobotModel refuses them.
+  /// Bodies without dynamics, as of negative mass, are kept for an audit; a RobotModel refuses them.
   bool keep_impossible = false;
 };
 

@@ -1,3 +1,10 @@
-// Preloaded into the program, stands for a MuJoCo library of another version.
+// Preloaded into the program, stands for a MuJoCo library of another version, or for a mistake of the
+// program.
 
-extern "C" int mj_version() { return 231; }
+#include <cstdlib>
+#include <stdexcept>
+
+extern "C" int mj_version() {
+  if (std::getenv("TEST_MISTAKE") != nullptr) throw std::invalid_argument("size: must be positive, got -1");
+  return 231;
+}

@@ -1,8 +1,6 @@
 #include "tests/common/random_robot.h"
 
-#include <fmt/format.h>
-
-#include <Eigen/Eigenvalues>
+#include <string>
 
 namespace dexcheck::testing {
 namespace {
@@ -30,73 +28,7 @@ MassProperties DrawBody(std::mt19937* random) {
   return {Draw(random, 0.3, 3.0), DrawVector(random, 0.2), 0.5 * (inertia + inertia.transpose())};
 }
 
-std::string WritePose(const Pose& X) {
-  const Eigen::Quaterniond q(X.linear());
-  const Vector3d p = X.translation();
-  return fmt::format("pos=\"{:.17g} {:.17g} {:.17g}\" quat=\"{:.17g} {:.17g} {:.17g} {:.17g}\"", p.x(), p.y(),
-                     p.z(), q.w(), q.x(), q.y(), q.z());
-}
-
-// Principal moments and axes: the engine diagonalises a "fullinertia" itself, but only to eight digits.
-std::string WriteInertial(const MassProperties& body) {
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(body.inertia);
-  Matrix3d axes = principal.eigenvectors();
-  if (axes.determinant() < 0.0) axes.col(0) = -axes.col(0);
-  Pose X = Pose::Identity();
-  X.linear() = axes;
-  X.translation() = body.com;
-  const Vector3d moments = principal.eigenvalues();
-  return fmt::format("<inertial {} mass=\"{:.17g}\" diaginertia=\"{:.17g} {:.17g} {:.17g}\"/>\n",
-                     WritePose(X), body.mass, moments[0], moments[1], moments[2]);
-}
-
 int CountJoints(const RobotSpec& spec) { return static_cast<int>(spec.joints.size()); }
-
-void WriteLinkContent(const RobotSpec& spec, int link, std::string* text);
-
-void WriteJoint(const RobotSpec& spec, int index, std::string* text) {
-  const Joint& joint = spec.joints[static_cast<size_t>(index)];
-  const bool is_ball = joint.type == JointType::kBall;
-  const Joint& last = spec.joints[static_cast<size_t>(index + (is_ball ? 2 : 0))];
-  const Pose X = joint.X_PB * Eigen::AngleAxisd(joint.mdh.alpha, Vector3d::UnitX()) *
-                 Eigen::Translation3d(joint.mdh.a, 0.0, 0.0) *
-                 Eigen::AngleAxisd(joint.mdh.q, Vector3d::UnitZ()) *
-                 Eigen::Translation3d(0.0, 0.0, joint.mdh.d);
-  *text += fmt::format("<body name=\"{}\" {}>\n", last.link, WritePose(X));
-  *text += fmt::format(
-      "<joint name=\"{}\" type=\"{}\" axis=\"0 0 1\" damping=\"{:.17g}\" armature=\"{:.17g}\" "
-      "limited=\"true\" range=\"{:.17g} {:.17g}\"/>\n",
-      NameInFile(joint),
-      is_ball                              ? "ball"
-      : joint.type == JointType::kRevolute ? "hinge"
-                                           : "slide",
-      joint.damping, joint.armature, joint.lower, joint.upper);
-  *text += WriteInertial(last.body);
-  WriteLinkContent(spec, index + (is_ball ? 2 : 0), text);
-  *text += "</body>\n";
-}
-
-void WriteLinkContent(const RobotSpec& spec, int link, std::string* text) {
-  for (const Frame& frame : spec.frames) {
-    if (frame.link == link)
-      *text += fmt::format("<site name=\"{}\" {}/>\n", frame.name, WritePose(frame.X_LF));
-  }
-  for (size_t i = 0; i < spec.joints.size(); ++i) {
-    if (spec.joints[i].parent == link) WriteJoint(spec, static_cast<int>(i), text);
-  }
-}
-
-void WriteWheel(const Base& base, const std::string& name, double y, std::string* text) {
-  *text += fmt::format(
-      "<body name=\"{0}_body\" pos=\"0 {1:.17g} 0\">\n<joint name=\"{0}\" axis=\"0 1 0\" "
-      "damping=\"{2:.17g}\" armature=\"{3:.17g}\"/>\n",
-      name, y, base.wheel.damping, base.wheel.armature);
-  const Vector3d moments(base.wheel.transverse_inertia, base.wheel.spin_inertia,
-                         base.wheel.transverse_inertia);
-  *text += WriteInertial({base.wheel.mass, Vector3d::Zero(), moments.asDiagonal()});
-  *text += fmt::format("<geom type=\"sphere\" size=\"{:.17g}\" contype=\"0\" conaffinity=\"0\"/>\n</body>\n",
-                       base.wheel_radius);
-}
 
 }  // namespace
 
@@ -128,8 +60,8 @@ RobotSpec MakeRandomRobot(const RandomRobotOptions& options, std::mt19937* rando
   std::vector<int> ends = {-1};  // the base and each joint's last entry
   for (int i = 0; i < options.joints; ++i) {
     Joint joint;
-    joint.name = fmt::format("joint_{}", i);
-    joint.link = fmt::format("link_{}", i);
+    joint.name = "joint_" + std::to_string(i);
+    joint.link = "link_" + std::to_string(i);
     joint.parent = ends.back();
     if (i > 0 && Draw(random, 0.0, 1.0) < options.branching) {
       joint.parent = ends[static_cast<size_t>(std::uniform_int_distribution<int>(0, i)(*random))];
@@ -167,35 +99,13 @@ RobotSpec MakeRandomRobot(const RandomRobotOptions& options, std::mt19937* rando
   for (size_t i = 0; i < is_leaf.size(); ++i) {
     if (!is_leaf[i]) continue;
     Frame frame;
-    frame.name = fmt::format("tip_{}", i);
+    frame.name = "tip_" + std::to_string(i);
     frame.link = static_cast<int>(i);
     frame.X_LF.linear() = DrawRotation(random);
     frame.X_LF.translation() = DrawVector(random, 0.1);
     spec.frames.push_back(frame);
   }
   return spec;
-}
-
-std::string WriteMjcf(const RobotSpec& spec, bool planar_by_free_joint, const Pose& X_0b) {
-  std::string text = fmt::format(
-      "<mujoco>\n<compiler angle=\"radian\" balanceinertia=\"false\"/>\n"
-      "<option gravity=\"{:.17g} {:.17g} {:.17g}\"/>\n<worldbody>\n<body name=\"{}\" {}>\n",
-      spec.gravity.x(), spec.gravity.y(), spec.gravity.z(), spec.base.link, WritePose(spec.base.X_B0 * X_0b));
-  if (spec.base.type != BaseType::kFixed) {
-    text += planar_by_free_joint
-                ? "<freejoint/>\n"
-                : "<joint type=\"slide\" axis=\"1 0 0\"/>\n<joint type=\"slide\" axis=\"0 1 0\"/>\n"
-                  "<joint axis=\"0 0 1\"/>\n";
-  }
-  // Everything stands in Sigma_0, which is welded to the base's body.
-  text += fmt::format("<body {}>\n", WritePose(X_0b.inverse()));
-  if (spec.base.type != BaseType::kFixed) text += WriteInertial(spec.base.body);
-  if (spec.base.type == BaseType::kDifferentialDrive) {
-    WriteWheel(spec.base, spec.base.wheel_joint_right, -0.5 * spec.base.wheel_distance, &text);
-    WriteWheel(spec.base, spec.base.wheel_joint_left, 0.5 * spec.base.wheel_distance, &text);
-  }
-  WriteLinkContent(spec, -1, &text);
-  return text + "</body>\n</body>\n</worldbody>\n</mujoco>\n";
 }
 
 VectorXd DrawPositions(const RobotModel& model, std::mt19937* random) {

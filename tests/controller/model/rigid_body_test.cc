@@ -182,6 +182,8 @@ TEST(PhysicalInconsistency, NamesWhatIsWrong) {
             "principal moments of inertia must not be negative, got [-1, 2, 2]");
   EXPECT_EQ(FindPhysicalInconsistency(MakeBody({1.0, 4.0, 2.0})),
             "principal moments of inertia must satisfy the triangle inequality, got [1, 2, 4]");
+  EXPECT_EQ(FindUndefinedDynamics(MakeBody({1.0, 4.0, 2.0})), "");
+  EXPECT_NE(FindUndefinedDynamics(MakeBody({2.0, -1.0, 2.0})), "");
 }
 
 TEST(PhysicalInconsistency, SeesThePrincipalMoments) {

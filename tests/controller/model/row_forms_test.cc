@@ -166,10 +166,9 @@ TEST(OtherForms, AreRefusedInOneLine) {
             "rows.toml:8: chain[0].rows[1].axis: must be a unit vector, got [1, 1, 0]");
   EXPECT_EQ(CatchProblem(kOneRow, "parent", "convention = \"dh\"\nparent"),
             "rows.toml:7: chain[0].convention: must be one of \"modified\", \"classic\", got \"dh\"");
-  EXPECT_EQ(
-      CatchProblem(kOneRow, "mass = 2, inertia = [0.1", "mass = 2, inertia = [0.9"),
-      "rows.toml:16: chain[0].links.l1.bodies[0].inertia: principal moments of inertia must satisfy the "
-      "triangle inequality, got [0.2, 0.25, 0.9]");
+  EXPECT_EQ(CatchProblem(kOneRow, "mass = 2, inertia = [0.1", "mass = 2, inertia = [-0.1"),
+            "rows.toml:16: chain[0].links.l1.bodies[0].inertia: principal moments of inertia must not be "
+            "negative, got [-0.1, 0.2, 0.25]");
   EXPECT_EQ(CatchProblem(kOneRow, "bodies", "mass = 1\nbodies"),
             "rows.toml:15: chain[0].links.l1.mass: must not stand beside \"bodies\"");
 }

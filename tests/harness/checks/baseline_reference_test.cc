@@ -55,7 +55,8 @@ TEST_P(BaselineCheck, TheLawPassesToRoundingAndAnotherIsFound) {
   ShippedRun run("curve", MakeOverrides(law, orientation));
   const RunResult& result = run.Run();
   EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
-  for (const char* name : {"law_torque", "grasp_force", "torque_applied"}) {
+  for (const char* name :
+       {"law_torque", "grasp_null_space", "grasp_cone", "grasp_optimality", "torque_applied"}) {
     const CheckRecord& check = run.loop().checks().Find(name);
     EXPECT_LE(check.worst, 0.5 * check.bound) << name;
     EXPECT_GT(check.count, 0) << name;

@@ -21,7 +21,8 @@ TEST(LawCheck, TheRightLawPassesToRounding) {
   const RunResult& result = run.Run();
   EXPECT_EQ(result.verdict, Verdict::kPass) << result.attribution.evidence;
   EXPECT_EQ(run.loop().checks().Find("law_torque").count, 800);
-  for (const char* name : {"law_torque", "law_demand", "grasp_force", "torque_applied", "error_dynamics"}) {
+  for (const char* name : {"law_torque", "law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality",
+                           "torque_applied", "error_dynamics"}) {
     const CheckRecord& check = run.loop().checks().Find(name);
     EXPECT_LE(check.worst, 0.5 * check.bound) << name;
     EXPECT_GT(check.count, 0) << name;
@@ -82,7 +83,9 @@ TEST(LawCheck, AnInternalForceThatIsNotTheBestIsFound) {
   Runner runner(shipped.setup(), /*check=*/true, std::move(parts));
   const RunResult& result = runner.Run([](const StepRecord&) {}, [] { return false; });
   EXPECT_EQ(result.attribution.cause, Cause::kControlLaw) << result.attribution.evidence;
-  EXPECT_TRUE(runner.loop().checks().Find("grasp_force").failed);
+  EXPECT_TRUE(runner.loop().checks().Find("grasp_optimality").failed);
+  for (const char* name : {"grasp_null_space", "grasp_cone"})
+    EXPECT_FALSE(runner.loop().checks().Find(name).failed) << name;
   EXPECT_FALSE(runner.loop().checks().Find("law_torque").failed);
 }
 

@@ -98,8 +98,7 @@ TEST(ConsistencyCommand, ChangedNumberIsADisagreement) {
                                            {folder.path()});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(result.err, "");
-  EXPECT_THAT(result.out,
-              HasSubstr("\nDISAGREE:\n  link_mass: link panda_link3: 3.3 in bad.toml, 3.228604 in"));
+  EXPECT_THAT(result.out, HasSubstr("\nDISAGREE: link_mass: link panda_link3: 3.3 in bad.toml, 3.228604 in"));
   EXPECT_THAT(result.out, HasSubstr("  gravity: nearest the base: panda_joint2;"));
 
   const Json results = Json::parse(ReadText(folder.path() / "out.json"));
@@ -124,23 +123,23 @@ TEST(ConsistencyCommand, WhatOnlyTheMjcfHasIsADisagreement) {
   for (const Addition& addition : {
            Addition{"<tendon><fixed name='t' stiffness='300'><joint joint='panda_joint2' "
                     "coef='1'/></fixed></tendon>",
-                    "  tendon_spring: tendon t: 0 in panda.toml, 300 in "},
+                    "tendon_spring: tendon t: 0 in panda.toml, 300 in "},
            {"<tendon><fixed name='t' damping='2'><joint joint='panda_joint2' coef='1'/></fixed></tendon>",
-            "  tendon_damping: tendon t: "},
+            "tendon_damping: tendon t: "},
            {"<tendon><fixed name='t' frictionloss='2'><joint joint='panda_joint2' "
             "coef='1'/></fixed></tendon>",
-            "  tendon_friction: tendon t: "},
+            "tendon_friction: tendon t: "},
            {"<tendon><fixed name='t' limited='true' range='0 1'><joint joint='panda_joint2' "
             "coef='1'/></fixed></tendon>",
-            "  tendon_limit: tendon t: "},
+            "tendon_limit: tendon t: "},
            {"<equality><joint name='e' joint1='panda_joint2' joint2='panda_joint3'/></equality>",
-            "  equality_constraint: constraint e: "},
+            "equality_constraint: constraint e: "},
            {"<actuator><position name='p' joint='panda_joint2' kp='50'/></actuator>",
-            "  motor_bias: actuator p: "},
+            "motor_bias: actuator p: "},
            {"<actuator><velocity name='p' joint='panda_joint2' kv='5'/></actuator>",
-            "  motor_gain: actuator p: "},
-           {"<option><flag gravity='disable'/></option>", "  disable_flag: Gravity: "},
-           {"<option><flag override='enable'/></option>", "  enable_flag: Override: "},
+            "motor_gain: actuator p: "},
+           {"<option><flag gravity='disable'/></option>", "disable_flag: Gravity: "},
+           {"<option><flag override='enable'/></option>", "enable_flag: Override: "},
        }) {
     const TempFolder folder;
     std::string text = ReadText(testing::kMjcf + "panda.xml");

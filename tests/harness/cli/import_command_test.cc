@@ -48,13 +48,12 @@ TEST_F(TwoDescriptions, ReportWhatOneLacksAndWhatDiffers) {
             ReplaceOnce(ReadText(mjcf_), "armature=\"0\"", "armature=\"0.1\""));
   const ProgramResult lacks =
       Run({"consistency", "panda.urdf", "motors.xml", "--samples", "20", "--json", "out.json"});
-  EXPECT_EQ(lacks.exit_code, 0);
-  EXPECT_THAT(lacks.out,
-              HasSubstr("armature: only motors.xml states it, up to 0.1, for panda_joint1, panda_joint2"));
-  EXPECT_THAT(lacks.out, ::testing::Not(HasSubstr("joint_armature")));
+  EXPECT_EQ(lacks.exit_code, 1);
   const Json results = Json::parse(ReadText(folder_.path() / "out.json"));
-  EXPECT_EQ(results.at("verdict"), "pass");
-  EXPECT_THAT(results.at("notes").dump(), HasSubstr("gravity: only motors.xml states it"));
+  EXPECT_EQ(results.at("verdict"), "disagreement");
+  EXPECT_EQ(results.at("findings").size(), 7U);
+  for (const Json& finding : results.at("findings")) EXPECT_EQ(finding.at("check"), "joint_armature");
+  EXPECT_THAT(results.at("not_compared").dump(), HasSubstr("gravity: only motors.xml states it"));
 
   WriteText(folder_.path() / "wrong.urdf",
             ReplaceOnce(testing::MakePandaUrdf(), "<mass value=\"3.228604\"/>", "<mass value=\"3.3\"/>"));
@@ -79,9 +78,8 @@ TEST_F(TwoDescriptions, AreJudgedByDigitsWhenTold) {
   WriteText(folder_.path() / "rounded.urdf", rounded);
   const ProgramResult strict = Run({"consistency", "rounded.urdf", mjcf_, "--samples", "20"});
   EXPECT_EQ(strict.exit_code, 1);
-  EXPECT_THAT(strict.out,
-              HasSubstr("All checks agree to 4 digits, as they would with rounded numbers on one side; "
-                        "--digits 4 judges by that."));
+  EXPECT_THAT(strict.out, HasSubstr("\nDISAGREE: everything agrees to 4 digits, as rounded numbers do; "
+                                    "--digits 4 judges by that"));
   const ProgramResult told =
       Run({"consistency", "rounded.urdf", mjcf_, "--samples", "20", "--digits", "4", "--json", "-"});
   EXPECT_EQ(told.exit_code, 0) << told.out;

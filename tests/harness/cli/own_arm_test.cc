@@ -11,6 +11,7 @@ namespace {
 
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 // A turning column, a lift that slides on it, an elbow; sizes and masses by geoms alone.
 constexpr const char* kArm = R"(<mujoco model="own arm">
@@ -86,7 +87,12 @@ TEST_F(OwnArm, IsRunReportedDrawnAndReplayed) {
   EXPECT_FALSE(summary.at("tracking").contains("position_error_max_m"));
   EXPECT_TRUE(summary.at("checks").contains("joint_dynamics"));
   EXPECT_FALSE(summary.at("checks").contains("contact_force"));
-  EXPECT_THAT(ReadText(folder_.path() / "run/report.html"), HasSubstr("largest error of a joint"));
+  const std::string page = ReadText(folder_.path() / "run/report.html");
+  EXPECT_THAT(page, HasSubstr("largest error of a joint"));
+  for (const char* title : {"Motion of the joints", "Errors of the joints", "Torques of the joints"})
+    EXPECT_THAT(page, HasSubstr(std::string("<figcaption>") + title + "</figcaption>"));
+  // Nothing here is in the paper.
+  for (const char* papers : {"the paper's figures", "<b>Figure"}) EXPECT_THAT(page, Not(HasSubstr(papers)));
   const ProgramResult picture =
       Run({"render", "run", "--still", "0.5", "--size", "320x240", "--out", "picture.png"});
   EXPECT_EQ(picture.exit_code, 0) << picture.err;
@@ -106,7 +112,7 @@ TEST_F(OwnArm, WithoutShapesHasAPageToo) {
   const ProgramResult result = Run({"run", "own.toml", "--out", "run"});
   ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
   EXPECT_EQ(result.err, "");
-  EXPECT_THAT(ReadText(folder_.path() / "run/report.html"), HasSubstr("Robot and object at the end"));
+  EXPECT_THAT(ReadText(folder_.path() / "run/report.html"), HasSubstr("Robot at the end"));
   const ProgramResult picture =
       Run({"render", "run", "--still", "0.5", "--size", "320x240", "--out", "picture.png"});
   EXPECT_EQ(picture.exit_code, 0) << picture.err;

@@ -45,7 +45,8 @@ void ExpectThePapersLaw(const std::string& controller) {
   EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
   const nlohmann::json summary = ReadSummary(own);
   EXPECT_EQ(summary["verdict"], "pass");
-  for (const char* check : {"law_torque", "law_demand", "grasp_force", "error_dynamics"}) {
+  for (const char* check :
+       {"law_torque", "law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality", "error_dynamics"}) {
     ASSERT_TRUE(summary["checks"].contains(check)) << check;
     EXPECT_TRUE(summary["checks"][check]["pass"]) << check;
   }
@@ -104,7 +105,8 @@ TEST(OwnController, AnUnknownLawIsNotAsked) {
   const std::filesystem::path own = folder.path() / "own";
   EXPECT_EQ(RunWith(PAPER_LAW_LIBRARY, {"--out", own.string()}).exit_code, 0);
   const nlohmann::json checks = ReadSummary(own)["checks"];
-  for (const char* check : {"law_torque", "law_demand", "grasp_force", "gain_stability", "error_dynamics"}) {
+  for (const char* check : {"law_torque", "law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality",
+                            "gain_stability", "error_dynamics"}) {
     EXPECT_FALSE(checks.contains(check)) << check;
   }
   for (const char* check : {"told", "torque_applied", "expect_position", "balance_robot", "contact_force"}) {

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <nlohmann/json.hpp>
@@ -36,7 +37,13 @@ TEST(RunCommand, SaysThatARunWithoutStepsHasNoVideo) {
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.out, HasSubstr("while settling"));
   EXPECT_THAT(result.out, HasSubstr("\nlog and summary in "));
-  EXPECT_EQ(result.err, "dexcheck: no video: the run ended before its first step\n");
+  EXPECT_THAT(result.err, HasSubstr("dexcheck: no video: the run ended before its first step\n"));
+  EXPECT_THAT(result.err, HasSubstr("while settling\n")) << "a failure has its line, whatever is printed";
+  EXPECT_TRUE(IsRefused(RunDexcheck({"run", "--replay", out.string()}), {"run/log.h5", "first step"}));
+  const ProgramResult table = RunDexcheck({"export", out.string(), "--csv", "-"});
+  EXPECT_EQ(table.exit_code, 0);
+  EXPECT_EQ(std::count(table.out.begin(), table.out.end(), '\n'), 1) << "the header";
+  EXPECT_THAT(table.err, HasSubstr("first step"));
   EXPECT_FALSE(std::filesystem::exists(out / "video.mp4"));
   EXPECT_FALSE(std::filesystem::exists(out / "report.html"));
 }
@@ -97,11 +104,13 @@ TEST(RunCommand, WritesAFolderThatTellsAll) {
 }
 
 /// Writes a log again, with one number of its last row changed.
+/// @param lost rows at its end, and with them the summary: the log of a run that was killed.
 void CopyLog(const std::filesystem::path& from, const std::filesystem::path& to, const std::string& changed,
-             double change) {
+             double change, long lost = 0) {
   const LogReader log(from);
   LogWriter copy(to, log.rows());
-  for (const std::string& text : log.ListTexts()) copy.SetText(text, log.ReadText(text));
+  for (const std::string& text : log.ListTexts())
+    copy.SetText(text, lost > 0 && text == "summary" ? "" : log.ReadText(text));
   for (const std::string& file : log.ListFiles("inputs")) {
     copy.EmbedFile("inputs", file, log.ReadFile("inputs", file));
   }
@@ -112,13 +121,70 @@ void CopyLog(const std::filesystem::path& from, const std::filesystem::path& to,
     signals.emplace_back(signal.name == "time" ? LogWriter::kTime : copy.AddSignal(signal), values);
   }
   copy.StartRows();
-  for (long row = 0; row < log.rows(); ++row) {
+  for (long row = 0; row < log.rows() - lost; ++row) {
     for (const auto& [signal, values] : signals) {
       std::copy_n(values.row(row).data(), values.cols(), copy.Row(signal).data());
     }
     copy.EndRow();
   }
   copy.Close();
+}
+
+TEST(RunCommand, WhatWasCutOffIsToldAndComparedByItsLength) {
+  const TempFolder folder;
+  const std::string whole = (folder.path() / "whole").string();
+  ASSERT_EQ(RunDexcheck({"run", "hold", "--set", "duration=0.02", "--set", "settle=0.1", "--no-report",
+                         "--out", whole})
+                .exit_code,
+            0);
+  std::vector<std::string> cut;
+  for (const long lost : {5, 10}) {
+    cut.push_back((folder.path() / ("cut" + std::to_string(lost))).string());
+    std::filesystem::create_directory(cut.back());
+    CopyLog(whole + "/log.h5", cut.back() + "/log.h5", "", 0.0, lost);
+  }
+  const ProgramResult replay = RunDexcheck({"run", "--replay", cut[0]});
+  EXPECT_EQ(replay.exit_code, 0) << replay.err;
+  EXPECT_THAT(replay.out, HasSubstr("cut off after 15 steps"));
+  EXPECT_THAT(RunDexcheck({"run", "--replay", whole}).out, ::testing::Not(HasSubstr("cut off")));
+  EXPECT_THAT(RunDexcheck({"export", cut[0], "--list"}).err, HasSubstr("cut off after 15 steps"));
+  const auto compare = [](std::vector<std::string> more) {
+    more.insert(more.begin(), "compare");
+    more.insert(more.end(), {"--tolerance", "0"});
+    return RunDexcheck(more).exit_code;
+  };
+  EXPECT_EQ(compare({cut[0], cut[0]}), 0);
+  EXPECT_EQ(compare({cut[0], cut[1]}), 1) << "not as long";
+  EXPECT_EQ(compare({cut[0], whole}), 1);
+  EXPECT_EQ(compare({whole, whole, "--signals", "time"}), 2) << "nothing was compared";
+}
+
+TEST(RunCommand, AWordThatIsSetReplacesTheFilesAndKeysCanBeRemoved) {
+  const auto run = [](std::vector<std::string> more) {
+    more.insert(more.begin(),
+                {"run", "hold", "--no-log", "--json", "--set", "duration=0.01", "--set", "settle=0.1"});
+    return RunDexcheck(more);
+  };
+  // The file has a natural frequency of 20 rad/s and a damping ratio of 1: K_p = 400, K_v = 40.
+  const auto motion = [](const ProgramResult& result) {
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(result.out)["tracking"];
+  };
+  const nlohmann::json as_written = motion(run({}));
+  for (const char* same : {"control.K_v=40", "control.K_p=400"}) {
+    const ProgramResult result = run({"--set", same});
+    EXPECT_EQ(motion(result), as_written) << same;
+    EXPECT_THAT(result.err, HasSubstr("hold.toml:")) << same;
+  }
+  EXPECT_NE(motion(run({"--set", "control.K_v=10"})), as_written);
+  EXPECT_EQ(
+      motion(run({"--unset", "description", "--unset", "control.damping_ratio", "--set", "control.K_v=40"})),
+      as_written);
+  EXPECT_TRUE(IsRefused(run({"--unset", "control.K_x"}), {"--unset control.K_x", "not there"}));
+  EXPECT_TRUE(IsRefused(run({"--unset", "control.K_v=1"}), {"--unset", "control.K_v=1"}));
+  for (const char* file : {"model.file", "plant.mjcf"}) {
+    EXPECT_TRUE(IsRefused(run({"--set", std::string(file) + "=nowhere"}), {"hold.toml", file, "nowhere"}));
+  }
 }
 
 // The C library's mathematics without fused multiply-add has other last bits: another machine.

@@ -4,6 +4,10 @@
 # and man shows the manual page.
 set -euo pipefail
 
+for program in tmux zsh groff; do
+  command -v $program >/dev/null || { echo "skipped: no $program here"; exit 77; }
+done
+
 dexcheck=$1
 work=$(mktemp -d)
 socket=$work/tmux

@@ -59,7 +59,7 @@ TEST(Usage, HelpMentionsEveryCommandAndOption) {
     EXPECT_THAT(help({"--help"}), HasSubstr(word));
   }
   for (const char* word : {"--robot FILE.toml", "--mjcf FILE.xml", "--samples N=10000", "--seed N=1",
-                           "--json FILE.json", "--quiet"}) {
+                           "--json [FILE.json]", "--quiet"}) {
     EXPECT_THAT(help({"consistency", "--help"}), HasSubstr(word));
   }
   for (const char* word :
@@ -67,7 +67,7 @@ TEST(Usage, HelpMentionsEveryCommandAndOption) {
     EXPECT_THAT(help({"eval", "--help"}), HasSubstr(word));
   }
   for (const char* word : {"--contacts REQUIRED", "--object-xyz X Y Z x 3 REQUIRED", "--hand right|left",
-                           "--palm FRAME", "--support-height Z", "--mu MU=0.5", "--json FILE.json"}) {
+                           "--palm FRAME", "--support-height Z", "--mu MU=0.5", "--json [FILE.json]"}) {
     EXPECT_THAT(help({"plan", "--help"}), HasSubstr(word));
   }
   for (const char* word : {"RUN_DIR", "--csv FILE.csv", "--signals A,B,...", "--every N=1", "--list"}) {

@@ -53,7 +53,8 @@ struct Copy {
 
 Copy Downgrade(const std::string& text, const std::string& source) {
   JoinedMjcf mjcf(text, source);
-  DowngradeMjcf(&mjcf);
+  LeaveOutNewerWords(&mjcf);
+  StateNewDefaults(&mjcf);
   return {mjcf.Print(), mjcf.changes()};
 }
 
@@ -71,7 +72,7 @@ class LeftOut : public ::testing::TestWithParam<Words> {};
 
 TEST_P(LeftOut, ThePendulumStays) {
   const std::string newer = WriteMjcf(GetParam());
-  EXPECT_THROW(LoadMjcfText(newer, "newer"), InputError);
+  EXPECT_EQ(CalcTerms(newer), CalcTerms(kPlain));
   const Copy copy = Downgrade(newer, "newer");
   EXPECT_FALSE(copy.changes.empty());
   const std::vector<double> terms = CalcTerms(copy.text);
@@ -96,7 +97,8 @@ INSTANTIATE_TEST_SUITE_P(
         Words{.in_body = "<light intensity=\"2\"/>"}, Words{.in_body = "<body name=\"b\" sleep=\"never\"/>"},
         Words{.actuator = "kv=\"3\" dampratio=\"1\" inheritrange=\"0\""},
         Words{.actuator = "armature=\"0.0\""}, Words{.tendon = "armature=\"0\" actuatorfrcrange=\"-1 1\""},
-        Words{.sensor = "delay=\"0.1\" nsample=\"3\""}, Words{.root = "<sensor><e_kinetic/></sensor>\n"}));
+        Words{.sensor = "delay=\"0.1\" nsample=\"3\""}, Words{.root = "<sensor><e_kinetic/></sensor>\n"},
+        Words{.root = "<sensor><contact geom1=\"a\"/><plugin/></sensor><extension><plugin/></extension>\n"}));
 
 /// What acts on the dynamics is refused in one line, with its place, since when it is, and what to do.
 struct Refused {
@@ -125,6 +127,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "<joint stiffness>: acts on the dynamics: 2.2.2 has the first"},
         Refused{{.in_body = "<frame pos=\"0 0 1\"/>"},
                 "<frame>: acts on the dynamics, since MuJoCo 3.1.0: load the file"},
+        Refused{{.in_body = "<plugin/>"}, "<plugin>: acts on the dynamics, since MuJoCo 2.3.0"},
         Refused{{.in_body = "<replicate count=\"2\"/>"}, "<replicate>: acts on the dynamics"},
         Refused{{.joint = "springiness=\"1\""},
                 "<joint springiness>: is neither in 2.2.2 nor known to be newer"},
@@ -152,22 +155,22 @@ TEST(NewerMjcf, ShippedFilesNeedNoCopy) {
   }
 }
 
-TEST(NewerMjcf, WhatTheEngineDoesNotLoadIsExplained) {
-  EXPECT_TRUE(testing::Throws<InputError>(
-      [] { LoadMjcfText(WriteMjcf({.joint = "actuatorfrcrange=\"-5 5\""}), "f"); },
-      "it is new since MuJoCo 3.0.0 and acts on forces of actuators; dexcheck "
-      "import FILE --downgrade"));
-  EXPECT_TRUE(
-      testing::Throws<InputError>([] { LoadMjcfText(WriteMjcf({.in_body = "<frame/>"}), "f"); },
-                                  "it is new since MuJoCo 3.1.0 and acts on dynamics: load the file in"));
-  EXPECT_TRUE(testing::Throws<InputError>(
-      [] { LoadMjcfText(WriteMjcf({.option = "integrator=\"implicitfast\""}), "f"); },
-      "it is new since MuJoCo 2.3.3 and acts on the integrator; dexcheck import FILE --downgrade"));
-  EXPECT_TRUE(testing::Throws<InputError>(
-      [] { LoadMjcfText("<mujoco><compiler assetdir=\"meshes\"/></mujoco>", "f"); },
-      "it is new since MuJoCo 2.3.0; dexcheck import FILE --downgrade"));
+TEST(NewerMjcf, WhatIsNoMjcfIsNamed) {
+  EXPECT_TRUE(testing::Throws<InputError>([] { LoadMjcfText(WriteMjcf({.in_body = "<frame/>"}), "f"); },
+                                          "f:8: <frame>: acts on the dynamics, since MuJoCo 3.1.0"));
   EXPECT_TRUE(testing::Throws<InputError>([] { Downgrade("<mujoco>", "f"); }, "f:1: is not XML"));
   EXPECT_TRUE(testing::Throws<InputError>([] { Downgrade("<robot/>", "f"); }, "f: must be an MJCF"));
+}
+
+/// As later releases take it; 2.2.2 asks for "limited".
+TEST(NewerMjcf, ARangeLimits) {
+  for (const auto& [words, limited] : {std::pair("", 1), std::pair("limited=\"false\"", 0)}) {
+    const MjModelPtr model =
+        LoadMjcfText("<mujoco><worldbody><body><joint range=\"-20 30\" " + std::string(words) +
+                         "/><geom size=\"1\"/></body></worldbody></mujoco>",
+                     "robot");
+    EXPECT_EQ(model->jnt_limited[0], limited) << words;
+  }
 }
 
 }  // namespace

@@ -36,9 +36,9 @@ struct Mutation {
 };
 void PrintTo(const Mutation& mutation, std::ostream* stream) { *stream << mutation.name; }
 
-class StaticGateTest : public ::testing::TestWithParam<Mutation> {
+class StaticGateFiles : public ::testing::Test {
  protected:
-  StaticGateTest() {
+  StaticGateFiles() {
     std::filesystem::copy(
         kMjcf, folder_.path(),
         std::filesystem::copy_options::recursive | std::filesystem::copy_options::overwrite_existing);
@@ -52,6 +52,8 @@ class StaticGateTest : public ::testing::TestWithParam<Mutation> {
   TempFolder folder_;
   RobotModel model_ = ReadRobotModel(kParameters + "assistant_robot.toml");
 };
+
+class StaticGateTest : public StaticGateFiles, public ::testing::WithParamInterface<Mutation> {};
 
 TEST_P(StaticGateTest, FindsAndNames) {
   const Mutation& mutation = GetParam();
@@ -68,6 +70,25 @@ TEST_P(StaticGateTest, FindsAndNames) {
   for (const CheckRecord& record : result.records) {
     EXPECT_EQ(record.failed, found.find(record.name + ": ") != std::string::npos) << record.name;
   }
+}
+
+// A fingertip's body may have other spheres, before it: one that is only seen, one that touches elsewhere.
+TEST_F(StaticGateFiles, TheFingertipIsTheSphereThatTouchesAtItsSite) {
+  const std::string tip = "<geom name=\"rf1_tip_geom\" class=\"tip\"/>";
+  const std::string seen =
+      "<geom name=\"seen\" size=\"0.011\" pos=\"0 0 -0.0185\" mass=\"0\" contype=\"0\" "
+      "conaffinity=\"0\"/>";
+  const std::string knuckle = "<geom name=\"knuckle\" size=\"0.008\" mass=\"0\" contype=\"2\"/>";
+  const std::filesystem::path file = folder_.path() / "robot.xml";
+  WriteText(file, ReplaceOnce(ReadText(file), tip, seen + knuckle + tip));
+  const MjModelPtr engine = LoadMjcf(folder_.path() / "scene.xml");
+  const Adapter adapter(model_, *engine, "scene.xml");
+  const int frame = model_.FindFrame("rf1_tip");
+  const int wanted = mj_name2id(engine.get(), mjOBJ_GEOM, "rf1_tip_geom");
+  ASSERT_LT(mj_name2id(engine.get(), mjOBJ_GEOM, "knuckle"), wanted);
+  EXPECT_EQ(adapter.FindTipGeom(frame), wanted);
+  EXPECT_EQ(adapter.RequireTipGeom(frame), wanted);
+  for (const GateFinding& one : RunStaticGate(adapter).findings) EXPECT_NE(one.check, "fingertip_radius");
 }
 
 const std::string kRightWheelColumn =
@@ -132,7 +153,7 @@ INSTANTIATE_TEST_SUITE_P(
         {"FingertipRadius", "robot.xml", "<default class=\"tip\"> <geom size=\"0.009\"",
          "<default class=\"tip\"> <geom size=\"0.0091\"", "fingertip_radius", kFingertip},
         {"FingertipPlace", "robot.xml", "<default class=\"tip\"> <geom size=\"0.009\" pos=\"0 0 -0.0185\"/>",
-         "<default class=\"tip\"> <geom size=\"0.008\" pos=\"0 0 -0.0195\"/>", "contact_friction",
+         "<default class=\"tip\"> <geom size=\"0.008\" pos=\"0 0 -0.0195\"/>", "fingertip_radius",
          kFingertip},
         {"PairFriction", "contacts.xml",
          "<default class=\"fingertip\"> <pair condim=\"3\" friction=\"0.8 0.8",

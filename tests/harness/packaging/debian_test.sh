@@ -6,21 +6,17 @@ set -euo pipefail
 
 repository=$(cd "$(dirname "${BASH_SOURCE[0]}")/../../.." && pwd)
 build=$(realpath "${1:-$repository/build/release}")
+. "$repository/tests/bare_root.sh"
 scratch=$(mktemp -d)
 root=$scratch/root
 trap 'umount -q "$root/proc" || true; rm -rf --one-file-system "$scratch"' EXIT
 
 (cd "$build" && cpack -B "$scratch/packages" >"$scratch/cpack.txt") || { tail -20 "$scratch/cpack.txt"; exit 1; }
-debootstrap --variant=minbase bookworm "$root" ${DEBIAN_MIRROR:+"$DEBIAN_MIRROR"} >"$scratch/debootstrap.txt" ||
-  { tail -20 "$scratch/debootstrap.txt"; exit 1; }
-cp /etc/resolv.conf "$root/etc/"
-# Packages come from where this machine's come from.
-rm -f "$root/etc/apt/sources.list"
-cp -rL /etc/apt/. "$root/etc/apt/"
+MakeBareRoot "$root"
 cp "$scratch"/packages/dexcheck_*.deb "$root/tmp/"
 chroot "$root" sh -c 'DEBIAN_FRONTEND=noninteractive apt-get --quiet=2 update &&
   apt-get --quiet=2 --yes install --no-install-recommends /tmp/dexcheck_*.deb' >"$scratch/apt.txt" 2>&1 ||
   { tail -20 "$scratch/apt.txt"; exit 1; }
 mount -t proc proc "$root/proc"
-chroot --userspec=nobody:nogroup "$root" sh -c 'cd /var/tmp && HOME=/var/tmp dexcheck run paper --out /var/tmp/paper --quiet'
+chroot --userspec=nobody:nogroup "$root" sh -c 'cd /var/tmp && env -u HOME dexcheck run paper --out /var/tmp/paper --quiet'
 ls "$root"/var/tmp/paper

@@ -23,7 +23,7 @@ constexpr const char* kAsk =
     "`${v.id} (${v.impact}), ${v.nodes.length} times: ${v.nodes[0].target} ${v.nodes[0].failureSummary}`); "
     "});";
 
-class AccessibilityTest : public ::testing::Test {
+class AccessibilityBrowserTest : public ::testing::Test {
  protected:
   /// axe-core's script from the npm registry; empty without a network.
   std::string FetchAxe() {
@@ -36,7 +36,7 @@ class AccessibilityTest : public ::testing::Test {
   testing::TempFolder folder_;
 };
 
-TEST_F(AccessibilityTest, AxeFindsNothingInThePageOfARun) {
+TEST_F(AccessibilityBrowserTest, AxeFindsNothingInThePageOfARun) {
   const std::string axe = FetchAxe();
   if (axe.empty()) GTEST_SKIP() << "axe-core cannot be fetched from the npm registry";
   testing::WriteReplayRun(folder_.path(), 0.3);

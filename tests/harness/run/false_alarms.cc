@@ -2,10 +2,12 @@
 // over seeds, time steps and impedances of the contacts, and tells how much of its bound each check takes.
 //
 //   false_alarms [--scenarios A,B] [--seeds N] [--steps MS,MS] [--impedances D,D] [--duration S]
-//                [--set KEY=VALUE]
+//                [--set KEY=VALUE] [--draws N] [--first K]
 //
-// Seeds are tried with the scenario's own plant, steps and impedances in all combinations with seed 0. A
-// duration of 0 is the scenario's own. Exit code 1 after an alarm.
+// With --draws, runs K to K + N - 1 of a list without end: scenario, law, plant, step, impedance, seed and
+// what is not ideal are drawn from the run's number alone. Otherwise seeds are tried with the scenario's own
+// plant, steps and impedances in all combinations with seed 0. A duration of 0 is the scenario's own. Exit
+// code 1 after an alarm.
 
 #include <fmt/format.h>
 
@@ -15,6 +17,7 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
+#include <random>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -45,6 +48,8 @@ struct Options {
   std::vector<std::string> impedances = {"0.9", "0.99", "0.999"};
   std::string duration = "4";
   std::vector<std::string> overrides;
+  int draws = 0;
+  int first = 0;
 };
 
 /// One run's choices.
@@ -87,6 +92,10 @@ Options ReadOptions(int argc, char** argv) {
       options.duration = value;
     else if (key == "--set")
       options.overrides.push_back(value);
+    else if (key == "--draws")
+      options.draws = std::stoi(value);
+    else if (key == "--first")
+      options.first = std::stoi(value);
     else
       throw InputError("unknown option " + key);
   }
@@ -94,8 +103,66 @@ Options ReadOptions(int argc, char** argv) {
   return options;
 }
 
+/// What a scenario may ask for of sensing, motors and plant without breaking the paper's assumptions. Those
+/// of the object last.
+const std::vector<std::vector<std::string>> kAsked = {
+    {"sensing.joint_counts=65536"},
+    {"sensing.joint_counts=1048576", "sensing.velocity=kalman", "sensing.kalman_acceleration=20"},
+    {"sensing.joint_noise=1e-6", "sensing.velocity=differenced", "sensing.velocity_cutoff=50"},
+    {"sensing.velocity_noise=1e-4"},
+    {"sensing.latency=0.002"},
+    {"actuation.torque_step=1e-3"},
+    {"actuation.gain_error=0.005"},
+    {"actuation.delay=0.0015"},
+    {"mismatch.mass_within=0.02"},
+    {"mismatch.damping=1.2"},
+    {"actuation.coulomb=0.02"},
+    {"control.kappa=integrated"},
+    {"sensing.object_position_noise=1e-5", "sensing.object_velocity=kalman", "sensing.object_acceleration=5"},
+    {"sensing.object_rate=250", "sensing.object_latency=0.004", "sensing.object_velocity=differenced"},
+    {"disturbance=[{ type = 'pulse', body = 'object', force = [0, 0, 0.5], begin = 0.05, duration = 0.1 }]"},
+};
+constexpr size_t kOfJoints = 10;  // of them, those that every robot can have
+
+/// The run of this number.
+Choice Draw(int number, const Options& options) {
+  std::mt19937_64 random(static_cast<std::uint64_t>(number));
+  const auto pick = [&](const auto& list) { return list[random() % std::size(list)]; };
+  Choice choice;
+  do choice.scenario = pick(options.scenarios);
+  while (kExpectedCause.contains(choice.scenario));
+  choice.seed = random() % 20;
+  choice.overrides = options.overrides;
+  if (std::stod(options.duration) > 0.0) choice.overrides.push_back("duration=" + options.duration);
+  const Scenario scenario = ReadShippedScenario(choice.scenario);
+  const bool moves_joints = scenario.joint_motion.has_value();
+  bool is_as_written = true;  // as far as the scenario's expectation goes
+  if (!scenario.task && !scenario.plant.bonded && random() % 3 == 0)
+    choice.overrides.push_back(std::string("plant.type=") + (random() % 2 == 0 ? "rigid" : "rigid_euler"));
+  else if (scenario.plant.type == PlantType::kEngine)
+    choice.overrides.push_back("plant.contact_impedance=" + pick(options.impedances));
+  if (!scenario.task && scenario.plant.type == PlantType::kEngine)
+    choice.overrides.push_back(fmt::format("plant.time_step={}", 1e-3 * std::stod(pick(options.steps))));
+  if (!scenario.task && random() % 2 == 0) {
+    const char* const laws[] = {"pd_gravity", "feedforward_pd", "operational_space", "impedance"};
+    choice.overrides.push_back(std::string("control.law=") +
+                               (moves_joints ? laws[random() % 2] : pick(laws)));
+    is_as_written = false;
+  }
+  const bool is_real = !scenario.imperfections.is_ideal();
+  for (auto count = is_real || scenario.task ? 0 : random() % 3; count > 0; --count) {
+    const auto& asked = kAsked[random() % (moves_joints ? kOfJoints : kAsked.size())];
+    choice.overrides.insert(choice.overrides.end(), asked.begin(), asked.end());
+    is_as_written = false;
+  }
+  if (!is_as_written) choice.overrides.emplace_back("expect={}");
+  return choice;
+}
+
 std::vector<Choice> ListChoices(const Options& options) {
   std::vector<Choice> choices;
+  for (int i = 0; i < options.draws; ++i) choices.push_back(Draw(options.first + i, options));
+  if (options.draws > 0) return choices;
   for (const std::string& scenario : options.scenarios) {
     std::vector<std::string> always = options.overrides;
     if (std::stod(options.duration) > 0.0) always.push_back("duration=" + options.duration);
@@ -142,20 +209,22 @@ bool Try(const Choice& choice, std::map<std::string, Largest>* largest) {
 
 int RunCampaign(const Options& options) {
   std::map<std::string, Largest> largest;
-  long runs = 0, alarms = 0;
+  long runs = 0, alarms = 0, refused = 0;
   for (const Choice& choice : ListChoices(options)) {
     // A variation that no run can be made of, such as a grasp that is out of reach, raises no alarm.
     try {
       ++runs;
       alarms += Try(choice, &largest) ? 0 : 1;
     } catch (const InputError& error) {
+      ++refused;
       fmt::print("refused {}: {}\n", choice.Describe(), error.what());
     }
   }
   fmt::print("\n{:<24}{:>16}  in\n", "check", "share of bound");
   for (const auto& [name, at] : largest) fmt::print("{:<24}{:>16.3g}  {}\n", name, at.share, at.where);
-  fmt::print("{} false alarms in {} runs\n", alarms, runs);
-  return alarms == 0 ? 0 : 1;
+  fmt::print("{} false alarms in {} runs, {} refused\n", alarms, runs - refused, refused);
+  // A campaign that runs next to nothing says nothing.
+  return alarms == 0 && 2 * refused <= runs ? 0 : 1;
 }
 
 }  // namespace

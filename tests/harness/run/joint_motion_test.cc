@@ -31,7 +31,8 @@ TEST(JointMotionRun, PandaReachesToRounding) {
   EXPECT_GT(result.tracking.joints_max(), 1e-12);
   EXPECT_GT(run.step().reading.state.xi.cwiseAbs().maxCoeff(), 0.1);
   // Nothing is held, and nothing is said of it.
-  for (const char* check : {"contact_force", "fingertip_slip", "kappa", "balance_object", "grasp_force"}) {
+  for (const char* check :
+       {"contact_force", "fingertip_slip", "kappa", "balance_object", "grasp_optimality"}) {
     EXPECT_FALSE(run.loop().checks().Find(check).applies) << check;
   }
 }

@@ -153,6 +153,19 @@ TEST(RunCampaign, AnUprightAxisHoldsWhatPushesAlongIt) {
   EXPECT_EQ(without, 2);
 }
 
+// The run without a mistake goes through what makes mistakes: fingertips that are joined stay where they are.
+TEST(RunCampaign, NothingInjectedChangesNothing) {
+  RunMutationOptions options;
+  options.from = 0.02;
+  options.duration = 0.02;
+  options.parameters = 0;
+  options.laws = options.equations = false;
+  RunCampaign campaign = MakeCampaign(options, "bonded");
+  const Count objects = RunSome(&campaign, [](const RunMutant& mutant) { return mutant.kind == "object"; });
+  EXPECT_GE(objects.made, 7);
+  EXPECT_GE(objects.cause, objects.made - 1);  // one pushes later than the run lasts
+}
+
 TEST(RunCampaign, ARunThatDoesNotPassIsNoPlaceForMistakes) {
   RunMutationOptions options;
   options.from = 0.01;

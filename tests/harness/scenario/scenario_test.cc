@@ -251,6 +251,12 @@ TEST(ListMjcfFiles, ReadsAnyXml) {
                 "<!-- <include file=\"gone.xml\"/> --><![CDATA[<mesh file=\"gone.stl\"/>]]></mujoco>");
   WriteText(folder.path() / "b.xml",
             "<mujocoinclude><include file='./a.xml'/><skin file=\"s.skn\"/></mujocoinclude>");
+  std::filesystem::create_directories(folder.path() / "looks");
+  std::filesystem::create_directories(folder.path() / "shapes");
+  for (const char* file :
+       {"looks/l.png", "looks/r.png", "shapes/h.png", "shapes/s.skn", "shapes/x & y.stl", "shapes/x.stl"}) {
+    WriteText(folder.path() / file, "");
+  }
   EXPECT_EQ(ListMjcfFiles(folder.path() / "a.xml"),
             (std::vector<std::string>{"a.xml", "b.xml", "looks/l.png", "looks/r.png", "shapes/h.png",
                                       "shapes/s.skn", "shapes/x & y.stl"}));

@@ -11,7 +11,6 @@
 #include "harness/checks/consistency.h"
 #include "harness/engine/engine.h"
 #include "harness/sides/audit.h"
-#include "harness/sides/complete_description.h"
 #include "harness/sides/description_match.h"
 #include "harness/sides/hypotheses.h"
 #include "harness/sides/mjcf_reader.h"

@@ -179,7 +179,7 @@ TEST_F(TwoMjcfs, MotorsBesideAUrdfAreNotCompared) {
   const Comparison comparison =
       CompareFiles(folder_.path() / "arm.urdf", folder_.path() / "arm.xml", {}, options);
   EXPECT_TRUE(comparison.result.Agrees()) << List(comparison);
-  EXPECT_THAT(comparison.notes,
+  EXPECT_THAT(comparison.not_compared,
               ::testing::Contains("motors: only arm.xml says how they make their forces (servos, muscles, "
                                   "transmissions): servo"));
 }

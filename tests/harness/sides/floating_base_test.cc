@@ -8,7 +8,6 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
 #include "harness/engine/engine.h"
-#include "harness/sides/complete_description.h"
 #include "harness/sides/description_match.h"
 #include "harness/sides/file_comparison.h"
 #include "harness/sides/mjcf_reader.h"
@@ -169,7 +168,7 @@ TEST_P(LeggedRobots, FixedInOneFileAndFloatingInTheOtherIsSaid) {
   EXPECT_THROW(CompareWithEngine(ParseUrdf(urdf_, "robot.urdf", floating), *fixed), InputError);
   RobotDescription urdf = ParseUrdf(urdf_, "robot.urdf");
   RobotDescription mjcf = ReadMjcfDescription(*engine_, "robot.xml");
-  const std::vector<std::string> notes = CompleteEachOther(&urdf, &mjcf);
+  const std::vector<std::string> notes = CompleteEachOther(&urdf, &mjcf).notes;
   EXPECT_THAT(notes,
               Contains(HasSubstr("base: robot.urdf does not say how its root moves; it floats as that of "
                                  "robot.xml")));
@@ -206,9 +205,9 @@ TEST(FloatingBase, TheRobotIsTheTreeWithTheMostJoints) {
   for (const auto& [a, b] : {std::pair(alone, scene), std::pair(scene, alone), std::pair(scene, scene)}) {
     const Comparison comparison = CompareFiles(a, b, {}, options);
     EXPECT_TRUE(comparison.result.Agrees()) << ::testing::PrintToString(ListDifferences(comparison));
-    const bool is_said = std::find(comparison.notes.begin(), comparison.notes.end(),
+    const bool is_said = std::find(comparison.not_compared.begin(), comparison.not_compared.end(),
                                    "no part of the robot, since nothing joins them to it: joints b, s") !=
-                         comparison.notes.end();
+                         comparison.not_compared.end();
     EXPECT_EQ(is_said, b == scene);
   }
 }

@@ -140,10 +140,11 @@ TEST(ModelComparison, WhatOneLacksIsNotCompared) {
   table.spec.gravity.x() = 1.0;
   urdf.spec.joints[2].link = "elbow";
   EXPECT_EQ(ListFailures(urdf, table), "");
-  const std::vector<std::string> notes = CompleteEachOther(&urdf, &table);
-  EXPECT_THAT(notes, ::testing::Contains(HasSubstr("armature: only")));
-  EXPECT_THAT(notes, ::testing::Contains(HasSubstr("gravity: only")));
-  EXPECT_THAT(notes, ::testing::Contains("links by other names: \"panda_link3\" is \"elbow\""));
+  const Completion completion = CompleteEachOther(&urdf, &table);
+  EXPECT_FALSE(completion.one_sided.empty());
+  for (const GateFinding& finding : completion.one_sided) EXPECT_EQ(finding.check, "joint_armature");
+  EXPECT_THAT(completion.not_compared, ::testing::Contains(HasSubstr("gravity: only")));
+  EXPECT_THAT(completion.notes, ::testing::Contains("links by other names: \"panda_link3\" is \"elbow\""));
   EXPECT_EQ(urdf.spec.joints[1].armature, 0.1);
 }
 
@@ -200,7 +201,7 @@ TEST(AlikeNames, AreTakenAndNoted) {
     other.spec.joints[i].name = "Joint " + std::to_string(i + 1);
   EXPECT_EQ(ListFailures(urdf, other), "");
   RobotDescription own = urdf;
-  EXPECT_THAT(CompleteEachOther(&own, &other),
+  EXPECT_THAT(CompleteEachOther(&own, &other).notes,
               ::testing::Contains(HasSubstr("joints by other names: \"Joint 1\" is "
                                             "\"panda_joint1\"")));
 }

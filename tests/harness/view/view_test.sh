@@ -3,6 +3,10 @@
 # view_test.sh DEXCHECK [FOLDER for screenshots]
 set -euo pipefail
 
+for program in Xvfb xdotool import; do
+  command -v $program >/dev/null || { echo "skipped: no $program here"; exit 77; }
+done
+
 dexcheck=$1
 work=$(mktemp -d)
 shots=${2:-$work}

@@ -1,0 +1,294 @@
+#include "harness/engine/mjcf_assets.h"
+
+#include <tinyxml2.h>
+
+#include <cstdlib>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/engine/finite_check.h"
+#include "harness/engine/mesh_check.h"
+#include "harness/engine/mjcf_files.h"
+#include "harness/engine/newer_mjcf.h"
+
+namespace dexcheck {
+namespace {
+
+using tinyxml2::XMLElement;
+
+bool Is(const XMLElement& element, std::string_view name) { return name == element.Name(); }
+
+std::string Read(const XMLElement& element, const char* attribute, const char* otherwise = "") {
+  const char* const value = element.Attribute(attribute);
+  return value != nullptr ? value : otherwise;
+}
+
+/// What elements of a class get that do not say it themselves.
+class DefaultClasses {
+ public:
+  /// @param section the `default` of the file, or one within it.
+  void Read(const XMLElement& section, const std::string& parent) {
+    const std::string name = dexcheck::Read(section, "class", parent.empty() ? "main" : "");
+    if (parent.empty()) top_ = name;
+    classes_[name].parent = parent;
+    classes_[name].sections.push_back(&section);
+    for (const XMLElement* child = section.FirstChildElement("default"); child != nullptr;
+         child = child->NextSiblingElement("default")) {
+      Read(*child, name);
+    }
+  }
+
+  /// The attribute of an element, its own or of its class; nullptr without one.
+  /// @param child_class of the bodies around it.
+  [[nodiscard]] const char* Find(const XMLElement& element, const std::string& child_class,
+                                 const char* attribute) const {
+    if (const char* own = element.Attribute(attribute)) return own;
+    std::string name = dexcheck::Read(element, "class", child_class.c_str());
+    if (name.empty()) name = top_;
+    for (size_t depth = 0; depth <= classes_.size(); ++depth) {
+      const auto found = classes_.find(name);
+      if (found == classes_.end()) break;
+      for (const XMLElement* section : found->second.sections) {
+        const XMLElement* const words = section->FirstChildElement(element.Name());
+        const char* const value = words != nullptr ? words->Attribute(attribute) : nullptr;
+        if (value != nullptr) return value;
+      }
+      name = found->second.parent;
+    }
+    return nullptr;
+  }
+
+ private:
+  struct Class {
+    std::string parent;
+    std::vector<const XMLElement*> sections;
+  };
+  std::string top_ = "main";
+  std::map<std::string, Class> classes_;
+};
+
+/// What stands around a geom.
+struct Surroundings {
+  std::string body;
+  std::string child_class;
+  bool moves = false;
+  bool has_inertial = false;
+};
+
+class AssetSieve {
+ public:
+  AssetSieve(const std::filesystem::path& folder, JoinedMjcf* mjcf) : folder_(folder), mjcf_(*mjcf) {}
+
+  void Run() {
+    VisitElements(mjcf_.root(), [&](XMLElement* element) { ReadSettings(*element); });
+    for (XMLElement* section : Sections("default")) defaults_.Read(*section, "");
+    for (XMLElement* section : Sections("asset")) SieveAssets(section);
+    for (XMLElement* section : Sections("worldbody")) SieveBody(section, {});
+    VisitElements(mjcf_.root(), [&](XMLElement* element) { DropLooks(element); });
+    for (const char* name : {"contact", "sensor", "tendon", "equality", "custom"}) {
+      for (XMLElement* section : Sections(name)) DropReferences(section);
+    }
+  }
+
+ private:
+  std::vector<XMLElement*> Sections(const char* name) {
+    std::vector<XMLElement*> sections;
+    for (XMLElement* section = mjcf_.root()->FirstChildElement(name); section != nullptr;
+         section = section->NextSiblingElement(name)) {
+      sections.push_back(section);
+    }
+    return sections;
+  }
+
+  void ReadSettings(const XMLElement& element) {
+    if (Is(element, "material")) materials_.insert(Read(element, "name"));
+    if (!Is(element, "compiler")) return;
+    folders_.Read(element);
+    inertia_from_geom_ = Read(element, "inertiafromgeom", inertia_from_geom_.c_str());
+    if (const char* range = element.Attribute("inertiagrouprange")) {
+      char* rest = nullptr;
+      first_group_ = std::strtol(range, &rest, 10);
+      last_group_ = std::strtol(rest, nullptr, 10);
+    }
+  }
+
+  /// As the engine does, by the file's name where there is none.
+  static std::string NameOf(const XMLElement& asset) {
+    if (const char* name = asset.Attribute("name")) return name;
+    return std::filesystem::path(Read(asset, "file")).stem().string();
+  }
+
+  [[nodiscard]] std::string FindFault(const XMLElement& asset, const std::string& folder, const char* file) {
+    const std::filesystem::path path = folder_ / folders_.Find(folder, file);
+    if (Is(asset, "mesh")) return FindMeshFault(path);
+    std::error_code error;
+    return std::filesystem::exists(path, error) ? "" : "does not exist";
+  }
+
+  void SieveAssets(XMLElement* section) {
+    for (XMLElement* asset = section->FirstChildElement(); asset != nullptr;) {
+      XMLElement* const next = asset->NextSiblingElement();
+      const std::string kind = asset->Name();
+      const bool is_shape = kind == "mesh" || kind == "hfield";
+      if (is_shape || kind == "skin") {
+        const char* const file = asset->Attribute("file");
+        const std::string fault = file != nullptr ? FindFault(*asset, folders_.meshes, file) : "";
+        if (is_shape) shapes_[kind][NameOf(*asset)] = {file != nullptr ? file : "", fault};
+        if (!fault.empty()) {
+          if (!is_shape) NoteFile(*asset, file, "left out", fault);
+          section->DeleteChild(asset);
+        }
+      } else if (kind == "texture") {
+        SieveTexture(asset);
+      }
+      asset = next;
+    }
+  }
+
+  /// A texture keeps its place, with one colour.
+  void SieveTexture(XMLElement* texture) {
+    textures_.insert(NameOf(*texture));
+    for (const char* side :
+         {"file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback"}) {
+      const char* const file = texture->Attribute(side);
+      if (file == nullptr) continue;
+      const std::string fault = FindFault(*texture, folders_.textures, file);
+      if (fault.empty()) continue;
+      NoteFile(*texture, file, "its texture left out", fault);
+      texture->SetAttribute("name", NameOf(*texture).c_str());
+      for (const char* other :
+           {"file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback"}) {
+        texture->DeleteAttribute(other);
+      }
+      texture->SetAttribute("builtin", "flat");
+      for (const char* size : {"width", "height"}) texture->SetAttribute(size, "1");
+      if (texture->Attribute("rgb1") == nullptr) texture->SetAttribute("rgb1", "1 1 1");
+      return;
+    }
+  }
+
+  void NoteFile(const XMLElement& element, const std::string& file, const std::string& loss,
+                const std::string& fault) {
+    mjcf_.Note(element, Abbreviate(std::filesystem::path(file).filename().string()), loss + ": " + fault);
+  }
+
+  void SieveBody(XMLElement* body, Surroundings around) {
+    if (Is(*body, "body")) around.body = Read(*body, "name");
+    around.child_class = Read(*body, "childclass", around.child_class.c_str());
+    around.moves |=
+        body->FirstChildElement("joint") != nullptr || body->FirstChildElement("freejoint") != nullptr;
+    around.has_inertial = body->FirstChildElement("inertial") != nullptr;
+    for (XMLElement* child = body->FirstChildElement(); child != nullptr;) {
+      XMLElement* const next = child->NextSiblingElement();
+      if (Is(*child, "body")) SieveBody(child, around);
+      if (Is(*child, "geom") && SieveGeom(*child, around)) body->DeleteChild(child);
+      child = next;
+    }
+  }
+
+  /// @return whether the geom must go.
+  bool SieveGeom(const XMLElement& geom, const Surroundings& around) {
+    const auto find = [&](const char* attribute) {
+      return defaults_.Find(geom, around.child_class, attribute);
+    };
+    for (const char* kind : {"mesh", "hfield"}) {
+      const char* const name = find(kind);
+      if (name == nullptr) continue;
+      const auto known = shapes_[kind].find(name);
+      const Shape shape = known != shapes_[kind].end()
+                              ? known->second
+                              : Shape{name, "is no " + std::string(kind) + " of the file"};
+      if (shape.fault.empty()) continue;
+      if (HasMass(find, around)) {
+        throw InputError(mjcf_.FindPlace(geom) + ": " + kind + " " + Quote(shape.file) + ": " + shape.fault +
+                         "; the mass of body " + Quote(around.body) +
+                         " follows from it: give the body an inertial");
+      }
+      const char* const own = geom.Attribute("name");
+      if (own != nullptr) removed_.insert(own);
+      const auto is_zero = [](const char* mask) { return mask != nullptr && std::atol(mask) == 0; };
+      const bool is_looked_at = is_zero(find("contype")) && is_zero(find("conaffinity"));
+      NoteFile(geom, shape.file, is_looked_at ? "left out" : "left out with its contacts", shape.fault);
+      return true;
+    }
+    return false;
+  }
+
+  template <typename Find>
+  [[nodiscard]] bool HasMass(const Find& find, const Surroundings& around) const {
+    if (!around.moves || inertia_from_geom_ == "false") return false;
+    if (inertia_from_geom_ == "auto" && around.has_inertial) return false;
+    const char* const group_text = find("group");
+    const long group = group_text != nullptr ? std::atol(group_text) : 0;
+    if (group < first_group_ || group > last_group_) return false;
+    const char* const mass = find("mass");
+    const char* const density = find("density");
+    if (mass != nullptr) return std::strtod(mass, nullptr) != 0.0;
+    return density == nullptr || std::strtod(density, nullptr) != 0.0;
+  }
+
+  /// Materials and textures that no asset is called.
+  void DropLooks(XMLElement* element) {
+    const auto drop = [&](const char* attribute, const std::set<std::string>& known) {
+      const char* const name = element->Attribute(attribute);
+      if (name == nullptr || known.contains(name)) return;
+      mjcf_.Note(*element, Abbreviate(name), "left out: no " + std::string(attribute) + " of the file");
+      element->DeleteAttribute(attribute);
+    };
+    drop("material", materials_);
+    if (Is(*element, "material")) drop("texture", textures_);
+  }
+
+  /// Pairs, sensors and the like of geoms that are gone.
+  void DropReferences(XMLElement* section) {
+    for (XMLElement* child = section->FirstChildElement(); child != nullptr;) {
+      XMLElement* const next = child->NextSiblingElement();
+      const bool is_gone = [&] {
+        for (const char* attribute : {"geom", "geom1", "geom2", "objname", "refname"}) {
+          if (removed_.contains(Read(*child, attribute))) return true;
+        }
+        return false;
+      }();
+      if (is_gone) {
+        mjcf_.Note(*child, "<" + std::string(child->Name()) + ">", "left out with its geom");
+        section->DeleteChild(child);
+      }
+      child = next;
+    }
+  }
+
+  struct Shape {
+    std::string file;
+    std::string fault;
+  };
+
+  std::filesystem::path folder_;
+  JoinedMjcf& mjcf_;
+  AssetFolders folders_;
+  DefaultClasses defaults_;
+  std::string inertia_from_geom_ = "auto";
+  long first_group_ = 0;
+  long last_group_ = 5;
+  std::map<std::string, std::map<std::string, Shape>> shapes_;  // meshes and height fields
+  std::set<std::string> materials_;
+  std::set<std::string> textures_;
+  std::set<std::string> removed_;  // names of geoms
+};
+
+}  // namespace
+
+void LeaveOutAssets(const std::filesystem::path& folder, JoinedMjcf* mjcf) { AssetSieve(folder, mjcf).Run(); }
+
+void AdaptMjcf(const std::filesystem::path& folder, JoinedMjcf* mjcf) {
+  CheckNumbers(mjcf);
+  LeaveOutNewerWords(mjcf);
+  LeaveOutAssets(folder, mjcf);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,12 @@
+# MakeBareRoot FOLDER: a bare Debian 12 (debootstrap's minbase) whose packages come from where this machine's come from.
+# Sourced by scripts that run as root; they umount what they mounted, or have a mount namespace of their own.
+MakeBareRoot() {
+  local root=$1 log
+  log=$(mktemp)
+  debootstrap --variant=minbase bookworm "$root" ${DEBIAN_MIRROR:+"$DEBIAN_MIRROR"} >"$log" ||
+    { tail -20 "$log"; return 1; }
+  rm "$log"
+  cp /etc/resolv.conf "$root/etc/"
+  rm -f "$root/etc/apt/sources.list"
+  cp -rL /etc/apt/. "$root/etc/apt/"
+}
