@@ -155,7 +155,7 @@ INSTANTIATE_TEST_SUITE_P(
          {},
          {{"<body name=\"stand\">", "<body name=\"stand\"><freejoint/><geom size=\"0.1\"/>"}},
          {"robot.xml: ", "only in the MJCF: joint \"#0\""}},
-        {"Syntax", {}, {{"</worldbody>", "</worldbodyy>"}}, {"robot.xml:14: is not XML"}},
+        {"Syntax", {}, {{"</worldbody>", "</worldbodyy>"}}, {"robot.xml:3: is not XML"}},
         {"UnknownElement",
          {},
          {{"<site", "<sight"}},
@@ -206,7 +206,7 @@ INSTANTIATE_TEST_SUITE_P(
         {"MissingInclude",
          {},
          {{"<worldbody>", "<include file=\"no.xml\"/><worldbody>"}},
-         {"robot.xml: ", "no.xml"}},
+         {"robot.xml:3: ", "no.xml"}},
         {"Empty", {}, {{testing::kTwoLinksMjcf, ""}}, {"robot.xml:0: is not XML"}},
     }),
     PrintName);
