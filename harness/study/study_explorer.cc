@@ -154,17 +154,7 @@ Json ListTheory(const StudyResults& results) {
   return list;
 }
 
-/// For a script element: "</script>" must not be in it.
-std::string Dump(const Json& json) {
-  std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-  for (size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at))
-    text.replace(at, 1, "\\u003c");
-  return text;
-}
-
 }  // namespace
-
-Html MakeExplorerStyle() { return Html::Raw(kExplorerCss); }
 
 Html MakeExplorer(const StudyResults& results) {
   const bool has_history = results.study.is_search() && !results.study.objectives.empty();
@@ -260,10 +250,10 @@ Html MakeExplorerScript(const StudyResults& results) {
     for (const double parameter : row->trial.parameters) add(parameter);
     for (const double metric : row->result.metrics) add(metric);
   }
-  return FormatHtml(
-      "<script type=\"application/json\" id=\"study-data\">{}</script>\n<script type=\"text/plain\" "
-      "id=\"study-values\">{}</script>\n<script>\n{}</script>\n",
-      Html::Raw(Dump(data)), Html::Raw(EncodeBase64(bytes)), Html::Raw(kExplorerJs));
+  Html html = EmbedJson("study-data", data);
+  html += EmbedBytes("study-values", bytes);
+  html += FormatHtml("<script>\n{}</script>\n", Html::Raw(kExplorerJs));
+  return html;
 }
 
 }  // namespace dexcheck
