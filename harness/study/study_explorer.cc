@@ -7,7 +7,6 @@
 
 #include "controller/common/errors.h"
 #include "harness/study/explorer_assets.h"
-#include "harness/study/halving_search.h"
 #include "harness/study/search_history.h"
 #include "harness/study/study_answer.h"
 #include "harness/study/study_theory.h"
@@ -66,7 +65,7 @@ Json ListHistory(const StudyResults& results, bool is_predicted) {
   Json history = Json::array();
   for (const JudgedPoint& point : points) {
     Json entry = {{"value", ShowObjective(objective, point.judgement.objectives.front())},
-                  {"feasible", point.judgement.is_feasible() && !point.is_shortened}};
+                  {"feasible", point.judgement.is_feasible()}};
     if (asks) {
       const Judgement theory = JudgeInTheory(results.inputs, point.values);
       if (theory.is_feasible()) entry["theory"] = ShowObjective(objective, theory.objectives.front());
@@ -225,14 +224,6 @@ Html MakeExplorerScript(const StudyResults& results) {
     data["held"].push_back(IsHeld(outcome));
   }
   data["theory"] = ListTheory(results);
-  // Of successive halving: from which trial on they last how long.
-  data["rounds"] = Json::array();
-  long first = 0;
-  const std::vector<long> counts = CountPointsOfRounds(study.search);
-  for (size_t round = 0; round < counts.size(); ++round) {
-    data["rounds"].push_back({{"first", first}, {"duration", study.search.durations[round]}});
-    first += counts[round] * CountTrialsOfPoint(study);
-  }
   if (study.is_search() && !study.objectives.empty()) {
     data["history"] = ListHistory(results, data["theory"].contains("predicted"));
     data["maximize"] = study.objectives.front().maximize;
