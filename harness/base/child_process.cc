@@ -1,4 +1,4 @@
-#include "harness/base/worker_process.h"
+#include "harness/base/child_process.h"
 
 #include <sys/prctl.h>
 #include <sys/socket.h>
@@ -34,13 +34,37 @@ namespace {
   ::_exit(succeeded ? EXIT_SUCCESS : EXIT_FAILURE);
 }
 
+/// In the child. Only calls that are safe after a fork.
+[[noreturn]] void RunProgram(const Program& program, const std::vector<char*>& words, pid_t parent) {
+  ::setpgid(0, 0);
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(EXIT_FAILURE);  // it ended before
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGXFSZ}) ::signal(signal, SIG_DFL);
+  const bool is_ready = ::dup2(program.input, STDIN_FILENO) >= 0 &&
+                        ::dup2(program.output, STDOUT_FILENO) >= 0 &&
+                        ::dup2(program.errors, STDERR_FILENO) >= 0 &&
+                        (program.folder.empty() || ::chdir(program.folder.c_str()) == 0);
+  if (is_ready) ::execvp(words.front(), words.data());
+  ::_exit(kNotFoundExitCode);
+}
+
+ProcessEnd ReadEnd(int status) {
+  if (WIFSIGNALED(status)) return {EXIT_FAILURE, WTERMSIG(status)};
+  return {WEXITSTATUS(status), 0};
+}
+
 }  // namespace
 
 std::string ProcessEnd::Describe(const std::string& without_signal) const {
   return signal != 0 ? ::strsignal(signal) : without_signal;
 }
 
-WorkerProcess::WorkerProcess(const std::string& what, const std::function<bool(int channel)>& work) {
+std::string ProcessEnd::Describe() const {
+  return signal != 0 ? "was killed by signal " + std::to_string(signal)
+                     : "ended with exit code " + std::to_string(exit_code);
+}
+
+ChildProcess::ChildProcess(const std::string& what, const std::function<bool(int channel)>& work) {
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) FailToStart(what, errno);
   const pid_t parent = ::getpid();
@@ -57,20 +81,34 @@ WorkerProcess::WorkerProcess(const std::string& what, const std::function<bool(i
   FailToStart(what, error);
 }
 
-WorkerProcess::~WorkerProcess() { Release(); }
+ChildProcess::ChildProcess(const std::string& what, const Program& program) : is_group_(true) {
+  std::vector<char*> words;
+  for (const std::string& word : program.words) words.push_back(const_cast<char*>(word.c_str()));
+  words.push_back(nullptr);
+  const pid_t parent = ::getpid();
+  pid_ = ::fork();
+  if (pid_ == 0) RunProgram(program, words, parent);
+  if (pid_ < 0) FailToStart(what, errno);
+  ::setpgid(pid_, pid_);  // whoever is first
+}
 
-WorkerProcess::WorkerProcess(WorkerProcess&& other) noexcept
-    : pid_(std::exchange(other.pid_, -1)), channel_(std::exchange(other.channel_, -1)) {}
+ChildProcess::~ChildProcess() { Release(); }
 
-WorkerProcess& WorkerProcess::operator=(WorkerProcess&& other) noexcept {
+ChildProcess::ChildProcess(ChildProcess&& other) noexcept
+    : pid_(std::exchange(other.pid_, -1)),
+      channel_(std::exchange(other.channel_, -1)),
+      is_group_(other.is_group_) {}
+
+ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
   if (this == &other) return *this;
   Release();
   pid_ = std::exchange(other.pid_, -1);
   channel_ = std::exchange(other.channel_, -1);
+  is_group_ = other.is_group_;
   return *this;
 }
 
-void WorkerProcess::Release() {
+void ChildProcess::Release() {
   if (pid_ >= 0) {
     Kill();
     Wait();
@@ -78,15 +116,28 @@ void WorkerProcess::Release() {
   if (channel_ >= 0) ::close(channel_);
 }
 
-void WorkerProcess::Kill() const { ::kill(pid_, SIGKILL); }
+void ChildProcess::Kill() const { ::kill(is_group_ ? -pid_ : pid_, SIGKILL); }
 
-ProcessEnd WorkerProcess::Wait() {
+ProcessEnd ChildProcess::Wait() {
   int status = 0;
   while (::waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
   }
   pid_ = -1;
-  return {WIFEXITED(status) && WEXITSTATUS(status) == EXIT_SUCCESS,
-          WIFSIGNALED(status) ? WTERMSIG(status) : 0};
+  return ReadEnd(status);
+}
+
+std::optional<ProcessEnd> ChildProcess::WaitFor(double seconds) {
+  constexpr double kPause = 0.005;  // s
+  for (double waited = 0.0; pid_ >= 0; waited += kPause) {
+    int status = 0;
+    if (::waitpid(pid_, &status, WNOHANG) == pid_) {
+      pid_ = -1;
+      return ReadEnd(status);
+    }
+    if (waited >= seconds) break;
+    ::usleep(static_cast<useconds_t>(1e6 * kPause));
+  }
+  return std::nullopt;
 }
 
 bool Send(int channel, std::string_view bytes) {

@@ -151,7 +151,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadProgram{"Missing", "no_such_program_of_anybody", 2, "cannot be run, its last words"},
         BadProgram{"Dies", "echo oh no >&2; exit 3", 3,
                    "ended with exit code 3 before its first answer, its last words: \"oh no\""},
-        BadProgram{"IsKilled", "kill -9 $$", 3, "was ended by signal 9"},
+        BadProgram{"IsKilled", "kill -9 $$", 3, "was killed by signal 9"},
         BadProgram{"DiesLater", kHello + "exit 4", 3, "ended with exit code 4 after 1 answers"},
         BadProgram{"Hangs", "sleep 60", 3, "gave no answer within 2 s (--time-limit)"},
         BadProgram{"HangsLater", kHello + "sleep 60", 3, "gave no answer within 2 s"},
