@@ -14,11 +14,12 @@ repository=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 . "$repository/tests/bare_root.sh"
 scratch=$(mktemp -d)
 root=$scratch/root
-trap 'umount --recursive --lazy "$root/dev" "$root/proc" 2>/dev/null || true; rm -rf --one-file-system "$scratch"' EXIT
+trap 'umount --recursive --lazy "$root/dev" "$root/sys" "$root/proc" 2>/dev/null || true; rm -rf --one-file-system "$scratch"' EXIT
 
 MakeBareRoot "$root"
 mount -t proc proc "$root/proc"
-mount --rbind --make-rslave /dev "$root/dev"
+# Chromium and slurmd look into /sys.
+for folder in dev sys; do mount --rbind --make-rslave "/$folder" "$root/$folder"; done
 clone=/var/tmp/dexcheck
 git clone --quiet "file://$repository" "$root$clone"
 echo "Commit $(git -C "$root$clone" rev-parse --short HEAD), bare Debian $(cat "$root/etc/debian_version"), order: $order"

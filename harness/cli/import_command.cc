@@ -43,6 +43,7 @@ RobotDescription ReadSource(const ImportRequest& request) {
 /// A copy of an MJCF, for MuJoCo 2.2.2 or with motors.
 int WriteCopy(const ImportRequest& request) {
   JoinedMjcf mjcf(request.source);
+  if (mjcf.IsUrdf()) throw InputError(request.source.string() + ": must be an MJCF, got a URDF");
   const std::filesystem::path from = std::filesystem::absolute(request.source).parent_path();
   if (request.downgrade) {
     AdaptMjcf(from, &mjcf);

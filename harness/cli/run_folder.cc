@@ -59,6 +59,10 @@ std::vector<std::string> Supersede(const std::filesystem::path& file, std::vecto
   const TomlDocument document(ReadTextFile(file.string()), file.string());
   const std::optional<TomlValue> control = document.Open().Find("control");
   if (!control || !control->IsTable()) return overrides;
+  const auto replaces_table = [](const std::string& assignment) {
+    return assignment.starts_with("control=");
+  };
+  if (std::any_of(overrides.begin(), overrides.end(), replaces_table)) return overrides;
   const auto is_changed = [&](const std::string& key) {
     return std::any_of(overrides.begin(), overrides.end(), [&](const std::string& assignment) {
       return assignment.starts_with("control." + key + "=") || assignment == "control." + key + "-=";

@@ -147,6 +147,7 @@ std::string Summarize(const JoinedMjcf& mjcf) {
 /// @param load what loads it when nothing need be changed.
 template <typename Load>
 MjModelPtr LoadAdapted(const std::filesystem::path& folder, JoinedMjcf* mjcf, const Load& load) {
+  if (mjcf->IsUrdf()) return load();
   AdaptMjcf(folder, mjcf);
   if (mjcf->changes().empty()) {
     try {
@@ -169,7 +170,7 @@ MjModelPtr LoadMjcf(const std::filesystem::path& path) {
   PrepareEngine();
   CheckReadable(path);
   JoinedMjcf mjcf(path);
-  if (!mjcf.HasWorld()) {
+  if (!mjcf.HasWorld() && !mjcf.IsUrdf()) {
     throw InputError(path.string() +
                      ": has no <worldbody>: it is a part for <include>; give the file that includes it");
   }

@@ -26,7 +26,8 @@ std::string ReadFile(const std::filesystem::path& path, const std::string& shown
 
 void ParseXml(std::string_view text, const std::string& shown, tinyxml2::XMLDocument* document) {
   if (document->Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
-    throw InputError(shown + ":" + std::to_string(document->ErrorLineNum()) + ": is not XML");
+    throw InputError(shown + ":" + std::to_string(std::max(document->ErrorLineNum(), 1)) + ": is not XML, " +
+                     document->ErrorName());
 }
 
 /// The first <include> at or below an element, in the order of the file.
@@ -43,7 +44,7 @@ XMLElement* FindInclude(XMLElement* element) {
 
 JoinedMjcf::JoinedMjcf(const std::filesystem::path& file) : source_(file.string()) {
   Parse(ReadFile(file, source_));
-  Join(file.parent_path());
+  if (!IsUrdf()) Join(file.parent_path());
 }
 
 JoinedMjcf::JoinedMjcf(std::string_view text, const std::string& source) : source_(source) { Parse(text); }
@@ -54,10 +55,12 @@ void JoinedMjcf::Parse(std::string_view text) {
   document_ = std::make_unique<tinyxml2::XMLDocument>();
   ParseXml(text, source_, document_.get());
   root_ = document_->RootElement();
-  if (root_ == nullptr || std::string_view(root_->Name()) != "mujoco") {
+  if (root_ == nullptr || (std::string_view(root_->Name()) != "mujoco" && !IsUrdf())) {
     throw InputError(source_ + ": must be an MJCF, its root element <mujoco>");
   }
 }
+
+bool JoinedMjcf::IsUrdf() const { return std::string_view(root_->Name()) == "robot"; }
 
 bool JoinedMjcf::HasWorld() const { return root_->FirstChildElement("worldbody") != nullptr; }
 

@@ -40,6 +40,8 @@ class JoinedMjcf {
   [[nodiscard]] tinyxml2::XMLElement* root() { return root_; }
   /// Whether it has a `worldbody`: parts that are meant for `include` have none.
   [[nodiscard]] bool HasWorld() const;
+  /// Whether it is no MJCF but a URDF, which the engine reads too.
+  [[nodiscard]] bool IsUrdf() const;
   [[nodiscard]] const std::string& source() const { return source_; }
   /// "FILE:LINE" of an element; that of the root for one that was added since.
   [[nodiscard]] std::string FindPlace(const tinyxml2::XMLElement& element) const;

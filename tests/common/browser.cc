@@ -96,8 +96,12 @@ Browser::Browser() {
   const Json wanted = {{"goog:chromeOptions", chromium},
                        {"goog:loggingPrefs", {{"browser", "ALL"}}},
                        {"timeouts", {{"script", 120000}}}};
-  const Json session = Call("POST", "/session", {{"capabilities", {{"alwaysMatch", wanted}}}});
-  session_ = "/session/" + session.at("sessionId").get<std::string>();
+  try {
+    const Json session = Call("POST", "/session", {{"capabilities", {{"alwaysMatch", wanted}}}});
+    session_ = "/session/" + session.at("sessionId").get<std::string>();
+  } catch (const std::exception& error) {
+    throw std::runtime_error(std::string("Chromium cannot start here: ") + error.what());
+  }
 }
 
 Browser& Browser::Share() {

@@ -155,7 +155,10 @@ INSTANTIATE_TEST_SUITE_P(
          {},
          {{"<body name=\"stand\">", "<body name=\"stand\"><freejoint/><geom size=\"0.1\"/>"}},
          {"robot.xml: ", "only in the MJCF: joint \"#0\""}},
-        {"Syntax", {}, {{"</worldbody>", "</worldbodyy>"}}, {"robot.xml:3: is not XML"}},
+        {"Syntax",
+         {},
+         {{"</worldbody>", "</worldbodyy>"}},
+         {"robot.xml:3: is not XML, XML_ERROR_MISMATCHED_ELEMENT"}},
         {"UnknownElement",
          {},
          {{"<site", "<sight"}},
@@ -207,7 +210,7 @@ INSTANTIATE_TEST_SUITE_P(
          {},
          {{"<worldbody>", "<include file=\"no.xml\"/><worldbody>"}},
          {"robot.xml:3: ", "no.xml"}},
-        {"Empty", {}, {{testing::kTwoLinksMjcf, ""}}, {"robot.xml:0: is not XML"}},
+        {"Empty", {}, {{testing::kTwoLinksMjcf, ""}}, {"robot.xml:1: is not XML, XML_ERROR_EMPTY_DOCUMENT"}},
     }),
     PrintName);
 

@@ -256,7 +256,7 @@ TEST(MutateCommand, InterruptedEndsWithWhatWasDone) {
   program.Signal(SIGINT);
   const ProgramResult result = program.Wait();
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_EQ(result.err, "");
+  EXPECT_EQ(result.err, "dexcheck: interrupted\n");
   EXPECT_THAT(result.out, HasSubstr("INTERRUPTED after "));
   EXPECT_FALSE(Json::parse(ReadText(folder.path() / "out.json")).at("complete").get<bool>());
 }

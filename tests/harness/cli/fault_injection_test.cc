@@ -78,7 +78,9 @@ class Explosions : public FaultInjection, public ::testing::WithParamInterface<E
            << what << "; exit code " << result.exit_code << ", " << result.out << result.err;
   };
   if (result.exit_code != 3) return fail("exit code must be 3");
-  if (!result.err.empty()) return fail("standard error must be empty");
+  if (CountLines(result.err) != 1 || result.err.find(reason) == std::string::npos) {
+    return fail("standard error must be the reason, in one line");
+  }
   const size_t at = result.out.find("FAILED: ");
   const std::string line =
       at == std::string::npos ? "" : result.out.substr(at, result.out.find('\n', at) - at);
@@ -110,7 +112,7 @@ TEST_P(StillBirths, LeaveALogWithoutRows) {
   EXPECT_TRUE(HasFailed(Run(GetParam().scenario, GetParam().settings), run_dir(), GetParam().reason));
   EXPECT_THAT(ListFiles(), ::testing::ElementsAre("run"));
   EXPECT_EQ(LogReader(run_dir() / "log.h5").rows(), 0);
-  EXPECT_EQ(RunDexcheck({"run", "--replay", run_dir().string()}).exit_code, 0);
+  EXPECT_TRUE(IsRefused(RunDexcheck({"run", "--replay", run_dir().string()}), {"log.h5: "}));
   EXPECT_TRUE(IsRefused(RunDexcheck({"report", run_dir().string()}), {"log.h5: the run has no steps"}));
   EXPECT_TRUE(IsRefused(RunDexcheck({"render", run_dir().string(), "--still", "0"}), {"log.h5: "}));
 }
@@ -149,14 +151,14 @@ TEST_F(FaultInjection, ModelsThatTheEngineRejectsAreRefused) {
     return IsRefused(Run("hold", {"duration=0.01", "settle=0.1", setting}), parts);
   };
   WriteText(robot, good.substr(0, good.size() / 2));
-  EXPECT_TRUE(is_refused({"scene.xml: ", "XML"}));
+  EXPECT_TRUE(is_refused({"robot.xml:280: is not XML"}));
   WriteText(robot, testing::ReplaceOnce(good, "<freejoint name=\"base\"/>",
                                         "<freejoint name=\"base\" mass=\"1\"/>"));
-  EXPECT_TRUE(is_refused({"scene.xml: "}));
+  EXPECT_TRUE(is_refused({"robot.xml:109: <freejoint mass>"}));
   WriteText(robot, "");
-  EXPECT_TRUE(is_refused({"scene.xml: "}));
+  EXPECT_TRUE(is_refused({"robot.xml:1: is not XML"}));
   fs::remove(robot);
-  EXPECT_TRUE(is_refused({"scene.xml: ", "robot.xml"}));
+  EXPECT_TRUE(is_refused({"scene.xml:3: ", "robot.xml"}));
   EXPECT_FALSE(fs::exists(run_dir())) << "nothing was begun";
 }
 

@@ -9,6 +9,7 @@ dexcheck=$(realpath "$1")
 for program in munged slurmctld slurmd sbatch squeue scontrol sqlite3; do
   command -v $program >/dev/null || { echo "skipped: no $program here"; exit $skip; }
 done
+mountpoint --quiet /sys/fs/cgroup || { echo "skipped: slurmd needs control groups in /sys/fs/cgroup"; exit $skip; }
 
 folder=$(mktemp -d /tmp/dexcheck-slurm-XXXXXX)
 daemons=()

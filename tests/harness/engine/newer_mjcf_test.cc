@@ -159,7 +159,7 @@ TEST(NewerMjcf, WhatIsNoMjcfIsNamed) {
   EXPECT_TRUE(testing::Throws<InputError>([] { LoadMjcfText(WriteMjcf({.in_body = "<frame/>"}), "f"); },
                                           "f:8: <frame>: acts on the dynamics, since MuJoCo 3.1.0"));
   EXPECT_TRUE(testing::Throws<InputError>([] { Downgrade("<mujoco>", "f"); }, "f:1: is not XML"));
-  EXPECT_TRUE(testing::Throws<InputError>([] { Downgrade("<robot/>", "f"); }, "f: must be an MJCF"));
+  EXPECT_TRUE(testing::Throws<InputError>([] { Downgrade("<model/>", "f"); }, "f: must be an MJCF"));
 }
 
 /// As later releases take it; 2.2.2 asks for "limited".
