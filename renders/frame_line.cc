@@ -82,7 +82,7 @@ void FrameLine::Draw(const std::function<Painter()>& make_painter, long first, i
 
 Image FrameLine::Take() {
   Require(taken_ < frames_, "frame", "must be one of the film's", static_cast<double>(taken_));
-  WorkerProcess& worker = workers_[static_cast<std::size_t>(taken_ % num_workers_)];
+  ChildProcess& worker = workers_[static_cast<std::size_t>(taken_ % num_workers_)];
   const std::string told = Receive(worker.channel(), 1);
   if (told != std::string{kDrawn}) Fail(&worker, told.empty() ? kDied : told.front());
   Image image(width_, height_);
@@ -93,7 +93,7 @@ Image FrameLine::Take() {
   return image;
 }
 
-void FrameLine::Fail(WorkerProcess* worker, char told) {
+void FrameLine::Fail(ChildProcess* worker, char told) {
   std::string text;
   for (std::string part = Receive(worker->channel(), 4096); !part.empty();
        part = Receive(worker->channel(), 4096))

@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "harness/base/worker_process.h"
+#include "harness/base/child_process.h"
 #include "renders/image.h"
 
 namespace dexcheck {
@@ -44,7 +44,7 @@ class FrameLine {
   bool Work(const std::function<Painter()>& make_painter, long first, int channel) const;
   void Draw(const std::function<Painter()>& make_painter, long first, int channel) const;
   [[nodiscard]] std::uint8_t* FindSlot(long frame) const;
-  [[noreturn]] static void Fail(WorkerProcess* worker, char told);
+  [[noreturn]] static void Fail(ChildProcess* worker, char told);
 
   long frames_;
   long num_workers_;
@@ -53,7 +53,7 @@ class FrameLine {
   long taken_ = 0;
   std::size_t size_ = 0;                                // bytes of all slots
   std::unique_ptr<std::uint8_t[], UnmapMemory> slots_;  // shared by all processes
-  std::vector<WorkerProcess> workers_;                  // tell of drawn frames, and are told of those taken
+  std::vector<ChildProcess> workers_;                   // tell of drawn frames, and are told of those taken
 };
 
 }  // namespace dexcheck

@@ -1,37 +1,29 @@
 #include "harness/cli/junit_file.h"
 
 #include <fmt/format.h>
+#include <tinyxml2.h>
 
 #include <algorithm>
+#include <string_view>
 
 namespace dexcheck::cli {
 namespace {
 
-/// As text or attribute of XML, in which most control characters cannot stand at all.
-std::string Escape(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      case '\n':
-        escaped += "&#10;";
-        break;
-      default:
-        escaped += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
-    }
+/// Most control characters cannot stand in XML at all.
+std::string Plain(std::string text) {
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 0x20 && c != '\n') c = '?';
   }
-  return escaped;
+  return text;
+}
+
+/// An element of text alone, with the first line of `message` as its attribute.
+void AddText(const char* name, const std::string& text, bool has_message, tinyxml2::XMLPrinter* xml) {
+  if (text.empty()) return;
+  xml->OpenElement(name);
+  if (has_message) xml->PushAttribute("message", Plain(text.substr(0, text.find('\n'))).c_str());
+  xml->PushText(Plain(text).c_str());
+  xml->CloseElement();
 }
 
 }  // namespace
@@ -48,32 +40,37 @@ std::string WriteJUnit(const std::string& suite, const std::vector<JUnitCase>& c
                        const std::string& error) {
   const auto failures =
       std::count_if(cases.begin(), cases.end(), [](const JUnitCase& test) { return !test.failure.empty(); });
-  const std::string counts =
-      fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" time=\"{:.3f}\"",
-                  cases.size() + (error.empty() ? 0 : 1), failures, error.empty() ? 0 : 1, seconds);
-  std::string text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
-  text += fmt::format("<testsuites {}>\n <testsuite name=\"{}\" {}>\n", counts, Escape(suite), counts);
+  tinyxml2::XMLPrinter xml;
+  xml.PushHeader(/*writeBOM=*/false, /*writeDeclaration=*/true);
+  const auto open = [&](const char* name) {
+    xml.OpenElement(name);
+    if (std::string_view(name) == "testsuite") xml.PushAttribute("name", Plain(suite).c_str());
+    xml.PushAttribute("tests", std::to_string(cases.size() + (error.empty() ? 0 : 1)).c_str());
+    xml.PushAttribute("failures", std::to_string(failures).c_str());
+    xml.PushAttribute("errors", error.empty() ? 0 : 1);
+    xml.PushAttribute("time", fmt::format("{:.3f}", seconds).c_str());
+  };
+  const auto open_case = [&](const std::string& group, const std::string& name) {
+    xml.OpenElement("testcase");
+    xml.PushAttribute("classname", Plain(suite + "." + group).c_str());
+    xml.PushAttribute("name", Plain(name).c_str());
+  };
+  open("testsuites");
+  open("testsuite");
   for (const JUnitCase& test : cases) {
-    text += fmt::format("  <testcase classname=\"{}.{}\" name=\"{}\"", Escape(suite), Escape(test.group),
-                        Escape(test.name));
-    if (test.failure.empty() && test.output.empty()) {
-      text += "/>\n";
-      continue;
-    }
-    text += ">";
-    if (!test.failure.empty()) {
-      const std::string line = test.failure.substr(0, test.failure.find('\n'));
-      text += fmt::format("<failure message=\"{}\">{}</failure>", Escape(line), Escape(test.failure));
-    }
-    if (!test.output.empty()) text += fmt::format("<system-out>{}</system-out>", Escape(test.output));
-    text += "</testcase>\n";
+    open_case(test.group, test.name);
+    AddText("failure", test.failure, true, &xml);
+    AddText("system-out", test.output, false, &xml);
+    xml.CloseElement();
   }
   if (!error.empty()) {
-    text += fmt::format(
-        "  <testcase classname=\"{0}.command\" name=\"ends\"><error message=\"{1}\">{1}</error></testcase>\n",
-        Escape(suite), Escape(error));
+    open_case("command", "ends");
+    AddText("error", error, true, &xml);
+    xml.CloseElement();
   }
-  return text + " </testsuite>\n</testsuites>\n";
+  xml.CloseElement();
+  xml.CloseElement();
+  return std::string(xml.CStr()) + "\n";
 }
 
 }  // namespace dexcheck::cli

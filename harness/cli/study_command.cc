@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
-#include <iostream>
 #include <map>
 #include <memory>
 #include <string>
@@ -23,7 +22,6 @@
 #include "harness/study/study_answer.h"
 #include "harness/study/study_progress.h"
 #include "harness/study/study_runner.h"
-#include "harness/study/study_server.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck::cli {
@@ -146,30 +144,9 @@ StudyStore OpenDatabase(const StudyInputs& inputs, const StudyRequest& request) 
   return StudyStore::OpenOrCreate(request.database, IdentifyStudy(inputs), inputs.study, makes_same_rows);
 }
 
-int ServeStudy(const StudyRequest& request) {
-  StudyInputs inputs = FindStudy(request.study);
-  if (!inputs.study.is_external()) {
-    throw InputError(inputs.study.source +
-                     ": search.method: must be \"external\" for points that another program chooses");
-  }
-  CheckTrials(&inputs);
-  StudyStore store = OpenDatabase(inputs, request);
-  CatchInterrupts();
-  ProgressBar bar(inputs.study.name, CountTrials(inputs.study), /*quiet=*/true);
-  ServePoints(inputs, MakeRunOptions(request, &bar), &store, std::cin, std::cout);
-  if (IsInterrupted())
-    throw Error(request.database + ": interrupted; the same points are answered from there again");
-  return kSuccess;
-}
-
 int RunStudy(const StudyRequest& request) {
   StudyInputs inputs = FindStudy(request.study);
   const Study& study = inputs.study;
-  if (study.is_external()) {
-    throw InputError(
-        study.source +
-        ": search.method: the points come from another program, which asks \"dexcheck study serve\"");
-  }
   if (study.is_search() && !request.shard.empty() && request.exchange.empty()) {
     throw InputError(
         "--shard: the trials of a search follow from one another: its parts need --exchange FOLDER, which "
@@ -264,17 +241,6 @@ void AddStudyCommand(Command app) {
   add_quiet(run);
   run.SetAction([=] { return RunStudy(*request); });
 
-  Command serve =
-      study.AddCommand("serve", "Make the points that another program's optimiser asks for, line by line");
-  serve.AddOption("STUDY", &request->study, "A TOML file with search.method = \"external\"").Required();
-  serve.AddOption("--db", &request->database, "The study's database (SQLite), made when there is none")
-      .TypeName("FILE.sqlite")
-      .Required();
-  serve.AddOption("--jobs", &request->jobs, "Trials at a time (all processors by default)")
-      .TypeName("N")
-      .Check(whole);
-  serve.SetAction([=] { return ServeStudy(*request); });
-
   Command merge = study.AddCommand("merge", "Put the databases of one study together");
   merge.AddOption("OUT", &request->database, "Database that gets all trials").Required();
   merge.AddOption("DB", databases.get(), "Databases of the same study").Required();
@@ -307,9 +273,6 @@ void AddStudyCommand(Command app) {
       .Check(CheckSlurmMemory);
   slurm.SetAction([=] {
     StudyInputs inputs = FindStudy(request->study);
-    if (inputs.study.is_external())
-      throw InputError(inputs.study.source +
-                       ": search.method: an external search asks \"dexcheck study serve\"");
     if (inputs.study.is_search() && job->tasks > job->array_size)
       throw InputError("--tasks: the parts of a search wait for each other: at most --array-size of them");
     CheckTrials(&inputs);  // what study run would refuse, must not be queued

@@ -13,8 +13,7 @@
 namespace dexcheck {
 
 /// Reads logs that LogWriter wrote, also unfinished ones: of a killed run, or of one that still goes on.
-/// Every member throws InputError, one line that names the file and says what is wrong. A forged log cannot
-/// crash the reader, nor make it read or write anything outside (see log_structure.h).
+/// Every member throws InputError, one line that names the file and says what is wrong.
 class LogReader {
  public:
   /// Opens the log and compares everything but its numbers with the checksum.

@@ -1,15 +1,12 @@
 #pragma once
 
-// Where the parts of a log lie. HDF5 1.10 can crash on, or loop over, a file whose structure was forged
-// together with its checksum. So a process of its own walks the structure and tells what it found; this one
-// checks what it was told, and reads numbers, files and late texts itself, at places that lie within the
-// file.
+// Where the parts of a log lie. The seal's checksum has told that they lie where LogWriter put them, before
+// HDF5 1.10, which can crash on a damaged structure, sees the file.
 
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -40,23 +37,10 @@ struct LogStructure {
   std::vector<StoredBytes> files;            ///< By path: "inputs/scenario.toml".
 };
 
-/// Walks the structure with HDF5, in this process. For trusted files, and for the process that may crash.
-/// @param descriptor of the open log.
-/// @throws std::exception whose text says what is wrong.
-LogStructure WalkStructure(int descriptor);
-
-/// Walks it in a process of its own, with limits on its time and memory, and checks what it tells.
+/// Walks the structure with HDF5.
+/// @param descriptor of the open log, whose seal was checked.
 /// @param path for messages.
-/// @throws InputError "PATH: the log is damaged: ...", also when that process crashes.
+/// @throws InputError "PATH: the log is damaged: ...", also of names that lead out of a folder.
 LogStructure ReadStructure(int descriptor, const std::filesystem::path& path);
-
-/// @throws InputError unless all parts lie within a file of this size, behind the seal, and all names are
-/// plain and do not collide.
-void CheckStructure(const LogStructure& structure, std::uint64_t file_size);
-
-/// As bytes between two processes of one program.
-std::string PackStructure(const LogStructure& structure);
-/// @throws InputError when these are no such bytes.
-LogStructure UnpackStructure(std::string_view bytes);
 
 }  // namespace dexcheck

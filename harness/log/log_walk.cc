@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <exception>
 #include <set>
 #include <stdexcept>
 
+#include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/log/hdf5_handle.h"
 #include "harness/log/log_structure.h"
@@ -11,12 +13,7 @@ namespace {
 
 using hdf5::Check;
 
-/// A log has one folder for signals of a kind, and the folders of a model's files.
-constexpr int kMaxDepth = 32;
-/// More than 3000 signals and as many files; hard links make trees of any size in a small file.
-constexpr size_t kMaxObjects = 100000;
-
-[[noreturn]] void Refuse(const std::string& name, const char* problem) {
+[[noreturn]] void RefusePart(const std::string& name, const char* problem) {
   throw std::runtime_error(Quote(name) + " " + problem);
 }
 
@@ -62,19 +59,13 @@ std::vector<std::string> ListAttributes(hid_t object) {
   return names;
 }
 
-struct Link {
-  std::string name;
-  bool is_hard;
-};
-
-std::vector<Link> ListLinks(hid_t group) {
-  const auto visit = [](hid_t /*group*/, const char* name, const H5L_info_t* info,
+std::vector<std::string> ListLinks(hid_t group) {
+  const auto visit = [](hid_t /*group*/, const char* name, const H5L_info_t* /*info*/,
                         void* out) noexcept -> herr_t {
-    auto* const links = static_cast<std::vector<Link>*>(out);
-    links->push_back({name, info->type == H5L_TYPE_HARD});
-    return links->size() > kMaxObjects ? -1 : 0;
+    static_cast<std::vector<std::string>*>(out)->emplace_back(name);
+    return 0;
   };
-  std::vector<Link> links;
+  std::vector<std::string> links;
   Check(H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, nullptr, visit, &links));
   return links;
 }
@@ -86,18 +77,14 @@ std::vector<hsize_t> GetExtents(hid_t dataset) {
   return extents;
 }
 
-/// Where the dataset's bytes lie. None is larger than a file can be.
+/// Where the dataset's bytes lie.
 ByteRange Locate(const hdf5::Dataset& dataset, const std::string& name, size_t value_size,
                  const std::vector<hsize_t>& extents) {
-  constexpr std::uint64_t kLargest = std::uint64_t{1} << 62;
   std::uint64_t size = value_size;
-  for (const hsize_t extent : extents) {
-    if (extent != 0 && size > kLargest / extent) Refuse(name, "is larger than a file");
-    size *= extent;
-  }
+  for (const hsize_t extent : extents) size *= extent;
   if (size == 0) return {};
   const haddr_t offset = H5Dget_offset(dataset.id());
-  if (offset == HADDR_UNDEF) Refuse(name, "is not stored in one piece");
+  if (offset == HADDR_UNDEF) RefusePart(name, "is not stored in one piece");
   return {offset, size};
 }
 
@@ -106,18 +93,14 @@ StoredSignal ReadSignal(hid_t file, const std::string& name) {
   const hdf5::Datatype type(H5Dget_type(dataset.id()));
   const std::vector<hsize_t> extents = GetExtents(dataset.id());
   if (Check(H5Tequal(type.id(), H5T_IEEE_F64LE)) == 0 || extents.empty() || extents.size() > 2) {
-    Refuse(name, "is not rows of numbers");
+    RefusePart(name, "is not rows of numbers");
   }
   StoredSignal signal;
   signal.rows = extents[0];
   signal.bytes = Locate(dataset, name, sizeof(double), extents);
   SignalInfo& info = signal.info;
   info.name = name;
-  if (extents.size() == 2) {
-    constexpr hsize_t kWidest = 1'000'000'000;
-    if (extents[1] < 1 || extents[1] > kWidest) Refuse(name, "has rows without an end");
-    info.width = static_cast<int>(extents[1]);
-  }
+  if (extents.size() == 2) info.width = static_cast<int>(extents[1]);
   for (const std::string& attribute : ListAttributes(dataset.id())) {
     if (attribute == "unit") {
       info.unit = ReadString(dataset.id(), attribute);
@@ -128,7 +111,7 @@ StoredSignal ReadSignal(hid_t file, const std::string& name) {
     } else {
       const hdf5::Attribute number(H5Aopen(dataset.id(), attribute.c_str(), H5P_DEFAULT));
       const hdf5::Dataspace space(H5Aget_space(number.id()));
-      if (Check(H5Sget_simple_extent_npoints(space.id())) != 1) Refuse(attribute, "is not one number");
+      if (Check(H5Sget_simple_extent_npoints(space.id())) != 1) RefusePart(attribute, "is not one number");
       Check(H5Aread(number.id(), H5T_NATIVE_DOUBLE, &info.attributes[attribute]));
     }
   }
@@ -142,17 +125,15 @@ class Walker {
     for (const StoredSignal& signal : structure->signals) signals_.insert(signal.info.name);
   }
 
-  void Walk(hid_t group, const std::string& prefix, int depth) {
-    if (depth > kMaxDepth) Refuse(prefix, "lies too deep");
-    for (const Link& link : ListLinks(group)) {
-      const std::string name = prefix + link.name;
-      if (!link.is_hard) Refuse(name, "is a link to elsewhere");
-      if (++objects_ > kMaxObjects) Refuse(name, "is one object too many");
-      const hdf5::Object object(H5Oopen(group, link.name.c_str(), H5P_DEFAULT));
+  void Walk(hid_t group, const std::string& prefix) {
+    for (const std::string& link : ListLinks(group)) {
+      const std::string name = prefix + link;
+      if (!IsPlainPath(name)) RefusePart(name, "is not a plain relative path");
+      const hdf5::Object object(H5Oopen(group, link.c_str(), H5P_DEFAULT));
       if (H5Iget_type(object.id()) == H5I_GROUP) {
-        Walk(object.id(), name + "/", depth + 1);
+        Walk(object.id(), name + "/");
       } else if (!signals_.contains(name)) {
-        Add(group, link.name, name);
+        Add(group, link, name);
       }
     }
   }
@@ -165,21 +146,19 @@ class Walker {
     const std::vector<hsize_t> extents = GetExtents(dataset.id());
     if (name.starts_with(kTexts)) {
       const bool is_text = H5Tget_class(type.id()) == H5T_STRING && H5Tis_variable_str(type.id()) == 0;
-      if (!is_text || !extents.empty()) Refuse(name, "is not a text");
+      if (!is_text || !extents.empty()) RefusePart(name, "is not a text");
       structure_->reserved_texts.emplace_back(name.substr(kTexts.size()),
                                               Locate(dataset, name, H5Tget_size(type.id()), {}));
     } else {
-      if (Check(H5Tequal(type.id(), H5T_STD_U8LE)) == 0 || extents.size() != 1) Refuse(name, "is not a file");
+      if (Check(H5Tequal(type.id(), H5T_STD_U8LE)) == 0 || extents.size() != 1)
+        RefusePart(name, "is not a file");
       structure_->files.emplace_back(name, Locate(dataset, name, 1, extents));
     }
   }
 
   LogStructure* structure_;
   std::set<std::string> signals_;
-  size_t objects_ = 0;
 };
-
-}  // namespace
 
 LogStructure WalkStructure(int descriptor) {
   const hdf5::SilencedErrors silenced;
@@ -187,14 +166,26 @@ LogStructure WalkStructure(int descriptor) {
   LogStructure structure;
   for (const std::string& name : ReadStrings(file.id(), "signals")) {
     structure.signals.push_back(ReadSignal(file.id(), name));
+    if (structure.signals.back().rows != structure.signals.front().rows) RefusePart(name, "has other rows");
   }
+  if (structure.signals.empty()) throw std::runtime_error("it has no signals");
   const hdf5::Group meta(H5Gopen2(file.id(), "meta", H5P_DEFAULT));
   for (const std::string& name : ListAttributes(meta.id())) {
     structure.texts[name] = ReadString(meta.id(), name);
   }
   const hdf5::Group root(H5Gopen2(file.id(), "/", H5P_DEFAULT));
-  Walker(&structure).Walk(root.id(), "", 0);
+  Walker(&structure).Walk(root.id(), "");
   return structure;
+}
+
+}  // namespace
+
+LogStructure ReadStructure(int descriptor, const std::filesystem::path& path) {
+  try {
+    return WalkStructure(descriptor);
+  } catch (const std::exception& error) {
+    throw InputError(path.string() + ": the log is damaged: " + Abbreviate(error.what()));
+  }
 }
 
 }  // namespace dexcheck

@@ -31,7 +31,7 @@ class ComparisonPage {
   std::string Make() {
     std::string title;
     for (const std::string& name : names_) title += (title.empty() ? "" : ", ") + name;
-    html_ += BeginPage("Comparison of " + title + " – dexcheck");
+    html_ += BeginPlotPage("Comparison of " + title);
     AddHeader();
     html_ += "<main>\n";
     AddInputs();

@@ -2,8 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
 
 #include <algorithm>
 #include <array>
@@ -13,10 +11,10 @@
 #include <limits>
 
 #include "controller/common/errors.h"
+#include "harness/base/child_process.h"
 #include "harness/base/temporary_path.h"
+#include "harness/log/log_file.h"
 #include "harness/report/thinning.h"
-
-extern char** environ;
 
 namespace dexcheck {
 namespace {
@@ -129,28 +127,19 @@ void WriteScript(const Figure& figure, const VectorXd& time, const Thinning& thi
 
 /// Runs gnuplot on FOLDER/figures.gnuplot, in the folder.
 void RunGnuplot(const std::filesystem::path& folder) {
-  const std::string errors = folder / "gnuplot.txt";
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, errors.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
-                                   0600);
-  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
-  std::array<std::string, 3> words = {"gnuplot", "--default-settings", "figures.gnuplot"};
-  std::array<char*, 4> arguments = {words[0].data(), words[1].data(), words[2].data(), nullptr};
-  pid_t process = -1;
-  const int error = ::posix_spawnp(&process, "gnuplot", &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) {
-    throw InputError(std::string("gnuplot: cannot be run: ") + std::strerror(error) +
-                     " (Debian's package gnuplot-nox has it)");
-  }
-  const TemporaryChild child(process);
-  int status = 0;
-  while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
-  }
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  const std::filesystem::path errors = folder / "gnuplot.txt";
+  const FileDescriptor nothing(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+  const FileDescriptor messages(::open(errors.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+  ChildProcess gnuplot("gnuplot", Program{{"gnuplot", "--default-settings", "figures.gnuplot"},
+                                          nothing.get(),
+                                          messages.get(),
+                                          messages.get(),
+                                          folder});
+  const TemporaryChild child(gnuplot.pid());
+  const ProcessEnd end = gnuplot.Wait();
+  if (end.has_succeeded()) return;
+  if (end.exit_code == kNotFoundExitCode)
+    throw InputError("gnuplot: cannot be run (Debian's package gnuplot-nox has it)");
   std::ifstream file(errors);
   const std::string message((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   throw InputError("gnuplot: could not draw the figures: " + Abbreviate(message));

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 namespace dexcheck {
@@ -61,6 +62,18 @@ std::string EncodeBase64(std::string_view bytes) {
     }
   }
   return text;
+}
+
+// Outside strings JSON has no "<", and in them it may be written so.
+Html EmbedJson(const std::string& id, const nlohmann::ordered_json& json) {
+  std::string text = json.dump(-1, ' ', /*ensure_ascii=*/false, nlohmann::json::error_handler_t::replace);
+  for (size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at))
+    text.replace(at, 1, "\\u003c");
+  return FormatHtml("<script type=\"application/json\" id=\"{}\">{}</script>\n", id, Html::Raw(text));
+}
+
+Html EmbedBytes(const std::string& id, std::string_view bytes) {
+  return FormatHtml("<script type=\"text/plain\" id=\"{}\">{}</script>\n", id, EncodeBase64(bytes));
 }
 
 std::string FormatShort(double value) {

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -73,6 +74,12 @@ Html FormatHtml(fmt::format_string<html_detail::Shown<Arguments>...> format, con
 }
 
 std::string EncodeBase64(std::string_view bytes);
+
+/// A script element that holds data. Text that is no UTF-8 is mended, and nothing in it can end the element.
+Html EmbedJson(const std::string& id, const nlohmann::ordered_json& json);
+
+/// A script element that holds bytes as base64.
+Html EmbedBytes(const std::string& id, std::string_view bytes);
 
 /// "2.6e-15", "0", "infinite".
 std::string FormatShort(double value);

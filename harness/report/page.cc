@@ -108,9 +108,7 @@ class Page {
 
   std::string Text(const char* name) const { return run_.FindText(name); }
 
-  void AddHead() {
-    html_ += BeginPage(fmt::format("{}: {} – dexcheck", FindHeadline(run_).word, Text("scenario")));
-  }
+  void AddHead() { html_ += BeginPlotPage(fmt::format("{}: {}", FindHeadline(run_).word, Text("scenario"))); }
 
   void AddVerdict() {
     const Headline headline = FindHeadline(run_);

@@ -1,5 +1,7 @@
 #include "harness/report/page_frame.h"
 
+#include <cmath>
+
 #include "harness/report/page_assets.h"
 #include "harness/report/page_plots.h"
 
@@ -12,14 +14,18 @@ constexpr const char* kContentPolicy =
 
 }  // namespace
 
-Html BeginPage(const std::string& title) {
-  return FormatHtml(
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+Html BeginPage(const std::string& title, const Html& style, double renew) {
+  Html html("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
+  if (renew > 0.0) html += FormatHtml("<meta http-equiv=\"refresh\" content=\"{:.0f}\">\n", std::ceil(renew));
+  html += FormatHtml(
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n<title>{}</title>\n"
-      "<link rel=\"icon\" href=\"data:,\">\n<style>\n{}\n{}</style>\n</head>\n<body>\n",
-      kContentPolicy, title, Html::Raw(kDygraphCss), Html::Raw(kPageCss));
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n<title>{} – dexcheck</title>\n"
+      "<link rel=\"icon\" href=\"data:,\">\n<style>\n{}{}</style>\n</head>\n<body>\n",
+      kContentPolicy, title, Html::Raw(kPageCss), style);
+  return html;
 }
+
+Html BeginPlotPage(const std::string& title) { return BeginPage(title, Html::Raw(kDygraphCss)); }
 
 Html MakePlotSection(const std::vector<Figure>& figures) {
   Html html;
@@ -43,18 +49,14 @@ Html MakePlotSection(const std::vector<Figure>& figures) {
 Html MakeReplaySection() { return Html::Raw(kReplayHtml); }
 
 Html EndPage(const std::vector<Figure>& figures, const VectorXd& time, const ReplayData* replay) {
-  const PlotData data = MakePlotData(figures, time);
-  Html html = FormatHtml(
-      "<script type=\"application/json\" id=\"run-plots\">{}</script>\n"
-      "<script type=\"text/plain\" id=\"run-values\">{}</script>\n"
-      "<script>\n{}\n</script>\n<script>\n{}</script>\n",
-      Html::Raw(data.json), Html::Raw(data.values), Html::Raw(kDygraphJs), Html::Raw(kPageJs));
+  Html html = EmbedPlots(figures, time);
+  html += FormatHtml("<script>\n{}\n</script>\n<script>\n{}</script>\n", Html::Raw(kDygraphJs),
+                     Html::Raw(kPageJs));
   if (replay != nullptr) {
-    html += FormatHtml(
-        "<script type=\"application/json\" id=\"replay-scene\">{}</script>\n"
-        "<script type=\"text/plain\" id=\"replay-values\">{}</script>\n"
-        "<script>\n{}\n</script>\n<script>\n{}</script>\n",
-        Html::Raw(replay->json), Html::Raw(replay->values), Html::Raw(kThreeJs), Html::Raw(kReplayJs));
+    html += EmbedJson("replay-scene", replay->json);
+    html += EmbedBytes("replay-values", replay->values);
+    html += FormatHtml("<script>\n{}\n</script>\n<script>\n{}</script>\n", Html::Raw(kThreeJs),
+                       Html::Raw(kReplayJs));
   }
   html += "</body>\n</html>\n";
   return html;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What all pages with plots have around their content.
+// What all pages have around their content.
 
 #include <string>
 #include <vector>
@@ -11,8 +11,12 @@
 
 namespace dexcheck {
 
-/// From the document's beginning to the beginning of its body, styles included.
-Html BeginPage(const std::string& title);
+/// From the document's beginning to the beginning of its body, with the styles that all pages have.
+/// @param style on top of them. @param renew after how many seconds it is loaded again; 0 for never.
+Html BeginPage(const std::string& title, const Html& style, double renew = 0.0);
+
+/// Likewise, of a page with plots.
+Html BeginPlotPage(const std::string& title);
 
 /// The section that shows a replay; EndPage brings its scene.
 Html MakeReplaySection();

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "harness/report/html.h"
 #include "harness/report/thinning.h"
 
 namespace dexcheck {
@@ -23,7 +22,7 @@ double RoundTime(double time) { return std::round(1e6 * time) / 1e6; }
 
 }  // namespace
 
-PlotData MakePlotData(const std::vector<Figure>& figures, const VectorXd& time) {
+Html EmbedPlots(const std::vector<Figure>& figures, const VectorXd& time) {
   long curves = 0;
   for (const Figure& figure : figures) curves += static_cast<long>(figure.curves.size());
   const Thinning thinning(time, std::max(kMostNumbers / std::max(curves, 1L), kFewestPoints));
@@ -55,15 +54,8 @@ PlotData MakePlotData(const std::vector<Figure>& figures, const VectorXd& time) 
     }
     json["plots"].push_back(plot);
   }
-  PlotData data;
-  data.values = EncodeBase64(bytes);
-  for (const char c : json.dump(-1, ' ', /*ensure_ascii=*/false, nlohmann::json::error_handler_t::replace)) {
-    if (c == '<') {
-      data.json += "\\u003c";
-    } else {
-      data.json += c;
-    }
-  }
+  Html data = EmbedJson("run-plots", json);
+  data += EmbedBytes("run-values", bytes);
   return data;
 }
 

@@ -54,12 +54,7 @@ class ReplayMaker {
     AddContacts();
     AddObject();
     AddPhases();
-    // In scripts "<" could begin a tag.
-    ReplayData replay{"", EncodeBase64(bytes_)};
-    for (const char c : json_.dump(-1, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace)) {
-      replay.json += c == '<' ? std::string("\\u003c") : std::string(1, c);
-    }
-    return replay;
+    return {json_, bytes_};
   }
 
  private:

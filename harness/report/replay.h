@@ -4,6 +4,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "renders/run_frames.h"
@@ -19,8 +20,8 @@ inline constexpr double kReplayRate = 60.0;
 inline constexpr int kMostReplayTriangles = 60'000;
 
 struct ReplayData {
-  std::string json;    ///< Ready to stand in a script element: it has no "<".
-  std::string values;  ///< base64 of little-endian numbers; the JSON says where each array begins.
+  nlohmann::ordered_json json;
+  std::string values;  ///< Little-endian numbers; the JSON says where each array begins.
 };
 
 /// Everything that the engine shows by default: geoms of groups 0 to 2 that are not wholly transparent,

@@ -1,23 +1,18 @@
 #include "harness/run/program_controller.h"
 
-#include <spawn.h>
 #include <sys/socket.h>
 #include <sys/time.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <Eigen/LU>
 #include <array>
 #include <cerrno>
-#include <csignal>
 #include <cstring>
 
 #include "controller/common/text.h"
 #include "controller/control/controller_protocol.h"
 #include "controller/model/platform.h"
 #include "harness/plant/plant.h"
-
-extern char** environ;
 
 namespace dexcheck {
 namespace {
@@ -67,25 +62,15 @@ void ProgramController::Start(const std::string& command) {
   socket_ = ends[0];
   SetTimeLimit(kGreetingShare * setup_.time_limit);
 
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], STDIN_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-  // A group of its own: Ctrl-C is dexcheck's, which then ends the program.
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  std::string shell = "sh", option = "-c", line = "exec " + command;
-  std::array<char*, 4> arguments = {shell.data(), option.data(), line.data(), nullptr};
-  const int error = posix_spawn(&process_, "/bin/sh", &actions, &attributes, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
-  close(ends[1]);
-  if (error == 0) return;
-  process_ = -1;
-  close(socket_);
-  throw RunFailure(name_ + ": " + std::strerror(error));
+  const int theirs = ends[1];
+  try {
+    process_.emplace(name_, Program{{"/bin/sh", "-c", "exec " + command}, theirs, theirs});
+  } catch (const Error& error) {
+    close(theirs);
+    close(socket_);
+    throw RunFailure(error.what());
+  }
+  close(theirs);
 }
 
 void ProgramController::SetTimeLimit(double seconds) {
@@ -149,26 +134,13 @@ void ProgramController::Stop() {
   (void)!send(socket_, &end, sizeof(end), MSG_NOSIGNAL | MSG_DONTWAIT);
   close(socket_);
   socket_ = -1;
-  if (process_ >= 0 && TellEnd().empty()) {
-    kill(-process_, SIGKILL);
-    waitpid(process_, nullptr, 0);
-  }
-  process_ = -1;
+  TellEnd();
+  process_.reset();
 }
 
 std::string ProgramController::TellEnd() {
-  constexpr int kLooks = 100;
-  for (int i = 0; i < kLooks; ++i) {
-    int status = 0;
-    const pid_t ended = waitpid(process_, &status, WNOHANG);
-    if (ended == process_) {
-      process_ = -1;
-      if (WIFSIGNALED(status)) return "was killed by signal " + std::to_string(WTERMSIG(status));
-      return "ended with exit code " + std::to_string(WEXITSTATUS(status));
-    }
-    usleep(static_cast<useconds_t>(1e6 * kEndTime / kLooks));
-  }
-  return "";
+  const std::optional<ProcessEnd> end = process_->WaitFor(kEndTime);
+  return end ? end->Describe() : "";
 }
 
 void ProgramController::Send(const void* data, size_t size) {

@@ -2,14 +2,13 @@
 
 // A controller of the user's own as a program, by controller/control/controller_protocol.h.
 
-#include <sys/types.h>
-
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "controller/control/controller.h"
 #include "controller/control/joint_controller.h"
+#include "harness/base/child_process.h"
 #include "harness/run/own_controller.h"
 
 namespace dexcheck {
@@ -39,7 +38,7 @@ class ProgramController final : public Controller {
   void Receive(void* data, size_t size);
   void FillRequest(const Reading& reading, double t, const Command& command);
   /// What became of the program, in words; waits for it a little.
-  [[nodiscard]] std::string TellEnd();
+  std::string TellEnd();
 
   std::string name_;
   OwnControllerSetup setup_;
@@ -50,7 +49,7 @@ class ProgramController final : public Controller {
   std::optional<JointDemand> joints_;
   int socket_ = -1;
   double time_limit_ = 0.0;  // s
-  pid_t process_ = -1;
+  std::optional<ChildProcess> process_;
   bool wants_terms_ = false;
   bool tells_F_N_ = false;
   std::vector<double> request_;  // the message before it takes the place of one double

@@ -9,7 +9,6 @@
 #include "controller/common/text.h"
 #include "harness/base/files.h"
 #include "harness/checks/random_states.h"
-#include "harness/sides/npz_file.h"
 
 namespace dexcheck {
 namespace {
@@ -92,18 +91,13 @@ AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescrip
     ReadLines(folder_ / "answers.jsonl");
     return;
   }
-  std::map<std::string, std::string> archive;
-  if (std::filesystem::exists(folder_ / "answers.npz")) {
-    archive = ReadNpz(ReadBytes(folder_ / "answers.npz"), (folder_ / "answers.npz").string());
+  if (const auto archive = folder_ / "answers.npz"; std::filesystem::exists(archive)) {
+    throw InputError(archive.string() + ": must be one file for each array: numpy.save(\"M.npy\", M)");
   }
   const auto n = static_cast<size_t>(layout().size());
   const auto find = [&](const std::string& term, const std::vector<size_t>& shape) {
     const std::string file = term + ".npy";
     if (std::filesystem::exists(folder_ / file)) terms_.emplace(term, Read(file, shape));
-    const auto packed = archive.find(file);
-    if (packed == archive.end()) return;
-    const std::string source = (folder_ / "answers.npz").string() + ": " + file;
-    terms_.insert_or_assign(term, Check(ParseNpy(packed->second, source), source, shape));
   };
   for (const char* term : {"M", "C"}) find(term, {count, n, n});
   for (const char* term : {"c", "g", "h", "friction"}) find(term, {count, n});
@@ -111,8 +105,8 @@ AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescrip
   if (!terms_.empty()) return;
   throw InputError(
       folder.string() +
-      ": must have answers: M.npy, C.npy, c.npy, g.npy, h.npy, friction.npy, kinetic_energy.npy or "
-      "potential_energy.npy, the same in answers.npz, or answers.jsonl, got none");
+      ": must have answers: M.npy, C.npy, c.npy, g.npy, h.npy, friction.npy, kinetic_energy.npy, "
+      "potential_energy.npy or answers.jsonl, got none");
 }
 
 void AnswerFiles::ReadLines(const std::filesystem::path& path) {

@@ -30,8 +30,8 @@ std::string WriteLayout(const RobotDescription& robot, const std::string& origin
 /// Answers in a folder beside the states they belong to: q.npy (N x num_positions) and v.npy (N x n) in the
 /// robot's own layout; M.npy, C.npy (N x n x n), c.npy, g.npy, h.npy, friction.npy (N x n),
 /// kinetic_energy.npy, potential_energy.npy (N), each of which may be missing, in the layout of layout.json,
-/// or in the robot's own without such a file. Instead of them the same arrays may stand in answers.npz, or
-/// the answers in answers.jsonl, a line for each state as a program gives it.
+/// or in the robot's own without such a file. Instead of them the answers may stand in
+/// answers.jsonl, a line for each state as a program gives it.
 class AnswerFiles : public AnsweringSide {
  public:
   /// @throws InputError, one line that names the file.

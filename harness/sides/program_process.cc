@@ -2,15 +2,12 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <sys/prctl.h>
 #include <sys/socket.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <csignal>
 #include <cstring>
 #include <system_error>
 
@@ -33,18 +30,6 @@ void SetNonBlocking(int descriptor) {
   ::fcntl(descriptor, F_SETFL, ::fcntl(descriptor, F_GETFL) | O_NONBLOCK);
 }
 
-/// In the child. Only calls that are safe after a fork.
-[[noreturn]] void BecomeProgram(const char* command, int input, int output, int messages) {
-  ::setpgid(0, 0);
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGXFSZ}) ::signal(signal, SIG_DFL);
-  ::dup2(input, STDIN_FILENO);
-  ::dup2(output, STDOUT_FILENO);
-  ::dup2(messages, STDERR_FILENO);
-  ::execl("/bin/sh", "sh", "-c", command, static_cast<char*>(nullptr));
-  ::_exit(127);
-}
-
 }  // namespace
 
 ProgramProcess::ProgramProcess(std::string command, double seconds)
@@ -54,19 +39,21 @@ ProgramProcess::ProgramProcess(std::string command, double seconds)
   int err[2] = {-1, -1};
   const bool piped = ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) == 0 &&
                      ::pipe2(out, O_CLOEXEC) == 0 && ::pipe2(err, O_CLOEXEC) == 0;
-  if (piped) child_ = ::fork();
-  if (child_ == 0) BecomeProgram(command_.c_str(), in[1], out[1], err[1]);
   const int error = errno;
-  for (int* const end : {&in[1], &out[1], &err[1]}) Close(end);
   input_ = in[0];
   output_ = out[0];
   messages_ = err[0];
-  if (child_ < 0) {
-    for (int* const end : {&input_, &output_, &messages_}) Close(end);
-    throw ProgramError("program " + Quote(command_) +
-                       ": cannot be started: " + std::generic_category().message(error));
+  const auto close = [&](std::initializer_list<int*> ends) {
+    for (int* const end : ends) Close(end);
+  };
+  try {
+    if (!piped) throw Error(std::generic_category().message(error));
+    child_.emplace("program", Program{{"/bin/sh", "-c", command_}, in[1], out[1], err[1]});
+  } catch (const Error& failure) {
+    close({&in[1], &out[1], &err[1], &input_, &output_, &messages_});
+    throw ProgramError("program " + Quote(command_) + ": cannot be started: " + failure.what());
   }
-  ::setpgid(child_, child_);
+  close({&in[1], &out[1], &err[1]});
   for (const int descriptor : {input_, output_, messages_}) SetNonBlocking(descriptor);
 }
 
@@ -74,12 +61,6 @@ ProgramProcess::~ProgramProcess() {
   Close(&input_);
   Close(&output_);
   Close(&messages_);
-  if (child_ < 0) return;
-  // It has nothing more to say: what it started ends with it.
-  ::kill(-child_, SIGKILL);
-  ::kill(child_, SIGKILL);
-  while (::waitpid(child_, nullptr, 0) < 0 && errno == EINTR) {
-  }
 }
 
 std::string ProgramProcess::LastWords() const {
@@ -91,28 +72,17 @@ std::string ProgramProcess::LastWords() const {
 
 void ProgramProcess::FailEnded() {
   // The pipes are closed; what closed them without ending gets a moment.
-  int status = 0;
-  bool ended = false;
-  for (int attempt = 0; attempt < 50 && !ended; ++attempt) {
-    ended = ::waitpid(child_, &status, WNOHANG) == child_;
-    if (!ended) ::usleep(10000);
-  }
+  const std::optional<ProcessEnd> end = child_->WaitFor(0.5);
   ReadMessages();
   const std::string key = "program " + Quote(command_) + ": ";
   const std::string after =
       answers_ == 0 ? " before its first answer" : " after " + std::to_string(answers_) + " answers";
-  if (!ended) throw ProgramError(key + "closed its standard output" + after + LastWords());
-  child_ = -1;
-  if (WIFSIGNALED(status)) {
-    throw ProgramError(key + "was ended by signal " + std::to_string(WTERMSIG(status)) + after + LastWords());
-  }
-  const int code = WEXITSTATUS(status);
+  if (!end) throw ProgramError(key + "closed its standard output" + after + LastWords());
   constexpr int kCannotRun = 126;
-  constexpr int kNotFound = 127;
-  if (answers_ == 0 && (code == kCannotRun || code == kNotFound)) {
+  if (answers_ == 0 && (end->exit_code == kCannotRun || end->exit_code == kNotFoundExitCode)) {
     throw InputError(key + "cannot be run" + LastWords());
   }
-  throw ProgramError(key + "ended with exit code " + std::to_string(code) + after + LastWords());
+  throw ProgramError(key + end->Describe() + after + LastWords());
 }
 
 void ProgramProcess::Write(const std::string& text, size_t* written) {

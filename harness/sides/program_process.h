@@ -2,11 +2,11 @@
 
 // A user's program that answers lines with lines.
 
-#include <sys/types.h>
-
+#include <optional>
 #include <string>
 
 #include "controller/common/errors.h"
+#include "harness/base/child_process.h"
 
 namespace dexcheck {
 
@@ -43,7 +43,7 @@ class ProgramProcess {
 
   std::string command_;
   double seconds_;
-  pid_t child_ = -1;
+  std::optional<ChildProcess> child_;
   int input_ = -1;     // a socket: what cannot be written is an error, not a signal
   int output_ = -1;    // standard output
   int messages_ = -1;  // standard error

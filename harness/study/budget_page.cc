@@ -1,8 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "harness/report/html.h"
+#include "harness/report/page_frame.h"
 #include "harness/study/error_budget.h"
+#include "harness/study/explorer_assets.h"
 
 namespace dexcheck {
 namespace {
@@ -55,12 +56,13 @@ Html DrawBar(const LogAxis& axis, double y, const std::string& name, double meas
 Html DrawChart(const ErrorBudget& budget) {
   const LogAxis axis(budget);
   const double height = kRowHeight * static_cast<double>(budget.entries.size() + 2) + 24.0;
-  Html chart = FormatHtml("<svg viewBox='0 0 {:.0f} {:.0f}' role='img' aria-label='error budget'>",
-                          kLabelWidth + kBarWidth + kRightMargin, height);
+  Html chart =
+      FormatHtml("<svg class='budget' viewBox='0 0 {:.0f} {:.0f}' role='img' aria-label='error budget'>",
+                 kLabelWidth + kBarWidth + kRightMargin, height);
   for (double decade = axis.least; decade <= axis.most; decade += 1.0) {
     const double x = kLabelWidth + axis.Place(std::pow(10.0, decade));
     chart += FormatHtml(
-        "<line x1='{:.1f}' x2='{:.1f}' y1='0' y2='{:.0f}' class='grid'/>"
+        "<line x1='{:.1f}' x2='{:.1f}' y1='0' y2='{:.0f}'/>"
         "<text x='{:.1f}' y='{:.0f}' text-anchor='middle'>1e{:.0f} {}</text>",
         x, x, height - 18.0, x, height - 4.0, decade, budget.unit);
   }
@@ -79,7 +81,8 @@ Html DrawChart(const ErrorBudget& budget) {
 
 Html MakeTable(const ErrorBudget& budget) {
   Html table = HtmlLiteral(
-      "<table><tr><th>source</th><th>alone, rms</th><th>alone, max</th><th>predicted, rms</th>"
+      "<table class='numbers'><tr><th>source</th><th>alone, rms</th><th>alone, max</th><th>predicted, "
+      "rms</th>"
       "<th>without it, rms</th><th>interaction</th><th></th></tr>");
   for (const BudgetEntry& e : budget.entries) {
     table += FormatHtml(
@@ -102,19 +105,8 @@ Html MakeTable(const ErrorBudget& budget) {
 }  // namespace
 
 std::string MakeBudgetPage(const ErrorBudget& budget) {
-  Html page = HtmlLiteral(
-      "<!DOCTYPE html><html lang='en'><head><meta charset='utf-8'>"
-      "<meta name='viewport' content='width=device-width, initial-scale=1'>");
-  page += FormatHtml("<title>error budget of {}</title>", budget.scenario);
-  page +=
-      "<style>body{font:15px/1.45 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 "
-      "1rem;color:#1d2733}"
-      "svg{width:100%;height:auto;font-size:13px}svg "
-      "text{fill:#1d2733}.measured{fill:#2f6fb0}.interacts{fill:#c2571a}"
-      ".predicted{fill:#9aa3ad}.grid{stroke:#d9dee4}table{border-collapse:collapse;width:100%}"
-      "td,th{padding:.25rem .5rem;border-bottom:1px solid #d9dee4;text-align:right}"
-      "td:first-child,th:first-child{text-align:left}</style></head><body>";
-  page += FormatHtml("<h1>Error budget of {}</h1>", budget.scenario);
+  Html page = BeginPage("error budget of " + budget.scenario, Html::Raw(kStudyCss));
+  page += FormatHtml("<header><h1>Error budget of <b>{}</b></h1></header><main>", budget.scenario);
   page += FormatHtml(
       "<p>RMS of {} with each source alone (blue; orange where it makes another error in company than "
       "alone), "
@@ -123,7 +115,7 @@ std::string MakeBudgetPage(const ErrorBudget& budget) {
   if (!budget.failure.empty()) page += FormatHtml("<p><strong>{}</strong></p>", budget.failure);
   page += DrawChart(budget);
   page += MakeTable(budget);
-  page += "</body></html>\n";
+  page += "</main></body></html>\n";
   return page.markup();
 }
 

@@ -4,7 +4,7 @@
 
 namespace dexcheck {
 
-extern const char* const kExplorerCss;
+extern const char* const kStudyCss;
 extern const char* const kExplorerJs;
 
 }  // namespace dexcheck

@@ -2,10 +2,6 @@
 // values of another one of it, so that a generation can be had beforehand: a copy of the algorithm runs until
 // it has named all its points and is then abandoned by an exception. When the values are known, the algorithm
 // itself makes the same generation.
-//
-// A generation of CMA-ES moves its mean by a part of its step only, so that a search of few trials ends on
-// the way. So each batch has one more point, where a quadratic through the best points so far is least; the
-// algorithm is not told of it.
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +11,6 @@
 #include <pagmo/problem.hpp>
 #include <variant>
 
-#include "harness/study/quadratic_model.h"
 #include "harness/study/search.h"
 
 namespace dexcheck {
@@ -78,7 +73,7 @@ class PopulationSearcher : public Searcher {
   }
 
   std::vector<UnitPoint> Ask() override {
-    if (!is_begun_) return asked_ = first_;
+    if (!is_begun_) return first_;
     Generation& generation = *problem_.generation;
     generation.points.clear();
     generation.values.clear();
@@ -87,22 +82,17 @@ class PopulationSearcher : public Searcher {
       std::visit([&](const auto& algorithm) { static_cast<void>(algorithm.evolve(population_)); }, copy);
     } catch (const GenerationIsNamed&) {
     }
-    asked_ = generation.points;
-    for (UnitPoint& point : asked_) point = MirrorIntoUnit(std::move(point));
-    // In front, so that the last batch has it though the count cuts the batch short.
-    if (const auto modelled = FindModelMinimum(tried_)) asked_.insert(asked_.begin(), *modelled);
-    return asked_;
+    std::vector<UnitPoint> asked = generation.points;
+    for (UnitPoint& point : asked) point = MirrorIntoUnit(std::move(point));
+    return asked;
   }
 
   void Tell(const std::vector<Judgement>& judgements) override {
-    if (std::holds_alternative<pagmo::cmaes>(algorithm_)) {
-      for (size_t i = 0; i < judgements.size(); ++i) tried_.push_back({asked_[i], judgements[i]});
-    }
     std::vector<std::vector<double>> values;
-    for (size_t k = judgements.size() - first_.size(); k < judgements.size(); ++k) {
+    for (const Judgement& judgement : judgements) {
       values.emplace_back();
-      for (size_t i = 0; i < judgements[k].objectives.size(); ++i)
-        values.back().push_back(CalcPenalised(judgements[k], i));
+      for (size_t i = 0; i < judgement.objectives.size(); ++i)
+        values.back().push_back(CalcPenalised(judgement, i));
     }
     if (!is_begun_) {
       for (size_t i = 0; i < first_.size(); ++i) population_.push_back(first_[i], values[i]);
@@ -119,8 +109,7 @@ class PopulationSearcher : public Searcher {
  private:
   GenerationProblem problem_;
   pagmo::population population_;
-  std::vector<UnitPoint> first_, asked_;
-  std::vector<TriedPoint> tried_;  // of CMA-ES
+  std::vector<UnitPoint> first_;
   std::variant<pagmo::cmaes, pagmo::nsga2> algorithm_;
   bool is_begun_ = false;
 };

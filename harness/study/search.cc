@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "harness/study/halving_search.h"
 #include "harness/study/margin_search.h"
 
 namespace dexcheck {
@@ -29,8 +28,6 @@ double CalcPenalised(const Judgement& judgement, size_t objective) {
 std::unique_ptr<Searcher> MakeSearcher(const Study& study, const UnitPoint& start) {
   if (study.search.method == SearchMethod::kMargins)
     return std::make_unique<MarginSearcher>(study.search, start);
-  if (study.search.method == SearchMethod::kHalving)
-    return std::make_unique<HalvingSearcher>(study.search, start);
   const bool local =
       study.search.method == SearchMethod::kNelderMead || study.search.method == SearchMethod::kBobyqa;
   return local ? MakeLocalSearcher(study.search, start)

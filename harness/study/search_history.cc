@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "controller/common/errors.h"
-#include "harness/study/halving_search.h"
 #include "harness/study/study_theory.h"
 
 namespace dexcheck {
@@ -49,8 +48,7 @@ void SearchHistory::TellWhatIsDone() {
         }
         results.push_back(row->second.result);
       }
-      judged.push_back({number, values, JudgePoint(study_.objectives, study_.constraints, results),
-                        IsShortened(study_.search, number)});
+      judged.push_back({number, values, JudgePoint(study_.objectives, study_.constraints, results)});
     }
     std::vector<Judgement> judgements;
     for (JudgedPoint& point : judged) {
@@ -122,8 +120,7 @@ void ForEachPoint(const Study& study, const std::vector<TrialRow>& rows, const T
     const std::vector<double>& values = rows[first].trial.parameters;
     take(JudgedPoint{number,
                      {values.begin(), values.begin() + static_cast<std::ptrdiff_t>(study.num_keys())},
-                     JudgePoint(study.objectives, study.constraints, results),
-                     IsShortened(study.search, number)});
+                     JudgePoint(study.objectives, study.constraints, results)});
   }
 }
 
@@ -140,7 +137,7 @@ PointSummary SummarisePoints(const Study& study, const std::vector<TrialRow>& ro
   ForEachPoint(study, rows, [&](JudgedPoint&& point) {
     if (summary.count++ == 0) summary.first = point;
     const bool better = !summary.best || IsBetter(point.judgement, summary.best->judgement);
-    if (point.judgement.is_feasible() && !point.is_shortened && better) summary.best = std::move(point);
+    if (point.judgement.is_feasible() && better) summary.best = std::move(point);
   });
   return summary;
 }
@@ -148,8 +145,7 @@ PointSummary SummarisePoints(const Study& study, const std::vector<TrialRow>& ro
 const JudgedPoint* FindBest(const std::vector<JudgedPoint>& points) {
   const JudgedPoint* best = nullptr;
   for (const JudgedPoint& point : points) {
-    if (point.judgement.is_feasible() && !point.is_shortened &&
-        (best == nullptr || IsBetter(point.judgement, best->judgement)))
+    if (point.judgement.is_feasible() && (best == nullptr || IsBetter(point.judgement, best->judgement)))
       best = &point;
   }
   return best;
@@ -158,7 +154,7 @@ const JudgedPoint* FindBest(const std::vector<JudgedPoint>& points) {
 std::vector<const JudgedPoint*> FindFront(const std::vector<JudgedPoint>& points) {
   std::vector<const JudgedPoint*> sorted;
   for (const JudgedPoint& point : points) {
-    if (point.judgement.is_feasible() && !point.is_shortened) sorted.push_back(&point);
+    if (point.judgement.is_feasible()) sorted.push_back(&point);
   }
   std::stable_sort(sorted.begin(), sorted.end(), [](const JudgedPoint* a, const JudgedPoint* b) {
     return a->judgement.objectives < b->judgement.objectives;

@@ -17,7 +17,6 @@ struct JudgedPoint {
   long number = 0;             ///< Its trials begin at number * CountTrialsOfPoint.
   std::vector<double> values;  ///< Of the study's own keys.
   Judgement judgement;
-  bool is_shortened = false;  ///< It was tried for less than the whole duration (successive halving).
 };
 
 /// Follows a search through its rows. The same rows always lead to the same next trials, so that a search

@@ -5,7 +5,6 @@
 
 #include "controller/common/expression.h"
 #include "controller/common/text.h"
-#include "harness/study/halving_search.h"
 #include "harness/study/sampling.h"
 
 namespace dexcheck {
@@ -148,11 +147,6 @@ std::vector<std::string> ListOverrides(const Study& study, const Trial& trial) {
   for (size_t i = 0; i < study.variations.size(); ++i) {
     overrides.push_back(study.variations[i].key + "=" +
                         FormatValue(study.variations[i], trial.parameters[i]));
-  }
-  const std::vector<double>& durations = study.search.durations;
-  if (!durations.empty()) {
-    const size_t round = FindRound(study.search, trial.number / CountTrialsOfPoint(study));
-    overrides.push_back("duration=" + FormatNumber(durations[round]));
   }
   return overrides;
 }

@@ -38,20 +38,18 @@ struct Sample {
   bool scramble = false;   ///< A Sobol sequence.
 };
 
-enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kBobyqa, kMargins, kHalving, kExternal };
+enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kBobyqa, kMargins };
 enum class SearchStart { kMiddle, kTheory, kValues };
 
 /// How a study looks for the best point.
 struct Search {
   SearchMethod method = SearchMethod::kNone;
-  long count = 0;       ///< Points at most.
-  long population = 0;  ///< Points of a generation, of kCmaEs and kNsga2; of the first round of kHalving.
-  long keep = 3;        ///< Of kHalving: one of so many points goes on.
-  std::vector<double> durations;  ///< Of kHalving: of the trials of each round, s, ascending.
-  long starts = 1;                ///< Local searches at a time, of kNelderMead and kBobyqa.
-  long directions = 0;            ///< Random ones, of kMargins.
-  double step = 0.25;             ///< First step relative to the ranges.
-  double tolerance = 1e-3;        ///< Relative to the ranges: where a local search or a bisection ends.
+  long count = 0;           ///< Points at most.
+  long population = 0;      ///< Points of a generation, of kCmaEs and kNsga2.
+  long starts = 1;          ///< Local searches at a time, of kNelderMead and kBobyqa.
+  long directions = 0;      ///< Random ones, of kMargins.
+  double step = 0.25;       ///< First step relative to the ranges.
+  double tolerance = 1e-3;  ///< Relative to the ranges: where a local search or a bisection ends.
   std::uint64_t seed = 0;
   SearchStart start = SearchStart::kMiddle;
   std::vector<double> start_values;  ///< Of kValues, one for each key.
@@ -84,7 +82,6 @@ struct Study {
   [[nodiscard]] std::span<const Variation> keys() const { return {variations.data(), num_keys()}; }
   [[nodiscard]] bool is_search() const { return search.method != SearchMethod::kNone; }
   /// Its points come from another program.
-  [[nodiscard]] bool is_external() const { return search.method == SearchMethod::kExternal; }
 };
 
 /// One run of a study.

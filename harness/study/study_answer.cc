@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 
-#include "harness/study/halving_search.h"
 #include "harness/study/margin_search.h"
 #include "harness/study/study_sensitivity.h"
 
@@ -42,7 +41,7 @@ std::string DescribeBest(const Study& study, const PointSummary& points) {
                   Describe(objective), CountPoints(points.count), value(best), unit,
                   DescribeValues(study, best.values), best.number * CountTrialsOfPoint(study));
   const JudgedPoint& first = *points.first;
-  if (study.is_search() && !first.is_shortened && first.number == 0 && first.number != best.number) {
+  if (study.is_search() && first.number == 0 && first.number != best.number) {
     if (!std::isfinite(value(first))) {
       text += " The search began where it has no value.";
     } else {
@@ -52,22 +51,6 @@ std::string DescribeBest(const Study& study, const PointSummary& points) {
     }
   }
   return text + DescribeEdges(study, best.values);
-}
-
-/// What successive halving stopped.
-std::string DescribeStopped(const Study& study, size_t tried) {
-  const std::vector<long> counts = CountPointsOfRounds(study.search);
-  std::string text;
-  long before = 0;
-  for (size_t round = 0; round + 1 < counts.size(); ++round) {
-    before += counts[round];
-    if (static_cast<long>(tried) < before + counts[round + 1]) break;  // the next round is not done
-    text += fmt::format("{}{} after {:g} s", text.empty() ? "" : ", ", counts[round] - counts[round + 1],
-                        study.search.durations[round]);
-  }
-  if (text.empty()) return {};
-  return fmt::format("Of {} that were begun, others were better than {}: these were stopped, and are kept.",
-                     CountPoints(static_cast<size_t>(counts.front())), text);
 }
 
 std::string DescribeFront(const Study& study, const std::vector<JudgedPoint>& points) {
@@ -210,8 +193,6 @@ std::vector<std::string> AnswerStudy(const Study& study, const std::vector<Trial
   if (study.objectives.empty()) return answers;
   const PointSummary points = SummarisePoints(study, rows);
   if (points.count == 0) return answers;
-  const std::string stopped = DescribeStopped(study, points.count);
-  if (!stopped.empty()) answers.push_back(stopped);
   if (!points.best) {
     answers.push_back(fmt::format("At none of {} all constraints hold.", CountPoints(points.count)));
   } else {

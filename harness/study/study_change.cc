@@ -44,8 +44,7 @@ std::string FindSearchDifference(const Study& before, const Study& now) {
   const Search& b = now.search;
   if (a.method != b.method || a.population != b.population || a.starts != b.starts ||
       a.directions != b.directions || a.step != b.step || a.tolerance != b.tolerance || a.seed != b.seed ||
-      a.start != b.start || a.start_values != b.start_values || a.keep != b.keep ||
-      a.durations != b.durations) {
+      a.start != b.start || a.start_values != b.start_values) {
     return "search";
   }
   if (!now.is_search()) return {};

@@ -7,7 +7,6 @@
 
 #include "controller/common/errors.h"
 #include "harness/study/explorer_assets.h"
-#include "harness/study/halving_search.h"
 #include "harness/study/search_history.h"
 #include "harness/study/study_answer.h"
 #include "harness/study/study_theory.h"
@@ -66,7 +65,7 @@ Json ListHistory(const StudyResults& results, bool is_predicted) {
   Json history = Json::array();
   for (const JudgedPoint& point : points) {
     Json entry = {{"value", ShowObjective(objective, point.judgement.objectives.front())},
-                  {"feasible", point.judgement.is_feasible() && !point.is_shortened}};
+                  {"feasible", point.judgement.is_feasible()}};
     if (asks) {
       const Judgement theory = JudgeInTheory(results.inputs, point.values);
       if (theory.is_feasible()) entry["theory"] = ShowObjective(objective, theory.objectives.front());
@@ -154,17 +153,7 @@ Json ListTheory(const StudyResults& results) {
   return list;
 }
 
-/// For a script element: "</script>" must not be in it.
-std::string Dump(const Json& json) {
-  std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-  for (size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at))
-    text.replace(at, 1, "\\u003c");
-  return text;
-}
-
 }  // namespace
-
-Html MakeExplorerStyle() { return Html::Raw(kExplorerCss); }
 
 Html MakeExplorer(const StudyResults& results) {
   const bool has_history = results.study.is_search() && !results.study.objectives.empty();
@@ -235,14 +224,6 @@ Html MakeExplorerScript(const StudyResults& results) {
     data["held"].push_back(IsHeld(outcome));
   }
   data["theory"] = ListTheory(results);
-  // Of successive halving: from which trial on they last how long.
-  data["rounds"] = Json::array();
-  long first = 0;
-  const std::vector<long> counts = CountPointsOfRounds(study.search);
-  for (size_t round = 0; round < counts.size(); ++round) {
-    data["rounds"].push_back({{"first", first}, {"duration", study.search.durations[round]}});
-    first += counts[round] * CountTrialsOfPoint(study);
-  }
   if (study.is_search() && !study.objectives.empty()) {
     data["history"] = ListHistory(results, data["theory"].contains("predicted"));
     data["maximize"] = study.objectives.front().maximize;
@@ -260,10 +241,10 @@ Html MakeExplorerScript(const StudyResults& results) {
     for (const double parameter : row->trial.parameters) add(parameter);
     for (const double metric : row->result.metrics) add(metric);
   }
-  return FormatHtml(
-      "<script type=\"application/json\" id=\"study-data\">{}</script>\n<script type=\"text/plain\" "
-      "id=\"study-values\">{}</script>\n<script>\n{}</script>\n",
-      Html::Raw(Dump(data)), Html::Raw(EncodeBase64(bytes)), Html::Raw(kExplorerJs));
+  Html html = EmbedJson("study-data", data);
+  html += EmbedBytes("study-values", bytes);
+  html += FormatHtml("<script>\n{}</script>\n", Html::Raw(kExplorerJs));
+  return html;
 }
 
 }  // namespace dexcheck

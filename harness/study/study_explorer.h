@@ -16,7 +16,4 @@ Html MakeExplorer(const StudyResults& results);
 /// Numbers and script.
 Html MakeExplorerScript(const StudyResults& results);
 
-/// Its styles.
-Html MakeExplorerStyle();
-
 }  // namespace dexcheck

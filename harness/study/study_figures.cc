@@ -8,7 +8,6 @@
 #include <limits>
 
 #include "harness/report/figure.h"
-#include "harness/study/halving_search.h"
 #include "harness/study/study_charts.h"
 #include "harness/study/study_theory.h"
 
@@ -218,8 +217,7 @@ StudyResults::StudyResults(const StudyStore& store)
 std::vector<const TrialRow*> StudyResults::ListTracked() const {
   std::vector<const TrialRow*> tracked;
   for (const TrialRow& row : rows) {
-    const bool shortened = IsShortened(study.search, row.trial.number / CountTrialsOfPoint(study));
-    if (row.result.outcome == Outcome::kTracked && !shortened) tracked.push_back(&row);
+    if (row.result.outcome == Outcome::kTracked) tracked.push_back(&row);
   }
   std::stable_sort(tracked.begin(), tracked.end(), [this](const TrialRow* a, const TrialRow* b) {
     return a->result.metrics[error] < b->result.metrics[error];
@@ -246,9 +244,6 @@ std::string Describe(const Study& study, const TrialRow& row) {
                     variation.labels.empty() ? fmt::format("{:.6g}", value) : FormatValue(variation, value));
   }
   text += NameOf(row.result.outcome);
-  const long point = row.trial.number / CountTrialsOfPoint(study);
-  if (IsShortened(study.search, point))
-    text += fmt::format(", a trial of {:g} s", study.search.durations[FindRound(study.search, point)]);
   if (!row.result.failure.empty()) text += ": " + row.result.failure;
   return text;
 }

@@ -26,7 +26,7 @@ StudyProgress FindProgress(const StudyStore& store) {
   if (!asks) return progress;
   const std::vector<TrialRow> rows = store.ReadRows(0, /*with_machine=*/false);
   for (const std::string& answer : AnswerStudy(study, rows)) progress.text += answer + "\n";
-  if (study.is_search() && !study.is_external()) {
+  if (study.is_search()) {
     StudyInputs inputs;
     inputs.study = study;
     inputs.scenario_text = store.Identify("scenario");

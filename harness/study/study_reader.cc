@@ -8,7 +8,6 @@
 #include "controller/common/expression.h"
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
-#include "harness/study/halving_search.h"
 #include "harness/study/margin_search.h"
 #include "harness/study/sampling.h"
 #include "harness/study/study.h"
@@ -316,25 +315,10 @@ void ReadMargins(TomlTable* table, Study* study) {
   search.count = MarginSearcher::CountPoints(search, study->num_keys());
 }
 
-/// Keys of `method = "halving"`, without those of all searches.
-void ReadHalving(TomlTable* table, Study* study) {
-  Search& search = study->search;
-  const TomlValue durations = table->Get("durations");
-  for (const TomlValue& entry : durations.AsList()) {
-    search.durations.push_back(entry.AsPositive());
-    const size_t count = search.durations.size();
-    if (count > 1 && search.durations[count - 2] >= search.durations.back())
-      entry.Fail("must be longer than the one before it");
-  }
-  if (search.durations.size() < 2) durations.Reject("needs at least two durations");
-  if (const auto keep = table->Find("keep")) search.keep = keep->AsWhole(2, kMaxValues);
-  const auto is_duration = [](const std::string& key) { return key.starts_with("duration="); };
-  if (std::any_of(study->overrides.begin(), study->overrides.end(), is_duration))
-    durations.Reject("set has a duration, too");
-  search.population = search.count;
-  search.count = 0;
-  for (const long count : CountPointsOfRounds(search)) search.count += count;
-}
+/// Methods of earlier versions, and what to use instead.
+constexpr std::pair<std::string_view, const char*> kGoneMethods[] = {
+    {"halving", "nelder_mead or cma_es, with stop_error for trials that are lost"},
+    {"external", "an optimiser that calls \"dexcheck run SCENARIO --no-log --json --set KEY=VALUE\""}};
 
 void ReadSearch(const TomlValue& value, Study* study) {
   constexpr long kLeastOfCmaEs = 5;  // of which it takes the better half
@@ -344,24 +328,20 @@ void ReadSearch(const TomlValue& value, Study* study) {
   TomlTable table = value.AsTable();
   Search& search = study->search;
   const TomlValue method = table.Get("method");
+  for (const auto& [gone, instead] : kGoneMethods) {
+    if (method.AsText() == gone) method.Reject(std::string("is gone: use ") + instead);
+  }
   search.method = method.AsChoice<SearchMethod>({{"cma_es", SearchMethod::kCmaEs},
                                                  {"nsga2", SearchMethod::kNsga2},
                                                  {"nelder_mead", SearchMethod::kNelderMead},
                                                  {"bobyqa", SearchMethod::kBobyqa},
-                                                 {"margins", SearchMethod::kMargins},
-                                                 {"halving", SearchMethod::kHalving},
-                                                 {"external", SearchMethod::kExternal}});
+                                                 {"margins", SearchMethod::kMargins}});
   if (search.method == SearchMethod::kMargins) {
     ReadMargins(&table, study);
     return;
   }
   const TomlValue count = table.Get("count");
   search.count = count.AsWhole(1, kMaxTrials);
-  if (search.method == SearchMethod::kExternal) {
-    table.RejectUnused();
-    if (study->objectives.empty()) method.Reject("a search needs an [[objective]]");
-    return;
-  }
   if (search.method == SearchMethod::kCmaEs || search.method == SearchMethod::kNsga2) {
     search.population = 16;
     if (const auto population = table.Find("population")) {
@@ -372,8 +352,6 @@ void ReadSearch(const TomlValue& value, Study* study) {
     if (search.count < search.population)
       count.Fail("must be at least the population, " + std::to_string(search.population));
     search.count -= search.count % search.population;  // whole generations
-  } else if (search.method == SearchMethod::kHalving) {
-    ReadHalving(&table, study);
   } else {
     if (const auto starts = table.Find("starts")) search.starts = starts->AsWhole(1, kMaxStarts);
     if (const auto tolerance = table.Find("tolerance")) search.tolerance = tolerance->AsPositive();
@@ -381,7 +359,7 @@ void ReadSearch(const TomlValue& value, Study* study) {
   }
   if (search.method == SearchMethod::kBobyqa && study->num_keys() < 2)
     method.Reject("bobyqa needs two keys at least");
-  if (search.method != SearchMethod::kNsga2 && search.method != SearchMethod::kHalving) {
+  if (search.method != SearchMethod::kNsga2) {
     if (const auto step = table.Find("step")) {
       search.step = step->AsPositive();
       if (search.step > 1.0) step->Fail("must be at most 1, the whole range");
@@ -463,7 +441,7 @@ Study ReadStudy(TomlTable& root, Study study) {
   if (search) ReadSearch(*search, &study);
   const bool moves_one_key = study.sample.method == SamplingMethod::kSaltelli ||
                              study.sample.method == SamplingMethod::kMorris ||
-                             study.search.method == SearchMethod::kMargins || study.is_external();
+                             study.search.method == SearchMethod::kMargins;
   for (const Variation& variation : study.variations) {
     if (moves_one_key && variation.depends_on_others())
       vary.Reject(Quote(variation.key) +

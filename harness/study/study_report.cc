@@ -9,8 +9,8 @@
 #include <optional>
 
 #include "harness/base/shell.h"
-#include "harness/report/html.h"
-#include "harness/report/page_assets.h"
+#include "harness/report/page_frame.h"
+#include "harness/study/explorer_assets.h"
 #include "harness/study/search_history.h"
 #include "harness/study/study_answer.h"
 #include "harness/study/study_explorer.h"
@@ -22,41 +22,6 @@ namespace dexcheck {
 namespace {
 
 constexpr size_t kMostAsked = 2000;  // trials that theory is asked about
-constexpr const char* kContentPolicy =
-    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
-
-// On top of what pages of runs look like.
-constexpr const char* kStyle = R"(
-figure svg { filter: none; font: 12px sans-serif; color: var(--ink); fill: currentColor; }
-svg .title { font-weight: 600; font-size: 14px; } svg .tick { font-size: 11px; fill: var(--soft); }
-svg .mark { stroke: var(--soft); } svg .frame { fill: none; stroke: var(--line); } svg .edge { stroke: #000; stroke-width: 3; }
-svg a:hover > *, svg a:focus > * { stroke: var(--accent); stroke-width: 2.5; }
-svg .dot { stroke: #333; stroke-width: .5; }
-.grid > figure { max-width: 640px; }
-.key { display: inline-block; width: 1em; height: 1em; vertical-align: -2px; border-radius: 3px; }
-.dot { border-radius: 50%; width: .6em; height: .6em; vertical-align: 0; border: 1px solid var(--soft); }
-.rule { height: 4px; vertical-align: 3px; background: #000; border-radius: 0; outline: 1px solid var(--line); }
-.counts { width: auto; }
-.effects th.wide { width: 30%; min-width: 6rem; } .effects td { min-width: 4.5rem; } .effects td:first-child { white-space: nowrap; }
-.track { position: relative; height: 1em; background: color-mix(in srgb, var(--line) 45%, transparent); border-radius: 3px; }
-.track i { position: absolute; top: 0; height: 100%; }
-.track .fill { background: var(--accent); border-radius: 3px; opacity: .75; }
-.track .span { top: 45%; height: 2px; background: var(--ink); }
-.track .start { width: 2px; background: var(--ink); }
-.track .mark { width: 0; border-left: 2px dashed #9b2226; }
-.trials { max-height: 36rem; overflow-y: auto; }
-.trial { border-bottom: 1px solid var(--line); padding: .6rem 0; }
-.trial pre { white-space: pre-wrap; overflow-wrap: anywhere; user-select: all; }
-.trial .close { display: none; }
-.trial:target { position: fixed; z-index: 900; left: 50%; bottom: 0; transform: translateX(-50%); width: min(1180px, 100%); background: var(--card);
-  border: 1px solid var(--line); border-top: 4px solid var(--accent); border-radius: 10px 10px 0 0; padding: .8rem 1.2rem;
-  box-shadow: 0 -6px 30px rgba(0, 0, 0, .35); max-height: 70vh; overflow-y: auto; }
-.trial:target .close { display: block; float: right; }
-@media print {
-  #trials, #trials + p, .trials { display: none; }
-  svg rect, svg circle, .key { -webkit-print-color-adjust: exact; print-color-adjust: exact; }
-}
-)";
 
 /// A failure without the time that it happened at, so that equal ones can be counted.
 std::string WithoutTime(const std::string& failure) {
@@ -71,15 +36,7 @@ class Report {
       : store_(store), results_(store), tracked_(results_.ListTracked()) {}
 
   std::string Make(double renew) {
-    Html html("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
-    if (renew > 0.0)
-      html += FormatHtml("<meta http-equiv=\"refresh\" content=\"{:.0f}\">\n", std::ceil(renew));
-    html += FormatHtml(
-        "<meta name=\"viewport\" "
-        "content=\"width=device-width, initial-scale=1\">\n<meta http-equiv=\"Content-Security-Policy\" "
-        "content=\"{}\">\n<title>{} – dexcheck study</title>\n<link rel=\"icon\" "
-        "href=\"data:,\">\n<style>\n{}{}{}</style>\n</head>\n<body>\n",
-        kContentPolicy, results_.study.name, Html::Raw(kPageCss), Html(kStyle), MakeExplorerStyle());
+    Html html = BeginPage(results_.study.name + " – study", Html::Raw(kStudyCss), renew);
     html += Head();
     Html body;
     if (results_.rows.empty()) {

@@ -158,7 +158,7 @@ TrialPool::Worker TrialPool::MakeWorker() const {
   FileDescriptor messages(::memfd_create("messages", MFD_CLOEXEC));
   if (!messages.is_open()) throw Error(std::string("a trial cannot be started: ") + std::strerror(errno));
   // It holds no other worker's channel: each would keep the others alive.
-  WorkerProcess process("a trial", [&](int channel) {
+  ChildProcess process("a trial", [&](int channel) {
     for (const Worker& other : workers_) ::close(other.process.channel());
     return Work(channel, messages.get());
   });

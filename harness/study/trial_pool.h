@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/base/worker_process.h"
+#include "harness/base/child_process.h"
 #include "harness/log/log_file.h"
 #include "harness/study/study_store.h"
 
@@ -43,7 +43,7 @@ class TrialPool {
 
  private:
   struct Worker {
-    WorkerProcess process;
+    ChildProcess process;
     FileDescriptor messages;     // its standard error
     std::optional<Trial> trial;  // that it makes now
     std::string received;

@@ -2,7 +2,6 @@
 
 #include "controller/common/errors.h"
 #include "harness/sides/npy_file.h"
-#include "harness/sides/npz_file.h"
 #include "harness/sides/side_layout.h"
 #include "harness/sides/urdf_reader.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -53,10 +52,6 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace dexcheck::fuzz;
   const std::string_view bytes = AsText(data, size);
   Try("M.npy:", [&] { ExpectWhole(dexcheck::ParseNpy(bytes, "M.npy")); });
-  Try("answers.npz:", [&] {
-    for (const auto& member : dexcheck::ReadNpz(bytes, "answers.npz"))
-      Try("M.npy:", [&] { ExpectWhole(dexcheck::ParseNpy(member.second, "M.npy")); });
-  });
   ReadTerms(bytes);
   return 0;
 }

@@ -439,8 +439,7 @@
   const ListSettings = row => study.overrides.concat(study.keys.map((key, i) => {
     const labels = columns[kFirstKey + i].labels, x = value(row, kFirstKey + i);
     return key + '=' + (labels ? labels[x] : String(x));
-  })).concat(study.rounds.filter(round => round.first <= value(row, kNumber)).slice(-1)
-    .map(round => 'duration=' + round.duration)).map(setting => ' --set ' + Quote(setting)).join('');
+  })).map(setting => ' --set ' + Quote(setting)).join('');
   const Choose = row => {
     chosen = row;
     byId('chosen').hidden = row < 0;

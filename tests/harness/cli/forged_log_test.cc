@@ -75,7 +75,7 @@ TEST_F(ForgedLog, WritesNoFilesOutside) {
     H5Gclose(up);
     H5Gclose(inputs);
   });
-  EXPECT_TRUE(AllRefuse("must be a plain relative path"));
+  EXPECT_TRUE(AllRefuse("is not a plain relative path"));
   EXPECT_FALSE(fs::exists(folder_.path() / "escaped"));
 }
 

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <random>
 
 #include "controller/common/errors.h"
 #include "tests/common/run_program.h"
@@ -190,6 +191,61 @@ TEST_F(LogReaderTest, EveryDamageIsNoticed) {
   ::close(file);
   EXPECT_EQ(noticed, bytes.size() - numbers);
   EXPECT_TRUE(IsSample(LogReader(path_), kRows));
+}
+
+/// Cut short, bits flipped, bytes put in or replaced, at random: all is noticed but changes of numbers.
+TEST_F(LogReaderTest, RandomDamageIsOneLine) {
+  constexpr int kTrials = 400;
+  WriteSampleLog(path_, 20, 20);
+  const std::string good = ReadText(path_);
+  const auto [begin, end] = testing::ReadVariablePart(good);
+  std::mt19937 random(5);
+  int refused = 0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    std::string damaged = good;
+    for (size_t count = size_t{1} << (random() % 6); count > 0; --count) {
+      const size_t at = random() % damaged.size();
+      if (trial % 4 == 0) damaged.resize(at + 1);
+      if (trial % 4 == 1) damaged[at] = static_cast<char>(damaged[at] ^ (1 << (random() % 8)));
+      if (trial % 4 == 2) damaged.insert(at, 1, static_cast<char>(random()));
+      if (trial % 4 == 3) damaged[at] = static_cast<char>(random());
+    }
+    WriteText(path_, damaged);
+    const bool is_whole = damaged.size() >= good.size() && damaged.compare(0, begin, good, 0, begin) == 0 &&
+                          damaged.compare(end, good.size() - end, good, end, good.size() - end) == 0;
+    const std::string message = Open();
+    EXPECT_EQ(message == "nothing was thrown", is_whole) << trial << ": " << message;
+    if (is_whole) continue;
+    ++refused;
+    EXPECT_THAT(message, StartsWith(path_.string() + ": "));
+    EXPECT_EQ(message.find('\n'), std::string::npos);
+  }
+  EXPECT_GE(refused, kTrials / 2);
+}
+
+TEST_F(LogReaderTest, LinksInTheFolderAreNotFollowed) {
+  namespace fs = std::filesystem;
+  WriteSampleLog(path_, 20, 20);
+  const fs::path elsewhere = folder_.path() / "elsewhere";
+  const fs::path unpacked = folder_.path() / "unpacked";
+  fs::create_directory(elsewhere);
+  const LogReader log(path_);
+  const auto extract = [&] { return MessageOf([&] { log.ExtractFiles("inputs", unpacked); }); };
+  // A folder's place, a file's place, and a file's place that leads nowhere yet.
+  const std::vector<std::pair<fs::path, fs::path>> links = {
+      {"mjcf", elsewhere}, {"mjcf/assets", elsewhere}, {"scenario.toml", elsewhere / "new"}};
+  for (const auto& [name, target] : links) {
+    fs::remove_all(unpacked);
+    fs::create_directories((unpacked / name).parent_path());
+    fs::create_symlink(target, unpacked / name);
+    EXPECT_THAT(extract(), HasSubstr("cannot be written: ")) << name;
+    EXPECT_TRUE(fs::is_empty(elsewhere)) << name;
+  }
+  // The folder itself may be a link, as a temporary folder often is.
+  fs::remove_all(unpacked);
+  fs::create_symlink(elsewhere, unpacked);
+  EXPECT_EQ(extract(), "nothing was thrown");
+  EXPECT_TRUE(fs::exists(elsewhere / "mjcf/assets/torus.msh"));
 }
 
 }  // namespace

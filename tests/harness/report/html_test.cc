@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <concepts>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 
@@ -39,6 +40,15 @@ TEST(Html, LeavesNumbersAndMarkupAsTheyAre) {
   html += Html::Raw("<br>");
   html += "</p>";
   EXPECT_EQ(html.markup(), "<p><br></p>");
+}
+
+TEST(Html, DataCannotEndItsElement) {
+  const std::string text = "</script><!--\xff";
+  const std::string element = EmbedJson("data", {{"name", text}}).markup();
+  EXPECT_EQ(element.find('<', 1), element.rfind("</script>"));
+  const size_t begin = element.find('>') + 1;
+  EXPECT_EQ(nlohmann::json::parse(element.substr(begin, element.rfind("</script>") - begin)).at("name"),
+            "</script><!--\uFFFD");
 }
 
 TEST(Html, SharesOfABoundAreNoPowersOfTen) {

@@ -9,7 +9,6 @@
 #include <random>
 
 #include "controller/common/errors.h"
-#include "harness/study/quadratic_model.h"
 #include "harness/study/search_history.h"
 #include "harness/study/study_answer.h"
 #include "tests/common/throws.h"
@@ -113,70 +112,20 @@ TEST(Search, ATenthOfAGridsTrialsIsEnough) {
     const Function& function = functions[i];
     double grid = 1e300;
     for (int j = 0; j < 400; ++j) grid = std::min(grid, function({j % 20 / 19.0, j / 20 / 19.0})[0]);
-    for (const SearchMethod method :
-         {SearchMethod::kCmaEs, SearchMethod::kNelderMead, SearchMethod::kBobyqa}) {
-      for (const long population :
-           method == SearchMethod::kCmaEs ? std::vector{5L, 8L, 16L} : std::vector{1L}) {
-        long found = 0;
-        for (long seed = 1; seed <= seeds; ++seed) {
-          Search search = MakeSearch(method, 40);
-          search.seed = static_cast<std::uint64_t>(seed);
-          search.starts = method == SearchMethod::kNelderMead ? 2 : 1;
-          search.population = population;
-          std::vector<JudgedPoint> points = RunSearch(search, {0.5, 0.5}, function);
-          points.resize(std::min(points.size(), size_t{40}));
-          EXPECT_GT(points.front().judgement.objectives[0], 1.05 * grid) << "it did not begin there";
-          if (FindBest(points)->judgement.objectives[0] < 1.05 * grid) ++found;
-        }
-        EXPECT_EQ(found, seeds) << "function " << i << ", method " << static_cast<int>(method)
-                                << ", population " << population;
+    for (const SearchMethod method : {SearchMethod::kNelderMead, SearchMethod::kBobyqa}) {
+      long found = 0;
+      for (long seed = 1; seed <= seeds; ++seed) {
+        Search search = MakeSearch(method, 40);
+        search.seed = static_cast<std::uint64_t>(seed);
+        search.starts = method == SearchMethod::kNelderMead ? 2 : 1;
+        const std::vector<JudgedPoint> points = RunSearch(search, {0.5, 0.5}, function);
+        ASSERT_LE(points.size(), 40U);
+        EXPECT_GT(points.front().judgement.objectives[0], 1.05 * grid) << "it did not begin there";
+        if (FindBest(points)->judgement.objectives[0] < 1.05 * grid) ++found;
       }
+      EXPECT_EQ(found, seeds) << "function " << i << ", method " << static_cast<int>(method);
     }
   }
-}
-
-TriedPoint MakeTried(const UnitPoint& point, double value, double violation = 0.0) {
-  return {point, {{value}, violation}};
-}
-
-// A quadratic is found again, turned and inside or falling towards a corner; of too few points there is none.
-TEST(QuadraticModel, IsLeastWhereTheFunctionIs) {
-  constexpr double kRounding = 1e-6;  // of a ridge of 1e-10
-  const auto bowl = [](const UnitPoint& x) {
-    const double a = x[0] - 0.4;
-    const double b = x[1] - 0.7;
-    return 3.0 + a * a + a * b + 2.0 * b * b;
-  };
-  const auto slope = [](const UnitPoint& x) { return x[0] - 2.0 * x[1]; };
-  std::vector<TriedPoint> on_bowl, on_slope;
-  for (const UnitPoint& point : MakeSobol(2, 12)) {
-    const UnitPoint x = {0.1 + 0.85 * point[0], 0.1 + 0.85 * point[1]};
-    on_bowl.push_back(MakeTried(x, bowl(x)));
-    on_slope.push_back(MakeTried(x, slope(x)));
-  }
-  const auto least = FindModelMinimum(on_bowl);
-  ASSERT_TRUE(least.has_value());
-  EXPECT_NEAR((*least)[0], 0.4, kRounding);
-  EXPECT_NEAR((*least)[1], 0.7, kRounding);
-  EXPECT_EQ(FindModelMinimum(on_slope), (UnitPoint{0.0, 1.0})) << "the box reaches the cube's corner";
-  on_bowl.push_back(MakeTried(*least, bowl(*least)));
-  EXPECT_EQ(FindModelMinimum(on_bowl), std::nullopt) << "it was tried";
-  on_slope.resize(3);
-  EXPECT_EQ(FindModelMinimum(on_slope), std::nullopt) << "three coefficients of three points";
-  EXPECT_EQ(FindModelMinimum({}), std::nullopt);
-}
-
-// What is forbidden lies higher than all that is not, whatever its objective says.
-TEST(QuadraticModel, LeavesWhatIsForbidden) {
-  std::vector<TriedPoint> tried;
-  for (const UnitPoint& x : MakeSobol(2, 12)) tried.push_back(MakeTried(x, -x[0], std::max(x[0] - 0.5, 0.0)));
-  const auto least = FindModelMinimum(tried);
-  ASSERT_TRUE(least.has_value());
-  EXPECT_LT((*least)[0], 0.75);
-  EXPECT_GT((*least)[0], 0.25);
-  // All of them forbidden: less violation leads back.
-  for (TriedPoint& point : tried) point.judgement.violation = 0.1 + point.point[0];
-  EXPECT_LT(FindModelMinimum(tried).value()[0], 0.1);
 }
 
 TEST(Search, Nsga2ApproachesTheFront) {
@@ -226,66 +175,6 @@ TEST(Search, LeavesWhatIsForbidden) {
     searcher->Tell(judgements);
   }
   EXPECT_LT(best, -0.28);
-}
-
-// Rounds of 27, 9, 3 and 1 points; what is best in each goes on, and only the last can be the best.
-TEST(Search, HalvingGoesOnWithTheBest) {
-  const Study study = ParseStudy(R"(name = "s"
-scenario = "hold"
-[[objective]]
-minimize = "energy"
-[search]
-method = "halving"
-count = 27
-durations = [0.5, 1, 2, 4]
-[[vary]]
-key = "a"
-from = 0
-to = 1
-[[vary]]
-key = "b"
-from = 0
-to = 1
-)",
-                                 "study.toml");
-  EXPECT_EQ(CountTrials(study), 27 + 9 + 3 + 1);
-  SearchHistory history(study, {0.5, 0.5});
-  std::vector<TrialRow> rows;
-  std::vector<std::string> last;
-  while (!history.is_over()) {
-    for (const Trial& trial : history.ListMissing()) {
-      TrialRow row;
-      row.trial = trial;
-      row.result.metrics.fill(0.0);
-      // Short trials are a little better, and so never the answer.
-      const double round = trial.number < 27 ? 0 : trial.number < 36 ? 1 : trial.number < 39 ? 2 : 3;
-      row.result.metrics[kEnergy] =
-          std::hypot(trial.parameters[0] - 0.2, trial.parameters[1] - 0.7) + 0.1 * round;
-      last = ListOverrides(study, trial);
-      const std::string duration = round == 0 ? "0.5" : round == 1 ? "1" : round == 2 ? "2" : "4";
-      EXPECT_EQ(last.back(), "duration=" + duration) << trial.number;
-      rows.push_back(row);
-      history.Add(row);
-    }
-  }
-  ASSERT_EQ(rows.size(), 40U);
-  double nearest = 1e9;
-  size_t which = 0;
-  for (size_t i = 0; i < 27; ++i) {
-    if (rows[i].result.metrics[kEnergy] >= nearest) continue;
-    nearest = rows[i].result.metrics[kEnergy];
-    which = i;
-  }
-  EXPECT_EQ(rows[39].trial.parameters, rows[which].trial.parameters);
-  ASSERT_NE(FindBest(history.points()), nullptr);
-  EXPECT_EQ(FindBest(history.points())->number, 39);
-  EXPECT_EQ(SummarisePoints(study, rows).best->number, 39);
-  const std::vector<std::string> answers = AnswerStudy(study, rows);
-  ASSERT_EQ(answers.size(), 2U);
-  EXPECT_EQ(
-      answers[0],
-      "Of 27 points that were begun, others were better than 18 after 0.5 s, 6 after 1 s, 2 after 2 s: these "
-      "were stopped, and are kept.");
 }
 
 const std::string kStudy = R"(name = "s"
