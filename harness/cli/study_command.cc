@@ -165,10 +165,14 @@ int RunStudy(const StudyRequest& request) {
   const std::vector<long> missing =
       study.is_search() ? MakeSearch(inputs, request, &store) : MakeTrials(inputs, trials, request, &store);
   if (!missing.empty()) {
-    throw Error(fmt::format(
-        "{}: {} of {} trials are missing ({}): {}; the same command goes on with them", request.database,
-        missing.size(), study.is_search() ? CountTrials(study) : static_cast<long>(trials.size()),
-        IsInterrupted() ? "interrupted" : "another process has them", ListNumbers(missing)));
+    const char* const why = IsInterrupted() ? "interrupted" : "another process has them";
+    if (study.is_search()) {
+      throw Error(fmt::format("{}: {} of at most {} trials are done ({}); the same command goes on",
+                              request.database, StudyStore::Open(request.database).ListNumbers().size(),
+                              CountTrials(study), why));
+    }
+    throw Error(fmt::format("{}: {} of {} trials are missing ({}): {}; the same command goes on with them",
+                            request.database, missing.size(), trials.size(), why, ListNumbers(missing)));
   }
   if (request.quiet) return kSuccess;
   const StudyStore made = StudyStore::Open(request.database);

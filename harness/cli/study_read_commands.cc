@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include "controller/common/errors.h"
@@ -39,15 +41,18 @@ int ShowTrial(const std::string& database, long number) {
   const TrialRow& row = *found;
   fmt::print("trial {}, seed {}: {}{}{}\n", row.trial.number, row.trial.seed, NameOf(row.result.outcome),
              row.result.failure.empty() ? "" : ": ", row.result.failure);
+  size_t width = 0;
+  for (const Variation& variation : study.variations) width = std::max(width, variation.key.size());
+  for (const MetricInfo& metric : kMetrics) width = std::max(width, std::string_view(metric.name).size());
   for (size_t i = 0; i < study.variations.size(); ++i) {
-    fmt::print("  {:<24}{}\n", study.variations[i].key,
+    fmt::print("  {:<{}}  {}\n", study.variations[i].key, width,
                FormatValue(study.variations[i], row.trial.parameters[i]));
   }
   for (size_t i = 0; i < kMetrics.size(); ++i) {
     const double value = row.result.metrics[i];
     const std::string unit = kMetrics[i].unit;
     if (std::isfinite(value))
-      fmt::print("  {:<24}{:.6g}{}\n", kMetrics[i].name, value, unit == "1" ? "" : " " + unit);
+      fmt::print("  {:<{}}  {:.6g}{}\n", kMetrics[i].name, width, value, unit == "1" ? "" : " " + unit);
   }
   fmt::print("{}\n", MakeReplayCommand(study, row.trial));
   return kSuccess;

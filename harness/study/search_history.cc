@@ -18,6 +18,10 @@ SearchHistory::SearchHistory(const Study& study, const UnitPoint& start)
 
 long SearchHistory::first_of_batch() const { return static_cast<long>(points_.size()) * per_point_; }
 
+long SearchHistory::CountDone() const {
+  return first_of_batch() + size_of_batch() - static_cast<long>(ListMissing().size());
+}
+
 void SearchHistory::AskNext() {
   batch_.clear();
   for (const UnitPoint& point : searcher_->Ask()) {
@@ -142,13 +146,15 @@ PointSummary SummarisePoints(const Study& study, const std::vector<TrialRow>& ro
   return summary;
 }
 
-const JudgedPoint* FindBest(const std::vector<JudgedPoint>& points) {
-  const JudgedPoint* best = nullptr;
+std::vector<const JudgedPoint*> SortFeasible(const std::vector<JudgedPoint>& points) {
+  std::vector<const JudgedPoint*> sorted;
   for (const JudgedPoint& point : points) {
-    if (point.judgement.is_feasible() && (best == nullptr || IsBetter(point.judgement, best->judgement)))
-      best = &point;
+    if (point.judgement.is_feasible()) sorted.push_back(&point);
   }
-  return best;
+  std::stable_sort(sorted.begin(), sorted.end(), [](const JudgedPoint* a, const JudgedPoint* b) {
+    return IsBetter(a->judgement, b->judgement);
+  });
+  return sorted;
 }
 
 std::vector<const JudgedPoint*> FindFront(const std::vector<JudgedPoint>& points) {

@@ -35,6 +35,8 @@ class SearchHistory {
   [[nodiscard]] bool is_over() const { return batch_.empty(); }
   /// Number of the first trial of the batch at hand.
   [[nodiscard]] long first_of_batch() const;
+  /// Trials that are made: of whole batches, and those of the batch at hand.
+  [[nodiscard]] long CountDone() const;
   /// How many trials the batch at hand has, with those that are made.
   [[nodiscard]] long size_of_batch() const { return static_cast<long>(batch_.size()) * per_point_; }
   /// In the order of their numbers.
@@ -65,15 +67,14 @@ std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<Trial
 struct PointSummary {
   size_t count = 0;
   std::optional<JudgedPoint> first;
-  std::optional<JudgedPoint> best;  ///< As FindBest.
+  std::optional<JudgedPoint> best;  ///< As SortFeasible.
 };
 PointSummary SummarisePoints(const Study& study, const std::vector<TrialRow>& rows);
 
-/// The best of one objective: feasible, tried for the whole duration, and the first of equals; null when
-/// there is none.
-const JudgedPoint* FindBest(const std::vector<JudgedPoint>& points);
+/// The feasible points of one objective, the best first; equals as they were.
+std::vector<const JudgedPoint*> SortFeasible(const std::vector<JudgedPoint>& points);
 
-/// Feasible points of the whole duration that none dominates, by the first objective.
+/// Feasible points that none dominates, by the first objective.
 std::vector<const JudgedPoint*> FindFront(const std::vector<JudgedPoint>& points);
 
 }  // namespace dexcheck

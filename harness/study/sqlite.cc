@@ -116,6 +116,13 @@ std::string Statement::GetText(int column) const {
   return {reinterpret_cast<const char*>(text), static_cast<size_t>(sqlite3_column_bytes(handle_, column))};
 }
 
+bool Statement::IsNumber(int column) const {
+  const int type = sqlite3_column_type(handle_, column);
+  return type == SQLITE_INTEGER || type == SQLITE_FLOAT;
+}
+
+bool Statement::IsNull(int column) const { return sqlite3_column_type(handle_, column) == SQLITE_NULL; }
+
 Transaction::~Transaction() {
   if (open_) sqlite3_exec(database_->handle(), "ROLLBACK", nullptr, nullptr, nullptr);
 }

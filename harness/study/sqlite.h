@@ -59,6 +59,9 @@ class Statement {
   /// NaN for NULL.
   [[nodiscard]] double GetNumber(int column) const;
   [[nodiscard]] std::string GetText(int column) const;
+  /// Whether a column holds a number; SQLite gives 0 for a text.
+  [[nodiscard]] bool IsNumber(int column) const;
+  [[nodiscard]] bool IsNull(int column) const;
 
  private:
   Database* database_;

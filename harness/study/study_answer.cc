@@ -118,13 +118,12 @@ std::string ShowSpread(std::vector<double> values) {
 /// Of a study that compares what has no order, laws for example, each in several trials: what came of each.
 std::vector<std::string> DescribeSpreads(const Study& study, const std::vector<TrialRow>& rows) {
   std::vector<std::string> answers;
-  if (study.is_search() || study.variations.size() != 1 || CountTrialsOfPoint(study) < 2) return answers;
-  const std::vector<double>& values = study.variations.front().values;
+  if (study.is_search() || study.num_keys() != 1 || CountTrialsOfPoint(study) < 2) return answers;
   for (size_t i = 0; i < study.variations.front().labels.size(); ++i) {
     long all = 0, held = 0;
     std::array<std::vector<double>, kNumMetrics> metrics;
     for (const TrialRow& row : rows) {
-      if (row.trial.parameters.front() != values[i]) continue;
+      if (row.trial.parameters.front() != static_cast<double>(i)) continue;
       ++all;
       if (!IsHeld(row.result.outcome)) continue;
       ++held;
@@ -132,8 +131,8 @@ std::vector<std::string> DescribeSpreads(const Study& study, const std::vector<T
         if (std::isfinite(row.result.metrics[k])) metrics[k].push_back(row.result.metrics[k]);
       }
     }
-    std::string text =
-        fmt::format("{}: held in {} of {} trials", DescribeValues(study, {values[i]}), held, all);
+    std::string text = fmt::format("{}: held in {} of {} trials",
+                                   DescribeValues(study, {static_cast<double>(i)}), held, all);
     for (const std::string& name : study.metrics) {
       for (size_t k = 0; k < metrics.size(); ++k) {
         if (kMetrics[k].name == name && !metrics[k].empty())

@@ -7,10 +7,12 @@
 namespace dexcheck {
 namespace {
 
-/// In quotes where a comma, a quote or a line's end needs them.
+/// A text in quotes where a comma, a quote or a line's end needs them. One that a spreadsheet would take for
+/// a formula gets an apostrophe, which makes it a text there.
 std::string QuoteField(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string quoted = "\"";
+  const bool is_formula = text.find_first_of("=+-@\t\r") == 0;
+  if (!is_formula && text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = is_formula ? "\"'" : "\"";
   for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
   return quoted + "\"";
 }
@@ -29,7 +31,8 @@ void WriteStudyCsv(const StudyStore& store, const std::function<void(std::string
   store.ForEachRow([&](const TrialRow& row) {
     line = std::to_string(row.trial.number) + "," + std::to_string(row.trial.seed);
     for (size_t i = 0; i < study.variations.size(); ++i) {
-      line += "," + QuoteField(FormatValue(study.variations[i], row.trial.parameters[i]));
+      const std::string value = FormatValue(study.variations[i], row.trial.parameters[i]);
+      line += "," + (study.variations[i].labels.empty() ? value : QuoteField(value));
     }
     line += std::string(",") + NameOf(row.result.outcome) + "," + QuoteField(row.result.failure);
     for (const double metric : row.result.metrics) line += "," + FormatField(metric);

@@ -34,7 +34,7 @@ Axis AxisOf(const Variation& variation) {
 }
 
 bool IsGrid(const Study& study) {
-  return study.sample.method == SamplingMethod::kGrid && !study.is_search() && study.variations.size() >= 2;
+  return study.sample.method == SamplingMethod::kGrid && !study.is_search() && study.num_keys() >= 2;
 }
 
 /// A map over the first two keys of a grid.
@@ -139,7 +139,7 @@ Chart MakeChart(const std::string& title, const std::string& x, const std::strin
 
 /// A few values of the second key, the ends among them; one that means nothing when there is no second key.
 std::vector<double> ChooseLines(const Study& study) {
-  if (study.variations.size() < 2) return {0.0};
+  if (study.num_keys() < 2) return {0.0};
   const std::vector<double>& all = study.variations[1].values;
   const size_t count = std::min(all.size(), kMostLines);
   std::vector<double> chosen;
@@ -159,20 +159,30 @@ void Thin(std::vector<Point>* points) {
   *points = std::move(fewer);
 }
 
+/// The median of each group of points with one x: of the trials of one point. @param points sorted.
+std::vector<std::pair<double, double>> FindMedians(const std::vector<std::pair<double, double>>& points) {
+  std::vector<std::pair<double, double>> medians;
+  for (auto from = points.begin(); from != points.end();) {
+    const auto to =
+        std::find_if(from, points.end(), [&](const auto& point) { return point.first != from->first; });
+    const auto count = to - from;
+    medians.emplace_back(from->first, 0.5 * (from[(count - 1) / 2].second + from[count / 2].second));
+    from = to;
+  }
+  return medians;
+}
+
 /// A bar from the least to the largest of each group of points with one x, and a dash at its median.
 void AddSpreads(const std::vector<std::pair<double, double>>& points, const std::string& color,
                 std::vector<ChartLine>* lines) {
   constexpr double kHalfDash = 0.12;  // of the distance between two texts
-  for (auto from = points.begin(); from != points.end();) {
-    const double x = from->first;
-    const auto to = std::find_if(from, points.end(), [&](const auto& point) { return point.first != x; });
-    const auto count = to - from;
-    const double median = 0.5 * (from[(count - 1) / 2].second + from[count / 2].second);
-    if (count > 1) {
-      lines->push_back({"", color, {*from, *(to - 1)}});
-      lines->push_back({"", color, {{x - kHalfDash, median}, {x + kHalfDash, median}}});
-    }
-    from = to;
+  for (const auto& [x, median] : FindMedians(points)) {
+    const auto is_of_x = [x = x](const auto& point) { return point.first == x; };
+    const auto from = std::find_if(points.begin(), points.end(), is_of_x);
+    const auto last = std::find_if(points.rbegin(), points.rend(), is_of_x);
+    if (&*from == &*last) continue;
+    lines->push_back({"", color, {*from, *last}});
+    lines->push_back({"", color, {{x - kHalfDash, median}, {x + kHalfDash, median}}});
   }
 }
 
@@ -250,7 +260,7 @@ std::string Describe(const Study& study, const TrialRow& row) {
 
 Html DrawOutcomes(const StudyResults& results) {
   const Study& study = results.study;
-  if (study.variations.size() < 2) return {};
+  if (study.num_keys() < 2) return {};
   if (IsGrid(study)) return Grid(results).DrawOutcomes();
   // Samples: where they lie.
   Chart chart = MakeChart("outcome", study.variations[0].key, study.variations[1].key);
@@ -271,7 +281,7 @@ Html DrawMetrics(const StudyResults& results) {
 Html DrawLines(const StudyResults& results) {
   const Study& study = results.study;
   if ((study.sample.method != SamplingMethod::kGrid || study.is_search())) return {};
-  const bool has_second = study.variations.size() > 1;
+  const bool has_second = study.num_keys() > 1;
   const std::vector<double> chosen = ChooseLines(study);
   Html figures;
   for (const Metric metric : results.metrics) {
@@ -297,12 +307,14 @@ Html DrawLines(const StudyResults& results) {
                                 Describe(study, row), LinkTo(row)});
       }
       std::sort(line.points.begin(), line.points.end());
-      Thin(&line.points);
       if (line.points.empty()) continue;
       // Between texts there is no line.
       if (!chart.x.labels.empty()) {
         if (!has_second) AddSpreads(line.points, line.color, &chart.lines);
         line.points.clear();
+      } else {
+        line.points = FindMedians(line.points);
+        Thin(&line.points);
       }
       chart.lines.push_back(line);
     }

@@ -33,7 +33,11 @@ std::string WithoutTime(const std::string& failure) {
 class Report {
  public:
   explicit Report(const StudyStore& store)
-      : store_(store), results_(store), tracked_(results_.ListTracked()) {}
+      : store_(store), results_(store), tracked_(results_.ListTracked()), admitted_(tracked_) {
+    std::erase_if(admitted_, [&](const TrialRow* row) {
+      return !JudgePoint({}, results_.study.constraints, {&row->result, 1}).is_feasible();
+    });
+  }
 
   std::string Make(double renew) {
     Html html = BeginPage(results_.study.name + " – study", Html::Raw(kStudyCss), renew);
@@ -83,11 +87,11 @@ class Report {
                              ShowUnit(objective.expression),
                          FormatHtml("{} {}", objective.maximize ? "largest" : "least", Describe(objective)));
       }
-    } else if (!tracked_.empty()) {
-      html += MakeTile(FormatShort(tracked_.front()->result.metrics[results_.error]) +
+    } else if (study.objectives.empty() && !admitted_.empty()) {
+      html += MakeTile(FormatShort(admitted_.front()->result.metrics[results_.error]) +
                            (results_.of_joints() ? " rad" : " m"),
                        FormatHtml("least rms {} error, <a href=\"{}\">trial {}</a>", NameOfError(),
-                                  LinkTo(*tracked_.front()), tracked_.front()->trial.number));
+                                  LinkTo(*admitted_.front()), admitted_.front()->trial.number));
     }
     html += "</div>\n</header>\n";
     return html;
@@ -233,40 +237,97 @@ class Report {
   }
 
   [[nodiscard]] Html Best() const {
-    if (tracked_.empty()) return {};
-    Html html = FormatHtml(
-        "<h2 id=\"best\">Best</h2>\n<p class=\"soft\">By rms {} error, of the trials that "
-        "tracked.</p>\n<div class=\"card scroll\"><table>\n<tr><th class=\"value\">trial</th>",
-        NameOfError());
-    const auto add_head = [&](const std::string& text) {
-      html += FormatHtml("<th class=\"value\">{}</th>", text);
-    };
-    for (const Variation& variation : results_.study.variations) add_head(variation.key);
-    std::vector<Metric> shown = {results_.error, kEnergy};
-    for (const Metric metric : results_.metrics) {
-      if (std::find(shown.begin(), shown.end(), metric) == shown.end()) shown.push_back(metric);
-    }
-    for (const Metric metric : shown) add_head(LabelOf(metric));
+    const Study& study = results_.study;
+    BestTable table;
+    for (const Variation& variation : study.keys()) table.heads.push_back(variation.key);
+    const std::string order = study.objectives.empty() ? FillByError(&table) : FillByObjectives(&table);
+    if (order.empty()) return {};
+    Html html = FormatHtml("<h2 id=\"best\">Best</h2>\n<p class=\"soft\">{}</p>\n", order);
+    if (table.rows.empty()) return html;
+    html += Html("<div class=\"card scroll\"><table>\n<tr><th class=\"value\">trial</th>");
+    for (const std::string& head : table.heads) html += FormatHtml("<th class=\"value\">{}</th>", head);
     html += "</tr>\n";
-    for (size_t i = 0; i < std::min(tracked_.size(), kMostBest); ++i) {
-      const TrialRow& row = *tracked_[i];
-      html += FormatHtml("<tr><td class=\"value\"><a href=\"{}\">{}</a></td>", LinkTo(row), row.trial.number);
-      const auto add = [&](const std::string& text) {
-        html += FormatHtml("<td class=\"value number\">{}</td>", text);
-      };
-      for (size_t k = 0; k < row.trial.parameters.size(); ++k) {
-        const Variation& variation = results_.study.variations[k];
-        const double value = row.trial.parameters[k];
-        add(variation.labels.empty() ? fmt::format("{:.6g}", value) : FormatValue(variation, value));
-      }
-      for (const Metric metric : shown) {
-        const double value = row.result.metrics[metric];
-        add(std::isfinite(value) ? fmt::format("{:.4g}", value) : "–");
-      }
+    for (const auto& [row, cells] : table.rows) {
+      html +=
+          FormatHtml("<tr><td class=\"value\"><a href=\"{}\">{}</a></td>", LinkTo(*row), row->trial.number);
+      for (const std::string& cell : cells) html += FormatHtml("<td class=\"value number\">{}</td>", cell);
       html += "</tr>\n";
     }
     html += "</table></div>\n";
     return html;
+  }
+
+  struct BestTable {
+    std::vector<std::string> heads;
+    std::vector<std::pair<const TrialRow*, std::vector<std::string>>> rows;  ///< A cell for each head.
+  };
+
+  /// A cell for each of these values of the first keys.
+  [[nodiscard]] std::vector<std::string> ShowKeys(const std::vector<double>& values) const {
+    std::vector<std::string> cells;
+    for (size_t i = 0; i < values.size(); ++i) {
+      const Variation& variation = results_.study.variations[i];
+      cells.push_back(variation.labels.empty() ? fmt::format("{:.6g}", values[i])
+                                               : FormatValue(variation, values[i]));
+    }
+    return cells;
+  }
+
+  /// Of a study that says what it wants: points that fulfil the constraints, by the objective; of several
+  /// objectives those that no other point beats in all. @return what the order is.
+  std::string FillByObjectives(BestTable* table) const {
+    const Study& study = results_.study;
+    const std::vector<JudgedPoint> points = JudgePoints(study, results_.rows);
+    const std::vector<const JudgedPoint*> best =
+        study.objectives.size() == 1 ? SortFeasible(points) : FindFront(points);
+    if (points.empty()) return "";
+    if (best.empty()) return fmt::format("At none of {} points all constraints hold.", points.size());
+    for (const Objective& objective : study.objectives)
+      table->heads.push_back(Describe(objective) + ShowUnit(objective.expression));
+    for (size_t i = 0; i < std::min(best.size(), kMostBest); ++i) {
+      const JudgedPoint& point = *best[i];
+      std::vector<std::string> cells = ShowKeys(point.values);
+      for (size_t k = 0; k < study.objectives.size(); ++k) {
+        const double value = ShowObjective(study.objectives[k], point.judgement.objectives[k]);
+        cells.push_back(std::isfinite(value) ? fmt::format("{:.4g}", value) : "–");
+      }
+      const auto first = std::lower_bound(
+          results_.rows.begin(), results_.rows.end(), point.number * CountTrialsOfPoint(study),
+          [](const TrialRow& row, long number) { return row.trial.number < number; });
+      table->rows.emplace_back(&*first, std::move(cells));
+    }
+    return (study.objectives.size() == 1
+                ? fmt::format("By {} {}", study.objectives.front().maximize ? "the largest" : "the least",
+                              Describe(study.objectives.front()))
+                : std::string("Points that no other one beats in everything")) +
+           fmt::format(", of {} points", points.size()) +
+           (study.constraints.empty() ? "." : ", those at which all constraints hold.") +
+           (CountTrialsOfPoint(study) > 1 ? " A point's trials begin with the one that is named." : "");
+  }
+
+  /// Of any other: trials by their error. @return what the order is.
+  std::string FillByError(BestTable* table) const {
+    if (tracked_.empty()) return "";
+    for (size_t i = results_.study.num_keys(); i < results_.study.variations.size(); ++i)
+      table->heads.push_back(results_.study.variations[i].key);
+    std::vector<Metric> shown = {results_.error, kEnergy};
+    for (const Metric metric : results_.metrics) {
+      if (std::find(shown.begin(), shown.end(), metric) == shown.end()) shown.push_back(metric);
+    }
+    for (const Metric metric : shown) table->heads.push_back(LabelOf(metric));
+    for (size_t i = 0; i < std::min(admitted_.size(), kMostBest); ++i) {
+      const TrialRow& row = *admitted_[i];
+      std::vector<std::string> cells = ShowKeys(row.trial.parameters);
+      for (const Metric metric : shown) {
+        const double value = row.result.metrics[metric];
+        cells.push_back(std::isfinite(value) ? fmt::format("{:.4g}", value) : "–");
+      }
+      table->rows.emplace_back(&row, std::move(cells));
+    }
+    if (admitted_.empty())
+      return fmt::format("In none of the {} trials that tracked all constraints hold.", tracked_.size());
+    return fmt::format("By rms {} error, of the trials that tracked{}.", NameOfError(),
+                       results_.study.constraints.empty() ? "" : " and fulfil the constraints");
   }
 
   [[nodiscard]] Html Trials() const {
@@ -312,6 +373,7 @@ class Report {
   const StudyStore& store_;
   StudyResults results_;
   std::vector<const TrialRow*> tracked_;
+  std::vector<const TrialRow*> admitted_;  // of these, those that fulfil the constraints
 };
 
 }  // namespace

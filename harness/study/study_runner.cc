@@ -162,10 +162,10 @@ void RunSearch(const StudyInputs& inputs, const RunOptions& options, StudyStore*
   while (!history.is_over() && !options.is_interrupted()) {
     const std::vector<Trial> missing = history.ListMissing();
     long made = 0;
-    const long before = history.first_of_batch();
     maker.Run(missing, [&](const TrialRow& row) {
       history.Add(row);
-      options.tell(before + ++made);
+      ++made;
+      options.tell(history.CountDone());
     });
     read();
     if (made == 0 && !history.is_over()) std::this_thread::sleep_for(kPatience);
@@ -181,15 +181,13 @@ void RunSearchPart(const StudyInputs& inputs, const RunOptions& options, const S
   SearchHistory history(inputs.study, FindSearchStart(inputs));
   for (const TrialRow& row : store->ReadRows()) history.Add(row);
   TrialMaker maker(inputs, options, store);
-  long made = 0;
   const auto make = [&](const std::vector<Trial>& trials) {
     maker.Run(trials, [&](const TrialRow& row) {
       history.Add(row);
-      options.tell(history.first_of_batch() + ++made);
+      options.tell(history.CountDone());
     });
   };
   while (!history.is_over() && !options.is_interrupted()) {
-    made = 0;
     const long first = history.first_of_batch();
     const long end = first + history.size_of_batch();
     const auto begun = Clock::now();

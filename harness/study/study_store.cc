@@ -1,6 +1,9 @@
 #include "harness/study/study_store.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <set>
 #include <unordered_map>
@@ -263,16 +266,29 @@ TrialRow StudyStore::ReadRow(const Statement& select, bool with_machine) const {
   row.trial.number = static_cast<long>(select.GetWhole(column++));
   row.trial.seed = static_cast<std::uint64_t>(select.GetWhole(column++));
   row.trial.parameters.reserve(study_.variations.size());
-  for (size_t i = 0; i < study_.variations.size(); ++i)
-    row.trial.parameters.push_back(select.GetNumber(column++));
-  const std::string outcome = select.GetText(column++);
-  if (!FindOutcome(outcome)) {
-    throw InputError(database_->name() + ": trial " + std::to_string(row.trial.number) +
-                     ": outcome: unknown, got " + Quote(outcome));
+  const auto reject = [&](const std::string& key, const std::string& why) {
+    throw InputError(database_->name() + ": trial " + std::to_string(row.trial.number) + ": " + key + ": " +
+                     why + ", got " + Quote(select.GetText(column)));
+  };
+  for (const Variation& variation : study_.variations) {
+    const double value = select.GetNumber(column);
+    if (!select.IsNumber(column)) reject(variation.key, "must be a number");
+    // Of a key of texts the number of one of them.
+    const auto count = static_cast<double>(variation.labels.size());
+    if (count > 0.0 && !(value >= 0.0 && value < count && value == std::floor(value)))
+      reject(variation.key, fmt::format("must be a whole number from 0 to {}", count - 1.0));
+    row.trial.parameters.push_back(value);
+    ++column;
   }
+  const std::string outcome = select.GetText(column);
+  if (!FindOutcome(outcome)) reject("outcome", "unknown");
+  ++column;
   row.result.outcome = *FindOutcome(outcome);
   row.result.failure = select.GetText(column++);
-  for (double& metric : row.result.metrics) metric = select.GetNumber(column++);
+  for (size_t i = 0; i < kMetrics.size(); ++i, ++column) {
+    if (!select.IsNumber(column) && !select.IsNull(column)) reject(kMetrics[i].name, "must be a number");
+    row.result.metrics[i] = select.GetNumber(column);
+  }
   if (with_machine) row.machine = select.GetText(column);
   return row;
 }

@@ -498,6 +498,7 @@
     return best;
   };
   for (const id of ['scatter', 'contour']) {
+    if (!byId(id)) continue;  // a study of one key
     byId(id).onclick = event => { const row = Nearest(id, event); if (row >= 0) Choose(row); };
   }
   let begun = null;

@@ -44,8 +44,8 @@ TEST(Search, FindsTheMinimum) {
     Search search = MakeSearch(method, count);
     search.tolerance = 1e-5;
     const auto points = RunSearch(search, start, Ellipsoid);
-    ASSERT_NE(FindBest(points), nullptr);
-    EXPECT_LT(FindBest(points)->judgement.objectives[0], kFound)
+    ASSERT_FALSE(SortFeasible(points).empty());
+    EXPECT_LT(SortFeasible(points).front()->judgement.objectives[0], kFound)
         << static_cast<int>(method) << ": " << points.size();
     EXPECT_EQ(points.front().values, start);
   }
@@ -66,10 +66,11 @@ TEST(Search, SeveralStartsFindTheBetterValley) {
     return std::vector<double>{std::min(near + 0.3, far)};
   };
   Search search = MakeSearch(SearchMethod::kNelderMead, 100);
-  EXPECT_NEAR(FindBest(RunSearch(search, {0.3, 0.2}, valleys))->judgement.objectives[0], 0.3, 0.01);
+  EXPECT_NEAR(SortFeasible(RunSearch(search, {0.3, 0.2}, valleys)).front()->judgement.objectives[0], 0.3,
+              0.01);
   search.count = 400;
   search.starts = 4;
-  EXPECT_LT(FindBest(RunSearch(search, {0.3, 0.2}, valleys))->judgement.objectives[0], 0.01);
+  EXPECT_LT(SortFeasible(RunSearch(search, {0.3, 0.2}, valleys)).front()->judgement.objectives[0], 0.01);
 }
 
 // A minimum on the edge of the range, where a search that knows no bounds would leave it.
@@ -79,8 +80,9 @@ TEST(Search, FindsAMinimumOnTheEdge) {
   };
   for (const SearchMethod method : {SearchMethod::kCmaEs, SearchMethod::kNelderMead, SearchMethod::kBobyqa}) {
     const auto points = RunSearch(MakeSearch(method, 480), {0.7, 0.2}, slope);
-    EXPECT_LT(FindBest(points)->judgement.objectives[0], 1e-3) << static_cast<int>(method);
-    EXPECT_EQ(FindBest(points)->values[0], 0.0) << "on the edge itself: " << static_cast<int>(method);
+    EXPECT_LT(SortFeasible(points).front()->judgement.objectives[0], 1e-3) << static_cast<int>(method);
+    EXPECT_EQ(SortFeasible(points).front()->values[0], 0.0)
+        << "on the edge itself: " << static_cast<int>(method);
   }
 }
 
@@ -121,7 +123,7 @@ TEST(Search, ATenthOfAGridsTrialsIsEnough) {
         const std::vector<JudgedPoint> points = RunSearch(search, {0.5, 0.5}, function);
         ASSERT_LE(points.size(), 40U);
         EXPECT_GT(points.front().judgement.objectives[0], 1.05 * grid) << "it did not begin there";
-        if (FindBest(points)->judgement.objectives[0] < 1.05 * grid) ++found;
+        if (SortFeasible(points).front()->judgement.objectives[0] < 1.05 * grid) ++found;
       }
       EXPECT_EQ(found, seeds) << "function " << i << ", method " << static_cast<int>(method);
     }
@@ -237,7 +239,8 @@ TEST(SearchHistory, GoesOnFromItsRowsWhereverItWasStopped) {
   ASSERT_EQ(all.size(), 48U * 6U) << "six times 8 within 50 points, 3 draws and 2 seeds of each";
   EXPECT_EQ(static_cast<long>(all.size()), CountTrials(study));
   ASSERT_EQ(whole.points().size(), 48U);
-  EXPECT_LT(FindBest(whole.points())->judgement.objectives[0], whole.points()[0].judgement.objectives[0]);
+  EXPECT_LT(SortFeasible(whole.points()).front()->judgement.objectives[0],
+            whole.points()[0].judgement.objectives[0]);
   for (const size_t stop : {size_t{0}, size_t{1}, size_t{47}, size_t{48}, size_t{100}, all.size() - 1}) {
     std::vector<TrialRow> rows;
     {

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "controller/common/toml_reader.h"
 #include "harness/study/study_report.h"
@@ -100,6 +102,31 @@ TEST_F(StudyPageBrowserTest, ACellShowsTheCommandThatRepeatsItsTrial) {
   EXPECT_TRUE(browser_.Run("document.querySelector(':target .close').click();").is_null());
   EXPECT_TRUE(browser_.WaitFor("return document.querySelector(':target') === null;"));
   EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty());
+}
+
+// All that a page has works for a study of one key too, and nothing sticks out at any width.
+TEST_F(StudyPageBrowserTest, FitsEveryWidthWithoutAnError) {
+  const std::string head = "name = 'page'\nscenario = 'offset'\n[[vary]]\nkey = 'control.K_p'\n";
+  const std::string nested =
+      "[nested]\nmethod = 'random'\ncount = 3\nseed = 1\n[[nested.vary]]\nkey = "
+      "'plant.finger_friction'\nfrom = 0.5\nto = 1\n";
+  const std::vector<std::string> studies = {
+      head + "values = [100, 1000]\n", head + "values = [100, 1000]\n" + nested,
+      head +
+          "values = [100, 1000]\n[[vary]]\nkey = 'control.K_v'\nvalues = [20, 3000]\n[[vary]]\nkey = "
+          "'control.law'\nvalues = ['computed_torque', 'pd_gravity']\n[[objective]]\nminimize = 'energy'\n"};
+  for (const std::string& study : studies) {
+    std::filesystem::remove(folder_.path() / "page.sqlite");
+    WritePage(study, "page");
+    for (const int width : {360, 768, 1280}) {
+      Open(width, 900, width == 360);
+      EXPECT_TRUE(browser_.WaitFor("return document.getElementById('explore').dataset.ready === 'yes';"))
+          << study;
+      EXPECT_TRUE(browser_.Run("return document.documentElement.scrollWidth <= innerWidth;"))
+          << width << study;
+      EXPECT_THAT(browser_.TakeConsole(), ::testing::IsEmpty()) << study;
+    }
+  }
 }
 
 TEST_F(StudyPageBrowserTest, DrawsMeasuredAndTheoreticalBoundaries) {

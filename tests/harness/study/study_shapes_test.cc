@@ -1,0 +1,192 @@
+// Every shape of study has its page, its progress, its CSV; a database that was spoiled is refused in one
+// line.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/common/toml_reader.h"
+#include "harness/study/search_history.h"
+#include "harness/study/sqlite.h"
+#include "harness/study/study_csv.h"
+#include "harness/study/study_progress.h"
+#include "harness/study/study_report.h"
+#include "tests/common/files.h"
+#include "tests/common/paths.h"
+
+namespace dexcheck::study_shapes_test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+struct Shape {
+  std::string name;
+  std::string text;  ///< Of the study, behind its name and scenario.
+};
+
+std::string Vary(const std::string& key, const std::string& values) {
+  return "[[vary]]\nkey = '" + key + "'\n" + values + "\n";
+}
+
+const std::string kHeld = "constraints = ['held']\n";
+const std::string kRange = "from = 5\nto = 50";
+const std::string kOne = Vary("control.K_p", "values = [100, 1e3, 1e4]");
+const std::string kTwo = kOne + Vary("control.K_v", "values = [20, 200]");
+const std::string kText = Vary("control.law", "values = ['computed_torque', 'pd_gravity']");
+const std::string kRanges = Vary("control.K_p", kRange) + Vary("control.K_v", kRange);
+const std::string kNested =
+    "[nested]\nmethod = 'random'\ncount = 3\nseed = 1\n[[nested.vary]]\nkey = 'plant.finger_friction'\nfrom "
+    "= "
+    "0.5\nto = 1\n";
+const std::string kWish = "[[objective]]\nminimize = 'energy'\n";
+
+std::string Search(const std::string& method) {
+  return "[search]\nmethod = '" + method + "'\ncount = 40\nseed = 1\n";
+}
+
+std::string Sample(const std::string& method) {
+  return "[sample]\nmethod = '" + method + "'\ncount = 8\nseed = 1\n";
+}
+
+const std::vector<Shape> kShapes = {
+    {"OneKey", kOne},
+    {"TwoKeys", kTwo},
+    {"ThreeKeys", kTwo + Vary("plant.finger_friction", "values = [0.5, 1]")},
+    {"OneKeyNested", kOne + kNested},
+    {"TwoKeysNested", kTwo + kNested},
+    {"OneKeySeeds", "seeds = [1, 2, 3]\n" + kOne},
+    {"OneText", kText},
+    {"TextNested", kText + kNested},
+    {"TextAndNumber", kOne + kText},
+    {"Truths", Vary("plant.implicit_damping", "values = [true, false]")},
+    {"Lists", Vary("control.K_p", "values = [[1, 1, 1, 1, 1, 1], [2, 2, 2, 2, 2, 2]]")},
+    {"Count", Vary("control.K_p", kRange + "\ncount = 4")},
+    {"RangeThatDepends",
+     Sample("sobol") + Vary("control.K_p", kRange) + Vary("control.K_v", "from = 1\nto = 'control.K_p + 1'")},
+    {"Latin", Sample("latin_hypercube") + kRanges},
+    {"LatinOneKey", Sample("latin_hypercube") + Vary("control.K_p", kRange)},
+    {"LatinText", Sample("latin_hypercube") + kText},
+    {"LatinNested", Sample("latin_hypercube") + kRanges + kNested},
+    {"Sobol", Sample("sobol") + kRanges},
+    {"Random", kHeld + Sample("random") + kRanges},
+    {"Saltelli", Sample("saltelli") + kRanges},
+    {"Morris", Sample("morris") + kRanges},
+    {"CmaEs", Search("cma_es") + kWish + kRanges},
+    {"CmaEsNested", Search("cma_es") + kWish + kRanges + kNested},
+    {"NelderMead", Search("nelder_mead") + kWish + kRanges},
+    {"NelderMeadOneKey", Search("nelder_mead") + kWish + Vary("control.K_p", kRange)},
+    {"Bobyqa", Search("bobyqa") + kWish + kRanges},
+    {"Nsga2", Search("nsga2") + kWish + "[[objective]]\nminimize = 'position_error_rms'\n" + kRanges},
+    {"Margins", kHeld + "[search]\nmethod = 'margins'\nseed = 1\n" + kRanges},
+    {"GridWithWish", kWish + kTwo},
+    {"GridWithTwoWishes", kWish + "[[objective]]\nmaximize = 'cone_margin'\n" + kTwo},
+};
+
+TrialRow MakeRow(const Trial& trial) {
+  TrialRow row;
+  row.trial = trial;
+  row.result.metrics.fill(1.0 / static_cast<double>(trial.number + 1));
+  if (trial.number % 3 == 2) row.result.outcome = Outcome::kDiverged;
+  row.machine = "=cmd|calc";
+  return row;
+}
+
+class StudyShapes : public ::testing::TestWithParam<Shape> {
+ protected:
+  /// A study with all its trials; of a search with those of its first batches.
+  StudyStore Make(const std::string& text) {
+    StudyInputs inputs;
+    inputs.study = ParseStudy("name = 'shape'\nscenario = 'offset'\n" + text, "study.toml");
+    inputs.scenario_text = ReadTextFile(testing::SourcePath("/harness/shipped/scenarios/offset.toml"));
+    inputs.scenario_source = "offset";
+    inputs.robot = testing::SourcePath("/controller/parameters/assistant_robot.toml");
+    inputs.mjcf = testing::SourcePath("/mjcf/scene.xml");
+    const Study& study = inputs.study;
+    StudyStore store = StudyStore::OpenOrCreate(path(), IdentifyStudy(inputs), study);
+    if (!study.is_search()) {
+      for (const Trial& trial : ListTrials(study)) store.Add(MakeRow(trial));
+      return store;
+    }
+    constexpr int kBatches = 3;
+    SearchHistory history(study, FindSearchStart(inputs));
+    for (int i = 0; i < kBatches; ++i) {
+      for (const Trial& trial : history.ListMissing()) {
+        store.Add(MakeRow(trial));
+        history.Add(MakeRow(trial));
+      }
+    }
+    EXPECT_EQ(history.CountDone(), static_cast<long>(store.ListNumbers().size()));
+    return store;
+  }
+
+  [[nodiscard]] std::filesystem::path path() const { return folder_.path() / "s.sqlite"; }
+  void Spoil(const std::string& sql) const { Database(path(), Database::Mode::kExisting).Execute(sql); }
+
+  testing::TempFolder folder_;
+};
+
+TEST_P(StudyShapes, HasItsPageItsProgressAndItsCsv) {
+  const StudyStore store = Make(GetParam().text);
+  const size_t count = store.ListNumbers().size();
+  ASSERT_GT(count, 0U);
+  EXPECT_THAT(MakeStudyReport(store), AllOf(HasSubstr("id=\"trials\""), HasSubstr("id=\"trial-0\"")));
+  EXPECT_EQ(FindProgress(store).done, static_cast<long>(count));
+  std::string csv;
+  WriteStudyCsv(store, [&](std::string_view text) { csv += text; });
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), static_cast<std::ptrdiff_t>(count) + 1);
+  EXPECT_THAT(csv, HasSubstr(",\"'=cmd|calc\"\n")) << "no formula for a spreadsheet";
+}
+
+INSTANTIATE_TEST_SUITE_P(All, StudyShapes, ::testing::ValuesIn(kShapes),
+                         [](const auto& info) { return info.param.name; });
+
+class StudyPage : public StudyShapes {};
+
+TEST_F(StudyPage, RefusesASpoiledDatabaseByTrialAndKey) {
+  const StudyStore store = Make(kText);
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"\"control.law\" = 'unknown'", "trial 1: control.law: must be a number, got \"unknown\""},
+      {"\"control.law\" = 7", "trial 1: control.law: must be a whole number from 0 to 1, got \"7.0\""},
+      {"\"control.law\" = 0.5", "trial 1: control.law: must be a whole number from 0 to 1, got \"0.5\""},
+      {"\"control.law\" = 1, energy = 'much'", "trial 1: energy: must be a number, got \"much\""}};
+  for (const auto& [set, message] : cases) {
+    Spoil("UPDATE trials SET " + set + " WHERE trial = 1");
+    try {
+      MakeStudyReport(StudyStore::Open(path()));
+      ADD_FAILURE() << set;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(message));
+    }
+  }
+}
+
+/// The part of a page under "Best".
+std::string FindBestOf(const StudyStore& store) {
+  const std::string page = MakeStudyReport(store);
+  const size_t begin = page.find("<h2 id=\"best\">");
+  return begin == std::string::npos ? "" : page.substr(begin, page.find("<h2 id=\"trials\">") - begin);
+}
+
+TEST_F(StudyPage, BestIsByTheObjectiveAmongWhatTheConstraintsAdmit) {
+  // Metrics fall with the number; each third trial is no candidate.
+  const auto best = [&](const std::string& constraint, const std::string& wish) {
+    std::filesystem::remove(path());
+    return FindBestOf(Make("constraints = ['" + constraint + "']\n" + wish + kTwo));
+  };
+  const std::string largest = best("energy < 0.6", "[[objective]]\nmaximize = 'energy'\n");
+  EXPECT_THAT(largest, AllOf(HasSubstr("By the largest energy"), Not(HasSubstr("#trial-0\"")),
+                             Not(HasSubstr("#trial-2\""))));
+  EXPECT_LT(largest.find("#trial-1\""), largest.find("#trial-4\""));
+  EXPECT_THAT(best("energy < 0", kWish),
+              AllOf(HasSubstr("At none of 6 points all constraints hold."), Not(HasSubstr("<table>"))));
+  EXPECT_THAT(best("energy > 0.3", ""), AllOf(HasSubstr("#trial-1\""), Not(HasSubstr("#trial-4\""))));
+}
+
+}  // namespace
+}  // namespace dexcheck::study_shapes_test
