@@ -193,9 +193,15 @@ ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) co
   const RowMatrixXd time = log_.ReadSignal("time");
   ReplayDifference first;
   first.rows = log_.rows();
-  first.signals = log_.signals().size();
   long first_row = log_.rows();
   for (const SignalInfo& signal : log_.signals()) {
+    const auto replaced = std::find_if(kReplacedSignals.begin(), kReplacedSignals.end(),
+                                       [&](const ReplacedSignal& old) { return old.name == signal.name; });
+    if (replaced != kReplacedSignals.end()) {
+      first.replaced.push_back(*replaced);
+      continue;
+    }
+    ++first.signals;
     const RowMatrixXd recorded = log_.ReadSignal(signal.name);
     const RowMatrixXd now = other.ReadSignal(signal.name);
     const double scale = CalcLargest(recorded);

@@ -10,6 +10,7 @@
 
 #include "harness/base/files.h"
 #include "harness/log/log_reader.h"
+#include "harness/log/old_names.h"
 #include "harness/scenario/scenario.h"
 
 namespace dexcheck::cli {
@@ -56,7 +57,8 @@ struct ReplayDifference {
   double recorded = 0.0;
   double now = 0.0;
   long rows = 0;
-  size_t signals = 0;
+  size_t signals = 0;                    ///< Compared.
+  std::vector<ReplacedSignal> replaced;  ///< Of the log; not compared.
 };
 
 /// A line on standard error when the log does not hold a whole run.

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kHeight = 420.0;
 constexpr double kInnerWidth = 435.0;
-constexpr double kLeft = 70.0;
+constexpr double kLeft = 86.0;
 constexpr double kRight = 15.0;
 constexpr double kScaleRoom = 60.0;  // for a scale of colours
 constexpr double kTop = 30.0;
@@ -53,7 +53,7 @@ Html Open(const std::string& title, double width, double height) {
 Html DrawLabels(const Axis& x, const Axis& y) {
   return FormatHtml(
       "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n"
-      "<text transform=\"translate(14 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
+      "<text transform=\"translate(13 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
       kLeft + 0.5 * kInnerWidth, kHeight - 10.0, x.label, kTop + 0.5 * kInnerHeight, y.label);
 }
 

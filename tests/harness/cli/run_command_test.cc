@@ -11,6 +11,7 @@
 #include "harness/log/log_reader.h"
 #include "harness/log/log_writer.h"
 #include "tests/harness/cli/dexcheck_program.h"
+#include "tests/harness/log/forge.h"
 
 namespace dexcheck::run_command_test {
 namespace {
@@ -188,6 +189,31 @@ TEST(RunCommand, AWordThatIsSetReplacesTheFilesAndKeysCanBeRemoved) {
 }
 
 // The C library's mathematics without fused multiply-add has other last bits: another machine.
+/// A log from before a check was split has a signal that nothing records any more.
+TEST(RunCommand, AReplayLeavesOutASignalThatWasReplaced) {
+  const testing::TempFolder folder;
+  const std::filesystem::path out = folder.path() / "run";
+  ASSERT_EQ(RunDexcheck({"run", "hold", "--set", "duration=0.01", "--out", out.string()}).exit_code, 0);
+  testing::ForgeStructure(out / "log.h5", [](hid_t file) {
+    ASSERT_GE(H5Lmove(file, "check/grasp_cone", file, "check/grasp_force", H5P_DEFAULT, H5P_DEFAULT), 0);
+    const hid_t attribute = H5Aopen(file, "signals", H5P_DEFAULT);
+    const hid_t type = H5Aget_type(attribute);
+    const hid_t space = H5Aget_space(attribute);
+    std::vector<char*> names(static_cast<size_t>(H5Sget_simple_extent_npoints(space)));
+    ASSERT_GE(H5Aread(attribute, type, names.data()), 0);
+    std::string old = "check/grasp_force";
+    *std::find(names.begin(), names.end(), std::string_view("check/grasp_cone")) = old.data();
+    ASSERT_GE(H5Awrite(attribute, type, names.data()), 0);
+    H5Sclose(space);
+    H5Tclose(type);
+    H5Aclose(attribute);
+  });
+  const ProgramResult replay = RunDexcheck({"run", "--replay", out.string()});
+  EXPECT_EQ(replay.exit_code, 0) << replay.err;
+  EXPECT_THAT(replay.out, HasSubstr("Not compared: check/grasp_force"));
+  EXPECT_THAT(replay.out, HasSubstr("IDENTICAL"));
+}
+
 TEST(RunCommand, AReplayTellsAnotherMachineFromAnotherRun) {
   const TempFolder folder;
   const std::filesystem::path out = folder.path() / "run";

@@ -174,7 +174,7 @@ TEST_F(StudyReportTest, ManyTrialsMakeASmallPage) {
   EXPECT_LT(page.size(), kMost);
   EXPECT_THAT(page, HasSubstr("<image "));
   EXPECT_THAT(page, HasSubstr("data:image/png;base64,iVBORw0KGgo"));
-  EXPECT_THAT(page, Not(HasSubstr("<rect x=\"70.00\" y=\"30.00\" width=\"2.90\"")));
+  EXPECT_THAT(page, Not(HasSubstr("<rect x=\"86.00\" y=\"30.00\" width=\"2.90\"")));
   EXPECT_THAT(page, HasSubstr("of 22500 trials; <code>dexcheck study show DB NUMBER</code>"));
   EXPECT_THAT(page, HasSubstr("id=\"trial-0\""));
 }
