@@ -207,7 +207,8 @@ TEST(StudyReader, MistakesOfASearchAreNamed) {
   EXPECT_TRUE(fails("count = 100", "count = 10", "count: must be at least the population, 16, got 10"));
   EXPECT_TRUE(fails("count = 100", "count = 100\npopulation = 4",
                     "population: must be a whole number from 5 to 10000, got 4"));
-  EXPECT_TRUE(fails("method = \"cma_es\"", "method = \"halving\"", "search.method: is gone: use nelder_mead"));
+  EXPECT_TRUE(
+      fails("method = \"cma_es\"", "method = \"halving\"", "search.method: is gone: use nelder_mead"));
   EXPECT_TRUE(fails("method = \"cma_es\"", "method = \"nsga2\"\npopulation = 18",
                     "population: must be a multiple of 4, got 18"));
   EXPECT_TRUE(fails("start = [20, 0.25]", "start = [20]", "needs a value for each of the 2 keys"));
