@@ -9,6 +9,7 @@
 
 #include "controller/common/text.h"
 #include "harness/base/console.h"
+#include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
 
@@ -137,8 +138,27 @@ void Command::SetAction(const std::function<int()>& action) {
   app_->callback([action, exit_code = exit_code_] { *exit_code = action(); });
 }
 
+namespace {
+
+/// Lines that fit the terminal, descriptions below one another.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  std::string make_option(const CLI::Option* option, bool is_positional) const override {
+    return Wrap(Formatter::make_option(option, is_positional), get_column_width()) + "\n";
+  }
+  std::string make_subcommand(const CLI::App* command) const override {
+    return Wrap(Formatter::make_subcommand(command), get_column_width()) + "\n";
+  }
+  std::string make_description(const CLI::App* app) const override {
+    return Wrap(Formatter::make_description(app), 0) + "\n";
+  }
+};
+
+}  // namespace
+
 CommandLine::CommandLine(const std::string& program, const std::string& help, const std::string& version)
     : app_(std::make_unique<CLI::App>(help, program)) {
+  app_->formatter(std::make_shared<HelpFormatter>());
   app_->set_version_flag("--version", version);
 }
 

@@ -19,6 +19,7 @@
 #include "harness/cli/slurm_script.h"
 #include "harness/cli/study_files.h"
 #include "harness/cli/study_read_commands.h"
+#include "harness/cli/terminal.h"
 #include "harness/study/study_answer.h"
 #include "harness/study/study_progress.h"
 #include "harness/study/study_runner.h"
@@ -176,7 +177,7 @@ int RunStudy(const StudyRequest& request) {
   }
   if (request.quiet) return kSuccess;
   const StudyStore made = StudyStore::Open(request.database);
-  fmt::print("{}", FindProgress(made).text);
+  fmt::print("{}\n", Wrap(FindProgress(made).text, 2));
   const std::map<Outcome, long> outcomes = made.CountOutcomes();
   if (outcomes.count(Outcome::kCrashed) + outcomes.count(Outcome::kTimedOut) > 0) {
     fmt::print("Trials that crashed or timed out are made again with --retry-failed.\n");
@@ -189,6 +190,7 @@ void AddToDatabase(const std::string& path, const StudyStore& like, const std::v
   const auto add = [&](const std::filesystem::path& database) {
     StudyStore store = StudyStore::OpenOrCreate(database, like.identity(), like.study());
     std::vector<TrialSource> all;
+    all.reserve(sources.size());
     for (const std::string& source : sources) {
       all.push_back({source, [source](const auto& take) { StudyStore::Open(source).ForEachRow(take); }});
     }
@@ -208,7 +210,7 @@ int MergeStudies(const std::string& out, const std::vector<std::string>& databas
   for (const std::string& database : databases) StudyStore::Open(database).RequireSame(first.identity());
   AddToDatabase(out, first, databases);
   const StudyStore merged = StudyStore::Open(out);
-  if (!quiet) fmt::print("{}", FindProgress(merged).text);
+  if (!quiet) fmt::print("{}\n", Wrap(FindProgress(merged).text, 2));
   if (first.study().is_search()) return kSuccess;
   const long count = CountTrials(first.study());
   const std::vector<long> missing = FindMissing(count, merged.ListNumbers());

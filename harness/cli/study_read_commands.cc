@@ -16,6 +16,7 @@
 #include "controller/common/text.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/output_file.h"
+#include "harness/cli/terminal.h"
 #include "harness/study/study_csv.h"
 #include "harness/study/study_progress.h"
 #include "harness/study/study_report.h"
@@ -63,7 +64,7 @@ int WatchStudy(const std::string& database, double interval, const std::string& 
   while (true) {
     const StudyStore store = StudyStore::Open(database);
     const StudyProgress progress = FindProgress(store);
-    fmt::print("{}\n", progress.text);
+    fmt::print("{}\n\n", Wrap(progress.text, 2));
     std::fflush(stdout);
     if (!page.empty()) {
       OutputFile out(page);

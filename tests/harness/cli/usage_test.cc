@@ -125,6 +125,9 @@ TEST(Usage, AnOptionMeansOneThing) {
   for (std::vector<std::string> command : commands) {
     command.emplace_back("--help");
     const std::string help = RunDexcheck(command).out;
+    std::istringstream lines(help);
+    for (std::string line; std::getline(lines, line);)
+      EXPECT_LE(line.size(), 80U) << command[0] << ": " << line;
     for (const auto& [word, meaning] : meanings) {
       const size_t at = help.find("\n  " + word);
       if (at == std::string::npos) continue;
@@ -132,7 +135,7 @@ TEST(Usage, AnOptionMeansOneThing) {
       const size_t end = help.find("\n  -", at + 4);
       std::string text =
           help.substr(at + 3 + word.size(), end == std::string::npos ? end : end - at - 3 - word.size());
-      std::replace(text.begin(), text.end(), '\n', ' ');
+      text = std::regex_replace(text, std::regex("\\s+"), " ");
       EXPECT_TRUE(std::regex_search(text, std::regex(meaning))) << command[0] << " " << word << text;
     }
   }
