@@ -228,6 +228,7 @@ int CommandLine::Run(int argc, char** argv) {
   try {
     const std::vector<std::string> words = CompleteJson(argc, argv);
     std::vector<const char*> pointers;
+    pointers.reserve(words.size());
     for (const std::string& word : words) pointers.push_back(word.c_str());
     app_->parse(argc, pointers.data());
     return exit_code_;
