@@ -37,6 +37,12 @@ class Report {
     std::erase_if(admitted_, [&](const TrialRow* row) {
       return !JudgePoint({}, results_.study.constraints, {&row->result, 1}).is_feasible();
     });
+    for (const Variation& variation : results_.study.keys()) best_.heads.push_back(variation.key);
+    best_order_ = results_.study.objectives.empty() ? FillByError(&best_) : FillByObjectives(&best_);
+    // What the table leads to must be on the page.
+    for (const auto& [row, cells] : best_.rows) results_.listed.push_back(row);
+    std::sort(results_.listed.begin(), results_.listed.end());  // of one vector, by number
+    results_.listed.erase(std::unique(results_.listed.begin(), results_.listed.end()), results_.listed.end());
   }
 
   std::string Make(double renew) {
@@ -237,17 +243,13 @@ class Report {
   }
 
   [[nodiscard]] Html Best() const {
-    const Study& study = results_.study;
-    BestTable table;
-    for (const Variation& variation : study.keys()) table.heads.push_back(variation.key);
-    const std::string order = study.objectives.empty() ? FillByError(&table) : FillByObjectives(&table);
-    if (order.empty()) return {};
-    Html html = FormatHtml("<h2 id=\"best\">Best</h2>\n<p class=\"soft\">{}</p>\n", order);
-    if (table.rows.empty()) return html;
+    if (best_order_.empty()) return {};
+    Html html = FormatHtml("<h2 id=\"best\">Best</h2>\n<p class=\"soft\">{}</p>\n", best_order_);
+    if (best_.rows.empty()) return html;
     html += Html("<div class=\"card scroll\"><table>\n<tr><th class=\"value\">trial</th>");
-    for (const std::string& head : table.heads) html += FormatHtml("<th class=\"value\">{}</th>", head);
+    for (const std::string& head : best_.heads) html += FormatHtml("<th class=\"value\">{}</th>", head);
     html += "</tr>\n";
-    for (const auto& [row, cells] : table.rows) {
+    for (const auto& [row, cells] : best_.rows) {
       html +=
           FormatHtml("<tr><td class=\"value\"><a href=\"{}\">{}</a></td>", LinkTo(*row), row->trial.number);
       for (const std::string& cell : cells) html += FormatHtml("<td class=\"value number\">{}</td>", cell);
@@ -374,6 +376,8 @@ class Report {
   StudyResults results_;
   std::vector<const TrialRow*> tracked_;
   std::vector<const TrialRow*> admitted_;  // of these, those that fulfil the constraints
+  BestTable best_;
+  std::string best_order_;  // empty without one
 };
 
 }  // namespace

@@ -166,7 +166,8 @@ TEST_F(StudyReportTest, TextsMayHaveAnyLength) {
 // Of many trials the page has pictures of the maps and an even part of the trials.
 TEST_F(StudyReportTest, ManyTrialsMakeASmallPage) {
   study_ = ParseStudy(
-      "name = \"many\"\nscenario = \"offset\"\n[[vary]]\nkey = 'control.K_p'\nfrom = 1\nto = 100\ncount = "
+      "name = \"many\"\nscenario = \"offset\"\n[[objective]]\nmaximize = 'position_error_rms'\n[[vary]]\nkey "
+      "= 'control.K_p'\nfrom = 1\nto = 100\ncount = "
       "150\n[[vary]]\nkey = 'control.K_v'\nfrom = 1\nto = 100\ncount = 150\n",
       "study.toml");
   const std::string page = Report("why");
@@ -177,6 +178,9 @@ TEST_F(StudyReportTest, ManyTrialsMakeASmallPage) {
   EXPECT_THAT(page, Not(HasSubstr("<rect x=\"86.00\" y=\"30.00\" width=\"2.90\"")));
   EXPECT_THAT(page, HasSubstr("of 22500 trials; <code>dexcheck study show DB NUMBER</code>"));
   EXPECT_THAT(page, HasSubstr("id=\"trial-0\""));
+  // The last that tracked have the largest error, and are not among each so many.
+  EXPECT_THAT(page, HasSubstr("<a href=\"#trial-22496\">22496</a>"));
+  EXPECT_THAT(page, HasSubstr("id=\"trial-22496\""));
 }
 
 }  // namespace
