@@ -6,7 +6,7 @@
 #include "harness/sides/urdf_reader.h"
 #include "tests/fuzz/fuzz_target.h"
 
-namespace dexcheck::fuzz {
+namespace dexcheck::testing::fuzz {
 namespace {
 
 constexpr std::string_view kArm = R"(<robot name="arm"><link name="stand"/>
@@ -46,10 +46,10 @@ void ReadTerms(std::string_view text) {
 }
 
 }  // namespace
-}  // namespace dexcheck::fuzz
+}  // namespace dexcheck::testing::fuzz
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace dexcheck::fuzz;
+  using namespace dexcheck::testing::fuzz;
   const std::string_view bytes = AsText(data, size);
   Try("M.npy:", [&] { ExpectWhole(dexcheck::ParseNpy(bytes, "M.npy")); });
   ReadTerms(bytes);

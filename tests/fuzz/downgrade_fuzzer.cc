@@ -5,7 +5,7 @@
 #include "tests/fuzz/fuzz_target.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace dexcheck::fuzz;
+  using namespace dexcheck::testing::fuzz;
   try {
     dexcheck::JoinedMjcf once(AsText(data, size), "robot.xml");
     dexcheck::AdaptMjcf("", &once);

@@ -9,7 +9,7 @@
 #include "controller/common/expression.h"
 #include "tests/fuzz/fuzz_target.h"
 
-namespace dexcheck::fuzz {
+namespace dexcheck::testing::fuzz {
 namespace {
 
 std::optional<double> Evaluate(std::string_view text) {
@@ -25,10 +25,10 @@ std::optional<double> Evaluate(std::string_view text) {
 bool IsSame(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
 
 }  // namespace
-}  // namespace dexcheck::fuzz
+}  // namespace dexcheck::testing::fuzz
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace dexcheck::fuzz;
+  using namespace dexcheck::testing::fuzz;
   const std::string text(AsText(data, size));
   const std::optional<double> value = Evaluate(text);
   const std::optional<double> spaced = Evaluate(" \t" + text + " ");

@@ -11,7 +11,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
-namespace dexcheck::fuzz {
+namespace dexcheck::testing::fuzz {
 
 inline std::string_view AsText(const std::uint8_t* data, std::size_t size) {
   return {reinterpret_cast<const char*>(data), size};
@@ -32,4 +32,4 @@ inline void ExpectGoodMessage(std::string_view message, std::string_view source)
   for (const char c : message) Expect(static_cast<unsigned char>(c) >= 0x20, "a control character", message);
 }
 
-}  // namespace dexcheck::fuzz
+}  // namespace dexcheck::testing::fuzz

@@ -11,7 +11,7 @@
 #include "harness/engine/mjcf_files.h"
 #include "tests/fuzz/fuzz_target.h"
 
-namespace dexcheck::fuzz {
+namespace dexcheck::testing::fuzz {
 namespace {
 
 /// A folder with the text and a part that it may include.
@@ -38,10 +38,10 @@ class Folder {
 };
 
 }  // namespace
-}  // namespace dexcheck::fuzz
+}  // namespace dexcheck::testing::fuzz
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace dexcheck::fuzz;
+  using namespace dexcheck::testing::fuzz;
   static Folder folder;
   const std::filesystem::path mjcf = folder.Write(AsText(data, size));
   try {

@@ -6,7 +6,7 @@
 #include "controller/model/parameter_reader.h"
 #include "tests/fuzz/fuzz_target.h"
 
-namespace dexcheck::fuzz {
+namespace dexcheck::testing::fuzz {
 namespace {
 
 void UseModel(const RobotModel& model) {
@@ -19,10 +19,10 @@ void UseModel(const RobotModel& model) {
 }
 
 }  // namespace
-}  // namespace dexcheck::fuzz
+}  // namespace dexcheck::testing::fuzz
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace dexcheck::fuzz;
+  using namespace dexcheck::testing::fuzz;
   try {
     UseModel(dexcheck::ParseRobotModel(AsText(data, size), "robot.toml"));
   } catch (const dexcheck::InputError& error) {

@@ -10,7 +10,7 @@
 #include "harness/scenario/scenario.h"
 #include "tests/fuzz/fuzz_target.h"
 
-namespace dexcheck::fuzz {
+namespace dexcheck::testing::fuzz {
 namespace {
 
 constexpr std::string_view kOverride = "#!";
@@ -37,10 +37,10 @@ void UseScenario(const Scenario& scenario) {
 }
 
 }  // namespace
-}  // namespace dexcheck::fuzz
+}  // namespace dexcheck::testing::fuzz
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace dexcheck::fuzz;
+  using namespace dexcheck::testing::fuzz;
   const std::string text(AsText(data, size));
   try {
     UseScenario(dexcheck::ParseScenario(text, "scenario.toml", "folder", ListOverrides(text)));

@@ -5,7 +5,7 @@
 #include "harness/scenario/state_file.h"
 #include "tests/fuzz/fuzz_target.h"
 
-namespace dexcheck::fuzz {
+namespace dexcheck::testing::fuzz {
 namespace {
 
 // Two joints, four fingertips, an object: few enough numbers for a fuzzer to find a state.
@@ -61,10 +61,10 @@ void ExpectSizes(const State& state, const RobotModel& model) {
 }
 
 }  // namespace
-}  // namespace dexcheck::fuzz
+}  // namespace dexcheck::testing::fuzz
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace dexcheck::fuzz;
+  using namespace dexcheck::testing::fuzz;
   static const dexcheck::RobotModel model = dexcheck::ParseRobotModel(kHand, "hand.toml");
   try {
     ExpectSizes(dexcheck::ParseState(AsText(data, size), "state.json", model), model);

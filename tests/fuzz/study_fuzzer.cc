@@ -4,7 +4,7 @@
 #include "harness/study/study.h"
 #include "tests/fuzz/fuzz_target.h"
 
-namespace dexcheck::fuzz {
+namespace dexcheck::testing::fuzz {
 namespace {
 
 /// What has more trials is only read.
@@ -31,10 +31,10 @@ void UseStudy(const Study& study) {
 }
 
 }  // namespace
-}  // namespace dexcheck::fuzz
+}  // namespace dexcheck::testing::fuzz
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace dexcheck::fuzz;
+  using namespace dexcheck::testing::fuzz;
   try {
     UseStudy(dexcheck::ParseStudy(std::string(AsText(data, size)), "study.toml"));
   } catch (const dexcheck::InputError& error) {

@@ -12,7 +12,7 @@
 #include "harness/report/page.h"
 #include "tests/fuzz/fuzz_target.h"
 
-namespace dexcheck::fuzz {
+namespace dexcheck::testing::fuzz {
 namespace {
 
 constexpr size_t kLongest = 1 << 14;
@@ -59,10 +59,10 @@ size_t Count(const std::string& text, std::string_view part) {
 std::string MakePageOfLog() { return MakePage(RunData(Log::Folder()), {}); }
 
 }  // namespace
-}  // namespace dexcheck::fuzz
+}  // namespace dexcheck::testing::fuzz
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace dexcheck::fuzz;
+  using namespace dexcheck::testing::fuzz;
   static Log log;
   static const size_t scripts = Count(MakePageOfLog(), "<script");
   std::string text(AsText(data, std::min(size, kLongest)));

@@ -8,7 +8,7 @@
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace dexcheck;
-  using namespace dexcheck::fuzz;
+  using namespace dexcheck::testing::fuzz;
   try {
     const TomlDocument document(AsText(data, size), "trajectory.toml");
     TomlTable root = document.Open();

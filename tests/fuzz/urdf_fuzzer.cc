@@ -5,7 +5,7 @@
 #include "harness/sides/urdf_reader.h"
 #include "tests/fuzz/fuzz_target.h"
 
-namespace dexcheck::fuzz {
+namespace dexcheck::testing::fuzz {
 namespace {
 
 void UseDescription(const RobotDescription& robot) {
@@ -24,10 +24,10 @@ void UseDescription(const RobotDescription& robot) {
 }
 
 }  // namespace
-}  // namespace dexcheck::fuzz
+}  // namespace dexcheck::testing::fuzz
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace dexcheck::fuzz;
+  using namespace dexcheck::testing::fuzz;
   try {
     UseDescription(dexcheck::ParseUrdf(AsText(data, size), "robot.urdf"));
   } catch (const dexcheck::InputError& error) {

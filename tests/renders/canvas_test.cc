@@ -11,10 +11,8 @@
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::canvas_test {
+namespace dexcheck::testing::canvas_test {
 namespace {
-
-using testing::Throws;
 
 const Color kWhite = MakeColor(0xffffff);
 
@@ -122,4 +120,4 @@ TEST(Font, NamesAFileThatIsNone) {
 }
 
 }  // namespace
-}  // namespace dexcheck::canvas_test
+}  // namespace dexcheck::testing::canvas_test

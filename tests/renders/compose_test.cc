@@ -7,10 +7,8 @@
 
 #include "tests/common/throws.h"
 
-namespace dexcheck::compose_test {
+namespace dexcheck::testing::compose_test {
 namespace {
-
-using testing::Throws;
 
 Image MakePlain(int width, int height, std::uint8_t value) {
   Image image(width, height);
@@ -56,4 +54,4 @@ TEST(PlaceInset, RefusesWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace dexcheck::compose_test
+}  // namespace dexcheck::testing::compose_test

@@ -18,10 +18,8 @@
 #include "controller/common/errors.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::frame_line_test {
+namespace dexcheck::testing::frame_line_test {
 namespace {
-
-using testing::Throws;
 
 constexpr int kWidth = 6;
 constexpr int kHeight = 4;
@@ -200,4 +198,4 @@ TEST(FrameLineTest, RefusesWhatCannotBeDrawn) {
 }
 
 }  // namespace
-}  // namespace dexcheck::frame_line_test
+}  // namespace dexcheck::testing::frame_line_test

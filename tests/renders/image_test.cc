@@ -7,10 +7,8 @@
 
 #include "tests/common/throws.h"
 
-namespace dexcheck::image_test {
+namespace dexcheck::testing::image_test {
 namespace {
-
-using testing::Throws;
 
 TEST(ReduceBottomUp, FlipsRowsWhenNothingIsToBeReduced) {
   const std::vector<std::uint8_t> source = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
@@ -35,4 +33,4 @@ TEST(Image, RefusesEmptyPictures) {
 }
 
 }  // namespace
-}  // namespace dexcheck::image_test
+}  // namespace dexcheck::testing::image_test

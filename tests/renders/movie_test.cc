@@ -23,12 +23,10 @@
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"
 
-namespace dexcheck::movie_test {
+namespace dexcheck::testing::movie_test {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::TempFolder;
-using testing::Throws;
 
 constexpr int kWidth = 320;
 constexpr int kHeight = 180;
@@ -348,4 +346,4 @@ TEST_F(MovieTest, CountsTheFramesOfTheLongestRun) {
 }
 
 }  // namespace
-}  // namespace dexcheck::movie_test
+}  // namespace dexcheck::testing::movie_test

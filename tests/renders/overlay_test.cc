@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-namespace dexcheck::overlay_test {
+namespace dexcheck::testing::overlay_test {
 namespace {
 
 TEST(FormatSi, KeepsOneToThreeDigitsBeforeThePoint) {
@@ -132,4 +132,4 @@ TEST(Overlay, ShortensATitleThatIsTooLong) {
 }
 
 }  // namespace
-}  // namespace dexcheck::overlay_test
+}  // namespace dexcheck::testing::overlay_test

@@ -10,12 +10,10 @@
 #include "tests/common/run_program.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::picture_file_test {
+namespace dexcheck::testing::picture_file_test {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::TempFolder;
-using testing::Throws;
 
 /// Colours that change smoothly over the picture; odd sizes, as a user may want.
 Image MakePicture() {
@@ -61,4 +59,4 @@ TEST(PictureFile, WritesWhatTheNameSaysOrNothing) {
 }
 
 }  // namespace
-}  // namespace dexcheck::picture_file_test
+}  // namespace dexcheck::testing::picture_file_test

@@ -9,12 +9,10 @@
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::png_file_test {
+namespace dexcheck::testing::png_file_test {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::TempFolder;
-using testing::Throws;
 
 TEST(PngFile, ReadsBackWhatItWrote) {
   std::mt19937 random(1);
@@ -57,4 +55,4 @@ TEST(PngFile, NamesTheFileThatIsNoPicture) {
 }
 
 }  // namespace
-}  // namespace dexcheck::png_file_test
+}  // namespace dexcheck::testing::png_file_test

@@ -18,10 +18,8 @@
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"
 
-namespace dexcheck::renderer_test {
+namespace dexcheck::testing::renderer_test {
 namespace {
-
-using testing::Throws;
 
 constexpr int kWidth = 320;
 constexpr int kHeight = 180;
@@ -272,4 +270,4 @@ TEST_F(RendererTest, StillLooksAsItDid) {
 }
 
 }  // namespace
-}  // namespace dexcheck::renderer_test
+}  // namespace dexcheck::testing::renderer_test

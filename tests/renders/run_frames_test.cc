@@ -12,10 +12,8 @@
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"
 
-namespace dexcheck::run_frames_test {
+namespace dexcheck::testing::run_frames_test {
 namespace {
-
-using testing::Throws;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -109,4 +107,4 @@ TEST_F(RunFramesTest, AllFiveQuestionsAreListed) {
 }
 
 }  // namespace
-}  // namespace dexcheck::run_frames_test
+}  // namespace dexcheck::testing::run_frames_test

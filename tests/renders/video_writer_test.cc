@@ -19,13 +19,10 @@
 #include "tests/common/run_program.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::video_writer_test {
+namespace dexcheck::testing::video_writer_test {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::RunProgram;
-using testing::TempFolder;
-using testing::Throws;
 
 constexpr int kWidth = 128;
 constexpr int kHeight = 72;
@@ -282,4 +279,4 @@ TEST(VideoWriter, RefusesWhatH264CannotTake) {
 }
 
 }  // namespace
-}  // namespace dexcheck::video_writer_test
+}  // namespace dexcheck::testing::video_writer_test

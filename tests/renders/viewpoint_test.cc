@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace dexcheck::viewpoint_test {
+namespace dexcheck::testing::viewpoint_test {
 namespace {
 
 constexpr double kRounding = 1e-12;  // m, of numbers of size 10
@@ -69,4 +69,4 @@ TEST(FitViewpoint, NeedsSomethingToSee) {
 }
 
 }  // namespace
-}  // namespace dexcheck::viewpoint_test
+}  // namespace dexcheck::testing::viewpoint_test

@@ -8,7 +8,7 @@
 
 #include "controller/common/types.h"
 
-namespace dexcheck::expression_test {
+namespace dexcheck::testing::expression_test {
 namespace {
 
 const SymbolTable& Symbols() {
@@ -76,4 +76,4 @@ TEST(Expression, TellsWhatCanNameASymbol) {
 }
 
 }  // namespace
-}  // namespace dexcheck::expression_test
+}  // namespace dexcheck::testing::expression_test

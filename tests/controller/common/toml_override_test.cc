@@ -5,7 +5,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/toml_reader.h"
 
-namespace dexcheck::toml_override_test {
+namespace dexcheck::testing::toml_override_test {
 namespace {
 
 const char* const kText = R"(size = 1
@@ -70,4 +70,4 @@ TEST(TomlOverride, RefusesWhatCannotBeSet) {
 }
 
 }  // namespace
-}  // namespace dexcheck::toml_override_test
+}  // namespace dexcheck::testing::toml_override_test

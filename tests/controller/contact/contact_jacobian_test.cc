@@ -12,14 +12,8 @@
 #include "tests/common/throws.h"
 #include "tests/controller/contact/test_finger.h"
 
-namespace dexcheck::contact_jacobian_test {
+namespace dexcheck::testing::contact_jacobian_test {
 namespace {
-
-using testing::Differentiate;
-using testing::DrawVector;
-using testing::MatrixNear;
-using testing::RollingFinger;
-using testing::Throws;
 
 // Rounding of a few dozen operations on numbers of order one.
 constexpr double kRounding = 1e-14;
@@ -237,4 +231,4 @@ TEST_F(ContactJacobianTest, ChainsColumnsHaveTheBitsOfTheWholeProduct) {
 }
 
 }  // namespace
-}  // namespace dexcheck::contact_jacobian_test
+}  // namespace dexcheck::testing::contact_jacobian_test

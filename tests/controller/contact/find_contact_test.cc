@@ -8,16 +8,8 @@
 #include "tests/common/throws.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
-namespace dexcheck::find_contact_test {
+namespace dexcheck::testing::find_contact_test {
 namespace {
-
-using testing::CalcTouchingPose;
-using testing::DrawPoint;
-using testing::DrawUniform;
-using testing::DrawVector;
-using testing::MatrixNear;
-using testing::SurfacePair;
-using testing::Throws;
 
 constexpr int kSamples = 100;
 // Newton's stopping bound, 1e-13 relative; measured 9.1e-14.
@@ -111,4 +103,4 @@ TEST(FindContactTest, ImpossibleInputIsAClearError) {
 }
 
 }  // namespace
-}  // namespace dexcheck::find_contact_test
+}  // namespace dexcheck::testing::find_contact_test

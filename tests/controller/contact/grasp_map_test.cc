@@ -12,16 +12,8 @@
 #include "tests/common/throws.h"
 #include "tests/controller/contact/test_finger.h"
 
-namespace dexcheck::grasp_map_test {
+namespace dexcheck::testing::grasp_map_test {
 namespace {
-
-using testing::CalcScrewMotion;
-using testing::Differentiate;
-using testing::DrawUniform;
-using testing::DrawVector;
-using testing::MatrixNear;
-using testing::RollingFinger;
-using testing::Throws;
 
 // Rounding of a few dozen operations on numbers of order one.
 constexpr double kRounding = 1e-14;
@@ -258,4 +250,4 @@ TEST(GraspMapTest, WrongSizesAreAClearError) {
 }
 
 }  // namespace
-}  // namespace dexcheck::grasp_map_test
+}  // namespace dexcheck::testing::grasp_map_test

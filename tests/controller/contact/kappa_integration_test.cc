@@ -7,14 +7,8 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
-namespace dexcheck::kappa_integration_test {
+namespace dexcheck::testing::kappa_integration_test {
 namespace {
-
-using testing::CalcTouchingPose;
-using testing::DrawPoint;
-using testing::DrawUniform;
-using testing::MatrixNear;
-using testing::SurfacePair;
 
 // Rounding of a few dozen operations on numbers of order one.
 constexpr double kRounding = 1e-13;
@@ -172,4 +166,4 @@ TEST_F(GreatCircleTest, FindContactRemovesTheDrift) {
 }
 
 }  // namespace
-}  // namespace dexcheck::kappa_integration_test
+}  // namespace dexcheck::testing::kappa_integration_test

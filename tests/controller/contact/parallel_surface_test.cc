@@ -5,7 +5,7 @@
 #include "controller/contact/contact_geometry.h"
 #include "controller/contact/shapes.h"
 
-namespace dexcheck::parallel_surface_test {
+namespace dexcheck::testing::parallel_surface_test {
 namespace {
 
 constexpr double kRounding = 1e-13;
@@ -73,4 +73,4 @@ TEST(ParallelSurface, MeetMidwayBetweenOverlappingBodies) {
 }
 
 }  // namespace
-}  // namespace dexcheck::parallel_surface_test
+}  // namespace dexcheck::testing::parallel_surface_test

@@ -10,16 +10,8 @@
 #include "tests/common/throws.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
-namespace dexcheck::projection_test {
+namespace dexcheck::testing::projection_test {
 namespace {
-
-using testing::DrawPoint;
-using testing::DrawUniform;
-using testing::DrawVector;
-using testing::MakeAllSurfaces;
-using testing::MatrixNear;
-using testing::NamedSurface;
-using testing::Throws;
 
 constexpr int kSamples = 200;
 // Rounding of coordinates of order one.
@@ -124,4 +116,4 @@ TEST(ProjectionTest, PointsWithoutAUniqueFootAreAnError) {
 }
 
 }  // namespace
-}  // namespace dexcheck::projection_test
+}  // namespace dexcheck::testing::projection_test

@@ -7,21 +7,8 @@
 #include "tests/common/throws.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
-namespace dexcheck::rolling_test {
+namespace dexcheck::testing::rolling_test {
 namespace {
-
-using testing::CalcScrewMotion;
-using testing::CalcTouchingPose;
-using testing::Differentiate;
-using testing::DifferentiatePose;
-using testing::DrawPoint;
-using testing::DrawUniform;
-using testing::DrawVector;
-using testing::MakeAllPairs;
-using testing::MatrixNear;
-using testing::NamedSurface;
-using testing::SurfacePair;
-using testing::Throws;
 
 constexpr int kSamples = 20;
 // Rounding of a few dozen operations on rates of order one.
@@ -338,4 +325,4 @@ TEST(KappaDotTest, ContactsThatAreNotPointsAreAnError) {
 }
 
 }  // namespace
-}  // namespace dexcheck::rolling_test
+}  // namespace dexcheck::testing::rolling_test

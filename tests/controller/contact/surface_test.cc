@@ -10,16 +10,8 @@
 #include "tests/common/throws.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
-namespace dexcheck::surface_test {
+namespace dexcheck::testing::surface_test {
 namespace {
-
-using testing::Differentiate;
-using testing::DrawPoint;
-using testing::DrawVector;
-using testing::MakeAllSurfaces;
-using testing::MatrixNear;
-using testing::NamedSurface;
-using testing::Throws;
 
 constexpr int kSamples = 100;
 
@@ -332,4 +324,4 @@ TEST(BoxTest, HasAFlatChartOnEachFaceThatEndsAtItsEdges) {
 }
 
 }  // namespace
-}  // namespace dexcheck::surface_test
+}  // namespace dexcheck::testing::surface_test

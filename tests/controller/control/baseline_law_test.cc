@@ -17,12 +17,8 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/control/grasp_scene.h"
 
-namespace dexcheck::baseline_law_test {
+namespace dexcheck::testing::baseline_law_test {
 namespace {
-
-using testing::AllocationCounter;
-using testing::GraspScene;
-using testing::MatrixNear;
 
 // Measured: forces 6e-13 N m (of 500), accelerations 1.8e-11 (of 1000).
 constexpr double kForceRounding = 5e-12;
@@ -290,4 +286,4 @@ TEST_F(BaselineLawTest, DemandsWithoutAllocation) {
 }
 
 }  // namespace
-}  // namespace dexcheck::baseline_law_test
+}  // namespace dexcheck::testing::baseline_law_test

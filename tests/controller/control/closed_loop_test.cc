@@ -12,15 +12,8 @@
 #include "tests/controller/control/ideal_simulation.h"
 #include "tests/controller/control/printed_law.h"
 
-namespace dexcheck::closed_loop_test {
+namespace dexcheck::testing::closed_loop_test {
 namespace {
-
-using testing::Fault;
-using testing::GraspScene;
-using testing::Hands;
-using testing::IdealSimulation;
-using testing::MatrixNear;
-using testing::PrintedLaw;
 
 constexpr double kDuration = 0.4;    // s
 constexpr double kFrequency = 12.0;  // rad/s, natural frequency of the error
@@ -234,4 +227,4 @@ TEST(ClosedLoop, PostureTaskKeepsTheLeftArmStill) {
 }
 
 }  // namespace
-}  // namespace dexcheck::closed_loop_test
+}  // namespace dexcheck::testing::closed_loop_test

@@ -18,16 +18,8 @@
 #include "tests/common/throws.h"
 #include "tests/controller/control/printed_law.h"
 
-namespace dexcheck::computed_torque_test {
+namespace dexcheck::testing::computed_torque_test {
 namespace {
-
-using testing::AllocationCounter;
-using testing::Fault;
-using testing::GraspScene;
-using testing::Hands;
-using testing::MatrixNear;
-using testing::PrintedLaw;
-using testing::Throws;
 
 // Measured, largest of all hands and weights: contact forces 2.8e-14 N (of 40 N), their wrench as M_o
 // X_o_ddot +
@@ -435,4 +427,4 @@ TEST(ComputedTorque, OneControlStepDoesNotAllocate) {
 }
 
 }  // namespace
-}  // namespace dexcheck::computed_torque_test
+}  // namespace dexcheck::testing::computed_torque_test

@@ -15,14 +15,8 @@
 #include "tests/common/throws.h"
 #include "tests/controller/control/grasp_scene.h"
 
-namespace dexcheck::constrained_dynamics_test {
+namespace dexcheck::testing::constrained_dynamics_test {
 namespace {
-
-using testing::AllocationCounter;
-using testing::GraspScene;
-using testing::Hands;
-using testing::MatrixNear;
-using testing::Throws;
 
 // Measured 1.4e-13 with forces of up to 100 N, and 2e-11 with accelerations of up to 8000 rad/s^2 (fingers of
 // 1e-5 kg m^2 are pushed).
@@ -308,4 +302,4 @@ TEST(ActuationMap, IsEBar) {
 }
 
 }  // namespace
-}  // namespace dexcheck::constrained_dynamics_test
+}  // namespace dexcheck::testing::constrained_dynamics_test

@@ -21,14 +21,8 @@
 #include "tests/common/throws.h"
 #include "tests/controller/control/grasp_scene.h"
 
-namespace dexcheck::grasp_terms_test {
+namespace dexcheck::testing::grasp_terms_test {
 namespace {
-
-using testing::AllocationCounter;
-using testing::Differentiate;
-using testing::GraspScene;
-using testing::MatrixNear;
-using testing::Throws;
 
 // Two formulas for one quantity of order one.
 constexpr double kRounding = 1e-14;
@@ -266,4 +260,4 @@ TEST_F(Misuse, FingertipsMustBeThereAndCarrySpheres) {
 }
 
 }  // namespace
-}  // namespace dexcheck::grasp_terms_test
+}  // namespace dexcheck::testing::grasp_terms_test

@@ -13,11 +13,8 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
 
-namespace dexcheck::joint_law_test {
+namespace dexcheck::testing::joint_law_test {
 namespace {
-
-using testing::AllocationCounter;
-using testing::MatrixNear;
 
 // Measured: 4e-14 N m (of 100), 2e-12 rad/s^2 (of 100): the wrist has a condition of some hundreds.
 constexpr double kTorqueRounding = 1e-12;
@@ -148,4 +145,4 @@ TEST(JointMotion, HasTheDerivativesOfItsPositions) {
 }
 
 }  // namespace
-}  // namespace dexcheck::joint_law_test
+}  // namespace dexcheck::testing::joint_law_test

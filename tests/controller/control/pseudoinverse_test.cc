@@ -12,12 +12,8 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::pseudoinverse_test {
+namespace dexcheck::testing::pseudoinverse_test {
 namespace {
-
-using testing::AllocationCounter;
-using testing::MatrixNear;
-using testing::Throws;
 
 constexpr Eigen::Index kRows = 12;
 constexpr Eigen::Index kColumns = 50;
@@ -254,4 +250,4 @@ TEST(Pseudoinverse, DoesNotAllocate) {
 }
 
 }  // namespace
-}  // namespace dexcheck::pseudoinverse_test
+}  // namespace dexcheck::testing::pseudoinverse_test

@@ -12,12 +12,8 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/control/grasp_scene.h"
 
-namespace dexcheck::trajectory_controller_test {
+namespace dexcheck::testing::trajectory_controller_test {
 namespace {
-
-using testing::AllocationCounter;
-using testing::GraspScene;
-using testing::MatrixNear;
 
 // Measured 2e-11 rad/s^2 of 100, 2e-13 N.
 constexpr double kAccelerationRounding = 1e-9;
@@ -152,4 +148,4 @@ TEST_F(TrajectoryControllerTest, StepsWithoutAllocation) {
 }
 
 }  // namespace
-}  // namespace dexcheck::trajectory_controller_test
+}  // namespace dexcheck::testing::trajectory_controller_test

@@ -17,13 +17,8 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::trajectory_test {
+namespace dexcheck::testing::trajectory_test {
 namespace {
-
-using testing::AllocationCounter;
-using testing::Differentiate;
-using testing::MatrixNear;
-using testing::Throws;
 
 constexpr double kRounding = 1e-14;  // values of up to a few m and rad
 
@@ -361,4 +356,4 @@ TEST(TrajectoryReader, RejectsWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace dexcheck::trajectory_test
+}  // namespace dexcheck::testing::trajectory_test

@@ -13,10 +13,8 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::allocation_test {
+namespace dexcheck::testing::allocation_test {
 namespace {
-
-using testing::AllocationCounter;
 
 // Keeps the compiler from leaving out an allocation that nobody uses.
 void Use(const volatile void* pointer) {
@@ -145,4 +143,4 @@ TEST_P(Allocation, AllocationsInTheLibraryAreSeen) {
 }
 
 }  // namespace
-}  // namespace dexcheck::allocation_test
+}  // namespace dexcheck::testing::allocation_test

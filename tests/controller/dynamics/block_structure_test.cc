@@ -14,14 +14,8 @@
 #include "tests/common/random_robot.h"
 #include "tests/common/reduction_map.h"
 
-namespace dexcheck::block_structure_test {
+namespace dexcheck::testing::block_structure_test {
 namespace {
-
-using testing::DrawPositions;
-using testing::DrawVelocities;
-using testing::MatrixNear;
-using testing::ReadPaperRobot;
-using testing::ScaleByMass;
 
 // One recursion behind both sides, entries scaled to 1 (M) and 30 (C). Measured 5e-16.
 constexpr double kRounding = 5e-15;
@@ -201,4 +195,4 @@ TEST_P(ReducedBlocks, AreThoseOfEquation17) {
 }
 
 }  // namespace
-}  // namespace dexcheck::block_structure_test
+}  // namespace dexcheck::testing::block_structure_test

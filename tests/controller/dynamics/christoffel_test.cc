@@ -15,17 +15,8 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::christoffel_test {
+namespace dexcheck::testing::christoffel_test {
 namespace {
-
-using testing::DrawPositions;
-using testing::DrawVelocities;
-using testing::Dual;
-using testing::DualVector;
-using testing::MatrixNear;
-using testing::NaiveDynamics;
-using testing::ScaleByMass;
-using testing::ScaleForceByMass;
 
 // Rounding of sums over 12 joints, on entries scaled to 1 in M and 30 in C; measured 2e-14.
 constexpr double kRounding = 2e-13;
@@ -203,4 +194,4 @@ TEST_P(Christoffel, MutatedModelsAndWrongSymbolsAreSeen) {
 }
 
 }  // namespace
-}  // namespace dexcheck::christoffel_test
+}  // namespace dexcheck::testing::christoffel_test

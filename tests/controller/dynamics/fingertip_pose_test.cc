@@ -10,10 +10,8 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::fingertip_pose_test {
+namespace dexcheck::testing::fingertip_pose_test {
 namespace {
-
-using testing::MatrixNear;
 
 using Eigen::Matrix4d;
 
@@ -147,4 +145,4 @@ TEST_F(FingertipPose, AtHomeIsUprightWithArmsHanging) {
 }
 
 }  // namespace
-}  // namespace dexcheck::fingertip_pose_test
+}  // namespace dexcheck::testing::fingertip_pose_test

@@ -9,10 +9,8 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::floating_test {
+namespace dexcheck::testing::floating_test {
 namespace {
-
-using testing::MatrixNear;
 
 // Masses of some 50 kg over lengths of a few metres, chains of 20 joints, and E^-1 at pitch below 1.2 rad.
 constexpr double kRounding = 1e-11;
@@ -191,4 +189,4 @@ l = { mass = 1, com = [0, 0, 0], inertia = [1, 1, 1, 0, 0, 0] }
 }
 
 }  // namespace
-}  // namespace dexcheck::floating_test
+}  // namespace dexcheck::testing::floating_test

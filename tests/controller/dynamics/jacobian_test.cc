@@ -16,14 +16,8 @@
 #include "tests/common/random_robot.h"
 #include "tests/common/reduction_map.h"
 
-namespace dexcheck::jacobian_test {
+namespace dexcheck::testing::jacobian_test {
 namespace {
-
-using testing::CalcReductionMap;
-using testing::Differentiate;
-using testing::DrawPositions;
-using testing::DrawVelocities;
-using testing::MatrixNear;
 
 // Five-point differences at unit rates: truncation h^4 / 30 = 3e-14 per metre, rounding eps |p| / h = 1e-12.
 // Measured 9e-13.
@@ -280,4 +274,4 @@ TEST(BasePose, OfAMobileBaseIsNotTurned) {
 }
 
 }  // namespace
-}  // namespace dexcheck::jacobian_test
+}  // namespace dexcheck::testing::jacobian_test

@@ -15,10 +15,8 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::kdl_test {
+namespace dexcheck::testing::kdl_test {
 namespace {
-
-using testing::MatrixNear;
 
 // Seven joints; M up to 3 kg m^2, forces up to 60 N m. Measured 2e-14.
 constexpr double kRounding = 2e-13;
@@ -177,4 +175,4 @@ TEST_F(PandaAgainstKdl, MutationsAreSeen) {
 }
 
 }  // namespace
-}  // namespace dexcheck::kdl_test
+}  // namespace dexcheck::testing::kdl_test

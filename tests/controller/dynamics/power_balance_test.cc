@@ -18,13 +18,8 @@
 #include "tests/common/random_robot.h"
 #include "tests/common/reduction_map.h"
 
-namespace dexcheck::power_balance_test {
+namespace dexcheck::testing::power_balance_test {
 namespace {
-
-using testing::CalcReductionMap;
-using testing::DrawPositions;
-using testing::DrawVelocities;
-using testing::TolScale;
 
 constexpr double kDuration = 0.2;  // s
 constexpr int kSamples = 20;       // common to all step sizes
@@ -244,4 +239,4 @@ TEST(Momentum, IsKeptByAFreePlanarRobot) {
 }
 
 }  // namespace
-}  // namespace dexcheck::power_balance_test
+}  // namespace dexcheck::testing::power_balance_test

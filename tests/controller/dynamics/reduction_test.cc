@@ -17,16 +17,8 @@
 #include "tests/common/random_robot.h"
 #include "tests/common/reduction_map.h"
 
-namespace dexcheck::reduction_test {
+namespace dexcheck::testing::reduction_test {
 namespace {
-
-using testing::CalcReductionMap;
-using testing::DrawPositions;
-using testing::DrawVelocities;
-using testing::MatrixNear;
-using testing::ReductionMap;
-using testing::ScaleByMass;
-using testing::ScaleForceByMass;
 
 // Both sides come from one recursion and differ in the base's columns only: entries scaled to 1 (M), 30 (C),
 // 100 (forces). Measured 6e-14.
@@ -227,4 +219,4 @@ TEST_P(Reduction, MassMatrixRateMinusTwiceCIsSkew) {
 }
 
 }  // namespace
-}  // namespace dexcheck::reduction_test
+}  // namespace dexcheck::testing::reduction_test

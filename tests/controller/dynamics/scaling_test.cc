@@ -15,7 +15,7 @@
 #include "tests/common/naive_dynamics.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::scaling_test {
+namespace dexcheck::testing::scaling_test {
 namespace {
 
 constexpr std::array kJoints = {10, 20, 50, 100, 200};
@@ -143,4 +143,4 @@ TEST_F(Scaling, CubicCostIsSeen) {
 }
 
 }  // namespace
-}  // namespace dexcheck::scaling_test
+}  // namespace dexcheck::testing::scaling_test

@@ -9,10 +9,8 @@
 #include "controller/dynamics/model_terms.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck::worked_examples_test {
+namespace dexcheck::testing::worked_examples_test {
 namespace {
-
-using testing::MatrixNear;
 
 // A dozen operations on numbers up to 50; measured 2.3e-15.
 constexpr double kRounding = 2e-14;
@@ -255,4 +253,4 @@ TEST(Platform, WheelRatesAreAnotherBasis) {
 }
 
 }  // namespace
-}  // namespace dexcheck::worked_examples_test
+}  // namespace dexcheck::testing::worked_examples_test

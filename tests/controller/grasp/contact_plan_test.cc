@@ -16,15 +16,12 @@
 #include "controller/dynamics/model_terms.h"
 #include "controller/grasp/finger_placement.h"
 #include "controller/grasp/force_closure.h"
+#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
 
-namespace dexcheck::contact_plan_test {
+namespace dexcheck::testing::contact_plan_test {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::MatrixNear;
-using ::testing::ThrowsMessage;
 
 // Fingertips rest within 1e-14 m, coordinates of a metre round at 1e-16.
 constexpr double kTouchTolerance = 1e-13;
@@ -338,4 +335,4 @@ TEST_F(ContactPlanTest, RejectsWhatCannotBeUsed) {
 }
 
 }  // namespace
-}  // namespace dexcheck::contact_plan_test
+}  // namespace dexcheck::testing::contact_plan_test

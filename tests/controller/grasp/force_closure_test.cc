@@ -8,17 +8,12 @@
 #include <random>
 
 #include "controller/grasp/grasp_force.h"
+#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/controller/grasp/random_grasp.h"
 
-namespace dexcheck::force_closure_test {
+namespace dexcheck::testing::force_closure_test {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::MakeEquatorGraspForceProblem;
-using testing::MakeRandomGraspForceProblem;
-using testing::MatrixNear;
-using ::testing::ThrowsMessage;
 
 ForceClosureOptions MakeOptions(ForceNormalization normalization) {
   ForceClosureOptions options;
@@ -280,4 +275,4 @@ TEST(ForceClosureErrors, NameTheValue) {
 }
 
 }  // namespace
-}  // namespace dexcheck::force_closure_test
+}  // namespace dexcheck::testing::force_closure_test

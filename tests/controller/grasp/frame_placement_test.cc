@@ -11,16 +11,13 @@
 #include "controller/dynamics/model_terms.h"
 #include "controller/grasp/contact_plan.h"
 #include "tests/common/linear_algebra.h"
+#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::frame_placement_test {
+namespace dexcheck::testing::frame_placement_test {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::MatrixNear;
-using ::testing::ThrowsMessage;
 
 // Residual that ends the search, 1e-13, and the rounding of two chains of 13 transforms a metre long.
 constexpr double kPoseTolerance = 1e-12;
@@ -217,4 +214,4 @@ TEST_F(FramePlacementTest, RejectsWhatCannotBeUsed) {
 }
 
 }  // namespace
-}  // namespace dexcheck::frame_placement_test
+}  // namespace dexcheck::testing::frame_placement_test

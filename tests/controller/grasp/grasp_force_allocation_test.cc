@@ -27,7 +27,7 @@ void* malloc(std::size_t size) {
 }
 }
 
-namespace dexcheck::grasp_force_allocation_test {
+namespace dexcheck::testing::grasp_force_allocation_test {
 namespace {
 
 long CountAllocations(GraspForceSolver& solver, const std::vector<GraspForceProblem>& problems) {
@@ -70,5 +70,5 @@ TEST(GraspForceAllocation, SolveDoesNone) {
 }
 
 }  // namespace
-}  // namespace dexcheck::grasp_force_allocation_test
+}  // namespace dexcheck::testing::grasp_force_allocation_test
 #endif

@@ -11,11 +11,8 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/grasp/random_grasp.h"
 
-namespace dexcheck::grasp_force_random_test {
+namespace dexcheck::testing::grasp_force_random_test {
 namespace {
-
-using testing::MakeRandomGraspForceProblem;
-using testing::TolScale;
 
 constexpr int kSamples = 10000;
 // No cone and no bound violated beyond this, N.
@@ -152,4 +149,4 @@ TEST(RandomGraspsOracle, NoSampledForceGivesMore) {
 }
 
 }  // namespace
-}  // namespace dexcheck::grasp_force_random_test
+}  // namespace dexcheck::testing::grasp_force_random_test

@@ -13,12 +13,8 @@
 #include "tests/controller/grasp/random_grasp.h"
 #include "tests/controller/grasp/sdp_oracle.h"
 
-namespace dexcheck::grasp_force_sdp_test {
+namespace dexcheck::testing::grasp_force_sdp_test {
 namespace {
-
-using testing::MakeRandomGraspForceProblem;
-using testing::SdpSolution;
-using testing::SdpStatus;
 
 // Relative difference of the optima. Both solvers stop at a relative gap of about 1e-7 (csdp: 1e-8).
 constexpr double kRelative = 1e-6;
@@ -106,4 +102,4 @@ TEST_F(GraspForceSdp, ThirteenContacts) { Compare(13, 0, 10); }
 TEST_F(GraspForceSdp, FourContactsWithSixteenLimits) { Compare(4, 16, 20); }
 
 }  // namespace
-}  // namespace dexcheck::grasp_force_sdp_test
+}  // namespace dexcheck::testing::grasp_force_sdp_test

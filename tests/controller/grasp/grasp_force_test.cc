@@ -11,19 +11,12 @@
 
 #include "controller/common/errors.h"
 #include "tests/common/linear_algebra.h"
+#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/controller/grasp/random_grasp.h"
 
-namespace dexcheck::grasp_force_test {
+namespace dexcheck::testing::grasp_force_test {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::MakeEquatorGraspForceProblem;
-using testing::MakeRandomGraspForceProblem;
-using testing::MatrixNear;
-using testing::MoveGrasp;
-using ::testing::ThrowsMessage;
-using testing::TolScale;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
@@ -474,4 +467,4 @@ TEST(GraspForceErrors, ContactsOnOneLineAreSingular) {
 }
 
 }  // namespace
-}  // namespace dexcheck::grasp_force_test
+}  // namespace dexcheck::testing::grasp_force_test

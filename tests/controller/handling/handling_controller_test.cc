@@ -13,12 +13,8 @@
 #include "tests/common/throws.h"
 #include "tests/controller/control/grasp_scene.h"
 
-namespace dexcheck::handling_controller_test {
+namespace dexcheck::testing::handling_controller_test {
 namespace {
-
-using testing::AllocationCounter;
-using testing::GraspScene;
-using testing::MatrixNear;
 
 // Measured 3e-13 N m of 50, 2e-11 rad/s^2 of 100, 2e-13 N.
 constexpr double kTorqueRounding = 1e-11;
@@ -206,4 +202,4 @@ TEST_F(HandlingControllerTest, AllocatesForNewSetsOfContactsOnly) {
 }
 
 }  // namespace
-}  // namespace dexcheck::handling_controller_test
+}  // namespace dexcheck::testing::handling_controller_test

@@ -13,14 +13,11 @@
 #include "controller/common/errors.h"
 #include "controller/common/toml_reader.h"
 #include "controller/model/parameter_reader.h"
+#include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::parameter_errors_test {
+namespace dexcheck::testing::parameter_errors_test {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::Not;
-using ::testing::StartsWith;
 
 const std::string& ShippedText() {
   static const std::string text = ReadTextFile(
@@ -382,4 +379,4 @@ TEST(ParameterTexts, DamagedAtRandomAreReadOrRefusedInOneLine) {
 }
 
 }  // namespace
-}  // namespace dexcheck::parameter_errors_test
+}  // namespace dexcheck::testing::parameter_errors_test

@@ -10,14 +10,12 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/toml_reader.h"
+#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::parameter_reader_test {
+namespace dexcheck::testing::parameter_reader_test {
 namespace {
-
-using dexcheck::testing::MatrixNear;
-using ::testing::ElementsAre;
 
 const std::filesystem::path kParameters = testing::SourcePath("/controller/parameters");
 
@@ -284,4 +282,4 @@ TEST(OtherForms, AreRead) {
 }
 
 }  // namespace
-}  // namespace dexcheck::parameter_reader_test
+}  // namespace dexcheck::testing::parameter_reader_test

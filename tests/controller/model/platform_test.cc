@@ -10,11 +10,8 @@
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck::platform_test {
+namespace dexcheck::testing::platform_test {
 namespace {
-
-using testing::MatrixNear;
-using testing::TolScale;
 
 // Entries reach 1/r = 10 and the products below a hundred; a handful of operations each: 10 eps * 100.
 constexpr double kRounding = 2e-13;
@@ -226,4 +223,4 @@ TEST_P(PlatformTest, RejectsWhatIsNotADifferentialDrive) {
 }
 
 }  // namespace
-}  // namespace dexcheck::platform_test
+}  // namespace dexcheck::testing::platform_test

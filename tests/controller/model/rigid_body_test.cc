@@ -10,10 +10,8 @@
 
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck::rigid_body_test {
+namespace dexcheck::testing::rigid_body_test {
 namespace {
-
-using dexcheck::testing::MatrixNear;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 // Some ten roundings of numbers that are at most 1.
@@ -214,4 +212,4 @@ TEST(PhysicalInconsistency, AllowsForRoundingAndNoMore) {
 }
 
 }  // namespace
-}  // namespace dexcheck::rigid_body_test
+}  // namespace dexcheck::testing::rigid_body_test

@@ -10,13 +10,11 @@
 #include <string>
 
 #include "controller/common/errors.h"
+#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck::robot_model_test {
+namespace dexcheck::testing::robot_model_test {
 namespace {
-
-using dexcheck::testing::MatrixNear;
-using ::testing::ElementsAre;
 
 const double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -197,4 +195,4 @@ INSTANTIATE_TEST_SUITE_P(RobotModel, RobotModelRejects,
                          [](const auto& info) { return info.param.name; });
 
 }  // namespace
-}  // namespace dexcheck::robot_model_test
+}  // namespace dexcheck::testing::robot_model_test

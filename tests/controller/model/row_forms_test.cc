@@ -10,10 +10,8 @@
 #include "controller/model/parameter_reader.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck::row_forms_test {
+namespace dexcheck::testing::row_forms_test {
 namespace {
-
-using testing::MatrixNear;
 
 // A few products of rotations and lengths of size 1.
 constexpr double kRounding = 1e-15;
@@ -174,4 +172,4 @@ TEST(OtherForms, AreRefusedInOneLine) {
 }
 
 }  // namespace
-}  // namespace dexcheck::row_forms_test
+}  // namespace dexcheck::testing::row_forms_test

@@ -9,17 +9,12 @@
 #include <string>
 
 #include "controller/common/errors.h"
+#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/controller/object/object_states.h"
 
-namespace dexcheck::euler_zyz_test {
+namespace dexcheck::testing::euler_zyz_test {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::MakeObjectStates;
-using testing::MatrixNear;
-using testing::ObjectState;
-using testing::RotationByEigen;
 
 // Entries up to 1, a few operations each: 20 eps.
 constexpr double kRounding = 5e-15;
@@ -214,4 +209,4 @@ TEST(EulerZyz, RejectsTheCallersMistakes) {
 }
 
 }  // namespace
-}  // namespace dexcheck::euler_zyz_test
+}  // namespace dexcheck::testing::euler_zyz_test

@@ -12,19 +12,8 @@
 #include "tests/common/matrix_near.h"
 #include "tests/controller/object/object_states.h"
 
-namespace dexcheck::object_dynamics_test {
+namespace dexcheck::testing::object_dynamics_test {
 namespace {
-
-using testing::kGravity;
-using testing::kPrincipalMoments;
-using testing::MakeObject;
-using testing::MakeObjectStates;
-using testing::MatrixNear;
-using testing::MoveBy;
-using testing::ObjectState;
-using testing::PrincipalAxes;
-using testing::RotationByEigen;
-using testing::TolScale;
 
 // Terms up to 30 (N_o 20 N), tens of operations: 20 eps * 30.
 constexpr double kRounding = 1e-13;
@@ -354,4 +343,4 @@ TEST(ObjectDynamics, RejectsABodyThatIsNotAnObject) {
 }
 
 }  // namespace
-}  // namespace dexcheck::object_dynamics_test
+}  // namespace dexcheck::testing::object_dynamics_test

@@ -10,11 +10,8 @@
 
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck::so3_test {
+namespace dexcheck::testing::so3_test {
 namespace {
-
-using testing::MatrixNear;
-using testing::TolScale;
 
 // Entries up to pi, about ten operations each: 20 eps.
 constexpr double kRounding = 5e-15;
@@ -318,4 +315,4 @@ TEST(OrientationError, ClosedLoopFollowsTheLinearSolution) {
 }
 
 }  // namespace
-}  // namespace dexcheck::so3_test
+}  // namespace dexcheck::testing::so3_test

@@ -6,7 +6,7 @@
 
 #include <limits>
 
-namespace dexcheck::check_record_test {
+namespace dexcheck::testing::check_record_test {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -158,4 +158,4 @@ TEST(CheckRecord, ResetForgetsValuesOnly) {
 }
 
 }  // namespace
-}  // namespace dexcheck::check_record_test
+}  // namespace dexcheck::testing::check_record_test

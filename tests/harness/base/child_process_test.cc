@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace dexcheck::child_process_test {
+namespace dexcheck::testing::child_process_test {
 namespace {
 
 std::string ReceiveAll(int channel) {
@@ -104,4 +104,4 @@ TEST(ChildProcess, OneThatHasEndedIsToldNothing) {
 }
 
 }  // namespace
-}  // namespace dexcheck::child_process_test
+}  // namespace dexcheck::testing::child_process_test

@@ -18,11 +18,10 @@
 #include "harness/base/partial_file.h"
 #include "tests/common/files.h"
 
-namespace dexcheck::temporary_path_test {
+namespace dexcheck::testing::temporary_path_test {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::WriteText;
 
 constexpr int kExitCode = 3;
 
@@ -154,4 +153,4 @@ TEST(HandleSignals, AFileThatGrowsBeyondItsLimitIsAnError) {
 }
 
 }  // namespace
-}  // namespace dexcheck::temporary_path_test
+}  // namespace dexcheck::testing::temporary_path_test

@@ -10,12 +10,10 @@
 #include <vector>
 
 #include "harness/checks/step_check_table.h"
+#include "tests/common/matchers.h"
 
-namespace dexcheck::attribution_test {
+namespace dexcheck::testing::attribution_test {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::StartsWith;
 
 struct Step {
   const char* name;
@@ -331,4 +329,4 @@ TEST(NameOf, CausesHaveDifferentNames) {
 }
 
 }  // namespace
-}  // namespace dexcheck::attribution_test
+}  // namespace dexcheck::testing::attribution_test

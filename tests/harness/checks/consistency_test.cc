@@ -17,10 +17,8 @@
 #include "tests/common/random_robot.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::consistency_test {
+namespace dexcheck::testing::consistency_test {
 namespace {
-
-using testing::RandomRobotOptions;
 
 constexpr double kLargestBound = 1e-11;
 
@@ -191,4 +189,4 @@ TEST(Consistency, StopsWhenToldTo) {
 }
 
 }  // namespace
-}  // namespace dexcheck::consistency_test
+}  // namespace dexcheck::testing::consistency_test

@@ -7,12 +7,11 @@
 #include "harness/checks/law_terms.h"
 #include "harness/checks/step_check_table.h"
 #include "harness/diagnosis/spoiled_law.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::law_check_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 const std::vector<std::string> kShort = {"duration=0.8", "settle=0.2"};
 

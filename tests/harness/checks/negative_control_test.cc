@@ -15,7 +15,7 @@
 #include "harness/engine/engine.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::negative_control_test {
+namespace dexcheck::testing::negative_control_test {
 namespace {
 
 constexpr double kChange = 1e-3;
@@ -164,4 +164,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& info) { return info.param.name; });
 
 }  // namespace
-}  // namespace dexcheck::negative_control_test
+}  // namespace dexcheck::testing::negative_control_test

@@ -9,10 +9,8 @@
 #include "controller/object/euler_zyz.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck::object_rates_test {
+namespace dexcheck::testing::object_rates_test {
 namespace {
-
-using testing::MatrixNear;
 
 TEST(ObjectRates, AreThoseOfTheModelToRounding) {
   std::mt19937 random(11);
@@ -35,4 +33,4 @@ TEST(ObjectRates, AreThoseOfTheModelToRounding) {
 }
 
 }  // namespace
-}  // namespace dexcheck::object_rates_test
+}  // namespace dexcheck::testing::object_rates_test

@@ -16,12 +16,8 @@
 #include "tests/common/paths.h"
 #include "tests/harness/checks/step_check_scene.h"
 
-namespace dexcheck::step_model_check_test {
+namespace dexcheck::testing::step_model_check_test {
 namespace {
-
-using testing::AllocationCounter;
-using testing::CheckedController;
-using testing::GraspWalk;
 
 constexpr double kRingRadius = 0.035;
 constexpr double kTubeRadius = 0.011;
@@ -357,4 +353,4 @@ TEST(TermTable, IsSound) {
 }
 
 }  // namespace
-}  // namespace dexcheck::step_model_check_test
+}  // namespace dexcheck::testing::step_model_check_test

@@ -5,21 +5,13 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/common/legged_robots.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::answers_command_test {
+namespace dexcheck::testing::answers_command_test {
 namespace {
 
 using Json = nlohmann::json;
-using ::testing::HasSubstr;
-using testing::IsRefused;
-using ::testing::Not;
-using testing::ProgramResult;
-using testing::ReadText;
-using testing::ReplaceOnce;
-using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 const std::string kExamples = testing::SourcePath("/harness/sides/examples/");
 const std::string kPython = DEXCHECK_PYTHON;
@@ -308,4 +300,4 @@ for line in sys.stdin:
 }
 
 }  // namespace
-}  // namespace dexcheck::answers_command_test
+}  // namespace dexcheck::testing::answers_command_test

@@ -5,15 +5,8 @@
 #include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::bad_input_test {
+namespace dexcheck::testing::bad_input_test {
 namespace {
-
-using testing::IsRefused;
-using testing::ReadText;
-using testing::ReplaceOnce;
-using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 /// Replaces one place in one file.
 struct Edit {
@@ -273,4 +266,4 @@ TEST_F(BadFiles, AMistakeOfTheProgramIsNoBadInput) {
 }
 
 }  // namespace
-}  // namespace dexcheck::bad_input_test
+}  // namespace dexcheck::testing::bad_input_test

@@ -7,11 +7,8 @@
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/report/report_run.h"
 
-namespace dexcheck::compare_command_test {
+namespace dexcheck::testing::compare_command_test {
 namespace {
-
-using testing::ProgramResult;
-using testing::RunDexcheck;
 
 TEST(CompareCommand, ExitsWithOneAboveTheTolerance) {
   const testing::TempFolder folder;
@@ -58,4 +55,4 @@ TEST(CompareCommand, BadInputIsOneLine) {
 }
 
 }  // namespace
-}  // namespace dexcheck::compare_command_test
+}  // namespace dexcheck::testing::compare_command_test

@@ -5,16 +5,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::compare_files_test {
+namespace dexcheck::testing::compare_files_test {
 namespace {
 
 using Json = nlohmann::json;
-using ::testing::HasSubstr;
-using testing::ProgramResult;
-using testing::ReplaceOnce;
-using testing::WriteText;
 
 const std::string kUrdf = R"(<robot name="two links">
 <link name="stand"/>
@@ -268,4 +265,4 @@ TEST_F(CompareFiles, WantOfMemoryIsNoInvalidModel) {
 }
 
 }  // namespace
-}  // namespace dexcheck::compare_files_test
+}  // namespace dexcheck::testing::compare_files_test

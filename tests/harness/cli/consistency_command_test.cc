@@ -7,20 +7,13 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::consistency_command_test {
+namespace dexcheck::testing::consistency_command_test {
 namespace {
 
 using Json = nlohmann::json;
-using testing::DexcheckCommand;
-using ::testing::HasSubstr;
-using testing::ProgramResult;
-using testing::ReadText;
-using testing::ReplaceOnce;
-using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 std::vector<std::string> Join(std::vector<std::string> a, const std::vector<std::string>& b) {
   a.insert(a.end(), b.begin(), b.end());
@@ -205,4 +198,4 @@ INSTANTIATE_TEST_SUITE_P(Signals, Interruption, ::testing::Values(SIGINT, SIGTER
                          [](const auto& info) { return info.param == SIGINT ? "SigInt" : "SigTerm"; });
 
 }  // namespace
-}  // namespace dexcheck::consistency_command_test
+}  // namespace dexcheck::testing::consistency_command_test

@@ -11,12 +11,8 @@
 #include "harness/log/log_reader.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::determinism_test {
+namespace dexcheck::testing::determinism_test {
 namespace {
-
-using testing::DexcheckCommand;
-using testing::ProgramResult;
-using testing::TempFolder;
 
 /// The program on the machine's first processor only.
 std::vector<std::string> OnOneProcessor(std::vector<std::string> command) {
@@ -88,4 +84,4 @@ TEST(Determinism, ComparisonsGiveTheSameNumbers) {
 }
 
 }  // namespace
-}  // namespace dexcheck::determinism_test
+}  // namespace dexcheck::testing::determinism_test

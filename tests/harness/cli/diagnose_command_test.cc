@@ -7,22 +7,13 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::diagnose_command_test {
+namespace dexcheck::testing::diagnose_command_test {
 namespace {
 
 using Json = nlohmann::json;
-using testing::DexcheckCommand;
-using ::testing::HasSubstr;
-using testing::IsRefused;
-using ::testing::Not;
-using testing::ProgramResult;
-using testing::ReadText;
-using testing::ReplaceOnce;
-using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 TEST(DiagnoseCommand, ShippedRobotHasNothingToExplain) {
   const ProgramResult result = RunDexcheck({"diagnose"});
@@ -303,4 +294,4 @@ TEST(MutateRunCommand, InterruptedTellsWhatWasDone) {
 }
 
 }  // namespace
-}  // namespace dexcheck::diagnose_command_test
+}  // namespace dexcheck::testing::diagnose_command_test

@@ -14,18 +14,10 @@
 #include "tests/common/random_robot.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::eval_command_test {
+namespace dexcheck::testing::eval_command_test {
 namespace {
 
 using Json = nlohmann::json;
-using testing::IsRefused;
-using testing::MatrixNear;
-using testing::ProgramResult;
-using testing::ReadText;
-using testing::ReplaceOnce;
-using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 std::vector<double> ToList(const VectorXd& vector) { return {vector.begin(), vector.end()}; }
 
@@ -332,4 +324,4 @@ TEST_F(EvalCommand, BallJointsHaveQuaternions) {
 }
 
 }  // namespace
-}  // namespace dexcheck::eval_command_test
+}  // namespace dexcheck::testing::eval_command_test

@@ -11,16 +11,10 @@
 #include "tests/common/matrix_near.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::eval_contacts_test {
+namespace dexcheck::testing::eval_contacts_test {
 namespace {
 
 using Json = nlohmann::json;
-using testing::IsRefused;
-using testing::MatrixNear;
-using testing::ProgramResult;
-using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 // Lengths of some 0.05 m and unit vectors, a few operations each.
 constexpr double kRounding = 1e-15;
@@ -261,4 +255,4 @@ TEST_F(EvalContacts, RefusesImpossibleContacts) {
 }
 
 }  // namespace
-}  // namespace dexcheck::eval_contacts_test
+}  // namespace dexcheck::testing::eval_contacts_test

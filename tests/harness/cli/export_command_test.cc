@@ -8,16 +8,11 @@
 #include <sstream>
 
 #include "harness/log/log_writer.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::export_command_test {
+namespace dexcheck::testing::export_command_test {
 namespace {
-
-using ::testing::ElementsAre;
-using testing::IsRefused;
-using testing::ReadText;
-using testing::RunDexcheck;
-using testing::WriteText;
 
 constexpr long kRows = 25;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -216,4 +211,4 @@ TEST_F(ExportTest, OutputsThatCannotBeWrittenAreNamed) {
 }
 
 }  // namespace
-}  // namespace dexcheck::export_command_test
+}  // namespace dexcheck::testing::export_command_test

@@ -14,21 +14,13 @@
 #include <random>
 
 #include "harness/log/log_reader.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::fault_injection_test {
+namespace dexcheck::testing::fault_injection_test {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::DexcheckCommand;
-using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::ProgramOptions;
-using testing::ProgramResult;
-using testing::ReadText;
-using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 /// Arguments of a run of some hundred steps without the report, whose drawing takes most of the time.
 std::vector<std::string> RunArguments(const std::string& scenario, const fs::path& out,
@@ -346,4 +338,4 @@ TEST_F(DamagedLogs, WithImpossibleNumbersAreRefusedOrReadToTheEnd) {
 }
 
 }  // namespace
-}  // namespace dexcheck::fault_injection_test
+}  // namespace dexcheck::testing::fault_injection_test

@@ -6,13 +6,10 @@
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/log/forge.h"
 
-namespace dexcheck::forged_log_test {
+namespace dexcheck::testing::forged_log_test {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::IsRefused;
-using testing::RunDexcheck;
-using testing::WriteText;
 
 class ForgedLog : public ::testing::Test {
  protected:
@@ -98,4 +95,4 @@ TEST_F(ForgedLog, ASeedThatIsNoNumberIsNamed) {
 }
 
 }  // namespace
-}  // namespace dexcheck::forged_log_test
+}  // namespace dexcheck::testing::forged_log_test

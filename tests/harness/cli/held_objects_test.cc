@@ -4,12 +4,11 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing::held_objects_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 /// An object in place of the shipped torus, of about its size, held where that is.
 struct HeldObject {

@@ -5,20 +5,14 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/sides/panda_urdf.h"
 
-namespace dexcheck::import_command_test {
+namespace dexcheck::testing::import_command_test {
 namespace {
 
 using Json = nlohmann::json;
-using ::testing::HasSubstr;
-using testing::ProgramResult;
-using testing::ReadText;
-using testing::ReplaceOnce;
-using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 class TwoDescriptions : public ::testing::Test {
  protected:
@@ -258,4 +252,4 @@ damping_ratio = 1
 }
 
 }  // namespace
-}  // namespace dexcheck::import_command_test
+}  // namespace dexcheck::testing::import_command_test

@@ -7,14 +7,8 @@
 #include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::install_test {
+namespace dexcheck::testing::install_test {
 namespace {
-
-using testing::ProgramResult;
-using testing::ReadText;
-using testing::ReplaceOnce;
-using testing::RunProgram;
-using testing::WriteText;
 
 TEST(InstalledProgram, UsesTheFilesBesideIt) {
   const testing::TempFolder folder;
@@ -44,4 +38,4 @@ TEST(InstalledProgram, UsesTheFilesBesideIt) {
 }
 
 }  // namespace
-}  // namespace dexcheck::install_test
+}  // namespace dexcheck::testing::install_test

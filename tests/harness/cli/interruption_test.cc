@@ -7,18 +7,14 @@
 #include <thread>
 
 #include "harness/log/log_reader.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/report/report_run.h"
 
-namespace dexcheck::interruption_test {
+namespace dexcheck::testing::interruption_test {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
-using testing::Program;
-using testing::ProgramOptions;
-using testing::ProgramResult;
-using testing::RunDexcheck;
 
 class Interruption : public ::testing::Test {
  protected:
@@ -132,4 +128,4 @@ TEST_F(Interruption, OfADiagnosisIsNoVerdict) {
 }
 
 }  // namespace
-}  // namespace dexcheck::interruption_test
+}  // namespace dexcheck::testing::interruption_test

@@ -3,13 +3,11 @@
 #include <gmock/gmock.h>
 #include <tinyxml2.h>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::junit_test {
+namespace dexcheck::testing::junit_test {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::RunDexcheck;
 
 /// The test cases of a JUnit file, whose counts must be those that it states.
 struct JUnitFile {
@@ -98,4 +96,4 @@ TEST_F(JUnit, ABadPathIsRefusedBeforeTheWork) {
 }
 
 }  // namespace
-}  // namespace dexcheck::junit_test
+}  // namespace dexcheck::testing::junit_test

@@ -4,14 +4,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing::own_arm_test {
 namespace {
 
 using Json = nlohmann::json;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 // A turning column, a lift that slides on it, an elbow; sizes and masses by geoms alone.
 constexpr const char* kArm = R"(<mujoco model="own arm">

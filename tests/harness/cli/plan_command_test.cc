@@ -8,24 +8,16 @@
 
 #include "controller/dynamics/model_terms.h"
 #include "controller/object/euler_zyz.h"
+#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paper_robot.h"
 #include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::plan_command_test {
+namespace dexcheck::testing::plan_command_test {
 namespace {
 
 using Json = nlohmann::json;
-using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::MatrixNear;
-using testing::ProgramResult;
-using testing::ReadText;
-using testing::ReplaceOnce;
-using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 /// The shipped scenario `hold` with another [grasp].
 std::string MakeScenario(const std::string& grasp, bool is_singular) {
@@ -193,4 +185,4 @@ TEST(PlanCommand, TellsWhichBodiesMeet) {
 }
 
 }  // namespace
-}  // namespace dexcheck::plan_command_test
+}  // namespace dexcheck::testing::plan_command_test

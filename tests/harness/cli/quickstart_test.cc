@@ -5,12 +5,10 @@
 #include "tests/common/paths.h"
 #include "tests/common/run_program.h"
 
-namespace dexcheck::quickstart_test {
+namespace dexcheck::testing::quickstart_test {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::ReadText;
-using testing::WriteText;
 
 class Quickstart : public ::testing::Test {
  protected:
@@ -55,4 +53,4 @@ TEST_F(Quickstart, RunsThePapersExperimentUnlessToldOtherwise) {
 }
 
 }  // namespace
-}  // namespace dexcheck::quickstart_test
+}  // namespace dexcheck::testing::quickstart_test

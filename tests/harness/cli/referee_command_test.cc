@@ -9,22 +9,14 @@
 
 #include "harness/base/shell.h"
 #include "tests/common/legged_robots.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/sides/panda_urdf.h"
 
-namespace dexcheck::referee_command_test {
+namespace dexcheck::testing::referee_command_test {
 namespace {
 
 using Json = nlohmann::json;
-using ::testing::HasSubstr;
-using testing::IsRefused;
-using ::testing::Not;
-using testing::ProgramResult;
-using testing::ReadText;
-using testing::ReplaceOnce;
-using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 /// Pairs whose terms were all compared and agree, of this many engines.
 void ExpectAllPairsAgree(const Json& json, size_t engines, double tolerance) {
@@ -233,4 +225,4 @@ TEST_F(Referee, MujocoThreeAgrees) {
 }
 
 }  // namespace
-}  // namespace dexcheck::referee_command_test
+}  // namespace dexcheck::testing::referee_command_test

@@ -16,17 +16,15 @@
 #include "harness/engine/engine.h"
 #include "harness/log/log_writer.h"
 #include "renders/png_file.h"
+#include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/renders/kinematic_run.h"
 
-namespace dexcheck::render_command_test {
+namespace dexcheck::testing::render_command_test {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::RunDexcheck;
 
 /// What a log leaves out, or has wrong.
 struct Flaw {
@@ -259,4 +257,4 @@ TEST_F(RenderCommandTest, StoppedItLeavesNothing) {
 }
 
 }  // namespace
-}  // namespace dexcheck::render_command_test
+}  // namespace dexcheck::testing::render_command_test

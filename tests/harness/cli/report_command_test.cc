@@ -7,19 +7,14 @@
 #include <string>
 #include <utility>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/report/report_run.h"
 
-namespace dexcheck::report_command_test {
+namespace dexcheck::testing::report_command_test {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::ReadText;
-using testing::ReportRun;
-using testing::RunDexcheck;
-using testing::WriteReportRun;
 
 class ReportCommandTest : public ::testing::Test {
  protected:
@@ -99,4 +94,4 @@ TEST_F(ReportCommandTest, SaysThatGnuplotIsMissing) {
 }
 
 }  // namespace
-}  // namespace dexcheck::report_command_test
+}  // namespace dexcheck::testing::report_command_test

@@ -10,20 +10,12 @@
 
 #include "harness/log/log_reader.h"
 #include "harness/log/log_writer.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/log/forge.h"
 
-namespace dexcheck::run_command_test {
+namespace dexcheck::testing::run_command_test {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::Program;
-using testing::ProgramResult;
-using testing::ReadText;
-using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 nlohmann::json ReadSummary(const std::filesystem::path& folder) {
   return nlohmann::json::parse(ReadText(folder / "summary.json"));
@@ -412,4 +404,4 @@ TEST(RunCommand, RefusesBadInputInOneLine) {
 }
 
 }  // namespace
-}  // namespace dexcheck::run_command_test
+}  // namespace dexcheck::testing::run_command_test

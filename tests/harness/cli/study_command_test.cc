@@ -13,10 +13,10 @@
 #include <random>
 #include <thread>
 
+#include "tests/common/matchers.h"
+
 namespace dexcheck::testing::study_command_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 /// Where settling leaves the object, m; a twentieth of the start error, measured 5e-9.
 constexpr double kSettled = 5e-8;

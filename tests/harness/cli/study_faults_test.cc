@@ -4,12 +4,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/study_command.h"
 
 namespace dexcheck::testing::study_faults_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 // One trial that takes about two seconds of processor time, and one that takes none to speak of.
 const std::string kSlowStudy = R"(name = "slow"

@@ -4,12 +4,11 @@
 
 #include <set>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/study_command.h"
 
 namespace dexcheck::testing::study_merge_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 TEST_F(StudyCommand, MergedShardsAreTheStudy) {
   const std::string reference = Reference();

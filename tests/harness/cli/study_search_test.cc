@@ -11,12 +11,11 @@
 #include <thread>
 
 #include "harness/study/search_history.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/study_command.h"
 
 namespace dexcheck::testing::study_search_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 // Gains of a run so short that the error hardly moves: the object's own weight and the start error decide.
 const std::string kSearch = R"(name = "tiny"

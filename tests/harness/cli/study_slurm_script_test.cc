@@ -2,12 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/study_command.h"
 
 namespace dexcheck::testing::study_slurm_script_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 TEST_F(StudyCommand, TheBatchScriptIsReady) {
   const ProgramResult result = RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "7"});

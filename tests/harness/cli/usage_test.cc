@@ -8,17 +8,11 @@
 #include <regex>
 #include <sstream>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::usage_test {
+namespace dexcheck::testing::usage_test {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::ReadText;
-using testing::RunDexcheck;
-using testing::TempFolder;
-using testing::WriteText;
 
 TEST(Usage, UnknownWordsAreNamed) {
   EXPECT_TRUE(IsRefused(RunDexcheck({}), {"A subcommand is required"}));
@@ -261,4 +255,4 @@ INSTANTIATE_TEST_SUITE_P(Commands, Outputs,
                          [](const auto& info) { return info.param.front(); });
 
 }  // namespace
-}  // namespace dexcheck::usage_test
+}  // namespace dexcheck::testing::usage_test

@@ -5,17 +5,13 @@
 #include <unistd.h>
 
 #include "harness/log/log_reader.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
-namespace dexcheck::verdict_test {
+namespace dexcheck::testing::verdict_test {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
-using testing::IsRefused;
-using testing::ProgramOptions;
-using testing::ProgramResult;
-using testing::RunDexcheck;
 
 class Verdict : public ::testing::Test {
  protected:
@@ -129,4 +125,4 @@ TEST_F(Verdict, OptionsThatWouldBeIgnoredAreRefused) {
 }
 
 }  // namespace
-}  // namespace dexcheck::verdict_test
+}  // namespace dexcheck::testing::verdict_test

@@ -18,12 +18,11 @@
 #include "harness/sides/mjcf_reader.h"
 #include "harness/sides/parameter_writer.h"
 #include "tests/common/legged_robots.h"
+#include "tests/common/matchers.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::diagnose_floating_test {
+namespace dexcheck::testing::diagnose_floating_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 /// A number of a table's text, found by what stands before its list.
 struct Place {
@@ -197,4 +196,4 @@ TEST(FileTermsTest, RowsOfModifiedParametersStay) {
 }
 
 }  // namespace
-}  // namespace dexcheck::diagnose_floating_test
+}  // namespace dexcheck::testing::diagnose_floating_test

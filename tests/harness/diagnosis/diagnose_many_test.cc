@@ -15,7 +15,7 @@
 #include "tests/common/paper_robot.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::diagnose_many_test {
+namespace dexcheck::testing::diagnose_many_test {
 namespace {
 
 using Kind = ParameterKind;
@@ -286,4 +286,4 @@ TEST(DiagnoseMany, NothingWrongIsPrinted) {
 }
 
 }  // namespace
-}  // namespace dexcheck::diagnose_many_test
+}  // namespace dexcheck::testing::diagnose_many_test

@@ -16,7 +16,7 @@
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::diagnose_test {
+namespace dexcheck::testing::diagnose_test {
 namespace {
 
 constexpr double kScale = 1e-3;
@@ -354,4 +354,4 @@ TEST(Diagnose, StopsWhenToldTo) {
 }
 
 }  // namespace
-}  // namespace dexcheck::diagnose_test
+}  // namespace dexcheck::testing::diagnose_test

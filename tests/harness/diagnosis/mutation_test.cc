@@ -14,7 +14,7 @@
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::mutation_test {
+namespace dexcheck::testing::mutation_test {
 namespace {
 
 constexpr int kSamples = 3;
@@ -180,4 +180,4 @@ TEST(Mutants, ReversedAxisTurnsTheOtherWay) {
 }
 
 }  // namespace
-}  // namespace dexcheck::mutation_test
+}  // namespace dexcheck::testing::mutation_test

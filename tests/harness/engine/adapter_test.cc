@@ -20,11 +20,8 @@
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::adapter_test {
+namespace dexcheck::testing::adapter_test {
 namespace {
-
-using testing::MatrixNear;
-using testing::ReplaceOnce;
 
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
@@ -406,4 +403,4 @@ TEST(ShippedAdapter, LeavesTheObjectAlone) {
 }
 
 }  // namespace
-}  // namespace dexcheck::adapter_test
+}  // namespace dexcheck::testing::adapter_test

@@ -15,10 +15,9 @@
 #include "tests/common/allocation_counter.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::clearance_test {
+namespace dexcheck::testing::clearance_test {
 namespace {
 
-using testing::AllocationCounter;
 using Shape = Solid::Shape;
 
 constexpr double kAccuracy = 2e-7;  // m: twice that of CalcDistance
@@ -279,4 +278,4 @@ TEST_F(ClearanceTest, TimeBeginsAnew) {
 }
 
 }  // namespace
-}  // namespace dexcheck::clearance_test
+}  // namespace dexcheck::testing::clearance_test

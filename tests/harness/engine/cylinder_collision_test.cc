@@ -13,10 +13,8 @@
 #include "harness/engine/engine.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck::cylinder_collision_test {
+namespace dexcheck::testing::cylinder_collision_test {
 namespace {
-
-using testing::MatrixNear;
 
 constexpr double kRadius = 0.05;
 constexpr double kHalfLength = 0.03;
@@ -122,4 +120,4 @@ TEST(EllipsoidCollision, FindsTheNearestPointsOutsideAndIn) {
 }
 
 }  // namespace
-}  // namespace dexcheck::cylinder_collision_test
+}  // namespace dexcheck::testing::cylinder_collision_test

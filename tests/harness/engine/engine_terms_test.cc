@@ -12,13 +12,8 @@
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::engine_terms_test {
+namespace dexcheck::testing::engine_terms_test {
 namespace {
-
-using testing::DrawPositions;
-using testing::DrawVelocities;
-using testing::MatrixNear;
-using testing::RandomRobotOptions;
 
 struct Case {
   const char* name;
@@ -342,4 +337,4 @@ TEST(EngineTerms, FrictionHasTheForcesOfTendonsAroundGeoms) {
 }
 
 }  // namespace
-}  // namespace dexcheck::engine_terms_test
+}  // namespace dexcheck::testing::engine_terms_test

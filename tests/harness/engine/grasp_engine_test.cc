@@ -19,10 +19,8 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::grasp_engine_test {
+namespace dexcheck::testing::grasp_engine_test {
 namespace {
-
-using testing::MatrixNear;
 
 constexpr int kFingers = 4;
 
@@ -282,4 +280,4 @@ TEST_F(RandomGrasp, RatesAreTheEnginesAccelerations) {
 }
 
 }  // namespace
-}  // namespace dexcheck::grasp_engine_test
+}  // namespace dexcheck::testing::grasp_engine_test

@@ -12,11 +12,8 @@
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::mjcf_assets_test {
+namespace dexcheck::testing::mjcf_assets_test {
 namespace {
-
-using testing::TempFolder;
-using testing::WriteText;
 
 /// A tetrahedron's corners, and its faces with their normals outwards.
 constexpr float kCorners[4][3] = {{0, 0, 0}, {0.1F, 0, 0}, {0, 0.1F, 0}, {0, 0, 0.1F}};
@@ -135,4 +132,4 @@ TEST(MjcfAssets, AMissingMeshThatHasMassIsNamed) {
 }
 
 }  // namespace
-}  // namespace dexcheck::mjcf_assets_test
+}  // namespace dexcheck::testing::mjcf_assets_test

@@ -8,15 +8,12 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/mujoco_release.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::newer_mjcf_test {
+namespace dexcheck::testing::newer_mjcf_test {
 namespace {
-
-using ::testing::Contains;
-using ::testing::Field;
-using ::testing::HasSubstr;
 
 /// A pendulum with these words added at the places that their names say.
 struct Words {
@@ -174,4 +171,4 @@ TEST(NewerMjcf, ARangeLimits) {
 }
 
 }  // namespace
-}  // namespace dexcheck::newer_mjcf_test
+}  // namespace dexcheck::testing::newer_mjcf_test

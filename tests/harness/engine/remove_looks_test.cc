@@ -11,7 +11,7 @@
 #include "harness/engine/engine.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::remove_looks_test {
+namespace dexcheck::testing::remove_looks_test {
 namespace {
 
 /// Whether two arrays have the same bits.
@@ -124,4 +124,4 @@ TEST(RemoveLooks, KeepsWhatAnythingRefersTo) {
 }
 
 }  // namespace
-}  // namespace dexcheck::remove_looks_test
+}  // namespace dexcheck::testing::remove_looks_test

@@ -11,7 +11,7 @@
 #include "harness/engine/engine.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::rolling_engine_test {
+namespace dexcheck::testing::rolling_engine_test {
 namespace {
 
 constexpr double kRing = 0.035;
@@ -167,4 +167,4 @@ TEST(RollingBall, ProjectionRemovesTheDrift) {
 }
 
 }  // namespace
-}  // namespace dexcheck::rolling_engine_test
+}  // namespace dexcheck::testing::rolling_engine_test

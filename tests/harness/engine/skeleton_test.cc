@@ -8,7 +8,7 @@
 
 #include "tests/common/paths.h"
 
-namespace dexcheck::skeleton_test {
+namespace dexcheck::testing::skeleton_test {
 namespace {
 
 constexpr const char* kArm = R"(<mujoco>
@@ -89,4 +89,4 @@ TEST(Skeleton, ShowsShapesThatAreAllHidden) {
 }
 
 }  // namespace
-}  // namespace dexcheck::skeleton_test
+}  // namespace dexcheck::testing::skeleton_test

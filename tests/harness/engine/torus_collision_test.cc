@@ -15,10 +15,8 @@
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::torus_collision_test {
+namespace dexcheck::testing::torus_collision_test {
 namespace {
-
-using testing::MatrixNear;
 
 constexpr double kRing = 0.035;
 constexpr double kTube = 0.011;
@@ -298,4 +296,4 @@ TEST(TorusInTheEngine, LiesStillOnABox) {
 }
 
 }  // namespace
-}  // namespace dexcheck::torus_collision_test
+}  // namespace dexcheck::testing::torus_collision_test

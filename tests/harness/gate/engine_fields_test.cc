@@ -19,16 +19,12 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/mujoco_release.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 #include "tests/common/paper_robot.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::engine_fields_test {
+namespace dexcheck::testing::engine_fields_test {
 namespace {
-
-using ::testing::Contains;
-using ::testing::HasSubstr;
-using testing::TempFolder;
-using testing::WriteText;
 
 const std::string kMjcf = testing::SourcePath("/mjcf/");
 
@@ -421,4 +417,4 @@ TEST_F(EngineFields, ChangedAreNamedOrMoveNothing) {
 }
 
 }  // namespace
-}  // namespace dexcheck::engine_fields_test
+}  // namespace dexcheck::testing::engine_fields_test

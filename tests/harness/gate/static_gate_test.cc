@@ -14,13 +14,8 @@
 #include "tests/common/paths.h"
 #include "tests/harness/run/shipped_run.h"
 
-namespace dexcheck::static_gate_test {
+namespace dexcheck::testing::static_gate_test {
 namespace {
-
-using testing::ReadText;
-using testing::ReplaceOnce;
-using testing::TempFolder;
-using testing::WriteText;
 
 const std::string kParameters = testing::SourcePath("/controller/parameters/");
 const std::string kMjcf = testing::SourcePath("/mjcf/");
@@ -205,4 +200,4 @@ TEST(StaticGate, TellsTheRingFromTheTorus) {
 }
 
 }  // namespace
-}  // namespace dexcheck::static_gate_test
+}  // namespace dexcheck::testing::static_gate_test

@@ -9,22 +9,11 @@
 
 #include "controller/common/errors.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/log/sample_log_check.h"
 
-namespace dexcheck::log_failures_test {
+namespace dexcheck::testing::log_failures_test {
 namespace {
-
-using ::testing::EndsWith;
-using ::testing::HasSubstr;
-using testing::IsSample;
-using testing::ReadText;
-using testing::StartSample;
-using ::testing::StartsWith;
-using testing::TempFolder;
-using testing::WriteSampleLog;
-using testing::WriteSampleRow;
-using testing::WriteSampleRows;
-using testing::WriteText;
 
 /// What the exception says; fails the test when there is none of this type.
 template <typename Exception, typename Function>
@@ -315,4 +304,4 @@ TEST_F(Misuse, CallsMustComeInOrder) {
 }
 
 }  // namespace
-}  // namespace dexcheck::log_failures_test
+}  // namespace dexcheck::testing::log_failures_test

@@ -16,10 +16,8 @@
 #include "tests/common/run_program.h"
 #include "tests/harness/log/sample_log_check.h"
 
-namespace dexcheck::log_kill_test {
+namespace dexcheck::testing::log_kill_test {
 namespace {
-
-using testing::TempFolder;
 
 constexpr long kRows = 4000;
 constexpr long kMaxRows = 5000;  // Close trims
@@ -208,4 +206,4 @@ TEST_F(KilledWriter, WhileClosing) {
 }
 
 }  // namespace
-}  // namespace dexcheck::log_kill_test
+}  // namespace dexcheck::testing::log_kill_test

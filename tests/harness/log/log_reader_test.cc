@@ -9,21 +9,13 @@
 #include <random>
 
 #include "controller/common/errors.h"
+#include "tests/common/matchers.h"
 #include "tests/common/run_program.h"
 #include "tests/harness/log/forge.h"
 #include "tests/harness/log/sample_log_check.h"
 
-namespace dexcheck::log_reader_test {
+namespace dexcheck::testing::log_reader_test {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using testing::IsSample;
-using testing::ReadText;
-using ::testing::StartsWith;
-using testing::TempFolder;
-using testing::WriteSampleLog;
-using testing::WriteText;
 
 template <typename Function>
 std::string MessageOf(const Function& function) {
@@ -249,4 +241,4 @@ TEST_F(LogReaderTest, LinksInTheFolderAreNotFollowed) {
 }
 
 }  // namespace
-}  // namespace dexcheck::log_reader_test
+}  // namespace dexcheck::testing::log_reader_test

@@ -8,20 +8,12 @@
 
 #include "tests/common/allocation_counter.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 #include "tests/common/run_program.h"
 #include "tests/harness/log/sample_log_check.h"
 
-namespace dexcheck::log_writer_test {
+namespace dexcheck::testing::log_writer_test {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::IsSample;
-using testing::ReadText;
-using testing::StartSample;
-using testing::TempFolder;
-using testing::WriteSampleLog;
-using testing::WriteSampleRow;
-using testing::WriteSampleRows;
 
 class LogWriterTest : public ::testing::Test {
  protected:
@@ -252,4 +244,4 @@ TEST_F(LogWriterTest, AnOtherProgramReadsIt) {
 }
 
 }  // namespace
-}  // namespace dexcheck::log_writer_test
+}  // namespace dexcheck::testing::log_writer_test

@@ -10,10 +10,8 @@
 #include "tests/common/run_program.h"
 #include "tests/harness/report/replay_run.h"
 
-namespace dexcheck::accessibility_test {
+namespace dexcheck::testing::accessibility_test {
 namespace {
-
-using testing::Browser;
 
 /// Everything unfolded; what axe finds comes as one line each.
 constexpr const char* kAsk =
@@ -64,4 +62,4 @@ TEST_F(AccessibilityBrowserTest, AxeFindsNothingInThePageOfARun) {
 }
 
 }  // namespace
-}  // namespace dexcheck::accessibility_test
+}  // namespace dexcheck::testing::accessibility_test

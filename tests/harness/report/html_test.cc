@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-namespace dexcheck::html_test {
+namespace dexcheck::testing::html_test {
 namespace {
 
 // Texts are no markup: what forgets to escape them does not compile.
@@ -63,4 +63,4 @@ TEST(Html, SharesOfABoundAreNoPowersOfTen) {
 }
 
 }  // namespace
-}  // namespace dexcheck::html_test
+}  // namespace dexcheck::testing::html_test

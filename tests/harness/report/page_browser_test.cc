@@ -15,14 +15,11 @@
 #include "renders/video_writer.h"
 #include "tests/common/browser.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/report/report_run.h"
 
-namespace dexcheck::page_browser_test {
+namespace dexcheck::testing::page_browser_test {
 namespace {
-
-using testing::Browser;
-using ::testing::IsEmpty;
-using ::testing::Not;
 
 constexpr long kRows = 2001;
 constexpr double kEnd = 2.0;              // s
@@ -242,4 +239,4 @@ TEST_F(PageBrowserTest, WouldNoticeErrors) {
 }
 
 }  // namespace
-}  // namespace dexcheck::page_browser_test
+}  // namespace dexcheck::testing::page_browser_test

@@ -12,13 +12,11 @@
 #include "renders/renderer.h"
 #include "renders/run_decorations.h"
 #include "tests/common/browser.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/report/replay_run.h"
 
-namespace dexcheck::replay_browser_test {
+namespace dexcheck::testing::replay_browser_test {
 namespace {
-
-using testing::Browser;
-using ::testing::IsEmpty;
 
 constexpr double kEnd = 1.0;              // s
 constexpr double kFloatTolerance = 2e-6;  // m: poses are 4-byte floats
@@ -239,4 +237,4 @@ TEST_F(ReplayBrowserTest, PlaysTurnsHidesAndFits) {
 }
 
 }  // namespace
-}  // namespace dexcheck::replay_browser_test
+}  // namespace dexcheck::testing::replay_browser_test

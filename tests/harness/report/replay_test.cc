@@ -15,7 +15,7 @@
 #include "harness/report/simplify_mesh.h"
 #include "tests/harness/report/replay_run.h"
 
-namespace dexcheck::replay_test {
+namespace dexcheck::testing::replay_test {
 namespace {
 
 constexpr size_t kMostBytes = 3'000'000;  // that the replay of 10 s may add to a page
@@ -108,4 +108,4 @@ TEST(SimplifyMesh, LeavesAMeshThatIsSmallEnough) {
 }
 
 }  // namespace
-}  // namespace dexcheck::replay_test
+}  // namespace dexcheck::testing::replay_test

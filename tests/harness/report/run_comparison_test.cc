@@ -6,14 +6,11 @@
 
 #include "harness/report/comparison_page.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/report/report_run.h"
 
-namespace dexcheck::run_comparison_test {
+namespace dexcheck::testing::run_comparison_test {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::Not;
 
 /// A run with one pose, x = slope * t, in rows of a time step.
 void WriteLine(const std::filesystem::path& folder, double time_step, double slope,
@@ -158,4 +155,4 @@ TEST_F(RunComparisonTest, ChecksOfARunWithoutSummaryKeepTheirQuestion) {
 }
 
 }  // namespace
-}  // namespace dexcheck::run_comparison_test
+}  // namespace dexcheck::testing::run_comparison_test

@@ -9,10 +9,10 @@
 #include <cmath>
 #include <limits>
 
-namespace dexcheck::thinning_test {
-namespace {
+#include "tests/common/matchers.h"
 
-using ::testing::ElementsAre;
+namespace dexcheck::testing::thinning_test {
+namespace {
 
 VectorXd MakeTimes(long rows) { return VectorXd::LinSpaced(rows, 0.0, static_cast<double>(rows - 1)); }
 
@@ -70,4 +70,4 @@ TEST(Thinning, LeavesOutWhatIsNotANumberUnlessThereIsNothingElse) {
 }
 
 }  // namespace
-}  // namespace dexcheck::thinning_test
+}  // namespace dexcheck::testing::thinning_test

@@ -16,19 +16,13 @@
 #include "harness/report/run_data.h"
 #include "harness/report/run_figures.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/report/report_run.h"
 
-namespace dexcheck::write_report_test {
+namespace dexcheck::testing::write_report_test {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::Not;
-using testing::ReadText;
-using testing::ReportRun;
-using testing::TempFolder;
-using testing::WriteReportRun;
 
 class WriteReportTest : public ::testing::Test {
  protected:
@@ -233,4 +227,4 @@ TEST(Figures, CurvesOfTwoAxesDoNotLieOnOneAnother) {
 }
 
 }  // namespace
-}  // namespace dexcheck::write_report_test
+}  // namespace dexcheck::testing::write_report_test

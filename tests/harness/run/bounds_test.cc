@@ -13,12 +13,11 @@
 #include "controller/dynamics/tree_factor.h"
 #include "harness/checks/contact_give.h"
 #include "harness/engine/contact_softness.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::bounds_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 TEST(Bounds, EachHasItsFormulaAndReasonInTheDocument) {
   const std::string document = ReadTextFile(SourcePath("/harness/README.md"));

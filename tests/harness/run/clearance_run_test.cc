@@ -6,12 +6,11 @@
 #include <memory>
 #include <tuple>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::clearance_run_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 const std::string kRobot = SourcePath("/controller/parameters/assistant_robot.toml");
 

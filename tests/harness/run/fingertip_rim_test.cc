@@ -9,12 +9,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::fingertip_rim_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 TEST(FingertipRim, IsAQuarterTurnFromThePole) {
   const Vector3d x = Vector3d::UnitX();

@@ -5,13 +5,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::half_step_test {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 RunResult Look(
     ShippedRun* run, const std::function<bool()>& should_stop = [] { return false; }) {

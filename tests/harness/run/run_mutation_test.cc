@@ -9,12 +9,11 @@
 #include <algorithm>
 
 #include "harness/run/detectability.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::run_mutation_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 const std::string kRobot = SourcePath("/controller/parameters/assistant_robot.toml");
 const std::string kScene = SourcePath("/mjcf/scene.xml");

@@ -12,13 +12,12 @@
 #include "harness/sides/read_description.h"
 #include "harness/sides/urdf_reader.h"
 #include "tests/common/legged_robots.h"
+#include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 #include "tests/harness/sides/panda_urdf.h"
 
-namespace dexcheck::audit_test {
+namespace dexcheck::testing::audit_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 // A torso with two arms, each link in a box that it fills.
 constexpr const char* kArms = R"(<robot name="arms">
@@ -168,4 +167,4 @@ TEST(Audit, CountsImpossibleInertiaAsTheFileHasIt) {
 }
 
 }  // namespace
-}  // namespace dexcheck::audit_test
+}  // namespace dexcheck::testing::audit_test

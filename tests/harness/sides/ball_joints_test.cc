@@ -18,16 +18,12 @@
 #include "harness/sides/parameter_writer.h"
 #include "harness/sides/side_layout.h"
 #include "tests/common/list_failures.h"
+#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/random_robot.h"
 
-namespace dexcheck::ball_joints_test {
+namespace dexcheck::testing::ball_joints_test {
 namespace {
-
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using testing::MatrixNear;
 
 ConsistencyOptions Few() {
   ConsistencyOptions options;
@@ -281,4 +277,4 @@ TEST(BallJoints, TablesAreRefusedWithAReason) {
 }
 
 }  // namespace
-}  // namespace dexcheck::ball_joints_test
+}  // namespace dexcheck::testing::ball_joints_test

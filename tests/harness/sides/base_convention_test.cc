@@ -13,10 +13,8 @@
 #include "tests/common/legged_robots.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck::base_convention_test {
+namespace dexcheck::testing::base_convention_test {
 namespace {
-
-using testing::MatrixNear;
 
 // Forces of some 100 N over lengths of a metre.
 constexpr double kRounding = 1e-11;
@@ -183,4 +181,4 @@ TEST(NpyFile, IsReadBack) {
 }
 
 }  // namespace
-}  // namespace dexcheck::base_convention_test
+}  // namespace dexcheck::testing::base_convention_test

@@ -15,14 +15,11 @@
 #include "harness/sides/parameter_writer.h"
 #include "harness/sides/urdf_reader.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck::coupled_joints_test {
+namespace dexcheck::testing::coupled_joints_test {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::MatrixNear;
-using testing::ReplaceOnce;
 
 // A gripper whose right finger follows the left one, which follows the wrist: q_right = -2 q_wrist - 0.3.
 constexpr const char* kGripper = R"(name = "gripper"
@@ -251,4 +248,4 @@ TEST(SeveralJointsOfABody, AgreeWithAChainOfMasslessLinks) {
 }
 
 }  // namespace
-}  // namespace dexcheck::coupled_joints_test
+}  // namespace dexcheck::testing::coupled_joints_test

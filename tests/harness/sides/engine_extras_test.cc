@@ -7,14 +7,10 @@
 
 #include "harness/sides/file_comparison.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 
-namespace dexcheck::engine_extras_test {
+namespace dexcheck::testing::engine_extras_test {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::ReplaceOnce;
-using testing::TempFolder;
-using testing::WriteText;
 
 constexpr const char* kArm = R"(<mujoco>
   <compiler angle="radian" autolimits="true"/>
@@ -185,4 +181,4 @@ TEST_F(TwoMjcfs, MotorsBesideAUrdfAreNotCompared) {
 }
 
 }  // namespace
-}  // namespace dexcheck::engine_extras_test
+}  // namespace dexcheck::testing::engine_extras_test

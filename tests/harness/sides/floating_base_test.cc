@@ -18,17 +18,13 @@
 #include "tests/common/files.h"
 #include "tests/common/legged_robots.h"
 #include "tests/common/list_failures.h"
+#include "tests/common/matchers.h"
 #include "tests/common/random_robot.h"
 #include "tests/common/throws.h"
 #include "tests/common/urdf_text.h"
 
-namespace dexcheck::floating_base_test {
+namespace dexcheck::testing::floating_base_test {
 namespace {
-
-using ::testing::Contains;
-using ::testing::HasSubstr;
-using testing::TempFolder;
-using testing::WriteText;
 
 ConsistencyOptions Few(long samples = 20) {
   ConsistencyOptions options;
@@ -236,4 +232,4 @@ TEST(FloatingBase, SmallRobotsAgreeToRounding) {
 }
 
 }  // namespace
-}  // namespace dexcheck::floating_base_test
+}  // namespace dexcheck::testing::floating_base_test

@@ -14,14 +14,12 @@
 #include "controller/model/body_frame.h"
 #include "harness/sides/read_description.h"
 #include "tests/common/legged_robots.h"
+#include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 #include "tests/harness/sides/robot_pairs.h"
 
-namespace dexcheck::hypotheses_test {
+namespace dexcheck::testing::hypotheses_test {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::StartsWith;
 
 using Pair = testing::RobotPair;
 const std::vector<Pair>& ListRobots() { return testing::ListRobotPairs(); }
@@ -490,4 +488,4 @@ TEST(Hypotheses, TablesThatAreMisread) {
 }
 
 }  // namespace
-}  // namespace dexcheck::hypotheses_test
+}  // namespace dexcheck::testing::hypotheses_test

@@ -24,21 +24,15 @@
 #include "harness/sides/urdf_reader.h"
 #include "tests/benchmarks/measured_time.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 #include "tests/common/throws.h"
 #include "tests/common/urdf_text.h"
 
-namespace dexcheck::import_test {
+namespace dexcheck::testing::import_test {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using testing::MatrixNear;
-using testing::TempFolder;
-using testing::WriteText;
 
 // Numbers are written to 8 eps of their vector's size; chains of at most 13 joints and a few kg.
 constexpr double kRounding = 1e-12;
@@ -262,4 +256,4 @@ TEST(ReadingTime, UrdfOfFiftyJointsIsComparedInTheTablesTime) {
 }
 
 }  // namespace
-}  // namespace dexcheck::import_test
+}  // namespace dexcheck::testing::import_test

@@ -17,7 +17,7 @@
 #include "harness/sides/hypotheses.h"
 #include "tests/harness/sides/robot_pairs.h"
 
-namespace dexcheck::mistakes_measurement_test {
+namespace dexcheck::testing::mistakes_measurement_test {
 namespace {
 
 /// A body in its link's own frame, and the link's own frame in its parent's.
@@ -319,4 +319,4 @@ TEST(Mistakes, AreNamedInWordsWithTheRightValues) {
 }
 
 }  // namespace
-}  // namespace dexcheck::mistakes_measurement_test
+}  // namespace dexcheck::testing::mistakes_measurement_test

@@ -11,15 +11,14 @@
 #include "harness/sides/description_match.h"
 #include "harness/sides/read_description.h"
 #include "tests/common/list_failures.h"
+#include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 #include "tests/common/urdf_text.h"
 #include "tests/harness/sides/panda_urdf.h"
 
-namespace dexcheck::model_comparison_test {
+namespace dexcheck::testing::model_comparison_test {
 namespace {
-
-using ::testing::HasSubstr;
 
 std::string ListFailures(RobotDescription a, RobotDescription b, long samples = 20) {
   CompleteEachOther(&a, &b);
@@ -207,4 +206,4 @@ TEST(AlikeNames, AreTakenAndNoted) {
 }
 
 }  // namespace
-}  // namespace dexcheck::model_comparison_test
+}  // namespace dexcheck::testing::model_comparison_test

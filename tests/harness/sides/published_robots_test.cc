@@ -11,14 +11,10 @@
 #include "harness/sides/read_description.h"
 #include "tests/common/files.h"
 #include "tests/common/legged_robots.h"
+#include "tests/common/matchers.h"
 
-namespace dexcheck::published_robots_test {
+namespace dexcheck::testing::published_robots_test {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::LeggedLink;
-using testing::TempFolder;
-using testing::WriteText;
 
 struct PublishedRobot {
   std::string name;
@@ -199,4 +195,4 @@ INSTANTIATE_TEST_SUITE_P(Sides, PublishedRobots, ::testing::ValuesIn(ListPublish
                          [](const auto& tried) { return tried.param.name; });
 
 }  // namespace
-}  // namespace dexcheck::published_robots_test
+}  // namespace dexcheck::testing::published_robots_test

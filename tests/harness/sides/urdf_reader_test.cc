@@ -21,19 +21,15 @@
 #include "harness/sides/read_description.h"
 #include "tests/common/files.h"
 #include "tests/common/list_failures.h"
+#include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 #include "tests/common/urdf_text.h"
 #include "tests/harness/sides/panda_urdf.h"
 
-namespace dexcheck::urdf_reader_test {
+namespace dexcheck::testing::urdf_reader_test {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using testing::MatrixNear;
-using ::testing::StartsWith;
 
 // A few products of rotations of size 1.
 constexpr double kRounding = 1e-14;
@@ -414,4 +410,4 @@ TEST(Urdf, RefusesWhatIsTooLargeOrEmpty) {
 }
 
 }  // namespace
-}  // namespace dexcheck::urdf_reader_test
+}  // namespace dexcheck::testing::urdf_reader_test

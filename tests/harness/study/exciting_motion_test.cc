@@ -7,13 +7,11 @@
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
+#include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::exciting_motion_test {
 namespace {
-
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 const std::string kPanda = SourcePath("/controller/parameters/panda.toml");
 const std::string kScene = SourcePath("/mjcf/panda_scene.xml");

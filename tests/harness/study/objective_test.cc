@@ -10,10 +10,8 @@
 
 #include "tests/common/throws.h"
 
-namespace dexcheck::objective_test {
+namespace dexcheck::testing::objective_test {
 namespace {
-
-using testing::Throws;
 
 constexpr double kRounding = 1e-15;  // of sums and quotients of a few numbers near 1
 
@@ -129,4 +127,4 @@ TEST(Judgement, DominatesWhereItIsNowhereWorse) {
 }
 
 }  // namespace
-}  // namespace dexcheck::objective_test
+}  // namespace dexcheck::testing::objective_test

@@ -20,7 +20,7 @@
 #include "harness/study/trial.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::sampled_stability_test {
+namespace dexcheck::testing::sampled_stability_test {
 namespace {
 
 const std::string kFolder = testing::SourcePath("/harness/shipped/scenarios");
@@ -422,4 +422,4 @@ TEST(Theory, IsSilentWhereMoreThanTheErrorDynamicsActs) {
 }
 
 }  // namespace
-}  // namespace dexcheck::sampled_stability_test
+}  // namespace dexcheck::testing::sampled_stability_test

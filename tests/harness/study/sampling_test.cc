@@ -7,7 +7,7 @@
 #include <cmath>
 #include <set>
 
-namespace dexcheck::sampling_test {
+namespace dexcheck::testing::sampling_test {
 namespace {
 
 /// Whether each of the `count` equal slices of an axis holds exactly one of the points.
@@ -84,4 +84,4 @@ TEST(Sampling, SobolsFirstPoints) {
 }
 
 }  // namespace
-}  // namespace dexcheck::sampling_test
+}  // namespace dexcheck::testing::sampling_test

@@ -10,7 +10,7 @@
 #include "tests/common/run_program.h"
 #include "tests/harness/study/search_functions.h"
 
-namespace dexcheck::search_optuna_test {
+namespace dexcheck::testing::search_optuna_test {
 namespace {
 
 constexpr long kPoints = 480;
@@ -61,4 +61,4 @@ TEST(SearchOptuna, Nsga2HasNoLessHypervolumeThanOptunas) {
 }
 
 }  // namespace
-}  // namespace dexcheck::search_optuna_test
+}  // namespace dexcheck::testing::search_optuna_test

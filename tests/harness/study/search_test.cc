@@ -14,16 +14,8 @@
 #include "tests/common/throws.h"
 #include "tests/harness/study/search_functions.h"
 
-namespace dexcheck::search_test {
+namespace dexcheck::testing::search_test {
 namespace {
-
-using testing::CalcHypervolume;
-using testing::Function;
-using testing::Make;
-using testing::MakeSearch;
-using testing::RunSearch;
-using testing::Throws;
-using testing::Zdt1;
 
 /// An ellipsoid of condition 100 around (0.3, 0.6, 0.45), turned against the axes.
 std::vector<double> Ellipsoid(const UnitPoint& x) {
@@ -291,4 +283,4 @@ TEST(SearchHistory, RowsOfAnotherSearchAreRefused) {
 }
 
 }  // namespace
-}  // namespace dexcheck::search_test
+}  // namespace dexcheck::testing::search_test

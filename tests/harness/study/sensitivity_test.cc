@@ -12,7 +12,7 @@
 #include "harness/study/study_answer.h"
 #include "harness/study/study_sensitivity.h"
 
-namespace dexcheck::sensitivity_test {
+namespace dexcheck::testing::sensitivity_test {
 namespace {
 
 /// A study of `keys` keys from 0 to 1, whose metric `energy` is a function of them.
@@ -259,4 +259,4 @@ TEST(Margins, AreFoundByBisection) {
 }
 
 }  // namespace
-}  // namespace dexcheck::sensitivity_test
+}  // namespace dexcheck::testing::sensitivity_test

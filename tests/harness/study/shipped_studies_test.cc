@@ -10,7 +10,7 @@
 #include "harness/study/trial.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::shipped_studies_test {
+namespace dexcheck::testing::shipped_studies_test {
 namespace {
 
 TEST(ShippedStudies, AreAccepted) {
@@ -69,4 +69,4 @@ values = [1, 1.1]
 }
 
 }  // namespace
-}  // namespace dexcheck::shipped_studies_test
+}  // namespace dexcheck::testing::shipped_studies_test

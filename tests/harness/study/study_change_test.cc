@@ -8,12 +8,8 @@
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::study_change_test {
+namespace dexcheck::testing::study_change_test {
 namespace {
-
-using testing::ReplaceOnce;
-using testing::TempFolder;
-using testing::Throws;
 
 const std::string kText = R"(name = "s"
 scenario = "hold"
@@ -162,4 +158,4 @@ TEST_F(StudyChangeTest, AnotherRevisionGoesOnWhenItMakesTheSameRows) {
 }
 
 }  // namespace
-}  // namespace dexcheck::study_change_test
+}  // namespace dexcheck::testing::study_change_test

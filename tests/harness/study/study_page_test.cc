@@ -14,13 +14,11 @@
 #include "harness/study/study_theory.h"
 #include "tests/common/browser.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::study_page_test {
+namespace dexcheck::testing::study_page_test {
 namespace {
-
-using testing::Browser;
-using ::testing::HasSubstr;
 
 const std::string kSource = testing::SourcePath();
 constexpr double kLimit = 2000.0;  // 1/s: of K_v at steps of 1 ms
@@ -318,4 +316,4 @@ TEST_F(StudyPageBrowserTest, FitsAPhone) {
 }
 
 }  // namespace
-}  // namespace dexcheck::study_page_test
+}  // namespace dexcheck::testing::study_page_test

@@ -10,11 +10,8 @@
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::study_reader_test {
+namespace dexcheck::testing::study_reader_test {
 namespace {
-
-using testing::ReplaceOnce;
-using testing::Throws;
 
 const std::string kStudy = R"(name = "example"
 description = "two keys"
@@ -292,4 +289,4 @@ TEST(StudyReader, MistakesAreNamed) {
 }
 
 }  // namespace
-}  // namespace dexcheck::study_reader_test
+}  // namespace dexcheck::testing::study_reader_test

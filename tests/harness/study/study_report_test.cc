@@ -13,13 +13,11 @@
 #include "controller/common/toml_reader.h"
 #include "harness/study/study_answer.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::study_report_test {
+namespace dexcheck::testing::study_report_test {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 const std::string kTheory = "The sampled error dynamics";
 const std::string kMarkup = "<img src=x onerror=\"alert(1)\">";
@@ -184,4 +182,4 @@ TEST_F(StudyReportTest, ManyTrialsMakeASmallPage) {
 }
 
 }  // namespace
-}  // namespace dexcheck::study_report_test
+}  // namespace dexcheck::testing::study_report_test

@@ -16,14 +16,11 @@
 #include "harness/study/study_progress.h"
 #include "harness/study/study_report.h"
 #include "tests/common/files.h"
+#include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 
-namespace dexcheck::study_shapes_test {
+namespace dexcheck::testing::study_shapes_test {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 struct Shape {
   std::string name;
@@ -189,4 +186,4 @@ TEST_F(StudyPage, BestIsByTheObjectiveAmongWhatTheConstraintsAdmit) {
 }
 
 }  // namespace
-}  // namespace dexcheck::study_shapes_test
+}  // namespace dexcheck::testing::study_shapes_test

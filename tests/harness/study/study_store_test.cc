@@ -14,11 +14,8 @@
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
 
-namespace dexcheck::study_store_test {
+namespace dexcheck::testing::study_store_test {
 namespace {
-
-using testing::TempFolder;
-using testing::Throws;
 
 const std::string kText =
     "name = \"s\"\nscenario = \"hold\"\n[[vary]]\nkey = \"control.K_p\"\nvalues = [1, 2, 3]\n";
@@ -265,4 +262,4 @@ TEST(ProcessName, KnowsTheLiving) {
 }
 
 }  // namespace
-}  // namespace dexcheck::study_store_test
+}  // namespace dexcheck::testing::study_store_test

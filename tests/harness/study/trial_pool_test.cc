@@ -14,7 +14,7 @@
 
 #include "harness/engine/engine.h"
 
-namespace dexcheck::trial_pool_test {
+namespace dexcheck::testing::trial_pool_test {
 namespace {
 
 TrialResult MakeResult(const Trial& trial) {
@@ -142,4 +142,4 @@ TEST(TrialPool, EndsTrialsThatTakeTooLong) {
 }
 
 }  // namespace
-}  // namespace dexcheck::trial_pool_test
+}  // namespace dexcheck::testing::trial_pool_test
