@@ -8,7 +8,7 @@
 namespace dexcheck {
 namespace {
 
-/// Share of a pixel inside an edge at this signed distance (inside negative) from its centre.
+/// Fraction of a pixel inside an edge at this signed distance (inside negative) from its centre.
 double Coverage(double distance) { return std::clamp(0.5 - distance, 0.0, 1.0); }
 
 double DistanceToSegment(const Vector2d& p, const Vector2d& a, const Vector2d& b) {

@@ -71,8 +71,8 @@ void FrameLine::Draw(const std::function<Painter()>& make_painter, long first, i
   const Painter paint = make_painter();
   for (long frame = first; frame < frames_; frame += num_workers_) {
     const Image image = paint(frame);
-    Require(image.width == width_, "frame width", "must be the film's", image.width);
-    Require(image.height == height_, "frame height", "must be the film's", image.height);
+    Require(image.width == width_, "frame width", "must be the video's", image.width);
+    Require(image.height == height_, "frame height", "must be the video's", image.height);
     const bool is_slot_free = frame < kSlots * num_workers_ || !Receive(channel, 1).empty();
     if (!is_slot_free) return;
     std::copy(image.rgb.begin(), image.rgb.end(), FindSlot(frame));
@@ -81,7 +81,7 @@ void FrameLine::Draw(const std::function<Painter()>& make_painter, long first, i
 }
 
 Image FrameLine::Take() {
-  Require(taken_ < frames_, "frame", "must be one of the film's", static_cast<double>(taken_));
+  Require(taken_ < frames_, "frame", "must be one of the video's", static_cast<double>(taken_));
   ChildProcess& worker = workers_[static_cast<std::size_t>(taken_ % num_workers_)];
   const std::string told = Receive(worker.channel(), 1);
   if (told != std::string{kDrawn}) Fail(&worker, told.empty() ? kDied : told.front());

@@ -19,9 +19,9 @@ struct UnmapMemory {
   void operator()(std::uint8_t* memory) const;
 };
 
-/// Processes that draw the frames of a film, each every n-th, and hand them over in order. Threads would wait
-/// for each other: OSMesa has one rasterizer for all contexts of a process and locks it for each picture. The
-/// processes end with the line.
+/// Processes that draw the frames of a video, each every n-th, and hand them over in order. Threads would
+/// wait for each other: OSMesa has one rasterizer for all contexts of a process and locks it for each
+/// picture. The processes end with the line.
 class FrameLine {
  public:
   /// Draws frame number `frame`.

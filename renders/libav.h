@@ -1,6 +1,6 @@
 #pragma once
 
-// libav for the writers of films and pictures only, loaded when the first is written: objects that free
+// libav for the writers of videos and pictures only, loaded when the first is written: objects that free
 // themselves, failures as text.
 
 extern "C" {

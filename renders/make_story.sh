@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Draws the story film of the README: renders/make_story.sh DEXCHECK OUT.gif [FOLDER with runs lift and curve]
+# Draws the story video of the README: renders/make_story.sh DEXCHECK OUT.gif [FOLDER with runs lift and curve]
 # Approach, grasp, lift, a curve, the verdict: 20 s. Needs ffmpeg and DejaVu fonts.
 set -euo pipefail
 
@@ -19,7 +19,7 @@ render lift near --camera grasp --forces
 render curve curve --camera overview --tracks
 
 font=/usr/share/fonts/truetype/dejavu/DejaVuSans-Bold.ttf
-# cut NAME FILM FROM TO SPEED CAPTION: a piece of a film, faster, with a caption.
+# cut NAME FILM FROM TO SPEED CAPTION: a piece of a video, faster, with a caption.
 cut() {
   ffmpeg -loglevel error -y -ss "$3" -to "$4" -i "$work/$2.mp4" -an -crf 12 -vf "setpts=PTS/$5,fps=$fps,drawtext=fontfile=$font:text='$6':\
 x=14:y=h-32:fontsize=16:fontcolor=white:box=1:boxcolor=black@0.55:boxborderw=7" "$work/$1.mp4"

@@ -13,7 +13,7 @@ constexpr int kSurfaceSize = 16;
 constexpr int kDepthBits = 24;
 constexpr int kStencilBits = 8;
 
-// Each frame is drawn by one thread; movies draw several frames at once in processes instead, which would not
+// Each frame is drawn by one thread; videos draw several frames at once in processes instead, which would not
 // have their parent's threads. Mesa's cache of shaders wants a home folder, and complains on standard error
 // where there is none.
 void ConfigureMesa() {

@@ -166,7 +166,7 @@ void Overlay::Draw(const OverlayState& state, Image* image) {
     y += 0.8 * kLine * s;
     canvas.DrawText(regular_, kSmallSize * s, {left, y}, "cross-check", kFaint);
     canvas.DrawText(regular_, kSmallSize * s, {right, y}, "worst so far / bound", kFaint, Align::kRight);
-    for (const QuestionStatus& question : state.questions) {
+    for (const CategoryStatus& question : state.questions) {
       y += kLine * s;
       const Color& dot = !question.asked ? kUnknown : question.Passes() ? kGood : kBad;
       canvas.FillCircle({left + 5.0 * s, y - 5.0 * s}, 5.0 * s, dot);

@@ -9,9 +9,9 @@
 
 #include "controller/common/types.h"
 #include "renders/canvas.h"
+#include "renders/category_status.h"
 #include "renders/font.h"
 #include "renders/image.h"
-#include "renders/question_status.h"
 
 namespace dexcheck {
 
@@ -33,7 +33,7 @@ struct OverlayState {
   double history_span = 3.0;  ///< s; the plot ends now and began so long ago.
   double error_low = 1e-9;    ///< m; range of the plot.
   double error_high = 1e-3;   ///< m.
-  std::vector<QuestionStatus> questions;
+  std::vector<CategoryStatus> questions;
   std::vector<LegendEntry> legend;
 };
 

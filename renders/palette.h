@@ -8,14 +8,14 @@
 
 namespace dexcheck {
 
-/// 256 colours for a film's frames, as GIF needs them: 64 spread evenly over all colours, so that what
+/// 256 colours for a video's frames, as GIF needs them: 64 spread evenly over all colours, so that what
 /// appears later has some, and 192 that divide one picture's colours evenly (Heckbert's median cut).
 class Palette {
  public:
   static constexpr int kColors = 256;
   using Color = std::array<std::uint8_t, 3>;
 
-  /// @param picture typical of the film.
+  /// @param picture typical of the video.
   explicit Palette(const Image& picture);
 
   [[nodiscard]] const std::array<Color, kColors>& colors() const { return colors_; }

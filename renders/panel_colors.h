@@ -1,6 +1,6 @@
 #pragma once
 
-// The colours of what is written over a scene: the film's panel and the live window's controls.
+// The colours of what is written over a scene: the video's panel and the live window's controls.
 
 #include "renders/canvas.h"
 

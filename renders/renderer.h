@@ -39,8 +39,8 @@ struct RenderOptions {
   /// Round geoms are drawn with so many sides, and so many rings of them.
   int slices = 24;
   int stacks = 8;
-  /// Moves what cameras of the MJCF see to the right by this share of the picture's width, to make room for a
-  /// panel.
+  /// Moves what cameras of the MJCF see to the right by this fraction of the picture's width, to make room
+  /// for a panel.
   double shift_right = 0.0;
   std::string translucent_body;  ///< Its geoms are drawn with this opacity; none when empty.
   double translucent_opacity = 0.35;

@@ -76,7 +76,7 @@ CheckHistory::CheckHistory(const RunFrames& run) : run_(run) {
   }
 }
 
-CheckHistory::Standing CheckHistory::At(CheckKind kind, long row) const {
+CheckHistory::Standing CheckHistory::At(CheckCategory kind, long row) const {
   Standing standing;
   for (size_t i = 0; i < worst_.size(); ++i) {
     const CheckSeries& check = run_.checks[i];
@@ -90,12 +90,12 @@ CheckHistory::Standing CheckHistory::At(CheckKind kind, long row) const {
   return standing;
 }
 
-std::vector<QuestionStatus> CheckHistory::ListQuestions(long row) const {
-  std::vector<QuestionStatus> questions;
+std::vector<CategoryStatus> CheckHistory::ListCategories(long row) const {
+  std::vector<CategoryStatus> questions;
   if (run_.checks.empty()) return questions;
-  for (const CheckKind kind : kCheckKinds) {
+  for (const CheckCategory kind : kCheckCategorys) {
     const Standing standing = At(kind, row);
-    QuestionStatus& question = questions.emplace_back();
+    CategoryStatus& question = questions.emplace_back();
     question.name = NameOf(kind);
     question.asked = standing.check != nullptr;
     if (!question.asked) continue;

@@ -7,19 +7,19 @@
 
 #include "controller/common/types.h"
 #include "harness/base/check_record.h"
-#include "renders/question_status.h"
+#include "renders/category_status.h"
 
 namespace dexcheck {
 
 /// One check over a run.
 struct CheckSeries {
   std::string name;
-  CheckKind kind = CheckKind::kModel;
+  CheckCategory kind = CheckCategory::kModel;
   double bound = 0.0;
   std::vector<double> residuals;  ///< One a row; what is not a number counts as infinite.
 };
 
-/// What a movie needs of a run: n rows, one a recorded instant. Everything but times and qpos may be empty.
+/// What a video needs of a run: n rows, one a recorded instant. Everything but times and qpos may be empty.
 struct RunFrames {
   std::string source;       ///< The run's folder or file, for messages.
   std::string title;        ///< Name of the scenario.
@@ -53,7 +53,7 @@ struct RunFrames {
 /// model and is finite, times increase, and the run lasts longer than an instant.
 void CheckRunFrames(const mjModel& model, const RunFrames& run);
 
-/// Worst residuals up to each row, so that a movie can tell at any time which check stands worst.
+/// Worst residuals up to each row, so that a video can tell at any time which check stands worst.
 class CheckHistory {
  public:
   explicit CheckHistory(const RunFrames& run);
@@ -63,10 +63,10 @@ class CheckHistory {
     double worst = 0.0;
   };
   /// The check of a kind with the largest residual per bound up to and including `row`.
-  [[nodiscard]] Standing At(CheckKind kind, long row) const;
+  [[nodiscard]] Standing At(CheckCategory kind, long row) const;
 
-  /// Where each question stands at `row`, in the order of kCheckKinds; none of a run without checks.
-  [[nodiscard]] std::vector<QuestionStatus> ListQuestions(long row) const;
+  /// Where each question stands at `row`, in the order of kCheckCategorys; none of a run without checks.
+  [[nodiscard]] std::vector<CategoryStatus> ListCategories(long row) const;
 
  private:
   const RunFrames& run_;

@@ -218,7 +218,7 @@ VideoFormat FindVideoFormat(const std::filesystem::path& path) {
   const auto recipe = std::find_if(kRecipes.begin(), kRecipes.end(),
                                    [&](const Recipe& candidate) { return candidate.extension == extension; });
   if (recipe != kRecipes.end()) return static_cast<VideoFormat>(recipe - kRecipes.begin());
-  throw InputError(path.string() + ": cannot be written: a film's name must end in .mp4, .webm or .gif");
+  throw InputError(path.string() + ": cannot be written: a video's name must end in .mp4, .webm or .gif");
 }
 
 VideoWriter::VideoWriter(const std::filesystem::path& path, const VideoOptions& options)

@@ -27,7 +27,7 @@ inline constexpr int kMostGifFramesPerSecond = 50;
 /// @throws InputError "PATH: cannot be written: ..." when it is none of theirs.
 VideoFormat FindVideoFormat(const std::filesystem::path& path);
 
-/// Writes a film that browsers play (an MP4 while it loads: its index stands before the data), frame by
+/// Writes a video that browsers play (an MP4 while it loads: its index stands before the data), frame by
 /// frame, in the format that its name says. The file appears under its name when it is finished; until then,
 /// and after an error, there is nothing.
 class VideoWriter {

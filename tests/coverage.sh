@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Prints which share of controller/'s lines its tests execute, file by file, and fails below the least share wanted:
+# Prints which fraction of controller/'s lines its tests execute, file by file, and fails below the least share wanted:
 # tests/coverage.sh [PERCENT], by default 95. Lines that no test reached are in build/coverage/lines.txt.
 set -euo pipefail
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// The errors that the library throws. A caller's mistake is std::invalid_argument (through Require);
+// The errors that the library throws. A caller's fault is std::invalid_argument (through Require);
 // everything else derives from Error, so that a program can tell input errors from simulation failures.
 
 #include <stdexcept>

@@ -40,7 +40,8 @@ struct ContactPlanOptions {
   double opening = 0.01;   ///< How far the fingers can open from their contacts along the normals, m.
   double room = 0.02;      ///< Free way of each fingertip out from the object along the normal, m.
   double spacing = 0.002;  ///< Between the fingers, m.
-  /// Fingers count as tubes with this share of their fingertips' radius; the model has no other size of them.
+  /// Fingers count as tubes with this fraction of their fingertips' radius; the model has no other size of
+  /// them.
   double finger_thickness = 0.8;
   /// Contacts have |z| up to this in the object, m: for cylinders, whose surface has no end.
   double half_length = std::numeric_limits<double>::infinity();

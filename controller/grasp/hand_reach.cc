@@ -47,8 +47,8 @@ double CalcDistance(const Surface& object, const Vector3d& p) {
   try {
     return object.Project(p).distance;
   } catch (const SingularityError&) {
-    constexpr double kNudge = 1e-7;  // m
-    return object.Project(p + kNudge * Vector3d(1.0, 2.0, 3.0)).distance;
+    constexpr double kOffset = 1e-7;  // m
+    return object.Project(p + kOffset * Vector3d(1.0, 2.0, 3.0)).distance;
   }
 }
 

@@ -9,13 +9,13 @@
 namespace dexcheck::grasp_internal {
 namespace {
 
-// Share of the way to the boundary that a step may go.
+// Fraction of the way to the boundary that a step may go.
 constexpr double kStepFraction = 0.99;
 // The same once a barrier problem has taken kPatience iterations: corrected steps can cycle where the
 // admissible forces are few; uncorrected, shorter ones do not.
 constexpr double kCautiousFraction = 0.7;
 constexpr int kPatience = 30;
-// Least share of the present complementarity that a corrected step aims at.
+// Least fraction of the present complementarity that a corrected step aims at.
 constexpr double kLeastCentering = 0.03;
 // A barrier problem aims at its target directly once its complementarity is within this factor of it.
 constexpr double kNearFactor = 3.0;

@@ -12,7 +12,7 @@ namespace dexcheck {
 namespace {
 
 constexpr double kPlatformDamping = 20.0;  // 1/s, while the platform should stand
-constexpr double kArmShare = 0.2;          // of the posture's frequency, for arm and waist while carrying
+constexpr double kArmFraction = 0.2;       // of the posture's frequency, for arm and waist while carrying
 constexpr double kFirstTouch = 0.2;        // of the touch force comes at once, so that no fingertip bounces
 constexpr double kFirstTouchTime = 0.03;   // s
 constexpr double kTouchTime = 0.6;         // s to build up or take back a touch force
@@ -179,7 +179,7 @@ void PickAndPlace::SetPostureGains(double t) {
   if (phase_ == Phase::kTakeOver) standing = 1.0 - change;
   if (phase_ == Phase::kHandOver) standing = change;
   const double frequency = options_.posture_frequency;
-  const double arm = frequency * (kArmShare + standing * (1.0 - kArmShare));
+  const double arm = frequency * (kArmFraction + standing * (1.0 - kArmFraction));
   const Eigen::Index base = model_->num_base_velocities();
   posture_.stiffness.setConstant(arm * arm);
   posture_.damping.head(base).setConstant(standing * kPlatformDamping);

@@ -259,9 +259,9 @@ RobotModel::RobotModel(RobotSpec spec) : spec_(std::move(spec)) {
     depth_.push_back(joint.parent < 0 ? 1 : depth(joint.parent) + 1);
     max_depth_ = std::max(max_depth_, depth_.back());
     // A ball's second and third entry have the quaternion of the first.
-    const bool shares = joint.type == JointType::kBall && joint.ball_axis > 0;
+    const bool fractions = joint.type == JointType::kBall && joint.ball_axis > 0;
     const int after = num_base_positions() + static_cast<int>(position_indices_.size()) + num_balls_;
-    position_indices_.push_back(shares ? position_indices_.back() : after);
+    position_indices_.push_back(fractions ? position_indices_.back() : after);
     if (joint.type == JointType::kBall && joint.ball_axis == 2) ++num_balls_;
   }
   for (size_t i = 0; i < spec_.frames.size(); ++i) {

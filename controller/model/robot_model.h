@@ -94,7 +94,7 @@ struct Joint {
   MassProperties body;    ///< Of the link, in frame i.
 
   // No part of F, which is smooth: the force -dry_friction sign(q_i_dot) stands beside it, and the terms are
-  // those of all joints, of which CalcCouplingMap (harness/sides) takes those that are free.
+  // those of all joints, of which CalcCouplingMap (harness/descriptions) takes those that are free.
   double dry_friction = 0.0;  ///< Coulomb friction, N m or N.
   std::optional<JointCoupling> coupling;
 };

@@ -17,17 +17,17 @@ std::string DescribeVelocity(int coordinate, const RobotModel& model, int base_v
 
 }  // namespace
 
-const char* NameOf(CheckKind kind) {
+const char* NameOf(CheckCategory kind) {
   switch (kind) {
-    case CheckKind::kLaw:
+    case CheckCategory::kLaw:
       return "law";
-    case CheckKind::kBalance:
+    case CheckCategory::kInverseDynamics:
       return "balance";
-    case CheckKind::kPrediction:
+    case CheckCategory::kForwardDynamics:
       return "prediction";
-    case CheckKind::kAssumption:
+    case CheckCategory::kAssumption:
       return "assumption";
-    case CheckKind::kModel:
+    case CheckCategory::kModel:
       break;
   }
   return "model";

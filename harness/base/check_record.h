@@ -12,10 +12,10 @@
 namespace dexcheck {
 
 /// Which of the harness's five questions a check answers.
-enum class CheckKind { kModel, kBalance, kPrediction, kAssumption, kLaw };
+enum class CheckCategory { kModel, kBalance, kPrediction, kAssumption, kLaw };
 
 /// "model", "law", "balance", "prediction" or "assumption".
-const char* NameOf(CheckKind kind);
+const char* NameOf(CheckCategory kind);
 
 /// The part of the robot that a compared number belongs to.
 struct Location {
@@ -41,7 +41,7 @@ std::string Describe(const Location& where, const RobotModel& model, int base_ve
 struct CheckRecord {
   // What is asked.
   std::string name;  ///< As in the log and in summary.json; of terms, as in NOTATION.md.
-  CheckKind kind = CheckKind::kModel;
+  CheckCategory kind = CheckCategory::kModel;
   std::string unit = "1";
   std::string description;  ///< What is measured, and against what: one line for log and report.
   double bound = 0.0;       ///< Largest value that passes.

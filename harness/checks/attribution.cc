@@ -46,7 +46,7 @@ const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
   // What slides in the step in which a force shows tells more than the force. Wheels of another size give
   // other forces besides, which show before they have rolled far; wheels that slide do too.
   const auto name = [](StepCheck which) { return kStepChecks[static_cast<size_t>(which)].name; };
-  if (first == nullptr || first->name != name(StepCheck::kBalanceRobot)) return first;
+  if (first == nullptr || first->name != name(StepCheck::kInverseDynamicsRobot)) return first;
   for (const StepCheck slides : {StepCheck::kConeUse, StepCheck::kTractionUse, StepCheck::kContactsLost}) {
     for (const CheckRecord& check : steps) {
       if (check.name == name(slides) && check.failed && check.failed_at <= first->failed_at) return &check;
@@ -74,7 +74,7 @@ Cause AttributeExpectation(const CheckRecord& check, const MeasuredCauses& measu
 
 Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRecord> steps) {
   if (run == Cause::kModel || run == Cause::kSensing) return run;
-  if (check.kind == CheckKind::kModel) return Cause::kModel;
+  if (check.kind == CheckCategory::kModel) return Cause::kModel;
   const FailureMeaning meaning = MeaningOf(check);
   if (!meaning.is_own) return run;
   if (meaning.sharper == StepCheck::kCount) return meaning.cause;
@@ -117,7 +117,7 @@ const char* NameOf(Cause cause) {
       return "actuator";
     case Cause::kActuatorLimit:
       return "actuator limit";
-    case Cause::kJointStop:
+    case Cause::kJointLimit:
       return "joint stop";
     case Cause::kFingertipSlip:
       return "fingertip slip";
@@ -164,7 +164,7 @@ AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord>
     result.evidence = finding.check + ": " + finding.where + ": " + FormatNumber(finding.model) +
                       " in the model, " + FormatNumber(finding.engine) + " in the MJCF";
   } else if (first_model != nullptr &&
-             !Failed(steps, kStepChecks[static_cast<size_t>(StepCheck::kTold)].name)) {
+             !Failed(steps, kStepChecks[static_cast<size_t>(StepCheck::kMeasurement)].name)) {
     result.cause = Cause::kModel;
     result.evidence = Tell(*first_model);
   } else if (any_step) {
@@ -182,7 +182,7 @@ AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord>
     } else {
       result.cause = Cause::kUnexplained;
       const auto assumption = std::find_if(steps.begin(), steps.end(), [](const CheckRecord& check) {
-        return check.failed && check.kind == CheckKind::kAssumption;
+        return check.failed && check.kind == CheckCategory::kAssumption;
       });
       result.evidence = assumption == steps.end() ? "no assumption broke" : Tell(*assumption);
     }

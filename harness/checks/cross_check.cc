@@ -10,7 +10,7 @@ namespace dexcheck {
 namespace {
 
 /// What should have been told.
-const MeasuredState& ToldOf(const StepRecord& step) {
+const MeasuredState& MeasuredOf(const StepRecord& step) {
   return step.known != nullptr ? step.known->told.state : step.reading.state;
 }
 
@@ -97,7 +97,7 @@ void CrossCheck::CompareModel(const StepRecord& step) {
     model_.IncludeContacts(std::all_of(state.overlap.begin(), state.overlap.end(),
                                        [](double depth) { return depth > -PlantReading::kFar; }));
   }
-  const GraspModel& plant = ModelAtTruth(step);
+  const GraspModel& plant = ModelAtTrueState(step);
   model_.Compare(plant.robot(), plant.grasp(), state, step.reading.X_W0, step.time);
   CheckClearance(step);
   if (!known_) return;
@@ -124,9 +124,9 @@ void CrossCheck::CheckClearance(const StepRecord& step) {
               [&] { return clearance_.DescribeGeoms(collision.geom1, collision.geom2); });
 }
 
-double CrossCheck::CompareTold(const StepRecord& step) {
+double CrossCheck::CompareMeasurement(const StepRecord& step) {
   const MeasuredState& told = step.told.state;
-  const MeasuredState& truth = ToldOf(step);
+  const MeasuredState& truth = MeasuredOf(step);
   const Touch& touch = step.known != nullptr ? step.known->told.touch : step.reading.touch;
   double apart = std::abs(step.told.touch.support_force - touch.support_force);
   if (step.told.touch.fingertips != touch.fingertips) apart = std::numeric_limits<double>::infinity();
@@ -181,15 +181,15 @@ const LawErrors& CrossCheck::CompareControl(const StepRecord& step) {
 void CrossCheck::CompareUnsent(const StepRecord& step) {
   if (joint_law_ && step.command.computes_joints) {
     CompareModel(step);
-    motion_.Add(StepCheck::kTold, CompareTold(step), step.time);
-    sensors_.Add(step.told.state, ToldOf(step));
+    motion_.Add(StepCheck::kMeasurement, CompareMeasurement(step), step.time);
+    sensors_.Add(step.told.state, MeasuredOf(step));
     ReadControllersTerms(step);
     motion_.Add(StepCheck::kLawTorque, joint_law_->CompareUnsent(step, law_terms_), step.time);
   }
   if (!law_ || !LawCheck::IsJudged(step)) return;
   CompareModel(step);
-  motion_.Add(StepCheck::kTold, CompareTold(step), step.time);
-  sensors_.Add(step.told.state, ToldOf(step));
+  motion_.Add(StepCheck::kMeasurement, CompareMeasurement(step), step.time);
+  sensors_.Add(step.told.state, MeasuredOf(step));
   ReadControllersTerms(step);
   motion_.Add(StepCheck::kLawTorque, law_->CompareUnsent(step, law_terms_), step.time);
 }
@@ -213,7 +213,7 @@ MeasuredCauses CrossCheck::Tell() const {
 
 void CrossCheck::CompareJointLaw(const StepRecord& step) {
   const double t = step.time;
-  motion_.Add(StepCheck::kGains, joint_law_->sampled_radius(), t);
+  motion_.Add(StepCheck::kSpectralRadius, joint_law_->sampled_radius(), t);
   if (!step.command.computes_joints) return;
   ReadControllersTerms(step);
   const bool as_meant = MovedAsMeant(step);
@@ -233,10 +233,10 @@ void CrossCheck::CompareMotors(const StepRecord& step) {
 void CrossCheck::CompareLaw(const StepRecord& step) {
   const double t = step.time;
   const Expectation& expect = setup_->scenario().expect;
-  motion_.Add(StepCheck::kTold, CompareTold(step), t);
+  motion_.Add(StepCheck::kMeasurement, CompareMeasurement(step), t);
   CompareMotors(step);
-  sensors_.Add(step.told.state, ToldOf(step));
-  if (law_) motion_.Add(StepCheck::kGains, law_->sampled_radius(), t);
+  sensors_.Add(step.told.state, MeasuredOf(step));
+  if (law_) motion_.Add(StepCheck::kSpectralRadius, law_->sampled_radius(), t);
   if (law_ && LawCheck::IsJudged(step)) CompareObjectLaw(step);
   if (step.command.tracks && t >= expect.from) {
     motion_.AddLess(StepCheck::kExpectPosition, step.error.position.norm(), position_by_hold_, t);

@@ -86,7 +86,7 @@ class CrossCheck {
   };
   /// Are bodies apart that are not meant to touch? At the state that the engine's terms were evaluated at.
   void CheckClearance(const StepRecord& step);
-  static double CompareTold(const StepRecord& step);
+  static double CompareMeasurement(const StepRecord& step);
   /// The engine's at what the controller was told; contacts that need not fit together are the controller's.
   void ReadControllersTerms(const StepRecord& step);
   /// Did the joints get what was sent?

@@ -11,7 +11,7 @@ enum class Cause {
                    ///< expected.
   kActuator,       ///< The motors gave other torques than were sent.
   kActuatorLimit,  ///< A motor could not give its torque.
-  kJointStop,      ///< A joint reached the end of its range.
+  kJointLimit,     ///< A joint reached the end of its range.
   kFingertipSlip,  ///< A fingertip slides: its force is at the edge of the friction cone.
   kWheelSlip,      ///< A wheel slides: assumption (1), rolling without slipping.
   kContactSoftness,  ///< Contacts give or creep without sliding.

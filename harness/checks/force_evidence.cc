@@ -16,14 +16,14 @@ constexpr double kForceExplains = 0.95;
 constexpr double kSimpler = 0.02;
 // The first steps are looked at, then every one that is a power of two away.
 constexpr long kFirstSteps = 8;
-// Directions in which a link moves less than this share of the others do not count.
+// Directions in which a link moves less than this fraction of the others do not count.
 constexpr double kSingular = 1e-3;
-// Gravity whose size differs by less than this share of its change only points elsewhere.
+// Gravity whose size differs by less than this fraction of its change only points elsewhere.
 constexpr double kTilted = 0.2;
 
 std::string Short(double value) { return FormatNumber(value, 3); }
 
-std::string Percent(double share) { return std::to_string(std::lround(100.0 * share)) + " %"; }
+std::string Percent(double fraction) { return std::to_string(std::lround(100.0 * fraction)) + " %"; }
 
 bool IsLookedAt(long step) { return step < kFirstSteps || (step & (step - 1)) == 0; }
 
@@ -126,7 +126,7 @@ ForceFinding ForceEvidence::Find() const {
   if (robot_squares_ > 0.0) {
     const Candidate& joint = *std::max_element(joints_.begin(), joints_.end(), larger);
     finding.joint = joint.name;
-    finding.joint_share = joint.square / robot_squares_;
+    finding.joint_fraction = joint.square / robot_squares_;
     finding.torque = joint.largest;
     // Of links that explain it equally well, the one where the least force does: bodies near the base, which
     // a chain of joints carries along, move in few directions, and a huge force there may look the same. Of
@@ -141,20 +141,20 @@ ForceFinding ForceEvidence::Find() const {
       return explains(one) && one.largest <= (1.0 + kSimpler) * least;
     });
     finding.link = link.name;
-    finding.link_share = link.square / robot_squares_;
+    finding.link_fraction = link.square / robot_squares_;
     finding.link_force = link.largest;
   }
   const Vector3d change = gravity_normal_.ldlt().solve(gravity_product_);
   finding.gravity = change;
-  finding.gravity_share = change.dot(gravity_product_) / squares_;
-  finding.object_share = 1.0 - robot_squares_ / squares_;
+  finding.gravity_fraction = change.dot(gravity_product_) / squares_;
+  finding.object_fraction = 1.0 - robot_squares_ / squares_;
   finding.object_force = object_force_;
   finding.object_moment = object_moment_;
   return finding;
 }
 
 bool ForceEvidence::IsSlope(const ForceFinding& finding, const Vector3d& gravity) {
-  if (finding.gravity_share < kForceExplains || gravity.isZero(0.0)) return false;
+  if (finding.gravity_fraction < kForceExplains || gravity.isZero(0.0)) return false;
   const double along = std::abs(finding.gravity.dot(gravity.normalized()));
   return along < kTilted * finding.gravity.norm();
 }
@@ -167,27 +167,27 @@ std::string ForceEvidence::Tell() const {
     const double slope = std::atan2(actual.cross(gravity).norm(), actual.dot(gravity));
     return "gravity is not upright but " + Short(RadToDeg(slope)) + " deg off, by (" +
            Short(finding.gravity.x()) + ", " + Short(finding.gravity.y()) + ", " +
-           Short(finding.gravity.z()) + ") m/s^2; explains " + Percent(finding.gravity_share);
+           Short(finding.gravity.z()) + ") m/s^2; explains " + Percent(finding.gravity_fraction);
   }
-  if (finding.gravity_share >= kForceExplains) {
+  if (finding.gravity_fraction >= kForceExplains) {
     return "gravity differs by (" + Short(finding.gravity.x()) + ", " + Short(finding.gravity.y()) + ", " +
-           Short(finding.gravity.z()) + ") m/s^2; explains " + Percent(finding.gravity_share);
+           Short(finding.gravity.z()) + ") m/s^2; explains " + Percent(finding.gravity_fraction);
   }
-  const bool on_object = finding.object_share >= 0.5;
+  const bool on_object = finding.object_fraction >= 0.5;
   if (on_object) {
     return "on body " + model_->object()->name + ", up to " + Short(finding.object_force) + " N, " +
-           Short(finding.object_moment) + " N m; " + Percent(finding.object_share) + " of what is left";
+           Short(finding.object_moment) + " N m; " + Percent(finding.object_fraction) + " of what is left";
   }
   const bool joint =
-      finding.joint_share >= kForceExplains || finding.joint_share + kSimpler >= finding.link_share;
+      finding.joint_fraction >= kForceExplains || finding.joint_fraction + kSimpler >= finding.link_fraction;
   if (joint) {
-    return std::string(finding.joint_share >= kForceExplains ? "at" : "nearest:") + " joint " +
+    return std::string(finding.joint_fraction >= kForceExplains ? "at" : "nearest:") + " joint " +
            finding.joint + ", up to " + Short(std::abs(finding.torque)) + " N m; explains " +
-           Percent(finding.joint_share);
+           Percent(finding.joint_fraction);
   }
-  return std::string(finding.link_share >= kForceExplains ? "on" : "nearest:") + " body " + finding.link +
+  return std::string(finding.link_fraction >= kForceExplains ? "on" : "nearest:") + " body " + finding.link +
          ", up to " + Short(finding.link_force) + " N at its centre of mass; explains " +
-         Percent(finding.link_share);
+         Percent(finding.link_fraction);
 }
 
 }  // namespace dexcheck

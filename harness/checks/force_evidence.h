@@ -12,18 +12,18 @@
 
 namespace dexcheck {
 
-/// What is known of a force after some steps. Shares are of what the balances left, squared and in the metric
-/// of the inertias, |f|_M^-1, over all steps that were added.
+/// What is known of a force after some steps. Fractions are of what the balances left, squared and in the
+/// metric of the inertias, |f|_M^-1, over all steps that were added.
 struct ForceFinding {
   std::string joint;  ///< Whose own force explains the robot's part best; empty when there is none.
-  double joint_share = 0.0;
+  double joint_fraction = 0.0;
   double torque = 0.0;  ///< At that joint when it was largest, N m (of a sliding joint N).
   std::string link;     ///< A force at whose centre of mass explains it best.
-  double link_share = 0.0;
+  double link_fraction = 0.0;
   double link_force = 0.0;              ///< N, when it was largest.
   Vector3d gravity = Vector3d::Zero();  ///< World, m/s^2: by how much gravity would have to differ.
-  double gravity_share = 0.0;           ///< Of robot and object together.
-  double object_share = 0.0;            ///< Of the square that is the object's.
+  double gravity_fraction = 0.0;        ///< Of robot and object together.
+  double object_fraction = 0.0;         ///< Of the square that is the object's.
   double object_force = 0.0, object_moment = 0.0;  ///< On the object, N, N m, when the force was largest.
 };
 

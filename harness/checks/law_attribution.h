@@ -14,7 +14,7 @@ struct LawFinding {
   std::string name;        ///< "Coriolis forces C_bar'".
   std::string symbol;      ///< "C_bar' xi_c".
   double factor = 1.0;     ///< 1 is right, 0 missing.
-  double explained = 0.0;  ///< Share of the difference's square that it explains.
+  double explained = 0.0;  ///< Fraction of the difference's square that it explains.
 };
 
 /// Regression of E_bar' (tau' - tau'_printed) = sum_i (factor_i - 1) part_i over the steps added.

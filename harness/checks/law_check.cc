@@ -18,7 +18,7 @@ static_assert(kGraspNullBound >= 10.0 * GraspForceOptions{}.residual_tolerance);
 static_assert(kGraspOptimalityBound == 10.0 * GraspForceOptions{}.slack_tolerance);
 // What slip changes in accelerations and forces, over the condition number, against the forces that it
 // changes.
-constexpr double kSlipShare = 10.0;
+constexpr double kSlipFraction = 10.0;
 
 /// Between two orientations, rad; good to rounding where it is small.
 double CalcAngle(const Matrix3d& a, const Matrix3d& b) {
@@ -163,10 +163,10 @@ void LawCheck::CompareDemand(const StepFindings& findings, bool knows_slip) {
   // Where contacts slip, (47) plans for xi_c and the rigid system starts from xi.
   difference_ = reference_.slip_acceleration();
   mass_factor_->Multiply(difference_);
-  const double apart = std::max(motion, forces) / kappa - kSlipShare * difference_.norm() / scale_;
+  const double apart = std::max(motion, forces) / kappa - kSlipFraction * difference_.norm() / scale_;
   const bool slip_explains = apart <= 0.0;
   errors_.demand =
-      slip_explains ? 0.0 : std::max(apart - kSlipShare * Norm(reference_.slip_coriolis()) / scale_, 0.0);
+      slip_explains ? 0.0 : std::max(apart - kSlipFraction * Norm(reference_.slip_coriolis()) / scale_, 0.0);
 }
 
 void LawCheck::CompareGraspForce(const StepRecord& step, const LawTerms& terms, const VectorXd& f_c) {
@@ -270,9 +270,9 @@ void LawCheck::Move(const Vector6d& change, Followed* one) const {
   // Velocities v_0 + dt (a + c) of positions x_0 + dt v_0 + dt^2 (a / 2 + c / 3), where the acceleration
   // goes from a to a + 2 c; by Euler's method c is zero and positions go by the new velocity.
   const double before = 0.5 * time_step_ - velocity_age_;
-  constexpr double kShare = 4.0 / 3.0;
-  object->X_Bo.translation() += time_step_ * (p_dot - before * (R * p_ddot + kShare * change.head<3>()));
-  R = R * ExpSo3(time_step_ * (omega - before * (V_dot.tail<3>() + kShare * change.tail<3>())));
+  constexpr double kFraction = 4.0 / 3.0;
+  object->X_Bo.translation() += time_step_ * (p_dot - before * (R * p_ddot + kFraction * change.head<3>()));
+  R = R * ExpSo3(time_step_ * (omega - before * (V_dot.tail<3>() + kFraction * change.tail<3>())));
   object->X_Bo.linear() = Eigen::Quaterniond(R).normalized().toRotationMatrix();
   object->V_Bo << object->X_Bo.linear().transpose() * p_dot, omega;
 }

@@ -2,7 +2,7 @@
 
 // The printed law (53)-(55), computed a second time: with dense matrices, straight from the formulas, and
 // from terms that another side evaluated. It shares the formulas of no law with controller/control, so that a
-// mistake there is seen; with rotation feedback, e_R and the desired pose are the controller's functions.
+// fault there is seen; with rotation feedback, e_R and the desired pose are the controller's functions.
 //
 //   X_o_ddot = X_d_ddot + K_v (X_d_dot - X_o_dot) + K_p (X_d - X_o)                 the last bracket of (55)
 //   V_o_dot  = P^-1 X_o_ddot + d/dt(P^-1) X_o_dot

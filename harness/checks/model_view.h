@@ -1,6 +1,6 @@
 #pragma once
 
-// What a check sees of the analytic model. Checks of checks put a view with a mistake in its place.
+// What a check sees of the analytic model. Checks of checks put a view with a fault in its place.
 
 #include <functional>
 #include <memory>

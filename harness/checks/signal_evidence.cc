@@ -14,7 +14,7 @@ namespace {
 constexpr double kNumberExplains = 0.98;
 // Readings' differences below this are rounding of packing them.
 constexpr double kRounding = 1e-15;
-// Of entries that differ, this share is "all" of them.
+// Of entries that differ, this fraction is "all" of them.
 constexpr double kMost = 0.5;
 
 std::string FourDigits(double value) { return FormatNumber(value, 4); }
@@ -134,9 +134,9 @@ SignalFinding SignalEvidence::Fit(Eigen::Index begin, Eigen::Index count) const 
   const double by = lag_by_.segment(begin, count).sum();
   const double square = lag_squares_.segment(begin, count).sum();
   if (square > 0.0) {
-    const double share = by / square;
-    const double left = lag_change_.segment(begin, count).sum() - share * by;
-    if (0.0 < share && share < 1.0) offer(Kind::kLag, share, 1.0 - left / all);
+    const double fraction = by / square;
+    const double left = lag_change_.segment(begin, count).sum() - fraction * by;
+    if (0.0 < fraction && fraction < 1.0) offer(Kind::kLag, fraction, 1.0 - left / all);
   }
   if (best.explained < kNumberExplains) best.kind = Kind::kNone;
   return best;
@@ -210,8 +210,8 @@ SensorEvidence::SensorEvidence(const RobotModel& model, const std::vector<int>& 
     add("contact of " + name + " on the object, u", "rad");
     add("contact of " + name + " on the object, v", "rad");
   }
-  told_.setZero(static_cast<Eigen::Index>(names_.size()));
-  truth_ = told_;
+  measured_.setZero(static_cast<Eigen::Index>(names_.size()));
+  truth_ = measured_;
 }
 
 void SensorEvidence::Pack(const MeasuredState& state, const MeasuredState& truth, VectorXd* entries) const {
@@ -231,9 +231,9 @@ void SensorEvidence::Pack(const MeasuredState& state, const MeasuredState& truth
 }
 
 void SensorEvidence::Add(const MeasuredState& told, const MeasuredState& truth) {
-  Pack(told, truth, &told_);
+  Pack(told, truth, &measured_);
   Pack(truth, truth, &truth_);
-  evidence_.Add(truth_, told_, none_);
+  evidence_.Add(truth_, measured_, none_);
 }
 
 std::string SensorEvidence::Tell() const {

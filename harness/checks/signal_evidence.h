@@ -15,10 +15,10 @@ namespace dexcheck {
 struct SignalFinding {
   enum class Kind { kNone, kGain, kOffset, kDelay, kLag, kDryFriction, kDamping };
   Kind kind = Kind::kNone;  ///< kNone: several numbers, or none of these.
-  /// kGain: the factor; kOffset: in the signal's unit; kDelay: steps; kLag: share of the difference that is
-  /// made up a step; kDryFriction, kDamping: N m, N m s/rad.
+  /// kGain: the factor; kOffset: in the signal's unit; kDelay: steps; kLag: fraction of the difference that
+  /// is made up a step; kDryFriction, kDamping: N m, N m s/rad.
   double value = 0.0;
-  double explained = 0.0;  ///< Share of the difference's square.
+  double explained = 0.0;  ///< Fraction of the difference's square.
 };
 
 /// Regression of got - meant, for many entries at once. Nothing allocates after construction.
@@ -87,7 +87,7 @@ class SensorEvidence {
 
   std::vector<std::string> names_, units_;
   double time_step_;
-  VectorXd told_, truth_, none_;
+  VectorXd measured_, truth_, none_;
   SignalEvidence evidence_;
 };
 

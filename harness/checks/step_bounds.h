@@ -26,7 +26,8 @@ namespace dexcheck {
 //
 // The prediction differs from the engine's motion by r_ddot and v_dot, which die out under a constant force,
 // and by what tilt leaves. What they come to is computed at each step, from the engine's own A = J M^-1 J^T
-// and R and from how the forces change (contact_give.h, contact_softness.h), and taken off above the bound.
+// and R and from how the forces change (contact_compliance.h, contact_softness.h), and taken off above the
+// bound.
 
 /// Distances are judged from a place between half of this and this ago, s.
 inline constexpr double kSlipWindow = 10.0;
@@ -70,7 +71,7 @@ inline constexpr double kTorqueAppliedBound = 1e-14;
 // less what the solver left over, and less what tilt and slip can come to (StepChecks::CalcUnevenForce). Then
 // all of it is rounding of the engine's terms, 1e-14 of forces that cancel, and products of small departures:
 // 1e-5 rad of tilt times 1e-2 of the forces that change with it.
-inline constexpr double kBalanceRobotBound = 1e-6;
+inline constexpr double kInverseDynamicsRobotBound = 1e-6;
 // What law_demand leaves, over K_p = 400/s^2: 1e-8 of accelerations of some m/s^2, times a condition number
 // of some tens. Measured 1.2e-9 m in `curve`.
 inline constexpr double kErrorDynamicsBound = 1e-8;
@@ -79,7 +80,7 @@ inline constexpr double kOrientationDynamicsBound = 1e-7;
 inline constexpr double kJointDynamicsBound = 1e-11;
 
 // rad, m: rounding of a joint that rests exactly at the end of its range, as fingers of a closed gripper do.
-inline constexpr double kJointStopBound = 1e-12;
+inline constexpr double kJointLimitBound = 1e-12;
 
 // m, for the shipped step of 1 ms: the error of the trapezoidal rule, (rate dt)^2 / 12 of the way. Measured
 // 3e-9 at most in the shipped scenarios.
@@ -88,7 +89,7 @@ inline constexpr double kKappaBound = 0.1 * (10.0 * 1e-3) * (10.0 * 1e-3) / 12.0
 // Ten times the accuracy of distances between bodies that are apart (solid.h).
 inline constexpr double kClearanceBound = 1e-6;
 
-/// What a bound is proportional to; none of them for one that is rounding, or a share.
+/// What a bound is proportional to; none of them for one that is rounding, or a fraction.
 enum class Scaling {
   kNone,
   kCreep,            ///< (1 - d) dt

@@ -7,7 +7,7 @@
 
 #include "controller/common/text.h"
 #include "harness/checks/bounds.h"
-#include "harness/checks/contact_give.h"
+#include "harness/checks/contact_compliance.h"
 #include "harness/checks/known_plant.h"
 
 namespace dexcheck {
@@ -29,7 +29,7 @@ double CalcSwingForce(const Setup& setup, const StepRecord& step, VectorXd* v, V
   } else {
     v->head<2>().array() -= v->head<2>().mean();
   }
-  momentum->noalias() = ModelAtTruth(step).robot().M() * *v;
+  momentum->noalias() = ModelAtTrueState(step).robot().M() * *v;
   Vector3d velocity, omega;
   setup.adapter().GetBaseMotion(step.reading.qpos.data(), step.reading.qvel.data(), &velocity, &omega);
   return 2.0 * omega.head<2>().norm() * std::sqrt(std::max(0.0, v->dot(*momentum)));
@@ -47,7 +47,7 @@ StepChecks::StepChecks(const Setup& setup)
       dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())),
       actuation_(setup.model()),
       time_step_(setup.scenario().plant.time_step),
-      give_(std::make_unique<PredictionGive>(setup)),
+      compliance_(std::make_unique<PredictionCompliance>(setup)),
       forces_(setup.model()),
       wheels_(setup.model().base()) {
   DefineChecks();
@@ -108,7 +108,7 @@ void StepChecks::SetApplying() {
   };
   using enum StepCheck;
   // Without a task every step is judged.
-  leave_out(!setup_->scenario().task, {kUnjudged});
+  leave_out(!setup_->scenario().task, {kExcluded});
   leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kRolling, kTractionUse});
   leave_out(setup_->model().base().type == BaseType::kFixed, {kBaseTilt});
   const bool joints = setup_->joint_motion() != nullptr;
@@ -117,7 +117,7 @@ void StepChecks::SetApplying() {
                      kContactsLost, kPenetration, kKappa});
   leave_out(!joints, {kJointDynamics});
   leave_out(!setup_->scenario().grasp.hemisphere, {kFingertipRim});
-  leave_out(!setup_->has_object(), {kBalanceObject});
+  leave_out(!setup_->has_object(), {kInverseDynamicsObject});
   // Nothing but stiffness holds them: whatever is not ideal moves them, and so do the Coriolis forces and the
   // friction that kPdGravity leaves to it. The least motion in the metric of M_bar' has them in it.
   const ControlOptions& control = setup_->scenario().control;
@@ -149,9 +149,9 @@ void StepChecks::Reset() {
   std::fill(findings_.wheel_slip.begin(), findings_.wheel_slip.end(), SlipState{});
   findings_.contacts_lost = 0;
   findings_.least_cone_margin = std::numeric_limits<double>::infinity();
-  findings_.unjudged_steps = 0;
+  findings_.excluded_steps = 0;
   steps_ = 0;
-  is_unjudged_ = false;
+  is_excluded_ = false;
   changed_at_ = -std::numeric_limits<double>::infinity();
 }
 
@@ -167,11 +167,11 @@ void StepChecks::Compare(const StepRecord& step) {
   time_ = step.time;
   CompareContacts(step);
   FindContacts(step);
-  const bool unjudged = handling.partial && time_ - changed_at_ < kTransient;
-  if (unjudged && !is_unjudged_) unjudged_since_ = time_;
-  is_unjudged_ = unjudged;
-  Add(StepCheck::kUnjudged, unjudged ? time_ - unjudged_since_ : 0.0);
-  if (unjudged) ++findings_.unjudged_steps;
+  const bool excluded = handling.partial && time_ - changed_at_ < kTransient;
+  if (excluded && !is_excluded_) excluded_since_ = time_;
+  is_excluded_ = excluded;
+  Add(StepCheck::kExcluded, excluded ? time_ - excluded_since_ : 0.0);
+  if (excluded) ++findings_.excluded_steps;
   CompareDynamics(step);
   CompareObject(step);
   KeepForces(step);
@@ -185,7 +185,7 @@ void StepChecks::Compare(const StepRecord& step) {
 
   Add(StepCheck::kBaseTilt, step.reading.departure.tilt);
   CheckIdleJoints(step.reading.state);
-  CheckJointStops(step.reading.state);
+  CheckJointLimits(step.reading.state);
   ++steps_;
 }
 
@@ -217,8 +217,8 @@ void StepChecks::FindContacts(const StepRecord& step) {
 }
 
 void StepChecks::Predict(const StepRecord& step) {
-  const ModelTerms& robot = ModelAtTruth(step).robot();
-  const GraspTerms& grasp = ModelAtTruth(step).grasp();
+  const ModelTerms& robot = ModelAtTrueState(step).robot();
+  const GraspTerms& grasp = ModelAtTrueState(step).grasp();
   const bool whole = touching_ == AllContacts(grasp.num_contacts());
   if (handling_.partial && !whole && touching_ != 0) return PredictPart(step);
   const bool in_hand = grasp.num_contacts() > 0 && (!handling_.partial || (whole && !supported_));
@@ -237,7 +237,7 @@ void StepChecks::Predict(const StepRecord& step) {
 }
 
 void StepChecks::PredictPart(const StepRecord& step) {
-  const ModelTerms& robot = ModelAtTruth(step).robot();
+  const ModelTerms& robot = ModelAtTrueState(step).robot();
   std::unique_ptr<PartialDynamics>& part = parts_[touching_];
   if (!part) part = std::make_unique<PartialDynamics>(*setup_, touching_);
   part->grasp.SetState(robot, step.reading.state);
@@ -251,17 +251,17 @@ void StepChecks::PredictPart(const StepRecord& step) {
 }
 
 void StepChecks::CompareDynamics(const StepRecord& step) {
-  const ModelTerms& robot = ModelAtTruth(step).robot();
+  const ModelTerms& robot = ModelAtTrueState(step).robot();
   const VectorXd& xi_dot = step.response.xi_dot;
   actuation_.CalcForce(step.drive.tau, force_);
   if (step.known != nullptr) force_ += step.known->force;
   AddFrictionAndStops(step);
   // Soft contacts become only in some milliseconds what rigid ones are at once.
-  if (!is_unjudged_) Predict(step);
+  if (!is_excluded_) Predict(step);
   if (mass_factor() == nullptr) return;
 
   // (48): M_bar' xi_dot + C_bar' xi + F_bar' + J_B'^T f_c - E_bar' tau'
-  if (is_unjudged_) {
+  if (is_excluded_) {
     bias_ = robot.gravity() + robot.friction();
     bias_.noalias() += robot.C() * robot.velocity();
   } else {
@@ -269,7 +269,7 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   }
   residual_ = bias_ - force_;
   residual_.noalias() += robot.M() * xi_dot;
-  residual_.noalias() += ModelAtTruth(step).grasp().J_B().transpose() * findings_.f_c;
+  residual_.noalias() += ModelAtTrueState(step).grasp().J_B().transpose() * findings_.f_c;
   if (step.response.departure_force.size() > 0) residual_ += step.response.departure_force;
   if (step.response.solver_force.size() > 0) residual_ -= step.response.solver_force;
   if (step.response.wheels.size() == 2) AddSpin(step);
@@ -277,21 +277,22 @@ void StepChecks::CompareDynamics(const StepRecord& step) {
   scale_ = std::max(Norm(bias_), std::numeric_limits<double>::min());
   const double left = Norm(residual_);
   const double uneven = CalcUnevenForce(step) + CalcSwingForce(*setup_, step, &work_, &residual_);
-  Add(StepCheck::kBalanceRobot, std::isnan(left) ? left : std::max(0.0, left - uneven) / scale_);
+  Add(StepCheck::kInverseDynamicsRobot, std::isnan(left) ? left : std::max(0.0, left - uneven) / scale_);
   solver_of_robot_ = step.response.solver_force.size() > 0 ? Norm(step.response.solver_force) / scale_ : 0.0;
   bias_ -= force_;
-  give_->Follow(step, bias_, findings_.f_c_model, uneven, [this](const VectorXd& f) { return Norm(f); });
+  compliance_->Follow(step, bias_, findings_.f_c_model, uneven,
+                      [this](const VectorXd& f) { return Norm(f); });
 
-  if (is_unjudged_) return;
+  if (is_excluded_) return;
   // |a|_M = |L a|
   residual_ = findings_.xi_dot_model - xi_dot;
   mass_factor()->Multiply(residual_);
-  AddLess(StepCheck::kReducedAcceleration, residual_.norm() / scale_, give_->motion() / scale_, time_);
+  AddLess(StepCheck::kReducedAcceleration, residual_.norm() / scale_, compliance_->motion() / scale_, time_);
   double force_scale = std::max(findings_.f_c.norm(), std::numeric_limits<double>::min());
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) force_scale = std::max(force_scale, Weight());
   const double apart = (findings_.f_c_model - findings_.f_c).norm();
-  AddLess(StepCheck::kContactForce, apart / force_scale, give_->force() / force_scale, time_);
+  AddLess(StepCheck::kContactForce, apart / force_scale, compliance_->force() / force_scale, time_);
 }
 
 void StepChecks::AddFrictionAndStops(const StepRecord& step) {
@@ -363,7 +364,7 @@ double StepChecks::Weight() const { return setup_->object().body.mass * setup_->
 void StepChecks::CompareObject(const StepRecord& step) {
   if (!setup_->has_object()) return Add(StepCheck::kSolver, solver_of_robot_);
   // (19), as forces at the contacts' arm
-  const GraspTerms& grasp = ModelAtTruth(step).grasp();
+  const GraspTerms& grasp = ModelAtTrueState(step).grasp();
   const PlantResponse& response = step.response;
   const ObjectBodyTerms& body = grasp.body();
   // Of an object that is not held, its radius of gyration.
@@ -377,10 +378,10 @@ void StepChecks::CompareObject(const StepRecord& step) {
   };
   left_of_object_ = body.M_hat * response.V_Bo_dot + body.C_hat * grasp.V_Bo() + body.N_o -
                     grasp.G() * findings_.f_c - response.support_wrench - response.solver_residual - push;
-  Add(StepCheck::kBalanceObject, relative(left_of_object_));
+  Add(StepCheck::kInverseDynamicsObject, relative(left_of_object_));
   // What the solver leaves over while contacts come and go is taken off the balances, and is gone some steps
   // later.
-  if (is_unjudged_) return;
+  if (is_excluded_) return;
   Add(StepCheck::kSolver, std::max(relative(response.solver_residual), solver_of_robot_));
 }
 
@@ -389,8 +390,8 @@ void StepChecks::KeepForces(const StepRecord& step) {
     return check(which).applies && !(check(which).last <= check(which).bound);
   };
   if (mass_factor() == nullptr) return;
-  if (!fails(StepCheck::kBalanceRobot) && !fails(StepCheck::kBalanceObject)) return;
-  forces_.Add(left_of_robot_, left_of_object_, ModelAtTruth(step), step.reading.state.q, *mass_factor(),
+  if (!fails(StepCheck::kInverseDynamicsRobot) && !fails(StepCheck::kInverseDynamicsObject)) return;
+  forces_.Add(left_of_robot_, left_of_object_, ModelAtTrueState(step), step.reading.state.q, *mass_factor(),
               scale_);
 }
 
@@ -406,12 +407,12 @@ void StepChecks::CompareRolling(const StepRecord& step) {
     beyond = std::max(beyond, std::abs(mismatch[static_cast<Eigen::Index>(k)]) - wheel.slip.norm() - sunk);
   }
   // So does one whose platform sinks or tilts while the tyres give to a force that changes.
-  beyond = std::max(0.0, beyond - give_->sinking());
+  beyond = std::max(0.0, beyond - compliance_->sinking());
   Add(StepCheck::kRolling, beyond);
   if (!(beyond <= check(StepCheck::kRolling).bound)) wheels_.Add(xi, rates);
 }
 
-void StepChecks::CheckJointStops(const MeasuredState& state) {
+void StepChecks::CheckJointLimits(const MeasuredState& state) {
   const std::vector<Joint>& joints = setup_->model().joints();
   const int offset = setup_->model().num_base_positions();
   double beyond = 0.0;
@@ -423,10 +424,10 @@ void StepChecks::CheckJointStops(const MeasuredState& state) {
     beyond = over;
     farthest = i;
   }
-  if (beyond > check(StepCheck::kJointStop).bound && !check(StepCheck::kJointStop).failed) {
-    check(StepCheck::kJointStop).part = "joint " + Quote(joints[farthest].name);
+  if (beyond > check(StepCheck::kJointLimit).bound && !check(StepCheck::kJointLimit).failed) {
+    check(StepCheck::kJointLimit).part = "joint " + Quote(joints[farthest].name);
   }
-  Add(StepCheck::kJointStop, beyond);
+  Add(StepCheck::kJointLimit, beyond);
 }
 
 }  // namespace dexcheck

@@ -24,7 +24,7 @@
 
 namespace dexcheck {
 
-class PredictionGive;
+class PredictionCompliance;
 
 /// Balance, prediction and assumptions. Nothing allocates after construction, except where a task's set of
 /// contacts comes up for the first time.
@@ -119,7 +119,7 @@ class StepChecks {
   /// Of the object, N.
   [[nodiscard]] double Weight() const;
   void CheckIdleJoints(const MeasuredState& state);
-  void CheckJointStops(const MeasuredState& state);
+  void CheckJointLimits(const MeasuredState& state);
   void CompareKappa(const StepRecord& step);
   /// By (40), from how fingertip and object have moved since the last step, in the charts of now.
   Vector5d CalcKappaChange(const StepRecord& step, size_t finger);
@@ -138,8 +138,8 @@ class StepChecks {
   bool supported_ = false;
   bool was_holding_ = false;
   double changed_at_ = -std::numeric_limits<double>::infinity();  // the contacts, s
-  double unjudged_since_ = 0.0;                                   // s, while it lasts
-  bool is_unjudged_ = false;
+  double excluded_since_ = 0.0;                                   // s, while it lasts
+  bool is_excluded_ = false;
   /// Integrated from (40) since the window's beginning, and since the next one's.
   std::vector<ContactCoordinates> kappa_, next_kappa_;
   std::vector<LastContact> last_contacts_;
@@ -149,7 +149,7 @@ class StepChecks {
   double time_step_ = 0.0;
   double time_ = 0.0;
   VectorXd force_, bias_, residual_;  // n
-  std::unique_ptr<PredictionGive> give_;
+  std::unique_ptr<PredictionCompliance> compliance_;
   VectorXd work_;          // n
   VectorXd contact_bias_;  // 3N, m/s^2, each in its Sigma_cf
   ForceEvidence forces_;
@@ -157,7 +157,7 @@ class StepChecks {
   VectorXd left_of_robot_;  // n, of the step's balance
   Vector6d left_of_object_ = Vector6d::Zero();
   double scale_ = 1.0;
-  double solver_of_robot_ = 0.0;  // relative, as balance_robot
+  double solver_of_robot_ = 0.0;  // relative, as inverse_dynamics_robot
   double mass_ = 0.0;             // of the robot, kg
 };
 

@@ -7,8 +7,8 @@
 #include "controller/common/text.h"
 #include "controller/contact/fingertip_rim.h"
 #include "controller/contact/rolling.h"
+#include "harness/checks/contact_compliance.h"
 #include "harness/checks/contact_drift.h"
-#include "harness/checks/contact_give.h"
 #include "harness/checks/step_checks.h"
 
 namespace dexcheck {
@@ -38,8 +38,8 @@ void StepChecks::CompareContacts(const StepRecord& step) {
   int lost = 0;
   double penetration = 0.0;
   for (size_t i = 0; i < contacts.size(); ++i) {
-    const Matrix3d R_B_cf =
-        step.reading.state.X_Bo.linear() * ModelAtTruth(step).grasp().contacts()[i].geometry.g_o_cf.linear();
+    const Matrix3d R_B_cf = step.reading.state.X_Bo.linear() *
+                            ModelAtTrueState(step).grasp().contacts()[i].geometry.g_o_cf.linear();
     findings_.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) = R_B_cf.transpose() * contacts[i].force;
     if (!contacts[i].touching) ++lost;
     if (holding && !contacts[i].touching && findings_.fingertip_slip[i].touching) ++findings_.contacts_lost;
@@ -86,7 +86,7 @@ void StepChecks::ReadSlip(const StepRecord& step) {
   };
   for (size_t i = 0; i < response.fingertips.size(); ++i) {
     SlipState& slip = findings_.fingertip_slip[i];
-    const Matrix3d& R_o_cf = ModelAtTruth(step).grasp().contacts()[i].geometry.g_o_cf.linear();
+    const Matrix3d& R_o_cf = ModelAtTrueState(step).grasp().contacts()[i].geometry.g_o_cf.linear();
     const Vector3d creep =
         time_step_ * R_o_cf.leftCols<2>() * contact_bias_.segment<2>(3 * static_cast<Eigen::Index>(i));
     slip.creep += time_step_ * creep;
@@ -101,7 +101,7 @@ void StepChecks::ReadSlip(const StepRecord& step) {
   }
   if (holding) {
     Add(StepCheck::kFingertipSlip, slipped);
-    if (!is_unjudged_) Add(StepCheck::kFingertipSlipRate, rate);
+    if (!is_excluded_) Add(StepCheck::kFingertipSlipRate, rate);
     Add(StepCheck::kConeUse, cone_use);
   }
   slipped = 0.0;
@@ -119,7 +119,7 @@ void StepChecks::ReadSlip(const StepRecord& step) {
 }
 
 void StepChecks::CheckRims(const StepRecord& step) {
-  const GraspTerms& grasp = ModelAtTruth(step).grasp();
+  const GraspTerms& grasp = ModelAtTrueState(step).grasp();
   const Vector3d& pole = *setup_->scenario().grasp.hemisphere;
   CheckRecord& rim = check(StepCheck::kFingertipRim);
   double beyond = 0.0;
@@ -136,8 +136,8 @@ void StepChecks::CheckRims(const StepRecord& step) {
 }
 
 Vector5d StepChecks::CalcKappaChange(const StepRecord& step, size_t finger) {
-  const ModelTerms& robot = ModelAtTruth(step).robot();
-  const GraspTerms& grasp = ModelAtTruth(step).grasp();
+  const ModelTerms& robot = ModelAtTrueState(step).robot();
+  const GraspTerms& grasp = ModelAtTrueState(step).grasp();
   const MeasuredState& state = step.reading.state;
   const ContactGeometry& contact = grasp.contacts()[finger].geometry;
   const Pose X_0f =
@@ -162,7 +162,7 @@ Vector5d StepChecks::CalcKappaChange(const StepRecord& step, size_t finger) {
 }
 
 void StepChecks::CompareKappa(const StepRecord& step) {
-  const GraspTerms& grasp = ModelAtTruth(step).grasp();
+  const GraspTerms& grasp = ModelAtTrueState(step).grasp();
   const MeasuredState& state = step.reading.state;
   double apart = 0.0;
   for (size_t i = 0; i < kappa_.size(); ++i) {

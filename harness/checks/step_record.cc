@@ -6,7 +6,7 @@
 
 namespace dexcheck {
 
-const GraspModel& ModelAtTruth(const StepRecord& step) {
+const GraspModel& ModelAtTrueState(const StepRecord& step) {
   return step.known != nullptr ? *step.known->model : *step.model;
 }
 

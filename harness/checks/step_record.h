@@ -44,7 +44,7 @@ struct StepFindings {
   std::vector<SlipState> fingertip_slip, wheel_slip;
 
   // Of all steps so far.
-  long unjudged_steps = 0;  ///< Whose balance and prediction were not judged: contacts had just changed.
+  long excluded_steps = 0;  ///< Whose balance and prediction were not judged: contacts had just changed.
   long contacts_lost = 0;   ///< Contacts of fingertips that broke.
   double least_cone_margin = std::numeric_limits<double>::infinity();  ///< Of a fingertip, N.
 };
@@ -72,7 +72,7 @@ struct StepRecord {
 };
 
 /// The model at the truth: the controller's own where it is told that and the plant is ideal.
-[[nodiscard]] const GraspModel& ModelAtTruth(const StepRecord& step);
+[[nodiscard]] const GraspModel& ModelAtTrueState(const StepRecord& step);
 
 /// Pose of the object, whose angles are on the controller's branch where it uses them.
 [[nodiscard]] Vector6d CalcX_o(const StepRecord& step);

@@ -7,7 +7,7 @@ namespace dexcheck {
 namespace {
 
 constexpr double kWheelExplains = 0.95;
-// A wheel with less than this share of the larger mismatch has none of its own.
+// A wheel with less than this fraction of the larger mismatch has none of its own.
 constexpr double kOwn = 0.05;
 constexpr std::array<double, 2> kSide = {1.0, -1.0};  // right, left
 

@@ -13,8 +13,8 @@
 #include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
-#include "harness/sides/audit.h"
-#include "harness/sides/read_description.h"
+#include "harness/descriptions/audit.h"
+#include "harness/descriptions/read_description.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -80,8 +80,8 @@ void Print(const AuditRequest& request, const RobotDescription& robot, const Aud
   if (counted == 0) {
     fmt::print("{}GOOD: nothing that a robot cannot have, and nothing odd.\n", request.quiet ? "" : "\n");
   } else {
-    const char* const things = counted == 1 ? "thing that a robot cannot have or that looks like a mistake"
-                                            : "things that a robot cannot have or that look like mistakes";
+    const char* const things = counted == 1 ? "thing that a robot cannot have or that looks like a fault"
+                                            : "things that a robot cannot have or that look like faults";
     fmt::print("{}FOUND: {} {}.\n", request.quiet ? "" : "\n", counted, things);
   }
 }

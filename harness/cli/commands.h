@@ -60,7 +60,7 @@ void AddBudgetCommand(Command app);
 void AddCompareCommand(Command app);
 void AddExciteCommand(Command app);
 void AddExportCommand(Command app);
-void AddRefereeCommand(Command app);
+void AddEngineComparisonCommand(Command app);
 void AddRenderCommand(Command app);
 void AddReportCommand(Command app);
 void AddStatesCommand(Command app);

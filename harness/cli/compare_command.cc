@@ -68,7 +68,7 @@ void PrintSignals(const RunComparison& comparison, bool all) {
     const std::string line =
         fmt::format("  {} - A  {:<28} {:>9} {:<7} {:>9}  at {:.3f} s", static_cast<char>('A' + signal.run),
                     name, FormatShort(signal.difference), signal.unit == "1" ? "" : signal.unit,
-                    FormatShort(signal.share()), signal.at_time);
+                    FormatShort(signal.fraction()), signal.at_time);
     fmt::print("{}\n", Wrap(line, 9));
   }
   if (!comparison.not_compared.empty())
@@ -153,10 +153,10 @@ int Run(const CompareRequest& request) {
   if (!request.json.empty()) json.emplace(request.json);
   const RunComparison comparison = CompareRuns(pointers, request.options);
   const bool prints = !json || !json->is_stdout();
-  const bool is_filmed =
-      request.video.empty() || WriteComparisonMovie(request.run_folders[0], request.run_folders[1],
+  const bool is_recorded =
+      request.video.empty() || WriteComparisonVideo(request.run_folders[0], request.run_folders[1],
                                                     request.video, request.quiet || !prints);
-  if (!is_filmed) return kFailure;
+  if (!is_recorded) return kFailure;
   if (prints && !request.quiet) Print(request, comparison);
   if (prints)
     fmt::print("{}{}\n", request.quiet ? "" : "\n",
@@ -184,7 +184,7 @@ void AddCompareCommand(Command app) {
   command
       .AddOption(
           "--tolerance", &request->tolerance,
-          "Exit with 1 when a signal differs by more than this share of its size, or a verdict differs")
+          "Exit with 1 when a signal differs by more than this fraction of its size, or a verdict differs")
       .TypeName("REL");
   command
       .AddOption("--signals", &request->options.patterns,
@@ -196,7 +196,7 @@ void AddCompareCommand(Command app) {
       .TypeName("FILE.html");
   command
       .AddOption("--video", &request->video,
-                 "Film two runs in one scene, the second as a ghost (.mp4, .webm or .gif)")
+                 "Video two runs in one scene, the second as a ghost (.mp4, .webm or .gif)")
       .TypeName("FILE");
   AddJsonOption(command, "the numbers", &request->json);
   command.AddFlag("--all", &request->all, "Print all checks and signals");

@@ -17,10 +17,10 @@
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
-#include "harness/sides/answer_files.h"
-#include "harness/sides/answers_comparison.h"
-#include "harness/sides/program_side.h"
-#include "harness/sides/read_description.h"
+#include "harness/descriptions/answer_files.h"
+#include "harness/descriptions/answers_comparison.h"
+#include "harness/descriptions/program_side.h"
+#include "harness/descriptions/read_description.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -141,7 +141,7 @@ void AddConsistencyCommand(Command app) {
   const Option program =
       command
           .AddOption("--program", &request->program,
-                     "Command of a program that answers terms, instead of B (harness/sides/README.md)")
+                     "Command of a program that answers terms, instead of B (harness/descriptions/README.md)")
           .TypeName("CMD");
   command
       .AddOption(

@@ -11,8 +11,8 @@
 #include "harness/checks/consistency.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/tolerance_options.h"
-#include "harness/sides/file_comparison.h"
-#include "harness/sides/program_side.h"
+#include "harness/descriptions/file_comparison.h"
+#include "harness/descriptions/program_side.h"
 
 namespace dexcheck::cli {
 

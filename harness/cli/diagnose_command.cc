@@ -19,15 +19,15 @@
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/terminal.h"
 #include "harness/cli/tolerance_options.h"
+#include "harness/descriptions/compiled_inertias.h"
+#include "harness/descriptions/description_match.h"
+#include "harness/descriptions/engine_extras.h"
+#include "harness/descriptions/join_names.h"
+#include "harness/descriptions/read_description.h"
+#include "harness/descriptions/robot_file.h"
 #include "harness/diagnosis/diagnose.h"
 #include "harness/diagnosis/file_terms.h"
 #include "harness/engine/engine.h"
-#include "harness/sides/compiled_inertias.h"
-#include "harness/sides/description_match.h"
-#include "harness/sides/engine_extras.h"
-#include "harness/sides/join_names.h"
-#include "harness/sides/read_description.h"
-#include "harness/sides/robot_file.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -118,8 +118,8 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotS
   if (number > 1) fmt::print("Together: {:.4g} %.\n", 100.0 * diagnosis.explained);
   if (!request.quiet && diagnosis.causes.size() > 1 && diagnosis.ranking.size() > 1) {
     fmt::print("One number alone (masses, inertias, joint constants, gravity) would explain at most:\n");
-    for (const auto& [cause, share] : diagnosis.ranking)
-      fmt::print("  {:5.2g} %  {}\n", 100.0 * share, DescribeShort(cause, written));
+    for (const auto& [cause, fraction] : diagnosis.ranking)
+      fmt::print("  {:5.2g} %  {}\n", 100.0 * fraction, DescribeShort(cause, written));
   }
   if (IsRepairedWholly(diagnosis)) {
     fmt::print("With {} the two agree to {}.\n", number == 1 ? "it repaired" : "these repaired",
@@ -214,7 +214,7 @@ int Run(DiagnoseRequest request) {
   std::vector<WrittenRow> rows;
   std::vector<std::string> notes;
   const RobotModel model = ReadGiven(request, engine.get(), &rows, &notes);
-  RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely mistakes)");
+  RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely faults)");
   CatchInterrupts();
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
@@ -229,8 +229,8 @@ int Run(DiagnoseRequest request) {
   bar.Finish();
   const FileTerms terms(model.spec(), std::move(rows));
   diagnosis.causes = terms.Convert(diagnosis.causes);
-  for (auto& [cause, share] : diagnosis.ranking) cause = terms.ConvertPart(cause);
-  // Mistakes of conventions first; what can only be moved shows no bodies to compare.
+  for (auto& [cause, fraction] : diagnosis.ranking) cause = terms.ConvertPart(cause);
+  // Faults of conventions first; what can only be moved shows no bodies to compare.
   const bool is_open = !diagnosis.agrees && !request.options.by_motion;
   std::vector<Hypothesis> hypotheses;
   if (is_open) {

@@ -9,8 +9,8 @@
 #include "controller/object/object_dynamics.h"
 #include "harness/cli/eval_contacts.h"
 #include "harness/cli/json_matrix.h"
+#include "harness/descriptions/base_convention.h"
 #include "harness/engine/engine_terms.h"
-#include "harness/sides/base_convention.h"
 
 namespace dexcheck::cli {
 namespace {

@@ -95,7 +95,7 @@ void AddExciteCommand(Command app) {
       .Check(WholeNumber(1, 100000))
       .ShowDefault();
   command
-      .AddOption("--share", &request->options.share,
+      .AddOption("--fraction", &request->options.fraction,
                  "What each check may take of its bound, or as much as before where that is more")
       .TypeName("X")
       .Check(PositiveNumber())

@@ -9,14 +9,14 @@
 #include "harness/base/files.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
+#include "harness/descriptions/parameter_writer.h"
+#include "harness/descriptions/read_description.h"
+#include "harness/descriptions/robot_file.h"
+#include "harness/engine/add_motors.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/give_motors.h"
 #include "harness/engine/mjcf_assets.h"
 #include "harness/engine/mjcf_files.h"
 #include "harness/engine/newer_mjcf.h"
-#include "harness/sides/parameter_writer.h"
-#include "harness/sides/read_description.h"
-#include "harness/sides/robot_file.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -49,7 +49,7 @@ int WriteCopy(const ImportRequest& request) {
     AdaptMjcf(from, &mjcf);
     StateNewDefaults(&mjcf);
   }
-  if (request.motors) GiveMotors(from, &mjcf);
+  if (request.motors) AddMotors(from, &mjcf);
   std::string copy = mjcf.Print();
   // What cannot be loaded must not be written.
   LoadMjcfText(MoveMjcf(copy, request.source.string(), from, std::filesystem::current_path()),

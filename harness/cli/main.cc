@@ -47,7 +47,7 @@ int RunCommandLine(int argc, char** argv) {
   AddEvalCommand(app);
   AddImportCommand(app);
   AddStatesCommand(app);
-  AddRefereeCommand(app);
+  AddEngineComparisonCommand(app);
   AddPlanCommand(app);
   AddExciteCommand(app);
   AddRunCommand(app, JoinArguments(argc, argv));
@@ -75,7 +75,7 @@ int Run(int argc, char** argv) {
     return Report(Explain(error), kInputError);
   } catch (const std::bad_alloc&) {
     return Report("not enough memory, or the limit of this process's (ulimit -v) is too small", kFailure);
-  } catch (const std::logic_error& error) {  // readers throw InputError: this is a mistake of the program
+  } catch (const std::logic_error& error) {  // readers throw InputError: this is a fault of the program
     return Report(std::string("internal error: ") + error.what(), kFailure);
   } catch (const std::exception& error) {
     return Report(error.what(), kFailure);

@@ -31,7 +31,7 @@ void ReadSize(const std::string& text, int* width, int* height) {
   throw InputError("--size: must be WIDTHxHEIGHT, even numbers from 32x32 to 3840x2160, got " + Quote(text));
 }
 
-bool WriteMovie(const std::vector<RunView>& views, const MovieOptions& options, const std::string& out,
+bool WriteVideo(const std::vector<RunView>& views, const VideoOptions& options, const std::string& out,
                 bool quiet) {
   const auto start = std::chrono::steady_clock::now();
   VideoOptions encoding;
@@ -42,7 +42,7 @@ bool WriteMovie(const std::vector<RunView>& views, const MovieOptions& options, 
   VideoWriter video(out, encoding);
   CatchInterrupts();
   ProgressBar bar("drawing", frames, quiet);
-  const bool complete = RenderMovie(views, options, &video, [&](long done, long) {
+  const bool complete = RenderVideo(views, options, &video, [&](long done, long) {
     bar.Update(done);
     return !IsInterrupted();
   });
@@ -62,22 +62,22 @@ bool WriteMovie(const std::vector<RunView>& views, const MovieOptions& options, 
   return true;
 }
 
-bool WriteRunMovie(const std::filesystem::path& run_folder, const std::string& out, bool quiet) {
+bool WriteRunVideo(const std::filesystem::path& run_folder, const std::string& out, bool quiet) {
   const RecordedFrames run = ReadRecordedFrames(run_folder);
-  MovieOptions options;
+  VideoOptions options;
   options.forces = true;
   options.workers = CountDrawers();
-  return WriteMovie({{run.model.get(), &run.frames}}, options, out, quiet);
+  return WriteVideo({{run.model.get(), &run.frames}}, options, out, quiet);
 }
 
-bool WriteComparisonMovie(const std::filesystem::path& run_folder, const std::filesystem::path& other_folder,
+bool WriteComparisonVideo(const std::filesystem::path& run_folder, const std::filesystem::path& other_folder,
                           const std::string& out, bool quiet) {
   const RecordedFrames run = ReadRecordedFrames(run_folder);
   const RecordedFrames other = ReadRecordedFrames(other_folder);
-  MovieOptions options;
+  VideoOptions options;
   options.ghost = true;
   options.workers = CountDrawers();
-  return WriteMovie({{run.model.get(), &run.frames}, {other.model.get(), &other.frames}}, options, out,
+  return WriteVideo({{run.model.get(), &run.frames}, {other.model.get(), &other.frames}}, options, out,
                     quiet);
 }
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "renders/movie.h"
+#include "renders/video.h"
 
 namespace dexcheck::cli {
 
@@ -14,17 +14,17 @@ int CountDrawers();
 /// Reads "1280x720". @throws InputError unless both are even numbers that a picture can have.
 void ReadSize(const std::string& text, int* width, int* height);
 
-/// Draws runs into a film, with a progress bar. @return false when the user stopped it; nothing is then
+/// Draws runs into a video, with a progress bar. @return false when the user stopped it; nothing is then
 /// written.
 /// @throws InputError when a camera is unknown or the file cannot be written.
-bool WriteMovie(const std::vector<RunView>& views, const MovieOptions& options, const std::string& out,
+bool WriteVideo(const std::vector<RunView>& views, const VideoOptions& options, const std::string& out,
                 bool quiet);
 
-/// The film of one run as `dexcheck run --video` makes it: with contact forces.
-bool WriteRunMovie(const std::filesystem::path& run_folder, const std::string& out, bool quiet);
+/// The video of one run as `dexcheck run --video` makes it: with contact forces.
+bool WriteRunVideo(const std::filesystem::path& run_folder, const std::string& out, bool quiet);
 
-/// The film of a comparison: both runs in one scene, the second one as a ghost.
-bool WriteComparisonMovie(const std::filesystem::path& run_folder, const std::filesystem::path& other_folder,
+/// The video of a comparison: both runs in one scene, the second one as a ghost.
+bool WriteComparisonVideo(const std::filesystem::path& run_folder, const std::filesystem::path& other_folder,
                           const std::string& out, bool quiet);
 
 }  // namespace dexcheck::cli

@@ -24,7 +24,7 @@ namespace dexcheck::cli {
 namespace {
 
 struct MutateRequest {
-  MutateRunRequest run;  // with a scenario, mistakes are made in its run
+  MutateRunRequest run;  // with a scenario, faults are made in its run
   RobotFiles files;
   MutationOptions options;
   bool no_diagnosis = false;
@@ -51,25 +51,25 @@ struct MutationRow {
   int survived = 0;
   int named_first = 0;
 
-  void Add(MutantFate fate, bool named) {
+  void Add(MutantOutcome outcome, bool named) {
     ++mutants;
-    killed += fate == MutantFate::kKilled ? 1 : 0;
-    refused += fate == MutantFate::kRefused ? 1 : 0;
-    no_effect += fate == MutantFate::kNoEffect ? 1 : 0;
-    survived += fate == MutantFate::kSurvived ? 1 : 0;
+    killed += outcome == MutantOutcome::kKilled ? 1 : 0;
+    refused += outcome == MutantOutcome::kRefused ? 1 : 0;
+    no_effect += outcome == MutantOutcome::kNoEffect ? 1 : 0;
+    survived += outcome == MutantOutcome::kSurvived ? 1 : 0;
     named_first += named ? 1 : 0;
   }
 };
 
-const char* NameOf(MutantFate fate) {
-  switch (fate) {
-    case MutantFate::kKilled:
+const char* NameOf(MutantOutcome outcome) {
+  switch (outcome) {
+    case MutantOutcome::kKilled:
       return "killed";
-    case MutantFate::kRefused:
+    case MutantOutcome::kRefused:
       return "refused";
-    case MutantFate::kNoEffect:
+    case MutantOutcome::kNoEffect:
       return "no effect";
-    case MutantFate::kSurvived:
+    case MutantOutcome::kSurvived:
       break;
   }
   return "survived";
@@ -77,18 +77,18 @@ const char* NameOf(MutantFate fate) {
 
 std::vector<MutationRow> SumUp(const Campaign& campaign) {
   std::vector<MutationRow> rows;
-  const auto add = [&](const std::string& kind, MutantFate fate, bool named) {
+  const auto add = [&](const std::string& kind, MutantOutcome outcome, bool named) {
     auto row = std::find_if(rows.begin(), rows.end(), [&](const MutationRow& r) { return r.kind == kind; });
     if (row == rows.end()) {
       row = rows.insert(rows.end(), MutationRow{});
       row->kind = kind;
     }
-    row->Add(fate, named);
+    row->Add(outcome, named);
   };
   for (size_t i = 0; i < campaign.done; ++i)
-    add(campaign.mutants[i].kind, campaign.mutants[i].fate, campaign.mutants[i].named_first);
+    add(campaign.mutants[i].kind, campaign.mutants[i].outcome, campaign.mutants[i].named_first);
   for (size_t i = 0; i < campaign.formulas_done; ++i)
-    add("wrong equation", campaign.formulas[i].fate, campaign.formulas[i].localised);
+    add("wrong equation", campaign.formulas[i].outcome, campaign.formulas[i].localised);
   return rows;
 }
 
@@ -120,17 +120,17 @@ void Print(const MutateRequest& request, const Campaign& campaign) {
     line(total);
     for (size_t i = 0; i < campaign.done; ++i) {
       const Mutant& mutant = campaign.mutants[i];
-      if (mutant.fate == MutantFate::kSurvived || mutant.fate == MutantFate::kNoEffect)
-        fmt::print("{}: {}\n", NameOf(mutant.fate), mutant.name);
-      if (request.options.diagnose && mutant.fate == MutantFate::kKilled && !mutant.named_first)
+      if (mutant.outcome == MutantOutcome::kSurvived || mutant.outcome == MutantOutcome::kNoEffect)
+        fmt::print("{}: {}\n", NameOf(mutant.outcome), mutant.name);
+      if (request.options.diagnose && mutant.outcome == MutantOutcome::kKilled && !mutant.named_first)
         fmt::print("not named first: {} ({}); named: {}{}\n", mutant.name, mutant.kind,
                    mutant.named.empty() ? "nothing" : mutant.named,
                    mutant.named_equal ? ", which is listed as equal" : "");
     }
     for (size_t i = 0; i < campaign.formulas_done; ++i) {
       const FormulaMutant& mutant = campaign.formulas[i];
-      if (mutant.fate != MutantFate::kKilled)
-        fmt::print("{}: {}\n", NameOf(mutant.fate), mutant.name);
+      if (mutant.outcome != MutantOutcome::kKilled)
+        fmt::print("{}: {}\n", NameOf(mutant.outcome), mutant.name);
       else if (!mutant.localised)
         fmt::print("not named: {}: expected {}, failed {}\n", mutant.name, mutant.first,
                    mutant.failed_checks);
@@ -164,7 +164,7 @@ std::string ToText(const MutateRequest& request, const Campaign& campaign) {
     const Mutant& mutant = campaign.mutants[i];
     json["mutants"].push_back({{"name", mutant.name},
                                {"kind", mutant.kind},
-                               {"fate", NameOf(mutant.fate)},
+                               {"outcome", NameOf(mutant.outcome)},
                                {"failed_checks", mutant.failed_checks},
                                {"named", mutant.named},
                                {"named_first", mutant.named_first},
@@ -175,7 +175,7 @@ std::string ToText(const MutateRequest& request, const Campaign& campaign) {
     const FormulaMutant& mutant = campaign.formulas[i];
     json["mutants"].push_back({{"name", mutant.name},
                                {"kind", "wrong equation"},
-                               {"fate", NameOf(mutant.fate)},
+                               {"outcome", NameOf(mutant.outcome)},
                                {"failed_checks", mutant.failed_checks},
                                {"named_first", mutant.localised}});
   }
@@ -254,7 +254,7 @@ void AddMutateCommand(Command app) {
   const auto request = std::make_shared<MutateRequest>();
   Command command = app.AddCommand(
       "mutate",
-      "Change every number and equation of the model on purpose: which mistakes are found and named?");
+      "Change every number and equation of the model on purpose: which faults are found and named?");
   Option robot = AddRobotOptions(command, &request->files);
   Option scale = command.AddOption("--scale", &request->options.scale, "Change of a number, relative to it")
                      .TypeName("X")
@@ -263,13 +263,13 @@ void AddMutateCommand(Command app) {
   Option run =
       command
           .AddOption("--run", &request->run.scenario,
-                     "Make mistakes in a run of this scenario instead: numbers, equations, laws, plants")
+                     "Make faults in a run of this scenario instead: numbers, equations, laws, plants")
           .TypeName("SCENARIO");
   for (Option option : AddOverrideOptions(command, &request->run.overrides)) option.Needs(run);
   Option from =
       command
           .AddOption("--from", &request->run.options.from,
-                     "In a run: when the mistake begins, s; in a motion of joints it is there from the first")
+                     "In a run: when the fault begins, s; in a motion of joints it is there from the first")
           .TypeName("T")
           .Check(Seconds(0.0, 1e4))
           .Needs(run)
@@ -280,13 +280,13 @@ void AddMutateCommand(Command app) {
           .Check(Seconds(1e-3, 1e4))
           .Needs(run)
           .ShowDefault();
-  Option mistakes = command
-                        .AddOption("--numbers", &request->run.options.parameters,
-                                   "In a run: how many numbers of the model are changed, evenly out of all")
-                        .TypeName("N")
-                        .Check(WholeNumber(0, 100000))
-                        .Needs(run)
-                        .ShowDefault();
+  Option faults = command
+                      .AddOption("--numbers", &request->run.options.parameters,
+                                 "In a run: how many numbers of the model are changed, evenly out of all")
+                      .TypeName("N")
+                      .Check(WholeNumber(0, 100000))
+                      .Needs(run)
+                      .ShowDefault();
   const auto states = AddSampleOptions(command, 1000, &request->options.samples, &request->options.seed);
   Option no_diagnosis = command.AddFlag("--no-diagnosis", &request->no_diagnosis,
                                         "Only whether each is found, not what is named");
@@ -296,7 +296,7 @@ void AddMutateCommand(Command app) {
       "In a run: how small an error of each number balance, prediction and law find, and how well it moves "
       "everything");
   smallest.Needs(run);
-  for (Option option : {from, duration, mistakes, scale}) option.Excludes(smallest);
+  for (Option option : {from, duration, faults, scale}) option.Excludes(smallest);
   for (Option option : states) option.Excludes(run);
   no_diagnosis.Excludes(run);
   AddJsonOption(command, "the results", &request->json_file);

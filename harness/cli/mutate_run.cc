@@ -55,13 +55,13 @@ std::vector<RunRow> SumUp(const std::vector<RunMutant>& mutants, size_t done) {
   return rows;
 }
 
-const char* FateOf(const RunMutant& mutant) {
+const char* OutcomeOf(const RunMutant& mutant) {
   if (mutant.refused) return "refused";
   if (mutant.no_effect) return "no effect";
   return mutant.killed ? "killed" : "survived";
 }
 
-/// What the table does not say: mistakes that were not found, or whose cause or part is another.
+/// What the table does not say: faults that were not found, or whose cause or part is another.
 void PrintExceptions(const std::vector<RunMutant>& mutants, size_t done) {
   for (size_t i = 0; i < done; ++i) {
     const RunMutant& mutant = mutants[i];
@@ -90,7 +90,7 @@ void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t 
   const std::vector<RunRow> rows = SumUp(campaign.mutants(), done);
   const RunRow& all = rows.back();
   if (!request.quiet) {
-    fmt::print("{:<16}{:>9}{:>6}{:>8}{:>10}{:>9}{:>12}{:>10}\n", "what was wrong", "mistakes", "found",
+    fmt::print("{:<16}{:>9}{:>6}{:>8}{:>10}{:>9}{:>12}{:>10}\n", "what was wrong", "faults", "found",
                "refused", "no effect", "survived", "cause right", "part");
     for (const RunRow& row : rows) {
       fmt::print("{:<16}{:>9}{:>6}{:>8}{:>10}{:>9}{:>12}{:>10}\n", row.kind, row.mutants, row.killed,
@@ -101,10 +101,10 @@ void Print(const MutateRunRequest& request, const RunCampaign& campaign, size_t 
     fmt::print("\n");
   }
   if (done < campaign.mutants().size())
-    fmt::print("INTERRUPTED after {} of {} mistakes. So far:\n", done, campaign.mutants().size());
+    fmt::print("INTERRUPTED after {} of {} faults. So far:\n", done, campaign.mutants().size());
   const int possible = all.mutants - all.refused - all.no_effect;
   const std::string verdict = fmt::format(
-      "{}: {} of {} mistakes that are possible and have an effect were found; the cause is right in {}, the "
+      "{}: {} of {} faults that are possible and have an effect were found; the cause is right in {}, the "
       "part in {} of {}.",
       all.survived == 0 ? "ALL FOUND" : "SURVIVORS", all.killed, possible, all.cause, all.part,
       all.with_part);
@@ -117,25 +117,25 @@ std::string ToText(const MutateRunRequest& request, const RunCampaign& campaign,
                {"scale", request.options.scale}, {"complete", done == campaign.mutants().size()}};
   json["kinds"] = Json::object();
   for (const RunRow& row : SumUp(campaign.mutants(), done)) {
-    json["kinds"][row.kind] = {{"mistakes", row.mutants},  {"found", row.killed},
+    json["kinds"][row.kind] = {{"faults", row.mutants},    {"found", row.killed},
                                {"refused", row.refused},   {"no_effect", row.no_effect},
                                {"survived", row.survived}, {"cause_right", row.cause},
                                {"part_named", row.part},   {"with_a_part", row.with_part}};
   }
-  json["mistakes"] = Json::array();
+  json["faults"] = Json::array();
   for (size_t i = 0; i < done; ++i) {
     const RunMutant& mutant = campaign.mutants()[i];
-    json["mistakes"].push_back({{"kind", mutant.kind},
-                                {"name", mutant.name},
-                                {"fate", FateOf(mutant)},
-                                {"expected_cause", NameOf(mutant.expected)},
-                                {"cause", NameOf(mutant.cause)},
-                                {"expected_part", mutant.part},
-                                {"part_named", mutant.names_part},
-                                {"evidence", mutant.evidence},
-                                {"failure", mutant.failure},
-                                {"failed_checks", mutant.failed_checks},
-                                {"position_error_max_m", mutant.position_error}});
+    json["faults"].push_back({{"kind", mutant.kind},
+                              {"name", mutant.name},
+                              {"outcome", OutcomeOf(mutant)},
+                              {"expected_cause", NameOf(mutant.expected)},
+                              {"cause", NameOf(mutant.cause)},
+                              {"expected_part", mutant.part},
+                              {"part_named", mutant.names_part},
+                              {"evidence", mutant.evidence},
+                              {"failure", mutant.failure},
+                              {"failed_checks", mutant.failed_checks},
+                              {"position_error_max_m", mutant.position_error}});
   }
   return json.dump(2) + "\n";
 }
@@ -158,7 +158,7 @@ int MutateRun(const MutateRunRequest& request) {
   bar.Finish();
   if (json) json->Write(ToText(request, campaign, done));
   if (request.json_file != "-") Print(request, campaign, done);
-  if (done < total) return ReportFailure(fmt::format("interrupted after {} of {} mistakes", done, total));
+  if (done < total) return ReportFailure(fmt::format("interrupted after {} of {} faults", done, total));
   return SumUp(campaign.mutants(), done).back().survived > 0 ? kDisagreement : kSuccess;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// `dexcheck mutate --run SCENARIO`: mistakes in a run.
+// `dexcheck mutate --run SCENARIO`: faults in a run.
 
 #include <string>
 #include <vector>
@@ -19,7 +19,7 @@ struct MutateRunRequest {
   bool smallest = false;  ///< PrintSmallestErrors instead of MutateRun.
 };
 
-/// Makes every mistake, prints the table, writes the JSON. @returns the exit code: 1 when one was not found,
+/// Makes every fault, prints the table, writes the JSON. @returns the exit code: 1 when one was not found,
 /// 3 when it was interrupted. @throws InputError.
 int MutateRun(const MutateRunRequest& request);
 

@@ -31,7 +31,7 @@ const std::vector<Column>& ListColumns() {
   static const std::vector<Column> columns = {
       {"balance",
        [](const Detectability& number) { return std::min(number.robot, number.object); },
-       {"balance_robot", "balance_object"}},
+       {"inverse_dynamics_robot", "inverse_dynamics_object"}},
       {"prediction",
        [](const Detectability& number) { return number.prediction; },
        {"reduced_acceleration", "contact_force"}},
@@ -92,7 +92,7 @@ std::vector<RetriedMedian> RetryMedians(const DetectabilityResult& result, const
     if (RetryError(files.scenario, files.robot, files.mjcf, any, 0.0, column.checks, IsInterrupted).found >
         0) {
       throw InputError(files.scenario.source + ": must pass with seeds 1 to " + std::to_string(kRetrySeeds) +
-                       " before mistakes are made in it, fails by " + column.name);
+                       " before faults are made in it, fails by " + column.name);
     }
     for (const std::string& quantity : quantities) {
       bar.Update(static_cast<long>(medians.size()));
@@ -128,8 +128,8 @@ std::string ToText(const MutateRunRequest& request, const DetectabilityResult& r
   for (const Detectability& number : result.numbers) {
     json["numbers"].push_back({{"name", number.name},
                                {"quantity", number.quantity},
-                               {"balance_robot", ErrorToJson(number.robot)},
-                               {"balance_object", ErrorToJson(number.object)},
+                               {"inverse_dynamics_robot", ErrorToJson(number.robot)},
+                               {"inverse_dynamics_object", ErrorToJson(number.object)},
                                {"prediction", ErrorToJson(number.prediction)},
                                {"law", ErrorToJson(number.law)}});
   }

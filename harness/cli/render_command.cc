@@ -17,8 +17,8 @@
 #include "harness/cli/make_video.h"
 #include "harness/cli/run_folder.h"
 #include "harness/report/recorded_frames.h"
-#include "renders/movie.h"
 #include "renders/picture_file.h"
+#include "renders/video.h"
 #include "renders/video_writer.h"
 
 namespace dexcheck::cli {
@@ -31,7 +31,7 @@ struct RenderRequest {
   std::string size = "1280x720";
   std::optional<double> still;
   std::string out;
-  MovieOptions movie;
+  VideoOptions video;
   std::vector<double> from;
   std::string look_at;
   bool follow = false;
@@ -57,10 +57,10 @@ void WriteStill(const RenderRequest& request, const std::vector<RunView>& views,
     throw InputError("--still: must be from 0 to " + FormatNumber(longest) + " s, got " +
                      FormatNumber(*request.still));
   }
-  WritePicture(out, MoviePainter(views, request.movie).Paint(*request.still));
+  WritePicture(out, VideoPainter(views, request.video).Paint(*request.still));
   if (!request.quiet) {
-    fmt::print("{}: {:.2f} s of the run, {} x {}\n", out, *request.still, request.movie.width,
-               request.movie.height);
+    fmt::print("{}: {:.2f} s of the run, {} x {}\n", out, *request.still, request.video.width,
+               request.video.height);
   }
 }
 
@@ -94,29 +94,29 @@ void CheckOutput(const RenderRequest& request, const std::string& out) {
   }
   if (request.still) {
     RequirePictureName(out);
-  } else if (FindVideoFormat(out) == VideoFormat::kGif && request.movie.fps > kMostGifFramesPerSecond) {
+  } else if (FindVideoFormat(out) == VideoFormat::kGif && request.video.fps > kMostGifFramesPerSecond) {
     throw InputError(fmt::format("--fps: must be at most {} for a GIF, got {}", kMostGifFramesPerSecond,
-                                 request.movie.fps));
+                                 request.video.fps));
   }
 }
 
 ExitCode Run(RenderRequest request) {
-  ReadSize(request.size, &request.movie.width, &request.movie.height);
+  ReadSize(request.size, &request.video.width, &request.video.height);
   std::string out = request.out;
   if (out.empty()) out = (request.run_folder / (request.still ? "still.png" : "video.mp4")).string();
   CheckOutput(request, out);
-  request.movie.panel = !request.no_panel;
-  request.movie.free = MakeFreeCamera(request);
+  request.video.panel = !request.no_panel;
+  request.video.free = MakeFreeCamera(request);
   std::vector<RecordedFrames> runs;
   runs.push_back(ReadRecordedFrames(request.run_folder));
-  request.movie.ghost = !request.ghost.empty();
+  request.video.ghost = !request.ghost.empty();
   for (const std::string& other : {request.beside, request.ghost}) {
     if (!other.empty()) runs.push_back(ReadRecordedFrames(other));
   }
   std::vector<RunView> views;
   views.reserve(runs.size());
   for (const RecordedFrames& run : runs) views.push_back({run.model.get(), &run.frames});
-  if (!request.still && !WriteMovie(views, request.movie, out, request.quiet)) return kFailure;
+  if (!request.still && !WriteVideo(views, request.video, out, request.quiet)) return kFailure;
   if (request.still) WriteStill(request, views, out);
   if (!request.quiet) WarnOfCut(request.run_folder, LogReader(request.run_folder / "log.h5"));
   return kSuccess;
@@ -128,17 +128,17 @@ void AddRenderCommand(Command app) {
   constexpr int kMostFramesPerSecond = 120;
   constexpr int kMostJobs = 64;
   const auto request = std::make_shared<RenderRequest>();
-  request->movie.workers = CountDrawers();
+  request->video.workers = CountDrawers();
   Command command = app.AddCommand("render", "Draw a recorded run as a video, or one instant of it");
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
   command
       .AddOption("--out", &request->out,
-                 "A film .mp4, .webm or .gif, or a picture .png or .jpg (default: video.mp4 or still.png in "
+                 "A video .mp4, .webm or .gif, or a picture .png or .jpg (default: video.mp4 or still.png in "
                  "RUN_DIR)")
       .TypeName("FILE");
   command.AddOption("--still", &request->still, "One picture at this time of the run, s").TypeName("T");
   Option camera = command
-                      .AddOption("--camera", &request->movie.camera,
+                      .AddOption("--camera", &request->video.camera,
                                  "overview (the default), follow, grasp, top, or another of the MJCF's; "
                                  "robot and object are near "
                                  "to those; course stands still and sees the whole way")
@@ -158,7 +158,7 @@ void AddRenderCommand(Command app) {
   command.AddOption("--orbit", &request->orbit, "It turns about what it looks at, degrees a second")
       .TypeName("DEG")
       .Needs(from);
-  command.AddOption("--inset", &request->movie.inset, "A second camera in the lower right corner")
+  command.AddOption("--inset", &request->video.inset, "A second camera in the lower right corner")
       .TypeName("NAME");
   Option beside =
       command.AddOption("--beside", &request->beside, "Another run, shown at the right").TypeName("RUN_DIR");
@@ -166,18 +166,18 @@ void AddRenderCommand(Command app) {
       .TypeName("RUN_DIR")
       .Excludes(beside);
   command.AddOption("--size", &request->size, "Of the picture in pixels").TypeName("WxH").ShowDefault();
-  command.AddOption("--fps", &request->movie.fps, "Frames a second")
+  command.AddOption("--fps", &request->video.fps, "Frames a second")
       .TypeName("N")
       .Check(WholeNumber(1, kMostFramesPerSecond))
       .ShowDefault();
   command
-      .AddOption("--jobs", &request->movie.workers,
+      .AddOption("--jobs", &request->video.workers,
                  "Processes that draw; default: one for each processor, at most 8")
       .TypeName("N")
       .Check(WholeNumber(1, kMostJobs));
-  command.AddFlag("--forces", &request->movie.forces, "Draw contact forces and friction cones");
-  command.AddFlag("--tracks", &request->movie.tracks, "Draw the contacts' tracks and the object's path");
-  command.AddFlag("--frames", &request->movie.frames, "Draw the object's axes");
+  command.AddFlag("--forces", &request->video.forces, "Draw contact forces and friction cones");
+  command.AddFlag("--tracks", &request->video.tracks, "Draw the contacts' tracks and the object's path");
+  command.AddFlag("--frames", &request->video.frames, "Draw the object's axes");
   command.AddFlag("--no-panel", &request->no_panel, "Leave out the panel with time, errors and checks");
   command.AddFlag("--quiet", &request->quiet, "Print nothing");
   command.SetAction([=] { return Run(*request); });

@@ -73,7 +73,7 @@ void TryToMake(const char* what, const Make& make) {
 void DrawRun(const RunRequest& request, const std::filesystem::path& folder, ExitCode verdict) {
   const bool quiet = request.quiet || request.json_file == "-";
   if (request.video) {
-    TryToMake("video", [&] { WriteRunMovie(folder, (folder / "video.mp4").string(), quiet); });
+    TryToMake("video", [&] { WriteRunVideo(folder, (folder / "video.mp4").string(), quiet); });
   }
   EndOnInterrupts(verdict);
   if (request.no_report || IsInterrupted()) return;
@@ -133,7 +133,7 @@ int RunScenario(const RunRequest& request) {
       PrintRunReport(setup, runner.loop(), result, folder ? folder->path().string() : "",
                      request.quiet ? Detail::kVerdict
                      : request.all ? Detail::kAll
-                                   : Detail::kQuestions);
+                                   : Detail::kCategories);
     }
     FlushOutput();
   } catch (const std::exception&) {

@@ -11,14 +11,14 @@
 #include "harness/base/interrupts.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
-#include "renders/question_status.h"
+#include "renders/category_status.h"
 
 namespace dexcheck::cli {
 namespace {
 
 std::string Tell(bool failed) { return failed ? Paint(Tone::kBad, "FAILS") : Paint(Tone::kGood, "ok"); }
 
-void PrintRow(CheckKind kind, const std::string& what, const CheckRecord& check) {
+void PrintRow(CheckCategory kind, const std::string& what, const CheckRecord& check) {
   fmt::print("  {:<12}{:<34}{:>9.2e}{:>9.1e}  {:<4} {}\n", NameOf(kind), what, check.worst, check.bound,
              check.unit == "1" ? "" : check.unit, Tell(check.failed));
 }
@@ -30,14 +30,14 @@ void PrintCheck(const CheckRecord& check) {
 }
 
 /// How near a check came to its bound.
-double CalcShare(const CheckRecord& check) {
+double CalcFraction(const CheckRecord& check) {
   if (check.bound > 0.0) return check.worst / check.bound;
   return check.worst > 0.0 ? std::numeric_limits<double>::infinity() : 0.0;
 }
 
 /// One line for what passes of a question, with the check that came nearest to its bound, and each that
 /// fails.
-void PrintQuestion(CheckKind kind, const ClosedLoop& loop) {
+void PrintCategory(CheckCategory kind, const ClosedLoop& loop) {
   const CheckRecord* nearest = nullptr;
   long passed = 0;
   const auto visit = [&](const auto& work) {
@@ -51,7 +51,7 @@ void PrintQuestion(CheckKind kind, const ClosedLoop& loop) {
   visit([&](const CheckRecord& check) {
     if (check.failed) return;
     ++passed;
-    if (nearest == nullptr || CalcShare(check) > CalcShare(*nearest)) nearest = &check;
+    if (nearest == nullptr || CalcFraction(check) > CalcFraction(*nearest)) nearest = &check;
   });
   if (nearest != nullptr) {
     const std::string what =
@@ -73,8 +73,8 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
     for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check);
     for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check);
   } else {
-    for (const CheckKind kind : kCheckKinds) {
-      PrintQuestion(kind, loop);
+    for (const CheckCategory kind : kCheckCategorys) {
+      PrintCategory(kind, loop);
     }
     fmt::print("  (--all lists each check)\n");
   }

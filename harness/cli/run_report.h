@@ -9,8 +9,8 @@ namespace dexcheck::cli {
 /// How much is printed of a run.
 enum class Detail {
   kVerdict,
-  kQuestions,  ///< A line for each question, and each check that fails.
-  kAll,        ///< Each check.
+  kCategories,  ///< A line for each question, and each check that fails.
+  kAll,         ///< Each check.
 };
 
 /// The user closed the run's window before its end: no failure, a check may have failed all the same.

@@ -8,8 +8,8 @@
 #include "controller/common/errors.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
-#include "harness/sides/answer_files.h"
-#include "harness/sides/read_description.h"
+#include "harness/descriptions/answer_files.h"
+#include "harness/descriptions/read_description.h"
 
 namespace dexcheck::cli {
 namespace {

@@ -87,7 +87,7 @@ ExitCode Conclude(const Setup& setup, const Runner& runner, const std::filesyste
         .Write(MakeSummary(setup, runner.loop(), runner.result()).dump(2) + "\n");
   }
   if (runner.loop().record().step > 0) {
-    PrintRunReport(setup, runner.loop(), runner.result(), folder.string(), Detail::kQuestions);
+    PrintRunReport(setup, runner.loop(), runner.result(), folder.string(), Detail::kCategories);
   }
   return ToExitCode(runner);
 }

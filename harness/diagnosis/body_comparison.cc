@@ -68,7 +68,7 @@ void BodyComparison::Compare(const std::vector<Parameter>& parameters, const std
 MassProperties BodyComparison::ReadBody(int link) const {
   MassProperties body;
   if (link >= 0 || adapter_.wheels().empty()) {
-    const Snapshot& at = evidence_.snapshots().front();
+    const StateSample& at = evidence_.samples().front();
     const LinkInWorld& there = at.links[static_cast<size_t>(link + 1)];
     ModelTerms terms(model_);
     terms.SetState(at.q, at.xi);

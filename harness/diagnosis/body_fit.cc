@@ -82,7 +82,7 @@ std::vector<Parameter> BodyFit::ListCandidates() const {
 }
 
 void BodyFit::MakePads() {
-  const Snapshot& at = evidence_->snapshots().front();
+  const StateSample& at = evidence_->samples().front();
   const size_t joints = spec_.joints.size();
   for (int link = -1; link < static_cast<int>(joints); ++link) {
     const MassProperties& body = BodyOf(spec_, link);
@@ -99,7 +99,7 @@ void BodyFit::MakePads() {
 void BodyFit::SetTarget(const mjModel& engine) {
   const RobotModel model(spec_);
   const int joints = model.num_joints();
-  const Snapshot& at = evidence_->snapshots().front();
+  const StateSample& at = evidence_->samples().front();
   const VectorXd forces = evidence_->CalcForces(model) + evidence_->CalcForceResidual(model);
   target_ = forces;
   if (!bodies_) return;

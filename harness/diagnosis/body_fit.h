@@ -34,8 +34,8 @@ class BodyFit {
   std::vector<Repair> Run();
   /// Only the ranking.
   void Rank();
-  /// Single numbers by the share of the disagreement that each explains by itself, the first few, before any
-  /// repair.
+  /// Single numbers by the fraction of the disagreement that each explains by itself, the first few, before
+  /// any repair.
   [[nodiscard]] const std::vector<std::pair<Repair, double>>& ranking() const { return ranking_; }
 
  private:

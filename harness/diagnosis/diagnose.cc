@@ -304,18 +304,18 @@ class Diagnostician {
     RobotSpec spec = model_.spec();
     const Size before = Measure(spec);
     Size last = before;
-    const auto share = [](double from, double to, double of) { return of > 0.0 ? (from - to) / of : 0.0; };
+    const auto fraction = [](double from, double to, double of) { return of > 0.0 ? (from - to) / of : 0.0; };
     for (Repair& cause : result_.causes) {
       if (cause.kind == RepairKind::kEngineOnly) continue;
       Apply(cause, &spec);
       const Size now = Measure(spec);
-      cause.explained = share(last.all, now.all, before.all);
-      cause.explained_of_forces = share(last.forces, now.forces, before.forces);
+      cause.explained = fraction(last.all, now.all, before.all);
+      cause.explained_of_forces = fraction(last.forces, now.forces, before.forces);
       last = now;
     }
-    result_.explained = before.all > 0.0 ? share(before.all, last.all, before.all) : 1.0;
+    result_.explained = before.all > 0.0 ? fraction(before.all, last.all, before.all) : 1.0;
     result_.explained_of_forces =
-        before.forces > 0.0 ? share(before.forces, last.forces, before.forces) : 1.0;
+        before.forces > 0.0 ? fraction(before.forces, last.forces, before.forces) : 1.0;
     // Rows and axes that were exchanged or turned must be repaired in the order found.
     const bool ordered = std::any_of(result_.causes.begin(), result_.causes.end(), [](const Repair& cause) {
       return cause.kind != RepairKind::kParameters && cause.kind != RepairKind::kEngineOnly;

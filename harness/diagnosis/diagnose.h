@@ -18,7 +18,7 @@ struct DiagnosisOptions {
   /// Use axes, frames and forces alone, not the engine's masses, centres of mass, inertias and joint
   /// constants: what would be known of a robot that can only be moved.
   bool by_motion = false;
-  /// Relative difference that is no mistake, since published numbers are rounded; 0: what rounding of doubles
+  /// Relative difference that is no fault, since published numbers are rounded; 0: what rounding of doubles
   /// leaves.
   double tolerance = 0.0;
 };
@@ -26,10 +26,10 @@ struct DiagnosisOptions {
 struct Diagnosis {
   bool agrees = true;
   std::vector<Repair> causes;  ///< The one that explains most first.
-  double explained = 0.0;      ///< Share of all residuals, squared and scaled, that they explain together.
+  double explained = 0.0;      ///< Fraction of all residuals, squared and scaled, that they explain together.
   double explained_of_forces = 0.0;
   std::vector<std::pair<Repair, double>>
-      ranking;  ///< Single numbers by the share of the bodies' residuals explained.
+      ranking;  ///< Single numbers by the fraction of the bodies' residuals explained.
   std::vector<GateFinding> remaining_constants;  ///< What disagrees after all repairs.
   std::vector<CheckRecord> remaining_terms;      ///< Failed checks after all repairs.
   RobotSpec repaired;

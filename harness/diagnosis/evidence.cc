@@ -23,7 +23,7 @@ EngineEvidence::EngineEvidence(const RobotModel& model, const mjModel& engine,
   StateSource source(model, {}, seed);
   const int n = terms.size();
   for (int sample = 0; sample < samples; ++sample) {
-    Snapshot at;
+    StateSample at;
     at.q.setZero(model.num_positions());
     at.xi.setZero(n);
     source.DrawPositions(&at.q);
@@ -48,13 +48,13 @@ EngineEvidence::EngineEvidence(const RobotModel& model, const mjModel& engine,
     if (model.base().type == BaseType::kFloating) base = at.q.head<3>();
     for (const Vector3d& anchor : at.anchors) length_ = std::max(length_, (anchor - base).norm());
     for (const Pose& frame : at.frames) length_ = std::max(length_, (frame.translation() - base).norm());
-    snapshots_.push_back(std::move(at));
+    samples_.push_back(std::move(at));
   }
   if (!(length_ > 0.0)) length_ = 1.0;
   CalcScales(model);
 }
 
-VectorXd EngineEvidence::CollectForces(const MatrixXd& M, const Snapshot& at, const VectorXd& coriolis,
+VectorXd EngineEvidence::CollectForces(const MatrixXd& M, const StateSample& at, const VectorXd& coriolis,
                                        const VectorXd& gravity, const VectorXd& friction) {
   const Eigen::Index n = coriolis.size();
   VectorXd forces(kBlocks * n);
@@ -69,7 +69,7 @@ VectorXd EngineEvidence::CalcRawForces(const RobotModel& variant) const {
   ModelTerms terms(variant, Coordinates::kReduced);
   VectorXd all(engine_forces_.size());
   Eigen::Index row = 0;
-  for (const Snapshot& at : snapshots_) {
+  for (const StateSample& at : samples_) {
     terms.SetState(at.q, at.xi);
     terms.CalcDynamics();
     const VectorXd forces =
@@ -82,11 +82,11 @@ VectorXd EngineEvidence::CalcRawForces(const RobotModel& variant) const {
 
 void EngineEvidence::CalcScales(const RobotModel& model) {
   const Eigen::Index n = model.num_velocities();
-  engine_forces_.resize(static_cast<Eigen::Index>(snapshots_.size()) * kBlocks * n);
+  engine_forces_.resize(static_cast<Eigen::Index>(samples_.size()) * kBlocks * n);
   scale_.resize(engine_forces_.size());
   Eigen::Index row = 0;
-  for (size_t sample = 0; sample < snapshots_.size(); ++sample) {
-    engine_forces_.segment(row, kBlocks * n) = snapshots_[sample].forces;
+  for (size_t sample = 0; sample < samples_.size(); ++sample) {
+    engine_forces_.segment(row, kBlocks * n) = samples_[sample].forces;
     for (int block = 0; block < kBlocks; ++block) {
       scale_.segment(row + block * n, n) = mass_roots_[sample].cwiseInverse();
     }
@@ -95,11 +95,11 @@ void EngineEvidence::CalcScales(const RobotModel& model) {
   // Coriolis forces or gravity that vanish but for rounding must not be blown up.
   constexpr double kSmall = 1e-4;
   double mass = 0.0;
-  for (const LinkInWorld& link : snapshots_.front().links) mass += link.mass;
+  for (const LinkInWorld& link : samples_.front().links) mass += link.mass;
   std::array<double, kBlocks> natural{};
   natural[kProbes + 1] = model.gravity().norm() * std::sqrt(mass);
-  for (size_t sample = 0; sample < snapshots_.size(); ++sample) {
-    const VectorXd& xi = snapshots_[sample].xi;
+  for (size_t sample = 0; sample < samples_.size(); ++sample) {
+    const VectorXd& xi = samples_[sample].xi;
     const double momentum = mass_roots_[sample].cwiseProduct(xi).cwiseAbs().maxCoeff();
     natural[kProbes] = std::max(natural[kProbes], momentum * xi.cwiseAbs().maxCoeff());
   }

@@ -13,7 +13,7 @@
 namespace dexcheck {
 
 /// The engine's robot at one state. Vectors of links begin with the base's.
-struct Snapshot {
+struct StateSample {
   VectorXd q;
   VectorXd xi;
   MatrixXd probes;                ///< Two accelerations, n x 2, of a size that moves each coordinate alike.
@@ -24,15 +24,15 @@ struct Snapshot {
   VectorXd forces;  ///< As CalcForces, unscaled.
 };
 
-/// Snapshots at random states, and the analytic model's forces in the same order and scale.
+/// StateSamples at random states, and the analytic model's forces in the same order and scale.
 class EngineEvidence {
  public:
-  /// @param tolerance relative difference that is no mistake: of published numbers, which are rounded.
+  /// @param tolerance relative difference that is no fault: of published numbers, which are rounded.
   /// @throws InputError when model and engine do not match.
   EngineEvidence(const RobotModel& model, const mjModel& engine, const std::string& engine_source,
                  int samples, std::uint64_t seed, double tolerance = 0.0);
 
-  [[nodiscard]] const std::vector<Snapshot>& snapshots() const { return snapshots_; }
+  [[nodiscard]] const std::vector<StateSample>& samples() const { return samples_; }
   /// Largest distance of a point of the robot from its base, m.
   [[nodiscard]] double length() const { return length_; }
 
@@ -50,13 +50,13 @@ class EngineEvidence {
   [[nodiscard]] VectorXd CalcForceResidual(const RobotModel& variant) const;
 
  private:
-  static VectorXd CollectForces(const MatrixXd& M, const Snapshot& at, const VectorXd& coriolis,
+  static VectorXd CollectForces(const MatrixXd& M, const StateSample& at, const VectorXd& coriolis,
                                 const VectorXd& gravity, const VectorXd& friction);
   [[nodiscard]] VectorXd CalcRawForces(const RobotModel& variant) const;
   void CalcScales(const RobotModel& model);
 
-  std::vector<Snapshot> snapshots_;
-  std::vector<VectorXd> mass_roots_;  // roots of the engine's M_ii at each snapshot
+  std::vector<StateSample> samples_;
+  std::vector<VectorXd> mass_roots_;  // roots of the engine's M_ii at each sample
   VectorXd engine_forces_;            // scaled
   VectorXd scale_;                    // what CalcRawForces is multiplied by
   double length_ = 0.0;

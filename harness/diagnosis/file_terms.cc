@@ -177,10 +177,10 @@ std::vector<Repair> FileTerms::Convert(const std::vector<Repair>& causes) const 
 Repair FileTerms::ConvertPart(const Repair& cause) const {
   if (!is_plain_ || cause.kind != RepairKind::kParameters) return cause;
   Repair changed = cause;
-  constexpr double kNudge = 1e-3;
+  constexpr double kOffset = 1e-3;
   for (size_t i = 0; i < changed.parameters.size(); ++i)
     changed.values[i] =
-        GetValue(spec_, changed.parameters[i]) + kNudge * GetScale(spec_, changed.parameters[i]);
+        GetValue(spec_, changed.parameters[i]) + kOffset * GetScale(spec_, changed.parameters[i]);
   return ConvertFrom(spec_, rows_, changed);
 }
 

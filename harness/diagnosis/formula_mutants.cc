@@ -302,7 +302,7 @@ VectorXd CollectTerms(const ModelView& view) {
   return Eigen::Map<const VectorXd>(all.data(), static_cast<Eigen::Index>(all.size()));
 }
 
-/// Whether the mistake changes anything at the states by more than rounding.
+/// Whether the fault changes anything at the states by more than rounding.
 bool HasEffect(const RobotModel& model, const ModelViewFactory& make_view, int samples, std::uint64_t seed) {
   constexpr double kRounding = 1e-14;
   StateSource source(model, {}, seed);
@@ -361,10 +361,10 @@ void RunFormulaMutant(const Adapter& adapter, int samples, FormulaMutant* mutant
     mutant->failed_checks += (mutant->failed_checks.empty() ? "" : " ") + record.name;
     mutant->localised = mutant->localised || record.name == mutant->first;
   }
-  mutant->fate = mutant->failed_checks.empty() ? MutantFate::kSurvived : MutantFate::kKilled;
-  if (mutant->fate == MutantFate::kSurvived && mutant->of_model &&
+  mutant->outcome = mutant->failed_checks.empty() ? MutantOutcome::kSurvived : MutantOutcome::kKilled;
+  if (mutant->outcome == MutantOutcome::kSurvived && mutant->of_model &&
       !HasEffect(adapter.model(), mutant->options.make_view, samples, mutant->options.seed))
-    mutant->fate = MutantFate::kNoEffect;
+    mutant->outcome = MutantOutcome::kNoEffect;
 }
 
 }  // namespace dexcheck

@@ -15,12 +15,12 @@ namespace dexcheck {
 /// A wrong equation, and which checks found it.
 struct FormulaMutant {
   std::string name;            ///< "Coriolis terms dropped".
-  std::string first;           ///< The check that a mistake of this kind should fail.
-  ConsistencyOptions options;  ///< With the mistake in make_view or object.
+  std::string first;           ///< The check that a fault of this kind should fail.
+  ConsistencyOptions options;  ///< With the fault in make_view or object.
   ContactFormulas contact;     ///< Or here,
   bool of_contact = false;     ///< and then only the contact check is run.
-  bool of_model = false;       ///< The mistake is in make_view.
-  MutantFate fate = MutantFate::kSurvived;
+  bool of_model = false;       ///< The fault is in make_view.
+  MutantOutcome outcome = MutantOutcome::kSurvived;
   std::string failed_checks;  ///< Names, separated by blanks.
   bool localised = false;     ///< `first` is among them, or is the first of them in the table.
 };

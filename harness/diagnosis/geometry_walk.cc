@@ -31,7 +31,7 @@ bool IsPitch(const Parameter& parameter) {
          parameter.component == 1;
 }
 
-/// A cause for each vector that is changed: two numbers solved for together may be two mistakes.
+/// A cause for each vector that is changed: two numbers solved for together may be two faults.
 std::vector<Repair> Split(const Repair& cause) {
   if (cause.parameters.size() < 2) return {cause};
   std::vector<Repair> parts;
@@ -202,13 +202,13 @@ std::vector<Parameter> GeometryWalk::ListNear(int link, const std::vector<Parame
 }
 
 bool GeometryWalk::KeepsWhatIsRight(const Parameter& parameter) {
-  constexpr double kNudge = 1e-3;  // rad or m
+  constexpr double kOffset = 1e-3;  // rad or m
   const std::vector<int>& items = placement_.ItemsBeyond(CarrierOf(spec_, parameter));
   std::vector<int> right;
   for (const int item : items) {
     if (!placement_.Fails(item)) right.push_back(item);
   }
-  placement_.Set(parameter, GetValue(spec_, parameter) + kNudge);
+  placement_.Set(parameter, GetValue(spec_, parameter) + kOffset);
   const bool keeps =
       std::none_of(right.begin(), right.end(), [&](int item) { return placement_.Fails(item); });
   placement_.Restore(spec_, parameter);
@@ -258,7 +258,7 @@ bool GeometryWalk::Iterate(const std::vector<Parameter>& parameters, const std::
   constexpr double kStep = 1e-6;
   constexpr double kConverged = 1e-14;
   const double zero =
-      placement_.evidence().Widen(1e-9);  // far above what is left of a right solution, far below any mistake
+      placement_.evidence().Widen(1e-9);  // far above what is left of a right solution, far below any fault
   constexpr double kExplained = 1e-3;     // of the residual, by a step
   constexpr double kFar = 10.0;           // of the robot's size: no length is that long
   constexpr double kLongestTurn =

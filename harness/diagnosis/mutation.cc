@@ -116,7 +116,7 @@ class MutantList {
     MassProperties changed = ReadBody(link);
     const Matrix3d before = changed.inertia;
     change(&changed);
-    constexpr double kSame = 1e-9;  // of the trace: a tensor that the mistake leaves as it is
+    constexpr double kSame = 1e-9;  // of the trace: a tensor that the fault leaves as it is
     if ((changed.inertia - before).norm() <= kSame * before.trace()) return;
     std::vector<Parameter> entries;
     entries.reserve(6);
@@ -202,7 +202,7 @@ void TryMutant(const RobotModel& model, const mjModel& engine, const std::string
   mutant->change(&spec);
   const std::optional<RobotModel> changed = TryModel(spec);
   if (!changed) {
-    mutant->fate = MutantFate::kRefused;
+    mutant->outcome = MutantOutcome::kRefused;
     return;
   }
   ConsistencyOptions check;
@@ -217,10 +217,11 @@ void TryMutant(const RobotModel& model, const mjModel& engine, const std::string
   }
   if (result.Agrees()) {
     const EngineEvidence evidence(model, engine, engine_source, options.samples, options.seed);
-    mutant->fate = HasEffect(model, *changed, evidence) ? MutantFate::kSurvived : MutantFate::kNoEffect;
+    mutant->outcome =
+        HasEffect(model, *changed, evidence) ? MutantOutcome::kSurvived : MutantOutcome::kNoEffect;
     return;
   }
-  mutant->fate = MutantFate::kKilled;
+  mutant->outcome = MutantOutcome::kKilled;
   if (!options.diagnose) return;
   const Diagnosis diagnosis = Diagnose(*changed, engine, engine_source, {}, [](const char*) { return true; });
   mutant->causes = static_cast<int>(diagnosis.causes.size());

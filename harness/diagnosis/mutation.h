@@ -11,7 +11,7 @@
 
 namespace dexcheck {
 
-enum class MutantFate {
+enum class MutantOutcome {
   kKilled,    ///< The checks disagree.
   kRefused,   ///< The model cannot be built: an input error.
   kNoEffect,  ///< The checks agree, and no term of the model changed at any state tried.
@@ -25,7 +25,7 @@ struct Mutant {
   std::function<void(RobotSpec*)> change;
   Repair expected;  ///< What the diagnosis should name, without values.
 
-  MutantFate fate = MutantFate::kSurvived;
+  MutantOutcome outcome = MutantOutcome::kSurvived;
   std::string failed_checks;  ///< Names, separated by blanks.
   // What the diagnosis says; for killed mutants.
   std::string named;         ///< Its first cause, in short.

@@ -7,7 +7,7 @@ namespace dexcheck {
 namespace {
 
 // Three states tell a wrong place from a right one that is seen along its axis.
-constexpr size_t kSnapshots = 3;
+constexpr size_t kStateSamples = 3;
 
 // Both sides chain some dozen rotations: 1e-14 of the robot's size. A file's numbers have fewer digits than
 // this leaves.
@@ -27,7 +27,7 @@ Placement::Placement(const RobotSpec& spec, const EngineEvidence& evidence, bool
     : trial_(spec),
       base_origin_(spec.base.X_B0.translation()),
       evidence_(&evidence),
-      used_(std::min(kSnapshots, evidence.snapshots().size())) {
+      used_(std::min(kStateSamples, evidence.samples().size())) {
   const int joints = static_cast<int>(spec.joints.size());
   subtree_.resize(At(joints));
   for (int i = 0; i < joints; ++i) {
@@ -84,7 +84,7 @@ void Placement::UpdateRow(int i) {
   const Joint& joint = trial_.joints[static_cast<size_t>(i)];
   const bool revolute = joint.type == JointType::kRevolute;
   for (size_t sample = 0; sample < used_; ++sample) {
-    const double q_i = evidence_->snapshots()[sample].q[offset + i];
+    const double q_i = evidence_->samples()[sample].q[offset + i];
     rows_[sample][At(i)] =
         joint.X_PB * CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q + (revolute ? q_i : 0.0),
                                       joint.mdh.d + (revolute ? 0.0 : q_i));
@@ -94,7 +94,7 @@ void Placement::UpdateRow(int i) {
 void Placement::UpdateFrom(int from) {
   for (size_t sample = 0; sample < used_; ++sample) {
     std::vector<Pose>& poses = poses_[sample];
-    if (from < 0) poses[0] = CalcBasePose(evidence_->snapshots()[sample].q);
+    if (from < 0) poses[0] = CalcBasePose(evidence_->samples()[sample].q);
     for (const int i : subtree_[At(from)]) {
       if (!focus_.empty() && !focus_[At(i)]) continue;
       poses[At(i)] = poses[At(trial_.joints[static_cast<size_t>(i)].parent)] * rows_[sample][At(i)];
@@ -163,7 +163,7 @@ void Placement::AppendResidual(int index, std::vector<double>* rows) const {
     for (const double entry : difference.reshaped()) rows->push_back(entry);
   };
   for (size_t sample = 0; sample < used_; ++sample) {
-    const Snapshot& engine = evidence_->snapshots()[sample];
+    const StateSample& engine = evidence_->samples()[sample];
     const Pose& X = poses_[sample][At(item.link)];
     switch (item.kind) {
       case PlacedItem::Kind::kAxisDirection:
@@ -209,7 +209,7 @@ int Placement::CountWrongNumbers(int index) const {
   if (item.kind != PlacedItem::Kind::kCom && item.kind != PlacedItem::Kind::kInertia) return 3;
   const Pose& X = poses_[0][At(item.link)];
   const MassProperties& body = trial_.joints[static_cast<size_t>(item.index)].body;
-  const LinkInWorld& engine = evidence_->snapshots()[0].links[static_cast<size_t>(item.index + 1)];
+  const LinkInWorld& engine = evidence_->samples()[0].links[static_cast<size_t>(item.index + 1)];
   const double rounding = evidence_->Widen(kPlaceRounding);
   int wrong = 0;
   if (item.kind == PlacedItem::Kind::kCom) {

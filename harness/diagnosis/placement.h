@@ -52,7 +52,7 @@ class Placement {
   /// Puts the geometry of one joint and of all frames back to that of `spec` (-1: the base's place).
   void Restore(const RobotSpec& spec, const Parameter& parameter);
 
-  /// The item's differences over all snapshots, engine minus trial: lengths by the robot's, inertias by their
+  /// The item's differences over all samples, engine minus trial: lengths by the robot's, inertias by their
   /// trace, directions as they are. All zero when both agree.
   void AppendResidual(int item, std::vector<double>* rows) const;
   /// Whether the largest of them is more than rounding, or the evidence's tolerance, leaves.
@@ -74,12 +74,12 @@ class Placement {
   RobotSpec trial_;
   Vector3d base_origin_;
   const EngineEvidence* evidence_;
-  size_t used_;  // snapshots
+  size_t used_;  // samples
   std::vector<PlacedItem> items_;
   std::vector<std::vector<int>> beyond_;
   std::vector<std::vector<int>> subtree_;  // joints that move with a joint, itself first; base first
-  std::vector<std::vector<Pose>> rows_;    // from parent to link, by snapshot; the base's is not used
-  std::vector<std::vector<Pose>> poses_;   // by snapshot, base first
+  std::vector<std::vector<Pose>> rows_;    // from parent to link, by sample; the base's is not used
+  std::vector<std::vector<Pose>> poses_;   // by sample, base first
   std::vector<bool> focus_;                // links whose poses are followed, base first; empty: all
   mutable std::vector<double> scratch_;
 };

@@ -139,15 +139,15 @@ PlantFault Delay(const std::string& joint, size_t steps) {
 }
 
 /// a' = (sent - a) / time: what is given follows what is sent.
-PlantFault Lag(const std::string& joint, double share) {
+PlantFault Lag(const std::string& joint, double fraction) {
   PlantFault fault{
-      (joint.empty() ? "all motors" : "motor " + joint) + ": follow by " + FormatNumber(share) + " a step",
+      (joint.empty() ? "all motors" : "motor " + joint) + ": follow by " + FormatNumber(fraction) + " a step",
       "motor", Cause::kActuator, joint.empty() ? "motors" : joint};
-  fault.motors = [joint, share](const Setup& setup) -> MotorFault {
-    return [joint, share, i = joint.empty() ? 0 : MotorOf(setup, joint), given = VectorXd()](
+  fault.motors = [joint, fraction](const Setup& setup) -> MotorFault {
+    return [joint, fraction, i = joint.empty() ? 0 : MotorOf(setup, joint), given = VectorXd()](
                double, VectorXd* tau) mutable {
       if (given.size() == 0) given = *tau;
-      given += share * (*tau - given);
+      given += fraction * (*tau - given);
       if (joint.empty()) {
         *tau = given;
       } else {

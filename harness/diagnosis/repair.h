@@ -26,7 +26,7 @@ struct Repair {
   int other = -1;              ///< The swaps.
   std::string note;            ///< kEngineOnly, in words.
 
-  double explained = 0.0;  ///< Share of all residuals that the repair removes, after the causes before it.
+  double explained = 0.0;  ///< Fraction of all residuals that the repair removes, after the causes before it.
   double explained_of_forces = 0.0;  ///< The same of the forces alone.
   std::vector<Repair> equivalents;   ///< Other repairs that remove just as much.
 };

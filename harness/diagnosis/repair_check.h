@@ -19,7 +19,7 @@ std::optional<Parameter> FindParameter(const RobotSpec& spec, const GateFinding&
 class RepairCheck {
  public:
   /// @param original the model as it is in the file. @param bodies whether the engine's bodies may be read.
-  /// @param tolerance relative difference that is no mistake.
+  /// @param tolerance relative difference that is no fault.
   RepairCheck(RobotSpec original, const mjModel& engine, std::string engine_source, int samples,
               std::uint64_t seed, bool bodies, double tolerance = 0.0);
 

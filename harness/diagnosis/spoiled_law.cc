@@ -78,26 +78,26 @@ GraspControllerOptions SpoilOptions(GraspControllerOptions options, LawSlip slip
 
 }  // namespace
 
-std::vector<LawMistake> ListLawMistakes(bool has_wheels) {
-  std::vector<LawMistake> mistakes;
+std::vector<LawFault> ListLawFaults(bool has_wheels) {
+  std::vector<LawFault> faults;
   const std::span<const LawPartName> parts = ListLawParts();
   for (size_t i = 0; i < parts.size(); ++i) {
     for (const double factor : {kSlight, 0.0}) {
       const std::string how = factor == 0.0 ? " left out" : " times " + FormatNumber(factor);
-      mistakes.push_back({parts[i].name + how, i, factor});
+      faults.push_back({parts[i].name + how, i, factor});
     }
   }
-  mistakes.push_back({"gravity in F_bar' upside down", AllParts().gravity, -1.0});
+  faults.push_back({"gravity in F_bar' upside down", AllParts().gravity, -1.0});
   for (const auto& [slip, name] : kSlips) {
     const bool of_wheels = slip == LawSlip::kWheelsExchanged || slip == LawSlip::kNoActuationMap;
-    if (has_wheels || !of_wheels) mistakes.push_back({name, SIZE_MAX, 1.0, slip});
+    if (has_wheels || !of_wheels) faults.push_back({name, SIZE_MAX, 1.0, slip});
   }
-  return mistakes;
+  return faults;
 }
 
-SpoiledLaw::SpoiledLaw(const Setup& setup, LawMistake mistake)
-    : options_(SpoilOptions(setup.MakeControllerOptions(), mistake.slip)),
-      mistake_(std::move(mistake)),
+SpoiledLaw::SpoiledLaw(const Setup& setup, LawFault fault)
+    : options_(SpoilOptions(setup.MakeControllerOptions(), fault.slip)),
+      fault_(std::move(fault)),
       model_(setup.model(), setup.fingertips(), setup.object().body, setup.surface(), options_),
       actuation_(setup.model()),
       J_pinv_("J_B'", 3 * static_cast<Eigen::Index>(setup.fingertips().size()),

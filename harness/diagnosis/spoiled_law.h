@@ -35,8 +35,8 @@ enum class LawSlip {
   kOtherBarrier,        ///< F_N with 1.1 times the weight of the barrier.
 };
 
-/// One mistake.
-struct LawMistake {
+/// One fault.
+struct LawFault {
   std::string name;        ///< "Coriolis forces C_bar' times 1.001".
   size_t part = SIZE_MAX;  ///< In ListLawParts; its name is what the evidence should say.
   double factor = 1.0;     ///< Of that part: 0 leaves it out.
@@ -45,19 +45,19 @@ struct LawMistake {
 
 /// Each part of the law a thousandth too large and left out, then gravity upside down and the slips, those of
 /// wheels where there are any.
-std::vector<LawMistake> ListLawMistakes(bool has_wheels);
+std::vector<LawFault> ListLawFaults(bool has_wheels);
 
-/// The law (55) as controller/control computes it, once more with a place for each mistake: from the
+/// The law (55) as controller/control computes it, once more with a place for each fault: from the
 /// controller's own terms, by its vectors and its pseudoinverses, and not by the formulas that judge it.
-/// Without a mistake it sends the same torques. What F_N it takes for right it tells as a right law does.
-/// The mistake begins with the run: while everything comes to rest the law is right.
+/// Without a fault it sends the same torques. What F_N it takes for right it tells as a right law does.
+/// The fault begins with the run: while everything comes to rest the law is right.
 class SpoiledLaw final : public Controller {
  public:
   /// @param setup of a scenario that is no task; outlives this.
-  SpoiledLaw(const Setup& setup, LawMistake mistake);
+  SpoiledLaw(const Setup& setup, LawFault fault);
   /// The right law, from terms of which one equation is wrong.
-  SpoiledLaw(const Setup& setup, const EquationMistake& mistake) : SpoiledLaw(setup, LawMistake{}) {
-    spoil_ = mistake.spoil;
+  SpoiledLaw(const Setup& setup, const EquationFault& fault) : SpoiledLaw(setup, LawFault{}) {
+    spoil_ = fault.spoil;
   }
 
   void Follow(const Trajectory& motion) override;
@@ -66,10 +66,10 @@ class SpoiledLaw final : public Controller {
   [[nodiscard]] const GraspModel& model() const override { return model_; }
 
  private:
-  [[nodiscard]] bool Has(LawSlip slip) const { return has_begun_ && mistake_.slip == slip; }
+  [[nodiscard]] bool Has(LawSlip slip) const { return has_begun_ && fault_.slip == slip; }
   /// Of a part by its number in ListLawParts.
   [[nodiscard]] double factor(size_t part) const {
-    return has_begun_ && mistake_.part == part ? mistake_.factor : 1.0;
+    return has_begun_ && fault_.part == part ? fault_.factor : 1.0;
   }
   void CalcTorque(const MeasuredState& state, double t, Command* command);
   [[nodiscard]] Vector6d CalcObjectAcceleration(const DesiredMotion& desired) const;
@@ -79,7 +79,7 @@ class SpoiledLaw final : public Controller {
   void SendTorques(Command* command);
 
   GraspControllerOptions options_;
-  LawMistake mistake_;
+  LawFault fault_;
   void (*spoil_)(const SpoiledTerms&) = nullptr;
   GraspModel model_;
   ActuationMap actuation_;

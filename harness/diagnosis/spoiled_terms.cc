@@ -56,7 +56,7 @@ void Roll(const Terms& t, Rate rate) {
   for (int i = 0; i < t.num_contacts(); ++i) t.SetKappaDot(i, rate(t.geometry(i), t.CalcTwist(i)));
 }
 
-void AddRobot(const RobotModel& model, std::vector<EquationMistake>* list) {
+void AddRobot(const RobotModel& model, std::vector<EquationFault>* list) {
   list->push_back({"Coriolis terms dropped", "C_bar_xi", [](const Terms& t) { t.C().setZero(); }});
   list->push_back(
       {"Coriolis matrix transposed", "C_bar_xi", [](const Terms& t) { t.C().transposeInPlace(); }});
@@ -76,7 +76,7 @@ void AddRobot(const RobotModel& model, std::vector<EquationMistake>* list) {
   list->push_back({"wheel spin left out of M", "M_bar", DropWheelSpin});
 }
 
-void AddContacts(std::vector<EquationMistake>* list) {
+void AddContacts(std::vector<EquationFault>* list) {
   list->push_back({"G without moments", "G", [](const Terms& t) {
                      for (int i = 0; i < t.num_contacts(); ++i) t.G(i).bottomRows<3>().setZero();
                    }});
@@ -138,7 +138,7 @@ void AddContacts(std::vector<EquationMistake>* list) {
                    }});
 }
 
-void AddObject(bool coordinates, std::vector<EquationMistake>* list) {
+void AddObject(bool coordinates, std::vector<EquationFault>* list) {
   list->push_back({"N_o with the wrong sign", "N_o", [](const Terms& t) { t.body().N_o *= -1.0; }});
   list->push_back(
       {"object without gyroscopic terms", "C_hat_V", [](const Terms& t) { t.body().C_hat.setZero(); }});
@@ -178,8 +178,8 @@ void SpoiledTerms::Finish() const {
   Open(grasp().slip_bias()) = grasp().J_B_dot() * state_.xi - grasp().G_dot().transpose() * grasp().V_Bo();
 }
 
-std::vector<EquationMistake> ListEquationMistakes(const RobotModel& model, bool coordinates) {
-  std::vector<EquationMistake> list;
+std::vector<EquationFault> ListEquationFaults(const RobotModel& model, bool coordinates) {
+  std::vector<EquationFault> list;
   AddRobot(model, &list);
   AddContacts(&list);
   AddObject(coordinates, &list);

@@ -54,7 +54,7 @@ class SpoiledTerms {
 };
 
 /// One wrong equation.
-struct EquationMistake {
+struct EquationFault {
   std::string name;   ///< "Coriolis terms dropped".
   std::string check;  ///< The check of the first question that should fail.
   void (*spoil)(const SpoiledTerms&) = nullptr;
@@ -62,6 +62,6 @@ struct EquationMistake {
 
 /// All that apply to the robot, which holds an object. @param coordinates whether the object's terms are
 /// those in X_o.
-std::vector<EquationMistake> ListEquationMistakes(const RobotModel& model, bool coordinates);
+std::vector<EquationFault> ListEquationFaults(const RobotModel& model, bool coordinates);
 
 }  // namespace dexcheck

@@ -1,6 +1,6 @@
 #pragma once
 
-// Views of the model with a mistake in them.
+// Views of the model with a fault in them.
 
 #include <functional>
 #include <memory>

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "controller/common/errors.h"
-#include "harness/engine/grown_copy.h"
 #include "harness/engine/mujoco_release.h"
+#include "harness/engine/resized_copy.h"
 
 namespace dexcheck {
 namespace {
@@ -36,7 +36,7 @@ MjModelPtr AddContactPairs(const mjModel& model, std::span<const std::pair<int, 
     throw InputError("MJCF: option collision: must be \"predefined\" for plant.collide");
   }
   const auto first = static_cast<int>(model.npair);
-  MjModelPtr grown = MakeGrownCopy(model, [&](mjModel* m) { m->npair += static_cast<int>(geoms.size()); });
+  MjModelPtr grown = MakeResizedCopy(model, [&](mjModel* m) { m->npair += static_cast<int>(geoms.size()); });
   for (size_t k = 0; k < geoms.size(); ++k) FillPair(grown.get(), first + static_cast<int>(k), geoms[k]);
   return grown;
 }

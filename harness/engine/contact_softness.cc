@@ -49,7 +49,7 @@ Eigen::RowVectorXd ReadRow(const mjModel& m, const mjData& d, int row) {
   return values;
 }
 
-double FindShare(const MatrixXd& A, const VectorXd& R) {
+double FindFraction(const MatrixXd& A, const VectorXd& R) {
   const VectorXd scale = R.cwiseSqrt().cwiseInverse();
   const MatrixXd S = scale.asDiagonal() * A * scale.asDiagonal();
   const VectorXd values = Eigen::SelfAdjointEigenSolver<MatrixXd>(S, Eigen::EigenvaluesOnly).eigenvalues();
@@ -90,15 +90,15 @@ ContactSoftness FindContactSoftness(const Adapter& adapter, const Eigen::Ref<con
   }
   const MatrixXd A = J * M.llt().solve(J.transpose());
   // With the rows rigid that are not chosen.
-  const auto share = [&](bool tangential, bool of_object) {
+  const auto fraction = [&](bool tangential, bool of_object) {
     VectorXd chosen = R;
     for (Eigen::Index i = 0; i < count; ++i) {
       const Row& row = rows[static_cast<size_t>(i)];
       if ((tangential && !row.tangential) || (of_object && !row.of_object)) chosen[i] *= kRigid;
     }
-    return FindShare(A, chosen);
+    return FindFraction(A, chosen);
   };
-  return {share(false, false), share(true, false), share(false, true), share(true, true)};
+  return {fraction(false, false), fraction(true, false), fraction(false, true), fraction(true, true)};
 }
 
 }  // namespace dexcheck

@@ -6,19 +6,19 @@
 
 namespace dexcheck {
 
-/// Shares of a change of forces that soft contacts hold back at first. A smooth force F on the robot and what
-/// it holds gives contact forces (A + R) f = -J M^-1 F + ... with A = J M^-1 J^T and the engine's R, where
-/// rigid contacts have R = 0. In |.|_M the accelerations differ by the matrix (1 + J^T R^-1 J)^-1 on the
-/// range of J^T (M = 1 in that metric), whose largest eigenvalue is
+/// Fractions of a change of forces that soft contacts hold back at first. A smooth force F on the robot and
+/// what it holds gives contact forces (A + R) f = -J M^-1 F + ... with A = J M^-1 J^T and the engine's R,
+/// where rigid contacts have R = 0. In |.|_M the accelerations differ by the matrix (1 + J^T R^-1 J)^-1 on
+/// the range of J^T (M = 1 in that metric), whose largest eigenvalue is
 ///
 ///   share = 1 / (1 + s),   s the smallest eigenvalue of R^-1/2 A R^-1/2 that is not zero:
 ///
 /// directions that contacts hold twice have zeros there, and nothing moves along them.
 struct ContactSoftness {
-  double share = 0.0;             ///< Of all rows of all contacts.
-  double tangential_share = 0.0;  ///< Of the rows along the tangents, the others taken as rigid.
+  double fraction = 0.0;             ///< Of all rows of all contacts.
+  double tangential_fraction = 0.0;  ///< Of the rows along the tangents, the others taken as rigid.
   /// Likewise of the object's contacts alone.
-  double object_share = 0.0, object_tangential_share = 0.0;
+  double object_fraction = 0.0, object_tangential_fraction = 0.0;
 };
 
 /// Where robot and object stand. Contacts that are open by less than 0.1 mm count as closed.

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "harness/engine/grown_copy.h"
 #include "harness/engine/map_vector.h"
+#include "harness/engine/resized_copy.h"
 
 namespace dexcheck {
 namespace {
@@ -128,7 +128,7 @@ MjModelPtr MakeVisible(MjModelPtr model) {
   for (const Bone& bone : bones) longest = std::max(longest, bone.length());
   const double unit = longest > 0.0 ? longest : kLoneRadius / kBallRadius;
   const auto first = static_cast<int>(model->ngeom);
-  MjModelPtr drawn = MakeGrownCopy(*model, [&](mjModel* m) { m->ngeom += static_cast<int>(bones.size()); });
+  MjModelPtr drawn = MakeResizedCopy(*model, [&](mjModel* m) { m->ngeom += static_cast<int>(bones.size()); });
   for (size_t i = 0; i < bones.size(); ++i)
     FillGeom(drawn.get(), first + static_cast<int>(i), bones[i], unit);
   return drawn;

@@ -126,7 +126,8 @@ std::vector<WatchedPair> ListWatchedPairs(const mjModel& engine, const Adapter& 
     for (const std::string& name : {pair.first, pair.second}) {
       const auto has_name = [&](const Solid& solid) { return solid.name == name; };
       if (std::any_of(solids.list.begin(), solids.list.end(), has_name)) continue;
-      throw InputError(source + ": plant.may_touch: " + Quote(name) + " is no body with a shape in the MJCF");
+      throw InputError(source + ": plant.allowed_collision_pairs: " + Quote(name) +
+                       " is no body with a shape in the MJCF");
     }
   }
   const PairLister lister(engine, adapter, solids);
@@ -136,11 +137,12 @@ std::vector<WatchedPair> ListWatchedPairs(const mjModel& engine, const Adapter& 
     for (int b = a + 1; b < count; ++b) {
       const std::string& name_a = solids.list[static_cast<size_t>(a)].name;
       const std::string& name_b = solids.list[static_cast<size_t>(b)].name;
-      const bool may_touch = std::any_of(allowed.begin(), allowed.end(), [&](const AllowedPair& pair) {
-        return (pair.first == name_a && pair.second == name_b) ||
-               (pair.first == name_b && pair.second == name_a);
-      });
-      if (!may_touch && lister.IsWatched(a, b)) pairs.push_back({a, b, lister.Classify(a, b)});
+      const bool allowed_collision_pairs =
+          std::any_of(allowed.begin(), allowed.end(), [&](const AllowedPair& pair) {
+            return (pair.first == name_a && pair.second == name_b) ||
+                   (pair.first == name_b && pair.second == name_a);
+          });
+      if (!allowed_collision_pairs && lister.IsWatched(a, b)) pairs.push_back({a, b, lister.Classify(a, b)});
     }
   }
   return pairs;

@@ -18,7 +18,7 @@ enum class FieldClass {
 /// A field of mjModel ("body_mass"), mjOption ("opt.timestep") or mjStatistic ("stat.extent").
 struct EngineField {
   const char* name;
-  FieldClass fate;
+  FieldClass outcome;
   /// kCompared, kReported: the check that names it; kOverridden: by what; kJudged: the note that names it;
   /// otherwise why.
   const char* how;

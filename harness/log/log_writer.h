@@ -20,7 +20,7 @@ namespace dexcheck {
 /// to this process, and holds all rows up to the last flush; before, nothing stands under its name.
 ///
 /// Every member throws InputError "PATH: cannot be written: reason" when the file system refuses, and
-/// std::invalid_argument for a caller's mistake (a name used twice, a call out of order).
+/// std::invalid_argument for a caller's fault (a name used twice, a call out of order).
 class LogWriter {
  public:
   /// Signal 0, "time", s. Its value must be finite in every row: NaN marks rows that were not written.

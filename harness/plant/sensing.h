@@ -16,7 +16,7 @@ namespace dexcheck {
 
 /// Stands between the plant and the controller: encoders, tachometers, odometry, a camera, a latency. Two of
 /// them that are made alike and hear the same truth tell the same: a check makes its own. Nothing allocates
-/// after construction, once `told` has its sizes.
+/// after construction, once `measurement` has its sizes.
 class Sensing {
  public:
   /// @throws InputError when the options name what the robot does not have.

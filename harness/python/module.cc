@@ -21,10 +21,10 @@
 #include "controller/dynamics/model_terms.h"
 #include "harness/base/version.h"
 #include "harness/checks/tolerance.h"
-#include "harness/sides/audit.h"
-#include "harness/sides/file_comparison.h"
-#include "harness/sides/function_side.h"
-#include "harness/sides/read_description.h"
+#include "harness/descriptions/audit.h"
+#include "harness/descriptions/file_comparison.h"
+#include "harness/descriptions/function_side.h"
+#include "harness/descriptions/read_description.h"
 
 namespace py = pybind11;
 
@@ -224,7 +224,7 @@ PYBIND11_MODULE(dexcheck, m) {
       .def_property_readonly(
           "differences", [](const ComparisonResult& r) { return ListDifferences(r.comparison); },
           "One line for each constant and term that differs.")
-      .def_property_readonly("likely", &ComparisonResult::Likely, "Mistakes that would explain it, in words.")
+      .def_property_readonly("likely", &ComparisonResult::Likely, "Faults that would explain it, in words.")
       .def_property_readonly("notes", [](const ComparisonResult& r) { return r.comparison.notes; })
       .def("__repr__", &ComparisonResult::Print);
 

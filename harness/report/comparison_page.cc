@@ -13,8 +13,8 @@ namespace {
 
 /// Signals that are drawn: those that differ most.
 constexpr size_t kMostPlots = 10;
-/// Shares below this are rounding, and their plots would be noise.
-constexpr double kLeastShare = 1e-15;
+/// Fractions below this are rounding, and their plots would be noise.
+constexpr double kLeastFraction = 1e-15;
 
 std::string Letter(size_t run) { return std::string(1, static_cast<char>('A' + run % 26)); }
 
@@ -150,7 +150,7 @@ class ComparisonPage {
       Add("<tr class=\"{}\"><td><code>{}</code></td><td>{} - A</td><td class=\"value number\">{} {}</td>"
           "<td class=\"value number\">{}</td><td class=\"value number\">{:.3f} s</td></tr>\n",
           signal.differs ? "open" : "pass", NameColumn(signal), Letter(signal.run),
-          FormatShort(signal.difference), signal.unit, FormatShort(signal.share()), signal.at_time);
+          FormatShort(signal.difference), signal.unit, FormatShort(signal.fraction()), signal.at_time);
     }
     html_ += "</tbody></table>\n";
     if (!comparison_.not_compared.empty()) {
@@ -168,7 +168,7 @@ class ComparisonPage {
     AddOverlay("joints/largest_error", 0, "largest error of a joint", "rad", /*log=*/true, &figures);
     std::vector<std::string> drawn;
     for (const SignalDifference& signal : comparison_.signals) {
-      if (drawn.size() == kMostPlots || signal.share() < kLeastShare) break;
+      if (drawn.size() == kMostPlots || signal.fraction() < kLeastFraction) break;
       if (std::find(drawn.begin(), drawn.end(), signal.name) != drawn.end()) continue;
       drawn.push_back(signal.name);
       AddOverlay(signal.name, signal.column_index, NameColumn(signal), signal.unit, /*log=*/false, &figures);

@@ -305,7 +305,7 @@ class MotionFigures {
   void AddFrictionUse() {
     Figure figure{"friction_use",
                   "",
-                  "Tangential force as a share of what friction can hold",
+                  "Tangential force as a fraction of what friction can hold",
                   "|f_t| / (μ f_n)",
                   "",
                   false,

@@ -59,18 +59,18 @@ Headline FindHeadline(const RunData& run) {
 
 /// One of the five questions.
 struct Question {
-  CheckKind kind;
+  CheckCategory kind;
   const char* name;
   const char* text;
   const char* of_joints = text;  ///< The same of a robot that holds nothing.
 };
 
-constexpr std::array<Question, 5> kQuestions = {
-    {{CheckKind::kModel, "Model", "same state, both descriptions"},
-     {CheckKind::kLaw, "Law", "torques against (53)-(55)", "torques against the law of the joints"},
-     {CheckKind::kBalance, "Balance", "engine's motion in the model's equations"},
-     {CheckKind::kPrediction, "Prediction", "accelerations and contact forces", "accelerations"},
-     {CheckKind::kAssumption, "Assumptions", "no slip, level base, forces in cones",
+constexpr std::array<Question, 5> kCategories = {
+    {{CheckCategory::kModel, "Model", "same state, both descriptions"},
+     {CheckCategory::kLaw, "Law", "torques against (53)-(55)", "torques against the law of the joints"},
+     {CheckCategory::kInverseDynamics, "Balance", "engine's motion in the model's equations"},
+     {CheckCategory::kForwardDynamics, "Prediction", "accelerations and contact forces", "accelerations"},
+     {CheckCategory::kAssumption, "Assumptions", "no slip, level base, forces in cones",
       "joints within their ranges, motors within their limits, bodies apart"}}};
 
 /// A button that brings the page to a time. @param words before the time.
@@ -129,7 +129,7 @@ class Page {
       Add("<p>The run was stopped by hand after {:.3f} s.</p>", run_.time()[run_.time().size() - 1]);
     }
     html_ += "</section>\n";
-    AddQuestions();
+    AddCategories();
     AddTiles();
     html_ += "</header>\n";
   }
@@ -162,27 +162,28 @@ class Page {
   [[nodiscard]] Answer FindAnswer(const Question& question) const {
     Answer answer;
     long failed = 0;
-    double share = 0.0;
+    double fraction = 0.0;
     for (const CheckLine& check : run_.checks()) {
       if (check.kind != question.kind) continue;
       answer.checks.push_back(&check);
       failed += check.pass ? 0 : 1;
-      share = std::max(share, check.share());
+      fraction = std::max(fraction, check.fraction());
     }
     const size_t count = answer.checks.size();
     if (count == 0) return answer;
     answer.fails = failed > 0;
     answer.tone = answer.fails ? "fail" : "pass";
     answer.word = answer.fails ? fmt::format("{} of {} fail", failed, count) : "holds";
-    answer.extent = fmt::format("{}, at most {} of a bound",
-                                count == 1 ? "1 check" : fmt::format("{} checks", count), FormatShare(share));
+    answer.extent =
+        fmt::format("{}, at most {} of a bound", count == 1 ? "1 check" : fmt::format("{} checks", count),
+                    FormatFraction(fraction));
     return answer;
   }
 
-  void AddQuestions() {
+  void AddCategories() {
     if (run_.checks().empty()) return;
     html_ += "<div class=\"tiles\">\n";
-    for (const Question& question : kQuestions) {
+    for (const Question& question : kCategories) {
       const Answer answer = FindAnswer(question);
       const Html text = FormatHtml("<b>{}: {}</b><span>{}</span><span>{}</span>", question.name, answer.word,
                                    TextOf(question), answer.extent);
@@ -219,7 +220,7 @@ class Page {
             fmt::format("simulated, {} steps", run_.time().size()).c_str());
     for (const CheckLine& check : run_.checks()) {
       if (check.name == "cone_use")
-        AddTile(FormatShare(check.max), "of the fingertips' friction used, at most");
+        AddTile(FormatFraction(check.max), "of the fingertips' friction used, at most");
     }
     AddClearanceTiles();
     const double factor = FindNumber(summary, "speed", "real_time_factor");
@@ -249,7 +250,7 @@ class Page {
   }
 
   void AddCheckRow(const CheckLine& check) {
-    const double share = check.share();
+    const double fraction = check.fraction();
     std::string where = check.where;
     if (!check.constant) where += fmt::format("{}{:.3f} s", where.empty() ? "" : ", ", check.at_time);
     const std::string unit = check.unit == "1" ? "" : " " + check.unit;
@@ -271,7 +272,7 @@ class Page {
         check.pass ? "pass" : "fail", check.name, check.description, verdict,
         cause.empty() ? Html() : FormatHtml("<small>cause: {}</small>", cause), FormatShort(check.max),
         check.max == 0.0 ? "" : unit, FormatShort(check.bound), check.bound == 0.0 ? "" : unit,
-        FormatShare(share), 100.0 * std::clamp(std::isfinite(share) ? share : 1.0, 0.0, 1.0),
+        FormatFraction(fraction), 100.0 * std::clamp(std::isfinite(fraction) ? fraction : 1.0, 0.0, 1.0),
         where.empty() ? "" : "at", where);
   }
 
@@ -307,10 +308,11 @@ class Page {
   void AddChecks() {
     if (run_.checks().empty()) return;
     html_ +=
-        "<h2 id=\"checks\">Checks</h2>\n<p class=\"soft\">What failed first, then by share of the bound. A "
+        "<h2 id=\"checks\">Checks</h2>\n<p class=\"soft\">What failed first, then by fraction of the bound. "
+        "A "
         "bound is "
         "what rounding, or the tolerance of the assumption, can explain.</p>\n<div class=\"card\">\n";
-    for (const Question& question : kQuestions) {
+    for (const Question& question : kCategories) {
       const Answer answer = FindAnswer(question);
       if (!answer.checks.empty()) AddAnswer(question, answer);
     }

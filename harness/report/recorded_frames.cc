@@ -103,7 +103,7 @@ class FramesReader {
       throw InputError(path_.string() + ": " + signal.name + ": kind must be 0, 1, 2, 3 or 4, got " +
                        FormatNumber(kind));
     }
-    return {signal.name.substr(std::strlen(kCheckPrefix)), static_cast<CheckKind>(static_cast<int>(kind)),
+    return {signal.name.substr(std::strlen(kCheckPrefix)), static_cast<CheckCategory>(static_cast<int>(kind)),
             attribute("bound"), ReadSeries(signal.name)};
   }
 

@@ -155,10 +155,10 @@ class ReplayMaker {
   void AddMeshes() {
     int total = 0;
     for (const int id : meshes_) total += model_.mesh_facenum[id];
-    const double share = std::min(1.0, static_cast<double>(kMostReplayTriangles) / std::max(total, 1));
+    const double fraction = std::min(1.0, static_cast<double>(kMostReplayTriangles) / std::max(total, 1));
     json_["meshes"] = Json::array();
     for (const int id : meshes_) {
-      const auto most = static_cast<size_t>(std::floor(share * model_.mesh_facenum[id]));
+      const auto most = static_cast<size_t>(std::floor(fraction * model_.mesh_facenum[id]));
       const TriangleMesh mesh = SimplifyMesh(ReadMesh(id), most);
       const size_t vertices = Align();
       for (const auto& vertex : mesh.vertices) {

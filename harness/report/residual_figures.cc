@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "harness/report/run_figures.h"
-#include "renders/question_status.h"
+#include "renders/category_status.h"
 
 namespace dexcheck {
 namespace {
@@ -10,28 +10,28 @@ namespace {
 constexpr int kNamedCurves = 8;  // as many as there are colors
 
 /// @param joints whether the robot holds nothing, and its joints follow a motion of their own.
-const char* AskQuestion(CheckKind kind, bool joints) {
+const char* DescribeCategory(CheckCategory kind, bool joints) {
   switch (kind) {
-    case CheckKind::kModel:
+    case CheckCategory::kModel:
       return "Model: both descriptions at the same state";
-    case CheckKind::kLaw:
+    case CheckCategory::kLaw:
       return joints ? "Law: torques against the law of the joints, and what they do"
                     : "Law: torques against (53)-(55), and what they do";
-    case CheckKind::kBalance:
+    case CheckCategory::kInverseDynamics:
       return "Balance: the engine's motion and forces in the model's equations";
-    case CheckKind::kPrediction:
+    case CheckCategory::kForwardDynamics:
       return joints ? "Prediction: accelerations against the engine's"
                     : "Prediction: accelerations and contact forces against the engine's";
-    case CheckKind::kAssumption:
+    case CheckCategory::kAssumption:
       return "Assumptions: what the equations take for granted";
   }
   return "";
 }
 
-Figure MakeFigure(const RunData& run, CheckKind kind) {
+Figure MakeFigure(const RunData& run, CheckCategory kind) {
   Figure figure;
   figure.name = std::string("residual_") + NameOf(kind);
-  figure.title = AskQuestion(kind, run.Find("joints/q_d") != nullptr);
+  figure.title = DescribeCategory(kind, run.Find("joints/q_d") != nullptr);
   figure.label = "value / bound";
   figure.log = true;
   figure.bound = 1.0;
@@ -62,7 +62,7 @@ Figure MakeFigure(const RunData& run, CheckKind kind) {
 
 std::vector<Figure> MakeResidualFigures(const RunData& run) {
   std::vector<Figure> figures;
-  for (const CheckKind kind : kCheckKinds) {
+  for (const CheckCategory kind : kCheckCategorys) {
     Figure figure = MakeFigure(run, kind);
     if (!figure.curves.empty()) figures.push_back(std::move(figure));
   }

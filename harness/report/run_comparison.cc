@@ -147,7 +147,7 @@ double LargestOf(const Eigen::Ref<const VectorXd>& values) {
   return largest;
 }
 
-double ShareOf(double difference, double size) {
+double FractionOf(double difference, double size) {
   if (size > 0.0) return difference / size;
   return difference == 0.0 ? 0.0 : kInfinity;
 }
@@ -187,8 +187,8 @@ SignalDifference CompareSignal(const SignalInfo& signal, const RunData& first, c
         result.differs = true;
         result.first_time = std::min(result.first_time, t);
       }
-      // A share of the size decides between columns of several units.
-      if (!(ShareOf(apart, size) > result.share())) continue;
+      // A fraction of the size decides between columns of several units.
+      if (!(FractionOf(apart, size) > result.fraction())) continue;
       result.difference = apart;
       result.size = size;
       result.unit = unit;
@@ -226,7 +226,7 @@ std::optional<double> ComparedNumber::CalcRatio(size_t run) const {
   return *values[run] / *values[0];
 }
 
-double SignalDifference::share() const { return ShareOf(difference, size); }
+double SignalDifference::fraction() const { return FractionOf(difference, size); }
 
 bool RunComparison::IsSame() const {
   if (!AllEqual(verdicts) || signals.empty()) return false;
@@ -256,8 +256,8 @@ VectorXd Resample(const VectorXd& time, const Eigen::Ref<const VectorXd>& values
     if (time[next] == at[i]) {
       result[i] = values[next];
     } else if (next > 0) {
-      const double share = (at[i] - time[next - 1]) / (time[next] - time[next - 1]);
-      result[i] = values[next - 1] + share * (values[next] - values[next - 1]);
+      const double fraction = (at[i] - time[next - 1]) / (time[next] - time[next - 1]);
+      result[i] = values[next - 1] + fraction * (values[next] - values[next - 1]);
     }
   }
   return result;
@@ -284,7 +284,7 @@ RunComparison CompareRuns(const std::vector<const RunData*>& runs, const RunComp
   }
   std::stable_sort(
       comparison.signals.begin(), comparison.signals.end(),
-      [](const SignalDifference& a, const SignalDifference& b) { return a.share() > b.share(); });
+      [](const SignalDifference& a, const SignalDifference& b) { return a.fraction() > b.fraction(); });
   return comparison;
 }
 

@@ -42,7 +42,7 @@ struct SignalDifference {
   bool differs = false;     ///< Whether it is above the tolerance.
 
   /// difference / size; 0 for 0 / 0.
-  [[nodiscard]] double share() const;
+  [[nodiscard]] double fraction() const;
 };
 
 struct RunComparisonOptions {
@@ -55,7 +55,7 @@ struct RunComparison {
   std::vector<std::string> verdicts;      ///< One for each run: "pass", "disagreement: wheel slip".
   std::vector<ComparedNumber> results;    ///< Tracking errors, duration, effort.
   std::vector<ComparedNumber> checks;     ///< Largest value of each check, in the first run's order.
-  std::vector<SignalDifference> signals;  ///< All that are compared, the largest share first.
+  std::vector<SignalDifference> signals;  ///< All that are compared, the largest fraction first.
   std::vector<std::string> not_compared;  ///< Signals that not all runs have, or not with the same columns.
 
   /// Whether verdicts, durations and signals are the same within the tolerance.

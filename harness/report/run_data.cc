@@ -6,7 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "renders/question_status.h"
+#include "renders/category_status.h"
 
 namespace dexcheck {
 namespace {
@@ -14,11 +14,11 @@ namespace {
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 constexpr const char* kCheckPrefix = "check/";
 
-CheckKind ReadKind(const std::string& name) {
-  for (const CheckKind kind : kCheckKinds) {
+CheckCategory ReadKind(const std::string& name) {
+  for (const CheckCategory kind : kCheckCategorys) {
     if (name == NameOf(kind)) return kind;
   }
-  return CheckKind::kAssumption;
+  return CheckCategory::kAssumption;
 }
 
 /// JSON has no infinity: it is written as null.
@@ -30,7 +30,7 @@ double ReadNumber(const nlohmann::json& json, const char* key) {
 
 }  // namespace
 
-double CheckLine::share() const {
+double CheckLine::fraction() const {
   if (bound > 0.0) return max / bound;
   return max == 0.0 ? 0.0 : kUnbounded;
 }
@@ -53,7 +53,7 @@ RunData::RunData(const std::filesystem::path& run_dir) : path_(run_dir / "log.h5
     ReadChecksOfSummary();
   }
   std::stable_sort(checks_.begin(), checks_.end(), [](const CheckLine& a, const CheckLine& b) {
-    return a.pass != b.pass ? !a.pass : a.share() > b.share();
+    return a.pass != b.pass ? !a.pass : a.fraction() > b.fraction();
   });
 }
 
@@ -119,8 +119,8 @@ void RunData::ReadChecksOfSignals() {
     }
     CheckLine line;
     line.name = signal.name.substr(std::string(kCheckPrefix).size());
-    line.kind = static_cast<CheckKind>(
-        std::clamp(static_cast<int>(kind->second), 0, static_cast<int>(CheckKind::kLaw)));
+    line.kind = static_cast<CheckCategory>(
+        std::clamp(static_cast<int>(kind->second), 0, static_cast<int>(CheckCategory::kLaw)));
     line.unit = signal.unit;
     line.description = signal.description;
     line.bound = bound->second;

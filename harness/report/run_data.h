@@ -15,7 +15,7 @@ namespace dexcheck {
 /// One check of a run, over all its steps.
 struct CheckLine {
   std::string name;
-  CheckKind kind = CheckKind::kModel;
+  CheckCategory kind = CheckCategory::kModel;
   std::string unit = "1";
   std::string description;
   double bound = 0.0;
@@ -27,7 +27,7 @@ struct CheckLine {
   std::string where;      ///< Part of the robot that was worst; may be empty.
 
   /// max / bound; 0 for 0 / 0.
-  [[nodiscard]] double share() const;
+  [[nodiscard]] double fraction() const;
 };
 
 /// The log of a run.
@@ -49,7 +49,7 @@ class RunData {
   [[nodiscard]] std::string FindText(const std::string& name) const { return log_.FindText(name); }
   /// Null when the run was cut off before its end.
   [[nodiscard]] const nlohmann::json& summary() const { return summary_; }
-  /// Failed ones first, then by share of the bound, largest first.
+  /// Failed ones first, then by fraction of the bound, largest first.
   [[nodiscard]] const std::vector<CheckLine>& checks() const { return checks_; }
 
  private:

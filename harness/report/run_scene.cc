@@ -6,9 +6,9 @@
 #include "harness/log/log_reader.h"
 #include "harness/report/recorded_frames.h"
 #include "renders/course.h"
-#include "renders/movie.h"
 #include "renders/png_file.h"
 #include "renders/renderer.h"
+#include "renders/video.h"
 
 namespace dexcheck {
 namespace {
@@ -23,7 +23,7 @@ bool HasSignal(const std::filesystem::path& run_dir, const char* name) {
 std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds,
                                         const std::filesystem::path& folder) {
   const std::array<RunView, 1> views = {{{run.model.get(), &run.frames}}};
-  MovieOptions options;
+  VideoOptions options;
   options.width = 960;
   options.height = 600;
   options.camera = kRobotCamera;
@@ -32,7 +32,7 @@ std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds,
   if (FindWay(*run.model, run.frames, data.get()).length > kLongWay) options.inset = kCourseCamera;
   options.tracks = true;
   options.panel = false;
-  MoviePainter painter(views, options);
+  VideoPainter painter(views, options);
   const std::string who = holds ? "Robot and object" : "Robot";
   const std::array<Picture, 2> pictures = {
       {{folder / "fig11a.png", holds ? "11 (a)" : "", who + " at the beginning"},

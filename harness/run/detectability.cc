@@ -14,7 +14,7 @@
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/joint_law.h"
 #include "harness/checks/bounds.h"
-#include "harness/checks/contact_give.h"
+#include "harness/checks/contact_compliance.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck {
@@ -33,10 +33,11 @@ struct Sample {
   VectorXd tau, F_N;
   DesiredMotion desired;
   DesiredJoints joints;
-  double scale = 1.0;                          // |C_bar' xi + F_bar'|_M^-1
-  double object_scale = 1.0;                   // N
-  double motion_give = 0.0, force_give = 0.0;  // what contacts that give are allowed above the bounds
-  RowMatrixXd half_inverse;                    // L^-T
+  double scale = 1.0;         // |C_bar' xi + F_bar'|_M^-1
+  double object_scale = 1.0;  // N
+  double motion_compliance = 0.0,
+         force_compliance = 0.0;  // what contacts that give are allowed above the bounds
+  RowMatrixXd half_inverse;       // L^-T
   MatrixXd M;
 };
 
@@ -144,7 +145,7 @@ std::vector<Sample> TakeSamples(const Setup& setup, int states) {
   Runner runner(setup, /*check=*/true);
   const long every = std::max(1L, runner.loop().num_steps() / states);
   TreeFactor factor(setup.model());
-  PredictionGive give(setup);
+  PredictionCompliance give(setup);
   const ActuationMap actuation(setup.model());
   VectorXd force(setup.model().num_velocities()), work;
   const double weight = setup.object().body.mass * setup.model().gravity().norm();
@@ -174,8 +175,8 @@ std::vector<Sample> TakeSamples(const Setup& setup, int states) {
         factor.SolveTransposedColumns(sample.half_inverse);
         sample.scale = norm(balanced);
         sample.object_scale = std::max(weight, sample.f_c.norm());
-        sample.motion_give = give.motion() / sample.scale;
-        sample.force_give = sample.f_c.size() > 0 ? give.force() / sample.f_c.norm() : 0.0;
+        sample.motion_compliance = give.motion() / sample.scale;
+        sample.force_compliance = sample.f_c.size() > 0 ? give.force() / sample.f_c.norm() : 0.0;
       },
       [] { return false; });
   if (!result.failure.empty()) throw InputError(setup.scenario().source + ": " + result.failure);
@@ -193,26 +194,26 @@ struct Bounds {
   double robot, object, motion, force, law;
 };
 
-/// To first order, what an error that changes the answers so at one instant fails. @param share of a unit of
-/// error that was made. @param arm m. @param left robot's residual, |.|_M^-1 relative.
+/// To first order, what an error that changes the answers so at one instant fails. @param fraction of a unit
+/// of error that was made. @param arm m. @param left robot's residual, |.|_M^-1 relative.
 void LowerAll(const Sample& sample, const Answer& right, const Answer& wrong, const Bounds& bounds,
-              double share, double arm, Detectability* number, VectorXd* left) {
-  *left = sample.half_inverse * (wrong.robot - right.robot) / (share * sample.scale);
+              double fraction, double arm, Detectability* number, VectorXd* left) {
+  *left = sample.half_inverse * (wrong.robot - right.robot) / (fraction * sample.scale);
   Lower(bounds.robot, left->norm(), &number->robot);
   const Vector6d wrench = wrong.object - right.object;
   Lower(bounds.object,
-        std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) / (share * sample.object_scale),
+        std::max(wrench.head<3>().norm(), wrench.tail<3>().norm() / arm) / (fraction * sample.object_scale),
         &number->object);
   // |a|_M
   const VectorXd apart = wrong.xi_dot - right.xi_dot;
-  const double motion = std::sqrt(std::max(0.0, apart.dot(sample.M * apart))) / (share * sample.scale);
-  Lower(bounds.motion + sample.motion_give, motion, &number->prediction);
+  const double motion = std::sqrt(std::max(0.0, apart.dot(sample.M * apart))) / (fraction * sample.scale);
+  Lower(bounds.motion + sample.motion_compliance, motion, &number->prediction);
   if (right.f_c.size() > 0) {
-    const double force = (wrong.f_c - right.f_c).norm() / (share * sample.f_c.norm());
-    Lower(bounds.force + sample.force_give, force, &number->prediction);
+    const double force = (wrong.f_c - right.f_c).norm() / (fraction * sample.f_c.norm());
+    Lower(bounds.force + sample.force_compliance, force, &number->prediction);
   }
   if (right.law.size() == 0) return;
-  const double torque = (sample.half_inverse * (wrong.law - right.law)).norm() / (share * sample.scale);
+  const double torque = (sample.half_inverse * (wrong.law - right.law)).norm() / (fraction * sample.scale);
   Lower(bounds.law, torque / right.condition, &number->law);
 }
 
@@ -235,7 +236,7 @@ DetectabilityResult FindDetectability(const Setup& setup, int states,
   const auto bound = [&](StepCheck which) {
     return CalcBound(kStepChecks[static_cast<size_t>(which)], setup.scenario());
   };
-  const Bounds bounds{bound(StepCheck::kBalanceRobot), bound(StepCheck::kBalanceObject),
+  const Bounds bounds{bound(StepCheck::kInverseDynamicsRobot), bound(StepCheck::kInverseDynamicsObject),
                       bound(StepCheck::kReducedAcceleration), bound(StepCheck::kContactForce),
                       bound(StepCheck::kLawTorque)};
   const auto rows = static_cast<Eigen::Index>(samples.size()) * setup.model().num_velocities();

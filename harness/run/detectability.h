@@ -21,8 +21,8 @@ struct Detectability {
   std::string name;      ///< "link r_forearm: mass".
   std::string quantity;  ///< "mass".
   // Smallest error that fails each question by itself, relative to GetScale; infinity where none does.
-  double robot = kNever;       ///< balance_robot.
-  double object = kNever;      ///< balance_object.
+  double robot = kNever;       ///< inverse_dynamics_robot.
+  double object = kNever;      ///< inverse_dynamics_object.
   double prediction = kNever;  ///< reduced_acceleration or contact_force.
   double law = kNever;         ///< law_torque.
 

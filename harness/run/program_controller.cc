@@ -18,7 +18,7 @@ namespace dexcheck {
 namespace {
 
 // How much more time than for an answer a program has to start.
-constexpr double kGreetingShare = 10.0;
+constexpr double kGreetingFraction = 10.0;
 // Time in which a program that has closed its output may end, s, before it is asked no more.
 constexpr double kEndTime = 0.5;
 
@@ -60,7 +60,7 @@ void ProgramController::Start(const std::string& command) {
     throw RunFailure(name_ + ": " + std::strerror(errno));
   }
   socket_ = ends[0];
-  SetTimeLimit(kGreetingShare * setup_.time_limit);
+  SetTimeLimit(kGreetingFraction * setup_.time_limit);
 
   const int theirs = ends[1];
   try {

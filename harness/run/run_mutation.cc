@@ -13,28 +13,28 @@ namespace {
 // Where the object is where it should be, feedback is nothing whatever its gains are: laws are judged from an
 // error on, m and rad, that comes within some steps. It takes 4 mm/s^2 at 20 rad/s, far below what softens
 // contacts or makes wheels slip.
-constexpr double kNudge = 1e-5;
-constexpr double kNudgeTime = 5e-3;  // s
+constexpr double kOffset = 1e-5;
+constexpr double kOffsetTime = 5e-3;  // s
 
 /// A trajectory that begins later, and goes a little off.
 class LaterTrajectory final : public Trajectory {
  public:
-  LaterTrajectory(std::unique_ptr<Trajectory> whole, double from, double nudge)
-      : whole_(std::move(whole)), from_(from), nudge_(nudge) {}
+  LaterTrajectory(std::unique_ptr<Trajectory> whole, double from, double offset)
+      : whole_(std::move(whole)), from_(from), offset_(offset) {}
   [[nodiscard]] DesiredMotion Evaluate(double t) const override {
     DesiredMotion motion = whole_->Evaluate(t + from_);
-    motion.X_d.array() += nudge_ * CalcMinJerk(t, kNudgeTime).s;
+    motion.X_d.array() += offset_ * CalcMinJerk(t, kOffsetTime).s;
     return motion;
   }
 
  private:
   std::unique_ptr<Trajectory> whole_;
-  double from_, nudge_;
+  double from_, offset_;
 };
 
 // Positions and rates that differ by less are the same, m, rad and s.
 constexpr double kSameMotion = 1e-12;
-// Mistakes that are there from the beginning settle so long at the most, s.
+// Faults that are there from the beginning settle so long at the most, s.
 constexpr double kSettle = 0.3;
 
 /// The engine's simulation among the parts.
@@ -69,19 +69,18 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
       mjcf_(std::move(mjcf)),
       options_(options),
       compiled_(LoadMjcf(mjcf_)) {
-  if (scenario.task)
-    throw InputError(scenario.source + ": task: mistakes are made in runs along a trajectory");
+  if (scenario.task) throw InputError(scenario.source + ": task: faults are made in runs along a trajectory");
   if (scenario.plant.type == PlantType::kRigid)
-    throw InputError(scenario.source + ": plant.type: mistakes are made in a run of the engine's plant");
+    throw InputError(scenario.source + ": plant.type: faults are made in a run of the engine's plant");
   MakeSetups();
-  ListMistakes();
+  ListFaults();
   if (!scenario.joint_motion) MoveToStart(should_stop);
-  if (!should_stop()) RequireNoMistakeToPass(should_stop);
+  if (!should_stop()) RequireNoFaultToPass(should_stop);
 }
 
 void RunCampaign::MakeSetups() {
   if (scenario_.joint_motion) {
-    // Arms settle fast, and a motion of joints has no later beginning: mistakes are there from the first.
+    // Arms settle fast, and a motion of joints has no later beginning: faults are there from the first.
     Scenario scenario = scenario_;
     scenario.duration = options_.from + options_.duration;
     scenario.settle = std::min(scenario.settle, kSettle);
@@ -91,10 +90,10 @@ void RunCampaign::MakeSetups() {
   // Even a run that is looked at from its beginning starts settled, one step in.
   options_.from = std::max(options_.from, scenario_.plant.time_step);
   setup_ = MakeSetup(MakeScenario(options_.from, options_.duration, 0.0), nullptr);
-  nudged_ = MakeSetup(MakeScenario(options_.from, options_.duration, kNudge), nullptr);
+  offsetd_ = MakeSetup(MakeScenario(options_.from, options_.duration, kOffset), nullptr);
 }
 
-void RunCampaign::ListMistakes() {
+void RunCampaign::ListFaults() {
   const RobotModel& model = setup_->model();
   if (options_.parameters > 0) {
     const std::vector<Parameter> numbers = ListParameters(model.spec());
@@ -109,17 +108,17 @@ void RunCampaign::ListMistakes() {
   }
   // Those of another law are not known.
   const bool knows_law = scenario_.control.law == ControlLaw::kComputedTorque && !scenario_.joint_motion;
-  if (options_.laws && knows_law) laws_ = ListLawMistakes(!setup_->adapter().wheels().empty());
-  for (const LawMistake& law : laws_) {
+  if (options_.laws && knows_law) laws_ = ListLawFaults(!setup_->adapter().wheels().empty());
+  for (const LawFault& law : laws_) {
     mutants_.push_back({.kind = law.part == SIZE_MAX ? "law, otherwise" : "law, one part",
                         .name = law.name,
                         .expected = Cause::kControlLaw,
                         .part = law.part == SIZE_MAX ? "" : ListLawParts()[law.part].name});
   }
   if (options_.equations && knows_law) {
-    equations_ = ListEquationMistakes(model, scenario_.control.orientation == OrientationFeedback::kAngles);
+    equations_ = ListEquationFaults(model, scenario_.control.orientation == OrientationFeedback::kAngles);
   }
-  for (const EquationMistake& equation : equations_) {
+  for (const EquationFault& equation : equations_) {
     mutants_.push_back(
         {.kind = "equation", .name = equation.name, .expected = Cause::kModel, .part = equation.check});
   }
@@ -134,17 +133,17 @@ std::unique_ptr<Setup> RunCampaign::MakeSetup(const Scenario& scenario, const Ro
   return std::make_unique<Setup>(scenario, robot_, mjcf_, std::move(engine));
 }
 
-Scenario RunCampaign::MakeScenario(double from, double duration, double nudge) const {
+Scenario RunCampaign::MakeScenario(double from, double duration, double offset) const {
   Scenario scenario = scenario_;
   scenario.duration = duration;
   if (!(from > 0.0)) return scenario;
   scenario.start = Start::kRest;
   scenario.settle = 0.0;
   scenario.expect.from = std::max(0.0, scenario_.expect.from - from);
-  scenario.trajectory = [whole = scenario_.trajectory, from, nudge](const Vector6d& X_start) {
-    return std::make_unique<LaterTrajectory>(whole(X_start), from, nudge);
+  scenario.trajectory = [whole = scenario_.trajectory, from, offset](const Vector6d& X_start) {
+    return std::make_unique<LaterTrajectory>(whole(X_start), from, offset);
   };
-  if (nudge != 0.0) scenario.expect = {};
+  if (offset != 0.0) scenario.expect = {};
   return scenario;
 }
 
@@ -163,8 +162,8 @@ void RunCampaign::MoveToStart(const std::function<bool()>& should_stop) {
   start_ = plant->simulation().GetState();
 }
 
-void RunCampaign::RequireNoMistakeToPass(const std::function<bool()>& should_stop) {
-  for (const Setup* setup : {setup_.get(), nudged_.get()}) {
+void RunCampaign::RequireNoFaultToPass(const std::function<bool()>& should_stop) {
+  for (const Setup* setup : {setup_.get(), offsetd_.get()}) {
     if (setup == nullptr) continue;
     RunMutant none;
     // With the injector in place, and nothing injected.
@@ -173,11 +172,11 @@ void RunCampaign::RequireNoMistakeToPass(const std::function<bool()>& should_sto
     LoopParts parts = MakeLoopParts(*setup);
     GoToStart(parts);
     InjectFault(*setup, nothing, &parts);
-    VectorXd* const end = setup == setup_.get() ? &end_ : &nudged_end_;
+    VectorXd* const end = setup == setup_.get() ? &end_ : &offsetd_end_;
     if (!RunLoop(*setup, std::move(parts), &none, end, should_stop)) return;
     if (!none.killed) continue;
     throw InputError(
-        scenario_.source + ": must pass before mistakes are made in it, got " +
+        scenario_.source + ": must pass before faults are made in it, got " +
         (none.failure.empty() ? NameOf(none.cause) + (" (" + none.evidence + ")") : none.failure));
   }
 }
@@ -222,14 +221,14 @@ bool RunCampaign::RunPlant(const PlantFault& fault, RunMutant* mutant, VectorXd*
 bool RunCampaign::Run(size_t index, const std::function<bool()>& should_stop) {
   RunMutant& mutant = mutants_[index];
   VectorXd end;
-  if (!RunMistake(index, &end, should_stop)) return false;
-  const VectorXd& right = IsLaw(index) ? nudged_end_ : end_;
+  if (!RunFault(index, &end, should_stop)) return false;
+  const VectorXd& right = IsLaw(index) ? offsetd_end_ : end_;
   mutant.no_effect = !mutant.killed && end.size() == right.size() && right.size() > 0 &&
                      (end - right).lpNorm<Eigen::Infinity>() < kSameMotion;
   return true;
 }
 
-bool RunCampaign::RunMistake(size_t index, VectorXd* end, const std::function<bool()>& should_stop) {
+bool RunCampaign::RunFault(size_t index, VectorXd* end, const std::function<bool()>& should_stop) {
   RunMutant& mutant = mutants_[index];
   try {
     if (index < parameters_.size()) {
@@ -245,7 +244,7 @@ bool RunCampaign::RunMistake(size_t index, VectorXd* end, const std::function<bo
     const bool is_equation = !is_law && index < equations_.size();
     if (!is_law && !is_equation)
       return RunPlant(plants_[index - equations_.size()], &mutant, end, should_stop);
-    const Setup& setup = is_law ? *nudged_ : *setup_;
+    const Setup& setup = is_law ? *offsetd_ : *setup_;
     LoopParts parts = MakeLoopParts(setup);
     GoToStart(parts);
     if (is_law) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// Mistakes made on purpose in a run: wrong numbers and equations of the model, wrong laws, wrong plants.
+// Faults made on purpose in a run: wrong numbers and equations of the model, wrong laws, wrong plants.
 // Which of them do the questions of a run find, and which cause do they name?
 
 #include <filesystem>
@@ -17,7 +17,7 @@
 
 namespace dexcheck {
 
-/// One mistake, and what a run with it came to.
+/// One fault, and what a run with it came to.
 struct RunMutant {
   std::string kind;  ///< "law", "motor", "sensor", ...: what a table sums up by.
   std::string name;
@@ -26,7 +26,7 @@ struct RunMutant {
 
   bool refused = false;  ///< There is no such robot, or the scenario cannot be run with it.
   bool killed = false;   ///< The verdict is not "pass".
-  /// Not killed, and what moves is at the end where it is without the mistake, to 1e-12: a push that bearings
+  /// Not killed, and what moves is at the end where it is without the fault, to 1e-12: a push that bearings
   /// hold, a number that no motion shows.
   bool no_effect = false;
   Cause cause = Cause::kNone;
@@ -40,40 +40,40 @@ struct RunMutant {
   [[nodiscard]] bool has_right_cause() const { return killed && cause == expected; }
 };
 
-/// All runs of one scenario. The right robot settles and moves up to options.from once; every mistake starts
+/// All runs of one scenario. The right robot settles and moves up to options.from once; every fault starts
 /// from the state that it had there, those of the contacts' geometry from the beginning.
 class RunCampaign {
  public:
-  /// @param scenario that is no task. @throws InputError when it is one; when the scenario without a mistake
+  /// @param scenario that is no task. @throws InputError when it is one; when the scenario without a fault
   /// does not pass, with its cause.
   RunCampaign(const Scenario& scenario, std::filesystem::path robot, std::filesystem::path mjcf,
               const RunMutationOptions& options, const std::function<bool()>& should_stop);
 
   [[nodiscard]] const std::vector<RunMutant>& mutants() const { return mutants_; }
-  /// Makes the mistake and looks what comes of it. @param should_stop asked before each step; what was
+  /// Makes the fault and looks what comes of it. @param should_stop asked before each step; what was
   /// stopped is not done.
   /// @returns whether it is done.
   bool Run(size_t index, const std::function<bool()>& should_stop);
 
  private:
   void MakeSetups();
-  void ListMistakes();
+  void ListFaults();
   void MoveToStart(const std::function<bool()>& should_stop);
   void GoToStart(const LoopParts& parts) const;
-  /// @param nudge by which X_d jumps at the beginning, m and rad.
-  [[nodiscard]] Scenario MakeScenario(double from, double duration, double nudge) const;
+  /// @param offset by which X_d jumps at the beginning, m and rad.
+  [[nodiscard]] Scenario MakeScenario(double from, double duration, double offset) const;
   [[nodiscard]] std::unique_ptr<Setup> MakeSetup(const Scenario& scenario, const RobotModel* model) const;
   /// @param end gets the engine's positions and rates at the end.
   bool RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant, VectorXd* end,
                const std::function<bool()>& should_stop);
   bool RunPlant(const PlantFault& fault, RunMutant* mutant, VectorXd* end,
                 const std::function<bool()>& should_stop);
-  /// Of the mistake with this index. @returns as Run.
-  bool RunMistake(size_t index, VectorXd* end, const std::function<bool()>& should_stop);
+  /// Of the fault with this index. @returns as Run.
+  bool RunFault(size_t index, VectorXd* end, const std::function<bool()>& should_stop);
   [[nodiscard]] bool IsLaw(size_t index) const {
     return index >= parameters_.size() && index < parameters_.size() + laws_.size();
   }
-  void RequireNoMistakeToPass(const std::function<bool()>& should_stop);
+  void RequireNoFaultToPass(const std::function<bool()>& should_stop);
 
   Scenario scenario_;
   std::filesystem::path robot_, mjcf_;
@@ -81,11 +81,11 @@ class RunCampaign {
   MjModelPtr compiled_;
   std::optional<EngineState> start_;   // of a trajectory; joints begin at their beginning
   std::unique_ptr<Setup> setup_;       // of the right robot, from the start
-  std::unique_ptr<Setup> nudged_;      // the same with an error that feedback has to answer
-  VectorXd end_, nudged_end_;          // where they come to without a mistake
+  std::unique_ptr<Setup> offsetd_;     // the same with an error that feedback has to answer
+  VectorXd end_, offsetd_end_;         // where they come to without a fault
   std::vector<Parameter> parameters_;  // by mutant, those of numbers first
-  std::vector<LawMistake> laws_;
-  std::vector<EquationMistake> equations_;
+  std::vector<LawFault> laws_;
+  std::vector<EquationFault> equations_;
   std::vector<PlantFault> plants_;
   std::vector<RunMutant> mutants_;
 };

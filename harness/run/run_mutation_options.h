@@ -2,9 +2,9 @@
 
 namespace dexcheck {
 
-/// Which mistakes are made in a run, and how long each is looked at.
+/// Which faults are made in a run, and how long each is looked at.
 struct RunMutationOptions {
-  /// The mistake begins at this time of the scenario, s. In a motion of joints it is there from the first,
+  /// The fault begins at this time of the scenario, s. In a motion of joints it is there from the first,
   /// and this is added to `duration`.
   double from = 0.5;
   double duration = 0.1;  ///< How long it is looked at, s.

@@ -76,7 +76,7 @@ void ReadMayTouch(const TomlValue& value, PlantOptions* plant) {
   for (const TomlValue& entry : value.AsList()) {
     const std::vector<TomlValue> bodies = entry.AsList();
     if (bodies.size() != 2) entry.Reject("must name two bodies");
-    plant->may_touch.emplace_back(bodies[0].AsName(), bodies[1].AsName());
+    plant->allowed_collision_pairs.emplace_back(bodies[0].AsName(), bodies[1].AsName());
   }
 }
 
@@ -100,7 +100,7 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
   if (const auto mu = table.Find("floor_friction")) plant.floor_friction = mu->AsPositive();
   if (const auto mu = table.Find("finger_friction")) plant.finger_friction = mu->AsPositive();
   if (const auto flag = table.Find("collide")) plant.collide = flag->AsFlag();
-  if (const auto pairs = table.Find("may_touch")) ReadMayTouch(*pairs, &plant);
+  if (const auto pairs = table.Find("allowed_collision_pairs")) ReadMayTouch(*pairs, &plant);
   table.RejectUnused();
 }
 

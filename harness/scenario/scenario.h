@@ -52,7 +52,7 @@ struct PlantOptions {
   std::optional<double> finger_friction;  ///< mu of fingertips on the object.
   bool collide = false;                   ///< Bodies that are not meant to touch push each other.
   /// Two bodies each that may touch, or pass through each other, without being told.
-  std::vector<std::pair<std::string, std::string>> may_touch;
+  std::vector<std::pair<std::string, std::string>> allowed_collision_pairs;
 
   /// By how much velocities are older than positions, s.
   [[nodiscard]] double velocity_age() const {

@@ -118,8 +118,8 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
 }
 
 void Setup::WatchSolids(const std::string& mjcf) {
-  watched_pairs_ =
-      ListWatchedPairs(*engine_, *adapter_, solids_, scenario_.plant.may_touch, scenario_.source);
+  watched_pairs_ = ListWatchedPairs(*engine_, *adapter_, solids_, scenario_.plant.allowed_collision_pairs,
+                                    scenario_.source);
   if (!scenario_.plant.collide) return;
   solids_ = ListSolids(*engine_);  // the same, with the numbers that their geoms have now
   std::vector<std::pair<int, int>> geoms;

@@ -49,10 +49,10 @@ ErrorPrediction::ErrorPrediction(const Setup& setup, bool acts_at_rest)
 
 const VectorXd& ErrorPrediction::CalcAcceleration(const StepRecord& ideal) {
   const MeasuredState& truth = ideal.reading.state;
-  sensing_.Tell(ideal.reading, &told_);
-  if (!has_begun_ && joint_motion_ != nullptr) controller_->Begin(ideal.time, told_);
+  sensing_.Tell(ideal.reading, &measured_);
+  if (!has_begun_ && joint_motion_ != nullptr) controller_->Begin(ideal.time, measured_);
   has_begun_ = true;
-  controller_->Step(told_, ideal.time, &command_);
+  controller_->Step(measured_, ideal.time, &command_);
   drive_.Drive(command_.tau, truth.xi, &tau_);
   actuation_.CalcForce(tau_, force_);
   const std::span<const Wrench> wrenches = disturbances_.Evaluate(ideal.time, truth);

@@ -51,7 +51,7 @@ class ErrorPrediction {
   ActuationMap actuation_;
   const JointMotion* joint_motion_;  // null of an object
   bool is_decoupled_ = true;         // the error's dynamics have gains of their own
-  Reading told_;
+  Reading measured_;
   Command command_;
   VectorXd tau_, force_;      // n
   Eigen::ArrayXd K_p_, K_v_;  // or K, D

@@ -96,7 +96,7 @@ class MotionSearch {
     if (result_.keys.empty()) {
       throw InputError(scenario.source + ": must have a trajectory, or a motion of joints, that oscillates");
     }
-    result_.floor = CalcBound(kStepChecks[static_cast<size_t>(StepCheck::kBalanceRobot)], scenario);
+    result_.floor = CalcBound(kStepChecks[static_cast<size_t>(StepCheck::kInverseDynamicsRobot)], scenario);
   }
 
   ExcitingMotion Run() {
@@ -176,7 +176,7 @@ class MotionSearch {
                        (failed != taken.end() ? failed->name + " above its bound" : result_.given.failure));
     }
     for (const Taken& check : taken)
-      limits_.push_back({check.name, std::max(options_.share * check.bound, check.worst), check.bound});
+      limits_.push_back({check.name, std::max(options_.fraction * check.bound, check.worst), check.bound});
     result_.rank = CountAbove(result_.given.singular_values, result_.floor);
     if (result_.rank == 0)
       throw InputError(scenario_.source + ": no number of the model shows in its forces");
@@ -199,7 +199,7 @@ class MotionSearch {
       const double over = worst <= 0.0 ? -kFar : limit <= 0.0 ? kFar : std::log(worst / limit);
       (*constraints)[i] = std::isnan(over) ? kFar : std::clamp(over, -kFar, kFar);
       // What the motion given takes already is no news.
-      if (limit > options_.share * limits_[i].bound || limit <= 0.0 || worst / limit <= nearest) continue;
+      if (limit > options_.fraction * limits_[i].bound || limit <= 0.0 || worst / limit <= nearest) continue;
       nearest = worst / limit;
       motion->nearest = limits_[i].name + ", " + FormatNumber(worst / limits_[i].bound, 2) + " of its bound";
     }

@@ -39,13 +39,13 @@ struct JudgedMotion {
 struct ExcitingMotionOptions {
   int runs = 200;
   /// Of its bound that each check may take; or as much as with the motion given, where that is more.
-  double share = 0.5;
+  double fraction = 0.5;
 };
 
 /// The best motion that was found.
 struct ExcitingMotion {
   std::vector<MotionKey> keys;
-  double floor = 0.0;  ///< Of balance_robot: what a combination must leave to show, relative.
+  double floor = 0.0;  ///< Of inverse_dynamics_robot: what a combination must leave to show, relative.
   int rank = 0;        ///< Combinations of numbers that show with the motion given.
   JudgedMotion given, found;
   int runs = 0;                        ///< That were made.

@@ -101,7 +101,7 @@ void MarginSearcher::Tell(const std::vector<Judgement>& judgements) {
 
 std::vector<Margin> FindMargins(const Study& study, const std::vector<JudgedPoint>& points) {
   if (points.empty()) return {};
-  const UnitPoint start = SharesOf(study.keys(), points[0].values);
+  const UnitPoint start = FractionsOf(study.keys(), points[0].values);
   MarginSearcher searcher(study.search, start);
   for (size_t next = 0;;) {
     const size_t count = searcher.Ask().size();

@@ -11,17 +11,17 @@ namespace dexcheck {
 
 /// One direction from the start.
 struct Margin {
-  UnitPoint direction;  ///< Of length 1, in shares of the ranges.
+  UnitPoint direction;  ///< Of length 1, in fractions of the ranges.
   UnitPoint good,
       bad;  ///< The two points, both tried, between which it turns; `bad` is empty where it does not.
-  double distance = 0.0;  ///< Of `good` from the start, in shares of the ranges.
+  double distance = 0.0;  ///< Of `good` from the start, in fractions of the ranges.
   double at_most = 0.0;   ///< Of `bad`, or of the end of the ranges.
 };
 
 /// Bisects along both directions of each key and along `search.directions` random ones, all at the same time:
-/// a batch has a point of each. It ends when each is known to within `search.tolerance` shares of the ranges,
-/// or at once where the start itself is not feasible. Bisection finds one turn; when there are several, not
-/// always the nearest.
+/// a batch has a point of each. It ends when each is known to within `search.tolerance` fractions of the
+/// ranges, or at once where the start itself is not feasible. Bisection finds one turn; when there are
+/// several, not always the nearest.
 class MarginSearcher : public Searcher {
  public:
   MarginSearcher(const Search& search, const UnitPoint& start);

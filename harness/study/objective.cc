@@ -46,7 +46,7 @@ double Combine(const Objective& objective, std::vector<double> values) {
     case Aggregate::kWorst:
       return values.back();
     case Aggregate::kQuantile: {
-      // The least value that at least this share of the trials does not exceed.
+      // The least value that at least this fraction of the trials does not exceed.
       const double rank = std::ceil(objective.quantile * static_cast<double>(values.size()));
       return values[static_cast<size_t>(std::max(rank, 1.0)) - 1];
     }
@@ -164,7 +164,8 @@ Judgement JudgePoint(const std::vector<Objective>& objectives, const std::vector
         ++good;
     }
     constexpr double kRounding = 1e-9;  // of share * count, which is whole where a user means it to be
-    if (static_cast<double>(good) < constraint.share * count - kRounding) judgement.violation += sum / count;
+    if (static_cast<double>(good) < constraint.fraction * count - kRounding)
+      judgement.violation += sum / count;
   }
   for (const Objective& objective : objectives) {
     std::vector<double> values;

@@ -21,7 +21,7 @@ struct Objective {
   std::string expression;  ///< Of names of metrics, as EvaluateExpression takes it.
   bool maximize = false;
   Aggregate aggregate = Aggregate::kMean;
-  double quantile = 0.5;  ///< Of kQuantile: this share of the trials is at least as good.
+  double quantile = 0.5;  ///< Of kQuantile: this fraction of the trials is at least as good.
 };
 
 /// "position_error_rms, worst of its trials".
@@ -38,7 +38,7 @@ struct Constraint {
   Kind kind = Kind::kHeld;
   std::string less, more;  ///< Of kLess: expressions, less <= more.
   Outcome outcome = Outcome::kTracked;
-  double share = 1.0;  ///< At this share of the trials at least.
+  double fraction = 1.0;  ///< At this fraction of the trials at least.
 };
 
 /// "peak_effort < 0.8", "outcome == tracked", "verdict == pass" (which is the same), "held" (to its end, in
@@ -69,7 +69,7 @@ struct Judgement {
 
 /// @param results of all trials of the point, in the order of their numbers. A point at which a trial was not
 /// held is
-///   not feasible unless a constraint of kind kHeld says which share may fail.
+///   not feasible unless a constraint of kind kHeld says which fraction may fail.
 Judgement JudgePoint(const std::vector<Objective>& objectives, const std::vector<Constraint>& constraints,
                      std::span<const TrialResult> results);
 

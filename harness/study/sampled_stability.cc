@@ -48,12 +48,12 @@ class ErrorChain {
     state_[kFiltered] += loop_.low_pass * ((e - state_[kSeen]) / h - state_[kFiltered]);
     state_[kSeen] = e;
     double told = e;
-    double told_rate = loop_.low_pass == 1.0 ? e_dot : state_[kFiltered];
+    double measured_rate = loop_.low_pass == 1.0 ? e_dot : state_[kFiltered];
     for (size_t i = 0; i < static_cast<size_t>(loop_.latency); ++i) {
       std::swap(told, state_[kChains + 2 * i]);
-      std::swap(told_rate, state_[kChains + 2 * i + 1]);
+      std::swap(measured_rate, state_[kChains + 2 * i + 1]);
     }
-    if (k % loop_.hold == 0) state_[kHeld] = -gains_.K_v * told_rate - gains_.K_p * told;
+    if (k % loop_.hold == 0) state_[kHeld] = -gains_.K_v * measured_rate - gains_.K_p * told;
     double a = state_[kHeld];
     if (!loop_.is_direct()) a = Lag(Delay(a));
     e_dot += h * a;
@@ -98,14 +98,14 @@ class ErrorChain {
 double CalcSpectralRadiusOf(std::vector<double> A, size_t n) {
   constexpr int kSquarings = 40;
   double logarithm = 0.0;  // of the power's size, divided by the power
-  double share = 1.0;
+  double fraction = 1.0;
   std::vector<double> square(n * n);
   for (int i = 0; i <= kSquarings; ++i) {
     double size = 0.0;
     for (const double entry : A) size = std::max(size, std::abs(entry));
     if (!(size > 0.0)) return 0.0;
-    logarithm += share * std::log(size);
-    share *= 0.5;
+    logarithm += fraction * std::log(size);
+    fraction *= 0.5;
     for (double& entry : A) entry /= size;
     std::fill(square.begin(), square.end(), 0.0);
     for (size_t column = 0; column < n; ++column) {

@@ -32,7 +32,7 @@ struct SampledLoop {
   double delay = 0.0;       ///< Of the torques, s.
   long latency = 0;         ///< Age of the error that is told, steps.
   double low_pass =
-      1.0;           ///< Share of a rate's change that its filter lets through at each step; 1 for no filter.
+      1.0;  ///< Fraction of a rate's change that its filter lets through at each step; 1 for no filter.
   double lag = 0.0;  ///< Time constant of the motors, s.
   [[nodiscard]] double period() const { return static_cast<double>(hold) * time_step; }
   /// Nothing is late and nothing filtered: what the closed forms below are for.

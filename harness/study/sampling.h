@@ -23,7 +23,7 @@ constexpr int kMaxSobolDimensions = 64;
 /// The first `count` points of the Sobol sequence with the direction numbers of Joe and Kuo (2008), from
 /// Boost.Random; it begins with the origin.
 /// @param scramble a seed: each axis is permuted as Owen (1995) does, digit by digit, so that every point is
-///   uniformly distributed and each dyadic box keeps its share of the points.
+///   uniformly distributed and each dyadic box keeps its fraction of the points.
 std::vector<UnitPoint> MakeSobol(int dimensions, long count, std::optional<std::uint64_t> scramble = {});
 
 /// `count` independent points, even in the cube.

@@ -1,6 +1,6 @@
 #pragma once
 
-// How the parts of one search, on nodes that share a folder and nothing else, learn of each other's rows.
+// How the parts of one search, on nodes that fraction a folder and nothing else, learn of each other's rows.
 
 #include <filesystem>
 #include <vector>

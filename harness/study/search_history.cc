@@ -86,7 +86,7 @@ UnitPoint FindSearchStart(const StudyInputs& inputs) {
   const size_t keys = study.num_keys();
   UnitPoint start(keys, 0.5);
   if (study.search.start == SearchStart::kValues) {
-    start = SharesOf(study.keys(), study.search.start_values);
+    start = FractionsOf(study.keys(), study.search.start_values);
   }
   if (study.search.start != SearchStart::kTheory) return start;
   constexpr long kPoints = 256;

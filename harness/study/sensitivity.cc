@@ -18,8 +18,8 @@ constexpr std::uint64_t kBootstrapSeed = 1;
 /// From the percentiles of a sample.
 Estimate MakeEstimate(double value, std::vector<double> sample) {
   std::sort(sample.begin(), sample.end());
-  const auto at = [&](double share) {
-    const double place = share * static_cast<double>(sample.size() - 1);
+  const auto at = [&](double fraction) {
+    const double place = fraction * static_cast<double>(sample.size() - 1);
     return sample[static_cast<size_t>(std::lround(place))];
   };
   return {value, at(kOutside), at(1.0 - kOutside)};

@@ -21,7 +21,7 @@ struct Estimate {
 /// AB_i, which is A with B's coordinate i. (A, B) are points of a scrambled Sobol sequence in 2 k dimensions.
 std::vector<UnitPoint> MakeSaltelli(int dimensions, long count, std::uint64_t seed);
 
-/// Shares of the variance of f over the cube.
+/// Fractions of the variance of f over the cube.
 struct SobolIndex {
   Estimate first;  ///< V(E(f | x_i)) / V(f): of key i alone.
   Estimate total;  ///< E(V(f | all but x_i)) / V(f): of key i and all its interactions.

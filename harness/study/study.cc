@@ -43,26 +43,27 @@ std::span<const Variation> NestedOf(const Study& study) {
 
 }  // namespace
 
-double ValueAt(const Variation& variation, double share) {
+double ValueAt(const Variation& variation, double fraction) {
   if (!variation.values.empty()) {
     const auto count = static_cast<double>(variation.values.size());
-    return variation.values[static_cast<size_t>(std::clamp(std::floor(share * count), 0.0, count - 1.0))];
+    return variation.values[static_cast<size_t>(std::clamp(std::floor(fraction * count), 0.0, count - 1.0))];
   }
-  const double value = variation.logarithmic ? variation.from * std::pow(variation.to / variation.from, share)
-                                             : variation.from + share * (variation.to - variation.from);
+  const double value = variation.logarithmic
+                           ? variation.from * std::pow(variation.to / variation.from, fraction)
+                           : variation.from + fraction * (variation.to - variation.from);
   return std::clamp(value, variation.from, variation.to);
 }
 
-double ShareOf(const Variation& variation, double value) {
+double FractionOf(const Variation& variation, double value) {
   if (!variation.values.empty()) {
     const auto found = std::find(variation.values.begin(), variation.values.end(), value);
     return (static_cast<double>(found - variation.values.begin()) + 0.5) /
            static_cast<double>(variation.values.size());
   }
-  const double share = variation.logarithmic
-                           ? std::log(value / variation.from) / std::log(variation.to / variation.from)
-                           : (value - variation.from) / (variation.to - variation.from);
-  return std::clamp(share, 0.0, 1.0);
+  const double fraction = variation.logarithmic
+                              ? std::log(value / variation.from) / std::log(variation.to / variation.from)
+                              : (value - variation.from) / (variation.to - variation.from);
+  return std::clamp(fraction, 0.0, 1.0);
 }
 
 Variation FixRange(std::span<const Variation> variations, size_t index, const std::vector<double>& values) {
@@ -75,21 +76,22 @@ Variation FixRange(std::span<const Variation> variations, size_t index, const st
   return fixed;
 }
 
-std::vector<double> ValuesAt(std::span<const Variation> variations, const std::vector<double>& shares) {
+std::vector<double> ValuesAt(std::span<const Variation> variations, const std::vector<double>& fractions) {
   std::vector<double> values;
-  values.reserve(shares.size());
-  for (size_t i = 0; i < shares.size(); ++i) {
-    values.push_back(variations[i].depends_on_others() ? ValueAt(FixRange(variations, i, values), shares[i])
-                                                       : ValueAt(variations[i], shares[i]));
+  values.reserve(fractions.size());
+  for (size_t i = 0; i < fractions.size(); ++i) {
+    values.push_back(variations[i].depends_on_others()
+                         ? ValueAt(FixRange(variations, i, values), fractions[i])
+                         : ValueAt(variations[i], fractions[i]));
   }
   return values;
 }
 
-std::vector<double> SharesOf(std::span<const Variation> variations, const std::vector<double>& values) {
-  std::vector<double> shares;
+std::vector<double> FractionsOf(std::span<const Variation> variations, const std::vector<double>& values) {
+  std::vector<double> fractions;
   for (size_t i = 0; i < values.size(); ++i)
-    shares.push_back(ShareOf(FixRange(variations, i, values), values[i]));
-  return shares;
+    fractions.push_back(FractionOf(FixRange(variations, i, values), values[i]));
+  return fractions;
 }
 
 std::vector<std::vector<double>> ListDraws(const Study& study) {

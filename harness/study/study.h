@@ -115,14 +115,14 @@ std::vector<Trial> ListTrialsOfPoint(const Study& study, long number, const std:
 std::vector<std::vector<double>> ListDraws(const Study& study);
 
 /// A value of a range, or of a list of values: 0 is its beginning, 1 its end. @param share in [0, 1].
-double ValueAt(const Variation& variation, double share);
+double ValueAt(const Variation& variation, double fraction);
 /// The share at which ValueAt gives this value; of a list the middle of its part.
-double ShareOf(const Variation& variation, double value);
+double FractionOf(const Variation& variation, double value);
 
-/// Values of a point at these shares, each range as the values before it make it.
-std::vector<double> ValuesAt(std::span<const Variation> variations, const std::vector<double>& shares);
-/// The shares of a point's values, likewise.
-std::vector<double> SharesOf(std::span<const Variation> variations, const std::vector<double>& values);
+/// Values of a point at these fractions, each range as the values before it make it.
+std::vector<double> ValuesAt(std::span<const Variation> variations, const std::vector<double>& fractions);
+/// The fractions of a point's values, likewise.
+std::vector<double> FractionsOf(std::span<const Variation> variations, const std::vector<double>& values);
 /// The range of one of them beside these values of the others.
 Variation FixRange(std::span<const Variation> variations, size_t index, const std::vector<double>& values);
 

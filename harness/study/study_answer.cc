@@ -22,8 +22,8 @@ std::string DescribeEdges(const Study& study, const std::vector<double>& values)
     const Variation& variation = study.variations[i];
     if (!variation.values.empty() || variation.depends_on_others() || variation.from == variation.to)
       continue;
-    const double share = ShareOf(variation, values[i]);
-    if (share > kAtEnd && share < 1.0 - kAtEnd) continue;
+    const double fraction = FractionOf(variation, values[i]);
+    if (fraction > kAtEnd && fraction < 1.0 - kAtEnd) continue;
     text += (text.empty() ? " At an end of its range is " : ", ") + variation.key;
   }
   return text.empty() ? "" : text + ": a wider range may give a better one.";

@@ -53,7 +53,7 @@ std::string FindSearchDifference(const Study& before, const Study& now) {
            x.quantile == y.quantile;
   };
   const auto same_constraint = [](const Constraint& x, const Constraint& y) {
-    return x.text == y.text && x.share == y.share;
+    return x.text == y.text && x.fraction == y.fraction;
   };
   if (!std::equal(before.objectives.begin(), before.objectives.end(), now.objectives.begin(),
                   now.objectives.end(), same_objective)) {

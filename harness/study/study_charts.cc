@@ -229,11 +229,11 @@ std::string ColorOf(double value, double least, double most) {
   const bool logarithmic = IsWide(least, most);
   const double from = Scale(least, logarithmic);
   const double to = Scale(most, logarithmic);
-  const double share =
+  const double fraction =
       to > from ? std::clamp((Scale(value, logarithmic) - from) / (to - from), 0.0, 1.0) : 0.0;
   // From pale yellow over green to dark blue.
   const auto mix = [&](double a, double b, double c) {
-    const double v = share < 0.5 ? a + 2.0 * share * (b - a) : b + (2.0 * share - 1.0) * (c - b);
+    const double v = fraction < 0.5 ? a + 2.0 * fraction * (b - a) : b + (2.0 * fraction - 1.0) * (c - b);
     return static_cast<int>(std::lround(v));
   };
   return fmt::format("#{:02x}{:02x}{:02x}", mix(255, 65, 8), mix(255, 182, 29), mix(204, 196, 88));

@@ -198,7 +198,7 @@ Html MakeExplorer(const StudyResults& results) {
       "were "
       "held. The error dynamics have the keys that are marked with (57).</p></section>\n</div>\n"
       "<section class=\"card\" id=\"explore-chosen\" hidden><h3 id=\"explore-which\"></h3><p class=\"soft\" "
-      "id=\"explore-numbers\"></p><p>Its run, with its film:</p><pre id=\"explore-command\"></pre><p>What "
+      "id=\"explore-numbers\"></p><p>Its run, with its video:</p><pre id=\"explore-command\"></pre><p>What "
       "its errors are "
       "made of:</p><pre id=\"explore-budget\"></pre></section>\n"
       "<div class=\"card scroll\"><table><thead><tr id=\"explore-head\"></tr></thead><tbody "

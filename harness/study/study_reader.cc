@@ -81,9 +81,9 @@ void WidenRange(const TomlValue& end, std::span<const Variation> before, Variati
   double least = std::numeric_limits<double>::infinity();
   double most = -least;
   for (size_t corner = 0; corner < size_t{1} << before.size(); ++corner) {
-    std::vector<double> shares;
-    for (size_t i = 0; i < before.size(); ++i) shares.push_back((corner >> i & 1U) != 0 ? 1.0 : 0.0);
-    const std::vector<double> values = ValuesAt({all.data(), before.size()}, shares);
+    std::vector<double> fractions;
+    for (size_t i = 0; i < before.size(); ++i) fractions.push_back((corner >> i & 1U) != 0 ? 1.0 : 0.0);
+    const std::vector<double> values = ValuesAt({all.data(), before.size()}, fractions);
     const Variation fixed = FixRange(all, before.size(), values);
     const bool good = std::isfinite(fixed.from) && std::isfinite(fixed.to) && fixed.from < fixed.to &&
                       (!fixed.logarithmic || fixed.from > 0.0);
@@ -266,9 +266,9 @@ Constraint ReadConstraint(const TomlValue& value) {
   if (value.IsText()) return parse(value);
   TomlTable table = value.AsTable();
   Constraint constraint = parse(table.Get("require"));
-  if (const auto share = table.Find("share")) {
-    constraint.share = share->AsPositive();
-    if (constraint.share > 1.0) share->Fail("must be at most 1");
+  if (const auto fraction = table.Find("fraction")) {
+    constraint.fraction = fraction->AsPositive();
+    if (constraint.fraction > 1.0) fraction->Fail("must be at most 1");
   }
   table.RejectUnused();
   return constraint;

@@ -29,9 +29,9 @@ bool MakesRowsAgain(const StudyInputs& inputs, const std::vector<TrialRow>& rows
 /// one database: each waits for the others' part of a batch.
 void RunSearch(const StudyInputs& inputs, const RunOptions& options, StudyStore* store);
 
-/// The same by one of several processes that have a database each and a folder together. Each makes its share
-/// of a batch and takes the others' rows into its own database. Shares that stay away for as long as its own
-/// took, because their process has ended or not begun, it makes itself: the rows are the same.
+/// The same by one of several processes that have a database each and a folder together. Each makes its
+/// fraction of a batch and takes the others' rows into its own database. Fractions that stay away for as long
+/// as its own took, because their process has ended or not begun, it makes itself: the rows are the same.
 void RunSearchPart(const StudyInputs& inputs, const RunOptions& options, const SearchPart& part,
                    StudyStore* store);
 

@@ -11,7 +11,9 @@
 namespace dexcheck {
 namespace {
 
-std::string FormatPlace(double share) { return fmt::format("{:.2f}%", 100.0 * std::clamp(share, 0.0, 1.0)); }
+std::string FormatPlace(double fraction) {
+  return fmt::format("{:.2f}%", 100.0 * std::clamp(fraction, 0.0, 1.0));
+}
 
 /// A bar from 0 to `value`, with the interval drawn over it; all of them relative to `most`.
 Html MakeBar(const Estimate& estimate, double most) {
@@ -38,7 +40,7 @@ Html MakeSensitivityTable(const StudyResults& results, const std::string& quanti
       "<section class=\"card scroll\"><h3>{}</h3>\n<table class=\"effects\"><tr><th>key</th><th "
       "class=\"wide\">{}</th><th class=\"value\"></th><th class=\"value\">{}</th></tr>\n",
       quantity + (ShowUnit(quantity).empty() ? "" : "," + ShowUnit(quantity)),
-      is_sobol ? "share of the variance, with interactions" : "moves it over its range by",
+      is_sobol ? "fraction of the variance, with interactions" : "moves it over its range by",
       is_sobol ? "alone" : "spread");
   for (const size_t key : keys) {
     const Estimate estimate = find(key);
@@ -100,8 +102,8 @@ Html MakeMarginTable(const StudyResults& results) {
     for (const KeyTheory::Turn& turn : theory.turns) {
       if (turn.key != key || !turn.is_stability) continue;
       turns += fmt::format("{}{:.4g}", turns.empty() ? "" : ", ", turn.value);
-      marks +=
-          FormatHtml("<i class=\"mark\" style=\"left:{}\"></i>", FormatPlace(ShareOf(variation, turn.value)));
+      marks += FormatHtml("<i class=\"mark\" style=\"left:{}\"></i>",
+                          FormatPlace(FractionOf(variation, turn.value)));
     }
     html += FormatHtml(
         "<tr><td>{}</td><td class=\"value number\">{}</td><td><div class=\"track\"><i class=\"fill\" "
@@ -109,7 +111,7 @@ Html MakeMarginTable(const StudyResults& results) {
         "class=\"value number\">{}</td><td class=\"value number\">{}</td><td class=\"value "
         "number\">{}</td></tr>\n",
         variation.key, show(down), FormatPlace(down.good[key]), FormatPlace(up.good[key] - down.good[key]),
-        FormatPlace(ShareOf(variation, points[0].values[key])), marks, show(up),
+        FormatPlace(FractionOf(variation, points[0].values[key])), marks, show(up),
         fmt::format("{:.4g}", points[0].values[key]), turns.empty() ? "–" : turns);
   }
   html +=

@@ -49,10 +49,10 @@ bool TestAxes(const StudyInputs& inputs, const std::vector<double>& parameters, 
 }
 
 /// From `from` at 0 to `to` at 1; evenly in the logarithm where that is how the key is varied.
-double Interpolate(const Variation& variation, double share) {
+double Interpolate(const Variation& variation, double fraction) {
   const bool logarithmic = variation.from > 0.0 && variation.to / variation.from > 10.0;
-  if (!logarithmic) return variation.from + share * (variation.to - variation.from);
-  return variation.from * std::pow(variation.to / variation.from, share);
+  if (!logarithmic) return variation.from + fraction * (variation.to - variation.from);
+  return variation.from * std::pow(variation.to / variation.from, fraction);
 }
 
 }  // namespace
@@ -136,7 +136,7 @@ TrialResult PredictInTheory(const StudyInputs& inputs, const std::vector<double>
     quarters[4 * k / steps] += size * size;
     largest = std::max(largest, size);
     overshoot = std::max(overshoot, -errors[k].dot(start) / start.squaredNorm());
-    const bool inside = size <= kSettledShare * start.norm();
+    const bool inside = size <= kSettledFraction * start.norm();
     if (inside && !settled) settled_since = static_cast<double>(k) * loop.time_step;
     settled = inside;
   }
@@ -206,8 +206,8 @@ std::vector<std::pair<double, double>> FindTurns(const StudyInputs& inputs,
   std::vector<std::pair<double, double>> turns;
   for (int i = 0; i <= kColumns; ++i) {
     point[0] = Interpolate(x, static_cast<double>(i) / kColumns);
-    const auto test = [&](double share) {
-      point[1] = Interpolate(y, share);
+    const auto test = [&](double fraction) {
+      point[1] = Interpolate(y, fraction);
       return holds(inputs, point);
     };
     bool before = test(0.0);
@@ -257,8 +257,8 @@ void FindTurnsAlong(const StudyInputs& inputs, std::vector<double> parameters, s
                     int rows, const std::function<void(bool is_stability, double value)>& found) {
   constexpr int kBisect = 10;
   const Variation& variation = inputs.study.variations[key];
-  const auto at = [&](double share) {
-    parameters[key] = Interpolate(variation, share);
+  const auto at = [&](double fraction) {
+    parameters[key] = Interpolate(variation, fraction);
     return FindAxes(inputs, parameters);
   };
   Axes before = at(0.0);

@@ -41,7 +41,7 @@ Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial);
 /// Makes one run. Values that make no run give Outcome::kRefused. Deterministic.
 TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial);
 
-/// Parses what the ends of all ranges make of the scenario, and sets up the first trial, so that a mistake is
+/// Parses what the ends of all ranges make of the scenario, and sets up the first trial, so that a fault is
 /// found before anything runs. Compiles the MJCF and reads the robot once, for all. @throws InputError.
 void CheckTrials(StudyInputs* inputs);
 

@@ -40,7 +40,7 @@ void TrialMonitor::RecordError(const StepRecord& step) {
   const TrackingError& error = step.error;
   error_ = of_joints_ ? error.joints : error.position.norm();
   const double size = by_position_ ? error_ : error.orientation;
-  const bool inside = size <= kSettledShare * start_error_;
+  const bool inside = size <= kSettledFraction * start_error_;
   if (inside && !settled_) settled_since_ = step.time;
   settled_ = inside;
   if (start_error_ > 0.0) {

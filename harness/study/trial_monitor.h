@@ -13,8 +13,8 @@ namespace dexcheck {
 /// Fingertips or wheels that slide further than this have slipped, m; the bounds of the cross-check.
 constexpr double kFingertipSlipBound = 2e-4;
 constexpr double kWheelSlipBound = 1e-3;
-/// An error within this share of the start error has settled.
-constexpr double kSettledShare = 0.02;
+/// An error within this fraction of the start error has settled.
+constexpr double kSettledFraction = 0.02;
 
 /// Watches one run. Nothing allocates after construction.
 class TrialMonitor {

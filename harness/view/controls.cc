@@ -88,7 +88,7 @@ Rectangle PlaceSlider(size_t index, int width) {
           {kSliderWidth, 20.0}};
 }
 
-double ToShare(double factor) { return 0.5 + 0.5 * std::log(factor) / std::log(kSliderRange); }
+double ToFraction(double factor) { return 0.5 + 0.5 * std::log(factor) / std::log(kSliderRange); }
 
 void DrawTrack(const Rectangle& place, double filled, double mark, Canvas* canvas) {
   const double y = place.corner.y() + 0.5 * place.size.y();
@@ -149,24 +149,24 @@ void Controls::Draw(const ControlsState& state, Image* image) {
     canvas.DrawText(font_, 12.5, {place.corner.x(), place.corner.y() - 3.0}, state.sliders[i].name, kFaint);
     canvas.DrawText(font_, 12.5, {place.corner.x() + place.size.x(), place.corner.y() - 3.0},
                     fmt::format("{:.2f} x", state.sliders[i].factor), kText, Align::kRight);
-    DrawTrack(place, 0.0, ToShare(state.sliders[i].factor), &canvas);
+    DrawTrack(place, 0.0, ToFraction(state.sliders[i].factor), &canvas);
   }
 }
 
 std::optional<ControlHit> Controls::Find(const ControlsState& state, int width, int height, double x,
                                          double y, const std::optional<ControlHit>& held) {
   if (!state.shown) return std::nullopt;
-  const auto share = [&](const Rectangle& place) {
+  const auto fraction = [&](const Rectangle& place) {
     return std::clamp((x - place.corner.x()) / place.size.x(), 0.0, 1.0);
   };
   const Rectangle time = PlaceTime(width, height);
   if (held ? held->id == ControlId::kTime : time.Contains(x, y)) {
-    return ControlHit{ControlId::kTime, 0, state.begin + share(time) * (state.end - state.begin)};
+    return ControlHit{ControlId::kTime, 0, state.begin + fraction(time) * (state.end - state.begin)};
   }
   for (size_t i = 0; i < state.sliders.size(); ++i) {
     const Rectangle place = PlaceSlider(i, width);
     if (held ? held->id == ControlId::kSlider && held->slider == i : place.Contains(x, y)) {
-      return ControlHit{ControlId::kSlider, i, std::pow(kSliderRange, 2.0 * share(place) - 1.0)};
+      return ControlHit{ControlId::kSlider, i, std::pow(kSliderRange, 2.0 * fraction(place) - 1.0)};
     }
   }
   if (held) return held;

@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "renders/question_status.h"
+#include "renders/category_status.h"
 #include "renders/run_frames.h"
 
 namespace dexcheck {
@@ -14,7 +14,7 @@ namespace dexcheck {
 /// One instant.
 struct ViewFrame {
   RunFrames frame;                        ///< One row.
-  std::vector<QuestionStatus> questions;  ///< Up to this instant.
+  std::vector<CategoryStatus> questions;  ///< Up to this instant.
   VectorXd q;                             ///< Of a live run: q' of the robot, and
   Pose X_Bo = Pose::Identity();           ///< the object.
 };

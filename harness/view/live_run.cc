@@ -123,18 +123,18 @@ void LiveRun::Record(const StepRecord& step) {
     frame.contact_normals.block<1, 3>(0, 3 * i) = contact.normal.transpose();
   }
   const CrossCheck& checks = runner_->loop().checks();
-  for (const CheckKind kind : kCheckKinds) {
-    QuestionStatus& question = view.questions.emplace_back();
+  for (const CheckCategory kind : kCheckCategorys) {
+    CategoryStatus& question = view.questions.emplace_back();
     question.name = NameOf(kind);
     double largest = -1.0;
     for (const std::span<const CheckRecord> records : {checks.model_checks(), checks.motion_checks()}) {
       for (const CheckRecord& check : records) {
         if (check.kind != kind || !check.applies) continue;
-        const double share =
+        const double fraction =
             check.bound > 0.0 ? check.worst / check.bound : (check.worst > 0.0 ? 1e300 : 0.0);
         question.asked = true;
-        if (share <= largest) continue;
-        largest = share;
+        if (fraction <= largest) continue;
+        largest = fraction;
         question.check = check.name;
         question.worst = check.worst;
         question.bound = check.bound;

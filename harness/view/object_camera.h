@@ -4,7 +4,7 @@
 
 #include "harness/engine/engine.h"
 #include "harness/view/frame_source.h"
-#include "harness/view/pull.h"
+#include "harness/view/mouse_force.h"
 #include "renders/viewpoint.h"
 
 namespace dexcheck {

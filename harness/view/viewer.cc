@@ -12,8 +12,8 @@
 #include "harness/base/interrupts.h"
 #include "harness/view/controls.h"
 #include "harness/view/gain_sliders.h"
+#include "harness/view/mouse_force.h"
 #include "harness/view/object_camera.h"
-#include "harness/view/pull.h"
 #include "harness/view/studio.h"
 #include "harness/view/window.h"
 
@@ -81,7 +81,7 @@ class Viewer {
     }
     camera_.Follow(row_, state_.follow);
     const ViewFrame frame = source_.Read(row_);
-    if (mouse_pull_) UpdatePull(frame);
+    if (mouse_force_) UpdatePull(frame);
     Studio::Order order{row_, {camera_.view(), state_.forces, MeasureForces(frame), pull_arrow_}, state_};
     studio_.Ask(order);
   }
@@ -159,9 +159,9 @@ class Viewer {
   // Mouse and keys.
 
   void UpdatePull(const ViewFrame& frame) {
-    const Pull pull = mouse_pull_->Find(frame, camera_.FindRay(mouse_.x, mouse_.y));
+    const Pull pull = mouse_force_->Find(frame, camera_.FindRay(mouse_.x, mouse_.y));
     live_->SetPull(pull);
-    const Vector3d point = mouse_pull_->FindPoint(frame);
+    const Vector3d point = mouse_force_->FindPoint(frame);
     pull_arrow_ = Arrow{point,
                         point + 0.3 * pull.force / std::max(pull.force.norm(), 3.0),
                         kPullRadius,
@@ -170,8 +170,8 @@ class Viewer {
   }
 
   void LetGo() {
-    if (!mouse_pull_) return;
-    mouse_pull_.reset();
+    if (!mouse_force_) return;
+    mouse_force_.reset();
     pull_arrow_.reset();
     live_->SetPull(std::nullopt);
     state_.message = "let go; the judge knows the pull";
@@ -208,9 +208,9 @@ class Viewer {
       Click(*held_, save);
     } else if (event.control && live_ != nullptr && source_.rows() > 0 && !live_->is_finished()) {
       looks_back_ = false;
-      mouse_pull_ = MousePull::Grab(live_->setup(), live_->model(), source_.Read(source_.rows() - 1),
-                                    camera_.FindRay(event.x, event.y));
-      state_.message = mouse_pull_ ? "" : "nothing to pull at here";
+      mouse_force_ = MouseForce::Grab(live_->setup(), live_->model(), source_.Read(source_.rows() - 1),
+                                      camera_.FindRay(event.x, event.y));
+      state_.message = mouse_force_ ? "" : "nothing to pull at here";
     } else {
       turning_ = true;
     }
@@ -341,7 +341,7 @@ class Viewer {
   InputEvent::Button button_ = InputEvent::Button::kLeft;
   bool turning_ = false;
   std::optional<ControlHit> held_;
-  std::optional<MousePull> mouse_pull_;
+  std::optional<MouseForce> mouse_force_;
   std::optional<Arrow> pull_arrow_;
   std::string title_;
   Studio studio_;

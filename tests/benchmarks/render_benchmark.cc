@@ -1,5 +1,5 @@
-// What a movie costs beyond MuJoCo's own drawing: the same frames drawn by mjr_render and mjr_readPixels
-// alone, and as a movie with panel and encoding. Both with two processes. Processor time, because the wall
+// What a video costs beyond MuJoCo's own drawing: the same frames drawn by mjr_render and mjr_readPixels
+// alone, and as a video with panel and encoding. Both with two processes. Processor time, because the wall
 // clock also counts others' work.
 //
 // render_benchmark [FRAMES]
@@ -15,10 +15,10 @@
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
-#include "renders/movie.h"
 #include "renders/offscreen_context.h"
 #include "renders/renderer.h"
 #include "renders/run_decorations.h"
+#include "renders/video.h"
 #include "tests/benchmarks/measured_time.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
@@ -28,7 +28,7 @@ namespace dexcheck {
 namespace {
 
 /// Draws every n-th frame with the engine's functions and nothing else.
-void DrawBare(const mjModel& model, const RunFrames& run, const MovieOptions& options, long first,
+void DrawBare(const mjModel& model, const RunFrames& run, const VideoOptions& options, long first,
               long frames) {
   const int width = options.samples * options.width;
   const int height = options.samples * options.height;
@@ -70,7 +70,7 @@ void DrawBare(const mjModel& model, const RunFrames& run, const MovieOptions& op
 
 int Run(long frames) {
   const MjModelPtr model = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
-  const MovieOptions options;
+  const VideoOptions options;
   const RunFrames run = testing::MakeKinematicRun(*model, static_cast<double>(frames) / options.fps, 0.001);
   const testing::TempFolder folder;
   fmt::print("{} frames of {} x {}, {} samples a pixel, {} processes\n", frames, options.width,
@@ -87,24 +87,24 @@ int Run(long frames) {
       if (status != EXIT_SUCCESS) throw Error("a process that draws died");
     }
   });
-  const MeasuredTime movie = Measure([&] {
+  const MeasuredTime video = Measure([&] {
     VideoOptions encoding;
     encoding.width = options.width;
     encoding.height = options.height;
     encoding.fps = options.fps;
-    VideoWriter video(folder.path() / "movie.mp4", encoding);
+    VideoWriter video(folder.path() / "video.mp4", encoding);
     const RunView view = {model.get(), &run};
-    RenderMovie({&view, 1}, options, &video);
+    RenderVideo({&view, 1}, options, &video);
     video.Finish();
   });
   const auto per_frame = [&](double seconds) { return 1e3 * seconds / static_cast<double>(frames); };
   fmt::print("{:<34}{:>10}{:>14}{:>12}\n", "", "wall", "processor", "a frame");
   fmt::print("{:<34}{:>8.1f} s{:>12.1f} s{:>9.1f} ms\n", "mjr_render and mjr_readPixels", bare.wall,
              bare.processor, per_frame(bare.processor));
-  fmt::print("{:<34}{:>8.1f} s{:>12.1f} s{:>9.1f} ms\n", "movie with panel, encoded", movie.wall,
-             movie.processor, per_frame(movie.processor));
+  fmt::print("{:<34}{:>8.1f} s{:>12.1f} s{:>9.1f} ms\n", "video with panel, encoded", video.wall,
+             video.processor, per_frame(video.processor));
   fmt::print("overlay and encoding cost {:.1f} % more processor time ({:.1f} % by the wall clock)\n",
-             100.0 * (movie.processor / bare.processor - 1.0), 100.0 * (movie.wall / bare.wall - 1.0));
+             100.0 * (video.processor / bare.processor - 1.0), 100.0 * (video.wall / bare.wall - 1.0));
   return 0;
 }
 

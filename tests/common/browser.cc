@@ -104,7 +104,7 @@ Browser::Browser() {
   }
 }
 
-Browser& Browser::Share() {
+Browser& Browser::Fraction() {
   static Browser shared;
   shared.Command("Emulation.clearDeviceMetricsOverride", Json::object());
   shared.SetDark(false);

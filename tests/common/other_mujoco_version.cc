@@ -1,4 +1,4 @@
-// Preloaded into the program, stands for a MuJoCo library of another version, or for a mistake of the
+// Preloaded into the program, stands for a MuJoCo library of another version, or for a fault of the
 // program.
 
 #include <cstdlib>

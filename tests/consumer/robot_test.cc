@@ -5,8 +5,8 @@
 #include <string>
 
 #include "controller/dynamics/model_terms.h"
-#include "harness/sides/matchers.h"
-#include "harness/sides/read_description.h"
+#include "harness/descriptions/matchers.h"
+#include "harness/descriptions/read_description.h"
 
 namespace {
 
@@ -36,7 +36,7 @@ TEST(Robot, CodeAgrees) {
   EXPECT_THAT(MakeTerms(1e-6), dexcheck::testing::AgreesWith(ArgumentAt(2), {.samples = 50, .digits = 4}));
 }
 
-TEST(Robot, AMistakeIsTold) {
+TEST(Robot, AFaultIsTold) {
   EXPECT_THAT(MakeTerms(0.1), Not(dexcheck::testing::AgreesWith(ArgumentAt(2), {.samples = 50})));
   ::testing::StringMatchResultListener listener;
   EXPECT_FALSE(::testing::ExplainMatchResult(dexcheck::testing::AgreesWith(ArgumentAt(2), {.samples = 50}),

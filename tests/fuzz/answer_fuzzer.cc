@@ -1,9 +1,9 @@
 // What programs answer: any bytes are arrays, terms of the right sizes, or an InputError that names the file.
 
 #include "controller/common/errors.h"
-#include "harness/sides/npy_file.h"
-#include "harness/sides/side_layout.h"
-#include "harness/sides/urdf_reader.h"
+#include "harness/descriptions/npy_file.h"
+#include "harness/descriptions/side_layout.h"
+#include "harness/descriptions/urdf_reader.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace dexcheck::testing::fuzz {

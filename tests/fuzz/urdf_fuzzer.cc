@@ -2,7 +2,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/dynamics/model_terms.h"
-#include "harness/sides/urdf_reader.h"
+#include "harness/descriptions/urdf_reader.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace dexcheck::testing::fuzz {

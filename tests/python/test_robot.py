@@ -10,7 +10,7 @@ import pytest
 import dexcheck
 
 ROOT = os.environ["DEXCHECK_SOURCE"]
-ARM = f"{ROOT}/harness/sides/examples/arm.urdf"
+ARM = f"{ROOT}/harness/descriptions/examples/arm.urdf"
 PANDA = f"{ROOT}/controller/parameters/panda.toml"
 PANDA_MJCF = f"{ROOT}/mjcf/panda.xml"
 

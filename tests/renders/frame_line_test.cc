@@ -75,7 +75,7 @@ TEST(FrameLineTest, HandsFramesOverInOrder) {
         ASSERT_EQ(image.rgb, Fill(frame, image.rgb[1], image.rgb[2]).rgb);
         processes.insert(256 * image.rgb[1] + image.rgb[2]);
       }
-      EXPECT_TRUE(Throws<std::invalid_argument>([&] { line.Take(); }, "frame: must be one of the film's"));
+      EXPECT_TRUE(Throws<std::invalid_argument>([&] { line.Take(); }, "frame: must be one of the video's"));
     }
     EXPECT_EQ(processes.size(), static_cast<size_t>(workers));
     EXPECT_FALSE(processes.contains(::getpid() % 65536));
@@ -142,7 +142,7 @@ TEST(FrameLineTest, ErrorsReachTheCaller) {
   EXPECT_TRUE(
       Throws<Error>(take(fail_at_3([] { ::_exit(0); })), "drawing: a process died: it ended too early"));
   EXPECT_TRUE(Throws<std::invalid_argument>(take([](long) { return Image(kWidth, kHeight + 1); }),
-                                            "frame height: must be the film's, got 5"));
+                                            "frame height: must be the video's, got 5"));
   EXPECT_FALSE(HasChildren());
 }
 

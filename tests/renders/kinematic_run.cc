@@ -16,7 +16,8 @@ int JointAddress(const mjModel& model, const char* name) {
   return model.jnt_qposadr[mj_name2id(&model, mjOBJ_JOINT, name)];
 }
 
-CheckSeries MakeCheck(const char* name, CheckKind kind, double bound, double level, const RunFrames& run) {
+CheckSeries MakeCheck(const char* name, CheckCategory kind, double bound, double level,
+                      const RunFrames& run) {
   CheckSeries check{name, kind, bound, {}};
   for (const double time : run.times) check.residuals.push_back(level * (1.0 + 0.5 * std::sin(3.0 * time)));
   return check;
@@ -49,10 +50,10 @@ RunFrames MakeKinematicRun(const mjModel& model, double duration, double step) {
     run.position_errors.push_back(2e-8 * (1.05 + std::sin(4.0 * time)) * std::exp(-0.3 * time));
     run.orientation_errors.push_back(3e-7 * (1.05 + std::cos(3.0 * time)));
   }
-  run.checks = {MakeCheck("M_bar", CheckKind::kModel, 1e-10, 2e-13, run),
-                MakeCheck("acceleration", CheckKind::kBalance, 1e-9, 3e-11, run),
-                MakeCheck("contact_force", CheckKind::kPrediction, 1e-6, 7e-8, run),
-                MakeCheck("wheel_slip", CheckKind::kAssumption, 1e-3, 4e-6, run)};
+  run.checks = {MakeCheck("M_bar", CheckCategory::kModel, 1e-10, 2e-13, run),
+                MakeCheck("acceleration", CheckCategory::kInverseDynamics, 1e-9, 3e-11, run),
+                MakeCheck("contact_force", CheckCategory::kForwardDynamics, 1e-6, 7e-8, run),
+                MakeCheck("wheel_slip", CheckCategory::kAssumption, 1e-3, 4e-6, run)};
 
   const MjDataPtr data = MakeData(model);
   SetRow(model, run, 0, data.get());

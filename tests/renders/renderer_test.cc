@@ -10,9 +10,9 @@
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
-#include "renders/movie.h"
 #include "renders/png_file.h"
 #include "renders/run_decorations.h"
+#include "renders/video.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
@@ -234,16 +234,16 @@ TEST_F(RendererTest, RefusesSizesThatCannotBeDrawn) {
   EXPECT_TRUE(Throws<std::invalid_argument>([&] { renderer.Render(*data_, many); }, "decorations: must fit"));
 }
 
-// A frame as a movie shows it. With DEXCHECK_WRITE_GOLDEN in the environment the picture is written anew
+// A frame as a video shows it. With DEXCHECK_WRITE_GOLDEN in the environment the picture is written anew
 // instead: look at it.
 TEST_F(RendererTest, StillLooksAsItDid) {
-  MovieOptions options;
+  VideoOptions options;
   options.width = kWidth;
   options.height = kHeight;
   options.inset = "grasp";
   const auto paint = [&](const RunFrames& run) {
     const RunView view = {model_.get(), &run};
-    return MoviePainter({&view, 1}, options).Paint(0.1);
+    return VideoPainter({&view, 1}, options).Paint(0.1);
   };
   const Image image = paint(run_);
   const std::string path = testing::SourcePath("/tests/renders/golden_still.png");
@@ -260,13 +260,13 @@ TEST_F(RendererTest, StillLooksAsItDid) {
   };
   // Another processor's rounding moves edges by a fraction of a pixel: the robot's outline and the floor's
   // lines are about 2 % of the pixels, of which a small part passes the threshold.
-  constexpr double kShare = 0.004;
-  EXPECT_LE(share_that_differs(image), kShare);
+  constexpr double kFraction = 0.004;
+  EXPECT_LE(share_that_differs(image), kFraction);
   // An elbow bent 5 degrees further shows.
   RunFrames bent = run_;
   bent.qpos.col(model_->jnt_qposadr[mj_name2id(model_.get(), mjOBJ_JOINT, "r_elbow")]).array() +=
       DegToRad(5.0);
-  EXPECT_GT(share_that_differs(paint(bent)), 2.0 * kShare);
+  EXPECT_GT(share_that_differs(paint(bent)), 2.0 * kFraction);
 }
 
 }  // namespace

@@ -68,42 +68,42 @@ TEST_F(RunFramesTest, RowAtIsTheLastOneRecorded) {
 }
 
 TEST_F(RunFramesTest, CheckHistoryKeepsTheWorstPerBound) {
-  run_.checks = {{"a", CheckKind::kModel, 1e-3, std::vector<double>(11, 5e-4)},
-                 {"b", CheckKind::kModel, 1e-9, std::vector<double>(11, 1e-10)},
-                 {"c", CheckKind::kBalance, 1.0, std::vector<double>(11, 0.0)}};
+  run_.checks = {{"a", CheckCategory::kModel, 1e-3, std::vector<double>(11, 5e-4)},
+                 {"b", CheckCategory::kModel, 1e-9, std::vector<double>(11, 1e-10)},
+                 {"c", CheckCategory::kInverseDynamics, 1.0, std::vector<double>(11, 0.0)}};
   run_.checks[1].residuals[4] = -8e-10;
   run_.checks[2].residuals[6] = kNan;
   const CheckHistory history(run_);
-  EXPECT_EQ(history.At(CheckKind::kModel, 3).check->name, "a");
-  EXPECT_DOUBLE_EQ(history.At(CheckKind::kModel, 3).worst, 5e-4);
-  EXPECT_EQ(history.At(CheckKind::kModel, 4).check->name, "b");
-  EXPECT_DOUBLE_EQ(history.At(CheckKind::kModel, 10).worst, 8e-10) << "a peak stays";
-  EXPECT_EQ(history.At(CheckKind::kBalance, 5).worst, 0.0);
-  EXPECT_EQ(history.At(CheckKind::kBalance, 10).worst, std::numeric_limits<double>::infinity());
-  EXPECT_EQ(history.At(CheckKind::kPrediction, 10).check, nullptr);
+  EXPECT_EQ(history.At(CheckCategory::kModel, 3).check->name, "a");
+  EXPECT_DOUBLE_EQ(history.At(CheckCategory::kModel, 3).worst, 5e-4);
+  EXPECT_EQ(history.At(CheckCategory::kModel, 4).check->name, "b");
+  EXPECT_DOUBLE_EQ(history.At(CheckCategory::kModel, 10).worst, 8e-10) << "a peak stays";
+  EXPECT_EQ(history.At(CheckCategory::kInverseDynamics, 5).worst, 0.0);
+  EXPECT_EQ(history.At(CheckCategory::kInverseDynamics, 10).worst, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(history.At(CheckCategory::kForwardDynamics, 10).check, nullptr);
 }
 
 TEST_F(RunFramesTest, AllFiveQuestionsAreListed) {
-  run_.checks = {{"law_torque", CheckKind::kLaw, 1e-9, std::vector<double>(11, 1e-10)},
-                 {"cone_use", CheckKind::kAssumption, 0.9, std::vector<double>(11, 0.2)}};
+  run_.checks = {{"law_torque", CheckCategory::kLaw, 1e-9, std::vector<double>(11, 1e-10)},
+                 {"cone_use", CheckCategory::kAssumption, 0.9, std::vector<double>(11, 0.2)}};
   run_.checks[0].residuals[4] = 2e-9;
-  const auto names = [](const std::vector<QuestionStatus>& questions) {
+  const auto names = [](const std::vector<CategoryStatus>& questions) {
     std::string text;
-    for (const QuestionStatus& question : questions) text += question.name + " ";
+    for (const CategoryStatus& question : questions) text += question.name + " ";
     return text;
   };
   const CheckHistory history(run_);
-  const std::vector<QuestionStatus> questions = history.ListQuestions(10);
+  const std::vector<CategoryStatus> questions = history.ListCategories(10);
   EXPECT_EQ(names(questions), "model law balance prediction assumption ");
   ASSERT_EQ(questions.size(), 5U);
   EXPECT_FALSE(questions[0].asked);
   EXPECT_EQ(questions[1].check, "law_torque");
   EXPECT_DOUBLE_EQ(questions[1].worst, 2e-9);
   EXPECT_FALSE(questions[1].Passes());
-  EXPECT_TRUE(history.ListQuestions(3)[1].Passes());
+  EXPECT_TRUE(history.ListCategories(3)[1].Passes());
   EXPECT_TRUE(questions[4].Passes());
   run_.checks.clear();
-  EXPECT_TRUE(CheckHistory(run_).ListQuestions(3).empty());
+  EXPECT_TRUE(CheckHistory(run_).ListCategories(3).empty());
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ void WriteVideo(const fs::path& path, int frames) {
 
 TEST(VideoWriter, IsWhatBrowsersPlay) {
   const TempFolder folder;
-  const fs::path path = folder.path() / "a film.mp4";
+  const fs::path path = folder.path() / "a video.mp4";
   WriteVideo(path, 20);
   const testing::ProgramResult probe =
       RunProgram({DEXCHECK_FFPROBE, "-v", "error", "-count_frames", "-show_streams", "-show_format", "-of",
@@ -136,7 +136,7 @@ TEST(VideoWriter, SameFramesGiveTheSameBytes) {
     video.Finish();
     const std::string bytes = testing::ReadText(folder.path() / "a.mp4");
     if (first.empty()) first = bytes;
-    ASSERT_TRUE(bytes == first) << "film " << k;
+    ASSERT_TRUE(bytes == first) << "video " << k;
   }
 }
 
@@ -191,7 +191,7 @@ TEST(VideoWriter, RefusesNamesOfOtherFormats) {
   const TempFolder folder;
   for (const char* name : {"a.avi", "a.png", "a", "mp4", "a.mp4.txt"}) {
     EXPECT_TRUE(Throws<InputError>([&] { VideoWriter video(folder.path() / name, MakeOptions()); },
-                                   "a film's name must end in .mp4, .webm or .gif"));
+                                   "a video's name must end in .mp4, .webm or .gif"));
   }
   VideoOptions options = MakeOptions();
   options.fps = kMostGifFramesPerSecond + 1;
@@ -211,7 +211,7 @@ TEST(VideoWriter, LeavesNothingUnlessFinished) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
 }
 
-TEST(VideoWriter, RefusesAFilmWithoutFrames) {
+TEST(VideoWriter, RefusesAVideoWithoutFrames) {
   const TempFolder folder;
   {
     VideoWriter video(folder.path() / "a.mp4", MakeOptions());

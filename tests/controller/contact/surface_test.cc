@@ -117,7 +117,7 @@ TEST(SurfaceTest, PointsLieOnTheBodyAndNormalsPointOut) {
   }
 }
 
-// A sphere's chart in the usual order (latitude, longitude): the mistake that the checks above must catch.
+// A sphere's chart in the usual order (latitude, longitude): the fault that the checks above must catch.
 TEST(SurfaceTest, ExchangedChartOrderTurnsTheNormalInward) {
   constexpr double kU = 0.3;
   constexpr double kV = 0.4;

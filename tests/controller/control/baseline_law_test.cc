@@ -1,6 +1,6 @@
 // The laws that the paper's is compared with, at single states: against (55) where they are the same by
 // algebra, against the rigid system's answer where their closed loop is known in closed form, and against
-// laws with a mistake.
+// laws with a fault.
 
 #include "controller/control/baseline_law.h"
 
@@ -23,8 +23,8 @@ namespace {
 // Measured: forces 6e-13 N m (of 500), accelerations 1.8e-11 (of 1000).
 constexpr double kForceRounding = 5e-12;
 constexpr double kAccelerationRounding = 2e-10;
-// What a mistake must exceed.
-constexpr double kMistake = 1e-4;
+// What a fault must exceed.
+constexpr double kFault = 1e-4;
 
 constexpr ControlLaw kBaselines[] = {ControlLaw::kPdGravity, ControlLaw::kFeedforwardPd,
                                      ControlLaw::kOperationalSpace, ControlLaw::kImpedance};
@@ -117,7 +117,7 @@ TEST_F(BaselineLawTest, OperationalSpaceIsThePapersLawWithTheInertiaAsWeight) {
                            kForceRounding));
     // With another weight the redundant motion is another one.
     EXPECT_FALSE(
-        MatrixNear(force, CalcPaperForce(desired, sigma_prime, RedundancyWeight::Kind::kIdentity), kMistake));
+        MatrixNear(force, CalcPaperForce(desired, sigma_prime, RedundancyWeight::Kind::kIdentity), kFault));
   }
 }
 
@@ -129,7 +129,7 @@ TEST_F(BaselineLawTest, WithoutErrorFeedForwardAndImpedanceAreThePapersLaw) {
   EXPECT_TRUE(MatrixNear(CalcForce(ControlLaw::kFeedforwardPd, desired, sigma_prime), paper, kForceRounding));
   EXPECT_TRUE(MatrixNear(CalcForce(ControlLaw::kImpedance, desired, sigma_prime), paper, kForceRounding));
   // PD knows nothing of the motion.
-  EXPECT_FALSE(MatrixNear(CalcForce(ControlLaw::kPdGravity, desired, sigma_prime), paper, kMistake));
+  EXPECT_FALSE(MatrixNear(CalcForce(ControlLaw::kPdGravity, desired, sigma_prime), paper, kFault));
 }
 
 TEST_F(BaselineLawTest, AtRestWithoutErrorEveryLawHoldsTheWeight) {
@@ -166,8 +166,8 @@ TEST_F(BaselineLawTest, TheObjectAnswersWithItsStiffnessOverTheAugmentedInertia)
     const Vector6d answer = Answer(CalcForce(law, desired, none)).V_Bo_dot;
     EXPECT_TRUE(MatrixNear(answer, expected, kAccelerationRounding));
     // Without the object's inertia, or with 1 % more of the robot's, it is not.
-    EXPECT_FALSE(MatrixNear(answer, CalcLambda(0.0).inverse() * W, kMistake));
-    EXPECT_FALSE(MatrixNear(answer, CalcLambda(1.0, 1.01).inverse() * W, kMistake));
+    EXPECT_FALSE(MatrixNear(answer, CalcLambda(0.0).inverse() * W, kFault));
+    EXPECT_FALSE(MatrixNear(answer, CalcLambda(1.0, 1.01).inverse() * W, kFault));
   }
 }
 

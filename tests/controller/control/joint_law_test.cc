@@ -1,4 +1,4 @@
-// Laws for the joints of an arm that holds nothing: against what (18) answers, and against a mistake.
+// Laws for the joints of an arm that holds nothing: against what (18) answers, and against a fault.
 
 #include "controller/control/joint_law.h"
 

@@ -25,7 +25,7 @@ constexpr std::array kBranching = {0.0, 0.5, 1.0};
 // Seconds of processor time. Noise only ever adds to it, so the least of many samples counts; samples of all
 // robots take turns, so that a slow spell of the machine meets them all.
 constexpr int kRounds = 40;
-// Cost per (joints times depth) may not grow with the robot. Measured: it falls, as the share of work per
+// Cost per (joints times depth) may not grow with the robot. Measured: it falls, as the fraction of work per
 // joint does, or rises by 1.03 (1.22 on a busy machine). The naive sum's grows fivefold from 10 to 200
 // joints.
 constexpr double kGrowth = 2.0;

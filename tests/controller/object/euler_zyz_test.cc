@@ -198,7 +198,7 @@ TEST(EulerZyz, WorksUpToTheThreshold) {
   }
 }
 
-TEST(EulerZyz, RejectsTheCallersMistakes) {
+TEST(EulerZyz, RejectsTheCallersFaults) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(CalcZyzAngles(Matrix3d::Constant(kNan)), std::invalid_argument);
   EXPECT_THROW(CalcZyzAngles(2.0 * CalcRotationZyz({0.1, 0.5, 0.2})), std::invalid_argument);

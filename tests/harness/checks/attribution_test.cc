@@ -17,13 +17,13 @@ namespace {
 
 struct Step {
   const char* name;
-  CheckKind kind = CheckKind::kAssumption;
+  CheckCategory kind = CheckCategory::kAssumption;
 };
-constexpr Step kSteps[] = {{"balance_object", CheckKind::kBalance},
-                           {"balance_robot", CheckKind::kBalance},
+constexpr Step kSteps[] = {{"inverse_dynamics_object", CheckCategory::kInverseDynamics},
+                           {"inverse_dynamics_robot", CheckCategory::kInverseDynamics},
                            {"rolling"},
-                           {"reduced_acceleration", CheckKind::kPrediction},
-                           {"contact_force", CheckKind::kPrediction},
+                           {"reduced_acceleration", CheckCategory::kForwardDynamics},
+                           {"contact_force", CheckCategory::kForwardDynamics},
                            {"fingertip_slip"},
                            {"fingertip_slip_rate"},
                            {"wheel_slip"},
@@ -36,13 +36,13 @@ constexpr Step kSteps[] = {{"balance_object", CheckKind::kBalance},
                            {"base_tilt"},
                            {"idle_joints"},
                            {"solver"},
-                           {"joint_stop"},
+                           {"joint_limit"},
                            {"clearance"},
                            {"collision"},
-                           {"unjudged"},
+                           {"excluded"},
                            {"actuator_effort"}};
 
-CheckRecord MakeCheck(const std::string& name, CheckKind kind) {
+CheckRecord MakeCheck(const std::string& name, CheckCategory kind) {
   CheckRecord check;
   check.name = name;
   check.kind = kind;
@@ -55,9 +55,9 @@ CheckRecord MakeCheck(const std::string& name, CheckKind kind) {
 class FakeRun {
  public:
   FakeRun() {
-    for (const char* name : {"M_bar", "gravity"}) model_.push_back(MakeCheck(name, CheckKind::kModel));
+    for (const char* name : {"M_bar", "gravity"}) model_.push_back(MakeCheck(name, CheckCategory::kModel));
     for (const Step& step : kSteps) steps_.push_back(MakeCheck(step.name, step.kind));
-    steps_.push_back(MakeCheck("expect_position", CheckKind::kLaw));
+    steps_.push_back(MakeCheck("expect_position", CheckCategory::kLaw));
   }
 
   FakeRun& Fail(const std::string& name, double time) {
@@ -130,9 +130,10 @@ TEST(Attribute, TellsTheModelCheckThatFailedFirst) {
 }
 
 TEST(Attribute, WhereTheModelHoldsTheObjectsBalanceIsAForceThatNobodyHas) {
-  const AttributionResult result = FakeRun().Fail("cone_use", 0.1).Fail("balance_object", 0.9).Explain();
+  const AttributionResult result =
+      FakeRun().Fail("cone_use", 0.1).Fail("inverse_dynamics_object", 0.9).Explain();
   EXPECT_EQ(result.cause, Cause::kUnmodelledForce);
-  EXPECT_THAT(result.evidence, StartsWith("balance_object"));
+  EXPECT_THAT(result.evidence, StartsWith("inverse_dynamics_object"));
 }
 
 TEST(Attribute, SlidingOutweighsWhatGaveEarlier) {
@@ -167,7 +168,7 @@ TEST(Attribute, OfSeveralThatSlideTheFirstCounts) {
 
 TEST(Attribute, SlipWithoutSlidingIsSoftness) {
   for (const char* name : {"fingertip_slip", "fingertip_slip_rate", "wheel_slip", "wheel_slip_rate",
-                           "penetration", "kappa", "unjudged"}) {
+                           "penetration", "kappa", "excluded"}) {
     const AttributionResult result = FakeRun().Fail(name, 0.1).Fail("reduced_acceleration", 0.05).Explain();
     EXPECT_EQ(result.cause, Cause::kContactSoftness) << name;
     EXPECT_THAT(result.evidence, StartsWith(name));
@@ -192,23 +193,25 @@ TEST(Attribute, NeverSaysThatNoAssumptionBrokeWhereOneDid) {
 TEST(Attribute, AForceOnTheRobotAndWhatSlidesAreToldByTime) {
   for (const bool force_first : {true, false}) {
     const AttributionResult result = FakeRun()
-                                         .Fail("balance_robot", force_first ? 0.1 : 0.2)
+                                         .Fail("inverse_dynamics_robot", force_first ? 0.1 : 0.2)
                                          .Fail("traction_use", force_first ? 0.2 : 0.1)
                                          .Fail("base_tilt", 0.05)
                                          .Explain();
     EXPECT_EQ(result.cause, force_first ? Cause::kUnmodelledForce : Cause::kWheelSlip);
   }
   // What slides in the same step tells; what pushes at a stop is the stop.
-  EXPECT_EQ(FakeRun().Fail("balance_robot", 0.1).Fail("cone_use", 0.1).Explain().cause,
+  EXPECT_EQ(FakeRun().Fail("inverse_dynamics_robot", 0.1).Fail("cone_use", 0.1).Explain().cause,
             Cause::kFingertipSlip);
   // The balance has the stop's own push: what it lacks is another, which may push joints into their stops.
-  EXPECT_EQ(FakeRun().Fail("balance_robot", 0.1).Fail("joint_stop", 0.1).Explain().cause,
+  EXPECT_EQ(FakeRun().Fail("inverse_dynamics_robot", 0.1).Fail("joint_limit", 0.1).Explain().cause,
             Cause::kUnmodelledForce);
-  EXPECT_EQ(FakeRun().Fail("balance_robot", 0.2).Fail("joint_stop", 0.1).Explain().cause, Cause::kJointStop);
+  EXPECT_EQ(FakeRun().Fail("inverse_dynamics_robot", 0.2).Fail("joint_limit", 0.1).Explain().cause,
+            Cause::kJointLimit);
 }
 
 TEST(Attribute, WheelsThatDoNotRollAsTheyShouldExplainForces) {
-  const AttributionResult result = FakeRun().Fail("balance_robot", 0.1).Fail("rolling", 0.3).Explain();
+  const AttributionResult result =
+      FakeRun().Fail("inverse_dynamics_robot", 0.1).Fail("rolling", 0.3).Explain();
   EXPECT_EQ(result.cause, Cause::kWheelGeometry);
   EXPECT_THAT(result.evidence, StartsWith("rolling"));
   // Unless they slide.
@@ -217,14 +220,14 @@ TEST(Attribute, WheelsThatDoNotRollAsTheyShouldExplainForces) {
 
 TEST(Attribute, EvidenceEndsWithWhatWasMeasured) {
   FakeRun run;
-  run.Fail("balance_object", 0.1).Fail("balance_robot", 0.1);
+  run.Fail("inverse_dynamics_object", 0.1).Fail("inverse_dynamics_robot", 0.1);
   MeasuredCauses measured;
   measured.force = "at joint r_elbow";
   EXPECT_THAT(run.Explain(measured).evidence, HasSubstr("; at joint r_elbow"));
   measured.is_slope = true;
   const AttributionResult slope = run.Explain(measured);
   EXPECT_EQ(slope.cause, Cause::kSlope);
-  EXPECT_EQ(FindCause(slope, "balance_robot"), "slope");
+  EXPECT_EQ(FindCause(slope, "inverse_dynamics_robot"), "slope");
 }
 
 // An expectation that alone fails: what (57) by itself leaves are the gains, the rest is what drives it.
@@ -318,7 +321,7 @@ TEST(StepCheckTable, SaysWhatEachFailureMeansWithoutTies) {
 TEST(NameOf, CausesHaveDifferentNames) {
   std::vector<std::string> names;
   for (const Cause cause :
-       {Cause::kNone, Cause::kModel, Cause::kActuatorLimit, Cause::kJointStop, Cause::kFingertipSlip,
+       {Cause::kNone, Cause::kModel, Cause::kActuatorLimit, Cause::kJointLimit, Cause::kFingertipSlip,
         Cause::kWheelSlip, Cause::kContactSoftness, Cause::kTilt, Cause::kSolver, Cause::kIntegrator,
         Cause::kSensing, Cause::kControlLaw, Cause::kActuator, Cause::kUnmodelledForce, Cause::kSlope,
         Cause::kWheelGeometry, Cause::kCollision, Cause::kUnexplained}) {

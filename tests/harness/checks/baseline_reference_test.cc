@@ -62,7 +62,7 @@ TEST_P(BaselineCheck, TheLawPassesToRoundingAndAnotherIsFound) {
     EXPECT_GT(check.count, 0) << name;
   }
   EXPECT_FALSE(run.loop().checks().Find("law_demand").applies);
-  EXPECT_EQ(run.loop().checks().Find("gain_stability").applies, law == "operational_space");
+  EXPECT_EQ(run.loop().checks().Find("closed_loop_spectral_radius").applies, law == "operational_space");
   EXPECT_EQ(run.loop().checks().Find("error_dynamics").applies, law == "operational_space");
 
   double worst = 0.0;

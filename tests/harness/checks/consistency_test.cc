@@ -53,14 +53,14 @@ MjModelPtr LoadLongChain(const RobotSpec& spec) {
   return LoadMjcf(folder.path() / "chain.xml");
 }
 
-/// The checks that failed, and the largest share of its bound that any other used.
-std::string ListFailures(const ConsistencyResult& result, double* share) {
+/// The checks that failed, and the largest fraction of its bound that any other used.
+std::string ListFailures(const ConsistencyResult& result, double* fraction) {
   std::string failures;
   for (const std::vector<CheckRecord>* records : {&result.gate.records, &result.terms}) {
     for (const CheckRecord& record : *records) {
       EXPECT_LT(record.bound, kLargestBound) << record.name;
       if (record.failed) failures += record.name + " ";
-      *share = std::max(*share, record.worst / record.bound);
+      *fraction = std::max(*fraction, record.worst / record.bound);
     }
   }
   return failures;
@@ -80,7 +80,7 @@ RandomRobotOptions MakeOptions(int index) {
 
 TEST(Consistency, HoldsOnTwoHundredRandomRobots) {
   std::mt19937 random(300);
-  double share = 0.0;
+  double fraction = 0.0;
   for (int index = 0; index < 200; ++index) {
     const RobotSpec spec = testing::MakeRandomRobot(MakeOptions(index), &random);
     const bool free_joint = index % 4 < 2;
@@ -94,10 +94,10 @@ TEST(Consistency, HoldsOnTwoHundredRandomRobots) {
         Compare(spec, LoadMjcfText(testing::WriteMjcf(spec, free_joint, X_0b), "text"), 5,
                 static_cast<std::uint64_t>(index));
     EXPECT_EQ(result.samples, 5);
-    EXPECT_EQ(ListFailures(result, &share), "") << "robot " << index;
+    EXPECT_EQ(ListFailures(result, &fraction), "") << "robot " << index;
   }
-  RecordProperty("largest share of a bound", std::to_string(share));
-  EXPECT_GT(share, 1e-3);  // bounds that no error comes near would prove nothing
+  RecordProperty("largest fraction of a bound", std::to_string(fraction));
+  EXPECT_GT(fraction, 1e-3);  // bounds that no error comes near would prove nothing
 }
 
 TEST(Consistency, BoundsStaySmallOnLongChains) {
@@ -107,9 +107,9 @@ TEST(Consistency, BoundsStaySmallOnLongChains) {
     options.joints = joints;
     options.branching = 0.0;
     const RobotSpec spec = testing::MakeRandomRobot(options, &random);
-    double share = 0.0;
-    EXPECT_EQ(ListFailures(Compare(spec, LoadLongChain(spec), 2), &share), "") << joints << " joints";
-    EXPECT_GT(share, 1e-4);
+    double fraction = 0.0;
+    EXPECT_EQ(ListFailures(Compare(spec, LoadLongChain(spec), 2), &fraction), "") << joints << " joints";
+    EXPECT_GT(fraction, 1e-4);
   }
 }
 
@@ -161,13 +161,13 @@ TEST(Consistency, HoldsOnTheRingScene) {
   const MjModelPtr engine = LoadMjcf(scenario.mjcf_file);
   ConsistencyOptions options;
   options.samples = 100;
-  double share = 0.0;
+  double fraction = 0.0;
   const ConsistencyResult result =
       CheckConsistency(Adapter(model, *engine, "ring_scene.xml"), options, kGoOn);
   EXPECT_EQ(result.samples, 100);
-  EXPECT_EQ(ListFailures(result, &share), "");
+  EXPECT_EQ(ListFailures(result, &fraction), "");
   EXPECT_TRUE(result.gate.findings.empty());
-  EXPECT_GT(share, 1e-3);
+  EXPECT_GT(fraction, 1e-3);
 }
 
 TEST(Consistency, StopsWhenToldTo) {

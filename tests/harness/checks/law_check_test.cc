@@ -28,7 +28,7 @@ TEST(LawCheck, TheRightLawPassesToRounding) {
   }
 }
 
-// What is spoiled is the controller's own law: without a mistake it sends what the controller sends.
+// What is spoiled is the controller's own law: without a fault it sends what the controller sends.
 TEST(LawCheck, AnUnchangedLawIsNotSpoiled) {
   for (const std::vector<std::string>& overrides : {std::vector<std::string>{},
                                                     {"control.orientation='rotation'"},
@@ -40,7 +40,7 @@ TEST(LawCheck, AnUnchangedLawIsNotSpoiled) {
     std::vector<VectorXd> sent[2];
     for (const bool spoiled : {false, true}) {
       LoopParts parts = MakeLoopParts(shipped.setup());
-      if (spoiled) parts.controller = std::make_unique<SpoiledLaw>(shipped.setup(), LawMistake{});
+      if (spoiled) parts.controller = std::make_unique<SpoiledLaw>(shipped.setup(), LawFault{});
       Runner runner(shipped.setup(), /*check=*/true, std::move(parts));
       runner.Run([&](const StepRecord& step) { sent[spoiled ? 1 : 0].push_back(step.command.tau); },
                  [] { return false; });
@@ -93,7 +93,7 @@ TEST(LawCheck, AnInternalForceThatIsNotTheBestIsFound) {
 class FaultyPlant final : public Plant {
  public:
   FaultyPlant(std::unique_ptr<Plant> plant, double gain, double told)
-      : plant_(std::move(plant)), gain_(gain), told_(told) {}
+      : plant_(std::move(plant)), gain_(gain), measured_(told) {}
   double time_step() const override { return plant_->time_step(); }
   std::span<const Motor> motors() const override { return plant_->motors(); }
   void BeginStep() override { plant_->BeginStep(); }
@@ -101,7 +101,7 @@ class FaultyPlant final : public Plant {
   void EndStep(const Eigen::Ref<const VectorXd>& tau) override { plant_->EndStep(gain_ * tau); }
   void Read(PlantResponse* response) override {
     plant_->Read(response);
-    response->V_Bo_dot[0] += told_;
+    response->V_Bo_dot[0] += measured_;
   }
   void Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) override { plant_->Place(q, X_Bo); }
   void AddVelocity(const MeasuredState& state, const Vector3d& v) override { plant_->AddVelocity(state, v); }
@@ -110,7 +110,7 @@ class FaultyPlant final : public Plant {
  private:
   std::unique_ptr<Plant> plant_;
   double gain_;
-  double told_;
+  double measured_;
 };
 
 RunResult RunFaultyPlant(double gain, double told, const char* check) {
@@ -157,8 +157,8 @@ TEST(LawCheck, GainsThatCannotSettleFailBeforeAnythingMoves) {
     const RunResult& result = run.Run();
     EXPECT_NE(result.verdict, Verdict::kPass);
     EXPECT_EQ(result.attribution.cause, Cause::kControlLaw);
-    EXPECT_TRUE(run.loop().checks().Find("gain_stability").failed);
-    EXPECT_EQ(run.loop().checks().Find("gain_stability").failed_at, 0.0);
+    EXPECT_TRUE(run.loop().checks().Find("closed_loop_spectral_radius").failed);
+    EXPECT_EQ(run.loop().checks().Find("closed_loop_spectral_radius").failed_at, 0.0);
   }
 }
 

@@ -61,7 +61,7 @@ TEST_P(StepModelCheckTest, ShippedRobotAgreesAlongAWalk) {
     EXPECT_FALSE(record.failed) << record.name << ": " << record.worst << " > " << record.bound << ", "
                                 << Describe(record.where, controller.model, 2) << ", " << record.model_value
                                 << " against " << record.engine_value << ", step " << record.at;
-    EXPECT_EQ(record.kind, CheckKind::kModel);
+    EXPECT_EQ(record.kind, CheckCategory::kModel);
     EXPECT_GE(record.comparisons, kSteps);
   }
 }
@@ -273,7 +273,7 @@ TEST(StepModelCheck, ObjectAndContactRatesFailWhenTheStateDiffers) {
   }
 }
 
-TEST(StepModelCheck, TiltThatTheCheckIsNotToldOfFailsInTheContactsAlone) {
+TEST(StepModelCheck, TiltThatTheCheckIsNotMeasuredOfFailsInTheContactsAlone) {
   GraspWalk walk;
   CheckedController controller(walk.scene().model.spec(), Torus(kRingRadius, kTubeRadius),
                                walk.scene().fingertips);

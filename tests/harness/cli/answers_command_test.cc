@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-const std::string kExamples = testing::SourcePath("/harness/sides/examples/");
+const std::string kExamples = testing::SourcePath("/harness/descriptions/examples/");
 const std::string kPython = DEXCHECK_PYTHON;
 
 class Answers : public ::testing::Test {
@@ -40,7 +40,7 @@ TEST_F(Answers, OfAnArmInNumPyAgree) {
   }
 }
 
-TEST_F(Answers, MistakesOfTheProgramAreFound) {
+TEST_F(Answers, FaultsOfTheProgramAreFound) {
   const std::string program = ReadText(kExamples + "arm.py");
   const auto expect = [&](const std::string& original, const std::string& changed, const std::string& found,
                           const std::string& right) {
@@ -196,7 +196,7 @@ TEST_F(Answers, AuditExitsByWhatItFinds) {
   EXPECT_EQ(odd.exit_code, 1);
   EXPECT_THAT(odd.out, HasSubstr("impossible odd.urdf:5: link column has principal moments"));
   EXPECT_THAT(odd.out, HasSubstr("with a plausible body"));
-  EXPECT_THAT(odd.out, HasSubstr("\nFOUND: 1 thing that a robot cannot have or that looks like a mistake."));
+  EXPECT_THAT(odd.out, HasSubstr("\nFOUND: 1 thing that a robot cannot have or that looks like a fault."));
   const Json json = Json::parse(ReadText(folder_.path() / "audit.json"));
   EXPECT_EQ(json.at("verdict"), "disagreement");
   EXPECT_EQ(json.at("findings").at(0).at("level"), "impossible");

@@ -256,7 +256,7 @@ TEST_F(BadFiles, AnotherMujocoVersionIsNamed) {
                         {"libmujoco: version must be 2.2.2, got 2.3.1"}));
 }
 
-TEST_F(BadFiles, AMistakeOfTheProgramIsNoBadInput) {
+TEST_F(BadFiles, AFaultOfTheProgramIsNoBadInput) {
   testing::ProgramOptions options;
   options.environment = {{"LD_PRELOAD", testing::BuildPath("/tests/libother_mujoco_version.so")},
                          {"TEST_MISTAKE", "1"}};

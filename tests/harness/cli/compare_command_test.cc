@@ -42,8 +42,8 @@ TEST(CompareCommand, BadInputIsOneLine) {
                                              {a, a, "--signals", "objct/*"},
                                              {a, a, "--tolerance", "-1"},
                                              {a, a, "--tolerance", "nan"},
-                                             {a, a, "--video", folder.path() / "film.txt"},
-                                             {a, a, a, "--video", folder.path() / "film.gif"},
+                                             {a, a, "--video", folder.path() / "video.txt"},
+                                             {a, a, a, "--video", folder.path() / "video.gif"},
                                              {a, a, "--out", folder.path() / "page.pdf"}}) {
     std::vector<std::string> command = {"compare", "--out", page};
     if (std::find(words.begin(), words.end(), "--out") != words.end()) command = {"compare"};

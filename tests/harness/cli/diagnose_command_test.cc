@@ -252,7 +252,7 @@ TEST(MutateCommand, InterruptedEndsWithWhatWasDone) {
   EXPECT_FALSE(Json::parse(ReadText(folder.path() / "out.json")).at("complete").get<bool>());
 }
 
-// Mistakes in a run: the same exit codes, a table, JSON that a program reads, and what has no meaning there
+// Faults in a run: the same exit codes, a table, JSON that a program reads, and what has no meaning there
 // is refused.
 TEST(MutateRunCommand, CountsWhatIsFoundInARun) {
   const TempFolder folder;
@@ -266,8 +266,8 @@ TEST(MutateRunCommand, CountsWhatIsFoundInARun) {
   const Json json = Json::parse(ReadText(file));
   EXPECT_EQ(json["complete"], true);
   EXPECT_EQ(json["kinds"]["number"]["cause_right"], 4);
-  EXPECT_EQ(json["kinds"]["law, one part"]["mistakes"], 45);
-  EXPECT_EQ(json["mistakes"].size(), json["kinds"]["all"]["mistakes"].get<size_t>());
+  EXPECT_EQ(json["kinds"]["law, one part"]["faults"], 45);
+  EXPECT_EQ(json["faults"].size(), json["kinds"]["all"]["faults"].get<size_t>());
 }
 
 TEST(MutateRunCommand, RefusesWhatHasNoMeaning) {

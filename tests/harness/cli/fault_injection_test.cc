@@ -320,10 +320,10 @@ TEST_F(DamagedLogs, WithImpossibleNumbersAreRefusedOrReadToTheEnd) {
                                               0.0,
                                               -1e-300};
   int differing = 0;
-  for (const double share : {0.001, 0.05, 1.0}) {
+  for (const double fraction : {0.001, 0.05, 1.0}) {
     std::string damaged = bytes_;
     for (unsigned long long at = begin; at + 8 <= end; at += 8) {
-      if (std::uniform_real_distribution<>()(random_) >= share) continue;
+      if (std::uniform_real_distribution<>()(random_) >= fraction) continue;
       std::memcpy(damaged.data() + at, &kNumbers[random_() % kNumbers.size()], 8);
     }
     WriteText(log(), damaged);

@@ -85,7 +85,8 @@ TEST_P(HeldObjects, AreRunReportedAndDrawn) {
   ASSERT_EQ(run.exit_code, 0) << run.out << run.err;
   EXPECT_THAT(run.out, HasSubstr("PASS"));
   const nlohmann::json summary = nlohmann::json::parse(ReadText(folder_.path() / "run/summary.json"));
-  for (const char* check : {"contact_frame", "G", "J_B", "J_B_dot_xi", "G_dot_T_V", "balance_object"})
+  for (const char* check :
+       {"contact_frame", "G", "J_B", "J_B_dot_xi", "G_dot_T_V", "inverse_dynamics_object"})
     EXPECT_GT(summary["checks"][check]["max"].get<double>(), 0.0) << check;
 
   const ProgramOptions there = {.folder = folder_.path()};

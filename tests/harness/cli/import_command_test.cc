@@ -7,7 +7,7 @@
 
 #include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
-#include "tests/harness/sides/panda_urdf.h"
+#include "tests/harness/descriptions/panda_urdf.h"
 
 namespace dexcheck::testing::import_command_test {
 namespace {
@@ -88,7 +88,7 @@ TEST_F(TwoDescriptions, AreJudgedByDigitsWhenTold) {
   EXPECT_EQ(tolerant.exit_code, 0);
   EXPECT_THAT(tolerant.out, HasSubstr("agree to 0.001 in all"));
 
-  // A mistake is none of rounding: nothing is said of digits.
+  // A fault is none of rounding: nothing is said of digits.
   WriteText(folder_.path() / "wrong.urdf",
             ReplaceOnce(testing::MakePandaUrdf(), "<mass value=\"3.228604\"/>", "<mass value=\"3.3\"/>"));
   const ProgramResult wrong = Run({"consistency", "wrong.urdf", mjcf_, "--samples", "20", "--digits", "4"});

@@ -68,7 +68,7 @@ TEST_F(JUnit, OfAComparison) {
 }
 
 TEST_F(JUnit, OfAnAudit) {
-  const std::string path = testing::SourcePath("/harness/sides/examples/arm.urdf");
+  const std::string path = testing::SourcePath("/harness/descriptions/examples/arm.urdf");
   EXPECT_THAT(Run({"audit", path}, 0).failures, ::testing::IsEmpty());
   Spoil(path, "izz=\"0.008\"", "izz=\"0.8\"", "arm.urdf");
   const JUnitFile bad = Run({"audit", "arm.urdf"}, 1);

@@ -141,7 +141,7 @@ TEST_F(OwnArm, WithDryFrictionIsRun) {
   const ProgramResult hidden = Run({"run", "own.toml", "--no-log"});
   EXPECT_EQ(hidden.exit_code, 1) << hidden.out;
   EXPECT_THAT(hidden.out, HasSubstr("joint_dry_friction: joint turn on link world: 0 in the model, 0.5 in"));
-  EXPECT_THAT(hidden.out, HasSubstr("balance_robot"));
+  EXPECT_THAT(hidden.out, HasSubstr("inverse_dynamics_robot"));
   EXPECT_THAT(hidden.out, HasSubstr("FAILS"));
 
   ASSERT_EQ(Run({"import", "arm.xml", "--out", "arm.toml"}).exit_code, 0);

@@ -106,10 +106,11 @@ TEST(OwnController, AnUnknownLawIsNotAsked) {
   EXPECT_EQ(RunWith(PAPER_LAW_LIBRARY, {"--out", own.string()}).exit_code, 0);
   const nlohmann::json checks = ReadSummary(own)["checks"];
   for (const char* check : {"law_torque", "law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality",
-                            "gain_stability", "error_dynamics"}) {
+                            "closed_loop_spectral_radius", "error_dynamics"}) {
     EXPECT_FALSE(checks.contains(check)) << check;
   }
-  for (const char* check : {"told", "torque_applied", "expect_position", "balance_robot", "contact_force"}) {
+  for (const char* check :
+       {"measurement", "torque_applied", "expect_position", "inverse_dynamics_robot", "contact_force"}) {
     EXPECT_TRUE(checks.contains(check)) << check;
   }
   // The log does not hold the library.

@@ -140,11 +140,11 @@ TEST_F(RenderCommandTest, TwoRunsInOneScene) {
                 .exit_code,
             0);
   EXPECT_EQ(ReadPng(still).width, 160) << "not two pictures";
-  const std::string film = folder_.path() / "film.gif";
-  const testing::ProgramResult result = RunDexcheck({"compare", run_, other, "--video", film});
+  const std::string video = folder_.path() / "video.gif";
+  const testing::ProgramResult result = RunDexcheck({"compare", run_, other, "--video", video});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr(film + ": 3 frames"));
-  EXPECT_THAT(testing::ReadText(film), ::testing::StartsWith("GIF89a"));
+  EXPECT_THAT(result.out, HasSubstr(video + ": 3 frames"));
+  EXPECT_THAT(testing::ReadText(video), ::testing::StartsWith("GIF89a"));
   EXPECT_TRUE(IsRefused(RunDexcheck({"render", run_, "--ghost", other, "--beside", other}), {"--beside"}));
 }
 
@@ -214,14 +214,15 @@ TEST_F(RenderCommandTest, RefusesBadRequestsAndLeavesNothing) {
   for (const char* size : {"1280", "x", "1280x721", "0x720", "1280x720x3", "99999x99999", "-2x4"}) {
     EXPECT_TRUE(refused({std::string("--size=") + size}, {"--size: must be WIDTHxHEIGHT", size}));
   }
-  for (const char* name : {"/film.avi", "/film", "/film.png", "/film.jpg"}) {
-    EXPECT_TRUE(refused({"--out", run_ + name}, {name, "a film's name must end in .mp4, .webm or .gif"}));
+  for (const char* name : {"/video.avi", "/video", "/video.png", "/video.jpg"}) {
+    EXPECT_TRUE(refused({"--out", run_ + name}, {name, "a video's name must end in .mp4, .webm or .gif"}));
   }
   for (const char* name : {"/still.mp4", "/still", "/still.tiff"}) {
     EXPECT_TRUE(refused({"--still", "0", "--out", run_ + name},
                         {name, "a picture's name must end in .png, .jpg or .jpeg"}));
   }
-  EXPECT_TRUE(refused({"--out", run_ + "/film.gif", "--fps", "60"}, {"--fps: must be at most 50 for a GIF"}));
+  EXPECT_TRUE(
+      refused({"--out", run_ + "/video.gif", "--fps", "60"}, {"--fps: must be at most 50 for a GIF"}));
   EXPECT_TRUE(refused({"--fps", "0"}, {"--fps", "must be a whole number from 1 to 120"}));
   EXPECT_TRUE(refused({"--beside", "/nowhere"}, {"/nowhere/log.h5"}));
   EXPECT_TRUE(refused({"--camra", "top"}, {"did you mean \"--camera\"?"}));

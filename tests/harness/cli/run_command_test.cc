@@ -56,7 +56,7 @@ TEST(RunCommand, WritesAFolderThatTellsAll) {
   EXPECT_LT(summary["tracking"]["position_error_max_m"].get<double>(), 1e-6);
   EXPECT_GT(summary["tracking"]["position_error_rms_m"].get<double>(), 0.0);
   EXPECT_TRUE(summary["tracking"].contains("orientation_error_max_rad"));
-  for (const char* check : {"M_bar", "balance_robot", "reduced_acceleration", "wheel_slip"}) {
+  for (const char* check : {"M_bar", "inverse_dynamics_robot", "reduced_acceleration", "wheel_slip"}) {
     const nlohmann::json& entry = summary["checks"][check];
     for (const char* key : {"kind", "max", "rms", "bound", "at_time_s", "pass"}) {
       EXPECT_TRUE(entry.contains(key)) << check << " " << key;

@@ -57,7 +57,7 @@ long CountTransactions(const std::string& path) {
   return count;
 }
 
-TEST_F(StudyCommand, ShortTrialsShareTransactionsWithOneJobToo) {
+TEST_F(StudyCommand, ShortTrialsFractionTransactionsWithOneJobToo) {
   constexpr long kTrials = 100;
   WriteText(Path("tiny.toml"), R"(name = "tiny"
 scenario = "hold"
@@ -147,7 +147,7 @@ TEST_F(StudyCommand, AnEditedStudyKeepsItsRows) {
   for (size_t i = 0; i < rows.size(); ++i) EXPECT_TRUE(IsSame(rows[i], expected[i])) << i;
 }
 
-TEST_F(StudyCommand, MistakesAreNamed) {
+TEST_F(StudyCommand, FaultsAreNamed) {
   EXPECT_TRUE(IsRefused(RunDexcheck({"study", "run", "gain", "--db", Path("a.sqlite")}),
                         {"study \"gain\"", "did you mean \"gains\"?"}));
   EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("no/a.sqlite")), {"no/a.sqlite: cannot be opened"}));

@@ -66,14 +66,14 @@ TEST_F(StudySearch, GivesTheSameRowsKilledOrSharedOrAlone) {
   const char* const more = std::getenv("DEXCHECK_KILLS");
   const long kills = more == nullptr ? 4 : std::clamp(std::atol(more), 1L, 100000L);
   std::mt19937 random(5);
-  std::uniform_real_distribution<double> share(0.1, 0.8);
+  std::uniform_real_distribution<double> fraction(0.1, 0.8);
   long midway = 0;
   long searches = 1;
   long made_before = 0;  // kills of earlier searches
   for (long made = 0; made < kills;) {
     {
       const Program killed(DexcheckCommand(RunArguments("killed.sqlite", {"--jobs", "2"})), {});
-      std::this_thread::sleep_for(share(random) * time);
+      std::this_thread::sleep_for(fraction(random) * time);
     }
     const long rows = CountRows("killed.sqlite");
     if (rows < 48) {
@@ -145,7 +145,7 @@ TEST_F(StudySearch, IsWatchedShownAndExported) {
   EXPECT_EQ(std::strtod(csv.out.c_str() + at, nullptr), rows[17].trial.parameters[0]);
 }
 
-// Parts with a database each, which share a folder: whatever happens to them, their rows are the search's.
+// Parts with a database each, which fraction a folder: whatever happens to them, their rows are the search's.
 TEST_F(StudySearch, PartsMakeTheSearchTogether) {
   const auto part = [&](const std::string& shard) {
     return RunArguments(shard.substr(0, 1) + ".sqlite",

@@ -128,7 +128,7 @@ Dump() { sqlite3 "$1" '.mode quote' 'SELECT * FROM study' 'SELECT * FROM trials 
 diff <(Dump merged.sqlite) <(Dump single.sqlite)
 echo "four tasks on two nodes, one requeued: 12 trials equal to those of one process"
 
-# A search by two tasks that share nothing but a folder.
+# A search by two tasks that fraction nothing but a folder.
 cat >search.toml <<'END'
 name = "search"
 scenario = "offset"

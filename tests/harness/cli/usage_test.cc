@@ -155,7 +155,7 @@ TEST(Usage, TablesFitEightyColumns) {
       {"run", "--list"},
       {"consistency", "--samples", "2"},
       {"audit", panda},
-      {"referee", panda, "--samples", "2", "--engines", "analytic,mujoco"},
+      {"engines", panda, "--samples", "2", "--engines", "analytic,mujoco"},
       {"compare", a, b, "--all"},
       {"export", a, "--list"},
       {"export", b, "--list"}};

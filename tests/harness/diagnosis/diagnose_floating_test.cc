@@ -11,12 +11,12 @@
 #include <sstream>
 
 #include "controller/model/parameter_reader.h"
+#include "harness/descriptions/mjcf_reader.h"
+#include "harness/descriptions/parameter_writer.h"
 #include "harness/diagnosis/diagnose.h"
 #include "harness/diagnosis/file_terms.h"
 #include "harness/diagnosis/mutation.h"
 #include "harness/engine/engine.h"
-#include "harness/sides/mjcf_reader.h"
-#include "harness/sides/parameter_writer.h"
 #include "tests/common/legged_robots.h"
 #include "tests/common/matchers.h"
 #include "tests/common/random_robot.h"
@@ -146,7 +146,7 @@ TEST_P(LeggedDiagnosis, MutantsOfTheBaseAreKilledAndNamed) {
     if (GetParam() == "humanoid" && changed.size() == 1) continue;  // as the quadruped's, in 3 s
     kinds.insert(mutant.kind);
     TryMutant(model, *engine_, "robot.xml", {}, &mutant);
-    EXPECT_EQ(mutant.fate, MutantFate::kKilled) << mutant.name;
+    EXPECT_EQ(mutant.outcome, MutantOutcome::kKilled) << mutant.name;
     EXPECT_TRUE(mutant.named_first) << mutant.kind << ": " << mutant.named;
   }
   EXPECT_THAT(kinds, ::testing::IsSupersetOf({"solid of another mass", "inertia about the frame's origin",

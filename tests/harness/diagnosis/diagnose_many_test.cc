@@ -222,9 +222,9 @@ void TrySets(const Robot& robot, bool bodies_only, int sets, const std::string& 
   std::vector<Parameter> numbers = ListParameters(robot.spec);
   if (bodies_only) std::erase_if(numbers, [](const Parameter& p) { return !IsOfBodies(p.kind); });
   for (int i = 0; i < sets; ++i) {
-    const double share = sets == 1 ? 1.0 : static_cast<double>(i) / (sets - 1);
+    const double fraction = sets == 1 ? 1.0 : static_cast<double>(i) / (sets - 1);
     const auto count =
-        static_cast<size_t>(2.0 * std::pow(static_cast<double>(numbers.size()) / 2.0, share) + 0.5);
+        static_cast<size_t>(2.0 * std::pow(static_cast<double>(numbers.size()) / 2.0, fraction) + 0.5);
     const RobotSpec wrong = Spoil(robot.spec, numbers, count, random);
     Look(robot, wrong, bodies_only,
          fmt::format("{}, set {}: {} of {} numbers", name, i, count, numbers.size()), random, tally);

@@ -1,4 +1,4 @@
-// The diagnosis: one mistake is named first, two are both named, and what they repair agrees.
+// The diagnosis: one fault is named first, two are both named, and what they repair agrees.
 
 #include "harness/diagnosis/diagnose.h"
 
@@ -64,9 +64,9 @@ std::optional<Diagnosis> ExplainMutants(const Robot& robot, const std::vector<co
   }
 }
 
-/// Whether one of the first causes, as many as there are mistakes, names the change or lists it as equal.
-bool IsNamed(const Diagnosis& diagnosis, const Mutant& mutant, size_t mistakes) {
-  const size_t looked_at = std::min(mistakes, diagnosis.causes.size());
+/// Whether one of the first causes, as many as there are faults, names the change or lists it as equal.
+bool IsNamed(const Diagnosis& diagnosis, const Mutant& mutant, size_t faults) {
+  const size_t looked_at = std::min(faults, diagnosis.causes.size());
   return std::any_of(diagnosis.causes.begin(),
                      diagnosis.causes.begin() + static_cast<std::ptrdiff_t>(looked_at),
                      [&](const Repair& cause) {
@@ -85,8 +85,8 @@ class Score {
     if (!named) missed_ += "\n  " + what;
   }
   [[nodiscard]] int tried() const { return tried_; }
-  void ExpectShare(double share) const {
-    EXPECT_GE(named_, share * tried_) << named_ << " of " << tried_ << " named; missed:" << missed_;
+  void ExpectFraction(double fraction) const {
+    EXPECT_GE(named_, fraction * tried_) << named_ << " of " << tried_ << " named; missed:" << missed_;
     fmt::print("{} of {} named{}\n", named_, tried_, missed_);
   }
 
@@ -96,8 +96,8 @@ class Score {
   std::string missed_;
 };
 
-/// Whether two changes are of one vector, tensor or row, and so one mistake.
-bool AreOneMistake(const Mutant& a, const Mutant& b) {
+/// Whether two changes are of one vector, tensor or row, and so one fault.
+bool AreOneFault(const Mutant& a, const Mutant& b) {
   const auto touches = [](const Mutant& mutant, const Mutant& other) {
     if (mutant.expected.kind != RepairKind::kParameters) {
       if (other.expected.kind != RepairKind::kParameters) return true;
@@ -118,7 +118,7 @@ void TryPairs(const Robot& robot, int count, std::mt19937* random, Score* score)
   for (int tries = 0; tries < count;) {
     const Mutant& a = mutants[(*random)() % mutants.size()];
     const Mutant& b = mutants[(*random)() % mutants.size()];
-    if (AreOneMistake(a, b)) continue;
+    if (AreOneFault(a, b)) continue;
     ++tries;
     const std::optional<Diagnosis> diagnosis = ExplainMutants(robot, {&a, &b});
     if (!diagnosis) continue;
@@ -160,7 +160,7 @@ RobotSpec Publish(const RobotSpec& spec, double error) {
   return published;
 }
 
-// Rounded numbers are no mistakes when so many digits are asked for; what differs by more is named alone,
+// Rounded numbers are no faults when so many digits are asked for; what differs by more is named alone,
 // within those digits, and printed with hardly more.
 TEST(Diagnose, NamesWhatDiffersBeyondTheDigitsOfPublishedNumbers) {
   constexpr double kPublished = 3e-7;
@@ -173,41 +173,41 @@ TEST(Diagnose, NamesWhatDiffersBeyondTheDigitsOfPublishedNumbers) {
   EXPECT_TRUE(nothing.agrees);
   EXPECT_TRUE(nothing.causes.empty());
 
-  struct Mistake {
+  struct Fault {
     Parameter parameter;
     double factor;
     bool by_motion;
   };
-  for (const Mistake& mistake : {Mistake{{ParameterKind::kMass, 2, 0}, 1.01, false},
-                                 {{ParameterKind::kInertia, 4, 0}, 0.9, false},
-                                 {{ParameterKind::kCom, 5, 1}, 1.3, false},
-                                 {{ParameterKind::kD, 2, 0}, 1.02, false},
-                                 {{ParameterKind::kA, 3, 0}, 0.9, false},
-                                 {{ParameterKind::kAlpha, 3, 0}, 1.01, false},
-                                 {{ParameterKind::kMass, 2, 0}, 1.01, true}}) {
+  for (const Fault& fault : {Fault{{ParameterKind::kMass, 2, 0}, 1.01, false},
+                             {{ParameterKind::kInertia, 4, 0}, 0.9, false},
+                             {{ParameterKind::kCom, 5, 1}, 1.3, false},
+                             {{ParameterKind::kD, 2, 0}, 1.02, false},
+                             {{ParameterKind::kA, 3, 0}, 0.9, false},
+                             {{ParameterKind::kAlpha, 3, 0}, 1.01, false},
+                             {{ParameterKind::kMass, 2, 0}, 1.01, true}}) {
     RobotSpec wrong = published;
-    const double right = GetValue(robot.spec, mistake.parameter);
+    const double right = GetValue(robot.spec, fault.parameter);
     ASSERT_NE(right, 0.0);
-    SetValue(&wrong, mistake.parameter, mistake.factor * right);
-    options.by_motion = mistake.by_motion;
+    SetValue(&wrong, fault.parameter, fault.factor * right);
+    options.by_motion = fault.by_motion;
     const Diagnosis diagnosis = Explain(robot, wrong, options);
     const std::string name =
-        DescribePart(robot.spec, mistake.parameter) + ": " + DescribeQuantity(mistake.parameter);
+        DescribePart(robot.spec, fault.parameter) + ": " + DescribeQuantity(fault.parameter);
     ASSERT_EQ(diagnosis.causes.size(), 1U) << name;
     const Repair& cause = diagnosis.causes.front();
     ASSERT_EQ(cause.parameters.size(), 1U) << name;
-    EXPECT_EQ(cause.parameters.front(), mistake.parameter) << Describe(cause, wrong, "FILE");
+    EXPECT_EQ(cause.parameters.front(), fault.parameter) << Describe(cause, wrong, "FILE");
     EXPECT_NEAR(cause.values.front(), right, options.tolerance * std::abs(right)) << name;
     // What is solved for is rounded; what is read is as the engine has it.
-    if (mistake.by_motion || IsGeometric(mistake.parameter.kind))
-      EXPECT_LE(CountDigits(wrong, mistake.parameter, cause.values.front()), 7) << name;
+    if (fault.by_motion || IsGeometric(fault.parameter.kind))
+      EXPECT_LE(CountDigits(wrong, fault.parameter, cause.values.front()), 7) << name;
     EXPECT_TRUE(diagnosis.remaining_constants.empty()) << name;
     EXPECT_TRUE(diagnosis.remaining_terms.empty()) << name;
   }
 }
 
 // Every mutant of the Panda; what is repaired agrees.
-TEST(Diagnose, NamesEverySingleMistakeOfThePanda) {
+TEST(Diagnose, NamesEverySingleFaultOfThePanda) {
   const Robot robot = LoadPanda();
   Score score;
   int wholly_repaired = 0;
@@ -219,11 +219,11 @@ TEST(Diagnose, NamesEverySingleMistakeOfThePanda) {
     wholly_repaired += diagnosis->remaining_terms.empty() && diagnosis->remaining_constants.empty() ? 1 : 0;
   }
   EXPECT_GT(score.tried(), 200);
-  score.ExpectShare(kSinglesNamedFirst);
+  score.ExpectFraction(kSinglesNamedFirst);
   EXPECT_GE(wholly_repaired, kSinglesNamedFirst * score.tried());
 }
 
-TEST(Diagnose, NamesSingleMistakesOfThePaperRobot) {
+TEST(Diagnose, NamesSingleFaultsOfThePaperRobot) {
   const Robot robot = LoadPaperRobot();
   const std::vector<Mutant> mutants = ListMutants(robot.spec, kScale);
   ASSERT_GT(mutants.size(), 1500U);
@@ -235,10 +235,10 @@ TEST(Diagnose, NamesSingleMistakesOfThePaperRobot) {
     score.Add(!diagnosis->causes.empty() && IsNamedBy(mutants[i], diagnosis->causes.front()),
               mutants[i].name);
   }
-  score.ExpectShare(kSinglesNamedFirst);
+  score.ExpectFraction(kSinglesNamedFirst);
 }
 
-TEST(Diagnose, NamesSingleMistakesOfRandomRobots) {
+TEST(Diagnose, NamesSingleFaultsOfRandomRobots) {
   std::mt19937 random(700);
   Score score;
   for (int index = 0; index < 80; ++index) {
@@ -250,20 +250,20 @@ TEST(Diagnose, NamesSingleMistakesOfRandomRobots) {
     score.Add(!diagnosis->causes.empty() && IsNamedBy(mutant, diagnosis->causes.front()), mutant.name);
   }
   EXPECT_GT(score.tried(), 70);
-  score.ExpectShare(kSinglesNamedFirst);
+  score.ExpectFraction(kSinglesNamedFirst);
 }
 
-TEST(Diagnose, NamesBothOfTwoMistakes) {
+TEST(Diagnose, NamesBothOfTwoFaults) {
   std::mt19937 random(701);
   Score panda;
   TryPairs(LoadPanda(), 60, &random, &panda);
-  panda.ExpectShare(kPairsBothNamed);
+  panda.ExpectFraction(kPairsBothNamed);
   Score random_robots;
   for (int index = 0; index < 45; ++index) TryPairs(MakeRandom(index, &random), 1, &random, &random_robots);
-  random_robots.ExpectShare(kPairsBothNamed);
+  random_robots.ExpectFraction(kPairsBothNamed);
   Score paper_robot;
   TryPairs(LoadPaperRobot(), 16, &random, &paper_robot);
-  paper_robot.ExpectShare(kPairsBothNamed);
+  paper_robot.ExpectFraction(kPairsBothNamed);
 }
 
 // The score must be able to be bad: named by another mutant's expectation, nothing counts.
@@ -304,7 +304,7 @@ TEST(Diagnose, ForcesAloneIdentifyWhatTheyShow) {
     EXPECT_GT(diagnosis.explained_of_forces, 0.999) << mutant.name;
   }
   EXPECT_GT(score.tried(), 40);
-  score.ExpectShare(kSinglesNamedFirst);
+  score.ExpectFraction(kSinglesNamedFirst);
 }
 
 TEST(Diagnose, SaysWhatOnlyTheMjcfHas) {

@@ -36,7 +36,7 @@ TEST_P(WrongEquations, AreAllFoundByTheCheckThatTheyBelongTo) {
   EXPECT_GE(mutants.size(), GetParam().formulas);
   for (FormulaMutant& mutant : mutants) {
     RunFormulaMutant(adapter, kSamples, &mutant);
-    EXPECT_EQ(mutant.fate, MutantFate::kKilled) << mutant.name;
+    EXPECT_EQ(mutant.outcome, MutantOutcome::kKilled) << mutant.name;
     EXPECT_TRUE(mutant.localised) << mutant.name << ": " << mutant.failed_checks;
   }
 }
@@ -129,18 +129,18 @@ TEST(Mutants, WithoutEffectAreShownToHaveNone) {
     if (mutant.name != "joint panda_joint2: upper limit") continue;
     ++limits;
     TryMutant(model, *engine, "mjcf", {}, &mutant);
-    EXPECT_EQ(mutant.fate, MutantFate::kKilled);
+    EXPECT_EQ(mutant.outcome, MutantOutcome::kKilled);
     EXPECT_EQ(mutant.failed_checks, "joint_range");
     EXPECT_TRUE(mutant.named_first);
     Mutant unlimited = mutant;
     engine->jnt_limited[joint] = 0;
     TryMutant(model, *engine, "mjcf", {}, &unlimited);
-    EXPECT_EQ(unlimited.fate, MutantFate::kNoEffect);
+    EXPECT_EQ(unlimited.outcome, MutantOutcome::kNoEffect);
     // A change that has an effect but is too small to be found is a survivor.
     Mutant tiny = mutant;
     tiny.change = [](RobotSpec* spec) { spec->joints[0].mdh.d *= 1.0 + 1e-13; };
     TryMutant(model, *engine, "mjcf", {}, &tiny);
-    EXPECT_NE(tiny.fate, MutantFate::kKilled);
+    EXPECT_NE(tiny.outcome, MutantOutcome::kKilled);
   }
   EXPECT_EQ(limits, 1);
 }
@@ -151,7 +151,7 @@ TEST(Mutants, ThatAreNoRobotAreRefused) {
   Mutant mutant = ListMutants(model.spec(), 1e-3).front();
   mutant.change = [](RobotSpec* spec) { spec->joints[1].body.mass = -1.0; };
   TryMutant(model, *engine, "mjcf", {}, &mutant);
-  EXPECT_EQ(mutant.fate, MutantFate::kRefused);
+  EXPECT_EQ(mutant.outcome, MutantOutcome::kRefused);
 }
 
 TEST(Mutants, ReversedAxisTurnsTheOtherWay) {

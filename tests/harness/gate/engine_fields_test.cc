@@ -272,7 +272,7 @@ class FieldCheck {
     for (const Field& field : ListFields(model.get())) {
       const EngineField& row = *table_.at(field.name);
       const int size = field.count * field.columns;
-      if (row.fate == FieldClass::kDerived || size == 0) continue;
+      if (row.outcome == FieldClass::kDerived || size == 0) continue;
       // Every number at once, and single ones of the first and of a middle element.
       std::vector<std::vector<int>> sets(1);
       for (int i = 0; i < size; ++i) sets[0].push_back(i);
@@ -313,9 +313,9 @@ class FieldCheck {
 
   /// Whether the change is named as the table says; a change that nothing names must move nothing.
   bool Look(const mjModel& model, const std::string& name, const EngineField& row) {
-    const bool terms = row.fate == FieldClass::kCompared;
+    const bool terms = row.outcome == FieldClass::kCompared;
     const Subject::Verdict now = subject_.Judge(model, terms);
-    switch (row.fate) {
+    switch (row.outcome) {
       case FieldClass::kNoEffect:
         EXPECT_TRUE(now.failed.empty()) << name << ": " << *now.failed.begin();
         EXPECT_EQ(now.notes, verdict_.notes) << name;
@@ -409,8 +409,8 @@ TEST_F(EngineFields, ChangedAreNamedOrMoveNothing) {
               Contains(HasSubstr("excluded: panda_link1 and panda_link3")));
   FieldCheck(panda).Run(&named, &tried);
   for (const EngineField& field : ListEngineFields()) {
-    const bool needs_naming = field.fate == FieldClass::kCompared || field.fate == FieldClass::kReported ||
-                              field.fate == FieldClass::kJudged;
+    const bool needs_naming = field.outcome == FieldClass::kCompared ||
+                              field.outcome == FieldClass::kReported || field.outcome == FieldClass::kJudged;
     if (needs_naming && tried[field.name] > 0)
       EXPECT_GT(named[field.name], 0) << field.name << " is never named by " << field.how;
   }

@@ -1,4 +1,4 @@
-// Writers that are refused: by the file system, or for a caller's mistake.
+// Writers that are refused: by the file system, or for a caller's fault.
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>

@@ -241,8 +241,8 @@ TEST(RigidRun, PushesMoveItAsTheEngine) {
     const RunResult& result = run.Run();
     if (plant != "plant.type=engine") {
       EXPECT_EQ(result.verdict, Verdict::kPass) << plant << result.failure << result.attribution.evidence;
-      EXPECT_LE(run.Worst("balance_robot"), 1e-10);
-      EXPECT_LE(run.Worst("balance_object"), 1e-10);
+      EXPECT_LE(run.Worst("inverse_dynamics_robot"), 1e-10);
+      EXPECT_LE(run.Worst("inverse_dynamics_object"), 1e-10);
     }
     return VectorXd(run.step().reading.state.q);
   };
@@ -256,7 +256,7 @@ TEST(RigidRun, PushesMoveItAsTheEngine) {
   const double most = 1e-3 * 2.0 * 20.0;
   const VectorXd apart = rigid - finish(kRigid, true);
   EXPECT_LT(apart.norm(), most * moved);
-  // Of first order in the step: half the step leaves half of it, but for such a share of what is left.
+  // Of first order in the step: half the step leaves half of it, but for such a fraction of what is left.
   const std::string kHalf = "plant.time_step=5e-4";
   const VectorXd half = finish(kEuler, true, kHalf) - finish(kRigid, true, kHalf);
   EXPECT_LT((2.0 * half - apart).norm(), 2.0 * most * apart.norm());

@@ -30,24 +30,28 @@ class SensingTest : public ::testing::Test {
     return {options, PartContext{&model_, 4, kDt, seed, "s.toml"}};
   }
   const Reading& Tell(Sensing& sensing) {
-    sensing.Tell(truth_, &told_);
-    return told_;
+    sensing.Tell(truth_, &measured_);
+    return measured_;
   }
   double& Joint(int i) { return truth_.state.q[model_.num_base_positions() + i]; }
-  [[nodiscard]] double ToldJoint(int i) const { return told_.state.q[model_.num_base_positions() + i]; }
-  [[nodiscard]] double ToldRate(int i) const { return told_.state.xi[model_.num_base_velocities() + i]; }
+  [[nodiscard]] double MeasuredJoint(int i) const {
+    return measured_.state.q[model_.num_base_positions() + i];
+  }
+  [[nodiscard]] double MeasuredRate(int i) const {
+    return measured_.state.xi[model_.num_base_velocities() + i];
+  }
 
   RobotModel model_;
   PlantReading truth_;
-  Reading told_;
+  Reading measured_;
 };
 
 TEST_F(SensingTest, WithoutFaultsTheTruthIsTold) {
   Sensing sensing = Make({});
   Tell(sensing);
-  EXPECT_EQ(told_.state.q, truth_.state.q);
-  EXPECT_EQ(told_.state.xi, truth_.state.xi);
-  EXPECT_EQ(told_.state.X_Bo.matrix(), truth_.state.X_Bo.matrix());
+  EXPECT_EQ(measured_.state.q, truth_.state.q);
+  EXPECT_EQ(measured_.state.xi, truth_.state.xi);
+  EXPECT_EQ(measured_.state.X_Bo.matrix(), truth_.state.X_Bo.matrix());
 }
 
 TEST_F(SensingTest, QuantisationHasTheVarianceOfAnEvenError) {
@@ -59,11 +63,11 @@ TEST_F(SensingTest, QuantisationHasTheVarianceOfAnEvenError) {
     // Slow enough that all parts of a count are visited, with no relation to it.
     Joint(3) = 1.234e-4 * k;
     Tell(sensing);
-    const double error = ToldJoint(3) - Joint(3);
+    const double error = MeasuredJoint(3) - Joint(3);
     EXPECT_LE(std::abs(error), 0.5 * step * (1.0 + 1e-9));
     sum += error;
     squares += error * error;
-    EXPECT_NEAR(std::remainder(ToldJoint(3), step), 0.0, 1e-12);
+    EXPECT_NEAR(std::remainder(MeasuredJoint(3), step), 0.0, 1e-12);
   }
   // Even over one count: mean 0, variance q^2 / 12. A ramp visits it evenly, to one count in kSteps.
   EXPECT_NEAR(sum / kSteps, 0.0, 1e-2 * step);
@@ -79,8 +83,8 @@ TEST_F(SensingTest, NoiseIsWhiteNormalAndItsOwnPerJoint) {
   double s_named = 0.0, s_other = 0.0, cross = 0.0, lag_one = 0.0, fourth = 0.0, last = 0.0;
   for (int k = 0; k < kSteps; ++k) {
     Tell(sensing);
-    const double a = (ToldJoint(named) - 0.1) / 2e-3, b = (ToldJoint(other) - 0.1) / 1e-3;
-    EXPECT_EQ(ToldJoint(none), 0.1);
+    const double a = (MeasuredJoint(named) - 0.1) / 2e-3, b = (MeasuredJoint(other) - 0.1) / 1e-3;
+    EXPECT_EQ(MeasuredJoint(none), 0.1);
     s_named += a * a;
     s_other += b * b;
     fourth += a * a * a * a;
@@ -127,7 +131,7 @@ TEST_F(SensingTest, FilteredDifferencesHaveTheLowPassesTransferFunction) {
       if (k < kSettle) continue;
       const std::complex<double> turn = std::polar(1.0, -phase);
       in += turn * ((Joint(0) - last) / kDt);
-      out += turn * ToldRate(0);
+      out += turn * MeasuredRate(0);
     }
     // y += a (u - y), z transform a / (1 - (1 - a) / z)
     const double a = 1.0 - std::exp(-2.0 * kPi * kCutoff * kDt);
@@ -145,7 +149,7 @@ TEST_F(SensingTest, DifferencesOfExactPositionsAreTheVelocities) {
   for (int k = 0; k < 3; ++k) {
     Joint(5) += kDt * 0.7;
     Tell(sensing);
-    EXPECT_NEAR(ToldRate(5), 0.7, 1e-12);
+    EXPECT_NEAR(MeasuredRate(5), 0.7, 1e-12);
   }
 }
 
@@ -158,10 +162,10 @@ TEST_F(SensingTest, LatencyIsWholeSamplesOfEverything) {
     truth_.touch.support_force = 30.0 + k;
     Tell(sensing);
     const double late = std::max(0, k - 3);
-    EXPECT_EQ(told_.state.q[7], late);
-    EXPECT_EQ(told_.state.xi[7], 10.0 + late);
-    EXPECT_EQ(told_.state.X_Bo.translation().x(), 20.0 + late);
-    EXPECT_EQ(told_.touch.support_force, 30.0 + late);
+    EXPECT_EQ(measured_.state.q[7], late);
+    EXPECT_EQ(measured_.state.xi[7], 10.0 + late);
+    EXPECT_EQ(measured_.state.X_Bo.translation().x(), 20.0 + late);
+    EXPECT_EQ(measured_.touch.support_force, 30.0 + late);
   }
 }
 
@@ -172,8 +176,8 @@ TEST_F(SensingTest, ACameraIsLateAndSeesNowAndThen) {
     truth_.state.q.setConstant(k);
     Tell(sensing);
     const int seen = k < 2 ? 0 : (k - 2) / 4 * 4;
-    EXPECT_EQ(told_.state.X_Bo.translation().x(), seen) << k;
-    EXPECT_EQ(told_.state.q[7], k);
+    EXPECT_EQ(measured_.state.X_Bo.translation().x(), seen) << k;
+    EXPECT_EQ(measured_.state.q[7], k);
   }
 }
 
@@ -189,9 +193,9 @@ TEST_F(SensingTest, ACameraWithAFilterKnowsAConstantMotion) {
     Tell(sensing);
     if (k >= 1500) {
       // Exact measurements of a motion without acceleration: the estimate converges on it, latency and all.
-      EXPECT_LT((told_.state.X_Bo.translation() - truth_.state.X_Bo.translation()).norm(), 1e-9);
-      EXPECT_LT(LogSo3(told_.state.X_Bo.linear().transpose() * truth_.state.X_Bo.linear()).norm(), 1e-9);
-      EXPECT_LT((told_.state.V_Bo - truth_.state.V_Bo).norm(), 1e-7);
+      EXPECT_LT((measured_.state.X_Bo.translation() - truth_.state.X_Bo.translation()).norm(), 1e-9);
+      EXPECT_LT(LogSo3(measured_.state.X_Bo.linear().transpose() * truth_.state.X_Bo.linear()).norm(), 1e-9);
+      EXPECT_LT((measured_.state.V_Bo - truth_.state.V_Bo).norm(), 1e-7);
     }
     truth_.state.X_Bo.translation() += kDt * p_dot;
     truth_.state.X_Bo.linear() = truth_.state.X_Bo.linear() * ExpSo3(kDt * omega);
@@ -204,8 +208,9 @@ TEST_F(SensingTest, NoiseOfTheObjectHasItsSize) {
   constexpr int kSteps = 5000;
   for (int k = 0; k < kSteps; ++k) {
     Tell(sensing);
-    position += (told_.state.X_Bo.translation() - truth_.state.X_Bo.translation()).squaredNorm();
-    orientation += LogSo3(told_.state.X_Bo.linear().transpose() * truth_.state.X_Bo.linear()).squaredNorm();
+    position += (measured_.state.X_Bo.translation() - truth_.state.X_Bo.translation()).squaredNorm();
+    orientation +=
+        LogSo3(measured_.state.X_Bo.linear().transpose() * truth_.state.X_Bo.linear()).squaredNorm();
   }
   const double spread = 5.0 * std::sqrt(2.0 / (3.0 * kSteps));
   EXPECT_NEAR(position / (3.0 * kSteps), 1e-6, spread * 1e-6);
@@ -222,12 +227,12 @@ TEST_F(SensingTest, OdometryIntegratesTheWheels) {
     truth_.state.q.head<3>().setConstant(9.0);  // the true pose is not looked at again
   }
   // A circle of radius v / w through 0.5 rad; the midpoint rule is off by w^2 dt^2 / 24 of the way.
-  EXPECT_NEAR(told_.state.q[2], 0.8, 1e-9);
-  EXPECT_NEAR(told_.state.q[0], 1.0 + v / w * (std::sin(0.8) - std::sin(0.3)), 1e-8);
-  EXPECT_NEAR(told_.state.q[1], 2.0 - v / w * (std::cos(0.8) - std::cos(0.3)), 1e-8);
+  EXPECT_NEAR(measured_.state.q[2], 0.8, 1e-9);
+  EXPECT_NEAR(measured_.state.q[0], 1.0 + v / w * (std::sin(0.8) - std::sin(0.3)), 1e-8);
+  EXPECT_NEAR(measured_.state.q[1], 2.0 - v / w * (std::cos(0.8) - std::cos(0.3)), 1e-8);
   sensing.Translate(Vector3d(-1.0, -2.0, 0.0));
   Tell(sensing);
-  EXPECT_NEAR(told_.state.q[0], v / w * (std::sin(0.8) - std::sin(0.3)), 1e-3);
+  EXPECT_NEAR(measured_.state.q[0], v / w * (std::sin(0.8) - std::sin(0.3)), 1e-3);
 }
 
 TEST(VelocityFilter, InnovationsOfItsOwnModelAreWhiteAndAsLargeAsItSays) {

@@ -51,15 +51,15 @@ TEST(Html, DataCannotEndItsElement) {
             "</script><!--\uFFFD");
 }
 
-TEST(Html, SharesOfABoundAreNoPowersOfTen) {
-  EXPECT_EQ(FormatShare(0.0), "0");
-  EXPECT_EQ(FormatShare(5e-5), "< 0.01 %");
-  EXPECT_EQ(FormatShare(0.0669), "6.7 %");
-  EXPECT_EQ(FormatShare(0.984), "98 %");
-  EXPECT_EQ(FormatShare(0.997), "99.7 %") << "not yet the whole bound";
-  EXPECT_EQ(FormatShare(1.0), "100 %");
-  EXPECT_EQ(FormatShare(1.5), "150 %");
-  EXPECT_EQ(FormatShare(25.0), "25 ×");
+TEST(Html, FractionsOfABoundAreNoPowersOfTen) {
+  EXPECT_EQ(FormatFraction(0.0), "0");
+  EXPECT_EQ(FormatFraction(5e-5), "< 0.01 %");
+  EXPECT_EQ(FormatFraction(0.0669), "6.7 %");
+  EXPECT_EQ(FormatFraction(0.984), "98 %");
+  EXPECT_EQ(FormatFraction(0.997), "99.7 %") << "not yet the whole bound";
+  EXPECT_EQ(FormatFraction(1.0), "100 %");
+  EXPECT_EQ(FormatFraction(1.5), "150 %");
+  EXPECT_EQ(FormatFraction(25.0), "25 ×");
 }
 
 }  // namespace

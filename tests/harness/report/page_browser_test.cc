@@ -92,7 +92,7 @@ class PageBrowserTest : public ::testing::Test {
   }
 
   testing::TempFolder folder_;
-  Browser& browser_ = Browser::Share();
+  Browser& browser_ = Browser::Fraction();
 };
 
 TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
@@ -137,8 +137,8 @@ TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
   EXPECT_THAT(browser_.TakeConsole(), IsEmpty());
 }
 
-// A film of one second, as `dexcheck run --video` encodes it: red, from the middle on blue.
-void WriteFilm(const std::filesystem::path& path) {
+// A video of one second, as `dexcheck run --video` encodes it: red, from the middle on blue.
+void WriteVideo(const std::filesystem::path& path) {
   VideoOptions options;
   options.width = 160;
   options.height = 90;
@@ -191,7 +191,7 @@ TEST_F(PageBrowserTest, AComparisonsTablesStayInTheirCards) {
 }
 
 TEST_F(PageBrowserTest, PlaysTheVideo) {
-  WriteFilm(folder_.path() / "video.mp4");
+  WriteVideo(folder_.path() / "video.mp4");
   WriteRunReport(folder_.path(), MakeReportFiles(folder_.path()), MakeNoScene);
   browser_.SetViewport(1280, 720);
   browser_.Open(folder_.path() / "report.html");

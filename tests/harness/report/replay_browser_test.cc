@@ -80,7 +80,7 @@ class ReplayBrowserTest : public ::testing::Test {
   RunFrames run_;
   MjModelPtr model_ = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   MjDataPtr data_ = MakeData(*model_);
-  Browser& browser_ = Browser::Share();
+  Browser& browser_ = Browser::Fraction();
 };
 
 /// Each body that moves is where a bone is.
@@ -172,7 +172,7 @@ TEST_F(ReplayBrowserTest, DrawsWhatTheOffscreenRendererDrawsAndCostsAPhoneLittle
   EXPECT_GT(std::abs(last - first), 50.0) << "the object moved in the picture";
 }
 
-TEST_F(ReplayBrowserTest, SharesItsTimeWithThePlots) {
+TEST_F(ReplayBrowserTest, FractionsItsTimeWithThePlots) {
   // A click on the failing check shows its moment, in the replay and in the plots.
   Ask("document.documentElement.style.scrollBehavior = 'auto'; "
       "document.getElementById('plots').scrollIntoView();");

@@ -56,7 +56,7 @@ inline std::string MakeReportSummary(const ReportRun& run) {
     if (max > bound) json["checks"][name]["failed_at_s"] = 0.133;
   };
   add("M_bar", "model", "1", 1e-16, 1e-13);
-  add("balance_robot", "balance", "1", 5e-6, 1e-5);
+  add("inverse_dynamics_robot", "balance", "1", 5e-6, 1e-5);
   add("contact_force", "prediction", "1", 1e-9, 1e-6);
   add("wheel_slip", "assumption", "m", fails ? 4e-3 : 1e-5, 1e-3);
   return json.dump(2);
@@ -95,7 +95,7 @@ inline void WriteReportRun(const std::filesystem::path& folder, const ReportRun&
   std::vector<int> checks;
   const std::vector<std::pair<const char*, std::map<std::string, double>>> names = {
       {"M_bar", {{"bound", 1e-13}, {"kind", 0.0}}},
-      {"balance_robot", {{"bound", 1e-5}, {"kind", 1.0}}},
+      {"inverse_dynamics_robot", {{"bound", 1e-5}, {"kind", 1.0}}},
       {"contact_force", {{"bound", 1e-6}, {"kind", 2.0}}},
       {"wheel_slip", {{"bound", 1e-3}, {"kind", 3.0}}}};
   for (const auto& [name, attributes] : names) {

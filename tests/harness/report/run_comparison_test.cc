@@ -151,7 +151,8 @@ TEST_F(RunComparisonTest, ChecksOfARunWithoutSummaryKeepTheirQuestion) {
   WriteLine(folder_.path(), 0.01, 1.0, "");
   const RunData run(folder_.path());
   for (const CheckLine& check : run.checks())
-    EXPECT_EQ(check.kind, check.name == "law_torque" ? CheckKind::kLaw : CheckKind::kModel) << check.name;
+    EXPECT_EQ(check.kind, check.name == "law_torque" ? CheckCategory::kLaw : CheckCategory::kModel)
+        << check.name;
 }
 
 }  // namespace

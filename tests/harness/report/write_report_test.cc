@@ -96,7 +96,7 @@ TEST_F(WriteReportTest, ShowsTheOptimalForcesBesideTheMeasuredOnes) {
   EXPECT_EQ(figure->curves[3].values[3], 0.0);
 }
 
-TEST_F(WriteReportTest, DrawsResidualsAsSharesOfTheirBounds) {
+TEST_F(WriteReportTest, DrawsResidualsAsFractionsOfTheirBounds) {
   WriteReportRun(run_dir());
   const std::vector<Figure> figures = MakeResidualFigures(RunData(run_dir()));
   ASSERT_EQ(figures.size(), 4U);
@@ -112,7 +112,8 @@ TEST_F(WriteReportTest, PutsFailedChecksFirstThenTheNearestToTheirBounds) {
   const RunData run(run_dir());
   std::vector<std::string> names;
   for (const CheckLine& check : run.checks()) names.push_back(check.name);
-  EXPECT_THAT(names, ElementsAre("wheel_slip", "balance_robot", "M_bar", "contact_force", "link_mass"));
+  EXPECT_THAT(names,
+              ElementsAre("wheel_slip", "inverse_dynamics_robot", "M_bar", "contact_force", "link_mass"));
   EXPECT_FALSE(run.checks()[0].pass);
   EXPECT_TRUE(run.checks()[4].constant);
 }
@@ -134,9 +135,10 @@ TEST_F(WriteReportTest, WritesPageAndFiguresAndLeavesNothingElse) {
 
 TEST_F(WriteReportTest, SaysVerdictCauseAndWhatWasRun) {
   const std::string page = Report();
-  for (const char* text : {"<strong>DISAGREEMENT</strong>", "Cause: <b>wheel slip</b>",
-                           "wheel_slip 0.004 (bound 0.001)", "fails from 0.133 s", "what balance_robot is",
-                           "a=&lt;b&gt;", "duration=0.4<br>mu=0.5", "2.2.2", "0.0.1"}) {
+  for (const char* text :
+       {"<strong>DISAGREEMENT</strong>", "Cause: <b>wheel slip</b>", "wheel_slip 0.004 (bound 0.001)",
+        "fails from 0.133 s", "what inverse_dynamics_robot is", "a=&lt;b&gt;", "duration=0.4<br>mu=0.5",
+        "2.2.2", "0.0.1"}) {
     EXPECT_THAT(page, HasSubstr(text));
   }
 }
@@ -210,20 +212,20 @@ TEST(Figures, CurvesOfTwoAxesDoNotLieOnOneAnother) {
   figure.least_span = 0.02;
   figure.label = "position (m)";
   figure.curves = {{"y", VectorXd::Constant(3, -0.22)}, {"z", VectorXd::Constant(3, 0.73)}};
-  const auto share = [&](double value, bool right) {
+  const auto fraction = [&](double value, bool right) {
     const std::array<double, 2> range = CalcAxisRange(figure, right);
     return (value - range[0]) / (range[1] - range[0]);
   };
-  EXPECT_LT(share(-0.22, false), 0.1) << "one axis is filled";
-  EXPECT_GT(share(0.73, false), 0.9);
+  EXPECT_LT(fraction(-0.22, false), 0.1) << "one axis is filled";
+  EXPECT_GT(fraction(0.73, false), 0.9);
   figure.right_label = "angle (rad)";
   for (const double angle : {-1.57, 0.0, 1.83}) {
     figure.curves.push_back({"angle", VectorXd::Constant(3, angle), 2, 0, true});
   }
-  EXPECT_GT(share(-0.22, false), 0.5);
-  EXPECT_LT(share(0.73, false), 1.0);
-  EXPECT_GT(share(-1.57, true), 0.0);
-  EXPECT_LT(share(1.83, true), 0.5);
+  EXPECT_GT(fraction(-0.22, false), 0.5);
+  EXPECT_LT(fraction(0.73, false), 1.0);
+  EXPECT_GT(fraction(-1.57, true), 0.0);
+  EXPECT_LT(fraction(1.83, true), 0.5);
 }
 
 }  // namespace

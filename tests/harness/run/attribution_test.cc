@@ -50,10 +50,10 @@ INSTANTIATE_TEST_SUITE_P(
               Cause::kContactSoftness},
         Fault{
             "creeping_contacts", "paper-ramp", {"duration=4.5", "plant.impratio=1"}, Cause::kContactSoftness},
-        Fault{"joint_stop",
+        Fault{"joint_limit",
               "two-hands",
               {"duration=5.5", "grasp.contacts_deg.3=[-121, 109]"},
-              Cause::kJointStop},
+              Cause::kJointLimit},
         Fault{"ring_radius", "two-hands", {"duration=0.1", "model.object.ring_radius=0.2503"}, Cause::kModel},
         Fault{"slippery_floor", "paper-ramp", {"duration=2", "plant.floor_friction=0.1"}, Cause::kWheelSlip}),
     [](const ::testing::TestParamInfo<Fault>& info) { return info.param.name; });

@@ -11,7 +11,7 @@
 
 #include "controller/control/actuation.h"
 #include "controller/dynamics/tree_factor.h"
-#include "harness/checks/contact_give.h"
+#include "harness/checks/contact_compliance.h"
 #include "harness/engine/contact_softness.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
@@ -64,7 +64,7 @@ TEST(Bounds, FollowStepStiffnessAndGains) {
   expect(kErrorDynamics, {"control.natural_frequency=10"}, 4.0);
   expect(kOrientationDynamics, {"control.natural_frequency=40"}, 0.25);
   expect(kIdleJoints, {"control.posture_frequency=20"}, 0.25);
-  for (const StepCheck check : {kLawTorque, kBalanceRobot, kBalanceObject, kConeUse, kSolver})
+  for (const StepCheck check : {kLawTorque, kInverseDynamicsRobot, kInverseDynamicsObject, kConeUse, kSolver})
     expect(check, {soft, step, slow}, 1.0);
   EXPECT_DOUBLE_EQ(CalcRatio(kErrorDynamics, {"control.natural_frequency=0"}), 1.0);
 }
@@ -86,19 +86,19 @@ TEST(Bounds, OfAScenarioFollowWhatIsSet) {
   EXPECT_NEAR(find("fingertip_slip_rate", {soft, step}), 20.0 * slip, 1e-9 * slip);
   // Whoever sets the bound means it.
   EXPECT_EQ(find("fingertip_slip_rate", {soft, "bounds.fingertip_slip_rate=3e-3"}), 3e-3);
-  // One that is a share scales with nothing.
+  // One that is a fraction scales with nothing.
   EXPECT_EQ(find("contact_force", {soft, step}), force);
 }
 
-TEST(ContactGive, ConstantForcesAreHeldWhole) {
+TEST(ContactCompliance, ConstantForcesAreHeldWhole) {
   PlantOptions plant;
-  ContactGive give(plant, ContactGive::Share::Of(0.2), ContactGive::Share::Of(0.1));
+  ContactCompliance give(plant, ContactCompliance::Fraction::Of(0.2), ContactCompliance::Fraction::Of(0.1));
   const Vector3d force(1.0, -2.0, 0.5);
   for (int i = 0; i < 10; ++i) {
     give.Add(force);
     EXPECT_LE(give.size(), 1e-15);
   }
-  // At first a share of a step is missing, and some time constants later nothing.
+  // At first a fraction of a step is missing, and some time constants later nothing.
   const Vector3d step(0.0, 1.0, 0.0);
   give.Add(force + step);
   EXPECT_NEAR(give.along_normal().norm(), 0.2, 1e-12);
@@ -107,18 +107,18 @@ TEST(ContactGive, ConstantForcesAreHeldWhole) {
   EXPECT_LE(give.size(), 1e-6);
 }
 
-TEST(ContactGive, AccelerationsAreHeldBackWhole) {
+TEST(ContactCompliance, AccelerationsAreHeldBackWhole) {
   PlantOptions plant;
-  ContactGive give(plant, ContactGive::Share::Of(0.0), ContactGive::Share::Whole());
+  ContactCompliance give(plant, ContactCompliance::Fraction::Of(0.0), ContactCompliance::Fraction::Whole());
   give.Add(VectorXd::Zero(1));
   give.Add(VectorXd::Ones(1));
   EXPECT_EQ(give.along_normal().norm(), 0.0);
   EXPECT_NEAR(give.along_tangent().norm(), 1.0, 1e-12);
 }
 
-// Modes of any shares up to the softest one's, under forces that jump at every step or wander: together they
-// hold back at most what is said, where the softest alone would be less than that.
-TEST(ModesGive, BoundsAllModes) {
+// Modes of any fractions up to the softest one's, under forces that jump at every step or wander: together
+// they hold back at most what is said, where the softest alone would be less than that.
+TEST(ModesCompliance, BoundsAllModes) {
   constexpr int kCount = 6;
   PlantOptions plant;
   plant.contact_impedance = 0.9;
@@ -126,13 +126,13 @@ TEST(ModesGive, BoundsAllModes) {
   std::normal_distribution<double> normal;
   const auto length = [](const VectorXd& f) { return f.norm(); };
   double largest = 0.0, over_softest = 0.0;
-  for (const double share : {0.1, 0.5, 0.7}) {
+  for (const double fraction : {0.1, 0.5, 0.7}) {
     for (const double kept : {0.0, 1.0}) {
-      ModesGive all(plant, share, 0.0);
-      std::vector<ContactGive> modes;
+      ModesCompliance all(plant, fraction, 0.0);
+      std::vector<ContactCompliance> modes;
       for (int i = 0; i < kCount; ++i) {
-        const double own = share * (i + 1.0) / kCount;
-        modes.emplace_back(plant, ContactGive::Share::Of(own), ContactGive::Share::Of(0.0));
+        const double own = fraction * (i + 1.0) / kCount;
+        modes.emplace_back(plant, ContactCompliance::Fraction::Of(own), ContactCompliance::Fraction::Of(0.0));
       }
       VectorXd force = VectorXd::Zero(kCount), held(kCount);
       for (int step = 0; step < 2000; ++step) {
@@ -164,7 +164,8 @@ TEST(Balance, KnowsThePlatformThatTiltsUnderRoughTorques) {
   }
 }
 
-// What the prediction misses when the torques jump at the start of `offset` is the derived share of the jump.
+// What the prediction misses when the torques jump at the start of `offset` is the derived fraction of the
+// jump.
 TEST(ContactSoftness, IsWhatThePredictionMisses) {
   for (const char* step : {"0.002"}) {
     for (const char* impedance : {"0.9", "0.99", "0.999"}) {
@@ -189,10 +190,10 @@ TEST(ContactSoftness, IsWhatThePredictionMisses) {
       const ContactSoftness softness = FindContactSoftness(offset.setup().adapter(), offset.setup().q_start(),
                                                            offset.setup().X_Bo_start());
       ASSERT_GT(missed.norm(), 1e-4);
-      const double share = missed.norm() / jump.norm();
-      EXPECT_LE(share, softness.share);
-      // Measured 0.38 to 0.9 of the largest share: the jump is not along its direction.
-      EXPECT_GE(share, 0.25 * softness.share);
+      const double fraction = missed.norm() / jump.norm();
+      EXPECT_LE(fraction, softness.fraction);
+      // Measured 0.38 to 0.9 of the largest fraction: the jump is not along its direction.
+      EXPECT_GE(fraction, 0.25 * softness.fraction);
       EXPECT_FALSE(offset.loop().checks().Find("reduced_acceleration").failed);
     }
   }
@@ -204,12 +205,13 @@ TEST(ContactSoftness, GrowsWithSoftness) {
     return FindContactSoftness(run.setup().adapter(), run.setup().q_start(), run.setup().X_Bo_start());
   };
   const ContactSoftness soft = find("0.99"), stiff = find("0.999");
-  for (const auto share : {&ContactSoftness::share, &ContactSoftness::tangential_share,
-                           &ContactSoftness::object_share, &ContactSoftness::object_tangential_share}) {
-    EXPECT_GT(soft.*share, 0.0);
-    // (1 - d) / d over A: ten times, but for what the share takes of A + R itself.
-    EXPECT_NEAR(soft.*share / (stiff.*share), 10.0, 1.5);
-    EXPECT_LE(soft.*share, soft.share);
+  for (const auto fraction :
+       {&ContactSoftness::fraction, &ContactSoftness::tangential_fraction, &ContactSoftness::object_fraction,
+        &ContactSoftness::object_tangential_fraction}) {
+    EXPECT_GT(soft.*fraction, 0.0);
+    // (1 - d) / d over A: ten times, but for what the fraction takes of A + R itself.
+    EXPECT_NEAR(soft.*fraction / (stiff.*fraction), 10.0, 1.5);
+    EXPECT_LE(soft.*fraction, soft.fraction);
   }
 }
 
@@ -220,7 +222,7 @@ TEST(Balance, KnowsTheFrictionOfWheelsThatSpin) {
   const RunResult& result = run.Run();
   EXPECT_GT(run.Worst("wheel_slip_rate"), 0.05);
   // Nor is the Coriolis force of a platform that hops, which alone is 3.1e-4.
-  EXPECT_LE(run.Worst("balance_robot"), 1e-6);  // measured 0
+  EXPECT_LE(run.Worst("inverse_dynamics_robot"), 1e-6);  // measured 0
   EXPECT_EQ(result.attribution.cause, Cause::kWheelSlip);
 }
 

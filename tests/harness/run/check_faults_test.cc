@@ -53,8 +53,10 @@ const std::vector<std::string> kSlippery = {"duration=0.1", "plant.finger_fricti
 const std::vector<std::string> kShort = {"duration=0.05"};
 
 const CheckFault kFaults[] = {
-    {"balance_robot", "hold", {"duration=0.02", "model.template.arm.links.forearm.shapes.0.mass=1.5"}},
-    {"balance_object", "hold", {"duration=0.02", "model.object.mass=0.21"}},
+    {"inverse_dynamics_robot",
+     "hold",
+     {"duration=0.02", "model.template.arm.links.forearm.shapes.0.mass=1.5"}},
+    {"inverse_dynamics_object", "hold", {"duration=0.02", "model.object.mass=0.21"}},
     {"reduced_acceleration", "hold", kSoft},
     {"contact_force", "hold", kSoft},
     {"fingertip_slip", "hold", kSlippery},
@@ -70,10 +72,10 @@ const CheckFault kFaults[] = {
     {"base_tilt", "paper-rest", kShort},
     {"idle_joints", "paper-rest", kShort},
     {"solver", "hold", {"duration=0.02"}, StopSolverEarly},
-    {"joint_stop", "hold", {"duration=0.02", "model.template.arm.joints.elbow.range=[-0.1, 1.4]"}},
+    {"joint_limit", "hold", {"duration=0.02", "model.template.arm.joints.elbow.range=[-0.1, 1.4]"}},
     {"clearance", "hold", {"duration=0.02", "grasp.joints_deg.l_shoulder_roll=-20"}},
     {"collision", "hold", {"duration=0.02", "plant.collide=true"}, ThickenLeftFingers},
-    {"unjudged",
+    {"excluded",
      "lift",
      {"duration=0.6", "settle=0.01", "task.xyz=[0.25, -0.5, 0.6335]", "plant.contact_time_constant=0.02"},
      RemoveDampingOfObject},
@@ -109,7 +111,7 @@ TEST(CheckFaults, AreThereForEveryCheck) {
   const ShippedRun run("hold");
   // Those of the law are in law_check_test, that of hemispheres in fingertip_rim_test.
   for (const CheckRecord& check : run.loop().checks().motion_checks()) {
-    if (check.kind != CheckKind::kLaw && check.name != std::string("fingertip_rim"))
+    if (check.kind != CheckCategory::kLaw && check.name != std::string("fingertip_rim"))
       checks.insert(check.name);
   }
   EXPECT_EQ(seeded, checks);
@@ -131,9 +133,9 @@ TEST(CheckFaults, WhatARunCannotAskIsNotPrinted) {
   using ::testing::Not;
   const std::set<std::string> hold = ListApplying(ShippedRun("hold"));
   EXPECT_THAT(hold, Contains("object_pose"));
-  EXPECT_THAT(hold, Not(Contains("unjudged")));
+  EXPECT_THAT(hold, Not(Contains("excluded")));
   const std::set<std::string> lift = ListApplying(ShippedRun("lift"));
-  EXPECT_THAT(lift, Contains("unjudged"));
+  EXPECT_THAT(lift, Contains("excluded"));
   // With the rotation itself as feedback nothing is made of the pose that was measured.
   EXPECT_THAT(lift, Not(Contains("object_pose")));
   EXPECT_THAT(lift, Not(Contains("V_Bo")));

@@ -88,7 +88,7 @@ TEST(ClearanceOfARun, APalmInTheTableIsFound) {
                           [](const CheckRecord& check) { return check.name == "clearance"; }));
   // It passes through, and pushes nothing.
   EXPECT_FALSE(run.checks().Find("collision").applies);
-  EXPECT_FALSE(run.checks().Find("balance_robot").failed);
+  EXPECT_FALSE(run.checks().Find("inverse_dynamics_robot").failed);
   const auto there = run.summary()["clearance"]["robot_surroundings"];
   EXPECT_NEAR(there["smallest_m"].get<double>(), -0.005, 1e-4);
   EXPECT_THAT(there["bodies"].get<std::string>(), HasSubstr("r_palm"));
@@ -103,7 +103,7 @@ TEST(ClearanceOfARun, ATableBesideThePalmIsNot) {
 }
 
 TEST(ClearanceOfARun, WhatMayTouchIsNotTold) {
-  const HoldAtATable run(0.005, {"plant.may_touch=[['r_palm', 'bench']]"});
+  const HoldAtATable run(0.005, {"plant.allowed_collision_pairs=[['r_palm', 'bench']]"});
   EXPECT_EQ(run.result().verdict, Verdict::kPass)
       << run.result().failure << run.result().attribution.evidence;
 }
@@ -168,12 +168,13 @@ TEST(ClearanceOfARun, ABodyAtRestPushesByItsWeight) {
 
 TEST(ClearanceOfARun, UnknownBodiesAreRefused) {
   try {
-    const HoldAtATable run(0.0, {"plant.may_touch=[['r_plam', 'bench']]"});
+    const HoldAtATable run(0.0, {"plant.allowed_collision_pairs=[['r_plam', 'bench']]"});
     FAIL() << "accepted";
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("plant.may_touch: \"r_plam\" is no body with a shape in the MJCF"));
+    EXPECT_THAT(error.what(),
+                HasSubstr("plant.allowed_collision_pairs: \"r_plam\" is no body with a shape in the MJCF"));
   }
-  EXPECT_THROW(ReadShippedScenario("hold", {"plant.may_touch=[['r_palm']]"}), InputError);
+  EXPECT_THROW(ReadShippedScenario("hold", {"plant.allowed_collision_pairs=[['r_palm']]"}), InputError);
   EXPECT_THROW(ReadShippedScenario("hold", {"plant={ type = 'rigid', collide = true }"}), InputError);
 }
 

@@ -29,8 +29,8 @@ namespace {
 
 /// What a scenario is expected to come to: "none" but where an assumption breaks on purpose.
 const std::map<std::string, std::string> kExpectedCause = {{"paper-rest", "wheel slip"}};
-/// A share of the bound from which on a check is told, below an alarm.
-constexpr double kTold = 0.5;
+/// A fraction of the bound from which on a check is told, below an alarm.
+constexpr double kNear = 0.5;
 
 std::vector<std::string> ListShipped() {
   std::vector<std::string> names;
@@ -65,7 +65,7 @@ struct Choice {
 };
 
 struct Largest {
-  double share = 0.0;
+  double fraction = 0.0;
   std::string where;
 };
 
@@ -195,11 +195,11 @@ bool Try(const Choice& choice, std::map<std::string, Largest>* largest) {
   }
   std::string told;
   for (const CheckRecord& check : run.loop().checks().motion_checks()) {
-    if (!check.applies || check.bound <= 0.0 || check.name == "gain_stability") continue;
-    const double share = check.worst / check.bound;
-    if (expected == kExpectedCause.end() && share > (*largest)[check.name].share)
-      (*largest)[check.name] = {share, choice.Describe()};
-    if (share > kTold) told += fmt::format(" {} {:.2g} of {:.2g}", check.name, check.worst, check.bound);
+    if (!check.applies || check.bound <= 0.0 || check.name == "closed_loop_spectral_radius") continue;
+    const double fraction = check.worst / check.bound;
+    if (expected == kExpectedCause.end() && fraction > (*largest)[check.name].fraction)
+      (*largest)[check.name] = {fraction, choice.Describe()};
+    if (fraction > kNear) told += fmt::format(" {} {:.2g} of {:.2g}", check.name, check.worst, check.bound);
   }
   if (!right || (!told.empty() && expected == kExpectedCause.end()))
     fmt::print("  {}:{}\n", choice.Describe(), told);
@@ -220,8 +220,8 @@ int RunCampaign(const Options& options) {
       fmt::print("refused {}: {}\n", choice.Describe(), error.what());
     }
   }
-  fmt::print("\n{:<24}{:>16}  in\n", "check", "share of bound");
-  for (const auto& [name, at] : largest) fmt::print("{:<24}{:>16.3g}  {}\n", name, at.share, at.where);
+  fmt::print("\n{:<24}{:>16}  in\n", "check", "fraction of bound");
+  for (const auto& [name, at] : largest) fmt::print("{:<24}{:>16.3g}  {}\n", name, at.fraction, at.where);
   fmt::print("{} false alarms in {} runs, {} refused\n", alarms, runs - refused, refused);
   // A campaign that runs next to nothing says nothing.
   return alarms == 0 && 2 * refused <= runs ? 0 : 1;

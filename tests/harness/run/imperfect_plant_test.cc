@@ -105,21 +105,21 @@ INSTANTIATE_TEST_SUITE_P(All, KnownCauses, ::testing::ValuesIn(kKnown),
 /// thousandth of a part that does not vanish with the errors fails law_demand under noise as it does without.
 TEST(KnownNoise, DoesNotBlindTheDemandOfTheLaw) {
   size_t parts = 0;
-  for (const LawMistake& mistake : ListLawMistakes(/*has_wheels=*/true)) {
-    if (mistake.factor != 1.001) continue;
-    const std::string name = ListLawParts()[mistake.part].name;
+  for (const LawFault& fault : ListLawFaults(/*has_wheels=*/true)) {
+    if (fault.factor != 1.001) continue;
+    const std::string name = ListLawParts()[fault.part].name;
     if (name != "mass matrix M_bar'" && name != "object's wrench G^+ F_o") continue;
     ++parts;
     for (const char* noise : {"sensing.velocity_noise=1e-2", "sensing.object_position_noise=1e-5"}) {
-      SCOPED_TRACE(mistake.name + " " + noise);
+      SCOPED_TRACE(fault.name + " " + noise);
       ShippedRun run("curve", {"duration=0.02", "settle=0.3", "expect={}", noise}, 1);
       LoopParts wrong = MakeLoopParts(run.setup());
-      wrong.controller = std::make_unique<SpoiledLaw>(run.setup(), mistake);
+      wrong.controller = std::make_unique<SpoiledLaw>(run.setup(), fault);
       Runner runner(run.setup(), /*check=*/true, std::move(wrong));
       runner.Run([](const StepRecord&) {}, [] { return false; });
       EXPECT_TRUE(runner.loop().checks().Find("law_demand").failed)
           << runner.loop().checks().Find("law_demand").worst;
-      EXPECT_FALSE(runner.loop().checks().Find("told").failed);
+      EXPECT_FALSE(runner.loop().checks().Find("measurement").failed);
     }
   }
   EXPECT_EQ(parts, 2U);
@@ -222,7 +222,7 @@ TEST(ImperfectPlant, WhatIsTooBadForTheExpectationIsStillSaid) {
   const RunResult& result = run.Run();
   EXPECT_EQ(result.verdict, Verdict::kDisagreement);
   EXPECT_TRUE(run.loop().checks().Find("expect_position").failed);
-  EXPECT_FALSE(run.loop().checks().Find("balance_robot").failed);
+  EXPECT_FALSE(run.loop().checks().Find("inverse_dynamics_robot").failed);
 }
 
 TEST(ImperfectPlant, CurveRealDoesWhatItExpects) {

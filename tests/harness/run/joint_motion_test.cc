@@ -22,7 +22,8 @@ TEST(JointMotionRun, PandaReachesToRounding) {
     EXPECT_GE(check.count, 3000) << check.name;
     EXPECT_FALSE(check.failed) << check.name << " " << check.worst;
   }
-  for (const char* check : {"law_torque", "balance_robot", "reduced_acceleration", "joint_dynamics"}) {
+  for (const char* check :
+       {"law_torque", "inverse_dynamics_robot", "reduced_acceleration", "joint_dynamics"}) {
     EXPECT_EQ(run.loop().checks().Find(check).count, 3000) << check;
     EXPECT_LE(run.Worst(check), kRounding) << check;
   }
@@ -32,7 +33,7 @@ TEST(JointMotionRun, PandaReachesToRounding) {
   EXPECT_GT(run.step().reading.state.xi.cwiseAbs().maxCoeff(), 0.1);
   // Nothing is held, and nothing is said of it.
   for (const char* check :
-       {"contact_force", "fingertip_slip", "kappa", "balance_object", "grasp_optimality"}) {
+       {"contact_force", "fingertip_slip", "kappa", "inverse_dynamics_object", "grasp_optimality"}) {
     EXPECT_FALSE(run.loop().checks().Find(check).applies) << check;
   }
 }

@@ -77,7 +77,7 @@ TEST_F(LoopPartsTest, MotorsThatGiveLessThanTheySayAreFound) {
   parts_.plant = std::make_unique<WeakPlant>(std::move(parts_.plant), 0.999);
   const StepRecord& step = Run();
   EXPECT_EQ(runner_->result().verdict, Verdict::kDisagreement) << runner_->result().failure;
-  EXPECT_GT(Worst("balance_robot"), 1e-4);
+  EXPECT_GT(Worst("inverse_dynamics_robot"), 1e-4);
   EXPECT_GT((step.response.motor_torques - step.drive.tau).norm(), 5e-4 * step.drive.tau.norm());
 }
 
@@ -85,7 +85,7 @@ TEST_F(LoopPartsTest, AWrongLawMovesTheObjectButIsNoFaultOfTheModel) {
   parts_.controller = std::make_unique<WrongController>(std::move(parts_.controller), 0.999);
   const StepRecord& step = Run();
   EXPECT_EQ(runner_->result().failure, "");
-  EXPECT_LE(Worst("balance_robot"), 1e-5);
+  EXPECT_LE(Worst("inverse_dynamics_robot"), 1e-5);
   EXPECT_GT(runner_->result().tracking.position_max(), 1e-6);
   // What the law demanded is not what happened.
   EXPECT_GT((step.response.xi_dot - step.command.demand.xi_dot).norm(), 1e-3);

@@ -1,4 +1,4 @@
-// Mistakes made in a run on purpose are found, and their causes are named and measured.
+// Faults made in a run on purpose are found, and their causes are named and measured.
 
 #include "harness/run/run_mutation.h"
 
@@ -24,12 +24,12 @@ RunCampaign MakeCampaign(const RunMutationOptions& options, const char* scenario
   return {ReadShippedScenario(scenario, {"settle=0.2"}), kRobot, kScene, options, kGoOn};
 }
 
-/// How many of the campaign's mistakes came to what.
+/// How many of the campaign's faults came to what.
 struct Count {
   int made = 0, killed = 0, cause = 0, part = 0, with_part = 0;
 };
 
-/// Makes those mistakes that are chosen.
+/// Makes those faults that are chosen.
 template <typename Choose>
 Count RunSome(RunCampaign* campaign, const Choose& choose) {
   Count count;
@@ -108,7 +108,7 @@ TEST(RunCampaign, FindsFaultsOfPlantsAndTheirCauses) {
 
 // A hand on the Panda that holds a ball, and the Panda with nothing: what can be wrong is looked for in the
 // robot, and no name is known beforehand.
-TEST(RunCampaign, MakesItsMistakesInOtherRobotsToo) {
+TEST(RunCampaign, MakesItsFaultsInOtherRobotsToo) {
   RunMutationOptions options;
   options.parameters = 12;
   for (const char* name : {"hand-curve", "panda-reach"}) {
@@ -152,7 +152,7 @@ TEST(RunCampaign, AnUprightAxisHoldsWhatPushesAlongIt) {
   EXPECT_EQ(without, 2);
 }
 
-// The run without a mistake goes through what makes mistakes: fingertips that are joined stay where they are.
+// The run without a fault goes through what makes faults: fingertips that are joined stay where they are.
 TEST(RunCampaign, NothingInjectedChangesNothing) {
   RunMutationOptions options;
   options.from = 0.02;
@@ -165,7 +165,7 @@ TEST(RunCampaign, NothingInjectedChangesNothing) {
   EXPECT_GE(objects.cause, objects.made - 1);  // one pushes later than the run lasts
 }
 
-TEST(RunCampaign, ARunThatDoesNotPassIsNoPlaceForMistakes) {
+TEST(RunCampaign, ARunThatDoesNotPassIsNoPlaceForFaults) {
   RunMutationOptions options;
   options.from = 0.01;
   EXPECT_THROW(RunCampaign(ReadShippedScenario("curve", {"settle=0.1", "model.object.mass=0.21"}), kRobot,
@@ -199,11 +199,11 @@ TEST(Detectability, TellsTheErrorThatFailsABalance) {
       });
   ASSERT_NE(mass, result.numbers.end());
   ASSERT_LT(mass->object, 1e-3);
-  const double bound = kStepChecks[static_cast<size_t>(StepCheck::kBalanceObject)].bound;
+  const double bound = kStepChecks[static_cast<size_t>(StepCheck::kInverseDynamicsObject)].bound;
   for (const double factor : {0.5, 2.0}) {
     std::vector<std::string> overrides = shorter;
     overrides.push_back(fmt::format("model.object.mass={:.17g}", 0.2 * (1.0 + factor * mass->object)));
-    const double worst = FindWorst("balance_object", overrides);
+    const double worst = FindWorst("inverse_dynamics_object", overrides);
     EXPECT_EQ(worst > bound, factor > 1.0) << factor << " " << worst;
     EXPECT_NEAR(worst / bound, factor, 0.5 * factor);
   }
@@ -220,7 +220,8 @@ TEST(Detectability, AClaimIsTriedAgainInRuns) {
   });
   ASSERT_NE(mass, numbers.end());
   const auto retry = [&](double error) {
-    return RetryError(scenario, kRobot, kScene, *mass, error, {"balance_object"}, [] { return false; });
+    return RetryError(scenario, kRobot, kScene, *mass, error, {"inverse_dynamics_object"},
+                      [] { return false; });
   };
   const RetriedError large = retry(1e-3);
   EXPECT_EQ(large.error, 1e-3);

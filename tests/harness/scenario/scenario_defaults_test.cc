@@ -145,7 +145,7 @@ std::string Show(const MismatchOptions& mismatch) {
 
 std::string Show(const PlantOptions& plant) {
   std::string touching;
-  for (const auto& [a, b] : plant.may_touch) touching += a + " " + b + " ";
+  for (const auto& [a, b] : plant.allowed_collision_pairs) touching += a + " " + b + " ";
   return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {}", static_cast<int>(plant.type),
                      static_cast<int>(plant.integrator), plant.time_step, plant.control_step,
                      plant.contact_time_constant, plant.contact_impedance, plant.impratio,

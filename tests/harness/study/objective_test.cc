@@ -106,15 +106,15 @@ TEST(Constraint, AShareOfTheTrialsMayBeEnough) {
   results.push_back(MakeResult(1, 0.9));
   Constraint constraint = ParseConstraint("peak_effort < 0.8");
   EXPECT_FALSE(JudgePoint({}, {constraint}, results).is_feasible());
-  constraint.share = 0.9;
+  constraint.fraction = 0.9;
   EXPECT_TRUE(JudgePoint({}, {constraint}, results).is_feasible());
-  constraint.share = 0.91;
+  constraint.fraction = 0.91;
   EXPECT_FALSE(JudgePoint({}, {constraint}, results).is_feasible());
   // A trial that was lost counts, unless a constraint says how many may be.
   results.back() = MakeResult(1, 0.5, Outcome::kDiverged);
   EXPECT_FALSE(JudgePoint({}, {}, results).is_feasible());
   Constraint held = ParseConstraint("held");
-  held.share = 0.9;
+  held.fraction = 0.9;
   EXPECT_TRUE(JudgePoint({}, {held}, results).is_feasible());
 }
 

@@ -86,8 +86,8 @@ TEST(SampledStability, CriticalDampingIsFastest) {
       EXPECT_GT(CalcSpectralRadius(loop, {K_p, change * K_v}), best) << change;
     }
     // Without overshoot from there on, with overshoot before.
-    const auto least = [&](double share) {
-      const std::vector<double> response = CalcStepResponse(loop, {K_p, share * K_v}, 100 * loop.hold);
+    const auto least = [&](double fraction) {
+      const std::vector<double> response = CalcStepResponse(loop, {K_p, fraction * K_v}, 100 * loop.hold);
       return *std::min_element(response.begin(), response.end());
     };
     EXPECT_GT(least(1.001), 0.0);
@@ -314,13 +314,13 @@ TEST(SampledStability, TheRobotIsDampedCriticallyWhereItIsPredicted) {
        {Case{{1e-3, 1}, 400.0, kDiscriminantAtEveryStep}, Case{{1e-3, 1}, 2500.0, kDiscriminantAtEveryStep},
         Case{{5e-4, 1}, 400.0, kDiscriminantAtEveryStep}, Case{{1e-3, 4}, 400.0, kDiscriminantHeld}}) {
     const double critical = CalcCriticalDamping(one.loop, one.K_p);
-    for (const double share : {1.0 - kMargin, 1.0, 1.0 + kMargin}) {
-      const AxisGains gains{one.K_p, share * critical};
+    for (const double fraction : {1.0 - kMargin, 1.0, 1.0 + kMargin}) {
+      const AxisGains gains{one.K_p, fraction * critical};
       const double measured = FitDiscriminant(MeasureResponse(one.loop, gains, 0.25));
       const double predicted = FitDiscriminant(CalcStepResponse(one.loop, gains, 250));
-      EXPECT_NEAR(measured, predicted, one.tolerance) << one.K_p << ", " << share;
-      if (share == 1.0) continue;
-      EXPECT_EQ(measured > 0.0, share > 1.0) << measured;
+      EXPECT_NEAR(measured, predicted, one.tolerance) << one.K_p << ", " << fraction;
+      if (fraction == 1.0) continue;
+      EXPECT_EQ(measured > 0.0, fraction > 1.0) << measured;
       EXPECT_GT(std::abs(predicted), 10.0 * one.tolerance) << "too near to tell";
     }
   }
@@ -353,11 +353,12 @@ TEST(SampledStability, TheRobotIsStableWhereItIsPredictedWithDelayAndFilter) {
     EXPECT_LT(MeasureDeparture(loop, {900, 60}, loop), kLate);
     EXPECT_GT(MeasureDeparture(loop, {900, 60}, {1e-3, 1}), 10.0 * kLate) << "lateness matters";
     const double limit = FindFrequencyLimit(loop);
-    for (const double share : {1.0 - kMargin, 1.0 + kMargin}) {
-      const double w = share * limit;
+    for (const double fraction : {1.0 - kMargin, 1.0 + kMargin}) {
+      const double w = fraction * limit;
       const Outcome outcome =
           RunTrial(MakeInputs(MakeOverrides(loop, w * w, 0.6, 1e-6)), {0, 0, {2.0 * w}}).outcome;
-      EXPECT_EQ(outcome, share < 1.0 ? Outcome::kTracked : Outcome::kDiverged) << limit << ", " << share;
+      EXPECT_EQ(outcome, fraction < 1.0 ? Outcome::kTracked : Outcome::kDiverged)
+          << limit << ", " << fraction;
     }
   }
 }

@@ -54,7 +54,7 @@ struct Coverage {
   double of_known, of_interchanged;
 };
 
-/// Shares of the intervals, of studies of 1024 blocks with ten seeds, that hold the indices known and the
+/// Fractions of the intervals, of studies of 1024 blocks with ten seeds, that hold the indices known and the
 /// wrong ones.
 Coverage CalcCoverage(const std::vector<Index>& known,
                       const std::function<double(const std::vector<double>&)>& function) {
@@ -207,7 +207,7 @@ TEST(Probability, HasClopperAndPearsonsInterval) {
   EXPECT_EQ(CalcProbability(10, 10).high, 1.0);
 }
 
-TEST(Probability, IsToldOfASampleWithConstraints) {
+TEST(Probability, IsMeasuredOfASampleWithConstraints) {
   const Study study =
       MakeStudy("method = \"random\"\ncount = 1000\nseed = 1", 2, "constraints = [\"energy < 0.9\"]");
   const auto rows = MakeRows(study, [](const std::vector<double>& x) { return x[0]; });

@@ -34,7 +34,7 @@ TEST(ShippedStudies, AreAccepted) {
 }
 
 /// A trial is made the same way whether its study was prepared or not, bit for bit.
-TEST(Trials, ShareNothingThatOneOfThemChanged) {
+TEST(Trials, FractionNothingThatOneOfThemChanged) {
   StudyInputs alone;
   alone.study = ParseStudy(R"(name = "shared"
 scenario = "hold"

@@ -72,7 +72,7 @@ class StudyPageBrowserTest : public ::testing::Test {
   }
 
   testing::TempFolder folder_;
-  Browser& browser_ = Browser::Share();
+  Browser& browser_ = Browser::Fraction();
 };
 
 TEST_F(StudyPageBrowserTest, ACellShowsTheCommandThatRepeatsItsTrial) {

@@ -72,10 +72,10 @@ TEST(StudyReader, ARangeMayDependOnAKeyBeforeIt) {
     const double f_max = trial.parameters[1];
     EXPECT_GE(f_max, 2.0 * f_min);
     EXPECT_LE(f_max, 10.0 * f_min + 5.0);
-    const std::vector<double> shares = SharesOf(study.keys(), trial.parameters);
-    EXPECT_NEAR(ValuesAt(study.keys(), shares)[1], f_max, 1e-12 * f_max) << "there and back";
-    least = std::min(least, shares[1]);
-    most = std::max(most, shares[1]);
+    const std::vector<double> fractions = FractionsOf(study.keys(), trial.parameters);
+    EXPECT_NEAR(ValuesAt(study.keys(), fractions)[1], f_max, 1e-12 * f_max) << "there and back";
+    least = std::min(least, fractions[1]);
+    most = std::max(most, fractions[1]);
   }
   EXPECT_LT(least, 0.05);
   EXPECT_GT(most, 0.95);
@@ -145,7 +145,7 @@ TEST(StudyReader, TruthsAndListsAreValuesToo) {
 
 const std::string kSearch = R"(name = "best"
 scenario = "hold"
-constraints = ["peak_effort < 0.8", { require = "held", share = 0.9 }]
+constraints = ["peak_effort < 0.8", { require = "held", fraction = 0.9 }]
 [search]
 method = "cma_es"
 count = 100
@@ -182,20 +182,20 @@ TEST(StudyReader, ReadsASearch) {
   EXPECT_EQ(study.objectives[0].expression, "energy + 2 * overshoot");
   EXPECT_EQ(study.objectives[0].quantile, 0.9);
   ASSERT_EQ(study.constraints.size(), 2U);
-  EXPECT_EQ(study.constraints[1].share, 0.9);
+  EXPECT_EQ(study.constraints[1].fraction, 0.9);
   EXPECT_EQ(study.num_keys(), 2U);
   EXPECT_EQ(study.num_nested, 1U);
   EXPECT_TRUE(study.nested.scramble);
   EXPECT_EQ(CountTrials(study), 96 * 4);
 }
 
-TEST(StudyReader, MistakesOfASearchAreNamed) {
+TEST(StudyReader, FaultsOfASearchAreNamed) {
   const std::string good = ReplaceOnce(kSearch, "\"pd\"", "0.25");
   const auto fails = [&](const std::string& from, const std::string& to, const std::string& message) {
     return Throws<InputError>([&] { return ParseStudy(ReplaceOnce(good, from, to), "study.toml"); }, message);
   };
   EXPECT_TRUE(fails("peak_effort < 0.8", "effort < 0.8", "study.toml:3: constraints[0]"));
-  EXPECT_TRUE(fails("share = 0.9", "share = 1.1", "share: must be at most 1, got 1.1"));
+  EXPECT_TRUE(fails("fraction = 0.9", "fraction = 1.1", "fraction: must be at most 1, got 1.1"));
   EXPECT_TRUE(fails("energy + 2", "energy + 2 *", "objective[0].minimize"));
   EXPECT_TRUE(fails("minimize", "minimise", "minimise"));
   EXPECT_TRUE(fails("quantile = 0.9", "quantile = 90", "quantile: must be at most 1, got 90"));
@@ -248,7 +248,7 @@ TEST(StudyReader, SamplesChooseAmongValues) {
   EXPECT_EQ(counts, (std::array<int, 4>{8, 8, 8, 8}));
 }
 
-TEST(StudyReader, MistakesAreNamed) {
+TEST(StudyReader, FaultsAreNamed) {
   const auto fails = [](const std::string& from, const std::string& to, const std::string& message) {
     return Throws<InputError>([&] { return ParseStudy(ReplaceOnce(kStudy, from, to), "study.toml"); },
                               message);

@@ -128,7 +128,7 @@ grep 'body = ' saved.toml >bodies.txt
 grep -qv "body = 'object'" bodies.txt || fail "no link was pulled: $(head -c 2000 saved.toml)"
 [[ $(differ before after) -gt 60 ]] || fail "the picture did not change"
 # The judge knows the pulls: without that, the balances would be off by far more than their bounds.
-for balance in balance_robot balance_object; do
+for balance in inverse_dynamics_robot inverse_dynamics_object; do
   grep -A12 "\"$balance\"" pulled/summary.json | grep '"pass": true' >/dev/null || fail "$balance does not know the pull"
 done
 "$dexcheck" run --replay pulled --quiet >replayed.txt || fail "a pulled run does not replay: $(cat replayed.txt)"

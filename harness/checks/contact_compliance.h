@@ -1,0 +1,131 @@
+#pragma once
+
+// What soft contacts hold back of a force that changes.
+
+#include <functional>
+
+#include "controller/common/types.h"
+#include "harness/checks/step_record.h"
+#include "harness/checks/wheel_evidence.h"
+#include "harness/engine/contact_softness.h"
+#include "harness/scenario/setup.h"
+
+namespace dexcheck {
+
+/// J_dot qvel of the plant's constraints at the fingertips (3N), m/s^2, each in its Sigma_cf: the model's
+/// slip_bias(), and the w x v of object and platform, which the model's rates of velocities that turn along
+/// have not and the engine's have. The rigid plant holds (46) whole; half of slip_bias() under semi-implicit
+/// Euler, whose velocities are those of half a step before.
+void CalcContactBias(const Setup& setup, const StepRecord& step, VectorXd* bias);
+
+/// One soft contact under a vector of forces F(t). The engine lets J qacc = a_ref - R f, of a contact that
+/// forces move by A: where it holds back a fraction s = R / (A + R) of a force that changes, along a normal
+///
+///   r_ddot = (1 - s) (-b r_dot - k r) - s F,   b = 2 / (tc d),  k = 1 / (d tc^2),
+///
+/// of time constant tc and impedance d, and along a tangent v_dot = -(1 - s) b v - s F. Under a constant
+/// force the contact comes to rest and holds as a rigid one does; what it holds back is r_ddot, or v_dot.
+/// Both are stepped as the engine steps: velocities first.
+class ContactCompliance {
+ public:
+  /// s, and 1 - s.
+  struct Fraction {
+    double force = 0.0, contact = 1.0;
+    static Fraction Of(double fraction) { return {fraction, 1.0 - fraction}; }
+    /// Of an acceleration instead of a force: it is held back whole.
+    static Fraction Whole() { return {1.0, 1.0}; }
+  };
+  ContactCompliance(const PlantOptions& plant, const Fraction& normal, const Fraction& tangential);
+
+  /// The next step's force. The first one finds the contact at rest.
+  void Add(const Eigen::Ref<const VectorXd>& force);
+
+  [[nodiscard]] bool has_any() const { return depth_.size() > 0; }
+  /// r_ddot and v_dot of that step.
+  [[nodiscard]] const VectorXd& along_normal() const { return normal_acceleration_; }
+  [[nodiscard]] const VectorXd& along_tangent() const { return tangent_acceleration_; }
+  /// The sum of their magnitudes.
+  [[nodiscard]] double size() const { return normal_acceleration_.norm() + tangent_acceleration_.norm(); }
+  /// By which fraction a step's give is still there at the next: modes do not pass through zero together.
+  [[nodiscard]] double memory() const { return memory_; }
+  /// r_dot at its end.
+  [[nodiscard]] const VectorXd& rate() const { return depth_rate_; }
+
+ private:
+  double time_step_, b_, k_, memory_;
+  Fraction normal_, tangential_;
+  VectorXd depth_, depth_rate_, slip_;
+  VectorXd normal_acceleration_, tangent_acceleration_;
+};
+
+/// All modes of soft contacts under one vector of forces. The modes are orthogonal in |.|_M, and each holds
+/// back a fraction s_i of its part of the force, from nothing up to the softest one's s. With theta = s_i / s
+/// and h_theta the answer of r_ddot to a step of the force, over s_i, a mode is at theta between contacts
+/// that hold back next to nothing, a = h_0 * F, and the softest, b = h_1 * F, but for what a straight line
+/// leaves of h_theta:
+///
+///   |r_ddot_i| / s = theta |(1 - theta) a_i + theta b_i + (e_theta * dF)_i|,
+///   e_theta = h_theta - (1 - theta) h_0 - theta h_1.
+///
+/// theta (1 - theta) is 1/4 at most, and norms of sums are less than sums of norms:
+///
+///   |r_ddot| <= s (|a| / 4 + |b| + sum_k max_theta |theta e_theta(k)| |F_n-k - F_n-k-1|).
+///
+/// Likewise along tangents. Modes in which normals and tangents take part are orthogonal but for what is of
+/// the order of s, which is added: 1 + s times the sum.
+class ModesCompliance {
+ public:
+  ModesCompliance(const PlantOptions& plant, double normal_fraction, double tangential_fraction);
+
+  /// As ContactCompliance.
+  void Add(const Eigen::Ref<const VectorXd>& force);
+  /// Bound of what is held back; once after each force. @param norm of a vector.
+  double CalcSize(const std::function<double(const VectorXd&)>& norm);
+  [[nodiscard]] const ContactCompliance& softest() const { return softest_; }
+
+ private:
+  double fraction_;  // the largest s
+  ContactCompliance softest_, stiffest_;
+  VectorXd bends_;    // s max_theta |theta e_theta(k)| by k
+  VectorXd changes_;  // |F_k - F_k-1| of as many steps, the one of this step at newest_
+  Eigen::Index newest_ = 0;
+  VectorXd force_, change_;
+};
+
+/// By how much soft contacts change what the rigid system (46), (48) predicts; formulas in
+/// step_check_table.h.
+class PredictionCompliance {
+ public:
+  explicit PredictionCompliance(const Setup& setup);
+
+  /// The next step that is judged. @param uneven what comes of tilt and slip, in |.|_M^-1. @param norm
+  /// |f|_M^-1 of this step. @param force C_bar' xi + F_bar' - E_bar' tau' (n). @param f_c (3N) predicted.
+  void Follow(const StepRecord& step, const Eigen::Ref<const VectorXd>& force,
+              const Eigen::Ref<const VectorXd>& f_c, double uneven,
+              const std::function<double(const VectorXd&)>& norm);
+  /// Of xi_dot, in |.|_M.
+  [[nodiscard]] double motion() const { return motion_; }
+  /// Of f_c, N.
+  [[nodiscard]] double force() const { return contact_force_; }
+  /// Of the platform's velocity, m/s: how fast it sinks and tilts.
+  [[nodiscard]] double sinking() const { return sinking_; }
+
+ private:
+  PredictionCompliance(const Setup& setup, const ContactSoftness& softness);
+
+  const Setup* setup_;
+  WheelEvidence wheels_;
+  double mass_ = 0.0;  // of the robot, kg
+  /// Of the force on the robot (n), of f_c (3N), and, of a plant that is not ideal, of pushes (3) and of
+  /// J_B'^T f_c (n).
+  ModesCompliance force_, f_c_, push_, grasp_;
+  /// Likewise of the accelerations that (46) has and the engine's constraints have not, m/s^2: of fingertips
+  /// (3N), of the wheels sideways (1).
+  ContactCompliance tips_, tyres_;
+  VectorXd tip_bias_, sideways_;           // 3N, 1
+  VectorXd grasp_force_;                   // n
+  double held_ = 0.0, held_of_f_c_ = 0.0;  // with what is left of former steps
+  double motion_ = 0.0, contact_force_ = 0.0, sinking_ = 0.0;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,258 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/common/text.h"
+#include "harness/base/interrupts.h"
+#include "harness/checks/tolerance.h"
+#include "harness/cli/commands.h"
+#include "harness/cli/junit_file.h"
+#include "harness/cli/output_file.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/cli/terminal.h"
+#include "harness/descriptions/engine_comparison.h"
+#include "harness/descriptions/join_names.h"
+#include "harness/descriptions/read_description.h"
+
+namespace dexcheck::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct EngineComparisonRequest {
+  std::filesystem::path robot;
+  EngineComparisonOptions options;
+  UrdfOptions urdf;
+  std::string json_file;
+  std::string junit_file;
+  int digits = 6;  ///< MuJoCo 2.2.2 diagonalises inertias to 1e-6 or better.
+  bool quiet = false;
+};
+
+/// Worst differences of a pair, by the names of terms; empty for those that one of the two does not have.
+std::string FormatCell(const ComparedPair& pair, const std::string& term) {
+  for (const CheckRecord& record : pair.terms) {
+    if (record.name == term) return fmt::format("{:.1e}{}", record.worst, record.failed ? "!" : " ");
+  }
+  return "- ";
+}
+
+const CheckRecord* FindWorst(const ComparedPair& pair) {
+  const auto by_bound = [](const CheckRecord& a, const CheckRecord& b) {
+    return a.worst / a.bound < b.worst / b.bound;
+  };
+  const auto worst = std::max_element(pair.terms.begin(), pair.terms.end(), by_bound);
+  return worst == pair.terms.end() ? nullptr : &*worst;
+}
+
+std::vector<std::string> NamesOf(const std::vector<size_t>& group, const EngineComparisonResult& result) {
+  std::vector<std::string> names;
+  for (const size_t side : group) names.push_back(result.names[side]);
+  return names;
+}
+
+void PrintTable(const EngineComparisonRequest& request, const RobotModel& model,
+                const EngineComparisonResult& result) {
+  fmt::print("{}: {}\n{} random states (seed {}), {} engines\n\n", model.name(),
+             request.robot.filename().string(), result.samples, request.options.states.seed,
+             result.names.size());
+  for (const std::string& note : result.notes) fmt::print("{}\n", Wrap("  " + note, 4));
+  for (const std::string& absent : result.absent) fmt::print("{}\n", Wrap("  not compared: " + absent, 4));
+  if (!result.notes.empty() || !result.absent.empty()) fmt::print("\n");
+
+  const auto letter = [](size_t side) { return std::string(1, static_cast<char>('A' + side)); };
+  const auto name = [&](const ComparedPair& pair) {
+    return letter(pair.first) + " - " + letter(pair.second);
+  };
+  for (size_t side = 0; side < result.names.size(); ++side)
+    fmt::print("{}  {}\n", letter(side), result.names[side]);
+  std::vector<std::string> terms;
+  for (const ComparedPair& pair : result.pairs) {
+    for (const CheckRecord& record : pair.terms) {
+      if (std::find(terms.begin(), terms.end(), record.name) == terms.end()) terms.push_back(record.name);
+    }
+  }
+  constexpr size_t kPairsInARow = 6;
+  for (size_t begin = 0; begin < result.pairs.size(); begin += kPairsInARow) {
+    const size_t end = std::min(begin + kPairsInARow, result.pairs.size());
+    fmt::print("\n{:<18}", "worst difference");
+    for (size_t i = begin; i < end; ++i) fmt::print("{:>10}", name(result.pairs[i]) + " ");
+    fmt::print("\n");
+    for (const std::string& term : terms) {
+      fmt::print("{:<18}", term);
+      for (size_t i = begin; i < end; ++i) fmt::print("{:>10}", FormatCell(result.pairs[i], term));
+      fmt::print("\n");
+    }
+  }
+  fmt::print("\nwhere it is worst\n");
+  const int base = model.num_base_velocities();
+  for (const ComparedPair& pair : result.pairs) {
+    const CheckRecord* const worst = FindWorst(pair);
+    const std::string where =
+        worst == nullptr ? "no term in common"
+                         : fmt::format("{} {}, state {}", worst->name, Describe(worst->where, model, base),
+                                       static_cast<long>(worst->at));
+    fmt::print("{}\n", Wrap(name(pair) + "  " + where, 7));
+  }
+  const std::string legend =
+      fmt::format("Differences are relative to each term's own scale; those above {:g} are marked by \"!\".",
+                  request.options.tolerance);
+  fmt::print("\n{}\n", Wrap(legend, 0));
+}
+
+void PrintVerdict(const EngineComparisonRequest& request, const EngineComparisonResult& result) {
+  if (result.samples < request.options.states.samples) {
+    fmt::print("INTERRUPTED after {} of {} states. So far:\n", result.samples,
+               request.options.states.samples);
+  }
+  if (result.Agrees()) {
+    fmt::print("AGREE: {} agree in all terms that they have in common.\n", JoinNames(result.names));
+    return;
+  }
+  fmt::print("DISAGREE:\n");
+  for (const std::vector<size_t>& group : result.groups) {
+    fmt::print("  {}{}\n", JoinNames(NamesOf(group, result)), group.size() > 1 ? " agree" : " stands alone");
+  }
+  for (const std::string& setting : result.settings) fmt::print("  {}\n", setting);
+}
+
+std::string ToText(const EngineComparisonRequest& request, const RobotModel& model,
+                   const EngineComparisonResult& result) {
+  const int base = model.num_base_velocities();
+  Json json = {{"robot", request.robot.string()},
+               {"verdict", result.Agrees() ? "pass" : "disagreement"},
+               {"samples", result.samples},
+               {"seed", request.options.states.seed},
+               {"tolerance", request.options.tolerance},
+               {"engines", result.names},
+               {"absent", result.absent},
+               {"notes", result.notes},
+               {"settings", result.settings}};
+  json["groups"] = Json::array();
+  for (const std::vector<size_t>& group : result.groups) json["groups"].push_back(NamesOf(group, result));
+  json["pairs"] = Json::array();
+  for (const ComparedPair& pair : result.pairs) {
+    Json entry = {{"first", result.names[pair.first]}, {"second", result.names[pair.second]}};
+    entry["terms"] = Json::object();
+    for (const CheckRecord& record : pair.terms) {
+      entry["terms"][record.name] = {{"max", record.worst},
+                                     {"digits", CountDigits(record.worst)},
+                                     {"pass", !record.failed},
+                                     {"compared", record.comparisons},
+                                     {"where", Describe(record.where, model, base)},
+                                     {"sample", static_cast<long>(record.at)},
+                                     {"first", record.model_value},
+                                     {"second", record.engine_value}};
+    }
+    json["pairs"].push_back(entry);
+  }
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+/// A case for each pair and term.
+std::string WriteEngineComparisonJUnit(const EngineComparisonRequest& request, const RobotModel& model,
+                                       const EngineComparisonResult& result) {
+  std::vector<JUnitCase> cases;
+  for (const ComparedPair& pair : result.pairs) {
+    for (const CheckRecord& record : pair.terms) {
+      cases.push_back(MakeJUnitCase(result.names[pair.first] + " - " + result.names[pair.second], record,
+                                    Describe(record.where, model, model.num_base_velocities())));
+    }
+  }
+  return WriteJUnit("dexcheck.engine_comparison." + request.robot.stem().string(), cases, 0.0,
+                    result.lacks_requested ? JoinNames(result.absent) : "");
+}
+
+/// What is shipped beside the program: ../libexec/dexcheck, in a build as when installed.
+std::filesystem::path FindProgramsFolder() {
+  std::error_code ignored;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", ignored);
+  return program.parent_path().parent_path() / "libexec/dexcheck";
+}
+
+int Run(EngineComparisonRequest request) {
+  CatchInterrupts();
+  request.options.tolerance = std::pow(10.0, -request.digits);
+  request.options.programs_folder = FindProgramsFolder();
+  std::optional<OutputFile> json;
+  if (!request.json_file.empty()) json.emplace(request.json_file);
+  std::optional<OutputFile> junit;
+  if (!request.junit_file.empty()) junit.emplace(request.junit_file);
+  const RobotDescription robot = ReadDescription(request.robot, request.urdf);
+  const RobotModel model(robot.spec);
+  ProgressBar bar("comparing", request.options.states.samples, request.quiet);
+  const EngineComparisonResult result =
+      RunEngineComparison(robot, request.robot, request.options, [&](long samples) {
+        bar.Update(samples);
+        return !IsInterrupted();
+      });
+  bar.Finish();
+  const bool is_whole = result.samples >= request.options.states.samples && !result.lacks_requested;
+  ExitCode code = is_whole ? kSuccess : kFailure;
+  if (!result.Agrees()) code = kDisagreement;
+  if (json) json->Write(ToText(request, model, result));
+  if (junit) junit->Write(WriteEngineComparisonJUnit(request, model, result));
+  if (request.json_file != "-") {
+    if (!request.quiet) PrintTable(request, model, result);
+    PrintVerdict(request, result);
+  }
+  if (code == kFailure)
+    return ReportFailure(result.lacks_requested
+                             ? "a library that was asked for is not there"
+                             : fmt::format("only {} of {} states were compared", result.samples,
+                                           request.options.states.samples));
+  return code;
+}
+
+}  // namespace
+
+void AddEngineComparisonCommand(Command app) {
+  constexpr std::uint64_t kMaxSamples = 1000000;
+  constexpr int kMostDigits = 15;
+  const auto request = std::make_shared<EngineComparisonRequest>();
+  request->options.states.samples = 100;
+  Command command =
+      app.AddCommand("engines", "Compare one robot's terms in several physics engines, pair by pair");
+  command.AddOption("ROBOT", &request->robot, "URDF; with fewer engines an MJCF or a parameter file (TOML)")
+      .TypeName("FILE")
+      .Required();
+  std::string names;
+  for (const EngineComparisonEngine& engine : ListEngineComparisonEngines())
+    names += (names.empty() ? "" : ", ") + engine.name;
+  command
+      .AddOption("--engines", &request->options.engines,
+                 "Which of " + names + "; all that are there when none is named")
+      .TypeName("NAME,...")
+      .Delimiter(',');
+  command
+      .AddOption("--engine", &request->options.programs,
+                 "One more: a program of your own that answers terms (harness/descriptions/README.md)")
+      .TypeName("NAME=CMD")
+      .Repeatable();
+  command.AddOption("--mjcf", &request->options.mjcf, "What MuJoCo reads instead of ROBOT")
+      .TypeName("FILE.xml");
+  command
+      .AddOption("--node-modules", &request->options.node_modules,
+                 "Folder where npm installed @mujoco/mujoco")
+      .TypeName("FOLDER");
+  command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats");
+  AddSampleOptions(command, kMaxSamples, &request->options.states.samples, &request->options.states.seed);
+  command.AddOption("--digits", &request->digits, "Agreement to this many digits of a term's scale is enough")
+      .TypeName("N")
+      .Check(WholeNumber(1, kMostDigits))
+      .ShowDefault();
+  AddJsonOption(command, "the results", &request->json_file);
+  AddJUnitOption(command, &request->junit_file);
+  AddIgnoreOption(command, &request->options.states.ignore);
+  command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
+  command.SetAction([=] { return Run(*request); });
+}
+
+}  // namespace dexcheck::cli

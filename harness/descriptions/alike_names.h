@@ -1,0 +1,26 @@
+#pragma once
+
+// Joints that two files call alike: "panda_joint1" and "joint1", "LeftKnee" and "left_knee".
+
+#include <string>
+#include <vector>
+
+#include "harness/descriptions/robot_description.h"
+
+namespace dexcheck {
+
+/// Its letters and digits, in small letters.
+std::string SimplifyName(const std::string& name);
+
+/// The name in `others` of each name: the same but for what all names of one file begin or end with, capitals
+/// and punctuation. Empty unless each name has one partner of its own.
+std::vector<std::string> FindAlikeNames(const std::vector<std::string>& names,
+                                        const std::vector<std::string>& others);
+
+/// Gives the joints of a description the names that another file has for them, when those are alike.
+/// @param others names of the other file's joints. @return a note that lists them; none when nothing was
+/// renamed.
+std::vector<std::string> TakeJointNames(const std::vector<std::string>& others,
+                                        const std::string& other_source, RobotDescription* robot);
+
+}  // namespace dexcheck

@@ -1,0 +1,22 @@
+#pragma once
+
+// What MuJoCo's compiler makes of the inertias that an MJCF gives as fullinertia.
+
+#include <mujoco/mujoco.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "harness/descriptions/robot_description.h"
+
+namespace dexcheck {
+
+/// The engine has principal moments and axes, and finds them of a tensor to 1e-8 of its size or, for slender
+/// bodies, 1e-6. Gives each body of a description whose inertia is, to rounding, the one that the MJCF states
+/// so the inertia that the engine made of it: the difference is the engine's, and no fault of the file.
+/// @param robot as CompleteFromEngine left it. @return a note, when there are such bodies.
+std::optional<std::string> TakeCompiledInertias(const std::filesystem::path& mjcf, const mjModel& engine,
+                                                RobotDescription* robot);
+
+}  // namespace dexcheck

@@ -1,0 +1,337 @@
+#include "harness/descriptions/description_match.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/dynamics/model_terms.h"
+#include "harness/checks/random_states.h"
+#include "harness/descriptions/alike_names.h"
+#include "harness/descriptions/join_names.h"
+#include "harness/descriptions/mjcf_reader.h"
+#include "harness/engine/engine.h"
+
+namespace dexcheck {
+namespace {
+
+/// A constant of joints that acts on the motion.
+struct JointConstant {
+  const char* word;  ///< Of --ignore, and in notes.
+  const char* check;
+  bool DescribedJoint::*states;
+  double Joint::*value;
+};
+constexpr JointConstant kJointConstants[] = {
+    {"armature", "joint_armature", &DescribedJoint::states_armature, &Joint::armature},
+    {"damping", "joint_damping", &DescribedJoint::states_damping, &Joint::damping},
+    {"friction", "joint_dry_friction", &DescribedJoint::states_dry_friction, &Joint::dry_friction}};
+
+/// What each of the two takes from the other.
+class Matching {
+ public:
+  Matching(RobotDescription* a, RobotDescription* b, const std::vector<std::string>& ignore)
+      : a_(*a),
+        b_(*b),
+        ignore_(ignore),
+        b_of_a_(MatchJoints(a_.spec, b_.spec)),
+        a_of_b_(MatchJoints(b_.spec, a_.spec)) {}
+
+  Completion Run() {
+    TakeBase();
+    RequireSameMechanism();
+    TakeGravity();
+    TakeNames();
+    for (const JointConstant& constant : kJointConstants)
+      Ignores(constant.word, ignore_) ? Ignore(constant) : Take(constant);
+    if (Ignores("coupling", ignore_)) IgnoreCouplings();
+    TakeRanges();
+    DropFrames();
+    return std::move(result_);
+  }
+
+ private:
+  void RequireSameMechanism() const {
+    const auto list = [](const RobotSpec& spec, const std::vector<int>& match) {
+      std::vector<std::string> missing;
+      for (size_t i = 0; i < match.size(); ++i) {
+        if (match[i] < 0) missing.push_back("joint " + Quote(spec.joints[i].name));
+      }
+      return missing.empty() ? "" : "; only in " + spec.source + ": " + JoinNames(missing);
+    };
+    const std::string missing = list(a_.spec, b_of_a_) + list(b_.spec, a_of_b_);
+    if (!missing.empty()) throw InputError(b_.spec.source + ": does not match " + a_.spec.source + missing);
+    const Base& base_a = a_.spec.base;
+    const Base& base_b = b_.spec.base;
+    if (base_a.type != base_b.type || base_a.velocity != base_b.velocity) {
+      throw InputError(b_.spec.source + ": base: must move as that of " + a_.spec.source);
+    }
+    for (size_t i = 0; i < b_of_a_.size(); ++i) {
+      const Joint& joint = a_.spec.joints[i];
+      const Joint& other = b_.spec.joints[static_cast<size_t>(b_of_a_[i])];
+      const std::string key = b_.spec.source + ": joint " + Quote(joint.name) + ": ";
+      if (joint.type != other.type) {
+        throw InputError(key + "must be " + NameOf(joint.type) + " as in " + a_.spec.source);
+      }
+      const int parent = joint.parent < 0 ? -1 : b_of_a_[static_cast<size_t>(joint.parent)];
+      if (other.parent == parent) continue;
+      const auto name = [](const RobotSpec& spec, int index) {
+        return index < 0 ? std::string("the base") : Quote(spec.joints[static_cast<size_t>(index)].name);
+      };
+      throw InputError(key + "must come after " + name(a_.spec, joint.parent) + " as in " + a_.spec.source +
+                       ", comes after " + name(b_.spec, other.parent));
+    }
+  }
+
+  /// A base that one file does not state moves as the other one's; a floating one's frame is that of the link
+  /// of one name.
+  void TakeBase() {
+    const auto take = [this](RobotDescription* robot, const RobotDescription& other) {
+      if (robot->states_base || other.spec.base.type != BaseType::kFloating) return;
+      LetBaseFloat(robot);
+      result_.notes.push_back("base: " + robot->spec.source +
+                              " does not say how its root moves; it floats as that of " + other.spec.source);
+    };
+    take(&a_, b_);
+    take(&b_, a_);
+    if (a_.spec.base.type != BaseType::kFloating || b_.spec.base.type != BaseType::kFloating) return;
+    if (!MoveBaseTo(a_.spec.base.link, &b_)) MoveBaseTo(b_.spec.base.link, &a_);
+  }
+
+  void TakeGravity() {
+    if (a_.states_gravity == b_.states_gravity) return;
+    (a_.states_gravity ? b_ : a_).spec.gravity = (a_.states_gravity ? a_ : b_).spec.gravity;
+    result_.unstated.emplace_back("gravity_vector");
+    result_.not_compared.push_back("gravity: only " + (a_.states_gravity ? a_ : b_).spec.source +
+                                   " states it, " + FormatNumbers(a_.spec.gravity));
+  }
+
+  /// Links that joints of one name move are the same one.
+  void TakeNames() {
+    std::vector<std::string> renamed;
+    const auto rename = [&](const std::string& name, std::string* other) {
+      if (name == *other) return;
+      renamed.push_back(Quote(*other) + " is " + Quote(name));
+      *other = name;
+    };
+    rename(a_.spec.base.link, &b_.spec.base.link);
+    for (size_t i = 0; i < b_of_a_.size(); ++i) {
+      rename(a_.spec.joints[i].link, &b_.spec.joints[static_cast<size_t>(b_of_a_[i])].link);
+    }
+    if (!renamed.empty()) result_.notes.push_back("links by other names: " + JoinNames(renamed));
+  }
+
+  template <typename Visit>
+  void ForJoints(const Visit& visit) {
+    for (size_t i = 0; i < b_of_a_.size(); ++i) visit(i, static_cast<size_t>(b_of_a_[i]));
+  }
+
+  /// The check has nothing to say when one of the two states the constant nowhere.
+  void NoteUnstated(const char* check, bool DescribedJoint::*states) {
+    for (const RobotDescription* const robot : {&a_, &b_}) {
+      if (std::any_of(robot->joints.begin(), robot->joints.end(),
+                      [&](const DescribedJoint& joint) { return joint.*states; })) {
+        continue;
+      }
+      result_.unstated.emplace_back(check);
+      return;
+    }
+  }
+
+  void Take(const JointConstant& constant) {
+    ForJoints([&](size_t i, size_t j) {
+      const bool in_a = a_.joints[i].*constant.states;
+      if (in_a == b_.joints[j].*constant.states) return;
+      double& own = a_.spec.joints[i].*constant.value;
+      double& other = b_.spec.joints[j].*constant.value;
+      if (own != other) {
+        GateFinding& finding = result_.one_sided.emplace_back();
+        finding.check = constant.check;
+        finding.location = {Location::Kind::kJoint, static_cast<int>(i), -1};
+        finding.model = own;
+        finding.engine = other;
+        finding.effect = "only " + (in_a ? a_ : b_).spec.source + " states it";
+      }
+      (in_a ? other : own) = in_a ? own : other;
+    });
+    NoteUnstated(constant.check, constant.states);
+  }
+
+  void Ignore(const JointConstant& constant) {
+    std::vector<std::string> names;
+    ForJoints([&](size_t i, size_t j) {
+      const double own = a_.spec.joints[i].*constant.value;
+      double& other = b_.spec.joints[j].*constant.value;
+      if (own != other) names.push_back(a_.spec.joints[i].name);
+      other = own;
+      a_.joints[i].*constant.states = b_.joints[j].*constant.states = false;
+    });
+    result_.unstated.emplace_back(constant.check);
+    result_.not_compared.push_back(std::string(constant.word) + ": ignored" +
+                                   (names.empty() ? ""
+                                                  : ", though it differs at " + JoinNames(names) +
+                                                        "; terms are with that of " + a_.spec.source));
+  }
+
+  void IgnoreCouplings() {
+    for (RobotDescription* const robot : {&a_, &b_}) {
+      for (Joint& joint : robot->spec.joints) joint.coupling.reset();
+    }
+    result_.not_compared.emplace_back("coupling: ignored");
+  }
+
+  void TakeRanges() {
+    std::map<std::string, std::vector<std::string>> taken;  // by the source that states it
+    ForJoints([&](size_t i, size_t j) {
+      const bool in_a = a_.joints[i].states_range;
+      if (in_a == b_.joints[j].states_range) return;
+      Joint& own = a_.spec.joints[i];
+      Joint& other = b_.spec.joints[j];
+      if (own.lower != other.lower || own.upper != other.upper)
+        taken[(in_a ? a_ : b_).spec.source].push_back(own.name);
+      const Joint& stated = in_a ? own : other;
+      Joint& silent = in_a ? other : own;
+      silent.lower = stated.lower;
+      silent.upper = stated.upper;
+    });
+    NoteUnstated("joint_range", &DescribedJoint::states_range);
+    for (const auto& [source, names] : taken)
+      result_.not_compared.push_back("range: only " + source + " states it, for " + JoinNames(names));
+  }
+
+  void DropFrames() {
+    const auto drop = [this](RobotDescription* robot, const RobotDescription& other) {
+      std::vector<std::string> dropped;
+      std::erase_if(robot->spec.frames, [&](const Frame& frame) {
+        const bool lacks = std::none_of(other.spec.frames.begin(), other.spec.frames.end(),
+                                        [&](const Frame& candidate) { return candidate.name == frame.name; });
+        if (lacks) dropped.push_back(frame.name);
+        return lacks;
+      });
+      if (!dropped.empty())
+        result_.not_compared.push_back("frames only in " + robot->spec.source + ": " + JoinNames(dropped));
+    };
+    drop(&a_, b_);
+    drop(&b_, a_);
+  }
+
+  RobotDescription& a_;
+  RobotDescription& b_;
+  const std::vector<std::string>& ignore_;
+  std::vector<int> b_of_a_;
+  std::vector<int> a_of_b_;
+  Completion result_;
+};
+
+}  // namespace
+
+std::vector<int> MatchJoints(const RobotSpec& a, const RobotSpec& b) {
+  std::map<std::string, int> index_of;
+  for (const Joint& joint : b.joints) index_of.emplace(joint.name, static_cast<int>(index_of.size()));
+  std::vector<int> match;
+  for (const Joint& joint : a.joints) {
+    const auto found = index_of.find(joint.name);
+    match.push_back(found == index_of.end() ? -1 : found->second);
+  }
+  return match;
+}
+
+bool Ignores(const std::string& word, const std::vector<std::string>& ignore) {
+  return std::find(ignore.begin(), ignore.end(), word) != ignore.end();
+}
+
+Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,
+                             const std::vector<std::string>& ignore) {
+  std::vector<std::string> names;
+  for (const Joint& joint : a->spec.joints) names.push_back(joint.name);
+  const std::vector<std::string> renamed = TakeJointNames(names, a->spec.source, b);
+  Completion completion = Matching(a, b, ignore).Run();
+  completion.notes.insert(completion.notes.begin(), renamed.begin(), renamed.end());
+  return completion;
+}
+
+Completion CompleteFromEngine(const mjModel& engine, const std::string& source, RobotDescription* robot,
+                              const std::vector<std::string>& ignore, bool is_table) {
+  RobotDescription other = is_table ? *robot : ReadMjcfDescription(engine, source);
+  if (is_table) {
+    other.spec.source = source;
+    for (Joint& joint : other.spec.joints) {
+      const int id = FindByName(engine, mjOBJ_JOINT, NameInFile(joint));
+      if (id < 0) continue;
+      const int dof = engine.jnt_dofadr[id];
+      joint.armature = engine.dof_armature[dof];
+      joint.damping = engine.dof_damping[dof];
+      joint.dry_friction = engine.dof_frictionloss[dof];
+    }
+  }
+  Completion completion = CompleteEachOther(&other, robot, ignore);
+  const std::vector<int> own = MatchJoints(other.spec, robot->spec);
+  for (GateFinding& finding : completion.one_sided) {
+    std::swap(finding.model, finding.engine);
+    finding.location.first = own[static_cast<size_t>(finding.location.first)];
+  }
+  return completion;
+}
+
+void TakeIgnored(const RobotSpec& robot, const std::vector<std::string>& ignore, mjModel* engine) {
+  for (const JointConstant& constant : kJointConstants) {
+    mjtNum* const values = constant.value == &Joint::armature       ? engine->dof_armature
+                           : constant.value == &Joint::damping      ? engine->dof_damping
+                           : constant.value == &Joint::dry_friction ? engine->dof_frictionloss
+                                                                    : nullptr;
+    if (values == nullptr || !Ignores(constant.word, ignore)) continue;
+    for (const Joint& joint : robot.joints) {
+      const int id = FindByName(*engine, mjOBJ_JOINT, NameInFile(joint));
+      if (id >= 0) values[engine->jnt_dofadr[id]] = joint.*constant.value;
+    }
+  }
+}
+
+void UndoOneSided(const std::vector<GateFinding>& one_sided, RobotSpec* spec) {
+  for (const GateFinding& finding : one_sided) {
+    for (const JointConstant& constant : kJointConstants) {
+      if (finding.check == constant.check)
+        spec->joints[static_cast<size_t>(finding.location.first)].*constant.value = finding.model;
+    }
+  }
+}
+
+void AddOneSided(const RobotModel& model, const std::vector<GateFinding>& one_sided, GateResult* gate) {
+  if (one_sided.empty()) return;
+  // An effect is largest where least inertia is moved: the least of M_jj over some states.
+  constexpr int kStates = 20;
+  const int base = model.num_base_velocities();
+  ModelTerms terms(model);
+  StateSource source(model, {}, 1);
+  VectorXd q = VectorXd::Zero(model.num_positions());
+  VectorXd inertia;
+  for (int i = 0; i < kStates; ++i) {
+    source.DrawPositions(&q);
+    terms.SetState(q, VectorXd::Zero(model.num_velocities()));
+    terms.CalcDynamics();
+    const VectorXd diagonal = terms.M().diagonal();
+    inertia = i == 0 ? diagonal : inertia.cwiseMin(diagonal).eval();
+  }
+  for (GateFinding finding : one_sided) {
+    const Joint& joint = model.joints()[static_cast<size_t>(finding.location.first)];
+    const double M_jj = inertia[base + finding.location.first];
+    const double value = std::max(finding.model, finding.engine);
+    const bool turns = joint.type != JointType::kPrismatic;
+    if (finding.check == "joint_armature") {
+      finding.effect +=
+          fmt::format(": M of {} by up to {:.2g} %", joint.name, 100.0 * value / (M_jj - value));
+    } else if (finding.check == "joint_damping") {
+      finding.effect += fmt::format(": rates of {} decay within {:.2g} s", joint.name, M_jj / value);
+    } else {
+      finding.effect += fmt::format(": {} is slowed by up to {:.2g} {}", joint.name, value / M_jj,
+                                    turns ? "rad/s^2" : "m/s^2");
+    }
+    finding.where = Describe(finding.location, model, base);
+    gate->Add(std::move(finding));
+  }
+}
+
+}  // namespace dexcheck

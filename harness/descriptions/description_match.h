@@ -1,0 +1,55 @@
+#pragma once
+
+// Two descriptions of one robot are brought to the same statements.
+
+#include <mujoco/mujoco.h>
+
+#include <string>
+#include <vector>
+
+#include "harness/descriptions/robot_description.h"
+#include "harness/gate/static_gate.h"
+
+namespace dexcheck {
+
+/// Index in `b` of each joint of `a`, by name; -1 where there is none.
+std::vector<int> MatchJoints(const RobotSpec& a, const RobotSpec& b);
+
+/// Whether a word of kIgnorable is among them.
+bool Ignores(const std::string& word, const std::vector<std::string>& ignore);
+
+/// What one of two descriptions took from the other.
+struct Completion {
+  std::vector<std::string> notes;         ///< One line each: what was done.
+  std::vector<std::string> not_compared;  ///< One line each: what only one of them states, or is ignored.
+  std::vector<std::string>
+      unstated;  ///< Names of the checks of constants that one of them states nothing of.
+  /// What only one of them states and what acts on the motion, where the other one has none: a disagreement.
+  /// `model` is the number of `a`, `engine` that of `b`; `location` is the joint of `a`.
+  std::vector<GateFinding> one_sided;
+};
+
+/// The other way round, for a robot that more than two share: the engine takes over what is ignored.
+void TakeIgnored(const RobotSpec& robot, const std::vector<std::string>& ignore, mjModel* engine);
+
+/// Gives the joints of `b` the names of `a` when they are alike, and completes either description by what
+/// only the other one states: gravity, constants of joints, names of links whose joints have one name; frames
+/// that only one has are dropped.
+/// @param ignore what need not agree, of kIgnorable: `b` takes those of `a`.
+/// @throws InputError that lists the joints that one lacks, or names one whose kind or parent differs.
+Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,
+                             const std::vector<std::string>& ignore = {});
+
+/// The same of a description and an engine's model, whose names it takes; `a` is the description.
+/// @param is_table a parameter file states all: only what is ignored is taken over.
+Completion CompleteFromEngine(const mjModel& engine, const std::string& source, RobotDescription* robot,
+                              const std::vector<std::string>& ignore = {}, bool is_table = false);
+
+/// Gives the joints back what their own file says where it leaves a constant out, which is none.
+void UndoOneSided(const std::vector<GateFinding>& one_sided, RobotSpec* spec);
+
+/// Adds what one side alone states to the gate, each with its effect on the motion.
+/// @param model of the robot with what both state.
+void AddOneSided(const RobotModel& model, const std::vector<GateFinding>& one_sided, GateResult* gate);
+
+}  // namespace dexcheck

@@ -1,0 +1,321 @@
+#include "harness/descriptions/engine_comparison.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <optional>
+#include <utility>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/model/body_frame.h"
+#include "harness/base/files.h"
+#include "harness/base/shell.h"
+#include "harness/descriptions/description_match.h"
+#include "harness/descriptions/engine_settings.h"
+#include "harness/descriptions/engine_urdf.h"
+#include "harness/descriptions/join_names.h"
+#include "harness/descriptions/mjcf_reader.h"
+#include "harness/descriptions/robot_file.h"
+#include "harness/gate/static_gate.h"
+
+namespace dexcheck {
+namespace {
+
+using SidePtr = std::unique_ptr<TermSide>;
+
+class EngineComparisonRun {
+ public:
+  EngineComparisonRun(const RobotDescription& robot, std::filesystem::path file,
+                      const EngineComparisonOptions& options)
+      : robot_(robot),
+        file_(std::move(file)),
+        format_(FindFormat(file_)),
+        options_(options),
+        model_(robot.spec) {}
+
+  EngineComparisonResult Run(const std::function<bool(long)>& progress) {
+    CheckNames();
+    for (const EngineComparisonEngine& engine : ListEngineComparisonEngines()) {
+      if (IsWanted(engine.name)) Add(engine.name, [&] { return Make(engine.name); });
+    }
+    for (const std::string& program : options_.programs) {
+      const size_t equals = program.find('=');
+      Add(program.substr(0, equals), [&] { return MakeProgram(program.substr(equals + 1)); });
+    }
+    if (sides_.size() < 2) {
+      std::string text = "engine_comparison: two engines must be there, got " + std::to_string(sides_.size());
+      for (const std::string& absent : result_.absent) text += "; " + absent;
+      throw InputError(text);
+    }
+    Compare(progress);
+    FormGroups();
+    if (!result_.Agrees()) Explain();
+    for (const SidePtr& side : sides_) result_.names.push_back(side->name());
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] bool IsWanted(const std::string& name) const {
+    return options_.engines.empty() ||
+           std::find(options_.engines.begin(), options_.engines.end(), name) != options_.engines.end();
+  }
+
+  void CheckNames() const {
+    std::vector<std::string> known;
+    for (const EngineComparisonEngine& engine : ListEngineComparisonEngines()) known.push_back(engine.name);
+    for (const std::string& name : options_.engines) {
+      if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+      throw InputError("--engines: must be of " + JoinNames(known) + ", got " + Quote(name));
+    }
+    for (const std::string& program : options_.programs) {
+      if (program.find('=') != std::string::npos && !program.starts_with('=')) continue;
+      throw InputError("--engine: must be NAME=COMMAND, got " + Quote(program));
+    }
+  }
+
+  /// What cannot be asked is told and left out.
+  void Add(const std::string& name, const std::function<SidePtr()>& make) {
+    try {
+      SidePtr side = make();
+      // One state, so that what cannot answer is left out before the comparison.
+      VectorXd q;
+      VectorXd xi;
+      q.setZero(model_.num_positions());
+      xi.setZero(model_.num_velocities());
+      MakeFeed()(0, &q, &xi);
+      side->Evaluate(0, q, xi);
+      sides_.push_back(std::move(side));
+    } catch (const Error& error) {
+      result_.absent.push_back(name + ": " + error.what());
+      result_.lacks_requested = result_.lacks_requested || !options_.engines.empty();
+    }
+  }
+
+  SidePtr Make(const std::string& name) {
+    if (name == "analytic") return std::make_unique<AnalyticSide>(robot_, "analytic model");
+    if (name == "mujoco") return MakeMujoco();
+    if (name == "mujoco3") {
+      const std::filesystem::path script = options_.programs_folder / "mujoco3.mjs";
+      RequireProgram(script);
+      if (!options_.states.ignore.empty() && !options_.mjcf.empty()) {
+        throw InputError("reads " + options_.mjcf.filename().string() +
+                         " with its own constants of joints, which --ignore cannot change");
+      }
+      std::string command =
+          "node " + QuoteForShell(script.string()) + " " + QuoteForShell(MujocoFile().string());
+      if (!options_.node_modules.empty()) command += " " + QuoteForShell(options_.node_modules.string());
+      return MakeProgram(command);
+    }
+    if (format_ != RobotFormat::kUrdf) throw InputError("reads a URDF only");
+    const std::filesystem::path program = options_.programs_folder / ("dexcheck-" + name);
+    RequireProgram(program);
+    return MakeProgram(QuoteForShell(program.string()) + " " + QuoteForShell(file_.string()));
+  }
+
+  static void RequireProgram(const std::filesystem::path& path) {
+    std::error_code ignored;
+    if (!std::filesystem::exists(path, ignored)) throw InputError("is not installed: " + path.string());
+  }
+
+  SidePtr MakeProgram(const std::string& command) {
+    return std::make_unique<ProgramSide>(command, robot_, options_.program_options);
+  }
+
+  /// An MJCF, or the URDF as MuJoCo's importer should have it.
+  const std::filesystem::path& MujocoFile() {
+    if (!mujoco_file_.empty()) return mujoco_file_;
+    if (!options_.mjcf.empty()) {
+      mujoco_file_ = options_.mjcf;
+    } else if (format_ == RobotFormat::kUrdf) {
+      folder_.emplace();
+      mujoco_file_ = folder_->path() / "robot.urdf";
+      std::ofstream(mujoco_file_) << WriteEngineUrdf(ReadBytes(file_), file_.string(),
+                                                     robot_.spec.base.type == BaseType::kFloating);
+    } else if (format_ == RobotFormat::kMjcf) {
+      mujoco_file_ = file_;
+    } else {
+      throw InputError("reads no parameter file; --mjcf names what it reads instead");
+    }
+    return mujoco_file_;
+  }
+
+  /// What MuJoCo makes of a file; a refusal speaks of the file that the user knows.
+  [[nodiscard]] MjModelPtr Load(const std::filesystem::path& path) const {
+    try {
+      return LoadMjcf(path);
+    } catch (const InputError& error) {
+      std::string text = error.what();
+      const size_t at = text.find(path.string());
+      if (folder_ && at != std::string::npos) text.replace(at, path.string().size(), file_.string());
+      throw InputError(text);
+    }
+  }
+
+  SidePtr MakeMujoco() {
+    const std::filesystem::path path = MujocoFile();
+    MjModelPtr engine = Load(path);
+    if (FindFormat(path) == RobotFormat::kUrdf) {
+      for (int k = 0; k < 3; ++k) engine->opt.gravity[k] = robot_.spec.gravity[k];
+    }
+    TakeIgnored(robot_.spec, options_.states.ignore, engine.get());
+    RobotDescription completed = robot_;
+    const std::string file = options_.mjcf.empty() ? file_.filename().string() : path.filename().string();
+    const Completion completion = CompleteFromEngine(*engine, file, &completed);
+    const Base& base = completed.spec.base;
+    if (base.type != robot_.spec.base.type) {
+      throw InputError("its base floats, and that of " + file_.filename().string() +
+                       " is fixed (--floating)");
+    }
+    const bool has_moved = std::any_of(robot_.spec.frames.begin(), robot_.spec.frames.end(),
+                                       [&](const Frame& frame) { return frame.name == base.link; });
+    if (base.type == BaseType::kFloating && has_moved) {
+      throw InputError("its base is " + Quote(base.link) + ", which another frame than " +
+                       Quote(robot_.spec.base.link) + " belongs to");
+    }
+    if (!options_.mjcf.empty()) {
+      for (const auto& notes : {completion.notes, completion.not_compared}) {
+        for (const std::string& note : notes) result_.notes.push_back("MuJoCo: " + note);
+      }
+      others_.push_back({"as with what only " + file + " states: armature, damping, gravity", completed});
+    }
+    NoteCompiledInertias(*engine, path.string(), completed);
+    NoteOtherForces(Adapter(RobotModel(completed.spec), *engine, path.string()));
+    return std::make_unique<EngineSide>(completed, std::move(engine), path.string(),
+                                        std::string("MuJoCo ") + mj_versionString());
+  }
+
+  /// The description with the bodies that MuJoCo's compiler made of it: it diagonalises inertias, to 1e-6.
+  void NoteCompiledInertias(const mjModel& engine, const std::string& source, RobotDescription completed) {
+    const RobotDescription compiled = ReadMjcfDescription(engine, source);
+    double largest = 0.0;
+    for (size_t i = 0; i < completed.spec.joints.size(); ++i) {
+      Joint& joint = completed.spec.joints[i];
+      const auto other = std::find_if(compiled.spec.joints.begin(), compiled.spec.joints.end(),
+                                      [&](const Joint& candidate) { return candidate.name == joint.name; });
+      if (other == compiled.spec.joints.end()) return;
+      const auto j = static_cast<size_t>(other - compiled.spec.joints.begin());
+      // From the compiled joint's frame over the link's own, which both know.
+      const MassProperties body =
+          ExpressIn(other->body, completed.joints[i].X_iL * compiled.joints[j].X_iL.inverse());
+      const double size = joint.body.inertia.norm();
+      if (size > 0.0) largest = std::max(largest, (body.inertia - joint.body.inertia).norm() / size);
+      joint.body = body;
+    }
+    others_.push_back(
+        {fmt::format("as with the inertias that its compiler made of the file, up to {:.0e} off", largest),
+         completed});
+  }
+
+  /// What the engine counts among its passive forces, as friction, and no description has.
+  void NoteOtherForces(const Adapter& adapter) {
+    constexpr const char* kChecks[] = {"joint_spring", "tendon_spring", "tendon_damping", "fluid"};
+    std::vector<std::string> parts;
+    for (const GateFinding& finding : RunStaticGate(adapter).findings) {
+      if (std::find(std::begin(kChecks), std::end(kChecks), finding.check) == std::end(kChecks)) continue;
+      std::string part = finding.check;
+      std::replace(part.begin(), part.end(), '_', ' ');
+      parts.push_back(part + (finding.where.empty() ? "" : " of " + finding.where));
+    }
+    if (!parts.empty())
+      other_forces_ = "its friction has forces that no description has: " + JoinNames(parts);
+  }
+
+  [[nodiscard]] StateFeed MakeFeed() const { return FeedRandomStates(model_, options_.states); }
+
+  void Compare(const std::function<bool(long)>& progress) {
+    std::vector<TermSide*> sides;
+    for (const SidePtr& side : sides_) sides.push_back(side.get());
+    SideComparison comparison(robot_, sides);
+    result_.samples = CompareAtStates(MakeFeed(), progress, &comparison);
+    result_.pairs = comparison.TakePairs();
+    for (ComparedPair& pair : result_.pairs) {
+      for (CheckRecord& record : pair.terms) {
+        record.bound = std::max(record.bound, options_.tolerance);
+        record.failed = !(record.worst <= record.bound);
+      }
+    }
+  }
+
+  /// Each side joins the first group all of whose sides it agrees with.
+  void FormGroups() {
+    const auto agree = [&](size_t a, size_t b) {
+      const auto pair =
+          std::find_if(result_.pairs.begin(), result_.pairs.end(), [&](const ComparedPair& candidate) {
+            return candidate.first == std::min(a, b) && candidate.second == std::max(a, b);
+          });
+      return std::none_of(pair->terms.begin(), pair->terms.end(),
+                          [](const CheckRecord& record) { return record.failed; });
+    };
+    for (size_t side = 0; side < sides_.size(); ++side) {
+      const auto fits = [&](const std::vector<size_t>& group) {
+        return std::all_of(group.begin(), group.end(), [&](size_t member) { return agree(member, side); });
+      };
+      const auto group = std::find_if(result_.groups.begin(), result_.groups.end(), fits);
+      if (group != result_.groups.end()) {
+        group->push_back(side);
+      } else {
+        result_.groups.push_back({side});
+      }
+    }
+    std::stable_sort(result_.groups.begin(), result_.groups.end(),
+                     [](const auto& a, const auto& b) { return a.size() > b.size(); });
+  }
+
+  /// Why those outside of the largest group differ from the description's analytic model.
+  void Explain() {
+    const auto make_feed = [this] { return MakeFeed(); };
+    AnalyticSide model(robot_, "");
+    for (const SidePtr& owned : sides_) {
+      TermSide* const side = owned.get();
+      if (AgreeAtFirst(robot_, &model, side, make_feed, options_.tolerance)) continue;
+      std::optional<std::string> setting = FindSetting(robot_, side, make_feed, options_.tolerance, others_);
+      auto* const answering = dynamic_cast<AnsweringSide*>(side);
+      if (!setting && answering != nullptr && answering->layout().is_floating()) {
+        const std::optional<BaseConvention> other = FindOtherConvention(
+            robot_, &model, side, answering->layout().convention(),
+            [&](const BaseConvention& convention) { answering->set_convention(convention); }, make_feed);
+        if (other) setting = "as with its base in " + Describe(*other);
+      }
+      const bool is_mujoco = dynamic_cast<EngineSide*>(side) != nullptr;
+      if (!setting && is_mujoco && !other_forces_.empty()) setting = other_forces_;
+      result_.settings.push_back(side->name() + ": " +
+                                 setting.value_or("no setting that is known explains it"));
+    }
+  }
+
+  const RobotDescription& robot_;
+  std::filesystem::path file_;
+  RobotFormat format_;
+  const EngineComparisonOptions& options_;
+  RobotModel model_;
+  std::optional<TemporaryFolder> folder_;
+  std::filesystem::path mujoco_file_;
+  std::vector<OtherDescription> others_;
+  std::string other_forces_;  // of the engine that is linked, in words
+  std::vector<SidePtr> sides_;
+  EngineComparisonResult result_;
+};
+
+}  // namespace
+
+const std::vector<EngineComparisonEngine>& ListEngineComparisonEngines() {
+  static const std::vector<EngineComparisonEngine> engines = {
+      {"analytic", "the analytic model of the file"},
+      {"mujoco", "MuJoCo 2.2.2, which is linked into this program"},
+      {"mujoco3", "MuJoCo 3 under Node (npm package @mujoco/mujoco)"},
+      {"bullet", "Bullet's btMultiBody"},
+      {"kdl", "the Orocos Kinematics and Dynamics Library"},
+      {"simbody", "Simbody"},
+  };
+  return engines;
+}
+
+EngineComparisonResult RunEngineComparison(const RobotDescription& robot, const std::filesystem::path& file,
+                                           const EngineComparisonOptions& options,
+                                           const std::function<bool(long)>& progress) {
+  return EngineComparisonRun(robot, file, options).Run(progress);
+}
+
+}  // namespace dexcheck

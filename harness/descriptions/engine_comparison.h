@@ -1,0 +1,60 @@
+#pragma once
+
+// One robot in several engines: the terms of all of them at the same states, each pair compared.
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "harness/descriptions/program_side.h"
+#include "harness/descriptions/side_comparison.h"
+
+namespace dexcheck {
+
+/// Where engines are found, and what they read.
+struct EngineComparisonOptions {
+  /// Names of ListEngineComparisonEngines; empty: all that are there.
+  std::vector<std::string> engines;
+  /// Programs of the user's own, "NAME=COMMAND".
+  std::vector<std::string> programs;
+  std::filesystem::path mjcf;             ///< What MuJoCo reads instead of the robot's file; may be empty.
+  std::filesystem::path programs_folder;  ///< With the programs that come with dexcheck.
+  std::filesystem::path node_modules;     ///< Folder in which npm installed MuJoCo 3; may be empty.
+  ProgramOptions program_options = {.seconds = 60.0};  ///< Node and large engines start slowly.
+  ConsistencyOptions states;
+  /// Relative difference at which two engines still agree. They have algorithms of their own: one that
+  /// inverts M loses as many digits as M's condition number has, and MuJoCo 2.2.2 diagonalises inertias to
+  /// 1e-6 or better.
+  double tolerance = 1e-6;
+};
+
+/// Name of an engine, and what it is: "analytic", "mujoco", "mujoco3", "bullet", "kdl", "simbody".
+struct EngineComparisonEngine {
+  std::string name;
+  std::string description;
+};
+const std::vector<EngineComparisonEngine>& ListEngineComparisonEngines();
+
+/// What all engines together say.
+struct EngineComparisonResult {
+  std::vector<std::string> names;   ///< Of the sides, as they call themselves.
+  std::vector<std::string> absent;  ///< "kdl: why it is not compared".
+  bool lacks_requested = false;     ///< One of them was asked for by name.
+  std::vector<std::string> notes;
+  std::vector<ComparedPair> pairs;          ///< Judged by the tolerance.
+  std::vector<std::vector<size_t>> groups;  ///< Sides that agree with each other; the largest group first.
+  std::vector<std::string> settings;        ///< "MuJoCo 2.2.2: as if ...": which setting explains a side.
+  long samples = 0;
+
+  [[nodiscard]] bool Agrees() const { return groups.size() <= 1; }
+};
+
+/// Asks the engines. @param robot the description of `file`, whose analytic model is the first side.
+/// @throws InputError for names that are none, and when fewer than two sides are left.
+EngineComparisonResult RunEngineComparison(const RobotDescription& robot, const std::filesystem::path& file,
+                                           const EngineComparisonOptions& options,
+                                           const std::function<bool(long)>& progress);
+
+}  // namespace dexcheck

@@ -1,0 +1,40 @@
+#pragma once
+
+// What an MJCF has besides the mechanism that a description tells of it: motors, springs, tendons,
+// constraints, flags, a fluid, and whatever acts on the joint that carries a floating base.
+
+#include <mujoco/mujoco.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "harness/descriptions/robot_description.h"
+#include "harness/engine/adapter.h"
+#include "harness/gate/static_gate.h"
+
+namespace dexcheck {
+
+/// Takes motors that are no plain torques (servos, muscles) out of an engine's model that is compared with a
+/// description that has no place for them, as a URDF. What they exert is an input and in no term.
+/// @return a line for the report; none when there are no such motors.
+std::optional<std::string> SetAsideMotors(const std::string& source, mjModel* engine);
+
+/// What two MJCFs have besides the mechanism, compared with each other.
+struct Extras {
+  GateResult differences;  ///< Parts of one name that both have, whose numbers differ.
+  GateResult of_first;     ///< What the first one's gate finds besides them.
+};
+
+/// Compares part by part of the same name, and takes such parts out of the second model, so that the gate
+/// finds there what the first one lacks. Couplings of joints (equality/joint) stay.
+/// @param first as it is read from `file`, before names are taken over.
+/// @param second of the same joints in the same order; `engine` is its model.
+Extras CompareExtras(const RobotDescription& first, const std::filesystem::path& file, const Adapter& second,
+                     mjModel* engine);
+
+/// Puts them into the second one's gate: what both gates find alike is taken back, what only the first one's
+/// finds is told from the other side.
+void AddExtras(const Extras& extras, GateResult* gate);
+
+}  // namespace dexcheck

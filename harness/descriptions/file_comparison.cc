@@ -1,0 +1,232 @@
+#include "harness/descriptions/file_comparison.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "controller/common/errors.h"
+#include "harness/checks/tolerance.h"
+#include "harness/descriptions/compiled_inertias.h"
+#include "harness/descriptions/description_check.h"
+#include "harness/descriptions/description_match.h"
+#include "harness/descriptions/engine_extras.h"
+#include "harness/descriptions/join_names.h"
+#include "harness/descriptions/link_frames.h"
+#include "harness/descriptions/mjcf_reader.h"
+#include "harness/descriptions/model_comparison.h"
+#include "harness/descriptions/read_description.h"
+#include "harness/descriptions/robot_file.h"
+#include "harness/engine/engine.h"
+
+namespace dexcheck {
+namespace {
+
+using Progress = std::function<bool(long)>;
+
+void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& more) {
+  notes->insert(notes->end(), more.begin(), more.end());
+}
+
+/// What moves in a scene and is no part of the robot.
+void NoteOthers(const Adapter& adapter, Comparison* comparison) {
+  std::vector<std::string> names;
+  for (const int joint : adapter.other_joints())
+    names.push_back(NameOf(adapter.engine(), mjOBJ_JOINT, joint));
+  if (!names.empty()) {
+    comparison->not_compared.push_back("no part of the robot, since nothing joins them to it: joints " +
+                                       JoinNames(names));
+  }
+}
+
+/// A term of which no number was compared is no agreement.
+void NoteEmptyTerms(Comparison* comparison) {
+  std::vector<std::string> names;
+  std::erase_if(comparison->result.terms, [&](const CheckRecord& record) {
+    if (record.comparisons == 0) names.push_back(record.name);
+    return record.comparisons == 0;
+  });
+  if (!names.empty())
+    comparison->not_compared.push_back("terms of frames, since the two have none in common: " +
+                                       JoinNames(names));
+}
+
+/// Counts roundings that the bounds of the table of terms do not know: kStep for each step along a chain, of
+/// both sides together, of which a rotation on one side has kRotation.
+/// - A table that dexcheck import wrote has those of its writing. For each row: a product of three
+/// transforms,
+///   the decomposition into three angles (one more product), and their composition when it is read (two), six
+///   rotations in all; and the angles as short decimals, each within 8 pi eps (FormatTidy).
+/// - A link's frame is placed by both chains at zero, as many roundings again.
+void CountRoundings(int imported, bool has_link_frames, std::vector<CheckRecord>* records) {
+  constexpr double kStep = 16.0;
+  constexpr double kRotation = 8.0;
+  constexpr double kImport = 6.0 * kRotation + 3.0 * 8.0 * kPi;
+  for (CheckRecord& record : *records) {
+    const bool is_of_frames = record.name == "frame_pose" || record.name == "J" || record.name == "J_dot_xi";
+    record.bound *= (1.0 + imported * kImport / kStep) * (has_link_frames && is_of_frames ? 2.0 : 1.0);
+    record.failed = !(record.worst <= record.bound);
+  }
+}
+
+/// What brings a description and an engine's model together.
+struct EngineCompletion {
+  Completion completion;
+  bool has_link_frames = false;
+};
+
+/// Completes a description, and gives it frames of links and the inertias that the engine compiled. A robot
+/// on wheels, one with an object, and a parameter file of another mechanism are left for the adapter to
+/// match.
+EngineCompletion Complete(const ConsistencyOptions& options, const mjModel& engine, Comparison* comparison,
+                          RobotDescription* robot) {
+  const std::string file = comparison->second.filename().string();
+  const bool is_table = FindFormat(comparison->first) == RobotFormat::kToml;
+  const BaseType base = robot->spec.base.type;
+  EngineCompletion result;
+  if ((base == BaseType::kFixed || base == BaseType::kFloating) && !robot->spec.object) {
+    RobotDescription completed = *robot;
+    try {
+      result.completion = CompleteFromEngine(engine, file, &completed, options.ignore);
+      RobotDescription compiled = ReadMjcfDescription(engine, file);
+      result.has_link_frames = AddLinkFrames(&completed, &compiled);
+      const std::optional<std::string> inertias =
+          TakeCompiledInertias(comparison->second, engine, &completed);
+      if (inertias) comparison->notes.push_back(*inertias);
+      *robot = std::move(completed);
+      return result;
+    } catch (const InputError&) {
+      if (!is_table) throw;
+    }
+  }
+  result.completion = CompleteFromEngine(engine, file, robot, options.ignore, is_table);
+  return result;
+}
+
+/// A description against the engine.
+void CompareWithEngine(const UrdfOptions& urdf, const ConsistencyOptions& options, const Progress& progress,
+                       Comparison* comparison) {
+  const std::string file = comparison->second.filename().string();
+  RobotDescription robot = ReadDescription(comparison->first, urdf);
+  const RobotDescription written = robot;
+  const MjModelPtr engine = LoadMjcf(comparison->second);
+  const RobotFormat format = FindFormat(comparison->first);
+  if (format == RobotFormat::kUrdf) {
+    const std::optional<std::string> motors = SetAsideMotors(file, engine.get());
+    if (motors) comparison->not_compared.push_back(*motors);
+  }
+  const EngineCompletion completed = Complete(options, *engine, comparison, &robot);
+  const Completion& completion = completed.completion;
+  comparison->model.emplace(robot.spec);
+  const Adapter adapter(*comparison->model, *engine, comparison->second.string());
+  std::optional<Extras> extras;
+  if (format == RobotFormat::kMjcf) extras = CompareExtras(written, comparison->first, adapter, engine.get());
+  comparison->result = CheckConsistency(adapter, options, progress);
+  CountRoundings(robot.is_imported ? 1 : 0, completed.has_link_frames, &comparison->result.terms);
+  GateResult& gate = comparison->result.gate;
+  std::erase_if(gate.records, [&](const CheckRecord& record) {
+    return !record.failed && std::find(completion.unstated.begin(), completion.unstated.end(), record.name) !=
+                                 completion.unstated.end();
+  });
+  AddOneSided(*comparison->model, completion.one_sided, &gate);
+  AppendTo(&comparison->not_compared,
+           CheckDescription(robot, adapter, &gate, Ignores("coupling", options.ignore)));
+  if (extras) AddExtras(*extras, &gate);
+  // An MJCF's notes are about what CompareExtras compares.
+  if (format != RobotFormat::kMjcf) AppendTo(&comparison->notes, robot.notes);
+  AppendTo(&comparison->not_compared, completion.not_compared);
+  for (const auto& notes : {completion.notes, DescribeCoordinates(robot)})
+    AppendTo(&comparison->notes, notes);
+  NoteOthers(adapter, comparison);
+}
+
+/// Two descriptions without the engine.
+void CompareTwoDescriptions(const UrdfOptions& urdf, const ConsistencyOptions& options,
+                            const Progress& progress, Comparison* comparison) {
+  RobotDescription a = ReadDescription(comparison->first, urdf);
+  RobotDescription b = ReadDescription(comparison->second, urdf);
+  const Completion completion = CompleteEachOther(&a, &b, options.ignore);
+  for (const auto& notes : {a.notes, b.notes, completion.notes, DescribeCoordinates(a)}) {
+    AppendTo(&comparison->notes, notes);
+  }
+  AppendTo(&comparison->not_compared, completion.not_compared);
+  const bool has_link_frames = AddLinkFrames(&a, &b);
+  comparison->model.emplace(a.spec);
+  comparison->result = CompareDescriptions(a, b, options, progress);
+  CountRoundings((a.is_imported ? 1 : 0) + (b.is_imported ? 1 : 0), has_link_frames,
+                 &comparison->result.terms);
+  AddOneSided(*comparison->model, completion.one_sided, &comparison->result.gate);
+}
+
+}  // namespace
+
+Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::path& b,
+                        const UrdfOptions& urdf, const ConsistencyOptions& options,
+                        const Progress& progress) {
+  Comparison comparison;
+  comparison.first = a;
+  comparison.second = b;
+  if (FindFormat(a) == RobotFormat::kMjcf && FindFormat(b) != RobotFormat::kMjcf) {
+    std::swap(comparison.first, comparison.second);
+  }
+  comparison.with_engine = FindFormat(comparison.second) == RobotFormat::kMjcf;
+  if (!comparison.with_engine) {
+    CompareTwoDescriptions(urdf, options, progress, &comparison);
+  } else {
+    CompareWithEngine(urdf, options, progress, &comparison);
+  }
+  NoteEmptyTerms(&comparison);
+  return comparison;
+}
+
+void ExplainComparison(const UrdfOptions& urdf, Comparison* comparison, double tolerance) {
+  if (comparison->result.Agrees()) return;
+  comparison->hypotheses = ExplainDifference(comparison->first, comparison->second, urdf,
+                                             std::max(tolerance, kHypothesisTolerance));
+}
+
+Differences SortDifferences(const Comparison& comparison) {
+  const RobotModel& model = *comparison.model;
+  const int base = model.num_base_velocities();
+  const std::string first = comparison.first.filename().string();
+  const std::string second = comparison.second.filename().string();
+  const std::vector<CheckRecord>& checks = comparison.result.gate.records;
+  Differences differences;
+  const auto add = [&](double error, std::string line) {
+    const int digits = CountDigits(error);
+    const bool is_rounded = digits >= kDigitsOfRoundedInput;
+    if (is_rounded) differences.digits = std::min(differences.digits, digits);
+    (is_rounded ? differences.rounded : differences.real).push_back(std::move(line));
+  };
+  for (const GateFinding& finding : comparison.result.gate.findings) {
+    // Where zero is a proper value, the check has another scale than the larger of the two.
+    const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
+    const auto check = std::find_if(checks.begin(), checks.end(),
+                                    [&](const CheckRecord& record) { return record.name == finding.check; });
+    const double worst = check == checks.end() ? 1.0 : check->worst;
+    add(std::min(std::abs(finding.model - finding.engine) / size, worst),
+        fmt::format("{}: {}: {:.12g} in {}, {:.12g} in {}{}{}", finding.check, finding.where, finding.model,
+                    first, finding.engine, second, finding.effect.empty() ? "" : "; ", finding.effect));
+  }
+  for (const CheckRecord& record : comparison.result.terms) {
+    if (!record.failed) continue;
+    add(record.worst,
+        fmt::format("{}: nearest the base: {}; worst: {}: {:.12g} in {}, {:.12g} in {} (sample {})",
+                    record.name, Describe(record.first_failure, model, base),
+                    Describe(record.where, model, base), record.model_value,
+                    comparison.with_engine ? "the model" : first, record.engine_value,
+                    comparison.with_engine ? "MuJoCo" : second, static_cast<long>(record.at)));
+  }
+  return differences;
+}
+
+std::vector<std::string> ListDifferences(const Comparison& comparison) {
+  Differences differences = SortDifferences(comparison);
+  std::vector<std::string> lines = std::move(differences.real);
+  lines.insert(lines.end(), differences.rounded.begin(), differences.rounded.end());
+  return lines;
+}
+
+}  // namespace dexcheck

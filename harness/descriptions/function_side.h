@@ -1,0 +1,44 @@
+#pragma once
+
+// Somebody's own terms, as functions in the same program: compared as a program's answers are.
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "harness/descriptions/file_comparison.h"
+#include "harness/descriptions/term_side.h"
+
+namespace dexcheck {
+
+/// Terms as functions of q' and xi, in the robot's own order of joints (of a floating base in MuJoCo's
+/// convention). Those that are empty are not compared.
+struct TermFunctions {
+  std::string name = "functions";
+  std::function<MatrixXd(const VectorXd& q)> M;                      ///< n x n, armature included.
+  std::function<VectorXd(const VectorXd& q, const VectorXd& xi)> c;  ///< C xi
+  std::function<VectorXd(const VectorXd& q)> g;                      ///< Forces that hold the robot still.
+  std::function<VectorXd(const VectorXd& q, const VectorXd& xi)> h;  ///< c + g
+  std::function<VectorXd(const VectorXd& q, const VectorXd& xi)> friction;  ///< Viscous.
+};
+
+/// The functions as one side.
+class FunctionSide : public TermSide {
+ public:
+  FunctionSide(TermFunctions functions, int size) : functions_(std::move(functions)), size_(size) {}
+  [[nodiscard]] const std::string& name() const override { return functions_.name; }
+  /// @throws InputError "NAME: TERM: must have n entries, got m".
+  SideTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
+
+ private:
+  void CheckSize(const char* term, Eigen::Index rows, Eigen::Index cols, Eigen::Index expected_cols) const;
+
+  TermFunctions functions_;
+  int size_;
+};
+
+/// Compares functions with a parameter file, a URDF, or an MJCF, of which the engine is asked.
+Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctions& functions,
+                            const UrdfOptions& urdf, const ConsistencyOptions& options);
+
+}  // namespace dexcheck

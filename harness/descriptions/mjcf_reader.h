@@ -1,0 +1,21 @@
+#pragma once
+
+// A table of parameters from an engine's model: the mechanism as the engine compiled it.
+
+#include <mujoco/mujoco.h>
+
+#include <string>
+
+#include "harness/descriptions/robot_description.h"
+
+namespace dexcheck {
+
+/// Reads the mechanism of an engine's model: hinges and slides on a fixed base or on one body with a free
+/// joint, masses, couplings by equality/joint, named sites. A body's own frame is kept
+/// (DescribedJoint::X_iL); frame i stands at the joint's anchor. A body with several joints becomes as many
+/// links, of which the last carries the mass. What a table has no place for is noted.
+/// Of several trees, the robot is the one with the most joints (robot_tree.h).
+/// @throws InputError for free joints within it, and where nothing moves.
+RobotDescription ReadMjcfDescription(const mjModel& engine, const std::string& source);
+
+}  // namespace dexcheck

@@ -1,0 +1,240 @@
+#include "harness/descriptions/parameter_writer.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/model/body_frame.h"
+
+namespace dexcheck {
+namespace {
+
+// Products of a few rotations leave zeros and decimal numbers beside themselves by this much of their
+// vector's size.
+constexpr double kPrintedRounding = 8.0 * std::numeric_limits<double>::epsilon();
+
+/// The shortest decimal number within rounding of `value`, which is part of something of size `scale`.
+std::string FormatTidy(double value, double scale) {
+  constexpr int kMaxDigits = 17;
+  if (std::abs(value) <= kPrintedRounding * scale) return "0";
+  for (int digits = 1; digits < kMaxDigits; ++digits) {
+    const std::string text = fmt::format("{:.{}g}", value, digits);
+    const double read = std::strtod(text.c_str(), nullptr);
+    if (std::abs(read - value) <= kPrintedRounding * scale) return FormatNumber(read);
+  }
+  return FormatNumber(value);
+}
+
+template <typename Vector>
+std::string FormatTidyList(const Vector& values, double scale) {
+  std::string text = "[";
+  for (const double value : values) text += (text.size() > 1 ? ", " : "") + FormatTidy(value, scale);
+  return text + "]";
+}
+
+/// Angles as fractions of pi where they are some.
+std::string FormatAngles(const Vector3d& angles) {
+  const auto format = [](double angle) -> std::string {
+    for (const int parts : {1, 2, 3, 4, 6}) {
+      const double count = std::round(angle * parts / kPi);
+      if (count == 0.0 || std::abs(angle - count * kPi / parts) > kPrintedRounding * kPi) continue;
+      const std::string factor = count == 1.0 ? "" : count == -1.0 ? "-" : FormatNumber(count) + " * ";
+      return "\"" + factor + "pi" + (parts == 1 ? "" : " / " + std::to_string(parts)) + "\"";
+    }
+    return FormatTidy(angle, kPi);
+  };
+  return "[" + format(angles[0]) + ", " + format(angles[1]) + ", " + format(angles[2]) + "]";
+}
+
+/// A TOML string.
+std::string QuoteToml(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
+  }
+  return quoted + "\"";
+}
+
+/// A comment's text on one line.
+std::string FormatComment(const std::string& text) { return Abbreviate(text); }
+
+/// ", xyz = ..., rpy = ...": what is not zero; always xyz when `always`.
+std::string FormatPose(const Pose& X, bool always) {
+  const Vector3d xyz = X.translation();
+  const Vector3d rpy = CalcRollPitchYaw(X.linear());
+  std::string text;
+  // Lengths of a robot are of size 1 m; smaller ones keep their digits.
+  const double length = xyz.norm();
+  if (always || length > 0.0) text += ", xyz = " + FormatTidyList(xyz, length);
+  if (rpy.norm() > kPrintedRounding) text += ", rpy = " + FormatAngles(rpy);
+  return text;
+}
+
+class ParameterWriter {
+ public:
+  explicit ParameterWriter(const RobotDescription& robot) : robot_(robot), spec_(robot.spec) {}
+
+  std::string Write(const std::string& origin) {
+    if (spec_.base.type != BaseType::kFixed && spec_.base.type != BaseType::kFloating) {
+      throw InputError(spec_.source + ": base: must be fixed or floating to be written as a parameter file");
+    }
+    WriteHead(origin);
+    for (size_t begin = 0; begin < spec_.joints.size();) {
+      size_t end = begin + 1;
+      while (end < spec_.joints.size() && spec_.joints[end].parent == static_cast<int>(end) - 1) ++end;
+      WriteChain(begin, end);
+      begin = end;
+    }
+    for (const Frame& frame : spec_.frames) WriteFrame(frame);
+    return text_;
+  }
+
+ private:
+  /// The frame that is written for a link: at the joint, along the axes of the link's own frame.
+  [[nodiscard]] Pose WrittenFrame(int joint) const {
+    Pose X_iW = Pose::Identity();
+    if (joint >= 0) X_iW.linear() = robot_.joints[static_cast<size_t>(joint)].X_iL.linear();
+    return X_iW;
+  }
+
+  [[nodiscard]] const std::string& LinkName(int joint) const {
+    return joint < 0 ? spec_.base.link : spec_.joints[static_cast<size_t>(joint)].link;
+  }
+
+  void WriteHead(const std::string& origin) {
+    text_ += kImportMark + FormatComment(origin) + ".\n";
+    for (const std::string& note : robot_.notes) text_ += "# Note: " + FormatComment(note) + ".\n";
+    text_ +=
+        "#\n"
+        "# Each row is a joint and the link that it moves. The link's frame stands at xyz (m), rpy (rad; R = "
+        "Rz(yaw)\n"
+        "# Ry(pitch) Rx(roll)) in its parent's frame when the joint is at zero, and turns about, or moves "
+        "along, axis\n"
+        "# ([0, 0, 1] unless given; a ball turns about all). A link's com (m) is the centre of mass from its "
+        "frame's origin; its "
+        "inertia\n"
+        "# [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] (kg m^2) is about the centre of mass, along its frame's axes. "
+        "Damping is in\n"
+        "# N m s/rad or N s/m, armature in kg m^2 or kg, range in rad or m.\n\n";
+    text_ += "name = " + QuoteToml(spec_.name) + "\n";
+    text_ += "gravity = " + FormatNumbers(spec_.gravity);
+    text_ += robot_.states_gravity ? "\n\n" : "  # not stated there\n\n";
+    const bool floats = spec_.base.type == BaseType::kFloating;
+    text_ += std::string("[base]\ntype = ") + (floats ? "\"floating\"" : "\"fixed\"");
+    text_ += (robot_.states_base ? "\nlink = " : "  # not stated there\nlink = ") +
+             QuoteToml(spec_.base.link) + "\n";
+    if (floats) WriteBody(spec_.base.body);
+    const std::string pose = FormatPose(spec_.base.X_B0, false);
+    if (!pose.empty()) text_ += "pose = {" + pose.substr(1) + " }\n";
+    text_ += "\n";
+  }
+
+  void WriteChain(size_t begin, size_t end) {
+    text_ += "[[chain]]\nparent = " + QuoteToml(LinkName(spec_.joints[begin].parent)) + "\nrows = [\n";
+    // A ball joint is one row: that of its last entry, which moves the link.
+    std::vector<size_t> rows;
+    for (size_t i = begin; i < end; ++i) {
+      const Joint& joint = spec_.joints[i];
+      if (joint.type != JointType::kBall || joint.ball_axis == 2) rows.push_back(i);
+    }
+    for (const size_t i : rows) WriteRow(spec_.joints[i], static_cast<int>(i));
+    text_ += "]\n\n[chain.joints]\n";
+    for (const size_t i : rows) WriteJoint(spec_.joints[i], robot_.joints[i]);
+    text_ += "\n";
+    for (const size_t i : rows) WriteLink(spec_.joints[i], WrittenFrame(static_cast<int>(i)));
+    text_ += "\n";
+  }
+
+  void WriteRow(const Joint& joint, int index) {
+    text_ += "  { joint = " + QuoteToml(NameInFile(joint)) + ", link = " + QuoteToml(joint.link);
+    if (joint.type == JointType::kBall) {
+      const Joint& first = spec_.joints[static_cast<size_t>(index - 2)];
+      text_ += ", type = \"ball\"";
+      text_ +=
+          FormatPose(WrittenFrame(first.parent).inverse() * first.X_PB * WrittenFrame(index), true) + " },\n";
+      return;
+    }
+    const Pose home = CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d);
+    const Pose X_iW = WrittenFrame(index);
+    const Pose X_PW = WrittenFrame(joint.parent).inverse() * joint.X_PB * home * X_iW;
+    const Vector3d axis = X_iW.linear().row(2).transpose();
+    if (joint.type == JointType::kPrismatic) text_ += ", type = \"prismatic\"";
+    text_ += FormatPose(X_PW, true);
+    if (axis != Vector3d::UnitZ()) text_ += ", axis = " + FormatTidyList(axis, 1.0);
+    text_ += " },\n";
+  }
+
+  void WriteJoint(const Joint& joint, const DescribedJoint& stated) {
+    text_ += QuoteToml(NameInFile(joint)) +
+             " = { range = " + FormatNumbers(Vector2d(joint.lower, joint.upper)) +
+             ", damping = " + FormatNumber(joint.damping) + ", armature = " + FormatNumber(joint.armature);
+    if (joint.dry_friction != 0.0) text_ += ", dry_friction = " + FormatNumber(joint.dry_friction);
+    if (joint.coupling) {
+      text_ +=
+          ", mimic = { joint = " + QuoteToml(spec_.joints[static_cast<size_t>(joint.coupling->leader)].name) +
+          ", multiplier = " + FormatNumber(joint.coupling->multiplier) +
+          ", offset = " + FormatNumber(joint.coupling->offset) + " }";
+    }
+    text_ += " }";
+    std::string unstated;
+    const auto note = [&](bool is_stated, const char* name) {
+      if (!is_stated) unstated += (unstated.empty() ? "  # not stated there: " : ", ") + std::string(name);
+    };
+    note(stated.states_range, "range");
+    note(stated.states_damping, "damping");
+    note(stated.states_armature, "armature");
+    text_ += unstated + "\n";
+  }
+
+  void WriteLink(const Joint& joint, const Pose& X_iW) {
+    text_ += "[chain.links." + QuoteToml(joint.link) + "]\n";
+    WriteBody(ExpressIn(joint.body, X_iW.inverse()));
+  }
+
+  void WriteBody(const MassProperties& body) {
+    const Matrix3d& I = body.inertia;
+    Vector6d entries;
+    entries << I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
+    text_ += "mass = " + FormatTidy(body.mass, body.mass) +
+             "\ncom = " + FormatTidyList(body.com, body.com.norm()) +
+             "\ninertia = " + FormatTidyList(entries, I.trace()) + "\n";
+  }
+
+  void WriteFrame(const Frame& frame) {
+    const Pose X_WF = WrittenFrame(frame.link).inverse() * frame.X_LF;
+    text_ +=
+        "[[frame]]\nname = " + QuoteToml(frame.name) + "\nlink = " + QuoteToml(LinkName(frame.link)) + "\n";
+    const Vector3d rpy = CalcRollPitchYaw(X_WF.linear());
+    text_ += "xyz = " + FormatTidyList(X_WF.translation(), X_WF.translation().norm()) + "\n";
+    if (rpy.norm() > kPrintedRounding) text_ += "rpy = " + FormatAngles(rpy) + "\n";
+    if (frame.sphere_radius) text_ += "sphere_radius = " + FormatNumber(*frame.sphere_radius) + "\n";
+    text_ += "\n";
+  }
+
+  const RobotDescription& robot_;
+  const RobotSpec& spec_;
+  std::string text_;
+};
+
+}  // namespace
+
+Vector3d CalcRollPitchYaw(const Matrix3d& R) {
+  // At pitch = +-90 degrees the first column stands along z, and any yaw will do: zero.
+  const double horizontal = std::hypot(R(0, 0), R(1, 0));
+  const double yaw = horizontal > kPrintedRounding ? std::atan2(R(1, 0), R(0, 0)) : 0.0;
+  // Rz(yaw)^T R = Ry(pitch) Rx(roll), whose middle row is [0, cos(roll), -sin(roll)].
+  const Matrix3d rest = Eigen::AngleAxisd(-yaw, Vector3d::UnitZ()).toRotationMatrix() * R;
+  return {std::atan2(-rest(1, 2), rest(1, 1)), std::atan2(-rest(2, 0), rest(0, 0)), yaw};
+}
+
+std::string WriteParameters(const RobotDescription& robot, const std::string& origin) {
+  return ParameterWriter(robot).Write(origin);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,40 @@
+#pragma once
+
+// A program of the user's that answers terms at states: the protocol is in README.md.
+
+#include <memory>
+#include <string>
+
+#include "harness/descriptions/program_process.h"
+#include "harness/descriptions/side_layout.h"
+
+namespace dexcheck {
+
+/// Version of the protocol that this program speaks.
+inline constexpr int kProgramProtocol = 1;
+
+struct ProgramOptions {
+  double seconds = 10.0;  ///< Within which each answer must come.
+};
+
+/// A running program as one side.
+class ProgramSide : public AnsweringSide {
+ public:
+  /// Starts it and says hello. @param robot outlives this.
+  /// @throws ProgramError when it dies or hangs, InputError for what it says that is no answer; one line.
+  ProgramSide(const std::string& command, const RobotDescription& robot, const ProgramOptions& options = {});
+
+  /// As it calls itself, or its command.
+  [[nodiscard]] const std::string& name() const override { return name_; }
+  SideTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
+
+ private:
+  nlohmann::json Ask(const nlohmann::ordered_json& request);
+
+  const RobotDescription& robot_;
+  ProgramProcess process_;
+  std::string source_;  // for messages
+  std::string name_;
+};
+
+}  // namespace dexcheck

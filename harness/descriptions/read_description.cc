@@ -1,0 +1,75 @@
+#include "harness/descriptions/read_description.h"
+
+#include "controller/common/errors.h"
+#include "controller/model/body_frame.h"
+#include "controller/model/parameter_reader.h"
+#include "harness/base/files.h"
+#include "harness/descriptions/mjcf_reader.h"
+#include "harness/descriptions/parameter_writer.h"
+#include "harness/descriptions/robot_file.h"
+#include "harness/engine/engine.h"
+
+namespace dexcheck {
+namespace {
+
+/// @param X_iL the link's own frame, in which its file gives the body.
+void AddPart(const std::string& name, const MassProperties& body, int joint, const Pose& X_iL,
+             RobotDescription* robot) {
+  DescribedPart& part = robot->parts.emplace_back();
+  part.name = name;
+  part.body = X_iL.isApprox(Pose::Identity(), 0.0) ? body : ExpressIn(body, X_iL.inverse());
+  part.joint = joint;
+  part.X_iL = X_iL;
+}
+
+RobotDescription ReadTable(const std::filesystem::path& path) {
+  RobotDescription robot;
+  robot.is_imported = ReadBytes(path).find(kImportMark) != std::string::npos;
+  std::vector<WrittenRow> rows;
+  robot.spec = ReadRobotModel(path, &rows).spec();
+  robot.joints.resize(robot.spec.joints.size());
+  if (robot.spec.base.type != BaseType::kFixed)
+    AddPart(robot.spec.base.link, robot.spec.base.body, -1, Pose::Identity(), &robot);
+  for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
+    const Joint& joint = robot.spec.joints[i];
+    robot.joints[i].X_iL = rows[i].X_iL;
+    if (joint.type == JointType::kBall && joint.ball_axis < 2) continue;  // its link is no part of the file
+    AddPart(joint.link, joint.body, static_cast<int>(i), rows[i].X_iL, &robot);
+  }
+  NoteImpossibleBodies(&robot);
+  return robot;
+}
+
+/// A URDF. When a body that no robot can have is all that stands against it, the audit reads it.
+RobotDescription ReadUrdfOrPointToAudit(const std::filesystem::path& path, const UrdfOptions& options) {
+  try {
+    return ReadUrdf(path, options);
+  } catch (const InputError& error) {
+    if (options.keep_impossible) throw;
+    UrdfOptions kept = options;
+    kept.keep_impossible = true;
+    try {
+      static_cast<void>(ReadUrdf(path, kept));
+    } catch (const InputError&) {
+      throw error;
+    }
+    throw InputError(std::string(error.what()) + " (dexcheck audit " + path.string() +
+                     " reads it all the same, and lists all that is impossible or odd)");
+  }
+}
+
+}  // namespace
+
+RobotDescription ReadDescription(const std::filesystem::path& path, const UrdfOptions& options) {
+  switch (FindFormat(path)) {
+    case RobotFormat::kUrdf:
+      return ReadUrdfOrPointToAudit(path, options);
+    case RobotFormat::kMjcf:
+      return ReadMjcfDescription(*LoadMjcf(path), path.string());
+    case RobotFormat::kToml:
+      break;
+  }
+  return ReadTable(path);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,120 @@
+#include "harness/descriptions/robot_description.h"
+
+#include <algorithm>
+
+#include "controller/common/text.h"
+#include "controller/model/body_frame.h"
+#include "harness/descriptions/join_names.h"
+
+namespace dexcheck {
+
+MatrixXd CalcCouplingMap(const RobotDescription& robot) {
+  std::vector<int> column(robot.joints.size(), -1);
+  int free = 0;
+  for (size_t i = 0; i < column.size(); ++i) {
+    if (!robot.spec.joints[i].coupling) column[i] = free++;
+  }
+  MatrixXd T = MatrixXd::Zero(static_cast<Eigen::Index>(column.size()), free);
+  for (size_t i = 0; i < column.size(); ++i) {
+    const std::optional<JointCoupling>& coupling = robot.spec.joints[i].coupling;
+    const auto row = static_cast<Eigen::Index>(i);
+    if (coupling) {
+      T(row, column[static_cast<size_t>(coupling->leader)]) = coupling->multiplier;
+    } else {
+      T(row, column[i]) = 1.0;
+    }
+  }
+  return T;
+}
+
+void NoteImpossibleBodies(RobotDescription* robot) {
+  std::vector<std::string> names;
+  const auto check = [&](const std::string& link, const MassProperties& body) {
+    if (!FindPhysicalInconsistency(body).empty()) names.push_back(link);
+  };
+  if (robot->spec.base.type != BaseType::kFixed) check(robot->spec.base.link, robot->spec.base.body);
+  for (const Joint& joint : robot->spec.joints) check(joint.link, joint.body);
+  if (names.empty()) return;
+  robot->notes.push_back(
+      "bodies that none can be, since their principal moments break the triangle inequality (dexcheck audit "
+      "has them): " +
+      JoinNames(names) +
+      ". The dynamics are well defined and are compared. MuJoCo's compiler refuses such a body, or with "
+      "balanceinertia gives it the mean of its moments: its copy differs there");
+}
+
+void LetBaseFloat(RobotDescription* robot) {
+  robot->spec.base.type = BaseType::kFloating;
+  robot->spec.base.X_B0 = Pose::Identity();
+  robot->states_base = true;
+}
+
+bool MoveBaseTo(const std::string& frame, RobotDescription* robot) {
+  RobotSpec& spec = robot->spec;
+  if (frame == spec.base.link) return true;
+  const auto found = std::find_if(spec.frames.begin(), spec.frames.end(), [&](const Frame& candidate) {
+    return candidate.link < 0 && candidate.name == frame;
+  });
+  if (found == spec.frames.end()) return false;
+  const Pose X_F0 = found->X_LF.inverse();  // Sigma_0 in the frame
+  *found = {spec.base.link, -1, X_F0, std::nullopt};
+  for (Frame& other : spec.frames) {
+    if (other.link < 0 && &other != &*found) other.X_LF = X_F0 * other.X_LF;
+  }
+  for (Joint& joint : spec.joints) {
+    if (joint.parent < 0) joint.X_PB = X_F0 * joint.X_PB;
+  }
+  for (DescribedPart& part : robot->parts) {
+    if (part.joint < 0) part.X_iL = X_F0 * part.X_iL;
+  }
+  spec.base.body = ExpressIn(spec.base.body, X_F0);
+  spec.base.link = frame;
+  return true;
+}
+
+namespace {
+
+std::vector<std::string> DescribeBase(const RobotDescription& robot) {
+  if (robot.spec.base.type != BaseType::kFloating) return {};
+  return {
+      "base " + Quote(robot.spec.base.link) +
+          " floats: q = [x y z, qw qx qy qz, joints from q[7]], xi = [velocity of its origin in world axes, "
+          "angular velocity in its own axes, joints from xi[6]], as MuJoCo has them",
+      "in Pinocchio's convention the quaternion is qx qy qz qw and the origin's velocity is in the base's "
+      "axes: xi' = B xi with B = diag(R^T, 1, 1), M' = B^-T M B^-1, bias' = B^-T bias + M' [omega x v; 0; "
+      "0] (dexcheck eval prints both)",
+      "in Drake's convention q = [qw qx qy qz, x y z, joints], xi = [angular velocity, velocity of its "
+      "origin, "
+      "both in world axes, joints]"};
+}
+
+/// Ball joints: where each one's entries are, and what others have in their place.
+std::vector<std::string> DescribeBalls(const RobotDescription& robot) {
+  const RobotModel model(robot.spec);
+  std::vector<std::string> places;
+  for (int i = 0; i < model.num_joints(); ++i) {
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    if (joint.type != JointType::kBall || joint.ball_axis > 0) continue;
+    const auto range = [](int first, int count) {
+      return "[" + std::to_string(first) + ".." + std::to_string(first + count - 1) + "]";
+    };
+    places.push_back(Quote(NameInFile(joint)) + " has q" + range(model.position_index(i), 4) + " and xi" +
+                     range(model.num_base_velocities() + i, 3));
+  }
+  if (places.empty()) return {};
+  return {"ball joints: " + JoinNames(places) +
+              ": q = [qw qx qy qz] turns the link against its parent, xi = its angular velocity against the "
+              "parent in the link's own axes, as MuJoCo has them",
+          "a ball joint in Pinocchio's convention has qx qy qz qw and the same velocity; in Simbody's, qw qx "
+          "qy qz and the angular velocity in the parent's axes: xi' = R xi"};
+}
+
+}  // namespace
+
+std::vector<std::string> DescribeCoordinates(const RobotDescription& robot) {
+  std::vector<std::string> notes = DescribeBase(robot);
+  for (const std::string& note : DescribeBalls(robot)) notes.push_back(note);
+  return notes;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,274 @@
+#include "harness/descriptions/side_layout.h"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <numeric>
+#include <utility>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/descriptions/join_names.h"
+
+namespace dexcheck {
+namespace {
+
+using Json = nlohmann::json;
+using Position = BaseConvention::Position;
+
+[[noreturn]] void Fail(const std::string& source, const std::string& key, const std::string& problem) {
+  throw InputError(source + ": " + key + ": " + problem);
+}
+
+constexpr std::pair<const char*, Position> kPositions[] = {
+    {"xyz_wxyz", Position::kXyzWxyz}, {"xyz_xyzw", Position::kXyzXyzw}, {"wxyz_xyz", Position::kWxyzXyz}};
+
+/// Index of a key's word among those that it may have; 0 when the key is missing.
+size_t ReadChoice(const Json& table, const char* key, std::initializer_list<const char*> words,
+                  const std::string& source) {
+  if (!table.contains(key)) return 0;
+  size_t index = 0;
+  std::string list;
+  for (const char* word : words) {
+    if (table.at(key) == word) return index;
+    list += (index++ == 0 ? "" : ", ") + Quote(word);
+  }
+  Fail(source, std::string("base.") + key,
+       "must be one of " + list + ", got " + Abbreviate(table.at(key).dump()));
+}
+
+BaseConvention ReadConvention(const Json& table, const std::string& source) {
+  if (!table.is_object()) Fail(source, "base", "must be an object, got " + Abbreviate(table.dump()));
+  for (const auto& item : table.items()) {
+    const std::string& key = item.key();
+    if (key == "position" || key == "velocity" || key == "linear_axes" || key == "angular_axes") continue;
+    Fail(source, "base." + Abbreviate(key),
+         "unknown key, known here are position, velocity, linear_axes, angular_axes");
+  }
+  BaseConvention convention;
+  convention.position =
+      kPositions[ReadChoice(table, "position", {"xyz_wxyz", "xyz_xyzw", "wxyz_xyz"}, source)].second;
+  convention.angular_first = ReadChoice(table, "velocity", {"linear_angular", "angular_linear"}, source) == 1;
+  convention.linear_in_base = ReadChoice(table, "linear_axes", {"world", "base"}, source) == 1;
+  convention.angular_in_world = ReadChoice(table, "angular_axes", {"base", "world"}, source) == 1;
+  return convention;
+}
+
+VectorXd ReadVector(const Json& list, Eigen::Index size, const std::string& key, const std::string& source) {
+  if (!list.is_array() || list.size() != static_cast<size_t>(size)) {
+    Fail(source, key,
+         "must be a list of " + std::to_string(size) + " numbers, got " +
+             (list.is_array() ? std::to_string(list.size()) : Abbreviate(list.dump())));
+  }
+  VectorXd values(size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const Json& value = list[static_cast<size_t>(i)];
+    if (!value.is_number()) {
+      Fail(source, key + "[" + std::to_string(i) + "]", "must be a number, got " + Abbreviate(value.dump()));
+    }
+    values[i] = value.get<double>();
+  }
+  return values;
+}
+
+MatrixXd ReadMatrix(const Json& rows, Eigen::Index size, const std::string& key, const std::string& source) {
+  if (!rows.is_array() || rows.size() != static_cast<size_t>(size)) {
+    Fail(source, key,
+         "must be a list of " + std::to_string(size) + " rows, got " +
+             (rows.is_array() ? std::to_string(rows.size()) : Abbreviate(rows.dump())));
+  }
+  MatrixXd M(size, size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    M.row(i) = ReadVector(rows[static_cast<size_t>(i)], size, key + "[" + std::to_string(i) + "]", source)
+                   .transpose();
+  }
+  return M;
+}
+
+double ReadNumber(const Json& value, const std::string& key, const std::string& source) {
+  if (!value.is_number()) Fail(source, key, "must be a number, got " + Abbreviate(value.dump()));
+  return value.get<double>();
+}
+
+}  // namespace
+
+SideLayout::SideLayout(const RobotDescription& robot)
+    : base_(robot.spec.base.type == BaseType::kFloating ? 6 : 0), base_positions_(base_ > 0 ? 7 : 0) {
+  if (base_ == 0 && robot.spec.base.type != BaseType::kFixed) {
+    throw InputError(robot.spec.source + ": base: must be fixed or floating to be compared with a program");
+  }
+  const RobotModel model(robot.spec);
+  for (int i = 0; i < model.num_joints(); ++i) {
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    const bool is_ball = joint.type == JointType::kBall;
+    if (is_ball && joint.ball_axis > 0) continue;
+    robot_joints_.push_back({NameInFile(joint), model.position_index(i), is_ball ? 4 : 1, i, is_ball ? 3 : 1,
+                             joint.coupling.has_value()});
+  }
+  std::vector<int> all(robot_joints_.size());
+  std::iota(all.begin(), all.end(), 0);
+  SetJoints(std::move(all));
+}
+
+void SideLayout::SetJoints(std::vector<int> joints) {
+  joints_ = std::move(joints);
+  velocities_.clear();
+  num_positions_ = base_positions_;
+  for (const int index : joints_) {
+    const NamedJoint& joint = robot_joints_[static_cast<size_t>(index)];
+    num_positions_ += joint.num_positions;
+    for (int k = 0; k < joint.num_velocities; ++k) velocities_.push_back(joint.velocity + k);
+  }
+  places_.resize(velocities_.size());
+  std::iota(places_.begin(), places_.end(), 0);
+  std::sort(places_.begin(), places_.end(), [this](int a, int b) {
+    return velocities_[static_cast<size_t>(a)] < velocities_[static_cast<size_t>(b)];
+  });
+}
+
+SideLayout::SideLayout(const RobotDescription& robot, const Json& json, const std::string& source)
+    : SideLayout(robot) {
+  if (json.contains("base")) {
+    if (base_ == 0) Fail(source, "base", "must not be given, the base is fixed");
+    convention_ = ReadConvention(json.at("base"), source);
+  }
+  if (!json.contains("joints")) return;
+  const Json& list = json.at("joints");
+  if (!list.is_array()) Fail(source, "joints", "must be a list of names, got " + Abbreviate(list.dump()));
+  std::vector<std::string> names;
+  for (const NamedJoint& joint : robot_joints_) names.push_back(joint.name);
+  std::vector<int> joints;
+  std::vector<bool> is_named(names.size(), false);
+  for (size_t i = 0; i < list.size(); ++i) {
+    const std::string key = "joints[" + std::to_string(i) + "]";
+    if (!list[i].is_string()) Fail(source, key, "must be a name, got " + Abbreviate(list[i].dump()));
+    const std::string name = list[i].get<std::string>();
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end()) {
+      const std::string nearest = FindNearest(name, names);
+      Fail(source, key,
+           "must be a joint of " + robot.spec.source +
+               (nearest.empty() ? "" : " (did you mean " + Quote(nearest) + "?)") + ", got " + Quote(name));
+    }
+    const auto joint = static_cast<size_t>(found - names.begin());
+    if (is_named[joint]) Fail(source, key, "must be named once, got " + Quote(name) + " again");
+    is_named[joint] = true;
+    joints.push_back(static_cast<int>(joint));
+  }
+  SetJoints(std::move(joints));
+  std::vector<std::string> missing;
+  size_t followers = 0;
+  bool only_followers = true;
+  for (size_t joint = 0; joint < names.size(); ++joint) {
+    followers += robot_joints_[joint].follows ? 1 : 0;
+    if (is_named[joint]) continue;
+    missing.push_back(names[joint]);
+    only_followers = only_followers && robot_joints_[joint].follows;
+  }
+  is_reduced_ = !missing.empty();
+  if (!is_reduced_) return;
+  if (!only_followers || missing.size() != followers) {
+    Fail(source, "joints", "must be all joints, or all that follow no other; missing: " + JoinNames(missing));
+  }
+}
+
+nlohmann::ordered_json SideLayout::ToJson() const {
+  nlohmann::ordered_json json;
+  json["joints"] = nlohmann::ordered_json::array();
+  for (const int joint : joints_) json["joints"].push_back(robot_joints_[static_cast<size_t>(joint)].name);
+  // Only where a number of entries does not follow from the number of names.
+  const auto is_ball = [this](int joint) {
+    return robot_joints_[static_cast<size_t>(joint)].num_positions > 1;
+  };
+  if (std::any_of(joints_.begin(), joints_.end(), is_ball)) {
+    json["balls"] = nlohmann::ordered_json::array();
+    for (const int joint : joints_) {
+      if (is_ball(joint)) json["balls"].push_back(robot_joints_[static_cast<size_t>(joint)].name);
+    }
+  }
+  if (base_ == 0) return json;
+  const auto position = std::find_if(std::begin(kPositions), std::end(kPositions),
+                                     [&](const auto& entry) { return entry.second == convention_.position; });
+  json["base"] = {{"position", position->first},
+                  {"velocity", convention_.angular_first ? "angular_linear" : "linear_angular"},
+                  {"linear_axes", convention_.linear_in_base ? "base" : "world"},
+                  {"angular_axes", convention_.angular_in_world ? "world" : "base"}};
+  return json;
+}
+
+VectorXd SideLayout::WritePositions(const VectorXd& q) const {
+  VectorXd written(num_positions());
+  if (base_ > 0) written.head<7>() = BaseConversion(convention_).ConvertPositions(q).head<7>();
+  Eigen::Index at = base_positions_;
+  for (const int index : joints_) {
+    const NamedJoint& joint = robot_joints_[static_cast<size_t>(index)];
+    written.segment(at, joint.num_positions) = q.segment(joint.position, joint.num_positions);
+    at += joint.num_positions;
+  }
+  return written;
+}
+
+VectorXd SideLayout::WriteVelocities(const VectorXd& q, const VectorXd& xi) const {
+  VectorXd written(size());
+  if (base_ > 0) written.head<6>() = BaseConversion(convention_).ConvertVelocities(q, xi).head<6>();
+  for (size_t i = 0; i < velocities_.size(); ++i)
+    written[base_ + static_cast<int>(i)] = xi[base_ + velocities_[i]];
+  return written;
+}
+
+void SideLayout::ReadTerms(const VectorXd& q, const VectorXd& xi, SideTerms* terms) const {
+  std::vector<Eigen::Index> from;
+  for (int i = 0; i < base_; ++i) from.push_back(i);
+  for (const int place : places_) from.push_back(base_ + place);
+  for (VectorXd* force : {&terms->coriolis, &terms->gravity, &terms->bias, &terms->friction}) {
+    if (force->size() > 0) *force = VectorXd((*force)(from));
+  }
+  if (terms->M.size() > 0) terms->M = MatrixXd(terms->M(from, from));
+  if (base_ == 0) return;
+  // The rate of the conversion lies in the base's entries alone.
+  VectorXd own = VectorXd::Zero(static_cast<Eigen::Index>(from.size()));
+  own.head<6>() = xi.head<6>();
+  BaseConversion(convention_).Restore(q, own, terms);
+}
+
+std::optional<Json> ParseAnswer(std::string_view text) {
+  // Answers have three brackets inside each other; what nests deeper would be freed by recursion.
+  constexpr int kMaxDepth = 32;
+  bool is_deep = false;
+  const auto check = [&](int depth, Json::parse_event_t, const Json&) {
+    is_deep = is_deep || depth > kMaxDepth;
+    return !is_deep;
+  };
+  Json answer = Json::parse(text, check, /*allow_exceptions=*/false);
+  if (is_deep || !answer.is_object()) return std::nullopt;
+  return answer;
+}
+
+SideTerms ReadSideTerms(const Json& json, const SideLayout& layout, const VectorXd& v,
+                        const std::string& source) {
+  const Eigen::Index n = layout.size();
+  SideTerms terms;
+  const auto find = [&](const char* key) { return json.contains(key) ? &json.at(key) : nullptr; };
+  if (const Json* M = find("M")) terms.M = ReadMatrix(*M, n, "M", source);
+  if (const Json* C = find("C")) terms.coriolis = ReadMatrix(*C, n, "C", source) * v;
+  if (const Json* c = find("c")) terms.coriolis = ReadVector(*c, n, "c", source);
+  if (const Json* g = find("g")) terms.gravity = ReadVector(*g, n, "g", source);
+  if (const Json* h = find("h")) terms.bias = ReadVector(*h, n, "h", source);
+  if (const Json* friction = find("friction")) terms.friction = ReadVector(*friction, n, "friction", source);
+  if (const Json* T = find("kinetic_energy")) terms.kinetic = ReadNumber(*T, "kinetic_energy", source);
+  if (const Json* U = find("potential_energy")) terms.potential = ReadNumber(*U, "potential_energy", source);
+  const bool is_empty = terms.M.size() == 0 && terms.coriolis.size() == 0 && terms.gravity.size() == 0 &&
+                        terms.bias.size() == 0 && terms.friction.size() == 0 && !terms.kinetic &&
+                        !terms.potential;
+  if (is_empty) {
+    throw InputError(source +
+                     ": must have M, C, c, g, h, friction, kinetic_energy or potential_energy, got " +
+                     Abbreviate(json.dump()));
+  }
+  if (terms.bias.size() == 0 && terms.coriolis.size() > 0 && terms.gravity.size() > 0) {
+    terms.bias = terms.coriolis + terms.gravity;
+  }
+  return terms;
+}
+
+}  // namespace dexcheck

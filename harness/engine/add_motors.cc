@@ -1,0 +1,106 @@
+#include "harness/engine/add_motors.h"
+
+#include <fmt/format.h>
+#include <tinyxml2.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/engine/engine.h"
+#include "harness/engine/mjcf_files.h"
+#include "harness/engine/robot_tree.h"
+
+namespace dexcheck {
+namespace {
+
+using tinyxml2::XMLElement;
+
+/// The largest force or torque of an actuator at its joint, as -limit to limit; none when nothing limits it.
+std::optional<double> FindLimit(const mjModel& m, int actuator) {
+  const double gear = std::abs(m.actuator_gear[6 * actuator]);
+  const auto reach = [&](const mjtNum* range) { return std::max(std::abs(range[0]), std::abs(range[1])); };
+  if (m.actuator_forcelimited[actuator] != 0) return gear * reach(m.actuator_forcerange + 2 * actuator);
+  const bool is_motor = m.actuator_gaintype[actuator] == mjGAIN_FIXED &&
+                        m.actuator_biastype[actuator] == mjBIAS_NONE &&
+                        m.actuator_dyntype[actuator] == mjDYN_NONE;
+  if (!is_motor || m.actuator_ctrllimited[actuator] == 0) return std::nullopt;
+  return gear * std::abs(m.actuator_gainprm[mjNGAIN * actuator]) * reach(m.actuator_ctrlrange + 2 * actuator);
+}
+
+/// Of all actuators of a joint, the strongest's.
+std::optional<double> FindJointLimit(const mjModel& m, int joint) {
+  std::optional<double> largest;
+  for (int i = 0; i < m.nu; ++i) {
+    if (m.actuator_trntype[i] != mjTRN_JOINT || m.actuator_trnid[2 * i] != joint) continue;
+    const std::optional<double> limit = FindLimit(m, i);
+    if (limit) largest = std::max(largest.value_or(0.0), *limit);
+  }
+  return largest;
+}
+
+void DeleteSections(XMLElement* root, const char* name) {
+  while (XMLElement* const section = root->FirstChildElement(name)) root->DeleteChild(section);
+}
+
+/// What names actuators or their controls.
+void DeleteUses(XMLElement* root) {
+  for (XMLElement* section = root->FirstChildElement("sensor"); section != nullptr;
+       section = section->NextSiblingElement("sensor")) {
+    for (XMLElement* sensor = section->FirstChildElement(); sensor != nullptr;) {
+      XMLElement* const next = sensor->NextSiblingElement();
+      if (sensor->Attribute("actuator") != nullptr) section->DeleteChild(sensor);
+      sensor = next;
+    }
+  }
+  for (XMLElement* section = root->FirstChildElement("keyframe"); section != nullptr;
+       section = section->NextSiblingElement("keyframe")) {
+    for (XMLElement* key = section->FirstChildElement(); key != nullptr; key = key->NextSiblingElement()) {
+      for (const char* name : {"ctrl", "act"}) key->DeleteAttribute(name);
+    }
+  }
+}
+
+}  // namespace
+
+void AddMotors(const std::filesystem::path& folder, JoinedMjcf* mjcf) {
+  const std::string& source = mjcf->source();
+  const MjModelPtr model =
+      LoadMjcfText(MoveMjcf(mjcf->Print(), source, folder, std::filesystem::current_path()), source);
+  const mjModel& m = *model;
+  const int tree = FindRobotTree(m, source).floating_body;
+  XMLElement* const root = mjcf->root();
+  DeleteSections(root, "actuator");
+  DeleteUses(root);
+  XMLElement* const actuators = root->InsertNewChildElement("actuator");
+  int motors = 0;
+  for (int joint = 0; joint < m.njnt; ++joint) {
+    if (m.jnt_type[joint] != mjJNT_HINGE && m.jnt_type[joint] != mjJNT_SLIDE) continue;
+    if (FindTree(m, joint) != tree) continue;
+    const char* const name = mj_id2name(&m, mjOBJ_JOINT, joint);
+    if (name == nullptr || *name == '\0') {
+      throw InputError(source + ": joint " + NameOf(m, mjOBJ_JOINT, joint) +
+                       ": must have a name, so that it can have a motor");
+    }
+    // Defaults are the file's; all that a motor could take of them is stated.
+    XMLElement* const motor = actuators->InsertNewChildElement("motor");
+    motor->SetAttribute("name", name);
+    motor->SetAttribute("joint", name);
+    motor->SetAttribute("gear", "1 0 0 0 0 0");
+    motor->SetAttribute("forcelimited", "false");
+    const std::optional<double> limit = FindJointLimit(m, joint);
+    motor->SetAttribute("ctrllimited", limit ? "true" : "false");
+    const std::string number = FormatNumber(limit.value_or(0.0));
+    if (limit) motor->SetAttribute("ctrlrange", fmt::format("-{0} {0}", number).c_str());
+    ++motors;
+  }
+  mjcf->Note(*root, "<actuator>",
+             std::to_string(m.nu) + (m.nu == 1 ? " actuator" : " actuators") + " replaced by " +
+                 std::to_string(motors) + (motors == 1 ? " motor" : " motors"));
+}
+
+}  // namespace dexcheck

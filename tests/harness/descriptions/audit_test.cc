@@ -1,0 +1,170 @@
+// One description alone: each oddity is found where it is, a sound robot has none.
+
+#include "harness/descriptions/audit.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "harness/descriptions/mjcf_reader.h"
+#include "harness/descriptions/read_description.h"
+#include "harness/descriptions/urdf_reader.h"
+#include "harness/engine/engine.h"
+#include "tests/common/legged_robots.h"
+#include "tests/common/matchers.h"
+#include "tests/common/paths.h"
+#include "tests/harness/descriptions/panda_urdf.h"
+
+namespace dexcheck::testing::audit_test {
+namespace {
+
+// A torso with two arms, each link in a box that it fills.
+constexpr const char* kArms = R"(<robot name="arms">
+  <link name="torso"/>
+  <link name="left_arm">
+    <collision><origin xyz="0 0.2 0"/><geometry><box size="0.1 0.4 0.08"/></geometry></collision>
+    <inertial><origin xyz="0.01 0.2 0"/><mass value="2"/>
+    <inertia ixx="0.028" ixy="0.001" ixz="0.0002" iyy="0.0035" iyz="0.0004" izz="0.029"/></inertial>
+  </link>
+  <link name="right_arm">
+    <collision><origin xyz="0 -0.2 0"/><geometry><box size="0.1 0.4 0.08"/></geometry></collision>
+    <inertial><origin xyz="0.01 -0.2 0"/><mass value="2"/>
+    <inertia ixx="0.028" ixy="-0.001" ixz="0.0002" iyy="0.0035" iyz="-0.0004" izz="0.029"/></inertial>
+  </link>
+  <joint name="left" type="revolute"><origin xyz="0 0.1 0"/><parent link="torso"/><child link="left_arm"/>
+    <axis xyz="1 0 0"/><limit lower="-1" upper="2" effort="1" velocity="1"/></joint>
+  <joint name="right" type="revolute"><origin xyz="0 -0.1 0"/><parent link="torso"/><child link="right_arm"/>
+    <axis xyz="1 0 0"/><limit lower="-2" upper="1" effort="1" velocity="1"/></joint>
+</robot>
+)";
+
+AuditResult Audit(const std::string& urdf) {
+  UrdfOptions options;
+  options.keep_impossible = true;
+  return AuditRobot(ParseUrdf(urdf, "arms.urdf", options));
+}
+
+std::string Describe(const AuditResult& result) {
+  std::string text;
+  for (const AuditFinding& finding : result.findings) {
+    text += std::string(NameOf(finding.level)) + " " + finding.check + ": " + finding.where + " " +
+            finding.text + "\n";
+  }
+  return text;
+}
+
+TEST(Audit, SoundRobotsAreGood) {
+  const AuditResult result = Audit(kArms);
+  EXPECT_TRUE(result.IsGood()) << Describe(result);
+  EXPECT_GT(result.condition, 1.0);
+  EXPECT_LT(result.condition, 1.2);
+  const AuditResult panda = Audit(testing::MakePandaUrdf());
+  EXPECT_TRUE(panda.IsGood()) << Describe(panda);
+  const AuditResult table =
+      AuditRobot(ReadDescription(testing::SourcePath("/controller/parameters/assistant_robot.toml")));
+  EXPECT_TRUE(table.IsGood()) << Describe(table);
+  for (const auto& links : {testing::ListQuadruped(), testing::ListHumanoid()}) {
+    const AuditResult urdf = Audit(testing::WriteLeggedUrdf("legged", links));
+    EXPECT_TRUE(urdf.IsGood()) << Describe(urdf);
+    const MjModelPtr engine = LoadMjcfText(testing::WriteLeggedMjcf("legged", links), "legged.xml");
+    const AuditResult mjcf = AuditRobot(ReadMjcfDescription(*engine, "legged.xml"));
+    EXPECT_TRUE(mjcf.IsGood()) << Describe(mjcf);
+    EXPECT_TRUE(std::isfinite(mjcf.condition));
+  }
+}
+
+/// A change of the sound robot and what is said of it.
+struct Suspicion {
+  std::string name;
+  std::string original;
+  std::string changed;
+  std::string finding;
+};
+
+class Suspicions : public ::testing::TestWithParam<Suspicion> {};
+
+TEST_P(Suspicions, AreFound) {
+  std::string text = kArms;
+  const size_t at = text.find(GetParam().original);
+  ASSERT_NE(at, std::string::npos);
+  text.replace(at, GetParam().original.size(), GetParam().changed);
+  const AuditResult result = Audit(text);
+  EXPECT_FALSE(result.IsGood());
+  EXPECT_THAT(Describe(result), HasSubstr(GetParam().finding));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Audit, Suspicions,
+    ::testing::Values(
+        Suspicion{"Triangle", "ixx=\"0.028\"", "ixx=\"0.28\"",
+                  "impossible inertia: link left_arm has principal moments [0.0034"},
+        Suspicion{"Negative", "iyy=\"0.0035\"", "iyy=\"-0.0035\"", "one of them negative"},
+        Suspicion{"NegativeMass", "<mass value=\"2\"/>", "<mass value=\"-2\"/>",
+                  "impossible mass: link left_arm has a negative mass, -2 kg"},
+        Suspicion{"NoMass", "<mass value=\"2\"/>", "<mass value=\"0\"/>",
+                  "impossible inertia: link left_arm has inertia"},
+        Suspicion{"GramsForKilograms", "<mass value=\"2\"/>", "<mass value=\"2000\"/>",
+                  "odd density: link left_arm has 2000 kg in a geometry of 0.0032 m^3"},
+        Suspicion{"Light", "<mass value=\"2\"/>", "<mass value=\"0.002\"/>", "odd density: link left_arm"},
+        Suspicion{"ComOutside", "xyz=\"0.01 0.2 0\"", "xyz=\"0.01 2 0\"",
+                  "odd com: link left_arm has its centre of mass [0.01, 2, 0] m outside of its geometry"},
+        Suspicion{"TooMuchInertia",
+                  "ixx=\"0.028\" ixy=\"0.001\" ixz=\"0.0002\" iyy=\"0.0035\" iyz=\"0.0004\" izz=\"0.029\"",
+                  "ixx=\"28\" ixy=\"1\" ixz=\"0.2\" iyy=\"3.5\" iyz=\"0.4\" izz=\"29\"",
+                  "more than its mass can have within its geometry"},
+        Suspicion{"GramMillimetres",
+                  "ixx=\"0.028\" ixy=\"0.001\" ixz=\"0.0002\" iyy=\"0.0035\" iyz=\"0.0004\" izz=\"0.029\"",
+                  "ixx=\"2.8e-8\" ixy=\"1e-9\" ixz=\"2e-10\" iyy=\"3.5e-9\" iyz=\"4e-10\" izz=\"2.9e-8\"",
+                  "which is small for its 2 kg"},
+        Suspicion{"MirroredMass", "<mass value=\"2\"/>", "<mass value=\"2.2\"/>",
+                  "odd mirror: link right_arm has 2 kg, the other side 2.2 kg (against left_arm)"},
+        Suspicion{
+            "MirroredSigns", "ixy=\"-0.001\"", "ixy=\"0.001\"",
+            "odd mirror: link right_arm has products of inertia [0.001, 0.0002, -0.0004] kg m^2 with signs"},
+        Suspicion{"MirroredPlace", "xyz=\"0.01 -0.2 0\"", "xyz=\"0.01 -0.17 0\"",
+                  "odd mirror: link right_arm has its centre of mass at [0.01, -0.17, 0] m"},
+        Suspicion{"Degrees", "lower=\"-1\" upper=\"2\"", "lower=\"-90\" upper=\"120\"",
+                  "odd range: joint left range [-90, 120] rad: as if it were in degrees"},
+        Suspicion{"NoRange", "lower=\"-1\" upper=\"2\"", "lower=\"0\" upper=\"0\"", "the joint cannot move"},
+        Suspicion{"Axis", "<axis xyz=\"1 0 0\"/>", "<axis xyz=\"1 1 0\"/>",
+                  "odd axis: joint left axis of length 1.414"},
+        Suspicion{"NameByCase", "joint name=\"right\"", "joint name=\"Left\"",
+                  "odd name: joint Left its name is that of \"left\" but for case and punctuation"}),
+    [](const auto& named) { return named.param.name; });
+
+// What each finding does to M is said: a point mass on the axis leaves it singular.
+TEST(Audit, SaysWhatItDoesToTheMassMatrix) {
+  const std::string point = R"(<robot name="point"><link name="base"/>
+  <link name="rotor"><inertial><origin xyz="0 0 0.1"/><mass value="1"/>
+    <inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>
+  <link name="arm"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>
+    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+  <joint name="lift" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/></joint>
+  <joint name="spin" type="continuous"><parent link="arm"/><child link="rotor"/><axis xyz="0 0 1"/></joint>
+  </robot>)";
+  const AuditResult result = Audit(point);
+  EXPECT_TRUE(std::isinf(result.condition));
+  EXPECT_THAT(Describe(result), HasSubstr("odd inertia: link rotor has 1 kg without inertia: a point mass"));
+  EXPECT_THAT(Describe(result),
+              HasSubstr("odd load: joint spin turns 1 kg without inertia about its axis, the end"));
+  for (const AuditFinding& finding : result.findings) {
+    ASSERT_TRUE(finding.condition_without) << finding.text;
+    EXPECT_LT(*finding.condition_without, 1e3);
+  }
+}
+
+// Impossible inertias have an M too: that of the file, which is not positive then.
+TEST(Audit, CountsImpossibleInertiaAsTheFileHasIt) {
+  std::string text = kArms;
+  const std::string original = "iyz=\"0.0004\" izz=\"0.029\"";
+  text.replace(text.find(original), original.size(), "iyz=\"0.0004\" izz=\"2.9\"");
+  const AuditResult result = Audit(text);
+  EXPECT_LT(result.condition, 1.2);  // about x, izz does not count
+  const std::string negative = "ixx=\"0.028\"";
+  text.replace(text.find(negative), negative.size(), "ixx=\"-28\"");
+  EXPECT_TRUE(std::isinf(Audit(text).condition));
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::audit_test

@@ -1,0 +1,184 @@
+// Other libraries' ways to write a floating base: terms are led back, by a route of the test's own, and a
+// side that speaks another convention than it says is recognised.
+
+#include "harness/descriptions/base_convention.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "controller/common/errors.h"
+#include "harness/descriptions/answers_comparison.h"
+#include "harness/descriptions/npy_file.h"
+#include "harness/descriptions/urdf_reader.h"
+#include "tests/common/legged_robots.h"
+#include "tests/common/matrix_near.h"
+
+namespace dexcheck::testing::base_convention_test {
+namespace {
+
+// Forces of some 100 N over lengths of a metre.
+constexpr double kRounding = 1e-11;
+
+RobotDescription ReadQuadruped() {
+  UrdfOptions options;
+  options.floating = true;
+  return ParseUrdf(testing::WriteLeggedUrdf("quadruped", testing::ListQuadruped()), "robot.urdf", options);
+}
+
+/// Draws the first state.
+void DrawState(const RobotDescription& robot, VectorXd* q, VectorXd* xi) {
+  const RobotModel model(robot.spec);
+  *q = VectorXd::Zero(model.num_positions());
+  *xi = VectorXd::Zero(model.num_velocities());
+  ASSERT_TRUE(FeedRandomStates(model, {})(0, q, xi));
+}
+
+TEST(BaseConvention, ListsAllOnce) {
+  const std::vector<BaseConvention> all = ListBaseConventions();
+  EXPECT_EQ(all.size(), 24U);
+  EXPECT_EQ(all[0], BaseConvention());
+  std::vector<std::string> names;
+  for (const BaseConvention& convention : all) names.push_back(Describe(convention));
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(std::unique(names.begin(), names.end()), names.end());
+}
+
+TEST(BaseConvention, QuaternionsChangePlaces) {
+  VectorXd q(8);
+  q << 1, 2, 3, 0.5, 0.6, 0.7, 0.8, 9;
+  BaseConvention convention;
+  convention.position = BaseConvention::Position::kXyzXyzw;
+  VectorXd pinocchio(8);
+  pinocchio << 1, 2, 3, 0.6, 0.7, 0.8, 0.5, 9;
+  EXPECT_EQ(BaseConversion(convention).ConvertPositions(q), pinocchio);
+  convention.position = BaseConvention::Position::kWxyzXyz;
+  VectorXd drake(8);
+  drake << 0.5, 0.6, 0.7, 0.8, 1, 2, 3, 9;
+  EXPECT_EQ(BaseConversion(convention).ConvertPositions(q), drake);
+}
+
+// At xi_dot along a motion, with v' = B(q) xi:  M' v'_dot + bias' = B^-T (M xi_dot + bias), v'_dot by
+// differences of v' along the motion, whose error is a few 1e-9.
+TEST(BaseConvention, ForcesAreThoseOfTheMotion) {
+  constexpr double kDifference = 1e-6;
+  const RobotDescription robot = ReadQuadruped();
+  VectorXd q, xi;
+  DrawState(robot, &q, &xi);
+  const SideTerms terms = AnalyticSide(robot, "model").Evaluate(0, q, xi);
+  const VectorXd xi_dot = VectorXd::LinSpaced(xi.size(), -1.0, 2.0);
+  const VectorXd force = terms.M * xi_dot + terms.bias;
+  const auto move = [&](double h) {
+    VectorXd moved = q;
+    const Vector3d turn = h * xi.segment<3>(3);
+    const Eigen::Quaterniond before(q[3], q[4], q[5], q[6]);
+    const Eigen::Quaterniond after = before * Eigen::AngleAxisd(turn.norm(), turn.normalized());
+    moved.segment<4>(3) << after.w(), after.x(), after.y(), after.z();
+    return moved;
+  };
+  int moved_forces = 0;
+  for (const BaseConvention& convention : ListBaseConventions()) {
+    const BaseConversion conversion(convention);
+    constexpr double kStep = 1e-5;
+    const VectorXd rate = (conversion.ConvertVelocities(move(kStep), xi + kStep * xi_dot) -
+                           conversion.ConvertVelocities(move(-kStep), xi - kStep * xi_dot)) /
+                          (2.0 * kStep);
+    SideTerms other = terms;
+    conversion.Apply(q, xi, &other);
+    SideTerms of_force;
+    of_force.M = terms.M;
+    of_force.gravity = force;  // led over as a force
+    conversion.Apply(q, xi, &of_force);
+    EXPECT_TRUE(MatrixNear(other.M * rate + other.bias, of_force.gravity, kDifference * force.norm()))
+        << Describe(convention);
+    // Power and energy stay the same, and the way back leads back.
+    const VectorXd v = conversion.ConvertVelocities(q, xi);
+    EXPECT_NEAR(v.dot(other.M * v), xi.dot(terms.M * xi), kRounding * xi.dot(terms.M * xi));
+    EXPECT_NEAR(v.dot(other.gravity), xi.dot(terms.gravity), kRounding * 1e3);
+    if ((other.bias - terms.bias).norm() > 1.0) ++moved_forces;
+    conversion.Restore(q, xi, &other);
+    EXPECT_TRUE(MatrixNear(other.M, terms.M, kRounding));
+    EXPECT_TRUE(MatrixNear(other.bias, terms.bias, 1e2 * kRounding));
+    EXPECT_TRUE(MatrixNear(other.coriolis, terms.coriolis, 1e2 * kRounding));
+    EXPECT_TRUE(MatrixNear(other.gravity, terms.gravity, 1e2 * kRounding));
+  }
+  EXPECT_GE(moved_forces, 20);
+}
+
+/// A program that speaks one convention, whatever it says.
+class Stubborn : public AnsweringSide {
+ public:
+  Stubborn(const RobotDescription& robot, const BaseConvention& spoken)
+      : AnsweringSide(SideLayout(robot)), model_(robot, "model"), spoken_(spoken) {}
+  [[nodiscard]] const std::string& name() const override { return model_.name(); }
+
+  SideTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override {
+    // What reaches it are numbers as the convention that it is taken to speak has them.
+    const VectorXd positions = layout().WritePositions(q);
+    const VectorXd velocities = layout().WriteVelocities(q, xi);
+    VectorXd own_q = positions;
+    using Position = BaseConvention::Position;
+    if (spoken_.position == Position::kXyzXyzw)
+      own_q.segment<4>(3) << positions[6], positions[3], positions[4], positions[5];
+    if (spoken_.position == Position::kWxyzXyz)
+      own_q.head<7>() << positions.segment<3>(4), positions.head<4>();
+    const Matrix3d R =
+        Eigen::Quaterniond(own_q[3], own_q[4], own_q[5], own_q[6]).normalized().toRotationMatrix();
+    Vector3d linear = spoken_.angular_first ? velocities.segment<3>(3) : velocities.head<3>();
+    Vector3d angular = spoken_.angular_first ? velocities.head<3>() : velocities.segment<3>(3);
+    if (spoken_.linear_in_base) linear = R * linear;
+    if (spoken_.angular_in_world) angular = R.transpose() * angular;
+    VectorXd own_xi = velocities;
+    own_xi.head<6>() << linear, angular;
+    SideTerms terms = model_.Evaluate(sample, own_q, own_xi);
+    BaseConversion(spoken_).Apply(own_q, own_xi, &terms);
+    layout().ReadTerms(q, xi, &terms);
+    return terms;
+  }
+
+ private:
+  AnalyticSide model_;
+  BaseConvention spoken_;
+};
+
+TEST(BaseConvention, OfAProgramIsRecognised) {
+  const RobotDescription robot = ReadQuadruped();
+  const RobotModel model(robot.spec);
+  for (const BaseConvention& spoken : ListBaseConventions()) {
+    AnalyticSide reference(robot, "robot.urdf");
+    Stubborn side(robot, spoken);
+    ConsistencyOptions options;
+    options.samples = 5;
+    std::vector<std::string> notes;
+    std::vector<std::string> not_compared;
+    const ConsistencyResult result = CompareAnswers(
+        robot, &reference, &side, [&] { return FeedRandomStates(model, options); }, [](long) { return true; },
+        &notes, &not_compared);
+    EXPECT_TRUE(not_compared.empty());
+    const bool is_default = spoken == BaseConvention();
+    EXPECT_EQ(result.Agrees(), is_default);
+    const std::string found = "all its terms agree with its base taken as " + Describe(spoken);
+    EXPECT_EQ(notes.back().starts_with(found), !is_default) << notes.back();
+  }
+}
+
+TEST(NpyFile, IsReadBack) {
+  const NpyArray array{{2, 3}, {1, 2, 3, 4, 5, 6}};
+  const std::string bytes = WriteNpy(array);
+  EXPECT_EQ(bytes.size() % 64, 48U);  // six numbers behind a multiple of 64
+  const NpyArray back = ParseNpy(bytes, "a.npy");
+  EXPECT_EQ(back.shape, array.shape);
+  EXPECT_EQ(back.values, array.values);
+  std::string fortran = bytes;
+  fortran.replace(fortran.find("False"), 5, "True ");
+  EXPECT_EQ(ParseNpy(fortran, "a.npy").values, (std::vector<double>{1, 3, 5, 2, 4, 6}));
+  EXPECT_EQ(ParseNpy(WriteNpy({{1}, {7}}), "a.npy").shape, (std::vector<size_t>{1}));
+  EXPECT_THROW(ParseNpy("", "a.npy"), InputError);
+  for (size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_THROW(ParseNpy(bytes.substr(0, size), "a.npy"), InputError);
+  std::string huge = bytes;
+  huge.replace(huge.find("(2, 3)"), 6, "(9999999999999999999, 9999999999)");
+  EXPECT_THROW(ParseNpy(huge, "a.npy"), InputError);
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::base_convention_test

@@ -1,0 +1,349 @@
+// A run as a video: what moved, moved; the same run gives the same video.
+
+#include "renders/video.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "harness/engine/engine.h"
+#include "renders/frame_line.h"
+#include "renders/renderer.h"
+#include "tests/common/files.h"
+#include "tests/common/paths.h"
+#include "tests/common/run_program.h"
+#include "tests/common/throws.h"
+#include "tests/renders/kinematic_run.h"
+
+namespace dexcheck::testing::video_test {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kWidth = 320;
+constexpr int kHeight = 180;
+
+class VideoTest : public ::testing::Test {
+ protected:
+  static VideoOptions MakeOptions() {
+    VideoOptions options;
+    options.width = kWidth;
+    options.height = kHeight;
+    options.fps = 10;
+    options.samples = 1;
+    options.shadow_size = 512;
+    return options;
+  }
+
+  bool Video(const fs::path& path, std::span<const RunView> runs, const VideoOptions& options,
+             const std::function<bool(long, long)>& progress = {}) {
+    VideoOptions encoding;
+    encoding.width = options.width;
+    encoding.height = options.height;
+    encoding.fps = options.fps;
+    VideoWriter video(path, encoding);
+    if (!RenderVideo(runs, options, &video, progress)) return false;
+    video.Finish();
+    return true;
+  }
+
+  MjModelPtr model_ = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
+  RunFrames run_ = testing::MakeKinematicRun(*model_, 0.5);
+  RunView view_ = {model_.get(), &run_};
+  TempFolder folder_;
+};
+
+/// Where the torus is in a picture: the mean of its orange pixels, and how many there are.
+Vector3d FindTorus(const Image& image) {
+  Vector3d sum = Vector3d::Zero();
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      const std::uint8_t* const rgb = image.Pixel(x, y);
+      if (rgb[0] > 90 && rgb[0] > 1.5 * rgb[1] && rgb[0] > 2.2 * rgb[2])
+        sum += Vector3d(x + 0.5, y + 0.5, 1.0);
+    }
+  }
+  return {sum.x() / sum.z(), sum.y() / sum.z(), sum.z()};
+}
+
+TEST_F(VideoTest, AFreeCameraKeepsWhatItLooksAtInTheMiddle) {
+  VideoOptions options = MakeOptions();
+  options.panel = false;
+  options.free = FreeCamera{{0.9, -1.0, 1.0}, {}, /*follow=*/true, /*orbit=*/0.8};
+  VideoPainter orbiting({&view_, 1}, options);
+  constexpr double kPixels = 4.0;  // fingers hide parts of the torus
+  for (const double time : {0.0, 0.25, 0.5}) {
+    const Vector3d torus = FindTorus(orbiting.Paint(time));
+    ASSERT_GT(torus.z(), 8.0) << time;
+    EXPECT_NEAR(torus.x(), 0.5 * kWidth, kPixels) << time;
+    EXPECT_NEAR(torus.y(), 0.5 * kHeight, kPixels) << time;
+  }
+  // One that stands still and looks at a point sees the torus pass by.
+  options.free = FreeCamera{{0.9, -1.0, 1.0}, Vector3d(0.6, -0.22, 0.75), false, 0.0};
+  VideoPainter standing({&view_, 1}, options);
+  EXPECT_GT(std::abs(FindTorus(standing.Paint(0.5)).x() - FindTorus(standing.Paint(0.0)).x()), 30.0);
+}
+
+/// Mean difference of two frames over a rectangle given in hundredths of the picture.
+template <typename Byte>
+double Difference(const Byte* a, const Byte* b, int left, int right, int top, int bottom) {
+  double sum = 0.0;
+  int count = 0;
+  for (int y = kHeight * top / 100; y < kHeight * bottom / 100; ++y) {
+    for (int x = kWidth * left / 100; x < kWidth * right / 100; ++x) {
+      for (int c = 0; c < 3; ++c, ++count) {
+        const int i = 3 * (y * kWidth + x) + c;
+        sum += std::abs(static_cast<unsigned char>(a[i]) - static_cast<unsigned char>(b[i]));
+      }
+    }
+  }
+  return sum / count;
+}
+
+TEST_F(VideoTest, DecodedFramesDifferWhereTheRobotMoved) {
+  // The robot stands; its right elbow stretches by a radian. "overview" sees the forearm left of the
+  // picture's middle.
+  const int elbow = model_->jnt_qposadr[mj_name2id(model_.get(), mjOBJ_JOINT, "r_elbow")];
+  for (long row = 0; row < run_.rows(); ++row) {
+    run_.qpos.row(row) = run_.qpos.row(0).eval();
+    run_.qpos(row, elbow) -= 2.0 * run_.times[static_cast<size_t>(row)];
+  }
+  VideoOptions options = MakeOptions();
+  options.panel = false;
+  ASSERT_TRUE(Video(folder_.path() / "a.mp4", {&view_, 1}, options));
+  const testing::ProgramResult decoded =
+      testing::RunProgram({DEXCHECK_FFMPEG, "-v", "error", "-i", folder_.path() / "a.mp4", "-f", "rawvideo",
+                           "-pix_fmt", "rgb24", "-"});
+  ASSERT_EQ(decoded.exit_code, 0) << decoded.err;
+  constexpr size_t kFrame = 3UL * kWidth * kHeight;
+  ASSERT_EQ(decoded.out.size(), 5 * kFrame);
+  const char* first = decoded.out.data();
+  const char* last = first + 4 * kFrame;
+  EXPECT_GT(Difference(first, last, 41, 57, 45, 65), 15.0) << "forearm and torus";
+  EXPECT_LT(Difference(first, last, 44, 56, 2, 30), 2.0) << "head";
+  EXPECT_LT(Difference(first, last, 75, 100, 0, 100), 2.0) << "floor and sky";
+}
+
+TEST_F(VideoTest, CamerasOfItsOwnAreNearToRobotAndObject) {
+  run_ = testing::MakeKinematicRun(*model_, 6.0, 0.1);
+  VideoOptions options = MakeOptions();
+  options.panel = false;
+  const auto find = [&](const char* camera, double time) {
+    options.camera = camera;
+    return FindTorus(VideoPainter({&view_, 1}, options).Paint(time));
+  };
+  const double far = find(kCourseCamera, 0.0).z();
+  EXPECT_GT(find(kRobotCamera, 0.0).z(), 3.0 * far);
+  EXPECT_GT(find(kRobotCamera, 6.0).z(), 3.0 * far);
+  const Vector3d torus = find(kObjectCamera, 6.0);
+  EXPECT_GT(torus.z(), 0.02 * kWidth * kHeight);
+  EXPECT_NEAR(torus.x(), 0.5 * kWidth, 0.08 * kWidth) << "fingers hide parts of it";
+  EXPECT_NEAR(torus.y(), 0.5 * kHeight, 0.1 * kHeight);
+  // As an inset, too, without moving the picture's own camera.
+  options.camera = kCourseCamera;
+  const Image plain = VideoPainter({&view_, 1}, options).Paint(6.0);
+  options.inset = kObjectCamera;
+  const Image with_inset = VideoPainter({&view_, 1}, options).Paint(6.0);
+  EXPECT_EQ(Difference(plain.rgb.data(), with_inset.rgb.data(), 0, 50, 0, 100), 0.0);
+  EXPECT_GT(FindTorus(with_inset).z(), FindTorus(plain).z() + 0.001 * kWidth * kHeight);
+}
+
+TEST_F(VideoTest, TheGhostOfAnotherRunStandsWhereThatRunIs) {
+  constexpr double kOff = 0.236;  // m, to the robot's left
+  RunFrames other = run_;
+  for (const char* joint : {"base", "torus_free"}) {
+    const int address = model_->jnt_qposadr[mj_name2id(model_.get(), mjOBJ_JOINT, joint)];
+    other.qpos.col(address + 1).array() += kOff;
+  }
+  VideoOptions options = MakeOptions();
+  options.panel = false;
+  options.free = FreeCamera{{2.6, -2.2, 1.4}, Vector3d(0.9, 0.0, 0.7), false, 0.0};
+  const RunView other_view = {model_.get(), &other};
+  const Image here = VideoPainter({&view_, 1}, options).Paint(0.2);
+  const Image there = VideoPainter({&other_view, 1}, options).Paint(0.2);
+  options.ghost = true;
+  const std::array<RunView, 2> both = {view_, other_view};
+  const Image ghost = VideoPainter(both, options).Paint(0.2);
+  const Image coincident = VideoPainter(std::array<RunView, 2>{view_, view_}, options).Paint(0.2);
+  // Where the other run differs from an empty scene, the ghost is seen, and nowhere else.
+  const auto pixels = [](const Image& a, const Image& b) {
+    std::vector<Vector2d> different;
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        int sum = 0;
+        for (int c = 0; c < 3; ++c) sum += std::abs(a.Pixel(x, y)[c] - b.Pixel(x, y)[c]);
+        if (sum > 24) different.emplace_back(x, y);
+      }
+    }
+    return different;
+  };
+  const auto right_end = [](const std::vector<Vector2d>& some) {
+    double right = 0.0;
+    for (const Vector2d& pixel : some) right = std::max(right, pixel.x());
+    return right;
+  };
+  const std::vector<Vector2d> moved = pixels(here, there);
+  const std::vector<Vector2d> seen = pixels(here, ghost);
+  ASSERT_GT(moved.size(), 1000U);
+  EXPECT_GT(seen.size(), moved.size() / 3);
+  EXPECT_LT(seen.size(), moved.size());
+  EXPECT_NEAR(right_end(seen), right_end(moved), 3.0);
+  EXPECT_LT(right_end(pixels(here, coincident)), right_end(moved) - 5.0)
+      << "not beside a run that is the same";
+  // Still where it was, and told how far apart.
+  EXPECT_NEAR((FindTorus(ghost) - FindTorus(here)).head<2>().norm(), 0.0, 3.0);
+  EXPECT_EQ(ghost.width, kWidth);
+}
+
+TEST_F(VideoTest, TheCourseCameraStandsStill) {
+  run_ = testing::MakeKinematicRun(*model_, 3.0);
+  VideoOptions options = MakeOptions();
+  options.panel = false;
+  const auto differences = [&](const char* camera) {
+    options.camera = camera;
+    VideoPainter painter({&view_, 1}, options);
+    const Image first = painter.Paint(0.0);
+    const Image last = painter.Paint(2.7);  // the floor's pattern repeats each metre
+    // Where the robot is at either end, and the left border.
+    return std::array<double, 3>{Difference(first.rgb.data(), last.rgb.data(), 0, 50, 0, 100),
+                                 Difference(first.rgb.data(), last.rgb.data(), 50, 100, 0, 100),
+                                 Difference(first.rgb.data(), last.rgb.data(), 0, 4, 0, 100)};
+  };
+  const auto [left, right, border] = differences(kCourseCamera);
+  constexpr double kSeen = 1.0;  // the robot, a twentieth of a half, differs from the floor by some 50
+  EXPECT_GT(left, kSeen) << "gone from here";
+  EXPECT_GT(right, kSeen) << "come here";
+  EXPECT_EQ(border, 0.0);
+  EXPECT_GT(differences("overview")[2], 0.0) << "a camera that moves along";
+}
+
+TEST_F(VideoTest, VideoDoesNotDependOnTheNumberOfProcesses) {
+  VideoOptions options = MakeOptions();
+  options.forces = options.tracks = options.frames = true;
+  options.inset = "grasp";
+  options.workers = 1;
+  ASSERT_TRUE(Video(folder_.path() / "one.mp4", {&view_, 1}, options));
+  options.workers = 3;
+  ASSERT_TRUE(Video(folder_.path() / "three.mp4", {&view_, 1}, options));
+  EXPECT_TRUE(testing::ReadText(folder_.path() / "one.mp4") ==
+              testing::ReadText(folder_.path() / "three.mp4"));
+}
+
+TEST_F(VideoTest, ProcessesDrawTheSameFramesByteForByte) {
+  VideoOptions options = MakeOptions();
+  options.forces = options.tracks = options.frames = true;
+  options.inset = "grasp";
+  constexpr long kFrames = 5;
+  std::vector<Image> own;
+  {
+    VideoPainter painter({&view_, 1}, options);
+    for (long frame = 0; frame < kFrames; ++frame)
+      own.push_back(painter.Paint(static_cast<double>(frame) / 10));
+  }
+  EXPECT_NE(own.front().rgb, own.back().rgb);
+  for (const int workers : {1, 2}) {
+    FrameLine line(
+        [&]() -> FrameLine::Painter {
+          return [painter = std::make_shared<VideoPainter>(std::span(&view_, 1), options)](long frame) {
+            return painter->Paint(static_cast<double>(frame) / 10);
+          };
+        },
+        kFrames, workers, kWidth, kHeight);
+    for (const Image& image : own) EXPECT_EQ(line.Take().rgb, image.rgb) << workers << " processes";
+  }
+}
+
+TEST_F(VideoTest, FramesAreTheStillsOfTheirTimes) {
+  VideoPainter painter({&view_, 1}, MakeOptions());
+  const Image start = painter.Paint(0.0);
+  EXPECT_NE(painter.Paint(0.3).rgb, start.rgb);
+  EXPECT_EQ(painter.Paint(0.0).rgb, start.rgb);
+  EXPECT_EQ(painter.Paint(9.0).rgb, painter.Paint(0.5).rgb) << "after its end a run stands still";
+}
+
+TEST_F(VideoTest, TwoRunsStandSideBySide) {
+  RunFrames other = run_;
+  const int elbow = model_->jnt_qposadr[mj_name2id(model_.get(), mjOBJ_JOINT, "r_elbow")];
+  other.qpos.col(elbow).array() -= 1.0;
+  other.title = "other";
+  const std::array<RunView, 2> both = {view_, {model_.get(), &other}};
+  const Image image = VideoPainter(both, MakeOptions()).Paint(0.2);
+  ASSERT_EQ(image.width, kWidth);
+  const std::array<RunView, 2> same = {view_, view_};
+  const Image twins = VideoPainter(same, MakeOptions()).Paint(0.2);
+  const auto half_differs = [&](int begin, int end) {
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = begin; x < end; ++x) {
+        if (!std::equal(image.Pixel(x, y), image.Pixel(x, y) + 3, twins.Pixel(x, y))) return true;
+      }
+    }
+    return false;
+  };
+  EXPECT_FALSE(half_differs(0, kWidth / 2));
+  EXPECT_TRUE(half_differs(kWidth / 2, kWidth));
+}
+
+TEST_F(VideoTest, LostContactsAreNotDrawn) {
+  VideoOptions options = MakeOptions();
+  options.panel = false;
+  options.camera = "grasp";
+  options.forces = options.tracks = true;
+  const Image all = VideoPainter({&view_, 1}, options).Paint(0.5);
+  run_.contact_positions.block(20, 0, 31, 3).setConstant(std::numeric_limits<double>::quiet_NaN());
+  const Image fewer = VideoPainter({&view_, 1}, options).Paint(0.5);
+  EXPECT_NE(all.rgb, fewer.rgb);
+  run_.contact_forces.setConstant(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_NO_THROW(VideoPainter({&view_, 1}, options).Paint(0.5));
+}
+
+TEST_F(VideoTest, TellsItsProgressAndStopsWhenTold) {
+  std::vector<long> told;
+  EXPECT_TRUE(Video(folder_.path() / "a.mp4", {&view_, 1}, MakeOptions(), [&](long done, long total) {
+    EXPECT_EQ(total, 5);
+    told.push_back(done);
+    return true;
+  }));
+  EXPECT_EQ(told, (std::vector<long>{1, 2, 3, 4, 5}));
+  EXPECT_FALSE(
+      Video(folder_.path() / "b.mp4", {&view_, 1}, MakeOptions(), [](long done, long) { return done < 2; }));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), {}), 1) << "nothing of the stopped video";
+}
+
+TEST_F(VideoTest, BadInputIsRefusedAndLeavesNothing) {
+  const auto video = [&](const VideoOptions& options) {
+    return [&, options] { return Video(folder_.path() / "a.mp4", {&view_, 1}, options); };
+  };
+  VideoOptions options = MakeOptions();
+  options.camera = "sideways";
+  EXPECT_TRUE(Throws<InputError>(video(options), "camera: no \"sideways\""));
+  options = MakeOptions();
+  options.inset = "sideways";
+  EXPECT_TRUE(Throws<InputError>(video(options), "camera: no \"sideways\""));
+  run_.object_body = "teapot";
+  options = MakeOptions();
+  options.tracks = true;
+  EXPECT_TRUE(Throws<InputError>(video(options), "kinematic run: object: no body \"teapot\" in the model"));
+  run_.times.clear();
+  EXPECT_TRUE(
+      Throws<InputError>(video(MakeOptions()), "kinematic run: time: the run has no recorded instants"));
+  EXPECT_TRUE(fs::is_empty(folder_.path()));
+}
+
+TEST_F(VideoTest, CountsTheFramesOfTheLongestRun) {
+  const RunFrames longer = testing::MakeKinematicRun(*model_, 2.0);
+  const std::array<RunView, 2> both = {view_, {model_.get(), &longer}};
+  EXPECT_EQ(CountFrames({&view_, 1}, 30), 15);
+  EXPECT_EQ(CountFrames(both, 30), 60);
+  EXPECT_EQ(CountFrames({&view_, 1}, 1), 1) << "at least one";
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::video_test
