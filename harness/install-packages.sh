@@ -15,13 +15,13 @@ packages=(
   # robots described by URDFs, the files that an MJCF names
   liburdfdom-dev libtinyxml2-dev
   # the run's log
-  libhdf5-dev zlib1g-dev
+  libhdf5-dev
   # studies: databases, searches, samples (Boost.Random)
   libsqlite3-dev libsqlitecpp-dev libpagmo-dev libnlopt-dev libnlopt-cxx-dev libboost-dev
   # the command line
   libcli11-dev libfmt-dev nlohmann-json3-dev
   # off-screen drawing and video
-  pkg-config libosmesa6-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libpng-dev libfreetype-dev
+  pkg-config libosmesa6-dev libcairo2-dev ffmpeg
   fonts-dejavu-core
   # pages: their plots, charts and replay, and the run's figures
   gnuplot-nox libjs-dygraphs libjs-chart.js libjs-three
@@ -36,7 +36,7 @@ esac
 if [[ $purpose != program ]]; then
   # tests and benchmarks, and the programs they take as oracles
   packages+=(
-    libgtest-dev libgmock-dev libbenchmark-dev coinor-csdp hdf5-tools ffmpeg
+    libgtest-dev libgmock-dev libbenchmark-dev coinor-csdp hdf5-tools
     sqlite3 slurm-wlm munge
     chromium chromium-driver python3-numpy python3-optuna python3-h5py doxygen
     xvfb xdotool imagemagick tmux zsh bash-completion

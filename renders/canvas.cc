@@ -1,21 +1,58 @@
 #include "renders/canvas.h"
 
-#include <algorithm>
+#include <cairo-ft.h>
+
 #include <array>
 #include <cmath>
-#include <vector>
+
+#include "controller/common/errors.h"
+#include "renders/cairo_surface.h"
 
 namespace dexcheck {
 namespace {
 
-/// Fraction of a pixel inside an edge at this signed distance (inside negative) from its centre.
-double Coverage(double distance) { return std::clamp(0.5 - distance, 0.0, 1.0); }
+using CairoPtr = std::shared_ptr<cairo_t>;
 
-double DistanceToSegment(const Vector2d& p, const Vector2d& a, const Vector2d& b) {
-  const Vector2d ab = b - a;
-  const double length_squared = ab.squaredNorm();
-  const double t = length_squared > 0.0 ? std::clamp((p - a).dot(ab) / length_squared, 0.0, 1.0) : 0.0;
-  return (p - a - t * ab).norm();
+/// Text as it is drawn: hinted a little, as the desktop does.
+CairoPtr MakeCairo(cairo_surface_t* surface) {
+  CairoPtr cairo(cairo_create(surface), cairo_destroy);
+  cairo_font_options_t* const options = cairo_font_options_create();
+  cairo_font_options_set_antialias(options, CAIRO_ANTIALIAS_GRAY);
+  cairo_font_options_set_hint_style(options, CAIRO_HINT_STYLE_SLIGHT);
+  cairo_font_options_set_hint_metrics(options, CAIRO_HINT_METRICS_OFF);
+  cairo_set_font_options(cairo.get(), options);
+  cairo_font_options_destroy(options);
+  cairo_set_line_cap(cairo.get(), CAIRO_LINE_CAP_ROUND);
+  cairo_set_line_join(cairo.get(), CAIRO_LINE_JOIN_ROUND);
+  return cairo;
+}
+
+void SetColor(const CairoPtr& cairo, const Color& color) {
+  cairo_set_source_rgba(cairo.get(), static_cast<double>(color[0]), static_cast<double>(color[1]),
+                        static_cast<double>(color[2]), static_cast<double>(color[3]));
+}
+
+/// UTF-8 that Cairo takes: what is none is a question mark.
+std::string MendUtf8(const std::string& text) {
+  std::string mended;
+  for (size_t at = 0; at < text.size();) {
+    const auto lead = static_cast<unsigned char>(text[at]);
+    size_t length = lead < 0x80 ? 1 : lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : lead >= 0xc2 ? 2 : 0;
+    for (size_t k = 1; k < length; ++k) {
+      if (at + k >= text.size() || (static_cast<unsigned char>(text[at + k]) & 0xc0U) != 0x80U) length = 0;
+    }
+    mended += length > 0 ? text.substr(at, length) : "?";
+    at += std::max<size_t>(length, 1);
+  }
+  return mended;
+}
+
+double MeasureWith(const CairoPtr& cairo, cairo_font_face_t* face, const std::string& text, double size) {
+  cairo_set_font_face(cairo.get(), face);
+  cairo_set_font_size(cairo.get(), size);
+  cairo_text_extents_t extents;
+  cairo_text_extents(cairo.get(), text.c_str(), &extents);
+  return extents.x_advance;
 }
 
 }  // namespace
@@ -25,37 +62,45 @@ Color MakeColor(unsigned rrggbb, float opacity) {
   return {channel(16), channel(8), channel(0), opacity};
 }
 
-void Canvas::Blend(int x, int y, const Color& color, double coverage) {
-  const float opacity = color[3] * static_cast<float>(coverage);
-  if (opacity <= 0.0F) return;
-  std::uint8_t* pixel = image_.Pixel(x, y);
-  for (int k = 0; k < 3; ++k) {
-    const auto old = static_cast<float>(pixel[k]);
-    const float mixed = old + opacity * (255.0F * color[static_cast<size_t>(k)] - old);
-    pixel[k] = static_cast<std::uint8_t>(std::clamp(mixed + 0.5F, 0.0F, 255.0F));
-  }
+std::filesystem::path Font::SystemFolder() { return DEXCHECK_FONT_FOLDER; }
+
+Font::Font(const std::filesystem::path& path) {
+  const std::unique_ptr<FcPattern, decltype(&FcPatternDestroy)> pattern(
+      FcPatternBuild(nullptr, FC_FILE, FcTypeString, path.c_str(), nullptr), FcPatternDestroy);
+  face_.reset(cairo_ft_font_face_create_for_pattern(pattern.get()), cairo_font_face_destroy);
+  const SurfacePtr surface = ToSurface(Image(1, 1));
+  const CairoPtr cairo = MakeCairo(surface.get());
+  const bool has_width = MeasureWith(cairo, face_.get(), "x", 10.0) > 0.0;
+  const cairo_status_t status = cairo_status(cairo.get());
+  if (status == CAIRO_STATUS_SUCCESS && has_width) return;
+  throw InputError(path.string() + ": cannot be used as a font" +
+                   (has_width ? std::string(": ") + cairo_status_to_string(status) : ""));
 }
 
-Canvas::Range Canvas::Clip(const Vector2d& low, const Vector2d& high) const {
-  const auto bound = [](double value, int most) {
-    return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(most)));
-  };
-  return {bound(std::floor(low.x()), image_.width), bound(std::ceil(high.x()), image_.width),
-          bound(std::floor(low.y()), image_.height), bound(std::ceil(high.y()), image_.height)};
+double Font::Measure(const std::string& text, double size) const {
+  static const SurfacePtr surface = ToSurface(Image(1, 1));
+  return MeasureWith(MakeCairo(surface.get()), face_.get(), MendUtf8(text), size);
 }
+
+Canvas::Canvas(Image* image)
+    : image_(*image),
+      surface_(ToSurface(*image).release(), cairo_surface_destroy),
+      cairo_(MakeCairo(surface_.get())) {}
+
+Canvas::~Canvas() { CopySurface(surface_.get(), &image_); }
 
 void Canvas::FillRoundedRectangle(const Vector2d& corner, const Vector2d& size, double radius,
                                   const Color& color) {
-  const Vector2d center = corner + 0.5 * size;
-  const Vector2d inner = 0.5 * size - Vector2d::Constant(radius);
-  const Range range = Clip(corner - Vector2d::Ones(), corner + size + Vector2d::Ones());
-  for (int y = range.y_begin; y < range.y_end; ++y) {
-    for (int x = range.x_begin; x < range.x_end; ++x) {
-      const Vector2d beyond = (Vector2d(x + 0.5, y + 0.5) - center).cwiseAbs() - inner;
-      const double distance = beyond.cwiseMax(0.0).norm() + std::min(beyond.maxCoeff(), 0.0) - radius;
-      Blend(x, y, color, Coverage(distance));
-    }
+  cairo_new_path(cairo_.get());
+  const Vector2d inner = size - Vector2d::Constant(2.0 * radius);
+  const Vector2d first = corner + Vector2d::Constant(radius);
+  for (int k = 0; k < 4; ++k) {  // from the upper left corner clockwise
+    const double x = first.x() + (k == 1 || k == 2 ? inner.x() : 0.0);
+    const double y = first.y() + (k >= 2 ? inner.y() : 0.0);
+    cairo_arc(cairo_.get(), x, y, radius, kPi * (1.0 + 0.5 * k), kPi * (1.5 + 0.5 * k));
   }
+  SetColor(cairo_, color);
+  cairo_fill(cairo_.get());
 }
 
 void Canvas::FillCircle(const Vector2d& center, double radius, const Color& color) {
@@ -65,36 +110,11 @@ void Canvas::FillCircle(const Vector2d& center, double radius, const Color& colo
 
 void Canvas::StrokePath(std::span<const Vector2d> points, double width, const Color& color) {
   if (points.size() < 2) return;
-  Vector2d low = points.front();
-  Vector2d high = low;
-  for (const Vector2d& point : points) {
-    low = low.cwiseMin(point);
-    high = high.cwiseMax(point);
-  }
-  const Vector2d margin = Vector2d::Constant(0.5 * width + 1.0);
-  const Range box = Clip(low - margin, high + margin);
-  const int box_width = box.x_end - box.x_begin;
-  if (box_width <= 0 || box.y_end <= box.y_begin) return;
-  // Joints are covered twice but must be blended once.
-  std::vector<float> coverage(static_cast<size_t>(box_width) * static_cast<size_t>(box.y_end - box.y_begin));
-  const auto at = [&](int x, int y) -> float& {
-    return coverage[static_cast<size_t>(y - box.y_begin) * static_cast<size_t>(box_width) +
-                    static_cast<size_t>(x - box.x_begin)];
-  };
-  for (size_t i = 1; i < points.size(); ++i) {
-    const Vector2d& a = points[i - 1];
-    const Vector2d& b = points[i];
-    const Range range = Clip(a.cwiseMin(b) - margin, a.cwiseMax(b) + margin);
-    for (int y = range.y_begin; y < range.y_end; ++y) {
-      for (int x = range.x_begin; x < range.x_end; ++x) {
-        const double distance = DistanceToSegment({x + 0.5, y + 0.5}, a, b) - 0.5 * width;
-        at(x, y) = std::max(at(x, y), static_cast<float>(Coverage(distance)));
-      }
-    }
-  }
-  for (int y = box.y_begin; y < box.y_end; ++y) {
-    for (int x = box.x_begin; x < box.x_end; ++x) Blend(x, y, color, static_cast<double>(at(x, y)));
-  }
+  cairo_new_path(cairo_.get());
+  for (const Vector2d& point : points) cairo_line_to(cairo_.get(), point.x(), point.y());
+  SetColor(cairo_, color);
+  cairo_set_line_width(cairo_.get(), width);
+  cairo_stroke(cairo_.get());
 }
 
 void Canvas::StrokeLine(const Vector2d& from, const Vector2d& to, double width, const Color& color) {
@@ -102,23 +122,15 @@ void Canvas::StrokeLine(const Vector2d& from, const Vector2d& to, double width, 
   StrokePath(ends, width, color);
 }
 
-void Canvas::DrawText(Font& font, double size, const Vector2d& baseline, const std::string& text,
+void Canvas::DrawText(const Font& font, double size, const Vector2d& baseline, const std::string& text,
                       const Color& color, Align align) {
-  double pen = baseline.x();
-  if (align == Align::kCenter) pen -= 0.5 * font.Measure(text, size);
-  if (align == Align::kRight) pen -= font.Measure(text, size);
-  const int line = static_cast<int>(std::lround(baseline.y()));
-  font.Visit(text, size, [&](const Font::Glyph& glyph) {
-    const int left = static_cast<int>(std::lround(pen)) + glyph.left;
-    const int top = line - glyph.top;
-    for (int y = std::max(0, -top); y < glyph.height && top + y < image_.height; ++y) {
-      for (int x = std::max(0, -left); x < glyph.width && left + x < image_.width; ++x) {
-        const std::uint8_t value = glyph.coverage[static_cast<size_t>(y * glyph.width + x)];
-        Blend(left + x, top + y, color, value / 255.0);
-      }
-    }
-    pen += glyph.advance;
-  });
+  const std::string mended = MendUtf8(text);
+  const double width = MeasureWith(cairo_, font.face_.get(), mended, size);
+  const double before = align == Align::kCenter ? 0.5 * width : align == Align::kRight ? width : 0.0;
+  SetColor(cairo_, color);
+  // On whole pixels the letters of a line look alike in all frames.
+  cairo_move_to(cairo_.get(), std::round(baseline.x() - before), std::round(baseline.y()));
+  cairo_show_text(cairo_.get(), mended.c_str());
 }
 
 }  // namespace dexcheck

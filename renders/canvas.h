@@ -1,25 +1,51 @@
 #pragma once
 
-// Smooth shapes and text on a picture. Positions in pixels, y downwards; a pixel's centre is at half a pixel.
+// Smooth shapes and text on a picture, by Cairo. Positions in pixels, y downwards; a pixel's centre is at
+// half a pixel.
 
+#include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
-#include <utility>
 
 #include "controller/common/types.h"
 #include "renders/decoration.h"
-#include "renders/font.h"
 #include "renders/image.h"
+
+struct _cairo;
+struct _cairo_font_face;
+struct _cairo_surface;
 
 namespace dexcheck {
 
 /// Opaque or translucent colour from "rrggbb".
 Color MakeColor(unsigned rrggbb, float opacity = 1.0F);
 
-/// Draws on one picture; what lies outside of it is cut off.
+/// An outline font, drawn smoothly at any size. For one thread.
+class Font {
+ public:
+  /// Folder of the system's DejaVu fonts: "DejaVuSans.ttf", "DejaVuSans-Bold.ttf".
+  static std::filesystem::path SystemFolder();
+
+  /// @throws InputError "PATH: cannot be used as a font: reason".
+  explicit Font(const std::filesystem::path& path);
+
+  /// Width of a text in pixels. @param text UTF-8; @param size of the font in pixels.
+  [[nodiscard]] double Measure(const std::string& text, double size) const;
+
+ private:
+  friend class Canvas;
+  std::shared_ptr<_cairo_font_face> face_;
+};
+
+/// Draws on one picture, which has what was drawn when the canvas is destroyed; what lies outside of it is
+/// cut off.
 class Canvas {
  public:
-  explicit Canvas(Image* image) : image_(*image) {}
+  explicit Canvas(Image* image);
+  ~Canvas();
+  Canvas(const Canvas&) = delete;
+  Canvas& operator=(const Canvas&) = delete;
 
   void FillRoundedRectangle(const Vector2d& corner, const Vector2d& size, double radius, const Color& color);
   void FillCircle(const Vector2d& center, double radius, const Color& color);
@@ -28,18 +54,13 @@ class Canvas {
 
   enum class Align { kLeft, kCenter, kRight };
   /// @param baseline where the text's line stands, at its left end, centre, or right end.
-  void DrawText(Font& font, double size, const Vector2d& baseline, const std::string& text,
+  void DrawText(const Font& font, double size, const Vector2d& baseline, const std::string& text,
                 const Color& color, Align align = Align::kLeft);
 
  private:
-  void Blend(int x, int y, const Color& color, double coverage);
-  /// The pixels between two corners, within the picture.
-  struct Range {
-    int x_begin, x_end, y_begin, y_end;
-  };
-  [[nodiscard]] Range Clip(const Vector2d& low, const Vector2d& high) const;
-
   Image& image_;
+  std::shared_ptr<_cairo_surface> surface_;
+  std::shared_ptr<_cairo> cairo_;
 };
 
 }  // namespace dexcheck

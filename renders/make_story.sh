@@ -33,7 +33,7 @@ verdict=$("$dexcheck" run --replay "$runs/curve" --quiet | head -1)
 grep -q '"verdict": "pass"' "$runs/curve/summary.json" || { echo "make_story: curve does not pass" >&2; exit 1; }
 ffmpeg -loglevel error -y -sseof -0.2 -i "$work/4.mp4" -frames:v 1 -update 1 "$work/last.png"
 ffmpeg -loglevel error -y -loop 1 -t 3 -i "$work/last.png" -crf 12 -vf "fps=$fps,drawbox=color=0x0b2a1e@0.78:t=fill,drawtext=fontfile=$font:\
-text='PASS':x=(w-tw)/2:y=78:fontsize=58:fontcolor=0x5fd3a5,drawtext=fontfile=$font:text='model, law, balance, prediction, assumptions':\
+text='PASS':x=(w-tw)/2:y=78:fontsize=58:fontcolor=0x5fd3a5,drawtext=fontfile=$font:text='model, law, inverse and forward dynamics, assumptions':\
 x=(w-tw)/2:y=160:fontsize=16:fontcolor=white,drawtext=fontfile=$font:text='checked against MuJoCo at each of 12000 steps':x=(w-tw)/2:y=188:\
 fontsize=16:fontcolor=white,format=yuv420p" "$work/5.mp4"
 for i in 1 2 3 4 5; do echo "file '$work/$i.mp4'"; done >"$work/list"

@@ -33,7 +33,7 @@ constexpr double kNarrow = 850.0;  // pictures narrower than this have a smaller
 constexpr double kPlotHeight = 58.0;
 
 /// The text, shortened with an ellipsis to fit.
-std::string Fit(std::string text, double width, double size, Font& font) {
+std::string Fit(std::string text, double width, double size, const Font& font) {
   if (font.Measure(text, size) <= width) return text;
   while (!text.empty() && font.Measure(text + "\u2026", size) > width) {
     do {
@@ -104,17 +104,31 @@ double Overlay::CalcCoveredWidth(int width, int height) {
   return (kMargin + kWidth) * CalcScale(width, height);
 }
 
+OverlayState MakeOverlayState(const RunFrames& run, long row, const std::vector<CategoryStatus>& categories) {
+  const auto at = static_cast<size_t>(row);
+  OverlayState state;
+  state.title = run.title;
+  if (!run.phases.empty()) state.title += ": " + run.phases[at];
+  state.time = run.times[at];
+  const auto add = [&](const char* name, const std::vector<double>& series, const char* unit) {
+    if (!series.empty()) state.rows.push_back({name, FormatSi(series[at], unit)});
+  };
+  add("position error", run.position_errors, "m");
+  add("orientation error", run.orientation_errors, "rad");
+  add("joint error", run.joint_errors, "rad");
+  state.categories = categories;
+  return state;
+}
+
 void Overlay::Draw(const OverlayState& state, Image* image) {
   const double s = CalcScale(image->width, image->height);
-  const bool has_plot = !state.history.empty();
-  const int errors = (state.position_error ? 1 : 0) + (state.orientation_error ? 1 : 0) +
-                     (state.joint_error ? 1 : 0) + (state.apart ? 1 : 0);
-  const auto rows = static_cast<double>(state.questions.size());
+  const auto rows = static_cast<double>(state.rows.size());
+  const auto categories = static_cast<double>(state.categories.size());
   const auto keys = static_cast<double>(state.legend.size());
   double height = 2.0 * kPadding + kLine;
-  if (errors > 0) height += 10.0 + errors * kLine;
-  if (has_plot) height += kPlotHeight + 22.0;
-  if (rows > 0) height += 14.0 + (rows + 0.8) * kLine;
+  if (rows > 0) height += 10.0 + rows * kLine;
+  if (!state.history.empty()) height += kPlotHeight + 22.0;
+  if (categories > 0) height += 14.0 + (categories + 0.8) * kLine;
   if (keys > 0) height += 12.0 + keys * kLine;
 
   Canvas canvas(image);
@@ -123,11 +137,10 @@ void Overlay::Draw(const OverlayState& state, Image* image) {
   const double left = corner.x() + kPadding * s;
   const double right = corner.x() + (kWidth - kPadding) * s;
   double y = corner.y() + (kPadding + 15.0) * s;
-
   const auto draw_rule = [&] { canvas.StrokeLine({left, y}, {right, y}, s, kRule); };
-  const auto draw_row = [&](double x, const std::string& name, const std::string& value) {
-    canvas.DrawText(regular_, kTextSize * s, {x, y}, name, kFaint);
-    canvas.DrawText(regular_, kTextSize * s, {right, y}, value, kText, Align::kRight);
+  const auto draw_row = [&](double x, const OverlayRow& row) {
+    canvas.DrawText(regular_, kTextSize * s, {x, y}, row.name, kFaint);
+    canvas.DrawText(regular_, kTextSize * s, {right, y}, row.value, kText, Align::kRight);
   };
 
   const std::string time = fmt::format("{:.2f} s", state.time);
@@ -136,43 +149,29 @@ void Overlay::Draw(const OverlayState& state, Image* image) {
                   kText);
   canvas.DrawText(bold_, kTitleSize * s, {right, y}, time, kText, Align::kRight);
   y += 10.0 * s;
-
-  if (errors > 0) {
-    if (state.position_error) {
-      y += kLine * s;
-      draw_row(left, "position error", FormatSi(*state.position_error, "m"));
-    }
-    if (state.orientation_error) {
-      y += kLine * s;
-      draw_row(left, "orientation error", FormatSi(*state.orientation_error, "rad"));
-    }
-    if (state.joint_error) {
-      y += kLine * s;
-      draw_row(left, "joint error", FormatSi(*state.joint_error, "rad"));
-    }
-    if (state.apart) {
-      y += kLine * s;
-      draw_row(left, "objects apart", FormatSi(*state.apart, "m"));
-    }
+  for (const OverlayRow& row : state.rows) {
+    y += kLine * s;
+    draw_row(left, row);
   }
-  if (has_plot) {
+  if (!state.history.empty()) {
     y += 18.0 * s;
     DrawPlot(state, {left, y}, {right - left, kPlotHeight * s}, s, &canvas);
     y += (kPlotHeight + 4.0) * s;
   }
-  if (rows > 0) {
+  if (categories > 0) {
     y += 12.0 * s;
     draw_rule();
     y += 0.8 * kLine * s;
     canvas.DrawText(regular_, kSmallSize * s, {left, y}, "cross-check", kFaint);
     canvas.DrawText(regular_, kSmallSize * s, {right, y}, "worst so far / bound", kFaint, Align::kRight);
-    for (const CategoryStatus& question : state.questions) {
+    for (const CategoryStatus& status : state.categories) {
       y += kLine * s;
-      const Color& dot = !question.asked ? kUnknown : question.Passes() ? kGood : kBad;
+      const Color& dot = !status.is_asked() ? kUnknown : status.failed == 0 ? kGood : kBad;
       canvas.FillCircle({left + 5.0 * s, y - 5.0 * s}, 5.0 * s, dot);
       draw_row(
-          left + 19.0 * s, question.name,
-          question.asked ? fmt::format("{:.1e} / {:.0e}", question.worst, question.bound) : "not checked");
+          left + 19.0 * s,
+          {TitleOf(status.category),
+           status.is_asked() ? fmt::format("{:.1e} / {:.0e}", status.worst, status.bound) : "not checked"});
     }
   }
   if (keys > 0) {

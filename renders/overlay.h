@@ -1,17 +1,15 @@
 #pragma once
 
 // The panel that tells on each frame how the run stands: scenario, time, tracking error, and the five
-// questions of the cross-check.
+// categories of the cross-check.
 
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "controller/common/types.h"
 #include "renders/canvas.h"
-#include "renders/category_status.h"
-#include "renders/font.h"
 #include "renders/image.h"
+#include "renders/run_frames.h"
 
 namespace dexcheck {
 
@@ -21,21 +19,27 @@ struct LegendEntry {
   Color color;
 };
 
+/// A line of the panel with a name at its left and a value at its right.
+struct OverlayRow {
+  std::string name;
+  std::string value;
+};
+
 struct OverlayState {
   std::string title;
-  double time = 0.0;                        ///< s.
-  std::optional<double> position_error;     ///< m.
-  std::optional<double> orientation_error;  ///< rad.
-  std::optional<double> joint_error;        ///< Of the joint that is farthest off, rad.
-  std::optional<double> apart;              ///< How far the objects of two runs are from each other, m.
+  double time = 0.0;             ///< s.
+  std::vector<OverlayRow> rows;  ///< Tracking errors.
   /// (time in s, position error in m) of the span that the plot shows, oldest first.
   std::vector<Vector2d> history;
   double history_span = 3.0;  ///< s; the plot ends now and began so long ago.
   double error_low = 1e-9;    ///< m; range of the plot.
   double error_high = 1e-3;   ///< m.
-  std::vector<CategoryStatus> questions;
+  std::vector<CategoryStatus> categories;
   std::vector<LegendEntry> legend;
 };
+
+/// Title, time and errors of one row of a run, and where its checks stand then.
+OverlayState MakeOverlayState(const RunFrames& run, long row, const std::vector<CategoryStatus>& categories);
 
 /// A length, angle or other number with a prefix that keeps one to three digits before the point: "12.4 nm".
 std::string FormatSi(double value, const std::string& unit);

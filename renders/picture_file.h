@@ -13,4 +13,7 @@ void RequirePictureName(const std::filesystem::path& path);
 /// @throws InputError "PATH: cannot be written: reason", or as RequirePictureName.
 void WritePicture(const std::filesystem::path& path, const Image& image);
 
+/// @throws InputError "PATH: cannot be read: reason".
+Image ReadPng(const std::filesystem::path& path);
+
 }  // namespace dexcheck

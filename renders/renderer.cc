@@ -2,13 +2,10 @@
 
 #include <algorithm>
 #include <mutex>
-#include <optional>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
-#include "renders/display_meshes.h"
-#include "renders/offscreen_context.h"
 #include "renders/scene_geoms.h"
 
 namespace dexcheck {
@@ -56,6 +53,17 @@ int FindBody(const mjModel& model, const std::string& name) {
   return id;
 }
 
+mjvCamera MakeFreeCamera(const Viewpoint& from) {
+  mjvCamera view;
+  mjv_defaultCamera(&view);
+  view.type = mjCAMERA_FREE;
+  std::copy_n(from.look_at.data(), 3, view.lookat);
+  view.distance = from.distance;
+  view.azimuth = RadToDeg(from.azimuth);
+  view.elevation = RadToDeg(from.elevation);
+  return view;
+}
+
 /// Only one model's meshes can be loaded to be drawn.
 void RequireSameMeshes(const mjModel& model, const mjModel& ghost) {
   const bool same = model.nmesh == ghost.nmesh && model.nmeshvert == ghost.nmeshvert &&
@@ -75,169 +83,112 @@ std::vector<std::string> ListCameras(const mjModel& model) {
 
 void CheckCamera(const mjModel& model, const std::string& name) { FindCamera(model, name); }
 
-class Renderer::Impl {
- public:
-  Impl(const mjModel& model, const RenderOptions& options)
-      : model_(model), options_(options), camera_(FindCamera(model, options.camera)) {
-    CheckOptions(options);
-    translucent_body_ = FindBody(model, options.translucent_body);
-    if (options.ghost) RequireSameMeshes(model, *options.ghost->model);
-    const std::lock_guard lock(context_mutex);
-    gl_.emplace();
-    mjv_defaultOption(&visible_);
-    mjv_defaultPerturb(&perturb_);
-    mjv_defaultScene(&scene_);
-    const auto ghost_geoms = options.ghost ? static_cast<int>(options.ghost->model->ngeom) : 0;
-    mjv_makeScene(&model, &scene_, static_cast<int>(model.ngeom) + ghost_geoms + kMostDecorations);
-    mjr_defaultContext(&context_);
-    // The context takes its sizes from the model's visual section.
-    const MjModelPtr sized(mj_copyModel(nullptr, &model));
-    sized->vis.global.offwidth = options.samples * options.width;
-    sized->vis.global.offheight = options.samples * options.height;
-    sized->vis.quality.offsamples = 0;
-    sized->vis.quality.shadowsize = options.shadow_size;
-    sized->vis.quality.numslices = options.slices;
-    sized->vis.quality.numstacks = options.stacks;
-    mjr_makeContext(sized.get(), &context_, mjFONTSCALE_100);
-    mjr_setBuffer(mjFB_OFFSCREEN, &context_);
-    meshes_.emplace(context_);
-    scene_.flags[mjRND_SHADOW] = options.shadows ? 1 : 0;
-    scene_.flags[mjRND_REFLECTION] = options.reflections ? 1 : 0;
-    pixels_.resize(3 * static_cast<size_t>(options.samples * options.width) *
-                   static_cast<size_t>(options.samples * options.height));
-  }
-
-  ~Impl() {
-    gl_->MakeCurrent();
-    meshes_.reset();
-    mjr_freeContext(&context_);
-    mjv_freeScene(&scene_);
-  }
-
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
-  Image Render(mjData& data, mjvCamera view, int width, int height, double shift_right,
-               std::span<const Decoration> decorations) {
-    RequireRoom(width, height);
-    gl_->MakeCurrent();
-    mjv_updateScene(&model_, &data, &visible_, &perturb_, &view, mjCAT_ALL, &scene_);
-    if (view.type == mjCAMERA_FREE) shift_right = 0.0;
-    for (mjvGLCamera& eye : scene_.camera) {
-      const double visible = static_cast<double>(eye.frustum_top - eye.frustum_bottom) * width / height;
-      eye.frustum_center -= static_cast<float>(shift_right * visible);
-    }
-    FadeBody();
-    if (options_.ghost) AddGhost(*options_.ghost);
-    meshes_->ClearTubes();
-    AddDecorations(decorations, &*meshes_, &scene_);
-    const mjrRect viewport = {0, 0, options_.samples * width, options_.samples * height};
-    mjr_render(viewport, &scene_, &context_);
-    mjr_readPixels(pixels_.data(), nullptr, viewport, &context_);
-    return ReduceBottomUp(pixels_.data(), width, height, options_.samples);
-  }
-
-  Image Render(mjData& data, const Viewpoint& from, int width, int height,
-               std::span<const Decoration> decorations) {
-    return Render(data, MakeFreeCamera(from), width, height, 0.0, decorations);
-  }
-
-  Image Render(mjData& data, const Viewpoint& from, std::span<const Decoration> decorations) {
-    return Render(data, from, options_.width, options_.height, decorations);
-  }
-
-  Image Render(mjData& data, std::span<const Decoration> decorations) {
-    return Render(data, MakeCamera(camera_), options_.width, options_.height, options_.shift_right,
-                  decorations);
-  }
-
-  Image Render(mjData& data, const std::string& camera, int width, int height,
-               std::span<const Decoration> decorations) {
-    return Render(data, MakeCamera(FindCamera(model_, camera)), width, height, 0.0, decorations);
-  }
-
- private:
-  void RequireRoom(int width, int height) const {
-    Require(kSmallest <= width && width <= options_.width, "width", "must fit into the renderer's picture",
-            width);
-    Require(kSmallest <= height && height <= options_.height, "height",
-            "must fit into the renderer's picture", height);
-  }
-
-  static mjvCamera MakeFreeCamera(const Viewpoint& from) {
-    mjvCamera view;
-    mjv_defaultCamera(&view);
-    view.type = mjCAMERA_FREE;
-    std::copy_n(from.look_at.data(), 3, view.lookat);
-    view.distance = from.distance;
-    view.azimuth = RadToDeg(from.azimuth);
-    view.elevation = RadToDeg(from.elevation);
-    return view;
-  }
-
-  [[nodiscard]] mjvCamera MakeCamera(int camera) const {
-    if (camera == kCourse) return MakeFreeCamera(options_.course);
-    mjvCamera view;
-    mjv_defaultCamera(&view);
-    view.type = mjCAMERA_FIXED;
-    view.fixedcamid = camera;
-    return view;
-  }
-
-  void FadeBody() {
-    if (translucent_body_ < 0) return;
-    for (int i = 0; i < scene_.ngeom; ++i) {
-      mjvGeom& geom = scene_.geoms[i];
-      if (geom.objtype != mjOBJ_GEOM || model_.geom_bodyid[geom.objid] != translucent_body_) continue;
-      geom.rgba[3] = std::min(geom.rgba[3], static_cast<float>(options_.translucent_opacity));
-    }
-  }
-
-  void AddGhost(const Ghost& ghost) {
-    const int first = scene_.ngeom;
-    mjv_addGeoms(ghost.model, ghost.data, &visible_, &perturb_, mjCAT_DYNAMIC, &scene_);
-    for (int i = first; i < scene_.ngeom; ++i) {
-      mjvGeom& geom = scene_.geoms[i];
-      std::copy(ghost.color.begin(), ghost.color.end(), geom.rgba);
-      geom.texid = -1;
-      geom.reflectance = 0.0F;
-    }
-  }
-
-  const mjModel& model_;
-  RenderOptions options_;
-  int camera_;
-  int translucent_body_ = -1;
-  std::optional<OffscreenContext> gl_;
-  mjvOption visible_;
-  mjvPerturb perturb_;
-  mjvScene scene_;
-  mjrContext context_;
-  std::optional<DisplayMeshes> meshes_;
-  std::vector<std::uint8_t> pixels_;
-};
-
 Renderer::Renderer(const mjModel& model, const RenderOptions& options)
-    : impl_(std::make_unique<Impl>(model, options)) {}
+    : model_(model),
+      options_(options),
+      camera_(FindCamera(model, options.camera)),
+      translucent_body_(FindBody(model, options.translucent_body)) {
+  CheckOptions(options);
+  if (options.ghost) RequireSameMeshes(model, *options.ghost->model);
+  const std::lock_guard lock(context_mutex);
+  gl_.emplace();
+  mjv_defaultOption(&visible_);
+  mjv_defaultPerturb(&perturb_);
+  mjv_defaultScene(&scene_);
+  const auto ghost_geoms = options.ghost ? static_cast<int>(options.ghost->model->ngeom) : 0;
+  mjv_makeScene(&model, &scene_, static_cast<int>(model.ngeom) + ghost_geoms + kMostDecorations);
+  mjr_defaultContext(&context_);
+  // The context takes its sizes from the model's visual section.
+  const MjModelPtr sized(mj_copyModel(nullptr, &model));
+  sized->vis.global.offwidth = options.samples * options.width;
+  sized->vis.global.offheight = options.samples * options.height;
+  sized->vis.quality.offsamples = 0;
+  sized->vis.quality.shadowsize = options.shadow_size;
+  sized->vis.quality.numslices = options.slices;
+  sized->vis.quality.numstacks = options.stacks;
+  mjr_makeContext(sized.get(), &context_, mjFONTSCALE_100);
+  mjr_setBuffer(mjFB_OFFSCREEN, &context_);
+  meshes_.emplace(context_);
+  scene_.flags[mjRND_SHADOW] = options.shadows ? 1 : 0;
+  scene_.flags[mjRND_REFLECTION] = options.reflections ? 1 : 0;
+  pixels_.resize(3 * static_cast<size_t>(options.samples * options.width) *
+                 static_cast<size_t>(options.samples * options.height));
+}
 
-Renderer::~Renderer() = default;
+Renderer::~Renderer() {
+  gl_->MakeCurrent();
+  meshes_.reset();
+  mjr_freeContext(&context_);
+  mjv_freeScene(&scene_);
+}
 
 Image Renderer::Render(mjData& data, std::span<const Decoration> decorations) {
-  return impl_->Render(data, decorations);
+  return Draw(data, MakeCamera(camera_), options_.width, options_.height, options_.shift_right, decorations);
 }
 
 Image Renderer::Render(mjData& data, const Viewpoint& from, std::span<const Decoration> decorations) {
-  return impl_->Render(data, from, decorations);
+  return Render(data, from, options_.width, options_.height, decorations);
 }
 
 Image Renderer::Render(mjData& data, const Viewpoint& from, int width, int height,
                        std::span<const Decoration> decorations) {
-  return impl_->Render(data, from, width, height, decorations);
+  return Draw(data, MakeFreeCamera(from), width, height, 0.0, decorations);
 }
 
 Image Renderer::Render(mjData& data, const std::string& camera, int width, int height,
                        std::span<const Decoration> decorations) {
-  return impl_->Render(data, camera, width, height, decorations);
+  return Draw(data, MakeCamera(FindCamera(model_, camera)), width, height, 0.0, decorations);
+}
+
+Image Renderer::Draw(mjData& data, mjvCamera view, int width, int height, double shift_right,
+                     std::span<const Decoration> decorations) {
+  constexpr const char* kRoom = "must fit into the renderer's picture";
+  Require(kSmallest <= width && width <= options_.width, "width", kRoom, width);
+  Require(kSmallest <= height && height <= options_.height, "height", kRoom, height);
+  gl_->MakeCurrent();
+  mjv_updateScene(&model_, &data, &visible_, &perturb_, &view, mjCAT_ALL, &scene_);
+  if (view.type == mjCAMERA_FREE) shift_right = 0.0;
+  for (mjvGLCamera& eye : scene_.camera) {
+    const double visible = static_cast<double>(eye.frustum_top - eye.frustum_bottom) * width / height;
+    eye.frustum_center -= static_cast<float>(shift_right * visible);
+  }
+  FadeBody();
+  if (options_.ghost) AddGhost(*options_.ghost);
+  meshes_->ClearTubes();
+  AddDecorations(decorations, &*meshes_, &scene_);
+  const mjrRect viewport = {0, 0, options_.samples * width, options_.samples * height};
+  mjr_render(viewport, &scene_, &context_);
+  mjr_readPixels(pixels_.data(), nullptr, viewport, &context_);
+  return ReduceBottomUp(pixels_.data(), width, height, options_.samples);
+}
+
+mjvCamera Renderer::MakeCamera(int camera) const {
+  if (camera == kCourse) return MakeFreeCamera(options_.course);
+  mjvCamera view;
+  mjv_defaultCamera(&view);
+  view.type = mjCAMERA_FIXED;
+  view.fixedcamid = camera;
+  return view;
+}
+
+void Renderer::FadeBody() {
+  if (translucent_body_ < 0) return;
+  for (int i = 0; i < scene_.ngeom; ++i) {
+    mjvGeom& geom = scene_.geoms[i];
+    if (geom.objtype != mjOBJ_GEOM || model_.geom_bodyid[geom.objid] != translucent_body_) continue;
+    geom.rgba[3] = std::min(geom.rgba[3], static_cast<float>(options_.translucent_opacity));
+  }
+}
+
+void Renderer::AddGhost(const Ghost& ghost) {
+  const int first = scene_.ngeom;
+  mjv_addGeoms(ghost.model, ghost.data, &visible_, &perturb_, mjCAT_DYNAMIC, &scene_);
+  for (int i = first; i < scene_.ngeom; ++i) {
+    mjvGeom& geom = scene_.geoms[i];
+    std::copy(ghost.color.begin(), ghost.color.end(), geom.rgba);
+    geom.texid = -1;
+    geom.reflectance = 0.0F;
+  }
 }
 
 }  // namespace dexcheck

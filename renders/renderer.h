@@ -2,14 +2,16 @@
 
 #include <mujoco/mujoco.h>
 
-#include <memory>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "renders/decoration.h"
+#include "renders/display_meshes.h"
 #include "renders/image.h"
+#include "renders/offscreen_context.h"
 #include "renders/viewpoint.h"
 
 namespace dexcheck {
@@ -71,16 +73,32 @@ class Renderer {
 
   /// The same from a camera that stands there.
   Image Render(mjData& data, const Viewpoint& from, std::span<const Decoration> decorations = {});
+  /// At most as large as the options' picture.
   Image Render(mjData& data, const Viewpoint& from, int width, int height,
                std::span<const Decoration> decorations);
 
-  /// The same from another camera, at most as large as the options' picture.
+  /// The same from another camera.
   Image Render(mjData& data, const std::string& camera, int width, int height,
                std::span<const Decoration> decorations = {});
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  Image Draw(mjData& data, mjvCamera view, int width, int height, double shift_right,
+             std::span<const Decoration> decorations);
+  [[nodiscard]] mjvCamera MakeCamera(int camera) const;
+  void FadeBody();
+  void AddGhost(const Ghost& ghost);
+
+  const mjModel& model_;
+  RenderOptions options_;
+  int camera_;
+  int translucent_body_;
+  std::optional<OffscreenContext> gl_;
+  mjvOption visible_;
+  mjvPerturb perturb_;
+  mjvScene scene_;
+  mjrContext context_;
+  std::optional<DisplayMeshes> meshes_;
+  std::vector<std::uint8_t> pixels_;
 };
 
 }  // namespace dexcheck

@@ -12,11 +12,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-double PerBound(double residual, double bound) {
-  if (bound > 0.0) return residual / bound;
-  return residual > 0.0 ? kInfinity : 0.0;
-}
-
 }  // namespace
 
 long RunFrames::RowAt(double time) const {
@@ -76,34 +71,18 @@ CheckHistory::CheckHistory(const RunFrames& run) : run_(run) {
   }
 }
 
-CheckHistory::Standing CheckHistory::At(CheckCategory kind, long row) const {
-  Standing standing;
-  for (size_t i = 0; i < worst_.size(); ++i) {
-    const CheckSeries& check = run_.checks[i];
-    if (check.kind != kind) continue;
-    const double worst = worst_[i][static_cast<size_t>(row)];
-    if (standing.check == nullptr ||
-        PerBound(worst, check.bound) > PerBound(standing.worst, standing.check->bound)) {
-      standing = {&check, worst};
+std::vector<CategoryStatus> CheckHistory::ListCategories(long row) const {
+  std::vector<CategoryStatus> categories;
+  if (run_.checks.empty()) return categories;
+  for (const CheckCategory kind : kCheckCategories) {
+    CategoryStatus& status = categories.emplace_back(CategoryStatus{kind});
+    for (size_t i = 0; i < worst_.size(); ++i) {
+      const CheckSeries& check = run_.checks[i];
+      const double worst = worst_[i][static_cast<size_t>(row)];
+      if (check.kind == kind) status.Add(check.name, worst, check.bound, worst > check.bound);
     }
   }
-  return standing;
-}
-
-std::vector<CategoryStatus> CheckHistory::ListCategories(long row) const {
-  std::vector<CategoryStatus> questions;
-  if (run_.checks.empty()) return questions;
-  for (const CheckCategory kind : kCheckCategorys) {
-    const Standing standing = At(kind, row);
-    CategoryStatus& question = questions.emplace_back();
-    question.name = NameOf(kind);
-    question.asked = standing.check != nullptr;
-    if (!question.asked) continue;
-    question.check = standing.check->name;
-    question.worst = standing.worst;
-    question.bound = standing.check->bound;
-  }
-  return questions;
+  return categories;
 }
 
 }  // namespace dexcheck

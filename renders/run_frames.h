@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "controller/common/types.h"
-#include "harness/base/check_record.h"
-#include "renders/category_status.h"
+#include "harness/base/check_summary.h"
 
 namespace dexcheck {
 
@@ -58,14 +57,7 @@ class CheckHistory {
  public:
   explicit CheckHistory(const RunFrames& run);
 
-  struct Standing {
-    const CheckSeries* check = nullptr;  ///< Null when no check is of the kind.
-    double worst = 0.0;
-  };
-  /// The check of a kind with the largest residual per bound up to and including `row`.
-  [[nodiscard]] Standing At(CheckCategory kind, long row) const;
-
-  /// Where each question stands at `row`, in the order of kCheckCategorys; none of a run without checks.
+  /// Where each category stands at `row`, in the order of kCheckCategories; none of a run without checks.
   [[nodiscard]] std::vector<CategoryStatus> ListCategories(long row) const;
 
  private:

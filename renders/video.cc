@@ -211,21 +211,13 @@ class VideoPainter::RunPainter {
   }
 
   [[nodiscard]] OverlayState MakeState(long row) const {
-    const auto at = static_cast<size_t>(row);
-    OverlayState state;
-    state.title = run_.title;
-    if (!run_.phases.empty()) state.title += ": " + run_.phases[static_cast<size_t>(row)];
-    state.time = run_.times[at];
-    if (!run_.position_errors.empty()) state.position_error = run_.position_errors[at];
-    if (!run_.joint_errors.empty()) state.joint_error = run_.joint_errors[at];
-    if (!run_.orientation_errors.empty()) state.orientation_error = run_.orientation_errors[at];
+    OverlayState state = MakeOverlayState(run_, row, checks_.ListCategories(row));
+    if (apart_) state.rows.push_back({"objects apart", FormatSi(*apart_, "m")});
     state.history_span = kHistorySpan;
-    state.history = MakeHistory(at);
+    state.history = MakeHistory(static_cast<size_t>(row));
     state.error_low = error_range_[0];
     state.error_high = error_range_[1];
-    state.questions = checks_.ListCategories(row);
     state.legend = decorator_.MakeLegend();
-    state.apart = apart_;
     if (ghost_) {
       const bool same_title = ghost_->run.title == run_.title;
       state.legend.push_back({same_title ? "the other run" : ghost_->run.title, kGhostLine});

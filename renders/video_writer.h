@@ -1,9 +1,10 @@
 #pragma once
 
 #include <filesystem>
-#include <memory>
+#include <optional>
 #include <string>
 
+#include "renders/ffmpeg.h"
 #include "renders/image.h"
 
 namespace dexcheck {
@@ -35,21 +36,19 @@ class VideoWriter {
   /// @throws InputError "PATH: cannot be written: reason".
   /// @throws std::invalid_argument for sizes or rates that the format cannot take.
   VideoWriter(const std::filesystem::path& path, const EncodingOptions& options);
-  /// Removes what was written unless Finish was called.
-  ~VideoWriter();
-  VideoWriter(const VideoWriter&) = delete;
-  VideoWriter& operator=(const VideoWriter&) = delete;
 
   /// Appends a frame of the options' size. @throws InputError as the constructor.
   void Write(const Image& image);
   /// Completes the file. @throws InputError as the constructor, also when there was no frame.
   void Finish();
 
-  [[nodiscard]] long frames() const;
+  [[nodiscard]] long frames() const { return frames_; }
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  EncodingOptions options_;
+  PartialFile file_;
+  Ffmpeg ffmpeg_;
+  long frames_ = 0;
 };
 
 }  // namespace dexcheck

@@ -22,9 +22,9 @@ const char* NameOf(CheckCategory kind) {
     case CheckCategory::kLaw:
       return "law";
     case CheckCategory::kInverseDynamics:
-      return "balance";
+      return "inverse_dynamics";
     case CheckCategory::kForwardDynamics:
-      return "prediction";
+      return "forward_dynamics";
     case CheckCategory::kAssumption:
       return "assumption";
     case CheckCategory::kModel:

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <system_error>
 
 #include "controller/common/errors.h"
@@ -36,6 +37,14 @@ PartialFile::PartialFile(const std::filesystem::path& target) : path_(target), t
 }
 
 PartialFile::~PartialFile() { Abort(); }
+
+void PartialFile::Write(std::string_view bytes) const {
+  errno = 0;
+  std::ofstream stream(partial_, std::ios::binary);
+  stream << bytes;
+  stream.close();
+  if (!stream) Fail(std::strerror(errno));
+}
 
 void PartialFile::Commit() {
   if (std::rename(partial_.c_str(), target_.c_str()) != 0) Fail(std::strerror(errno));

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "harness/base/temporary_path.h"
 
@@ -21,6 +22,9 @@ class PartialFile {
 
   /// Where to write.
   [[nodiscard]] const std::filesystem::path& partial() const { return partial_; }
+
+  /// Puts these bytes into it, in the place of what was there. @throws InputError as the constructor.
+  void Write(std::string_view bytes) const;
 
   /// Gives the file its name. @throws InputError as the constructor.
   void Commit();

@@ -1,8 +1,5 @@
 #include "harness/base/temporary_path.h"
 
-#include <dirent.h>
-#include <fcntl.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -11,6 +8,7 @@
 #include <cerrno>
 #include <climits>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <string>
 
@@ -29,39 +27,20 @@ constexpr size_t kSlots = 128;
 std::array<Slot, kSlots> slots;
 std::atomic<pid_t> running_child = 0;
 
-/// Deeper folders stay: the handler must not use up the stack.
-constexpr int kMaxDepth = 40;
-/// Passes over a folder, for file systems that skip entries when others are removed meanwhile.
-constexpr int kPasses = 8;
-
-void Remove(int folder, const char* name, int depth);
-
-/// Removes what an open folder holds.
-void RemoveEntries(int folder, int depth) {
-  alignas(dirent64) std::array<char, 2048> entries;
-  for (;;) {
-    const long count = ::syscall(SYS_getdents64, folder, entries.data(), entries.size());
-    if (count <= 0) return;
-    for (long at = 0; at < count;) {
-      const auto* const entry = reinterpret_cast<const dirent64*>(entries.data() + at);
-      at += entry->d_reclen;
-      const bool is_link_to_folder =
-          std::strcmp(entry->d_name, ".") == 0 || std::strcmp(entry->d_name, "..") == 0;
-      if (!is_link_to_folder) Remove(folder, entry->d_name, depth);
-    }
+void WaitFor(pid_t child) {
+  while (::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
   }
 }
 
-void Remove(int folder, const char* name, int depth) {
-  if (::unlinkat(folder, name, 0) == 0 || (errno != EISDIR && errno != EPERM) || depth >= kMaxDepth) return;
-  const int inner = ::openat(folder, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-  if (inner < 0) return;
-  for (int pass = 0; pass < kPasses; ++pass) {
-    RemoveEntries(inner, depth + 1);
-    if (::unlinkat(folder, name, AT_REMOVEDIR) == 0) break;
-    ::lseek(inner, 0, SEEK_SET);
+/// A file, or a folder with all that is in it. In a handler no memory may be taken: a folder is left to rm.
+void Remove(const char* path) {
+  if (::unlink(path) == 0 || (errno != EISDIR && errno != EPERM)) return;
+  const pid_t child = ::vfork();
+  if (child == 0) {
+    ::execl("/bin/rm", "rm", "-rf", "--", path, static_cast<char*>(nullptr));
+    ::_exit(EXIT_FAILURE);
   }
-  ::close(inner);
+  if (child > 0) WaitFor(child);
 }
 
 }  // namespace
@@ -89,13 +68,10 @@ TemporaryChild::TemporaryChild(pid_t child) { running_child = child; }
 TemporaryChild::~TemporaryChild() { running_child = 0; }
 
 void RemoveTemporaryPaths() {
-  if (const pid_t child = running_child; child > 0 && ::kill(child, SIGKILL) == 0) {
-    while (::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
-    }
-  }
+  if (const pid_t child = running_child; child > 0 && ::kill(child, SIGKILL) == 0) WaitFor(child);
   const pid_t self = ::getpid();
   for (const Slot& slot : slots) {
-    if (slot.owner == self) Remove(AT_FDCWD, slot.path.data(), 0);
+    if (slot.owner == self) Remove(slot.path.data());
   }
 }
 

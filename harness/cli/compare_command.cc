@@ -16,6 +16,7 @@
 #include "harness/cli/terminal.h"
 #include "harness/report/comparison_page.h"
 #include "harness/report/html.h"
+#include "harness/report/recorded_frames.h"
 #include "renders/video_writer.h"
 
 namespace dexcheck::cli {
@@ -37,15 +38,11 @@ struct CompareRequest {
 
 std::string Show(const std::optional<double>& value) { return value ? FormatShort(*value) : "-"; }
 
-bool FailsAnywhere(const ComparedNumber& number) {
-  return std::find(number.fails.begin(), number.fails.end(), true) != number.fails.end();
-}
-
 void PrintNumbers(const std::vector<ComparedNumber>& numbers, bool all) {
   size_t width = 0;
   for (const ComparedNumber& number : numbers) width = std::max(width, number.name.size());
   for (const ComparedNumber& number : numbers) {
-    if (!all && !FailsAnywhere(number)) continue;
+    if (!all && !number.fails_anywhere()) continue;
     std::string line = fmt::format("  {:<{}}", number.name, width);
     for (size_t i = 0; i < number.values.size(); ++i)
       line += fmt::format("  {:>9}{}", Show(number.values[i]), number.fails[i] ? "!" : " ");
@@ -64,11 +61,10 @@ void PrintSignals(const RunComparison& comparison, bool all) {
   size_t printed = 0;
   for (const SignalDifference& signal : comparison.signals) {
     if (!all && (signal.difference == 0.0 || printed++ == kMostPrinted)) break;
-    const std::string name = signal.column.empty() ? signal.name : signal.name + "." + signal.column;
     const std::string line =
         fmt::format("  {} - A  {:<28} {:>9} {:<7} {:>9}  at {:.3f} s", static_cast<char>('A' + signal.run),
-                    name, FormatShort(signal.difference), signal.unit == "1" ? "" : signal.unit,
-                    FormatShort(signal.fraction()), signal.at_time);
+                    signal.NameColumn(), FormatShort(signal.difference),
+                    signal.unit == "1" ? "" : signal.unit, FormatShort(signal.fraction()), signal.at_time);
     fmt::print("{}\n", Wrap(line, 9));
   }
   if (!comparison.not_compared.empty())
@@ -88,7 +84,8 @@ void Print(const CompareRequest& request, const RunComparison& comparison) {
   }
   fmt::print("\nresults\n");
   PrintNumbers(comparison.results, true);
-  const auto failing = std::count_if(comparison.checks.begin(), comparison.checks.end(), FailsAnywhere);
+  const auto failing = std::count_if(comparison.checks.begin(), comparison.checks.end(),
+                                     std::mem_fn(&ComparedNumber::fails_anywhere));
   fmt::print("\nchecks: {} of {} are above their bounds (!)\n", failing, comparison.checks.size());
   PrintNumbers(comparison.checks, request.all);
   PrintSignals(comparison, request.all);
@@ -153,10 +150,16 @@ int Run(const CompareRequest& request) {
   if (!request.json.empty()) json.emplace(request.json);
   const RunComparison comparison = CompareRuns(pointers, request.options);
   const bool prints = !json || !json->is_stdout();
-  const bool is_recorded =
-      request.video.empty() || WriteComparisonVideo(request.run_folders[0], request.run_folders[1],
-                                                    request.video, request.quiet || !prints);
-  if (!is_recorded) return kFailure;
+  if (!request.video.empty()) {
+    VideoOptions options;
+    options.ghost = true;
+    options.workers = CountDrawers();
+    const RecordedFrames run = ReadRecordedFrames(pointers[0]->log());
+    const RecordedFrames other = ReadRecordedFrames(pointers[1]->log());
+    const bool is_whole = WriteVideo({{run.model.get(), &run.frames}, {other.model.get(), &other.frames}},
+                                     options, request.video, request.quiet || !prints);
+    if (!is_whole) return kFailure;
+  }
   if (prints && !request.quiet) Print(request, comparison);
   if (prints)
     fmt::print("{}{}\n", request.quiet ? "" : "\n",

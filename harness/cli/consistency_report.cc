@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "controller/common/text.h"
+#include "harness/base/check_summary.h"
 #include "harness/checks/tolerance.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
@@ -16,18 +17,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json ToJson(const CheckRecord& record, const RobotModel& model) {
+Json DescribeTerm(const CheckRecord& record, const RobotModel& model) {
   const int base = model.num_base_velocities();
-  Json json = {{"kind", NameOf(record.kind)},
-               {"max", record.worst},
-               {"bound", record.bound},
-               {"pass", !record.failed},
-               {"compared", record.comparisons},
-               {"where", Describe(record.where, model, base)},
-               {"sample", static_cast<long>(record.at)},
-               {"model", record.model_value},
-               {"engine", record.engine_value},
-               {"digits", CountDigits(record.worst)}};
+  Json json = ToJson(record, /*timed=*/false);
+  json["compared"] = record.comparisons;
+  json["where"] = Describe(record.where, model, base);
+  json["sample"] = static_cast<long>(record.at);
+  json["model"] = record.model_value;
+  json["engine"] = record.engine_value;
+  json["digits"] = CountDigits(record.worst);
   if (record.failed) json["first_failure"] = Describe(record.first_failure, model, base);
   return json;
 }
@@ -163,8 +161,8 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
   if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
   json["checks"] = Json::object();
   for (const CheckRecord& record : result.constants.records)
-    json["checks"][record.name] = ToJson(record, model);
-  for (const CheckRecord& record : result.terms) json["checks"][record.name] = ToJson(record, model);
+    json["checks"][record.name] = DescribeTerm(record, model);
+  for (const CheckRecord& record : result.terms) json["checks"][record.name] = DescribeTerm(record, model);
   json["findings"] = Json::array();
   for (const ConstantFinding& finding : result.constants.findings) {
     json["findings"].push_back({{"check", finding.check},

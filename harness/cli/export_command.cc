@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <fnmatch.h>
 
 #include <algorithm>
 #include <cmath>
@@ -32,31 +31,13 @@ struct ExportRequest {
   std::vector<std::string> patterns;
   long every = 1;
   bool list = false;
+  std::string json_file;
 };
 
-bool Matches(const std::string& pattern, const SignalInfo& signal) {
-  return ::fnmatch(pattern.c_str(), signal.name.c_str(), 0) == 0;
-}
-
-/// The signals that match, in the log's order; all of them without patterns. Time is always among them.
-std::vector<SignalInfo> ChooseSignals(const LogReader& log, const ExportRequest& request) {
-  std::vector<std::string> names;
-  for (const SignalInfo& signal : log.signals()) names.push_back(signal.name);
-  for (const std::string& pattern : request.patterns) {
-    const auto matches = [&](const SignalInfo& signal) { return Matches(pattern, signal); };
-    if (std::any_of(log.signals().begin(), log.signals().end(), matches)) continue;
-    const std::string nearest = FindNearest(pattern, names);
-    throw InputError("--signals: no signal matches " + Quote(pattern) +
-                     (nearest.empty() ? " (see --list)" : ", did you mean " + Quote(nearest) + "?"));
-  }
-  std::vector<SignalInfo> chosen;
-  for (const SignalInfo& signal : log.signals()) {
-    const auto is_match = [&](const std::string& pattern) { return Matches(pattern, signal); };
-    if (chosen.empty() || request.patterns.empty() ||
-        std::any_of(request.patterns.begin(), request.patterns.end(), is_match)) {
-      chosen.push_back(signal);
-    }
-  }
+/// The signals that are wanted, time before all others.
+std::vector<SignalInfo> ListWanted(const LogReader& log, const ExportRequest& request) {
+  std::vector<SignalInfo> chosen = ChooseSignals(log, request.patterns);
+  if (chosen.front().name != log.signals().front().name) chosen.insert(chosen.begin(), log.signals().front());
   return chosen;
 }
 
@@ -196,14 +177,27 @@ void PrintList(const LogReader& log, const std::vector<SignalInfo>& signals) {
   }
 }
 
+nlohmann::ordered_json ToJson(const LogReader& log, const std::vector<SignalInfo>& signals) {
+  nlohmann::ordered_json json = {{"rows", log.rows()}, {"signals", nlohmann::ordered_json::array()}};
+  for (const SignalInfo& signal : signals) {
+    json["signals"].push_back({{"name", signal.name},
+                               {"width", signal.width},
+                               {"units", ListUnits(signal)},
+                               {"columns", signal.columns},
+                               {"description", signal.description}});
+  }
+  return json;
+}
+
 int Run(const ExportRequest& request) {
-  if (!request.list && request.csv_file.empty() && request.mcap_file.empty()) {
+  if (!request.list && request.csv_file.empty() && request.mcap_file.empty() && request.json_file.empty()) {
     throw InputError(
         "export: --csv FILE.csv or --list is required, or --mcap FILE.mcap (see dexcheck export --help)");
   }
   const LogReader log(request.run_folder / "log.h5");
-  const std::vector<SignalInfo> signals = ChooseSignals(log, request);
+  const std::vector<SignalInfo> signals = ListWanted(log, request);
   if (request.list) PrintList(log, signals);
+  if (!request.json_file.empty()) OutputFile(request.json_file).Write(ToJson(log, signals).dump(1) + "\n");
   if (!request.csv_file.empty()) WriteCsv(log, signals, request);
   if (!request.mcap_file.empty()) WriteMcap(log, signals, request);
   WarnOfCut(request.run_folder, log);
@@ -236,6 +230,7 @@ void AddExportCommand(Command app) {
   command.AddFlag("--list", &request->list, "Print the signals, their units and descriptions")
       .Excludes(csv)
       .Excludes(mcap);
+  AddJsonOption(command, "what --list prints", &request->json_file);
   command.SetAction([=] { return Run(*request); });
 }
 

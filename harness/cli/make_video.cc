@@ -70,15 +70,4 @@ bool WriteRunVideo(const std::filesystem::path& run_folder, const std::string& o
   return WriteVideo({{run.model.get(), &run.frames}}, options, out, quiet);
 }
 
-bool WriteComparisonVideo(const std::filesystem::path& run_folder, const std::filesystem::path& other_folder,
-                          const std::string& out, bool quiet) {
-  const RecordedFrames run = ReadRecordedFrames(run_folder);
-  const RecordedFrames other = ReadRecordedFrames(other_folder);
-  VideoOptions options;
-  options.ghost = true;
-  options.workers = CountDrawers();
-  return WriteVideo({{run.model.get(), &run.frames}, {other.model.get(), &other.frames}}, options, out,
-                    quiet);
-}
-
 }  // namespace dexcheck::cli

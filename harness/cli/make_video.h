@@ -23,8 +23,4 @@ bool WriteVideo(const std::vector<RunView>& views, const VideoOptions& options, 
 /// The video of one run as `dexcheck run --video` makes it: with contact forces.
 bool WriteRunVideo(const std::filesystem::path& run_folder, const std::string& out, bool quiet);
 
-/// The video of a comparison: both runs in one scene, the second one as a ghost.
-bool WriteComparisonVideo(const std::filesystem::path& run_folder, const std::filesystem::path& other_folder,
-                          const std::string& out, bool quiet);
-
 }  // namespace dexcheck::cli

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -15,6 +16,7 @@
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/make_video.h"
+#include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/report/recorded_frames.h"
 #include "renders/picture_file.h"
@@ -38,6 +40,7 @@ struct RenderRequest {
   double orbit = 0.0;  // degrees a second
   bool no_panel = false;
   bool quiet = false;
+  std::string json_file;
 };
 
 double Duration(const RunFrames& run) { return run.times.back() - run.times.front(); }
@@ -101,6 +104,7 @@ void CheckOutput(const RenderRequest& request, const std::string& out) {
 }
 
 ExitCode Run(RenderRequest request) {
+  request.quiet |= request.json_file == "-";
   ReadSize(request.size, &request.video.width, &request.video.height);
   std::string out = request.out;
   if (out.empty()) out = (request.run_folder / (request.still ? "still.png" : "video.mp4")).string();
@@ -118,6 +122,17 @@ ExitCode Run(RenderRequest request) {
   for (const RecordedFrames& run : runs) views.push_back({run.model.get(), &run.frames});
   if (!request.still && !WriteVideo(views, request.video, out, request.quiet)) return kFailure;
   if (request.still) WriteStill(request, views, out);
+  if (!request.json_file.empty()) {
+    nlohmann::ordered_json json = {
+        {"file", out}, {"width", request.video.width}, {"height", request.video.height}};
+    if (request.still) {
+      json["time_s"] = *request.still;
+    } else {
+      json["frames"] = CountFrames(views, request.video.fps);
+      json["frames_per_second"] = request.video.fps;
+    }
+    OutputFile(request.json_file).Write(json.dump(1) + "\n");
+  }
   if (!request.quiet) WarnOfCut(request.run_folder, LogReader(request.run_folder / "log.h5"));
   return kSuccess;
 }
@@ -180,6 +195,7 @@ void AddRenderCommand(Command app) {
   command.AddFlag("--frames", &request->video.frames, "Draw the object's axes");
   command.AddFlag("--no-panel", &request->no_panel, "Leave out the panel with time, errors and checks");
   command.AddFlag("--quiet", &request->quiet, "Print nothing");
+  AddJsonOption(command, "what was drawn", &request->json_file);
   command.SetAction([=] { return Run(*request); });
 }
 

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "harness/cli/commands.h"
@@ -16,11 +17,12 @@ struct ReportRequest {
   std::string out;
   bool no_replay = false;
   bool quiet = false;
+  std::string json_file;
 };
 
 /// Pictures alone.
-RunScene MakeStillScene(const std::filesystem::path& run_dir, const std::filesystem::path& folder) {
-  RunScene scene = MakeRunScene(run_dir, folder);
+RunScene MakeStillScene(const RunData& run, const std::filesystem::path& folder) {
+  RunScene scene = MakeRunScene(run, folder);
   scene.replay.reset();
   return scene;
 }
@@ -37,12 +39,18 @@ void AddReportCommand(Command app) {
       .TypeName("FILE.html");
   command.AddFlag("--no-replay", &request->no_replay, "Leave out the replay in three dimensions");
   command.AddFlag("--quiet", &request->quiet, "Print nothing");
+  AddJsonOption(command, "where page and figures are", &request->json_file);
   command.SetAction([=] {
     RequirePageName(request->out);
     ReportFiles files = MakeReportFiles(request->run_folder);
     if (!request->out.empty()) files = {request->out, {}};
     WriteRunReport(request->run_folder, files, request->no_replay ? MakeStillScene : MakeRunScene);
-    if (!request->quiet) fmt::print("{}\n", files.page.string());
+    if (!request->json_file.empty()) {
+      const nlohmann::ordered_json json = {{"page", files.page.string()},
+                                           {"figures", files.figures.string()}};
+      OutputFile(request->json_file).Write(json.dump(1) + "\n");
+    }
+    if (!request->quiet && request->json_file != "-") fmt::print("{}\n", files.page.string());
     return kSuccess;
   });
 }

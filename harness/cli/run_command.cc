@@ -185,8 +185,8 @@ int ReplayRun(const RunRequest& request) {
   if (!cut.empty()) {
     fmt::print("Not the whole run, {} steps, is compared: {}.\n", runner.loop().num_steps(), cut);
   }
-  for (const ReplacedSignal& old : difference.replaced)
-    fmt::print("Not compared: {}, in whose place are now {}.\n", old.name, old.by);
+  for (const OldName& old : difference.replaced)
+    fmt::print("Not compared: {}, in whose place are now {}.\n", old.old, old.now);
   if (difference.signal.empty()) {
     fmt::print("IDENTICAL: {} steps of {} signals, bit for bit.\n", difference.rows, difference.signals);
     return kSuccess;

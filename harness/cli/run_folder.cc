@@ -195,9 +195,11 @@ ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) co
   first.rows = log_.rows();
   long first_row = log_.rows();
   for (const SignalInfo& signal : log_.signals()) {
-    const auto replaced = std::find_if(kReplacedSignals.begin(), kReplacedSignals.end(),
-                                       [&](const ReplacedSignal& old) { return old.name == signal.name; });
-    if (replaced != kReplacedSignals.end()) {
+    const std::vector<OldName>& names = ListOldNames();
+    const auto replaced = std::find_if(names.begin(), names.end(), [&](const OldName& name) {
+      return name.of == OldName::Of::kReplaced && name.old == signal.name;
+    });
+    if (replaced != names.end()) {
       first.replaced.push_back(*replaced);
       continue;
     }

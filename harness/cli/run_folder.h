@@ -57,8 +57,8 @@ struct ReplayDifference {
   double recorded = 0.0;
   double now = 0.0;
   long rows = 0;
-  size_t signals = 0;                    ///< Compared.
-  std::vector<ReplacedSignal> replaced;  ///< Of the log; not compared.
+  size_t signals = 0;             ///< Compared.
+  std::vector<OldName> replaced;  ///< Of the log; not compared.
 };
 
 /// A line on standard error when the log does not hold a whole run.

@@ -4,77 +4,73 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
 #include <vector>
 
+#include "harness/base/check_summary.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/terminal.h"
-#include "renders/category_status.h"
 
 namespace dexcheck::cli {
 namespace {
 
+constexpr const char* kAllHolds =
+    "model, law, inverse and forward dynamics, and assumptions hold at every step";
+
 std::string Tell(bool failed) { return failed ? Paint(Tone::kBad, "FAILS") : Paint(Tone::kGood, "ok"); }
 
-void PrintRow(CheckCategory kind, const std::string& what, const CheckRecord& check) {
-  fmt::print("  {:<12}{:<34}{:>9.2e}{:>9.1e}  {:<4} {}\n", NameOf(kind), what, check.worst, check.bound,
-             check.unit == "1" ? "" : check.unit, Tell(check.failed));
+/// @param count of the checks that the row stands for; empty for one. @param tell "ok", or what is wrong.
+void PrintRow(CheckCategory kind, const std::string& count, const std::string& check, double worst,
+              double bound, const std::string& unit, const std::string& tell) {
+  fmt::print("  {:<17}{:>3} {:<28}{:>8.1e}{:>8.0e}  {:<4} {}\n", NameOf(kind), count, check, worst, bound,
+             unit == "1" ? "" : unit, tell);
 }
 
 void PrintCheck(const CheckRecord& check) {
   if (!check.applies) return;
-  PrintRow(check.kind,
-           check.failed ? fmt::format("{} from {:.3f} s", check.name, check.failed_at) : check.name, check);
+  PrintRow(check.kind, "", check.name, check.worst, check.bound, check.unit, Tell(check.failed));
+  if (check.failed) fmt::print("{:22}from {:.3f} s\n", "", check.failed_at);
 }
 
-/// How near a check came to its bound.
-double CalcFraction(const CheckRecord& check) {
-  if (check.bound > 0.0) return check.worst / check.bound;
-  return check.worst > 0.0 ? std::numeric_limits<double>::infinity() : 0.0;
-}
-
-/// One line for what passes of a question, with the check that came nearest to its bound, and each that
+/// One line for what passes of a category, with the check that came nearest to its bound, and each that
 /// fails.
 void PrintCategory(CheckCategory kind, const ClosedLoop& loop) {
-  const CheckRecord* nearest = nullptr;
-  long passed = 0;
-  const auto visit = [&](const auto& work) {
-    for (const std::span<const CheckRecord> records :
-         {loop.checks().model_checks(), std::span<const CheckRecord>(loop.checks().motion_checks())}) {
-      for (const CheckRecord& check : records) {
-        if (check.kind == kind && check.applies) work(check);
+  CategoryStatus passing{kind};
+  std::vector<const CheckRecord*> failing;
+  std::string unit;
+  for (const std::span<const CheckRecord> records :
+       {loop.checks().model_checks(), std::span<const CheckRecord>(loop.checks().motion_checks())}) {
+    for (const CheckRecord& check : records) {
+      if (check.kind != kind || !check.applies) continue;
+      if (check.failed) {
+        failing.push_back(&check);
+        continue;
       }
+      passing.Add(check.name, check.worst, check.bound, false);
+      if (passing.check == check.name) unit = check.unit;
     }
-  };
-  visit([&](const CheckRecord& check) {
-    if (check.failed) return;
-    ++passed;
-    if (nearest == nullptr || CalcFraction(check) > CalcFraction(*nearest)) nearest = &check;
-  });
-  if (nearest != nullptr) {
-    const std::string what =
-        passed == 1 ? nearest->name : fmt::format("{} checks: {}", passed, nearest->name);
-    PrintRow(kind, what, *nearest);
   }
-  visit([&](const CheckRecord& check) {
-    if (check.failed) PrintCheck(check);
-  });
+  if (passing.is_asked()) {
+    const std::string count = passing.checks == 1 ? "" : std::to_string(passing.checks);
+    PrintRow(kind, count, passing.check, passing.worst, passing.bound, unit, Tell(false));
+  }
+  for (const CheckRecord* check : failing) PrintCheck(*check);
 }
 
 void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
-  fmt::print("\n  {:<12}{:<34}{:>9}{:>9}\n", "question",
-             detail == Detail::kAll ? "check" : "nearest to its bound", "worst", "bound");
+  fmt::print("\n  {:<17}    {:<28}{:>8}{:>8}\n", "category",
+             detail == Detail::kAll ? "check" : "checks, nearest to its bound", "worst", "bound");
   const auto& constants = setup.constants().records;
   const auto differs =
       std::count_if(constants.begin(), constants.end(), [](const CheckRecord& r) { return r.failed; });
-  fmt::print("  {:<12}{:<34}{:>9}{:>9}       {}\n", "model", "constants", differs, 0, Tell(differs > 0));
+  fmt::print("  {:<17}{:>3} {:<28}{:>8}{:>8}       {}\n", "model", constants.size(), "constants", differs, 0,
+             Tell(differs > 0));
   if (detail == Detail::kAll) {
     for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check);
     for (const CheckRecord& check : loop.checks().motion_checks()) PrintCheck(check);
   } else {
-    for (const CheckCategory kind : kCheckCategorys) {
+    for (const CheckCategory kind : kCheckCategories) {
       PrintCategory(kind, loop);
     }
     fmt::print("  (--all lists each check)\n");
@@ -108,7 +104,7 @@ void PrintTracking(const Scenario& scenario, const TrackingStatistics& tracking)
              tracking.position_max(), tracking.position_rms(), tracking.orientation_max());
 }
 
-/// Which bodies came nearest to each other that are not meant to touch.
+/// Which bodies came nearest to each other that must not touch.
 void PrintClearance(const Clearance& clearance) {
   const Clearance::Nearest* nearest = nullptr;
   for (int i = 0; i < kPairClassCount; ++i) {
@@ -164,12 +160,11 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
   switch (result.verdict) {
     case Verdict::kPass:
       fmt::print("{}: {}\n", Paint(Tone::kGood, "PASS"),
-                 loop.is_checking()
-                     ? scenario.imperfections.is_ideal()
-                           ? "model, law, balance, prediction and assumptions hold at every step."
-                           : "model, law, balance, prediction and assumptions hold at every step, with "
-                             "what the scenario asks of the plant counted in."
-                     : "the run completed; nothing was checked.");
+                 loop.is_checking() ? std::string(kAllHolds) +
+                                          (scenario.imperfections.is_ideal()
+                                               ? "."
+                                               : ",\nwith what the scenario asks of the plant counted in.")
+                                    : "the run completed; nothing was checked.");
       return;
     case Verdict::kFailed:
       if (WasClosed(result)) {

@@ -119,7 +119,7 @@ int ViewScenario(const ViewRequest& request) {
   };
   CatchInterrupts();
   const std::unique_ptr<LiveRun> run = ViewLive(make, "dexcheck " + request.what, request.viewer, save);
-  if (!folder || !run->was_pulled()) {
+  if (!folder || !run->was_disturbed()) {
     return Conclude(run->setup(), run->runner(), folder ? folder->path() : std::filesystem::path());
   }
   const Rerun again(request, run->ListOverrides(), folder->path(), run->rows());

@@ -60,21 +60,12 @@ class LogBuilder {
   LogLayout Build() {
     AddRootAttributes();
     AddTexts();
-    for (const EmbeddedFile& file : content_.files) AddFile(file);
-    std::vector<hdf5::Dataset> datasets;
-    for (const SignalInfo& signal : content_.signals) datasets.push_back(AddSignal(signal));
-    std::map<std::string, hdf5::Dataset> texts;
-    for (const auto& [name, reserved] : content_.reserved_texts) {
-      texts.emplace(name, AddReservedText(name, reserved));
-    }
-    // Last, so that the variable part lies together behind everything else.
     LogLayout layout;
-    for (const auto& [name, dataset] : texts) {
-      layout.reserved_texts[name] = WriteReservedText(dataset, content_.reserved_texts.at(name));
+    for (const EmbeddedFile& file : content_.files) AddFile(file);
+    for (const auto& [name, reserved] : content_.reserved_texts) {
+      layout.reserved_texts[name] = AddReservedText(name, reserved);
     }
-    for (const hdf5::Dataset& dataset : datasets) layout.signals.push_back(TakePlace(dataset));
-    for (auto& [name, dataset] : texts) dataset.Close();
-    for (hdf5::Dataset& dataset : datasets) dataset.Close();
+    for (const SignalInfo& signal : content_.signals) layout.signals.push_back(AddSignal(signal));
     file_.Close();
     return layout;
   }
@@ -82,7 +73,6 @@ class LogBuilder {
  private:
   static hdf5::File CreateFile(const hdf5::Driver& driver, hdf5::MemoryImage* image) {
     const hdf5::Properties creation(H5Pcreate(H5P_FILE_CREATE));
-    Check(H5Pset_userblock(creation.id(), kSealSize));
     Check(H5Pset_obj_track_times(creation.id(), false));
     const hdf5::Properties access(H5Pcreate(H5P_FILE_ACCESS));
     Check(H5Pset_libver_bounds(access.id(), H5F_LIBVER_EARLIEST, H5F_LIBVER_LATEST));
@@ -120,6 +110,7 @@ class LogBuilder {
   void AddRootAttributes() const {
     std::vector<std::string> names;
     for (const SignalInfo& signal : content_.signals) names.push_back(signal.name);
+    AddAttribute(file_.id(), kFormatAttribute, std::string(kLogFormat));
     AddAttribute(file_.id(), "signals", names);
   }
 
@@ -134,34 +125,27 @@ class LogBuilder {
     Check(H5Dwrite(dataset.id(), H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, file.bytes.data()));
   }
 
-  [[nodiscard]] hdf5::Dataset AddSignal(const SignalInfo& signal) const {
+  /// @return its offset.
+  [[nodiscard]] std::uint64_t AddSignal(const SignalInfo& signal) const {
     Extents extents = {rows_};
     if (signal.width != 1) extents.push_back(static_cast<hsize_t>(signal.width));
-    hdf5::Dataset dataset = AddDataset(signal.name, H5T_IEEE_F64LE, extents);
+    const hdf5::Dataset dataset = AddDataset(signal.name, H5T_IEEE_F64LE, extents);
     AddAttribute(dataset.id(), "unit", signal.unit);
     AddAttribute(dataset.id(), "description", signal.description);
     if (!signal.columns.empty()) AddAttribute(dataset.id(), "columns", signal.columns);
     for (const auto& [name, value] : signal.attributes) {
       AddAttribute(dataset.id(), name, H5T_IEEE_F64LE, {}, &value);
     }
-    return dataset;
+    return TakePlace(dataset);
   }
 
-  static hdf5::Datatype MakeReservedType(const ReservedText& reserved) {
-    hdf5::Datatype type(H5Tcopy(H5T_C_S1));
+  /// @return its offset.
+  [[nodiscard]] std::uint64_t AddReservedText(const std::string& name, const ReservedText& reserved) const {
+    const std::string padded = Pad(reserved);
+    const hdf5::Datatype type(H5Tcopy(H5T_C_S1));
     Check(H5Tset_size(type.id(), reserved.capacity));
     Check(H5Tset_cset(type.id(), H5T_CSET_UTF8));
-    return type;
-  }
-
-  [[nodiscard]] hdf5::Dataset AddReservedText(const std::string& name, const ReservedText& reserved) const {
-    return AddDataset("meta/" + name, MakeReservedType(reserved).id(), {});
-  }
-
-  /// @return the text's offset.
-  static std::uint64_t WriteReservedText(const hdf5::Dataset& dataset, const ReservedText& reserved) {
-    const std::string padded = Pad(reserved);
-    const hdf5::Datatype type = MakeReservedType(reserved);
+    const hdf5::Dataset dataset = AddDataset("meta/" + name, type.id(), {});
     Check(H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()));
     return GetOffset(dataset);
   }
@@ -193,30 +177,6 @@ class LogBuilder {
   hdf5::Driver driver_;
   hdf5::File file_;
 };
-
-/// Begin and end of the variable part. @throws std::logic_error unless it lies together.
-std::pair<std::uint64_t, std::uint64_t> FindVariablePart(const LogContent& content, const LogLayout& layout,
-                                                         long rows) {
-  std::uint64_t begin = std::numeric_limits<std::uint64_t>::max();
-  std::uint64_t end = kSealSize;
-  std::uint64_t total = 0;
-  const auto add = [&](std::uint64_t offset, std::uint64_t size) {
-    if (size == 0) return;
-    begin = std::min(begin, offset);
-    end = std::max(end, offset + size);
-    total += size;
-  };
-  for (size_t i = 0; i < content.signals.size(); ++i) {
-    const auto width = static_cast<std::uint64_t>(content.signals[i].width);
-    add(layout.signals[i], sizeof(double) * static_cast<std::uint64_t>(rows) * width);
-  }
-  for (const auto& [name, reserved] : content.reserved_texts) {
-    add(layout.reserved_texts.at(name), reserved.capacity);
-  }
-  begin = std::min(begin, end);
-  if (end - begin != total) throw std::logic_error("HDF5 did not lay the log's variable part together");
-  return {begin, end};
-}
 
 /// Writes the image to an empty file. @return 0, or the system's error number.
 int WriteImage(int descriptor, const hdf5::MemoryImage& image) {
@@ -287,19 +247,6 @@ int WriteAt(int descriptor, const void* bytes, size_t count, std::uint64_t offse
   return 0;
 }
 
-int ReadExactly(int descriptor, void* bytes, size_t count, std::uint64_t offset) {
-  size_t done = 0;
-  while (done < count) {
-    const ssize_t step = ::pread(descriptor, static_cast<char*>(bytes) + done, count - done,
-                                 static_cast<off_t>(offset + done));
-    if (step < 0 && errno == EINTR) continue;
-    if (step < 0) return errno;
-    if (step == 0) return EIO;
-    done += static_cast<size_t>(step);
-  }
-  return 0;
-}
-
 int CopyBytes(int from, std::uint64_t from_offset, int to, std::uint64_t to_offset, size_t count) {
   constexpr size_t kChunk = size_t{1} << 20;
   std::vector<char> chunk(std::min(kChunk, count));
@@ -325,12 +272,10 @@ LogLayout WriteLogFile(const std::filesystem::path& path, const std::string& nam
   } catch (const hdf5::Hdf5Error& error) {
     throw InputError(name + ": cannot be written: " + error.what());
   }
-  const auto [begin, end] = FindVariablePart(content, layout, rows);
-  FileDescriptor file(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  FileDescriptor file(::open(path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
   if (!file.is_open()) FailToWrite(name, errno);
   int error = WriteImage(file.get(), image);
   if (error == 0) error = MarkAllRowsUnwritten(file.get(), layout.signals.front(), rows);
-  if (error == 0) error = WriteSeal(file.get(), begin, end);
   if (error == 0) error = file.Close();
   if (error != 0) FailToWrite(name, error);
   return layout;

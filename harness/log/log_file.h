@@ -1,10 +1,8 @@
 #pragma once
 
-// The log as bytes in a file. A log is an HDF5 file behind a user block of 512 bytes, the seal: lines of text
-// that give the file's size, where its variable part lies (the rows' numbers and the reserved texts), and a
-// checksum of everything else. HDF5 writes everything else once and closes the file; after that only the
-// variable part is written, in place, so that a process that dies cannot leave a file that HDF5 does not
-// open.
+// The log as bytes in a file. HDF5 writes everything but the numbers and the late texts once and closes the
+// file; after that only these are written, in place, so that a process that dies cannot leave a file that
+// HDF5 does not open.
 
 #include <cstddef>
 #include <cstdint>
@@ -42,12 +40,12 @@ class FileDescriptor {
 /// Writes all bytes at the offset, or returns the system's error number; 0 is success.
 int WriteAt(int descriptor, const void* bytes, size_t count, std::uint64_t offset);
 
-/// Reads all bytes at the offset, or returns the system's error number; 0 is success, EIO a file that ends
-/// before.
-int ReadExactly(int descriptor, void* bytes, size_t count, std::uint64_t offset);
-
 /// Copies bytes between files, or returns the system's error number; 0 is success.
 int CopyBytes(int from, std::uint64_t from_offset, int to, std::uint64_t to_offset, size_t count);
+
+/// The root's attribute that says how a log is laid out and which names it uses; logs of format 1 have none.
+inline constexpr const char* kFormatAttribute = "format";
+inline constexpr const char* kLogFormat = "dexcheck log 2";
 
 /// Where lies what may be written after the file was made: offsets from the file's begin.
 struct LogLayout {
@@ -59,21 +57,10 @@ struct LogLayout {
 std::string Pad(const ReservedText& reserved);
 
 /// Writes a log with room for `rows` rows of each signal; times are NaN, which marks rows not written, other
-/// numbers zero. `path` must not exist.
+/// numbers zero. `path` must exist.
 /// @param name in messages.
 /// @throws InputError when the file cannot be written.
 LogLayout WriteLogFile(const std::filesystem::path& path, const std::string& name, const LogContent& content,
                        long rows);
-
-/// Size of the seal, and the HDF5 file's offset.
-inline constexpr std::uint64_t kSealSize = 512;
-
-/// Compares a file with its seal.
-/// @throws InputError that names the file and says what is wrong: not a log, cut short, or damaged.
-void CheckSeal(int descriptor, const std::filesystem::path& path);
-
-/// Writes the seal of a finished file whose variable part lies at [begin, end).
-/// @return 0, or the system's error number.
-int WriteSeal(int descriptor, std::uint64_t begin, std::uint64_t end);
 
 }  // namespace dexcheck

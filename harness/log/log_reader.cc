@@ -1,34 +1,262 @@
 #include "harness/log/log_reader.h"
 
-#include <fcntl.h>
+#include <fnmatch.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <bit>
 #include <cerrno>
 #include <cmath>
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <map>
+#include <stdexcept>
+#include <system_error>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/log/extract_file.h"
+#include "harness/base/child_process.h"
+#include "harness/log/hdf5_handle.h"
+#include "harness/log/log_file.h"
+#include "harness/log/old_names.h"
 
 namespace dexcheck {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "numbers are read as they lie in the file");
+using hdf5::Check;
 
-FileDescriptor Open(const std::filesystem::path& path) {
-  // Non-blocking, for the sake of pipes; it changes nothing for files.
-  FileDescriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
-  if (!file.is_open()) FailToRead(path, errno);
-  CheckSeal(file.get(), path);
-  return file;
+/// Where the texts lie that have a dataset of their own.
+constexpr std::string_view kTexts = "meta/";
+
+[[noreturn]] void RefusePart(const std::string& name, const char* problem) {
+  throw std::runtime_error(Quote(name) + " " + problem);
 }
 
-/// The part of that name, or null.
-const ByteRange* Find(const std::vector<StoredBytes>& parts, const std::string& name) {
-  const auto part = std::find_if(parts.begin(), parts.end(),
-                                 [&](const StoredBytes& stored) { return stored.first == name; });
-  return part == parts.end() ? nullptr : &part->second;
+/// The texts of an attribute, one or several.
+std::vector<std::string> ReadStrings(hid_t object, const std::string& name) {
+  const hdf5::Attribute attribute(H5Aopen(object, name.c_str(), H5P_DEFAULT));
+  const hdf5::Dataspace space(H5Aget_space(attribute.id()));
+  const auto count = static_cast<size_t>(Check(H5Sget_simple_extent_npoints(space.id())));
+  const hdf5::Datatype type = hdf5::MakeStringType();
+  std::vector<char*> values(count, nullptr);
+  Check(H5Aread(attribute.id(), type.id(), values.data()));
+  std::vector<std::string> texts;
+  for (const char* value : values) texts.emplace_back(value == nullptr ? "" : value);
+  Check(H5Dvlen_reclaim(type.id(), space.id(), H5P_DEFAULT, values.data()));
+  return texts;
+}
+
+std::string ReadString(hid_t object, const std::string& name) {
+  const std::vector<std::string> texts = ReadStrings(object, name);
+  return texts.empty() ? "" : texts.front();
+}
+
+std::vector<std::string> ListAttributes(hid_t object) {
+  const auto visit = [](hid_t /*object*/, const char* name, const H5A_info_t* /*info*/,
+                        void* out) noexcept -> herr_t {
+    static_cast<std::vector<std::string>*>(out)->emplace_back(name);
+    return 0;
+  };
+  std::vector<std::string> names;
+  Check(H5Aiterate2(object, H5_INDEX_NAME, H5_ITER_INC, nullptr, visit, &names));
+  return names;
+}
+
+/// All datasets, with their groups: "object/X_o".
+std::vector<std::string> ListDatasets(hid_t file) {
+  const auto visit = [](hid_t group, const char* name, const H5L_info_t* link, void* out) noexcept -> herr_t {
+    H5O_info_t object;
+    if (link->type != H5L_TYPE_HARD) return 0;
+    if (H5Oget_info_by_name2(group, name, &object, H5O_INFO_BASIC, H5P_DEFAULT) < 0) return -1;
+    if (object.type == H5O_TYPE_DATASET) static_cast<std::vector<std::string>*>(out)->emplace_back(name);
+    return 0;
+  };
+  std::vector<std::string> names;
+  Check(H5Lvisit(file, H5_INDEX_NAME, H5_ITER_INC, visit, &names));
+  return names;
+}
+
+struct Shape {
+  hdf5::Datatype type;
+  std::vector<hsize_t> extents;  // none of a single value
+};
+
+Shape GetShape(const hdf5::Dataset& dataset) {
+  const hdf5::Dataspace space(H5Dget_space(dataset.id()));
+  std::vector<hsize_t> extents(static_cast<size_t>(Check(H5Sget_simple_extent_ndims(space.id()))));
+  Check(H5Sget_simple_extent_dims(space.id(), extents.data(), nullptr));
+  return {hdf5::Datatype(H5Dget_type(dataset.id())), std::move(extents)};
+}
+
+hdf5::Dataset Open(hid_t file, const std::string& name) {
+  return hdf5::Dataset(H5Dopen2(file, name.c_str(), H5P_DEFAULT));
+}
+
+SignalInfo ReadInfo(const hdf5::Dataset& dataset, const std::string& name) {
+  const Shape shape = GetShape(dataset);
+  if (Check(H5Tequal(shape.type.id(), H5T_IEEE_F64LE)) == 0 || shape.extents.empty() ||
+      shape.extents.size() > 2) {
+    RefusePart(name, "is not rows of numbers");
+  }
+  SignalInfo info;
+  info.name = name;
+  if (shape.extents.size() == 2) info.width = static_cast<int>(shape.extents[1]);
+  for (const std::string& attribute : ListAttributes(dataset.id())) {
+    if (attribute == "unit") {
+      info.unit = ReadString(dataset.id(), attribute);
+    } else if (attribute == "description") {
+      info.description = ReadString(dataset.id(), attribute);
+    } else if (attribute == "columns") {
+      info.columns = ReadStrings(dataset.id(), attribute);
+    } else {
+      const hdf5::Attribute number(H5Aopen(dataset.id(), attribute.c_str(), H5P_DEFAULT));
+      const hdf5::Dataspace space(H5Aget_space(number.id()));
+      if (Check(H5Sget_simple_extent_npoints(space.id())) != 1) RefusePart(attribute, "is not one number");
+      Check(H5Aread(number.id(), H5T_NATIVE_DOUBLE, &info.attributes[attribute]));
+    }
+  }
+  if (!info.columns.empty() && info.columns.size() != static_cast<size_t>(info.width))
+    RefusePart(name, "has not as many columns as numbers");
+  return info;
+}
+
+RowMatrixXd ReadRows(hid_t file, const std::string& name, hsize_t rows, int width) {
+  const hdf5::Dataset dataset = Open(file, name);
+  const hdf5::Dataspace space(H5Dget_space(dataset.id()));
+  const hsize_t begin[2] = {0, 0};
+  const hsize_t counts[2] = {rows, static_cast<hsize_t>(width)};
+  RowMatrixXd values(static_cast<Eigen::Index>(rows), width);
+  if (values.size() == 0) return values;
+  Check(H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, begin, nullptr, counts, nullptr));
+  const hdf5::Dataspace memory(H5Screate_simple(2, counts, nullptr));
+  Check(H5Dread(dataset.id(), H5T_NATIVE_DOUBLE, memory.id(), space.id(), H5P_DEFAULT, values.data()));
+  return values;
+}
+
+/// @throws InputError of what is no file of HDF5's at all.
+void RequireHdf5(const std::filesystem::path& path) {
+  const auto fail = [&](const char* problem) { throw InputError(path.string() + ": " + problem); };
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) FailToRead(path, errno);
+  if (S_ISDIR(status.st_mode)) FailToRead(path, EISDIR);
+  if (!S_ISREG(status.st_mode)) fail("not a dexcheck log: not a regular file");
+  if (::access(path.c_str(), R_OK) != 0) FailToRead(path, errno);
+  if (status.st_size == 0) fail("not a dexcheck log: the file is empty");
+  if (H5Fis_hdf5(path.c_str()) <= 0) fail("not a dexcheck log");
+}
+
+}  // namespace
+
+/// What is read of the file at once. Throws any std::exception of what is damaged.
+class LogReader::File {
+ public:
+  explicit File(const std::filesystem::path& path) : file_(OpenFile(path)) {
+    if (H5Aexists(file_.id(), "signals") <= 0) throw std::runtime_error("it has no list of signals");
+    const bool has_format = H5Aexists(file_.id(), kFormatAttribute) > 0;
+    if (has_format && ReadString(file_.id(), kFormatAttribute) != kLogFormat)
+      throw std::runtime_error("written by another version of dexcheck");
+    is_old_ = !has_format;
+    for (const std::string& name : ReadStrings(file_.id(), "signals")) AddSignal(name);
+    if (signals_.empty()) throw std::runtime_error("it has no signals");
+    const hdf5::Group meta(H5Gopen2(file_.id(), "meta", H5P_DEFAULT));
+    for (const std::string& name : ListAttributes(meta.id())) texts_[name] = ReadString(meta.id(), name);
+    for (const std::string& name : ListDatasets(file_.id())) AddOther(name);
+    if (is_old_) RenameTexts();
+  }
+
+  [[nodiscard]] std::vector<SignalInfo> ListSignals() const {
+    std::vector<SignalInfo> signals = signals_;
+    for (SignalInfo& signal : signals) signal.name = RenameSignal(signal.name);
+    return signals;
+  }
+  [[nodiscard]] const std::map<std::string, std::string>& texts() const { return texts_; }
+  [[nodiscard]] const std::vector<std::string>& files() const { return files_; }
+
+  [[nodiscard]] long CountRows() const {
+    const RowMatrixXd times = ReadRows(file_.id(), signals_.front().name, room_, 1);
+    const auto is_unwritten = [](double value) { return std::isnan(value); };
+    return std::find_if(times.data(), times.data() + times.size(), is_unwritten) - times.data();
+  }
+
+  [[nodiscard]] RowMatrixXd ReadSignal(const SignalInfo& signal, size_t index, long rows) const {
+    return ReadRows(file_.id(), signals_[index].name, static_cast<hsize_t>(rows), signal.width);
+  }
+
+  [[nodiscard]] std::string ReadFile(const std::string& name) const {
+    const hdf5::Dataset dataset = Open(file_.id(), name);
+    std::string bytes(GetShape(dataset).extents.at(0), '\0');
+    Check(H5Dread(dataset.id(), H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()));
+    return is_old_ && name.ends_with(".toml") ? RenameKeys(bytes) : bytes;
+  }
+
+ private:
+  static hdf5::File OpenFile(const std::filesystem::path& path) {
+    const hdf5::Properties access(H5Pcreate(H5P_FILE_ACCESS));
+    Check(H5Pset_fclose_degree(access.id(), H5F_CLOSE_STRONG));
+    return hdf5::File(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id()));
+  }
+
+  void AddSignal(const std::string& name) {
+    const hdf5::Dataset dataset = Open(file_.id(), name);
+    signals_.push_back(ReadInfo(dataset, name));
+    const hsize_t rows = GetShape(dataset).extents[0];
+    if (signals_.size() == 1) room_ = rows;
+    if (rows != room_) RefusePart(name, "has other rows");
+  }
+
+  /// Of a dataset that is no signal: a text or a file.
+  void AddOther(const std::string& name) {
+    if (std::any_of(signals_.begin(), signals_.end(), [&](const SignalInfo& s) { return s.name == name; }))
+      return;
+    if (!IsPlainPath(name)) RefusePart(name, "is not a plain relative path");
+    const hdf5::Dataset dataset = Open(file_.id(), name);
+    const Shape shape = GetShape(dataset);
+    if (name.starts_with(kTexts)) {
+      const bool is_text = H5Tget_class(shape.type.id()) == H5T_STRING &&
+                           H5Tis_variable_str(shape.type.id()) == 0 && shape.extents.empty();
+      if (!is_text) RefusePart(name, "is not a text");
+      std::string text(H5Tget_size(shape.type.id()), '\0');
+      Check(H5Dread(dataset.id(), shape.type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()));
+      texts_[name.substr(kTexts.size())] = text.substr(0, text.find('\0'));
+    } else {
+      if (Check(H5Tequal(shape.type.id(), H5T_STD_U8LE)) == 0 || shape.extents.size() != 1)
+        RefusePart(name, "is not a file");
+      files_.push_back(name);
+    }
+  }
+
+  [[nodiscard]] std::string RenameSignal(const std::string& name) const {
+    return is_old_ ? dexcheck::RenameSignal(name) : name;
+  }
+
+  void RenameTexts() {
+    if (const auto summary = texts_.find("summary"); summary != texts_.end())
+      summary->second = RenameSummary(summary->second);
+    if (const auto overrides = texts_.find("overrides"); overrides != texts_.end())
+      overrides->second = RenameKeys(overrides->second);
+  }
+
+  hdf5::SilencedErrors silenced_;
+  hdf5::File file_;
+  bool is_old_ = false;              // format 1
+  hsize_t room_ = 0;                 // rows, written or not
+  std::vector<SignalInfo> signals_;  // by their names in the file
+  std::map<std::string, std::string> texts_;
+  std::vector<std::string> files_;
+};
+
+namespace {
+
+/// What `work` returns. @throws InputError that names the log for whatever it throws.
+template <typename Work>
+auto Guard(const std::filesystem::path& path, const Work& work) {
+  try {
+    return work();
+  } catch (const std::exception& error) {
+    throw InputError(path.string() + ": the log is damaged: " + Abbreviate(error.what()));
+  }
 }
 
 [[noreturn]] void FailToFind(const std::filesystem::path& path, const std::string& kind,
@@ -40,68 +268,65 @@ const ByteRange* Find(const std::vector<StoredBytes>& parts, const std::string& 
 
 }  // namespace
 
-LogReader::LogReader(const std::filesystem::path& path)
-    : path_(path), file_(Open(path)), structure_(ReadStructure(file_.get(), path)) {
-  for (const StoredSignal& signal : structure_.signals) signals_.push_back(signal.info);
-  CountRows();
+LogReader::LogReader(const std::filesystem::path& path) : path_(path) {
+  const hdf5::SilencedErrors silenced;
+  RequireHdf5(path);
+  ChildProcess trial("reading a log", [&](int /*channel*/) {
+    constexpr rlimit kLongest{10, 10};  // s
+    ::setrlimit(RLIMIT_CPU, &kLongest);
+    try {
+      (void)File(path).CountRows();
+    } catch (const std::exception&) {  // which this process finds, too
+    }
+    return true;
+  });
+  if (!trial.Wait().has_succeeded()) throw InputError(path.string() + ": the log is damaged");
+  Guard(path, [&] {
+    file_ = std::make_unique<File>(path);
+    signals_ = file_->ListSignals();
+    rows_ = file_->CountRows();
+  });
 }
 
-void LogReader::Read(std::uint64_t begin, size_t count, void* out) const {
-  if (const int error = ReadExactly(file_.get(), out, count, begin); error != 0) FailToRead(path_, error);
-}
+LogReader::~LogReader() = default;
 
-std::string LogReader::ReadRange(const ByteRange& range) const {
-  std::string bytes(range.size, '\0');
-  Read(range.begin, bytes.size(), bytes.data());
-  return bytes;
-}
-
-void LogReader::CountRows() {
-  const StoredSignal& time = structure_.signals.front();
-  std::vector<double> times(time.rows);
-  Read(time.bytes.begin, time.bytes.size, times.data());
-  const auto is_unwritten = [](double value) { return std::isnan(value); };
-  rows_ = static_cast<long>(std::find_if(times.begin(), times.end(), is_unwritten) - times.begin());
+const SignalInfo* LogReader::Find(const std::string& signal) const {
+  const auto found = std::find_if(signals_.begin(), signals_.end(),
+                                  [&](const SignalInfo& info) { return info.name == signal; });
+  return found == signals_.end() ? nullptr : &*found;
 }
 
 RowMatrixXd LogReader::ReadSignal(const std::string& name) const {
-  const auto is_wanted = [&](const StoredSignal& signal) { return signal.info.name == name; };
-  const auto signal = std::find_if(structure_.signals.begin(), structure_.signals.end(), is_wanted);
-  if (signal == structure_.signals.end()) {
+  const SignalInfo* const signal = Find(name);
+  if (signal == nullptr) {
     std::vector<std::string> known;
     for (const SignalInfo& other : signals_) known.push_back(other.name);
     FailToFind(path_, "signal", name, known);
   }
-  RowMatrixXd rows(rows_, signal->info.width);
-  Read(signal->bytes.begin, sizeof(double) * static_cast<size_t>(rows.size()), rows.data());
-  return rows;
+  const auto index = static_cast<size_t>(signal - signals_.data());
+  return Guard(path_, [&] { return file_->ReadSignal(*signal, index, rows_); });
 }
 
 std::vector<std::string> LogReader::ListTexts() const {
   std::vector<std::string> names;
-  for (const auto& [name, text] : structure_.texts) names.push_back(name);
-  for (const auto& [name, range] : structure_.reserved_texts) names.push_back(name);
-  std::sort(names.begin(), names.end());
+  for (const auto& [name, text] : file_->texts()) names.push_back(name);
   return names;
 }
 
 std::string LogReader::ReadText(const std::string& name) const {
-  if (const auto text = structure_.texts.find(name); text != structure_.texts.end()) return text->second;
-  const ByteRange* const range = Find(structure_.reserved_texts, name);
-  if (range == nullptr) FailToFind(path_, "text", name, ListTexts());
-  const std::string text = ReadRange(*range);
-  return text.substr(0, text.find('\0'));
+  if (!file_->texts().contains(name)) FailToFind(path_, "text", name, ListTexts());
+  return FindText(name);
 }
 
 std::string LogReader::FindText(const std::string& name) const {
-  const bool has = structure_.texts.count(name) != 0 || Find(structure_.reserved_texts, name) != nullptr;
-  return has ? ReadText(name) : "";
+  const auto found = file_->texts().find(name);
+  return found == file_->texts().end() ? "" : found->second;
 }
 
 std::vector<std::string> LogReader::ListFiles(const std::string& group) const {
   const std::string prefix = group + "/";
   std::vector<std::string> names;
-  for (const auto& [name, range] : structure_.files) {
+  for (const std::string& name : file_->files()) {
     if (name.starts_with(prefix)) names.push_back(name.substr(prefix.size()));
   }
   if (names.empty()) FailToFind(path_, "group of files", group, {});
@@ -111,13 +336,47 @@ std::vector<std::string> LogReader::ListFiles(const std::string& group) const {
 
 std::string LogReader::ReadFile(const std::string& group, const std::string& relative_name) const {
   const std::string name = group + "/" + relative_name;
-  const ByteRange* const range = Find(structure_.files, name);
-  if (range == nullptr) FailToFind(path_, "embedded file", name, {});
-  return ReadRange(*range);
+  const std::vector<std::string>& files = file_->files();
+  if (std::find(files.begin(), files.end(), name) == files.end())
+    FailToFind(path_, "embedded file", name, {});
+  return Guard(path_, [&] { return file_->ReadFile(name); });
 }
 
 void LogReader::ExtractFiles(const std::string& group, const std::filesystem::path& folder) const {
-  for (const std::string& name : ListFiles(group)) ExtractFile(folder, name, ReadFile(group, name));
+  for (const std::string& name : ListFiles(group)) {
+    const std::filesystem::path path = folder / name;
+    std::error_code error;
+    std::filesystem::create_directories(path.parent_path(), error);
+    if (error) FailToWrite(path.parent_path(), error.value());
+    if (std::filesystem::exists(path)) FailToWrite(path, EEXIST);
+    std::ofstream file(path, std::ios::binary);
+    file << ReadFile(group, name);
+    file.close();
+    if (!file) FailToWrite(path, errno);
+  }
+}
+
+std::vector<SignalInfo> ChooseSignals(const LogReader& log, const std::vector<std::string>& patterns) {
+  if (patterns.empty()) return log.signals();
+  std::vector<std::string> names;
+  for (const SignalInfo& signal : log.signals()) names.push_back(signal.name);
+  const auto matches = [](const std::string& pattern, const std::string& name) {
+    return ::fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
+  };
+  for (const std::string& pattern : patterns) {
+    if (std::any_of(names.begin(), names.end(), [&](const auto& name) { return matches(pattern, name); }))
+      continue;
+    const std::string nearest = FindNearest(pattern, names);
+    throw InputError("--signals: no signal matches " + Quote(pattern) +
+                     (nearest.empty() ? " (dexcheck export --list names them)"
+                                      : ", did you mean " + Quote(nearest) + "?"));
+  }
+  std::vector<SignalInfo> chosen;
+  for (const SignalInfo& signal : log.signals()) {
+    const auto is_wanted = [&](const std::string& pattern) { return matches(pattern, signal.name); };
+    if (std::any_of(patterns.begin(), patterns.end(), is_wanted)) chosen.push_back(signal);
+  }
+  return chosen;
 }
 
 }  // namespace dexcheck

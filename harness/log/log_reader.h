@@ -1,28 +1,31 @@
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "controller/common/types.h"
 #include "harness/log/log_content.h"
-#include "harness/log/log_file.h"
-#include "harness/log/log_structure.h"
 
 namespace dexcheck {
 
-/// Reads logs that LogWriter wrote, also unfinished ones: of a killed run, or of one that still goes on.
-/// Every member throws InputError, one line that names the file and says what is wrong.
+/// Reads logs that LogWriter wrote, also unfinished ones: of a killed run, or of one that still goes on. A
+/// log of format 1 is read as if it had today's names (old_names.h). Every member throws InputError, one line
+/// that names the file and says what is wrong.
 class LogReader {
  public:
-  /// Opens the log and compares everything but its numbers with the checksum.
+  /// Opens the log. A child process reads its structure first, since HDF5 1.10 crashes on some damaged files.
   explicit LogReader(const std::filesystem::path& path);
+  ~LogReader();
   LogReader(const LogReader&) = delete;
   LogReader& operator=(const LogReader&) = delete;
 
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   /// In the order in which they were added; the first is time.
   [[nodiscard]] const std::vector<SignalInfo>& signals() const { return signals_; }
+  /// Null when it was not recorded.
+  [[nodiscard]] const SignalInfo* Find(const std::string& signal) const;
   /// Rows written, as far as they were flushed when the log was opened.
   [[nodiscard]] long rows() const { return rows_; }
 
@@ -40,19 +43,20 @@ class LogReader {
   [[nodiscard]] std::string ReadFile(const std::string& group, const std::string& relative_name) const;
 
   /// Writes the files of a group into a folder, which it makes when it is not there. What it cannot write is
-  /// an error, and so is a file that is already there; links in that folder are not followed.
+  /// an error, and so is a file that is already there.
   void ExtractFiles(const std::string& group, const std::filesystem::path& folder) const;
 
  private:
-  void CountRows();
-  void Read(std::uint64_t begin, size_t count, void* out) const;
-  [[nodiscard]] std::string ReadRange(const ByteRange& range) const;
+  class File;
 
   std::filesystem::path path_;
-  FileDescriptor file_;
-  LogStructure structure_;
+  std::unique_ptr<File> file_;
   std::vector<SignalInfo> signals_;
   long rows_ = 0;
 };
+
+/// The signals whose names match one of these patterns, as fnmatch has them, in the log's order; all of them
+/// without patterns. @throws InputError "--signals: no signal matches ..." of a pattern that matches none.
+std::vector<SignalInfo> ChooseSignals(const LogReader& log, const std::vector<std::string>& patterns);
 
 }  // namespace dexcheck

@@ -7,14 +7,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <stdexcept>
 #include <system_error>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/base/temporary_path.h"
+#include "harness/base/partial_file.h"
 
 namespace dexcheck {
 namespace {
@@ -54,22 +53,6 @@ void RequireUsable(const SignalInfo& signal) {
   }
 }
 
-/// Renames without replacing. @return 0, or the system's error number.
-int Publish(const std::filesystem::path& from, const std::filesystem::path& to) {
-  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
-  if (errno != EINVAL && errno != ENOSYS) return errno;
-  // A file system that has no such call.
-  if (::access(to.c_str(), F_OK) == 0) return EEXIST;
-  return std::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
-}
-
-/// Removes a file on leaving the scope, unless it has been moved away.
-struct Remover {
-  const std::filesystem::path& path;
-  const TemporaryPath protection{path};  // against signals
-  ~Remover() { ::unlink(path.c_str()); }
-};
-
 }  // namespace
 
 LogWriter::LogWriter(const std::filesystem::path& path, long max_rows, long rows_per_flush)
@@ -80,15 +63,9 @@ LogWriter::LogWriter(const std::filesystem::path& path, long max_rows, long rows
   std::error_code error;
   path_ = std::filesystem::absolute(path, error);
   if (error) Fail(error.value());
-  partial_ = path_.string() + ".partial-" + std::to_string(::getpid());
   // A bad path is known before long work starts.
-  struct stat status {};
-  if (::lstat(path_.c_str(), &status) == 0) Fail(EEXIST);
-  if (errno != ENOENT) Fail(errno);
-  ::unlink(partial_.c_str());
-  const Remover remover{partial_};
-  const FileDescriptor trial(::open(partial_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-  if (!trial.is_open()) Fail(errno);
+  RequireNoFile();
+  const PartialFile trial(path);
   content_.signals.push_back({"time", "s", "Simulated time", 1, {}, {}});
 }
 
@@ -101,7 +78,19 @@ LogWriter::~LogWriter() {
   }
 }
 
+void LogWriter::RequireNoFile() const {
+  struct stat status {};
+  if (::lstat(path_.c_str(), &status) == 0) Fail(EEXIST);
+  if (errno != ENOENT) Fail(errno);
+}
+
 void LogWriter::Fail(int error) const { FailToWrite(name_, error); }
+
+FileDescriptor LogWriter::Open(const PartialFile& partial) const {
+  FileDescriptor file(::open(partial.partial().c_str(), O_RDWR | O_CLOEXEC));
+  if (!file.is_open()) Fail(errno);
+  return file;
+}
 
 void LogWriter::RequireState(bool condition, const char* call) const {
   if (condition) return;
@@ -193,11 +182,11 @@ void LogWriter::StartRows() {
     buffers_.push_back({begin, width});
     begin += width * rows_per_flush_;
   }
-  const Remover remover{partial_};
-  layout_ = WriteLogFile(partial_, name_, content_, max_rows_);
-  file_ = FileDescriptor(::open(partial_.c_str(), O_RDWR | O_CLOEXEC));
-  if (!file_.is_open()) Fail(errno);
-  if (const int error = Publish(partial_, path_); error != 0) Fail(error);
+  PartialFile partial(path_);
+  layout_ = WriteLogFile(partial.partial(), name_, content_, max_rows_);
+  file_ = Open(partial);
+  RequireNoFile();
+  partial.Commit();
   changed_ = false;
   state_ = State::kRecording;
 }
@@ -259,11 +248,9 @@ void LogWriter::Close() {
 
 /// Builds the final file beside the present one, and replaces it at once.
 void LogWriter::Rewrite() {
-  ::unlink(partial_.c_str());
-  const Remover remover{partial_};
-  const LogLayout layout = WriteLogFile(partial_, name_, content_, flushed_rows_);
-  FileDescriptor file(::open(partial_.c_str(), O_RDWR | O_CLOEXEC));
-  if (!file.is_open()) Fail(errno);
+  PartialFile partial(path_);
+  const LogLayout layout = WriteLogFile(partial.partial(), name_, content_, flushed_rows_);
+  FileDescriptor file = Open(partial);
   for (size_t k = 0; k < buffers_.size(); ++k) {
     const size_t size = buffers_[k].width * sizeof(double) * static_cast<size_t>(flushed_rows_);
     const int error = CopyBytes(file_.get(), layout_.signals[k], file.get(), layout.signals[k], size);
@@ -277,7 +264,7 @@ void LogWriter::Rewrite() {
   if (ours.st_dev != there.st_dev || ours.st_ino != there.st_ino) {
     throw InputError(name_ + ": cannot be written: another file has taken its place");
   }
-  if (std::rename(partial_.c_str(), path_.c_str()) != 0) Fail(errno);
+  partial.Commit();
 }
 
 }  // namespace dexcheck

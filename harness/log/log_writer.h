@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/base/partial_file.h"
 #include "harness/log/log_content.h"
 #include "harness/log/log_file.h"
 
@@ -85,6 +86,8 @@ class LogWriter {
   };
 
   void RequireState(bool condition, const char* call) const;
+  void RequireNoFile() const;
+  [[nodiscard]] FileDescriptor Open(const PartialFile& partial) const;
   void RequireFree(const std::string& name) const;
   void WriteBufferedRows();
   void WriteReservedText(const std::string& name, const ReservedText& reserved);
@@ -92,9 +95,8 @@ class LogWriter {
   void Rewrite();
   [[noreturn]] void Fail(int error) const;
 
-  std::string name_;               // as given, for messages
-  std::filesystem::path path_;     // absolute
-  std::filesystem::path partial_;  // beside it
+  std::string name_;            // as given, for messages
+  std::filesystem::path path_;  // absolute
   long max_rows_;
   size_t rows_per_flush_;
   State state_ = State::kDescribing;

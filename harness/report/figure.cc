@@ -115,8 +115,9 @@ void WriteScript(const Figure& figure, const VectorXd& time, const Thinning& thi
             << QuoteText(figure.right_label) << "\n";
   }
   const std::string plot = PlotCurves(figure);
-  *script << fmt::format("set terminal svg size {},{} font 'Helvetica,12' enhanced\nset output '{}.svg'\n",
-                         kWidth, height, figure.name)
+  *script << fmt::format(
+                 "set terminal pdfcairo size {}pt,{}pt font 'DejaVu Sans,9' enhanced\nset output '{}.pdf'\n",
+                 kWidth, height, figure.name)
           << plot
           << fmt::format(
                  "set terminal pngcairo size {},{} fontscale 2 linewidth 2 dashlength 2 font "
@@ -192,7 +193,7 @@ void DrawFigures(const std::vector<Figure>& figures, const VectorXd& time,
   if (!script) throw InputError(path.string() + ": cannot be written: " + std::strerror(errno));
   RunGnuplot(folder);
   for (const Figure& figure : figures) {
-    for (const char* extension : {".svg", ".png"}) {
+    for (const char* extension : {".pdf", ".png"}) {
       const std::filesystem::path picture = folder / (figure.name + extension);
       std::error_code error;
       if (std::filesystem::file_size(picture, error) == 0 || error) {

@@ -33,24 +33,24 @@ std::vector<int> FindDashes(int dash);
 
 /// A plot of curves over time.
 struct Figure {
-  std::string name;   ///< Of its files: "fig12a".
-  std::string panel;  ///< Number in the paper, "12 (a)"; empty for figures that it lacks.
+  std::string name;        ///< Of its files: "fig12a".
+  std::string panel = {};  ///< Number in the paper, "12 (a)"; empty for figures that it lacks.
   std::string title;
-  std::string label;            ///< Of the axis: "position (m)".
-  std::string right_label;      ///< Empty when no curve uses the right axis.
-  bool log = false;             ///< Values up to 0 are gaps.
-  double least_span = 0.0;      ///< Axes show at least this much, so that rounding errors don't fill them.
-  std::optional<double> bound;  ///< A dashed line at this value.
-  std::vector<Curve> curves;
-  std::string note;      ///< What the reader has to know; may be empty.
-  bool printed = false;  ///< Drawn as a picture, too.
+  std::string label = {};        ///< Of the axis: "position (m)".
+  std::string right_label = {};  ///< Empty when no curve uses the right axis.
+  bool log = false;              ///< Values up to 0 are gaps.
+  double least_span = 0.0;       ///< Axes show at least this much, so that rounding errors don't fill them.
+  std::optional<double> bound = {};  ///< A dashed line at this value.
+  std::vector<Curve> curves = {};
+  std::string note = {};  ///< What the reader has to know; may be empty.
+  bool printed = false;   ///< Drawn as a picture for print, too.
 };
 
 /// What an axis shows, from below to above. With two axes the curves of the left one are in the upper half
 /// and those of the right one in the lower half, so that none hides another by chance.
 std::array<double, 2> CalcAxisRange(const Figure& figure, bool right_axis);
 
-/// Draws figures as FOLDER/NAME.svg and FOLDER/NAME.png, with gnuplot.
+/// Draws figures as FOLDER/NAME.pdf and FOLDER/NAME.png, with gnuplot.
 /// @param time of the curves' values, s.
 /// @throws InputError when gnuplot cannot be run, or a file cannot be written.
 void DrawFigures(const std::vector<Figure>& figures, const VectorXd& time,

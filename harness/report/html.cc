@@ -7,19 +7,6 @@
 #include <utility>
 
 namespace dexcheck {
-namespace {
-
-/// Removes everything from `from` to the end of the `to` that follows, wherever it is found.
-void RemoveAll(const std::string& from, const std::string& to, std::string* text) {
-  for (size_t begin = text->find(from); begin != std::string::npos; begin = text->find(from, begin)) {
-    const size_t end = text->find(to, begin + from.size());
-    if (end == std::string::npos) return;
-    text->erase(begin, end + to.size() - begin);
-  }
-}
-
-}  // namespace
-
 Html Html::Text(std::string_view text) {
   std::string escaped;
   escaped.reserve(text.size());
@@ -92,19 +79,6 @@ std::string FormatFraction(double fraction) {
   // Two digits, but 99.7 % is not yet the whole bound, and 150 % is no power of ten.
   if (percent >= 99.5) return fmt::format("{:.{}f} %", percent, percent < 100.0 ? 1 : 0);
   return fmt::format("{:.2g} %", percent);
-}
-
-Html MakeInlineSvg(std::string svg, const std::string& title) {
-  svg.erase(0, svg.find("<svg"));
-  RemoveAll("<defs>", "</defs>", &svg);
-  RemoveAll("<title>", "</title>", &svg);
-  RemoveAll("<desc>", "</desc>", &svg);
-  RemoveAll(" id=\"", "\"", &svg);
-  RemoveAll(" xmlns:xlink=\"", "\"", &svg);
-  const size_t tag_end = svg.find('>');
-  if (tag_end == std::string::npos) return {};
-  svg.insert(tag_end, FormatHtml(" role=\"img\" aria-label=\"{}\"", title).markup());
-  return Html::Raw(std::move(svg));
 }
 
 }  // namespace dexcheck

@@ -87,7 +87,4 @@ std::string FormatShort(double value);
 /// "4.5 %", "0", "over 1000 x": a check's value as a fraction of its bound.
 std::string FormatFraction(double fraction);
 
-/// What gnuplot wrote as SVG, ready to stand in a page: without prolog, definitions and ids.
-Html MakeInlineSvg(std::string svg, const std::string& title);
-
 }  // namespace dexcheck

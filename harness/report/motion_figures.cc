@@ -20,8 +20,16 @@ constexpr double kSingularSine = 0.01;
 std::string NoteOnAngles(const VectorXd& beta) {
   if (beta.size() == 0 || beta.array().sin().abs().minCoeff() >= kSingularSine) return "";
   return "Where β is near 0 or π, only the sum or the difference of α and γ is an orientation: either may "
-         "jump while "
-         "the object is at rest.";
+         "jump while the object is at rest.";
+}
+
+/// The finger that a fingertip or finger joint belongs to: what stands before the underscore.
+std::string NameFinger(const std::string& part) { return part.substr(0, part.find('_')); }
+
+/// By name, as the paper's robot has them: "rf1_2".
+bool IsPapersFinger(const std::string& joint) {
+  return joint.size() > 3 && (joint[0] == 'r' || joint[0] == 'l') && joint[1] == 'f' &&
+         joint.find('_') != std::string::npos;
 }
 
 class MotionFigures {
@@ -41,120 +49,96 @@ class MotionFigures {
   }
 
  private:
-  /// The finger that a fingertip or finger joint belongs to: what stands before the underscore.
-  static std::string NameFinger(const std::string& part) { return part.substr(0, part.find('_')); }
+  [[nodiscard]] RowMatrixXd Read(const char* signal) const { return run_.log().ReadSignal(signal); }
+  [[nodiscard]] bool Has(const char* signal) const { return run_.Find(signal) != nullptr; }
+  [[nodiscard]] int WidthOf(const char* signal) const { return Has(signal) ? run_.Find(signal)->width : 0; }
+  [[nodiscard]] std::string NameColumn(const char* signal, int column) const {
+    return RunData::NameColumn(*run_.Find(signal), column);
+  }
 
   void Add(Figure figure) {
     if (!figure.curves.empty()) figures_.push_back(std::move(figure));
   }
 
   void AddObject() {
-    const SignalInfo* const actual = run_.Find("object/X_o");
-    const SignalInfo* const desired = run_.Find("object/X_d");
-    if (actual == nullptr || desired == nullptr || actual->width != 6 || desired->width != 6) return;
-    const RowMatrixXd X_o = run_.log().ReadSignal("object/X_o");
-    const RowMatrixXd X_d = run_.log().ReadSignal("object/X_d");
-    Figure a{"fig12a", "12 (a)", "Motion of the object along x", "x (m)", "", false, kLeastSpan, {}, {},
-             "",       true};
-    a.curves = {{"x actual", X_o.col(0), 0, 0, false}, {"x desired", X_d.col(0), 0, 0, false, true, true}};
-    Add(a);
-    Figure b{"fig12b",
-             "12 (b)",
-             "Motion of the object along y and z, and its orientation",
-             "position (m)",
-             "ZYZ angle (rad)",
-             false,
-             kLeastSpan,
-             {},
-             {},
-             "",
-             true};
+    if (WidthOf("object/X_o") != 6 || WidthOf("object/X_d") != 6) return;
+    const RowMatrixXd X_o = Read("object/X_o");
+    const RowMatrixXd X_d = Read("object/X_d");
+    Add({.name = "fig12a",
+         .panel = "12 (a)",
+         .title = "Motion of the object along x",
+         .label = "x (m)",
+         .least_span = kLeastSpan,
+         .curves = {{.label = "x actual", .values = X_o.col(0)},
+                    {.label = "x desired", .values = X_d.col(0), .wide = true}},
+         .printed = true});
+    Figure b{.name = "fig12b",
+             .panel = "12 (b)",
+             .title = "Motion of the object along y and z, and its orientation",
+             .label = "position (m)",
+             .right_label = "ZYZ angle (rad)",
+             .least_span = kLeastSpan,
+             .note = NoteOnAngles(X_o.col(4)),
+             .printed = true};
     const char* const names[] = {"x", "y", "z", "α", "β", "γ"};
-    for (int k = 1; k < 6; ++k) {
-      b.curves.push_back({std::string(names[k]) + (k < 3 ? " (m)" : " (rad)"), X_o.col(k), k - 1, 0, k >= 3});
+    for (const bool desired : {false, true}) {
+      for (int k = 1; k < 6; ++k) {
+        const std::string what = desired ? " desired" : k < 3 ? " (m)" : " (rad)";
+        b.curves.push_back({.label = names[k] + what,
+                            .values = (desired ? X_d : X_o).col(k),
+                            .color = k - 1,
+                            .right_axis = k >= 3,
+                            .wide = desired});
+      }
     }
-    for (int k = 1; k < 6; ++k) {
-      b.curves.push_back({std::string(names[k]) + " desired", X_d.col(k), k - 1, 0, k >= 3, true, true});
-    }
-    b.note = NoteOnAngles(X_o.col(4));
     Add(b);
   }
 
   /// Of a robot that holds nothing: where its joints are, should be, and how far they are from there.
   void AddJoints() {
-    const SignalInfo* const desired = run_.Find("joints/q_d");
-    const SignalInfo* const error = run_.Find("joints/error");
-    const SignalInfo* const actual = run_.Find("q");
-    if (desired == nullptr || error == nullptr || actual == nullptr) return;
-    if (desired->width > actual->width || error->width != desired->width) return;
-    const RowMatrixXd q = run_.log().ReadSignal("q").rightCols(desired->width);  // without the base's
-    const RowMatrixXd q_d = run_.log().ReadSignal("joints/q_d");
-    const RowMatrixXd e = run_.log().ReadSignal("joints/error");
-    Figure motion{"joints", "",  "Motion of the joints", "position (rad, m)", "", false, kLeastSpan, {}, {},
-                  "",       true};
-    Figure errors{
-        "joint_errors", "", "Errors of the joints", "error (rad, m)", "", true, 0.0, {}, {}, "", true};
-    for (int k = 0; k < desired->width; ++k) {
-      motion.curves.push_back({RunData::NameColumn(*desired, k), q.col(k), k, 0, false});
-      errors.curves.push_back({RunData::NameColumn(*desired, k), e.col(k).cwiseAbs(), k, 0, false});
+    const int count = WidthOf("joints/q_d");
+    if (count == 0 || count > WidthOf("q") || WidthOf("joints/error") != count) return;
+    const RowMatrixXd q = Read("q").rightCols(count);  // without the base's
+    const RowMatrixXd q_d = Read("joints/q_d");
+    const RowMatrixXd e = Read("joints/error");
+    Figure motion{.name = "joints",
+                  .title = "Motion of the joints",
+                  .label = "position (rad, m)",
+                  .least_span = kLeastSpan,
+                  .printed = true};
+    Figure errors{.name = "joint_errors",
+                  .title = "Errors of the joints",
+                  .label = "error (rad, m)",
+                  .log = true,
+                  .printed = true};
+    for (int k = 0; k < count; ++k) {
+      const std::string joint = NameColumn("joints/q_d", k);
+      motion.curves.push_back({.label = joint, .values = q.col(k), .color = k});
+      errors.curves.push_back({.label = joint, .values = e.col(k).cwiseAbs(), .color = k});
     }
-    for (int k = 0; k < desired->width; ++k) {
-      motion.curves.push_back(
-          {RunData::NameColumn(*desired, k) + " desired", q_d.col(k), k, 0, false, true, true});
+    for (int k = 0; k < count; ++k) {
+      motion.curves.push_back({.label = NameColumn("joints/q_d", k) + " desired",
+                               .values = q_d.col(k),
+                               .color = k,
+                               .wide = true});
     }
     Add(motion);
     Add(errors);
   }
 
   void AddPlatform() {
-    const SignalInfo* const q = run_.Find("q");
-    if (q == nullptr || q->columns.size() < 3 || q->columns[2] != "phi") return;
-    const RowMatrixXd values = run_.log().ReadSignal("q");
-    Figure c{"fig12c",
-             "12 (c)",
-             "Motion of the mobile platform",
-             "position (m)",
-             "heading (rad)",
-             false,
-             kLeastSpan,
-             {},
-             {},
-             "",
-             true};
-    c.curves = {{"x_c (m)", values.col(0), 0, 0, false},
-                {"y_c (m)", values.col(1), 1, 0, false},
-                {"φ (rad)", values.col(2), 2, 1, true}};
-    Add(c);
-  }
-
-  /// Torques of the joints whose names satisfy `belongs`; fingers by color, their joints by dashes.
-  void AddTorqueFigure(Figure figure, const std::function<bool(const std::string&)>& belongs) {
-    const SignalInfo* const tau = run_.Find("tau");
-    if (tau == nullptr) return;
-    const RowMatrixXd values = run_.log().ReadSignal("tau");
-    figure.label = "torque (N m)";
-    figure.least_span = 1e-3;
-    int color = 0;
-    int dash = 0;
-    std::string finger;
-    for (int k = 0; k < tau->width; ++k) {
-      const std::string joint = RunData::NameColumn(*tau, k);
-      if (!belongs(joint)) continue;
-      if (IsFinger(joint)) {
-        dash = NameFinger(joint) == finger ? dash + 1 : 0;
-        color = NameFinger(joint) == finger || finger.empty() ? color : color + 1;
-        finger = NameFinger(joint);
-      }
-      figure.curves.push_back({joint, values.col(k), color, dash, false});
-      if (!IsFinger(joint) && ++color % 8 == 0) ++dash;
-    }
-    Add(std::move(figure));
-  }
-
-  /// By name, as the paper's robot has them: "rf1_2".
-  static bool IsPapersFinger(const std::string& joint) {
-    return joint.size() > 3 && (joint[0] == 'r' || joint[0] == 'l') && joint[1] == 'f' &&
-           joint.find('_') != std::string::npos;
+    if (!Has("q") || run_.Find("q")->columns.size() < 3 || run_.Find("q")->columns[2] != "phi") return;
+    const RowMatrixXd q = Read("q");
+    Add({.name = "fig12c",
+         .panel = "12 (c)",
+         .title = "Motion of the mobile platform",
+         .label = "position (m)",
+         .right_label = "heading (rad)",
+         .least_span = kLeastSpan,
+         .curves = {{.label = "x_c (m)", .values = q.col(0)},
+                    {.label = "y_c (m)", .values = q.col(1), .color = 1},
+                    {.label = "φ (rad)", .values = q.col(2), .color = 2, .dash = 1, .right_axis = true}},
+         .printed = true});
   }
 
   /// Whether it is one of the fingers that hold the object. They are told apart by what stands before the
@@ -175,15 +159,34 @@ class MotionFigures {
     return IsPapersFinger(joint) || Grasps(joint);
   }
 
-  /// Whether the torques are those of the paper's robot, whose arms and trunk have figures of their own.
-  [[nodiscard]] bool IsPapersRobot() const {
-    const SignalInfo* const tau = run_.Find("tau");
-    return tau != nullptr && std::any_of(tau->columns.begin(), tau->columns.end(),
-                                         [](const std::string& name) { return name.starts_with("waist"); });
+  /// Torques of the joints whose names satisfy `belongs`; fingers by color, their joints by dashes.
+  void AddTorqueFigure(Figure figure, const std::function<bool(const std::string&)>& belongs) {
+    const RowMatrixXd values = Read("tau");
+    figure.label = "torque (N m)";
+    figure.least_span = 1e-3;
+    int color = 0;
+    int dash = 0;
+    std::string finger;
+    for (int k = 0; k < WidthOf("tau"); ++k) {
+      const std::string joint = NameColumn("tau", k);
+      if (!belongs(joint)) continue;
+      if (IsFinger(joint)) {
+        dash = NameFinger(joint) == finger ? dash + 1 : 0;
+        color = NameFinger(joint) == finger || finger.empty() ? color : color + 1;
+        finger = NameFinger(joint);
+      }
+      figure.curves.push_back({.label = joint, .values = values.col(k), .color = color, .dash = dash});
+      if (!IsFinger(joint) && ++color % 8 == 0) ++dash;
+    }
+    Add(std::move(figure));
   }
 
   void AddTorques() {
-    const bool is_papers = IsPapersRobot();
+    if (!Has("tau")) return;
+    // Arms and trunk of the paper's robot have figures of their own.
+    const std::vector<std::string>& joints = run_.Find("tau")->columns;
+    const bool is_papers = std::any_of(joints.begin(), joints.end(),
+                                       [](const std::string& name) { return name.starts_with("waist"); });
     const auto grasps = [&](const std::string& joint) { return Grasps(joint); };
     const auto idle = [&](const std::string& joint) { return IsFinger(joint) && !Grasps(joint); };
     const auto left = [&](const std::string& joint) { return is_papers && joint.starts_with("l_"); };
@@ -191,139 +194,115 @@ class MotionFigures {
       return is_papers &&
              (joint.starts_with("wheel") || joint.starts_with("waist") || joint.starts_with("r_"));
     };
-    Figure figure;
-    figure.printed = true;
-    const auto add = [&](const char* name, const char* panel, const char* title, const auto& belongs) {
-      figure.name = name;
-      figure.panel = panel;
-      figure.title = title;
-      AddTorqueFigure(figure, belongs);
+    const auto other = [&](const std::string& joint) {
+      return !grasps(joint) && !idle(joint) && !left(joint) && !trunk(joint);
     };
-    add("fig12d", "12 (d)", "Torques of the grasping fingers' joints", grasps);
-    add("fig12e", "12 (e)", "Torques of the left arm's joints", left);
-    add("fig12f", "12 (f)", "Torques of wheels, waist and right arm", trunk);
-    figure.printed = false;
-    add("idle_finger_torques", "", "Torques of the other fingers' joints", idle);
-    const bool are_all = run_.Find("contact/overlap") == nullptr && !is_papers;
-    figure.printed = are_all;
-    add("other_torques", "", are_all ? "Torques of the joints" : "Torques of other joints",
-        [&](const std::string& joint) {
-          return !grasps(joint) && !idle(joint) && !left(joint) && !trunk(joint);
-        });
-  }
-
-  /// How far contacts that the law follows by (40) are from where they are.
-  void AddContactDrift() {
-    Figure figure{"contact_drift",
-                  "",
-                  "Contacts followed by (40) against where they are",
-                  "points on object and fingertip (m)",
-                  "psi (rad)",
-                  true,
-                  0.0,
-                  {},
-                  {},
-                  "",
-                  false};
-    int dash = 0;
-    for (const auto& [name, what] : {std::pair{"contact/drift_object", " on the object"},
-                                     std::pair{"contact/drift_fingertip", " on the fingertip"},
-                                     std::pair{"contact/drift_psi", " psi"}}) {
-      const SignalInfo* const drift = run_.Find(name);
-      if (drift == nullptr) continue;
-      const RowMatrixXd values = run_.log().ReadSignal(name);
-      for (int k = 0; k < drift->width; ++k)
-        figure.curves.push_back(
-            {RunData::NameColumn(*drift, k) + what, values.col(k), k, dash, /*right_axis=*/dash == 2});
-      ++dash;
-    }
-    Add(std::move(figure));
+    const bool are_all = !Has("contact/overlap") && !is_papers;
+    AddTorqueFigure({.name = "fig12d",
+                     .panel = "12 (d)",
+                     .title = "Torques of the grasping fingers' joints",
+                     .printed = true},
+                    grasps);
+    AddTorqueFigure(
+        {.name = "fig12e", .panel = "12 (e)", .title = "Torques of the left arm's joints", .printed = true},
+        left);
+    AddTorqueFigure({.name = "fig12f",
+                     .panel = "12 (f)",
+                     .title = "Torques of wheels, waist and right arm",
+                     .printed = true},
+                    trunk);
+    AddTorqueFigure({.name = "idle_finger_torques", .title = "Torques of the other fingers' joints"}, idle);
+    AddTorqueFigure({.name = "other_torques",
+                     .title = are_all ? "Torques of the joints" : "Torques of other joints",
+                     .printed = are_all},
+                    other);
   }
 
   void AddForces() {
-    const SignalInfo* const f_c = run_.Find("contact/f_c");
-    if (f_c == nullptr || f_c->width % 3 != 0) return;
-    const auto mu = f_c->attributes.find("mu");
-    const RowMatrixXd forces = run_.log().ReadSignal("contact/f_c");
-    const SignalInfo* const commanded = run_.Find("law/f_c");
-    RowMatrixXd optimal;
-    if (commanded != nullptr && commanded->width == f_c->width) optimal = run_.log().ReadSignal("law/f_c");
-    for (int i = 0; i < f_c->width / 3; ++i) {
-      const std::string column = RunData::NameColumn(*f_c, 3 * i);
+    const int width = WidthOf("contact/f_c");
+    if (width % 3 != 0) return;
+    const RowMatrixXd forces = width > 0 ? Read("contact/f_c") : RowMatrixXd();
+    const RowMatrixXd optimal = WidthOf("law/f_c") == width && width > 0 ? Read("law/f_c") : RowMatrixXd();
+    const bool has_optimal = optimal.size() > 0 && optimal.allFinite();
+    for (int i = 0; i < width / 3; ++i) {
+      const std::string column = NameColumn("contact/f_c", 3 * i);
       const std::string tip = column.substr(0, column.find('.'));
       const std::string letter(1, static_cast<char>('a' + i));
-      Figure figure{"fig13" + letter,
-                    "13 (" + letter + ")",
-                    "Contact forces of finger " + std::to_string(i + 1) + " (" + tip + ")",
-                    "force (N)",
-                    "",
-                    false,
-                    0.1,
-                    {},
-                    {},
-                    "",
-                    true};
-      const VectorXd normal = forces.col(3 * i + 2);
-      const bool has_optimal = optimal.size() > 0 && optimal.allFinite();
-      const char* const what = has_optimal ? ", measured" : "";
-      figure.curves = {
-          {std::string("normal") + what, normal, 0, 0, false},
-          {std::string("tangential") + what, forces.middleCols<2>(3 * i).rowwise().norm(), 1, 0, false}};
-      if (has_optimal) {
-        figure.curves.push_back({"normal, optimal (49)", optimal.col(3 * i + 2), 0, 0, false, true, true});
-        figure.curves.push_back({"tangential, optimal (49)", optimal.middleCols<2>(3 * i).rowwise().norm(), 1,
-                                 0, false, true, true});
-      }
-      if (mu != f_c->attributes.end()) {
-        figure.curves.push_back({"friction cone: μ × normal", mu->second * normal, 2, 2, false});
+      Figure figure{.name = "fig13" + letter,
+                    .panel = "13 (" + letter + ")",
+                    .title = "Contact forces of finger " + std::to_string(i + 1) + " (" + tip + ")",
+                    .label = "force (N)",
+                    .least_span = 0.1,
+                    .printed = true};
+      const auto add = [&](const RowMatrixXd& all, const char* what, bool wide) {
+        figure.curves.push_back(
+            {.label = std::string("normal") + what, .values = all.col(3 * i + 2), .wide = wide});
+        figure.curves.push_back({.label = std::string("tangential") + what,
+                                 .values = all.middleCols<2>(3 * i).rowwise().norm(),
+                                 .color = 1,
+                                 .wide = wide});
+      };
+      add(forces, has_optimal ? ", measured" : "", false);
+      if (has_optimal) add(optimal, ", optimal (49)", true);
+      const auto& attributes = run_.Find("contact/f_c")->attributes;
+      if (const auto mu = attributes.find("mu"); mu != attributes.end()) {
+        figure.curves.push_back({.label = "friction cone: μ × normal",
+                                 .values = mu->second * forces.col(3 * i + 2),
+                                 .color = 2,
+                                 .dash = 2});
       }
       Add(figure);
     }
   }
 
   void AddErrors() {
-    Figure figure{"tracking_error",
-                  "",
-                  "Error of the object against its desired motion",
-                  "position error (m)",
-                  "",
-                  true,
-                  0.0,
-                  {},
-                  {},
-                  "",
-                  true};
-    if (run_.Find("object/position_error") == nullptr || run_.Find("object/orientation_error") == nullptr)
-      return;
-    figure.label = "error (m, rad)";
-    figure.curves = {
-        {"position (m)", run_.log().ReadSignal("object/position_error").col(0), 0, 0, false},
-        {"orientation (rad)", run_.log().ReadSignal("object/orientation_error").col(0), 1, 0, false}};
-    Add(figure);
+    if (!Has("object/position_error") || !Has("object/orientation_error")) return;
+    Add({.name = "tracking_error",
+         .title = "Error of the object against its desired motion",
+         .label = "error (m, rad)",
+         .log = true,
+         .curves = {{.label = "position (m)", .values = Read("object/position_error").col(0)},
+                    {.label = "orientation (rad)",
+                     .values = Read("object/orientation_error").col(0),
+                     .color = 1}},
+         .printed = true});
+  }
+
+  /// Adds a curve for each column of a signal, if it was recorded.
+  void AddColumns(const char* signal, const std::string& what, int first_color, int dash, bool right_axis,
+                  Figure* figure) const {
+    if (!Has(signal)) return;
+    const RowMatrixXd values = Read(signal);
+    for (int k = 0; k < WidthOf(signal); ++k) {
+      figure->curves.push_back({.label = NameColumn(signal, k) + what,
+                                .values = values.col(k),
+                                .color = first_color + k,
+                                .dash = dash,
+                                .right_axis = right_axis});
+    }
   }
 
   void AddFrictionUse() {
-    Figure figure{"friction_use",
-                  "",
-                  "Tangential force as a fraction of what friction can hold",
-                  "|f_t| / (μ f_n)",
-                  "",
-                  false,
-                  0.1,
-                  {},
-                  {},
-                  "",
-                  false};
-    for (const char* name : {"contact/cone_use", "wheel/cone_use"}) {
-      const SignalInfo* const signal = run_.Find(name);
-      if (signal == nullptr) continue;
-      const RowMatrixXd values = run_.log().ReadSignal(name);
-      for (int k = 0; k < signal->width; ++k) {
-        figure.curves.push_back({RunData::NameColumn(*signal, k), values.col(k),
-                                 static_cast<int>(figure.curves.size()), 0, false});
-      }
-    }
-    figure.bound = 1.0;
+    Figure figure{.name = "friction_use",
+                  .title = "Tangential force as a fraction of what friction can hold",
+                  .label = "|f_t| / (μ f_n)",
+                  .least_span = 0.1,
+                  .bound = 1.0};
+    AddColumns("contact/cone_use", "", 0, 0, false, &figure);
+    AddColumns("wheel/cone_use", "", static_cast<int>(figure.curves.size()), 0, false, &figure);
+    Add(figure);
+  }
+
+  /// How far contacts that the law follows by (40) are from where they are.
+  void AddContactDrift() {
+    Figure figure{.name = "contact_drift",
+                  .title = "Contacts followed by (40) against where they are",
+                  .label = "points on object and fingertip (m)",
+                  .right_label = "psi (rad)",
+                  .log = true};
+    AddColumns("contact/drift_object", " on the object", 0, 0, false, &figure);
+    AddColumns("contact/drift_fingertip", " on the fingertip", 0, 1, false, &figure);
+    AddColumns("contact/drift_psi", " psi", 0, 2, true, &figure);
     Add(figure);
   }
 

@@ -17,6 +17,7 @@ namespace dexcheck {
 namespace {
 
 constexpr std::uintmax_t kLargestEmbeddedVideo = 20'000'000;  // bytes
+
 /// The verdict in the words of the page.
 struct Headline {
   const char* tone;  ///< CSS class.
@@ -24,54 +25,69 @@ struct Headline {
   std::string sentence;
 };
 
-std::string FindString(const nlohmann::json& json, const char* group, const char* key) {
-  if (!json.contains(group) || !json[group].is_object()) return "";
-  const auto value = json[group].find(key);
-  return value != json[group].end() && value->is_string() ? value->get<std::string>() : "";
-}
-
-double FindNumber(const nlohmann::json& json, const char* group, const char* key) {
-  if (!json.contains(group) || !json[group].is_object()) return std::nan("");
-  const auto value = json[group].find(key);
-  return value != json[group].end() && value->is_number() ? value->get<double>() : std::nan("");
-}
-
 Headline FindHeadline(const RunData& run) {
-  const nlohmann::json& summary = run.summary();
-  if (summary.is_null()) {
-    return {"open", "NO VERDICT",
-            fmt::format("The run was cut off after {:.3f} s; what was recorded until then is below.",
-                        run.time()[run.time().size() - 1])};
+  if (run.is_cut_off()) {
+    return {
+        "open", "NO VERDICT",
+        fmt::format("The run was cut off after {:.3f} s; what was recorded until then is below.", run.end())};
   }
-  const std::string verdict = summary.value("verdict", "");
+  const std::string verdict = run.FindSummaryText("/verdict");
   if (verdict == "failed")
-    return {"fail", "FAILED", "The run could not be completed: " + summary.value("failure", "")};
+    return {"fail", "FAILED", "The run could not be completed: " + run.FindSummaryText("/failure")};
   if (verdict == "disagreement") {
-    const std::string cause = FindString(summary, "attribution", "cause");
+    const std::string cause = run.FindSummaryText("/attribution/cause");
     return {"fail", "DISAGREEMENT",
             cause == "model"         ? "The two descriptions of the robot differ."
             : cause == "control law" ? "The torques are not those of the law, or do not do what is expected."
                                      : "The engine does not do what the equations say."};
   }
   if (run.checks().empty()) return {"open", "NOT CHECKED", "The run completed; nothing was checked."};
-  return {"pass", "PASS", "Model, law, balance, prediction and assumptions hold at every step."};
+  return {"pass", "PASS", "Model, law, inverse and forward dynamics, and assumptions hold at every step."};
 }
 
-/// One of the five questions.
-struct Question {
-  CheckCategory kind;
-  const char* name;
-  const char* text;
-  const char* of_joints = text;  ///< The same of a robot that holds nothing.
+/// What a category compares, in a few words.
+const char* Explain(CheckCategory category, bool moves_joints) {
+  switch (category) {
+    case CheckCategory::kModel:
+      return "same state, both descriptions";
+    case CheckCategory::kLaw:
+      return moves_joints ? "torques against the law of the joints" : "torques against (53)-(55)";
+    case CheckCategory::kInverseDynamics:
+      return "engine's motion in the model's equations";
+    case CheckCategory::kForwardDynamics:
+      return moves_joints ? "accelerations" : "accelerations and contact forces";
+    case CheckCategory::kAssumption:
+      return moves_joints ? "joints within their ranges, motors within their limits, bodies apart"
+                          : "no slip, level base, forces in cones";
+  }
+  return "";
+}
+
+/// A category with its checks, in words.
+struct Section {
+  CategoryStatus status;
+  std::vector<const CheckRecord*> checks;
+  const char* tone = "open";  ///< CSS class.
+  std::string word = "not asked";
+  std::string extent;  ///< "3 checks, at most 40 % of a bound".
 };
 
-constexpr std::array<Question, 5> kCategories = {
-    {{CheckCategory::kModel, "Model", "same state, both descriptions"},
-     {CheckCategory::kLaw, "Law", "torques against (53)-(55)", "torques against the law of the joints"},
-     {CheckCategory::kInverseDynamics, "Balance", "engine's motion in the model's equations"},
-     {CheckCategory::kForwardDynamics, "Prediction", "accelerations and contact forces", "accelerations"},
-     {CheckCategory::kAssumption, "Assumptions", "no slip, level base, forces in cones",
-      "joints within their ranges, motors within their limits, bodies apart"}}};
+Section MakeSection(CheckCategory category, const RunData& run) {
+  Section section;
+  CategoryStatus& status = section.status;
+  status.category = category;
+  for (const CheckRecord& check : run.checks()) {
+    if (check.kind != category) continue;
+    section.checks.push_back(&check);
+    status.Add(check.name, check.worst, check.bound, check.failed);
+  }
+  if (!status.is_asked()) return section;
+  section.tone = status.failed > 0 ? "fail" : "pass";
+  section.word = status.failed > 0 ? fmt::format("{} of {} fail", status.failed, status.checks) : "holds";
+  section.extent = fmt::format("{} check{}, at most {} of a bound", status.checks,
+                               status.checks == 1 ? "" : "s", FormatFraction(status.fraction()));
+  return section;
+}
 
 /// A button that brings the page to a time. @param words before the time.
 Html MakeTimeButton(const char* style, const std::string& words, double time) {
@@ -79,55 +95,57 @@ Html MakeTimeButton(const char* style, const std::string& words, double time) {
                     time, words, time);
 }
 
-class Page {
+/// A value with its unit; 0 has none.
+std::string FormatWithUnit(double value, const std::string& unit) {
+  return FormatShort(value) + (unit == "1" || value == 0.0 ? "" : " " + unit);
+}
+
+class Page : public PageBuilder {
  public:
-  Page(const RunData& run, const PageContent& content) : run_(run), content_(content) {}
+  Page(const RunData& run, const PageContent& content) : run_(run), content_(content) {
+    for (const CheckCategory category : kCheckCategories) sections_.push_back(MakeSection(category, run));
+  }
 
   std::string Make() {
-    AddHead();
+    html_ += BeginPlotPage(fmt::format("{}: {}", FindHeadline(run_).word, Text("scenario")));
     AddVerdict();
     AddNavigation();
     html_ += "<main>\n";
     if (content_.scene.replay) html_ += MakeReplaySection();
     AddVideo();
+    AddPictures();
     html_ += MakePlotSection(content_.figures);
     AddChecks();
-    AddFigures();
     AddInputs();
     html_ += "</main>\n";
-    AddFooter();
+    Add("<footer>Made by dexcheck {} from the run's log, which holds every number, and the inputs to repeat "
+        "the run bit for bit: <code>dexcheck run --replay RUN_DIR</code>. Plots by dygraphs, replay by "
+        "three.js (copyright 2010-2019 three.js authors; both MIT license).</footer>\n",
+        Text("dexcheck_version"));
+    html_ +=
+        EndPage(content_.figures, run_.time(), content_.scene.replay ? &*content_.scene.replay : nullptr);
     return html_.markup();
   }
 
  private:
-  /// Texts among the arguments are escaped.
-  template <typename... Arguments>
-  void Add(fmt::format_string<html_detail::Shown<Arguments>...> format, const Arguments&... arguments) {
-    html_ += FormatHtml(format, arguments...);
-  }
-
   std::string Text(const char* name) const { return run_.FindText(name); }
-
-  void AddHead() { html_ += BeginPlotPage(fmt::format("{}: {}", FindHeadline(run_).word, Text("scenario"))); }
 
   void AddVerdict() {
     const Headline headline = FindHeadline(run_);
-    const nlohmann::json& summary = run_.summary();
-    const std::string description = summary.is_null() ? "" : summary.value("description", "");
+    const std::string description = run_.FindSummaryText("/description");
     Add("<header>\n<h1><b>{}</b>{}{}</h1>\n<section class=\"verdict {}\" id=\"verdict\"><strong>{}</strong>"
         "<p>{}</p>",
         Text("scenario"), description.empty() ? "" : " – ", description, headline.tone, headline.word,
         headline.sentence);
-    const std::string cause = FindString(summary, "attribution", "cause");
+    const std::string cause = run_.FindSummaryText("/attribution/cause");
     if (!cause.empty() && cause != "none") {
-      Add("<p>Cause: <b>{}</b>. Evidence: {}.</p>", cause, FindString(summary, "attribution", "evidence"));
+      Add("<p>Cause: <b>{}</b>. Evidence: {}.</p>", cause, run_.FindSummaryText("/attribution/evidence"));
     }
-    if (const CheckLine* const first = FindFirstFailure()) {
+    if (const CheckRecord* const first = FindFirstFailure()) {
       Add("<p>{}</p>", MakeTimeButton("", "See it: " + first->name + " fails from", first->failed_at));
     }
-    if (!summary.is_null() && summary.value("interrupted", false)) {
-      Add("<p>The run was stopped by hand after {:.3f} s.</p>", run_.time()[run_.time().size() - 1]);
-    }
+    if (run_.summary().value("interrupted", false))
+      Add("<p>The run was stopped by hand after {:.3f} s.</p>", run_.end());
     html_ += "</section>\n";
     AddCategories();
     AddTiles();
@@ -135,167 +153,119 @@ class Page {
   }
 
   /// The check that failed first in time; null when none did in the run.
-  [[nodiscard]] const CheckLine* FindFirstFailure() const {
-    const CheckLine* first = nullptr;
-    for (const CheckLine& check : run_.checks()) {
-      if (check.pass || check.constant) continue;
+  [[nodiscard]] const CheckRecord* FindFirstFailure() const {
+    const CheckRecord* first = nullptr;
+    for (const CheckRecord& check : run_.checks()) {
+      if (!check.failed || !IsTimed(check)) continue;
       if (first == nullptr || check.failed_at < first->failed_at) first = &check;
     }
     return first;
   }
 
-  /// Whether the robot holds nothing, and its joints follow a motion of their own.
-  [[nodiscard]] bool MovesJoints() const { return run_.Find("joints/q_d") != nullptr; }
-  [[nodiscard]] const char* TextOf(const Question& question) const {
-    return MovesJoints() ? question.of_joints : question.text;
-  }
-
-  /// What the checks of a question say together.
-  struct Answer {
-    std::vector<const CheckLine*> checks;
-    const char* tone = "open";  ///< CSS class.
-    std::string word = "not asked";
-    std::string extent;  ///< "3 checks, at most 40 % of a bound".
-    bool fails = false;
-  };
-
-  [[nodiscard]] Answer FindAnswer(const Question& question) const {
-    Answer answer;
-    long failed = 0;
-    double fraction = 0.0;
-    for (const CheckLine& check : run_.checks()) {
-      if (check.kind != question.kind) continue;
-      answer.checks.push_back(&check);
-      failed += check.pass ? 0 : 1;
-      fraction = std::max(fraction, check.fraction());
-    }
-    const size_t count = answer.checks.size();
-    if (count == 0) return answer;
-    answer.fails = failed > 0;
-    answer.tone = answer.fails ? "fail" : "pass";
-    answer.word = answer.fails ? fmt::format("{} of {} fail", failed, count) : "holds";
-    answer.extent =
-        fmt::format("{}, at most {} of a bound", count == 1 ? "1 check" : fmt::format("{} checks", count),
-                    FormatFraction(fraction));
-    return answer;
+  [[nodiscard]] const char* Explain(const Section& section) const {
+    return dexcheck::Explain(section.status.category, run_.moves_joints());
   }
 
   void AddCategories() {
     if (run_.checks().empty()) return;
     html_ += "<div class=\"tiles\">\n";
-    for (const Question& question : kCategories) {
-      const Answer answer = FindAnswer(question);
-      const Html text = FormatHtml("<b>{}: {}</b><span>{}</span><span>{}</span>", question.name, answer.word,
-                                   TextOf(question), answer.extent);
-      if (answer.checks.empty()) {
-        Add("<div class=\"card question {}\">{}</div>\n", answer.tone, text);
-      } else {
-        Add("<a class=\"card question {}\" href=\"#checks-{}\">{}</a>\n", answer.tone, NameOf(question.kind),
-            text);
-      }
+    for (const Section& section : sections_) {
+      const Html link = section.checks.empty()
+                            ? Html()
+                            : FormatHtml(" href=\"#checks-{}\"", NameOf(section.status.category));
+      Add("<a class=\"card category {}\"{}><b>{}: {}</b><span>{}</span><span>{}</span></a>\n", section.tone,
+          link, TitleOf(section.status.category), section.word, Explain(section), section.extent);
     }
     html_ += "</div>\n";
   }
 
-  void AddTile(const std::string& value, const char* label) {
+  void AddTile(const std::string& value, const std::string& label) {
     Add("<div class=\"card\"><b>{}</b><span>{}</span></div>\n", value, label);
   }
 
   void AddTiles() {
-    const nlohmann::json& summary = run_.summary();
     html_ += "<div class=\"tiles\">\n";
-    const auto tracking = [&](const char* key, const char* unit) {
-      const double value = FindNumber(summary, "tracking", key);
-      return std::isfinite(value) ? FormatShort(value) + unit : std::string("–");
+    const auto add_error = [&](const char* pointer, const char* unit, const char* label) {
+      const double value = run_.FindSummaryNumber(pointer);
+      AddTile(std::isfinite(value) ? FormatShort(value) + unit : std::string("–"), label);
     };
-    if (std::isfinite(FindNumber(summary, "tracking", "joint_error_max_rad"))) {
-      AddTile(tracking("joint_error_max_rad", " rad"), "largest error of a joint");
+    if (std::isfinite(run_.FindSummaryNumber("/tracking/joint_error_max_rad"))) {
+      add_error("/tracking/joint_error_max_rad", " rad", "largest error of a joint");
     } else {
-      AddTile(tracking("position_error_max_m", " m"), "largest position error of the object");
-      AddTile(tracking("orientation_error_max_rad", " rad"), "largest orientation error");
+      add_error("/tracking/position_error_max_m", " m", "largest position error of the object");
+      add_error("/tracking/orientation_error_max_rad", " rad", "largest orientation error");
     }
-    const double simulated =
-        summary.is_null() ? run_.time()[run_.time().size() - 1] : summary.value("simulated_s", 0.0);
-    AddTile(fmt::format("{:.4g} s", simulated),
-            fmt::format("simulated, {} steps", run_.time().size()).c_str());
-    for (const CheckLine& check : run_.checks()) {
+    const double simulated = run_.FindSummaryNumber("/simulated_s");
+    AddTile(fmt::format("{:.4g} s", std::isfinite(simulated) ? simulated : run_.end()),
+            fmt::format("simulated, {} steps", run_.time().size()));
+    for (const CheckRecord& check : run_.checks()) {
       if (check.name == "cone_use")
-        AddTile(FormatFraction(check.max), "of the fingertips' friction used, at most");
+        AddTile(FormatFraction(check.worst), "of the fingertips' friction used, at most");
     }
-    AddClearanceTiles();
-    const double factor = FindNumber(summary, "speed", "real_time_factor");
+    // By class of bodies that are not meant to touch.
+    for (const auto& [pairs, nearest] : run_.summary().value("clearance", nlohmann::json::object()).items()) {
+      std::string name = pairs;
+      std::replace(name.begin(), name.end(), '_', ' ');
+      AddTile(fmt::format("{:.1f} mm", 1e3 * nearest.value("smallest_m", std::nan(""))),
+              fmt::format("{}: nearest are {}", name, nearest.value("bodies", "")));
+    }
+    const double factor = run_.FindSummaryNumber("/speed/real_time_factor");
     if (std::isfinite(factor)) AddTile(fmt::format("{:.2g} ×", factor), "real time");
     html_ += "</div>\n";
   }
 
-  /// By class of bodies that are not meant to touch.
-  void AddClearanceTiles() {
-    if (run_.summary().is_null() || !run_.summary().contains("clearance")) return;
-    for (const auto& [pairs, nearest] : run_.summary()["clearance"].items()) {
-      std::string name = pairs;
-      std::replace(name.begin(), name.end(), '_', ' ');
-      const double distance = nearest.value("smallest_m", std::nan(""));
-      AddTile(fmt::format("{:.1f} mm", 1e3 * distance),
-              fmt::format("{}: nearest are {}", name, nearest.value("bodies", "")).c_str());
-    }
-  }
-
   void AddNavigation() {
-    html_ += "<nav><div><a href=\"#verdict\">Verdict</a>";
-    if (content_.scene.replay) html_ += "<a href=\"#replay\">Replay</a>";
-    if (!content_.video.empty()) html_ += "<a href=\"#video\">Video</a>";
-    html_ += "<a href=\"#plots\">Plots</a>";
-    if (!run_.checks().empty()) html_ += "<a href=\"#checks\">Checks</a>";
-    html_ += "<a href=\"#figures\">Figures</a><a href=\"#inputs\">Inputs</a></div></nav>\n";
+    std::vector<std::string> sections = {"Verdict"};
+    if (content_.scene.replay) sections.emplace_back("Replay");
+    if (!content_.video.empty()) sections.emplace_back("Video");
+    if (!content_.scene.pictures.empty()) sections.emplace_back("Pictures");
+    sections.emplace_back("Plots");
+    if (!run_.checks().empty()) sections.emplace_back("Checks");
+    sections.emplace_back("Inputs");
+    html_ += MakeNavigation(sections);
   }
 
-  void AddCheckRow(const CheckLine& check) {
-    const double fraction = check.fraction();
-    std::string where = check.where;
-    if (!check.constant) where += fmt::format("{}{:.3f} s", where.empty() ? "" : ", ", check.at_time);
-    const std::string unit = check.unit == "1" ? "" : " " + check.unit;
-    const Html verdict = check.pass || check.constant
-                             ? FormatHtml("<span class=\"badge\">{}</span>", check.pass ? "holds" : "differs")
-                             : MakeTimeButton("badge", "fails from", check.failed_at);
-    const std::string cause = [&]() -> std::string {
-      const nlohmann::json& summary = run_.summary();
-      if (check.pass || !summary.contains("attribution")) return "";
-      const nlohmann::json& causes = summary["attribution"];
-      return causes.contains("checks") ? causes["checks"].value(check.name, "") : "";
-    }();
+  void AddCheckRow(const CheckRecord& check) {
+    const double fraction = CalcFraction(check);
+    std::string where = check.part;
+    if (IsTimed(check)) where += fmt::format("{}{:.3f} s", where.empty() ? "" : ", ", check.at);
+    const Html verdict =
+        !check.failed || !IsTimed(check)
+            ? FormatHtml("<span class=\"badge\">{}</span>", check.failed ? "differs" : "holds")
+            : MakeTimeButton("badge", "fails from", check.failed_at);
+    const std::string cause = run_.FindSummaryText(("/attribution/checks/" + check.name).c_str());
     Add("<tr class=\"{}\"><td><code>{}</code><small>{}</small></td><td>{}{}</td><td class=\"value number\" "
-        "data-label=\"worst\">{}{}</td>"
-        "<td class=\"value number\" data-label=\"bound\">{}{}</td>"
+        "data-label=\"worst\">{}</td><td class=\"value number\" data-label=\"bound\">{}</td>"
         "<td data-label=\"of bound\"><span class=\"number\">{}</span><span class=\"meter\"><i "
-        "style=\"width:{:.1f}%\">"
-        "</i></span></td><td class=\"where\" data-label=\"{}\"><small>{}</small></td></tr>\n",
-        check.pass ? "pass" : "fail", check.name, check.description, verdict,
-        cause.empty() ? Html() : FormatHtml("<small>cause: {}</small>", cause), FormatShort(check.max),
-        check.max == 0.0 ? "" : unit, FormatShort(check.bound), check.bound == 0.0 ? "" : unit,
+        "style=\"width:{:.1f}%\"></i></span></td><td class=\"where\" data-label=\"{}\"><small>{}</small></td>"
+        "</tr>\n",
+        check.failed ? "fail" : "pass", check.name, check.description, verdict,
+        cause.empty() || !check.failed ? Html() : FormatHtml("<small>cause: {}</small>", cause),
+        FormatWithUnit(check.worst, check.unit), FormatWithUnit(check.bound, check.unit),
         FormatFraction(fraction), 100.0 * std::clamp(std::isfinite(fraction) ? fraction : 1.0, 0.0, 1.0),
         where.empty() ? "" : "at", where);
   }
 
-  void AddCheckTable(const std::vector<const CheckLine*>& checks) {
+  void AddCheckTable(const std::vector<const CheckRecord*>& checks) {
     html_ +=
-        "<table class=\"checks\"><thead><tr><th>check</th><th>verdict</th><th "
-        "class=\"value\">worst</th>"
+        "<table class=\"checks\"><thead><tr><th>check</th><th>verdict</th><th class=\"value\">worst</th>"
         "<th class=\"value\">bound</th><th>of bound</th><th>where, when</th></tr></thead><tbody>\n";
-    for (const CheckLine* check : checks) AddCheckRow(*check);
+    for (const CheckRecord* check : checks) AddCheckRow(*check);
     html_ += "</tbody></table>\n";
   }
 
-  /// The checks of a question, folded unless one fails.
-  void AddAnswer(const Question& question, const Answer& answer) {
-    std::vector<const CheckLine*> shown;
-    std::vector<const CheckLine*> equal_constants;
-    for (const CheckLine* check : answer.checks) {
-      (check->constant && check->pass ? equal_constants : shown).push_back(check);
+  /// The checks of a category, folded unless one fails.
+  void AddSection(const Section& section) {
+    std::vector<const CheckRecord*> shown;
+    std::vector<const CheckRecord*> equal_constants;
+    for (const CheckRecord* check : section.checks) {
+      (!IsTimed(*check) && !check->failed ? equal_constants : shown).push_back(check);
     }
+    const CheckCategory category = section.status.category;
     Add("<details class=\"answer {}\" id=\"checks-{}\"{}><summary><b>{}</b> <span class=\"badge\">{}</span> "
         "{}: {}</summary>\n",
-        answer.tone, NameOf(question.kind), answer.fails ? " open" : "", question.name, answer.word,
-        TextOf(question), answer.extent);
+        section.tone, NameOf(category), section.status.failed > 0 ? " open" : "", TitleOf(category),
+        section.word, Explain(section), section.extent);
     if (!shown.empty()) AddCheckTable(shown);
     if (!equal_constants.empty()) {
       Add("<details><summary>{} constants of both descriptions agree</summary>\n", equal_constants.size());
@@ -309,12 +279,10 @@ class Page {
     if (run_.checks().empty()) return;
     html_ +=
         "<h2 id=\"checks\">Checks</h2>\n<p class=\"soft\">What failed first, then by fraction of the bound. "
-        "A "
-        "bound is "
-        "what rounding, or the tolerance of the assumption, can explain.</p>\n<div class=\"card\">\n";
-    for (const Question& question : kCategories) {
-      const Answer answer = FindAnswer(question);
-      if (!answer.checks.empty()) AddAnswer(question, answer);
+        "A bound is what rounding, or the tolerance of the assumption, can explain.</p>\n"
+        "<div class=\"card\">\n";
+    for (const Section& section : sections_) {
+      if (!section.checks.empty()) AddSection(section);
     }
     html_ += "</div>\n";
   }
@@ -328,33 +296,18 @@ class Page {
           content_.video.filename().string());
       return;
     }
-    html_ += "<video controls playsinline preload=\"metadata\" src=\"data:video/mp4;base64,";
-    html_ += Html::Raw(EncodeBase64(ReadBytes(content_.video)));
-    html_ += "\"></video>\n";
+    Add("<video controls playsinline preload=\"metadata\" src=\"data:video/mp4;base64,{}\"></video>\n",
+        EncodeBase64(ReadBytes(content_.video)));
   }
 
-  void AddCaption(const std::string& panel, const std::string& title) {
-    Add("<figcaption>{}{}</figcaption>", panel.empty() ? Html() : FormatHtml("<b>Figure {}</b>", panel),
-        title);
-  }
-
-  void AddFigures() {
-    Add("<h2 id=\"figures\">Figures</h2>\n<p class=\"soft\">{}SVG and PNG files lie in the run's folder "
-        "<code>figures</code>.</p>\n<div class=\"grid\">\n",
-        MovesJoints() ? "" : "Numbers are those of the paper's figures. ");
+  void AddPictures() {
+    if (content_.scene.pictures.empty()) return;
+    html_ += "<h2 id=\"pictures\">Pictures</h2>\n<div class=\"grid\">\n";
     for (const Picture& picture : content_.scene.pictures) {
-      html_ += "<figure class=\"card\">";
-      AddCaption(picture.panel, picture.title);
-      Add("<img alt=\"{}\" src=\"data:image/png;base64,{}\"></figure>\n", picture.title,
-          EncodeBase64(ReadBytes(picture.file)));
-    }
-    for (const Figure& figure : content_.figures) {
-      if (!figure.printed) continue;
-      html_ += "<figure class=\"card\">";
-      AddCaption(figure.panel, figure.title);
-      html_ += MakeInlineSvg(ReadBytes(content_.drawings / (figure.name + ".svg")), figure.title);
-      if (!figure.note.empty()) Add("<p class=\"soft\"><small>{}</small></p>", figure.note);
-      html_ += "</figure>\n";
+      Add("<figure class=\"card\"><figcaption>{}{}</figcaption><img alt=\"{}\" "
+          "src=\"data:image/png;base64,{}\"></figure>\n",
+          picture.panel.empty() ? Html() : FormatHtml("<b>Figure {}</b>", picture.panel), picture.title,
+          picture.title, EncodeBase64(ReadBytes(picture.file)));
     }
     html_ += "</div>\n";
   }
@@ -379,34 +332,23 @@ class Page {
       overrides += FormatHtml("{}{}", overrides.empty() ? Html() : Html("<br>"), line);
     }
     add("Overrides", overrides.empty() ? Html("none") : FormatHtml("<code>{}</code>", overrides));
-    add("Seed", Html::Text(Text("seed")));
-    add("Model", Html::Text(Text("robot")));
-    add("MJCF", Html::Text(Text("mjcf")));
-    add("dexcheck", Html::Text(Text("dexcheck_version")));
-    add("MuJoCo", Html::Text(Text("mujoco_version")));
-    add("Machine", Html::Text(Text("machine")));
+    constexpr std::array<std::array<const char*, 2>, 6> kTexts = {{{"Seed", "seed"},
+                                                                   {"Model", "robot"},
+                                                                   {"MJCF", "mjcf"},
+                                                                   {"dexcheck", "dexcheck_version"},
+                                                                   {"MuJoCo", "mujoco_version"},
+                                                                   {"Machine", "machine"}}};
+    for (const auto& [term, name] : kTexts) add(term, Html::Text(Text(name)));
     html_ += "</dl>\n";
     AddFile("scenario.toml", "Scenario", true);
-    const std::string robot = run_.FindText("robot");
-    AddFile("robot/" + robot, "Parameters of the model: " + robot, false);
-    const std::string mjcf = run_.FindText("mjcf");
-    AddFile("mjcf/" + mjcf, "MJCF: " + mjcf, false);
+    AddFile("robot/" + Text("robot"), "Parameters of the model: " + Text("robot"), false);
+    AddFile("mjcf/" + Text("mjcf"), "MJCF: " + Text("mjcf"), false);
     html_ += "</div>\n";
-  }
-
-  void AddFooter() {
-    Add("<footer>Made by dexcheck {} from the run's log, which holds every number, and the inputs to repeat "
-        "the run bit "
-        "for bit: <code>dexcheck run --replay RUN_DIR</code>. Plots by dygraphs, replay by three.js "
-        "(copyright 2010-2019 three.js authors; both MIT license).</footer>\n",
-        Text("dexcheck_version"));
-    html_ +=
-        EndPage(content_.figures, run_.time(), content_.scene.replay ? &*content_.scene.replay : nullptr);
   }
 
   const RunData& run_;
   const PageContent& content_;
-  Html html_;
+  std::vector<Section> sections_;
 };
 
 }  // namespace
@@ -415,7 +357,7 @@ std::string MakePage(const RunData& run, const PageContent& content) {
   try {
     return Page(run, content).Make();
   } catch (const nlohmann::json::exception& error) {
-    throw InputError(run.path().string() + ": summary: " + error.what());
+    throw InputError(run.log().path().string() + ": summary: " + error.what());
   }
 }
 

@@ -1,5 +1,6 @@
 #include "harness/report/page_frame.h"
 
+#include <cctype>
 #include <cmath>
 
 #include "harness/report/page_assets.h"
@@ -27,6 +28,16 @@ Html BeginPage(const std::string& title, const Html& style, double renew) {
 
 Html BeginPlotPage(const std::string& title) { return BeginPage(title, Html::Raw(kDygraphCss)); }
 
+Html MakeNavigation(const std::vector<std::string>& sections) {
+  Html links;
+  for (const std::string& section : sections) {
+    std::string id = section;
+    id[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(id[0])));
+    links += FormatHtml("<a href=\"#{}\">{}</a>", id, section);
+  }
+  return FormatHtml("<nav><div>{}</div></nav>\n", links);
+}
+
 Html MakePlotSection(const std::vector<Figure>& figures) {
   Html html;
   html +=
@@ -38,9 +49,10 @@ Html MakePlotSection(const std::vector<Figure>& figures) {
     const Figure& figure = figures[i];
     html += FormatHtml(
         "<section class=\"card\" data-plot=\"{}\"><h3>{} {}<span class=\"soft number time\"></span></h3>"
-        "<div class=\"keys\"></div><div class=\"plot\"></div></section>\n",
+        "<div class=\"keys\"></div><div class=\"plot\"></div>{}</section>\n",
         i, figure.title,
-        figure.panel.empty() ? Html() : FormatHtml("<span class=\"panel\">Figure {}</span> ", figure.panel));
+        figure.panel.empty() ? Html() : FormatHtml("<span class=\"panel\">Figure {}</span> ", figure.panel),
+        figure.note.empty() ? Html() : FormatHtml("<p class=\"soft\"><small>{}</small></p>", figure.note));
   }
   html += "</div></section>\n";
   return html;

@@ -18,6 +18,20 @@ Html BeginPage(const std::string& title, const Html& style, double renew = 0.0);
 /// Likewise, of a page with plots.
 Html BeginPlotPage(const std::string& title);
 
+/// A page that is put together piece by piece.
+class PageBuilder {
+ protected:
+  /// Texts among the arguments are escaped.
+  template <typename... Arguments>
+  void Add(fmt::format_string<html_detail::Shown<Arguments>...> format, const Arguments&... arguments) {
+    html_ += FormatHtml(format, arguments...);
+  }
+  Html html_;
+};
+
+/// Links to the sections, whose ids are their names in small letters.
+Html MakeNavigation(const std::vector<std::string>& sections);
+
 /// The section that shows a replay; EndPage brings its scene.
 Html MakeReplaySection();
 

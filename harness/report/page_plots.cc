@@ -33,9 +33,10 @@ Html EmbedPlots(const std::vector<Figure>& figures, const VectorXd& time) {
   json["plots"] = nlohmann::ordered_json::array();
   int series = 0;
   for (const Figure& figure : figures) {
-    nlohmann::ordered_json plot = {{"name", figure.name},         {"label", figure.label},
-                                   {"right", figure.right_label}, {"log", figure.log},
-                                   {"span", figure.least_span},   {"bound", nullptr}};
+    nlohmann::ordered_json plot = {
+        {"name", figure.name}, {"label", figure.label}, {"right", figure.right_label},
+        {"log", figure.log},   {"bound", nullptr},      {"range", CalcAxisRange(figure, false)}};
+    if (!figure.right_label.empty()) plot["right_range"] = CalcAxisRange(figure, true);
     if (figure.bound) plot["bound"] = *figure.bound;
     for (const Curve& curve : figure.curves) {
       plot["curves"].push_back({{"id", "s" + std::to_string(series)},

@@ -20,9 +20,10 @@ struct RecordedFrames {
   RunFrames frames;
 };
 
-/// Reads RUN_DIR/log.h5. Only time, engine/qpos and the MJCF must be there; what else is missing is not
-/// drawn.
+/// From a log, or from RUN_DIR/log.h5. Only time, engine/qpos and the MJCF must be there; what else is
+/// missing is not drawn.
 /// @throws InputError that names the log and what is wrong with it.
+RecordedFrames ReadRecordedFrames(const LogReader& log);
 RecordedFrames ReadRecordedFrames(const std::filesystem::path& run_folder);
 
 }  // namespace dexcheck

@@ -25,6 +25,7 @@ struct ComparedNumber {
 
   /// Value of a run over that of the first; none without either, or for 0 / 0.
   [[nodiscard]] std::optional<double> CalcRatio(size_t run) const;
+  [[nodiscard]] bool fails_anywhere() const;
 };
 
 /// By how much a signal of a later run differs from the first run's, over the time that both cover. Where the
@@ -43,6 +44,8 @@ struct SignalDifference {
 
   /// difference / size; 0 for 0 / 0.
   [[nodiscard]] double fraction() const;
+  /// "object/X_o.x".
+  [[nodiscard]] std::string NameColumn() const;
 };
 
 struct RunComparisonOptions {

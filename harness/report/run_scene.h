@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "harness/report/replay.h"
+#include "harness/report/run_data.h"
 
 namespace dexcheck {
 
@@ -27,6 +28,6 @@ struct RunScene {
 /// has no positions of the engine.
 /// @param folder gets the pictures' files.
 /// @throws InputError that names the log and what is wrong with it.
-RunScene MakeRunScene(const std::filesystem::path& run_dir, const std::filesystem::path& folder);
+RunScene MakeRunScene(const RunData& run, const std::filesystem::path& folder);
 
 }  // namespace dexcheck

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <iterator>
 #include <memory>
 #include <optional>
@@ -21,13 +20,6 @@ namespace dexcheck {
 namespace {
 
 namespace fs = std::filesystem;
-
-void WriteText(const std::string& text, const PartialFile& file) {
-  std::ofstream stream(file.partial(), std::ios::binary);
-  stream << text;
-  stream.close();
-  if (!stream) file.Fail(std::strerror(errno));
-}
 
 /// Copies pictures into a folder, which it makes when it is not there. Destroyed before Commit, it leaves
 /// nothing.
@@ -95,7 +87,6 @@ void WriteRunReport(const fs::path& run_dir, const ReportFiles& files, const Sce
 
   const TemporaryFolder drawings;
   PageContent content;
-  content.drawings = drawings.path();
   content.figures = MakeMotionFigures(run);
   std::vector<Figure> residuals = MakeResidualFigures(run);
   std::move(residuals.begin(), residuals.end(), std::back_inserter(content.figures));
@@ -103,14 +94,14 @@ void WriteRunReport(const fs::path& run_dir, const ReportFiles& files, const Sce
   std::copy_if(content.figures.begin(), content.figures.end(), std::back_inserter(printed),
                [](const Figure& figure) { return figure.printed; });
   DrawFigures(printed, run.time(), drawings.path());
-  content.scene = make_scene(run_dir, drawings.path());
+  content.scene = make_scene(run, drawings.path());
   AddVideo(run_dir, files.page, &content);
-  WriteText(MakePage(run, content), page);
+  page.Write(MakePage(run, content));
 
   if (folder) {
     for (const Picture& picture : content.scene.pictures) folder->Add(picture.file);
     for (const Figure& figure : printed) {
-      folder->Add(drawings.path() / (figure.name + ".svg"));
+      folder->Add(drawings.path() / (figure.name + ".pdf"));
       folder->Add(drawings.path() / (figure.name + ".png"));
     }
     folder->Commit();

@@ -13,12 +13,11 @@ namespace dexcheck {
 /// Where a report goes.
 struct ReportFiles {
   std::filesystem::path page;
-  std::filesystem::path figures;  ///< Folder for the figures' SVG and PNG files; empty for none.
+  std::filesystem::path figures;  ///< Folder for the figures' PDF and PNG files; empty for none.
 };
 
 /// Makes pictures and replay of a run, as MakeRunScene.
-using SceneMaker =
-    std::function<RunScene(const std::filesystem::path& run_dir, const std::filesystem::path& folder)>;
+using SceneMaker = std::function<RunScene(const RunData& run, const std::filesystem::path& folder)>;
 
 /// RUN_DIR/report.html and RUN_DIR/figures.
 ReportFiles MakeReportFiles(const std::filesystem::path& run_dir);

@@ -60,7 +60,7 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
   log_.SetText("mujoco_version", mj_versionString());
   log_.SetText("dexcheck_version", Version());
   log_.SetText("git_revision", kGitRevision);
-  log_.SetText("check_kinds", "0 model, 1 balance, 2 prediction, 3 assumption, 4 law");
+  log_.SetText("check_kinds", "0 model, 1 inverse_dynamics, 2 forward_dynamics, 3 assumption, 4 law");
   log_.SetText("machine", DescribeMachine());
   log_.EmbedFile("inputs", "scenario.toml", scenario.text);
   log_.EmbedFile("inputs", "robot/" + inputs.robot.filename().string(), ReadBytes(inputs.robot));

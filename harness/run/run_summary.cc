@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/base/check_summary.h"
 #include "harness/base/version.h"
 #include "harness/engine/machine.h"
 
@@ -13,24 +14,6 @@ using Json = nlohmann::ordered_json;
 
 double Rms(double squares, long count) {
   return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
-}
-
-Json ToJson(const CheckRecord& check) {
-  Json json = {{"kind", NameOf(check.kind)}, {"max", check.worst}, {"rms", check.rms()},
-               {"bound", check.bound},       {"unit", check.unit}, {"at_time_s", check.at},
-               {"pass", !check.failed}};
-  if (check.failed) json["failed_at_s"] = check.failed_at;
-  if (!check.part.empty()) json["where"] = check.part;
-  json["description"] = check.description;
-  return json;
-}
-
-/// Of a constant, which has no time.
-Json ConstantToJson(const CheckRecord& record) {
-  return {{"kind", NameOf(record.kind)},
-          {"max", record.worst},
-          {"bound", record.bound},
-          {"pass", !record.failed}};
 }
 
 /// Of the object.
@@ -133,16 +116,16 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
   json["checks"] = Json::object();
   if (loop.is_checking()) {
     for (const CheckRecord& record : setup.constants().records)
-      json["checks"][record.name] = ConstantToJson(record);
+      json["checks"][record.name] = ToJson(record, /*timed=*/false);
     for (const std::span<const CheckRecord> checks :
          {loop.checks().model_checks(), loop.checks().motion_checks()}) {
       for (const CheckRecord& check : checks) {
-        if (check.applies) json["checks"][check.name] = ToJson(check);
+        if (check.applies) json["checks"][check.name] = ToJson(check, /*timed=*/true);
       }
     }
     json["settling"] = Json::object();
     for (const CheckRecord& check : loop.checks().settling_failures())
-      json["settling"][check.name] = ToJson(check);
+      json["settling"][check.name] = ToJson(check, /*timed=*/true);
     const CrossCheck& checks = loop.checks();
     const StepFindings& findings = checks.findings();
     json["assumptions"] = {{"fingertip_slip_max_m", checks.Find("fingertip_slip").worst},

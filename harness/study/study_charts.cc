@@ -9,7 +9,7 @@
 
 #include "harness/base/files.h"
 #include "harness/report/html.h"
-#include "renders/png_file.h"
+#include "renders/picture_file.h"
 
 namespace dexcheck {
 namespace {
@@ -263,7 +263,7 @@ Html DrawCells(const HeatMap& map) {
     }
   }
   const TemporaryFolder folder;
-  WritePng(folder.path() / "map.png", image);
+  WritePicture(folder.path() / "map.png", image);
   return FormatHtml(
       "<image x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" preserveAspectRatio=\"none\" "
       "style=\"image-rendering:pixelated\" href=\"data:image/png;base64,{}\"/>\n",

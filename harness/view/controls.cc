@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <utility>
 
+#include "harness/view/window.h"
 #include "renders/panel_colors.h"
 
 namespace dexcheck {
@@ -27,24 +28,35 @@ constexpr double kButtonHeight = 28.0;
 constexpr double kSliderWidth = 200.0;
 constexpr double kSliderLine = 40.0;
 
-/// Keys and mouse, after those of MuJoCo's own `simulate`.
-constexpr std::array<std::array<const char*, 2>, 15> kHelp = {{
-    {"space", "pause, go on"},
-    {"right, left", "one step, one step back"},
-    {"- +", "slower, faster"},
-    {"Backspace, R", "begins a live run anew"},
-    {"drag", "turns the camera"},
-    {"right drag", "moves it"},
-    {"middle drag, wheel", "brings it nearer"},
-    {"Ctrl and drag", "pulls at the object or a link"},
-    {"Esc", "a free camera, which follows nothing"},
-    {"F", "follows the object, or does not"},
-    {"G", "goes to the grasp"},
-    {"C", "forces on, off"},
-    {"S", "saves a live run as a scenario"},
-    {"Tab, F1", "controls, this list: on, off"},
-    {"Q", "closes the window"},
-}};
+/// A line of the help: what keys and mouse do, after MuJoCo's own `simulate`.
+struct HelpLine {
+  const char* keys;
+  const char* text;
+  std::vector<std::pair<int, Action>> actions = {};  // of keys
+};
+
+const std::vector<HelpLine>& ListHelp() {
+  static const std::vector<HelpLine> lines = {
+      {"space", "pause, go on", {{' ', Action::kPlay}}},
+      {"right, left", "one step, one step back", {{kKeyRight, Action::kStep}, {kKeyLeft, Action::kStepBack}}},
+      {"- +", "slower, faster", {{'-', Action::kSlower}, {'=', Action::kFaster}, {'+', Action::kFaster}}},
+      {"Backspace, R",
+       "begins a live run anew",
+       {{kKeyBackspace, Action::kRestart}, {'R', Action::kRestart}}},
+      {"drag", "turns the camera"},
+      {"right drag", "moves it"},
+      {"middle drag, wheel", "brings it nearer"},
+      {"Ctrl and drag", "pulls at the object or a link"},
+      {"Esc", "a free camera, which follows nothing", {{kKeyEscape, Action::kFreeCamera}}},
+      {"F", "follows the object, or does not", {{'F', Action::kFollow}}},
+      {"G", "goes to the grasp", {{'G', Action::kGrasp}}},
+      {"C", "forces on, off", {{'C', Action::kForces}}},
+      {"S", "saves a live run as a scenario", {{'S', Action::kSave}}},
+      {"Tab, F1", "controls, this list: on, off", {{kKeyTab, Action::kControls}, {kKeyF1, Action::kHelp}}},
+      {"Q", "closes the window", {{'Q', Action::kClose}}},
+  };
+  return lines;
+}
 
 struct Rectangle {
   Vector2d corner;
@@ -55,7 +67,7 @@ struct Rectangle {
 };
 
 struct Button {
-  ControlId id;
+  Action action;
   std::string text;
   bool on;
   Rectangle place;
@@ -64,18 +76,18 @@ struct Button {
 std::vector<Button> PlaceButtons(const ControlsState& state, int height) {
   std::vector<Button> buttons;
   double x = kMargin;
-  const auto add = [&](ControlId id, const std::string& text, bool on, double width) {
-    buttons.push_back({id, text, on, {{x, height - kButtonHeight - 8.0}, {width, kButtonHeight}}});
+  const auto add = [&](Action action, const std::string& text, bool on, double width) {
+    buttons.push_back({action, text, on, {{x, height - kButtonHeight - 8.0}, {width, kButtonHeight}}});
     x += width + 8.0;
   };
-  add(ControlId::kPlay, state.playing ? "Pause" : "Play", state.playing, 66.0);
-  add(ControlId::kStep, "Step", false, 52.0);
-  add(ControlId::kSlower, "-", false, 28.0);
-  add(ControlId::kFaster, "+", false, 28.0);
+  add(Action::kPlay, state.playing ? "Pause" : "Play", state.playing, 66.0);
+  add(Action::kStep, "Step", false, 52.0);
+  add(Action::kSlower, "-", false, 28.0);
+  add(Action::kFaster, "+", false, 28.0);
   x += 76.0;  // the speed
-  add(ControlId::kFollow, "Follow", state.follow, 66.0);
-  add(ControlId::kForces, "Forces", state.forces, 66.0);
-  if (state.live) add(ControlId::kSave, "Save", false, 54.0);
+  add(Action::kFollow, "Follow", state.follow, 66.0);
+  add(Action::kForces, "Forces", state.forces, 66.0);
+  if (state.live) add(Action::kSave, "Save", false, 54.0);
   return buttons;
 }
 
@@ -100,29 +112,38 @@ void DrawTrack(const Rectangle& place, double filled, double mark, Canvas* canva
   canvas->FillCircle({place.corner.x() + mark * place.size.x(), y}, 8.0, panel::kMark);
 }
 
-void DrawHelp(int height, Font* font, Canvas* canvas) {
+void DrawHelp(int height, const Font& font, Canvas* canvas) {
   constexpr double kLine = 19.0;
   constexpr double kWidth = 410.0;
   constexpr double kKeys = 145.0;
-  const double lines = static_cast<double>(kHelp.size());
+  const double lines = static_cast<double>(ListHelp().size());
   const Vector2d corner(kMargin, height - kBar - kLine * lines - 3.0 * kMargin);
   canvas->FillRoundedRectangle(corner, {kWidth, kLine * lines + 1.2 * kMargin}, 10.0,
                                panel::MakeGround(0.93F));
   double y = corner.y() + 1.5 * kMargin;
-  for (const auto& [keys, action] : kHelp) {
-    canvas->DrawText(*font, 13.0, {corner.x() + kMargin, y}, keys, kFaint);
-    canvas->DrawText(*font, 13.0, {corner.x() + kMargin + kKeys, y}, action, kText);
+  for (const HelpLine& line : ListHelp()) {
+    canvas->DrawText(font, 13.0, {corner.x() + kMargin, y}, line.keys, kFaint);
+    canvas->DrawText(font, 13.0, {corner.x() + kMargin + kKeys, y}, line.text, kText);
     y += kLine;
   }
 }
 
 }  // namespace
 
+std::optional<Action> FindAction(int key) {
+  for (const HelpLine& line : ListHelp()) {
+    for (const auto& [its_key, action] : line.actions) {
+      if (its_key == key) return action;
+    }
+  }
+  return std::nullopt;
+}
+
 void Controls::Draw(const ControlsState& state, Image* image) {
   const int width = image->width;
   const int height = image->height;
   Canvas canvas(image);
-  if (state.help) DrawHelp(height, &font_, &canvas);
+  if (state.help) DrawHelp(height, font_, &canvas);
   if (!state.shown) return;
   canvas.FillRoundedRectangle({0.0, height - kBar}, {static_cast<double>(width), kBar}, 0.0, kGround);
   const double span = std::max(state.end - state.begin, 1e-9);
@@ -133,7 +154,7 @@ void Controls::Draw(const ControlsState& state, Image* image) {
     canvas.FillRoundedRectangle(button.place.corner, button.place.size, 6.0, button.on ? kOn : kButton);
     const Vector2d middle = button.place.corner + 0.5 * button.place.size;
     canvas.DrawText(font_, 14.0, {middle.x(), middle.y() + 5.0}, button.text, kText, Align::kCenter);
-    if (button.id == ControlId::kFaster) {
+    if (button.action == Action::kFaster) {
       canvas.DrawText(font_, 14.0, {button.place.corner.x() + 36.0, middle.y() + 5.0},
                       fmt::format("{:g} x", state.speed), kFaint);
     }
@@ -159,19 +180,21 @@ std::optional<ControlHit> Controls::Find(const ControlsState& state, int width, 
   const auto fraction = [&](const Rectangle& place) {
     return std::clamp((x - place.corner.x()) / place.size.x(), 0.0, 1.0);
   };
+  using Kind = ControlHit::Kind;
   const Rectangle time = PlaceTime(width, height);
-  if (held ? held->id == ControlId::kTime : time.Contains(x, y)) {
-    return ControlHit{ControlId::kTime, 0, state.begin + fraction(time) * (state.end - state.begin)};
+  if (held ? held->kind == Kind::kTime : time.Contains(x, y)) {
+    return ControlHit{Kind::kTime, Action::kPlay, 0,
+                      state.begin + fraction(time) * (state.end - state.begin)};
   }
   for (size_t i = 0; i < state.sliders.size(); ++i) {
     const Rectangle place = PlaceSlider(i, width);
-    if (held ? held->id == ControlId::kSlider && held->slider == i : place.Contains(x, y)) {
-      return ControlHit{ControlId::kSlider, i, std::pow(kSliderRange, 2.0 * fraction(place) - 1.0)};
+    if (held ? held->kind == Kind::kSlider && held->slider == i : place.Contains(x, y)) {
+      return ControlHit{Kind::kSlider, Action::kPlay, i, std::pow(kSliderRange, 2.0 * fraction(place) - 1.0)};
     }
   }
   if (held) return held;
   for (const Button& button : PlaceButtons(state, height)) {
-    if (button.place.Contains(x, y)) return ControlHit{button.id};
+    if (button.place.Contains(x, y)) return ControlHit{Kind::kButton, button.action};
   }
   return std::nullopt;
 }

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "renders/canvas.h"
-#include "renders/font.h"
 #include "renders/image.h"
 
 namespace dexcheck {
@@ -34,13 +33,34 @@ struct ControlsState {
   std::string message;
 };
 
-enum class ControlId { kPlay, kStep, kSlower, kFaster, kFollow, kForces, kSave, kTime, kSlider };
+/// What a button or a key does.
+enum class Action {
+  kPlay,
+  kStep,
+  kStepBack,
+  kSlower,
+  kFaster,
+  kRestart,
+  kFreeCamera,
+  kFollow,
+  kGrasp,
+  kForces,
+  kSave,
+  kControls,
+  kHelp,
+  kClose
+};
+
+/// By a key as InputEvent has it; none for a key that does nothing.
+std::optional<Action> FindAction(int key);
 
 /// Where a click went.
 struct ControlHit {
-  ControlId id;
-  size_t slider = 0;   ///< kSlider.
-  double value = 0.0;  ///< kTime: s; kSlider: the factor.
+  enum class Kind { kButton, kTime, kSlider };
+  Kind kind = Kind::kButton;
+  Action action = Action::kPlay;  ///< kButton.
+  size_t slider = 0;              ///< kSlider.
+  double value = 0.0;             ///< kTime: s; kSlider: the factor.
 };
 
 /// For the thread that made it, but for Find.

@@ -6,17 +6,17 @@
 
 #include <vector>
 
-#include "renders/category_status.h"
+#include "harness/base/check_summary.h"
 #include "renders/run_frames.h"
 
 namespace dexcheck {
 
 /// One instant.
 struct ViewFrame {
-  RunFrames frame;                        ///< One row.
-  std::vector<CategoryStatus> questions;  ///< Up to this instant.
-  VectorXd q;                             ///< Of a live run: q' of the robot, and
-  Pose X_Bo = Pose::Identity();           ///< the object.
+  RunFrames frame;                         ///< One row.
+  std::vector<CategoryStatus> categories;  ///< Up to this instant.
+  VectorXd q;                              ///< Of a live run: q' of the robot, and
+  Pose X_Bo = Pose::Identity();            ///< the object.
 };
 
 /// Instants of a run by number. For several threads.

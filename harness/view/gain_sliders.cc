@@ -31,7 +31,7 @@ void Multiply(const ByName& numbers, double factor, std::vector<std::string>* ov
 
 std::vector<Slider> MakeGainSliders(const Scenario& scenario) {
   std::vector<Slider> sliders = {{"stiffness K_p"}, {"damping K_v"}};
-  if (!scenario.joint_motion) sliders.push_back({"squeeze f_min"});
+  if (!scenario.joint_motion) sliders.push_back({"internal force f_min"});
   return sliders;
 }
 

@@ -32,11 +32,7 @@ LiveRun::LiveRun(std::unique_ptr<Setup> setup, const RunInputs& inputs, const st
 }
 
 LiveRun::~LiveRun() {
-  {
-    const std::lock_guard lock(mutex_);
-    quit_ = true;
-  }
-  changed_.notify_all();
+  Change([&] { quit_ = true; });
   if (thread_.joinable()) thread_.join();
 }
 
@@ -75,17 +71,17 @@ bool LiveRun::Wait() {
 void LiveRun::Disturb() {
   const double t = runner_->loop().time();
   constexpr double kRounding = 1e-9;  // of times, s
-  if (!pull_ || t < pulled_until_ - kRounding) return;
+  if (!force_ || t < held_until_ - kRounding) return;
   DisturbanceOptions one;
-  one.key = fmt::format("pull.{}", pulls_.size());
-  one.body = pull_->body;
-  one.at = pull_->at;
-  one.force = pull_->force;
+  one.key = fmt::format("mouse_force.{}", forces_.size());
+  one.body = force_->body;
+  one.at = force_->at;
+  one.force = force_->force;
   one.begin = t;
-  one.duration = std::max(kPullTime, setup_->scenario().plant.time_step);
+  one.duration = std::max(kForceTime, setup_->scenario().plant.time_step);
   runner_->Disturb(one);
-  pulled_until_ = t + one.duration;
-  pulls_.push_back(fmt::format(
+  held_until_ = t + one.duration;
+  forces_.push_back(fmt::format(
       "disturbance+={{ type = \"pulse\", body = \"{}\", at = {}, force = {}, begin = {}, duration = {} }}",
       one.body, Print(one.at), Print(one.force), one.begin, one.duration));
 }
@@ -123,21 +119,12 @@ void LiveRun::Record(const StepRecord& step) {
     frame.contact_normals.block<1, 3>(0, 3 * i) = contact.normal.transpose();
   }
   const CrossCheck& checks = runner_->loop().checks();
-  for (const CheckCategory kind : kCheckCategorys) {
-    CategoryStatus& question = view.questions.emplace_back();
-    question.name = NameOf(kind);
-    double largest = -1.0;
+  for (const CheckCategory kind : kCheckCategories) {
+    CategoryStatus& status = view.categories.emplace_back(CategoryStatus{kind});
     for (const std::span<const CheckRecord> records : {checks.model_checks(), checks.motion_checks()}) {
       for (const CheckRecord& check : records) {
-        if (check.kind != kind || !check.applies) continue;
-        const double fraction =
-            check.bound > 0.0 ? check.worst / check.bound : (check.worst > 0.0 ? 1e300 : 0.0);
-        question.asked = true;
-        if (fraction <= largest) continue;
-        largest = fraction;
-        question.check = check.name;
-        question.worst = check.worst;
-        question.bound = check.bound;
+        if (check.kind == kind && check.applies)
+          status.Add(check.name, check.worst, check.bound, check.failed);
       }
     }
   }
@@ -162,45 +149,35 @@ ViewFrame LiveRun::Read(long row) const {
   return frames_[static_cast<size_t>(row)];
 }
 
-void LiveRun::SetPaused(bool paused) {
+void LiveRun::Change(const std::function<void()>& change) {
   {
     const std::lock_guard lock(mutex_);
-    paused_ = paused;
-    is_paced_ = false;
+    change();
   }
   changed_.notify_all();
 }
 
-bool LiveRun::is_paused() const {
-  const std::lock_guard lock(mutex_);
-  return paused_;
+void LiveRun::SetPaused(bool paused) {
+  Change([&] {
+    paused_ = paused;
+    is_paced_ = false;
+  });
 }
 
 void LiveRun::Advance() {
-  {
-    const std::lock_guard lock(mutex_);
-    if (paused_) ++granted_;
-  }
-  changed_.notify_all();
+  Change([&] { granted_ += paused_ ? 1 : 0; });
 }
 
 void LiveRun::SetSpeed(double speed) {
-  {
-    const std::lock_guard lock(mutex_);
+  Change([&] {
     speed_ = speed;
     is_paced_ = false;
-  }
-  changed_.notify_all();
+  });
 }
 
-double LiveRun::speed() const {
+void LiveRun::SetForce(const std::optional<MouseForce>& force) {
   const std::lock_guard lock(mutex_);
-  return speed_;
-}
-
-void LiveRun::SetPull(const std::optional<Pull>& pull) {
-  const std::lock_guard lock(mutex_);
-  pull_ = pull;
+  force_ = force;
 }
 
 bool LiveRun::is_finished() const {
@@ -209,24 +186,20 @@ bool LiveRun::is_finished() const {
 }
 
 void LiveRun::Finish() {
-  {
-    const std::lock_guard lock(mutex_);
-    quit_ = true;
-  }
-  changed_.notify_all();
+  Change([&] { quit_ = true; });
   if (thread_.joinable()) thread_.join();
   if (problem_) std::rethrow_exception(problem_);
 }
 
-bool LiveRun::was_pulled() const {
+bool LiveRun::was_disturbed() const {
   const std::lock_guard lock(mutex_);
-  return !pulls_.empty();
+  return !forces_.empty();
 }
 
 std::vector<std::string> LiveRun::ListOverrides() const {
   const std::lock_guard lock(mutex_);
   std::vector<std::string> overrides = setup_->scenario().overrides;
-  overrides.insert(overrides.end(), pulls_.begin(), pulls_.end());
+  overrides.insert(overrides.end(), forces_.begin(), forces_.end());
   return overrides;
 }
 

@@ -6,6 +6,7 @@
 #include <deque>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -19,19 +20,19 @@
 
 namespace dexcheck {
 
-/// A force that pulls at a body.
-struct Pull {
+/// A force with which the mouse pulls at a body.
+struct MouseForce {
   std::string body;                   ///< A link, or "object".
   Vector3d at = Vector3d::Zero();     ///< Where, in its frame, m.
   Vector3d force = Vector3d::Zero();  ///< World, N.
 };
 
-/// The same loop as `dexcheck run`. Undisturbed it makes the same numbers, however often it is paused; pulls
-/// become disturbances that the judge knows, constant for a while each.
+/// The same loop as `dexcheck run`. Undisturbed it makes the same numbers, however often it is paused; forces
+/// of the mouse become disturbances that the checks know, constant for a while each.
 class LiveRun : public FrameSource {
  public:
-  /// How long a pull stays as it is, s; the loop's step where that is longer.
-  static constexpr double kPullTime = 0.02;
+  /// How long a force stays as it is, s; the loop's step where that is longer.
+  static constexpr double kForceTime = 0.02;
 
   /// Starts. @param log file to record to; empty for none. @param speed of simulated against real time.
   /// @throws InputError as ClosedLoop and RunRecorder.
@@ -49,22 +50,20 @@ class LiveRun : public FrameSource {
   [[nodiscard]] const Setup& setup() const { return *setup_; }
 
   void SetPaused(bool paused);
-  [[nodiscard]] bool is_paused() const;
   /// One step while paused.
   void Advance();
   void SetSpeed(double speed);
-  [[nodiscard]] double speed() const;
   /// From now on; none lets go.
-  void SetPull(const std::optional<Pull>& pull);
+  void SetForce(const std::optional<MouseForce>& pull);
   /// Ends the run where it is, if it is still going on, and waits for it. @throws what the input is wrong
   /// with.
   void Finish();
   [[nodiscard]] bool is_finished() const;
 
-  [[nodiscard]] bool was_pulled() const;
+  [[nodiscard]] bool was_disturbed() const;
   /// Once finished.
   [[nodiscard]] const Runner& runner() const { return *runner_; }
-  /// The scenario's overrides and the pulls so far, each as an assignment that a scenario takes.
+  /// The scenario's overrides and the mouse's forces so far, each as an assignment that a scenario takes.
   [[nodiscard]] std::vector<std::string> ListOverrides() const;
 
  private:
@@ -73,6 +72,8 @@ class LiveRun : public FrameSource {
   bool Wait();
   void Record(const StepRecord& step);
   void Disturb();
+  /// Changes what the run waits for.
+  void Change(const std::function<void()>& change);
 
   std::unique_ptr<Setup> setup_;
   MjModelPtr looks_;
@@ -86,9 +87,9 @@ class LiveRun : public FrameSource {
   bool finished_ = false;
   long granted_ = 0;  // single steps
   double speed_;
-  std::optional<Pull> pull_;
-  double pulled_until_ = 0.0;
-  std::vector<std::string> pulls_;
+  std::optional<MouseForce> force_;
+  double held_until_ = 0.0;
+  std::vector<std::string> forces_;
   std::exception_ptr problem_;
   std::chrono::steady_clock::time_point due_;
   bool is_paced_ = false;  // due_ means something

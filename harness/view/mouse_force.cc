@@ -37,8 +37,8 @@ Ray CalcRay(const Viewpoint& view, double fovy, double x, double y) {
   return {view.look_at - view.distance * forward, (forward + slope * (x * right + y * up)).normalized()};
 }
 
-std::optional<MouseForce> MouseForce::Grab(const Setup& setup, const mjModel& looks, const ViewFrame& frame,
-                                           const Ray& ray) {
+std::optional<MouseSpring> MouseSpring::Grab(const Setup& setup, const mjModel& looks, const ViewFrame& frame,
+                                             const Ray& ray) {
   const mjModel& m = looks;
   const MjDataPtr data = MakeData(m);
   SetRow(m, frame.frame, 0, data.get());
@@ -49,29 +49,29 @@ std::optional<MouseForce> MouseForce::Grab(const Setup& setup, const mjModel& lo
   const std::optional<int> link = FindLink(setup, m.geom_bodyid[geom]);
   if (!link) return std::nullopt;
   const double mass = m.body_mass[m.body_weldid[m.geom_bodyid[geom]]];
-  MouseForce pull(setup, *link, Vector3d::Zero(), std::max(kWeights * mass, kLeastSpring));
-  pull.at_ = pull.FindPose(frame).inverse() * Vector3d(ray.from + distance * ray.along);
-  return pull;
+  MouseSpring spring(setup, *link, Vector3d::Zero(), std::max(kWeights * mass, kLeastSpring));
+  spring.at_ = spring.FindPose(frame).inverse() * Vector3d(ray.from + distance * ray.along);
+  return spring;
 }
 
-Pose MouseForce::FindPose(const ViewFrame& frame) const {
+Pose MouseSpring::FindPose(const ViewFrame& frame) const {
   if (link_ == Wrench::kObject) return frame.X_Bo;
   ModelTerms robot(setup_->model());
   robot.SetState(frame.q, VectorXd::Zero(setup_->model().num_velocities()));
   return robot.CalcLinkPose(link_);
 }
 
-Vector3d MouseForce::FindPoint(const ViewFrame& frame) const { return FindPose(frame) * at_; }
+Vector3d MouseSpring::FindPoint(const ViewFrame& frame) const { return FindPose(frame) * at_; }
 
-Pull MouseForce::Find(const ViewFrame& frame, const Ray& ray) const {
+MouseForce MouseSpring::Find(const ViewFrame& frame, const Ray& ray) const {
   const Vector3d point = FindPoint(frame);
   // Towards the place on the ray that is nearest.
   const Vector3d target = ray.from + ray.along.dot(point - ray.from) * ray.along;
-  Pull pull;
-  pull.body = link_ == Wrench::kObject ? "object" : setup_->model().link_name(link_);
-  pull.at = at_;
-  pull.force = stiffness_ * (target - point);
-  return pull;
+  MouseForce force;
+  force.body = link_ == Wrench::kObject ? "object" : setup_->model().link_name(link_);
+  force.at = at_;
+  force.force = stiffness_ * (target - point);
+  return force;
 }
 
 }  // namespace dexcheck

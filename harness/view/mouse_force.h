@@ -25,20 +25,20 @@ struct Ray {
 Ray CalcRay(const Viewpoint& view, double fovy, double x, double y);
 
 /// Pulls at a point of a body towards the mouse, as a spring does.
-class MouseForce {
+class MouseSpring {
  public:
   /// Takes hold of what the ray meets first. None when that is neither the object nor a link.
   /// @param looks the model as it is seen, with the bodies of the setup's.
-  static std::optional<MouseForce> Grab(const Setup& setup, const mjModel& looks, const ViewFrame& frame,
-                                        const Ray& ray);
+  static std::optional<MouseSpring> Grab(const Setup& setup, const mjModel& looks, const ViewFrame& frame,
+                                         const Ray& ray);
 
   /// The pull when the mouse is on this ray and the run at this frame.
-  [[nodiscard]] Pull Find(const ViewFrame& frame, const Ray& ray) const;
+  [[nodiscard]] MouseForce Find(const ViewFrame& frame, const Ray& ray) const;
   /// The point that is pulled, m, world.
   [[nodiscard]] Vector3d FindPoint(const ViewFrame& frame) const;
 
  private:
-  MouseForce(const Setup& setup, int link, const Vector3d& at, double stiffness)
+  MouseSpring(const Setup& setup, int link, const Vector3d& at, double stiffness)
       : setup_(&setup), link_(link), at_(at), stiffness_(stiffness) {}
   [[nodiscard]] Pose FindPose(const ViewFrame& frame) const;
 

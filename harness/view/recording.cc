@@ -30,7 +30,7 @@ ViewFrame Recording::Read(long row) const {
   take(all.contact_forces, &one.contact_forces);
   take(all.contact_normals, &one.contact_normals);
   take(all.desired_positions, &one.desired_positions);
-  view.questions = checks_.ListCategories(row);
+  view.categories = checks_.ListCategories(row);
   return view;
 }
 

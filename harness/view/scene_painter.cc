@@ -26,18 +26,9 @@ Image ScenePainter::Paint(const ViewFrame& frame, const SceneLook& look) {
   SetRow(model_, frame.frame, 0, data_.get());
   std::vector<Decoration> decorations;
   if (look.forces) AddForces(frame.frame, 0, look.meters_per_newton, &decorations);
-  if (look.pull) decorations.emplace_back(*look.pull);
+  if (look.mouse_force) decorations.emplace_back(*look.mouse_force);
   Image image = renderer_.Render(*data_, look.view, decorations);
-  OverlayState state;
-  state.title = frame.frame.title;
-  if (!frame.frame.phases.empty()) state.title += ": " + frame.frame.phases.front();
-  state.time = frame.frame.times.front();
-  if (!frame.frame.position_errors.empty()) state.position_error = frame.frame.position_errors.front();
-  if (!frame.frame.joint_errors.empty()) state.joint_error = frame.frame.joint_errors.front();
-  if (!frame.frame.orientation_errors.empty())
-    state.orientation_error = frame.frame.orientation_errors.front();
-  state.questions = frame.questions;
-  overlay_.Draw(state, &image);
+  overlay_.Draw(MakeOverlayState(frame.frame, 0, frame.categories), &image);
   return image;
 }
 

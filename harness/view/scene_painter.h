@@ -14,8 +14,8 @@ namespace dexcheck {
 struct SceneLook {
   Viewpoint view;
   bool forces = true;
-  double meters_per_newton = 0.01;  ///< Of arrows.
-  std::optional<Arrow> pull;        ///< At what is pulled.
+  double meters_per_newton = 0.01;   ///< Of arrows.
+  std::optional<Arrow> mouse_force;  ///< At what is pulled.
 };
 
 /// Draws frames with the panel of the checks. For the thread that made it.

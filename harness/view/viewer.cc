@@ -24,7 +24,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::array<double, 7> kSpeeds = {0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0};
 constexpr double kForceLength = 0.042;    // m, of the largest contact force so far
-constexpr double kPullRadius = 0.006;     // m
+constexpr double kArrowRadius = 0.006;    // m
 constexpr double kPixelsOfANotch = 32.0;  // of the middle button's way that count as one notch of the wheel
 
 /// One window on one source.
@@ -81,8 +81,8 @@ class Viewer {
     }
     camera_.Follow(row_, state_.follow);
     const ViewFrame frame = source_.Read(row_);
-    if (mouse_force_) UpdatePull(frame);
-    Studio::Order order{row_, {camera_.view(), state_.forces, MeasureForces(frame), pull_arrow_}, state_};
+    if (spring_) UpdateForce(frame);
+    Studio::Order order{row_, {camera_.view(), state_.forces, MeasureForces(frame), arrow_}, state_};
     studio_.Ask(order);
   }
 
@@ -158,23 +158,23 @@ class Viewer {
 
   // Mouse and keys.
 
-  void UpdatePull(const ViewFrame& frame) {
-    const Pull pull = mouse_force_->Find(frame, camera_.FindRay(mouse_.x, mouse_.y));
-    live_->SetPull(pull);
-    const Vector3d point = mouse_force_->FindPoint(frame);
-    pull_arrow_ = Arrow{point,
-                        point + 0.3 * pull.force / std::max(pull.force.norm(), 3.0),
-                        kPullRadius,
-                        {1.0F, 0.85F, 0.1F, 1.0F}};
-    state_.message = fmt::format("pulling at {} with {:.2f} N", pull.body, pull.force.norm());
+  void UpdateForce(const ViewFrame& frame) {
+    const MouseForce force = spring_->Find(frame, camera_.FindRay(mouse_.x, mouse_.y));
+    live_->SetForce(force);
+    const Vector3d point = spring_->FindPoint(frame);
+    arrow_ = Arrow{point,
+                   point + 0.3 * force.force / std::max(force.force.norm(), 3.0),
+                   kArrowRadius,
+                   {1.0F, 0.85F, 0.1F, 1.0F}};
+    state_.message = fmt::format("pulling at {} with {:.2f} N", force.body, force.force.norm());
   }
 
   void LetGo() {
-    if (!mouse_force_) return;
-    mouse_force_.reset();
-    pull_arrow_.reset();
-    live_->SetPull(std::nullopt);
-    state_.message = "let go; the judge knows the pull";
+    if (!spring_) return;
+    spring_.reset();
+    arrow_.reset();
+    live_->SetForce(std::nullopt);
+    state_.message = "let go; the checks know the force";
   }
 
   void Handle(const InputEvent& event, const std::function<std::string()>& save) {
@@ -193,7 +193,7 @@ class Viewer {
         camera_.Zoom(event.scroll);
         break;
       case Kind::kKey:
-        PressKey(event.key, save);
+        if (const std::optional<Action> action = FindAction(event.key)) Act(*action, save);
         break;
     }
     mouse_ = event;
@@ -204,13 +204,15 @@ class Viewer {
     held_ = event.button == InputEvent::Button::kLeft
                 ? Controls::Find(state_, options_.width, options_.height, event.x, event.y)
                 : std::nullopt;
-    if (held_) {
-      Click(*held_, save);
+    if (held_ && held_->kind == ControlHit::Kind::kButton) {
+      Act(held_->action, save);
+    } else if (held_) {
+      Slide(*held_);
     } else if (event.control && live_ != nullptr && source_.rows() > 0 && !live_->is_finished()) {
       looks_back_ = false;
-      mouse_force_ = MouseForce::Grab(live_->setup(), live_->model(), source_.Read(source_.rows() - 1),
-                                      camera_.FindRay(event.x, event.y));
-      state_.message = mouse_force_ ? "" : "nothing to pull at here";
+      spring_ = MouseSpring::Grab(live_->setup(), live_->model(), source_.Read(source_.rows() - 1),
+                                  camera_.FindRay(event.x, event.y));
+      state_.message = spring_ ? "" : "nothing to pull at here";
     } else {
       turning_ = true;
     }
@@ -219,14 +221,14 @@ class Viewer {
   void Release(const InputEvent& /*event*/) {
     turning_ = false;
     LetGo();
-    if (held_ && held_->id == ControlId::kSlider) restart_ = true;
+    if (held_ && held_->kind == ControlHit::Kind::kSlider) restart_ = true;
     held_.reset();
   }
 
   void Drag(const InputEvent& event) {
     const double x = event.x - mouse_.x;
     const double y = event.y - mouse_.y;
-    if (held_ && (held_->id == ControlId::kTime || held_->id == ControlId::kSlider)) {
+    if (held_ && held_->kind != ControlHit::Kind::kButton) {
       held_ = Controls::Find(state_, options_.width, options_.height, event.x, event.y, held_);
       Slide(*held_);
     } else if (turning_ && button_ == InputEvent::Button::kLeft) {
@@ -239,88 +241,49 @@ class Viewer {
   }
 
   void Slide(const ControlHit& hit) {
-    if (hit.id == ControlId::kTime) LookBack(hit.value);
-    if (hit.id == ControlId::kSlider) state_.sliders[hit.slider].factor = hit.value;
+    if (hit.kind == ControlHit::Kind::kTime) LookBack(hit.value);
+    if (hit.kind == ControlHit::Kind::kSlider) state_.sliders[hit.slider].factor = hit.value;
   }
 
-  void Click(const ControlHit& hit, const std::function<std::string()>& save) {
-    switch (hit.id) {
-      case ControlId::kPlay:
-        SetPlaying(!state_.playing);
-        break;
-      case ControlId::kStep:
-        Step(1);
-        break;
-      case ControlId::kSlower:
-        ChangeSpeed(-1);
-        break;
-      case ControlId::kFaster:
-        ChangeSpeed(1);
-        break;
-      case ControlId::kFollow:
-        state_.follow = !state_.follow;
-        break;
-      case ControlId::kForces:
-        state_.forces = !state_.forces;
-        break;
-      case ControlId::kSave:
-        state_.message = save();
-        break;
-      case ControlId::kTime:
-      case ControlId::kSlider:
-        Slide(hit);
-        break;
-    }
-  }
-
-  void PressKey(int key, const std::function<std::string()>& save) {
-    switch (key) {
-      case ' ':
-        SetPlaying(!state_.playing);
-        break;
-      case kKeyRight:
-        Step(1);
-        break;
-      case kKeyLeft:
-        Step(-1);
-        break;
-      case '-':
-        ChangeSpeed(-1);
-        break;
-      case '=':
-      case '+':
-        ChangeSpeed(1);
-        break;
-      case 'F':
-        state_.follow = !state_.follow;
-        break;
-      case 'C':
-        state_.forces = !state_.forces;
-        break;
-      case 'G':
-        if (source_.rows() > 0) camera_.AimAtObject(std::max(row_, 0L));
-        break;
-      case 'S':
-        if (live_ != nullptr) state_.message = save();
-        break;
-      case 'R':
-      case kKeyBackspace:
+  void Act(Action action, const std::function<std::string()>& save) {
+    switch (action) {
+      case Action::kPlay:
+        return SetPlaying(!state_.playing);
+      case Action::kStep:
+        return Step(1);
+      case Action::kStepBack:
+        return Step(-1);
+      case Action::kSlower:
+        return ChangeSpeed(-1);
+      case Action::kFaster:
+        return ChangeSpeed(1);
+      case Action::kRestart:
         restart_ = live_ != nullptr;
-        break;
-      case kKeyEscape:
+        return;
+      case Action::kFreeCamera:
         state_.follow = false;
-        break;
-      case kKeyTab:
+        return;
+      case Action::kFollow:
+        state_.follow = !state_.follow;
+        return;
+      case Action::kGrasp:
+        if (source_.rows() > 0) camera_.AimAtObject(std::max(row_, 0L));
+        return;
+      case Action::kForces:
+        state_.forces = !state_.forces;
+        return;
+      case Action::kSave:
+        if (live_ != nullptr) state_.message = save();
+        return;
+      case Action::kControls:
         state_.shown = !state_.shown;
-        break;
-      case kKeyF1:
+        return;
+      case Action::kHelp:
         state_.help = !state_.help;
-        break;
-      case 'Q':
+        return;
+      case Action::kClose:
         closed_ = true;
-        break;
-      default:
-        break;
+        return;
     }
   }
 
@@ -341,8 +304,8 @@ class Viewer {
   InputEvent::Button button_ = InputEvent::Button::kLeft;
   bool turning_ = false;
   std::optional<ControlHit> held_;
-  std::optional<MouseForce> mouse_force_;
-  std::optional<Arrow> pull_arrow_;
+  std::optional<MouseSpring> spring_;
+  std::optional<Arrow> arrow_;
   std::string title_;
   Studio studio_;
 };

@@ -4,6 +4,7 @@
 #include <GLFW/glfw3.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "controller/common/errors.h"
@@ -24,22 +25,11 @@ Function Load(const char* name) {
 }
 
 int NameKey(int key) {
-  switch (key) {
-    case GLFW_KEY_LEFT:
-      return kKeyLeft;
-    case GLFW_KEY_RIGHT:
-      return kKeyRight;
-    case GLFW_KEY_ESCAPE:
-      return kKeyEscape;
-    case GLFW_KEY_BACKSPACE:
-      return kKeyBackspace;
-    case GLFW_KEY_TAB:
-      return kKeyTab;
-    case GLFW_KEY_F1:
-      return kKeyF1;
-    default:
-      return key;
-  }
+  static const std::map<int, int> names = {{GLFW_KEY_LEFT, kKeyLeft},     {GLFW_KEY_RIGHT, kKeyRight},
+                                           {GLFW_KEY_ESCAPE, kKeyEscape}, {GLFW_KEY_BACKSPACE, kKeyBackspace},
+                                           {GLFW_KEY_TAB, kKeyTab},       {GLFW_KEY_F1, kKeyF1}};
+  const auto name = names.find(key);
+  return name == names.end() ? key : name->second;
 }
 
 std::string TellError() {

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "controller/common/errors.h"
 #include "tests/common/paths.h"
@@ -34,51 +35,26 @@ TEST(Canvas, MakesColorsFromHexadecimal) {
   EXPECT_FLOAT_EQ(color[3], 0.5F);
 }
 
-TEST(Canvas, FillsARectangleExactly) {
+TEST(Canvas, FillsAndMixes) {
   Image image(20, 20);
   Canvas(&image).FillRoundedRectangle({4.0, 5.0}, {8.0, 6.0}, 0.0, kWhite);
   EXPECT_NEAR(Area(image), 48.0, kRounding);
-  EXPECT_EQ(image.Pixel(4, 5)[0], 255);
-  EXPECT_EQ(image.Pixel(11, 10)[0], 255);
-  EXPECT_EQ(image.Pixel(3, 5)[0], 0);
-  EXPECT_EQ(image.Pixel(12, 10)[0], 0);
-}
-
-TEST(Canvas, TranslucentColorsMix) {
-  Image image(4, 4);
-  Canvas(&image).FillRoundedRectangle({0.0, 0.0}, {4.0, 4.0}, 0.0, MakeColor(0xffffff, 0.5F));
-  EXPECT_NEAR(image.Pixel(1, 1)[1], 128, 1);
-}
-
-TEST(Canvas, CircleHasItsArea) {
-  Image image(40, 40);
-  Canvas(&image).FillCircle({20.3, 19.6}, 12.0, kWhite);
-  // The smoothed edge is a straight cut through each pixel, the circle is not.
-  constexpr double kRelative = 0.005;
-  EXPECT_NEAR(Area(image), kPi * 144.0, kRelative * kPi * 144.0);
-}
-
-TEST(Canvas, PathCoversItsJointsOnce) {
-  Image image(60, 40);
-  const std::array<Vector2d, 3> bent = {Vector2d(10.0, 10.0), Vector2d(30.0, 10.0), Vector2d(30.0, 30.0)};
-  Canvas(&image).StrokePath(bent, 4.0, MakeColor(0xffffff, 0.5F));
-  // Two arms of 20, round ends, one quarter of a circle outside of the corner, one square of the joint inside
-  // of both arms.
-  const double expected = 0.5 * (2.0 * 20.0 * 4.0 + kPi * 4.0 + 0.25 * kPi * 4.0 - 4.0);
-  EXPECT_NEAR(Area(image), expected, 0.02 * expected);
-  for (const std::uint8_t value : image.rgb) EXPECT_LE(value, 128);
+  Canvas(&image).FillRoundedRectangle({0.0, 0.0}, {4.0, 4.0}, 0.0, MakeColor(0x204080, 0.5F));
+  for (const auto& [channel, value] : {std::pair(0, 16), std::pair(1, 32), std::pair(2, 64)})
+    EXPECT_NEAR(image.Pixel(1, 1)[channel], value, 1);
 }
 
 TEST(Canvas, CutsOffWhatIsOutside) {
   Image image(8, 8);
-  Canvas canvas(&image);
-  canvas.FillRoundedRectangle({-100.0, -100.0}, {300.0, 300.0}, 5.0, kWhite);
-  EXPECT_NEAR(Area(image), 64.0, kRounding);
-  const std::array<Vector2d, 2> away = {Vector2d(-50.0, -10.0), Vector2d(1e6, -10.0)};
-  canvas.StrokePath(away, 3.0, MakeColor(0x000000));
-  canvas.FillCircle({1e9, -1e9}, 5.0, MakeColor(0x000000));
-  Font font(Font::SystemFolder() / "DejaVuSans.ttf");
-  canvas.DrawText(font, 20.0, {-500.0, 4.0}, "outside", MakeColor(0x000000));
+  {
+    Canvas canvas(&image);
+    canvas.FillRoundedRectangle({-100.0, -100.0}, {300.0, 300.0}, 5.0, kWhite);
+    const std::array<Vector2d, 2> away = {Vector2d(-50.0, -10.0), Vector2d(1e6, -10.0)};
+    canvas.StrokePath(away, 3.0, MakeColor(0x000000));
+    canvas.FillCircle({1e9, -1e9}, 5.0, MakeColor(0x000000));
+    canvas.DrawText(Font(Font::SystemFolder() / "DejaVuSans.ttf"), 20.0, {-500.0, 4.0}, "outside",
+                    MakeColor(0x000000));
+  }
   EXPECT_NEAR(Area(image), 64.0, kRounding);
 }
 
@@ -107,7 +83,7 @@ TEST(Canvas, TextStandsWhereItIsAligned) {
   }
 }
 
-TEST(Font, BrokenUtf8IsDrawnAsReplacement) {
+TEST(Font, BrokenUtf8IsMended) {
   Font font(Font::SystemFolder() / "DejaVuSans.ttf");
   EXPECT_GT(font.Measure("\xff\xc3", 20.0), 0.0);
   EXPECT_EQ(font.Measure("", 20.0), 0.0);
@@ -115,8 +91,9 @@ TEST(Font, BrokenUtf8IsDrawnAsReplacement) {
 
 TEST(Font, NamesAFileThatIsNone) {
   EXPECT_TRUE(Throws<InputError>([] { Font font("/nowhere/font.ttf"); },
-                                 "/nowhere/font.ttf: cannot be used as a font: cannot be read"));
-  EXPECT_TRUE(Throws<InputError>([] { Font font(testing::SourcePath("/README.md")); }, "not a font file"));
+                                 "/nowhere/font.ttf: cannot be used as a font"));
+  EXPECT_TRUE(
+      Throws<InputError>([] { Font font(testing::SourcePath("/README.md")); }, "cannot be used as a font"));
 }
 
 }  // namespace

@@ -99,23 +99,24 @@ TEST(FrameLineTest, HasNoMoreProcessesThanFrames) {
 TEST(FrameLineTest, FewFramesWaitToBeTaken) {
   SharedCounter drawn;
   constexpr int kWorkers = 2;
-  // Two of each process wait, and one more is drawn and does not fit.
-  constexpr long kMost = 3 * kWorkers;
-  FrameLine line = MakeLine(
-      [&](long frame) {
-        ++*drawn;
-        return Fill(frame, 0, 0);
+  constexpr int kLarge = 1000;  // pixels: one picture fills a channel
+  FrameLine line(
+      [&] {
+        return [&](long) {
+          ++*drawn;
+          return Image(kLarge, kLarge);
+        };
       },
-      100, kWorkers);
+      100, kWorkers, kLarge, kLarge);
   const auto settle = [&](long expected) {
     for (int k = 0; k < 1000 && *drawn < expected; ++k)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     return (*drawn).load();
   };
-  EXPECT_EQ(settle(kMost), kMost);
-  EXPECT_EQ(line.Take().rgb, Fill(0, 0, 0).rgb);
-  EXPECT_EQ(settle(kMost + 1), kMost + 1);
+  EXPECT_EQ(settle(kWorkers), kWorkers);
+  line.Take();
+  EXPECT_EQ(settle(kWorkers + 1), kWorkers + 1);
 }
 
 TEST(FrameLineTest, ErrorsReachTheCaller) {

@@ -39,10 +39,8 @@ OverlayState MakeState() {
   OverlayState state;
   state.title = "scenario";
   state.time = 1.0;
-  state.questions = {{"model", "M_bar", 1e-13, 1e-12, true},
-                     {"balance", "", 0.0, 0.0, false},
-                     {"prediction", "force", 1e-7, 1e-6, true},
-                     {"assumption", "slip", 1e-7, 1e-6, true}};
+  for (const CheckCategory category : kCheckCategories) state.categories.emplace_back(category);
+  for (const size_t asked : {0U, 3U, 4U}) state.categories[asked].Add("a check", 1e-7, 1e-6, false);
   return state;
 }
 
@@ -55,13 +53,13 @@ TEST(Overlay, DotsShowTheChecksThatPassAndFail) {
   EXPECT_NEAR(CountSaturated(good, 1), 3 * 78, 40);
   EXPECT_EQ(CountSaturated(good, 0), 0);
 
-  state.questions[2].worst = 2e-6;
+  state.categories[3].Add("another", 2e-6, 1e-6, true);
   Image bad(900, 720);
   overlay.Draw(state, &bad);
   EXPECT_NEAR(CountSaturated(bad, 1), 2 * 78, 30);
   EXPECT_NEAR(CountSaturated(bad, 0), 78, 15);
 
-  state.questions[2].worst = std::numeric_limits<double>::infinity();
+  state.categories[3].Add("a third", std::numeric_limits<double>::infinity(), 1e-6, true);
   Image infinite(900, 720);
   overlay.Draw(state, &infinite);
   EXPECT_NEAR(CountSaturated(infinite, 0), 78, 15);
@@ -70,7 +68,7 @@ TEST(Overlay, DotsShowTheChecksThatPassAndFail) {
 TEST(Overlay, PlotRisesWithTheError) {
   Overlay overlay;
   OverlayState state = MakeState();
-  state.questions.clear();
+  state.categories.clear();
   state.error_low = 1e-9;
   state.error_high = 1e-6;
   const auto mean_row = [&](double error) {

@@ -5,7 +5,6 @@
 #include <filesystem>
 
 #include "controller/common/errors.h"
-#include "renders/png_file.h"
 #include "tests/common/files.h"
 #include "tests/common/run_program.h"
 #include "tests/common/throws.h"
@@ -56,6 +55,23 @@ TEST(PictureFile, WritesWhatTheNameSaysOrNothing) {
   EXPECT_TRUE(Throws<InputError>([&] { WritePicture("/nowhere/a.jpg", MakePicture()); },
                                  "/nowhere/a.jpg: cannot be written: No such file"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1);
+}
+
+TEST(PictureFile, ReplacesAnExistingFileWhole) {
+  const TempFolder folder;
+  testing::WriteText(folder.path() / "a.png", "old");
+  WritePicture(folder.path() / "a.png", Image(3, 3));
+  EXPECT_EQ(ReadPng(folder.path() / "a.png").width, 3);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(PictureFile, NamesTheFileThatIsNoPicture) {
+  EXPECT_TRUE(Throws<InputError>([] { ReadPng("/nowhere/a.png"); }, "/nowhere/a.png: cannot be read"));
+  const TempFolder folder;
+  WritePicture(folder.path() / "a.png", MakePicture());
+  const std::string text = testing::ReadText(folder.path() / "a.png");
+  testing::WriteText(folder.path() / "a.png", text.substr(0, text.size() / 2));
+  EXPECT_TRUE(Throws<InputError>([&] { ReadPng(folder.path() / "a.png"); }, "a.png: cannot be read"));
 }
 
 }  // namespace

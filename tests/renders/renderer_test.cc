@@ -10,7 +10,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
-#include "renders/png_file.h"
+#include "renders/picture_file.h"
 #include "renders/run_decorations.h"
 #include "renders/video.h"
 #include "tests/common/files.h"
@@ -247,7 +247,7 @@ TEST_F(RendererTest, StillLooksAsItDid) {
   };
   const Image image = paint(run_);
   const std::string path = testing::SourcePath("/tests/renders/golden_still.png");
-  if (std::getenv("DEXCHECK_WRITE_GOLDEN") != nullptr) WritePng(path, image);
+  if (std::getenv("DEXCHECK_WRITE_GOLDEN") != nullptr) WritePicture(path, image);
   const Image golden = ReadPng(path);
   ASSERT_EQ(golden.rgb.size(), image.rgb.size());
   const auto share_that_differs = [&](const Image& other) {

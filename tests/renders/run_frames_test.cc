@@ -74,34 +74,30 @@ TEST_F(RunFramesTest, CheckHistoryKeepsTheWorstPerBound) {
   run_.checks[1].residuals[4] = -8e-10;
   run_.checks[2].residuals[6] = kNan;
   const CheckHistory history(run_);
-  EXPECT_EQ(history.At(CheckCategory::kModel, 3).check->name, "a");
-  EXPECT_DOUBLE_EQ(history.At(CheckCategory::kModel, 3).worst, 5e-4);
-  EXPECT_EQ(history.At(CheckCategory::kModel, 4).check->name, "b");
-  EXPECT_DOUBLE_EQ(history.At(CheckCategory::kModel, 10).worst, 8e-10) << "a peak stays";
-  EXPECT_EQ(history.At(CheckCategory::kInverseDynamics, 5).worst, 0.0);
-  EXPECT_EQ(history.At(CheckCategory::kInverseDynamics, 10).worst, std::numeric_limits<double>::infinity());
-  EXPECT_EQ(history.At(CheckCategory::kForwardDynamics, 10).check, nullptr);
+  const auto at = [&](size_t category, long row) { return history.ListCategories(row)[category]; };
+  EXPECT_EQ(at(0, 3).check, "a");
+  EXPECT_DOUBLE_EQ(at(0, 3).worst, 5e-4);
+  EXPECT_EQ(at(0, 4).check, "b");
+  EXPECT_DOUBLE_EQ(at(0, 10).worst, 8e-10) << "a peak stays";
+  EXPECT_EQ(at(2, 5).worst, 0.0);
+  EXPECT_EQ(at(2, 10).worst, std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(at(3, 10).is_asked());
 }
 
-TEST_F(RunFramesTest, AllFiveQuestionsAreListed) {
+TEST_F(RunFramesTest, AllFiveCategoriesAreListed) {
   run_.checks = {{"law_torque", CheckCategory::kLaw, 1e-9, std::vector<double>(11, 1e-10)},
                  {"cone_use", CheckCategory::kAssumption, 0.9, std::vector<double>(11, 0.2)}};
   run_.checks[0].residuals[4] = 2e-9;
-  const auto names = [](const std::vector<CategoryStatus>& questions) {
-    std::string text;
-    for (const CategoryStatus& question : questions) text += question.name + " ";
-    return text;
-  };
   const CheckHistory history(run_);
-  const std::vector<CategoryStatus> questions = history.ListCategories(10);
-  EXPECT_EQ(names(questions), "model law balance prediction assumption ");
-  ASSERT_EQ(questions.size(), 5U);
-  EXPECT_FALSE(questions[0].asked);
-  EXPECT_EQ(questions[1].check, "law_torque");
-  EXPECT_DOUBLE_EQ(questions[1].worst, 2e-9);
-  EXPECT_FALSE(questions[1].Passes());
-  EXPECT_TRUE(history.ListCategories(3)[1].Passes());
-  EXPECT_TRUE(questions[4].Passes());
+  const std::vector<CategoryStatus> categories = history.ListCategories(10);
+  ASSERT_EQ(categories.size(), kCheckCategories.size());
+  for (size_t i = 0; i < categories.size(); ++i) EXPECT_EQ(categories[i].category, kCheckCategories[i]);
+  EXPECT_FALSE(categories[0].is_asked());
+  EXPECT_EQ(categories[1].check, "law_torque");
+  EXPECT_DOUBLE_EQ(categories[1].worst, 2e-9);
+  EXPECT_EQ(categories[1].failed, 1);
+  EXPECT_EQ(history.ListCategories(3)[1].failed, 0);
+  EXPECT_EQ(categories[4].failed, 0);
   run_.checks.clear();
   EXPECT_TRUE(CheckHistory(run_).ListCategories(3).empty());
 }

@@ -55,31 +55,6 @@
     return rows;
   };
 
-  /** An axis that shows at least the plot's least span, so that rounding errors do not fill it. */
-  const findRange = (plot, rows, right) => {
-    let low = Infinity;
-    let high = -Infinity;
-    plot.curves.forEach((curve, k) => {
-      if (curve.right !== right) return;
-      for (const row of rows) {
-        if (row[k + 1] === null) continue;
-        low = Math.min(low, row[k + 1]);
-        high = Math.max(high, row[k + 1]);
-      }
-    });
-    if (!right && plot.bound !== null) {
-      low = Math.min(low, plot.bound);
-      high = Math.max(high, plot.bound);
-    }
-    if (low > high) return plot.log ? [0.1, 10] : [-1, 1];
-    if (plot.log) return [low / 2, high * 3];
-    const middle = (low + high) / 2;
-    const half = 0.54 * Math.max(high - low, plot.span, 1e-9 * Math.abs(middle), 1e-12);
-    // With two axes the left one's curves are in the upper half, the right one's in the lower half.
-    const room = plot.right ? 2 * half : 0;
-    return [middle - half - (right ? 0 : room), middle + half + (right ? room : 0)];
-  };
-
   const showTogether = range => {
     shown = range;
     for (const plot of plots) {
@@ -163,8 +138,7 @@
     });
     let graph = null;
     const values = makeKeys(plot, box.querySelector('.keys'), () => graph);
-    const range = findRange(plot, rows, false);
-    const rightRange = findRange(plot, rows, true);
+    const ranges = [plot.range, plot.right_range ?? null];
     const formatAxis = value => format(Number(value.toPrecision(4)));
     const axis = {axisLabelFormatter: formatAxis, axisLabelWidth: 62};
     if (plot.log) axis.ticker = tickDecades;
@@ -173,8 +147,8 @@
       series,
       axes: {
         x: {axisLabelFormatter: formatAxis},
-        y: Object.assign({valueRange: range}, axis),
-        y2: Object.assign({valueRange: plot.right ? rightRange : null, independentTicks: true, drawGrid: false}, axis),
+        y: Object.assign({valueRange: ranges[0]}, axis),
+        y2: Object.assign({valueRange: ranges[1], independentTicks: true, drawGrid: false}, axis),
       },
       logscale: plot.log,
       xlabel: 't (s)',
@@ -215,7 +189,7 @@
     clock.listeners.push(showValues);
     showValues();
     box.graph = graph;
-    box.ranges = [range, plot.right ? rightRange : null];
+    box.ranges = ranges;
     plots.push(graph);
   };
 
@@ -236,6 +210,9 @@
     }
   }, {rootMargin: '400px'});
   for (const box of boxes) watcher.observe(box);
+  addEventListener('beforeprint', () => {
+    for (const box of boxes) if (!box.graph) draw(box, run.plots[Number(box.dataset.plot)]);
+  });
   for (const button of document.querySelectorAll('[data-time]')) {
     button.addEventListener('click', () => {
       clock.set(Number(button.dataset.time));

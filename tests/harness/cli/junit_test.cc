@@ -78,7 +78,7 @@ TEST_F(JUnit, OfAnAudit) {
 
 TEST_F(JUnit, OfARun) {
   const JUnitFile good = Run({"run", "paper", "--set", "duration=0.05", "--no-log"}, 0);
-  EXPECT_THAT(good.cases, ::testing::Contains("dexcheck.run.paper.prediction contact_force"));
+  EXPECT_THAT(good.cases, ::testing::Contains("dexcheck.run.paper.forward_dynamics contact_force"));
   EXPECT_THAT(good.failures, ::testing::IsEmpty());
   const JUnitFile bad =
       Run({"run", "paper", "--set", "duration=0.05", "--set", "model.gravity=[0,0,-9.8]", "--no-log"}, 1);

@@ -15,7 +15,7 @@
 
 #include "harness/engine/engine.h"
 #include "harness/log/log_writer.h"
-#include "renders/png_file.h"
+#include "renders/picture_file.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"

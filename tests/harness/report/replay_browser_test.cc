@@ -8,7 +8,7 @@
 #include <string>
 
 #include "harness/report/write_report.h"
-#include "renders/png_file.h"
+#include "renders/picture_file.h"
 #include "renders/renderer.h"
 #include "renders/run_decorations.h"
 #include "tests/common/browser.h"

@@ -56,8 +56,8 @@ inline std::string MakeReportSummary(const ReportRun& run) {
     if (max > bound) json["checks"][name]["failed_at_s"] = 0.133;
   };
   add("M_bar", "model", "1", 1e-16, 1e-13);
-  add("inverse_dynamics_robot", "balance", "1", 5e-6, 1e-5);
-  add("contact_force", "prediction", "1", 1e-9, 1e-6);
+  add("inverse_dynamics_robot", "inverse_dynamics", "1", 5e-6, 1e-5);
+  add("contact_force", "forward_dynamics", "1", 1e-9, 1e-6);
   add("wheel_slip", "assumption", "m", fails ? 4e-3 : 1e-5, 1e-3);
   return json.dump(2);
 }

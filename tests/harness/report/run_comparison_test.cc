@@ -147,10 +147,10 @@ TEST_F(RunComparisonTest, APageEscapesWhatComesFromTheLogs) {
 }
 
 // A run that was cut off has no summary: its checks are read from their signals, the law's among them.
-TEST_F(RunComparisonTest, ChecksOfARunWithoutSummaryKeepTheirQuestion) {
+TEST_F(RunComparisonTest, ChecksOfARunWithoutSummaryKeepTheirCategory) {
   WriteLine(folder_.path(), 0.01, 1.0, "");
   const RunData run(folder_.path());
-  for (const CheckLine& check : run.checks())
+  for (const CheckRecord& check : run.checks())
     EXPECT_EQ(check.kind, check.name == "law_torque" ? CheckCategory::kLaw : CheckCategory::kModel)
         << check.name;
 }
