@@ -170,7 +170,7 @@ std::string Show(const ControlOptions& control) {
                      static_cast<int>(control.kappa), control.contact_error);
 }
 
-std::string Show(const TaskOptions& task) {
+std::string Show(const PickTask& task) {
   const PickAndPlaceOptions& pick = task.pick_and_place;
   return fmt::format("{} {} {} {} | {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
                      Show(MatrixXd(task.X_Bo.matrix())), fmt::join(task.arm_joints, " "), Show(pick.raise),
@@ -191,13 +191,13 @@ std::string Show(const TrajectoryMaker& make) {
 std::string Show(const Scenario& scenario) {
   std::string text =
       fmt::format("{} {} {} {} {} {}\n", scenario.description, scenario.duration, scenario.settle,
-                  static_cast<int>(scenario.start), Show(scenario.start_error), scenario.tolerance);
+                  static_cast<int>(scenario.start), Show(scenario.start_error()), scenario.tolerance);
   text += Show(scenario.plant) + "\n" + Show(scenario.grasp) + "\n" + Show(scenario.control) + "\n";
   text += Show(scenario.imperfections.sensing) + "\n" + Show(scenario.imperfections.actuation) + "\n";
   for (const auto& push : scenario.imperfections.disturbances) text += Show(push) + "\n";
   text += Show(scenario.imperfections.mismatch) + "\n";
-  if (scenario.task) text += Show(*scenario.task) + "\n";
-  if (scenario.trajectory) text += Show(scenario.trajectory) + "\n";
+  if (scenario.pick_task() != nullptr) text += Show(*scenario.pick_task()) + "\n";
+  if (scenario.trajectory_task() != nullptr) text += Show(scenario.trajectory_task()->trajectory) + "\n";
   return text + fmt::format("{} {} {}", Show(scenario.expect.position), Show(scenario.expect.orientation),
                             scenario.expect.from);
 }
