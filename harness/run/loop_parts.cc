@@ -114,7 +114,7 @@ LoopParts MakeLoopParts(const Setup& setup, const std::string& what, const std::
   if (scenario.pick_task() != nullptr)
     throw InputError(scenario.source + ": task: is done by no other controller");
   if (scenario.control.kappa == ContactSource::kIntegrated) {
-    throw InputError(scenario.source + ": control.kappa: other controllers are told where contacts are");
+    throw InputError(scenario.source + ": control.kappa: other controllers get measured contacts");
   }
   LoopParts parts = MakeLoopParts(setup);
   const OwnControllerSetup own{&setup.model(),

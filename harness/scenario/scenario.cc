@@ -57,18 +57,13 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
   PlantOptions& plant = scenario->plant;
   scenario->mjcf_file = ReadPath(table, "mjcf", folder);
   ReadPlantType(table, &plant);
-  ReadKeys<PlantOptions>(table,
-                         {{"time_step", &PlantOptions::time_step, Range::kPositive},
-                          {"control_step", &PlantOptions::control_step},
-                          {"contact_time_constant", &PlantOptions::contact_time_constant},
-                          {"contact_impedance", &PlantOptions::contact_impedance, Range::kPositive},
-                          {"impratio", &PlantOptions::impratio, Range::kPositive},
-                          {"bonded", &PlantOptions::bonded},
-                          {"implicit_damping", &PlantOptions::implicit_damping},
-                          {"floor_friction", &PlantOptions::floor_friction, Range::kPositive},
-                          {"finger_friction", &PlantOptions::finger_friction, Range::kPositive},
-                          {"collide", &PlantOptions::collide}},
-                         &plant);
+  using Options = PlantOptions;
+  ReadKeys<Options>(
+      table,
+      {POSITIVE_KEY(time_step), KEY(control_step), KEY(contact_time_constant),
+       POSITIVE_KEY(contact_impedance), POSITIVE_KEY(impratio), KEY(bonded), KEY(implicit_damping),
+       POSITIVE_KEY(floor_friction), POSITIVE_KEY(finger_friction), KEY(collide)},
+      &plant);
   if (plant.contact_impedance >= 1.0) table.Get("contact_impedance").Fail("must be less than 1");
   if (const auto count = table.Find("noslip_iterations")) {
     plant.noslip_iterations = static_cast<int>(count->AsWhole(0, kMaxNoslipIterations));
@@ -86,9 +81,9 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
 /// @param of_joints whether joints follow a motion, and no object does.
 void ReadExpectation(const TomlValue& value, bool of_joints, Expectation* expect) {
   TomlTable table = value.AsTable();
-  ReadKeys<Expectation>(table, {{"from", &Expectation::from}}, expect);
-  if (!of_joints)
-    ReadKeys<Expectation>(table, {{"position", &Expectation::position, Range::kPositive}}, expect);
+  using Options = Expectation;
+  ReadKeys<Options>(table, {KEY(from)}, expect);
+  if (!of_joints) ReadKeys<Options>(table, {POSITIVE_KEY(position)}, expect);
   const auto [angle, unit] = table.FindWithAngleUnit(of_joints ? "joints" : "orientation");
   if (angle) (of_joints ? expect->joints : expect->orientation) = unit * angle->AsPositive();
   table.RejectUnused();
@@ -113,7 +108,7 @@ void RequireFewSteps(TomlTable& root, const Scenario& scenario) {
   root.Get("plant").AsTable().Get("time_step").Fail("is too small to settle in 1e8 time steps");
 }
 
-/// @param scenario what is known of it before its file is read.
+/// @param scenario text, source and overrides.
 Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
                       const std::vector<std::string>& model_overrides, Scenario scenario) {
   root.RejectOthersThan({"name",        "description", "duration",     "settle",  "start",
@@ -124,9 +119,8 @@ Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
   if (const auto description = root.Find("description")) scenario.description = description->AsText();
   scenario.duration = root.Get("duration").AsPositive();
   scenario.start = root.Get("start").AsChoice<Start>({{"moving", Start::kMoving}, {"rest", Start::kRest}});
-  ReadKeys<Scenario>(root,
-                     {{"settle", &Scenario::settle, Range::kPositive}, {"tolerance", &Scenario::tolerance}},
-                     &scenario);
+  using Options = Scenario;
+  ReadKeys<Options>(root, {POSITIVE_KEY(settle), KEY(tolerance)}, &scenario);
   if (scenario.settle > kMaxSettle) root.Get("settle").Fail("must be at most 100 s");
   if (scenario.tolerance >= 1.0) root.Get("tolerance").Fail("must be below 1");
   if (const auto model = root.Find("model")) ReadModel(*model, folder, &scenario);

@@ -51,7 +51,7 @@ struct PlantOptions {
   bool implicit_damping = false;  ///< The engine's own treatment of joint damping.
   std::optional<double> floor_friction;   ///< mu of wheels on the floor.
   std::optional<double> finger_friction;  ///< mu of fingertips on the object.
-  bool collide = false;                   ///< Bodies that are not meant to touch push each other.
+  bool collide = false;                   ///< Bodies that should not touch push each other.
   /// Two bodies each that may touch, or pass through each other, unwatched.
   std::vector<std::pair<std::string, std::string>> allowed_collision_pairs;
 

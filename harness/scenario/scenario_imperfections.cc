@@ -42,18 +42,10 @@ void ReadSensing(const TomlValue& value, double time_step, SensingOptions* sensi
   using Options = SensingOptions;
   TomlTable table = value.AsTable();
   ReadKeys<Options>(table,
-                    {{"joint_counts", &Options::joint_counts},
-                     {"joint_noise", &Options::joint_noise},
-                     {"velocity_noise", &Options::velocity_noise},
-                     {"velocity_cutoff", &Options::velocity_cutoff},
-                     {"kalman_acceleration", &Options::kalman_acceleration, Range::kPositive},
-                     {"odometry", &Options::odometry},
-                     {"object_position_noise", &Options::object_position_noise},
-                     {"object_orientation_noise", &Options::object_orientation_noise},
-                     {"object_rate", &Options::object_rate},
-                     {"object_velocity_cutoff", &Options::object_velocity_cutoff},
-                     {"object_acceleration", &Options::object_acceleration, Range::kPositive},
-                     {"contact_force_noise", &Options::contact_force_noise}},
+                    {KEY(joint_counts), KEY(joint_noise), KEY(velocity_noise), KEY(velocity_cutoff),
+                     POSITIVE_KEY(kalman_acceleration), KEY(odometry), KEY(object_position_noise),
+                     KEY(object_orientation_noise), KEY(object_rate), KEY(object_velocity_cutoff),
+                     POSITIVE_KEY(object_acceleration), KEY(contact_force_noise)},
                     sensing);
   ReadSource(table, "velocity", "kalman_acceleration", &sensing->velocity);
   ReadSource(table, "object_velocity", "object_acceleration", &sensing->object_velocity);
@@ -74,14 +66,8 @@ void ReadActuation(const TomlValue& value, double time_step, ActuationOptions* a
   using Options = ActuationOptions;
   TomlTable table = value.AsTable();
   ReadKeys<Options>(table,
-                    {{"torque_step", &Options::torque_step},
-                     {"gain_error", &Options::gain_error, Range::kAny},
-                     {"lag", &Options::lag},
-                     {"coulomb", &Options::coulomb},
-                     {"stribeck", &Options::stribeck},
-                     {"stribeck_velocity", &Options::stribeck_velocity, Range::kPositive},
-                     {"backlash", &Options::backlash},
-                     {"saturate", &Options::saturate}},
+                    {KEY(torque_step), ANY_KEY(gain_error), KEY(lag), KEY(coulomb), KEY(stribeck),
+                     POSITIVE_KEY(stribeck_velocity), KEY(backlash), KEY(saturate)},
                     actuation);
   ReadDelay(table, "delay", time_step, /*whole=*/false, &actuation->delay);
   table.RejectUnused();
@@ -92,14 +78,8 @@ void ReadWrench(TomlTable& table, double time_step, DisturbanceOptions* one) {
   one->body = table.Get("body").AsName();
   ReadChoice<bool>(table, "frame", {{"world", false}, {"body", true}}, &one->in_body_frame);
   ReadKeys<Options>(table,
-                    {{"force", &Options::force},
-                     {"torque", &Options::torque},
-                     {"at", &Options::at},
-                     {"begin", &Options::begin},
-                     {"duration", &Options::duration, Range::kPositive},
-                     {"period", &Options::period, Range::kPositive},
-                     {"begin_within", &Options::begin_within},
-                     {"size_within", &Options::size_within}},
+                    {KEY(force), KEY(torque), KEY(at), KEY(begin), POSITIVE_KEY(duration),
+                     POSITIVE_KEY(period), KEY(begin_within), KEY(size_within)},
                     one);
   if (one->kind == Options::Kind::kPulse || (one->period > 0.0 && one->duration <= 0.0)) {
     (void)table.Get("duration");
@@ -141,7 +121,7 @@ void ReadDisturbance(const TomlValue& value, size_t number, double time_step, Im
     ReadSlope(table, &all->mismatch.slope);
   } else if (type == Type::kPayload) {
     Payload payload{.body = table.Get("body").AsName(), .mass = table.Get("mass").AsPositive(), .key = key};
-    ReadKeys<Payload>(table, {{"at", &Payload::at}}, &payload);
+    if (const auto at = table.Find("at")) payload.at = at->AsVector<3>();
     all->mismatch.payloads.push_back(payload);
   } else {
     constexpr Kind kKinds[] = {Kind::kPulse, Kind::kStep, Kind::kSine, Kind::kNoise};
@@ -157,12 +137,7 @@ void ReadDisturbance(const TomlValue& value, size_t number, double time_step, Im
 void ReadMismatch(const TomlValue& value, MismatchOptions* mismatch) {
   using Options = MismatchOptions;
   TomlTable table = value.AsTable();
-  ReadKeys<Options>(table,
-                    {{"mass", &Options::mass, Range::kPositive},
-                     {"mass_within", &Options::mass_within},
-                     {"damping", &Options::damping},
-                     {"armature", &Options::armature}},
-                    mismatch);
+  ReadKeys<Options>(table, {POSITIVE_KEY(mass), KEY(mass_within), KEY(damping), KEY(armature)}, mismatch);
   const ByName& within = mismatch->mass_within;
   const bool too_wide = within.all > kLargestSpread ||
                         std::any_of(within.groups.begin(), within.groups.end(),

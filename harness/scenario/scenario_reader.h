@@ -31,8 +31,14 @@ struct Key {
   Range range = Range::kNotNegative;
 };
 
-/// A number. @throws InputError when it is out of its range.
-double ReadNumber(const TomlValue& value, Range range);
+// Keys that are called as the members of Options where their values go: numbers that are not negative (also
+// flags and lists), positive ones, any.
+#define KEY(member) \
+  { #member, &Options::member }
+#define POSITIVE_KEY(member) \
+  { #member, &Options::member, Range::kPositive }
+#define ANY_KEY(member) \
+  { #member, &Options::member, Range::kAny }
 
 void ReadValue(const TomlValue& value, Range range, double* target);
 void ReadValue(const TomlValue& value, Range range, std::optional<double>* target);

@@ -133,9 +133,8 @@ void ReadControl(const TomlValue& value, const Scenario& scenario, ControlOption
   ReadWeight(table, control);
   control->f_max = table.Get("f_max").AsPositive();
   control->mu = table.Get("mu").AsPositive();
-  ReadKeys<ControlOptions>(
-      table, {{"posture_frequency", &ControlOptions::posture_frequency}, {"f_min", &ControlOptions::f_min}},
-      control);
+  using Options = ControlOptions;
+  ReadKeys<Options>(table, {KEY(posture_frequency), KEY(f_min)}, control);
   if (control->f_max <= control->f_min) table.Get("f_max").Fail("must be greater than f_min");
   ReadChoice<ContactSource>(table, "kappa",
                             {{"exact", ContactSource::kExact}, {"integrated", ContactSource::kIntegrated}},
@@ -158,24 +157,17 @@ PickTask ReadPickTask(const TomlValue& value) {
   PickAndPlaceOptions& pick = task.pick_and_place;
   (void)table.Get("xyz");
   ReadPose(table, &task.X_Bo);
-  ReadKeys<PickTask>(table, {{"arm_joints", &PickTask::arm_joints}}, &task);
+  if (const auto joints = table.Find("arm_joints")) ReadValue(*joints, Range::kAny, &task.arm_joints);
+  using Options = PickAndPlaceOptions;
   pick.raise.z() = pick.plan.raise = table.Get("raise").AsPositive();
   pick.transport = pick.plan.transport = table.Get("transport").AsVector<3>();
   pick.plan.support = table.Get("support_height").AsNumber();
-  ReadKeys<PickAndPlaceOptions>(table,
-                                {{"approach_time", &PickAndPlaceOptions::approach_time, Range::kPositive},
-                                 {"lower_time", &PickAndPlaceOptions::lower_time, Range::kPositive},
-                                 {"close_time", &PickAndPlaceOptions::close_time, Range::kPositive},
-                                 {"search_speed", &PickAndPlaceOptions::search_speed, Range::kPositive},
-                                 {"grip_time", &PickAndPlaceOptions::grip_time, Range::kPositive},
-                                 {"take_over_time", &PickAndPlaceOptions::take_over_time, Range::kPositive},
-                                 {"raise_time", &PickAndPlaceOptions::raise_time, Range::kPositive},
-                                 {"arm_rate", &PickAndPlaceOptions::arm_rate, Range::kPositive},
-                                 {"transport_time", &PickAndPlaceOptions::transport_time, Range::kPositive},
-                                 {"touch_force", &PickAndPlaceOptions::touch_force, Range::kPositive},
-                                 {"overload", &PickAndPlaceOptions::overload, Range::kPositive},
-                                 {"largest_push", &PickAndPlaceOptions::largest_push, Range::kPositive}},
-                                &pick);
+  ReadKeys<Options>(table,
+                    {POSITIVE_KEY(approach_time), POSITIVE_KEY(lower_time), POSITIVE_KEY(close_time),
+                     POSITIVE_KEY(search_speed), POSITIVE_KEY(grip_time), POSITIVE_KEY(take_over_time),
+                     POSITIVE_KEY(raise_time), POSITIVE_KEY(arm_rate), POSITIVE_KEY(transport_time),
+                     POSITIVE_KEY(touch_force), POSITIVE_KEY(overload), POSITIVE_KEY(largest_push)},
+                    &pick);
   if (const auto opening = table.Find("opening")) pick.plan.opening = opening->AsPositive();
   constexpr long kMaxAttempts = 10;
   if (const auto attempts = table.Find("attempts")) {
@@ -291,12 +283,8 @@ void ReadJointControl(const TomlValue& value, ControlOptions* control, JointTask
   for (ByName* numbers : {&task->natural_frequency, &task->damping_ratio, &task->stiffness, &task->damping}) {
     numbers->all = std::numeric_limits<double>::quiet_NaN();
   }
-  ReadKeys<JointTask>(table,
-                      {{"natural_frequency", &JointTask::natural_frequency},
-                       {"damping_ratio", &JointTask::damping_ratio},
-                       {"stiffness", &JointTask::stiffness},
-                       {"damping", &JointTask::damping}},
-                      task);
+  using Options = JointTask;
+  ReadKeys<Options>(table, {KEY(natural_frequency), KEY(damping_ratio), KEY(stiffness), KEY(damping)}, task);
   table.RejectUnused();
 }
 
@@ -315,7 +303,7 @@ void ReadTask(TomlTable& root, Scenario* scenario) {
                   {{scenario->start != Start::kRest, "start: must be \"rest\" for a motion of joints"},
                    {scenario->plant.bonded, "plant.bonded: a motion of joints has no contacts"}});
   }
-  // First, so that all that are missing are told together.
+  // All that are missing are named together.
   const TomlValue grasp = root.Get("grasp");
   const TomlValue control = root.Get("control");
   const auto trajectory = pick ? std::nullopt : std::optional(root.Get("trajectory"));
