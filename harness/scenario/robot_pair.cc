@@ -100,8 +100,8 @@ RobotPair::RobotPair(const Scenario& scenario, RobotModel the_model, const std::
   RemoveLooks(engine.get(), pushing);
   adapter = std::make_unique<Adapter>(model, *engine, mjcf.string());
   RequireNothingElse(*adapter, mjcf.string());
-  gate = RunStaticGate(*adapter);
-  if (scenario.tolerance > 0.0) JudgeByTolerance(scenario.tolerance, &gate);
+  constants = CheckConstants(*adapter);
+  if (scenario.tolerance > 0.0) JudgeByTolerance(scenario.tolerance, &constants);
   WatchBodies(scenario, mjcf.string(), this);
   ApplyPlantOptions(scenario.plant, engine.get());
 }

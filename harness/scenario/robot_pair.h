@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "controller/model/robot_model.h"
+#include "harness/descriptions/constant_checks.h"
 #include "harness/engine/adapter.h"
 #include "harness/engine/clearance.h"
 #include "harness/engine/engine.h"
-#include "harness/gate/static_gate.h"
 #include "harness/scenario/scenario.h"
 
 namespace dexcheck {
@@ -41,8 +41,9 @@ struct RobotPair {
   /// engine.
   std::unique_ptr<RobotModel> rigid;
   std::unique_ptr<DeclaredMismatch> declared;  ///< Null without one.
-  GateResult gate;  ///< What the two disagree on before anything moves, the scenario's changes aside.
-  Solids solids;    ///< The shapes of all bodies,
+  ConstantChecks
+      constants;  ///< What the two disagree on before anything moves, the scenario's changes aside.
+  Solids solids;  ///< The shapes of all bodies,
   std::vector<WatchedPair> watched_pairs;  ///< and those pairs that should not touch.
 };
 

@@ -43,6 +43,7 @@ class Setup {
   [[nodiscard]] const RobotModel& model() const { return robots_.model; }
   [[nodiscard]] const mjModel& engine() const { return *robots_.engine; }
   [[nodiscard]] const Adapter& adapter() const { return *robots_.adapter; }
+  [[nodiscard]] const ConstantChecks& constants() const { return robots_.constants; }
   [[nodiscard]] const std::vector<int>& fingertips() const { return hold_.fingertips; }
   /// Whether there is an object; otherwise object() stands for it where terms of one are evaluated.
   [[nodiscard]] bool has_object() const { return model().object().has_value(); }
