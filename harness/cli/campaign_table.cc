@@ -50,15 +50,16 @@ const char* NameOf(MutantOutcome outcome) {
 }  // namespace
 
 void Campaign::Print(bool quiet) const {
-  constexpr const char* kLine = "{:<32}{:>7}{:>6}{:>8}{:>10}{:>9}{:>12}{:>10}\n";
   const std::vector<Row> rows = SumUp(faults);
   const Row& all = rows.back();
   if (!quiet) {
-    fmt::print(kLine, "what was wrong", "faults", "found", "refused", "no effect", "survived", "cause right",
-               "part");
+    size_t width = 15;
+    for (const Row& row : rows) width = std::max(width, row.kind.size() + 1);
+    fmt::print("{:<{}}{:>7}{:>6}{:>8}{:>10}{:>9}{:>6}{:>10}\n", "what was wrong", width, "faults", "found",
+               "refused", "no effect", "survived", "cause", all.with_part > 0 ? "part" : "");
     for (const Row& row : rows) {
-      fmt::print(kLine, row.kind, row.faults, row.found, row.refused, row.no_effect, row.survived,
-                 row.cause_right,
+      fmt::print("{:<{}}{:>7}{:>6}{:>8}{:>10}{:>9}{:>6}{:>10}\n", row.kind, width, row.faults, row.found,
+                 row.refused, row.no_effect, row.survived, row.cause_right,
                  row.with_part > 0 ? fmt::format("{} of {}", row.part_named, row.with_part) : "");
     }
     for (const CampaignFault& fault : faults) {
