@@ -80,52 +80,6 @@ void CheckSize(size_t size, std::string_view source) {
                    " bytes long");
 }
 
-enum class Change { kSet, kAppend, kRemove };
-
-/// Follows the path and makes the change where it ends. @param label of the assignment in messages.
-/// @param value none to remove. @returns the new node.
-const toml::node* ChangeAt(std::string_view path, Change change, const std::string& label, toml::node* value,
-                           toml::table* root) {
-  const auto fail = [&](const std::string& why) { throw InputError(label + ": " + why); };
-  toml::node* at = root;
-  size_t begin = 0;
-  while (true) {
-    const size_t dot = path.find('.', begin);
-    const std::string_view key = path.substr(begin, dot - begin);
-    const bool is_last = dot == std::string_view::npos;
-    if (key.empty()) fail("its path has an empty part");
-    if (toml::array* const list = at->as_array()) {
-      size_t index = 0;
-      const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), index);
-      if (error != std::errc() || end != key.data() + key.size() || index >= list->size()) {
-        fail(Quote(key) + " is no entry of a list of " + std::to_string(list->size()));
-      }
-      if (is_last) {
-        const auto place = list->cbegin() + static_cast<std::ptrdiff_t>(index);
-        if (change == Change::kRemove) return list->erase(place), nullptr;
-        return &*list->replace(place, std::move(*value));
-      }
-      at = list->get(index);
-    } else if (toml::table* const table = at->as_table()) {
-      if (change == Change::kRemove && !table->contains(key)) {
-        fail(Quote(path.substr(0, dot)) + " is not there");
-      }
-      if (is_last && change == Change::kAppend) {
-        toml::array* const list = table->insert(key, toml::array{}).first->second.as_array();
-        if (list == nullptr) fail(Quote(path) + " is no list");
-        list->push_back(std::move(*value));
-        return &list->back();
-      }
-      if (is_last && change == Change::kRemove) return table->erase(key), nullptr;
-      if (is_last) return &table->insert_or_assign(key, std::move(*value)).first->second;
-      at = &table->insert(key, toml::table{}).first->second;
-    } else {
-      fail(Quote(path.substr(0, begin - 1)) + " is no table or list");
-    }
-    begin = dot + 1;
-  }
-}
-
 /// TomlDocument::Override. "PATH+=VALUE" adds an entry to a list, which is made when it is not there;
 /// "PATH-=" removes a key that is there.
 void Assign(std::string_view assignment, toml::table* root) {
@@ -155,18 +109,59 @@ void Assign(std::string_view assignment, toml::table* root) {
     if (parsed.size() == 1) break;  // more keys mean that the value had a line break in it
   }
   if (parsed.size() != 1) fail("is not a value");
-  ChangeAt(path,
-           removes   ? Change::kRemove
-           : appends ? Change::kAppend
-                     : Change::kSet,
-           label, parsed.get("value"), root);
+
+  toml::node* at = root;
+  size_t begin = 0;
+  while (true) {
+    const size_t dot = path.find('.', begin);
+    const std::string_view key = path.substr(begin, dot - begin);
+    const bool is_last = dot == std::string_view::npos;
+    if (key.empty()) fail("its path has an empty part");
+    if (toml::array* const list = at->as_array()) {
+      size_t index = 0;
+      const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), index);
+      if (error != std::errc() || end != key.data() + key.size() || index >= list->size()) {
+        fail(Quote(key) + " is no entry of a list of " + std::to_string(list->size()));
+      }
+      if (is_last && removes) {
+        list->erase(list->cbegin() + static_cast<std::ptrdiff_t>(index));
+        return;
+      }
+      if (is_last) {
+        list->replace(list->cbegin() + static_cast<std::ptrdiff_t>(index), std::move(*parsed.get("value")));
+        return;
+      }
+      at = list->get(index);
+    } else if (toml::table* const table = at->as_table()) {
+      if (is_last && appends) {
+        if (!table->contains(key)) table->insert(key, toml::array{});
+        toml::array* const list = table->get(key)->as_array();
+        if (list == nullptr) fail(Quote(path) + " is no list");
+        list->push_back(std::move(*parsed.get("value")));
+        return;
+      }
+      if (removes && !table->contains(key)) fail(Quote(path.substr(0, dot)) + " is not there");
+      if (is_last && removes) {
+        table->erase(key);
+        return;
+      }
+      if (is_last) {
+        table->insert_or_assign(key, std::move(*parsed.get("value")));
+        return;
+      }
+      if (!table->contains(key)) table->insert(key, toml::table{});
+      at = table->get(key);
+    } else {
+      fail(Quote(path.substr(0, begin - 1)) + " is no table or list");
+    }
+    begin = dot + 1;
+  }
 }
 
 }  // namespace
 
 TomlDocument::TomlDocument(std::string_view text, std::string_view source)
-    : context_(std::make_unique<TomlContext>(
-          TomlContext{.source = std::string(source), .symbols = {}, .labels = {}, .missing = {}})) {
+    : context_(std::make_unique<TomlContext>(TomlContext{std::string(source), {}, {}})) {
   CheckSize(text.size(), source);
   if (const int line = NestingScanner(text).FindTooDeep(); line > 0) {
     throw InputError(context_->source + ":" + std::to_string(line) + ": nested too deeply, more than " +
@@ -183,19 +178,11 @@ TomlDocument::TomlDocument(std::string_view text, std::string_view source)
 
 TomlDocument::TomlDocument(const TomlDocument& other)
     : context_(std::make_unique<TomlContext>(*other.context_)),
-      root_(std::make_unique<toml::table>(*other.root_)) {
-  context_->labels.clear();
-}
+      root_(std::make_unique<toml::table>(*other.root_)) {}
 
 TomlTable TomlDocument::Open() const { return {*context_, TomlValue(*context_, *root_, ""), *root_}; }
 
 void TomlDocument::Override(std::string_view assignment) { Assign(assignment, root_.get()); }
-
-void TomlDocument::Set(std::string_view path, double value) {
-  const std::string label = Abbreviate("--set " + std::string(path) + "=" + FormatNumber(value));
-  toml::value<double> number(value);
-  context_->labels[ChangeAt(path, Change::kSet, label, &number, root_.get())] = label;
-}
 
 namespace {
 

@@ -117,7 +117,6 @@ void TomlValue::Fail(std::string_view requirement) const {
 std::string TomlValue::Locate() const {
   // A value that was overridden has its own source, which says where it comes from better than a line does.
   const toml::source_path_ptr& own_source = node_->source().path;
-  if (const auto label = context_->labels.find(node_); label != context_->labels.end()) return label->second;
   return own_source ? *own_source : context_->source + ":" + std::to_string(line());
 }
 

@@ -14,7 +14,6 @@
 
 #include <exception>
 #include <initializer_list>
-#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -39,10 +38,8 @@ struct MissingKeys {
 
 /// What all values of one file share.
 struct TomlContext {
-  std::string source;   ///< The file, for messages.
-  SymbolTable symbols;  ///< For quoted arithmetic.
-  /// Of values that TomlDocument::Set has put in place of the file's: where they come from.
-  std::map<const toml::node*, std::string> labels;
+  std::string source;                        ///< The file, for messages.
+  SymbolTable symbols;                       ///< For quoted arithmetic.
   mutable std::vector<MissingKeys> missing;  ///< So far.
 
   /// Throws InputError, one line with all keys that are missing so far; without any it does nothing.
@@ -216,9 +213,6 @@ class TomlDocument {
   /// numbers in the path count the entries of lists, from 0. A value that is not TOML is taken as text.
   /// @throws InputError when this is no assignment, or its path leads through what is no table or list.
   void Override(std::string_view assignment);
-  /// The same for a number that is one already. Messages show it as "--set PATH=VALUE".
-  /// @throws InputError as Override.
-  void Set(std::string_view path, double value);
   /// Adds a symbol to those that quoted arithmetic may use from now on.
   void Define(const std::string& symbol, double value) { context_->symbols[symbol] = value; }
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "harness/scenario/scenario_reader.h"
 
 namespace dexcheck {
@@ -158,10 +159,7 @@ void ScenarioDocument::Override(const std::string& assignment) {
 }
 
 void ScenarioDocument::Set(const std::string& path, double value) {
-  const std::string assignment = path + "=" + FormatNumber(value);
-  if (IsOfModel(assignment)) return Override(assignment);
-  document_.Set(path, value);
-  overrides_.push_back(assignment);
+  Override(path + "=" + FormatNumber(value));
 }
 
 Scenario ScenarioDocument::Read() const {

@@ -203,7 +203,7 @@ class ScenarioDocument {
   /// @param assignment "PATH=VALUE", as users write it; "model.PATH=VALUE" reaches into the parameter file.
   /// @throws InputError as TomlDocument::Override.
   void Override(const std::string& assignment);
-  /// The same for a number. @throws InputError as TomlDocument::Set.
+  /// The same for a number. @throws InputError as Override.
   void Set(const std::string& path, double value);
   /// @throws InputError, one line that names file, line, key and value.
   [[nodiscard]] Scenario Read() const;
