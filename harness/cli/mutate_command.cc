@@ -29,7 +29,10 @@ struct MutateRequest {
 };
 
 CampaignFault Describe(const Mutant& mutant, bool diagnosed) {
-  CampaignFault fault{mutant.kind, mutant.name, mutant.outcome, mutant.named_first};
+  CampaignFault fault{.kind = mutant.kind,
+                      .name = mutant.name,
+                      .outcome = mutant.outcome,
+                      .cause_right = mutant.named_first};
   if (mutant.outcome == MutantOutcome::kSurvived) fault.exception = "survived: " + mutant.name;
   if (mutant.outcome == MutantOutcome::kNoEffect) fault.exception = "no effect: " + mutant.name;
   if (diagnosed && mutant.outcome == MutantOutcome::kKilled && !mutant.named_first) {
@@ -45,7 +48,10 @@ CampaignFault Describe(const Mutant& mutant, bool diagnosed) {
 }
 
 CampaignFault Describe(const FormulaMutant& mutant) {
-  CampaignFault fault{"wrong equation", mutant.name, mutant.outcome, mutant.localised};
+  CampaignFault fault{.kind = "wrong equation",
+                      .name = mutant.name,
+                      .outcome = mutant.outcome,
+                      .cause_right = mutant.localised};
   if (mutant.outcome == MutantOutcome::kSurvived) fault.exception = "survived: " + mutant.name;
   if (mutant.outcome == MutantOutcome::kNoEffect) fault.exception = "no effect: " + mutant.name;
   if (mutant.outcome == MutantOutcome::kKilled && !mutant.localised) {
