@@ -74,8 +74,8 @@ VideoFormat FindVideoFormat(const std::filesystem::path& path) {
 }
 
 VideoWriter::VideoWriter(const std::filesystem::path& path, const EncodingOptions& options)
-    : options_(path.empty() ? options : Checked(options, FindVideoFormat(path))),
-      file_(path),
+    : file_(path),
+      options_(Checked(options, FindVideoFormat(path))),
       ffmpeg_(file_, options.width, options.height, options.fps,
               ListArguments(options, FindVideoFormat(path))) {}
 

@@ -45,8 +45,8 @@ class VideoWriter {
   [[nodiscard]] long frames() const { return frames_; }
 
  private:
-  EncodingOptions options_;
   PartialFile file_;
+  EncodingOptions options_;
   Ffmpeg ffmpeg_;
   long frames_ = 0;
 };

@@ -28,34 +28,37 @@ enum Opcode : std::uint8_t {
   kDataEnd = 0x0F,
 };
 
-/// Numbers and texts as the format writes them.
-class Packer {
- public:
-  template <typename Number>
-  Packer& Add(Number number) {
-    const auto chars = std::bit_cast<std::array<char, sizeof(Number)>>(number);
-    bytes_.append(chars.data(), chars.size());
-    return *this;
-  }
-  /// With its length before it.
-  Packer& AddText(std::string_view text) {
-    Add(static_cast<std::uint32_t>(text.size()));
-    bytes_ += text;
-    return *this;
-  }
-  Packer& AddBytes(std::string_view bytes) {
-    bytes_ += bytes;
-    return *this;
-  }
-  [[nodiscard]] const std::string& bytes() const { return bytes_; }
-
- private:
-  std::string bytes_;
+/// Bytes that stand as they are, without their length.
+struct Raw {
+  std::string_view bytes;
 };
 
-std::string MakeRecord(std::uint8_t opcode, std::string_view content) {
-  return Packer().Add(opcode).Add(static_cast<std::uint64_t>(content.size())).AddBytes(content).bytes();
+template <typename Number>
+void Append(Number number, std::string* bytes) {
+  const auto chars = std::bit_cast<std::array<char, sizeof(Number)>>(number);
+  bytes->append(chars.data(), chars.size());
 }
+void Append(std::string_view text, std::string* bytes) {
+  Append(static_cast<std::uint32_t>(text.size()), bytes);
+  *bytes += text;
+}
+void Append(const std::string& text, std::string* bytes) { Append(std::string_view(text), bytes); }
+void Append(const char* text, std::string* bytes) { Append(std::string_view(text), bytes); }
+void Append(const Raw& raw, std::string* bytes) { *bytes += raw.bytes; }
+
+/// Numbers, and texts with their lengths before them, as the format writes them.
+template <typename... Parts>
+std::string Pack(const Parts&... parts) {
+  std::string bytes;
+  (Append(parts, &bytes), ...);
+  return bytes;
+}
+
+std::string MakeRecord(std::uint8_t opcode, std::string_view content) {
+  return Pack(opcode, std::uint64_t{content.size()}, Raw{content});
+}
+
+constexpr std::uint32_t kNone = 0;  // checksums, attachments, metadata
 
 }  // namespace
 
@@ -64,7 +67,7 @@ McapWriter::McapWriter(const std::filesystem::path& path)
   if (!stream_) file_.Fail(std::strerror(errno));
   stream_ << kMagic;
   position_ = kMagic.size();
-  WriteRecord(kHeader, Packer().AddText("").AddText("dexcheck").bytes());
+  WriteRecord(kHeader, Pack("", "dexcheck"));
 }
 
 void McapWriter::WriteRecord(std::uint8_t opcode, std::string_view content) {
@@ -83,19 +86,8 @@ void McapWriter::WriteChannels() {
   for (size_t i = 0; i < channels_.size(); ++i) {
     const Channel& channel = channels_[i];
     const auto schema = static_cast<std::uint16_t>(i + 1);  // 0 means none
-    WriteRecord(kSchema, Packer()
-                             .Add(schema)
-                             .AddText(channel.schema_name)
-                             .AddText("jsonschema")
-                             .AddText(channel.schema)
-                             .bytes());
-    WriteRecord(kChannel, Packer()
-                              .Add(static_cast<std::uint16_t>(i))
-                              .Add(schema)
-                              .AddText(channel.topic)
-                              .AddText("json")
-                              .AddText("")  // no metadata
-                              .bytes());
+    WriteRecord(kSchema, Pack(schema, channel.schema_name, "jsonschema", channel.schema));
+    WriteRecord(kChannel, Pack(static_cast<std::uint16_t>(i), schema, channel.topic, "json", kNone));
   }
 }
 
@@ -107,13 +99,8 @@ void McapWriter::Write(std::uint16_t channel, double time, std::string_view json
   if (messages_ == 0) first_time_ = nanoseconds;
   chunk_last_ = last_time_ = nanoseconds;
   entries_[channel].push_back({nanoseconds, chunk_.size()});
-  chunk_ += MakeRecord(kMessage, Packer()
-                                     .Add(channel)
-                                     .Add(channels_[channel].messages++)
-                                     .Add(nanoseconds)
-                                     .Add(nanoseconds)
-                                     .AddBytes(json)
-                                     .bytes());
+  chunk_ +=
+      MakeRecord(kMessage, Pack(channel, channels_[channel].messages++, nanoseconds, nanoseconds, Raw{json}));
   ++messages_;
   if (chunk_.size() >= kChunkSize) FlushChunk();
 }
@@ -121,22 +108,15 @@ void McapWriter::Write(std::uint16_t channel, double time, std::string_view json
 void McapWriter::FlushChunk() {
   if (chunk_.empty()) return;
   ChunkIndex index{chunk_first_, chunk_last_, position_, 0, 0, chunk_.size(), {}};
-  WriteRecord(kChunk, Packer()
-                          .Add(chunk_first_)
-                          .Add(chunk_last_)
-                          .Add(static_cast<std::uint64_t>(chunk_.size()))
-                          .Add(std::uint32_t{0})  // no checksum
-                          .AddText("")            // no compression
-                          .Add(static_cast<std::uint64_t>(chunk_.size()))
-                          .AddBytes(chunk_)
-                          .bytes());
+  const std::uint64_t size = chunk_.size();
+  WriteRecord(kChunk, Pack(chunk_first_, chunk_last_, size, kNone, "", size, Raw{chunk_}));
   index.length = position_ - index.start;
   const std::uint64_t before = position_;
   for (const auto& [channel, entries] : entries_) {
     index.message_indexes[channel] = position_;
-    Packer pairs;
-    for (const Entry& entry : entries) pairs.Add(entry.time).Add(entry.offset);
-    WriteRecord(kMessageIndex, Packer().Add(channel).AddText(pairs.bytes()).bytes());
+    std::string pairs;
+    for (const Entry& entry : entries) pairs += Pack(entry.time, entry.offset);
+    WriteRecord(kMessageIndex, Pack(channel, pairs));
   }
   index.index_length = position_ - before;
   chunks_.push_back(index);
@@ -147,40 +127,23 @@ void McapWriter::FlushChunk() {
 void McapWriter::Finish() {
   if (!started_) WriteChannels();
   FlushChunk();
-  WriteRecord(kDataEnd, Packer().Add(std::uint32_t{0}).bytes());
+  WriteRecord(kDataEnd, Pack(kNone));
   const std::uint64_t summary = position_;
   WriteChannels();
-  Packer counts;
+  std::string counts;
   for (size_t i = 0; i < channels_.size(); ++i) {
-    counts.Add(static_cast<std::uint16_t>(i)).Add(static_cast<std::uint64_t>(channels_[i].messages));
+    counts += Pack(static_cast<std::uint16_t>(i), std::uint64_t{channels_[i].messages});
   }
-  WriteRecord(kStatistics, Packer()
-                               .Add(messages_)
-                               .Add(static_cast<std::uint16_t>(channels_.size()))
-                               .Add(static_cast<std::uint32_t>(channels_.size()))
-                               .Add(std::uint32_t{0})  // attachments
-                               .Add(std::uint32_t{0})  // metadata
-                               .Add(static_cast<std::uint32_t>(chunks_.size()))
-                               .Add(first_time_)
-                               .Add(last_time_)
-                               .AddText(counts.bytes())
-                               .bytes());
+  const auto channels = static_cast<std::uint16_t>(channels_.size());
+  WriteRecord(kStatistics, Pack(messages_, channels, std::uint32_t{channels}, kNone, kNone,
+                                static_cast<std::uint32_t>(chunks_.size()), first_time_, last_time_, counts));
   for (const ChunkIndex& chunk : chunks_) {
-    Packer offsets;
-    for (const auto& [channel, offset] : chunk.message_indexes) offsets.Add(channel).Add(offset);
-    WriteRecord(kChunkIndex, Packer()
-                                 .Add(chunk.first_time)
-                                 .Add(chunk.last_time)
-                                 .Add(chunk.start)
-                                 .Add(chunk.length)
-                                 .AddText(offsets.bytes())
-                                 .Add(chunk.index_length)
-                                 .AddText("")
-                                 .Add(chunk.size)
-                                 .Add(chunk.size)
-                                 .bytes());
+    std::string offsets;
+    for (const auto& [channel, offset] : chunk.message_indexes) offsets += Pack(channel, offset);
+    WriteRecord(kChunkIndex, Pack(chunk.first_time, chunk.last_time, chunk.start, chunk.length, offsets,
+                                  chunk.index_length, "", chunk.size, chunk.size));
   }
-  WriteRecord(kFooter, Packer().Add(summary).Add(std::uint64_t{0}).Add(std::uint32_t{0}).bytes());
+  WriteRecord(kFooter, Pack(summary, std::uint64_t{0}, kNone));
   stream_ << kMagic;
   stream_.close();
   if (!stream_) file_.Fail(std::strerror(errno));

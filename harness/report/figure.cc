@@ -116,8 +116,9 @@ void WriteScript(const Figure& figure, const VectorXd& time, const Thinning& thi
   }
   const std::string plot = PlotCurves(figure);
   *script << fmt::format(
-                 "set terminal pdfcairo size {}pt,{}pt font 'DejaVu Sans,9' enhanced\nset output '{}.pdf'\n",
-                 kWidth, height, figure.name)
+                 "set terminal pdfcairo size {:.2f}in,{:.2f}in font 'DejaVu Sans,9' enhanced\nset output "
+                 "'{}.pdf'\n",
+                 kWidth / 100.0, height / 100.0, figure.name)
           << plot
           << fmt::format(
                  "set terminal pngcairo size {},{} fontscale 2 linewidth 2 dashlength 2 font "
