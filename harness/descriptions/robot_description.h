@@ -58,6 +58,10 @@ struct RobotDescription {
 /// Notes bodies whose principal moments no body can have. Their dynamics are well defined all the same.
 void NoteImpossibleBodies(RobotDescription* robot);
 
+/// Makes the bodies of the base and of the joints' links from the parts that are welded together there; those
+/// that state no inertial, or one without dynamics (a negative mass), do not count.
+void FuseParts(RobotDescription* robot);
+
 /// T with xi = T xi_free, size joints x (joints - coupled joints): the rates that the couplings leave free. T
 /// is constant, so T^T M T, T^T C T, T^T F are the terms of the coupled robot.
 MatrixXd CalcCouplingMap(const RobotDescription& robot);

@@ -1,7 +1,6 @@
 #include "harness/engine/finite_check.h"
 
 #include <mujoco/mjxmacro.h>
-#include <tinyxml2.h>
 
 #include <cmath>
 #include <cstdlib>
@@ -10,11 +9,11 @@
 #include <string_view>
 #include <type_traits>
 
-#include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_passes.h"
 #include "harness/engine/mujoco_release.h"
+#include "harness/engine/xml.h"
 
 namespace dexcheck {
 namespace {
@@ -78,7 +77,7 @@ bool IsNumbers(const char* text, bool integer) {
 
 }  // namespace
 
-void CheckNumbers(JoinedMjcf* mjcf) {
+void CheckNumbers(MjcfFile* mjcf) {
   VisitElements(mjcf->root(), [&](tinyxml2::XMLElement* element) {
     const std::string_view kind = element->Name();
     const bool has_lists = kind == "mesh" || kind == "skin" || kind == "bone";

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_file.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
