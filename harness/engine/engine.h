@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <vector>
 
 namespace dexcheck {
 
@@ -28,10 +27,6 @@ MjModelPtr LoadMjcf(const std::filesystem::path& path);
 
 /// Compiles MJCF text (tests, replays). @throws InputError as LoadMjcf; `source` names the text in messages.
 MjModelPtr LoadMjcfText(const std::string& text, const std::string& source);
-
-/// What was said so far, on standard error, of the files that this process loaded: what was left out of them
-/// for this release of the engine, and the engine's own warnings. For the JSON of commands.
-std::vector<std::string> ListLoadNotes();
 
 /// @throws std::bad_alloc when the engine cannot allocate.
 MjDataPtr MakeData(const mjModel& model);

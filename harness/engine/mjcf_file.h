@@ -93,6 +93,10 @@ class MjcfFile {
   std::vector<MjcfChange> changes_;
 };
 
+/// What was said so far, on standard error, of the files that this process loaded (LoadMjcf): what was left
+/// out of them for this release of the engine, and the engine's own warnings. For the JSON of commands.
+std::vector<std::string> ListLoadNotes();
+
 /// Files of an MJCF model: the file itself, what it includes, and those of its meshes, height fields and
 /// textures that exist, as paths relative to its folder; itself first.
 /// @throws InputError as MjcfFile, and when one lies outside that folder.
