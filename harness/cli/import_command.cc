@@ -11,7 +11,6 @@
 #include "harness/cli/output_file.h"
 #include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/read_description.h"
-#include "harness/descriptions/robot_file.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_passes.h"
 
@@ -57,13 +56,12 @@ void WriteOut(const ImportRequest& request, const std::string& text) {
 }
 
 RobotDescription ReadSource(const ImportRequest& request) {
-  if (FindFormat(request.source) == RobotFormat::kToml) {
-    throw InputError(request.source.string() + ": must be a URDF or an MJCF, is a parameter file already");
-  }
   UrdfOptions options;
   options.packages.assign(request.packages.begin(), request.packages.end());
   options.floating = request.floating;
-  return ReadDescription(request.source, options);
+  RobotDescription robot = ReadDescription(request.source, options);
+  if (robot.format != RobotFormat::kToml) return robot;
+  throw InputError(request.source.string() + ": must be a URDF or an MJCF, is a parameter file already");
 }
 
 /// A copy of an MJCF, for MuJoCo 2.2.2 or with motors.

@@ -224,7 +224,7 @@ class JointAudit {
 
 const char* NameOf(AuditLevel level) {
   if (level == AuditLevel::kImpossible) return "impossible";
-  return level == AuditLevel::kSuspicious ? "odd" : "note";
+  return level == AuditLevel::kSuspicious ? "suspicious" : "note";
 }
 
 bool AuditResult::IsGood() const {

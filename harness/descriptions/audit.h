@@ -1,6 +1,6 @@
 #pragma once
 
-// One description alone: what no body can have, what is odd, and what it does to the mass matrix.
+// One description alone: what no body can have, what is suspicious, and what it does to the mass matrix.
 
 #include <optional>
 #include <string>
@@ -16,7 +16,7 @@ enum class AuditLevel {
   kNote,        ///< Worth knowing.
 };
 
-/// "impossible", "odd" or "note".
+/// "impossible", "suspicious" or "note".
 const char* NameOf(AuditLevel level);
 
 /// One finding.

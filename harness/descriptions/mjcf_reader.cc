@@ -32,6 +32,7 @@ class MjcfDescriptionReader {
       : engine_(engine), source_(std::move(source)), other_equalities_(static_cast<int>(engine.neq)) {}
 
   RobotDescription Read() {
+    robot_.format = RobotFormat::kMjcf;
     robot_.spec.name = *engine_.names == '\0' ? source_ : engine_.names;
     robot_.spec.source = source_;
     robot_.spec.gravity = MapVector(engine_.opt.gravity);

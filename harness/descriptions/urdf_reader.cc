@@ -52,6 +52,7 @@ class UrdfReader {
  public:
   UrdfReader(const UrdfFile& file, std::string source, const UrdfOptions& options)
       : file_(file), options_(options) {
+    robot_.format = RobotFormat::kUrdf;
     robot_.spec.source = std::move(source);
   }
 
@@ -198,6 +199,7 @@ class UrdfReader {
     added.X_PB.linear() = X_PJ.linear() * R;
     DescribedJoint stated;
     stated.states_armature = false;
+    stated.is_plain = true;
     stated.X_iL.linear() = R.transpose();
     stated.line = joint.line;
     stated.axis_length = length;
@@ -312,7 +314,9 @@ class UrdfReader {
   }
 
   [[noreturn]] void FailInertial(const UrdfLink& link, const std::string& problem) const {
-    file_.Fail(link.line, KeyOf(link) + "inertial: " + problem);
+    const std::string& file = robot_.spec.source;
+    file_.Fail(link.line, KeyOf(link) + "inertial: " + problem + " (dexcheck audit " + file +
+                              " reads it all the same, and lists all that is impossible or suspicious)");
   }
 
   /// Published robots have small parts that no body can be; what counts is the body that they are welded to.
