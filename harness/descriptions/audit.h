@@ -22,12 +22,12 @@ const char* NameOf(AuditLevel level);
 /// One finding.
 struct AuditFinding {
   AuditLevel level = AuditLevel::kNote;
-  std::string check;  ///< Such as "inertia" or "density".
-  std::string where;  ///< Such as "link upper_arm" or "joint elbow".
-  int line = 0;       ///< Of the file; 0 when it is not known.
-  std::string text;   ///< What is found, with its values.
+  std::string check;      ///< Such as "inertia" or "density".
+  std::string where;      ///< Such as "link upper_arm" or "joint elbow".
+  int line = 0;           ///< Of the file; 0 when it is not known.
+  std::string text = {};  ///< What is found, with its values.
   /// Condition number of M with a plausible body there instead, for findings about one moving body.
-  std::optional<double> condition_without;
+  std::optional<double> condition_without = {};
   /// The joint that moves the body it is about, -1 for the base.
   int body = kNoBody;
 
