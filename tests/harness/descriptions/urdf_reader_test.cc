@@ -13,8 +13,6 @@
 #include "controller/common/errors.h"
 #include "controller/model/body_frame.h"
 #include "controller/model/parameter_reader.h"
-#include "harness/checks/consistency.h"
-#include "harness/descriptions/description_check.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/read_description.h"
@@ -38,13 +36,7 @@ constexpr double kRounding = 1e-14;
 std::string ListFailures(const std::string& urdf, const mjModel& engine, long samples = 20) {
   RobotDescription robot = ParseUrdf(urdf, "robot.urdf");
   CompleteFromEngine(engine, "robot.xml", &robot);
-  const RobotModel model(robot.spec);
-  ConsistencyOptions options;
-  options.samples = samples;
-  const Adapter adapter(model, engine, "robot.xml");
-  ConsistencyResult result = CheckConsistency(adapter, options, [](long) { return true; });
-  CheckDescription(robot, adapter, &result.constants);
-  return testing::ListFailures(result);
+  return CompareWithEngine(robot, engine, samples);
 }
 
 TEST(Urdf, PandaAgreesWithTheMjcf) {
