@@ -8,7 +8,7 @@
 #include "controller/common/errors.h"
 #include "controller/handling/pick_and_place.h"
 #include "harness/base/files.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_file.h"
 #include "harness/engine/skeleton.h"
 #include "harness/report/run_data.h"
 
