@@ -272,7 +272,7 @@ LogReader::LogReader(const std::filesystem::path& path) : path_(path) {
   const hdf5::SilencedErrors silenced;
   RequireHdf5(path);
   ChildProcess trial("reading a log", [&](int /*channel*/) {
-    constexpr rlimit kLongest{10, 10};  // s
+    constexpr rlimit kLongest{3, 3};  // s
     ::setrlimit(RLIMIT_CPU, &kLongest);
     ::close(STDERR_FILENO);  // the C library says there that the heap is damaged
     try {

@@ -205,8 +205,7 @@ TEST_F(LogReaderTest, WrongAndMissingPartsAreNamed) {
 
 /// Of the program as it was: signals, checks and keys have today's names, numbers their bits.
 TEST_F(LogReaderTest, FormatOneHasTodaysNames) {
-  const ProgramResult unpacked =
-      RunProgram({"xz", "-dc", SourcePath("/tests/harness/log/format_1.h5.xz")});
+  const ProgramResult unpacked = RunProgram({"xz", "-dc", SourcePath("/tests/harness/log/format_1.h5.xz")});
   ASSERT_EQ(unpacked.exit_code, 0) << unpacked.err;
   WriteText(path_, unpacked.out);
   const LogReader log(path_);
