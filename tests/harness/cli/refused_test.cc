@@ -129,6 +129,14 @@ TEST_F(RefusedFolder, StatesThatNoTableHolds) {
   }
 }
 
+TEST_F(RefusedFolder, AnObjectThatNoFingertipsTouch) {
+  Write("two.toml",
+        Read("two.toml") +
+            "[object]\nbody = \"ball\"\nshape = \"sphere\"\nradius = 0.1\nmass = 0.2\nfriction = 0.5\n");
+  Write("state.json", R"({"q": [0, 1], "xi": [0, 1], "kappa": [[0, 0, 0, 0, 0]]})");
+  EXPECT_TRUE(Refused("eval --robot two.toml --state state.json", {"state.json: ", "0 fingertips", "3"}));
+}
+
 TEST_F(RefusedFolder, AMobileBaseWithoutAFreeJoint) {
   fs::copy(kMjcf, Path("mjcf"), fs::copy_options::recursive);
   WriteChanged("mjcf/robot.xml", Read("mjcf/robot.xml"), "<freejoint name=\"base\"/>", "");

@@ -124,6 +124,7 @@ TEST_F(RunCommand, WhatWasCutOffIsToldAndComparedByItsLength) {
   Expect(0, "compare cut5 cut5 --tolerance 0");
   Expect(1, "compare cut5 cut10 --tolerance 0");  // not as long
   Expect(1, "compare cut5 whole --tolerance 0");
+  Expect(2, "compare whole whole --signals time --tolerance 0");  // nothing was compared
 }
 
 TEST_F(RunCommand, AWordThatIsSetReplacesTheFilesAndKeysCanBeRemoved) {
