@@ -52,6 +52,7 @@ class RefusedFolder : public CommandTest {
       Copy(file.path().filename());
     for (const char* folder : {"folder.toml", "folder.xml"}) fs::create_directory(Path(folder));
     for (const char* file : {"out.json", "state.json"}) Write(file, "what stood here before");
+    Write("scene.sdf", "<sdf/>");
   }
 
   /// All files of the folder and what is in them.
