@@ -20,7 +20,7 @@ std::vector<std::string> ListCommands(const Words& command) {
   for (std::string line; std::getline(help, line);) {
     if (listed && line.starts_with("  ") && line[2] != ' ')
       names.push_back(line.substr(2, line.find(' ', 2) - 2));
-    listed = listed || line == "Subcommands:";
+    listed = listed || line == "Subcommands:" || line == "Compare descriptions:";
   }
   return names;
 }
@@ -65,6 +65,17 @@ TEST(Usage, AnOptionMeansOneThing) {
   EXPECT_GE(seen["--out"], 9);
   EXPECT_GE(seen["--samples"], 5);
   EXPECT_EQ(seen["--ignore"], 3);
+}
+
+TEST(Usage, TwoRobotsAreComparedWithoutTheWordForIt) {
+  const auto compare = [](const Words& words) {
+    Json results =
+        Json::parse(RunDexcheck(words + Words{kPandaToml, kPandaXml, "--samples", "2", "--json"}).out);
+    results.erase("seconds");
+    return results;
+  };
+  EXPECT_EQ(compare(Words{}), compare("consistency"));
+  EXPECT_TRUE(IsRefused(RunDexcheck(Words{kPandaToml}), {"unknown command"}));
 }
 
 TEST(Usage, TheVersionIsThreeNumbers) {
