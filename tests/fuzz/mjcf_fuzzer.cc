@@ -7,7 +7,7 @@
 #include <fstream>
 #include <string>
 
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_file.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace dexcheck::testing::fuzz {

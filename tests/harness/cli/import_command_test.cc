@@ -72,6 +72,21 @@ TEST_F(TwoDescriptions, AreImportedAsTablesThatAgreeWithThem) {
   }
 }
 
+TEST_F(TwoDescriptions, AreImportedWithAListOfWhatWasReadAndLeftOut) {
+  const Json urdf = RunJson(0, "import panda.urdf");
+  EXPECT_EQ(urdf.at("joints").size(), 7U);
+  EXPECT_EQ(urdf.at("base").at("floats"), false);
+  EXPECT_TRUE(urdf.at("changes").empty());
+  WriteChanged("newer.xml", ReadText(kPandaXml), "<joint name=\"panda_joint1\"",
+               "<joint actuatorfrcrange=\"-1 1\" name=\"panda_joint1\"");
+  const std::string word = "<joint actuatorfrcrange>";
+  EXPECT_THAT(RunJson(0, "import newer.xml --out a.toml").at("notes").dump(), HasSubstr(word));
+  const Json change = RunJson(0, "import newer.xml --downgrade --out old.xml").at("changes").at(0);
+  EXPECT_EQ(change.at("word"), word);
+  EXPECT_THAT(change.at("what"), HasSubstr("3.0.0"));
+  EXPECT_THAT(Json::parse(Run("audit newer.xml --json").out).at("notes").dump(), HasSubstr("actuator"));
+}
+
 TEST_F(TwoDescriptions, ACopyForAnOlderEngineFindsItsFilesFromAnotherFolder) {
   for (const char* folder : {"robot/shapes", "copies/old"}) std::filesystem::create_directories(Path(folder));
   std::filesystem::copy(kMjcf + "assets/torus.msh", Path("robot/shapes/ring.msh"));
