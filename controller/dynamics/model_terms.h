@@ -142,8 +142,10 @@ class ModelTerms {
   void SetBaseColumns(const Vector3d& base_linear_velocity);
   void SetFloatingColumns();
   void SetJointState(int joint, double q, double rate);
-  /// Of a ball joint's three entries, from its first one on.
   void SetBallState(int joint, const Eigen::Quaterniond& turn, const Vector3d& rates);
+  [[nodiscard]] Column& joint_column(int joint, int k = 0) {
+    return columns_[static_cast<size_t>(base_size_ + model_->dof(joint) + k)];
+  }
   static MassIntegrals CalcLinkIntegrals(const LinkMass& mass, const LinkState& state);
   void PushColumn(int depth, const Column& column, int dof);
   void FillRowAndColumn(int depth, int dof, const Column& column, const MassIntegrals& subtree);
@@ -156,7 +158,7 @@ class ModelTerms {
 
   std::vector<JointPlace> places_;
   std::vector<LinkMass> masses_;                // base first
-  std::vector<std::vector<int>> frame_chains_;  // per frame: joints from the base outward
+  std::vector<std::vector<int>> frame_chains_;  // per frame: velocities of joints from the base outward
 
   double phi_ = 0.0;
   Vector3d base_position_ = Vector3d::Zero();

@@ -109,14 +109,13 @@ class JointAudit {
   AuditFinding& Add(AuditLevel level, const std::string& check, size_t joint, const std::string& text) {
     const int line = robot_.joints[joint].line;
     findings_.push_back(
-        {level, check, "joint " + NameInFile(spec_.joints[joint]), line, text, {}, AuditFinding::kNoBody});
+        {level, check, "joint " + spec_.joints[joint].name, line, text, {}, AuditFinding::kNoBody});
     return findings_.back();
   }
 
   void AuditRange(size_t i) {
     const Joint& joint = spec_.joints[i];
     if (!robot_.joints[i].states_range) return;
-    if (joint.type == JointType::kBall && joint.ball_axis > 0) return;  // told of the first entry
     const std::string range = FormatNumbers(Vector2d(joint.lower, joint.upper));
     const bool is_revolute = joint.type != JointType::kPrismatic;
     const double widest = std::max(std::abs(joint.lower), std::abs(joint.upper));
@@ -169,7 +168,7 @@ class JointAudit {
     for (size_t i = 0; i < count; ++i) {
       const Joint& joint = spec_.joints[i];
       const bool is_ball = joint.type == JointType::kBall;
-      if (joint.armature > 0.0 || (is_ball && joint.ball_axis < 2)) continue;
+      if (joint.armature > 0.0) continue;
       const std::string end = is_end[i] ? ", the end of a chain" : "";
       if (mass[i] <= 0.0) {
         Add(AuditLevel::kSuspicious, "load", i, "moves no mass" + end + ": M is singular").body =

@@ -33,7 +33,6 @@ RobotDescription ReadTable(const std::filesystem::path& path) {
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
     robot.joints[i].X_iL = rows[i].X_iL;
-    if (joint.type == JointType::kBall && joint.ball_axis < 2) continue;  // its link is no part of the file
     AddPart(joint.link, joint.body, static_cast<int>(i), rows[i].X_iL, &robot);
   }
   NoteImpossibleBodies(&robot);

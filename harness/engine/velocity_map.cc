@@ -112,13 +112,13 @@ void VelocityMap::ExpandBracket(const Eigen::Ref<const VectorXd>& q, const Eigen
   }
   for (Eigen::Index row = 0; row < bracket_.size(); ++row)
     qacc[base_dofs_[static_cast<size_t>(row)]] = bracket_[row];
-  const std::vector<Joint>& joints = adapter_->model().joints();
-  for (size_t i = 0; i < joints.size(); ++i) {
-    mjtNum* const rate = qacc + adapter_->joint_dofs()[i];
-    const Eigen::Index at = base_size_ + static_cast<Eigen::Index>(i);
-    if (joints[i].type != JointType::kBall) {
+  const RobotModel& model = adapter_->model();
+  for (int i = 0; i < model.num_joints(); ++i) {
+    mjtNum* const rate = qacc + adapter_->joint_dofs()[static_cast<size_t>(model.dof(i))];
+    const Eigen::Index at = base_size_ + model.dof(i);
+    if (model.joints()[static_cast<size_t>(i)].type != JointType::kBall) {
       *rate = 0.0;
-    } else if (joints[i].ball_axis == 0) {
+    } else {
       const Vector3d bracket = Vector3d(a.segment<3>(at)).cross(Vector3d(b.segment<3>(at)));
       mju_copy3(rate, bracket.data());
     }
