@@ -18,7 +18,7 @@ GraspController::GraspController(const RobotModel& model, std::span<const int> f
       model_(model, fingertips, object, surface, options),
       law_(model, static_cast<int>(fingertips.size()), options.weight),
       problem_(static_cast<int>(fingertips.size())),
-      solver_(static_cast<int>(fingertips.size()), 0, options.force) {
+      solver_(static_cast<int>(fingertips.size()), options.force) {
   problem_.mu.setConstant(options.mu);
   problem_.f_min.setConstant(options.f_min);
   problem_.f_max.setConstant(options.f_max);

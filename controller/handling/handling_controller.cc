@@ -15,7 +15,7 @@ HandlingController::HandlingController(const RobotModel& model, std::span<const 
       surface_(&surface),
       options_(options),
       problem_(static_cast<int>(fingertips.size())),
-      solver_(static_cast<int>(fingertips.size()), 0, options.force) {
+      solver_(static_cast<int>(fingertips.size()), options.force) {
   problem_.mu.setConstant(options.mu);
   problem_.f_max.setConstant(options.f_max);
   f_c_.setZero(3 * static_cast<Eigen::Index>(fingertips.size()));

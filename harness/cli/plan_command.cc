@@ -174,7 +174,7 @@ std::optional<double> CalcHandPickedMargin(const Surface& surface, const Hand& h
     const ContactCoordinates kappa{{0.0, 0.0, 0}, {DegToRad(degrees), 0.0, 0}, 0.0};
     contacts.push_back({.geometry = CalcContactGeometry(any_fingertip, surface, kappa)});
   }
-  Matrix6Xd G(6, CountForces(contacts));
+  Matrix6Xd G(6, 3 * contacts.size());
   CalcGraspMap(contacts, G);
   ForceClosureOptions options;
   options.length = request.options.length;
