@@ -105,7 +105,6 @@ void ModelTerms::SetBaseState(const Eigen::Ref<const VectorXd>& q,
     state.v = base_R_.transpose() * velocity.head<3>();
     state.w = velocity.segment<3>(3);
     SetFloatingColumns();
-    state.v_dot = state.v.cross(state.w);
     return;
   }
   phi_ = q[2];
@@ -126,10 +125,6 @@ void ModelTerms::SetBaseState(const Eigen::Ref<const VectorXd>& q,
   SetBaseColumns(state.v);
   const Vector3d twist(state.v.x(), state.v.y(), state.w.z());
   wheel_rates_ = wheel_map_ * twist;
-  for (int i = 0; i < base_size_; ++i) {
-    state.w_dot += columns_[static_cast<size_t>(i)].w_dot * velocity[i];
-    state.v_dot += columns_[static_cast<size_t>(i)].v_dot * velocity[i];
-  }
 }
 
 void ModelTerms::SetFloatingColumns() {
@@ -224,8 +219,6 @@ void ModelTerms::SetJointState(int joint, double q, double rate) {
   }
   state.w = parent.w + rate * S.w;
   state.v = parent.v + rate * S.v;
-  state.w_dot = parent.w_dot + rate * S.w_dot;
-  state.v_dot = parent.v_dot + rate * S.v_dot;
 }
 
 void ModelTerms::SetBallState(int joint, const Eigen::Quaterniond& turn, const Vector3d& rates) {
@@ -238,16 +231,12 @@ void ModelTerms::SetBallState(int joint, const Eigen::Quaterniond& turn, const V
   const Vector3d w = state.R * rates;
   state.w = parent.w + w;
   state.v = parent.v + state.p.cross(w);
-  state.w_dot = parent.w_dot;
-  state.v_dot = parent.v_dot;
   for (int k = 0; k < 3; ++k) {
     Column& S = joint_column(joint, k);
     S.w = state.R.col(k);
     S.v = state.p.cross(S.w);
     S.w_dot = state.w.cross(S.w);
     S.v_dot = state.w.cross(S.v) + state.v.cross(S.w);
-    state.w_dot += rates[k] * S.w_dot;
-    state.v_dot += rates[k] * S.v_dot;
   }
 }
 
@@ -301,17 +290,6 @@ void ModelTerms::CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref
   };
   for (int i = 0; i < base_size_; ++i) write(i);
   for (const int dof : frame_chains_[static_cast<size_t>(frame)]) write(base_size_ + dof);
-}
-
-void ModelTerms::CalcFrameMotion(int frame, Vector6d* velocity, Vector6d* bias_acceleration) const {
-  const Frame& f = model_->frames().at(static_cast<size_t>(frame));
-  const LinkState& state = link(f.link);
-  const Vector3d p = state.p + state.R * f.X_LF.translation();
-  const Vector3d p_dot = state.v + state.w.cross(p);
-  velocity->head<3>() = base_R_ * p_dot;
-  velocity->tail<3>() = base_R_ * state.w;
-  bias_acceleration->head<3>() = base_R_ * (state.v_dot + state.w_dot.cross(p) + state.w.cross(p_dot));
-  bias_acceleration->tail<3>() = base_R_ * state.w_dot;
 }
 
 }  // namespace dexcheck

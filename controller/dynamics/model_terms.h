@@ -78,10 +78,6 @@ class ModelTerms {
   /// they are.
   void CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref<Matrix6Xd> J_dot) const;
 
-  /// Velocity of a frame and J_dot xi (its acceleration when the velocity coordinates do not change), both
-  /// [linear; angular] of the frame's origin in world axes.
-  void CalcFrameMotion(int frame, Vector6d* velocity, Vector6d* bias_acceleration) const;
-
   /// Velocity of a link's frame, [linear; angular] of its origin in world axes, by the index of its joint; -1
   /// is Sigma_0.
   [[nodiscard]] Vector6d CalcLinkVelocity(int joint) const;
@@ -90,22 +86,19 @@ class ModelTerms {
   [[nodiscard]] EnergyAndMomentum CalcEnergyAndMomentum() const;
 
  private:
-  /// Motion of one coordinate's column or of one link: (w, v) and its derivative's columns (w_dot, v_dot).
+  /// One coordinate's column (w, v) and its derivative (w_dot, v_dot).
   struct Column {
     Vector3d w = Vector3d::Zero();
     Vector3d v = Vector3d::Zero();
     Vector3d w_dot = Vector3d::Zero();
     Vector3d v_dot = Vector3d::Zero();
   };
-  /// Where a link is and how it moves: rotation, origin, twist, and twist rate at constant coordinates'
-  /// rates.
+  /// Where a link is and how it moves: rotation, origin, twist.
   struct LinkState {
     Matrix3d R = Matrix3d::Identity();
     Vector3d p = Vector3d::Zero();
     Vector3d w = Vector3d::Zero();
     Vector3d v = Vector3d::Zero();
-    Vector3d w_dot = Vector3d::Zero();
-    Vector3d v_dot = Vector3d::Zero();
   };
   /// Integrals over the mass of a link and all that it carries: of 1, p, p p^T (six entries), p_dot, p_dot
   /// p^T.
