@@ -16,15 +16,13 @@
 #include "controller/common/errors.h"
 #include "harness/base/console.h"
 #include "harness/base/temporary_path.h"
-#include "harness/engine/cylinder_collision.h"
-#include "harness/engine/ellipsoid_collision.h"
+#include "harness/engine/exact_collision.h"
 #include "harness/engine/finite_check.h"
 #include "harness/engine/joined_mjcf.h"
 #include "harness/engine/mjcf_assets.h"
 #include "harness/engine/mjcf_files.h"
 #include "harness/engine/mujoco_release.h"
 #include "harness/engine/newer_mjcf.h"
-#include "harness/engine/torus_collision.h"
 
 namespace dexcheck {
 namespace {
@@ -64,9 +62,7 @@ void CheckReadable(const std::filesystem::path& path) {
 void PrepareEngine() {
   InstallMessageHandlers();
   CheckVersion();
-  InstallCylinderCollision();
-  InstallEllipsoidCollision();
-  InstallTorusCollision();
+  InstallExactCollision();
 }
 
 /// Commands load a file more than once.

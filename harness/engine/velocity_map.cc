@@ -19,7 +19,6 @@ VelocityMap::VelocityMap(const Adapter& adapter, Coordinates coordinates)
   T_base_.setZero(rows, base_size_);
   bias_.setZero(rows);
   bracket_.setZero(rows);
-  M_T_.setZero(engine.nv, base_size_);
   if (is_floating_) T_base_.setIdentity();
 }
 
@@ -134,32 +133,6 @@ void VelocityMap::ProjectForce(const mjtNum* force, Eigen::Ref<VectorXd> result)
   }
   for (size_t i = 0; i < adapter_->joint_dofs().size(); ++i) {
     result[base_size_ + static_cast<int>(i)] = force[adapter_->joint_dofs()[i]];
-  }
-}
-
-void VelocityMap::ProjectMatrix(const Eigen::Ref<const MatrixXd>& M, Eigen::Ref<MatrixXd> result) {
-  M_T_.setZero();
-  for (Eigen::Index row = 0; row < T_base_.rows(); ++row) {
-    M_T_.noalias() += M.col(base_dofs_[static_cast<size_t>(row)]) * T_base_.row(row);
-  }
-  for (int i = 0; i < base_size_; ++i) ProjectForce(M_T_.col(i).data(), result.col(i));
-  result.topRightCorner(base_size_, result.cols() - base_size_) =
-      result.bottomLeftCorner(result.rows() - base_size_, base_size_).transpose();
-  const std::vector<int>& dofs = adapter_->joint_dofs();
-  for (size_t j = 0; j < dofs.size(); ++j) {
-    for (size_t i = 0; i < dofs.size(); ++i) {
-      result(base_size_ + static_cast<int>(i), base_size_ + static_cast<int>(j)) = M(dofs[i], dofs[j]);
-    }
-  }
-}
-
-void VelocityMap::ProjectJacobian(const Eigen::Ref<const RowMatrixXd>& J, Eigen::Ref<MatrixXd> result) const {
-  result.leftCols(base_size_).setZero();
-  for (Eigen::Index row = 0; row < T_base_.rows(); ++row) {
-    result.leftCols(base_size_).noalias() += J.col(base_dofs_[static_cast<size_t>(row)]) * T_base_.row(row);
-  }
-  for (size_t i = 0; i < adapter_->joint_dofs().size(); ++i) {
-    result.col(base_size_ + static_cast<int>(i)) = J.col(adapter_->joint_dofs()[i]);
   }
 }
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "harness/engine/engine.h"
-#include "harness/engine/torus_collision.h"
+#include "harness/engine/exact_collision.h"
 #include "harness/engine/wheel_inertia.h"
 #include "harness/gate/engine_only.h"
 
