@@ -28,7 +28,6 @@
 
 #include "controller/grasp/contact_pack.h"
 #include "controller/grasp/grasp_force.h"
-#include "controller/grasp/lanes.h"
 
 namespace dexcheck::grasp_internal {
 
