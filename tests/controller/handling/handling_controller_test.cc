@@ -90,7 +90,7 @@ TEST_F(HandlingControllerTest, CarryingWithAllContactsIsTheLawOfThePaper) {
   const VectorXd expected = grasp_.CalcTorque(demand_.desired);
   ASSERT_GT(expected.norm(), 1.0);
   EXPECT_TRUE(MatrixNear(tau, expected, kTorqueRounding));
-  EXPECT_TRUE(MatrixNear(handling_.f_c(), grasp_.force().f_c, kForceRounding));
+  EXPECT_TRUE(MatrixNear(handling_.f_c(), grasp_.law().f_c(), kForceRounding));
 }
 
 TEST_F(HandlingControllerTest, WithoutContactItIsComputedTorque) {
