@@ -17,14 +17,14 @@ packages=(
   # the run's log
   libhdf5-dev zlib1g-dev
   # studies: databases, searches, samples (Boost.Random)
-  libsqlite3-dev libpagmo-dev libnlopt-dev libnlopt-cxx-dev libboost-dev
+  libsqlite3-dev libsqlitecpp-dev libpagmo-dev libnlopt-dev libnlopt-cxx-dev libboost-dev
   # the command line
   libcli11-dev libfmt-dev nlohmann-json3-dev
   # off-screen drawing and video
   pkg-config libosmesa6-dev libavcodec-dev libavformat-dev libavutil-dev libswscale-dev libpng-dev libfreetype-dev
   fonts-dejavu-core
-  # the report: its figures, its page's plots and replay
-  gnuplot-nox libjs-dygraphs libjs-three
+  # pages: their plots, charts and replay, and the run's figures
+  gnuplot-nox libjs-dygraphs libjs-chart.js libjs-three
   # the live window
   libglfw3-dev
 )

@@ -12,7 +12,7 @@
 namespace dexcheck {
 
 /// Which of the harness's five questions a check answers.
-enum class CheckCategory { kModel, kBalance, kPrediction, kAssumption, kLaw };
+enum class CheckCategory { kModel, kInverseDynamics, kForwardDynamics, kAssumption, kLaw };
 
 /// "model", "law", "balance", "prediction" or "assumption".
 const char* NameOf(CheckCategory kind);

@@ -52,16 +52,16 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
       std::any_of(joints.begin(), joints.end(), [](const Joint& joint) { return joint.dry_friction > 0.0; });
   if (follows || has_friction || !setup.scenario().imperfections.is_ideal()) known_.emplace(setup, motors);
   using enum StepCheck;
-  if (joint_law_ && !joint_law_->has_error_dynamics()) motion_.LeaveOut(kGains);
+  if (joint_law_ && !joint_law_->has_error_dynamics()) motion_.LeaveOut(kSpectralRadius);
   if (joint_law_ && !joint_law_->follows_error()) motion_.LeaveOut(kJointDynamics);
   if (joint_law_) return;
   if (!law_) {
     for (const StepCheck check :
-         {kGains, kLawTorque, kLawDemand, kGraspNullSpace, kGraspCone, kGraspOptimality, kJointDynamics}) {
+         {kSpectralRadius, kLawTorque, kLawDemand, kGraspNullSpace, kGraspCone, kGraspOptimality, kJointDynamics}) {
       motion_.LeaveOut(check);
     }
   }
-  if (law_ && !law_->has_error_dynamics()) motion_.LeaveOut(kGains);
+  if (law_ && !law_->has_error_dynamics()) motion_.LeaveOut(kSpectralRadius);
   if (law_ && !law_->has_demand()) motion_.LeaveOut(kLawDemand);
   if (!law_ || !law_->follows_error()) {
     motion_.LeaveOut(kErrorDynamics);

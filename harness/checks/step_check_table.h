@@ -14,7 +14,7 @@ namespace dexcheck {
 
 /// In the order of log and summary.
 enum class StepCheck {
-  kGains,
+  kSpectralRadius,
   kMeasurement,
   kLawTorque,
   kLawDemand,

@@ -9,6 +9,7 @@ extern const char* const kPageJs;
 extern const char* const kReplayHtml;
 extern const char* const kReplayJs;
 extern const char* const kThreeJs;
+extern const char* const kChartJs;  ///< Chart.js: window.Chart.
 extern const char* const kDygraphCss;
 extern const char* const kDygraphJs;
 
