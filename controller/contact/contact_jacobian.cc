@@ -9,7 +9,8 @@ namespace {
 using Matrix36 = Eigen::Matrix<double, 3, 6>;
 
 void RequireRowsShape(Eigen::Index columns, Eigen::Ref<MatrixXd> rows) {
-  Require(rows.rows() == 3, "rows of the contact Jacobian", "must be three", static_cast<double>(rows.rows()));
+  Require(rows.rows() == 3, "rows of the contact Jacobian", "must be three",
+          static_cast<double>(rows.rows()));
   Require(rows.cols() == columns, "columns of the contact Jacobian",
           "must equal those of the fingertip Jacobian", static_cast<double>(rows.cols()));
 }
@@ -48,9 +49,8 @@ void CalcContactJacobianDot(const Contact& contact, const Eigen::Ref<const Matri
   const Matrix36 A = Ad.topRows<3>();
   const Matrix36 A_dot = Ad_dot.topRows<3>();
   auto J_dot = rows_dot.topRows<3>();
-  ForEachColumn(columns, J_f.cols(), [&](Eigen::Index i) {
-    J_dot.col(i).noalias() = A * J_f_dot.col(i) + A_dot * J_f.col(i);
-  });
+  ForEachColumn(columns, J_f.cols(),
+                [&](Eigen::Index i) { J_dot.col(i).noalias() = A * J_f_dot.col(i) + A_dot * J_f.col(i); });
 }
 
 }  // namespace dexcheck

@@ -1,8 +1,8 @@
 #pragma once
 
 // Grasp map G of any number of hard-finger contacts (section 4.1 (b)) and its rate along rolling contacts.
-// A hard finger transmits f_c = [f_x f_y f_z] in Sigma_cf (20): B_c = [I_3; 0], which print has as 5 wide. Its
-// friction cone FC (21) is |(f_x, f_y)| <= mu f_z. Outputs are the caller's, sized beforehand; nothing
+// A hard finger transmits f_c = [f_x f_y f_z] in Sigma_cf (20): B_c = [I_3; 0], which print has as 5 wide.
+// Its friction cone FC (21) is |(f_x, f_y)| <= mu f_z. Outputs are the caller's, sized beforehand; nothing
 // allocates.
 
 #include <span>

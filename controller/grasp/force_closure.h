@@ -19,8 +19,9 @@ struct ForceClosureOptions {
   int max_vertices = 2000;  ///< Points of the inner polytope.
 };
 
-/// The largest ball of wrenches [force; moment / length] that normalised contact forces can give, sum_i f_i3 <=
-/// 1: the hand has one budget of normal force for all contacts. Margins are per newton of it, without unit.
+/// The largest ball of wrenches [force; moment / length] that normalised contact forces can give, sum_i f_i3
+/// <= 1: the hand has one budget of normal force for all contacts. Margins are per newton of it, without
+/// unit.
 struct ForceClosureResult {
   ForceClosureStatus status = ForceClosureStatus::kUndecided;
   double margin = 0.0;  ///< Largest resisted wrench in `direction`: an upper bound on the ball's radius.

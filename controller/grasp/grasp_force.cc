@@ -74,8 +74,7 @@ GraspForceProblem::GraspForceProblem(int num_contacts) {
   f_max = VectorXd::Constant(num_contacts, 100.0);
 }
 
-GraspForceSolver::GraspForceSolver(int num_contacts, const GraspForceOptions& options)
-    : options_(options) {
+GraspForceSolver::GraspForceSolver(int num_contacts, const GraspForceOptions& options) : options_(options) {
   RequireValid(options);
   result_.f_c = VectorXd::Zero(GraspForceProblem(num_contacts).G.cols());
   result_.y = VectorXd::Zero(6);

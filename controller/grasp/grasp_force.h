@@ -42,11 +42,11 @@ struct GraspForceProblem {
 ///
 ///   sum_i f_i3 - rho [sum_i log det P_i + sum of log(slack) over all bounds].
 ///
-/// Its optimum is unique, strictly inside every cone and bound, a smooth function of G and F_o, and exceeds the
-/// least sum_i f_i3 by at most 4 N rho.
+/// Its optimum is unique, strictly inside every cone and bound, a smooth function of G and F_o, and exceeds
+/// the least sum_i f_i3 by at most 4 N rho.
 struct GraspForceOptions {
-  double barrier_weight = 0.1;    ///< rho, N. The larger, the farther from the cones' boundaries.
-  double slack_tolerance = 1e-5;  ///< Relative error of the slacks at which to stop.
+  double barrier_weight = 0.1;        ///< rho, N. The larger, the farther from the cones' boundaries.
+  double slack_tolerance = 1e-5;      ///< Relative error of the slacks at which to stop.
   double residual_tolerance = 1e-10;  ///< Largest |G f_c - F_o| (N, N m), relative to max(1, |F_o|).
   int max_iterations = 60;
   bool warm_start = true;  ///< Start from the last solution. A warm start that fails is repeated cold.
@@ -89,7 +89,8 @@ class GraspForceSolver {
   GraspForceSolver& operator=(GraspForceSolver&&) noexcept;
 
   /// Solves `problem`; the result is valid until the next call. Throws std::invalid_argument for a size that
-  /// differs from the solver's, a number that is not finite, mu <= 0 or crossed bounds; SingularityError if G has not full row rank.
+  /// differs from the solver's, a number that is not finite, mu <= 0 or crossed bounds; SingularityError if G
+  /// has not full row rank.
   const GraspForceResult& Solve(const GraspForceProblem& problem);
 
   /// Forgets the last solution: the next Solve starts cold.

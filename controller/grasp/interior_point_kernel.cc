@@ -257,8 +257,7 @@ void InteriorPointKernel::Report(const GraspForceProblem& problem, const GraspFo
                                  GraspForceResult& result) const {
   const bool optimal = result.status == GraspForceStatus::kOptimal;
   result.objective = optimal ? objective_ : 0.0;
-  result.duality_gap =
-      optimal ? CalcGap(options.barrier_weight) : std::numeric_limits<double>::infinity();
+  result.duality_gap = optimal ? CalcGap(options.barrier_weight) : std::numeric_limits<double>::infinity();
   double largest = 0.0;
   for (const double y : y_) largest = std::max(largest, std::abs(y));
   const double scale = result.status == GraspForceStatus::kInfeasible ? 1.0 / largest : 1.0;

@@ -61,8 +61,8 @@ const VectorXd& HandlingController::CalcTorque(const GraspModel& terms, const Me
   if (demand.grip > 0.0) {
     Require(demand.contacts == all, "grip", "must be zero without all contacts", demand.grip);
     const ObjectBodyTerms& body = grasp.body();
-    const Vector6d F_o = demand.scale * (body.M_hat * V_Bo_dot_ + body.C_hat * grasp.V_Bo()) +
-                         demand.weight * body.N_o;
+    const Vector6d F_o =
+        demand.scale * (body.M_hat * V_Bo_dot_ + body.C_hat * grasp.V_Bo()) + demand.weight * body.N_o;
     law.f_c += demand.grip * force_.Solve(grasp, F_o, demand.f_min);
     force_seconds_ = force_.seconds();
   }

@@ -120,8 +120,8 @@ double MeasureBox(const Vector3d& point, const Vector3d& half_size, Vector3d* no
 
 }  // namespace
 
-ExactContact CollideSphereCylinder(const Vector3d& center, double sphere_radius,
-                                            double cylinder_radius, double half_length) {
+ExactContact CollideSphereCylinder(const Vector3d& center, double sphere_radius, double cylinder_radius,
+                                   double half_length) {
   const double rho = center.head<2>().norm();
   const Vector3d outward = rho > 0.0 ? Vector3d(center.x() / rho, center.y() / rho, 0.0) : Vector3d::UnitX();
   const Vector3d along = center.z() < 0.0 ? Vector3d(-Vector3d::UnitZ()) : Vector3d::UnitZ();
@@ -143,8 +143,7 @@ ExactContact CollideSphereCylinder(const Vector3d& center, double sphere_radius,
   return contact;
 }
 
-ExactContact CollideSphereEllipsoid(const Vector3d& center, double sphere_radius,
-                                              const Vector3d& semi_axes) {
+ExactContact CollideSphereEllipsoid(const Vector3d& center, double sphere_radius, const Vector3d& semi_axes) {
   // The nearest point x has p - x = t grad, so x_i = a_i^2 p_i / (a_i^2 + t) with sum (x_i / a_i)^2 = 1. The
   // sum falls from infinity at t = -a_min^2; halving finds where it is 1, to the last bit. In s = t +
   // a_min^2.

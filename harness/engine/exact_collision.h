@@ -16,8 +16,8 @@ namespace dexcheck {
 /// One place where two surfaces are nearest, in the frame that a function names.
 struct ExactContact {
   double distance = std::numeric_limits<double>::infinity();  ///< m; negative when they overlap.
-  Vector3d normal = Vector3d::Zero();    ///< From the sphere, or the box, to the other.
-  Vector3d position = Vector3d::Zero();  ///< Midway between the surfaces, m.
+  Vector3d normal = Vector3d::Zero();                         ///< From the sphere, or the box, to the other.
+  Vector3d position = Vector3d::Zero();                       ///< Midway between the surfaces, m.
 };
 
 /// The nearest points of a sphere and a cylinder about the z axis of its frame: on the side, on an end, or on
@@ -51,9 +51,10 @@ inline constexpr int kRingPlaces = 8;
 int CollideBoxTorus(const Pose& X_BT, double ring_radius, double tube_radius, const Vector3d& half_size,
                     double margin, ExactContact contacts[kRingPlaces]);
 
-/// Makes the engine collide so, in the whole process; meshes that are no tori keep the engine's own functions.
-/// A mesh geom is a torus about its BODY's origin and z axis when the MJCF gives it user="RING_RADIUS
-/// TUBE_RADIUS" (with <size nuser_geom="2"/>). Safe to call more than once and from several threads.
+/// Makes the engine collide so, in the whole process; meshes that are no tori keep the engine's own
+/// functions. A mesh geom is a torus about its BODY's origin and z axis when the MJCF gives it
+/// user="RING_RADIUS TUBE_RADIUS" (with <size nuser_geom="2"/>). Safe to call more than once and from several
+/// threads.
 void InstallExactCollision();
 
 /// Ring and tube radius of a geom marked as a torus; false for all others.

@@ -153,8 +153,7 @@ TEST(GraspMapTest, RateMatchesDifferencesWhileAFingerRolls) {
     Contact contact = motion.CalcContact(0.0);
     Matrix6Xd G_dot(6, 3);
     CalcGraspMapDot({&contact, 1}, G_dot);
-    const MatrixXd expected =
-        Differentiate([&](double t) { return CalcG({motion.CalcContact(t)}); });
+    const MatrixXd expected = Differentiate([&](double t) { return CalcG({motion.CalcContact(t)}); });
     ASSERT_GT(expected.norm(), 0.1);
     EXPECT_TRUE(MatrixNear(G_dot, expected, kDifference));
     // Without the object's torsion in psi_dot the contact frame turns at the wrong rate.

@@ -30,8 +30,8 @@ bool CanGive(const GraspForceProblem& grasp, const Vector6d& F_o) {
   return result.status == GraspForceStatus::kOptimal && result.objective <= 1.0;
 }
 
-// Largest n^T [force; moment / length] of the wrenches of normalised contact forces: a contact gives most with
-// its force on the cone's boundary.
+// Largest n^T [force; moment / length] of the wrenches of normalised contact forces: a contact gives most
+// with its force on the cone's boundary.
 double CalcSupport(const GraspForceProblem& grasp, const Vector6d& n) {
   Vector6d functional = n;
   functional.tail<3>() /= ForceClosureOptions().length;
@@ -126,8 +126,8 @@ TEST(ForceClosure, DescentOverDirectionsFindsNothingWeaker) {
 }
 
 TEST(ForceClosureHandWorked, FourContactsOnTheEquator) {
-  // With sum f_i3 <= 1 the weakest direction is a moment about the axis midway between x and y: each contact has
-  // the lever (R + r) / sqrt 2 and gives it by friction, mu (R + r) / (sqrt 2 length).
+  // With sum f_i3 <= 1 the weakest direction is a moment about the axis midway between x and y: each contact
+  // has the lever (R + r) / sqrt 2 and gives it by friction, mu (R + r) / (sqrt 2 length).
   constexpr double kMu = 0.8;
   const GraspForceProblem grasp = MakeEquatorGraspForceProblem(4, kMu);
   const ForceClosureOptions options;

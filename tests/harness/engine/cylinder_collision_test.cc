@@ -1,7 +1,5 @@
 // The exact sphere-cylinder narrow phase, by itself and inside the engine.
 
-#include "harness/engine/exact_collision.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 
 #include "controller/contact/shapes.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/exact_collision.h"
 #include "tests/common/matrix_near.h"
 
 namespace dexcheck::testing::cylinder_collision_test {

@@ -206,8 +206,7 @@ TEST_F(RandomGrasp, ContactJacobianIsTheEngines) {
       const Matrix3d turn = X_cf.linear().transpose() * frame.transpose();  // engine's frame to Sigma_cf
       const RowMatrixXd relative = -(turn * efc_J);
       MatrixXd T = MatrixXd::Zero(nv, terms_.size());
-      for (int i = 0; i < terms_.size(); ++i)
-        map_.Expand(VectorXd::Unit(terms_.size(), i), T.col(i).data());
+      for (int i = 0; i < terms_.size(); ++i) map_.Expand(VectorXd::Unit(terms_.size(), i), T.col(i).data());
       const MatrixXd J_engine = relative * T;
       EXPECT_TRUE(MatrixNear(J_B_.middleRows(3 * finger, 3), J_engine, kRounding));
 

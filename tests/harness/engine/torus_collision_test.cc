@@ -1,7 +1,5 @@
 // The plant's sphere-torus contact against closed form, the engine's own capsules, and the hole.
 
-#include "harness/engine/exact_collision.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -12,6 +10,7 @@
 
 #include "controller/contact/shapes.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/exact_collision.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 
