@@ -121,6 +121,8 @@ class TomlValue {
 
  private:
   void CopyNumbers(double* target, int count) const;
+  /// The note of this problem with this value, made when there is none yet.
+  MissingKeys& Note(const std::string& problem) const;
   /// "FILE:LINE", or where the value was set.
   [[nodiscard]] std::string Locate() const;
 
