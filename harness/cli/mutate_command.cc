@@ -11,7 +11,9 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
+#include "harness/base/byte_archive.h"
 #include "harness/base/interrupts.h"
+#include "harness/base/process_pool.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/mutate_run.h"
@@ -233,14 +235,29 @@ int Run(MutateRequest request) {
   campaign.formulas = ListFormulaMutants(model);
   const auto total = static_cast<long>(campaign.mutants.size() + campaign.formulas.size());
   ProgressBar bar("changing", total, request.quiet);
-  while (campaign.formulas_done < campaign.formulas.size() && !IsInterrupted()) {
-    RunFormulaMutant(adapter, request.options.samples, &campaign.formulas[campaign.formulas_done++]);
-    bar.Update(static_cast<long>(campaign.formulas_done));
-  }
-  while (campaign.done < campaign.mutants.size() && !IsInterrupted()) {
-    TryMutant(model, *engine, source, request.options, &campaign.mutants[campaign.done++]);
-    bar.Update(static_cast<long>(campaign.formulas_done + campaign.done));
-  }
+  const auto make = [&](size_t i) {
+    if (i < campaign.formulas.size()) {
+      FormulaMutant& f = campaign.formulas[i];
+      RunFormulaMutant(adapter, request.options.samples, &f);
+      return PackBytes(f.outcome, f.failed_checks, f.localised);
+    }
+    Mutant& m = campaign.mutants[i - campaign.formulas.size()];
+    TryMutant(model, *engine, source, request.options, &m);
+    return PackBytes(m.outcome, m.failed_checks, m.named, m.named_first, m.named_equal, m.causes,
+                     m.explained);
+  };
+  const auto take = [&](size_t i, const std::string& result) {
+    if (i < campaign.formulas.size()) {
+      FormulaMutant& f = campaign.formulas[campaign.formulas_done++];
+      UnpackBytes(result, &f.outcome, &f.failed_checks, &f.localised);
+    } else {
+      Mutant& m = campaign.mutants[campaign.done++];
+      UnpackBytes(result, &m.outcome, &m.failed_checks, &m.named, &m.named_first, &m.named_equal, &m.causes,
+                  &m.explained);
+    }
+    bar.Update(static_cast<long>(i) + 1);
+  };
+  RunJobs("a mutant", static_cast<size_t>(total), CountJobs(request.run.jobs), make, take, IsInterrupted);
   bar.Finish();
   if (json) json->Write(ToText(request, campaign));
   if (request.json_file != "-") Print(request, campaign);
@@ -299,6 +316,7 @@ void AddMutateCommand(Command app) {
   for (Option option : {from, duration, faults, scale}) option.Excludes(smallest);
   for (Option option : states) option.Excludes(run);
   no_diagnosis.Excludes(run);
+  AddJobsOption(command, "Faults", &request->run.jobs).Excludes(smallest);
   AddJsonOption(command, "the results", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });

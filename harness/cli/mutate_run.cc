@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <optional>
 
+#include "harness/base/byte_archive.h"
 #include "harness/base/interrupts.h"
+#include "harness/base/process_pool.h"
 #include "harness/cli/command_line.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
@@ -150,11 +152,19 @@ int MutateRun(const MutateRunRequest& request) {
   RunCampaign campaign(files.scenario, files.robot, files.mjcf, request.options, IsInterrupted);
   const size_t total = campaign.mutants().size();
   ProgressBar bar("changing", static_cast<long>(total), request.quiet || request.json_file == "-");
-  size_t done = 0;
-  while (done < total && !IsInterrupted() && campaign.Run(done, IsInterrupted)) {
-    ++done;
-    bar.Update(static_cast<long>(done));
-  }
+  const auto make = [&](size_t i) {
+    campaign.Run(i, [] { return false; });
+    const RunMutant& m = campaign.mutants()[i];
+    return PackBytes(m.refused, m.killed, m.no_effect, m.cause, m.names_part, m.position_error,
+                     m.is_as_expected, m.evidence, m.failure, m.failed_checks);
+  };
+  const auto take = [&](size_t i, const std::string& result) {
+    RunMutant* const m = campaign.mutant(i);
+    UnpackBytes(result, &m->refused, &m->killed, &m->no_effect, &m->cause, &m->names_part, &m->position_error,
+                &m->is_as_expected, &m->evidence, &m->failure, &m->failed_checks);
+    bar.Update(static_cast<long>(i) + 1);
+  };
+  const size_t done = RunJobs("a fault", total, CountJobs(request.jobs), make, take, IsInterrupted);
   bar.Finish();
   if (json) json->Write(ToText(request, campaign, done));
   if (request.json_file != "-") Print(request, campaign, done);

@@ -1,6 +1,7 @@
 #include "harness/cli/shared_request.h"
 
 #include "controller/common/text.h"
+#include "harness/base/process_pool.h"
 #include "harness/cli/commands.h"
 
 namespace dexcheck::cli {
@@ -28,6 +29,14 @@ std::array<Option, 2> AddOverrideOptions(Command command, Overrides* overrides) 
                            .Repeatable();
   return {set, unset};
 }
+
+Option AddJobsOption(Command command, const std::string& what, std::uint64_t* jobs) {
+  return command.AddOption("--jobs", jobs, what + " at a time (all processors by default)")
+      .TypeName("N")
+      .Check(WholeNumber(1, 1000000));
+}
+
+int CountJobs(std::uint64_t jobs) { return jobs > 0 ? static_cast<int>(jobs) : CountProcessors(); }
 
 void AddScenarioOptions(Command command, ScenarioRequest* request) {
   command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();

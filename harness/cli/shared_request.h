@@ -3,6 +3,7 @@
 // What commands ask for that make many runs of one scenario and print one result.
 
 #include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,11 @@ struct Overrides {
 
 /// Adds --set and --unset. @returns them.
 std::array<Option, 2> AddOverrideOptions(Command command, Overrides* overrides);
+
+/// Adds --jobs. @param what is made: "Trials". @param jobs 0 for one on each processor, as CountJobs reads
+/// it.
+Option AddJobsOption(Command command, const std::string& what, std::uint64_t* jobs);
+int CountJobs(std::uint64_t jobs);
 
 struct ScenarioRequest {
   std::string scenario;

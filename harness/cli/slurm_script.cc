@@ -71,7 +71,7 @@ std::string MakeSlurmScript(const StudyInputs& inputs, const std::string& name_o
 #SBATCH --job-name={name}
 #SBATCH --array=1-{elements}{throttle}
 #SBATCH --ntasks=1
-#SBATCH --cpus-per-task=1
+#SBATCH --cpus-per-task={cpus}
 {more}#SBATCH --requeue
 #SBATCH --open-mode=append
 #SBATCH --output={name}-%a-of-{elements}.log
@@ -79,17 +79,15 @@ std::string MakeSlurmScript(const StudyInputs& inputs, const std::string& name_o
 code=0
 for ((task = SLURM_ARRAY_TASK_ID; task <= {tasks}; task += {elements})); do
   {program} study run {study} --quiet --jobs "${{SLURM_CPUS_PER_TASK:-1}}" \
-    --shard "$task/{tasks}" --db "{name}-$task-of-{tasks}.sqlite"{exchange} || code=$?
+    {shard}--db "{name}-$task-of-{tasks}.sqlite" || code=$?
 done
 exit $code
 )",
       fmt::arg("name", name), fmt::arg("tasks", job.tasks),
       fmt::arg("elements", std::min(job.tasks, job.array_size)),
       fmt::arg("throttle", job.throttle > 0 ? "%" + std::to_string(job.throttle) : ""),
-      fmt::arg("more", more),
-      fmt::arg("exchange", inputs.study.is_search()
-                               ? fmt::format(" \\\n    --exchange \"{}-of-{}-exchange\"", name, job.tasks)
-                               : ""),
+      fmt::arg("cpus", job.cpus), fmt::arg("more", more),
+      fmt::arg("shard", inputs.study.is_search() ? "" : fmt::format("--shard \"$task/{}\" ", job.tasks)),
       fmt::arg("program", QuoteForShell(program)), fmt::arg("study", QuoteForShell(study)));
 }
 

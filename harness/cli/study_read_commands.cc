@@ -15,11 +15,12 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/interrupts.h"
+#include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/study/study_csv.h"
+#include "harness/study/study_page.h"
 #include "harness/study/study_progress.h"
-#include "harness/study/study_report.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck::cli {
@@ -34,12 +35,18 @@ std::string CheckInterval(const std::string& text) {
   return good ? "" : "must be from 0.1 to 86400 s, got " + Quote(text);
 }
 
-int ShowTrial(const std::string& database, long number) {
+void WriteJson(const std::string& file, const nlohmann::ordered_json& json) {
+  if (!file.empty()) OutputFile(file).Write(json.dump(2) + "\n");
+}
+
+int ShowTrial(const std::string& database, long number, const std::string& json) {
   const StudyStore store = StudyStore::Open(database);
   const Study& study = store.study();
   const std::optional<TrialRow> found = store.FindRow(number);
   if (!found) throw InputError(fmt::format("{}: trial {}: has no row", database, number));
   const TrialRow& row = *found;
+  WriteJson(json, ToJson(study, row));
+  if (json == "-") return kSuccess;
   fmt::print("trial {}, seed {}: {}{}{}\n", row.trial.number, row.trial.seed, NameOf(row.result.outcome),
              row.result.failure.empty() ? "" : ": ", row.result.failure);
   size_t width = 0;
@@ -68,7 +75,7 @@ int WatchStudy(const std::string& database, double interval, const std::string& 
     std::fflush(stdout);
     if (!page.empty()) {
       OutputFile out(page);
-      out.Write(MakeStudyReport(store, progress.is_over ? 0.0 : interval));
+      out.Write(MakeStudyPage(SummariseStudy(store), progress.is_over ? 0.0 : interval));
     }
     if (progress.is_over) return kSuccess;
     const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(interval);
@@ -91,11 +98,14 @@ void AddStudyReadCommands(Command study) {
   add_database(report);
   report.AddOption("--out", out.get(), "The page (DB.html by default); - for standard output")
       .TypeName("FILE.html");
+  const auto json = std::make_shared<std::string>();
+  AddJsonOption(report, "the same data", json.get());
   report.SetAction([=] {
     RequirePageName(*out);
-    const StudyStore store = StudyStore::Open(*database);
-    OutputFile file(out->empty() ? *database + ".html" : *out);
-    file.Write(MakeStudyReport(store));
+    const StudySummary summary = SummariseStudy(StudyStore::Open(*database));
+    WriteJson(*json, summary.json);
+    if (!json->empty() && out->empty()) return kSuccess;
+    OutputFile(out->empty() ? *database + ".html" : *out).Write(MakeStudyPage(summary));
     return kSuccess;
   });
 
@@ -103,7 +113,8 @@ void AddStudyReadCommands(Command study) {
   add_database(show);
   const auto number = std::make_shared<long>(0);
   show.AddOption("TRIAL", number.get(), "Its number").Required();
-  show.SetAction([=] { return ShowTrial(*database, *number); });
+  AddJsonOption(show, "the trial", json.get());
+  show.SetAction([=] { return ShowTrial(*database, *number, *json); });
 
   Command csv = study.AddCommand("export", "Write all trials as CSV");
   add_database(csv);

@@ -17,23 +17,6 @@ constexpr double kMaxSteps = 1e8;
 /// task; whatever has not come to rest by then, never will.
 constexpr double kMaxSettle = 100.0;
 
-/// A document with the overrides that are the scenario's own; the others go to `model_overrides`.
-TomlDocument OpenDocument(const std::string& text, const std::string& source,
-                          const std::vector<std::string>& overrides,
-                          std::vector<std::string>* model_overrides) {
-  constexpr std::string_view kModel = "model.";
-  TomlDocument document(text, source);
-  for (const std::string& assignment : overrides) {
-    const bool own = assignment.starts_with("model.file=") || assignment.starts_with("model.overrides");
-    if (assignment.starts_with(kModel) && !own) {
-      model_overrides->push_back(assignment.substr(kModel.size()));
-    } else {
-      document.Override(assignment);
-    }
-  }
-  return document;
-}
-
 double ReadOr(TomlTable& table, std::string_view key, double otherwise,
               double (TomlValue::*read)() const = &TomlValue::AsPositive) {
   const auto value = table.Find(key);
@@ -389,6 +372,33 @@ Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
 
 }  // namespace
 
+std::string_view FindModelKey(std::string_view key) {
+  constexpr std::string_view kModel = "model.";
+  const bool own = key == "model.file" || key.starts_with("model.overrides");
+  return key.starts_with(kModel) && !own ? key.substr(kModel.size()) : std::string_view();
+}
+
+TomlDocument OpenScenario(const std::string& text, const std::string& source,
+                          const std::vector<std::string>& overrides,
+                          std::vector<std::string>* model_overrides) {
+  TomlDocument document(text, source);
+  for (const std::string& assignment : overrides) {
+    const std::string_view key = std::string_view(assignment).substr(0, assignment.find('='));
+    const std::string_view model_key = FindModelKey(key);
+    if (model_key.empty()) {
+      document.Override(assignment);
+    } else {
+      model_overrides->push_back(assignment.substr(key.size() - model_key.size()));
+    }
+  }
+  return document;
+}
+
+Scenario ParseScenario(const TomlDocument& document, Scenario named, const std::filesystem::path& folder,
+                       const std::vector<std::string>& model_overrides) {
+  return document.Read([&](TomlTable root) { return ReadScenario(root, folder, model_overrides, named); });
+}
+
 Scenario ParseScenario(const std::string& text, const std::string& source,
                        const std::filesystem::path& folder, const std::vector<std::string>& overrides) {
   Scenario scenario;
@@ -396,8 +406,8 @@ Scenario ParseScenario(const std::string& text, const std::string& source,
   scenario.source = source;
   scenario.overrides = overrides;
   std::vector<std::string> model_overrides;
-  const TomlDocument document = OpenDocument(text, source, overrides, &model_overrides);
-  return document.Read([&](TomlTable root) { return ReadScenario(root, folder, model_overrides, scenario); });
+  const TomlDocument document = OpenScenario(text, source, overrides, &model_overrides);
+  return ParseScenario(document, std::move(scenario), folder, model_overrides);
 }
 
 }  // namespace dexcheck

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -189,5 +190,18 @@ struct Scenario {
 /// @throws InputError, one line that names file, line, key and value.
 Scenario ParseScenario(const std::string& text, const std::string& source,
                        const std::filesystem::path& folder, const std::vector<std::string>& overrides);
+
+/// The same from a file that is parsed already, with its overrides made.
+/// @param named has text, source and overrides. @param model_overrides of the parameter file.
+Scenario ParseScenario(const TomlDocument& document, Scenario named, const std::filesystem::path& folder,
+                       const std::vector<std::string>& model_overrides);
+
+/// A scenario's document with the overrides that are its own made; the others go to `model_overrides`.
+/// @throws InputError.
+TomlDocument OpenScenario(const std::string& text, const std::string& source,
+                          const std::vector<std::string>& overrides,
+                          std::vector<std::string>* model_overrides);
+/// Whether a key as --set takes it is one of the parameter file: then its name there, else empty.
+std::string_view FindModelKey(std::string_view key);
 
 }  // namespace dexcheck

@@ -74,11 +74,11 @@ const VectorXd& ErrorPrediction::CalcAcceleration(const StepRecord& ideal) {
 
 void ErrorPrediction::Step(const VectorXd& d) {
   const MatrixXd& M = model_.robot().M();
-  if (errors_.empty() && acts_at_rest_) {
+  if (errors_.values.empty() && acts_at_rest_) {
     const VectorXd at_rest = is_decoupled_ ? d : VectorXd(M * d);
     e_ = (K_p_ > 0.0).select(-at_rest.array() / K_p_, 0.0);
   }
-  errors_.push_back(e_);
+  errors_.Append(e_);
   e_ddot_ = -(K_v_ * e_dot_.array() + K_p_ * e_.array());
   if (!is_decoupled_) {
     // What the springs and dampers add to the forces, M^-1 (force + bias - bias).

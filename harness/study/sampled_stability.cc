@@ -136,12 +136,6 @@ double CalcRadiusOfChain(const SampledLoop& loop, const AxisGains& gains) {
 
 }  // namespace
 
-StableRange CalcStableRange(const SampledLoop& loop, double K_p) {
-  const double T = loop.period();
-  const double h = loop.time_step;
-  return {0.5 * (T - h) * K_p, 2.0 / T - 0.5 * h * K_p};
-}
-
 double CalcCriticalDamping(const SampledLoop& loop, double K_p) {
   return 2.0 * std::sqrt(K_p) - CalcReach(loop) / loop.period() * K_p;
 }

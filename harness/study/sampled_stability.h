@@ -49,13 +49,6 @@ struct AxisGains {
   bool operator==(const AxisGains&) const = default;
 };
 
-/// Open range of K_v that is stable at K_p > 0, 1/s; empty when least >= most. Of a direct loop.
-struct StableRange {
-  double least = 0.0;
-  double most = 0.0;
-};
-StableRange CalcStableRange(const SampledLoop& loop, double K_p);
-
 /// K_v of critical damping at K_p, 1/s; where it is not in the stable range there is none. Of a direct loop.
 double CalcCriticalDamping(const SampledLoop& loop, double K_p);
 

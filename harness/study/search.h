@@ -30,7 +30,7 @@ class Searcher {
 std::unique_ptr<Searcher> MakePopulationSearcher(const Search& search, size_t num_objectives,
                                                  const UnitPoint& start);
 
-/// Nelder-Mead's and Powell's methods of NLopt: a batch has a point of each of the local searches. The first
+/// Nelder and Mead's method of NLopt: a batch has a point of each of the local searches. The first
 /// begins at the start, the others at points of a Latin hypercube.
 std::unique_ptr<Searcher> MakeLocalSearcher(const Search& search, const UnitPoint& start);
 

@@ -96,7 +96,7 @@ UnitPoint FindSearchStart(const StudyInputs& inputs) {
     std::vector<double> values = ValuesAt(study.keys(), point);
     values.insert(values.end(), draw.begin(), draw.end());
     try {
-      const double radius = CalcRadiusInTheory(inputs, values);
+      const double radius = CalcTheory(inputs, values).radius;
       if (radius < least && IsDampedInTheory(inputs, values)) {
         least = radius;
         start = point;

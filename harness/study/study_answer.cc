@@ -20,8 +20,7 @@ std::string DescribeEdges(const Study& study, const std::vector<double>& values)
   std::string text;
   for (size_t i = 0; i < study.num_keys(); ++i) {
     const Variation& variation = study.variations[i];
-    if (!variation.values.empty() || variation.depends_on_others() || variation.from == variation.to)
-      continue;
+    if (!variation.values.empty() || variation.from == variation.to) continue;
     const double fraction = FractionOf(variation, values[i]);
     if (fraction > kAtEnd && fraction < 1.0 - kAtEnd) continue;
     text += (text.empty() ? " At an end of its range is " : ", ") + variation.key;

@@ -31,8 +31,7 @@ std::vector<size_t> FindPlaces(const Study& before, const Study& now) {
 
 bool IsSameVariation(const Variation& a, const Variation& b) {
   return a.key == b.key && a.values == b.values && a.labels == b.labels && a.from == b.from && a.to == b.to &&
-         a.logarithmic == b.logarithmic && a.from_expression == b.from_expression &&
-         a.to_expression == b.to_expression;
+         a.logarithmic == b.logarithmic;
 }
 
 bool IsSameSample(const Sample& a, const Sample& b) {
