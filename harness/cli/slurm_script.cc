@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <string_view>
+#include <regex>
 
 #include "controller/common/text.h"
 #include "harness/base/shell.h"
@@ -13,44 +13,19 @@
 namespace dexcheck::cli {
 namespace {
 
-/// Takes digits from the front of a text; false when there are none, or more than a sensible number has.
-bool TakeNumber(std::string_view* text) {
-  constexpr size_t kMostDigits = 9;
-  size_t count = 0;
-  while (count < text->size() && (*text)[count] >= '0' && (*text)[count] <= '9') ++count;
-  text->remove_prefix(count);
-  return count >= 1 && count <= kMostDigits;
-}
-
-bool IsTime(std::string_view text) {
-  if (!TakeNumber(&text)) return false;
-  const bool has_days = text.starts_with('-');
-  if (has_days) {
-    text.remove_prefix(1);
-    if (!TakeNumber(&text)) return false;
-  }
-  for (int parts = 0; text.starts_with(':') && parts < 2; ++parts) {
-    text.remove_prefix(1);
-    if (!TakeNumber(&text)) return false;
-  }
-  return text.empty();
-}
-
-bool IsMemory(std::string_view text) {
-  if (!TakeNumber(&text)) return false;
-  return text.empty() ||
-         (text.size() == 1 && std::string_view("KMGT").find(text[0]) != std::string_view::npos);
+bool Matches(const std::string& text, const char* pattern) {
+  return std::regex_match(text, std::regex(pattern));
 }
 
 }  // namespace
 
 std::string CheckSlurmTime(const std::string& text) {
-  if (IsTime(text)) return {};
+  if (Matches(text, "\\d{1,9}(-\\d{1,9})?(:\\d{1,9}){0,2}")) return {};
   return "must be MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]], got " + Quote(text);
 }
 
 std::string CheckSlurmMemory(const std::string& text) {
-  if (IsMemory(text)) return {};
+  if (Matches(text, "\\d{1,9}[KMGT]?")) return {};
   return "must be a whole number with K, M, G or T, got " + Quote(text);
 }
 

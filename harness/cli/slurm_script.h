@@ -7,7 +7,7 @@
 
 namespace dexcheck::cli {
 
-/// What a study's array job asks for.
+/// A study's array job.
 struct SlurmJob {
   std::uint64_t tasks = 1;  ///< Parts of the study.
   /// Most elements of the array. Slurm's MaxArraySize, 1001 unless configured, is one more than the largest

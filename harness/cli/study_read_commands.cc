@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -49,18 +48,15 @@ int ShowTrial(const std::string& database, long number, const std::string& json)
   if (json == "-") return kSuccess;
   fmt::print("trial {}, seed {}: {}{}{}\n", row.trial.number, row.trial.seed, NameOf(row.result.outcome),
              row.result.failure.empty() ? "" : ": ", row.result.failure);
-  size_t width = 0;
-  for (const Variation& variation : study.variations) width = std::max(width, variation.key.size());
-  for (const MetricInfo& metric : kMetrics) width = std::max(width, std::string_view(metric.name).size());
-  for (size_t i = 0; i < study.variations.size(); ++i) {
-    fmt::print("  {:<{}}  {}\n", study.variations[i].key, width,
-               FormatValue(study.variations[i], row.trial.parameters[i]));
-  }
+  const auto print = [](std::string_view name, const std::string& value) {
+    fmt::print("  {:<36}  {}\n", name, value);
+  };
+  for (size_t i = 0; i < study.variations.size(); ++i)
+    print(study.variations[i].key, FormatValue(study.variations[i], row.trial.parameters[i]));
   for (size_t i = 0; i < kMetrics.size(); ++i) {
     const double value = row.result.metrics[i];
-    const std::string unit = kMetrics[i].unit;
     if (std::isfinite(value))
-      fmt::print("  {:<{}}  {:.6g}{}\n", kMetrics[i].name, width, value, unit == "1" ? "" : " " + unit);
+      print(kMetrics[i].name, fmt::format("{:.6g}{}", value, ShowUnit(kMetrics[i].name)));
   }
   fmt::print("{}\n", MakeReplayCommand(study, row.trial));
   return kSuccess;
@@ -128,7 +124,7 @@ void AddStudyReadCommands(Command study) {
     return kSuccess;
   });
 
-  Command watch = study.AddCommand("watch", "Tell how far a study has come, until it is done");
+  Command watch = study.AddCommand("watch", "Print how far a study has come, until it is done");
   add_database(watch);
   const auto interval = std::make_shared<double>(5.0);
   watch.AddOption("--interval", interval.get(), "Seconds between two looks")

@@ -224,7 +224,7 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
   const std::vector<ErrorSource> sources = ListErrorSources(scenario.imperfections);
   if (sources.empty()) {
     throw InputError(scenario.source +
-                     ": asks for nothing of [sensing], [actuation], [[disturbance]] or "
+                     ": has nothing in [sensing], [actuation], [[disturbance]] or "
                      "[mismatch] that could cost accuracy");
   }
   const SetupMaker maker(scenario, robot, mjcf);
@@ -240,7 +240,7 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
     }
     return maker.Make(kept);
   };
-  // Made here, so that a scenario that is wrong is told as such.
+  // Made here, so that a fault of the scenario is an input error.
   const std::unique_ptr<Setup> ideal_setup = without([](size_t) { return true; });
   const std::unique_ptr<Setup> all_setup = without([](size_t) { return false; });
   if (budget.of_joints) budget.unit = NameUnit(ideal_setup->model());

@@ -12,7 +12,7 @@
 
 namespace dexcheck {
 
-/// One thing that a scenario asks of its plant.
+/// One thing in which a scenario's plant is not ideal.
 struct ErrorSource {
   std::string name;  ///< Its key: "sensing.joint_counts", "disturbance.0".
   /// Takes it out. The random numbers of the others stay as they are.
@@ -62,7 +62,7 @@ struct ErrorBudget {
 };
 
 /// Runs the scenario 2 n + 2 times for its n sources, unchecked, `jobs` runs at a time.
-/// @param progress asked often with the number of runs done and to do; false stops.
+/// @param progress called often with the number of runs done and to do; false stops.
 /// @throws InputError as Setup; when the scenario is a task or its plant is ideal.
 ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::path& robot,
                             const std::filesystem::path& mjcf, int jobs,

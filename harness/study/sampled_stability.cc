@@ -47,13 +47,13 @@ class ErrorChain {
     // The rate is differenced: (e_k - e_{k-1}) / h, which is e_dot where the filter lets all through.
     state_[kFiltered] += loop_.low_pass * ((e - state_[kSeen]) / h - state_[kFiltered]);
     state_[kSeen] = e;
-    double told = e;
+    double measured = e;
     double measured_rate = loop_.low_pass == 1.0 ? e_dot : state_[kFiltered];
     for (size_t i = 0; i < static_cast<size_t>(loop_.latency); ++i) {
-      std::swap(told, state_[kChains + 2 * i]);
+      std::swap(measured, state_[kChains + 2 * i]);
       std::swap(measured_rate, state_[kChains + 2 * i + 1]);
     }
-    if (k % loop_.hold == 0) state_[kHeld] = -gains_.K_v * measured_rate - gains_.K_p * told;
+    if (k % loop_.hold == 0) state_[kHeld] = -gains_.K_v * measured_rate - gains_.K_p * measured;
     double a = state_[kHeld];
     if (!loop_.is_direct()) a = Lag(Delay(a));
     e_dot += h * a;

@@ -17,9 +17,9 @@
 // and they are equal, trace^2 = 4 determinant, at K_v = 2 sqrt(K_p) - b K_p / T. For h -> 0 these are the
 // continuous K_v > 0 and K_v = 2 sqrt(K_p).
 //
-// Torques that come late, a state that is told late, a rate that is differenced and filtered, and motors that
-// lag make a longer chain of states. One period of it is a matrix A, of which column i is what a period makes
-// of the i-th unit state, and its spectral radius is lim |A^n|^(1/n), here with n = 2^40 by squaring.
+// Torques that come late, a state that is measured late, a rate that is differenced and filtered, and motors
+// that lag make a longer chain of states. One period of it is a matrix A, of which column i is what a period
+// makes of the i-th unit state, and its spectral radius is lim |A^n|^(1/n), here with n = 2^40 by squaring.
 
 #include <vector>
 
@@ -30,7 +30,7 @@ struct SampledLoop {
   double time_step = 1e-3;  ///< h, s.
   long hold = 1;            ///< m, steps that torques are held.
   double delay = 0.0;       ///< Of the torques, s.
-  long latency = 0;         ///< Age of the error that is told, steps.
+  long latency = 0;         ///< Age of the error that is measured, steps.
   double low_pass =
       1.0;  ///< Fraction of a rate's change that its filter lets through at each step; 1 for no filter.
   double lag = 0.0;  ///< Time constant of the motors, s.

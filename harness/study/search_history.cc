@@ -107,43 +107,22 @@ UnitPoint FindSearchStart(const StudyInputs& inputs) {
   return start;
 }
 
-namespace {
-
-/// Calls `take` with each point whose trials are all there.
-template <typename Take>
-void ForEachPoint(const Study& study, const std::vector<TrialRow>& rows, const Take& take) {
+std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows) {
   const long per_point = CountTrialsOfPoint(study);
+  std::vector<JudgedPoint> points;
   std::vector<TrialResult> results;
   for (size_t i = 0; i < rows.size();) {
     const long number = rows[i].trial.number / per_point;
     results.clear();
-    const size_t first = i;
+    const std::vector<double>& values = rows[i].trial.parameters;
     for (; i < rows.size() && rows[i].trial.number / per_point == number; ++i)
       results.push_back(rows[i].result);
     if (static_cast<long>(results.size()) < per_point) continue;
-    const std::vector<double>& values = rows[first].trial.parameters;
-    take(JudgedPoint{number,
-                     {values.begin(), values.begin() + static_cast<std::ptrdiff_t>(study.num_keys())},
-                     JudgePoint(study.objectives, study.constraints, results)});
+    points.push_back({number,
+                      {values.begin(), values.begin() + static_cast<std::ptrdiff_t>(study.num_keys())},
+                      JudgePoint(study.objectives, study.constraints, results)});
   }
-}
-
-}  // namespace
-
-std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows) {
-  std::vector<JudgedPoint> points;
-  ForEachPoint(study, rows, [&](JudgedPoint&& point) { points.push_back(std::move(point)); });
   return points;
-}
-
-PointSummary SummarisePoints(const Study& study, const std::vector<TrialRow>& rows) {
-  PointSummary summary;
-  ForEachPoint(study, rows, [&](JudgedPoint&& point) {
-    if (summary.count++ == 0) summary.first = point;
-    const bool better = !summary.best || IsBetter(point.judgement, summary.best->judgement);
-    if (point.judgement.is_feasible() && better) summary.best = std::move(point);
-  });
-  return summary;
 }
 
 std::vector<const JudgedPoint*> SortFeasible(const std::vector<JudgedPoint>& points) {

@@ -22,6 +22,7 @@ struct Variation {
   double from = 0.0;  ///< Ends of the range.
   double to = 0.0;
   bool logarithmic = false;  ///< Even in the logarithm.
+  bool operator==(const Variation&) const = default;
 };
 
 enum class SamplingMethod { kGrid, kLatinHypercube, kSobol, kRandom, kSaltelli, kMorris };
@@ -29,9 +30,10 @@ enum class SamplingMethod { kGrid, kLatinHypercube, kSobol, kRandom, kSaltelli, 
 /// Points of the ranges of some keys.
 struct Sample {
   SamplingMethod method = SamplingMethod::kGrid;
-  long count = 0;  ///< Points; of a grid its keys say how many. Blocks and walks of kSaltelli and kMorris.
+  long count = 0;  ///< Points; of a grid its keys say how many. Blocks of kSaltelli, trajectories of kMorris.
   std::uint64_t seed = 0;  ///< Of all but a grid and a Sobol sequence that is not scrambled.
   bool scramble = false;   ///< A Sobol sequence.
+  bool operator==(const Sample&) const = default;
 };
 
 enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kMargins };
@@ -49,6 +51,7 @@ struct Search {
   std::uint64_t seed = 0;
   SearchStart start = SearchStart::kMiddle;
   std::vector<double> start_values;  ///< Of kValues, one for each key.
+  bool operator==(const Search&) const = default;
 };
 
 /// A study file.

@@ -17,7 +17,7 @@ namespace {
 constexpr long kMaxValues = 10000;
 constexpr long kMaxSeed = 1L << 53;  // whole numbers that a double holds
 
-/// Texts, truths and lists have no order: their numbers stand for them.
+/// Texts, flags and lists have no order: their numbers stand for them.
 bool IsWord(const TomlValue& value) {
   const std::string shown = value.Show();
   return value.IsText() || shown == "true" || shown == "false" || shown.starts_with('[');
@@ -27,7 +27,7 @@ void ReadValues(const TomlValue& list, Variation* variation) {
   for (const TomlValue& entry : list.AsList()) {
     const bool are_words = !variation->labels.empty();
     if (are_words || (variation->values.empty() && IsWord(entry))) {
-      if (!IsWord(entry)) entry.Fail("must be a text, a truth or a list as the first one is");
+      if (!IsWord(entry)) entry.Fail("must be a text, a flag or a list as the first one is");
       variation->values.push_back(static_cast<double>(variation->labels.size()));
       variation->labels.push_back(entry.IsText() ? entry.AsText() : entry.Show());
     } else {
@@ -309,7 +309,7 @@ void RequireFewTrials(const TomlValue& where, const Study& study) {
   }
 }
 
-/// @param study what is known of it before its file is read.
+/// @param study with its text and source.
 Study ReadStudy(TomlTable& root, Study study) {
   root.RejectOthersThan({"name", "description", "scenario", "set", "seeds", "check", "trial_time_limit",
                          "stop_error", "metrics", "sample", "search", "objective", "constraints", "vary",

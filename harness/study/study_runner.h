@@ -11,7 +11,7 @@ namespace dexcheck {
 
 struct RunOptions {
   int jobs = 1;                               ///< Trials at a time.
-  std::function<bool()> is_interrupted;       ///< Asked often.
+  std::function<bool()> is_interrupted;       ///< Called often.
   std::function<void(long finished)> report;  ///< Called with the number of trials that are done.
 };
 

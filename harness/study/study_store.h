@@ -62,7 +62,7 @@ void RequirePlainFile(const std::string& name);
 class StudyStore {
  public:
   /// Opens a study's database, or makes it when there is none. A study that was edited keeps the rows that it
-  /// still means, and sets the others aside (ChangeStudy); another revision of this program goes on with the
+  /// still has, and sets the others aside (ChangeStudy); another revision of this program goes on with the
   /// rows when it makes the same ones.
   /// @param makes_same_rows asked when the file was written by another revision; none for that it does not.
   /// @throws InputError, also when the file holds another study.

@@ -22,8 +22,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::array<const char*, kNumOutcomes> kOutcomeColors = {
     "#7bb662", "#f2c14e", "#e4572e", "#f78154", "#9b2226", "#577590", "#cccccc", "#000000", "#6d597a"};
-constexpr size_t kMostBest = 20;     // trials in the table of the best
-constexpr size_t kMostAsked = 2000;  // trials that theory is asked about
+constexpr size_t kMostBest = 20;        // trials in the table of the best
+constexpr size_t kMostCompared = 2000;  // trials that are compared with theory
 
 /// A failure without the time that it happened at, so that equal ones can be counted.
 std::string WithoutTime(const std::string& failure) {
@@ -84,7 +84,7 @@ class Summary {
     json["margins"] = ListMargins();
     json["sensitivity"] = ListSensitivity();
     ChooseShown();
-    AskTheory();
+    CalcTheories();
     json["theory"] = CompareWithTheory();
     json["keys"] = Json::array();
     for (const Variation& variation : study_.variations) json["keys"].push_back(variation.key);
@@ -269,11 +269,11 @@ class Summary {
   }
 
   /// Theory is that of an object.
-  void AskTheory() {
+  void CalcTheories() {
     if (of_joints() || rows_.empty()) return;
     inputs_.OpenScenario();
     theory_.resize(shown_.size());
-    const size_t every = (shown_.size() + kMostAsked - 1) / kMostAsked;
+    const size_t every = (shown_.size() + kMostCompared - 1) / kMostCompared;
     for (size_t i = 0; i < shown_.size(); i += every) {
       if (shown_[i]->result.outcome != Outcome::kRefused)
         theory_[i] = FindTheory(shown_[i]->trial.parameters);
@@ -284,13 +284,13 @@ class Summary {
   [[nodiscard]] Json CompareWithTheory() const {
     if (!has_theory()) return nullptr;
     std::map<std::string, long> reasons;
-    long asked = 0, right = 0;
+    long compared = 0, agree = 0;
     for (size_t i = 0; i < shown_.size(); ++i) {
       if (!theory_[i]) continue;
       const TrialResult& result = shown_[i]->result;
       const bool is_stable = theory_[i]->is_stable();
-      ++asked;
-      right += is_stable == IsHeld(result.outcome) ? 1 : 0;
+      ++compared;
+      agree += is_stable == IsHeld(result.outcome) ? 1 : 0;
       if (is_stable == IsHeld(result.outcome)) continue;
       std::string reason = WithoutTime(result.failure);
       if (reason.empty()) {
@@ -302,7 +302,7 @@ class Summary {
     }
     Json departures = Json::array();
     for (const auto& [reason, count] : reasons) departures.push_back({{"reason", reason}, {"count", count}});
-    return {{"asked", asked}, {"right", right}, {"departures", departures}};
+    return {{"compared", compared}, {"agree", agree}, {"departures", departures}};
   }
 
   /// Names and labels of what PackValues has of each trial.

@@ -55,7 +55,7 @@ bool VariesModel(const Study& study) {
                      [](const Variation& variation) { return !FindModelKey(variation.key).empty(); });
 }
 
-/// The scenario and the robot from their texts: what is wrong with them is told by their lines.
+/// The scenario and the robot from their texts: messages name their lines.
 Scenario ParseTrialScenario(const StudyInputs& inputs, const Trial& trial) {
   Scenario scenario = ParseScenario(inputs.scenario_text, inputs.scenario_source, inputs.scenario_folder,
                                     ListOverrides(inputs.study, trial));

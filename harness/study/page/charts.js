@@ -49,7 +49,7 @@ const MakeCharts = () => {
   // Bars along labels: sets of {label, values, color, thin}; a value may be [from, to].
   const Bars = (canvas, {labels, sets, unit = '', log = false, least, most}) => {
     const thin = sets.some(set => set.thin);
-    canvas.parentElement.style.height = 70 + labels.length * (thin ? 22 : 14 * sets.length) + 'px';
+    canvas.parentElement.style.height = 110 + labels.length * (thin ? 24 : 14 * sets.length + 4) + 'px';
     return Draw(canvas, {
       type: 'bar',
       data: {labels, datasets: sets.map(set => ({label: set.label, data: set.values, backgroundColor: set.color, grouped: !thin,
@@ -64,11 +64,12 @@ const MakeCharts = () => {
   const Scatter = (canvas, {x, y, points, lines = [], chosen, choose, tell}) => Draw(canvas, {
     type: 'scatter',
     data: {datasets: [
-      {label: 'chosen', data: points.filter(p => p.row === chosen), pointRadius: 7, pointBorderWidth: 2, pointHitRadius: 0,
+      {label: 'chosen', data: points.filter(p => p.row === chosen), pointRadius: 7, pointBorderWidth: 2, pointHitRadius: 0, order: 0,
         backgroundColor: 'transparent', borderColor: style('--accent')},
       ...lines.map(line => ({label: line.label, data: line.points, showLine: !line.rings, borderColor: line.color,
-        borderDash: line.dash ?? [], backgroundColor: 'transparent', pointRadius: line.rings ? 4 : 0, pointHitRadius: 0, borderWidth: 1.6})),
-      {label: 'trials', data: points, backgroundColor: points.map(p => p.color), pointRadius: points.length > 3000 ? 1.5 : 3.5}]},
+        borderDash: line.dash ?? [], backgroundColor: 'transparent', pointRadius: line.rings ? 4 : 0, pointHitRadius: 0, borderWidth: line.rings ? 1 : 1.8,
+        order: line.rings ? 3 : 1})),
+      {label: 'trials', data: points, order: 2, backgroundColor: points.map(p => p.color), pointRadius: points.length > 3000 ? 1.5 : 3.5}]},
     options: {onClick: Choose(choose), plugins: {legend: {...Legend(lines.length > 0),
       labels: {boxWidth: 14, filter: item => lines.some(line => line.label === item.text)}}, tooltip: Tip(tell)},
       scales: {x: MakeAxis(x), y: MakeAxis(y)}}

@@ -46,8 +46,8 @@
     Add(get('outcome-table'), Table(['outcome', 'trials'], study.outcomes.filter(o => o.count > 0).map(o => [
       Add(Make('span'), Object.assign(Make('span', '', {className: 'key'}), {style: 'background:' + o.color}), ' ' + o.name), o.count])));
     if (study.theory) {
-      Add(get('departures'), Make('p', 'The sampled error dynamics E_ddot + K_v E_dot + K_p E = 0 (57), stepped as the engine steps, tell ' +
-        `${study.theory.right} of ${study.theory.asked} trials rightly.`));
+      Add(get('departures'), Make('p', 'The sampled error dynamics E_ddot + K_v E_dot + K_p E = 0 (57), stepped as the engine steps, agree with ' +
+        `${study.theory.agree} of ${study.theory.compared} trials in whether the object is held.`));
       if (study.theory.departures.length)
         Add(get('departures'), Table(['where the plant departs from them', 'trials'], study.theory.departures.map(d => [d.reason, d.count])));
     }
@@ -144,7 +144,7 @@
       lines.push({label: `Pareto front, ${front.length} trials`, points: front.map(At), color: '#9b2226'});
     } else if (withMedian && !columns[x].labels) {
       const groups = [...GroupBy(good.filter(held), row => value(row, x))].sort((a, b) => a[0] - b[0]);
-      if (groups.some(([, group]) => group.length > 1) || groups.length === good.length)
+      if (study.is_grid || good.length >= 2 * groups.length)
         lines.push({label: 'median', color: style('--accent'), points: groups.map(([at, group]) => ({x: at, y: Median(group.map(row => value(row, y)))}))});
     }
     const theory = find('theory.' + columns[y].name);
@@ -291,7 +291,7 @@
     Filter();
     ShowChosen();
     for (const {z, canvas, text} of maps) DrawMap(canvas, kFirstKey, kFirstKey + 1, z, text);
-    const [x, y, color, cx, cy, cz] = ['x', 'y', 'color', 'cx', 'cy', 'cz'].map(id => Number(byId(id).value));
+    const [x, y, color, cx, cy, cz] = ['x', 'y', 'color', 'cx', 'cy', 'cz'].map(id => Number(byId(id)?.value));
     if (study.keys.length > 1) DrawMap(byId('map'), cx, cy, cz, byId('range'));
     DrawPair(byId('scatter'), x, y, color);
     for (const {x, canvas} of along) DrawPair(canvas, x, y, kOutcome, rows, /*withMedian=*/true);
@@ -333,9 +333,11 @@
   Fill('x', kFirstKey, width, kFirstKey);
   Fill('y', firstMetric, width, shown[0]);
   Fill('color', kFirstKey, width, kOutcome, [kOutcome]);
-  Fill('cx', kFirstKey, firstMetric, kFirstKey);
-  Fill('cy', kFirstKey, firstMetric, kFirstKey + Math.min(1, study.keys.length - 1));
-  Fill('cz', firstMetric, width, study.is_grid ? shown[0] : kOutcome, [kOutcome]);
+  if (study.keys.length > 1) {
+    Fill('cx', kFirstKey, firstMetric, kFirstKey);
+    Fill('cy', kFirstKey, firstMetric, kFirstKey + 1);
+    Fill('cz', firstMetric, width, study.is_grid ? shown[0] : kOutcome, [kOutcome]);
+  }
   byId('outcome').append(new Option('any outcome', ''));
   study.outcomes.forEach((outcome, i) => byId('outcome').append(new Option(outcome.name, i)));
   byId('outcome').onchange = byId('filter').oninput = Draw;

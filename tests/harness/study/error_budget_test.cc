@@ -126,7 +126,7 @@ TEST(ErrorBudget, EverySourceOfAScenarioIsListedAndDropped) {
 }
 
 TEST(ErrorBudget, IdealPlantsAndTasksAreRefused) {
-  EXPECT_TRUE(Throws<InputError>([] { return Calc({"duration=0.1"}); }, "asks for nothing of [sensing]"));
+  EXPECT_TRUE(Throws<InputError>([] { return Calc({"duration=0.1"}); }, "has nothing in [sensing]"));
   EXPECT_TRUE(Throws<InputError>(
       [] {
         return CalcErrorBudget(ReadShippedScenario("lift", {"mismatch.mass=1.01"}), kRobot, kScene, kJobs,
