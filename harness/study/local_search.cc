@@ -14,8 +14,7 @@ namespace {
 /// One local search.
 struct Descent {
   UnitPoint start;
-  std::vector<UnitPoint> points;
-  std::vector<double> values;
+  std::vector<double> values;  ///< Of the points that were tried.
   bool is_over = false;
 };
 
@@ -38,7 +37,7 @@ class LocalSearcher : public Searcher {
   LocalSearcher(const Search& search, const UnitPoint& start) : search_(search) {
     const auto dimensions = static_cast<int>(start.size());
     for (UnitPoint& point : MakeLatinHypercube(dimensions, search.starts, search.seed)) {
-      descents_.push_back({std::move(point), {}, {}, false});
+      descents_.push_back({std::move(point), {}, false});
     }
     descents_.front().start = start;
   }
@@ -54,14 +53,12 @@ class LocalSearcher : public Searcher {
       asked_.push_back(&descent);
       points.push_back(point);
     }
-    asked_points_ = points;
     return points;
   }
 
   void Tell(const std::vector<Judgement>& judgements) override {
     for (size_t i = 0; i < judgements.size(); ++i) {
       Descent& descent = *asked_[i];
-      descent.points.push_back(asked_points_[i]);
       descent.values.push_back(FindValue(descent, judgements[i]));
     }
   }
@@ -94,7 +91,6 @@ class LocalSearcher : public Searcher {
   Search search_;
   std::vector<Descent> descents_;
   std::vector<Descent*> asked_;
-  std::vector<UnitPoint> asked_points_;
 };
 
 }  // namespace

@@ -87,15 +87,16 @@ long CountTrialsOfPoint(const Study& study) {
 }
 
 long CountTrials(const Study& study) {
-  long points = 1;
+  constexpr double kMost = 1e18;
+  double points = 1.0;  // of many keys more than whole numbers can count
   if (study.is_search()) {
-    points = study.search.count;
+    points = static_cast<double>(study.search.count);
   } else if (study.sample.method != SamplingMethod::kGrid) {
-    points = CountUnitPoints(study.sample, static_cast<int>(study.num_keys()));
+    points = static_cast<double>(CountUnitPoints(study.sample, static_cast<int>(study.num_keys())));
   } else {
-    for (const Variation& variation : study.keys()) points *= static_cast<long>(variation.values.size());
+    for (const Variation& variation : study.keys()) points *= static_cast<double>(variation.values.size());
   }
-  return points * CountTrialsOfPoint(study);
+  return std::lround(std::min(points * static_cast<double>(CountTrialsOfPoint(study)), kMost));
 }
 
 std::vector<Trial> ListTrialsOfPoint(const Study& study, long number, const std::vector<double>& point,

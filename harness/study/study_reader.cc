@@ -293,20 +293,10 @@ void ReadSearch(const TomlValue& value, Study* study) {
 }
 
 void RequireFewTrials(const TomlValue& where, const Study& study) {
-  double trials = static_cast<double>(study.seeds.size());
-  if (study.num_nested > 0) trials *= static_cast<double>(study.nested.count);
-  if (study.is_search()) {
-    trials *= static_cast<double>(study.search.count);
-  } else if (study.sample.method != SamplingMethod::kGrid) {
-    trials *= static_cast<double>(CountUnitPoints(study.sample, static_cast<int>(study.num_keys())));
-  } else {
-    for (size_t i = 0; i < study.num_keys(); ++i)
-      trials *= static_cast<double>(study.variations[i].values.size());
-  }
-  if (trials > static_cast<double>(kMaxTrials)) {
-    where.Reject("makes " + FormatNumber(trials) + " trials; at most " + std::to_string(kMaxTrials) +
-                 " can be made");
-  }
+  const long trials = CountTrials(study);
+  if (trials <= kMaxTrials) return;
+  where.Reject("makes " + FormatNumber(static_cast<double>(trials)) + " trials; at most " +
+               std::to_string(kMaxTrials) + " can be made");
 }
 
 /// @param study with its text and source.

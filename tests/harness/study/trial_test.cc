@@ -61,7 +61,7 @@ TEST(Trial, NumbersSetInParsedFilesAreThoseOfTheText) {
   StudyInputs text;
   text.study = ParseStudy(
       "name = 'mass'\nscenario = 'hold'\nset = ['duration=0.02', 'settle=0.05', 'model.object.mass=0.21']\n"
-      "[[vary]]\nkey = 'model.wheels.damping'\nvalues = [0.02, 0.0312345678901234]\n"
+      "[[vary]]\nkey = 'model.base.wheels.damping'\nvalues = [0.02, 0.0312345678901234]\n"
       "[[vary]]\nkey = 'control.law'\nvalues = ['computed_torque', 'impedance']\n"
       "[[vary]]\nkey = 'actuation.delay'\nvalues = [0, 0.0012345678901234, -1]\n",
       "study.toml");
