@@ -50,8 +50,6 @@ class RunCampaign {
               const RunMutationOptions& options, const std::function<bool()>& should_stop);
 
   [[nodiscard]] const std::vector<RunMutant>& mutants() const { return mutants_; }
-  /// For results of a process of its own.
-  [[nodiscard]] RunMutant* mutant(size_t index) { return &mutants_[index]; }
   /// Makes the fault and looks what comes of it. @param should_stop asked before each step; what was
   /// stopped is not done.
   /// @returns whether it is done.

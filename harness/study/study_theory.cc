@@ -44,15 +44,15 @@ bool FollowsErrorDynamics(const Scenario& scenario) {
     rest.sensing.object_velocity_cutoff = 0.0;
   }
   return rest.is_ideal() && scenario.control.law == ControlLaw::kComputedTorque &&
-         scenario.control.contact_error == 0.0 && scenario.trajectory &&
-         scenario.start_error.head<3>().norm() > 0.0;
+         scenario.control.contact_error == 0.0 && scenario.trajectory_task() != nullptr &&
+         scenario.start_error().head<3>().norm() > 0.0;
 }
 
 /// Metrics of the object's position, as TrialMonitor has them; of a loop that is stable.
 void PredictMetrics(const Scenario& scenario, const SampledLoop& loop,
                     std::array<double, kNumMetrics>* metrics) {
   const auto steps = static_cast<size_t>(std::lround(scenario.duration / loop.time_step));
-  const Vector3d start = scenario.start_error.head<3>();
+  const Vector3d start = scenario.start_error().head<3>();
   std::vector<Vector3d> errors(steps, Vector3d::Zero());
   for (int axis = 0; axis < 3; ++axis) {
     if (start[axis] == 0.0) continue;

@@ -34,13 +34,17 @@ MjModelPtr MakeEngine(const StudyInputs& inputs) {
   return copy;
 }
 
-/// Makes the trial's values of the varied keys in a document: of the scenario, or of the parameter file.
-void SetKeys(const Study& study, const Trial& trial, bool of_model, TomlDocument* document) {
+bool IsModelKey(const Variation& variation) { return IsOfModel(variation.key + "="); }
+
+/// Makes the trial's values of the varied keys in a document: those of the scenario, or those of the
+/// parameter file.
+template <typename Document>
+void SetKeys(const Study& study, const Trial& trial, bool of_model, Document* document) {
+  constexpr size_t kPrefix = std::string_view("model.").size();
   for (size_t i = 0; i < study.variations.size(); ++i) {
     const Variation& variation = study.variations[i];
-    const std::string_view model_key = FindModelKey(variation.key);
-    if (model_key.empty() == of_model) continue;
-    const std::string key(of_model ? model_key : std::string_view(variation.key));
+    if (IsModelKey(variation) != of_model) continue;
+    const std::string key = variation.key.substr(of_model ? kPrefix : 0);
     // A text may be any value, and "KEY+" adds to a list.
     if (variation.labels.empty() && !key.ends_with('+')) {
       document->Set(key, trial.parameters[i]);
@@ -48,11 +52,6 @@ void SetKeys(const Study& study, const Trial& trial, bool of_model, TomlDocument
       document->Override(key + "=" + FormatValue(variation, trial.parameters[i]));
     }
   }
-}
-
-bool VariesModel(const Study& study) {
-  return std::any_of(study.variations.begin(), study.variations.end(),
-                     [](const Variation& variation) { return !FindModelKey(variation.key).empty(); });
 }
 
 /// The scenario and the robot from their texts: messages name their lines.
@@ -83,8 +82,8 @@ Setup MakeSetup(const StudyInputs& inputs, const Trial& trial, const Scenario& s
 
 bool HasDiverged(const Setup& setup, const TrialResult& result) {
   if (!result.failure.empty()) return true;
-  if (setup.scenario().start_error.norm() > 0.0) return !(result.metrics[kErrorGrowth] <= 1.0);
-  if (setup.joint_motion() != nullptr) return !(result.metrics[kJointErrorRms] <= kLostTrackOfJoints);
+  if (setup.scenario().start_error().norm() > 0.0) return !(result.metrics[kErrorGrowth] <= 1.0);
+  if (setup.joints() != nullptr) return !(result.metrics[kJointErrorRms] <= kLostTrackOfJoints);
   return !(result.metrics[kPositionErrorRms] <= kLostTrack);
 }
 
@@ -100,22 +99,19 @@ Outcome Classify(const Setup& setup, const RunResult& run, const TrialResult& re
 }  // namespace
 
 void StudyInputs::OpenScenario() {
-  set_of_model.clear();
-  scenario_document = std::make_shared<const TomlDocument>(
-      dexcheck::OpenScenario(scenario_text, scenario_source, study.overrides, &set_of_model));
+  ScenarioDocument document(scenario_text, scenario_source, scenario_folder);
+  for (const std::string& assignment : study.overrides) document.Override(assignment);
+  scenario_document = std::make_shared<const ScenarioDocument>(std::move(document));
 }
 
 Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial) {
   if (!inputs.scenario_document) return ParseTrialScenario(inputs, trial);
   try {
-    TomlDocument document = *inputs.scenario_document;
+    ScenarioDocument document = *inputs.scenario_document;
     SetKeys(inputs.study, trial, /*of_model=*/false, &document);
-    Scenario scenario;
-    scenario.text = inputs.scenario_text;
-    scenario.source = inputs.scenario_source;
-    scenario.overrides = inputs.study.overrides;
+    Scenario scenario = document.Read();
     scenario.seed = trial.seed;
-    return ParseScenario(document, std::move(scenario), inputs.scenario_folder, inputs.set_of_model);
+    return scenario;
   } catch (const InputError&) {
     return ParseTrialScenario(inputs, trial);
   }
@@ -133,7 +129,7 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
     const RunResult& run = runner.Run([&](const StepRecord& step) { monitor.Record(step); }, is_lost);
     result.failure = run.failure;
     if (run.interrupted) {
-      const bool of_joints = setup.joint_motion() != nullptr;
+      const bool of_joints = setup.joints() != nullptr;
       result.failure = std::string(of_joints ? "an error of a joint" : "the position error") +
                        " is above stop_error, " + FormatNumber(limit) +
                        (of_joints ? " rad at t = " : " m at t = ") +
@@ -169,7 +165,8 @@ void CheckTrials(StudyInputs* inputs) {
   for (const std::string& assignment : first.model_overrides) model.Override(assignment);
   inputs->model_document = std::make_shared<const TomlDocument>(std::move(model));
   inputs->model_overrides = first.model_overrides;
-  if (!VariesModel(study)) inputs->model = std::make_shared<const RobotModel>(setup.model());
+  if (std::none_of(study.variations.begin(), study.variations.end(), IsModelKey))
+    inputs->model = std::make_shared<const RobotModel>(setup.model());
   const Runner runner(setup, study.check);  // sensors and motors know more names than the setup
   const std::vector<double> parameters = trial.parameters;
   for (size_t i = 0; i < study.variations.size(); ++i) {

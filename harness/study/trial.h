@@ -24,11 +24,8 @@ struct StudyInputs {
   std::filesystem::path robot;
   std::filesystem::path mjcf;
   // What all trials have, made once by CheckTrials; without it each trial makes its own.
-  std::shared_ptr<const mjModel> engine;  ///< The MJCF compiled.
-  /// The scenario parsed, with the study's overrides but for those of the parameter file, which are beside
-  /// it.
-  std::shared_ptr<const TomlDocument> scenario_document;
-  std::vector<std::string> set_of_model;
+  std::shared_ptr<const mjModel> engine;                      ///< The MJCF compiled.
+  std::shared_ptr<const ScenarioDocument> scenario_document;  ///< With the study's overrides.
   /// The parameter file parsed, with these overrides: the scenario's own and the study's.
   std::shared_ptr<const TomlDocument> model_document;
   std::vector<std::string> model_overrides;

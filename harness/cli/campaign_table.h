@@ -1,0 +1,47 @@
+#pragma once
+
+// What a campaign of faults that were made on purpose came to: one table and one JSON, whether the faults are
+// of descriptions or of a run.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/cli/command_line.h"
+#include "harness/cli/json_matrix.h"
+#include "harness/cli/progress_bar.h"
+#include "harness/diagnosis/mutation.h"
+
+namespace dexcheck::cli {
+
+/// A fault that was made.
+struct CampaignFault {
+  std::string kind;  ///< What the table sums up by.
+  std::string name;
+  MutantOutcome outcome = MutantOutcome::kSurvived;
+  bool cause_right = false;        ///< The first cause that is named is the fault.
+  std::optional<bool> part_named;  ///< Whether its part is named, too; none without a part.
+  std::string exception;           ///< What is said of it besides, in a line; empty when all went well.
+  Json details = Json::object();   ///< In the JSON, besides the above.
+};
+
+/// A campaign so far.
+struct Campaign {
+  std::vector<CampaignFault> faults;  ///< That were made.
+  size_t total = 0;                   ///< To be made.
+  bool names_causes = true;           ///< Whether causes were looked for.
+
+  /// Makes all faults, so many at a time as CountJobs says, until the user interrupts.
+  /// @param make makes one in a process of its own. @throws Error when such a process dies.
+  void Make(std::uint64_t jobs, ProgressBar* bar, const std::function<CampaignFault(size_t fault)>& make);
+  /// Prints a line for each kind of fault, the exceptions, and the verdict; the verdict alone when quiet.
+  void Print(bool quiet) const;
+  /// Adds "complete", "kinds" and "faults". @returns the text of a file.
+  [[nodiscard]] std::string ToText(Json head) const;
+  /// 3 when not all were made, which is said on standard error; else 1 when one survived.
+  [[nodiscard]] ExitCode ToExitCode() const;
+};
+
+}  // namespace dexcheck::cli
