@@ -117,7 +117,7 @@ std::vector<long> MakeTrials(const StudyInputs& inputs, const std::vector<Trial>
 std::vector<long> MakeSearch(const StudyInputs& inputs, const StudyRequest& request, StudyStore* store) {
   ProgressBar bar(inputs.study.name, CountTrials(inputs.study), request.quiet);
   RunSearch(inputs, MakeRunOptions(request, &bar), store);
-  SearchHistory history(inputs.study, FindSearchStart(inputs));
+  SearchHistory history(inputs.study, FindSearchStart(inputs.study));
   for (const TrialRow& row : StudyStore::Open(request.database).ReadRows()) history.Add(row);
   std::vector<long> missing;
   for (const Trial& trial : history.ListMissing()) missing.push_back(trial.number);

@@ -136,10 +136,6 @@ double CalcRadiusOfChain(const SampledLoop& loop, const AxisGains& gains) {
 
 }  // namespace
 
-double CalcCriticalDamping(const SampledLoop& loop, double K_p) {
-  return 2.0 * std::sqrt(K_p) - CalcReach(loop) / loop.period() * K_p;
-}
-
 double CalcSpectralRadius(const SampledLoop& loop, const AxisGains& gains) {
   if (!loop.is_direct()) return CalcRadiusOfChain(loop, gains);
   const double T = loop.period();
@@ -149,18 +145,6 @@ double CalcSpectralRadius(const SampledLoop& loop, const AxisGains& gains) {
   const double discriminant = 0.25 * trace * trace - determinant;
   if (discriminant < 0.0) return std::sqrt(determinant);
   return 0.5 * std::abs(trace) + std::sqrt(discriminant);
-}
-
-bool IsDamped(const SampledLoop& loop, const AxisGains& gains) {
-  if (loop.is_direct()) return gains.K_v >= CalcCriticalDamping(loop, gains.K_p);
-  constexpr double kOvershoot = 1e-3;
-  constexpr double kPeriods = 10.0;  // 1 / sqrt(K_p) is the time that a damped error takes
-  const double steps = kPeriods / std::sqrt(gains.K_p) / loop.time_step;
-  constexpr double kMostSteps = 1e5;
-  const std::vector<double> response =
-      CalcStepResponse(loop, gains, static_cast<long>(std::min(steps, kMostSteps)) + 1);
-  return std::all_of(response.begin(), response.end(),
-                     [](double error) { return error > -kOvershoot && error <= 1.0; });
 }
 
 std::vector<double> CalcStepResponse(const SampledLoop& loop, const AxisGains& gains, long count) {

@@ -49,15 +49,8 @@ struct AxisGains {
   bool operator==(const AxisGains&) const = default;
 };
 
-/// K_v of critical damping at K_p, 1/s; where it is not in the stable range there is none. Of a direct loop.
-double CalcCriticalDamping(const SampledLoop& loop, double K_p);
-
 /// Largest |eigenvalue| of one sample.
 double CalcSpectralRadius(const SampledLoop& loop, const AxisGains& gains);
-
-/// Whether the error creeps to zero from a start error: K_v is at least the critical one, or, in a loop that
-/// is not direct, the step response overshoots by less than 0.1 %.
-bool IsDamped(const SampledLoop& loop, const AxisGains& gains);
 
 /// Errors at the beginning of each of `count` steps of h, from e = 1 and e_dot = 0.
 std::vector<double> CalcStepResponse(const SampledLoop& loop, const AxisGains& gains, long count);

@@ -1,10 +1,8 @@
 #include "harness/study/search_history.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "controller/common/errors.h"
-#include "harness/study/study_theory.h"
 
 namespace dexcheck {
 
@@ -81,30 +79,9 @@ std::vector<Trial> SearchHistory::ListMissing() const {
   return missing;
 }
 
-UnitPoint FindSearchStart(const StudyInputs& inputs) {
-  const Study& study = inputs.study;
-  const size_t keys = study.num_keys();
-  UnitPoint start(keys, 0.5);
-  if (study.search.start == SearchStart::kValues) {
-    start = FractionsOf(study.keys(), study.search.start_values);
-  }
-  if (study.search.start != SearchStart::kTheory) return start;
-  constexpr long kPoints = 256;
-  const std::vector<double> draw = ListDraws(study).front();
-  double least = std::numeric_limits<double>::infinity();
-  for (const UnitPoint& point : MakeSobol(static_cast<int>(keys), kPoints)) {
-    std::vector<double> values = ValuesAt(study.keys(), point);
-    values.insert(values.end(), draw.begin(), draw.end());
-    try {
-      const double radius = CalcTheory(inputs, values).radius;
-      if (radius < least && IsDampedInTheory(inputs, values)) {
-        least = radius;
-        start = point;
-      }
-    } catch (const InputError&) {  // values that make no scenario are no start
-    }
-  }
-  return start;
+UnitPoint FindSearchStart(const Study& study) {
+  if (study.search.start_values.empty()) return UnitPoint(study.num_keys(), 0.5);
+  return FractionsOf(study.keys(), study.search.start_values);
 }
 
 std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows) {

@@ -55,10 +55,8 @@ class SearchHistory {
   std::vector<JudgedPoint> points_;
 };
 
-/// Where a search begins, as `[search] start` says. From theory: of some hundred points of the ranges the one
-/// at which (57), sampled as the plant steps it, is damped at least critically on all axes and decays
-/// fastest.
-UnitPoint FindSearchStart(const StudyInputs& inputs);
+/// Where a search begins, as `[search] start` says.
+UnitPoint FindSearchStart(const Study& study);
 
 /// Points of any study whose trials are all there, judged by its objectives.
 std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows);

@@ -37,7 +37,6 @@ struct Sample {
 };
 
 enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kMargins };
-enum class SearchStart { kMiddle, kTheory, kValues };
 
 /// How a study looks for the best point.
 struct Search {
@@ -49,8 +48,7 @@ struct Search {
   double step = 0.25;       ///< First step relative to the ranges.
   double tolerance = 1e-3;  ///< Relative to the ranges: where a local search or a bisection ends.
   std::uint64_t seed = 0;
-  SearchStart start = SearchStart::kMiddle;
-  std::vector<double> start_values;  ///< Of kValues, one for each key.
+  std::vector<double> start_values;  ///< One for each key; empty for the middle of the ranges.
   bool operator==(const Search&) const = default;
 };
 

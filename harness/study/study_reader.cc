@@ -192,11 +192,9 @@ Constraint ReadConstraint(const TomlValue& value) {
 void ReadStart(const TomlValue& value, Study* study) {
   Search& search = study->search;
   if (value.IsText()) {
-    search.start =
-        value.AsChoice<SearchStart>({{"middle", SearchStart::kMiddle}, {"theory", SearchStart::kTheory}});
+    if (value.AsText() != "middle") value.Fail("must be \"middle\" or a value for each key");
     return;
   }
-  search.start = SearchStart::kValues;
   const std::vector<TomlValue> list = value.AsList();
   if (list.size() != study->num_keys()) {
     value.Reject("needs a value for each of the " + std::to_string(study->num_keys()) + " keys");

@@ -95,13 +95,4 @@ Theory CalcTheory(const StudyInputs& inputs, const std::vector<double>& paramete
   return theory;
 }
 
-bool IsDampedInTheory(const StudyInputs& inputs, const std::vector<double>& parameters) {
-  const Scenario scenario = MakeTrialScenario(inputs, {0, 0, parameters});
-  const SampledLoop loop = MakeLoop(scenario);
-  for (int axis = 0; axis < 6; ++axis) {
-    if (!IsDamped(loop, GainsOf(scenario, axis))) return false;
-  }
-  return true;
-}
-
 }  // namespace dexcheck

@@ -29,7 +29,4 @@ Theory CalcTheory(const StudyInputs& inputs, const std::vector<double>& paramete
 inline constexpr std::array kPredictedMetrics = {kPositionErrorRms, kPositionErrorMax, kSettlingTime,
                                                  kOvershoot, kErrorGrowth};
 
-/// Whether (57) is damped at least critically on all axes (IsDamped).
-bool IsDampedInTheory(const StudyInputs& inputs, const std::vector<double>& parameters);
-
 }  // namespace dexcheck

@@ -108,7 +108,7 @@ class StudyShapes : public ::testing::TestWithParam<Shape> {
       return store;
     }
     constexpr int kBatches = 3;
-    SearchHistory history(study, FindSearchStart(inputs));
+    SearchHistory history(study, FindSearchStart(study));
     for (int i = 0; i < kBatches; ++i) {
       for (const Trial& trial : history.ListMissing()) {
         store.Add(MakeRow(trial));
