@@ -62,7 +62,7 @@ class StudyPageBrowserTest : public ::testing::Test {
     return row;
   }
 
-  [[nodiscard]] nlohmann::json Run(const std::string& body) const { return browser_.Run(body); }
+  nlohmann::json Run(const std::string& body) const { return browser_.Run(body); }
   [[nodiscard]] std::string Text(const std::string& id) const {
     return Run("return document.getElementById('" + id + "').textContent;");
   }
