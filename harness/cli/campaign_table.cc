@@ -7,7 +7,7 @@
 #include "harness/base/byte_archive.h"
 #include "harness/base/interrupts.h"
 #include "harness/base/process_pool.h"
-#include "harness/cli/shared_request.h"
+#include "harness/cli/commands.h"
 #include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {

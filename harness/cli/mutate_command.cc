@@ -162,6 +162,7 @@ void AddMutateCommand(Command app) {
   for (Option option : {from, duration, faults, scale}) option.Excludes(smallest);
   for (Option option : states) option.Excludes(run);
   no_diagnosis.Excludes(run);
+  AddJobsOption(command, "Faults", &request->run.jobs).Excludes(smallest);
   AddJsonOption(command, "the results", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });

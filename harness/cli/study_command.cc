@@ -15,7 +15,6 @@
 #include "harness/base/partial_file.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/progress_bar.h"
-#include "harness/cli/shared_request.h"
 #include "harness/cli/slurm_script.h"
 #include "harness/cli/study_files.h"
 #include "harness/cli/study_read_commands.h"
