@@ -4,16 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "harness/checks/model_comparison.h"
 #include "harness/checks/tolerance.h"
+#include "harness/descriptions/answer_files.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_check.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_extras.h"
+#include "harness/descriptions/engine_provider.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/link_frames.h"
 #include "harness/descriptions/mjcf_reader.h"
@@ -23,8 +25,6 @@
 
 namespace dexcheck {
 namespace {
-
-using Progress = std::function<bool(long)>;
 
 void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& more) {
   notes->insert(notes->end(), more.begin(), more.end());
@@ -41,13 +41,12 @@ void NoteOthers(const Adapter& adapter, Comparison* comparison) {
   }
 }
 
+bool IsOfFrames(const std::string& term) { return term == "frame_pose" || term == "J" || term == "J_dot_xi"; }
+
 /// A term of which no number was compared is no agreement.
-void NoteEmptyTerms(Comparison* comparison) {
-  std::vector<std::string> names;
-  std::erase_if(comparison->result.terms, [&](const CheckRecord& record) {
-    if (record.comparisons == 0) names.push_back(record.name);
-    return record.comparisons == 0;
-  });
+void NoteTermsOfFrames(Comparison* comparison) {
+  std::vector<std::string> names = comparison->result.not_compared;
+  std::erase_if(names, [](const std::string& name) { return !IsOfFrames(name); });
   if (!names.empty())
     comparison->not_compared.push_back("terms of frames, since the two have none in common: " +
                                        JoinNames(names));
@@ -65,8 +64,8 @@ void CountRoundings(int imported, bool has_link_frames, std::vector<CheckRecord>
   constexpr double kRotation = 8.0;
   constexpr double kImport = 6.0 * kRotation + 3.0 * 8.0 * kPi;
   for (CheckRecord& record : *records) {
-    const bool is_of_frames = record.name == "frame_pose" || record.name == "J" || record.name == "J_dot_xi";
-    record.bound *= (1.0 + imported * kImport / kStep) * (has_link_frames && is_of_frames ? 2.0 : 1.0);
+    record.bound *=
+        (1.0 + imported * kImport / kStep) * (has_link_frames && IsOfFrames(record.name) ? 2.0 : 1.0);
     record.failed = !(record.worst <= record.bound);
   }
 }
@@ -177,7 +176,90 @@ Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::p
   } else {
     CompareWithEngine(urdf, options, progress, &comparison);
   }
-  NoteEmptyTerms(&comparison);
+  NoteTermsOfFrames(&comparison);
+  return comparison;
+}
+
+namespace {
+
+/// A description whose terms stand first: the analytic model's, or of an MJCF the engine's.
+struct Reference {
+  Reference(const std::filesystem::path& file, const UrdfOptions& urdf, Comparison* comparison)
+      : robot(ReadDescription(file, urdf)) {
+    comparison->first = file;
+    comparison->notes = robot.notes;
+    comparison->model.emplace(robot.spec);
+    if (FindFormat(file) == RobotFormat::kMjcf) {
+      provider = std::make_unique<EngineProvider>(robot.spec, LoadMjcf(file), file.string(), "MuJoCo");
+    } else {
+      provider = std::make_unique<AnalyticProvider>(*comparison->model, file.filename().string());
+    }
+  }
+  RobotDescription robot;
+  std::unique_ptr<DynamicsProvider> provider;
+};
+
+/// What is worth knowing of a base whose convention is the other side's.
+void NoteConvention(const Reference& reference, AnsweringProvider* answering,
+                    const std::function<StateFeed()>& make_feed, Comparison* comparison) {
+  if (!answering->layout().is_floating()) return;
+  comparison->notes.push_back("the other side's base is taken as " +
+                              Describe(answering->layout().convention()));
+  if (comparison->result.Agrees()) return;
+  const std::optional<BaseConvention> other =
+      FindOtherConvention(*comparison->model, reference.provider.get(), answering, make_feed);
+  if (!other) return;
+  comparison->notes.push_back("all its terms agree with its base taken as " + Describe(*other) +
+                              ": this is its convention, and its key \"base\" can say so");
+}
+
+}  // namespace
+
+Comparison CompareAnswers(const std::filesystem::path& file, const AnswersSource& source,
+                          const UrdfOptions& urdf, const ConsistencyOptions& options,
+                          const Progress& progress) {
+  Comparison comparison;
+  const Reference reference(file, urdf, &comparison);
+  std::unique_ptr<AnsweringProvider> answering;
+  std::function<StateFeed()> make_feed = [&] { return FeedRandomStates(*comparison.model, options); };
+  if (source.answers.empty()) {
+    comparison.second = "the program";
+    answering = std::make_unique<ProgramProvider>(source.program, reference.robot, source.program_options);
+  } else {
+    comparison.second = source.answers;
+    auto answers = std::make_unique<AnswerFiles>(source.answers, reference.robot);
+    make_feed = [&read = *answers] {
+      return [&read](DynamicsState* state) { return read.ReadState(state); };
+    };
+    answering = std::move(answers);
+  }
+  AppendTo(&comparison.notes, DescribeCoordinates(reference.robot));
+  comparison.result =
+      CompareProviders(*comparison.model, reference.provider.get(), answering.get(), make_feed(), progress);
+  if (!comparison.result.not_compared.empty())
+    comparison.not_compared.push_back("terms that are not answered: " +
+                                      JoinNames(comparison.result.not_compared));
+  if (answering->is_reduced()) {
+    comparison.notes.push_back(
+        "joints that follow others have no coordinate there: compared are T^T M T and T^T of the "
+        "forces, with xi = T xi_free");
+  }
+  NoteConvention(reference, answering.get(), make_feed, &comparison);
+  return comparison;
+}
+
+Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctions& functions,
+                            const UrdfOptions& urdf, const ConsistencyOptions& options) {
+  if (!functions.M && !functions.c && !functions.g && !functions.h && !functions.friction) {
+    throw InputError(functions.name + ": must have one of M, c, g, h, friction");
+  }
+  Comparison comparison;
+  const Reference reference(file, urdf, &comparison);
+  comparison.second = functions.name;
+  FunctionProvider provider(functions, comparison.model->num_velocities());
+  comparison.result =
+      CompareProviders(*comparison.model, reference.provider.get(), &provider,
+                       FeedRandomStates(*comparison.model, options), [](long) { return true; });
   return comparison;
 }
 

@@ -15,7 +15,7 @@
 #include <ostream>
 #include <string>
 
-#include "harness/checks/answers_comparison.h"
+#include "harness/checks/file_comparison.h"
 #include "harness/checks/tolerance.h"
 
 namespace dexcheck::testing {

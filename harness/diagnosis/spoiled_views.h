@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "controller/contact/adjoint.h"
-#include "harness/checks/model_view.h"
+#include "harness/descriptions/model_view.h"
 
 namespace dexcheck {
 

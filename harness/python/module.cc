@@ -20,7 +20,6 @@
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/base/version.h"
-#include "harness/checks/answers_comparison.h"
 #include "harness/checks/file_comparison.h"
 #include "harness/checks/tolerance.h"
 #include "harness/descriptions/audit.h"

@@ -1,7 +1,5 @@
 // Every number of the engine's model is seen: changed, it is found and named, or nothing that moves changes.
 
-#include "harness/constants/engine_fields.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

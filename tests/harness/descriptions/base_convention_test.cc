@@ -64,7 +64,7 @@ TEST(BaseConvention, ForcesAreThoseOfTheMotion) {
   const RobotDescription robot = ReadQuadruped();
   VectorXd q, xi;
   DrawState(robot, &q, &xi);
-  const SideTerms terms = AnalyticSide(robot, "model").Evaluate(0, q, xi);
+  const AnsweredTerms terms = AnalyticSide(robot, "model").Evaluate(0, q, xi);
   const VectorXd xi_dot = VectorXd::LinSpaced(xi.size(), -1.0, 2.0);
   const VectorXd force = terms.M * xi_dot + terms.bias;
   const auto move = [&](double h) {
@@ -82,9 +82,9 @@ TEST(BaseConvention, ForcesAreThoseOfTheMotion) {
     const VectorXd rate = (conversion.ConvertVelocities(move(kStep), xi + kStep * xi_dot) -
                            conversion.ConvertVelocities(move(-kStep), xi - kStep * xi_dot)) /
                           (2.0 * kStep);
-    SideTerms other = terms;
+    AnsweredTerms other = terms;
     conversion.Apply(q, xi, &other);
-    SideTerms of_force;
+    AnsweredTerms of_force;
     of_force.M = terms.M;
     of_force.gravity = force;  // led over as a force
     conversion.Apply(q, xi, &of_force);
@@ -105,13 +105,13 @@ TEST(BaseConvention, ForcesAreThoseOfTheMotion) {
 }
 
 /// A program that speaks one convention, whatever it says.
-class Stubborn : public AnsweringSide {
+class Stubborn : public AnsweringProvider {
  public:
   Stubborn(const RobotDescription& robot, const BaseConvention& spoken)
-      : AnsweringSide(SideLayout(robot)), model_(robot, "model"), spoken_(spoken) {}
+      : AnsweringProvider(AnswerLayout(robot)), model_(robot, "model"), spoken_(spoken) {}
   [[nodiscard]] const std::string& name() const override { return model_.name(); }
 
-  SideTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override {
+  AnsweredTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override {
     // What reaches it are numbers as the convention that it is taken to speak has them.
     const VectorXd positions = layout().WritePositions(q);
     const VectorXd velocities = layout().WriteVelocities(q, xi);
@@ -129,7 +129,7 @@ class Stubborn : public AnsweringSide {
     if (spoken_.angular_in_world) angular = R.transpose() * angular;
     VectorXd own_xi = velocities;
     own_xi.head<6>() << linear, angular;
-    SideTerms terms = model_.Evaluate(sample, own_q, own_xi);
+    AnsweredTerms terms = model_.Evaluate(sample, own_q, own_xi);
     BaseConversion(spoken_).Apply(own_q, own_xi, &terms);
     layout().ReadTerms(q, xi, &terms);
     return terms;

@@ -71,7 +71,7 @@ TEST(CoupledJoints, TablesSayThem) {
   EXPECT_EQ(joints[1].coupling->multiplier, -2.0);
   EXPECT_DOUBLE_EQ(joints[1].coupling->offset, -0.3);
   EXPECT_EQ(joints[2].coupling->multiplier, 2.0);
-  EXPECT_EQ(CalcCouplingMap(table), Vector3d(1.0, -2.0, 2.0));
+  EXPECT_EQ(CalcCouplingMap(table.spec), Vector3d(1.0, -2.0, 2.0));
 
   // Written and read again they are the same.
   const RobotDescription again = ReadTable(WriteParameters(table, "gripper.toml"));
@@ -160,13 +160,13 @@ TEST(CoupledJoints, TablesAgreeWithTheMjcf) {
 
 /// A program that knows the free joint alone, with the equations of the whole gripper on its constraint:
 /// energies and their derivatives by a route of its own, T(xi) = 1/2 m(q) v^2.
-class ReducedGripper : public AnsweringSide {
+class ReducedGripper : public AnsweringProvider {
  public:
   explicit ReducedGripper(const RobotDescription& robot)
-      : AnsweringSide(SideLayout(robot, nlohmann::json{{"joints", {"wrist"}}}, "the program")),
+      : AnsweringProvider(AnswerLayout(robot, nlohmann::json{{"joints", {"wrist"}}}, "the program")),
         whole_(robot, "gripper") {}
   [[nodiscard]] const std::string& name() const override { return whole_.name(); }
-  SideTerms Evaluate(long, const VectorXd& q, const VectorXd& xi) override {
+  AnsweredTerms Evaluate(long, const VectorXd& q, const VectorXd& xi) override {
     const double wrist = layout().WritePositions(q)[0];
     const double rate = layout().WriteVelocities(q, xi)[0];
     constexpr double kStep = 1e-5;
@@ -175,7 +175,7 @@ class ReducedGripper : public AnsweringSide {
     const double slope = (mass(wrist + kStep) - mass(wrist - kStep)) / (2.0 * kStep);
     const double weight =
         (*Whole(wrist + kStep, 0.0).potential - *Whole(wrist - kStep, 0.0).potential) / (2.0 * kStep);
-    SideTerms terms;
+    AnsweredTerms terms;
     terms.M = MatrixXd::Constant(1, 1, m);
     terms.coriolis = VectorXd::Constant(1, 0.5 * slope * rate * rate);  // d/dt (m v) - dT/dq at constant v
     terms.gravity = VectorXd::Constant(1, weight);
@@ -183,7 +183,7 @@ class ReducedGripper : public AnsweringSide {
   }
 
  private:
-  SideTerms Whole(double wrist, double rate) {
+  AnsweredTerms Whole(double wrist, double rate) {
     return whole_.Evaluate(0, Vector3d(wrist, -2.0 * wrist - 0.3, 2.0 * wrist + 0.4),
                            Vector3d(rate, -2.0 * rate, 2.0 * rate));
   }
