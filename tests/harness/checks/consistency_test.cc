@@ -9,7 +9,6 @@
 #include <algorithm>
 
 #include "controller/model/parameter_reader.h"
-#include "harness/checks/model_check.h"
 #include "harness/descriptions/random_states.h"
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"

@@ -9,7 +9,6 @@
 #include "controller/model/body_frame.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
-#include "harness/checks/model_comparison.h"
 #include "harness/descriptions/audit.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/hypotheses.h"

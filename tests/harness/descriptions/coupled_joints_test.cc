@@ -5,15 +5,14 @@
 
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
-#include "harness/checks/answers_comparison.h"
 #include "harness/checks/consistency.h"
-#include "harness/checks/model_comparison.h"
 #include "harness/descriptions/description_check.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/engine/engine.h"
+#include "tests/common/evaluate_terms.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
@@ -164,7 +163,7 @@ class ReducedGripper : public AnsweringProvider {
  public:
   explicit ReducedGripper(const RobotDescription& robot)
       : AnsweringProvider(AnswerLayout(robot, nlohmann::json{{"joints", {"wrist"}}}, "the program")),
-        whole_(robot, "gripper") {}
+        whole_(robot.spec, "gripper") {}
   [[nodiscard]] const std::string& name() const override { return whole_.name(); }
   AnsweredTerms Evaluate(long, const VectorXd& q, const VectorXd& xi) override {
     const double wrist = layout().WritePositions(q)[0];
@@ -184,25 +183,24 @@ class ReducedGripper : public AnsweringProvider {
 
  private:
   AnsweredTerms Whole(double wrist, double rate) {
-    return whole_.Evaluate(0, Vector3d(wrist, -2.0 * wrist - 0.3, 2.0 * wrist + 0.4),
-                           Vector3d(rate, -2.0 * rate, 2.0 * rate));
+    return EvaluateTerms(&whole_, Vector3d(wrist, -2.0 * wrist - 0.3, 2.0 * wrist + 0.4),
+                         Vector3d(rate, -2.0 * rate, 2.0 * rate));
   }
-  AnalyticSide whole_;
+  AnalyticProvider whole_;
 };
 
-TEST(CoupledJoints, ArePutOnTheirConstraintWhenASideHasOnlyFreeOnes) {
+TEST(CoupledJoints, ArePutOnTheirConstraintWhenAProgramHasOnlyFreeOnes) {
   const RobotDescription robot = ReadTable(kGripper);
-  AnalyticSide reference(robot, "gripper.toml");
-  ReducedGripper side(robot);
-  EXPECT_TRUE(side.is_reduced());
   const RobotModel model(robot.spec);
-  SideComparison comparison(robot, {&reference, &side});
+  AnalyticProvider reference(model, "gripper.toml");
+  ReducedGripper program(robot);
+  EXPECT_TRUE(program.is_reduced());
   ConsistencyOptions options;
   options.samples = 10;
-  EXPECT_EQ(CompareAtStates(
-                FeedRandomStates(model, options), [](long) { return true; }, &comparison),
-            10);
-  const std::vector<CheckRecord> terms = comparison.TakePairs().front().terms;
+  const ConsistencyResult result = CompareProviders(
+      model, &reference, &program, FeedRandomStates(model, options), [](long) { return true; });
+  EXPECT_EQ(result.samples, 10);
+  const std::vector<CheckRecord>& terms = result.terms;
   ASSERT_EQ(terms.size(), 3U);
   constexpr double kDifference = 1e-7;  // of central differences
   for (const CheckRecord& record : terms) {
