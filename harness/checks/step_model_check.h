@@ -55,7 +55,7 @@ class StepModelCheck {
   /// There are bonds in the place of contacts, where the engine has nothing to compare with.
   void LeaveOutContacts();
 
-  /// Nothing allocates but at the first step, and when a new worst case is stored.
+  /// Nothing allocates but for what fails first.
   /// @param robot, grasp evaluated at `state`, reduced coordinates, CalcDynamics included.
   /// @param X_W0 pose of Sigma_0 in the plant, tilt and height included: kappa was found there. Without a
   /// plant, robot.CalcLinkPose(-1).

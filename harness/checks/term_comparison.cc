@@ -66,6 +66,7 @@ TermComparison::TermComparison(const RobotModel& model, Asker asker, std::vector
                                                           is_velocity && cols > 1 ? T_.cols() : cols));
     term.is_read.assign(providers_.size(), false);
     term.scale.setOnes(rows, cols);
+    term.weight = term.numbers[0];
   }
   for (size_t a = 0; a < providers_.size(); ++a) {
     for (size_t b = a + 1; b < providers_.size(); ++b) {
@@ -144,7 +145,7 @@ void TermComparison::Read(AskedTerm* term, size_t provider) {
 
 void TermComparison::Weigh(AskedTerm* term) {
   const TermEntry& entry = *term->entry;
-  const bool is_first = term->weight.size() == 0;
+  const bool is_first = term->count < 0;
   if (!is_first && (entry.is_scaled_once || entry.scale == nullptr)) return;
   scales_.first = &term->numbers[0];
   scales_.second = &term->numbers[1];

@@ -65,7 +65,7 @@ class TermComparison {
     std::vector<MatrixXd> numbers;  ///< By provider,
     std::vector<bool> is_read;      ///< if it has the term at this state.
     MatrixXd scale, weight;         ///< 1 / scale
-    long count = 0;                 ///< Numbers compared.
+    long count = -1;                ///< Numbers compared; not known before the first state.
   };
   void FormCoupling();
   [[nodiscard]] bool Shares(const TermEntry& entry, size_t a, size_t b) const;
