@@ -17,9 +17,6 @@
 namespace dexcheck {
 namespace {
 
-// Both sides read decimal numbers and form at most short sums and products of them.
-constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
-
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
@@ -41,7 +38,7 @@ class ConstantTable {
     last_location_ = where;
     const double size = std::max({std::abs(model), std::abs(engine), scale});
     const double error = record->Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
-    if (error > kRounding) {
+    if (error > kConstantRounding) {
       result_.findings.push_back(
           {check, Describe(where, model_, model_.num_base_velocities()), model, engine, where, entry_});
     }
@@ -408,7 +405,7 @@ CheckRecord* ConstantChecks::Define(const std::string& check) {
   if (record == records.end()) {
     record = records.insert(record, CheckRecord{});
     record->name = check;
-    record->bound = kRounding;
+    record->bound = kConstantRounding;
   }
   return &*record;
 }

@@ -3,6 +3,7 @@
 // What can be compared without motion, before anything else: masses, joints, wheels, fingertips, object,
 // options.
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,9 @@
 #include "harness/engine/adapter.h"
 
 namespace dexcheck {
+
+/// Two readers of decimal numbers form at most short sums and products of them.
+inline constexpr double kConstantRounding = 64.0 * std::numeric_limits<double>::epsilon();
 
 /// One constant that the parameter file and the MJCF give differently.
 struct ConstantFinding {

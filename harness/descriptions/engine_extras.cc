@@ -17,10 +17,7 @@
 namespace dexcheck {
 namespace {
 
-// Both sides read decimal numbers and form at most short sums and products of them.
-constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
-
-bool AreSame(double a, double b) { return std::abs(a - b) <= kRounding * std::max(std::abs(a), std::abs(b)); }
+bool AreSame(double a, double b) { return std::abs(a - b) <= kConstantRounding * std::max(std::abs(a), std::abs(b)); }
 
 /// One number of a part, and the check that it belongs to.
 struct Number {
