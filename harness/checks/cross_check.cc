@@ -18,7 +18,7 @@ const MeasuredState& MeasuredOf(const StepRecord& step) {
 
 CrossCheck::NotIdeal::NotIdeal(const Setup& setup, std::span<const Motor> motors)
     : plant(setup, motors),
-      controller(setup.controller_side(), setup.fingertips(), setup.scenario().control.orientation) {
+      controller(setup.controller_adapter(), setup.fingertips(), setup.scenario().control.orientation) {
   // What is told of robot, object and contacts need not fit together: contacts are compared at the truth.
   controller.LeaveOutContacts();
   controller.RaiseBounds(setup.scenario().tolerance);
@@ -26,9 +26,9 @@ CrossCheck::NotIdeal::NotIdeal(const Setup& setup, std::span<const Motor> motors
 
 CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool knows_law)
     : setup_(&setup),
-      model_(setup.plant_side(), setup.fingertips(), setup.scenario().control.orientation),
+      model_(setup.plant_adapter(), setup.fingertips(), setup.scenario().control.orientation),
       motion_(setup),
-      clearance_(setup.engine(), setup.plant_side(), setup.solids(), setup.watched_pairs()),
+      clearance_(setup.engine(), setup.plant_adapter(), setup.robots().solids, setup.robots().watched_pairs),
       kinematics_(MakeData(setup.engine())),
       law_terms_(setup.model().num_positions(), setup.model().num_velocities(),
                  3 * static_cast<int>(setup.fingertips().size())),
@@ -37,11 +37,11 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
       meant_dynamics_(setup.model(), static_cast<int>(setup.fingertips().size())),
       actuation_(setup.model()),
       meant_force_(VectorXd::Zero(setup.model().num_velocities())) {
-  if (!setup.bonds().empty()) model_.LeaveOutContacts();
+  if (!setup.start().bonds.empty()) model_.LeaveOutContacts();
   model_.RaiseBounds(setup.scenario().tolerance);
-  if (setup.joint_motion() != nullptr && knows_law) {
+  if (setup.joints() != nullptr && knows_law) {
     joint_law_.emplace(setup);
-  } else if (!setup.scenario().task && knows_law) {
+  } else if (setup.scenario().pick_task() == nullptr && knows_law) {
     law_.emplace(setup);
   }
   // A controller that follows its contacts has others than the truth, too.
@@ -164,7 +164,7 @@ void CrossCheck::FindMeant(const StepRecord& step) {
 
 void CrossCheck::ReadControllersTerms(const StepRecord& step) {
   const StepModelCheck& controller = known_ ? known_->controller : model_;
-  const bool contacts = setup_->bonds().empty() && !known_;
+  const bool contacts = setup_->start().bonds.empty() && !known_;
   ReadEngineTerms(controller.engine(), *step.model, step.told.state, contacts, &law_terms_);
 }
 

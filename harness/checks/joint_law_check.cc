@@ -13,8 +13,8 @@ namespace dexcheck {
 
 JointLawCheck::JointLawCheck(const Setup& setup)
     : law_(setup.scenario().control.law),
-      gains_(setup.joint_gains()),
-      motion_(setup.joint_motion()),
+      gains_(setup.joints()->gains),
+      motion_(&setup.joints()->motion),
       time_step_(setup.scenario().plant.time_step),
       velocity_age_(setup.scenario().plant.velocity_age()),
       hold_(std::max(1L, std::lround(setup.scenario().plant.control_step / time_step_))),

@@ -66,7 +66,7 @@ LawCheck::LawCheck(const Setup& setup)
     baseline_ = std::make_unique<BaselineReference>(options.law, options.stiffness, n, k);
     has_error_dynamics_ = options.law == ControlLaw::kOperationalSpace;
   }
-  trajectory_ = setup.scenario().trajectory(setup.X_start() + setup.scenario().start_error);
+  trajectory_ = setup.MakeTrajectory();
   force_.setZero(setup.model().num_velocities());
   difference_ = force_;
   slope_.setZero(3 * static_cast<Eigen::Index>(setup.fingertips().size()));

@@ -38,9 +38,9 @@ double CalcSwingForce(const Setup& setup, const StepRecord& step, VectorXd* v, V
 }  // namespace
 
 StepChecks::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)
-    : grasp(setup.known_model(), setup.fingertips(), setup.known_model().object()->body, setup.surface(),
-            set),
-      dynamics(setup.known_model(), static_cast<int>(grasp.members().size())) {}
+    : grasp(setup.declared_model(), setup.fingertips(), setup.declared_model().object()->body,
+            setup.surface(), set),
+      dynamics(setup.declared_model(), static_cast<int>(grasp.members().size())) {}
 
 StepChecks::StepChecks(const Setup& setup)
     : setup_(&setup),
@@ -64,7 +64,7 @@ StepChecks::StepChecks(const Setup& setup)
   residual_.setZero(n);
   work_.setZero(n);
   left_of_robot_.setZero(n);
-  idle_start_.setZero(static_cast<Eigen::Index>(setup.idle_joints().size()));
+  idle_start_.setZero(static_cast<Eigen::Index>(setup.hold().idle_joints.size()));
   kappa_.resize(setup.fingertips().size());
   next_kappa_ = kappa_;
   last_contacts_.resize(kappa_.size());
@@ -73,8 +73,8 @@ StepChecks::StepChecks(const Setup& setup)
 StepChecks::~StepChecks() = default;
 
 void StepChecks::DefineChecks() {
-  const bool bonded = !setup_->bonds().empty();
-  const bool moves_joints = setup_->scenario().joint_motion.has_value();
+  const bool bonded = !setup_->start().bonds.empty();
+  const bool moves_joints = setup_->scenario().joint_task() != nullptr;
   for (const StepCheckInfo& info : kStepChecks) {
     CheckRecord check;
     check.name = info.name;
@@ -108,10 +108,10 @@ void StepChecks::SetApplying() {
   };
   using enum StepCheck;
   // Without a task every step is judged.
-  leave_out(!setup_->scenario().task, {kExcluded});
+  leave_out(setup_->scenario().pick_task() == nullptr, {kExcluded});
   leave_out(setup_->adapter().wheels().empty(), {kWheelSlip, kWheelSlipRate, kRolling, kTractionUse});
   leave_out(setup_->model().base().type == BaseType::kFixed, {kBaseTilt});
-  const bool joints = setup_->joint_motion() != nullptr;
+  const bool joints = setup_->joints() != nullptr;
   leave_out(joints, {kLawDemand, kGraspNullSpace, kGraspCone, kGraspOptimality, kErrorDynamics,
                      kOrientationDynamics, kContactForce, kFingertipSlip, kFingertipSlipRate, kConeUse,
                      kContactsLost, kPenetration, kKappa});
@@ -124,12 +124,12 @@ void StepChecks::SetApplying() {
   const bool moves_idle = control.law == ControlLaw::kPdGravity ||
                           control.law == ControlLaw::kOperationalSpace ||
                           control.weight == RedundancyWeight::Kind::kMass;
-  leave_out(setup_->idle_joints().empty() || !setup_->scenario().imperfections.is_ideal() || moves_idle,
+  leave_out(setup_->hold().idle_joints.empty() || !setup_->scenario().imperfections.is_ideal() || moves_idle,
             {kIdleJoints});
   // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
   leave_out(setup_->scenario().plant.type == PlantType::kRigid,
             {kWheelSlip, kRolling, kWheelSlipRate, kTractionUse, kBaseTilt, kSolver});
-  leave_out(setup_->watched_pairs().empty(), {kClearance, kCollision});
+  leave_out(setup_->robots().watched_pairs.empty(), {kClearance, kCollision});
   leave_out(!setup_->scenario().plant.collide, {kCollision});
   const mjModel& engine = setup_->engine();
   const auto* const limited = engine.actuator_ctrllimited;
@@ -191,7 +191,7 @@ void StepChecks::Compare(const StepRecord& step) {
 
 void StepChecks::CheckIdleJoints(const MeasuredState& state) {
   double idle = 0.0;
-  const std::vector<int>& joints = setup_->idle_joints();
+  const std::vector<int>& joints = setup_->hold().idle_joints;
   const int offset = setup_->model().num_base_positions();
   for (size_t i = 0; i < joints.size(); ++i) {
     const double q = state.q[offset + joints[i]];

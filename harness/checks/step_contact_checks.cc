@@ -96,7 +96,7 @@ void StepChecks::ReadSlip(const StepRecord& step) {
       findings_.least_cone_margin = std::min(findings_.least_cone_margin, slip.cone_margin);
     }
   }
-  if (!setup_->bonds().empty()) {
+  if (!setup_->start().bonds.empty()) {
     for (const PlantContact& bond : response.contacts) slipped = std::max(slipped, bond.distance);
   }
   if (holding) {

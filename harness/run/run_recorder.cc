@@ -68,7 +68,7 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
     log_.EmbedFile("inputs", "mjcf/" + file, ReadBytes(inputs.mjcf.parent_path() / file));
   }
   AddStateSignals();
-  if (setup.joint_motion() != nullptr) {
+  if (setup.joints() != nullptr) {
     AddJointSignals();
   } else {
     AddObjectSignals();
@@ -131,7 +131,7 @@ void RunRecorder::AddStateSignals() {
   Add({"engine/qvel", qvel.units, "MuJoCo's velocities", static_cast<int>(m.nv), qvel.names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.qvel, row); });
   const int n = model.num_velocities();
-  const bool moves_joints = setup_->joint_motion() != nullptr;
+  const bool moves_joints = setup_->joints() != nullptr;
   Add({"q", q_units, "q' as read from the plant", model.num_positions(), q_names, {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.q, row); });
   Add({"xi", xi_units, "reduced velocity as read from the plant", n, xi_names, {}},
@@ -143,7 +143,7 @@ void RunRecorder::AddStateSignals() {
        tau_names,
        {}},
       [](const StepRecord& step, std::span<double> row) { Copy(step.command.tau, row); });
-  if (!setup_->scenario().task) {
+  if (setup_->scenario().pick_task() == nullptr) {
     Add({"law/xi_dot_d",
          xi_dot_units,
          moves_joints ? "accelerations that the law demands" : "xi_dot_d of (47), which the law demands",
@@ -169,8 +169,8 @@ void RunRecorder::AddStateSignals() {
       [](const StepRecord& step, std::span<double> row) { Copy(step.response.xi_dot, row); });
   Add({"model/xi_dot",
        xi_dot_units,
-       setup_->joint_motion() != nullptr ? "accelerations that the equations of motion predict"
-                                         : "reduced acceleration that (46), (48) predict",
+       setup_->joints() != nullptr ? "accelerations that the equations of motion predict"
+                                   : "reduced acceleration that (46), (48) predict",
        n,
        xi_names,
        {}},
@@ -243,7 +243,7 @@ void RunRecorder::AddContactSignals() {
       [](const StepRecord& step, std::span<double> row) {
         std::copy(step.reading.state.overlap.begin(), step.reading.state.overlap.end(), row.begin());
       });
-  if (!setup_->scenario().task) {
+  if (setup_->scenario().pick_task() == nullptr) {
     Add({"law/f_c",
          "N",
          "f_c of (49), which the law commands, each in its contact frame",
