@@ -30,6 +30,34 @@ void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& m
   notes->insert(notes->end(), more.begin(), more.end());
 }
 
+/// One of two files, read once.
+struct RobotFile {
+  RobotFile(std::filesystem::path file, const UrdfOptions& urdf)
+      : path(std::move(file)), format(FindFormat(path)) {
+    if (format == RobotFormat::kMjcf) {
+      engine = LoadMjcf(path);
+    } else {
+      description = ReadDescription(path, urdf);
+    }
+  }
+  /// @throws InputError for an MJCF that can be none.
+  [[nodiscard]] RobotDescription Describe() const {
+    return description ? *description : ReadMjcfDescription(*engine, path.string());
+  }
+  [[nodiscard]] std::optional<RobotDescription> TryToDescribe() const {
+    try {
+      return Describe();
+    } catch (const InputError&) {
+      return std::nullopt;
+    }
+  }
+
+  std::filesystem::path path;
+  RobotFormat format;
+  std::optional<RobotDescription> description;  ///< Of a parameter file or URDF.
+  MjModelPtr engine;                            ///< Of an MJCF.
+};
+
 /// What moves in a scene and is no part of the robot.
 void NoteOthers(const Adapter& adapter, Comparison* comparison) {
   std::vector<std::string> names;
@@ -79,10 +107,9 @@ struct EngineCompletion {
 /// Completes a description, and gives it frames of links and the inertias that the engine compiled. A robot
 /// on wheels, one with an object, and a parameter file of another mechanism are left for the adapter to
 /// match.
-EngineCompletion Complete(const ConsistencyOptions& options, const mjModel& engine, Comparison* comparison,
-                          RobotDescription* robot) {
+EngineCompletion Complete(const ConsistencyOptions& options, const mjModel& engine, bool is_table,
+                          Comparison* comparison, RobotDescription* robot) {
   const std::string file = comparison->second.filename().string();
-  const bool is_table = FindFormat(comparison->first) == RobotFormat::kToml;
   const BaseType base = robot->spec.base.type;
   EngineCompletion result;
   if ((base == BaseType::kFixed || base == BaseType::kFloating) && !robot->spec.object) {
@@ -105,23 +132,25 @@ EngineCompletion Complete(const ConsistencyOptions& options, const mjModel& engi
 }
 
 /// A description against the engine.
-void CompareWithEngine(const UrdfOptions& urdf, const ConsistencyOptions& options, const Progress& progress,
-                       Comparison* comparison) {
+void CompareWithEngine(const RobotFile& first, const mjModel& second, const ConsistencyOptions& options,
+                       const Progress& progress, Comparison* comparison) {
   const std::string file = comparison->second.filename().string();
-  RobotDescription robot = ReadDescription(comparison->first, urdf);
-  const RobotDescription written = robot;
-  const MjModelPtr engine = LoadMjcf(comparison->second);
-  const RobotFormat format = FindFormat(comparison->first);
+  const RobotDescription written = first.Describe();
+  RobotDescription robot = written;
+  const MjModelPtr engine(mj_copyModel(nullptr, &second));
+  const RobotFormat format = first.format;
   if (format == RobotFormat::kUrdf) {
     const std::optional<std::string> motors = SetAsideMotors(file, engine.get());
     if (motors) comparison->not_compared.push_back(*motors);
   }
-  const EngineCompletion completed = Complete(options, *engine, comparison, &robot);
+  const EngineCompletion completed =
+      Complete(options, *engine, format == RobotFormat::kToml, comparison, &robot);
   const Completion& completion = completed.completion;
   comparison->model.emplace(robot.spec);
   const Adapter adapter(*comparison->model, *engine, comparison->second.string());
   std::optional<Extras> extras;
-  if (format == RobotFormat::kMjcf) extras = CompareExtras(written, comparison->first, adapter, engine.get());
+  if (format == RobotFormat::kMjcf)
+    extras = CompareExtras(written, *first.engine, first.path.string(), adapter, engine.get());
   comparison->result = CheckConsistency(adapter, options, progress);
   CountRoundings(robot.is_imported ? 1 : 0, completed.has_link_frames, &comparison->result.terms);
   ConstantChecks& constants = comparison->result.constants;
@@ -142,10 +171,8 @@ void CompareWithEngine(const UrdfOptions& urdf, const ConsistencyOptions& option
 }
 
 /// Two descriptions without the engine.
-void CompareTwoDescriptions(const UrdfOptions& urdf, const ConsistencyOptions& options,
+void CompareTwoDescriptions(RobotDescription a, RobotDescription b, const ConsistencyOptions& options,
                             const Progress& progress, Comparison* comparison) {
-  RobotDescription a = ReadDescription(comparison->first, urdf);
-  RobotDescription b = ReadDescription(comparison->second, urdf);
   const Completion completion = CompleteEachOther(&a, &b, options.ignore);
   for (const auto& notes : {a.notes, b.notes, completion.notes, DescribeCoordinates(a)}) {
     AppendTo(&comparison->notes, notes);
@@ -164,17 +191,19 @@ void CompareTwoDescriptions(const UrdfOptions& urdf, const ConsistencyOptions& o
 Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::path& b,
                         const UrdfOptions& urdf, const ConsistencyOptions& options,
                         const Progress& progress) {
+  RobotFile first(a, urdf);
+  RobotFile second(b, urdf);
+  if (first.format == RobotFormat::kMjcf && second.format != RobotFormat::kMjcf) std::swap(first, second);
   Comparison comparison;
-  comparison.first = a;
-  comparison.second = b;
-  if (FindFormat(a) == RobotFormat::kMjcf && FindFormat(b) != RobotFormat::kMjcf) {
-    std::swap(comparison.first, comparison.second);
-  }
-  comparison.with_engine = FindFormat(comparison.second) == RobotFormat::kMjcf;
-  if (!comparison.with_engine) {
-    CompareTwoDescriptions(urdf, options, progress, &comparison);
+  comparison.first = first.path;
+  comparison.second = second.path;
+  comparison.with_engine = second.format == RobotFormat::kMjcf;
+  comparison.read_first = first.TryToDescribe();
+  comparison.read_second = second.TryToDescribe();
+  if (comparison.with_engine) {
+    CompareWithEngine(first, *second.engine, options, progress, &comparison);
   } else {
-    CompareWithEngine(urdf, options, progress, &comparison);
+    CompareTwoDescriptions(first.Describe(), second.Describe(), options, progress, &comparison);
   }
   NoteTermsOfFrames(&comparison);
   return comparison;
@@ -184,15 +213,15 @@ namespace {
 
 /// A description whose terms stand first: the analytic model's, or of an MJCF the engine's.
 struct Reference {
-  Reference(const std::filesystem::path& file, const UrdfOptions& urdf, Comparison* comparison)
-      : robot(ReadDescription(file, urdf)) {
-    comparison->first = file;
+  Reference(RobotFile file, Comparison* comparison) : robot(file.Describe()) {
+    comparison->first = file.path;
     comparison->notes = robot.notes;
     comparison->model.emplace(robot.spec);
-    if (FindFormat(file) == RobotFormat::kMjcf) {
-      provider = std::make_unique<EngineProvider>(robot.spec, LoadMjcf(file), file.string(), "MuJoCo");
+    if (file.engine != nullptr) {
+      provider =
+          std::make_unique<EngineProvider>(robot.spec, std::move(file.engine), file.path.string(), "MuJoCo");
     } else {
-      provider = std::make_unique<AnalyticProvider>(*comparison->model, file.filename().string());
+      provider = std::make_unique<AnalyticProvider>(*comparison->model, file.path.filename().string());
     }
   }
   RobotDescription robot;
@@ -219,7 +248,7 @@ Comparison CompareAnswers(const std::filesystem::path& file, const AnswersSource
                           const UrdfOptions& urdf, const ConsistencyOptions& options,
                           const Progress& progress) {
   Comparison comparison;
-  const Reference reference(file, urdf, &comparison);
+  const Reference reference(RobotFile(file, urdf), &comparison);
   std::unique_ptr<AnsweringProvider> answering;
   std::function<StateFeed()> make_feed = [&] { return FeedRandomStates(*comparison.model, options); };
   if (source.answers.empty()) {
@@ -254,7 +283,7 @@ Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctio
     throw InputError(functions.name + ": must have one of M, c, g, h, friction");
   }
   Comparison comparison;
-  const Reference reference(file, urdf, &comparison);
+  const Reference reference(RobotFile(file, urdf), &comparison);
   comparison.second = functions.name;
   FunctionProvider provider(functions, comparison.model->num_velocities());
   comparison.result =
@@ -263,9 +292,9 @@ Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctio
   return comparison;
 }
 
-void ExplainComparison(const UrdfOptions& urdf, Comparison* comparison, double tolerance) {
-  if (comparison->result.Agrees()) return;
-  comparison->hypotheses = ExplainDifference(comparison->first, comparison->second, urdf,
+void ExplainComparison(Comparison* comparison, double tolerance) {
+  if (comparison->result.Agrees() || !comparison->read_first || !comparison->read_second) return;
+  comparison->hypotheses = ExplainDifference(*comparison->read_first, *comparison->read_second,
                                              std::max(tolerance, kHypothesisTolerance));
 }
 

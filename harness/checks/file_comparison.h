@@ -25,6 +25,8 @@ struct Comparison {
   std::vector<std::string> not_compared;  ///< What only one of them has and no term depends on.
   ConsistencyResult result;
   std::vector<Hypothesis> hypotheses;  ///< Faults that would explain what differs.
+  /// As they were read; none of an MJCF that can be no description (with several free bodies).
+  std::optional<RobotDescription> read_first, read_second;
 };
 
 /// Compares constants and terms of two parameter files, URDFs or MJCFs. Of two MJCFs the second is the
@@ -51,9 +53,9 @@ Comparison CompareAnswers(const std::filesystem::path& file, const AnswersSource
 Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctions& functions,
                             const UrdfOptions& urdf, const ConsistencyOptions& options);
 
-/// Tries the faults that people make on what differs, after any judgement by a tolerance, which is given
-/// again: what agrees to it is no fault.
-void ExplainComparison(const UrdfOptions& urdf, Comparison* comparison, double tolerance = 0.0);
+/// Tries the faults that people make on what differs between two files, after any judgement by a tolerance,
+/// which is given again: what agrees to it is no fault.
+void ExplainComparison(Comparison* comparison, double tolerance = 0.0);
 
 /// Numbers that were rounded when they were printed agree to so many digits at least.
 inline constexpr int kDigitsOfRoundedInput = 4;

@@ -59,7 +59,7 @@ class AgreesWithMatcher {
     const double tolerance = options_.digits > 0 ? std::pow(10.0, -options_.digits) : 0.0;
     if (tolerance > 0.0) JudgeByTolerance(tolerance, &comparison.result);
     for (const std::string& line : ListDifferences(comparison)) *listener << "\n  " << line;
-    if (explain) ExplainComparison(options_.urdf, &comparison, tolerance);
+    if (explain) ExplainComparison(&comparison, tolerance);
     for (const Hypothesis& likely : comparison.hypotheses) *listener << "\n  likely: " << likely.text;
     return comparison.result.Agrees();
   }

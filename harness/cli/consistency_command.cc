@@ -74,8 +74,7 @@ int Run(ConsistencyRequest request) {
   if (const std::optional<double> tolerance = request.judging.Find()) {
     JudgeByTolerance(*tolerance, &comparison.result);
   }
-  if (!request.has_answers())
-    ExplainComparison(MakeUrdfOptions(request), &comparison, request.judging.Find().value_or(0.0));
+  if (!request.has_answers()) ExplainComparison(&comparison, request.judging.Find().value_or(0.0));
   const ConsistencyResult& result = comparison.result;
   const bool is_whole = result.samples >= request.options.samples || !request.source.answers.empty();
   ExitCode code = is_whole ? kSuccess : kFailure;

@@ -17,7 +17,9 @@
 namespace dexcheck {
 namespace {
 
-bool AreSame(double a, double b) { return std::abs(a - b) <= kConstantRounding * std::max(std::abs(a), std::abs(b)); }
+bool AreSame(double a, double b) {
+  return std::abs(a - b) <= kConstantRounding * std::max(std::abs(a), std::abs(b));
+}
 
 /// One number of a part, and the check that it belongs to.
 struct Number {
@@ -295,11 +297,11 @@ std::optional<std::string> SetAsideMotors(const std::string& source, mjModel* en
          " says how they make their forces (servos, muscles, transmissions): " + JoinNames(motors);
 }
 
-Extras CompareExtras(const RobotDescription& first, const std::filesystem::path& file, const Adapter& second,
-                     mjModel* engine) {
-  const MjModelPtr own_engine = LoadMjcf(file);
+Extras CompareExtras(const RobotDescription& first, const mjModel& first_engine, const std::string& file,
+                     const Adapter& second, mjModel* engine) {
+  const MjModelPtr own_engine(mj_copyModel(nullptr, &first_engine));
   const RobotModel own_model(first.spec);
-  const Adapter own(own_model, *own_engine, file.string());
+  const Adapter own(own_model, *own_engine, file);
   Extras extras;
   ExtrasComparison(own, own_engine.get(), second, engine, &extras.differences).Run();
   extras.of_first = CheckConstants(own);

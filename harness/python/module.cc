@@ -147,7 +147,7 @@ class Robot {
     }
     const double tolerance = digits > 0 ? std::pow(10.0, -digits) : 0.0;
     if (tolerance > 0.0) JudgeByTolerance(tolerance, &result.comparison.result);
-    if (is_file) ExplainComparison(urdf_, &result.comparison, tolerance);
+    if (is_file) ExplainComparison(&result.comparison, tolerance);
     return result;
   }
 
