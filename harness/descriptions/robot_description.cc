@@ -1,6 +1,7 @@
 #include "harness/descriptions/robot_description.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
@@ -25,6 +26,20 @@ MatrixXd CalcCouplingMap(const RobotSpec& robot) {
     }
   }
   return T;
+}
+
+void FuseParts(RobotDescription* robot) {
+  std::vector<std::vector<MassProperties>> bodies(robot->spec.joints.size() + 1);
+  for (const DescribedPart& part : robot->parts) {
+    const MassProperties& body = part.body;
+    if (!part.states_inertial || !(body.mass >= 0.0) || !std::isfinite(body.mass)) continue;
+    if (!body.inertia.allFinite()) continue;
+    bodies[static_cast<size_t>(part.joint + 1)].push_back(ExpressIn(body, part.X_iL));
+  }
+  // One part stays as it is: its sum would be rounded.
+  const auto fuse = [&](size_t i) { return bodies[i].size() == 1 ? bodies[i][0] : Combine(bodies[i]); };
+  robot->spec.base.body = fuse(0);
+  for (size_t i = 1; i < bodies.size(); ++i) robot->spec.joints[i - 1].body = fuse(i);
 }
 
 void NoteImpossibleBodies(RobotDescription* robot) {

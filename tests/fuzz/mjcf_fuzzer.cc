@@ -8,7 +8,7 @@
 #include <string>
 
 #include "controller/common/errors.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_file.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace dexcheck::testing::fuzz {

@@ -204,7 +204,7 @@ TEST_F(Answers, AuditExitsByWhatItFinds) {
   // The published inertia of this link was identified, and is that of something much longer than the link.
   const ProgramResult panda = Run({"audit", testing::kMjcf + "panda.xml"});
   EXPECT_EQ(panda.exit_code, 1);
-  EXPECT_THAT(panda.out, HasSubstr("odd        panda.xml: link panda_link1 has a principal moment of 0.70"));
+  EXPECT_THAT(panda.out, HasSubstr("suspicious panda.xml: link panda_link1 has a principal moment of 0.70"));
   WriteText(folder_.path() / "broken.urdf", "<robot name=\"x\"><link name=\"a\"></robot>");
   EXPECT_TRUE(testing::IsRefused(Run({"audit", "broken.urdf"}), {"broken.urdf:1: is not XML"}));
 }

@@ -115,6 +115,24 @@ TEST_F(TwoDescriptions, AreImportedAsTablesThatAgreeWithThem) {
               HasSubstr("# Parameters of one robot, written by dexcheck import from panda.urdf."));
 }
 
+TEST_F(TwoDescriptions, AreImportedWithAListOfWhatWasReadAndLeftOut) {
+  const Json urdf = Json::parse(Run({"import", "panda.urdf", "--json"}).out);
+  EXPECT_EQ(urdf.at("joints").size(), 7U);
+  EXPECT_EQ(urdf.at("base").at("floats"), false);
+  EXPECT_TRUE(urdf.at("changes").empty());
+  WriteText(folder_.path() / "newer.xml",
+            ReplaceOnce(ReadText(mjcf_), "<joint name=\"panda_joint1\"",
+                        "<joint actuatorfrcrange=\"-1 1\" name=\"panda_joint1\""));
+  const Json read = Json::parse(Run({"import", "newer.xml", "--out", "a.toml", "--json", "-"}).out);
+  EXPECT_THAT(read.at("notes").dump(), HasSubstr("forces of actuators: <joint actuatorfrcrange>"));
+  const ProgramResult copied = Run({"import", "newer.xml", "--downgrade", "--out", "old.xml", "--json", "-"});
+  const Json change = Json::parse(copied.out).at("changes").at(0);
+  EXPECT_EQ(change.at("word"), "<joint actuatorfrcrange>");
+  EXPECT_EQ(change.at("what"), "left out: forces of actuators, since MuJoCo 3.0.0");
+  const Json audit = Json::parse(Run({"audit", "newer.xml", "--json"}).out);
+  EXPECT_THAT(audit.at("notes").dump(), HasSubstr("forces of actuators"));
+}
+
 TEST_F(TwoDescriptions, AreRefusedInOneLineWhenTheyCannotBeRead) {
   WriteText(folder_.path() / "broken.urdf", "<robot name=\"x\">\n<link name=\"a\">\n</robot>");
   WriteText(folder_.path() / "scene.sdf", "<sdf/>");

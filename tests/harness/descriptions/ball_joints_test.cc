@@ -34,13 +34,6 @@ ConsistencyResult CompareWithEngine(const RobotModel& model, const mjModel& engi
   return CheckConsistency(Adapter(model, engine, "robot.xml"), Few(), [](long) { return true; });
 }
 
-RobotDescription ReadTable(const std::string& text) {
-  RobotDescription table;
-  table.spec = ParseRobotModel(text, "robot.toml").spec();
-  table.joints.resize(table.spec.joints.size());
-  return table;
-}
-
 RobotSpec MakeRobot(BaseType base, std::mt19937* random) {
   testing::RandomRobotOptions options;
   options.base = base;

@@ -11,13 +11,13 @@
 #include "controller/control/grasp_controller.h"
 #include "controller/control/pseudoinverse.h"
 #include "harness/checks/law_reference.h"
-#include "harness/diagnosis/spoiled_terms.h"
+#include "harness/diagnosis/equation_faults.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
 
 /// What else than a factor can be wrong in a law.
-enum class LawSlip {
+enum class LawFaultKind {
   kNone,
   kNotProjected,        ///< xi_dot_d has sigma' instead of N sigma'.
   kOtherWeight,         ///< The pseudoinverse of J_B' has the weight M_bar', or 1 where M_bar' is asked for.
@@ -31,7 +31,7 @@ enum class LawSlip {
   kVelocityOfNow,       ///< X_d_dot at t instead of half a time step before.
   kOneGain,             ///< K_p of x alone, 1 % too large.
   kWideCone,            ///< F_N counts on 1.1 times the friction that is asked for.
-  kLessSqueeze,         ///< F_N with half of f_min.
+  kLessPreload,         ///< F_N with half of f_min.
   kOtherBarrier,        ///< F_N with 1.1 times the weight of the barrier.
 };
 
@@ -40,24 +40,24 @@ struct LawFault {
   std::string name;        ///< "Coriolis forces C_bar' times 1.001".
   size_t part = SIZE_MAX;  ///< In ListLawParts; its name is what the evidence should say.
   double factor = 1.0;     ///< Of that part: 0 leaves it out.
-  LawSlip slip = LawSlip::kNone;
+  LawFaultKind kind = LawFaultKind::kNone;
 };
 
-/// Each part of the law a thousandth too large and left out, then gravity upside down and the slips, those of
-/// wheels where there are any.
+/// Each part of the law a thousandth too large and left out, then gravity upside down and the other kinds,
+/// those of wheels where there are any.
 std::vector<LawFault> ListLawFaults(bool has_wheels);
 
 /// The law (55) as controller/control computes it, once more with a place for each fault: from the
 /// controller's own terms, by its vectors and its pseudoinverses, and not by the formulas that judge it.
 /// Without a fault it sends the same torques. What F_N it takes for right it tells as a right law does.
 /// The fault begins with the run: while everything comes to rest the law is right.
-class SpoiledLaw final : public Controller {
+class FaultyLaw final : public Controller {
  public:
   /// @param setup of a scenario that is no task; outlives this.
-  SpoiledLaw(const Setup& setup, LawFault fault);
+  FaultyLaw(const Setup& setup, LawFault fault);
   /// The right law, from terms of which one equation is wrong.
-  SpoiledLaw(const Setup& setup, const EquationFault& fault) : SpoiledLaw(setup, LawFault{}) {
-    spoil_ = fault.spoil;
+  FaultyLaw(const Setup& setup, const EquationFault& fault) : FaultyLaw(setup, LawFault{}) {
+    change_ = fault.apply;
   }
 
   void Follow(const Trajectory& motion) override;
@@ -66,7 +66,7 @@ class SpoiledLaw final : public Controller {
   [[nodiscard]] const GraspModel& model() const override { return model_; }
 
  private:
-  [[nodiscard]] bool Has(LawSlip slip) const { return has_begun_ && fault_.slip == slip; }
+  [[nodiscard]] bool Has(LawFaultKind kind) const { return has_begun_ && fault_.kind == kind; }
   /// Of a part by its number in ListLawParts.
   [[nodiscard]] double factor(size_t part) const {
     return has_begun_ && fault_.part == part ? fault_.factor : 1.0;
@@ -80,7 +80,7 @@ class SpoiledLaw final : public Controller {
 
   GraspControllerOptions options_;
   LawFault fault_;
-  void (*spoil_)(const SpoiledTerms&) = nullptr;
+  std::function<void(const FaultyTerms&)> change_;
   GraspModel model_;
   ActuationMap actuation_;
   Pseudoinverse J_pinv_, G_pinv_;

@@ -1,4 +1,4 @@
-#include "harness/diagnosis/spoiled_law.h"
+#include "harness/diagnosis/faulty_law.h"
 
 #include <cmath>
 #include <string_view>
@@ -52,27 +52,27 @@ const Parts& AllParts() {
   return parts;
 }
 
-constexpr std::pair<LawSlip, const char*> kSlips[] = {
-    {LawSlip::kNotProjected, "sigma' is not projected into the null space"},
-    {LawSlip::kOtherWeight, "another weight W of the pseudoinverse"},
-    {LawSlip::kGraspTransposed, "G^T in the place of G^+"},
-    {LawSlip::kCoriolisTransposed, "C_bar' transposed"},
-    {LawSlip::kNoActuationMap, "no E_bar' between forces and torques"},
-    {LawSlip::kWheelsExchanged, "the wheels' torques exchanged"},
-    {LawSlip::kJointsExchanged, "two joints' torques exchanged"},
-    {LawSlip::kForceAxes, "the contact frames' x and y exchanged"},
-    {LawSlip::kLate, "X_d of a time step before"},
-    {LawSlip::kVelocityOfNow, "X_d_dot half a time step too late"},
-    {LawSlip::kOneGain, "K_p of x times 1.01"},
-    {LawSlip::kWideCone, "the friction counted on times 1.1"},
-    {LawSlip::kLessSqueeze, "f_min halved"},
-    {LawSlip::kOtherBarrier, "the barrier's weight times 1.1"},
+constexpr std::pair<LawFaultKind, const char*> kKinds[] = {
+    {LawFaultKind::kNotProjected, "sigma' is not projected into the null space"},
+    {LawFaultKind::kOtherWeight, "another weight W of the pseudoinverse"},
+    {LawFaultKind::kGraspTransposed, "G^T in the place of G^+"},
+    {LawFaultKind::kCoriolisTransposed, "C_bar' transposed"},
+    {LawFaultKind::kNoActuationMap, "no E_bar' between forces and torques"},
+    {LawFaultKind::kWheelsExchanged, "the wheels' torques exchanged"},
+    {LawFaultKind::kJointsExchanged, "two joints' torques exchanged"},
+    {LawFaultKind::kForceAxes, "the contact frames' x and y exchanged"},
+    {LawFaultKind::kLate, "X_d of a time step before"},
+    {LawFaultKind::kVelocityOfNow, "X_d_dot half a time step too late"},
+    {LawFaultKind::kOneGain, "K_p of x times 1.01"},
+    {LawFaultKind::kWideCone, "the friction counted on times 1.1"},
+    {LawFaultKind::kLessPreload, "f_min halved"},
+    {LawFaultKind::kOtherBarrier, "the barrier's weight times 1.1"},
 };
 
-GraspControllerOptions SpoilOptions(GraspControllerOptions options, LawSlip slip) {
-  if (slip == LawSlip::kWideCone) options.mu *= 1.1;
-  if (slip == LawSlip::kLessSqueeze) options.f_min *= 0.5;
-  if (slip == LawSlip::kOtherBarrier) options.force.barrier_weight *= 1.1;
+GraspControllerOptions ChangeOptions(GraspControllerOptions options, LawFaultKind kind) {
+  if (kind == LawFaultKind::kWideCone) options.mu *= 1.1;
+  if (kind == LawFaultKind::kLessPreload) options.f_min *= 0.5;
+  if (kind == LawFaultKind::kOtherBarrier) options.force.barrier_weight *= 1.1;
   return options;
 }
 
@@ -88,15 +88,15 @@ std::vector<LawFault> ListLawFaults(bool has_wheels) {
     }
   }
   faults.push_back({"gravity in F_bar' upside down", AllParts().gravity, -1.0});
-  for (const auto& [slip, name] : kSlips) {
-    const bool of_wheels = slip == LawSlip::kWheelsExchanged || slip == LawSlip::kNoActuationMap;
-    if (has_wheels || !of_wheels) faults.push_back({name, SIZE_MAX, 1.0, slip});
+  for (const auto& [kind, name] : kKinds) {
+    const bool of_wheels = kind == LawFaultKind::kWheelsExchanged || kind == LawFaultKind::kNoActuationMap;
+    if (has_wheels || !of_wheels) faults.push_back({name, SIZE_MAX, 1.0, kind});
   }
   return faults;
 }
 
-SpoiledLaw::SpoiledLaw(const Setup& setup, LawFault fault)
-    : options_(SpoilOptions(setup.MakeControllerOptions(), fault.slip)),
+FaultyLaw::FaultyLaw(const Setup& setup, LawFault fault)
+    : options_(ChangeOptions(setup.MakeControllerOptions(), fault.kind)),
       fault_(std::move(fault)),
       model_(setup.model(), setup.fingertips(), setup.object().body, setup.surface(), options_),
       actuation_(setup.model()),
@@ -117,23 +117,23 @@ SpoiledLaw::SpoiledLaw(const Setup& setup, LawFault fault)
   exchanged_ = model_.grasp().moving_entries().back();
 }
 
-void SpoiledLaw::Follow(const Trajectory& motion) {
+void FaultyLaw::Follow(const Trajectory& motion) {
   motion_ = &motion;
   steps_until_due_ = 0;
 }
 
-void SpoiledLaw::Begin(double /*t*/, const Reading& /*reading*/) { has_begun_ = true; }
+void FaultyLaw::Begin(double /*t*/, const Reading& /*reading*/) { has_begun_ = true; }
 
-void SpoiledLaw::Step(const Reading& reading, double t, Command* command) {
+void FaultyLaw::Step(const Reading& reading, double t, Command* command) {
   command->tracks = true;
   command->handling = Handling{};
   command->force_seconds = 0.0;
   command->force_solves = 0;
   command->desired = TrajectoryController::EvaluateDesired(*motion_, t, time_step_);
   model_.SetState(reading.state);
-  if (has_begun_ && spoil_ != nullptr) {
-    const SpoiledTerms terms(&model_, reading.state);
-    spoil_(terms);
+  if (has_begun_ && change_) {
+    const FaultyTerms terms(&model_, reading.state);
+    change_(terms);
     terms.Finish();
   }
   if (steps_until_due_ > 0) {
@@ -145,11 +145,11 @@ void SpoiledLaw::Step(const Reading& reading, double t, Command* command) {
   command->force_solves = 1;
 }
 
-void SpoiledLaw::CalcTorque(const MeasuredState& state, double t, Command* command) {
+void FaultyLaw::CalcTorque(const MeasuredState& state, double t, Command* command) {
   DesiredMotion desired = command->desired;
-  if (Has(LawSlip::kLate)) {
+  if (Has(LawFaultKind::kLate)) {
     desired = TrajectoryController::EvaluateDesired(*motion_, t - time_step_, time_step_);
-  } else if (Has(LawSlip::kVelocityOfNow)) {
+  } else if (Has(LawFaultKind::kVelocityOfNow)) {
     desired.X_d_dot = motion_->Evaluate(t).X_d_dot;
   }
   const Vector6d V_Bo_dot = factor(AllParts().demand) * CalcObjectAcceleration(desired);
@@ -163,14 +163,14 @@ void SpoiledLaw::CalcTorque(const MeasuredState& state, double t, Command* comma
   command->demand.F_N = F_N_;
 }
 
-Vector6d SpoiledLaw::CalcObjectAcceleration(const DesiredMotion& desired) const {
+Vector6d FaultyLaw::CalcObjectAcceleration(const DesiredMotion& desired) const {
   const Parts& part = AllParts();
   const GraspTerms& grasp = model_.grasp();
   const double feed = factor(part.feed_forward);
   const double rate = factor(part.rate);
   Vector6d K_v = factor(part.both) * factor(part.velocity) * options_.gains.K_v;
   Vector6d K_p = factor(part.both) * factor(part.position) * options_.gains.K_p;
-  if (Has(LawSlip::kOneGain)) K_p[0] *= 1.01;
+  if (Has(LawFaultKind::kOneGain)) K_p[0] *= 1.01;
   if (options_.orientation == OrientationFeedback::kAngles) {
     // V_dot = P^-1 (X_d_ddot + K_v E_dot + K_p E) + d/dt(P^-1) X_o_dot
     const Vector6d X_o_ddot = feed * desired.X_d_ddot + K_v.cwiseProduct(desired.X_d_dot - grasp.X_o_dot()) +
@@ -194,10 +194,10 @@ Vector6d SpoiledLaw::CalcObjectAcceleration(const DesiredMotion& desired) const 
   return V_dot;
 }
 
-void SpoiledLaw::FactorJacobian() {
+void FaultyLaw::FactorJacobian() {
   const MatrixXd& J = model_.grasp().J_B();
   RedundancyWeight::Kind kind = options_.weight.kind;
-  if (Has(LawSlip::kOtherWeight)) {
+  if (Has(LawFaultKind::kOtherWeight)) {
     kind = kind == RedundancyWeight::Kind::kMass ? RedundancyWeight::Kind::kIdentity
                                                  : RedundancyWeight::Kind::kMass;
   }
@@ -206,7 +206,7 @@ void SpoiledLaw::FactorJacobian() {
   J_pinv_.FactorWeighted(J, model_.robot().M());
 }
 
-void SpoiledLaw::SetMotion(const MeasuredState& state, const Vector6d& V_Bo_dot) {
+void FaultyLaw::SetMotion(const MeasuredState& state, const Vector6d& V_Bo_dot) {
   const Parts& part = AllParts();
   const ModelTerms& robot = model_.robot();
   const GraspTerms& grasp = model_.grasp();
@@ -220,11 +220,11 @@ void SpoiledLaw::SetMotion(const MeasuredState& state, const Vector6d& V_Bo_dot)
   J_pinv_.Apply(rates_, xi_dot_d_);
   xi_dot_d_ *= factor(part.carried);
   options_.posture.CalcAcceleration(state.q, state.xi, sigma_prime_);
-  if (!Has(LawSlip::kNotProjected)) J_pinv_.Project(sigma_prime_);
+  if (!Has(LawFaultKind::kNotProjected)) J_pinv_.Project(sigma_prime_);
   xi_dot_d_ += factor(part.sigma) * sigma_prime_;
 }
 
-void SpoiledLaw::SolveForces(const Vector6d& V_Bo_dot) {
+void FaultyLaw::SolveForces(const Vector6d& V_Bo_dot) {
   const Parts& part = AllParts();
   const GraspTerms& grasp = model_.grasp();
   const ObjectBodyTerms& body = grasp.body();
@@ -239,29 +239,29 @@ void SpoiledLaw::SolveForces(const Vector6d& V_Bo_dot) {
   // F_N = f_c - G^+ F_o
   G_pinv_.Apply(F_o_, f_c_);
   F_N_ = result.f_c - f_c_;
-  if (Has(LawSlip::kGraspTransposed)) f_c_.noalias() = grasp.G().transpose() * F_o_;
+  if (Has(LawFaultKind::kGraspTransposed)) f_c_.noalias() = grasp.G().transpose() * F_o_;
   f_c_ += factor(part.F_N) * F_N_;
-  if (!Has(LawSlip::kForceAxes)) return;
+  if (!Has(LawFaultKind::kForceAxes)) return;
   for (Eigen::Index i = 0; i < f_c_.size(); i += 3) std::swap(f_c_[i], f_c_[i + 1]);
 }
 
-void SpoiledLaw::SendTorques(Command* command) {
+void FaultyLaw::SendTorques(Command* command) {
   const Parts& part = AllParts();
   const ModelTerms& robot = model_.robot();
   // E_bar' tau' = M_bar' xi_dot_d + C_bar' xi_c + F_bar' + J^T f_c
   force_ =
       factor(part.F) * (factor(part.gravity) * robot.gravity() + factor(part.friction) * robot.friction());
   force_.noalias() += factor(part.M) * (robot.M() * xi_dot_d_);
-  if (Has(LawSlip::kCoriolisTransposed)) {
+  if (Has(LawFaultKind::kCoriolisTransposed)) {
     force_.noalias() += robot.C().transpose() * xi_c_;
   } else {
     force_.noalias() += factor(part.C) * (robot.C() * xi_c_);
   }
   force_.noalias() += factor(part.f_c) * (model_.grasp().J_B().transpose() * f_c_);
   force_ *= factor(part.tau);
-  if (!Has(LawSlip::kNoActuationMap)) actuation_.CalcTorque(force_, force_);
-  if (Has(LawSlip::kWheelsExchanged)) std::swap(force_[0], force_[1]);
-  if (Has(LawSlip::kJointsExchanged)) std::swap(force_[exchanged_ - 1], force_[exchanged_]);
+  if (!Has(LawFaultKind::kNoActuationMap)) actuation_.CalcTorque(force_, force_);
+  if (Has(LawFaultKind::kWheelsExchanged)) std::swap(force_[0], force_[1]);
+  if (Has(LawFaultKind::kJointsExchanged)) std::swap(force_[exchanged_ - 1], force_[exchanged_]);
   command->tau = force_;
 }
 

@@ -1,11 +1,8 @@
 #pragma once
 
-// What releases of MuJoCo after 2.2.2 added to MJCF, and copies of newer files that 2.2.2 reads.
+// What releases of MuJoCo after 2.2.2 added to MJCF.
 
-#include <string>
 #include <string_view>
-
-#include "harness/engine/joined_mjcf.h"
 
 namespace dexcheck {
 
@@ -32,13 +29,5 @@ struct NewerWord {
 
 /// The word's entry; nullptr when it is not known. @param attribute empty for the element itself.
 const NewerWord* FindNewerWord(std::string_view element, std::string_view attribute);
-
-/// Leaves out what this program's engine does not know and what has no effect on the dynamics.
-/// @throws InputError "FILE:LINE: <joint damping>: ...", which says since which release and what to do, for
-/// what acts on the dynamics or is not known at all.
-void LeaveOutNewerWords(JoinedMjcf* mjcf);
-
-/// States what later releases take by default, and 2.2.2 refuses to guess: a range alone limits (autolimits).
-void StateNewDefaults(JoinedMjcf* mjcf);
 
 }  // namespace dexcheck

@@ -2,41 +2,32 @@
 
 // Views of the model with a fault in them.
 
-#include <functional>
 #include <memory>
 #include <utility>
 
 #include "controller/contact/adjoint.h"
 #include "harness/descriptions/model_view.h"
+#include "harness/diagnosis/equation_faults.h"
 
 namespace dexcheck {
 
 /// A view whose terms pass through a function before they are seen.
-class SpoiledView : public ModelView {
+class FaultyView : public ModelView {
  public:
-  struct Terms {
-    const RobotModel& model;
-    const VectorXd& q;
-    const VectorXd& velocity;
-    MatrixXd M, C;
-    VectorXd gravity, friction;
-  };
-  using Spoil = std::function<void(Terms*)>;
+  using Change = void (*)(const RobotEquations&);
 
-  SpoiledView(const RobotModel& model, Coordinates coordinates, Spoil spoil)
-      : ModelView(model, coordinates), spoil_(std::move(spoil)) {}
+  FaultyView(const RobotModel& model, Coordinates coordinates, Change change)
+      : ModelView(model, coordinates), change_(change) {}
 
   void SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity) override {
     ModelView::SetState(q, velocity);
     const VectorXd at = q;
     const VectorXd rates = velocity;
-    Terms terms{
-        model(), at, rates, ModelView::M(), ModelView::C(), ModelView::gravity(), ModelView::friction()};
-    spoil_(&terms);
-    M_ = std::move(terms.M);
-    C_ = std::move(terms.C);
-    gravity_ = std::move(terms.gravity);
-    friction_ = std::move(terms.friction);
+    M_ = ModelView::M();
+    C_ = ModelView::C();
+    gravity_ = ModelView::gravity();
+    friction_ = ModelView::friction();
+    change_({model(), at, rates, M_, C_, gravity_, friction_});
   }
   [[nodiscard]] const MatrixXd& M() const override { return M_; }
   [[nodiscard]] const MatrixXd& C() const override { return C_; }
@@ -44,16 +35,10 @@ class SpoiledView : public ModelView {
   [[nodiscard]] const VectorXd& friction() const override { return friction_; }
 
  private:
-  Spoil spoil_;
+  Change change_;
   MatrixXd M_, C_;
   VectorXd gravity_, friction_;
 };
-
-inline ModelViewFactory Spoil(SpoiledView::Spoil spoil) {
-  return [spoil = std::move(spoil)](const RobotModel& model, Coordinates coordinates) {
-    return std::make_unique<SpoiledView>(model, coordinates, spoil);
-  };
-}
 
 template <typename View, typename... Arguments>
 ModelViewFactory Use(Arguments... arguments) {
@@ -101,10 +86,10 @@ class TransposedFrames : public ModelView {
 };
 
 /// Jacobians through a 6x6 matrix that depends on the frame's pose; J_dot scaled.
-class SpoiledJacobian : public ModelView {
+class FaultyJacobian : public ModelView {
  public:
   using Change = Matrix6d (*)(const Pose&);
-  SpoiledJacobian(const RobotModel& model, Coordinates coordinates, Change change, double rate)
+  FaultyJacobian(const RobotModel& model, Coordinates coordinates, Change change, double rate)
       : ModelView(model, coordinates), change_(change), rate_(rate) {}
   void CalcFrameJacobian(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref<Matrix6Xd> J_dot) const override {
     ModelView::CalcFrameJacobian(frame, J, J_dot);
@@ -117,10 +102,10 @@ class SpoiledJacobian : public ModelView {
   double rate_;
 };
 
-class SpoiledEnergy : public ModelView {
+class FaultyEnergy : public ModelView {
  public:
   using Change = void (*)(const ModelView&, EnergyAndMomentum*);
-  SpoiledEnergy(const RobotModel& model, Coordinates coordinates, Change change)
+  FaultyEnergy(const RobotModel& model, Coordinates coordinates, Change change)
       : ModelView(model, coordinates), change_(change) {}
   [[nodiscard]] EnergyAndMomentum CalcEnergyAndMomentum() const override {
     EnergyAndMomentum terms = ModelView::CalcEnergyAndMomentum();
