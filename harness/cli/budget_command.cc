@@ -11,7 +11,6 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
-#include "harness/cli/shared_request.h"
 #include "harness/cli/terminal.h"
 #include "harness/study/error_budget.h"
 
@@ -86,9 +85,7 @@ void AddBudgetCommand(Command app) {
   Command command = app.AddCommand(
       "budget", "Which part of a plant that is not ideal costs the accuracy: each alone, all but each, all");
   AddScenarioOptions(command, request.get());
-  command.AddOption("--seed", &request->seed, "Seed of all that is random")
-      .TypeName("N")
-      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
+  AddSeedOption(command, &request->seed, "Seed of all that is random");
   command.AddOption("--page", &request->page, "Write table and bar chart as a page").TypeName("FILE.html");
   AddResultOptions(command, "the budget", request.get());
   command.SetAction([=] { return Run(*request); });

@@ -11,7 +11,6 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
-#include "harness/cli/shared_request.h"
 #include "harness/run/excitation.h"
 #include "harness/study/exciting_motion.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/cli/shared_request.h"
+#include "harness/cli/commands.h"
 #include "harness/run/run_mutation_options.h"
 
 namespace dexcheck::cli {
