@@ -361,7 +361,7 @@ class EngineConstants : public ConstantTable {
     }
     for (const auto& [joint, where] : joints) {
       if (engine_.jnt_limited[joint] != 0)
-        Compare("joint_stop_margin", where, 0.0, engine_.jnt_margin[joint]);
+        Compare("joint_limit_margin", where, 0.0, engine_.jnt_margin[joint]);
     }
     Compare("fluid", {}, 0.0, engine_.opt.density);
     Compare("fluid", {}, 0.0, engine_.opt.viscosity);

@@ -157,7 +157,7 @@ Part ReadSpring(const mjModel& m, int joint) {
   const int count = CountPositions(m.jnt_type[joint]);
   if (m.jnt_stiffness[joint] != 0.0) mju_copy(rest, m.qpos_spring + m.jnt_qposadr[joint], count);
   part.Add("joint_spring", "springref", rest, count);
-  part.Add("joint_stop_margin", "margin", m.jnt_limited[joint] != 0 ? m.jnt_margin[joint] : 0.0);
+  part.Add("joint_limit_margin", "margin", m.jnt_limited[joint] != 0 ? m.jnt_margin[joint] : 0.0);
   return part;
 }
 
