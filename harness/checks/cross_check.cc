@@ -56,8 +56,8 @@ CrossCheck::CrossCheck(const Setup& setup, std::span<const Motor> motors, bool k
   if (joint_law_ && !joint_law_->follows_error()) motion_.LeaveOut(kJointDynamics);
   if (joint_law_) return;
   if (!law_) {
-    for (const StepCheck check :
-         {kSpectralRadius, kLawTorque, kLawDemand, kGraspNullSpace, kGraspCone, kGraspOptimality, kJointDynamics}) {
+    for (const StepCheck check : {kSpectralRadius, kLawTorque, kLawDemand, kGraspNullSpace, kGraspCone,
+                                  kGraspOptimality, kJointDynamics}) {
       motion_.LeaveOut(check);
     }
   }

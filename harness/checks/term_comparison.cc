@@ -24,7 +24,8 @@ bool IsVelocity(TermParts parts) {
 /// perpendicular from the second's. A ball has one place.
 void MoveAlongAxes(const RobotModel& model, const MatrixXd& second, MatrixXd* first) {
   for (Eigen::Index i = 0; i < first->cols(); ++i) {
-    if (model.joints()[static_cast<size_t>(i)].type == JointType::kBall) continue;
+    if (model.joints()[static_cast<size_t>(model.joint_of_dof(static_cast<int>(i)))].type == JointType::kBall)
+      continue;
     const Vector3d axis = first->col(i).head<3>();
     const Vector3d point = first->col(i).tail<3>();
     first->col(i).tail<3>() = point + axis.dot(second.col(i).tail<3>() - point) * axis;
@@ -91,7 +92,7 @@ void TermComparison::FormCoupling() {
   T_.topLeftCorner(base, base).setIdentity();
   T_.bottomRightCorner(of_joints.rows(), of_joints.cols()) = of_joints;
   for (int i = 0; i < model().num_velocities(); ++i) {
-    if (i < base || !joints[static_cast<size_t>(i - base)].coupling) free_.push_back(i);
+    if (i < base || !joints[static_cast<size_t>(model().joint_of_dof(i - base))].coupling) free_.push_back(i);
   }
 }
 
@@ -113,7 +114,7 @@ void TermComparison::Follow(DynamicsState* state) const {
     if (!coupling) continue;
     state->q[model().position_index(i)] =
         coupling->multiplier * state->q[model().position_index(coupling->leader)] + coupling->offset;
-    state->xi[base + i] = coupling->multiplier * state->xi[base + coupling->leader];
+    state->xi[base + model().dof(i)] = coupling->multiplier * state->xi[base + model().dof(coupling->leader)];
   }
 }
 

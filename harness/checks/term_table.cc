@@ -86,7 +86,7 @@ constexpr TermEntry kTerms[] = {
      [](const C& c, S scale) {
        ScalePlaces(c, scale);
        for (int i = 0; i < scale.cols(); ++i) {
-         if (c.model->joints()[static_cast<size_t>(i)].type == JointType::kPrismatic)
+         if (c.model->joints()[static_cast<size_t>(c.model->joint_of_dof(i))].type == JointType::kPrismatic)
            scale.col(i).tail<3>().setConstant(kNotCompared);
        }
      }},
@@ -229,7 +229,7 @@ std::pair<Eigen::Index, Eigen::Index> CalcShape(const TermEntry& entry, const Sc
   const auto count = [](const auto& list) { return static_cast<Eigen::Index>(list.size()); };
   switch (entry.parts) {
     case P::kJoint:
-      return {entry.rows, joints};
+      return {entry.rows, model.num_dofs()};
     case P::kLink:
       return {entry.rows, joints - FirstLink(model)};
     case P::kModelFrame:
@@ -263,7 +263,7 @@ Location FindLocation(const TermEntry& entry, const ScaleContext& c, Eigen::Inde
   const auto i = static_cast<int>(col);
   switch (entry.parts) {
     case P::kJoint:
-      return {Kind::kJoint, i, -1};
+      return {Kind::kJoint, c.model->joint_of_dof(i), -1};
     case P::kLink:
       return {Kind::kLink, i + FirstLink(*c.model), -1};
     case P::kModelFrame:

@@ -23,7 +23,7 @@ enum Asker : unsigned {
 /// What the columns of a term's matrix belong to; its rows are the numbers of each.
 enum class TermParts {
   kWhole,
-  kJoint,
+  kJoint,          ///< One column for each of its velocities.
   kLink,           ///< That moves, the base first.
   kModelFrame,     ///< Every frame of the model.
   kFrame,          ///< Frames whose Jacobians are compared;

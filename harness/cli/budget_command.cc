@@ -12,13 +12,14 @@
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
-#include "harness/study/error_budget.h"
+#include "harness/study/study_page.h"
 
 namespace dexcheck::cli {
 namespace {
 
 struct BudgetRequest : ScenarioRequest {
   std::uint64_t seed = 0;
+  std::uint64_t jobs = 0;
   std::string page;
 };
 
@@ -55,12 +56,13 @@ int Run(const BudgetRequest& request) {
     page.emplace(request.page);
   }
   std::unique_ptr<ProgressBar> bar;
+  const auto progress = [&](long done, long total) {
+    if (!bar) bar = std::make_unique<ProgressBar>("running", total, request.quiet);
+    bar->Update(done);
+    return !IsInterrupted();
+  };
   const ErrorBudget budget =
-      CalcErrorBudget(files.scenario, files.robot, files.mjcf, [&](long done, long total) {
-        if (!bar) bar = std::make_unique<ProgressBar>("running", total, request.quiet);
-        bar->Update(done);
-        return !IsInterrupted();
-      });
+      CalcErrorBudget(files.scenario, files.robot, files.mjcf, CountJobs(request.jobs), progress);
   if (bar) bar->Finish();
   if (json) json->Write(ToJson(budget).dump(2) + "\n");
   if (page) page->Write(MakeBudgetPage(budget));
@@ -87,6 +89,7 @@ void AddBudgetCommand(Command app) {
   AddScenarioOptions(command, request.get());
   AddSeedOption(command, &request->seed, "Seed of all that is random");
   command.AddOption("--page", &request->page, "Write table and bar chart as a page").TypeName("FILE.html");
+  AddJobsOption(command, "Runs", &request->jobs);
   AddResultOptions(command, "the budget", request.get());
   command.SetAction([=] { return Run(*request); });
 }

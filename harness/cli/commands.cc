@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "controller/common/text.h"
+#include "harness/base/process_pool.h"
 #include "harness/checks/consistency.h"
 #include "harness/cli/shipped_files.h"
 
@@ -74,6 +75,14 @@ void AddResultOptions(Command command, const std::string& what, ScenarioRequest*
   AddJsonOption(command, what, &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the last line only");
 }
+
+Option AddJobsOption(Command command, const std::string& what, std::uint64_t* jobs) {
+  return command.AddOption("--jobs", jobs, what + " at a time (all processors by default)")
+      .TypeName("N")
+      .Check(WholeNumber(1, 1000000));
+}
+
+int CountJobs(std::uint64_t jobs) { return jobs > 0 ? static_cast<int>(jobs) : CountProcessors(); }
 
 Option AddSeedOption(Command command, std::uint64_t* seed, const std::string& help) {
   return command.AddOption("--seed", seed, help)

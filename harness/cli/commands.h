@@ -46,6 +46,11 @@ void AddScenarioOptions(Command command, ScenarioRequest* request);
 /// Adds --json and --quiet. @param what the file gets: "the budget".
 void AddResultOptions(Command command, const std::string& what, ScenarioRequest* request);
 
+/// Adds --jobs. @param what is made: "Trials". @param jobs 0 for one on each processor, as CountJobs reads
+/// it.
+Option AddJobsOption(Command command, const std::string& what, std::uint64_t* jobs);
+int CountJobs(std::uint64_t jobs);
+
 /// Adds --seed. @param help what is drawn by it.
 Option AddSeedOption(Command command, std::uint64_t* seed,
                      const std::string& help = "Vary posture and grasp at random; 0 does not");

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "harness/base/interrupts.h"
+#include "harness/base/shell.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
@@ -42,7 +43,7 @@ void Print(const Scenario& scenario, const ExcitingMotion& motion) {
   both(fmt::format("combinations above the floor of {:.0e}", motion.floor), "{}",
        [&](const JudgedMotion& m) { return CountAbove(m.singular_values, motion.floor); });
   fmt::print("nearest to what it may take: {}\n\n", motion.found.nearest);
-  for (const std::string& line : ShowMotion(scenario, motion.overrides)) fmt::print("{}\n", line);
+  for (const std::string& setting : motion.overrides) fmt::print("--set {}\n", QuoteForShell(setting));
 }
 
 std::string ToText(const Scenario& scenario, const ExcitingMotion& motion, bool complete) {

@@ -20,8 +20,10 @@ const MassProperties& BodyOf(const RobotModel& model, int link) {
 
 std::vector<int> ListChain(const RobotModel& model, int link) {
   std::vector<int> chain;
-  for (int joint = link; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent)
-    chain.push_back(model.num_base_velocities() + joint);
+  for (int joint = link; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent) {
+    for (int k = 0; k < CountVelocities(model.joints()[static_cast<size_t>(joint)].type); ++k)
+      chain.push_back(model.num_base_velocities() + model.dof(joint) + k);
+  }
   for (int i = model.num_base_velocities() - 1; i >= 0; --i) chain.push_back(i);
   std::sort(chain.begin(), chain.end());
   return chain;
@@ -42,10 +44,10 @@ CoordinateMap::CoordinateMap(const RobotModel& model, const RobotModel& coordina
     const Joint& joint = coordinates.joints()[static_cast<size_t>(i)];
     const int own = model.FindJoint(joint.name);
     joints[static_cast<size_t>(i)] = own;
-    const int count = joint.type == JointType::kBall ? 4 : 1;
-    for (int k = 0; k < count; ++k)
+    for (int k = 0; k < CountPositions(joint.type); ++k)
       positions[static_cast<size_t>(coordinates.position_index(i) + k)] = model.position_index(own) + k;
-    velocities[static_cast<size_t>(base + i)] = base + own;
+    for (int k = 0; k < CountVelocities(joint.type); ++k)
+      velocities[static_cast<size_t>(base + coordinates.dof(i) + k)] = base + model.dof(own) + k;
   }
   for (size_t i = 0; i < frames.size(); ++i) frames[i] = model.FindFrame(coordinates.frames()[i].name);
   compared_frames = frames;
@@ -191,10 +193,12 @@ void AnalyticProvider::Read(Term term, Eigen::Ref<MatrixXd> out) {
   switch (term) {
     case Term::kJointAxis:
       for (Eigen::Index col = 0; col < out.cols(); ++col) {
-        const int own = map_.joints[static_cast<size_t>(col)];
-        const Joint& joint = model.joints()[static_cast<size_t>(own)];
+        const int base = model.num_base_velocities();
+        const int dof = map_.velocities[static_cast<size_t>(base + col)] - base;
+        const int own = model.joint_of_dof(dof);
+        const bool is_ball = model.joints()[static_cast<size_t>(own)].type == JointType::kBall;
         const Pose X = view_->CalcLinkPose(own);
-        out.col(col) << X.linear().col(joint.type == JointType::kBall ? joint.ball_axis : 2), X.translation();
+        out.col(col) << X.linear().col(is_ball ? dof - model.dof(own) : 2), X.translation();
       }
       return;
     case Term::kLinkCom:

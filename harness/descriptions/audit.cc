@@ -108,13 +108,12 @@ class JointAudit {
   AuditFinding& Add(AuditLevel level, const std::string& check, size_t joint, const std::string& text) {
     const int line = robot_.joints[joint].line;
     return findings_.emplace_back(
-        AuditFinding{level, check, "joint " + NameInFile(spec_.joints[joint]), line, text});
+        AuditFinding{level, check, "joint " + spec_.joints[joint].name, line, text});
   }
 
   void AuditRange(size_t i) {
     const Joint& joint = spec_.joints[i];
     if (!robot_.joints[i].states_range) return;
-    if (joint.type == JointType::kBall && joint.ball_axis > 0) return;  // the first entry says it
     const std::string range = FormatNumbers(Vector2d(joint.lower, joint.upper));
     const bool is_revolute = joint.type != JointType::kPrismatic;
     const double widest = std::max(std::abs(joint.lower), std::abs(joint.upper));
@@ -167,7 +166,7 @@ class JointAudit {
     for (size_t i = 0; i < count; ++i) {
       const Joint& joint = spec_.joints[i];
       const bool is_ball = joint.type == JointType::kBall;
-      if (joint.armature > 0.0 || (is_ball && joint.ball_axis < 2)) continue;
+      if (joint.armature > 0.0) continue;
       const std::string end = is_end[i] ? ", the end of a chain" : "";
       if (mass[i] <= 0.0) {
         Add(AuditLevel::kSuspicious, "load", i, "moves no mass" + end + ": M is singular").body =

@@ -11,7 +11,7 @@
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_only.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/torus_collision.h"
+#include "harness/engine/exact_collision.h"
 #include "harness/engine/wheel_inertia.h"
 
 namespace dexcheck {
@@ -140,13 +140,16 @@ class EngineConstants : public ConstantTable {
 
  private:
   void CompareJoints() {
-    for (int i = 0; i < model_.num_joints(); ++i) {
-      const int dof = adapter_.joint_dofs()[static_cast<size_t>(i)];
-      Compare("joint_damping", AtJoint(i), JointOf(i).damping, engine_.dof_damping[dof]);
+    const std::vector<int>& dofs = adapter_.joint_dofs();
+    for (int i = 0; i < model_.num_dofs(); ++i) {
+      const int joint = model_.joint_of_dof(i);
+      Compare("joint_damping", AtJoint(joint), JointOf(joint).damping,
+              engine_.dof_damping[dofs[static_cast<size_t>(i)]]);
     }
-    for (int i = 0; i < model_.num_joints(); ++i) {
-      const int dof = adapter_.joint_dofs()[static_cast<size_t>(i)];
-      Compare("joint_armature", AtJoint(i), JointOf(i).armature, engine_.dof_armature[dof]);
+    for (int i = 0; i < model_.num_dofs(); ++i) {
+      const int joint = model_.joint_of_dof(i);
+      Compare("joint_armature", AtJoint(joint), JointOf(joint).armature,
+              engine_.dof_armature[dofs[static_cast<size_t>(i)]]);
     }
     for (int i = 0; i < model_.num_joints(); ++i) {
       const int id = adapter_.joint_ids()[static_cast<size_t>(i)];

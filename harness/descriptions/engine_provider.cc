@@ -163,8 +163,10 @@ void EngineProvider::ReadJacobians(Eigen::Ref<MatrixXd> out) const {
 void EngineProvider::Read(Term term, Eigen::Ref<MatrixXd> out) {
   switch (term) {
     case Term::kJointAxis:
-      for (int i = 0; i < static_cast<int>(out.cols()); ++i)
-        out.col(i) << terms_.JointAxis(i), terms_.JointAnchor(i);
+      for (int i = 0; i < static_cast<int>(out.cols()); ++i) {
+        const int joint = adapter_->model().joint_of_dof(i);
+        out.col(i) << terms_.JointAxis(joint, i - adapter_->model().dof(joint)), terms_.JointAnchor(joint);
+      }
       return;
     case Term::kLinkCom:
     case Term::kLinkInertia:

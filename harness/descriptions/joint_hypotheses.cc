@@ -437,9 +437,7 @@ std::vector<OwnRow> ListOwnRows(const RobotDescription& robot) {
     row.is_revolute = joint.type != JointType::kPrismatic;
     row.X_PL = X_PL0.inverse() * joint.X_PB *
                CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d) * X_iL;
-    // A ball's entries turn about the link's own axes one after the other.
-    const int axis = joint.type == JointType::kBall ? joint.ball_axis : 2;
-    row.axis = X_iL.linear().row(axis).transpose();
+    row.axis = X_iL.linear().row(2).transpose();  // one of those that a ball joint turns about
     row.body = ExpressIn(joint.body, X_iL.inverse());
     // The own frame may stand beside the axis, as an MJCF's does: then the row's place is on it.
     const Vector3d on_axis = X_iL.inverse().translation();

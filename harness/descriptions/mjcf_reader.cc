@@ -201,24 +201,11 @@ class MjcfDescriptionReader {
     stated.states_range = engine_.jnt_limited[id] != 0;
     joint.lower = stated.states_range ? engine_.jnt_range[2 * id] : -kPi;
     joint.upper = stated.states_range ? engine_.jnt_range[2 * id + 1] : kPi;
-    if (type == mjJNT_BALL) {
-      joint.lower = 0.0;
-      for (int axis_index = 0; axis_index < 2; ++axis_index) {
-        DescribedJoint within = stated;
-        within.X_iL = Pose::Identity();
-        AddEntry(id, MakeBallEntry(joint, axis_index, joint.parent), within);
-        joint.parent = static_cast<int>(robot_.spec.joints.size()) - 1;
-      }
-      joint = MakeBallEntry(joint, 2, joint.parent);
-    }
-    AddEntry(id, joint, stated);
-    return {static_cast<int>(robot_.spec.joints.size()) - 1, stated.X_iL};
-  }
-
-  void AddEntry(int id, const Joint& joint, const DescribedJoint& stated) {
+    if (type == mjJNT_BALL) joint.lower = 0.0;
     robot_.spec.joints.push_back(joint);
     robot_.joints.push_back(stated);
     joint_ids_.push_back(id);
+    return {static_cast<int>(robot_.spec.joints.size()) - 1, stated.X_iL};
   }
 
   void AddSites() {

@@ -33,7 +33,6 @@ RobotDescription ReadTable(const std::string& text, const std::string& source) {
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
     static_cast<WrittenRow&>(robot.joints[i]) = rows[i];
-    if (joint.type == JointType::kBall && joint.ball_axis < 2) continue;  // its link is no part of the file
     AddPart(joint.link, joint.body, static_cast<int>(i), rows[i].X_iL, &robot);
   }
   NoteImpossibleBodies(&robot);

@@ -104,7 +104,7 @@ FaultyLaw::FaultyLaw(const Setup& setup, LawFault fault)
               setup.model().num_velocities()),
       G_pinv_("G", 6, 3 * static_cast<Eigen::Index>(setup.fingertips().size())),
       problem_(static_cast<int>(setup.fingertips().size())),
-      solver_(static_cast<int>(setup.fingertips().size()), 0, options_.force),
+      solver_(static_cast<int>(setup.fingertips().size()), options_.force),
       time_step_(setup.scenario().plant.time_step),
       hold_(std::max(1L, std::lround(setup.scenario().plant.control_step / time_step_))) {
   problem_.mu.setConstant(options_.mu);

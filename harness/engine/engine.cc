@@ -15,12 +15,10 @@
 #include "controller/common/errors.h"
 #include "harness/base/console.h"
 #include "harness/base/temporary_path.h"
-#include "harness/engine/cylinder_collision.h"
-#include "harness/engine/ellipsoid_collision.h"
+#include "harness/engine/exact_collision.h"
 #include "harness/engine/finite_check.h"
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/mujoco_release.h"
-#include "harness/engine/torus_collision.h"
 
 namespace dexcheck {
 namespace {
@@ -60,9 +58,7 @@ void CheckReadable(const std::filesystem::path& path) {
 void PrepareEngine() {
   InstallMessageHandlers();
   CheckVersion();
-  InstallCylinderCollision();
-  InstallEllipsoidCollision();
-  InstallTorusCollision();
+  InstallExactCollision();
 }
 
 /// What was said of the files that were loaded; commands load a file more than once.
