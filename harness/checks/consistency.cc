@@ -3,7 +3,32 @@
 #include <algorithm>
 #include <chrono>
 
+#include "controller/common/errors.h"
+#include "harness/descriptions/engine_provider.h"
+
 namespace dexcheck {
+namespace {
+
+/// Compares at all states; constants are the caller's.
+ConsistencyResult CompareTerms(const StateFeed& feed, const Progress& progress, TermComparison* comparison) {
+  const auto start = std::chrono::steady_clock::now();
+  ConsistencyResult result;
+  result.samples = CompareAtStates(feed, progress, comparison);
+  result.terms = comparison->TakePairs().front().terms;
+  result.not_compared = comparison->ListNotCompared();
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+ConsistencyResult CompareAtRandomStates(const ConsistencyOptions& options, const Progress& progress,
+                                        TermComparison* comparison) {
+  const RobotModel& model = comparison->model();
+  return CompareTerms(FeedRandomStates(model, options.samples, options.range, options.seed,
+                                       comparison->needs_second_velocity(), model.object().has_value()),
+                      progress, comparison);
+}
+
+}  // namespace
 
 bool ConsistencyResult::Agrees() const {
   const auto good = [](const CheckRecord& record) { return !record.failed; };
@@ -12,32 +37,60 @@ bool ConsistencyResult::Agrees() const {
 }
 
 ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOptions& options,
-                                   const std::function<bool(long)>& progress) {
-  const auto start = std::chrono::steady_clock::now();
-  const RobotModel& model = adapter.model();
-  ConsistencyResult result;
+                                   const Progress& progress) {
+  AnalyticProvider model(adapter.model(), "model", options.make_view, options.object);
+  EngineProvider engine(adapter, "engine");
+  TermComparison comparison(adapter.model(), kAskedByConsistency, {&model, &engine});
+  ConsistencyResult result = CompareAtRandomStates(options, progress, &comparison);
   result.constants = CheckConstants(adapter);
-
-  ModelCheck check(adapter, options.make_view, options.object);
-  StateSource source(model, options.range, options.seed);
-  VectorXd q = VectorXd::Zero(model.num_positions());
-  VectorXd xi = VectorXd::Zero(model.num_velocities());
-  VectorXd w = VectorXd::Zero(model.num_velocities());
-  Vector6d X_o = Vector6d::Zero();
-  Vector6d X_o_dot = Vector6d::Zero();
-  bool go_on = true;
-  while (go_on && result.samples < options.samples) {
-    const long sample = result.samples++;
-    source.DrawPositions(&q);
-    source.DrawVelocity(&xi);
-    source.DrawVelocity(&w);
-    if (model.object()) source.DrawObject(&X_o, &X_o_dot);
-    check.Compare(q, xi, w, X_o, X_o_dot, sample);
-    go_on = progress(result.samples);
-  }
-  result.terms.assign(check.records().begin(), check.records().end());
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
+}
+
+ConsistencyResult CompareDescriptions(const RobotDescription& a, const RobotDescription& b,
+                                      const ConsistencyOptions& options, const Progress& progress) {
+  const RobotModel model_a(a.spec);
+  const RobotModel model_b(b.spec);
+  AnalyticProvider first(model_a, a.spec.source);
+  AnalyticProvider second(model_b, b.spec.source, model_a);
+  TermComparison comparison(model_a, kAskedByConsistency, {&first, &second});
+  ConsistencyResult result = CompareAtRandomStates(options, progress, &comparison);
+  result.constants = CheckConstants(a, b);
+  return result;
+}
+
+ConsistencyResult CompareProviders(const RobotModel& model, DynamicsProvider* first, DynamicsProvider* second,
+                                   const StateFeed& feed, const Progress& progress) {
+  TermComparison comparison(model, kAskedOfPrograms, {first, second});
+  return CompareTerms(feed, progress, &comparison);
+}
+
+bool AgreeAtFirst(const RobotModel& model, DynamicsProvider* a, DynamicsProvider* b, const StateFeed& feed,
+                  double tolerance) {
+  constexpr long kStates = 3;
+  const ConsistencyResult result =
+      CompareProviders(model, a, b, feed, [](long samples) { return samples < kStates; });
+  return !result.terms.empty() &&
+         std::all_of(result.terms.begin(), result.terms.end(), [&](const CheckRecord& record) {
+           return record.worst <= std::max(record.bound, tolerance);
+         });
+}
+
+std::optional<BaseConvention> FindOtherConvention(const RobotModel& model, DynamicsProvider* reference,
+                                                  AnsweringProvider* answering,
+                                                  const std::function<StateFeed()>& make_feed) {
+  const BaseConvention spoken = answering->layout().convention();
+  std::optional<BaseConvention> found;
+  for (const BaseConvention& convention : ListBaseConventions()) {
+    if (convention == spoken || found) continue;
+    answering->set_convention(convention);
+    try {
+      if (AgreeAtFirst(model, reference, answering, make_feed())) found = convention;
+    } catch (const Error&) {
+      break;  // a program may not bear what it did not ask for
+    }
+  }
+  answering->set_convention(spoken);
+  return found;
 }
 
 }  // namespace dexcheck

@@ -1,15 +1,17 @@
 #pragma once
 
-// Random states, model against engine, no stepping.
+// Two of whatever tells a robot's terms, compared at random states, no stepping.
 
 #include <cstdint>
 #include <functional>
+#include <optional>
+#include <string>
 #include <vector>
 
-#include "harness/base/check_record.h"
-#include "harness/checks/model_check.h"
+#include "harness/checks/term_comparison.h"
+#include "harness/descriptions/analytic_provider.h"
+#include "harness/descriptions/answer_layout.h"
 #include "harness/descriptions/constant_checks.h"
-#include "harness/descriptions/random_states.h"
 #include "harness/engine/adapter.h"
 
 namespace dexcheck {
@@ -29,15 +31,46 @@ struct ConsistencyOptions {
 struct ConsistencyResult {
   ConstantChecks constants;
   std::vector<CheckRecord> terms;
-  long samples = 0;  ///< Compared: fewer than asked for when `progress` said stop.
+  std::vector<std::string> not_compared;  ///< Names of terms that one of the two lacks.
+  long samples = 0;                       ///< Compared: fewer than asked for when `progress` said stop.
   double seconds = 0.0;
 
   [[nodiscard]] bool Agrees() const;
 };
 
-/// The constants, then all terms of robot and object at random states over the joint ranges.
-/// @param progress called after each sample with the number done; its false ends the work early.
+/// Called after each sample with the number done; its false ends the work early.
+using Progress = std::function<bool(long)>;
+
+/// Constants of model and engine, then all terms of robot and object at random states over the joint ranges.
 ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOptions& options,
-                                   const std::function<bool(long)>& progress);
+                                   const Progress& progress);
+
+/// Constants that both state, then all terms of two descriptions at random states over the ranges of `a`.
+/// `model_value` of a record is that of `a`, `engine_value` that of `b`; locations are those of `a`.
+/// @param a, b as CompleteEachOther left them.
+ConsistencyResult CompareDescriptions(const RobotDescription& a, const RobotDescription& b,
+                                      const ConsistencyOptions& options, const Progress& progress);
+
+/// What a program, answers in files or functions have, against a description.
+/// @param feed gives the states. @param asker whose terms are compared.
+ConsistencyResult CompareProviders(const RobotModel& model, DynamicsProvider* first, DynamicsProvider* second,
+                                   const StateFeed& feed, const Progress& progress);
+
+/// States as CheckConsistency draws them, without what only some terms need. The model outlives the feed.
+inline StateFeed FeedRandomStates(const RobotModel& model, const ConsistencyOptions& options) {
+  return FeedRandomStates(model, options.samples, options.range, options.seed);
+}
+
+/// Whether all terms that two providers have in common agree at the first few states.
+/// @param tolerance relative, at which terms agree; at least their bound.
+bool AgreeAtFirst(const RobotModel& model, DynamicsProvider* a, DynamicsProvider* b, const StateFeed& feed,
+                  double tolerance = 0.0);
+
+/// The convention of a floating base, other than the one that it speaks, under which a provider that
+/// disagrees would agree in all its terms.
+/// @param make_feed states to compare at; the first few are used.
+std::optional<BaseConvention> FindOtherConvention(const RobotModel& model, DynamicsProvider* reference,
+                                                  AnsweringProvider* answering,
+                                                  const std::function<StateFeed()>& make_feed);
 
 }  // namespace dexcheck

@@ -6,6 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/contact/object_surface.h"
+#include "harness/checks/contact_terms.h"
 
 namespace dexcheck {
 namespace {
@@ -21,26 +22,23 @@ Matrix3d CalcContactTurn(double psi) {
 }  // namespace
 
 ContactCheck::ContactCheck(const Adapter& adapter, int fingertip, ContactFormulas formulas)
-    : TermComparison(adapter),
-      fingertip_(fingertip),
+    : fingertip_(fingertip),
       formulas_(std::move(formulas)),
-      engine_(adapter, {&fingertip_, 1}),
+      engine_(adapter, {&fingertip_, 1}, /*has_coordinates=*/false),
+      model_(engine_.terms().size()),
+      comparison_(adapter.model(), kAskedByContacts, {&model_, &engine_}, {fingertip}, 1),
       robot_(adapter.model()),
       tip_(adapter.model().frames()[static_cast<size_t>(fingertip)].sphere_radius.value()) {
+  const RobotModel& model = adapter.model();
   try {
-    object_ = MakeSurface(model().object()->shape);
+    object_ = MakeSurface(model.object()->shape);
   } catch (const std::invalid_argument& error) {
-    throw InputError(model().spec().source + ": object: " + error.what());
+    throw InputError(model.spec().source + ": object: " + error.what());
   }
-  const int n = engine_.size();
+  const int n = engine_.terms().size();
   J_f_.setZero(6, n);
   J_f_dot_.setZero(6, n);
-  J_B_.setZero(3, n);
   G_.setZero(6, 3);
-  context_.engine = &engine_;
-  context_.J_B = &J_B_;
-  SetFrames({&fingertip_, 1}, /*contacts=*/true);
-  Ask(kAskedByContacts, {});
 }
 
 Pose ContactCheck::CalcObjectPose(const ContactCoordinates& kappa, const Pose& X_cf) const {
@@ -62,35 +60,35 @@ void ContactCheck::Compare(const VectorXd& q, const VectorXd& xi, StateSource* s
   V_relative[2] = 0.0;
 
   // The engine's fingertip, then the object against it.
-  engine_.SetState(q, xi);
-  const Pose X_cf = engine_.FramePose(fingertip_) * tip_.Evaluate(kappa.alpha_f).CalcPose();
+  EngineTerms& engine = engine_.terms();
+  engine.SetState(q, xi);
+  const Pose X_cf = engine.FramePose(fingertip_) * tip_.Evaluate(kappa.alpha_f).CalcPose();
   const Pose X_Bo = CalcObjectPose(kappa, X_cf);
-  const EngineMotion tip = engine_.FrameMotion(fingertip_).MoveTo(X_cf.translation());
+  const EngineMotion tip = engine.FrameMotion(fingertip_).MoveTo(X_cf.translation());
   const Vector3d omega_o = tip.omega - X_cf.linear() * V_relative.tail<3>();
   const Vector3d at_contact = tip.v - X_cf.linear() * V_relative.head<3>();
   const Vector3d v_o = at_contact - omega_o.cross(X_cf.translation() - X_Bo.translation());
   Vector6d V_o;
   V_o << X_Bo.linear().transpose() * v_o, X_Bo.linear().transpose() * omega_o;
-  engine_.SetState(q, xi, X_Bo, V_o);
-  EvaluateFrames();
+  engine_.SetState(q, xi, X_Bo, V_o, nullptr);
 
   // The model's side.
   robot_.SetState(q, xi);
-  scales_.SetState(robot_, q, xi);
+  comparison_.SetScales(robot_, q, xi);
   robot_.CalcFrameJacobian(fingertip_, J_f_, J_f_dot_);
   Contact contact;
   contact.geometry = formulas_.geometry(tip_, *object_, kappa);
   const Vector6d V_f = J_f_ * xi;
   contact.kappa_dot = formulas_.kappa_dot(contact.geometry, CalcRelativeTwist(contact.geometry, V_f, V_o));
-  formulas_.jacobian(contact, J_f_, J_B_);
+  ContactValues& values = model_.mutable_contacts()->front();
+  MatrixXd J_B(3, xi.size());
+  formulas_.jacobian(contact, J_f_, J_B);
+  values.J_B = J_B;
   formulas_.grasp_map(contact, G_);
-  ContactValues& model_side = context_.contacts[0].model;
-  model_side.frame[ContactValues::kOverlap] = 0.0;
-  model_side.G = G_;
-  Eigen::Index k = 0;
-  for (const int col : engine_.chain(fingertip_)) model_side.J_B.col(k++) = J_B_.col(col);
-  EvaluateContact(contact, Pose::Identity(), 0, &context_);
-  TermComparison::Compare(static_cast<double>(sample), /*contacts=*/true);
+  values.G = G_;
+  values.frame[ContactValues::kOverlap] = 0.0;
+  EvaluateContact(contact, Pose::Identity(), 0, &engine_, &values, &comparison_.scales());
+  comparison_.Compare(static_cast<double>(sample));
 }
 
 }  // namespace dexcheck

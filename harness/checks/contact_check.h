@@ -11,6 +11,7 @@
 #include "controller/contact/rolling.h"
 #include "controller/contact/shapes.h"
 #include "harness/checks/term_comparison.h"
+#include "harness/descriptions/engine_provider.h"
 #include "harness/descriptions/random_states.h"
 
 namespace dexcheck {
@@ -35,7 +36,7 @@ struct ContactFormulas {
 /// Puts the object against a fingertip at random contact coordinates and compares, with the engine's narrow
 /// phase and the motion of its two bodies: g_o_cf, G, J_B', and whether Sigma_cf, moved by (40), stays one
 /// frame on both.
-class ContactCheck : public TermComparison {
+class ContactCheck {
  public:
   /// @param fingertip a frame that carries a sphere.
   /// @throws InputError unless the fingertip can touch and the object is a free torus or another smooth
@@ -45,17 +46,32 @@ class ContactCheck : public TermComparison {
   /// One contact at q', xi.
   void Compare(const VectorXd& q, const VectorXd& xi, StateSource* source, long sample);
 
+  [[nodiscard]] std::span<const CheckRecord> records() const { return comparison_.records(); }
+
  private:
+  /// The model's values at the contact.
+  class ModelProvider : public MechanismProvider {
+   public:
+    explicit ModelProvider(int size) : MechanismProvider("model") {
+      contacts_.resize(1);
+      contacts_[0].J_B.setZero(3, size);
+    }
+    void SetState(const DynamicsState&) override {}
+    [[nodiscard]] bool Has(Term term) const override { return HasValue(term); }
+    void Read(Term term, Eigen::Ref<MatrixXd> out) override { ReadValues(term, out); }
+  };
+
   /// Where these contact coordinates put the object, in the engine's world.
   [[nodiscard]] Pose CalcObjectPose(const ContactCoordinates& kappa, const Pose& X_cf) const;
 
   int fingertip_;
   ContactFormulas formulas_;
-  EngineTerms engine_;
+  EngineProvider engine_;
+  ModelProvider model_;
+  TermComparison comparison_;
   ModelTerms robot_;
   Sphere tip_;
   std::unique_ptr<Surface> object_;
-  MatrixXd J_B_;
   Matrix6Xd J_f_, J_f_dot_, G_;
 };
 

@@ -165,7 +165,7 @@ void CrossCheck::FindMeant(const StepRecord& step) {
 void CrossCheck::ReadControllersTerms(const StepRecord& step) {
   const StepModelCheck& controller = known_ ? known_->controller : model_;
   const bool contacts = setup_->start().bonds.empty() && !known_;
-  ReadEngineTerms(controller.context(), *step.model, step.told.state, contacts, &law_terms_);
+  ReadEngineTerms(controller.engine(), *step.model, step.told.state, contacts, &law_terms_);
 }
 
 const LawErrors& CrossCheck::CompareControl(const StepRecord& step) {

@@ -15,6 +15,7 @@
 #include "harness/checks/engine_settings.h"
 #include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/description_match.h"
+#include "harness/descriptions/engine_provider.h"
 #include "harness/descriptions/engine_urdf.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/mjcf_reader.h"
@@ -23,7 +24,7 @@
 namespace dexcheck {
 namespace {
 
-using SidePtr = std::unique_ptr<TermSide>;
+using ProviderPtr = std::unique_ptr<DynamicsProvider>;
 
 class EngineComparisonRun {
  public:
@@ -44,15 +45,16 @@ class EngineComparisonRun {
       const size_t equals = program.find('=');
       Add(program.substr(0, equals), [&] { return MakeProgram(program.substr(equals + 1)); });
     }
-    if (sides_.size() < 2) {
-      std::string text = "engine_comparison: two engines must be there, got " + std::to_string(sides_.size());
+    if (providers_.size() < 2) {
+      std::string text =
+          "engine_comparison: two engines must be there, got " + std::to_string(providers_.size());
       for (const std::string& absent : result_.absent) text += "; " + absent;
       throw InputError(text);
     }
     Compare(progress);
     FormGroups();
     if (!result_.Agrees()) Explain();
-    for (const SidePtr& side : sides_) result_.names.push_back(side->name());
+    for (const ProviderPtr& provider : providers_) result_.names.push_back(provider->name());
     return std::move(result_);
   }
 
@@ -76,25 +78,24 @@ class EngineComparisonRun {
   }
 
   /// What cannot be asked is told and left out.
-  void Add(const std::string& name, const std::function<SidePtr()>& make) {
+  void Add(const std::string& name, const std::function<ProviderPtr()>& make) {
     try {
-      SidePtr side = make();
+      ProviderPtr provider = make();
       // One state, so that what cannot answer is left out before the comparison.
-      VectorXd q;
-      VectorXd xi;
-      q.setZero(model_.num_positions());
-      xi.setZero(model_.num_velocities());
-      MakeFeed()(0, &q, &xi);
-      side->Evaluate(0, q, xi);
-      sides_.push_back(std::move(side));
+      DynamicsState state;
+      state.q.setZero(model_.num_positions());
+      state.xi.setZero(model_.num_velocities());
+      MakeFeed()(&state);
+      provider->SetState(state);
+      providers_.push_back(std::move(provider));
     } catch (const Error& error) {
       result_.absent.push_back(name + ": " + error.what());
       result_.lacks_requested = result_.lacks_requested || !options_.engines.empty();
     }
   }
 
-  SidePtr Make(const std::string& name) {
-    if (name == "analytic") return std::make_unique<AnalyticSide>(robot_, "analytic model");
+  ProviderPtr Make(const std::string& name) {
+    if (name == "analytic") return std::make_unique<AnalyticProvider>(model_, "analytic model");
     if (name == "mujoco") return MakeMujoco();
     if (name == "mujoco3") {
       const std::filesystem::path script = options_.programs_folder / "mujoco3.mjs";
@@ -119,8 +120,8 @@ class EngineComparisonRun {
     if (!std::filesystem::exists(path, ignored)) throw InputError("is not installed: " + path.string());
   }
 
-  SidePtr MakeProgram(const std::string& command) {
-    return std::make_unique<ProgramSide>(command, robot_, options_.program_options);
+  ProviderPtr MakeProgram(const std::string& command) {
+    return std::make_unique<ProgramProvider>(command, robot_, options_.program_options);
   }
 
   /// An MJCF, or the URDF as MuJoCo's importer should have it.
@@ -153,7 +154,7 @@ class EngineComparisonRun {
     }
   }
 
-  SidePtr MakeMujoco() {
+  ProviderPtr MakeMujoco() {
     const std::filesystem::path path = MujocoFile();
     MjModelPtr engine = Load(path);
     if (FindFormat(path) == RobotFormat::kUrdf) {
@@ -182,8 +183,8 @@ class EngineComparisonRun {
     }
     NoteCompiledInertias(*engine, path.string(), completed);
     NoteOtherForces(Adapter(RobotModel(completed.spec), *engine, path.string()));
-    return std::make_unique<EngineSide>(completed, std::move(engine), path.string(),
-                                        std::string("MuJoCo ") + mj_versionString());
+    return std::make_unique<EngineProvider>(completed.spec, std::move(engine), path.string(),
+                                            std::string("MuJoCo ") + mj_versionString());
   }
 
   /// The description with the bodies that MuJoCo's compiler made of it: it diagonalises inertias, to 1e-6.
@@ -225,9 +226,9 @@ class EngineComparisonRun {
   [[nodiscard]] StateFeed MakeFeed() const { return FeedRandomStates(model_, options_.states); }
 
   void Compare(const std::function<bool(long)>& progress) {
-    std::vector<TermSide*> sides;
-    for (const SidePtr& side : sides_) sides.push_back(side.get());
-    SideComparison comparison(robot_, sides);
+    std::vector<DynamicsProvider*> providers;
+    for (const ProviderPtr& provider : providers_) providers.push_back(provider.get());
+    TermComparison comparison(model_, kAskedOfPrograms, providers);
     result_.samples = CompareAtStates(MakeFeed(), progress, &comparison);
     result_.pairs = comparison.TakePairs();
     for (ComparedPair& pair : result_.pairs) {
@@ -238,7 +239,7 @@ class EngineComparisonRun {
     }
   }
 
-  /// Each side joins the first group all of whose sides it agrees with.
+  /// Each provider joins the first group all of whose sides it agrees with.
   void FormGroups() {
     const auto agree = [&](size_t a, size_t b) {
       const auto pair =
@@ -248,15 +249,15 @@ class EngineComparisonRun {
       return std::none_of(pair->terms.begin(), pair->terms.end(),
                           [](const CheckRecord& record) { return record.failed; });
     };
-    for (size_t side = 0; side < sides_.size(); ++side) {
+    for (size_t one = 0; one < providers_.size(); ++one) {
       const auto fits = [&](const std::vector<size_t>& group) {
-        return std::all_of(group.begin(), group.end(), [&](size_t member) { return agree(member, side); });
+        return std::all_of(group.begin(), group.end(), [&](size_t member) { return agree(member, one); });
       };
       const auto group = std::find_if(result_.groups.begin(), result_.groups.end(), fits);
       if (group != result_.groups.end()) {
-        group->push_back(side);
+        group->push_back(one);
       } else {
-        result_.groups.push_back({side});
+        result_.groups.push_back({one});
       }
     }
     std::stable_sort(result_.groups.begin(), result_.groups.end(),
@@ -266,21 +267,20 @@ class EngineComparisonRun {
   /// Why those outside of the largest group differ from the description's analytic model.
   void Explain() {
     const auto make_feed = [this] { return MakeFeed(); };
-    AnalyticSide model(robot_, "");
-    for (const SidePtr& owned : sides_) {
-      TermSide* const side = owned.get();
-      if (AgreeAtFirst(robot_, &model, side, make_feed, options_.tolerance)) continue;
-      std::optional<std::string> setting = FindSetting(robot_, side, make_feed, options_.tolerance, others_);
-      auto* const answering = dynamic_cast<AnsweringSide*>(side);
+    AnalyticProvider model(model_, "");
+    for (const ProviderPtr& owned : providers_) {
+      DynamicsProvider* const provider = owned.get();
+      if (AgreeAtFirst(model_, &model, provider, make_feed(), options_.tolerance)) continue;
+      std::optional<std::string> setting =
+          FindSetting(robot_, provider, make_feed, options_.tolerance, others_);
+      auto* const answering = dynamic_cast<AnsweringProvider*>(provider);
       if (!setting && answering != nullptr && answering->layout().is_floating()) {
-        const std::optional<BaseConvention> other = FindOtherConvention(
-            robot_, &model, side, answering->layout().convention(),
-            [&](const BaseConvention& convention) { answering->set_convention(convention); }, make_feed);
+        const std::optional<BaseConvention> other = FindOtherConvention(model_, &model, answering, make_feed);
         if (other) setting = "as with its base in " + Describe(*other);
       }
-      const bool is_mujoco = dynamic_cast<EngineSide*>(side) != nullptr;
+      const bool is_mujoco = dynamic_cast<EngineProvider*>(provider) != nullptr;
       if (!setting && is_mujoco && !other_forces_.empty()) setting = other_forces_;
-      result_.settings.push_back(side->name() + ": " +
+      result_.settings.push_back(provider->name() + ": " +
                                  setting.value_or("no setting that is known explains it"));
     }
   }
@@ -294,7 +294,7 @@ class EngineComparisonRun {
   std::filesystem::path mujoco_file_;
   std::vector<OtherDescription> others_;
   std::string other_forces_;  // of the engine that is linked, in words
-  std::vector<SidePtr> sides_;
+  std::vector<ProviderPtr> providers_;
   EngineComparisonResult result_;
 };
 

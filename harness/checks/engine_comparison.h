@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/checks/side_comparison.h"
-#include "harness/descriptions/program_side.h"
+#include "harness/checks/consistency.h"
+#include "harness/descriptions/program_provider.h"
 
 namespace dexcheck {
 
@@ -39,20 +39,21 @@ const std::vector<EngineComparisonEngine>& ListEngineComparisonEngines();
 
 /// What all engines together say.
 struct EngineComparisonResult {
-  std::vector<std::string> names;   ///< Of the sides, as they call themselves.
+  std::vector<std::string> names;   ///< Of the providers, as they call themselves.
   std::vector<std::string> absent;  ///< "kdl: why it is not compared".
   bool lacks_requested = false;     ///< One of them was asked for by name.
   std::vector<std::string> notes;
-  std::vector<ComparedPair> pairs;          ///< Judged by the tolerance.
-  std::vector<std::vector<size_t>> groups;  ///< Sides that agree with each other; the largest group first.
-  std::vector<std::string> settings;        ///< "MuJoCo 2.2.2: as if ...": which setting explains a side.
+  std::vector<ComparedPair> pairs;  ///< Judged by the tolerance.
+  std::vector<std::vector<size_t>>
+      groups;                         ///< Providers that agree with each other; the largest group first.
+  std::vector<std::string> settings;  ///< "MuJoCo 2.2.2: as if ...": which setting explains a provider.
   long samples = 0;
 
   [[nodiscard]] bool Agrees() const { return groups.size() <= 1; }
 };
 
-/// Asks the engines. @param robot the description of `file`, whose analytic model is the first side.
-/// @throws InputError for names that are none, and when fewer than two sides are left.
+/// Asks the engines. @param robot the description of `file`, whose analytic model is the first of them.
+/// @throws InputError for names that are none, and when fewer than two are left.
 EngineComparisonResult RunEngineComparison(const RobotDescription& robot, const std::filesystem::path& file,
                                            const EngineComparisonOptions& options,
                                            const std::function<bool(long)>& progress);

@@ -110,29 +110,17 @@ std::vector<Setting> ListSettings() {
 
 }  // namespace
 
-bool AgreeAtFirst(const RobotDescription& robot, TermSide* a, TermSide* b,
-                  const std::function<StateFeed()>& make_feed, double tolerance) {
-  constexpr long kStates = 3;
-  SideComparison comparison(robot, {a, b});
-  CompareAtStates(
-      make_feed(), [](long samples) { return samples < kStates; }, &comparison);
-  const std::vector<CheckRecord> terms = comparison.TakePairs().front().terms;
-  return !terms.empty() && std::all_of(terms.begin(), terms.end(), [&](const CheckRecord& record) {
-    return record.worst <= std::max(record.bound, tolerance);
-  });
-}
-
-std::optional<std::string> FindSetting(const RobotDescription& robot, TermSide* side,
+std::optional<std::string> FindSetting(const RobotDescription& robot, DynamicsProvider* provider,
                                        const std::function<StateFeed()>& make_feed, double tolerance,
                                        const std::vector<OtherDescription>& others) {
+  const RobotModel coordinates(robot.spec);
   const auto is_explained_by = [&](const RobotDescription& changed) {
-    std::unique_ptr<AnalyticSide> model;
     try {
-      model = std::make_unique<AnalyticSide>(changed, "");
+      AnalyticProvider model(changed.spec, "");
+      return AgreeAtFirst(coordinates, &model, provider, make_feed(), tolerance);
     } catch (const InputError&) {
       return false;  // no body is like that
     }
-    return AgreeAtFirst(robot, model.get(), side, make_feed, tolerance);
   };
   const std::vector<Setting> settings = ListSettings();
   const auto explains = [&](const std::vector<const Setting*>& chosen) {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/checks/side_comparison.h"
+#include "harness/checks/consistency.h"
 
 namespace dexcheck {
 
@@ -17,17 +17,13 @@ struct OtherDescription {
   RobotDescription robot;
 };
 
-/// The setting under which the analytic model of the description has the terms of a side that disagrees with
-/// it: a changed description, for example one without armature, agrees in all terms.
-/// @param side answers in the coordinates of `robot`. @param tolerance relative, at which terms agree.
+/// The setting under which the analytic model of the description has the terms of a provider that disagrees
+/// with it: a changed description, for example one without armature, agrees in all terms.
+/// @param provider answers in the coordinates of `robot`. @param tolerance relative, at which terms agree.
 /// @param others tried first.
 /// @return "as with no gravity"; nothing when no setting explains it.
-std::optional<std::string> FindSetting(const RobotDescription& robot, TermSide* side,
+std::optional<std::string> FindSetting(const RobotDescription& robot, DynamicsProvider* provider,
                                        const std::function<StateFeed()>& make_feed, double tolerance,
                                        const std::vector<OtherDescription>& others = {});
-
-/// Whether all terms that two sides have in common agree at the first few states.
-bool AgreeAtFirst(const RobotDescription& robot, TermSide* a, TermSide* b,
-                  const std::function<StateFeed()>& make_feed, double tolerance);
 
 }  // namespace dexcheck

@@ -4,16 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "harness/checks/model_comparison.h"
 #include "harness/checks/tolerance.h"
+#include "harness/descriptions/answer_files.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_check.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_extras.h"
+#include "harness/descriptions/engine_provider.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/link_frames.h"
 #include "harness/descriptions/mjcf_reader.h"
@@ -24,11 +26,37 @@
 namespace dexcheck {
 namespace {
 
-using Progress = std::function<bool(long)>;
-
 void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& more) {
   notes->insert(notes->end(), more.begin(), more.end());
 }
+
+/// One of two files, read once.
+struct RobotFile {
+  RobotFile(std::filesystem::path file, const UrdfOptions& urdf)
+      : path(std::move(file)), format(FindFormat(path)) {
+    if (format == RobotFormat::kMjcf) {
+      engine = LoadMjcf(path);
+    } else {
+      description = ReadDescription(path, urdf);
+    }
+  }
+  /// @throws InputError for an MJCF that can be none.
+  [[nodiscard]] RobotDescription Describe() const {
+    return description ? *description : ReadMjcfDescription(*engine, path.string());
+  }
+  [[nodiscard]] std::optional<RobotDescription> TryToDescribe() const {
+    try {
+      return Describe();
+    } catch (const InputError&) {
+      return std::nullopt;
+    }
+  }
+
+  std::filesystem::path path;
+  RobotFormat format;
+  std::optional<RobotDescription> description;  ///< Of a parameter file or URDF.
+  MjModelPtr engine;                            ///< Of an MJCF.
+};
 
 /// What moves in a scene and is no part of the robot.
 void NoteOthers(const Adapter& adapter, Comparison* comparison) {
@@ -41,13 +69,12 @@ void NoteOthers(const Adapter& adapter, Comparison* comparison) {
   }
 }
 
+bool IsOfFrames(const std::string& term) { return term == "frame_pose" || term == "J" || term == "J_dot_xi"; }
+
 /// A term of which no number was compared is no agreement.
-void NoteEmptyTerms(Comparison* comparison) {
-  std::vector<std::string> names;
-  std::erase_if(comparison->result.terms, [&](const CheckRecord& record) {
-    if (record.comparisons == 0) names.push_back(record.name);
-    return record.comparisons == 0;
-  });
+void NoteTermsOfFrames(Comparison* comparison) {
+  std::vector<std::string> names = comparison->result.not_compared;
+  std::erase_if(names, [](const std::string& name) { return !IsOfFrames(name); });
   if (!names.empty())
     comparison->not_compared.push_back("terms of frames, since the two have none in common: " +
                                        JoinNames(names));
@@ -65,8 +92,8 @@ void CountRoundings(int imported, bool has_link_frames, std::vector<CheckRecord>
   constexpr double kRotation = 8.0;
   constexpr double kImport = 6.0 * kRotation + 3.0 * 8.0 * kPi;
   for (CheckRecord& record : *records) {
-    const bool is_of_frames = record.name == "frame_pose" || record.name == "J" || record.name == "J_dot_xi";
-    record.bound *= (1.0 + imported * kImport / kStep) * (has_link_frames && is_of_frames ? 2.0 : 1.0);
+    record.bound *=
+        (1.0 + imported * kImport / kStep) * (has_link_frames && IsOfFrames(record.name) ? 2.0 : 1.0);
     record.failed = !(record.worst <= record.bound);
   }
 }
@@ -80,10 +107,9 @@ struct EngineCompletion {
 /// Completes a description, and gives it frames of links and the inertias that the engine compiled. A robot
 /// on wheels, one with an object, and a parameter file of another mechanism are left for the adapter to
 /// match.
-EngineCompletion Complete(const ConsistencyOptions& options, const mjModel& engine, Comparison* comparison,
-                          RobotDescription* robot) {
+EngineCompletion Complete(const ConsistencyOptions& options, const mjModel& engine, bool is_table,
+                          Comparison* comparison, RobotDescription* robot) {
   const std::string file = comparison->second.filename().string();
-  const bool is_table = FindFormat(comparison->first) == RobotFormat::kToml;
   const BaseType base = robot->spec.base.type;
   EngineCompletion result;
   if ((base == BaseType::kFixed || base == BaseType::kFloating) && !robot->spec.object) {
@@ -106,23 +132,25 @@ EngineCompletion Complete(const ConsistencyOptions& options, const mjModel& engi
 }
 
 /// A description against the engine.
-void CompareWithEngine(const UrdfOptions& urdf, const ConsistencyOptions& options, const Progress& progress,
-                       Comparison* comparison) {
+void CompareWithEngine(const RobotFile& first, const mjModel& second, const ConsistencyOptions& options,
+                       const Progress& progress, Comparison* comparison) {
   const std::string file = comparison->second.filename().string();
-  RobotDescription robot = ReadDescription(comparison->first, urdf);
-  const RobotDescription written = robot;
-  const MjModelPtr engine = LoadMjcf(comparison->second);
-  const RobotFormat format = FindFormat(comparison->first);
+  const RobotDescription written = first.Describe();
+  RobotDescription robot = written;
+  const MjModelPtr engine(mj_copyModel(nullptr, &second));
+  const RobotFormat format = first.format;
   if (format == RobotFormat::kUrdf) {
     const std::optional<std::string> motors = SetAsideMotors(file, engine.get());
     if (motors) comparison->not_compared.push_back(*motors);
   }
-  const EngineCompletion completed = Complete(options, *engine, comparison, &robot);
+  const EngineCompletion completed =
+      Complete(options, *engine, format == RobotFormat::kToml, comparison, &robot);
   const Completion& completion = completed.completion;
   comparison->model.emplace(robot.spec);
   const Adapter adapter(*comparison->model, *engine, comparison->second.string());
   std::optional<Extras> extras;
-  if (format == RobotFormat::kMjcf) extras = CompareExtras(written, comparison->first, adapter, engine.get());
+  if (format == RobotFormat::kMjcf)
+    extras = CompareExtras(written, *first.engine, first.path.string(), adapter, engine.get());
   comparison->result = CheckConsistency(adapter, options, progress);
   CountRoundings(robot.is_imported ? 1 : 0, completed.has_link_frames, &comparison->result.terms);
   ConstantChecks& constants = comparison->result.constants;
@@ -143,10 +171,8 @@ void CompareWithEngine(const UrdfOptions& urdf, const ConsistencyOptions& option
 }
 
 /// Two descriptions without the engine.
-void CompareTwoDescriptions(const UrdfOptions& urdf, const ConsistencyOptions& options,
+void CompareTwoDescriptions(RobotDescription a, RobotDescription b, const ConsistencyOptions& options,
                             const Progress& progress, Comparison* comparison) {
-  RobotDescription a = ReadDescription(comparison->first, urdf);
-  RobotDescription b = ReadDescription(comparison->second, urdf);
   const Completion completion = CompleteEachOther(&a, &b, options.ignore);
   for (const auto& notes : {a.notes, b.notes, completion.notes, DescribeCoordinates(a)}) {
     AppendTo(&comparison->notes, notes);
@@ -165,25 +191,110 @@ void CompareTwoDescriptions(const UrdfOptions& urdf, const ConsistencyOptions& o
 Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::path& b,
                         const UrdfOptions& urdf, const ConsistencyOptions& options,
                         const Progress& progress) {
+  RobotFile first(a, urdf);
+  RobotFile second(b, urdf);
+  if (first.format == RobotFormat::kMjcf && second.format != RobotFormat::kMjcf) std::swap(first, second);
   Comparison comparison;
-  comparison.first = a;
-  comparison.second = b;
-  if (FindFormat(a) == RobotFormat::kMjcf && FindFormat(b) != RobotFormat::kMjcf) {
-    std::swap(comparison.first, comparison.second);
-  }
-  comparison.with_engine = FindFormat(comparison.second) == RobotFormat::kMjcf;
-  if (!comparison.with_engine) {
-    CompareTwoDescriptions(urdf, options, progress, &comparison);
+  comparison.first = first.path;
+  comparison.second = second.path;
+  comparison.with_engine = second.format == RobotFormat::kMjcf;
+  comparison.read_first = first.TryToDescribe();
+  comparison.read_second = second.TryToDescribe();
+  if (comparison.with_engine) {
+    CompareWithEngine(first, *second.engine, options, progress, &comparison);
   } else {
-    CompareWithEngine(urdf, options, progress, &comparison);
+    CompareTwoDescriptions(first.Describe(), second.Describe(), options, progress, &comparison);
   }
-  NoteEmptyTerms(&comparison);
+  NoteTermsOfFrames(&comparison);
   return comparison;
 }
 
-void ExplainComparison(const UrdfOptions& urdf, Comparison* comparison, double tolerance) {
+namespace {
+
+/// A description whose terms stand first: the analytic model's, or of an MJCF the engine's.
+struct Reference {
+  Reference(RobotFile file, Comparison* comparison) : robot(file.Describe()) {
+    comparison->first = file.path;
+    comparison->notes = robot.notes;
+    comparison->model.emplace(robot.spec);
+    if (file.engine != nullptr) {
+      provider =
+          std::make_unique<EngineProvider>(robot.spec, std::move(file.engine), file.path.string(), "MuJoCo");
+    } else {
+      provider = std::make_unique<AnalyticProvider>(*comparison->model, file.path.filename().string());
+    }
+  }
+  RobotDescription robot;
+  std::unique_ptr<DynamicsProvider> provider;
+};
+
+/// What is worth knowing of a base whose convention is the other side's.
+void NoteConvention(const Reference& reference, AnsweringProvider* answering,
+                    const std::function<StateFeed()>& make_feed, Comparison* comparison) {
+  if (!answering->layout().is_floating()) return;
+  comparison->notes.push_back("the other side's base is taken as " +
+                              Describe(answering->layout().convention()));
   if (comparison->result.Agrees()) return;
-  comparison->hypotheses = ExplainDifference(comparison->first, comparison->second, urdf,
+  const std::optional<BaseConvention> other =
+      FindOtherConvention(*comparison->model, reference.provider.get(), answering, make_feed);
+  if (!other) return;
+  comparison->notes.push_back("all its terms agree with its base taken as " + Describe(*other) +
+                              ": this is its convention, and its key \"base\" can say so");
+}
+
+}  // namespace
+
+Comparison CompareAnswers(const std::filesystem::path& file, const AnswersSource& source,
+                          const UrdfOptions& urdf, const ConsistencyOptions& options,
+                          const Progress& progress) {
+  Comparison comparison;
+  const Reference reference(RobotFile(file, urdf), &comparison);
+  std::unique_ptr<AnsweringProvider> answering;
+  std::function<StateFeed()> make_feed = [&] { return FeedRandomStates(*comparison.model, options); };
+  if (source.answers.empty()) {
+    comparison.second = "the program";
+    answering = std::make_unique<ProgramProvider>(source.program, reference.robot, source.program_options);
+  } else {
+    comparison.second = source.answers;
+    auto answers = std::make_unique<AnswerFiles>(source.answers, reference.robot);
+    make_feed = [&read = *answers] {
+      return [&read](DynamicsState* state) { return read.ReadState(state); };
+    };
+    answering = std::move(answers);
+  }
+  AppendTo(&comparison.notes, DescribeCoordinates(reference.robot));
+  comparison.result =
+      CompareProviders(*comparison.model, reference.provider.get(), answering.get(), make_feed(), progress);
+  if (!comparison.result.not_compared.empty())
+    comparison.not_compared.push_back("terms that are not answered: " +
+                                      JoinNames(comparison.result.not_compared));
+  if (answering->is_reduced()) {
+    comparison.notes.push_back(
+        "joints that follow others have no coordinate there: compared are T^T M T and T^T of the "
+        "forces, with xi = T xi_free");
+  }
+  NoteConvention(reference, answering.get(), make_feed, &comparison);
+  return comparison;
+}
+
+Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctions& functions,
+                            const UrdfOptions& urdf, const ConsistencyOptions& options) {
+  if (!functions.M && !functions.c && !functions.g && !functions.h && !functions.friction) {
+    throw InputError(functions.name + ": must have one of M, c, g, h, friction");
+  }
+  Comparison comparison;
+  const Reference reference(RobotFile(file, urdf), &comparison);
+  comparison.second = functions.name;
+  FunctionProvider provider(functions, comparison.model->num_velocities());
+  comparison.result =
+      CompareProviders(*comparison.model, reference.provider.get(), &provider,
+                       FeedRandomStates(*comparison.model, options), [](long) { return true; });
+  return comparison;
+}
+
+void ExplainComparison(Comparison* comparison, double tolerance) {
+  if (comparison->result.Agrees() || !comparison->read_first || !comparison->read_second) return;
+  comparison->hypotheses = ExplainDifference(*comparison->read_first, *comparison->read_second,
                                              std::max(tolerance, kHypothesisTolerance));
 }
 

@@ -3,13 +3,14 @@
 // Two files that describe one robot, compared: what `dexcheck consistency A B` does.
 
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "harness/checks/consistency.h"
+#include "harness/descriptions/function_provider.h"
 #include "harness/descriptions/hypotheses.h"
+#include "harness/descriptions/program_provider.h"
 #include "harness/descriptions/urdf_reader.h"
 
 namespace dexcheck {
@@ -24,6 +25,8 @@ struct Comparison {
   std::vector<std::string> not_compared;  ///< What only one of them has and no term depends on.
   ConsistencyResult result;
   std::vector<Hypothesis> hypotheses;  ///< Faults that would explain what differs.
+  /// As they were read; none of an MJCF that can be no description (with several free bodies).
+  std::optional<RobotDescription> read_first, read_second;
 };
 
 /// Compares constants and terms of two parameter files, URDFs or MJCFs. Of two MJCFs the second is the
@@ -31,11 +34,28 @@ struct Comparison {
 /// @throws InputError for files that cannot be read, and for robots of two mechanisms.
 Comparison CompareFiles(
     const std::filesystem::path& a, const std::filesystem::path& b, const UrdfOptions& urdf,
-    const ConsistencyOptions& options, const std::function<bool(long)>& progress = [](long) { return true; });
+    const ConsistencyOptions& options, const Progress& progress = [](long) { return true; });
 
-/// Tries the faults that people make on what differs, after any judgement by a tolerance, which is given
-/// again: what agrees to it is no fault.
-void ExplainComparison(const UrdfOptions& urdf, Comparison* comparison, double tolerance = 0.0);
+/// What stands against a description: a program's command, or a folder with answers.
+struct AnswersSource {
+  std::string program;
+  std::filesystem::path answers;
+  ProgramOptions program_options;
+};
+
+/// Compares a description with what a program answers, or has answered; of an MJCF the engine's terms. Of a
+/// floating base whose terms disagree, the other conventions are tried.
+Comparison CompareAnswers(const std::filesystem::path& file, const AnswersSource& source,
+                          const UrdfOptions& urdf, const ConsistencyOptions& options,
+                          const Progress& progress);
+
+/// Compares functions with a parameter file, a URDF, or an MJCF, of which the engine is asked.
+Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctions& functions,
+                            const UrdfOptions& urdf, const ConsistencyOptions& options);
+
+/// Tries the faults that people make on what differs between two files, after any judgement by a tolerance,
+/// which is given again: what agrees to it is no fault.
+void ExplainComparison(Comparison* comparison, double tolerance = 0.0);
 
 /// Numbers that were rounded when they were printed agree to so many digits at least.
 inline constexpr int kDigitsOfRoundedInput = 4;

@@ -10,13 +10,11 @@ void ReadModelContacts(const GraspTerms& grasp, const MeasuredState& state, LawT
   terms->G_dot_T_V.noalias() = grasp.G_dot().transpose() * grasp.V_Bo();
 }
 
-void ReadEngineContacts(const TermContext& engine, LawTerms* terms) {
-  for (size_t i = 0; i < engine.contacts.size(); ++i) {
+void ReadEngineContacts(const EngineProvider& engine, LawTerms* terms) {
+  for (size_t i = 0; i < engine.contacts().size(); ++i) {
     const auto row = 3 * static_cast<Eigen::Index>(i);
-    const ContactValues& contact = engine.contacts[i].engine;
-    Eigen::Index k = 0;
-    for (const int col : engine.engine->chain(engine.contacts[i].frame))
-      terms->J.block<3, 1>(row, col) = contact.J_B.col(k++);
+    const ContactValues& contact = engine.contacts()[i];
+    terms->J.middleRows<3>(row) = contact.J_B;
     terms->J_dot_xi.segment<3>(row) = contact.J_B_dot_xi;
     terms->G.middleCols<3>(row) = contact.G;
     terms->G_dot_T_V.segment<3>(row) = contact.G_dot_T_V;
@@ -25,7 +23,7 @@ void ReadEngineContacts(const TermContext& engine, LawTerms* terms) {
 
 }  // namespace
 
-void ReadEngineTerms(const TermContext& engine, const GraspModel& model, const MeasuredState& state,
+void ReadEngineTerms(const EngineProvider& engine, const GraspModel& model, const MeasuredState& state,
                      bool contacts, LawTerms* terms) {
   terms->q = state.q;
   terms->xi = state.xi;
@@ -33,13 +31,13 @@ void ReadEngineTerms(const TermContext& engine, const GraspModel& model, const M
   terms->J_dot = &model.grasp().J_B_dot();
   if (model.has_coordinates()) terms->X_o = model.grasp().X_o();
 
-  const EngineTerms& robot = *engine.engine;
+  const EngineTerms& robot = engine.terms();
   const double* entry = robot.mass().data();
   for (const MassEntry& at : robot.mass_entries()) terms->M(at.row, at.col) = *entry++;
   terms->C_xi = robot.coriolis();
   terms->gravity = robot.gravity();
   terms->friction = robot.friction();
-  const ObjectValues& object = engine.object_engine;
+  const ObjectValues& object = engine.object();
   terms->X_Bo.matrix().topRows<3>() = object.pose;
   terms->V_Bo = object.V_Bo;
   terms->M_hat = object.M_hat;

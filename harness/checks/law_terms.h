@@ -4,7 +4,7 @@
 
 #include "controller/control/grasp_model.h"
 #include "harness/checks/law_reference.h"
-#include "harness/checks/term_table.h"
+#include "harness/descriptions/engine_provider.h"
 
 namespace dexcheck {
 
@@ -13,7 +13,7 @@ namespace dexcheck {
 /// @param contacts whether the engine has contacts to compare; bonds it has not, and theirs are the model's.
 /// @param terms of this engine and model at each step, or new: entries that are always zero are not written.
 /// It keeps pointers into the model.
-void ReadEngineTerms(const TermContext& engine, const GraspModel& model, const MeasuredState& state,
+void ReadEngineTerms(const EngineProvider& engine, const GraspModel& model, const MeasuredState& state,
                      bool contacts, LawTerms* terms);
 
 }  // namespace dexcheck

@@ -15,7 +15,7 @@
 #include <ostream>
 #include <string>
 
-#include "harness/checks/answers_comparison.h"
+#include "harness/checks/file_comparison.h"
 #include "harness/checks/tolerance.h"
 
 namespace dexcheck::testing {
@@ -59,7 +59,7 @@ class AgreesWithMatcher {
     const double tolerance = options_.digits > 0 ? std::pow(10.0, -options_.digits) : 0.0;
     if (tolerance > 0.0) JudgeByTolerance(tolerance, &comparison.result);
     for (const std::string& line : ListDifferences(comparison)) *listener << "\n  " << line;
-    if (explain) ExplainComparison(options_.urdf, &comparison, tolerance);
+    if (explain) ExplainComparison(&comparison, tolerance);
     for (const Hypothesis& likely : comparison.hypotheses) *listener << "\n  likely: " << likely.text;
     return comparison.result.Agrees();
   }

@@ -1,115 +1,135 @@
 #include "harness/checks/step_model_check.h"
 
+#include <algorithm>
 #include <numeric>
 
 #include "controller/object/object_dynamics.h"
+#include "harness/checks/contact_terms.h"
 
 namespace dexcheck {
 namespace {
 
-/// The engine's terms for a grasp, or of a robot that holds nothing, whose frames are all of interest.
-EngineTerms MakeTerms(const Adapter& adapter, std::span<const int> fingertips) {
-  return fingertips.empty() ? EngineTerms(adapter, Coordinates::kReduced) : EngineTerms(adapter, fingertips);
+/// Of a grasp, or of a robot that holds nothing, all of whose frames are of interest.
+std::vector<int> ListFrames(const RobotModel& model, std::span<const int> fingertips) {
+  std::vector<int> frames(fingertips.begin(), fingertips.end());
+  if (!frames.empty()) return frames;
+  frames.resize(model.frames().size());
+  std::iota(frames.begin(), frames.end(), 0);
+  return frames;
 }
 
 }  // namespace
 
+ControllerProvider::ControllerProvider(const RobotModel& model, std::vector<int> frames, bool contacts,
+                                       bool has_coordinates)
+    : AnalyticProvider(model, "controller", std::move(frames)) {
+  has_coordinates_ = has_coordinates;
+  const Eigen::Index n = xi_.size();
+  if (contacts) {
+    contacts_.resize(jacobians_.size());
+    for (ContactValues& contact : contacts_) contact.J_B.setZero(3, n);
+    J_B_dot_xi_.setZero(3 * static_cast<Eigen::Index>(contacts_.size()));
+  } else {
+    own_jacobians_.assign(jacobians_.size(), {Matrix6Xd::Zero(6, n), Matrix6Xd::Zero(6, n)});
+  }
+}
+
+void ControllerProvider::Read(const ModelTerms& robot, const GraspTerms& grasp, const MeasuredState& state) {
+  view_of_terms_.emplace(robot);
+  view_ = &*view_of_terms_;
+  xi_ = state.xi;
+  ReadEnergy();
+  for (size_t i = 0; i < jacobians_.size(); ++i) {
+    const auto index = static_cast<int>(i);
+    if (own_jacobians_.empty()) {
+      jacobians_[i] = {&grasp.J_f(index), &grasp.J_f_dot(index)};
+      continue;
+    }
+    auto& [J, J_dot] = own_jacobians_[i];
+    robot.CalcFrameJacobian(map_.compared_frames[i], J, J_dot);
+    jacobians_[i] = {&J, &J_dot};
+  }
+  if (!contacts_.empty()) ReadContacts(grasp, state);
+  if (has_object_) ReadObject(grasp);
+}
+
+void ControllerProvider::ReadContacts(const GraspTerms& grasp, const MeasuredState& state) {
+  J_B_dot_xi_.noalias() = grasp.J_B_dot() * state.xi;
+  for (size_t i = 0; i < contacts_.size(); ++i) {
+    const auto row = 3 * static_cast<Eigen::Index>(i);
+    ContactValues& values = contacts_[i];
+    values.frame[ContactValues::kOverlap] = state.overlap[i];
+    values.G = grasp.G().middleCols<3>(row);
+    values.J_B = grasp.J_B().middleRows<3>(row);
+    values.J_B_dot_xi = J_B_dot_xi_.segment<3>(row);
+    values.G_dot_T_V = grasp.G_dot().middleCols<3>(row).transpose() * grasp.V_Bo();
+  }
+}
+
+void ControllerProvider::ReadObject(const GraspTerms& grasp) {
+  const MassProperties& body = grasp.object();
+  const Vector6d& V_Bo = grasp.V_Bo();
+  object_.pose = grasp.X_Bo().matrix().topRows<3>();
+  object_.V_Bo = V_Bo;
+  object_.M_hat = grasp.body().M_hat;
+  object_.C_hat_V = grasp.body().C_hat * V_Bo;
+  object_.N_o = grasp.body().N_o;
+  object_.kinetic = CalcObjectKineticEnergy(body, V_Bo);
+  object_.potential = CalcObjectPotentialEnergy(body, grasp.gravity(), grasp.X_Bo().translation());
+  if (!has_coordinates_) return;
+  object_.M_o = grasp.coordinates().M_o;
+  object_.C_o_X_o_dot = grasp.coordinates().C_o * grasp.X_o_dot();
+}
+
 StepModelCheck::StepModelCheck(const Adapter& adapter, std::span<const int> fingertips,
                                OrientationFeedback orientation)
-    : TermComparison(adapter),
-      has_coordinates_(orientation == OrientationFeedback::kAngles),
-      has_object_(adapter.model().object().has_value()),
-      engine_(MakeTerms(adapter, fingertips)) {
-  context_.engine = &engine_;
-  if (fingertips.empty()) {
-    if (has_object_) engine_.RequireObject();
-    std::vector<int> all(adapter.model().frames().size());
-    std::iota(all.begin(), all.end(), 0);
-    SetFrames(all, /*contacts=*/false);
-    const int n = engine_.size();
-    frame_jacobians_.assign(all.size(), {Matrix6Xd::Zero(6, n), Matrix6Xd::Zero(6, n)});
-  } else {
-    SetFrames(fingertips, /*contacts=*/true);
-  }
-  J_B_dot_xi_.setZero(3 * static_cast<Eigen::Index>(fingertips.size()));
-  context_.xi.setZero(engine_.size());
-  std::vector<TermGroup> left_out;
-  if (!has_coordinates_) left_out.push_back(TermGroup::kObjectCoordinates);
-  if (!has_object_) left_out.push_back(TermGroup::kObject);
-  if (fingertips.empty()) left_out.push_back(TermGroup::kContact);
-  Ask(kAskedByRun, left_out);
+    : has_coordinates_(orientation == OrientationFeedback::kAngles),
+      engine_(adapter, fingertips, has_coordinates_),
+      controller_(adapter.model(), ListFrames(adapter.model(), fingertips), !fingertips.empty(),
+                  has_coordinates_),
+      comparison_(adapter.model(), kAskedByRun, {&controller_, &engine_},
+                  ListFrames(adapter.model(), fingertips), fingertips.size()) {}
+
+void StepModelCheck::RaiseBounds(double least) {
+  for (CheckRecord& record : comparison_.records()) record.bound = std::max(record.bound, least);
 }
 
 void StepModelCheck::Merge(const StepModelCheck& other) {
-  for (size_t i = 0; i < records_.size(); ++i) {
-    if (other.records_[i].applies) records_[i].Merge(other.records_[i]);
+  const std::span<CheckRecord> own = comparison_.records();
+  for (size_t i = 0; i < own.size(); ++i) {
+    if (other.records()[i].applies) own[i].Merge(other.records()[i]);
   }
 }
 
 void StepModelCheck::LeaveOutContacts() {
   with_contacts_ = false;
-  for (size_t i = 0; i < records_.size(); ++i) records_[i].applies = !IsOfContacts(i);
+  const std::span<CheckRecord> own = comparison_.records();
+  for (size_t i = 0; i < own.size(); ++i) own[i].applies = !IsOfContacts(comparison_.entry(i));
 }
 
 void StepModelCheck::Compare(const ModelTerms& robot, const GraspTerms& grasp, const MeasuredState& state,
                              const Pose& X_W0, double when) {
-  engine_.SetState(state.q, state.xi, state.X_Bo, state.V_Bo);
-  EvaluateFrames();
-  scales_.SetState(robot, state.q, state.xi);
-  const ModelView view(robot);
-  context_.robot = &view;
-  context_.xi = state.xi;
-  context_.energy = robot.CalcEnergyAndMomentum();
-  for (size_t i = 0; i < context_.jacobians.size(); ++i) {
-    const auto index = static_cast<int>(i);
-    if (frame_jacobians_.empty()) {
-      context_.jacobians[i] = {&grasp.J_f(index), &grasp.J_f_dot(index)};
-      continue;
-    }
-    auto& [J, J_dot] = frame_jacobians_[i];
-    robot.CalcFrameJacobian(context_.frames[i], J, J_dot);
-    context_.jacobians[i] = {&J, &J_dot};
+  std::optional<ObjectCoordinates> coordinates;
+  const bool has_object = comparison_.model().object().has_value();
+  if (has_object && has_coordinates_) coordinates = {grasp.X_o(), grasp.X_o_dot()};
+  engine_.SetState(state.q, state.xi, state.X_Bo, state.V_Bo, coordinates ? &*coordinates : nullptr);
+  controller_.Read(robot, grasp, state);
+  comparison_.SetScales(robot, state.q, state.xi);
+  ScaleContext& scales = comparison_.scales();
+  if (has_object) {
+    const Vector6d& V = controller_.object().V_Bo;
+    double rate = std::max(V.head<3>().norm(), V.tail<3>().norm());
+    if (coordinates) rate = std::max(rate, coordinates->X_o_dot.tail<3>().cwiseAbs().sum());
+    scales.object =
+        CalcObjectScales(grasp.object(), grasp.gravity(), engine_.object().pose.col(3).norm(), rate);
   }
-  if (with_contacts_) ReadContacts(grasp, state, X_W0);
-  if (has_object_) ReadObject(grasp);
-  TermComparison::Compare(when, with_contacts_);
-}
-
-void StepModelCheck::ReadContacts(const GraspTerms& grasp, const MeasuredState& state, const Pose& X_W0) {
-  const Pose shift = X_W0 * engine_.BasePose().inverse(Eigen::Isometry);
-  J_B_dot_xi_.noalias() = grasp.J_B_dot() * state.xi;
-  context_.J_B = &grasp.J_B();
-  for (size_t i = 0; i < context_.contacts.size(); ++i) {
-    const auto row = 3 * static_cast<Eigen::Index>(i);
-    ContactValues& model = context_.contacts[i].model;
-    model.frame[ContactValues::kOverlap] = state.overlap[i];
-    model.G = grasp.G().middleCols<3>(row);
-    Eigen::Index k = 0;
-    for (const int col : engine_.chain(context_.frames[i]))
-      model.J_B.col(k++) = grasp.J_B().block<3, 1>(row, col);
-    model.J_B_dot_xi = J_B_dot_xi_.segment<3>(row);
-    model.G_dot_T_V = grasp.G_dot().middleCols<3>(row).transpose() * grasp.V_Bo();
-    EvaluateContact(grasp.contacts()[i], shift, i, &context_);
+  if (with_contacts_) {
+    const Pose shift = X_W0 * engine_.terms().BasePose().inverse(Eigen::Isometry);
+    for (size_t i = 0; i < scales.contacts.size(); ++i)
+      EvaluateContact(grasp.contacts()[i], shift, i, &engine_, &(*controller_.mutable_contacts())[i],
+                      &scales);
   }
-}
-
-void StepModelCheck::ReadObject(const GraspTerms& grasp) {
-  const MassProperties& body = grasp.object();
-  const Vector6d& V_Bo = grasp.V_Bo();
-  ObjectValues& model = context_.object_model;
-  model.pose = grasp.X_Bo().matrix().topRows<3>();
-  model.V_Bo = V_Bo;
-  model.M_hat = grasp.body().M_hat;
-  model.C_hat_V = grasp.body().C_hat * V_Bo;
-  model.N_o = grasp.body().N_o;
-  model.kinetic = CalcObjectKineticEnergy(body, V_Bo);
-  model.potential = CalcObjectPotentialEnergy(body, grasp.gravity(), grasp.X_Bo().translation());
-  if (!has_coordinates_) return EvaluateObject(body, grasp.gravity(), nullptr, &context_);
-  const ObjectTerms& terms = grasp.coordinates();
-  model.M_o = terms.M_o;
-  model.C_o_X_o_dot = terms.C_o * grasp.X_o_dot();
-  const ObjectCoordinates coordinates{grasp.X_o(), grasp.X_o_dot()};
-  EvaluateObject(body, grasp.gravity(), &coordinates, &context_);
+  comparison_.Compare(when, with_contacts_);
 }
 
 }  // namespace dexcheck

@@ -1,20 +1,42 @@
 #pragma once
 
-// The first of the harness's questions at every step of a run: are the controller's terms the engine's?
+// The category "model" at every step of a run: are the controller's terms the engine's?
 
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "controller/control/grasp_controller.h"
 #include "harness/checks/term_comparison.h"
+#include "harness/descriptions/analytic_provider.h"
+#include "harness/descriptions/engine_provider.h"
 
 namespace dexcheck {
+
+/// The terms that a controller has evaluated, as a provider.
+class ControllerProvider : public AnalyticProvider {
+ public:
+  /// @param frames of the grasp, or all of a robot that holds nothing.
+  ControllerProvider(const RobotModel& model, std::vector<int> frames, bool contacts, bool has_coordinates);
+  /// Nothing allocates.
+  void Read(const ModelTerms& robot, const GraspTerms& grasp, const MeasuredState& state);
+  using AnalyticProvider::Read;
+  void SetState(const DynamicsState&) override {}
+
+ private:
+  void ReadContacts(const GraspTerms& grasp, const MeasuredState& state);
+  void ReadObject(const GraspTerms& grasp);
+
+  std::optional<ModelView> view_of_terms_;
+  std::vector<std::pair<Matrix6Xd, Matrix6Xd>> own_jacobians_;  // J, J_dot; without a grasp
+  VectorXd J_B_dot_xi_;
+};
 
 /// Compares the terms that the controller has evaluated with the engine's at the projected state (no tilt,
 /// rolling wheels), and remembers the worst of the run. What random states have beyond this (M unreduced, the
 /// matrix C_bar', link inertias) needs no run.
-class StepModelCheck : public TermComparison {
+class StepModelCheck {
  public:
   /// @param fingertips frames of the grasp; none for a robot that holds nothing, all of whose frames are then
   /// compared. @param orientation kAngles when the grasp's state is set by X_o,
@@ -22,6 +44,10 @@ class StepModelCheck : public TermComparison {
   /// @throws InputError as EngineTerms.
   StepModelCheck(const Adapter& adapter, std::span<const int> fingertips, OrientationFeedback orientation);
 
+  /// One for each term asked, in the table's order.
+  [[nodiscard]] std::span<const CheckRecord> records() const { return comparison_.records(); }
+  /// Every bound is at least this: what a scenario's tolerance asks for.
+  void RaiseBounds(double least);
   /// Whether Compare includes the contacts' terms: not while a fingertip is far from the object.
   void IncludeContacts(bool include) { with_contacts_ = include; }
   /// Takes what is worse in the records of another such check, of the terms that it compares.
@@ -29,6 +55,7 @@ class StepModelCheck : public TermComparison {
   /// There are bonds in the place of contacts, where the engine has nothing to compare with.
   void LeaveOutContacts();
 
+  /// Nothing allocates but for what fails first.
   /// @param robot, grasp evaluated at `state`, reduced coordinates, CalcDynamics included.
   /// @param X_W0 pose of Sigma_0 in the plant, tilt and height included: kappa was found there. Without a
   /// plant, robot.CalcLinkPose(-1).
@@ -36,16 +63,15 @@ class StepModelCheck : public TermComparison {
   void Compare(const ModelTerms& robot, const GraspTerms& grasp, const MeasuredState& state, const Pose& X_W0,
                double when);
 
- private:
-  void ReadContacts(const GraspTerms& grasp, const MeasuredState& state, const Pose& X_W0);
-  void ReadObject(const GraspTerms& grasp);
+  /// The engine's terms at the last state.
+  [[nodiscard]] const EngineProvider& engine() const { return engine_; }
 
+ private:
   bool has_coordinates_;
   bool with_contacts_ = true;
-  bool has_object_;
-  EngineTerms engine_;
-  std::vector<std::pair<Matrix6Xd, Matrix6Xd>> frame_jacobians_;  // J, J_dot; without fingertips
-  VectorXd J_B_dot_xi_;
+  EngineProvider engine_;
+  ControllerProvider controller_;
+  TermComparison comparison_;
 };
 
 }  // namespace dexcheck

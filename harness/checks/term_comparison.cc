@@ -1,82 +1,274 @@
 #include "harness/checks/term_comparison.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numeric>
 #include <utility>
 
 namespace dexcheck {
+namespace {
 
-TermComparison::TermComparison(const Adapter& adapter) : scales_(adapter.model()) {
-  context_.adapter = &adapter;
-  context_.scales = &scales_;
+std::vector<int> ListFrames(const RobotModel& model) {
+  std::vector<int> all(model.frames().size());
+  std::iota(all.begin(), all.end(), 0);
+  return all;
 }
 
-void TermComparison::SetFrames(std::span<const int> frames, bool contacts) {
-  for (const int frame : frames) {
-    const auto chain = static_cast<Eigen::Index>(context_.engine->chain(frame).size());
-    context_.frames.push_back(frame);
-    context_.jacobians.emplace_back();
-    context_.columns.emplace_back(Matrix6Xd::Zero(6, chain));
-    if (!contacts) continue;
-    ContactSides& sides = context_.contacts.emplace_back();
-    sides.frame = frame;
-    sides.model.J_B.setZero(3, chain);
-    sides.engine.J_B.setZero(3, chain);
+bool IsVelocity(TermParts parts) {
+  return parts == TermParts::kVelocity || parts == TermParts::kVelocityPair;
+}
+
+/// Where along its axis a joint stands is a choice of frames: the first's point becomes the foot of the
+/// perpendicular from the second's. A ball has one place.
+void MoveAlongAxes(const RobotModel& model, const MatrixXd& second, MatrixXd* first) {
+  for (Eigen::Index i = 0; i < first->cols(); ++i) {
+    if (model.joints()[static_cast<size_t>(model.joint_of_dof(static_cast<int>(i)))].type == JointType::kBall)
+      continue;
+    const Vector3d axis = first->col(i).head<3>();
+    const Vector3d point = first->col(i).tail<3>();
+    first->col(i).tail<3>() = point + axis.dot(second.col(i).tail<3>() - point) * axis;
   }
 }
 
-void TermComparison::EvaluateFrames() {
-  for (size_t i = 0; i < context_.frames.size(); ++i)
-    context_.engine->CalcFrameColumns(context_.frames[i], context_.columns[i]);
-}
+}  // namespace
 
-void TermComparison::Ask(Asker asker, std::span<const TermGroup> leave_out) {
-  std::vector<const TermEntry*> entries;
+TermComparison::TermComparison(const RobotModel& model, Asker asker, std::vector<DynamicsProvider*> providers)
+    : TermComparison(model, asker, std::move(providers), ListFrames(model)) {}
+
+TermComparison::TermComparison(const RobotModel& model, Asker asker, std::vector<DynamicsProvider*> providers,
+                               std::vector<int> frames, size_t contacts)
+    : providers_(std::move(providers)), scales_(model), first_potential_(providers_.size()) {
+  scales_.contact_frames.assign(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(contacts));
+  scales_.contacts.resize(contacts);
+  scales_.frames = std::move(frames);
+  scales_.xi.setZero(model.num_velocities());
+  for (int link = model.base().type == BaseType::kFixed ? 0 : -1; link < model.num_joints(); ++link) {
+    scales_.has_mass.push_back(std::all_of(providers_.begin(), providers_.end(),
+                                           [&](const DynamicsProvider* one) { return one->HasMass(link); }));
+  }
+  for (const DynamicsProvider* const provider : providers_) {
+    is_reduced_ = is_reduced_ || provider->is_reduced();
+    has_own_level_ = has_own_level_ || provider->has_own_level();
+  }
+  if (is_reduced_) FormCoupling();
   for (const TermEntry& entry : ListTerms()) {
-    const bool left_out = std::find(leave_out.begin(), leave_out.end(), entry.group) != leave_out.end();
-    if ((entry.askers & asker) != 0 && !left_out) entries.push_back(&entry);
+    if ((entry.askers & asker) == 0) continue;
+    // What a program has is known at its first answer.
+    bool is_shared = asker == kAskedOfPrograms;
+    for (size_t b = 1; b < providers_.size(); ++b) is_shared = is_shared || Shares(entry, 0, b);
+    if (!is_shared) continue;
+    const auto [rows, cols] = CalcShape(entry, scales_);
+    AskedTerm& term = terms_.emplace_back();
+    term.entry = &entry;
+    const bool is_velocity = is_reduced_ && IsVelocity(entry.parts);
+    term.numbers.assign(providers_.size(), MatrixXd::Zero(is_velocity ? T_.cols() : rows,
+                                                          is_velocity && cols > 1 ? T_.cols() : cols));
+    term.is_read.assign(providers_.size(), false);
+    term.scale.setOnes(rows, cols);
+    term.weight = term.numbers[0];
   }
-  // The terms point to their records.
-  records_.resize(entries.size());
-  for (size_t i = 0; i < entries.size(); ++i) {
-    const TermEntry& entry = *entries[i];
-    CheckRecord& record = records_[i];
-    record.name = asker == kAskedByRun ? entry.name : entry.consistency_name;
-    record.description = "model against engine at the same state, relative to the term's scale";
-    record.bound = CalcBound(entry, model().max_depth());
-    std::vector<ZeroPattern> zeros;
-    if (entry.list_zeros != nullptr) zeros = entry.list_zeros(context_);
-    std::vector<Item> items;
-    std::vector<Location> where;
-    for (const TermItem& item : entry.list(context_)) {
-      items.push_back({item.index, static_cast<Eigen::Index>(where.size()),
-                       static_cast<Eigen::Index>(item.where.size())});
-      where.insert(where.end(), item.where.begin(), item.where.end());
+  for (size_t a = 0; a < providers_.size(); ++a) {
+    for (size_t b = a + 1; b < providers_.size(); ++b) {
+      ComparedPair& pair = pairs_.emplace_back(ComparedPair{a, b, {}});
+      for (const AskedTerm& term : terms_) {
+        CheckRecord& record = pair.terms.emplace_back();
+        const TermEntry& entry = *term.entry;
+        record.name =
+            asker == kAskedByRun || entry.consistency_name == nullptr ? entry.name : entry.consistency_name;
+        record.description = "model against engine at the same state, relative to the term's scale";
+        record.bound = CalcBound(entry, model.max_depth());
+      }
     }
-    AskedTerm& asked = terms_.emplace_back(
-        AskedTerm{&entry, std::move(items), ComparedTerm(&record, std::move(where), std::move(zeros))});
-    if (entry.weighed == Weighed::kOnce) Evaluate(entry.weigh, asked.items, &asked.term.weight);
   }
 }
 
-void TermComparison::Evaluate(Evaluator evaluate, const std::vector<Item>& items,
-                              Eigen::ArrayXd* numbers) const {
-  for (const Item& item : items) evaluate(context_, item.index, numbers->segment(item.begin, item.count));
+void TermComparison::FormCoupling() {
+  const std::vector<Joint>& joints = model().joints();
+  const MatrixXd of_joints = CalcCouplingMap(model().spec());
+  const int base = model().num_base_velocities();
+  T_.setZero(model().num_velocities(), base + of_joints.cols());
+  T_.topLeftCorner(base, base).setIdentity();
+  T_.bottomRightCorner(of_joints.rows(), of_joints.cols()) = of_joints;
+  for (int i = 0; i < model().num_velocities(); ++i) {
+    if (i < base || !joints[static_cast<size_t>(model().joint_of_dof(i - base))].coupling) free_.push_back(i);
+  }
+}
+
+bool TermComparison::Shares(const TermEntry& entry, size_t a, size_t b) const {
+  const auto both_have = [&](Term term) { return providers_[a]->Has(term) && providers_[b]->Has(term); };
+  return both_have(entry.term) && (entry.instead_of == Term::kTermCount || !both_have(entry.instead_of));
+}
+
+bool TermComparison::needs_second_velocity() const {
+  return std::any_of(terms_.begin(), terms_.end(),
+                     [](const AskedTerm& term) { return term.entry->term == Term::kCBarProduct; });
+}
+
+void TermComparison::Follow(DynamicsState* state) const {
+  if (!is_reduced_) return;
+  const int base = model().num_base_velocities();
+  for (int i = 0; i < model().num_joints(); ++i) {
+    const std::optional<JointCoupling>& coupling = model().joints()[static_cast<size_t>(i)].coupling;
+    if (!coupling) continue;
+    state->q[model().position_index(i)] =
+        coupling->multiplier * state->q[model().position_index(coupling->leader)] + coupling->offset;
+    state->xi[base + model().dof(i)] = coupling->multiplier * state->xi[base + model().dof(coupling->leader)];
+  }
+}
+
+void TermComparison::SetScales(const ModelTerms& terms, const Eigen::Ref<const VectorXd>& q,
+                               const Eigen::Ref<const VectorXd>& xi) {
+  scales_.robot.SetState(terms, q, xi);
+  scales_.xi = xi;
+}
+
+void TermComparison::Read(AskedTerm* term, size_t provider) {
+  DynamicsProvider* const one = providers_[provider];
+  term->is_read[provider] = one->Has(term->entry->term);
+  if (!term->is_read[provider]) return;
+  MatrixXd& numbers = term->numbers[provider];
+  if (is_reduced_ && IsVelocity(term->entry->parts) && !one->is_reduced()) {
+    // T is constant: T^T M T, and T^T of the forces.
+    whole_.setZero(term->scale.rows(), term->scale.cols());
+    one->Read(term->entry->term, whole_);
+    numbers = T_.transpose() * whole_;
+    if (whole_.cols() > 1) numbers = (numbers * T_).eval();
+  } else {
+    one->Read(term->entry->term, numbers);
+  }
+  if (term->entry->term != Term::kPotentialEnergy || !has_own_level_) return;
+  // From the first state on: the level of zero is each provider's own.
+  if (!first_potential_[provider]) first_potential_[provider] = numbers(0, 0);
+  numbers(0, 0) -= *first_potential_[provider];
+}
+
+void TermComparison::Weigh(AskedTerm* term) {
+  const TermEntry& entry = *term->entry;
+  const bool is_first = term->count < 0;
+  if (!is_first && (entry.is_scaled_once || entry.scale == nullptr)) return;
+  scales_.first = &term->numbers[0];
+  scales_.second = &term->numbers[1];
+  if (entry.scale != nullptr) entry.scale(scales_, term->scale);
+  if (is_reduced_ && IsVelocity(entry.parts)) {
+    const MatrixXd T = T_.cwiseAbs();
+    MatrixXd reduced = T.transpose() * term->scale;
+    if (term->scale.cols() > 1) reduced = (reduced * T).eval();
+    term->weight = reduced.cwiseInverse();
+  } else {
+    term->weight = term->scale.cwiseInverse();
+  }
+  if (entry.term == Term::kPotentialEnergy && has_own_level_) term->weight *= 0.5;
+  if (is_first) term->count = (term->weight.array() != 0.0).count();
+}
+
+Location TermComparison::Locate(const TermEntry& entry, Eigen::Index row, Eigen::Index col) const {
+  if (!is_reduced_ || !IsVelocity(entry.parts)) return FindLocation(entry, scales_, row, col);
+  const int second = entry.parts == TermParts::kVelocity ? 0 : free_[static_cast<size_t>(col)];
+  return FindLocation(entry, scales_, free_[static_cast<size_t>(row)], second);
+}
+
+void TermComparison::ComparePair(size_t index, double when, ComparedPair* pair) {
+  AskedTerm& term = terms_[index];
+  const TermEntry& entry = *term.entry;
+  if (!term.is_read[pair->first] || !term.is_read[pair->second] || !Shares(entry, pair->first, pair->second))
+    return;
+  CheckRecord& record = pair->terms[index];
+  MatrixXd& first = term.numbers[pair->first];
+  const MatrixXd& second = term.numbers[pair->second];
+  if (entry.term == Term::kJointAxis) MoveAlongAxes(model(), second, &first);
+  double error = 0.0;
+  if (first.size() > 0)
+    error = ((first - second).array().abs() * term.weight.array()).maxCoeff<Eigen::PropagateNaN>();
+  if (!(error < std::numeric_limits<double>::infinity())) error = std::numeric_limits<double>::infinity();
+  const bool failed_before = record.failed;
+  const bool is_worst = error > record.worst || record.comparisons == 0;
+  if (is_worst || (!(error <= record.bound) && !failed_before)) {
+    for (Eigen::Index col = 0; col < first.cols(); ++col) {
+      for (Eigen::Index row = 0; row < first.rows(); ++row) {
+        const double weight = term.weight(row, col);
+        if (weight == 0.0) continue;
+        record.CompareError(std::abs(first(row, col) - second(row, col)) * weight, first(row, col),
+                            second(row, col), Locate(entry, row, col), when);
+      }
+    }
+  } else {
+    record.comparisons += term.count;
+  }
+  record.AddStep(error);
+  if (record.failed && !failed_before)
+    record.part = Describe(record.first_failure, model(), model().num_base_velocities());
 }
 
 void TermComparison::Compare(double when, bool contacts) {
-  context_.when = when;
   for (size_t i = 0; i < terms_.size(); ++i) {
-    auto& [entry, items, term] = terms_[i];
-    if (IsOfContacts(i) && !contacts) continue;
-    Evaluate(entry->model, items, &term.model);
-    Evaluate(entry->engine, items, &term.engine);
-    if (entry->weighed == Weighed::kAtEachState) Evaluate(entry->weigh, items, &term.weight);
-    if (entry->check_zeros != nullptr) entry->check_zeros(context_, &term);
-    const bool failed_before = records_[i].failed;
-    term.Finish(when);
-    if (!records_[i].failed || failed_before) continue;
-    records_[i].part = Describe(records_[i].first_failure, model(), model().num_base_velocities());
+    AskedTerm& term = terms_[i];
+    if (!contacts && IsOfContacts(*term.entry)) continue;
+    for (size_t provider = 0; provider < providers_.size(); ++provider) Read(&term, provider);
+    Weigh(&term);
+    for (ComparedPair& pair : pairs_) ComparePair(i, when, &pair);
   }
+}
+
+std::vector<ComparedPair> TermComparison::TakePairs() const {
+  std::vector<ComparedPair> pairs = pairs_;
+  for (ComparedPair& pair : pairs)
+    std::erase_if(pair.terms, [](const CheckRecord& record) { return record.comparisons == 0; });
+  return pairs;
+}
+
+std::vector<std::string> TermComparison::ListNotCompared() const {
+  std::vector<std::string> names;
+  for (size_t i = 0; i < terms_.size(); ++i) {
+    if (std::all_of(pairs_.begin(), pairs_.end(),
+                    [&](const ComparedPair& pair) { return pair.terms[i].comparisons == 0; }))
+      names.emplace_back(pairs_.front().terms[i].name);
+  }
+  return names;
+}
+
+StateFeed FeedRandomStates(const RobotModel& model, long samples, const StateRange& range, std::uint64_t seed,
+                           bool second_velocity, bool object) {
+  const auto source = std::make_shared<StateSource>(model, range, seed);
+  return [=](DynamicsState* state) {
+    if (state->sample >= samples) return false;
+    source->DrawPositions(&state->q);
+    source->DrawVelocity(&state->xi);
+    if (second_velocity) source->DrawVelocity(&state->w);
+    if (object) source->DrawObject(&state->X_o, &state->X_o_dot);
+    return true;
+  };
+}
+
+long CompareAtStates(const StateFeed& feed, const std::function<bool(long)>& progress,
+                     TermComparison* comparison) {
+  const RobotModel& model = comparison->model();
+  ModelTerms terms(model);  // for scales alone
+  ScaleContext& scales = comparison->scales();
+  DynamicsState state;
+  state.q.setZero(model.num_positions());
+  state.xi.setZero(model.num_velocities());
+  if (comparison->needs_second_velocity()) state.w = state.xi;
+  bool go_on = true;
+  while (go_on && feed(&state)) {
+    comparison->Follow(&state);
+    for (DynamicsProvider* const provider : comparison->providers()) provider->SetState(state);
+    if (state.w.size() > 0) {
+      terms.SetState(state.q, state.w);
+      scales.robot_at_w.SetState(terms, state.q, state.w);
+    }
+    terms.SetState(state.q, state.xi);
+    comparison->SetScales(terms, state.q, state.xi);
+    if (model.object()) {
+      const double rate = std::max(state.X_o_dot.head<3>().norm(), state.X_o_dot.tail<3>().cwiseAbs().sum());
+      scales.object =
+          CalcObjectScales(model.object()->body, model.gravity(), state.X_o.head<3>().norm(), rate);
+    }
+    comparison->Compare(static_cast<double>(state.sample));
+    go_on = progress(++state.sample);
+  }
+  return state.sample;
 }
 
 }  // namespace dexcheck

@@ -106,7 +106,7 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
 
 void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison) {
   const ConsistencyResult& result = comparison.result;
-  if (result.samples < request.options.samples && request.answers.empty()) {
+  if (result.samples < request.options.samples && request.source.answers.empty()) {
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
   }
   std::string left_out;
@@ -198,7 +198,7 @@ std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comp
   for (JUnitCase& test : cases) {
     if (!test.failure.empty()) test.failure += likely;
   }
-  const bool is_whole = result.samples >= request.options.samples || !request.answers.empty();
+  const bool is_whole = result.samples >= request.options.samples || !request.source.answers.empty();
   return WriteJUnit("dexcheck.consistency." + comparison.first.stem().string(), cases, result.seconds,
                     is_whole ? "" : "interrupted");
 }

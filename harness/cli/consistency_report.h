@@ -12,7 +12,6 @@
 #include "harness/checks/file_comparison.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/tolerance_options.h"
-#include "harness/descriptions/program_side.h"
 
 namespace dexcheck::cli {
 
@@ -20,9 +19,7 @@ namespace dexcheck::cli {
 struct ConsistencyRequest {
   std::string a, b;  ///< Two descriptions; none with --robot and --mjcf.
   RobotFiles files;
-  std::string program;            ///< Command of the shell that stands for B.
-  std::filesystem::path answers;  ///< Folder that stands for B.
-  ProgramOptions program_options;
+  AnswersSource source;  ///< What stands for B and answers terms.
   std::vector<std::string> packages;
   bool floating = false;
   ConsistencyOptions options;
@@ -32,7 +29,7 @@ struct ConsistencyRequest {
   ToleranceOptions judging;
 
   /// What stands for B answers terms, and is no description.
-  [[nodiscard]] bool has_answers() const { return !program.empty() || !answers.empty(); }
+  [[nodiscard]] bool has_answers() const { return !source.program.empty() || !source.answers.empty(); }
 
   /// The results themselves take standard output: a table would spoil them.
   [[nodiscard]] bool PrintsJson() const { return json_file == "-"; }

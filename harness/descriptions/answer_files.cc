@@ -27,8 +27,8 @@ Eigen::Map<const VectorXd> MapRow(const NpyArray& array, long sample) {
   return {array.values.data() + static_cast<size_t>(sample) * width, static_cast<Eigen::Index>(width)};
 }
 
-SideLayout ReadLayout(const std::filesystem::path& path, const RobotDescription& robot) {
-  if (!std::filesystem::exists(path)) return SideLayout(robot);
+AnswerLayout ReadLayout(const std::filesystem::path& path, const RobotDescription& robot) {
+  if (!std::filesystem::exists(path)) return AnswerLayout(robot);
   const std::optional<Json> json = ParseAnswer(ReadBytes(path));
   if (!json) throw InputError(path.string() + ": must be a JSON object");
   return {robot, *json, path.string()};
@@ -69,7 +69,7 @@ std::string WriteStateLines(const StateTable& states) {
 }
 
 std::string WriteLayout(const RobotDescription& robot, const std::string& origin) {
-  const SideLayout layout(robot);
+  const AnswerLayout layout(robot);
   OrderedJson json = layout.ToJson();
   const Vector3d& g = robot.spec.gravity;
   json["robot"] = robot.spec.name;
@@ -79,14 +79,14 @@ std::string WriteLayout(const RobotDescription& robot, const std::string& origin
 }
 
 AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescription& robot)
-    : AnsweringSide(ReadLayout(folder / "layout.json", robot)), folder_(folder), name_(folder.string()) {
+    : AnsweringProvider(ReadLayout(folder / "layout.json", robot)), folder_(folder), name_(folder.string()) {
   const RobotModel model(robot.spec);
   q_ = ParseNpy(ReadBytes(folder / "q.npy"), (folder / "q.npy").string());
   const size_t count = q_.shape.empty() ? 0 : q_.shape[0];
   count_ = static_cast<long>(count);
   if (count == 0) throw InputError((folder / "q.npy").string() + ": must have states, got none");
-  q_ = Read("q.npy", {count, static_cast<size_t>(model.num_positions())});
-  v_ = Read("v.npy", {count, static_cast<size_t>(model.num_velocities())});
+  q_ = ReadArray("q.npy", {count, static_cast<size_t>(model.num_positions())});
+  v_ = ReadArray("v.npy", {count, static_cast<size_t>(model.num_velocities())});
   if (std::filesystem::exists(folder_ / "answers.jsonl")) {
     ReadLines(folder_ / "answers.jsonl");
     return;
@@ -94,7 +94,7 @@ AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescrip
   const auto n = static_cast<size_t>(layout().size());
   const auto find = [&](const std::string& term, const std::vector<size_t>& shape) {
     const std::string file = term + ".npy";
-    if (std::filesystem::exists(folder_ / file)) terms_.emplace(term, Read(file, shape));
+    if (std::filesystem::exists(folder_ / file)) terms_.emplace(term, ReadArray(file, shape));
   };
   for (const char* term : {"M", "C"}) find(term, {count, n, n});
   for (const char* term : {"c", "g", "h", "friction"}) find(term, {count, n});
@@ -126,7 +126,7 @@ void AnswerFiles::ReadLines(const std::filesystem::path& path) {
     const auto sample = id.get<size_t>();
     const auto state = static_cast<long>(sample);
     lines_[sample] =
-        ReadSideTerms(json, layout(), layout().WriteVelocities(positions(state), velocities(state)), source);
+        ReadAnswer(json, layout(), layout().WriteVelocities(Row(q_, state), Row(v_, state)), source);
     seen[sample] = true;
   }
   const auto missing = std::find(seen.begin(), seen.end(), false);
@@ -135,16 +135,14 @@ void AnswerFiles::ReadLines(const std::filesystem::path& path) {
                    std::to_string(missing - seen.begin()));
 }
 
-StateFeed AnswerFiles::MakeFeed() const {
-  return [this](long sample, VectorXd* q, VectorXd* xi) {
-    if (sample >= count_) return false;
-    *q = positions(sample);
-    *xi = velocities(sample);
-    return true;
-  };
+bool AnswerFiles::ReadState(DynamicsState* state) const {
+  if (state->sample >= count_) return false;
+  state->q = Row(q_, state->sample);
+  state->xi = Row(v_, state->sample);
+  return true;
 }
 
-NpyArray AnswerFiles::Read(const std::string& file, const std::vector<size_t>& shape) const {
+NpyArray AnswerFiles::ReadArray(const std::string& file, const std::vector<size_t>& shape) const {
   const std::string source = (folder_ / file).string();
   NpyArray array = Check(ParseNpy(ReadBytes(folder_ / file), source), source, shape);
   if (file != "q.npy" && file != "v.npy") return array;
@@ -170,8 +168,8 @@ VectorXd AnswerFiles::FindRow(const std::string& term, long sample) const {
   return found == terms_.end() ? VectorXd() : Row(found->second, sample);
 }
 
-SideTerms AnswerFiles::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
-  SideTerms terms;
+AnsweredTerms AnswerFiles::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
+  AnsweredTerms terms;
   if (!lines_.empty()) {
     terms = lines_[static_cast<size_t>(sample)];
     layout().ReadTerms(q, xi, &terms);
@@ -190,9 +188,7 @@ SideTerms AnswerFiles::Evaluate(long sample, const VectorXd& q, const VectorXd& 
   terms.gravity = FindRow("g", sample);
   terms.bias = FindRow("h", sample);
   terms.friction = FindRow("friction", sample);
-  if (terms.bias.size() == 0 && terms.coriolis.size() > 0 && terms.gravity.size() > 0) {
-    terms.bias = terms.coriolis + terms.gravity;
-  }
+  terms.AddBias();
   const VectorXd kinetic = FindRow("kinetic_energy", sample);
   const VectorXd potential = FindRow("potential_energy", sample);
   if (kinetic.size() > 0) terms.kinetic = kinetic[0];

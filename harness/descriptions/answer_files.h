@@ -6,9 +6,9 @@
 #include <map>
 #include <string>
 
+#include "harness/descriptions/answer_layout.h"
 #include "harness/descriptions/npy_file.h"
 #include "harness/descriptions/random_states.h"
-#include "harness/descriptions/side_layout.h"
 
 namespace dexcheck {
 
@@ -32,23 +32,19 @@ std::string WriteLayout(const RobotDescription& robot, const std::string& origin
 /// kinetic_energy.npy, potential_energy.npy (N), each of which may be missing, in the layout of layout.json,
 /// or in the robot's own without such a file. Instead of them the answers may stand in
 /// answers.jsonl, a line for each state as a program gives it.
-class AnswerFiles : public AnsweringSide {
+class AnswerFiles : public AnsweringProvider {
  public:
   /// @throws InputError, one line that names the file.
   AnswerFiles(const std::filesystem::path& folder, const RobotDescription& robot);
 
   [[nodiscard]] const std::string& name() const override { return name_; }
 
-  /// Number of states, and each of them.
-  [[nodiscard]] long count() const { return count_; }
-  [[nodiscard]] VectorXd positions(long sample) const { return Row(q_, sample); }
-  [[nodiscard]] VectorXd velocities(long sample) const { return Row(v_, sample); }
-  /// Gives the states, from the first to the last.
-  [[nodiscard]] StateFeed MakeFeed() const;
-  SideTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
+  /// The state of a sample; false when there is none.
+  bool ReadState(DynamicsState* state) const;
+  AnsweredTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
 
  private:
-  [[nodiscard]] NpyArray Read(const std::string& file, const std::vector<size_t>& shape) const;
+  [[nodiscard]] NpyArray ReadArray(const std::string& file, const std::vector<size_t>& shape) const;
   [[nodiscard]] static NpyArray Check(NpyArray array, const std::string& source,
                                       const std::vector<size_t>& shape);
   void ReadLines(const std::filesystem::path& path);
@@ -60,7 +56,7 @@ class AnswerFiles : public AnsweringSide {
   long count_ = 0;
   NpyArray q_, v_;
   std::map<std::string, NpyArray> terms_;
-  std::vector<SideTerms> lines_;  // of answers.jsonl, by state
+  std::vector<AnsweredTerms> lines_;  // of answers.jsonl, by state
 };
 
 }  // namespace dexcheck

@@ -63,7 +63,7 @@ double CalcCondition(const RobotDescription& robot, const RobotSpec& spec) {
   Matrix6Xd J(6, n);
   Matrix6Xd J_dot(6, n);
   // Coupled joints are one coordinate.
-  const MatrixXd couplings = CalcCouplingMap(robot);
+  const MatrixXd couplings = CalcCouplingMap(robot.spec);
   const int base = model.num_base_velocities();
   MatrixXd T = MatrixXd::Zero(n, base + couplings.cols());
   T.topLeftCorner(base, base).setIdentity();

@@ -64,7 +64,7 @@ VectorXd BaseConversion::CalcRate(const VectorXd& q, const VectorXd& xi) const {
   return rate;
 }
 
-void BaseConversion::Restore(const VectorXd& q, const VectorXd& xi, SideTerms* terms) const {
+void BaseConversion::Restore(const VectorXd& q, const VectorXd& xi, AnsweredTerms* terms) const {
   const Matrix6d B = CalcB(q);
   const VectorXd rate = CalcRate(q, xi);
   for (VectorXd* force : {&terms->coriolis, &terms->bias}) {
@@ -75,7 +75,7 @@ void BaseConversion::Restore(const VectorXd& q, const VectorXd& xi, SideTerms* t
       *force += terms->M * rate;
     }
   }
-  for (VectorXd* force : {&terms->coriolis, &terms->gravity, &terms->bias, &terms->friction}) {
+  for (VectorXd* const force : terms->forces()) {
     if (force->size() > 0) force->head<6>() = (B.transpose() * force->head<6>()).eval();
   }
   if (terms->M.size() == 0) return;
@@ -83,12 +83,12 @@ void BaseConversion::Restore(const VectorXd& q, const VectorXd& xi, SideTerms* t
   terms->M.leftCols<6>() = (terms->M.leftCols<6>() * B).eval();
 }
 
-void BaseConversion::Apply(const VectorXd& q, const VectorXd& xi, SideTerms* terms) const {
+void BaseConversion::Apply(const VectorXd& q, const VectorXd& xi, AnsweredTerms* terms) const {
   // B is made of rotations: B^-1 = B^T.
   const Matrix6d B = CalcB(q);
   terms->M.topRows<6>() = (B * terms->M.topRows<6>()).eval();
   terms->M.leftCols<6>() = (terms->M.leftCols<6>() * B.transpose()).eval();
-  for (VectorXd* force : {&terms->coriolis, &terms->gravity, &terms->bias, &terms->friction}) {
+  for (VectorXd* const force : terms->forces()) {
     if (force->size() > 0) force->head<6>() = (B * force->head<6>()).eval();
   }
   const VectorXd change = terms->M * CalcRate(q, xi);

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_only.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"
@@ -14,21 +17,118 @@
 namespace dexcheck {
 namespace {
 
-// Both sides read decimal numbers and form at most short sums and products of them.
-constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
-
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
-class ConstantComparison {
+Location AtLink(int link) { return {Location::Kind::kLink, link, -1}; }
+Location AtJoint(int joint) { return {Location::Kind::kJoint, joint, -1}; }
+
+/// Numbers of two, one check after the other.
+class ConstantTable {
+ protected:
+  explicit ConstantTable(const RobotModel& model) : model_(model) {}
+
+  /// Compares relative to the larger of the two, or to `scale` where zero is a proper value.
+  void Compare(const std::string& check, const Location& where, double model, double engine,
+               double scale = 0.0) {
+    CheckRecord* const record = result_.Define(check);
+    entry_ = check == last_check_ && where == last_location_ ? entry_ + 1 : 0;
+    last_check_ = check;
+    last_location_ = where;
+    const double size = std::max({std::abs(model), std::abs(engine), scale});
+    const double error = record->Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
+    if (error > kConstantRounding) {
+      result_.findings.push_back(
+          {check, Describe(where, model_, model_.num_base_velocities()), model, engine, where, entry_});
+    }
+  }
+  void CompareGravity(const Vector3d& other) {
+    for (int k = 0; k < 3; ++k)
+      Compare("gravity_vector", {}, model_.gravity()[k], other[k], model_.gravity().norm());
+  }
+  /// @param mass_of of the other's link, by this model's joint; -1 the base.
+  template <typename MassOf>
+  void CompareMasses(const MassOf& mass_of) {
+    for (int link = model_.base().type == BaseType::kFixed ? 0 : -1; link < model_.num_joints(); ++link) {
+      Compare("link_mass", AtLink(link), link < 0 ? model_.base_with_wheels().mass : JointOf(link).body.mass,
+              mass_of(link));
+    }
+  }
+  [[nodiscard]] const Joint& JointOf(int joint) const { return model_.joints()[static_cast<size_t>(joint)]; }
+
+  const RobotModel& model_;
+  ConstantChecks result_;
+
+ private:
+  std::string last_check_;
+  Location last_location_;
+  int entry_ = 0;
+};
+
+/// Two descriptions, in what both state.
+class DescriptionConstants : public ConstantTable {
  public:
-  explicit ConstantComparison(const Adapter& adapter)
-      : adapter_(adapter), model_(adapter.model()), engine_(adapter.engine()) {}
+  DescriptionConstants(const RobotModel& model, const RobotDescription& a, const RobotDescription& b)
+      : ConstantTable(model), a_(a), b_(b), b_of_a_(MatchJoints(a.spec, b.spec)) {}
 
   ConstantChecks Run() {
-    CompareGravity();
-    CompareLinks();
+    if (a_.states_gravity && b_.states_gravity) CompareGravity(b_.spec.gravity);
+    const RobotModel other(b_.spec);
+    CompareMasses([&](int link) { return link < 0 ? other.base_with_wheels().mass : Other(link).body.mass; });
+    CompareStated("joint_damping", &DescribedJoint::states_damping, {&Joint::damping});
+    CompareStated("joint_dry_friction", &DescribedJoint::states_dry_friction, {&Joint::dry_friction});
+    CompareStated("joint_armature", &DescribedJoint::states_armature, {&Joint::armature});
+    CompareStated("joint_range", &DescribedJoint::states_range, {&Joint::lower, &Joint::upper});
+    for (int i = 0; i < model_.num_joints(); ++i) CompareCoupling(i, JointOf(i).coupling, Other(i).coupling);
+    return std::move(result_);
+  }
+
+ private:
+  [[nodiscard]] const Joint& Other(int joint) const {
+    return b_.spec.joints[static_cast<size_t>(b_of_a_[static_cast<size_t>(joint)])];
+  }
+  void CompareStated(const char* check, bool DescribedJoint::*states,
+                     std::initializer_list<double Joint::*> numbers) {
+    for (int i = 0; i < model_.num_joints(); ++i) {
+      const auto own = static_cast<size_t>(i);
+      if (!(a_.joints[own].*states) || !(b_.joints[static_cast<size_t>(b_of_a_[own])].*states)) continue;
+      for (double Joint::*const number : numbers)
+        Compare(check, AtJoint(i), JointOf(i).*number, Other(i).*number);
+    }
+  }
+  void CompareCoupling(int joint, const std::optional<JointCoupling>& own,
+                       const std::optional<JointCoupling>& other) {
+    constexpr const char* kCheck = "joint_coupling";
+    if (own && other) {
+      Compare(kCheck, AtJoint(joint), b_of_a_[static_cast<size_t>(own->leader)], other->leader);
+      Compare(kCheck, AtJoint(joint), own->multiplier, other->multiplier);
+      Compare(kCheck, AtJoint(joint), own->offset, other->offset);
+    } else if (own || other) {
+      result_.Add({kCheck, Describe(AtJoint(joint), model_, model_.num_base_velocities()),
+                   own ? own->multiplier : 0.0, other ? other->multiplier : 0.0, AtJoint(joint), 1});
+    }
+  }
+
+  const RobotDescription& a_;
+  const RobotDescription& b_;
+  std::vector<int> b_of_a_;
+};
+
+/// A model and the engine's.
+class EngineConstants : public ConstantTable {
+ public:
+  explicit EngineConstants(const Adapter& adapter)
+      : ConstantTable(adapter.model()), adapter_(adapter), engine_(adapter.engine()) {}
+
+  ConstantChecks Run() {
+    CompareGravity(MapVector(engine_.opt.gravity));
+    CompareMasses([&](int link) {
+      double mass = 0.0;
+      for (const int b : adapter_.welded_bodies()[static_cast<size_t>(link + 1)])
+        mass += engine_.body_mass[b];
+      return mass;
+    });
     CompareJoints();
     if (!adapter_.wheels().empty()) CompareWheels();
     CompareFingertips();
@@ -39,97 +139,58 @@ class ConstantComparison {
   }
 
  private:
-  /// Compares relative to the larger of the two, or to `scale` where zero is a proper value.
-  void Compare(const std::string& check, const Location& where, double model, double engine,
-               double scale = 0.0) {
-    CheckRecord* const record = result_.Define(check);
-    entry_ = check == last_check_ && where == last_location_ ? entry_ + 1 : 0;
-    last_check_ = check;
-    last_location_ = where;
-    const double size = std::max({std::abs(model), std::abs(engine), scale});
-    const double error = record->Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
-    if (error > kRounding) {
-      result_.findings.push_back(
-          {check, Describe(where, model_, model_.num_base_velocities()), model, engine, where, entry_});
-    }
-  }
-
-  static Location AtLink(int link) { return {Location::Kind::kLink, link, -1}; }
-  static Location AtJoint(int joint) { return {Location::Kind::kJoint, joint, -1}; }
-
-  void CompareGravity() {
-    for (int k = 0; k < 3; ++k) {
-      Compare("gravity_vector", {}, model_.gravity()[k], engine_.opt.gravity[k], model_.gravity().norm());
-    }
-  }
-
-  void CompareLinks() {
-    for (int link = -1; link < model_.num_joints(); ++link) {
-      if (link < 0 && model_.base().type == BaseType::kFixed) continue;
-      const MassProperties& body =
-          link < 0 ? model_.base_with_wheels() : model_.joints()[static_cast<size_t>(link)].body;
-      double mass = 0.0;
-      for (const int b : adapter_.welded_bodies()[static_cast<size_t>(link + 1)])
-        mass += engine_.body_mass[b];
-      Compare("link_mass", AtLink(link), body.mass, mass);
-    }
-  }
-
   void CompareJoints() {
     const std::vector<int>& dofs = adapter_.joint_dofs();
     for (int i = 0; i < model_.num_dofs(); ++i) {
       const int joint = model_.joint_of_dof(i);
-      Compare("joint_damping", AtJoint(joint), model_.joints()[static_cast<size_t>(joint)].damping,
+      Compare("joint_damping", AtJoint(joint), JointOf(joint).damping,
               engine_.dof_damping[dofs[static_cast<size_t>(i)]]);
     }
     for (int i = 0; i < model_.num_dofs(); ++i) {
       const int joint = model_.joint_of_dof(i);
-      Compare("joint_armature", AtJoint(joint), model_.joints()[static_cast<size_t>(joint)].armature,
+      Compare("joint_armature", AtJoint(joint), JointOf(joint).armature,
               engine_.dof_armature[dofs[static_cast<size_t>(i)]]);
     }
     for (int i = 0; i < model_.num_joints(); ++i) {
       const int id = adapter_.joint_ids()[static_cast<size_t>(i)];
       if (!engine_.jnt_limited[id]) continue;  // then the parameter file's range is only where to sample
-      Compare("joint_range", AtJoint(i), model_.joints()[static_cast<size_t>(i)].lower,
-              engine_.jnt_range[2 * id]);
-      Compare("joint_range", AtJoint(i), model_.joints()[static_cast<size_t>(i)].upper,
-              engine_.jnt_range[2 * id + 1]);
+      Compare("joint_range", AtJoint(i), JointOf(i).lower, engine_.jnt_range[2 * id]);
+      Compare("joint_range", AtJoint(i), JointOf(i).upper, engine_.jnt_range[2 * id + 1]);
     }
   }
 
   void CompareWheels() {
     const Base& base = model_.base();
-    const auto each = [&](const auto& compare) {
+    const auto each = [&](const char* check, const auto& compare) {
       for (size_t k = 0; k < 2; ++k) {
-        compare(adapter_.wheels()[k], Location{Location::Kind::kWheel, static_cast<int>(k), -1},
-                k == 0 ? -1.0 : 1.0);
+        const EngineWheel& wheel = adapter_.wheels()[k];
+        compare(wheel, k == 0 ? -1.0 : 1.0, [&, k](double model, double engine, double scale = 0.0) {
+          Compare(check, {Location::Kind::kWheel, static_cast<int>(k), -1}, model, engine, scale);
+        });
       }
     };
-    each([&](const EngineWheel& wheel, const Location& where, double) {
-      Compare("wheel_radius", where, base.wheel_radius, wheel.radius);
+    using Wheel = const EngineWheel&;
+    each("wheel_radius", [&](Wheel w, double, auto&& compare) { compare(base.wheel_radius, w.radius); });
+    each("wheel_distance", [&](Wheel w, double side, auto&& compare) {
+      compare(base.wheel_distance, 2.0 * side * w.center.y());
     });
-    each([&](const EngineWheel& wheel, const Location& where, double side) {
-      Compare("wheel_distance", where, base.wheel_distance, 2.0 * side * wheel.center.y());
+    each("axle_position", [&](Wheel w, double, auto&& compare) {
+      compare(0.0, w.center.x(), base.wheel_radius);
+      compare(0.0, w.center.z(), base.wheel_radius);
     });
-    each([&](const EngineWheel& wheel, const Location& where, double) {
-      Compare("axle_position", where, 0.0, wheel.center.x(), base.wheel_radius);
-      Compare("axle_position", where, 0.0, wheel.center.z(), base.wheel_radius);
+    each("wheel_axis", [&](Wheel w, double, auto&& compare) {
+      for (int k = 0; k < 3; ++k) compare(k == 1 ? 1.0 : 0.0, w.axis[k], 1.0);
     });
-    each([&](const EngineWheel& wheel, const Location& where, double) {
-      for (int k = 0; k < 3; ++k) Compare("wheel_axis", where, k == 1 ? 1.0 : 0.0, wheel.axis[k], 1.0);
+    each("wheel_mass", [&](Wheel w, double, auto&& compare) {
+      compare(base.wheel.mass, engine_.body_mass[engine_.jnt_bodyid[w.joint]]);
     });
-    each([&](const EngineWheel& wheel, const Location& where, double) {
-      Compare("wheel_mass", where, base.wheel.mass, engine_.body_mass[engine_.jnt_bodyid[wheel.joint]]);
+    each("wheel_spin_inertia", [&](Wheel w, double, auto&& compare) {
+      compare(base.wheel.spin_inertia, CalcWheelInertia(engine_, w).spin);
     });
-    each([&](const EngineWheel& wheel, const Location& where, double) {
-      Compare("wheel_spin_inertia", where, base.wheel.spin_inertia, CalcWheelInertia(engine_, wheel).spin);
-    });
-    each([&](const EngineWheel& wheel, const Location& where, double) {
-      Compare("wheel_damping", where, base.wheel.damping, engine_.dof_damping[wheel.dof]);
-    });
-    each([&](const EngineWheel& wheel, const Location& where, double) {
-      Compare("wheel_armature", where, base.wheel.armature, engine_.dof_armature[wheel.dof]);
-    });
+    each("wheel_damping",
+         [&](Wheel w, double, auto&& compare) { compare(base.wheel.damping, engine_.dof_damping[w.dof]); });
+    each("wheel_armature",
+         [&](Wheel w, double, auto&& compare) { compare(base.wheel.armature, engine_.dof_armature[w.dof]); });
   }
 
   /// The fingertip's sphere if it is at the frame's site; otherwise -1.
@@ -303,7 +364,7 @@ class ConstantComparison {
     }
     for (const auto& [joint, where] : joints) {
       if (engine_.jnt_limited[joint] != 0)
-        Compare("joint_stop_margin", where, 0.0, engine_.jnt_margin[joint]);
+        Compare("joint_limit_margin", where, 0.0, engine_.jnt_margin[joint]);
     }
     Compare("fluid", {}, 0.0, engine_.opt.density);
     Compare("fluid", {}, 0.0, engine_.opt.viscosity);
@@ -336,12 +397,7 @@ class ConstantComparison {
   }
 
   const Adapter& adapter_;
-  const RobotModel& model_;
   const mjModel& engine_;
-  ConstantChecks result_;
-  std::string last_check_;
-  Location last_location_;
-  int entry_ = 0;
 };
 
 }  // namespace
@@ -352,7 +408,7 @@ CheckRecord* ConstantChecks::Define(const std::string& check) {
   if (record == records.end()) {
     record = records.insert(record, CheckRecord{});
     record->name = check;
-    record->bound = kRounding;
+    record->bound = kConstantRounding;
   }
   return &*record;
 }
@@ -364,7 +420,12 @@ void ConstantChecks::Add(ConstantFinding finding) {
   findings.push_back(std::move(finding));
 }
 
-ConstantChecks CheckConstants(const Adapter& adapter) { return ConstantComparison(adapter).Run(); }
+ConstantChecks CheckConstants(const Adapter& adapter) { return EngineConstants(adapter).Run(); }
+
+ConstantChecks CheckConstants(const RobotDescription& a, const RobotDescription& b) {
+  const RobotModel model(a.spec);
+  return DescriptionConstants(model, a, b).Run();
+}
 
 void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records) {
   for (CheckRecord& record : *records) {

@@ -3,13 +3,18 @@
 // What can be compared without motion, before anything else: masses, joints, wheels, fingertips, object,
 // options.
 
+#include <limits>
 #include <string>
 #include <vector>
 
 #include "harness/base/check_record.h"
+#include "harness/descriptions/robot_description.h"
 #include "harness/engine/adapter.h"
 
 namespace dexcheck {
+
+/// Two readers of decimal numbers form at most short sums and products of them.
+inline constexpr double kConstantRounding = 64.0 * std::numeric_limits<double>::epsilon();
 
 /// One constant that the parameter file and the MJCF give differently.
 struct ConstantFinding {
@@ -46,6 +51,11 @@ struct ConstantChecks {
 /// object's mass, inertia, centre of mass, shape and friction; and finds whatever the MJCF has that the
 /// analytic model lacks. engine_fields.h says of each field of the engine's model how it is seen.
 ConstantChecks CheckConstants(const Adapter& adapter);
+
+/// Compares what both descriptions state: gravity, mass of each link; damping, dry friction, armature, range
+/// and coupling of each joint. Locations are those of `a`.
+/// @param a, b as CompleteEachOther left them.
+ConstantChecks CheckConstants(const RobotDescription& a, const RobotDescription& b);
 
 /// Judges checks by a relative tolerance where that is wider than their bound.
 void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records);

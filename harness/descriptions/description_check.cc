@@ -13,9 +13,6 @@
 namespace dexcheck {
 namespace {
 
-// Both sides read decimal numbers and form at most short sums and products of them.
-constexpr double kRowRounding = 64.0 * std::numeric_limits<double>::epsilon();
-
 class DescriptionCheck {
  public:
   DescriptionCheck(const RobotDescription& robot, const Adapter& adapter, bool ignores_couplings,
@@ -48,7 +45,7 @@ class DescriptionCheck {
     const Location where{Location::Kind::kJoint, joint, -1};
     const double size = std::max(std::abs(model), std::abs(engine));
     const double error = record->Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
-    if (error <= kRowRounding) return;
+    if (error <= kConstantRounding) return;
     const RobotModel& described = adapter_.model();
     constants_.findings.push_back({record->name, Describe(where, described, described.num_base_velocities()),
                                    model, engine, where, entry});

@@ -17,10 +17,9 @@
 namespace dexcheck {
 namespace {
 
-// Both sides read decimal numbers and form at most short sums and products of them.
-constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
-
-bool AreSame(double a, double b) { return std::abs(a - b) <= kRounding * std::max(std::abs(a), std::abs(b)); }
+bool AreSame(double a, double b) {
+  return std::abs(a - b) <= kConstantRounding * std::max(std::abs(a), std::abs(b));
+}
 
 /// One number of a part, and the check that it belongs to.
 struct Number {
@@ -158,7 +157,7 @@ Part ReadSpring(const mjModel& m, int joint) {
   const int count = CountPositions(m.jnt_type[joint]);
   if (m.jnt_stiffness[joint] != 0.0) mju_copy(rest, m.qpos_spring + m.jnt_qposadr[joint], count);
   part.Add("joint_spring", "springref", rest, count);
-  part.Add("joint_stop_margin", "margin", m.jnt_limited[joint] != 0 ? m.jnt_margin[joint] : 0.0);
+  part.Add("joint_limit_margin", "margin", m.jnt_limited[joint] != 0 ? m.jnt_margin[joint] : 0.0);
   return part;
 }
 
@@ -298,11 +297,11 @@ std::optional<std::string> SetAsideMotors(const std::string& source, mjModel* en
          " says how they make their forces (servos, muscles, transmissions): " + JoinNames(motors);
 }
 
-Extras CompareExtras(const RobotDescription& first, const std::filesystem::path& file, const Adapter& second,
-                     mjModel* engine) {
-  const MjModelPtr own_engine = LoadMjcf(file);
+Extras CompareExtras(const RobotDescription& first, const mjModel& first_engine, const std::string& file,
+                     const Adapter& second, mjModel* engine) {
+  const MjModelPtr own_engine(mj_copyModel(nullptr, &first_engine));
   const RobotModel own_model(first.spec);
-  const Adapter own(own_model, *own_engine, file.string());
+  const Adapter own(own_model, *own_engine, file);
   Extras extras;
   ExtrasComparison(own, own_engine.get(), second, engine, &extras.differences).Run();
   extras.of_first = CheckConstants(own);

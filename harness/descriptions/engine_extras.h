@@ -5,7 +5,6 @@
 
 #include <mujoco/mujoco.h>
 
-#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -28,10 +27,10 @@ struct Extras {
 
 /// Compares part by part of the same name, and takes such parts out of the second model, so that the constant
 /// checks finds there what the first one lacks. Couplings of joints (equality/joint) stay.
-/// @param first as it is read from `file`, before names are taken over.
+/// @param first as it is read from `file`, whose model is `first_engine`, before names are taken over.
 /// @param second of the same joints in the same order; `engine` is its model.
-Extras CompareExtras(const RobotDescription& first, const std::filesystem::path& file, const Adapter& second,
-                     mjModel* engine);
+Extras CompareExtras(const RobotDescription& first, const mjModel& first_engine, const std::string& file,
+                     const Adapter& second, mjModel* engine);
 
 /// Puts them into the second one's constant checks: what both constant checks find alike is taken back, what
 /// only the first one's finds is told from the other side.

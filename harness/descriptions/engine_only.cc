@@ -20,9 +20,6 @@ namespace {
 
 using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-// Places are sums of a few rotated lengths of the robot's size.
-constexpr double kUnmodelledRounding = 64.0 * std::numeric_limits<double>::epsilon();
-
 /// Hard fingers and wheels (20): a normal force and friction along the surface.
 constexpr int kHardContact = 3;
 
@@ -55,7 +52,7 @@ class EngineOnly {
     if (error <= tolerance) error = 0.0;
     // How large a force may be that should not be there is nothing that a relative tolerance says.
     if (tolerance == 0.0 && error > 0.0) error /= std::max(std::abs(engine), std::abs(neutral));
-    if (!(record->CompareError(error, neutral, engine, {}, -1) <= kUnmodelledRounding))
+    if (!(record->CompareError(error, neutral, engine, {}, -1) <= kConstantRounding))
       result_->findings.push_back({check, where, neutral, engine, {}, 0, true});
   }
 
@@ -211,7 +208,7 @@ class EngineOnly {
     };
     for (const EngineWheel& wheel : adapter_.wheels()) {
       const Vector3d center = adapter_.model().base().X_B0 * wheel.center;
-      const double tolerance = kUnmodelledRounding * std::max(1.0, center.norm());
+      const double tolerance = kConstantRounding * std::max(1.0, center.norm());
       for (int geom = 0; geom < engine_.ngeom; ++geom) {
         if (engine_.geom_bodyid[geom] != engine_.jnt_bodyid[wheel.joint] || !Touches(geom)) continue;
         Expect("wheel_geom_place", GeomName(geom), 0.0, (place(geom) - center).norm(), tolerance);

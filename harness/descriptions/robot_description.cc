@@ -9,8 +9,8 @@
 
 namespace dexcheck {
 
-MatrixXd CalcCouplingMap(const RobotDescription& robot) {
-  const std::vector<Joint>& joints = robot.spec.joints;
+MatrixXd CalcCouplingMap(const RobotSpec& robot) {
+  const std::vector<Joint>& joints = robot.joints;
   std::vector<Eigen::Index> first(joints.size(), -1);  // column of each joint that follows none
   Eigen::Index rows = 0, free = 0;
   for (size_t i = 0; i < joints.size(); ++i) {

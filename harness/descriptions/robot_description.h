@@ -66,7 +66,7 @@ void FuseParts(RobotDescription* robot);
 
 /// T with xi = T xi_free, size joints x (joints - coupled joints): the rates that the couplings leave free. T
 /// is constant, so T^T M T, T^T C T, T^T F are the terms of the coupled robot.
-MatrixXd CalcCouplingMap(const RobotDescription& robot);
+MatrixXd CalcCouplingMap(const RobotSpec& robot);
 
 /// Lets a base that the file does not state float: its link's frame is Sigma_0.
 void LetBaseFloat(RobotDescription* robot);

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "controller/contact/adjoint.h"
-#include "harness/checks/model_view.h"
+#include "harness/descriptions/model_view.h"
 #include "harness/diagnosis/equation_faults.h"
 
 namespace dexcheck {

@@ -20,7 +20,6 @@
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/base/version.h"
-#include "harness/checks/answers_comparison.h"
 #include "harness/checks/file_comparison.h"
 #include "harness/checks/tolerance.h"
 #include "harness/descriptions/audit.h"
@@ -148,7 +147,7 @@ class Robot {
     }
     const double tolerance = digits > 0 ? std::pow(10.0, -digits) : 0.0;
     if (tolerance > 0.0) JudgeByTolerance(tolerance, &result.comparison.result);
-    if (is_file) ExplainComparison(urdf_, &result.comparison, tolerance);
+    if (is_file) ExplainComparison(&result.comparison, tolerance);
     return result;
   }
 

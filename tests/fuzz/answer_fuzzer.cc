@@ -1,7 +1,7 @@
 // What programs answer: any bytes are arrays, terms of the right sizes, or an InputError that names the file.
 
 #include "harness/descriptions/npy_file.h"
-#include "harness/descriptions/side_layout.h"
+#include "harness/descriptions/answer_layout.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "tests/fuzz/fuzz_target.h"
 
@@ -25,8 +25,8 @@ void ReadTerms(std::string_view text) {
   const std::optional<nlohmann::json> answer = ParseAnswer(text);
   if (!answer) return;
   Try("answer:", [&] {
-    const SideLayout layout(robot, *answer, "answer");
-    SideTerms terms = ReadSideTerms(*answer, layout, VectorXd::Ones(layout.size()), "answer");
+    const AnswerLayout layout(robot, *answer, "answer");
+    AnsweredTerms terms = ReadAnswer(*answer, layout, VectorXd::Ones(layout.size()), "answer");
     layout.ReadTerms(VectorXd::Zero(2), VectorXd::Zero(2), &terms);
     Expect(terms.M.size() == 0 || (terms.M.rows() == 2 && terms.M.cols() == 2), "M");
     for (const VectorXd* force : {&terms.coriolis, &terms.gravity, &terms.bias, &terms.friction})

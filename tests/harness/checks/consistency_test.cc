@@ -9,8 +9,7 @@
 #include <algorithm>
 
 #include "controller/model/parameter_reader.h"
-#include "harness/checks/model_check.h"
-#include "harness/descriptions/random_states.h"
+#include "harness/descriptions/engine_provider.h"
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
@@ -121,17 +120,20 @@ TEST(Consistency, HoldsForVelocitiesOfDifferentSize) {
     const RobotModel model(spec);
     const MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "text");
     const Adapter adapter(model, *engine, "text");
-    StateSource source(model, {}, 5);
-    VectorXd q = VectorXd::Zero(model.num_positions());
-    VectorXd xi = VectorXd::Zero(model.num_velocities());
-    VectorXd w = xi;
+    std::uint64_t seed = 5;
     for (const double ratio : {1e-6, 1e-3, 1e3, 1e6}) {
-      ModelCheck check(adapter);
-      source.DrawPositions(&q);
-      source.DrawVelocity(&xi);
-      source.DrawVelocity(&w);
-      check.Compare(q, xi, ratio * w, Vector6d::Zero(), Vector6d::Zero(), 0);
-      for (const CheckRecord& record : check.records()) {
+      AnalyticProvider analytic(model, "model");
+      EngineProvider provider(adapter, "engine");
+      TermComparison comparison(model, kAskedByConsistency, {&analytic, &provider});
+      const StateFeed drawn = FeedRandomStates(model, 1, {}, seed++, /*second_velocity=*/true);
+      const StateFeed feed = [&](DynamicsState* state) {
+        const bool is_new = drawn(state);
+        state->w *= ratio;
+        return is_new;
+      };
+      CompareAtStates(
+          feed, [](long) { return true; }, &comparison);
+      for (const CheckRecord& record : comparison.records()) {
         EXPECT_FALSE(record.failed) << record.name << " of robot " << index << ": " << record.worst;
       }
     }

@@ -85,7 +85,7 @@ constexpr FieldGroup kFieldGroups[] = {
     {FieldClass::kCompared, "gravity_vector", "opt.gravity"},
     {FieldClass::kReported, "joint_limited", "jnt_limited"},
     {FieldClass::kReported, "joint_spring", "jnt_stiffness"},
-    {FieldClass::kReported, "joint_stop_margin", "jnt_margin"},
+    {FieldClass::kReported, "joint_limit_margin", "jnt_margin"},
     {FieldClass::kReported, "joint_dry_friction", "dof_frictionloss"},
     {FieldClass::kReported, "wheel_geom_place", "geom_pos"},
     {FieldClass::kReported, "floor_pose", "geom_quat"},

@@ -1,7 +1,7 @@
 // Two descriptions without the engine: they agree when they describe one robot, whatever the order of joints
 // and the choice of frames, and what differs is found.
 
-#include "harness/checks/model_comparison.h"
+#include "harness/checks/consistency.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -287,68 +287,51 @@ TEST(StepModelCheck, TiltThatTheCheckIsNotMeasuredOfFailsInTheContactsAlone) {
   }
 }
 
-CheckRecord MakeRecord() {
-  CheckRecord record;
-  record.name = "term";
-  record.bound = 1e-10;
-  return record;
-}
+/// An identity matrix, or what a test makes of it.
+class MatrixProvider : public MechanismProvider {
+ public:
+  explicit MatrixProvider(int size) : MechanismProvider("matrix"), M(MatrixXd::Identity(size, size)) {}
+  void SetState(const DynamicsState&) override {}
+  [[nodiscard]] bool Has(Term term) const override { return term == Term::kMBar; }
+  void Read(Term, Eigen::Ref<MatrixXd> out) override { out = M; }
+  MatrixXd M;
+};
 
-TEST(ComparedTerm, CountsWhatIsNotANumberAsInfinite) {
-  for (const double value : {std::nan(""), std::numeric_limits<double>::infinity()}) {
-    CheckRecord record = MakeRecord();
-    ComparedTerm term(&record, std::vector<Location>(3));
-    term.model << 0.0, value, 0.0;
-    term.Finish(5);
-    EXPECT_TRUE(record.failed);
-    EXPECT_EQ(record.failed_at, 5);
-    EXPECT_EQ(record.last, std::numeric_limits<double>::infinity());
-  }
-}
-
-TEST(ComparedTerm, FindsAnEntryWhereTheTreeHasZero) {
-  for (const double value : {1e-9, std::nan("")}) {
-    Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic> may_differ;
-    may_differ.setConstant(3, 4, false);
-    may_differ.matrix().diagonal().setConstant(true);
-    const ZeroPattern pattern(may_differ);
-    EXPECT_EQ(pattern.count(), 9);
-    MatrixXd matrix = MatrixXd::Zero(3, 4);
-    matrix.diagonal().setOnes();
-    CheckRecord record = MakeRecord();
-    ComparedTerm term(&record, {Location{}}, {pattern});
-    const auto scale = [](Eigen::Index, Eigen::Index) { return 1.0; };
-    const auto where = [](Eigen::Index row, Eigen::Index col) {
-      return Location{Location::Kind::kVelocityPair, static_cast<int>(row), static_cast<int>(col)};
-    };
-    term.CheckZeros(0, matrix, scale, where, 0);
-    term.Finish(0);
+TEST(TermComparison, FindsWhatIsNotANumberAndWhatShouldBeZero) {
+  const RobotModel model = testing::ReadPaperRobot();
+  for (const double value : {1e-9, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    MatrixProvider a(model.num_velocities());
+    MatrixProvider b(model.num_velocities());
+    TermComparison comparison(model, kAskedByRun, {&a, &b}, {});
+    comparison.Compare(0);
+    const CheckRecord& record = comparison.records().front();
     EXPECT_FALSE(record.failed);
     EXPECT_EQ(record.last, 0.0);
-    matrix(2, 1) = value;
-    term.CheckZeros(0, matrix, scale, where, 1);
-    term.Finish(1);
+    a.M(2, 1) = value;
+    comparison.Compare(1);
     EXPECT_TRUE(record.failed);
+    EXPECT_EQ(record.failed_at, 1);
     EXPECT_EQ(record.first_failure.first, 2);
     EXPECT_EQ(record.first_failure.second, 1);
-    EXPECT_GE(record.last, 1e-9);
-    EXPECT_EQ(record.comparisons, 20);
-    term.Finish(2);
+    EXPECT_EQ(std::isinf(record.last), !(value < 1.0));
+    EXPECT_EQ(record.comparisons, 2 * a.M.size());
+    a.M(2, 1) = 0.0;
+    comparison.Compare(2);
     EXPECT_EQ(record.last, 0.0);
   }
 }
 
 // Names and factors are nowhere else, so the table itself must be sound.
 TEST(TermTable, IsSound) {
-  std::set<std::string> names, consistency_names;
+  std::set<std::string> names;
+  size_t place = 0;
   for (const TermEntry& term : ListTerms()) {
     EXPECT_TRUE(names.insert(term.name).second) << term.name << " is there twice";
-    EXPECT_TRUE(consistency_names.insert(term.consistency_name).second) << term.consistency_name;
+    EXPECT_EQ(static_cast<size_t>(term.term), place++) << term.name;
     EXPECT_GT(term.factor, 0.0) << term.name;
     EXPECT_NE(term.askers, 0U) << term.name << " is asked by nobody";
     EXPECT_GT(CalcBound(term, 14), 0.0) << term.name;
     EXPECT_LT(CalcBound(term, 14), 1e-12) << term.name;
-    EXPECT_EQ(term.list_zeros == nullptr, term.check_zeros == nullptr) << term.name;
   }
 }
 

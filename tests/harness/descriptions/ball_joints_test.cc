@@ -9,13 +9,12 @@
 #include "controller/model/body_frame.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
-#include "harness/checks/model_comparison.h"
 #include "harness/descriptions/audit.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/hypotheses.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/parameter_writer.h"
-#include "harness/descriptions/side_layout.h"
+#include "harness/descriptions/answer_layout.h"
 #include "harness/engine/engine.h"
 #include "tests/common/list_failures.h"
 #include "tests/common/matchers.h"
@@ -246,7 +245,7 @@ TEST(BallJoints, FaultsAreFound) {
 TEST(BallJoints, ALayoutHasFourPositionsAndThreeVelocities) {
   const RobotDescription robot = ReadMjcfDescription(*LoadMjcfText(kArm, "arm.xml"), "arm.xml");
   const nlohmann::json json = {{"joints", {"wrist", "reach", "elbow", "shoulder"}}};
-  const SideLayout layout(robot, json, "program");
+  const AnswerLayout layout(robot, json, "program");
   EXPECT_EQ(layout.num_positions(), 10);
   EXPECT_EQ(layout.size(), 8);
   VectorXd q(10), xi(8);
@@ -254,7 +253,7 @@ TEST(BallJoints, ALayoutHasFourPositionsAndThreeVelocities) {
   xi << 1, 2, 3, 4, 5, 6, 7, 8;
   EXPECT_THAT(layout.WritePositions(q), ElementsAre(7, 8, 9, 10, 6, 5, 1, 2, 3, 4));
   EXPECT_THAT(layout.WriteVelocities(q, xi), ElementsAre(6, 7, 8, 5, 4, 1, 2, 3));
-  SideTerms terms;
+  AnsweredTerms terms;
   terms.gravity = layout.WriteVelocities(q, xi);
   layout.ReadTerms(q, xi, &terms);
   EXPECT_EQ(terms.gravity, xi);

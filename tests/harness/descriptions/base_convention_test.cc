@@ -7,9 +7,10 @@
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
-#include "harness/checks/answers_comparison.h"
+#include "harness/checks/consistency.h"
 #include "harness/descriptions/npy_file.h"
 #include "harness/descriptions/urdf_reader.h"
+#include "tests/common/evaluate_terms.h"
 #include "tests/common/legged_robots.h"
 #include "tests/common/matrix_near.h"
 
@@ -30,7 +31,9 @@ void DrawState(const RobotDescription& robot, VectorXd* q, VectorXd* xi) {
   const RobotModel model(robot.spec);
   *q = VectorXd::Zero(model.num_positions());
   *xi = VectorXd::Zero(model.num_velocities());
-  ASSERT_TRUE(FeedRandomStates(model, {})(0, q, xi));
+  StateSource source(model, {}, 1);
+  source.DrawPositions(q);
+  source.DrawVelocity(xi);
 }
 
 TEST(BaseConvention, ListsAllOnce) {
@@ -64,7 +67,8 @@ TEST(BaseConvention, ForcesAreThoseOfTheMotion) {
   const RobotDescription robot = ReadQuadruped();
   VectorXd q, xi;
   DrawState(robot, &q, &xi);
-  const SideTerms terms = AnalyticSide(robot, "model").Evaluate(0, q, xi);
+  AnalyticProvider model(robot.spec, "model");
+  const AnsweredTerms terms = EvaluateTerms(&model, q, xi);
   const VectorXd xi_dot = VectorXd::LinSpaced(xi.size(), -1.0, 2.0);
   const VectorXd force = terms.M * xi_dot + terms.bias;
   const auto move = [&](double h) {
@@ -82,9 +86,9 @@ TEST(BaseConvention, ForcesAreThoseOfTheMotion) {
     const VectorXd rate = (conversion.ConvertVelocities(move(kStep), xi + kStep * xi_dot) -
                            conversion.ConvertVelocities(move(-kStep), xi - kStep * xi_dot)) /
                           (2.0 * kStep);
-    SideTerms other = terms;
+    AnsweredTerms other = terms;
     conversion.Apply(q, xi, &other);
-    SideTerms of_force;
+    AnsweredTerms of_force;
     of_force.M = terms.M;
     of_force.gravity = force;  // led over as a force
     conversion.Apply(q, xi, &of_force);
@@ -105,13 +109,13 @@ TEST(BaseConvention, ForcesAreThoseOfTheMotion) {
 }
 
 /// A program that speaks one convention, whatever it says.
-class Stubborn : public AnsweringSide {
+class Stubborn : public AnsweringProvider {
  public:
   Stubborn(const RobotDescription& robot, const BaseConvention& spoken)
-      : AnsweringSide(SideLayout(robot)), model_(robot, "model"), spoken_(spoken) {}
+      : AnsweringProvider(AnswerLayout(robot)), model_(robot.spec, "model"), spoken_(spoken) {}
   [[nodiscard]] const std::string& name() const override { return model_.name(); }
 
-  SideTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override {
+  AnsweredTerms Evaluate(long, const VectorXd& q, const VectorXd& xi) override {
     // What reaches it are numbers as the convention that it is taken to speak has them.
     const VectorXd positions = layout().WritePositions(q);
     const VectorXd velocities = layout().WriteVelocities(q, xi);
@@ -129,14 +133,14 @@ class Stubborn : public AnsweringSide {
     if (spoken_.angular_in_world) angular = R.transpose() * angular;
     VectorXd own_xi = velocities;
     own_xi.head<6>() << linear, angular;
-    SideTerms terms = model_.Evaluate(sample, own_q, own_xi);
+    AnsweredTerms terms = EvaluateTerms(&model_, own_q, own_xi);
     BaseConversion(spoken_).Apply(own_q, own_xi, &terms);
     layout().ReadTerms(q, xi, &terms);
     return terms;
   }
 
  private:
-  AnalyticSide model_;
+  AnalyticProvider model_;
   BaseConvention spoken_;
 };
 
@@ -144,20 +148,16 @@ TEST(BaseConvention, OfAProgramIsRecognised) {
   const RobotDescription robot = ReadQuadruped();
   const RobotModel model(robot.spec);
   for (const BaseConvention& spoken : ListBaseConventions()) {
-    AnalyticSide reference(robot, "robot.urdf");
-    Stubborn side(robot, spoken);
+    AnalyticProvider reference(model, "robot.urdf");
+    Stubborn program(robot, spoken);
     ConsistencyOptions options;
     options.samples = 5;
-    std::vector<std::string> notes;
-    std::vector<std::string> not_compared;
-    const ConsistencyResult result = CompareAnswers(
-        robot, &reference, &side, [&] { return FeedRandomStates(model, options); }, [](long) { return true; },
-        &notes, &not_compared);
-    EXPECT_TRUE(not_compared.empty());
-    const bool is_default = spoken == BaseConvention();
-    EXPECT_EQ(result.Agrees(), is_default);
-    const std::string found = "all its terms agree with its base taken as " + Describe(spoken);
-    EXPECT_EQ(notes.back().starts_with(found), !is_default) << notes.back();
+    const auto make_feed = [&] { return FeedRandomStates(model, options); };
+    const ConsistencyResult result =
+        CompareProviders(model, &reference, &program, make_feed(), [](long) { return true; });
+    EXPECT_TRUE(result.not_compared.empty());
+    EXPECT_EQ(result.Agrees(), spoken == BaseConvention());
+    if (!result.Agrees()) EXPECT_EQ(FindOtherConvention(model, &reference, &program, make_feed), spoken);
   }
 }
 

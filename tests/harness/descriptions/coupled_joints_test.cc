@@ -5,15 +5,14 @@
 
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
-#include "harness/checks/answers_comparison.h"
 #include "harness/checks/consistency.h"
-#include "harness/checks/model_comparison.h"
 #include "harness/descriptions/description_check.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/engine/engine.h"
+#include "tests/common/evaluate_terms.h"
 #include "tests/common/files.h"
 #include "tests/common/list_failures.h"
 #include "tests/common/matchers.h"
@@ -67,7 +66,7 @@ TEST(CoupledJoints, TablesSayThem) {
   EXPECT_EQ(joints[1].coupling->multiplier, -2.0);
   EXPECT_DOUBLE_EQ(joints[1].coupling->offset, -0.3);
   EXPECT_EQ(joints[2].coupling->multiplier, 2.0);
-  EXPECT_EQ(CalcCouplingMap(table), Vector3d(1.0, -2.0, 2.0));
+  EXPECT_EQ(CalcCouplingMap(table.spec), Vector3d(1.0, -2.0, 2.0));
 
   // Written and read again they are the same.
   const RobotDescription again = ReadGripper(WriteParameters(table, "gripper.toml"));
@@ -138,13 +137,13 @@ TEST(CoupledJoints, TablesAgreeWithTheMjcf) {
 
 /// A program that knows the free joint alone, with the equations of the whole gripper on its constraint:
 /// energies and their derivatives by a route of its own, T(xi) = 1/2 m(q) v^2.
-class ReducedGripper : public AnsweringSide {
+class ReducedGripper : public AnsweringProvider {
  public:
   explicit ReducedGripper(const RobotDescription& robot)
-      : AnsweringSide(SideLayout(robot, nlohmann::json{{"joints", {"wrist"}}}, "the program")),
-        whole_(robot, "gripper") {}
+      : AnsweringProvider(AnswerLayout(robot, nlohmann::json{{"joints", {"wrist"}}}, "the program")),
+        whole_(robot.spec, "gripper") {}
   [[nodiscard]] const std::string& name() const override { return whole_.name(); }
-  SideTerms Evaluate(long, const VectorXd& q, const VectorXd& xi) override {
+  AnsweredTerms Evaluate(long, const VectorXd& q, const VectorXd& xi) override {
     const double wrist = layout().WritePositions(q)[0];
     const double rate = layout().WriteVelocities(q, xi)[0];
     constexpr double kStep = 1e-5;
@@ -153,7 +152,7 @@ class ReducedGripper : public AnsweringSide {
     const double slope = (mass(wrist + kStep) - mass(wrist - kStep)) / (2.0 * kStep);
     const double weight =
         (*Whole(wrist + kStep, 0.0).potential - *Whole(wrist - kStep, 0.0).potential) / (2.0 * kStep);
-    SideTerms terms;
+    AnsweredTerms terms;
     terms.M = MatrixXd::Constant(1, 1, m);
     terms.coriolis = VectorXd::Constant(1, 0.5 * slope * rate * rate);  // d/dt (m v) - dT/dq at constant v
     terms.gravity = VectorXd::Constant(1, weight);
@@ -161,26 +160,25 @@ class ReducedGripper : public AnsweringSide {
   }
 
  private:
-  SideTerms Whole(double wrist, double rate) {
-    return whole_.Evaluate(0, Vector3d(wrist, -2.0 * wrist - 0.3, 2.0 * wrist + 0.4),
-                           Vector3d(rate, -2.0 * rate, 2.0 * rate));
+  AnsweredTerms Whole(double wrist, double rate) {
+    return EvaluateTerms(&whole_, Vector3d(wrist, -2.0 * wrist - 0.3, 2.0 * wrist + 0.4),
+                         Vector3d(rate, -2.0 * rate, 2.0 * rate));
   }
-  AnalyticSide whole_;
+  AnalyticProvider whole_;
 };
 
-TEST(CoupledJoints, ArePutOnTheirConstraintWhenASideHasOnlyFreeOnes) {
+TEST(CoupledJoints, ArePutOnTheirConstraintWhenAProgramHasOnlyFreeOnes) {
   const RobotDescription robot = ReadGripper(kGripper);
-  AnalyticSide reference(robot, "gripper.toml");
-  ReducedGripper side(robot);
-  EXPECT_TRUE(side.is_reduced());
   const RobotModel model(robot.spec);
-  SideComparison comparison(robot, {&reference, &side});
+  AnalyticProvider reference(model, "gripper.toml");
+  ReducedGripper program(robot);
+  EXPECT_TRUE(program.is_reduced());
   ConsistencyOptions options;
   options.samples = 10;
-  EXPECT_EQ(CompareAtStates(
-                FeedRandomStates(model, options), [](long) { return true; }, &comparison),
-            10);
-  const std::vector<CheckRecord> terms = comparison.TakePairs().front().terms;
+  const ConsistencyResult result = CompareProviders(
+      model, &reference, &program, FeedRandomStates(model, options), [](long) { return true; });
+  EXPECT_EQ(result.samples, 10);
+  const std::vector<CheckRecord>& terms = result.terms;
   ASSERT_EQ(terms.size(), 3U);
   constexpr double kDifference = 1e-7;  // of central differences
   for (const CheckRecord& record : terms) {

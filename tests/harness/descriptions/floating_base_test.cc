@@ -8,7 +8,6 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
 #include "harness/checks/file_comparison.h"
-#include "harness/checks/model_comparison.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/parameter_writer.h"

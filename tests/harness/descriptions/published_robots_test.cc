@@ -142,7 +142,7 @@ class PublishedRobots : public ::testing::TestWithParam<PublishedRobot> {
     ConsistencyOptions options;
     options.samples = samples;
     Comparison comparison = CompareFiles(folder_.path() / a, folder_.path() / b, urdf(), options);
-    ExplainComparison(urdf(), &comparison);
+    ExplainComparison(&comparison);
     return comparison;
   }
   [[nodiscard]] UrdfOptions urdf() const {

@@ -1,4 +1,4 @@
-#include "harness/descriptions/side_layout.h"
+#include "harness/descriptions/answer_layout.h"
 
 #include <algorithm>
 #include <cmath>
@@ -92,7 +92,7 @@ double ReadNumber(const Json& value, const std::string& key, const std::string& 
 
 }  // namespace
 
-SideLayout::SideLayout(const RobotDescription& robot)
+AnswerLayout::AnswerLayout(const RobotDescription& robot)
     : base_(robot.spec.base.type == BaseType::kFloating ? 6 : 0), base_positions_(base_ > 0 ? 7 : 0) {
   if (base_ == 0 && robot.spec.base.type != BaseType::kFixed) {
     throw InputError(robot.spec.source + ": base: must be fixed or floating to be compared with a program");
@@ -108,7 +108,7 @@ SideLayout::SideLayout(const RobotDescription& robot)
   SetJoints(std::move(all));
 }
 
-void SideLayout::SetJoints(std::vector<int> joints) {
+void AnswerLayout::SetJoints(std::vector<int> joints) {
   joints_ = std::move(joints);
   velocities_.clear();
   num_positions_ = base_positions_;
@@ -124,8 +124,8 @@ void SideLayout::SetJoints(std::vector<int> joints) {
   });
 }
 
-SideLayout::SideLayout(const RobotDescription& robot, const Json& json, const std::string& source)
-    : SideLayout(robot) {
+AnswerLayout::AnswerLayout(const RobotDescription& robot, const Json& json, const std::string& source)
+    : AnswerLayout(robot) {
   if (json.contains("base")) {
     if (base_ == 0) Fail(source, "base", "must not be given, the base is fixed");
     convention_ = ReadConvention(json.at("base"), source);
@@ -170,7 +170,7 @@ SideLayout::SideLayout(const RobotDescription& robot, const Json& json, const st
   }
 }
 
-nlohmann::ordered_json SideLayout::ToJson() const {
+nlohmann::ordered_json AnswerLayout::ToJson() const {
   nlohmann::ordered_json json;
   json["joints"] = nlohmann::ordered_json::array();
   for (const int joint : joints_) json["joints"].push_back(robot_joints_[static_cast<size_t>(joint)].name);
@@ -194,7 +194,7 @@ nlohmann::ordered_json SideLayout::ToJson() const {
   return json;
 }
 
-VectorXd SideLayout::WritePositions(const VectorXd& q) const {
+VectorXd AnswerLayout::WritePositions(const VectorXd& q) const {
   VectorXd written(num_positions());
   if (base_ > 0) written.head<7>() = BaseConversion(convention_).ConvertPositions(q).head<7>();
   Eigen::Index at = base_positions_;
@@ -206,7 +206,7 @@ VectorXd SideLayout::WritePositions(const VectorXd& q) const {
   return written;
 }
 
-VectorXd SideLayout::WriteVelocities(const VectorXd& q, const VectorXd& xi) const {
+VectorXd AnswerLayout::WriteVelocities(const VectorXd& q, const VectorXd& xi) const {
   VectorXd written(size());
   if (base_ > 0) written.head<6>() = BaseConversion(convention_).ConvertVelocities(q, xi).head<6>();
   for (size_t i = 0; i < velocities_.size(); ++i)
@@ -214,11 +214,11 @@ VectorXd SideLayout::WriteVelocities(const VectorXd& q, const VectorXd& xi) cons
   return written;
 }
 
-void SideLayout::ReadTerms(const VectorXd& q, const VectorXd& xi, SideTerms* terms) const {
+void AnswerLayout::ReadTerms(const VectorXd& q, const VectorXd& xi, AnsweredTerms* terms) const {
   std::vector<Eigen::Index> from;
   for (int i = 0; i < base_; ++i) from.push_back(i);
   for (const int place : places_) from.push_back(base_ + place);
-  for (VectorXd* force : {&terms->coriolis, &terms->gravity, &terms->bias, &terms->friction}) {
+  for (VectorXd* const force : terms->forces()) {
     if (force->size() > 0) *force = VectorXd((*force)(from));
   }
   if (terms->M.size() > 0) terms->M = MatrixXd(terms->M(from, from));
@@ -242,10 +242,10 @@ std::optional<Json> ParseAnswer(std::string_view text) {
   return answer;
 }
 
-SideTerms ReadSideTerms(const Json& json, const SideLayout& layout, const VectorXd& v,
-                        const std::string& source) {
+AnsweredTerms ReadAnswer(const Json& json, const AnswerLayout& layout, const VectorXd& v,
+                         const std::string& source) {
   const Eigen::Index n = layout.size();
-  SideTerms terms;
+  AnsweredTerms terms;
   const auto find = [&](const char* key) { return json.contains(key) ? &json.at(key) : nullptr; };
   if (const Json* M = find("M")) terms.M = ReadMatrix(*M, n, "M", source);
   if (const Json* C = find("C")) terms.coriolis = ReadMatrix(*C, n, "C", source) * v;
@@ -255,17 +255,14 @@ SideTerms ReadSideTerms(const Json& json, const SideLayout& layout, const Vector
   if (const Json* friction = find("friction")) terms.friction = ReadVector(*friction, n, "friction", source);
   if (const Json* T = find("kinetic_energy")) terms.kinetic = ReadNumber(*T, "kinetic_energy", source);
   if (const Json* U = find("potential_energy")) terms.potential = ReadNumber(*U, "potential_energy", source);
-  const bool is_empty = terms.M.size() == 0 && terms.coriolis.size() == 0 && terms.gravity.size() == 0 &&
-                        terms.bias.size() == 0 && terms.friction.size() == 0 && !terms.kinetic &&
-                        !terms.potential;
-  if (is_empty) {
+  constexpr Term kAll[] = {Term::kMBar,     Term::kCBarXi,        Term::kGravity,        Term::kBias,
+                           Term::kFriction, Term::kKineticEnergy, Term::kPotentialEnergy};
+  if (std::none_of(std::begin(kAll), std::end(kAll), [&](Term term) { return terms.Has(term); })) {
     throw InputError(source +
                      ": must have M, C, c, g, h, friction, kinetic_energy or potential_energy, got " +
                      Abbreviate(json.dump()));
   }
-  if (terms.bias.size() == 0 && terms.coriolis.size() > 0 && terms.gravity.size() > 0) {
-    terms.bias = terms.coriolis + terms.gravity;
-  }
+  terms.AddBias();
   return terms;
 }
 

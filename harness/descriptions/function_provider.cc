@@ -1,11 +1,11 @@
-#include "harness/descriptions/function_side.h"
+#include "harness/descriptions/function_provider.h"
 
 #include "controller/common/errors.h"
 
 namespace dexcheck {
 
-void FunctionSide::CheckSize(const char* term, Eigen::Index rows, Eigen::Index cols,
-                             Eigen::Index expected_cols) const {
+void FunctionProvider::CheckSize(const char* term, Eigen::Index rows, Eigen::Index cols,
+                                 Eigen::Index expected_cols) const {
   if (rows == size_ && cols == expected_cols) return;
   const auto describe = [](Eigen::Index r, Eigen::Index c) {
     return std::to_string(r) + (c == 1 ? " entries" : " x " + std::to_string(c) + " entries");
@@ -14,8 +14,8 @@ void FunctionSide::CheckSize(const char* term, Eigen::Index rows, Eigen::Index c
                    ", got " + describe(rows, cols));
 }
 
-SideTerms FunctionSide::Evaluate(long, const VectorXd& q, const VectorXd& xi) {
-  SideTerms terms;
+AnsweredTerms FunctionProvider::Evaluate(long, const VectorXd& q, const VectorXd& xi) {
+  AnsweredTerms terms;
   if (functions_.M) {
     terms.M = functions_.M(q);
     CheckSize("M", terms.M.rows(), terms.M.cols(), size_);
@@ -27,11 +27,8 @@ SideTerms FunctionSide::Evaluate(long, const VectorXd& q, const VectorXd& xi) {
   if (functions_.c) take("c", functions_.c(q, xi), &terms.coriolis);
   if (functions_.g) take("g", functions_.g(q), &terms.gravity);
   if (functions_.friction) take("friction", functions_.friction(q, xi), &terms.friction);
-  if (functions_.h) {
-    take("h", functions_.h(q, xi), &terms.bias);
-  } else if (functions_.c && functions_.g) {
-    terms.bias = terms.coriolis + terms.gravity;
-  }
+  if (functions_.h) take("h", functions_.h(q, xi), &terms.bias);
+  terms.AddBias();
   return terms;
 }
 

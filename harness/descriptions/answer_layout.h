@@ -10,22 +10,23 @@
 #include <vector>
 
 #include "harness/descriptions/base_convention.h"
+#include "harness/descriptions/robot_description.h"
 
 namespace dexcheck {
 
-/// How one side writes q', xi and terms. Coordinates are the base's, if it floats, then one for each joint; a
-/// ball joint has a quaternion qw qx qy qz in q' and three entries in xi, in the robot's own convention.
-class SideLayout {
+/// How a program writes q', xi and terms. Coordinates are the base's, if it floats, then one for each joint;
+/// a ball joint has a quaternion qw qx qy qz in q' and three entries in xi, in the robot's own convention.
+class AnswerLayout {
  public:
   /// The robot's own: all joints, in its order.
-  explicit SideLayout(const RobotDescription& robot);
+  explicit AnswerLayout(const RobotDescription& robot);
 
-  /// From the keys `joints` (names in the side's order; all joints, or all that follow no other) and `base`
-  /// (of a floating base: {"position": "xyz_wxyz" | "xyz_xyzw" | "wxyz_xyz", "velocity": "linear_angular" |
-  /// "angular_linear", "linear_axes": "world" | "base", "angular_axes": "base" | "world"}), each of which may
-  /// be missing.
+  /// From the keys `joints` (names in the program's order; all joints, or all that follow no other) and
+  /// `base` (of a floating base: {"position": "xyz_wxyz" | "xyz_xyzw" | "wxyz_xyz", "velocity":
+  /// "linear_angular" | "angular_linear", "linear_axes": "world" | "base", "angular_axes": "base" |
+  /// "world"}), each of which may be missing.
   /// @param source who says so, for messages. @throws InputError "SOURCE: KEY: what, got VALUE".
-  SideLayout(const RobotDescription& robot, const nlohmann::json& json, const std::string& source);
+  AnswerLayout(const RobotDescription& robot, const nlohmann::json& json, const std::string& source);
 
   /// The keys that the constructor reads, of this layout.
   [[nodiscard]] nlohmann::ordered_json ToJson() const;
@@ -35,16 +36,16 @@ class SideLayout {
   [[nodiscard]] bool is_floating() const { return base_ > 0; }
   [[nodiscard]] const BaseConvention& convention() const { return convention_; }
   void set_convention(const BaseConvention& convention) { convention_ = convention; }
-  /// Entries of q' and xi as the side has them.
+  /// Entries of q' and xi as the program has them.
   [[nodiscard]] int num_positions() const { return num_positions_; }
   [[nodiscard]] int size() const { return base_ + static_cast<int>(velocities_.size()); }
 
-  /// q' and xi as the side writes them. q', xi: the robot's own.
+  /// q' and xi as the program writes them. q', xi: the robot's own.
   [[nodiscard]] VectorXd WritePositions(const VectorXd& q) const;
   [[nodiscard]] VectorXd WriteVelocities(const VectorXd& q, const VectorXd& xi) const;
-  /// Terms as the side wrote them, in the robot's own coordinates; without the joints that follow when the
-  /// side is reduced.
-  void ReadTerms(const VectorXd& q, const VectorXd& xi, SideTerms* terms) const;
+  /// Terms as the program wrote them, in the robot's own coordinates; without the joints that follow when it
+  /// is reduced.
+  void ReadTerms(const VectorXd& q, const VectorXd& xi, AnsweredTerms* terms) const;
 
  private:
   /// A joint as files have it: a ball's entries are one.
@@ -60,27 +61,27 @@ class SideLayout {
   int base_;  // entries of xi before the joints'
   int base_positions_;
   int num_positions_ = 0;
-  std::vector<int> joints_;      // the robot's index of each of the side's joints
-  std::vector<int> velocities_;  // the robot's of each of the side's velocities, without the base's
-  std::vector<int> places_;      // where the side has the robot's velocities, in the robot's order
+  std::vector<int> joints_;      // the robot's index of each of the program's joints
+  std::vector<int> velocities_;  // the robot's of each of the program's velocities, without the base's
+  std::vector<int> places_;      // where the program has the robot's velocities, in the robot's order
   bool is_reduced_ = false;
   BaseConvention convention_;
 };
 
-/// A side that answers in a layout of its own.
-class AnsweringSide : public TermSide {
+/// A provider that answers in a layout of its own.
+class AnsweringProvider : public AnsweredProvider {
  public:
   [[nodiscard]] bool is_reduced() const override { return layout_.is_reduced(); }
-  [[nodiscard]] const SideLayout& layout() const { return layout_; }
+  [[nodiscard]] const AnswerLayout& layout() const { return layout_; }
   /// Takes its words for another convention of the base than the one it said.
   void set_convention(const BaseConvention& convention) { layout_.set_convention(convention); }
 
  protected:
-  explicit AnsweringSide(SideLayout layout) : layout_(std::move(layout)) {}
-  void set_layout(SideLayout layout) { layout_ = std::move(layout); }
+  explicit AnsweringProvider(AnswerLayout layout) : layout_(std::move(layout)) {}
+  void set_layout(AnswerLayout layout) { layout_ = std::move(layout); }
 
  private:
-  SideLayout layout_;
+  AnswerLayout layout_;
 };
 
 /// A program's answer, which is one JSON object; none where the text is anything else or nests deeper than
@@ -88,9 +89,10 @@ class AnsweringSide : public TermSide {
 std::optional<nlohmann::json> ParseAnswer(std::string_view text);
 
 /// Terms from the keys M (n x n), C (n x n) or c = C v (n), g (n), h = c + g (n), friction (n),
-/// kinetic_energy, potential_energy; at least one. n is the layout's size, v the velocity as the side has it.
+/// kinetic_energy, potential_energy; at least one. n is the layout's size, v the velocity as the program has
+/// it.
 /// @throws InputError "SOURCE: KEY: what, got VALUE" for sizes that differ and what is no number.
-SideTerms ReadSideTerms(const nlohmann::json& json, const SideLayout& layout, const VectorXd& v,
-                        const std::string& source);
+AnsweredTerms ReadAnswer(const nlohmann::json& json, const AnswerLayout& layout, const VectorXd& v,
+                         const std::string& source);
 
 }  // namespace dexcheck

@@ -1,6 +1,6 @@
 // The checks' own P^-1 and its rate: the model's formulas and finite differences agree with them.
 
-#include "harness/checks/object_rates.h"
+#include "harness/descriptions/object_rates.h"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
+#include "harness/descriptions/answer_layout.h"
 #include "harness/descriptions/program_process.h"
-#include "harness/descriptions/side_layout.h"
 
 namespace dexcheck {
 
@@ -18,15 +18,16 @@ struct ProgramOptions {
 };
 
 /// A running program as one side.
-class ProgramSide : public AnsweringSide {
+class ProgramProvider : public AnsweringProvider {
  public:
   /// Starts it and says hello. @param robot outlives this.
   /// @throws ProgramError when it dies or hangs, InputError for what it says that is no answer; one line.
-  ProgramSide(const std::string& command, const RobotDescription& robot, const ProgramOptions& options = {});
+  ProgramProvider(const std::string& command, const RobotDescription& robot,
+                  const ProgramOptions& options = {});
 
   /// As it calls itself, or its command.
   [[nodiscard]] const std::string& name() const override { return name_; }
-  SideTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
+  AnsweredTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
 
  private:
   nlohmann::json Ask(const nlohmann::ordered_json& request);

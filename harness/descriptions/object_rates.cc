@@ -1,4 +1,4 @@
-#include "harness/checks/object_rates.h"
+#include "harness/descriptions/object_rates.h"
 
 #include <mujoco/mujoco.h>
 

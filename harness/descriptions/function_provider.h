@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "harness/descriptions/term_side.h"
+#include "harness/descriptions/answered_terms.h"
 
 namespace dexcheck {
 
@@ -20,13 +20,13 @@ struct TermFunctions {
   std::function<VectorXd(const VectorXd& q, const VectorXd& xi)> friction;  ///< Viscous.
 };
 
-/// The functions as one side.
-class FunctionSide : public TermSide {
+/// The functions as a provider.
+class FunctionProvider : public AnsweredProvider {
  public:
-  FunctionSide(TermFunctions functions, int size) : functions_(std::move(functions)), size_(size) {}
+  FunctionProvider(TermFunctions functions, int size) : functions_(std::move(functions)), size_(size) {}
   [[nodiscard]] const std::string& name() const override { return functions_.name; }
   /// @throws InputError "NAME: TERM: must have n entries, got m".
-  SideTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
+  AnsweredTerms Evaluate(long sample, const VectorXd& q, const VectorXd& xi) override;
 
  private:
   void CheckSize(const char* term, Eigen::Index rows, Eigen::Index cols, Eigen::Index expected_cols) const;

@@ -1,4 +1,4 @@
-#include "harness/descriptions/program_side.h"
+#include "harness/descriptions/program_provider.h"
 
 #include "controller/common/text.h"
 
@@ -10,7 +10,7 @@ using OrderedJson = nlohmann::ordered_json;
 
 OrderedJson ToList(const VectorXd& values) { return std::vector<double>(values.begin(), values.end()); }
 
-OrderedJson MakeHello(const RobotDescription& robot, const SideLayout& layout) {
+OrderedJson MakeHello(const RobotDescription& robot, const AnswerLayout& layout) {
   OrderedJson joints = OrderedJson::array();
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
@@ -35,9 +35,9 @@ OrderedJson MakeHello(const RobotDescription& robot, const SideLayout& layout) {
 
 }  // namespace
 
-ProgramSide::ProgramSide(const std::string& command, const RobotDescription& robot,
-                         const ProgramOptions& options)
-    : AnsweringSide(SideLayout(robot)),
+ProgramProvider::ProgramProvider(const std::string& command, const RobotDescription& robot,
+                                 const ProgramOptions& options)
+    : AnsweringProvider(AnswerLayout(robot)),
       robot_(robot),
       process_(command, options.seconds),
       source_("program " + Quote(command)),
@@ -51,10 +51,10 @@ ProgramSide::ProgramSide(const std::string& command, const RobotDescription& rob
   if (answer.contains("name") && answer.at("name").is_string()) {
     name_ = Abbreviate(answer.at("name").get<std::string>());
   }
-  set_layout(SideLayout(robot_, answer, source_));
+  set_layout(AnswerLayout(robot_, answer, source_));
 }
 
-Json ProgramSide::Ask(const OrderedJson& request) {
+Json ProgramProvider::Ask(const OrderedJson& request) {
   const std::string line = process_.Ask(request.dump(-1, ' ', false, OrderedJson::error_handler_t::replace));
   const std::optional<Json> parsed = ParseAnswer(line);
   if (!parsed) {
@@ -71,7 +71,7 @@ Json ProgramSide::Ask(const OrderedJson& request) {
   return answer;
 }
 
-SideTerms ProgramSide::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
+AnsweredTerms ProgramProvider::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
   const VectorXd positions = layout().WritePositions(q);
   const VectorXd velocities = layout().WriteVelocities(q, xi);
   const Json answer =
@@ -81,7 +81,7 @@ SideTerms ProgramSide::Evaluate(long sample, const VectorXd& q, const VectorXd& 
     throw InputError(source + ": id: must be " + std::to_string(sample) + ", got " +
                      (answer.contains("id") ? Abbreviate(answer.at("id").dump()) : "none"));
   }
-  SideTerms terms = ReadSideTerms(answer, layout(), velocities, source);
+  AnsweredTerms terms = ReadAnswer(answer, layout(), velocities, source);
   layout().ReadTerms(q, xi, &terms);
   return terms;
 }

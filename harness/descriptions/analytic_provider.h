@@ -1,0 +1,88 @@
+#pragma once
+
+// The analytic model's terms (controller/).
+
+#include <functional>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "controller/object/euler_zyz.h"
+#include "controller/object/object_dynamics.h"
+#include "harness/descriptions/dynamics_provider.h"
+#include "harness/descriptions/model_view.h"
+
+namespace dexcheck {
+
+/// The model's equations of the object. Checks of checks put wrong ones in their place.
+struct ObjectFormulas {
+  std::function<ObjectTerms(const MassProperties&, const Vector3d&, const Vector6d&, const Vector6d&)> terms =
+      CalcObjectTerms;
+  std::function<Pose(const Vector6d&)> pose = CalcObjectPose;
+};
+
+/// Where entries of one model are in another: joints and frames are matched by name.
+struct CoordinateMap {
+  /// The model's own. @param frames whose Jacobians are compared.
+  CoordinateMap(const RobotModel& model, std::vector<int> frames);
+  /// Of `model`, for each entry of `coordinates`. @throws InputError when a joint has no counterpart.
+  CoordinateMap(const RobotModel& model, const RobotModel& coordinates);
+
+  bool is_identity = true;
+  std::vector<int> positions, velocities, joints, frames;
+  std::vector<int> compared_frames;  ///< Whose Jacobians are compared, in the order of the comparison.
+};
+
+/// Coordinates of xi that move a link, ascending: the base's, then those of the joints between.
+std::vector<int> ListChain(const RobotModel& model, int link);
+
+/// The analytic model as a provider.
+class AnalyticProvider : public MechanismProvider {
+ public:
+  /// All frames. The model must outlive the provider.
+  /// @param make_view what stands for the model; a test may put a wrong one there.
+  AnalyticProvider(const RobotModel& model, std::string name,
+                   const ModelViewFactory& make_view = MakeModelView, ObjectFormulas object = {});
+  /// A model of its own.
+  AnalyticProvider(const RobotSpec& robot, std::string name);
+  /// Another model of the robot, in the coordinates of the first.
+  AnalyticProvider(const RobotModel& model, std::string name, const RobotModel& coordinates);
+
+  void SetState(const DynamicsState& state) override;
+  [[nodiscard]] bool Has(Term term) const override;
+  void Read(Term term, Eigen::Ref<MatrixXd> out) override;
+  [[nodiscard]] bool HasMass(int link) const override;
+
+ protected:
+  /// Terms that somebody else evaluates; the derived class sets view and Jacobians at each state.
+  AnalyticProvider(const RobotModel& model, std::string name, std::vector<int> frames);
+  void ReadEnergy() { energy_ = view_->CalcEnergyAndMomentum(); }
+
+  const RobotModel* model_;
+  CoordinateMap map_;
+  const ModelView* view_ = nullptr;
+  std::vector<std::pair<const Matrix6Xd*, const Matrix6Xd*>>
+      jacobians_;  ///< J, J_dot of the frames compared.
+  VectorXd xi_;    ///< In this model's order.
+
+ private:
+  AnalyticProvider(std::shared_ptr<const RobotModel> model, std::string name);
+  AnalyticProvider(const RobotModel& model, std::string name, CoordinateMap map,
+                   const ModelViewFactory& make_view, ObjectFormulas object);
+  void ReadObject(const DynamicsState& state);
+  void CalcJacobians();
+  void ReadJacobians(Eigen::Ref<MatrixXd> out) const;
+  void ReadAccelerations(Eigen::Ref<MatrixXd> out) const;
+  void ReadVelocities(const Eigen::Ref<const VectorXd>& own, Eigen::Ref<MatrixXd> out) const;
+  void ReadMatrix(const MatrixXd& own, Eigen::Ref<MatrixXd> out) const;
+
+  std::shared_ptr<const RobotModel> own_model_;
+  std::unique_ptr<ModelView> own_view_, unreduced_;
+  bool has_jacobians_ = false;  // at the state set
+  ObjectFormulas formulas_;
+  VectorXd q_, w_, unreduced_velocity_;
+  std::vector<std::pair<Matrix6Xd, Matrix6Xd>> own_jacobians_;
+  std::vector<std::vector<int>> chains_;  // of the frames compared
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,223 @@
+#include "harness/descriptions/engine_provider.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "harness/descriptions/object_rates.h"
+
+namespace dexcheck {
+namespace {
+
+std::vector<int> ListFrames(const RobotModel& model) {
+  std::vector<int> all(model.frames().size());
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+EngineTerms MakeTerms(const Adapter& adapter, std::span<const int> fingertips) {
+  return fingertips.empty() ? EngineTerms(adapter, Coordinates::kReduced) : EngineTerms(adapter, fingertips);
+}
+
+/// Pose and body velocity of the object at X_o, X_o_dot by the engine's quaternions.
+struct EngineObjectState {
+  Pose X_Bo = Pose::Identity();
+  Vector6d V_Bo = Vector6d::Zero();
+};
+
+EngineObjectState CalcEngineObjectState(const Vector6d& X_o, const Vector6d& X_o_dot) {
+  // Quaternion z(alpha) y(beta) z(gamma); each angle's rate turns about its axis as the later rotations leave
+  // it.
+  const mjtNum axes[3][3] = {{0, 0, 1}, {0, 1, 0}, {0, 0, 1}};
+  mjtNum rotation[4] = {1, 0, 0, 0};
+  Vector3d omega = Vector3d::Zero();  // in the frame reached so far
+  for (int k = 0; k < 3; ++k) {
+    mjtNum step[4];
+    mjtNum inverse[4];
+    mjtNum turned[3];
+    mju_axisAngle2Quat(step, axes[k], X_o[3 + k]);
+    mju_mulQuat(rotation, rotation, step);
+    mju_negQuat(inverse, step);
+    mju_rotVecQuat(turned, omega.data(), inverse);
+    omega = Vector3d(turned[0], turned[1], turned[2]) +
+            X_o_dot[3 + k] * Vector3d(axes[k][0], axes[k][1], axes[k][2]);
+  }
+  mju_normalize4(rotation);
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R;
+  mju_quat2Mat(R.data(), rotation);
+  EngineObjectState state;
+  state.X_Bo.linear() = R;
+  state.X_Bo.translation() = X_o.head<3>();
+  state.V_Bo << R.transpose() * X_o_dot.head<3>(), omega;
+  return state;
+}
+
+}  // namespace
+
+struct EngineProvider::OwnModel {
+  OwnModel(const RobotSpec& robot, MjModelPtr own, const std::string& source)
+      : model(robot), engine(std::move(own)), adapter(model, *engine, source) {}
+  RobotModel model;
+  MjModelPtr engine;
+  Adapter adapter;
+};
+
+EngineProvider::EngineProvider(const Adapter& adapter, std::string name)
+    : MechanismProvider(std::move(name)),
+      adapter_(&adapter),
+      terms_(adapter, Coordinates::kReduced),
+      unreduced_(std::make_unique<EngineTerms>(adapter, Coordinates::kUnreduced)) {
+  has_object_ = has_coordinates_ = adapter.model().object().has_value();
+  if (has_object_) terms_.RequireObject();
+  PrepareFrames(ListFrames(adapter.model()), /*contacts=*/false);
+  unreduced_velocity_.setZero(unreduced_->size());
+}
+
+EngineProvider::EngineProvider(const RobotSpec& robot, MjModelPtr engine, const std::string& source,
+                               std::string name)
+    : MechanismProvider(std::move(name)),
+      own_(std::make_shared<const OwnModel>(robot, std::move(engine), source)),
+      adapter_(&own_->adapter),
+      terms_(own_->adapter, Coordinates::kReduced) {
+  PrepareFrames({}, /*contacts=*/false);
+}
+
+EngineProvider::EngineProvider(const Adapter& adapter, std::span<const int> fingertips, bool has_coordinates)
+    : MechanismProvider("engine"), adapter_(&adapter), terms_(MakeTerms(adapter, fingertips)) {
+  has_object_ = adapter.model().object().has_value();
+  has_coordinates_ = has_coordinates;
+  if (fingertips.empty()) {
+    if (has_object_) terms_.RequireObject();
+    PrepareFrames(ListFrames(adapter.model()), /*contacts=*/false);
+  } else {
+    PrepareFrames(fingertips, /*contacts=*/true);
+  }
+}
+
+void EngineProvider::PrepareFrames(std::span<const int> frames, bool contacts) {
+  frames_.assign(frames.begin(), frames.end());
+  for (const int frame : frames_)
+    columns_.emplace_back(Matrix6Xd::Zero(6, static_cast<Eigen::Index>(terms_.chain(frame).size())));
+  if (contacts) {
+    contacts_.resize(frames_.size());
+    for (ContactValues& contact : contacts_) contact.J_B.setZero(3, terms_.size());
+  }
+  xi_.setZero(terms_.size());
+}
+
+void EngineProvider::SetState(const DynamicsState& state) {
+  const ObjectCoordinates coordinates{state.X_o, state.X_o_dot};
+  const EngineObjectState object = CalcEngineObjectState(state.X_o, state.X_o_dot);
+  SetState(state.q, state.xi, object.X_Bo, object.V_Bo, &coordinates);
+  w_ = state.w;
+  if (unreduced_ != nullptr) unreduced_->SetState(state.q, unreduced_velocity_);
+  links_ = terms_.links();
+}
+
+void EngineProvider::SetState(const VectorXd& q, const VectorXd& xi, const Pose& X_Bo, const Vector6d& V_Bo,
+                              const ObjectCoordinates* coordinates) {
+  xi_ = xi;
+  terms_.SetState(q, xi, X_Bo, V_Bo);
+  for (size_t i = 0; i < frames_.size(); ++i) terms_.CalcFrameColumns(frames_[i], columns_[i]);
+  energy_ = terms_.energy_and_momentum();
+  if (has_object_) ReadObject(coordinates);
+}
+
+void EngineProvider::ReadObject(const ObjectCoordinates* coordinates) {
+  const Pose X = terms_.ObjectPose();
+  object_.pose = X.matrix().topRows<3>();
+  object_.V_Bo = terms_.ObjectVelocity();
+  object_.M_hat = terms_.ObjectInertia();
+  object_.C_hat_V = terms_.ObjectCoriolis();
+  object_.N_o = terms_.ObjectGravity();
+  object_.kinetic = 0.5 * object_.V_Bo.dot(object_.M_hat * object_.V_Bo);
+  object_.potential = (X.linear() * object_.N_o.head<3>()).dot(X.translation());
+  if (coordinates == nullptr) return;
+  const ObjectRates rates = CalcObjectRates(coordinates->X_o, coordinates->X_o_dot);
+  object_.M_o = object_.M_hat * rates.P_inv;
+  object_.C_o_X_o_dot = object_.C_hat_V + object_.M_hat * rates.bias;
+}
+
+bool EngineProvider::Has(Term term) const {
+  if (term == Term::kM) return unreduced_ != nullptr;
+  return term != Term::kCBar && HasValue(term);
+}
+
+bool EngineProvider::HasMass(int link) const {
+  const std::vector<int>& bodies = adapter_->welded_bodies()[static_cast<size_t>(link + 1)];
+  return std::any_of(bodies.begin(), bodies.end(),
+                     [&](int body) { return adapter_->engine().body_mass[body] > 0.0; });
+}
+
+void EngineProvider::ReadJacobians(Eigen::Ref<MatrixXd> out) const {
+  for (size_t i = 0; i < frames_.size(); ++i) {
+    const Matrix3d R_T = terms_.FramePose(frames_[i]).linear().transpose();
+    Eigen::Index k = 0;
+    for (const int col : terms_.chain(frames_[i])) {
+      const Eigen::Index to = static_cast<Eigen::Index>(i) * terms_.size() + col;
+      out.col(to).head<3>() = R_T * columns_[i].col(k).head<3>();
+      out.col(to).tail<3>() = R_T * columns_[i].col(k++).tail<3>();
+    }
+  }
+}
+
+void EngineProvider::Read(Term term, Eigen::Ref<MatrixXd> out) {
+  switch (term) {
+    case Term::kJointAxis:
+      for (int i = 0; i < static_cast<int>(out.cols()); ++i) {
+        const int joint = adapter_->model().joint_of_dof(i);
+        out.col(i) << terms_.JointAxis(joint, i - adapter_->model().dof(joint)), terms_.JointAnchor(joint);
+      }
+      return;
+    case Term::kLinkCom:
+    case Term::kLinkInertia:
+      // Of a fixed base, which is the first, there is nothing to compare.
+      for (Eigen::Index i = 1; i <= out.cols(); ++i) {
+        const LinkInWorld& link = links_[links_.size() - static_cast<size_t>(i)];
+        if (term == Term::kLinkCom) {
+          out.col(out.cols() - i) = link.com;
+        } else {
+          out.col(out.cols() - i) = link.inertia.reshaped();
+        }
+      }
+      return;
+    case Term::kFramePose:
+      for (int i = 0; i < static_cast<int>(out.cols()); ++i)
+        out.col(i) = terms_.FramePose(i).matrix().topRows<3>().reshaped();
+      return;
+    case Term::kJ:
+      return ReadJacobians(out);
+    case Term::kJDotXi:
+      for (size_t i = 0; i < frames_.size(); ++i) {
+        const EngineMotion motion = terms_.FrameMotion(frames_[i]);
+        const Matrix3d R_T = terms_.FramePose(frames_[i]).linear().transpose();
+        out.col(static_cast<Eigen::Index>(i)) << R_T * motion.a, R_T * motion.alpha;
+      }
+      return;
+    case Term::kM:
+      out = unreduced_->M();
+      return;
+    case Term::kMBar: {
+      const double* entry = terms_.mass().data();
+      for (const MassEntry& at : terms_.mass_entries()) out(at.row, at.col) = *entry++;
+      return;
+    }
+    case Term::kCBarXi:
+      out = terms_.coriolis();
+      return;
+    case Term::kCBarProduct:
+      return terms_.CalcCoriolisProduct(xi_, w_, out.col(0));
+    case Term::kGravity:
+      out = terms_.gravity();
+      return;
+    case Term::kBias:
+      out = terms_.coriolis() + terms_.gravity();
+      return;
+    case Term::kFriction:
+      out = terms_.friction();
+      return;
+    default:
+      ReadValues(term, out);
+  }
+}
+
+}  // namespace dexcheck
