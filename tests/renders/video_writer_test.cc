@@ -269,7 +269,8 @@ TEST(VideoWriter, RefusesWhatH264CannotTake) {
     EXPECT_TRUE(
         Throws<std::invalid_argument>([&] { VideoWriter video(folder.path() / "a.mp4", options); }, message));
   };
-  expect([](EncodingOptions* o) { o->width = 129; }, "video width: must be even and from 2 to 16384, got 129");
+  expect([](EncodingOptions* o) { o->width = 129; },
+         "video width: must be even and from 2 to 16384, got 129");
   expect([](EncodingOptions* o) { o->height = 0; }, "video height: must be even");
   expect([](EncodingOptions* o) { o->fps = 0; }, "frames a second: must be from 1 to 240, got 0");
   EXPECT_TRUE(fs::is_empty(folder.path()));
