@@ -70,7 +70,7 @@ lines=$(wc -l <"$root/README.md")
 
 # Rows of the table of commands against the subcommands that --help lists.
 sed -nE 's/^\| `dexcheck ([a-z-]+)` .*/\1/p' "$root/README.md" | sort >"$scratch/listed"
-"$dexcheck" --help | sed -nE '/^Subcommands:/,$ s/^  ([a-z-]+) .*/\1/p' | sort >"$scratch/known"
+"$dexcheck" --help | sed -nE '/^Compare descriptions:/,$ s/^  ([a-z-]+) .*/\1/p' | sort >"$scratch/known"
 [[ $(wc -l <"$scratch/known") -ge 5 ]] || fail "dexcheck --help lists no commands"
 diff "$scratch/listed" "$scratch/known" >"$scratch/difference" ||
   fail "README.md (<) and dexcheck --help (>) have other commands:"$'\n'"$(cat "$scratch/difference")"

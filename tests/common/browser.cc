@@ -104,7 +104,7 @@ Browser::Browser() {
   }
 }
 
-Browser& Browser::Fraction() {
+Browser& Browser::Shared() {
   static Browser shared;
   shared.Command("Emulation.clearDeviceMetricsOverride", Json::object());
   shared.SetDark(false);

@@ -18,7 +18,7 @@ class Browser {
   Browser();
   ~Browser();
   /// One for all tests of a process, which takes its time to start: as new, but for what was open.
-  static Browser& Fraction();
+  static Browser& Shared();
   Browser(const Browser&) = delete;
   Browser& operator=(const Browser&) = delete;
 

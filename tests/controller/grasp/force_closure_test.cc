@@ -126,11 +126,13 @@ TEST(ForceClosure, DescentOverDirectionsFindsNothingWeaker) {
 }
 
 TEST(ForceClosureHandWorked, FourContactsOnTheEquator) {
-  // With sum f_i3 <= 1 the weakest direction is a moment about the axis midway between x and y: each contact
-  // has the lever (R + r) / sqrt 2 and gives it by friction, mu (R + r) / (sqrt 2 length).
+  // With sum f_i3 <= 1 a wrench is held as far as the best contact holds it. A length that is long beside the
+  // torus makes moments the weakest: the weakest of all is the one about the axis midway between x and y.
+  // Each contact has the lever (R + r) / sqrt 2 and gives it by friction, mu (R + r) / (sqrt 2 length).
   constexpr double kMu = 0.8;
   const GraspForceProblem grasp = MakeEquatorGraspForceProblem(4, kMu);
-  const ForceClosureOptions options;
+  ForceClosureOptions options;
+  options.length = 1.0;
   const double expected =
       kMu * (testing::kTorusRadius + testing::kTubeRadius) / (std::sqrt(2.0) * options.length);
   const ForceClosureResult result = CalcForceClosure(grasp.G, grasp.mu, options);

@@ -9,7 +9,7 @@
 
 #include "tests/common/matrix_near.h"
 
-namespace dexcheck::testing::grasp_internal::growing_polytope_test {
+namespace dexcheck::grasp_internal::growing_polytope_test {
 namespace {
 
 // Rounding of facet planes through points of unit size: the normal of a facet that is a thousand times
@@ -68,4 +68,4 @@ TEST(GrowingPolytope, NearestFacetSupportsAllPoints) {
 }
 
 }  // namespace
-}  // namespace dexcheck::testing::grasp_internal::growing_polytope_test
+}  // namespace dexcheck::grasp_internal::growing_polytope_test

@@ -1,11 +1,10 @@
 // Files for releases of MuJoCo after 2.2.2.
 
-#include "harness/engine/mjcf_passes.h"
-
 #include <gmock/gmock.h>
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/mjcf_passes.h"
 #include "harness/engine/mujoco_release.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"

@@ -92,7 +92,7 @@ class PageBrowserTest : public ::testing::Test {
   }
 
   testing::TempFolder folder_;
-  Browser& browser_ = Browser::Fraction();
+  Browser& browser_ = Browser::Shared();
 };
 
 TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {

@@ -80,7 +80,7 @@ class ReplayBrowserTest : public ::testing::Test {
   RunFrames run_;
   MjModelPtr model_ = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   MjDataPtr data_ = MakeData(*model_);
-  Browser& browser_ = Browser::Fraction();
+  Browser& browser_ = Browser::Shared();
 };
 
 /// Each body that moves is where a bone is.

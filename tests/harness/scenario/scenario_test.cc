@@ -75,7 +75,7 @@ TEST(Scenario, AllMissingKeysAreToldAtOnce) {
             "new.toml:1: missing key \"name\", \"duration\", \"start\", \"grasp\", \"control\", "
             "\"trajectory\"");
   // A value that is wrong as well is told when nothing is missing any more.
-  EXPECT_EQ(problem("name = \"mine\"\nsettle = 1e9"), "new.toml:1: missing key \"duration\"");
+  EXPECT_EQ(problem("name = \"mine\"\nsettle = 1e9"), "new.toml:1: missing key \"duration\", \"start\"");
 }
 
 struct BadInput {

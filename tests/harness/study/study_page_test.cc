@@ -39,10 +39,11 @@ class StudyPageBrowserTest : public ::testing::Test {
     std::filesystem::remove(folder_.path() / "page.sqlite");
     StudyStore store =
         StudyStore::OpenOrCreate(folder_.path() / "page.sqlite", IdentifyStudy(inputs), inputs.study);
-    SearchHistory history(inputs.study, UnitPoint(inputs.study.num_keys(), 0.5));
-    const bool is_search = inputs.study.is_search();
-    for (const Trial& trial : is_search ? history.ListMissing() : ListTrials(inputs.study))
-      store.Add(MakeRow(trial));
+    const std::vector<Trial> trials =
+        inputs.study.is_search()
+            ? SearchHistory(inputs.study, UnitPoint(inputs.study.num_keys(), 0.5)).ListMissing()
+            : ListTrials(inputs.study);
+    for (const Trial& trial : trials) store.Add(MakeRow(trial));
     WriteText(folder_.path() / "page.html", MakeStudyPage(SummariseStudy(store)));
     browser_.SetViewport(width, 900, width < 500);
     browser_.Open(folder_.path() / "page.html");
@@ -68,7 +69,7 @@ class StudyPageBrowserTest : public ::testing::Test {
   }
 
   TempFolder folder_;
-  Browser& browser_ = Browser::Fraction();
+  Browser& browser_ = Browser::Shared();
 };
 
 TEST_F(StudyPageBrowserTest, ACellShowsTheCommandThatRepeatsItsTrial) {
