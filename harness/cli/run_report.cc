@@ -15,8 +15,7 @@
 namespace dexcheck::cli {
 namespace {
 
-constexpr const char* kAllHolds =
-    "model, law, inverse and forward dynamics, and assumptions hold at every step";
+constexpr const char* kAllHolds = "model, law, inverse and forward dynamics, assumptions hold at every step";
 
 std::string Tell(bool failed) { return failed ? Paint(Tone::kBad, "FAILS") : Paint(Tone::kGood, "ok"); }
 

@@ -80,6 +80,9 @@ using Properties = Handle<H5Pclose>;
 class SilencedErrors {
  public:
   SilencedErrors() {
+    // Of a damaged file HDF5 cannot close what it holds, and would say so when the program ends. It listens
+    // to the first call only.
+    H5dont_atexit();
     H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   }

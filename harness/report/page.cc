@@ -42,7 +42,7 @@ Headline FindHeadline(const RunData& run) {
                                      : "The engine does not do what the equations say."};
   }
   if (run.checks().empty()) return {"open", "NOT CHECKED", "The run completed; nothing was checked."};
-  return {"pass", "PASS", "Model, law, inverse and forward dynamics, and assumptions hold at every step."};
+  return {"pass", "PASS", "Model, law, inverse and forward dynamics, assumptions hold at every step."};
 }
 
 /// What a category compares, in a few words.

@@ -42,7 +42,8 @@ const MakeCharts = () => {
   const Legend = shown => ({display: shown, position: 'bottom', labels: {boxWidth: 14}});
   const Choose = choose => (_, elements, chart) => {
     const point = elements.map(e => chart.data.datasets[e.datasetIndex].data[e.index]).find(p => p.row !== undefined);
-    if (point) choose(point.row);
+    // Later, for charts are drawn anew by it: this one still has the event to finish.
+    if (point) setTimeout(() => choose(point.row));
   };
   const Tip = tell => ({callbacks: {title: () => '', label: item => tell(item.raw)}});
 

@@ -1,12 +1,11 @@
 // Two descriptions without the engine: they agree when they describe one robot, whatever the order of joints
 // and the choice of frames, and what differs is found.
 
-#include "harness/checks/consistency.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
+#include "harness/checks/consistency.h"
 #include "harness/descriptions/alike_names.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/read_description.h"

@@ -150,7 +150,7 @@ TEST_F(ExportTest, LogsWithoutRowsGiveAHeader) {
 TEST_F(ExportTest, BadLogsAreRefusedInOneLine) {
   Write("out.csv", "before");
   const std::string log = Read("run/log.h5");
-  for (const auto& [text, part] : {std::pair(log.substr(0, log.size() / 2), "cut short"),
+  for (const auto& [text, part] : {std::pair(log.substr(0, log.size() / 2), "the log is damaged"),
                                    {std::string("no log"), "not a dexcheck log"}}) {
     Write("run/log.h5", text);
     EXPECT_TRUE(IsRefused(Export("--csv out.csv"), {"run/log.h5: ", part}));

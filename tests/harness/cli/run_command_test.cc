@@ -8,7 +8,7 @@
 #include "harness/log/log_writer.h"
 #include "tests/common/refused_text.h"
 #include "tests/harness/cli/dexcheck_program.h"
-#include "tests/harness/log/forge.h"
+#include "tests/harness/log/change_log.h"
 
 namespace dexcheck::testing::run_command_test {
 namespace {
@@ -49,8 +49,8 @@ TEST_F(RunCommand, WritesAFolderThatTellsAll) {
   EXPECT_GT(summary["tracking"]["position_error_rms_m"].get<double>(), 0.0);
   EXPECT_TRUE(summary["tracking"].contains("orientation_error_max_rad"));
   for (const auto& [check, kind] : {std::pair("M_bar", "model"),
-                                    {"inverse_dynamics_robot", "balance"},
-                                    {"reduced_acceleration", "prediction"},
+                                    {"inverse_dynamics_robot", "inverse_dynamics"},
+                                    {"reduced_acceleration", "forward_dynamics"},
                                     {"wheel_slip", "assumption"}}) {
     const Json& entry = summary["checks"][check];
     for (const char* key : {"max", "rms", "bound", "at_time_s"})
@@ -145,7 +145,7 @@ TEST_F(RunCommand, AWordThatIsSetReplacesTheFilesAndKeysCanBeRemoved) {
 /// A log from before a check was split has a signal that nothing records any more.
 TEST_F(RunCommand, AReplayLeavesOutASignalThatWasReplaced) {
   Expect(0, "run hold --set duration=0.01 --no-report --out run");
-  ForgeStructure(Path("run/log.h5"), [](hid_t file) {
+  ChangeLog(Path("run/log.h5"), [](hid_t file) {
     ASSERT_GE(H5Lmove(file, "check/grasp_cone", file, "check/grasp_force", H5P_DEFAULT, H5P_DEFAULT), 0);
     const hid_t attribute = H5Aopen(file, "signals", H5P_DEFAULT);
     const hid_t type = H5Aget_type(attribute);

@@ -160,7 +160,7 @@ TEST_F(PageBrowserTest, NoTileIsNarrowerThanItsWords) {
   browser_.Open(folder_.path() / "report.html");
   for (const int width : {360, 641, 850, 1300, 2560}) {
     browser_.SetViewport(width, 900, false);
-    ASSERT_GE(browser_.Run("return document.querySelectorAll('.question b').length;"), 1);
+    ASSERT_GE(browser_.Run("return document.querySelectorAll('.category b').length;"), 1);
     EXPECT_EQ(browser_.Run("return [...document.querySelectorAll('.tiles b')]"
                            "  .filter(b => b.scrollWidth > b.clientWidth).map(b => b.textContent);"),
               nlohmann::json::array())
