@@ -38,9 +38,9 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
       disturbances_(parts.disturbances, setup.MakePartContext()),
       num_steps_(std::lround(setup.scenario().duration / setup.scenario().plant.time_step)) {
   const Scenario& scenario = setup.scenario();
-  StepChecks::RequireKnownBounds(scenario);
+  RequireKnownBounds(scenario);
   if (check) checks_.emplace(setup, plant_->motors(), parts.knows_law);
-  record_.model = &controller_->model();
+  record_.model = record_.true_model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);
   if (!scenario.trajectory) return;
@@ -78,7 +78,7 @@ bool ClosedLoop::Settle(const std::function<bool()>& should_stop) {
 void ClosedLoop::BeginRun() {
   const std::string where = setup_->scenario().source + (task_ != nullptr ? ": task: " : ": control: ");
   try {
-    controller_->Begin(0.0, record_.told);
+    controller_->Begin(0.0, record_.measured);
   } catch (const InputError& error) {
     throw InputError(where + error.what());
   } catch (const std::invalid_argument& error) {
@@ -100,12 +100,12 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
     ControlStep(t);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
     if (checks_ && i == grip) checks_->Forget();
-    if (checks_ && t >= kRoughTime) checks_->CompareSettling(record_);
+    if (checks_ && t >= kRoughTime) checks_->JudgeSettling(record_);
     try {
       CheckGrasp();
     } catch (const RunFailure&) {
       // Why it does not hold: of a run that never begins, the first question is asked here.
-      if (checks_) checks_->CompareModel(record_);
+      if (checks_) checks_->JudgeModel(record_);
       throw;
     }
   }
@@ -134,9 +134,9 @@ void ClosedLoop::ControlStep(double t) {
   const auto read = Clock::now();
   plant_->Read(&record_.reading);
   CheckRobot();
-  sensing_.Tell(record_.reading, &record_.told);
-  if (hidden_sensor_fault_) hidden_sensor_fault_(t, &record_.told.state);
-  controller_->Step(record_.told, t, &record_.command);
+  sensing_.Tell(record_.reading, &record_.measured);
+  if (hidden_sensor_fault_) hidden_sensor_fault_(t, &record_.measured.state);
+  controller_->Step(record_.measured, t, &record_.command);
   DriveMotors(t);
   if (!disturbances_.empty()) {
     plant_->Push(disturbances_.Evaluate(record_.time, record_.reading));
@@ -145,7 +145,7 @@ void ClosedLoop::ControlStep(double t) {
   plant_->EndStep(record_.drive.tau);
   const auto end = Clock::now();
   plant_->Read(&record_.response);
-  if (checks_) record_.known = checks_->Follow(record_);
+  if (checks_) record_.true_model = &checks_->Follow(record_);
   if (checks_) times_.cross_check += Seconds(end, Clock::now());
   times_.plant += Seconds(begin, read) + Seconds(control, end);
   times_.controller += Seconds(read, control);
@@ -157,14 +157,14 @@ void ClosedLoop::DriveMotors(double t) {
   try {
     drive_.Apply(record_.command.tau, record_.reading.state.xi, &record_.drive);
   } catch (const RunFailure&) {
-    if (checks_) checks_->JudgeEffort(record_.drive.effort, t);
-    if (checks_) record_.known = checks_->Follow(record_);
+    if (checks_) checks_->JudgeEffort(record_, t);
+    if (checks_) record_.true_model = &checks_->Follow(record_);
     // Torques that are too large may be those of no law. While everything settles they follow another
     // trajectory.
-    if (checks_ && is_running_) checks_->CompareUnsent(record_);
+    if (checks_ && is_running_) checks_->JudgeUnsent(record_);
     throw;
   }
-  if (checks_) checks_->JudgeEffort(record_.drive.effort, t);
+  if (checks_) checks_->JudgeEffort(record_, t);
 }
 
 void ClosedLoop::Step() {
@@ -177,10 +177,9 @@ void ClosedLoop::Step() {
   ++record_.step;
   if (checks_) {
     const auto begin = Clock::now();
-    checks_->CompareModel(record_);
-    checks_->CompareMotion(record_);
-    checks_->CompareLaw(record_);
-    record_.findings = checks_->findings();
+    checks_->JudgeModel(record_);
+    checks_->JudgeStep(record_);
+    record_.findings = checks_->analysis().findings;
     times_.cross_check += Seconds(begin, Clock::now());
   }
   CheckGrasp();
@@ -189,7 +188,7 @@ void ClosedLoop::Step() {
 
 void ClosedLoop::Disturb(const DisturbanceOptions& disturbance) {
   disturbances_.Add(disturbance, setup_->MakePartContext());
-  if (checks_) checks_->Expect(disturbance, plant_->motors());
+  if (checks_) checks_->Expect(disturbance);
 }
 
 void ClosedLoop::CheckTask() const {

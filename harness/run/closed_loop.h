@@ -8,7 +8,7 @@
 
 #include "controller/control/controller.h"
 #include "controller/control/trajectory.h"
-#include "harness/checks/cross_check.h"
+#include "harness/checks/run_checks.h"
 #include "harness/checks/step_record.h"
 #include "harness/plant/disturbances.h"
 #include "harness/plant/motor_drive.h"
@@ -39,7 +39,7 @@ struct LoopTimes {
 ///   plant --PlantReading--> sensing --Reading--> controller --Command--> motors --tau'--> plant <-- pushes
 ///     `----PlantResponse----> checks: all of it is one StepRecord
 ///
-/// Deterministic. Nothing allocates in a step, except as the controller and StepChecks say.
+/// Deterministic. Nothing allocates in a step, except as the controller and RunChecks say.
 class ClosedLoop {
  public:
   /// @param check whether to cross-check.
@@ -74,7 +74,7 @@ class ClosedLoop {
 
   [[nodiscard]] bool is_checking() const { return checks_.has_value(); }
   /// Only when checking.
-  [[nodiscard]] const CrossCheck& checks() const { return checks_.value(); }
+  [[nodiscard]] const RunChecks& checks() const { return checks_.value(); }
   /// The controller of a task; null unless the scenario is one.
   [[nodiscard]] const PickAndPlaceController* task() const { return task_; }
   [[nodiscard]] const LoopTimes& times() const { return times_; }
@@ -101,7 +101,7 @@ class ClosedLoop {
   const TrajectoryController* follower_ = nullptr;  // likewise
   MotorDrive drive_;
   Disturbances disturbances_;
-  std::optional<CrossCheck> checks_;
+  std::optional<RunChecks> checks_;
   std::unique_ptr<Trajectory> trajectory_;  // null for a task or a motion of joints
   StepRecord record_;
   long num_steps_ = 0;

@@ -154,9 +154,9 @@ void RunRecorder::AddStateSignals() {
   }
   if (!setup_->scenario().imperfections.is_ideal()) {
     Add({"told/q", q_units, "q' as the controller was told it", model.num_positions(), q_names, {}},
-        [](const StepRecord& step, std::span<double> row) { Copy(step.told.state.q, row); });
+        [](const StepRecord& step, std::span<double> row) { Copy(step.measured.state.q, row); });
     Add({"told/xi", xi_units, "reduced velocity as the controller was told it", n, xi_names, {}},
-        [](const StepRecord& step, std::span<double> row) { Copy(step.told.state.xi, row); });
+        [](const StepRecord& step, std::span<double> row) { Copy(step.measured.state.xi, row); });
     Add({"tau_given", "N m", "what the motors made of tau", n, tau_names, {}},
         [](const StepRecord& step, std::span<double> row) { Copy(step.drive.tau, row); });
   }
@@ -365,7 +365,7 @@ void RunRecorder::AddTaskSignals() {
 void RunRecorder::AddClearanceSignals() {
   std::vector<PairClass> classes;
   std::vector<std::string> names;
-  for (const WatchedPair& pair : checks_->clearance().pairs()) {
+  for (const WatchedPair& pair : checks_->analysis().clearance->pairs()) {
     if (std::find(classes.begin(), classes.end(), pair.pairs) == classes.end()) classes.push_back(pair.pairs);
   }
   std::sort(classes.begin(), classes.end());
@@ -379,7 +379,7 @@ void RunRecorder::AddClearanceSignals() {
        {}},
       [this, classes](const StepRecord& /*step*/, std::span<double> row) {
         for (size_t i = 0; i < classes.size(); ++i) {
-          row[i] = checks_->clearance().nearest(classes[i]).distance;
+          row[i] = checks_->analysis().clearance->nearest(classes[i]).distance;
         }
       });
 }

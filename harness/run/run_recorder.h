@@ -45,7 +45,7 @@ class RunRecorder {
   void AddCheckSignals();
 
   const Setup* setup_;
-  const CrossCheck* checks_;  // null without
+  const RunChecks* checks_;  // null without
   LogWriter log_;
   struct Channel {
     int signal;

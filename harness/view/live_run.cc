@@ -122,7 +122,7 @@ void LiveRun::Record(const StepRecord& step) {
     frame.contact_forces.block<1, 3>(0, 3 * i) = contact.force.transpose();
     frame.contact_normals.block<1, 3>(0, 3 * i) = contact.normal.transpose();
   }
-  const CrossCheck& checks = runner_->loop().checks();
+  const RunChecks& checks = runner_->loop().checks();
   for (const CheckCategory kind : kCheckCategorys) {
     CategoryStatus& question = view.questions.emplace_back();
     question.name = NameOf(kind);

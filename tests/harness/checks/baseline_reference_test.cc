@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "controller/control/trajectory_controller.h"
-#include "harness/checks/step_check_table.h"
+#include "harness/checks/check_table.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::baseline_reference_test {
@@ -61,9 +61,9 @@ TEST_P(BaselineCheck, TheLawPassesToRoundingAndAnotherIsFound) {
     EXPECT_LE(check.worst, 0.5 * check.bound) << name;
     EXPECT_GT(check.count, 0) << name;
   }
-  EXPECT_FALSE(run.loop().checks().Find("law_demand").applies);
-  EXPECT_EQ(run.loop().checks().Find("closed_loop_spectral_radius").applies, law == "operational_space");
-  EXPECT_EQ(run.loop().checks().Find("error_dynamics").applies, law == "operational_space");
+  EXPECT_FALSE(run.loop().checks().Has("law_demand"));
+  EXPECT_EQ(run.loop().checks().Has("closed_loop_spectral_radius"), law == "operational_space");
+  EXPECT_EQ(run.loop().checks().Has("error_dynamics"), law == "operational_space");
 
   double worst = 0.0;
   // A millionth too much, and the law beside it.

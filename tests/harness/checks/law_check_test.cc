@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include "harness/checks/law_terms.h"
-#include "harness/checks/step_check_table.h"
 #include "harness/diagnosis/spoiled_law.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"

@@ -34,7 +34,7 @@ TEST(JointMotionRun, PandaReachesToRounding) {
   // Nothing is held, and nothing is said of it.
   for (const char* check :
        {"contact_force", "fingertip_slip", "kappa", "inverse_dynamics_object", "grasp_optimality"}) {
-    EXPECT_FALSE(run.loop().checks().Find(check).applies) << check;
+    EXPECT_FALSE(run.loop().checks().Has(check)) << check;
   }
 }
 

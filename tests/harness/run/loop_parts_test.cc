@@ -103,7 +103,7 @@ TEST_F(LoopPartsTest, TheRecordHasWhatTheLawDemandedAndWhatCameOfIt) {
   EXPECT_LT((step.response.V_Bo_dot - step.command.demand.V_Bo_dot).norm(), 1e-4);
   EXPECT_LT((step.response.motor_torques - step.drive.tau).norm(), 1e-12 * step.drive.tau.norm());
   EXPECT_EQ(step.drive.tau, step.command.tau);
-  EXPECT_EQ(step.told.state.q, step.reading.state.q);
+  EXPECT_EQ(step.measured.state.q, step.reading.state.q);
 }
 
 }  // namespace
