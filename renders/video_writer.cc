@@ -29,7 +29,7 @@ constexpr std::array<Recipe, 3> kRecipes = {{{".mp4", "mp4", "libx264", AV_PIX_F
                                              {".webm", "webm", "libvpx-vp9", AV_PIX_FMT_YUV420P},
                                              {".gif", "gif", "gif", AV_PIX_FMT_PAL8}}};
 
-void CheckOptions(const VideoOptions& options, VideoFormat format) {
+void CheckOptions(const EncodingOptions& options, VideoFormat format) {
   constexpr int kLargest = 16384;
   const auto check_size = [](const char* name, int value) {
     Require(value >= 2 && value <= kLargest && value % 2 == 0, name, "must be even and from 2 to 16384",
@@ -49,7 +49,7 @@ void CheckOptions(const VideoOptions& options, VideoFormat format) {
 
 class VideoWriter::Impl {
  public:
-  Impl(const std::filesystem::path& path, const VideoOptions& options)
+  Impl(const std::filesystem::path& path, const EncodingOptions& options)
       : file_(path),
         kind_(FindVideoFormat(path)),
         recipe_(kRecipes[static_cast<size_t>(kind_)]),
@@ -202,7 +202,7 @@ class VideoWriter::Impl {
   PartialFile file_;
   VideoFormat kind_;
   const Recipe& recipe_;
-  VideoOptions options_;
+  EncodingOptions options_;
   libav::CodecPtr encoder_;
   libav::FormatPtr format_;
   AVStream* stream_ = nullptr;      // of format_
@@ -221,7 +221,7 @@ VideoFormat FindVideoFormat(const std::filesystem::path& path) {
   throw InputError(path.string() + ": cannot be written: a video's name must end in .mp4, .webm or .gif");
 }
 
-VideoWriter::VideoWriter(const std::filesystem::path& path, const VideoOptions& options)
+VideoWriter::VideoWriter(const std::filesystem::path& path, const EncodingOptions& options)
     : impl_(std::make_unique<Impl>(path, options)) {}
 
 VideoWriter::~VideoWriter() = default;

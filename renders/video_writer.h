@@ -8,7 +8,7 @@
 
 namespace dexcheck {
 
-struct VideoOptions {
+struct EncodingOptions {
   int width = 1280;                 ///< Even.
   int height = 720;                 ///< Even.
   int fps = 30;                     ///< Frames a second.
@@ -34,7 +34,7 @@ class VideoWriter {
  public:
   /// @throws InputError "PATH: cannot be written: reason".
   /// @throws std::invalid_argument for sizes or rates that the format cannot take.
-  VideoWriter(const std::filesystem::path& path, const VideoOptions& options);
+  VideoWriter(const std::filesystem::path& path, const EncodingOptions& options);
   /// Removes what was written unless Finish was called.
   ~VideoWriter();
   VideoWriter(const VideoWriter&) = delete;

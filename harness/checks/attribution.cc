@@ -144,7 +144,7 @@ const char* NameOf(Cause cause) {
   return "none";
 }
 
-AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord> model,
+AttributionResult Attribute(const ConstantChecks& constants, std::span<const CheckRecord> model,
                             std::span<const CheckRecord> steps, const MeasuredCauses& measured) {
   AttributionResult result;
   const CheckRecord* first_model = nullptr;
@@ -155,8 +155,8 @@ AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord>
   }
   const bool any_step =
       std::any_of(steps.begin(), steps.end(), [](const CheckRecord& c) { return c.failed; });
-  if (!gate.findings.empty()) {
-    const GateFinding& finding = gate.findings.front();
+  if (!constants.findings.empty()) {
+    const ConstantFinding& finding = constants.findings.front();
     result.cause = Cause::kModel;
     result.evidence = finding.check + ": " + finding.where + ": " + FormatNumber(finding.model) +
                       " in the model, " + FormatNumber(finding.engine) + " in the MJCF";

@@ -8,7 +8,7 @@
 
 #include "harness/base/check_record.h"
 #include "harness/checks/failure_cause.h"
-#include "harness/gate/static_gate.h"
+#include "harness/descriptions/constant_checks.h"
 
 namespace dexcheck {
 
@@ -44,7 +44,7 @@ struct AttributionResult {
 /// sliding shows at the edge of the friction cone, and tells slip from contacts that merely give.
 /// @param model checks of the first question.
 /// @param measured what was found out beside the checks.
-AttributionResult Attribute(const GateResult& gate, std::span<const CheckRecord> model,
+AttributionResult Attribute(const ConstantChecks& constants, std::span<const CheckRecord> model,
                             std::span<const CheckRecord> steps, const MeasuredCauses& measured = {});
 
 /// What was measured of a cause; empty when nothing was.

@@ -7,7 +7,7 @@ namespace dexcheck {
 
 bool ConsistencyResult::Agrees() const {
   const auto good = [](const CheckRecord& record) { return !record.failed; };
-  return std::all_of(gate.records.begin(), gate.records.end(), good) &&
+  return std::all_of(constants.records.begin(), constants.records.end(), good) &&
          std::all_of(terms.begin(), terms.end(), good);
 }
 
@@ -16,7 +16,7 @@ ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOpti
   const auto start = std::chrono::steady_clock::now();
   const RobotModel& model = adapter.model();
   ConsistencyResult result;
-  result.gate = RunStaticGate(adapter);
+  result.constants = CheckConstants(adapter);
 
   ModelCheck check(adapter, options.make_view, options.object);
   StateSource source(model, options.range, options.seed);

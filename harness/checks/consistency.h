@@ -8,9 +8,9 @@
 
 #include "harness/base/check_record.h"
 #include "harness/checks/model_check.h"
-#include "harness/checks/random_states.h"
+#include "harness/descriptions/constant_checks.h"
+#include "harness/descriptions/random_states.h"
 #include "harness/engine/adapter.h"
-#include "harness/gate/static_gate.h"
 
 namespace dexcheck {
 
@@ -27,7 +27,7 @@ struct ConsistencyOptions {
 };
 
 struct ConsistencyResult {
-  GateResult gate;
+  ConstantChecks constants;
   std::vector<CheckRecord> terms;
   long samples = 0;  ///< Compared: fewer than asked for when `progress` said stop.
   double seconds = 0.0;
@@ -35,7 +35,7 @@ struct ConsistencyResult {
   [[nodiscard]] bool Agrees() const;
 };
 
-/// The static gate, then all terms of robot and object at random states over the joint ranges.
+/// The constants, then all terms of robot and object at random states over the joint ranges.
 /// @param progress called after each sample with the number done; its false ends the work early.
 ConsistencyResult CheckConsistency(const Adapter& adapter, const ConsistencyOptions& options,
                                    const std::function<bool(long)>& progress);

@@ -10,8 +10,8 @@
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/rolling.h"
 #include "controller/contact/shapes.h"
-#include "harness/checks/random_states.h"
 #include "harness/checks/term_comparison.h"
+#include "harness/descriptions/random_states.h"
 
 namespace dexcheck {
 

@@ -19,7 +19,7 @@ int CountDigits(double error) {
 
 int CountDigits(const ConsistencyResult& result) {
   int digits = kMostDigits;
-  for (const std::vector<CheckRecord>* records : {&result.gate.records, &result.terms}) {
+  for (const std::vector<CheckRecord>* records : {&result.constants.records, &result.terms}) {
     for (const CheckRecord& record : *records) {
       if (record.failed) digits = std::min(digits, CountDigits(record.worst));
     }
@@ -28,7 +28,7 @@ int CountDigits(const ConsistencyResult& result) {
 }
 
 void JudgeByTolerance(double tolerance, ConsistencyResult* result) {
-  JudgeByTolerance(tolerance, &result->gate);
+  JudgeByTolerance(tolerance, &result->constants);
   JudgeByTolerance(tolerance, &result->terms);
 }
 

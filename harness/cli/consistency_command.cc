@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -12,13 +14,13 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/interrupts.h"
+#include "harness/checks/answers_comparison.h"
 #include "harness/checks/tolerance.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/descriptions/answer_files.h"
-#include "harness/descriptions/answers_comparison.h"
 #include "harness/descriptions/program_side.h"
 #include "harness/descriptions/read_description.h"
 

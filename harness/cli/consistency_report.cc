@@ -80,13 +80,13 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
   list("not compared", comparison.not_compared);
   list("worth knowing", comparison.notes);
   fmt::print("{:<24}{:>9}  {:>12}  {:>9}  {:>6}\n", "constant", "compared", "worst error", "bound", "digits");
-  for (const CheckRecord& record : result.gate.records) {
+  for (const CheckRecord& record : result.constants.records) {
     fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {}\n", record.name, record.comparisons, record.worst,
                record.bound, CountDigits(record.worst), record.failed ? "DIFFERS" : "ok");
   }
-  if (!result.gate.notes.empty()) {
+  if (!result.constants.notes.empty()) {
     fmt::print("{} notes on what only a run has (contacts, solver, motors' limits): --json\n",
-               result.gate.notes.size());
+               result.constants.notes.size());
   }
   fmt::print("\n{:<24}{:>9}  {:>12}  {:>9}  {:>6}\n", "term", "compared", "worst error", "bound", "digits");
   for (const CheckRecord& record : result.terms) {
@@ -162,10 +162,11 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
   json["not_compared"] = comparison.not_compared;
   if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
   json["checks"] = Json::object();
-  for (const CheckRecord& record : result.gate.records) json["checks"][record.name] = ToJson(record, model);
+  for (const CheckRecord& record : result.constants.records)
+    json["checks"][record.name] = ToJson(record, model);
   for (const CheckRecord& record : result.terms) json["checks"][record.name] = ToJson(record, model);
   json["findings"] = Json::array();
-  for (const GateFinding& finding : result.gate.findings) {
+  for (const ConstantFinding& finding : result.constants.findings) {
     json["findings"].push_back({{"check", finding.check},
                                 {"where", finding.where},
                                 {"model", finding.model},
@@ -173,7 +174,7 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
     if (!finding.effect.empty()) json["findings"].back()["effect"] = finding.effect;
   }
   json["engine_notes"] = Json::array();
-  for (const GateNote& note : result.gate.notes)
+  for (const ConstantNote& note : result.constants.notes)
     json["engine_notes"].push_back({{"kind", note.kind}, {"text", note.text}});
   json["hypotheses"] = ListHypotheses(comparison.hypotheses);
   return json.dump(2) + "\n";
@@ -186,10 +187,10 @@ std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comp
   const auto add = [&](const std::string& group, const CheckRecord& record) {
     cases.push_back(MakeJUnitCase(group, record, Describe(record.where, model, model.num_base_velocities())));
   };
-  for (const CheckRecord& record : result.gate.records) add("constant", record);
+  for (const CheckRecord& record : result.constants.records) add("constant", record);
   for (const CheckRecord& record : result.terms) add("term", record);
   // What the engine's model alone has belongs to no check of its own.
-  for (const GateFinding& finding : result.gate.findings) {
+  for (const ConstantFinding& finding : result.constants.findings) {
     const bool has_case = std::any_of(cases.begin(), cases.end(),
                                       [&](const JUnitCase& test) { return test.name == finding.check; });
     if (!has_case) cases.push_back({"constant", finding.check, finding.where, ""});

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "harness/checks/consistency.h"
+#include "harness/checks/file_comparison.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/tolerance_options.h"
-#include "harness/descriptions/file_comparison.h"
 #include "harness/descriptions/program_side.h"
 
 namespace dexcheck::cli {

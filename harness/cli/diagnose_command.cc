@@ -54,7 +54,7 @@ bool IsRepairedWholly(const Diagnosis& diagnosis) {
 
 void PrintRemaining(const DiagnoseRequest& request, const RobotModel& model, const Diagnosis& diagnosis) {
   fmt::print("What remains after these repairs:\n");
-  for (const GateFinding& finding : diagnosis.remaining_constants) {
+  for (const ConstantFinding& finding : diagnosis.remaining_constants) {
     fmt::print("  {}: {}: {:.10g} in {}, {:.10g} in {}\n", finding.check, finding.where, finding.model,
                request.files.robot.filename().string(), finding.engine,
                request.files.mjcf.filename().string());
@@ -161,7 +161,8 @@ std::string ToText(const DiagnoseRequest& request, const RobotSpec& written, con
   json["causes"] = Json::array();
   for (const Repair& cause : diagnosis.causes) json["causes"].push_back(ToJson(cause, written, file));
   json["remaining"] = Json::array();
-  for (const GateFinding& finding : diagnosis.remaining_constants) json["remaining"].push_back(finding.check);
+  for (const ConstantFinding& finding : diagnosis.remaining_constants)
+    json["remaining"].push_back(finding.check);
   for (const CheckRecord& record : diagnosis.remaining_terms) json["remaining"].push_back(record.name);
   return json.dump(2) + "\n";
 }

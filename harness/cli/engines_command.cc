@@ -11,13 +11,13 @@
 
 #include "controller/common/text.h"
 #include "harness/base/interrupts.h"
+#include "harness/checks/engine_comparison.h"
 #include "harness/checks/tolerance.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/terminal.h"
-#include "harness/descriptions/engine_comparison.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/read_description.h"
 

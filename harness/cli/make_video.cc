@@ -34,7 +34,7 @@ void ReadSize(const std::string& text, int* width, int* height) {
 bool WriteVideo(const std::vector<RunView>& views, const VideoOptions& options, const std::string& out,
                 bool quiet) {
   const auto start = std::chrono::steady_clock::now();
-  VideoOptions encoding;
+  EncodingOptions encoding;
   encoding.width = options.width;
   encoding.height = options.height;
   encoding.fps = options.fps;

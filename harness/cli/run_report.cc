@@ -66,8 +66,9 @@ void PrintCategory(CheckCategory kind, const ClosedLoop& loop) {
 void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
   fmt::print("\n  {:<12}{:<34}{:>9}{:>9}\n", "question",
              detail == Detail::kAll ? "check" : "nearest to its bound", "worst", "bound");
-  const auto& gate = setup.gate().records;
-  const auto differs = std::count_if(gate.begin(), gate.end(), [](const CheckRecord& r) { return r.failed; });
+  const auto& constants = setup.constants().records;
+  const auto differs =
+      std::count_if(constants.begin(), constants.end(), [](const CheckRecord& r) { return r.failed; });
   fmt::print("  {:<12}{:<34}{:>9}{:>9}       {}\n", "model", "constants", differs, 0, Tell(differs > 0));
   if (detail == Detail::kAll) {
     for (const CheckRecord& check : loop.checks().model_checks()) PrintCheck(check);
@@ -185,12 +186,12 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
   }
   if (result.attribution.cause == Cause::kNone) return;
   fmt::print("  cause: {} ({})\n", NameOf(result.attribution.cause), result.attribution.evidence);
-  for (const GateFinding& finding : setup.gate().findings) {
+  for (const ConstantFinding& finding : setup.constants().findings) {
     fmt::print("  {}: {}: {:.12g} in the model, {:.12g} in the MJCF\n", finding.check, finding.where,
                finding.model, finding.engine);
   }
-  const std::vector<GateFinding>& findings = setup.gate().findings;
-  const bool has_servos = std::any_of(findings.begin(), findings.end(), [](const GateFinding& finding) {
+  const std::vector<ConstantFinding>& findings = setup.constants().findings;
+  const bool has_servos = std::any_of(findings.begin(), findings.end(), [](const ConstantFinding& finding) {
     return finding.check.starts_with("motor_");
   });
   if (has_servos)
@@ -202,7 +203,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
 std::string WriteJUnit(const Setup& setup, const ClosedLoop& loop, const RunResult& result) {
   std::vector<JUnitCase> cases;
   if (loop.is_checking()) {
-    for (const CheckRecord& check : setup.gate().records) {
+    for (const CheckRecord& check : setup.constants().records) {
       cases.push_back(MakeJUnitCase("constant", check, ""));
     }
     for (const std::span<const CheckRecord> checks :

@@ -18,13 +18,13 @@ struct StatesRequest {
   std::filesystem::path robot;
   std::filesystem::path out;
   long count = 1000;
-  ConsistencyOptions options;
+  std::uint64_t seed = 1;
   UrdfOptions urdf;
 };
 
 int Run(const StatesRequest& request) {
   const RobotDescription robot = ReadDescription(request.robot, request.urdf);
-  const StateTable states = DrawStates(robot, request.count, request.options);
+  const StateTable states = DrawStates(robot, request.count, {}, request.seed);
   std::error_code error;
   std::filesystem::create_directories(request.out, error);
   if (error) throw InputError(request.out.string() + ": cannot be made: " + error.message());
@@ -52,7 +52,7 @@ void AddStatesCommand(Command app) {
   command.AddOption("--out", &request->out, "Folder for layout.json, states.jsonl, q.npy and v.npy")
       .TypeName("DIR")
       .Required();
-  AddSampleOptions(command, kMaxCount, &request->count, &request->options.seed, "--samples,--count");
+  AddSampleOptions(command, kMaxCount, &request->count, &request->seed, "--samples,--count");
   command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats");
   command.SetAction([=] { return Run(*request); });
 }

@@ -8,7 +8,6 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/files.h"
-#include "harness/checks/random_states.h"
 
 namespace dexcheck {
 namespace {
@@ -37,13 +36,14 @@ SideLayout ReadLayout(const std::filesystem::path& path, const RobotDescription&
 
 }  // namespace
 
-StateTable DrawStates(const RobotDescription& robot, long count, const ConsistencyOptions& options) {
+StateTable DrawStates(const RobotDescription& robot, long count, const StateRange& range,
+                      std::uint64_t seed) {
   const RobotModel model(robot.spec);
   const auto rows = static_cast<size_t>(count);
   const auto positions = static_cast<size_t>(model.num_positions());
   const auto velocities = static_cast<size_t>(model.num_velocities());
   StateTable states{{{rows, positions}, {}}, {{rows, velocities}, {}}};
-  StateSource source(model, options.range, options.seed);
+  StateSource source(model, range, seed);
   VectorXd q(model.num_positions());
   VectorXd xi(model.num_velocities());
   for (long sample = 0; sample < count; ++sample) {
@@ -90,9 +90,6 @@ AnswerFiles::AnswerFiles(const std::filesystem::path& folder, const RobotDescrip
   if (std::filesystem::exists(folder_ / "answers.jsonl")) {
     ReadLines(folder_ / "answers.jsonl");
     return;
-  }
-  if (const auto archive = folder_ / "answers.npz"; std::filesystem::exists(archive)) {
-    throw InputError(archive.string() + ": must be one file for each array: numpy.save(\"M.npy\", M)");
   }
   const auto n = static_cast<size_t>(layout().size());
   const auto find = [&](const std::string& term, const std::vector<size_t>& shape) {

@@ -6,9 +6,9 @@
 #include <map>
 #include <string>
 
-#include "harness/checks/consistency.h"
 #include "harness/descriptions/npy_file.h"
-#include "harness/descriptions/side_comparison.h"
+#include "harness/descriptions/random_states.h"
+#include "harness/descriptions/side_layout.h"
 
 namespace dexcheck {
 
@@ -19,7 +19,7 @@ struct StateTable {
 };
 
 /// Random states, drawn as CheckConsistency draws them.
-StateTable DrawStates(const RobotDescription& robot, long count, const ConsistencyOptions& options);
+StateTable DrawStates(const RobotDescription& robot, long count, const StateRange& range, std::uint64_t seed);
 
 /// A line {"id":0,"q":[...],"v":[...]} for each state.
 std::string WriteStateLines(const StateTable& states);

@@ -10,8 +10,8 @@
 
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
-#include "harness/checks/random_states.h"
 #include "harness/descriptions/alike_names.h"
+#include "harness/descriptions/random_states.h"
 
 namespace dexcheck {
 namespace {

@@ -19,12 +19,12 @@ constexpr double kRowRounding = 64.0 * std::numeric_limits<double>::epsilon();
 class DescriptionCheck {
  public:
   DescriptionCheck(const RobotDescription& robot, const Adapter& adapter, bool ignores_couplings,
-                   GateResult* gate)
+                   ConstantChecks* constants)
       : robot_(robot),
         adapter_(adapter),
         engine_(adapter.engine()),
         ignores_couplings_(ignores_couplings),
-        gate_(*gate) {}
+        constants_(*constants) {}
 
   std::vector<std::string> Run() {
     CheckCouplings();
@@ -32,15 +32,16 @@ class DescriptionCheck {
   }
 
  private:
-  /// Takes back findings of the gate about what it believes that only the engine has. The check goes with the
-  /// last of them.
-  void TakeBack(const std::string& check, const std::function<bool(const GateFinding&)>& is_known) {
-    std::erase_if(gate_.findings,
-                  [&](const GateFinding& finding) { return finding.check == check && is_known(finding); });
-    const bool has_more = std::any_of(gate_.findings.begin(), gate_.findings.end(),
-                                      [&](const GateFinding& finding) { return finding.check == check; });
+  /// Takes back findings of the constant checks about what it believes that only the engine has. The check
+  /// goes with the last of them.
+  void TakeBack(const std::string& check, const std::function<bool(const ConstantFinding&)>& is_known) {
+    std::erase_if(constants_.findings, [&](const ConstantFinding& finding) {
+      return finding.check == check && is_known(finding);
+    });
+    const bool has_more = std::any_of(constants_.findings.begin(), constants_.findings.end(),
+                                      [&](const ConstantFinding& finding) { return finding.check == check; });
     if (has_more) return;
-    std::erase_if(gate_.records, [&](const CheckRecord& record) { return record.name == check; });
+    std::erase_if(constants_.records, [&](const CheckRecord& record) { return record.name == check; });
   }
 
   void Compare(CheckRecord* record, int joint, double model, double engine, int entry) {
@@ -49,8 +50,8 @@ class DescriptionCheck {
     const double error = record->Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
     if (error <= kRowRounding) return;
     const RobotModel& described = adapter_.model();
-    gate_.findings.push_back({record->name, Describe(where, described, described.num_base_velocities()),
-                              model, engine, where, entry});
+    constants_.findings.push_back({record->name, Describe(where, described, described.num_base_velocities()),
+                                   model, engine, where, entry});
   }
 
   /// The description's index of a joint of the engine's model; -1 when it has none.
@@ -76,24 +77,24 @@ class DescriptionCheck {
       if (ignores_couplings_) continue;
       if (own && !other) {
         const std::string leader = robot_.spec.joints[static_cast<size_t>(own->leader)].name;
-        gate_.Add({"joint_coupling",
-                   Describe({Location::Kind::kJoint, joint, -1}, adapter_.model(), 0),
-                   own->multiplier,
-                   0.0,
-                   {Location::Kind::kJoint, joint, -1},
-                   1,
-                   false,
-                   "only " + robot_.spec.source + " states it: it follows " + leader});
+        constants_.Add({"joint_coupling",
+                        Describe({Location::Kind::kJoint, joint, -1}, adapter_.model(), 0),
+                        own->multiplier,
+                        0.0,
+                        {Location::Kind::kJoint, joint, -1},
+                        1,
+                        false,
+                        "only " + robot_.spec.source + " states it: it follows " + leader});
       }
       if (!own && other) only_there.push_back(described.name);
       if (!own || !other) continue;
-      CheckRecord* const record = gate_.Define("joint_coupling");
+      CheckRecord* const record = constants_.Define("joint_coupling");
       Compare(record, joint, own->leader, FindIndex(other->leader), 0);
       Compare(record, joint, own->multiplier, other->multiplier, 1);
       Compare(record, joint, own->offset, other->offset, 2);
     }
     if (!constraints.empty()) {
-      TakeBack("equality_constraint", [&](const GateFinding& finding) {
+      TakeBack("equality_constraint", [&](const ConstantFinding& finding) {
         return std::find(constraints.begin(), constraints.end(), finding.where) != constraints.end();
       });
     }
@@ -106,7 +107,7 @@ class DescriptionCheck {
   const Adapter& adapter_;
   const mjModel& engine_;
   bool ignores_couplings_;
-  GateResult& gate_;
+  ConstantChecks& constants_;
   std::vector<std::string> notes_;
 };
 
@@ -134,8 +135,8 @@ std::optional<JointCoupling> FindEngineCoupling(const mjModel& engine, int joint
 }
 
 std::vector<std::string> CheckDescription(const RobotDescription& robot, const Adapter& adapter,
-                                          GateResult* gate, bool ignores_couplings) {
-  return DescriptionCheck(robot, adapter, ignores_couplings, gate).Run();
+                                          ConstantChecks* constants, bool ignores_couplings) {
+  return DescriptionCheck(robot, adapter, ignores_couplings, constants).Run();
 }
 
 }  // namespace dexcheck

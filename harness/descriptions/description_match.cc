@@ -9,10 +9,10 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
-#include "harness/checks/random_states.h"
 #include "harness/descriptions/alike_names.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/mjcf_reader.h"
+#include "harness/descriptions/random_states.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck {
@@ -148,7 +148,7 @@ class Matching {
       double& own = a_.spec.joints[i].*constant.value;
       double& other = b_.spec.joints[j].*constant.value;
       if (own != other) {
-        GateFinding& finding = result_.one_sided.emplace_back();
+        ConstantFinding& finding = result_.one_sided.emplace_back();
         finding.check = constant.check;
         finding.location = {Location::Kind::kJoint, static_cast<int>(i), -1};
         finding.model = own;
@@ -269,7 +269,7 @@ Completion CompleteFromEngine(const mjModel& engine, const std::string& source, 
   }
   Completion completion = CompleteEachOther(&other, robot, ignore);
   const std::vector<int> own = MatchJoints(other.spec, robot->spec);
-  for (GateFinding& finding : completion.one_sided) {
+  for (ConstantFinding& finding : completion.one_sided) {
     std::swap(finding.model, finding.engine);
     finding.location.first = own[static_cast<size_t>(finding.location.first)];
   }
@@ -290,8 +290,8 @@ void TakeIgnored(const RobotSpec& robot, const std::vector<std::string>& ignore,
   }
 }
 
-void UndoOneSided(const std::vector<GateFinding>& one_sided, RobotSpec* spec) {
-  for (const GateFinding& finding : one_sided) {
+void UndoOneSided(const std::vector<ConstantFinding>& one_sided, RobotSpec* spec) {
+  for (const ConstantFinding& finding : one_sided) {
     for (const JointConstant& constant : kJointConstants) {
       if (finding.check == constant.check)
         spec->joints[static_cast<size_t>(finding.location.first)].*constant.value = finding.model;
@@ -299,7 +299,8 @@ void UndoOneSided(const std::vector<GateFinding>& one_sided, RobotSpec* spec) {
   }
 }
 
-void AddOneSided(const RobotModel& model, const std::vector<GateFinding>& one_sided, GateResult* gate) {
+void AddOneSided(const RobotModel& model, const std::vector<ConstantFinding>& one_sided,
+                 ConstantChecks* constants) {
   if (one_sided.empty()) return;
   // An effect is largest where least inertia is moved: the least of M_jj over some states.
   constexpr int kStates = 20;
@@ -315,7 +316,7 @@ void AddOneSided(const RobotModel& model, const std::vector<GateFinding>& one_si
     const VectorXd diagonal = terms.M().diagonal();
     inertia = i == 0 ? diagonal : inertia.cwiseMin(diagonal).eval();
   }
-  for (GateFinding finding : one_sided) {
+  for (ConstantFinding finding : one_sided) {
     const Joint& joint = model.joints()[static_cast<size_t>(finding.location.first)];
     const double M_jj = inertia[base + finding.location.first];
     const double value = std::max(finding.model, finding.engine);
@@ -330,7 +331,7 @@ void AddOneSided(const RobotModel& model, const std::vector<GateFinding>& one_si
                                     turns ? "rad/s^2" : "m/s^2");
     }
     finding.where = Describe(finding.location, model, base);
-    gate->Add(std::move(finding));
+    constants->Add(std::move(finding));
   }
 }
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/robot_description.h"
-#include "harness/gate/static_gate.h"
 
 namespace dexcheck {
 
@@ -26,7 +26,7 @@ struct Completion {
       unstated;  ///< Names of the checks of constants that one of them states nothing of.
   /// What only one of them states and what acts on the motion, where the other one has none: a disagreement.
   /// `model` is the number of `a`, `engine` that of `b`; `location` is the joint of `a`.
-  std::vector<GateFinding> one_sided;
+  std::vector<ConstantFinding> one_sided;
 };
 
 /// The other way round, for a robot that more than two share: the engine takes over what is ignored.
@@ -46,10 +46,11 @@ Completion CompleteFromEngine(const mjModel& engine, const std::string& source, 
                               const std::vector<std::string>& ignore = {}, bool is_table = false);
 
 /// Gives the joints back what their own file says where it leaves a constant out, which is none.
-void UndoOneSided(const std::vector<GateFinding>& one_sided, RobotSpec* spec);
+void UndoOneSided(const std::vector<ConstantFinding>& one_sided, RobotSpec* spec);
 
-/// Adds what one side alone states to the gate, each with its effect on the motion.
+/// Adds what one side alone states to the constant checks, each with its effect on the motion.
 /// @param model of the robot with what both state.
-void AddOneSided(const RobotModel& model, const std::vector<GateFinding>& one_sided, GateResult* gate);
+void AddOneSided(const RobotModel& model, const std::vector<ConstantFinding>& one_sided,
+                 ConstantChecks* constants);
 
 }  // namespace dexcheck

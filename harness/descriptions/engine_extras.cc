@@ -188,8 +188,9 @@ void FreeBaseJoint(int joint, mjModel* m) {
 
 class ExtrasComparison {
  public:
-  ExtrasComparison(const Adapter& a, mjModel* engine_a, const Adapter& b, mjModel* engine_b, GateResult* gate)
-      : adapter_a_(a), adapter_b_(b), a_(*engine_a), b_(*engine_b), gate_(*gate) {}
+  ExtrasComparison(const Adapter& a, mjModel* engine_a, const Adapter& b, mjModel* engine_b,
+                   ConstantChecks* constants)
+      : adapter_a_(a), adapter_b_(b), a_(*engine_a), b_(*engine_b), constants_(*constants) {}
 
   void Run() {
     CompareJoints();
@@ -209,7 +210,7 @@ class ExtrasComparison {
 
  private:
   void Compare(const char* check, const std::string& where, double a, double b) {
-    if (!AreSame(a, b)) gate_.findings.push_back({check, where, a, b, {}, 0, true});
+    if (!AreSame(a, b)) constants_.findings.push_back({check, where, a, b, {}, 0, true});
   }
 
   void Compare(const std::string& name, const Part& a, const Part& b) {
@@ -280,7 +281,7 @@ class ExtrasComparison {
   const Adapter& adapter_b_;
   mjModel& a_;
   mjModel& b_;
-  GateResult& gate_;
+  ConstantChecks& constants_;
 };
 
 }  // namespace
@@ -304,15 +305,15 @@ Extras CompareExtras(const RobotDescription& first, const std::filesystem::path&
   const Adapter own(own_model, *own_engine, file.string());
   Extras extras;
   ExtrasComparison(own, own_engine.get(), second, engine, &extras.differences).Run();
-  extras.of_first = RunStaticGate(own);
+  extras.of_first = CheckConstants(own);
   CheckDescription(first, own, &extras.of_first);
   return extras;
 }
 
-void AddExtras(const Extras& extras, GateResult* gate) {
-  std::vector<GateFinding> missing;
-  for (GateFinding finding : extras.of_first.findings) {
-    const size_t in_both = std::erase_if(gate->findings, [&](const GateFinding& other) {
+void AddExtras(const Extras& extras, ConstantChecks* constants) {
+  std::vector<ConstantFinding> missing;
+  for (ConstantFinding finding : extras.of_first.findings) {
+    const size_t in_both = std::erase_if(constants->findings, [&](const ConstantFinding& other) {
       return other.check == finding.check && other.where == finding.where &&
              AreSame(other.engine, finding.engine);
     });
@@ -320,13 +321,13 @@ void AddExtras(const Extras& extras, GateResult* gate) {
     std::swap(finding.model, finding.engine);
     missing.push_back(std::move(finding));
   }
-  std::erase_if(gate->records, [&](const CheckRecord& record) {
+  std::erase_if(constants->records, [&](const CheckRecord& record) {
     return record.failed &&
-           std::none_of(gate->findings.begin(), gate->findings.end(),
-                        [&](const GateFinding& finding) { return finding.check == record.name; });
+           std::none_of(constants->findings.begin(), constants->findings.end(),
+                        [&](const ConstantFinding& finding) { return finding.check == record.name; });
   });
-  for (const GateFinding& finding : extras.differences.findings) gate->Add(finding);
-  for (const GateFinding& finding : missing) gate->Add(finding);
+  for (const ConstantFinding& finding : extras.differences.findings) constants->Add(finding);
+  for (const ConstantFinding& finding : missing) constants->Add(finding);
 }
 
 }  // namespace dexcheck

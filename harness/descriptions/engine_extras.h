@@ -9,9 +9,9 @@
 #include <optional>
 #include <string>
 
+#include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/robot_description.h"
 #include "harness/engine/adapter.h"
-#include "harness/gate/static_gate.h"
 
 namespace dexcheck {
 
@@ -22,19 +22,19 @@ std::optional<std::string> SetAsideMotors(const std::string& source, mjModel* en
 
 /// What two MJCFs have besides the mechanism, compared with each other.
 struct Extras {
-  GateResult differences;  ///< Parts of one name that both have, whose numbers differ.
-  GateResult of_first;     ///< What the first one's gate finds besides them.
+  ConstantChecks differences;  ///< Parts of one name that both have, whose numbers differ.
+  ConstantChecks of_first;     ///< What the first one's constant checks find besides them.
 };
 
-/// Compares part by part of the same name, and takes such parts out of the second model, so that the gate
-/// finds there what the first one lacks. Couplings of joints (equality/joint) stay.
+/// Compares part by part of the same name, and takes such parts out of the second model, so that the constant
+/// checks finds there what the first one lacks. Couplings of joints (equality/joint) stay.
 /// @param first as it is read from `file`, before names are taken over.
 /// @param second of the same joints in the same order; `engine` is its model.
 Extras CompareExtras(const RobotDescription& first, const std::filesystem::path& file, const Adapter& second,
                      mjModel* engine);
 
-/// Puts them into the second one's gate: what both gates find alike is taken back, what only the first one's
-/// finds is told from the other side.
-void AddExtras(const Extras& extras, GateResult* gate);
+/// Puts them into the second one's constant checks: what both constant checks find alike is taken back, what
+/// only the first one's finds is told from the other side.
+void AddExtras(const Extras& extras, ConstantChecks* constants);
 
 }  // namespace dexcheck

@@ -2,11 +2,9 @@
 
 // Somebody's own terms, as functions in the same program: compared as a program's answers are.
 
-#include <filesystem>
 #include <functional>
 #include <string>
 
-#include "harness/descriptions/file_comparison.h"
 #include "harness/descriptions/term_side.h"
 
 namespace dexcheck {
@@ -36,9 +34,5 @@ class FunctionSide : public TermSide {
   TermFunctions functions_;
   int size_;
 };
-
-/// Compares functions with a parameter file, a URDF, or an MJCF, of which the engine is asked.
-Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctions& functions,
-                            const UrdfOptions& urdf, const ConsistencyOptions& options);
 
 }  // namespace dexcheck

@@ -44,7 +44,7 @@ std::string InWords(const std::string& check) {
 }
 
 /// Takes from the engine's model what the analytic model cannot have, and says what it was.
-std::vector<Repair> Neutralise(const Adapter& adapter, const GateResult& gate, mjModel* engine) {
+std::vector<Repair> Neutralise(const Adapter& adapter, const ConstantChecks& constants, mjModel* engine) {
   std::vector<Repair> causes;
   const auto report = [&](const std::string& note) {
     Repair cause;
@@ -52,7 +52,7 @@ std::vector<Repair> Neutralise(const Adapter& adapter, const GateResult& gate, m
     cause.note = note + " only in the MJCF: the analytic model has none";
     causes.push_back(cause);
   };
-  for (const GateFinding& finding : gate.findings) {
+  for (const ConstantFinding& finding : constants.findings) {
     if (!finding.engine_only) continue;
     report(fmt::format("{}: {} of {:.9g}", finding.where, InWords(finding.check), finding.engine));
     if (finding.where.starts_with("free joint of "))
@@ -111,17 +111,18 @@ class Diagnostician {
     const ConsistencyResult before = Compare(model_);
     result_.agrees = before.Agrees();
     if (result_.agrees) return std::move(result_);
-    for (const Repair& cause : Neutralise(Adapter(model_, *engine_, source_), before.gate, engine_.get()))
+    for (const Repair& cause :
+         Neutralise(Adapter(model_, *engine_, source_), before.constants, engine_.get()))
       result_.causes.push_back(cause);
-    if (progress("constants")) ReadConstants(before.gate);
+    if (progress("constants")) ReadConstants(before.constants);
     if (progress("geometry")) WalkGeometry();
     if (progress("bodies")) FitBodies();
     progress("verdict");
     WithdrawWhatFails();
     const ConsistencyResult after = Compare(RobotModel(result_.repaired));
     const double solved = std::max(kSolved, options_.tolerance);
-    std::copy_if(after.gate.findings.begin(), after.gate.findings.end(),
-                 std::back_inserter(result_.remaining_constants), [&](const GateFinding& finding) {
+    std::copy_if(after.constants.findings.begin(), after.constants.findings.end(),
+                 std::back_inserter(result_.remaining_constants), [&](const ConstantFinding& finding) {
                    if (finding.engine_only) return false;  // named already
                    const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
                    return !(std::abs(finding.model - finding.engine) <= solved * size);
@@ -199,7 +200,7 @@ class Diagnostician {
     return ReadBackPrinted(model_.spec(), parameter, same ? rounded : value);
   }
 
-  void ReadConstants(const GateResult& gate) {
+  void ReadConstants(const ConstantChecks& constants) {
     struct Reading {
       Parameter parameter;
       double value;
@@ -208,7 +209,7 @@ class Diagnostician {
     };
     std::vector<Reading> readings;
     constexpr double kSame = 1e-12;
-    for (const GateFinding& finding : gate.findings) {
+    for (const ConstantFinding& finding : constants.findings) {
       const std::optional<Parameter> parameter = FindParameter(result_.repaired, finding);
       if (!parameter || !std::isfinite(finding.engine)) continue;
       if (options_.by_motion && MovesTheRobot(parameter->kind)) continue;
@@ -289,7 +290,7 @@ class Diagnostician {
     for (size_t item = 0; item < placement.items().size(); ++item)
       placement.AppendResidual(static_cast<int>(item), &rows);
     for (const double row : rows) size.all += row * row;
-    for (const GateFinding& finding : RunStaticGate(Adapter(model, *engine_, source_)).findings) {
+    for (const ConstantFinding& finding : CheckConstants(Adapter(model, *engine_, source_)).findings) {
       if (finding.engine_only) continue;
       const double larger = std::max(std::abs(finding.model), std::abs(finding.engine));
       const double apart = (finding.model - finding.engine) / larger;

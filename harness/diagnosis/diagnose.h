@@ -30,8 +30,8 @@ struct Diagnosis {
   double explained_of_forces = 0.0;
   std::vector<std::pair<Repair, double>>
       ranking;  ///< Single numbers by the fraction of the bodies' residuals explained.
-  std::vector<GateFinding> remaining_constants;  ///< What disagrees after all repairs.
-  std::vector<CheckRecord> remaining_terms;      ///< Failed checks after all repairs.
+  std::vector<ConstantFinding> remaining_constants;  ///< What disagrees after all repairs.
+  std::vector<CheckRecord> remaining_terms;          ///< Failed checks after all repairs.
   RobotSpec repaired;
 };
 

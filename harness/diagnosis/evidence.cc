@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "harness/checks/random_states.h"
+#include "harness/descriptions/random_states.h"
 
 namespace dexcheck {
 namespace {

@@ -210,7 +210,7 @@ void TryMutant(const RobotModel& model, const mjModel& engine, const std::string
   check.seed = options.seed;
   const ConsistencyResult result =
       CheckConsistency(Adapter(*changed, engine, engine_source), check, [](long) { return true; });
-  for (const std::vector<CheckRecord>* records : {&result.gate.records, &result.terms}) {
+  for (const std::vector<CheckRecord>* records : {&result.constants.records, &result.terms}) {
     for (const CheckRecord& record : *records) {
       if (record.failed) mutant->failed_checks += (mutant->failed_checks.empty() ? "" : " ") + record.name;
     }

@@ -31,7 +31,7 @@ bool IsAxleRight(const Adapter& adapter, double rounding) {
 
 }  // namespace
 
-std::optional<Parameter> FindParameter(const RobotSpec& spec, const GateFinding& finding) {
+std::optional<Parameter> FindParameter(const RobotSpec& spec, const ConstantFinding& finding) {
   const std::string& check = finding.check;
   if (finding.engine_only) return std::nullopt;
   const int part = finding.location.first;
@@ -64,7 +64,7 @@ struct RepairCheck::Trial {
         model(spec),
         evidence(model, engine, source, samples, seed, tolerance),
         placement(spec, evidence, bodies) {
-    for (const GateFinding& finding : RunStaticGate(Adapter(model, engine, source)).findings) {
+    for (const ConstantFinding& finding : CheckConstants(Adapter(model, engine, source)).findings) {
       const std::optional<Parameter> parameter = FindParameter(spec, finding);
       const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
       const bool same = std::abs(finding.model - finding.engine) <= evidence.Widen(kSame) * size;

@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
+#include "harness/descriptions/constant_checks.h"
 #include "harness/diagnosis/repair.h"
-#include "harness/gate/static_gate.h"
 
 namespace dexcheck {
 
-/// The number of the parameter file that a constant of the static gate is, when it can be read there at once.
-std::optional<Parameter> FindParameter(const RobotSpec& spec, const GateFinding& finding);
+/// The number of the parameter file that a constant of the constants is, when it can be read there at once.
+std::optional<Parameter> FindParameter(const RobotSpec& spec, const ConstantFinding& finding);
 
 /// Holds repairs against the engine.
 class RepairCheck {

@@ -20,10 +20,10 @@
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/base/version.h"
+#include "harness/checks/answers_comparison.h"
+#include "harness/checks/file_comparison.h"
 #include "harness/checks/tolerance.h"
 #include "harness/descriptions/audit.h"
-#include "harness/descriptions/file_comparison.h"
-#include "harness/descriptions/function_side.h"
 #include "harness/descriptions/read_description.h"
 
 namespace py = pybind11;
@@ -44,7 +44,7 @@ struct ComparisonResult {
     const RobotModel& model = *comparison.model;
     py::dict terms;
     for (const std::vector<CheckRecord>* records :
-         {&comparison.result.gate.records, &comparison.result.terms}) {
+         {&comparison.result.constants.records, &comparison.result.terms}) {
       for (const CheckRecord& record : *records) {
         py::dict entry;
         entry["max"] = record.worst;

@@ -96,8 +96,8 @@ double TrackingStatistics::joints_rms() const { return Rms(joints_squares_, coun
 
 void Judge(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   if (loop.is_checking()) {
-    result->attribution = Attribute(setup.gate(), loop.checks().model_checks(), loop.checks().motion_checks(),
-                                    loop.checks().Tell());
+    result->attribution = Attribute(setup.constants(), loop.checks().model_checks(),
+                                    loop.checks().motion_checks(), loop.checks().Tell());
   }
   const bool disagrees = result->attribution.cause != Cause::kNone;
   result->verdict = disagrees ? Verdict::kDisagreement : Verdict::kPass;
@@ -132,7 +132,7 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
   }
   json["checks"] = Json::object();
   if (loop.is_checking()) {
-    for (const CheckRecord& record : setup.gate().records)
+    for (const CheckRecord& record : setup.constants().records)
       json["checks"][record.name] = ConstantToJson(record);
     for (const std::span<const CheckRecord> checks :
          {loop.checks().model_checks(), loop.checks().motion_checks()}) {

@@ -97,8 +97,8 @@ Setup::Setup(const Scenario& scenario, RobotModel model, const std::filesystem::
   RemoveLooks(engine_.get(), pushing);
   adapter_ = std::make_unique<Adapter>(model_, *engine_, mjcf.string());
   RequireNothingElse(*adapter_, mjcf.string());
-  gate_ = RunStaticGate(*adapter_);
-  if (scenario_.tolerance > 0.0) JudgeByTolerance(scenario_.tolerance, &gate_);
+  constants_ = CheckConstants(*adapter_);
+  if (scenario_.tolerance > 0.0) JudgeByTolerance(scenario_.tolerance, &constants_);
   WatchSolids(mjcf.string());
   ApplyPlantOptions();
   try {

@@ -14,9 +14,9 @@
 #include "controller/grasp/contact_plan.h"
 #include "controller/grasp/finger_placement.h"
 #include "controller/model/robot_model.h"
+#include "harness/descriptions/constant_checks.h"
 #include "harness/engine/adapter.h"
 #include "harness/engine/clearance.h"
-#include "harness/gate/static_gate.h"
 #include "harness/plant/observer.h"
 #include "harness/plant/part_context.h"
 #include "harness/plant/plant.h"
@@ -54,7 +54,7 @@ class Setup {
     return controller_side_ ? *controller_side_ : *adapter_;
   }
   /// What the two descriptions disagree on before anything moves, the scenario's changes to the plant aside.
-  [[nodiscard]] const GateResult& gate() const { return gate_; }
+  [[nodiscard]] const ConstantChecks& constants() const { return constants_; }
   /// Whether there is one; otherwise object() stands for it where terms of one are evaluated.
   [[nodiscard]] bool has_object() const { return model_.object().has_value(); }
   [[nodiscard]] const ObjectModel& object() const { return model_.object() ? *model_.object() : no_object_; }
@@ -131,7 +131,7 @@ class Setup {
   std::optional<RobotModel> known_model_;  // these four only with a mismatch
   MjModelPtr controller_engine_;
   std::unique_ptr<Adapter> plant_side_, controller_side_;
-  GateResult gate_;
+  ConstantChecks constants_;
   Solids solids_;
   std::vector<WatchedPair> watched_pairs_;
   std::unique_ptr<Surface> surface_;

@@ -88,7 +88,7 @@ int Run(long frames) {
     }
   });
   const MeasuredTime video = Measure([&] {
-    VideoOptions encoding;
+    EncodingOptions encoding;
     encoding.width = options.width;
     encoding.height = options.height;
     encoding.fps = options.fps;

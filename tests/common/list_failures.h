@@ -12,7 +12,7 @@ namespace dexcheck::testing {
 inline std::string ListFailures(const ConsistencyResult& result) {
   EXPECT_GE(result.terms.size(), 11U);  // as many has a body that floats alone
   std::string failures;
-  for (const auto* records : {&result.gate.records, &result.terms}) {
+  for (const auto* records : {&result.constants.records, &result.terms}) {
     for (const CheckRecord& record : *records) {
       if (record.failed) failures += record.name + " ";
     }

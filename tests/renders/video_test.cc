@@ -45,7 +45,7 @@ class VideoTest : public ::testing::Test {
 
   bool Video(const fs::path& path, std::span<const RunView> runs, const VideoOptions& options,
              const std::function<bool(long, long)>& progress = {}) {
-    VideoOptions encoding;
+    EncodingOptions encoding;
     encoding.width = options.width;
     encoding.height = options.height;
     encoding.fps = options.fps;

@@ -27,8 +27,8 @@ namespace fs = std::filesystem;
 constexpr int kWidth = 128;
 constexpr int kHeight = 72;
 
-VideoOptions MakeOptions() {
-  VideoOptions options;
+EncodingOptions MakeOptions() {
+  EncodingOptions options;
   options.width = kWidth;
   options.height = kHeight;
   options.fps = 25;
@@ -193,7 +193,7 @@ TEST(VideoWriter, RefusesNamesOfOtherFormats) {
     EXPECT_TRUE(Throws<InputError>([&] { VideoWriter video(folder.path() / name, MakeOptions()); },
                                    "a video's name must end in .mp4, .webm or .gif"));
   }
-  VideoOptions options = MakeOptions();
+  EncodingOptions options = MakeOptions();
   options.fps = kMostGifFramesPerSecond + 1;
   EXPECT_TRUE(Throws<std::invalid_argument>([&] { VideoWriter video(folder.path() / "a.gif", options); },
                                             "must be at most 50 in a GIF"));
@@ -263,15 +263,15 @@ TEST(VideoWriter, AFullDiskLeavesNothing) {
 
 TEST(VideoWriter, RefusesWhatH264CannotTake) {
   const TempFolder folder;
-  const auto expect = [&](void (*spoil)(VideoOptions*), const std::string& message) {
-    VideoOptions options = MakeOptions();
+  const auto expect = [&](void (*spoil)(EncodingOptions*), const std::string& message) {
+    EncodingOptions options = MakeOptions();
     spoil(&options);
     EXPECT_TRUE(
         Throws<std::invalid_argument>([&] { VideoWriter video(folder.path() / "a.mp4", options); }, message));
   };
-  expect([](VideoOptions* o) { o->width = 129; }, "video width: must be even and from 2 to 16384, got 129");
-  expect([](VideoOptions* o) { o->height = 0; }, "video height: must be even");
-  expect([](VideoOptions* o) { o->fps = 0; }, "frames a second: must be from 1 to 240, got 0");
+  expect([](EncodingOptions* o) { o->width = 129; }, "video width: must be even and from 2 to 16384, got 129");
+  expect([](EncodingOptions* o) { o->height = 0; }, "video height: must be even");
+  expect([](EncodingOptions* o) { o->fps = 0; }, "frames a second: must be from 1 to 240, got 0");
   EXPECT_TRUE(fs::is_empty(folder.path()));
   VideoWriter video(folder.path() / "a.mp4", MakeOptions());
   EXPECT_TRUE(

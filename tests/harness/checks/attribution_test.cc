@@ -69,11 +69,11 @@ class FakeRun {
     return *this;
   }
   FakeRun& FailConstant(const std::string& name) {
-    gate_.findings.push_back({name, "link r_forearm", 1.5, 1.25, {}, 0});
+    constants_.findings.push_back({name, "link r_forearm", 1.5, 1.25, {}, 0});
     return *this;
   }
   [[nodiscard]] AttributionResult Explain(const MeasuredCauses& measured = {}) const {
-    return Attribute(gate_, model_, steps_, measured);
+    return Attribute(constants_, model_, steps_, measured);
   }
   CheckRecord& step(const std::string& name) {
     return *std::find_if(steps_.begin(), steps_.end(),
@@ -81,7 +81,7 @@ class FakeRun {
   }
 
  private:
-  GateResult gate_;
+  ConstantChecks constants_;
   std::vector<CheckRecord> model_, steps_;
 };
 

@@ -10,7 +10,7 @@
 
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/model_check.h"
-#include "harness/checks/random_states.h"
+#include "harness/descriptions/random_states.h"
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
@@ -56,7 +56,7 @@ MjModelPtr LoadLongChain(const RobotSpec& spec) {
 /// The checks that failed, and the largest fraction of its bound that any other used.
 std::string ListFailures(const ConsistencyResult& result, double* fraction) {
   std::string failures;
-  for (const std::vector<CheckRecord>* records : {&result.gate.records, &result.terms}) {
+  for (const std::vector<CheckRecord>* records : {&result.constants.records, &result.terms}) {
     for (const CheckRecord& record : *records) {
       EXPECT_LT(record.bound, kLargestBound) << record.name;
       if (record.failed) failures += record.name + " ";
@@ -166,7 +166,7 @@ TEST(Consistency, HoldsOnTheRingScene) {
       CheckConsistency(Adapter(model, *engine, "ring_scene.xml"), options, kGoOn);
   EXPECT_EQ(result.samples, 100);
   EXPECT_EQ(ListFailures(result, &fraction), "");
-  EXPECT_TRUE(result.gate.findings.empty());
+  EXPECT_TRUE(result.constants.findings.empty());
   EXPECT_GT(fraction, 1e-3);
 }
 

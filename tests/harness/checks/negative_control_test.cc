@@ -109,7 +109,7 @@ std::set<std::string> FindChangedParts(const RobotSpec& a, const RobotSpec& b) {
 /// What a person reads first: the parts named by findings and by each failed term's failure nearest the base.
 std::string ListNamedParts(const ConsistencyResult& result, const RobotModel& model) {
   std::string text;
-  for (const GateFinding& finding : result.gate.findings) text += finding.where + "; ";
+  for (const ConstantFinding& finding : result.constants.findings) text += finding.where + "; ";
   for (const CheckRecord& record : result.terms) {
     if (record.failed) text += Describe(record.first_failure, model, model.num_base_velocities()) + "; ";
   }

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
-#include "harness/descriptions/answers_comparison.h"
+#include "harness/checks/answers_comparison.h"
 #include "harness/descriptions/npy_file.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "tests/common/legged_robots.h"

@@ -5,12 +5,12 @@
 
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
+#include "harness/checks/answers_comparison.h"
 #include "harness/checks/consistency.h"
-#include "harness/descriptions/answers_comparison.h"
+#include "harness/checks/model_comparison.h"
 #include "harness/descriptions/description_check.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/mjcf_reader.h"
-#include "harness/descriptions/model_comparison.h"
 #include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/engine/engine.h"
@@ -126,10 +126,10 @@ std::string CompareWithEngine(const RobotDescription& robot, const mjModel& engi
   ConsistencyOptions options;
   options.samples = 20;
   ConsistencyResult result = CheckConsistency(adapter, options, [](long) { return true; });
-  const std::vector<std::string> found = CheckDescription(robot, adapter, &result.gate);
+  const std::vector<std::string> found = CheckDescription(robot, adapter, &result.constants);
   if (notes != nullptr) *notes = found;
   std::string failures;
-  for (const std::vector<CheckRecord>* records : {&result.gate.records, &result.terms}) {
+  for (const std::vector<CheckRecord>* records : {&result.constants.records, &result.terms}) {
     for (const CheckRecord& record : *records) {
       if (record.failed) failures += record.name + " ";
     }

@@ -5,7 +5,7 @@
 
 #include <gmock/gmock.h>
 
-#include "harness/descriptions/file_comparison.h"
+#include "harness/checks/file_comparison.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 
@@ -68,10 +68,10 @@ TEST_P(TwoMjcfs, AreComparedInWhatTheyHaveBesidesTheMechanism) {
     const Comparison different = Compare(a, b);
     EXPECT_FALSE(different.result.Agrees());
     EXPECT_THAT(List(different), HasSubstr(std::string(extra.check) + ": "));
-    for (const GateFinding& finding : different.result.gate.findings) {
+    for (const ConstantFinding& finding : different.result.constants.findings) {
       EXPECT_NE(finding.model, finding.engine) << finding.check;
     }
-    for (const CheckRecord& record : different.result.gate.records) {
+    for (const CheckRecord& record : different.result.constants.records) {
       if (record.name == extra.check) EXPECT_TRUE(record.failed);
     }
   }

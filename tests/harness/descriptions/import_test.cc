@@ -14,9 +14,9 @@
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
+#include "harness/checks/file_comparison.h"
 #include "harness/descriptions/description_check.h"
 #include "harness/descriptions/description_match.h"
-#include "harness/descriptions/file_comparison.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/read_description.h"
@@ -154,12 +154,12 @@ TEST(MjcfDescription, IsTheEnginesModel) {
   for (const CheckRecord& record : result.terms) EXPECT_FALSE(record.failed) << record.name;
   // What tables have no place for, and the description has.
   std::vector<std::string> found;
-  for (const GateFinding& finding : result.gate.findings) found.push_back(finding.check);
+  for (const ConstantFinding& finding : result.constants.findings) found.push_back(finding.check);
   EXPECT_THAT(found, ElementsAre("equality_constraint"));
-  GateResult gate = result.gate;
-  EXPECT_THAT(CheckDescription(robot, adapter, &gate), IsEmpty());
-  EXPECT_TRUE(gate.findings.empty());
-  for (const CheckRecord& record : gate.records) EXPECT_FALSE(record.failed) << record.name;
+  ConstantChecks constants = result.constants;
+  EXPECT_THAT(CheckDescription(robot, adapter, &constants), IsEmpty());
+  EXPECT_TRUE(constants.findings.empty());
+  for (const CheckRecord& record : constants.records) EXPECT_FALSE(record.failed) << record.name;
   EXPECT_EQ(robot.spec.joints[1].dry_friction, 0.7);
   EXPECT_FALSE(robot.joints[0].states_range);
   EXPECT_TRUE(robot.joints[1].states_range);

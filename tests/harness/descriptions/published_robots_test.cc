@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "harness/descriptions/file_comparison.h"
+#include "harness/checks/file_comparison.h"
 #include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/read_description.h"
 #include "tests/common/files.h"

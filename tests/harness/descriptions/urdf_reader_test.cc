@@ -43,7 +43,7 @@ std::string ListFailures(const std::string& urdf, const mjModel& engine, long sa
   options.samples = samples;
   const Adapter adapter(model, engine, "robot.xml");
   ConsistencyResult result = CheckConsistency(adapter, options, [](long) { return true; });
-  CheckDescription(robot, adapter, &result.gate);
+  CheckDescription(robot, adapter, &result.constants);
   return testing::ListFailures(result);
 }
 

@@ -139,7 +139,7 @@ TEST_F(PageBrowserTest, ShowsVerdictAndPlotsWithoutErrors) {
 
 // A video of one second, as `dexcheck run --video` encodes it: red, from the middle on blue.
 void WriteVideo(const std::filesystem::path& path) {
-  VideoOptions options;
+  EncodingOptions options;
   options.width = 160;
   options.height = 90;
   VideoWriter video(path, options);

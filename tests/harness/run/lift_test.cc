@@ -83,7 +83,7 @@ TEST_F(LiftTest, TakesCarriesAndPutsDown) {
   EXPECT_GT(run_->Worst("excluded"), 0.03);
   // A check that has the name of another would hide it in the summary.
   std::set<std::string> names;
-  for (const CheckRecord& record : run_->setup().gate().records)
+  for (const CheckRecord& record : run_->setup().constants().records)
     EXPECT_TRUE(names.insert(record.name).second) << record.name;
   for (const CheckRecord& check : loop.checks().model_checks())
     EXPECT_TRUE(names.insert(check.name).second) << check.name;

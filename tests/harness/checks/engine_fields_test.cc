@@ -1,7 +1,5 @@
 // Every number of the engine's model is seen: changed, it is found and named, or nothing that moves changes.
 
-#include "harness/gate/engine_fields.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,6 +19,7 @@
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paper_robot.h"
+#include "tests/harness/checks/engine_fields.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::engine_fields_test {
@@ -151,13 +150,14 @@ class Subject {
     try {
       const Adapter adapter(model_, engine, "mjcf");
       ConsistencyResult result;
-      result.gate = RunStaticGate(adapter);
-      for (const GateNote& note : result.gate.notes) verdict.notes.insert(note.kind + ": " + note.text);
-      for (const GateFinding& finding : result.gate.findings) verdict.failed.insert(finding.check);
+      result.constants = CheckConstants(adapter);
+      for (const ConstantNote& note : result.constants.notes)
+        verdict.notes.insert(note.kind + ": " + note.text);
+      for (const ConstantFinding& finding : result.constants.findings) verdict.failed.insert(finding.check);
       ConsistencyOptions options;
       options.samples = 1;
       if (terms) result = CheckConsistency(adapter, options, [](long) { return true; });
-      for (const auto* records : {&result.gate.records, &result.terms}) {
+      for (const auto* records : {&result.constants.records, &result.terms}) {
         for (const CheckRecord& record : *records) {
           if (record.failed) verdict.failed.insert(record.name);
         }
@@ -264,13 +264,13 @@ class FieldCheck {
         motion_(subject.Move(*before_)),
         run_(subject.MoveAsInRun(*before_)) {
     EXPECT_TRUE(verdict_.failed.empty()) << *verdict_.failed.begin();
-    for (const EngineField& field : ListEngineFields()) table_[field.name] = &field;
+    for (const EngineField& field : ListEngineFields()) table_[field.name] = field;
   }
 
   void Run(std::map<std::string, int>* named, std::map<std::string, int>* tried) {
     const MjModelPtr model = subject_.Copy();
     for (const Field& field : ListFields(model.get())) {
-      const EngineField& row = *table_.at(field.name);
+      const EngineField& row = table_.at(field.name);
       const int size = field.count * field.columns;
       if (row.outcome == FieldClass::kDerived || size == 0) continue;
       // Every number at once, and single ones of the first and of a middle element.
@@ -351,7 +351,7 @@ class FieldCheck {
   MjModelPtr before_;
   Subject::Verdict verdict_;
   Motion motion_, run_;
-  std::map<std::string, const EngineField*> table_;
+  std::map<std::string, EngineField> table_;
 };
 
 TEST_F(EngineFields, AreAllClassed) {
@@ -359,7 +359,7 @@ TEST_F(EngineFields, AreAllClassed) {
   std::set<std::string> listed;
   for (const EngineField& field : ListEngineFields()) {
     EXPECT_TRUE(listed.insert(field.name).second) << field.name << " is listed twice";
-    EXPECT_GT(std::strlen(field.how), 0U) << field.name;
+    EXPECT_FALSE(field.how.empty()) << field.name;
   }
   std::set<std::string> fields;
   for (const Field& field : ListFields(model.get())) fields.insert(field.name);

@@ -1,6 +1,6 @@
 // Every kind of constant that the MJCF can have otherwise than the parameters is found and named.
 
-#include "harness/gate/static_gate.h"
+#include "harness/descriptions/constant_checks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -39,9 +39,9 @@ class StaticGateFiles : public ::testing::Test {
         std::filesystem::copy_options::recursive | std::filesystem::copy_options::overwrite_existing);
   }
 
-  [[nodiscard]] GateResult Run() const {
+  [[nodiscard]] ConstantChecks Run() const {
     const MjModelPtr engine = LoadMjcf(folder_.path() / "scene.xml");
-    return RunStaticGate(Adapter(model_, *engine, "scene.xml"));
+    return CheckConstants(Adapter(model_, *engine, "scene.xml"));
   }
 
   TempFolder folder_;
@@ -54,12 +54,12 @@ TEST_P(StaticGateTest, FindsAndNames) {
   const Mutation& mutation = GetParam();
   const std::filesystem::path file = folder_.path() / mutation.file;
   WriteText(file, ReplaceOnce(ReadText(file), mutation.from, mutation.to));
-  const GateResult result = Run();
+  const ConstantChecks result = Run();
   const auto finding = std::find_if(
       result.findings.begin(), result.findings.end(),
-      [&](const GateFinding& one) { return one.check == mutation.check && one.where == mutation.where; });
+      [&](const ConstantFinding& one) { return one.check == mutation.check && one.where == mutation.where; });
   std::string found;
-  for (const GateFinding& one : result.findings) found += one.check + ": " + one.where + "; ";
+  for (const ConstantFinding& one : result.findings) found += one.check + ": " + one.where + "; ";
   ASSERT_NE(finding, result.findings.end()) << "found: " << found;
   EXPECT_NE(finding->model, finding->engine);
   for (const CheckRecord& record : result.records) {
@@ -83,7 +83,8 @@ TEST_F(StaticGateFiles, TheFingertipIsTheSphereThatTouchesAtItsSite) {
   ASSERT_LT(mj_name2id(engine.get(), mjOBJ_GEOM, "knuckle"), wanted);
   EXPECT_EQ(adapter.FindTipGeom(frame), wanted);
   EXPECT_EQ(adapter.RequireTipGeom(frame), wanted);
-  for (const GateFinding& one : RunStaticGate(adapter).findings) EXPECT_NE(one.check, "fingertip_radius");
+  for (const ConstantFinding& one : CheckConstants(adapter).findings)
+    EXPECT_NE(one.check, "fingertip_radius");
 }
 
 const std::string kRightWheelColumn =
@@ -169,7 +170,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 void ExpectNoFindings(const RobotModel& model, const std::filesystem::path& mjcf) {
   const MjModelPtr engine = LoadMjcf(mjcf);
-  const GateResult result = RunStaticGate(Adapter(model, *engine, mjcf));
+  const ConstantChecks result = CheckConstants(Adapter(model, *engine, mjcf));
   EXPECT_TRUE(result.findings.empty())
       << result.findings.front().check << " " << result.findings.front().where;
   EXPECT_GE(result.records.size(), 7U);
@@ -179,13 +180,13 @@ void ExpectNoFindings(const RobotModel& model, const std::filesystem::path& mjcf
   }
 }
 
-TEST(StaticGate, RaisesNoFalseAlarm) {
+TEST(ConstantComparison, RaisesNoFalseAlarm) {
   ExpectNoFindings(ReadRobotModel(kParameters + "assistant_robot.toml"), kMjcf + "scene.xml");
   ExpectNoFindings(ReadRobotModel(kParameters + "panda.toml"), kMjcf + "panda.xml");
 }
 
 // The larger ring agrees with what its scenario says of it, and not with the torus of the parameter file.
-TEST(StaticGate, TellsTheRingFromTheTorus) {
+TEST(ConstantComparison, TellsTheRingFromTheTorus) {
   const Scenario scenario = testing::ReadShippedScenario("two-hands");
   const std::string robot = kParameters + "assistant_robot.toml";
   ExpectNoFindings(ParseRobotModel(ReadText(robot), robot, scenario.model_overrides), scenario.mjcf_file);
@@ -193,7 +194,7 @@ TEST(StaticGate, TellsTheRingFromTheTorus) {
   const RobotModel torus = ReadRobotModel(robot);
   const MjModelPtr engine = LoadMjcf(scenario.mjcf_file);
   std::vector<std::string> found;
-  for (const GateFinding& one : RunStaticGate(Adapter(torus, *engine, "ring_scene.xml")).findings) {
+  for (const ConstantFinding& one : CheckConstants(Adapter(torus, *engine, "ring_scene.xml")).findings) {
     found.push_back(one.check);
   }
   EXPECT_THAT(found, ::testing::IsSupersetOf({"object_mass", "object_inertia", "object_shape"}));

@@ -1,4 +1,4 @@
-#include "harness/gate/engine_only.h"
+#include "harness/descriptions/engine_only.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -32,7 +32,7 @@ std::string List(const mjtNum* values, int count) {
 
 class EngineOnly {
  public:
-  EngineOnly(const Adapter& adapter, GateResult* result)
+  EngineOnly(const Adapter& adapter, ConstantChecks* result)
       : adapter_(adapter), engine_(adapter.engine()), result_(result) {}
 
   void Run() {
@@ -290,11 +290,11 @@ class EngineOnly {
 
   const Adapter& adapter_;
   const mjModel& engine_;
-  GateResult* result_;
+  ConstantChecks* result_;
 };
 
 }  // namespace
 
-void FindEngineOnly(const Adapter& adapter, GateResult* result) { EngineOnly(adapter, result).Run(); }
+void FindEngineOnly(const Adapter& adapter, ConstantChecks* result) { EngineOnly(adapter, result).Run(); }
 
 }  // namespace dexcheck

@@ -3,6 +3,7 @@
 // Random states of a robot and its object, the same on every platform.
 
 #include <cstdint>
+#include <functional>
 #include <random>
 
 #include "controller/model/robot_model.h"
@@ -41,5 +42,8 @@ class StateSource {
   StateRange range_;
   std::mt19937_64 bits_;
 };
+
+/// Gives the state of each sample; false when there are no more.
+using StateFeed = std::function<bool(long sample, VectorXd* q, VectorXd* xi)>;
 
 }  // namespace dexcheck

@@ -1,4 +1,4 @@
-#include "harness/descriptions/side_comparison.h"
+#include "harness/checks/side_comparison.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "harness/checks/random_states.h"
 #include "harness/checks/rounding_scales.h"
 #include "harness/checks/term_table.h"
+#include "harness/descriptions/random_states.h"
 
 namespace dexcheck {
 namespace {

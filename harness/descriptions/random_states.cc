@@ -1,4 +1,4 @@
-#include "harness/checks/random_states.h"
+#include "harness/descriptions/random_states.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // Two descriptions without the engine: they agree when they describe one robot, whatever the order of joints
 // and the choice of frames, and what differs is found.
 
-#include "harness/descriptions/model_comparison.h"
+#include "harness/checks/model_comparison.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -141,7 +141,7 @@ TEST(ModelComparison, WhatOneLacksIsNotCompared) {
   EXPECT_EQ(ListFailures(urdf, table), "");
   const Completion completion = CompleteEachOther(&urdf, &table);
   EXPECT_FALSE(completion.one_sided.empty());
-  for (const GateFinding& finding : completion.one_sided) EXPECT_EQ(finding.check, "joint_armature");
+  for (const ConstantFinding& finding : completion.one_sided) EXPECT_EQ(finding.check, "joint_armature");
   EXPECT_THAT(completion.not_compared, ::testing::Contains(HasSubstr("gravity: only")));
   EXPECT_THAT(completion.notes, ::testing::Contains("links by other names: \"panda_link3\" is \"elbow\""));
   EXPECT_EQ(urdf.spec.joints[1].armature, 0.1);

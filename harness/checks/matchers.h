@@ -15,9 +15,8 @@
 #include <ostream>
 #include <string>
 
+#include "harness/checks/answers_comparison.h"
 #include "harness/checks/tolerance.h"
-#include "harness/descriptions/file_comparison.h"
-#include "harness/descriptions/function_side.h"
 
 namespace dexcheck::testing {
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "harness/checks/consistency.h"
+#include "harness/descriptions/random_states.h"
 #include "harness/descriptions/side_layout.h"
 
 namespace dexcheck {
@@ -63,9 +64,6 @@ class SideComparison {
   std::vector<std::optional<double>> first_potential_;  // of each side
   std::vector<Pair> pairs_;
 };
-
-/// Gives the state of each sample; false when there are no more.
-using StateFeed = std::function<bool(long sample, VectorXd* q, VectorXd* xi)>;
 
 /// States drawn as CheckConsistency draws them. The model outlives the feed.
 StateFeed FeedRandomStates(const RobotModel& model, const ConsistencyOptions& options);

@@ -1,4 +1,4 @@
-#include "harness/descriptions/engine_comparison.h"
+#include "harness/checks/engine_comparison.h"
 
 #include <fmt/format.h>
 
@@ -12,13 +12,13 @@
 #include "controller/model/body_frame.h"
 #include "harness/base/files.h"
 #include "harness/base/shell.h"
+#include "harness/checks/engine_settings.h"
+#include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/description_match.h"
-#include "harness/descriptions/engine_settings.h"
 #include "harness/descriptions/engine_urdf.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/robot_file.h"
-#include "harness/gate/static_gate.h"
 
 namespace dexcheck {
 namespace {
@@ -212,7 +212,7 @@ class EngineComparisonRun {
   void NoteOtherForces(const Adapter& adapter) {
     constexpr const char* kChecks[] = {"joint_spring", "tendon_spring", "tendon_damping", "fluid"};
     std::vector<std::string> parts;
-    for (const GateFinding& finding : RunStaticGate(adapter).findings) {
+    for (const ConstantFinding& finding : CheckConstants(adapter).findings) {
       if (std::find(std::begin(kChecks), std::end(kChecks), finding.check) == std::end(kChecks)) continue;
       std::string part = finding.check;
       std::replace(part.begin(), part.end(), '_', ' ');

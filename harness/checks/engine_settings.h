@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/descriptions/side_comparison.h"
+#include "harness/checks/side_comparison.h"
 
 namespace dexcheck {
 

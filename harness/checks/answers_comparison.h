@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/descriptions/side_comparison.h"
+#include "harness/checks/file_comparison.h"
+#include "harness/checks/side_comparison.h"
+#include "harness/descriptions/function_side.h"
 
 namespace dexcheck {
 
@@ -22,5 +24,9 @@ ConsistencyResult CompareAnswers(const RobotDescription& robot, TermSide* refere
                                  const std::function<StateFeed()>& make_feed,
                                  const std::function<bool(long)>& progress, std::vector<std::string>* notes,
                                  std::vector<std::string>* not_compared);
+
+/// Compares functions with a parameter file, a URDF, or an MJCF, of which the engine is asked.
+Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctions& functions,
+                            const UrdfOptions& urdf, const ConsistencyOptions& options);
 
 }  // namespace dexcheck

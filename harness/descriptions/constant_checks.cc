@@ -1,4 +1,4 @@
-#include "harness/gate/static_gate.h"
+#include "harness/descriptions/constant_checks.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include "harness/descriptions/engine_only.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/torus_collision.h"
 #include "harness/engine/wheel_inertia.h"
-#include "harness/gate/engine_only.h"
 
 namespace dexcheck {
 namespace {
@@ -21,12 +21,12 @@ constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
-class StaticGate {
+class ConstantComparison {
  public:
-  explicit StaticGate(const Adapter& adapter)
+  explicit ConstantComparison(const Adapter& adapter)
       : adapter_(adapter), model_(adapter.model()), engine_(adapter.engine()) {}
 
-  GateResult Run() {
+  ConstantChecks Run() {
     CompareGravity();
     CompareLinks();
     CompareJoints();
@@ -308,7 +308,7 @@ class StaticGate {
     Compare("fluid", {}, 0.0, engine_.opt.viscosity);
     NameBaseJoints(first_finding);
     for (size_t i = first_finding; i < result_.findings.size(); ++i) {
-      GateFinding& finding = result_.findings[i];
+      ConstantFinding& finding = result_.findings[i];
       finding.engine_only =
           finding.check != "joint_dry_friction" || finding.location.kind != Location::Kind::kJoint;
     }
@@ -320,13 +320,13 @@ class StaticGate {
     if (adapter_.base_joints().empty()) return;
     const int type = engine_.jnt_type[adapter_.base_joints().front()];
     const std::string joint = type == mjJNT_FREE ? "free joint of " : "joints of ";
-    std::vector<GateFinding> findings;
+    std::vector<ConstantFinding> findings;
     findings.swap(result_.findings);
     for (size_t i = 0; i < findings.size(); ++i) {
-      GateFinding& finding = findings[i];
+      ConstantFinding& finding = findings[i];
       const bool is_of_base = i >= first_finding && finding.location == AtLink(-1);
       if (is_of_base) finding.where = joint + finding.where;
-      const auto is_same = [&](const GateFinding& other) {
+      const auto is_same = [&](const ConstantFinding& other) {
         return other.check == finding.check && other.where == finding.where && other.engine == finding.engine;
       };
       if (is_of_base && std::any_of(result_.findings.begin(), result_.findings.end(), is_same)) continue;
@@ -337,7 +337,7 @@ class StaticGate {
   const Adapter& adapter_;
   const RobotModel& model_;
   const mjModel& engine_;
-  GateResult result_;
+  ConstantChecks result_;
   std::string last_check_;
   Location last_location_;
   int entry_ = 0;
@@ -345,7 +345,7 @@ class StaticGate {
 
 }  // namespace
 
-CheckRecord* GateResult::Define(const std::string& check) {
+CheckRecord* ConstantChecks::Define(const std::string& check) {
   auto record =
       std::find_if(records.begin(), records.end(), [&](const CheckRecord& one) { return one.name == check; });
   if (record == records.end()) {
@@ -356,14 +356,14 @@ CheckRecord* GateResult::Define(const std::string& check) {
   return &*record;
 }
 
-void GateResult::Add(GateFinding finding) {
+void ConstantChecks::Add(ConstantFinding finding) {
   const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
   Define(finding.check)
       ->Compare(finding.model, finding.engine, size > 0.0 ? size : 1.0, finding.location, -1);
   findings.push_back(std::move(finding));
 }
 
-GateResult RunStaticGate(const Adapter& adapter) { return StaticGate(adapter).Run(); }
+ConstantChecks CheckConstants(const Adapter& adapter) { return ConstantComparison(adapter).Run(); }
 
 void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records) {
   for (CheckRecord& record : *records) {
@@ -374,13 +374,13 @@ void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records) {
   }
 }
 
-void JudgeByTolerance(double tolerance, GateResult* gate) {
-  JudgeByTolerance(tolerance, &gate->records);
-  std::erase_if(gate->findings, [&](const GateFinding& finding) {
+void JudgeByTolerance(double tolerance, ConstantChecks* constants) {
+  JudgeByTolerance(tolerance, &constants->records);
+  std::erase_if(constants->findings, [&](const ConstantFinding& finding) {
     const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
     const bool is_within = std::abs(finding.model - finding.engine) <= tolerance * size;
     const bool check_holds = std::any_of(
-        gate->records.begin(), gate->records.end(),
+        constants->records.begin(), constants->records.end(),
         [&](const CheckRecord& record) { return record.name == finding.check && !record.failed; });
     return is_within || check_holds;
   });

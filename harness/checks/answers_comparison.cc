@@ -1,8 +1,10 @@
-#include "harness/descriptions/answers_comparison.h"
+#include "harness/checks/answers_comparison.h"
 
 #include <filesystem>
 
+#include "controller/common/errors.h"
 #include "harness/descriptions/join_names.h"
+#include "harness/descriptions/read_description.h"
 #include "harness/descriptions/robot_file.h"
 
 namespace dexcheck {
@@ -41,6 +43,26 @@ ConsistencyResult CompareAnswers(const RobotDescription& robot, TermSide* refere
                      ": this is its convention, and its key \"base\" can say so");
   }
   return result;
+}
+
+Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctions& functions,
+                            const UrdfOptions& urdf, const ConsistencyOptions& options) {
+  if (!functions.M && !functions.c && !functions.g && !functions.h && !functions.friction) {
+    throw InputError(functions.name + ": must have one of M, c, g, h, friction");
+  }
+  const RobotDescription robot = ReadDescription(file, urdf);
+  Comparison comparison;
+  comparison.first = file;
+  comparison.second = functions.name;
+  comparison.model.emplace(robot.spec);
+  comparison.notes = robot.notes;
+  const std::unique_ptr<TermSide> reference = MakeReferenceSide(robot, file.string());
+  FunctionSide side(functions, comparison.model->num_velocities());
+  SideComparison terms(robot, {reference.get(), &side});
+  comparison.result.samples = CompareAtStates(
+      FeedRandomStates(*comparison.model, options), [](long) { return true; }, &terms);
+  comparison.result.terms = terms.TakePairs().front().terms;
+  return comparison;
 }
 
 }  // namespace dexcheck

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/checks/side_comparison.h"
 #include "harness/descriptions/program_side.h"
-#include "harness/descriptions/side_comparison.h"
 
 namespace dexcheck {
 

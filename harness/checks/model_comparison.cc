@@ -1,4 +1,4 @@
-#include "harness/descriptions/model_comparison.h"
+#include "harness/checks/model_comparison.h"
 
 #include <algorithm>
 #include <chrono>
@@ -58,35 +58,35 @@ class ModelComparison {
 
   [[nodiscard]] const RobotModel& model() const { return model_a_; }
 
-  GateResult CompareConstants() {
-    GateResult gate;
+  ConstantChecks CompareConstants() {
+    ConstantChecks constants;
     if (a_.states_gravity && b_.states_gravity) {
       for (int k = 0; k < 3; ++k) {
-        AddConstant(&gate, "gravity_vector", {}, a_.spec.gravity[k], b_.spec.gravity[k], k,
+        AddConstant(&constants, "gravity_vector", {}, a_.spec.gravity[k], b_.spec.gravity[k], k,
                     a_.spec.gravity.norm());
       }
     }
     if (model_a_.base().type != BaseType::kFixed) {
-      AddConstant(&gate, "link_mass", {Location::Kind::kLink, -1, -1}, model_a_.base_with_wheels().mass,
+      AddConstant(&constants, "link_mass", {Location::Kind::kLink, -1, -1}, model_a_.base_with_wheels().mass,
                   model_b_.base_with_wheels().mass, 0);
     }
     ForJoints([&](size_t i, size_t j) {
-      AddConstant(&gate, "link_mass", {Location::Kind::kLink, static_cast<int>(i), -1},
+      AddConstant(&constants, "link_mass", {Location::Kind::kLink, static_cast<int>(i), -1},
                   a_.spec.joints[i].body.mass, b_.spec.joints[j].body.mass, 0);
     });
-    CompareStated(&gate, "joint_damping", &DescribedJoint::states_damping,
+    CompareStated(&constants, "joint_damping", &DescribedJoint::states_damping,
                   [](const RobotDescription& robot, size_t i) {
                     return std::vector<double>{robot.spec.joints[i].damping};
                   });
-    CompareStated(&gate, "joint_dry_friction", &DescribedJoint::states_dry_friction,
+    CompareStated(&constants, "joint_dry_friction", &DescribedJoint::states_dry_friction,
                   [](const RobotDescription& robot, size_t i) {
                     return std::vector<double>{robot.spec.joints[i].dry_friction};
                   });
-    CompareStated(&gate, "joint_armature", &DescribedJoint::states_armature,
+    CompareStated(&constants, "joint_armature", &DescribedJoint::states_armature,
                   [](const RobotDescription& robot, size_t i) {
                     return std::vector<double>{robot.spec.joints[i].armature};
                   });
-    CompareStated(&gate, "joint_range", &DescribedJoint::states_range,
+    CompareStated(&constants, "joint_range", &DescribedJoint::states_range,
                   [](const RobotDescription& robot, size_t i) {
                     return std::vector<double>{robot.spec.joints[i].lower, robot.spec.joints[i].upper};
                   });
@@ -96,13 +96,13 @@ class ModelComparison {
       const Location where{Location::Kind::kJoint, static_cast<int>(i), -1};
       const std::string name = "joint_coupling";
       if (own.has_value() != other.has_value())
-        AddConstant(&gate, name, where, own ? own->multiplier : 0.0, other ? other->multiplier : 0.0, 1);
+        AddConstant(&constants, name, where, own ? own->multiplier : 0.0, other ? other->multiplier : 0.0, 1);
       if (!own || !other) return;
-      AddConstant(&gate, name, where, b_of_a_[static_cast<size_t>(own->leader)], other->leader, 0);
-      AddConstant(&gate, name, where, own->multiplier, other->multiplier, 1);
-      AddConstant(&gate, name, where, own->offset, other->offset, 2);
+      AddConstant(&constants, name, where, b_of_a_[static_cast<size_t>(own->leader)], other->leader, 0);
+      AddConstant(&constants, name, where, own->multiplier, other->multiplier, 1);
+      AddConstant(&constants, name, where, own->offset, other->offset, 2);
     });
-    return gate;
+    return constants;
   }
 
   void Compare(const VectorXd& q, const VectorXd& xi, long sample) {
@@ -153,24 +153,24 @@ class ModelComparison {
     for (size_t i = 0; i < b_of_a_.size(); ++i) visit(i, static_cast<size_t>(b_of_a_[i]));
   }
 
-  void CompareStated(GateResult* gate, const std::string& name, bool DescribedJoint::*states,
+  void CompareStated(ConstantChecks* constants, const std::string& name, bool DescribedJoint::*states,
                      const std::function<std::vector<double>(const RobotDescription&, size_t)>& numbers) {
     ForJoints([&](size_t i, size_t j) {
       if (!(a_.joints[i].*states) || !(b_.joints[j].*states)) return;
       const std::vector<double> own = numbers(a_, i);
       const std::vector<double> other = numbers(b_, j);
       for (size_t k = 0; k < own.size(); ++k) {
-        AddConstant(gate, name, {Location::Kind::kJoint, static_cast<int>(i), -1}, own[k], other[k],
+        AddConstant(constants, name, {Location::Kind::kJoint, static_cast<int>(i), -1}, own[k], other[k],
                     static_cast<int>(k));
       }
     });
   }
 
-  void AddConstant(GateResult* gate, const std::string& name, const Location& where, double a, double b,
-                   int entry, double scale = 0.0) {
+  void AddConstant(ConstantChecks* constants, const std::string& name, const Location& where, double a,
+                   double b, int entry, double scale = 0.0) {
     const double size = std::max({std::abs(a), std::abs(b), scale});
-    if (gate->Define(name)->Compare(a, b, size > 0.0 ? size : 1.0, where, -1) <= kRounding) return;
-    gate->findings.push_back({name, Describe(where, model_a_, base_), a, b, where, entry});
+    if (constants->Define(name)->Compare(a, b, size > 0.0 ? size : 1.0, where, -1) <= kRounding) return;
+    constants->findings.push_back({name, Describe(where, model_a_, base_), a, b, where, entry});
   }
 
   void Add(Term term, double a, double b, double scale, const Location& where) {
@@ -310,7 +310,7 @@ ConsistencyResult CompareDescriptions(const RobotDescription& a, const RobotDesc
   const auto start = std::chrono::steady_clock::now();
   ModelComparison comparison(a, b);
   ConsistencyResult result;
-  result.gate = comparison.CompareConstants();
+  result.constants = comparison.CompareConstants();
   StateSource source(comparison.model(), options.range, options.seed);
   VectorXd q = VectorXd::Zero(comparison.model().num_positions());
   VectorXd xi = VectorXd::Zero(comparison.model().num_velocities());

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "harness/gate/static_gate.h"
+#include "harness/descriptions/constant_checks.h"
 
 namespace dexcheck {
 
@@ -8,6 +8,6 @@ namespace dexcheck {
 /// constraints, motors that are no plain torque sources, flags, contacts with friction, distance or a floor
 /// that the model does not know. Anything but the neutral value is a finding. What a run of the plant
 /// overrides or judges (contacts, solver, motors' limits) becomes a note.
-void FindEngineOnly(const Adapter& adapter, GateResult* result);
+void FindEngineOnly(const Adapter& adapter, ConstantChecks* result);
 
 }  // namespace dexcheck

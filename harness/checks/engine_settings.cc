@@ -1,4 +1,4 @@
-#include "harness/descriptions/engine_settings.h"
+#include "harness/checks/engine_settings.h"
 
 #include <algorithm>
 #include <memory>

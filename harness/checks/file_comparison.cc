@@ -1,4 +1,4 @@
-#include "harness/descriptions/file_comparison.h"
+#include "harness/checks/file_comparison.h"
 
 #include <fmt/format.h>
 
@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "harness/checks/model_comparison.h"
 #include "harness/checks/tolerance.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_check.h"
@@ -16,7 +17,6 @@
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/link_frames.h"
 #include "harness/descriptions/mjcf_reader.h"
-#include "harness/descriptions/model_comparison.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/descriptions/robot_file.h"
 #include "harness/engine/engine.h"
@@ -125,15 +125,15 @@ void CompareWithEngine(const UrdfOptions& urdf, const ConsistencyOptions& option
   if (format == RobotFormat::kMjcf) extras = CompareExtras(written, comparison->first, adapter, engine.get());
   comparison->result = CheckConsistency(adapter, options, progress);
   CountRoundings(robot.is_imported ? 1 : 0, completed.has_link_frames, &comparison->result.terms);
-  GateResult& gate = comparison->result.gate;
-  std::erase_if(gate.records, [&](const CheckRecord& record) {
+  ConstantChecks& constants = comparison->result.constants;
+  std::erase_if(constants.records, [&](const CheckRecord& record) {
     return !record.failed && std::find(completion.unstated.begin(), completion.unstated.end(), record.name) !=
                                  completion.unstated.end();
   });
-  AddOneSided(*comparison->model, completion.one_sided, &gate);
+  AddOneSided(*comparison->model, completion.one_sided, &constants);
   AppendTo(&comparison->not_compared,
-           CheckDescription(robot, adapter, &gate, Ignores("coupling", options.ignore)));
-  if (extras) AddExtras(*extras, &gate);
+           CheckDescription(robot, adapter, &constants, Ignores("coupling", options.ignore)));
+  if (extras) AddExtras(*extras, &constants);
   // An MJCF's notes are about what CompareExtras compares.
   if (format != RobotFormat::kMjcf) AppendTo(&comparison->notes, robot.notes);
   AppendTo(&comparison->not_compared, completion.not_compared);
@@ -157,7 +157,7 @@ void CompareTwoDescriptions(const UrdfOptions& urdf, const ConsistencyOptions& o
   comparison->result = CompareDescriptions(a, b, options, progress);
   CountRoundings((a.is_imported ? 1 : 0) + (b.is_imported ? 1 : 0), has_link_frames,
                  &comparison->result.terms);
-  AddOneSided(*comparison->model, completion.one_sided, &comparison->result.gate);
+  AddOneSided(*comparison->model, completion.one_sided, &comparison->result.constants);
 }
 
 }  // namespace
@@ -192,7 +192,7 @@ Differences SortDifferences(const Comparison& comparison) {
   const int base = model.num_base_velocities();
   const std::string first = comparison.first.filename().string();
   const std::string second = comparison.second.filename().string();
-  const std::vector<CheckRecord>& checks = comparison.result.gate.records;
+  const std::vector<CheckRecord>& checks = comparison.result.constants.records;
   Differences differences;
   const auto add = [&](double error, std::string line) {
     const int digits = CountDigits(error);
@@ -200,7 +200,7 @@ Differences SortDifferences(const Comparison& comparison) {
     if (is_rounded) differences.digits = std::min(differences.digits, digits);
     (is_rounded ? differences.rounded : differences.real).push_back(std::move(line));
   };
-  for (const GateFinding& finding : comparison.result.gate.findings) {
+  for (const ConstantFinding& finding : comparison.result.constants.findings) {
     // Where zero is a proper value, the check has another scale than the larger of the two.
     const double size = std::max(std::abs(finding.model), std::abs(finding.engine));
     const auto check = std::find_if(checks.begin(), checks.end(),
