@@ -94,8 +94,15 @@ class StatefulJudge {
   virtual void Reset() = 0;
 };
 
+/// What a check is called, as in log and summary.
+struct CheckName {
+  std::string_view name;
+  CheckCategory category = CheckCategory::kModel;
+  const char* unit = "1";
+};
+
 /// One check.
-struct CheckInfo {
+struct CheckInfo : CheckName {
   /// When a check is evaluated, bit by bit.
   enum Moment : unsigned {
     kSettling = 1U,  ///< At each step while everything settles.
@@ -105,14 +112,11 @@ struct CheckInfo {
     kAlways = kSettling | kRunning,
   };
 
-  std::string_view name;
-  CheckCategory category = CheckCategory::kModel;
-  const char* unit = "1";
   Bound bound;
   const char* description = "";
   FailureMeaning meaning;
-  unsigned moments = kAlways;
   Evaluation (*evaluate)(const StepAnalysis& step) = nullptr;
+  unsigned moments = kAlways;
   std::string (*describe)(const StepAnalysis& step, int part) = nullptr;  ///< A value's part in words.
   std::unique_ptr<StatefulJudge> (*make)(const Setup& setup) = nullptr;   ///< In the place of `evaluate`.
 };

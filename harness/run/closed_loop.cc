@@ -40,6 +40,7 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
   const Scenario& scenario = setup.scenario();
   RequireKnownBounds(scenario);
   if (check) checks_.emplace(setup, plant_->motors(), parts.knows_law);
+  if (check && parts.threads > 1) checker_.emplace([this] { JudgeStep(); });
   record_.model = record_.true_model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);
@@ -130,7 +131,7 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
 
 void ClosedLoop::ControlStep(double t) {
   const auto begin = Clock::now();
-  plant_->BeginStep();
+  BeginStep();
   const auto read = Clock::now();
   plant_->Read(&record_.reading);
   CheckRobot();
@@ -167,6 +168,38 @@ void ClosedLoop::DriveMotors(double t) {
   if (checks_) checks_->JudgeEffort(record_, t);
 }
 
+void ClosedLoop::BeginStep() {
+  if (!std::exchange(has_begun_, false)) return plant_->BeginStep();
+  if (begin_failure_) std::rethrow_exception(std::exchange(begin_failure_, nullptr));
+}
+
+void ClosedLoop::JudgeStep() {
+  const auto begin = Clock::now();
+  checks_->JudgeModel(record_);
+  checks_->JudgeStep(record_);
+  times_.cross_check += Seconds(begin, Clock::now());
+}
+
+void ClosedLoop::Check() {
+  if (!checker_) {
+    JudgeStep();
+  } else {
+    checker_->Start();
+    if (record_.step < num_steps_) {
+      const auto begin = Clock::now();
+      try {
+        plant_->BeginStep();
+      } catch (...) {
+        begin_failure_ = std::current_exception();
+      }
+      has_begun_ = true;
+      times_.plant += Seconds(begin, Clock::now());
+    }
+    checker_->Wait();
+  }
+  record_.findings = checks_->analysis().findings;
+}
+
 void ClosedLoop::Step() {
   record_.time = time();
   ControlStep(record_.time);
@@ -175,13 +208,7 @@ void ClosedLoop::Step() {
   CalcContactDrifts(record_, &record_.drift);
   for (const ContactDrift& drift : record_.drift) largest_drift_.Raise(drift);
   ++record_.step;
-  if (checks_) {
-    const auto begin = Clock::now();
-    checks_->JudgeModel(record_);
-    checks_->JudgeStep(record_);
-    record_.findings = checks_->analysis().findings;
-    times_.cross_check += Seconds(begin, Clock::now());
-  }
+  if (checks_) Check();
   CheckGrasp();
   if (task_ != nullptr) CheckTask();
 }

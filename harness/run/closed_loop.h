@@ -2,6 +2,7 @@
 
 // The loop of plant and controller, cross-checked at every step.
 
+#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "harness/plant/plant.h"
 #include "harness/plant/sensing.h"
 #include "harness/run/loop_parts.h"
+#include "harness/run/side_thread.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
@@ -39,7 +41,9 @@ struct LoopTimes {
 ///   plant --PlantReading--> sensing --Reading--> controller --Command--> motors --tau'--> plant <-- pushes
 ///     `----PlantResponse----> checks: all of it is one StepRecord
 ///
-/// Deterministic. Nothing allocates in a step, except as the controller and RunChecks say.
+/// Deterministic: with two threads the checks of a step are made while the plant computes positions,
+/// velocities and contacts of the next, which is all that happens early, and every number is the same.
+/// Nothing allocates in a step, except as the controller and RunChecks say.
 class ClosedLoop {
  public:
   /// @param check whether to cross-check.
@@ -86,6 +90,11 @@ class ClosedLoop {
   bool StartMoving(const Vector3d& v, const std::function<bool()>& should_stop);
   bool SettleOn(const Trajectory& motion, double duration, const std::function<bool()>& should_stop);
   void BeginRun();
+  /// The plant's, unless it has begun already.
+  void BeginStep();
+  void JudgeStep();
+  /// The checks of the step, and beside them the beginning of the next.
+  void Check();
   void ControlStep(double t);
   void DriveMotors(double t);
   void CheckRobot() const;
@@ -104,6 +113,9 @@ class ClosedLoop {
   std::optional<RunChecks> checks_;
   std::unique_ptr<Trajectory> trajectory_;  // null for a task or a motion of joints
   StepRecord record_;
+  std::optional<SideThread> checker_;  // none with one thread
+  bool has_begun_ = false;             // the next step
+  std::exception_ptr begin_failure_;   // of that
   long num_steps_ = 0;
   bool is_running_ = false;  // all has settled
   long steps_without_grasp_ = 0;

@@ -7,6 +7,7 @@
 
 #include "controller/control/trajectory_controller.h"
 #include "harness/checks/check_table.h"
+#include "tests/harness/run/changed_parts.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::baseline_reference_test {
@@ -25,26 +26,12 @@ std::vector<std::string> MakeOverrides(const std::string& law, const std::string
 
 RunResult RunWith(const ShippedRun& spec, const ShippedRun& law, double factor, double* worst) {
   LoopParts parts = MakeLoopParts(spec.setup());
-  class Scaled final : public Controller {
-   public:
-    Scaled(std::unique_ptr<Controller> law, double factor) : law_(std::move(law)), factor_(factor) {}
-    void Follow(const Trajectory& motion) override { law_->Follow(motion); }
-    void Begin(double t, const Reading& reading) override { law_->Begin(t, reading); }
-    void Step(const Reading& reading, double t, Command* command) override {
-      law_->Step(reading, t, command);
-      command->tau *= factor_;
-    }
-    const GraspModel& model() const override { return law_->model(); }
-
-   private:
-    std::unique_ptr<Controller> law_;
-    double factor_;
-  };
-  parts.controller = std::make_unique<Scaled>(MakeLoopParts(law.setup()).controller, factor);
-  Runner runner(spec.setup(), /*check=*/true, std::move(parts));
-  const RunResult result = runner.Run([](const StepRecord&) {}, [] { return false; });
-  *worst = runner.loop().checks().Find("law_torque").worst;
-  return result;
+  parts.controller = std::make_unique<ChangedController>(
+      MakeLoopParts(law.setup()).controller,
+      [=](const GraspModel&, Command* command) { command->tau *= factor; });
+  const std::unique_ptr<Runner> runner = RunParts(spec.setup(), std::move(parts));
+  *worst = runner->loop().checks().Find("law_torque").worst;
+  return runner->result();
 }
 
 class BaselineCheck : public ::testing::TestWithParam<std::tuple<const char*, const char*>> {};

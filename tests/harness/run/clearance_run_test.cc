@@ -98,7 +98,8 @@ TEST(ClearanceOfARun, ATableBesideThePalmIsNot) {
   const HoldAtATable run(-0.001);
   EXPECT_EQ(run.result().verdict, Verdict::kPass)
       << run.result().failure << run.result().attribution.evidence;
-  EXPECT_NEAR(run.checks().analysis().clearance->nearest(PairClass::kRobotSurroundings).distance, 0.001, 1e-4);
+  EXPECT_NEAR(run.checks().analysis().clearance->nearest(PairClass::kRobotSurroundings).distance, 0.001,
+              1e-4);
   EXPECT_EQ(run.checks().Find("clearance").worst, 0.0);
 }
 
