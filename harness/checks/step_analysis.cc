@@ -6,7 +6,7 @@
 namespace dexcheck {
 namespace {
 
-constexpr double kSmallest = std::numeric_limits<double>::min();
+constexpr double kTiny = std::numeric_limits<double>::min();
 
 double CalcRobotMass(const RobotModel& model) {
   double mass = model.base_with_wheels().mass;
@@ -104,7 +104,7 @@ void StepAnalyzer::MeasureClearance() {
 
 void StepAnalyzer::CompareMotors() {
   now_.torque_error = (now_.step->response.motor_torques - now_.declared->tau).cwiseAbs().maxCoeff() /
-                      std::max(now_.step->command.tau.cwiseAbs().maxCoeff(), kSmallest);
+                      std::max(now_.step->command.tau.cwiseAbs().maxCoeff(), kTiny);
 }
 
 void StepAnalyzer::Analyze() {
@@ -230,7 +230,7 @@ void StepAnalyzer::CalcRobotResidual() {
     actuation_.CalcForce(spin_force_, spin_force_);
     residual += spin_force_;
   }
-  now_.balanced = std::max(Norm(now_.bias), kSmallest);
+  now_.balanced = std::max(Norm(now_.bias), kTiny);
   now_.robot_residual_norm = Norm(residual);
   now_.uneven_force = CalcUnevenForce() + CalcSwingForce();
   now_.robot_solver = response.solver_force.size() > 0 ? Norm(response.solver_force) / now_.balanced : 0.0;
@@ -286,7 +286,7 @@ void StepAnalyzer::ComparePrediction() {
   acceleration_error_ = findings.xi_dot_model - now_.step->response.xi_dot;
   now_.mass_factor->Multiply(acceleration_error_);
   now_.acceleration_error = acceleration_error_.norm() / now_.balanced;
-  double scale = std::max(findings.f_c.norm(), kSmallest);
+  double scale = std::max(findings.f_c.norm(), kTiny);
   // Fingertips that only touch push with less than what they will bear.
   if (handling_.partial) scale = std::max(scale, CalcWeight());
   now_.contact_force_error = (findings.f_c_model - findings.f_c).norm() / scale;
