@@ -19,7 +19,7 @@ constexpr int kBendFractions = 8;
 /// A rigid plant's contacts are not soft.
 ContactSoftness FindSoftness(const Setup& setup) {
   if (setup.scenario().plant.type == PlantType::kRigid) return {};
-  return FindContactSoftness(setup.adapter(), setup.q_start(), setup.X_Bo_start());
+  return FindContactSoftness(setup.adapter(), setup.start().q, setup.start().X_Bo);
 }
 
 /// |d/dt r| of the rigid plant by Euler's method, which leads contacts back to the constraints

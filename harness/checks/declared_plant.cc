@@ -21,7 +21,7 @@ DeclaredPlant::DeclaredPlant(const Setup& setup, std::span<const Motor> motors)
     : sensing_(setup.scenario().imperfections.sensing, setup.MakePartContext()),
       drive_(motors, setup.scenario().imperfections.actuation, setup.MakePartContext()),
       disturbances_(setup.scenario().imperfections.disturbances, setup.MakePartContext()),
-      model_(setup.known_model(), setup.fingertips(), setup.known_object().body, setup.surface(),
+      model_(setup.declared_model(), setup.fingertips(), setup.declared_object().body, setup.surface(),
              setup.MakeControllerOptions()) {
   step_.is_ideal = IsIdeal(setup);
   step_.force.setZero(setup.model().num_velocities());

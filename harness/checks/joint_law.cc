@@ -16,8 +16,8 @@ class JudgedJointLaw final : public JudgedLaw {
       : JudgedLaw(setup),
         model_(&setup.model()),
         law_(setup.scenario().control.law),
-        gains_(setup.joint_gains()),
-        motion_(setup.joint_motion()) {
+        gains_(setup.joints()->gains),
+        motion_(&setup.joints()->motion) {
     for (VectorXd* vector : {&force_, &demand_, &true_demand_, &differed_})
       vector->setZero(setup.model().num_velocities());
   }

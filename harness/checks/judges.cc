@@ -11,7 +11,7 @@ namespace {
 
 class IdleJointsJudge final : public StatefulJudge {
  public:
-  explicit IdleJointsJudge(const Setup& setup) : joints_(setup.idle_joints()), start_(joints_.size()) {}
+  explicit IdleJointsJudge(const Setup& setup) : joints_(setup.hold().idle_joints), start_(joints_.size()) {}
   Evaluation Evaluate(const StepAnalysis& step) override {
     const int offset = step.setup->model().num_base_positions();
     double moved = 0.0;

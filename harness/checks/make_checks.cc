@@ -15,7 +15,7 @@ using Names = std::initializer_list<std::string_view>;
 /// metric of M_bar' has them in it.
 bool HoldsIdleJoints(const Setup& setup) {
   const ControlOptions& control = setup.scenario().control;
-  return !setup.idle_joints().empty() && setup.scenario().imperfections.is_ideal() &&
+  return !setup.hold().idle_joints.empty() && setup.scenario().imperfections.is_ideal() &&
          control.law != ControlLaw::kPdGravity && control.law != ControlLaw::kOperationalSpace &&
          control.weight != RedundancyWeight::Kind::kMass;
 }
@@ -27,7 +27,7 @@ std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law)
   const auto leave_out = [&](bool leave, Names names) {
     if (leave) missing.insert(names);
   };
-  const bool joints = setup.joint_motion() != nullptr;
+  const bool joints = setup.joints() != nullptr;
   const bool rigid = scenario.plant.type == PlantType::kRigid;
   leave_out(law == nullptr,
             {"law_torque", "law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality"});
@@ -42,10 +42,10 @@ std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law)
                      "orientation_dynamics", "contact_force", "fingertip_slip", "fingertip_slip_rate",
                      "cone_use", "contacts_lost", "penetration", "kappa"});
   leave_out(!joints, {"joint_dynamics"});
-  leave_out(!setup.bonds().empty(),
+  leave_out(!setup.start().bonds.empty(),
             {"fingertip_slip_rate", "cone_use", "contacts_lost", "penetration", "kappa"});
   // Without a task every step is judged.
-  leave_out(!scenario.task, {"excluded"});
+  leave_out(scenario.pick_task() == nullptr, {"excluded"});
   leave_out(setup.adapter().wheels().empty(), {"wheel_slip", "wheel_slip_rate", "rolling", "traction_use"});
   leave_out(setup.model().base().type == BaseType::kFixed, {"base_tilt"});
   leave_out(!scenario.grasp.hemisphere, {"fingertip_rim"});
@@ -53,7 +53,7 @@ std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law)
   leave_out(!HoldsIdleJoints(setup), {"idle_joints"});
   // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
   leave_out(rigid, {"wheel_slip", "rolling", "wheel_slip_rate", "traction_use", "base_tilt", "solver"});
-  leave_out(setup.watched_pairs().empty(), {"clearance", "collision"});
+  leave_out(setup.robots().watched_pairs.empty(), {"clearance", "collision"});
   leave_out(!scenario.plant.collide, {"collision"});
   const mjModel& engine = setup.engine();
   const auto* const limited = engine.actuator_ctrllimited;
@@ -64,7 +64,7 @@ std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law)
 
 /// Descriptions that differ from those of check_table.cc.
 std::map<std::string_view, const char*> ListDescriptions(const Setup& setup) {
-  if (setup.joint_motion() != nullptr) {
+  if (setup.joints() != nullptr) {
     return {
         {"closed_loop_spectral_radius",
          "largest eigenvalue of the errors of the joints under the scenario's gains, sampled as the "
@@ -78,7 +78,7 @@ std::map<std::string_view, const char*> ListDescriptions(const Setup& setup) {
         {"reduced_acceleration", "accelerations of the joints that the torques mean, against the engine's"},
         {"solver", "what the engine's solver left over of its own equations of motion"}};
   }
-  if (!setup.bonds().empty())
+  if (!setup.start().bonds.empty())
     return {{"fingertip_slip", "distance of the joined points on fingertip and object"}};
   return {};
 }
@@ -98,8 +98,8 @@ double FindBound(const CheckInfo& info, const Scenario& scenario) {
 
 std::unique_ptr<JudgedLaw> MakeJudgedLaw(const Setup& setup, bool knows_law) {
   if (!knows_law) return nullptr;
-  if (setup.joint_motion() != nullptr) return MakeJointLaw(setup);
-  return setup.scenario().task ? nullptr : MakeObjectLaw(setup);
+  if (setup.joints() != nullptr) return MakeJointLaw(setup);
+  return setup.scenario().pick_task() != nullptr ? nullptr : MakeObjectLaw(setup);
 }
 
 std::vector<Judge> MakeChecks(const Setup& setup, const JudgedLaw* law) {

@@ -31,7 +31,7 @@ class JudgedObjectLaw final : public JudgedLaw {
       : JudgedLaw(setup),
         options_(setup.MakeControllerOptions()),
         spec_(MakeLawSpec(options_)),
-        trajectory_(setup.scenario().trajectory(setup.X_start() + setup.scenario().start_error)),
+        trajectory_(setup.MakeTrajectory()),
         reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())),
         error_(spec_, time_step_, velocity_age_) {
     const int n = setup.model().num_velocities();

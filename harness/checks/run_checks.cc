@@ -11,7 +11,7 @@ namespace dexcheck {
 
 RunChecks::RunChecks(const Setup& setup, std::span<const Motor> motors, bool knows_law)
     : setup_(&setup),
-      model_(setup.plant_side(), setup.fingertips(), setup.scenario().control.orientation),
+      model_(setup.plant_adapter(), setup.fingertips(), setup.scenario().control.orientation),
       declared_(setup, motors),
       analyzer_(setup),
       law_(MakeJudgedLaw(setup, knows_law)),
@@ -22,7 +22,7 @@ RunChecks::RunChecks(const Setup& setup, std::span<const Motor> motors, bool kno
       sensors_(setup.model(), setup.fingertips(), setup.scenario().plant.time_step),
       forces_(setup.model()),
       wheels_(setup.model().base()) {
-  if (!setup.bonds().empty()) model_.LeaveOutContacts();
+  if (!setup.start().bonds.empty()) model_.LeaveOutContacts();
   model_.RaiseBounds(setup.scenario().tolerance);
   for (const Judge& judge : judges_) records_.push_back(judge.record);
   if (law_) analyzer_.SetSpectralRadius(law_->CalcSpectralRadius().value_or(0.0));
@@ -30,7 +30,7 @@ RunChecks::RunChecks(const Setup& setup, std::span<const Motor> motors, bool kno
 }
 
 void RunChecks::CheckMeasuredState() {
-  controller_.emplace(setup_->controller_side(), setup_->fingertips(),
+  controller_.emplace(setup_->controller_adapter(), setup_->fingertips(),
                       setup_->scenario().control.orientation);
   // What is measured of robot, object and contacts need not fit together: contacts are compared at the true
   // state.
@@ -148,7 +148,7 @@ void RunChecks::Analyze(const StepRecord& step) {
 
 const LawTerms& RunChecks::ReadLawTerms(const StepRecord& step) {
   const StepModelCheck& controller = controller_ ? *controller_ : model_;
-  const bool contacts = setup_->bonds().empty() && !controller_;
+  const bool contacts = setup_->start().bonds.empty() && !controller_;
   ReadEngineTerms(controller.context(), *step.model, step.measured.state, contacts, &law_terms_);
   return law_terms_;
 }

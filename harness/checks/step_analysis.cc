@@ -17,15 +17,15 @@ double CalcRobotMass(const RobotModel& model) {
 }  // namespace
 
 StepAnalyzer::PartialDynamics::PartialDynamics(const Setup& setup, ContactSet set)
-    : grasp(setup.known_model(), setup.fingertips(), setup.known_model().object()->body, setup.surface(),
-            set),
-      dynamics(setup.known_model(), static_cast<int>(grasp.members().size())) {}
+    : grasp(setup.declared_model(), setup.fingertips(), setup.declared_model().object()->body,
+            setup.surface(), set),
+      dynamics(setup.declared_model(), static_cast<int>(grasp.members().size())) {}
 
 StepAnalyzer::StepAnalyzer(const Setup& setup)
     : setup_(&setup),
       time_step_(setup.scenario().plant.time_step),
       mass_(CalcRobotMass(setup.model())),
-      clearance_(setup.engine(), setup.plant_side(), setup.solids(), setup.watched_pairs()),
+      clearance_(setup.engine(), setup.plant_adapter(), setup.robots().solids, setup.robots().watched_pairs),
       kinematics_(MakeData(setup.engine())),
       actuation_(setup.model()),
       wheel_geometry_(setup.model().base()),

@@ -72,7 +72,7 @@ void StepAnalyzer::FollowSlip() {
     if (slip.touching && step.command.handling.holding)
       findings.least_cone_margin = std::min(findings.least_cone_margin, slip.cone_margin);
   }
-  if (!setup_->bonds().empty()) {
+  if (!setup_->start().bonds.empty()) {
     for (const PlantContact& bond : step.response.contacts)
       now_.fingertips.distance = std::max(now_.fingertips.distance, bond.distance);
   }

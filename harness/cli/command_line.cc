@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <sstream>
 #include <system_error>
 
@@ -24,13 +25,39 @@ ValueCheck WholeNumber(std::uint64_t least, std::uint64_t most) {
   };
 }
 
+namespace {
+
+/// The number that the whole text is; not finite when it is none.
+double ReadNumber(const std::string& text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool is_number = error == std::errc() && end == text.data() + text.size();
+  return is_number ? value : std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace
+
 ValueCheck PositiveNumber(const std::string& demand) {
-  return [demand](const std::string& text) -> std::string {
-    double value = 0.0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    const bool is_number = error == std::errc() && end == text.data() + text.size();
-    if (is_number && std::isfinite(value) && value > 0.0) return {};
-    return demand + ", got " + Quote(text);
+  return [demand](const std::string& text) {
+    const double value = ReadNumber(text);
+    return std::isfinite(value) && value > 0.0 ? std::string() : demand + ", got " + Quote(text);
+  };
+}
+
+ValueCheck NumberFrom(double least, double most) {
+  return [least, most](const std::string& text) {
+    const double value = ReadNumber(text);
+    if (least <= value && value <= most) return std::string();
+    return "must be a number from " + FormatNumber(least) + " to " + FormatNumber(most) + ", got " +
+           Quote(text);
+  };
+}
+
+ValueCheck Fraction() {
+  return [](const std::string& text) {
+    const double value = ReadNumber(text);
+    if (0.0 < value && value < 1.0) return std::string();
+    return "must be a number above 0 and below 1, got " + Quote(text);
   };
 }
 
@@ -87,37 +114,8 @@ Option& Option::ShowDefault() {
 bool Option::is_given() const { return option_->count() > 0; }
 
 template <typename Value>
-Option Command::Add(const std::string& name, Value* value, const std::string& help) {
+Option Command::AddOption(const std::string& name, Value* value, const std::string& help) {
   return Option(app_->add_option(name, *value, help));
-}
-
-Option Command::AddOption(const std::string& name, std::string* value, const std::string& help) {
-  return Add(name, value, help);
-}
-Option Command::AddOption(const std::string& name, std::filesystem::path* value, const std::string& help) {
-  return Add(name, value, help);
-}
-Option Command::AddOption(const std::string& name, double* value, const std::string& help) {
-  return Add(name, value, help);
-}
-Option Command::AddOption(const std::string& name, int* value, const std::string& help) {
-  return Add(name, value, help);
-}
-Option Command::AddOption(const std::string& name, long* value, const std::string& help) {
-  return Add(name, value, help);
-}
-Option Command::AddOption(const std::string& name, std::uint64_t* value, const std::string& help) {
-  return Add(name, value, help);
-}
-Option Command::AddOption(const std::string& name, std::optional<double>* value, const std::string& help) {
-  return Add(name, value, help);
-}
-Option Command::AddOption(const std::string& name, std::vector<double>* values, const std::string& help) {
-  return Add(name, values, help);
-}
-Option Command::AddOption(const std::string& name, std::vector<std::string>* values,
-                          const std::string& help) {
-  return Add(name, values, help);
 }
 
 Option Command::AddFlag(const std::string& name, bool* value, const std::string& help) {
@@ -128,8 +126,16 @@ Option Command::AddFlag(const std::string& name, const std::string& help) {
   return Option(app_->add_flag(name, help));
 }
 
+Command Command::Under(const std::string& heading) const {
+  Command command = *this;
+  command.heading_ = heading;
+  return command;
+}
+
 Command Command::AddCommand(const std::string& name, const std::string& help) {
-  return {app_->add_subcommand(name, help), exit_code_};
+  CLI::App* const command = app_->add_subcommand(name, help);
+  if (!heading_.empty()) command->group(heading_);
+  return {command, exit_code_};
 }
 
 void Command::RequireCommand() { app_->require_subcommand(1); }
@@ -160,14 +166,16 @@ CommandLine::CommandLine(const std::string& program, const std::string& help, co
     : app_(std::make_unique<CLI::App>(help, program)) {
   app_->formatter(std::make_shared<HelpFormatter>());
   app_->set_version_flag("--version", version);
+  app_->footer(program + " A B, with two files of robots, is " + program + " consistency A B.");
 }
 
 CommandLine::~CommandLine() = default;
 
 namespace {
 
-void DescribeCommand(const CLI::App& app, const std::string& name, std::vector<CommandHelp>* all) {
-  CommandHelp help{name, app.get_description(), {}, {}};
+void DescribeCommand(const CLI::App& app, const std::string& name, const std::string& heading,
+                     std::vector<CommandHelp>* all) {
+  CommandHelp help{name, heading, app.get_description(), {}, {}};
   for (const CLI::Option* option : app.get_options()) {
     OptionHelp one;
     one.is_positional = option->get_positional();
@@ -186,7 +194,8 @@ void DescribeCommand(const CLI::App& app, const std::string& name, std::vector<C
   for (const CLI::App* command : commands) help.commands.push_back(command->get_name());
   all->push_back(help);
   for (const CLI::App* command : commands) {
-    DescribeCommand(*command, (name.empty() ? "" : name + " ") + command->get_name(), all);
+    DescribeCommand(*command, (name.empty() ? "" : name + " ") + command->get_name(),
+                    name.empty() ? command->get_group() : heading, all);
   }
 }
 
@@ -200,21 +209,29 @@ ExitCode ReportFailure(const std::string& why) {
 
 std::vector<CommandHelp> CommandLine::Describe() const {
   std::vector<CommandHelp> all;
-  DescribeCommand(*app_, "", &all);
+  DescribeCommand(*app_, "", "", &all);
   return all;
 }
 
 namespace {
 
-/// Words with the "-" of a --json that names no file. The next word is none when it is an option, a
+/// Whether the word names a file that may describe a robot.
+bool NamesRobot(std::string_view word) {
+  return !word.starts_with("-") &&
+         (word.ends_with(".urdf") || word.ends_with(".xml") || word.ends_with(".toml"));
+}
+
+/// The words with what they leave out: the command that compares two robots, and the "-" of a --json that
+/// names no file. The next word is none when it is an option, a
 /// description of a robot, or what a command reads: a scenario's name or a folder.
-std::vector<std::string> CompleteJson(int argc, char** argv) {
+std::vector<std::string> CompleteWords(int argc, char** argv) {
   std::vector<std::string> words(argv, argv + argc);
+  if (argc > 2 && NamesRobot(words[1]) && NamesRobot(words[2]))
+    words.insert(words.begin() + 1, "consistency");
   const auto is_file = [&](const std::string& word) {
     if (word == "-" || word.ends_with(".json") || word.starts_with("/dev/")) return true;
-    const bool is_read = word.ends_with(".urdf") || word.ends_with(".xml") || word.ends_with(".toml");
     const bool is_of_run = words.size() > 1 && words[1] == "run";
-    return !word.empty() && !word.starts_with("-") && !is_read && !is_of_run;
+    return !word.empty() && !word.starts_with("-") && !NamesRobot(word) && !is_of_run;
   };
   for (size_t i = 0; i < words.size(); ++i) {
     if (words[i] == "--json" && !(i + 1 < words.size() && is_file(words[i + 1]))) words[i] = "--json=-";
@@ -226,11 +243,11 @@ std::vector<std::string> CompleteJson(int argc, char** argv) {
 
 int CommandLine::Run(int argc, char** argv) {
   try {
-    const std::vector<std::string> words = CompleteJson(argc, argv);
+    const std::vector<std::string> words = CompleteWords(argc, argv);
     std::vector<const char*> pointers;
     pointers.reserve(words.size());
     for (const std::string& word : words) pointers.push_back(word.c_str());
-    app_->parse(argc, pointers.data());
+    app_->parse(static_cast<int>(pointers.size()), pointers.data());
     return exit_code_;
   } catch (const CLI::Success& success) {
     // By way of a text: whether standard output takes it is the caller's to see.
@@ -263,5 +280,15 @@ std::string CommandLine::Explain(const std::string& what) const {
   return "unknown " + kind + " " + Quote(word) +
          (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?");
 }
+
+template Option Command::AddOption(const std::string&, std::string*, const std::string&);
+template Option Command::AddOption(const std::string&, std::filesystem::path*, const std::string&);
+template Option Command::AddOption(const std::string&, double*, const std::string&);
+template Option Command::AddOption(const std::string&, int*, const std::string&);
+template Option Command::AddOption(const std::string&, long*, const std::string&);
+template Option Command::AddOption(const std::string&, std::uint64_t*, const std::string&);
+template Option Command::AddOption(const std::string&, std::optional<double>*, const std::string&);
+template Option Command::AddOption(const std::string&, std::vector<double>*, const std::string&);
+template Option Command::AddOption(const std::string&, std::vector<std::string>*, const std::string&);
 
 }  // namespace dexcheck::cli

@@ -41,6 +41,12 @@ ValueCheck WholeNumber(std::uint64_t least, std::uint64_t most);
 /// Accepts finite numbers above zero. @param demand what is said of others.
 ValueCheck PositiveNumber(const std::string& demand = "must be a positive number");
 
+/// Accepts numbers from `least` to `most`.
+ValueCheck NumberFrom(double least, double most);
+
+/// Accepts numbers above 0 and below 1.
+ValueCheck Fraction();
+
 /// An option, a flag or a positional argument.
 class Option {
  public:
@@ -73,19 +79,15 @@ class Command {
  public:
   /// @param name of an option with its dashes, of a positional argument without. @param value lives as long
   /// as the command; what it holds is the default.
-  Option AddOption(const std::string& name, std::string* value, const std::string& help);
-  Option AddOption(const std::string& name, std::filesystem::path* value, const std::string& help);
-  Option AddOption(const std::string& name, double* value, const std::string& help);
-  Option AddOption(const std::string& name, int* value, const std::string& help);
-  Option AddOption(const std::string& name, long* value, const std::string& help);
-  Option AddOption(const std::string& name, std::uint64_t* value, const std::string& help);
-  Option AddOption(const std::string& name, std::optional<double>* value, const std::string& help);
-  Option AddOption(const std::string& name, std::vector<double>* values, const std::string& help);
-  Option AddOption(const std::string& name, std::vector<std::string>* values, const std::string& help);
+  /// Its type is one of those at the end of command_line.cc: texts, paths, numbers and lists of them.
+  template <typename Value>
+  Option AddOption(const std::string& name, Value* value, const std::string& help);
   Option AddFlag(const std::string& name, bool* value, const std::string& help);
   /// A word that says what the command does already.
   Option AddFlag(const std::string& name, const std::string& help);
 
+  /// The same command, whose next commands stand under this heading in the help.
+  [[nodiscard]] Command Under(const std::string& heading) const;
   Command AddCommand(const std::string& name, const std::string& help);
   /// One of its commands must be given.
   void RequireCommand();
@@ -95,10 +97,9 @@ class Command {
  private:
   friend class CommandLine;
   Command(CLI::App* app, int* exit_code) : app_(app), exit_code_(exit_code) {}
-  template <typename Value>
-  Option Add(const std::string& name, Value* value, const std::string& help);
   CLI::App* app_;
   int* exit_code_;
+  std::string heading_;
 };
 
 /// What the help says of an option or a positional argument.
@@ -111,7 +112,8 @@ struct OptionHelp {
 
 /// And of a command.
 struct CommandHelp {
-  std::string name;  ///< "study run"; empty for the program itself.
+  std::string name;     ///< "study run"; empty for the program itself.
+  std::string heading;  ///< Under which it stands; of the last word's, the first word's.
   std::string text;
   std::vector<OptionHelp> options;
   std::vector<std::string> commands;  ///< Next words.
@@ -126,7 +128,8 @@ class CommandLine {
   /// What --help says, by command: the program first, then all commands in order.
   [[nodiscard]] std::vector<CommandHelp> Describe() const;
   [[nodiscard]] Command root() { return {app_.get(), &exit_code_}; }
-  /// Reads the words and runs the command's action. @returns the program's exit code; --help and --version
+  /// Reads the words and runs the command's action. Two files of robots instead of a command are compared, as
+  /// by "consistency". @returns the program's exit code; --help and --version
   /// print and are a success. @throws UsageError, which for an unknown word names the nearest known one; what
   /// the action throws.
   int Run(int argc, char** argv);

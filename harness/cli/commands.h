@@ -22,7 +22,7 @@ struct RobotFiles {
 /// Adds --robot and --mjcf, both or neither. @return the first of them.
 Option AddRobotOptions(Command command, RobotFiles* files);
 
-/// Adds --samples, of at most `most`, and --seed: the random states at which two sides are compared.
+/// Adds --samples, of at most `most`, and --seed: the random states at which two descriptions are compared.
 template <typename Count>
 std::array<Option, 2> AddSampleOptions(Command command, std::uint64_t most, Count* samples,
                                        std::uint64_t* seed, const char* word = "--samples") {

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/base/shell.h"
@@ -76,7 +77,7 @@ std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
     }
     text += fmt::format("    '{}') words='{}'; [[ $cur != -* ]] || words='{}'; files={} ;;\n", command.name,
                         Join(words, " "), Join(ListOptionNames(command), " "),
-                        command.commands.empty() ? "1" : "");
+                        command.commands.empty() || command.name.empty() ? "1" : "");
   }
   text +=
       "  esac\n"
@@ -89,6 +90,18 @@ std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
   return text;
 }
 
+/// The program's commands, by the headings that they stand under.
+std::vector<std::pair<std::string, std::vector<CommandHelp>>> ListGroups(
+    const std::vector<CommandHelp>& commands) {
+  std::vector<std::pair<std::string, std::vector<CommandHelp>>> groups;
+  for (const CommandHelp& command : commands) {
+    if (command.name.empty()) continue;
+    if (groups.empty() || groups.back().first != command.heading) groups.push_back({command.heading, {}});
+    groups.back().second.push_back(command);
+  }
+  return groups;
+}
+
 /// For zsh, with what each option means.
 std::string MakeZshCompletion(const std::vector<CommandHelp>& commands) {
   std::string text =
@@ -97,6 +110,16 @@ std::string MakeZshCompletion(const std::vector<CommandHelp>& commands) {
       "  local command= word\n  for word in ${words[2,CURRENT-1]}; do\n    case \"$command $word\" in\n";
   text += ListCommandCases(commands) +
           "    esac\n  done\n  local -a options next\n  local files=\n  case $command in\n";
+  std::string groups;
+  for (const auto& [heading, members] : ListGroups(commands)) {
+    groups += "; next=(";
+    for (const CommandHelp& command : members) {
+      if (command.name.find(' ') == std::string::npos)
+        groups += " " + QuoteForShell(command.name + ":" + Escape(command.text, ":"));
+    }
+    groups += "); _describe " + QuoteForShell(heading) + " next";
+  }
+  groups += "; next=()";
   for (const CommandHelp& command : commands) {
     std::string options;
     for (const OptionHelp& option : command.options) {
@@ -106,12 +129,14 @@ std::string MakeZshCompletion(const std::vector<CommandHelp>& commands) {
       }
     }
     std::string next;
-    for (const std::string& word : command.commands) next += " '" + word + "'";
+    if (!command.name.empty()) {  // those of the program stand in groups
+      for (const std::string& word : command.commands) next += " '" + word + "'";
+    }
     if (TakesScenario(command)) {
       for (const std::string& name : ListShippedNames()) next += " '" + name + "'";
     }
-    text += fmt::format("    '{}') options=({}); next=({}); files={} ;;\n", command.name, options, next,
-                        command.commands.empty() ? "1" : "");
+    text += fmt::format("    '{}') options=({}); next=({}); files={}{} ;;\n", command.name, options, next,
+                        command.commands.empty() ? "1" : "", command.name.empty() ? groups : "");
   }
   text +=
       "  esac\n"
@@ -133,19 +158,23 @@ std::string MakeManualPage(const std::vector<CommandHelp>& commands) {
   std::string text =
       fmt::format(".TH DEXCHECK 1 \"\" \"dexcheck {}\" \"User Commands\"\n.SH NAME\ndexcheck \\- {}\n",
                   Version(), clean(commands.front().text));
-  text += ".SH SYNOPSIS\n.B dexcheck\n.I COMMAND\n[\\fIOPTION\\fR]...\n.SH COMMANDS\n";
-  for (const CommandHelp& command : commands) {
-    if (command.name.empty()) continue;
-    text += fmt::format(".SS dexcheck {}", clean(command.name));
+  const auto describe = [&](const CommandHelp& command) {
+    std::string section = fmt::format(".SS dexcheck {}", clean(command.name));
     for (const OptionHelp& option : command.options) {
-      if (option.is_positional) text += " " + clean(option.names.front());
+      if (option.is_positional) section += " " + clean(option.names.front());
     }
-    text += "\n" + clean(command.text) + ".\n";
+    section += "\n" + clean(command.text) + ".\n";
     for (const OptionHelp& option : command.options) {
-      text +=
+      section +=
           fmt::format(".TP\n\\fB{}\\fR{}\n{}\n", clean(Join(option.names, ", ")),
                       option.value.empty() ? "" : " \\fI" + clean(option.value) + "\\fR", clean(option.text));
     }
+    return section;
+  };
+  text += ".SH SYNOPSIS\n.B dexcheck\n.I COMMAND\n[\\fIOPTION\\fR]...\n";
+  for (const auto& [heading, members] : ListGroups(commands)) {
+    text += ".SH " + clean(heading) + "\n";
+    for (const CommandHelp& command : members) text += describe(command);
   }
   text +=
       ".SH EXIT STATUS\n.TP\n0\nall good\n.TP\n1\na disagreement was found\n.TP\n2\nwrong usage or "

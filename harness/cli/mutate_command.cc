@@ -1,19 +1,15 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <charconv>
 #include <memory>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "controller/common/errors.h"
-#include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/interrupts.h"
+#include "harness/cli/campaign_table.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/json_matrix.h"
 #include "harness/cli/mutate_run.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
@@ -32,176 +28,38 @@ struct MutateRequest {
   bool quiet = false;
 };
 
-struct Campaign {
-  std::vector<Mutant> mutants;
-  std::vector<FormulaMutant> formulas;
-  size_t done = 0;
-  size_t formulas_done = 0;
-
-  [[nodiscard]] bool IsComplete() const { return done == mutants.size() && formulas_done == formulas.size(); }
-};
-
-/// A line of the table.
-struct MutationRow {
-  std::string kind;
-  int mutants = 0;
-  int killed = 0;
-  int refused = 0;
-  int no_effect = 0;
-  int survived = 0;
-  int named_first = 0;
-
-  void Add(MutantOutcome outcome, bool named) {
-    ++mutants;
-    killed += outcome == MutantOutcome::kKilled ? 1 : 0;
-    refused += outcome == MutantOutcome::kRefused ? 1 : 0;
-    no_effect += outcome == MutantOutcome::kNoEffect ? 1 : 0;
-    survived += outcome == MutantOutcome::kSurvived ? 1 : 0;
-    named_first += named ? 1 : 0;
+CampaignFault Describe(const Mutant& mutant, bool diagnosed) {
+  CampaignFault fault{.kind = mutant.kind,
+                      .name = mutant.name,
+                      .outcome = mutant.outcome,
+                      .cause_right = mutant.named_first};
+  if (mutant.outcome == MutantOutcome::kSurvived) fault.exception = "survived: " + mutant.name;
+  if (mutant.outcome == MutantOutcome::kNoEffect) fault.exception = "no effect: " + mutant.name;
+  if (diagnosed && mutant.outcome == MutantOutcome::kKilled && !mutant.named_first) {
+    fault.exception = fmt::format("cause: {} ({}): named {}{}", mutant.name, mutant.kind,
+                                  mutant.named.empty() ? "nothing" : mutant.named,
+                                  mutant.named_equal ? ", which is listed as equal" : "");
   }
-};
-
-const char* NameOf(MutantOutcome outcome) {
-  switch (outcome) {
-    case MutantOutcome::kKilled:
-      return "killed";
-    case MutantOutcome::kRefused:
-      return "refused";
-    case MutantOutcome::kNoEffect:
-      return "no effect";
-    case MutantOutcome::kSurvived:
-      break;
-  }
-  return "survived";
+  fault.details = {{"failed_checks", mutant.failed_checks},
+                   {"named", mutant.named},
+                   {"named_equal", mutant.named_equal},
+                   {"explained", mutant.explained}};
+  return fault;
 }
 
-std::vector<MutationRow> SumUp(const Campaign& campaign) {
-  std::vector<MutationRow> rows;
-  const auto add = [&](const std::string& kind, MutantOutcome outcome, bool named) {
-    auto row = std::find_if(rows.begin(), rows.end(), [&](const MutationRow& r) { return r.kind == kind; });
-    if (row == rows.end()) {
-      row = rows.insert(rows.end(), MutationRow{});
-      row->kind = kind;
-    }
-    row->Add(outcome, named);
-  };
-  for (size_t i = 0; i < campaign.done; ++i)
-    add(campaign.mutants[i].kind, campaign.mutants[i].outcome, campaign.mutants[i].named_first);
-  for (size_t i = 0; i < campaign.formulas_done; ++i)
-    add("wrong equation", campaign.formulas[i].outcome, campaign.formulas[i].localised);
-  return rows;
-}
-
-MutationRow Total(const std::vector<MutationRow>& rows) {
-  MutationRow total;
-  total.kind = "all";
-  for (const MutationRow& row : rows) {
-    total.mutants += row.mutants;
-    total.killed += row.killed;
-    total.refused += row.refused;
-    total.no_effect += row.no_effect;
-    total.survived += row.survived;
-    total.named_first += row.named_first;
+CampaignFault Describe(const FormulaMutant& mutant) {
+  CampaignFault fault{.kind = "wrong equation",
+                      .name = mutant.name,
+                      .outcome = mutant.outcome,
+                      .cause_right = mutant.localised};
+  if (mutant.outcome == MutantOutcome::kSurvived) fault.exception = "survived: " + mutant.name;
+  if (mutant.outcome == MutantOutcome::kNoEffect) fault.exception = "no effect: " + mutant.name;
+  if (mutant.outcome == MutantOutcome::kKilled && !mutant.localised) {
+    fault.exception =
+        fmt::format("cause: {}: expected {}, failed {}", mutant.name, mutant.first, mutant.failed_checks);
   }
-  return total;
-}
-
-void Print(const MutateRequest& request, const Campaign& campaign) {
-  const auto line = [](const MutationRow& row) {
-    fmt::print("{:<32}{:>8}{:>7}{:>8}{:>10}{:>9}{:>6}\n", row.kind, row.mutants, row.killed, row.refused,
-               row.no_effect, row.survived, row.named_first);
-  };
-  const std::vector<MutationRow> rows = SumUp(campaign);
-  const MutationRow total = Total(rows);
-  if (!request.quiet) {
-    fmt::print("{:<32}{:>8}{:>7}{:>8}{:>10}{:>9}{:>6}\n", "what was changed", "mutants", "killed", "refused",
-               "no effect", "survived", "first");
-    for (const MutationRow& row : rows) line(row);
-    line(total);
-    for (size_t i = 0; i < campaign.done; ++i) {
-      const Mutant& mutant = campaign.mutants[i];
-      if (mutant.outcome == MutantOutcome::kSurvived || mutant.outcome == MutantOutcome::kNoEffect)
-        fmt::print("{}: {}\n", NameOf(mutant.outcome), mutant.name);
-      if (request.options.diagnose && mutant.outcome == MutantOutcome::kKilled && !mutant.named_first)
-        fmt::print("not named first: {} ({}); named: {}{}\n", mutant.name, mutant.kind,
-                   mutant.named.empty() ? "nothing" : mutant.named,
-                   mutant.named_equal ? ", which is listed as equal" : "");
-    }
-    for (size_t i = 0; i < campaign.formulas_done; ++i) {
-      const FormulaMutant& mutant = campaign.formulas[i];
-      if (mutant.outcome != MutantOutcome::kKilled)
-        fmt::print("{}: {}\n", NameOf(mutant.outcome), mutant.name);
-      else if (!mutant.localised)
-        fmt::print("not named: {}: expected {}, failed {}\n", mutant.name, mutant.first,
-                   mutant.failed_checks);
-    }
-    fmt::print("\n");
-  }
-  if (!campaign.IsComplete()) {
-    fmt::print("INTERRUPTED after {} of {} mutants. So far:\n", campaign.done + campaign.formulas_done,
-               campaign.mutants.size() + campaign.formulas.size());
-  }
-  const int effective = total.mutants - total.refused - total.no_effect;
-  fmt::print("{}: {} of {} mutants that are possible and have an effect were found",
-             total.survived == 0 ? "ALL KILLED" : "SURVIVORS", total.killed, effective);
-  if (request.options.diagnose) fmt::print("; {} named first", total.named_first);
-  fmt::print(".\n");
-}
-
-std::string ToText(const MutateRequest& request, const Campaign& campaign) {
-  Json json = {{"robot", request.files.robot.string()}, {"mjcf", request.files.mjcf.string()},
-               {"mujoco", mj_versionString()},          {"scale", request.options.scale},
-               {"samples", request.options.samples},    {"seed", request.options.seed},
-               {"complete", campaign.IsComplete()}};
-  json["kinds"] = Json::object();
-  for (const MutationRow& row : SumUp(campaign)) {
-    json["kinds"][row.kind] = {{"mutants", row.mutants},   {"killed", row.killed},
-                               {"refused", row.refused},   {"no_effect", row.no_effect},
-                               {"survived", row.survived}, {"named_first", row.named_first}};
-  }
-  json["mutants"] = Json::array();
-  for (size_t i = 0; i < campaign.done; ++i) {
-    const Mutant& mutant = campaign.mutants[i];
-    json["mutants"].push_back({{"name", mutant.name},
-                               {"kind", mutant.kind},
-                               {"outcome", NameOf(mutant.outcome)},
-                               {"failed_checks", mutant.failed_checks},
-                               {"named", mutant.named},
-                               {"named_first", mutant.named_first},
-                               {"named_equal", mutant.named_equal},
-                               {"explained", mutant.explained}});
-  }
-  for (size_t i = 0; i < campaign.formulas_done; ++i) {
-    const FormulaMutant& mutant = campaign.formulas[i];
-    json["mutants"].push_back({{"name", mutant.name},
-                               {"kind", "wrong equation"},
-                               {"outcome", NameOf(mutant.outcome)},
-                               {"failed_checks", mutant.failed_checks},
-                               {"named_first", mutant.localised}});
-  }
-  return json.dump(2) + "\n";
-}
-
-/// Empty for a number that a mutant can be changed by; what is wrong otherwise.
-std::string CheckScale(const std::string& text) {
-  constexpr double kSmallest = 1e-9;
-  constexpr double kLargest = 0.5;
-  double scale = 0.0;
-  const char* const end = text.data() + text.size();
-  const std::from_chars_result result = std::from_chars(text.data(), end, scale);
-  if (result.ec == std::errc() && result.ptr == end && kSmallest <= scale && scale <= kLargest) return {};
-  return fmt::format("must be a number from {} to {}, got {}", kSmallest, kLargest, Quote(text));
-}
-
-/// Empty for a time that can be taken.
-ValueCheck Seconds(double least, double most) {
-  return [=](const std::string& text) -> std::string {
-    double value = 0.0;
-    const char* const end = text.data() + text.size();
-    const std::from_chars_result result = std::from_chars(text.data(), end, value);
-    if (result.ec == std::errc() && result.ptr == end && least <= value && value <= most) return {};
-    return fmt::format("must be a number of seconds from {} to {}, got {}", least, most, Quote(text));
-  };
+  fault.details = {{"failed_checks", mutant.failed_checks}};
+  return fault;
 }
 
 int Run(MutateRequest request) {
@@ -228,24 +86,34 @@ int Run(MutateRequest request) {
                      " before it is changed on purpose (see dexcheck diagnose), got a disagreement");
   }
 
-  Campaign campaign;
-  campaign.mutants = ListMutants(model.spec(), request.options.scale);
-  campaign.formulas = ListFormulaMutants(model);
-  const auto total = static_cast<long>(campaign.mutants.size() + campaign.formulas.size());
-  ProgressBar bar("changing", total, request.quiet);
-  while (campaign.formulas_done < campaign.formulas.size() && !IsInterrupted()) {
-    RunFormulaMutant(adapter, request.options.samples, &campaign.formulas[campaign.formulas_done++]);
-    bar.Update(static_cast<long>(campaign.formulas_done));
+  std::vector<Mutant> mutants = ListMutants(model.spec(), request.options.scale);
+  std::vector<FormulaMutant> formulas = ListFormulaMutants(model);
+  Campaign campaign{
+      .faults = {}, .total = mutants.size() + formulas.size(), .names_causes = request.options.diagnose};
+  ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet);
+  const auto add = [&](const CampaignFault& fault) {
+    campaign.faults.push_back(fault);
+    bar.Update(static_cast<long>(campaign.faults.size()));
+  };
+  for (size_t i = 0; i < formulas.size() && !IsInterrupted(); ++i) {
+    RunFormulaMutant(adapter, request.options.samples, &formulas[i]);
+    add(Describe(formulas[i]));
   }
-  while (campaign.done < campaign.mutants.size() && !IsInterrupted()) {
-    TryMutant(model, *engine, source, request.options, &campaign.mutants[campaign.done++]);
-    bar.Update(static_cast<long>(campaign.formulas_done + campaign.done));
+  for (size_t i = 0; i < mutants.size() && !IsInterrupted(); ++i) {
+    TryMutant(model, *engine, source, request.options, &mutants[i]);
+    add(Describe(mutants[i], request.options.diagnose));
   }
   bar.Finish();
-  if (json) json->Write(ToText(request, campaign));
-  if (request.json_file != "-") Print(request, campaign);
-  if (Total(SumUp(campaign)).survived > 0) return kDisagreement;
-  return campaign.IsComplete() ? kSuccess : ReportFailure("interrupted");
+  if (json) {
+    json->Write(campaign.ToText({{"robot", request.files.robot.string()},
+                                 {"mjcf", request.files.mjcf.string()},
+                                 {"mujoco", mj_versionString()},
+                                 {"scale", request.options.scale},
+                                 {"samples", request.options.samples},
+                                 {"seed", request.options.seed}}));
+  }
+  if (request.json_file != "-") campaign.Print(request.quiet);
+  return campaign.ToExitCode();
 }
 
 }  // namespace
@@ -258,7 +126,7 @@ void AddMutateCommand(Command app) {
   Option robot = AddRobotOptions(command, &request->files);
   Option scale = command.AddOption("--scale", &request->options.scale, "Change of a number, relative to it")
                      .TypeName("X")
-                     .Check(CheckScale)
+                     .Check(NumberFrom(1e-9, 0.5))
                      .ShowDefault();
   Option run =
       command
@@ -271,13 +139,13 @@ void AddMutateCommand(Command app) {
           .AddOption("--from", &request->run.options.from,
                      "In a run: when the fault begins, s; in a motion of joints it is there from the first")
           .TypeName("T")
-          .Check(Seconds(0.0, 1e4))
+          .Check(NumberFrom(0.0, 1e4))
           .Needs(run)
           .ShowDefault();
   Option duration =
       command.AddOption("--duration", &request->run.options.duration, "In a run: how long it is looked at, s")
           .TypeName("T")
-          .Check(Seconds(1e-3, 1e4))
+          .Check(NumberFrom(1e-3, 1e4))
           .Needs(run)
           .ShowDefault();
   Option faults = command

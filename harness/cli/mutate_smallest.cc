@@ -20,35 +20,35 @@ namespace {
 constexpr int kStates = 24;
 constexpr double kGood = 1e-3;  // an error that should be found
 
-/// One question's column: what of the numbers it finds.
-struct Column {
+/// What the checks of one category find of the numbers.
+struct Category {
   const char* name;
   double (*smallest)(const Detectability&);
   std::vector<std::string> checks;
 };
 
-const std::vector<Column>& ListColumns() {
-  static const std::vector<Column> columns = {
-      {"balance",
+const std::vector<Category>& ListCategories() {
+  static const std::vector<Category> categories = {
+      {"inverse dynamics",
        [](const Detectability& number) { return std::min(number.robot, number.object); },
        {"inverse_dynamics_robot", "inverse_dynamics_object"}},
-      {"prediction",
+      {"forward dynamics",
        [](const Detectability& number) { return number.prediction; },
        {"reduced_acceleration", "contact_force"}},
       {"law", [](const Detectability& number) { return number.law; }, {"law_torque"}},
   };
-  return columns;
+  return categories;
 }
 
-/// A line of the table: the numbers of one quantity, by one question.
+/// A line of the table: the numbers of one quantity, by one category of checks.
 struct SmallestRow {
   int numbers = 0, shown = 0, good = 0;
   std::vector<double> errors;
 };
 
-/// What became of the median claims of a question, by quantity.
+/// What became of the median claim of a category and quantity.
 struct RetriedMedian {
-  std::string question, quantity, name;
+  std::string category, quantity, name;
   double claimed = 0.0;
   RetriedError retried;
 };
@@ -64,12 +64,12 @@ std::vector<std::string> ListQuantities(const DetectabilityResult& result) {
 }
 
 /// @param quantity empty for all.
-SmallestRow SumUp(const DetectabilityResult& result, const std::string& quantity, const Column& column) {
+SmallestRow SumUp(const DetectabilityResult& result, const std::string& quantity, const Category& category) {
   SmallestRow row;
   for (const Detectability& number : result.numbers) {
     if (!quantity.empty() && number.quantity != quantity) continue;
     ++row.numbers;
-    const double error = column.smallest(number);
+    const double error = category.smallest(number);
     if (!std::isfinite(error)) continue;
     ++row.shown;
     row.good += error <= kGood ? 1 : 0;
@@ -85,28 +85,28 @@ std::vector<RetriedMedian> RetryMedians(const DetectabilityResult& result, const
   const std::vector<std::string> quantities = ListQuantities(result);
   std::vector<RetriedMedian> medians;
   if (result.numbers.empty()) return medians;
-  ProgressBar bar("trying again", static_cast<long>(ListColumns().size() * quantities.size()), quiet);
-  for (const Column& column : ListColumns()) {
+  ProgressBar bar("trying again", static_cast<long>(ListCategories().size() * quantities.size()), quiet);
+  for (const Category& category : ListCategories()) {
     // Without an error none may fail.
     const Parameter& any = result.numbers.front().parameter;
-    if (RetryError(files.scenario, files.robot, files.mjcf, any, 0.0, column.checks, IsInterrupted).found >
+    if (RetryError(files.scenario, files.robot, files.mjcf, any, 0.0, category.checks, IsInterrupted).found >
         0) {
       throw InputError(files.scenario.source + ": must pass with seeds 1 to " + std::to_string(kRetrySeeds) +
-                       " before faults are made in it, fails by " + column.name);
+                       " before faults are made in it, fails by " + category.name);
     }
     for (const std::string& quantity : quantities) {
       bar.Update(static_cast<long>(medians.size()));
-      const SmallestRow row = SumUp(result, quantity, column);
+      const SmallestRow row = SumUp(result, quantity, category);
       if (row.errors.empty()) continue;
       const double claimed = row.errors[row.errors.size() / 2];
       const auto number =
           std::find_if(result.numbers.begin(), result.numbers.end(), [&](const Detectability& one) {
-            return one.quantity == quantity && column.smallest(one) == claimed;
+            return one.quantity == quantity && category.smallest(one) == claimed;
           });
       const RetriedError retried = RetryError(files.scenario, files.robot, files.mjcf, number->parameter,
-                                              claimed, column.checks, IsInterrupted);
+                                              claimed, category.checks, IsInterrupted);
       if (IsInterrupted()) return medians;
-      medians.push_back({column.name, quantity, number->name, claimed, retried});
+      medians.push_back({category.name, quantity, number->name, claimed, retried});
     }
   }
   bar.Finish();
@@ -130,12 +130,12 @@ std::string ToText(const MutateRunRequest& request, const DetectabilityResult& r
                                {"quantity", number.quantity},
                                {"inverse_dynamics_robot", ErrorToJson(number.robot)},
                                {"inverse_dynamics_object", ErrorToJson(number.object)},
-                               {"prediction", ErrorToJson(number.prediction)},
+                               {"forward_dynamics", ErrorToJson(number.prediction)},
                                {"law", ErrorToJson(number.law)}});
   }
   json["retried"] = Json::array();
   for (const RetriedMedian& median : medians) {
-    json["retried"].push_back({{"question", median.question},
+    json["retried"].push_back({{"category", median.category},
                                {"quantity", median.quantity},
                                {"name", median.name},
                                {"claimed", median.claimed},
@@ -149,13 +149,13 @@ std::string ToText(const MutateRunRequest& request, const DetectabilityResult& r
 void Print(const DetectabilityResult& result, const std::vector<RetriedMedian>& medians) {
   std::vector<std::string> quantities = ListQuantities(result);
   quantities.emplace_back();  // all
-  for (const Column& column : ListColumns()) {
+  for (const Category& category : ListCategories()) {
     fmt::print(
-        "smallest relative error that fails by {} alone, to first "
+        "smallest relative error that {} alone find, to first "
         "order\n\n{:<24}{:>8}{:>7}{:>10}{:>10}{:>10}{:>10}\n",
-        column.name, "quantity", "numbers", "shown", "to 0.1 %", "best", "median", "worst");
+        category.name, "quantity", "numbers", "shown", "to 0.1 %", "best", "median", "worst");
     for (const std::string& quantity : quantities) {
-      const SmallestRow row = SumUp(result, quantity, column);
+      const SmallestRow row = SumUp(result, quantity, category);
       fmt::print("{:<24}{:>8}{:>7}{:>10}", quantity.empty() ? "all" : quantity, row.numbers, row.shown,
                  row.good);
       if (!row.errors.empty() && !quantity.empty()) {
@@ -166,14 +166,15 @@ void Print(const DetectabilityResult& result, const std::vector<RetriedMedian>& 
     }
     fmt::print("\n");
   }
-  fmt::print("the medians, made in runs with {} seeds\n\n{:<12}{:<24}{:>10}{:>10}{:>12}\n", kRetrySeeds,
-             "question", "quantity", "claimed", "made", "found");
+  fmt::print("the medians, made in runs with {} seeds\n\n{:<18}{:<24}{:>10}{:>10}{:>12}\n", kRetrySeeds,
+             "category", "quantity", "claimed", "made", "found");
   for (const RetriedMedian& median : medians) {
-    fmt::print("{:<12}{:<24}{:>10.1e}{:>10.1e}{:>7} of {}\n", median.question, median.quantity,
+    fmt::print("{:<18}{:<24}{:>10.1e}{:>10.1e}{:>7} of {}\n", median.category, median.quantity,
                median.claimed, median.retried.error, median.retried.found, median.retried.runs);
   }
-  fmt::print("\n{} combinations of numbers show in the balances; singular values from {:.2e} to {:.2e}.\n",
-             result.rank, result.smallest_singular_value, result.largest_singular_value);
+  fmt::print(
+      "\n{} combinations of numbers show in the inverse dynamics; singular values from {:.2e} to {:.2e}.\n",
+      result.rank, result.smallest_singular_value, result.largest_singular_value);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ struct PlanClearance {
   std::string bodies;                                         ///< Empty when there is no such pair.
 };
 
-/// How far bodies that are not meant to touch are apart in an MJCF's scene, with the hand open and closed
+/// How far bodies that should not touch are apart in an MJCF's scene, with the hand open and closed
 /// around the object. @param q, q_open positions q'. @throws InputError as LoadMjcf and Adapter.
 std::array<PlanClearance, kPairClassCount> FindPlanClearance(const RobotModel& model,
                                                              const std::filesystem::path& mjcf,

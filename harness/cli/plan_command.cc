@@ -13,12 +13,8 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/contact/contact_geometry.h"
-#include "controller/contact/grasp_map.h"
 #include "controller/contact/object_surface.h"
-#include "controller/contact/shapes.h"
 #include "controller/grasp/contact_plan.h"
-#include "controller/grasp/force_closure.h"
 #include "controller/model/parameter_reader.h"
 #include "controller/object/euler_zyz.h"
 #include "harness/cli/commands.h"
@@ -118,67 +114,42 @@ VectorXd MakeNominalPosture(const RobotModel& model, const Hand& hand, const Pla
   return q;
 }
 
-/// Printed numbers: to a millionth of a degree or a micrometre, and 0 without a sign.
-double Round(double value) { return std::round(value * 1e6) / 1e6 + 0.0; }
-
-std::string FormatRounded(const std::vector<double>& values) {
-  std::vector<double> rounded(values.size());
-  std::transform(values.begin(), values.end(), rounded.begin(), Round);
-  return FormatNumbers(rounded);
-}
-
 /// What a scenario's [grasp] says.
-struct GraspBlock {
-  std::vector<std::string> fingertips;
-  std::string frame;
-  std::vector<double> xyz;  // object in the palm frame, m
-  std::vector<double> zyz_deg;
-  std::vector<std::array<double, 2>> contacts_deg;
-  std::vector<std::pair<std::string, double>> joints_deg;  // those that are not 0
-};
-
-GraspBlock MakeGraspBlock(const RobotModel& model, const Hand& hand, const Surface& surface,
-                          const ContactPlan& plan) {
-  GraspBlock block;
+Json MakeGrasp(const RobotModel& model, const Hand& hand, const Surface& surface, const ContactPlan& plan,
+               const PlanRequest& request) {
+  Json grasp;
   for (const int tip : hand.fingertips) {
-    block.fingertips.push_back(model.frames()[static_cast<size_t>(tip)].name);
+    grasp["fingertips"].push_back(model.frames()[static_cast<size_t>(tip)].name);
   }
-  block.frame = model.frames()[static_cast<size_t>(hand.palm_frame)].name;
-  const Pose X_Po = plan.X_oP.inverse();
+  if (!request.hemisphere.empty()) grasp["hemisphere"] = request.hemisphere;
+  grasp["frame"] = model.frames()[static_cast<size_t>(hand.palm_frame)].name;
+  const Pose X_Po = plan.X_oP.inverse();  // object in the palm frame
   const Vector3d zyz = CalcAnyZyzAngles(X_Po.linear());
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    block.xyz.push_back(X_Po.translation()[i]);
-    block.zyz_deg.push_back(RadToDeg(zyz[i]));
-  }
+  grasp["xyz"] = ToList(X_Po.translation());
+  grasp["zyz_deg"] = {RadToDeg(zyz[0]), RadToDeg(zyz[1]), RadToDeg(zyz[2])};
   for (const SurfacePoint& contact : plan.contacts) {
     const Vector2d angles = AnglesOfPoint(surface, contact);
-    block.contacts_deg.push_back({RadToDeg(angles.x()), RadToDeg(angles.y())});
+    grasp["contacts_deg"].push_back({RadToDeg(angles.x()), RadToDeg(angles.y())});
   }
+  grasp["joints_deg"] = Json::object();
   for (int joint = 0; joint < model.num_joints(); ++joint) {
     const double position = plan.q[model.num_base_positions() + joint];
     if (position != 0.0) {
-      block.joints_deg.emplace_back(model.joints()[static_cast<size_t>(joint)].name, RadToDeg(position));
+      grasp["joints_deg"][model.joints()[static_cast<size_t>(joint)].name] = RadToDeg(position);
     }
   }
-  return block;
+  return grasp;
 }
 
-/// The margin of the contacts that the shipped scenarios use: four fingertips on the torus's outer equator.
-std::optional<double> CalcHandPickedMargin(const Surface& surface, const Hand& hand,
-                                           const PlanRequest& request) {
-  constexpr std::array<double, 4> kDegrees = {125.0, 90.0, 55.0, -90.0};
-  if (dynamic_cast<const Torus*>(&surface) == nullptr || hand.fingertips.size() != kDegrees.size()) return {};
-  const Sphere any_fingertip(1.0);  // m; forces on the object do not depend on it
-  std::vector<Contact> contacts;
-  for (const double degrees : kDegrees) {
-    const ContactCoordinates kappa{{0.0, 0.0, 0}, {DegToRad(degrees), 0.0, 0}, 0.0};
-    contacts.push_back({.geometry = CalcContactGeometry(any_fingertip, surface, kappa)});
+/// As TOML has it; numbers to a millionth of a degree or a micrometre, and 0 without a sign.
+std::string ToToml(const Json& value) {
+  if (value.is_number()) return FormatNumber(std::round(value.get<double>() * 1e6) / 1e6 + 0.0);
+  if (value.is_string()) return Quote(value.get<std::string>());
+  std::string entries;
+  for (const auto& [name, entry] : value.items()) {
+    entries += (entries.empty() ? "" : ", ") + (value.is_object() ? name + " = " : "") + ToToml(entry);
   }
-  Matrix6Xd G(6, CountForces(contacts));
-  CalcGraspMap(contacts, G);
-  ForceClosureOptions options;
-  options.length = request.options.length;
-  return CalcForceClosure(G, VectorXd::Constant(kDegrees.size(), request.options.mu), options).margin_lower;
+  return value.is_object() ? "{ " + entries + " }" : "[" + entries + "]";
 }
 
 using Clearances = std::array<PlanClearance, kPairClassCount>;
@@ -192,58 +163,30 @@ const PlanClearance* FindSmallest(const Clearances& clearances) {
   return smallest;
 }
 
-void PrintText(const PlanRequest& request, const ContactPlan& plan, const GraspBlock& block,
-               const std::optional<double>& hand_picked, const std::optional<Clearances>& clearances,
-               double seconds) {
+void PrintText(const PlanRequest& request, const ContactPlan& plan, const Json& grasp,
+               const std::optional<Clearances>& clearances, double seconds) {
   fmt::print("# {} contacts for the object at {} m, {} degrees (ZYZ); {} palm poses tried in {:.2f} s\n",
-             block.contacts_deg.size(), FormatNumbers(request.xyz), FormatNumbers(request.zyz_deg),
+             plan.contacts.size(), FormatNumbers(request.xyz), FormatNumbers(request.zyz_deg),
              plan.palm_poses, seconds);
-  fmt::print("# margin of force closure {:.3f} per newton of normal force, mu = {}", plan.margin,
+  fmt::print("# margin of force closure {:.3f} per newton of normal force, mu = {}\n", plan.margin,
              FormatNumber(request.options.mu));
-  if (hand_picked) {
-    fmt::print("; contacts at 125, 90, 55, -90 degrees have {:.3f}", *hand_picked);
-  }
-  fmt::print("\n# every joint stays {:.3f} or more from the ends of its range\n", plan.joint_margin);
+  fmt::print("# every joint stays {:.3f} or more from the ends of its range\n", plan.joint_margin);
   if (const PlanClearance* nearest = clearances ? FindSmallest(*clearances) : nullptr) {
-    fmt::print("# nearest of what is not meant to touch, hand open or closed: {}, {:.1f} mm {}\n",
-               nearest->bodies, 1e3 * std::abs(nearest->distance),
-               nearest->distance < 0.0 ? "into each other" : "apart");
+    fmt::print("# nearest of what should not touch, hand open or closed: {}, {:.1f} mm {}\n", nearest->bodies,
+               1e3 * std::abs(nearest->distance), nearest->distance < 0.0 ? "into each other" : "apart");
   }
   if (std::abs(std::sin(DegToRad(request.zyz_deg[1]))) < kMinSinBeta) {
     fmt::print("# ZYZ angles are singular at this pose: in [control], orientation = \"rotation\"\n");
   }
-  fmt::print("[grasp]\nfingertips = [");
-  const char* separator = "";
-  for (const std::string& name : block.fingertips) {
-    fmt::print("{}\"{}\"", separator, name);
-    separator = ", ";
-  }
-  fmt::print("]\n");
-  if (!request.hemisphere.empty()) fmt::print("hemisphere = {}\n", FormatNumbers(request.hemisphere));
-  fmt::print("frame = \"{}\"\nxyz = {}\nzyz_deg = {}\ncontacts_deg = [", block.frame,
-             FormatRounded(block.xyz), FormatRounded(block.zyz_deg));
-  separator = "";
-  for (const std::array<double, 2>& contact : block.contacts_deg) {
-    fmt::print("{}{}", separator, FormatRounded({contact[0], contact[1]}));
-    separator = ", ";
-  }
-  fmt::print("]\njoints_deg = {{ ");
-  separator = "";
-  for (const auto& [name, degrees] : block.joints_deg) {
-    fmt::print("{}{} = {}", separator, name, FormatNumber(Round(degrees)));
-    separator = ", ";
-  }
-  fmt::print(" }}\n");
+  fmt::print("[grasp]\n");
+  for (const auto& [key, value] : grasp.items()) fmt::print("{} = {}\n", key, ToToml(value));
 }
 
-std::string ToText(const PlanRequest& request, const ContactPlan& plan,
-                   const std::optional<GraspBlock>& block, const std::optional<double>& hand_picked,
+std::string ToText(const PlanRequest& request, const ContactPlan& plan, const Json& grasp,
                    const std::optional<Clearances>& clearances, double seconds) {
   Json json = {
       {"found", plan.found},      {"object_xyz", request.xyz},     {"object_zyz_deg", request.zyz_deg},
       {"mu", request.options.mu}, {"palm_poses", plan.palm_poses}, {"seconds", seconds}};
-  if (!plan.found) json["problem"] = plan.problem;
-  if (hand_picked) json["hand_picked_margin"] = *hand_picked;
   if (clearances) {
     json["clearance"] = Json::object();
     for (size_t i = 0; i < clearances->size(); ++i) {
@@ -253,21 +196,23 @@ std::string ToText(const PlanRequest& request, const ContactPlan& plan,
                                                               {"bodies", one.bodies}};
     }
   }
-  if (block) {
+  if (plan.found) {
     json["margin"] = plan.margin;
     json["joint_margin"] = plan.joint_margin;
     json["q"] = ToList(plan.q);
     json["q_open"] = ToList(plan.q_open);
-    json["grasp"] = {{"fingertips", block->fingertips},
-                     {"frame", block->frame},
-                     {"xyz", block->xyz},
-                     {"zyz_deg", block->zyz_deg},
-                     {"contacts_deg", block->contacts_deg},
-                     {"joints_deg", Json::object()}};
-    if (!request.hemisphere.empty()) json["grasp"]["hemisphere"] = request.hemisphere;
-    for (const auto& [name, degrees] : block->joints_deg) json["grasp"]["joints_deg"][name] = degrees;
+    json["grasp"] = grasp;
+  } else {
+    json["problem"] = plan.problem;
   }
   return json.dump(2) + "\n";
+}
+
+/// The three numbers of an option. @throws InputError when one is not finite.
+Vector3d ToVector3(const char* option, const std::vector<double>& values) {
+  const Vector3d vector(values[0], values[1], values[2]);
+  if (!vector.allFinite()) Fail(option, "must be finite, got " + FormatNumbers(values));
+  return vector;
 }
 
 int Run(PlanRequest request) {
@@ -286,10 +231,7 @@ int Run(PlanRequest request) {
     throw InputError(request.robot.string() + ": " + error.what());
   }
   Hand hand = FindHand(model, request);
-  if (!request.hold_at.empty()) {
-    hand.hold_at = Vector3d(request.hold_at[0], request.hold_at[1], request.hold_at[2]);
-    if (!hand.hold_at->allFinite()) Fail("--hold-at", "must be finite");
-  }
+  if (!request.hold_at.empty()) hand.hold_at = ToVector3("--hold-at", request.hold_at);
   const VectorXd nominal = MakeNominalPosture(model, hand, request);
   const double tip_radius = *model.frames()[static_cast<size_t>(hand.fingertips.front())].sphere_radius;
   request.options.half_length = CalcContactHalfLength(model.object()->shape, tip_radius);
@@ -297,40 +239,32 @@ int Run(PlanRequest request) {
     request.options.support = SupportPlane{Vector3d::UnitZ(), *request.support_height};
   }
   if (!request.hemisphere.empty()) {
-    const Vector3d pole(request.hemisphere[0], request.hemisphere[1], request.hemisphere[2]);
-    if (!(pole.norm() > 0.0) || !pole.allFinite()) Fail("--hemisphere", "must be a direction");
+    const Vector3d pole = ToVector3("--hemisphere", request.hemisphere);
+    if (!(pole.norm() > 0.0)) Fail("--hemisphere", "must be a direction");
     request.options.hemisphere = pole.normalized();
   }
   if (!request.lift.empty()) {
     request.options.reaches.emplace_back(request.lift[0], request.lift[1], request.lift[2]);
   }
   Vector6d X_o;
-  for (size_t i = 0; i < 3; ++i) {
-    for (const double value : {request.xyz[i], request.zyz_deg[i]}) {
-      if (!std::isfinite(value))
-        Fail("--object-xyz, --object-zyz-deg", "must be finite, got " + FormatNumber(value));
-    }
-    X_o[static_cast<Eigen::Index>(i)] = request.xyz[i];
-    X_o[static_cast<Eigen::Index>(i) + 3] = DegToRad(request.zyz_deg[i]);
-  }
+  X_o << ToVector3("--object-xyz", request.xyz), kPi / 180.0 * ToVector3("--object-zyz-deg", request.zyz_deg);
   std::optional<OutputFile> json;
   if (!request.json_file.empty()) json.emplace(request.json_file);
 
   const auto start = std::chrono::steady_clock::now();
   const ContactPlan plan = PlanContacts(model, hand, *surface, CalcObjectPose(X_o), nominal, request.options);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  const std::optional<double> hand_picked = CalcHandPickedMargin(*surface, hand, request);
-  std::optional<GraspBlock> block;
+  Json grasp;
   std::optional<Clearances> clearances;
   if (plan.found) {
-    block = MakeGraspBlock(model, hand, *surface, plan);
+    grasp = MakeGrasp(model, hand, *surface, plan, request);
     if (!request.mjcf.empty()) {
       clearances = FindPlanClearance(model, request.mjcf, CalcObjectPose(X_o), plan.q, plan.q_open);
     }
   }
-  if (json) json->Write(ToText(request, plan, block, hand_picked, clearances, seconds));
+  if (json) json->Write(ToText(request, plan, grasp, clearances, seconds));
   if (!plan.found) throw Error("no plan: " + plan.problem);
-  if (request.json_file != "-") PrintText(request, plan, *block, hand_picked, clearances, seconds);
+  if (request.json_file != "-") PrintText(request, plan, grasp, clearances, seconds);
   const PlanClearance* nearest = clearances ? FindSmallest(*clearances) : nullptr;
   return nearest != nullptr && nearest->distance < 0.0 ? kDisagreement : kSuccess;
 }

@@ -62,7 +62,7 @@ ExitCode ToExitCode(const RunResult& result) {
   return result.verdict == Verdict::kPass ? kSuccess : kDisagreement;
 }
 
-/// The run and its verdict stand without a video or a report: why there is none is only told.
+/// The run and its verdict stand without a video or a report: why there is none is a warning.
 template <typename Make>
 void TryToMake(const char* what, const Make& make) {
   try {
@@ -143,7 +143,7 @@ int RunScenario(const RunRequest& request) {
     }
     FlushOutput();
   } catch (const std::exception&) {
-    unprinted = std::current_exception();  // standard output takes nothing: told when all is done
+    unprinted = std::current_exception();  // standard output takes nothing: reported when all is done
   }
   if (folder && !IsInterrupted()) {
     if (runner.loop().record().step > 0) {
@@ -205,7 +205,7 @@ int ReplayRun(const RunRequest& request) {
              FormatNumber(difference.now));
   if (!other_machine) return kDisagreement;
   if (machine.empty()) {
-    fmt::print("The log does not tell on what machine it was written.\n");
+    fmt::print("The log does not say on which machine it was written.\n");
     return kDisagreement;
   }
   fmt::print("written on:  {}\nrepeated on: {}\n{}\n", machine, DescribeMachine(),
@@ -279,7 +279,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
   Option junit = AddJUnitOption(command, &request->junit_file);
   Option no_log = command.AddFlag("--no-log", &request->no_log, "Write no files");
   Option quiet = command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
-  Option all = command.AddFlag("--all", &request->all, "Print each check, not only a line for each question");
+  Option all = command.AddFlag("--all", &request->all, "Print each check, not only a line for each category");
   Option json = AddJsonOption(command, "the summary", &request->json_file);
   controller.Excludes(list);
   scenario.Excludes(list).Excludes(replay);

@@ -99,7 +99,7 @@ void PrintTask(const ClosedLoop& loop) {
 }
 
 void PrintTracking(const Scenario& scenario, const TrackingStatistics& tracking) {
-  if (scenario.joint_motion) {
+  if (scenario.joint_task() != nullptr) {
     fmt::print("joints: largest error {:.2e} rad (rms {:.2e})\n", tracking.joints_max(),
                tracking.joints_rms());
     return;

@@ -3,12 +3,9 @@
 // --digits and --tolerance: how published numbers, which are rounded when printed, are judged.
 
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <optional>
-#include <string>
 
-#include "controller/common/text.h"
 #include "harness/cli/command_line.h"
 
 namespace dexcheck::cli {
@@ -27,13 +24,6 @@ struct ToleranceOptions {
 /// Adds the two options, of which one may be given. @returns them.
 inline std::array<Option, 2> AddToleranceOptions(Command command, ToleranceOptions* options) {
   constexpr int kMostDigits = 15;
-  const auto fraction = [](const std::string& text) {
-    double value = 0.0;
-    const char* const end = text.data() + text.size();
-    const std::from_chars_result read = std::from_chars(text.data(), end, value);
-    if (read.ec == std::errc() && read.ptr == end && 0.0 < value && value < 1.0) return std::string();
-    return "must be a number above 0 and below 1, got " + Quote(text);
-  };
   const Option digits = command
                             .AddOption("--digits", &options->digits,
                                        "Agreement to this many digits of a term's scale is enough")
@@ -42,7 +32,7 @@ inline std::array<Option, 2> AddToleranceOptions(Command command, ToleranceOptio
   const Option tolerance =
       command.AddOption("--tolerance", &options->tolerance, "The same as a relative tolerance")
           .TypeName("REL")
-          .Check(fraction)
+          .Check(Fraction())
           .Excludes(digits);
   return {digits, tolerance};
 }

@@ -46,8 +46,8 @@ ExitCode ToExitCode(const Runner& runner) {
   return result.attribution.cause == Cause::kNone ? kSuccess : kDisagreement;
 }
 
-/// The part of a scenario that a session went through, once more and without a window: with pulls in the
-/// scenario from the beginning, log and verdict are those of `dexcheck run`.
+/// The part of a scenario that a session went through, once more and without a window: with the forces of the
+/// mouse in the scenario from the beginning, log and verdict are those of `dexcheck run`.
 class Rerun {
  public:
   Rerun(const ViewRequest& request, const std::vector<std::string>& overrides,
@@ -57,7 +57,7 @@ class Rerun {
         runner_(setup_, /*check=*/true) {
     const std::filesystem::path log = folder / "log.h5";
     std::error_code ignored;
-    std::filesystem::remove(log, ignored);  // of the session, in which pulls came as they came
+    std::filesystem::remove(log, ignored);  // of the session, in which forces came as they came
     RunRecorder recorder(log, runner_.loop(), setup_,
                          RunInputs{files_.robot, files_.mjcf, request.command, ""});
     ProgressBar bar("recording", rows, /*quiet=*/false);
@@ -80,7 +80,7 @@ class Rerun {
   Runner runner_;
 };
 
-/// Tells and writes what a session came to.
+/// Prints and writes what a session came to.
 ExitCode Conclude(const Setup& setup, const Runner& runner, const std::filesystem::path& folder) {
   if (!folder.empty()) {
     OutputFile(folder / "summary.json")

@@ -27,7 +27,7 @@ class Roles {
   explicit Roles(const Setup& setup) : setup_(setup) {
     const std::vector<Joint>& joints = setup.model().joints();
     std::vector<bool> carries(joints.size(), setup.fingertips().empty());
-    for (const int joint : setup.arm_joints()) carries[static_cast<size_t>(joint)] = true;
+    for (const int joint : setup.hold().arm_joints) carries[static_cast<size_t>(joint)] = true;
     for (const int tip : setup.fingertips()) {
       std::vector<int> own;
       int joint = setup.model().frames()[static_cast<size_t>(tip)].link;
@@ -58,12 +58,12 @@ class Roles {
   }
   /// One that should stay still; null where there is none.
   [[nodiscard]] const Joint* Idle() const {
-    const std::vector<int>& idle = setup_.idle_joints();
+    const std::vector<int>& idle = setup_.hold().idle_joints;
     return idle.empty() ? nullptr : &JointOf(idle[std::min<size_t>(kElbow, idle.size() - 1)]);
   }
   /// Where it begins, rad or m.
   [[nodiscard]] double StartOf(const std::string& joint) const {
-    return setup_.q_start()[setup_.model().num_base_positions() + setup_.model().FindJoint(joint)];
+    return setup_.start().q[setup_.model().num_base_positions() + setup_.model().FindJoint(joint)];
   }
 
  private:
@@ -363,7 +363,7 @@ void AddObjectForces(const Roles& roles, std::vector<PlantFault>* faults) {
     for (int k = 0; k < 3; ++k) m->body_inertia[3 * body + k] *= 2.0;
   }));
   PlantFault tether{"body " + object + ": a tether of 1 N/m", kObject, Cause::kUnmodelledForce, object};
-  const Vector3d fixed = roles.setup().X_Bo_start().translation() + Vector3d(0.05, 0.05, -0.1);
+  const Vector3d fixed = roles.setup().start().X_Bo.translation() + Vector3d(0.05, 0.05, -0.1);
   tether.forces = [object, fixed](const mjModel& m, double, mjData* d) {
     const int body = BodyId(m, object);
     const mjtNum* const p = d->xpos + 3 * body;

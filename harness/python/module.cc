@@ -256,7 +256,7 @@ PYBIND11_MODULE(dexcheck, m) {
       .def("pose", &Robot::PoseOf, py::arg("name"), py::arg("q"), "Of a frame or link in the world, 4 x 4.")
       .def("jacobian", &Robot::Jacobian, py::arg("frame"), py::arg("q"),
            "Body Jacobian of a frame, 6 x nv: [linear; angular] along the frame's axes.")
-      .def("audit", &Robot::Audit, "What cannot be, or is odd, one line each.")
+      .def("audit", &Robot::Audit, "What is impossible or suspicious, one line each.")
       .def("compare", &Robot::Compare, py::arg("other"), py::arg("samples") = 1000, py::arg("seed") = 1,
            py::arg("digits") = 0, py::arg("ignore") = std::vector<std::string>(),
            "Compares with another robot or file (TOML, URDF, MJCF), or with functions M(q), c(q, v), g(q), "

@@ -44,8 +44,8 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
   record_.model = record_.true_model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);
-  if (!scenario.trajectory) return;
-  trajectory_ = scenario.trajectory(setup.X_start() + scenario.start_error);
+  trajectory_ = setup.MakeTrajectory();
+  if (!trajectory_) return;
   if (scenario.start == Start::kMoving) CheckMovingStart();
 }
 
@@ -53,7 +53,7 @@ void ClosedLoop::CheckMovingStart() const {
   const DesiredMotion at_start = trajectory_->Evaluate(0.0);
   const Vector3d v = at_start.X_d_dot.head<3>();
   const bool is_drive = setup_->model().base().type == BaseType::kDifferentialDrive;
-  const double phi = is_drive ? setup_->q_start()[2] : 0.0;
+  const double phi = is_drive ? setup_->start().q[2] : 0.0;
   const Vector3d heading(std::cos(phi), std::sin(phi), 0.0);
   const bool along = (v - v.dot(heading) * heading).norm() <= kLargestSkew * v.norm();
   if (is_drive && along && at_start.X_d_dot.tail<3>().norm() == 0.0 && at_start.X_d_ddot.norm() == 0.0)
@@ -64,7 +64,7 @@ void ClosedLoop::CheckMovingStart() const {
 }
 
 bool ClosedLoop::Settle(const std::function<bool()>& should_stop) {
-  const LineTrajectory rest(setup_->X_start(), Vector6d::Zero(), 0.0);
+  const LineTrajectory rest(setup_->start().X_o, Vector6d::Zero(), 0.0);
   if (!SettleOn(rest, setup_->scenario().settle, should_stop)) return false;
   const bool moving = setup_->scenario().start == Start::kMoving;
   if (moving && !StartMoving(trajectory_->Evaluate(0.0).X_d_dot.head<3>(), should_stop)) return false;
@@ -119,7 +119,7 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
   if (checks_) checks_->AddVelocity(v);
   Vector6d velocity = Vector6d::Zero();
   velocity.head<3>() = v;
-  if (!SettleOn(LineTrajectory(setup_->X_start(), velocity, 0.0), kSettleMoving, should_stop)) return false;
+  if (!SettleOn(LineTrajectory(setup_->start().X_o, velocity, 0.0), kSettleMoving, should_stop)) return false;
   // Back to where it began: on a level floor every place is alike.
   const double dt = plant_->time_step();
   const Vector3d way = static_cast<double>(std::lround(kSettleMoving / dt)) * dt * v;

@@ -61,8 +61,8 @@ class Asked {
                surface_ ? *surface_ : setup.surface(), MakeOptions(setup)),
         dynamics_(robot_, static_cast<int>(setup.fingertips().size())),
         actuation_(robot_) {
-    if (setup.joint_motion() != nullptr) {
-      joint_law_.emplace(robot_, setup.scenario().control.law, setup.joint_gains());
+    if (setup.joints() != nullptr) {
+      joint_law_.emplace(robot_, setup.scenario().control.law, setup.joints()->gains);
     } else if (options_.law == ControlLaw::kComputedTorque) {
       law_.emplace(robot_, static_cast<int>(setup.fingertips().size()), options_.weight);
     }
@@ -107,7 +107,7 @@ class Asked {
   static GraspModelOptions MakeOptions(const Setup& setup) {
     const GraspControllerOptions given = setup.MakeControllerOptions();
     GraspModelOptions options = static_cast<const GraspModelOptions&>(given);
-    if (setup.joint_motion() != nullptr) options.orientation = OrientationFeedback::kRotation;
+    if (setup.joints() != nullptr) options.orientation = OrientationFeedback::kRotation;
     return options;
   }
   /// E_bar' tau' (n).
@@ -211,7 +211,8 @@ void LowerAll(const Sample& sample, const Answer& right, const Answer& wrong, co
 
 DetectabilityResult FindDetectability(const Setup& setup, int states,
                                       const std::function<bool(size_t done, size_t all)>& go_on) {
-  if (setup.scenario().task) throw InputError(setup.scenario().source + ": task: has no trajectory");
+  if (setup.scenario().pick_task() != nullptr)
+    throw InputError(setup.scenario().source + ": task: has no trajectory");
   const std::vector<Sample> samples = TakeSamples(setup, states);
   const RobotSpec& spec = setup.model().spec();
   const std::vector<Parameter> numbers = ListParameters(spec);

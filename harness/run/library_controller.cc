@@ -41,15 +41,14 @@ LibraryController::LibraryController(const std::string& library, const OwnContro
     throw InputError("--controller: " + library + ": was built for interface " + Quote(built_for) +
                      ", this program has " + Quote(DescribeControllerInterface()));
   }
-  const bool moves_joints = setup_.joint_motion != nullptr;
-  if (moves_joints) joints_.emplace(*setup_.joint_motion, setup_.sampling.time_step);
+  if (setup_.joints != nullptr) joints_.emplace(setup_.joints->motion, setup_.sampling.time_step);
   const ControllerContext context{*setup_.model,
                                   setup_.fingertips,
                                   setup_.object,
                                   *setup_.surface,
                                   setup_.options,
                                   setup_.sampling,
-                                  moves_joints ? &setup_.joint_gains : nullptr};
+                                  setup_.joints != nullptr ? &setup_.joints->gains : nullptr};
   Guard([&] { controller_.reset(make(&context)); }, kPatience);
   if (controller_ == nullptr) throw RunFailure(name_ + ": made no controller");
 }

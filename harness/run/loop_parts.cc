@@ -37,16 +37,16 @@ double FindFingerFriction(const Setup& setup) {
 
 std::unique_ptr<Plant> MakeRigidPlant(const Setup& setup) {
   const PlantOptions& options = setup.scenario().plant;
-  for (const Joint& joint : setup.plant_model()->joints()) {
+  for (const Joint& joint : setup.robots().rigid->joints()) {
     if (joint.dry_friction > 0.0)
       throw InputError(setup.scenario().source + ": plant.type: a rigid plant has no dry friction, joint " +
                        Quote(joint.name) + " has some");
   }
   const EngineSimulation engine(setup.adapter(), /*implicit_damping=*/false);
   auto plant = std::make_unique<RigidPlant>(
-      *setup.plant_model(), setup.adapter(), setup.fingertips(), engine.ListMotors(),
+      *setup.robots().rigid, setup.adapter(), setup.fingertips(), engine.ListMotors(),
       RigidPlantOptions{options.time_step, options.integrator, FindFingerFriction(setup)});
-  plant->Place(setup.q_start(), setup.X_Bo_start());
+  plant->Place(setup.start().q, setup.start().X_Bo);
   return plant;
 }
 
@@ -54,16 +54,9 @@ std::unique_ptr<Plant> MakePlant(const Setup& setup) {
   if (setup.scenario().plant.type == PlantType::kRigid) return MakeRigidPlant(setup);
   auto plant = std::make_unique<EnginePlant>(setup.adapter(), setup.fingertips(), setup.surface(),
                                              setup.scenario().plant.implicit_damping);
-  if (setup.scenario().plant.collide) {
-    std::vector<std::pair<int, int>> geoms;
-    for (const WatchedPair& pair : setup.watched_pairs()) {
-      geoms.emplace_back(setup.solids().list[static_cast<size_t>(pair.a)].geom,
-                         setup.solids().list[static_cast<size_t>(pair.b)].geom);
-    }
-    plant->WatchCollisions(geoms);
-  }
-  if (!setup.bonds().empty()) plant->SetBonds(setup.kappa_start(), setup.bond_constraints());
-  plant->Place(setup.q_start(), setup.X_Bo_start());
+  if (setup.scenario().plant.collide) plant->WatchCollisions(ListGeoms(setup.robots()));
+  if (!setup.start().bonds.empty()) plant->SetBonds(setup.start().kappa, setup.start().bond_constraints);
+  plant->Place(setup.start().q, setup.start().X_Bo);
   return plant;
 }
 
@@ -76,23 +69,28 @@ Sampling MakeSampling(const Setup& setup) {
   return sampling;
 }
 
-std::unique_ptr<TrajectoryController> MakeTrajectoryController(const Setup& setup) {
-  return std::make_unique<TrajectoryController>(setup.model(), setup.fingertips(), setup.object().body,
-                                                setup.surface(), setup.MakeControllerOptions(),
-                                                MakeSampling(setup));
-}
-
-std::unique_ptr<Controller> MakeJointController(const Setup& setup) {
-  return std::make_unique<JointController>(setup.model(), setup.object().body, setup.surface(),
-                                           setup.scenario().control.law, setup.joint_gains(),
-                                           *setup.joint_motion(), MakeSampling(setup));
-}
-
-std::unique_ptr<PickAndPlaceController> MakeTaskController(const Setup& setup) {
+/// The controller of the scenario's task.
+void MakeController(const Setup& setup, LoopParts* parts) {
   const Scenario& scenario = setup.scenario();
-  return std::make_unique<PickAndPlaceController>(
-      setup.model(), setup.hand(), setup.object().body, setup.surface(), setup.MakeControllerOptions(),
-      setup.q_start(), scenario.task->pick_and_place, scenario.plant.time_step);
+  const RobotModel& model = setup.model();
+  const MassProperties& object = setup.object().body;
+  if (const PickTask* const pick = scenario.pick_task()) {
+    auto task = std::make_unique<PickAndPlaceController>(model, setup.hold().hand, object, setup.surface(),
+                                                         setup.MakeControllerOptions(), setup.start().q,
+                                                         pick->pick_and_place, scenario.plant.time_step);
+    parts->task = task.get();
+    parts->controller = std::move(task);
+  } else if (const JointPlan* const joints = setup.joints()) {
+    parts->controller =
+        std::make_unique<JointController>(model, object, setup.surface(), scenario.control.law, joints->gains,
+                                          joints->motion, MakeSampling(setup));
+  } else {
+    auto controller =
+        std::make_unique<TrajectoryController>(model, setup.fingertips(), object, setup.surface(),
+                                               setup.MakeControllerOptions(), MakeSampling(setup));
+    if (scenario.control.kappa == ContactSource::kIntegrated) parts->follower = controller.get();
+    parts->controller = std::move(controller);
+  }
 }
 
 }  // namespace
@@ -100,17 +98,7 @@ std::unique_ptr<PickAndPlaceController> MakeTaskController(const Setup& setup) {
 LoopParts MakeLoopParts(const Setup& setup) {
   LoopParts parts;
   parts.plant = MakePlant(setup);
-  if (setup.scenario().task) {
-    std::unique_ptr<PickAndPlaceController> task = MakeTaskController(setup);
-    parts.task = task.get();
-    parts.controller = std::move(task);
-  } else if (setup.joint_motion() != nullptr) {
-    parts.controller = MakeJointController(setup);
-  } else {
-    std::unique_ptr<TrajectoryController> controller = MakeTrajectoryController(setup);
-    if (setup.scenario().control.kappa == ContactSource::kIntegrated) parts.follower = controller.get();
-    parts.controller = std::move(controller);
-  }
+  MakeController(setup, &parts);
   const Imperfections& imperfections = setup.scenario().imperfections;
   parts.sensing = imperfections.sensing;
   parts.actuation = imperfections.actuation;
@@ -123,9 +111,10 @@ LoopParts MakeLoopParts(const Setup& setup) {
 LoopParts MakeLoopParts(const Setup& setup, const std::string& what, const std::filesystem::path& robot,
                         double time_limit) {
   const Scenario& scenario = setup.scenario();
-  if (scenario.task) throw InputError(scenario.source + ": task: is done by no other controller");
+  if (scenario.pick_task() != nullptr)
+    throw InputError(scenario.source + ": task: is done by no other controller");
   if (scenario.control.kappa == ContactSource::kIntegrated) {
-    throw InputError(scenario.source + ": control.kappa: other controllers are told where contacts are");
+    throw InputError(scenario.source + ": control.kappa: other controllers get measured contacts");
   }
   LoopParts parts = MakeLoopParts(setup);
   const OwnControllerSetup own{&setup.model(),
@@ -134,8 +123,7 @@ LoopParts MakeLoopParts(const Setup& setup, const std::string& what, const std::
                                &setup.surface(),
                                setup.MakeControllerOptions(),
                                MakeSampling(setup),
-                               setup.joint_motion(),
-                               setup.joint_gains(),
+                               setup.joints(),
                                ReadTextFile(robot.string()),
                                scenario.text,
                                time_limit};

@@ -29,8 +29,8 @@ struct LoopParts {
   SensingOptions sensing;
   ActuationOptions actuation;
   std::vector<DisturbanceOptions> disturbances;
-  /// Changes what the controller is told at time t besides, as no scenario says; empty for nothing.
-  std::function<void(double t, MeasuredState* told)> hidden_sensor_fault;
+  /// Changes the measured state at time t besides, as no scenario declares; empty for nothing.
+  std::function<void(double t, MeasuredState* measured)> hidden_sensor_fault;
 };
 
 /// The parts that the scenario names, robot and object where it starts.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "controller/control/controller_library.h"
+#include "harness/scenario/start_state.h"
 
 namespace dexcheck {
 
@@ -19,11 +20,10 @@ struct OwnControllerSetup {
   const Surface* surface = nullptr;
   GraspControllerOptions options;
   Sampling sampling;
-  const JointMotion* joint_motion = nullptr;  ///< Of a scenario that moves joints,
-  JointGains joint_gains;                     ///< and its law's gains.
-  std::string robot_text;                     ///< The parameter file.
-  std::string scenario_text;                  ///< The scenario.
-  double time_limit = 1.0;                    ///< For each answer, s; ten times that to start.
+  const JointPlan* joints = nullptr;  ///< Of a scenario that moves joints.
+  std::string robot_text;             ///< The parameter file.
+  std::string scenario_text;          ///< The scenario.
+  double time_limit = 1.0;            ///< For each answer, s; ten times that to start.
 };
 
 /// @param what a shared library (a name that ends in .so), or else a command for the shell.

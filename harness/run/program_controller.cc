@@ -44,7 +44,7 @@ ProgramController::ProgramController(const std::string& command, const OwnContro
   if (setup.model->base().type == BaseType::kDifferentialDrive) {
     wheels_inverse_ = CalcWheelRateMap(setup.model->base()).transpose().inverse();
   }
-  if (setup.joint_motion != nullptr) joints_.emplace(*setup.joint_motion, setup.sampling.time_step);
+  if (setup.joints != nullptr) joints_.emplace(setup.joints->motion, setup.sampling.time_step);
   Start(command);
   try {
     Greet();
@@ -102,7 +102,7 @@ void ProgramController::Greet() {
   Send(setup_.robot_text.data(), setup_.robot_text.size());
   Send(setup_.scenario_text.data(), setup_.scenario_text.size());
   if (joints_) {
-    for (const VectorXd* gain : {&setup_.joint_gains.K_p, &setup_.joint_gains.K_v}) {
+    for (const VectorXd* gain : {&setup_.joints->gains.K_p, &setup_.joints->gains.K_v}) {
       Send(gain->data(), static_cast<size_t>(gain->size()) * sizeof(double));
     }
   }

@@ -13,8 +13,8 @@
 
 namespace dexcheck {
 
-/// Runs the program and asks it at each step. A program that ends, is killed, says nothing in time or answers
-/// what was not asked ends the run, in one line. Nothing allocates in a step.
+/// Runs the program, with a request and an answer at each step. A program that ends, is killed, is late or
+/// sends another message ends the run, in one line. Nothing allocates in a step.
 class ProgramController final : public Controller {
  public:
   /// Starts the program and greets it.

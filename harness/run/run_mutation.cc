@@ -69,17 +69,18 @@ RunCampaign::RunCampaign(const Scenario& scenario, std::filesystem::path robot, 
       mjcf_(std::move(mjcf)),
       options_(options),
       compiled_(LoadMjcf(mjcf_)) {
-  if (scenario.task) throw InputError(scenario.source + ": task: faults are made in runs along a trajectory");
+  if (scenario.pick_task() != nullptr)
+    throw InputError(scenario.source + ": task: faults are made in runs along a trajectory");
   if (scenario.plant.type == PlantType::kRigid)
     throw InputError(scenario.source + ": plant.type: faults are made in a run of the engine's plant");
   MakeSetups();
   ListFaults();
-  if (!scenario.joint_motion) MoveToStart(should_stop);
+  if (scenario.joint_task() == nullptr) MoveToStart(should_stop);
   if (!should_stop()) RequireNoFaultToPass(should_stop);
 }
 
 void RunCampaign::MakeSetups() {
-  if (scenario_.joint_motion) {
+  if (scenario_.joint_task() != nullptr) {
     // Arms settle fast, and a motion of joints has no later beginning: faults are there from the first.
     Scenario scenario = scenario_;
     scenario.duration = options_.from + options_.duration;
@@ -107,7 +108,8 @@ void RunCampaign::ListFaults() {
     }
   }
   // Those of another law are not known.
-  const bool knows_law = scenario_.control.law == ControlLaw::kComputedTorque && !scenario_.joint_motion;
+  const bool knows_law =
+      scenario_.control.law == ControlLaw::kComputedTorque && scenario_.joint_task() == nullptr;
   if (options_.laws && knows_law) laws_ = ListLawFaults(!setup_->adapter().wheels().empty());
   for (const LawFault& law : laws_) {
     mutants_.push_back({.kind = law.part == SIZE_MAX ? "law, otherwise" : "law, one part",
@@ -140,7 +142,8 @@ Scenario RunCampaign::MakeScenario(double from, double duration, double offset) 
   scenario.start = Start::kRest;
   scenario.settle = 0.0;
   scenario.expect.from = std::max(0.0, scenario_.expect.from - from);
-  scenario.trajectory = [whole = scenario_.trajectory, from, offset](const Vector6d& X_start) {
+  auto& task = std::get<TrajectoryTask>(scenario.task);
+  task.trajectory = [whole = task.trajectory, from, offset](const Vector6d& X_start) {
     return std::make_unique<LaterTrajectory>(whole(X_start), from, offset);
   };
   if (offset != 0.0) scenario.expect = {};

@@ -113,7 +113,7 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
     log_.EmbedFile("inputs", "mjcf/" + file, ReadBytes(inputs.mjcf.parent_path() / file));
   }
   AddStateSignals();
-  if (setup.joint_motion() != nullptr) {
+  if (setup.joints() != nullptr) {
     AddJointSignals();
   } else {
     AddObjectSignals();
@@ -175,7 +175,7 @@ void RunRecorder::AddStateSignals() {
   const LogColumns qvel = ListVelocityColumns(m);
   const int n = model.num_velocities();
   const int p = model.num_positions();
-  const bool moves_joints = setup_->joint_motion() != nullptr;
+  const bool moves_joints = setup_->joints() != nullptr;
   Add("engine/qpos", qpos.units, "MuJoCo's positions, quaternions wxyz", static_cast<int>(m.nq), qpos.names,
       Vector([](const StepRecord& step) -> const auto& { return step.reading.qpos; }));
   Add("engine/qvel", qvel.units, "MuJoCo's velocities", static_cast<int>(m.nv), qvel.names,
@@ -186,7 +186,7 @@ void RunRecorder::AddStateSignals() {
       Vector([](const StepRecord& step) -> const auto& { return step.reading.state.xi; }));
   Add("tau", "N m", moves_joints ? "torques of the joints' law" : "tau' of the computed torque law (55)", n,
       tau_names, Vector([](const StepRecord& step) -> const auto& { return step.command.tau; }));
-  if (!setup_->scenario().task) {
+  if (setup_->scenario().pick_task() == nullptr) {
     Add("law/xi_dot_d", xi_dot_units,
         moves_joints ? "accelerations that the law demands" : "xi_dot_d of (47), which the law demands", n,
         xi_names, Demand(&LawDemand::xi_dot));
@@ -256,7 +256,7 @@ void RunRecorder::AddContactSignals() {
       [](const StepRecord& step, Row row) {
         std::copy(step.reading.state.overlap.begin(), step.reading.state.overlap.end(), row.begin());
       });
-  if (!setup_->scenario().task) {
+  if (setup_->scenario().pick_task() == nullptr) {
     Add("law/f_c", "N", "f_c of (49), which the law commands, each in its contact frame", 3 * count, xyz,
         Demand(&LawDemand::f_c), mu);
     Add("law/F_N", "N", "internal part F_N of law/f_c, which the grasp-force problem chooses", 3 * count, xyz,

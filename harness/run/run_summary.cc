@@ -111,7 +111,7 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
                {"interrupted", result.interrupted}, {"seed", scenario.seed},
                {"overrides", scenario.overrides},   {"duration_s", scenario.duration},
                {"simulated_s", loop.time()},        {"time_step_s", scenario.plant.time_step}};
-  if (scenario.joint_motion) {
+  if (scenario.joint_task() != nullptr) {
     json["tracking"] = {{"joint_error_max_rad", result.tracking.joints_max()},
                         {"joint_error_rms_rad", result.tracking.joints_rms()}};
   } else {

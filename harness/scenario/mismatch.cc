@@ -1,5 +1,3 @@
-#include "harness/scenario/mismatch.h"
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include "harness/engine/data_without_contacts.h"
 #include "harness/engine/engine.h"
 #include "harness/plant/random_stream.h"
+#include "harness/scenario/robot_pair.h"
 
 namespace dexcheck {
 namespace {
@@ -204,8 +203,9 @@ void ScaleJoints(const MismatchOptions& options, const std::string& source, cons
   scale(options.armature, armature, engine->dof_armature);
 }
 
-}  // namespace
-
+/// Changes the engine's robot, and says of the change what the checks have to know: `plant` becomes what the
+/// engine's robot is now.
+/// @param adapter of the controller's model and `engine`, which is changed.
 void ApplyMismatch(const MismatchOptions& options, std::uint64_t seed, const std::string& source,
                    const Adapter& adapter, mjModel* engine, RobotSpec* plant) {
   Bodies bodies(adapter, engine, plant);
@@ -231,6 +231,24 @@ void ApplyMismatch(const MismatchOptions& options, std::uint64_t seed, const std
   const MjDataPtr data = MakeData(*engine);
   mj_setConst(engine, data.get());
   std::copy(bonds.begin(), bonds.end(), engine->eq_data);
+}
+
+}  // namespace
+
+void DeclareMismatch(const Scenario& scenario, const std::filesystem::path& mjcf, RobotPair* robots) {
+  const MismatchOptions& options = scenario.imperfections.mismatch;
+  if (options.is_none()) return;
+  const auto copy = [&] { return MjModelPtr(mj_copyModel(nullptr, robots->engine.get())); };
+  const auto change = [&](const RobotModel& model, mjModel* engine) {
+    RobotSpec spec = model.spec();
+    ApplyMismatch(options, scenario.seed, scenario.source, *robots->adapter, engine, &spec);
+    return RobotModel(std::move(spec));
+  };
+  MjModelPtr without = copy();
+  if (robots->rigid) *robots->rigid = change(*robots->rigid, copy().get());
+  RobotModel plant = change(robots->model, robots->engine.get());
+  robots->declared = std::make_unique<DeclaredMismatch>(std::move(plant), std::move(without), *robots->engine,
+                                                        robots->model, mjcf.string());
 }
 
 }  // namespace dexcheck

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "controller/common/toml_reader.h"
@@ -50,8 +51,8 @@ struct PlantOptions {
   bool implicit_damping = false;  ///< The engine's own treatment of joint damping.
   std::optional<double> floor_friction;   ///< mu of wheels on the floor.
   std::optional<double> finger_friction;  ///< mu of fingertips on the object.
-  bool collide = false;                   ///< Bodies that are not meant to touch push each other.
-  /// Two bodies each that may touch, or pass through each other, without being told.
+  bool collide = false;                   ///< Bodies that should not touch push each other.
+  /// Two bodies each that may touch, or pass through each other, unwatched.
   std::vector<std::pair<std::string, std::string>> allowed_collision_pairs;
 
   /// By how much velocities are older than positions, s.
@@ -90,15 +91,21 @@ struct ControlOptions {
   double platform_weight = 1.0;     ///< W of the platform's velocities; kDiagonal.
   double arm_weight = 1.0;          ///< Of joints that move several fingertips of the grasp; kDiagonal.
   double posture_frequency = 10.0;  ///< Of the null-space posture task, rad/s, critically damped.
-  double f_min = 0.0;               ///< Least normal force (squeeze), N.
+  double f_min = 0.0;               ///< Least normal force, N.
   double f_max = 0.0;               ///< Largest, N.
   double mu = 0.0;                  ///< Friction that the grasp force counts on.
   ContactSource kappa = ContactSource::kExact;
-  double contact_error = 0.0;  ///< By how much kappa is told wrongly, rad: a fault to be found.
+  double contact_error = 0.0;  ///< By how much the measured kappa is wrong, rad: a fault to be found.
 };
 
-/// Take the object from a support, carry it, put it down.
-struct TaskOptions {
+/// The object follows a trajectory, held at the contacts of the grasp.
+struct TrajectoryTask {
+  TrajectoryMaker trajectory;
+  Vector6d start_error = Vector6d::Zero();  ///< X_d - X_o at t = 0: m, rad.
+};
+
+/// Take the object from a support, carry it, put it down. The contacts of the grasp are planned.
+struct PickTask {
   Pose X_Bo = Pose::Identity();  ///< Where the object lies.
   /// Joints that may place the palm; empty for those of the arm alone.
   std::vector<std::string> arm_joints;
@@ -113,7 +120,7 @@ struct JointNumbers {
 };
 
 /// The joints of a robot that holds nothing follow a motion of their own.
-struct JointMotionOptions {
+struct JointTask {
   struct Point {
     double time = 0.0;   ///< s.
     JointNumbers where;  ///< Joints that it does not name stay where the point before has them.
@@ -129,10 +136,8 @@ struct JointMotionOptions {
   JointNumbers start;  ///< Others begin at 0.
   std::vector<Point> points;
   std::vector<Oscillation> oscillations;
-};
 
-/// Gains of a law for joints: by joint, or for all.
-struct JointControlOptions {
+  // Gains of its law: by joint, or for all.
   ByName natural_frequency, damping_ratio;  ///< rad/s and 1.
   ByName stiffness, damping;                ///< N m/rad and N m s/rad; without a key, as the gains above.
 };
@@ -153,9 +158,8 @@ struct Scenario {
   std::string name;
   std::string description;
   double duration = 0.0;  ///< s.
-  double settle = 0.0;    ///< Before t = 0, s.
+  double settle = 1.0;    ///< Before t = 0, s.
   Start start = Start::kRest;
-  Vector6d start_error = Vector6d::Zero();  ///< X_d - X_o at t = 0: m, rad.
   double tolerance = 0.0;  ///< Relative, of what model and engine are compared by where it is wider.
 
   std::string model_file;                    ///< Empty for the shipped one.
@@ -165,11 +169,8 @@ struct Scenario {
   size_t own_model_overrides = 0;
   std::string mjcf_file;  ///< Empty for the shipped one.
   PlantOptions plant;
-  GraspOptions grasp;
-  TrajectoryMaker trajectory;       ///< None for a task or a motion of joints.
-  std::optional<TaskOptions> task;  ///< Instead of a trajectory; the grasp's contacts are then planned.
-  std::optional<JointMotionOptions> joint_motion;  ///< Instead of both, and of a grasp.
-  JointControlOptions joint_control;               ///< Gains of its law.
+  std::variant<TrajectoryTask, PickTask, JointTask> task;
+  GraspOptions grasp;  ///< Not of a JointTask.
   ControlOptions control;
   Imperfections imperfections;
   std::vector<BoundOverride> bounds;
@@ -182,11 +183,39 @@ struct Scenario {
   std::string text;                    ///< The file.
   std::string source;                  ///< Its name, for messages.
   std::vector<std::string> overrides;  ///< "PATH=VALUE" of the scenario.
+
+  // The task, where it is of this kind; null otherwise.
+  [[nodiscard]] const TrajectoryTask* trajectory_task() const { return std::get_if<TrajectoryTask>(&task); }
+  [[nodiscard]] const PickTask* pick_task() const { return std::get_if<PickTask>(&task); }
+  [[nodiscard]] const JointTask* joint_task() const { return std::get_if<JointTask>(&task); }
+  /// X_d - X_o at t = 0; zero where nothing is to be followed from there.
+  [[nodiscard]] Vector6d start_error() const {
+    return trajectory_task() == nullptr ? Vector6d::Zero() : trajectory_task()->start_error;
+  }
 };
 
-/// Reads a scenario. Relative paths in it start at `folder`, its own.
-/// @param overrides "PATH=VALUE" each; "model.PATH=VALUE" reaches into the parameter file.
-/// @throws InputError, one line that names file, line, key and value.
+/// The text of a scenario, in which keys can be changed before it is read. A copy has the same changes.
+class ScenarioDocument {
+ public:
+  /// Relative paths in it start at `folder`, its own. @throws InputError as TomlDocument.
+  ScenarioDocument(const std::string& text, const std::string& source, std::filesystem::path folder);
+
+  /// @param assignment "PATH=VALUE", as users write it; "model.PATH=VALUE" reaches into the parameter file.
+  /// @throws InputError as TomlDocument::Override.
+  void Override(const std::string& assignment);
+  /// The same for a number. @throws InputError as Override.
+  void Set(const std::string& path, double value);
+  /// @throws InputError, one line that names file, line, key and value.
+  [[nodiscard]] Scenario Read() const;
+
+ private:
+  TomlDocument document_;
+  std::string text_, source_;
+  std::filesystem::path folder_;
+  std::vector<std::string> overrides_, model_overrides_;
+};
+
+/// Reads a scenario at once. @throws InputError as ScenarioDocument.
 Scenario ParseScenario(const std::string& text, const std::string& source,
                        const std::filesystem::path& folder, const std::vector<std::string>& overrides);
 

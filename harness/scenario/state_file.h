@@ -27,7 +27,7 @@ struct ContactState {
   double friction = 0.0;  ///< mu of (21).
 };
 
-/// What the law (47) to (57) is asked to do at that state.
+/// What the law (47) to (57) should do at that state.
 struct LawState {
   Vector6d X_d, X_d_dot, X_d_ddot;  ///< Desired motion of the object, m and rad.
   Vector6d K_p, K_v;                ///< 1/s^2, 1/s.

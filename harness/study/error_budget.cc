@@ -213,7 +213,8 @@ bool ErrorBudget::is_complete() const {
 ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::path& robot,
                             const std::filesystem::path& mjcf,
                             const std::function<bool(long done, long total)>& progress) {
-  if (scenario.task) throw InputError(scenario.source + ": task: a budget needs a trajectory");
+  if (scenario.pick_task() != nullptr)
+    throw InputError(scenario.source + ": task: a budget needs a trajectory");
   const std::vector<ErrorSource> sources = ListErrorSources(scenario.imperfections);
   if (sources.empty()) {
     throw InputError(scenario.source +
@@ -226,7 +227,7 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
   long done = 0;
   ErrorBudget budget;
   budget.scenario = scenario.name;
-  budget.of_joints = scenario.joint_motion.has_value();
+  budget.of_joints = scenario.joint_task() != nullptr;
   const auto size_of = [&](const Errors& errors) { return CalcSize(errors, from, budget.of_joints); };
   const auto stop = [&] {
     if (progress(done++, total)) return false;

@@ -6,7 +6,7 @@ namespace dexcheck {
 namespace {
 
 GraspModelOptions MakeModelOptions(const Setup& setup) {
-  if (setup.joint_motion() == nullptr) {
+  if (setup.joints() == nullptr) {
     const GraspControllerOptions controller = setup.MakeControllerOptions();
     return static_cast<const GraspModelOptions&>(controller);
   }
@@ -23,22 +23,22 @@ ErrorPrediction::ErrorPrediction(const Setup& setup, bool acts_at_rest)
              setup.MakePartContext()),
       disturbances_(setup.scenario().imperfections.disturbances, setup.MakePartContext()),
       controller_(MakeLoopParts(setup).controller),
-      model_(setup.known_model(), setup.fingertips(), setup.known_object().body, setup.surface(),
+      model_(setup.declared_model(), setup.fingertips(), setup.declared_object().body, setup.surface(),
              MakeModelOptions(setup)),
-      dynamics_(setup.known_model(), static_cast<int>(setup.fingertips().size())),
+      dynamics_(setup.declared_model(), static_cast<int>(setup.fingertips().size())),
       actuation_(setup.model()),
-      joint_motion_(setup.joint_motion()),
+      joint_motion_(setup.joints() == nullptr ? nullptr : &setup.joints()->motion),
       time_step_(setup.scenario().plant.time_step),
       acts_at_rest_(acts_at_rest) {
   force_.setZero(setup.model().num_velocities());
   command_.tau = force_;
   if (joint_motion_ == nullptr) {
-    trajectory_ = setup.scenario().trajectory(setup.X_start() + setup.scenario().start_error);
+    trajectory_ = setup.MakeTrajectory();
     controller_->Follow(*trajectory_);
     K_p_ = setup.scenario().control.gains.K_p.head<3>();
     K_v_ = setup.scenario().control.gains.K_v.head<3>();
   } else {
-    const JointGains& gains = setup.joint_gains();
+    const JointGains& gains = setup.joints()->gains;
     is_decoupled_ = setup.scenario().control.law == ControlLaw::kComputedTorque;
     K_p_ = is_decoupled_ ? gains.K_p : gains.K;
     K_v_ = is_decoupled_ ? gains.K_v : gains.D;

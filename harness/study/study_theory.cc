@@ -82,7 +82,7 @@ double CalcOvershootInTheory(const StudyInputs& inputs, const std::vector<double
   const long steps = std::lround(scenario.duration / loop.time_step);
   double overshoot = 0.0;
   for (int axis = 0; axis < 6; ++axis) {
-    if (scenario.start_error[axis] == 0.0) continue;
+    if (scenario.start_error()[axis] == 0.0) continue;
     for (const double error : CalcStepResponse(loop, GainsOf(scenario, axis), steps)) {
       if (!(std::abs(error) <= 1.0)) return std::numeric_limits<double>::infinity();
       overshoot = std::max(overshoot, -error);
@@ -104,8 +104,8 @@ bool FollowsErrorDynamics(const Scenario& scenario) {
     rest.sensing.object_velocity_cutoff = 0.0;
   }
   return rest.is_ideal() && scenario.control.law == ControlLaw::kComputedTorque &&
-         scenario.control.contact_error == 0.0 && scenario.trajectory &&
-         scenario.start_error.head<3>().norm() > 0.0;
+         scenario.control.contact_error == 0.0 && scenario.trajectory_task() != nullptr &&
+         scenario.start_error().head<3>().norm() > 0.0;
 }
 
 }  // namespace
@@ -117,7 +117,7 @@ TrialResult PredictInTheory(const StudyInputs& inputs, const std::vector<double>
   if (!FollowsErrorDynamics(scenario)) return result;
   const SampledLoop loop = MakeLoop(scenario);
   const auto steps = static_cast<size_t>(std::lround(scenario.duration / loop.time_step));
-  const Vector3d start = scenario.start_error.head<3>();
+  const Vector3d start = scenario.start_error().head<3>();
   std::vector<Vector3d> errors(steps, Vector3d::Zero());
   for (int axis = 0; axis < 3; ++axis) {
     if (start[axis] == 0.0) continue;

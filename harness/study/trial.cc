@@ -52,8 +52,8 @@ Setup MakeSetup(const StudyInputs& inputs, const Scenario& scenario) {
 
 bool HasDiverged(const Setup& setup, const TrialResult& result) {
   if (!result.failure.empty()) return true;
-  if (setup.scenario().start_error.norm() > 0.0) return !(result.metrics[kErrorGrowth] <= 1.0);
-  if (setup.joint_motion() != nullptr) return !(result.metrics[kJointErrorRms] <= kLostTrackOfJoints);
+  if (setup.scenario().start_error().norm() > 0.0) return !(result.metrics[kErrorGrowth] <= 1.0);
+  if (setup.joints() != nullptr) return !(result.metrics[kJointErrorRms] <= kLostTrackOfJoints);
   return !(result.metrics[kPositionErrorRms] <= kLostTrack);
 }
 
@@ -96,7 +96,7 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
     const RunResult& run = runner.Run([&](const StepRecord& step) { monitor.Record(step); }, is_lost);
     result.failure = run.failure;
     if (run.interrupted) {
-      const bool of_joints = setup.joint_motion() != nullptr;
+      const bool of_joints = setup.joints() != nullptr;
       result.failure = std::string(of_joints ? "an error of a joint" : "the position error") +
                        " is above stop_error, " + FormatNumber(limit) +
                        (of_joints ? " rad at t = " : " m at t = ") +

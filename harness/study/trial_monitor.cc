@@ -14,12 +14,12 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 TrialMonitor::TrialMonitor(const Setup& setup, long num_steps)
     : num_steps_(num_steps),
       time_step_(setup.scenario().plant.time_step),
-      of_joints_(setup.joint_motion() != nullptr),
+      of_joints_(setup.joints() != nullptr),
       has_heading_(setup.model().num_base_positions() == 3),
       fingertip_slips_(setup.fingertips().size(), Vector3d::Zero()),
       wheel_slips_(setup.adapter().wheels().size(), Vector3d::Zero()),
       cone_margin_(std::numeric_limits<double>::infinity()) {
-  const Vector6d& start = setup.scenario().start_error;
+  const Vector6d& start = setup.scenario().start_error();
   by_position_ = start.head<3>().norm() > 0.0 || start.tail<3>().norm() == 0.0;
   start_error_ = by_position_ ? start.head<3>().norm() : start.tail<3>().norm();
   if (by_position_ && start_error_ > 0.0) direction_ = start.head<3>() / start_error_;

@@ -31,7 +31,7 @@ void Multiply(const ByName& numbers, double factor, std::vector<std::string>* ov
 
 std::vector<Slider> MakeGainSliders(const Scenario& scenario) {
   std::vector<Slider> sliders = {{"stiffness K_p"}, {"damping K_v"}};
-  if (!scenario.joint_motion) sliders.push_back({"squeeze f_min"});
+  if (scenario.joint_task() == nullptr) sliders.push_back({"squeeze f_min"});
   return sliders;
 }
 
@@ -39,8 +39,8 @@ std::vector<std::string> MakeGainOverrides(const Scenario& scenario, const std::
   std::vector<std::string> overrides;
   const double stiffness = sliders[0].factor;
   const double damping = sliders[1].factor;
-  if (scenario.joint_motion) {
-    const JointControlOptions& joints = scenario.joint_control;
+  if (scenario.joint_task() != nullptr) {
+    const JointTask& joints = *scenario.joint_task();
     Multiply(joints.natural_frequency, std::sqrt(stiffness), &overrides);
     Multiply(joints.damping_ratio, damping / std::sqrt(stiffness), &overrides);
     Multiply(joints.stiffness, stiffness, &overrides);

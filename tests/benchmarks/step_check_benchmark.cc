@@ -133,7 +133,8 @@ void FollowClearanceOf(benchmark::State& state, const std::string& scenario, con
         rotations.push_back(step.reading.body_rotations);
       },
       [] { return false; });
-  Clearance clearance(setup.engine(), setup.plant_side(), setup.solids(), setup.watched_pairs());
+  Clearance clearance(setup.engine(), setup.plant_adapter(), setup.robots().solids,
+                      setup.robots().watched_pairs);
   int step = 0;
   for (auto _ : state) {
     const auto k = static_cast<size_t>(step) % positions.size();

@@ -41,7 +41,7 @@ int main() {
   PlantReading reading;
   parts.plant->BeginStep();
   parts.plant->Read(&reading);
-  const LineTrajectory rest(setup.X_start(), Vector6d::Zero(), 0.0);
+  const LineTrajectory rest(setup.start().X_o, Vector6d::Zero(), 0.0);
   parts.controller->Follow(rest);
   const Reading told{reading.state, reading.touch};
   Command command;

@@ -30,9 +30,9 @@ void UseScenario(const Scenario& scenario) {
   Expect(scenario.grasp.fingertips.size() == scenario.grasp.contacts.size(), "contacts");
   Expect(scenario.grasp.fingertips.size() >= 3, "fingertips");
   Expect(scenario.control.gains.K_p.allFinite() && scenario.control.gains.K_v.allFinite(), "gains");
-  Expect(scenario.grasp.X_FO.matrix().allFinite() && scenario.start_error.allFinite(), "places");
+  Expect(scenario.grasp.X_FO.matrix().allFinite() && scenario.start_error().allFinite(), "places");
   Expect(scenario.control.f_max > scenario.control.f_min && scenario.control.f_min >= 0.0, "forces");
-  const DesiredMotion start = scenario.trajectory(Vector6d::Ones())->Evaluate(0.0);
+  const DesiredMotion start = scenario.trajectory_task()->trajectory(Vector6d::Ones())->Evaluate(0.0);
   Expect(start.X_d == Vector6d::Ones(), "the trajectory does not start where the object is");
 }
 

@@ -87,7 +87,7 @@ grep -q 'consistency' zsh.txt || fail "zsh does not know the commands"
 
 # The manual page has each command of the help, and groff has no complaint.
 dexcheck man >dexcheck.1
-for command in $(dexcheck --help | sed -nE '1,/[Ss]ubcommands/d; s/^  ([a-z]+) .*/\1/p'); do
+for command in $(dexcheck --help | sed -nE '1,/^Compare descriptions/d; s/^  ([a-z]+) .*/\1/p'); do
   grep -q "^.SS dexcheck $command" dexcheck.1 || fail "the manual page lacks $command"
 done
 if command -v groff >/dev/null; then

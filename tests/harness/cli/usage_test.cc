@@ -54,7 +54,8 @@ TEST(Usage, HelpMentionsEveryCommandAndOption) {
     EXPECT_EQ(result.err, "");
     return result.out;
   };
-  for (const char* word : {"consistency", "eval", "export", "render", "--help", "--version"}) {
+  for (const char* word : {"consistency", "eval", "export", "render", "--help", "--version",
+                           "\nCompare descriptions:", "\nRun and look:", "\nStudy:", "\nSet up:"}) {
     EXPECT_THAT(help({"--help"}), HasSubstr(word));
   }
   for (const char* word : {"--robot FILE.toml", "--mjcf FILE.xml", "--samples N=10000", "--seed N=1",
@@ -81,6 +82,17 @@ TEST(Usage, HelpMentionsEveryCommandAndOption) {
   EXPECT_THAT(help({"--version"}), ::testing::MatchesRegex("[0-9]+\\.[0-9]+\\.[0-9]+\n"));
 }
 
+TEST(Usage, TwoRobotsAreComparedWithoutTheWordForIt) {
+  const std::vector<std::string> words = {testing::kParameters + "panda.toml", testing::kMjcf + "panda.xml",
+                                          "--samples", "2", "--json"};
+  std::vector<std::string> whole = words;
+  whole.insert(whole.begin(), "consistency");
+  const testing::ProgramResult result = RunDexcheck(words);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out, RunDexcheck(whole).out);
+  EXPECT_TRUE(IsRefused(RunDexcheck({words[0]}), {"unknown command"}));
+}
+
 /// The words of a command that --help lists under a title.
 std::vector<std::string> ListCommands(const std::vector<std::string>& command) {
   std::vector<std::string> arguments = command;
@@ -91,7 +103,7 @@ std::vector<std::string> ListCommands(const std::vector<std::string>& command) {
   for (std::string line; std::getline(help, line);) {
     if (listed && line.starts_with("  ") && line[2] != ' ')
       names.push_back(line.substr(2, line.find(' ', 2) - 2));
-    listed = listed || line == "Subcommands:";
+    listed = listed || line == "Subcommands:" || line == "Compare descriptions:";
   }
   return names;
 }

@@ -21,7 +21,7 @@ class EnginePlantTest : public ::testing::Test {
       : scenario_("curve"),
         setup_(scenario_.setup()),
         plant_(setup_.adapter(), setup_.fingertips(), setup_.surface(), /*implicit_damping=*/false) {
-    plant_.Place(setup_.q_start(), setup_.X_Bo_start());
+    plant_.Place(setup_.start().q, setup_.start().X_Bo);
     tau_.setZero(setup_.model().num_velocities());
   }
 
@@ -45,9 +45,9 @@ constexpr double kRounding = 1e-12;
 
 TEST_F(EnginePlantTest, ReadsWhereRobotAndObjectWerePlaced) {
   Step();
-  EXPECT_TRUE(MatrixNear(reading_.state.q, setup_.q_start(), kRounding));
+  EXPECT_TRUE(MatrixNear(reading_.state.q, setup_.start().q, kRounding));
   EXPECT_TRUE(
-      MatrixNear(reading_.state.X_Bo.matrix().eval(), setup_.X_Bo_start().matrix().eval(), kRounding));
+      MatrixNear(reading_.state.X_Bo.matrix().eval(), setup_.start().X_Bo.matrix().eval(), kRounding));
   EXPECT_EQ(reading_.state.xi.norm(), 0.0);
   EXPECT_EQ(reading_.touch.fingertips, AllContacts(4));
   EXPECT_NEAR(reading_.departure.tilt, 0.0, kRounding);
@@ -87,7 +87,7 @@ TEST_F(EnginePlantTest, MovesAsAWhole) {
   Step();
   const PlantReading before = reading_;
   const Vector3d v(0.5, 0.0, 0.0);
-  plant_.Place(setup_.q_start(), setup_.X_Bo_start());
+  plant_.Place(setup_.start().q, setup_.start().X_Bo);
   plant_.AddVelocity(reading_.state, v);
   plant_.Translate(Vector3d(0.25, -0.125, 0.0));
   Step();
@@ -133,9 +133,9 @@ TEST_F(EnginePlantTest, TheControllerIsToldTheTruthUnlessAskedOtherwise) {
 
 /// An object that falls freely under a push: impulse is momentum, moment's impulse is angular momentum.
 TEST_F(EnginePlantTest, APushIsItsImpulse) {
-  Pose X_Bo = setup_.X_Bo_start();
+  Pose X_Bo = setup_.start().X_Bo;
   X_Bo.translation() += Vector3d(3.0, 3.0, 2.0);
-  plant_.Place(setup_.q_start(), X_Bo);
+  plant_.Place(setup_.start().q, X_Bo);
   const MassProperties& body = setup_.object().body;
   Wrench push;
   push.force = Vector3d(1.0, 20.0, -2.0);

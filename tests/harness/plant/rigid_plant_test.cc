@@ -32,7 +32,7 @@ class RigidPlantTest : public ::testing::Test {
     const RigidPlantOptions options{.time_step = time_step, .integrator = integrator, .finger_friction = 1.0};
     auto plant =
         std::make_unique<RigidPlant>(setup_.model(), setup_.adapter(), setup_.fingertips(), motors_, options);
-    plant->Place(setup_.q_start(), setup_.X_Bo_start());
+    plant->Place(setup_.start().q, setup_.start().X_Bo);
     return plant;
   }
 
@@ -40,7 +40,7 @@ class RigidPlantTest : public ::testing::Test {
   VectorXd MakeTorques() const {
     TrajectoryController law(setup_.model(), setup_.fingertips(), setup_.object().body, setup_.surface(),
                              setup_.MakeControllerOptions(), {});
-    const LineTrajectory rest(setup_.X_start(), Vector6d::Zero(), 0.0);
+    const LineTrajectory rest(setup_.start().X_o, Vector6d::Zero(), 0.0);
     law.Follow(rest);
     const std::unique_ptr<RigidPlant> plant = MakePlant(1e-3);
     PlantReading reading;
@@ -209,7 +209,7 @@ TEST(RigidRun, ErrorFollowsEquation57ToTheOrderOfTheHold) {
     ShippedRun run(
         "hold", {kRigid, "duration=0.5", "settle=0.2", "expect={ from = 0 }", "plant.time_step=" + time_step,
                  "start_error.xyz=[1e-3, -5e-4, 8e-4]", "start_error.zyz=[0.01, -0.008, 0.012]"});
-    const Vector6d E_0 = run.setup().scenario().start_error;
+    const Vector6d E_0 = run.setup().scenario().start_error();
     double worst = 0.0;
     const RunResult& result = run.Run([&] {
       const double t = run.step().time;
@@ -309,10 +309,10 @@ TEST(RigidRun, EveryScenarioThatItTakesPasses) {
 // controller's alone.
 TEST(RigidRun, IsOfTheScenariosRobot) {
   const ShippedRun ring("two-hands", {kRigid, "model.object.mass=1.1"});
-  EXPECT_EQ(ring.setup().plant_model()->object()->body.mass, 1.0);
+  EXPECT_EQ(ring.setup().robots().rigid->object()->body.mass, 1.0);
   EXPECT_EQ(ring.setup().model().object()->body.mass, 1.1);
   const ShippedRun believed("hold", {kRigid, "model.object.mass=0.21"});
-  EXPECT_EQ(believed.setup().plant_model()->object()->body.mass, 0.2);
+  EXPECT_EQ(believed.setup().robots().rigid->object()->body.mass, 0.2);
 }
 
 }  // namespace

@@ -186,8 +186,8 @@ TEST(ContactSoftness, IsWhatThePredictionMisses) {
       factor.SolveTransposed(jump);
       VectorXd missed = offset.step().findings.xi_dot_model - offset.step().response.xi_dot;
       factor.Multiply(missed);
-      const ContactSoftness softness = FindContactSoftness(offset.setup().adapter(), offset.setup().q_start(),
-                                                           offset.setup().X_Bo_start());
+      const ContactSoftness softness = FindContactSoftness(offset.setup().adapter(), offset.setup().start().q,
+                                                           offset.setup().start().X_Bo);
       ASSERT_GT(missed.norm(), 1e-4);
       const double fraction = missed.norm() / jump.norm();
       EXPECT_LE(fraction, softness.fraction);
@@ -201,7 +201,7 @@ TEST(ContactSoftness, IsWhatThePredictionMisses) {
 TEST(ContactSoftness, GrowsWithSoftness) {
   const auto find = [](const char* impedance) {
     const ShippedRun run("hold", {std::string("plant.contact_impedance=") + impedance});
-    return FindContactSoftness(run.setup().adapter(), run.setup().q_start(), run.setup().X_Bo_start());
+    return FindContactSoftness(run.setup().adapter(), run.setup().start().q, run.setup().start().X_Bo);
   };
   const ContactSoftness soft = find("0.99"), stiff = find("0.999");
   for (const auto fraction :

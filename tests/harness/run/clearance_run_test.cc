@@ -60,7 +60,7 @@ class HoldAtATable {
     const ShippedRun run("hold");
     const mjModel& m = run.setup().engine();
     const MjDataPtr data = MakeData(m);
-    run.setup().adapter().SetPositions(run.setup().q_start(), data->qpos);
+    run.setup().adapter().SetPositions(run.setup().start().q, data->qpos);
     mj_kinematics(&m, data.get());
     const int palm = mj_name2id(&m, mjOBJ_BODY, "r_palm");
     Pose X = Pose::Identity();

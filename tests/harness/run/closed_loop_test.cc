@@ -36,7 +36,7 @@ TEST_P(ErrorDynamics, FollowTheClosedFormOfEquation57) {
   ShippedRun run("hold", {"duration=1", "control.natural_frequency=" + std::to_string(omega),
                           "control.damping_ratio=" + std::to_string(zeta),
                           "start_error.xyz=[1e-3, -5e-4, 8e-4]", "start_error.zyz=[0.01, -0.008, 0.012]"});
-  const Vector6d E_0 = run.setup().scenario().start_error;
+  const Vector6d E_0 = run.setup().scenario().start_error();
   Vector6d worst = Vector6d::Zero();
   Vector6d last = Vector6d::Zero();
   run.Run([&] {

@@ -135,22 +135,22 @@ Choice Draw(int number, const Options& options) {
   choice.overrides = options.overrides;
   if (std::stod(options.duration) > 0.0) choice.overrides.push_back("duration=" + options.duration);
   const Scenario scenario = ReadShippedScenario(choice.scenario);
-  const bool moves_joints = scenario.joint_motion.has_value();
+  const bool moves_joints = scenario.joint_task() != nullptr;
   bool is_as_written = true;  // as far as the scenario's expectation goes
-  if (!scenario.task && !scenario.plant.bonded && random() % 3 == 0)
+  if (scenario.pick_task() == nullptr && !scenario.plant.bonded && random() % 3 == 0)
     choice.overrides.push_back(std::string("plant.type=") + (random() % 2 == 0 ? "rigid" : "rigid_euler"));
   else if (scenario.plant.type == PlantType::kEngine)
     choice.overrides.push_back("plant.contact_impedance=" + pick(options.impedances));
-  if (!scenario.task && scenario.plant.type == PlantType::kEngine)
+  if (scenario.pick_task() == nullptr && scenario.plant.type == PlantType::kEngine)
     choice.overrides.push_back(fmt::format("plant.time_step={}", 1e-3 * std::stod(pick(options.steps))));
-  if (!scenario.task && random() % 2 == 0) {
+  if (scenario.pick_task() == nullptr && random() % 2 == 0) {
     const char* const laws[] = {"pd_gravity", "feedforward_pd", "operational_space", "impedance"};
     choice.overrides.push_back(std::string("control.law=") +
                                (moves_joints ? laws[random() % 2] : pick(laws)));
     is_as_written = false;
   }
   const bool is_real = !scenario.imperfections.is_ideal();
-  for (auto count = is_real || scenario.task ? 0 : random() % 3; count > 0; --count) {
+  for (auto count = is_real || scenario.pick_task() != nullptr ? 0 : random() % 3; count > 0; --count) {
     const auto& asked = kAsked[random() % (moves_joints ? kOfJoints : kAsked.size())];
     choice.overrides.insert(choice.overrides.end(), asked.begin(), asked.end());
     is_as_written = false;

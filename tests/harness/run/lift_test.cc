@@ -34,7 +34,7 @@ class LiftTest : public ::testing::Test {
   /// Runs with highest place of the object and largest support force while it is carried.
   const RunResult& Lift(const std::vector<std::string>& overrides, std::uint64_t seed = 0) {
     run_ = std::make_unique<ShippedRun>("lift", overrides, seed);
-    start_ = run_->setup().X_Bo_start().translation();
+    start_ = run_->setup().start().X_Bo.translation();
     return run_->Run([&] {
       const ClosedLoop& loop = run_->loop();
       highest_ = std::max(highest_, loop.record().reading.state.X_Bo.translation().z());
@@ -170,7 +170,7 @@ TEST(HandLiftScenario, TheArmCarriesWhereNoPlatformDrives) {
                                "task.approach_time=0.8", "task.lower_time=0.6", "task.close_time=0.3",
                                "task.search_speed=0.01", "task.grip_time=0.5", "task.take_over_time=0.6",
                                "task.raise_time=1", "task.arm_rate=0.5", "task.transport_time=1"});
-  const Vector3d start = run.setup().X_Bo_start().translation();
+  const Vector3d start = run.setup().start().X_Bo.translation();
   double highest = 0.0;
   const RunResult& result =
       run.Run([&] { highest = std::max(highest, run.loop().record().reading.state.X_Bo.translation().z()); });
@@ -188,7 +188,7 @@ TEST(HandLiftScenario, TheArmCarriesWhereNoPlatformDrives) {
   EXPECT_GT((plan.landing.Evaluate(0.0) - plan.q_open).cwiseAbs().maxCoeff(), 0.01);
   EXPECT_LE((plan.rise.Evaluate(1.0) - plan.along.Evaluate(0.0)).cwiseAbs().maxCoeff(), 1e-9);
   EXPECT_LE((plan.landing.Evaluate(1.0) - plan.along.Evaluate(1.0)).cwiseAbs().maxCoeff(), 1e-9);
-  EXPECT_LE((run.step().reading.state.q - run.setup().q_start()).cwiseAbs().maxCoeff(), 1e-3);
+  EXPECT_LE((run.step().reading.state.q - run.setup().start().q).cwiseAbs().maxCoeff(), 1e-3);
 }
 
 TEST(HandLiftScenario, SaysWhenTheArmDoesNotReachWhereTheObjectGoes) {

@@ -128,7 +128,7 @@ TEST(RunCampaign, MakesItsFaultsInOtherRobotsToo) {
       if (is_of_plant(mutant)) EXPECT_TRUE(mutant.killed || mutant.no_effect) << mutant.name;
       EXPECT_EQ(mutant.name.find("wheel"), std::string::npos) << mutant.name;
     }
-    EXPECT_EQ(has_laws, scenario.joint_motion == std::nullopt);
+    EXPECT_EQ(has_laws, scenario.joint_task() == nullptr);
   }
 }
 

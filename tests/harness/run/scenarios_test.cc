@@ -52,7 +52,7 @@ TEST(ShippedScenarios, PaperFollowsTheLine) {
   EXPECT_LE(run.Worst("reduced_acceleration"), 1e-5);
   EXPECT_LE(run.Worst("contact_force"), 1e-6);
   EXPECT_LE(run.Worst("idle_joints"), 1e-5);
-  const double way = run.step().reading.state.X_Bo.translation().x() - run.setup().X_start()[0];
+  const double way = run.step().reading.state.X_Bo.translation().x() - run.setup().start().X_o[0];
   EXPECT_NEAR(way, 10.0 - 1e-3, 1e-6);
 }
 
@@ -71,7 +71,7 @@ TEST(ShippedScenarios, AHandOnThePandaHoldsTurnsAndCarriesABall) {
   for (const char* name : {"hand-hold", "hand-reorient", "hand-curve"}) {
     SCOPED_TRACE(name);
     ShippedRun run(name, {"duration=2", "settle=0.5"});
-    const Pose start = run.setup().X_Bo_start();
+    const Pose start = run.setup().start().X_Bo;
     const RunResult& result = run.Run();
     ExpectPass(run, result);
     EXPECT_EQ(run.step().reading.state.q.size(), 23);
@@ -164,7 +164,7 @@ TEST(ShippedScenarios, BondedFingertipsLetTheObjectTurn) {
   ShippedRun run("reorient", {"duration=2.5", "plant.bonded=true"});
   double turned = 0.0;
   const RunResult& result = run.Run(
-      [&] { turned = std::max(turned, std::abs(CalcX_o(run.step())[5] - run.setup().X_start()[5])); });
+      [&] { turned = std::max(turned, std::abs(CalcX_o(run.step())[5] - run.setup().start().X_o[5])); });
   ExpectBondedPass(run, result);
   EXPECT_GT(turned, 0.1);
 }
@@ -184,12 +184,12 @@ TEST(ShippedScenarios, TwoHandsRaiseTiltAndTurn) {
   // All eight push.
   for (Eigen::Index i = 2; i < 24; i += 3) EXPECT_GT(run.step().findings.f_c[i], 0.5) << i;
 
-  const Pose& start = run.setup().X_Bo_start();
+  const Pose& start = run.setup().start().X_Bo;
   const Pose& end = run.step().reading.state.X_Bo;
   EXPECT_NEAR(end.translation().z() - start.translation().z(), 0.12, 1e-6);
   EXPECT_NEAR(CalcLean(end) - CalcLean(start), DegToRad(30.0), 1e-6);
   // Turn and tilt, both about axes that the tilt's does not leave the horizontal plane with.
-  const double turn = run.step().command.desired.X_d[3] - run.setup().X_start()[3];
+  const double turn = run.step().command.desired.X_d[3] - run.setup().start().X_o[3];
   EXPECT_LT(turn, -0.7);
   EXPECT_LT(run.step().reading.state.q[2], -0.6);  // so does the platform
   const Matrix3d R = end.linear() * start.linear().transpose();
@@ -215,7 +215,7 @@ TEST(ShippedScenarios, OtherGraspsPassToo) {
     const RunResult& result = run.Run();
     EXPECT_EQ(result.verdict, Verdict::kPass)
         << "seed " << seed << ": " << result.failure << result.attribution.evidence;
-    EXPECT_NE(run.setup().q_start(), ShippedRun("curve").setup().q_start());
+    EXPECT_NE(run.setup().start().q, ShippedRun("curve").setup().start().q);
   }
 }
 

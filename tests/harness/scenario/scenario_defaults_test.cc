@@ -98,114 +98,86 @@ std::vector<Key> ListKeys() {
   return keys;
 }
 
+/// Any value of a scenario as text.
 template <typename T>
-std::string Show(const std::optional<T>& value) {
-  if (!value) return "none";
-  if constexpr (std::is_same_v<T, Vector6d>) {
-    return fmt::format("{}", fmt::join(value->begin(), value->end(), " "));
+std::string Show(const T& value) {
+  if constexpr (std::is_enum_v<T>) {
+    return std::to_string(static_cast<int>(value));
+  } else if constexpr (std::is_base_of_v<Eigen::EigenBase<T>, T>) {
+    const MatrixXd numbers = (value.array() + 0.0).matrix();  // -0 is 0
+    return fmt::format("{} ", fmt::join(numbers.reshaped().begin(), numbers.reshaped().end(), " "));
+  } else if constexpr (requires { value.matrix(); }) {
+    return Show(value.matrix().eval());
+  } else if constexpr (requires { value.has_value(); }) {
+    return value ? Show(*value) : "none ";
+  } else if constexpr (requires { value.groups; }) {
+    return fmt::format("{} {} ", value.all, value.groups);
   } else {
-    return fmt::format("{}", *value);
+    return fmt::format("{} ", value);
   }
 }
 
-std::string Show(MatrixXd numbers) {
-  numbers.array() += 0.0;  // -0 is 0
-  return fmt::format("{}", fmt::join(numbers.reshaped().begin(), numbers.reshaped().end(), " "));
+template <typename... T>
+std::string ShowAll(const T&... values) {
+  return (Show(values) + ...) + "\n";
 }
 
-std::string Show(const ByName& numbers) { return fmt::format("{} {}", numbers.all, numbers.groups); }
-
-std::string Show(const SensingOptions& sensing) {
-  return fmt::format("{} | {} | {} | {} {} {} {} {} {} {} {} {} {} {} {} {}", Show(sensing.joint_counts),
-                     Show(sensing.joint_noise), Show(sensing.velocity_noise),
-                     static_cast<int>(sensing.velocity), sensing.velocity_cutoff, sensing.kalman_acceleration,
-                     sensing.odometry, sensing.object_position_noise, sensing.object_orientation_noise,
-                     sensing.object_rate, sensing.object_latency, static_cast<int>(sensing.object_velocity),
-                     sensing.object_velocity_cutoff, sensing.object_acceleration, sensing.contact_force_noise,
-                     sensing.latency);
-}
-
-std::string Show(const ActuationOptions& actuation) {
-  return fmt::format("{} | {} | {} | {} | {} | {} | {} {} {}", Show(actuation.torque_step),
-                     Show(actuation.gain_error), Show(actuation.lag), Show(actuation.coulomb),
-                     Show(actuation.stribeck), Show(actuation.backlash), actuation.stribeck_velocity,
-                     actuation.delay, actuation.saturate);
-}
-
-std::string Show(const DisturbanceOptions& push) {
-  return fmt::format("{} {} {} | {} | {} | {} | {} {} {} {} {} {}", static_cast<int>(push.kind), push.body,
-                     Show(push.force), Show(push.torque), Show(push.at), push.in_body_frame, push.begin,
-                     push.duration, push.period, push.frequency, push.begin_within, push.size_within);
-}
-
-std::string Show(const MismatchOptions& mismatch) {
-  return fmt::format("{} | {} | {} | {}", Show(mismatch.mass), Show(mismatch.mass_within),
-                     Show(mismatch.damping), Show(mismatch.armature));
-}
-
-std::string Show(const PlantOptions& plant) {
-  std::string touching;
-  for (const auto& [a, b] : plant.allowed_collision_pairs) touching += a + " " + b + " ";
-  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {}", static_cast<int>(plant.type),
-                     static_cast<int>(plant.integrator), plant.time_step, plant.control_step,
-                     plant.contact_time_constant, plant.contact_impedance, plant.impratio,
-                     plant.noslip_iterations, plant.bonded, plant.implicit_damping,
-                     Show(plant.floor_friction), Show(plant.finger_friction), plant.collide, touching);
-}
-
-std::string Show(const GraspOptions& grasp) {
-  std::string text = fmt::format("{} {}", fmt::join(grasp.fingertips, " "), grasp.frame);
-  for (const SurfacePoint& contact : grasp.contacts) text += fmt::format(" {} {}", contact.u, contact.v);
-  for (const auto& [joint, angle] : grasp.joints) text += fmt::format(" {} {}", joint, angle);
-  if (grasp.hemisphere) text += Show(*grasp.hemisphere);
-  return text + Show(MatrixXd(grasp.X_FO.matrix()));
-}
-
-std::string Show(const ControlOptions& control) {
-  return fmt::format("{} {} {} | {} | {} | {} {} {} {} {} {} {} {} {} {}", static_cast<int>(control.law),
-                     Show(control.gains.K_p), Show(control.gains.K_v), Show(control.stiffness),
-                     Show(control.damping), static_cast<int>(control.orientation),
-                     static_cast<int>(control.weight), control.platform_weight, control.arm_weight,
-                     control.posture_frequency, control.f_min, control.f_max, control.mu,
-                     static_cast<int>(control.kappa), control.contact_error);
-}
-
-std::string Show(const TaskOptions& task) {
-  const PickAndPlaceOptions& pick = task.pick_and_place;
-  return fmt::format("{} {} {} {} | {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
-                     Show(MatrixXd(task.X_Bo.matrix())), fmt::join(task.arm_joints, " "), Show(pick.raise),
-                     Show(pick.transport), pick.approach_time, pick.lower_time, pick.close_time,
-                     pick.search_speed, pick.grip_time, pick.take_over_time, pick.raise_time, pick.arm_rate,
-                     pick.transport_time, pick.touch_force, pick.overload, pick.largest_push, pick.attempts,
-                     pick.plan.opening, pick.plan.support);
+std::string ShowImperfections(const Imperfections& all) {
+  const SensingOptions& s = all.sensing;
+  const ActuationOptions& a = all.actuation;
+  const MismatchOptions& m = all.mismatch;
+  std::string text = ShowAll(
+      s.joint_counts, s.joint_noise, s.velocity_noise, s.velocity, s.velocity_cutoff, s.kalman_acceleration,
+      s.odometry, s.object_position_noise, s.object_orientation_noise, s.object_rate, s.object_latency,
+      s.object_velocity, s.object_velocity_cutoff, s.object_acceleration, s.contact_force_noise, s.latency);
+  text += ShowAll(a.torque_step, a.gain_error, a.lag, a.coulomb, a.stribeck, a.backlash, a.stribeck_velocity,
+                  a.delay, a.saturate, m.mass, m.mass_within, m.damping, m.armature);
+  for (const DisturbanceOptions& d : all.disturbances) {
+    text += ShowAll(d.kind, d.body, d.force, d.torque, d.at, d.in_body_frame, d.begin, d.duration, d.period,
+                    d.frequency, d.begin_within, d.size_within);
+  }
+  return text;
 }
 
 /// Where the trajectory is at some times.
-std::string Show(const TrajectoryMaker& make) {
+std::string ShowTrajectory(const TrajectoryMaker& make) {
   std::string text;
-  for (const double t : {0.1, 0.7, 3.0}) text += Show(make(Vector6d::Zero())->Evaluate(t).X_d) + " ";
+  for (const double t : {0.1, 0.7, 3.0}) text += Show(make(Vector6d::Zero())->Evaluate(t).X_d);
   return text;
 }
 
 /// All that the reader made of a scenario's keys.
-std::string Show(const Scenario& scenario) {
-  std::string text =
-      fmt::format("{} {} {} {} {} {}\n", scenario.description, scenario.duration, scenario.settle,
-                  static_cast<int>(scenario.start), Show(scenario.start_error), scenario.tolerance);
-  text += Show(scenario.plant) + "\n" + Show(scenario.grasp) + "\n" + Show(scenario.control) + "\n";
-  text += Show(scenario.imperfections.sensing) + "\n" + Show(scenario.imperfections.actuation) + "\n";
-  for (const auto& push : scenario.imperfections.disturbances) text += Show(push) + "\n";
-  text += Show(scenario.imperfections.mismatch) + "\n";
-  if (scenario.task) text += Show(*scenario.task) + "\n";
-  if (scenario.trajectory) text += Show(scenario.trajectory) + "\n";
-  return text + fmt::format("{} {} {}", Show(scenario.expect.position), Show(scenario.expect.orientation),
-                            scenario.expect.from);
+std::string ShowScenario(const Scenario& scenario) {
+  const PlantOptions& p = scenario.plant;
+  const GraspOptions& g = scenario.grasp;
+  const ControlOptions& c = scenario.control;
+  std::string text = ShowAll(scenario.description, scenario.duration, scenario.settle, scenario.start,
+                             scenario.start_error(), scenario.tolerance, scenario.expect.position,
+                             scenario.expect.orientation, scenario.expect.from);
+  text += ShowAll(p.type, p.integrator, p.time_step, p.control_step, p.contact_time_constant,
+                  p.contact_impedance, p.impratio, p.noslip_iterations, p.bonded, p.implicit_damping,
+                  p.floor_friction, p.finger_friction, p.collide, p.allowed_collision_pairs);
+  text += ShowAll(g.fingertips, g.frame, g.joints, g.hemisphere, g.X_FO);
+  for (const SurfacePoint& contact : g.contacts) text += ShowAll(contact.u, contact.v);
+  text += ShowAll(c.law, c.gains.K_p, c.gains.K_v, c.stiffness, c.damping, c.orientation, c.weight,
+                  c.platform_weight, c.arm_weight, c.posture_frequency, c.f_min, c.f_max, c.mu, c.kappa,
+                  c.contact_error);
+  text += ShowImperfections(scenario.imperfections);
+  if (const PickTask* const task = scenario.pick_task()) {
+    const PickAndPlaceOptions& k = task->pick_and_place;
+    text += ShowAll(task->X_Bo, task->arm_joints, k.raise, k.transport, k.approach_time, k.lower_time,
+                    k.close_time, k.search_speed, k.grip_time, k.take_over_time, k.raise_time, k.arm_rate,
+                    k.transport_time, k.touch_force, k.overload, k.largest_push, k.attempts, k.plan.opening,
+                    k.plan.support);
+  }
+  if (const TrajectoryTask* const task = scenario.trajectory_task()) text += ShowTrajectory(task->trajectory);
+  return text;
 }
 
 std::string Read(const Key& key, const std::string& value) {
   std::vector<std::string> overrides = key.before;
   if (!value.empty()) overrides.push_back(key.path + "=" + value);
-  return Show(ParseScenario(kRun, "least.toml", ".", overrides));
+  return ShowScenario(ParseScenario(kRun, "least.toml", ".", overrides));
 }
 
 TEST(ScenarioDefaults, AreThoseOfTheDocument) {

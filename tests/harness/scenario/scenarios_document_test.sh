@@ -119,11 +119,11 @@ for section in "${!sections[@]}"; do
     fail "[${section%%|*}] has other keys in $document (<) and in the reader (>):"$'\n'"$(cat difference)"
 done
 
-# Keys and choices are texts of letters and _ in the reader's sources: explain_all DOCUMENT LEAST SOURCE...
+# Keys and choices are texts of letters and _ in the reader's sources, or KEY(name): explain_all DOCUMENT LEAST SOURCE...
 explain_all() {
   local explained=$1 least=$2 words word
   shift 2
-  mapfile -t words < <(sed -E 's://.*::' "$@" | grep -oE '"[A-Za-z][A-Za-z_]*"' | tr -d '"' | sort -u)
+  mapfile -t words < <(sed -E 's://.*::; s/KEY\(([a-z_]+)\)/"\1"/g' "$@" | grep -vE '^#' | grep -oE '"[A-Za-z][A-Za-z_]*"' | tr -d '"' | sort -u)
   [[ ${#words[@]} -ge $least ]] || fail "only ${#words[@]} keys are found in $*"
   for word in "${words[@]}"; do
     grep -qE "[\`\"[]$word[\`\"]|\`\[$word\]|\`\[\[$word\]\]|[|] $word [|]|[{ ,]$word = " "$explained" ||

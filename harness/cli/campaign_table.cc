@@ -1,0 +1,107 @@
+#include "harness/cli/campaign_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "harness/cli/terminal.h"
+
+namespace dexcheck::cli {
+namespace {
+
+/// A line of the table.
+struct Row {
+  std::string kind;
+  int faults = 0, found = 0, refused = 0, no_effect = 0, survived = 0, cause_right = 0, part_named = 0,
+      with_part = 0;
+
+  void Add(const CampaignFault& fault) {
+    ++faults;
+    found += fault.outcome == MutantOutcome::kKilled ? 1 : 0;
+    refused += fault.outcome == MutantOutcome::kRefused ? 1 : 0;
+    no_effect += fault.outcome == MutantOutcome::kNoEffect ? 1 : 0;
+    survived += fault.outcome == MutantOutcome::kSurvived ? 1 : 0;
+    cause_right += fault.cause_right ? 1 : 0;
+    with_part += fault.part_named ? 1 : 0;
+    part_named += fault.part_named.value_or(false) ? 1 : 0;
+  }
+};
+
+/// One for each kind, and one for all.
+std::vector<Row> SumUp(const std::vector<CampaignFault>& faults) {
+  std::vector<Row> rows;
+  Row all{.kind = "all"};
+  for (const CampaignFault& fault : faults) {
+    auto row = std::find_if(rows.begin(), rows.end(), [&](const Row& one) { return one.kind == fault.kind; });
+    if (row == rows.end()) row = rows.insert(rows.end(), Row{.kind = fault.kind});
+    row->Add(fault);
+    all.Add(fault);
+  }
+  rows.push_back(all);
+  return rows;
+}
+
+const char* NameOf(MutantOutcome outcome) {
+  if (outcome == MutantOutcome::kKilled) return "found";
+  if (outcome == MutantOutcome::kRefused) return "refused";
+  return outcome == MutantOutcome::kNoEffect ? "no effect" : "survived";
+}
+
+}  // namespace
+
+void Campaign::Print(bool quiet) const {
+  const std::vector<Row> rows = SumUp(faults);
+  const Row& all = rows.back();
+  if (!quiet) {
+    size_t width = 15;
+    for (const Row& row : rows) width = std::max(width, row.kind.size() + 1);
+    fmt::print("{:<{}}{:>7}{:>6}{:>8}{:>10}{:>9}{:>6}{:>10}\n", "what was wrong", width, "faults", "found",
+               "refused", "no effect", "survived", "cause", all.with_part > 0 ? "part" : "");
+    for (const Row& row : rows) {
+      fmt::print("{:<{}}{:>7}{:>6}{:>8}{:>10}{:>9}{:>6}{:>10}\n", row.kind, width, row.faults, row.found,
+                 row.refused, row.no_effect, row.survived, row.cause_right,
+                 row.with_part > 0 ? fmt::format("{} of {}", row.part_named, row.with_part) : "");
+    }
+    for (const CampaignFault& fault : faults) {
+      if (!fault.exception.empty()) fmt::print("{}\n", Wrap(fault.exception, 2));
+    }
+    fmt::print("\n");
+  }
+  if (faults.size() < total) fmt::print("INTERRUPTED after {} of {} faults. So far:\n", faults.size(), total);
+  std::string verdict = fmt::format("{}: {} of {} faults that are possible and have an effect were found",
+                                    all.survived == 0 ? "ALL FOUND" : "SURVIVORS", all.found,
+                                    all.faults - all.refused - all.no_effect);
+  if (names_causes) verdict += fmt::format("; the cause is right in {}", all.cause_right);
+  if (all.with_part > 0) verdict += fmt::format(", the part in {} of {}", all.part_named, all.with_part);
+  fmt::print("{}\n", Wrap(verdict + ".", 2));
+}
+
+std::string Campaign::ToText(Json head) const {
+  head["complete"] = faults.size() == total;
+  head["kinds"] = Json::object();
+  for (const Row& row : SumUp(faults)) {
+    head["kinds"][row.kind] = {{"faults", row.faults},         {"found", row.found},
+                               {"refused", row.refused},       {"no_effect", row.no_effect},
+                               {"survived", row.survived},     {"cause_right", row.cause_right},
+                               {"part_named", row.part_named}, {"with_a_part", row.with_part}};
+  }
+  head["faults"] = Json::array();
+  for (const CampaignFault& fault : faults) {
+    Json one = {{"kind", fault.kind},
+                {"name", fault.name},
+                {"outcome", NameOf(fault.outcome)},
+                {"cause_right", fault.cause_right}};
+    if (fault.part_named) one["part_named"] = *fault.part_named;
+    one.update(fault.details);
+    head["faults"].push_back(one);
+  }
+  return head.dump(2) + "\n";
+}
+
+ExitCode Campaign::ToExitCode() const {
+  if (faults.size() < total)
+    return ReportFailure(fmt::format("interrupted after {} of {} faults", faults.size(), total));
+  return SumUp(faults).back().survived > 0 ? kDisagreement : kSuccess;
+}
+
+}  // namespace dexcheck::cli

@@ -1,0 +1,41 @@
+#pragma once
+
+// What a campaign of faults that were made on purpose came to: one table and one JSON, whether the faults are
+// of descriptions or of a run.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "harness/cli/command_line.h"
+#include "harness/cli/json_matrix.h"
+#include "harness/diagnosis/mutation.h"
+
+namespace dexcheck::cli {
+
+/// A fault that was made.
+struct CampaignFault {
+  std::string kind;  ///< What the table sums up by.
+  std::string name;
+  MutantOutcome outcome = MutantOutcome::kSurvived;
+  bool cause_right = false;        ///< The first cause that is named is the fault.
+  std::optional<bool> part_named;  ///< Whether its part is named, too; none without a part.
+  std::string exception;           ///< What is said of it besides, in a line; empty when all went well.
+  Json details = Json::object();   ///< In the JSON, besides the above.
+};
+
+/// A campaign so far.
+struct Campaign {
+  std::vector<CampaignFault> faults;  ///< That were made.
+  size_t total = 0;                   ///< To be made.
+  bool names_causes = true;           ///< Whether causes were looked for.
+
+  /// Prints a line for each kind of fault, the exceptions, and the verdict; the verdict alone when quiet.
+  void Print(bool quiet) const;
+  /// Adds "complete", "kinds" and "faults". @returns the text of a file.
+  [[nodiscard]] std::string ToText(Json head) const;
+  /// 3 when not all were made, which is said on standard error; else 1 when one survived.
+  [[nodiscard]] ExitCode ToExitCode() const;
+};
+
+}  // namespace dexcheck::cli

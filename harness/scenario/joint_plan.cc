@@ -1,0 +1,139 @@
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/dynamics/model_terms.h"
+#include "harness/scenario/start_state.h"
+
+namespace dexcheck {
+namespace {
+
+constexpr double kVariedStart =
+    DegToRad(2.0);  // rad, or this many m: how far a seed moves the start, either way
+
+/// Finds joints, and says what of the scenario does not fit them.
+class JointReader {
+ public:
+  JointReader(const Scenario& scenario, const RobotModel& model) : source_(scenario.source), model_(model) {}
+
+  [[nodiscard]] int Find(const std::string& key, const std::string& name, bool in_degrees) const {
+    const std::string where = source_ + ": " + key + ": ";
+    const int joint = model_.FindJoint(name);
+    if (joint < 0) {
+      std::vector<std::string> names;
+      for (const Joint& one : model_.joints()) names.push_back(one.name);
+      const std::string nearest = FindNearest(name, names);
+      throw InputError(where + Quote(name) + " is no joint of the model" +
+                       (nearest.empty() ? "" : " (" + Quote(nearest) + "?)"));
+    }
+    if (in_degrees && model_.joints()[static_cast<size_t>(joint)].type == JointType::kPrismatic) {
+      throw InputError(where + Quote(name) + " is prismatic: give it in m, under the key without _deg");
+    }
+    return joint;
+  }
+
+  /// Writes numbers by joint into q.
+  void Set(const JointNumbers& numbers, VectorXd* q) const {
+    for (const auto& [name, value] : numbers.by_name) {
+      (*q)[Find(numbers.key, name, numbers.in_degrees)] = value;
+    }
+  }
+
+  void RequireInRange(const std::string& key, const VectorXd& q) const {
+    for (int i = 0; i < model_.num_joints(); ++i) {
+      const Joint& joint = model_.joints()[static_cast<size_t>(i)];
+      if (q[i] >= joint.lower && q[i] <= joint.upper) continue;
+      const bool turns = joint.type == JointType::kRevolute;
+      const auto show = [&](double value) { return FormatNumber(turns ? RadToDeg(value) : value, 6); };
+      throw InputError(source_ + ": " + key + ": joint " + Quote(joint.name) + " must be from " +
+                       show(joint.lower) + " to " + show(joint.upper) + (turns ? " degrees" : " m") +
+                       ", got " + show(q[i]));
+    }
+  }
+
+  /// The number of each joint.
+  [[nodiscard]] VectorXd Resolve(const ByName& numbers) const {
+    std::vector<std::string> names;
+    for (const Joint& joint : model_.joints()) names.push_back(joint.name);
+    VectorXd values = numbers.Resolve(names, source_);
+    for (size_t i = 0; i < names.size(); ++i) {
+      if (!std::isnan(values[static_cast<Eigen::Index>(i)])) continue;
+      throw InputError(source_ + ": " + numbers.key + ": has no number for joint " + Quote(names[i]) +
+                       ", and none for \"all\"");
+    }
+    return values;
+  }
+
+ private:
+  const std::string& source_;
+  const RobotModel& model_;
+};
+
+JointGains FindGains(const JointTask& task, const JointReader& joints, const RobotModel& model,
+                     const VectorXd& q_start) {
+  JointGains gains;
+  const VectorXd omega = joints.Resolve(task.natural_frequency);
+  gains.K_p = omega.cwiseAbs2();
+  gains.K_v = 2.0 * joints.Resolve(task.damping_ratio).cwiseProduct(omega);
+  // Stiffness and damping as K_p and K_v with each joint's own inertia at the start.
+  ModelTerms terms(model, Coordinates::kReduced);
+  terms.SetState(q_start, VectorXd::Zero(model.num_velocities()));
+  terms.CalcDynamics();
+  const VectorXd inertia = terms.M().diagonal();
+  gains.K = inertia.cwiseProduct(gains.K_p);
+  gains.D = inertia.cwiseProduct(gains.K_v);
+  if (!task.stiffness.key.empty()) gains.K = joints.Resolve(task.stiffness);
+  if (!task.damping.key.empty()) gains.D = joints.Resolve(task.damping);
+  return gains;
+}
+
+VectorXd VaryPosture(const RobotModel& model, std::uint64_t seed, VectorXd q) {
+  std::mt19937_64 random(seed);
+  for (int i = 0; i < model.num_joints(); ++i) {
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    q[i] = std::clamp(q[i] + kVariedStart * DrawSymmetric(&random), joint.lower, joint.upper);
+  }
+  return q;
+}
+
+}  // namespace
+
+JointPlan MakeJointPlan(const Scenario& scenario, const RobotPair& robots, StartState* start) {
+  const RobotModel& model = robots.model;
+  if (model.base().type != BaseType::kFixed) {
+    throw InputError(model.spec().source + ": base.type: must be \"fixed\" for a motion of joints");
+  }
+  const JointReader joints(scenario, model);
+  const JointTask& task = *scenario.joint_task();
+  VectorXd q = VectorXd::Zero(model.num_joints());
+  joints.Set(task.start, &q);
+  joints.RequireInRange(task.start.key.empty() ? "joint_motion.start_deg" : task.start.key, q);
+  if (scenario.seed != 0) q = VaryPosture(model, scenario.seed, q);
+  start->q = q;
+  std::vector<JointWayPoint> points;
+  for (const JointTask::Point& point : task.points) {
+    joints.Set(point.where, &q);
+    joints.RequireInRange(point.where.key, q);
+    points.push_back({point.time, q});
+  }
+  std::vector<JointOscillation> oscillations;
+  for (const JointTask::Oscillation& one : task.oscillations) {
+    oscillations.push_back({joints.Find(one.key + ".joint", one.joint, one.in_degrees), one.amplitude,
+                            one.frequency, one.ramp_time});
+  }
+  Pose X_Bo = Pose::Identity();
+  if (model.object()) {
+    const mjModel& m = *robots.engine;
+    const mjtNum* const pose = m.qpos0 + m.jnt_qposadr[m.body_jntadr[robots.adapter->object_body()]];
+    X_Bo.translation() << pose[0], pose[1], pose[2];
+    X_Bo.linear() = Eigen::Quaterniond(pose[3], pose[4], pose[5], pose[6]).toRotationMatrix();
+  }
+  PlaceObject(X_Bo, start);
+  return {JointMotion(start->q, points, oscillations), FindGains(task, joints, model, start->q)};
+}
+
+}  // namespace dexcheck

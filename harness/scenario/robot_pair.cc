@@ -1,0 +1,116 @@
+#include "harness/scenario/robot_pair.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "controller/model/parameter_reader.h"
+#include "harness/engine/add_contact_pairs.h"
+#include "harness/engine/remove_looks.h"
+
+namespace dexcheck {
+namespace {
+
+/// Nothing moves in a run but the robot, its base and its object.
+void RequireNothingElse(const Adapter& adapter, const std::string& mjcf) {
+  if (adapter.other_joints().empty()) return;
+  throw InputError(mjcf + ": must have nothing that moves but the robot and its object, has joint " +
+                   Quote(NameOf(adapter.engine(), mjOBJ_JOINT, adapter.other_joints().front())));
+}
+
+void RequireUsable(const Scenario& scenario, const RobotModel& model) {
+  const std::string& robot = model.spec().source;
+  if (model.base().type == BaseType::kFloating) {
+    throw InputError(robot + ": base.type: must not be \"floating\" in a run, whose law drives the base");
+  }
+  RequireNoBalls(model, "in a run, whose law has one number for each joint");
+  if (!model.object() && scenario.joint_task() == nullptr) {
+    throw InputError(robot + ": object: is missing, and the scenario holds one");
+  }
+}
+
+/// The robot that a rigid plant moves: the scenario's, whatever the controller is made to believe.
+std::unique_ptr<RobotModel> ReadRigidModel(const Scenario& scenario, const std::string& robot) {
+  if (scenario.plant.type != PlantType::kRigid) return nullptr;
+  const auto first = scenario.model_overrides.begin();
+  const std::vector<std::string> own(first,
+                                     first + static_cast<std::ptrdiff_t>(scenario.own_model_overrides));
+  return std::make_unique<RobotModel>(ParseRobotModel(ReadTextFile(robot), robot, own));
+}
+
+void ApplyPlantOptions(const PlantOptions& plant, mjModel* engine) {
+  mjModel& m = *engine;
+  m.opt.timestep = plant.time_step;
+  m.opt.impratio = plant.impratio;
+  m.opt.noslip_iterations = plant.noslip_iterations;
+  const double time_constant =
+      plant.contact_time_constant > 0.0 ? plant.contact_time_constant : 2.0 * plant.time_step;
+  for (int pair = 0; pair < m.npair; ++pair) {
+    SetStiffness(time_constant, plant.contact_impedance, m.pair_solref + mjNREF * pair,
+                 m.pair_solimp + mjNIMP * pair);
+    const bool has_floor =
+        m.geom_type[m.pair_geom1[pair]] == mjGEOM_PLANE || m.geom_type[m.pair_geom2[pair]] == mjGEOM_PLANE;
+    const std::optional<double>& mu = has_floor ? plant.floor_friction : plant.finger_friction;
+    if (mu) m.pair_friction[5 * pair] = m.pair_friction[5 * pair + 1] = *mu;
+  }
+}
+
+/// Lists the pairs, and lets them push when the scenario says so.
+void WatchBodies(const Scenario& scenario, const std::string& mjcf, RobotPair* robots) {
+  const PlantOptions& plant = scenario.plant;
+  robots->watched_pairs = ListWatchedPairs(*robots->engine, *robots->adapter, robots->solids,
+                                           plant.allowed_collision_pairs, scenario.source);
+  if (!plant.collide) return;
+  robots->solids = ListSolids(*robots->engine);  // the same, with the numbers that their geoms have now
+  robots->engine = AddContactPairs(*robots->engine, ListGeoms(*robots));
+  robots->adapter = std::make_unique<Adapter>(robots->model, *robots->engine, mjcf);
+}
+
+}  // namespace
+
+void SetStiffness(double time_constant, double impedance, mjtNum* solref, mjtNum* solimp) {
+  solref[0] = time_constant;
+  solref[1] = 1.0;
+  const mjtNum constant[mjNIMP] = {impedance, impedance, 0.001, 0.5, 2.0};  // the last three without effect
+  std::copy_n(constant, mjNIMP, solimp);
+}
+
+std::vector<std::pair<int, int>> ListGeoms(const RobotPair& robots) {
+  std::vector<std::pair<int, int>> geoms;
+  for (const WatchedPair& pair : robots.watched_pairs) {
+    geoms.emplace_back(robots.solids.list[static_cast<size_t>(pair.a)].geom,
+                       robots.solids.list[static_cast<size_t>(pair.b)].geom);
+  }
+  return geoms;
+}
+
+RobotPair::RobotPair(const Scenario& scenario, RobotModel the_model, const std::filesystem::path& mjcf,
+                     MjModelPtr the_engine)
+    : model(std::move(the_model)),
+      engine(std::move(the_engine)),
+      rigid(ReadRigidModel(scenario, model.spec().source)) {
+  RequireUsable(scenario, model);
+  solids = ListSolids(*engine);
+  std::vector<int> pushing;
+  if (scenario.plant.collide) {
+    for (const Solid& solid : solids.list) pushing.push_back(solid.geom);
+  }
+  RemoveLooks(engine.get(), pushing);
+  adapter = std::make_unique<Adapter>(model, *engine, mjcf.string());
+  RequireNothingElse(*adapter, mjcf.string());
+  constants = CheckConstants(*adapter);
+  if (scenario.tolerance > 0.0) JudgeByTolerance(scenario.tolerance, &constants);
+  WatchBodies(scenario, mjcf.string(), this);
+  ApplyPlantOptions(scenario.plant, engine.get());
+}
+
+DeclaredMismatch::DeclaredMismatch(RobotModel the_plant, MjModelPtr engine_without, const mjModel& engine,
+                                   const RobotModel& model, const std::string& source)
+    : plant(std::move(the_plant)),
+      without(std::move(engine_without)),
+      plant_adapter(plant, engine, source),
+      controller_adapter(model, *without, source) {}
+
+}  // namespace dexcheck
