@@ -1,9 +1,12 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <sstream>
 #include <utility>
@@ -80,6 +83,61 @@ void CheckSize(size_t size, std::string_view source) {
                    " bytes long");
 }
 
+enum class Change { kSet, kAppend, kRemove };
+
+/// Changes what stands at a path, whose parts are keys and numbers of list entries.
+/// @param value gets moved away. @param fail throws for a reason.
+void Place(std::string_view path, Change mode, toml::node* value,
+           const std::function<void(const std::string& why)>& fail, toml::table* root) {
+  toml::node* at = root;
+  size_t begin = 0;
+  while (true) {
+    const size_t dot = path.find('.', begin);
+    const std::string_view key = path.substr(begin, dot - begin);
+    const bool is_last = dot == std::string_view::npos;
+    if (key.empty()) fail("its path has an empty part");
+    if (toml::array* const list = at->as_array()) {
+      size_t index = 0;
+      const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), index);
+      if (error != std::errc() || end != key.data() + key.size() || index >= list->size()) {
+        fail(Quote(key) + " is no entry of a list of " + std::to_string(list->size()));
+      }
+      if (is_last && mode == Change::kRemove) {
+        list->erase(list->cbegin() + static_cast<std::ptrdiff_t>(index));
+        return;
+      }
+      if (is_last) {
+        list->replace(list->cbegin() + static_cast<std::ptrdiff_t>(index), std::move(*value));
+        return;
+      }
+      at = list->get(index);
+    } else if (toml::table* const table = at->as_table()) {
+      if (is_last && mode == Change::kAppend) {
+        if (!table->contains(key)) table->insert(key, toml::array{});
+        toml::array* const list = table->get(key)->as_array();
+        if (list == nullptr) fail(Quote(path) + " is no list");
+        list->push_back(std::move(*value));
+        return;
+      }
+      if (mode == Change::kRemove && !table->contains(key))
+        fail(Quote(path.substr(0, dot)) + " is not there");
+      if (is_last && mode == Change::kRemove) {
+        table->erase(key);
+        return;
+      }
+      if (is_last) {
+        table->insert_or_assign(key, std::move(*value));
+        return;
+      }
+      if (!table->contains(key)) table->insert(key, toml::table{});
+      at = table->get(key);
+    } else {
+      fail(Quote(path.substr(0, begin - 1)) + " is no table or list");
+    }
+    begin = dot + 1;
+  }
+}
+
 /// TomlDocument::Override. "PATH+=VALUE" adds an entry to a list, which is made when it is not there;
 /// "PATH-=" removes a key that is there.
 void Assign(std::string_view assignment, toml::table* root) {
@@ -109,53 +167,8 @@ void Assign(std::string_view assignment, toml::table* root) {
     if (parsed.size() == 1) break;  // more keys mean that the value had a line break in it
   }
   if (parsed.size() != 1) fail("is not a value");
-
-  toml::node* at = root;
-  size_t begin = 0;
-  while (true) {
-    const size_t dot = path.find('.', begin);
-    const std::string_view key = path.substr(begin, dot - begin);
-    const bool is_last = dot == std::string_view::npos;
-    if (key.empty()) fail("its path has an empty part");
-    if (toml::array* const list = at->as_array()) {
-      size_t index = 0;
-      const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), index);
-      if (error != std::errc() || end != key.data() + key.size() || index >= list->size()) {
-        fail(Quote(key) + " is no entry of a list of " + std::to_string(list->size()));
-      }
-      if (is_last && removes) {
-        list->erase(list->cbegin() + static_cast<std::ptrdiff_t>(index));
-        return;
-      }
-      if (is_last) {
-        list->replace(list->cbegin() + static_cast<std::ptrdiff_t>(index), std::move(*parsed.get("value")));
-        return;
-      }
-      at = list->get(index);
-    } else if (toml::table* const table = at->as_table()) {
-      if (is_last && appends) {
-        if (!table->contains(key)) table->insert(key, toml::array{});
-        toml::array* const list = table->get(key)->as_array();
-        if (list == nullptr) fail(Quote(path) + " is no list");
-        list->push_back(std::move(*parsed.get("value")));
-        return;
-      }
-      if (removes && !table->contains(key)) fail(Quote(path.substr(0, dot)) + " is not there");
-      if (is_last && removes) {
-        table->erase(key);
-        return;
-      }
-      if (is_last) {
-        table->insert_or_assign(key, std::move(*parsed.get("value")));
-        return;
-      }
-      if (!table->contains(key)) table->insert(key, toml::table{});
-      at = table->get(key);
-    } else {
-      fail(Quote(path.substr(0, begin - 1)) + " is no table or list");
-    }
-    begin = dot + 1;
-  }
+  const Change mode = removes ? Change::kRemove : appends ? Change::kAppend : Change::kSet;
+  Place(path, mode, parsed.get("value"), fail, root);
 }
 
 }  // namespace
@@ -183,6 +196,21 @@ TomlDocument::TomlDocument(const TomlDocument& other)
 TomlTable TomlDocument::Open() const { return {*context_, TomlValue(*context_, *root_, ""), *root_}; }
 
 void TomlDocument::Override(std::string_view assignment) { Assign(assignment, root_.get()); }
+
+void TomlDocument::Set(std::string_view path, double number) {
+  constexpr double kMostWhole = 0x1p53;
+  const auto fail = [&](const std::string& why) {
+    throw InputError(Abbreviate("--set " + std::string(path) + "=" + FormatNumber(number)) + ": " + why);
+  };
+  if (NestingScanner(path).FindTooDeep() > 0) fail("nested too deeply");
+  if (std::abs(number) < kMostWhole && number == std::floor(number)) {
+    toml::value<std::int64_t> whole(static_cast<std::int64_t>(number));
+    Place(path, Change::kSet, &whole, fail, root_.get());
+  } else {
+    toml::value<double> value(number);
+    Place(path, Change::kSet, &value, fail, root_.get());
+  }
+}
 
 namespace {
 

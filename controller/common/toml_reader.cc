@@ -126,31 +126,24 @@ void TomlValue::Reject(std::string_view problem) const {
   throw InputError(Locate() + ": " + key + std::string(problem));
 }
 
-void TomlValue::NoteMissing(const std::string& key) const {
+MissingKeys& TomlValue::Note(const std::string& problem) const {
   const bool is_own = node_->source().path != nullptr;
-  MissingKeys keys{Locate(), is_own ? 0 : line(), path_, {}, ""};
+  MissingKeys note{Locate(), is_own ? 0 : line(), path_, {}, problem};
   std::vector<MissingKeys>& all = context_->missing;
   // What two arms are made from is read twice.
   const auto same = std::find_if(all.begin(), all.end(), [&](const MissingKeys& other) {
-    return other.where == keys.where && other.path == keys.path && !other.names.empty();
+    return other.where == note.where && other.path == note.path && other.problem == problem;
   });
-  if (same == all.end()) {
-    keys.names = {key};
-    all.push_back(std::move(keys));
-  } else if (std::find(same->names.begin(), same->names.end(), key) == same->names.end()) {
-    same->names.push_back(key);
-  }
+  return same == all.end() ? all.emplace_back(std::move(note)) : *same;
+}
+
+void TomlValue::NoteMissing(const std::string& key) const {
+  std::vector<std::string>& names = Note("").names;
+  if (std::find(names.begin(), names.end(), key) == names.end()) names.push_back(key);
 }
 
 void TomlValue::NoteMisspelt(const std::string& key) const {
-  const bool is_own = node_->source().path != nullptr;
-  const MissingKeys note{
-      Locate(), is_own ? 0 : line(), path_, {}, "unknown key, did you mean " + Quote(key) + "?"};
-  std::vector<MissingKeys>& all = context_->missing;
-  const bool is_new = std::none_of(all.begin(), all.end(), [&](const MissingKeys& other) {
-    return other.where == note.where && other.path == note.path && other.problem == note.problem;
-  });
-  if (is_new) all.push_back(note);
+  Note("unknown key, did you mean " + Quote(key) + "?");
 }
 
 double TomlValue::AsNumber() const {

@@ -121,6 +121,8 @@ class TomlValue {
 
  private:
   void CopyNumbers(double* target, int count) const;
+  /// The note of this problem with this value, made when there is none yet.
+  MissingKeys& Note(const std::string& problem) const;
   /// "FILE:LINE", or where the value was set.
   [[nodiscard]] std::string Locate() const;
 
@@ -213,6 +215,8 @@ class TomlDocument {
   /// numbers in the path count the entries of lists, from 0. A value that is not TOML is taken as text.
   /// @throws InputError when this is no assignment, or its path leads through what is no table or list.
   void Override(std::string_view assignment);
+  /// Sets a number in place of the file's, at a path as Override takes it. @throws InputError likewise.
+  void Set(std::string_view path, double number);
   /// Adds a symbol to those that quoted arithmetic may use from now on.
   void Define(const std::string& symbol, double value) { context_->symbols[symbol] = value; }
 

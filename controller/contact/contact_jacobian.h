@@ -1,6 +1,6 @@
 #pragma once
 
-// Grasp constraints (section 4.2): rows of the hand and whole-body Jacobians, and their rates along rolling
+// Grasp constraints (section 4.2): rows of the whole-body Jacobian, and their rates along rolling
 // contacts. Outputs are the caller's, sized beforehand; nothing allocates.
 
 #include <span>
@@ -16,7 +16,7 @@ struct ColumnRun {
   Eigen::Index count = 0;
 };
 
-/// Rows (m x n) of the grasp constraint that belong to one contact: B_c^T Ad_{g_cf_f} J_f with the
+/// Rows (3 x n) of the grasp constraint that belong to one contact: B_c^T Ad_{g_cf_f} J_f with the
 /// fingertip's body Jacobian J_f (6 x n, twist [v; omega] in the fingertip frame). With J_f = J_sf^f over the
 /// finger's joint rates this is a block of J_h (32), (33); with J_f = J_Bf^f reduced to xi, the contact's
 /// rows of J_B' (34), (44). `rows` may be a block of a larger matrix. Throws std::invalid_argument when a
@@ -25,17 +25,11 @@ struct ColumnRun {
 void CalcContactJacobian(const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
                          Eigen::Ref<MatrixXd> rows, std::span<const ColumnRun> columns = {});
 
-/// Rate (m x n) of these rows, J_B_dot' of (46), from J_f_dot (6 x n, componentwise rate in the fingertip
+/// Rate (3 x n) of these rows, J_B_dot' of (46), from J_f_dot (6 x n, componentwise rate in the fingertip
 /// frame) and the contact's motion over the fingertip at kappa_dot. Throws and uses `columns` as
 /// CalcContactJacobian.
 void CalcContactJacobianDot(const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
                             const Eigen::Ref<const Matrix6Xd>& J_f_dot, Eigen::Ref<MatrixXd> rows_dot,
                             std::span<const ColumnRun> columns = {});
-
-/// Hand Jacobian J_h (33), CountForces(contacts) x (sum of the fingers' joints), block diagonal: contact i
-/// with fingertip Jacobian J_f[i] (6 x joints of finger i). Satisfies J_h qdot_f = G^T V_po^o in rolling
-/// contact. Throws std::invalid_argument when a size does not fit.
-void CalcHandJacobian(std::span<const Contact> contacts, std::span<const Matrix6Xd> J_f,
-                      Eigen::Ref<MatrixXd> J_h);
 
 }  // namespace dexcheck

@@ -104,9 +104,4 @@ FoundContact FindContact(const Surface& fingertip, const Surface& object, const 
   return FindContact(fingertip, object, X_OF, guess);
 }
 
-void RequireTouching(const FoundContact& contact, double tolerance) {
-  Require(std::abs(contact.gap) <= tolerance, "gap between fingertip and object [m]",
-          "must be within the tolerance", contact.gap);
-}
-
 }  // namespace dexcheck

@@ -28,7 +28,4 @@ FoundContact FindContact(const Surface& fingertip, const Surface& object, const 
 /// As above without a guess: starts at the object's point closest to the fingertip frame's origin.
 FoundContact FindContact(const Surface& fingertip, const Surface& object, const Pose& X_OF);
 
-/// Throws std::invalid_argument when the gap (m) of a contact found exceeds `tolerance` (m) either way.
-void RequireTouching(const FoundContact& contact, double tolerance);
-
 }  // namespace dexcheck

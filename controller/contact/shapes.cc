@@ -140,25 +140,27 @@ SurfacePoint Cylinder::DoToChart(const SurfacePoint& alpha, int chart) const {
   return {WrapAngle(alpha.u), alpha.v, chart};
 }
 
-Sphere::Sphere(double radius) : radius_(radius) { RequirePositive(radius, "sphere radius [m]"); }
-
-SurfaceProjection Sphere::Project(const Vector3d& p) const {
-  const double centre_distance = p.norm();
-  RequireUnique(centre_distance, radius_, "the sphere's centre");
-  return {CalcBestLatitudeCoordinates(p), centre_distance - radius_};
+SurfaceJet LatitudeSurface::DoCalcJet(const SurfacePoint& alpha) const {
+  return CalcLatitudeJet(semi_axes_, alpha);
 }
 
-SurfaceJet Sphere::DoCalcJet(const SurfacePoint& alpha) const {
-  return CalcLatitudeJet(Vector3d::Constant(radius_), alpha);
-}
-
-SurfacePoint Sphere::DoToChart(const SurfacePoint& alpha, int chart) const {
+SurfacePoint LatitudeSurface::DoToChart(const SurfacePoint& alpha, int chart) const {
   return ChangeLatitudeChart(alpha, chart);
 }
 
-bool Sphere::DoHasMargin(const SurfacePoint& alpha) const { return HasLatitudeMargin(alpha); }
+bool LatitudeSurface::DoHasMargin(const SurfacePoint& alpha) const { return HasLatitudeMargin(alpha); }
 
-Ellipsoid::Ellipsoid(const Vector3d& semi_axes) : semi_axes_(semi_axes) {
+Sphere::Sphere(double radius) : LatitudeSurface(Vector3d::Constant(radius)) {
+  RequirePositive(radius, "sphere radius [m]");
+}
+
+SurfaceProjection Sphere::Project(const Vector3d& p) const {
+  const double centre_distance = p.norm();
+  RequireUnique(centre_distance, radius(), "the sphere's centre");
+  return {CalcBestLatitudeCoordinates(p), centre_distance - radius()};
+}
+
+Ellipsoid::Ellipsoid(const Vector3d& semi_axes) : LatitudeSurface(semi_axes) {
   for (const double semi_axis : semi_axes) RequirePositive(semi_axis, "ellipsoid semi-axis [m]");
 }
 
@@ -198,16 +200,6 @@ SurfaceProjection Ellipsoid::Project(const Vector3d& p) const {
   const Vector3d n = e.cwiseQuotient(semi_axes_).normalized();
   return {CalcBestLatitudeCoordinates(e), n.dot(p - semi_axes_.cwiseProduct(e))};
 }
-
-SurfaceJet Ellipsoid::DoCalcJet(const SurfacePoint& alpha) const {
-  return CalcLatitudeJet(semi_axes_, alpha);
-}
-
-SurfacePoint Ellipsoid::DoToChart(const SurfacePoint& alpha, int chart) const {
-  return ChangeLatitudeChart(alpha, chart);
-}
-
-bool Ellipsoid::DoHasMargin(const SurfacePoint& alpha) const { return HasLatitudeMargin(alpha); }
 
 Box::Box(const Vector3d& half_size) : half_size_(half_size) {
   for (const double half : half_size) RequirePositive(half, "box half length [m]");

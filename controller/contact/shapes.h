@@ -32,40 +32,40 @@ class Cylinder final : public Surface {
   double radius_;
 };
 
-/// Sphere about the origin, u longitude and v latitude. Chart 0 has its poles on z,
-/// c(u, v) = rho (cos v cos u, cos v sin u, sin v); chart 1 has them on x, the axes exchanged cyclically.
-class Sphere final : public Surface {
+/// What sphere and ellipsoid share: u longitude and v latitude in two charts of the unit sphere, whose points
+/// are scaled by the semi-axes.
+class LatitudeSurface : public Surface {
+ public:
+  [[nodiscard]] int num_charts() const final { return 2; }
+
+ protected:
+  explicit LatitudeSurface(const Vector3d& semi_axes) : semi_axes_(semi_axes) {}
+  Vector3d semi_axes_;
+
+ private:
+  [[nodiscard]] SurfaceJet DoCalcJet(const SurfacePoint& alpha) const final;
+  [[nodiscard]] SurfacePoint DoToChart(const SurfacePoint& alpha, int chart) const final;
+  [[nodiscard]] bool DoHasMargin(const SurfacePoint& alpha) const final;
+};
+
+/// Sphere about the origin. Chart 0 has its poles on z, c(u, v) = rho (cos v cos u, cos v sin u, sin v);
+/// chart 1 has them on x, the axes exchanged cyclically.
+class Sphere final : public LatitudeSurface {
  public:
   /// Throws std::invalid_argument unless radius (m) is positive.
   explicit Sphere(double radius);
-  [[nodiscard]] double radius() const { return radius_; }
-  [[nodiscard]] int num_charts() const override { return 2; }
+  [[nodiscard]] double radius() const { return semi_axes_.x(); }
   [[nodiscard]] SurfaceProjection Project(const Vector3d& p) const override;
-
- private:
-  [[nodiscard]] SurfaceJet DoCalcJet(const SurfacePoint& alpha) const override;
-  [[nodiscard]] SurfacePoint DoToChart(const SurfacePoint& alpha, int chart) const override;
-  [[nodiscard]] bool DoHasMargin(const SurfacePoint& alpha) const override;
-
-  double radius_;
 };
 
 /// Ellipsoid with three free semi-axes along x, y, z; the sphere's charts, each coordinate scaled by its
 /// semi-axis: c(u, v) = (a cos v cos u, b cos v sin u, c sin v). Not orthogonal unless a = b.
-class Ellipsoid final : public Surface {
+class Ellipsoid final : public LatitudeSurface {
  public:
   /// Throws std::invalid_argument unless all semi-axes (3x1, m) are positive.
   explicit Ellipsoid(const Vector3d& semi_axes);
   [[nodiscard]] const Vector3d& semi_axes() const { return semi_axes_; }
-  [[nodiscard]] int num_charts() const override { return 2; }
   [[nodiscard]] SurfaceProjection Project(const Vector3d& p) const override;
-
- private:
-  [[nodiscard]] SurfaceJet DoCalcJet(const SurfacePoint& alpha) const override;
-  [[nodiscard]] SurfacePoint DoToChart(const SurfacePoint& alpha, int chart) const override;
-  [[nodiscard]] bool DoHasMargin(const SurfacePoint& alpha) const override;
-
-  Vector3d semi_axes_;
 };
 
 /// Box about the origin, its faces across x, y, z. Each face is a chart, which ends at its edges: chart 2 i

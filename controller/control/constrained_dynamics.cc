@@ -5,7 +5,6 @@
 #include "controller/common/errors.h"
 #include "controller/common/gram_matrix.h"
 #include "controller/common/text.h"
-#include "controller/object/euler_zyz.h"
 
 namespace dexcheck {
 namespace {
@@ -31,10 +30,6 @@ void FactorIndependentConstraints(const MatrixXd& schur, Eigen::Index k, BlockCh
 }
 
 }  // namespace
-
-Vector6d CalcCoordinateAcceleration(const GraspTerms& grasp, const Vector6d& V_Bo_dot) {
-  return CalcP(grasp.X_o()) * (V_Bo_dot - grasp.coordinates().P_inv_dot * grasp.X_o_dot());
-}
 
 ConstrainedDynamics::ConstrainedDynamics(const RobotModel& model, int num_contacts)
     : factor_(model), schur_factor_(std::max(Eigen::Index{3} * num_contacts, Eigen::Index{0})) {
@@ -120,33 +115,6 @@ void ConstrainedDynamics::CalcFreeForce(const ModelTerms& robot, const Eigen::Re
   bias_ = robot.gravity() + robot.friction();
   bias_.noalias() += robot.C() * robot.velocity();
   free = force - bias_;
-}
-
-ObjectSpaceTerms CalcObjectSpaceTerms(const ModelTerms& robot, const GraspTerms& grasp,
-                                      const Pseudoinverse& J_B_pinv, const Eigen::Ref<const VectorXd>& sigma,
-                                      const Eigen::Ref<const VectorXd>& sigma_prime) {
-  const ObjectTerms& o = grasp.coordinates();
-  const MatrixXd J_plus = J_B_pinv.CalcMatrix();
-  const MatrixXd N = J_B_pinv.CalcProjector();
-  // H = J_B'^+ G^T
-  const MatrixXd H = J_plus * grasp.G().transpose();
-  const MatrixXd H_P_inv = H * o.P_inv;
-  const VectorXd N_sigma = N * sigma;
-
-  ObjectSpaceTerms terms;
-  terms.G_J_T = H.transpose();
-  // M_tilde = M_o + G J^+T M_bar' J^+ G^T P^-1
-  terms.M_tilde = o.M_o + terms.G_J_T * robot.M() * H_P_inv;
-  // C_tilde = C_o + G J^+T (M_bar' J^+ (G_dot^T P^-1 + G^T d/dt(P^-1) - J_dot J^+ G^T P^-1) + C_bar' J^+ G^T
-  // P^-1)
-  const MatrixXd H_rate = J_plus * (grasp.G_dot().transpose() * o.P_inv +
-                                    grasp.G().transpose() * o.P_inv_dot - grasp.J_B_dot() * H_P_inv);
-  terms.C_tilde = o.C_o + terms.G_J_T * (robot.M() * H_rate + robot.C() * H_P_inv);
-  // N_tilde = N_o + G J^+T (F_bar' - M_bar' J^+ J_dot N sigma + M_bar' N sigma' + C_bar' N sigma)
-  const VectorXd null_acceleration = N * sigma_prime - J_plus * (grasp.J_B_dot() * N_sigma);
-  terms.N_tilde = o.N_o + terms.G_J_T * (robot.gravity() + robot.friction() + robot.M() * null_acceleration +
-                                         robot.C() * N_sigma);
-  return terms;
 }
 
 }  // namespace dexcheck

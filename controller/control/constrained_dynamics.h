@@ -7,7 +7,6 @@
 #include "controller/common/block_cholesky.h"
 #include "controller/common/types.h"
 #include "controller/control/grasp_terms.h"
-#include "controller/control/pseudoinverse.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/dynamics/tree_factor.h"
 
@@ -19,11 +18,6 @@ struct Prediction {
   Vector6d V_Bo_dot = Vector6d::Zero();  ///< Of the object's body velocity, Sigma_o.
   VectorXd f_c;                          ///< k, N, of finger on object, each in its Sigma_cf.
 };
-
-/// X_o_ddot = P (V_Bo_dot - d/dt(P^-1) X_o_dot).
-/// @throws SingularityError when abs(sin beta) < kMinSinBeta; std::logic_error unless the grasp's state was
-/// set by X_o.
-Vector6d CalcCoordinateAcceleration(const GraspTerms& grasp, const Vector6d& V_Bo_dot);
 
 /// What bears the object.
 enum class ObjectSupport {
@@ -78,22 +72,5 @@ class ConstrainedDynamics {
   VectorXd bias_;    // n
   Prediction prediction_;
 };
-
-/// M_tilde X_o_ddot + C_tilde X_o_dot + N_tilde = G J_B'^+T E_bar' tau', (52): what the object feels through
-/// the grasp.
-struct ObjectSpaceTerms {
-  Matrix6d M_tilde;
-  Matrix6d C_tilde;
-  Vector6d N_tilde;
-  Matrix6Xd G_J_T;  ///< G J_B'^+T (6 x n), (50).
-};
-
-/// Terms of (52) with the null-space motions sigma and sigma' (n) of (47). Departure: N' sigma'' is left out,
-/// because N' = 0 for J_B' of full row rank. For analysis: it forms n x n matrices and allocates.
-/// @param J_B_pinv with grasp.J_B() factored, by the weight of choice.
-/// @throws std::logic_error unless the grasp's state was set by X_o.
-ObjectSpaceTerms CalcObjectSpaceTerms(const ModelTerms& robot, const GraspTerms& grasp,
-                                      const Pseudoinverse& J_B_pinv, const Eigen::Ref<const VectorXd>& sigma,
-                                      const Eigen::Ref<const VectorXd>& sigma_prime);
 
 }  // namespace dexcheck

@@ -11,17 +11,31 @@ void RequireGraspForce(const GraspForceResult& result) {
                             : "the grasp-force problem did not converge");
 }
 
+GraspForceStage::GraspForceStage(int num_contacts, const GraspControllerOptions& options)
+    : problem_(num_contacts), solver_(num_contacts, options.force) {
+  problem_.mu.setConstant(options.mu);
+  problem_.f_max.setConstant(options.f_max);
+}
+
+const VectorXd& GraspForceStage::Solve(const GraspTerms& grasp, const Vector6d& F_o, double f_min) {
+  if (!F_o.allFinite()) throw GraspForceError("the demanded forces are not finite");
+  problem_.G = grasp.G();
+  problem_.F_o = F_o;
+  problem_.f_min.setConstant(f_min);
+  const auto begin = std::chrono::steady_clock::now();
+  const GraspForceResult& result = solver_.Solve(problem_);
+  seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  RequireGraspForce(result);
+  return result.f_c;
+}
+
 GraspController::GraspController(const RobotModel& model, std::span<const int> fingertips,
                                  const MassProperties& object, const Surface& surface,
                                  const GraspControllerOptions& options)
     : options_(options),
       model_(model, fingertips, object, surface, options),
       law_(model, static_cast<int>(fingertips.size()), options.weight),
-      problem_(static_cast<int>(fingertips.size())),
-      solver_(static_cast<int>(fingertips.size()), 0, options.force) {
-  problem_.mu.setConstant(options.mu);
-  problem_.f_min.setConstant(options.f_min);
-  problem_.f_max.setConstant(options.f_max);
+      force_(static_cast<int>(fingertips.size()), options) {
   sigma_prime_.setZero(model.num_velocities());
   F_N_.setZero(grasp().num_forces());
   if (options.law != ControlLaw::kComputedTorque) {
@@ -46,17 +60,9 @@ const VectorXd& GraspController::CalcTorque(const DesiredMotion& desired) {
     law_.SetDemand(robot(), grasp(), V_Bo_dot_, sigma_prime_);
   }
 
-  if (!law_.F_o().allFinite() || !law_.tau_0().allFinite()) {
-    throw GraspForceError("the demanded forces are not finite");
-  }
-  problem_.G = grasp().G();
-  problem_.F_o = law_.F_o();
-  const auto begin = std::chrono::steady_clock::now();
-  force_ = &solver_.Solve(problem_);
-  force_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  RequireGraspForce(*force_);
+  if (!law_.tau_0().allFinite()) throw GraspForceError("the demanded forces are not finite");
   // F_N = f_c - G^+ F_o, so that (49) gives f_c back
-  law_.CalcInternalForce(force_->f_c, F_N_);
+  law_.CalcInternalForce(force_.Solve(grasp(), law_.F_o(), options_.f_min), F_N_);
   return law_.CalcTorque(grasp(), F_N_);
 }
 

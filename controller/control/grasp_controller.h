@@ -40,6 +40,25 @@ struct GraspControllerOptions : GraspModelOptions {
   GraspForceOptions force;
 };
 
+/// The stage between the two of a law: F_o to contact forces inside the friction cones.
+class GraspForceStage {
+ public:
+  /// @throws as GraspForceSolver.
+  GraspForceStage(int num_contacts, const GraspControllerOptions& options);
+
+  /// f_c (3N), N, with G f_c = F_o (Sigma_o). @param f_min least normal force of each finger, N.
+  /// @throws GraspForceError when there are none, or F_o is not finite.
+  const VectorXd& Solve(const GraspTerms& grasp, const Vector6d& F_o, double f_min);
+
+  /// Time that the last problem took, s.
+  [[nodiscard]] double seconds() const { return seconds_; }
+
+ private:
+  GraspForceProblem problem_;
+  GraspForceSolver solver_;
+  double seconds_ = 0.0;
+};
+
 /// Computed torque (55), or another law for the object, with the grasp force from the friction cones. Owns
 /// every term that one step needs. Nothing allocates in Step.
 class GraspController {
@@ -63,14 +82,13 @@ class GraspController {
   [[nodiscard]] const ComputedTorque& law() const { return law_; }
   /// sigma' (n) of the state set, from the posture task.
   [[nodiscard]] const VectorXd& sigma_prime() const { return sigma_prime_; }
-  [[nodiscard]] const GraspForceResult& force() const { return *force_; }
   /// V_Bo_dot (Sigma_o) that the last torques demand of the object: what it would do if the law's terms were
   /// all there is.
   [[nodiscard]] const Vector6d& V_Bo_dot() const { return V_Bo_dot_; }
   /// F_N (k) of (49) that belongs to them, N.
   [[nodiscard]] const VectorXd& F_N() const { return F_N_; }
   /// Time that the last grasp-force problem took, s.
-  [[nodiscard]] double force_seconds() const { return force_seconds_; }
+  [[nodiscard]] double force_seconds() const { return force_.seconds(); }
   [[nodiscard]] const GraspControllerOptions& options() const { return options_; }
 
  private:
@@ -78,10 +96,7 @@ class GraspController {
   GraspModel model_;
   ComputedTorque law_;
   std::optional<BaselineLaw> baseline_;  // none for computed torque
-  GraspForceProblem problem_;
-  GraspForceSolver solver_;
-  const GraspForceResult* force_ = nullptr;
-  double force_seconds_ = 0.0;
+  GraspForceStage force_;
   Vector6d V_Bo_dot_ = Vector6d::Zero();
   VectorXd sigma_prime_;  // n
   VectorXd F_N_;          // k

@@ -28,14 +28,14 @@ JointMotion::JointMotion(const VectorXd& q_start, const std::vector<JointWayPoin
       WayPoint& to = displacements.emplace_back(WayPoint{point.time, Vector6d::Zero()});
       to.displacement.head(count) = (point.q - q_start).segment(begin, count);
     }
-    ways_.push_back(std::make_unique<WayPointTrajectory>(Vector6d::Zero(), displacements));
+    ways_.push_back(MakeWayPointTrajectory(Vector6d::Zero(), displacements));
   }
   for (const JointOscillation& one : oscillations) {
     Require(one.joint >= 0 && one.joint < q_start.size(), "joint of an oscillation", "must be one",
             one.joint);
     const Vector6d amplitude = one.amplitude * Vector6d::Unit(0);
-    oscillations_.emplace_back(one.joint, std::make_unique<OscillationTrajectory>(
-                                              Vector6d::Zero(), amplitude, one.frequency, one.ramp_time));
+    oscillations_.emplace_back(
+        one.joint, MakeOscillationTrajectory(Vector6d::Zero(), amplitude, one.frequency, one.ramp_time));
   }
 }
 

@@ -30,13 +30,14 @@ struct JointOscillation {
   double ramp_time = 0.0;  ///< s.
 };
 
-/// q_d(t) of all joints: from where they start through way points, as WayPointTrajectory goes, with
+/// q_d(t) of all joints: from where they start through way points, as MakeWayPointTrajectory goes, with
 /// oscillations on top. Before t = 0 it is at rest at the start. Evaluation does not allocate once the result
 /// has its sizes.
 class JointMotion {
  public:
   /// @param q_start of all joints. @param points none to stay at the start.
-  /// @throws std::invalid_argument when a size differs, and as WayPointTrajectory, OscillationTrajectory.
+  /// @throws std::invalid_argument when a size differs, and as MakeWayPointTrajectory,
+  /// MakeOscillationTrajectory.
   JointMotion(const VectorXd& q_start, const std::vector<JointWayPoint>& points,
               const std::vector<JointOscillation>& oscillations);
 

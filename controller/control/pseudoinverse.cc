@@ -109,11 +109,6 @@ void Pseudoinverse::Apply(const Eigen::Ref<const VectorXd>& y, Eigen::Ref<Vector
   for (const int i : entries_) x[i] = W_inv_J_T_.row(i).head(work_.size()).dot(work_);
 }
 
-void Pseudoinverse::ApplyTransposed(const Eigen::Ref<const VectorXd>& x, Eigen::Ref<VectorXd> y) {
-  y.noalias() = W_inv_J_T_.leftCols(work_.size()).transpose() * x;
-  gram_factor_.Solve(y);
-}
-
 void Pseudoinverse::Project(Eigen::Ref<VectorXd> x) {
   // N x = x - J^+ (J x)
   work_.setZero();

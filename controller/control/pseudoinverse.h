@@ -44,8 +44,6 @@ class Pseudoinverse {
 
   /// x (n) = J^+ y (k).
   void Apply(const Eigen::Ref<const VectorXd>& y, Eigen::Ref<VectorXd> x);
-  /// y (k) = J^+T x (n).
-  void ApplyTransposed(const Eigen::Ref<const VectorXd>& x, Eigen::Ref<VectorXd> y);
   /// x (n) becomes N x.
   void Project(Eigen::Ref<VectorXd> x);
 

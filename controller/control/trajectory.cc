@@ -14,9 +14,112 @@ DesiredMotion MoveAlong(const Vector6d& X_start, const Vector6d& direction, cons
   return {X_start + motion.s * direction, motion.s_dot * direction, motion.s_ddot * direction};
 }
 
-double CheckRampTime(double ramp_time) {
+void RequireRampTime(double ramp_time) {
   Require(ramp_time >= 0.0 && std::isfinite(ramp_time), "ramp_time", "must not be negative", ramp_time);
-  return ramp_time;
+}
+
+/// X_d(t) as a function.
+template <typename Function>
+class FunctionTrajectory final : public Trajectory {
+ public:
+  explicit FunctionTrajectory(Function function) : function_(std::move(function)) {}
+  [[nodiscard]] DesiredMotion Evaluate(double t) const override { return function_(t); }
+
+ private:
+  Function function_;
+};
+
+template <typename Function>
+std::unique_ptr<Trajectory> MakeTrajectory(Function function) {
+  return std::make_unique<FunctionTrajectory<Function>>(std::move(function));
+}
+
+/// Place [x, y, turn] of a planar path at its parameter s (m), and its first two derivatives by s; x along
+/// the heading.
+struct PathPoint {
+  Vector3d place, place_s, place_ss;
+};
+
+/// @param evaluate PathPoint of s.
+template <typename Function>
+std::unique_ptr<Trajectory> MakePlanarTrajectory(const Vector6d& X_start, const PlanarPath& path,
+                                                 Function evaluate) {
+  RequireRampTime(path.ramp_time);
+  const double cos_heading = std::cos(path.heading);
+  const double sin_heading = std::sin(path.heading);
+  return MakeTrajectory([=](double t) -> DesiredMotion {
+    const ScalarMotion motion = CalcSpeedRamp(t, path.ramp_time);
+    const PathPoint at = evaluate(path.speed * motion.s);
+    // X_dot = X_s s_dot, X_ddot = X_ss s_dot^2 + X_s s_ddot
+    const double s_dot = path.speed * motion.s_dot;
+    const Vector3d rate = at.place_s * s_dot;
+    const Vector3d acceleration = at.place_ss * (s_dot * s_dot) + at.place_s * (path.speed * motion.s_ddot);
+    const auto place_in_world = [&](const Vector3d& p) {
+      Vector6d X = Vector6d::Zero();
+      X[0] = cos_heading * p.x() - sin_heading * p.y();
+      X[1] = sin_heading * p.x() + cos_heading * p.y();
+      X[3] = p.z();
+      return X;
+    };
+    return {X_start + place_in_world(at.place), place_in_world(rate), place_in_world(acceleration)};
+  });
+}
+
+struct Knot {
+  double time;
+  Vector6d X, X_dot, X_ddot;
+};
+
+void SetKnotRates(std::vector<Knot>* all) {
+  std::vector<Knot>& knots = *all;
+  // Clamped cubic spline: v_{i-1} / h_i + 2 (1/h_i + 1/h_{i+1}) v_i + v_{i+1} / h_{i+1}
+  //   = 3 (X_i - X_{i-1}) / h_i^2 + 3 (X_{i+1} - X_i) / h_{i+1}^2, v = 0 at the ends; by elimination.
+  const size_t last = knots.size() - 1;
+  std::vector<double> upper(knots.size(), 0.0);
+  for (size_t i = 1; i < last; ++i) {
+    Knot& knot = knots[i];
+    const Knot& before = knots[i - 1];
+    const Knot& after = knots[i + 1];
+    const double a = 1.0 / (knot.time - before.time);
+    const double b = 1.0 / (after.time - knot.time);
+    const double pivot = 2.0 * (a + b) - a * upper[i - 1];
+    upper[i] = b / pivot;
+    knot.X_dot =
+        (3.0 * a * a * (knot.X - before.X) + 3.0 * b * b * (after.X - knot.X) - a * before.X_dot) / pivot;
+  }
+  for (size_t i = last; i-- > 1;) knots[i].X_dot -= upper[i] * knots[i + 1].X_dot;
+  // X_ddot_i = 6 (X_{i+1} - X_i) / h^2 - (4 v_i + 2 v_{i+1}) / h
+  for (size_t i = 1; i < last; ++i) {
+    const double b = 1.0 / (knots[i + 1].time - knots[i].time);
+    knots[i].X_ddot =
+        6.0 * b * b * (knots[i + 1].X - knots[i].X) - b * (4.0 * knots[i].X_dot + 2.0 * knots[i + 1].X_dot);
+  }
+}
+
+DesiredMotion EvaluateKnots(const std::vector<Knot>& knots, double t) {
+  if (t <= knots.front().time) return {knots.front().X, Vector6d::Zero(), Vector6d::Zero()};
+  if (t >= knots.back().time) return {knots.back().X, Vector6d::Zero(), Vector6d::Zero()};
+  const auto after = std::upper_bound(knots.begin(), knots.end(), t,
+                                      [](double time, const Knot& k) { return time < k.time; });
+  const Knot& k1 = *after;
+  const Knot& k0 = *(after - 1);
+  const double h = k1.time - k0.time;
+  const double u = (t - k0.time) / h;
+  // The quintic with value, velocity and acceleration of both knots: X_0 + v_0 t + a_0 t^2/2 up to second
+  // order, and what is missing at the end, in value, velocity, acceleration, through u^3, u^4, u^5.
+  const Vector6d v0 = h * k0.X_dot;
+  const Vector6d a0 = h * h * k0.X_ddot;
+  const Vector6d d = k1.X - k0.X - v0 - 0.5 * a0;
+  const Vector6d e = h * k1.X_dot - v0 - a0;
+  const Vector6d f = h * h * k1.X_ddot - a0;
+  const Vector6d c3 = 10.0 * d - 4.0 * e + 0.5 * f;
+  const Vector6d c4 = -15.0 * d + 7.0 * e - f;
+  const Vector6d c5 = 6.0 * d - 3.0 * e + 0.5 * f;
+  DesiredMotion motion;
+  motion.X_d = k0.X + u * (v0 + u * (0.5 * a0 + u * (c3 + u * (c4 + u * c5))));
+  motion.X_d_dot = (v0 + u * (a0 + u * (3.0 * c3 + u * (4.0 * c4 + u * (5.0 * c5))))) / h;
+  motion.X_d_ddot = (a0 + u * (6.0 * c3 + u * (12.0 * c4 + u * (20.0 * c5)))) / (h * h);
+  return motion;
 }
 
 }  // namespace
@@ -49,175 +152,85 @@ ScalarMotion CalcSpeedRamp(double t, double duration) {
   return {duration * u * u * u * u * (2.5 + u * (-3.0 + u)), speed.s, speed.s_dot};
 }
 
-LineTrajectory::LineTrajectory(const Vector6d& X_start, const Vector6d& velocity, double ramp_time)
-    : X_start_(X_start), velocity_(velocity), ramp_time_(CheckRampTime(ramp_time)) {}
-
-DesiredMotion LineTrajectory::Evaluate(double t) const {
-  return MoveAlong(X_start_, velocity_, CalcSpeedRamp(t, ramp_time_));
+std::unique_ptr<Trajectory> MakeLineTrajectory(const Vector6d& X_start, const Vector6d& velocity,
+                                               double ramp_time) {
+  RequireRampTime(ramp_time);
+  return MakeTrajectory([=](double t) { return MoveAlong(X_start, velocity, CalcSpeedRamp(t, ramp_time)); });
 }
 
-PointToPointTrajectory::PointToPointTrajectory(const Vector6d& X_start, const Vector6d& displacement,
-                                               double duration)
-    : X_start_(X_start), displacement_(displacement), duration_(duration) {
+std::unique_ptr<Trajectory> MakePointToPointTrajectory(const Vector6d& X_start, const Vector6d& displacement,
+                                                       double duration) {
   Require(duration > 0.0, "duration", "must be positive", duration);
+  return MakeTrajectory([=](double t) { return MoveAlong(X_start, displacement, CalcMinJerk(t, duration)); });
 }
 
-DesiredMotion PointToPointTrajectory::Evaluate(double t) const {
-  return MoveAlong(X_start_, displacement_, CalcMinJerk(t, duration_));
-}
-
-OscillationTrajectory::OscillationTrajectory(const Vector6d& X_start, const Vector6d& amplitude,
-                                             double frequency, double ramp_time)
-    : X_start_(X_start),
-      amplitude_(amplitude),
-      rate_(2.0 * kPi * frequency),
-      ramp_time_(CheckRampTime(ramp_time)) {
+std::unique_ptr<Trajectory> MakeOscillationTrajectory(const Vector6d& X_start, const Vector6d& amplitude,
+                                                      double frequency, double ramp_time) {
+  RequireRampTime(ramp_time);
   Require(frequency > 0.0, "frequency", "must be positive", frequency);
+  return MakeTrajectory([=, rate = 2.0 * kPi * frequency](double t) {
+    const ScalarMotion ramp = ramp_time > 0.0 ? CalcMinJerk(t, ramp_time) : ScalarMotion{1.0, 0.0, 0.0};
+    const double sine = std::sin(rate * t);
+    const double cosine = std::cos(rate * t);
+    return MoveAlong(X_start, amplitude,
+                     {ramp.s * sine, ramp.s_dot * sine + ramp.s * rate * cosine,
+                      ramp.s_ddot * sine + 2.0 * ramp.s_dot * rate * cosine - ramp.s * rate * rate * sine});
+  });
 }
 
-DesiredMotion OscillationTrajectory::Evaluate(double t) const {
-  const ScalarMotion ramp = ramp_time_ > 0.0 ? CalcMinJerk(t, ramp_time_) : ScalarMotion{1.0, 0.0, 0.0};
-  const double sine = std::sin(rate_ * t);
-  const double cosine = std::cos(rate_ * t);
-  return MoveAlong(X_start_, amplitude_,
-                   {ramp.s * sine, ramp.s_dot * sine + ramp.s * rate_ * cosine,
-                    ramp.s_ddot * sine + 2.0 * ramp.s_dot * rate_ * cosine - ramp.s * rate_ * rate_ * sine});
-}
-
-PlanarTrajectory::PlanarTrajectory(const Vector6d& X_start, double heading, double speed, double ramp_time)
-    : X_start_(X_start),
-      cos_heading_(std::cos(heading)),
-      sin_heading_(std::sin(heading)),
-      speed_(speed),
-      ramp_time_(CheckRampTime(ramp_time)) {}
-
-DesiredMotion PlanarTrajectory::Evaluate(double t) const {
-  const ScalarMotion motion = CalcSpeedRamp(t, ramp_time_);
-  const PathPoint path = DoEvaluate(speed_ * motion.s);
-  // X_dot = X_s s_dot, X_ddot = X_ss s_dot^2 + X_s s_ddot
-  const double s_dot = speed_ * motion.s_dot;
-  const Vector3d rate = path.place_s * s_dot;
-  const Vector3d acceleration = path.place_ss * (s_dot * s_dot) + path.place_s * (speed_ * motion.s_ddot);
-  const auto place_in_world = [&](const Vector3d& p) {
-    Vector6d X = Vector6d::Zero();
-    X[0] = cos_heading_ * p.x() - sin_heading_ * p.y();
-    X[1] = sin_heading_ * p.x() + cos_heading_ * p.y();
-    X[3] = p.z();
-    return X;
-  };
-  return {X_start_ + place_in_world(path.place), place_in_world(rate), place_in_world(acceleration)};
-}
-
-WeaveTrajectory::WeaveTrajectory(const Vector6d& X_start, double heading, double speed, double ramp_time,
-                                 double amplitude, double wavelength)
-    : PlanarTrajectory(X_start, heading, speed, ramp_time),
-      amplitude_(amplitude),
-      wave_number_(2.0 * kPi / wavelength) {
+std::unique_ptr<Trajectory> MakeWeaveTrajectory(const Vector6d& X_start, const PlanarPath& path,
+                                                double amplitude, double wavelength) {
   Require(wavelength > 0.0, "wavelength", "must be positive", wavelength);
+  return MakePlanarTrajectory(X_start, path, [=, k = 2.0 * kPi / wavelength](double s) -> PathPoint {
+    const double c = std::cos(k * s);
+    // y' = slope; turn = atan(slope)
+    const double slope = amplitude * k * std::sin(k * s);
+    const double slope_s = amplitude * k * k * c;
+    const double slope_ss = -k * k * slope;
+    const double secant = 1.0 / (1.0 + slope * slope);
+    return {{s, amplitude * (1.0 - c), std::atan(slope)},
+            {1.0, slope, slope_s * secant},
+            {0.0, slope_s, slope_ss * secant - 2.0 * slope * slope_s * slope_s * secant * secant}};
+  });
 }
 
-PlanarTrajectory::PathPoint WeaveTrajectory::DoEvaluate(double s) const {
-  const double k = wave_number_;
-  const double c = std::cos(k * s);
-  // y' = slope; turn = atan(slope)
-  const double slope = amplitude_ * k * std::sin(k * s);
-  const double slope_s = amplitude_ * k * k * c;
-  const double slope_ss = -k * k * slope;
-  const double secant = 1.0 / (1.0 + slope * slope);
-  return {{s, amplitude_ * (1.0 - c), std::atan(slope)},
-          {1.0, slope, slope_s * secant},
-          {0.0, slope_s, slope_ss * secant - 2.0 * slope * slope_s * slope_s * secant * secant}};
-}
-
-CircleTrajectory::CircleTrajectory(const Vector6d& X_start, double heading, double speed, double ramp_time,
-                                   double radius)
-    : PlanarTrajectory(X_start, heading, speed, ramp_time), radius_(radius) {
+std::unique_ptr<Trajectory> MakeCircleTrajectory(const Vector6d& X_start, const PlanarPath& path,
+                                                 double radius) {
   Require(radius != 0.0, "radius", "must not be zero", radius);
+  return MakePlanarTrajectory(X_start, path, [=](double s) -> PathPoint {
+    const double turn = s / radius;
+    const double c = std::cos(turn);
+    const double n = std::sin(turn);
+    return {{radius * n, radius * (1.0 - c), turn}, {c, n, 1.0 / radius}, {-n / radius, c / radius, 0.0}};
+  });
 }
 
-PlanarTrajectory::PathPoint CircleTrajectory::DoEvaluate(double s) const {
-  const double turn = s / radius_;
-  const double c = std::cos(turn);
-  const double n = std::sin(turn);
-  return {{radius_ * n, radius_ * (1.0 - c), turn}, {c, n, 1.0 / radius_}, {-n / radius_, c / radius_, 0.0}};
-}
-
-WayPointTrajectory::WayPointTrajectory(const Vector6d& X_start, const std::vector<WayPoint>& points) {
+std::unique_ptr<Trajectory> MakeWayPointTrajectory(const Vector6d& X_start,
+                                                   const std::vector<WayPoint>& points) {
   Require(!points.empty(), "number of way-points", "must be positive", 0.0);
-  knots_.push_back({0.0, X_start, Vector6d::Zero(), Vector6d::Zero()});
+  std::vector<Knot> knots = {{0.0, X_start, Vector6d::Zero(), Vector6d::Zero()}};
   for (const WayPoint& point : points) {
-    Require(point.time > knots_.back().time, "time of way-point",
+    Require(point.time > knots.back().time, "time of way-point",
             "must be positive and greater than the one before", point.time);
-    knots_.push_back({point.time, X_start + point.displacement, Vector6d::Zero(), Vector6d::Zero()});
+    knots.push_back({point.time, X_start + point.displacement, Vector6d::Zero(), Vector6d::Zero()});
   }
-  SetKnotRates();
+  SetKnotRates(&knots);
+  return MakeTrajectory([knots = std::move(knots)](double t) { return EvaluateKnots(knots, t); });
 }
 
-void WayPointTrajectory::SetKnotRates() {
-  // Clamped cubic spline: v_{i-1} / h_i + 2 (1/h_i + 1/h_{i+1}) v_i + v_{i+1} / h_{i+1}
-  //   = 3 (X_i - X_{i-1}) / h_i^2 + 3 (X_{i+1} - X_i) / h_{i+1}^2, v = 0 at the ends; by elimination.
-  const size_t last = knots_.size() - 1;
-  std::vector<double> upper(knots_.size(), 0.0);
-  for (size_t i = 1; i < last; ++i) {
-    Knot& knot = knots_[i];
-    const Knot& before = knots_[i - 1];
-    const Knot& after = knots_[i + 1];
-    const double a = 1.0 / (knot.time - before.time);
-    const double b = 1.0 / (after.time - knot.time);
-    const double pivot = 2.0 * (a + b) - a * upper[i - 1];
-    upper[i] = b / pivot;
-    knot.X_dot =
-        (3.0 * a * a * (knot.X - before.X) + 3.0 * b * b * (after.X - knot.X) - a * before.X_dot) / pivot;
-  }
-  for (size_t i = last; i-- > 1;) knots_[i].X_dot -= upper[i] * knots_[i + 1].X_dot;
-  // X_ddot_i = 6 (X_{i+1} - X_i) / h^2 - (4 v_i + 2 v_{i+1}) / h
-  for (size_t i = 1; i < last; ++i) {
-    const double b = 1.0 / (knots_[i + 1].time - knots_[i].time);
-    knots_[i].X_ddot = 6.0 * b * b * (knots_[i + 1].X - knots_[i].X) -
-                       b * (4.0 * knots_[i].X_dot + 2.0 * knots_[i + 1].X_dot);
-  }
-}
-
-DesiredMotion WayPointTrajectory::Evaluate(double t) const {
-  if (t <= knots_.front().time) return {knots_.front().X, Vector6d::Zero(), Vector6d::Zero()};
-  if (t >= knots_.back().time) return {knots_.back().X, Vector6d::Zero(), Vector6d::Zero()};
-  const auto after = std::upper_bound(knots_.begin(), knots_.end(), t,
-                                      [](double time, const Knot& k) { return time < k.time; });
-  const Knot& k1 = *after;
-  const Knot& k0 = *(after - 1);
-  const double h = k1.time - k0.time;
-  const double u = (t - k0.time) / h;
-  // The quintic with value, velocity and acceleration of both knots: X_0 + v_0 t + a_0 t^2/2 up to second
-  // order, and what is missing at the end, in value, velocity, acceleration, through u^3, u^4, u^5.
-  const Vector6d v0 = h * k0.X_dot;
-  const Vector6d a0 = h * h * k0.X_ddot;
-  const Vector6d d = k1.X - k0.X - v0 - 0.5 * a0;
-  const Vector6d e = h * k1.X_dot - v0 - a0;
-  const Vector6d f = h * h * k1.X_ddot - a0;
-  const Vector6d c3 = 10.0 * d - 4.0 * e + 0.5 * f;
-  const Vector6d c4 = -15.0 * d + 7.0 * e - f;
-  const Vector6d c5 = 6.0 * d - 3.0 * e + 0.5 * f;
-  DesiredMotion motion;
-  motion.X_d = k0.X + u * (v0 + u * (0.5 * a0 + u * (c3 + u * (c4 + u * c5))));
-  motion.X_d_dot = (v0 + u * (a0 + u * (3.0 * c3 + u * (4.0 * c4 + u * (5.0 * c5))))) / h;
-  motion.X_d_ddot = (a0 + u * (6.0 * c3 + u * (12.0 * c4 + u * (20.0 * c5)))) / (h * h);
-  return motion;
-}
-
-SumTrajectory::SumTrajectory(const Vector6d& X_start, std::vector<std::unique_ptr<Trajectory>> parts)
-    : X_start_(X_start), parts_(std::move(parts)) {
-  Require(!parts_.empty(), "number of parts", "must be positive", 0.0);
-}
-
-DesiredMotion SumTrajectory::Evaluate(double t) const {
-  DesiredMotion sum{X_start_, Vector6d::Zero(), Vector6d::Zero()};
-  for (const std::unique_ptr<Trajectory>& part : parts_) {
-    const DesiredMotion motion = part->Evaluate(t);
-    sum.X_d += motion.X_d;
-    sum.X_d_dot += motion.X_d_dot;
-    sum.X_d_ddot += motion.X_d_ddot;
-  }
-  return sum;
+std::unique_ptr<Trajectory> MakeSumTrajectory(const Vector6d& X_start,
+                                              std::vector<std::unique_ptr<Trajectory>> parts) {
+  Require(!parts.empty(), "number of parts", "must be positive", 0.0);
+  return MakeTrajectory([X_start, parts = std::move(parts)](double t) {
+    DesiredMotion sum{X_start, Vector6d::Zero(), Vector6d::Zero()};
+    for (const std::unique_ptr<Trajectory>& part : parts) {
+      const DesiredMotion motion = part->Evaluate(t);
+      sum.X_d += motion.X_d;
+      sum.X_d_dot += motion.X_d_dot;
+      sum.X_d_ddot += motion.X_d_ddot;
+    }
+    return sum;
+  });
 }
 
 }  // namespace dexcheck

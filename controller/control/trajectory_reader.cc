@@ -77,18 +77,22 @@ std::vector<TrajectoryMaker> ReadParts(TomlTable& table) {
   return parts;
 }
 
-/// A maker of trajectories of one type, whose constructor takes the start and then these arguments.
-template <typename Motion, typename... Arguments>
-TrajectoryMaker MakerOf(const Arguments&... arguments) {
-  return [=](const Vector6d& X_start) { return std::make_unique<Motion>(X_start, arguments...); };
+/// The maker by a function that takes the start and then these arguments.
+template <typename Make, typename... Arguments>
+TrajectoryMaker MakerOf(const Make& make, const Arguments&... arguments) {
+  return [=](const Vector6d& X_start) { return make(X_start, arguments...); };
 }
 
-TrajectoryMaker MakerOfSum(const std::vector<TrajectoryMaker>& parts) {
-  return [=](const Vector6d& X_start) {
-    std::vector<std::unique_ptr<Trajectory>> made;
-    for (const TrajectoryMaker& part : parts) made.push_back(part(Vector6d::Zero()));
-    return std::make_unique<SumTrajectory>(X_start, std::move(made));
-  };
+std::unique_ptr<Trajectory> MakeSum(const Vector6d& X_start, const std::vector<TrajectoryMaker>& parts) {
+  std::vector<std::unique_ptr<Trajectory>> made;
+  for (const TrajectoryMaker& part : parts) made.push_back(part(Vector6d::Zero()));
+  return MakeSumTrajectory(X_start, std::move(made));
+}
+
+PlanarPath ReadPath(TomlTable& table) {
+  const double heading = ReadHeading(table);
+  const double speed = table.Get("speed").AsNumber();
+  return {heading, speed, ReadRampTime(table)};
 }
 
 TrajectoryMaker ReadByType(TomlTable& table) {
@@ -102,34 +106,30 @@ TrajectoryMaker ReadByType(TomlTable& table) {
   switch (type) {
     case Type::kLine: {
       const Vector6d velocity = ReadCoordinates(table, "velocity", "turning");
-      return MakerOf<LineTrajectory>(velocity, ReadRampTime(table));
+      return MakerOf(MakeLineTrajectory, velocity, ReadRampTime(table));
     }
     case Type::kPointToPoint: {
       const Vector6d displacement = ReadCoordinates(table, "xyz", "zyz");
-      return MakerOf<PointToPointTrajectory>(displacement, table.Get("duration").AsPositive());
+      return MakerOf(MakePointToPointTrajectory, displacement, table.Get("duration").AsPositive());
     }
     case Type::kOscillation: {
       const Vector6d amplitude = ReadCoordinates(table, "xyz", "zyz");
       const double frequency = ReadFrequency(table);
-      return MakerOf<OscillationTrajectory>(amplitude, frequency, ReadRampTime(table));
+      return MakerOf(MakeOscillationTrajectory, amplitude, frequency, ReadRampTime(table));
     }
     case Type::kWeave: {
       const Wave wave = ReadWave(table);
-      const double heading = ReadHeading(table);
-      const double speed = table.Get("speed").AsNumber();
-      return MakerOf<WeaveTrajectory>(heading, speed, ReadRampTime(table), wave.amplitude, wave.wavelength);
+      return MakerOf(MakeWeaveTrajectory, ReadPath(table), wave.amplitude, wave.wavelength);
     }
     case Type::kCircle: {
       const TomlValue radius = table.Get("radius");
       if (radius.AsNumber() == 0.0) radius.Fail("must not be zero");
-      const double heading = ReadHeading(table);
-      const double speed = table.Get("speed").AsNumber();
-      return MakerOf<CircleTrajectory>(heading, speed, ReadRampTime(table), radius.AsNumber());
+      return MakerOf(MakeCircleTrajectory, ReadPath(table), radius.AsNumber());
     }
     case Type::kWayPoints:
-      return MakerOf<WayPointTrajectory>(ReadWayPoints(table));
+      return MakerOf(MakeWayPointTrajectory, ReadWayPoints(table));
     case Type::kSum:
-      return MakerOfSum(ReadParts(table));
+      return MakerOf(MakeSum, ReadParts(table));
   }
   return nullptr;
 }

@@ -15,10 +15,13 @@ void CheckSize(const char* name, Eigen::Index expected, Eigen::Index actual) {
                               " entries expected, got " + std::to_string(actual));
 }
 
+/// Velocities of the joints from the base to this one, counted from the base's.
 std::vector<int> ChainTo(const RobotModel& model, int joint) {
   std::vector<int> chain;
-  for (int i = joint; i >= 0; i = model.joints()[static_cast<size_t>(i)].parent)
-    chain.insert(chain.begin(), i);
+  for (int i = joint; i >= 0; i = model.joints()[static_cast<size_t>(i)].parent) {
+    for (int k = CountVelocities(model.joints()[static_cast<size_t>(i)].type); k-- > 0;)
+      chain.insert(chain.begin(), model.dof(i) + k);
+  }
   return chain;
 }
 
@@ -28,7 +31,7 @@ ModelTerms::ModelTerms(const RobotModel& model, Coordinates coordinates)
     : model_(&model),
       base_size_(coordinates == Coordinates::kReduced ? model.num_base_velocities()
                                                       : model.num_unreduced_base_velocities()),
-      size_(base_size_ + model.num_joints()) {
+      size_(base_size_ + model.num_dofs()) {
   const auto add_mass = [this](const MassProperties& body) {
     // Second moments about the link's origin: P = (tr(I)/2) 1 - I + m c c^T.
     const Matrix3d P = 0.5 * body.inertia.trace() * Matrix3d::Identity() - body.inertia +
@@ -76,13 +79,13 @@ void ModelTerms::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<
   const int joints = model_->num_joints();
   for (int i = 0; i < joints; ++i) {
     const int at = model_->position_index(i);
+    const int rates = base_size_ + model_->dof(i);
     if (places_[static_cast<size_t>(i)].type != JointType::kBall) {
-      SetJointState(i, q[at], velocity[base_size_ + i]);
-      continue;
+      SetJointState(i, q[at], velocity[rates]);
+    } else {
+      const Eigen::Quaterniond turn(q[at], q[at + 1], q[at + 2], q[at + 3]);
+      SetBallState(i, turn.normalized(), velocity.segment<3>(rates));
     }
-    const Eigen::Quaterniond turn(q[at], q[at + 1], q[at + 2], q[at + 3]);
-    SetBallState(i, turn.normalized(), velocity.segment<3>(base_size_ + i));
-    i += 2;
   }
 }
 
@@ -102,7 +105,6 @@ void ModelTerms::SetBaseState(const Eigen::Ref<const VectorXd>& q,
     state.v = base_R_.transpose() * velocity.head<3>();
     state.w = velocity.segment<3>(3);
     SetFloatingColumns();
-    state.v_dot = state.v.cross(state.w);
     return;
   }
   phi_ = q[2];
@@ -123,10 +125,6 @@ void ModelTerms::SetBaseState(const Eigen::Ref<const VectorXd>& q,
   SetBaseColumns(state.v);
   const Vector3d twist(state.v.x(), state.v.y(), state.w.z());
   wheel_rates_ = wheel_map_ * twist;
-  for (int i = 0; i < base_size_; ++i) {
-    state.w_dot += columns_[static_cast<size_t>(i)].w_dot * velocity[i];
-    state.v_dot += columns_[static_cast<size_t>(i)].v_dot * velocity[i];
-  }
 }
 
 void ModelTerms::SetFloatingColumns() {
@@ -207,47 +205,39 @@ void ModelTerms::SetJointState(int joint, double q, double rate) {
   state.p = p_B + place.a * x + d * z;
 
   // The joint's column rides on the parent: S_dot = V_parent x S.
-  Column& column = columns_[static_cast<size_t>(base_size_ + joint)];
+  Column& S = joint_column(joint);
   if (revolute) {
-    column.w = z;
-    column.v = state.p.cross(z);
-    column.w_dot = parent.w.cross(z);
-    column.v_dot = parent.w.cross(column.v) + parent.v.cross(z);
+    S.w = z;
+    S.v = state.p.cross(z);
+    S.w_dot = parent.w.cross(z);
+    S.v_dot = parent.w.cross(S.v) + parent.v.cross(z);
   } else {
-    column.w.setZero();
-    column.v = z;
-    column.w_dot.setZero();
-    column.v_dot = parent.w.cross(z);
+    S.w.setZero();
+    S.v = z;
+    S.w_dot.setZero();
+    S.v_dot = parent.w.cross(z);
   }
-  state.w = parent.w + rate * column.w;
-  state.v = parent.v + rate * column.v;
-  state.w_dot = parent.w_dot + rate * column.w_dot;
-  state.v_dot = parent.v_dot + rate * column.v_dot;
+  state.w = parent.w + rate * S.w;
+  state.v = parent.v + rate * S.v;
 }
 
 void ModelTerms::SetBallState(int joint, const Eigen::Quaterniond& turn, const Vector3d& rates) {
   const JointPlace& place = places_[static_cast<size_t>(joint)];
   const LinkState& parent = link(place.parent);
-  LinkState state;
+  LinkState& state = links_[static_cast<size_t>(joint + 1)];
   state.R = parent.R * place.R_offset * turn.toRotationMatrix();
   state.p = parent.p + parent.R * place.p_offset;
   // The columns ride on the link itself: S_dot = V x S with V = V_parent + sum of rate_k S_k.
   const Vector3d w = state.R * rates;
   state.w = parent.w + w;
   state.v = parent.v + state.p.cross(w);
-  state.w_dot = parent.w_dot;
-  state.v_dot = parent.v_dot;
   for (int k = 0; k < 3; ++k) {
-    Column& column = columns_[static_cast<size_t>(base_size_ + joint + k)];
-    column.w = state.R.col(k);
-    column.v = state.p.cross(column.w);
-    column.w_dot = state.w.cross(column.w);
-    column.v_dot = state.w.cross(column.v) + state.v.cross(column.w);
-    state.w_dot += rates[k] * column.w_dot;
-    state.v_dot += rates[k] * column.v_dot;
+    Column& S = joint_column(joint, k);
+    S.w = state.R.col(k);
+    S.v = state.p.cross(S.w);
+    S.w_dot = state.w.cross(S.w);
+    S.v_dot = state.w.cross(S.v) + state.v.cross(S.w);
   }
-  // The links of the first two entries have no mass, and nothing hangs on them.
-  for (int k = 1; k <= 3; ++k) links_[static_cast<size_t>(joint + k)] = state;
 }
 
 Pose ModelTerms::CalcLinkPose(int joint) const {
@@ -299,18 +289,7 @@ void ModelTerms::CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref
     J_dot.col(dof).tail<3>().noalias() = R_f.transpose() * (column.w_dot - w.cross(column.w));
   };
   for (int i = 0; i < base_size_; ++i) write(i);
-  for (const int joint : frame_chains_[static_cast<size_t>(frame)]) write(base_size_ + joint);
-}
-
-void ModelTerms::CalcFrameMotion(int frame, Vector6d* velocity, Vector6d* bias_acceleration) const {
-  const Frame& f = model_->frames().at(static_cast<size_t>(frame));
-  const LinkState& state = link(f.link);
-  const Vector3d p = state.p + state.R * f.X_LF.translation();
-  const Vector3d p_dot = state.v + state.w.cross(p);
-  velocity->head<3>() = base_R_ * p_dot;
-  velocity->tail<3>() = base_R_ * state.w;
-  bias_acceleration->head<3>() = base_R_ * (state.v_dot + state.w_dot.cross(p) + state.w.cross(p_dot));
-  bias_acceleration->tail<3>() = base_R_ * state.w_dot;
+  for (const int dof : frame_chains_[static_cast<size_t>(frame)]) write(base_size_ + dof);
 }
 
 }  // namespace dexcheck

@@ -78,10 +78,6 @@ class ModelTerms {
   /// they are.
   void CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref<Matrix6Xd> J_dot) const;
 
-  /// Velocity of a frame and J_dot xi (its acceleration when the velocity coordinates do not change), both
-  /// [linear; angular] of the frame's origin in world axes.
-  void CalcFrameMotion(int frame, Vector6d* velocity, Vector6d* bias_acceleration) const;
-
   /// Velocity of a link's frame, [linear; angular] of its origin in world axes, by the index of its joint; -1
   /// is Sigma_0.
   [[nodiscard]] Vector6d CalcLinkVelocity(int joint) const;
@@ -90,22 +86,19 @@ class ModelTerms {
   [[nodiscard]] EnergyAndMomentum CalcEnergyAndMomentum() const;
 
  private:
-  /// Motion of one coordinate's column or of one link: (w, v) and its derivative's columns (w_dot, v_dot).
+  /// One coordinate's column (w, v) and its derivative (w_dot, v_dot).
   struct Column {
     Vector3d w = Vector3d::Zero();
     Vector3d v = Vector3d::Zero();
     Vector3d w_dot = Vector3d::Zero();
     Vector3d v_dot = Vector3d::Zero();
   };
-  /// Where a link is and how it moves: rotation, origin, twist, and twist rate at constant coordinates'
-  /// rates.
+  /// Where a link is and how it moves: rotation, origin, twist.
   struct LinkState {
     Matrix3d R = Matrix3d::Identity();
     Vector3d p = Vector3d::Zero();
     Vector3d w = Vector3d::Zero();
     Vector3d v = Vector3d::Zero();
-    Vector3d w_dot = Vector3d::Zero();
-    Vector3d v_dot = Vector3d::Zero();
   };
   /// Integrals over the mass of a link and all that it carries: of 1, p, p p^T (six entries), p_dot, p_dot
   /// p^T.
@@ -142,8 +135,10 @@ class ModelTerms {
   void SetBaseColumns(const Vector3d& base_linear_velocity);
   void SetFloatingColumns();
   void SetJointState(int joint, double q, double rate);
-  /// Of a ball joint's three entries, from its first one on.
   void SetBallState(int joint, const Eigen::Quaterniond& turn, const Vector3d& rates);
+  [[nodiscard]] Column& joint_column(int joint, int k = 0) {
+    return columns_[static_cast<size_t>(base_size_ + model_->dof(joint) + k)];
+  }
   static MassIntegrals CalcLinkIntegrals(const LinkMass& mass, const LinkState& state);
   void PushColumn(int depth, const Column& column, int dof);
   void FillRowAndColumn(int depth, int dof, const Column& column, const MassIntegrals& subtree);
@@ -156,7 +151,7 @@ class ModelTerms {
 
   std::vector<JointPlace> places_;
   std::vector<LinkMass> masses_;                // base first
-  std::vector<std::vector<int>> frame_chains_;  // per frame: joints from the base outward
+  std::vector<std::vector<int>> frame_chains_;  // per frame: velocities of joints from the base outward
 
   double phi_ = 0.0;
   Vector3d base_position_ = Vector3d::Zero();

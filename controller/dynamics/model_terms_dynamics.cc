@@ -162,15 +162,18 @@ void ModelTerms::CalcDynamics() {
   };
   for (int i = 0; i < base_size_; ++i) fill(i, i, subtrees_[0]);
   for (const int joint : model_->depth_first()) {
-    fill(base_size_ + model_->depth(joint) - 1, base_size_ + joint,
-         subtrees_[static_cast<size_t>(joint + 1)]);
+    const int velocities = CountVelocities(places_[static_cast<size_t>(joint)].type);
+    for (int k = 0; k < velocities; ++k) {
+      fill(base_size_ + model_->depth(joint) - velocities + k, base_size_ + model_->dof(joint) + k,
+           subtrees_[static_cast<size_t>(joint + 1)]);
+    }
   }
   AddWheelsAndRotors();
 }
 
 void ModelTerms::AddWheelsAndRotors() {
-  for (int i = 0; i < model_->num_joints(); ++i) {
-    const Joint& joint = model_->joints()[static_cast<size_t>(i)];
+  for (int i = 0; i < model_->num_dofs(); ++i) {
+    const Joint& joint = model_->joints()[static_cast<size_t>(model_->joint_of_dof(i))];
     const int dof = base_size_ + i;
     M_(dof, dof) += joint.armature;
     friction_[dof] = joint.damping * velocity_[dof];

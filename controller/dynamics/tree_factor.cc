@@ -27,8 +27,14 @@ TreeFactor::TreeFactor(const RobotModel& model) {
   };
   for (int i = 0; i < base; ++i) add(i, i - 1);
   for (int i = 0; i < model.num_joints(); ++i) {
-    const int parent = model.joints()[static_cast<size_t>(i)].parent;
-    add(base + i, parent >= 0 ? base + parent : base - 1);
+    const Joint& joint = model.joints()[static_cast<size_t>(i)];
+    const int first = base + model.dof(i);
+    // The last velocity of what the joint hangs on.
+    const Joint* const parent =
+        joint.parent < 0 ? nullptr : &model.joints()[static_cast<size_t>(joint.parent)];
+    add(first,
+        parent == nullptr ? base - 1 : base + model.dof(joint.parent) + CountVelocities(parent->type) - 1);
+    for (int k = 1; k < CountVelocities(joint.type); ++k) add(first + k, first + k - 1);
   }
   L_.assign(path_.size(), 0.0);
   all_rows_.resize(rows_.size());

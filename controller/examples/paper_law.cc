@@ -19,7 +19,7 @@ class PaperLaw final : public Controller {
         model_(context.model, context.fingertips, context.object, context.surface, context.options),
         actuation_(context.model),
         problem_(static_cast<int>(context.fingertips.size())),
-        solver_(static_cast<int>(context.fingertips.size()), 0, context.options.force) {
+        solver_(static_cast<int>(context.fingertips.size()), context.options.force) {
     problem_.mu.setConstant(options_.mu);
     problem_.f_min.setConstant(options_.f_min);
     problem_.f_max.setConstant(options_.f_max);

@@ -2,13 +2,114 @@
 
 // Four contacts in the interior-point method: what concerns each contact alone. Internal to controller/grasp.
 
+#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 
-#include "controller/grasp/box_bounds.h"
-#include "controller/grasp/lanes.h"
-
 namespace dexcheck::grasp_internal {
+
+inline constexpr int kLanes = 4;
+
+/// One number for each of four contacts.
+using Lanes = Eigen::Array<double, kLanes, 1>;
+
+/// One vector (x0, x1, x2) for each of four contacts.
+using Lanes3 = std::array<Lanes, 3>;
+
+inline Lanes3 ZeroLanes3() { return {Lanes::Zero(), Lanes::Zero(), Lanes::Zero()}; }
+
+inline Lanes CalcDot(const Lanes3& a, const Lanes3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+/// a^T J b with J = diag(1, -1, -1). det x = x^T J x is positive inside the cone {x0 >= |(x1, x2)|}.
+inline Lanes CalcDotJ(const Lanes3& a, const Lanes3& b) { return a[0] * b[0] - a[1] * b[1] - a[2] * b[2]; }
+
+/// Inverse of the longest step along `d` that stays in the cone, from an interior point x with 1/det x given;
+/// not positive if no step leaves it.
+inline Lanes CalcInverseConeStep(const Lanes3& x, const Lanes& inv_det, const Lanes3& d) {
+  // det(x + d / beta) = 0  <=>  beta^2 + 2 p beta + q = 0,  p = x^T J d / det x,  q = det d / det x.
+  const Lanes p = CalcDotJ(x, d) * inv_det;
+  const Lanes q = CalcDotJ(d, d) * inv_det;
+  return (p * p - q).max(0.0).sqrt() - p;
+}
+
+/// Bounds lower <= v <= upper on one scalar of each contact: the slacks v - lower and upper - v, their
+/// multipliers, and the part of the search direction that belongs to them. Complementarity asks slack_lower *
+/// z_lower = slack_upper * z_upper = target.
+class Bounds {
+ public:
+  Lanes slack_lower, slack_upper;
+  Lanes z_lower, z_upper;
+
+  void SetValue(const Lanes& value, const Lanes& lower, const Lanes& upper) {
+    slack_lower = value - lower;
+    slack_upper = upper - value;
+  }
+
+  Lanes CalcGap() const { return slack_lower * z_lower + slack_upper * z_upper; }
+
+  /// Upper bound on target * sum (t - 1 - log t), t = slack * z / target: what these bounds add to the
+  /// duality gap of the barrier problem, since t - 1 - log t <= (t - 1)^2 / t.
+  Lanes CalcBarrierGap(double target) const {
+    const Lanes t_lower = slack_lower * z_lower / target;
+    const Lanes t_upper = slack_upper * z_upper / target;
+    return target *
+           ((t_lower - 1.0) * (t_lower - 1.0) / t_lower + (t_upper - 1.0) * (t_upper - 1.0) / t_upper);
+  }
+
+  /// Prepares the Newton step from the present slacks and multipliers.
+  void CalcScaling() {
+    inv_slack_lower_ = 1.0 / slack_lower;
+    inv_slack_upper_ = 1.0 / slack_upper;
+    curvature_lower_ = z_lower * inv_slack_lower_;
+    curvature_upper_ = z_upper * inv_slack_upper_;
+  }
+
+  /// Curvature that the bounds add to v in the Newton step.
+  Lanes curvature() const { return curvature_lower_ + curvature_upper_; }
+
+  /// Aims the step at slack * z = target.
+  void Aim(double target) {
+    z_aim_lower_ = target * inv_slack_lower_;
+    z_aim_upper_ = target * inv_slack_upper_;
+  }
+
+  /// The same with Mehrotra's second-order correction from the direction last set, in which v moved by dv.
+  void AimCorrected(double target, const Lanes& dv) {
+    z_aim_lower_ = (target - dv * dz_lower_) * inv_slack_lower_;
+    z_aim_upper_ = (target + dv * dz_upper_) * inv_slack_upper_;
+  }
+
+  /// d(z_lower - z_upper) at dv = 0.
+  Lanes CalcFreeMultiplierStep() const { return (z_aim_lower_ - z_lower) - (z_aim_upper_ - z_upper); }
+
+  /// dz from the linearised complementarity z dslack + slack dz = aim - slack z.
+  void SetDirection(const Lanes& dv) {
+    dz_lower_ = z_aim_lower_ - z_lower - curvature_lower_ * dv;
+    dz_upper_ = z_aim_upper_ - z_upper + curvature_upper_ * dv;
+  }
+
+  /// d(z_lower - z_upper) of the direction last set.
+  Lanes CalcMultiplierStep() const { return dz_lower_ - dz_upper_; }
+
+  /// Inverse of the longest step that keeps slacks and multipliers positive.
+  Lanes CalcInverseStep(const Lanes& dv) const {
+    const Lanes primal = (-dv * inv_slack_lower_).max(dv * inv_slack_upper_);
+    return primal.max((-dz_lower_ / z_lower).max(-dz_upper_ / z_upper));
+  }
+
+  void Advance(double step, const Lanes& dv) {
+    slack_lower += step * dv;
+    slack_upper -= step * dv;
+    z_lower += step * dz_lower_;
+    z_upper += step * dz_upper_;
+  }
+
+ private:
+  Lanes inv_slack_lower_, inv_slack_upper_;
+  Lanes curvature_lower_, curvature_upper_;
+  Lanes z_aim_lower_, z_aim_upper_;
+  Lanes dz_lower_, dz_upper_;
+};
 
 /// Problem data, iterate, scaling and search direction of four contacts in the coordinates x = (mu f3, f1,
 /// f2), in which the friction cone (21) is K = {x0 >= |(x1, x2)|}; s in K is the multiplier of the cone, e =
@@ -28,12 +129,8 @@ class ContactPack {
   Lanes upper = Lanes::Ones();
 
   // The iterate.
-  struct Iterate {
-    Lanes3 x, s;
-    BoxBounds<Lanes> bounds;  // of x0
-  };
-  Iterate at;
-  Iterate saved;
+  Lanes3 x, s;
+  Bounds bounds;         // of x0
   Lanes3 dual_residual;  // w e - A^T y - s - (z_lower - z_upper) e
 
   // The scaling and the direction, for the constraint rows.
@@ -46,7 +143,6 @@ class ContactPack {
   void AimCorrected(double target);
   Lanes3 CalcFreeDirection() const;
   Lanes SetDirection(const Lanes3& g);
-  Lanes SetPrimalDirection(const Lanes3& g);
   Lanes CalcBarrierGap(double rho) const;
   Lanes CalcSupport(const Lanes3& g) const;
 
@@ -66,18 +162,16 @@ class ContactPack {
 /// + upper).
 inline void ContactPack::SetCenter(double target) {
   const Lanes mid = 0.5 * (lower + upper);
-  at.x = {mid, Lanes::Zero(), Lanes::Zero()};
-  at.s = {2.0 * target / mid, Lanes::Zero(), Lanes::Zero()};
-  at.bounds.SetValue(mid, lower, upper);
-  at.bounds.z_lower = target / at.bounds.slack_lower;
-  at.bounds.z_upper = at.s[0] + at.bounds.z_lower - w;
+  x = {mid, Lanes::Zero(), Lanes::Zero()};
+  s = {2.0 * target / mid, Lanes::Zero(), Lanes::Zero()};
+  bounds.SetValue(mid, lower, upper);
+  bounds.z_lower = target / bounds.slack_lower;
+  bounds.z_upper = s[0] + bounds.z_lower - w;
 }
 
 /// W, R and K = W R at the present iterate.
 inline void ContactPack::CalcScaling() {
   // u = W e = (x + eta^2 J s) / sqrt(2 (k + x^T s)),  k = sqrt(det x det s) = det lambda,  eta^2 = det x / k.
-  const Lanes3& x = at.x;
-  const Lanes3& s = at.s;
   const Lanes det_x = CalcDotJ(x, x);
   const Lanes det_lambda = (det_x * CalcDotJ(s, s)).sqrt();
   inv_det_lambda_ = det_lambda.inverse();
@@ -96,8 +190,8 @@ inline void ContactPack::CalcScaling() {
   lambda_ = {sum * root, eta_ * s[1] + u_[1] * v_s, eta_ * s[2] + u_[2] * v_s};
 
   // R = I + r u u^T,  r = -d / (q (1 + q)),  q = sqrt(1 + d |u|^2),  R u = u / q.
-  at.bounds.CalcScaling();
-  const Lanes d = at.bounds.curvature();
+  bounds.CalcScaling();
+  const Lanes d = bounds.curvature();
   const Lanes q = (1.0 + d * CalcDot(u_, u_)).sqrt();
   const Lanes inv_q_1q = (q * (1.0 + q)).inverse();
   r_ = -d * inv_q_1q;
@@ -118,7 +212,7 @@ inline void ContactPack::Aim(double target) {
   // aim = lambda \ (2 target e - lambda o lambda) = 2 target J lambda / det lambda - lambda.
   const Lanes ratio = 2.0 * target * inv_det_lambda_;
   aim_ = {(ratio - 1.0) * lambda_[0], -(ratio + 1.0) * lambda_[1], -(ratio + 1.0) * lambda_[2]};
-  at.bounds.Aim(target);
+  bounds.Aim(target);
 }
 
 /// The same with Mehrotra's second-order correction from the direction last set.
@@ -132,7 +226,7 @@ inline void ContactPack::AimCorrected(double target) {
   const Lanes inv_lambda0 = lambda_[0].inverse();
   aim_ = {first - lambda_[0], (rhs[1] - first * lambda_[1]) * inv_lambda0 - lambda_[1],
           (rhs[2] - first * lambda_[2]) * inv_lambda0 - lambda_[2]};
-  at.bounds.AimCorrected(target, dx[0]);
+  bounds.AimCorrected(target, dx[0]);
 }
 
 /// R^-1 dx_scaled for dy = 0.
@@ -144,7 +238,7 @@ inline Lanes3 ContactPack::CalcFreeDirection() const {
   Lanes3 h = {aim_[0] - CalcDot(u_, g), aim_[1] - v_g * u_[1] - eta_ * g[1],
               aim_[2] - v_g * u_[2] - eta_ * g[2]};
   const Lanes along = r_ * CalcDot(u_, h);
-  const Lanes pull = at.bounds.CalcPull();
+  const Lanes pull = bounds.CalcFreeMultiplierStep();
   for (std::size_t j = 0; j < 3; ++j) h[j] += along * u_[j] + pull * K[0][j];
   return h;
 }
@@ -157,26 +251,19 @@ inline Lanes ContactPack::SetDirection(const Lanes3& g) {
     dx_scaled_[j] = g[j] + along * u_[j];
     ds_scaled_[j] = aim_[j] - dx_scaled_[j];
   }
-  at.bounds.SetDirection(dx[0]);
-  return at.bounds.CalcInverseStep(dx[0])
+  bounds.SetDirection(dx[0]);
+  return bounds.CalcInverseStep(dx[0])
       .max(CalcInverseConeStep(lambda_, inv_det_lambda_, dx_scaled_))
       .max(CalcInverseConeStep(lambda_, inv_det_lambda_, ds_scaled_));
-}
-
-/// Sets dx alone; returns the inverse of the longest step for which x stays inside.
-inline Lanes ContactPack::SetPrimalDirection(const Lanes3& g) {
-  for (std::size_t j = 0; j < 3; ++j) dx[j] = CalcDot(K[j], g);
-  return at.bounds.CalcInversePrimalStep(dx[0]).max(
-      CalcInverseConeStep(at.x, CalcDotJ(at.x, at.x).inverse(), dx));
 }
 
 /// What the contact adds, at most, to the distance of the barrier objective from its optimum. With t1, t2 the
 /// eigenvalues of x o s / (2 rho), t1 + t2 = x^T s / rho and t1 t2 = det x det s / (2 rho)^2, that is rho sum
 /// (t - 1 - log t), and t - 1 - log t <= (t - 1)^2 / t.
 inline Lanes ContactPack::CalcBarrierGap(double rho) const {
-  const Lanes sum = CalcDot(at.x, at.s) / rho;
-  const Lanes product = CalcDotJ(at.x, at.x) * CalcDotJ(at.s, at.s) / (4.0 * rho * rho);
-  return rho * (sum - 4.0 + sum / product) + at.bounds.CalcBarrierGap(rho);
+  const Lanes sum = CalcDot(x, s) / rho;
+  const Lanes product = CalcDotJ(x, x) * CalcDotJ(s, s) / (4.0 * rho * rho);
+  return rho * (sum - 4.0 + sum / product) + bounds.CalcBarrierGap(rho);
 }
 
 /// max g^T x over {x in K, lower <= x0 <= upper} = max(lower h, upper h), h = g0 + |(g1, g2)|.

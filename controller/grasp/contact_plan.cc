@@ -8,7 +8,6 @@
 #include "controller/common/text.h"
 #include "controller/grasp/finger_placement.h"
 #include "controller/grasp/hand_reach.h"
-#include "controller/grasp/own_joints.h"
 #include "controller/grasp/palm_search.h"
 #include "controller/grasp/touch_choice.h"
 #include "controller/object/so3.h"
@@ -16,7 +15,6 @@
 namespace dexcheck {
 namespace {
 
-using grasp_internal::HalfSpace;
 using grasp_internal::HandClearance;
 using grasp_internal::HandReach;
 using grasp_internal::PalmPose;
@@ -45,18 +43,8 @@ struct Candidate {
 };
 
 HandClearance MakeClearance(const ContactPlanOptions& options, const Pose& X_BP) {
-  HandClearance clearance;
-  clearance.thickness = options.finger_thickness;
-  clearance.spacing = options.spacing;
-  clearance.room = options.room;
-  clearance.opening = options.opening;
-  clearance.half_length = options.half_length;
-  clearance.support = options.clearance;
-  clearance.steepest = options.steepest;
-  clearance.hemisphere = options.hemisphere;
-  if (options.support) {
-    clearance.above = HalfSpace{options.support->normal, options.support->height}.Transform(X_BP.inverse());
-  }
+  HandClearance clearance{options, std::nullopt};
+  if (options.support) clearance.above = options.support->Transform(X_BP.inverse());
   return clearance;
 }
 

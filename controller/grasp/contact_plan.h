@@ -18,6 +18,13 @@ namespace dexcheck {
 struct SupportPlane {
   Vector3d normal = Vector3d::UnitZ();  ///< Out of the support.
   double height = 0.0;                  ///< normal . x on the plane, m.
+
+  [[nodiscard]] double CalcHeight(const Vector3d& p) const { return normal.dot(p) - height; }
+  /// The same seen from a frame that X_FB places this one's frame in.
+  [[nodiscard]] SupportPlane Transform(const Pose& X_FB) const {
+    const Vector3d turned = X_FB.linear() * normal;
+    return {turned, height + turned.dot(X_FB.translation())};
+  }
 };
 
 /// The hand that is to hold the object.

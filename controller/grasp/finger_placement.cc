@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "controller/dynamics/model_terms.h"
-#include "controller/grasp/own_joints.h"
+#include "controller/grasp/serial_chain.h"
 
 namespace dexcheck {
 

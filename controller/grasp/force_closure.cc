@@ -21,7 +21,7 @@ class WrenchSet {
  public:
   WrenchSet(const Eigen::Ref<const Matrix6Xd>& G, const Eigen::Ref<const VectorXd>& mu,
             const ForceClosureOptions& options)
-      : G_(G), mu_(mu), normalization_(options.normalization) {
+      : G_(G), mu_(mu) {
     G_.bottomRows<3>() /= options.length;
   }
 
@@ -36,29 +36,23 @@ class WrenchSet {
   // The point of W farthest along n. A contact gives most with its force on the cone's boundary, along the
   // tangential part of g = G_i^T n: h_i = g3 + mu |(g1, g2)|, per newton of normal force.
   Vector6d FindFarthest(const Vector6d& n) const {
-    Vector6d sum = Vector6d::Zero();
     Vector6d best = Vector6d::Zero();
     double best_h = 0.0;
     for (Eigen::Index i = 0; i < mu_.size(); ++i) {
       const Vector3d g = G_.middleCols<3>(3 * i).transpose() * n;
       const double tangential = std::hypot(g.x(), g.y());
       const double h = g.z() + mu_[i] * tangential;
-      if (h <= 0.0) continue;
+      if (h <= best_h) continue;
       const double scale = tangential > 0.0 ? mu_[i] / tangential : 0.0;
-      const Vector6d wrench = G_.middleCols<3>(3 * i) * Vector3d(scale * g.x(), scale * g.y(), 1.0);
-      sum += wrench;
-      if (h > best_h) {
-        best_h = h;
-        best = wrench;
-      }
+      best_h = h;
+      best = G_.middleCols<3>(3 * i) * Vector3d(scale * g.x(), scale * g.y(), 1.0);
     }
-    return normalization_ == ForceNormalization::kTotalNormal ? best : sum;
+    return best;
   }
 
  private:
   Matrix6Xd G_;
   VectorXd mu_;
-  ForceNormalization normalization_;
 };
 
 void RequireValid(const Eigen::Ref<const Matrix6Xd>& G, const Eigen::Ref<const VectorXd>& mu,
@@ -140,12 +134,6 @@ ForceClosureResult CalcForceClosure(const Eigen::Ref<const Matrix6Xd>& G,
   result.direction = weakest;
   result.direction.tail<3>() *= options.length;
   return result;
-}
-
-double CalcWrenchSupport(const Eigen::Ref<const Matrix6Xd>& G, const Eigen::Ref<const VectorXd>& mu,
-                         const Vector6d& n, const ForceClosureOptions& options) {
-  RequireValid(G, mu, options);
-  return n.dot(WrenchSet(G, mu, options).FindFarthest(n));
 }
 
 }  // namespace dexcheck

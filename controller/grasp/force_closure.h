@@ -6,12 +6,6 @@
 
 namespace dexcheck {
 
-/// What limits the contact forces when a grasp's margin is measured.
-enum class ForceNormalization {
-  kTotalNormal,    ///< sum_i f_i3 <= 1: the hand has one budget of normal force for all contacts.
-  kLargestNormal,  ///< f_i3 <= 1 for each i: every finger has its own.
-};
-
 enum class ForceClosureStatus {
   kForceClosure,     ///< Every wrench can be resisted: margin_lower > 0.
   kNotForceClosure,  ///< `direction` cannot be resisted at all.
@@ -19,15 +13,15 @@ enum class ForceClosureStatus {
 };
 
 struct ForceClosureOptions {
-  ForceNormalization normalization = ForceNormalization::kTotalNormal;
   double length = 0.05;     ///< Characteristic length, m: a moment counts as the force moment / length.
   double tolerance = 0.02;  ///< Relative width of [margin_lower, margin] at which to stop.
   double zero = 1e-9;       ///< Margins up to this count as none.
   int max_vertices = 2000;  ///< Points of the inner polytope.
 };
 
-/// The largest ball of wrenches [force; moment / length] that normalised contact forces can give. Margins are
-/// per newton of normal force, without unit.
+/// The largest ball of wrenches [force; moment / length] that normalised contact forces can give, sum_i f_i3
+/// <= 1: the hand has one budget of normal force for all contacts. Margins are per newton of it, without
+/// unit.
 struct ForceClosureResult {
   ForceClosureStatus status = ForceClosureStatus::kUndecided;
   double margin = 0.0;  ///< Largest resisted wrench in `direction`: an upper bound on the ball's radius.
@@ -50,11 +44,5 @@ struct ForceClosureResult {
 ForceClosureResult CalcForceClosure(const Eigen::Ref<const Matrix6Xd>& G,
                                     const Eigen::Ref<const VectorXd>& mu,
                                     const ForceClosureOptions& options = {});
-
-/// Support function of the set of wrenches of normalised contact forces: the largest n^T [force; moment /
-/// length] over it, for the functional n (6) on scaled wrenches. The ball's radius is its minimum over the
-/// unit sphere.
-double CalcWrenchSupport(const Eigen::Ref<const Matrix6Xd>& G, const Eigen::Ref<const VectorXd>& mu,
-                         const Vector6d& n, const ForceClosureOptions& options);
 
 }  // namespace dexcheck

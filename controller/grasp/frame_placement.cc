@@ -4,7 +4,6 @@
 
 #include "controller/common/errors.h"
 #include "controller/grasp/serial_chain.h"
-#include "controller/grasp/spread_points.h"
 #include "controller/object/so3.h"
 
 namespace dexcheck {

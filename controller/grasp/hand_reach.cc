@@ -8,8 +8,6 @@
 
 #include "controller/common/errors.h"
 #include "controller/contact/fingertip_rim.h"
-#include "controller/grasp/own_joints.h"
-#include "controller/grasp/spread_points.h"
 
 namespace dexcheck::grasp_internal {
 namespace {
@@ -37,11 +35,6 @@ std::vector<Vector3d> ListPoints(const SerialChain::Poses& poses) {
 }
 
 }  // namespace
-
-HalfSpace HalfSpace::Transform(const Pose& X_FB) const {
-  const Vector3d turned = X_FB.linear() * normal;
-  return {turned, height + turned.dot(X_FB.translation())};
-}
 
 double CalcDistance(const Surface& object, const Vector3d& p) {
   try {
@@ -104,14 +97,14 @@ std::optional<Touch> HandReach::FindTouch(size_t finger_index, const Surface& ob
   if (!object.Contains(alpha, finger.radius)) return {};
   const SurfaceGeometry surface = object.Evaluate(alpha);
   const Vector3d n = surface.R.col(2);
-  if (std::abs(surface.p.z()) > clearance.half_length) return {};
+  if (std::abs(surface.p.z()) > clearance.options.half_length) return {};
   // The fingertip must come from somewhere.
-  const double away = finger.radius + clearance.room;
+  const double away = finger.radius + clearance.options.room;
   if (clearance.above) {
     const double slope = clearance.above->normal.dot(X_Po.linear() * n);
-    if (std::abs(slope) > std::sin(clearance.steepest)) return {};
+    if (std::abs(slope) > std::sin(clearance.options.steepest)) return {};
     const double height = clearance.above->CalcHeight(X_Po * Vector3d(surface.p + away * n));
-    if (height < finger.radius + clearance.support) return {};
+    if (height < finger.radius + clearance.options.clearance) return {};
   }
   if (CalcDistance(object, surface.p + away * n) < kNearlyAll * away) return {};
 
@@ -125,7 +118,7 @@ std::optional<Touch> HandReach::FindTouch(size_t finger_index, const Surface& ob
   };
   const ChainSolution solution = solve(finger.radius, q_start);
   if (!solution.reached) return {};
-  const ChainSolution open = solve(finger.radius + clearance.opening, solution.q);
+  const ChainSolution open = solve(finger.radius + clearance.options.opening, solution.q);
   if (!open.reached) return {};
 
   Touch touch;
@@ -134,13 +127,16 @@ std::optional<Touch> HandReach::FindTouch(size_t finger_index, const Surface& ob
   touch.points = ListPoints(poses);
   // The object's outward normal points into the fingertip.
   const Vector3d p_f = -(poses.frame.linear().transpose() * (X_Po.linear() * n));
-  if (clearance.hemisphere && CalcRimDistance(finger.radius, *clearance.hemisphere, p_f) < 0.0) return {};
+  if (clearance.options.hemisphere &&
+      CalcRimDistance(finger.radius, *clearance.options.hemisphere, p_f) < 0.0)
+    return {};
   const Pose X_oP = X_Po.inverse();
-  const double thick = clearance.thickness * finger.radius;
+  const double thick = clearance.options.finger_thickness * finger.radius;
   for (size_t k = 0; k < touch.points.size(); ++k) {
     const bool is_tip = k + 1 == touch.points.size();
     const double radius = is_tip ? finger.radius : thick;
-    if (clearance.above && clearance.above->CalcHeight(touch.points[k]) < radius + clearance.support)
+    if (clearance.above &&
+        clearance.above->CalcHeight(touch.points[k]) < radius + clearance.options.clearance)
       return {};
     if (!is_tip && CalcDistance(object, X_oP * touch.points[k]) < thick) return {};
   }
@@ -184,10 +180,11 @@ std::vector<Touch> HandReach::ListTouches(size_t finger_index, const Surface& ob
 
 bool HandReach::AreApart(size_t finger_a, const Touch& a, size_t finger_b, const Touch& b,
                          const HandClearance& clearance) const {
-  const double tips = fingers_[finger_a].radius + fingers_[finger_b].radius + clearance.spacing;
+  const double tips = fingers_[finger_a].radius + fingers_[finger_b].radius + clearance.options.spacing;
   if ((a.points.back() - b.points.back()).squaredNorm() < tips * tips) return false;
   const double tubes =
-      clearance.thickness * (fingers_[finger_a].radius + fingers_[finger_b].radius) + clearance.spacing;
+      clearance.options.finger_thickness * (fingers_[finger_a].radius + fingers_[finger_b].radius) +
+      clearance.options.spacing;
   for (const Vector3d& p : a.points) {
     for (const Vector3d& q : b.points) {
       if ((p - q).squaredNorm() < tubes * tubes) return false;

@@ -2,40 +2,22 @@
 
 // Where the fingers of a hand can touch an object. Internal to controller/grasp.
 
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "controller/common/types.h"
 #include "controller/contact/surface.h"
+#include "controller/grasp/contact_plan.h"
 #include "controller/grasp/serial_chain.h"
 #include "controller/model/robot_model.h"
 
 namespace dexcheck::grasp_internal {
 
-/// A half space {x: normal . x >= height} that something must stay in; |normal| = 1.
-struct HalfSpace {
-  Vector3d normal = Vector3d::UnitZ();
-  double height = 0.0;  // m
-
-  [[nodiscard]] double CalcHeight(const Vector3d& p) const { return normal.dot(p) - height; }
-  /// The same seen from a frame that X_FB places this one's frame in.
-  [[nodiscard]] HalfSpace Transform(const Pose& X_FB) const;
-};
-
-/// What the fingers keep clear of. Fingers count as tubes as thick as `thickness` times their fingertips.
+/// What the fingers keep clear of.
 struct HandClearance {
-  double thickness = 0.8;
-  double spacing = 0.0;  // m, between fingers
-  double room = 0.0;     // m, free way of a fingertip out from the object along its normal
-  double opening = 0.0;  // m, that a finger can open along the normal
-  double half_length = std::numeric_limits<double>::infinity();  // m, of contacts along the object's z
-  double support = 0.0;                                          // m, between fingers and the support
-  double steepest = 0.0;           // rad, of contacts' normals above the support
-  std::optional<HalfSpace> above;  // in the palm frame
-  /// Of hemispherical fingertips, in their frames: they touch within the rim alone.
-  std::optional<Vector3d> hemisphere;
+  const ContactPlanOptions& options;
+  std::optional<SupportPlane> above;  // the support in the palm frame
 };
 
 /// One way in which a finger can touch the object.

@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "controller/common/errors.h"
-#include "controller/grasp/spread_points.h"
 
 namespace dexcheck::grasp_internal {
 namespace {
@@ -13,10 +12,6 @@ namespace {
 constexpr int kRolls = 12;
 // Of the object from the fingers' bases, over the fingers' length; of a given place, the first stands for it.
 constexpr std::array<double, 5> kDistances = {0.7, 0.55, 0.62, 0.78, 0.86};
-
-double CalcHeight(const SupportPlane& support, const Vector3d& p) {
-  return support.normal.dot(p) - support.height;
-}
 
 /// Where the palm's z axis may point: down on a support, with up to 50 degrees of tilt, or anywhere.
 std::vector<Vector3d> ListDirections(const Pose& X_Bo, const ContactPlanOptions& options) {
@@ -85,7 +80,7 @@ bool PalmSearch::IsPalmClear(const Pose& X_BP) const {
   return std::all_of(points.begin(), points.end(), [&](const Vector3d& p) {
     return CalcDistance(object_, X_oP * p) >= reach_.radius(0) &&
            (!options_.support ||
-            CalcHeight(*options_.support, X_BP * p) >= reach_.radius(0) + options_.clearance);
+            options_.support->CalcHeight(X_BP * p) >= reach_.radius(0) + options_.clearance);
   });
 }
 
@@ -94,7 +89,7 @@ bool PalmSearch::IsArmClear(const VectorXd& q_arm) const {
   SerialChain::Poses poses;
   arm_.CalcPoses(q_arm, &poses);
   return std::all_of(poses.links.begin(), poses.links.end(), [&](const Pose& link) {
-    return CalcHeight(*options_.support, link.translation()) >= options_.arm_clearance;
+    return options_.support->CalcHeight(link.translation()) >= options_.arm_clearance;
   });
 }
 

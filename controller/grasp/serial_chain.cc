@@ -7,10 +7,34 @@
 #include <stdexcept>
 
 #include "controller/common/errors.h"
-#include "controller/grasp/own_joints.h"
 #include "controller/object/so3.h"
 
 namespace dexcheck::grasp_internal {
+
+std::vector<int> ListChain(const RobotModel& model, int frame) {
+  std::vector<int> chain;
+  int joint = model.frames().at(static_cast<size_t>(frame)).link;
+  for (; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent) chain.push_back(joint);
+  std::reverse(chain.begin(), chain.end());
+  return chain;
+}
+
+std::vector<std::vector<int>> ListOwnJoints(const RobotModel& model, std::span<const int> fingertips) {
+  std::vector<int> users(static_cast<size_t>(model.num_joints()), 0);
+  for (const int frame : fingertips) {
+    for (const int joint : ListChain(model, frame)) ++users[static_cast<size_t>(joint)];
+  }
+  std::vector<std::vector<int>> own(fingertips.size());
+  for (size_t i = 0; i < fingertips.size(); ++i) {
+    std::vector<int> chain = ListChain(model, fingertips[i]);
+    std::reverse(chain.begin(), chain.end());
+    for (const int joint : chain) {
+      if (users[static_cast<size_t>(joint)] == 1) own[i].push_back(joint);
+    }
+    if (own[i].empty()) throw std::invalid_argument("fingertips: a finger has no joints of its own");
+  }
+  return own;
+}
 
 SerialChain::SerialChain(const RobotModel& model, int frame, std::span<const int> joints,
                          const Eigen::Ref<const VectorXd>& q)
@@ -255,6 +279,21 @@ ChainSolution SolveChain(const SerialChain& chain, const ChainTarget& target, co
 
 double CalcRangeMargin(const VectorXd& q, const VectorXd& lower, const VectorXd& upper) {
   return std::min((q - lower).minCoeff(), (upper - q).minCoeff());
+}
+
+VectorXd CalcSpreadPoint(int index, const VectorXd& lower, const VectorXd& upper) {
+  const Eigen::Index n = lower.size();
+  double phi = 2.0;
+  constexpr int kIterations = 40;
+  for (int i = 0; i < kIterations; ++i) phi = std::pow(1.0 + phi, 1.0 / static_cast<double>(n + 1));
+  VectorXd point(n);
+  double step = 1.0;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    step /= phi;
+    const double x = 0.5 + step * index;
+    point[k] = lower[k] + (x - std::floor(x)) * (upper[k] - lower[k]);
+  }
+  return point;
 }
 
 }  // namespace dexcheck::grasp_internal

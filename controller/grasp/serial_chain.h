@@ -12,6 +12,13 @@
 
 namespace dexcheck::grasp_internal {
 
+/// Joints on the chain from the base to a frame, the base's side first.
+std::vector<int> ListChain(const RobotModel& model, int frame);
+
+/// For each fingertip the joints that move it and no other one of them, the fingertip's side first.
+/// @throws std::invalid_argument when one has none.
+std::vector<std::vector<int>> ListOwnJoints(const RobotModel& model, std::span<const int> fingertips);
+
 /// The chain from the base to a frame with some of its joints free and all others held.
 class SerialChain {
  public:
@@ -82,5 +89,9 @@ ChainSolution SolveChain(const SerialChain& chain, const ChainTarget& target, co
 
 /// Smallest distance of an entry from the ends of its range; negative outside.
 double CalcRangeMargin(const VectorXd& q, const VectorXd& lower, const VectorXd& upper);
+
+/// The index-th point (from 1 on) of the additive recurrence x_k = frac(1/2 + index / phi^k), scaled to the
+/// box; phi > 1 solves phi^(n+1) = phi + 1 for n coordinates, of which the golden ratio is the case n = 1.
+VectorXd CalcSpreadPoint(int index, const VectorXd& lower, const VectorXd& upper);
 
 }  // namespace dexcheck::grasp_internal

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "controller/grasp/spread_points.h"
-
 namespace dexcheck::grasp_internal {
 
 TouchChooser::TouchChooser(const HandReach& hand, double mu, double length, TouchScore score)

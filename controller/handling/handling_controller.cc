@@ -1,7 +1,5 @@
 #include "controller/handling/handling_controller.h"
 
-#include <chrono>
-
 #include "controller/control/object_tracking.h"
 
 namespace dexcheck {
@@ -14,12 +12,8 @@ HandlingController::HandlingController(const RobotModel& model, std::span<const 
       object_(object),
       surface_(&surface),
       options_(options),
-      problem_(static_cast<int>(fingertips.size())),
-      solver_(static_cast<int>(fingertips.size()), 0, options.force) {
-  problem_.mu.setConstant(options.mu);
-  problem_.f_max.setConstant(options.f_max);
+      force_(static_cast<int>(fingertips.size()), options) {
   f_c_.setZero(3 * static_cast<Eigen::Index>(fingertips.size()));
-  f_grip_ = f_c_;
   xi_dot_d_.setZero(model.num_velocities());
   const ContactSet all = AllContacts(static_cast<int>(fingertips_.size()));
   FindLaw(all, false);
@@ -66,26 +60,14 @@ const VectorXd& HandlingController::CalcTorque(const GraspModel& terms, const Me
   }
   if (demand.grip > 0.0) {
     Require(demand.contacts == all, "grip", "must be zero without all contacts", demand.grip);
-    CalcGripForce(grasp, V_Bo_dot_, demand);
-    law.f_c += demand.grip * f_grip_;
+    const ObjectBodyTerms& body = grasp.body();
+    const Vector6d F_o =
+        demand.scale * (body.M_hat * V_Bo_dot_ + body.C_hat * grasp.V_Bo()) + demand.weight * body.N_o;
+    law.f_c += demand.grip * force_.Solve(grasp, F_o, demand.f_min);
+    force_seconds_ = force_.seconds();
   }
   law.grasp.Scatter(law.f_c, f_c_);
   return law.torque.CalcTorqueWithForces(grasp, law.f_c);
-}
-
-void HandlingController::CalcGripForce(const GraspTerms& terms, const Vector6d& V_Bo_dot,
-                                       const HandlingDemand& demand) {
-  const ObjectBodyTerms& body = terms.body();
-  problem_.G = terms.G();
-  problem_.F_o =
-      demand.scale * (body.M_hat * V_Bo_dot + body.C_hat * terms.V_Bo()) + demand.weight * body.N_o;
-  problem_.f_min.setConstant(demand.f_min);
-  if (!problem_.F_o.allFinite()) throw GraspForceError("the demanded forces are not finite");
-  const auto begin = std::chrono::steady_clock::now();
-  const GraspForceResult& result = solver_.Solve(problem_);
-  force_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  RequireGraspForce(result);
-  f_grip_ = result.f_c;
 }
 
 }  // namespace dexcheck

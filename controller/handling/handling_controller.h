@@ -74,7 +74,6 @@ class HandlingController {
     VectorXd f_c;
   };
   Law& FindLaw(ContactSet set, bool by_inertia);
-  void CalcGripForce(const GraspTerms& terms, const Vector6d& V_Bo_dot, const HandlingDemand& demand);
 
   const RobotModel* model_;
   std::vector<int> fingertips_;
@@ -82,12 +81,10 @@ class HandlingController {
   const Surface* surface_;
   GraspControllerOptions options_;
   std::map<std::pair<ContactSet, bool>, std::unique_ptr<Law>> laws_;
-  GraspForceProblem problem_;
-  GraspForceSolver solver_;
+  GraspForceStage force_;
   Vector6d V_Bo_dot_ = Vector6d::Zero();
   VectorXd xi_dot_d_;  // n
   VectorXd f_c_;       // 3N
-  VectorXd f_grip_;    // 3N
   double force_seconds_ = 0.0;
 };
 

@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "controller/control/contact_set.h"
 #include "controller/control/grasp_terms.h"
 #include "controller/control/measured_state.h"
 

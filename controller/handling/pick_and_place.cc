@@ -5,7 +5,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/grasp/own_joints.h"
+#include "controller/grasp/serial_chain.h"
 #include "controller/object/euler_zyz.h"
 
 namespace dexcheck {

@@ -124,10 +124,7 @@ class SpecChecker {
     CheckFinite(key + "d", joint.mdh.d);
     CheckFinite(key + "range", joint.lower);
     CheckFinite(key + "range", joint.upper);
-    if (joint.type == JointType::kBall) CheckBall(key, joint, index);
-    Check(joint.parent < 0 || IsEndOfJoint(spec_.joints[static_cast<size_t>(joint.parent)]) ||
-              (joint.type == JointType::kBall && joint.ball_axis > 0),
-          key + "parent", "must not be within a ball joint, index", joint.parent);
+    if (joint.type == JointType::kBall) CheckBall(key, joint);
     Check(joint.lower <= joint.upper, key + "range",
           "lower limit must not exceed upper limit " + FormatNumber(joint.upper), joint.lower);
     CheckNotNegative(key + "damping", joint.damping);
@@ -137,47 +134,20 @@ class SpecChecker {
     CheckLink("link " + Quote(joint.link), joint.body);
   }
 
-  static bool IsEndOfJoint(const Joint& joint) {
-    return joint.type != JointType::kBall || joint.ball_axis == 2;
-  }
-
-  void CheckBall(const std::string& key, const Joint& joint, int index) const {
-    Check(0 <= joint.ball_axis && joint.ball_axis <= 2, key + "axis", "must be 0, 1 or 2", joint.ball_axis);
+  void CheckBall(const std::string& key, const Joint& joint) const {
     Check(joint.lower == 0.0, key + "range", "must begin at 0 for a ball joint", joint.lower);
     const MdhRow& row = joint.mdh;
     Check(row.alpha == 0.0 && row.a == 0.0 && row.q == 0.0 && row.d == 0.0, key + "row",
           "must be a plain transform for a ball joint, zeros", row.alpha + row.a + row.q + row.d);
     if (joint.coupling) Fail(key + "mimic", "must not be given for a ball joint");
-    const auto has_axis = [&](int other, int axis) {
-      const auto count = static_cast<int>(spec_.joints.size());
-      return other >= 0 && other < count &&
-             spec_.joints[static_cast<size_t>(other)].type == JointType::kBall &&
-             spec_.joints[static_cast<size_t>(other)].ball_axis == axis;
-    };
-    if (joint.ball_axis < 2) {
-      Check(has_axis(index + 1, joint.ball_axis + 1), key + "axis",
-            "must be followed by the ball's next axis", joint.ball_axis);
-      Check(joint.body.mass == 0.0, key + "mass", "must be that of the ball's last entry alone, 0 here",
-            joint.body.mass);
-    }
-    if (joint.ball_axis == 0) return;
-    Check(has_axis(index - 1, joint.ball_axis - 1) && joint.parent == index - 1, key + "parent",
-          "must be the ball's axis before", joint.parent);
-    Check(joint.X_PB.isApprox(Pose::Identity(), 0.0), key + "pose", "must be that of the ball's first entry",
-          joint.X_PB.translation().norm());
   }
 
   void CheckCoupling(const std::string& key, const JointCoupling& coupling, int index) const {
     const bool is_joint = 0 <= coupling.leader && coupling.leader < static_cast<int>(spec_.joints.size());
     Check(is_joint && coupling.leader != index, key, "must be another joint, index of one", coupling.leader);
-    if (spec_.joints[static_cast<size_t>(coupling.leader)].type == JointType::kBall) {
-      Fail(key,
-           "must be no ball joint, got " + Quote(spec_.joints[static_cast<size_t>(coupling.leader)].name));
-    }
-    if (spec_.joints[static_cast<size_t>(coupling.leader)].coupling) {
-      Fail(key, "must be a joint that follows none, got " +
-                    Quote(spec_.joints[static_cast<size_t>(coupling.leader)].name));
-    }
+    const Joint& leader = spec_.joints[static_cast<size_t>(coupling.leader)];
+    if (leader.type == JointType::kBall) Fail(key, "must be no ball joint, got " + Quote(leader.name));
+    if (leader.coupling) Fail(key, "must be a joint that follows none, got " + Quote(leader.name));
     CheckFinite(key + ".multiplier", coupling.multiplier);
     CheckFinite(key + ".offset", coupling.offset);
   }
@@ -235,34 +205,19 @@ const char* NameOf(JointType type) {
   return type == JointType::kPrismatic ? "prismatic" : "revolute";
 }
 
-std::string NameInFile(const Joint& joint) {
-  constexpr size_t kSuffix = 2;  // ":x"
-  return joint.type == JointType::kBall ? joint.name.substr(0, joint.name.size() - kSuffix) : joint.name;
-}
-
-Joint MakeBallEntry(const Joint& ball, int axis, int parent) {
-  Joint entry = ball;
-  entry.type = JointType::kBall;
-  entry.ball_axis = axis;
-  entry.name += std::string(":") + "xyz"[axis];
-  entry.parent = parent;
-  if (axis < 2) entry.link = ball.link + ":" + entry.name;
-  if (axis < 2) entry.body = MassProperties{};
-  if (axis > 0) entry.X_PB = Pose::Identity();
-  return entry;
-}
-
 RobotModel::RobotModel(RobotSpec spec) : spec_(std::move(spec)) {
   SpecChecker(spec_).CheckAll();
   depth_first_ = SortDepthFirst(spec_.joints);
-  for (const Joint& joint : spec_.joints) {
-    depth_.push_back(joint.parent < 0 ? 1 : depth(joint.parent) + 1);
+  num_positions_ = num_base_positions();
+  for (int i = 0; i < num_joints(); ++i) {
+    const Joint& joint = spec_.joints[static_cast<size_t>(i)];
+    const int velocities = CountVelocities(joint.type);
+    depth_.push_back((joint.parent < 0 ? 0 : depth(joint.parent)) + velocities);
     max_depth_ = std::max(max_depth_, depth_.back());
-    // A ball's second and third entry have the quaternion of the first.
-    const bool fractions = joint.type == JointType::kBall && joint.ball_axis > 0;
-    const int after = num_base_positions() + static_cast<int>(position_indices_.size()) + num_balls_;
-    position_indices_.push_back(fractions ? position_indices_.back() : after);
-    if (joint.type == JointType::kBall && joint.ball_axis == 2) ++num_balls_;
+    position_indices_.push_back(num_positions_);
+    num_positions_ += CountPositions(joint.type);
+    dofs_.push_back(num_dofs());
+    dof_joints_.insert(dof_joints_.end(), static_cast<size_t>(velocities), i);
   }
   for (size_t i = 0; i < spec_.frames.size(); ++i) {
     if (spec_.frames[i].sphere_radius) fingertips_.push_back(static_cast<int>(i));
@@ -304,6 +259,13 @@ Pose RobotModel::CalcBasePose(const Eigen::Ref<const VectorXd>& q) const {
   return X_B0;
 }
 
+std::string RobotModel::dof_name(int dof) const {
+  const int joint = joint_of_dof(dof);
+  const Joint& owner = spec_.joints[static_cast<size_t>(joint)];
+  if (owner.type != JointType::kBall) return owner.name;
+  return owner.name + ":" + "xyz"[dof - this->dof(joint)];
+}
+
 int RobotModel::FindJoint(std::string_view name) const {
   return FindByName(spec_.joints, &Joint::name, name);
 }
@@ -328,8 +290,8 @@ const std::string& RobotModel::link_name(int joint) const {
 void RequireNoBalls(const RobotModel& model, const std::string& where) {
   for (const Joint& joint : model.joints()) {
     if (joint.type != JointType::kBall) continue;
-    throw InputError(model.spec().source + ": joint " + Quote(NameInFile(joint)) +
-                     ": must not be a ball joint " + where);
+    throw InputError(model.spec().source + ": joint " + Quote(joint.name) + ": must not be a ball joint " +
+                     where);
   }
 }
 

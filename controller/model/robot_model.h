@@ -60,12 +60,16 @@ struct Base {
 enum class JointType {
   kRevolute,
   kPrismatic,
-  /// A third of a ball joint, whose three entries follow each other (ball_axis 0, 1, 2), each the next one's
-  /// parent; the first two have links without mass. All share one quaternion of q', which turns the third
-  /// one's frame i from the first one's X_PB; their rates are the components of the link's angular velocity
-  /// against the parent, along the link's own axes. Range: of the angle of that turn, from 0.
+  /// Turns about all axes. Of q' it has a unit quaternion qw qx qy qz, which turns frame i from X_PB; of xi
+  /// the components of the link's angular velocity against the parent, along the link's own axes. Its MDH row
+  /// is zeros. Range: of the angle of that turn, from 0.
   kBall,
 };
+
+/// Entries of q' that a joint has: four of a ball joint, else one.
+constexpr int CountPositions(JointType type) { return type == JointType::kBall ? 4 : 1; }
+/// Entries of xi that a joint has: three of a ball joint, else one.
+constexpr int CountVelocities(JointType type) { return type == JointType::kBall ? 3 : 1; }
 
 /// "revolute", "prismatic", "ball": as files and programs say it.
 const char* NameOf(JointType type);
@@ -84,7 +88,6 @@ struct Joint {
   std::string link;
   int parent = -1;  ///< Index of the joint that moves the parent link; -1 is the base.
   JointType type = JointType::kRevolute;
-  int ball_axis = 0;             ///< Of a kBall alone: x, y or z of frame i.
   Pose X_PB = Pose::Identity();  ///< Where the MDH row starts, in the parent link's frame.
   MdhRow mdh;
   double lower = 0.0;  ///< Range of q_i, rad or m.
@@ -98,13 +101,6 @@ struct Joint {
   double dry_friction = 0.0;  ///< Coulomb friction, N m or N.
   std::optional<JointCoupling> coupling;
 };
-
-/// What a file calls the joint: of a ball joint's entries "name:x", "name:y", "name:z" the name.
-std::string NameInFile(const Joint& joint);
-
-/// The entry of a ball joint about one of its axes, by the joint's name, as a file has it, and its link's. It
-/// gets the place and the body that `ball` has where they belong.
-Joint MakeBallEntry(const Joint& ball, int axis, int parent);
 
 /// A frame fixed to a link; a fingertip when it carries a sphere.
 struct Frame {
@@ -155,13 +151,21 @@ class RobotModel {
   [[nodiscard]] int num_base_velocities() const;
   /// Entries of the base's velocity in unreduced coordinates: of q_v_dot, or of v for a floating base.
   [[nodiscard]] int num_unreduced_base_velocities() const;
-  /// p', entries of q': 51 for the paper's robot. A ball joint has four, qw qx qy qz.
-  [[nodiscard]] int num_positions() const { return num_base_positions() + num_joints() + num_balls_; }
-  [[nodiscard]] int num_balls() const { return num_balls_; }
-  /// Where q' has a joint's position: q_i, or the quaternion that a ball joint's entries share.
-  [[nodiscard]] int position_index(int joint) const { return position_indices_[static_cast<size_t>(joint)]; }
+  /// Velocities of all joints of the tree, which follow the base's in xi and q_dot'.
+  [[nodiscard]] int num_dofs() const { return static_cast<int>(dof_joints_.size()); }
+  /// p', entries of q': 51 for the paper's robot.
+  [[nodiscard]] int num_positions() const { return num_positions_; }
   /// p' - r, entries of xi: 50 for the paper's robot.
-  [[nodiscard]] int num_velocities() const { return num_base_velocities() + num_joints(); }
+  [[nodiscard]] int num_velocities() const { return num_base_velocities() + num_dofs(); }
+  /// First entry of q' that a joint has.
+  [[nodiscard]] int position_index(int joint) const { return position_indices_[static_cast<size_t>(joint)]; }
+  /// First velocity that a joint has, counted from the base's: xi has it at num_base_velocities() +
+  /// dof(joint).
+  [[nodiscard]] int dof(int joint) const { return dofs_[static_cast<size_t>(joint)]; }
+  /// The joint that has a velocity, counted from the base's.
+  [[nodiscard]] int joint_of_dof(int dof) const { return dof_joints_[static_cast<size_t>(dof)]; }
+  /// Name of a velocity, counted from the base's: the joint's, of a ball joint "name:x", "name:y", "name:z".
+  [[nodiscard]] std::string dof_name(int dof) const;
 
   /// Index of a joint by name; -1 when there is none.
   [[nodiscard]] int FindJoint(std::string_view name) const;
@@ -175,10 +179,10 @@ class RobotModel {
   /// Name of a link by the index of its joint; -1 is the base's link.
   [[nodiscard]] const std::string& link_name(int joint) const;
 
-  /// Joints in depth-first order, children in declared order. Writing each joint to entry depth - 1 of an
-  /// array keeps its whole chain to the base in the entries before it.
+  /// Joints in depth-first order, children in declared order. Writing each joint's velocities to the entries
+  /// that end at depth - 1 of an array keeps its whole chain to the base in the entries before them.
   [[nodiscard]] std::span<const int> depth_first() const { return depth_first_; }
-  /// Number of joints from the base to this one, itself included.
+  /// Number of velocities of the joints from the base to this one, itself included.
   [[nodiscard]] int depth(int joint) const { return depth_[static_cast<size_t>(joint)]; }
   [[nodiscard]] int max_depth() const { return max_depth_; }
 
@@ -194,8 +198,9 @@ class RobotModel {
   std::vector<int> depth_first_;
   std::vector<int> depth_;
   int max_depth_ = 0;
-  int num_balls_ = 0;
-  std::vector<int> position_indices_;
+  int num_positions_ = 0;
+  std::vector<int> position_indices_, dofs_;  // by joint
+  std::vector<int> dof_joints_;
   MassProperties base_with_wheels_;
 };
 

@@ -227,11 +227,10 @@ class TreeReader {
     if (row.type == JointType::kBall && entry.mimic) {
       entry.mimic->joint.Fail("must not be given for a ball joint");
     }
-    if (row.type == JointType::kBall) return BuildBall(chain, row, parent, X_LB, entry, link);
     const int index = static_cast<int>(spec_.joints.size());
     const bool is_plain = !row.X_before.isApprox(Pose::Identity(), 0.0);
     const bool has_own_frame = !row.written.X_iL.isApprox(Pose::Identity(), 0.0);
-    spec_.joints.push_back({chain.prefix + row.joint, chain.prefix + row.link, parent, row.type, 0,
+    spec_.joints.push_back({chain.prefix + row.joint, chain.prefix + row.link, parent, row.type,
                             FromOwnFrame(parent, is_plain ? X_LB * row.X_before : X_LB), row.mdh, entry.lower,
                             entry.upper, entry.damping, entry.armature,
                             has_own_frame ? ExpressIn(link.body, row.written.X_iL) : link.body,
@@ -240,27 +239,6 @@ class TreeReader {
     rows_.push_back(row.written);
     joint_of_link_[chain.prefix + row.link] = index;
     return index;
-  }
-
-  /// The three entries of a ball joint. @return the last one's index.
-  int BuildBall(const Chain& chain, const SegmentRow& row, int parent, const Pose& X_LB,
-                const JointEntry& entry, const LinkEntry& link) {
-    Joint ball;
-    ball.name = chain.prefix + row.joint;
-    ball.link = chain.prefix + row.link;
-    ball.X_PB = FromOwnFrame(parent, X_LB * row.X_before);
-    ball.upper = entry.upper;
-    ball.damping = entry.damping;
-    ball.armature = entry.armature;
-    ball.dry_friction = entry.dry_friction;
-    ball.body = link.body;
-    for (int axis = 0; axis < 3; ++axis) {
-      spec_.joints.push_back(MakeBallEntry(ball, axis, parent));
-      rows_.push_back(row.written);
-      parent = static_cast<int>(spec_.joints.size()) - 1;
-    }
-    joint_of_link_[ball.link] = parent;
-    return parent;
   }
 
   /// The joint that one follows in the end, by its chain's own names or by whole ones.

@@ -4,8 +4,7 @@ namespace dexcheck {
 namespace {
 
 std::string DescribeVelocity(int coordinate, const RobotModel& model, int base_velocities) {
-  if (coordinate >= base_velocities)
-    return model.joints()[static_cast<size_t>(coordinate - base_velocities)].name;
+  if (coordinate >= base_velocities) return model.dof_name(coordinate - base_velocities);
   static constexpr const char* kUnreduced[] = {"x_dot", "y_dot", "phi_dot"};
   static constexpr const char* kTwist[] = {"v_c", "w_c"};
   static constexpr const char* kWheelRates[] = {"thetadot_r", "thetadot_l"};

@@ -13,15 +13,11 @@ namespace {
 
 /// Makes the bodies anew from their parts, each changed in its own frame.
 void ChangeParts(const std::function<MassProperties(const DescribedPart&)>& change, RobotDescription* robot) {
-  std::vector<std::vector<MassProperties>> bodies(robot->spec.joints.size() + 1);
-  for (const DescribedPart& part : robot->parts) {
-    const MassProperties body = change(part);
-    if (body.mass > 0.0 || body.inertia != Matrix3d::Zero()) {
-      bodies[static_cast<size_t>(part.joint + 1)].push_back(ExpressIn(body, part.X_iL));
-    }
+  for (DescribedPart& part : robot->parts) {
+    part.body = change(part);
+    part.states_inertial = part.body.mass > 0.0 || part.body.inertia != Matrix3d::Zero();
   }
-  robot->spec.base.body = Combine(bodies[0]);
-  for (size_t i = 0; i < robot->spec.joints.size(); ++i) robot->spec.joints[i].body = Combine(bodies[i + 1]);
+  FuseParts(robot);
 }
 
 /// Along the axes in which the file gives it, as if these were the link's.

@@ -36,10 +36,12 @@ class ModelComparison {
     for (int i = 0; i < base_; ++i) velocity_of_[static_cast<size_t>(i)] = i;
     for (size_t i = 0; i < b_of_a_.size(); ++i) {
       const auto at = static_cast<size_t>(model_a_.position_index(static_cast<int>(i)));
-      const int count = a_.spec.joints[i].type == JointType::kBall ? 4 : 1;
-      for (int k = 0; k < count; ++k)
+      const JointType type = a_.spec.joints[i].type;
+      for (int k = 0; k < CountPositions(type); ++k)
         position_of_[at + static_cast<size_t>(k)] = model_b_.position_index(b_of_a_[i]) + k;
-      velocity_of_[static_cast<size_t>(base_) + i] = base_ + b_of_a_[i];
+      for (int k = 0; k < CountVelocities(type); ++k)
+        velocity_of_[static_cast<size_t>(base_ + model_a_.dof(static_cast<int>(i)) + k)] =
+            base_ + model_b_.dof(b_of_a_[i]) + k;
     }
     q_b_.setZero(model_a_.num_positions());
     xi_b_.setZero(n);
@@ -187,9 +189,11 @@ class ModelComparison {
       const Pose X_b = terms_b_.CalcLinkPose(static_cast<int>(j));
       const Location at_joint{Location::Kind::kJoint, static_cast<int>(i), -1};
       const bool is_ball = joint.type == JointType::kBall;
-      const int col = is_ball ? joint.ball_axis : 2;
-      const Vector3d axis = X_a.linear().col(col);
-      for (int k = 0; k < 3; ++k) Add(kJointAxis, axis[k], X_b.linear()(k, col), 1.0, at_joint);
+      for (int col = is_ball ? 0 : 2; col < 3; ++col) {
+        for (int k = 0; k < 3; ++k)
+          Add(kJointAxis, X_a.linear()(k, col), X_b.linear()(k, col), 1.0, at_joint);
+      }
+      const Vector3d axis = X_a.linear().col(2);
       if (joint.type != JointType::kPrismatic) {
         const Vector3d anchor = X_b.translation();
         // A ball has one place, a hinge any along its axis.

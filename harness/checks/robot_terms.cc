@@ -38,10 +38,14 @@ Items ListVelocities(const C& c) {
   for (int i = 0; i < c.engine->size(); ++i) all.where.push_back({Kind::kVelocity, i, -1});
   return {all};
 }
+/// Axes of a joint, columns of its frame's rotation: all of a ball joint, else the last.
+int CountAxes(const C& c, int joint) { return CountVelocities(JointOf(c, joint).type); }
 Items ListAxes(const C& c) {
   Items items;
-  for (int i = 0; i < ModelOf(c).num_joints(); ++i)
-    items.push_back(MakeItem(i, JointOf(c, i).type == JointType::kPrismatic ? 3 : 6, {Kind::kJoint, i, -1}));
+  for (int i = 0; i < ModelOf(c).num_joints(); ++i) {
+    const int place = JointOf(c, i).type == JointType::kPrismatic ? 0 : 3;
+    items.push_back(MakeItem(i, static_cast<size_t>(3 * CountAxes(c, i) + place), {Kind::kJoint, i, -1}));
+  }
   return items;
 }
 /// Links that move, the base as -1. @param massive only those with mass on either side.
@@ -180,22 +184,23 @@ constexpr TermEntry kTerms[] =
         {"joint_axis", "joint_axis", "z_i", "(3), (4)", kRobot, kOnce, 1.0, ListAxes,
          [](const C& c, int joint, N out) {
            const Pose X = c.robot->CalcLinkPose(joint);
-           const bool is_ball = JointOf(c, joint).type == JointType::kBall;
-           const Vector3d axis = X.linear().col(is_ball ? JointOf(c, joint).ball_axis : 2);
-           out.head<3>() = axis;
-           if (out.size() == 3) return;
-           if (is_ball) {
+           if (out.size() == 12) {
+             Eigen::Map<Matrix3d>(out.data()) = X.linear();
              out.tail<3>() = X.translation();
              return;
            }
+           const Vector3d axis = X.linear().col(2);
+           out.head<3>() = axis;
+           if (out.size() == 3) return;
            out.tail<3>() = X.translation() + axis.dot(c.engine->JointAnchor(joint) - X.translation()) * axis;
          },
          [](const C& c, int joint, N out) {
-           out.head<3>() = c.engine->JointAxis(joint);
-           if (out.size() == 6) out.tail<3>() = c.engine->JointAnchor(joint);
+           for (int k = 0; k < CountAxes(c, joint); ++k)
+             out.segment<3>(3 * k) = c.engine->JointAxis(joint, k);
+           if (out.size() > 3) out.tail<3>() = c.engine->JointAnchor(joint);
          },
          [](const C& c, int, N weight) {
-           if (weight.size() == 6) weight.tail<3>().setConstant(1.0 / c.scales->world_length());
+           if (weight.size() > 3) weight.tail<3>().setConstant(1.0 / c.scales->world_length());
          }},
         {"link_com", "link_com", "r_i", "(5)", kRobot, kOnce, 1.0,
          [](const C& c) { return ListLinks(c, 3, /*massive=*/true); },

@@ -70,7 +70,7 @@ RoundingScales::RoundingScales(const RobotModel& model)
     const Joint& joint = model.joints()[static_cast<size_t>(i)];
     subtree_mass_[static_cast<size_t>(i + 1)] += joint.body.mass;
     subtree_mass_[static_cast<size_t>(joint.parent + 1)] += subtree_mass_[static_cast<size_t>(i + 1)];
-    rotors_ += joint.armature;
+    rotors_ += CountVelocities(joint.type) * joint.armature;
   }
 }
 
@@ -87,7 +87,8 @@ void RoundingScales::SetState(const ModelTerms& terms, const Eigen::Ref<const Ve
   double fastest = squared_rate_[0];
   for (int i = 0; i < model_->num_joints(); ++i) {
     const Joint& joint = model_->joints()[static_cast<size_t>(i)];
-    const double squared = xi[base_velocities_ + i] * xi[base_velocities_ + i];
+    const double squared =
+        xi.segment(base_velocities_ + model_->dof(i), CountVelocities(joint.type)).squaredNorm();
     double& rate = squared_rate_[static_cast<size_t>(i + 1)];
     rate = squared_rate_[static_cast<size_t>(joint.parent + 1)];
     (joint.type == JointType::kPrismatic ? sliding : rate) += squared;
@@ -98,11 +99,7 @@ void RoundingScales::SetState(const ModelTerms& terms, const Eigen::Ref<const Ve
 }
 
 double RoundingScales::CalcVelocityScale(int coordinate) const {
-  if (coordinate >= base_velocities_) {
-    const bool slides =
-        model_->joints()[static_cast<size_t>(coordinate - base_velocities_)].type == JointType::kPrismatic;
-    return slides ? 1.0 : arm_;
-  }
+  if (coordinate >= base_velocities_) return JointOf(coordinate).type == JointType::kPrismatic ? 1.0 : arm_;
   if (base_velocities_ == 6) return coordinate < 3 ? 1.0 : arm_;
   if (base_velocities_ == 3) return coordinate < 2 ? 1.0 : arm_;
   if (model_->base().velocity == DriveVelocity::kTwist) return coordinate == 0 ? 1.0 : arm_;
@@ -110,15 +107,18 @@ double RoundingScales::CalcVelocityScale(int coordinate) const {
          model_->base().wheel_radius / model_->base().wheel_distance * arm_;
 }
 
+const Joint& RoundingScales::JointOf(int coordinate) const {
+  return model_->joints()[static_cast<size_t>(model_->joint_of_dof(coordinate - base_velocities_))];
+}
+
 double RoundingScales::GetSubtreeMass(int coordinate) const {
-  return subtree_mass_[static_cast<size_t>(std::max(coordinate - base_velocities_ + 1, 0))];
+  if (coordinate < base_velocities_) return subtree_mass_[0];
+  return subtree_mass_[static_cast<size_t>(model_->joint_of_dof(coordinate - base_velocities_) + 1)];
 }
 
 double RoundingScales::CalcMassScale(int row, int col) const {
   const double mass = std::min(GetSubtreeMass(row), GetSubtreeMass(col));
-  const double armature = row == col && row >= base_velocities_
-                              ? model_->joints()[static_cast<size_t>(row - base_velocities_)].armature
-                              : 0.0;
+  const double armature = row == col && row >= base_velocities_ ? JointOf(row).armature : 0.0;
   return Positive(mass * CalcVelocityScale(row) * CalcVelocityScale(col) + armature);
 }
 
@@ -136,10 +136,7 @@ double RoundingScales::CalcCoriolisScale(int coordinate) const {
 }
 
 double RoundingScales::CalcFrictionScale(int coordinate, const Eigen::Ref<const VectorXd>& xi) const {
-  if (coordinate >= base_velocities_) {
-    return Positive(model_->joints()[static_cast<size_t>(coordinate - base_velocities_)].damping *
-                    std::abs(xi[coordinate]));
-  }
+  if (coordinate >= base_velocities_) return Positive(JointOf(coordinate).damping * std::abs(xi[coordinate]));
   if (model_->base().type != BaseType::kDifferentialDrive) return 1.0;
   // K^T D K v with K of size velocity / r: the two wheels' parts may cancel.
   const double r = model_->base().wheel_radius;

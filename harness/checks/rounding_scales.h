@@ -69,6 +69,8 @@ class RoundingScales {
 
  private:
   const RobotModel* model_;
+  [[nodiscard]] const Joint& JointOf(int coordinate) const;
+
   int base_velocities_;
   double reach_;
   /// The reach, or the shortest arm that rounding of coordinates in the world leaves its bounds, m.

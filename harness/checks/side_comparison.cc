@@ -54,8 +54,9 @@ SideComparison::SideComparison(const RobotDescription& robot, std::vector<TermSi
 int SideComparison::CoordinateOf(Eigen::Index entry) const {
   // The column's leader is the only joint of it that follows none.
   for (Eigen::Index row = 0; row < T_.rows(); ++row) {
-    const bool is_free = row < base_ || !is_reduced_ ||
-                         !robot_.spec.joints[static_cast<size_t>(row - base_)].coupling.has_value();
+    const bool is_free =
+        row < base_ || !is_reduced_ ||
+        !model_.joints()[static_cast<size_t>(model_.joint_of_dof(static_cast<int>(row) - base_))].coupling;
     if (is_free && T_(row, entry) != 0.0) return static_cast<int>(row);
   }
   return static_cast<int>(entry);
@@ -66,10 +67,10 @@ void SideComparison::Follow(VectorXd* q, VectorXd* xi) const {
   for (size_t i = 0; i < robot_.spec.joints.size(); ++i) {
     const std::optional<JointCoupling>& coupling = robot_.spec.joints[i].coupling;
     if (!coupling) continue;
-    const auto own = static_cast<Eigen::Index>(i);
-    (*q)[model_.position_index(static_cast<int>(i))] =
+    const auto own = static_cast<int>(i);
+    (*q)[model_.position_index(own)] =
         coupling->multiplier * (*q)[model_.position_index(coupling->leader)] + coupling->offset;
-    (*xi)[base_ + own] = coupling->multiplier * (*xi)[base_ + coupling->leader];
+    (*xi)[base_ + model_.dof(own)] = coupling->multiplier * (*xi)[base_ + model_.dof(coupling->leader)];
   }
 }
 

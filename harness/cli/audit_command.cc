@@ -15,6 +15,7 @@
 #include "harness/cli/terminal.h"
 #include "harness/descriptions/audit.h"
 #include "harness/descriptions/read_description.h"
+#include "harness/engine/mjcf_file.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -32,7 +33,7 @@ struct AuditRequest {
 
 Json ConditionToJson(double value) { return std::isfinite(value) ? Json(value) : Json("infinity"); }
 
-std::string ToText(const AuditRequest& request, const AuditResult& result) {
+std::string ToText(const AuditRequest& request, const RobotDescription& robot, const AuditResult& result) {
   Json json = {{"robot", request.robot.string()},
                {"verdict", result.IsGood() ? "pass" : "disagreement"},
                {"condition_number", ConditionToJson(result.condition)}};
@@ -47,6 +48,8 @@ std::string ToText(const AuditRequest& request, const AuditResult& result) {
       entry["condition_number_without"] = ConditionToJson(*finding.condition_without);
     json["findings"].push_back(entry);
   }
+  json["notes"] = robot.notes;
+  for (const std::string& note : ListLoadNotes()) json["notes"].push_back(note);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -78,7 +81,8 @@ void Print(const AuditRequest& request, const RobotDescription& robot, const Aud
     if (!request.quiet) fmt::print("{}\n", Wrap(fmt::format("{:<11}{}: {}", "note", file, note), 11));
   }
   if (counted == 0) {
-    fmt::print("{}GOOD: nothing that a robot cannot have, and nothing odd.\n", request.quiet ? "" : "\n");
+    fmt::print("{}GOOD: nothing that a robot cannot have, and nothing suspicious.\n",
+               request.quiet ? "" : "\n");
   } else {
     const char* const things = counted == 1 ? "thing that a robot cannot have or that looks like a fault"
                                             : "things that a robot cannot have or that look like faults";
@@ -113,7 +117,7 @@ int Run(const AuditRequest& request) {
   std::optional<OutputFile> junit;
   if (!request.junit_file.empty()) junit.emplace(request.junit_file);
   const AuditResult result = AuditRobot(robot);
-  if (json) json->Write(ToText(request, result));
+  if (json) json->Write(ToText(request, robot, result));
   if (junit) junit->Write(WriteAuditJUnit(request, result));
   if (request.json_file != "-") Print(request, robot, result);
   return result.IsGood() ? kSuccess : kDisagreement;
@@ -124,7 +128,7 @@ int Run(const AuditRequest& request) {
 void AddAuditCommand(Command app) {
   const auto request = std::make_shared<AuditRequest>();
   Command command =
-      app.AddCommand("audit", "Look for what cannot be, or is odd, in one description of a robot");
+      app.AddCommand("audit", "Look for what cannot be, or is suspicious, in one description of a robot");
   command.AddOption("FILE", &request->robot, "Parameter file (TOML), URDF or MJCF")
       .TypeName("FILE")
       .Required();

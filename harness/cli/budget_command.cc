@@ -11,15 +11,15 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
-#include "harness/cli/shared_request.h"
 #include "harness/cli/terminal.h"
-#include "harness/study/error_budget.h"
+#include "harness/study/study_page.h"
 
 namespace dexcheck::cli {
 namespace {
 
 struct BudgetRequest : ScenarioRequest {
   std::uint64_t seed = 0;
+  std::uint64_t jobs = 0;
   std::string page;
 };
 
@@ -56,12 +56,13 @@ int Run(const BudgetRequest& request) {
     page.emplace(request.page);
   }
   std::unique_ptr<ProgressBar> bar;
+  const auto progress = [&](long done, long total) {
+    if (!bar) bar = std::make_unique<ProgressBar>("running", total, request.quiet);
+    bar->Update(done);
+    return !IsInterrupted();
+  };
   const ErrorBudget budget =
-      CalcErrorBudget(files.scenario, files.robot, files.mjcf, [&](long done, long total) {
-        if (!bar) bar = std::make_unique<ProgressBar>("running", total, request.quiet);
-        bar->Update(done);
-        return !IsInterrupted();
-      });
+      CalcErrorBudget(files.scenario, files.robot, files.mjcf, CountJobs(request.jobs), progress);
   if (bar) bar->Finish();
   if (json) json->Write(ToJson(budget).dump(2) + "\n");
   if (page) page->Write(MakeBudgetPage(budget));
@@ -86,10 +87,9 @@ void AddBudgetCommand(Command app) {
   Command command = app.AddCommand(
       "budget", "Which part of a plant that is not ideal costs the accuracy: each alone, all but each, all");
   AddScenarioOptions(command, request.get());
-  command.AddOption("--seed", &request->seed, "Seed of all that is random")
-      .TypeName("N")
-      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
+  AddSeedOption(command, &request->seed, "Seed of all that is random");
   command.AddOption("--page", &request->page, "Write table and bar chart as a page").TypeName("FILE.html");
+  AddJobsOption(command, "Runs", &request->jobs);
   AddResultOptions(command, "the budget", request.get());
   command.SetAction([=] { return Run(*request); });
 }

@@ -4,6 +4,10 @@
 
 #include <algorithm>
 
+#include "harness/base/byte_archive.h"
+#include "harness/base/interrupts.h"
+#include "harness/base/process_pool.h"
+#include "harness/cli/commands.h"
 #include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
@@ -48,6 +52,24 @@ const char* NameOf(MutantOutcome outcome) {
 }
 
 }  // namespace
+
+void Campaign::Make(std::uint64_t jobs, ProgressBar* bar,
+                    const std::function<CampaignFault(size_t fault)>& make) {
+  const auto run = [&](size_t i) {
+    const CampaignFault fault = make(i);
+    return PackBytes(fault.kind, fault.name, fault.outcome, fault.cause_right, fault.part_named,
+                     fault.exception, fault.details.dump());
+  };
+  const auto take = [&](size_t i, const std::string& result) {
+    CampaignFault& fault = faults.emplace_back();
+    std::string details;
+    UnpackBytes(result, &fault.kind, &fault.name, &fault.outcome, &fault.cause_right, &fault.part_named,
+                &fault.exception, &details);
+    fault.details = Json::parse(details);
+    bar->Update(static_cast<long>(i + 1));
+  };
+  RunJobs("a fault", total, CountJobs(jobs), run, take, IsInterrupted);
+}
 
 void Campaign::Print(bool quiet) const {
   const std::vector<Row> rows = SumUp(faults);

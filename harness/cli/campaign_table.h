@@ -3,12 +3,15 @@
 // What a campaign of faults that were made on purpose came to: one table and one JSON, whether the faults are
 // of descriptions or of a run.
 
+#include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "harness/cli/command_line.h"
 #include "harness/cli/json_matrix.h"
+#include "harness/cli/progress_bar.h"
 #include "harness/diagnosis/mutation.h"
 
 namespace dexcheck::cli {
@@ -30,6 +33,9 @@ struct Campaign {
   size_t total = 0;                   ///< To be made.
   bool names_causes = true;           ///< Whether causes were looked for.
 
+  /// Makes all faults, so many at a time as CountJobs says, until the user interrupts.
+  /// @param make makes one in a process of its own. @throws Error when such a process dies.
+  void Make(std::uint64_t jobs, ProgressBar* bar, const std::function<CampaignFault(size_t fault)>& make);
   /// Prints a line for each kind of fault, the exceptions, and the verdict; the verdict alone when quiet.
   void Print(bool quiet) const;
   /// Adds "complete", "kinds" and "faults". @returns the text of a file.

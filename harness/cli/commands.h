@@ -5,7 +5,6 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -22,6 +21,40 @@ struct RobotFiles {
 /// Adds --robot and --mjcf, both or neither. @return the first of them.
 Option AddRobotOptions(Command command, RobotFiles* files);
 
+/// What is changed in a scenario.
+struct Overrides {
+  std::vector<std::string> set;    ///< "KEY=VALUE"
+  std::vector<std::string> unset;  ///< "KEY"
+  [[nodiscard]] bool empty() const { return set.empty() && unset.empty(); }
+  /// As ParseScenario takes them: what is removed first.
+  [[nodiscard]] std::vector<std::string> List() const;
+};
+
+/// Adds --set and --unset. @returns them.
+std::array<Option, 2> AddOverrideOptions(Command command, Overrides* overrides);
+
+/// What commands need that make many runs of one scenario and print one result.
+struct ScenarioRequest {
+  std::string scenario;
+  Overrides overrides;
+  std::string json_file;
+  bool quiet = false;
+};
+
+/// Adds SCENARIO, --set and --unset.
+void AddScenarioOptions(Command command, ScenarioRequest* request);
+/// Adds --json and --quiet. @param what the file gets: "the budget".
+void AddResultOptions(Command command, const std::string& what, ScenarioRequest* request);
+
+/// Adds --jobs. @param what is made: "Trials". @param jobs 0 for one on each processor, as CountJobs reads
+/// it.
+Option AddJobsOption(Command command, const std::string& what, std::uint64_t* jobs);
+int CountJobs(std::uint64_t jobs);
+
+/// Adds --seed. @param help what is drawn by it.
+Option AddSeedOption(Command command, std::uint64_t* seed,
+                     const std::string& help = "Vary posture and grasp at random; 0 does not");
+
 /// Adds --samples, of at most `most`, and --seed: the random states at which two descriptions are compared.
 template <typename Count>
 std::array<Option, 2> AddSampleOptions(Command command, std::uint64_t most, Count* samples,
@@ -30,10 +63,7 @@ std::array<Option, 2> AddSampleOptions(Command command, std::uint64_t most, Coun
               .TypeName("N")
               .Check(WholeNumber(1, most))
               .ShowDefault(),
-          command.AddOption("--seed", seed, "Of the random states")
-              .TypeName("N")
-              .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()))
-              .ShowDefault()};
+          AddSeedOption(command, seed, "Of the random states").ShowDefault()};
 }
 
 /// Adds --json [FILE]: JSON to this file; without a file, or with "-", to standard output and nothing else.

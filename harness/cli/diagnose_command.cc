@@ -10,7 +10,6 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/model/parameter_reader.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/consistency_report.h"
@@ -23,11 +22,13 @@
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_extras.h"
 #include "harness/descriptions/join_names.h"
+#include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/descriptions/robot_file.h"
 #include "harness/diagnosis/diagnose.h"
 #include "harness/diagnosis/file_terms.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/mjcf_file.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -156,7 +157,8 @@ std::string ToText(const DiagnoseRequest& request, const RobotSpec& written, con
       {"seed", request.options.seed},          {"verdict", diagnosis.agrees ? "pass" : "disagreement"},
       {"explained", diagnosis.explained},      {"explained_of_forces", diagnosis.explained_of_forces}};
   if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
-  json["notes"] = notes;
+  json["notes"] = ListLoadNotes();
+  for (const std::string& note : notes) json["notes"].push_back(note);
   json["hypotheses"] = ListHypotheses(hypotheses);
   json["causes"] = Json::array();
   for (const Repair& cause : diagnosis.causes) json["causes"].push_back(ToJson(cause, written, file));
@@ -169,52 +171,56 @@ std::string ToText(const DiagnoseRequest& request, const RobotSpec& written, con
 
 /// Puts A and B where --robot and --mjcf would stand.
 void SortFiles(DiagnoseRequest* request) {
-  if (!request->a.empty()) {
-    if (request->b.empty()) throw InputError("diagnose: two files must be given, got " + Quote(request->a));
-    request->files = {request->a, request->b};
-  }
-  const auto require = [](bool is_right, const std::filesystem::path& file, const char* expected) {
-    if (!is_right) throw InputError(file.string() + ": " + expected);
-  };
-  require(FindFormat(request->files.robot) != RobotFormat::kMjcf, request->files.robot,
-          "must be a parameter file or a URDF to be repaired, is an MJCF (dexcheck import writes a parameter "
-          "file from it)");
-  require(FindFormat(request->files.mjcf) == RobotFormat::kMjcf, request->files.mjcf,
-          "must be an MJCF, which is taken to be right (dexcheck consistency compares any two files)");
+  if (request->a.empty()) return;
+  if (request->b.empty()) throw InputError("diagnose: two files must be given, got " + Quote(request->a));
+  request->files = {request->a, request->b};
+}
+
+void Require(bool is_right, const std::filesystem::path& file, const char* expected) {
+  if (!is_right) throw InputError(file.string() + ": " + expected);
 }
 
 /// What is to be repaired, completed by what only the MJCF states when it is a URDF. What a URDF has no place
 /// for is taken out of the engine's model.
-/// @param rows filled with how its joints' rows are written. @param notes on what is the engine's.
-RobotModel ReadGiven(const DiagnoseRequest& request, mjModel* engine, std::vector<WrittenRow>* rows,
-                     std::vector<std::string>* notes) {
-  const RobotFiles& files = request.files;
-  const bool is_table = FindFormat(files.robot) == RobotFormat::kToml;
-  RobotDescription robot = ReadDescription(files.robot);
-  if (!is_table) SetAsideMotors(files.mjcf.filename().string(), engine);
-  const Completion completion =
-      CompleteFromEngine(*engine, files.mjcf.filename().string(), &robot, request.ignore, is_table);
+/// @param robot as its file has it. @param notes on what is the engine's.
+RobotModel Complete(const DiagnoseRequest& request, RobotDescription robot, mjModel* engine,
+                    std::vector<std::string>* notes) {
+  const std::string mjcf = request.files.mjcf.filename().string();
+  const bool is_table = robot.format == RobotFormat::kToml;
+  if (!is_table) SetAsideMotors(mjcf, engine);
+  const Completion completion = CompleteFromEngine(*engine, mjcf, &robot, request.ignore, is_table);
   UndoOneSided(completion.one_sided, &robot.spec);
   const BaseType base = robot.spec.base.type;
   if (base == BaseType::kFixed || base == BaseType::kFloating) {
-    if (const std::optional<std::string> inertias = TakeCompiledInertias(files.mjcf, *engine, &robot))
+    if (const std::optional<std::string> inertias = TakeCompiledInertias(request.files.mjcf, *engine, &robot))
       notes->push_back(*inertias);
   }
-  if (is_table) {
-    static_cast<void>(ReadRobotModel(files.robot, rows));
-    return RobotModel(robot.spec);
-  }
-  for (const DescribedJoint& joint : robot.joints) rows->push_back({joint.X_iL, true});
   return RobotModel(robot.spec);
+}
+
+/// Faults of conventions; none when the MJCF is no description (of several free bodies).
+std::vector<Hypothesis> Explain(const DiagnoseRequest& request, const RobotDescription& robot,
+                                const mjModel& engine) {
+  try {
+    return ExplainDifference(robot, ReadMjcfDescription(engine, request.files.mjcf.string()),
+                             std::max(request.options.tolerance, kHypothesisTolerance));
+  } catch (const InputError&) {
+    return {};
+  }
 }
 
 int Run(DiagnoseRequest request) {
   SortFiles(&request);
   request.options.tolerance = request.judging.Find().value_or(0.0);
+  const RobotDescription robot = ReadDescription(request.files.robot);
+  Require(robot.format != RobotFormat::kMjcf, request.files.robot,
+          "must be a parameter file or a URDF to be repaired, is an MJCF (dexcheck import writes a parameter "
+          "file from it)");
+  Require(FindFormat(request.files.mjcf) == RobotFormat::kMjcf, request.files.mjcf,
+          "must be an MJCF, which is taken to be right (dexcheck consistency compares any two files)");
   const MjModelPtr engine = LoadMjcf(request.files.mjcf);
-  std::vector<WrittenRow> rows;
   std::vector<std::string> notes;
-  const RobotModel model = ReadGiven(request, engine.get(), &rows, &notes);
+  const RobotModel model = Complete(request, robot, engine.get(), &notes);
   RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely faults)");
   CatchInterrupts();
   std::optional<OutputFile> json;
@@ -228,16 +234,13 @@ int Run(DiagnoseRequest request) {
         return !IsInterrupted();
       });
   bar.Finish();
-  const FileTerms terms(model.spec(), std::move(rows));
+  const FileTerms terms(model.spec(), {robot.joints.begin(), robot.joints.end()});
   diagnosis.causes = terms.Convert(diagnosis.causes);
   for (auto& [cause, fraction] : diagnosis.ranking) cause = terms.ConvertPart(cause);
   // Faults of conventions first; what can only be moved shows no bodies to compare.
   const bool is_open = !diagnosis.agrees && !request.options.by_motion;
   std::vector<Hypothesis> hypotheses;
-  if (is_open) {
-    const double tolerance = std::max(request.options.tolerance, kHypothesisTolerance);
-    hypotheses = ExplainDifference(request.files.robot, request.files.mjcf, {}, tolerance);
-  }
+  if (is_open) hypotheses = Explain(request, robot, *engine);
   if (json) json->Write(ToText(request, terms.written(), diagnosis, hypotheses, notes));
   if (request.json_file != "-") {
     if (!request.quiet) {

@@ -74,8 +74,8 @@ void AddUnreducedTerms(const RobotModel& model, const State& state, Json* out) {
   if (model.base().type == BaseType::kDifferentialDrive) {
     const Vector2d v = state.xi.head<2>();
     const PlatformConstraint platform = CalcPlatformConstraint(model.base(), state.q.head<3>(), v);
-    q_dot.resize(model.num_unreduced_base_velocities() + model.num_joints());
-    q_dot << platform.S_v * v, state.xi.tail(model.num_joints());
+    q_dot.resize(model.num_unreduced_base_velocities() + model.num_dofs());
+    q_dot << platform.S_v * v, state.xi.tail(model.num_dofs());
     (*out)["A_v"] = ToRows(platform.A_v);
     (*out)["S_v"] = ToRows(platform.S_v);
     (*out)["S_v_dot"] = ToRows(platform.S_v_dot);

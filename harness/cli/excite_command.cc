@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "harness/base/interrupts.h"
+#include "harness/base/shell.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
-#include "harness/cli/shared_request.h"
 #include "harness/run/excitation.h"
 #include "harness/study/exciting_motion.h"
 
@@ -43,7 +43,7 @@ void Print(const Scenario& scenario, const ExcitingMotion& motion) {
   both(fmt::format("combinations above the floor of {:.0e}", motion.floor), "{}",
        [&](const JudgedMotion& m) { return CountAbove(m.singular_values, motion.floor); });
   fmt::print("nearest to what it may take: {}\n\n", motion.found.nearest);
-  for (const std::string& line : ShowMotion(scenario, motion.overrides)) fmt::print("{}\n", line);
+  for (const std::string& setting : motion.overrides) fmt::print("--set {}\n", QuoteForShell(setting));
 }
 
 std::string ToText(const Scenario& scenario, const ExcitingMotion& motion, bool complete) {

@@ -6,17 +6,13 @@
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/console.h"
-#include "harness/base/files.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/descriptions/parameter_writer.h"
 #include "harness/descriptions/read_description.h"
-#include "harness/descriptions/robot_file.h"
-#include "harness/engine/add_motors.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/mjcf_assets.h"
-#include "harness/engine/mjcf_files.h"
-#include "harness/engine/newer_mjcf.h"
+#include "harness/engine/mjcf_passes.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -24,46 +20,70 @@ namespace {
 struct ImportRequest {
   std::filesystem::path source;
   std::string out = "-";
+  std::string json_file;
   std::vector<std::string> packages;
   bool floating = false;
   bool downgrade = false;
   bool motors = false;
 };
 
-RobotDescription ReadSource(const ImportRequest& request) {
-  if (FindFormat(request.source) == RobotFormat::kToml) {
-    throw InputError(request.source.string() + ": must be a URDF or an MJCF, is a parameter file already");
+/// What was read, and what of it was left out.
+void WriteJson(const ImportRequest& request, const RobotDescription* robot,
+               const std::vector<MjcfChange>& changes) {
+  Json json = {{"source", request.source.string()}, {"out", request.out}};
+  if (robot != nullptr) {
+    const BaseType base = robot->spec.base.type;
+    json["robot"] = robot->spec.name;
+    json["base"] = {{"link", robot->spec.base.link}, {"floats", base == BaseType::kFloating}};
+    json["joints"] = Json::array();
+    for (const Joint& joint : robot->spec.joints) json["joints"].push_back(joint.name);
+    json["links"] = Json::array();
+    for (const DescribedPart& part : robot->parts) json["links"].push_back(part.name);
+    json["notes"] = robot->notes;
+    for (const std::string& note : ListLoadNotes()) json["notes"].push_back(note);
   }
+  json["changes"] = Json::array();
+  for (const MjcfChange& change : changes) {
+    json["changes"].push_back(
+        {{"file", change.file}, {"line", change.line}, {"word", change.word}, {"what", change.what}});
+  }
+  OutputFile(request.json_file).Write(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+/// The copy or table, unless the JSON takes its place on standard output.
+void WriteOut(const ImportRequest& request, const std::string& text) {
+  if (request.out != "-" || request.json_file != "-") OutputFile(request.out).Write(text);
+}
+
+RobotDescription ReadSource(const ImportRequest& request) {
   UrdfOptions options;
   options.packages.assign(request.packages.begin(), request.packages.end());
   options.floating = request.floating;
-  return ReadDescription(request.source, options);
+  RobotDescription robot = ReadDescription(request.source, options);
+  if (robot.format != RobotFormat::kToml) return robot;
+  throw InputError(request.source.string() + ": must be a URDF or an MJCF, is a parameter file already");
 }
 
 /// A copy of an MJCF, for MuJoCo 2.2.2 or with motors.
 int WriteCopy(const ImportRequest& request) {
-  JoinedMjcf mjcf(request.source);
+  MjcfFile mjcf(request.source);
   if (mjcf.IsUrdf()) throw InputError(request.source.string() + ": must be an MJCF, got a URDF");
-  const std::filesystem::path from = std::filesystem::absolute(request.source).parent_path();
   if (request.downgrade) {
-    AdaptMjcf(from, &mjcf);
+    AdaptMjcf(&mjcf);
     StateNewDefaults(&mjcf);
   }
-  if (request.motors) AddMotors(from, &mjcf);
-  std::string copy = mjcf.Print();
+  if (request.motors) AddMotors(&mjcf);
   // What cannot be loaded must not be written.
-  LoadMjcfText(MoveMjcf(copy, request.source.string(), from, std::filesystem::current_path()),
-               request.source.string());
+  LoadMjcfText(mjcf.PrintFor(std::filesystem::current_path()), request.source.string());
   const std::filesystem::path to = std::filesystem::absolute(request.out).parent_path();
   std::error_code error;
-  if (request.out != "-" && !std::filesystem::equivalent(from, to, error))
-    copy = MoveMjcf(copy, request.source.string(), from, to);
-  OutputFile file(request.out);
-  file.Write(copy);
+  const bool stays = request.out == "-" || std::filesystem::equivalent(mjcf.folder(), to, error);
+  WriteOut(request, stays ? mjcf.Print() : mjcf.PrintFor(to));
   for (const MjcfChange& change : mjcf.changes()) {
     Warn(std::filesystem::path(change.file).filename().string() + ":" + std::to_string(change.line) + ": " +
          change.word + ": " + change.what);
   }
+  if (!request.json_file.empty()) WriteJson(request, nullptr, mjcf.changes());
   return kSuccess;
 }
 
@@ -73,8 +93,8 @@ int Run(const ImportRequest& request) {
   const std::string text = WriteParameters(robot, request.source.filename().string());
   // What cannot be read back must not be written: a name that is too long, for example.
   ParseRobotModel(text, request.source.string() + " as a parameter file");
-  OutputFile file(request.out);
-  file.Write(text);
+  WriteOut(request, text);
+  if (!request.json_file.empty()) WriteJson(request, &robot, {});
   return kSuccess;
 }
 
@@ -99,6 +119,7 @@ void AddImportCommand(Command app) {
   command.AddFlag("--motors", &request->motors,
                   "Write an MJCF instead: a copy with a torque motor for each joint, as run needs it, in the "
                   "place of all actuators");
+  AddJsonOption(command, "what was read, and what was left out or changed", &request->json_file);
   command.SetAction([=] { return Run(*request); });
 }
 

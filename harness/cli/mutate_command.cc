@@ -29,10 +29,8 @@ struct MutateRequest {
 };
 
 CampaignFault Describe(const Mutant& mutant, bool diagnosed) {
-  CampaignFault fault{.kind = mutant.kind,
-                      .name = mutant.name,
-                      .outcome = mutant.outcome,
-                      .cause_right = mutant.named_first};
+  CampaignFault fault{
+      .kind = mutant.kind, .name = mutant.name, .outcome = mutant.outcome, .cause_right = mutant.named_first};
   if (mutant.outcome == MutantOutcome::kSurvived) fault.exception = "survived: " + mutant.name;
   if (mutant.outcome == MutantOutcome::kNoEffect) fault.exception = "no effect: " + mutant.name;
   if (diagnosed && mutant.outcome == MutantOutcome::kKilled && !mutant.named_first) {
@@ -91,18 +89,15 @@ int Run(MutateRequest request) {
   Campaign campaign{
       .faults = {}, .total = mutants.size() + formulas.size(), .names_causes = request.options.diagnose};
   ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet);
-  const auto add = [&](const CampaignFault& fault) {
-    campaign.faults.push_back(fault);
-    bar.Update(static_cast<long>(campaign.faults.size()));
-  };
-  for (size_t i = 0; i < formulas.size() && !IsInterrupted(); ++i) {
-    RunFormulaMutant(adapter, request.options.samples, &formulas[i]);
-    add(Describe(formulas[i]));
-  }
-  for (size_t i = 0; i < mutants.size() && !IsInterrupted(); ++i) {
-    TryMutant(model, *engine, source, request.options, &mutants[i]);
-    add(Describe(mutants[i], request.options.diagnose));
-  }
+  campaign.Make(request.run.jobs, &bar, [&](size_t i) {
+    if (i < formulas.size()) {
+      RunFormulaMutant(adapter, request.options.samples, &formulas[i]);
+      return Describe(formulas[i]);
+    }
+    Mutant& mutant = mutants[i - formulas.size()];
+    TryMutant(model, *engine, source, request.options, &mutant);
+    return Describe(mutant, request.options.diagnose);
+  });
   bar.Finish();
   if (json) {
     json->Write(campaign.ToText({{"robot", request.files.robot.string()},
@@ -167,6 +162,7 @@ void AddMutateCommand(Command app) {
   for (Option option : {from, duration, faults, scale}) option.Excludes(smallest);
   for (Option option : states) option.Excludes(run);
   no_diagnosis.Excludes(run);
+  AddJobsOption(command, "Faults", &request->run.jobs).Excludes(smallest);
   AddJsonOption(command, "the results", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] { return Run(*request); });

@@ -63,10 +63,10 @@ int MutateRun(const MutateRunRequest& request) {
   RunCampaign runs(files.scenario, files.robot, files.mjcf, request.options, IsInterrupted);
   Campaign campaign{.faults = {}, .total = runs.mutants().size()};
   ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet || request.json_file == "-");
-  for (size_t i = 0; i < campaign.total && !IsInterrupted() && runs.Run(i, IsInterrupted); ++i) {
-    campaign.faults.push_back(Describe(runs.mutants()[i]));
-    bar.Update(static_cast<long>(i + 1));
-  }
+  campaign.Make(request.jobs, &bar, [&](size_t i) {
+    runs.Run(i, [] { return false; });
+    return Describe(runs.mutants()[i]);
+  });
   bar.Finish();
   if (json) {
     json->Write(campaign.ToText({{"scenario", request.scenario},

@@ -2,10 +2,11 @@
 
 // `dexcheck mutate --run SCENARIO`: faults in a run.
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
-#include "harness/cli/shared_request.h"
+#include "harness/cli/commands.h"
 #include "harness/run/run_mutation_options.h"
 
 namespace dexcheck::cli {
@@ -15,6 +16,7 @@ struct MutateRunRequest {
   Overrides overrides;
   RunMutationOptions options;
   std::string json_file;
+  std::uint64_t jobs = 0;  ///< Runs at a time; 0 for one on each processor.
   bool quiet = false;
   bool smallest = false;  ///< PrintSmallestErrors instead of MutateRun.
 };

@@ -21,7 +21,6 @@
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
-#include "harness/cli/shared_request.h"
 #include "harness/cli/shipped_files.h"
 #include "harness/cli/terminal.h"
 #include "harness/cli/tolerance_options.h"
@@ -250,9 +249,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
                    .TypeName("DIR");
   const auto [set, unset] = AddOverrideOptions(command, &request->overrides);
   const std::array<Option, 2> judging = AddToleranceOptions(command, &request->judging);
-  Option seed = command.AddOption("--seed", &request->seed, "Vary posture and grasp at random; 0 does not")
-                    .TypeName("N")
-                    .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
+  Option seed = AddSeedOption(command, &request->seed);
   command
       .AddOption(
           "--threads", &request->threads,

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <string_view>
+#include <regex>
 
 #include "controller/common/text.h"
 #include "harness/base/shell.h"
@@ -13,44 +13,19 @@
 namespace dexcheck::cli {
 namespace {
 
-/// Takes digits from the front of a text; false when there are none, or more than a sensible number has.
-bool TakeNumber(std::string_view* text) {
-  constexpr size_t kMostDigits = 9;
-  size_t count = 0;
-  while (count < text->size() && (*text)[count] >= '0' && (*text)[count] <= '9') ++count;
-  text->remove_prefix(count);
-  return count >= 1 && count <= kMostDigits;
-}
-
-bool IsTime(std::string_view text) {
-  if (!TakeNumber(&text)) return false;
-  const bool has_days = text.starts_with('-');
-  if (has_days) {
-    text.remove_prefix(1);
-    if (!TakeNumber(&text)) return false;
-  }
-  for (int parts = 0; text.starts_with(':') && parts < 2; ++parts) {
-    text.remove_prefix(1);
-    if (!TakeNumber(&text)) return false;
-  }
-  return text.empty();
-}
-
-bool IsMemory(std::string_view text) {
-  if (!TakeNumber(&text)) return false;
-  return text.empty() ||
-         (text.size() == 1 && std::string_view("KMGT").find(text[0]) != std::string_view::npos);
+bool Matches(const std::string& text, const char* pattern) {
+  return std::regex_match(text, std::regex(pattern));
 }
 
 }  // namespace
 
 std::string CheckSlurmTime(const std::string& text) {
-  if (IsTime(text)) return {};
+  if (Matches(text, "\\d{1,9}(-\\d{1,9})?(:\\d{1,9}){0,2}")) return {};
   return "must be MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]], got " + Quote(text);
 }
 
 std::string CheckSlurmMemory(const std::string& text) {
-  if (IsMemory(text)) return {};
+  if (Matches(text, "\\d{1,9}[KMGT]?")) return {};
   return "must be a whole number with K, M, G or T, got " + Quote(text);
 }
 
@@ -71,7 +46,7 @@ std::string MakeSlurmScript(const StudyInputs& inputs, const std::string& name_o
 #SBATCH --job-name={name}
 #SBATCH --array=1-{elements}{throttle}
 #SBATCH --ntasks=1
-#SBATCH --cpus-per-task=1
+#SBATCH --cpus-per-task={cpus}
 {more}#SBATCH --requeue
 #SBATCH --open-mode=append
 #SBATCH --output={name}-%a-of-{elements}.log
@@ -79,17 +54,15 @@ std::string MakeSlurmScript(const StudyInputs& inputs, const std::string& name_o
 code=0
 for ((task = SLURM_ARRAY_TASK_ID; task <= {tasks}; task += {elements})); do
   {program} study run {study} --quiet --jobs "${{SLURM_CPUS_PER_TASK:-1}}" \
-    --shard "$task/{tasks}" --db "{name}-$task-of-{tasks}.sqlite"{exchange} || code=$?
+    {shard}--db "{name}-$task-of-{tasks}.sqlite" || code=$?
 done
 exit $code
 )",
       fmt::arg("name", name), fmt::arg("tasks", job.tasks),
       fmt::arg("elements", std::min(job.tasks, job.array_size)),
       fmt::arg("throttle", job.throttle > 0 ? "%" + std::to_string(job.throttle) : ""),
-      fmt::arg("more", more),
-      fmt::arg("exchange", inputs.study.is_search()
-                               ? fmt::format(" \\\n    --exchange \"{}-of-{}-exchange\"", name, job.tasks)
-                               : ""),
+      fmt::arg("cpus", job.cpus), fmt::arg("more", more),
+      fmt::arg("shard", inputs.study.is_search() ? "" : fmt::format("--shard \"$task/{}\" ", job.tasks)),
       fmt::arg("program", QuoteForShell(program)), fmt::arg("study", QuoteForShell(study)));
 }
 

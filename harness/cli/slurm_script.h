@@ -7,12 +7,13 @@
 
 namespace dexcheck::cli {
 
-/// What a study's array job asks for.
+/// A study's array job.
 struct SlurmJob {
   std::uint64_t tasks = 1;  ///< Parts of the study.
   /// Most elements of the array. Slurm's MaxArraySize, 1001 unless configured, is one more than the largest
   /// index.
   std::uint64_t array_size = 1000;
+  std::uint64_t cpus = 1;      ///< Processors of an element, each for a trial at a time.
   std::uint64_t throttle = 0;  ///< Elements at a time; 0 for any.
   std::string time;            ///< As sbatch --time; empty for the partition's.
   std::string memory;          ///< As sbatch --mem; empty for the partition's.

@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "controller/common/errors.h"
@@ -32,15 +31,14 @@ struct StudyRequest {
   std::string study;
   std::string database;
   std::string shard;
-  std::string exchange;
   std::uint64_t jobs = 0;
   bool retry_failed = false;
   bool quiet = false;
 };
 
-/// "I/N"; "" is all.
-SearchPart ParseShard(const std::string& text) {
-  if (text.empty()) return {};
+/// The trials of the shard "I/N"; "" is all.
+std::vector<Trial> SelectShard(std::vector<Trial> trials, const std::string& text) {
+  if (text.empty()) return trials;
   long index = 0;
   long count = 0;
   const char* const end = text.data() + text.size();
@@ -48,13 +46,7 @@ SearchPart ParseShard(const std::string& text) {
   const bool good = error == std::errc() && slash != end && *slash == '/' &&
                     std::from_chars(slash + 1, end, count).ptr == end && 1 <= index && index <= count;
   if (!good) throw InputError("--shard: must be I/N with 1 <= I <= N, got " + Quote(text));
-  return {index - 1, count, {}};
-}
-
-/// The trials of the shard.
-std::vector<Trial> SelectShard(std::vector<Trial> trials, const std::string& text) {
-  const SearchPart part = ParseShard(text);
-  if (part.count > 1) std::erase_if(trials, [&](const Trial& trial) { return !part.is_mine(trial.number); });
+  std::erase_if(trials, [&](const Trial& trial) { return trial.number % count != index - 1; });
   return trials;
 }
 
@@ -87,17 +79,16 @@ std::vector<long> FindMissing(long count, const std::vector<long>& done) {
 
 RunOptions MakeRunOptions(const StudyRequest& request, ProgressBar* bar) {
   RunOptions options;
-  options.jobs =
-      static_cast<int>(request.jobs > 0 ? request.jobs : std::max(std::thread::hardware_concurrency(), 1U));
+  options.jobs = CountJobs(request.jobs);
   options.is_interrupted = IsInterrupted;
-  options.tell = [bar](long finished) { bar->Update(finished); };
+  options.report = [bar](long finished) { bar->Update(finished); };
   return options;
 }
 
 /// Forgets trials that failed; of a search also what followed from them.
 void RemoveFailed(const Study& study, StudyStore* store) {
   if (!study.is_search()) {
-    store->RemoveFailed(store->ListNumbers());
+    store->RemoveFailed();
     return;
   }
   for (const TrialRow& row : store->ReadRows()) {
@@ -124,14 +115,8 @@ std::vector<long> MakeTrials(const StudyInputs& inputs, const std::vector<Trial>
 /// The same for a search, of which only the batch at hand is known.
 std::vector<long> MakeSearch(const StudyInputs& inputs, const StudyRequest& request, StudyStore* store) {
   ProgressBar bar(inputs.study.name, CountTrials(inputs.study), request.quiet);
-  SearchPart part = ParseShard(request.shard);
-  part.exchange = request.exchange;
-  if (part.count == 1) {
-    RunSearch(inputs, MakeRunOptions(request, &bar), store);
-  } else {
-    RunSearchPart(inputs, MakeRunOptions(request, &bar), part, store);
-  }
-  SearchHistory history(inputs.study, FindSearchStart(inputs));
+  RunSearch(inputs, MakeRunOptions(request, &bar), store);
+  SearchHistory history(inputs.study, FindSearchStart(inputs.study));
   for (const TrialRow& row : StudyStore::Open(request.database).ReadRows()) history.Add(row);
   std::vector<long> missing;
   for (const Trial& trial : history.ListMissing()) missing.push_back(trial.number);
@@ -148,14 +133,8 @@ StudyStore OpenDatabase(const StudyInputs& inputs, const StudyRequest& request) 
 int RunStudy(const StudyRequest& request) {
   StudyInputs inputs = FindStudy(request.study);
   const Study& study = inputs.study;
-  if (study.is_search() && !request.shard.empty() && request.exchange.empty()) {
-    throw InputError(
-        "--shard: the trials of a search follow from one another: its parts need --exchange FOLDER, which "
-        "all of "
-        "them see");
-  }
-  if (!request.exchange.empty() && (!study.is_search() || request.shard.empty()))
-    throw InputError("--exchange: is for the parts of a search, with --shard");
+  if (study.is_search() && !request.shard.empty())
+    throw InputError("--shard: the trials of a search follow from one another: it is made by one command");
   const std::vector<Trial> trials =
       study.is_search() ? std::vector<Trial>() : SelectShard(ListTrials(study), request.shard);
   CheckTrials(&inputs);
@@ -236,13 +215,8 @@ void AddStudyCommand(Command app) {
   run.AddOption("--db", &request->database, "The study's database (SQLite), made when there is none")
       .TypeName("FILE.sqlite")
       .Required();
-  run.AddOption("--jobs", &request->jobs, "Trials at a time (all processors by default)")
-      .TypeName("N")
-      .Check(whole);
+  AddJobsOption(run, "Trials", &request->jobs);
   run.AddOption("--shard", &request->shard, "Only the I-th of N parts of the study").TypeName("I/N");
-  run.AddOption("--exchange", &request->exchange,
-                "Folder in which the parts of a search find each other's trials")
-      .TypeName("FOLDER");
   run.AddFlag("--retry-failed", &request->retry_failed, "Make trials again that crashed or timed out");
   add_quiet(run);
   run.SetAction([=] { return RunStudy(*request); });
@@ -268,6 +242,7 @@ void AddStudyCommand(Command app) {
                  "each makes several")
       .TypeName("N")
       .Check(whole);
+  slurm.AddOption("--cpus", &job->cpus, "Processors of an element (1)").TypeName("N").Check(whole);
   slurm.AddOption("--throttle", &job->throttle, "Elements that run at a time").TypeName("N").Check(whole);
   slurm
       .AddOption("--time", &job->time,
@@ -279,8 +254,8 @@ void AddStudyCommand(Command app) {
       .Check(CheckSlurmMemory);
   slurm.SetAction([=] {
     StudyInputs inputs = FindStudy(request->study);
-    if (inputs.study.is_search() && job->tasks > job->array_size)
-      throw InputError("--tasks: the parts of a search wait for each other: at most --array-size of them");
+    if (inputs.study.is_search() && job->tasks > 1)
+      throw InputError("--tasks: the trials of a search follow from one another: it is one task");
     CheckTrials(&inputs);  // what study run would refuse, must not be queued
     fmt::print("{}", MakeSlurmScript(inputs, request->study, *job));
     return kSuccess;

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -15,11 +14,12 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/interrupts.h"
+#include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/study/study_csv.h"
+#include "harness/study/study_page.h"
 #include "harness/study/study_progress.h"
-#include "harness/study/study_report.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck::cli {
@@ -34,26 +34,29 @@ std::string CheckInterval(const std::string& text) {
   return good ? "" : "must be from 0.1 to 86400 s, got " + Quote(text);
 }
 
-int ShowTrial(const std::string& database, long number) {
+void WriteJson(const std::string& file, const nlohmann::ordered_json& json) {
+  if (!file.empty()) OutputFile(file).Write(json.dump(2) + "\n");
+}
+
+int ShowTrial(const std::string& database, long number, const std::string& json) {
   const StudyStore store = StudyStore::Open(database);
   const Study& study = store.study();
   const std::optional<TrialRow> found = store.FindRow(number);
   if (!found) throw InputError(fmt::format("{}: trial {}: has no row", database, number));
   const TrialRow& row = *found;
+  WriteJson(json, ToJson(study, row));
+  if (json == "-") return kSuccess;
   fmt::print("trial {}, seed {}: {}{}{}\n", row.trial.number, row.trial.seed, NameOf(row.result.outcome),
              row.result.failure.empty() ? "" : ": ", row.result.failure);
-  size_t width = 0;
-  for (const Variation& variation : study.variations) width = std::max(width, variation.key.size());
-  for (const MetricInfo& metric : kMetrics) width = std::max(width, std::string_view(metric.name).size());
-  for (size_t i = 0; i < study.variations.size(); ++i) {
-    fmt::print("  {:<{}}  {}\n", study.variations[i].key, width,
-               FormatValue(study.variations[i], row.trial.parameters[i]));
-  }
+  const auto print = [](std::string_view name, const std::string& value) {
+    fmt::print("  {:<36}  {}\n", name, value);
+  };
+  for (size_t i = 0; i < study.variations.size(); ++i)
+    print(study.variations[i].key, FormatValue(study.variations[i], row.trial.parameters[i]));
   for (size_t i = 0; i < kMetrics.size(); ++i) {
     const double value = row.result.metrics[i];
-    const std::string unit = kMetrics[i].unit;
     if (std::isfinite(value))
-      fmt::print("  {:<{}}  {:.6g}{}\n", kMetrics[i].name, width, value, unit == "1" ? "" : " " + unit);
+      print(kMetrics[i].name, fmt::format("{:.6g}{}", value, ShowUnit(kMetrics[i].name)));
   }
   fmt::print("{}\n", MakeReplayCommand(study, row.trial));
   return kSuccess;
@@ -68,7 +71,7 @@ int WatchStudy(const std::string& database, double interval, const std::string& 
     std::fflush(stdout);
     if (!page.empty()) {
       OutputFile out(page);
-      out.Write(MakeStudyReport(store, progress.is_over ? 0.0 : interval));
+      out.Write(MakeStudyPage(SummariseStudy(store), progress.is_over ? 0.0 : interval));
     }
     if (progress.is_over) return kSuccess;
     const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(interval);
@@ -91,11 +94,14 @@ void AddStudyReadCommands(Command study) {
   add_database(report);
   report.AddOption("--out", out.get(), "The page (DB.html by default); - for standard output")
       .TypeName("FILE.html");
+  const auto json = std::make_shared<std::string>();
+  AddJsonOption(report, "the same data", json.get());
   report.SetAction([=] {
     RequirePageName(*out);
-    const StudyStore store = StudyStore::Open(*database);
-    OutputFile file(out->empty() ? *database + ".html" : *out);
-    file.Write(MakeStudyReport(store));
+    const StudySummary summary = SummariseStudy(StudyStore::Open(*database));
+    WriteJson(*json, summary.json);
+    if (!json->empty() && out->empty()) return kSuccess;
+    OutputFile(out->empty() ? *database + ".html" : *out).Write(MakeStudyPage(summary));
     return kSuccess;
   });
 
@@ -103,7 +109,8 @@ void AddStudyReadCommands(Command study) {
   add_database(show);
   const auto number = std::make_shared<long>(0);
   show.AddOption("TRIAL", number.get(), "Its number").Required();
-  show.SetAction([=] { return ShowTrial(*database, *number); });
+  AddJsonOption(show, "the trial", json.get());
+  show.SetAction([=] { return ShowTrial(*database, *number, *json); });
 
   Command csv = study.AddCommand("export", "Write all trials as CSV");
   add_database(csv);
@@ -117,7 +124,7 @@ void AddStudyReadCommands(Command study) {
     return kSuccess;
   });
 
-  Command watch = study.AddCommand("watch", "Tell how far a study has come, until it is done");
+  Command watch = study.AddCommand("watch", "Print how far a study has come, until it is done");
   add_database(watch);
   const auto interval = std::make_shared<double>(5.0);
   watch.AddOption("--interval", interval.get(), "Seconds between two looks")

@@ -18,7 +18,6 @@
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
-#include "harness/cli/shared_request.h"
 #include "harness/view/recording.h"
 #include "harness/view/save_scenario.h"
 #include "harness/view/viewer.h"
@@ -152,9 +151,7 @@ void AddViewCommand(Command app, const std::string& command_line) {
   command.AddOption("--out", &request->out, "Folder for log and summary, made by the run (none by default)")
       .TypeName("DIR");
   AddOverrideOptions(command, &request->overrides);
-  command.AddOption("--seed", &request->seed, "Vary posture and grasp at random; 0 does not")
-      .TypeName("N")
-      .Check(WholeNumber(0, std::numeric_limits<std::uint64_t>::max()));
+  AddSeedOption(command, &request->seed);
   command
       .AddOption("--save", &request->save,
                  "Where S saves the run as a scenario (SCENARIO-live.toml by default)")

@@ -63,10 +63,9 @@ double CalcCondition(const RobotDescription& robot, const RobotSpec& spec) {
   Matrix6Xd J(6, n);
   Matrix6Xd J_dot(6, n);
   // Coupled joints are one coordinate.
-  MatrixXd T = MatrixXd::Identity(n, n);
   const MatrixXd couplings = CalcCouplingMap(robot);
   const int base = model.num_base_velocities();
-  T = MatrixXd::Zero(n, base + couplings.cols());
+  MatrixXd T = MatrixXd::Zero(n, base + couplings.cols());
   T.topLeftCorner(base, base).setIdentity();
   T.bottomRightCorner(couplings.rows(), couplings.cols()) = couplings;
   std::vector<double> conditions;
@@ -108,15 +107,13 @@ class JointAudit {
  private:
   AuditFinding& Add(AuditLevel level, const std::string& check, size_t joint, const std::string& text) {
     const int line = robot_.joints[joint].line;
-    findings_.push_back(
-        {level, check, "joint " + NameInFile(spec_.joints[joint]), line, text, {}, AuditFinding::kNoBody});
-    return findings_.back();
+    return findings_.emplace_back(
+        AuditFinding{level, check, "joint " + spec_.joints[joint].name, line, text});
   }
 
   void AuditRange(size_t i) {
     const Joint& joint = spec_.joints[i];
     if (!robot_.joints[i].states_range) return;
-    if (joint.type == JointType::kBall && joint.ball_axis > 0) return;  // told of the first entry
     const std::string range = FormatNumbers(Vector2d(joint.lower, joint.upper));
     const bool is_revolute = joint.type != JointType::kPrismatic;
     const double widest = std::max(std::abs(joint.lower), std::abs(joint.upper));
@@ -169,7 +166,7 @@ class JointAudit {
     for (size_t i = 0; i < count; ++i) {
       const Joint& joint = spec_.joints[i];
       const bool is_ball = joint.type == JointType::kBall;
-      if (joint.armature > 0.0 || (is_ball && joint.ball_axis < 2)) continue;
+      if (joint.armature > 0.0) continue;
       const std::string end = is_end[i] ? ", the end of a chain" : "";
       if (mass[i] <= 0.0) {
         Add(AuditLevel::kSuspicious, "load", i, "moves no mass" + end + ": M is singular").body =
@@ -195,8 +192,7 @@ class JointAudit {
     std::map<std::string, std::string> joints;
     const auto check = [&](std::map<std::string, std::string>* known, const std::string& kind,
                            const std::string& name, int line) {
-      AuditFinding finding{AuditLevel::kSuspicious, "name", kind + " " + name, line, "", {},
-                           AuditFinding::kNoBody};
+      AuditFinding finding{AuditLevel::kSuspicious, "name", kind + " " + name, line};
       if (name.front() == ' ' || name.back() == ' ') {
         finding.text = "its name begins or ends with a blank";
         findings_.push_back(finding);
@@ -211,7 +207,7 @@ class JointAudit {
       check(&joints, "joint", spec_.joints[i].name, robot_.joints[i].line);
     }
     for (const std::string& name : robot_.unused) {
-      findings_.push_back({AuditLevel::kNote, "name", name, 0, "nothing uses it", {}, AuditFinding::kNoBody});
+      findings_.push_back({AuditLevel::kNote, "name", name, 0, "nothing uses it"});
     }
   }
 
@@ -224,7 +220,7 @@ class JointAudit {
 
 const char* NameOf(AuditLevel level) {
   if (level == AuditLevel::kImpossible) return "impossible";
-  return level == AuditLevel::kSuspicious ? "odd" : "note";
+  return level == AuditLevel::kSuspicious ? "suspicious" : "note";
 }
 
 bool AuditResult::IsGood() const {

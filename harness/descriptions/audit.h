@@ -1,6 +1,6 @@
 #pragma once
 
-// One description alone: what no body can have, what is odd, and what it does to the mass matrix.
+// One description alone: what no body can have, what is suspicious, and what it does to the mass matrix.
 
 #include <optional>
 #include <string>
@@ -16,18 +16,18 @@ enum class AuditLevel {
   kNote,        ///< Worth knowing.
 };
 
-/// "impossible", "odd" or "note".
+/// "impossible", "suspicious" or "note".
 const char* NameOf(AuditLevel level);
 
 /// One finding.
 struct AuditFinding {
   AuditLevel level = AuditLevel::kNote;
-  std::string check;  ///< Such as "inertia" or "density".
-  std::string where;  ///< Such as "link upper_arm" or "joint elbow".
-  int line = 0;       ///< Of the file; 0 when it is not known.
-  std::string text;   ///< What is found, with its values.
+  std::string check;      ///< Such as "inertia" or "density".
+  std::string where;      ///< Such as "link upper_arm" or "joint elbow".
+  int line = 0;           ///< Of the file; 0 when it is not known.
+  std::string text = {};  ///< What is found, with its values.
   /// Condition number of M with a plausible body there instead, for findings about one moving body.
-  std::optional<double> condition_without;
+  std::optional<double> condition_without = {};
   /// The joint that moves the body it is about, -1 for the base.
   int body = kNoBody;
 

@@ -1,5 +1,7 @@
 // Bodies: can they be, do they fit their geometry, are left and right alike?
 
+#include <fmt/format.h>
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
@@ -8,7 +10,6 @@
 #include <limits>
 #include <map>
 #include <numbers>
-#include <sstream>
 
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
@@ -17,16 +18,9 @@
 namespace dexcheck {
 namespace {
 
-/// Three or four digits: what a person reads.
-std::string Format(double value) {
-  std::ostringstream text;
-  text.precision(4);
-  text << value;
-  return text.str();
-}
-std::string Format(const Vector3d& v) {
-  return "[" + Format(v[0]) + ", " + Format(v[1]) + ", " + Format(v[2]) + "]";
-}
+/// Four digits: what a person reads.
+std::string Format(double value) { return fmt::format("{:.4g}", value); }
+std::string Format(const Vector3d& v) { return fmt::format("[{:.4g}, {:.4g}, {:.4g}]", v[0], v[1], v[2]); }
 
 Vector3d CalcMoments(const Matrix3d& inertia) {
   return Eigen::SelfAdjointEigenSolver<Matrix3d>(0.5 * (inertia + inertia.transpose()),
@@ -244,13 +238,8 @@ class MirrorAudit {
 
  private:
   void Add(const DescribedPart& left, const DescribedPart& right, const std::string& text) {
-    findings_.push_back({AuditLevel::kSuspicious,
-                         "mirror",
-                         "link " + right.name,
-                         right.line,
-                         text + " (against " + left.name + ")",
-                         {},
-                         AuditFinding::kNoBody});
+    findings_.push_back({AuditLevel::kSuspicious, "mirror", "link " + right.name, right.line,
+                         text + " (against " + left.name + ")"});
   }
 
   void ComparePair(const DescribedPart& left, const DescribedPart& right) {

@@ -15,16 +15,6 @@ MassProperties WithCom(const ComparedBody& body, const Vector3d& com) {
   return {body.given.mass, com, body.given.inertia};
 }
 
-/// [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] from and to a tensor.
-std::array<double, 6> ToList(const Matrix3d& I) {
-  return {I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)};
-}
-Matrix3d FromList(const std::array<double, 6>& I) {
-  Matrix3d tensor;
-  tensor << I[0], I[3], I[4], I[3], I[1], I[5], I[4], I[5], I[2];
-  return tensor;
-}
-
 /// But for what rotations leave by rounding.
 bool IsDiagonal(const Matrix3d& I) {
   constexpr double kRounding = 1e-12;  // of the trace
@@ -79,40 +69,33 @@ void AddInertiaFaults(std::vector<BodyFault>* faults) {
     const Matrix3d R = body.parts[0].X_LC.linear();
     return WithInertia(body, R * body.given.inertia * R.transpose());
   });
-  static constexpr struct {
-    std::array<int, 3> axes;
-    const char* text;
-  } kPermutations[] = {{{1, 0, 2}, "with the axes x and y exchanged"},
-                       {{2, 1, 0}, "with the axes x and z exchanged"},
-                       {{0, 2, 1}, "with the axes y and z exchanged"},
-                       {{1, 2, 0}, "with the axes in the order y, z, x"},
-                       {{2, 0, 1}, "with the axes in the order z, x, y"}};
-  for (const auto& permutation : kPermutations) {
-    add(permutation.text, [axes = permutation.axes](const ComparedBody& body) {
+  for (const auto& [axes, order] : kAxisOrders) {
+    add(std::string("with the axes ") + order, [axes = axes](const ComparedBody& body) {
       Matrix3d inertia;
-      for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j)
-          inertia(axes[static_cast<size_t>(i)], axes[static_cast<size_t>(j)]) = body.given.inertia(i, j);
+      for (size_t i = 0; i < 3; ++i) {
+        for (size_t j = 0; j < 3; ++j)
+          inertia(axes[i], axes[j]) = body.given.inertia(static_cast<int>(i), static_cast<int>(j));
       }
       return WithInertia(body, inertia);
     });
   }
   // Lists of six numbers in other orders than [xx, yy, zz, xy, xz, yz]: which place the number of each
   // belongs to.
-  static constexpr struct {
-    std::array<int, 6> place;
-    const char* text;
-  } kOrders[] = {{{0, 3, 4, 1, 5, 2}, "with its six numbers in the order xx, xy, xz, yy, yz, zz"},
-                 {{0, 3, 1, 4, 5, 2}, "with its six numbers in the order xx, xy, yy, xz, yz, zz"},
-                 {{0, 1, 2, 5, 4, 3}, "with the products in the order yz, xz, xy"},
-                 {{0, 1, 2, 3, 5, 4}, "with the products in the order xy, yz, xz"},
-                 {{0, 1, 2, 4, 3, 5}, "with the products in the order xz, xy, yz"}};
-  for (const auto& order : kOrders) {
-    add(order.text, [place = order.place](const ComparedBody& body) {
-      const std::array<double, 6> given = ToList(body.given.inertia);
+  static constexpr std::pair<std::array<size_t, 6>, const char*> kOrders[] = {
+      {{0, 3, 4, 1, 5, 2}, "with its six numbers in the order xx, xy, xz, yy, yz, zz"},
+      {{0, 3, 1, 4, 5, 2}, "with its six numbers in the order xx, xy, yy, xz, yz, zz"},
+      {{0, 1, 2, 5, 4, 3}, "with the products in the order yz, xz, xy"},
+      {{0, 1, 2, 3, 5, 4}, "with the products in the order xy, yz, xz"},
+      {{0, 1, 2, 4, 3, 5}, "with the products in the order xz, xy, yz"}};
+  for (const auto& [place, text] : kOrders) {
+    add(text, [place = place](const ComparedBody& body) {
+      const Matrix3d& I = body.given.inertia;
+      const std::array<double, 6> given = {I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)};
       std::array<double, 6> right = given;
-      for (size_t i = 0; i < 6; ++i) right[static_cast<size_t>(place[i])] = given[i];
-      return WithInertia(body, FromList(right));
+      for (size_t i = 0; i < 6; ++i) right[place[i]] = given[i];
+      Matrix3d tensor;
+      tensor << right[0], right[3], right[4], right[3], right[1], right[5], right[4], right[5], right[2];
+      return WithInertia(body, tensor);
     });
   }
   static constexpr std::pair<double, const char*> kUnits[] = {
@@ -153,22 +136,15 @@ void AddComFaults(std::vector<BodyFault>* faults) {
       return WithCom(body, com);
     });
   }
-  static constexpr std::pair<std::array<int, 3>, const char*> kPermutations[] = {
-      {{1, 0, 2}, "with x and y exchanged"},
-      {{2, 1, 0}, "with x and z exchanged"},
-      {{0, 2, 1}, "with y and z exchanged"},
-      {{1, 2, 0}, "in the order y, z, x"},
-      {{2, 0, 1}, "in the order z, x, y"}};
-  for (const auto& [axes, text] : kPermutations) {
-    add(text, [axes = axes](const ComparedBody& body) {
+  for (size_t order = 0; order < std::size(kAxisOrders); ++order) {
+    const auto& [axes, text] = kAxisOrders[order];
+    add((order < kAxisExchanges ? "with " : "") + std::string(text), [axes = axes](const ComparedBody& body) {
       Vector3d com;
-      for (int i = 0; i < 3; ++i) com[axes[static_cast<size_t>(i)]] = body.given.com[i];
+      for (size_t i = 0; i < 3; ++i) com[axes[i]] = body.given.com[static_cast<int>(i)];
       return WithCom(body, com);
     });
   }
-  static constexpr std::pair<double, const char*> kUnits[] = {
-      {1e-3, "as if in mm"}, {1e-2, "as if in cm"}, {0.0254, "as if in inches"}, {1e3, "divided by 1000"}};
-  for (const auto& [factor, text] : kUnits) {
+  for (const auto& [factor, text] : kLengthUnits) {
     add(text, [factor = factor](const ComparedBody& body) { return WithCom(body, factor * body.given.com); });
   }
 }
@@ -180,26 +156,21 @@ void AddMassFaults(std::vector<BodyFault>* faults) {
                                                               {1e3, "divided by 1000"},
                                                               {2.0, "halved"},
                                                               {0.5, "doubled"}};
-  for (const auto& [factor, text] : kUnits) {
-    faults->push_back({"mass", "masses", text, [factor = factor](const ComparedBody& body) {
-                         return MassProperties{factor * body.given.mass, body.given.com, body.given.inertia};
+  const auto add = [&](const char* noun, const char* plural, const char* text, double mass, double com,
+                       double inertia) {
+    faults->push_back({noun, plural, text, [=](const ComparedBody& body) {
+                         const MassProperties& given = body.given;
+                         return MassProperties{mass * given.mass, com * given.com, inertia * given.inertia};
                        }});
-    faults->push_back(
-        {"mass with its inertia", "masses with their inertias", text,
-         [factor = factor](const ComparedBody& body) {
-           return MassProperties{factor * body.given.mass, body.given.com, factor * body.given.inertia};
-         }});
+  };
+  for (const auto& [factor, text] : kUnits) {
+    add("mass", "masses", text, factor, 1.0, 1.0);
+    add("mass with its inertia", "masses with their inertias", text, factor, 1.0, factor);
   }
-  // Com and inertia in mm at once, as drawing programs write them.
-  faults->push_back(
-      {"centre of mass and inertia", "centres of mass and inertias", "as if in mm and kg mm^2",
-       [](const ComparedBody& body) {
-         return MassProperties{body.given.mass, 1e-3 * body.given.com, 1e-6 * body.given.inertia};
-       }});
-  faults->push_back(
-      {"body", "bodies", "as if in g, mm and g mm^2", [](const ComparedBody& body) {
-         return MassProperties{1e-3 * body.given.mass, 1e-3 * body.given.com, 1e-9 * body.given.inertia};
-       }});
+  // As drawing programs write them.
+  add("centre of mass and inertia", "centres of mass and inertias", "as if in mm and kg mm^2", 1.0, 1e-3,
+      1e-6);
+  add("body", "bodies", "as if in g, mm and g mm^2", 1e-3, 1e-3, 1e-9);
 }
 
 }  // namespace

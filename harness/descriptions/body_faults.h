@@ -3,9 +3,11 @@
 // Faults of one body that people make, each with what undoes it.
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/descriptions/hypotheses.h"
@@ -35,6 +37,19 @@ struct BodyFault {
   std::string text;    ///< "as if given about the link's origin"
   UndoBodyFault undo;
 };
+
+/// Lengths in another unit: right is the factor times what is given.
+inline constexpr std::pair<double, const char*> kLengthUnits[] = {
+    {1e-3, "as if in mm"}, {1e-2, "as if in cm"}, {0.0254, "as if in inches"}, {1e3, "divided by 1000"}};
+
+/// Axes in another order: axis i of what is given is axis [i] of what is right. First those of two axes.
+inline constexpr std::pair<std::array<int, 3>, const char*> kAxisOrders[] = {
+    {{1, 0, 2}, "x and y exchanged"},
+    {{2, 1, 0}, "x and z exchanged"},
+    {{0, 2, 1}, "y and z exchanged"},
+    {{1, 2, 0}, "in the order y, z, x"},
+    {{2, 0, 1}, "in the order z, x, y"}};
+inline constexpr size_t kAxisExchanges = 3;
 
 /// Those that are known, of inertias, of centres of mass, of masses.
 std::vector<BodyFault> ListBodyFaults();

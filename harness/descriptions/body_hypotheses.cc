@@ -1,7 +1,8 @@
 // Faults of bodies: each is undone, and the result is compared with what would be right.
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
 #include "controller/common/text.h"
@@ -12,25 +13,13 @@
 namespace dexcheck {
 namespace {
 
-/// What a person reads of a body.
+/// Seven digits: what a person reads of a body.
 std::string Describe(const MassProperties& body) {
-  const auto round = [](double x) {
-    constexpr double kDigits = 1e6;
-    const double size = std::pow(10.0, std::floor(std::log10(std::max(std::abs(x), 1e-300))));
-    return x == 0.0 ? 0.0 : std::round(x / size * kDigits) / kDigits * size;
-  };
-  const Matrix3d& I = body.inertia;
-  const auto list = [&](std::initializer_list<double> values) {
-    std::string text;
-    char buffer[32];
-    for (const double value : values) {
-      std::snprintf(buffer, sizeof buffer, "%.7g", round(value));
-      text += (text.empty() ? "[" : ", ") + std::string(buffer);
-    }
-    return text + "]";
-  };
-  return "mass " + FormatNumber(round(body.mass)) + ", com " + list({body.com[0], body.com[1], body.com[2]}) +
-         ", inertia " + list({I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)});
+  const Matrix3d I = body.inertia + Matrix3d::Zero();  // no -0
+  const Vector3d c = body.com + Vector3d::Zero();
+  return fmt::format(
+      "mass {:.7g}, com [{:.7g}, {:.7g}, {:.7g}], inertia [{:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}, {:.7g}]",
+      body.mass, c[0], c[1], c[2], I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2));
 }
 
 class BodySearch {
@@ -166,15 +155,16 @@ class BodySearch {
         if (!is_open_[i] || !is_open_[j]) continue;
         const MassProperties& a = bodies_[i].given;
         const MassProperties& b = bodies_[j].given;
-        const std::string links = "links " + bodies_[i].link + " and " + bodies_[j].link;
-        if (IsRight(i, b) && IsRight(j, a)) {
-          Add(links + ": their bodies look exchanged", {i, j});
-        } else if (IsRight(i, {b.mass, a.com, a.inertia}) && IsRight(j, {a.mass, b.com, b.inertia})) {
-          Add(links + ": their masses look exchanged", {i, j});
-        } else if (IsRight(i, {a.mass, b.com, a.inertia}) && IsRight(j, {b.mass, a.com, b.inertia})) {
-          Add(links + ": their centres of mass look exchanged", {i, j});
-        } else if (IsRight(i, {a.mass, a.com, b.inertia}) && IsRight(j, {b.mass, b.com, a.inertia})) {
-          Add(links + ": their inertias look exchanged", {i, j});
+        const std::pair<const char*, std::pair<MassProperties, MassProperties>> exchanges[] = {
+            {"bodies", {b, a}},
+            {"masses", {{b.mass, a.com, a.inertia}, {a.mass, b.com, b.inertia}}},
+            {"centres of mass", {{a.mass, b.com, a.inertia}, {b.mass, a.com, b.inertia}}},
+            {"inertias", {{a.mass, a.com, b.inertia}, {b.mass, b.com, a.inertia}}}};
+        for (const auto& [what, exchanged] : exchanges) {
+          if (!IsRight(i, exchanged.first) || !IsRight(j, exchanged.second)) continue;
+          Add("links " + bodies_[i].link + " and " + bodies_[j].link + ": their " + what + " look exchanged",
+              {i, j});
+          break;
         }
       }
     }

@@ -1,7 +1,6 @@
 #include "harness/descriptions/compiled_inertias.h"
 
 #include <fmt/format.h>
-#include <tinyxml2.h>
 
 #include <algorithm>
 #include <limits>
@@ -9,13 +8,13 @@
 #include <sstream>
 #include <vector>
 
-#include "controller/common/errors.h"
 #include "controller/model/body_frame.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/link_frames.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/joined_mjcf.h"
+#include "harness/engine/mjcf_file.h"
+#include "harness/engine/xml.h"
 
 namespace dexcheck {
 namespace {
@@ -27,11 +26,8 @@ class FullInertias {
  public:
   FullInertias(const std::filesystem::path& mjcf, const mjModel& engine) : engine_(engine) {
     try {
-      JoinedMjcf file(mjcf);
-      for (const XMLElement* world = file.root()->FirstChildElement("worldbody"); world != nullptr;
-           world = world->NextSiblingElement("worldbody")) {
-        Visit(*world);
-      }
+      const MjcfFile file(mjcf);
+      for (const XMLElement* world : ListChildren(file.root(), "worldbody")) Visit(*world);
     } catch (const InputError&) {
       number_ = -1;
     }
@@ -47,12 +43,10 @@ class FullInertias {
 
  private:
   void Visit(const XMLElement& parent) {
-    for (const XMLElement* body = parent.FirstChildElement("body"); body != nullptr;
-         body = body->NextSiblingElement("body")) {
+    for (const XMLElement* body : ListChildren(&parent, "body")) {
       ++number_;
       const XMLElement* const inertial = body->FirstChildElement("inertial");
-      const char* const text = inertial == nullptr ? nullptr : inertial->Attribute("fullinertia");
-      std::istringstream numbers(text == nullptr ? "" : text);
+      std::istringstream numbers(inertial == nullptr ? "" : ReadAttribute(*inertial, "fullinertia"));
       Vector6d I;
       if (numbers >> I[0] >> I[1] >> I[2] >> I[3] >> I[4] >> I[5]) {
         // clang-format off

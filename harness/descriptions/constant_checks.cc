@@ -8,7 +8,7 @@
 
 #include "harness/descriptions/engine_only.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/torus_collision.h"
+#include "harness/engine/exact_collision.h"
 #include "harness/engine/wheel_inertia.h"
 
 namespace dexcheck {
@@ -76,15 +76,16 @@ class ConstantComparison {
   }
 
   void CompareJoints() {
-    for (int i = 0; i < model_.num_joints(); ++i) {
-      const int dof = adapter_.joint_dofs()[static_cast<size_t>(i)];
-      Compare("joint_damping", AtJoint(i), model_.joints()[static_cast<size_t>(i)].damping,
-              engine_.dof_damping[dof]);
+    const std::vector<int>& dofs = adapter_.joint_dofs();
+    for (int i = 0; i < model_.num_dofs(); ++i) {
+      const int joint = model_.joint_of_dof(i);
+      Compare("joint_damping", AtJoint(joint), model_.joints()[static_cast<size_t>(joint)].damping,
+              engine_.dof_damping[dofs[static_cast<size_t>(i)]]);
     }
-    for (int i = 0; i < model_.num_joints(); ++i) {
-      const int dof = adapter_.joint_dofs()[static_cast<size_t>(i)];
-      Compare("joint_armature", AtJoint(i), model_.joints()[static_cast<size_t>(i)].armature,
-              engine_.dof_armature[dof]);
+    for (int i = 0; i < model_.num_dofs(); ++i) {
+      const int joint = model_.joint_of_dof(i);
+      Compare("joint_armature", AtJoint(joint), model_.joints()[static_cast<size_t>(joint)].armature,
+              engine_.dof_armature[dofs[static_cast<size_t>(i)]]);
     }
     for (int i = 0; i < model_.num_joints(); ++i) {
       const int id = adapter_.joint_ids()[static_cast<size_t>(i)];

@@ -259,7 +259,7 @@ Completion CompleteFromEngine(const mjModel& engine, const std::string& source, 
   if (is_table) {
     other.spec.source = source;
     for (Joint& joint : other.spec.joints) {
-      const int id = FindByName(engine, mjOBJ_JOINT, NameInFile(joint));
+      const int id = FindByName(engine, mjOBJ_JOINT, joint.name);
       if (id < 0) continue;
       const int dof = engine.jnt_dofadr[id];
       joint.armature = engine.dof_armature[dof];
@@ -284,8 +284,10 @@ void TakeIgnored(const RobotSpec& robot, const std::vector<std::string>& ignore,
                                                                     : nullptr;
     if (values == nullptr || !Ignores(constant.word, ignore)) continue;
     for (const Joint& joint : robot.joints) {
-      const int id = FindByName(*engine, mjOBJ_JOINT, NameInFile(joint));
-      if (id >= 0) values[engine->jnt_dofadr[id]] = joint.*constant.value;
+      const int id = FindByName(*engine, mjOBJ_JOINT, joint.name);
+      if (id < 0) continue;
+      for (int k = 0; k < CountVelocities(joint.type); ++k)
+        values[engine->jnt_dofadr[id] + k] = joint.*constant.value;
     }
   }
 }
@@ -318,7 +320,8 @@ void AddOneSided(const RobotModel& model, const std::vector<ConstantFinding>& on
   }
   for (ConstantFinding finding : one_sided) {
     const Joint& joint = model.joints()[static_cast<size_t>(finding.location.first)];
-    const double M_jj = inertia[base + finding.location.first];
+    const int first = base + model.dof(finding.location.first);
+    const double M_jj = inertia.segment(first, CountVelocities(joint.type)).minCoeff();
     const double value = std::max(finding.model, finding.engine);
     const bool turns = joint.type != JointType::kPrismatic;
     if (finding.check == "joint_armature") {

@@ -12,8 +12,8 @@
 
 #include "harness/engine/data_without_contacts.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/exact_collision.h"
 #include "harness/engine/mujoco_release.h"
-#include "harness/engine/torus_collision.h"
 
 namespace dexcheck {
 namespace {

@@ -1,5 +1,7 @@
 #include "harness/descriptions/hypotheses.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -54,49 +56,44 @@ std::vector<Hypothesis> FindConstantHypotheses(const RobotDescription& a, const 
   struct Constant {
     const char* text;
     double factor;
-    bool (*states)(const DescribedJoint&);
-    double (*value)(const Joint&, int);
-    int count;
-    bool only_revolute;
+    bool DescribedJoint::*states;
+    std::vector<double Joint::*> values;
   };
   constexpr double kDegrees = kPi / 180.0;
-  const auto lower_upper = [](const Joint& joint, int k) { return k == 0 ? joint.lower : joint.upper; };
-  const auto damping = [](const Joint& joint, int) { return joint.damping; };
-  const auto armature = [](const Joint& joint, int) { return joint.armature; };
-  const auto states_range = [](const DescribedJoint& joint) { return joint.states_range; };
-  const auto states_damping = [](const DescribedJoint& joint) { return joint.states_damping; };
-  const auto states_armature = [](const DescribedJoint& joint) { return joint.states_armature; };
   const Constant constants[] = {
-      {"ranges look as if in degrees", kDegrees, states_range, lower_upper, 2, true},
-      {"damping looks as if per degree (N m s/deg)", 1.0 / kDegrees, states_damping, damping, 1, true},
-      {"damping looks as if times pi / 180", kDegrees, states_damping, damping, 1, true},
-      {"armature looks as if in g cm^2", 1e-7, states_armature, armature, 1, true},
-      {"armature looks as if in kg mm^2", 1e-6, states_armature, armature, 1, true}};
+      {"ranges look as if in degrees",
+       kDegrees,
+       &DescribedJoint::states_range,
+       {&Joint::lower, &Joint::upper}},
+      {"damping looks as if per degree (N m s/deg)",
+       1.0 / kDegrees,
+       &DescribedJoint::states_damping,
+       {&Joint::damping}},
+      {"damping looks as if times pi / 180", kDegrees, &DescribedJoint::states_damping, {&Joint::damping}},
+      {"armature looks as if in g cm^2", 1e-7, &DescribedJoint::states_armature, {&Joint::armature}},
+      {"armature looks as if in kg mm^2", 1e-6, &DescribedJoint::states_armature, {&Joint::armature}}};
   std::vector<Hypothesis> found;
   for (const Constant& constant : constants) {
     std::vector<std::string> joints;
     for (size_t i = 0; i < b_of_a.size(); ++i) {
       const auto j = static_cast<size_t>(b_of_a[i]);
       const Joint& own = a.spec.joints[i];
-      const Joint& other = b.spec.joints[j];
-      if (!constant.states(a.joints[i]) || !constant.states(b.joints[j])) continue;
-      if (constant.only_revolute && own.type == JointType::kPrismatic) continue;
+      if (!(a.joints[i].*constant.states) || !(b.joints[j].*constant.states)) continue;
+      if (own.type == JointType::kPrismatic) continue;
       bool explains = false;
       bool fits = true;
-      for (int k = 0; k < constant.count; ++k) {
-        const double given = constant.value(own, k);
-        const double right = constant.value(other, k);
-        explains = explains || std::abs(given - right) > tolerance * std::abs(right);
-        fits = fits && std::abs(constant.factor * given - right) <= tolerance * std::abs(right);
+      for (double Joint::*const value : constant.values) {
+        const double right = b.spec.joints[j].*value;
+        explains = explains || std::abs(own.*value - right) > tolerance * std::abs(right);
+        fits = fits && std::abs(constant.factor * (own.*value) - right) <= tolerance * std::abs(right);
       }
       if (explains && fits) joints.push_back(own.name);
     }
     if (joints.empty()) continue;
     Hypothesis hypothesis;
-    hypothesis.text = std::string(joints.size() == 1 ? "joint " + joints[0] + ": " : "") + constant.text +
-                      (joints.size() == 1 ? ""
-                                          : ": " + std::to_string(joints.size()) + " of " +
-                                                std::to_string(b_of_a.size()) + " joints");
+    hypothesis.text = joints.size() == 1
+                          ? fmt::format("joint {}: {}", joints[0], constant.text)
+                          : fmt::format("{}: {} of {} joints", constant.text, joints.size(), b_of_a.size());
     hypothesis.explained = 1.0;
     found.push_back(hypothesis);
   }

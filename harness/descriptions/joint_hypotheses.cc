@@ -2,7 +2,6 @@
 // then.
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -10,6 +9,7 @@
 
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
+#include "harness/descriptions/body_faults.h"
 #include "harness/descriptions/hypotheses.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/parameter_writer.h"
@@ -56,9 +56,7 @@ std::vector<JointFault> ListJointFaults() {
       return row;
     });
   };
-  static constexpr std::pair<double, const char*> kUnits[] = {
-      {1e-3, "as if in mm"}, {1e-2, "as if in cm"}, {0.0254, "as if in inches"}, {1e3, "divided by 1000"}};
-  for (const auto& [factor, text] : kUnits) {
+  for (const auto& [factor, text] : kLengthUnits) {
     of_origin(text, [factor = factor](const Pose& X) { return Vector3d(factor * X.translation()); });
   }
   of_origin("turned around (its sign)", [](const Pose& X) { return Vector3d(-X.translation()); });
@@ -71,12 +69,9 @@ std::vector<JointFault> ListJointFaults() {
   }
   of_origin("as if given along the link's axes instead of the parent's",
             [](const Pose& X) { return Vector3d(X.linear() * X.translation()); });
-  static constexpr std::pair<std::array<int, 3>, const char*> kPermutations[] = {
-      {{1, 0, 2}, "with x and y exchanged"},
-      {{2, 1, 0}, "with x and z exchanged"},
-      {{0, 2, 1}, "with y and z exchanged"}};
-  for (const auto& [axes, text] : kPermutations) {
-    of_origin(text, [axes = axes](const Pose& X) {
+  for (size_t order = 0; order < kAxisExchanges; ++order) {
+    const auto& [axes, text] = kAxisOrders[order];
+    of_origin("with " + std::string(text), [axes = axes](const Pose& X) {
       const Vector3d& p = X.translation();
       return Vector3d(p[axes[0]], p[axes[1]], p[axes[2]]);
     });
@@ -442,9 +437,7 @@ std::vector<OwnRow> ListOwnRows(const RobotDescription& robot) {
     row.is_revolute = joint.type != JointType::kPrismatic;
     row.X_PL = X_PL0.inverse() * joint.X_PB *
                CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d) * X_iL;
-    // A ball's entries turn about the link's own axes one after the other.
-    const int axis = joint.type == JointType::kBall ? joint.ball_axis : 2;
-    row.axis = X_iL.linear().row(axis).transpose();
+    row.axis = X_iL.linear().row(2).transpose();  // one of those that a ball joint turns about
     row.body = ExpressIn(joint.body, X_iL.inverse());
     // The own frame may stand beside the axis, as an MJCF's does: then the row's place is on it.
     const Vector3d on_axis = X_iL.inverse().translation();

@@ -32,6 +32,7 @@ class MjcfDescriptionReader {
       : engine_(engine), source_(std::move(source)), other_equalities_(static_cast<int>(engine.neq)) {}
 
   RobotDescription Read() {
+    robot_.format = RobotFormat::kMjcf;
     robot_.spec.name = *engine_.names == '\0' ? source_ : engine_.names;
     robot_.spec.source = source_;
     robot_.spec.gravity = MapVector(engine_.opt.gravity);
@@ -39,8 +40,7 @@ class MjcfDescriptionReader {
     for (int body = 1; body < engine_.nbody; ++body) AddBody(body);
     if (robot_.spec.joints.empty() && floating_ <= 0)
       throw InputError(source_ + ": must have a joint: nothing in it moves");
-    robot_.spec.base.body = Combine(base_parts_);
-    for (size_t i = 0; i < robot_.spec.joints.size(); ++i) robot_.spec.joints[i].body = Combine(parts_[i]);
+    FuseParts(&robot_);
     AddSites();
     AddCouplings();
     NoteTheRest();
@@ -111,9 +111,6 @@ class MjcfDescriptionReader {
     const MassProperties principal{engine_.body_mass[body], Vector3d::Zero(), moments.asDiagonal()};
     const Pose X_LC = MapPose(engine_.body_ipos + 3 * body, engine_.body_iquat + 4 * body);
     AddPart(body, place, ExpressIn(principal, X_LC), X_LC);
-    if (principal.mass <= 0.0) return;
-    const MassProperties whole = ExpressIn(principal, place.X_iL * X_LC);
-    (place.joint < 0 ? base_parts_ : parts_[static_cast<size_t>(place.joint)]).push_back(whole);
   }
 
   void AddPart(int body, const Place& place, const MassProperties& mass, const Pose& X_LC) {
@@ -204,25 +201,11 @@ class MjcfDescriptionReader {
     stated.states_range = engine_.jnt_limited[id] != 0;
     joint.lower = stated.states_range ? engine_.jnt_range[2 * id] : -kPi;
     joint.upper = stated.states_range ? engine_.jnt_range[2 * id + 1] : kPi;
-    if (type == mjJNT_BALL) {
-      joint.lower = 0.0;
-      for (int axis_index = 0; axis_index < 2; ++axis_index) {
-        DescribedJoint within = stated;
-        within.X_iL = Pose::Identity();
-        AddEntry(id, MakeBallEntry(joint, axis_index, joint.parent), within);
-        joint.parent = static_cast<int>(robot_.spec.joints.size()) - 1;
-      }
-      joint = MakeBallEntry(joint, 2, joint.parent);
-    }
-    AddEntry(id, joint, stated);
-    return {static_cast<int>(robot_.spec.joints.size()) - 1, stated.X_iL};
-  }
-
-  void AddEntry(int id, const Joint& joint, const DescribedJoint& stated) {
+    if (type == mjJNT_BALL) joint.lower = 0.0;
     robot_.spec.joints.push_back(joint);
     robot_.joints.push_back(stated);
     joint_ids_.push_back(id);
-    parts_.emplace_back();
+    return {static_cast<int>(robot_.spec.joints.size()) - 1, stated.X_iL};
   }
 
   void AddSites() {
@@ -271,8 +254,6 @@ class MjcfDescriptionReader {
   int floating_ = 0;           // the base's body, when it floats
   std::vector<Place> places_;  // by body
   std::vector<int> joint_ids_;
-  std::vector<MassProperties> base_parts_;
-  std::vector<std::vector<MassProperties>> parts_;
   int other_equalities_;
 };
 

@@ -137,27 +137,20 @@ class ParameterWriter {
 
   void WriteChain(size_t begin, size_t end) {
     text_ += "[[chain]]\nparent = " + QuoteToml(LinkName(spec_.joints[begin].parent)) + "\nrows = [\n";
-    // A ball joint is one row: that of its last entry, which moves the link.
-    std::vector<size_t> rows;
-    for (size_t i = begin; i < end; ++i) {
-      const Joint& joint = spec_.joints[i];
-      if (joint.type != JointType::kBall || joint.ball_axis == 2) rows.push_back(i);
-    }
-    for (const size_t i : rows) WriteRow(spec_.joints[i], static_cast<int>(i));
+    for (size_t i = begin; i < end; ++i) WriteRow(spec_.joints[i], static_cast<int>(i));
     text_ += "]\n\n[chain.joints]\n";
-    for (const size_t i : rows) WriteJoint(spec_.joints[i], robot_.joints[i]);
+    for (size_t i = begin; i < end; ++i) WriteJoint(spec_.joints[i], robot_.joints[i]);
     text_ += "\n";
-    for (const size_t i : rows) WriteLink(spec_.joints[i], WrittenFrame(static_cast<int>(i)));
+    for (size_t i = begin; i < end; ++i) WriteLink(spec_.joints[i], WrittenFrame(static_cast<int>(i)));
     text_ += "\n";
   }
 
   void WriteRow(const Joint& joint, int index) {
-    text_ += "  { joint = " + QuoteToml(NameInFile(joint)) + ", link = " + QuoteToml(joint.link);
+    text_ += "  { joint = " + QuoteToml(joint.name) + ", link = " + QuoteToml(joint.link);
     if (joint.type == JointType::kBall) {
-      const Joint& first = spec_.joints[static_cast<size_t>(index - 2)];
       text_ += ", type = \"ball\"";
       text_ +=
-          FormatPose(WrittenFrame(first.parent).inverse() * first.X_PB * WrittenFrame(index), true) + " },\n";
+          FormatPose(WrittenFrame(joint.parent).inverse() * joint.X_PB * WrittenFrame(index), true) + " },\n";
       return;
     }
     const Pose home = CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d);
@@ -171,8 +164,7 @@ class ParameterWriter {
   }
 
   void WriteJoint(const Joint& joint, const DescribedJoint& stated) {
-    text_ += QuoteToml(NameInFile(joint)) +
-             " = { range = " + FormatNumbers(Vector2d(joint.lower, joint.upper)) +
+    text_ += QuoteToml(joint.name) + " = { range = " + FormatNumbers(Vector2d(joint.lower, joint.upper)) +
              ", damping = " + FormatNumber(joint.damping) + ", armature = " + FormatNumber(joint.armature);
     if (joint.dry_friction != 0.0) text_ += ", dry_friction = " + FormatNumber(joint.dry_friction);
     if (joint.coupling) {

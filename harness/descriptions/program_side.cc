@@ -14,8 +14,7 @@ OrderedJson MakeHello(const RobotDescription& robot, const SideLayout& layout) {
   OrderedJson joints = OrderedJson::array();
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
-    if (joint.type == JointType::kBall && joint.ball_axis > 0) continue;
-    joints.push_back({{"name", NameInFile(joint)}, {"type", NameOf(joint.type)}});
+    joints.push_back({{"name", joint.name}, {"type", NameOf(joint.type)}});
     if (!robot.spec.joints[i].coupling) continue;
     joints.back()["follows"] =
         robot.spec.joints[static_cast<size_t>(robot.spec.joints[i].coupling->leader)].name;

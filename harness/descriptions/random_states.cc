@@ -43,7 +43,7 @@ void StateSource::DrawPositions(VectorXd* q) {
     const int at = model_->position_index(i);
     if (joint.type != JointType::kBall) {
       (*q)[at] = Draw(joint.lower, joint.upper);
-    } else if (joint.ball_axis == 0) {
+    } else {
       q->segment<4>(at) = DrawTurn(std::min(joint.upper, kPi));
     }
   }
@@ -62,8 +62,9 @@ void StateSource::DrawVelocity(VectorXd* xi) {
     (*xi)[0] = forward + turn;
     (*xi)[1] = forward - turn;
   }
-  for (int i = 0; i < model_->num_joints(); ++i) {
-    const bool slides = model_->joints()[static_cast<size_t>(i)].type == JointType::kPrismatic;
+  for (int i = 0; i < model_->num_dofs(); ++i) {
+    const Joint& joint = model_->joints()[static_cast<size_t>(model_->joint_of_dof(i))];
+    const bool slides = joint.type == JointType::kPrismatic;
     (*xi)[base + i] = draw(slides ? range_.linear_speed : range_.joint_speed);
   }
 }

@@ -22,54 +22,36 @@ void AddPart(const std::string& name, const MassProperties& body, int joint, con
   part.X_iL = X_iL;
 }
 
-RobotDescription ReadTable(const std::filesystem::path& path) {
+RobotDescription ReadTable(const std::string& text, const std::string& source) {
   RobotDescription robot;
-  robot.is_imported = ReadBytes(path).find(kImportMark) != std::string::npos;
+  robot.is_imported = text.find(kImportMark) != std::string::npos;
   std::vector<WrittenRow> rows;
-  robot.spec = ReadRobotModel(path, &rows).spec();
+  robot.spec = ParseRobotModel(text, source, {}, &rows).spec();
   robot.joints.resize(robot.spec.joints.size());
   if (robot.spec.base.type != BaseType::kFixed)
     AddPart(robot.spec.base.link, robot.spec.base.body, -1, Pose::Identity(), &robot);
   for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
     const Joint& joint = robot.spec.joints[i];
-    robot.joints[i].X_iL = rows[i].X_iL;
-    if (joint.type == JointType::kBall && joint.ball_axis < 2) continue;  // its link is no part of the file
+    static_cast<WrittenRow&>(robot.joints[i]) = rows[i];
     AddPart(joint.link, joint.body, static_cast<int>(i), rows[i].X_iL, &robot);
   }
   NoteImpossibleBodies(&robot);
   return robot;
 }
 
-/// A URDF. When a body that no robot can have is all that stands against it, the audit reads it.
-RobotDescription ReadUrdfOrPointToAudit(const std::filesystem::path& path, const UrdfOptions& options) {
-  try {
-    return ReadUrdf(path, options);
-  } catch (const InputError& error) {
-    if (options.keep_impossible) throw;
-    UrdfOptions kept = options;
-    kept.keep_impossible = true;
-    try {
-      static_cast<void>(ReadUrdf(path, kept));
-    } catch (const InputError&) {
-      throw error;
-    }
-    throw InputError(std::string(error.what()) + " (dexcheck audit " + path.string() +
-                     " reads it all the same, and lists all that is impossible or odd)");
-  }
-}
-
 }  // namespace
 
 RobotDescription ReadDescription(const std::filesystem::path& path, const UrdfOptions& options) {
-  switch (FindFormat(path)) {
+  const std::string text = ReadBytes(path);
+  switch (FindFormat(text, path)) {
     case RobotFormat::kUrdf:
-      return ReadUrdfOrPointToAudit(path, options);
+      return ParseUrdf(text, path.string(), options);
     case RobotFormat::kMjcf:
       return ReadMjcfDescription(*LoadMjcf(path), path.string());
     case RobotFormat::kToml:
       break;
   }
-  return ReadTable(path);
+  return ReadTable(text, path.string());
 }
 
 }  // namespace dexcheck

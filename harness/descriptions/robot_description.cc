@@ -1,6 +1,7 @@
 #include "harness/descriptions/robot_description.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
@@ -9,22 +10,41 @@
 namespace dexcheck {
 
 MatrixXd CalcCouplingMap(const RobotDescription& robot) {
-  std::vector<int> column(robot.joints.size(), -1);
-  int free = 0;
-  for (size_t i = 0; i < column.size(); ++i) {
-    if (!robot.spec.joints[i].coupling) column[i] = free++;
+  const std::vector<Joint>& joints = robot.spec.joints;
+  std::vector<Eigen::Index> first(joints.size(), -1);  // column of each joint that follows none
+  Eigen::Index rows = 0, free = 0;
+  for (size_t i = 0; i < joints.size(); ++i) {
+    const int count = CountVelocities(joints[i].type);
+    rows += count;
+    if (joints[i].coupling) continue;
+    first[i] = free;
+    free += count;
   }
-  MatrixXd T = MatrixXd::Zero(static_cast<Eigen::Index>(column.size()), free);
-  for (size_t i = 0; i < column.size(); ++i) {
-    const std::optional<JointCoupling>& coupling = robot.spec.joints[i].coupling;
-    const auto row = static_cast<Eigen::Index>(i);
+  MatrixXd T = MatrixXd::Zero(rows, free);
+  Eigen::Index row = 0;
+  for (size_t i = 0; i < joints.size(); ++i) {
+    const std::optional<JointCoupling>& coupling = joints[i].coupling;
     if (coupling) {
-      T(row, column[static_cast<size_t>(coupling->leader)]) = coupling->multiplier;
+      T(row++, first[static_cast<size_t>(coupling->leader)]) = coupling->multiplier;
     } else {
-      T(row, column[i]) = 1.0;
+      for (int k = 0; k < CountVelocities(joints[i].type); ++k) T(row++, first[i] + k) = 1.0;
     }
   }
   return T;
+}
+
+void FuseParts(RobotDescription* robot) {
+  std::vector<std::vector<MassProperties>> bodies(robot->spec.joints.size() + 1);
+  for (const DescribedPart& part : robot->parts) {
+    const MassProperties& body = part.body;
+    if (!part.states_inertial || !(body.mass >= 0.0) || !std::isfinite(body.mass)) continue;
+    if (!body.inertia.allFinite()) continue;
+    bodies[static_cast<size_t>(part.joint + 1)].push_back(ExpressIn(body, part.X_iL));
+  }
+  // One part stays as it is: its sum would be rounded.
+  const auto fuse = [&](size_t i) { return bodies[i].size() == 1 ? bodies[i][0] : Combine(bodies[i]); };
+  robot->spec.base.body = fuse(0);
+  for (size_t i = 1; i < bodies.size(); ++i) robot->spec.joints[i - 1].body = fuse(i);
 }
 
 void NoteImpossibleBodies(RobotDescription* robot) {
@@ -94,12 +114,12 @@ std::vector<std::string> DescribeBalls(const RobotDescription& robot) {
   std::vector<std::string> places;
   for (int i = 0; i < model.num_joints(); ++i) {
     const Joint& joint = model.joints()[static_cast<size_t>(i)];
-    if (joint.type != JointType::kBall || joint.ball_axis > 0) continue;
+    if (joint.type != JointType::kBall) continue;
     const auto range = [](int first, int count) {
       return "[" + std::to_string(first) + ".." + std::to_string(first + count - 1) + "]";
     };
-    places.push_back(Quote(NameInFile(joint)) + " has q" + range(model.position_index(i), 4) + " and xi" +
-                     range(model.num_base_velocities() + i, 3));
+    places.push_back(Quote(joint.name) + " has q" + range(model.position_index(i), 4) + " and xi" +
+                     range(model.num_base_velocities() + model.dof(i), 3));
   }
   if (places.empty()) return {};
   return {"ball joints: " + JoinNames(places) +

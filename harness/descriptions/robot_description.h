@@ -7,19 +7,20 @@
 #include <vector>
 
 #include "controller/model/robot_model.h"
+#include "controller/model/written_row.h"
 
 namespace dexcheck {
 
-/// What a file says of a joint and its link, beside the specification.
-struct DescribedJoint {
+enum class RobotFormat { kToml, kUrdf, kMjcf };
+
+/// What a file says of a joint and its link, beside the specification: how its row is written, too.
+struct DescribedJoint : WrittenRow {
   // Which constants the file states. What it does not state is zero in the specification, or a range of +-pi.
   bool states_range = true;
   bool states_damping = true;
   bool states_dry_friction = true;
   bool states_armature = true;
 
-  /// The link's own frame L, in which its file gives masses and what hangs on it, in frame i.
-  Pose X_iL = Pose::Identity();
   int line = 0;              ///< Of the file; 0 when it is not known.
   double axis_length = 1.0;  ///< Of the axis as the file gives it.
 };
@@ -46,7 +47,8 @@ struct DescribedPart {
 /// A robot as one file describes it.
 struct RobotDescription {
   RobotSpec spec;
-  std::vector<DescribedJoint> joints;  ///< By joint.
+  RobotFormat format = RobotFormat::kToml;  ///< Of the file.
+  std::vector<DescribedJoint> joints;       ///< By joint.
   bool states_gravity = true;
   bool states_base = true;  ///< Whether the base is fixed or floats; otherwise `spec` has a fixed one.
   std::vector<DescribedPart> parts;
@@ -57,6 +59,10 @@ struct RobotDescription {
 
 /// Notes bodies whose principal moments no body can have. Their dynamics are well defined all the same.
 void NoteImpossibleBodies(RobotDescription* robot);
+
+/// Makes the bodies of the base and of the joints' links from the parts that are welded together there; those
+/// that state no inertial, or one without dynamics (a negative mass), do not count.
+void FuseParts(RobotDescription* robot);
 
 /// T with xi = T xi_free, size joints x (joints - coupled joints): the rates that the couplings leave free. T
 /// is constant, so T^T M T, T^T C T, T^T F are the terms of the coupled robot.

@@ -35,25 +35,20 @@ std::string_view FindRootElement(std::string_view text) {
 
 }  // namespace
 
-RobotFormat FindFormat(std::string_view text, const std::string& source) {
+RobotFormat FindFormat(std::string_view text, const std::filesystem::path& path) {
   const std::string_view root = FindRootElement(text);
-  if (root == "robot") return RobotFormat::kUrdf;
-  if (root == "mujoco") return RobotFormat::kMjcf;
+  if (root == "robot" || (root.empty() && path.extension() == ".urdf")) return RobotFormat::kUrdf;
+  if (root == "mujoco" || (root.empty() && path.extension() == ".xml")) return RobotFormat::kMjcf;
   if (root.empty()) return RobotFormat::kToml;
-  if (root == "mujocoinclude")
-    throw InputError(source + ": is a part for <include> (<mujocoinclude>); give the file that includes it");
-  throw InputError(source +
+  if (root == "mujocoinclude") {
+    throw InputError(path.string() +
+                     ": is a part for <include> (<mujocoinclude>); give the file that includes it");
+  }
+  throw InputError(path.string() +
                    ": must be a parameter file (TOML), a URDF (<robot>) or an MJCF (<mujoco>), got " +
                    Quote("<" + std::string(root) + ">"));
 }
 
-RobotFormat FindFormat(const std::filesystem::path& path) {
-  const std::string text = ReadBytes(path);
-  if (FindRootElement(text).empty()) {
-    if (path.extension() == ".xml") return RobotFormat::kMjcf;
-    if (path.extension() == ".urdf") return RobotFormat::kUrdf;
-  }
-  return FindFormat(text, path.string());
-}
+RobotFormat FindFormat(const std::filesystem::path& path) { return FindFormat(ReadBytes(path), path); }
 
 }  // namespace dexcheck

@@ -100,10 +100,8 @@ SideLayout::SideLayout(const RobotDescription& robot)
   const RobotModel model(robot.spec);
   for (int i = 0; i < model.num_joints(); ++i) {
     const Joint& joint = model.joints()[static_cast<size_t>(i)];
-    const bool is_ball = joint.type == JointType::kBall;
-    if (is_ball && joint.ball_axis > 0) continue;
-    robot_joints_.push_back({NameInFile(joint), model.position_index(i), is_ball ? 4 : 1, i, is_ball ? 3 : 1,
-                             joint.coupling.has_value()});
+    robot_joints_.push_back({joint.name, model.position_index(i), CountPositions(joint.type), model.dof(i),
+                             CountVelocities(joint.type), joint.coupling.has_value()});
   }
   std::vector<int> all(robot_joints_.size());
   std::iota(all.begin(), all.end(), 0);

@@ -1,8 +1,5 @@
 #include "harness/descriptions/urdf_reader.h"
 
-#include <console_bridge/console.h>
-#include <urdf_parser/urdf_parser.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -10,131 +7,75 @@
 #include <set>
 #include <utility>
 
-#include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
 #include "harness/base/files.h"
-#include "harness/descriptions/engine_urdf.h"
 #include "harness/descriptions/join_names.h"
-#include "harness/descriptions/urdf_outline.h"
+#include "harness/descriptions/urdf_file.h"
+#include "harness/engine/xml.h"
 
 namespace dexcheck {
 namespace {
 
-/// Keeps what urdfdom would print while it lives.
-class MessageCollector : public console_bridge::OutputHandler {
- public:
-  MessageCollector() { console_bridge::useOutputHandler(this); }
-  ~MessageCollector() override { console_bridge::restorePreviousOutputHandler(); }
-  MessageCollector(const MessageCollector&) = delete;
-  MessageCollector& operator=(const MessageCollector&) = delete;
+using Element = tinyxml2::XMLElement;
 
-  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
-    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) errors_.push_back(text);
+/// Numbers of a joint's elements, which must be some whether or not they are used here.
+constexpr struct {
+  const char* element;
+  const char* attribute;
+  bool is_required = false;
+} kJointNumbers[] = {{"limit", "lower"},
+                     {"limit", "upper"},
+                     {"limit", "effort", true},
+                     {"limit", "velocity", true},
+                     {"dynamics", "damping"},
+                     {"dynamics", "friction"},
+                     {"mimic", "multiplier"},
+                     {"mimic", "offset"},
+                     {"safety_controller", "soft_lower_limit"},
+                     {"safety_controller", "soft_upper_limit"},
+                     {"safety_controller", "k_position"},
+                     {"safety_controller", "k_velocity", true},
+                     {"calibration", "rising"},
+                     {"calibration", "falling"}};
+
+/// Whether two materials have one name.
+bool HasMaterialTwice(const Element& robot) {
+  std::set<std::string> names;
+  for (const Element* material : ListChildren(&robot, "material")) {
+    if (!names.insert(ReadAttribute(*material, "name")).second) return true;
   }
-
-  /// Whether materials are what was found first.
-  [[nodiscard]] bool IsAboutLooks() const { return !errors_.empty() && errors_[0].starts_with("material "); }
-
-  /// What was found first and where: urdfdom reports from the inside out.
-  [[nodiscard]] std::string Describe() const {
-    if (errors_.empty()) return "cannot be parsed";
-    // urdfdom quotes the file, which may have any characters.
-    const std::string first = Abbreviate(errors_[0]);
-    return errors_.size() == 1 ? first : first + " (" + Abbreviate(errors_[1]) + ")";
-  }
-
- private:
-  std::vector<std::string> errors_;
-};
-
-/// @param has_bad_looks set when materials had to be left out.
-urdf::ModelInterfaceSharedPtr ParseWithUrdfdom(const std::string& text, const std::string& source,
-                                               bool* has_bad_looks) {
-  const MessageCollector messages;
-  urdf::ModelInterfaceSharedPtr model;
-  try {
-    model = urdf::parseURDF(text);
-    // Dynamics need no materials.
-    *has_bad_looks = !model && messages.IsAboutLooks();
-    if (*has_bad_looks) model = urdf::parseURDF(RemoveMaterials(text, source));
-  } catch (const std::exception& error) {
-    throw InputError(source + ": " + error.what());
-  }
-  if (!model) throw InputError(source + ": " + messages.Describe());
-  return model;
-}
-
-Pose ToPose(const urdf::Pose& pose) {
-  Pose X = Pose::Identity();
-  const urdf::Rotation& q = pose.rotation;
-  X.linear() = Eigen::Quaterniond(q.w, q.x, q.y, q.z).toRotationMatrix();
-  X.translation() = Vector3d(pose.position.x, pose.position.y, pose.position.z);
-  return X;
-}
-
-/// Volume and box of a primitive shape; a mesh has no volume here.
-DescribedShape ReadShape(const urdf::Geometry& geometry, const Pose& X_LS) {
-  DescribedShape shape;
-  Vector3d half = Vector3d::Zero();
-  if (geometry.type == urdf::Geometry::SPHERE) {
-    const double r = static_cast<const urdf::Sphere&>(geometry).radius;
-    half.setConstant(r);
-    shape.volume = 4.0 / 3.0 * kPi * r * r * r;
-  } else if (geometry.type == urdf::Geometry::BOX) {
-    const urdf::Vector3& size = static_cast<const urdf::Box&>(geometry).dim;
-    half = 0.5 * Vector3d(size.x, size.y, size.z);
-    shape.volume = size.x * size.y * size.z;
-  } else if (geometry.type == urdf::Geometry::CYLINDER) {
-    const auto& cylinder = static_cast<const urdf::Cylinder&>(geometry);
-    half = Vector3d(cylinder.radius, cylinder.radius, 0.5 * cylinder.length);
-    shape.volume = kPi * cylinder.radius * cylinder.radius * cylinder.length;
-  }
-  const Vector3d around =
-      geometry.type == urdf::Geometry::SPHERE ? half : Vector3d(X_LS.linear().cwiseAbs() * half);
-  shape.low = X_LS.translation() - around;
-  shape.high = X_LS.translation() + around;
-  return shape;
-}
-
-/// What can touch, or else what is seen.
-std::vector<DescribedShape> ReadShapes(const urdf::Link& link) {
-  std::vector<DescribedShape> shapes;
-  for (const auto& collision : link.collision_array) {
-    if (collision->geometry) shapes.push_back(ReadShape(*collision->geometry, ToPose(collision->origin)));
-  }
-  if (!shapes.empty()) return shapes;
-  for (const auto& visual : link.visual_array) {
-    if (visual->geometry) shapes.push_back(ReadShape(*visual->geometry, ToPose(visual->origin)));
-  }
-  return shapes;
+  return false;
 }
 
 class UrdfReader {
  public:
-  UrdfReader(std::string source, UrdfOutline outline, urdf::ModelInterfaceSharedPtr model,
-             const UrdfOptions& options)
-      : source_(std::move(source)),
-        outline_(std::move(outline)),
-        model_(std::move(model)),
-        options_(options) {}
+  UrdfReader(const UrdfFile& file, std::string source, const UrdfOptions& options)
+      : file_(file), options_(options) {
+    robot_.format = RobotFormat::kUrdf;
+    robot_.spec.source = std::move(source);
+  }
 
   RobotDescription Read() {
-    robot_.spec.name = model_->getName();
-    robot_.spec.source = source_;
-    robot_.states_gravity = false;
+    ReadHead();
+    for (const UrdfJoint& joint : file_.joints()) CheckJoint(joint);
     PlaceBase();
     ReadTree();
     if (robot_.spec.joints.empty() && robot_.spec.base.type != BaseType::kFloating) {
-      Fail(outline_.links[static_cast<size_t>(outline_.root)].line,
-           "no joint moves and the root is fixed (--floating lets it float), got " +
-               std::to_string(outline_.joints.size()) + " joints");
+      file_.Fail(file_.link(file_.root()).line,
+                 "no joint moves and the root is fixed (--floating lets it float), got " +
+                     std::to_string(file_.joints().size()) + " joints");
     }
-    FinishBodies();
+    FuseParts(&robot_);
+    JudgeImpossibleParts();
     ReadCouplings();
     NoteNames();
     NoteInertials();
     if (!options_.keep_impossible) NoteImpossibleBodies(&robot_);
+    if (HasMaterialTwice(*file_.robot())) {
+      robot_.notes.emplace_back(
+          "materials that other readers of URDFs refuse, such as two of one name (dynamics need none)");
+    }
     return std::move(robot_);
   }
 
@@ -145,34 +86,58 @@ class UrdfReader {
     Pose X_iL;
   };
 
-  [[noreturn]] void Fail(int line, const std::string& problem) const {
-    throw InputError(source_ + ":" + std::to_string(line) + ": " + problem);
+  static std::string KeyOf(const UrdfJoint& joint) { return "joint " + Quote(joint.name) + ": "; }
+  static std::string KeyOf(const UrdfLink& link) { return "link " + Quote(link.name) + ": "; }
+
+  void ReadHead() {
+    const int line = file_.robot()->GetLineNum();
+    const char* const name = file_.robot()->Attribute("name");
+    if (name == nullptr) file_.Fail(line, "robot: must have a name");
+    const char* const version = file_.robot()->Attribute("version");
+    if (version != nullptr && std::string_view(version) != "1.0")
+      file_.Fail(line, "robot: version: must be 1.0, got " + Quote(version));
+    robot_.spec.name = name;
+    robot_.states_gravity = false;
   }
 
-  [[nodiscard]] const UrdfLink& Link(int index) const { return outline_.links[static_cast<size_t>(index)]; }
+  void CheckJoint(const UrdfJoint& joint) const {
+    const std::string key = KeyOf(joint);
+    constexpr std::string_view kTypes[] = {"fixed",     "revolute", "continuous",
+                                           "prismatic", "floating", "planar"};
+    if (std::find(std::begin(kTypes), std::end(kTypes), joint.type) == std::end(kTypes))
+      file_.Fail(joint.line,
+                 key + "type: must be fixed, revolute, continuous or prismatic, got " + Quote(joint.type));
+    for (const auto& [name, attribute, is_required] : kJointNumbers) {
+      const Element* const element = joint.element->FirstChildElement(name);
+      if (element == nullptr || (!is_required && element->Attribute(attribute) == nullptr)) continue;
+      file_.ReadNumber(*element, key, attribute);
+    }
+    const bool needs_limit = joint.type == "revolute" || joint.type == "prismatic";
+    if (needs_limit && joint.element->FirstChildElement("limit") == nullptr)
+      file_.Fail(joint.line, key + "limit: missing");
+    const Element* const dynamics = joint.element->FirstChildElement("dynamics");
+    if (dynamics != nullptr && dynamics->Attribute("damping") == nullptr)
+      file_.ReadNumber(*dynamics, key, "friction");
+  }
 
   /// Which link is the base, and whether it floats.
   void PlaceBase() {
-    base_ = outline_.root;
-    const UrdfLink& root = Link(base_);
+    base_ = file_.root();
+    const UrdfLink& root = file_.link(base_);
     bool floats = options_.floating;
-    if (root.child_joints.size() == 1) {
-      const UrdfJoint& only = outline_.joints[static_cast<size_t>(root.child_joints[0])];
-      if (model_->getJoint(only.name)->type == urdf::Joint::FLOATING) {
-        base_ = only.child;
-        floats = true;
-      }
+    if (root.child_joints.size() == 1 && file_.joint(root.child_joints[0]).type == "floating") {
+      base_ = file_.joint(root.child_joints[0]).child;
+      floats = true;
     }
-    robot_.spec.base.link = Link(base_).name;
+    robot_.spec.base.link = file_.link(base_).name;
     robot_.states_base = floats || root.name == "world";
     if (floats) LetBaseFloat(&robot_);
   }
 
   void ReadTree() {
-    parts_.emplace_back();
     std::vector<std::pair<int, Place>> open;  // joints to come, and where their parent links are
     const auto visit = [&](int index, const Place& place) {
-      const UrdfLink& link = outline_.links[static_cast<size_t>(index)];
+      const UrdfLink& link = file_.link(index);
       ReadBody(link, place);
       for (auto joint = link.child_joints.rbegin(); joint != link.child_joints.rend(); ++joint) {
         open.emplace_back(*joint, place);
@@ -182,130 +147,176 @@ class UrdfReader {
     while (!open.empty()) {
       const auto [index, parent] = open.back();
       open.pop_back();
-      const UrdfJoint& element = outline_.joints[static_cast<size_t>(index)];
-      visit(element.child, ReadJoint(element, parent));
+      const UrdfJoint& joint = file_.joint(index);
+      visit(joint.child, ReadJoint(joint, parent));
+    }
+    for (const UrdfLink& link : file_.links()) {
+      if (link.element->FirstChildElement("inertial") == nullptr) massless_.push_back(link.name);
     }
   }
 
   /// @param parent where the parent link is. @return where the child link is.
-  Place ReadJoint(const UrdfJoint& element, const Place& parent) {
-    const urdf::Joint& joint = *model_->getJoint(element.name);
-    const std::string& link = outline_.links[static_cast<size_t>(element.child)].name;
-    const std::string key = "joint " + Quote(element.name) + ": ";
-    const Pose X_iJ = parent.X_iL * ToPose(joint.parent_to_joint_origin_transform);
-    if (!X_iJ.matrix().allFinite()) Fail(element.line, key + "origin: must be finite");
-    switch (joint.type) {
-      case urdf::Joint::FIXED:
-        robot_.spec.frames.push_back({link, parent.joint, X_iJ, std::nullopt});
-        return {parent.joint, X_iJ};
-      case urdf::Joint::REVOLUTE:
-      case urdf::Joint::CONTINUOUS:
-      case urdf::Joint::PRISMATIC:
-        break;
-      default:
-        Fail(element.line, key + "type: must be fixed, revolute, continuous or prismatic, got " +
-                               (joint.type == urdf::Joint::FLOATING
-                                    ? "\"floating\", which must be the only joint on the root"
-                                    : "\"planar\""));
+  Place ReadJoint(const UrdfJoint& joint, const Place& parent) {
+    const std::string& link = file_.link(joint.child).name;
+    const std::string key = KeyOf(joint);
+    const Pose X_iJ = parent.X_iL * file_.ReadOrigin(*joint.element, key);
+    if (!X_iJ.matrix().allFinite()) file_.Fail(joint.line, key + "origin: must be finite");
+    if (joint.type == "fixed") {
+      robot_.spec.frames.push_back({link, parent.joint, X_iJ, std::nullopt});
+      return {parent.joint, X_iJ};
     }
-    return {AddMovingJoint(joint, link, parent.joint, X_iJ, element.line), robot_.joints.back().X_iL};
+    if (joint.type == "floating" || joint.type == "planar") {
+      file_.Fail(joint.line,
+                 key + "type: must be fixed, revolute, continuous or prismatic, got " +
+                     (joint.type == "floating" ? "\"floating\", which must be the only joint on the root"
+                                               : "\"planar\""));
+    }
+    AddMovingJoint(joint, link, parent.joint, X_iJ);
+    return {static_cast<int>(robot_.spec.joints.size()) - 1, robot_.joints.back().X_iL};
   }
 
-  /// @return its index.
-  int AddMovingJoint(const urdf::Joint& joint, const std::string& link, int parent, const Pose& X_PJ,
-                     int line) {
-    const std::string key = "joint " + Quote(joint.name) + ": ";
-    const Vector3d given(joint.axis.x, joint.axis.y, joint.axis.z);
+  void AddMovingJoint(const UrdfJoint& joint, const std::string& link, int parent, const Pose& X_PJ) {
+    const std::string key = KeyOf(joint);
+    const Element* const axis = joint.element->FirstChildElement("axis");
+    const Vector3d given =
+        axis == nullptr ? Vector3d::UnitX() : file_.ReadVector(*axis, key, "xyz", Vector3d::Zero());
     const double length = given.stableNorm();
-    if (!(length > 0.0)) Fail(line, key + "axis: must not be zero, got " + FormatNumbers(given));
+    if (!(length > 0.0)) file_.Fail(joint.line, key + "axis: must not be zero, got " + FormatNumbers(given));
     constexpr double kUnitVectorAllowance = 1e-4;  // of the digits that people write
     if (std::abs(length - 1.0) > kUnitVectorAllowance) {
       robot_.notes.push_back(key + "axis " + FormatNumbers(given) +
                              " is not a unit vector; its direction counts");
     }
     // Frame i has its z axis along the joint's; the link's own frame is turned back.
-    const Matrix3d R = MakeRotation(given / length);
+    Matrix3d R = Matrix3d::Identity();
+    if (given / length != Vector3d::UnitZ()) R = MakeRotationFromZ(given / length);
     Joint added;
     added.name = joint.name;
     added.link = link;
     added.parent = parent;
-    added.type = joint.type == urdf::Joint::PRISMATIC ? JointType::kPrismatic : JointType::kRevolute;
+    added.type = joint.type == "prismatic" ? JointType::kPrismatic : JointType::kRevolute;
     added.X_PB = X_PJ;
     added.X_PB.linear() = X_PJ.linear() * R;
     DescribedJoint stated;
     stated.states_armature = false;
+    stated.is_plain = true;
     stated.X_iL.linear() = R.transpose();
-    stated.line = line;
+    stated.line = joint.line;
     stated.axis_length = length;
-    ReadLimits(joint, line, &added, &stated);
-    ReadFriction(joint, line, &added, &stated);
+    ReadLimits(joint, &added, &stated);
+    ReadFriction(joint, &added, &stated);
     robot_.spec.joints.push_back(added);
     robot_.joints.push_back(stated);
-    parts_.emplace_back();
-    return static_cast<int>(robot_.spec.joints.size()) - 1;
   }
 
-  static Matrix3d MakeRotation(const Vector3d& z) {
-    return z == Vector3d::UnitZ() ? Matrix3d(Matrix3d::Identity()) : MakeRotationFromZ(z);
-  }
-
-  void ReadLimits(const urdf::Joint& joint, int line, Joint* added, DescribedJoint* stated) const {
+  void ReadLimits(const UrdfJoint& joint, Joint* added, DescribedJoint* stated) const {
     added->lower = -kPi;
     added->upper = kPi;
-    stated->states_range = joint.limits != nullptr && joint.type != urdf::Joint::CONTINUOUS;
+    stated->states_range = joint.type != "continuous";
     if (!stated->states_range) return;
-    added->lower = joint.limits->lower;
-    added->upper = joint.limits->upper;
+    const std::string key = KeyOf(joint);
+    const Element& limit = *joint.element->FirstChildElement("limit");
+    added->lower = file_.ReadNumber(limit, key, "lower", 0.0);
+    added->upper = file_.ReadNumber(limit, key, "upper", 0.0);
     if (added->lower <= added->upper) return;
-    Fail(line, "joint " + Quote(joint.name) + ": limit: lower must not exceed upper " +
-                   FormatNumber(added->upper) + ", got " + FormatNumber(added->lower));
+    file_.Fail(joint.line, key + "limit: lower must not exceed upper " + FormatNumber(added->upper) +
+                               ", got " + FormatNumber(added->lower));
   }
 
-  void ReadFriction(const urdf::Joint& joint, int line, Joint* added, DescribedJoint* stated) const {
-    stated->states_damping = stated->states_dry_friction = joint.dynamics != nullptr;
-    if (!joint.dynamics) return;
-    added->damping = joint.dynamics->damping;
-    added->dry_friction = joint.dynamics->friction;
-    const auto check = [&](const char* name, double value) {
-      if (value >= 0.0) return;
-      Fail(line, "joint " + Quote(joint.name) + ": dynamics: " + name + " must not be negative, got " +
-                     FormatNumber(value));
-    };
-    check("damping", added->damping);
-    check("friction", added->dry_friction);
+  void ReadFriction(const UrdfJoint& joint, Joint* added, DescribedJoint* stated) const {
+    const Element* const dynamics = joint.element->FirstChildElement("dynamics");
+    stated->states_damping = stated->states_dry_friction = dynamics != nullptr;
+    if (dynamics == nullptr) return;
+    const std::string key = KeyOf(joint);
+    for (const auto& [name, target] :
+         {std::pair("damping", &added->damping), std::pair("friction", &added->dry_friction)}) {
+      *target = file_.ReadNumber(*dynamics, key, name, 0.0);
+      if (*target >= 0.0) continue;
+      file_.Fail(joint.line,
+                 key + "dynamics: " + name + " must not be negative, got " + FormatNumber(*target));
+    }
   }
 
-  void ReadBody(const UrdfLink& element, const Place& place) {
-    const urdf::LinkConstSharedPtr link = model_->getLink(element.name);
+  void ReadBody(const UrdfLink& link, const Place& place) {
+    const Element* const inertial = link.element->FirstChildElement("inertial");
     DescribedPart& part = robot_.parts.emplace_back();
-    part.name = element.name;
-    part.line = element.line;
+    part.name = link.name;
+    part.line = link.line;
     part.joint = place.joint;
     part.X_iL = place.X_iL;
-    part.shapes = ReadShapes(*link);
-    part.states_inertial = link->inertial != nullptr;
-    if (!link->inertial) return;
-    const urdf::Inertial& inertial = *link->inertial;
+    part.shapes = ReadShapes(link);
+    part.states_inertial = inertial != nullptr;
+    if (inertial == nullptr) return;
+    const std::string key = KeyOf(link);
+    part.X_LC = file_.ReadOrigin(*inertial, key);
+    const auto read = [&](const char* name, const char* attribute) {
+      const Element* const element = inertial->FirstChildElement(name);
+      if (element == nullptr) file_.Fail(inertial->GetLineNum(), key + name + ": " + attribute + ": missing");
+      return file_.ReadNumber(*element, key, attribute);
+    };
     // The inertia is given along the axes of the inertial's own frame, which stands at the centre of mass.
-    MassProperties body{inertial.mass, Vector3d::Zero(), Matrix3d::Zero()};
-    // clang-format off
-    body.inertia << inertial.ixx, inertial.ixy, inertial.ixz,
-                    inertial.ixy, inertial.iyy, inertial.iyz,
-                    inertial.ixz, inertial.iyz, inertial.izz;
-    // clang-format on
+    MassProperties body{read("mass", "value"), Vector3d::Zero(), Matrix3d::Zero()};
+    for (const auto& [attribute, row, col] :
+         {std::tuple("ixx", 0, 0), {"ixy", 0, 1}, {"ixz", 0, 2}, {"iyy", 1, 1}, {"iyz", 1, 2}, {"izz", 2, 2}})
+      body.inertia(row, col) = body.inertia(col, row) = read("inertia", attribute);
     const bool is_usable = body.mass >= 0.0 && std::isfinite(body.mass) && body.inertia.allFinite();
     const std::string problem = FindPhysicalInconsistency(body);
-    if (!is_usable && !options_.keep_impossible) FailInertial(element, problem);
-    if (!problem.empty()) impossible_.push_back({&element, problem, place.joint});
-    part.X_LC = ToPose(inertial.origin);
-    body = ExpressIn(body, part.X_LC);
-    part.body = body;
-    if (!is_usable) return;
-    parts_[static_cast<size_t>(place.joint + 1)].push_back(ExpressIn(body, place.X_iL));
+    if (!is_usable && !options_.keep_impossible) FailInertial(link, problem);
+    if (!problem.empty()) impossible_.push_back({&link, problem, place.joint});
+    part.body = ExpressIn(body, part.X_LC);
+  }
+
+  /// What can touch, or else what is seen. Dynamics need no shapes: nothing behind a broken one is read.
+  [[nodiscard]] std::vector<DescribedShape> ReadShapes(const UrdfLink& link) const {
+    std::vector<DescribedShape> seen;
+    std::vector<DescribedShape> touching;
+    try {
+      for (const auto& [use, shapes] : {std::pair("visual", &seen), std::pair("collision", &touching)}) {
+        for (const Element* shape : ListChildren(link.element, use)) shapes->push_back(ReadShape(*shape));
+      }
+    } catch (const InputError&) {
+    }
+    return touching.empty() ? seen : touching;
+  }
+
+  /// Volume and box of a primitive shape; a mesh has no volume here.
+  [[nodiscard]] DescribedShape ReadShape(const Element& use) const {
+    const Pose X_LS = file_.ReadOrigin(use, "");
+    const Element* const geometry = use.FirstChildElement("geometry");
+    const Element* const solid = geometry == nullptr ? nullptr : geometry->FirstChildElement();
+    if (solid == nullptr) file_.Fail(use.GetLineNum(), "geometry: missing");
+    const std::string_view kind = solid->Name();
+    const auto read = [&](const char* attribute) { return file_.ReadNumber(*solid, "", attribute); };
+    DescribedShape shape;
+    Vector3d half = Vector3d::Zero();
+    if (kind == "sphere") {
+      const double r = read("radius");
+      half.setConstant(r);
+      shape.volume = 4.0 / 3.0 * kPi * r * r * r;
+    } else if (kind == "box" && solid->Attribute("size") != nullptr) {
+      const Vector3d size = file_.ReadVector(*solid, "", "size", half);
+      half = 0.5 * size;
+      shape.volume = size.x() * size.y() * size.z();
+    } else if (kind == "cylinder") {
+      const double length = read("length");
+      const double r = read("radius");
+      half << r, r, 0.5 * length;
+      shape.volume = kPi * r * r * length;
+    } else if (kind == "mesh" && solid->Attribute("filename") != nullptr) {
+      file_.ReadVector(*solid, "", "scale", half);
+    } else {
+      file_.Fail(solid->GetLineNum(), "geometry: must be a shape");
+    }
+    const Vector3d around = kind == "sphere" ? half : Vector3d(X_LS.linear().cwiseAbs() * half);
+    shape.low = X_LS.translation() - around;
+    shape.high = X_LS.translation() + around;
+    return shape;
   }
 
   [[noreturn]] void FailInertial(const UrdfLink& link, const std::string& problem) const {
-    Fail(link.line, "link " + Quote(link.name) + ": inertial: " + problem);
+    const std::string& file = robot_.spec.source;
+    file_.Fail(link.line, KeyOf(link) + "inertial: " + problem + " (dexcheck audit " + file +
+                              " reads it all the same, and lists all that is impossible or suspicious)");
   }
 
   /// Published robots have small parts that no body can be; what counts is the body that they are welded to.
@@ -327,37 +338,31 @@ class UrdfReader {
                            JoinNames(names));
   }
 
-  void FinishBodies() {
-    // One part stays as it is: its sum would be rounded.
-    const auto combine = [&](size_t i) { return parts_[i].size() == 1 ? parts_[i][0] : Combine(parts_[i]); };
-    robot_.spec.base.body = combine(0);
-    for (size_t i = 0; i < robot_.spec.joints.size(); ++i) robot_.spec.joints[i].body = combine(i + 1);
-    JudgeImpossibleParts();
-  }
-
   /// A joint that follows one which follows a third follows the third.
   void ReadCouplings() {
     std::map<std::string, int> index_of;
     for (const Joint& joint : robot_.spec.joints) {
       index_of.emplace(joint.name, static_cast<int>(index_of.size()));
     }
-    for (const UrdfJoint& element : outline_.joints) {
-      const urdf::JointConstSharedPtr joint = model_->getJoint(element.name);
-      const auto own = index_of.find(element.name);
-      if (!joint->mimic || own == index_of.end()) continue;
+    std::map<std::string, const Element*> mimic_of;
+    for (const UrdfJoint& joint : file_.joints())
+      mimic_of[joint.name] = joint.element->FirstChildElement("mimic");
+    for (const UrdfJoint& joint : file_.joints()) {
+      const auto own = index_of.find(joint.name);
+      if (mimic_of[joint.name] == nullptr || own == index_of.end()) continue;
+      const std::string key = KeyOf(joint) + "mimic: ";
       JointCoupling coupling{-1, 1.0, 0.0};
-      std::set<std::string> seen = {element.name};
-      for (urdf::JointConstSharedPtr at = joint; at->mimic;) {
-        coupling.offset += coupling.multiplier * at->mimic->offset;
-        coupling.multiplier *= at->mimic->multiplier;
-        const std::string& name = at->mimic->joint_name;
+      std::set<std::string> seen = {joint.name};
+      for (const Element* mimic = mimic_of[joint.name]; mimic != nullptr;) {
+        coupling.offset += coupling.multiplier * file_.ReadNumber(*mimic, key, "offset", 0.0);
+        coupling.multiplier *= file_.ReadNumber(*mimic, key, "multiplier", 1.0);
+        const std::string name = ReadAttribute(*mimic, "joint");
         const auto leader = index_of.find(name);
-        const std::string key = "joint " + Quote(element.name) + ": mimic: ";
         if (leader == index_of.end())
-          Fail(element.line, key + "must be a joint that moves, got " + Quote(name));
-        if (!seen.insert(name).second) Fail(element.line, key + "must not be cyclic, got " + Quote(name));
+          file_.Fail(joint.line, key + "must be a joint that moves, got " + Quote(name));
+        if (!seen.insert(name).second) file_.Fail(joint.line, key + "must not be cyclic, got " + Quote(name));
         coupling.leader = leader->second;
-        at = model_->getJoint(name);
+        mimic = mimic_of[name];
       }
       robot_.spec.joints[static_cast<size_t>(own->second)].coupling = coupling;
     }
@@ -365,9 +370,9 @@ class UrdfReader {
 
   void NoteNames() {
     std::vector<std::string> named;
-    for (const UrdfJoint& joint : outline_.joints) {
+    for (const UrdfJoint& joint : file_.joints()) {
       if (joint.name.starts_with('#'))
-        named.push_back(Quote(joint.name) + " moves " + Quote(Link(joint.child).name));
+        named.push_back(Quote(joint.name) + " moves " + Quote(file_.link(joint.child).name));
     }
     if (!named.empty())
       robot_.notes.push_back("joints without a name, called by their number in the file: " +
@@ -375,19 +380,15 @@ class UrdfReader {
   }
 
   void NoteInertials() {
-    std::vector<std::string> without;
-    for (const UrdfLink& link : outline_.links) {
-      if (!link.has_inertial) without.push_back(link.name);
+    if (massless_.size() == file_.links().size()) {
+      file_.Fail(file_.link(file_.root()).line,
+                 "no link has an inertial, so that there are no dynamics, got " +
+                     std::to_string(massless_.size()) + " links");
     }
-    if (without.size() == outline_.links.size()) {
-      Fail(outline_.links[static_cast<size_t>(outline_.root)].line,
-           "no link has an inertial, so that there are no dynamics, got " + std::to_string(without.size()) +
-               " links");
-    }
-    if (!without.empty())
-      robot_.notes.push_back("links without inertial, taken as massless: " + JoinNames(without));
+    if (!massless_.empty())
+      robot_.notes.push_back("links without inertial, taken as massless: " + JoinNames(massless_));
     std::vector<std::string> idle;
-    std::vector<double> carried(parts_.size(), 0.0);
+    std::vector<double> carried(robot_.spec.joints.size() + 1, 0.0);
     for (size_t i = robot_.spec.joints.size(); i-- > 0;) {
       const Joint& joint = robot_.spec.joints[i];
       carried[i + 1] += joint.body.mass;
@@ -397,12 +398,11 @@ class UrdfReader {
     if (!idle.empty()) robot_.notes.push_back("joints that move no mass: " + JoinNames(idle));
   }
 
-  std::string source_;
-  UrdfOutline outline_;
-  urdf::ModelInterfaceSharedPtr model_;
-  UrdfOptions options_;
+  const UrdfFile& file_;
+  const UrdfOptions& options_;
   int base_ = -1;  // the base's link
   RobotDescription robot_;
+  std::vector<std::string> massless_;  // links without an inertial
   /// A link whose own inertial breaks an inequality.
   struct ImpossiblePart {
     const UrdfLink* link;
@@ -410,7 +410,6 @@ class UrdfReader {
     int joint;  ///< That moves it; -1 the base.
   };
   std::vector<ImpossiblePart> impossible_;
-  std::vector<std::vector<MassProperties>> parts_;  // of the base, then of each joint's link, in frame i
 };
 
 /// The file of a mesh; empty when it is in none of the packages.
@@ -438,35 +437,35 @@ std::filesystem::path FindMesh(const std::string& name, const std::filesystem::p
   return {};
 }
 
+/// Files of the meshes that are in none of the packages, each once.
+std::vector<std::string> ListMissingMeshes(const UrdfFile& file, const std::filesystem::path& folder,
+                                           const UrdfOptions& options) {
+  std::set<std::string> seen;
+  std::vector<std::string> missing;
+  for (const UrdfLink& link : file.links()) {
+    for (const char* use : {"visual", "collision"}) {
+      for (const Element* shape : ListChildren(link.element, use)) {
+        const Element* const geometry = shape->FirstChildElement("geometry");
+        const Element* const mesh = geometry == nullptr ? nullptr : geometry->FirstChildElement("mesh");
+        const char* const name = mesh == nullptr ? nullptr : mesh->Attribute("filename");
+        if (name == nullptr || !seen.insert(name).second) continue;
+        if (FindMesh(name, folder, options).empty()) missing.emplace_back(name);
+      }
+    }
+  }
+  return missing;
+}
+
 }  // namespace
 
 RobotDescription ParseUrdf(std::string_view text, const std::string& source, const UrdfOptions& options) {
-  UrdfOutline outline = ReadUrdfOutline(text, source);
-  const std::vector<std::string> meshes = outline.meshes;
-  bool has_bad_looks = false;
-  urdf::ModelInterfaceSharedPtr model = ParseWithUrdfdom(
-      outline.has_nameless_joints ? NameJoints(text, source) : std::string(text), source, &has_bad_looks);
-  for (const UrdfLink& link : outline.links) {
-    if (!model->getLink(link.name))
-      throw InputError(source + ": link " + Quote(link.name) + ": cannot be parsed");
-  }
-  for (const UrdfJoint& joint : outline.joints) {
-    if (!model->getJoint(joint.name))
-      throw InputError(source + ": joint " + Quote(joint.name) + ": cannot be parsed");
-  }
-  RobotDescription robot = UrdfReader(source, std::move(outline), std::move(model), options).Read();
-  if (has_bad_looks) {
-    robot.notes.emplace_back(
-        "materials that other readers of URDFs refuse, such as two of one name (dynamics need none)");
-  }
+  const UrdfFile file(text, source);
+  RobotDescription robot = UrdfReader(file, source, options).Read();
   if (options.packages.empty()) return robot;
-  std::vector<std::string> missing;
-  for (const std::string& mesh : meshes) {
-    if (FindMesh(mesh, std::filesystem::path(source).parent_path(), options).empty()) missing.push_back(mesh);
-  }
-  if (!missing.empty()) {
+  const std::vector<std::string> missing =
+      ListMissingMeshes(file, std::filesystem::path(source).parent_path(), options);
+  if (!missing.empty())
     robot.notes.push_back("meshes that are missing (dynamics need none): " + JoinNames(missing));
-  }
   return robot;
 }
 

@@ -1,13 +1,11 @@
 #include "harness/diagnosis/formula_mutants.h"
 
-#include <algorithm>
 #include <memory>
 #include <utility>
 
-#include "controller/contact/adjoint.h"
-#include "controller/model/platform.h"
 #include "controller/object/object_dynamics.h"
-#include "harness/diagnosis/spoiled_views.h"
+#include "harness/diagnosis/equation_faults.h"
+#include "harness/diagnosis/faulty_views.h"
 
 namespace dexcheck {
 namespace {
@@ -17,49 +15,9 @@ class MutantTable {
   explicit MutantTable(const RobotModel& model) : model_(model) {}
 
   void AddDynamics() {
-    using Terms = SpoiledView::Terms;
-    AddView("Coriolis terms dropped", "C_bar_xi", Spoil([](Terms* t) { t->C.setZero(); }));
-    AddView("Coriolis matrix transposed", "C_bar_xi", Spoil([](Terms* t) { t->C.transposeInPlace(); }));
-    AddView("one joint's Coriolis row dropped", "C_bar_xi",
-            Spoil([](Terms* t) { t->C.row(t->C.rows() / 2).setZero(); }));
-    AddView("Coriolis matrix without coupling", "C_bar",
-            Spoil([](Terms* t) { t->C = MatrixXd(t->C.diagonal().asDiagonal()); }));
-    AddFactorisations();
-    AddView("gravity with the wrong sign", "gravity", Spoil([](Terms* t) { t->gravity *= -1.0; }));
-    AddView("friction dropped", "friction", Spoil([](Terms* t) { t->friction.setZero(); }));
-    AddView("friction with the wrong sign", "friction", Spoil([](Terms* t) { t->friction *= -1.0; }));
-    AddView("half of the mass matrix not mirrored", "M_bar",
-            Spoil([](Terms* t) { t->M.triangularView<Eigen::StrictlyUpper>().setZero(); }));
-    if (HasArmature()) {
-      AddView("armature left out of M", "M_bar", Spoil([](Terms* t) {
-                const Eigen::Index base = t->M.rows() - t->model.num_joints();
-                for (int i = 0; i < t->model.num_joints(); ++i)
-                  t->M(base + i, base + i) -= t->model.joints()[static_cast<size_t>(i)].armature;
-              }));
+    for (const auto& equation : ListRobotEquations(model_)) {
+      if (equation.term != nullptr) AddView(equation.name, equation.term, Use<FaultyView>(equation.change));
     }
-    if (model_.base().type != BaseType::kDifferentialDrive) return;
-    AddView("S_v_dot = 0", "C_bar_xi", Spoil([](Terms* t) {
-              if (t->M.rows() != t->model.num_velocities()) return;
-              // C_bar = S^T C S + S^T M S_dot of (14), without the second term.
-              ModelTerms unreduced(t->model, Coordinates::kUnreduced);
-              const PlatformConstraint platform =
-                  CalcPlatformConstraint(t->model.base(), t->q.head<3>(), t->velocity.head<2>());
-              const Eigen::Index n = t->M.rows();
-              MatrixXd S = MatrixXd::Zero(n + 1, n);
-              MatrixXd S_dot = S;
-              S.topLeftCorner<3, 2>() = platform.S_v;
-              S.bottomRightCorner(n - 2, n - 2).setIdentity();
-              S_dot.topLeftCorner<3, 2>() = platform.S_v_dot;
-              unreduced.SetState(t->q, S * t->velocity);
-              unreduced.CalcDynamics();
-              t->C -= S.transpose() * unreduced.M() * S_dot;
-            }));
-    AddView("wheel spin left out of M", "M_bar", Spoil([](Terms* t) {
-              if (t->M.rows() != t->model.num_velocities()) return;
-              const WheelProperties& wheel = t->model.base().wheel;
-              const Matrix2d W = CalcWheelRateMap(t->model.base());
-              t->M.topLeftCorner<2, 2>() -= (wheel.spin_inertia + wheel.armature) * W.transpose() * W;
-            }));
   }
 
   void AddKinematics() {
@@ -67,11 +25,11 @@ class MutantTable {
     AddView("link rotations transposed", "joint_axis", Use<TransposedLinks>());
     if (has_frames) {
       AddView("frame rotations transposed", "frame_pose", Use<TransposedFrames>());
-      AddView("body Jacobian taken in world axes", "J", Use<SpoiledJacobian>(&TurnedToWorld, 1.0));
-      AddView("linear and angular part exchanged", "J", Use<SpoiledJacobian>(&PartsExchanged, 1.0));
-      AddView("moment arm of the adjoint with the wrong sign", "J", Use<SpoiledJacobian>(&WrongAdjoint, 1.0));
-      AddView("J_dot = 0", "J_dot_xi", Use<SpoiledJacobian>(&Unchanged, 0.0));
-      AddView("J_dot doubled", "J_dot_xi", Use<SpoiledJacobian>(&Unchanged, 2.0));
+      AddView("body Jacobian taken in world axes", "J", Use<FaultyJacobian>(&TurnedToWorld, 1.0));
+      AddView("linear and angular part exchanged", "J", Use<FaultyJacobian>(&PartsExchanged, 1.0));
+      AddView("moment arm of the adjoint with the wrong sign", "J", Use<FaultyJacobian>(&WrongAdjoint, 1.0));
+      AddView("J_dot = 0", "J_dot_xi", Use<FaultyJacobian>(&Unchanged, 0.0));
+      AddView("J_dot doubled", "J_dot_xi", Use<FaultyJacobian>(&Unchanged, 2.0));
     }
     for (int b = 0; b < model_.num_joints(); ++b) {
       const int a = model_.joints()[static_cast<size_t>(b)].parent;
@@ -84,17 +42,16 @@ class MutantTable {
 
   void AddEnergies() {
     AddView("kinetic energy doubled", "kinetic_energy",
-            Use<SpoiledEnergy>(+[](const ModelView&, EnergyAndMomentum* t) { t->kinetic *= 2.0; }));
+            Use<FaultyEnergy>(+[](const ModelView&, EnergyAndMomentum* t) { t->kinetic *= 2.0; }));
     AddView("potential energy with the wrong sign", "potential_energy",
-            Use<SpoiledEnergy>(+[](const ModelView&, EnergyAndMomentum* t) { t->potential *= -1.0; }));
+            Use<FaultyEnergy>(+[](const ModelView&, EnergyAndMomentum* t) { t->potential *= -1.0; }));
     AddView("angular momentum about the origin", "angular_momentum",
-            Use<SpoiledEnergy>(+[](const ModelView&, EnergyAndMomentum* t) {
+            Use<FaultyEnergy>(+[](const ModelView&, EnergyAndMomentum* t) {
               t->angular_momentum += t->com.cross(t->linear_momentum);
             }));
   }
 
   void AddObject() {
-    using Terms = ObjectTerms;
     AddObjectMutant("rotation of the object transposed", "object_pose", nullptr, [](const Vector6d& X_o) {
       Pose X = CalcObjectPose(X_o);
       X.linear().transposeInPlace();
@@ -108,38 +65,17 @@ class MutantTable {
               .toRotationMatrix();
       return X;
     });
-    const auto spoil = [&](const std::string& name, const std::string& first, void (*change)(Terms*)) {
+    for (const auto& equation : ListObjectEquations()) {
       AddObjectMutant(
-          name, first,
-          [change](const MassProperties& body, const Vector3d& gravity, const Vector6d& X_o,
-                   const Vector6d& X_o_dot) {
-            Terms terms = CalcObjectTerms(body, gravity, X_o, X_o_dot);
+          equation.name, equation.term,
+          [change = equation.change](const MassProperties& body, const Vector3d& gravity, const Vector6d& X_o,
+                                     const Vector6d& X_o_dot) {
+            ObjectTerms terms = CalcObjectTerms(body, gravity, X_o, X_o_dot);
             change(&terms);
             return terms;
           },
           nullptr);
-    };
-    spoil("body velocity in world axes", "P_inv", [](Terms* t) {
-      const Matrix3d R = t->P_inv.topLeftCorner<3, 3>().transpose();
-      t->V_Bo.head<3>() = R * t->V_Bo.head<3>();
-      t->V_Bo.tail<3>() = R * t->V_Bo.tail<3>();
-    });
-    spoil("M_o of the Lagrange form", "M_o", [](Terms* t) { t->M_o = t->P_inv.transpose() * t->M_o; });
-    // A wrong P^-1 that M_o and C_o share.
-    spoil("P^-1 of angles in reverse", "M_o", [](Terms* t) {
-      t->P_inv.col(3).swap(t->P_inv.col(5));
-      t->M_o = t->body.M_hat * t->P_inv;
-    });
-    spoil("rate of P^-1 with the wrong sign", "C_o_X_o_dot", [](Terms* t) {
-      t->P_inv_dot *= -1.0;
-      t->C_o = t->body.M_hat * t->P_inv_dot + t->body.C_hat * t->P_inv;
-    });
-    spoil("C_o without the rate of P^-1", "C_o_X_o_dot", [](Terms* t) { t->C_o = t->body.C_hat * t->P_inv; });
-    spoil("C_o without gyroscopic terms", "C_o_X_o_dot",
-          [](Terms* t) { t->C_o = t->body.M_hat * t->P_inv_dot; });
-    spoil("N_o with the wrong sign", "N_o", [](Terms* t) { t->N_o *= -1.0; });
-    spoil("N_o in world axes", "N_o",
-          [](Terms* t) { t->N_o.head<3>() = t->P_inv.topLeftCorner<3, 3>().transpose() * t->N_o.head<3>(); });
+    }
   }
 
   void AddContact() {
@@ -155,100 +91,24 @@ class MutantTable {
                                      Eigen::AngleAxisd(-kappa.psi, Vector3d::UnitZ()).toRotationMatrix();
           return geometry;
         };
-    const auto map = [&](const std::string& name, Matrix6d (*transform)(const Pose&)) {
-      AddContactMutant(name, "G").contact.grasp_map = [transform](const Contact& contact,
-                                                                  Eigen::Ref<Matrix6Xd> G) {
-        G = transform(contact.geometry.g_o_cf).leftCols<3>();
-      };
-    };
-    map("G without moments", [](const Pose& g) {
-      Matrix6d transform = CalcWrenchTransform(g);
-      transform.bottomRows<3>().setZero();
-      return transform;
-    });
-    map("G with Ad^T instead of Ad^-T", [](const Pose& g) { return Matrix6d(CalcAdjoint(g).transpose()); });
-    map("G with Ad instead of Ad^-T", [](const Pose& g) { return CalcAdjoint(g); });
-    map("G with the rotation transposed", [](const Pose& g) {
-      Pose turned = g;
-      turned.linear().transposeInPlace();
-      return CalcWrenchTransform(turned);
-    });
-    AddContactMutant("J_B' with Ad instead of its inverse", "J_B").contact.jacobian =
-        [](const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f, Eigen::Ref<MatrixXd> rows) {
-          rows = (CalcAdjoint(contact.geometry.g_f_cf) * J_f).topRows(3);
-        };
-    AddContactMutant("J_B' at the fingertip's centre", "J_B").contact.jacobian =
-        [](const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f, Eigen::Ref<MatrixXd> rows) {
-          rows = contact.geometry.g_f_cf.linear().transpose() * J_f.topRows(3);
-        };
-    const auto roll = [&](const std::string& name,
-                          Vector5d (*rate)(const ContactGeometry&, const Vector6d&)) {
-      AddContactMutant(name, "kappa_dot").contact.kappa_dot = rate;
-    };
-    roll("spin term dropped in (40)", [](const ContactGeometry& contact, const Vector6d& V) {
-      Vector6d without = V;
-      without[5] = 0.0;
-      return CalcKappaDot(contact, without);
-    });
-    roll("slip dropped in (40)", [](const ContactGeometry& contact, const Vector6d& V) {
-      Vector6d without = V;
-      without.head<2>().setZero();
-      return CalcKappaDot(contact, without);
-    });
-    roll("rolling about the wrong axis in (40)", [](const ContactGeometry& contact, const Vector6d& V) {
-      Vector6d turned = V;
-      std::swap(turned[3], turned[4]);
-      return CalcKappaDot(contact, turned);
-    });
-    roll("object's curvature not turned by psi in (40)",
-         [](const ContactGeometry& contact, const Vector6d& V) {
-           ContactGeometry wrong = contact;
-           wrong.object.K = contact.R_psi * contact.object.K * contact.R_psi;
-           return CalcKappaDot(wrong, V);
-         });
-    roll("fingertip's torsion dropped in (40)", [](const ContactGeometry& contact, const Vector6d& V) {
-      ContactGeometry wrong = contact;
-      wrong.fingertip.T.setZero();
-      return CalcKappaDot(wrong, V);
-    });
-    roll("object's torsion dropped in (40)", [](const ContactGeometry& contact, const Vector6d& V) {
-      ContactGeometry wrong = contact;
-      wrong.object.T.setZero();
-      return CalcKappaDot(wrong, V);
-    });
-    roll("object's metric dropped in (40)", [](const ContactGeometry& contact, const Vector6d& V) {
-      ContactGeometry wrong = contact;
-      wrong.object.M.setIdentity();
-      return CalcKappaDot(wrong, V);
-    });
+    for (const auto& equation : ListGraspMapEquations()) {
+      AddContactMutant(equation.name, equation.term).contact.grasp_map =
+          [change = equation.change](const Contact& contact, Eigen::Ref<Matrix6Xd> G) {
+            G = change(contact.geometry.g_o_cf).leftCols<3>();
+          };
+    }
+    for (const auto& equation : ListContactJacobianEquations()) {
+      AddContactMutant(equation.name, equation.term).contact.jacobian =
+          [change = equation.change](const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
+                                     Eigen::Ref<MatrixXd> rows) { rows = change(contact.geometry, J_f); };
+    }
+    for (const auto& equation : ListRollingEquations())
+      AddContactMutant(equation.name, equation.term).contact.kappa_dot = equation.change;
   }
 
   std::vector<FormulaMutant> Take() { return std::move(mutants_); }
 
  private:
-  /// Other matrices with the same force: C + S with S xi = 0.
-  void AddFactorisations() {
-    using Terms = SpoiledView::Terms;
-    const int n = model_.num_velocities();
-    if (n >= 2) {
-      AddView("Coriolis matrix without Property 2", "C_bar", Spoil([](Terms* t) {
-                const Eigen::Index last = t->C.rows() - 1;
-                t->C(last, last - 1) += t->M(last, last) * t->velocity[last];
-                t->C(last, last) -= t->M(last, last) * t->velocity[last - 1];
-              }));
-    }
-    if (n >= 3) {
-      AddView("Coriolis matrix plus an antisymmetric part", "C_bar", Spoil([](Terms* t) {
-                const Eigen::Index last = t->C.rows() - 1;
-                t->C.bottomRightCorner<3, 3>() += t->M(last, last) * Skew(t->velocity.tail<3>());
-              }));
-    }
-  }
-  [[nodiscard]] bool HasArmature() const {
-    return std::any_of(model_.joints().begin(), model_.joints().end(),
-                       [](const Joint& joint) { return joint.armature > 0.0; });
-  }
-
   FormulaMutant& Add(const std::string& name, const std::string& first) {
     FormulaMutant& mutant = mutants_.emplace_back();
     mutant.name = name;

@@ -54,9 +54,6 @@ double CalcRollingRadius(const mjModel& engine, int body) {
 
 constexpr int kNoBody = -1;
 
-/// Whether this entry of a ball joint is not its last one.
-bool IsWithinBall(const Joint& joint) { return joint.type == JointType::kBall && joint.ball_axis < 2; }
-
 /// Whether another joint of the same body stands between this one and the body.
 bool HasJointBehind(const mjModel& engine, int joint) {
   const int body = engine.jnt_bodyid[joint];
@@ -67,7 +64,6 @@ bool HasJointBehind(const mjModel& engine, int joint) {
 /// that one body has, only the last moves it; the others' links have no body.
 template <typename Need>
 int FindLinkBody(const mjModel& engine, const Joint& joint, int joint_id, const Need& need) {
-  if (IsWithinBall(joint)) return kNoBody;
   if (joint_id >= 0) {
     if (HasJointBehind(engine, joint_id)) return kNoBody;
     const int body = engine.jnt_bodyid[joint_id];
@@ -121,8 +117,7 @@ void Adapter::MatchJoints(const std::string& engine_source) {
     need(mjOBJ_JOINT, "wheel joint", model_->base().wheel_joint_left);
   }
   for (const Joint& joint : model_->joints()) {
-    const bool continues_ball = joint.type == JointType::kBall && joint.ball_axis > 0;
-    joint_ids_.push_back(continues_ball ? joint_ids_.back() : need(mjOBJ_JOINT, "joint", NameInFile(joint)));
+    joint_ids_.push_back(need(mjOBJ_JOINT, "joint", joint.name));
     link_bodies_.push_back(FindLinkBody(engine, joint, joint_ids_.back(), need));
     known.insert(joint_ids_.back());
   }
@@ -157,7 +152,7 @@ void Adapter::MatchJoints(const std::string& engine_source) {
     const Joint& joint = model_->joints()[static_cast<size_t>(i)];
     const int id = joint_ids_[static_cast<size_t>(i)];
     const int body = engine.jnt_bodyid[id];
-    const std::string key = "joint " + Quote(NameInFile(joint)) + ": ";
+    const std::string key = "joint " + Quote(joint.name) + ": ";
     const bool hinge = engine.jnt_type[id] == mjJNT_HINGE;
     const bool slide = engine.jnt_type[id] == mjJNT_SLIDE;
     if (joint.type == JointType::kRevolute && !hinge)
@@ -171,9 +166,8 @@ void Adapter::MatchJoints(const std::string& engine_source) {
       fail(key + "must move body " + Quote(joint.link) + ", moves " +
            Quote(NameOf(engine, mjOBJ_BODY, body)));
     }
-    joint_dofs_.push_back(engine.jnt_dofadr[id] + joint.ball_axis);
+    for (int k = 0; k < CountVelocities(joint.type); ++k) joint_dofs_.push_back(engine.jnt_dofadr[id] + k);
     joint_qpos_.push_back(engine.jnt_qposadr[id]);
-    if (joint.ball_axis > 0) continue;
     if (id > engine.body_jntadr[body]) {
       if (joint.parent >= 0 && joint_ids_[static_cast<size_t>(joint.parent)] == id - 1) continue;
       fail(key + "must come after joint " + Quote(NameOf(engine, mjOBJ_JOINT, id - 1)) +
@@ -295,7 +289,7 @@ void Adapter::SetPositions(const Eigen::Ref<const VectorXd>& q, mjtNum* qpos) co
     const int at = model_->position_index(static_cast<int>(i));
     if (joint.type != JointType::kBall) {
       qpos[joint_qpos_[i]] = q[at];
-    } else if (joint.ball_axis == 0) {
+    } else {
       mju_copy4(qpos + joint_qpos_[i], q.data() + at);
       mju_normalize4(qpos + joint_qpos_[i]);
     }
@@ -375,8 +369,7 @@ int Adapter::RequireTipGeom(int frame) const {
 
 void Adapter::GetPositions(const mjtNum* qpos, Eigen::Ref<VectorXd> q) const {
   for (size_t i = 0; i < joint_qpos_.size(); ++i) {
-    const Joint& joint = model_->joints()[i];
-    const int count = joint.type == JointType::kBall ? 4 : 1;
+    const int count = CountPositions(model_->joints()[i].type);
     mju_copy(q.data() + model_->position_index(static_cast<int>(i)), qpos + joint_qpos_[i], count);
   }
   if (base_joints_.empty()) return;

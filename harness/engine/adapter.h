@@ -27,12 +27,11 @@ struct EngineWheel {
 
 /// Matches the analytic model with an engine's model by joint and body names and maps q', xi to qpos, qvel.
 ///
-/// q_i is the engine's position of the joint of the same name; of a ball joint the quaternion is the
-/// engine's, and its three entries have its three dofs. The base's q_v = 0 is the pose that the MJCF gives to
-/// the base's body. The base may move by a free joint, or by two slides and a hinge; a differential drive has
-/// a hinge per wheel besides. A floating base's Sigma_0 is the frame of its body, which moves by a free
-/// joint: its q_v and v are the engine's. qvel = T velocity, where T has dense base columns and one entry per
-/// joint.
+/// q_i is the engine's position of the joint of the same name, and of a ball joint its quaternion. The base's
+/// q_v = 0 is the pose that the MJCF gives to the base's body. The base may move by a free joint, or by two
+/// slides and a hinge; a differential drive has a hinge per wheel besides. A floating base's Sigma_0 is the
+/// frame of its body, which moves by a free joint: its q_v and v are the engine's. qvel = T velocity, where T
+/// has dense base columns and one entry per joint.
 class Adapter {
  public:
   /// @throws InputError that lists the joints, bodies and sites that the other side lacks (the first few of
@@ -44,7 +43,7 @@ class Adapter {
 
   /// Engine's joint id of each joint of the model.
   [[nodiscard]] const std::vector<int>& joint_ids() const { return joint_ids_; }
-  /// Engine's dof address of each joint of the model.
+  /// Engine's dof address of each velocity of the model's joints.
   [[nodiscard]] const std::vector<int>& joint_dofs() const { return joint_dofs_; }
   /// Engine's body id of each link: base first, then by joint; -1 for links between several joints that one
   /// body has.

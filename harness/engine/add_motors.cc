@@ -1,7 +1,4 @@
-#include "harness/engine/add_motors.h"
-
 #include <fmt/format.h>
-#include <tinyxml2.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,11 +6,11 @@
 #include <string>
 #include <string_view>
 
-#include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_passes.h"
 #include "harness/engine/robot_tree.h"
+#include "harness/engine/xml.h"
 
 namespace dexcheck {
 namespace {
@@ -43,23 +40,16 @@ std::optional<double> FindJointLimit(const mjModel& m, int joint) {
   return largest;
 }
 
-void DeleteSections(XMLElement* root, const char* name) {
-  while (XMLElement* const section = root->FirstChildElement(name)) root->DeleteChild(section);
-}
-
-/// What names actuators or their controls.
-void DeleteUses(XMLElement* root) {
-  for (XMLElement* section = root->FirstChildElement("sensor"); section != nullptr;
-       section = section->NextSiblingElement("sensor")) {
-    for (XMLElement* sensor = section->FirstChildElement(); sensor != nullptr;) {
-      XMLElement* const next = sensor->NextSiblingElement();
+/// What names actuators or their controls, and all actuators.
+void DeleteActuators(XMLElement* root) {
+  for (XMLElement* section : ListChildren(root, "actuator")) root->DeleteChild(section);
+  for (XMLElement* section : ListChildren(root, "sensor")) {
+    for (XMLElement* sensor : ListChildren(section)) {
       if (sensor->Attribute("actuator") != nullptr) section->DeleteChild(sensor);
-      sensor = next;
     }
   }
-  for (XMLElement* section = root->FirstChildElement("keyframe"); section != nullptr;
-       section = section->NextSiblingElement("keyframe")) {
-    for (XMLElement* key = section->FirstChildElement(); key != nullptr; key = key->NextSiblingElement()) {
+  for (XMLElement* section : ListChildren(root, "keyframe")) {
+    for (XMLElement* key : ListChildren(section)) {
       for (const char* name : {"ctrl", "act"}) key->DeleteAttribute(name);
     }
   }
@@ -67,15 +57,13 @@ void DeleteUses(XMLElement* root) {
 
 }  // namespace
 
-void AddMotors(const std::filesystem::path& folder, JoinedMjcf* mjcf) {
+void AddMotors(MjcfFile* mjcf) {
   const std::string& source = mjcf->source();
-  const MjModelPtr model =
-      LoadMjcfText(MoveMjcf(mjcf->Print(), source, folder, std::filesystem::current_path()), source);
+  const MjModelPtr model = LoadMjcfText(mjcf->PrintFor(std::filesystem::current_path()), source);
   const mjModel& m = *model;
   const int tree = FindRobotTree(m, source).floating_body;
   XMLElement* const root = mjcf->root();
-  DeleteSections(root, "actuator");
-  DeleteUses(root);
+  DeleteActuators(root);
   XMLElement* const actuators = root->InsertNewChildElement("actuator");
   int motors = 0;
   for (int joint = 0; joint < m.njnt; ++joint) {

@@ -7,24 +7,18 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <map>
 #include <mutex>
 #include <new>
-#include <set>
 #include <system_error>
+#include <vector>
 
 #include "controller/common/errors.h"
 #include "harness/base/console.h"
 #include "harness/base/temporary_path.h"
-#include "harness/engine/cylinder_collision.h"
-#include "harness/engine/ellipsoid_collision.h"
+#include "harness/engine/exact_collision.h"
 #include "harness/engine/finite_check.h"
-#include "harness/engine/joined_mjcf.h"
-#include "harness/engine/mjcf_assets.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_passes.h"
 #include "harness/engine/mujoco_release.h"
-#include "harness/engine/newer_mjcf.h"
-#include "harness/engine/torus_collision.h"
 
 namespace dexcheck {
 namespace {
@@ -64,17 +58,26 @@ void CheckReadable(const std::filesystem::path& path) {
 void PrepareEngine() {
   InstallMessageHandlers();
   CheckVersion();
-  InstallCylinderCollision();
-  InstallEllipsoidCollision();
-  InstallTorusCollision();
+  InstallExactCollision();
 }
 
-/// Commands load a file more than once.
+/// What was said of the files that were loaded; commands load a file more than once.
+struct LoadNotes {
+  std::mutex mutex;
+  std::vector<std::string> texts;
+};
+
+LoadNotes& AllLoadNotes() {
+  static LoadNotes notes;
+  return notes;
+}
+
 void WarnOnce(const std::string& text) {
-  static std::mutex mutex;
-  static std::set<std::string> told;
-  const std::scoped_lock lock(mutex);
-  if (told.insert(text).second) Warn(text);
+  LoadNotes& notes = AllLoadNotes();
+  const std::scoped_lock lock(notes.mutex);
+  if (std::find(notes.texts.begin(), notes.texts.end(), text) != notes.texts.end()) return;
+  notes.texts.push_back(text);
+  Warn(text);
 }
 
 std::string OneLine(std::string text) {
@@ -125,30 +128,11 @@ MjModelPtr LoadText(const std::string& text, const std::string& source) {
   }
 }
 
-/// One line: "robot.xml: left out: forces of actuators: <joint kv> (7), ...; left out: ...".
-std::string Summarize(const JoinedMjcf& mjcf) {
-  constexpr size_t kMostWords = 4;
-  std::map<std::string, std::map<std::string, int>> groups;
-  for (const MjcfChange& change : mjcf.changes())
-    ++groups[change.what.substr(0, change.what.find(", since"))][change.word];
-  std::string line = mjcf.source() + ":";
-  for (const auto& [what, words] : groups) {
-    line += (line.back() == ':' ? " " : "; ") + what + ": ";
-    size_t count = 0;
-    for (const auto& [word, times] : words) {
-      if (count++ >= kMostWords) continue;
-      line += (count > 1 ? ", " : "") + word + (times > 1 ? " (" + std::to_string(times) + ")" : "");
-    }
-    if (count > kMostWords) line += " and " + std::to_string(count - kMostWords) + " more";
-  }
-  return line;
-}
-
 /// @param load what loads it when nothing need be changed.
 template <typename Load>
-MjModelPtr LoadAdapted(const std::filesystem::path& folder, JoinedMjcf* mjcf, const Load& load) {
+MjModelPtr LoadAdapted(MjcfFile* mjcf, const Load& load) {
   if (mjcf->IsUrdf()) return load();
-  AdaptMjcf(folder, mjcf);
+  AdaptMjcf(mjcf);
   if (mjcf->changes().empty()) {
     try {
       return load();
@@ -158,9 +142,8 @@ MjModelPtr LoadAdapted(const std::filesystem::path& folder, JoinedMjcf* mjcf, co
     }
   }
   StateNewDefaults(mjcf);
-  MjModelPtr model = LoadText(
-      MoveMjcf(mjcf->Print(), mjcf->source(), folder, std::filesystem::current_path()), mjcf->source());
-  WarnOnce(Summarize(*mjcf));
+  MjModelPtr model = LoadText(mjcf->PrintFor(std::filesystem::current_path()), mjcf->source());
+  WarnOnce(mjcf->SummarizeChanges());
   return model;
 }
 
@@ -169,19 +152,24 @@ MjModelPtr LoadAdapted(const std::filesystem::path& folder, JoinedMjcf* mjcf, co
 MjModelPtr LoadMjcf(const std::filesystem::path& path) {
   PrepareEngine();
   CheckReadable(path);
-  JoinedMjcf mjcf(path);
+  MjcfFile mjcf(path);
   if (!mjcf.HasWorld() && !mjcf.IsUrdf()) {
     throw InputError(path.string() +
                      ": has no <worldbody>: it is a part for <include>; give the file that includes it");
   }
-  return LoadAdapted(std::filesystem::absolute(path).parent_path(), &mjcf,
-                     [&] { return Load(path.string(), nullptr, path.string()); });
+  return LoadAdapted(&mjcf, [&] { return Load(path.string(), nullptr, path.string()); });
 }
 
 MjModelPtr LoadMjcfText(const std::string& text, const std::string& source) {
   PrepareEngine();
-  JoinedMjcf mjcf(text, source);
-  return LoadAdapted(std::filesystem::current_path(), &mjcf, [&] { return LoadText(text, source); });
+  MjcfFile mjcf(text, source);
+  return LoadAdapted(&mjcf, [&] { return LoadText(text, source); });
+}
+
+std::vector<std::string> ListLoadNotes() {
+  LoadNotes& notes = AllLoadNotes();
+  const std::scoped_lock lock(notes.mutex);
+  return notes.texts;
 }
 
 MjDataPtr MakeData(const mjModel& model) {

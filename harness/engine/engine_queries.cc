@@ -49,13 +49,11 @@ const mjtNum* EngineTerms::PlaceOf(int frame) const {
   return site < 0 ? data_->xpos + 3 * body_of(frame) : data_->site_xpos + 3 * site;
 }
 
-Vector3d EngineTerms::JointAxis(int joint) const {
-  const Joint& entry = adapter_->model().joints()[static_cast<size_t>(joint)];
+Vector3d EngineTerms::JointAxis(int joint, int column) const {
   const int id = adapter_->joint_ids()[static_cast<size_t>(joint)];
-  if (entry.type != JointType::kBall) return MapVector(data_->xaxis + 3 * id);
-  // Its body's own axis: a ball's dofs turn about them.
+  if (engine_->jnt_type[id] != mjJNT_BALL) return MapVector(data_->xaxis + 3 * id);
   const mjtNum* const R = data_->xmat + 9 * engine_->jnt_bodyid[id];
-  return {R[entry.ball_axis], R[3 + entry.ball_axis], R[6 + entry.ball_axis]};
+  return {R[column], R[3 + column], R[6 + column]};
 }
 
 Vector3d EngineTerms::JointAnchor(int joint) const {

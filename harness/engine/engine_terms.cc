@@ -323,10 +323,9 @@ void EngineTerms::CalcCoriolisProduct(const Eigen::Ref<const VectorXd>& velocity
   map_.ExpandBracket(q_, velocity, w, bracket_nv_.data());
   mj_mulM(engine_.get(), data_.get(), force_nv_.data(), bracket_nv_.data());
   // A ball's rotors have one inertia in all directions of its rates, and no gyroscopic forces.
-  const std::vector<Joint>& joints = adapter_->model().joints();
-  for (size_t i = 0; i < joints.size(); ++i) {
-    const int dof = adapter_->joint_dofs()[i];
-    if (joints[i].type == JointType::kBall) force_nv_[dof] -= engine_->dof_armature[dof] * bracket_nv_[dof];
+  for (const int dof : adapter_->joint_dofs()) {
+    if (engine_->jnt_type[engine_->dof_jntid[dof]] == mjJNT_BALL)
+      force_nv_[dof] -= engine_->dof_armature[dof] * bracket_nv_[dof];
   }
   map_.ProjectForce(force_nv_.data(), other_force_);
   result = 0.25 * result + 0.5 * other_force_;

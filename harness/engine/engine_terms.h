@@ -90,8 +90,8 @@ class EngineTerms {
 
   /// Links, base first.
   [[nodiscard]] std::vector<LinkInWorld> links() const;
-  /// Axis direction and a point on the axis of a joint, world frame.
-  [[nodiscard]] Vector3d JointAxis(int joint) const;
+  /// Axis of a joint (of a ball joint the x, y or z axis of its body) and a point on it, world frame.
+  [[nodiscard]] Vector3d JointAxis(int joint, int column = 2) const;
   [[nodiscard]] Vector3d JointAnchor(int joint) const;
 
   /// Pose of Sigma_0.

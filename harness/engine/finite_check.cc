@@ -1,7 +1,6 @@
 #include "harness/engine/finite_check.h"
 
 #include <mujoco/mjxmacro.h>
-#include <tinyxml2.h>
 
 #include <cmath>
 #include <cstdlib>
@@ -10,25 +9,14 @@
 #include <string_view>
 #include <type_traits>
 
-#include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_passes.h"
 #include "harness/engine/mujoco_release.h"
+#include "harness/engine/xml.h"
 
 namespace dexcheck {
 namespace {
-
-/// One attribute of all elements of a kind: `count` entries of `width` numbers.
-struct Attribute {
-  const char* kind;
-  mjtObj type;
-  const char* name;
-  const mjtNum* values;
-  EngineSize count;
-  int width;
-  const int* owner = nullptr;  ///< Element of each entry where they are not the same.
-};
 
 constexpr const char* kBlanks = " \t\r\n";
 
@@ -76,9 +64,45 @@ bool IsNumbers(const char* text, bool integer) {
   return !integer || count == 1;
 }
 
+/// Elements whose numbers must be finite: by the array's name, "body_mass" is the mass of a body.
+constexpr struct {
+  std::string_view prefix;
+  const char* kind;
+  mjtObj type;
+  std::string_view finite;  ///< Attributes, each between blanks.
+} kElements[] = {
+    {"body_", "body", mjOBJ_BODY, " pos quat ipos iquat mass inertia "},
+    {"jnt_", "joint", mjOBJ_JOINT, " pos axis range stiffness "},
+    {"dof_", "joint", mjOBJ_JOINT, " armature damping frictionloss "},
+    {"geom_", "geom", mjOBJ_GEOM, " pos quat size friction "},
+    {"site_", "site", mjOBJ_SITE, " pos quat "},
+    {"pair_", "pair", mjOBJ_PAIR, " friction "},
+};
+
+template <typename Number>
+void CheckArray(const mjModel& model, const std::string& source, const std::string& name,
+                const Number* values, size_t rows, size_t columns) {
+  for (const auto& element : kElements) {
+    if (!name.starts_with(element.prefix)) continue;
+    const std::string attribute = name.substr(element.prefix.size());
+    if (element.finite.find(" " + attribute + " ") == std::string_view::npos) break;
+    for (size_t i = 0; i < rows * columns; ++i) {
+      if (std::isfinite(values[i])) continue;
+      const auto row = static_cast<int>(i / columns);
+      const int id = element.prefix == "dof_" ? model.dof_jntid[row] : row;
+      throw InputError(source + ": " + element.kind + " " + Quote(NameOf(model, element.type, id)) + ": " +
+                       attribute + " must be finite, got " + FormatNumber(static_cast<double>(values[i])));
+    }
+  }
+  for (size_t i = 0; i < rows * columns; ++i) {
+    if (std::isnan(values[i]))
+      throw InputError(source + ": " + name + "[" + std::to_string(i) + "] must be a number, got nan");
+  }
+}
+
 }  // namespace
 
-void CheckNumbers(JoinedMjcf* mjcf) {
+void CheckNumbers(MjcfFile* mjcf) {
   VisitElements(mjcf->root(), [&](tinyxml2::XMLElement* element) {
     const std::string_view kind = element->Name();
     const bool has_lists = kind == "mesh" || kind == "skin" || kind == "bone";
@@ -103,68 +127,32 @@ void CheckNumbers(JoinedMjcf* mjcf) {
 }
 
 void CheckFinite(const mjModel& model, const std::string& source) {
-  const auto check = [&](const mjtNum* values, EngineSize count, const auto& describe) {
-    for (EngineSize i = 0; i < count; ++i) {
-      if (std::isfinite(values[i])) continue;
-      throw InputError(source + ": " + describe(i) + " must be finite, got " + FormatNumber(values[i]));
+  const mjOption& option = model.opt;
+  const auto check_option = [&](const char* name, const mjtNum* values, int count) {
+    for (int i = 0; i < count; ++i) {
+      if (!std::isfinite(values[i]))
+        throw InputError(source + ": option " + name + " must be finite, got " + FormatNumber(values[i]));
     }
   };
-  const auto option = [](const char* name) {
-    return [name](EngineSize) { return std::string("option ") + name; };
-  };
-  check(&model.opt.timestep, 1, option("timestep"));
-  check(model.opt.gravity, 3, option("gravity"));
-  check(&model.opt.density, 1, option("density"));
-  check(&model.opt.viscosity, 1, option("viscosity"));
-  check(&model.opt.impratio, 1, option("impratio"));
-  check(&model.opt.tolerance, 1, option("tolerance"));
-  check(&model.opt.noslip_tolerance, 1, option("noslip_tolerance"));
-  check(&model.opt.o_margin, 1, option("o_margin"));
-  check(model.opt.wind, 3, option("wind"));
-  check(model.opt.magnetic, 3, option("magnetic"));
-  check(model.opt.o_solref, mjNREF, option("o_solref"));
-  check(model.opt.o_solimp, mjNIMP, option("o_solimp"));
-
-  const Attribute attributes[] = {
-      {"body", mjOBJ_BODY, "pos", model.body_pos, model.nbody, 3},
-      {"body", mjOBJ_BODY, "quat", model.body_quat, model.nbody, 4},
-      {"body", mjOBJ_BODY, "inertial pos", model.body_ipos, model.nbody, 3},
-      {"body", mjOBJ_BODY, "inertial quat", model.body_iquat, model.nbody, 4},
-      {"body", mjOBJ_BODY, "mass", model.body_mass, model.nbody, 1},
-      {"body", mjOBJ_BODY, "inertia", model.body_inertia, model.nbody, 3},
-      {"joint", mjOBJ_JOINT, "pos", model.jnt_pos, model.njnt, 3},
-      {"joint", mjOBJ_JOINT, "axis", model.jnt_axis, model.njnt, 3},
-      {"joint", mjOBJ_JOINT, "range", model.jnt_range, model.njnt, 2},
-      {"joint", mjOBJ_JOINT, "stiffness", model.jnt_stiffness, model.njnt, 1},
-      {"joint", mjOBJ_JOINT, "armature", model.dof_armature, model.nv, 1, model.dof_jntid},
-      {"joint", mjOBJ_JOINT, "damping", model.dof_damping, model.nv, 1, model.dof_jntid},
-      {"joint", mjOBJ_JOINT, "frictionloss", model.dof_frictionloss, model.nv, 1, model.dof_jntid},
-      {"geom", mjOBJ_GEOM, "pos", model.geom_pos, model.ngeom, 3},
-      {"geom", mjOBJ_GEOM, "quat", model.geom_quat, model.ngeom, 4},
-      {"geom", mjOBJ_GEOM, "size", model.geom_size, model.ngeom, 3},
-      {"geom", mjOBJ_GEOM, "friction", model.geom_friction, model.ngeom, 3},
-      {"site", mjOBJ_SITE, "pos", model.site_pos, model.nsite, 3},
-      {"site", mjOBJ_SITE, "quat", model.site_quat, model.nsite, 4},
-      {"pair", mjOBJ_PAIR, "friction", model.pair_friction, model.npair, 5},
-  };
-  for (const Attribute& attribute : attributes) {
-    check(attribute.values, attribute.count * attribute.width, [&](EngineSize i) {
-      const auto entry = static_cast<int>(i / attribute.width);
-      const int element = attribute.owner == nullptr ? entry : attribute.owner[entry];
-      return std::string(attribute.kind) + " " + Quote(NameOf(model, attribute.type, element)) + ": " +
-             attribute.name;
-    });
+  for (const auto& [name, value] :
+       {std::pair("timestep", option.timestep), std::pair("density", option.density),
+        std::pair("viscosity", option.viscosity), std::pair("impratio", option.impratio),
+        std::pair("tolerance", option.tolerance), std::pair("noslip_tolerance", option.noslip_tolerance),
+        std::pair("o_margin", option.o_margin)}) {
+    check_option(name, &value, 1);
   }
+  check_option("gravity", option.gravity, 3);
+  check_option("wind", option.wind, 3);
+  check_option("magnetic", option.magnetic, 3);
+  check_option("o_solref", option.o_solref, mjNREF);
+  check_option("o_solimp", option.o_solimp, mjNIMP);
 
 #undef MJ_M
 #define MJ_M(size) model.size
-#define X(type, name, rows, columns)                                                                     \
-  if constexpr (std::is_floating_point_v<type>) {                                                        \
-    for (size_t i = 0, n = static_cast<size_t>(model.rows) * static_cast<size_t>(columns); i < n; ++i) { \
-      if (!std::isnan(model.name[i])) continue;                                                          \
-      throw InputError(source + ": " #name "[" + std::to_string(i) + "] must be a number, got nan");     \
-    }                                                                                                    \
-  }
+#define X(type, name, rows, columns)                                              \
+  if constexpr (std::is_floating_point_v<type>)                                   \
+    CheckArray(model, source, #name, model.name, static_cast<size_t>(model.rows), \
+               static_cast<size_t>(columns));
   MJMODEL_POINTERS
 #undef X
 }

@@ -1,47 +1,34 @@
-#include "harness/engine/mjcf_assets.h"
-
-#include <tinyxml2.h>
-
 #include <cstdlib>
 #include <map>
 #include <set>
-#include <string>
-#include <string_view>
 #include <system_error>
-#include <vector>
 
-#include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/engine/finite_check.h"
 #include "harness/engine/mesh_check.h"
-#include "harness/engine/mjcf_files.h"
-#include "harness/engine/newer_mjcf.h"
+#include "harness/engine/mjcf_passes.h"
+#include "harness/engine/xml.h"
 
 namespace dexcheck {
 namespace {
 
 using tinyxml2::XMLElement;
 
-bool Is(const XMLElement& element, std::string_view name) { return name == element.Name(); }
+constexpr const char* kFile[] = {"file"};
+constexpr const char* kTextureFiles[] = {"file",     "fileright", "fileleft", "fileup",
+                                         "filedown", "filefront", "fileback"};
 
-std::string Read(const XMLElement& element, const char* attribute, const char* otherwise = "") {
-  const char* const value = element.Attribute(attribute);
-  return value != nullptr ? value : otherwise;
-}
+bool Is(const XMLElement& element, std::string_view name) { return name == element.Name(); }
 
 /// What elements of a class get that do not say it themselves.
 class DefaultClasses {
  public:
   /// @param section the `default` of the file, or one within it.
   void Read(const XMLElement& section, const std::string& parent) {
-    const std::string name = dexcheck::Read(section, "class", parent.empty() ? "main" : "");
+    const std::string name = ReadAttribute(section, "class", parent.empty() ? "main" : "");
     if (parent.empty()) top_ = name;
     classes_[name].parent = parent;
     classes_[name].sections.push_back(&section);
-    for (const XMLElement* child = section.FirstChildElement("default"); child != nullptr;
-         child = child->NextSiblingElement("default")) {
-      Read(*child, name);
-    }
+    for (const XMLElement* child : ListChildren(&section, "default")) Read(*child, name);
   }
 
   /// The attribute of an element, its own or of its class; nullptr without one.
@@ -49,7 +36,7 @@ class DefaultClasses {
   [[nodiscard]] const char* Find(const XMLElement& element, const std::string& child_class,
                                  const char* attribute) const {
     if (const char* own = element.Attribute(attribute)) return own;
-    std::string name = dexcheck::Read(element, "class", child_class.c_str());
+    std::string name = ReadAttribute(element, "class", child_class);
     if (name.empty()) name = top_;
     for (size_t depth = 0; depth <= classes_.size(); ++depth) {
       const auto found = classes_.find(name);
@@ -83,34 +70,25 @@ struct Surroundings {
 
 class AssetSieve {
  public:
-  AssetSieve(const std::filesystem::path& folder, JoinedMjcf* mjcf) : folder_(folder), mjcf_(*mjcf) {}
+  explicit AssetSieve(MjcfFile* mjcf) : mjcf_(*mjcf) {}
 
   void Run() {
     VisitElements(mjcf_.root(), [&](XMLElement* element) { ReadSettings(*element); });
-    for (XMLElement* section : Sections("default")) defaults_.Read(*section, "");
-    for (XMLElement* section : Sections("asset")) SieveAssets(section);
-    for (XMLElement* section : Sections("worldbody")) SieveBody(section, {});
+    for (XMLElement* section : ListChildren(mjcf_.root(), "default")) defaults_.Read(*section, "");
+    for (XMLElement* section : ListChildren(mjcf_.root(), "asset")) SieveAssets(section);
+    for (XMLElement* section : ListChildren(mjcf_.root(), "worldbody")) SieveBody(section, {});
     VisitElements(mjcf_.root(), [&](XMLElement* element) { DropLooks(element); });
     for (const char* name : {"contact", "sensor", "tendon", "equality", "custom"}) {
-      for (XMLElement* section : Sections(name)) DropReferences(section);
+      for (XMLElement* section : ListChildren(mjcf_.root(), name)) DropReferences(section);
     }
   }
 
  private:
-  std::vector<XMLElement*> Sections(const char* name) {
-    std::vector<XMLElement*> sections;
-    for (XMLElement* section = mjcf_.root()->FirstChildElement(name); section != nullptr;
-         section = section->NextSiblingElement(name)) {
-      sections.push_back(section);
-    }
-    return sections;
-  }
-
   void ReadSettings(const XMLElement& element) {
-    if (Is(element, "material")) materials_.insert(Read(element, "name"));
+    if (Is(element, "material")) materials_.insert(ReadAttribute(element, "name"));
     if (!Is(element, "compiler")) return;
     folders_.Read(element);
-    inertia_from_geom_ = Read(element, "inertiafromgeom", inertia_from_geom_.c_str());
+    inertia_from_geom_ = ReadAttribute(element, "inertiafromgeom", inertia_from_geom_);
     if (const char* range = element.Attribute("inertiagrouprange")) {
       char* rest = nullptr;
       first_group_ = std::strtol(range, &rest, 10);
@@ -120,52 +98,41 @@ class AssetSieve {
 
   /// As the engine does, by the file's name where there is none.
   static std::string NameOf(const XMLElement& asset) {
-    if (const char* name = asset.Attribute("name")) return name;
-    return std::filesystem::path(Read(asset, "file")).stem().string();
+    const std::filesystem::path file = ReadAttribute(asset, "file");
+    return ReadAttribute(asset, "name", file.stem().string());
   }
 
   [[nodiscard]] std::string FindFault(const XMLElement& asset, const std::string& folder, const char* file) {
-    const std::filesystem::path path = folder_ / folders_.Find(folder, file);
+    const std::filesystem::path path = mjcf_.folder() / folders_.Find(folder, file);
     if (Is(asset, "mesh")) return FindMeshFault(path);
     std::error_code error;
     return std::filesystem::exists(path, error) ? "" : "does not exist";
   }
 
   void SieveAssets(XMLElement* section) {
-    for (XMLElement* asset = section->FirstChildElement(); asset != nullptr;) {
-      XMLElement* const next = asset->NextSiblingElement();
-      const std::string kind = asset->Name();
-      const bool is_shape = kind == "mesh" || kind == "hfield";
-      if (is_shape || kind == "skin") {
-        const char* const file = asset->Attribute("file");
-        const std::string fault = file != nullptr ? FindFault(*asset, folders_.meshes, file) : "";
-        if (is_shape) shapes_[kind][NameOf(*asset)] = {file != nullptr ? file : "", fault};
-        if (!fault.empty()) {
-          if (!is_shape) NoteFile(*asset, file, "left out", fault);
-          section->DeleteChild(asset);
-        }
-      } else if (kind == "texture") {
-        SieveTexture(asset);
-      }
-      asset = next;
+    for (XMLElement* asset : ListChildren(section)) {
+      const bool is_shape = Is(*asset, "mesh") || Is(*asset, "hfield");
+      if (Is(*asset, "texture")) SieveTexture(asset);
+      if (!is_shape && !Is(*asset, "skin")) continue;
+      const char* const file = asset->Attribute("file");
+      const std::string fault = file != nullptr ? FindFault(*asset, folders_.meshes, file) : "";
+      if (is_shape) shapes_[asset->Name()][NameOf(*asset)] = {file != nullptr ? file : "", fault};
+      if (fault.empty()) continue;
+      if (!is_shape) NoteFile(*asset, file, "left out", fault);
+      section->DeleteChild(asset);
     }
   }
 
   /// A texture keeps its place, with one colour.
   void SieveTexture(XMLElement* texture) {
     textures_.insert(NameOf(*texture));
-    for (const char* side :
-         {"file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback"}) {
+    for (const char* side : kTextureFiles) {
       const char* const file = texture->Attribute(side);
-      if (file == nullptr) continue;
-      const std::string fault = FindFault(*texture, folders_.textures, file);
+      const std::string fault = file != nullptr ? FindFault(*texture, folders_.textures, file) : "";
       if (fault.empty()) continue;
       NoteFile(*texture, file, "its texture left out", fault);
       texture->SetAttribute("name", NameOf(*texture).c_str());
-      for (const char* other :
-           {"file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback"}) {
-        texture->DeleteAttribute(other);
-      }
+      for (const char* other : kTextureFiles) texture->DeleteAttribute(other);
       texture->SetAttribute("builtin", "flat");
       for (const char* size : {"width", "height"}) texture->SetAttribute(size, "1");
       if (texture->Attribute("rgb1") == nullptr) texture->SetAttribute("rgb1", "1 1 1");
@@ -179,16 +146,14 @@ class AssetSieve {
   }
 
   void SieveBody(XMLElement* body, Surroundings around) {
-    if (Is(*body, "body")) around.body = Read(*body, "name");
-    around.child_class = Read(*body, "childclass", around.child_class.c_str());
+    if (Is(*body, "body")) around.body = ReadAttribute(*body, "name");
+    around.child_class = ReadAttribute(*body, "childclass", around.child_class);
     around.moves |=
         body->FirstChildElement("joint") != nullptr || body->FirstChildElement("freejoint") != nullptr;
     around.has_inertial = body->FirstChildElement("inertial") != nullptr;
-    for (XMLElement* child = body->FirstChildElement(); child != nullptr;) {
-      XMLElement* const next = child->NextSiblingElement();
+    for (XMLElement* child : ListChildren(body)) {
       if (Is(*child, "body")) SieveBody(child, around);
       if (Is(*child, "geom") && SieveGeom(*child, around)) body->DeleteChild(child);
-      child = next;
     }
   }
 
@@ -247,19 +212,13 @@ class AssetSieve {
 
   /// Pairs, sensors and the like of geoms that are gone.
   void DropReferences(XMLElement* section) {
-    for (XMLElement* child = section->FirstChildElement(); child != nullptr;) {
-      XMLElement* const next = child->NextSiblingElement();
-      const bool is_gone = [&] {
-        for (const char* attribute : {"geom", "geom1", "geom2", "objname", "refname"}) {
-          if (removed_.contains(Read(*child, attribute))) return true;
-        }
-        return false;
-      }();
-      if (is_gone) {
+    for (XMLElement* child : ListChildren(section)) {
+      for (const char* attribute : {"geom", "geom1", "geom2", "objname", "refname"}) {
+        if (!removed_.contains(ReadAttribute(*child, attribute))) continue;
         mjcf_.Note(*child, "<" + std::string(child->Name()) + ">", "left out with its geom");
         section->DeleteChild(child);
+        break;
       }
-      child = next;
     }
   }
 
@@ -268,8 +227,7 @@ class AssetSieve {
     std::string fault;
   };
 
-  std::filesystem::path folder_;
-  JoinedMjcf& mjcf_;
+  MjcfFile& mjcf_;
   AssetFolders folders_;
   DefaultClasses defaults_;
   std::string inertia_from_geom_ = "auto";
@@ -283,12 +241,16 @@ class AssetSieve {
 
 }  // namespace
 
-void LeaveOutAssets(const std::filesystem::path& folder, JoinedMjcf* mjcf) { AssetSieve(folder, mjcf).Run(); }
+void LeaveOutAssets(MjcfFile* mjcf) { AssetSieve(mjcf).Run(); }
 
-void AdaptMjcf(const std::filesystem::path& folder, JoinedMjcf* mjcf) {
-  CheckNumbers(mjcf);
-  LeaveOutNewerWords(mjcf);
-  LeaveOutAssets(folder, mjcf);
+void AdaptMjcf(MjcfFile* mjcf) {
+  for (const auto& pass : {CheckNumbers, LeaveOutNewerWords, LeaveOutAssets}) pass(mjcf);
+}
+
+std::span<const char* const> ListAssetAttributes(std::string_view element) {
+  if (element == "texture") return kTextureFiles;
+  if (element == "mesh" || element == "hfield" || element == "skin") return kFile;
+  return {};
 }
 
 }  // namespace dexcheck

@@ -1,16 +1,14 @@
-#include "harness/engine/newer_mjcf.h"
-
 #include <mujoco/mujoco.h>
-#include <tinyxml2.h>
 
-#include <algorithm>
 #include <map>
 #include <memory>
 #include <set>
 #include <sstream>
 
-#include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/engine/mjcf_passes.h"
+#include "harness/engine/newer_mjcf_words.h"
+#include "harness/engine/xml.h"
 
 namespace dexcheck {
 namespace {
@@ -79,7 +77,7 @@ bool IsZero(std::string_view text) { return text.find_first_of("123456789") == s
 
 class Downgrade {
  public:
-  explicit Downgrade(JoinedMjcf* mjcf) : mjcf_(*mjcf) {}
+  explicit Downgrade(MjcfFile* mjcf) : mjcf_(*mjcf) {}
 
   void Run() {
     static const Schema schema;
@@ -96,10 +94,6 @@ class Downgrade {
     throw InputError(mjcf_.FindPlace(element) + ": " + word + ": " + why);
   }
 
-  void Note(const XMLElement& element, const std::string& word, const std::string& what) {
-    mjcf_.Note(element, word, what);
-  }
-
   static std::string DescribeLoss(const NewerWord& word) {
     return "left out: " + std::string(NameOf(word.effect)) + ", since MuJoCo " + std::string(word.since);
   }
@@ -107,20 +101,18 @@ class Downgrade {
   void Walk(XMLElement* element, const SchemaElement& schema) {
     ReplaceValues(element);
     RemoveAttributes(element, schema);
-    for (XMLElement* child = element->FirstChildElement(); child != nullptr;) {
-      XMLElement* const next = child->NextSiblingElement();
-      const auto known = schema.children.find(std::string_view(child->Name()));
+    for (XMLElement* child : ListChildren(element)) {
+      const std::string name = child->Name();
+      const auto known = schema.children.find(name);
       if (known != schema.children.end()) {
         Walk(child, *known->second);
-      } else {
-        const std::string word = "<" + std::string(child->Name()) + ">";
-        const NewerWord* newer = FindNewerWord(element->Name() + ("/" + std::string(child->Name())), "");
-        if (newer == nullptr) newer = FindNewerWord(child->Name(), "");
-        if (newer == nullptr || newer->effect == MjcfEffect::kDynamics) Refuse(*child, word, newer);
-        Note(*child, word, DescribeLoss(*newer));
-        element->DeleteChild(child);
+        continue;
       }
-      child = next;
+      const NewerWord* newer = FindNewerWord(element->Name() + ("/" + name), "");
+      if (newer == nullptr) newer = FindNewerWord(name, "");
+      if (newer == nullptr || newer->effect == MjcfEffect::kDynamics) Refuse(*child, "<" + name + ">", newer);
+      mjcf_.Note(*child, "<" + name + ">", DescribeLoss(*newer));
+      element->DeleteChild(child);
     }
   }
 
@@ -136,7 +128,7 @@ class Downgrade {
             !newer->neutral.empty() &&
             (newer->neutral == attribute->Value() || (newer->neutral == "0" && IsZero(attribute->Value())));
         if (newer->effect == MjcfEffect::kDynamics && !is_neutral) Refuse(*element, word, newer);
-        Note(*element, word, DescribeLoss(*newer));
+        mjcf_.Note(*element, word, DescribeLoss(*newer));
         element->DeleteAttribute(name.c_str());
       }
       attribute = next;
@@ -154,7 +146,7 @@ class Downgrade {
           if (element->Attribute(each) == nullptr) element->SetAttribute(each, assets.c_str());
         }
         element->DeleteAttribute("assetdir");
-        Note(*element, "<compiler assetdir>", "written as meshdir and texturedir");
+        mjcf_.Note(*element, "<compiler assetdir>", "written as meshdir and texturedir");
       }
     }
     if (name == "option") {
@@ -162,8 +154,8 @@ class Downgrade {
            {std::pair("implicitfast", "implicit"), std::pair("discrete", "Euler")}) {
         if (element->Attribute("integrator", value) == nullptr) continue;
         element->SetAttribute("integrator", other);
-        Note(*element, "<option integrator>",
-             std::string(value) + " written as " + other + ", which no term depends on");
+        mjcf_.Note(*element, "<option integrator>",
+                   std::string(value) + " written as " + other + ", which no term depends on");
       }
     }
     if (name == "joint") {
@@ -188,26 +180,26 @@ class Downgrade {
                        ": acts on the dynamics: 2.2.2 has the first coefficient only, got " + Quote(value));
     }
     joint->SetAttribute(attribute, first.c_str());
-    Note(*joint, word, "its zero coefficients left out");
+    mjcf_.Note(*joint, word, "its zero coefficients left out");
   }
 
-  JoinedMjcf& mjcf_;
+  MjcfFile& mjcf_;
 };
 
 }  // namespace
 
-void LeaveOutNewerWords(JoinedMjcf* mjcf) { Downgrade(mjcf).Run(); }
+void LeaveOutNewerWords(MjcfFile* mjcf) { Downgrade(mjcf).Run(); }
 
-void StateNewDefaults(JoinedMjcf* mjcf) {
-  XMLElement* const root = mjcf->root();
-  XMLElement* compiler = root->FirstChildElement("compiler");
-  for (XMLElement* each = compiler; each != nullptr; each = each->NextSiblingElement("compiler")) {
-    if (each->Attribute("autolimits") != nullptr) return;
+XMLElement* RequireCompiler(XMLElement* root) {
+  if (XMLElement* const compiler = root->FirstChildElement("compiler")) return compiler;
+  return root->InsertFirstChild(root->GetDocument()->NewElement("compiler"))->ToElement();
+}
+
+void StateNewDefaults(MjcfFile* mjcf) {
+  for (const XMLElement* compiler : ListChildren(mjcf->root(), "compiler")) {
+    if (compiler->Attribute("autolimits") != nullptr) return;
   }
-  if (compiler == nullptr) {
-    compiler = root->GetDocument()->NewElement("compiler");
-    root->InsertFirstChild(compiler);
-  }
+  XMLElement* const compiler = RequireCompiler(mjcf->root());
   compiler->SetAttribute("autolimits", "true");
   mjcf->Note(*compiler, "<compiler autolimits>", "stated: true by default since MuJoCo 3.0.0");
 }

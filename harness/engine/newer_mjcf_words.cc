@@ -1,9 +1,9 @@
 // The schemas of MuJoCo's releases from 2.3.0 to 3.12.0, compared with that of 2.2.2.
 
+#include "harness/engine/newer_mjcf_words.h"
+
 #include <algorithm>
 #include <vector>
-
-#include "harness/engine/newer_mjcf.h"
 
 namespace dexcheck {
 namespace {

@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "harness/engine/engine.h"
+#include "harness/engine/exact_collision.h"
 #include "harness/engine/mujoco_release.h"
-#include "harness/engine/torus_collision.h"
 
 namespace dexcheck {
 namespace {
@@ -68,7 +68,7 @@ bool ReadShape(const mjModel& m, int geom, Solid* solid) {
         ReadHull(m, geom, solid);
         return true;
       }
-      // About the body's own axis; see InstallTorusCollision.
+      // About the body's own axis; see InstallExactCollision.
       solid->shape = kTorus;
       solid->X_BG = Pose::Identity();
       solid->size = Vector3d(ring, tube, 0.0);

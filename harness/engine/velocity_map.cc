@@ -19,7 +19,6 @@ VelocityMap::VelocityMap(const Adapter& adapter, Coordinates coordinates)
   T_base_.setZero(rows, base_size_);
   bias_.setZero(rows);
   bracket_.setZero(rows);
-  M_T_.setZero(engine.nv, base_size_);
   if (is_floating_) T_base_.setIdentity();
 }
 
@@ -112,13 +111,13 @@ void VelocityMap::ExpandBracket(const Eigen::Ref<const VectorXd>& q, const Eigen
   }
   for (Eigen::Index row = 0; row < bracket_.size(); ++row)
     qacc[base_dofs_[static_cast<size_t>(row)]] = bracket_[row];
-  const std::vector<Joint>& joints = adapter_->model().joints();
-  for (size_t i = 0; i < joints.size(); ++i) {
-    mjtNum* const rate = qacc + adapter_->joint_dofs()[i];
-    const Eigen::Index at = base_size_ + static_cast<Eigen::Index>(i);
-    if (joints[i].type != JointType::kBall) {
+  const RobotModel& model = adapter_->model();
+  for (int i = 0; i < model.num_joints(); ++i) {
+    mjtNum* const rate = qacc + adapter_->joint_dofs()[static_cast<size_t>(model.dof(i))];
+    const Eigen::Index at = base_size_ + model.dof(i);
+    if (model.joints()[static_cast<size_t>(i)].type != JointType::kBall) {
       *rate = 0.0;
-    } else if (joints[i].ball_axis == 0) {
+    } else {
       const Vector3d bracket = Vector3d(a.segment<3>(at)).cross(Vector3d(b.segment<3>(at)));
       mju_copy3(rate, bracket.data());
     }
@@ -134,32 +133,6 @@ void VelocityMap::ProjectForce(const mjtNum* force, Eigen::Ref<VectorXd> result)
   }
   for (size_t i = 0; i < adapter_->joint_dofs().size(); ++i) {
     result[base_size_ + static_cast<int>(i)] = force[adapter_->joint_dofs()[i]];
-  }
-}
-
-void VelocityMap::ProjectMatrix(const Eigen::Ref<const MatrixXd>& M, Eigen::Ref<MatrixXd> result) {
-  M_T_.setZero();
-  for (Eigen::Index row = 0; row < T_base_.rows(); ++row) {
-    M_T_.noalias() += M.col(base_dofs_[static_cast<size_t>(row)]) * T_base_.row(row);
-  }
-  for (int i = 0; i < base_size_; ++i) ProjectForce(M_T_.col(i).data(), result.col(i));
-  result.topRightCorner(base_size_, result.cols() - base_size_) =
-      result.bottomLeftCorner(result.rows() - base_size_, base_size_).transpose();
-  const std::vector<int>& dofs = adapter_->joint_dofs();
-  for (size_t j = 0; j < dofs.size(); ++j) {
-    for (size_t i = 0; i < dofs.size(); ++i) {
-      result(base_size_ + static_cast<int>(i), base_size_ + static_cast<int>(j)) = M(dofs[i], dofs[j]);
-    }
-  }
-}
-
-void VelocityMap::ProjectJacobian(const Eigen::Ref<const RowMatrixXd>& J, Eigen::Ref<MatrixXd> result) const {
-  result.leftCols(base_size_).setZero();
-  for (Eigen::Index row = 0; row < T_base_.rows(); ++row) {
-    result.leftCols(base_size_).noalias() += J.col(base_dofs_[static_cast<size_t>(row)]) * T_base_.row(row);
-  }
-  for (size_t i = 0; i < adapter_->joint_dofs().size(); ++i) {
-    result.col(base_size_ + static_cast<int>(i)) = J.col(adapter_->joint_dofs()[i]);
   }
 }
 

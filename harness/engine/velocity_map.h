@@ -41,10 +41,6 @@ class VelocityMap {
                      const Eigen::Ref<const VectorXd>& b, mjtNum* qacc);
   /// result = T^T force.
   void ProjectForce(const mjtNum* force, Eigen::Ref<VectorXd> result) const;
-  /// result = T^T M T, for the engine's symmetric nv x nv matrix.
-  void ProjectMatrix(const Eigen::Ref<const MatrixXd>& M, Eigen::Ref<MatrixXd> result);
-  /// result = J T, for m x nv rows as the engine writes them.
-  void ProjectJacobian(const Eigen::Ref<const RowMatrixXd>& J, Eigen::Ref<MatrixXd> result) const;
 
  private:
   /// Velocity (or acceleration) of the base: of Sigma_0's origin in the world, and about the vertical.
@@ -65,7 +61,6 @@ class VelocityMap {
   MatrixXd T_base_;   // base_dofs x base_size
   VectorXd bias_;     // T_dot velocity on base_dofs
   VectorXd bracket_;  // scratch of ExpandBracket
-  MatrixXd M_T_;      // scratch of ProjectMatrix, nv x base_size
 };
 
 }  // namespace dexcheck

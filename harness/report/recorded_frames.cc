@@ -11,7 +11,7 @@
 #include "controller/common/text.h"
 #include "controller/handling/pick_and_place.h"
 #include "harness/base/files.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_file.h"
 #include "harness/engine/skeleton.h"
 #include "harness/log/log_reader.h"
 

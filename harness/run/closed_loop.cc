@@ -64,8 +64,8 @@ void ClosedLoop::CheckMovingStart() const {
 }
 
 bool ClosedLoop::Settle(const std::function<bool()>& should_stop) {
-  const LineTrajectory rest(setup_->start().X_o, Vector6d::Zero(), 0.0);
-  if (!SettleOn(rest, setup_->scenario().settle, should_stop)) return false;
+  const auto rest = MakeLineTrajectory(setup_->start().X_o, Vector6d::Zero(), 0.0);
+  if (!SettleOn(*rest, setup_->scenario().settle, should_stop)) return false;
   const bool moving = setup_->scenario().start == Start::kMoving;
   if (moving && !StartMoving(trajectory_->Evaluate(0.0).X_d_dot.head<3>(), should_stop)) return false;
   if (trajectory_) controller_->Follow(*trajectory_);
@@ -119,7 +119,8 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
   if (checks_) checks_->AddVelocity(v);
   Vector6d velocity = Vector6d::Zero();
   velocity.head<3>() = v;
-  if (!SettleOn(LineTrajectory(setup_->start().X_o, velocity, 0.0), kSettleMoving, should_stop)) return false;
+  if (!SettleOn(*MakeLineTrajectory(setup_->start().X_o, velocity, 0.0), kSettleMoving, should_stop))
+    return false;
   // Back to where it began: on a level floor every place is alike.
   const double dt = plant_->time_step();
   const Vector3d way = static_cast<double>(std::lround(kSettleMoving / dt)) * dt * v;

@@ -251,9 +251,9 @@ bool RunCampaign::RunFault(size_t index, VectorXd* end, const std::function<bool
     LoopParts parts = MakeLoopParts(setup);
     GoToStart(parts);
     if (is_law) {
-      parts.controller = std::make_unique<SpoiledLaw>(setup, laws_[index]);
+      parts.controller = std::make_unique<FaultyLaw>(setup, laws_[index]);
     } else {
-      parts.controller = std::make_unique<SpoiledLaw>(setup, equations_[index]);
+      parts.controller = std::make_unique<FaultyLaw>(setup, equations_[index]);
     }
     return RunLoop(setup, std::move(parts), &mutant, end, should_stop);
   } catch (const InputError& error) {

@@ -11,7 +11,7 @@
 
 #include "harness/diagnosis/parameters.h"
 #include "harness/diagnosis/plant_faults.h"
-#include "harness/diagnosis/spoiled_law.h"
+#include "harness/diagnosis/faulty_law.h"
 #include "harness/run/run_mutation_options.h"
 #include "harness/run/runner.h"
 

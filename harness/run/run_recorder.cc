@@ -9,7 +9,7 @@
 #include "harness/base/git_revision.h"
 #include "harness/base/version.h"
 #include "harness/engine/machine.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_file.h"
 #include "harness/run/log_columns.h"
 
 namespace dexcheck {

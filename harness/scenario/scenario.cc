@@ -15,11 +15,6 @@ constexpr double kMaxSteps = 1e8;
 /// task; whatever has not come to rest by then, never will.
 constexpr double kMaxSettle = 100.0;
 
-/// Whether the key belongs to the robot's parameter file: it begins with "model.", and is none of [model].
-bool IsOfModel(std::string_view key) {
-  return key.starts_with("model.") && !key.starts_with("model.file=") && !key.starts_with("model.overrides");
-}
-
 std::string ReadPath(TomlTable& table, std::string_view key, const std::filesystem::path& folder) {
   const auto value = table.Find(key);
   return value ? (folder / value->AsText()).lexically_normal().string() : "";
@@ -145,6 +140,11 @@ Scenario ReadScenario(TomlTable& root, const std::filesystem::path& folder,
 
 }  // namespace
 
+bool IsOfModel(std::string_view assignment) {
+  return assignment.starts_with("model.") && !assignment.starts_with("model.file=") &&
+         !assignment.starts_with("model.overrides");
+}
+
 ScenarioDocument::ScenarioDocument(const std::string& text, const std::string& source,
                                    std::filesystem::path folder)
     : document_(text, source), text_(text), source_(source), folder_(std::move(folder)) {}
@@ -159,7 +159,10 @@ void ScenarioDocument::Override(const std::string& assignment) {
 }
 
 void ScenarioDocument::Set(const std::string& path, double value) {
-  Override(path + "=" + FormatNumber(value));
+  const std::string assignment = path + "=" + FormatNumber(value);
+  if (IsOfModel(assignment)) return Override(assignment);
+  document_.Set(path, value);
+  overrides_.push_back(assignment);
 }
 
 Scenario ScenarioDocument::Read() const {

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -193,6 +194,10 @@ struct Scenario {
     return trajectory_task() == nullptr ? Vector6d::Zero() : trajectory_task()->start_error;
   }
 };
+
+/// Whether "PATH=VALUE" belongs to the robot's parameter file: it begins with "model.", and is none of
+/// [model].
+bool IsOfModel(std::string_view assignment);
 
 /// The text of a scenario, in which keys can be changed before it is read. A copy has the same changes.
 class ScenarioDocument {

@@ -33,7 +33,7 @@ constexpr int kMostDraws = 100;                   // until the fingers reach
   throw InputError(scenario.source + ": " + key + ": " + problem);
 }
 
-/// A frame's pose, and the model at rest in that posture.
+/// The model at rest in that posture.
 ModelTerms MakeKinematics(const RobotModel& model, const VectorXd& q) {
   ModelTerms kinematics(model, Coordinates::kReduced);
   kinematics.SetState(q, VectorXd::Zero(model.num_velocities()));

@@ -98,8 +98,7 @@ class StateReader {
   static std::string ListBalls(const RobotModel& model) {
     std::string names;
     for (const Joint& joint : model.joints()) {
-      if (joint.type == JointType::kBall && joint.ball_axis == 0)
-        names += (names.empty() ? "" : ", ") + Quote(NameInFile(joint));
+      if (joint.type == JointType::kBall) names += (names.empty() ? "" : ", ") + Quote(joint.name);
     }
     return names.empty() ? "" : " (of which each ball joint, " + Abbreviate(names) + ", has";
   }
@@ -114,8 +113,7 @@ class StateReader {
     if (model.base().type == BaseType::kFloating) check(3, "the base " + Quote(model.base().link));
     for (int i = 0; i < model.num_joints(); ++i) {
       const Joint& joint = model.joints()[static_cast<size_t>(i)];
-      if (joint.type == JointType::kBall && joint.ball_axis == 0)
-        check(model.position_index(i), "joint " + Quote(NameInFile(joint)));
+      if (joint.type == JointType::kBall) check(model.position_index(i), "joint " + Quote(joint.name));
     }
   }
 

@@ -7,14 +7,20 @@
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "harness/base/byte_archive.h"
+#include "harness/base/process_pool.h"
 #include "harness/run/runner.h"
 #include "harness/study/error_prediction.h"
 
 namespace dexcheck {
 namespace {
 
-/// By step: of the object's position, or of each joint that follows a motion of its own.
-using Errors = std::vector<VectorXd>;
+/// Of one run, by step: of the object's position, or of each joint that follows a motion of its own.
+struct Measured {
+  Errors errors;
+  std::vector<std::vector<double>> predicted;  ///< Values of errors, by source; of the ideal run.
+  std::string failure;
+};
 
 VectorXd CalcError(const StepRecord& step) {
   const VectorXd& q_d = step.command.joints.q;
@@ -22,122 +28,123 @@ VectorXd CalcError(const StepRecord& step) {
   return step.error.position;
 }
 
-/// What one run came to.
-struct Measured {
-  Errors errors;
-  std::string failure;
-};
-
-Measured RunOnce(const Setup& setup) {
+/// @param predictions made along the run; of the ideal one.
+Measured RunOnce(const Setup& setup, const std::vector<std::unique_ptr<ErrorPrediction>>& predictions) {
   Measured measured;
-  Runner runner(setup, /*check=*/false);
-  const RunResult& result = runner.Run(
-      [&](const StepRecord& step) { measured.errors.push_back(CalcError(step)); }, [] { return false; });
-  measured.failure = result.failure;
-  return measured;
-}
-
-/// The ideal run, along which all predictions are made.
-Measured RunIdeal(const Setup& setup, const std::vector<std::unique_ptr<ErrorPrediction>>& predictions) {
-  Measured measured;
-  ErrorPrediction reference(setup, /*acts_at_rest=*/true);
+  std::unique_ptr<ErrorPrediction> reference;
+  if (!predictions.empty()) reference = std::make_unique<ErrorPrediction>(setup, /*acts_at_rest=*/true);
   Runner runner(setup, /*check=*/false);
   const RunResult& result = runner.Run(
       [&](const StepRecord& step) {
-        measured.errors.push_back(CalcError(step));
-        const VectorXd ideal = reference.CalcAcceleration(step);
+        measured.errors.Append(CalcError(step));
+        if (!reference) return;
+        const VectorXd ideal = reference->CalcAcceleration(step);
         for (const auto& prediction : predictions)
           prediction->Step(prediction->CalcAcceleration(step) - ideal);
       },
       [] { return false; });
   measured.failure = result.failure;
+  for (const auto& prediction : predictions) measured.predicted.push_back(prediction->errors().values);
   return measured;
 }
 
 ErrorSize CalcSize(const Errors& errors, size_t from, bool of_joints) {
   ErrorSize size;
   double squares = 0.0;
-  for (size_t i = from; i < errors.size(); ++i) {
-    const double length = of_joints ? errors[i].cwiseAbs().maxCoeff() : errors[i].norm();
+  const size_t count = errors.CountSteps();
+  for (size_t i = from; i < count; ++i) {
+    const auto error = errors.At(i);
+    const double length = of_joints ? error.cwiseAbs().maxCoeff() : error.norm();
     squares += length * length;
     size.max = std::max(size.max, length);
   }
-  if (errors.size() > from) size.rms = std::sqrt(squares / static_cast<double>(errors.size() - from));
+  if (count > from) size.rms = std::sqrt(squares / static_cast<double>(count - from));
   return size;
 }
 
-/// a += sign b, as far as both go.
-void Add(const Errors& b, double sign, Errors* a) {
-  a->resize(std::min(a->size(), b.size()));
-  for (size_t i = 0; i < a->size(); ++i) (*a)[i] += sign * b[i];
+/// a + sign b, as far as both go.
+Errors Add(Errors a, double sign, const Errors& b) {
+  a.values.resize(std::min(a.values.size(), b.values.size()));
+  for (size_t i = 0; i < a.values.size(); ++i) a.values[i] += sign * b.values[i];
+  return a;
 }
 
-/// A source with one number or one by name.
-ErrorSource ByKey(const char* name, std::function<void(Imperfections*)> drop) {
-  return {name, std::move(drop)};
+bool IsAt(const ByName& value, const ByName& rest) { return value.Is(rest.all); }
+template <typename Value>
+bool IsAt(const Value& value, const Value& rest) {
+  return value == rest;
 }
 
-void ListSensing(const SensingOptions& s, std::vector<ErrorSource>* list) {
-  const auto add = [&](bool given, const char* name, auto drop) {
-    if (given) list->push_back(ByKey(name, drop));
-  };
-  // What the first step draws is no error that lasts.
-  const auto add_noise = [&](bool given, const char* name, auto drop) {
-    if (given) list->push_back({name, drop, /*acts_at_rest=*/false});
-  };
-  add(!s.joint_counts.Is(0.0), "sensing.joint_counts",
-      [](Imperfections* i) { i->sensing.joint_counts = {}; });
-  add_noise(!s.joint_noise.Is(0.0), "sensing.joint_noise",
-            [](Imperfections* i) { i->sensing.joint_noise = {}; });
-  add(s.velocity != VelocitySource::kMeasured, "sensing.velocity",
-      [](Imperfections* i) { i->sensing.velocity = VelocitySource::kMeasured; });
-  add_noise(!s.velocity_noise.Is(0.0), "sensing.velocity_noise",
-            [](Imperfections* i) { i->sensing.velocity_noise = {}; });
-  add(s.odometry, "sensing.odometry", [](Imperfections* i) { i->sensing.odometry = false; });
-  add_noise(s.object_position_noise > 0.0, "sensing.object_position_noise",
-            [](Imperfections* i) { i->sensing.object_position_noise = 0.0; });
-  add_noise(s.object_orientation_noise > 0.0, "sensing.object_orientation_noise",
-            [](Imperfections* i) { i->sensing.object_orientation_noise = 0.0; });
-  add(s.object_rate > 0.0, "sensing.object_rate", [](Imperfections* i) { i->sensing.object_rate = 0.0; });
-  add(s.object_latency > 0.0, "sensing.object_latency",
-      [](Imperfections* i) { i->sensing.object_latency = 0.0; });
-  add(s.object_velocity != VelocitySource::kMeasured, "sensing.object_velocity",
-      [](Imperfections* i) { i->sensing.object_velocity = VelocitySource::kMeasured; });
-  add(s.latency > 0.0, "sensing.latency", [](Imperfections* i) { i->sensing.latency = 0.0; });
-}
+/// The sources among the keys of one part of a plant that is not ideal: those that are not at rest, which is
+/// where dropping puts them.
+template <typename Part>
+class SourceLister {
+ public:
+  SourceLister(const Imperfections& imperfections, Part Imperfections::*part, std::vector<ErrorSource>* list)
+      : part_(part), is_(imperfections.*part), list_(list) {}
 
-void ListActuation(const ActuationOptions& a, std::vector<ErrorSource>* list) {
-  const auto add = [&](bool given, const char* name, auto drop) {
-    if (given) list->push_back(ByKey(name, drop));
-  };
-  add(a.delay > 0.0, "actuation.delay", [](Imperfections* i) { i->actuation.delay = 0.0; });
-  add(!a.torque_step.Is(0.0), "actuation.torque_step",
-      [](Imperfections* i) { i->actuation.torque_step = {}; });
-  add(!a.gain_error.Is(0.0), "actuation.gain_error", [](Imperfections* i) { i->actuation.gain_error = {}; });
-  add(!a.lag.Is(0.0), "actuation.lag", [](Imperfections* i) { i->actuation.lag = {}; });
-  add(!a.backlash.Is(0.0), "actuation.backlash", [](Imperfections* i) { i->actuation.backlash = {}; });
-  add(!a.coulomb.Is(0.0) || !a.stribeck.Is(0.0), "actuation.coulomb", [](Imperfections* i) {
-    i->actuation.coulomb = {};
-    i->actuation.stribeck = {};
-  });
-}
-
-void ListMismatch(const MismatchOptions& m, std::vector<ErrorSource>* list) {
-  const ByName one{.all = 1.0};
-  const auto add = [&](bool given, const std::string& name, const std::function<void(Imperfections*)>& drop) {
-    if (given) list->push_back({name, drop});
-  };
-  add(!m.slope.isZero(0.0), "disturbance (slope)", [](Imperfections* i) { i->mismatch.slope.setZero(); });
-  for (const Payload& payload : m.payloads) {
-    add(true, payload.key + " (payload)", [key = payload.key](Imperfections* i) {
-      std::erase_if(i->mismatch.payloads, [&](const Payload& p) { return p.key == key; });
-    });
+  template <typename Value>
+  void Add(const char* name, Value Part::*member, bool acts_at_rest = true) {
+    if (IsAt(is_.*member, rest_.*member)) return;
+    list_->push_back({name, [part = part_, member](Imperfections* i) { (*i).*part.*member = Part().*member; },
+                      acts_at_rest});
   }
-  add(!m.mass.Is(1.0), "mismatch.mass", [one](Imperfections* i) { i->mismatch.mass = one; });
-  add(!m.mass_within.Is(0.0), "mismatch.mass_within", [](Imperfections* i) { i->mismatch.mass_within = {}; });
-  add(!m.com.empty(), "mismatch.com", [](Imperfections* i) { i->mismatch.com.clear(); });
-  add(!m.damping.Is(1.0), "mismatch.damping", [one](Imperfections* i) { i->mismatch.damping = one; });
-  add(!m.armature.Is(1.0), "mismatch.armature", [one](Imperfections* i) { i->mismatch.armature = one; });
+  /// What the first step draws is no error that lasts.
+  template <typename Value>
+  void AddNoise(const char* name, Value Part::*member) {
+    Add(name, member, /*acts_at_rest=*/false);
+  }
+
+ private:
+  Part Imperfections::*part_;
+  const Part& is_;
+  Part rest_;
+  std::vector<ErrorSource>* list_;
+};
+
+void ListSensing(const Imperfections& all, std::vector<ErrorSource>* list) {
+  using S = SensingOptions;
+  SourceLister<S> lister(all, &Imperfections::sensing, list);
+  lister.Add("sensing.joint_counts", &S::joint_counts);
+  lister.AddNoise("sensing.joint_noise", &S::joint_noise);
+  lister.Add("sensing.velocity", &S::velocity);
+  lister.AddNoise("sensing.velocity_noise", &S::velocity_noise);
+  lister.Add("sensing.odometry", &S::odometry);
+  lister.AddNoise("sensing.object_position_noise", &S::object_position_noise);
+  lister.AddNoise("sensing.object_orientation_noise", &S::object_orientation_noise);
+  lister.Add("sensing.object_rate", &S::object_rate);
+  lister.Add("sensing.object_latency", &S::object_latency);
+  lister.Add("sensing.object_velocity", &S::object_velocity);
+  lister.Add("sensing.latency", &S::latency);
+}
+
+void ListActuation(const Imperfections& all, std::vector<ErrorSource>* list) {
+  using A = ActuationOptions;
+  SourceLister<A> lister(all, &Imperfections::actuation, list);
+  lister.Add("actuation.delay", &A::delay);
+  lister.Add("actuation.torque_step", &A::torque_step);
+  lister.Add("actuation.gain_error", &A::gain_error);
+  lister.Add("actuation.lag", &A::lag);
+  lister.Add("actuation.backlash", &A::backlash);
+  if (all.actuation.coulomb.Is(0.0) && all.actuation.stribeck.Is(0.0)) return;
+  list->push_back(
+      {"actuation.coulomb", [](Imperfections* i) { i->actuation.coulomb = i->actuation.stribeck = {}; }});
+}
+
+void ListMismatch(const Imperfections& all, std::vector<ErrorSource>* list) {
+  using M = MismatchOptions;
+  SourceLister<M> lister(all, &Imperfections::mismatch, list);
+  lister.Add("disturbance (slope)", &M::slope);
+  for (const Payload& payload : all.mismatch.payloads) {
+    list->push_back({payload.key + " (payload)", [key = payload.key](Imperfections* i) {
+                       std::erase_if(i->mismatch.payloads, [&](const Payload& p) { return p.key == key; });
+                     }});
+  }
+  lister.Add("mismatch.mass", &M::mass);
+  lister.Add("mismatch.mass_within", &M::mass_within);
+  lister.Add("mismatch.com", &M::com);
+  lister.Add("mismatch.damping", &M::damping);
+  lister.Add("mismatch.armature", &M::armature);
 }
 
 /// Makes setups of one scenario with other imperfections; the scene is compiled once.
@@ -169,8 +176,8 @@ std::string NameUnit(const RobotModel& model) {
 
 std::vector<ErrorSource> ListErrorSources(const Imperfections& imperfections) {
   std::vector<ErrorSource> list;
-  ListSensing(imperfections.sensing, &list);
-  ListActuation(imperfections.actuation, &list);
+  ListSensing(imperfections, &list);
+  ListActuation(imperfections, &list);
   for (const DisturbanceOptions& one : imperfections.disturbances) {
     list.push_back({one.key + " (" + one.body + ")",
                     [key = one.key](Imperfections* i) {
@@ -178,7 +185,7 @@ std::vector<ErrorSource> ListErrorSources(const Imperfections& imperfections) {
                     },
                     /*acts_at_rest=*/false});
   }
-  ListMismatch(imperfections.mismatch, &list);
+  ListMismatch(imperfections, &list);
   return list;
 }
 
@@ -211,29 +218,22 @@ bool ErrorBudget::is_complete() const {
 }
 
 ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::path& robot,
-                            const std::filesystem::path& mjcf,
+                            const std::filesystem::path& mjcf, int jobs,
                             const std::function<bool(long done, long total)>& progress) {
   if (scenario.pick_task() != nullptr)
     throw InputError(scenario.source + ": task: a budget needs a trajectory");
   const std::vector<ErrorSource> sources = ListErrorSources(scenario.imperfections);
   if (sources.empty()) {
     throw InputError(scenario.source +
-                     ": asks for nothing of [sensing], [actuation], [[disturbance]] or "
+                     ": has nothing in [sensing], [actuation], [[disturbance]] or "
                      "[mismatch] that could cost accuracy");
   }
   const SetupMaker maker(scenario, robot, mjcf);
   const auto from = static_cast<size_t>(std::lround(scenario.expect.from / scenario.plant.time_step));
-  const auto total = static_cast<long>(2 * sources.size() + 2);
-  long done = 0;
   ErrorBudget budget;
   budget.scenario = scenario.name;
   budget.of_joints = scenario.joint_task() != nullptr;
   const auto size_of = [&](const Errors& errors) { return CalcSize(errors, from, budget.of_joints); };
-  const auto stop = [&] {
-    if (progress(done++, total)) return false;
-    budget.failure = "interrupted";
-    return true;
-  };
   const auto without = [&](const std::function<bool(size_t)>& dropped) {
     Imperfections kept = scenario.imperfections;
     for (size_t i = 0; i < sources.size(); ++i) {
@@ -241,47 +241,61 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
     }
     return maker.Make(kept);
   };
-
-  if (stop()) return budget;
-  std::vector<std::unique_ptr<Setup>> alone;
-  std::vector<std::unique_ptr<ErrorPrediction>> predictions;
-  for (size_t i = 0; i < sources.size(); ++i) {
-    alone.push_back(without([&](size_t other) { return other != i; }));
-    predictions.push_back(std::make_unique<ErrorPrediction>(*alone[i], sources[i].acts_at_rest));
-  }
+  // Made here, so that a fault of the scenario is an input error.
   const std::unique_ptr<Setup> ideal_setup = without([](size_t) { return true; });
+  const std::unique_ptr<Setup> all_setup = without([](size_t) { return false; });
   if (budget.of_joints) budget.unit = NameUnit(ideal_setup->model());
-  const Measured ideal = RunIdeal(*ideal_setup, predictions);
-  if (stop()) return budget;
-  const Measured all = RunOnce(*without([](size_t) { return false; }));
-  budget.failure = ideal.failure.empty() ? all.failure : ideal.failure;
+
+  // Run 0 is the ideal one, along which all predictions are made, run 1 that with all sources; then come for
+  // each source that with it alone and that with all others.
+  const auto only = [&](size_t source) { return without([&](size_t other) { return other != source; }); };
+  const auto run = [&](size_t job) {
+    std::vector<std::unique_ptr<Setup>> alone;
+    std::vector<std::unique_ptr<ErrorPrediction>> predictions;
+    for (size_t i = 0; job == 0 && i < sources.size(); ++i) {
+      alone.push_back(only(i));
+      predictions.push_back(std::make_unique<ErrorPrediction>(*alone[i], sources[i].acts_at_rest));
+    }
+    const size_t source = job / 2 - 1;
+    const Measured measured = job < 2 ? RunOnce(job == 0 ? *ideal_setup : *all_setup, predictions)
+                              : job % 2 == 0
+                                  ? RunOnce(*only(source), {})
+                                  : RunOnce(*without([&](size_t other) { return other == source; }), {});
+    return PackBytes(measured.errors.size, measured.errors.values, measured.predicted, measured.failure);
+  };
+  std::vector<Measured> runs(2 * sources.size() + 2);
+  size_t taken = 0;
+  const auto take = [&](size_t job, const std::string& result) {
+    Measured& one = runs[job];
+    UnpackBytes(result, &one.errors.size, &one.errors.values, &one.predicted, &one.failure);
+    taken = job + 1;
+  };
+  RunJobs("a run", runs.size(), jobs, run, take,
+          [&] { return !progress(static_cast<long>(taken), static_cast<long>(runs.size())); });
+
+  const Measured& ideal = runs[0];
+  const Measured& all = runs[1];
+  budget.failure = taken < runs.size() ? "interrupted" : ideal.failure.empty() ? all.failure : ideal.failure;
+  if (taken < 2) return budget;
   budget.ideal = size_of(ideal.errors);
   budget.all = size_of(all.errors);
-  Errors all_added = all.errors;
-  Add(ideal.errors, -1.0, &all_added);
-  const double scale = std::max(size_of(all_added).rms, std::numeric_limits<double>::min());
-
+  const double scale =
+      std::max(size_of(Add(all.errors, -1.0, ideal.errors)).rms, std::numeric_limits<double>::min());
   Errors sum = ideal.errors, predicted = ideal.errors;
-  for (size_t i = 0; i < sources.size(); ++i) {
+  for (size_t i = 0; 2 * i + 3 < taken; ++i) {
+    const Measured& one = runs[2 * i + 2];
+    const Measured& others = runs[2 * i + 3];
     BudgetEntry entry;
     entry.name = sources[i].name;
-    if (stop()) return budget;
-    const Measured one = RunOnce(*alone[i]);
-    alone[i].reset();
-    if (stop()) return budget;
-    const Measured others = RunOnce(*without([&](size_t other) { return other == i; }));
     entry.failure = one.failure.empty() ? others.failure : one.failure;
     entry.alone = size_of(one.errors);
     entry.without = size_of(others.errors);
-    entry.predicted = size_of(predictions[i]->errors());
-    Errors alone_added = one.errors;
-    Add(ideal.errors, -1.0, &alone_added);
-    Errors company = all.errors;
-    Add(others.errors, -1.0, &company);
-    Add(alone_added, -1.0, &company);
-    entry.interaction = size_of(company).rms / scale;
-    Add(alone_added, 1.0, &sum);
-    Add(predictions[i]->errors(), 1.0, &predicted);
+    const Errors prediction{ideal.predicted[i], ideal.errors.size};
+    entry.predicted = size_of(prediction);
+    const Errors alone_added = Add(one.errors, -1.0, ideal.errors);
+    entry.interaction = size_of(Add(Add(all.errors, -1.0, others.errors), -1.0, alone_added)).rms / scale;
+    sum = Add(std::move(sum), 1.0, alone_added);
+    predicted = Add(std::move(predicted), 1.0, prediction);
     budget.entries.push_back(entry);
   }
   budget.sum = size_of(sum);

@@ -12,7 +12,7 @@
 
 namespace dexcheck {
 
-/// One thing that a scenario asks of its plant.
+/// One thing in which a scenario's plant is not ideal.
 struct ErrorSource {
   std::string name;  ///< Its key: "sensing.joint_counts", "disturbance.0".
   /// Takes it out. The random numbers of the others stay as they are.
@@ -61,16 +61,13 @@ struct ErrorBudget {
   [[nodiscard]] bool is_complete() const;
 };
 
-/// Runs the scenario 2 n + 2 times for its n sources, unchecked.
-/// @param progress asked before each run with the number of runs done and to do; false stops.
+/// Runs the scenario 2 n + 2 times for its n sources, unchecked, `jobs` runs at a time.
+/// @param progress called often with the number of runs done and to do; false stops.
 /// @throws InputError as Setup; when the scenario is a task or its plant is ideal.
 ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::path& robot,
-                            const std::filesystem::path& mjcf,
+                            const std::filesystem::path& mjcf, int jobs,
                             const std::function<bool(long done, long total)>& progress);
 
 nlohmann::ordered_json ToJson(const ErrorBudget& budget);
-
-/// A page with the table and a bar chart, which needs no other file.
-std::string MakeBudgetPage(const ErrorBudget& budget);
 
 }  // namespace dexcheck

@@ -48,37 +48,37 @@ ErrorPrediction::ErrorPrediction(const Setup& setup, bool acts_at_rest)
 }
 
 const VectorXd& ErrorPrediction::CalcAcceleration(const StepRecord& ideal) {
-  const MeasuredState& truth = ideal.reading.state;
+  const MeasuredState& true_state = ideal.reading.state;
   sensing_.Tell(ideal.reading, &measured_);
   if (!has_begun_ && joint_motion_ != nullptr) controller_->Begin(ideal.time, measured_);
   has_begun_ = true;
   controller_->Step(measured_, ideal.time, &command_);
-  drive_.Drive(command_.tau, truth.xi, &tau_);
+  drive_.Drive(command_.tau, true_state.xi, &tau_);
   actuation_.CalcForce(tau_, force_);
-  const std::span<const Wrench> wrenches = disturbances_.Evaluate(ideal.time, truth);
-  model_.SetState(truth);
+  const std::span<const Wrench> wrenches = disturbances_.Evaluate(ideal.time, true_state);
+  model_.SetState(true_state);
   AddRobotForce(wrenches, model_.robot(), force_);
   if (joint_motion_ != nullptr) {
     acceleration_ = dynamics_.PredictFree(model_.robot(), force_).xi_dot;
     return acceleration_;
   }
-  const Vector6d push = CalcObjectWrench(wrenches, truth.X_Bo);
+  const Vector6d push = CalcObjectWrench(wrenches, true_state.X_Bo);
   const Vector6d& V_Bo_dot =
       dynamics_.Predict(model_.robot(), model_.grasp(), force_, ObjectSupport::kHand, nullptr, &push)
           .V_Bo_dot;
   // p_ddot = R (v_dot + omega x v)
-  const Vector3d v = truth.V_Bo.head<3>(), omega = truth.V_Bo.tail<3>();
-  acceleration_ = truth.X_Bo.linear() * (V_Bo_dot.head<3>() + omega.cross(v));
+  const Vector3d v = true_state.V_Bo.head<3>(), omega = true_state.V_Bo.tail<3>();
+  acceleration_ = true_state.X_Bo.linear() * (V_Bo_dot.head<3>() + omega.cross(v));
   return acceleration_;
 }
 
 void ErrorPrediction::Step(const VectorXd& d) {
   const MatrixXd& M = model_.robot().M();
-  if (errors_.empty() && acts_at_rest_) {
+  if (errors_.values.empty() && acts_at_rest_) {
     const VectorXd at_rest = is_decoupled_ ? d : VectorXd(M * d);
     e_ = (K_p_ > 0.0).select(-at_rest.array() / K_p_, 0.0);
   }
-  errors_.push_back(e_);
+  errors_.Append(e_);
   e_ddot_ = -(K_v_ * e_dot_.array() + K_p_ * e_.array());
   if (!is_decoupled_) {
     // What the springs and dampers add to the forces, M^-1 (force + bias - bias).

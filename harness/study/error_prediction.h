@@ -16,9 +16,23 @@
 
 namespace dexcheck {
 
+/// Errors by step: of the object's position (3), m, or of joints (n), rad or m.
+struct Errors {
+  std::vector<double> values;  ///< One step behind the other.
+  size_t size = 3;             ///< Numbers of a step.
+  void Append(const VectorXd& error) {
+    size = static_cast<size_t>(error.size());
+    values.insert(values.end(), error.begin(), error.end());
+  }
+  [[nodiscard]] size_t CountSteps() const { return values.size() / size; }
+  [[nodiscard]] Eigen::Map<const VectorXd> At(size_t step) const {
+    return {values.data() + step * size, static_cast<Eigen::Index>(size)};
+  }
+};
+
 /// What a plant that is not ideal makes of the tracking error, to first order: along the run of an ideal one
-/// it asks at each step what would be told, what the law would send then, what the motors would give, and how
-/// the rigid system (19), (46), (48) with the plant's own masses and pushes would accelerate. That
+/// it computes at each step what would be measured, what the law would send then, what the motors would give,
+/// and how the rigid system (19), (46), (48) with the plant's own masses and pushes would accelerate. That
 /// acceleration less the ideal one, d, drives the error. Of the object's position, with the gains of (57),
 ///
 ///   e_ddot + K_v e_dot + K_p e = -d,   e = X_d - X_o
@@ -36,9 +50,8 @@ class ErrorPrediction {
   const VectorXd& CalcAcceleration(const StepRecord& ideal);
   /// One step of the error. @param d as CalcAcceleration.
   void Step(const VectorXd& d);
-  /// The error at each step, less that of the ideal run: of the object's position, m, or of the joints, rad
-  /// or m.
-  [[nodiscard]] const std::vector<VectorXd>& errors() const { return errors_; }
+  /// The error at each step, less that of the ideal run.
+  [[nodiscard]] const Errors& errors() const { return errors_; }
 
  private:
   Sensing sensing_;
@@ -59,7 +72,7 @@ class ErrorPrediction {
   bool acts_at_rest_;
   bool has_begun_ = false;
   VectorXd acceleration_, e_, e_dot_, e_ddot_;
-  std::vector<VectorXd> errors_;
+  Errors errors_;
 };
 
 }  // namespace dexcheck

@@ -23,16 +23,12 @@ constexpr double kClose = 0.005;  // of a range: near enough to end
 // A check far below what it may take, or far above, says no more by being farther.
 constexpr double kFar = 3.0;
 
-TomlDocument Open(const Scenario& scenario, const std::vector<std::string>& overrides) {
+TomlDocument Open(const Scenario& scenario) {
   TomlDocument document(scenario.text, scenario.source);
-  const auto make = [&](const std::vector<std::string>& all) {
-    for (const std::string& assignment : all) {
-      if (assignment.starts_with("trajectory") || assignment.starts_with("joint_motion"))
-        document.Override(assignment);
-    }
-  };
-  make(scenario.overrides);
-  make(overrides);
+  for (const std::string& assignment : scenario.overrides) {
+    if (assignment.starts_with("trajectory") || assignment.starts_with("joint_motion"))
+      document.Override(assignment);
+  }
   return document;
 }
 
@@ -251,13 +247,10 @@ class MotionSearch {
   std::vector<double> constraints_;
 };
 
-/// A value as it stands in a file.
-std::string ShowValue(const TomlValue& value) { return value.Show(); }
-
 }  // namespace
 
 std::vector<MotionKey> ListMotionKeys(const Scenario& scenario) {
-  const TomlDocument document = Open(scenario, {});
+  const TomlDocument document = Open(scenario);
   TomlTable root = document.Open();
   std::vector<MotionKey> keys;
   AddKeys(ListEntries(root, "trajectory"), &keys);
@@ -273,34 +266,6 @@ ExcitingMotion FindExcitingMotion(const Scenario& scenario, const std::filesyste
                                   const std::filesystem::path& mjcf, const ExcitingMotionOptions& options,
                                   const std::function<bool(int runs)>& go_on) {
   return MotionSearch(scenario, robot, mjcf, options, go_on).Run();
-}
-
-std::vector<std::string> ShowMotion(const Scenario& scenario, const std::vector<std::string>& overrides) {
-  const TomlDocument document = Open(scenario, overrides);
-  TomlTable root = document.Open();
-  std::vector<std::string> lines;
-  const auto show_list = [&](const std::string& name, const TomlValue& list) {
-    lines.push_back(name + " = [");
-    for (const TomlValue& entry : list.AsList()) {
-      std::string line = "  {";
-      for (const auto& [key, value] : entry.AsTable().GetEntries())
-        line += (line.back() == '{' ? " " : ", ") + key + " = " + ShowValue(value);
-      lines.push_back(line + " },");
-    }
-    lines.emplace_back("]");
-  };
-  for (const char* table : {"trajectory", "joint_motion"}) {
-    const auto entries = ListEntries(root, table);
-    if (entries.empty()) continue;
-    lines.push_back("[" + std::string(table) + "]");
-    for (const auto& [name, value] : entries) {
-      if (name == "parts" || name == "oscillations" || name == "points")
-        show_list(name, value);
-      else
-        lines.push_back(name + " = " + ShowValue(value));
-    }
-  }
-  return lines;
 }
 
 }  // namespace dexcheck

@@ -56,13 +56,10 @@ struct ExcitingMotion {
 /// (M. J. D. Powell, 1994; NLopt's): each check of questions two to five is a constraint, so joints stay in
 /// their ranges, torques below their limits, fingertips and wheels inside their cones, and contacts as stiff
 /// as the balances need.
-/// @param go_on asked before each run with the number of runs made; false ends the search.
+/// @param go_on called before each run with the number of runs made; false ends the search.
 /// @throws InputError as Setup; when the scenario has no such key or does not pass as it is.
 ExcitingMotion FindExcitingMotion(const Scenario& scenario, const std::filesystem::path& robot,
                                   const std::filesystem::path& mjcf, const ExcitingMotionOptions& options,
                                   const std::function<bool(int runs)>& go_on);
-
-/// The lines of [trajectory], or of [joint_motion]'s oscillations, with overrides made.
-std::vector<std::string> ShowMotion(const Scenario& scenario, const std::vector<std::string>& overrides);
 
 }  // namespace dexcheck

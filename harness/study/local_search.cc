@@ -1,5 +1,5 @@
-// NLopt's local methods call the function themselves and cannot be stopped in between. So each question
-// begins them anew: they are given the values that are known, and at the first point without one they are
+// NLopt calls the function itself and cannot be stopped in between. So each question
+// begins it anew: it is given the values that are known, and at the first point without one they are
 // stopped. That takes n^2 calls for n points, which costs nothing beside n trials.
 
 #include <algorithm>
@@ -14,8 +14,7 @@ namespace {
 /// One local search.
 struct Descent {
   UnitPoint start;
-  std::vector<UnitPoint> points;
-  std::vector<double> values;
+  std::vector<double> values;  ///< Of the points that were tried.
   bool is_over = false;
 };
 
@@ -38,7 +37,7 @@ class LocalSearcher : public Searcher {
   LocalSearcher(const Search& search, const UnitPoint& start) : search_(search) {
     const auto dimensions = static_cast<int>(start.size());
     for (UnitPoint& point : MakeLatinHypercube(dimensions, search.starts, search.seed)) {
-      descents_.push_back({std::move(point), {}, {}, false});
+      descents_.push_back({std::move(point), {}, false});
     }
     descents_.front().start = start;
   }
@@ -54,30 +53,23 @@ class LocalSearcher : public Searcher {
       asked_.push_back(&descent);
       points.push_back(point);
     }
-    asked_points_ = points;
     return points;
   }
 
   void Tell(const std::vector<Judgement>& judgements) override {
     for (size_t i = 0; i < judgements.size(); ++i) {
       Descent& descent = *asked_[i];
-      descent.points.push_back(asked_points_[i]);
       descent.values.push_back(FindValue(descent, judgements[i]));
     }
   }
 
  private:
   [[nodiscard]] UnitPoint FindNext(const Descent& descent) const {
-    const auto dimensions = static_cast<unsigned>(descent.start.size());
-    nlopt::opt method(search_.method == SearchMethod::kBobyqa ? nlopt::LN_BOBYQA : nlopt::LN_NELDERMEAD,
-                      dimensions);
+    nlopt::opt method(nlopt::LN_NELDERMEAD, static_cast<unsigned>(descent.start.size()));
     Replay replay{&descent, 0, {}};
     method.set_min_objective(Evaluate, &replay);
-    if (search_.method == SearchMethod::kBobyqa) {
-      method.set_lower_bounds(0.0);
-      method.set_upper_bounds(1.0);
-    }  // else a simplex would lie down flat on a bound and stay there; MirrorIntoUnit serves instead
-    method.set_initial_step(ListSteps(descent.start));
+    // Without bounds, for a simplex would lie down flat on one and stay there; MirrorIntoUnit serves instead.
+    method.set_initial_step(search_.step);
     method.set_xtol_abs(search_.tolerance);
     std::vector<double> x = descent.start;
     double value = 0.0;
@@ -85,25 +77,11 @@ class LocalSearcher : public Searcher {
       method.optimize(x, value);
     } catch (const nlopt::forced_stop&) {
     } catch (const nlopt::roundoff_limited&) {  // as near as it gets
-    } catch (const std::runtime_error&) {       // BOBYQA's model degenerated: its search is over
     }
     return MirrorIntoUnit(replay.asked);
   }
 
-  /// As far as the study wants; of BOBYQA no further than the bounds are away, for it would move the start.
-  [[nodiscard]] std::vector<double> ListSteps(const UnitPoint& start) const {
-    std::vector<double> steps(start.size(), search_.step);
-    if (search_.method != SearchMethod::kBobyqa) return steps;
-    constexpr double kLeastStep = 0.02;  // of a start on the edge
-    for (size_t i = 0; i < start.size(); ++i) {
-      const double room = std::min(start[i], 1.0 - start[i]);
-      steps[i] = std::max(std::min(search_.step, room), kLeastStep);
-    }
-    return steps;
-  }
-
-  /// A feasible point's objective; else a little worse than all that this search has seen, for models of the
-  /// function would suffer from a wall.
+  /// A feasible point's objective; else a little worse than all that this search has seen.
   static double FindValue(const Descent& descent, const Judgement& judgement) {
     if (judgement.is_feasible() || descent.values.empty()) return CalcPenalised(judgement);
     const double worst = *std::max_element(descent.values.begin(), descent.values.end());
@@ -113,7 +91,6 @@ class LocalSearcher : public Searcher {
   Search search_;
   std::vector<Descent> descents_;
   std::vector<Descent*> asked_;
-  std::vector<UnitPoint> asked_points_;
 };
 
 }  // namespace

@@ -65,7 +65,7 @@ UnitPoint MarginSearcher::PointAt(const Margin& margin, double distance) const {
 }
 
 bool MarginSearcher::IsOpen(const Margin& margin) const {
-  constexpr double kRounding = 1e-9;  // of a start that is told by its values
+  constexpr double kRounding = 1e-9;  // of a start that is given by its values
   return !margin.bad.empty() && margin.at_most - margin.distance > tolerance_ * (1.0 + kRounding);
 }
 

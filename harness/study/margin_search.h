@@ -48,7 +48,7 @@ class MarginSearcher : public Searcher {
   std::vector<Margin*> asked_;
 };
 
-/// What the points of such a search tell, in the order of their numbers.
+/// The margins that the points of such a search show, in the order of their numbers.
 std::vector<Margin> FindMargins(const Study& study, const std::vector<JudgedPoint>& points);
 
 }  // namespace dexcheck

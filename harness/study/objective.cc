@@ -163,7 +163,7 @@ Judgement JudgePoint(const std::vector<Objective>& objectives, const std::vector
       else
         ++good;
     }
-    constexpr double kRounding = 1e-9;  // of share * count, which is whole where a user means it to be
+    constexpr double kRounding = 1e-9;  // of fraction * count, which is whole where a user means it to be
     if (static_cast<double>(good) < constraint.fraction * count - kRounding)
       judgement.violation += sum / count;
   }

@@ -22,6 +22,7 @@ struct Objective {
   bool maximize = false;
   Aggregate aggregate = Aggregate::kMean;
   double quantile = 0.5;  ///< Of kQuantile: this fraction of the trials is at least as good.
+  bool operator==(const Objective&) const = default;
 };
 
 /// "position_error_rms, worst of its trials".
@@ -39,6 +40,7 @@ struct Constraint {
   std::string less, more;  ///< Of kLess: expressions, less <= more.
   Outcome outcome = Outcome::kTracked;
   double fraction = 1.0;  ///< At this fraction of the trials at least.
+  bool operator==(const Constraint&) const = default;
 };
 
 /// "peak_effort < 0.8", "outcome == tracked", "verdict == pass" (which is the same), "held" (to its end, in

@@ -47,13 +47,13 @@ class ErrorChain {
     // The rate is differenced: (e_k - e_{k-1}) / h, which is e_dot where the filter lets all through.
     state_[kFiltered] += loop_.low_pass * ((e - state_[kSeen]) / h - state_[kFiltered]);
     state_[kSeen] = e;
-    double told = e;
+    double measured = e;
     double measured_rate = loop_.low_pass == 1.0 ? e_dot : state_[kFiltered];
     for (size_t i = 0; i < static_cast<size_t>(loop_.latency); ++i) {
-      std::swap(told, state_[kChains + 2 * i]);
+      std::swap(measured, state_[kChains + 2 * i]);
       std::swap(measured_rate, state_[kChains + 2 * i + 1]);
     }
-    if (k % loop_.hold == 0) state_[kHeld] = -gains_.K_v * measured_rate - gains_.K_p * told;
+    if (k % loop_.hold == 0) state_[kHeld] = -gains_.K_v * measured_rate - gains_.K_p * measured;
     double a = state_[kHeld];
     if (!loop_.is_direct()) a = Lag(Delay(a));
     e_dot += h * a;
@@ -136,16 +136,6 @@ double CalcRadiusOfChain(const SampledLoop& loop, const AxisGains& gains) {
 
 }  // namespace
 
-StableRange CalcStableRange(const SampledLoop& loop, double K_p) {
-  const double T = loop.period();
-  const double h = loop.time_step;
-  return {0.5 * (T - h) * K_p, 2.0 / T - 0.5 * h * K_p};
-}
-
-double CalcCriticalDamping(const SampledLoop& loop, double K_p) {
-  return 2.0 * std::sqrt(K_p) - CalcReach(loop) / loop.period() * K_p;
-}
-
 double CalcSpectralRadius(const SampledLoop& loop, const AxisGains& gains) {
   if (!loop.is_direct()) return CalcRadiusOfChain(loop, gains);
   const double T = loop.period();
@@ -155,18 +145,6 @@ double CalcSpectralRadius(const SampledLoop& loop, const AxisGains& gains) {
   const double discriminant = 0.25 * trace * trace - determinant;
   if (discriminant < 0.0) return std::sqrt(determinant);
   return 0.5 * std::abs(trace) + std::sqrt(discriminant);
-}
-
-bool IsDamped(const SampledLoop& loop, const AxisGains& gains) {
-  if (loop.is_direct()) return gains.K_v >= CalcCriticalDamping(loop, gains.K_p);
-  constexpr double kOvershoot = 1e-3;
-  constexpr double kPeriods = 10.0;  // 1 / sqrt(K_p) is the time that a damped error takes
-  const double steps = kPeriods / std::sqrt(gains.K_p) / loop.time_step;
-  constexpr double kMostSteps = 1e5;
-  const std::vector<double> response =
-      CalcStepResponse(loop, gains, static_cast<long>(std::min(steps, kMostSteps)) + 1);
-  return std::all_of(response.begin(), response.end(),
-                     [](double error) { return error > -kOvershoot && error <= 1.0; });
 }
 
 std::vector<double> CalcStepResponse(const SampledLoop& loop, const AxisGains& gains, long count) {

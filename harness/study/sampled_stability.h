@@ -17,9 +17,9 @@
 // and they are equal, trace^2 = 4 determinant, at K_v = 2 sqrt(K_p) - b K_p / T. For h -> 0 these are the
 // continuous K_v > 0 and K_v = 2 sqrt(K_p).
 //
-// Torques that come late, a state that is told late, a rate that is differenced and filtered, and motors that
-// lag make a longer chain of states. One period of it is a matrix A, of which column i is what a period makes
-// of the i-th unit state, and its spectral radius is lim |A^n|^(1/n), here with n = 2^40 by squaring.
+// Torques that come late, a state that is measured late, a rate that is differenced and filtered, and motors
+// that lag make a longer chain of states. One period of it is a matrix A, of which column i is what a period
+// makes of the i-th unit state, and its spectral radius is lim |A^n|^(1/n), here with n = 2^40 by squaring.
 
 #include <vector>
 
@@ -30,7 +30,7 @@ struct SampledLoop {
   double time_step = 1e-3;  ///< h, s.
   long hold = 1;            ///< m, steps that torques are held.
   double delay = 0.0;       ///< Of the torques, s.
-  long latency = 0;         ///< Age of the error that is told, steps.
+  long latency = 0;         ///< Age of the error that is measured, steps.
   double low_pass =
       1.0;  ///< Fraction of a rate's change that its filter lets through at each step; 1 for no filter.
   double lag = 0.0;  ///< Time constant of the motors, s.
@@ -49,22 +49,8 @@ struct AxisGains {
   bool operator==(const AxisGains&) const = default;
 };
 
-/// Open range of K_v that is stable at K_p > 0, 1/s; empty when least >= most. Of a direct loop.
-struct StableRange {
-  double least = 0.0;
-  double most = 0.0;
-};
-StableRange CalcStableRange(const SampledLoop& loop, double K_p);
-
-/// K_v of critical damping at K_p, 1/s; where it is not in the stable range there is none. Of a direct loop.
-double CalcCriticalDamping(const SampledLoop& loop, double K_p);
-
 /// Largest |eigenvalue| of one sample.
 double CalcSpectralRadius(const SampledLoop& loop, const AxisGains& gains);
-
-/// Whether the error creeps to zero from a start error: K_v is at least the critical one, or, in a loop that
-/// is not direct, the step response overshoots by less than 0.1 %.
-bool IsDamped(const SampledLoop& loop, const AxisGains& gains);
 
 /// Errors at the beginning of each of `count` steps of h, from e = 1 and e_dot = 0.
 std::vector<double> CalcStepResponse(const SampledLoop& loop, const AxisGains& gains, long count);

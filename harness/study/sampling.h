@@ -29,7 +29,7 @@ std::vector<UnitPoint> MakeSobol(int dimensions, long count, std::optional<std::
 /// `count` independent points, even in the cube.
 std::vector<UnitPoint> MakeRandom(int dimensions, long count, std::uint64_t seed);
 
-/// What a study's sample asks for.
+/// The points of a study's sample.
 std::vector<UnitPoint> MakeUnitPoints(const Sample& sample, int dimensions);
 /// How many points those are.
 long CountUnitPoints(const Sample& sample, int dimensions);

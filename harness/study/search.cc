@@ -28,10 +28,9 @@ double CalcPenalised(const Judgement& judgement, size_t objective) {
 std::unique_ptr<Searcher> MakeSearcher(const Study& study, const UnitPoint& start) {
   if (study.search.method == SearchMethod::kMargins)
     return std::make_unique<MarginSearcher>(study.search, start);
-  const bool local =
-      study.search.method == SearchMethod::kNelderMead || study.search.method == SearchMethod::kBobyqa;
-  return local ? MakeLocalSearcher(study.search, start)
-               : MakePopulationSearcher(study.search, study.objectives.size(), start);
+  return study.search.method == SearchMethod::kNelderMead
+             ? MakeLocalSearcher(study.search, start)
+             : MakePopulationSearcher(study.search, study.objectives.size(), start);
 }
 
 }  // namespace dexcheck

@@ -1,6 +1,6 @@
 #pragma once
 
-// Searches as ask and tell: which points of the unit cube come next, and what the last ones came to.
+// Searches by ask and tell: which points of the unit cube come next, and what the last ones came to.
 
 #include <memory>
 #include <vector>
@@ -30,11 +30,11 @@ class Searcher {
 std::unique_ptr<Searcher> MakePopulationSearcher(const Search& search, size_t num_objectives,
                                                  const UnitPoint& start);
 
-/// Nelder-Mead's and Powell's methods of NLopt: a batch has a point of each of the local searches. The first
+/// Nelder and Mead's method of NLopt: a batch has a point of each of the local searches. The first
 /// begins at the start, the others at points of a Latin hypercube.
 std::unique_ptr<Searcher> MakeLocalSearcher(const Search& search, const UnitPoint& start);
 
-/// The one that the study asks for.
+/// The search of the study.
 std::unique_ptr<Searcher> MakeSearcher(const Study& study, const UnitPoint& start);
 
 /// Into [0, 1], as by mirrors at both ends: an algorithm that knows no bounds sees a continuous function.

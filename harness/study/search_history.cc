@@ -1,10 +1,8 @@
 #include "harness/study/search_history.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "controller/common/errors.h"
-#include "harness/study/study_theory.h"
 
 namespace dexcheck {
 
@@ -81,69 +79,27 @@ std::vector<Trial> SearchHistory::ListMissing() const {
   return missing;
 }
 
-UnitPoint FindSearchStart(const StudyInputs& inputs) {
-  const Study& study = inputs.study;
-  const size_t keys = study.num_keys();
-  UnitPoint start(keys, 0.5);
-  if (study.search.start == SearchStart::kValues) {
-    start = FractionsOf(study.keys(), study.search.start_values);
-  }
-  if (study.search.start != SearchStart::kTheory) return start;
-  constexpr long kPoints = 256;
-  const std::vector<double> draw = ListDraws(study).front();
-  double least = std::numeric_limits<double>::infinity();
-  for (const UnitPoint& point : MakeSobol(static_cast<int>(keys), kPoints)) {
-    std::vector<double> values = ValuesAt(study.keys(), point);
-    values.insert(values.end(), draw.begin(), draw.end());
-    try {
-      const double radius = CalcRadiusInTheory(inputs, values);
-      if (radius < least && IsDampedInTheory(inputs, values)) {
-        least = radius;
-        start = point;
-      }
-    } catch (const InputError&) {  // values that make no scenario are no start
-    }
-  }
-  return start;
+UnitPoint FindSearchStart(const Study& study) {
+  if (study.search.start_values.empty()) return UnitPoint(study.num_keys(), 0.5);
+  return FractionsOf(study.keys(), study.search.start_values);
 }
 
-namespace {
-
-/// Calls `take` with each point whose trials are all there.
-template <typename Take>
-void ForEachPoint(const Study& study, const std::vector<TrialRow>& rows, const Take& take) {
+std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows) {
   const long per_point = CountTrialsOfPoint(study);
+  std::vector<JudgedPoint> points;
   std::vector<TrialResult> results;
   for (size_t i = 0; i < rows.size();) {
     const long number = rows[i].trial.number / per_point;
     results.clear();
-    const size_t first = i;
+    const std::vector<double>& values = rows[i].trial.parameters;
     for (; i < rows.size() && rows[i].trial.number / per_point == number; ++i)
       results.push_back(rows[i].result);
     if (static_cast<long>(results.size()) < per_point) continue;
-    const std::vector<double>& values = rows[first].trial.parameters;
-    take(JudgedPoint{number,
-                     {values.begin(), values.begin() + static_cast<std::ptrdiff_t>(study.num_keys())},
-                     JudgePoint(study.objectives, study.constraints, results)});
+    points.push_back({number,
+                      {values.begin(), values.begin() + static_cast<std::ptrdiff_t>(study.num_keys())},
+                      JudgePoint(study.objectives, study.constraints, results)});
   }
-}
-
-}  // namespace
-
-std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows) {
-  std::vector<JudgedPoint> points;
-  ForEachPoint(study, rows, [&](JudgedPoint&& point) { points.push_back(std::move(point)); });
   return points;
-}
-
-PointSummary SummarisePoints(const Study& study, const std::vector<TrialRow>& rows) {
-  PointSummary summary;
-  ForEachPoint(study, rows, [&](JudgedPoint&& point) {
-    if (summary.count++ == 0) summary.first = point;
-    const bool better = !summary.best || IsBetter(point.judgement, summary.best->judgement);
-    if (point.judgement.is_feasible() && better) summary.best = std::move(point);
-  });
-  return summary;
 }
 
 std::vector<const JudgedPoint*> SortFeasible(const std::vector<JudgedPoint>& points) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// A search as its rows tell it: the points tried so far, and the trials that come next.
+// A search as it follows from its rows: the points tried so far, and the trials that come next.
 
 #include <map>
 #include <memory>
@@ -55,21 +55,11 @@ class SearchHistory {
   std::vector<JudgedPoint> points_;
 };
 
-/// Where a search begins, as `[search] start` says. From theory: of some hundred points of the ranges the one
-/// at which (57), sampled as the plant steps it, is damped at least critically on all axes and decays
-/// fastest.
-UnitPoint FindSearchStart(const StudyInputs& inputs);
+/// Where a search begins, as `[search] start` says.
+UnitPoint FindSearchStart(const Study& study);
 
 /// Points of any study whose trials are all there, judged by its objectives.
 std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<TrialRow>& rows);
-
-/// What many points of one objective come to, without all of them being in memory.
-struct PointSummary {
-  size_t count = 0;
-  std::optional<JudgedPoint> first;
-  std::optional<JudgedPoint> best;  ///< As SortFeasible.
-};
-PointSummary SummarisePoints(const Study& study, const std::vector<TrialRow>& rows);
 
 /// The feasible points of one objective, the best first; equals as they were.
 std::vector<const JudgedPoint*> SortFeasible(const std::vector<JudgedPoint>& points);

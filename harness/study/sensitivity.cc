@@ -112,7 +112,7 @@ std::vector<UnitPoint> MakeMorris(int dimensions, long count, std::uint64_t seed
   std::mt19937_64 random(seed);
   std::vector<UnitPoint> points;
   std::vector<size_t> order(k);
-  for (long walk = 0; walk < count; ++walk) {
+  for (long trajectory = 0; trajectory < count; ++trajectory) {
     UnitPoint point(k);
     for (double& x : point) x = kLevel * static_cast<double>(random() % 4);
     points.push_back(point);

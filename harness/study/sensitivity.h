@@ -36,8 +36,8 @@ struct SobolIndex {
 /// @returns one for each dimension; empty when fewer than two blocks are left or f does not vary.
 std::vector<SobolIndex> CalcSobolIndices(std::span<const double> values, int dimensions);
 
-/// Morris's design: `count` walks of k + 1 points; each step of a walk moves one key, in random order, by 2/3
-/// of its range between the levels 0, 1/3, 2/3, 1.
+/// Morris's design: `count` trajectories of k + 1 points; each step of a trajectory moves one key, in random
+/// order, by 2/3 of its range between the levels 0, 1/3, 2/3, 1.
 std::vector<UnitPoint> MakeMorris(int dimensions, long count, std::uint64_t seed);
 
 /// Elementary effects of a key: differences of f over a step, as of a step through the whole range.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/common/expression.h"
 #include "controller/common/text.h"
 #include "harness/study/sampling.h"
 
@@ -66,31 +65,15 @@ double FractionOf(const Variation& variation, double value) {
   return std::clamp(fraction, 0.0, 1.0);
 }
 
-Variation FixRange(std::span<const Variation> variations, size_t index, const std::vector<double>& values) {
-  Variation fixed = variations[index];
-  if (!fixed.depends_on_others()) return fixed;
-  SymbolTable symbols;
-  for (size_t i = 0; i < index; ++i) symbols["key" + std::to_string(i)] = values[i];
-  if (!fixed.from_expression.empty()) fixed.from = EvaluateExpression(fixed.from_expression, symbols);
-  if (!fixed.to_expression.empty()) fixed.to = EvaluateExpression(fixed.to_expression, symbols);
-  return fixed;
-}
-
 std::vector<double> ValuesAt(std::span<const Variation> variations, const std::vector<double>& fractions) {
   std::vector<double> values;
-  values.reserve(fractions.size());
-  for (size_t i = 0; i < fractions.size(); ++i) {
-    values.push_back(variations[i].depends_on_others()
-                         ? ValueAt(FixRange(variations, i, values), fractions[i])
-                         : ValueAt(variations[i], fractions[i]));
-  }
+  for (size_t i = 0; i < fractions.size(); ++i) values.push_back(ValueAt(variations[i], fractions[i]));
   return values;
 }
 
 std::vector<double> FractionsOf(std::span<const Variation> variations, const std::vector<double>& values) {
   std::vector<double> fractions;
-  for (size_t i = 0; i < values.size(); ++i)
-    fractions.push_back(FractionOf(FixRange(variations, i, values), values[i]));
+  for (size_t i = 0; i < values.size(); ++i) fractions.push_back(FractionOf(variations[i], values[i]));
   return fractions;
 }
 
@@ -104,15 +87,16 @@ long CountTrialsOfPoint(const Study& study) {
 }
 
 long CountTrials(const Study& study) {
-  long points = 1;
+  constexpr double kMost = 1e18;
+  double points = 1.0;  // of many keys more than whole numbers can count
   if (study.is_search()) {
-    points = study.search.count;
+    points = static_cast<double>(study.search.count);
   } else if (study.sample.method != SamplingMethod::kGrid) {
-    points = CountUnitPoints(study.sample, static_cast<int>(study.num_keys()));
+    points = static_cast<double>(CountUnitPoints(study.sample, static_cast<int>(study.num_keys())));
   } else {
-    for (const Variation& variation : study.keys()) points *= static_cast<long>(variation.values.size());
+    for (const Variation& variation : study.keys()) points *= static_cast<double>(variation.values.size());
   }
-  return points * CountTrialsOfPoint(study);
+  return std::lround(std::min(points * static_cast<double>(CountTrialsOfPoint(study)), kMost));
 }
 
 std::vector<Trial> ListTrialsOfPoint(const Study& study, long number, const std::vector<double>& point,

@@ -19,13 +19,10 @@ struct Variation {
   /// Of a key whose values are texts: values and parameters are then their numbers, from 0. Empty for
   /// numbers.
   std::vector<std::string> labels;
-  double from = 0.0;  ///< Ends of the range; of one that depends on other keys the widest.
+  double from = 0.0;  ///< Ends of the range.
   double to = 0.0;
-  /// Of a range that depends on keys before it: its ends as expressions of them, in which `key0` is the first
-  /// of the variations that the range stands among, and so on. Empty for numbers.
-  std::string from_expression, to_expression;
-  [[nodiscard]] bool depends_on_others() const { return !from_expression.empty() || !to_expression.empty(); }
   bool logarithmic = false;  ///< Even in the logarithm.
+  bool operator==(const Variation&) const = default;
 };
 
 enum class SamplingMethod { kGrid, kLatinHypercube, kSobol, kRandom, kSaltelli, kMorris };
@@ -33,26 +30,26 @@ enum class SamplingMethod { kGrid, kLatinHypercube, kSobol, kRandom, kSaltelli, 
 /// Points of the ranges of some keys.
 struct Sample {
   SamplingMethod method = SamplingMethod::kGrid;
-  long count = 0;  ///< Points; of a grid its keys say how many. Blocks and walks of kSaltelli and kMorris.
+  long count = 0;  ///< Points; of a grid its keys say how many. Blocks of kSaltelli, trajectories of kMorris.
   std::uint64_t seed = 0;  ///< Of all but a grid and a Sobol sequence that is not scrambled.
   bool scramble = false;   ///< A Sobol sequence.
+  bool operator==(const Sample&) const = default;
 };
 
-enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kBobyqa, kMargins };
-enum class SearchStart { kMiddle, kTheory, kValues };
+enum class SearchMethod { kNone, kCmaEs, kNsga2, kNelderMead, kMargins };
 
 /// How a study looks for the best point.
 struct Search {
   SearchMethod method = SearchMethod::kNone;
   long count = 0;           ///< Points at most.
   long population = 0;      ///< Points of a generation, of kCmaEs and kNsga2.
-  long starts = 1;          ///< Local searches at a time, of kNelderMead and kBobyqa.
+  long starts = 1;          ///< Local searches at a time, of kNelderMead.
   long directions = 0;      ///< Random ones, of kMargins.
   double step = 0.25;       ///< First step relative to the ranges.
   double tolerance = 1e-3;  ///< Relative to the ranges: where a local search or a bisection ends.
   std::uint64_t seed = 0;
-  SearchStart start = SearchStart::kMiddle;
-  std::vector<double> start_values;  ///< Of kValues, one for each key.
+  std::vector<double> start_values;  ///< One for each key; empty for the middle of the ranges.
+  bool operator==(const Search&) const = default;
 };
 
 /// A study file.
@@ -81,7 +78,6 @@ struct Study {
   [[nodiscard]] size_t num_keys() const { return variations.size() - num_nested; }
   [[nodiscard]] std::span<const Variation> keys() const { return {variations.data(), num_keys()}; }
   [[nodiscard]] bool is_search() const { return search.method != SearchMethod::kNone; }
-  /// Its points come from another program.
 };
 
 /// One run of a study.
@@ -114,17 +110,15 @@ std::vector<Trial> ListTrialsOfPoint(const Study& study, long number, const std:
 /// Values of the nested keys, the same for each point; one empty draw when there are none.
 std::vector<std::vector<double>> ListDraws(const Study& study);
 
-/// A value of a range, or of a list of values: 0 is its beginning, 1 its end. @param share in [0, 1].
+/// A value of a range, or of a list of values: 0 is its beginning, 1 its end. @param fraction in [0, 1].
 double ValueAt(const Variation& variation, double fraction);
-/// The share at which ValueAt gives this value; of a list the middle of its part.
+/// The fraction at which ValueAt gives this value; of a list the middle of its part.
 double FractionOf(const Variation& variation, double value);
 
-/// Values of a point at these fractions, each range as the values before it make it.
+/// Values of a point at these fractions.
 std::vector<double> ValuesAt(std::span<const Variation> variations, const std::vector<double>& fractions);
-/// The fractions of a point's values, likewise.
+/// The fractions of a point's values.
 std::vector<double> FractionsOf(std::span<const Variation> variations, const std::vector<double>& values);
-/// The range of one of them beside these values of the others.
-Variation FixRange(std::span<const Variation> variations, size_t index, const std::vector<double>& values);
 
 /// A value of the key as --set takes it.
 std::string FormatValue(const Variation& variation, double value);

@@ -20,8 +20,7 @@ std::string DescribeEdges(const Study& study, const std::vector<double>& values)
   std::string text;
   for (size_t i = 0; i < study.num_keys(); ++i) {
     const Variation& variation = study.variations[i];
-    if (!variation.values.empty() || variation.depends_on_others() || variation.from == variation.to)
-      continue;
+    if (!variation.values.empty() || variation.from == variation.to) continue;
     const double fraction = FractionOf(variation, values[i]);
     if (fraction > kAtEnd && fraction < 1.0 - kAtEnd) continue;
     text += (text.empty() ? " At an end of its range is " : ", ") + variation.key;
@@ -29,8 +28,9 @@ std::string DescribeEdges(const Study& study, const std::vector<double>& values)
   return text.empty() ? "" : text + ": a wider range may give a better one.";
 }
 
-std::string DescribeBest(const Study& study, const PointSummary& points) {
-  const JudgedPoint& best = *points.best;
+/// @param points of which at least one is feasible.
+std::string DescribeBest(const Study& study, const std::vector<JudgedPoint>& points) {
+  const JudgedPoint& best = *SortFeasible(points).front();
   const Objective& objective = study.objectives.front();
   const auto value = [&](const JudgedPoint& point) {
     return ShowObjective(objective, point.judgement.objectives.front());
@@ -38,9 +38,9 @@ std::string DescribeBest(const Study& study, const PointSummary& points) {
   const std::string unit = ShowUnit(objective.expression);
   std::string text =
       fmt::format("The {} {} of {} is {:.4g}{}, at {} (trial {}).", objective.maximize ? "largest" : "least",
-                  Describe(objective), CountPoints(points.count), value(best), unit,
+                  Describe(objective), CountPoints(points.size()), value(best), unit,
                   DescribeValues(study, best.values), best.number * CountTrialsOfPoint(study));
-  const JudgedPoint& first = *points.first;
+  const JudgedPoint& first = points.front();
   if (study.is_search() && first.number == 0 && first.number != best.number) {
     if (!std::isfinite(value(first))) {
       text += " The search began where it has no value.";
@@ -190,13 +190,13 @@ std::vector<std::string> AnswerStudy(const Study& study, const std::vector<Trial
   if (method != SamplingMethod::kGrid && !study.constraints.empty())
     answers.push_back(DescribeFailures(study, rows));
   if (study.objectives.empty()) return answers;
-  const PointSummary points = SummarisePoints(study, rows);
-  if (points.count == 0) return answers;
-  if (!points.best) {
-    answers.push_back(fmt::format("At none of {} all constraints hold.", CountPoints(points.count)));
+  const std::vector<JudgedPoint> points = JudgePoints(study, rows);
+  if (points.empty()) return answers;
+  if (SortFeasible(points).empty()) {
+    answers.push_back(fmt::format("At none of {} all constraints hold.", CountPoints(points.size())));
   } else {
     answers.push_back(study.objectives.size() == 1 ? DescribeBest(study, points)
-                                                   : DescribeFront(study, JudgePoints(study, rows)));
+                                                   : DescribeFront(study, points));
   }
   return answers;
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-// A study that was edited: which of its rows are still meant.
+// A study that was edited: which of its rows still belong to it.
 
 #include <string>
 #include <vector>
@@ -11,11 +11,11 @@ namespace dexcheck {
 
 /// What an edited study makes of a database's rows.
 struct StudyChange {
-  std::vector<TrialRow> rows;  ///< All of them, with the numbers that they have now; those that are not meant
-                               ///< any more have negative ones.
-  long kept = 0;               ///< Rows that were meant, and are.
+  std::vector<TrialRow> rows;  ///< All of them, with the numbers that they have now; those that do not belong
+                               ///< to it have negative ones.
+  long kept = 0;               ///< Rows that belonged to it, and do.
   long brought_back = 0;       ///< Rows that had been set aside.
-  long set_aside = 0;          ///< Rows that were meant and are not any more.
+  long set_aside = 0;          ///< Rows that belonged to it and do not any more.
 };
 
 /// Why rows of one study cannot be rows of the other, whatever their parameters; empty when they can: trials

@@ -11,7 +11,7 @@
 #include "harness/base/version.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/machine.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_file.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck {

@@ -27,11 +27,7 @@ StudyProgress FindProgress(const StudyStore& store) {
   const std::vector<TrialRow> rows = store.ReadRows(0, /*with_machine=*/false);
   for (const std::string& answer : AnswerStudy(study, rows)) progress.text += answer + "\n";
   if (study.is_search()) {
-    StudyInputs inputs;
-    inputs.study = study;
-    inputs.scenario_text = store.Identify("scenario");
-    inputs.scenario_source = study.scenario;
-    SearchHistory history(study, FindSearchStart(inputs));
+    SearchHistory history(study, FindSearchStart(study));
     for (const TrialRow& row : rows) history.Add(row);
     progress.is_over = history.is_over();
   }

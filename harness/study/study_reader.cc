@@ -5,7 +5,6 @@
 #include <limits>
 #include <stdexcept>
 
-#include "controller/common/expression.h"
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/study/margin_search.h"
@@ -18,7 +17,7 @@ namespace {
 constexpr long kMaxValues = 10000;
 constexpr long kMaxSeed = 1L << 53;  // whole numbers that a double holds
 
-/// Texts, truths and lists have no order: their numbers stand for them.
+/// Texts, flags and lists have no order: their numbers stand for them.
 bool IsWord(const TomlValue& value) {
   const std::string shown = value.Show();
   return value.IsText() || shown == "true" || shown == "false" || shown.starts_with('[');
@@ -28,7 +27,7 @@ void ReadValues(const TomlValue& list, Variation* variation) {
   for (const TomlValue& entry : list.AsList()) {
     const bool are_words = !variation->labels.empty();
     if (are_words || (variation->values.empty() && IsWord(entry))) {
-      if (!IsWord(entry)) entry.Fail("must be a text, a truth or a list as the first one is");
+      if (!IsWord(entry)) entry.Fail("must be a text, a flag or a list as the first one is");
       variation->values.push_back(static_cast<double>(variation->labels.size()));
       variation->labels.push_back(entry.IsText() ? entry.AsText() : entry.Show());
     } else {
@@ -41,88 +40,7 @@ void ReadValues(const TomlValue& list, Variation* variation) {
   variation->to = *most;
 }
 
-bool IsOfKey(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '.';
-}
-
-/// The expression with `key0`, `key1`, ... for the keys before it. @throws InputError when it is no
-/// arithmetic of them.
-std::string ReadEnd(const TomlValue& end, std::span<const Variation> before) {
-  const std::string text = end.AsText();
-  std::string expression;
-  for (size_t i = 0; i < text.size();) {
-    size_t last = i;
-    while (last < text.size() && IsOfKey(text[last])) ++last;
-    const std::string word = text.substr(i, std::max(last, i + 1) - i);
-    const auto found =
-        std::find_if(before.begin(), before.end(), [&](const Variation& other) { return other.key == word; });
-    if (found != before.end() && !found->labels.empty()) end.Reject(Quote(word) + " has no numbers");
-    expression += found == before.end() ? word : "key" + std::to_string(found - before.begin());
-    i += word.size();
-  }
-  SymbolTable symbols;
-  for (size_t i = 0; i < before.size(); ++i) symbols["key" + std::to_string(i)] = before[i].from;
-  try {
-    EvaluateExpression(expression, symbols);
-  } catch (const std::invalid_argument& error) {
-    end.Reject(std::string("must be a number or arithmetic of keys that are varied before it: ") +
-               error.what());
-  }
-  return expression;
-}
-
-/// The widest range over all corners of the keys before it, at each of which it must be one.
-void WidenRange(const TomlValue& end, std::span<const Variation> before, Variation* variation) {
-  constexpr size_t kMostKeys = 12;  // 4096 corners
-  if (before.size() > kMostKeys)
-    end.Reject("a range may depend on keys among the first " + std::to_string(kMostKeys));
-  std::vector<Variation> all(before.begin(), before.end());
-  all.push_back(*variation);
-  double least = std::numeric_limits<double>::infinity();
-  double most = -least;
-  for (size_t corner = 0; corner < size_t{1} << before.size(); ++corner) {
-    std::vector<double> fractions;
-    for (size_t i = 0; i < before.size(); ++i) fractions.push_back((corner >> i & 1U) != 0 ? 1.0 : 0.0);
-    const std::vector<double> values = ValuesAt({all.data(), before.size()}, fractions);
-    const Variation fixed = FixRange(all, before.size(), values);
-    const bool good = std::isfinite(fixed.from) && std::isfinite(fixed.to) && fixed.from < fixed.to &&
-                      (!fixed.logarithmic || fixed.from > 0.0);
-    if (!good) {
-      std::string where;
-      for (size_t i = 0; i < before.size(); ++i)
-        where += (i == 0 ? "" : ", ") + before[i].key + " = " + FormatValue(before[i], values[i]);
-      end.Reject("the range is from " + FormatNumber(fixed.from) + " to " + FormatNumber(fixed.to) +
-                 " where " + where);
-    }
-    least = std::min(least, fixed.from);
-    most = std::max(most, fixed.to);
-  }
-  variation->from = least;
-  variation->to = most;
-}
-
-/// Ends of which at least one is a text: they depend on keys before this one.
-void ReadDependentRange(TomlTable* table, std::span<const Variation> before, Variation* variation) {
-  const TomlValue from = table->Get("from");
-  const TomlValue to = table->Get("to");
-  if (from.IsText()) {
-    variation->from_expression = ReadEnd(from, before);
-  } else {
-    variation->from = from.AsNumber();
-  }
-  if (to.IsText()) {
-    variation->to_expression = ReadEnd(to, before);
-  } else {
-    variation->to = to.AsNumber();
-  }
-  if (const auto spacing = table->Find("spacing"))
-    variation->logarithmic = spacing->AsChoice<bool>({{"linear", false}, {"log", true}});
-  WidenRange(from.IsText() ? from : to, before, variation);
-}
-
-void ReadRange(TomlTable* table, bool is_grid, std::span<const Variation> before, Variation* variation) {
-  if (!is_grid && (table->Get("from").IsText() || table->Get("to").IsText()))
-    return ReadDependentRange(table, before, variation);
+void ReadRange(TomlTable* table, bool is_grid, Variation* variation) {
   variation->from = table->Get("from").AsNumber();
   variation->to = table->Get("to").AsNumber();
   if (variation->to <= variation->from) table->Get("to").Fail("must be greater than from");
@@ -143,8 +61,7 @@ void ReadRange(TomlTable* table, bool is_grid, std::span<const Variation> before
   variation->values = std::move(values);
 }
 
-/// @param before the variations that it stands among, without those after it.
-Variation ReadVariation(const TomlValue& value, bool is_grid, std::span<const Variation> before) {
+Variation ReadVariation(const TomlValue& value, bool is_grid) {
   TomlTable table = value.AsTable();
   Variation variation;
   const TomlValue key = table.Get("key");
@@ -156,17 +73,15 @@ Variation ReadVariation(const TomlValue& value, bool is_grid, std::span<const Va
   if (const auto list = table.Find("values")) {
     ReadValues(*list, &variation);
   } else {
-    ReadRange(&table, is_grid, before, &variation);
+    ReadRange(&table, is_grid, &variation);
   }
   table.RejectUnused();
   return variation;
 }
 
 void ReadVariations(const TomlValue& value, bool is_grid, Study* study) {
-  const size_t first = study->variations.size();
   for (const TomlValue& entry : value.AsList()) {
-    study->variations.push_back(
-        ReadVariation(entry, is_grid, std::span<const Variation>(study->variations).subspan(first)));
+    study->variations.push_back(ReadVariation(entry, is_grid));
     const Variation& added = study->variations.back();
     for (size_t i = 0; i + 1 < study->variations.size(); ++i) {
       if (study->variations[i].key == added.key) entry.Reject(Quote(added.key) + " is varied twice");
@@ -277,11 +192,9 @@ Constraint ReadConstraint(const TomlValue& value) {
 void ReadStart(const TomlValue& value, Study* study) {
   Search& search = study->search;
   if (value.IsText()) {
-    search.start =
-        value.AsChoice<SearchStart>({{"middle", SearchStart::kMiddle}, {"theory", SearchStart::kTheory}});
+    if (value.AsText() != "middle") value.Fail("must be \"middle\" or a value for each key");
     return;
   }
-  search.start = SearchStart::kValues;
   const std::vector<TomlValue> list = value.AsList();
   if (list.size() != study->num_keys()) {
     value.Reject("needs a value for each of the " + std::to_string(study->num_keys()) + " keys");
@@ -317,6 +230,7 @@ void ReadMargins(TomlTable* table, Study* study) {
 
 /// Methods of earlier versions, and what to use instead.
 constexpr std::pair<std::string_view, const char*> kGoneMethods[] = {
+    {"bobyqa", "nelder_mead, or cma_es where there are constraints"},
     {"halving", "nelder_mead or cma_es, with stop_error for trials that are lost"},
     {"external", "an optimiser that calls \"dexcheck run SCENARIO --no-log --json --set KEY=VALUE\""}};
 
@@ -334,7 +248,6 @@ void ReadSearch(const TomlValue& value, Study* study) {
   search.method = method.AsChoice<SearchMethod>({{"cma_es", SearchMethod::kCmaEs},
                                                  {"nsga2", SearchMethod::kNsga2},
                                                  {"nelder_mead", SearchMethod::kNelderMead},
-                                                 {"bobyqa", SearchMethod::kBobyqa},
                                                  {"margins", SearchMethod::kMargins}});
   if (search.method == SearchMethod::kMargins) {
     ReadMargins(&table, study);
@@ -357,8 +270,6 @@ void ReadSearch(const TomlValue& value, Study* study) {
     if (const auto tolerance = table.Find("tolerance")) search.tolerance = tolerance->AsPositive();
     if (search.count < search.starts) count.Fail("must be at least the number of starts");
   }
-  if (search.method == SearchMethod::kBobyqa && study->num_keys() < 2)
-    method.Reject("bobyqa needs two keys at least");
   if (search.method != SearchMethod::kNsga2) {
     if (const auto step = table.Find("step")) {
       search.step = step->AsPositive();
@@ -380,23 +291,13 @@ void ReadSearch(const TomlValue& value, Study* study) {
 }
 
 void RequireFewTrials(const TomlValue& where, const Study& study) {
-  double trials = static_cast<double>(study.seeds.size());
-  if (study.num_nested > 0) trials *= static_cast<double>(study.nested.count);
-  if (study.is_search()) {
-    trials *= static_cast<double>(study.search.count);
-  } else if (study.sample.method != SamplingMethod::kGrid) {
-    trials *= static_cast<double>(CountUnitPoints(study.sample, static_cast<int>(study.num_keys())));
-  } else {
-    for (size_t i = 0; i < study.num_keys(); ++i)
-      trials *= static_cast<double>(study.variations[i].values.size());
-  }
-  if (trials > static_cast<double>(kMaxTrials)) {
-    where.Reject("makes " + FormatNumber(trials) + " trials; at most " + std::to_string(kMaxTrials) +
-                 " can be made");
-  }
+  const long trials = CountTrials(study);
+  if (trials <= kMaxTrials) return;
+  where.Reject("makes " + FormatNumber(static_cast<double>(trials)) + " trials; at most " +
+               std::to_string(kMaxTrials) + " can be made");
 }
 
-/// @param study what is known of it before its file is read.
+/// @param study with its text and source.
 Study ReadStudy(TomlTable& root, Study study) {
   root.RejectOthersThan({"name", "description", "scenario", "set", "seeds", "check", "trial_time_limit",
                          "stop_error", "metrics", "sample", "search", "objective", "constraints", "vary",
@@ -439,15 +340,6 @@ Study ReadStudy(TomlTable& root, Study study) {
     for (const TomlValue& entry : list->AsList()) study.constraints.push_back(ReadConstraint(entry));
   }
   if (search) ReadSearch(*search, &study);
-  const bool moves_one_key = study.sample.method == SamplingMethod::kSaltelli ||
-                             study.sample.method == SamplingMethod::kMorris ||
-                             study.search.method == SearchMethod::kMargins;
-  for (const Variation& variation : study.variations) {
-    if (moves_one_key && variation.depends_on_others())
-      vary.Reject(Quote(variation.key) +
-                  " has a range that depends on other keys, which is for points of a "
-                  "sample or a search for the best");
-  }
   if (const auto nested = root.Find("nested")) ReadNested(*nested, &study);
   RequireFewTrials(vary, study);
   return study;

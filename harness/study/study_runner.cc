@@ -128,7 +128,7 @@ void RunTrials(const StudyInputs& inputs, const std::vector<Trial>& trials, cons
   if (missing.empty()) return;
   auto finished = static_cast<long>(trials.size() - missing.size());
   TrialMaker maker(inputs, options, store);
-  maker.Run(missing, [&](const TrialRow&) { options.tell(++finished); });
+  maker.Run(missing, [&](const TrialRow&) { options.report(++finished); });
 }
 
 bool MakesRowsAgain(const StudyInputs& inputs, const std::vector<TrialRow>& rows) {
@@ -153,7 +153,7 @@ bool MakesRowsAgain(const StudyInputs& inputs, const std::vector<TrialRow>& rows
 
 void RunSearch(const StudyInputs& inputs, const RunOptions& options, StudyStore* store) {
   constexpr auto kPatience = std::chrono::milliseconds(100);  // with other processes
-  SearchHistory history(inputs.study, FindSearchStart(inputs));
+  SearchHistory history(inputs.study, FindSearchStart(inputs.study));
   const auto read = [&] {
     for (const TrialRow& row : store->ReadRows(history.first_of_batch())) history.Add(row);
   };
@@ -165,59 +165,10 @@ void RunSearch(const StudyInputs& inputs, const RunOptions& options, StudyStore*
     maker.Run(missing, [&](const TrialRow& row) {
       history.Add(row);
       ++made;
-      options.tell(history.CountDone());
+      options.report(history.CountDone());
     });
     read();
     if (made == 0 && !history.is_over()) std::this_thread::sleep_for(kPatience);
-  }
-}
-
-void RunSearchPart(const StudyInputs& inputs, const RunOptions& options, const SearchPart& part,
-                   StudyStore* store) {
-  using Clock = std::chrono::steady_clock;
-  constexpr auto kPatience = std::chrono::milliseconds(200);
-  constexpr Clock::duration kLeastWait = std::chrono::seconds(2);
-  SearchExchange exchange(inputs, part);
-  SearchHistory history(inputs.study, FindSearchStart(inputs));
-  for (const TrialRow& row : store->ReadRows()) history.Add(row);
-  TrialMaker maker(inputs, options, store);
-  const auto make = [&](const std::vector<Trial>& trials) {
-    maker.Run(trials, [&](const TrialRow& row) {
-      history.Add(row);
-      options.tell(history.CountDone());
-    });
-  };
-  while (!history.is_over() && !options.is_interrupted()) {
-    const long first = history.first_of_batch();
-    const long end = first + history.size_of_batch();
-    const auto begun = Clock::now();
-    std::vector<Trial> mine = history.ListMissing();
-    std::erase_if(mine, [&](const Trial& trial) { return !part.is_mine(trial.number); });
-    make(mine);
-    if (options.is_interrupted()) return;
-    // Published before any row of another part is taken: then a batch that is whole here is published.
-    std::vector<TrialRow> rows = store->ReadRows(first);
-    std::erase_if(rows, [&](const TrialRow& row) {
-      return row.trial.number >= end || !part.is_mine(row.trial.number);
-    });
-    exchange.Publish(first, rows);
-    const auto wait_begun = Clock::now();
-    const auto wait = std::max(wait_begun - begun, kLeastWait);
-    while (history.first_of_batch() == first && !history.is_over() && !options.is_interrupted()) {
-      const std::vector<TrialRow> others = exchange.Read(first);
-      if (!others.empty()) store->Add(others);
-      for (const TrialRow& row : others) history.Add(row);
-      if (!others.empty()) continue;
-      if (Clock::now() - wait_begun < wait) {
-        std::this_thread::sleep_for(kPatience);
-        continue;
-      }
-      // From the end, for the part that has them begins at its beginning.
-      std::vector<Trial> some = history.ListMissing();
-      const size_t count = std::min(some.size(), static_cast<size_t>(options.jobs));
-      some.erase(some.begin(), some.end() - static_cast<std::ptrdiff_t>(count));
-      make(some);
-    }
   }
 }
 

@@ -5,15 +5,14 @@
 #include <functional>
 #include <vector>
 
-#include "harness/study/search_exchange.h"
 #include "harness/study/study_store.h"
 
 namespace dexcheck {
 
 struct RunOptions {
-  int jobs = 1;                             ///< Trials at a time.
-  std::function<bool()> is_interrupted;     ///< Asked often.
-  std::function<void(long finished)> tell;  ///< Called with the number of trials that are done.
+  int jobs = 1;                               ///< Trials at a time.
+  std::function<bool()> is_interrupted;       ///< Called often.
+  std::function<void(long finished)> report;  ///< Called with the number of trials that are done.
 };
 
 /// Makes those of the trials that have no row. Trials that other living processes have are left to them.
@@ -28,11 +27,5 @@ bool MakesRowsAgain(const StudyInputs& inputs, const std::vector<TrialRow>& rows
 /// Makes a search's trials, batch by batch, until it is over or interrupted. Several processes may work on
 /// one database: each waits for the others' part of a batch.
 void RunSearch(const StudyInputs& inputs, const RunOptions& options, StudyStore* store);
-
-/// The same by one of several processes that have a database each and a folder together. Each makes its
-/// fraction of a batch and takes the others' rows into its own database. Fractions that stay away for as long
-/// as its own took, because their process has ended or not begun, it makes itself: the rows are the same.
-void RunSearchPart(const StudyInputs& inputs, const RunOptions& options, const SearchPart& part,
-                   StudyStore* store);
 
 }  // namespace dexcheck

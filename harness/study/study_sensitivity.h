@@ -10,7 +10,7 @@
 
 namespace dexcheck {
 
-/// What the points of a study with `method = "saltelli"` or `"morris"` tell of one quantity.
+/// What the points of a study with `method = "saltelli"` or `"morris"` show of one quantity.
 struct Sensitivity {
   std::string expression;            ///< Of metrics.
   std::vector<SobolIndex> sobol;     ///< Of "saltelli", by key.
@@ -26,7 +26,7 @@ struct Sensitivity {
 Sensitivity AnalyseSensitivity(const Study& study, const std::vector<TrialRow>& rows,
                                const std::string& expression);
 
-/// What a study of this kind asks about: its objectives, else its metrics, else the error of its trials.
+/// The quantities of a study of this kind: its objectives, else its metrics, else the error of its trials.
 std::vector<std::string> ListQuantities(const Study& study, const std::vector<TrialRow>& rows);
 
 /// "energy: x1 explains 62 % of the variance, 55 to 70 %, with its interactions; then ...".

@@ -1,11 +1,15 @@
 #include "harness/study/study_store.h"
 
+#include <SQLiteCpp/Transaction.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sqlite3.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
+#include <system_error>
 #include <unordered_map>
 
 #include "controller/common/errors.h"
@@ -17,8 +21,29 @@ namespace dexcheck {
 namespace {
 
 constexpr int kApplicationId = 0x44584353;  // "DXCS", tells a study from other databases
-const std::string kLayout = kStudyLayout;
-constexpr const char* kLayoutWithoutMachine = "1";  // does not say which machine made a trial
+/// Others hold the lock for some rows; on a slow disk or network that may take a while.
+constexpr int kBusyTimeout = 60000;  // ms
+/// For reading too the file has to be written: what a killed process left half done must be undone.
+constexpr int kExisting = SQLITE_OPEN_READWRITE;
+
+std::string Explain(const SQLite::Exception& error) {
+  switch (error.getErrorCode()) {
+    case SQLITE_NOTADB:
+    case SQLITE_CORRUPT:
+      return std::string("is not a usable database: ") + error.what();
+    case SQLITE_CANTOPEN:
+      return "cannot be opened";
+    case SQLITE_READONLY:
+      return "cannot be written: it is read-only";
+    case SQLITE_FULL:
+    case SQLITE_IOERR:
+      return std::string("cannot be written: ") + error.what();
+    case SQLITE_BUSY:
+      return "is locked by another program";
+    default:
+      return error.what();
+  }
+}
 
 std::string QuoteName(const std::string& name) {
   std::string quoted = "\"";
@@ -26,130 +51,149 @@ std::string QuoteName(const std::string& name) {
   return quoted + "\"";
 }
 
+std::string ListMarks(size_t count) {
+  return fmt::format("{}", fmt::join(std::vector<const char*>(count, "?"), ", "));
+}
+
+/// A transaction that may write; undone unless committed.
+class Transaction : public SQLite::Transaction {
+ public:
+  explicit Transaction(SQLite::Database* database)
+      : SQLite::Transaction(*database, SQLite::TransactionBehavior::IMMEDIATE) {}
+};
+
 }  // namespace
 
-StudyStore::StudyStore(const std::filesystem::path& path, Database::Mode mode)
-    : database_(std::make_unique<Database>(path, mode)) {}
+/// SQLite gives empty names, those that begin with a colon and URIs a meaning of their own: databases in
+/// memory, or temporary ones.
+void RequirePlainFile(const std::string& name) {
+  const auto refuse = [&](const std::string& why) {
+    throw InputError(Quote(name) + ": a database must be a plain file: " + why);
+  };
+  if (name.empty()) refuse("the name is empty");
+  if (name.starts_with(':')) refuse("the name begins with a colon (a file of this name is ./" + name + ")");
+  if (name.starts_with("file:")) refuse("this is a URI (a file of this name is ./" + name + ")");
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(name, error);
+  if (std::filesystem::is_directory(status)) refuse("this is a folder");
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    refuse("this is a device, a pipe or a socket");
+  }
+}
+
+template <typename Function>
+auto StudyStore::Do(const Function& function) const {
+  try {
+    return function();
+  } catch (const SQLite::Exception& error) {
+    throw InputError(name_ + ": " + Explain(error));
+  }
+}
+
+StudyStore::StudyStore(const std::filesystem::path& path, int flags) : name_(path.string()) {
+  RequirePlainFile(name_);
+  Do([&] { database_ = std::make_unique<SQLite::Database>(name_, flags, kBusyTimeout); });
+}
 
 StudyStore StudyStore::OpenOrCreate(const std::filesystem::path& path, const StudyIdentity& identity,
                                     const Study& study, const MakesSameRows& makes_same_rows) {
-  StudyStore store(path, Database::Mode::kCreate);
-  store.Create(identity, study);
-  store.Load();
-  store.Adopt(identity, study, makes_same_rows);
+  StudyStore store(path, kExisting | SQLITE_OPEN_CREATE);
+  store.Do([&] {
+    store.Create(identity, study);
+    store.Load();
+    store.Adopt(identity, study, makes_same_rows);
+  });
   return store;
 }
 
 StudyStore StudyStore::Open(const std::filesystem::path& path) {
-  StudyStore store(path, Database::Mode::kExisting);
-  store.Load();
+  StudyStore store(path, kExisting);
+  store.Do([&] { store.Load(); });
   return store;
 }
 
 void StudyStore::Create(const StudyIdentity& identity, const Study& study) {
   const auto is_empty = [&] {
-    Statement count(database_.get(), "SELECT count(*) FROM sqlite_master");
-    count.Step();
-    return count.GetWhole(0) == 0;
+    return database_->execAndGet("SELECT count(*) FROM sqlite_master").getInt() == 0;
   };
   if (!is_empty()) return;
   Transaction transaction(database_.get());
   if (!is_empty()) return;  // another process was faster
-  database_->Execute("PRAGMA application_id = " + std::to_string(kApplicationId));
-  std::string columns;
-  std::string marks;
-  for (const auto& [column, value] : identity) {
-    columns += (columns.empty() ? "" : ", ") + column + " TEXT NOT NULL";
-    marks += marks.empty() ? "?" : ", ?";
-  }
-  database_->Execute("CREATE TABLE study (" + columns + ")");
-  Statement insert(database_.get(), "INSERT INTO study VALUES (" + marks + ")");
-  for (size_t i = 0; i < identity.size(); ++i) insert.Bind(static_cast<int>(i) + 1, identity[i].second);
-  insert.Step();
-  study_ = study;
+  database_->exec("PRAGMA application_id = " + std::to_string(kApplicationId));
+  std::vector<std::string> columns;
+  for (const auto& [column, value] : identity) columns.push_back(column + " TEXT NOT NULL");
+  database_->exec(fmt::format("CREATE TABLE study ({})", fmt::join(columns, ", ")));
+  SQLite::Statement insert(*database_, "INSERT INTO study VALUES (" + ListMarks(identity.size()) + ")");
+  for (size_t i = 0; i < identity.size(); ++i) insert.bind(static_cast<int>(i) + 1, identity[i].second);
+  insert.exec();
   std::string table = "CREATE TABLE trials (trial INTEGER PRIMARY KEY, seed INTEGER NOT NULL";
   for (const Variation& variation : study.variations) {
     table += ", " + QuoteName(variation.key) + " REAL NOT NULL";
   }
   table += ", outcome TEXT NOT NULL, failure TEXT NOT NULL";
   for (const MetricInfo& metric : kMetrics) table += std::string(", ") + metric.name + " REAL";
-  database_->Execute(table + ", machine TEXT NOT NULL)");
+  database_->exec(table + ", machine TEXT NOT NULL)");
   // Of trials that are running: who has them.
-  database_->Execute("CREATE TABLE claims (trial INTEGER PRIMARY KEY, process TEXT NOT NULL)");
-  transaction.Commit();
+  database_->exec("CREATE TABLE claims (trial INTEGER PRIMARY KEY, process TEXT NOT NULL)");
+  transaction.commit();
 }
 
 void StudyStore::Load() {
-  Statement id(database_.get(), "PRAGMA application_id");
-  if (!id.Step() || id.GetWhole(0) != kApplicationId) {
-    throw InputError(database_->name() + ": is not the database of a study");
+  if (database_->execAndGet("PRAGMA application_id").getInt() != kApplicationId) {
+    throw InputError(name_ + ": is not the database of a study");
   }
-  Upgrade();
-  AddMissingMetrics();
   identity_.clear();
   for (const char* column : {"layout", "name", "study", "scenario", "robot", "mjcf_hash", "dexcheck_version",
                              "git_revision", "mujoco_version"}) {
-    Statement select(database_.get(), std::string("SELECT ") + column + " FROM study");
-    select.Step();
-    identity_.emplace_back(column, select.GetText(0));
+    identity_.emplace_back(column,
+                           database_->execAndGet(fmt::format("SELECT {} FROM study", column)).getString());
   }
-  study_ = ParseStudy(Identify("study"), database_->name());
+  std::string& layout = identity_.front().second;
+  if (layout != kStudyLayout && layout != "1")  // which does not say which machine made a trial
+    throw InputError(name_ + ": was written by another version of dexcheck");
+  AddMissingColumns();
+  if (layout != kStudyLayout) Update("layout", kStudyLayout);
+  study_ = ParseStudy(Identify("study"), name_);
 }
 
-void StudyStore::Upgrade() {
-  const auto read_layout = [&] {
-    Statement layout(database_.get(), "SELECT layout FROM study");
-    return layout.Step() ? layout.GetText(0) : "";
-  };
-  if (read_layout() == kLayout) return;
-  Transaction transaction(database_.get());
-  if (read_layout() == kLayout) return;  // another process was faster
-  if (read_layout() != kLayoutWithoutMachine) {
-    throw InputError(database_->name() + ": was written by another version of dexcheck");
-  }
-  database_->Execute("ALTER TABLE trials ADD COLUMN machine TEXT NOT NULL DEFAULT ''");
-  database_->Execute("UPDATE study SET layout = '" + kLayout + "'");
-  transaction.Commit();
-}
-
-void StudyStore::AddMissingMetrics() {
+void StudyStore::AddMissingColumns() {
   const auto list_missing = [&] {
     std::set<std::string> there;
-    Statement columns(database_.get(), "SELECT name FROM pragma_table_info('trials')");
-    while (columns.Step()) there.insert(columns.GetText(0));
+    SQLite::Statement columns(*database_, "SELECT name FROM pragma_table_info('trials')");
+    while (columns.executeStep()) there.insert(columns.getColumn(0));
     std::vector<std::string> missing;
     for (const MetricInfo& metric : kMetrics) {
-      if (!there.contains(metric.name)) missing.emplace_back(metric.name);
+      if (!there.contains(metric.name)) missing.push_back(std::string(metric.name) + " REAL");
     }
+    if (!there.contains("machine")) missing.emplace_back("machine TEXT NOT NULL DEFAULT ''");
     return missing;
   };
   if (list_missing().empty()) return;
   Transaction transaction(database_.get());
   // Another process may have been faster.
-  for (const std::string& name : list_missing()) {
-    database_->Execute("ALTER TABLE trials ADD COLUMN " + name + " REAL");
-  }
-  transaction.Commit();
+  for (const std::string& column : list_missing()) database_->exec("ALTER TABLE trials ADD COLUMN " + column);
+  transaction.commit();
 }
 
 const std::string& StudyStore::Identify(const std::string& column) const {
   for (const auto& [name, value] : identity_) {
     if (name == column) return value;
   }
-  throw InputError(database_->name() + ": no column " + Quote(column));
+  throw InputError(name_ + ": no column " + Quote(column));
 }
 
-bool StudyStore::IsInUse() const {
-  Statement claims(database_.get(), "SELECT process FROM claims");
-  bool in_use = false;
-  while (claims.Step()) in_use = in_use || IsRunningHere(claims.GetText(0));
-  return in_use;
+bool StudyStore::IsInUse() {
+  SQLite::Statement claims(*database_, "SELECT process FROM claims");
+  while (claims.executeStep()) {
+    if (IsRunningHere(claims.getColumn(0))) return true;
+  }
+  return false;
 }
 
 void StudyStore::Update(const std::string& column, const std::string& value) {
-  Statement update(database_.get(), "UPDATE study SET " + column + " = ?");
-  update.Bind(1, value);
-  update.Step();
+  SQLite::Statement update(*database_, "UPDATE study SET " + column + " = ?");
+  update.bind(1, value);
+  update.exec();
   for (auto& [name, text] : identity_) {
     if (name == column) text = value;
   }
@@ -171,7 +215,7 @@ void StudyStore::Adopt(const StudyIdentity& identity, const Study& study,
   };
   const std::string difference = FindDifference(study_, study);
   if (!difference.empty()) {
-    throw InputError(database_->name() + ": is of another study: study differs: " + difference +
+    throw InputError(name_ + ": is of another study: study differs: " + difference +
                      "; rows made otherwise cannot be kept, take another database");
   }
   if (find("git_revision") != Identify("git_revision")) {
@@ -181,18 +225,17 @@ void StudyStore::Adopt(const StudyIdentity& identity, const Study& study,
   }
   if (study.text == study_.text) return;
   if (!HasSameTrials(study_, study)) {
-    if (IsInUse())
-      throw InputError(database_->name() + ": another process makes trials of the study as it was");
+    if (IsInUse()) throw InputError(name_ + ": another process makes trials of the study as it was");
     Transaction transaction(database_.get());
     StudyChange changed = ChangeStudy(study_, study, ReadRows(std::numeric_limits<long>::min()));
-    database_->Execute("DELETE FROM trials");
+    database_->exec("DELETE FROM trials");
     study_ = study;
     insert_.reset();  // their columns' order
     find_.reset();
     for (const TrialRow& row : changed.rows) Insert(row);
     Update("study", study.text);
     Update("name", study.name);
-    transaction.Commit();
+    transaction.commit();
     change_ += (change_.empty() ? "" : "; ") + ("the study was edited: " + Describe(changed));
     return;
   }
@@ -207,11 +250,11 @@ void StudyStore::RequireSame(const StudyIdentity& other) const {
     const std::string& own = Identify(column);
     if (own == value) continue;
     if (column == "study") {
-      const Study there = ParseStudy(value, database_->name());
+      const Study there = ParseStudy(value, name_);
       if (HasSameTrials(study_, there)) continue;
     }
     const bool is_short = own.size() < kReadable && value.size() < kReadable;
-    throw InputError(database_->name() + ": is of another study: " + column + " differs" +
+    throw InputError(name_ + ": is of another study: " + column + " differs" +
                      (is_short ? ", " + Quote(own) + " there and " + Quote(value) + " here" : ""));
   }
 }
@@ -225,204 +268,214 @@ std::string StudyStore::ListColumns() const {
 }
 
 std::vector<long> StudyStore::ListNumbers() const {
-  Statement select(database_.get(), "SELECT trial FROM trials WHERE trial >= 0 ORDER BY trial");
-  std::vector<long> numbers;
-  while (select.Step()) numbers.push_back(static_cast<long>(select.GetWhole(0)));
-  return numbers;
+  return Do([&] {
+    SQLite::Statement select(*database_, "SELECT trial FROM trials WHERE trial >= 0 ORDER BY trial");
+    std::vector<long> numbers;
+    while (select.executeStep()) numbers.push_back(select.getColumn(0));
+    return numbers;
+  });
 }
 
 std::map<Outcome, long> StudyStore::CountOutcomes() const {
-  Statement select(database_.get(), "SELECT outcome, count(*) FROM trials WHERE trial >= 0 GROUP BY outcome");
-  std::map<Outcome, long> counts;
-  while (select.Step()) {
-    const auto outcome = FindOutcome(select.GetText(0));
-    if (outcome) counts[*outcome] = static_cast<long>(select.GetWhole(1));
-  }
-  return counts;
+  return Do([&] {
+    SQLite::Statement select(*database_,
+                             "SELECT outcome, count(*) FROM trials WHERE trial >= 0 GROUP BY outcome");
+    std::map<Outcome, long> counts;
+    while (select.executeStep()) {
+      const auto outcome = FindOutcome(select.getColumn(0).getString());
+      if (outcome) counts[*outcome] = select.getColumn(1);
+    }
+    return counts;
+  });
 }
 
 std::vector<TrialRow> StudyStore::ReadRows(long first, bool with_machine) const {
-  // A vector that grows holds its rows twice for a moment.
-  Statement count(database_.get(), "SELECT count(*) FROM trials WHERE trial >= ?");
-  count.Bind(1, static_cast<long long>(first));
-  count.Step();
   std::vector<TrialRow> rows;
-  rows.reserve(static_cast<size_t>(count.GetWhole(0)));
+  Do([&] {
+    // A vector that grows holds its rows twice for a moment.
+    SQLite::Statement count(*database_, "SELECT count(*) FROM trials WHERE trial >= ?");
+    count.bind(1, first);
+    count.executeStep();
+    rows.reserve(static_cast<size_t>(count.getColumn(0).getInt64()));
+  });
   ForEachRow([&](TrialRow&& row) { rows.push_back(std::move(row)); }, first, with_machine);
   return rows;
 }
 
 void StudyStore::ForEachRow(const std::function<void(TrialRow&&)>& take, long first,
                             bool with_machine) const {
-  Statement select(database_.get(),
-                   "SELECT " + ListColumns() + " FROM trials WHERE trial >= ? ORDER BY trial");
-  select.Bind(1, static_cast<long long>(first));
-  while (select.Step()) take(ReadRow(select, with_machine));
+  Do([&] {
+    SQLite::Statement select(*database_,
+                             "SELECT " + ListColumns() + " FROM trials WHERE trial >= ? ORDER BY trial");
+    select.bind(1, first);
+    while (select.executeStep()) take(ReadRow(select, with_machine));
+  });
 }
 
-TrialRow StudyStore::ReadRow(const Statement& select, bool with_machine) const {
+TrialRow StudyStore::ReadRow(const SQLite::Statement& select, bool with_machine) const {
   TrialRow row;
   int column = 0;
-  row.trial.number = static_cast<long>(select.GetWhole(column++));
-  row.trial.seed = static_cast<std::uint64_t>(select.GetWhole(column++));
+  row.trial.number = select.getColumn(column++);
+  row.trial.seed = static_cast<std::uint64_t>(select.getColumn(column++).getInt64());
   row.trial.parameters.reserve(study_.variations.size());
   const auto reject = [&](const std::string& key, const std::string& why) {
-    throw InputError(database_->name() + ": trial " + std::to_string(row.trial.number) + ": " + key + ": " +
-                     why + ", got " + Quote(select.GetText(column)));
+    throw InputError(name_ + ": trial " + std::to_string(row.trial.number) + ": " + key + ": " + why +
+                     ", got " + Quote(select.getColumn(column).getString()));
   };
+  const auto is_number = [](const SQLite::Column& value) { return value.isInteger() || value.isFloat(); };
   for (const Variation& variation : study_.variations) {
-    const double value = select.GetNumber(column);
-    if (!select.IsNumber(column)) reject(variation.key, "must be a number");
+    const SQLite::Column value = select.getColumn(column);
+    if (!is_number(value)) reject(variation.key, "must be a number");
+    row.trial.parameters.push_back(value);
     // Of a key of texts the number of one of them.
     const auto count = static_cast<double>(variation.labels.size());
-    if (count > 0.0 && !(value >= 0.0 && value < count && value == std::floor(value)))
+    const double number = row.trial.parameters.back();
+    if (count > 0.0 && !(number >= 0.0 && number < count && number == std::floor(number)))
       reject(variation.key, fmt::format("must be a whole number from 0 to {}", count - 1.0));
-    row.trial.parameters.push_back(value);
     ++column;
   }
-  const std::string outcome = select.GetText(column);
-  if (!FindOutcome(outcome)) reject("outcome", "unknown");
-  ++column;
-  row.result.outcome = *FindOutcome(outcome);
-  row.result.failure = select.GetText(column++);
-  for (size_t i = 0; i < kMetrics.size(); ++i, ++column) {
-    if (!select.IsNumber(column) && !select.IsNull(column)) reject(kMetrics[i].name, "must be a number");
-    row.result.metrics[i] = select.GetNumber(column);
+  const auto outcome = FindOutcome(select.getColumn(column).getString());
+  if (!outcome) reject("outcome", "unknown");
+  row.result.outcome = *outcome;
+  row.result.failure = select.getColumn(++column).getString();
+  for (size_t i = 0; i < kMetrics.size(); ++i) {
+    const SQLite::Column value = select.getColumn(++column);
+    if (!is_number(value) && !value.isNull()) reject(kMetrics[i].name, "must be a number");
+    row.result.metrics[i] = value.isNull() ? std::numeric_limits<double>::quiet_NaN() : value.getDouble();
   }
-  if (with_machine) row.machine = select.GetText(column);
+  if (with_machine) row.machine = select.getColumn(++column).getString();
   return row;
 }
 
 std::optional<TrialRow> StudyStore::FindRow(long trial) const {
-  if (!find_) {
-    find_ = std::make_unique<Statement>(database_.get(),
-                                        "SELECT " + ListColumns() + " FROM trials WHERE trial = ?");
-  }
-  find_->Bind(1, static_cast<long long>(trial));
-  std::optional<TrialRow> row;
-  if (find_->Step()) row = ReadRow(*find_, /*with_machine=*/true);
-  find_->Reset();
-  return row;
+  return Do([&] {
+    if (!find_) {
+      find_ = std::make_unique<SQLite::Statement>(*database_,
+                                                  "SELECT " + ListColumns() + " FROM trials WHERE trial = ?");
+    }
+    find_->reset();
+    find_->bind(1, trial);
+    std::optional<TrialRow> row;
+    if (find_->executeStep()) row = ReadRow(*find_, /*with_machine=*/true);
+    find_->reset();
+    return row;
+  });
 }
 
 bool StudyStore::Has(long trial) const {
-  Statement select(database_.get(), "SELECT 1 FROM trials WHERE trial = ?");
-  select.Bind(1, static_cast<long long>(trial));
-  return select.Step();
+  return Do([&] {
+    SQLite::Statement select(*database_, "SELECT 1 FROM trials WHERE trial = ?");
+    select.bind(1, trial);
+    return select.executeStep();
+  });
 }
 
 std::vector<long> StudyStore::Claim(const std::vector<long>& trials) {
-  Transaction transaction(database_.get());
-  Statement owner(database_.get(), "SELECT process FROM claims WHERE trial = ?");
-  Statement claim(database_.get(), "INSERT OR REPLACE INTO claims VALUES (?, ?)");
-  const std::string self = NameThisProcess();
-  std::vector<long> claimed;
-  for (const long trial : trials) {
-    if (Has(trial)) continue;
-    owner.Bind(1, static_cast<long long>(trial));
-    const bool taken = owner.Step() && IsRunningHere(owner.GetText(0));
-    owner.Reset();
-    if (taken) continue;
-    claim.Bind(1, static_cast<long long>(trial));
-    claim.Bind(2, self);
-    claim.Step();
-    claimed.push_back(trial);
-  }
-  transaction.Commit();
-  return claimed;
+  return Do([&] {
+    Transaction transaction(database_.get());
+    SQLite::Statement owner(*database_, "SELECT process FROM claims WHERE trial = ?");
+    SQLite::Statement claim(*database_, "INSERT OR REPLACE INTO claims VALUES (?, ?)");
+    const std::string self = NameThisProcess();
+    std::vector<long> claimed;
+    for (const long trial : trials) {
+      if (Has(trial)) continue;
+      owner.reset();
+      owner.bind(1, trial);
+      if (owner.executeStep() && IsRunningHere(owner.getColumn(0))) continue;
+      claim.reset();
+      claim.bind(1, trial);
+      claim.bind(2, self);
+      claim.exec();
+      claimed.push_back(trial);
+    }
+    owner.reset();
+    transaction.commit();
+    return claimed;
+  });
 }
 
 void StudyStore::Release(const std::vector<long>& trials) {
-  Statement release(database_.get(), "DELETE FROM claims WHERE trial = ? AND process = ?");
-  release.Bind(2, NameThisProcess());
-  for (const long trial : trials) {
-    release.Bind(1, static_cast<long long>(trial));
-    release.Step();
-  }
+  Do([&] {
+    SQLite::Statement release(*database_, "DELETE FROM claims WHERE trial = ? AND process = ?");
+    release.bind(2, NameThisProcess());
+    for (const long trial : trials) {
+      release.reset();
+      release.bind(1, trial);
+      release.exec();
+    }
+  });
 }
 
 void StudyStore::Insert(const TrialRow& row) {
   if (!insert_) {
-    std::string marks = "?, ?, ?, ?, ?";
-    for (size_t i = 0; i < study_.variations.size() + kNumMetrics; ++i) marks += ", ?";
-    insert_ = std::make_unique<Statement>(
-        database_.get(), "INSERT OR IGNORE INTO trials (" + ListColumns() + ") VALUES (" + marks + ")");
+    const std::string marks = ListMarks(study_.variations.size() + kNumMetrics + 5);
+    insert_ = std::make_unique<SQLite::Statement>(
+        *database_, "INSERT OR IGNORE INTO trials (" + ListColumns() + ") VALUES (" + marks + ")");
   }
-  Statement& insert = *insert_;
+  SQLite::Statement& insert = *insert_;
   int parameter = 1;
-  insert.Bind(parameter++, static_cast<long long>(row.trial.number));
-  insert.Bind(parameter++, static_cast<long long>(row.trial.seed));
-  for (const double value : row.trial.parameters) insert.Bind(parameter++, value);
-  insert.Bind(parameter++, NameOf(row.result.outcome));
-  insert.Bind(parameter++, row.result.failure);
-  for (const double metric : row.result.metrics) insert.Bind(parameter++, metric);
-  insert.Bind(parameter++, row.machine);
-  insert.Step();
+  insert.bind(parameter++, row.trial.number);
+  insert.bind(parameter++, static_cast<std::int64_t>(row.trial.seed));
+  for (const double value : row.trial.parameters) insert.bind(parameter++, value);
+  insert.bind(parameter++, NameOf(row.result.outcome));
+  insert.bind(parameter++, row.result.failure);
+  for (const double metric : row.result.metrics) insert.bind(parameter++, metric);  // NaN is NULL
+  insert.bind(parameter++, row.machine);
+  insert.exec();
+  insert.reset();
 }
 
 void StudyStore::Add(const std::vector<TrialRow>& rows) {
-  Transaction transaction(database_.get());
-  std::vector<long> numbers;
-  for (const TrialRow& row : rows) {
-    Insert(row);
-    numbers.push_back(row.trial.number);
-  }
-  Release(numbers);
-  transaction.Commit();
-}
-
-void StudyStore::Remove(long trial) {
-  Statement remove(database_.get(), "DELETE FROM trials WHERE trial = ?");
-  remove.Bind(1, static_cast<long long>(trial));
-  remove.Step();
+  Do([&] {
+    Transaction transaction(database_.get());
+    std::vector<long> numbers;
+    for (const TrialRow& row : rows) {
+      Insert(row);
+      numbers.push_back(row.trial.number);
+    }
+    Release(numbers);
+    transaction.commit();
+  });
 }
 
 void StudyStore::AddAll(const std::vector<TrialSource>& sources) {
-  Transaction transaction(database_.get());
-  std::unordered_map<long, const std::string*> added;  // from which source
-  for (const TrialSource& source : sources) {
-    source.read([&](TrialRow&& row) {
-      const long number = row.trial.number;
-      if (const auto other = FindRow(number)) {
-        if (IsFailed(row.result.outcome)) return;
-        if (IsFailed(other->result.outcome)) {
-          Remove(number);
-        } else if (IsSame(*other, row)) {
-          return;
-        } else {
-          const auto from = added.find(number);
-          throw InputError(source.name + ": trial " + std::to_string(number) +
-                           " has another result than in " +
-                           (from == added.end() ? database_->name() : *from->second));
+  Do([&] {
+    Transaction transaction(database_.get());
+    std::unordered_map<long, const std::string*> added;  // from which source
+    for (const TrialSource& source : sources) {
+      source.read([&](TrialRow&& row) {
+        const long number = row.trial.number;
+        if (const auto other = FindRow(number)) {
+          if (IsFailed(row.result.outcome)) return;
+          if (IsFailed(other->result.outcome)) {
+            database_->exec("DELETE FROM trials WHERE trial = " + std::to_string(number));
+          } else if (IsSame(*other, row)) {
+            return;
+          } else {
+            const auto from = added.find(number);
+            throw InputError(source.name + ": trial " + std::to_string(number) +
+                             " has another result than in " + (from == added.end() ? name_ : *from->second));
+          }
         }
-      }
-      Insert(row);
-      added[number] = &source.name;
-    });
-  }
-  transaction.Commit();
+        Insert(row);
+        added[number] = &source.name;
+      });
+    }
+    transaction.commit();
+  });
 }
 
 void StudyStore::RemoveFrom(long first) {
-  Statement remove(database_.get(), "DELETE FROM trials WHERE trial >= ?");
-  remove.Bind(1, static_cast<long long>(first));
-  remove.Step();
+  Do([&] { database_->exec("DELETE FROM trials WHERE trial >= " + std::to_string(first)); });
 }
 
-long StudyStore::RemoveFailed(const std::vector<long>& trials) {
-  Transaction transaction(database_.get());
-  std::set<long> failed;
-  for (const TrialRow& row : ReadRows()) {
-    if (IsFailed(row.result.outcome)) failed.insert(row.trial.number);
-  }
-  long count = 0;
-  for (const long trial : trials) {
-    if (failed.count(trial) == 0) continue;
-    Remove(trial);
-    ++count;
-  }
-  transaction.Commit();
-  return count;
+void StudyStore::RemoveFailed() {
+  Do([&] {
+    SQLite::Statement remove(*database_, "DELETE FROM trials WHERE trial >= 0 AND outcome IN (?, ?)");
+    remove.bind(1, NameOf(Outcome::kCrashed));
+    remove.bind(2, NameOf(Outcome::kTimedOut));
+    remove.exec();
+  });
 }
 
 }  // namespace dexcheck

@@ -3,6 +3,9 @@
 // A study's database: table `study` says what the study is, table `trials` has a row for each finished trial.
 // Each row is one transaction, so that the file is whole whenever a process is killed.
 
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Statement.h>
+
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -12,7 +15,6 @@
 #include <utility>
 #include <vector>
 
-#include "harness/study/sqlite.h"
 #include "harness/study/study.h"
 #include "harness/study/trial.h"
 
@@ -52,10 +54,15 @@ bool IsSame(const TrialRow& a, const TrialRow& b);
 /// Whether this program gives the same rows as the one that made these.
 using MakesSameRows = std::function<bool(const std::vector<TrialRow>&)>;
 
+/// @throws InputError when this cannot be the name of a database file: it must be a regular file, and nothing
+/// else that SQLite would take a name for (nothing that is gone when the process ends).
+void RequirePlainFile(const std::string& name);
+
+/// An open database. Everything that fails throws InputError "FILE: what: why".
 class StudyStore {
  public:
   /// Opens a study's database, or makes it when there is none. A study that was edited keeps the rows that it
-  /// still means, and sets the others aside (ChangeStudy); another revision of this program goes on with the
+  /// still has, and sets the others aside (ChangeStudy); another revision of this program goes on with the
   /// rows when it makes the same ones.
   /// @param makes_same_rows asked when the file was written by another revision; none for that it does not.
   /// @throws InputError, also when the file holds another study.
@@ -65,7 +72,7 @@ class StudyStore {
   static StudyStore Open(const std::filesystem::path& path);
 
   /// The file, as it was named.
-  [[nodiscard]] const std::string& name() const { return database_->name(); }
+  [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const StudyIdentity& identity() const { return identity_; }
   [[nodiscard]] const std::string& Identify(const std::string& column) const;
   /// As the file has it.
@@ -101,29 +108,31 @@ class StudyStore {
   /// All rows in one transaction. Those that are the same as one that is there may be, and failed ones
   /// (IsFailed) give way to others. @throws InputError when one differs; then nothing is added.
   void AddAll(const std::vector<TrialSource>& sources);
-  /// Forgets these trials where they failed (IsFailed). @return how many.
-  long RemoveFailed(const std::vector<long>& trials);
+  /// Forgets the trials that failed (IsFailed).
+  void RemoveFailed();
   /// Forgets all trials from this number on.
   void RemoveFrom(long first);
 
  private:
-  StudyStore(const std::filesystem::path& path, Database::Mode mode);
+  StudyStore(const std::filesystem::path& path, int flags);
+  /// Calls a function, and makes InputError of what SQLite throws.
+  template <typename Function>
+  auto Do(const Function& function) const;
   void Create(const StudyIdentity& identity, const Study& study);
-  void Upgrade();
-  /// Columns of metrics that the program which wrote the file did not have; its trials have none of these.
-  void AddMissingMetrics();
+  /// Columns that the program which wrote the file did not have: metrics, and which machine made a trial.
+  void AddMissingColumns();
   void Adopt(const StudyIdentity& identity, const Study& study, const MakesSameRows& makes_same_rows);
   void Update(const std::string& column, const std::string& value);
-  [[nodiscard]] bool IsInUse() const;
-  void Remove(long trial);
+  [[nodiscard]] bool IsInUse();
   void Load();
   void Insert(const TrialRow& row);
-  [[nodiscard]] TrialRow ReadRow(const Statement& select, bool with_machine) const;
+  [[nodiscard]] TrialRow ReadRow(const SQLite::Statement& select, bool with_machine) const;
   [[nodiscard]] std::string ListColumns() const;
 
-  std::unique_ptr<Database> database_;
-  std::unique_ptr<Statement> insert_;        // prepared once
-  mutable std::unique_ptr<Statement> find_;  // likewise
+  std::string name_;
+  std::unique_ptr<SQLite::Database> database_;
+  std::unique_ptr<SQLite::Statement> insert_;        // prepared once
+  mutable std::unique_ptr<SQLite::Statement> find_;  // likewise
   StudyIdentity identity_;
   Study study_;
   std::string change_;

@@ -1,12 +1,12 @@
 #include "harness/study/trial.h"
 
+#include <algorithm>
 #include <limits>
 #include <new>
 #include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/common/toml_reader.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/remove_looks.h"
@@ -34,20 +34,50 @@ MjModelPtr MakeEngine(const StudyInputs& inputs) {
   return copy;
 }
 
-/// What is wrong with the robot is told from its text, which has lines.
-RobotModel MakeModel(const StudyInputs& inputs, const Scenario& scenario) {
-  if (inputs.model && scenario.model_overrides == inputs.model_overrides) return *inputs.model;
-  const std::string source = inputs.robot.string();
-  try {
-    if (inputs.model_document)
-      return ParseRobotModel(*inputs.model_document, source, scenario.model_overrides);
-  } catch (const InputError&) {
+bool IsModelKey(const Variation& variation) { return IsOfModel(variation.key + "="); }
+
+/// Makes the trial's values of the varied keys in a document: those of the scenario, or those of the
+/// parameter file.
+template <typename Document>
+void SetKeys(const Study& study, const Trial& trial, bool of_model, Document* document) {
+  constexpr size_t kPrefix = std::string_view("model.").size();
+  for (size_t i = 0; i < study.variations.size(); ++i) {
+    const Variation& variation = study.variations[i];
+    if (IsModelKey(variation) != of_model) continue;
+    const std::string key = variation.key.substr(of_model ? kPrefix : 0);
+    // A text may be any value, and "KEY+" adds to a list.
+    if (variation.labels.empty() && !key.ends_with('+')) {
+      document->Set(key, trial.parameters[i]);
+    } else {
+      document->Override(key + "=" + FormatValue(variation, trial.parameters[i]));
+    }
   }
-  return ParseRobotModel(ReadTextFile(source), source, scenario.model_overrides);
 }
 
-Setup MakeSetup(const StudyInputs& inputs, const Scenario& scenario) {
-  return Setup(scenario, MakeModel(inputs, scenario), inputs.mjcf, MakeEngine(inputs));
+/// The scenario and the robot from their texts: messages name their lines.
+Scenario ParseTrialScenario(const StudyInputs& inputs, const Trial& trial) {
+  Scenario scenario = ParseScenario(inputs.scenario_text, inputs.scenario_source, inputs.scenario_folder,
+                                    ListOverrides(inputs.study, trial));
+  scenario.seed = trial.seed;
+  return scenario;
+}
+
+RobotModel MakeModel(const StudyInputs& inputs, const Trial& trial, const Scenario& scenario) {
+  const std::string source = inputs.robot.string();
+  if (inputs.model_document && scenario.model_overrides == inputs.model_overrides) {
+    if (inputs.model) return *inputs.model;
+    try {
+      TomlDocument document = *inputs.model_document;
+      SetKeys(inputs.study, trial, /*of_model=*/true, &document);
+      return ParseRobotModel(std::move(document), source, {});
+    } catch (const InputError&) {
+    }
+  }
+  return ParseRobotModel(ReadTextFile(source), source, ParseTrialScenario(inputs, trial).model_overrides);
+}
+
+Setup MakeSetup(const StudyInputs& inputs, const Trial& trial, const Scenario& scenario) {
+  return Setup(scenario, MakeModel(inputs, trial, scenario), inputs.mjcf, MakeEngine(inputs));
 }
 
 bool HasDiverged(const Setup& setup, const TrialResult& result) {
@@ -66,29 +96,32 @@ Outcome Classify(const Setup& setup, const RunResult& run, const TrialResult& re
   return Outcome::kTracked;
 }
 
-/// The range of a key beside these values of the others of its table.
-Variation FindRange(const Study& study, size_t index, const std::vector<double>& values) {
-  const std::span<const Variation> all(study.variations);
-  const size_t keys = study.num_keys();
-  if (index < keys) return FixRange(all.first(keys), index, values);
-  return FixRange(all.subspan(keys), index - keys,
-                  {values.begin() + static_cast<std::ptrdiff_t>(keys), values.end()});
-}
-
 }  // namespace
 
+void StudyInputs::OpenScenario() {
+  ScenarioDocument document(scenario_text, scenario_source, scenario_folder);
+  for (const std::string& assignment : study.overrides) document.Override(assignment);
+  scenario_document = std::make_shared<const ScenarioDocument>(std::move(document));
+}
+
 Scenario MakeTrialScenario(const StudyInputs& inputs, const Trial& trial) {
-  Scenario scenario = ParseScenario(inputs.scenario_text, inputs.scenario_source, inputs.scenario_folder,
-                                    ListOverrides(inputs.study, trial));
-  scenario.seed = trial.seed;
-  return scenario;
+  if (!inputs.scenario_document) return ParseTrialScenario(inputs, trial);
+  try {
+    ScenarioDocument document = *inputs.scenario_document;
+    SetKeys(inputs.study, trial, /*of_model=*/false, &document);
+    Scenario scenario = document.Read();
+    scenario.seed = trial.seed;
+    return scenario;
+  } catch (const InputError&) {
+    return ParseTrialScenario(inputs, trial);
+  }
 }
 
 TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial) {
   TrialResult result;
   try {
     const Scenario scenario = MakeTrialScenario(inputs, trial);
-    const Setup setup = MakeSetup(inputs, scenario);
+    const Setup setup = MakeSetup(inputs, trial, scenario);
     Runner runner(setup, inputs.study.check);
     TrialMonitor monitor(setup, runner.loop().num_steps());
     const double limit = inputs.study.stop_error;
@@ -121,26 +154,25 @@ void CheckTrials(StudyInputs* inputs) {
   } else {
     trial = ListTrials(study).front();
   }
+  inputs->OpenScenario();
   const Scenario first = MakeTrialScenario(*inputs, trial);
   MjModelPtr engine = LoadMjcf(inputs->mjcf);
   RemovePictures(engine.get());
   inputs->engine = std::move(engine);
-  const Setup setup = MakeSetup(*inputs, first);
-  inputs->model = std::make_shared<const RobotModel>(setup.model());
-  inputs->model_overrides = first.model_overrides;
+  const Setup setup = MakeSetup(*inputs, trial, first);
   const std::string robot = inputs->robot.string();
-  inputs->model_document = std::make_shared<const TomlDocument>(ReadTextFile(robot), robot);
+  TomlDocument model(ReadTextFile(robot), robot);
+  for (const std::string& assignment : first.model_overrides) model.Override(assignment);
+  inputs->model_document = std::make_shared<const TomlDocument>(std::move(model));
+  inputs->model_overrides = first.model_overrides;
+  if (std::none_of(study.variations.begin(), study.variations.end(), IsModelKey))
+    inputs->model = std::make_shared<const RobotModel>(setup.model());
   const Runner runner(setup, study.check);  // sensors and motors know more names than the setup
   const std::vector<double> parameters = trial.parameters;
   for (size_t i = 0; i < study.variations.size(); ++i) {
-    const Variation range = FindRange(study, i, parameters);
-    for (const double end : {range.from, range.to}) {
-      trial.parameters = parameters;
+    trial.parameters = parameters;
+    for (const double end : {study.variations[i].from, study.variations[i].to}) {
       trial.parameters[i] = end;
-      for (size_t j = i + 1; j < parameters.size(); ++j) {
-        if (study.variations[j].depends_on_others())
-          trial.parameters[j] = ValueAt(FindRange(study, j, trial.parameters), 0.5);
-      }
       MakeTrialScenario(*inputs, trial);
     }
   }

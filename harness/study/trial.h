@@ -23,12 +23,16 @@ struct StudyInputs {
   std::filesystem::path scenario_folder;
   std::filesystem::path robot;
   std::filesystem::path mjcf;
-  std::shared_ptr<const mjModel> engine;  ///< The MJCF compiled, for all trials; none before CheckTrials.
-  /// The parameter file read with these overrides, for the trials that have no others; likewise.
-  std::shared_ptr<const RobotModel> model;
+  // What all trials have, made once by CheckTrials; without it each trial makes its own.
+  std::shared_ptr<const mjModel> engine;                      ///< The MJCF compiled.
+  std::shared_ptr<const ScenarioDocument> scenario_document;  ///< With the study's overrides.
+  /// The parameter file parsed, with these overrides: the scenario's own and the study's.
+  std::shared_ptr<const TomlDocument> model_document;
   std::vector<std::string> model_overrides;
-  std::shared_ptr<const TomlDocument>
-      model_document;  ///< The parameter file parsed, for the others; likewise.
+  std::shared_ptr<const RobotModel> model;  ///< Read from it, of a study that varies no key of it.
+
+  /// Parses the scenario, for MakeTrialScenario. @throws InputError.
+  void OpenScenario();
 };
 
 /// A run without a start error diverged when its error is above this, rms, m; of joints rad.

@@ -28,16 +28,15 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kProblems = 1000;
 
-GraspForceOptions MakeOptions(GraspForceObjective objective, bool warm_start) {
+GraspForceOptions MakeOptions(bool warm_start) {
   GraspForceOptions options;
-  options.objective = objective;
   options.warm_start = warm_start;
   return options;
 }
 
 std::vector<GraspForceProblem> MakeProblems(int num_contacts, GraspForceStatus status, int count) {
   std::mt19937_64 random(1);
-  GraspForceSolver solver(num_contacts, 0, MakeOptions(GraspForceObjective::kBarrier, false));
+  GraspForceSolver solver(num_contacts, MakeOptions(false));
   std::vector<GraspForceProblem> problems;
   while (static_cast<int>(problems.size()) < count) {
     const GraspForceProblem problem = testing::MakeRandomGraspForceProblem(random, num_contacts);
@@ -48,7 +47,7 @@ std::vector<GraspForceProblem> MakeProblems(int num_contacts, GraspForceStatus s
 
 // `count` problems a millisecond apart, all feasible.
 std::vector<GraspForceProblem> MakeMotion(int num_contacts, int count) {
-  GraspForceSolver solver(num_contacts, 0, MakeOptions(GraspForceObjective::kBarrier, false));
+  GraspForceSolver solver(num_contacts, MakeOptions(false));
   for (const GraspForceProblem& start : MakeProblems(num_contacts, GraspForceStatus::kOptimal, 50)) {
     std::mt19937_64 random(2);
     std::vector<GraspForceProblem> problems{start};
@@ -63,28 +62,9 @@ std::vector<GraspForceProblem> MakeMotion(int num_contacts, int count) {
   throw std::runtime_error("no grasp stays feasible");
 }
 
-// Adds limits that rarely bind, as many as a hand has joints.
-std::vector<GraspForceProblem> AddLimits(const std::vector<GraspForceProblem>& problems, int num_limits) {
-  std::mt19937_64 random(3);
-  std::uniform_real_distribution<double> lever(-0.05, 0.05);
-  std::vector<GraspForceProblem> result;
-  for (const GraspForceProblem& problem : problems) {
-    GraspForceProblem limited(problem.num_contacts(), num_limits);
-    limited.G = problem.G;
-    limited.F_o = problem.F_o;
-    limited.mu = problem.mu;
-    limited.f_min = problem.f_min;
-    for (double& entry : limited.A.reshaped()) entry = lever(random);
-    limited.a_min.setConstant(-10.0);
-    limited.a_max.setConstant(10.0);
-    result.push_back(limited);
-  }
-  return result;
-}
-
 void RunSolver(benchmark::State& state, const std::vector<GraspForceProblem>& problems,
                const GraspForceOptions& options) {
-  GraspForceSolver solver(problems[0].num_contacts(), problems[0].num_limits(), options);
+  GraspForceSolver solver(problems[0].num_contacts(), options);
   std::vector<double> times;
   double iterations = 0.0;
   std::size_t next = 0;
@@ -127,14 +107,12 @@ void RunCsdp(benchmark::State& state, bool idle) {
   std::filesystem::remove_all(folder);
 }
 
-void RunForceClosure(benchmark::State& state, ForceNormalization normalization) {
+void RunForceClosure(benchmark::State& state) {
   const std::vector<GraspForceProblem> problems = MakeProblems(4, GraspForceStatus::kOptimal, 50);
-  ForceClosureOptions options;
-  options.normalization = normalization;
   std::size_t next = 0;
   for (auto _ : state) {
     const GraspForceProblem& problem = problems[++next % problems.size()];
-    benchmark::DoNotOptimize(CalcForceClosure(problem.G, problem.mu, options));
+    benchmark::DoNotOptimize(CalcForceClosure(problem.G, problem.mu));
   }
 }
 
@@ -144,27 +122,16 @@ void Register() {
     benchmark::RegisterBenchmark(name.c_str(),
                                  [=](benchmark::State& state) { RunSolver(state, problems, options); });
   };
-  for (const GraspForceObjective objective : {GraspForceObjective::kBarrier, GraspForceObjective::kMinimum}) {
-    const std::string name = objective == GraspForceObjective::kBarrier ? "barrier/" : "minimum/";
-    const GraspForceOptions cold = MakeOptions(objective, false);
-    const GraspForceOptions warm = MakeOptions(objective, true);
-    for (const int n : {4, 8, 12}) {
-      const std::string contacts = name + std::to_string(n) + "_contacts/";
-      Add(contacts + "cold", MakeProblems(n, GraspForceStatus::kOptimal, kProblems), cold);
-      Add(contacts + "warm", MakeMotion(n, kProblems), warm);
-    }
-    Add(name + "4_contacts/infeasible", MakeProblems(4, GraspForceStatus::kInfeasible, kProblems), cold);
-    Add(name + "4_contacts_16_limits/cold", AddLimits(MakeProblems(4, GraspForceStatus::kOptimal, 100), 16),
-        cold);
+  for (const int n : {4, 8, 12}) {
+    const std::string contacts = "barrier/" + std::to_string(n) + "_contacts/";
+    Add(contacts + "cold", MakeProblems(n, GraspForceStatus::kOptimal, kProblems), MakeOptions(false));
+    Add(contacts + "warm", MakeMotion(n, kProblems), MakeOptions(true));
   }
+  Add("barrier/4_contacts/infeasible", MakeProblems(4, GraspForceStatus::kInfeasible, kProblems),
+      MakeOptions(false));
   benchmark::RegisterBenchmark("csdp/4_contacts", [](benchmark::State& state) { RunCsdp(state, false); });
   benchmark::RegisterBenchmark("csdp/start_alone", [](benchmark::State& state) { RunCsdp(state, true); });
-  benchmark::RegisterBenchmark("force_closure/total_normal", [](benchmark::State& state) {
-    RunForceClosure(state, ForceNormalization::kTotalNormal);
-  });
-  benchmark::RegisterBenchmark("force_closure/largest_normal", [](benchmark::State& state) {
-    RunForceClosure(state, ForceNormalization::kLargestNormal);
-  });
+  benchmark::RegisterBenchmark("force_closure", RunForceClosure);
 }
 
 }  // namespace

@@ -41,8 +41,8 @@ int main() {
   PlantReading reading;
   parts.plant->BeginStep();
   parts.plant->Read(&reading);
-  const LineTrajectory rest(setup.start().X_o, Vector6d::Zero(), 0.0);
-  parts.controller->Follow(rest);
+  const auto rest = MakeLineTrajectory(setup.start().X_o, Vector6d::Zero(), 0.0);
+  parts.controller->Follow(*rest);
   const Reading told{reading.state, reading.touch};
   Command command;
   const double step = Measure([&] { parts.controller->Step(told, 0.0, &command); });

@@ -46,4 +46,9 @@ std::string ReplaceOnce(std::string text, const std::string& from, const std::st
   return text.replace(at, from.size(), to);
 }
 
+std::string ApplyEdits(std::string text, const std::vector<Edit>& edits) {
+  for (const Edit& edit : edits) text = ReplaceOnce(text, edit.from, edit.to);
+  return text;
+}
+
 }  // namespace dexcheck::testing

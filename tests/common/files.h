@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace dexcheck::testing {
 
@@ -26,5 +27,13 @@ void WriteText(const std::filesystem::path& path, const std::string& text);
 
 /// The text with its only occurrence of `from` replaced; anything but one occurrence fails the test.
 std::string ReplaceOnce(std::string text, const std::string& from, const std::string& to);
+
+/// One place of a text, and what stands there instead.
+struct Edit {
+  std::string from;
+  std::string to;
+};
+/// The text with these places replaced, each by ReplaceOnce.
+std::string ApplyEdits(std::string text, const std::vector<Edit>& edits);
 
 }  // namespace dexcheck::testing

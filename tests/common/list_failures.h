@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
+#include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
+#include "harness/descriptions/description_check.h"
 
 namespace dexcheck::testing {
 
@@ -18,6 +21,27 @@ inline std::string ListFailures(const ConsistencyResult& result) {
     }
   }
   return failures;
+}
+
+/// Of a description against an engine's model. @param notes filled with what is not compared, unless null.
+inline std::string CompareWithEngine(const RobotDescription& robot, const mjModel& engine, long samples = 20,
+                                     std::vector<std::string>* notes = nullptr) {
+  const RobotModel model(robot.spec);
+  const Adapter adapter(model, engine, "robot.xml");
+  ConsistencyOptions options;
+  options.samples = samples;
+  ConsistencyResult result = CheckConsistency(adapter, options, [](long) { return true; });
+  const std::vector<std::string> found = CheckDescription(robot, adapter, &result.constants);
+  if (notes != nullptr) *notes = found;
+  return ListFailures(result);
+}
+
+/// A parameter file's text as a description, without its parts.
+inline RobotDescription ReadTable(const std::string& text, const std::string& source = "robot.toml") {
+  RobotDescription table;
+  table.spec = ParseRobotModel(text, source).spec();
+  table.joints.resize(table.spec.joints.size());
+  return table;
 }
 
 }  // namespace dexcheck::testing

@@ -28,8 +28,6 @@ MassProperties DrawBody(std::mt19937* random) {
   return {Draw(random, 0.3, 3.0), DrawVector(random, 0.2), 0.5 * (inertia + inertia.transpose())};
 }
 
-int CountJoints(const RobotSpec& spec) { return static_cast<int>(spec.joints.size()); }
-
 }  // namespace
 
 RobotSpec MakeRandomRobot(const RandomRobotOptions& options, std::mt19937* random) {
@@ -57,14 +55,13 @@ RobotSpec MakeRandomRobot(const RandomRobotOptions& options, std::mt19937* rando
     base.wheel_joint_left = "wheel_left";
   }
   std::vector<bool> is_leaf;
-  std::vector<int> ends = {-1};  // the base and each joint's last entry
   for (int i = 0; i < options.joints; ++i) {
     Joint joint;
     joint.name = "joint_" + std::to_string(i);
     joint.link = "link_" + std::to_string(i);
-    joint.parent = ends.back();
+    joint.parent = i - 1;
     if (i > 0 && Draw(random, 0.0, 1.0) < options.branching) {
-      joint.parent = ends[static_cast<size_t>(std::uniform_int_distribution<int>(0, i)(*random))];
+      joint.parent = std::uniform_int_distribution<int>(0, i)(*random) - 1;
     }
     if (Draw(random, 0.0, 1.0) < options.prismatic) joint.type = JointType::kPrismatic;
     const bool is_ball = options.ball > 0.0 && Draw(random, 0.0, 1.0) < options.ball;
@@ -86,15 +83,10 @@ RobotSpec MakeRandomRobot(const RandomRobotOptions& options, std::mt19937* rando
       joint.X_PB.linear() = DrawRotation(random);
       joint.X_PB.translation() = DrawVector(random, 0.3);
       joint.mdh = MdhRow{};
-      for (int axis = 0; axis < 2; ++axis) {
-        spec.joints.push_back(MakeBallEntry(joint, axis, axis == 0 ? joint.parent : CountJoints(spec) - 1));
-        is_leaf.push_back(false);
-      }
-      joint = MakeBallEntry(joint, 2, CountJoints(spec) - 1);
+      joint.type = JointType::kBall;
     }
     is_leaf.push_back(true);
     spec.joints.push_back(joint);
-    ends.push_back(CountJoints(spec) - 1);
   }
   for (size_t i = 0; i < is_leaf.size(); ++i) {
     if (!is_leaf[i]) continue;
@@ -121,7 +113,7 @@ VectorXd DrawPositions(const RobotModel& model, std::mt19937* random) {
     const int at = model.position_index(i);
     if (joint.type != JointType::kBall) {
       q[at] = Draw(random, joint.lower, joint.upper);
-    } else if (joint.ball_axis == 0) {
+    } else {
       const Vector3d axis = DrawVector(random, 1.0).normalized();
       const Eigen::Quaterniond turn(Eigen::AngleAxisd(Draw(random, 0.0, joint.upper), axis));
       q.segment<4>(at) << turn.w(), turn.x(), turn.y(), turn.z();

@@ -15,7 +15,7 @@ struct RandomRobotOptions {
   int joints = 20;
   double branching = 0.3;  ///< Probability that a joint hangs on a random earlier link, not on the last.
   double prismatic = 0.2;  ///< Probability that a joint is prismatic.
-  double ball = 0.0;       ///< Probability that a joint is a ball, with three entries.
+  double ball = 0.0;       ///< Probability that a joint is a ball.
   double offset = 0.3;     ///< Probability that an MDH row starts at a displaced frame.
   bool planar_by_free_joint =
       true;  ///< A planar base moves by a free joint in the MJCF, or by slides and a hinge.

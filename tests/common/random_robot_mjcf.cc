@@ -31,23 +31,21 @@ void WriteLinkContent(const RobotSpec& spec, int link, std::string* text);
 
 void WriteJoint(const RobotSpec& spec, int index, std::string* text) {
   const Joint& joint = spec.joints[static_cast<size_t>(index)];
-  const bool is_ball = joint.type == JointType::kBall;
-  const Joint& last = spec.joints[static_cast<size_t>(index + (is_ball ? 2 : 0))];
   const Pose X = joint.X_PB * Eigen::AngleAxisd(joint.mdh.alpha, Vector3d::UnitX()) *
                  Eigen::Translation3d(joint.mdh.a, 0.0, 0.0) *
                  Eigen::AngleAxisd(joint.mdh.q, Vector3d::UnitZ()) *
                  Eigen::Translation3d(0.0, 0.0, joint.mdh.d);
-  *text += fmt::format("<body name=\"{}\" {}>\n", last.link, WritePose(X));
+  *text += fmt::format("<body name=\"{}\" {}>\n", joint.link, WritePose(X));
   *text += fmt::format(
       "<joint name=\"{}\" type=\"{}\" axis=\"0 0 1\" damping=\"{:.17g}\" armature=\"{:.17g}\" "
       "limited=\"true\" range=\"{:.17g} {:.17g}\"/>\n",
-      NameInFile(joint),
-      is_ball                              ? "ball"
+      joint.name,
+      joint.type == JointType::kBall       ? "ball"
       : joint.type == JointType::kRevolute ? "hinge"
                                            : "slide",
       joint.damping, joint.armature, joint.lower, joint.upper);
-  *text += WriteInertial(last.body);
-  WriteLinkContent(spec, index + (is_ball ? 2 : 0), text);
+  *text += WriteInertial(joint.body);
+  WriteLinkContent(spec, index, text);
   *text += "</body>\n";
 }
 

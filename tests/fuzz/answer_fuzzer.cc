@@ -1,6 +1,5 @@
 // What programs answer: any bytes are arrays, terms of the right sizes, or an InputError that names the file.
 
-#include "controller/common/errors.h"
 #include "harness/descriptions/npy_file.h"
 #include "harness/descriptions/side_layout.h"
 #include "harness/descriptions/urdf_reader.h"
@@ -19,16 +18,6 @@ void ExpectWhole(const NpyArray& array) {
   size_t count = 1;
   for (const size_t size : array.shape) count *= size;
   Expect(count == array.values.size(), "an array without all its numbers");
-}
-
-/// Reads with `read`, whose errors must name `source`.
-template <typename Read>
-void Try(std::string_view source, const Read& read) {
-  try {
-    read();
-  } catch (const InputError& error) {
-    ExpectGoodMessage(error.what(), source);
-  }
 }
 
 void ReadTerms(std::string_view text) {

@@ -9,6 +9,8 @@
 #include <string>
 #include <string_view>
 
+#include "controller/common/errors.h"
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace dexcheck::testing::fuzz {
@@ -30,6 +32,17 @@ inline void ExpectGoodMessage(std::string_view message, std::string_view source)
   Expect(message.starts_with(source), "the message does not name the file", message);
   Expect(message.size() <= kLongest, "the message is too long", message);
   for (const char c : message) Expect(static_cast<unsigned char>(c) >= 0x20, "a control character", message);
+}
+
+/// Reads with `read`, whose errors must name `source`. @return 0, for libFuzzer.
+template <typename Read>
+int Try(std::string_view source, const Read& read) {
+  try {
+    read();
+  } catch (const InputError& error) {
+    ExpectGoodMessage(error.what(), source);
+  }
+  return 0;
 }
 
 }  // namespace dexcheck::testing::fuzz

@@ -7,8 +7,7 @@
 #include <fstream>
 #include <string>
 
-#include "controller/common/errors.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_file.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace dexcheck::testing::fuzz {
@@ -44,15 +43,12 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace dexcheck::testing::fuzz;
   static Folder folder;
   const std::filesystem::path mjcf = folder.Write(AsText(data, size));
-  try {
+  return Try(mjcf.parent_path().string(), [&] {
     const std::vector<std::string> files = dexcheck::ListMjcfFiles(mjcf);
     Expect(!files.empty() && files.front() == "robot.xml", "the file itself is not the first");
     for (const std::string& file : files) {
       const std::filesystem::path path = file;
       Expect(path.is_relative() && (path.empty() || *path.begin() != ".."), "a file lies elsewhere", file);
     }
-  } catch (const dexcheck::InputError& error) {
-    ExpectGoodMessage(error.what(), mjcf.parent_path().string());
-  }
-  return 0;
+  });
 }

@@ -1,7 +1,6 @@
 // ParseRobotModel: any text is a robot or an InputError that names the file; the terms of a robot can be
 // calculated.
 
-#include "controller/common/errors.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -23,10 +22,5 @@ void UseModel(const RobotModel& model) {
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace dexcheck::testing::fuzz;
-  try {
-    UseModel(dexcheck::ParseRobotModel(AsText(data, size), "robot.toml"));
-  } catch (const dexcheck::InputError& error) {
-    ExpectGoodMessage(error.what(), "robot.toml:");
-  }
-  return 0;
+  return Try("robot.toml:", [&] { UseModel(dexcheck::ParseRobotModel(AsText(data, size), "robot.toml")); });
 }

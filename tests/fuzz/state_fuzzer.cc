@@ -1,6 +1,5 @@
 // ParseState: any text is a state of the right sizes or an InputError that names the file.
 
-#include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/scenario/state_file.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -66,10 +65,6 @@ void ExpectSizes(const State& state, const RobotModel& model) {
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace dexcheck::testing::fuzz;
   static const dexcheck::RobotModel model = dexcheck::ParseRobotModel(kHand, "hand.toml");
-  try {
-    ExpectSizes(dexcheck::ParseState(AsText(data, size), "state.json", model), model);
-  } catch (const dexcheck::InputError& error) {
-    ExpectGoodMessage(error.what(), "state.json:");
-  }
-  return 0;
+  return Try("state.json:",
+             [&] { ExpectSizes(dexcheck::ParseState(AsText(data, size), "state.json", model), model); });
 }

@@ -1,6 +1,5 @@
 // ParseStudy: any text is a study or an InputError that names the file; its trials are what it says.
 
-#include "controller/common/errors.h"
 #include "harness/study/study.h"
 #include "tests/fuzz/fuzz_target.h"
 
@@ -35,10 +34,6 @@ void UseStudy(const Study& study) {
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace dexcheck::testing::fuzz;
-  try {
-    UseStudy(dexcheck::ParseStudy(std::string(AsText(data, size)), "study.toml"));
-  } catch (const dexcheck::InputError& error) {
-    ExpectGoodMessage(error.what(), "study.toml:");
-  }
-  return 0;
+  return Try("study.toml:",
+             [&] { UseStudy(dexcheck::ParseStudy(std::string(AsText(data, size)), "study.toml")); });
 }

@@ -1,7 +1,6 @@
 // ReadTrajectory: any text is a trajectory or an InputError that names the file; a trajectory can be
 // evaluated.
 
-#include "controller/common/errors.h"
 #include "controller/common/toml_reader.h"
 #include "controller/control/trajectory_reader.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -9,7 +8,7 @@
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace dexcheck;
   using namespace dexcheck::testing::fuzz;
-  try {
+  return Try("trajectory.toml:", [&] {
     const TomlDocument document(AsText(data, size), "trajectory.toml");
     TomlTable root = document.Open();
     const std::unique_ptr<Trajectory> trajectory = ReadTrajectory(root)(Vector6d::Ones());
@@ -18,8 +17,5 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     for (const double t : {-1.0, 0.3, 1.0, 1e6}) {
       Expect(trajectory->Evaluate(t).X_d.size() == 6, "no motion");
     }
-  } catch (const InputError& error) {
-    ExpectGoodMessage(error.what(), "trajectory.toml:");
-  }
-  return 0;
+  });
 }

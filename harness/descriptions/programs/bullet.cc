@@ -29,13 +29,13 @@ struct PrincipalFrame {
 };
 
 PrincipalFrame FindPrincipalFrame(const UrdfBody& body) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(body.CalcInertiaInLink());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(body.inertia);
   PrincipalFrame frame;
   frame.moments = solver.eigenvalues();
   Eigen::Matrix3d R = solver.eigenvectors();
   if (R.determinant() < 0.0) R.col(0) = -R.col(0);
   frame.X_LB.linear() = R;
-  frame.X_LB.translation() = body.X_LC.translation();
+  frame.X_LB.translation() = body.com;
   return frame;
 }
 
@@ -91,16 +91,11 @@ class BulletRobot : public EngineRobot {
     const btVector3 pivot = ToBullet(X_BpL.translation());
     const btVector3 com = ToBullet(own.X_LB.linear().transpose() * own.X_LB.translation());
     const btVector3 axis = ToBullet(own.X_LB.linear().transpose() * body.axis);
-    if (body.motion == Motion::kFixed) {
-      robot_->setupFixed(link, body.mass, moments, body.parent - 1, from_parent, pivot, com);
-      return;
-    }
     if (body.motion == Motion::kTurns) {
       robot_->setupRevolute(link, body.mass, moments, body.parent - 1, from_parent, axis, pivot, com, true);
     } else {
       robot_->setupPrismatic(link, body.mass, moments, body.parent - 1, from_parent, axis, pivot, com, true);
     }
-    moving_.push_back(link);
   }
 
   /// The frame of the root link in the world.
@@ -123,10 +118,10 @@ class BulletRobot : public EngineRobot {
       robot_->setBaseOmega(ToBullet(omega));
       robot_->setBaseVel(ToBullet(v.segment<3>(3) + omega.cross(r)));
     }
-    const auto count = static_cast<Eigen::Index>(moving_.size());
-    for (Eigen::Index i = 0; i < count; ++i) {
-      robot_->setJointPos(moving_[static_cast<size_t>(i)], q[q.size() - count + i]);
-      robot_->setJointVel(moving_[static_cast<size_t>(i)], v[v.size() - count + i]);
+    const int count = robot_->getNumLinks();
+    for (int i = 0; i < count; ++i) {
+      robot_->setJointPos(i, q[q.size() - count + i]);
+      robot_->setJointVel(i, v[v.size() - count + i]);
     }
   }
 
@@ -168,7 +163,6 @@ class BulletRobot : public EngineRobot {
   bool floats_;
   btVector3 gravity_;
   std::vector<PrincipalFrame> frames_;  // by body
-  std::vector<int> moving_;             // Bullet's index of the link behind each joint
   std::unique_ptr<btMultiBody> robot_;
   btAlignedObjectArray<btScalar> scratch_r_;
   btAlignedObjectArray<btVector3> scratch_v_;

@@ -32,9 +32,8 @@ std::string FindJointWithoutMass(const std::vector<UrdfBody>& bodies) {
     carried[i] += bodies[i].mass;
     if (bodies[i].parent >= 0) carried[static_cast<size_t>(bodies[i].parent)] += carried[i];
   }
-  for (size_t i = 0; i < bodies.size(); ++i) {
-    const bool moves = bodies[i].motion == Motion::kTurns || bodies[i].motion == Motion::kSlides;
-    if (moves && carried[i] == 0.0) return bodies[i].joint;
+  for (size_t i = 1; i < bodies.size(); ++i) {
+    if (carried[i] == 0.0) return bodies[i].joint;
   }
   return {};
 }
@@ -56,7 +55,8 @@ class Session {
     facts.floats = robot.at("base") == "floating";
     facts.gravity = ReadVector(robot.at("gravity"));
     robot_ = make_(bodies_, facts);
-    Json answer = {{"dexcheck_protocol", 1}, {"name", name_}, {"joints", ListJoints(bodies_)}};
+    Json answer = {{"dexcheck_protocol", 1}, {"name", name_}, {"joints", Json::array()}};
+    for (size_t i = 1; i < bodies_.size(); ++i) answer["joints"].push_back(bodies_[i].joint);
     if (facts.floats) {
       answer["base"] = {{"position", "wxyz_xyz"},
                         {"velocity", "angular_linear"},

@@ -29,7 +29,8 @@ struct EngineTerms {
   std::optional<double> potential;
 };
 
-/// A robot in an engine. Coordinates are the base's, if it floats, then one for each joint of ListJoints.
+/// A robot in an engine. Coordinates are the base's, if it floats, then one for each body but the root, in
+/// their order.
 class EngineRobot {
  public:
   EngineRobot() = default;

@@ -20,17 +20,14 @@ KDL::Frame ToFrame(const Eigen::Isometry3d& X) {
 }
 
 KDL::Segment MakeSegment(const UrdfBody& body) {
-  const Eigen::Matrix3d I = body.CalcInertiaInLink();
+  const Eigen::Matrix3d& I = body.inertia;
   const KDL::RigidBodyInertia inertia(
-      body.mass, ToVector(body.X_LC.translation()),
+      body.mass, ToVector(body.com),
       KDL::RotationalInertia(I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)));
   const KDL::Frame tip = ToFrame(body.X_PL);
-  KDL::Joint joint(body.joint, KDL::Joint::None);
-  if (body.motion != Motion::kFixed) {
-    // The joint's line is given in the parent's frame.
-    joint = KDL::Joint(body.joint, tip.p, tip.M * ToVector(body.axis),
-                       body.motion == Motion::kTurns ? KDL::Joint::RotAxis : KDL::Joint::TransAxis);
-  }
+  // The joint's line is given in the parent's frame.
+  const KDL::Joint joint(body.joint, tip.p, tip.M * ToVector(body.axis),
+                         body.motion == Motion::kTurns ? KDL::Joint::RotAxis : KDL::Joint::TransAxis);
   return KDL::Segment(body.name, joint, tip, inertia);
 }
 
@@ -46,10 +43,9 @@ class KdlRobot : public EngineRobot {
       }
     }
     // Where KDL has each joint.
-    for (const UrdfBody& body : bodies) {
-      if (body.motion != Motion::kTurns && body.motion != Motion::kSlides) continue;
-      places_.push_back(static_cast<Eigen::Index>(GetTreeElementQNr(tree_.getSegment(body.name)->second)));
-    }
+    for (size_t i = 1; i < bodies.size(); ++i)
+      places_.push_back(
+          static_cast<Eigen::Index>(GetTreeElementQNr(tree_.getSegment(bodies[i].name)->second)));
   }
 
   EngineTerms Evaluate(const Eigen::VectorXd& q, const Eigen::VectorXd& v) override {

@@ -18,8 +18,8 @@ SimTK::Transform ToTransform(const Eigen::Isometry3d& X) {
 
 /// A body of Simbody has its inertia about its origin.
 SimTK::Body::Rigid MakeBody(const UrdfBody& body) {
-  const Eigen::Matrix3d I = body.CalcInertiaInLink();
-  const SimTK::Vec3 com = ToVec3(body.X_LC.translation());
+  const Eigen::Matrix3d& I = body.inertia;
+  const SimTK::Vec3 com = ToVec3(body.com);
   const SimTK::Inertia central(SimTK::Vec3(I(0, 0), I(1, 1), I(2, 2)),
                                SimTK::Vec3(I(0, 1), I(0, 2), I(1, 2)));
   return SimTK::Body::Rigid(
@@ -35,7 +35,7 @@ class SimbodyRobot : public EngineRobot {
  public:
   SimbodyRobot(const std::vector<UrdfBody>& bodies, const RobotFacts& facts)
       : matter_(system_), forces_(system_), gravity_(forces_, matter_, ToVec3(facts.gravity)) {
-    for (const UrdfBody& body : FuseFixedLinks(bodies)) Add(body, facts.floats);
+    for (const UrdfBody& body : bodies) Add(body, facts.floats);
     state_ = system_.realizeTopology();
   }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// A URDF as a list of links with numbers, for engines that read none themselves. It shares nothing with the
+// A URDF as a list of bodies with numbers, for engines that read none themselves. It shares nothing with the
 // reader of dexcheck, so that a fault of that one shows.
 
 #include <Eigen/Geometry>
@@ -9,37 +9,27 @@
 
 namespace dexcheck::engines {
 
-/// How a link moves against its parent.
-enum class Motion { kRoot, kFixed, kTurns, kSlides };
+/// How a body moves against its parent.
+enum class Motion { kRoot, kTurns, kSlides };
 
-/// A link and the joint that carries it; lengths in m, masses in kg.
+/// The links that one moving joint carries, each on fixed joints counted in the link that it stands on; or
+/// those that the root carries. Engines that judge every inertia by itself refuse the small parts of
+/// published robots that no body can be.
 struct UrdfBody {
-  std::string name;
-  int parent = -1;  ///< Index; -1 for the root.
+  std::string name;  ///< Of the link at the joint.
+  int parent = -1;   ///< Index; -1 for the root.
   std::string joint;
   Motion motion = Motion::kRoot;
-  Eigen::Isometry3d X_PL = Eigen::Isometry3d::Identity();  ///< The link's frame in its parent's, at q = 0.
+  Eigen::Isometry3d X_PL = Eigen::Isometry3d::Identity();  ///< The link's frame in its parent's, at q = 0, m.
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();         ///< In the link's frame, of length 1.
-  double mass = 0.0;
-  Eigen::Isometry3d X_LC = Eigen::Isometry3d::Identity();  ///< The inertial's frame, at the centre of mass.
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();       ///< About the centre of mass, along axes of C.
-
-  /// Inertia about the centre of mass along the link's axes.
-  [[nodiscard]] Eigen::Matrix3d CalcInertiaInLink() const {
-    return X_LC.linear() * inertia * X_LC.linear().transpose();
-  }
+  double mass = 0.0;                                       ///< kg
+  Eigen::Vector3d com = Eigen::Vector3d::Zero();           ///< In the link's frame, m.
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();       ///< About the com, along the link's axes, kg m^2.
 };
 
-/// Links, parents before children. The root is the URDF's, or what hangs on it when the only joint there is
+/// Bodies, parents before children. The root is the URDF's, or what hangs on it when the only joint there is
 /// of the type "floating".
 /// @throws std::runtime_error "FILE: what is wrong".
 std::vector<UrdfBody> ReadUrdfTree(const std::string& path);
-
-/// Names of the joints that move, in the order of the links.
-std::vector<std::string> ListJoints(const std::vector<UrdfBody>& bodies);
-
-/// The same robot with each link on a fixed joint counted in the link that it stands on: for engines that
-/// judge every inertia by itself, and refuse the small parts of published robots that no body can be.
-std::vector<UrdfBody> FuseFixedLinks(const std::vector<UrdfBody>& bodies);
 
 }  // namespace dexcheck::engines

@@ -33,10 +33,9 @@ class ContactJacobianTest : public ::testing::Test {
     return motions;
   }
 
-  static MatrixXd CalcRows(const RollingFinger& motion, double t, ContactType type) {
-    const Contact contact = motion.CalcContact(t, type);
-    MatrixXd rows(CountForces(type), 4);
-    CalcContactJacobian(contact, motion.CalcBodyJacobian(t), rows);
+  static MatrixXd CalcRows(const RollingFinger& motion, double t) {
+    MatrixXd rows(3, 4);
+    CalcContactJacobian(motion.CalcContact(t), motion.CalcBodyJacobian(t), rows);
     return rows;
   }
 
@@ -50,24 +49,21 @@ class ContactJacobianTest : public ::testing::Test {
 // that at the object's; both from velocities of points in the world, by differences.
 TEST_F(ContactJacobianTest, DualToVirtualWork) {
   for (const RollingFinger& motion : MakeMotions()) {
-    const ContactType type = ContactType::kSoftFinger;
-    const Contact contact = motion.CalcContact(0.0, type);
-    const VectorXd f_c = DrawVector(random_, 4);
+    const Contact contact = motion.CalcContact(0.0);
+    const Vector3d f_c = DrawVector(random_, 3);
     const Matrix3d R_Bc = motion.CalcFingertipPose(0.0).linear() * contact.geometry.g_f_cf.linear();
-    const Vector3d force = R_Bc * f_c.head<3>();
-    const Vector3d moment = R_Bc.col(2) * f_c(3);
+    const Vector3d force = R_Bc * f_c;
     const auto calc_power = [&](const auto& pose, const Vector3d& point) {
       const Vector3d velocity = Differentiate([&](double t) { return MatrixXd(pose(t) * point); });
-      const Vector6d V = testing::DifferentiatePose(pose);
-      return force.dot(velocity) + moment.dot(pose(0.0).linear() * V.tail<3>());
+      return force.dot(velocity);
     };
     const double on_finger = calc_power([&](double t) { return motion.CalcFingertipPose(t); },
                                         contact.geometry.g_f_cf.translation());
     const double on_object =
         calc_power([&](double t) { return motion.CalcObjectPose(t); }, contact.geometry.g_o_cf.translation());
     ASSERT_GT(std::abs(on_finger), 1e-3);
-    EXPECT_NEAR(f_c.dot(CalcRows(motion, 0.0, type) * motion.q_dot()), on_finger, kDifference);
-    Matrix6Xd G(6, 4);
+    EXPECT_NEAR(f_c.dot(CalcRows(motion, 0.0) * motion.q_dot()), on_finger, kDifference);
+    Matrix6Xd G(6, 3);
     CalcGraspMap({&contact, 1}, G);
     EXPECT_NEAR(f_c.dot(G.transpose() * motion.V_o()), on_object, kDifference);
   }
@@ -76,12 +72,12 @@ TEST_F(ContactJacobianTest, DualToVirtualWork) {
 // Rolling satisfies the grasp constraint (33) by (29); a transposed or inverted adjoint does not.
 TEST_F(ContactJacobianTest, RollingSatisfiesTheGraspConstraint) {
   for (const RollingFinger& motion : MakeMotions()) {
-    const Contact contact = motion.CalcContact(0.0, ContactType::kHardFinger);
+    const Contact contact = motion.CalcContact(0.0);
     Matrix6Xd G(6, 3);
     CalcGraspMap({&contact, 1}, G);
     const Vector3d object_side = G.transpose() * motion.V_o();
     ASSERT_GT(object_side.norm(), 1e-3);
-    EXPECT_TRUE(MatrixNear(CalcRows(motion, 0.0, contact.type) * motion.q_dot(), object_side, kRounding));
+    EXPECT_TRUE(MatrixNear(CalcRows(motion, 0.0) * motion.q_dot(), object_side, kRounding));
 
     const Vector6d V_f = motion.CalcBodyJacobian(0.0) * motion.q_dot();
     const Matrix6d Ad = CalcAdjointInverse(contact.geometry.g_f_cf);
@@ -94,62 +90,25 @@ TEST_F(ContactJacobianTest, RollingSatisfiesTheGraspConstraint) {
 TEST_F(ContactJacobianTest, RateMatchesDifferencesWhileTheFingerRolls) {
   double without_rolling = 0.0;
   for (const RollingFinger& motion : MakeMotions()) {
-    for (const ContactType type :
-         {ContactType::kFrictionless, ContactType::kHardFinger, ContactType::kSoftFinger}) {
-      Contact contact = motion.CalcContact(0.0, type);
-      const Matrix6Xd J_f = motion.CalcBodyJacobian(0.0);
-      const Matrix6Xd J_f_dot = Differentiate([&](double t) { return MatrixXd(motion.CalcBodyJacobian(t)); });
-      MatrixXd rows_dot(CountForces(type), 4);
-      CalcContactJacobianDot(contact, J_f, J_f_dot, rows_dot);
-      const MatrixXd expected = Differentiate([&](double t) { return CalcRows(motion, t, type); });
-      ASSERT_GT(expected.norm(), 1e-2);
-      EXPECT_TRUE(MatrixNear(rows_dot, expected, kDifference));
-      // A contact point taken as fixed on the fingertip.
-      contact.kappa_dot.setZero();
-      CalcContactJacobianDot(contact, J_f, J_f_dot, rows_dot);
-      without_rolling = std::max(without_rolling, (rows_dot - expected).norm());
-    }
+    Contact contact = motion.CalcContact(0.0);
+    const Matrix6Xd J_f = motion.CalcBodyJacobian(0.0);
+    const Matrix6Xd J_f_dot = Differentiate([&](double t) { return MatrixXd(motion.CalcBodyJacobian(t)); });
+    MatrixXd rows_dot(3, 4);
+    CalcContactJacobianDot(contact, J_f, J_f_dot, rows_dot);
+    const MatrixXd expected = Differentiate([&](double t) { return CalcRows(motion, t); });
+    ASSERT_GT(expected.norm(), 1e-2);
+    EXPECT_TRUE(MatrixNear(rows_dot, expected, kDifference));
+    // A contact point taken as fixed on the fingertip.
+    contact.kappa_dot.setZero();
+    CalcContactJacobianDot(contact, J_f, J_f_dot, rows_dot);
+    without_rolling = std::max(without_rolling, (rows_dot - expected).norm());
   }
   EXPECT_GT(without_rolling, 1e6 * kDifference);
 }
 
-TEST_F(ContactJacobianTest, HandJacobianIsBlockDiagonal) {
-  const std::vector<RollingFinger> motions = MakeMotions();
-  const std::array<ContactType, 3> types = {ContactType::kSoftFinger, ContactType::kFrictionless,
-                                            ContactType::kHardFinger};
-  std::vector<Contact> contacts;
-  std::vector<Matrix6Xd> J_f;
-  MatrixXd expected = MatrixXd::Zero(8, 12);
-  Eigen::Index row = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    contacts.push_back(motions[i].CalcContact(0.0, types[i]));
-    J_f.push_back(motions[i].CalcBodyJacobian(0.0));
-    const Matrix6d Ad = CalcAdjoint(contacts[i].geometry.g_f_cf.inverse());
-    const MatrixXd block = CalcWrenchBasis(types[i]).transpose() * Ad * J_f[i];
-    expected.block(row, 4 * static_cast<Eigen::Index>(i), block.rows(), 4) = block;
-    row += block.rows();
-  }
-  MatrixXd J_h(8, 12);
-  CalcHandJacobian(contacts, J_f, J_h);
-  EXPECT_TRUE(MatrixNear(J_h, expected, kRounding));
-
-  const auto calc = [&](Eigen::Index rows, Eigen::Index columns, std::size_t fingers) {
-    return [&, rows, columns, fingers] {
-      MatrixXd J(rows, columns);
-      CalcHandJacobian(std::span(contacts).first(fingers), J_f, J);
-      return 0;
-    };
-  };
-  using Invalid = std::invalid_argument;
-  EXPECT_TRUE(Throws<Invalid>(calc(9, 12, 3), "rows of J_h"));
-  EXPECT_TRUE(Throws<Invalid>(calc(8, 11, 3), "columns of J_h"));
-  EXPECT_TRUE(Throws<Invalid>(calc(8, 12, 2), "number of fingertip Jacobians"));
-  EXPECT_TRUE(Throws<Invalid>(calc(8, 12, 0), "number of contacts"));
-}
-
 TEST_F(ContactJacobianTest, WrongSizesAreAClearError) {
   const std::vector<RollingFinger> motions = MakeMotions();
-  const Contact contact = motions[0].CalcContact(0.0, ContactType::kHardFinger);
+  const Contact contact = motions[0].CalcContact(0.0);
   const Matrix6Xd J_f = motions[0].CalcBodyJacobian(0.0);
   const auto calc = [&](Eigen::Index rows, Eigen::Index columns, Eigen::Index rate_columns) {
     return [&, rows, columns, rate_columns] {
@@ -216,7 +175,7 @@ TEST_F(ContactJacobianTest, ChainsColumnsHaveTheBitsOfTheWholeProduct) {
     Eigen::Index row = 0;
     for (const RollingFinger& motion : MakeMotions()) {
       if (row == forces) break;
-      const Contact contact = motion.CalcContact(0.1, ContactType::kHardFinger);
+      const Contact contact = motion.CalcContact(0.1);
       CalcContactJacobian(contact, J_f, whole.middleRows(row, 3));
       CalcContactJacobianDot(contact, J_f, J_f_dot, whole_dot.middleRows(row, 3));
       CalcContactJacobian(contact, J_f, chain.middleRows(row, 3), kRuns);

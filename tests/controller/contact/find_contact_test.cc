@@ -82,13 +82,6 @@ TEST(FindContactTest, ImpossibleInputIsAClearError) {
   X_OF.translation() = Vector3d(0.0, 0.0, 0.012);
   const FoundContact hovering = FindContact(ball, plane, X_OF);
   EXPECT_NEAR(hovering.gap, 0.002, kConverged);
-  EXPECT_TRUE(Throws<std::invalid_argument>(
-      [&] {
-        RequireTouching(hovering, 1e-4);
-        return 0;
-      },
-      "gap"));
-  EXPECT_NO_THROW(RequireTouching(hovering, 2.1e-3));
   // Parallel planes have no closest pair; a ball whose start is its far side meets the wrong normals.
   EXPECT_TRUE(Throws<SingularityError>(
       [&] {

@@ -19,31 +19,27 @@ namespace {
 constexpr double kRounding = 1e-14;
 // Five-point differences of motions of order 1 rad/s; measured 5.7e-12.
 constexpr double kDifference = 5e-11;
-constexpr std::array<ContactType, 3> kAllTypes = {ContactType::kFrictionless, ContactType::kHardFinger,
-                                                  ContactType::kSoftFinger};
 
-Contact MakeContact(const Surface& fingertip, const Surface& object, const ContactCoordinates& kappa,
-                    ContactType type = ContactType::kHardFinger) {
+Contact MakeContact(const Surface& fingertip, const Surface& object, const ContactCoordinates& kappa) {
   Contact contact;
-  contact.type = type;
   contact.geometry = CalcContactGeometry(fingertip, object, kappa);
   return contact;
 }
 
 // Precision grasp of the torus: contacts on the outer equator at the angles given, degrees.
-std::vector<Contact> MakeTorusGrasp(const std::vector<double>& angles, ContactType type) {
+std::vector<Contact> MakeTorusGrasp(const std::vector<double>& angles) {
   const Sphere tip(0.009);
   const Torus torus(0.035, 0.011);
   std::vector<Contact> contacts;
   contacts.reserve(angles.size());
   for (const double angle : angles) {
-    contacts.push_back(MakeContact(tip, torus, {{0.2, -0.3, 0}, {DegToRad(angle), 0.0, 0}, 0.7}, type));
+    contacts.push_back(MakeContact(tip, torus, {{0.2, -0.3, 0}, {DegToRad(angle), 0.0, 0}, 0.7}));
   }
   return contacts;
 }
 
 MatrixXd CalcG(const std::vector<Contact>& contacts) {
-  Matrix6Xd G(6, CountForces(contacts));
+  Matrix6Xd G(6, 3 * contacts.size());
   CalcGraspMap(contacts, G);
   return G;
 }
@@ -63,44 +59,6 @@ TEST(AdjointTest, IsTheBodyTwistOfTheMovedFrame) {
   EXPECT_TRUE(MatrixNear(Differentiate(along), CalcAdjoint(g) * CalcTwistCross(V), kDifference));
 }
 
-TEST(ContactModelTest, WrenchBasesByHand) {
-  MatrixXd frictionless = MatrixXd::Zero(6, 1);
-  frictionless(2, 0) = 1.0;
-  MatrixXd hard = MatrixXd::Zero(6, 3);
-  hard.topRows(3).setIdentity();
-  MatrixXd soft = MatrixXd::Zero(6, 4);
-  soft.topLeftCorner(3, 3).setIdentity();
-  soft(5, 3) = 1.0;
-  EXPECT_TRUE(MatrixNear(CalcWrenchBasis(ContactType::kFrictionless), frictionless, kRounding));
-  EXPECT_TRUE(MatrixNear(CalcWrenchBasis(ContactType::kHardFinger), hard, kRounding));
-  EXPECT_TRUE(MatrixNear(CalcWrenchBasis(ContactType::kSoftFinger), soft, kRounding));
-}
-
-TEST(ContactModelTest, ConeMarginByHand) {
-  const ContactFriction friction{.mu = 0.5, .gamma = 0.01};
-  EXPECT_DOUBLE_EQ(CalcConeMargin(ContactType::kFrictionless, {}, VectorXd::Constant(1, -2.0)), -2.0);
-  EXPECT_DOUBLE_EQ(CalcConeMargin(ContactType::kHardFinger, friction, Vector3d(3.0, 4.0, 12.0)), 2.0);
-  EXPECT_DOUBLE_EQ(CalcConeMargin(ContactType::kHardFinger, friction, Vector3d(0.0, 0.0, -1.0)), -1.0);
-  // |f_xy| / mu = 3, tau / gamma = 4
-  EXPECT_DOUBLE_EQ(CalcConeMargin(ContactType::kSoftFinger, friction, Eigen::Vector4d(1.5, 0.0, 6.0, 0.04)),
-                   1.0);
-}
-
-TEST(ContactModelTest, BadInputIsAClearError) {
-  using Invalid = std::invalid_argument;
-  const Vector3d f_c = Vector3d::UnitZ();
-  const auto margin = [](ContactType type, ContactFriction friction, const VectorXd& f) {
-    return [=] { return CalcConeMargin(type, friction, f); };
-  };
-  EXPECT_TRUE(Throws<Invalid>(margin(ContactType::kHardFinger, {.mu = 0.0}, f_c), "mu: must be positive"));
-  EXPECT_TRUE(Throws<Invalid>(margin(ContactType::kHardFinger, {.mu = -0.5}, f_c), "mu: must be positive"));
-  EXPECT_TRUE(Throws<Invalid>(margin(ContactType::kHardFinger, {.mu = std::nan("")}, f_c), "mu"));
-  EXPECT_TRUE(
-      Throws<Invalid>(margin(ContactType::kSoftFinger, {.mu = 0.5}, Eigen::Vector4d::Ones()), "gamma"));
-  EXPECT_TRUE(
-      Throws<Invalid>(margin(ContactType::kSoftFinger, {.mu = 0.5, .gamma = 0.1}, f_c), "length of f_c"));
-}
-
 TEST(GraspMapTest, SingleContactByHand) {
   // Contact at (0.05, 0, 0) of a sphere: at psi = 0 the contact frame is x = +y, y = -z, z = -x of the
   // object, so f = (-f_3, f_1, -f_2) and tau = p x f = 0.05 (0, f_2, f_1).
@@ -118,7 +76,7 @@ TEST(GraspMapTest, SingleContactByHand) {
 TEST(GraspMapTest, TransposedAdjointFailsTheHandWorkedCase) {
   const Contact contact = MakeContact(Sphere(0.009), Sphere(0.05), {});
   const MatrixXd G = CalcG({contact});
-  const MatrixXd B_c = CalcWrenchBasis(contact.type);
+  const MatrixXd B_c = MatrixXd::Identity(6, 3);
   const Matrix6d Ad = CalcAdjoint(contact.geometry.g_o_cf);
   EXPECT_TRUE(MatrixNear(G, Matrix6d(testing::CalcInverse(Ad)).transpose() * B_c, kRounding));
   for (const Matrix6d& wrong : {Ad, Matrix6d(Ad.transpose()), Matrix6d(testing::CalcInverse(Ad))}) {
@@ -133,34 +91,29 @@ TEST(GraspMapTest, WrenchIsForceAndMomentArm) {
   const Sphere tip(0.009);
   std::vector<Contact> contacts;
   Vector6d expected = Vector6d::Zero();
-  VectorXd f_c(8);
-  Eigen::Index index = 0;
-  for (const ContactType type : kAllTypes) {
+  VectorXd f_c(9);
+  for (Eigen::Index i = 0; i < 3; ++i) {
     const ContactCoordinates kappa = {{DrawUniform(random, -3.0, 3.0), DrawUniform(random, -1.0, 1.0), 1},
                                       {DrawUniform(random, -3.0, 3.0), DrawUniform(random, -1.0, 1.0), 0},
                                       DrawUniform(random, -3.0, 3.0)};
-    contacts.push_back(MakeContact(tip, object, kappa, type));
-    const VectorXd f = DrawVector(random, CountForces(type));
-    f_c.segment(index, f.size()) = f;
-    index += f.size();
+    contacts.push_back(MakeContact(tip, object, kappa));
+    const Vector3d f = DrawVector(random, 3);
+    f_c.segment<3>(3 * i) = f;
 
     const SurfaceGeometry at = object.Evaluate(kappa.alpha_o);
     const Vector3d into_object = -at.R.col(2);
     const Vector3d x = Eigen::AngleAxisd(kappa.psi, into_object) * Vector3d(at.R.col(0));
     const Vector3d y = into_object.cross(x);
-    Vector3d force = into_object * (type == ContactType::kFrictionless ? f(0) : f(2));
-    if (type != ContactType::kFrictionless) force += f(0) * x + f(1) * y;
-    Vector3d moment = at.p.cross(force);
-    if (type == ContactType::kSoftFinger) moment += f(3) * into_object;
+    const Vector3d force = f(0) * x + f(1) * y + f(2) * into_object;
     expected.head<3>() += force;
-    expected.tail<3>() += moment;
+    expected.tail<3>() += at.p.cross(force);
   }
   ASSERT_GT(expected.norm(), 0.1);
   EXPECT_TRUE(MatrixNear(CalcG(contacts) * f_c, expected, kRounding));
 }
 
 TEST(GraspMapTest, OpposedNormalForcesAreInternal) {
-  const std::vector<Contact> contacts = MakeTorusGrasp({0.0, 180.0}, ContactType::kHardFinger);
+  const std::vector<Contact> contacts = MakeTorusGrasp({0.0, 180.0});
   VectorXd squeeze = VectorXd::Zero(6);
   squeeze(2) = squeeze(5) = 5.0;
   // sin(pi) is 1.2e-16, not 0
@@ -179,12 +132,12 @@ TEST(GraspMapTest, RateMatchesDifferencesForMovingContacts) {
   const auto contacts_at = [&](double t) {
     std::vector<Contact> contacts;
     for (std::size_t i = 0; i < 3; ++i) {
-      contacts.push_back(MakeContact(tip, torus, Displace(kappa[i], t * kappa_dot[i]), kAllTypes[i]));
+      contacts.push_back(MakeContact(tip, torus, Displace(kappa[i], t * kappa_dot[i])));
       contacts.back().kappa_dot = kappa_dot[i];
     }
     return contacts;
   };
-  Matrix6Xd G_dot(6, 8);
+  Matrix6Xd G_dot(6, 9);
   CalcGraspMapDot(contacts_at(0.0), G_dot);
   ASSERT_GT(G_dot.norm(), 1.0);
   EXPECT_TRUE(MatrixNear(G_dot, Differentiate([&](double t) { return CalcG(contacts_at(t)); }), kDifference));
@@ -197,11 +150,10 @@ TEST(GraspMapTest, RateMatchesDifferencesWhileAFingerRolls) {
   double mutated_error = 0.0;
   for (const double v : {0.3, 2.0, 3.0}) {
     const RollingFinger motion(tip, torus, random, {{0.4, 0.5, 0}, {0.8, v, 0}, 0.6});
-    Contact contact = motion.CalcContact(0.0, ContactType::kSoftFinger);
-    Matrix6Xd G_dot(6, 4);
+    Contact contact = motion.CalcContact(0.0);
+    Matrix6Xd G_dot(6, 3);
     CalcGraspMapDot({&contact, 1}, G_dot);
-    const MatrixXd expected =
-        Differentiate([&](double t) { return CalcG({motion.CalcContact(t, ContactType::kSoftFinger)}); });
+    const MatrixXd expected = Differentiate([&](double t) { return CalcG({motion.CalcContact(t)}); });
     ASSERT_GT(expected.norm(), 0.1);
     EXPECT_TRUE(MatrixNear(G_dot, expected, kDifference));
     // Without the object's torsion in psi_dot the contact frame turns at the wrong rate.
@@ -213,29 +165,8 @@ TEST(GraspMapTest, RateMatchesDifferencesWhileAFingerRolls) {
   EXPECT_GT(mutated_error, 1e6 * kDifference);
 }
 
-TEST(GraspMapTest, FullGraspNeedsEnoughContacts) {
-  EXPECT_NO_THROW(
-      RequireFullGrasp(CalcG(MakeTorusGrasp({55.0, 90.0, 125.0, -90.0}, ContactType::kHardFinger))));
-  EXPECT_NO_THROW(RequireFullGrasp(CalcG(MakeTorusGrasp({90.0, -90.0}, ContactType::kSoftFinger))));
-  const auto require = [](const std::vector<Contact>& contacts) {
-    return [=] {
-      RequireFullGrasp(CalcG(contacts));
-      return 0;
-    };
-  };
-  EXPECT_TRUE(Throws<std::invalid_argument>(require(MakeTorusGrasp({90.0}, ContactType::kHardFinger)),
-                                            "number of contact forces"));
-  // Two point contacts cannot turn the object about the line through them; frictionless ones not about the
-  // axis.
-  EXPECT_TRUE(
-      Throws<SingularityError>(require(MakeTorusGrasp({90.0, -90.0}, ContactType::kHardFinger)), "rank 6"));
-  EXPECT_TRUE(Throws<SingularityError>(
-      require(MakeTorusGrasp({0.0, 50.0, 110.0, 160.0, 230.0, 300.0}, ContactType::kFrictionless)),
-      "rank 6"));
-}
-
 TEST(GraspMapTest, WrongSizesAreAClearError) {
-  const std::vector<Contact> contacts = MakeTorusGrasp({90.0, -90.0}, ContactType::kHardFinger);
+  const std::vector<Contact> contacts = MakeTorusGrasp({90.0, -90.0});
   Matrix6Xd G(6, 5);
   const auto calc = [&](std::span<const Contact> some, bool rate) {
     return [&G, some, rate] {

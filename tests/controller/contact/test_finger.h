@@ -75,10 +75,9 @@ class RollingFinger {
   }
 
   /// The contact at time t, by closest points in the charts of t = 0; its rate from (40).
-  [[nodiscard]] Contact CalcContact(double t, ContactType type) const {
+  [[nodiscard]] Contact CalcContact(double t) const {
     const Pose X_OF = CalcObjectPose(t).inverse() * CalcFingertipPose(t);
     Contact contact;
-    contact.type = type;
     contact.geometry =
         CalcContactGeometry(fingertip_, object_, FindContact(fingertip_, object_, X_OF, kappa_).kappa);
     const Vector6d V_f = CalcBodyJacobian(t) * q_dot_;

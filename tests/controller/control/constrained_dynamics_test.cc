@@ -42,6 +42,42 @@ struct Balance {
   VectorXd robot_residual, object_residual, contact_residual;
 };
 
+/// M_tilde X_o_ddot + C_tilde X_o_dot + N_tilde = G J_B'^+T E_bar' tau', (52), with the null-space motions
+/// sigma and sigma' (n) of (47). N' sigma'' is left out: N' = 0 for J_B' of full row rank.
+struct ObjectSpaceTerms {
+  Matrix6d M_tilde;
+  Matrix6d C_tilde;
+  Vector6d N_tilde;
+  Matrix6Xd G_J_T;  // G J_B'^+T (6 x n), (50)
+};
+
+ObjectSpaceTerms CalcObjectSpaceTerms(const ModelTerms& robot, const GraspTerms& grasp,
+                                      const Pseudoinverse& J_B_pinv, const Eigen::Ref<const VectorXd>& sigma,
+                                      const Eigen::Ref<const VectorXd>& sigma_prime) {
+  const ObjectTerms& o = grasp.coordinates();
+  const MatrixXd J_plus = J_B_pinv.CalcMatrix();
+  const MatrixXd N = J_B_pinv.CalcProjector();
+  // H = J_B'^+ G^T
+  const MatrixXd H = J_plus * grasp.G().transpose();
+  const MatrixXd H_P_inv = H * o.P_inv;
+  const VectorXd N_sigma = N * sigma;
+
+  ObjectSpaceTerms terms;
+  terms.G_J_T = H.transpose();
+  // M_tilde = M_o + G J^+T M_bar' J^+ G^T P^-1
+  terms.M_tilde = o.M_o + terms.G_J_T * robot.M() * H_P_inv;
+  // C_tilde = C_o + G J^+T (M_bar' J^+ (G_dot^T P^-1 + G^T d/dt(P^-1) - J_dot J^+ G^T P^-1) + C_bar' J^+ G^T
+  // P^-1)
+  const MatrixXd H_rate = J_plus * (grasp.G_dot().transpose() * o.P_inv +
+                                    grasp.G().transpose() * o.P_inv_dot - grasp.J_B_dot() * H_P_inv);
+  terms.C_tilde = o.C_o + terms.G_J_T * (robot.M() * H_rate + robot.C() * H_P_inv);
+  // N_tilde = N_o + G J^+T (F_bar' - M_bar' J^+ J_dot N sigma + M_bar' N sigma' + C_bar' N sigma)
+  const VectorXd null_acceleration = N * sigma_prime - J_plus * (grasp.J_B_dot() * N_sigma);
+  terms.N_tilde = o.N_o + terms.G_J_T * (robot.gravity() + robot.friction() + robot.M() * null_acceleration +
+                                         robot.C() * N_sigma);
+  return terms;
+}
+
 class PredictionTest : public ::testing::TestWithParam<Hands> {};
 
 TEST_P(PredictionTest, SatisfiesAllThreeEquations) {

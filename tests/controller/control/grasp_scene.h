@@ -21,6 +21,11 @@
 
 namespace dexcheck::testing {
 
+/// X_o_ddot = P (V_Bo_dot - d/dt(P^-1) X_o_dot).
+inline Vector6d CalcCoordinateAcceleration(const GraspTerms& grasp, const Vector6d& V_Bo_dot) {
+  return CalcP(grasp.X_o()) * (V_Bo_dot - grasp.coordinates().P_inv_dot * grasp.X_o_dot());
+}
+
 enum class Hands { kRight, kLeft, kBoth };
 
 /// Robot, torus and contacts at one state.

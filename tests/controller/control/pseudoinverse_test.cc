@@ -94,9 +94,6 @@ TEST(Pseudoinverse, FunctionsApplyTheMatrices) {
     VectorXd x(kColumns);
     c.J_pinv.Apply(y, x);
     EXPECT_TRUE(MatrixNear(x, c.J_pinv.CalcMatrix() * y, kRounding));
-    VectorXd f(kRows);
-    c.J_pinv.ApplyTransposed(z, f);
-    EXPECT_TRUE(MatrixNear(f, c.J_pinv.CalcMatrix().transpose() * z, kRounding));
     VectorXd projected = z;
     c.J_pinv.Project(projected);
     EXPECT_TRUE(MatrixNear(projected, c.J_pinv.CalcProjector() * z, kRounding));
@@ -238,14 +235,12 @@ TEST(Pseudoinverse, DoesNotAllocate) {
   const VectorXd w = VectorXd::Constant(kColumns, 2.0);
   const VectorXd y = VectorXd::Ones(kRows);
   VectorXd x(kColumns);
-  VectorXd f(kRows);
   const AllocationCounter counter;
   c.J_pinv.Factor(c.J);
   c.J_pinv.FactorDiagonal(c.J, w);
   c.J_pinv.FactorWeighted(c.J, c.W);
   c.J_pinv.Apply(y, x);
   c.J_pinv.Project(x);
-  c.J_pinv.ApplyTransposed(x, f);
   EXPECT_EQ(counter.count(), 0);
 }
 

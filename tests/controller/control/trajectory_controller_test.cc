@@ -23,7 +23,8 @@ class TrajectoryControllerTest : public ::testing::Test {
  protected:
   TrajectoryControllerTest()
       : options_(MakeOptions(scene_)),
-        motion_(scene_.X_o, (Vector6d() << 0.1, -0.2, 0.3, 0.2, 0.1, -0.1).finished(), 2.0) {
+        motion_(MakePointToPointTrajectory(scene_.X_o,
+                                           (Vector6d() << 0.1, -0.2, 0.3, 0.2, 0.1, -0.1).finished(), 2.0)) {
     std::mt19937 random(3);
     scene_.DrawVelocities(&random, 0.05);
     reading_.state = {scene_.q,
@@ -51,7 +52,7 @@ class TrajectoryControllerTest : public ::testing::Test {
 
   GraspScene scene_;
   GraspControllerOptions options_;
-  PointToPointTrajectory motion_;
+  std::unique_ptr<Trajectory> motion_;
   Reading reading_;
   Command command_;
 };
@@ -59,11 +60,11 @@ class TrajectoryControllerTest : public ::testing::Test {
 TEST_F(TrajectoryControllerTest, SendsTheLawsTorquesWithTheVelocityOfHalfAStepBefore) {
   constexpr double kStep = 0.01;
   TrajectoryController controller = Make({.time_step = kStep});
-  controller.Follow(motion_);
+  controller.Follow(*motion_);
   controller.Step(reading_, 0.7, &command_);
-  DesiredMotion desired = motion_.Evaluate(0.7);
-  ASSERT_GT((desired.X_d_dot - motion_.Evaluate(0.7 - 0.5 * kStep).X_d_dot).norm(), 1e-5);
-  desired.X_d_dot = motion_.Evaluate(0.7 - 0.5 * kStep).X_d_dot;
+  DesiredMotion desired = motion_->Evaluate(0.7);
+  ASSERT_GT((desired.X_d_dot - motion_->Evaluate(0.7 - 0.5 * kStep).X_d_dot).norm(), 1e-5);
+  desired.X_d_dot = motion_->Evaluate(0.7 - 0.5 * kStep).X_d_dot;
   GraspController law(scene_.model, scene_.fingertips, scene_.object, scene_.surface, options_);
   law.SetState(reading_.state);
   EXPECT_EQ(command_.tau, law.CalcTorque(desired));
@@ -77,7 +78,7 @@ TEST_F(TrajectoryControllerTest, SendsTheLawsTorquesWithTheVelocityOfHalfAStepBe
 // (56) to (57): the rigid system under the torques does what the demand says.
 TEST_F(TrajectoryControllerTest, TheRigidSystemAnswersWithTheDemand) {
   TrajectoryController controller = Make({.time_step = 1e-3});
-  controller.Follow(motion_);
+  controller.Follow(*motion_);
   controller.Step(reading_, 0.5, &command_);
   VectorXd force(command_.tau.size());
   ActuationMap(scene_.model).CalcForce(command_.tau, force);
@@ -109,27 +110,27 @@ TEST_F(TrajectoryControllerTest, HoldsTorquesUntilTheNextAreDue) {
     }
     return solves;
   };
-  controller.Follow(motion_);
+  controller.Follow(*motion_);
   EXPECT_EQ(count_solves(3), 1);
   const VectorXd held = command_.tau;
-  EXPECT_EQ(command_.desired.X_d, motion_.Evaluate(t).X_d);  // though the torques are older
+  EXPECT_EQ(command_.desired.X_d, motion_->Evaluate(t).X_d);  // though the torques are older
   EXPECT_EQ(count_solves(1), 1);
   EXPECT_NE(command_.tau, held);
   // A new motion is due at once.
-  controller.Follow(motion_);
+  controller.Follow(*motion_);
   EXPECT_EQ(count_solves(7), 3);
 }
 
 TEST_F(TrajectoryControllerTest, TellsWhatItKnewWhenTheLawFails) {
   TrajectoryController controller = Make({});
-  controller.Follow(motion_);
+  controller.Follow(*motion_);
   controller.Step(reading_, 0.0, &command_);
   const VectorXd before = command_.tau;
-  const LineTrajectory impossible(scene_.X_o, Vector6d::Constant(1e6), 0.0);
-  controller.Follow(impossible);
+  const auto impossible = MakeLineTrajectory(scene_.X_o, Vector6d::Constant(1e6), 0.0);
+  controller.Follow(*impossible);
   EXPECT_THROW(controller.Step(reading_, 0.5, &command_), GraspForceError);
   EXPECT_EQ(command_.tau, before);
-  EXPECT_EQ(command_.desired.X_d, impossible.Evaluate(0.5).X_d);
+  EXPECT_EQ(command_.desired.X_d, impossible->Evaluate(0.5).X_d);
 }
 
 TEST_F(TrajectoryControllerTest, RefusesWhatCannotBe) {
@@ -140,7 +141,7 @@ TEST_F(TrajectoryControllerTest, RefusesWhatCannotBe) {
 
 TEST_F(TrajectoryControllerTest, StepsWithoutAllocation) {
   TrajectoryController controller = Make({.time_step = 1e-3});
-  controller.Follow(motion_);
+  controller.Follow(*motion_);
   controller.Step(reading_, 0.1, &command_);
   const AllocationCounter counter;
   controller.Step(reading_, 0.2, &command_);

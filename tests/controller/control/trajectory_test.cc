@@ -46,23 +46,23 @@ std::vector<WayPoint> MakeWayPoints() {
 
 std::unique_ptr<Trajectory> MakeSum() {
   std::vector<std::unique_ptr<Trajectory>> parts;
-  parts.push_back(std::make_unique<CircleTrajectory>(Vector6d::Zero(), -0.4, 0.9, 1.2, 0.8));
-  parts.push_back(std::make_unique<PointToPointTrajectory>(Vector6d::Zero(), MakeDirection(), 1.7));
-  return std::make_unique<SumTrajectory>(MakeStart(), std::move(parts));
+  parts.push_back(MakeCircleTrajectory(Vector6d::Zero(), {-0.4, 0.9, 1.2}, 0.8));
+  parts.push_back(MakePointToPointTrajectory(Vector6d::Zero(), MakeDirection(), 1.7));
+  return MakeSumTrajectory(MakeStart(), std::move(parts));
 }
 
 std::map<std::string, std::unique_ptr<Trajectory>> MakeAll() {
   std::map<std::string, std::unique_ptr<Trajectory>> all;
   const Vector6d X = MakeStart();
   const Vector6d d = MakeDirection();
-  all["line"] = std::make_unique<LineTrajectory>(X, d, 0.0);
-  all["ramp"] = std::make_unique<LineTrajectory>(X, d, 1.3);
-  all["point_to_point"] = std::make_unique<PointToPointTrajectory>(X, d, 1.7);
-  all["oscillation"] = std::make_unique<OscillationTrajectory>(X, d, 0.8, 1.1);
-  all["weave"] = std::make_unique<WeaveTrajectory>(X, 0.7, 1.0, 1.2, 0.15, 1.6);
-  all["circle"] = std::make_unique<CircleTrajectory>(X, -0.4, 0.9, 1.2, 0.8);
-  all["right_circle"] = std::make_unique<CircleTrajectory>(X, -0.4, 0.9, 0.0, -0.8);
-  all["way_points"] = std::make_unique<WayPointTrajectory>(X, MakeWayPoints());
+  all["line"] = MakeLineTrajectory(X, d, 0.0);
+  all["ramp"] = MakeLineTrajectory(X, d, 1.3);
+  all["point_to_point"] = MakePointToPointTrajectory(X, d, 1.7);
+  all["oscillation"] = MakeOscillationTrajectory(X, d, 0.8, 1.1);
+  all["weave"] = MakeWeaveTrajectory(X, {0.7, 1.0, 1.2}, 0.15, 1.6);
+  all["circle"] = MakeCircleTrajectory(X, {-0.4, 0.9, 1.2}, 0.8);
+  all["right_circle"] = MakeCircleTrajectory(X, {-0.4, 0.9, 0.0}, -0.8);
+  all["way_points"] = MakeWayPointTrajectory(X, MakeWayPoints());
   all["sum"] = MakeSum();
   return all;
 }
@@ -72,11 +72,11 @@ TEST(Trajectory, DerivativesAreThoseOfThePosition) {
   constexpr double kStep = 1e-3;
   constexpr double kTolerance = 1e-8;
   for (const auto& [name, trajectory] : MakeAll()) {
-    const Trajectory& path = *trajectory;
+    const Trajectory& curve = *trajectory;
     for (double t = 0.0573; t < 3.2; t += 0.0973) {  // no knot within two steps
       const DesiredMotion motion = trajectory->Evaluate(t);
-      const auto X = [&](double h) { return path.Evaluate(t + h).X_d; };
-      const auto X_dot = [&](double h) { return path.Evaluate(t + h).X_d_dot; };
+      const auto X = [&](double h) { return curve.Evaluate(t + h).X_d; };
+      const auto X_dot = [&](double h) { return curve.Evaluate(t + h).X_d_dot; };
       EXPECT_TRUE(MatrixNear(Differentiate(X, kStep), motion.X_d_dot, kTolerance)) << name << " at " << t;
       EXPECT_TRUE(MatrixNear(Differentiate(X_dot, kStep), motion.X_d_ddot, kTolerance))
           << name << " at " << t;
@@ -119,31 +119,31 @@ TEST(Trajectory, AccelerationIsContinuous) {
 TEST(Trajectory, LineIsThatOfSection6) {
   Vector6d velocity = Vector6d::Zero();
   velocity[0] = 1.0;
-  const LineTrajectory line(MakeStart(), velocity, 0.0);
-  const DesiredMotion motion = line.Evaluate(2.5);
+  const auto line = MakeLineTrajectory(MakeStart(), velocity, 0.0);
+  const DesiredMotion motion = line->Evaluate(2.5);
   Vector6d expected = MakeStart();
   expected[0] += 2.5;
   EXPECT_TRUE(MatrixNear(motion.X_d, expected, kRounding));
   EXPECT_TRUE(MatrixNear(motion.X_d_dot, velocity, 0.0));
   EXPECT_TRUE(MatrixNear(motion.X_d_ddot, Vector6d::Zero(), 0.0));
   // With a ramp half of the ramp's time is lost.
-  const LineTrajectory ramp(MakeStart(), velocity, 2.0);
+  const auto ramp = MakeLineTrajectory(MakeStart(), velocity, 2.0);
   expected[0] = MakeStart()[0] + 1.5;
-  EXPECT_TRUE(MatrixNear(ramp.Evaluate(2.5).X_d, expected, kRounding));
-  EXPECT_TRUE(MatrixNear(ramp.Evaluate(2.5).X_d_dot, velocity, 0.0));
-  EXPECT_NEAR(ramp.Evaluate(1.0).X_d_dot[0], 0.5, kRounding);
-  EXPECT_NEAR(ramp.Evaluate(1.0).X_d_ddot[0], 30.0 / 16.0 / 2.0, kRounding);
+  EXPECT_TRUE(MatrixNear(ramp->Evaluate(2.5).X_d, expected, kRounding));
+  EXPECT_TRUE(MatrixNear(ramp->Evaluate(2.5).X_d_dot, velocity, 0.0));
+  EXPECT_NEAR(ramp->Evaluate(1.0).X_d_dot[0], 0.5, kRounding);
+  EXPECT_NEAR(ramp->Evaluate(1.0).X_d_ddot[0], 30.0 / 16.0 / 2.0, kRounding);
 }
 
 TEST(Trajectory, MinJerkByHand) {
   // u = 1/2: s = 1/2, s_dot = 15/8 / T, s_ddot = 0; ends at rest.
-  const PointToPointTrajectory move(MakeStart(), MakeDirection(), 2.0);
-  const DesiredMotion middle = move.Evaluate(1.0);
+  const auto move = MakePointToPointTrajectory(MakeStart(), MakeDirection(), 2.0);
+  const DesiredMotion middle = move->Evaluate(1.0);
   EXPECT_TRUE(MatrixNear(middle.X_d, MakeStart() + 0.5 * MakeDirection(), kRounding));
   EXPECT_TRUE(MatrixNear(middle.X_d_dot, 15.0 / 16.0 * MakeDirection(), kRounding));
   EXPECT_TRUE(MatrixNear(middle.X_d_ddot, Vector6d::Zero(), kRounding));
   for (const double t : {2.0, 3.0}) {
-    const DesiredMotion end = move.Evaluate(t);
+    const DesiredMotion end = move->Evaluate(t);
     EXPECT_TRUE(MatrixNear(end.X_d, MakeStart() + MakeDirection(), kRounding));
     EXPECT_TRUE(MatrixNear(end.X_d_dot, Vector6d::Zero(), 0.0));
     EXPECT_TRUE(MatrixNear(end.X_d_ddot, Vector6d::Zero(), 0.0));
@@ -151,8 +151,8 @@ TEST(Trajectory, MinJerkByHand) {
 }
 
 TEST(Trajectory, OscillationByHand) {
-  const OscillationTrajectory swing(MakeStart(), MakeDirection(), 0.25, 0.0);
-  const DesiredMotion peak = swing.Evaluate(1.0);
+  const auto swing = MakeOscillationTrajectory(MakeStart(), MakeDirection(), 0.25, 0.0);
+  const DesiredMotion peak = swing->Evaluate(1.0);
   EXPECT_TRUE(MatrixNear(peak.X_d, MakeStart() + MakeDirection(), kRounding));
   EXPECT_TRUE(MatrixNear(peak.X_d_dot, Vector6d::Zero(), kRounding));
   EXPECT_TRUE(MatrixNear(peak.X_d_ddot, -kPi * kPi / 4.0 * MakeDirection(), kRounding));
@@ -161,8 +161,8 @@ TEST(Trajectory, OscillationByHand) {
 TEST(Trajectory, CircleByHand) {
   // A quarter to the left from heading +x: at (r, r), turned by 90 degrees, accelerating to the centre.
   const double radius = 0.8;
-  const CircleTrajectory circle(Vector6d::Zero(), 0.0, 0.4, 0.0, radius);
-  const DesiredMotion quarter = circle.Evaluate(kPi / 2.0 * radius / 0.4);
+  const auto circle = MakeCircleTrajectory(Vector6d::Zero(), {0.0, 0.4, 0.0}, radius);
+  const DesiredMotion quarter = circle->Evaluate(kPi / 2.0 * radius / 0.4);
   Vector6d X, X_dot, X_ddot;
   X << radius, radius, 0.0, kPi / 2.0, 0.0, 0.0;
   X_dot << 0.0, 0.4, 0.0, 0.4 / radius, 0.0, 0.0;
@@ -195,8 +195,8 @@ TEST(Trajectory, PlanarPathsKeepTheObjectsHeading) {
 
 TEST(Trajectory, WeaveByHand) {
   // Half a wave on: on the far side, heading as at the start.
-  const WeaveTrajectory weave(Vector6d::Zero(), kPi / 2.0, 1.0, 0.0, 0.2, 2.0);
-  const DesiredMotion far = weave.Evaluate(1.0);
+  const auto weave = MakeWeaveTrajectory(Vector6d::Zero(), {kPi / 2.0, 1.0, 0.0}, 0.2, 2.0);
+  const DesiredMotion far = weave->Evaluate(1.0);
   Vector6d X, X_dot;
   X << -0.4, 1.0, 0.0, 0.0, 0.0, 0.0;
   X_dot << 0.0, 1.0, 0.0, -0.2 * kPi * kPi, 0.0, 0.0;
@@ -205,13 +205,13 @@ TEST(Trajectory, WeaveByHand) {
 }
 
 TEST(Trajectory, GoesThroughItsWayPoints) {
-  const WayPointTrajectory path(MakeStart(), MakeWayPoints());
+  const auto path = MakeWayPointTrajectory(MakeStart(), MakeWayPoints());
   for (const WayPoint& point : MakeWayPoints()) {
-    EXPECT_TRUE(MatrixNear(path.Evaluate(point.time).X_d, MakeStart() + point.displacement, kRounding));
+    EXPECT_TRUE(MatrixNear(path->Evaluate(point.time).X_d, MakeStart() + point.displacement, kRounding));
   }
   for (const double t : {-1.0, 0.0, 3.0, 4.0}) {
-    EXPECT_TRUE(MatrixNear(path.Evaluate(t).X_d_dot, Vector6d::Zero(), kRounding));
-    EXPECT_TRUE(MatrixNear(path.Evaluate(t).X_d_ddot, Vector6d::Zero(), kRounding));
+    EXPECT_TRUE(MatrixNear(path->Evaluate(t).X_d_dot, Vector6d::Zero(), kRounding));
+    EXPECT_TRUE(MatrixNear(path->Evaluate(t).X_d_ddot, Vector6d::Zero(), kRounding));
   }
 }
 
@@ -219,15 +219,15 @@ TEST(Trajectory, GoesThroughItsWayPoints) {
 // 3/4 (X_2 - X_0) and its acceleration 3 X_2 - 6 X_1 + 3 X_0.
 TEST(Trajectory, WayPointsByHand) {
   const Vector6d d = MakeDirection();
-  const WayPointTrajectory move(MakeStart(), {{2.0, d}});
-  const PointToPointTrajectory expected(MakeStart(), d, 2.0);
+  const auto move = MakeWayPointTrajectory(MakeStart(), {{2.0, d}});
+  const auto expected = MakePointToPointTrajectory(MakeStart(), d, 2.0);
   for (double t = 0.1; t < 2.0; t += 0.3) {
-    EXPECT_TRUE(MatrixNear(move.Evaluate(t).X_d, expected.Evaluate(t).X_d, kRounding));
-    EXPECT_TRUE(MatrixNear(move.Evaluate(t).X_d_ddot, expected.Evaluate(t).X_d_ddot, 10.0 * kRounding));
+    EXPECT_TRUE(MatrixNear(move->Evaluate(t).X_d, expected->Evaluate(t).X_d, kRounding));
+    EXPECT_TRUE(MatrixNear(move->Evaluate(t).X_d_ddot, expected->Evaluate(t).X_d_ddot, 10.0 * kRounding));
   }
-  const WayPointTrajectory two(MakeStart(), {{1.0, 5.0 * d}, {2.0, 2.0 * d}});
-  EXPECT_TRUE(MatrixNear(two.Evaluate(1.0).X_d_dot, 0.75 * 2.0 * d, kRounding));
-  EXPECT_TRUE(MatrixNear(two.Evaluate(1.0).X_d_ddot, (3.0 * 2.0 - 6.0 * 5.0) * d, 10.0 * kRounding));
+  const auto two = MakeWayPointTrajectory(MakeStart(), {{1.0, 5.0 * d}, {2.0, 2.0 * d}});
+  EXPECT_TRUE(MatrixNear(two->Evaluate(1.0).X_d_dot, 0.75 * 2.0 * d, kRounding));
+  EXPECT_TRUE(MatrixNear(two->Evaluate(1.0).X_d_ddot, (3.0 * 2.0 - 6.0 * 5.0) * d, 10.0 * kRounding));
 }
 
 TEST(Trajectory, SumAddsItsParts) {
@@ -251,10 +251,10 @@ TEST(Trajectory, SumOfAPathAndATiltTiltsAboutAHorizontalAxis) {
   rise[2] = 0.12;
   rise[4] = tilt;
   std::vector<std::unique_ptr<Trajectory>> parts;
-  parts.push_back(std::make_unique<CircleTrajectory>(Vector6d::Zero(), 0.0, 0.9, 1.2, 0.8));
-  parts.push_back(std::make_unique<PointToPointTrajectory>(Vector6d::Zero(), rise, 1.7));
-  const SumTrajectory sum(MakeStart(), std::move(parts));
-  const Vector6d end = sum.Evaluate(2.5).X_d;
+  parts.push_back(MakeCircleTrajectory(Vector6d::Zero(), {0.0, 0.9, 1.2}, 0.8));
+  parts.push_back(MakePointToPointTrajectory(Vector6d::Zero(), rise, 1.7));
+  const auto sum = MakeSumTrajectory(MakeStart(), std::move(parts));
+  const Vector6d end = sum->Evaluate(2.5).X_d;
   const double turn = end[3] - MakeStart()[3];
   EXPECT_GT(turn, 0.5);
   EXPECT_NEAR(end[2] - MakeStart()[2], 0.12, kRounding);
@@ -274,14 +274,14 @@ TEST(Trajectory, RejectsWrongNumbers) {
         },
         text);
   };
-  EXPECT_TRUE(rejects([&] { LineTrajectory(X, X, -1.0); }, "ramp_time"));
-  EXPECT_TRUE(rejects([&] { PointToPointTrajectory(X, X, 0.0); }, "duration"));
-  EXPECT_TRUE(rejects([&] { OscillationTrajectory(X, X, 0.0, 1.0); }, "frequency"));
-  EXPECT_TRUE(rejects([&] { WeaveTrajectory(X, 0.0, 1.0, 1.0, 0.1, 0.0); }, "wavelength"));
-  EXPECT_TRUE(rejects([&] { CircleTrajectory(X, 0.0, 1.0, 1.0, 0.0); }, "radius"));
-  EXPECT_TRUE(rejects([&] { WayPointTrajectory(X, {}); }, "number of way-points"));
-  EXPECT_TRUE(rejects([&] { WayPointTrajectory(X, {{1.0, X}, {1.0, X}}); }, "time of way-point"));
-  EXPECT_TRUE(rejects([&] { SumTrajectory(X, {}); }, "number of parts"));
+  EXPECT_TRUE(rejects([&] { MakeLineTrajectory(X, X, -1.0); }, "ramp_time"));
+  EXPECT_TRUE(rejects([&] { MakePointToPointTrajectory(X, X, 0.0); }, "duration"));
+  EXPECT_TRUE(rejects([&] { MakeOscillationTrajectory(X, X, 0.0, 1.0); }, "frequency"));
+  EXPECT_TRUE(rejects([&] { MakeWeaveTrajectory(X, {0.0, 1.0, 1.0}, 0.1, 0.0); }, "wavelength"));
+  EXPECT_TRUE(rejects([&] { MakeCircleTrajectory(X, {0.0, 1.0, 1.0}, 0.0); }, "radius"));
+  EXPECT_TRUE(rejects([&] { MakeWayPointTrajectory(X, {}); }, "number of way-points"));
+  EXPECT_TRUE(rejects([&] { MakeWayPointTrajectory(X, {{1.0, X}, {1.0, X}}); }, "time of way-point"));
+  EXPECT_TRUE(rejects([&] { MakeSumTrajectory(X, {}); }, "number of parts"));
 }
 
 TEST(Trajectory, EvaluationDoesNotAllocate) {

@@ -72,7 +72,7 @@ class ContactPlanTest : public ::testing::Test {
     for (const SurfacePoint& point : points) {
       contacts.push_back({.geometry = CalcContactGeometry(tip, object, {{0.3, 0.2, 0}, point, 0.7})});
     }
-    Matrix6Xd G(6, CountForces(contacts));
+    Matrix6Xd G(6, 3 * contacts.size());
     CalcGraspMap(contacts, G);
     return CalcForceClosure(G, VectorXd::Constant(static_cast<Eigen::Index>(points.size()), mu));
   }

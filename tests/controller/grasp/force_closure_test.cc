@@ -15,35 +15,37 @@
 namespace dexcheck::testing::force_closure_test {
 namespace {
 
-ForceClosureOptions MakeOptions(ForceNormalization normalization) {
-  ForceClosureOptions options;
-  options.normalization = normalization;
-  return options;
-}
-
-// Whether normalised contact forces can give the wrench F_o: decided by the interior-point solver, with f_i3
-// <= 1 as bounds or sum f_i3 <= 1 as a limit.
-bool CanGive(const GraspForceProblem& grasp, const Vector6d& F_o, ForceNormalization normalization) {
-  const int n = grasp.num_contacts();
-  GraspForceProblem problem(n, 1);
-  problem.G = grasp.G;
-  problem.mu = grasp.mu;
+// Whether contact forces with sum f_i3 <= 1 can give the wrench F_o: by the interior-point solver, whose
+// optimum with a tiny barrier is the least sum of normal forces to 4 N rho.
+bool CanGive(const GraspForceProblem& grasp, const Vector6d& F_o) {
+  GraspForceProblem problem = grasp;
   problem.F_o = F_o;
+  problem.f_min.setZero();
   problem.f_max.setOnes();
-  for (Eigen::Index i = 0; i < n; ++i) problem.A(0, 3 * i + 2) = 1.0;
-  problem.a_min[0] = -1.0;
-  problem.a_max[0] = normalization == ForceNormalization::kTotalNormal ? 1.0 : 2.0 * n;
-  GraspForceSolver solver(n, 1);
-  const GraspForceStatus status = solver.Solve(problem).status;
-  EXPECT_NE(status, GraspForceStatus::kNotConverged);
-  return status == GraspForceStatus::kOptimal;
+  GraspForceOptions options;
+  options.barrier_weight = 1e-6;
+  GraspForceSolver solver(grasp.num_contacts(), options);
+  const GraspForceResult& result = solver.Solve(problem);
+  EXPECT_NE(result.status, GraspForceStatus::kNotConverged);
+  return result.status == GraspForceStatus::kOptimal && result.objective <= 1.0;
 }
 
-class ForceClosure : public ::testing::TestWithParam<ForceNormalization> {};
+// Largest n^T [force; moment / length] of the wrenches of normalised contact forces: a contact gives most
+// with its force on the cone's boundary.
+double CalcSupport(const GraspForceProblem& grasp, const Vector6d& n) {
+  Vector6d functional = n;
+  functional.tail<3>() /= ForceClosureOptions().length;
+  double most = 0.0;
+  for (Eigen::Index i = 0; i < grasp.num_contacts(); ++i) {
+    const Vector3d g = grasp.G.middleCols<3>(3 * i).transpose() * functional;
+    most = std::max(most, g.z() + grasp.mu[i] * g.head<2>().norm());
+  }
+  return most;
+}
 
-TEST_P(ForceClosure, MarginIsWhereTheForceSolverGivesUp) {
+TEST(ForceClosure, MarginIsWhereTheForceSolverGivesUp) {
   std::mt19937_64 random(1);
-  const ForceClosureOptions options = MakeOptions(GetParam());
+  const ForceClosureOptions options;
   int closed = 0;
   for (int sample = 0; sample < 60; ++sample) {
     const GraspForceProblem grasp = MakeRandomGraspForceProblem(random, 4 + sample % 3);
@@ -54,45 +56,42 @@ TEST_P(ForceClosure, MarginIsWhereTheForceSolverGivesUp) {
     ASSERT_NEAR(scaled.norm(), 1.0, 1e-12);
     if (result.status == ForceClosureStatus::kNotForceClosure) {
       // Not even a thousandth of the direction.
-      EXPECT_FALSE(CanGive(grasp, 1e-3 * result.direction, GetParam()));
+      EXPECT_FALSE(CanGive(grasp, 1e-3 * result.direction));
       EXPECT_EQ(result.margin_lower, 0.0);
       continue;
     }
     ++closed;
     EXPECT_GT(result.margin_lower, 0.0);
     EXPECT_LE(result.margin - result.margin_lower, options.tolerance * result.margin);
-    EXPECT_NEAR(result.margin, CalcWrenchSupport(grasp.G, grasp.mu, scaled, options), 1e-12);
+    EXPECT_NEAR(result.margin, CalcSupport(grasp, scaled), 1e-12);
     // The functional `direction` bounds the wrenches on its own axis.
-    EXPECT_FALSE(CanGive(grasp, 1.001 * result.margin * result.direction, GetParam()));
+    EXPECT_FALSE(CanGive(grasp, 1.001 * result.margin * result.direction));
     std::normal_distribution<double> normal;
     for (int trial = 0; trial < 30; ++trial) {
       Vector6d n;
       for (double& entry : n) entry = normal(random);
       n.normalize();
-      EXPECT_GE(CalcWrenchSupport(grasp.G, grasp.mu, n, options), result.margin_lower);
+      EXPECT_GE(CalcSupport(grasp, n), result.margin_lower);
       n.tail<3>() *= options.length;
-      EXPECT_TRUE(CanGive(grasp, 0.999 * result.margin_lower * n, GetParam()));
+      EXPECT_TRUE(CanGive(grasp, 0.999 * result.margin_lower * n));
     }
   }
   EXPECT_GT(closed, 10);
   EXPECT_LT(closed, 60);
 }
 
-TEST_P(ForceClosure, DescentOverDirectionsFindsNothingWeaker) {
+TEST(ForceClosure, DescentOverDirectionsFindsNothingWeaker) {
   // An independent minimisation of the support function over the unit sphere: descent along its numerical
   // gradient, from random directions and from around the direction found. At a kink it may stop early.
   std::mt19937_64 random(2);
   std::normal_distribution<double> normal;
-  const ForceClosureOptions options = MakeOptions(GetParam());
+  const ForceClosureOptions options;
   int closed = 0;
   while (closed < 8) {
     const GraspForceProblem grasp = MakeRandomGraspForceProblem(random, 5);
     const ForceClosureResult result = CalcForceClosure(grasp.G, grasp.mu, options);
     if (result.status != ForceClosureStatus::kForceClosure || result.margin < 0.02) continue;
     ++closed;
-    const auto CalcSupport = [&](const Vector6d& n) {
-      return CalcWrenchSupport(grasp.G, grasp.mu, n, options);
-    };
     double best = std::numeric_limits<double>::infinity();
     for (int start = 0; start < 30; ++start) {
       Vector6d n;
@@ -102,16 +101,16 @@ TEST_P(ForceClosure, DescentOverDirectionsFindsNothingWeaker) {
         n.tail<3>() += (1.0 / options.length - 1.0) * result.direction.tail<3>();
       }
       n.normalize();
-      double support = CalcSupport(n);
+      double support = CalcSupport(grasp, n);
       for (double step = 0.3; step > 1e-5;) {
         Vector6d gradient;
         for (Eigen::Index k = 0; k < 6; ++k) {
           const Vector6d h = 1e-6 * Vector6d::Unit(k);
-          gradient[k] = (CalcSupport(n + h) - CalcSupport(n - h)) / 2e-6;
+          gradient[k] = (CalcSupport(grasp, n + h) - CalcSupport(grasp, n - h)) / 2e-6;
         }
         gradient -= gradient.dot(n) * n;
         const Vector6d trial = (n - step * gradient.normalized()).normalized();
-        const double trial_support = CalcSupport(trial);
+        const double trial_support = CalcSupport(grasp, trial);
         if (trial_support < support) {
           support = trial_support;
           n = trial;
@@ -126,21 +125,14 @@ TEST_P(ForceClosure, DescentOverDirectionsFindsNothingWeaker) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Both, ForceClosure,
-                         ::testing::Values(ForceNormalization::kTotalNormal,
-                                           ForceNormalization::kLargestNormal),
-                         [](const auto& info) {
-                           return info.param == ForceNormalization::kTotalNormal ? "TotalNormal"
-                                                                                 : "LargestNormal";
-                         });
-
 TEST(ForceClosureHandWorked, FourContactsOnTheEquator) {
-  // With f_i3 <= 1 the weakest direction is a moment about x (or y): only the two contacts on the other axis
-  // have a lever, the torus's outer radius, and give it by friction: 2 mu (R + r) / length.
+  // With sum f_i3 <= 1 the weakest direction is a moment about the axis midway between x and y: each contact
+  // has the lever (R + r) / sqrt 2 and gives it by friction, mu (R + r) / (sqrt 2 length).
   constexpr double kMu = 0.8;
   const GraspForceProblem grasp = MakeEquatorGraspForceProblem(4, kMu);
-  const ForceClosureOptions options = MakeOptions(ForceNormalization::kLargestNormal);
-  const double expected = 2.0 * kMu * (testing::kTorusRadius + testing::kTubeRadius) / options.length;
+  const ForceClosureOptions options;
+  const double expected =
+      kMu * (testing::kTorusRadius + testing::kTubeRadius) / (std::sqrt(2.0) * options.length);
   const ForceClosureResult result = CalcForceClosure(grasp.G, grasp.mu, options);
   EXPECT_EQ(result.status, ForceClosureStatus::kForceClosure);
   EXPECT_LE(result.margin_lower, expected);
@@ -153,7 +145,7 @@ TEST(ForceClosureHandWorked, FourContactsOnTheEquator) {
 TEST(ForceClosureHandWorked, CharacteristicLengthWeighsMoments) {
   // The same grasp: doubling the length halves the margin as long as a moment is the weakest direction.
   const GraspForceProblem grasp = MakeEquatorGraspForceProblem(4, 0.8);
-  ForceClosureOptions options = MakeOptions(ForceNormalization::kLargestNormal);
+  ForceClosureOptions options;
   const double margin = CalcForceClosure(grasp.G, grasp.mu, options).margin;
   options.length *= 2.0;
   EXPECT_NEAR(CalcForceClosure(grasp.G, grasp.mu, options).margin, 0.5 * margin,

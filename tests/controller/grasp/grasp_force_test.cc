@@ -23,26 +23,15 @@ constexpr double kEps = std::numeric_limits<double>::epsilon();
 // A cone or bound may be violated by the rounding of f_c alone: forces of at most 100 N.
 constexpr double kConeTolerance = 100.0 * kEps;
 
-GraspForceOptions MakeOptions(GraspForceObjective objective) {
-  GraspForceOptions options;
-  options.objective = objective;
-  return options;
-}
-
-GraspForceResult SolveCold(const GraspForceProblem& problem, const GraspForceOptions& options) {
-  GraspForceSolver solver(problem.num_contacts(), problem.num_limits(), options);
-  return solver.Solve(problem);
-}
-
-GraspForceResult SolveCold(const GraspForceProblem& problem, GraspForceObjective objective) {
-  return SolveCold(problem, MakeOptions(objective));
+GraspForceResult SolveCold(const GraspForceProblem& problem, const GraspForceOptions& options = {}) {
+  return GraspForceSolver(problem.num_contacts(), options).Solve(problem);
 }
 
 // A feasible random problem.
 GraspForceProblem MakeFeasibleProblem(std::mt19937_64& random, int num_contacts) {
   for (;;) {
     GraspForceProblem problem = MakeRandomGraspForceProblem(random, num_contacts);
-    const GraspForceStatus status = SolveCold(problem, GraspForceObjective::kBarrier).status;
+    const GraspForceStatus status = SolveCold(problem).status;
     if (status == GraspForceStatus::kOptimal) return problem;
   }
 }
@@ -58,7 +47,7 @@ double CalcBarrierObjective(const GraspForceProblem& problem, double rho, const 
     const double slacks = (f.z() - problem.f_min[i]) * (problem.f_max[i] - f.z());
     if (mu_f3 <= 0.0 || P.determinant() <= 0.0 || slacks <= 0.0)
       return std::numeric_limits<double>::infinity();
-    sum += problem.weight[i] * f.z() - rho * (std::log(P.determinant()) + std::log(slacks));
+    sum += f.z() - rho * (std::log(P.determinant()) + std::log(slacks));
   }
   return sum;
 }
@@ -81,7 +70,7 @@ VectorXd MinimiseBarrier(const GraspForceProblem& problem, double rho, VectorXd 
       H.diagonal() -= 2.0 * J / det;
       H(2, 2) += 1.0 / (lower * lower) + 1.0 / (upper * upper);
       gradient.segment<3>(3 * i) = -rho * d_det / det;
-      gradient[3 * i + 2] += problem.weight[i] - rho * (1.0 / lower - 1.0 / upper);
+      gradient[3 * i + 2] += 1.0 - rho * (1.0 / lower - 1.0 / upper);
       hessian.block<3, 3>(3 * i, 3 * i) = rho * H;
     }
     const VectorXd step = -Z * testing::SolveDense(Z.transpose() * hessian * Z, Z.transpose() * gradient);
@@ -93,21 +82,21 @@ VectorXd MinimiseBarrier(const GraspForceProblem& problem, double rho, VectorXd 
   return f_c;
 }
 
-TEST(GraspForceHandWorked, ThreeContactsCarryAWeightAtTheConesEdge) {
+TEST(GraspForceHandWorked, ThreeContactsCarryAWeightNearTheConesEdge) {
   // Three contacts every 120 degrees on the equator carry the weight F along z. sum f_i3 >= sum |f_it| / mu
-  // >= F / mu, with equality only for equal vertical tangential forces F / 3: f_i3 = F / (3 mu).
+  // >= F / mu; the objective exceeds that by less than 4 N rho.
   constexpr double kWeight = 1.962;
   constexpr double kMu = 0.5;
   GraspForceProblem problem = MakeEquatorGraspForceProblem(3, kMu);
   problem.F_o[2] = kWeight;
-  const GraspForceResult result = SolveCold(problem, GraspForceObjective::kMinimum);
-  ASSERT_EQ(result.status, GraspForceStatus::kOptimal);
-  VectorXd expected(9);
-  for (Eigen::Index i = 0; i < 3; ++i)
-    expected.segment<3>(3 * i) << 0.0, -kWeight / 3.0, kWeight / (3.0 * kMu);
-  // The objective is within its gap of 1e-7 N; f_c measured 2e-9 N.
-  EXPECT_NEAR(result.objective, kWeight / kMu, 1e-7 * TolScale());
-  EXPECT_TRUE(MatrixNear(result.f_c, expected, 2e-8));
+  for (const double rho : {0.1, 1e-3, 1e-5}) {
+    GraspForceOptions options;
+    options.barrier_weight = rho;
+    const GraspForceResult result = SolveCold(problem, options);
+    ASSERT_EQ(result.status, GraspForceStatus::kOptimal);
+    EXPECT_GT(result.objective, kWeight / kMu);
+    EXPECT_LT(result.objective, kWeight / kMu + 12.0 * rho);
+  }
 }
 
 TEST(GraspForceHandWorked, BarrierBalancesWeightAgainstDistance) {
@@ -116,7 +105,7 @@ TEST(GraspForceHandWorked, BarrierBalancesWeightAgainstDistance) {
   constexpr double kMu = 0.5;
   GraspForceProblem problem = MakeEquatorGraspForceProblem(3, kMu);
   problem.F_o[2] = kWeight;
-  const GraspForceOptions options = MakeOptions(GraspForceObjective::kBarrier);
+  const GraspForceOptions options;
   const GraspForceResult result = SolveCold(problem, options);
   ASSERT_EQ(result.status, GraspForceStatus::kOptimal);
   const double t = kWeight / 3.0;
@@ -138,15 +127,15 @@ TEST(GraspForceHandWorked, LimitOfTheFingersIsCertified) {
   GraspForceProblem problem = MakeEquatorGraspForceProblem(3, 0.5);
   problem.f_max.setConstant(10.0);
   problem.F_o[2] = 14.999;
-  EXPECT_EQ(SolveCold(problem, GraspForceObjective::kBarrier).status, GraspForceStatus::kOptimal);
+  EXPECT_EQ(SolveCold(problem).status, GraspForceStatus::kOptimal);
   problem.F_o[2] = 15.001;
-  const GraspForceResult result = SolveCold(problem, GraspForceObjective::kBarrier);
+  const GraspForceResult result = SolveCold(problem);
   ASSERT_EQ(result.status, GraspForceStatus::kInfeasible);
   EXPECT_EQ(result.f_c, VectorXd::Zero(9));
-  EXPECT_GT(result.infeasibility, 0.0);
-  EXPECT_LE(result.infeasibility, 0.001 + kConeTolerance);
-  EXPECT_NEAR(result.infeasibility, CalcInfeasibility(problem, result.y), kConeTolerance * TolScale());
-  EXPECT_LT(CalcInfeasibility(problem, -result.y), 0.0) << "the opposite direction proves nothing";
+  const Vector6d y = result.y;
+  EXPECT_GT(CalcSeparation(problem, y), 0.0);
+  EXPECT_LE(CalcSeparation(problem, y), 0.001 + kConeTolerance);
+  EXPECT_LT(CalcSeparation(problem, -y), 0.0) << "the opposite direction proves nothing";
 }
 
 TEST(GraspForceBarrier, AgreesWithNewtonInTheNullSpace) {
@@ -172,22 +161,22 @@ TEST(GraspForceBarrier, AgreesWithNewtonInTheNullSpace) {
   }
 }
 
-TEST(GraspForceBarrier, ExceedsTheMinimumByAtMostItsParameter) {
+TEST(GraspForceBarrier, FallsTowardsTheMinimumByItsParameter) {
+  // The optimum for rho exceeds the least objective by at most 4 N rho; a tiny rho stands for none.
   std::mt19937_64 random(2);
   for (int sample = 0; sample < 30; ++sample) {
     const GraspForceProblem problem = MakeFeasibleProblem(random, 4);
-    const double minimum = SolveCold(problem, GraspForceObjective::kMinimum).objective;
+    GraspForceOptions options;
+    options.barrier_weight = 1e-4;
+    const double minimum = SolveCold(problem, options).objective;
     double previous = std::numeric_limits<double>::infinity();
     for (const double rho : {1.0, 0.1, 0.01}) {
-      GraspForceOptions options;
       options.barrier_weight = rho;
       const GraspForceResult result = SolveCold(problem, options);
       ASSERT_EQ(result.status, GraspForceStatus::kOptimal);
-      // rho (4 N + 2 M), up to the gaps of both solutions.
-      EXPECT_LE(result.objective, minimum + 16.0 * rho + 1e-6 * minimum);
-      EXPECT_GE(result.objective, minimum - 1e-6 * minimum);
+      EXPECT_LE(result.objective, minimum + 16.0 * rho);
+      EXPECT_GE(result.objective, minimum);
       EXPECT_LT(result.objective, previous);
-      EXPECT_GT(result.cone_margin, 0.0);
       previous = result.objective;
     }
   }
@@ -215,13 +204,11 @@ TEST(GraspForceBarrier, IsASmoothFunctionOfTheWrench) {
   }
 }
 
-class GraspForceObjectives : public ::testing::TestWithParam<GraspForceObjective> {};
-
-TEST_P(GraspForceObjectives, DoesNotDependOnTheFramesChosen) {
+TEST(GraspForceSolver, DoesNotDependOnTheFramesChosen) {
   std::mt19937_64 random(4);
   for (int sample = 0; sample < 20; ++sample) {
     const GraspForceProblem problem = MakeFeasibleProblem(random, 4);
-    const GraspForceResult result = SolveCold(problem, GetParam());
+    const GraspForceResult result = SolveCold(problem);
     ASSERT_GT(result.f_c.norm(), 1.0);
 
     // Another object frame: wrenches transform by the inverse transpose of the adjoint.
@@ -237,10 +224,9 @@ TEST_P(GraspForceObjectives, DoesNotDependOnTheFramesChosen) {
     for (Eigen::Index i = 0; i < 4; ++i) {
       moved.G.middleCols<3>(3 * i) = (moved.G.middleCols<3>(3 * i) * spin).eval();
     }
-    const GraspForceResult other = SolveCold(moved, GetParam());
+    const GraspForceResult other = SolveCold(moved);
     ASSERT_EQ(other.status, GraspForceStatus::kOptimal);
     EXPECT_NEAR(other.objective, result.objective, 2e-7 * TolScale() * result.objective);
-    if (GetParam() != GraspForceObjective::kBarrier) continue;  // the linear optimum need not be unique
     VectorXd f_c(12);
     for (Eigen::Index i = 0; i < 4; ++i) f_c.segment<3>(3 * i) = spin * other.f_c.segment<3>(3 * i);
     // Both within slack_tolerance of one optimum, as above; measured 1e-13, when they take equal steps.
@@ -248,35 +234,15 @@ TEST_P(GraspForceObjectives, DoesNotDependOnTheFramesChosen) {
   }
 }
 
-TEST_P(GraspForceObjectives, NumberOfContactsOnlyChoosesTheCode) {
-  // The same problems on the code for any size, which a limit that never binds calls for.
-  std::mt19937_64 random(5);
-  for (int num_contacts = 3; num_contacts <= 9; ++num_contacts) {
-    const GraspForceProblem problem = MakeFeasibleProblem(random, num_contacts);
-    GraspForceProblem limited(num_contacts, 1);
-    limited.G = problem.G;
-    limited.F_o = problem.F_o;
-    limited.mu = problem.mu;
-    limited.f_min = problem.f_min;
-    limited.A.setConstant(0.01);
-    limited.a_min.setConstant(-1e7);
-    limited.a_max.setConstant(1e7);
-    const GraspForceResult expected = SolveCold(problem, GetParam());
-    const GraspForceResult result = SolveCold(limited, GetParam());
-    ASSERT_EQ(result.status, GraspForceStatus::kOptimal);
-    EXPECT_NEAR(result.objective, expected.objective, 1e-6 * TolScale() * expected.objective) << num_contacts;
-  }
-}
-
-TEST_P(GraspForceObjectives, FollowsAMovingGraspAsIfStartedAnew) {
+TEST(GraspForceSolver, FollowsAMovingGraspAsIfStartedAnew) {
   std::mt19937_64 random(6);
   for (const int num_contacts : {4, 8, 10}) {
     GraspForceProblem problem = MakeFeasibleProblem(random, num_contacts);
-    GraspForceSolver solver(num_contacts, 0, MakeOptions(GetParam()));
+    GraspForceSolver solver(num_contacts);
     int cold_iterations = 0;
     int warm_iterations = 0;
     for (int step = 0; step < 200; ++step) {
-      const GraspForceResult expected = SolveCold(problem, GetParam());
+      const GraspForceResult expected = SolveCold(problem);
       const GraspForceResult& result = solver.Solve(problem);
       ASSERT_EQ(result.status, expected.status);
       if (expected.status != GraspForceStatus::kOptimal) break;
@@ -290,14 +256,14 @@ TEST_P(GraspForceObjectives, FollowsAMovingGraspAsIfStartedAnew) {
       MoveGrasp(random, problem);
     }
     EXPECT_GT(warm_iterations, 0);
-    EXPECT_LT(warm_iterations, (GetParam() == GraspForceObjective::kBarrier ? 0.3 : 0.7) * cold_iterations);
+    EXPECT_LT(warm_iterations, 0.3 * cold_iterations);
   }
 }
 
-TEST_P(GraspForceObjectives, RecoversAfterAnInfeasibleProblem) {
+TEST(GraspForceSolver, RecoversAfterAnInfeasibleProblem) {
   std::mt19937_64 random(7);
   GraspForceProblem problem = MakeFeasibleProblem(random, 4);
-  GraspForceSolver solver(4, 0, MakeOptions(GetParam()));
+  GraspForceSolver solver(4);
   const VectorXd f_c = solver.Solve(problem).f_c;
   GraspForceProblem impossible = problem;
   impossible.F_o[2] = 1000.0;
@@ -313,82 +279,12 @@ TEST_P(GraspForceObjectives, RecoversAfterAnInfeasibleProblem) {
   EXPECT_EQ(again.f_c, f_c);
 }
 
-TEST_P(GraspForceObjectives, TorqueLimitsBind) {
-  // A finger whose one joint feels f_i3 with the lever 2 cm: a limit of 0.1 N m is a limit of 5 N.
-  std::mt19937_64 random(8);
-  int bound = 0;
-  for (int sample = 0; sample < 60; ++sample) {
-    GraspForceProblem problem = MakeFeasibleProblem(random, 4);
-    GraspForceProblem limited(4, 1);
-    limited.G = problem.G;
-    limited.F_o = problem.F_o;
-    limited.mu = problem.mu;
-    limited.f_min = problem.f_min;
-    MatrixXd J = MatrixXd::Zero(12, 1);
-    J(2, 0) = 0.02;
-    limited.SetTorqueLimits(J, VectorXd::Constant(1, 0.03), VectorXd::Constant(1, -1e4),
-                            VectorXd::Constant(1, 0.13));
-    problem.f_max[0] = 5.0;
-    const GraspForceResult expected = SolveCold(problem, GraspForceObjective::kMinimum);
-    const GraspForceResult result = SolveCold(limited, GetParam());
-    ASSERT_EQ(result.status, expected.status);
-    if (result.status != GraspForceStatus::kOptimal) continue;
-    if (expected.f_c[2] > 4.999) ++bound;
-    const double tau = 0.03 + J.col(0).dot(result.f_c);
-    EXPECT_LE(tau, 0.13 + 1e-9);
-    if (GetParam() == GraspForceObjective::kMinimum) {
-      EXPECT_NEAR(result.objective, expected.objective, 1e-6 * TolScale() * expected.objective);
-    } else {
-      EXPECT_GE(result.objective, expected.objective);
-    }
-    EXPECT_LE(CalcGraspForceBound(limited, result.y), result.objective + 1e-9);
-    EXPECT_NEAR(CalcGraspForceBound(limited, result.y), result.lower_bound,
-                100.0 * kConeTolerance * TolScale());
-  }
-  EXPECT_GT(bound, 3) << "the limit never mattered";
-}
-
-INSTANTIATE_TEST_SUITE_P(Both, GraspForceObjectives,
-                         ::testing::Values(GraspForceObjective::kMinimum, GraspForceObjective::kBarrier),
-                         [](const auto& info) {
-                           return info.param == GraspForceObjective::kMinimum ? "Minimum" : "Barrier";
-                         });
-
-TEST(GraspForceBound, HoldsForAnyMultipliers) {
-  std::mt19937_64 random(9);
-  std::normal_distribution<double> normal;
-  for (int sample = 0; sample < 20; ++sample) {
-    const GraspForceProblem problem = MakeFeasibleProblem(random, 4);
-    const GraspForceResult result = SolveCold(problem, GraspForceObjective::kMinimum);
-    for (int trial = 0; trial < 50; ++trial) {
-      VectorXd y = result.y;
-      for (double& entry : y) entry += normal(random);
-      EXPECT_LE(CalcGraspForceBound(problem, y), result.objective);
-      EXPECT_LT(CalcInfeasibility(problem, y), 0.0);
-    }
-  }
-}
-
-TEST(CalcInternalForce, IsWhatTheWrenchDoesNotNeed) {
-  std::mt19937_64 random(10);
-  const GraspForceProblem problem = MakeFeasibleProblem(random, 4);
-  const VectorXd f_c = SolveCold(problem, GraspForceObjective::kBarrier).f_c;
-  const VectorXd F_N = CalcInternalForce(problem.G, problem.F_o, f_c);
-  ASSERT_GT(F_N.norm(), 1.0);
-  // (27), to the residual tolerance of 1e-10 relative to |F_o| <= 20 N; (49) with the Moore-Penrose inverse
-  // of an independent factorisation.
-  EXPECT_TRUE(MatrixNear(problem.G * F_N, Vector6d::Zero(), 2e-9));
-  const VectorXd least = testing::CalcPseudoinverse(problem.G) * problem.F_o;
-  EXPECT_TRUE(MatrixNear(F_N + least, f_c, 10.0 * kConeTolerance));
-  EXPECT_GT((f_c - least).norm(), 1.0) << "with no internal force there would be nothing to compute";
-}
-
 TEST(GraspForceErrors, NameTheValue) {
   EXPECT_THAT([] { GraspForceSolver solver(2); },
               ThrowsMessage<std::invalid_argument>(HasSubstr("num_contacts")));
   GraspForceOptions options;
   options.barrier_weight = 0.0;
-  EXPECT_THAT([&] { GraspForceSolver solver(4, 0, options); },
+  EXPECT_THAT([&] { GraspForceSolver solver(4, options); },
               ThrowsMessage<std::invalid_argument>(HasSubstr("barrier_weight")));
 
   GraspForceSolver solver(4);
@@ -406,19 +302,7 @@ TEST(GraspForceErrors, NameTheValue) {
   ExpectError("f_max(1, 0): must be finite", [](GraspForceProblem& p) { p.f_max[1] = kInfinity; });
   ExpectError("f_max[3]: must be above f_min", [](GraspForceProblem& p) { p.f_max[3] = p.f_min[3]; });
   ExpectError("f_min[1]: must not be negative", [](GraspForceProblem& p) { p.f_min[1] = -1.0; });
-  ExpectError("weight[1]: must not be negative", [](GraspForceProblem& p) { p.weight[1] = -1.0; });
   ExpectError("problem", [](GraspForceProblem& p) { p = MakeEquatorGraspForceProblem(5, 0.5); });
-
-  GraspForceProblem limited(4, 2);
-  EXPECT_THAT(
-      [&] {
-        limited.SetTorqueLimits(MatrixXd::Zero(11, 2), Vector2d::Zero(), Vector2d::Zero(), Vector2d::Ones());
-      },
-      ThrowsMessage<std::invalid_argument>(HasSubstr("J rows")));
-  limited.G = MakeEquatorGraspForceProblem(4, 0.5).G;
-  GraspForceSolver limited_solver(4, 2);
-  EXPECT_THAT([&] { limited_solver.Solve(limited); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("a_max[0]: must be above a_min")));
 }
 
 TEST(GraspForceErrors, ContactsOnAnyLineAreSingular) {
@@ -435,8 +319,6 @@ TEST(GraspForceErrors, ContactsOnAnyLineAreSingular) {
         problem.F_o = problem.G * VectorXd::Ones(3 * n);
         GraspForceSolver& solver = solvers.at(n);
         ASSERT_THROW(solver.Solve(problem), SingularityError) << "offset " << offset << ", unit " << unit;
-        ASSERT_THROW(CalcInternalForce(problem.G, problem.F_o, VectorXd::Zero(3 * n)), SingularityError)
-            << "offset " << offset << ", unit " << unit;
       }
     }
   }
@@ -461,7 +343,6 @@ TEST(GraspForceErrors, ContactsOnOneLineAreSingular) {
   }
   GraspForceSolver solver(3);
   EXPECT_THROW(solver.Solve(problem), SingularityError);
-  EXPECT_THROW(CalcInternalForce(problem.G, problem.F_o, VectorXd::Zero(9)), SingularityError);
   problem.G = MakeEquatorGraspForceProblem(3, 0.5).G;
   EXPECT_EQ(solver.Solve(problem).status, GraspForceStatus::kOptimal);
 }

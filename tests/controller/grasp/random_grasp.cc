@@ -1,5 +1,6 @@
 #include "tests/controller/grasp/random_grasp.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace dexcheck::testing {
@@ -77,6 +78,16 @@ LineGrasp MakeRandomLineGrasp(std::mt19937_64& random, int num_contacts, double 
   }
   grasp.n << middle.cross(along), along;
   return grasp;
+}
+
+double CalcSeparation(const GraspForceProblem& problem, const Vector6d& y) {
+  double most = 0.0;
+  for (Eigen::Index i = 0; i < problem.num_contacts(); ++i) {
+    const Vector3d g = problem.G.middleCols<3>(3 * i).transpose() * y;
+    const double h = g.z() + problem.mu[i] * g.head<2>().norm();
+    most += std::max(problem.f_min[i] * h, problem.f_max[i] * h);
+  }
+  return y.dot(problem.F_o) - most;
 }
 
 void MoveGrasp(std::mt19937_64& random, GraspForceProblem& problem) {

@@ -36,6 +36,11 @@ struct LineGrasp {
 };
 LineGrasp MakeRandomLineGrasp(std::mt19937_64& random, int num_contacts, double offset, double unit);
 
+/// y^T F_o less the largest y^T G f of admissible forces f, contact by contact: a linear function over a
+/// truncated cone is largest at a normal force at one of its bounds and a tangential force at the cone's
+/// edge, along the function's own. Positive: no admissible forces give F_o.
+double CalcSeparation(const GraspForceProblem& problem, const Vector6d& y);
+
 /// One millisecond of motion: the wrench changes by about 5 mN and 0.2 mN m, contacts roll by about 0.5 mrad.
 void MoveGrasp(std::mt19937_64& random, GraspForceProblem& problem);
 

@@ -37,7 +37,7 @@ void WriteEntry(std::ostream& out, const ForceSpace& space, int block, int row, 
 
 VectorXd CalcCost(const GraspForceProblem& problem) {
   VectorXd cost = VectorXd::Zero(problem.G.cols());
-  for (Eigen::Index i = 0; i < problem.num_contacts(); ++i) cost[3 * i + 2] = problem.weight[i];
+  for (Eigen::Index i = 0; i < problem.num_contacts(); ++i) cost[3 * i + 2] = 1.0;
   return cost;
 }
 
@@ -46,11 +46,10 @@ VectorXd CalcCost(const GraspForceProblem& problem) {
 void WriteSdp(const GraspForceProblem& problem, const std::filesystem::path& file) {
   const ForceSpace space = CalcForceSpace(problem);
   const int n = problem.num_contacts();
-  const int m = problem.num_limits();
   std::ofstream out(file);
   out << std::setprecision(17) << space.basis.cols() << '\n' << n + 1 << '\n';
   for (int i = 0; i < n; ++i) out << "2 ";
-  out << -2 * (n + m) << '\n' << (space.basis.transpose() * CalcCost(problem)).transpose() << '\n';
+  out << -2 * n << '\n' << (space.basis.transpose() * CalcCost(problem)).transpose() << '\n';
 
   for (int i = 0; i < n; ++i) {
     const VectorXd f1 = VectorXd::Unit(3 * n, 3 * i);
@@ -61,11 +60,6 @@ void WriteSdp(const GraspForceProblem& problem, const std::filesystem::path& fil
     WriteEntry(out, space, i + 1, 2, 2, 0.0, problem.mu[i] * f3 - f1);
     WriteEntry(out, space, n + 1, 2 * i + 1, 2 * i + 1, -problem.f_min[i], f3);
     WriteEntry(out, space, n + 1, 2 * i + 2, 2 * i + 2, problem.f_max[i], -f3);
-  }
-  for (int j = 0; j < m; ++j) {
-    const VectorXd a = problem.A.row(j);
-    WriteEntry(out, space, n + 1, 2 * (n + j) + 1, 2 * (n + j) + 1, -problem.a_min[j], a);
-    WriteEntry(out, space, n + 1, 2 * (n + j) + 2, 2 * (n + j) + 2, problem.a_max[j], -a);
   }
 }
 

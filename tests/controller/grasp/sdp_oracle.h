@@ -13,11 +13,11 @@ enum class SdpStatus { kOptimal, kInfeasible, kOther };
 struct SdpSolution {
   SdpStatus status = SdpStatus::kOther;
   VectorXd f_c;            ///< 3N
-  double objective = 0.0;  ///< sum_i weight_i f_i3
+  double objective = 0.0;  ///< sum_i f_i3
 };
 
 /// Writes `problem` in SDPA's sparse format: with f_c = G^+ F_o + Z x, the columns of Z a basis of null(G),
-/// minimise the weighted normal forces over x subject to P_i(f_ci) >= 0 (2 x 2 blocks) and all bounds (a
+/// minimise the sum of normal forces over x subject to P_i(f_ci) >= 0 (2 x 2 blocks) and all bounds (a
 /// diagonal block).
 void WriteSdp(const GraspForceProblem& problem, const std::filesystem::path& file);
 

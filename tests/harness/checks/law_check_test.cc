@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "harness/checks/law_terms.h"
-#include "harness/diagnosis/spoiled_law.h"
+#include "harness/diagnosis/faulty_law.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/run/changed_parts.h"
 #include "tests/harness/run/shipped_run.h"
@@ -40,7 +40,7 @@ TEST(LawCheck, AnUnchangedLawIsNotSpoiled) {
     std::vector<VectorXd> sent[2];
     for (const bool spoiled : {false, true}) {
       LoopParts parts = MakeLoopParts(shipped.setup());
-      if (spoiled) parts.controller = std::make_unique<SpoiledLaw>(shipped.setup(), LawFault{});
+      if (spoiled) parts.controller = std::make_unique<FaultyLaw>(shipped.setup(), LawFault{});
       Runner runner(shipped.setup(), /*check=*/true, std::move(parts));
       runner.Run([&](const StepRecord& step) { sent[spoiled ? 1 : 0].push_back(step.command.tau); },
                  [] { return false; });

@@ -1,24 +1,9 @@
-// dexcheck consistency: exit codes, results as JSON, repeatability, interruption.
+// dexcheck consistency: exit codes, results as JSON, repeatability.
 
-#include <gmock/gmock.h>
-
-#include <chrono>
-#include <csignal>
-#include <nlohmann/json.hpp>
-#include <thread>
-
-#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing::consistency_command_test {
 namespace {
-
-using Json = nlohmann::json;
-
-std::vector<std::string> Join(std::vector<std::string> a, const std::vector<std::string>& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
 
 /// Every check has all of its parts, each of the right type; returns how many checks there are.
 size_t CheckSchema(const Json& results) {
@@ -48,111 +33,73 @@ size_t CheckSchema(const Json& results) {
   return results.at("checks").size();
 }
 
-TEST(ConsistencyCommand, ShippedRobotAgrees) {
-  const ProgramResult result = RunDexcheck({"consistency", "--samples", "20"});
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_EQ(result.err, "");
-  EXPECT_THAT(result.out, HasSubstr("20 random states (seed 1)"));
-  EXPECT_THAT(result.out, HasSubstr("\nAGREE: "));
-  EXPECT_THAT(result.out, ::testing::Not(HasSubstr("DIFFERS")));
-}
+using ConsistencyCommand = CommandTest;
 
-TEST(ConsistencyCommand, QuietPrintsTheVerdictOnly) {
-  const ProgramResult result = RunDexcheck({"consistency", "--samples", "2", "--quiet"});
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.out, ::testing::MatchesRegex("AGREE: [^\n]*\n"));
-}
-
-TEST(ConsistencyCommand, JsonHasEveryPartOfEveryCheck) {
-  const ProgramResult shipped = RunDexcheck({"consistency", "--samples", "20", "--json", "-"});
-  ASSERT_EQ(shipped.exit_code, 0);
+TEST_F(ConsistencyCommand, JsonHasEveryPartOfEveryCheck) {
+  const ProgramResult shipped = Expect(0, "consistency --samples 20 --json -");
+  EXPECT_EQ(shipped.err, "");
   const Json results = Json::parse(shipped.out);  // nothing else stands on standard output
   EXPECT_EQ(results.at("verdict"), "pass");
+  EXPECT_EQ(results.at("seed"), 1);
   EXPECT_EQ(results.at("samples"), 20);
   EXPECT_EQ(results.at("samples_requested"), 20);
   EXPECT_GE(CheckSchema(results), 43U);
+  for (const auto& [name, check] : results.at("checks").items()) EXPECT_EQ(check.at("pass"), true) << name;
   for (const char* name : {"link_mass", "M_bar", "C_bar", "C_bar_xi", "J", "J_dot_xi", "gravity", "friction",
-                           "kinetic_energy", "angular_momentum", "M_o", "N_o"}) {
+                           "kinetic_energy", "angular_momentum", "M_o", "N_o"})
     EXPECT_TRUE(results.at("checks").contains(name)) << name;
-  }
-
-  const ProgramResult panda =
-      RunDexcheck(Join({"consistency", "--samples", "20", "--json", "-"}, testing::kPandaFiles));
-  ASSERT_EQ(panda.exit_code, 0);
-  EXPECT_GE(CheckSchema(Json::parse(panda.out)), 20U);
+  EXPECT_GE(CheckSchema(RunJson(0, {"consistency", kPandaToml, kPandaXml, "--samples", "20"})), 20U);
 }
 
-TEST(ConsistencyCommand, ChangedNumberIsADisagreement) {
-  const TempFolder folder;
-  const std::string panda = ReadText(testing::kParameters + "panda.toml");
-  WriteText(folder.path() / "bad.toml", ReplaceOnce(panda, "mass = 3.228604", "mass = 3.3"));
-  const ProgramResult result = RunDexcheck({"consistency", "--samples", "20", "--robot", "bad.toml", "--mjcf",
-                                            testing::kMjcf + "panda.xml", "--json", "out.json"},
-                                           {folder.path()});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.err, "");
-  EXPECT_THAT(result.out, HasSubstr("\nDISAGREE: link_mass: link panda_link3: 3.3 in bad.toml, 3.228604 in"));
-  EXPECT_THAT(result.out, HasSubstr("  gravity: nearest the base: panda_joint2;"));
+TEST_F(ConsistencyCommand, QuietPrintsTheVerdictOnly) {
+  EXPECT_THAT(Expect(0, "consistency --samples 2 --quiet").out, ::testing::MatchesRegex("AGREE: [^\n]*\n"));
+}
 
-  const Json results = Json::parse(ReadText(folder.path() / "out.json"));
+TEST_F(ConsistencyCommand, ChangedNumberIsADisagreement) {
+  WriteChanged("bad.toml", ReadText(kPandaToml), "mass = 3.228604", "mass = 3.3");
+  const Json results = RunJson(1, {"consistency", "bad.toml", kPandaXml, "--samples", "20"});
   EXPECT_EQ(results.at("verdict"), "disagreement");
   CheckSchema(results);
   EXPECT_FALSE(results.at("checks").at("M_bar").at("pass"));
   EXPECT_TRUE(results.at("checks").at("joint_axis").at("pass"));
   ASSERT_EQ(results.at("findings").size(), 1U);
-  const Json finding = results.at("findings").front();
-  EXPECT_EQ(finding.at("check"), "link_mass");
-  EXPECT_EQ(finding.at("where"), "link panda_link3");
-  EXPECT_EQ(finding.at("model"), 3.3);
-  EXPECT_EQ(finding.at("engine"), 3.228604);
+  EXPECT_TRUE(HasFinding(results, "link_mass", "link panda_link3", 3.3, 3.228604));
 }
 
 // What only the MJCF has is a disagreement, whatever it is.
-TEST(ConsistencyCommand, WhatOnlyTheMjcfHasIsADisagreement) {
+TEST_F(ConsistencyCommand, WhatOnlyTheMjcfHasIsADisagreement) {
   struct Addition {
-    const char* text;
-    const char* finding;
+    std::string text;
+    const char* check;
+    const char* where;
+    bool is_of_joint = false;  ///< The text stands in a tendon of a joint.
   };
-  for (const Addition& addition : {
-           Addition{"<tendon><fixed name='t' stiffness='300'><joint joint='panda_joint2' "
-                    "coef='1'/></fixed></tendon>",
-                    "tendon_spring: tendon t: 0 in panda.toml, 300 in "},
-           {"<tendon><fixed name='t' damping='2'><joint joint='panda_joint2' coef='1'/></fixed></tendon>",
-            "tendon_damping: tendon t: "},
-           {"<tendon><fixed name='t' frictionloss='2'><joint joint='panda_joint2' "
-            "coef='1'/></fixed></tendon>",
-            "tendon_friction: tendon t: "},
-           {"<tendon><fixed name='t' limited='true' range='0 1'><joint joint='panda_joint2' "
-            "coef='1'/></fixed></tendon>",
-            "tendon_limit: tendon t: "},
-           {"<equality><joint name='e' joint1='panda_joint2' joint2='panda_joint3'/></equality>",
-            "equality_constraint: constraint e: "},
-           {"<actuator><position name='p' joint='panda_joint2' kp='50'/></actuator>",
-            "motor_bias: actuator p: "},
-           {"<actuator><velocity name='p' joint='panda_joint2' kv='5'/></actuator>",
-            "motor_gain: actuator p: "},
-           {"<option><flag gravity='disable'/></option>", "disable_flag: Gravity: "},
-           {"<option><flag override='enable'/></option>", "enable_flag: Override: "},
-       }) {
-    const TempFolder folder;
-    std::string text = ReadText(testing::kMjcf + "panda.xml");
-    const std::string end = "</mujoco>";
-    text.replace(text.rfind(end), end.size(), addition.text + end);
-    WriteText(folder.path() / "more.xml", text);
-    const ProgramResult result =
-        RunDexcheck({"consistency", "--samples", "2", "--robot", testing::kParameters + "panda.toml",
-                     "--mjcf", (folder.path() / "more.xml").string()});
-    EXPECT_EQ(result.exit_code, 1) << addition.text << result.err;
-    EXPECT_THAT(result.out, HasSubstr(addition.finding));
+  for (const Addition& addition :
+       {Addition{"stiffness='300'", "tendon_spring", "tendon t", true},
+        {"damping='2'", "tendon_damping", "tendon t", true},
+        {"frictionloss='2'", "tendon_friction", "tendon t", true},
+        {"limited='true' range='0 1'", "tendon_limit", "tendon t", true},
+        {"<equality><joint name='e' joint1='panda_joint2' joint2='panda_joint3'/></equality>",
+         "equality_constraint", "constraint e"},
+        {"<actuator><position name='p' joint='panda_joint2' kp='50'/></actuator>", "motor_bias",
+         "actuator p"},
+        {"<actuator><velocity name='p' joint='panda_joint2' kv='5'/></actuator>", "motor_gain", "actuator p"},
+        {"<option><flag gravity='disable'/></option>", "disable_flag", "Gravity"},
+        {"<option><flag override='enable'/></option>", "enable_flag", "Override"}}) {
+    SCOPED_TRACE(addition.text);
+    const std::string text = addition.is_of_joint
+                                 ? "<tendon><fixed name='t' " + addition.text +
+                                       "><joint joint='panda_joint2' coef='1'/></fixed></tendon>"
+                                 : addition.text;
+    WriteChanged("more.xml", ReadText(kPandaXml), "\n</mujoco>", text + "\n</mujoco>");
+    const Json results = RunJson(1, {"consistency", kPandaToml, "more.xml", "--samples", "2"});
+    EXPECT_TRUE(HasFinding(results, addition.check, addition.where));
   }
 }
 
-TEST(ConsistencyCommand, SeedDecidesTheStates) {
-  const auto run = [](const std::string& seed) {
-    const ProgramResult result = RunDexcheck(
-        Join({"consistency", "--samples", "50", "--seed", seed, "--json", "-"}, testing::kPandaFiles));
-    EXPECT_EQ(result.exit_code, 0);
-    Json results = Json::parse(result.out);
+TEST_F(ConsistencyCommand, SeedDecidesTheStates) {
+  const auto run = [&](const std::string& seed) {
+    Json results = RunJson(0, {"consistency", kPandaToml, kPandaXml, "--samples", "50", "--seed", seed});
     EXPECT_EQ(results.erase("seconds"), 1U);
     return results;
   };
@@ -161,41 +108,6 @@ TEST(ConsistencyCommand, SeedDecidesTheStates) {
   EXPECT_NE(once.at("checks"), run("8").at("checks"));
   EXPECT_EQ(run("18446744073709551615").at("seed"), 18446744073709551615U);
 }
-
-class Interruption : public ::testing::TestWithParam<int> {};
-
-// The program makes its output file once it listens to signals.
-bool WaitForFile(const std::filesystem::path& folder) {
-  for (int attempt = 0; attempt < 3000; ++attempt) {
-    if (!std::filesystem::is_empty(folder)) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return false;
-}
-
-TEST_P(Interruption, EndsWithWhatWasDone) {
-  const TempFolder folder;
-  testing::Program program(DexcheckCommand({"consistency", "--samples", "1000000000", "--json", "out.json"}),
-                           {folder.path()});
-  ASSERT_TRUE(WaitForFile(folder.path()));
-  program.Signal(GetParam());
-  const ProgramResult result = program.Wait();
-  EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.err, HasSubstr(" of 1000000000 states were compared\n"));
-  EXPECT_THAT(result.out, HasSubstr("INTERRUPTED after "));
-  EXPECT_THAT(result.out, HasSubstr(" of 1000000000 samples. So far:\nAGREE: "));
-
-  const Json results = Json::parse(ReadText(folder.path() / "out.json"));
-  CheckSchema(results);
-  EXPECT_EQ(results.at("verdict"), "failed");
-  EXPECT_GT(results.at("samples"), 0);
-  EXPECT_LT(results.at("samples"), results.at("samples_requested"));
-  const auto files = std::filesystem::directory_iterator(folder.path());
-  EXPECT_EQ(std::distance(begin(files), end(files)), 1);
-}
-
-INSTANTIATE_TEST_SUITE_P(Signals, Interruption, ::testing::Values(SIGINT, SIGTERM),
-                         [](const auto& info) { return info.param == SIGINT ? "SigInt" : "SigTerm"; });
 
 }  // namespace
 }  // namespace dexcheck::testing::consistency_command_test

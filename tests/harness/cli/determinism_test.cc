@@ -1,13 +1,5 @@
 // Same inputs, same bytes: again, and on one processor or all.
 
-#include <gmock/gmock.h>
-
-#include <bit>
-#include <cstdint>
-#include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
-
 #include "harness/log/log_reader.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
@@ -38,46 +30,47 @@ std::string ListLog(const std::filesystem::path& path) {
   return all;
 }
 
-nlohmann::json ReadWithoutClock(const std::string& text) {
-  nlohmann::json json = nlohmann::json::parse(text);
+Json WithoutClock(Json json) {
   json.erase("seconds");
   json.erase("speed");
   return json;
 }
 
-TEST(Determinism, RunsGiveTheSameLog) {
-  const TempFolder folder;
-  const auto run = [&](const std::string& name, const std::string& seed, bool alone) {
-    std::vector<std::string> command =
-        DexcheckCommand({"run", "curve", "--set", "duration=0.3", "--seed", seed, "--no-report", "--out",
-                         (folder.path() / name).string()});
+class Determinism : public CommandTest {
+ protected:
+  /// Runs dexcheck, on one processor alone or on all.
+  ProgramResult RunOn(bool alone, const Words& arguments) const {
+    std::vector<std::string> command = DexcheckCommand(arguments);
     if (alone) command = OnOneProcessor(command);
-    const ProgramResult result = testing::RunProgram(command);
+    const ProgramResult result = RunProgram(command, {.folder = folder_.path()});
     EXPECT_EQ(result.exit_code, 0) << result.err;
-    return ListLog(folder.path() / name / "log.h5");
+    return result;
+  }
+};
+
+TEST_F(Determinism, RunsGiveTheSameLog) {
+  const auto run = [&](const std::string& name, const char* seed, bool alone) {
+    RunOn(alone, Words("run curve --set duration=0.3 --no-report") + Words{"--seed", seed, "--out", name});
+    return ListLog(Path(name + "/log.h5"));
+  };
+  const auto summary = [&](const std::string& name) {
+    return WithoutClock(ReadJson(name + "/summary.json"));
   };
   const std::string first = run("first", "3", false);
   ASSERT_GT(first.size(), 300U * 8 * 100);
   EXPECT_TRUE(run("again", "3", false) == first);
   EXPECT_TRUE(run("alone", "3", true) == first);
   EXPECT_FALSE(run("other", "4", false) == first);
-  const auto summary = [&](const char* name) {
-    return ReadWithoutClock(testing::ReadText(folder.path() / name / "summary.json"));
-  };
   EXPECT_EQ(summary("first"), summary("alone"));
   EXPECT_NE(summary("first"), summary("other"));
 }
 
-TEST(Determinism, ComparisonsGiveTheSameNumbers) {
-  const auto compare = [](const std::string& seed, bool alone) {
-    std::vector<std::string> command =
-        DexcheckCommand({"consistency", "--samples", "50", "--seed", seed, "--json", "-"});
-    if (alone) command = OnOneProcessor(command);
-    const ProgramResult result = testing::RunProgram(command);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    return ReadWithoutClock(result.out);
+TEST_F(Determinism, ComparisonsGiveTheSameNumbers) {
+  const auto compare = [&](const char* seed, bool alone) {
+    return WithoutClock(
+        Json::parse(RunOn(alone, Words("consistency --samples 50 --json - --seed") + Words{seed}).out));
   };
-  const nlohmann::json first = compare("5", false);
+  const Json first = compare("5", false);
   EXPECT_EQ(compare("5", false), first);
   EXPECT_EQ(compare("5", true), first);
   EXPECT_NE(compare("6", false), first);

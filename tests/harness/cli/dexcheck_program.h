@@ -1,26 +1,54 @@
 #pragma once
 
-// The program under test, and two robots small enough to be read at a glance.
+// The program under test, as its users run it, in a folder of its own; and robots small enough to be read at
+// a glance (files/).
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "tests/common/matchers.h"
 #include "tests/common/paths.h"
 #include "tests/common/run_program.h"
 
 namespace dexcheck::testing {
 
+using Json = nlohmann::json;
+
+/// The words of a command: a list, or a text as in a shell, where '...' holds a word with blanks together.
+class Words : public std::vector<std::string> {
+ public:
+  Words(std::initializer_list<std::string> words) : vector(words) {}
+  Words(std::vector<std::string> words) : vector(std::move(words)) {}
+  Words(const char* text) : Words(std::string(text)) {}
+  Words(const std::string& text) {
+    bool quoted = false;
+    bool begun = false;
+    for (const char c : text) {
+      if (c == '\'') {
+        quoted = !quoted;
+      } else if (c == ' ' && !quoted) {
+        begun = false;
+        continue;
+      }
+      if (!std::exchange(begun, true)) emplace_back();
+      if (c != '\'') back() += c;
+    }
+  }
+  friend Words operator+(Words a, const Words& b) { return a.insert(a.end(), b.begin(), b.end()), a; }
+};
+
 /// Command that runs dexcheck with these arguments.
-inline std::vector<std::string> DexcheckCommand(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), testing::ProgramPath());
-  return arguments;
+inline std::vector<std::string> DexcheckCommand(const Words& arguments) {
+  return Words{ProgramPath()} + arguments;
 }
 
-inline ProgramResult RunDexcheck(const std::vector<std::string>& arguments,
-                                 const ProgramOptions& options = {}) {
+inline ProgramResult RunDexcheck(const Words& arguments, const ProgramOptions& options = {}) {
   return RunProgram(DexcheckCommand(arguments), options);
 }
 
@@ -46,51 +74,73 @@ inline ::testing::AssertionResult IsRefused(const ProgramResult& result,
   return ::testing::AssertionSuccess();
 }
 
+/// Success when the JSON of a comparison lists a difference of this check at this place, with these values
+/// where they are given.
+inline ::testing::AssertionResult HasFinding(const Json& results, const std::string& check,
+                                             const std::string& where, const Json& model = nullptr,
+                                             const Json& engine = nullptr) {
+  for (const Json& finding : results.at("findings")) {
+    if (finding.at("check") == check && finding.at("where") == where &&
+        (model.is_null() || finding.at("model") == model) &&
+        (engine.is_null() || finding.at("engine") == engine))
+      return ::testing::AssertionSuccess();
+  }
+  return ::testing::AssertionFailure()
+         << check << " at " << where << " is not among " << results.at("findings");
+}
+
 /// Shipped files.
-inline const std::string kParameters = testing::SourcePath("/controller/parameters/");
-inline const std::string kMjcf = testing::SourcePath("/mjcf/");
-inline const std::vector<std::string> kPandaFiles = {"--robot", kParameters + "panda.toml", "--mjcf",
-                                                     kMjcf + "panda.xml"};
+inline const std::string kParameters = SourcePath("/controller/parameters/");
+inline const std::string kMjcf = SourcePath("/mjcf/");
+inline const std::string kPandaToml = kParameters + "panda.toml";
+inline const std::string kPandaXml = kMjcf + "panda.xml";
 
-/// A fixed base with two hinges.
-inline const std::string kTwoLinksToml = R"(name = "two links"
-gravity = [0.0, 0.0, -9.81]
+/// A file of tests/harness/cli/files: two.toml and two.xml, a fixed base with two hinges; pair.urdf and
+/// pair.xml, two hinges and full tensors; arm.xml and own.toml, an arm with a slide and a scenario for it.
+inline std::string ReadFixture(const std::string& name) {
+  return ReadText(SourcePath("/tests/harness/cli/files/" + name));
+}
 
-[base]
-type = "fixed"
-link = "stand"
+/// Tests that run dexcheck in a folder of their own; names of files are meant there.
+class CommandTest : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::filesystem::path Path(const std::string& name) const { return folder_.path() / name; }
+  [[nodiscard]] std::string Read(const std::string& name) const { return ReadText(Path(name)); }
+  [[nodiscard]] Json ReadJson(const std::string& name) const { return Json::parse(Read(name)); }
+  [[nodiscard]] bool Has(const std::string& name) const { return std::filesystem::exists(Path(name)); }
+  [[nodiscard]] long CountFiles(const std::string& name = ".") const {
+    return std::distance(std::filesystem::directory_iterator(Path(name)), {});
+  }
+  void Write(const std::string& name, const std::string& text) const { WriteText(Path(name), text); }
+  /// Writes a text with one place changed.
+  void WriteChanged(const std::string& name, const std::string& text, const std::string& from,
+                    const std::string& to) const {
+    Write(name, ReplaceOnce(text, from, to));
+  }
+  /// Copies a fixture under its own name.
+  void Copy(const std::string& fixture) const { Write(fixture, ReadFixture(fixture)); }
 
-[[chain]]
-parent = "stand"
-rows = [
-  { joint = "shoulder", link = "upper", alpha_deg = 0, a = 0, q = 0, d = 0.1 },
-  { joint = "elbow", link = "lower", alpha_deg = -90, a = 0.3, q = 0, d = 0 },
-]
-frames = [{ name = "tip", link = "lower", xyz = [0.2, 0.0, 0.0] }]
-[chain.joints]
-shoulder = { range = [-2.0, 2.0], damping = 0.10, armature = 0.01 }
-elbow = { range = [-1.0, 1.0], damping = 0.05, armature = 0.02 }
-[chain.links]
-upper = { mass = 1.5, com = [0.1, 0.0, 0.0], inertia = [0.01, 0.02, 0.02, 0, 0, 0] }
-lower = { mass = 0.8, com = [0.1, 0.0, 0.0], inertia = [0.01, 0.01, 0.01, 0, 0, 0] }
-)";
+  [[nodiscard]] ProgramResult Run(const Words& arguments, ProgramOptions options = {}) const {
+    options.folder = folder_.path();
+    return RunDexcheck(arguments, options);
+  }
+  /// Runs the command, which must end with this exit code.
+  ProgramResult Expect(int exit_code, const Words& arguments, const ProgramOptions& options = {}) const {
+    const ProgramResult result = Run(arguments, options);
+    EXPECT_EQ(result.exit_code, exit_code) << arguments[0] << ": " << result.out << result.err;
+    return result;
+  }
+  /// What the command prints with --json, and nothing else.
+  [[nodiscard]] Json RunJson(int exit_code, const Words& arguments) const {
+    return Json::parse(Expect(exit_code, arguments + Words{"--json", "-"}).out);
+  }
+  /// Success when the command is refused in one line with these parts.
+  [[nodiscard]] ::testing::AssertionResult Refused(const Words& arguments,
+                                                   const std::vector<std::string>& parts) const {
+    return IsRefused(Run(arguments), parts);
+  }
 
-inline const std::string kTwoLinksMjcf = R"(<mujoco>
-  <compiler angle="radian"/>
-  <worldbody>
-    <body name="stand">
-      <body name="upper" pos="0 0 0.1">
-        <joint name="shoulder" axis="0 0 1" damping="0.10" armature="0.01" limited="true" range="-2 2"/>
-        <inertial pos="0.1 0 0" mass="1.5" diaginertia="0.01 0.02 0.02"/>
-        <body name="lower" pos="0.3 0 0" quat="1 -1 0 0">
-          <joint name="elbow" axis="0 0 1" damping="0.05" armature="0.02" limited="true" range="-1 1"/>
-          <inertial pos="0.1 0 0" mass="0.8" diaginertia="0.01 0.01 0.01"/>
-          <site name="tip" pos="0.2 0 0"/>
-        </body>
-      </body>
-    </body>
-  </worldbody>
-</mujoco>
-)";
+  TempFolder folder_;
+};
 
 }  // namespace dexcheck::testing

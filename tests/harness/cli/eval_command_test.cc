@@ -1,11 +1,6 @@
 // dexcheck eval: state files, names and shapes of the terms, all digits of their values, and the engine's
 // side.
 
-#include <gmock/gmock.h>
-
-#include <algorithm>
-#include <nlohmann/json.hpp>
-#include <ostream>
 #include <random>
 
 #include "controller/dynamics/model_terms.h"
@@ -16,8 +11,6 @@
 
 namespace dexcheck::testing::eval_command_test {
 namespace {
-
-using Json = nlohmann::json;
 
 std::vector<double> ToList(const VectorXd& vector) { return {vector.begin(), vector.end()}; }
 
@@ -45,20 +38,15 @@ MatrixXd ToMatrix(const Json& rows) {
   return matrix;
 }
 
-class EvalCommand : public ::testing::Test {
+class EvalCommand : public CommandTest {
  protected:
-  /// Runs eval in the folder on this state and parses what it prints.
-  Json Evaluate(const Json& state, const std::vector<std::string>& options = {}) {
-    WriteText(folder_.path() / "state.json", state.dump());
-    std::vector<std::string> arguments = {"eval", "--state", "state.json"};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    const ProgramResult result = RunDexcheck(arguments, {folder_.path()});
-    EXPECT_EQ(result.exit_code, 0) << result.err;
+  /// What eval says of this state.
+  [[nodiscard]] Json Evaluate(const Json& state, const Words& options = "--out -") const {
+    Write("state.json", state.dump());
+    const ProgramResult result = Expect(0, Words("eval --state state.json") + options);
     EXPECT_EQ(result.err, "");
     return Json::parse(result.out);
   }
-
-  TempFolder folder_;
 };
 
 struct Shape {
@@ -80,7 +68,7 @@ void ExpectShapes(const Json& terms, const std::vector<Shape>& shapes) {
 }
 
 TEST_F(EvalCommand, ShippedRobotHasEveryTerm) {
-  const RobotModel model = ReadRobotModel(testing::kParameters + "assistant_robot.toml");
+  const RobotModel model = ReadRobotModel(kParameters + "assistant_robot.toml");
   const Json terms = Evaluate(MakeState(model, true));
   EXPECT_EQ(terms.at("robot"), "personal assistant robot");
   ExpectShapes(terms, {{"q", 51, 1},        {"xi", 50, 1},
@@ -115,8 +103,8 @@ TEST_F(EvalCommand, ShippedRobotHasEveryTerm) {
 }
 
 TEST_F(EvalCommand, PandaHasEveryTerm) {
-  const RobotModel model = ReadRobotModel(testing::kParameters + "panda.toml");
-  const Json terms = Evaluate(MakeState(model, false), {"--robot", testing::kParameters + "panda.toml"});
+  const RobotModel model = ReadRobotModel(kPandaToml);
+  const Json terms = Evaluate(MakeState(model, false), {"--robot", kPandaToml});
   ExpectShapes(terms,
                {{"q", 7, 1}, {"xi", 7, 1}, {"M_bar", 7, 7}, {"C_bar", 7, 7}, {"bias", 7, 1}, {"M", 7, 7}});
   ExpectShapes(terms.at("frames").at("panda_flange"), {{"pose", 4, 4}, {"J_f", 6, 7}});
@@ -125,7 +113,7 @@ TEST_F(EvalCommand, PandaHasEveryTerm) {
 }
 
 TEST_F(EvalCommand, ValuesKeepAllTheirDigits) {
-  const RobotModel model = ReadRobotModel(testing::kParameters + "assistant_robot.toml");
+  const RobotModel model = ReadRobotModel(kParameters + "assistant_robot.toml");
   const Json state = MakeState(model, false);
   const Json terms = Evaluate(state);
   EXPECT_EQ(terms.at("q"), state.at("q"));
@@ -143,14 +131,12 @@ TEST_F(EvalCommand, ValuesKeepAllTheirDigits) {
 }
 
 TEST_F(EvalCommand, WritesTheSameToAFile) {
-  const RobotModel model = ReadRobotModel(testing::kParameters + "panda.toml");
-  const std::vector<std::string> robot = {"--robot", testing::kParameters + "panda.toml"};
+  const RobotModel model = ReadRobotModel(kPandaToml);
+  const Words robot = {"--robot", kPandaToml};
   const Json printed = Evaluate(MakeState(model, false), robot);
-  const ProgramResult result = RunDexcheck(
-      {"eval", "--state", "state.json", robot[0], robot[1], "--out", "out.json"}, {folder_.path()});
-  EXPECT_EQ(result.exit_code, 0);
+  const ProgramResult result = Expect(0, Words("eval --state state.json --out out.json") + robot);
   EXPECT_EQ(result.out + result.err, "");
-  EXPECT_EQ(Json::parse(ReadText(folder_.path() / "out.json")), printed);
+  EXPECT_EQ(ReadJson("out.json"), printed);
 }
 
 // Measured at most 8e-15 on both robots.
@@ -171,9 +157,9 @@ class EvalWithEngine : public EvalCommand,
                        public ::testing::WithParamInterface<std::pair<const char*, const char*>> {};
 
 TEST_P(EvalWithEngine, BothSidesAgreeTermByTerm) {
-  const std::string robot = testing::kParameters + GetParam().first;
+  const std::string robot = kParameters + GetParam().first;
   const Json terms = Evaluate(MakeState(ReadRobotModel(robot), false),
-                              {"--robot", robot, "--mjcf", testing::kMjcf + GetParam().second});
+                              {"--robot", robot, "--mjcf", kMjcf + GetParam().second});
   const Json& engine = terms.at("engine");
   for (const char* name : kCommonTerms) {
     EXPECT_GT(ToMatrix(engine.at(name)).norm(), 0.0) << name;
@@ -197,11 +183,11 @@ INSTANTIATE_TEST_SUITE_P(Robots, EvalWithEngine,
                          [](const auto& info) { return info.index == 0 ? "Assistant" : "Panda"; });
 
 TEST_F(EvalCommand, EngineKnowsNothingOfTheParameters) {
-  const std::string panda = ReadText(testing::kParameters + "panda.toml");
-  WriteText(folder_.path() / "bad.toml", ReplaceOnce(panda, "mass = 3.228604", "mass = 3.3"));
-  const Json state = MakeState(ReadRobotModel(testing::kParameters + "panda.toml"), false);
-  const std::string mjcf = testing::kMjcf + "panda.xml";
-  const Json good = Evaluate(state, {"--robot", testing::kParameters + "panda.toml", "--mjcf", mjcf});
+  const std::string panda = ReadText(kPandaToml);
+  WriteChanged("bad.toml", panda, "mass = 3.228604", "mass = 3.3");
+  const Json state = MakeState(ReadRobotModel(kPandaToml), false);
+  const std::string mjcf = kPandaXml;
+  const Json good = Evaluate(state, {"--robot", kPandaToml, "--mjcf", mjcf});
   const Json bad = Evaluate(state, {"--robot", "bad.toml", "--mjcf", mjcf});
   EXPECT_EQ(bad.at("engine"), good.at("engine"));
   EXPECT_GT(CompareTerm(bad, bad.at("engine"), "M_bar"), 1e-4);
@@ -209,99 +195,16 @@ TEST_F(EvalCommand, EngineKnowsNothingOfTheParameters) {
   EXPECT_LT(CompareTerm(bad, bad.at("engine"), "friction"), kRounding);
 }
 
-struct BadState {
-  const char* name;
-  std::string text;
-  std::vector<std::string> parts;
-};
-void PrintTo(const BadState& bad, std::ostream* stream) { *stream << bad.name; }
-
-class BadStates : public ::testing::TestWithParam<BadState> {};
-
-TEST_P(BadStates, AreRefusedInOneLine) {
-  const TempFolder folder;
-  WriteText(folder.path() / "robot.toml",
-            testing::kTwoLinksToml +
-                "[object]\nbody = \"ball\"\nshape = \"sphere\"\nradius = 0.1\nmass = 0.2\nfriction = 0.5\n");
-  WriteText(folder.path() / "state.json", GetParam().text);
-  WriteText(folder.path() / "out.json", "before");
-  const ProgramResult result = RunDexcheck(
-      {"eval", "--robot", "robot.toml", "--state", "state.json", "--out", "out.json"}, {folder.path()});
-  std::vector<std::string> parts = GetParam().parts;
-  parts.emplace_back("state.json: ");
-  EXPECT_TRUE(IsRefused(result, parts));
-  EXPECT_EQ(ReadText(folder.path() / "out.json"), "before");
-}
-
-const std::string kGoodStart = R"({"q": [0, 1], "xi": [0, 1], )";
-
-INSTANTIATE_TEST_SUITE_P(
-    States, BadStates,
-    ::testing::ValuesIn(std::vector<BadState>{
-        {"TooShort", R"({"q": [0], "xi": [0, 1]})", {"q: must be a list of 2 numbers, got 1"}},
-        {"TooLong", R"({"q": [0, 1], "xi": [0, 1, 2]})", {"xi: must be a list of 2 numbers, got 3"}},
-        {"TextForNumber", R"({"q": [0, "one"], "xi": [0, 1]})", {"q[1]: must be a number, got \"one\""}},
-        {"TextForList", R"({"q": "0 1", "xi": [0, 1]})", {"q: must be a list of 2 numbers, got \"0 1\""}},
-        {"Null", R"({"q": [0, null], "xi": [0, 1]})", {"q[1]: must be a number, got null"}},
-        {"NotANumber",
-         R"({"q": [0, NaN], "xi": [0, 1]})",
-         {"not valid JSON: ", "line 1, column 11", "last read: '0, N'"}},
-        {"Infinite",
-         R"({"q": [0, 1e999], "xi": [0, 1]})",
-         {"not valid JSON: number overflow parsing '1e999'"}},
-        {"MissingKey", R"({"q": [0, 1]})", {"xi: missing key"}},
-        {"UnknownKey",
-         kGoodStart + R"("qdot": [0, 1]})",
-         {"qdot: unknown key, known here are q, xi, object, kappa, contact_points, fingers, mu, law"}},
-        {"NotAnObject", "[0, 1]", {"must be a JSON object, got [0,1]"}},
-        {"NotJson", "q = [0, 1]\n", {"not valid JSON: ", "line 1, column 1"}},
-        {"Empty", "", {"not valid JSON: ", "unexpected end of input"}},
-        {"Binary", std::string("\0\xff\n\n", 4), {"not valid JSON: "}},
-        {"NestedDeeply",
-         std::string(500000, '[') + std::string(500000, ']'),
-         {"nested too deeply, more than 32 brackets"}},
-        {"LongValue",
-         R"({"q": ")" + std::string(5000, 'x') + R"(", "xi": [0, 1]})",
-         {"q: must be a list", "xxx..."}},
-        {"ObjectIsList", kGoodStart + R"("object": []})", {"object: must be a JSON object, got []"}},
-        {"ObjectMissingKey",
-         kGoodStart + R"("object": {"X_o": [0, 0, 0, 0, 1, 0]}})",
-         {"object.X_o_dot: missing key"}},
-        {"ObjectUnknownKey",
-         kGoodStart + R"("object": {"X_0": []}})",
-         {"object.X_0: unknown key, known here are X_o, X_o_dot"}},
-        {"Singular",
-         kGoodStart + R"("object": {"X_o": [0, 0, 0, 0, 0, 0], "X_o_dot": [0, 0, 0, 0, 0, 0]}})",
-         {"object.X_o: ", "singular", "beta = 0 rad"}},
-        {"KappaWithoutFingertips",
-         kGoodStart + R"("kappa": [[0, 0, 0, 0, 0]]})",
-         {"has 0 fingertips, needed are 3"}},
-    }),
-    [](const auto& info) { return info.param.name; });
-
-TEST_F(EvalCommand, RefusesAnObjectThatTheRobotDoesNotKnow) {
-  const RobotModel model = ReadRobotModel(testing::kParameters + "panda.toml");
-  WriteText(folder_.path() / "state.json", MakeState(model, true).dump());
-  EXPECT_TRUE(
-      IsRefused(RunDexcheck({"eval", "--state", "state.json", "--robot", testing::kParameters + "panda.toml"},
-                            {folder_.path()}),
-                {"state.json: object: ", "panda.toml has no [object]"}));
-  EXPECT_TRUE(IsRefused(RunDexcheck({"eval", "--state", "no.json"}, {folder_.path()}),
-                        {"no.json: cannot be read: No such file or directory"}));
-  EXPECT_TRUE(IsRefused(RunDexcheck({"eval", "--state", "."}, {folder_.path()}),
-                        {".: cannot be read: is a directory"}));
-}
-
 // A ball joint has four positions and three velocities; model and engine have the same terms there.
 TEST_F(EvalCommand, BallJointsHaveQuaternions) {
-  WriteText(folder_.path() / "arm.xml",
-            R"(<mujoco model="arm"><compiler angle="radian"/><worldbody><body name="stand">
+  Write("arm.xml",
+        R"(<mujoco model="arm"><compiler angle="radian"/><worldbody><body name="stand">
 <body name="upper" pos="0 0 1"><joint name="shoulder" type="ball" damping="0.2" armature="0.01" limited="true" range="0 1.5"/>
 <inertial pos="0.1 0.02 0" mass="2" diaginertia="0.01 0.02 0.025"/>
 <body name="lower" pos="0.3 0 0"><joint name="elbow" axis="0 1 0"/>
 <inertial pos="0.1 0 0.01" mass="1" diaginertia="0.004 0.006 0.008"/></body></body></body></worldbody></mujoco>)");
-  ASSERT_EQ(RunDexcheck({"import", "arm.xml", "--out", "arm.toml"}, {folder_.path()}).exit_code, 0);
-  const std::vector<std::string> files = {"--robot", "arm.toml", "--mjcf", "arm.xml"};
+  Expect(0, "import arm.xml --out arm.toml");
+  const Words files = "--robot arm.toml --mjcf arm.xml";
   const Json terms = Evaluate({{"q", {0.8, 0.3, -0.4, 0.2, 0.7}}, {"xi", {1.0, -2.0, 0.5, 1.5}}}, files);
   const Json& engine = terms.at("engine");
   constexpr double kRounding = 1e-14;  // of 2 kg over 1 m
@@ -311,16 +214,12 @@ TEST_F(EvalCommand, BallJointsHaveQuaternions) {
     EXPECT_GT(values.topRows(3).cwiseAbs().maxCoeff(), 0.01) << force;
     EXPECT_TRUE(MatrixNear(values, ToMatrix(engine.at(force)), 100.0 * kRounding)) << force;
   }
-  const auto refuse = [&](const Json& state, const std::vector<std::string>& parts) {
-    WriteText(folder_.path() / "state.json", state.dump());
-    std::vector<std::string> arguments = {"eval", "--state", "state.json"};
-    arguments.insert(arguments.end(), files.begin(), files.end());
-    EXPECT_TRUE(IsRefused(RunDexcheck(arguments, {folder_.path()}), parts));
-  };
-  refuse({{"q", {0.1, 0.2}}, {"xi", {1.0, -2.0, 0.5, 1.5}}},
-         {"state.json: q: must be a list of 5 numbers", "ball joint, \"shoulder\", has four", "got 2"});
-  refuse({{"q", {0, 0, 0, 0, 0.7}}, {"xi", {1.0, -2.0, 0.5, 1.5}}},
-         {"state.json: q[0..3]: must be a quaternion", "joint \"shoulder\""});
+  for (const auto& [q, parts] : std::vector<std::pair<Json, std::vector<std::string>>>{
+           {{0.1, 0.2}, {"state.json: q: ", "5 numbers", "ball joint, \"shoulder\"", "got 2"}},
+           {{0, 0, 0, 0, 0.7}, {"state.json: q[0..3]: ", "quaternion", "joint \"shoulder\""}}}) {
+    Write("state.json", Json({{"q", q}, {"xi", {1.0, -2.0, 0.5, 1.5}}}).dump());
+    EXPECT_TRUE(Refused(Words("eval --state state.json") + files, parts));
+  }
 }
 
 }  // namespace

@@ -1,11 +1,6 @@
 // dexcheck eval with contacts: G against wrenches worked by hand, J_B against the fingertips' velocities, bad
 // contacts.
 
-#include <gmock/gmock.h>
-
-#include <nlohmann/json.hpp>
-#include <ostream>
-
 #include "controller/common/types.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
@@ -14,26 +9,8 @@
 namespace dexcheck::testing::eval_contacts_test {
 namespace {
 
-using Json = nlohmann::json;
-
 // Lengths of some 0.05 m and unit vectors, a few operations each.
 constexpr double kRounding = 1e-15;
-
-Json MakeState() {
-  std::vector<double> q(51);
-  std::vector<double> xi(50);
-  for (size_t i = 0; i < q.size(); ++i) q[i] = 0.3 * std::sin(1.0 + static_cast<double>(i));
-  for (size_t i = 0; i < xi.size(); ++i) xi[i] = 0.4 * std::cos(2.0 + static_cast<double>(i));
-  return {
-      {"q", q},
-      {"xi", xi},
-      {"object", {{"X_o", {0.4, -0.2, 0.7, 0.3, 1.1, -0.5}}, {"X_o_dot", {0.1, 0.2, -0.3, 0.4, 0.5, 0.6}}}}};
-}
-
-/// Four points on the outer equator of the shipped torus (R + r = 46 mm).
-Json EquatorPoints() {
-  return {{0.046, 0.0, 0.0}, {0.0, 0.046, 0.0}, {-0.046, 0.0, 0.0}, {0.0, -0.046, 0.0}};
-}
 
 MatrixXd ToMatrix(const Json& rows) {
   MatrixXd matrix(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(rows.front().size()));
@@ -45,28 +22,23 @@ MatrixXd ToMatrix(const Json& rows) {
   return matrix;
 }
 
-class EvalContacts : public ::testing::Test {
+/// files/grasp.json: four fingertips at points on the outer equator of the shipped torus (R + r = 46 mm).
+class EvalContacts : public CommandTest {
  protected:
-  ProgramResult Run(const Json& state) {
-    WriteText(folder_.path() / "state.json", state.dump());
-    return RunDexcheck({"eval", "--state", "state.json"}, {folder_.path()});
+  [[nodiscard]] Json Evaluate(const Json& state) const {
+    Write("state.json", state.dump());
+    return Json::parse(Expect(0, "eval --state state.json").out);
   }
-  Json Evaluate(const Json& state) {
-    const ProgramResult result = Run(state);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    return Json::parse(result.out);
-  }
-  TempFolder folder_;
+
+  Json state_ = Json::parse(ReadFixture("grasp.json"));
 };
 
 TEST_F(EvalContacts, GraspMapOfTheEquator) {
-  Json state = MakeState();
-  state["contact_points"] = EquatorPoints();
-  const Json terms = Evaluate(state);
+  const Json terms = Evaluate(state_);
   const MatrixXd G = ToMatrix(terms.at("G"));
   ASSERT_EQ(G.rows(), 6);
   ASSERT_EQ(G.cols(), 12);
-  const MatrixXd points = ToMatrix(EquatorPoints());
+  const MatrixXd points = ToMatrix(state_["contact_points"]);
   for (int i = 0; i < 4; ++i) {
     // A unit normal force pushes inward through the centre: [-n; 0]. Any force has the moment p x f.
     const Vector3d p = points.row(i);
@@ -80,16 +52,13 @@ TEST_F(EvalContacts, GraspMapOfTheEquator) {
 }
 
 TEST_F(EvalContacts, ContactJacobianTurnsFingertipVelocityToTheContact) {
-  Json state = MakeState();
-  state["contact_points"] = EquatorPoints();
-  state["fingers"] = {"rf2_tip", "lf1_tip", "rf4_tip", "lf3_tip"};
-  const Json terms = Evaluate(state);
+  const Json terms = Evaluate(state_);
   const MatrixXd J_B = ToMatrix(terms.at("J_B"));
   ASSERT_EQ(J_B.rows(), 12);
   ASSERT_EQ(J_B.cols(), 50);
   for (size_t i = 0; i < 4; ++i) {
     const Json& contact = terms.at("contacts").at(i);
-    EXPECT_EQ(contact.at("finger"), state["fingers"].at(i));
+    EXPECT_EQ(contact.at("finger"), state_["fingers"].at(i));
     const MatrixXd J_f = ToMatrix(terms.at("frames").at(contact.at("finger").get<std::string>()).at("J_f"));
     const MatrixXd g_f_cf = ToMatrix(contact.at("g_f_cf"));
     const Matrix3d R = g_f_cf.topLeftCorner<3, 3>();
@@ -101,10 +70,10 @@ TEST_F(EvalContacts, ContactJacobianTurnsFingertipVelocityToTheContact) {
 }
 
 TEST_F(EvalContacts, CoordinatesGiveTheSameTermsAsPoints) {
-  Json by_points = MakeState();
-  by_points["contact_points"] = EquatorPoints();
-  const Json expected = Evaluate(by_points);
-  Json by_kappa = MakeState();
+  state_.erase("fingers");
+  const Json expected = Evaluate(state_);
+  Json by_kappa = state_;
+  by_kappa.erase("contact_points");
   for (const Json& contact : expected.at("contacts")) {
     ASSERT_EQ(contact.at("charts"), Json({0, 0}));
     by_kappa["kappa"].push_back(contact.at("kappa"));
@@ -120,20 +89,7 @@ TEST_F(EvalContacts, CoordinatesGiveTheSameTermsAsPoints) {
 
 // Sections 4.4 and 5 as they are printed, from the other terms.
 TEST_F(EvalContacts, LawIsThePrintedOne) {
-  Json state = MakeState();
-  state["contact_points"] = EquatorPoints();
-  state["mu"] = 0.8;
-  std::vector<double> sigma_prime(50);
-  for (size_t i = 0; i < sigma_prime.size(); ++i) sigma_prime[i] = std::sin(3.0 + static_cast<double>(i));
-  state["law"] = {{"X_d", {0.41, -0.2, 0.7, 0.3, 1.12, -0.5}},
-                  {"X_d_dot", {0.1, 0.3, -0.3, 0.4, 0.5, 0.5}},
-                  {"X_d_ddot", {0.5, 0.1, 0.2, -0.1, 0.3, 0.2}},
-                  {"K_p", {400, 400, 400, 300, 300, 300}},
-                  {"K_v", {40, 40, 40, 30, 30, 30}},
-                  {"f_min", 1.0},
-                  {"f_max", 200.0},
-                  {"sigma_prime", sigma_prime}};
-  const Json terms = Evaluate(state);
+  const Json terms = Evaluate(state_);
   const Json& law = terms.at("law");
   const auto vector = [](const Json& list) {
     const std::vector<double> values = list;
@@ -152,10 +108,10 @@ TEST_F(EvalContacts, LawIsThePrintedOne) {
   expect_near(ToMatrix(law.at("J_B_pinv")), J_pinv, "J_B_pinv");
   expect_near(ToMatrix(law.at("N")), N, "N");
 
-  const Json& given = state.at("law");
-  const VectorXd X_o = vector(state.at("object").at("X_o")),
-                 X_o_dot = vector(state.at("object").at("X_o_dot"));
-  const VectorXd V_o = P_inv * X_o_dot, xi = vector(state.at("xi"));
+  const Json& given = state_.at("law");
+  const VectorXd X_o = vector(state_.at("object").at("X_o")),
+                 X_o_dot = vector(state_.at("object").at("X_o_dot"));
+  const VectorXd V_o = P_inv * X_o_dot, xi = vector(state_.at("xi"));
   // (55): X_o_ddot = X_d_ddot + K_v E_dot + K_p E
   const VectorXd X_o_ddot = vector(given.at("X_d_ddot")) +
                             vector(given.at("K_v")).cwiseProduct(vector(given.at("X_d_dot")) - X_o_dot) +
@@ -188,32 +144,9 @@ TEST_F(EvalContacts, LawIsThePrintedOne) {
               "A");
 }
 
-TEST_F(EvalContacts, RefusesImpossibleLaws) {
-  Json state = MakeState();
-  const Json six = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-  const Json law = {{"X_d", six}, {"X_d_dot", six}, {"X_d_ddot", six}, {"K_p", six},
-                    {"K_v", six}, {"f_min", 1.0},   {"f_max", 50.0}};
-  state["law"] = law;
-  EXPECT_TRUE(IsRefused(Run(state), {"law: needs object, and kappa or contact_points"}));
-  state["contact_points"] = EquatorPoints();
-  const auto expect_refused = [&](const char* key, const Json& value, const std::string& message) {
-    Json changed = state;
-    changed["law"][key] = value;
-    EXPECT_TRUE(IsRefused(Run(changed), {message}));
-  };
-  expect_refused("f_max", 0.5, "law.f_max: must be above f_min = 1, got 0.5");
-  expect_refused("f_min", -1.0, "law.f_min: must not be negative");
-  expect_refused("X_d", {1.0}, "law.X_d: must be a list of 6 numbers, got 1");
-  expect_refused("gain", 1.0, "law.gain: unknown key");
-  // Without friction to speak of no forces hold the object.
-  state["mu"] = 1e-6;
-  EXPECT_TRUE(IsRefused(Run(state), {"law: no contact forces inside the friction cones hold the object"}));
-}
-
 TEST_F(EvalContacts, ForceClosureNeedsFriction) {
-  Json state = MakeState();
-  state["contact_points"] = EquatorPoints();
-  state["mu"] = 0.8;
+  Json state = state_;
+  state.erase("law");
   const Json closed = Evaluate(state).at("force_closure");
   EXPECT_EQ(closed.at("closed"), true);
   EXPECT_GT(closed.at("margin_lower"), 0.01);
@@ -225,33 +158,6 @@ TEST_F(EvalContacts, ForceClosureNeedsFriction) {
   const Json open = Evaluate(state).at("force_closure");
   EXPECT_EQ(open.at("closed"), false);
   EXPECT_EQ(open.at("weakest_wrench").size(), 6U);
-}
-
-TEST_F(EvalContacts, RefusesImpossibleContacts) {
-  const auto expect_refused = [&](const Json& change, const std::string& message) {
-    Json state = MakeState();
-    state["contact_points"] = EquatorPoints();
-    state.merge_patch(change);
-    EXPECT_TRUE(IsRefused(Run(state), {message}));
-  };
-  expect_refused({{"contact_points", {{0.046, 0, 0}, {0, 0.046, 0}, {-0.046, 0, 0}, {0, -0.046, 0.001}}}},
-                 "contact_points[3]: distance of the contact point from the surface [m]");
-  expect_refused({{"contact_points", {{0.046, 0, 0}, {0, 0.046, 0}}}},
-                 "contact_points: must be a list of 3 to 8 lists");
-  const Json row = {0.1, 0.2, 0.3, 0.4, 0.5};
-  expect_refused({{"contact_points", nullptr}, {"kappa", {row, row}}},
-                 "kappa: must be a list of 3 to 8 lists, one for each");
-  expect_refused({{"contact_points", nullptr}, {"kappa", {row, {0.1, 0.2, 0.3, 0.4}, row}}},
-                 "kappa[1]: must be a list of 5 numbers, got 4");
-  expect_refused({{"kappa", {row, row, row}}}, "kappa: give kappa or contact_points, not both");
-  expect_refused({{"mu", 0}}, "mu: must be a positive number, got 0");
-  expect_refused({{"mu", -0.5}}, "mu: must be a positive number, got -0.5");
-  expect_refused({{"fingers", {"rf1_tip", "rf1_tip", "rf2_tip", "rf3_tip"}}},
-                 "fingers[1]: names a fingertip again");
-  expect_refused({{"fingers", {"rf1_tip", "nose", "rf2_tip", "rf3_tip"}}},
-                 "fingers[1]: must name a fingertip");
-  expect_refused({{"object", nullptr}}, "contact_points: needs object");
-  expect_refused({{"contact_points", nullptr}, {"mu", 0.5}}, "mu: needs kappa or contact_points");
 }
 
 }  // namespace

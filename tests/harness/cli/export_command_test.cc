@@ -1,14 +1,11 @@
 // dexcheck export: a run's log as a table.
 
-#include <gmock/gmock.h>
-
 #include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <sstream>
 
 #include "harness/log/log_writer.h"
-#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing::export_command_test {
@@ -40,11 +37,11 @@ std::vector<double> ReadNumbers(const std::string& line) {
   return numbers;
 }
 
-class ExportTest : public ::testing::Test {
+class ExportTest : public CommandTest {
  protected:
   ExportTest() {
     std::filesystem::create_directory(folder_.path() / "run");
-    LogWriter log(folder_.path() / "run/log.h5", 100);
+    LogWriter log(Path("run/log.h5"), 100);
     log.AddSignal({"object/X_o", "m, rad", "Pose of the object", 2, {"x", "phi"}, {}});
     log.AddSignal({"object/f", "N", "Force", 2, {}, {}});
     log.AddSignal({"check/mixed", "m, rad", "Two units, three numbers", 3, {}, {}});
@@ -63,30 +60,22 @@ class ExportTest : public ::testing::Test {
     log.Close();
   }
 
-  [[nodiscard]] testing::ProgramResult Export(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.begin(), {"export", "run"});
-    testing::ProgramOptions options;
-    options.folder = folder_.path();
-    return RunDexcheck(arguments, options);
+  [[nodiscard]] ProgramResult Export(const Words& arguments) const {
+    return Run(Words("export run") + arguments);
   }
 
   /// The first line of what goes to standard output.
   [[nodiscard]] std::string HeaderOf(const std::string& signals) const {
-    const testing::ProgramResult result = Export({"--csv", "-", "--signals", signals});
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    return SplitLines(result.out).at(0);
+    return SplitLines(Expect(0, {"export", "run", "--csv", "-", "--signals", signals}).out).at(0);
   }
-
-  testing::TempFolder folder_;
 };
 
 TEST_F(ExportTest, EveryNumberReadsBackExactly) {
-  const testing::ProgramResult result = Export({"--csv", "out.csv"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const ProgramResult result = Expect(0, "export run --csv out.csv");
   EXPECT_EQ(result.out, "");
-  EXPECT_THAT(result.err, ::testing::HasSubstr("cut off after")) << "the log has no summary";
-  const std::string text = ReadText(folder_.path() / "out.csv");
-  EXPECT_THAT(text, ::testing::StartsWith(kHeader));
+  EXPECT_THAT(result.err, HasSubstr("cut off after")) << "the log has no summary";
+  const std::string text = Read("out.csv");
+  EXPECT_THAT(text, StartsWith(kHeader));
   const std::vector<std::string> lines = SplitLines(text);
   ASSERT_EQ(lines.size(), kRows + 1U);
   for (long row = 0; row < kRows; ++row) {
@@ -95,9 +84,9 @@ TEST_F(ExportTest, EveryNumberReadsBackExactly) {
     EXPECT_EQ(numbers[0], 1e-3 * static_cast<double>(row));
     for (int k = 1; k < 8; ++k) EXPECT_EQ(numbers[static_cast<size_t>(k)], Number(row, k)) << row << " " << k;
   }
-  EXPECT_THAT(lines[4], ::testing::EndsWith(",nan"));
-  EXPECT_THAT(lines[5], ::testing::EndsWith(",-inf"));
-  EXPECT_EQ(Export({"--csv", "-"}).out, text);
+  EXPECT_THAT(lines[4], EndsWith(",nan"));
+  EXPECT_THAT(lines[5], EndsWith(",-inf"));
+  EXPECT_EQ(Export("--csv -").out, text);
 }
 
 TEST_F(ExportTest, SignalsAreChosenByPattern) {
@@ -108,37 +97,29 @@ TEST_F(ExportTest, SignalsAreChosenByPattern) {
   EXPECT_EQ(HeaderOf("object/?"), "time [s],object/f.0 [N],object/f.1 [N]");
   EXPECT_EQ(HeaderOf("*") + "\n", kHeader);
   // The option takes one word: the folder may follow it.
-  testing::ProgramOptions options;
-  options.folder = folder_.path();
-  const testing::ProgramResult result =
-      RunDexcheck({"export", "--csv", "-", "--signals", "check/M_bar", "run"}, options);
-  EXPECT_THAT(result.out, ::testing::StartsWith("time [s],check/M_bar [1]\n")) << result.err;
+  EXPECT_THAT(Expect(0, "export --csv - --signals check/M_bar run").out,
+              StartsWith("time [s],check/M_bar [1]\n"));
 }
 
 TEST_F(ExportTest, RowsAreThinnedOut) {
-  const std::vector<std::string> all = SplitLines(Export({"--csv", "-"}).out);
-  EXPECT_THAT(SplitLines(Export({"--csv", "-", "--every", "10"}).out),
-              ElementsAre(all[0], all[1], all[11], all[21]));
-  EXPECT_THAT(SplitLines(Export({"--csv", "-", "--every", "1000"}).out), ElementsAre(all[0], all[1]));
+  const std::vector<std::string> all = SplitLines(Export("--csv -").out);
+  EXPECT_THAT(SplitLines(Export("--csv - --every 10").out), ElementsAre(all[0], all[1], all[11], all[21]));
+  EXPECT_THAT(SplitLines(Export("--csv - --every 1000").out), ElementsAre(all[0], all[1]));
 }
 
 TEST_F(ExportTest, ListNamesUnitsAndDescriptions) {
-  const testing::ProgramResult result = Export({"--list"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(SplitLines(result.out), ElementsAre("25 rows", "signal       numbers  [unit] description",
-                                                  "time               1  [s] Simulated time",
-                                                  "object/X_o         2  [m, rad] Pose of the object",  //
-                                                  "object/f           2  [N] Force",
-                                                  "check/mixed        3  [m, rad] Two units, three numbers",
-                                                  "check/M_bar        1  [1] Worst error"));
-  EXPECT_THAT(SplitLines(Export({"--list", "--signals", "object/f"}).out), ::testing::SizeIs(4));
+  const std::vector<std::string> lines = SplitLines(Expect(0, "export run --list").out);
+  ASSERT_EQ(lines.size(), 7U);
+  EXPECT_THAT(lines[0], StartsWith("25 "));
+  EXPECT_THAT(lines[3], AllOf(StartsWith("object/X_o "), EndsWith(" 2  [m, rad] Pose of the object")));
+  EXPECT_EQ(SplitLines(Export("--list --signals object/f").out).size(), 4U);
 }
 
 /// More text than is handed on at a time.
 TEST_F(ExportTest, LongLogsAreWhole) {
   constexpr long kManyRows = 60000;
-  std::filesystem::remove(folder_.path() / "run/log.h5");
-  LogWriter log(folder_.path() / "run/log.h5", kManyRows);
+  std::filesystem::remove(Path("run/log.h5"));
+  LogWriter log(Path("run/log.h5"), kManyRows);
   log.AddSignal({"x", "m", "", 1, {}, {}});
   log.StartRows();
   for (long row = 0; row < kManyRows; ++row) {
@@ -147,8 +128,8 @@ TEST_F(ExportTest, LongLogsAreWhole) {
     log.EndRow();
   }
   log.Close();
-  ASSERT_EQ(Export({"--csv", "out.csv"}).exit_code, 0);
-  const std::vector<std::string> lines = SplitLines(ReadText(folder_.path() / "out.csv"));
+  Expect(0, "export run --csv out.csv");
+  const std::vector<std::string> lines = SplitLines(Read("out.csv"));
   ASSERT_EQ(lines.size(), kManyRows + 1U);
   for (long row = 0; row < kManyRows; ++row) {
     ASSERT_EQ(ReadNumbers(lines[static_cast<size_t>(row) + 1]),
@@ -157,57 +138,35 @@ TEST_F(ExportTest, LongLogsAreWhole) {
 }
 
 TEST_F(ExportTest, LogsWithoutRowsGiveAHeader) {
-  std::filesystem::remove(folder_.path() / "run/log.h5");
+  std::filesystem::remove(Path("run/log.h5"));
   {
-    LogWriter log(folder_.path() / "run/log.h5", 10);
+    LogWriter log(Path("run/log.h5"), 10);
     log.StartRows();
     log.Close();
   }
-  EXPECT_EQ(Export({"--csv", "-"}).out, "time [s]\n");
-}
-
-TEST_F(ExportTest, BadRequestsAreRefusedInOneLine) {
-  EXPECT_TRUE(IsRefused(Export({}), {"--csv FILE.csv or --list is required"}));
-  EXPECT_TRUE(IsRefused(Export({"--csv", "-", "--list"}), {"--csv excludes --list"}));
-  EXPECT_TRUE(IsRefused(Export({"--csv", "out.csv", "--signals", "object/f,object/g"}),
-                        {"--signals: no signal matches \"object/g\", did you mean \"object/f\"?"}));
-  EXPECT_TRUE(
-      IsRefused(Export({"--csv", "out.csv", "--signals", "gripper/*"}), {"\"gripper/*\" (see --list)"}));
-  for (const char* every : {"0", "-1", "x", "1.5"}) {
-    EXPECT_TRUE(
-        IsRefused(Export({"--csv", "out.csv", "--every", every}), {"--every: must be a whole number"}));
-  }
-  EXPECT_TRUE(IsRefused(RunDexcheck({"export", "--csv", "-"}), {"RUN_DIR is required"}));
-  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "out.csv"));
+  EXPECT_EQ(Export("--csv -").out, "time [s]\n");
 }
 
 TEST_F(ExportTest, BadLogsAreRefusedInOneLine) {
-  WriteText(folder_.path() / "out.csv", "before");
-  const std::filesystem::path log = folder_.path() / "run/log.h5";
-  const std::string bytes = ReadText(log);
-  WriteText(log, bytes.substr(0, bytes.size() / 2));
-  EXPECT_TRUE(IsRefused(Export({"--csv", "out.csv"}), {"run/log.h5: the log is cut short: "}));
-  WriteText(log, "no log");
-  EXPECT_TRUE(IsRefused(Export({"--csv", "out.csv"}), {"run/log.h5: not a dexcheck log"}));
-  std::filesystem::remove(log);
-  EXPECT_TRUE(
-      IsRefused(Export({"--csv", "out.csv"}), {"run/log.h5: cannot be read: No such file or directory"}));
-  EXPECT_EQ(ReadText(folder_.path() / "out.csv"), "before");
+  Write("out.csv", "before");
+  const std::string log = Read("run/log.h5");
+  for (const auto& [text, part] : {std::pair(log.substr(0, log.size() / 2), "cut short"),
+                                   {std::string("no log"), "not a dexcheck log"}}) {
+    Write("run/log.h5", text);
+    EXPECT_TRUE(IsRefused(Export("--csv out.csv"), {"run/log.h5: ", part}));
+  }
+  std::filesystem::remove(Path("run/log.h5"));
+  EXPECT_TRUE(IsRefused(Export("--csv out.csv"), {"run/log.h5: ", "No such file"}));
+  EXPECT_EQ(Read("out.csv"), "before");
 }
 
 TEST_F(ExportTest, OutputsThatCannotBeWrittenAreNamed) {
-  EXPECT_TRUE(IsRefused(Export({"--csv", "no/out.csv"}), {"no/out.csv: cannot be written: No such file"}));
-  testing::ProgramOptions options;
-  options.folder = folder_.path();
-  options.largest_file = 1000;
-  WriteText(folder_.path() / "out.csv", "before");
-  EXPECT_TRUE(IsRefused(RunDexcheck({"export", "run", "--csv", "out.csv"}, options),
-                        {"out.csv: cannot be written: File too large"}));
-  EXPECT_EQ(ReadText(folder_.path() / "out.csv"), "before");
-  options.largest_file.reset();
-  options.out = "/dev/full";
-  EXPECT_TRUE(IsRefused(RunDexcheck({"export", "run", "--csv", "-"}, options),
-                        {"standard output: cannot be written: No space left on device"}));
+  Write("out.csv", "before");
+  EXPECT_TRUE(
+      IsRefused(Run("export run --csv out.csv", {.largest_file = 1000}), {"out.csv: ", "File too large"}));
+  EXPECT_EQ(Read("out.csv"), "before");
+  EXPECT_TRUE(
+      IsRefused(Run("export run --csv -", {.out = "/dev/full"}), {"standard output: ", "No space left"}));
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 // folders that may not be written, logs that were cut or damaged. Exit codes and one line say so; nothing
 // crashes.
 
-#include <gmock/gmock.h>
 #include <sys/mount.h>
 #include <unistd.h>
 
@@ -14,7 +13,7 @@
 #include <random>
 
 #include "harness/log/log_reader.h"
-#include "tests/common/matchers.h"
+#include "tests/common/refused_text.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing::fault_injection_test {
@@ -22,91 +21,66 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Arguments of a run of some hundred steps without the report, whose drawing takes most of the time.
-std::vector<std::string> RunArguments(const std::string& scenario, const fs::path& out,
-                                      const std::vector<std::string>& settings = {}) {
-  std::vector<std::string> arguments = {"run", scenario, "--no-report", "--out", out.string()};
-  for (const std::string& setting : settings) arguments.insert(arguments.end(), {"--set", setting});
-  return arguments;
-}
-
 long CountLines(const std::string& text) { return std::count(text.begin(), text.end(), '\n'); }
 
-class FaultInjection : public ::testing::Test {
+class FaultInjection : public CommandTest {
  protected:
-  [[nodiscard]] fs::path run_dir() const { return folder_.path() / "run"; }
   [[nodiscard]] std::vector<std::string> ListFiles() const {
     std::vector<std::string> files;
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder_.path())) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder_.path()))
       files.push_back(entry.path().filename());
-    }
     return files;
   }
-  ProgramResult Run(const std::string& scenario, const std::vector<std::string>& settings) const {
-    ProgramOptions options;
-    options.folder = folder_.path();
-    return RunDexcheck(RunArguments(scenario, run_dir(), settings), options);
+  /// A short run without the report, whose drawing takes most of the time, into the folder `run`.
+  static Words Scenario(const std::string& scenario, const std::vector<std::string>& settings,
+                        const std::string& out = "run") {
+    Words arguments = {"run", scenario, "--no-report", "--out", out};
+    for (const std::string& setting : settings) arguments = arguments + Words{"--set", setting};
+    return arguments;
   }
-
-  TempFolder folder_;
+  [[nodiscard]] LogReader ReadLog(const std::string& run = "run") const {
+    return LogReader(Path(run + "/log.h5"));
+  }
 };
 
 /// A run that fails, with its reason.
 struct Explosion {
-  const char* name;
-  const char* scenario;
+  std::string name;
+  std::string scenario;
   std::vector<std::string> settings;
-  const char* reason;
+  std::string reason;
 };
 
 void PrintTo(const Explosion& explosion, std::ostream* out) { *out << explosion.name; }
 
-class Explosions : public FaultInjection, public ::testing::WithParamInterface<Explosion> {};
-
-/// Whether the run failed for that reason, left a log and a summary, and nothing else.
-::testing::AssertionResult HasFailed(const ProgramResult& result, const fs::path& run, const char* reason) {
-  const auto fail = [&](const std::string& what) {
-    return ::testing::AssertionFailure()
-           << what << "; exit code " << result.exit_code << ", " << result.out << result.err;
-  };
-  if (result.exit_code != 3) return fail("exit code must be 3");
-  if (CountLines(result.err) != 1 || result.err.find(reason) == std::string::npos) {
-    return fail("standard error must be the reason, in one line");
+class Explosions : public FaultInjection, public ::testing::WithParamInterface<Explosion> {
+ protected:
+  /// The run fails for its reason, and leaves a log and a summary, and nothing else.
+  void RunAndFail() const {
+    const auto& [name, scenario, settings, reason] = GetParam();
+    EXPECT_TRUE(IsOneLineWith(Expect(3, Scenario(scenario, settings)).err, {reason}));
+    const Json summary = ReadJson("run/summary.json");
+    EXPECT_EQ(summary.at("verdict"), "failed");
+    EXPECT_THAT(summary.at("failure"), HasSubstr(reason));
+    EXPECT_EQ(Json::parse(ReadLog().ReadText("summary")), summary);
+    EXPECT_THAT(ListFiles(), ElementsAre("run")) << "the engine writes no files of its own";
   }
-  const size_t at = result.out.find("FAILED: ");
-  const std::string line =
-      at == std::string::npos ? "" : result.out.substr(at, result.out.find('\n', at) - at);
-  if (line.find(reason) == std::string::npos) return fail(std::string("the line lacks ") + reason);
-  if (LogReader(run / "log.h5").ReadText("summary").find("\"verdict\": \"failed\"") == std::string::npos) {
-    return fail("the log has no verdict");
-  }
-  return ::testing::AssertionSuccess();
-}
+};
 
 TEST_P(Explosions, EndWithTheirReasonAndAReadableLog) {
-  EXPECT_TRUE(HasFailed(Run(GetParam().scenario, GetParam().settings), run_dir(), GetParam().reason));
-  EXPECT_THAT(ListFiles(), ::testing::ElementsAre("run")) << "the engine writes no files of its own";
-  const LogReader log(run_dir() / "log.h5");
-  EXPECT_GE(log.rows(), 10);
-  EXPECT_TRUE(log.ReadSignal("engine/qpos").allFinite());
-  for (const std::vector<std::string>& command :
-       {std::vector<std::string>{"run", "--replay", run_dir().string()},
-        {"export", run_dir().string(), "--csv", "-"},
-        {"report", run_dir().string()}}) {
-    const ProgramResult later = RunDexcheck(command);
-    EXPECT_EQ(later.exit_code, 0) << command[0] << ": " << later.out << later.err;
-  }
+  RunAndFail();
+  EXPECT_GE(ReadLog().rows(), 10);
+  EXPECT_TRUE(ReadLog().ReadSignal("engine/qpos").allFinite());
+  for (const char* command : {"run --replay run", "export run --csv -", "report run"}) Expect(0, command);
 }
 
 class StillBirths : public Explosions {};
 
 TEST_P(StillBirths, LeaveALogWithoutRows) {
-  EXPECT_TRUE(HasFailed(Run(GetParam().scenario, GetParam().settings), run_dir(), GetParam().reason));
-  EXPECT_THAT(ListFiles(), ::testing::ElementsAre("run"));
-  EXPECT_EQ(LogReader(run_dir() / "log.h5").rows(), 0);
-  EXPECT_TRUE(IsRefused(RunDexcheck({"run", "--replay", run_dir().string()}), {"log.h5: "}));
-  EXPECT_TRUE(IsRefused(RunDexcheck({"report", run_dir().string()}), {"log.h5: the run has no steps"}));
-  EXPECT_TRUE(IsRefused(RunDexcheck({"render", run_dir().string(), "--still", "0"}), {"log.h5: "}));
+  RunAndFail();
+  EXPECT_EQ(ReadLog().rows(), 0);
+  for (const char* command : {"run --replay run", "report run", "render run --still 0"})
+    EXPECT_TRUE(Refused(command, {"log.h5: "}));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -118,7 +92,7 @@ INSTANTIATE_TEST_SUITE_P(
                   {"duration=1", "settle=0.05", "control.K_p=100", "control.K_v=2050"},
                   "is at its limit"},
         Explosion{"Slippery", "paper-ramp", {"duration=2", "plant.floor_friction=0.1"}, "is at its limit"}),
-    [](const auto& info) { return info.param.name; });
+    CaseName());
 
 /// Runs that fail before their first step.
 INSTANTIATE_TEST_SUITE_P(All, StillBirths,
@@ -132,38 +106,34 @@ INSTANTIATE_TEST_SUITE_P(All, StillBirths,
                                                      {"duration=1", "plant.finger_friction=0.15",
                                                       "control.weight={ platform = 1e8, arm = 1e8 }"},
                                                      "no longer touches the object while settling"}),
-                         [](const auto& info) { return info.param.name; });
+                         CaseName());
 
 TEST_F(FaultInjection, ModelsThatTheEngineRejectsAreRefused) {
-  fs::copy(testing::kMjcf, folder_.path() / "mjcf", fs::copy_options::recursive);
-  const fs::path robot = folder_.path() / "mjcf/robot.xml";
-  const std::string good = ReadText(robot);
-  const std::string setting = "plant.mjcf=" + (folder_.path() / "mjcf/scene.xml").string();
-  const auto is_refused = [&](const std::vector<std::string>& parts) {
-    return IsRefused(Run("hold", {"duration=0.01", "settle=0.1", setting}), parts);
-  };
-  WriteText(robot, good.substr(0, good.size() / 2));
-  EXPECT_TRUE(is_refused({"robot.xml:280: is not XML"}));
-  WriteText(robot, testing::ReplaceOnce(good, "<freejoint name=\"base\"/>",
-                                        "<freejoint name=\"base\" mass=\"1\"/>"));
-  EXPECT_TRUE(is_refused({"robot.xml:109: <freejoint mass>"}));
-  WriteText(robot, "");
-  EXPECT_TRUE(is_refused({"robot.xml:1: is not XML"}));
-  fs::remove(robot);
-  EXPECT_TRUE(is_refused({"scene.xml:3: ", "robot.xml"}));
-  EXPECT_FALSE(fs::exists(run_dir())) << "nothing was begun";
+  fs::copy(kMjcf, Path("mjcf"), fs::copy_options::recursive);
+  const std::string good = Read("mjcf/robot.xml");
+  const Words command =
+      Scenario("hold", {"duration=0.01", "settle=0.1", "plant.mjcf=" + Path("mjcf/scene.xml").string()});
+  const std::string freejoint = "<freejoint name=\"base\"";
+  for (const auto& [text, part] :
+       {std::pair(good.substr(0, good.size() / 2), "robot.xml:280: "),
+        {ReplaceOnce(good, freejoint, freejoint + " mass=\"1\""), "robot.xml:109: <freejoint mass>"},
+        {std::string(), "robot.xml:1: "}}) {
+    Write("mjcf/robot.xml", text);
+    EXPECT_TRUE(Refused(command, {part}));
+  }
+  fs::remove(Path("mjcf/robot.xml"));
+  EXPECT_TRUE(Refused(command, {"scene.xml:3: ", "robot.xml"}));
+  EXPECT_FALSE(Has("run")) << "nothing was begun";
 }
 
 // Sizes at which the log's begin, its first rows and its later rows do not fit.
 TEST_F(FaultInjection, FilesThatMayNotGrowEndARun) {
   for (const rlim_t bytes : {1000UL, 50'000UL, 1'000'000UL}) {
-    ProgramOptions options;
-    options.largest_file = bytes;
-    const fs::path out = folder_.path() / std::to_string(bytes);
-    EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("hold", out, {"duration=0.3", "settle=0.1"}), options),
-                          {"log.h5: cannot be written: File too large"}));
-    EXPECT_FALSE(fs::exists(out / "summary.json"));
-    if (fs::exists(out / "log.h5")) EXPECT_GE(LogReader(out / "log.h5").rows(), 0);
+    const std::string out = std::to_string(bytes);
+    EXPECT_TRUE(IsRefused(Run(Scenario("hold", {"duration=0.3", "settle=0.1"}, out), {.largest_file = bytes}),
+                          {"log.h5: ", "File too large"}));
+    EXPECT_FALSE(Has(out + "/summary.json"));
+    if (Has(out + "/log.h5")) EXPECT_GE(ReadLog(out).rows(), 0);
   }
 }
 
@@ -188,81 +158,72 @@ class SmallDisk {
 };
 
 TEST_F(FaultInjection, AFullDiskEndsARunAndKeepsItsRows) {
-  const fs::path disk = folder_.path() / "disk";
-  const SmallDisk small(disk, "4m");
+  const SmallDisk small(Path("disk"), "4m");
   if (!small.is_mounted()) GTEST_SKIP() << "no file system can be mounted here";
-  const fs::path out = disk / "run";
-  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("hold", out, {"duration=5", "settle=0.1"})),
-                        {"log.h5: cannot be written: No space left on device"}));
+  const std::string full = "No space left on device";
+  EXPECT_TRUE(Refused(Scenario("hold", {"duration=5", "settle=0.1"}, "disk/run"), {"log.h5: ", full}));
   {
-    const LogReader log(out / "log.h5");
+    const LogReader log = ReadLog("disk/run");
     EXPECT_GE(log.rows(), 100);
     EXPECT_LT(log.rows(), 5000);
     EXPECT_TRUE(log.ReadSignal("engine/qpos").allFinite());
   }
-  EXPECT_FALSE(fs::exists(out / "summary.json"));
-  const std::string before = ReadText(out / "log.h5");
-  EXPECT_TRUE(
-      IsRefused(RunDexcheck({"report", out.string()}), {"cannot be written: No space left on device"}));
-  EXPECT_TRUE(IsRefused(RunDexcheck({"export", out.string(), "--csv", (disk / "all.csv").string()}),
-                        {"all.csv: cannot be written: No space left on device"}));
-  EXPECT_TRUE(ReadText(out / "log.h5") == before);
-  long files = 0;
-  for ([[maybe_unused]] const auto& entry : fs::recursive_directory_iterator(disk)) ++files;
-  EXPECT_EQ(files, 2) << "the run's folder and its log, no half-written file";
-}
-
-/// The program as a user who may not write everywhere, as root may.
-ProgramResult RunAsNobody(const std::vector<std::string>& arguments) {
-  std::vector<std::string> command = DexcheckCommand(arguments);
-  if (::geteuid() == 0) command.insert(command.begin(), {"setpriv", "--reuid=65534", "--clear-groups"});
-  return testing::RunProgram(command);
+  EXPECT_FALSE(Has("disk/run/summary.json"));
+  const std::string before = Read("disk/run/log.h5");
+  EXPECT_TRUE(Refused("report disk/run", {full}));
+  EXPECT_TRUE(Refused("export disk/run --csv disk/all.csv", {"all.csv: ", full}));
+  EXPECT_TRUE(Read("disk/run/log.h5") == before);
+  EXPECT_EQ(CountFiles("disk"), 1) << "no half-written file";
+  EXPECT_EQ(CountFiles("disk/run"), 1) << "the log";
 }
 
 TEST_F(FaultInjection, FoldersThatMayNotBeWrittenAreNamed) {
-  ASSERT_EQ(Run("hold", {"duration=0.02", "settle=0.1"}).exit_code, 0);
-  fs::permissions(run_dir(), fs::perms(0555));
-  fs::permissions(folder_.path(), fs::perms(0555));
-  EXPECT_TRUE(IsRefused(RunAsNobody(RunArguments("hold", folder_.path() / "new", {"duration=0.02"})),
-                        {(folder_.path() / "new").string(), "cannot be made: Permission denied"}));
-  EXPECT_TRUE(IsRefused(RunAsNobody({"report", run_dir().string()}), {"report.html: cannot be written: "}));
-  EXPECT_TRUE(IsRefused(RunAsNobody({"render", run_dir().string(), "--still", "0", "--size", "64x64"}),
-                        {"still.png: cannot be written: "}));
-  EXPECT_TRUE(IsRefused(RunAsNobody({"export", run_dir().string(), "--csv", (run_dir() / "a.csv").string()}),
-                        {"a.csv: cannot be written: "}));
+  Expect(0, Scenario("hold", {"duration=0.02", "settle=0.1"}));
+  // A user who may not write everywhere, as root may.
+  const auto run = [&](const Words& arguments) {
+    Words command = DexcheckCommand(arguments);
+    if (::geteuid() == 0) command = Words("setpriv --reuid=65534 --clear-groups") + command;
+    return RunProgram(command, {.folder = folder_.path()});
+  };
+  for (const char* folder : {"run", "."}) fs::permissions(Path(folder), fs::perms(0555));
+  EXPECT_TRUE(IsRefused(run(Scenario("hold", {"duration=0.02"}, "new")),
+                        {"new", "cannot be made: Permission denied"}));
+  for (const auto& [command, file] : {std::pair("report run", "report.html: "),
+                                      {"render run --still 0 --size 64x64", "still.png: "},
+                                      {"export run --csv run/a.csv", "a.csv: "}})
+    EXPECT_TRUE(IsRefused(run(command), {file, "cannot be written"}));
   // Reading needs no right to write.
-  const ProgramResult replay = RunAsNobody({"run", "--replay", run_dir().string()});
+  const ProgramResult replay = run("run --replay run");
   EXPECT_EQ(replay.exit_code, 0) << replay.err;
-  fs::permissions(folder_.path(), fs::perms(0755));
-  fs::permissions(run_dir(), fs::perms(0755));
-  EXPECT_EQ(std::distance(fs::directory_iterator(run_dir()), fs::directory_iterator()), 2)
-      << "log and summary, as before";
+  for (const char* folder : {".", "run"}) fs::permissions(Path(folder), fs::perms(0755));
+  EXPECT_EQ(CountFiles("run"), 2) << "log and summary, as before";
 }
 
 /// What reads a run's log.
-std::vector<std::vector<std::string>> ListReaders(const fs::path& run) {
-  const fs::path scratch = run.parent_path();
-  return {{"run", "--replay", run.string()},
-          {"report", run.string(), "--out", (scratch / "page.html").string()},
-          {"export", run.string(), "--csv", (scratch / "all.csv").string()},
-          {"render", run.string(), "--still", "0", "--size", "64x64", "--forces", "--tracks", "--out",
-           (scratch / "still.png").string()}};
-}
-
-/// Whatever the log makes it do, a reader ends; busy machines get time.
-ProgramResult RunReader(const std::vector<std::string>& command) {
-  ProgramOptions options;
-  options.seconds = 300;
-  return RunDexcheck(command, options);
-}
+constexpr const char* kReaders[] = {"run --replay run", "report run --out page.html",
+                                    "export run --csv all.csv",
+                                    "render run --still 0 --size 64x64 --forces --tracks --out still.png"};
 
 class DamagedLogs : public FaultInjection {
  protected:
   DamagedLogs() {
-    EXPECT_EQ(Run("hold", {"duration=0.05", "settle=0.1"}).exit_code, 0);
-    bytes_ = ReadText(log());
+    Expect(0, Scenario("hold", {"duration=0.05", "settle=0.1"}));
+    bytes_ = Read("run/log.h5");
   }
-  [[nodiscard]] fs::path log() const { return run_dir() / "log.h5"; }
+  /// Puts these bytes in place of the log; every reader refuses it or reads it to the end.
+  /// @return how many ended with this exit code.
+  [[nodiscard]] int CountEnds(const std::string& damaged, int exit_code) const {
+    Write("run/log.h5", damaged);
+    int count = 0;
+    for (const char* command : kReaders) {
+      const ProgramResult result = Run(command);
+      // 1: a replay that differs.
+      EXPECT_THAT(result.exit_code, ::testing::AnyOf(0, 1, 2)) << command << ": " << result.err;
+      EXPECT_LE(CountLines(result.err), 1) << result.err;
+      count += result.exit_code == exit_code ? 1 : 0;
+    }
+    return count;
+  }
 
   std::string bytes_;
   std::mt19937 random_{17};
@@ -272,12 +233,10 @@ TEST_F(DamagedLogs, CutAnywhereAreRefusedByAllReaders) {
   std::vector<size_t> lengths = {0, 1, 12, 300, 511, 512, 513, bytes_.size() / 2, bytes_.size() - 1};
   for (int i = 0; i < 3; ++i) lengths.push_back(random_() % bytes_.size());
   for (const size_t length : lengths) {
-    WriteText(log(), bytes_.substr(0, length));
-    for (const std::vector<std::string>& command : ListReaders(run_dir())) {
-      EXPECT_TRUE(IsRefused(RunReader(command), {"log.h5: "})) << command[0] << ", " << length << " bytes";
-    }
+    Write("run/log.h5", bytes_.substr(0, length));
+    for (const char* command : kReaders) EXPECT_TRUE(Refused(command, {"log.h5: "})) << length << " bytes";
   }
-  EXPECT_THAT(ListFiles(), ::testing::ElementsAre("run")) << "nothing was written";
+  EXPECT_THAT(ListFiles(), ElementsAre("run")) << "nothing was written";
 }
 
 TEST_F(DamagedLogs, WithChangedBytesAreRefusedOrReadToTheEnd) {
@@ -290,14 +249,7 @@ TEST_F(DamagedLogs, WithChangedBytesAreRefusedOrReadToTheEnd) {
     const size_t begin = random_() % (damaged.size() - count);
     for (size_t i = 0; i < count; ++i)
       damaged[begin + i] = static_cast<char>(damaged[begin + i] + 1 + static_cast<int>(random_() % 255));
-    WriteText(log(), damaged);
-    for (const std::vector<std::string>& command : ListReaders(run_dir())) {
-      const ProgramResult result = RunReader(command);
-      // 1: a replay that differs.
-      EXPECT_THAT(result.exit_code, ::testing::AnyOf(0, 1, 2)) << command[0] << ": " << result.err;
-      EXPECT_LE(CountLines(result.err), 1) << result.err;
-      refused += result.exit_code == 2 ? 1 : 0;
-    }
+    refused += CountEnds(damaged, 2);
   }
   EXPECT_GT(refused, 0);
 }
@@ -326,13 +278,7 @@ TEST_F(DamagedLogs, WithImpossibleNumbersAreRefusedOrReadToTheEnd) {
       if (std::uniform_real_distribution<>()(random_) >= fraction) continue;
       std::memcpy(damaged.data() + at, &kNumbers[random_() % kNumbers.size()], 8);
     }
-    WriteText(log(), damaged);
-    for (const std::vector<std::string>& command : ListReaders(run_dir())) {
-      const ProgramResult result = RunReader(command);
-      EXPECT_THAT(result.exit_code, ::testing::AnyOf(0, 1, 2)) << command[0] << ": " << result.err;
-      EXPECT_LE(CountLines(result.err), 1) << result.err;
-      differing += result.exit_code == 1 ? 1 : 0;
-    }
+    differing += CountEnds(damaged, 1);
   }
   EXPECT_GE(differing, 1) << "a replay sees what was changed";
 }

@@ -1,10 +1,5 @@
 // Every surface that can be held, under a body's name of its own: run, report, render.
 
-#include <gmock/gmock.h>
-
-#include <nlohmann/json.hpp>
-
-#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing::held_objects_test {
@@ -37,14 +32,14 @@ constexpr const char* kMotion =
     "trajectory={ type = 'point_to_point', xyz = [0, 5e-5, 1e-4], zyz_deg = [0.1, 0.1, 0.1], duration = 0.3 "
     "}";
 
-class HeldObjects : public ::testing::TestWithParam<HeldObject> {
+class HeldObjects : public CommandTest, public ::testing::WithParamInterface<HeldObject> {
  protected:
   /// Writes robot, scene and scenario. @param geom of the MJCF.
   void WriteFiles(const std::string& geom) {
     const HeldObject& object = GetParam();
     const std::string name = object.body;
     const std::filesystem::path source = SourcePath();
-    const std::filesystem::path mjcf = folder_.path() / "mjcf";
+    const std::filesystem::path mjcf = Path("mjcf");
     if (!std::filesystem::exists(mjcf)) {
       std::filesystem::copy(source / "mjcf", mjcf, std::filesystem::copy_options::recursive);
       std::filesystem::copy(source / "tests/harness/objects/held_pairs.xml", mjcf);
@@ -61,43 +56,29 @@ class HeldObjects : public ::testing::TestWithParam<HeldObject> {
                   " contype=\"0\" conaffinity=\"0\"/></body></worldbody>"
                   "<include file=\"held_pairs.xml\"/></mujoco>\n");
     const std::string robot = ReadText(source / "controller/parameters/assistant_robot.toml");
-    WriteText(folder_.path() / "robot.toml", robot.substr(0, robot.find("[object]")) + "[object]\nbody = \"" +
-                                                 name + "\"\nmass = 0.2\nfriction = 0.8\n" + object.shape +
-                                                 "\n");
-    const std::string hold = ReadText(source / "harness/shipped/scenarios/hold.toml");
-    WriteText(folder_.path() / "hold.toml",
-              ReplaceOnce(hold, "[grasp]",
-                          "[model]\nfile = \"robot.toml\"\n[plant]\nmjcf = \"mjcf/held.xml\"\n[grasp]"));
+    Write("robot.toml", robot.substr(0, robot.find("[object]")) + "[object]\nbody = \"" + name +
+                            "\"\nmass = 0.2\nfriction = 0.8\n" + object.shape + "\n");
+    WriteChanged("hold.toml", ReadText(source / "harness/shipped/scenarios/hold.toml"), "[grasp]",
+                 "[model]\nfile = \"robot.toml\"\n[plant]\nmjcf = \"mjcf/held.xml\"\n[grasp]");
   }
 
-  ProgramResult Run() {
-    return RunDexcheck(
-        {"run", "hold.toml", "--set", "duration=0.3", "--set", kMotion, "--no-report", "--out", "run"},
-        {.folder = folder_.path()});
+  /// The checks of a run that must end so.
+  [[nodiscard]] Json RunHold(int exit_code) const {
+    Expect(exit_code, Words("run hold.toml --set duration=0.3 --no-report --out run --set") + Words{kMotion});
+    return ReadJson("run/summary.json").at("checks");
   }
-
-  TempFolder folder_;
 };
 
 TEST_P(HeldObjects, AreRunReportedAndDrawn) {
   WriteFiles(GetParam().geom);
-  const ProgramResult run = Run();
-  ASSERT_EQ(run.exit_code, 0) << run.out << run.err;
-  EXPECT_THAT(run.out, HasSubstr("PASS"));
-  const nlohmann::json summary = nlohmann::json::parse(ReadText(folder_.path() / "run/summary.json"));
+  const Json checks = RunHold(0);
   for (const char* check :
        {"contact_frame", "G", "J_B", "J_B_dot_xi", "G_dot_T_V", "inverse_dynamics_object"})
-    EXPECT_GT(summary["checks"][check]["max"].get<double>(), 0.0) << check;
-
-  const ProgramOptions there = {.folder = folder_.path()};
-  const ProgramResult report = RunDexcheck({"report", "run"}, there);
-  EXPECT_EQ(report.exit_code, 0) << report.err;
-  EXPECT_THAT(ReadText(folder_.path() / "run/report.html"), HasSubstr("contact_frame"));
-  const ProgramResult drawn = RunDexcheck({"render", "run", "--still", "0.2", "--forces", "--tracks",
-                                           "--size", "160x120", "--camera", "grasp", "--out", "still.png"},
-                                          there);
-  EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
-  EXPECT_GT(std::filesystem::file_size(folder_.path() / "still.png"), 1000U);
+    EXPECT_GT(checks[check]["max"].get<double>(), 0.0) << check;
+  Expect(0, "report run");
+  EXPECT_THAT(Read("run/report.html"), HasSubstr("contact_frame"));
+  Expect(0, "render run --still 0.2 --forces --tracks --size 160x120 --camera grasp --out still.png");
+  EXPECT_GT(std::filesystem::file_size(Path("still.png")), 1000U);
 }
 
 // A size that only one side has is found before anything moves.
@@ -106,11 +87,9 @@ TEST_P(HeldObjects, OfAnotherSizeAreNamed) {
   geom = geom.find("0.046") != std::string::npos ? ReplaceOnce(geom, "0.046", "0.0461")
                                                  : ReplaceOnce(geom, "0.011", "0.0111");
   WriteFiles(geom);
-  const ProgramResult run = Run();
-  EXPECT_EQ(run.exit_code, 1) << run.out << run.err;
-  const nlohmann::json summary = nlohmann::json::parse(ReadText(folder_.path() / "run/summary.json"));
-  EXPECT_FALSE(summary["checks"]["object_shape"]["pass"].get<bool>());
-  EXPECT_FALSE(summary["checks"]["contact_frame"]["pass"].get<bool>());
+  const Json checks = RunHold(1);
+  for (const char* check : {"object_shape", "contact_frame"})
+    EXPECT_EQ(checks[check]["pass"], false) << check;
 }
 
 INSTANTIATE_TEST_SUITE_P(Surfaces, HeldObjects, ::testing::ValuesIn(kObjects),

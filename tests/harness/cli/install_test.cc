@@ -1,20 +1,15 @@
 // An installed program finds its shipped files, also after its folder was moved.
 
-#include <gmock/gmock.h>
-
-#include <nlohmann/json.hpp>
-
-#include "tests/common/paths.h"
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing::install_test {
 namespace {
 
 TEST(InstalledProgram, UsesTheFilesBesideIt) {
-  const testing::TempFolder folder;
+  const TempFolder folder;
   const std::filesystem::path first = folder.path() / "first";
   const ProgramResult install =
-      RunProgram({DEXCHECK_CMAKE, "--install", testing::BuildPath(), "--prefix", first.string()});
+      RunProgram({DEXCHECK_CMAKE, "--install", BuildPath(), "--prefix", first.string()});
   ASSERT_EQ(install.exit_code, 0) << install.out << install.err;
   const std::filesystem::path prefix = folder.path() / "moved here";
   std::filesystem::rename(first, prefix);
@@ -22,7 +17,7 @@ TEST(InstalledProgram, UsesTheFilesBesideIt) {
   const std::vector<std::string> command = {prefix / "bin/dexcheck", "consistency", "--samples", "10"};
   const ProgramResult result = RunProgram({command[0], command[1], command[2], command[3], "--json", "-"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  const nlohmann::json results = nlohmann::json::parse(result.out);
+  const Json results = Json::parse(result.out);
   const std::filesystem::path share = std::filesystem::canonical(prefix) / "share/dexcheck";
   EXPECT_EQ(results.at("robot"), (share / "controller/parameters/assistant_robot.toml").string());
   EXPECT_EQ(results.at("mjcf"), (share / "mjcf/scene.xml").string());

@@ -1,93 +1,77 @@
 // Controllers that the user brings along: a library and programs, sound ones and each way to fail.
 
-#include <gtest/gtest.h>
-
-#include <nlohmann/json.hpp>
-
 #include "tests/harness/cli/dexcheck_program.h"
 
 namespace dexcheck::testing::own_controller_test {
 namespace {
 
-const std::vector<std::string> kShort = {"run",          "curve", "--no-report", "--set",
-                                         "duration=0.3", "--set", "settle=0.2"};
-
-ProgramResult RunWith(const std::string& controller, std::vector<std::string> more = {},
-                      const ProgramOptions& options = {}) {
-  std::vector<std::string> arguments = kShort;
-  arguments.insert(arguments.end(), {"--controller", controller});
-  if (std::find(more.begin(), more.end(), "--out") == more.end()) arguments.push_back("--no-log");
-  arguments.insert(arguments.end(), more.begin(), more.end());
-  return RunDexcheck(arguments, options);
-}
-
-nlohmann::json ReadSummary(const std::filesystem::path& run) {
-  return nlohmann::json::parse(ReadText(run / "summary.json"));
-}
-
-/// Success when the run ended with exit code 3 and a verdict that has these words.
-::testing::AssertionResult HasFailed(const ProgramResult& result, const std::string& words) {
-  const std::string all = result.out + result.err;
-  if (result.exit_code != 3) {
-    return ::testing::AssertionFailure() << "exit code " << result.exit_code << ": " << all;
+/// Runs of 0.3 s with a controller of the user's own.
+class OwnController : public CommandTest {
+ protected:
+  [[nodiscard]] ProgramResult RunWith(const std::string& controller, const Words& more = "--out run",
+                                      const ProgramOptions& options = {}) const {
+    return Run(Words("run curve --no-report --set duration=0.3 --set settle=0.2 --controller") +
+                   Words{controller} + more,
+               options);
   }
-  if (all.find(words) != std::string::npos) return ::testing::AssertionSuccess();
-  return ::testing::AssertionFailure() << "\"" << words << "\" is missing in: " << all;
-}
-
-/// The law rewritten outside, and its own: the same verdict, and torques that the check of the law finds
-/// right.
-void ExpectThePapersLaw(const std::string& controller) {
-  const TempFolder folder;
-  const std::filesystem::path own = folder.path() / "own";
-  const ProgramResult result =
-      RunWith(controller, {"--out", own.string(), "--set", "control.law=computed_torque"});
-  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
-  const nlohmann::json summary = ReadSummary(own);
-  EXPECT_EQ(summary["verdict"], "pass");
-  for (const char* check :
-       {"law_torque", "law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality", "error_dynamics"}) {
-    ASSERT_TRUE(summary["checks"].contains(check)) << check;
-    EXPECT_TRUE(summary["checks"][check]["pass"]) << check;
+  [[nodiscard]] Json ReadSummary(const std::string& run = "run") const {
+    return ReadJson(run + "/summary.json");
   }
-  EXPECT_GT(summary["checks"]["law_torque"]["max"], 0.0);
-}
+  [[nodiscard]] Json ReadChecks() const { return ReadSummary()["checks"]; }
 
-TEST(OwnController, TheLawRewrittenAsALibraryIsTheLaw) { ExpectThePapersLaw(PAPER_LAW_LIBRARY); }
+  /// Success when the run into this folder ended with exit code 3 and a verdict that has these words.
+  [[nodiscard]] ::testing::AssertionResult HasFailed(const ProgramResult& result, const std::string& words,
+                                                     const std::string& run = "run") const {
+    const std::string all = result.out + result.err;
+    if (result.exit_code != 3)
+      return ::testing::AssertionFailure() << "exit code " << result.exit_code << ": " << all;
+    const bool has_summary = Has(run + "/summary.json");
+    const std::string failure = has_summary ? ReadSummary(run)["failure"].get<std::string>() : all;
+    if (has_summary && ReadSummary(run)["verdict"] != "failed")
+      return ::testing::AssertionFailure() << "the verdict";
+    std::filesystem::remove_all(Path(run));
+    if (failure.find(words) != std::string::npos) return ::testing::AssertionSuccess();
+    return ::testing::AssertionFailure() << "\"" << words << "\" is missing in: " << failure;
+  }
 
-TEST(OwnController, TheLawRewrittenInNumPyIsTheLaw) {
-  ExpectThePapersLaw("/usr/bin/python3 " + testing::SourcePath("/controller/examples/numpy_law.py"));
+  /// The law rewritten outside, and its own: the same verdict, and torques that the check of the law finds
+  /// right.
+  void ExpectThePapersLaw(const std::string& controller) const {
+    const ProgramResult result = RunWith(controller, "--out run --set control.law=computed_torque");
+    EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+    const Json checks = ReadChecks();
+    for (const char* check : {"law_torque", "law_demand", "grasp_null_space", "grasp_cone",
+                              "grasp_optimality", "error_dynamics"}) {
+      ASSERT_TRUE(checks.contains(check)) << check;
+      EXPECT_EQ(checks[check]["pass"], true) << check;
+    }
+    EXPECT_GT(checks["law_torque"]["max"], 0.0);
+  }
+};
+
+TEST_F(OwnController, TheLawRewrittenAsALibraryIsTheLaw) { ExpectThePapersLaw(PAPER_LAW_LIBRARY); }
+
+TEST_F(OwnController, TheLawRewrittenInNumPyIsTheLaw) {
+  ExpectThePapersLaw("/usr/bin/python3 " + SourcePath("/controller/examples/numpy_law.py"));
 }
 
 /// The law of the joints rewritten outside, with gains that differ from joint to joint.
-class OwnJointLaw : public ::testing::TestWithParam<std::string> {};
+class OwnJointLaw : public OwnController, public ::testing::WithParamInterface<std::string> {};
 
 TEST_P(OwnJointLaw, IsTheLaw) {
   constexpr double kRounding = 1e-13;  // measured 1.3e-15
-  const TempFolder folder;
-  const std::filesystem::path own = folder.path() / "own";
-  const std::vector<std::string> reach = {
-      "run",        "panda-reach",  "--no-report",
-      "--set",      "duration=0.3", "--set",
-      "settle=0.1", "--set",        "control.natural_frequency={ all = 20, panda_joint4 = 30 }"};
-  std::vector<std::string> arguments = reach;
-  arguments.insert(arguments.end(), {"--controller", GetParam(), "--out", own.string()});
-  const ProgramResult result = RunDexcheck(arguments);
-  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
-  const nlohmann::json summary = ReadSummary(own);
-  EXPECT_EQ(summary["verdict"], "pass");
-  const nlohmann::json& checks = summary["checks"];
+  const Words reach = Words(
+                          "run panda-reach --no-report --set duration=0.3 --set settle=0.1 --set "
+                          "'control.natural_frequency={ all = 20, panda_joint4 = 30 }' --controller") +
+                      Words{GetParam()};
+  const Json checks = RunJson(0, reach + "--no-log")["checks"];
   EXPECT_LE(checks["law_torque"]["max"], kRounding);
   EXPECT_GT(checks["law_torque"]["max"], 0.0);
-  EXPECT_TRUE(checks["joint_dynamics"]["pass"]);
-  EXPECT_TRUE(checks["expect_joints"]["pass"]);
+  EXPECT_EQ(checks["joint_dynamics"]["pass"], true);
+  EXPECT_EQ(checks["expect_joints"]["pass"], true);
   // The scenario's law is another: the same torques are not its.
-  arguments = reach;
-  arguments.insert(arguments.end(), {"--controller", GetParam(), "--no-log", "--set",
-                                     "control.law=feedforward_pd", "--set", "expect.joints=0.01"});
-  const ProgramResult other = RunDexcheck(arguments);
-  EXPECT_EQ(other.exit_code, 1) << other.out << other.err;
-  EXPECT_NE(other.out.find("control law"), std::string::npos) << other.out;
+  const Json other = RunJson(1, reach + "--no-log --set control.law=feedforward_pd --set expect.joints=0.01");
+  EXPECT_EQ(other["attribution"]["cause"], "control law");
 }
 
 INSTANTIATE_TEST_SUITE_P(OwnController, OwnJointLaw,
@@ -96,75 +80,55 @@ INSTANTIATE_TEST_SUITE_P(OwnController, OwnJointLaw,
                                                SourcePath("/controller/examples/numpy_joint_law.py")),
                          [](const auto& info) { return info.index == 0 ? "Library" : "NumPy"; });
 
-TEST(OwnController, AJointLawIsNoneForAGrasp) {
-  EXPECT_TRUE(HasFailed(RunWith(JOINT_LAW_LIBRARY), "this law is for a [joint_motion]"));
+TEST_F(OwnController, AJointLawIsNoneForAGrasp) {
+  EXPECT_TRUE(HasFailed(RunWith(JOINT_LAW_LIBRARY), "[joint_motion]"));
 }
 
-TEST(OwnController, AnUnknownLawIsNotAsked) {
-  const TempFolder folder;
-  const std::filesystem::path own = folder.path() / "own";
-  EXPECT_EQ(RunWith(PAPER_LAW_LIBRARY, {"--out", own.string()}).exit_code, 0);
-  const nlohmann::json checks = ReadSummary(own)["checks"];
+TEST_F(OwnController, AnUnknownLawIsNotAsked) {
+  EXPECT_EQ(RunWith(PAPER_LAW_LIBRARY).exit_code, 0);
+  const Json checks = ReadChecks();
   for (const char* check : {"law_torque", "law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality",
-                            "closed_loop_spectral_radius", "error_dynamics"}) {
+                            "closed_loop_spectral_radius", "error_dynamics"})
     EXPECT_FALSE(checks.contains(check)) << check;
-  }
   for (const char* check :
-       {"measurement", "torque_applied", "expect_position", "inverse_dynamics_robot", "contact_force"}) {
+       {"measurement", "torque_applied", "expect_position", "inverse_dynamics_robot", "contact_force"})
     EXPECT_TRUE(checks.contains(check)) << check;
-  }
   // The log does not hold the library.
-  EXPECT_TRUE(IsRefused(RunDexcheck({"run", "--replay", own.string()}), {"--controller", "paper_law"}));
-  const ProgramResult replay =
-      RunDexcheck({"run", "--replay", own.string(), "--controller", PAPER_LAW_LIBRARY});
-  EXPECT_EQ(replay.exit_code, 0) << replay.out << replay.err;
+  EXPECT_TRUE(Refused("run --replay run", {"--controller", "paper_law"}));
+  Expect(0, {"run", "--replay", "run", "--controller", PAPER_LAW_LIBRARY});
 }
 
-TEST(OwnController, WhatALibraryThrowsEndsTheRunWithItsWords) {
-  const auto run = [](const std::string& fault) {
-    return RunWith(FAULTY_LIBRARY, {}, {.environment = {{"FAULT", fault}}});
-  };
-  EXPECT_EQ(run("none").exit_code, 0);
-  EXPECT_TRUE(HasFailed(run("throw"), "the widget is out of cheese at t = 0.01 s"));
-  EXPECT_TRUE(HasFailed(run("throw_number"), "threw something that is no std::exception at t = 0.01 s"));
-  EXPECT_TRUE(HasFailed(run("nan"), "sent a torque that is not a number at t = 0.01 s"));
-  EXPECT_TRUE(HasFailed(run("size"), "sent 3 torques, must be 50 at t = 0.01 s"));
-}
-
-// And leaves a log that ends before it, and nothing else.
-TEST(OwnController, ACrashOrAHangOfALibraryEndsTheRunInOneLine) {
-  const TempFolder folder;
+// A log that ends before it, and nothing else, is left.
+TEST_F(OwnController, WhatALibraryDoesWrongEndsTheRunInOneLine) {
   const auto run = [&](const std::string& fault) {
-    return RunWith(FAULTY_LIBRARY,
-                   {"--controller-time-limit", "0.4", "--out", (folder.path() / fault).string()},
+    return RunWith(FAULTY_LIBRARY, {"--controller-time-limit", "0.4", "--out", fault},
                    {.environment = {{"FAULT", fault}}});
   };
-  EXPECT_TRUE(HasFailed(run("crash"), "crashed (Segmentation fault) at t = 0.01 s"));
-  EXPECT_TRUE(HasFailed(run("abort"), "crashed (Aborted) at t = 0.01 s"));
-  EXPECT_TRUE(HasFailed(run("overflow"), "crashed (Segmentation fault) at t = 0.01 s"));
-  EXPECT_TRUE(HasFailed(run("hang"), "did not return within 0.4 s at t = 0.01 s"));
-  for (const char* fault : {"crash", "abort", "overflow", "hang"}) {
-    EXPECT_EQ(ReadSummary(folder.path() / fault)["speed"]["steps"], 10) << fault;
-    EXPECT_TRUE(std::filesystem::exists(folder.path() / fault / "log.h5")) << fault;
-    for (const auto& entry : std::filesystem::directory_iterator(folder.path() / fault)) {
-      EXPECT_NE(entry.path().extension(), ".partial") << entry.path();
-    }
+  EXPECT_EQ(run("none").exit_code, 0);
+  for (const auto& [fault, words] : {std::pair("throw", "the widget is out of cheese at t = 0.01 s"),
+                                     {"throw_number", "std::exception at t = 0.01 s"},
+                                     {"nan", "not a number at t = 0.01 s"},
+                                     {"size", "3 torques, must be 50 at t = 0.01 s"},
+                                     {"crash", "(Segmentation fault) at t = 0.01 s"},
+                                     {"abort", "(Aborted) at t = 0.01 s"},
+                                     {"overflow", "(Segmentation fault) at t = 0.01 s"},
+                                     {"hang", "0.4 s at t = 0.01 s"}}) {
+    const ProgramResult result = run(fault);
+    EXPECT_EQ(ReadSummary(fault)["speed"]["steps"], 10) << fault;
+    EXPECT_EQ(CountFiles(fault), 2) << fault << ": log and summary";
+    EXPECT_TRUE(HasFailed(result, words, fault)) << fault;
   }
 }
 
-TEST(OwnController, LibrariesThatAreNoneAreRefused) {
-  const TempFolder folder;
-  EXPECT_TRUE(IsRefused(RunWith("/nowhere/law.so"), {"--controller", "/nowhere/law.so"}));
-  EXPECT_TRUE(IsRefused(RunWith(OTHER_INTERFACE_LIBRARY), {"was built for interface", "0, of another time"}));
-  EXPECT_TRUE(IsRefused(RunWith(NO_CONTROLLER_LIBRARY), {"names no controller"}));
-  EXPECT_TRUE(
-      IsRefused(RunDexcheck({"run", "lift", "--no-log", "--controller", PAPER_LAW_LIBRARY}), {"task"}));
+TEST_F(OwnController, LibrariesThatAreNoneAreRefused) {
+  EXPECT_TRUE(IsRefused(RunWith(OTHER_INTERFACE_LIBRARY), {"interface", "0, of another time"}));
+  EXPECT_TRUE(IsRefused(RunWith(NO_CONTROLLER_LIBRARY), {"no controller"}));
+  EXPECT_TRUE(Refused({"run", "lift", "--no-log", "--controller", PAPER_LAW_LIBRARY}, {"task"}));
 }
 
 /// A program in Python without NumPy: it greets, answers `good` steps with torques of zero, and then does
 /// `then`.
-std::string WriteProgram(const TempFolder& folder, int good, const std::string& then) {
-  const std::filesystem::path file = folder.path() / "law.py";
+std::string WriteProgram(const std::filesystem::path& file, int good, const std::string& then) {
   WriteText(file, R"(import os, signal, struct, sys, time
 def read(n):
     data = sys.stdin.buffer.read(n)
@@ -189,31 +153,29 @@ while True:
   return "/usr/bin/python3 " + file.string();
 }
 
-TEST(OwnController, EachFailureOfAProgramIsOneClearLine) {
-  const TempFolder folder;
-  const auto run = [&](const std::string& then) {
-    return RunWith(WriteProgram(folder, 5, then), {"--controller-time-limit", "0.5"});
+TEST_F(OwnController, EachFailureOfAProgramIsOneClearLine) {
+  const auto fails = [&](const std::string& then, const std::string& words) {
+    return HasFailed(RunWith(WriteProgram(Path("law.py"), 5, then), "--controller-time-limit 0.5 --out run"),
+                     words);
   };
-  EXPECT_TRUE(HasFailed(run("sys.exit(4)"), "ended with exit code 4"));
-  EXPECT_TRUE(HasFailed(run("os.kill(os.getpid(), signal.SIGSEGV)"), "was killed by signal 11"));
-  EXPECT_TRUE(HasFailed(run("time.sleep(100)"), "did not answer within 0.5 s"));
-  EXPECT_TRUE(HasFailed(run("write(struct.pack('=II', 1, 3) + bytes(24)); time.sleep(9)"),
-                        "answered with message 1 of 3 numbers, must be 1 of 50"));
-  EXPECT_TRUE(HasFailed(run("write(struct.pack('=II50d', 1, 50, *[float('nan')] * 50)); time.sleep(9)"),
-                        "sent a torque that is not a number"));
-  EXPECT_TRUE(HasFailed(run("os.close(1); os.close(0); time.sleep(9)"), "closed its standard"));
+  EXPECT_TRUE(fails("sys.exit(4)", "exit code 4"));
+  EXPECT_TRUE(fails("os.kill(os.getpid(), signal.SIGSEGV)", "signal 11"));
+  EXPECT_TRUE(fails("time.sleep(100)", "within 0.5 s"));
+  EXPECT_TRUE(fails("write(struct.pack('=II', 1, 3) + bytes(24)); time.sleep(9)",
+                    "message 1 of 3 numbers, must be 1 of 50"));
+  EXPECT_TRUE(
+      fails("write(struct.pack('=II50d', 1, 50, *[float('nan')] * 50)); time.sleep(9)", "not a number"));
+  EXPECT_TRUE(fails("os.close(1); os.close(0); time.sleep(9)", "closed its standard"));
 }
 
-TEST(OwnController, ProgramsThatDoNotSpeakAreRefusedAtOnce) {
-  EXPECT_TRUE(HasFailed(RunWith("/nowhere/law"), "ended with exit code 127"));
-  EXPECT_TRUE(HasFailed(RunWith("sh -c 'echo I know nothing of your protocol; sleep 9'"),
-                        "does not speak the protocol"));
-  EXPECT_TRUE(HasFailed(RunWith("sleep 9", {"--controller-time-limit", "0.2"}), "did not answer within 2 s"));
-  EXPECT_EQ(RunWith("true", {"--controller-time-limit", "0"}).exit_code, 2);
+TEST_F(OwnController, ProgramsThatDoNotSpeakAreRefusedAtOnce) {
+  EXPECT_TRUE(HasFailed(RunWith("/nowhere/law"), "exit code 127"));
+  EXPECT_TRUE(HasFailed(RunWith("sh -c 'echo I know nothing of your protocol; sleep 9'"), "protocol"));
+  EXPECT_TRUE(HasFailed(RunWith("sleep 9", "--controller-time-limit 0.2 --out run"), "within 2 s"));
 }
 
 // With no torque the robot falls: the transport works, and the run ends as it does with any bad controller.
-TEST(OwnController, TheEchoAnswersAndTheRobotFalls) {
+TEST_F(OwnController, TheEchoAnswersAndTheRobotFalls) {
   EXPECT_TRUE(HasFailed(RunWith(ECHO_PROGRAM), "while settling"));
 }
 

@@ -1,96 +1,45 @@
 // dexcheck report: where it writes, and what it refuses.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <string>
-#include <utility>
-
-#include "tests/common/matchers.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/report/report_run.h"
 
 namespace dexcheck::testing::report_command_test {
 namespace {
 
-namespace fs = std::filesystem;
-
-class ReportCommandTest : public ::testing::Test {
+class ReportCommand : public CommandTest {
  protected:
-  [[nodiscard]] fs::path run_dir() const { return folder_.path() / "run"; }
-  /// Whether only the log is in the run's folder.
-  [[nodiscard]] bool HasOnlyLog() const {
-    return std::distance(fs::directory_iterator(run_dir()), fs::directory_iterator()) == 1;
-  }
-  testing::TempFolder folder_;
+  ReportCommand() { WriteReportRun(Path("run")); }
 };
 
-TEST_F(ReportCommandTest, WritesPageAndFigures) {
-  WriteReportRun(run_dir());
-  const testing::ProgramResult result = RunDexcheck({"report", run_dir().string()});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(result.out, (run_dir() / "report.html").string() + "\n");
+TEST_F(ReportCommand, WritesPageAndFigures) {
+  const ProgramResult result = Expect(0, "report run");
+  EXPECT_EQ(result.out, "run/report.html\n");
   EXPECT_EQ(result.err, "");
-  EXPECT_THAT(ReadText(run_dir() / "report.html"), HasSubstr("DISAGREEMENT"));
-  EXPECT_TRUE(fs::exists(run_dir() / "figures/fig12a.png"));
+  EXPECT_THAT(Read("run/report.html"), HasSubstr("DISAGREEMENT"));
+  EXPECT_TRUE(Has("run/figures/fig12a.png"));
 }
 
-TEST_F(ReportCommandTest, WritesThePageAlone) {
-  WriteReportRun(run_dir());
-  const fs::path page = folder_.path() / "page.html";
-  const testing::ProgramResult result =
-      RunDexcheck({"report", run_dir().string(), "--out", page.string(), "--quiet"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(result.out, "");
-  EXPECT_THAT(ReadText(page), HasSubstr("</html>"));
-  EXPECT_TRUE(HasOnlyLog());
+TEST_F(ReportCommand, WritesThePageAlone) {
+  EXPECT_EQ(Expect(0, "report run --out page.html --quiet").out, "");
+  EXPECT_THAT(Read("page.html"), HasSubstr("</html>"));
+  EXPECT_EQ(CountFiles("run"), 1);
 }
 
-TEST_F(ReportCommandTest, RefusesAFolderWithoutALog) {
-  fs::create_directory(run_dir());
-  EXPECT_TRUE(IsRefused(RunDexcheck({"report", run_dir().string()}), {"log.h5"}));
-  EXPECT_TRUE(IsRefused(RunDexcheck({"report", (folder_.path() / "none").string()}), {"none/log.h5"}));
-  EXPECT_TRUE(fs::is_empty(run_dir()));
+TEST_F(ReportCommand, RefusesARunWithoutSteps) {
+  WriteReportRun(Path("empty"), {.rows = 0});
+  EXPECT_TRUE(Refused("report empty", {"log.h5", "no steps"}));
+  EXPECT_EQ(CountFiles("empty"), 1);
 }
 
-TEST_F(ReportCommandTest, RefusesARunWithoutSteps) {
-  ReportRun run;
-  run.rows = 0;
-  WriteReportRun(run_dir(), run);
-  EXPECT_TRUE(IsRefused(RunDexcheck({"report", run_dir().string()}), {"log.h5", "no steps"}));
-  EXPECT_TRUE(HasOnlyLog());
-}
-
-TEST_F(ReportCommandTest, RefusesOutputsThatCannotBeWritten) {
-  WriteReportRun(run_dir());
-  for (const fs::path& out : {folder_.path() / "none/page.html", folder_.path()}) {
-    EXPECT_TRUE(IsRefused(RunDexcheck({"report", run_dir().string(), "--out", out.string()}),
-                          {out.string(), "cannot be written"}));
-  }
-  EXPECT_TRUE(
-      IsRefused(RunDexcheck({"report", run_dir().string(), "--out", (folder_.path() / "page.pdf").string()}),
-                {"page.pdf", "a page's name must end in .html"}));
-  testing::WriteText(run_dir() / "figures", "a file");
-  EXPECT_TRUE(IsRefused(RunDexcheck({"report", run_dir().string()}), {"figures", "cannot be made"}));
-  EXPECT_FALSE(fs::exists(run_dir() / "report.html"));
-}
-
-TEST_F(ReportCommandTest, LeavesNothingOnAFullDisk) {
-  WriteReportRun(run_dir());
-  testing::ProgramOptions options;
-  options.largest_file = 200'000;  // bytes: figures fit, the page does not
-  const testing::ProgramResult result = RunDexcheck({"report", run_dir().string()}, options);
-  EXPECT_TRUE(IsRefused(result, {"report.html", "cannot be written"}));
-  EXPECT_TRUE(HasOnlyLog());
-}
-
-TEST_F(ReportCommandTest, SaysThatGnuplotIsMissing) {
-  WriteReportRun(run_dir());
-  testing::ProgramOptions options;
-  options.environment = {{"PATH", folder_.path().string()}};
-  EXPECT_TRUE(IsRefused(RunDexcheck({"report", run_dir().string()}, options), {"gnuplot", "gnuplot-nox"}));
-  EXPECT_TRUE(HasOnlyLog());
+TEST_F(ReportCommand, LeavesNothingWhereItCannotWrite) {
+  // Bytes: figures fit, the page does not.
+  EXPECT_TRUE(IsRefused(Run("report run", {.largest_file = 200'000}), {"report.html", "cannot be written"}));
+  EXPECT_TRUE(IsRefused(Run("report run", {.environment = {{"PATH", folder_.path().string()}}}),
+                        {"gnuplot", "gnuplot-nox"}));
+  EXPECT_EQ(CountFiles("run"), 1);
+  Write("run/figures", "a file");
+  EXPECT_TRUE(Refused("report run", {"figures", "cannot be made"}));
+  EXPECT_FALSE(Has("run/report.html"));
 }
 
 }  // namespace

@@ -2,10 +2,11 @@
 
 // A study of six trials for the tests of `dexcheck study`, and its rows as text.
 
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Statement.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <sqlite3.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -30,29 +31,26 @@ values = [20, 200, 2100]
 )";
 constexpr size_t kNumTrials = 6;
 
+/// An open database that may be changed.
+inline SQLite::Database OpenDatabase(const std::filesystem::path& path) {
+  constexpr int kPatience = 10000;  // ms, with a program that writes
+  return SQLite::Database(path, SQLite::OPEN_READWRITE, kPatience);
+}
+
 /// Every value of the tables that make up a study, with its type, row by row.
 inline std::string Dump(const std::filesystem::path& path) {
-  Database database(path, Database::Mode::kExisting);
+  const SQLite::Database database = OpenDatabase(path);
   std::string text;
   for (const char* sql :
        {"SELECT * FROM study", "SELECT * FROM trials ORDER BY trial", "PRAGMA integrity_check"}) {
-    sqlite3_stmt* statement = nullptr;
-    EXPECT_EQ(sqlite3_prepare_v2(database.handle(), sql, -1, &statement, nullptr), SQLITE_OK);
-    while (sqlite3_step(statement) == SQLITE_ROW) {
-      for (int i = 0; i < sqlite3_column_count(statement); ++i) {
-        const void* const bytes = sqlite3_column_type(statement, i) == SQLITE_FLOAT ? nullptr : "";
-        if (bytes == nullptr) {
-          char number[64];
-          std::snprintf(number, sizeof(number), "%a", sqlite3_column_double(statement, i));
-          text += number;
-        } else if (sqlite3_column_type(statement, i) != SQLITE_NULL) {
-          text += reinterpret_cast<const char*>(sqlite3_column_text(statement, i));
-        }
-        text += '|';
+    SQLite::Statement select(database, sql);
+    while (select.executeStep()) {
+      for (int i = 0; i < select.getColumnCount(); ++i) {
+        const SQLite::Column value = select.getColumn(i);
+        text += (value.isFloat() ? fmt::format("{:a}", value.getDouble()) : value.getString()) + '|';
       }
       text += '\n';
     }
-    sqlite3_finalize(statement);
   }
   return text;
 }
@@ -71,13 +69,9 @@ class StudyCommand : public ::testing::Test {
 
   [[nodiscard]] long CountRows(const std::string& file) const {
     if (!std::filesystem::exists(Path(file))) return 0;
-    Database database(Path(file), Database::Mode::kExisting);
-    Statement tables(&database, "SELECT count(*) FROM sqlite_master WHERE name = 'trials'");
-    tables.Step();
-    if (tables.GetWhole(0) == 0) return 0;
-    Statement rows(&database, "SELECT count(*) FROM trials");
-    rows.Step();
-    return static_cast<long>(rows.GetWhole(0));
+    SQLite::Database database = OpenDatabase(Path(file));
+    if (!database.tableExists("trials")) return 0;
+    return database.execAndGet("SELECT count(*) FROM trials");
   }
 
   /// Rows of the uninterrupted study, made once.

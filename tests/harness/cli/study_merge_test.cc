@@ -35,8 +35,7 @@ TEST_F(StudyCommand, MergedShardsAreTheStudy) {
 TEST_F(StudyCommand, AMergeWithAConflictLeavesNothing) {
   ASSERT_EQ(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})).exit_code, 0);
   std::filesystem::copy(Path("a.sqlite"), Path("b.sqlite"));
-  Database(Path("b.sqlite"), Database::Mode::kExisting)
-      .Execute("UPDATE trials SET energy = energy * (1 + 1e-15) WHERE trial = 4");
+  OpenDatabase(Path("b.sqlite")).exec("UPDATE trials SET energy = energy * (1 + 1e-15) WHERE trial = 4");
   ASSERT_FALSE(Dump(Path("a.sqlite")) == Dump(Path("b.sqlite")));
   const auto list = [&] {
     std::set<std::string> names;
@@ -98,8 +97,8 @@ TEST_F(StudyCommand, RowsOfOtherMachinesAreMergedWithinRounding) {
       RunDexcheck({"study", "merge", Path("all.sqlite"), Path("a.sqlite"), Path("b.sqlite")});
   EXPECT_EQ(merged.exit_code, 0) << merged.err;
   EXPECT_EQ(Dump(Path("all.sqlite")), Dump(Path("a.sqlite"))) << "the first one's rows";
-  Database(Path("b.sqlite"), Database::Mode::kExisting)
-      .Execute("UPDATE trials SET cone_margin = cone_margin * (1 + 1e-6) WHERE trial = 1");
+  OpenDatabase(Path("b.sqlite"))
+      .exec("UPDATE trials SET cone_margin = cone_margin * (1 + 1e-6) WHERE trial = 1");
   EXPECT_TRUE(
       IsRefused(RunDexcheck({"study", "merge", Path("new.sqlite"), Path("a.sqlite"), Path("b.sqlite")}),
                 {"b.sqlite: trial 1 has another result"}));

@@ -130,7 +130,11 @@ TEST_F(StudySearch, IsWatchedShownAndExported) {
   const ProgramResult shown = RunDexcheck({"study", "show", Path("a.sqlite"), "17"});
   EXPECT_EQ(shown.exit_code, 0) << shown.err;
   EXPECT_THAT(shown.out, HasSubstr("trial 17, seed 1: tracked"));
-  EXPECT_THAT(shown.out, HasSubstr("dexcheck run offset --set duration=0.02"));
+  const auto trial =
+      nlohmann::json::parse(RunDexcheck({"study", "show", Path("a.sqlite"), "17", "--json"}).out);
+  EXPECT_EQ(trial["outcome"], "tracked");
+  EXPECT_EQ(trial["metrics"]["position_error_rms"], rows[17].result.metrics[kPositionErrorRms]);
+  EXPECT_THAT(trial["command"].get<std::string>(), HasSubstr("dexcheck run offset --set duration=0.02"));
   EXPECT_TRUE(
       IsRefused(RunDexcheck({"study", "show", Path("a.sqlite"), "48"}), {"a.sqlite: trial 48: has no row"}));
   EXPECT_TRUE(
@@ -145,53 +149,16 @@ TEST_F(StudySearch, IsWatchedShownAndExported) {
   EXPECT_EQ(std::strtod(csv.out.c_str() + at, nullptr), rows[17].trial.parameters[0]);
 }
 
-// Parts with a database each, which fraction a folder: whatever happens to them, their rows are the search's.
-TEST_F(StudySearch, PartsMakeTheSearchTogether) {
-  const auto part = [&](const std::string& shard) {
-    return RunArguments(shard.substr(0, 1) + ".sqlite",
-                        {"--shard", shard, "--exchange", Path("rows"), "--jobs", "1"});
-  };
-  ASSERT_EQ(RunDexcheck(RunArguments("whole.sqlite", {"--quiet"})).exit_code, 0);
-  const std::string reference = Dump(Path("whole.sqlite"));
-  Program one(DexcheckCommand(part("1/2")), {});
-  {
-    const Program killed(DexcheckCommand(part("2/2")), {});
-    std::this_thread::sleep_for(std::chrono::milliseconds(700));
-  }
-  EXPECT_LT(CountRows("2.sqlite"), 48) << "it was killed too late to matter";
-  Program two(DexcheckCommand(part("2/2")), {});
-  for (const ProgramResult& result : {one.Wait(), two.Wait()}) EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(Dump(Path("1.sqlite")), reference);
-  EXPECT_EQ(Dump(Path("2.sqlite")), reference);
-  EXPECT_FALSE(std::filesystem::is_empty(Path("rows")));
-}
-
-TEST_F(StudySearch, APartWhoseOthersStayAwayMakesTheSearchAlone) {
-  WriteText(folder_.path() / "tiny.toml", ReplaceOnce(kSearch, "count = 24", "count = 8"));
-  ASSERT_EQ(RunDexcheck(RunArguments("whole.sqlite", {"--quiet"})).exit_code, 0);
-  const ProgramResult alone =
-      RunDexcheck(RunArguments("a.sqlite", {"--shard", "2/3", "--exchange", Path("rows"), "--quiet"}));
-  EXPECT_EQ(alone.exit_code, 0) << alone.err;
-  EXPECT_EQ(Dump(Path("a.sqlite")), Dump(Path("whole.sqlite")));
-  // Rows of a machine whose bits are others cannot lead on.
-  for (const auto& file : std::filesystem::directory_iterator(Path("rows"))) {
-    Database(file.path(), Database::Mode::kExisting).Execute("UPDATE trials SET machine = 'abacus'");
-  }
-  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("b.sqlite", {"--shard", "1/3", "--exchange", Path("rows")})),
-                        {"another kind of machine, \"abacus\""}));
-}
-
-TEST_F(StudySearch, PartsNeedAFolder) {
+TEST_F(StudySearch, IsMadeByOneCommand) {
   EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite", {"--shard", "1/2"})),
                         {"--shard: the trials of a search follow from one another"}));
-  EXPECT_TRUE(IsRefused(RunDexcheck(RunArguments("a.sqlite", {"--exchange", Path("rows")})),
-                        {"--exchange: is for the parts of a search"}));
-  EXPECT_TRUE(
-      IsRefused(RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "3", "--array-size", "2"}),
-                {"--tasks: the parts of a search wait for each other"}));
-  const ProgramResult script = RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "2"});
+  EXPECT_TRUE(IsRefused(RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "2"}),
+                        {"--tasks: the trials of a search follow from one another"}));
+  const ProgramResult script =
+      RunDexcheck({"study", "slurm", Path("tiny.toml"), "--tasks", "1", "--cpus", "16"});
   EXPECT_EQ(script.exit_code, 0) << script.err;
-  EXPECT_THAT(script.out, HasSubstr("--exchange \"tiny-of-2-exchange\""));
+  EXPECT_THAT(script.out, HasSubstr("#SBATCH --cpus-per-task=16\n"));
+  EXPECT_THAT(script.out, ::testing::Not(HasSubstr("--shard")));
 }
 
 }  // namespace

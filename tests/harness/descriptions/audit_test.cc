@@ -105,10 +105,12 @@ INSTANTIATE_TEST_SUITE_P(
         Suspicion{"NoMass", "<mass value=\"2\"/>", "<mass value=\"0\"/>",
                   "impossible inertia: link left_arm has inertia"},
         Suspicion{"GramsForKilograms", "<mass value=\"2\"/>", "<mass value=\"2000\"/>",
-                  "odd density: link left_arm has 2000 kg in a geometry of 0.0032 m^3"},
-        Suspicion{"Light", "<mass value=\"2\"/>", "<mass value=\"0.002\"/>", "odd density: link left_arm"},
-        Suspicion{"ComOutside", "xyz=\"0.01 0.2 0\"", "xyz=\"0.01 2 0\"",
-                  "odd com: link left_arm has its centre of mass [0.01, 2, 0] m outside of its geometry"},
+                  "suspicious density: link left_arm has 2000 kg in a geometry of 0.0032 m^3"},
+        Suspicion{"Light", "<mass value=\"2\"/>", "<mass value=\"0.002\"/>",
+                  "suspicious density: link left_arm"},
+        Suspicion{
+            "ComOutside", "xyz=\"0.01 0.2 0\"", "xyz=\"0.01 2 0\"",
+            "suspicious com: link left_arm has its centre of mass [0.01, 2, 0] m outside of its geometry"},
         Suspicion{"TooMuchInertia",
                   "ixx=\"0.028\" ixy=\"0.001\" ixz=\"0.0002\" iyy=\"0.0035\" iyz=\"0.0004\" izz=\"0.029\"",
                   "ixx=\"28\" ixy=\"1\" ixz=\"0.2\" iyy=\"3.5\" iyz=\"0.4\" izz=\"29\"",
@@ -118,19 +120,19 @@ INSTANTIATE_TEST_SUITE_P(
                   "ixx=\"2.8e-8\" ixy=\"1e-9\" ixz=\"2e-10\" iyy=\"3.5e-9\" iyz=\"4e-10\" izz=\"2.9e-8\"",
                   "which is small for its 2 kg"},
         Suspicion{"MirroredMass", "<mass value=\"2\"/>", "<mass value=\"2.2\"/>",
-                  "odd mirror: link right_arm has 2 kg, the other side 2.2 kg (against left_arm)"},
-        Suspicion{
-            "MirroredSigns", "ixy=\"-0.001\"", "ixy=\"0.001\"",
-            "odd mirror: link right_arm has products of inertia [0.001, 0.0002, -0.0004] kg m^2 with signs"},
+                  "suspicious mirror: link right_arm has 2 kg, the other side 2.2 kg (against left_arm)"},
+        Suspicion{"MirroredSigns", "ixy=\"-0.001\"", "ixy=\"0.001\"",
+                  "suspicious mirror: link right_arm has products of inertia [0.001, 0.0002, -0.0004] kg m^2 "
+                  "with signs"},
         Suspicion{"MirroredPlace", "xyz=\"0.01 -0.2 0\"", "xyz=\"0.01 -0.17 0\"",
-                  "odd mirror: link right_arm has its centre of mass at [0.01, -0.17, 0] m"},
+                  "suspicious mirror: link right_arm has its centre of mass at [0.01, -0.17, 0] m"},
         Suspicion{"Degrees", "lower=\"-1\" upper=\"2\"", "lower=\"-90\" upper=\"120\"",
-                  "odd range: joint left range [-90, 120] rad: as if it were in degrees"},
+                  "suspicious range: joint left range [-90, 120] rad: as if it were in degrees"},
         Suspicion{"NoRange", "lower=\"-1\" upper=\"2\"", "lower=\"0\" upper=\"0\"", "the joint cannot move"},
         Suspicion{"Axis", "<axis xyz=\"1 0 0\"/>", "<axis xyz=\"1 1 0\"/>",
-                  "odd axis: joint left axis of length 1.414"},
+                  "suspicious axis: joint left axis of length 1.414"},
         Suspicion{"NameByCase", "joint name=\"right\"", "joint name=\"Left\"",
-                  "odd name: joint Left its name is that of \"left\" but for case and punctuation"}),
+                  "suspicious name: joint Left its name is that of \"left\" but for case and punctuation"}),
     [](const auto& named) { return named.param.name; });
 
 // What each finding does to M is said: a point mass on the axis leaves it singular.
@@ -145,9 +147,10 @@ TEST(Audit, SaysWhatItDoesToTheMassMatrix) {
   </robot>)";
   const AuditResult result = Audit(point);
   EXPECT_TRUE(std::isinf(result.condition));
-  EXPECT_THAT(Describe(result), HasSubstr("odd inertia: link rotor has 1 kg without inertia: a point mass"));
   EXPECT_THAT(Describe(result),
-              HasSubstr("odd load: joint spin turns 1 kg without inertia about its axis, the end"));
+              HasSubstr("suspicious inertia: link rotor has 1 kg without inertia: a point mass"));
+  EXPECT_THAT(Describe(result),
+              HasSubstr("suspicious load: joint spin turns 1 kg without inertia about its axis, the end"));
   for (const AuditFinding& finding : result.findings) {
     ASSERT_TRUE(finding.condition_without) << finding.text;
     EXPECT_LT(*finding.condition_without, 1e3);

@@ -35,13 +35,6 @@ ConsistencyResult CompareWithEngine(const RobotModel& model, const mjModel& engi
   return CheckConsistency(Adapter(model, engine, "robot.xml"), Few(), [](long) { return true; });
 }
 
-RobotDescription ReadTable(const std::string& text) {
-  RobotDescription table;
-  table.spec = ParseRobotModel(text, "robot.toml").spec();
-  table.joints.resize(table.spec.joints.size());
-  return table;
-}
-
 RobotSpec MakeRobot(BaseType base, std::mt19937* random) {
   testing::RandomRobotOptions options;
   options.base = base;
@@ -49,7 +42,7 @@ RobotSpec MakeRobot(BaseType base, std::mt19937* random) {
   options.ball = 0.5;
   RobotSpec spec = testing::MakeRandomRobot(options, random);
   const auto is_ball = [](const Joint& joint) { return joint.type == JointType::kBall; };
-  EXPECT_GE(std::count_if(spec.joints.begin(), spec.joints.end(), is_ball), 6);
+  EXPECT_GE(std::count_if(spec.joints.begin(), spec.joints.end(), is_ball), 2);
   return spec;
 }
 
@@ -59,7 +52,9 @@ TEST(BallJoints, RandomRobotsAgree) {
     for (int index = 0; index < 2; ++index) {
       const RobotSpec spec = MakeRobot(base, &random);
       const RobotModel model(spec);
-      EXPECT_EQ(model.num_positions(), model.num_base_positions() + model.num_joints() + model.num_balls());
+      EXPECT_GE(model.num_dofs(), model.num_joints() + 4);
+      EXPECT_EQ(2 * (model.num_positions() - model.num_base_positions() - model.num_joints()),
+                3 * (model.num_dofs() - model.num_joints()));
       const MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "text");
       EXPECT_EQ(testing::ListFailures(CompareWithEngine(model, *engine)), "");
       if (base == BaseType::kPlanar) continue;  // an MJCF's description has none
@@ -76,8 +71,8 @@ TEST(BallJoints, RandomRobotsAgree) {
   }
 }
 
-/// Turns about z, y, x in the place of each ball: its angular velocity along its own axes is E times their
-/// rates, as for the Euler angles of a floating base.
+/// Turns about z, y, x in the place of each ball, the first two of links without mass: its angular velocity
+/// along its own axes is E times their rates, as for the Euler angles of a floating base.
 struct OnHinges {
   RobotSpec spec;
   VectorXd q;
@@ -87,38 +82,50 @@ struct OnHinges {
 OnHinges PutOnHinges(const RobotModel& balls, const VectorXd& xi, VectorXd* q, std::mt19937* random) {
   OnHinges hinges;
   hinges.spec = balls.spec();
-  const int n = balls.num_joints();
+  hinges.spec.joints.clear();
+  const int n = balls.num_dofs();
   hinges.q = VectorXd::Zero(n);
   hinges.T = MatrixXd::Identity(n, n);
   hinges.T_dot = MatrixXd::Zero(n, n);
   std::uniform_real_distribution<double> angle(-1.2, 1.2);
   const Vector3d axes[] = {Vector3d::UnitZ(), Vector3d::UnitY(), Vector3d::UnitX()};
-  const Matrix3d R_x = MakeRotationFromZ(Vector3d::UnitX());
-  for (int i = 0; i < n; ++i) {
-    Joint& joint = hinges.spec.joints[static_cast<size_t>(i)];
-    const bool after_ball = joint.parent >= 0 &&
-                            balls.joints()[static_cast<size_t>(joint.parent)].type == JointType::kBall &&
-                            !(joint.type == JointType::kBall && joint.ball_axis > 0);
-    if (after_ball) joint.X_PB = Eigen::Isometry3d(R_x.transpose()) * joint.X_PB;
-    if (joint.type != JointType::kBall) {
-      hinges.q[i] = (*q)[balls.position_index(i)];
+  Pose X_turned = Pose::Identity();  // a ball's frame i in that of its last hinge
+  X_turned.linear() = MakeRotationFromZ(Vector3d::UnitX()).transpose();
+  const auto is_ball = [&](int joint) {
+    return joint >= 0 && balls.joints()[static_cast<size_t>(joint)].type == JointType::kBall;
+  };
+  const auto last_of = [&](int joint) {
+    return joint < 0 ? -1 : balls.dof(joint) + (is_ball(joint) ? 2 : 0);
+  };
+  for (int i = 0; i < balls.num_joints(); ++i) {
+    Joint joint = balls.joints()[static_cast<size_t>(i)];
+    if (is_ball(joint.parent)) joint.X_PB = X_turned * joint.X_PB;
+    joint.parent = last_of(joint.parent);
+    const int first = balls.dof(i);
+    if (!is_ball(i)) {
+      hinges.spec.joints.push_back(joint);
+      hinges.q[first] = (*q)[balls.position_index(i)];
       continue;
     }
-    const int k = joint.ball_axis;
-    const Matrix3d R = MakeRotationFromZ(axes[k]);
-    const Matrix3d R_before = k == 0 ? Matrix3d::Identity() : MakeRotationFromZ(axes[k - 1]);
-    joint.X_PB.linear() = joint.X_PB.linear() * R_before.transpose() * R;
+    const MassProperties body = ExpressIn(joint.body, X_turned);
+    const std::string name = joint.name, link = joint.link;
     joint.type = JointType::kRevolute;
     joint.lower = -kPi;
     joint.upper = kPi;
-    joint.damping = joint.armature = 0.0;  // of other rates
-    Pose X_i = Pose::Identity();
-    X_i.linear() = R.transpose();
-    joint.body = ExpressIn(joint.body, X_i);
-    hinges.q[i] = angle(*random);
-    if (k < 2) continue;
-    const double p = hinges.q[i - 1], r = hinges.q[i];
-    const Eigen::Quaterniond turn(Eigen::AngleAxisd(hinges.q[i - 2], Vector3d::UnitZ()) *
+    for (int k = 0; k < 3; ++k) {
+      const Matrix3d R = MakeRotationFromZ(axes[k]);
+      const Matrix3d R_before = k == 0 ? Matrix3d::Identity() : MakeRotationFromZ(axes[k - 1]);
+      if (k > 0) joint.X_PB.setIdentity();
+      if (k > 0) joint.parent = first + k - 1;
+      joint.X_PB.linear() = joint.X_PB.linear() * R_before.transpose() * R;
+      joint.name = name + std::to_string(k);
+      joint.link = k == 2 ? link : link + std::to_string(k);
+      joint.body = k == 2 ? body : MassProperties{};
+      hinges.spec.joints.push_back(joint);
+      hinges.q[first + k] = angle(*random);
+    }
+    const double p = hinges.q[first + 1], r = hinges.q[first + 2];
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(hinges.q[first], Vector3d::UnitZ()) *
                                   Eigen::AngleAxisd(p, Vector3d::UnitY()) *
                                   Eigen::AngleAxisd(r, Vector3d::UnitX()));
     q->segment<4>(balls.position_index(i)) << turn.w(), turn.x(), turn.y(), turn.z();
@@ -126,17 +133,17 @@ OnHinges PutOnHinges(const RobotModel& balls, const VectorXd& xi, VectorXd* q, s
     Matrix3d E;
     E << -sp, 0.0, 1.0, cp * sr, cr, 0.0, cp * cr, -sr, 0.0;
     const Matrix3d E_inverse = E.inverse();
-    const Vector3d rates = E_inverse * xi.segment<3>(i - 2);
+    const Vector3d rates = E_inverse * xi.segment<3>(first);
     const double dp = rates[1], dr = rates[2];
     Matrix3d E_dot;
     E_dot << -cp * dp, 0.0, 0.0, -sp * sr * dp + cp * cr * dr, -sr * dr, 0.0, -sp * cr * dp - cp * sr * dr,
         -cr * dr, 0.0;
-    hinges.T.block<3, 3>(i - 2, i - 2) = E_inverse;
-    hinges.T_dot.block<3, 3>(i - 2, i - 2) = -E_inverse * E_dot * E_inverse;
+    hinges.T.block<3, 3>(first, first) = E_inverse;
+    hinges.T_dot.block<3, 3>(first, first) = -E_inverse * E_dot * E_inverse;
   }
   for (Frame& frame : hinges.spec.frames) {
-    if (frame.link < 0 || balls.joints()[static_cast<size_t>(frame.link)].type != JointType::kBall) continue;
-    frame.X_LF = Eigen::Isometry3d(R_x.transpose()) * frame.X_LF;
+    if (is_ball(frame.link)) frame.X_LF = X_turned * frame.X_LF;
+    frame.link = last_of(frame.link);
   }
   return hinges;
 }
@@ -192,7 +199,7 @@ TEST(BallJoints, MjcfIsImportedAndAgrees) {
   EXPECT_THAT(text, HasSubstr("{ joint = \"shoulder\", link = \"upper\", type = \"ball\", xyz = "));
   EXPECT_THAT(text, HasSubstr("\"shoulder\" = { range = [0, 1.5], damping = 0.2, armature = 0.01"));
   const RobotDescription table = ReadTable(text);
-  EXPECT_EQ(table.spec.joints.size(), 8U);
+  EXPECT_EQ(table.spec.joints.size(), 4U);
   for (const CheckRecord& record : CompareWithEngine(RobotModel(table.spec), *engine).terms)
     EXPECT_LT(record.worst, 1e-13) << record.name;
   EXPECT_THAT(
@@ -218,18 +225,18 @@ TEST(BallJoints, FaultsAreFound) {
     Pose X = Pose::Identity();
     X.linear() = R;
     spec->joints[0].X_PB = spec->joints[0].X_PB * X;
-    spec->joints[2].body = ExpressIn(spec->joints[2].body, X.inverse());
-    spec->joints[3].X_PB = X.inverse() * spec->joints[3].X_PB;
+    spec->joints[0].body = ExpressIn(spec->joints[0].body, X.inverse());
+    spec->joints[1].X_PB = X.inverse() * spec->joints[1].X_PB;
   };
   EXPECT_THAT(compare(turn), HasSubstr("joint_axis "));
   EXPECT_THAT(compare(turn), HasSubstr("M_bar "));
   EXPECT_THAT(compare([](RobotSpec* spec) { spec->joints[0].X_PB.translation().x() += 1e-6; }),
               HasSubstr("joint_axis "));
-  EXPECT_THAT(compare([](RobotSpec* spec) { spec->joints[1].damping = 0.3; }), HasSubstr("joint_damping "));
-  EXPECT_THAT(compare([](RobotSpec* spec) { spec->joints[2].upper = 1.4; }), HasSubstr("joint_range "));
+  EXPECT_THAT(compare([](RobotSpec* spec) { spec->joints[0].damping = 0.3; }), HasSubstr("joint_damping "));
+  EXPECT_THAT(compare([](RobotSpec* spec) { spec->joints[0].upper = 1.4; }), HasSubstr("joint_range "));
   RobotDescription wrong = mjcf;
-  wrong.spec.joints[2].body.mass *= 1000.0;
-  wrong.spec.joints[2].body.inertia *= 1000.0;
+  wrong.spec.joints[0].body.mass *= 1000.0;
+  wrong.spec.joints[0].body.inertia *= 1000.0;
   wrong.parts.clear();
   const std::vector<Hypothesis> hypotheses = ExplainDifference(wrong, mjcf);
   ASSERT_EQ(hypotheses.size(), 1U);
@@ -273,7 +280,7 @@ TEST(BallJoints, TablesAreRefusedWithAReason) {
   expect("[0, 1.5]", "[-1, 1.5]", "must begin at 0 for a ball joint");
   expect("type = \"ball\"", "axis = [0, 1, 0], type = \"ball\"", "axis");
   expect("armature = 0.01", "armature = 0.01, mimic = { joint = \"elbow\" }", "must not be given for a ball");
-  expect("\"elbow\" = { range", "\"elbow\" = { mimic = { joint = \"shoulder:y\" }, range", "must be no ball");
+  expect("\"elbow\" = { range", "\"elbow\" = { mimic = { joint = \"shoulder\" }, range", "must be no ball");
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/engine/engine.h"
 #include "tests/common/files.h"
+#include "tests/common/list_failures.h"
 #include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 
@@ -52,15 +53,10 @@ prefix = "left_"
 joint = { range = [-1, 1], damping = 0, armature = 0, mimic = { joint = "wrist", multiplier = 2, offset = 0.4 } }
 )";
 
-RobotDescription ReadTable(const std::string& text) {
-  RobotDescription table;
-  table.spec = ParseRobotModel(text, "gripper.toml").spec();
-  table.joints.resize(table.spec.joints.size());
-  return table;
-}
+RobotDescription ReadGripper(const std::string& text) { return ReadTable(text, "gripper.toml"); }
 
 TEST(CoupledJoints, TablesSayThem) {
-  const RobotDescription table = ReadTable(kGripper);
+  const RobotDescription table = ReadGripper(kGripper);
   const std::vector<Joint>& joints = table.spec.joints;
   ASSERT_EQ(joints.size(), 3U);
   EXPECT_EQ(joints[0].dry_friction, 0.4);
@@ -74,7 +70,7 @@ TEST(CoupledJoints, TablesSayThem) {
   EXPECT_EQ(CalcCouplingMap(table), Vector3d(1.0, -2.0, 2.0));
 
   // Written and read again they are the same.
-  const RobotDescription again = ReadTable(WriteParameters(table, "gripper.toml"));
+  const RobotDescription again = ReadGripper(WriteParameters(table, "gripper.toml"));
   for (size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(again.spec.joints[i].dry_friction, joints[i].dry_friction);
     ASSERT_EQ(again.spec.joints[i].coupling.has_value(), joints[i].coupling.has_value());
@@ -89,7 +85,7 @@ TEST(CoupledJoints, FaultsInTablesAreNamed) {
   const auto expect = [](const std::string& original, const std::string& changed,
                          const std::string& message) {
     try {
-      ReadTable(ReplaceOnce(kGripper, original, changed));
+      ReadGripper(ReplaceOnce(kGripper, original, changed));
       ADD_FAILURE() << "accepted " << changed;
     } catch (const InputError& error) {
       EXPECT_THAT(error.what(), HasSubstr(message));
@@ -119,42 +115,24 @@ constexpr const char* kGripperMjcf = R"(<mujoco><compiler angle="radian"/><world
   <equality><joint joint1="left_joint" joint2="wrist" polycoef="0.4 2 0 0 0"/>
     <joint joint1="right_joint" joint2="wrist" polycoef="-0.3 -2 0 0 0"/></equality></mujoco>)";
 
-std::string CompareWithEngine(const RobotDescription& robot, const mjModel& engine,
-                              std::vector<std::string>* notes = nullptr) {
-  const RobotModel model(robot.spec);
-  const Adapter adapter(model, engine, "robot.xml");
-  ConsistencyOptions options;
-  options.samples = 20;
-  ConsistencyResult result = CheckConsistency(adapter, options, [](long) { return true; });
-  const std::vector<std::string> found = CheckDescription(robot, adapter, &result.constants);
-  if (notes != nullptr) *notes = found;
-  std::string failures;
-  for (const std::vector<CheckRecord>* records : {&result.constants.records, &result.terms}) {
-    for (const CheckRecord& record : *records) {
-      if (record.failed) failures += record.name + " ";
-    }
-  }
-  return failures;
-}
-
 TEST(CoupledJoints, TablesAgreeWithTheMjcf) {
   const MjModelPtr engine = LoadMjcfText(kGripperMjcf, "gripper.xml");
-  EXPECT_EQ(CompareWithEngine(ReadTable(kGripper), *engine), "");
+  EXPECT_EQ(CompareWithEngine(ReadGripper(kGripper), *engine), "");
   EXPECT_EQ(CompareWithEngine(ReadMjcfDescription(*engine, "gripper.xml"), *engine), "");
   EXPECT_EQ(
-      CompareWithEngine(ReadTable(ReplaceOnce(kGripper, "multiplier = 2", "multiplier = 2.01")), *engine),
+      CompareWithEngine(ReadGripper(ReplaceOnce(kGripper, "multiplier = 2", "multiplier = 2.01")), *engine),
       "joint_coupling ");
-  EXPECT_EQ(CompareWithEngine(ReadTable(ReplaceOnce(kGripper, "offset = 0.1", "offset = 0.2")), *engine),
+  EXPECT_EQ(CompareWithEngine(ReadGripper(ReplaceOnce(kGripper, "offset = 0.1", "offset = 0.2")), *engine),
             "joint_coupling ");
-  EXPECT_EQ(CompareWithEngine(ReadTable(ReplaceOnce(kGripper, "dry_friction = 0.4", "dry_friction = 0.3")),
+  EXPECT_EQ(CompareWithEngine(ReadGripper(ReplaceOnce(kGripper, "dry_friction = 0.4", "dry_friction = 0.3")),
                               *engine),
             "joint_dry_friction ");
-  EXPECT_EQ(CompareWithEngine(ReadTable(ReplaceOnce(kGripper, ", dry_friction = 0.4", "")), *engine),
+  EXPECT_EQ(CompareWithEngine(ReadGripper(ReplaceOnce(kGripper, ", dry_friction = 0.4", "")), *engine),
             "joint_dry_friction ");
   std::vector<std::string> notes;
   const std::string uncoupled =
       ReplaceOnce(kGripper, ", mimic = { joint = \"wrist\", multiplier = 2, offset = 0.4 }", "");
-  EXPECT_THAT(CompareWithEngine(ReadTable(uncoupled), *engine, &notes), HasSubstr("joint_coupling"));
+  EXPECT_THAT(CompareWithEngine(ReadGripper(uncoupled), *engine, 20, &notes), HasSubstr("joint_coupling"));
   EXPECT_THAT(notes, ::testing::Contains(HasSubstr("only the MJCF couples left_joint")));
 }
 
@@ -191,7 +169,7 @@ class ReducedGripper : public AnsweringSide {
 };
 
 TEST(CoupledJoints, ArePutOnTheirConstraintWhenASideHasOnlyFreeOnes) {
-  const RobotDescription robot = ReadTable(kGripper);
+  const RobotDescription robot = ReadGripper(kGripper);
   AnalyticSide reference(robot, "gripper.toml");
   ReducedGripper side(robot);
   EXPECT_TRUE(side.is_reduced());
@@ -229,7 +207,7 @@ TEST(SeveralJointsOfABody, AgreeWithAChainOfMasslessLinks) {
   ASSERT_EQ(mjcf.spec.joints.size(), 4U);
   EXPECT_EQ(mjcf.spec.joints[0].link, "shoulder:x");
   EXPECT_EQ(CompareWithEngine(mjcf, *engine), "");
-  EXPECT_EQ(CompareWithEngine(ReadTable(WriteParameters(mjcf, "shoulder.xml")), *engine), "");
+  EXPECT_EQ(CompareWithEngine(ReadGripper(WriteParameters(mjcf, "shoulder.xml")), *engine), "");
 
   RobotDescription wrong = mjcf;
   std::swap(wrong.spec.joints[0].X_PB, wrong.spec.joints[1].X_PB);

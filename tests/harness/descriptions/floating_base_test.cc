@@ -32,23 +32,14 @@ ConsistencyOptions Few(long samples = 20) {
   return options;
 }
 
-std::string CompareWithEngine(RobotDescription robot, const mjModel& engine) {
+std::string CompleteAndCompare(RobotDescription robot, const mjModel& engine) {
   CompleteFromEngine(engine, "robot.xml", &robot);
-  const RobotModel model(robot.spec);
-  return testing::ListFailures(
-      CheckConsistency(Adapter(model, engine, "robot.xml"), Few(), [](long) { return true; }));
+  return testing::CompareWithEngine(robot, engine);
 }
 
 std::string CompareBoth(RobotDescription a, RobotDescription b) {
   CompleteEachOther(&a, &b);
   return testing::ListFailures(CompareDescriptions(a, b, Few(), [](long) { return true; }));
-}
-
-RobotDescription ReadTable(const std::string& text) {
-  RobotDescription table;
-  table.spec = ParseRobotModel(text, "robot.toml").spec();
-  table.joints.resize(table.spec.joints.size());
-  return table;
 }
 
 TEST(FloatingBase, RandomRobotsAgree) {
@@ -63,7 +54,7 @@ TEST(FloatingBase, RandomRobotsAgree) {
     urdf.spec.gravity = spec.gravity;
     urdf.states_gravity = true;
     const MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "text");
-    EXPECT_EQ(CompareWithEngine(urdf, *engine), "") << "robot " << index;
+    EXPECT_EQ(CompleteAndCompare(urdf, *engine), "") << "robot " << index;
     const RobotDescription mjcf = ReadMjcfDescription(*engine, "robot.xml");
     EXPECT_EQ(CompareBoth(urdf, mjcf), "") << "robot " << index;
     // Angles of a table are rounded twice: when they are written, and when they are read.
@@ -92,7 +83,7 @@ TEST_P(LeggedRobots, UrdfMjcfAndTableAgree) {
   const RobotDescription urdf = ParseUrdf(urdf_, "robot.urdf");
   EXPECT_FALSE(urdf.states_base);
   EXPECT_EQ(urdf.spec.joints.size(), GetParam() == "quadruped" ? 12U : 31U);
-  EXPECT_EQ(CompareWithEngine(urdf, *engine_), "");
+  EXPECT_EQ(CompleteAndCompare(urdf, *engine_), "");
   EXPECT_EQ(CompareBoth(urdf, ReadMjcfDescription(*engine_, "robot.xml")), "");
   UrdfOptions floating;
   floating.floating = true;
@@ -110,7 +101,7 @@ TEST_P(LeggedRobots, FaultsOfTheBaseAreFound) {
     const size_t at = text.find(original);
     ASSERT_NE(at, std::string::npos) << original;
     text.replace(at, original.size(), changed);
-    const std::string failures = CompareWithEngine(ParseUrdf(text, "robot.urdf"), *engine_);
+    const std::string failures = CompleteAndCompare(ParseUrdf(text, "robot.urdf"), *engine_);
     EXPECT_THAT(failures, HasSubstr(found_by));
     EXPECT_THAT(failures, HasSubstr("M_bar"));
   };
@@ -136,7 +127,7 @@ TEST_P(LeggedRobots, RootsThatPublishersWrite) {
                           base + "\"/></joint>"),
                 "robot.urdf");
   EXPECT_EQ(footprint.spec.base.link, "footprint");
-  EXPECT_EQ(CompareWithEngine(footprint, *engine_), "");
+  EXPECT_EQ(CompleteAndCompare(footprint, *engine_), "");
   EXPECT_EQ(CompareBoth(footprint, ReadMjcfDescription(*engine_, "robot.xml")), "");
   const RobotDescription floating =
       ParseUrdf(with_root("<link name=\"world\"/><joint name=\"free\" type=\"floating\"><parent "
@@ -145,7 +136,7 @@ TEST_P(LeggedRobots, RootsThatPublishersWrite) {
                 "robot.urdf");
   EXPECT_EQ(floating.spec.base.link, base);
   EXPECT_EQ(floating.spec.base.type, BaseType::kFloating);
-  EXPECT_EQ(CompareWithEngine(floating, *engine_), "");
+  EXPECT_EQ(CompleteAndCompare(floating, *engine_), "");
 
   const RobotDescription fixed = ParseUrdf(
       with_root(
@@ -153,7 +144,7 @@ TEST_P(LeggedRobots, RootsThatPublishersWrite) {
           base + "\"/></joint>"),
       "robot.urdf");
   EXPECT_TRUE(fixed.states_base);
-  EXPECT_THROW(CompareWithEngine(fixed, *engine_), InputError);
+  EXPECT_THROW(CompleteAndCompare(fixed, *engine_), InputError);
   EXPECT_THROW(CompareBoth(fixed, ReadMjcfDescription(*engine_, "robot.xml")), InputError);
 }
 
@@ -161,7 +152,7 @@ TEST_P(LeggedRobots, FixedInOneFileAndFloatingInTheOtherIsSaid) {
   const MjModelPtr fixed = LoadMjcfText(testing::WriteLeggedMjcf(GetParam(), links_, ""), "fixed.xml");
   UrdfOptions floating;
   floating.floating = true;
-  EXPECT_THROW(CompareWithEngine(ParseUrdf(urdf_, "robot.urdf", floating), *fixed), InputError);
+  EXPECT_THROW(CompleteAndCompare(ParseUrdf(urdf_, "robot.urdf", floating), *fixed), InputError);
   RobotDescription urdf = ParseUrdf(urdf_, "robot.urdf");
   RobotDescription mjcf = ReadMjcfDescription(*engine_, "robot.xml");
   const std::vector<std::string> notes = CompleteEachOther(&urdf, &mjcf).notes;

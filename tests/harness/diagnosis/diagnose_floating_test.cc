@@ -78,8 +78,8 @@ void ExpectNamed(const std::string& text, const mjModel& engine, const std::stri
 class LeggedDiagnosis : public ::testing::TestWithParam<std::string> {
  protected:
   LeggedDiagnosis()
-      : links_(GetParam() == "quadruped" ? testing::ListQuadruped() : testing::ListHumanoid()),
-        engine_(LoadMjcfText(testing::WriteLeggedMjcf(GetParam(), links_), "robot.xml")),
+      : links_(GetParam() == "quadruped" ? ListQuadruped() : ListHumanoid()),
+        engine_(LoadMjcfText(WriteLeggedMjcf(GetParam(), links_), "robot.xml")),
         text_(WriteParameters(ReadMjcfDescription(*engine_, "robot.xml"), "robot.xml")) {}
 
   void Try(const Place& place, double change, const std::string& part, const std::string& quantity,
@@ -89,7 +89,7 @@ class LeggedDiagnosis : public ::testing::TestWithParam<std::string> {
     ExpectNamed(text, *engine_, part, quantity, right, options);
   }
 
-  std::vector<testing::LeggedLink> links_;
+  std::vector<LeggedLink> links_;
   MjModelPtr engine_;
   std::string text_;
 };
@@ -114,7 +114,7 @@ TEST_P(LeggedDiagnosis, NamesOneLinkInTheFilesTerms) {
   const size_t every = GetParam() == "quadruped" ? 3 : 8;  // links with axes of each kind
   size_t tried = 0;
   for (size_t i = 1; i < links_.size(); ++i) {
-    const testing::LeggedLink& link = links_[i];
+    const LeggedLink& link = links_[i];
     if (!link.has_joint || i % every != 1) continue;
     const std::string heading = "[chain.links.\"" + link.name + "\"]";
     const std::string row = "joint = \"" + link.name + "_joint\"";
@@ -185,7 +185,7 @@ TEST(FileTermsTest, SlantedAxesAreTurnedBack) {
 // Rows of modified parameters stand in the file as in the specification.
 TEST(FileTermsTest, RowsOfModifiedParametersStay) {
   std::mt19937 random(12);
-  const RobotSpec spec = testing::MakeRandomRobot({}, &random);
+  const RobotSpec spec = MakeRandomRobot({}, &random);
   const FileTerms terms(spec, {});
   Repair cause;
   cause.parameters = {{ParameterKind::kAlpha, 1, 0}};

@@ -5,15 +5,11 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <optional>
-#include <random>
 
 #include "controller/common/errors.h"
 #include "controller/dynamics/model_terms.h"
-#include "harness/diagnosis/diagnose.h"
 #include "harness/engine/engine_terms.h"
-#include "tests/common/paper_robot.h"
-#include "tests/common/random_robot.h"
+#include "tests/harness/diagnosis/diagnosed_robot.h"
 
 namespace dexcheck::testing::diagnose_many_test {
 namespace {
@@ -24,10 +20,7 @@ using Kind = ParameterKind;
 // smaller.
 constexpr double kSame = 1e-9;
 
-struct Robot {
-  RobotSpec spec;  // agrees with the engine
-  MjModelPtr engine;
-};
+using Robot = DiagnosedRobot;
 
 bool IsOfBodies(Kind kind) {
   return kind == Kind::kMass || kind == Kind::kCom || kind == Kind::kInertia || kind == Kind::kDamping ||
@@ -72,7 +65,7 @@ class Comparison {
         adapter_(model_, *robot.engine, "mjcf"),
         engine_(adapter_, Coordinates::kReduced),
         terms_(model_) {
-    for (int sample = 0; sample < 3; ++sample) states_.push_back(testing::DrawPositions(model_, random));
+    for (int sample = 0; sample < 3; ++sample) states_.push_back(DrawPositions(model_, random));
   }
 
   [[nodiscard]] bool IsSame(const Parameter& p) {
@@ -174,8 +167,7 @@ struct Tally {
 /// Diagnoses a wrong model and looks at each repair as it is printed.
 void Look(const Robot& robot, const RobotSpec& wrong, bool bodies_only, const std::string& what,
           std::mt19937* random, Tally* tally) {
-  const Diagnosis diagnosis =
-      Diagnose(RobotModel(wrong), *robot.engine, "mjcf", {}, [](const char*) { return true; });
+  const Diagnosis diagnosis = Explain(robot, wrong);
   ++tally->sets;
   tally->causes += static_cast<int>(diagnosis.causes.size());
   RobotSpec repaired = wrong;
@@ -196,7 +188,7 @@ void Look(const Robot& robot, const RobotSpec& wrong, bool bodies_only, const st
         EXPECT_TRUE(comparison.IsAxisSame(joint)) << what << ": " << DescribeShort(cause, wrong);
     }
   }
-  const bool wholly = diagnosis.remaining_constants.empty() && diagnosis.remaining_terms.empty();
+  const bool wholly = IsRepairedWholly(diagnosis);
   tally->wholly += wholly ? 1 : 0;
   if (!bodies_only) return;
   // Numbers that both sides state are all found.
@@ -232,22 +224,17 @@ void TrySets(const Robot& robot, bool bodies_only, int sets, const std::string& 
   }
 }
 
-Robot LoadPanda() { return {testing::ReadPanda().spec(), LoadMjcf(testing::SourcePath("/mjcf/panda.xml"))}; }
-Robot LoadAssistant() {
-  return {testing::ReadPaperRobot().spec(), LoadMjcf(testing::SourcePath("/mjcf/scene.xml"))};
-}
 Robot MakeRandom(int index, std::mt19937* random) {
-  testing::RandomRobotOptions options;
+  RandomRobotOptions options;
   constexpr BaseType kBases[] = {BaseType::kFixed, BaseType::kPlanar, BaseType::kDifferentialDrive,
                                  BaseType::kFloating};
   options.base = kBases[index % 4];
   options.joints = 2 + index % 6;
   options.branching = 0.1 * (index % 10);
-  RobotSpec spec = testing::MakeRandomRobot(options, random);
-  MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "text");
+  Robot robot = MakeDiagnosedRobot(options, random);
   // Where a floating base starts in the MJCF says nothing of the robot.
-  if (options.base == BaseType::kFloating) engine->qpos0[2] += 0.7;
-  return {std::move(spec), std::move(engine)};
+  if (options.base == BaseType::kFloating) robot.engine->qpos0[2] += 0.7;
+  return robot;
 }
 
 /// For long runs by hand: how many times as many sets.
@@ -267,7 +254,7 @@ TEST(DiagnoseMany, BodiesAreAllReadWhateverTheirNumber) {
   TrySets(LoadPanda(), true, 20 * Factor(), "panda", &random, &tally);
   for (int i = 0; i < 30 * Factor(); ++i)
     TrySets(MakeRandom(i, &random), true, 2, fmt::format("random robot {}", i), &random, &tally);
-  TrySets(LoadAssistant(), true, 2 * Factor(), "assistant", &random, &tally);
+  TrySets(LoadPaperRobot(), true, 2 * Factor(), "assistant", &random, &tally);
   Print("bodies", tally);
   EXPECT_GE(tally.sets, 80);
   EXPECT_EQ(tally.wholly, tally.sets);
@@ -279,7 +266,7 @@ TEST(DiagnoseMany, NothingWrongIsPrinted) {
   TrySets(LoadPanda(), false, 6 * Factor(), "panda", &random, &tally);
   for (int i = 0; i < 24 * Factor(); ++i)
     TrySets(MakeRandom(i, &random), false, 3, fmt::format("random robot {}", i), &random, &tally);
-  TrySets(LoadAssistant(), false, 2 * Factor(), "assistant", &random, &tally);
+  TrySets(LoadPaperRobot(), false, 2 * Factor(), "assistant", &random, &tally);
   Print("all", tally);
   EXPECT_GE(tally.sets, 80);
   EXPECT_GT(tally.causes, 2 * tally.sets);  // it still says much

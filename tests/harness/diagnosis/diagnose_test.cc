@@ -7,14 +7,10 @@
 
 #include <algorithm>
 #include <optional>
-#include <random>
 
 #include "controller/common/errors.h"
 #include "harness/diagnosis/mutation.h"
-#include "harness/engine/engine.h"
-#include "tests/common/paper_robot.h"
-#include "tests/common/paths.h"
-#include "tests/common/random_robot.h"
+#include "tests/harness/diagnosis/diagnosed_robot.h"
 
 namespace dexcheck::testing::diagnose_test {
 namespace {
@@ -25,32 +21,18 @@ constexpr double kScale = 1e-3;
 constexpr double kSinglesNamedFirst = 0.95;
 constexpr double kPairsBothNamed = 0.80;
 
-struct Robot {
-  RobotSpec spec;
-  MjModelPtr engine;
-};
-
-Robot LoadPanda() { return {testing::ReadPanda().spec(), LoadMjcf(testing::SourcePath("/mjcf/panda.xml"))}; }
-Robot LoadPaperRobot() {
-  return {testing::ReadPaperRobot().spec(), LoadMjcf(testing::SourcePath("/mjcf/scene.xml"))};
-}
+using Robot = DiagnosedRobot;
 
 /// All kinds of base, of joint and of branching.
 Robot MakeRandom(int index, std::mt19937* random) {
-  testing::RandomRobotOptions options;
+  RandomRobotOptions options;
   constexpr BaseType kBases[] = {BaseType::kFixed, BaseType::kPlanar, BaseType::kDifferentialDrive};
   options.base = kBases[index % 3];
   options.velocity = index % 2 == 0 ? DriveVelocity::kTwist : DriveVelocity::kWheelRates;
   options.joints = 2 + index % 16;
   options.branching = 0.1 * (index % 10);
   options.prismatic = 0.1 * (index % 5);
-  RobotSpec spec = testing::MakeRandomRobot(options, random);
-  MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "text");
-  return {std::move(spec), std::move(engine)};
-}
-
-Diagnosis Explain(const Robot& robot, const RobotSpec& wrong, const DiagnosisOptions& options = {}) {
-  return Diagnose(RobotModel(wrong), *robot.engine, "mjcf", options, [](const char*) { return true; });
+  return MakeDiagnosedRobot(options, random);
 }
 
 /// The diagnosis after several changes at once; nothing when they cannot be made together.
@@ -145,8 +127,7 @@ TEST(Diagnose, NamesAMassWithTheValueThatRepairsIt) {
             "link r_forearm: mass 1.5 kg in FILE, 1.4 kg repairs it");
   EXPECT_NEAR(diagnosis.causes[0].explained, 1.0, 1e-9);
   EXPECT_NEAR(diagnosis.causes[0].explained_of_forces, 1.0, 1e-9);
-  EXPECT_TRUE(diagnosis.remaining_constants.empty());
-  EXPECT_TRUE(diagnosis.remaining_terms.empty());
+  EXPECT_TRUE(IsRepairedWholly(diagnosis));
   EXPECT_FALSE(diagnosis.ranking.empty());
 }
 
@@ -201,9 +182,16 @@ TEST(Diagnose, NamesWhatDiffersBeyondTheDigitsOfPublishedNumbers) {
     // What is solved for is rounded; what is read is as the engine has it.
     if (fault.by_motion || IsGeometric(fault.parameter.kind))
       EXPECT_LE(CountDigits(wrong, fault.parameter, cause.values.front()), 7) << name;
-    EXPECT_TRUE(diagnosis.remaining_constants.empty()) << name;
-    EXPECT_TRUE(diagnosis.remaining_terms.empty()) << name;
+    EXPECT_TRUE(IsRepairedWholly(diagnosis)) << name;
   }
+}
+
+/// Diagnoses the fault alone. @return the diagnosis, or nothing where it makes no robot.
+std::optional<Diagnosis> TryFault(const Robot& robot, const Mutant& fault, Score* score) {
+  std::optional<Diagnosis> diagnosis = ExplainMutants(robot, {&fault});
+  if (diagnosis && !diagnosis->agrees)
+    score->Add(!diagnosis->causes.empty() && IsNamedBy(fault, diagnosis->causes.front()), fault.name);
+  return diagnosis;
 }
 
 // Every mutant of the Panda; what is repaired agrees.
@@ -212,11 +200,10 @@ TEST(Diagnose, NamesEverySingleFaultOfThePanda) {
   Score score;
   int wholly_repaired = 0;
   for (const Mutant& mutant : ListMutants(robot.spec, kScale)) {
-    const std::optional<Diagnosis> diagnosis = ExplainMutants(robot, {&mutant});
+    const std::optional<Diagnosis> diagnosis = TryFault(robot, mutant, &score);
     if (!diagnosis) continue;
     EXPECT_FALSE(diagnosis->agrees) << mutant.name;
-    score.Add(!diagnosis->causes.empty() && IsNamedBy(mutant, diagnosis->causes.front()), mutant.name);
-    wholly_repaired += diagnosis->remaining_terms.empty() && diagnosis->remaining_constants.empty() ? 1 : 0;
+    wholly_repaired += IsRepairedWholly(*diagnosis) ? 1 : 0;
   }
   EXPECT_GT(score.tried(), 200);
   score.ExpectFraction(kSinglesNamedFirst);
@@ -229,12 +216,8 @@ TEST(Diagnose, NamesSingleFaultsOfThePaperRobot) {
   ASSERT_GT(mutants.size(), 1500U);
   constexpr size_t kEvery = 37;
   Score score;
-  for (size_t i = 0; i < mutants.size(); i += kEvery) {
-    const std::optional<Diagnosis> diagnosis = ExplainMutants(robot, {&mutants[i]});
-    if (!diagnosis) continue;
-    score.Add(!diagnosis->causes.empty() && IsNamedBy(mutants[i], diagnosis->causes.front()),
-              mutants[i].name);
-  }
+  for (size_t i = 0; i < mutants.size(); i += kEvery) TryFault(robot, mutants[i], &score);
+  EXPECT_GT(score.tried(), 35);
   score.ExpectFraction(kSinglesNamedFirst);
 }
 
@@ -244,10 +227,7 @@ TEST(Diagnose, NamesSingleFaultsOfRandomRobots) {
   for (int index = 0; index < 80; ++index) {
     const Robot robot = MakeRandom(index, &random);
     const std::vector<Mutant> mutants = ListMutants(robot.spec, kScale);
-    const Mutant& mutant = mutants[random() % mutants.size()];
-    const std::optional<Diagnosis> diagnosis = ExplainMutants(robot, {&mutant});
-    if (!diagnosis || diagnosis->agrees) continue;
-    score.Add(!diagnosis->causes.empty() && IsNamedBy(mutant, diagnosis->causes.front()), mutant.name);
+    TryFault(robot, mutants[random() % mutants.size()], &score);
   }
   EXPECT_GT(score.tried(), 70);
   score.ExpectFraction(kSinglesNamedFirst);

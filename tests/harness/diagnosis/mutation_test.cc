@@ -30,7 +30,7 @@ class WrongEquations : public ::testing::TestWithParam<Files> {};
 
 TEST_P(WrongEquations, AreAllFoundByTheCheckThatTheyBelongTo) {
   const RobotModel model = GetParam().read();
-  const MjModelPtr engine = LoadMjcf(testing::SourcePath(GetParam().mjcf));
+  const MjModelPtr engine = LoadMjcf(SourcePath(GetParam().mjcf));
   const Adapter adapter(model, *engine, "mjcf");
   std::vector<FormulaMutant> mutants = ListFormulaMutants(model);
   EXPECT_GE(mutants.size(), GetParam().formulas);
@@ -43,8 +43,8 @@ TEST_P(WrongEquations, AreAllFoundByTheCheckThatTheyBelongTo) {
 
 // A term on both sides of its own comparison, or one that nothing can spoil, would say "ok" for ever.
 TEST(FormulaMutants, FailEveryTermThatConsistencyCompares) {
-  const RobotModel model = testing::ReadPaperRobot();
-  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
+  const RobotModel model = ReadPaperRobot();
+  const MjModelPtr engine = LoadMjcf(SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *engine, "mjcf");
   ConsistencyOptions options;
   options.samples = kSamples;
@@ -62,16 +62,15 @@ TEST(FormulaMutants, FailEveryTermThatConsistencyCompares) {
 
 INSTANTIATE_TEST_SUITE_P(
     Robots, WrongEquations,
-    ::testing::Values(Files{"Assistant", [] { return testing::ReadPaperRobot(); }, "/mjcf/scene.xml", 85},
-                      Files{"AssistantWheelRates",
-                            [] { return testing::ReadPaperRobot(DriveVelocity::kWheelRates); },
+    ::testing::Values(Files{"Assistant", [] { return ReadPaperRobot(); }, "/mjcf/scene.xml", 85},
+                      Files{"AssistantWheelRates", [] { return ReadPaperRobot(DriveVelocity::kWheelRates); },
                             "/mjcf/scene.xml", 85},
-                      Files{"Panda", [] { return testing::ReadPanda(); }, "/mjcf/panda.xml", 24}),
+                      Files{"Panda", [] { return ReadPanda(); }, "/mjcf/panda.xml", 24}),
     [](const auto& info) { return info.param.name; });
 
 TEST(ContactCheck, AgreesAtRandomContacts) {
-  const RobotModel model = testing::ReadPaperRobot();
-  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
+  const RobotModel model = ReadPaperRobot();
+  const MjModelPtr engine = LoadMjcf(SourcePath("/mjcf/scene.xml"));
   const Adapter adapter(model, *engine, "mjcf");
   StateSource source(model, {}, 3);
   VectorXd q = VectorXd::Zero(model.num_positions());
@@ -95,7 +94,7 @@ TEST(ContactCheck, AgreesAtRandomContacts) {
 }
 
 TEST(Mutants, CoverEveryNumberOfTheModel) {
-  const RobotSpec spec = testing::ReadPaperRobot().spec();
+  const RobotSpec spec = ReadPaperRobot().spec();
   const std::vector<Parameter> parameters = ListParameters(spec);
   // 48 joints with 14 numbers of kinematics and motion and 10 of the link; 8 fingertips and 3 frames; the
   // base's place and body, wheels, gravity and the torus.
@@ -121,8 +120,8 @@ TEST(Mutants, CoverEveryNumberOfTheModel) {
 
 // A range that the MJCF does not limit only says where to look.
 TEST(Mutants, WithoutEffectAreShownToHaveNone) {
-  const RobotModel model = testing::ReadPanda();
-  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/panda.xml"));
+  const RobotModel model = ReadPanda();
+  const MjModelPtr engine = LoadMjcf(SourcePath("/mjcf/panda.xml"));
   const int joint = mj_name2id(engine.get(), mjOBJ_JOINT, "panda_joint2");
   int limits = 0;
   for (Mutant& mutant : ListMutants(model.spec(), 1e-3)) {
@@ -146,8 +145,8 @@ TEST(Mutants, WithoutEffectAreShownToHaveNone) {
 }
 
 TEST(Mutants, ThatAreNoRobotAreRefused) {
-  const RobotModel model = testing::ReadPanda();
-  const MjModelPtr engine = LoadMjcf(testing::SourcePath("/mjcf/panda.xml"));
+  const RobotModel model = ReadPanda();
+  const MjModelPtr engine = LoadMjcf(SourcePath("/mjcf/panda.xml"));
   Mutant mutant = ListMutants(model.spec(), 1e-3).front();
   mutant.change = [](RobotSpec* spec) { spec->joints[1].body.mass = -1.0; };
   TryMutant(model, *engine, "mjcf", {}, &mutant);
@@ -156,10 +155,10 @@ TEST(Mutants, ThatAreNoRobotAreRefused) {
 
 TEST(Mutants, ReversedAxisTurnsTheOtherWay) {
   std::mt19937 random(702);
-  testing::RandomRobotOptions options;
+  RandomRobotOptions options;
   options.joints = 8;
   for (int index = 0; index < 10; ++index) {
-    const RobotSpec spec = testing::MakeRandomRobot(options, &random);
+    const RobotSpec spec = MakeRandomRobot(options, &random);
     const int joint = index % 8;
     RobotSpec reversed = spec;
     ReverseAxis(&reversed, joint);
@@ -167,7 +166,7 @@ TEST(Mutants, ReversedAxisTurnsTheOtherWay) {
     const RobotModel b(reversed);
     ModelTerms terms_a(a);
     ModelTerms terms_b(b);
-    VectorXd q = testing::DrawPositions(a, &random);
+    VectorXd q = DrawPositions(a, &random);
     const VectorXd xi = VectorXd::Zero(terms_a.size());
     terms_a.SetState(q, xi);
     q[3 + joint] = -q[3 + joint];

@@ -297,8 +297,7 @@ TEST_P(AdapterTest, BiasIsTheDerivativeOfTheMap) {
   }
 }
 
-TEST_P(AdapterTest, ProjectionsAreProductsWithTheDenseMap) {
-  constexpr double kSums = 5e-13;  // entries up to 100; measured at most 5e-14
+TEST_P(AdapterTest, TheProjectionIsTheProductWithTheDenseMap) {
   for (const Coordinates coordinates : AllCoordinates()) {
     VelocityMap map(adapter(), coordinates);
     map.SetState(DrawPositions(), DrawVelocities(map.size()));
@@ -309,17 +308,6 @@ TEST_P(AdapterTest, ProjectionsAreProductsWithTheDenseMap) {
     VectorXd projected_force(map.size());
     map.ProjectForce(force.data(), projected_force);
     EXPECT_TRUE(MatrixNear(projected_force, T.transpose() * force, kRounding));
-
-    RowMatrixXd J(5, m()->nv);
-    for (double& entry : J.reshaped()) entry = DrawVelocities(1)[0];
-    MatrixXd projected_J(5, map.size());
-    map.ProjectJacobian(J, projected_J);
-    EXPECT_TRUE(MatrixNear(projected_J, J * T, kRounding));
-
-    const MatrixXd M = J.transpose() * J;
-    MatrixXd projected_M(map.size(), map.size());
-    map.ProjectMatrix(M, projected_M);
-    EXPECT_TRUE(MatrixNear(projected_M, T.transpose() * M * T, kSums));
   }
 }
 

@@ -11,7 +11,7 @@
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/engine/engine.h"
-#include "harness/engine/torus_collision.h"
+#include "harness/engine/exact_collision.h"
 #include "tests/common/allocation_counter.h"
 #include "tests/common/paths.h"
 

@@ -1,7 +1,5 @@
 // The exact sphere-cylinder narrow phase, by itself and inside the engine.
 
-#include "harness/engine/cylinder_collision.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,8 +7,8 @@
 #include <random>
 
 #include "controller/contact/shapes.h"
-#include "harness/engine/ellipsoid_collision.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/exact_collision.h"
 #include "tests/common/matrix_near.h"
 
 namespace dexcheck::testing::cylinder_collision_test {
@@ -39,7 +37,7 @@ TEST(CylinderCollision, FindsTheNearestPointsOutsideAndIn) {
   int rim = 0;
   for (int i = 0; i < 4000; ++i) {
     const Vector3d center(draw(random), draw(random), draw(random));
-    const SphereCylinderContact contact = CollideSphereCylinder(center, kBall, kRadius, kHalfLength);
+    const ExactContact contact = CollideSphereCylinder(center, kBall, kRadius, kHalfLength);
     const double beyond_side = center.head<2>().norm() - kRadius;
     const double beyond_end = std::abs(center.z()) - kHalfLength;
     ASSERT_NEAR(contact.normal.norm(), 1.0, 4e-16);
@@ -69,7 +67,7 @@ TEST(CylinderCollision, FindsTheNearestPointsOutsideAndIn) {
 TEST(CylinderCollision, HasAnAnswerOnTheAxisAndAtTheRim) {
   for (const Vector3d& center :
        {Vector3d(0.0, 0.0, 0.0), Vector3d(0.0, 0.0, kHalfLength), Vector3d(kRadius, 0.0, kHalfLength)}) {
-    const SphereCylinderContact contact = CollideSphereCylinder(center, kBall, kRadius, kHalfLength);
+    const ExactContact contact = CollideSphereCylinder(center, kBall, kRadius, kHalfLength);
     EXPECT_NEAR(contact.normal.norm(), 1.0, 1e-15);
     EXPECT_LE(contact.distance, -kBall);
   }
@@ -86,7 +84,7 @@ TEST(CylinderCollision, IsTheEnginesToRounding) {
   mj_fwdPosition(model.get(), data.get());
   ASSERT_EQ(data->ncon, 1);
   const mjContact& contact = data->contact[0];
-  const SphereCylinderContact expected = CollideSphereCylinder(center, kBall, kRadius, kHalfLength);
+  const ExactContact expected = CollideSphereCylinder(center, kBall, kRadius, kHalfLength);
   EXPECT_LT(expected.distance, 0.0);
   EXPECT_NEAR(contact.dist, expected.distance, kRounding);
   EXPECT_TRUE(MatrixNear(Eigen::Map<const Vector3d>(contact.pos), expected.position, 1e-15));
@@ -106,7 +104,7 @@ TEST(EllipsoidCollision, FindsTheNearestPointsOutsideAndIn) {
   int inside = 0;
   for (int i = 0; i < 2000; ++i) {
     const Vector3d center(draw(random), draw(random), draw(random));
-    const SphereEllipsoidContact contact = CollideSphereEllipsoid(center, kBall, axes);
+    const ExactContact contact = CollideSphereEllipsoid(center, kBall, axes);
     const SurfaceProjection projection = surface.Project(center);
     const SurfaceGeometry place = surface.Evaluate(projection.alpha);
     ASSERT_NEAR(contact.distance, projection.distance - kBall, 10.0 * kRounding);

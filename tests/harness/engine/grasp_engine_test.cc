@@ -205,8 +205,9 @@ TEST_F(RandomGrasp, ContactJacobianIsTheEngines) {
           Eigen::Map<const RowMatrixXd>(data_->efc_J + contact->efc_address * nv, 3, nv);
       const Matrix3d turn = X_cf.linear().transpose() * frame.transpose();  // engine's frame to Sigma_cf
       const RowMatrixXd relative = -(turn * efc_J);
-      MatrixXd J_engine(3, terms_.size());
-      map_.ProjectJacobian(relative, J_engine);
+      MatrixXd T = MatrixXd::Zero(nv, terms_.size());
+      for (int i = 0; i < terms_.size(); ++i) map_.Expand(VectorXd::Unit(terms_.size(), i), T.col(i).data());
+      const MatrixXd J_engine = relative * T;
       EXPECT_TRUE(MatrixNear(J_B_.middleRows(3 * finger, 3), J_engine, kRounding));
 
       // The object's columns: qvel = [R v; omega] of its body velocity.

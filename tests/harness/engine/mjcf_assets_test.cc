@@ -1,7 +1,5 @@
 // Meshes and textures that are missing or damaged.
 
-#include "harness/engine/mjcf_assets.h"
-
 #include <gmock/gmock.h>
 
 #include <cstring>
@@ -9,6 +7,7 @@
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mesh_check.h"
+#include "harness/engine/mjcf_passes.h"
 #include "tests/common/files.h"
 #include "tests/common/throws.h"
 

@@ -1,6 +1,6 @@
 // Files for releases of MuJoCo after 2.2.2.
 
-#include "harness/engine/newer_mjcf.h"
+#include "harness/engine/mjcf_passes.h"
 
 #include <gmock/gmock.h>
 
@@ -49,7 +49,7 @@ struct Copy {
 };
 
 Copy Downgrade(const std::string& text, const std::string& source) {
-  JoinedMjcf mjcf(text, source);
+  MjcfFile mjcf(text, source);
   LeaveOutNewerWords(&mjcf);
   StateNewDefaults(&mjcf);
   return {mjcf.Print(), mjcf.changes()};

@@ -1,7 +1,5 @@
 // The plant's sphere-torus contact against closed form, the engine's own capsules, and the hole.
 
-#include "harness/engine/torus_collision.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -12,6 +10,7 @@
 
 #include "controller/contact/shapes.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/exact_collision.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/paths.h"
 
@@ -47,7 +46,7 @@ TEST(CollideSphereTorus, AgreesWithTheSurfacesClosestPoint) {
   for (int i = 0; i < 2000; ++i) {
     const Vector3d center(draw(random), draw(random), draw(random));
     const SurfaceProjection expected = torus.Project(center);
-    SphereTorusContact contacts[2];
+    ExactContact contacts[2];
     const int count = CollideSphereTorus(center, kBall, kRing, kTube, 0.002, contacts);
     const double distance = expected.distance - kBall;
     ASSERT_EQ(count > 0, distance <= 0.002);
@@ -64,7 +63,7 @@ TEST(CollideSphereTorus, AgreesWithTheSurfacesClosestPoint) {
 }
 
 TEST(CollideSphereTorus, BallInTheHoleTouchesBothSides) {
-  SphereTorusContact contacts[2];
+  ExactContact contacts[2];
   // On the axis, a ball of the hole's radius touches at distance 0 on opposite sides.
   ASSERT_EQ(CollideSphereTorus(Vector3d::Zero(), kRing - kTube, kRing, kTube, 1e-9, contacts), 2);
   EXPECT_TRUE(MatrixNear(contacts[0].normal, -contacts[1].normal, kRounding));
@@ -138,7 +137,7 @@ TEST(TorusCollision, CapsuleRingConvergesToIt) {
       const double middle = kPi / capsules;
       const double rho = kRing + 0.019 * std::cos(elevation);
       const Vector3d center(rho * std::cos(middle), rho * std::sin(middle), 0.019 * std::sin(elevation));
-      SphereTorusContact contacts[2];
+      ExactContact contacts[2];
       ASSERT_GE(CollideSphereTorus(center, kBall, kRing, kTube, 0.0, contacts), 1);
       const double error = std::abs(CapsuleRingDistance(capsules, center) - contacts[0].distance);
       EXPECT_LE(error, kRing * (1.0 - std::cos(kPi / capsules)) * 1.001);
@@ -222,7 +221,7 @@ TEST(CollideBoxTorus, FindsTheLowestPlaceOfATorusOnAFace) {
     const Vector3d axis = Vector3d(draw(random), draw(random), draw(random)).normalized();
     X_BT.linear() = Eigen::AngleAxisd(0.5 * draw(random), axis).toRotationMatrix();
     X_BT.translation() = Vector3d(0.3 * draw(random), 0.2 * draw(random), 0.05 + 0.02 * draw(random));
-    BoxTorusContact contacts[kRingPlaces];
+    ExactContact contacts[kRingPlaces];
     const int count = CollideBoxTorus(X_BT, kRing, kTube, half_size, 0.002, contacts);
     const double gap = MeasureGap(X_BT, half_size);
     ASSERT_EQ(count > 0, gap <= 0.002) << gap;
@@ -244,10 +243,10 @@ TEST(CollideBoxTorus, FindsTheLowestPlaceOfATorusOnAFace) {
 TEST(CollideBoxTorus, SupportsAFlatTorusAllAround) {
   Pose X_BT = Pose::Identity();
   X_BT.translation().z() = 0.02 + kTube - 1e-6;
-  BoxTorusContact contacts[kRingPlaces];
+  ExactContact contacts[kRingPlaces];
   ASSERT_EQ(CollideBoxTorus(X_BT, kRing, kTube, Vector3d(0.5, 0.4, 0.02), 0.0, contacts), kRingPlaces);
   Vector3d middle = Vector3d::Zero();
-  for (const BoxTorusContact& contact : contacts) {
+  for (const ExactContact& contact : contacts) {
     EXPECT_NEAR(contact.distance, -1e-6, 1e-15);
     EXPECT_NEAR(contact.position.head<2>().norm(), kRing, 1e-15);
     middle += contact.position / kRingPlaces;
@@ -257,7 +256,7 @@ TEST(CollideBoxTorus, SupportsAFlatTorusAllAround) {
 
 TEST(CollideBoxTorus, HangsOnAnEdgeAndFallsBesideTheBox) {
   const Vector3d half_size(0.5, 0.4, 0.02);
-  BoxTorusContact contacts[kRingPlaces];
+  ExactContact contacts[kRingPlaces];
   Pose X_BT = Pose::Identity();
   // Half of the ring is over the box.
   X_BT.translation() = Vector3d(0.5, 0.0, 0.02 + kTube);
@@ -269,7 +268,7 @@ TEST(CollideBoxTorus, HangsOnAnEdgeAndFallsBesideTheBox) {
 }
 
 TEST(TorusInTheEngine, LiesStillOnABox) {
-  InstallTorusCollision();
+  InstallExactCollision();
   const MjModelPtr model =
       LoadMjcfText(fmt::format(R"(<mujoco><size nuser_geom="2"/><compiler meshdir="{}/mjcf/assets"/>
         <option timestep="0.001" cone="elliptic"/>

@@ -40,8 +40,8 @@ class RigidPlantTest : public ::testing::Test {
   VectorXd MakeTorques() const {
     TrajectoryController law(setup_.model(), setup_.fingertips(), setup_.object().body, setup_.surface(),
                              setup_.MakeControllerOptions(), {});
-    const LineTrajectory rest(setup_.start().X_o, Vector6d::Zero(), 0.0);
-    law.Follow(rest);
+    const auto rest = MakeLineTrajectory(setup_.start().X_o, Vector6d::Zero(), 0.0);
+    law.Follow(*rest);
     const std::unique_ptr<RigidPlant> plant = MakePlant(1e-3);
     PlantReading reading;
     plant->BeginStep();

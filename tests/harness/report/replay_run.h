@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "harness/engine/engine.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_file.h"
 #include "harness/log/log_writer.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"

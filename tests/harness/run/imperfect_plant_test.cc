@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "harness/diagnosis/spoiled_law.h"
+#include "harness/diagnosis/faulty_law.h"
 #include "harness/run/runner.h"
 #include "tests/harness/run/shipped_run.h"
 
@@ -114,7 +114,7 @@ TEST(KnownNoise, DoesNotBlindTheDemandOfTheLaw) {
       SCOPED_TRACE(fault.name + " " + noise);
       ShippedRun run("curve", {"duration=0.02", "settle=0.3", "expect={}", noise}, 1);
       LoopParts wrong = MakeLoopParts(run.setup());
-      wrong.controller = std::make_unique<SpoiledLaw>(run.setup(), fault);
+      wrong.controller = std::make_unique<FaultyLaw>(run.setup(), fault);
       Runner runner(run.setup(), /*check=*/true, std::move(wrong));
       runner.Run([](const StepRecord&) {}, [] { return false; });
       EXPECT_TRUE(runner.loop().checks().Find("law_demand").failed)

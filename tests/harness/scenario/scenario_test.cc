@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
-#include "harness/engine/mjcf_files.h"
+#include "harness/engine/mjcf_file.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
@@ -249,8 +249,7 @@ TEST(ListMjcfFiles, ReadsAnyXml) {
                 "<hfield file=\"h.png\"/><texture fileright=\"r.png\" fileleft=\"l.png\"/></asset>\n"
                 "<worldbody><body><body><include file=\"b.xml\"></include></body></body></worldbody>\n"
                 "<!-- <include file=\"gone.xml\"/> --><![CDATA[<mesh file=\"gone.stl\"/>]]></mujoco>");
-  WriteText(folder.path() / "b.xml",
-            "<mujocoinclude><include file='./a.xml'/><skin file=\"s.skn\"/></mujocoinclude>");
+  WriteText(folder.path() / "b.xml", "<mujocoinclude><skin file=\"s.skn\"/></mujocoinclude>");
   std::filesystem::create_directories(folder.path() / "looks");
   std::filesystem::create_directories(folder.path() / "shapes");
   for (const char* file :

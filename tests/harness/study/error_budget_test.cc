@@ -14,9 +14,10 @@ namespace {
 
 const std::string kRobot = SourcePath("/controller/parameters/assistant_robot.toml");
 const std::string kScene = SourcePath("/mjcf/scene.xml");
+constexpr int kJobs = 2;
 
 ErrorBudget Calc(const std::vector<std::string>& overrides) {
-  return CalcErrorBudget(ReadShippedScenario("curve", overrides), kRobot, kScene,
+  return CalcErrorBudget(ReadShippedScenario("curve", overrides), kRobot, kScene, kJobs,
                          [](long, long) { return true; });
 }
 
@@ -47,7 +48,7 @@ TEST(ErrorBudget, PartsOfAMotionOfJointsAddUpAndArePredicted) {
          "disturbance=[{ type = 'step', body = 'panda_link5', force = [0, 2, 0], begin = 0.2 }]"});
     const ErrorBudget budget =
         CalcErrorBudget(scenario, SourcePath("/controller/parameters/panda.toml"),
-                        SourcePath("/mjcf/panda_scene.xml"), [](long, long) { return true; });
+                        SourcePath("/mjcf/panda_scene.xml"), kJobs, [](long, long) { return true; });
     EXPECT_TRUE(budget.is_complete()) << budget.failure;
     EXPECT_TRUE(budget.of_joints);
     EXPECT_EQ(budget.unit, "rad");
@@ -71,7 +72,7 @@ TEST(ErrorBudget, NoiseIsPredictedToItsSize) {
       ReadShippedScenario("panda-reach", {"duration=1", "settle=0.2", "sensing.joint_noise=1e-5"});
   const ErrorBudget budget =
       CalcErrorBudget(scenario, SourcePath("/controller/parameters/panda.toml"),
-                      SourcePath("/mjcf/panda_scene.xml"), [](long, long) { return true; });
+                      SourcePath("/mjcf/panda_scene.xml"), kJobs, [](long, long) { return true; });
   ASSERT_EQ(budget.entries.size(), 1U);
   const BudgetEntry& entry = budget.entries[0];
   EXPECT_GT(entry.alone.rms, 10.0 * budget.ideal.rms);
@@ -86,7 +87,7 @@ TEST(ErrorBudget, SourcesThatInteractAreMarked) {
       "panda-reach", {"duration=0.5", "settle=0.5", "actuation.gain_error=-0.3", "mismatch.mass=1.5"});
   const ErrorBudget budget =
       CalcErrorBudget(scenario, SourcePath("/controller/parameters/panda.toml"),
-                      SourcePath("/mjcf/panda_scene.xml"), [](long, long) { return true; });
+                      SourcePath("/mjcf/panda_scene.xml"), kJobs, [](long, long) { return true; });
   EXPECT_TRUE(budget.is_complete()) << budget.failure;
   const double of_gain = 1.0 / (1.0 + kGain) - 1.0;
   const double expected = kMass * of_gain / ((1.0 + kMass) / (1.0 + kGain) - 1.0);
@@ -125,10 +126,10 @@ TEST(ErrorBudget, EverySourceOfAScenarioIsListedAndDropped) {
 }
 
 TEST(ErrorBudget, IdealPlantsAndTasksAreRefused) {
-  EXPECT_TRUE(Throws<InputError>([] { return Calc({"duration=0.1"}); }, "asks for nothing of [sensing]"));
+  EXPECT_TRUE(Throws<InputError>([] { return Calc({"duration=0.1"}); }, "has nothing in [sensing]"));
   EXPECT_TRUE(Throws<InputError>(
       [] {
-        return CalcErrorBudget(ReadShippedScenario("lift", {"mismatch.mass=1.01"}), kRobot, kScene,
+        return CalcErrorBudget(ReadShippedScenario("lift", {"mismatch.mass=1.01"}), kRobot, kScene, kJobs,
                                [](long, long) { return true; });
       },
       "task: a budget needs a trajectory"));

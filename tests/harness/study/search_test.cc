@@ -30,9 +30,8 @@ constexpr double kFound = 1e-6;  // of the ellipsoid, 1e-3 of a range away from 
 TEST(Search, FindsTheMinimum) {
   const UnitPoint start = {0.9, 0.1, 0.8};
   ASSERT_GT(Ellipsoid(start)[0], 1e3 * kFound);
-  for (const auto& [method, count] : {std::pair{SearchMethod::kCmaEs, 800L},
-                                      {SearchMethod::kNelderMead, 300L},
-                                      {SearchMethod::kBobyqa, 100L}}) {
+  for (const auto& [method, count] :
+       {std::pair{SearchMethod::kCmaEs, 800L}, {SearchMethod::kNelderMead, 300L}}) {
     Search search = MakeSearch(method, count);
     search.tolerance = 1e-5;
     const auto points = RunSearch(search, start, Ellipsoid);
@@ -70,7 +69,7 @@ TEST(Search, FindsAMinimumOnTheEdge) {
   const Function slope = [](const UnitPoint& x) {
     return std::vector<double>{x[0] + (x[1] - 0.5) * (x[1] - 0.5)};
   };
-  for (const SearchMethod method : {SearchMethod::kCmaEs, SearchMethod::kNelderMead, SearchMethod::kBobyqa}) {
+  for (const SearchMethod method : {SearchMethod::kCmaEs, SearchMethod::kNelderMead}) {
     const auto points = RunSearch(MakeSearch(method, 480), {0.7, 0.2}, slope);
     EXPECT_LT(SortFeasible(points).front()->judgement.objectives[0], 1e-3) << static_cast<int>(method);
     EXPECT_EQ(SortFeasible(points).front()->values[0], 0.0)
@@ -106,19 +105,17 @@ TEST(Search, ATenthOfAGridsTrialsIsEnough) {
     const Function& function = functions[i];
     double grid = 1e300;
     for (int j = 0; j < 400; ++j) grid = std::min(grid, function({j % 20 / 19.0, j / 20 / 19.0})[0]);
-    for (const SearchMethod method : {SearchMethod::kNelderMead, SearchMethod::kBobyqa}) {
-      long found = 0;
-      for (long seed = 1; seed <= seeds; ++seed) {
-        Search search = MakeSearch(method, 40);
-        search.seed = static_cast<std::uint64_t>(seed);
-        search.starts = method == SearchMethod::kNelderMead ? 2 : 1;
-        const std::vector<JudgedPoint> points = RunSearch(search, {0.5, 0.5}, function);
-        ASSERT_LE(points.size(), 40U);
-        EXPECT_GT(points.front().judgement.objectives[0], 1.05 * grid) << "it did not begin there";
-        if (SortFeasible(points).front()->judgement.objectives[0] < 1.05 * grid) ++found;
-      }
-      EXPECT_EQ(found, seeds) << "function " << i << ", method " << static_cast<int>(method);
+    long found = 0;
+    for (long seed = 1; seed <= seeds; ++seed) {
+      Search search = MakeSearch(SearchMethod::kNelderMead, 40);
+      search.seed = static_cast<std::uint64_t>(seed);
+      search.starts = 2;
+      const std::vector<JudgedPoint> points = RunSearch(search, {0.5, 0.5}, function);
+      ASSERT_LE(points.size(), 40U);
+      EXPECT_GT(points.front().judgement.objectives[0], 1.05 * grid) << "it did not begin there";
+      if (SortFeasible(points).front()->judgement.objectives[0] < 1.05 * grid) ++found;
     }
+    EXPECT_EQ(found, seeds) << "function " << i;
   }
 }
 

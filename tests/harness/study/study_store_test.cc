@@ -2,6 +2,7 @@
 
 #include "harness/study/study_store.h"
 
+#include <SQLiteCpp/Database.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -31,6 +32,10 @@ class StudyStoreTest : public ::testing::Test {
 
   [[nodiscard]] StudyStore Open() const {
     return StudyStore::OpenOrCreate(folder_.path() / "s.sqlite", identity_, study_);
+  }
+
+  void Execute(const std::string& sql) const {
+    SQLite::Database(folder_.path() / "s.sqlite", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE).exec(sql);
   }
 
   [[nodiscard]] static TrialRow MakeRow(long number) {
@@ -97,7 +102,7 @@ TEST_F(StudyStoreTest, OtherFilesAreRefused) {
   testing::WriteText(path, std::string(5000, 'x'));
   EXPECT_TRUE(Throws<InputError>([&] { return Open(); }, "s.sqlite: is not a usable database"));
   std::filesystem::remove(path);
-  Database(path, Database::Mode::kCreate).Execute("CREATE TABLE other (x)");
+  Execute("CREATE TABLE other (x)");
   EXPECT_TRUE(Throws<InputError>([&] { return Open(); }, "s.sqlite: is not the database of a study"));
   EXPECT_TRUE(
       Throws<InputError>([&] { return StudyStore::Open(folder_.path() / "no.sqlite"); }, "cannot be opened"));
@@ -174,8 +179,7 @@ TEST_F(StudyStoreTest, FailedTrialsGiveWay) {
 
     crashed.trial.number = 1;
     store.Add(crashed);
-    EXPECT_EQ(store.RemoveFailed({0}), 0) << "not this one";
-    EXPECT_EQ(store.RemoveFailed({0, crashed.trial.number}), 1);
+    store.RemoveFailed();
     EXPECT_TRUE(store.Has(0));
     EXPECT_FALSE(store.Has(1));
     EXPECT_TRUE(store.Claim(1));
@@ -185,11 +189,8 @@ TEST_F(StudyStoreTest, FailedTrialsGiveWay) {
 TEST_F(StudyStoreTest, DatabasesThatDoNotTellTheMachineAreReadAndContinued) {
   const std::filesystem::path path = folder_.path() / "s.sqlite";
   Open().Add(MakeRow(0));
-  {
-    Database database(path, Database::Mode::kExisting);
-    database.Execute("ALTER TABLE trials DROP COLUMN machine");
-    database.Execute("UPDATE study SET layout = '1'");
-  }
+  Execute("ALTER TABLE trials DROP COLUMN machine");
+  Execute("UPDATE study SET layout = '1'");
   TrialRow row = MakeRow(1);
   row.machine = "this";
   Open().Add(row);
@@ -198,22 +199,15 @@ TEST_F(StudyStoreTest, DatabasesThatDoNotTellTheMachineAreReadAndContinued) {
   EXPECT_EQ(rows[0].machine, "");
   EXPECT_EQ(rows[0].result.metrics[kEnergy], MakeRow(0).result.metrics[kEnergy]);
   EXPECT_EQ(rows[1].machine, "this");
-  {
-    Database database(path, Database::Mode::kExisting);
-    database.Execute("UPDATE study SET layout = '0'");
-  }
+  Execute("UPDATE study SET layout = '0'");
   EXPECT_TRUE(Throws<InputError>([&] { return StudyStore::Open(path); }, "another version of dexcheck"));
 }
 
 TEST_F(StudyStoreTest, DatabasesWithoutTheNewestMetricsAreReadAndContinued) {
   const std::filesystem::path path = folder_.path() / "s.sqlite";
   Open().Add(MakeRow(0));
-  {
-    Database database(path, Database::Mode::kExisting);
-    for (const char* name : {"joint_error_rms", "joint_error_max"}) {
-      database.Execute(std::string("ALTER TABLE trials DROP COLUMN ") + name);
-    }
-  }
+  for (const char* name : {"joint_error_rms", "joint_error_max"})
+    Execute(std::string("ALTER TABLE trials DROP COLUMN ") + name);
   Open().Add(MakeRow(1));
   const std::vector<TrialRow> rows = StudyStore::Open(path).ReadRows();
   ASSERT_EQ(rows.size(), 2u);

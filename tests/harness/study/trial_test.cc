@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 
 #include "harness/study/study.h"
 #include "tests/harness/run/shipped_run.h"
@@ -52,6 +53,37 @@ TEST(TrialOfJoints, DivergesAndIsStoppedByTheErrorOfAJoint) {
   EXPECT_NE(stopped.failure.find("an error of a joint is above stop_error, 0.02 rad"), std::string::npos)
       << stopped.failure;
   EXPECT_LT(stopped.metrics[kSimulatedTime], 0.5);
+}
+
+// A trial sets its numbers in files that are parsed once: the same bits, and the same refusals, as from their
+// text with "KEY=VALUE".
+TEST(Trial, NumbersSetInParsedFilesAreThoseOfTheText) {
+  StudyInputs text;
+  text.study = ParseStudy(
+      "name = 'mass'\nscenario = 'hold'\nset = ['duration=0.02', 'settle=0.05', 'model.object.mass=0.21']\n"
+      "[[vary]]\nkey = 'model.base.wheels.damping'\nvalues = [0.02, 0.0312345678901234]\n"
+      "[[vary]]\nkey = 'control.law'\nvalues = ['computed_torque', 'impedance']\n"
+      "[[vary]]\nkey = 'actuation.delay'\nvalues = [0, 0.0012345678901234, -1]\n",
+      "study.toml");
+  text.scenario_folder = SourcePath("/harness/shipped/scenarios");
+  text.scenario_source = "hold";
+  text.scenario_text = ReadTextFile((text.scenario_folder / "hold.toml").string());
+  text.robot = SourcePath("/controller/parameters/assistant_robot.toml");
+  text.mjcf = SourcePath("/mjcf/scene.xml");
+  StudyInputs parsed = text;
+  parsed.study.variations.back().from = 0.0;  // whose ends must make a scenario
+  CheckTrials(&parsed);
+  ASSERT_TRUE(parsed.scenario_document && parsed.model_document);
+  int refused = 0;
+  for (const Trial& trial : ListTrials(text.study)) {
+    const TrialResult a = RunTrial(text, trial);
+    const TrialResult b = RunTrial(parsed, trial);
+    EXPECT_EQ(a.outcome, b.outcome);
+    EXPECT_EQ(a.failure, b.failure);
+    EXPECT_EQ(std::memcmp(a.metrics.data(), b.metrics.data(), sizeof a.metrics), 0) << trial.number;
+    refused += a.outcome == Outcome::kRefused ? 1 : 0;
+  }
+  EXPECT_EQ(refused, 4) << "delays below zero";
 }
 
 }  // namespace

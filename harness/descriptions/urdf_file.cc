@@ -1,0 +1,197 @@
+#include "harness/descriptions/urdf_file.h"
+
+#include <urdf_model/pose.h>
+#include <urdf_model/utils.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "controller/common/text.h"
+#include "harness/engine/xml.h"
+
+namespace dexcheck {
+namespace {
+
+// Far more than robots have; it also keeps what follows within seconds and megabytes.
+constexpr size_t kMaxLinks = 2000;
+
+using Element = tinyxml2::XMLElement;
+
+/// The part of that name; nullptr when there is none.
+template <typename Part>
+const Part* Find(const std::vector<Part>& parts, std::string_view name) {
+  const auto found = std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.name == name; });
+  return found == parts.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+UrdfFile::UrdfFile(std::string_view text, std::string source)
+    : source_(std::move(source)), document_(std::make_unique<tinyxml2::XMLDocument>()) {
+  ParseXml(text, source_, document_.get());
+  robot_ = document_->RootElement();
+  if (robot_ == nullptr || std::string_view(robot_->Name()) != "robot") {
+    Fail(robot_ == nullptr ? 1 : robot_->GetLineNum(),
+         "must have the root element <robot>, got " +
+             (robot_ == nullptr ? std::string("none") : Quote("<" + std::string(robot_->Name()) + ">")));
+  }
+  for (Element* child : ListChildren(robot_)) {
+    const std::string_view kind = child->Name();
+    if (kind.starts_with("xacro:")) {
+      Fail(child->GetLineNum(), "is a template, got " + Quote("<" + std::string(kind) + ">") +
+                                    ": write the URDF with the program xacro first");
+    }
+    if (kind == "link") AddLink(child);
+    if (kind == "joint") AddJoint(child);
+  }
+  Connect();
+  FindRoot();
+  RejectCycles();
+}
+
+UrdfFile::~UrdfFile() = default;
+
+void UrdfFile::Fail(int line, const std::string& problem) const {
+  throw InputError(source_ + ":" + std::to_string(std::max(line, 1)) + ": " + problem);
+}
+
+std::string UrdfFile::Print() const { return PrintXml(*document_); }
+
+void UrdfFile::AddLink(Element* element) {
+  const int line = element->GetLineNum();
+  const std::string name = ReadAttribute(*element, "name");
+  if (name.empty()) Fail(line, "link: must have a name");
+  const std::string key = "link " + Quote(name) + ": ";
+  if (const UrdfLink* const other = Find(links_, name))
+    Fail(line, key + "names must be unique, taken on line " + std::to_string(other->line));
+  if (links_.size() == kMaxLinks)
+    Fail(line, key + "a robot must have at most " + std::to_string(kMaxLinks) + " links, got more");
+  links_.push_back({name, element, line, -1, {}});
+}
+
+void UrdfFile::AddJoint(Element* element) {
+  UrdfJoint joint{ReadAttribute(*element, "name"), element, element->GetLineNum(),
+                  ReadAttribute(*element, "type")};
+  if (joint.name.empty()) joint.name = "#" + std::to_string(joints_.size());
+  const std::string key = "joint " + Quote(joint.name) + ": ";
+  if (Find(joints_, joint.name) != nullptr) Fail(joint.line, key + "names must be unique");
+  if (joints_.size() == kMaxLinks)
+    Fail(joint.line, key + "a robot must have at most " + std::to_string(kMaxLinks) + " joints, got more");
+  joints_.push_back(std::move(joint));
+}
+
+int UrdfFile::FindEnd(const UrdfJoint& joint, const char* end) const {
+  const Element* const child = joint.element->FirstChildElement(end);
+  const char* const name = child == nullptr ? nullptr : child->Attribute("link");
+  const std::string key = "joint " + Quote(joint.name) + ": " + end + ": ";
+  if (name == nullptr) Fail(joint.line, key + "missing, must name a link");
+  if (const UrdfLink* const found = Find(links_, name)) return static_cast<int>(found - links_.data());
+  std::vector<std::string> names;
+  for (const UrdfLink& link : links_) names.push_back(link.name);
+  const std::string nearest = FindNearest(name, names);
+  Fail(joint.line, key + "must be a link" +
+                       (nearest.empty() ? "" : " (did you mean " + Quote(nearest) + "?)") + ", got " +
+                       Quote(name));
+}
+
+void UrdfFile::Connect() {
+  if (links_.empty()) Fail(1, "must have links, got none");
+  for (size_t i = 0; i < joints_.size(); ++i) {
+    UrdfJoint& joint = joints_[i];
+    joint.parent = FindEnd(joint, "parent");
+    joint.child = FindEnd(joint, "child");
+    UrdfLink& child = links_[static_cast<size_t>(joint.child)];
+    if (child.parent_joint >= 0) {
+      Fail(joint.line, "joint " + Quote(joint.name) + ": child: must hang on one joint only, " +
+                           Quote(child.name) + " hangs on " + Quote(this->joint(child.parent_joint).name) +
+                           " too: loops cannot be described by a tree");
+    }
+    child.parent_joint = static_cast<int>(i);
+    links_[static_cast<size_t>(joint.parent)].child_joints.push_back(static_cast<int>(i));
+  }
+}
+
+void UrdfFile::FindRoot() {
+  for (size_t i = 0; i < links_.size(); ++i) {
+    if (links_[i].parent_joint >= 0) continue;
+    if (root_ >= 0) {
+      Fail(links_[i].line, "link " + Quote(links_[i].name) + ": must hang on a joint, since " +
+                               Quote(link(root_).name) + " is the root already");
+    }
+    root_ = static_cast<int>(i);
+  }
+  if (root_ < 0) FailCycle(0);
+}
+
+/// Every link must be reached from the root.
+void UrdfFile::RejectCycles() const {
+  std::vector<bool> reached(links_.size(), false);
+  std::vector<int> open = {root_};
+  while (!open.empty()) {
+    const int index = open.back();
+    open.pop_back();
+    reached[static_cast<size_t>(index)] = true;
+    for (const int child : link(index).child_joints) open.push_back(joint(child).child);
+  }
+  const auto lost = std::find(reached.begin(), reached.end(), false);
+  if (lost != reached.end()) FailCycle(static_cast<size_t>(lost - reached.begin()));
+}
+
+/// Follows the parents of a link that no root carries until one comes again.
+void UrdfFile::FailCycle(size_t link) const {
+  std::vector<size_t> path;
+  while (std::find(path.begin(), path.end(), link) == path.end()) {
+    path.push_back(link);
+    link = static_cast<size_t>(joint(links_[link].parent_joint).parent);
+  }
+  std::string text = links_[link].name;
+  for (auto at = path.rbegin(); *at != link; ++at) text += " -> " + links_[*at].name;
+  text += " -> " + links_[link].name;
+  Fail(links_[link].line, "links must not be cyclic, got " + Quote(text));
+}
+
+double UrdfFile::ReadNumber(const Element& element, const std::string& key, const char* attribute) const {
+  const char* const value = element.Attribute(attribute);
+  const std::string name = key + element.Name() + ": " + attribute + ": ";
+  if (value == nullptr) Fail(element.GetLineNum(), name + "missing");
+  try {
+    return urdf::strToDouble(value);
+  } catch (const std::runtime_error&) {
+    Fail(element.GetLineNum(), name + "must be a number, got " + Quote(value));
+  }
+}
+
+double UrdfFile::ReadNumber(const Element& element, const std::string& key, const char* attribute,
+                            double otherwise) const {
+  return element.Attribute(attribute) == nullptr ? otherwise : ReadNumber(element, key, attribute);
+}
+
+Vector3d UrdfFile::ReadVector(const Element& element, const std::string& key, const char* attribute,
+                              const Vector3d& otherwise) const {
+  const char* const value = element.Attribute(attribute);
+  if (value == nullptr) return otherwise;
+  try {
+    urdf::Vector3 numbers;
+    numbers.init(value);
+    return {numbers.x, numbers.y, numbers.z};
+  } catch (const urdf::ParseError&) {
+    Fail(element.GetLineNum(),
+         key + element.Name() + ": " + attribute + ": must be three numbers, got " + Quote(value));
+  }
+}
+
+Pose UrdfFile::ReadOrigin(const Element& element, const std::string& key) const {
+  Pose X = Pose::Identity();
+  const Element* const origin = element.FirstChildElement("origin");
+  if (origin == nullptr) return X;
+  X.translation() = ReadVector(*origin, key, "xyz", Vector3d::Zero());
+  if (origin->Attribute("rpy") == nullptr) return X;
+  const Vector3d rpy = ReadVector(*origin, key, "rpy", Vector3d::Zero());
+  urdf::Rotation q;
+  q.setFromRPY(rpy[0], rpy[1], rpy[2]);
+  X.linear() = Eigen::Quaterniond(q.w, q.x, q.y, q.z).toRotationMatrix();
+  return X;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,202 @@
+#include "harness/engine/mjcf_file.h"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <system_error>
+
+#include "controller/common/text.h"
+#include "harness/engine/mjcf_passes.h"
+#include "harness/engine/xml.h"
+
+namespace dexcheck {
+namespace {
+
+using tinyxml2::XMLElement;
+using tinyxml2::XMLNode;
+
+std::string ReadFile(const std::filesystem::path& path, const std::string& shown) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) throw InputError(shown + ": cannot be read: is a folder");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw InputError(shown + ": cannot be read");
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The first <include> at or below an element, in the order of the file.
+XMLElement* FindInclude(XMLElement* root) {
+  XMLElement* found = nullptr;
+  VisitElements(root, [&](XMLElement* element) {
+    if (found == nullptr && std::string_view(element->Name()) == "include") found = element;
+  });
+  return found;
+}
+
+bool LiesInside(const std::filesystem::path& file) {
+  return !file.is_absolute() && (file.empty() || *file.begin() != "..");
+}
+
+}  // namespace
+
+void AssetFolders::Read(const XMLElement& compiler) {
+  meshes = ReadAttribute(compiler, "meshdir", meshes);
+  textures = ReadAttribute(compiler, "texturedir", textures);
+  strips_paths = ReadAttribute(compiler, "strippath", strips_paths ? "true" : "false") == "true";
+}
+
+std::filesystem::path AssetFolders::Find(const std::string& folder, const std::string& name) const {
+  const std::filesystem::path path(name);
+  return std::filesystem::path(folder) / (strips_paths ? path.filename() : path);
+}
+
+MjcfFile::MjcfFile(const std::filesystem::path& file)
+    : source_(file.string()), folder_(std::filesystem::absolute(file).parent_path()) {
+  Parse(ReadFile(file, source_));
+  if (IsUrdf()) return;
+  while (XMLElement* const include = FindInclude(root_)) Splice(include);
+}
+
+MjcfFile::MjcfFile(std::string_view text, const std::string& source)
+    : source_(source), folder_(std::filesystem::current_path()) {
+  Parse(text);
+}
+
+MjcfFile::~MjcfFile() = default;
+
+void MjcfFile::Parse(std::string_view text) {
+  document_ = std::make_unique<tinyxml2::XMLDocument>();
+  ParseXml(text, source_, document_.get());
+  root_ = document_->RootElement();
+  if (root_ == nullptr || (std::string_view(root_->Name()) != "mujoco" && !IsUrdf())) {
+    throw InputError(source_ + ": must be an MJCF, its root element <mujoco>");
+  }
+}
+
+bool MjcfFile::IsUrdf() const { return std::string_view(root_->Name()) == "robot"; }
+
+bool MjcfFile::HasWorld() const { return root_->FirstChildElement("worldbody") != nullptr; }
+
+void MjcfFile::Splice(XMLElement* include) {
+  const char* const name = include->Attribute("file");
+  if (name == nullptr) throw InputError(FindPlace(*include) + ": <include>: must have a file");
+  // The engine takes all names from the folder of the file that is loaded, and each file once.
+  const std::filesystem::path own = source_;
+  const std::string path = (own.parent_path() / name).lexically_normal().string();
+  if (path == own.lexically_normal() || std::find(files_.begin(), files_.end(), path) != files_.end()) {
+    throw InputError(FindPlace(*include) + ": <include>: file " + Quote(name) +
+                     ": must be included once only");
+  }
+  tinyxml2::XMLDocument document;
+  ParseXml(ReadFile(path, FindPlace(*include) + ": file " + Quote(name)), path, &document);
+  files_.push_back(path);
+  included_.push_back(std::filesystem::path(name).lexically_normal().string());
+  XMLNode* last = include;
+  for (const XMLElement* child : ListChildren<const XMLElement>(document.RootElement()))
+    last = include->Parent()->InsertAfterChild(last, Clone(*child, &files_.back()));
+  include->Parent()->DeleteChild(include);
+}
+
+XMLElement* MjcfFile::Clone(const XMLElement& element, const std::string* file) {
+  XMLElement* const copy = element.ShallowClone(document_.get())->ToElement();
+  places_.push_back({file, element.GetLineNum()});
+  copy->SetUserData(&places_.back());
+  for (const XMLNode* child = element.FirstChild(); child != nullptr; child = child->NextSibling()) {
+    const XMLElement* const inner = child->ToElement();
+    copy->InsertEndChild(inner != nullptr ? Clone(*inner, file) : child->ShallowClone(document_.get()));
+  }
+  return copy;
+}
+
+MjcfFile::Place MjcfFile::ReadPlace(const XMLElement& element) const {
+  if (const auto* const place = static_cast<const Place*>(element.GetUserData())) return *place;
+  return {&source_, std::max(element.GetLineNum(), 1)};
+}
+
+std::string MjcfFile::FindPlace(const XMLElement& element) const {
+  const Place place = ReadPlace(element);
+  return *place.file + ":" + std::to_string(place.line);
+}
+
+void MjcfFile::Note(const XMLElement& element, const std::string& word, const std::string& what) {
+  const Place place = ReadPlace(element);
+  changes_.push_back({*place.file, place.line, word, what});
+}
+
+std::string MjcfFile::SummarizeChanges() const {
+  constexpr size_t kMostWords = 4;
+  std::map<std::string, std::map<std::string, int>> groups;
+  for (const MjcfChange& change : changes_)
+    ++groups[change.what.substr(0, change.what.find(", since"))][change.word];
+  std::string line = source_ + ":";
+  for (const auto& [what, words] : groups) {
+    line += (line.back() == ':' ? " " : "; ") + what + ": ";
+    size_t count = 0;
+    for (const auto& [word, times] : words) {
+      if (count++ >= kMostWords) continue;
+      line += (count > 1 ? ", " : "") + word + (times > 1 ? " (" + std::to_string(times) + ")" : "");
+    }
+    if (count > kMostWords) line += " and " + std::to_string(count - kMostWords) + " more";
+  }
+  return line;
+}
+
+std::string MjcfFile::Print() const { return PrintXml(*document_); }
+
+std::string MjcfFile::PrintFor(const std::filesystem::path& folder) const {
+  tinyxml2::XMLDocument copy;
+  document_->DeepCopy(&copy);
+  XMLElement* const root = copy.RootElement();
+  const auto move = [&](XMLElement* compiler, const char* name) {
+    const std::filesystem::path old = ReadAttribute(*compiler, name);
+    if (old.is_absolute()) return;
+    std::error_code error;
+    compiler->SetAttribute(name, std::filesystem::proximate(folder_ / old, folder, error).string().c_str());
+  };
+  for (const char* name : {"meshdir", "texturedir"}) {
+    bool is_stated = false;
+    VisitElements(root, [&](XMLElement* element) {
+      if (std::string_view(element->Name()) != "compiler" || element->Attribute(name) == nullptr) return;
+      move(element, name);
+      is_stated = true;
+    });
+    // Without such a folder, files are looked for in the MJCF's own.
+    if (!is_stated) move(RequireCompiler(root), name);
+  }
+  return PrintXml(copy);
+}
+
+std::vector<std::string> ListMjcfFiles(const std::filesystem::path& mjcf) {
+  const MjcfFile model(mjcf);
+  std::vector<std::string> files;
+  const auto add = [&](const std::filesystem::path& given) {
+    const std::filesystem::path file = given.lexically_normal();
+    if (!LiesInside(file)) {
+      throw InputError(mjcf.string() + ": file " + Quote(file.string()) +
+                       ": must lie in the MJCF's folder, so that the log can keep it");
+    }
+    files.push_back(file.string());
+  };
+  add(mjcf.filename());
+  for (const std::string& file : model.included()) add(file);
+  AssetFolders folders;
+  VisitElements(model.root(), [&](const XMLElement* element) {
+    if (std::string_view(element->Name()) == "compiler") folders.Read(*element);
+  });
+  VisitElements(model.root(), [&](const XMLElement* element) {
+    for (const char* attribute : ListAssetAttributes(element->Name())) {
+      const char* const name = element->Attribute(attribute);
+      if (name == nullptr) continue;
+      const bool is_texture = std::string_view(element->Name()) == "texture";
+      const std::filesystem::path file = folders.Find(is_texture ? folders.textures : folders.meshes, name);
+      std::error_code error;
+      if (!LiesInside(file.lexically_normal()) || std::filesystem::exists(model.folder() / file, error))
+        add(file);
+    }
+  });
+  std::sort(files.begin() + 1, files.end());
+  files.erase(std::unique(files.begin(), files.end()), files.end());
+  return files;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,105 @@
+#pragma once
+
+// An MJCF as one document: what it includes is joined, passes change it (mjcf_passes.h), and it is written
+// again in one piece.
+
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tinyxml2 {
+class XMLDocument;
+class XMLElement;
+}  // namespace tinyxml2
+
+namespace dexcheck {
+
+/// What was done with one word of a file.
+struct MjcfChange {
+  std::string file;
+  int line = 0;
+  std::string word;  ///< "<joint actuatorfrcrange>"
+  std::string what;  ///< "left out: forces of actuators, since MuJoCo 3.0.0"
+};
+
+/// Where an MJCF's assets are, as its `compiler` elements say.
+struct AssetFolders {
+  std::string meshes;  ///< Height fields and skins too.
+  std::string textures;
+  bool strips_paths = false;  ///< The engine then takes a file's name only, without its folder.
+
+  void Read(const tinyxml2::XMLElement& compiler);
+  /// A file of that name, from the MJCF's folder.
+  [[nodiscard]] std::filesystem::path Find(const std::string& folder, const std::string& name) const;
+};
+
+/// The elements of an MJCF and of the files that it includes, and where each stood.
+class MjcfFile {
+ public:
+  /// What is included takes the place of its `include`.
+  /// @throws InputError when a file cannot be read, is not XML, or is included twice.
+  explicit MjcfFile(const std::filesystem::path& file);
+  /// A text, whose files are found from the working directory; its `include` elements stay.
+  /// @param source its name in messages. @throws InputError.
+  MjcfFile(std::string_view text, const std::string& source);
+  ~MjcfFile();
+  MjcfFile(const MjcfFile&) = delete;
+  MjcfFile& operator=(const MjcfFile&) = delete;
+
+  /// The element `mujoco`.
+  [[nodiscard]] tinyxml2::XMLElement* root() const { return root_; }
+  /// Whether it has a `worldbody`: parts that are meant for `include` have none.
+  [[nodiscard]] bool HasWorld() const;
+  /// Whether it is no MJCF but a URDF, which the engine reads too.
+  [[nodiscard]] bool IsUrdf() const;
+  [[nodiscard]] const std::string& source() const { return source_; }
+  /// From which its files are found; absolute.
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  /// The files that it includes, relative to its folder.
+  [[nodiscard]] const std::vector<std::string>& included() const { return included_; }
+  /// "FILE:LINE" of an element; that of the root for one that was added since.
+  [[nodiscard]] std::string FindPlace(const tinyxml2::XMLElement& element) const;
+  /// Notes what was done with a word of this element.
+  void Note(const tinyxml2::XMLElement& element, const std::string& word, const std::string& what);
+  [[nodiscard]] const std::vector<MjcfChange>& changes() const { return changes_; }
+  /// "robot.xml: left out: forces of actuators: <joint kv> (7), ...; left out: ...": all changes in one line.
+  [[nodiscard]] std::string SummarizeChanges() const;
+  [[nodiscard]] std::string Print() const;
+  /// As a file in another folder has to say it: the folders of its meshes and textures are found from there.
+  [[nodiscard]] std::string PrintFor(const std::filesystem::path& folder) const;
+
+ private:
+  struct Place {
+    const std::string* file;
+    int line;
+  };
+
+  void Parse(std::string_view text);
+  void Splice(tinyxml2::XMLElement* include);
+  /// A copy in this document of an element of another file.
+  [[nodiscard]] tinyxml2::XMLElement* Clone(const tinyxml2::XMLElement& element, const std::string* file);
+  [[nodiscard]] Place ReadPlace(const tinyxml2::XMLElement& element) const;
+
+  std::string source_;
+  std::filesystem::path folder_;
+  std::unique_ptr<tinyxml2::XMLDocument> document_;
+  tinyxml2::XMLElement* root_ = nullptr;
+  std::deque<std::string> files_;  // that are included, from the working directory
+  std::vector<std::string> included_;
+  std::deque<Place> places_;  // of elements from there, which point here
+  std::vector<MjcfChange> changes_;
+};
+
+/// What was said so far, on standard error, of the files that this process loaded (LoadMjcf): what was left
+/// out of them for this release of the engine, and the engine's own warnings. For the JSON of commands.
+std::vector<std::string> ListLoadNotes();
+
+/// Files of an MJCF model: the file itself, what it includes, and those of its meshes, height fields and
+/// textures that exist, as paths relative to its folder; itself first.
+/// @throws InputError as MjcfFile, and when one lies outside that folder.
+std::vector<std::string> ListMjcfFiles(const std::filesystem::path& mjcf);
+
+}  // namespace dexcheck

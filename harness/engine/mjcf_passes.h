@@ -1,0 +1,46 @@
+#pragma once
+
+// Passes over an MJCF, each of which changes it, notes what it did (MjcfFile::changes), or refuses it.
+
+#include <span>
+#include <string_view>
+
+#include "harness/engine/mjcf_file.h"
+
+namespace dexcheck {
+
+/// Makes an MJCF one that this program's engine reads: CheckNumbers, LeaveOutNewerWords, LeaveOutAssets.
+void AdaptMjcf(MjcfFile* mjcf);
+
+/// Of single integers and of lists of numbers the engine reads what it can and drops the rest: 1 of "1,5".
+/// Takes off blanks at which it reads a number twice.
+/// @throws InputError "FILE:LINE: <size nconmax>: must be an integer, got "1,5"".
+void CheckNumbers(MjcfFile* mjcf);
+
+/// Leaves out what this program's engine does not know and what has no effect on the dynamics.
+/// @throws InputError "FILE:LINE: <joint damping>: ...", which says since which release and what to do, for
+/// what acts on the dynamics or is not known at all.
+void LeaveOutNewerWords(MjcfFile* mjcf);
+
+/// Leaves out what its missing or broken files (meshes, height fields, skins, textures) and missing materials
+/// take with them: looks, and the contacts of geoms that have no mesh.
+/// @throws InputError "FILE:LINE: mesh "no.stl": does not exist; ..." where a body's mass follows from the
+/// mesh.
+void LeaveOutAssets(MjcfFile* mjcf);
+
+/// States what later releases take by default, and 2.2.2 refuses to guess: a range alone limits (autolimits).
+void StateNewDefaults(MjcfFile* mjcf);
+
+/// Puts one torque motor for each joint of the robot in the place of all of an MJCF's actuators, as a run
+/// needs them: servos, muscles and tendons are what a controller here replaces. A motor's limit is what the
+/// joint's actuator could give; sensors of actuators and the controls of key frames go with them.
+/// @throws InputError when the engine cannot load it, or a joint has no name.
+void AddMotors(MjcfFile* mjcf);
+
+/// The element `compiler` of an MJCF's root; a new one when it has none.
+tinyxml2::XMLElement* RequireCompiler(tinyxml2::XMLElement* root);
+
+/// Attributes of an element of that name (mesh, hfield, skin, texture) that name files; empty for others.
+std::span<const char* const> ListAssetAttributes(std::string_view element);
+
+}  // namespace dexcheck

@@ -1,0 +1,64 @@
+#pragma once
+
+// XML documents of robots: parsing in one line of error, children, attributes.
+
+#include <tinyxml2.h>
+
+#include <algorithm>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "controller/common/errors.h"
+
+namespace dexcheck {
+
+/// @param shown the file in messages. @throws InputError "FILE:LINE: is not XML, XML_ERROR_...".
+inline void ParseXml(std::string_view text, const std::string& shown, tinyxml2::XMLDocument* document) {
+  if (document->Parse(text.data(), text.size()) == tinyxml2::XML_SUCCESS) return;
+  throw InputError(shown + ":" + std::to_string(std::max(document->ErrorLineNum(), 1)) + ": is not XML, " +
+                   document->ErrorName());
+}
+
+/// The child elements, of one name or all, as they are now: a loop over them may delete each.
+/// @param parent none has no children.
+template <typename Element>
+std::vector<Element*> ListChildren(Element* parent, const char* name = nullptr) {
+  std::vector<Element*> children;
+  if (parent == nullptr) return children;
+  for (Element* child = parent->FirstChildElement(name); child != nullptr;
+       child = child->NextSiblingElement(name)) {
+    children.push_back(child);
+  }
+  return children;
+}
+
+/// Calls visit for an element and all below it, in the order of the file, without recursion: the depth is the
+/// file's choice. What visit adds below an element is visited too.
+template <typename Element, typename Visit>
+void VisitElements(Element* root, const Visit& visit) {
+  for (Element* element = root; element != nullptr;) {
+    visit(element);
+    if (Element* const child = element->FirstChildElement()) {
+      element = child;
+      continue;
+    }
+    while (element != root && element->NextSiblingElement() == nullptr)
+      element = element->Parent()->ToElement();
+    element = element == root ? nullptr : element->NextSiblingElement();
+  }
+}
+
+inline std::string ReadAttribute(const tinyxml2::XMLElement& element, const char* name,
+                                 const std::string& otherwise = "") {
+  const char* const value = element.Attribute(name);
+  return value != nullptr ? value : otherwise;
+}
+
+inline std::string PrintXml(const tinyxml2::XMLDocument& document) {
+  tinyxml2::XMLPrinter printer;
+  document.Print(&printer);
+  return printer.CStr();
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "harness/study/error_budget.h"
+#include "harness/study/study_summary.h"
+
+namespace dexcheck {
+
+/// One HTML page that loads nothing else: what the study answers, outcomes and metrics over the varied keys,
+/// the best trials, and the command that repeats each.
+/// @param renew seconds after which a browser loads the page again; 0 for never.
+std::string MakeStudyPage(const StudySummary& summary, double renew = 0.0);
+
+/// A page with the budget's chart and table.
+std::string MakeBudgetPage(const ErrorBudget& budget);
+
+}  // namespace dexcheck

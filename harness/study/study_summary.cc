@@ -1,0 +1,417 @@
+#include "harness/study/study_summary.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
+#include "harness/base/shell.h"
+#include "harness/study/margin_search.h"
+#include "harness/study/search_history.h"
+#include "harness/study/study_answer.h"
+#include "harness/study/study_sensitivity.h"
+#include "harness/study/study_theory.h"
+
+namespace dexcheck {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::array<const char*, kNumOutcomes> kOutcomeColors = {
+    "#7bb662", "#f2c14e", "#e4572e", "#f78154", "#9b2226", "#577590", "#cccccc", "#000000", "#6d597a"};
+constexpr size_t kMostBest = 20;        // trials in the table of the best
+constexpr size_t kMostCompared = 2000;  // trials that are compared with theory
+
+/// A failure without the time that it happened at, so that equal ones can be counted.
+std::string WithoutTime(const std::string& failure) {
+  constexpr std::string_view kSettling = " while settling";
+  if (failure.ends_with(kSettling)) return failure.substr(0, failure.size() - kSettling.size());
+  return failure.substr(0, failure.find(" at t = "));
+}
+
+std::string LabelOf(Metric metric) {
+  const std::string unit = kMetrics[metric].unit;
+  return kMetrics[metric].name + (unit == "1" ? "" : ", " + unit);
+}
+
+Json ShowValue(const Variation& variation, double value) {
+  return variation.labels.empty() ? Json(value) : Json(FormatValue(variation, value));
+}
+
+class Summary {
+ public:
+  explicit Summary(const StudyStore& store)
+      : study_(store.study()),
+        rows_(store.ReadRows(0, /*with_machine=*/false)),
+        error_(FindErrorMetric(rows_)) {
+    inputs_.study = study_;
+    inputs_.scenario_text = store.Identify("scenario");
+    inputs_.scenario_source = study_.scenario;
+    for (const std::string& name : study_.metrics) {
+      for (size_t i = 0; i < kMetrics.size(); ++i) {
+        if (kMetrics[i].name == name) metrics_.push_back(static_cast<Metric>(i));
+      }
+    }
+    if (metrics_.empty()) metrics_ = {error_, kPeakEffort, of_joints() ? kEnergy : kConeMargin};
+    for (const TrialRow& row : rows_) {
+      if (row.result.outcome == Outcome::kTracked) tracked_.push_back(&row);
+    }
+    std::stable_sort(tracked_.begin(), tracked_.end(), [&](const TrialRow* a, const TrialRow* b) {
+      return a->result.metrics[error_] < b->result.metrics[error_];
+    });
+  }
+
+  StudySummary Make() {
+    StudySummary summary;
+    Json& json = summary.json;
+    json = {{"name", study_.name},
+            {"description", study_.description},
+            {"scenario", study_.scenario},
+            {"overrides", study_.overrides},
+            {"check", study_.check},
+            {"seeds", study_.seeds.size()},
+            {"is_search", study_.is_search()},
+            {"is_grid", study_.sample.method == SamplingMethod::kGrid && !study_.is_search()},
+            {"done", rows_.size()},
+            {"total", CountTrials(study_)},
+            {"error", kMetrics[error_].name}};
+    json["outcomes"] = ListOutcomes();
+    json["answers"] = AnswerStudy(study_, rows_);
+    json["best"] = rows_.empty() ? Json(nullptr) : ListBest();
+    json["margins"] = ListMargins();
+    json["sensitivity"] = ListSensitivity();
+    ChooseShown();
+    CalcTheories();
+    json["theory"] = CompareWithTheory();
+    json["keys"] = Json::array();
+    for (const Variation& variation : study_.variations) json["keys"].push_back(variation.key);
+    json["shown"] = Json::array();
+    for (const Metric metric : metrics_) json["shown"].push_back(kMetrics[metric].name);
+    json["columns"] = ListColumns();
+    json["failures"] = ListFailures();
+    json["history"] = ListHistory();
+    json["maximize"] = !study_.objectives.empty() && study_.objectives.front().maximize;
+    summary.values = PackValues();
+    return summary;
+  }
+
+ private:
+  [[nodiscard]] bool of_joints() const { return error_ == kJointErrorRms; }
+  [[nodiscard]] bool has_theory() const { return !theory_.empty(); }
+
+  [[nodiscard]] Json ListOutcomes() const {
+    std::array<long, kNumOutcomes> counts{};
+    for (const TrialRow& row : rows_) ++counts[static_cast<size_t>(row.result.outcome)];
+    Json outcomes = Json::array();
+    for (int i = 0; i < kNumOutcomes; ++i) {
+      const auto outcome = static_cast<Outcome>(i);
+      outcomes.push_back({{"name", NameOf(outcome)},
+                          {"count", counts[static_cast<size_t>(i)]},
+                          {"held", IsHeld(outcome)},
+                          {"color", kOutcomeColors[static_cast<size_t>(i)]}});
+    }
+    return outcomes;
+  }
+
+  const TrialRow& FindRow(long number) const {
+    return *std::lower_bound(rows_.begin(), rows_.end(), number,
+                             [](const TrialRow& row, long wanted) { return row.trial.number < wanted; });
+  }
+
+  Json ListBest() {
+    Json best = {{"order", ""}, {"heads", Json::array()}, {"rows", Json::array()}};
+    for (const Variation& variation : study_.keys()) best["heads"].push_back(variation.key);
+    if (study_.objectives.empty()) {
+      FillByError(&best);
+    } else {
+      FillByObjectives(&best);
+    }
+    return best;
+  }
+
+  void AddBest(const TrialRow& row, const std::vector<double>& keys, const std::vector<double>& more,
+               Json* best) {
+    Json cells = Json::array();
+    for (size_t i = 0; i < keys.size(); ++i) cells.push_back(ShowValue(study_.variations[i], keys[i]));
+    for (const double value : more) cells.push_back(value);
+    (*best)["rows"].push_back({{"trial", row.trial.number}, {"cells", cells}});
+    shown_.push_back(&row);  // what the table leads to must be on the page
+  }
+
+  /// Of a study that says what it wants: points that fulfil the constraints, by the objective; of several
+  /// objectives those that no other point beats in all.
+  void FillByObjectives(Json* best) {
+    const std::vector<JudgedPoint> points = JudgePoints(study_, rows_);
+    const bool is_one = study_.objectives.size() == 1;
+    const std::vector<const JudgedPoint*> chosen = is_one ? SortFeasible(points) : FindFront(points);
+    if (points.empty()) return;
+    if (chosen.empty()) {
+      (*best)["order"] = fmt::format("At none of {} points all constraints hold.", points.size());
+      return;
+    }
+    const Objective& first = study_.objectives.front();
+    const std::string order =
+        is_one ? fmt::format("By the {} {}", first.maximize ? "largest" : "least", Describe(first))
+               : "Points that no other one beats in everything";
+    (*best)["order"] = fmt::format(
+        "{}, of {} points{}{}", order, points.size(),
+        study_.constraints.empty() ? "." : ", those at which all constraints hold.",
+        CountTrialsOfPoint(study_) > 1 ? " A point's trials begin with the one that is named." : "");
+    for (const Objective& objective : study_.objectives)
+      (*best)["heads"].push_back(Describe(objective) + ShowUnit(objective.expression));
+    for (size_t i = 0; i < std::min(chosen.size(), kMostBest); ++i) {
+      std::vector<double> values;
+      for (size_t k = 0; k < study_.objectives.size(); ++k)
+        values.push_back(ShowObjective(study_.objectives[k], chosen[i]->judgement.objectives[k]));
+      AddBest(FindRow(chosen[i]->number * CountTrialsOfPoint(study_)), chosen[i]->values, values, best);
+    }
+  }
+
+  /// Of any other: trials by their error.
+  void FillByError(Json* best) {
+    if (tracked_.empty()) return;
+    std::vector<const TrialRow*> admitted = tracked_;
+    std::erase_if(admitted, [&](const TrialRow* row) {
+      return !JudgePoint({}, study_.constraints, {&row->result, 1}).is_feasible();
+    });
+    if (admitted.empty()) {
+      (*best)["order"] =
+          fmt::format("In none of the {} trials that tracked all constraints hold.", tracked_.size());
+      return;
+    }
+    (*best)["order"] =
+        fmt::format("By rms {} error, of the trials that tracked{}.", of_joints() ? "joint" : "position",
+                    study_.constraints.empty() ? "" : " and fulfil the constraints");
+    for (size_t i = study_.num_keys(); i < study_.variations.size(); ++i)
+      (*best)["heads"].push_back(study_.variations[i].key);
+    std::vector<Metric> metrics = {error_, kEnergy};
+    for (const Metric metric : metrics_) {
+      if (std::find(metrics.begin(), metrics.end(), metric) == metrics.end()) metrics.push_back(metric);
+    }
+    for (const Metric metric : metrics) (*best)["heads"].push_back(LabelOf(metric));
+    for (size_t i = 0; i < std::min(admitted.size(), kMostBest); ++i) {
+      std::vector<double> values;
+      for (const Metric metric : metrics) values.push_back(admitted[i]->result.metrics[metric]);
+      AddBest(*admitted[i], admitted[i]->trial.parameters, values, best);
+    }
+  }
+
+  /// How far each key can go, the others as at the start; `fractions` of its range.
+  [[nodiscard]] Json ListMargins() const {
+    Json list = Json::array();
+    if (study_.search.method != SearchMethod::kMargins) return list;
+    const std::vector<JudgedPoint> points = JudgePoints(study_, rows_);
+    const std::vector<Margin> margins = FindMargins(study_, points);
+    for (size_t key = 0; key < study_.num_keys() && !margins.empty(); ++key) {
+      const Variation& variation = study_.variations[key];
+      Json entry = {{"key", variation.key}, {"start", points[0].values[key]}};
+      entry["fractions"]["start"] = FractionOf(variation, points[0].values[key]);
+      for (const auto& [name, margin] :
+           {std::pair("down", &margins[2 * key]), std::pair("up", &margins[2 * key + 1])}) {
+        entry[name] = {
+            {"good", ValueAt(variation, margin->good[key])}, {"bad", nullptr}, {"stable_by_57", nullptr}};
+        entry["fractions"][name] = margin->good[key];
+        if (margin->bad.empty()) continue;  // to the end of the range
+        entry[name]["bad"] = ValueAt(variation, margin->bad[key]);
+        const auto theory = FindTheory(ValuesAt(study_.keys(), margin->bad));
+        if (theory) entry[name]["stable_by_57"] = theory->is_stable();
+      }
+      list.push_back(entry);
+    }
+    return list;
+  }
+
+  [[nodiscard]] Json ListSensitivity() const {
+    Json list = Json::array();
+    const SamplingMethod method = study_.sample.method;
+    if (study_.is_search() || (method != SamplingMethod::kSaltelli && method != SamplingMethod::kMorris))
+      return list;
+    for (const std::string& quantity : ListQuantities(study_, rows_)) {
+      const Sensitivity sensitivity = AnalyseSensitivity(study_, rows_, quantity);
+      if (sensitivity.empty()) continue;
+      const bool is_sobol = !sensitivity.sobol.empty();
+      Json keys = Json::array();
+      for (const size_t key : sensitivity.ListByImportance()) {
+        const Estimate& estimate = is_sobol ? sensitivity.sobol[key].total : sensitivity.morris[key].size;
+        keys.push_back({{"key", study_.variations[key].key},
+                        {"value", estimate.value},
+                        {"low", estimate.low},
+                        {"high", estimate.high},
+                        {is_sobol ? "alone" : "spread",
+                         is_sobol ? sensitivity.sobol[key].first.value : sensitivity.morris[key].spread}});
+      }
+      list.push_back({{"quantity", quantity + (ShowUnit(quantity).empty() ? "" : "," + ShowUnit(quantity))},
+                      {"method", is_sobol ? "saltelli" : "morris"},
+                      {"left_out", sensitivity.left_out},
+                      {"keys", keys}});
+    }
+    return list;
+  }
+
+  /// All trials, or an even part and the best.
+  void ChooseShown() {
+    const size_t every = std::max((rows_.size() + kMostShown - 1) / kMostShown, size_t{1});
+    for (size_t i = 0; i < rows_.size(); i += every) shown_.push_back(&rows_[i]);
+    std::sort(shown_.begin(), shown_.end());  // of one vector, by number
+    shown_.erase(std::unique(shown_.begin(), shown_.end()), shown_.end());
+  }
+
+  /// None for values that make no scenario.
+  [[nodiscard]] std::optional<Theory> FindTheory(const std::vector<double>& parameters) const {
+    try {
+      return CalcTheory(inputs_, parameters);
+    } catch (const InputError&) {
+      return std::nullopt;
+    }
+  }
+
+  /// Theory is that of an object.
+  void CalcTheories() {
+    if (of_joints() || rows_.empty()) return;
+    inputs_.OpenScenario();
+    theory_.resize(shown_.size());
+    const size_t every = (shown_.size() + kMostCompared - 1) / kMostCompared;
+    for (size_t i = 0; i < shown_.size(); i += every) {
+      if (shown_[i]->result.outcome != Outcome::kRefused)
+        theory_[i] = FindTheory(shown_[i]->trial.parameters);
+    }
+  }
+
+  /// Where theory and run differ in whether the object is held, by reason.
+  [[nodiscard]] Json CompareWithTheory() const {
+    if (!has_theory()) return nullptr;
+    std::map<std::string, long> reasons;
+    long compared = 0, agree = 0;
+    for (size_t i = 0; i < shown_.size(); ++i) {
+      if (!theory_[i]) continue;
+      const TrialResult& result = shown_[i]->result;
+      const bool is_stable = theory_[i]->is_stable();
+      ++compared;
+      agree += is_stable == IsHeld(result.outcome) ? 1 : 0;
+      if (is_stable == IsHeld(result.outcome)) continue;
+      std::string reason = WithoutTime(result.failure);
+      if (reason.empty()) {
+        reason = result.metrics[kErrorGrowth] > 1.0 ? "the error grew"
+                                                    : fmt::format("the rms error is above {} m", kLostTrack);
+      }
+      ++reasons[is_stable ? "stable in theory, but " + reason
+                          : "unstable in theory, but held to the end of the run"];
+    }
+    Json departures = Json::array();
+    for (const auto& [reason, count] : reasons) departures.push_back({{"reason", reason}, {"count", count}});
+    return {{"compared", compared}, {"agree", agree}, {"departures", departures}};
+  }
+
+  /// Names and labels of what PackValues has of each trial.
+  [[nodiscard]] Json ListColumns() const {
+    Json columns = {{{"name", "trial"}, {"label", "trial"}},
+                    {{"name", "seed"}, {"label", "seed"}},
+                    {{"name", "outcome"}, {"label", "outcome"}}};
+    for (const Variation& variation : study_.variations) {
+      Json column = {{"name", variation.key}, {"label", variation.key}};
+      if (!variation.labels.empty()) column["labels"] = variation.labels;
+      columns.push_back(column);
+    }
+    for (int i = 0; i < kNumMetrics; ++i) {
+      const auto metric = static_cast<Metric>(i);
+      columns.push_back({{"name", kMetrics[metric].name}, {"label", LabelOf(metric)}});
+      if (metric == kConeMargin || metric == kSimulatedTime) columns.back()["larger_is_better"] = true;
+    }
+    if (!has_theory()) return columns;
+    columns.push_back(
+        {{"name", "theory.stable"}, {"label", "stable by (57)"}, {"labels", {"unstable", "stable"}}});
+    for (const Metric metric : kPredictedMetrics) {
+      columns.push_back({{"name", std::string("theory.") + kMetrics[metric].name},
+                         {"label", LabelOf(metric) + ", by (57)"}});
+    }
+    return columns;
+  }
+
+  /// By the trial's number.
+  [[nodiscard]] Json ListFailures() const {
+    Json failures = Json::object();
+    for (const TrialRow* row : shown_) {
+      if (!row->result.failure.empty())
+        failures[std::to_string(row->trial.number)] = Abbreviate(row->result.failure);
+    }
+    return failures;
+  }
+
+  [[nodiscard]] std::string PackValues() const {
+    std::string bytes;
+    const auto add = [&](double value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
+    for (size_t i = 0; i < shown_.size(); ++i) {
+      const TrialRow& row = *shown_[i];
+      add(static_cast<double>(row.trial.number));
+      add(static_cast<double>(row.trial.seed));
+      add(static_cast<double>(row.result.outcome));
+      for (const double parameter : row.trial.parameters) add(parameter);
+      for (const double metric : row.result.metrics) add(metric);
+      if (!has_theory()) continue;
+      add(!theory_[i] ? std::nan("") : theory_[i]->is_stable() ? 1.0 : 0.0);
+      for (const Metric metric : kPredictedMetrics)
+        add(theory_[i] ? theory_[i]->metrics[metric] : std::nan(""));
+    }
+    return bytes;
+  }
+
+  /// The points of a search.
+  [[nodiscard]] Json ListHistory() const {
+    Json history = Json::array();
+    if (!study_.is_search() || study_.objectives.empty()) return history;
+    for (const JudgedPoint& point : JudgePoints(study_, rows_)) {
+      history.push_back(
+          {{"trial", point.number * CountTrialsOfPoint(study_)},
+           {"value", ShowObjective(study_.objectives.front(), point.judgement.objectives.front())},
+           {"feasible", point.judgement.is_feasible()}});
+    }
+    return history;
+  }
+
+  Study study_;
+  StudyInputs inputs_;  // as far as the database keeps them: for scenarios of trials
+  std::vector<TrialRow> rows_;
+  Metric error_;                               // that says how good the trials are
+  std::vector<Metric> metrics_;                // to be shown
+  std::vector<const TrialRow*> tracked_;       // least error first
+  std::vector<const TrialRow*> shown_;         // by number
+  std::vector<std::optional<Theory>> theory_;  // of these; empty without
+};
+
+}  // namespace
+
+StudySummary SummariseStudy(const StudyStore& store) {
+  StudySummary summary = Summary(store).Make();
+  for (const char* column : {"dexcheck_version", "git_revision", "mujoco_version"})
+    summary.json["versions"][column] = store.Identify(column);
+  return summary;
+}
+
+Json ToJson(const Study& study, const TrialRow& row) {
+  Json json = {{"trial", row.trial.number},
+               {"seed", row.trial.seed},
+               {"outcome", NameOf(row.result.outcome)},
+               {"failure", row.result.failure},
+               {"keys", Json::object()},
+               {"metrics", Json::object()},
+               {"machine", row.machine},
+               {"command", MakeReplayCommand(study, row.trial)}};
+  for (size_t i = 0; i < study.variations.size(); ++i)
+    json["keys"][study.variations[i].key] = ShowValue(study.variations[i], row.trial.parameters[i]);
+  for (size_t i = 0; i < kMetrics.size(); ++i) json["metrics"][kMetrics[i].name] = row.result.metrics[i];
+  return json;
+}
+
+std::string MakeReplayCommand(const Study& study, const Trial& trial) {
+  std::string command = "dexcheck run " + QuoteForShell(study.scenario);
+  for (const std::string& setting : ListOverrides(study, trial))
+    command += " --set " + QuoteForShell(setting);
+  if (trial.seed != 0) command += fmt::format(" --seed {}", trial.seed);
+  if (!study.check) command += " --no-check";
+  return command + fmt::format(" --video --out trial-{}", trial.number);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,164 @@
+// What a page and `report --json` have of a study, from a database that somebody else may have written.
+
+#include "harness/study/study_summary.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "harness/study/study_answer.h"
+#include "harness/study/study_page.h"
+#include "tests/common/files.h"
+#include "tests/common/matchers.h"
+#include "tests/common/paths.h"
+
+namespace dexcheck::testing::study_summary_test {
+namespace {
+
+const std::string kMarkup = "</script><img src=x onerror=\"alert(1)\">";
+
+Study Parse(const std::string& text) {
+  return ParseStudy("name = \"page\"\nscenario = 'offset'\n" + text, "study.toml");
+}
+
+const std::string kGrid =
+    "[[vary]]\nkey = 'control.K_p'\nvalues = [1, 2]\n[[vary]]\nkey = 'control.K_v'\nvalues = [20, 200]\n";
+
+/// Of a database with one text in all columns, the study itself and its scenario excepted.
+/// @param of_joints its trials have errors of joints, and none of an object.
+StudySummary Summarise(const Study& study, const std::string& text, bool of_joints = false) {
+  const TempFolder folder;
+  StudyIdentity identity;
+  for (const char* column : {"layout", "name", "study", "scenario", "robot", "mjcf_hash", "dexcheck_version",
+                             "git_revision", "mujoco_version"}) {
+    identity.emplace_back(column, text);
+  }
+  identity[0].second = "2";
+  identity[2].second = study.text;
+  identity[3].second = ReadTextFile(SourcePath("/harness/shipped/scenarios/offset.toml"));
+  StudyStore store = StudyStore::OpenOrCreate(folder.path() / "s.sqlite", identity, study);
+  std::vector<TrialRow> rows;
+  for (const Trial& trial : ListTrials(study)) {
+    TrialRow row;
+    row.trial = trial;
+    row.result.outcome = trial.number % 2 == 0 ? Outcome::kTracked : Outcome::kDiverged;
+    row.result.metrics[kPositionErrorRms] = 1.0 + static_cast<double>(trial.number);
+    row.result.metrics[kEnergy] = 1.0 / row.result.metrics[kPositionErrorRms];
+    row.result.metrics[kJointErrorRms] = std::numeric_limits<double>::quiet_NaN();
+    if (of_joints) std::swap(row.result.metrics[kPositionErrorRms], row.result.metrics[kJointErrorRms]);
+    if (trial.number % 2 == 1) row.result.failure = text;
+    rows.push_back(row);
+  }
+  store.Add(rows);
+  return SummariseStudy(store);
+}
+
+TEST(StudySummary, HasOutcomesBestAndTheory) {
+  const nlohmann::ordered_json json = Summarise(Parse(kGrid), "why at t = 1 s").json;
+  EXPECT_EQ(json["done"], 4);
+  EXPECT_EQ(json["total"], 4);
+  EXPECT_EQ(json["outcomes"][0]["name"], "tracked");
+  EXPECT_EQ(json["outcomes"][0]["count"], 2);
+  EXPECT_EQ(json["best"]["order"], "By rms position error, of the trials that tracked.");
+  EXPECT_EQ(json["best"]["rows"][0]["trial"], 0);
+  EXPECT_EQ(json["theory"]["compared"], 4);
+  EXPECT_EQ(json["theory"]["agree"], 2) << "all are stable";
+  EXPECT_EQ(json["theory"]["departures"][0]["reason"], "stable in theory, but why");
+  EXPECT_EQ(json["theory"]["departures"][0]["count"], 2) << "without the time";
+  EXPECT_EQ(json["failures"]["3"], "why at t = 1 s");
+  EXPECT_EQ(json["versions"]["git_revision"], "why at t = 1 s");
+}
+
+TEST(StudySummary, NoTextBecomesMarkup) {
+  const Study study = Parse("description = '" + kMarkup + "'\n" + kGrid);
+  const std::string page = MakeStudyPage(Summarise(study, kMarkup));
+  EXPECT_THAT(page, Not(HasSubstr("<img")));
+  EXPECT_THAT(page, Not(HasSubstr(kMarkup)));
+}
+
+// Theory is that of an object, which an arm that holds nothing has not.
+TEST(StudySummary, OfJointsHasTheirErrorAndNoTheoryOfAnObject) {
+  const nlohmann::ordered_json json = Summarise(Parse(kGrid), "why", /*of_joints=*/true).json;
+  EXPECT_EQ(json["theory"], nullptr);
+  EXPECT_EQ(json["error"], "joint_error_rms");
+  EXPECT_EQ(json["best"]["order"], "By rms joint error, of the trials that tracked.");
+}
+
+TEST(StudySummary, OfManyTrialsItHasAnEvenPartAndTheBest) {
+  const StudySummary summary = Summarise(
+      Parse("[[objective]]\nmaximize = 'position_error_rms'\n[[vary]]\nkey = 'control.K_p'\nfrom = 1\nto = "
+            "100\ncount = 150\n[[vary]]\nkey = 'control.K_v'\nfrom = 1\nto = 100\ncount = 150\n"),
+      "why");
+  EXPECT_EQ(summary.json["done"], 22500);
+  const size_t width = summary.json["columns"].size();
+  const size_t count = summary.values.size() / sizeof(double) / width;
+  EXPECT_GT(count, kMostShown / 2);
+  EXPECT_LE(count, kMostShown + 20);
+  // The last that tracked have the largest error, and are not among each so many.
+  std::vector<double> numbers(count * width);
+  std::memcpy(numbers.data(), summary.values.data(), summary.values.size());
+  EXPECT_EQ(summary.json["best"]["rows"][0]["trial"], 22498);
+  EXPECT_EQ(numbers[(count - 1) * width], 22498.0);
+}
+
+TEST(StudySummary, ATrialHasTheCommandThatRepeatsIt) {
+  const Study study = Parse("set = [\"duration=1\"]\n" + kGrid);
+  TrialRow row;
+  row.trial = {3, 7, {2.0, 200.0}};
+  row.result.metrics[kEnergy] = 0.1;
+  const nlohmann::ordered_json json = ToJson(study, row);
+  EXPECT_EQ(json["command"],
+            "dexcheck run offset --set duration=1 --set control.K_p=2 --set control.K_v=200 --seed 7 "
+            "--no-check --video --out trial-3");
+  EXPECT_EQ(json["keys"]["control.K_v"], 200.0);
+  EXPECT_EQ(json["metrics"]["energy"], 0.1);
+}
+
+TEST(StudyAnswer, TellsTheSpreadOfWhatHasNoOrder) {
+  const Study study = Parse(
+      "seeds = [1, 2, 3, 4]\nmetrics = ['position_error_rms']\n"
+      "[[vary]]\nkey = 'control.law'\nvalues = ['computed_torque', 'pd_gravity']\n");
+  std::vector<TrialRow> rows;
+  for (const Trial& trial : ListTrials(study)) {
+    TrialRow row;
+    row.trial = trial;
+    // 1, 4, 9, 16; the other law loses the grasp in all trials but the third.
+    row.result.metrics[kPositionErrorRms] = static_cast<double>(trial.seed * trial.seed);
+    if (trial.parameters.front() == 1.0 && trial.seed != 3) row.result.outcome = Outcome::kLostContact;
+    rows.push_back(row);
+  }
+  ASSERT_EQ(rows.size(), 8U);
+  EXPECT_THAT(AnswerStudy(study, rows),
+              ::testing::ElementsAre("control.law = computed_torque: held in 4 of 4 trials; "
+                                     "position_error_rms 6.5 (1 to 16) m, medians and ranges.",
+                                     "control.law = pd_gravity: held in 1 of 4 trials; "
+                                     "position_error_rms 9 (9 to 9) m, medians and ranges."));
+}
+
+// The best of a search that presses against its range, in the quantity's unit.
+TEST(StudyAnswer, TellsWhatIsWantedWithItsUnitAndItsEdge) {
+  const Study study = Parse(
+      "[[objective]]\nminimize = 'settling_time'\n[search]\nmethod = 'cma_es'\ncount = 24\npopulation = "
+      "8\nseed = 1\n[[vary]]\nkey = 'control.K_p'\nfrom = 1\nto = 100\n[[vary]]\nkey = 'control.K_v'\nfrom = "
+      "1\nto = 100\n");
+  std::vector<TrialRow> rows;
+  const std::vector<std::vector<double>> points = {{50, 50}, {100, 30}, {20, 30}};
+  for (size_t i = 0; i < points.size(); ++i) {
+    TrialRow row;
+    row.trial = {static_cast<long>(i), 0, points[i]};
+    row.result.metrics[kSettlingTime] = i == 0 ? std::nan("") : 0.01 * static_cast<double>(i);
+    rows.push_back(row);
+  }
+  EXPECT_THAT(AnswerStudy(study, rows),
+              ::testing::ElementsAre(
+                  "The least settling_time of 3 points is 0.01 s, at control.K_p = 100, control.K_v = 30 "
+                  "(trial 1). The search began where it has no value. At an end of its range is control.K_p: "
+                  "a wider range may give a better one."));
+}
+
+}  // namespace
+}  // namespace dexcheck::testing::study_summary_test
