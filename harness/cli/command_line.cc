@@ -134,7 +134,9 @@ Command Command::Under(const std::string& heading) const {
 
 Command Command::AddCommand(const std::string& name, const std::string& help) {
   CLI::App* const command = app_->add_subcommand(name, help);
-  if (!heading_.empty()) command->group(heading_);
+  // Which it would have of the program otherwise.
+  command->group(heading_.empty() ? "Subcommands" : heading_);
+  command->footer("");
   return {command, exit_code_};
 }
 

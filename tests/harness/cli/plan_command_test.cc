@@ -50,8 +50,8 @@ TEST_F(PlanCommand, PrintsAGraspThatHoldsTheTorus) {
 
 TEST_F(PlanCommand, WritesThePlanAsJson) {
   const Json json = Plan(0, "0.3 -0.5 0.631 --support-height 0.62");
-  EXPECT_GT(json["margin"].get<double>(), json["hand_picked_margin"].get<double>());
-  EXPECT_NEAR(json["hand_picked_margin"], 0.145, 5e-4);
+  // Contacts at 125, 90, 55, -90 degrees, picked by hand, have this.
+  EXPECT_GT(json["margin"].get<double>(), 0.145);
   EXPECT_GE(json["joint_margin"].get<double>(), 0.05 - 1e-9);
   EXPECT_EQ(json["grasp"]["contacts_deg"].size(), 4U);
 
