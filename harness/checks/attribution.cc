@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "controller/common/text.h"
-#include "harness/checks/step_check_table.h"
+#include "harness/checks/check_table.h"
 
 namespace dexcheck {
 namespace {
@@ -16,7 +16,7 @@ bool Failed(std::span<const CheckRecord> checks, std::string_view name) {
 
 /// What the failure of a check means; nothing for one that has no entry.
 FailureMeaning MeaningOf(const CheckRecord& check) {
-  const StepCheckInfo* info = FindStepCheck(check.name);
+  const CheckInfo* info = FindCheck(check.name);
   return info == nullptr ? FailureMeaning{} : info->meaning;
 }
 
@@ -45,23 +45,22 @@ const CheckRecord* FindEvidence(std::span<const CheckRecord> steps) {
   }
   // What slides in the step in which a force shows tells more than the force. Wheels of another size give
   // other forces besides, which show before they have rolled far; wheels that slide do too.
-  const auto name = [](StepCheck which) { return kStepChecks[static_cast<size_t>(which)].name; };
-  if (first == nullptr || first->name != name(StepCheck::kInverseDynamicsRobot)) return first;
-  for (const StepCheck slides : {StepCheck::kConeUse, StepCheck::kTractionUse, StepCheck::kContactsLost}) {
+  if (first == nullptr || first->name != "inverse_dynamics_robot") return first;
+  for (const std::string_view slides : {"cone_use", "traction_use", "contacts_lost"}) {
     for (const CheckRecord& check : steps) {
-      if (check.name == name(slides) && check.failed && check.failed_at <= first->failed_at) return &check;
+      if (check.name == slides && check.failed && check.failed_at <= first->failed_at) return &check;
     }
   }
-  if (!Failed(steps, name(StepCheck::kRolling)) || Failed(steps, name(StepCheck::kTractionUse))) return first;
+  if (!Failed(steps, "rolling") || Failed(steps, "traction_use")) return first;
   return &*std::find_if(steps.begin(), steps.end(),
-                        [&](const CheckRecord& check) { return check.name == name(StepCheck::kRolling); });
+                        [&](const CheckRecord& check) { return check.name == "rolling"; });
 }
 
 /// What an expectation that alone fails comes from: the gains, if (57) by itself leaves most of the error,
 /// and what drives it otherwise. By algebra that is what contacts give, or what the scenario asks for of the
 /// plant.
 Cause AttributeExpectation(const CheckRecord& check, const MeasuredCauses& measured, std::string* evidence) {
-  const bool position = check.name == kStepChecks[static_cast<size_t>(StepCheck::kExpectPosition)].name;
+  const bool position = check.name == "expect_position";
   const double by_law = position ? measured.position_by_law : measured.orientation_by_law;
   if (by_law < 0.0) return Cause::kControlLaw;
   *evidence += "; (57) by itself leaves " + FormatNumber(by_law, 3) + " " + check.unit;
@@ -77,9 +76,7 @@ Cause AttributeOne(const CheckRecord& check, Cause run, std::span<const CheckRec
   if (check.kind == CheckCategory::kModel) return Cause::kModel;
   const FailureMeaning meaning = MeaningOf(check);
   if (!meaning.is_own) return run;
-  if (meaning.sharper == StepCheck::kCount) return meaning.cause;
-  const StepCheckInfo& sharper = kStepChecks[static_cast<size_t>(meaning.sharper)];
-  return Failed(steps, sharper.name) ? sharper.meaning.cause : meaning.cause;
+  return Failed(steps, meaning.sharper) ? FindCheck(meaning.sharper)->meaning.cause : meaning.cause;
 }
 
 }  // namespace
@@ -163,8 +160,7 @@ AttributionResult Attribute(const ConstantChecks& constants, std::span<const Che
     result.cause = Cause::kModel;
     result.evidence = finding.check + ": " + finding.where + ": " + FormatNumber(finding.model) +
                       " in the model, " + FormatNumber(finding.engine) + " in the MJCF";
-  } else if (first_model != nullptr &&
-             !Failed(steps, kStepChecks[static_cast<size_t>(StepCheck::kMeasurement)].name)) {
+  } else if (first_model != nullptr && !Failed(steps, "measurement")) {
     result.cause = Cause::kModel;
     result.evidence = Tell(*first_model);
   } else if (any_step) {

@@ -1,7 +1,9 @@
-#include "harness/checks/bounds.h"
+// How the bounds of check_table.cc scale with what a scenario changes.
 
 #include <algorithm>
-#include <cmath>
+
+#include "controller/common/text.h"
+#include "harness/checks/check_table.h"
 
 namespace dexcheck {
 namespace {
@@ -36,12 +38,7 @@ double CalcGainScale(const Vector3d& K_p) {
   return K_p.minCoeff() > 0.0 ? kShippedGain / K_p.minCoeff() : 1.0;
 }
 
-}  // namespace
-
-double FindContactTimeConstant(const PlantOptions& plant) {
-  return plant.contact_time_constant > 0.0 ? plant.contact_time_constant : 2.0 * plant.time_step;
-}
-
+/// What a bound is proportional to, over what that is for the shipped plant and gains.
 double CalcScale(Scaling scaling, const Scenario& scenario) {
   const ControlOptions& control = scenario.control;
   if (scaling == Scaling::kPositionGain) return CalcGainScale(control.gains.K_p.head<3>());
@@ -55,12 +52,34 @@ double CalcScale(Scaling scaling, const Scenario& scenario) {
   return scale;
 }
 
-double CalcStatedBound(const StepCheckInfo& info, const BoundOverride& stated, const Scenario& scenario) {
+}  // namespace
+
+std::string Bound::Print() const { return formula != nullptr ? formula : FormatNumber(shipped, 3); }
+
+double FindContactTimeConstant(const PlantOptions& plant) {
+  return plant.contact_time_constant > 0.0 ? plant.contact_time_constant : 2.0 * plant.time_step;
+}
+
+double CalcBound(const CheckInfo& info, const Scenario& scenario) {
+  const double bound = info.bound.shipped * CalcScale(info.bound.scaling, scenario);
+  // What is formed of several terms, parts of which cancel, has a digit less than they.
+  constexpr double kLost = 10.0;
+  return info.bound.is_relative ? std::max(bound, kLost * scenario.tolerance) : bound;
+}
+
+double CalcStatedBound(const CheckInfo& info, const BoundOverride& stated, const Scenario& scenario) {
   const Scenario* const written = scenario.written.get();
   const bool is_written = written != nullptr && std::find(written->bounds.begin(), written->bounds.end(),
                                                           stated) != written->bounds.end();
   if (!is_written) return stated.second;
-  return stated.second * CalcScale(info.scaling, scenario) / CalcScale(info.scaling, *written);
+  return stated.second * CalcScale(info.bound.scaling, scenario) / CalcScale(info.bound.scaling, *written);
+}
+
+void RequireKnownBounds(const Scenario& scenario) {
+  for (const auto& [name, bound] : scenario.bounds) {
+    if (FindCheck(name) != nullptr) continue;
+    throw InputError(scenario.source + ": bounds." + name + ": no check has this name");
+  }
 }
 
 }  // namespace dexcheck

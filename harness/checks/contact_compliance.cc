@@ -4,8 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "harness/checks/bounds.h"
-#include "harness/checks/known_plant.h"
+#include "harness/checks/check_table.h"
 
 namespace dexcheck {
 namespace {
@@ -39,8 +38,7 @@ double CalcLeadingBack(const PlantOptions& plant, const StepRecord& step, const 
 
 }  // namespace
 
-void CalcContactBias(const Setup& setup, const StepRecord& step, VectorXd* bias) {
-  const GraspModel& model = ModelAtTrueState(step);
+void CalcContactBias(const Setup& setup, const StepRecord& step, const GraspModel& model, VectorXd* bias) {
   const GraspTerms& grasp = model.grasp();
   const PlantOptions& plant = setup.scenario().plant;
   *bias = grasp.slip_bias();
@@ -153,14 +151,13 @@ PredictionCompliance::PredictionCompliance(const Setup& setup, const ContactSoft
   for (const Joint& joint : setup.model().joints()) mass_ += joint.body.mass;
 }
 
-void PredictionCompliance::Follow(const StepRecord& step, const Eigen::Ref<const VectorXd>& force,
-                                  const Eigen::Ref<const VectorXd>& f_c, double uneven,
-                                  const std::function<double(const VectorXd&)>& norm) {
-  const GraspTerms& grasp = ModelAtTrueState(step).grasp();
+void PredictionCompliance::Follow(const StepRecord& step, const DeclaredStep& declared,
+                                  const VectorXd& contact_bias, const VectorXd& force, const VectorXd& f_c,
+                                  double uneven, const std::function<double(const VectorXd&)>& norm) {
+  const GraspTerms& grasp = declared.model->grasp();
   force_.Add(force);
   f_c_.Add(f_c);
-  CalcContactBias(*setup_, step, &tip_bias_);
-  tips_.Add(tip_bias_);
+  tips_.Add(contact_bias);
   if (!step.response.wheels.empty()) {
     const VectorXd& xi = step.reading.state.xi;
     const double turn = std::abs(wheels_.CalcTurn(xi));
@@ -173,10 +170,10 @@ void PredictionCompliance::Follow(const StepRecord& step, const Eigen::Ref<const
   const auto length = [](const VectorXd& f) { return f.norm(); };
   // |f|_M^-1 of a force on all masses is |f| / sqrt(m), |a|_M of their acceleration |a| sqrt(m).
   const double root = std::sqrt(mass_);
-  if (step.known != nullptr) {
+  if (!declared.is_ideal) {
     // A push changes contact forces without any torque, and what pushes sideways is held by tyres and is no
     // part of a force on xi.
-    push_.Add(step.known->push);
+    push_.Add(declared.push);
     grasp_force_.noalias() = grasp.J_B().transpose() * f_c;
     grasp_.Add(grasp_force_);
     held += grasp_.CalcSize(norm) + push_.CalcSize(length) / root;

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "controller/common/types.h"
+#include "harness/checks/declared_plant.h"
 #include "harness/checks/step_record.h"
 #include "harness/checks/wheel_evidence.h"
 #include "harness/engine/contact_softness.h"
@@ -16,7 +17,8 @@ namespace dexcheck {
 /// slip_bias(), and the w x v of object and platform, which the model's rates of velocities that turn along
 /// have not and the engine's have. The rigid plant holds (46) whole; half of slip_bias() under semi-implicit
 /// Euler, whose velocities are those of half a step before.
-void CalcContactBias(const Setup& setup, const StepRecord& step, VectorXd* bias);
+/// @param model at the true state.
+void CalcContactBias(const Setup& setup, const StepRecord& step, const GraspModel& model, VectorXd* bias);
 
 /// One soft contact under a vector of forces F(t). The engine lets J qacc = a_ref - R f, of a contact that
 /// forces move by A: where it holds back a fraction s = R / (A + R) of a force that changes, along a normal
@@ -93,15 +95,16 @@ class ModesCompliance {
 };
 
 /// By how much soft contacts change what the rigid system (46), (48) predicts; formulas in
-/// step_check_table.h.
+/// check_table.cc.
 class PredictionCompliance {
  public:
   explicit PredictionCompliance(const Setup& setup);
 
-  /// The next step that is judged. @param uneven what comes of tilt and slip, in |.|_M^-1. @param norm
-  /// |f|_M^-1 of this step. @param force C_bar' xi + F_bar' - E_bar' tau' (n). @param f_c (3N) predicted.
-  void Follow(const StepRecord& step, const Eigen::Ref<const VectorXd>& force,
-              const Eigen::Ref<const VectorXd>& f_c, double uneven,
+  /// The next step that is judged. @param contact_bias CalcContactBias. @param force C_bar' xi + F_bar' -
+  /// E_bar' tau' (n). @param f_c (3N) predicted. @param uneven what comes of tilt and slip, in |.|_M^-1.
+  /// @param norm |f|_M^-1 of this step.
+  void Follow(const StepRecord& step, const DeclaredStep& declared, const VectorXd& contact_bias,
+              const VectorXd& force, const VectorXd& f_c, double uneven,
               const std::function<double(const VectorXd&)>& norm);
   /// Of xi_dot, in |.|_M.
   [[nodiscard]] double motion() const { return motion_; }
@@ -116,13 +119,13 @@ class PredictionCompliance {
   const Setup* setup_;
   WheelEvidence wheels_;
   double mass_ = 0.0;  // of the robot, kg
-  /// Of the force on the robot (n), of f_c (3N), and, of a plant that is not ideal, of pushes (3) and of
+  /// Of the force on the robot (n), of f_c (3N), and, of a plant that declares anything, of pushes (3) and of
   /// J_B'^T f_c (n).
   ModesCompliance force_, f_c_, push_, grasp_;
   /// Likewise of the accelerations that (46) has and the engine's constraints have not, m/s^2: of fingertips
   /// (3N), of the wheels sideways (1).
   ContactCompliance tips_, tyres_;
-  VectorXd tip_bias_, sideways_;           // 3N, 1
+  VectorXd sideways_;                      // 1
   VectorXd grasp_force_;                   // n
   double held_ = 0.0, held_of_f_c_ = 0.0;  // with what is left of former steps
   double motion_ = 0.0, contact_force_ = 0.0, sinking_ = 0.0;

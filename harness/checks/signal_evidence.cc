@@ -13,7 +13,7 @@ namespace {
 // One number that explains this much of the squares says all; what is left is rounding, or the first steps.
 constexpr double kNumberExplains = 0.98;
 // Readings' differences below this are rounding of packing them.
-constexpr double kRounding = 1e-15;
+constexpr double kSignalRounding = 1e-15;
 // Of entries that differ, this fraction is "all" of them.
 constexpr double kMost = 0.5;
 
@@ -94,7 +94,7 @@ void SignalEvidence::Compare(const VectorXd& meant, const VectorXd& got, const V
 std::vector<Eigen::Index> SignalEvidence::ListDifferent(const VectorXd& weight) const {
   std::vector<Eigen::Index> different;
   for (Eigen::Index i = 0; i < squares_.size(); ++i) {
-    if (largest_[i] > kRounding * std::max(1.0, std::sqrt(meant_squares_[i]))) different.push_back(i);
+    if (largest_[i] > kSignalRounding * std::max(1.0, std::sqrt(meant_squares_[i]))) different.push_back(i);
   }
   std::sort(different.begin(), different.end(), [&](Eigen::Index a, Eigen::Index b) {
     return weight[a] * squares_[a] > weight[b] * squares_[b];

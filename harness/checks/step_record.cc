@@ -2,20 +2,15 @@
 
 #include "controller/object/euler_zyz.h"
 #include "controller/object/so3.h"
-#include "harness/checks/known_plant.h"
 
 namespace dexcheck {
-
-const GraspModel& ModelAtTrueState(const StepRecord& step) {
-  return step.known != nullptr ? *step.known->model : *step.model;
-}
 
 Vector6d CalcX_o(const StepRecord& step) {
   const Pose& X_Bo = step.reading.state.X_Bo;
   if (step.model->has_coordinates()) {
-    const Vector6d& told = step.model->grasp().X_o();
-    const bool is_true = step.told.state.X_Bo.matrix() == X_Bo.matrix();
-    return is_true ? told : CalcObjectCoordinates(X_Bo, told);
+    const Vector6d& measured = step.model->grasp().X_o();
+    const bool is_true = step.measured.state.X_Bo.matrix() == X_Bo.matrix();
+    return is_true ? measured : CalcObjectCoordinates(X_Bo, measured);
   }
   Vector6d X_o;
   X_o << X_Bo.translation(), CalcAnyZyzAngles(X_Bo.linear());

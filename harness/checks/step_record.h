@@ -13,8 +13,6 @@
 
 namespace dexcheck {
 
-struct KnownStep;
-
 /// Distance of the object from its desired pose.
 struct TrackingError {
   Vector3d position = Vector3d::Zero();  ///< X_d - X_o, world, m.
@@ -55,24 +53,22 @@ struct StepRecord {
   long step = 0;      ///< Steps of the run that are complete, this one included; 0 before.
   double time = 0.0;  ///< s; below zero while everything comes to rest.
   PlantReading reading;
-  Reading told;  ///< What the controller was told of it.
+  Reading measured;  ///< What the controller measured of it.
   Command command;
   DriveOutput drive;  ///< What the motors made of the command.
   PlantResponse response;
   TrackingError error;
-  /// The model as the controller evaluated it, at what it was told; until the next step.
+  /// The model as the controller evaluated it, at the measured state; until the next step.
   const GraspModel* model = nullptr;
-  /// What the scenario itself asks for beyond an ideal plant; null without cross-check or where it is ideal.
-  const KnownStep* known = nullptr;
+  /// The model at the true state, with what is declared of the plant; `model` where nothing is, and without
+  /// checks.
+  const GraspModel* true_model = nullptr;
   /// Of a controller that follows its contacts: kappa (39) as it has them, and how far each is from where it
   /// is. Otherwise empty.
   std::vector<ContactCoordinates> followed_kappa;
   std::vector<ContactDrift> drift;
-  StepFindings findings;  ///< Without cross-check empty.
+  StepFindings findings;  ///< Without checks empty.
 };
-
-/// The model at the truth: the controller's own where it is told that and the plant is ideal.
-[[nodiscard]] const GraspModel& ModelAtTrueState(const StepRecord& step);
 
 /// Pose of the object, whose angles are on the controller's branch where it uses them.
 [[nodiscard]] Vector6d CalcX_o(const StepRecord& step);

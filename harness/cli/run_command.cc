@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <exception>
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "controller/common/errors.h"
@@ -38,6 +40,7 @@ struct RunRequest {
   Overrides overrides;
   ToleranceOptions judging;
   std::uint64_t seed = 0;
+  int threads = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 2U));
   bool no_check = false;
   bool no_log = false;
   bool no_report = false;
@@ -84,8 +87,11 @@ void DrawRun(const RunRequest& request, const std::filesystem::path& folder, Exi
 }
 
 LoopParts MakeParts(const RunRequest& request, const Setup& setup, const std::filesystem::path& robot) {
-  if (request.controller.empty()) return MakeLoopParts(setup);
-  return MakeLoopParts(setup, request.controller, robot, request.controller_time_limit);
+  LoopParts parts = request.controller.empty()
+                        ? MakeLoopParts(setup)
+                        : MakeLoopParts(setup, request.controller, robot, request.controller_time_limit);
+  parts.threads = request.threads;
+  return parts;
 }
 
 int RunScenario(const RunRequest& request) {
@@ -244,6 +250,12 @@ void AddRunCommand(Command app, const std::string& command_line) {
   const auto [set, unset] = AddOverrideOptions(command, &request->overrides);
   const std::array<Option, 2> judging = AddToleranceOptions(command, &request->judging);
   Option seed = AddSeedOption(command, &request->seed);
+  command
+      .AddOption(
+          "--threads", &request->threads,
+          "2 (where there are two processors): checks have a thread of their own; the numbers are the same")
+      .TypeName("N")
+      .Check(WholeNumber(1, 2));
   Option controller =
       command
           .AddOption(

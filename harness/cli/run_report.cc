@@ -150,7 +150,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
           drift.object, drift.fingertip, drift.psi);
     }
     if (loop.task() != nullptr) PrintTask(loop);
-    if (loop.is_checking()) PrintClearance(loop.checks().clearance());
+    if (loop.is_checking()) PrintClearance(*loop.checks().analysis().clearance);
     if (loop.is_checking()) PrintChecks(setup, loop, detail);
     PrintSpeed(loop, result);
     if (!folder.empty()) fmt::print("log and summary in {}\n", folder);

@@ -38,9 +38,10 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
       disturbances_(parts.disturbances, setup.MakePartContext()),
       num_steps_(std::lround(setup.scenario().duration / setup.scenario().plant.time_step)) {
   const Scenario& scenario = setup.scenario();
-  StepChecks::RequireKnownBounds(scenario);
+  RequireKnownBounds(scenario);
   if (check) checks_.emplace(setup, plant_->motors(), parts.knows_law);
-  record_.model = &controller_->model();
+  if (check && parts.threads > 1) checker_.emplace([this] { JudgeStep(); });
+  record_.model = record_.true_model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);
   trajectory_ = setup.MakeTrajectory();
@@ -78,7 +79,7 @@ bool ClosedLoop::Settle(const std::function<bool()>& should_stop) {
 void ClosedLoop::BeginRun() {
   const std::string where = setup_->scenario().source + (task_ != nullptr ? ": task: " : ": control: ");
   try {
-    controller_->Begin(0.0, record_.told);
+    controller_->Begin(0.0, record_.measured);
   } catch (const InputError& error) {
     throw InputError(where + error.what());
   } catch (const std::invalid_argument& error) {
@@ -100,12 +101,12 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
     ControlStep(t);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
     if (checks_ && i == grip) checks_->Forget();
-    if (checks_ && t >= kRoughTime) checks_->CompareSettling(record_);
+    if (checks_ && t >= kRoughTime) checks_->JudgeSettling(record_);
     try {
       CheckGrasp();
     } catch (const RunFailure&) {
       // Why it does not hold: of a run that never begins, the first question is asked here.
-      if (checks_) checks_->CompareModel(record_);
+      if (checks_) checks_->JudgeModel(record_);
       throw;
     }
   }
@@ -131,13 +132,13 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
 
 void ClosedLoop::ControlStep(double t) {
   const auto begin = Clock::now();
-  plant_->BeginStep();
+  BeginStep();
   const auto read = Clock::now();
   plant_->Read(&record_.reading);
   CheckRobot();
-  sensing_.Tell(record_.reading, &record_.told);
-  if (hidden_sensor_fault_) hidden_sensor_fault_(t, &record_.told.state);
-  controller_->Step(record_.told, t, &record_.command);
+  sensing_.Tell(record_.reading, &record_.measured);
+  if (hidden_sensor_fault_) hidden_sensor_fault_(t, &record_.measured.state);
+  controller_->Step(record_.measured, t, &record_.command);
   DriveMotors(t);
   if (!disturbances_.empty()) {
     plant_->Push(disturbances_.Evaluate(record_.time, record_.reading));
@@ -146,7 +147,7 @@ void ClosedLoop::ControlStep(double t) {
   plant_->EndStep(record_.drive.tau);
   const auto end = Clock::now();
   plant_->Read(&record_.response);
-  if (checks_) record_.known = checks_->Follow(record_);
+  if (checks_) record_.true_model = &checks_->Follow(record_);
   if (checks_) times_.cross_check += Seconds(end, Clock::now());
   times_.plant += Seconds(begin, read) + Seconds(control, end);
   times_.controller += Seconds(read, control);
@@ -158,14 +159,46 @@ void ClosedLoop::DriveMotors(double t) {
   try {
     drive_.Apply(record_.command.tau, record_.reading.state.xi, &record_.drive);
   } catch (const RunFailure&) {
-    if (checks_) checks_->JudgeEffort(record_.drive.effort, t);
-    if (checks_) record_.known = checks_->Follow(record_);
+    if (checks_) checks_->JudgeEffort(record_, t);
+    if (checks_) record_.true_model = &checks_->Follow(record_);
     // Torques that are too large may be those of no law. While everything settles they follow another
     // trajectory.
-    if (checks_ && is_running_) checks_->CompareUnsent(record_);
+    if (checks_ && is_running_) checks_->JudgeUnsent(record_);
     throw;
   }
-  if (checks_) checks_->JudgeEffort(record_.drive.effort, t);
+  if (checks_) checks_->JudgeEffort(record_, t);
+}
+
+void ClosedLoop::BeginStep() {
+  if (!std::exchange(has_begun_, false)) return plant_->BeginStep();
+  if (begin_failure_) std::rethrow_exception(std::exchange(begin_failure_, nullptr));
+}
+
+void ClosedLoop::JudgeStep() {
+  const auto begin = Clock::now();
+  checks_->JudgeModel(record_);
+  checks_->JudgeStep(record_);
+  times_.cross_check += Seconds(begin, Clock::now());
+}
+
+void ClosedLoop::Check() {
+  if (!checker_) {
+    JudgeStep();
+  } else {
+    checker_->Start();
+    if (record_.step < num_steps_) {
+      const auto begin = Clock::now();
+      try {
+        plant_->BeginStep();
+      } catch (...) {
+        begin_failure_ = std::current_exception();
+      }
+      has_begun_ = true;
+      times_.plant += Seconds(begin, Clock::now());
+    }
+    checker_->Wait();
+  }
+  record_.findings = checks_->analysis().findings;
 }
 
 void ClosedLoop::Step() {
@@ -176,21 +209,14 @@ void ClosedLoop::Step() {
   CalcContactDrifts(record_, &record_.drift);
   for (const ContactDrift& drift : record_.drift) largest_drift_.Raise(drift);
   ++record_.step;
-  if (checks_) {
-    const auto begin = Clock::now();
-    checks_->CompareModel(record_);
-    checks_->CompareMotion(record_);
-    checks_->CompareLaw(record_);
-    record_.findings = checks_->findings();
-    times_.cross_check += Seconds(begin, Clock::now());
-  }
+  if (checks_) Check();
   CheckGrasp();
   if (task_ != nullptr) CheckTask();
 }
 
 void ClosedLoop::Disturb(const DisturbanceOptions& disturbance) {
   disturbances_.Add(disturbance, setup_->MakePartContext());
-  if (checks_) checks_->Expect(disturbance, plant_->motors());
+  if (checks_) checks_->Expect(disturbance);
 }
 
 void ClosedLoop::CheckTask() const {

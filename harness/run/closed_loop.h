@@ -2,19 +2,21 @@
 
 // The loop of plant and controller, cross-checked at every step.
 
+#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
 
 #include "controller/control/controller.h"
 #include "controller/control/trajectory.h"
-#include "harness/checks/cross_check.h"
+#include "harness/checks/run_checks.h"
 #include "harness/checks/step_record.h"
 #include "harness/plant/disturbances.h"
 #include "harness/plant/motor_drive.h"
 #include "harness/plant/plant.h"
 #include "harness/plant/sensing.h"
 #include "harness/run/loop_parts.h"
+#include "harness/run/side_thread.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
@@ -39,7 +41,9 @@ struct LoopTimes {
 ///   plant --PlantReading--> sensing --Reading--> controller --Command--> motors --tau'--> plant <-- pushes
 ///     `----PlantResponse----> checks: all of it is one StepRecord
 ///
-/// Deterministic. Nothing allocates in a step, except as the controller and StepChecks say.
+/// Deterministic: with two threads the checks of a step are made while the plant computes positions,
+/// velocities and contacts of the next, which is all that happens early, and every number is the same.
+/// Nothing allocates in a step, except as the controller and RunChecks say.
 class ClosedLoop {
  public:
   /// @param check whether to cross-check.
@@ -74,7 +78,7 @@ class ClosedLoop {
 
   [[nodiscard]] bool is_checking() const { return checks_.has_value(); }
   /// Only when checking.
-  [[nodiscard]] const CrossCheck& checks() const { return checks_.value(); }
+  [[nodiscard]] const RunChecks& checks() const { return checks_.value(); }
   /// The controller of a task; null unless the scenario is one.
   [[nodiscard]] const PickAndPlaceController* task() const { return task_; }
   [[nodiscard]] const LoopTimes& times() const { return times_; }
@@ -86,6 +90,11 @@ class ClosedLoop {
   bool StartMoving(const Vector3d& v, const std::function<bool()>& should_stop);
   bool SettleOn(const Trajectory& motion, double duration, const std::function<bool()>& should_stop);
   void BeginRun();
+  /// The plant's, unless it has begun already.
+  void BeginStep();
+  void JudgeStep();
+  /// The checks of the step, and beside them the beginning of the next.
+  void Check();
   void ControlStep(double t);
   void DriveMotors(double t);
   void CheckRobot() const;
@@ -101,9 +110,12 @@ class ClosedLoop {
   const TrajectoryController* follower_ = nullptr;  // likewise
   MotorDrive drive_;
   Disturbances disturbances_;
-  std::optional<CrossCheck> checks_;
+  std::optional<RunChecks> checks_;
   std::unique_ptr<Trajectory> trajectory_;  // null for a task or a motion of joints
   StepRecord record_;
+  std::optional<SideThread> checker_;  // none with one thread
+  bool has_begun_ = false;             // the next step
+  std::exception_ptr begin_failure_;   // of that
   long num_steps_ = 0;
   bool is_running_ = false;  // all has settled
   long steps_without_grasp_ = 0;

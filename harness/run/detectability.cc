@@ -13,8 +13,7 @@
 #include "controller/control/computed_torque.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/joint_law.h"
-#include "harness/checks/bounds.h"
-#include "harness/checks/contact_compliance.h"
+#include "harness/checks/check_table.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck {
@@ -145,21 +144,11 @@ std::vector<Sample> TakeSamples(const Setup& setup, int states) {
   Runner runner(setup, /*check=*/true);
   const long every = std::max(1L, runner.loop().num_steps() / states);
   TreeFactor factor(setup.model());
-  PredictionCompliance give(setup);
-  const ActuationMap actuation(setup.model());
-  VectorXd force(setup.model().num_velocities()), work;
   const double weight = setup.object().body.mass * setup.model().gravity().norm();
   const RunResult& result = runner.Run(
       [&](const StepRecord& step) {
-        // What contacts give is followed from step to step, as StepChecks does.
-        const ModelTerms& robot = step.model->robot();
-        factor.Compute(robot.M());
-        const VectorXd balanced = robot.C() * step.reading.state.xi + robot.gravity() + robot.friction();
-        actuation.CalcForce(step.command.tau, force);
-        force = balanced - force;
-        const auto norm = [&](const VectorXd& f) { return factor.CalcForceNorm(f, &work); };
-        give.Follow(step, force, step.findings.f_c_model, /*uneven=*/0.0, norm);
         if (step.step % every != 0) return;
+        const StepAnalysis& analysis = runner.loop().checks().analysis();
         Sample& sample = samples.emplace_back();
         sample.state = step.reading.state;
         sample.xi_dot = step.response.xi_dot;
@@ -169,14 +158,15 @@ std::vector<Sample> TakeSamples(const Setup& setup, int states) {
         sample.F_N = step.command.demand.F_N;
         sample.desired = step.command.desired;
         sample.joints = step.command.joints;
-        sample.M = robot.M();
+        sample.M = step.model->robot().M();
         const Eigen::Index n = sample.xi_dot.size();
         sample.half_inverse = RowMatrixXd::Identity(n, n);
+        factor.Compute(sample.M);
         factor.SolveTransposedColumns(sample.half_inverse);
-        sample.scale = norm(balanced);
+        sample.scale = analysis.balanced;
         sample.object_scale = std::max(weight, sample.f_c.norm());
-        sample.motion_compliance = give.motion() / sample.scale;
-        sample.force_compliance = sample.f_c.size() > 0 ? give.force() / sample.f_c.norm() : 0.0;
+        sample.motion_compliance = analysis.acceleration_compliance;
+        sample.force_compliance = analysis.contact_force_compliance;
       },
       [] { return false; });
   if (!result.failure.empty()) throw InputError(setup.scenario().source + ": " + result.failure);
@@ -234,12 +224,9 @@ DetectabilityResult FindDetectability(const Setup& setup, int states,
   const double arm = holds ? right.grasp().contacts()[0].geometry.g_o_cf.translation().norm() : 1.0;
 
   DetectabilityResult result;
-  const auto bound = [&](StepCheck which) {
-    return CalcBound(kStepChecks[static_cast<size_t>(which)], setup.scenario());
-  };
-  const Bounds bounds{bound(StepCheck::kInverseDynamicsRobot), bound(StepCheck::kInverseDynamicsObject),
-                      bound(StepCheck::kReducedAcceleration), bound(StepCheck::kContactForce),
-                      bound(StepCheck::kLawTorque)};
+  const auto bound = [&](const char* name) { return CalcBound(*FindCheck(name), setup.scenario()); };
+  const Bounds bounds{bound("inverse_dynamics_robot"), bound("inverse_dynamics_object"),
+                      bound("reduced_acceleration"), bound("contact_force"), bound("law_torque")};
   const auto rows = static_cast<Eigen::Index>(samples.size()) * setup.model().num_velocities();
   MatrixXd regressor = MatrixXd::Zero(rows, static_cast<Eigen::Index>(numbers.size()));
   for (size_t k = 0; k < numbers.size(); ++k) {
@@ -297,8 +284,7 @@ RetriedError RetryError(const Scenario& scenario, const std::filesystem::path& r
         Runner runner(wrong, /*check=*/true);
         const auto fails = [&] {
           return std::any_of(checks.begin(), checks.end(), [&](const std::string& name) {
-            const CheckRecord& check = runner.loop().checks().Find(name);
-            return check.applies && check.failed;
+            return runner.loop().checks().Has(name) && runner.loop().checks().Find(name).failed;
           });
         };
         runner.Run([](const StepRecord&) {}, [&] { return should_stop() || fails(); });

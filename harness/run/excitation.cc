@@ -37,7 +37,7 @@ std::optional<RobotModel> Change(const RobotSpec& robot, const Parameter& number
 }  // namespace
 
 MotionSample TakeMotionSample(const StepRecord& step, TreeFactor* factor) {
-  const ModelTerms& robot = ModelAtTrueState(step).robot();
+  const ModelTerms& robot = step.true_model->robot();
   factor->Compute(robot.M());
   const VectorXd balanced = robot.C() * step.reading.state.xi + robot.gravity() + robot.friction();
   MotionSample sample{step.reading.state.q, step.reading.state.xi, step.response.xi_dot, {}};

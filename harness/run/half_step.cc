@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "controller/common/text.h"
-#include "harness/checks/bounds.h"
+#include "harness/checks/check_table.h"
 
 namespace dexcheck {
 namespace {
@@ -30,7 +30,7 @@ void LookForIntegrator(const Setup& setup, const ClosedLoop& loop, const std::fi
                        const std::filesystem::path& mjcf, const std::function<bool()>& should_stop,
                        RunResult* result) {
   AttributionResult& attribution = result->attribution;
-  const StepCheckInfo* const info = FindStepCheck(attribution.check);
+  const CheckInfo* const info = FindCheck(attribution.check);
   if (!loop.is_checking() || info == nullptr || info->meaning.rank != Rank::kResidual) return;
   const CheckRecord& check = loop.checks().Find(attribution.check);
   if (!std::isfinite(check.worst)) return;

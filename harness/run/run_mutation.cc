@@ -50,7 +50,7 @@ void InjectFault(const Setup& setup, const PlantFault& fault, LoopParts* parts) 
   parts->plant = std::make_unique<FaultyPlant>(setup, std::unique_ptr<EnginePlant>(engine), fault);
 }
 
-std::string JoinFailed(const CrossCheck& checks) {
+std::string JoinFailed(const RunChecks& checks) {
   std::string names;
   for (const std::span<const CheckRecord> records : {checks.model_checks(), checks.motion_checks()}) {
     for (const CheckRecord& record : records) {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <set>
+#include <utility>
 
 #include "harness/base/files.h"
 #include "harness/base/git_revision.h"
@@ -29,11 +31,54 @@ std::vector<std::string> Expand(const std::vector<std::string>& names,
   return columns;
 }
 
-/// The law's demand, which a controller of the user's own need not tell.
+using Row = std::span<double>;
+
+/// A number of the step.
+template <typename Get>
+auto Number(Get get) {
+  return [get](const StepRecord& step, Row row) { row[0] = get(step); };
+}
+
+/// A vector of the step.
+template <typename Get>
+auto Vector(Get get) {
+  return [get](const StepRecord& step, Row row) { Copy(get(step), row); };
+}
+
+/// The law's demand, which a controller of the user's own need not have.
+template <typename Member>
+auto Demand(Member LawDemand::*member) {
+  return [member](const StepRecord& step, Row row) {
+    const Member& demand = step.command.demand.*member;
+    if (demand.size() == static_cast<Eigen::Index>(row.size())) return Copy(demand, row);
+    std::fill(row.begin(), row.end(), std::numeric_limits<double>::quiet_NaN());
+  };
+}
+
+void Put(double from, Row to) { to[0] = from; }
 template <typename Derived>
-void CopyDemand(const Eigen::DenseBase<Derived>& from, std::span<double> to) {
-  if (from.size() == static_cast<Eigen::Index>(to.size())) return Copy(from, to);
-  std::fill(to.begin(), to.end(), std::numeric_limits<double>::quiet_NaN());
+void Put(const Eigen::DenseBase<Derived>& from, Row to) {
+  Copy(from, to);
+}
+
+/// Of each entry of a list of the step a number or a vector, one after the other.
+template <typename List, typename Get>
+auto Each(List list, Get get) {
+  return [list, get](const StepRecord& step, Row row) {
+    const auto& entries = list(step);
+    for (size_t i = 0; i < entries.size(); ++i) {
+      const size_t width = row.size() / entries.size();
+      Put(get(entries[i]), row.subspan(width * i, width));
+    }
+  };
+}
+
+const std::vector<PlantContact>& ListContacts(const StepRecord& step) { return step.response.contacts; }
+const std::vector<ContactCoordinates>& ListKappa(const StepRecord& step) { return step.reading.state.kappa; }
+const std::vector<ContactCoordinates>& ListFollowed(const StepRecord& step) { return step.followed_kappa; }
+Vector5d ReadKappa(const ContactCoordinates& kappa) { return kappa.CalcVector(); }
+Vector2d ReadCharts(const ContactCoordinates& kappa) {
+  return {static_cast<double>(kappa.alpha_f.chart), static_cast<double>(kappa.alpha_o.chart)};
 }
 
 constexpr const char* kPoseUnits = "m, m, m, rad, rad, rad";
@@ -75,13 +120,20 @@ RunRecorder::RunRecorder(const std::filesystem::path& path, const ClosedLoop& lo
     AddContactSignals();
   }
   if (loop.task() != nullptr) AddTaskSignals();
-  if (checks_ != nullptr) AddClearanceSignals();
   if (checks_ != nullptr) AddCheckSignals();
   log_.StartRows();
 }
 
-void RunRecorder::Add(const SignalInfo& signal, Source source) {
-  channels_.push_back({log_.AddSignal(signal), std::move(source)});
+void RunRecorder::Add(const std::string& name, const std::string& unit, const std::string& description,
+                      int width, std::vector<std::string> columns, Source source,
+                      std::map<std::string, double> numbers) {
+  const int signal = log_.AddSignal({name, unit, description, width, std::move(columns), std::move(numbers)});
+  channels_.push_back({signal, std::move(source)});
+}
+
+void RunRecorder::AddNumber(const std::string& name, const std::string& unit, const std::string& description,
+                            Source source) {
+  Add(name, unit, description, 1, {}, std::move(source));
 }
 
 void RunRecorder::AddStateSignals() {
@@ -121,60 +173,43 @@ void RunRecorder::AddStateSignals() {
   const std::string xi_dot_units = is_named ? ListJointUnits(model, xi_base, "/s^2") : "m/s^2, rad/s^2";
   const LogColumns qpos = ListPositionColumns(m);
   const LogColumns qvel = ListVelocityColumns(m);
-  Add({"engine/qpos",
-       qpos.units,
-       "MuJoCo's positions, quaternions wxyz",
-       static_cast<int>(m.nq),
-       qpos.names,
-       {}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.qpos, row); });
-  Add({"engine/qvel", qvel.units, "MuJoCo's velocities", static_cast<int>(m.nv), qvel.names, {}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.qvel, row); });
   const int n = model.num_velocities();
+  const int p = model.num_positions();
   const bool moves_joints = setup_->joints() != nullptr;
-  Add({"q", q_units, "q' as read from the plant", model.num_positions(), q_names, {}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.q, row); });
-  Add({"xi", xi_units, "reduced velocity as read from the plant", n, xi_names, {}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.xi, row); });
-  Add({"tau",
-       "N m",
-       moves_joints ? "torques of the joints' law" : "tau' of the computed torque law (55)",
-       n,
-       tau_names,
-       {}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.command.tau, row); });
+  Add("engine/qpos", qpos.units, "MuJoCo's positions, quaternions wxyz", static_cast<int>(m.nq), qpos.names,
+      Vector([](const StepRecord& step) -> const auto& { return step.reading.qpos; }));
+  Add("engine/qvel", qvel.units, "MuJoCo's velocities", static_cast<int>(m.nv), qvel.names,
+      Vector([](const StepRecord& step) -> const auto& { return step.reading.qvel; }));
+  Add("q", q_units, "q' as read from the plant", p, q_names,
+      Vector([](const StepRecord& step) -> const auto& { return step.reading.state.q; }));
+  Add("xi", xi_units, "reduced velocity as read from the plant", n, xi_names,
+      Vector([](const StepRecord& step) -> const auto& { return step.reading.state.xi; }));
+  Add("tau", "N m", moves_joints ? "torques of the joints' law" : "tau' of the computed torque law (55)", n,
+      tau_names, Vector([](const StepRecord& step) -> const auto& { return step.command.tau; }));
   if (setup_->scenario().pick_task() == nullptr) {
-    Add({"law/xi_dot_d",
-         xi_dot_units,
-         moves_joints ? "accelerations that the law demands" : "xi_dot_d of (47), which the law demands",
-         n,
-         xi_names,
-         {}},
-        [](const StepRecord& step, std::span<double> row) { CopyDemand(step.command.demand.xi_dot, row); });
+    Add("law/xi_dot_d", xi_dot_units,
+        moves_joints ? "accelerations that the law demands" : "xi_dot_d of (47), which the law demands", n,
+        xi_names, Demand(&LawDemand::xi_dot));
   }
   if (!setup_->scenario().imperfections.is_ideal()) {
-    Add({"told/q", q_units, "q' as the controller was told it", model.num_positions(), q_names, {}},
-        [](const StepRecord& step, std::span<double> row) { Copy(step.told.state.q, row); });
-    Add({"told/xi", xi_units, "reduced velocity as the controller was told it", n, xi_names, {}},
-        [](const StepRecord& step, std::span<double> row) { Copy(step.told.state.xi, row); });
-    Add({"tau_given", "N m", "what the motors made of tau", n, tau_names, {}},
-        [](const StepRecord& step, std::span<double> row) { Copy(step.drive.tau, row); });
+    Add("told/q", q_units, "measured q'", p, q_names,
+        Vector([](const StepRecord& step) -> const auto& { return step.measured.state.q; }));
+    Add("told/xi", xi_units, "measured reduced velocity", n, xi_names,
+        Vector([](const StepRecord& step) -> const auto& { return step.measured.state.xi; }));
+    Add("tau_given", "N m", "what the motors made of tau", n, tau_names,
+        Vector([](const StepRecord& step) -> const auto& { return step.drive.tau; }));
   }
-  Add({"base/tilt", "rad", "angle of the platform against the vertical", 1, {}, {}},
-      [](const StepRecord& step, std::span<double> row) { row[0] = step.reading.departure.tilt; });
-  Add({"base/height", "m", "height of the axle's midpoint against the model's", 1, {}, {}},
-      [](const StepRecord& step, std::span<double> row) { row[0] = step.reading.departure.height; });
+  AddNumber("base/tilt", "rad", "angle of the platform against the vertical",
+            Number([](const StepRecord& step) { return step.reading.departure.tilt; }));
+  AddNumber("base/height", "m", "height of the axle's midpoint against the model's",
+            Number([](const StepRecord& step) { return step.reading.departure.height; }));
   if (checks_ == nullptr) return;
-  Add({"engine/xi_dot", xi_dot_units, "reduced acceleration of the plant", n, xi_names, {}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.response.xi_dot, row); });
-  Add({"model/xi_dot",
-       xi_dot_units,
-       setup_->joints() != nullptr ? "accelerations that the equations of motion predict"
-                                   : "reduced acceleration that (46), (48) predict",
-       n,
-       xi_names,
-       {}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.findings.xi_dot_model, row); });
+  Add("engine/xi_dot", xi_dot_units, "reduced acceleration of the plant", n, xi_names,
+      Vector([](const StepRecord& step) -> const auto& { return step.response.xi_dot; }));
+  Add("model/xi_dot", xi_dot_units,
+      moves_joints ? "accelerations that the equations of motion predict"
+                   : "reduced acceleration that (46), (48) predict",
+      n, xi_names, Vector([](const StepRecord& step) -> const auto& { return step.findings.xi_dot_model; }));
 }
 
 void RunRecorder::AddJointSignals() {
@@ -182,163 +217,90 @@ void RunRecorder::AddJointSignals() {
   const int n = model.num_joints();
   std::vector<std::string> names;
   for (const Joint& joint : model.joints()) names.push_back(joint.name);
-  Add({"joints/q_d", ListJointUnits(model, {}, ""), "desired positions of the joints", n, names, {}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.command.joints.q, row); });
-  Add({"joints/error", ListJointUnits(model, {}, ""), "q_d - q", n, names, {}},
-      [](const StepRecord& step, std::span<double> row) {
-        Copy(step.command.joints.q - step.reading.state.q, row);
-      });
-  Add({"joints/largest_error", "rad, m", "largest of joints/error", 1, {}, {}},
-      [](const StepRecord& step, std::span<double> row) { row[0] = step.error.joints; });
+  Add("joints/q_d", ListJointUnits(model, {}, ""), "desired positions of the joints", n, names,
+      Vector([](const StepRecord& step) -> const auto& { return step.command.joints.q; }));
+  Add("joints/error", ListJointUnits(model, {}, ""), "q_d - q", n, names,
+      [](const StepRecord& step, Row row) { Copy(step.command.joints.q - step.reading.state.q, row); });
+  AddNumber("joints/largest_error", "rad, m", "largest of joints/error",
+            Number([](const StepRecord& step) { return step.error.joints; }));
 }
 
 void RunRecorder::AddObjectSignals() {
-  const std::vector<std::string> columns = {"x", "y", "z", "alpha", "beta", "gamma"};
-  Add({"object/X_o", kPoseUnits, "pose of the object, ZYZ angles (8)", 6, columns, {}},
-      [](const StepRecord& step, std::span<double> row) { Copy(CalcX_o(step), row); });
-  Add({"object/X_d", kPoseUnits, "desired pose of the object", 6, columns, {}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.command.desired.X_d, row); });
-  const std::vector<std::string> twist = {"v_x", "v_y", "v_z", "w_x", "w_y", "w_z"};
-  Add({"object/V", "m/s, m/s, m/s, rad/s, rad/s, rad/s", "body velocity of the object", 6, twist, {}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.reading.state.V_Bo, row); });
-  Add({"object/error", "m", "X_d - X_o, position", 3, {"x", "y", "z"}, {}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.error.position, row); });
-  Add({"object/position_error", "m", "distance of the object from its desired place", 1, {}, {}},
-      [](const StepRecord& step, std::span<double> row) { row[0] = step.error.position.norm(); });
-  Add({"object/orientation_error", "rad", "angle between the object and its desired orientation", 1, {}, {}},
-      [](const StepRecord& step, std::span<double> row) { row[0] = step.error.orientation; });
+  const std::vector<std::string> pose = {"x", "y", "z", "alpha", "beta", "gamma"};
+  Add("object/X_o", kPoseUnits, "pose of the object, ZYZ angles (8)", 6, pose, Vector(CalcX_o));
+  Add("object/X_d", kPoseUnits, "desired pose of the object", 6, pose,
+      Vector([](const StepRecord& step) -> const auto& { return step.command.desired.X_d; }));
+  Add("object/V", "m/s, m/s, m/s, rad/s, rad/s, rad/s", "body velocity of the object", 6,
+      {"v_x", "v_y", "v_z", "w_x", "w_y", "w_z"},
+      Vector([](const StepRecord& step) -> const auto& { return step.reading.state.V_Bo; }));
+  Add("object/error", "m", "X_d - X_o, position", 3, {"x", "y", "z"},
+      Vector([](const StepRecord& step) -> const auto& { return step.error.position; }));
+  AddNumber("object/position_error", "m", "distance of the object from its desired place",
+            Number([](const StepRecord& step) { return step.error.position.norm(); }));
+  AddNumber("object/orientation_error", "rad", "angle between the object and its desired orientation",
+            Number([](const StepRecord& step) { return step.error.orientation; }));
 }
 
 void RunRecorder::AddContactSignals() {
   const std::vector<std::string>& tips = setup_->scenario().grasp.fingertips;
   const int count = CountOf(tips);
-  const double mu = setup_->object().friction;
+  const std::map<std::string, double> mu = {{"mu", setup_->object().friction}};
   const std::vector<std::string> xyz = Expand(tips, {"x", "y", "z"});
-  Add({"contact/kappa",
-       "rad",
-       "contact coordinates (39)",
-       5 * count,
-       Expand(tips, {"u_f", "v_f", "u_o", "v_o", "psi"}),
-       {}},
-      [](const StepRecord& step, std::span<double> row) {
-        for (size_t i = 0; i < step.reading.state.kappa.size(); ++i) {
-          Copy(step.reading.state.kappa[i].CalcVector(), row.subspan(5 * i, 5));
-        }
-      });
-  Add({"contact/chart",
-       "1",
-       "chart of the fingertip's (u_f, v_f) and of the object's (u_o, v_o) of contact/kappa",
-       2 * count,
-       Expand(tips, {"f", "o"}),
-       {}},
-      [](const StepRecord& step, std::span<double> row) {
-        for (size_t i = 0; i < step.reading.state.kappa.size(); ++i) {
-          const ContactCoordinates& kappa = step.reading.state.kappa[i];
-          row[2 * i] = kappa.alpha_f.chart;
-          row[2 * i + 1] = kappa.alpha_o.chart;
-        }
-      });
+  Add("contact/kappa", "rad", "contact coordinates (39)", 5 * count,
+      Expand(tips, {"u_f", "v_f", "u_o", "v_o", "psi"}), Each(ListKappa, ReadKappa));
+  Add("contact/chart", "1",
+      "chart of the fingertip's (u_f, v_f) and of the object's (u_o, v_o) of contact/kappa", 2 * count,
+      Expand(tips, {"f", "o"}), Each(ListKappa, ReadCharts));
   if (setup_->scenario().control.kappa == ContactSource::kIntegrated) AddFollowedContacts();
-  Add({"contact/overlap", "m", "depth to which fingertip and object overlap", count, tips, {}},
-      [](const StepRecord& step, std::span<double> row) {
+  Add("contact/overlap", "m", "depth to which fingertip and object overlap", count, tips,
+      [](const StepRecord& step, Row row) {
         std::copy(step.reading.state.overlap.begin(), step.reading.state.overlap.end(), row.begin());
       });
   if (setup_->scenario().pick_task() == nullptr) {
-    Add({"law/f_c",
-         "N",
-         "f_c of (49), which the law commands, each in its contact frame",
-         3 * count,
-         xyz,
-         {{"mu", mu}}},
-        [](const StepRecord& step, std::span<double> row) { CopyDemand(step.command.demand.f_c, row); });
-    Add({"law/F_N",
-         "N",
-         "internal part F_N of law/f_c, which the grasp-force problem chooses",
-         3 * count,
-         xyz,
-         {}},
-        [](const StepRecord& step, std::span<double> row) { CopyDemand(step.command.demand.F_N, row); });
+    Add("law/f_c", "N", "f_c of (49), which the law commands, each in its contact frame", 3 * count, xyz,
+        Demand(&LawDemand::f_c), mu);
+    Add("law/F_N", "N", "internal part F_N of law/f_c, which the grasp-force problem chooses", 3 * count, xyz,
+        Demand(&LawDemand::F_N));
   }
   if (checks_ == nullptr) return;
-  const auto each = [](Vector3d PlantContact::*member) {
-    return [member](const StepRecord& step, std::span<double> row) {
-      for (size_t i = 0; i < step.response.contacts.size(); ++i) {
-        Copy(step.response.contacts[i].*member, row.subspan(3 * i, 3));
-      }
-    };
-  };
-  Add({"contact/position", "m", "contact points in the world", 3 * count, xyz, {}},
-      each(&PlantContact::position));
-  Add({"contact/normal", "1", "normals in the world, into the object", 3 * count, xyz, {}},
-      each(&PlantContact::normal));
-  Add({"contact/force", "N", "forces of finger on object in the world", 3 * count, xyz, {{"mu", mu}}},
-      each(&PlantContact::force));
-  Add({"contact/f_c",
-       "N",
-       "f_c of the engine, each in its contact frame, z into the object",
-       3 * count,
-       xyz,
-       {{"mu", mu}}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.findings.f_c, row); });
-  Add({"contact/f_c_model", "N", "f_c that (19), (46), (48) predict", 3 * count, xyz, {{"mu", mu}}},
-      [](const StepRecord& step, std::span<double> row) { Copy(step.findings.f_c_model, row); });
+  Add("contact/position", "m", "contact points in the world", 3 * count, xyz,
+      Each(ListContacts, [](const PlantContact& contact) { return contact.position; }));
+  Add("contact/normal", "1", "normals in the world, into the object", 3 * count, xyz,
+      Each(ListContacts, [](const PlantContact& contact) { return contact.normal; }));
+  Add("contact/force", "N", "forces of finger on object in the world", 3 * count, xyz,
+      Each(ListContacts, [](const PlantContact& contact) { return contact.force; }), mu);
+  Add("contact/f_c", "N", "f_c of the engine, each in its contact frame, z into the object", 3 * count, xyz,
+      Vector([](const StepRecord& step) -> const auto& { return step.findings.f_c; }), mu);
+  Add("contact/f_c_model", "N", "f_c that (19), (46), (48) predict", 3 * count, xyz,
+      Vector([](const StepRecord& step) -> const auto& { return step.findings.f_c_model; }), mu);
   const auto add_slip = [&](const std::string& group, const std::string& what,
                             const std::vector<std::string>& parts,
                             std::vector<SlipState> StepFindings::*states) {
-    Add({group + "/slip",
-         "m",
-         "slip of each " + what + " since t = 0",
-         3 * CountOf(parts),
-         Expand(parts, {"x", "y", "z"}),
-         {}},
-        [states](const StepRecord& step, std::span<double> row) {
-          const std::vector<SlipState>& slip = step.findings.*states;
-          for (size_t i = 0; i < slip.size(); ++i) Copy(slip[i].distance, row.subspan(3 * i, 3));
-        });
-    Add({group + "/cone_use",
-         "1",
-         "tangential force over mu times normal force of each " + what,
-         CountOf(parts),
-         parts,
-         {}},
-        [states](const StepRecord& step, std::span<double> row) {
-          const std::vector<SlipState>& slip = step.findings.*states;
-          for (size_t i = 0; i < slip.size(); ++i) row[i] = slip[i].cone_use;
-        });
+    const auto list = [states](const StepRecord& step) -> const auto& { return step.findings.*states; };
+    Add(group + "/slip", "m", "slip of each " + what + " since t = 0", 3 * CountOf(parts),
+        Expand(parts, {"x", "y", "z"}), Each(list, [](const SlipState& slip) { return slip.distance; }));
+    Add(group + "/cone_use", "1", "tangential force over mu times normal force of each " + what,
+        CountOf(parts), parts, Each(list, [](const SlipState& slip) { return slip.cone_use; }));
   };
   add_slip("contact", "fingertip", tips, &StepFindings::fingertip_slip);
   std::vector<std::string> wheels;
-  for (const EngineWheel& wheel : setup_->adapter().wheels()) {
+  for (const EngineWheel& wheel : setup_->adapter().wheels())
     wheels.push_back(NameOf(setup_->engine(), mjOBJ_JOINT, wheel.joint));
-  }
   if (!wheels.empty()) add_slip("wheel", "wheel", wheels, &StepFindings::wheel_slip);
 }
 
 void RunRecorder::AddFollowedContacts() {
   const std::vector<std::string>& tips = setup_->scenario().grasp.fingertips;
   const int count = CountOf(tips);
-  Add({"law/kappa",
-       "rad",
-       "contact coordinates (39) that the law follows by (40) from t = 0",
-       5 * count,
-       Expand(tips, {"u_f", "v_f", "u_o", "v_o", "psi"}),
-       {}},
-      [](const StepRecord& step, std::span<double> row) {
-        const std::vector<ContactCoordinates>& kappa = step.followed_kappa;
-        for (size_t i = 0; i < kappa.size(); ++i) Copy(kappa[i].CalcVector(), row.subspan(5 * i, 5));
-      });
-  Add({"law/chart", "1", "charts of law/kappa, as contact/chart", 2 * count, Expand(tips, {"f", "o"}), {}},
-      [](const StepRecord& step, std::span<double> row) {
-        const std::vector<ContactCoordinates>& kappa = step.followed_kappa;
-        for (size_t i = 0; i < kappa.size(); ++i) {
-          row[2 * i] = kappa[i].alpha_f.chart;
-          row[2 * i + 1] = kappa[i].alpha_o.chart;
-        }
-      });
+  Add("law/kappa", "rad", "contact coordinates (39) that the law follows by (40) from t = 0", 5 * count,
+      Expand(tips, {"u_f", "v_f", "u_o", "v_o", "psi"}), Each(ListFollowed, ReadKappa));
+  Add("law/chart", "1", "charts of law/kappa, as contact/chart", 2 * count, Expand(tips, {"f", "o"}),
+      Each(ListFollowed, ReadCharts));
   const auto add = [&](const char* name, const char* unit, const char* what, double ContactDrift::*member) {
-    Add({name, unit, what, count, tips, {}}, [member](const StepRecord& step, std::span<double> row) {
-      for (size_t i = 0; i < step.drift.size(); ++i) row[i] = step.drift[i].*member;
-    });
+    Add(name, unit, what, count, tips,
+        Each(
+            [](const StepRecord& step) -> const auto& { return step.drift; },
+            [member](const ContactDrift& drift) { return drift.*member; }));
   };
   add("contact/drift_object", "m", "distance of law/kappa's points on the object from contact/kappa's",
       &ContactDrift::object);
@@ -351,50 +313,36 @@ void RunRecorder::AddTaskSignals() {
   for (int i = 0; i <= static_cast<int>(Phase::kDone); ++i) {
     phases += (i > 0 ? ", " : "") + std::to_string(i) + " " + NameOf(static_cast<Phase>(i));
   }
-  Add({"task/phase", "1", "phase of the task: " + phases, 1, {}, {}},
-      [](const StepRecord& step, std::span<double> row) { row[0] = step.command.task.phase; });
-  Add({"task/contacts", "1", "fingertips that the law lets push, bit by bit", 1, {}, {}},
-      [](const StepRecord& step, std::span<double> row) { row[0] = step.command.handling.contacts; });
-  Add({"task/weight", "1", "part of the object's stated weight that the hand bears", 1, {}, {}},
-      [](const StepRecord& step, std::span<double> row) { row[0] = step.command.task.weight; });
+  AddNumber("task/phase", "1", "phase of the task: " + phases,
+            Number([](const StepRecord& step) { return step.command.task.phase; }));
+  AddNumber("task/contacts", "1", "fingertips that the law lets push, bit by bit",
+            Number([](const StepRecord& step) { return step.command.handling.contacts; }));
+  AddNumber("task/weight", "1", "part of the object's stated weight that the hand bears",
+            Number([](const StepRecord& step) { return step.command.task.weight; }));
   if (checks_ == nullptr) return;
-  Add({"task/support_force", "N", "upward force on the object by what it lies on", 1, {}, {}},
-      [](const StepRecord& step, std::span<double> row) { row[0] = step.response.support_force; });
-}
-
-void RunRecorder::AddClearanceSignals() {
-  std::vector<PairClass> classes;
-  std::vector<std::string> names;
-  for (const WatchedPair& pair : checks_->clearance().pairs()) {
-    if (std::find(classes.begin(), classes.end(), pair.pairs) == classes.end()) classes.push_back(pair.pairs);
-  }
-  std::sort(classes.begin(), classes.end());
-  for (const PairClass pairs : classes) names.emplace_back(NameOf(pairs));
-  if (classes.empty()) return;
-  Add({"clearance/smallest",
-       "m",
-       "smallest distance so far of bodies that are not meant to touch",
-       static_cast<int>(classes.size()),
-       names,
-       {}},
-      [this, classes](const StepRecord& /*step*/, std::span<double> row) {
-        for (size_t i = 0; i < classes.size(); ++i) {
-          row[i] = checks_->clearance().nearest(classes[i]).distance;
-        }
-      });
+  AddNumber("task/support_force", "N", "upward force on the object by what it lies on",
+            Number([](const StepRecord& step) { return step.response.support_force; }));
 }
 
 void RunRecorder::AddCheckSignals() {
+  const Clearance& clearance = *checks_->analysis().clearance;
+  std::set<PairClass> classes;
+  for (const WatchedPair& pair : clearance.pairs()) classes.insert(pair.pairs);
+  std::vector<std::string> names;
+  for (const PairClass pairs : classes) names.emplace_back(NameOf(pairs));
+  if (!classes.empty()) {
+    Add("clearance/smallest", "m", "smallest distance so far of bodies that are not meant to touch",
+        CountOf(names), names, [&clearance, classes](const StepRecord& /*step*/, Row row) {
+          size_t i = 0;
+          for (const PairClass pairs : classes) row[i++] = clearance.nearest(pairs).distance;
+        });
+  }
   for (const std::span<const CheckRecord> checks : {checks_->model_checks(), checks_->motion_checks()}) {
     for (const CheckRecord& check : checks) {
       if (!check.applies) continue;
-      Add({"check/" + check.name,
-           check.unit,
-           check.description,
-           1,
-           {},
-           {{"bound", check.bound}, {"kind", static_cast<double>(check.kind)}}},
-          [&check](const StepRecord& /*step*/, std::span<double> row) { row[0] = check.last; });
+      Add("check/" + check.name, check.unit, check.description, 1, {},
+          [&check](const StepRecord& /*step*/, Row row) { row[0] = check.last; },
+          {{"bound", check.bound}, {"kind", static_cast<double>(check.kind)}});
     }
   }
 }

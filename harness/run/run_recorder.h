@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -34,18 +35,23 @@ class RunRecorder {
 
  private:
   using Source = std::function<void(const StepRecord& step, std::span<double> row)>;
-  void Add(const SignalInfo& signal, Source source);
+  /// One quantity. @param width its numbers. @param columns their names, if they have any. @param numbers
+  /// attributes.
+  void Add(const std::string& name, const std::string& unit, const std::string& description, int width,
+           std::vector<std::string> columns, Source source, std::map<std::string, double> numbers = {});
+  /// One that is a single number.
+  void AddNumber(const std::string& name, const std::string& unit, const std::string& description,
+                 Source source);
   void AddStateSignals();
   void AddJointSignals();
   void AddObjectSignals();
   void AddContactSignals();
   void AddFollowedContacts();
   void AddTaskSignals();
-  void AddClearanceSignals();
   void AddCheckSignals();
 
   const Setup* setup_;
-  const CrossCheck* checks_;  // null without
+  const RunChecks* checks_;  // null without
   LogWriter log_;
   struct Channel {
     int signal;

@@ -126,15 +126,17 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
     json["settling"] = Json::object();
     for (const CheckRecord& check : loop.checks().settling_failures())
       json["settling"][check.name] = ToJson(check, /*timed=*/true);
-    const CrossCheck& checks = loop.checks();
-    const StepFindings& findings = checks.findings();
-    json["assumptions"] = {{"fingertip_slip_max_m", checks.Find("fingertip_slip").worst},
-                           {"wheel_slip_max_m", checks.Find("wheel_slip").worst},
-                           {"base_tilt_max_rad", checks.Find("base_tilt").worst},
+    const StepFindings& findings = loop.checks().analysis().findings;
+    const auto worst = [&](const char* name) {
+      return loop.checks().Has(name) ? loop.checks().Find(name).worst : 0.0;
+    };
+    json["assumptions"] = {{"fingertip_slip_max_m", worst("fingertip_slip")},
+                           {"wheel_slip_max_m", worst("wheel_slip")},
+                           {"base_tilt_max_rad", worst("base_tilt")},
                            {"cone_margin_min", findings.least_cone_margin},
                            {"contacts_lost", findings.contacts_lost}};
   }
-  if (loop.is_checking()) json["clearance"] = ClearanceToJson(loop.checks().clearance());
+  if (loop.is_checking()) json["clearance"] = ClearanceToJson(*loop.checks().analysis().clearance);
   const LoopTimes& times = loop.times();
   const double steps = static_cast<double>(std::max(loop.record().step, 1L));
   const double microseconds = 1e6 / steps;

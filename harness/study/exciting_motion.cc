@@ -8,7 +8,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/checks/bounds.h"
+#include "harness/checks/check_table.h"
 #include "harness/engine/engine.h"
 #include "harness/run/excitation.h"
 #include "harness/run/runner.h"
@@ -92,7 +92,7 @@ class MotionSearch {
     if (result_.keys.empty()) {
       throw InputError(scenario.source + ": must have a trajectory, or a motion of joints, that oscillates");
     }
-    result_.floor = CalcBound(kStepChecks[static_cast<size_t>(StepCheck::kInverseDynamicsRobot)], scenario);
+    result_.floor = CalcBound(*FindCheck("inverse_dynamics_robot"), scenario);
   }
 
   ExcitingMotion Run() {

@@ -118,7 +118,7 @@ void LiveRun::Record(const StepRecord& step) {
     frame.contact_forces.block<1, 3>(0, 3 * i) = contact.force.transpose();
     frame.contact_normals.block<1, 3>(0, 3 * i) = contact.normal.transpose();
   }
-  const CrossCheck& checks = runner_->loop().checks();
+  const RunChecks& checks = runner_->loop().checks();
   for (const CheckCategory kind : kCheckCategories) {
     CategoryStatus& status = view.categories.emplace_back(CategoryStatus{kind});
     for (const std::span<const CheckRecord> records : {checks.model_checks(), checks.motion_checks()}) {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/checks/step_check_table.h"
+#include "harness/checks/check_table.h"
 #include "tests/common/matchers.h"
 
 namespace dexcheck::testing::attribution_test {
@@ -296,26 +296,28 @@ TEST(Attribute, NeverContradictsItself) {
 }
 
 // The table has one entry for each check, and the order of two that failed at one time is never open.
-TEST(StepCheckTable, SaysWhatEachFailureMeansWithoutTies) {
+TEST(CheckTable, SaysWhatEachFailureMeansWithoutTies) {
   std::vector<std::string> names;
   std::vector<int> precedences;
-  for (const StepCheckInfo& info : kStepChecks) {
+  for (const CheckInfo& info : ListChecks()) {
     names.emplace_back(info.name);
-    EXPECT_EQ(FindStepCheck(info.name), &info);
+    EXPECT_EQ(FindCheck(info.name), &info);
     EXPECT_NE(*info.description, '\0') << info.name;
     const FailureMeaning& meaning = info.meaning;
     if (meaning.cause != Cause::kNone && meaning.cause != Cause::kModel) {
       precedences.push_back(meaning.precedence);
     }
     EXPECT_TRUE(!meaning.is_own || meaning.cause != Cause::kNone) << info.name;
-    EXPECT_TRUE(meaning.sharper == StepCheck::kCount || meaning.is_own) << info.name;
+    EXPECT_TRUE(meaning.sharper.empty() || (meaning.is_own && FindCheck(meaning.sharper) != nullptr))
+        << info.name;
+    EXPECT_NE(info.make == nullptr, info.evaluate == nullptr) << info.name;
   }
-  for (const Step& step : kSteps) EXPECT_NE(FindStepCheck(step.name), nullptr) << step.name;
+  for (const Step& step : kSteps) EXPECT_NE(FindCheck(step.name), nullptr) << step.name;
   std::sort(names.begin(), names.end());
   EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());
   std::sort(precedences.begin(), precedences.end());
   EXPECT_EQ(std::adjacent_find(precedences.begin(), precedences.end()), precedences.end());
-  EXPECT_EQ(FindStepCheck("M_bar"), nullptr);
+  EXPECT_EQ(FindCheck("M_bar"), nullptr);
 }
 
 TEST(NameOf, CausesHaveDifferentNames) {

@@ -6,7 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "controller/control/trajectory_controller.h"
-#include "harness/checks/step_check_table.h"
+#include "harness/checks/check_table.h"
+#include "tests/harness/run/changed_parts.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::baseline_reference_test {
@@ -25,26 +26,12 @@ std::vector<std::string> MakeOverrides(const std::string& law, const std::string
 
 RunResult RunWith(const ShippedRun& spec, const ShippedRun& law, double factor, double* worst) {
   LoopParts parts = MakeLoopParts(spec.setup());
-  class Scaled final : public Controller {
-   public:
-    Scaled(std::unique_ptr<Controller> law, double factor) : law_(std::move(law)), factor_(factor) {}
-    void Follow(const Trajectory& motion) override { law_->Follow(motion); }
-    void Begin(double t, const Reading& reading) override { law_->Begin(t, reading); }
-    void Step(const Reading& reading, double t, Command* command) override {
-      law_->Step(reading, t, command);
-      command->tau *= factor_;
-    }
-    const GraspModel& model() const override { return law_->model(); }
-
-   private:
-    std::unique_ptr<Controller> law_;
-    double factor_;
-  };
-  parts.controller = std::make_unique<Scaled>(MakeLoopParts(law.setup()).controller, factor);
-  Runner runner(spec.setup(), /*check=*/true, std::move(parts));
-  const RunResult result = runner.Run([](const StepRecord&) {}, [] { return false; });
-  *worst = runner.loop().checks().Find("law_torque").worst;
-  return result;
+  parts.controller = std::make_unique<ChangedController>(
+      MakeLoopParts(law.setup()).controller,
+      [=](const GraspModel&, Command* command) { command->tau *= factor; });
+  const std::unique_ptr<Runner> runner = RunParts(spec.setup(), std::move(parts));
+  *worst = runner->loop().checks().Find("law_torque").worst;
+  return runner->result();
 }
 
 class BaselineCheck : public ::testing::TestWithParam<std::tuple<const char*, const char*>> {};
@@ -61,9 +48,9 @@ TEST_P(BaselineCheck, TheLawPassesToRoundingAndAnotherIsFound) {
     EXPECT_LE(check.worst, 0.5 * check.bound) << name;
     EXPECT_GT(check.count, 0) << name;
   }
-  EXPECT_FALSE(run.loop().checks().Find("law_demand").applies);
-  EXPECT_EQ(run.loop().checks().Find("closed_loop_spectral_radius").applies, law == "operational_space");
-  EXPECT_EQ(run.loop().checks().Find("error_dynamics").applies, law == "operational_space");
+  EXPECT_FALSE(run.loop().checks().Has("law_demand"));
+  EXPECT_EQ(run.loop().checks().Has("closed_loop_spectral_radius"), law == "operational_space");
+  EXPECT_EQ(run.loop().checks().Has("error_dynamics"), law == "operational_space");
 
   double worst = 0.0;
   // A millionth too much, and the law beside it.

@@ -5,9 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "harness/checks/law_terms.h"
-#include "harness/checks/step_check_table.h"
 #include "harness/diagnosis/faulty_law.h"
 #include "tests/common/matchers.h"
+#include "tests/harness/run/changed_parts.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::law_check_test {
@@ -53,74 +53,35 @@ TEST(LawCheck, AnUnchangedLawIsNotSpoiled) {
   }
 }
 
-/// A controller with one fault besides its law.
-class FaultyController final : public Controller {
- public:
-  FaultyController(const Setup& setup, std::unique_ptr<Controller> law)
-      : law_(std::move(law)), actuation_(setup.model()) {}
-  void Follow(const Trajectory& motion) override { law_->Follow(motion); }
-  void Begin(double t, const Reading& reading) override { law_->Begin(t, reading); }
-  void Step(const Reading& reading, double t, Command* command) override {
-    law_->Step(reading, t, command);
-    // More squeeze than is best: still in null(G), still in the cones.
-    VectorXd force = law_->model().grasp().J_B().transpose() * (0.05 * command->demand.F_N);
-    actuation_.CalcTorque(force, force);
-    command->tau += force;
-    command->demand.F_N *= 1.05;
-  }
-  const GraspModel& model() const override { return law_->model(); }
-
- private:
-  std::unique_ptr<Controller> law_;
-  ActuationMap actuation_;
-};
-
 TEST(LawCheck, AnInternalForceThatIsNotTheBestIsFound) {
   const ShippedRun shipped("hold", {"duration=0.05", "settle=0.2"});
   LoopParts parts = MakeLoopParts(shipped.setup());
-  parts.controller = std::make_unique<FaultyController>(shipped.setup(), std::move(parts.controller));
-  Runner runner(shipped.setup(), /*check=*/true, std::move(parts));
-  const RunResult& result = runner.Run([](const StepRecord&) {}, [] { return false; });
+  // More internal force than is best: still in null(G), still in the cones.
+  const ActuationMap actuation(shipped.setup().model());
+  parts.controller = std::make_unique<ChangedController>(
+      std::move(parts.controller), [&](const GraspModel& model, Command* command) {
+        VectorXd force = model.grasp().J_B().transpose() * (0.05 * command->demand.F_N);
+        actuation.CalcTorque(force, force);
+        command->tau += force;
+        command->demand.F_N *= 1.05;
+      });
+  const std::unique_ptr<Runner> runner = RunParts(shipped.setup(), std::move(parts));
+  const RunResult& result = runner->result();
   EXPECT_EQ(result.attribution.cause, Cause::kControlLaw) << result.attribution.evidence;
-  EXPECT_TRUE(runner.loop().checks().Find("grasp_optimality").failed);
-  for (const char* name : {"grasp_null_space", "grasp_cone"})
-    EXPECT_FALSE(runner.loop().checks().Find(name).failed) << name;
-  EXPECT_FALSE(runner.loop().checks().Find("law_torque").failed);
+  EXPECT_TRUE(runner->loop().checks().Find("grasp_optimality").failed);
+  for (const char* name : {"grasp_null_space", "grasp_cone", "law_torque"})
+    EXPECT_FALSE(runner->loop().checks().Find(name).failed) << name;
 }
 
-/// A plant with faults: motors that give another torque than they are sent, an object that accelerates
-/// otherwise than it says.
-class FaultyPlant final : public Plant {
- public:
-  FaultyPlant(std::unique_ptr<Plant> plant, double gain, double told)
-      : plant_(std::move(plant)), gain_(gain), measured_(told) {}
-  double time_step() const override { return plant_->time_step(); }
-  std::span<const Motor> motors() const override { return plant_->motors(); }
-  void BeginStep() override { plant_->BeginStep(); }
-  void Read(PlantReading* reading) override { plant_->Read(reading); }
-  void EndStep(const Eigen::Ref<const VectorXd>& tau) override { plant_->EndStep(gain_ * tau); }
-  void Read(PlantResponse* response) override {
-    plant_->Read(response);
-    response->V_Bo_dot[0] += measured_;
-  }
-  void Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) override { plant_->Place(q, X_Bo); }
-  void AddVelocity(const MeasuredState& state, const Vector3d& v) override { plant_->AddVelocity(state, v); }
-  void Translate(const Vector3d& way) override { plant_->Translate(way); }
-
- private:
-  std::unique_ptr<Plant> plant_;
-  double gain_;
-  double measured_;
-};
-
-RunResult RunFaultyPlant(double gain, double told, const char* check) {
+/// Motors that give another torque than they are sent, an object that accelerates otherwise than it says.
+RunResult RunFaultyPlant(double gain, double acceleration, const char* check) {
   const ShippedRun shipped("hold", {"duration=0.2", "settle=0.2"});
   LoopParts parts = MakeLoopParts(shipped.setup());
-  parts.plant = std::make_unique<FaultyPlant>(std::move(parts.plant), gain, told);
-  Runner runner(shipped.setup(), /*check=*/true, std::move(parts));
-  RunResult result = runner.Run([](const StepRecord&) {}, [] { return false; });
-  EXPECT_TRUE(runner.loop().checks().Find(check).failed) << check;
-  return result;
+  parts.plant = std::make_unique<ChangedPlant>(
+      std::move(parts.plant), gain, [=](PlantResponse* response) { response->V_Bo_dot[0] += acceleration; });
+  const std::unique_ptr<Runner> runner = RunParts(shipped.setup(), std::move(parts));
+  EXPECT_TRUE(runner->loop().checks().Find(check).failed) << check;
+  return runner->result();
 }
 
 TEST(LawCheck, TorquesThatDoNotArriveAreTheActuators) {

@@ -1,8 +1,6 @@
 // Bounds follow from the plant's step and stiffness and from the gains, by the formulas that the document
 // has.
 
-#include "harness/checks/bounds.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +9,7 @@
 
 #include "controller/control/actuation.h"
 #include "controller/dynamics/tree_factor.h"
+#include "harness/checks/check_table.h"
 #include "harness/checks/contact_compliance.h"
 #include "harness/engine/contact_softness.h"
 #include "tests/common/matchers.h"
@@ -21,52 +20,52 @@ namespace {
 
 TEST(Bounds, EachHasItsFormulaAndReasonInTheDocument) {
   const std::string document = ReadTextFile(SourcePath("/harness/README.md"));
-  for (const StepCheckInfo& info : kStepChecks) {
-    ASSERT_NE(*info.formula, '\0') << info.name;
-    ASSERT_NE(*info.reason, '\0') << info.name;
-    const std::string row =
-        std::string("\n| `") + info.name + "` | " + info.formula + " | " + info.reason + " |\n";
-    EXPECT_THAT(document, HasSubstr(row));
+  std::string table;
+  for (const CheckInfo& info : ListChecks()) {
+    ASSERT_NE(*info.bound.reason, '\0') << info.name;
+    table +=
+        "| `" + std::string(info.name) + "` | " + info.bound.Print() + " | " + info.bound.reason + " |\n";
   }
+  EXPECT_THAT(document, HasSubstr("\n|---|---|---|\n" + table + "\n"));
 }
 
 TEST(Bounds, AreTheTablesForTheShippedPlant) {
   const Scenario scenario = ReadShippedScenario("hold");
-  for (const StepCheckInfo& info : kStepChecks)
-    EXPECT_DOUBLE_EQ(CalcBound(info, scenario), info.bound) << info.name;
+  for (const CheckInfo& info : ListChecks())
+    EXPECT_DOUBLE_EQ(CalcBound(info, scenario), info.bound.shipped) << info.name;
 }
 
 /// The bound in `hold` so changed over the shipped one.
-double CalcRatio(StepCheck check, const std::vector<std::string>& overrides) {
-  const StepCheckInfo& info = kStepChecks[static_cast<size_t>(check)];
-  return CalcBound(info, ReadShippedScenario("hold", overrides)) / info.bound;
+double CalcRatio(const char* check, const std::vector<std::string>& overrides) {
+  const CheckInfo& info = *FindCheck(check);
+  return CalcBound(info, ReadShippedScenario("hold", overrides)) / info.bound.shipped;
 }
 
 TEST(Bounds, FollowStepStiffnessAndGains) {
-  using enum StepCheck;
-  const auto expect = [](StepCheck check, const std::vector<std::string>& overrides, double ratio) {
+  const auto expect = [](const char* check, const std::vector<std::string>& overrides, double ratio) {
     EXPECT_NEAR(CalcRatio(check, overrides), ratio, 1e-9 * ratio) << overrides[0];
   };
   const std::string step = "plant.time_step=0.002";
   const std::string soft = "plant.contact_impedance=0.9";
   const std::string slow = "plant.contact_time_constant=0.02";
-  expect(kPenetration, {step}, 4.0);
-  expect(kPenetration, {soft}, 10.0);
+  expect("penetration", {step}, 4.0);
+  expect("penetration", {soft}, 10.0);
   // Softer than the step needs is no reason to forgive.
-  expect(kPenetration, {slow}, 1.0);
-  expect(kBaseTilt, {soft, step}, 40.0);
-  expect(kRolling, {soft, step}, 20.0);
-  expect(kFingertipSlipRate, {soft, step}, 20.0);
-  expect(kFingertipSlip, {soft, step}, 20.0);
-  expect(kFingertipSlipRate, {"plant.impratio=10"}, 1.0);
-  expect(kWheelSlipRate, {soft, step}, 2.0);
-  expect(kRolling, {slow}, 10.0);
-  expect(kErrorDynamics, {"control.natural_frequency=10"}, 4.0);
-  expect(kOrientationDynamics, {"control.natural_frequency=40"}, 0.25);
-  expect(kIdleJoints, {"control.posture_frequency=20"}, 0.25);
-  for (const StepCheck check : {kLawTorque, kInverseDynamicsRobot, kInverseDynamicsObject, kConeUse, kSolver})
+  expect("penetration", {slow}, 1.0);
+  expect("base_tilt", {soft, step}, 40.0);
+  expect("rolling", {soft, step}, 20.0);
+  expect("fingertip_slip_rate", {soft, step}, 20.0);
+  expect("fingertip_slip", {soft, step}, 20.0);
+  expect("fingertip_slip_rate", {"plant.impratio=10"}, 1.0);
+  expect("wheel_slip_rate", {soft, step}, 2.0);
+  expect("rolling", {slow}, 10.0);
+  expect("error_dynamics", {"control.natural_frequency=10"}, 4.0);
+  expect("orientation_dynamics", {"control.natural_frequency=40"}, 0.25);
+  expect("idle_joints", {"control.posture_frequency=20"}, 0.25);
+  for (const char* check :
+       {"law_torque", "inverse_dynamics_robot", "inverse_dynamics_object", "cone_use", "solver"})
     expect(check, {soft, step, slow}, 1.0);
-  EXPECT_DOUBLE_EQ(CalcRatio(kErrorDynamics, {"control.natural_frequency=0"}), 1.0);
+  EXPECT_DOUBLE_EQ(CalcRatio("error_dynamics", {"control.natural_frequency=0"}), 1.0);
 }
 
 TEST(Bounds, OfAScenarioFollowWhatIsSet) {
@@ -75,7 +74,7 @@ TEST(Bounds, OfAScenarioFollowWhatIsSet) {
     const Scenario scenario = ParseScenario(ReadTextFile(file) + "contact_force = 1e-5\n", file,
                                             std::filesystem::path(file).parent_path(), overrides);
     for (const BoundOverride& stated : scenario.bounds) {
-      if (stated.first == check) return CalcStatedBound(*FindStepCheck(check), stated, scenario);
+      if (stated.first == check) return CalcStatedBound(*FindCheck(check), stated, scenario);
     }
     ADD_FAILURE() << check;
     return 0.0;

@@ -65,7 +65,7 @@ Discrepancies Measure(const std::string& scenario, const std::vector<std::string
   ShippedRun run(scenario, overrides);
   Discrepancies worst;
   const RunResult& result = run.Run([&] {
-    const StepFindings& findings = run.loop().checks().findings();
+    const StepFindings& findings = run.loop().checks().analysis().findings;
     worst.acceleration =
         std::max(worst.acceleration, (findings.xi_dot_model - run.step().response.xi_dot).norm());
     worst.force = std::max(worst.force, (findings.f_c_model - findings.f_c).norm() / findings.f_c.norm());

@@ -97,7 +97,7 @@ TEST(FingertipRim, AContactThatRollsPastItIsNamedWithItsTime) {
 TEST(FingertipRim, IsNotAskedOfWholeSpheres) {
   ShippedRun run("reorient", {"duration=0.002", "settle=0.2"});
   run.Run();
-  EXPECT_FALSE(run.loop().checks().Find("fingertip_rim").applies);
+  EXPECT_FALSE(run.loop().checks().Has("fingertip_rim"));
 }
 
 }  // namespace

@@ -5,54 +5,18 @@
 #include <utility>
 
 #include "harness/run/runner.h"
+#include "tests/harness/run/changed_parts.h"
 #include "tests/harness/run/shipped_run.h"
 
 namespace dexcheck::testing::loop_parts_test {
 namespace {
-
-/// A plant whose motors give another torque than they say.
-class WeakPlant final : public Plant {
- public:
-  WeakPlant(std::unique_ptr<Plant> plant, double gain) : plant_(std::move(plant)), gain_(gain) {}
-  double time_step() const override { return plant_->time_step(); }
-  std::span<const Motor> motors() const override { return plant_->motors(); }
-  void BeginStep() override { plant_->BeginStep(); }
-  void Read(PlantReading* reading) override { plant_->Read(reading); }
-  void EndStep(const Eigen::Ref<const VectorXd>& tau) override { plant_->EndStep(gain_ * tau); }
-  void Read(PlantResponse* response) override { plant_->Read(response); }
-  void Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) override { plant_->Place(q, X_Bo); }
-  void AddVelocity(const MeasuredState& state, const Vector3d& v) override { plant_->AddVelocity(state, v); }
-  void Translate(const Vector3d& way) override { plant_->Translate(way); }
-
- private:
-  std::unique_ptr<Plant> plant_;
-  double gain_;
-};
-
-/// A controller that sends another torque than its law's.
-class WrongController final : public Controller {
- public:
-  WrongController(std::unique_ptr<Controller> law, double gain) : law_(std::move(law)), gain_(gain) {}
-  void Follow(const Trajectory& motion) override { law_->Follow(motion); }
-  void Begin(double t, const Reading& reading) override { law_->Begin(t, reading); }
-  void Step(const Reading& reading, double t, Command* command) override {
-    law_->Step(reading, t, command);
-    command->tau *= gain_;
-  }
-  const GraspModel& model() const override { return law_->model(); }
-
- private:
-  std::unique_ptr<Controller> law_;
-  double gain_;
-};
 
 class LoopPartsTest : public ::testing::Test {
  protected:
   LoopPartsTest() : shipped_("curve", {"duration=0.1"}), parts_(MakeLoopParts(shipped_.setup())) {}
 
   const StepRecord& Run() {
-    runner_ = std::make_unique<Runner>(shipped_.setup(), /*check=*/true, std::move(parts_));
-    runner_->Run([](const StepRecord&) {}, [] { return false; });
+    runner_ = RunParts(shipped_.setup(), std::move(parts_));
     return runner_->loop().record();
   }
   [[nodiscard]] double Worst(std::string_view check) const {
@@ -64,8 +28,44 @@ class LoopPartsTest : public ::testing::Test {
   std::unique_ptr<Runner> runner_;
 };
 
+// Each check's value at each step, of tasks too, and how a run ends that fails.
+TEST(TwoThreads, GiveTheSameBits) {
+  for (const auto& [scenario, overrides] :
+       {std::pair<const char*, std::vector<std::string>>{"curve", {"duration=0.2", "settle=0.3"}},
+        {"lift", {"duration=0.6", "settle=0.1"}},
+        {"paper-rigid", {"duration=0.1"}},
+        {"hold", {"duration=0.2", "settle=0.3", "plant.finger_friction=0.1"}}}) {
+    SCOPED_TRACE(scenario);
+    std::vector<double> values[2];
+    std::string failures[2];
+    for (const int threads : {1, 2}) {
+      const ShippedRun shipped(scenario, overrides);
+      LoopParts parts = MakeLoopParts(shipped.setup());
+      parts.threads = threads;
+      Runner runner(shipped.setup(), /*check=*/true, std::move(parts));
+      std::vector<double>& all = values[threads - 1];
+      failures[threads - 1] =
+          runner
+              .Run(
+                  [&](const StepRecord& step) {
+                    all.insert(all.end(), step.reading.qpos.begin(), step.reading.qpos.end());
+                    all.insert(all.end(), step.findings.xi_dot_model.begin(),
+                               step.findings.xi_dot_model.end());
+                    const RunChecks& checks = runner.loop().checks();
+                    for (const auto records : {checks.model_checks(), checks.motion_checks()})
+                      for (const CheckRecord& check : records) all.push_back(check.last);
+                  },
+                  [] { return false; })
+              .failure;
+    }
+    EXPECT_GT(values[0].size(), 0U);
+    EXPECT_EQ(values[0], values[1]);
+    EXPECT_EQ(failures[0], failures[1]);
+  }
+}
+
 TEST_F(LoopPartsTest, AnotherPlantOfTheSameKindGivesTheSameBits) {
-  parts_.plant = std::make_unique<WeakPlant>(std::move(parts_.plant), 1.0);
+  parts_.plant = std::make_unique<ChangedPlant>(std::move(parts_.plant), 1.0);
   const StepRecord& step = Run();
   shipped_.Run();
   EXPECT_EQ(step.reading.qpos, shipped_.step().reading.qpos);
@@ -74,7 +74,7 @@ TEST_F(LoopPartsTest, AnotherPlantOfTheSameKindGivesTheSameBits) {
 }
 
 TEST_F(LoopPartsTest, MotorsThatGiveLessThanTheySayAreFound) {
-  parts_.plant = std::make_unique<WeakPlant>(std::move(parts_.plant), 0.999);
+  parts_.plant = std::make_unique<ChangedPlant>(std::move(parts_.plant), 0.999);
   const StepRecord& step = Run();
   EXPECT_EQ(runner_->result().verdict, Verdict::kDisagreement) << runner_->result().failure;
   EXPECT_GT(Worst("inverse_dynamics_robot"), 1e-4);
@@ -82,7 +82,8 @@ TEST_F(LoopPartsTest, MotorsThatGiveLessThanTheySayAreFound) {
 }
 
 TEST_F(LoopPartsTest, AWrongLawMovesTheObjectButIsNoFaultOfTheModel) {
-  parts_.controller = std::make_unique<WrongController>(std::move(parts_.controller), 0.999);
+  parts_.controller = std::make_unique<ChangedController>(
+      std::move(parts_.controller), [](const GraspModel&, Command* command) { command->tau *= 0.999; });
   const StepRecord& step = Run();
   EXPECT_EQ(runner_->result().failure, "");
   EXPECT_LE(Worst("inverse_dynamics_robot"), 1e-5);
@@ -103,7 +104,7 @@ TEST_F(LoopPartsTest, TheRecordHasWhatTheLawDemandedAndWhatCameOfIt) {
   EXPECT_LT((step.response.V_Bo_dot - step.command.demand.V_Bo_dot).norm(), 1e-4);
   EXPECT_LT((step.response.motor_torques - step.drive.tau).norm(), 1e-12 * step.drive.tau.norm());
   EXPECT_EQ(step.drive.tau, step.command.tau);
-  EXPECT_EQ(step.told.state.q, step.reading.state.q);
+  EXPECT_EQ(step.measured.state.q, step.reading.state.q);
 }
 
 }  // namespace

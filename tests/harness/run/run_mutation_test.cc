@@ -199,7 +199,7 @@ TEST(Detectability, TellsTheErrorThatFailsABalance) {
       });
   ASSERT_NE(mass, result.numbers.end());
   ASSERT_LT(mass->object, 1e-3);
-  const double bound = kStepChecks[static_cast<size_t>(StepCheck::kInverseDynamicsObject)].bound;
+  const double bound = FindCheck("inverse_dynamics_object")->bound.shipped;
   for (const double factor : {0.5, 2.0}) {
     std::vector<std::string> overrides = shorter;
     overrides.push_back(fmt::format("model.object.mass={:.17g}", 0.2 * (1.0 + factor * mass->object)));

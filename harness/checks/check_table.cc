@@ -1,0 +1,387 @@
+#include "harness/checks/check_table.h"
+
+#include <algorithm>
+
+#include "harness/checks/judges.h"
+#include "harness/checks/step_analysis.h"
+
+namespace dexcheck {
+namespace {
+
+// Contacts hold by soft constraints of a time constant tc, two time steps dt unless the scenario says
+// otherwise, and an impedance d. With b = 2 / (tc d), k = 1 / (d tc^2) and R = (1 - d) / (d m) of the mass m
+// that the contact moves the engine lets
+//
+//   along a normal   r_ddot = -b r_dot - k r - R f_n
+//                    at rest: r = -(1 - d) tc^2 f_n / m
+//   along a tangent  v_dot = -b v - R f_t / impratio + J_dot qvel
+//                    at rest: v = tc d / 2 J_dot qvel - (1 - d) tc / 2 / impratio f_t / m
+//
+// J_dot qvel is what (46) has and the engine's constraint has not: at a fingertip the model's J_B_dot' xi -
+// G_dot^T V_Bo, and the w x v of object and platform, whose velocities the model takes along axes that turn;
+// v w in a curve at a tyre. So fingertips that stick creep, tyres give sideways, the platform sinks and
+// tilts, each by a load f / m or an acceleration that is the same whatever the step is; each bound below is
+// that of the shipped plant (dt = 1 ms, d = 0.99, impratio = 100) and scales as its formula says.
+// Where the paper's assumptions are judged, tc is 2 dt, the least that the engine can step, and impratio 100:
+// contacts that a scenario makes softer than that need not be, and are found. Distances grow with time, at
+// rates that do not: distances are judged over the last kSlipWindow at most, with kSlipWindow times the
+// rate's bound.
+//
+// The prediction differs from the engine's motion by r_ddot and v_dot, which die out under a constant force,
+// and by what tilt leaves. What they come to is computed at each step, from the engine's own A = J M^-1 J^T
+// and R and from how the forces change (contact_compliance.h, contact_softness.h), and taken off above the
+// bound.
+
+/// f_t / m up to which a fingertip may creep, m/s^2: 10 N on a phalanx of 50 g. `hold` has 6, `two-hands`
+/// 130.
+constexpr double kTipLoad = 200.0;
+/// f_n / m up to which it may sink in, m/s^2. `hold` has 28, `two-hands` 215.
+constexpr double kTipPress = 500.0;
+/// Acceleration v w in a curve up to which tyres may give, m/s^2. `curve` has 0.03.
+constexpr double kSideways = 0.1;
+/// Acceleration of load at a tyre, over the arm between the tyres, up to which the platform may tilt, 1/s^2.
+constexpr double kTiltLoad = 250.0;
+/// Acceleration of load that comes and goes within tc, over which the platform sinks and its wheels do not
+/// roll, m/s^2.
+constexpr double kRollLoad = 0.5;
+constexpr double kShippedTimeConstant = 2e-3;  // s
+constexpr double kShippedSoftness = 1.0 - 0.99;
+constexpr double kShippedCreep = kShippedSoftness * kShippedTimeConstant / 2.0 / 100.0 * kTipLoad;  // m/s
+constexpr double kShippedLag = kShippedTimeConstant / 2.0 * kSideways;                              // m/s
+constexpr double kShippedSinking = kShippedSoftness * kShippedTimeConstant * kShippedTimeConstant;  // s^2
+constexpr double kJointLimitBound = 1e-12;
+
+constexpr bool kOwn = true;       // FailureMeaning::is_own
+constexpr bool kRelative = true;  // Bound::is_relative
+using enum CheckCategory;
+using enum CheckInfo::Moment;
+
+using Analysis = StepAnalysis;
+
+Evaluation When(bool applies, double value, double explained = 0.0) {
+  if (!applies) return std::nullopt;
+  return CheckValue{value, -1, explained};
+}
+
+template <double LawErrors::*error>
+Evaluation OfLaw(const Analysis& a) {
+  return a.law == nullptr ? std::nullopt : When(true, a.law->*error);
+}
+
+bool IsHolding(const Analysis& a) { return a.step->command.handling.holding; }
+bool IsPredicted(const Analysis& a) { return a.mass_factor != nullptr && !a.is_transient; }
+/// Whether the scenario's expectations begin.
+bool IsExpected(const Analysis& a) { return a.step->time >= a.setup->scenario().expect.from; }
+
+/// What the solver leaves over of the object while contacts come and go is taken off the inverse dynamics,
+/// and is gone some steps later.
+Evaluation EvaluateSolver(const Analysis& a) {
+  if (!a.setup->has_object()) return When(true, a.robot_solver);
+  return When(!a.is_transient, std::max(a.object_solver, a.robot_solver));
+}
+
+// name, category, unit;
+// bound: shipped, reason, scaling, formula, whether relative;
+// description;
+// what a failure means: cause, precedence, rank, whether its own, sharper check;
+// how it is evaluated, when, how its part is described, who evaluates it
+const CheckInfo kChecks[] = {
+    // Asked once, before anything moves. A radius of 1 never settles; so near to it an error takes 1e9 steps.
+    {{"closed_loop_spectral_radius", kLaw, "1"},
+     {1.0 - 1e-9, "an error that settles within 1e9 steps", Scaling::kNone, "1 - 1e-9"},
+     "largest eigenvalue of (57) with the scenario's gains, sampled as the controller does it",
+     {Cause::kControlLaw, 14, Rank::kLaw, kOwn},
+     [](const Analysis& a) { return When(true, a.spectral_radius); },
+     kRunning},
+    {{"measurement", kLaw, "1"},
+     {0.0, "copied, or computed twice from the same numbers"},
+     "measured state against the true one, beyond what the scenario declares",
+     {Cause::kSensing, 15, Rank::kMeasurement, kOwn},
+     [](const Analysis& a) { return When(true, a.measurement_error); },
+     kRunning | kUnsent},
+    {{"law_torque", kLaw, "1"},
+     {kLawTorqueBound,
+      "rounding of the terms, 1e-15, through Gram matrices of condition number^2; the condition number is "
+      "divided out",
+      Scaling::kNone, nullptr, kRelative},
+     "tau' sent against (53)-(55) computed from the engine's terms, relative to the forces balanced and to "
+     "the condition number of J_B'",
+     {Cause::kControlLaw, 16, Rank::kLaw, kOwn},
+     OfLaw<&LawErrors::torque>,
+     kRunning | kUnsent},
+    // Where contacts slip, (47) plans for xi_c and the rigid system starts from xi: C_bar' (xi - xi_c) and
+    // J_dot (xi - xi_c) stay, slip speeds of some 1e-6 m/s against rates of the order of 1/s: measured 8e-10
+    // in `curve`.
+    {{"law_demand", kLaw, "1"},
+     {1e-8, "C_bar' (xi - xi_c) and M_bar' J^+ J_dot (xi - xi_c), which slip makes, are taken off",
+      Scaling::kNone, "1e-8 + 10 slip forces", kRelative},
+     "accelerations and contact forces of the rigid system (46), (48) under tau' against those that (47), "
+     "(49), (55) demand, likewise",
+     {Cause::kControlLaw, 17, Rank::kLaw, kOwn},
+     OfLaw<&LawErrors::demand>,
+     kRunning},
+    {{"grasp_null_space", kLaw, "1"},
+     {kGraspNullBound,
+      "F_N = f_c - G^+ F_o has the solver's residual of f_c, 1e-10, and the rounding of G^+"},
+     "largest entry of G F_N, N and N m, over |f_c| and 1 N",
+     {Cause::kControlLaw, 18, Rank::kLaw, kOwn},
+     OfLaw<&LawErrors::grasp_null_space>,
+     kRunning},
+    {{"grasp_cone", kLaw, "1"},
+     {kGraspNullBound, "likewise: the solver's own f_c are inside"},
+     "how far f_c = G^+ F_o + F_N is outside the friction cones, f_min and f_max, over |f_c| and 1 N",
+     {Cause::kControlLaw, 32, Rank::kLaw, kOwn},
+     OfLaw<&LawErrors::grasp_cone>,
+     kRunning},
+    {{"grasp_optimality", kLaw, "1"},
+     {kGraspOptimalityBound,
+      "a barrier solution is optimal to the tolerance of the solver's slacks, 1e-5; near a cone's edge its "
+      "slope follows with ten times that",
+      Scaling::kNone, "10 slack_tolerance"},
+     "slope of the grasp force's objective that is left within null(G), over the whole slope and 1; where "
+     "f_c is inside",
+     {Cause::kControlLaw, 33, Rank::kLaw, kOwn},
+     OfLaw<&LawErrors::grasp_optimality>,
+     kRunning},
+    {{"torque_applied", kLaw, "1"},
+     {1e-14, "a gear's ratio, once and back: two roundings"},
+     "torques that the joints received against those that were sent, relative to the largest",
+     {Cause::kActuator, 19, Rank::kActuator, kOwn},
+     [](const Analysis& a) { return When(true, a.torque_error); }},
+    // What law_demand leaves, over K_p = 400/s^2: 1e-8 of accelerations of some m/s^2, times a condition
+    // number of some tens. Measured 1.2e-9 m in `curve`.
+    {{"error_dynamics", kLaw, "m"},
+     {1e-8, "what law_demand leaves is held by K_p alone", Scaling::kPositionGain, "4e-6 m/s^2 / K_p"},
+     "object's position against (57) integrated beside the run, driven by the accelerations that the "
+     "prediction missed",
+     {Cause::kUnexplained, 20, Rank::kResidual},
+     OfLaw<&LawErrors::error_dynamics>,
+     kRunning},
+    {{"orientation_dynamics", kLaw, "rad"},
+     {1e-7, "likewise", Scaling::kOrientationGain, "4e-5 rad/s^2 / K_p"},
+     "object's orientation likewise",
+     {Cause::kUnexplained, 28, Rank::kResidual},
+     OfLaw<&LawErrors::orientation_dynamics>,
+     kRunning},
+    {{"expect_position", kLaw, "m"},
+     {0.0,
+      "what the scenario means; hold is where (57) is led by what a rigid plant accelerates within a step",
+      Scaling::kNone, "[expect] position + hold"},
+     "object's position error, against what the scenario expects",
+     {Cause::kControlLaw, 21, Rank::kResidual},
+     [](const Analysis& a) {
+       return When(a.step->command.tracks && IsExpected(a), a.step->error.position.norm(),
+                   a.position_by_hold);
+     },
+     kRunning},
+    {{"expect_orientation", kLaw, "rad"},
+     {0.0, "likewise", Scaling::kNone, "[expect] orientation + hold"},
+     "object's orientation error, against what the scenario expects",
+     {Cause::kControlLaw, 22, Rank::kResidual},
+     [](const Analysis& a) {
+       return When(a.step->command.tracks && IsExpected(a), a.step->error.orientation, a.orientation_by_hold);
+     },
+     kRunning},
+    // Measured 1e-14 for the Panda.
+    {{"joint_dynamics", kLaw, "rad"},
+     {1e-11, "rounding of torques, over the least inertia that they drive and over K_p"},
+     "joints against e_ddot + K_v e_dot + K_p e = 0 integrated beside the run, driven by the accelerations "
+     "that the prediction missed",
+     {Cause::kUnexplained, 29, Rank::kResidual},
+     OfLaw<&LawErrors::error_dynamics>,
+     kRunning},
+    {{"expect_joints", kLaw, "rad"},
+     {0.0, "what the scenario means", Scaling::kNone, "[expect] joints"},
+     "largest error of a joint (rad or m), against what the scenario expects",
+     {Cause::kControlLaw, 30, Rank::kResidual},
+     [](const Analysis& a) {
+       return When(a.step->command.joints.q.size() > 0 && IsExpected(a), a.step->error.joints);
+     },
+     kRunning},
+    // What is left of (48) is compared less the inertia of what the platform does on soft tyres besides
+    // rolling, less what the solver left over, and less what tilt and slip can come to
+    // (StepAnalysis::uneven_force). Then all of it is rounding of the engine's terms, 1e-14 of forces that
+    // cancel, and products of small departures: 1e-5 rad of tilt times 1e-2 of the forces that change with
+    // it.
+    {{"inverse_dynamics_robot", kInverseDynamics, "1"},
+     {1e-6, "rounding of forces that cancel; the state that is judged is level and does not slip",
+      Scaling::kNone, "1e-6 + (g tilt + 2 slip w) sqrt(m) + f_t r_sunk / (2 r) + 2 tilt_rate sqrt(2 E)",
+      kRelative},
+     "what is left of (48) with the engine's accelerations and contact forces, less what the platform does "
+     "besides and its solver left over, against the forces balanced",
+     {Cause::kUnmodelledForce, -1, Rank::kDecisive},
+     EvaluateRobotDynamics},
+    // The object's dynamics have no other unknowns than its inertia and the contacts' geometry, which checks
+    // of the model compare: where those hold, a force acts on the object that nobody has.
+    {{"inverse_dynamics_object", kInverseDynamics, "1"},
+     {1e-9, "rounding of the object's terms", Scaling::kNone, nullptr, kRelative},
+     "what is left of (19) with the engine's acceleration and contact forces, less what its solver left "
+     "over, against the contact forces",
+     {Cause::kUnmodelledForce, 24, Rank::kObjectBalance},
+     [](const Analysis& a) { return When(true, a.object_residual_size); }},
+    {{"reduced_acceleration", kForwardDynamics, "1"},
+     {1e-6,
+      "what contacts hold back of forces that change, computed at each step; the rest is of second order in "
+      "tilt and slip",
+      Scaling::kNone, "1e-6 + compliance", kRelative},
+     "xi_dot of the rigid constrained system (46), (48) against the engine's",
+     {Cause::kContactSoftness, 25, Rank::kPrediction},
+     [](const Analysis& a) { return When(IsPredicted(a), a.acceleration_error, a.acceleration_compliance); }},
+    {{"contact_force", kForwardDynamics, "1"},
+     {1e-7, "likewise", Scaling::kNone, "1e-7 + compliance", kRelative},
+     "f_c of the rigid constrained system against the engine's, relative to |f_c|",
+     {Cause::kContactSoftness, 26, Rank::kPrediction},
+     [](const Analysis& a) {
+       return When(IsPredicted(a), a.contact_force_error, a.contact_force_compliance);
+     }},
+    // Slip and use of the cone tell sliding from contacts that merely give.
+    {{"fingertip_slip", kAssumption, "m"},
+     {kSlipWindow * kShippedCreep, "the rate below, over the window, less the same", Scaling::kCreep,
+      "10 s (1 - d) dt 2 m/s^2"},
+     "how far a fingertip has slipped on the object in the last 5 to 10 s",
+     {Cause::kContactSoftness, 6, Rank::kAssumption, kOwn, "cone_use"},
+     [](const Analysis& a) { return When(IsHolding(a), a.fingertips.distance); }},
+    {{"fingertip_slip_rate", kAssumption, "m/s"},
+     {kShippedCreep,
+      "besides dt J_dot qvel, which is known and taken off: creep of a contact that sticks under f_t / m of "
+      "200 m/s^2, over an impratio of 100",
+      Scaling::kCreep, "(1 - d) dt 2 m/s^2"},
+     "how fast a fingertip slips on the object, less what (46) and the engine's constraint differ by",
+     {Cause::kContactSoftness, 7, Rank::kAssumption, kOwn, "cone_use"},
+     [](const Analysis& a) { return When(IsHolding(a) && !a.is_transient, a.fingertips.rate); }},
+    {{"wheel_slip", kAssumption, "m"},
+     {kSlipWindow * kShippedLag, "the rate below, over the window", Scaling::kLag, "10 s dt 0.1 m/s^2"},
+     "how far a wheel has slipped on the floor in the last 5 to 10 s, (1)",
+     {Cause::kContactSoftness, 8, Rank::kAssumption, kOwn, "traction_use"},
+     [](const Analysis& a) { return When(true, a.wheels.distance); }},
+    {{"wheel_slip_rate", kAssumption, "m/s"},
+     {kShippedLag, "tyres give sideways by v w / b, of v w up to 0.1 m/s^2", Scaling::kLag, "dt 0.1 m/s^2"},
+     "how fast a wheel slips on the floor",
+     {Cause::kContactSoftness, 9, Rank::kAssumption, kOwn, "traction_use"},
+     [](const Analysis& a) { return When(true, a.wheels.rate); }},
+    {{"rolling", kAssumption, "m/s"},
+     {kShippedSoftness * kShippedTimeConstant * kRollLoad,
+      "a platform that sinks or tilts on soft tyres; how fast it does under changing torques is computed",
+      Scaling::kSinkingRate, "(1 - d) tc 0.5 m/s^2 + slip + sinking"},
+     "speed of a wheel's rim against that of the platform above it, less its slip, (1)",
+     {Cause::kWheelGeometry, 27, Rank::kDecisive, kOwn},
+     EvaluateRolling},
+    {{"cone_use", kAssumption, "1"},
+     {0.99, "1 slides"},
+     "tangential force over mu times normal force at a fingertip; 1 slides, (21)",
+     {Cause::kFingertipSlip, 2, Rank::kDecisive, kOwn},
+     [](const Analysis& a) { return When(IsHolding(a), a.fingertips.cone_use); }},
+    {{"traction_use", kAssumption, "1"},
+     {0.99, "1 slides"},
+     "tangential force over mu times normal force at a wheel; 1 spins or skids",
+     {Cause::kWheelSlip, 3, Rank::kDecisive, kOwn},
+     [](const Analysis& a) { return When(true, a.wheels.cone_use); }},
+    {{"contacts_lost", kAssumption, "1"},
+     {0.0, "none"},
+     "fingertips that do not touch the object",
+     {Cause::kFingertipSlip, 4, Rank::kDecisive, kOwn},
+     [](const Analysis& a) { return When(true, IsHolding(a) ? a.contacts_missing : 0); }},
+    {{"penetration", kAssumption, "m"},
+     {kShippedSinking * kTipPress, "the overlap at rest under f_n / m of 500 m/s^2", Scaling::kSinking,
+      "4 (1 - d) dt^2 500 m/s^2"},
+     "overlap of fingertip and object",
+     {Cause::kContactSoftness, 5, Rank::kAssumption, kOwn},
+     [](const Analysis& a) { return When(true, a.penetration); }},
+    // For the shipped step of 1 ms: the error of the trapezoidal rule, (rate dt)^2 / 12 of the way. Measured
+    // 3e-9 at most in the shipped scenarios.
+    {{"kappa", kAssumption, "m"},
+     {0.1 * (10.0 * 1e-3) * (10.0 * 1e-3) / 12.0,
+      "the trapezoidal rule, of contacts that roll 0.1 m within the window and turn at 10 rad/s",
+      Scaling::kSquaredStep, "0.1 m (10 rad/s dt)^2 / 12"},
+     "kappa integrated by (40) over the last 5 to 10 s, as fingertip and object moved, slip included, "
+     "against the engine's: points on object and fingertip, psi at its radius",
+     {Cause::kContactSoftness, 10},
+     nullptr,
+     kAlways,
+     nullptr,
+     MakeKappaJudge},
+    // On the sphere that the plant has, contacts roll on; the paper's fingertip ends.
+    {{"fingertip_rim", kAssumption, "m"},
+     {0.0, "a hemisphere ends there"},
+     "how far a contact is past the rim of its hemispherical fingertip",
+     {Cause::kFingertipRim, -6, Rank::kDecisive, kOwn},
+     EvaluateRim,
+     kAlways,
+     DescribeFingertip},
+    {{"base_tilt", kAssumption, "rad"},
+     {kShippedSinking * kTiltLoad, "tyres that sink under loads of 100 m/s^2 at an arm of 0.4 m",
+      Scaling::kSinking, "4 (1 - d) dt^2 250 / s^2"},
+     "angle of the platform against the vertical",
+     {Cause::kTilt, 13},
+     [](const Analysis& a) { return When(true, a.step->reading.departure.tilt); }},
+    {{"idle_joints", kAssumption, "rad"},
+     {1e-5, "what the posture task's stiffness leaves of accelerations that soft contacts make",
+      Scaling::kPosture, "(1 - d) dt^2 1e5 rad/s^4 / omega_p^2"},
+     "movement since t = 0 of joints that do not carry the object",
+     {},
+     nullptr,
+     kAlways,
+     nullptr,
+     MakeIdleJointsJudge},
+    // As small as the discrepancies that the prediction is judged by. Forces that do not fit the motion
+    // explain whatever else is wrong from then on.
+    {{"solver", kAssumption, "1"},
+     {1e-5, "as small as what the prediction is judged by"},
+     "what the engine's solver left over of its own equations of motion, of the object as "
+     "inverse_dynamics_object, of the robot as inverse_dynamics_robot",
+     {Cause::kSolver, -4, Rank::kDecisive, kOwn},
+     EvaluateSolver},
+    // rad, m: rounding of a joint that rests exactly at the end of its range, as fingers of a closed gripper
+    // do.
+    {{"joint_limit", kAssumption, "rad"},
+     {kJointLimitBound, "a limit pushes; less is rounding"},
+     "how far a joint is beyond its range, where a limit pushes that the model does not have",
+     {Cause::kJointLimit, 1, Rank::kDecisive, kOwn},
+     EvaluateJointLimit,
+     kAlways,
+     DescribeJoint},
+    // Ten times the accuracy of distances between bodies that are apart (solid.h).
+    {{"clearance", kAssumption, "m"},
+     {1e-6, "the bodies' distances are known to 1e-7 m"},
+     "how deep two bodies overlap that are not meant to touch",
+     {Cause::kCollision, 12, Rank::kAssumption, kOwn},
+     [](const Analysis& a) -> Evaluation {
+       return CheckValue{a.deepest_overlap.first, a.deepest_overlap.second};
+     },
+     kAlways | kUnsent,
+     [](const Analysis& a, int part) { return a.clearance->Describe(part); }},
+    {{"collision", kAssumption, "N"},
+     {0.0, "the model has no such contact"},
+     "largest force between two bodies that are not meant to touch",
+     {Cause::kCollision, -5, Rank::kDecisive, kOwn},
+     [](const Analysis& a) -> Evaluation {
+       return CheckValue{a.step->response.collision.force, 0};
+     },
+     kAlways | kUnsent,
+     DescribeCollision},
+    // The fingers of one hand touch within some hundredths of a second, kTransient each at the most.
+    {{"excluded", kAssumption, "s"},
+     {5.0 * kTransient, "five transients: the fingers of one hand touch within some hundredths of a second",
+      Scaling::kNone, "0.25 s"},
+     "how long in one go contacts have come and gone, so that the prediction was not judged",
+     {Cause::kContactSoftness, 11},
+     [](const Analysis& a) { return When(true, a.transient_time); }},
+    {{"actuator_effort", kAssumption, "1"},
+     {1.0, "the motor's limit"},
+     "|tau'| over the motor's limit",
+     {Cause::kActuatorLimit, -3, Rank::kDecisive, kOwn},
+     [](const Analysis& a) { return When(true, a.step->drive.effort); },
+     kBefore},
+};
+
+}  // namespace
+
+std::span<const CheckInfo> ListChecks() { return kChecks; }
+
+const CheckInfo* FindCheck(std::string_view name) {
+  const auto* const found = std::find_if(std::begin(kChecks), std::end(kChecks),
+                                         [&](const CheckInfo& info) { return info.name == name; });
+  return found == std::end(kChecks) ? nullptr : found;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,57 @@
+#include "harness/checks/declared_plant.h"
+
+#include <algorithm>
+
+namespace dexcheck {
+namespace {
+
+/// A controller that follows its contacts has others than the true ones, too, and joints with dry friction do
+/// not do what any law here plans.
+bool IsIdeal(const Setup& setup) {
+  const std::vector<Joint>& joints = setup.model().joints();
+  return setup.scenario().imperfections.is_ideal() &&
+         setup.scenario().control.kappa != ContactSource::kIntegrated &&
+         std::none_of(joints.begin(), joints.end(),
+                      [](const Joint& joint) { return joint.dry_friction > 0.0; });
+}
+
+}  // namespace
+
+DeclaredPlant::DeclaredPlant(const Setup& setup, std::span<const Motor> motors)
+    : sensing_(setup.scenario().imperfections.sensing, setup.MakePartContext()),
+      drive_(motors, setup.scenario().imperfections.actuation, setup.MakePartContext()),
+      disturbances_(setup.scenario().imperfections.disturbances, setup.MakePartContext()),
+      model_(setup.declared_model(), setup.fingertips(), setup.declared_object().body, setup.surface(),
+             setup.MakeControllerOptions()) {
+  step_.is_ideal = IsIdeal(setup);
+  step_.force.setZero(setup.model().num_velocities());
+}
+
+void DeclaredPlant::Expect(const DisturbanceOptions& disturbance, const PartContext& context) {
+  disturbances_.Add(disturbance, context);
+  step_.is_ideal = false;
+}
+
+const DeclaredStep& DeclaredPlant::Follow(const StepRecord& step) {
+  const MeasuredState& state = step.reading.state;
+  sensing_.Tell(step.reading, &step_.measured);
+  drive_.Drive(step.command.tau, state.xi, &step_.tau);
+  step_.model = step.model;
+  if (step_.is_ideal) return step_;
+  model_.SetState(state);
+  step_.model = &model_;
+  step_.force.setZero();
+  step_.push.setZero();
+  step_.object_wrench.setZero();
+  if (!disturbances_.empty()) {
+    const std::span<const Wrench> wrenches = disturbances_.Evaluate(step.time, state);
+    for (const Wrench& w : wrenches) {
+      if (w.body != Wrench::kObject) step_.push += w.force;
+    }
+    AddRobotForce(wrenches, model_.robot(), step_.force);
+    step_.object_wrench = CalcObjectWrench(wrenches, state.X_Bo);
+  }
+  return step_;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,131 @@
+// The law of a robot that holds nothing and follows a motion of its joints.
+
+#include "controller/control/joint_law.h"
+
+#include "controller/common/text.h"
+#include "controller/control/joint_controller.h"
+#include "controller/control/joint_motion.h"
+#include "harness/checks/judged_law.h"
+
+namespace dexcheck {
+namespace {
+
+class JudgedJointLaw final : public JudgedLaw {
+ public:
+  explicit JudgedJointLaw(const Setup& setup)
+      : JudgedLaw(setup),
+        model_(&setup.model()),
+        law_(setup.scenario().control.law),
+        gains_(setup.joints()->gains),
+        motion_(&setup.joints()->motion) {
+    for (VectorXd* vector : {&force_, &demand_, &true_demand_, &differed_})
+      vector->setZero(setup.model().num_velocities());
+  }
+
+  [[nodiscard]] std::optional<double> CalcSpectralRadius() const override {
+    if (law_ != ControlLaw::kComputedTorque) return std::nullopt;
+    double radius = 0.0;
+    for (Eigen::Index i = 0; i < gains_.K_p.size(); ++i) {
+      ObjectGains one;
+      one.K_p.setConstant(gains_.K_p[i]);
+      one.K_v.setConstant(gains_.K_v[i]);
+      radius = std::max(radius, CalcSampledRadius(one, time_step_, hold_, velocity_age_));
+    }
+    return radius;
+  }
+  [[nodiscard]] bool IsComputed(const Command& command) const override { return command.computes_joints; }
+
+  const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalysis& plant,
+                           bool as_commanded) override {
+    errors_ = LawErrors{};
+    errors_.torque = CompareTorque(step, terms);
+    if (!follows_error()) return errors_;
+    const VectorXd* predicted = &plant.findings.xi_dot_model;
+    if (!as_commanded) {
+      actuation_.CalcForce(step.command.tau, difference_);
+      predicted = &commanded_.PredictFree(step.model->robot(), difference_).xi_dot;
+    }
+    FollowError(step, plant.declared->is_ideal ? predicted : nullptr);
+    return errors_;
+  }
+
+  [[nodiscard]] std::string Tell() const override {
+    Eigen::Index joint = 0;
+    const double largest = differed_.size() > 0 ? differed_.maxCoeff(&joint) : 0.0;
+    if (!(largest > 0.0)) return {};
+    return "the torque of joint " + model_->joints()[static_cast<size_t>(joint)].name + " is up to " +
+           FormatNumber(largest, 4) + " N m off the law's";
+  }
+
+ protected:
+  bool Evaluate(const StepRecord& step, const LawTerms& terms) override {
+    JointDemand::EvaluateDesired(*motion_, step.time, 2.0 * velocity_age_, &desired_, &half_step_);
+    force_ = terms.C_xi + terms.gravity + terms.friction;
+    if (law_ == ControlLaw::kComputedTorque) {
+      // M_bar' (q_d_ddot + K_v e_dot + K_p e) + C_bar' q_dot + F_bar'
+      CalcDemand(terms.q, terms.xi, &demand_);
+      force_.noalias() += terms.M * demand_;
+      return true;
+    }
+    // K e + D e_dot + g [+ M_bar' q_d_ddot + C_bar' q_d_dot + friction]
+    if (law_ == ControlLaw::kPdGravity) {
+      force_ = terms.gravity;
+    } else {
+      force_.noalias() += terms.M * desired_.q_ddot;
+      force_.noalias() += *terms.C * (desired_.q_dot - terms.xi);
+    }
+    force_ += gains_.K.cwiseProduct(desired_.q - terms.q);
+    force_ += gains_.D.cwiseProduct(desired_.q_dot - terms.xi);
+    return true;
+  }
+  [[nodiscard]] const VectorXd& force() const override { return force_; }
+  /// What the law sends may be much more than what it balances, and is rounded as that.
+  [[nodiscard]] double CalcScale(double balanced) override { return std::max(balanced, Norm(force_)); }
+  void Explain(const StepRecord& /*step*/, const LawTerms& /*terms*/) override {
+    differed_ = differed_.cwiseMax(difference_.cwiseAbs());
+  }
+
+ private:
+  /// K_v e_dot + K_p e + q_d_ddot.
+  void CalcDemand(const VectorXd& q, const VectorXd& xi, VectorXd* xi_dot) const {
+    *xi_dot = desired_.q_ddot;
+    *xi_dot += gains_.K_v.cwiseProduct(desired_.q_dot - xi);
+    *xi_dot += gains_.K_p.cwiseProduct(desired_.q - q);
+  }
+
+  /// @param predicted xi_dot of the rigid robot; null where the true error's own demand stands for it.
+  void FollowError(const StepRecord& step, const VectorXd* predicted) {
+    const MeasuredState& truth = step.reading.state;
+    if (q_.size() == 0) {
+      q_ = truth.q;
+      xi_ = truth.xi;
+    }
+    errors_.error_dynamics = (q_ - truth.q).cwiseAbs().maxCoeff();
+    CalcDemand(q_, xi_, &demand_);
+    // What the plant's robot did beyond the rigid prediction. Where the controller measures otherwise, its
+    // torques arrive otherwise and the robot is pushed, all of that drives the error as well.
+    demand_ += step.response.xi_dot;
+    if (predicted == nullptr) CalcDemand(truth.q, truth.xi, &true_demand_);
+    demand_ -= predicted != nullptr ? *predicted : true_demand_;
+    // Semi-implicit, as the plant: velocities first.
+    xi_ += time_step_ * demand_;
+    q_ += time_step_ * xi_;
+  }
+
+  const RobotModel* model_;
+  ControlLaw law_;
+  JointGains gains_;
+  const JointMotion* motion_;
+  DesiredJoints desired_, half_step_;
+  VectorXd force_, demand_, true_demand_;  // n
+  VectorXd differed_;                      // n, N m
+  VectorXd q_, xi_;                        // where the error dynamics have the joints; empty at first
+};
+
+}  // namespace
+
+std::unique_ptr<JudgedLaw> MakeJointLaw(const Setup& setup) {
+  return std::make_unique<JudgedJointLaw>(setup);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,90 @@
+#pragma once
+
+// A law as the checks judge it: computed a second time, from the terms of another provider.
+
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "controller/control/actuation.h"
+#include "controller/control/constrained_dynamics.h"
+#include "controller/dynamics/tree_factor.h"
+#include "harness/checks/law_reference.h"
+#include "harness/checks/step_analysis.h"
+#include "harness/checks/step_record.h"
+#include "harness/scenario/setup.h"
+
+namespace dexcheck {
+
+/// Largest magnitude of the eigenvalues of (57), per time step, when the command is held for `hold` steps: 1
+/// and more does not settle. Over all six axes. @param velocity_age by how much velocities are older than
+/// positions, s: half a time step where velocities step first and positions by them, 0 where both step
+/// together.
+double CalcSampledRadius(const ObjectGains& gains, double time_step, long hold, double velocity_age);
+
+/// One law: reference torques, demanded accelerations, error dynamics, and the spectral radius of the sampled
+/// closed loop. A law has of these what it has.
+class JudgedLaw {
+ public:
+  virtual ~JudgedLaw() = default;
+
+  /// Of the scenario's gains; none where the closed loop has no error dynamics of its own.
+  [[nodiscard]] virtual std::optional<double> CalcSpectralRadius() const = 0;
+  /// Whether the rigid system answers with what the law demands of it: the paper's does.
+  [[nodiscard]] virtual bool has_demand() const { return false; }
+  /// Whether the error dynamics can be integrated beside the run: the controller computes anew at every step,
+  /// in the way that velocities of the middle of the step before need.
+  [[nodiscard]] bool follows_error() const {
+    return CalcSpectralRadius().has_value() && hold_ == 1 && !accelerates_within_step();
+  }
+  /// Whether these torques were computed at their step, by this law.
+  [[nodiscard]] virtual bool IsComputed(const Command& command) const = 0;
+
+  /// @param terms another provider's, at the measured state. @param plant the analysis of the same step.
+  /// @param as_commanded whether nothing but the commanded torques moved the plant, so that its prediction is
+  /// that of the law.
+  virtual const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalysis& plant,
+                                   bool as_commanded) = 0;
+  /// The torques alone, for a step that the motors refuse: nothing is known of what they would do.
+  double CompareTorque(const StepRecord& step, const LawTerms& terms);
+  /// Which part of the law differs, in words, over all steps whose torques did; empty for none.
+  [[nodiscard]] virtual std::string Tell() const = 0;
+
+ protected:
+  explicit JudgedLaw(const Setup& setup);
+  /// E_bar' tau' (n) of the reference law; false when it has none.
+  virtual bool Evaluate(const StepRecord& step, const LawTerms& terms) = 0;
+  [[nodiscard]] virtual const VectorXd& force() const = 0;
+  /// What the torques' error is relative to. @param balanced |C_bar' xi + F_bar'|_M^-1.
+  [[nodiscard]] virtual double CalcScale(double balanced) { return balanced; }
+  [[nodiscard]] virtual double condition_number() const { return 1.0; }
+  /// Keeps what differs, of a step whose torques do.
+  virtual void Explain(const StepRecord& step, const LawTerms& terms) = 0;
+  /// LawErrors::torque, after Evaluate, and `scale_`. @param factor of M_bar' = L^T L.
+  double CalcTorqueError(const StepRecord& step, const LawTerms& terms, const TreeFactor& factor);
+  /// |f|_M^-1 = |L^-T f|
+  double Norm(const VectorXd& f) { return factor_->CalcForceNorm(f, &work_); }
+  /// Whether a plant that does not step by Euler's method.
+  [[nodiscard]] bool accelerates_within_step() const { return velocity_age_ == 0.0; }
+
+  double time_step_, velocity_age_;  // s
+  long hold_;                        // steps
+  ActuationMap actuation_;
+  ConstrainedDynamics commanded_;  // what the controller's rigid system does under the commanded torques
+  TreeFactor own_factor_;          // of the terms' M_bar'
+  const TreeFactor* factor_ = nullptr;
+  VectorXd difference_;  // n, E_bar' (tau' - tau'_printed)
+  double scale_ = 1.0;
+  LawErrors errors_;
+
+ private:
+  VectorXd balanced_, work_;  // n
+};
+
+/// The paper's (55), or one of those that it is compared with, by the scenario.
+std::unique_ptr<JudgedLaw> MakeObjectLaw(const Setup& setup);
+/// That of the joints, for a robot that holds nothing.
+std::unique_ptr<JudgedLaw> MakeJointLaw(const Setup& setup);
+
+}  // namespace dexcheck

@@ -1,0 +1,125 @@
+#include "harness/checks/make_checks.h"
+
+#include <algorithm>
+#include <initializer_list>
+#include <map>
+#include <set>
+
+namespace dexcheck {
+namespace {
+
+using Names = std::initializer_list<std::string_view>;
+
+/// Whether nothing but stiffness holds joints that do not carry the object: whatever is not ideal moves them,
+/// and so do the Coriolis forces and the friction that kPdGravity leaves to it. The least motion in the
+/// metric of M_bar' has them in it.
+bool HoldsIdleJoints(const Setup& setup) {
+  const ControlOptions& control = setup.scenario().control;
+  return !setup.hold().idle_joints.empty() && setup.scenario().imperfections.is_ideal() &&
+         control.law != ControlLaw::kPdGravity && control.law != ControlLaw::kOperationalSpace &&
+         control.weight != RedundancyWeight::Kind::kMass;
+}
+
+/// Checks that the run does not have.
+std::set<std::string_view> ListMissing(const Setup& setup, const JudgedLaw* law) {
+  const Scenario& scenario = setup.scenario();
+  std::set<std::string_view> missing;
+  const auto leave_out = [&](bool leave, Names names) {
+    if (leave) missing.insert(names);
+  };
+  const bool joints = setup.joints() != nullptr;
+  const bool rigid = scenario.plant.type == PlantType::kRigid;
+  leave_out(law == nullptr,
+            {"law_torque", "law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality"});
+  leave_out(law == nullptr || !law->CalcSpectralRadius(), {"closed_loop_spectral_radius"});
+  leave_out(law == nullptr || !law->has_demand(), {"law_demand"});
+  leave_out(law == nullptr || !law->follows_error(),
+            {"error_dynamics", "orientation_dynamics", "joint_dynamics"});
+  leave_out(!scenario.expect.position, {"expect_position"});
+  leave_out(!scenario.expect.orientation, {"expect_orientation"});
+  leave_out(!scenario.expect.joints, {"expect_joints"});
+  leave_out(joints, {"law_demand", "grasp_null_space", "grasp_cone", "grasp_optimality", "error_dynamics",
+                     "orientation_dynamics", "contact_force", "fingertip_slip", "fingertip_slip_rate",
+                     "cone_use", "contacts_lost", "penetration", "kappa"});
+  leave_out(!joints, {"joint_dynamics"});
+  leave_out(!setup.start().bonds.empty(),
+            {"fingertip_slip_rate", "cone_use", "contacts_lost", "penetration", "kappa"});
+  // Without a task every step is judged.
+  leave_out(scenario.pick_task() == nullptr, {"excluded"});
+  leave_out(setup.adapter().wheels().empty(), {"wheel_slip", "wheel_slip_rate", "rolling", "traction_use"});
+  leave_out(setup.model().base().type == BaseType::kFixed, {"base_tilt"});
+  leave_out(!scenario.grasp.hemisphere, {"fingertip_rim"});
+  leave_out(!setup.has_object(), {"inverse_dynamics_object"});
+  leave_out(!HoldsIdleJoints(setup), {"idle_joints"});
+  // A rigid plant's wheels roll, its base is upright and its equations are solved, whatever happens.
+  leave_out(rigid, {"wheel_slip", "rolling", "wheel_slip_rate", "traction_use", "base_tilt", "solver"});
+  leave_out(setup.robots().watched_pairs.empty(), {"clearance", "collision"});
+  leave_out(!scenario.plant.collide, {"collision"});
+  const mjModel& engine = setup.engine();
+  const auto* const limited = engine.actuator_ctrllimited;
+  leave_out(std::none_of(limited, limited + engine.nu, [](auto flag) { return flag != 0; }),
+            {"actuator_effort"});
+  return missing;
+}
+
+/// Descriptions that differ from those of check_table.cc.
+std::map<std::string_view, const char*> ListDescriptions(const Setup& setup) {
+  if (setup.joints() != nullptr) {
+    return {
+        {"closed_loop_spectral_radius",
+         "largest eigenvalue of the errors of the joints under the scenario's gains, sampled as the "
+         "controller does it"},
+        {"law_torque",
+         "torques sent against the law of the joints computed from the engine's terms, relative to the "
+         "forces balanced"},
+        {"inverse_dynamics_robot",
+         "what is left of the equations of motion with the engine's accelerations, against the forces "
+         "balanced"},
+        {"reduced_acceleration", "accelerations of the joints that the torques mean, against the engine's"},
+        {"solver", "what the engine's solver left over of its own equations of motion"}};
+  }
+  if (!setup.start().bonds.empty())
+    return {{"fingertip_slip", "distance of the joined points on fingertip and object"}};
+  return {};
+}
+
+/// What the scenario itself says of a bound.
+double FindBound(const CheckInfo& info, const Scenario& scenario) {
+  double bound = CalcBound(info, scenario);
+  if (info.name == "expect_position") bound = scenario.expect.position.value_or(0.0);
+  if (info.name == "expect_orientation") bound = scenario.expect.orientation.value_or(0.0);
+  if (info.name == "expect_joints") bound = scenario.expect.joints.value_or(0.0);
+  for (const BoundOverride& stated : scenario.bounds)
+    if (stated.first == info.name) bound = CalcStatedBound(info, stated, scenario);
+  return bound;
+}
+
+}  // namespace
+
+std::unique_ptr<JudgedLaw> MakeJudgedLaw(const Setup& setup, bool knows_law) {
+  if (!knows_law) return nullptr;
+  if (setup.joints() != nullptr) return MakeJointLaw(setup);
+  return setup.scenario().pick_task() != nullptr ? nullptr : MakeObjectLaw(setup);
+}
+
+std::vector<Judge> MakeChecks(const Setup& setup, const JudgedLaw* law) {
+  RequireKnownBounds(setup.scenario());
+  const std::set<std::string_view> missing = ListMissing(setup, law);
+  const std::map<std::string_view, const char*> descriptions = ListDescriptions(setup);
+  std::vector<Judge> checks;
+  for (const CheckInfo& info : ListChecks()) {
+    if (missing.contains(info.name)) continue;
+    Judge& judge = checks.emplace_back();
+    judge.info = &info;
+    if (info.make != nullptr) judge.state = info.make(setup);
+    judge.record.name = info.name;
+    judge.record.kind = info.category;
+    judge.record.unit = info.unit;
+    judge.record.bound = FindBound(info, setup.scenario());
+    const auto own = descriptions.find(info.name);
+    judge.record.description = own == descriptions.end() ? info.description : own->second;
+  }
+  return checks;
+}
+
+}  // namespace dexcheck

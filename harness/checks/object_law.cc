@@ -1,0 +1,178 @@
+// The paper's law (55), and those that it is compared with.
+
+#include <algorithm>
+#include <cmath>
+
+#include "controller/control/trajectory.h"
+#include "controller/object/euler_zyz.h"
+#include "harness/checks/baseline_reference.h"
+#include "harness/checks/check_table.h"
+#include "harness/checks/judged_law.h"
+#include "harness/checks/law_attribution.h"
+#include "harness/checks/object_error_dynamics.h"
+
+namespace dexcheck {
+namespace {
+
+// What F_N is judged by follows from the solver's options, which no scenario changes.
+static_assert(kGraspNullBound >= 10.0 * GraspForceOptions{}.residual_tolerance);
+static_assert(kGraspOptimalityBound == 10.0 * GraspForceOptions{}.slack_tolerance);
+// What slip changes in accelerations and forces, over the condition number, against the forces that it
+// changes.
+constexpr double kSlipFraction = 10.0;
+constexpr double kSmallest = std::numeric_limits<double>::min();
+
+/// Computes the scenario's law at each step from the other provider's terms, the scenario's gains and its
+/// trajectory. Of the controller it takes F_N, which the law may choose, X_o's angles on the law's branch
+/// (checks of the model compare their pose), and C_bar', J_B_dot' where they multiply what slips.
+class JudgedObjectLaw final : public JudgedLaw {
+ public:
+  explicit JudgedObjectLaw(const Setup& setup)
+      : JudgedLaw(setup),
+        options_(setup.MakeControllerOptions()),
+        spec_(MakeLawSpec(options_)),
+        trajectory_(setup.MakeTrajectory()),
+        reference_(setup.model().num_velocities(), 3 * static_cast<int>(setup.fingertips().size())),
+        error_(spec_, time_step_, velocity_age_) {
+    const int n = setup.model().num_velocities();
+    const int k = 3 * static_cast<int>(setup.fingertips().size());
+    if (options_.law != ControlLaw::kComputedTorque)
+      baseline_.emplace(options_.law, options_.stiffness, n, k);
+    work_n_.setZero(n);
+    work_k_.setZero(k);
+  }
+
+  /// Of (57): of the paper's law, and by algebra of that of operational space.
+  [[nodiscard]] std::optional<double> CalcSpectralRadius() const override {
+    if (baseline_ && options_.law != ControlLaw::kOperationalSpace) return std::nullopt;
+    return CalcSampledRadius(spec_.gains, time_step_, hold_, velocity_age_);
+  }
+  [[nodiscard]] bool has_demand() const override { return !baseline_; }
+  [[nodiscard]] bool IsComputed(const Command& command) const override {
+    return !command.handling.partial && command.force_solves > 0;
+  }
+
+  const LawErrors& Compare(const StepRecord& step, const LawTerms& terms, const StepAnalysis& plant,
+                           bool as_commanded) override {
+    errors_ = LawErrors{};
+    if (!Evaluate(step, terms)) {
+      constexpr double kInfinity = std::numeric_limits<double>::infinity();
+      errors_ = {kInfinity, kInfinity, kInfinity, kInfinity, kInfinity, kInfinity};
+      return errors_;
+    }
+    const Motion moved = as_commanded ? Motion{&plant.findings.xi_dot_model, &plant.findings.V_Bo_dot_model,
+                                               &plant.findings.f_c_model, plant.mass_factor}
+                                      : Predict(step);
+    errors_.torque = CalcTorqueError(step, terms, *moved.mass_factor);
+    if (!baseline_) errors_.demand = CompareDemand(moved, /*has_slip=*/as_commanded);
+    CompareGraspForce(terms, step.command.demand.F_N, baseline_ ? baseline_->f_c() : reference_.f_c());
+    if (CalcSpectralRadius() && hold_ == 1) {
+      error_.Follow(step, terms, desired_, plant.declared->is_ideal ? moved.V_Bo_dot : nullptr, &reference_,
+                    &errors_);
+    }
+    return errors_;
+  }
+
+  [[nodiscard]] std::string Tell() const override { return attribution_.Tell(); }
+
+ protected:
+  bool Evaluate(const StepRecord& step, const LawTerms& terms) override {
+    // Semi-implicit Euler steps like a leapfrog: velocities belong to the middle of the step before.
+    desired_ = trajectory_->Evaluate(step.time);
+    desired_.X_d_dot = trajectory_->Evaluate(step.time - velocity_age_).X_d_dot;
+    const VectorXd& F_N = step.command.demand.F_N;
+    return reference_.Evaluate(spec_, terms, desired_, F_N) &&
+           (!baseline_ ||
+            baseline_->Evaluate(spec_, reference_, terms, step.model->grasp().G_dot(), desired_, F_N));
+  }
+  [[nodiscard]] const VectorXd& force() const override {
+    return baseline_ ? baseline_->force() : reference_.force();
+  }
+  [[nodiscard]] double condition_number() const override { return reference_.condition_number(); }
+  /// Only the printed law is known summand by summand.
+  void Explain(const StepRecord& step, const LawTerms& terms) override {
+    if (baseline_) return;
+    attribution_.Add(difference_, reference_.CalcParts(terms, step.command.demand.F_N), 1.0 / scale_);
+  }
+
+ private:
+  /// What a rigid system does under some torques.
+  struct Motion {
+    const VectorXd* xi_dot;
+    const Vector6d* V_Bo_dot;
+    const VectorXd* f_c;
+    const TreeFactor* mass_factor;
+  };
+
+  /// What the controller's rigid system does under the commanded torques. Measured rates need not fit
+  /// together: what (47), (55) plan for is xi_c, nearest to xi without slip. With C_bar' xi_c and J_dot xi_c
+  /// in (48), (46) the rigid system does exactly what is demanded.
+  Motion Predict(const StepRecord& step) {
+    actuation_.CalcForce(step.command.tau, work_n_);
+    work_n_ -= reference_.slip_coriolis();
+    work_k_ = -reference_.slip_rates();
+    const Prediction& prediction =
+        commanded_.Predict(step.model->robot(), step.model->grasp(), work_n_, ObjectSupport::kHand, &work_k_);
+    return {&prediction.xi_dot, &prediction.V_Bo_dot, &prediction.f_c, &commanded_.mass_factor()};
+  }
+
+  /// @param has_slip whether the rigid system starts from xi, and not from xi_c, as (47) plans: where
+  /// contacts slip the two differ, which is taken off.
+  double CompareDemand(const Motion& moved, bool has_slip) {
+    // |a|_M = |L a|
+    work_n_ = *moved.xi_dot - reference_.xi_dot_d();
+    factor_->Multiply(work_n_);
+    const double motion = work_n_.norm() / scale_;
+    const VectorXd& f_c = reference_.f_c();
+    const double forces = (*moved.f_c - f_c).norm() / std::max(f_c.norm(), kSmallest);
+    const double error = std::max(motion, forces) / reference_.condition_number();
+    if (!has_slip) return error;
+    work_n_ = reference_.slip_acceleration();
+    factor_->Multiply(work_n_);
+    const double apart = error - kSlipFraction * work_n_.norm() / scale_;
+    const bool slip_explains = apart <= 0.0;
+    return slip_explains ? 0.0
+                         : std::max(apart - kSlipFraction * Norm(reference_.slip_coriolis()) / scale_, 0.0);
+  }
+
+  void CompareGraspForce(const LawTerms& terms, const VectorXd& F_N, const VectorXd& f_c) {
+    const double size = std::max(1.0, f_c.norm());
+    errors_.grasp_null_space = (terms.G * F_N).cwiseAbs().maxCoeff() / size;
+    // Slope of sum f_i3 - rho [sum log det P_i + sum log slack]: at the optimum it is in the range of G^T, so
+    // that no internal force improves on F_N.
+    double outside = 0.0;
+    const double rho = options_.force.barrier_weight;
+    const double mu = options_.mu, f_min = options_.f_min, f_max = options_.f_max;
+    for (Eigen::Index i = 0; i < f_c.size(); i += 3) {
+      const double x = f_c[i], y = f_c[i + 1], z = f_c[i + 2];
+      const double det = mu * mu * z * z - x * x - y * y;
+      outside = std::max({outside, std::hypot(x, y) - mu * z, f_min - z, z - f_max});
+      work_k_.segment<3>(i) << 2.0 * rho * x / det, 2.0 * rho * y / det,
+          1.0 - 2.0 * rho * mu * mu * z / det - rho / (z - f_min) + rho / (f_max - z);
+    }
+    errors_.grasp_cone = outside / size;
+    if (outside > 0.0) return;
+    const double whole = work_k_.norm();
+    const Vector6d y = reference_.SolveGrasp(work_k_);
+    work_k_.noalias() -= terms.G.transpose() * y;
+    errors_.grasp_optimality = work_k_.norm() / std::max(whole, 1.0);
+  }
+
+  GraspControllerOptions options_;
+  LawSpec spec_;
+  std::unique_ptr<Trajectory> trajectory_;
+  LawReference reference_;
+  std::optional<BaselineReference> baseline_;  // none for the paper's law
+  ObjectErrorDynamics error_;
+  DesiredMotion desired_;
+  LawAttribution attribution_;
+  VectorXd work_n_, work_k_;
+};
+
+}  // namespace
+
+std::unique_ptr<JudgedLaw> MakeObjectLaw(const Setup& setup) {
+  return std::make_unique<JudgedObjectLaw>(setup);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,191 @@
+#include "harness/checks/run_checks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "controller/common/text.h"
+#include "harness/checks/law_terms.h"
+
+namespace dexcheck {
+
+RunChecks::RunChecks(const Setup& setup, std::span<const Motor> motors, bool knows_law)
+    : setup_(&setup),
+      model_(setup.plant_adapter(), setup.fingertips(), setup.scenario().control.orientation),
+      declared_(setup, motors),
+      analyzer_(setup),
+      law_(MakeJudgedLaw(setup, knows_law)),
+      law_terms_(setup.model().num_positions(), setup.model().num_velocities(),
+                 3 * static_cast<int>(setup.fingertips().size())),
+      judges_(MakeChecks(setup, law_.get())),
+      motors_(setup.model(), setup.scenario().plant.time_step),
+      sensors_(setup.model(), setup.fingertips(), setup.scenario().plant.time_step),
+      forces_(setup.model()),
+      wheels_(setup.model().base()) {
+  if (!setup.start().bonds.empty()) model_.LeaveOutContacts();
+  model_.RaiseBounds(setup.scenario().tolerance);
+  for (const Judge& judge : judges_) records_.push_back(judge.record);
+  if (law_) analyzer_.SetSpectralRadius(law_->CalcSpectralRadius().value_or(0.0));
+  if (!declared_.is_ideal()) CheckMeasuredState();
+}
+
+void RunChecks::CheckMeasuredState() {
+  controller_.emplace(setup_->controller_adapter(), setup_->fingertips(),
+                      setup_->scenario().control.orientation);
+  // What is measured of robot, object and contacts need not fit together: contacts are compared at the true
+  // state.
+  controller_->LeaveOutContacts();
+  controller_->RaiseBounds(setup_->scenario().tolerance);
+}
+
+void RunChecks::Expect(const DisturbanceOptions& disturbance) {
+  declared_.Expect(disturbance, setup_->MakePartContext());
+  if (!controller_) CheckMeasuredState();
+  for (CheckRecord& record : records_)
+    if (record.name == "idle_joints") record.applies = false;
+}
+
+const GraspModel& RunChecks::Follow(const StepRecord& step) {
+  declared_step_ = &declared_.Follow(step);
+  return *declared_step_->model;
+}
+
+void RunChecks::Reset() {
+  std::copy_if(records_.begin(), records_.end(), std::back_inserter(settling_failures_),
+               [](const CheckRecord& record) { return record.failed; });
+  Forget();
+  analyzer_.RestartClearance();
+}
+
+void RunChecks::Forget() {
+  for (CheckRecord& record : records_) record.Reset();
+  for (const Judge& judge : judges_)
+    if (judge.state) judge.state->Reset();
+  analyzer_.Reset();
+}
+
+bool RunChecks::Has(std::string_view name) const {
+  return std::any_of(records_.begin(), records_.end(),
+                     [&](const CheckRecord& record) { return record.name == name; });
+}
+
+const CheckRecord& RunChecks::Find(std::string_view name) const {
+  for (const CheckRecord& record : records_)
+    if (record.name == name) return record;
+  throw std::invalid_argument("no check " + Quote(name));
+}
+
+bool RunChecks::Exceeds(std::string_view name) const {
+  return Has(name) && !(Find(name).last <= Find(name).bound);
+}
+
+void RunChecks::Evaluate(CheckInfo::Moment moment, double time) {
+  for (size_t i = 0; i < judges_.size(); ++i) {
+    if ((judges_[i].info->moments & moment) != 0) Add(judges_[i], &records_[i], time);
+  }
+}
+
+void RunChecks::Add(const Judge& judge, CheckRecord* record, double time) {
+  if (!record->applies) return;
+  const Evaluation found = judge.Evaluate(analysis());
+  if (!found) return;
+  double value = found->value;
+  // As it is up to the bound, and above it less what is known to be in it.
+  if (found->explained != 0.0 && !std::isnan(value))
+    value = std::max(std::min(value, record->bound), value - found->explained);
+  if (judge.info->describe != nullptr && !record->failed && !(value <= record->bound))
+    record->part = judge.info->describe(analysis(), found->part);
+  record->Add(value, time);
+}
+
+void RunChecks::JudgeEffort(const StepRecord& step, double time) {
+  analyzer_.SetStep(step);
+  Evaluate(CheckInfo::kBefore, time);
+}
+
+void RunChecks::JudgeModel(const StepRecord& step) {
+  const MeasuredState& state = step.reading.state;
+  if (step.command.handling.partial) {
+    model_.IncludeContacts(std::all_of(state.overlap.begin(), state.overlap.end(),
+                                       [](double depth) { return depth > -PlantReading::kFar; }));
+  }
+  const GraspModel& plant = *declared_step_->model;
+  model_.Compare(plant.robot(), plant.grasp(), state, step.reading.X_W0, step.time);
+  if (!controller_) return;
+  controller_->Compare(step.model->robot(), step.model->grasp(), step.measured.state, step.reading.X_W0,
+                       step.time);
+  model_.Merge(*controller_);
+}
+
+void RunChecks::JudgeSettling(const StepRecord& step) {
+  Analyze(step);
+  Evaluate(CheckInfo::kSettling, step.time);
+  KeepEvidence(step);
+}
+
+void RunChecks::JudgeStep(const StepRecord& step) {
+  Analyze(step);
+  if (law_ && law_->IsComputed(step.command)) CompareLaw(step);
+  Evaluate(CheckInfo::kRunning, step.time);
+  KeepEvidence(step);
+  sensors_.Add(step.measured.state, declared_step_->measured.state);
+}
+
+void RunChecks::JudgeUnsent(const StepRecord& step) {
+  if (!law_ || !law_->IsComputed(step.command)) return;
+  JudgeModel(step);
+  analyzer_.Begin(step, *declared_step_);
+  sensors_.Add(step.measured.state, declared_step_->measured.state);
+  unsent_.torque = law_->CompareTorque(step, ReadLawTerms(step));
+  analyzer_.SetLaw(&unsent_);
+  Evaluate(CheckInfo::kUnsent, step.time);
+}
+
+void RunChecks::Analyze(const StepRecord& step) {
+  analyzer_.Begin(step, *declared_step_);
+  analyzer_.Analyze();
+}
+
+const LawTerms& RunChecks::ReadLawTerms(const StepRecord& step) {
+  const StepModelCheck& controller = controller_ ? *controller_ : model_;
+  const bool contacts = setup_->start().bonds.empty() && !controller_;
+  ReadEngineTerms(controller.engine(), *step.model, step.measured.state, contacts, &law_terms_);
+  return law_terms_;
+}
+
+void RunChecks::CompareLaw(const StepRecord& step) {
+  const bool as_commanded =
+      declared_.is_ideal() && step.drive.tau == step.command.tau && step.response.stop_force.size() == 0;
+  const LawErrors& errors = law_->Compare(step, ReadLawTerms(step), analysis(), as_commanded);
+  analyzer_.SetLaw(&errors);
+  if (!law_->follows_error() || step.time < setup_->scenario().expect.from) return;
+  position_by_law_ = std::max(position_by_law_, errors.position_by_law);
+  orientation_by_law_ = std::max(orientation_by_law_, errors.orientation_by_law);
+}
+
+void RunChecks::KeepEvidence(const StepRecord& step) {
+  const StepAnalysis& now = analysis();
+  motors_.Add(declared_step_->tau, step.response.motor_torques, step.reading.state.xi);
+  if (step.response.wheels.size() == 2 && Exceeds("rolling"))
+    wheels_.Add(step.reading.state.xi, now.wheel_rates);
+  if (now.mass_factor != nullptr && (Exceeds("inverse_dynamics_robot") || Exceeds("inverse_dynamics_object")))
+    forces_.Add(now.robot_residual, now.object_residual, *declared_step_->model, step.reading.state.q,
+                *now.mass_factor, now.balanced);
+}
+
+MeasuredCauses RunChecks::Tell() const {
+  MeasuredCauses measured;
+  if (law_) measured.law = law_->Tell();
+  measured.motors = motors_.Tell();
+  measured.sensors = sensors_.Tell();
+  measured.wheels = wheels_.Tell();
+  measured.position_by_law = position_by_law_;
+  measured.orientation_by_law = orientation_by_law_;
+  measured.is_ideal = declared_.is_ideal();
+  if (!forces_.has_any()) return measured;
+  measured.force = forces_.Tell();
+  measured.is_slope = ForceEvidence::IsSlope(forces_.Find(), setup_->model().gravity());
+  return measured;
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,105 @@
+#pragma once
+
+// All checks of a run, at every step.
+
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "harness/checks/attribution.h"
+#include "harness/checks/declared_plant.h"
+#include "harness/checks/force_evidence.h"
+#include "harness/checks/judged_law.h"
+#include "harness/checks/make_checks.h"
+#include "harness/checks/signal_evidence.h"
+#include "harness/checks/step_analysis.h"
+#include "harness/checks/step_model_check.h"
+#include "harness/checks/wheel_evidence.h"
+
+namespace dexcheck {
+
+/// The checks of one run, with what went worst. Each step is followed first, and judged then. Nothing
+/// allocates in a step, except as StepAnalyzer and where a check of the model fails for the first time.
+class RunChecks {
+ public:
+  /// @param motors of the plant. @param knows_law whether the controller's law is the scenario's; otherwise
+  /// no check of the law is made.
+  /// @throws InputError as EngineTerms and MakeChecks.
+  RunChecks(const Setup& setup, std::span<const Motor> motors, bool knows_law = true);
+
+  /// What the scenario declares of the step, whose command is set: once at each step, before it is judged,
+  /// also of those that are not.
+  /// @returns the model at the true state.
+  const GraspModel& Follow(const StepRecord& step);
+  /// One more disturbance is declared from now on; between steps. Joints that only stiffness holds are not
+  /// judged any more.
+  void Expect(const DisturbanceOptions& disturbance);
+  /// Robot and object are elsewhere from now on, by `way` (m, world).
+  void Translate(const Vector3d& way) { declared_.Translate(way); }
+  /// They move at `v` (m/s, world) more from now on.
+  void AddVelocity(const Vector3d& v) { declared_.AddVelocity(v); }
+
+  /// Before a step that the motors may refuse. @param time of the step, s.
+  void JudgeEffort(const StepRecord& step, double time);
+  /// While everything settles.
+  void JudgeSettling(const StepRecord& step);
+  /// Are the terms that the controller used the engine's?
+  void JudgeModel(const StepRecord& step);
+  /// All else, after JudgeModel.
+  void JudgeStep(const StepRecord& step);
+  /// Model and torques alone, of torques that were not sent because they are above a motor's limit.
+  void JudgeUnsent(const StepRecord& step);
+  /// Forgets motion and forces of all steps so far, but for the checks that failed: time begins anew.
+  void Reset();
+  /// The same for the checks that failed, too.
+  void Forget();
+
+  [[nodiscard]] std::span<const CheckRecord> model_checks() const { return model_.records(); }
+  [[nodiscard]] std::span<const CheckRecord> motion_checks() const { return records_; }
+  /// Whether the run has a check of the motion of that name.
+  [[nodiscard]] bool Has(std::string_view name) const;
+  /// That check. @throws std::invalid_argument when the run has none.
+  [[nodiscard]] const CheckRecord& Find(std::string_view name) const;
+  /// Checks of the motion that failed before the last Reset, while everything settled, in that order.
+  [[nodiscard]] std::span<const CheckRecord> settling_failures() const { return settling_failures_; }
+  /// What was measured of each cause, in words.
+  [[nodiscard]] MeasuredCauses Tell() const;
+  /// Of the last step.
+  [[nodiscard]] const StepAnalysis& analysis() const { return analyzer_.analysis(); }
+
+ private:
+  void CheckMeasuredState();
+  void Analyze(const StepRecord& step);
+  /// Evaluates the checks of that moment.
+  void Evaluate(CheckInfo::Moment moment, double time);
+  void Add(const Judge& judge, CheckRecord* record, double time);
+  /// Whether a check fails at this step.
+  [[nodiscard]] bool Exceeds(std::string_view name) const;
+  /// The law's terms, of the engine at the measured state.
+  const LawTerms& ReadLawTerms(const StepRecord& step);
+  void CompareLaw(const StepRecord& step);
+  void KeepEvidence(const StepRecord& step);
+
+  const Setup* setup_;
+  StepModelCheck model_;
+  /// Of the controller's terms at the measured state, by an engine without the scenario's mismatch, where
+  /// that is not the true one.
+  std::optional<StepModelCheck> controller_;
+  DeclaredPlant declared_;
+  const DeclaredStep* declared_step_ = nullptr;  // of the step
+  StepAnalyzer analyzer_;
+  std::unique_ptr<JudgedLaw> law_;  // null where none is known
+  LawTerms law_terms_;
+  LawErrors unsent_;
+  std::vector<Judge> judges_;
+  std::vector<CheckRecord> records_;  // of judges_
+  std::vector<CheckRecord> settling_failures_;
+  double position_by_law_ = -1.0, orientation_by_law_ = -1.0;  // largest; see MeasuredCauses
+  MotorEvidence motors_;
+  SensorEvidence sensors_;
+  ForceEvidence forces_;
+  WheelEvidence wheels_;
+};
+
+}  // namespace dexcheck

@@ -1,0 +1,199 @@
+#pragma once
+
+// What several checks share at a step: each quantity is computed once, and has one name.
+//
+// Errors of forces and accelerations of the robot are measured in the metric of its own inertia, in which
+// metres and radians, arms and phalanges weigh what they weigh: |a|_M = sqrt(a^T M_bar' a), |f|_M^-1 =
+// sqrt(f^T M_bar'^-1 f), relative to |C_bar' xi + F_bar'|_M^-1, the force that the motors have to balance.
+
+#include <limits>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "controller/control/actuation.h"
+#include "controller/control/constrained_dynamics.h"
+#include "controller/handling/partial_grasp.h"
+#include "harness/checks/contact_compliance.h"
+#include "harness/checks/declared_plant.h"
+#include "harness/checks/step_record.h"
+#include "harness/checks/wheel_evidence.h"
+#include "harness/engine/clearance.h"
+#include "harness/scenario/setup.h"
+
+namespace dexcheck {
+
+/// How long inverse and forward dynamics are not judged after a contact has come, gone or been let go: soft
+/// contacts need some milliseconds to become what rigid ones are at once. s.
+inline constexpr double kTransient = 0.05;
+/// Distances are judged from a place between half of this and this ago, s.
+inline constexpr double kSlipWindow = 10.0;
+
+/// The largest over the contacts of one kind.
+struct SlipSummary {
+  double distance = 0.0;  ///< Within the window, less creep, m; of bonds the distance of the joined points.
+  double rate = 0.0;      ///< Less creep, m/s.
+  double cone_use = 0.0;
+};
+
+/// What one step says of the law. Each is relative to what rounding, or the named tolerance, can explain;
+/// what a law does not have is zero.
+struct LawErrors {
+  /// |E_bar' (tau' - tau'_printed)| against the forces that the motors balance, both in the metric of the
+  /// robot's inertia, over the condition number of J_B'.
+  double torque = 0.0;
+  /// xi_dot, V_o_dot and f_c of the rigid system (46), (48) under tau' against what (47), (49), (55) demand,
+  /// likewise; forces relative to |f_c|. The largest of them.
+  double demand = 0.0;
+  /// F_N by its certificate: the largest entry of G F_N, and how far f_c is outside its cones and bounds,
+  /// both over max(1 N, |f_c|); the slope that the objective has left within null(G), over max(1, all of it).
+  double grasp_null_space = 0.0, grasp_cone = 0.0, grasp_optimality = 0.0;
+  /// Object's position, m, or largest distance of a joint, rad or m, against the error dynamics integrated
+  /// from t = 0 and driven by the accelerations that the prediction missed.
+  double error_dynamics = 0.0;
+  double orientation_dynamics = 0.0;  ///< The object's orientation likewise, rad.
+  /// How far from its desired pose the object would be if (57) alone drove it, m and rad: what the gains
+  /// leave.
+  double position_by_law = 0.0, orientation_by_law = 0.0;
+  /// How far what the plant accelerates within a step, while torques and demand are held, leads away from
+  /// (57), m and rad.
+  double position_by_hold = 0.0, orientation_by_hold = 0.0;
+};
+
+/// One step; n entries of xi, 3N of f_c.
+struct StepAnalysis {
+  const Setup* setup = nullptr;
+  const StepRecord* step = nullptr;
+  const DeclaredStep* declared = nullptr;
+  const ModelTerms* robot = nullptr;  ///< At the true state.
+  const GraspTerms* grasp = nullptr;  ///< Likewise.
+
+  // Contacts.
+  ContactSet touching = 0;      ///< Fingertips that touch the object.
+  bool is_supported = false;    ///< Whether anything else does.
+  bool is_transient = false;    ///< Whether contacts of a task have just changed.
+  double transient_time = 0.0;  ///< How long it has been so in one go, s.
+  bool begins_holding = false;  ///< Whether all fingertips should touch the object from this step on.
+  bool is_window_end = false;  ///< Whether the window that distances are judged over moves on after the step.
+  int contacts_missing = 0;    ///< Fingertips that do not touch.
+  double penetration = 0.0;    ///< Deepest overlap of a fingertip and the object, m.
+  VectorXd contact_bias;       ///< CalcContactBias (3N).
+  SlipSummary fingertips, wheels;
+
+  // Wheels.
+  Vector2d wheel_rates = Vector2d::Zero();     ///< Of the right and left wheel, rad/s.
+  Vector2d wheel_mismatch = Vector2d::Zero();  ///< WheelEvidence::CalcMismatch, m/s.
+
+  // Dynamics: (48) and (19) with the plant's accelerations and contact forces.
+  VectorXd applied_force;  ///< E_bar' tau' + pushes that are declared + dry friction and joint limits (n).
+  VectorXd bias;           ///< C_bar' xi + F_bar' (n).
+  /// M_bar' = L^T L, of the last prediction; null before the first, and then nothing of the following is set.
+  const TreeFactor* mass_factor = nullptr;
+  double balanced = 1.0;           ///< |bias|_M^-1.
+  VectorXd robot_residual;         ///< M_bar' xi_dot + bias + J_B'^T f_c - applied_force (n) of (48).
+  double robot_residual_norm = 0;  ///< Of that, |.|_M^-1.
+  double uneven_force = 0.0;       ///< Largest that tilt, slip and sinking of the platform can make of it.
+  double robot_solver = 0.0;  ///< What the plant's solver left over for the robot, relative to `balanced`.
+  Vector6d object_residual = Vector6d::Zero();  ///< M_hat V_o_dot + C_hat V_o + N_o - G f_c - ... of (19).
+  double object_residual_size = 0.0;            ///< Relative, as forces at the contacts' arm.
+  double object_solver = 0.0;                   ///< What the plant's solver left over, likewise.
+
+  // Prediction: what the rigid constrained system does under the same torques. Not in a transient.
+  double acceleration_error = 0.0;       ///< |xi_dot_model - xi_dot|_M relative to `balanced`.
+  double contact_force_error = 0.0;      ///< |f_c_model - f_c|, relative.
+  double acceleration_compliance = 0.0;  ///< What contacts that give can make of each.
+  double contact_force_compliance = 0.0;
+  double sinking = 0.0;  ///< How fast the platform sinks and tilts, m/s.
+
+  // Law, motors and sensors.
+  double measurement_error =
+      0.0;                    ///< What was measured against what the declared sensing makes of the truth.
+  double torque_error = 0.0;  ///< Largest torque received against the declared one, over the largest.
+  const LawErrors* law = nullptr;  ///< Of torques that a known law computed at this step; null otherwise.
+  double spectral_radius = 0.0;    ///< Of the law's sampled closed loop, where it has error dynamics.
+  /// LawErrors, of the last step whose law was judged.
+  double position_by_hold = 0.0, orientation_by_hold = 0.0;
+
+  // Bodies that are not meant to touch.
+  const Clearance* clearance = nullptr;
+  std::pair<double, int> deepest_overlap;  ///< Clearance::FindDeepest.
+
+  StepFindings findings;  ///< For the step's record.
+};
+
+/// Forms the analysis of each step. Nothing allocates after construction, except where a task's set of
+/// contacts comes up for the first time.
+///
+/// For a task, each step is predicted with the contacts that it has: (46) for the fingertips that touch, and
+/// an object that does not move while it lies on something. For kTransient after a contact has come, gone or
+/// been let go there is no prediction.
+class StepAnalyzer {
+ public:
+  explicit StepAnalyzer(const Setup& setup);
+
+  /// The next step, whose torques are set: measurements, and the clearance of bodies.
+  void Begin(const StepRecord& step, const DeclaredStep& declared);
+  /// The same step, whose response was read: motion and forces.
+  void Analyze();
+  /// The next step's torques, which may be refused.
+  void SetStep(const StepRecord& step) { now_.step = &step; }
+  void SetSpectralRadius(double radius) { now_.spectral_radius = radius; }
+  /// Keeps what was found of the same step's law.
+  void SetLaw(const LawErrors* errors);
+  /// Forgets all steps so far, but for clearances: time begins anew.
+  void Reset();
+  void RestartClearance() { clearance_.Restart(); }
+  /// Of the last step.
+  [[nodiscard]] const StepAnalysis& analysis() const { return now_; }
+
+ private:
+  /// Contacts of a task, and how the rigid system behaves with them.
+  struct PartialDynamics {
+    PartialDynamics(const Setup& setup, ContactSet set);
+    PartialGrasp grasp;
+    ConstrainedDynamics dynamics;
+  };
+  void CompareMeasurement();
+  void MeasureClearance();
+  void CompareMotors();
+  void FindContacts();
+  void FindTransient();
+  void CalcAppliedForce();
+  void Predict();
+  void PredictPart();
+  void CalcRobotResidual();
+  /// Of a platform that tilts, and on tyres that slip and sink, in |.|_M^-1.
+  [[nodiscard]] double CalcUnevenForce();
+  [[nodiscard]] double CalcSwingForce();
+  void ComparePrediction();
+  void CalcObjectResidual();
+  void FollowSlip();
+  void ForgetSlip();
+  void MoveWindow();
+  /// |f|_M^-1 = |L^-T f|
+  [[nodiscard]] double Norm(const VectorXd& force) {
+    return now_.mass_factor->CalcForceNorm(force, &norm_work_);
+  }
+  [[nodiscard]] double CalcWeight() const;  // of the object, N
+
+  const Setup* setup_;
+  double time_step_;
+  double mass_;  // of the robot, kg
+  StepAnalysis now_;
+  Clearance clearance_;
+  MjDataPtr kinematics_;  // of a plant that has no bodies of the engine's
+  ActuationMap actuation_;
+  WheelEvidence wheel_geometry_;
+  ConstrainedDynamics dynamics_;
+  std::map<ContactSet, std::unique_ptr<PartialDynamics>> parts_;
+  PredictionCompliance compliance_;
+  Handling handling_;                                             // of the step before
+  bool was_holding_ = false;                                      // likewise
+  double changed_at_ = -std::numeric_limits<double>::infinity();  // the contacts, s
+  double transient_since_ = 0.0;                                  // s
+  long steps_ = 0;
+  VectorXd spin_force_, held_force_, moving_, momentum_, acceleration_error_;  // n
+  VectorXd norm_work_;
+};
+
+}  // namespace dexcheck

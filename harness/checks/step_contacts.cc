@@ -1,0 +1,86 @@
+// The part of a step's analysis that follows contacts of fingertips and wheels.
+
+#include <algorithm>
+#include <cmath>
+
+#include "harness/checks/step_analysis.h"
+
+namespace dexcheck {
+namespace {
+
+/// One more step of a contact. @param R of the body that is slipped on, in the world. @param creep_rate dt
+/// J_dot qvel, m/s.
+void Follow(const BodyContact& contact, const Matrix3d& R, const Vector3d& creep_rate, double time_step,
+            SlipState* slip, SlipSummary* largest) {
+  slip->touching = contact.touching;
+  slip->cone_use = contact.cone_use;
+  slip->cone_margin = contact.cone_margin;
+  slip->velocity = R.transpose() * contact.slip;
+  slip->distance += time_step * slip->velocity;
+  slip->creep += time_step * creep_rate;
+  largest->distance = std::max(largest->distance, (slip->distance - slip->creep - slip->window).norm());
+  largest->rate = std::max(largest->rate, (slip->velocity - creep_rate).norm());
+  largest->cone_use = std::max(largest->cone_use, contact.cone_use);
+}
+
+}  // namespace
+
+void StepAnalyzer::FindContacts() {
+  const StepRecord& step = *now_.step;
+  StepFindings& findings = now_.findings;
+  const std::vector<PlantContact>& contacts = step.response.contacts;
+  now_.contacts_missing = 0;
+  now_.penetration = 0.0;
+  for (size_t i = 0; i < contacts.size(); ++i) {
+    const Matrix3d R_B_cf =
+        step.reading.state.X_Bo.linear() * now_.grasp->contacts()[i].geometry.g_o_cf.linear();
+    findings.f_c.segment<3>(3 * static_cast<Eigen::Index>(i)) = R_B_cf.transpose() * contacts[i].force;
+    if (!contacts[i].touching) ++now_.contacts_missing;
+    if (step.command.handling.holding && !contacts[i].touching && findings.fingertip_slip[i].touching)
+      ++findings.contacts_lost;
+    now_.penetration = std::max(now_.penetration, -contacts[i].distance);
+  }
+}
+
+void StepAnalyzer::ForgetSlip() {
+  std::fill(now_.findings.fingertip_slip.begin(), now_.findings.fingertip_slip.end(), SlipState{});
+}
+
+void StepAnalyzer::MoveWindow() {
+  const long half = std::max(1L, std::lround(0.5 * kSlipWindow / time_step_));
+  now_.is_window_end = steps_ > 0 && steps_ % half == 0;
+  if (!now_.is_window_end) return;
+  for (std::vector<SlipState>* slips : {&now_.findings.fingertip_slip, &now_.findings.wheel_slip}) {
+    for (SlipState& slip : *slips) {
+      slip.window = slip.next_window;
+      slip.next_window = slip.distance - slip.creep;
+    }
+  }
+}
+
+void StepAnalyzer::FollowSlip() {
+  const StepRecord& step = *now_.step;
+  const MeasuredState& state = step.reading.state;
+  StepFindings& findings = now_.findings;
+  now_.fingertips = now_.wheels = SlipSummary{};
+  for (size_t i = 0; i < step.response.fingertips.size(); ++i) {
+    SlipState& slip = findings.fingertip_slip[i];
+    const Matrix3d& R_o_cf = now_.grasp->contacts()[i].geometry.g_o_cf.linear();
+    const Vector3d creep_rate =
+        time_step_ * R_o_cf.leftCols<2>() * now_.contact_bias.segment<2>(3 * static_cast<Eigen::Index>(i));
+    Follow(step.response.fingertips[i], state.X_Bo.linear(), creep_rate, time_step_, &slip, &now_.fingertips);
+    if (slip.touching && step.command.handling.holding)
+      findings.least_cone_margin = std::min(findings.least_cone_margin, slip.cone_margin);
+  }
+  if (!setup_->start().bonds.empty()) {
+    for (const PlantContact& bond : step.response.contacts)
+      now_.fingertips.distance = std::max(now_.fingertips.distance, bond.distance);
+  }
+  const double phi = setup_->model().num_base_positions() == 3 ? state.q[2] : 0.0;
+  const Matrix3d R_B0 = Eigen::AngleAxisd(phi, Vector3d::UnitZ()).toRotationMatrix();
+  for (size_t i = 0; i < step.response.wheels.size(); ++i)
+    Follow(step.response.wheels[i], R_B0, Vector3d::Zero(), time_step_, &findings.wheel_slip[i],
+           &now_.wheels);
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,48 @@
+#include "harness/run/side_thread.h"
+
+#include <utility>
+
+namespace dexcheck {
+
+SideThread::SideThread(std::function<void()> work) : work_(std::move(work)), thread_([this] { Run(); }) {}
+
+SideThread::~SideThread() {
+  AwaitChange(kWorking);
+  Set(kQuit);
+  thread_.join();
+}
+
+void SideThread::Start() { Set(kWorking); }
+
+void SideThread::Wait() {
+  AwaitChange(kWorking);
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+}
+
+void SideThread::AwaitChange(State from) const {
+  // Sleeping and waking takes longer than most of a step's work.
+  constexpr int kSpins = 20000;
+  for (int i = 0; i < kSpins; ++i)
+    if (state_.load(std::memory_order_acquire) != from) return;
+  state_.wait(from, std::memory_order_acquire);
+}
+
+void SideThread::Set(State state) {
+  state_.store(state, std::memory_order_release);
+  state_.notify_one();
+}
+
+void SideThread::Run() {
+  while (true) {
+    AwaitChange(kIdle);
+    if (state_.load(std::memory_order_acquire) == kQuit) return;
+    try {
+      work_();
+    } catch (...) {
+      failure_ = std::current_exception();
+    }
+    Set(kIdle);
+  }
+}
+
+}  // namespace dexcheck
