@@ -40,11 +40,11 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
   const Scenario& scenario = setup.scenario();
   RequireKnownBounds(scenario);
   if (check) checks_.emplace(setup, plant_->motors(), parts.knows_law);
-  if (check && parts.threads > 1) checker_.emplace([this] { JudgeStep(); });
   record_.model = record_.true_model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);
   trajectory_ = setup.MakeTrajectory();
+  if (check && parts.threads > 1) checker_.emplace(record_, [this](StepRecord* step) { Judge(step); });
   if (!trajectory_) return;
   if (scenario.start == Start::kMoving) CheckMovingStart();
 }
@@ -98,7 +98,9 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
     if (should_stop()) return false;
     const double t = static_cast<double>(i) * dt;
     record_.time = t - duration;
-    ControlStep(t);
+    MakeStep(t);
+    if (checks_) checks_->JudgeEffort(record_, t);
+    if (checks_) record_.true_model = &checks_->Follow(record_);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
     if (checks_ && i == grip) checks_->Forget();
     if (checks_ && t >= kRoughTime) checks_->JudgeSettling(record_);
@@ -132,7 +134,8 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
 
 void ClosedLoop::ControlStep(double t) {
   const auto begin = Clock::now();
-  BeginStep();
+  plant_->BeginStep();
+  if (checker_) checker_->AwaitCopy();
   const auto read = Clock::now();
   plant_->Read(&record_.reading);
   CheckRobot();
@@ -147,8 +150,6 @@ void ClosedLoop::ControlStep(double t) {
   plant_->EndStep(record_.drive.tau);
   const auto end = Clock::now();
   plant_->Read(&record_.response);
-  if (checks_) record_.true_model = &checks_->Follow(record_);
-  if (checks_) times_.cross_check += Seconds(end, Clock::now());
   times_.plant += Seconds(begin, read) + Seconds(control, end);
   times_.controller += Seconds(read, control);
   times_.grasp_force += record_.command.force_seconds;
@@ -159,6 +160,7 @@ void ClosedLoop::DriveMotors(double t) {
   try {
     drive_.Apply(record_.command.tau, record_.reading.state.xi, &record_.drive);
   } catch (const RunFailure&) {
+    Finish();
     if (checks_) checks_->JudgeEffort(record_, t);
     if (checks_) record_.true_model = &checks_->Follow(record_);
     // Torques that are too large may be those of no law. While everything settles they follow another
@@ -166,55 +168,78 @@ void ClosedLoop::DriveMotors(double t) {
     if (checks_ && is_running_) checks_->JudgeUnsent(record_);
     throw;
   }
-  if (checks_) checks_->JudgeEffort(record_, t);
+  is_driven_ = true;
 }
 
-void ClosedLoop::BeginStep() {
-  if (!std::exchange(has_begun_, false)) return plant_->BeginStep();
-  if (begin_failure_) std::rethrow_exception(std::exchange(begin_failure_, nullptr));
+void ClosedLoop::MakeStep(double t) {
+  is_driven_ = false;
+  try {
+    ControlStep(t);
+  } catch (...) {
+    Finish();
+    if (checks_ && is_driven_) checks_->JudgeEffort(record_, t);
+    if (record_.step > 0 && !has_failed_) Observe(record_);
+    throw;
+  }
 }
 
-void ClosedLoop::JudgeStep() {
+void ClosedLoop::Judge(StepRecord* step) {
   const auto begin = Clock::now();
-  checks_->JudgeModel(record_);
-  checks_->JudgeStep(record_);
+  checks_->JudgeEffort(*step, step->time);
+  step->true_model = &checks_->Follow(*step);
+  checks_->JudgeModel(*step);
+  checks_->JudgeStep(*step);
+  step->findings = checks_->analysis().findings;
   times_.cross_check += Seconds(begin, Clock::now());
 }
 
 void ClosedLoop::Check() {
-  if (!checker_) {
-    JudgeStep();
-  } else {
-    checker_->Start();
-    if (record_.step < num_steps_) {
-      const auto begin = Clock::now();
-      try {
-        plant_->BeginStep();
-      } catch (...) {
-        begin_failure_ = std::current_exception();
-      }
-      has_begun_ = true;
-      times_.plant += Seconds(begin, Clock::now());
-    }
-    checker_->Wait();
+  try {
+    if (checks_) Judge(&record_);
+  } catch (...) {
+    Observe(record_);
+    throw;
   }
-  record_.findings = checks_->analysis().findings;
+  Observe(record_);
+}
+
+void ClosedLoop::Observe(const StepRecord& step) const {
+  if (observe_) observe_(step);
+}
+
+void ClosedLoop::Finish() {
+  if (!checker_ || !checker_->is_pending()) return;
+  try {
+    checker_->Await();
+  } catch (...) {
+    record_ = checker_->step();  // nothing came after it
+    has_failed_ = true;
+    Observe(record_);
+    throw;
+  }
+  Observe(checker_->step());
 }
 
 void ClosedLoop::Step() {
   record_.time = time();
-  ControlStep(record_.time);
+  MakeStep(record_.time);
   record_.error = CalcTrackingError(record_);
   if (follower_ != nullptr) record_.followed_kappa = follower_->followed_kappa();
   CalcContactDrifts(record_, &record_.drift);
   for (const ContactDrift& drift : record_.drift) largest_drift_.Raise(drift);
   ++record_.step;
-  if (checks_) Check();
+  Finish();
+  if (checker_) {
+    checker_->Start(record_);
+  } else {
+    Check();
+  }
   CheckGrasp();
   if (task_ != nullptr) CheckTask();
 }
 
 void ClosedLoop::Disturb(const DisturbanceOptions& disturbance) {
+  Finish();
   disturbances_.Add(disturbance, setup_->MakePartContext());
   if (checks_) checks_->Expect(disturbance);
 }

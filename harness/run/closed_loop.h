@@ -2,10 +2,10 @@
 
 // The loop of plant and controller, cross-checked at every step.
 
-#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "controller/control/controller.h"
 #include "controller/control/trajectory.h"
@@ -16,7 +16,7 @@
 #include "harness/plant/plant.h"
 #include "harness/plant/sensing.h"
 #include "harness/run/loop_parts.h"
-#include "harness/run/side_thread.h"
+#include "harness/run/step_checker.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
@@ -41,9 +41,9 @@ struct LoopTimes {
 ///   plant --PlantReading--> sensing --Reading--> controller --Command--> motors --tau'--> plant <-- pushes
 ///     `----PlantResponse----> checks: all of it is one StepRecord
 ///
-/// Deterministic: with two threads the checks of a step are made while the plant computes positions,
-/// velocities and contacts of the next, which is all that happens early, and every number is the same.
-/// Nothing allocates in a step, except as the controller and RunChecks say.
+/// Deterministic: with two threads the checks of a step are made beside the whole next step, on a copy of its
+/// record, and every number is the same. Nothing allocates in a step, except as the controller and RunChecks
+/// say.
 class ClosedLoop {
  public:
   /// @param check whether to cross-check.
@@ -58,16 +58,21 @@ class ClosedLoop {
   /// @return whether all came to rest; false when it was stopped before. @throws as Step.
   bool Settle(const std::function<bool()>& should_stop = [] { return false; });
 
+  /// Each step goes there once its checks are made, in order, also one that fails after the first: with two
+  /// threads a step later than it was made.
+  void SetObserver(std::function<void(const StepRecord&)> observe) { observe_ = std::move(observe); }
   /// One step. @throws RunFailure, DivergenceError, GraspForceError, SingularityError. What the step saw up
   /// to then can be read.
   void Step();
+  /// Waits for the checks of the last step. @throws as Step.
+  void Finish();
 
   /// A disturbance of which the scenario does not tell, and the checks do; between steps, beginning at time()
   /// or later.
   /// @throws InputError when its body is neither a link nor the object.
   void Disturb(const DisturbanceOptions& disturbance);
 
-  /// The last step. It stays in its place.
+  /// The last step. It stays in its place. Its findings come with its checks.
   [[nodiscard]] const StepRecord& record() const { return record_; }
   /// Number of steps of the scenario's duration, the most that a task may take.
   [[nodiscard]] long num_steps() const { return num_steps_; }
@@ -90,11 +95,13 @@ class ClosedLoop {
   bool StartMoving(const Vector3d& v, const std::function<bool()>& should_stop);
   bool SettleOn(const Trajectory& motion, double duration, const std::function<bool()>& should_stop);
   void BeginRun();
-  /// The plant's, unless it has begun already.
-  void BeginStep();
-  void JudgeStep();
-  /// The checks of the step, and beside them the beginning of the next.
+  /// ControlStep as far as it comes.
+  void MakeStep(double t);
+  /// The checks of the step, in this thread.
   void Check();
+  /// All checks of a step of the run.
+  void Judge(StepRecord* step);
+  void Observe(const StepRecord& step) const;
   void ControlStep(double t);
   void DriveMotors(double t);
   void CheckRobot() const;
@@ -113,14 +120,15 @@ class ClosedLoop {
   std::optional<RunChecks> checks_;
   std::unique_ptr<Trajectory> trajectory_;  // null for a task or a motion of joints
   StepRecord record_;
-  std::optional<SideThread> checker_;  // none with one thread
-  bool has_begun_ = false;             // the next step
-  std::exception_ptr begin_failure_;   // of that
+  std::function<void(const StepRecord&)> observe_;
   long num_steps_ = 0;
   bool is_running_ = false;  // all has settled
   long steps_without_grasp_ = 0;
+  bool is_driven_ = false;   // whether the step's torques were sent
+  bool has_failed_ = false;  // the checker
   LoopTimes times_;
   ContactDrift largest_drift_;
+  std::optional<StepChecker> checker_;  // none with one thread
 };
 
 }  // namespace dexcheck

@@ -25,8 +25,8 @@ class Runner {
   void Disturb(const DisturbanceOptions& disturbance) { loop_.Disturb(disturbance); }
 
   /// Settles, steps to the end or to a failure, and judges.
-  /// @param after_step called with the step's record after each step, also after one that failed; its time
-  /// counts as recording.
+  /// @param after_step called with each step's record once its checks are made (ClosedLoop::SetObserver), also
+  /// after one that failed; its time counts as recording.
   /// @param should_stop asked before each step, of settling too; true ends the run as interrupted.
   template <typename AfterStep, typename ShouldStop>
   const RunResult& Run(const AfterStep& after_step, const ShouldStop& should_stop) {
@@ -35,6 +35,12 @@ class Runner {
           if (!loop_.Settle(should_stop)) Interrupt();
         },
         /*settling=*/true);
+    loop_.SetObserver([&](const StepRecord& step) {
+      if (step.command.tracks || step.command.joints.q.size() > 0) result_.tracking.Add(step.error);
+      const Clock::time_point recording = Clock::now();
+      after_step(step);
+      result_.recording_seconds += SecondsSince(recording);
+    });
     const Clock::time_point begin = Clock::now();
     while (result_.failure.empty() && !loop_.is_finished()) {
       if (should_stop()) {
@@ -42,13 +48,8 @@ class Runner {
         break;
       }
       Guard([&] { loop_.Step(); }, /*settling=*/false);
-      if (loop_.record().step == 0) break;
-      const Command& command = loop_.record().command;
-      if (command.tracks || command.joints.q.size() > 0) result_.tracking.Add(loop_.record().error);
-      const Clock::time_point recording = Clock::now();
-      after_step(loop_.record());
-      result_.recording_seconds += SecondsSince(recording);
     }
+    Guard([&] { loop_.Finish(); }, /*settling=*/false);
     result_.wall_seconds = SecondsSince(begin);
     Judge(*setup_, loop_, &result_);
     return result_;

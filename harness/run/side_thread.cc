@@ -20,8 +20,8 @@ void SideThread::Wait() {
 }
 
 void SideThread::AwaitChange(State from) const {
-  // Sleeping and waking takes longer than most of a step's work.
-  constexpr int kSpins = 20000;
+  // Sleeping and waking takes longer than a step: awake for some of them.
+  constexpr int kSpins = 1000000;
   for (int i = 0; i < kSpins; ++i)
     if (state_.load(std::memory_order_acquire) != from) return;
   state_.wait(from, std::memory_order_acquire);

@@ -22,7 +22,7 @@ class SideThread {
 
  private:
   enum State : int { kIdle, kWorking, kQuit };
-  /// Until the state is another: some microseconds awake, then asleep.
+  /// Until the state is another: a millisecond or so awake, then asleep.
   void AwaitChange(State from) const;
   void Set(State state);
   void Run();

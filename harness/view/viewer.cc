@@ -334,11 +334,15 @@ std::unique_ptr<LiveRun> ViewLive(const LiveRunMaker& make, const std::string& t
   controls.sliders = MakeGainSliders(first);
   while (true) {
     run->SetPaused(!controls.playing);
-    Viewer viewer(*run, run.get(), &window, options, controls);
-    const bool restart = viewer.Show(title, [&] { return save(*run); });
+    bool restart = false;
+    {
+      // It draws this run in a thread of its own, and ends before the run does.
+      Viewer viewer(*run, run.get(), &window, options, controls);
+      restart = viewer.Show(title, [&] { return save(*run); });
+      controls = viewer.state();
+    }
     run->Finish();
     if (!restart) return run;
-    controls = viewer.state();
     controls.playing = true;
     controls.message = "";
     run = make(MakeGainOverrides(first, controls.sliders));

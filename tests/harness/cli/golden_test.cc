@@ -30,9 +30,11 @@ std::vector<std::string> SplitWords(const std::string& text) {
 /// The text with # for what varies with the machine: numbers that rounding decides, and times of the clock.
 std::string HideNumbers(std::string text) {
   static const std::regex numbers(
-      R"([-+]?\b\d+(\.\d+(e[-+]?\d+)?|e[-+]?\d+)|\b\d+(?= (s|min|h|us|ms|times|x)\b))");
+      R"([-+]?\b\d+(\.\d+(e[-+]?\d+)?|e[-+]?\d+)|\b\d+(?=(\s+[\d#]\S*)?\s+(s|min|h|us|ms|times|x real)\b))");
   static const std::regex parts(R"(\b(plant|controller|cross-check|recording) \d+)");  // us a step
-  return std::regex_replace(std::regex_replace(text, numbers, "#"), parts, "$1 #");
+  static const std::regex ratios(R"((\bu?s\s+x) \d+)");                               // of times
+  text = std::regex_replace(std::regex_replace(text, numbers, "#"), parts, "$1 #");
+  return std::regex_replace(text, ratios, "$1 #");
 }
 
 class Golden : public CommandTest, public ::testing::WithParamInterface<const char*> {

