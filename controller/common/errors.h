@@ -3,6 +3,7 @@
 // The errors that the library throws. A caller's fault is std::invalid_argument (through Require);
 // everything else derives from Error, so that a program can tell input errors from simulation failures.
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -36,10 +37,22 @@ class SingularityError : public Error {
 };
 
 /// Throws std::invalid_argument "name: requirement, got value" unless `condition` holds.
-inline void Require(bool condition, std::string_view name, std::string_view requirement, double value) {
+/// @param value a number or an enumerator.
+template <typename Value>
+void Require(bool condition, std::string_view name, std::string_view requirement, Value value) {
   if (condition) return;
   throw std::invalid_argument(std::string(name) + ": " + std::string(requirement) + ", got " +
-                              FormatNumber(value));
+                              FormatNumber(static_cast<double>(value)));
+}
+
+/// The same for a number that must be finite and positive.
+inline void RequirePositive(double value, std::string_view name) {
+  Require(std::isfinite(value) && value > 0.0, name, "must be positive", value);
+}
+
+/// The same for one that must be finite and not negative.
+inline void RequireNotNegative(double value, std::string_view name) {
+  Require(std::isfinite(value) && value >= 0.0, name, "must not be negative", value);
 }
 
 }  // namespace dexcheck

@@ -205,6 +205,12 @@ std::string TomlValue::AsName() const {
   return name;
 }
 
+std::string TomlValue::AsPartName() const {
+  std::string name = AsText();
+  if (!IsKey(name)) Fail("must be " + std::string(kKeyRule));
+  return name;
+}
+
 std::vector<TomlValue> TomlValue::AsList() const {
   if (is_missing_) return {};
   const toml::array* list = node_->as_array();

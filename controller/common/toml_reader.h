@@ -76,6 +76,8 @@ class TomlValue {
   [[nodiscard]] std::string AsText() const;
   /// Text that can name a thing: 1 to 64 of the letters A-Z, a-z, digits, and _ - .
   [[nodiscard]] std::string AsName() const;
+  /// A name of a joint, link or frame, as other formats allow it: 1 to 256 bytes without control characters.
+  [[nodiscard]] std::string AsPartName() const;
   [[nodiscard]] std::vector<TomlValue> AsList() const;
   [[nodiscard]] TomlTable AsTable() const;
 

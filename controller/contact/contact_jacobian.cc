@@ -9,10 +9,9 @@ namespace {
 using Matrix36 = Eigen::Matrix<double, 3, 6>;
 
 void RequireRowsShape(Eigen::Index columns, Eigen::Ref<MatrixXd> rows) {
-  Require(rows.rows() == 3, "rows of the contact Jacobian", "must be three",
-          static_cast<double>(rows.rows()));
+  Require(rows.rows() == 3, "rows of the contact Jacobian", "must be three", rows.rows());
   Require(rows.cols() == columns, "columns of the contact Jacobian",
-          "must equal those of the fingertip Jacobian", static_cast<double>(rows.cols()));
+          "must equal those of the fingertip Jacobian", rows.cols());
 }
 
 /// Calls visit(i) for the columns of each run, or for all columns when there are no runs.
@@ -40,8 +39,7 @@ void CalcContactJacobianDot(const Contact& contact, const Eigen::Ref<const Matri
                             const Eigen::Ref<const Matrix6Xd>& J_f_dot, Eigen::Ref<MatrixXd> rows_dot,
                             std::span<const ColumnRun> columns) {
   RequireRowsShape(J_f.cols(), rows_dot);
-  Require(J_f_dot.cols() == J_f.cols(), "columns of J_f_dot", "must equal those of J_f",
-          static_cast<double>(J_f_dot.cols()));
+  Require(J_f_dot.cols() == J_f.cols(), "columns of J_f_dot", "must equal those of J_f", J_f_dot.cols());
   // d/dt (Ad_{g_cf_f} J_f) = Ad_{g_cf_f} J_f_dot - ad_V Ad_{g_cf_f} J_f with V = V_f_cf^cf
   const Matrix6d Ad = CalcAdjointInverse(contact.geometry.g_f_cf);
   const Matrix6d Ad_dot =

@@ -9,7 +9,7 @@ namespace {
 void RequireGraspShape(std::span<const Contact> contacts, Eigen::Index columns) {
   Require(!contacts.empty(), "number of contacts", "must be positive", 0.0);
   Require(columns == 3 * static_cast<Eigen::Index>(contacts.size()), "columns of the grasp map",
-          "must equal the number of contact forces", static_cast<double>(columns));
+          "must equal the number of contact forces", columns);
 }
 
 }  // namespace

@@ -21,10 +21,6 @@ constexpr int kMaxNewtonSteps = 100;
 
 double WrapAngle(double angle) { return std::remainder(angle, 2.0 * kPi); }
 
-void RequirePositive(double value, const char* name) {
-  Require(std::isfinite(value) && value > 0.0, name, "must be positive", value);
-}
-
 void RequireUnique(double distance, double scale, const char* what) {
   if (distance > kCentreTolerance * scale) return;
   throw SingularityError(

@@ -17,19 +17,15 @@ namespace dexcheck {
 
 /// Local coordinates alpha = (u, v) of a surface point (35), with the chart of the atlas that they belong to.
 struct SurfacePoint {
-  double u = 0.0;
-  double v = 0.0;
+  double u = 0.0, v = 0.0;
   int chart = 0;
 };
 
 /// A chart c(u, v) at one point, with its first and second partial derivatives (36).
 struct SurfaceJet {
   Vector3d c;
-  Vector3d c_u;
-  Vector3d c_v;
-  Vector3d c_uu;
-  Vector3d c_uv;
-  Vector3d c_vv;
+  Vector3d c_u, c_v;
+  Vector3d c_uu, c_uv, c_vv;
 };
 
 /// Geometry of a surface at one point: Gauss frame (38) and the geometric parameters M, K, T (37).

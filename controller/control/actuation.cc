@@ -17,8 +17,7 @@ ActuationMap::ActuationMap(const RobotModel& model)
 
 void ActuationMap::Apply(const Matrix2d& wheels, const Eigen::Ref<const VectorXd>& from,
                          Eigen::Ref<VectorXd> to) const {
-  Require(from.size() == size_ && to.size() == size_, "length of tau'", "must be that of xi",
-          static_cast<double>(from.size()));
+  Require(from.size() == size_ && to.size() == size_, "length of tau'", "must be that of xi", from.size());
   if (to.data() != from.data()) to = from;
   if (has_wheels_) to.head<2>() = Vector2d(wheels * to.head<2>());
 }

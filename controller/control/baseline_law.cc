@@ -1,6 +1,7 @@
 #include "controller/control/baseline_law.h"
 
 #include <Eigen/Eigenvalues>
+#include <array>
 #include <cmath>
 
 #include "controller/common/errors.h"
@@ -31,19 +32,9 @@ Matrix6d CalcDesignedDamping(const Matrix6d& Lambda, const Matrix6d& K, double z
 }  // namespace
 
 std::string_view NameOf(ControlLaw law) {
-  switch (law) {
-    case ControlLaw::kComputedTorque:
-      return "computed_torque";
-    case ControlLaw::kPdGravity:
-      return "pd_gravity";
-    case ControlLaw::kFeedforwardPd:
-      return "feedforward_pd";
-    case ControlLaw::kOperationalSpace:
-      return "operational_space";
-    case ControlLaw::kImpedance:
-      break;
-  }
-  return "impedance";
+  constexpr std::array<std::string_view, 5> kNames = {"computed_torque", "pd_gravity", "feedforward_pd",
+                                                      "operational_space", "impedance"};
+  return kNames.at(static_cast<size_t>(law));
 }
 
 ObjectStiffness CalcStiffness(const ObjectGains& gains, const Matrix6d& Lambda, const Matrix3d& R_Bo) {
@@ -69,11 +60,9 @@ BaselineLaw::BaselineLaw(const RobotModel& model, int num_contacts, ControlLaw l
       inertia_(model, num_contacts),
       J_B_pinv_("J_B'", Eigen::Index{3} * num_contacts, model.num_velocities()) {
   const Eigen::Index n = model.num_velocities();
-  Require(law != ControlLaw::kComputedTorque, "law", "must be one of the baselines",
-          static_cast<double>(law));
+  Require(law != ControlLaw::kComputedTorque, "law", "must be one of the baselines", law);
   if (options.weight.kind == RedundancyWeight::Kind::kDiagonal) {
-    Require(options.weight.w.size() == n, "length of w", "must be that of xi",
-            static_cast<double>(options.weight.w.size()));
+    Require(options.weight.w.size() == n, "length of w", "must be that of xi", options.weight.w.size());
   }
   xi_d_.setZero(n);
   xi_dot_d_.setZero(n);
@@ -94,8 +83,7 @@ Vector6d BaselineLaw::CalcWrench(const GraspTerms& grasp, const ObjectErrors& er
 
 void BaselineLaw::SetDemand(const ModelTerms& robot, const GraspTerms& grasp, const DesiredMotion& desired,
                             const Eigen::Ref<const VectorXd>& sigma_prime) {
-  Require(sigma_prime.size() == force_.size(), "length of sigma'", "must be that of xi",
-          static_cast<double>(sigma_prime.size()));
+  Require(sigma_prime.size() == force_.size(), "length of sigma'", "must be that of xi", sigma_prime.size());
   inertia_.Compute(robot, grasp);
   if (law_ == ControlLaw::kOperationalSpace) return SetOperationalSpace(robot, grasp, desired, sigma_prime);
   const bool knows_motion = law_ != ControlLaw::kPdGravity;

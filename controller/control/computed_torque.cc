@@ -28,8 +28,7 @@ ComputedTorque::ComputedTorque(const RobotModel& model, int num_contacts, Redund
   const Eigen::Index n = model.num_velocities();
   const Eigen::Index k = Eigen::Index{3} * num_contacts;
   if (weight_.kind == RedundancyWeight::Kind::kDiagonal) {
-    Require(weight_.w.size() == n, "length of w", "must be that of xi",
-            static_cast<double>(weight_.w.size()));
+    Require(weight_.w.size() == n, "length of w", "must be that of xi", weight_.w.size());
   }
   xi_c_.setZero(n);
   xi_dot_d_.setZero(n);
@@ -51,8 +50,7 @@ void ComputedTorque::SetDemand(const ModelTerms& robot, const GraspTerms& grasp,
 void ComputedTorque::SetMotion(const ModelTerms& robot, const GraspTerms& grasp, const Vector6d& V_Bo_dot,
                                const Eigen::Ref<const VectorXd>& sigma_prime) {
   Require(robot.size() == xi_c_.size(), "entries of xi", "must be those of the law's model", robot.size());
-  Require(sigma_prime.size() == xi_c_.size(), "length of sigma'", "must be that of xi",
-          static_cast<double>(sigma_prime.size()));
+  Require(sigma_prime.size() == xi_c_.size(), "length of sigma'", "must be that of xi", sigma_prime.size());
   Require(grasp.num_forces() == f_c_.size(), "number of contact forces", "must be as constructed",
           grasp.num_forces());
   FactorJacobian(weight_, robot, grasp, &J_B_pinv_);
@@ -74,8 +72,7 @@ void ComputedTorque::SetMotion(const ModelTerms& robot, const GraspTerms& grasp,
 
 void ComputedTorque::SetFreeMotion(const ModelTerms& robot, const Eigen::Ref<const VectorXd>& sigma_prime) {
   Require(robot.size() == xi_c_.size(), "entries of xi", "must be those of the law's model", robot.size());
-  Require(sigma_prime.size() == xi_c_.size(), "length of sigma'", "must be that of xi",
-          static_cast<double>(sigma_prime.size()));
+  Require(sigma_prime.size() == xi_c_.size(), "length of sigma'", "must be that of xi", sigma_prime.size());
   xi_c_ = robot.velocity();
   xi_dot_d_ = sigma_prime;
   CalcFreeTorque(robot);
@@ -85,7 +82,7 @@ void ComputedTorque::SetForces(const GraspTerms& grasp, const Vector6d& F_o,
                                const Eigen::Ref<const VectorXd>& force,
                                const Eigen::Ref<const VectorXd>& xi_dot_d) {
   Require(force.size() == tau_0_.size() && xi_dot_d.size() == tau_0_.size(), "length of force",
-          "must be that of xi", static_cast<double>(force.size()));
+          "must be that of xi", force.size());
   G_pinv_.Factor(grasp.G());
   F_o_ = F_o;
   xi_dot_d_ = xi_dot_d;
@@ -106,7 +103,7 @@ void ComputedTorque::CalcInternalForce(const Eigen::Ref<const VectorXd>& f_c, Ei
 }
 
 const VectorXd& ComputedTorque::CalcTorque(const GraspTerms& grasp, const Eigen::Ref<const VectorXd>& F_N) {
-  Require(F_N.size() == f_c_.size(), "length of F_N", "must be that of f_c", static_cast<double>(F_N.size()));
+  Require(F_N.size() == f_c_.size(), "length of F_N", "must be that of f_c", F_N.size());
   // f_c = G^+ F_o + F_N
   G_pinv_.Apply(F_o_, f_c_);
   f_c_ += F_N;
@@ -115,8 +112,7 @@ const VectorXd& ComputedTorque::CalcTorque(const GraspTerms& grasp, const Eigen:
 
 const VectorXd& ComputedTorque::CalcTorqueWithForces(const GraspTerms& grasp,
                                                      const Eigen::Ref<const VectorXd>& f_c) {
-  Require(f_c.size() == f_c_.size(), "length of f_c", "must be as constructed",
-          static_cast<double>(f_c.size()));
+  Require(f_c.size() == f_c_.size(), "length of f_c", "must be as constructed", f_c.size());
   f_c_ = f_c;
   return AddContactTorque(grasp);
 }

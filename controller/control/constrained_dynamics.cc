@@ -49,8 +49,7 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
                                                const Eigen::Ref<const VectorXd>& force, ObjectSupport object,
                                                const VectorXd* contact_acceleration, const Vector6d* push) {
   const Eigen::Index n = prediction_.xi_dot.size();
-  Require(robot.size() == n && force.size() == n, "length of force", "must be that of xi",
-          static_cast<double>(force.size()));
+  Require(robot.size() == n && force.size() == n, "length of force", "must be that of xi", force.size());
   const Eigen::Index k = prediction_.f_c.size();
   Require(grasp.num_forces() == k && k > 0, "number of contact forces", "must be as constructed and positive",
           grasp.num_forces());
@@ -98,8 +97,7 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
 const Prediction& ConstrainedDynamics::PredictFree(const ModelTerms& robot,
                                                    const Eigen::Ref<const VectorXd>& force) {
   const Eigen::Index n = prediction_.xi_dot.size();
-  Require(robot.size() == n && force.size() == n, "length of force", "must be that of xi",
-          static_cast<double>(force.size()));
+  Require(robot.size() == n && force.size() == n, "length of force", "must be that of xi", force.size());
   factor_.Compute(robot.M());
   CalcFreeForce(robot, force);
   prediction_.xi_dot = motion_.head(n);

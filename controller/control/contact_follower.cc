@@ -14,9 +14,7 @@ ContactFollower::ContactFollower(const RobotModel& model, std::span<const int> f
       kappa_(fingertips.size()),
       last_(fingertips.size()) {
   Require(timing.time_step > 0.0, "time step [s]", "must be positive", timing.time_step);
-  for (const int frame : fingertips_) {
-    tips_.emplace_back(model.frames().at(static_cast<size_t>(frame)).sphere_radius.value());
-  }
+  for (const int frame : fingertips_) tips_.emplace_back(model.tip_radius(frame));
   J_f_.setZero(6, model.num_velocities());
   J_f_dot_ = J_f_;
 }

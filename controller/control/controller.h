@@ -20,7 +20,7 @@ struct Touch {
   double support_force = 0.0;  ///< Upward, on the object by what it lies on, N; of the step before.
 };
 
-/// What a controller is told of the world at one instant.
+/// What is measured at one instant.
 struct Reading {
   MeasuredState state;
   Touch touch;

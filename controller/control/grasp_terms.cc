@@ -29,11 +29,7 @@ GraspTerms::GraspTerms(const RobotModel& model, std::span<const int> fingertips,
       object_(object),
       gravity_(model.gravity()),
       surface_(&surface) {
-  for (const int frame : fingertips_) {
-    const Frame& tip = model.frames().at(static_cast<size_t>(frame));
-    if (!tip.sphere_radius) throw std::invalid_argument("fingertips: " + tip.name + " carries no sphere");
-    tips_.emplace_back(*tip.sphere_radius);
-  }
+  for (const int frame : fingertips_) tips_.emplace_back(model.tip_radius(frame));
   const int n = model.num_velocities();
   const int k = num_forces();
   contacts_.resize(fingertips_.size());
@@ -49,18 +45,10 @@ GraspTerms::GraspTerms(const RobotModel& model, std::span<const int> fingertips,
 }
 
 void GraspTerms::ListChains(const RobotModel& model) {
-  const int base = model.num_base_velocities();
   std::vector<bool> moves_any(static_cast<size_t>(model.num_velocities()), false);
   for (const int frame : fingertips_) {
-    std::vector<bool> moves(moves_any.size(), false);
-    std::fill_n(moves.begin(), base, true);
-    for (int i = model.frames()[static_cast<size_t>(frame)].link; i >= 0;
-         i = model.joints()[static_cast<size_t>(i)].parent) {
-      moves[static_cast<size_t>(base + i)] = true;
-    }
     std::vector<ColumnRun>& runs = chains_.emplace_back();
-    for (int i = 0; i < model.num_velocities(); ++i) {
-      if (!moves[static_cast<size_t>(i)]) continue;
+    for (const int i : model.ListMovingEntries(model.frame(frame).link)) {
       moves_any[static_cast<size_t>(i)] = true;
       if (runs.empty() || runs.back().begin + runs.back().count != i) runs.push_back({i, 0});
       ++runs.back().count;
@@ -73,13 +61,13 @@ void GraspTerms::ListChains(const RobotModel& model) {
 
 void GraspTerms::SetOverlaps(std::span<const double> overlaps) {
   Require(overlaps.size() == overlaps_.size(), "number of overlaps", "must be that of the fingertips",
-          static_cast<double>(overlaps.size()));
+          overlaps.size());
   std::copy(overlaps.begin(), overlaps.end(), overlaps_.begin());
 }
 
 void GraspTerms::SetBonds(std::span<const Bond> bonds) {
   Require(bonds.size() == fingertips_.size(), "number of bonds", "must be that of the fingertips",
-          static_cast<double>(bonds.size()));
+          bonds.size());
   bonds_.assign(bonds.begin(), bonds.end());
 }
 
@@ -133,7 +121,7 @@ void GraspTerms::SetPose(const ModelTerms& robot, const Pose& X_Bo, const Vector
 
 void GraspTerms::SetContacts(const ModelTerms& robot, std::span<const ContactCoordinates> kappa) {
   Require(kappa.size() == fingertips_.size(), "number of kappa", "must be that of the fingertips",
-          static_cast<double>(kappa.size()));
+          kappa.size());
   Require(robot.size() == J_B_.cols(), "entries of xi", "must be those of the grasp's model", robot.size());
   for (size_t i = 0; i < fingertips_.size(); ++i) {
     const Eigen::Index row = 3 * static_cast<Eigen::Index>(i);

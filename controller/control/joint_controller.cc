@@ -21,7 +21,7 @@ JointController::JointController(const RobotModel& model, const MassProperties& 
       law_(model, law, gains),
       demand_(motion, sampling.time_step),
       sampling_(sampling) {
-  Require(sampling.hold > 0, "sampling.hold", "must be positive", static_cast<double>(sampling.hold));
+  Require(sampling.hold > 0, "sampling.hold", "must be positive", sampling.hold);
 }
 
 void JointController::Follow(const Trajectory& /*motion*/) { steps_until_due_ = 0; }

@@ -13,11 +13,10 @@ JointLaw::JointLaw(const RobotModel& model, ControlLaw law, const JointGains& ga
     : law_(law), gains_(gains), actuation_(model) {
   const Eigen::Index n = model.num_velocities();
   Require(model.base().type == BaseType::kFixed, "base", "must be fixed", model.num_base_velocities());
-  Require(IsJointLaw(law), "law", "must be one for joints", static_cast<double>(law));
+  Require(IsJointLaw(law), "law", "must be one for joints", law);
   const bool computed = law == ControlLaw::kComputedTorque;
   for (const VectorXd* gain : {computed ? &gains.K_p : &gains.K, computed ? &gains.K_v : &gains.D}) {
-    Require(gain->size() == n, "number of gains", "must be that of the joints",
-            static_cast<double>(gain->size()));
+    Require(gain->size() == n, "number of gains", "must be that of the joints", gain->size());
   }
   for (VectorXd* vector : {&xi_dot_d_, &force_, &tau_}) vector->setZero(n);
 }

@@ -19,7 +19,7 @@ JointMotion::JointMotion(const VectorXd& q_start, const std::vector<JointWayPoin
     : q_start_(q_start) {
   for (const JointWayPoint& point : points) {
     Require(point.q.size() == q_start.size(), "length of a way point", "must be that of q_start",
-            static_cast<double>(point.q.size()));
+            point.q.size());
   }
   for (Eigen::Index begin = 0; !points.empty() && begin < q_start.size(); begin += kBlock) {
     const Eigen::Index count = CountIn(q_start, begin);

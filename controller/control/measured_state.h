@@ -16,7 +16,7 @@ using ContactSet = std::uint32_t;
 constexpr ContactSet AllContacts(int count) { return (ContactSet{1} << count) - 1; }
 constexpr bool Contains(ContactSet set, size_t fingertip) { return (set >> fingertip & 1U) != 0; }
 
-/// State of robot, object and contacts at one instant, as it is or as somebody is told it.
+/// State of robot, object and contacts at one instant, true or measured.
 struct MeasuredState {
   VectorXd q;   ///< q' (p').
   VectorXd xi;  ///< n.

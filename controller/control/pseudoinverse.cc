@@ -14,8 +14,8 @@ namespace dexcheck {
 namespace {
 
 Eigen::Index CheckRows(const std::string& name, Eigen::Index rows, Eigen::Index columns) {
-  Require(rows > 0, "rows of " + name, "must be positive", static_cast<double>(rows));
-  Require(rows <= columns, "rows of " + name, "must not exceed its columns", static_cast<double>(rows));
+  Require(rows > 0, "rows of " + name, "must be positive", rows);
+  Require(rows <= columns, "rows of " + name, "must not exceed its columns", rows);
   return rows;
 }
 
@@ -37,8 +37,8 @@ Pseudoinverse::Pseudoinverse(std::string name, Eigen::Index rows, Eigen::Index c
 }
 
 void Pseudoinverse::Load(const Eigen::Ref<const MatrixXd>& J, std::span<const int> columns) {
-  Require(J.rows() == work_.size(), "rows of J", "must be as constructed", static_cast<double>(J.rows()));
-  Require(J.cols() == J_T_.rows(), "columns of J", "must be as constructed", static_cast<double>(J.cols()));
+  Require(J.rows() == work_.size(), "rows of J", "must be as constructed", J.rows());
+  Require(J.cols() == J_T_.rows(), "columns of J", "must be as constructed", J.cols());
   if (columns.empty()) columns = all_columns_;
   if (!std::equal(columns.begin(), columns.end(), columns_.begin(), columns_.end())) {
     columns_.assign(columns.begin(), columns.end());
@@ -58,7 +58,7 @@ void Pseudoinverse::Factor(const Eigen::Ref<const MatrixXd>& J, std::span<const 
 void Pseudoinverse::FactorDiagonal(const Eigen::Ref<const MatrixXd>& J, const Eigen::Ref<const VectorXd>& w,
                                    std::span<const int> columns) {
   Load(J, columns);
-  Require(w.size() == J.cols(), "length of w", "must be the columns of J", static_cast<double>(w.size()));
+  Require(w.size() == J.cols(), "length of w", "must be the columns of J", w.size());
   for (Eigen::Index i = 0; i < w.size(); ++i) Require(w[i] > 0.0, "entry of w", "must be positive", w[i]);
   SetEntries(columns_);
   for (const int i : columns_) W_inv_J_T_.row(i) = J_T_.row(i) / w[i];
@@ -68,8 +68,8 @@ void Pseudoinverse::FactorDiagonal(const Eigen::Ref<const MatrixXd>& J, const Ei
 
 void Pseudoinverse::FactorWeighted(const Eigen::Ref<const MatrixXd>& J, const Eigen::Ref<const MatrixXd>& W) {
   Load(J, {});
-  Require(W.rows() == J.cols(), "rows of W", "must be the columns of J", static_cast<double>(W.rows()));
-  Require(W.cols() == J.cols(), "columns of W", "must be the columns of J", static_cast<double>(W.cols()));
+  Require(W.rows() == J.cols(), "rows of W", "must be the columns of J", W.rows());
+  Require(W.cols() == J.cols(), "columns of W", "must be the columns of J", W.cols());
   W_llt_.compute(W);
   Require(W_llt_.info() == Eigen::Success, "W", "must be positive definite; trace", W.trace());
   SetEntries(all_columns_);

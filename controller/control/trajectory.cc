@@ -14,10 +14,6 @@ DesiredMotion MoveAlong(const Vector6d& X_start, const Vector6d& direction, cons
   return {X_start + motion.s * direction, motion.s_dot * direction, motion.s_ddot * direction};
 }
 
-void RequireRampTime(double ramp_time) {
-  Require(ramp_time >= 0.0 && std::isfinite(ramp_time), "ramp_time", "must not be negative", ramp_time);
-}
-
 /// X_d(t) as a function.
 template <typename Function>
 class FunctionTrajectory final : public Trajectory {
@@ -44,7 +40,7 @@ struct PathPoint {
 template <typename Function>
 std::unique_ptr<Trajectory> MakePlanarTrajectory(const Vector6d& X_start, const PlanarPath& path,
                                                  Function evaluate) {
-  RequireRampTime(path.ramp_time);
+  RequireNotNegative(path.ramp_time, "ramp_time");
   const double cos_heading = std::cos(path.heading);
   const double sin_heading = std::sin(path.heading);
   return MakeTrajectory([=](double t) -> DesiredMotion {
@@ -154,7 +150,7 @@ ScalarMotion CalcSpeedRamp(double t, double duration) {
 
 std::unique_ptr<Trajectory> MakeLineTrajectory(const Vector6d& X_start, const Vector6d& velocity,
                                                double ramp_time) {
-  RequireRampTime(ramp_time);
+  RequireNotNegative(ramp_time, "ramp_time");
   return MakeTrajectory([=](double t) { return MoveAlong(X_start, velocity, CalcSpeedRamp(t, ramp_time)); });
 }
 
@@ -166,7 +162,7 @@ std::unique_ptr<Trajectory> MakePointToPointTrajectory(const Vector6d& X_start, 
 
 std::unique_ptr<Trajectory> MakeOscillationTrajectory(const Vector6d& X_start, const Vector6d& amplitude,
                                                       double frequency, double ramp_time) {
-  RequireRampTime(ramp_time);
+  RequireNotNegative(ramp_time, "ramp_time");
   Require(frequency > 0.0, "frequency", "must be positive", frequency);
   return MakeTrajectory([=, rate = 2.0 * kPi * frequency](double t) {
     const ScalarMotion ramp = ramp_time > 0.0 ? CalcMinJerk(t, ramp_time) : ScalarMotion{1.0, 0.0, 0.0};

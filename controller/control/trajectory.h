@@ -13,9 +13,7 @@ namespace dexcheck {
 
 /// A function of time and its first two derivatives.
 struct ScalarMotion {
-  double s = 0.0;
-  double s_dot = 0.0;
-  double s_ddot = 0.0;
+  double s = 0.0, s_dot = 0.0, s_ddot = 0.0;
 };
 
 /// From 0 to 1 in `duration` s with least jerk: s = 10 u^3 - 15 u^4 + 6 u^5, u = t / duration; constant

@@ -11,7 +11,7 @@ TrajectoryController::TrajectoryController(const RobotModel& model, std::span<co
                                            const GraspControllerOptions& options, const Sampling& sampling)
     : law_(model, fingertips, object, surface, options), sampling_(sampling) {
   if (sampling.contacts) follower_.emplace(model, fingertips, surface, *sampling.contacts);
-  Require(sampling.hold > 0, "sampling.hold", "must be positive", static_cast<double>(sampling.hold));
+  Require(sampling.hold > 0, "sampling.hold", "must be positive", sampling.hold);
 }
 
 void TrajectoryController::Follow(const Trajectory& motion) {

@@ -30,7 +30,7 @@ class TrajectoryController final : public Controller {
   /// @throws std::logic_error before Follow; else as GraspController.
   void Step(const Reading& reading, double t, Command* command) override;
   [[nodiscard]] const GraspModel& model() const override { return law_.model(); }
-  /// kappa (39) of each contact that is followed; empty before Begin, and where contacts are told.
+  /// kappa (39) of each contact that is followed; empty before Begin, and where contacts are measured.
   [[nodiscard]] const std::vector<ContactCoordinates>& followed_kappa() const { return followed_.kappa; }
 
   /// X_d, X_d_ddot at t, and X_d_dot half a time step before.

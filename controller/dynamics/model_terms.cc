@@ -15,16 +15,6 @@ void CheckSize(const char* name, Eigen::Index expected, Eigen::Index actual) {
                               " entries expected, got " + std::to_string(actual));
 }
 
-/// Velocities of the joints from the base to this one, counted from the base's.
-std::vector<int> ChainTo(const RobotModel& model, int joint) {
-  std::vector<int> chain;
-  for (int i = joint; i >= 0; i = model.joints()[static_cast<size_t>(i)].parent) {
-    for (int k = CountVelocities(model.joints()[static_cast<size_t>(i)].type); k-- > 0;)
-      chain.insert(chain.begin(), model.dof(i) + k);
-  }
-  return chain;
-}
-
 }  // namespace
 
 ModelTerms::ModelTerms(const RobotModel& model, Coordinates coordinates)
@@ -46,7 +36,12 @@ ModelTerms::ModelTerms(const RobotModel& model, Coordinates coordinates)
                        joint.mdh.d, joint.X_PB.linear(), joint.X_PB.translation()});
     add_mass(joint.body);
   }
-  for (const Frame& frame : model.frames()) frame_chains_.push_back(ChainTo(model, frame.link));
+  for (const Frame& frame : model.frames()) {
+    // Of reduced coordinates; the base of unreduced ones may have more.
+    std::vector<int>& chain = frame_chains_.emplace_back(model.ListMovingEntries(frame.link));
+    chain.erase(chain.begin(), chain.begin() + model.num_base_velocities());
+    for (int& entry : chain) entry += base_size_ - model.num_base_velocities();
+  }
 
   if (model.base().type == BaseType::kDifferentialDrive) {
     // thetadot_r = (v_c + w_c b/2) / r,  thetadot_l = (v_c - w_c b/2) / r   (rolling, (12))
@@ -258,7 +253,7 @@ Vector6d ModelTerms::CalcLinkVelocity(int joint) const {
 }
 
 Pose ModelTerms::CalcFramePose(int frame) const {
-  const Frame& f = model_->frames().at(static_cast<size_t>(frame));
+  const Frame& f = model_->frame(frame);
   return CalcLinkPose(f.link) * f.X_LF;
 }
 
@@ -271,7 +266,7 @@ void ModelTerms::CalcFrameJacobian(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Re
 void ModelTerms::CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref<Matrix6Xd> J_dot) const {
   CheckSize("J columns", size_, J.cols());
   CheckSize("J_dot columns", size_, J_dot.cols());
-  const Frame& f = model_->frames().at(static_cast<size_t>(frame));
+  const Frame& f = model_->frame(frame);
   const LinkState& state = link(f.link);
   const Matrix3d R_f = state.R * f.X_LF.linear();
   const Vector3d p = state.p + state.R * f.X_LF.translation();
@@ -289,7 +284,7 @@ void ModelTerms::CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref
     J_dot.col(dof).tail<3>().noalias() = R_f.transpose() * (column.w_dot - w.cross(column.w));
   };
   for (int i = 0; i < base_size_; ++i) write(i);
-  for (const int dof : frame_chains_[static_cast<size_t>(frame)]) write(base_size_ + dof);
+  for (const int dof : frame_chains_[static_cast<size_t>(frame)]) write(dof);
 }
 
 }  // namespace dexcheck

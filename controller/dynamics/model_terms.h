@@ -151,7 +151,7 @@ class ModelTerms {
 
   std::vector<JointPlace> places_;
   std::vector<LinkMass> masses_;                // base first
-  std::vector<std::vector<int>> frame_chains_;  // per frame: velocities of joints from the base outward
+  std::vector<std::vector<int>> frame_chains_;  // per frame: entries of its chain's joints
 
   double phi_ = 0.0;
   Vector3d base_position_ = Vector3d::Zero();

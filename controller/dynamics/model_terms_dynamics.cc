@@ -173,7 +173,7 @@ void ModelTerms::CalcDynamics() {
 
 void ModelTerms::AddWheelsAndRotors() {
   for (int i = 0; i < model_->num_dofs(); ++i) {
-    const Joint& joint = model_->joints()[static_cast<size_t>(model_->joint_of_dof(i))];
+    const Joint& joint = model_->joint(model_->joint_of_dof(i));
     const int dof = base_size_ + i;
     M_(dof, dof) += joint.armature;
     friction_[dof] = joint.damping * velocity_[dof];

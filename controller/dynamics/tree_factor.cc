@@ -15,26 +15,16 @@ using Segment = Eigen::Map<VectorXd>;
 }  // namespace
 
 TreeFactor::TreeFactor(const RobotModel& model) {
-  const int base = model.num_base_velocities();
-  const auto add = [&](int coordinate, int parent) {
-    const size_t begin = path_.size();
-    if (parent >= 0) {
-      const Row above = rows_[static_cast<size_t>(parent)];
-      for (size_t k = 0; k < above.size; ++k) path_.push_back(path_[above.begin + k]);
-    }
-    path_.push_back(coordinate);
-    rows_.push_back({begin, path_.size() - begin});
+  const auto add = [&](std::span<const int> path) {
+    rows_.push_back({path_.size(), path.size()});
+    path_.insert(path_.end(), path.begin(), path.end());
   };
-  for (int i = 0; i < base; ++i) add(i, i - 1);
-  for (int i = 0; i < model.num_joints(); ++i) {
-    const Joint& joint = model.joints()[static_cast<size_t>(i)];
-    const int first = base + model.dof(i);
-    // The last velocity of what the joint hangs on.
-    const Joint* const parent =
-        joint.parent < 0 ? nullptr : &model.joints()[static_cast<size_t>(joint.parent)];
-    add(first,
-        parent == nullptr ? base - 1 : base + model.dof(joint.parent) + CountVelocities(parent->type) - 1);
-    for (int k = 1; k < CountVelocities(joint.type); ++k) add(first + k, first + k - 1);
+  const std::vector<int> base = model.ListMovingEntries(-1);
+  for (size_t i = 1; i <= base.size(); ++i) add(std::span(base).first(i));
+  for (int joint = 0; joint < model.num_joints(); ++joint) {
+    const std::vector<int> entries = model.ListMovingEntries(joint);
+    for (auto k = static_cast<size_t>(CountVelocities(model.joint(joint).type)); k-- > 0;)
+      add(std::span(entries).first(entries.size() - k));
   }
   L_.assign(path_.size(), 0.0);
   all_rows_.resize(rows_.size());
@@ -43,7 +33,7 @@ TreeFactor::TreeFactor(const RobotModel& model) {
 
 void TreeFactor::Compute(const Eigen::Ref<const MatrixXd>& M) {
   const auto n = static_cast<Eigen::Index>(rows_.size());
-  Require(M.rows() == n && M.cols() == n, "rows of M", "must be those of xi", static_cast<double>(M.rows()));
+  Require(M.rows() == n && M.cols() == n, "rows of M", "must be those of xi", M.rows());
   for (Eigen::Index i = 0; i < n; ++i) {
     const Row row = rows_[static_cast<size_t>(i)];
     // A column, which is contiguous.

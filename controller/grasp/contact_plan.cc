@@ -250,30 +250,23 @@ class Planner {
 };
 
 void RequireUsable(const Hand& hand, const Pose& X_Bo, const ContactPlanOptions& options) {
-  const auto require_positive = [](double value, std::string_view name) {
-    Require(std::isfinite(value) && value > 0.0, name, "must be positive", value);
-  };
-  const auto require_not_negative = [](double value, std::string_view name) {
-    Require(std::isfinite(value) && value >= 0.0, name, "must not be negative", value);
-  };
-  Require(hand.fingertips.size() >= 3, "fingertips", "must be at least three",
-          static_cast<double>(hand.fingertips.size()));
+  Require(hand.fingertips.size() >= 3, "fingertips", "must be at least three", hand.fingertips.size());
   RequireRotation(X_Bo.linear(), "X_Bo");
   Require(X_Bo.translation().allFinite(), "X_Bo", "must be finite", std::numeric_limits<double>::quiet_NaN());
-  require_positive(options.mu, "mu");
-  require_positive(options.length, "length");
-  require_positive(options.least_margin, "least_margin");
-  require_positive(options.finger_thickness, "finger_thickness");
+  RequirePositive(options.mu, "mu");
+  RequirePositive(options.length, "length");
+  RequirePositive(options.least_margin, "least_margin");
+  RequirePositive(options.finger_thickness, "finger_thickness");
   Require(options.steepest > 0.0 && options.steepest <= kPi / 2.0, "steepest", "must be in (0, pi/2]",
           options.steepest);
-  require_not_negative(options.joint_margin, "joint_margin");
-  require_not_negative(options.comfort, "comfort");
-  require_not_negative(options.opening, "opening");
-  require_not_negative(options.room, "room");
+  RequireNotNegative(options.joint_margin, "joint_margin");
+  RequireNotNegative(options.comfort, "comfort");
+  RequireNotNegative(options.opening, "opening");
+  RequireNotNegative(options.room, "room");
   Require(options.half_length >= 0.0, "half_length", "must not be negative", options.half_length);
-  require_not_negative(options.spacing, "spacing");
-  require_not_negative(options.clearance, "clearance");
-  require_not_negative(options.arm_clearance, "arm_clearance");
+  RequireNotNegative(options.spacing, "spacing");
+  RequireNotNegative(options.clearance, "clearance");
+  RequireNotNegative(options.arm_clearance, "arm_clearance");
   for (const Vector3d& displacement : options.reaches) {
     for (const double value : displacement) {
       Require(std::isfinite(value), "reaches", "must be finite", value);
@@ -297,10 +290,10 @@ double CalcContactHalfLength(const Shape& shape, double tip_radius) {
 }
 
 std::vector<int> ListArmJoints(const RobotModel& model, std::span<const int> fingertips, int palm_frame) {
-  std::vector<int> joints = grasp_internal::ListChain(model, palm_frame);
+  std::vector<int> joints = model.ListChain(model.frame(palm_frame).link);
   for (const int tip : model.fingertips()) {
     if (std::find(fingertips.begin(), fingertips.end(), tip) != fingertips.end()) continue;
-    for (const int joint : grasp_internal::ListChain(model, tip)) std::erase(joints, joint);
+    for (const int joint : model.ListChain(model.frame(tip).link)) std::erase(joints, joint);
   }
   return joints;
 }

@@ -19,11 +19,9 @@ FingerPlacement SolveFingerPlacement(const RobotModel& model, std::span<const in
   const std::vector<std::vector<int>> own_joints = grasp_internal::ListOwnJoints(model, fingertips);
   std::vector<Vector3d> places;
   for (size_t i = 0; i < fingertips.size(); ++i) {
-    const Frame& frame = model.frames().at(static_cast<size_t>(fingertips[i]));
-    if (!frame.sphere_radius) throw std::invalid_argument("fingertips: " + frame.name + " carries no sphere");
     const SurfaceGeometry surface = object.Evaluate(targets[i]);
-    places.push_back(X_Bo *
-                     Vector3d(surface.p + (*frame.sphere_radius - options.penetration) * surface.R.col(2)));
+    const double height = model.tip_radius(fingertips[i]) - options.penetration;
+    places.push_back(X_Bo * Vector3d(surface.p + height * surface.R.col(2)));
   }
 
   FingerPlacement result;
@@ -55,7 +53,7 @@ FingerPlacement SolveFingerPlacement(const RobotModel& model, std::span<const in
       constexpr double kLargestStep = 0.2;  // rad
       const double shrink = std::min(1.0, kLargestStep / std::max(step.cwiseAbs().maxCoeff(), 1e-300));
       for (size_t k = 0; k < own_joints[i].size(); ++k) {
-        const Joint& joint = model.joints()[static_cast<size_t>(own_joints[i][k])];
+        const Joint& joint = model.joint(own_joints[i][k]);
         double& position = result.q[q_offset + own_joints[i][k]];
         position =
             std::clamp(position + shrink * step[static_cast<Eigen::Index>(k)], joint.lower, joint.upper);

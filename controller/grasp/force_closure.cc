@@ -58,14 +58,12 @@ class WrenchSet {
 void RequireValid(const Eigen::Ref<const Matrix6Xd>& G, const Eigen::Ref<const VectorXd>& mu,
                   const ForceClosureOptions& options) {
   Require(mu.size() > 0, "mu", "must not be empty", 0.0);
-  Require(G.cols() == 3 * mu.size(), "G", "must have three columns for each mu",
-          static_cast<double>(G.cols()));
+  Require(G.cols() == 3 * mu.size(), "G", "must have three columns for each mu", G.cols());
   Require(G.allFinite(), "G", "must be finite", std::numeric_limits<double>::quiet_NaN());
   for (Eigen::Index i = 0; i < mu.size(); ++i) {
     Require(std::isfinite(mu[i]) && mu[i] > 0.0, "mu", "must be positive and finite", mu[i]);
   }
-  Require(std::isfinite(options.length) && options.length > 0.0, "length", "must be positive",
-          options.length);
+  RequirePositive(options.length, "length");
   Require(options.tolerance > 0.0 && options.tolerance < 1.0, "tolerance", "must be in (0, 1)",
           options.tolerance);
   Require(options.zero >= 0.0, "zero", "must not be negative", options.zero);

@@ -9,6 +9,7 @@
 namespace dexcheck {
 
 using grasp_internal::ChainSolution;
+using grasp_internal::JointRange;
 using grasp_internal::SerialChain;
 
 FramePlacement SolveFramePlacement(const RobotModel& model, int frame, const Pose& X_BF,
@@ -17,25 +18,20 @@ FramePlacement SolveFramePlacement(const RobotModel& model, int frame, const Pos
                                    const FramePlacementOptions& options) {
   RequireRotation(X_BF.linear(), "X_BF");
   Require(X_BF.translation().allFinite(), "X_BF", "must be finite", std::numeric_limits<double>::quiet_NaN());
-  Require(q_nominal.size() == q.size(), "q_nominal", "must have as many entries as q",
-          static_cast<double>(q_nominal.size()));
+  Require(q_nominal.size() == q.size(), "q_nominal", "must have as many entries as q", q_nominal.size());
   Require(options.num_starts >= 1, "num_starts", "must be at least 1", options.num_starts);
   Require(options.length > 0.0, "length", "must be positive", options.length);
   const SerialChain chain(model, frame, joints, q);
-  const VectorXd lower = chain.lower().array() + options.joint_margin;
-  const VectorXd upper = chain.upper().array() - options.joint_margin;
-  Require((lower.array() <= upper.array()).all(), "joint_margin", "must leave each joint a range",
-          options.joint_margin);
+  const JointRange range = chain.range().Shrink(options.joint_margin);
   const VectorXd nominal = chain.Gather(q_nominal);
 
   ChainSolution best;
   double best_error = std::numeric_limits<double>::infinity();
   for (int start = 0; start < options.num_starts && !best.reached; ++start) {
     VectorXd q_start = start == 0 ? chain.Gather(q) : nominal;
-    if (start >= 2) q_start = grasp_internal::CalcSpreadPoint(start - 1, lower, upper);
-    const ChainSolution solution =
-        SolveChain(chain, {X_BF, options.length, options.tolerance, options.max_iterations}, lower, upper,
-                   q_start, nominal);
+    if (start >= 2) q_start = range.CalcSpreadPoint(start - 1);
+    const ChainSolution solution = SolveChain(
+        chain, {X_BF, options.length, options.tolerance, options.max_iterations}, range, q_start, nominal);
     const double error = solution.position + options.length * solution.orientation;
     if (!solution.reached && error >= best_error) continue;
     best = solution;
@@ -46,7 +42,7 @@ FramePlacement SolveFramePlacement(const RobotModel& model, int frame, const Pos
   chain.Scatter(best.q, result.q);
   result.position_residual = best.position;
   result.orientation_residual = best.orientation;
-  result.joint_margin = grasp_internal::CalcRangeMargin(best.q, chain.lower(), chain.upper());
+  result.joint_margin = chain.range().CalcMargin(best.q);
   result.reached = best.reached;
   return result;
 }

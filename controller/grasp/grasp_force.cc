@@ -14,7 +14,7 @@ constexpr int kLeastContacts = 3;
 
 void RequireSize(Eigen::Index actual, Eigen::Index expected, const char* name) {
   if (actual == expected) return;
-  Require(false, name, "size must be " + std::to_string(expected), static_cast<double>(actual));
+  Require(false, name, "size must be " + std::to_string(expected), actual);
 }
 
 template <class Derived>

@@ -48,30 +48,27 @@ double CalcDistance(const Surface& object, const Vector3d& p) {
 HandReach::HandReach(const RobotModel& model, std::span<const int> fingertips, int palm_frame,
                      const Eigen::Ref<const VectorXd>& q, double joint_margin) {
   const std::vector<std::vector<int>> own = ListOwnJoints(model, fingertips);
-  const std::vector<int> palm_chain = ListChain(model, palm_frame);
+  const std::vector<int> palm_chain = model.ListChain(model.frame(palm_frame).link);
   const SerialChain palm(model, palm_frame, palm_chain, q);
   SerialChain::Poses poses;
   palm.CalcPoses(palm.Gather(q), &poses);
   const Pose X_PB = poses.frame.inverse();
   double farthest = 0.0;
   for (size_t i = 0; i < fingertips.size(); ++i) {
-    const Frame& frame = model.frames()[static_cast<size_t>(fingertips[i])];
-    if (!frame.sphere_radius) throw std::invalid_argument("fingertips: " + frame.name + " carries no sphere");
-    const std::vector<int> chain = ListChain(model, fingertips[i]);
+    const std::vector<int> chain = model.ListChain(model.frame(fingertips[i]).link);
     const bool on_palm = std::includes(chain.begin(), chain.end(), palm_chain.begin(), palm_chain.end());
     const bool is_free = std::find(palm_chain.begin(), palm_chain.end(), own[i].back()) == palm_chain.end();
     if (!on_palm || !is_free) {
-      throw std::invalid_argument("fingertips: " + frame.name + " does not hang on the palm with the others");
+      throw std::invalid_argument("fingertips: " + model.frame(fingertips[i]).name +
+                                  " does not hang on the palm with the others");
     }
-    Finger finger{SerialChain(model, fingertips[i], own[i], q), *frame.sphere_radius, {}, {}, {}, {}, {}};
+    Finger finger{
+        SerialChain(model, fingertips[i], own[i], q), model.tip_radius(fingertips[i]), {}, {}, {}, {}};
     finger.chain.SetRoot(X_PB);
-    finger.lower = finger.chain.lower().array() + joint_margin;
-    finger.upper = finger.chain.upper().array() - joint_margin;
-    Require((finger.lower.array() <= finger.upper.array()).all(), "joint_margin",
-            "must leave each joint a range", joint_margin);
-    finger.middle = 0.5 * (finger.lower + finger.upper);
+    finger.range = finger.chain.range().Shrink(joint_margin);
+    finger.middle = 0.5 * (finger.range.lower + finger.range.upper);
     for (int k = 1; k <= kPostures; ++k) {
-      finger.postures.push_back(CalcSpreadPoint(k, finger.lower, finger.upper));
+      finger.postures.push_back(finger.range.CalcSpreadPoint(k));
       finger.chain.CalcPoses(finger.postures.back(), &poses);
       finger.tips.push_back(poses.frame.translation());
       farthest = std::max(farthest, poses.frame.translation().z());
@@ -113,8 +110,7 @@ std::optional<Touch> HandReach::FindTouch(size_t finger_index, const Surface& ob
     constexpr int kMaxIterations = 40;
     Pose X = Pose::Identity();
     X.translation() = X_Po * Vector3d(surface.p + distance * n);
-    return SolveChain(finger.chain, {X, 0.0, kTolerance, kMaxIterations}, finger.lower, finger.upper, start,
-                      finger.middle);
+    return SolveChain(finger.chain, {X, 0.0, kTolerance, kMaxIterations}, finger.range, start, finger.middle);
   };
   const ChainSolution solution = solve(finger.radius, q_start);
   if (!solution.reached) return {};
@@ -147,7 +143,7 @@ std::optional<Touch> HandReach::FindTouch(size_t finger_index, const Surface& ob
   touch.G << R, Skew(surface.p) * R;
   touch.q = solution.q;
   touch.q_open = open.q;
-  touch.joint_margin = CalcRangeMargin(solution.q, finger.chain.lower(), finger.chain.upper());
+  touch.joint_margin = finger.chain.range().CalcMargin(solution.q);
   return touch;
 }
 

@@ -64,7 +64,7 @@ class HandReach {
   struct Finger {
     SerialChain chain;  // rooted in the palm frame
     double radius;
-    VectorXd lower, upper;  // ranges less the margin
+    JointRange range;  // less the margin
     VectorXd middle;
     std::vector<VectorXd> postures;  // all over the ranges
     std::vector<Vector3d> tips;      // fingertip's centre in them

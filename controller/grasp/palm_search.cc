@@ -52,12 +52,9 @@ PalmSearch::PalmSearch(const RobotModel& model, const Hand& hand, const HandReac
       options_(options),
       X_Bo_(X_Bo),
       arm_(model, hand.palm_frame, hand.arm_joints, q_nominal),
-      lower_(arm_.lower().array() + options.joint_margin),
-      upper_(arm_.upper().array() - options.joint_margin),
+      range_(arm_.range().Shrink(options.joint_margin)),
       nominal_(arm_.Gather(q_nominal)),
       p_Po_(hand.hold_at.value_or(reach.center() + kDistances.front() * reach.length() * Vector3d::UnitZ())) {
-  Require((lower_.array() <= upper_.array()).all(), "joint_margin", "must leave each joint a range",
-          options.joint_margin);
 }
 
 Pose PalmSearch::CalcPalmPose(const Vector3d& direction, double roll) const {
@@ -97,7 +94,7 @@ ChainSolution PalmSearch::SolveArm(const Pose& X_BP, const VectorXd& q_start) co
   constexpr double kLength = 0.2;       // m
   constexpr double kTolerance = 1e-12;  // m, rad
   constexpr int kMaxIterations = 60;
-  return SolveChain(arm_, {X_BP, kLength, kTolerance, kMaxIterations}, lower_, upper_, q_start, nominal_);
+  return SolveChain(arm_, {X_BP, kLength, kTolerance, kMaxIterations}, range_, q_start, nominal_);
 }
 
 void PalmSearch::Try(const Pose& X_BP, const std::vector<VectorXd>& starts, std::vector<PalmPose>* poses) {
@@ -113,7 +110,7 @@ void PalmSearch::Try(const Pose& X_BP, const std::vector<VectorXd>& starts, std:
     tally_.nearest_miss = std::min(tally_.nearest_miss, solution.position);
     if (!solution.reached) continue;
     reached = true;
-    const double margin = CalcRangeMargin(solution.q, arm_.lower(), arm_.upper());
+    const double margin = arm_.range().CalcMargin(solution.q);
     if (!IsArmClear(solution.q) || (best && margin <= best->arm_margin)) continue;
     best = PalmPose{X_BP, solution.q, margin};
   }
@@ -132,7 +129,7 @@ std::vector<PalmPose> PalmSearch::List() {
       std::vector<VectorXd> starts;
       if (!poses.empty()) starts.push_back(poses.back().q_arm);
       starts.push_back(nominal_);
-      for (int k = 1; k <= kExtraStarts; ++k) starts.push_back(CalcSpreadPoint(k, lower_, upper_));
+      for (int k = 1; k <= kExtraStarts; ++k) starts.push_back(range_.CalcSpreadPoint(k));
       Try(CalcPalmPose(direction, 2.0 * kPi * roll / kRolls), starts, &poses);
     }
   }

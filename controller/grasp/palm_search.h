@@ -60,9 +60,9 @@ class PalmSearch {
   const ContactPlanOptions& options_;
   Pose X_Bo_;
   SerialChain arm_;
-  VectorXd lower_, upper_;  // of the arm, less the margin
-  VectorXd nominal_;        // of the arm
-  Vector3d p_Po_;           // where the hand holds the object
+  JointRange range_;  // of the arm, less the margin
+  VectorXd nominal_;  // of the arm
+  Vector3d p_Po_;     // where the hand holds the object
   PalmTally tally_;
 };
 

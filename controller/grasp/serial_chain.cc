@@ -11,22 +11,14 @@
 
 namespace dexcheck::grasp_internal {
 
-std::vector<int> ListChain(const RobotModel& model, int frame) {
-  std::vector<int> chain;
-  int joint = model.frames().at(static_cast<size_t>(frame)).link;
-  for (; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent) chain.push_back(joint);
-  std::reverse(chain.begin(), chain.end());
-  return chain;
-}
-
 std::vector<std::vector<int>> ListOwnJoints(const RobotModel& model, std::span<const int> fingertips) {
   std::vector<int> users(static_cast<size_t>(model.num_joints()), 0);
   for (const int frame : fingertips) {
-    for (const int joint : ListChain(model, frame)) ++users[static_cast<size_t>(joint)];
+    for (const int joint : model.ListChain(model.frame(frame).link)) ++users[static_cast<size_t>(joint)];
   }
   std::vector<std::vector<int>> own(fingertips.size());
   for (size_t i = 0; i < fingertips.size(); ++i) {
-    std::vector<int> chain = ListChain(model, fingertips[i]);
+    std::vector<int> chain = model.ListChain(model.frame(fingertips[i]).link);
     std::reverse(chain.begin(), chain.end());
     for (const int joint : chain) {
       if (users[static_cast<size_t>(joint)] == 1) own[i].push_back(joint);
@@ -39,12 +31,10 @@ std::vector<std::vector<int>> ListOwnJoints(const RobotModel& model, std::span<c
 SerialChain::SerialChain(const RobotModel& model, int frame, std::span<const int> joints,
                          const Eigen::Ref<const VectorXd>& q)
     : q_offset_(model.num_base_positions()) {
-  Require(q.size() == model.num_positions(), "q", "must have an entry for each position",
-          static_cast<double>(q.size()));
-  const std::vector<int> chain = ListChain(model, frame);
+  Require(q.size() == model.num_positions(), "q", "must have an entry for each position", q.size());
   Pose held = model.CalcBasePose(q);
-  for (const int index : chain) {
-    const Joint& joint = model.joints()[static_cast<size_t>(index)];
+  for (const int index : model.ListChain(model.frame(frame).link)) {
+    const Joint& joint = model.joint(index);
     const bool revolute = joint.type == JointType::kRevolute;
     held = held * joint.X_PB;
     if (std::find(joints.begin(), joints.end(), index) == joints.end()) {
@@ -60,17 +50,16 @@ SerialChain::SerialChain(const RobotModel& model, int frame, std::span<const int
     segments_.push_back({held, revolute, revolute ? mdh.q : mdh.d});
     held = Pose::Identity();
   }
-  after_ = held * model.frames()[static_cast<size_t>(frame)].X_LF;
+  after_ = held * model.frame(frame).X_LF;
   if (joints_.size() != joints.size() || joints.empty()) {
-    throw std::invalid_argument("joints: each must move frame " +
-                                model.frames()[static_cast<size_t>(frame)].name + ", once");
+    throw std::invalid_argument("joints: each must move frame " + model.frame(frame).name + ", once");
   }
-  lower_.resize(size());
-  upper_.resize(size());
+  range_.lower.resize(size());
+  range_.upper.resize(size());
   for (Eigen::Index k = 0; k < size(); ++k) {
-    const Joint& joint = model.joints()[static_cast<size_t>(joints_[static_cast<size_t>(k)])];
-    lower_[k] = joint.lower;
-    upper_[k] = joint.upper;
+    const Joint& joint = model.joint(joints_[static_cast<size_t>(k)]);
+    range_.lower[k] = joint.lower;
+    range_.upper[k] = joint.upper;
   }
 }
 
@@ -126,10 +115,10 @@ constexpr double kLargestStep = 0.3;  // rad or m
 template <int kRows>
 class ChainSolver {
  public:
-  ChainSolver(const SerialChain& chain, const ChainTarget& target, const VectorXd& lower,
-              const VectorXd& upper, const VectorXd& q_start)
-      : chain_(chain), target_(target), lower_(lower), upper_(upper) {
-    result_.q = q_start.cwiseMax(lower).cwiseMin(upper);
+  ChainSolver(const SerialChain& chain, const ChainTarget& target, const JointRange& range,
+              const VectorXd& q_start)
+      : chain_(chain), target_(target), range_(range) {
+    result_.q = q_start.cwiseMax(range.lower).cwiseMin(range.upper);
     SetError();
   }
 
@@ -152,7 +141,7 @@ class ChainSolver {
     const double largest = step_.cwiseAbs().maxCoeff();
     if (largest > kLargestStep) step_ *= kLargestStep / largest;
     const VectorXd before = result_.q;
-    result_.q = (result_.q + step_).cwiseMax(lower_).cwiseMin(upper_);
+    result_.q = (result_.q + step_).cwiseMax(range_.lower).cwiseMin(range_.upper);
     SetError();
     return (result_.q - before).cwiseAbs().maxCoeff();
   }
@@ -207,8 +196,8 @@ class ChainSolver {
   bool HoldJointsAtEnds() {
     bool held = false;
     for (Eigen::Index k = 0; k < chain_.size(); ++k) {
-      const bool leaves =
-          (result_.q[k] <= lower_[k] && step_[k] < 0.0) || (result_.q[k] >= upper_[k] && step_[k] > 0.0);
+      const bool leaves = (result_.q[k] <= range_.lower[k] && step_[k] < 0.0) ||
+                          (result_.q[k] >= range_.upper[k] && step_[k] > 0.0);
       if (!leaves || !free_[static_cast<size_t>(k)]) continue;
       free_[static_cast<size_t>(k)] = false;
       held = true;
@@ -218,8 +207,7 @@ class ChainSolver {
 
   const SerialChain& chain_;
   const ChainTarget& target_;
-  const VectorXd& lower_;
-  const VectorXd& upper_;
+  const JointRange& range_;
   ChainSolution result_;
   SerialChain::Poses poses_;
   Rows error_;
@@ -269,19 +257,26 @@ ChainSolution Solve(ChainSolver<kRows> solver, int max_iterations, const VectorX
 
 }  // namespace
 
-ChainSolution SolveChain(const SerialChain& chain, const ChainTarget& target, const VectorXd& lower,
-                         const VectorXd& upper, const VectorXd& q_start, const VectorXd& q_nominal) {
+ChainSolution SolveChain(const SerialChain& chain, const ChainTarget& target, const JointRange& range,
+                         const VectorXd& q_start, const VectorXd& q_nominal) {
   if (target.length > 0.0) {
-    return Solve(ChainSolver<6>(chain, target, lower, upper, q_start), target.max_iterations, q_nominal);
+    return Solve(ChainSolver<6>(chain, target, range, q_start), target.max_iterations, q_nominal);
   }
-  return Solve(ChainSolver<3>(chain, target, lower, upper, q_start), target.max_iterations, q_nominal);
+  return Solve(ChainSolver<3>(chain, target, range, q_start), target.max_iterations, q_nominal);
 }
 
-double CalcRangeMargin(const VectorXd& q, const VectorXd& lower, const VectorXd& upper) {
+JointRange JointRange::Shrink(double joint_margin) const {
+  JointRange shrunk{lower.array() + joint_margin, upper.array() - joint_margin};
+  Require((shrunk.lower.array() <= shrunk.upper.array()).all(), "joint_margin",
+          "must leave each joint a range", joint_margin);
+  return shrunk;
+}
+
+double JointRange::CalcMargin(const VectorXd& q) const {
   return std::min((q - lower).minCoeff(), (upper - q).minCoeff());
 }
 
-VectorXd CalcSpreadPoint(int index, const VectorXd& lower, const VectorXd& upper) {
+VectorXd JointRange::CalcSpreadPoint(int index) const {
   const Eigen::Index n = lower.size();
   double phi = 2.0;
   constexpr int kIterations = 40;

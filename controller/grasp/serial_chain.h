@@ -12,12 +12,23 @@
 
 namespace dexcheck::grasp_internal {
 
-/// Joints on the chain from the base to a frame, the base's side first.
-std::vector<int> ListChain(const RobotModel& model, int frame);
-
 /// For each fingertip the joints that move it and no other one of them, the fingertip's side first.
 /// @throws std::invalid_argument when one has none.
 std::vector<std::vector<int>> ListOwnJoints(const RobotModel& model, std::span<const int> fingertips);
+
+/// Ranges of joints, rad or m.
+struct JointRange {
+  VectorXd lower, upper;
+
+  /// The same less a margin at each end. @throws std::invalid_argument when that leaves a joint no range.
+  [[nodiscard]] JointRange Shrink(double joint_margin) const;
+  /// Smallest distance of an entry of q from the ends of its range; negative outside.
+  [[nodiscard]] double CalcMargin(const VectorXd& q) const;
+  /// The index-th point (from 1 on) of the additive recurrence x_k = frac(1/2 + index / phi^k), scaled to the
+  /// ranges; phi > 1 solves phi^(n+1) = phi + 1 for n coordinates, of which the golden ratio is the case n
+  /// = 1.
+  [[nodiscard]] VectorXd CalcSpreadPoint(int index) const;
+};
 
 /// The chain from the base to a frame with some of its joints free and all others held.
 class SerialChain {
@@ -31,9 +42,7 @@ class SerialChain {
   /// Free joints, the base's side first; the order of `q` below.
   [[nodiscard]] const std::vector<int>& joints() const { return joints_; }
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(joints_.size()); }
-  /// Ranges, rad or m.
-  [[nodiscard]] const VectorXd& lower() const { return lower_; }
-  [[nodiscard]] const VectorXd& upper() const { return upper_; }
+  [[nodiscard]] const JointRange& range() const { return range_; }
 
   /// Expresses all that follows in another frame than the world: X_RB places the world in it.
   void SetRoot(const Pose& X_RB) { segments_.front().before = X_RB * segments_.front().before; }
@@ -63,8 +72,7 @@ class SerialChain {
   std::vector<Segment> segments_;
   Pose after_;  // the frame in the last free joint's link
   int q_offset_;
-  VectorXd lower_;
-  VectorXd upper_;
+  JointRange range_;
 };
 
 /// Where a chain's frame should be.
@@ -82,16 +90,9 @@ struct ChainSolution {
   bool reached = false;
 };
 
-/// Damped least squares from `q_start` with joints kept in [lower, upper]; what the target leaves free is
-/// pulled towards `q_nominal`. Sizes are the chain's.
-ChainSolution SolveChain(const SerialChain& chain, const ChainTarget& target, const VectorXd& lower,
-                         const VectorXd& upper, const VectorXd& q_start, const VectorXd& q_nominal);
-
-/// Smallest distance of an entry from the ends of its range; negative outside.
-double CalcRangeMargin(const VectorXd& q, const VectorXd& lower, const VectorXd& upper);
-
-/// The index-th point (from 1 on) of the additive recurrence x_k = frac(1/2 + index / phi^k), scaled to the
-/// box; phi > 1 solves phi^(n+1) = phi + 1 for n coordinates, of which the golden ratio is the case n = 1.
-VectorXd CalcSpreadPoint(int index, const VectorXd& lower, const VectorXd& upper);
+/// Damped least squares from `q_start` with joints kept in `range`; what the target leaves free is pulled
+/// towards `q_nominal`. Sizes are the chain's.
+ChainSolution SolveChain(const SerialChain& chain, const ChainTarget& target, const JointRange& range,
+                         const VectorXd& q_start, const VectorXd& q_nominal);
 
 }  // namespace dexcheck::grasp_internal

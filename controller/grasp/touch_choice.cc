@@ -13,8 +13,8 @@ TouchChooser::TouchChooser(const HandReach& hand, double mu, double length, Touc
     directions_.emplace_back(Vector6d::Unit(k));
     directions_.emplace_back(-Vector6d::Unit(k));
   }
-  const VectorXd one = VectorXd::Ones(6);
-  for (int k = 1; k <= kDirections; ++k) directions_.emplace_back(CalcSpreadPoint(k, -one, one).normalized());
+  const JointRange cube{-VectorXd::Ones(6), VectorXd::Ones(6)};
+  for (int k = 1; k <= kDirections; ++k) directions_.emplace_back(cube.CalcSpreadPoint(k).normalized());
 }
 
 VectorXd TouchChooser::CalcSupports(const Touch& touch) const {

@@ -1,6 +1,7 @@
 #include "controller/handling/pick_and_place.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "controller/common/errors.h"
@@ -29,27 +30,9 @@ constexpr double kWeighingRate = 0.2;      // of the stated weight, 1/s
 }  // namespace
 
 const char* NameOf(Phase phase) {
-  switch (phase) {
-    case Phase::kApproach:
-      return "approach";
-    case Phase::kClose:
-      return "close";
-    case Phase::kGrip:
-      return "grip";
-    case Phase::kTakeOver:
-      return "take over";
-    case Phase::kCarry:
-      return "carry";
-    case Phase::kHandOver:
-      return "hand over";
-    case Phase::kRelease:
-      return "release";
-    case Phase::kWithdraw:
-      return "withdraw";
-    case Phase::kDone:
-      return "done";
-  }
-  return "done";
+  constexpr std::array<const char*, 9> kNames = {"approach",  "close",   "grip",     "take over", "carry",
+                                                 "hand over", "release", "withdraw", "done"};
+  return kNames.at(static_cast<size_t>(phase));
 }
 
 PickAndPlace::PickAndPlace(const RobotModel& model, const Hand& hand, const Surface& surface,
@@ -196,38 +179,16 @@ void PickAndPlace::Update(double t, const MeasuredState& state, const Touch& tou
   if (phase_ == Phase::kClose || phase_ == Phase::kGrip) {
     push_ = std::max(push_, (state.X_Bo.translation() - lay_at_).norm());
   }
-  switch (phase_) {
-    case Phase::kApproach:
-      UpdateApproach(t);
-      break;
-    case Phase::kClose:
-      UpdateClose(t, state, touch);
-      break;
-    case Phase::kGrip:
-      UpdateGrip(t, state);
-      break;
-    case Phase::kTakeOver:
-      UpdateTakeOver(t, touch);
-      break;
-    case Phase::kCarry:
-      UpdateCarry(t);
-      break;
-    case Phase::kHandOver:
-      UpdateHandOver(t);
-      break;
-    case Phase::kRelease:
-      UpdateRelease(t, state);
-      break;
-    case Phase::kWithdraw:
-      UpdateWithdraw(t, state);
-      break;
-    case Phase::kDone:
-      break;
-  }
+  // By phase.
+  constexpr std::array<void (PickAndPlace::*)(double, const MeasuredState&, const Touch&), 9> kUpdates = {
+      &PickAndPlace::UpdateApproach, &PickAndPlace::UpdateClose,    &PickAndPlace::UpdateGrip,
+      &PickAndPlace::UpdateTakeOver, &PickAndPlace::UpdateCarry,    &PickAndPlace::UpdateHandOver,
+      &PickAndPlace::UpdateRelease,  &PickAndPlace::UpdateWithdraw, nullptr};
+  if (const auto update = kUpdates.at(static_cast<size_t>(phase_))) (this->*update)(t, state, touch);
   FollowMove(t);
 }
 
-void PickAndPlace::UpdateApproach(double t) {
+void PickAndPlace::UpdateApproach(double t, const MeasuredState& /*state*/, const Touch& /*touch*/) {
   if (!MoveDone(t)) return;
   if (stage_ == 0) {
     stage_ = 1;
@@ -279,12 +240,12 @@ void PickAndPlace::UpdateClose(double t, const MeasuredState& state, const Touch
     }
     StartMove(move_.to, to, t, way / options_.search_speed, /*steady=*/true);
   } else {
-    const std::string& name = model_->frames()[static_cast<size_t>(missing)].name;
+    const std::string& name = model_->frame(missing).name;
     GiveUp(t, state, "fingertip " + Quote(name) + " found no object where it should be");
   }
 }
 
-void PickAndPlace::UpdateGrip(double t, const MeasuredState& state) {
+void PickAndPlace::UpdateGrip(double t, const MeasuredState& state, const Touch& /*touch*/) {
   const double s = CalcMinSnap(t - begin_, options_.grip_time).s;
   demand_.grip = s;
   demand_.weight = 0.0;
@@ -303,7 +264,7 @@ void PickAndPlace::UpdateGrip(double t, const MeasuredState& state) {
   demand_.desired.X_d = X_start_;
 }
 
-void PickAndPlace::UpdateTakeOver(double t, const Touch& touch) {
+void PickAndPlace::UpdateTakeOver(double t, const MeasuredState& /*state*/, const Touch& touch) {
   borne_ = demand_.weight;
   const bool free = touch.support_force <= 0.0;
   if (stage_ == 0) {
@@ -360,7 +321,7 @@ DesiredMotion PickAndPlace::EvaluateCarry(double t) const {
   return desired;
 }
 
-void PickAndPlace::UpdateCarry(double t) {
+void PickAndPlace::UpdateCarry(double t, const MeasuredState& /*state*/, const Touch& /*touch*/) {
   demand_.weight = demand_.scale;
   demand_.desired = EvaluateCarry(t);
   // The arm bends as the plan has it, so that fingers need not.
@@ -384,14 +345,14 @@ void PickAndPlace::UpdateCarry(double t) {
   Enter(Phase::kHandOver, t);
 }
 
-void PickAndPlace::UpdateHandOver(double t) {
+void PickAndPlace::UpdateHandOver(double t, const MeasuredState& /*state*/, const Touch& /*touch*/) {
   demand_.weight = lowering_from_ * (1.0 - CalcMinSnap(t - begin_, options_.take_over_time).s);
   if (t < begin_ + options_.take_over_time + kRest) return;
   demand_.carried = false;
   Enter(Phase::kRelease, t);
 }
 
-void PickAndPlace::UpdateRelease(double t, const MeasuredState& state) {
+void PickAndPlace::UpdateRelease(double t, const MeasuredState& state, const Touch& /*touch*/) {
   const double since = t - stage_begin_;
   if (stage_ == 0) {
     const double s = CalcMinSnap(since, kReleaseTime).s;
@@ -420,7 +381,7 @@ void PickAndPlace::UpdateRelease(double t, const MeasuredState& state) {
   }
 }
 
-void PickAndPlace::UpdateWithdraw(double t, const MeasuredState& state) {
+void PickAndPlace::UpdateWithdraw(double t, const MeasuredState& state, const Touch& /*touch*/) {
   if (!MoveDone(t)) return;
   if (stage_ == 0 && retrying_) {
     retrying_ = false;

@@ -122,14 +122,14 @@ class PickAndPlace {
   void HoldPosture(const VectorXd& q_joints);
   [[nodiscard]] VectorXd Joints(const MeasuredState& state) const;
 
-  void UpdateApproach(double t);
+  void UpdateApproach(double t, const MeasuredState& state, const Touch& touch);
   void UpdateClose(double t, const MeasuredState& state, const Touch& touch);
-  void UpdateGrip(double t, const MeasuredState& state);
-  void UpdateTakeOver(double t, const Touch& touch);
-  void UpdateCarry(double t);
-  void UpdateHandOver(double t);
-  void UpdateRelease(double t, const MeasuredState& state);
-  void UpdateWithdraw(double t, const MeasuredState& state);
+  void UpdateGrip(double t, const MeasuredState& state, const Touch& touch);
+  void UpdateTakeOver(double t, const MeasuredState& state, const Touch& touch);
+  void UpdateCarry(double t, const MeasuredState& state, const Touch& touch);
+  void UpdateHandOver(double t, const MeasuredState& state, const Touch& touch);
+  void UpdateRelease(double t, const MeasuredState& state, const Touch& touch);
+  void UpdateWithdraw(double t, const MeasuredState& state, const Touch& touch);
   void GiveUp(double t, const MeasuredState& state, const std::string& reason);
   void PlanAttempt(double t, const MeasuredState& state);
   [[nodiscard]] DesiredMotion EvaluateCarry(double t) const;

@@ -15,7 +15,7 @@ PickAndPlaceController::PickAndPlaceController(const RobotModel& model, const Ha
       law_(model, hand.fingertips, object, surface, options),
       task_(model, hand, surface, object, q_start, task, time_step) {
   Require(options.orientation == OrientationFeedback::kRotation, "orientation", "must be kRotation",
-          static_cast<double>(options.orientation));
+          options.orientation);
   sigma_prime_.setZero(model.num_velocities());
   tau_ = tau_before_ = sigma_prime_;
 }

@@ -67,7 +67,7 @@ Base ReadBase(const TomlValue& value) {
                                                     {"planar", BaseType::kPlanar},
                                                     {"differential_drive", BaseType::kDifferentialDrive},
                                                     {"floating", BaseType::kFloating}});
-  base.link = ReadPartName(table.Get("link"));
+  base.link = table.Get("link").AsPartName();
   if (base.type == BaseType::kDifferentialDrive) {
     ReadDrive(table, base);
   } else if (const std::optional<TomlValue> pose = table.Find("pose")) {

@@ -8,8 +8,7 @@ namespace dexcheck {
 namespace {
 
 void RequireDifferentialDrive(const Base& base) {
-  Require(base.type == BaseType::kDifferentialDrive, "base type", "must be a differential drive",
-          static_cast<double>(base.type));
+  Require(base.type == BaseType::kDifferentialDrive, "base type", "must be a differential drive", base.type);
   Require(base.wheel_radius > 0.0, "wheel_radius", "must be positive", base.wheel_radius);
   Require(base.wheel_distance > 0.0, "wheel_distance", "must be positive", base.wheel_distance);
 }
@@ -65,12 +64,31 @@ Matrix2d CalcWheelRateMap(const Base& base) {
   return W;
 }
 
-Vector2d CalcWheelRates(const Base& base, const Vector2d& v) { return CalcWheelRateMap(base) * v; }
+Vector2d CalcWheelRates(const Base& base, const Vector2d& v) {
+  RequireDifferentialDrive(base);
+  if (base.velocity == DriveVelocity::kWheelRates) return v;
+  return CalcWheelRatesOfTwist(base, v);
+}
+
+Vector2d CalcWheelRatesOfTwist(const Base& base, const Vector2d& twist) {
+  // thetadot_r,l = (v_c +- w_c b/2) / r
+  const double turn = 0.5 * base.wheel_distance * twist[1];
+  return Vector2d(twist[0] + turn, twist[0] - turn) / base.wheel_radius;
+}
+
+Vector2d CalcTwist(const Base& base, const Vector2d& wheel_rates) {
+  // v_c = r (thetadot_r + thetadot_l) / 2,  w_c = r (thetadot_r - thetadot_l) / b
+  return {0.5 * base.wheel_radius * wheel_rates.sum(),
+          base.wheel_radius * (wheel_rates[0] - wheel_rates[1]) / base.wheel_distance};
+}
 
 Vector2d CalcDriveVelocity(const Base& base, const Vector2d& wheel_rates) {
   RequireDifferentialDrive(base);
-  if (base.velocity == DriveVelocity::kWheelRates) return wheel_rates;
-  return CalcTwistFromWheels(base) * wheel_rates;
+  return base.velocity == DriveVelocity::kWheelRates ? wheel_rates : CalcTwist(base, wheel_rates);
+}
+
+Vector2d CalcDriveVelocityOfTwist(const Base& base, const Vector2d& twist) {
+  return base.velocity == DriveVelocity::kTwist ? twist : CalcWheelRatesOfTwist(base, twist);
 }
 
 }  // namespace dexcheck

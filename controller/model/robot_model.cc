@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 #include <utility>
@@ -281,6 +282,29 @@ int RobotModel::FindFrame(std::string_view name) const {
   const int frame = FindByName(spec_.frames, &Frame::name, name);
   if (frame < 0) throw std::invalid_argument("frame: must exist in " + spec_.source + ", got " + Quote(name));
   return frame;
+}
+
+double RobotModel::tip_radius(int frame) const {
+  const Frame& tip = this->frame(frame);
+  if (!tip.sphere_radius) throw std::invalid_argument("fingertips: " + tip.name + " carries no sphere");
+  return *tip.sphere_radius;
+}
+
+std::vector<int> RobotModel::ListChain(int link) const {
+  std::vector<int> chain;
+  for (int joint = link; joint >= 0; joint = this->joint(joint).parent) chain.push_back(joint);
+  std::reverse(chain.begin(), chain.end());
+  return chain;
+}
+
+std::vector<int> RobotModel::ListMovingEntries(int link) const {
+  const int base = num_base_velocities();
+  std::vector<int> entries(static_cast<size_t>(base));
+  std::iota(entries.begin(), entries.end(), 0);
+  for (const int index : ListChain(link)) {
+    for (int k = 0; k < CountVelocities(joint(index).type); ++k) entries.push_back(base + dof(index) + k);
+  }
+  return entries;
 }
 
 const std::string& RobotModel::link_name(int joint) const {

@@ -141,6 +141,9 @@ class RobotModel {
   [[nodiscard]] const Base& base() const { return spec_.base; }
   [[nodiscard]] const std::vector<Joint>& joints() const { return spec_.joints; }
   [[nodiscard]] const std::vector<Frame>& frames() const { return spec_.frames; }
+  /// One of them. @throws std::out_of_range.
+  [[nodiscard]] const Joint& joint(int index) const { return spec_.joints.at(static_cast<size_t>(index)); }
+  [[nodiscard]] const Frame& frame(int index) const { return spec_.frames.at(static_cast<size_t>(index)); }
   [[nodiscard]] const std::optional<ObjectModel>& object() const { return spec_.object; }
 
   /// Number of joints of the tree (without the base and the wheels).
@@ -176,6 +179,13 @@ class RobotModel {
   [[nodiscard]] int FindFrame(std::string_view name) const;
   /// Indices of the fingertip frames, in the file's order (R1..R4, L1..L4 for the paper's robot).
   [[nodiscard]] const std::vector<int>& fingertips() const { return fingertips_; }
+  /// Radius of the sphere that a fingertip's frame carries, m.
+  /// @throws std::invalid_argument when it carries none.
+  [[nodiscard]] double tip_radius(int frame) const;
+  /// Joints from the base to the one that moves a link, itself last; none for the base's link, -1.
+  [[nodiscard]] std::vector<int> ListChain(int link) const;
+  /// Entries of xi that move a link, ascending: the base's, then those of its chain.
+  [[nodiscard]] std::vector<int> ListMovingEntries(int link) const;
   /// Name of a link by the index of its joint; -1 is the base's link.
   [[nodiscard]] const std::string& link_name(int joint) const;
 

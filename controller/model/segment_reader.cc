@@ -35,8 +35,8 @@ void ReadPlainTransform(TomlTable& table, SegmentRow& row) {
 SegmentRow ReadRow(const TomlValue& value, Convention convention) {
   TomlTable table = value.AsTable();
   SegmentRow row{value,
-                 ReadPartName(table.Get("joint")),
-                 ReadPartName(table.Get("link")),
+                 table.Get("joint").AsPartName(),
+                 table.Get("link").AsPartName(),
                  JointType::kRevolute,
                  {},
                  Pose::Identity(),
@@ -46,7 +46,7 @@ SegmentRow ReadRow(const TomlValue& value, Convention convention) {
                                           {"prismatic", JointType::kPrismatic},
                                           {"ball", JointType::kBall}});
   }
-  // A ball turns about all axes of the link's own frame, whose place is told by a plain transform.
+  // A ball turns about all axes of the link's own frame, placed by a plain transform.
   if (row.type == JointType::kBall) {
     row.X_before = ReadPose(table);
     row.written.is_plain = true;
@@ -144,17 +144,6 @@ std::vector<Entry> ReadList(const std::optional<TomlValue>& value, Entry (*read)
 }
 
 }  // namespace
-
-std::string ReadPartName(const TomlValue& value) {
-  constexpr size_t kMaxLength = 256;
-  std::string name = value.AsText();
-  const bool has_controls =
-      std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; });
-  if (name.empty() || name.size() > kMaxLength || has_controls) {
-    value.Fail("must be a name of 1 to 256 bytes without control characters");
-  }
-  return name;
-}
 
 FrameEntry ReadFrameEntry(const TomlValue& value) {
   TomlTable table = value.AsTable();

@@ -70,10 +70,6 @@ struct Segment {
   std::vector<FrameEntry> frames;
 };
 
-/// A name of a joint, link or frame, as other formats allow it: 1 to 256 bytes without control characters.
-/// @throws InputError.
-std::string ReadPartName(const TomlValue& value);
-
 /// Reads `rows`, `joints`, `links` and `frames`, each of which may be missing. @throws InputError.
 Segment ReadSegment(TomlTable& table);
 

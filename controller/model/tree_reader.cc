@@ -121,7 +121,7 @@ class TreeReader {
   void ReadChain(const TomlValue& value) {
     TomlTable table = value.AsTable();
     Chain chain{value, table.Get("parent"), "", Pose::Identity(), ReadSegment(table)};
-    if (const std::optional<TomlValue> prefix = table.Find("prefix")) chain.prefix = ReadPartName(*prefix);
+    if (const std::optional<TomlValue> prefix = table.Find("prefix")) chain.prefix = prefix->AsPartName();
     if (const std::optional<TomlValue> pose = table.Find("pose")) chain.X_PB = ReadPose(*pose);
     if (const std::optional<TomlValue> name = table.Find("template")) chain.common = FindTemplate(*name);
     table.RejectUnused();
@@ -247,7 +247,7 @@ class TreeReader {
     std::set<int> seen = {joint};
     for (const Mimic* at = &first; at != nullptr;) {
       const MimicEntry& entry = *at->entry;
-      const std::string name = ReadPartName(entry.joint);
+      const std::string name = entry.joint.AsPartName();
       coupling.leader = FindJoint(at->prefix + name);
       if (coupling.leader < 0) coupling.leader = FindJoint(name);
       if (coupling.leader < 0) {
@@ -292,7 +292,7 @@ class TreeReader {
   }
 
   void BuildFrame(const FrameEntry& frame, const TomlValue& owner, const std::string& prefix) {
-    const std::string name = prefix + ReadPartName(frame.name);
+    const std::string name = prefix + frame.name.AsPartName();
     const std::string own_link = frame.link.AsText();
     const std::string link = prefix + own_link;
     frame_names_.Add(name, owner);

@@ -34,7 +34,7 @@ void DeclaredPlant::Expect(const DisturbanceOptions& disturbance, const PartCont
 
 const DeclaredStep& DeclaredPlant::Follow(const StepRecord& step) {
   const MeasuredState& state = step.reading.state;
-  sensing_.Tell(step.reading, &step_.measured);
+  sensing_.Measure(step.reading, &step_.measured);
   drive_.Drive(step.command.tau, state.xi, &step_.tau);
   step_.model = step.model;
   if (step_.is_ideal) return step_;

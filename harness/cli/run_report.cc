@@ -139,7 +139,7 @@ void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult&
                loop.record().step, 1e3 * scenario.plant.time_step);
     if (scenario.tolerance > 0.0) fmt::print("judged to a relative tolerance of {:g}\n", scenario.tolerance);
     if (!scenario.imperfections.is_ideal()) {
-      for (const std::string& key : scenario.imperfections.asked) fmt::print("asked for: {}\n", key);
+      for (const std::string& key : scenario.imperfections.declared) fmt::print("declared: {}\n", key);
     }
     PrintTracking(scenario, result.tracking);
     if (scenario.control.kappa == ContactSource::kIntegrated) {

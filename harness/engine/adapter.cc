@@ -15,13 +15,6 @@
 namespace dexcheck {
 namespace {
 
-Pose BodyPose(const mjData& data, int body) {
-  Pose X = Pose::Identity();
-  X.linear() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(data.xmat + 9 * body);
-  X.translation() = MapVector(data.xpos + 3 * body);
-  return X;
-}
-
 /// The body that carries the joints which move `body`: itself, or the one it is welded to.
 int MovingBody(const mjModel& engine, int body) { return engine.body_weldid[body]; }
 
@@ -53,6 +46,10 @@ double CalcRollingRadius(const mjModel& engine, int body) {
 }
 
 constexpr int kNoBody = -1;
+
+/// By JointType.
+constexpr std::array<std::pair<mjtJoint, const char*>, 3> kJointKinds = {
+    {{mjJNT_HINGE, "hinge"}, {mjJNT_SLIDE, "slide"}, {mjJNT_BALL, "ball"}}};
 
 /// Whether another joint of the same body stands between this one and the body.
 bool HasJointBehind(const mjModel& engine, int joint) {
@@ -128,6 +125,10 @@ void Adapter::MatchJoints(const std::string& engine_source) {
                                    : need(mjOBJ_SITE, "site", frame.name));
   }
   if (model_->object()) object_body_ = need(mjOBJ_BODY, "body", model_->object()->name);
+  if (object_body_ >= 0 && engine.body_jntnum[object_body_] > 0) {
+    object_qpos_ = engine.jnt_qposadr[engine.body_jntadr[object_body_]];
+    object_dof_ = engine.jnt_dofadr[engine.body_jntadr[object_body_]];
+  }
   std::vector<std::string> only_in_engine;
   const BaseType base = model_->base().type;
   const std::set<int> trees = FindTrees();
@@ -149,18 +150,13 @@ void Adapter::MatchJoints(const std::string& engine_source) {
 
   // Then that each joint is of one kind and moves the link of one name, carried by the same parent.
   for (int i = 0; i < model_->num_joints(); ++i) {
-    const Joint& joint = model_->joints()[static_cast<size_t>(i)];
+    const Joint& joint = model_->joint(i);
     const int id = joint_ids_[static_cast<size_t>(i)];
     const int body = engine.jnt_bodyid[id];
     const std::string key = "joint " + Quote(joint.name) + ": ";
-    const bool hinge = engine.jnt_type[id] == mjJNT_HINGE;
-    const bool slide = engine.jnt_type[id] == mjJNT_SLIDE;
-    if (joint.type == JointType::kRevolute && !hinge)
-      fail(key + "must be a hinge (revolute in the parameters)");
-    if (joint.type == JointType::kPrismatic && !slide)
-      fail(key + "must be a slide (prismatic in the parameters)");
-    if (joint.type == JointType::kBall && engine.jnt_type[id] != mjJNT_BALL)
-      fail(key + "must be a ball (ball in the parameters)");
+    const auto& [kind, kind_name] = kJointKinds.at(static_cast<size_t>(joint.type));
+    if (engine.jnt_type[id] != kind)
+      fail(key + "must be a " + kind_name + " (" + NameOf(joint.type) + " in the parameters)");
     const int link_body = link_bodies_[static_cast<size_t>(i + 1)];
     if (link_body != kNoBody && body != link_body) {
       fail(key + "must move body " + Quote(joint.link) + ", moves " +
@@ -233,7 +229,7 @@ void Adapter::MatchBase(const std::string& engine_source) {
   mj_kinematics(&engine, data.get());
   const Pose& X_B0 = model_->base().X_B0;
   if (base_is_free_) {
-    X_0b_ = X_B0.inverse() * BodyPose(*data, body);
+    X_0b_ = X_B0.inverse() * MapPose(data->xmat + 9 * body, data->xpos + 3 * body);
   } else {
     reference_anchor_ = MapVector(data->xanchor + 3 * (first + 2));
     X_0b_ = X_B0.inverse() * Eigen::Translation3d(reference_anchor_);
@@ -305,13 +301,7 @@ void Adapter::SetPositions(const Eigen::Ref<const VectorXd>& q, mjtNum* qpos) co
   }
   const Pose X_WA = model_->CalcBasePose(q) * X_0b_;
   if (base_is_free_) {
-    mjtNum* const pose = qpos + engine_->jnt_qposadr[base_joints_[0]];
-    const Eigen::Quaterniond rotation(X_WA.linear());
-    for (int i = 0; i < 3; ++i) pose[i] = X_WA.translation()[i];
-    pose[3] = rotation.w();
-    pose[4] = rotation.x();
-    pose[5] = rotation.y();
-    pose[6] = rotation.z();
+    WriteFreePose(X_WA, qpos + engine_->jnt_qposadr[base_joints_[0]]);
   } else {
     const Vector3d displacement = X_WA.translation() - reference_anchor_;
     const double rates[3] = {slide_axes_[0].dot(displacement), slide_axes_[1].dot(displacement),
@@ -326,11 +316,7 @@ void Adapter::SetPositions(const Eigen::Ref<const VectorXd>& q, mjtNum* qpos) co
 
 Pose Adapter::GetBasePose(const mjtNum* qpos) const {
   if (base_is_free_) {
-    const mjtNum* const pose = qpos + engine_->jnt_qposadr[base_joints_[0]];
-    Pose X_WA = Pose::Identity();
-    X_WA.linear() = Eigen::Quaterniond(pose[3], pose[4], pose[5], pose[6]).normalized().toRotationMatrix();
-    X_WA.translation() = MapVector(pose);
-    return X_WA * X_0b_.inverse();
+    return ReadFreePose(qpos + engine_->jnt_qposadr[base_joints_[0]]) * X_0b_.inverse();
   }
   Pose X_W0 = model_->base().X_B0;
   if (base_joints_.empty()) return X_W0;
@@ -363,7 +349,7 @@ int Adapter::FindTipGeom(int frame) const {
 int Adapter::RequireTipGeom(int frame) const {
   const int geom = FindTipGeom(frame);
   if (geom >= 0 && CanTouch(*engine_, geom)) return geom;
-  throw InputError("MJCF: fingertip " + Quote(model_->frames()[static_cast<size_t>(frame)].name) +
+  throw InputError("MJCF: fingertip " + Quote(model_->frame(frame).name) +
                    ": its body needs a sphere that can touch");
 }
 

@@ -60,6 +60,9 @@ class Adapter {
   [[nodiscard]] int RequireTipGeom(int frame) const;
   /// Engine's body of the object; -1 without one.
   [[nodiscard]] int object_body() const { return object_body_; }
+  /// Where qpos and qvel have the joint that moves it; -1 without one.
+  [[nodiscard]] int object_qpos() const { return object_qpos_; }
+  [[nodiscard]] int object_dof() const { return object_dof_; }
   /// Right and left wheel; empty unless the base is a differential drive.
   [[nodiscard]] const std::vector<EngineWheel>& wheels() const { return wheels_; }
 
@@ -104,7 +107,7 @@ class Adapter {
   std::vector<std::vector<int>> welded_bodies_;
   std::vector<int> frame_sites_;
   std::vector<EngineWheel> wheels_;
-  int object_body_ = -1;
+  int object_body_ = -1, object_qpos_ = -1, object_dof_ = -1;
 
   std::vector<int> other_joints_;
   std::vector<int> base_joints_;

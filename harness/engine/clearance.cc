@@ -5,17 +5,13 @@
 
 #include "controller/common/text.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/map_vector.h"
 
 namespace dexcheck {
 namespace {
 
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
 Pose ReadBody(const BodyPoses& bodies, int body) {
-  Pose X = Pose::Identity();
-  X.linear() = Eigen::Map<const RowMatrix3d>(bodies.rotations + 9 * body);
-  X.translation() = Eigen::Map<const Vector3d>(bodies.positions + 3 * body);
-  return X;
+  return MapPose(bodies.rotations + 9 * body, bodies.positions + 3 * body);
 }
 
 /// How far a point within `reach` of the frame's origin moved at the most: a rotation's difference from

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "harness/engine/engine.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
@@ -68,12 +69,7 @@ ContactSoftness FindContactSoftness(const Adapter& adapter, const Eigen::Ref<con
   std::fill_n(model->geom_margin, model->ngeom, kClosed);
   const MjDataPtr data = MakeData(*model);
   adapter.SetPositions(q, data->qpos);
-  if (const int object = adapter.object_body(); object >= 0) {
-    mjtNum* const pose = data->qpos + model->jnt_qposadr[model->body_jntadr[object]];
-    const Eigen::Quaterniond rotation(X_Bo.linear());
-    Eigen::Map<Vector3d>{pose} = X_Bo.translation();
-    Eigen::Map<Eigen::Vector4d>(pose + 3) << rotation.w(), rotation.x(), rotation.y(), rotation.z();
-  }
+  if (adapter.object_body() >= 0) WriteFreePose(X_Bo, data->qpos + adapter.object_qpos());
   mj_fwdPosition(model.get(), data.get());
   const std::vector<Row> rows = ListRows(*model, *data, adapter.object_body());
   if (rows.empty()) return {};

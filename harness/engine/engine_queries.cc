@@ -7,18 +7,9 @@
 namespace dexcheck {
 namespace {
 
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
 /// Gap up to which CalcTouch looks for the nearest points, m: much more than contacts are compared at, and
 /// not more than the engine's general method for convex bodies bears.
 constexpr double kTouchMargin = 0.1;
-
-Pose MakePose(const mjtNum* rotation, const mjtNum* position) {
-  Pose X = Pose::Identity();
-  X.linear() = Eigen::Map<const RowMatrix3d>(rotation);
-  X.translation() = MapVector(position);
-  return X;
-}
 
 }  // namespace
 
@@ -33,14 +24,14 @@ EngineMotion EngineMotion::MoveTo(const Vector3d& point) const {
 
 Pose EngineTerms::FramePose(int frame) const {
   const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
-  if (site < 0) return MakePose(data_->xmat + 9 * body_of(frame), data_->xpos + 3 * body_of(frame));
-  return MakePose(data_->site_xmat + 9 * site, data_->site_xpos + 3 * site);
+  if (site < 0) return MapPose(data_->xmat + 9 * body_of(frame), data_->xpos + 3 * body_of(frame));
+  return MapPose(data_->site_xmat + 9 * site, data_->site_xpos + 3 * site);
 }
 
 int EngineTerms::body_of(int frame) const {
   const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
   if (site >= 0) return engine_->site_bodyid[site];
-  const int link = adapter_->model().frames()[static_cast<size_t>(frame)].link;
+  const int link = adapter_->model().frame(frame).link;
   return adapter_->link_bodies()[static_cast<size_t>(link + 1)];
 }
 
@@ -72,7 +63,7 @@ std::vector<LinkInWorld> EngineTerms::links() const {
     }
     if (link.mass > 0.0) link.com /= link.mass;
     for (const int body : welded) {
-      const Eigen::Map<const RowMatrix3d> R(d->ximat + 9 * body);
+      const RotationMap R(d->ximat + 9 * body);
       const Vector3d arm = MapVector(d->xipos + 3 * body) - link.com;
       link.inertia += R * MapVector(m->body_inertia + 3 * body).asDiagonal() * R.transpose() +
                       m->body_mass[body] * (arm.squaredNorm() * Matrix3d::Identity() - arm * arm.transpose());
@@ -127,12 +118,10 @@ EngineMotion EngineTerms::FrameMotion(int frame) const {
                   : ReadMotion(mjOBJ_SITE, site, PlaceOf(frame));
 }
 
-Matrix3d EngineTerms::ObjectRotation() const {
-  return Eigen::Map<const RowMatrix3d>(data_->xmat + 9 * object_body_);
-}
+Matrix3d EngineTerms::ObjectRotation() const { return RotationMap(data_->xmat + 9 * object_body_); }
 
 Pose EngineTerms::ObjectPose() const {
-  return MakePose(data_->xmat + 9 * object_body_, data_->xpos + 3 * object_body_);
+  return MapPose(data_->xmat + 9 * object_body_, data_->xpos + 3 * object_body_);
 }
 
 Vector6d EngineTerms::ObjectVelocity() const {
@@ -152,7 +141,7 @@ Matrix6d EngineTerms::ObjectInertia() const {
   Matrix6d M;
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j <= i; ++j) {
-      const int at = FindMassEntry(m, object_dof_ + i, i - j);
+      const int at = FindMassEntry(m, adapter_->object_dof() + i, i - j);
       M(i, j) = M(j, i) = at < 0 ? 0.0 : GetMassEntries(*data_)[at];
     }
   }
@@ -175,7 +164,7 @@ Vector6d EngineTerms::ObjectGravity() const {
 
 Eigen::Matrix<double, 3, 6> EngineTerms::CalcObjectJacobian(const Vector3d& point) const {
   Eigen::Matrix<double, 3, 6> J;
-  for (int i = 0; i < 6; ++i) J.col(i) = CalcPointColumn(object_dof_ + i, point).head<3>();
+  for (int i = 0; i < 6; ++i) J.col(i) = CalcPointColumn(adapter_->object_dof() + i, point).head<3>();
   J.leftCols<3>() *= ObjectRotation();
   return J;
 }

@@ -5,14 +5,13 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/engine/data_without_contacts.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
 #include "harness/engine/passive_forces.h"
 
 namespace dexcheck {
 namespace {
-
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 std::vector<int> ListAll(size_t count) {
   std::vector<int> all(count);
@@ -43,7 +42,7 @@ bool ForcesNeedGeoms(const mjModel& model) {
 EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates, std::span<const int> frames)
     : adapter_(&adapter),
       engine_(mj_copyModel(nullptr, &adapter.engine())),
-      data_(MakeData(*engine_)),
+      data_(MakeDataWithoutContacts(*engine_)),
       map_(adapter, coordinates),
       base_size_(static_cast<int>(map_.base_columns().cols())),
       carrying_dofs_(static_cast<int>(map_.base_dofs().size() - adapter.wheels().size())),
@@ -92,9 +91,6 @@ void EngineTerms::FindObject() {
   if (object_body_ < 0) return;
   const int joint = engine_->body_jntadr[object_body_];
   has_object_ = engine_->body_jntnum[object_body_] == 1 && engine_->jnt_type[joint] == mjJNT_FREE;
-  if (!has_object_) return;
-  object_qpos_ = engine_->jnt_qposadr[joint];
-  object_dof_ = engine_->jnt_dofadr[joint];
 }
 
 void EngineTerms::RequireObject() const {
@@ -201,12 +197,7 @@ void EngineTerms::SetPositions(const Eigen::Ref<const VectorXd>& q, const Pose& 
   const mjModel* m = engine_.get();
   mjData* d = data_.get();
   adapter_->SetPositions(q, d->qpos);
-  if (has_object_) {
-    const Eigen::Quaterniond rotation(X_Bo.linear());
-    const mjtNum wxyz[4] = {rotation.w(), rotation.x(), rotation.y(), rotation.z()};
-    mju_copy3(d->qpos + object_qpos_, X_Bo.translation().data());
-    mju_copy4(d->qpos + object_qpos_ + 3, wxyz);
-  }
+  if (has_object_) WriteFreePose(X_Bo, d->qpos + adapter_->object_qpos());
   mj_kinematics(m, d);
   mj_comPos(m, d);
   MakeMass(*m, d);
@@ -223,10 +214,10 @@ void EngineTerms::SetVelocities(const Eigen::Ref<const VectorXd>& q,
     const Matrix3d R = ObjectRotation();
     const Vector3d v = R * V_Bo.head<3>();
     const Vector3d turning = (R * V_Bo.tail<3>()).cross(v);
-    mju_copy3(d->qvel + object_dof_, v.data());
-    mju_copy3(d->qvel + object_dof_ + 3, V_Bo.data() + 3);
-    mju_copy3(d->qacc + object_dof_, turning.data());
-    mju_zero3(d->qacc + object_dof_ + 3);
+    mju_copy3(d->qvel + adapter_->object_dof(), v.data());
+    mju_copy3(d->qvel + adapter_->object_dof() + 3, V_Bo.data() + 3);
+    mju_copy3(d->qacc + adapter_->object_dof(), turning.data());
+    mju_zero3(d->qacc + adapter_->object_dof() + 3);
   }
   mj_comVel(engine_.get(), d);
 }
@@ -278,7 +269,7 @@ void EngineTerms::CalcForces() {
   mjData* d = data_.get();
   CalcBiasForce();
   map_.ProjectForce(force_nv_.data(), coriolis_);
-  if (has_object_) object_coriolis_ = force_nv_.segment<6>(object_dof_);
+  if (has_object_) object_coriolis_ = force_nv_.segment<6>(adapter_->object_dof());
 
   // A dof moves the centre of mass of what it carries by v + omega x p, both about the whole tree's centre of
   // mass.
@@ -291,7 +282,7 @@ void EngineTerms::CalcForces() {
     force_nv_[i] = -m->body_subtreemass[body] * g.dot(moved);
   }
   map_.ProjectForce(force_nv_.data(), gravity_);
-  if (has_object_) object_gravity_ = force_nv_.segment<6>(object_dof_);
+  if (has_object_) object_gravity_ = force_nv_.segment<6>(adapter_->object_dof());
 
   CalcPassiveForces(*m, d);
   map_.ProjectForce(d->qfrc_passive, friction_);

@@ -190,8 +190,6 @@ class EngineTerms {
   int object_body_;
   bool has_object_ = false;
   std::vector<int> object_geoms_;
-  int object_qpos_ = 0;
-  int object_dof_ = 0;
   Vector6d object_coriolis_ = Vector6d::Zero();  // in the engine's coordinates
   Vector6d object_gravity_ = Vector6d::Zero();
 };

@@ -5,25 +5,17 @@
 #include <mutex>
 #include <utility>
 
+#include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
-
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 mjfCollision original_sphere_mesh = nullptr;
 mjfCollision original_box_mesh = nullptr;
 
 /// Tilt of a torus that lies flat, rad.
 constexpr double kLyingFlat = 1e-3;
-
-Pose MapPose(const mjtNum* rotation, const mjtNum* position) {
-  Pose X = Pose::Identity();
-  X.linear() = Eigen::Map<const RowMatrix3d>(rotation);
-  X.translation() = Eigen::Map<const Vector3d>(position);
-  return X;
-}
 
 /// Pose of the body, which is a torus's frame: the engine turns a mesh geom's own frame to the mesh's
 /// principal axes.
@@ -44,11 +36,10 @@ void PlaceContact(const Pose& X, const ExactContact& contact, CollisionContact* 
 template <typename Collide>
 int CollideSphereGeom(const mjModel& m, const mjData& d, int g1, int g2, mjtNum margin,
                       const Collide& collide, CollisionContact* found) {
-  const Eigen::Map<const RowMatrix3d> R(d.geom_xmat + 9 * g2);
-  const Eigen::Map<const Vector3d> origin(d.geom_xpos + 3 * g2);
-  const Eigen::Map<const Vector3d> sphere(d.geom_xpos + 3 * g1);
-  const Eigen::Map<const Vector3d> size(m.geom_size + 3 * g2);
-  const ExactContact contact = collide(R.transpose() * (sphere - origin), m.geom_size[3 * g1], size);
+  const RotationMap R(d.geom_xmat + 9 * g2);
+  const Vector3d origin = MapVector(d.geom_xpos + 3 * g2);
+  const Vector3d center = R.transpose() * (MapVector(d.geom_xpos + 3 * g1) - origin);
+  const ExactContact contact = collide(center, m.geom_size[3 * g1], MapVector(m.geom_size + 3 * g2));
   if (contact.distance > margin) return 0;
   const Vector3d position = origin + R * contact.position;
   const Vector3d normal = R * contact.normal;

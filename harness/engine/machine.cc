@@ -9,6 +9,8 @@
 #if defined(__x86_64__)
 #define _Bool bool  // The header is written for C. NOLINT(bugprone-reserved-identifier)
 #include <sys/platform/x86.h>
+
+#include <utility>
 #undef _Bool
 #endif
 
@@ -20,11 +22,12 @@ namespace {
 std::string DescribeProcessor() {
 #if defined(__x86_64__)
   std::string text = "x86_64";
-  if (CPU_FEATURE_ACTIVE(SSE4_1)) text += " SSE4.1";
-  if (CPU_FEATURE_ACTIVE(AVX)) text += " AVX";
-  if (CPU_FEATURE_ACTIVE(AVX2)) text += " AVX2";
-  if (CPU_FEATURE_ACTIVE(FMA)) text += " FMA";
-  if (CPU_FEATURE_ACTIVE(FMA4)) text += " FMA4";
+  for (const auto& [name, is_active] :
+       {std::pair(" SSE4.1", CPU_FEATURE_ACTIVE(SSE4_1)), std::pair(" AVX", CPU_FEATURE_ACTIVE(AVX)),
+        std::pair(" AVX2", CPU_FEATURE_ACTIVE(AVX2)), std::pair(" FMA", CPU_FEATURE_ACTIVE(FMA)),
+        std::pair(" FMA4", CPU_FEATURE_ACTIVE(FMA4))}) {
+    if (is_active) text += name;
+  }
   return text;
 #elif defined(__aarch64__)
   return "aarch64";

@@ -1,5 +1,7 @@
 #pragma once
 
+// Vectors and poses of the engine's arrays.
+
 #include <mujoco/mujoco.h>
 
 #include "controller/common/types.h"
@@ -8,5 +10,30 @@ namespace dexcheck {
 
 /// Three numbers of the engine.
 inline Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
+
+/// A rotation of the engine, row by row.
+using RotationMap = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
+
+inline Pose MapPose(const mjtNum* rotation, const mjtNum* position) {
+  Pose X = Pose::Identity();
+  X.linear() = RotationMap(rotation);
+  X.translation() = MapVector(position);
+  return X;
+}
+
+/// Pose that a free joint's seven entries of qpos mean: origin, then a quaternion of any length.
+inline Pose ReadFreePose(const mjtNum* qpos) {
+  Pose X = Pose::Identity();
+  X.linear() = Eigen::Quaterniond(qpos[3], qpos[4], qpos[5], qpos[6]).normalized().toRotationMatrix();
+  X.translation() = MapVector(qpos);
+  return X;
+}
+
+inline void WriteFreePose(const Pose& X, mjtNum* qpos) {
+  const Eigen::Quaterniond rotation(X.linear());
+  const mjtNum wxyz[4] = {rotation.w(), rotation.x(), rotation.y(), rotation.z()};
+  mju_copy3(qpos, X.translation().data());
+  mju_copy4(qpos + 3, wxyz);
+}
 
 }  // namespace dexcheck

@@ -3,6 +3,7 @@
 #include "harness/engine/newer_mjcf_words.h"
 
 #include <algorithm>
+#include <array>
 #include <vector>
 
 namespace dexcheck {
@@ -154,17 +155,9 @@ const std::vector<NewerWord>& ListWords() {
 }  // namespace
 
 const char* NameOf(MjcfEffect effect) {
-  switch (effect) {
-    case kNone:
-      return "looks, sensors or memory";
-    case kContacts:
-      return "contacts, solver or time steps";
-    case kActuators:
-      return "forces of actuators";
-    case kDynamics:
-      break;
-  }
-  return "dynamics";
+  constexpr std::array<const char*, 4> kNames = {"looks, sensors or memory", "contacts, solver or time steps",
+                                                 "forces of actuators", "dynamics"};
+  return kNames.at(static_cast<size_t>(effect));
 }
 
 const NewerWord* FindNewerWord(std::string_view element, std::string_view attribute) {

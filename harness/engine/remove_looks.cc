@@ -7,6 +7,7 @@
 
 #include "harness/engine/engine.h"
 #include "harness/engine/model_arrays.h"
+#include "harness/engine/resized_copy.h"
 
 namespace dexcheck {
 namespace {
@@ -39,34 +40,10 @@ void KeepRows(const std::vector<int>& stay, size_t columns, Number* rows) {
   }
 }
 
-bool HasKnownLayout(mjModel* m) {
-  bool known = true;
-  size_t offset = 0;
-  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
-    offset = AlignArray(offset);
-    known = known && reinterpret_cast<char*>(array) == static_cast<char*>(m->buffer) + offset;
-    offset += sizeof(Number) * rows * columns;
-  });
-  return known && static_cast<size_t>(m->nbuffer) == offset;
-}
-
-/// Moves the arrays to where a model of these sizes has them.
-void LayOut(mjModel* m) {
-  size_t offset = 0;
-  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
-    offset = AlignArray(offset);
-    char* const place = static_cast<char*>(m->buffer) + offset;
-    const size_t bytes = sizeof(Number) * rows * columns;
-    std::memmove(place, array, bytes);
-    array = reinterpret_cast<Number*>(place);
-    offset += bytes;
-  });
-  m->nbuffer = static_cast<decltype(m->nbuffer)>(offset);
-}
-
 }  // namespace
 
-int RemoveLooks(mjModel* m, std::span<const int> wanted) {
+int RemoveLooks(MjModelPtr* model, std::span<const int> wanted) {
+  mjModel* m = model->get();
   std::vector<bool> keep(static_cast<size_t>(m->ngeom), false);
   for (const int geom : wanted) keep[static_cast<size_t>(geom)] = true;
   for (int geom = 0; geom < m->ngeom; ++geom) {
@@ -83,7 +60,7 @@ int RemoveLooks(mjModel* m, std::span<const int> wanted) {
     stay.push_back(geom);
   }
   const auto removed = static_cast<int>(m->ngeom) - static_cast<int>(stay.size());
-  if (removed == 0 || !HasKnownLayout(m)) return 0;
+  if (removed == 0) return 0;
 
   const auto renumber = [&](int* geom) {
     if (*geom >= 0) *geom = new_id[static_cast<size_t>(*geom)];
@@ -96,8 +73,8 @@ int RemoveLooks(mjModel* m, std::span<const int> wanted) {
   ForEachArray(m, [&]<typename Number>(Number*& array, size_t, size_t columns, bool of_geoms) {
     if (of_geoms) KeepRows(stay, columns, array);
   });
-  m->ngeom = static_cast<int>(stay.size());
-  LayOut(m);
+  *model = MakeResizedCopy(*m, [&](mjModel* smaller) { smaller->ngeom = static_cast<int>(stay.size()); });
+  m = model->get();
 
   int next = 0;
   for (int body = 0; body < m->nbody; ++body) {
@@ -109,18 +86,18 @@ int RemoveLooks(mjModel* m, std::span<const int> wanted) {
   return removed;
 }
 
-size_t RemovePictures(mjModel* m) {
-  if (m->ntex == 0 || !HasKnownLayout(m)) return 0;
-  const auto before = static_cast<size_t>(m->nbuffer);
-  ForEachArray(m, [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
+size_t RemovePictures(MjModelPtr* model) {
+  const mjModel& m = **model;
+  if (m.ntex == 0) return 0;
+  const auto before = static_cast<size_t>(m.nbuffer);
+  *model = MakeResizedCopy(m, [](mjModel* smaller) { smaller->ntex = smaller->ntexdata = 0; });
+  // In later releases a material has several.
+  ForEachArray(model->get(), [&]<typename Number>(Number*& array, size_t rows, size_t columns, bool) {
     if constexpr (std::is_same_v<Number, int>) {
-      if (array == m->mat_texid) std::fill_n(array, rows * columns, -1);
+      if (array == (*model)->mat_texid) std::fill_n(array, rows * columns, -1);
     }
   });
-  m->ntex = 0;
-  m->ntexdata = 0;
-  LayOut(m);
-  return before - static_cast<size_t>(m->nbuffer);
+  return before - static_cast<size_t>((*model)->nbuffer);
 }
 
 }  // namespace dexcheck

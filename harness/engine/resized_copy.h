@@ -6,8 +6,9 @@
 
 namespace dexcheck {
 
-/// A copy of a compiled model whose arrays have more rows.
-/// @param enlarge raises sizes of the model (npair, ngeom) that it is given. New rows come last and are zero.
-MjModelPtr MakeResizedCopy(const mjModel& model, const std::function<void(mjModel*)>& enlarge);
+/// A copy of a compiled model whose arrays have more rows or fewer.
+/// @param resize changes sizes of the model (npair, ngeom) that it is given. Rows that are dropped are the
+/// last ones; new ones come last and are zero.
+MjModelPtr MakeResizedCopy(const mjModel& model, const std::function<void(mjModel*)>& resize);
 
 }  // namespace dexcheck

@@ -115,7 +115,7 @@ void VelocityMap::ExpandBracket(const Eigen::Ref<const VectorXd>& q, const Eigen
   for (int i = 0; i < model.num_joints(); ++i) {
     mjtNum* const rate = qacc + adapter_->joint_dofs()[static_cast<size_t>(model.dof(i))];
     const Eigen::Index at = base_size_ + model.dof(i);
-    if (model.joints()[static_cast<size_t>(i)].type != JointType::kBall) {
+    if (model.joint(i).type != JointType::kBall) {
       *rate = 0.0;
     } else {
       const Vector3d bracket = Vector3d(a.segment<3>(at)).cross(Vector3d(b.segment<3>(at)));

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <set>
 
 #include "controller/common/errors.h"
@@ -104,19 +105,9 @@ class PairLister {
 }  // namespace
 
 const char* NameOf(PairClass pairs) {
-  switch (pairs) {
-    case PairClass::kRobotItself:
-      return "robot_itself";
-    case PairClass::kRobotObject:
-      return "robot_object";
-    case PairClass::kRobotFloor:
-      return "robot_floor";
-    case PairClass::kRobotSurroundings:
-      return "robot_surroundings";
-    case PairClass::kObjectSurroundings:
-      return "object_surroundings";
-  }
-  return "";
+  constexpr std::array<const char*, kPairClassCount> kNames = {"robot_itself", "robot_object", "robot_floor",
+                                                               "robot_surroundings", "object_surroundings"};
+  return kNames.at(static_cast<size_t>(pairs));
 }
 
 std::vector<WatchedPair> ListWatchedPairs(const mjModel& engine, const Adapter& adapter, const Solids& solids,

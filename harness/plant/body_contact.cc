@@ -2,10 +2,11 @@
 
 #include <cmath>
 
+#include "harness/engine/map_vector.h"
+
 namespace dexcheck {
 
 BodyContact ReadBodyContact(const mjModel& m, const mjData& d, int body, int other) {
-  using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   BodyContact result;
   for (int i = 0; i < d.ncon; ++i) {
     const mjContact& c = d.contact[i];
@@ -18,7 +19,7 @@ BodyContact ReadBodyContact(const mjModel& m, const mjData& d, int body, int oth
     result.touching = true;
     result.distance = c.dist;
     // Velocity of the second geom against the first, along the contact's tangents.
-    const Eigen::Map<const RowMatrix3d> frame(c.frame);
+    const RotationMap frame(c.frame);
     const mjtNum* const velocity = d.efc_vel + c.efc_address;
     result.slip = (velocity[1] * frame.row(1) + velocity[2] * frame.row(2)).transpose();
     if (first) result.slip = -result.slip;

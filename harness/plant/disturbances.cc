@@ -107,10 +107,10 @@ void AddRobotForce(std::span<const Wrench> wrenches, const ModelTerms& robot, Ei
   const int offset = model.num_base_velocities();
   for (const Wrench& w : wrenches) {
     if (w.body == Wrench::kObject) continue;
-    for (int joint = w.body; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent) {
+    for (int joint = w.body; joint >= 0; joint = model.joint(joint).parent) {
       const Pose X_Bj = robot.CalcLinkPose(joint);
       const Vector3d axis = X_Bj.linear().col(2);
-      const bool turns = model.joints()[static_cast<size_t>(joint)].type == JointType::kRevolute;
+      const bool turns = model.joint(joint).type == JointType::kRevolute;
       // A point moves by z x (p - o), or by z, for each unit of q_i.
       force[offset + joint] +=
           turns ? axis.dot(w.torque + (w.point - X_Bj.translation()).cross(w.force)) : axis.dot(w.force);

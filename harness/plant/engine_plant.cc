@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/model/platform.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/velocity_map.h"
 
 namespace dexcheck {
@@ -57,17 +59,11 @@ Collision EnginePlant::FindCollision() const {
 }
 
 void EnginePlant::Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) {
-  const mjModel& m = adapter_->engine();
   EngineState state = simulation_.GetState();
   state.qvel.setZero();
   state.qacc_warmstart.setZero();
   adapter_->SetPositions(q, state.qpos.data());
-  if (adapter_->object_body() >= 0) {
-    const Eigen::Quaterniond rotation(X_Bo.linear());
-    const int joint = m.body_jntadr[adapter_->object_body()];
-    state.qpos.segment<7>(m.jnt_qposadr[joint]) << X_Bo.translation(), rotation.w(), rotation.x(),
-        rotation.y(), rotation.z();
-  }
+  if (adapter_->object_body() >= 0) WriteFreePose(X_Bo, state.qpos.data() + adapter_->object_qpos());
   simulation_.SetState(state);
 }
 
@@ -77,14 +73,12 @@ void EnginePlant::AddVelocity(const MeasuredState& state, const Vector3d& v) {
   const Vector3d heading(std::cos(state.q[2]), std::sin(state.q[2]), 0.0);
   EngineState moving = simulation_.GetState();
   VectorXd xi = VectorXd::Zero(model.num_velocities());
-  xi.head<2>() = model.base().velocity == DriveVelocity::kTwist
-                     ? Vector2d(v.dot(heading), 0.0)
-                     : Vector2d::Constant(v.dot(heading) / model.base().wheel_radius);
+  xi.head<2>() = CalcDriveVelocityOfTwist(model.base(), {v.dot(heading), 0.0});
   VelocityMap map(*adapter_, Coordinates::kReduced);
   map.SetState(state.q, xi);
   VectorXd added = VectorXd::Zero(m.nv);
   map.Expand(xi, added.data());
-  added.segment<3>(m.jnt_dofadr[m.body_jntadr[adapter_->object_body()]]) = v;
+  added.segment<3>(adapter_->object_dof()) = v;
   moving.qvel += added;
   simulation_.SetState(moving);
 }
@@ -93,7 +87,7 @@ void EnginePlant::Translate(const Vector3d& way) {
   const mjModel& m = adapter_->engine();
   EngineState moved = simulation_.GetState();
   moved.qpos.segment<2>(m.jnt_qposadr[adapter_->base_joints()[0]]) += way.head<2>();
-  moved.qpos.segment<3>(m.jnt_qposadr[m.body_jntadr[adapter_->object_body()]]) += way;
+  moved.qpos.segment<3>(adapter_->object_qpos()) += way;
   simulation_.SetState(moved);
 }
 

@@ -53,7 +53,7 @@ void EngineSimulation::BeginStep() { mj_step1(model_.get(), data_.get()); }
 
 void EngineSimulation::SetTorques(const Eigen::Ref<const VectorXd>& tau) {
   Require(tau.size() == static_cast<Eigen::Index>(motors_.size()), "length of tau'", "must be that of xi",
-          static_cast<double>(tau.size()));
+          tau.size());
   for (size_t i = 0; i < motors_.size(); ++i) {
     data_->ctrl[motors_[i]] = tau[static_cast<Eigen::Index>(i)] / model_->actuator_gear[6 * motors_[i]];
   }

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a scenario asks of a plant that is not ideal: faults of sensing and motors, disturbances, and an
+// What a scenario declares of a plant that is not ideal: faults of sensing and motors, disturbances, and an
 // engine whose masses are not those that the controller knows. The defaults are the ideal plant.
 
 #include <cmath>
@@ -36,11 +36,11 @@ inline long CountSteps(double time, double time_step) { return std::lround(time 
 /// How a velocity becomes known.
 enum class VelocitySource {
   kMeasured,     ///< By a sensor of its own.
-  kDifferenced,  ///< Change of the position told, filtered.
-  kKalman,       ///< By a Kalman filter from the position told.
+  kDifferenced,  ///< Change of the measured position, filtered.
+  kKalman,       ///< By a Kalman filter from the measured position.
 };
 
-/// What the controller is told instead of the truth.
+/// How measurements differ from the true state.
 struct SensingOptions {
   ByName joint_counts;    ///< Of an encoder, per turn (per metre of a prismatic joint); 0 is exact.
   ByName joint_noise;     ///< Standard deviation of a joint's position, rad, before the encoder counts.
@@ -55,16 +55,16 @@ struct SensingOptions {
   double object_orientation_noise = 0.0;                       ///< Likewise, rad.
   double object_rate = 0.0;                                    ///< Poses a second; 0 for one at each step.
   double object_latency = 0.0;                                 ///< Age of the pose, s.
-  VelocitySource object_velocity = VelocitySource::kMeasured;  ///< kMeasured: told with the pose.
+  VelocitySource object_velocity = VelocitySource::kMeasured;  ///< kMeasured: comes with the pose.
   double object_velocity_cutoff = 0.0;                         ///< As velocity_cutoff, Hz.
   double object_acceleration = 0.0;                            ///< As kalman_acceleration, m/s^2 and rad/s^2.
 
   double contact_force_noise = 0.0;  ///< Of the support's force, N.
-  double latency = 0.0;              ///< Age of all that is told, s; a whole number of time steps.
+  double latency = 0.0;              ///< Age of all measurements, s; a whole number of time steps.
 
-  double contact_error = 0.0;  ///< By how much each contact's place on the object is told wrongly, rad.
+  double contact_error = 0.0;  ///< Error of each contact's measured place on the object, rad.
 
-  /// Whether the truth is told.
+  /// Whether the true state is measured.
   [[nodiscard]] bool is_exact() const;
 };
 
@@ -78,7 +78,7 @@ struct ActuationOptions {
   ByName backlash;                  ///< Free play, rad.
   double stribeck_velocity = 0.05;  ///< Rate at which stribeck has fallen to 1/e, rad/s.
   double delay = 0.0;               ///< s.
-  bool saturate = false;            ///< A motor gives its limit when it is asked for more.
+  bool saturate = false;            ///< A motor gives its limit when more is commanded.
 
   [[nodiscard]] bool is_exact() const;
 };
@@ -135,8 +135,8 @@ struct Imperfections {
   std::vector<DisturbanceOptions> disturbances;
   MismatchOptions mismatch;
 
-  /// "sensing.latency = 0.002" for each key, as the scenario has it: what a verdict should say.
-  std::vector<std::string> asked;
+  /// "sensing.latency = 0.002" for each key that the scenario has: what a verdict should say.
+  std::vector<std::string> declared;
 
   /// Whether the plant is the ideal one, whatever keys there are.
   [[nodiscard]] bool is_ideal() const;

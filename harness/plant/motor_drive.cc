@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "controller/common/text.h"
+#include "controller/model/platform.h"
 
 namespace dexcheck {
 namespace {
@@ -13,7 +14,7 @@ VectorXd ListArmatures(const RobotModel& model) {
   VectorXd armature(model.num_velocities());
   armature.setConstant(model.base().wheel.armature);  // of the base's entries
   for (int i = 0; i < model.num_joints(); ++i) {
-    armature[model.num_base_velocities() + i] = model.joints()[static_cast<size_t>(i)].armature;
+    armature[model.num_base_velocities() + i] = model.joint(i).armature;
   }
   return armature;
 }
@@ -69,10 +70,7 @@ void MotorDrive::Apply(const VectorXd& tau, const VectorXd& xi, DriveOutput* out
 
 void MotorDrive::ReadRates(const VectorXd& xi) {
   rates_ = xi;
-  if (base_.type != BaseType::kDifferentialDrive || base_.velocity == DriveVelocity::kWheelRates) return;
-  // w_r,l = (v +- b w / 2) / r
-  const double turn = 0.5 * base_.wheel_distance * xi[1];
-  rates_.head<2>() = Vector2d(xi[0] + turn, xi[0] - turn) / base_.wheel_radius;
+  if (base_.type == BaseType::kDifferentialDrive) rates_.head<2>() = CalcWheelRates(base_, xi.head<2>());
 }
 
 void MotorDrive::Delay(VectorXd* tau) {

@@ -37,7 +37,7 @@ ObjectSensor::ObjectSensor(const SensingOptions& options, double time_step, std:
   orientation_gains_ = KalmanGains(options.object_acceleration, orientation * orientation, time_step);
 }
 
-ObjectMotion ObjectSensor::Measure(const ObjectMotion& truth, std::uint64_t k) const {
+ObjectMotion ObjectSensor::Sample(const ObjectMotion& truth, std::uint64_t k) const {
   ObjectMotion seen = truth;
   if (options_.object_position_noise > 0.0) {
     seen.X_Bo.translation() += options_.object_position_noise * DrawNormal(position_noise_, k);
@@ -49,10 +49,10 @@ ObjectMotion ObjectSensor::Measure(const ObjectMotion& truth, std::uint64_t k) c
   return seen;
 }
 
-ObjectMotion ObjectSensor::Tell(const ObjectMotion& truth, std::uint64_t k) {
+ObjectMotion ObjectSensor::Measure(const ObjectMotion& truth, std::uint64_t k) {
   const bool is_first = !has_seen_;
   const auto period = static_cast<std::uint64_t>(period_);
-  if (is_first || k % period == 0) seen_ = Measure(truth, k);
+  if (is_first || k % period == 0) seen_ = Sample(truth, k);
   if (is_first) Start();
   const std::uint64_t age = delayed_.size() - 1;  // steps
   delayed_[k % delayed_.size()] = seen_;

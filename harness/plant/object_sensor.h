@@ -21,18 +21,18 @@ class ObjectSensor {
   ObjectSensor(const SensingOptions& options, double time_step, std::uint64_t seed);
 
   [[nodiscard]] bool is_exact() const { return is_exact_; }
-  /// What is known at step k = 0, 1, ... when this is the truth then.
-  ObjectMotion Tell(const ObjectMotion& truth, std::uint64_t k);
+  /// What is measured of the true motion at step k = 0, 1, ...
+  ObjectMotion Measure(const ObjectMotion& truth, std::uint64_t k);
   /// Everything is elsewhere from now on, by `way` (m, world).
   void Translate(const Vector3d& way);
   /// The object moves at `v` (m/s, world) more from step k on: what is remembered becomes as if it always
   /// had.
   void AddVelocity(const Vector3d& v, std::uint64_t k);
-  /// By how many steps the pose is old that is told at step k.
+  /// Age of the pose that is measured at step k, steps.
   [[nodiscard]] double FindAge(std::uint64_t k) const;
 
  private:
-  [[nodiscard]] ObjectMotion Measure(const ObjectMotion& truth, std::uint64_t k) const;
+  [[nodiscard]] ObjectMotion Sample(const ObjectMotion& truth, std::uint64_t k) const;
   void Start();
   void Difference(const ObjectMotion& seen);
   void Filter(const Pose& seen, bool is_new);

@@ -5,16 +5,14 @@
 
 #include "controller/common/text.h"
 #include "controller/contact/find_contact.h"
+#include "controller/model/platform.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
 
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
 constexpr int kWorldBody = 0;
-
-Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
 /// result = M a of an a that is zero but on the base's dofs: `carrying` at the root, one after the other, and
 /// wheels that hang on these.
@@ -48,7 +46,7 @@ Observer::Observer(const Adapter& adapter, std::span<const int> fingertips, cons
       surface_(&surface),
       map_(adapter, Coordinates::kReduced) {
   for (const int frame : fingertips_) {
-    const Frame& tip = adapter.model().frames()[static_cast<size_t>(frame)];
+    const Frame& tip = adapter.model().frame(frame);
     tips_.emplace_back(tip.sphere_radius.value());
     tip_sites_.push_back(adapter.frame_sites()[static_cast<size_t>(frame)]);
     tip_geoms_.push_back(adapter.RequireTipGeom(frame));
@@ -95,7 +93,7 @@ void Observer::Read(const EngineSimulation& simulation, PlantReading* reading) {
 void Observer::Read(const EngineSimulation& simulation, PlantResponse* response) {
   const mjModel& m = simulation.model();
   const mjData& d = simulation.data();
-  ReadAccelerations(m, d, response);
+  ReadAccelerations(d, response);
   response->contacts.resize(fingertips_.size());
   if (bond_constraints_.empty()) {
     ReadContacts(m, d, &response->contacts);
@@ -129,22 +127,17 @@ void Observer::ReadState(const mjData& data, MeasuredState* state) {
     state->xi.head<3>() << rates_.velocity.x(), rates_.velocity.y(), rates_.omega.z();
   } else if (base == 2) {
     const Vector3d heading(std::cos(state->q[2]), std::sin(state->q[2]), 0.0);
-    state->xi.head<2>() = CalcDriveVelocity(heading.dot(rates_.velocity), rates_.omega.z());
+    state->xi.head<2>() =
+        CalcDriveVelocityOfTwist(model.base(), {heading.dot(rates_.velocity), rates_.omega.z()});
   }
   const std::vector<int>& dofs = adapter_->joint_dofs();
   for (size_t i = 0; i < dofs.size(); ++i) state->xi[base + static_cast<int>(i)] = data.qvel[dofs[i]];
 
-  if (const int body = adapter_->object_body(); body >= 0) {
-    const mjModel& m = adapter_->engine();
-    const int joint = m.body_jntadr[body];
-    const mjtNum* const pose = data.qpos + m.jnt_qposadr[joint];
-    const mjtNum* const rate = data.qvel + m.jnt_dofadr[joint];
-    state->X_Bo.linear() =
-        Eigen::Quaterniond(pose[3], pose[4], pose[5], pose[6]).normalized().toRotationMatrix();
-    state->X_Bo.translation() = MapVector(pose);
+  if (adapter_->object_body() >= 0) {
+    const mjtNum* const rate = data.qvel + adapter_->object_dof();
+    state->X_Bo = ReadFreePose(data.qpos + adapter_->object_qpos());
     state->V_Bo << state->X_Bo.linear().transpose() * MapVector(rate), MapVector(rate + 3);
   }
-
   q_ = state->q;
   xi_ = state->xi;
   if (model.num_base_positions() == 3) phi_ = state->q[2];
@@ -160,9 +153,7 @@ void Observer::FindContacts(const mjData& data, MeasuredState* state) {
   overlap_.resize(fingertips_.size());
   for (size_t i = 0; i < fingertips_.size(); ++i) {
     const int site = tip_sites_[i];
-    Pose X_Bf = Pose::Identity();
-    X_Bf.linear() = Eigen::Map<const RowMatrix3d>(data.site_xmat + 9 * site);
-    X_Bf.translation() = MapVector(data.site_xpos + 3 * site);
+    const Pose X_Bf = MapPose(data.site_xmat + 9 * site, data.site_xpos + 3 * site);
     const Pose X_of = X_oB * X_Bf;
     const bool near = has_guess && overlap_[i] > -PlantReading::kFar;
     const FoundContact found =
@@ -174,14 +165,7 @@ void Observer::FindContacts(const mjData& data, MeasuredState* state) {
   state->overlap = overlap_;
 }
 
-Vector2d Observer::CalcDriveVelocity(double forward, double yaw_rate) const {
-  const Base& base = adapter_->model().base();
-  if (base.velocity == DriveVelocity::kTwist) return {forward, yaw_rate};
-  const double turn = 0.5 * base.wheel_distance * yaw_rate;
-  return Vector2d(forward + turn, forward - turn) / base.wheel_radius;
-}
-
-void Observer::ReadAccelerations(const mjModel& m, const mjData& d, PlantResponse* response) const {
+void Observer::ReadAccelerations(const mjData& d, PlantResponse* response) const {
   const RobotModel& model = adapter_->model();
   VectorXd& xi_dot = response->xi_dot;
   xi_dot.resize(model.num_velocities());
@@ -197,14 +181,13 @@ void Observer::ReadAccelerations(const mjModel& m, const mjData& d, PlantRespons
     const Vector3d heading(std::cos(phi_), std::sin(phi_), 0.0);
     const Vector3d left(-heading.y(), heading.x(), 0.0);
     const double forward = heading.dot(linear) + rates_.omega.z() * left.dot(rates_.velocity);
-    xi_dot.head<2>() = CalcDriveVelocity(forward, angular.z());
+    xi_dot.head<2>() = CalcDriveVelocityOfTwist(model.base(), {forward, angular.z()});
   }
   const std::vector<int>& dofs = adapter_->joint_dofs();
   for (size_t i = 0; i < dofs.size(); ++i) xi_dot[base + static_cast<int>(i)] = d.qacc[dofs[i]];
 
   if (adapter_->object_body() < 0) return;
-  const int joint = m.body_jntadr[adapter_->object_body()];
-  const mjtNum* const rate = d.qacc + m.jnt_dofadr[joint];
+  const mjtNum* const rate = d.qacc + adapter_->object_dof();
   // v = R^T p_dot, hence v_dot = R^T p_ddot - omega x v
   const Vector3d v = V_Bo_.head<3>();
   const Vector3d omega = V_Bo_.tail<3>();
@@ -226,7 +209,7 @@ void Observer::ReadBonds(const mjModel& m, const mjData& d, std::vector<PlantCon
       // Three rows along the world's axes: place of the first body's point against the second's, and the
       // force on the first.
       const int body = m.eq_obj2id[eq];
-      const Eigen::Map<const RowMatrix3d> R(d.xmat + 9 * body);
+      const RotationMap R(d.xmat + 9 * body);
       contact.touching = true;
       contact.position = MapVector(d.xpos + 3 * body) + R * MapVector(m.eq_data + mjNEQDATA * eq + 3);
       contact.distance = MapVector(d.efc_pos + row).norm();
@@ -261,7 +244,7 @@ Vector6d Observer::ReadSupportWrench(const mjModel& m, const mjData& d) const {
     const bool first = m.geom_bodyid[c.geom1] == object;
     if (!first && m.geom_bodyid[c.geom2] != object) continue;
     if (FindFingertip(first ? c.geom2 : c.geom1) >= 0) continue;
-    const Eigen::Map<const RowMatrix3d> frame(c.frame);
+    const RotationMap frame(c.frame);
     mjtNum contact_force[6];  // on geom2, in the contact's frame
     mj_contactForce(&m, &d, k, contact_force);
     const Vector3d force = (first ? -1.0 : 1.0) * (frame.transpose() * MapVector(contact_force));
@@ -325,7 +308,7 @@ void Observer::ReadSolverResidual(const mjModel& m, const mjData& d, PlantRespon
   response->solver_force.resize(response->xi_dot.size());
   map_.ProjectForce(departure_.data(), response->solver_force);
   if (adapter_->object_body() < 0) return;
-  const int dof = m.jnt_dofadr[m.body_jntadr[adapter_->object_body()]];
+  const int dof = adapter_->object_dof();
   // The free joint's forces: in the world, then about the body's axes.
   response->solver_residual << X_Bo_.linear().transpose() * departure_.segment<3>(dof),
       departure_.segment<3>(dof + 3);
@@ -341,7 +324,7 @@ void Observer::ReadContacts(const mjModel& m, const mjData& d, std::vector<Plant
       const bool second = c.geom2 == tip_geoms_[i] && m.geom_bodyid[c.geom1] == adapter_->object_body();
       if (!first && !second) continue;
       if (contact.touching && c.dist >= contact.distance) continue;
-      const Eigen::Map<const RowMatrix3d> frame(c.frame);
+      const RotationMap frame(c.frame);
       const double sign = first ? 1.0 : -1.0;
       mjtNum force[6];  // on geom2, in the contact's frame
       mj_contactForce(&m, &d, k, force);

@@ -40,7 +40,7 @@ class Observer {
   void ReadState(const mjData& data, MeasuredState* state);
   void FindContacts(const mjData& data, MeasuredState* state);
   [[nodiscard]] ContactSet FindTouching(const mjModel& m, const mjData& d) const;
-  void ReadAccelerations(const mjModel& m, const mjData& d, PlantResponse* response) const;
+  void ReadAccelerations(const mjData& d, PlantResponse* response) const;
   void ReadContacts(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const;
   void ReadBonds(const mjModel& m, const mjData& d, std::vector<PlantContact>* contacts) const;
   [[nodiscard]] Vector6d ReadSupportWrench(const mjModel& m, const mjData& d) const;
@@ -52,7 +52,6 @@ class Observer {
   [[nodiscard]] int FindFingertip(int geom) const;
   void ReadDeparture(const mjModel& m, const mjData& d, PlantResponse* response);
   [[nodiscard]] BaseRates ReadBaseRates(const mjData& data) const;
-  [[nodiscard]] Vector2d CalcDriveVelocity(double forward, double yaw_rate) const;
 
   const Adapter* adapter_;
   std::vector<int> fingertips_;

@@ -11,6 +11,7 @@
 #include "controller/model/platform.h"
 #include "controller/object/object_dynamics.h"
 #include "controller/object/so3.h"
+#include "harness/engine/map_vector.h"
 #include "harness/plant/disturbances.h"
 
 namespace dexcheck {
@@ -107,11 +108,8 @@ void RigidPlant::Read(PlantReading* reading) {
   velocity_map_.SetState(state_.q, state_.xi);
   velocity_map_.Expand(state_.xi, reading->qvel.data());
   if (!holds_) return;
-  const int joint = m.body_jntadr[adapter_->object_body()];
-  const Eigen::Quaterniond rotation(state_.X_Bo.linear());
-  reading->qpos.segment<7>(m.jnt_qposadr[joint]) << state_.X_Bo.translation(), rotation.w(), rotation.x(),
-      rotation.y(), rotation.z();
-  reading->qvel.segment<6>(m.jnt_dofadr[joint]) << state_.X_Bo.linear() * state_.V_Bo.head<3>(),
+  WriteFreePose(state_.X_Bo, reading->qpos.data() + adapter_->object_qpos());
+  reading->qvel.segment<6>(adapter_->object_dof()) << state_.X_Bo.linear() * state_.V_Bo.head<3>(),
       state_.V_Bo.tail<3>();
 }
 
@@ -312,9 +310,7 @@ void RigidPlant::Place(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) {
 
 void RigidPlant::AddVelocity(const MeasuredState& /*state*/, const Vector3d& v) {
   const Vector3d heading(std::cos(state_.q[2]), std::sin(state_.q[2]), 0.0);
-  state_.xi.head<2>() += model_->base().velocity == DriveVelocity::kTwist
-                             ? Vector2d(v.dot(heading), 0.0)
-                             : Vector2d::Constant(v.dot(heading) / model_->base().wheel_radius);
+  state_.xi.head<2>() += CalcDriveVelocityOfTwist(model_->base(), {v.dot(heading), 0.0});
   state_.V_Bo.head<3>() += state_.X_Bo.linear().transpose() * v;
 }
 

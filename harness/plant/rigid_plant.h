@@ -32,7 +32,7 @@ namespace dexcheck {
 struct RigidPlantOptions {
   double time_step = 1e-3;  ///< s.
   Integrator integrator = Integrator::kRungeKutta4;
-  double finger_friction = 1.0;  ///< mu, by which the use of the friction cones is told.
+  double finger_friction = 1.0;  ///< mu, by which the use of the friction cones is counted.
 };
 
 /// Nothing allocates in a step, once the values that are read into have their sizes.

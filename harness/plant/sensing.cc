@@ -52,7 +52,7 @@ Sensing::Sensing(const SensingOptions& options, const PartContext& context)
   velocity_noise_ = options.velocity_noise.Resolve(all, context.source);
   count_ = options.joint_counts.Resolve(joints, context.source);
   for (Eigen::Index i = 0; i < count_.size(); ++i) {
-    const bool turns = model.joints()[static_cast<size_t>(i)].type == JointType::kRevolute;
+    const bool turns = model.joint(static_cast<int>(i)).type == JointType::kRevolute;
     if (count_[i] > 0.0) count_[i] = (turns ? 2.0 * kPi : 1.0) / count_[i];
     // A position that is rounded to whole counts is off by up to half of one, evenly: variance q^2 / 12.
     const double variance = joint_noise_[i] * joint_noise_[i] + count_[i] * count_[i] / 12.0;
@@ -63,30 +63,30 @@ Sensing::Sensing(const SensingOptions& options, const PartContext& context)
   if (latency > 0) delayed_.assign(static_cast<size_t>(latency) + 1, MakeReading(context));
 }
 
-void Sensing::Tell(const PlantReading& truth, Reading* told) {
-  told->state = truth.state;
-  told->touch = truth.touch;
+void Sensing::Measure(const PlantReading& truth, Reading* measured) {
+  measured->state = truth.state;
+  measured->touch = truth.touch;
   if (is_exact_) return;
-  TellJoints(&told->state);
-  TellBase(truth.state, &told->state);
+  MeasureJoints(&measured->state);
+  MeasureBase(truth.state, &measured->state);
   if (!object_.is_exact()) {
-    const ObjectMotion object = object_.Tell({truth.state.X_Bo, truth.state.V_Bo}, k_);
-    told->state.X_Bo = object.X_Bo;
-    told->state.V_Bo = object.V_Bo;
+    const ObjectMotion object = object_.Measure({truth.state.X_Bo, truth.state.V_Bo}, k_);
+    measured->state.X_Bo = object.X_Bo;
+    measured->state.V_Bo = object.V_Bo;
   }
-  for (ContactCoordinates& kappa : told->state.kappa) kappa.alpha_o.u += options_.contact_error;
+  for (ContactCoordinates& kappa : measured->state.kappa) kappa.alpha_o.u += options_.contact_error;
   if (options_.contact_force_noise > 0.0) {
-    told->touch.support_force += options_.contact_force_noise * force_stream_.Normal(k_);
+    measured->touch.support_force += options_.contact_force_noise * force_stream_.Normal(k_);
   }
   if (!delayed_.empty()) {
-    if (k_ == 0) delayed_.assign(delayed_.size(), *told);
-    delayed_[k_ % delayed_.size()] = *told;
-    *told = delayed_[(k_ + 1) % delayed_.size()];
+    if (k_ == 0) delayed_.assign(delayed_.size(), *measured);
+    delayed_[k_ % delayed_.size()] = *measured;
+    *measured = delayed_[(k_ + 1) % delayed_.size()];
   }
   ++k_;
 }
 
-void Sensing::TellVelocity(int joint, double position, double* rate) {
+void Sensing::MeasureVelocity(int joint, double position, double* rate) {
   VelocityFilter& filter = filters_[static_cast<size_t>(joint)];
   if (options_.velocity == VelocitySource::kKalman) {
     if (k_ == 0) {
@@ -108,16 +108,16 @@ void Sensing::TellVelocity(int joint, double position, double* rate) {
   }
 }
 
-void Sensing::TellJoints(MeasuredState* told) {
+void Sensing::MeasureJoints(MeasuredState* measured) {
   const auto wheels = static_cast<int>(velocity_noise_.size() - count_.size());
   for (int i = 0; i < static_cast<int>(count_.size()); ++i) {
-    double& q = told->q[base_positions_ + i];
-    double& rate = told->xi[base_velocities_ + i];
+    double& q = measured->q[base_positions_ + i];
+    double& rate = measured->xi[base_velocities_ + i];
     const auto channel = static_cast<std::uint64_t>(i);
     if (joint_noise_[i] > 0.0) q += joint_noise_[i] * joint_stream_.Normal(k_, channel);
     if (count_[i] > 0.0) q = count_[i] * std::round(q / count_[i]);
     if (options_.velocity != VelocitySource::kMeasured) {
-      TellVelocity(i, q, &rate);
+      MeasureVelocity(i, q, &rate);
     } else if (velocity_noise_[wheels + i] > 0.0) {
       rate +=
           velocity_noise_[wheels + i] * velocity_stream_.Normal(k_, static_cast<std::uint64_t>(wheels + i));
@@ -125,7 +125,7 @@ void Sensing::TellJoints(MeasuredState* told) {
   }
 }
 
-void Sensing::TellBase(const MeasuredState& truth, MeasuredState* told) {
+void Sensing::MeasureBase(const MeasuredState& truth, MeasuredState* measured) {
   if (base_positions_ == 0) return;
   if (base_.type == BaseType::kDifferentialDrive) {
     Vector2d noise = Vector2d::Zero();  // of the wheels' rates
@@ -134,29 +134,21 @@ void Sensing::TellBase(const MeasuredState& truth, MeasuredState* told) {
         noise[i] = velocity_noise_[i] * velocity_stream_.Normal(k_, static_cast<std::uint64_t>(i));
       }
     }
-    if (base_.velocity == DriveVelocity::kTwist) {
-      // v = r (w_r + w_l) / 2, w = r (w_r - w_l) / b
-      noise = Vector2d(0.5 * base_.wheel_radius * (noise[0] + noise[1]),
-                       base_.wheel_radius * (noise[0] - noise[1]) / base_.wheel_distance);
-    }
-    told->xi.head<2>() += noise;
+    measured->xi.head<2>() += CalcDriveVelocity(base_, noise);
   }
   if (!options_.odometry) return;
   if (k_ == 0) {
     odometry_ = truth.q.head<3>();
   } else if (base_.type == BaseType::kPlanar) {
-    odometry_ += time_step_ * told->xi.head<3>();
+    odometry_ += time_step_ * measured->xi.head<3>();
   } else {
-    double v = told->xi[0], w = told->xi[1];
-    if (base_.velocity == DriveVelocity::kWheelRates) {
-      v = 0.5 * base_.wheel_radius * (told->xi[0] + told->xi[1]);
-      w = base_.wheel_radius * (told->xi[0] - told->xi[1]) / base_.wheel_distance;
-    }
+    Vector2d twist = measured->xi.head<2>();
+    if (base_.velocity == DriveVelocity::kWheelRates) twist = CalcTwist(base_, twist);
     // Velocities are those of the middle of the step that has led here.
-    const double phi = odometry_[2] + 0.5 * time_step_ * w;
-    odometry_ += time_step_ * Vector3d(v * std::cos(phi), v * std::sin(phi), w);
+    const double phi = odometry_[2] + 0.5 * time_step_ * twist[1];
+    odometry_ += time_step_ * Vector3d(twist[0] * std::cos(phi), twist[0] * std::sin(phi), twist[1]);
   }
-  told->q.head<3>() = odometry_;
+  measured->q.head<3>() = odometry_;
 }
 
 void Sensing::AddVelocity(const Vector3d& v) {

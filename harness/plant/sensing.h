@@ -15,15 +15,15 @@
 namespace dexcheck {
 
 /// Stands between the plant and the controller: encoders, tachometers, odometry, a camera, a latency. Two of
-/// them that are made alike and hear the same truth tell the same: a check makes its own. Nothing allocates
-/// after construction, once `measurement` has its sizes.
+/// them that are made alike measure the same of the same true states: a check makes its own. Nothing
+/// allocates after construction, once `measurement` has its sizes.
 class Sensing {
  public:
   /// @throws InputError when the options name what the robot does not have.
   Sensing(const SensingOptions& options, const PartContext& context);
 
-  /// What the controller is told when this is the truth; once at each step, from the first one on.
-  void Tell(const PlantReading& truth, Reading* told);
+  /// What is measured of the true state; once at each step, from the first one on.
+  void Measure(const PlantReading& truth, Reading* measured);
   /// Robot and object are elsewhere from now on, by `way` (m, world): what is remembered moves along.
   void Translate(const Vector3d& way);
   /// Platform and object move at `v` (m/s, world) more from now on, as a run that starts moving does: what is
@@ -31,9 +31,9 @@ class Sensing {
   void AddVelocity(const Vector3d& v);
 
  private:
-  void TellJoints(MeasuredState* told);
-  void TellBase(const MeasuredState& truth, MeasuredState* told);
-  void TellVelocity(int joint, double position, double* rate);
+  void MeasureJoints(MeasuredState* measured);
+  void MeasureBase(const MeasuredState& truth, MeasuredState* measured);
+  void MeasureVelocity(int joint, double position, double* rate);
 
   SensingOptions options_;
   bool is_exact_;
@@ -49,7 +49,7 @@ class Sensing {
   Vector3d odometry_ = Vector3d::Zero();  // x, y, phi
   ObjectSensor object_;
   std::vector<Reading> delayed_;  // ring; empty without latency
-  std::uint64_t k_ = 0;           // steps told
+  std::uint64_t k_ = 0;           // steps measured
 };
 
 }  // namespace dexcheck

@@ -139,7 +139,7 @@ void ClosedLoop::ControlStep(double t) {
   const auto read = Clock::now();
   plant_->Read(&record_.reading);
   CheckRobot();
-  sensing_.Tell(record_.reading, &record_.measured);
+  sensing_.Measure(record_.reading, &record_.measured);
   if (hidden_sensor_fault_) hidden_sensor_fault_(t, &record_.measured.state);
   controller_->Step(record_.measured, t, &record_.command);
   DriveMotors(t);

@@ -192,9 +192,9 @@ void RunRecorder::AddStateSignals() {
         xi_names, Demand(&LawDemand::xi_dot));
   }
   if (!setup_->scenario().imperfections.is_ideal()) {
-    Add("told/q", q_units, "measured q'", p, q_names,
+    Add("measured/q", q_units, "measured q'", p, q_names,
         Vector([](const StepRecord& step) -> const auto& { return step.measured.state.q; }));
-    Add("told/xi", xi_units, "measured reduced velocity", n, xi_names,
+    Add("measured/xi", xi_units, "measured reduced velocity", n, xi_names,
         Vector([](const StepRecord& step) -> const auto& { return step.measured.state.xi; }));
     Add("tau_given", "N m", "what the motors made of tau", n, tau_names,
         Vector([](const StepRecord& step) -> const auto& { return step.drive.tau; }));

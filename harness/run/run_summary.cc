@@ -106,7 +106,7 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
         {"object_max_m", drift.object}, {"fingertip_max_m", drift.fingertip}, {"psi_max_rad", drift.psi}};
   }
   if (loop.task() != nullptr) json["task"] = TaskToJson(loop);
-  if (!scenario.imperfections.is_ideal()) json["plant_asked_for"] = scenario.imperfections.asked;
+  if (!scenario.imperfections.is_ideal()) json["plant_declared"] = scenario.imperfections.declared;
   json["attribution"] = {{"cause", NameOf(result.attribution.cause)},
                          {"evidence", result.attribution.evidence},
                          {"checks", Json::object()}};

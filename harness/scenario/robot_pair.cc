@@ -97,7 +97,7 @@ RobotPair::RobotPair(const Scenario& scenario, RobotModel the_model, const std::
   if (scenario.plant.collide) {
     for (const Solid& solid : solids.list) pushing.push_back(solid.geom);
   }
-  RemoveLooks(engine.get(), pushing);
+  RemoveLooks(&engine, pushing);
   adapter = std::make_unique<Adapter>(model, *engine, mjcf.string());
   RequireNothingElse(*adapter, mjcf.string());
   constants = CheckConstants(*adapter);

@@ -152,9 +152,9 @@ void ReadMismatch(const TomlValue& value, MismatchOptions* mismatch) {
 }
 
 /// "sensing.latency = 0.002" for each key that the scenario has.
-void ListKeys(const TomlValue& value, std::vector<std::string>* asked) {
+void ListKeys(const TomlValue& value, std::vector<std::string>* declared) {
   for (const auto& [name, entry] : value.AsTable().GetEntries()) {
-    asked->push_back(entry.path() + " = " + entry.Show());
+    declared->push_back(entry.path() + " = " + entry.Show());
   }
 }
 
@@ -164,22 +164,22 @@ Imperfections ReadImperfections(TomlTable& root, double time_step) {
   Imperfections all;
   if (const auto sensing = root.Find("sensing")) {
     ReadSensing(*sensing, time_step, &all.sensing);
-    ListKeys(*sensing, &all.asked);
+    ListKeys(*sensing, &all.declared);
   }
   if (const auto actuation = root.Find("actuation")) {
     ReadActuation(*actuation, time_step, &all.actuation);
-    ListKeys(*actuation, &all.asked);
+    ListKeys(*actuation, &all.declared);
   }
   if (const auto disturbances = root.Find("disturbance")) {
     size_t number = 0;
     for (const TomlValue& entry : disturbances->AsList()) {
       ReadDisturbance(entry, number++, time_step, &all);
-      all.asked.push_back(entry.path() + " = " + entry.Show());
+      all.declared.push_back(entry.path() + " = " + entry.Show());
     }
   }
   if (const auto mismatch = root.Find("mismatch")) {
     ReadMismatch(*mismatch, &all.mismatch);
-    ListKeys(*mismatch, &all.asked);
+    ListKeys(*mismatch, &all.declared);
   }
   return all;
 }

@@ -49,7 +49,7 @@ ErrorPrediction::ErrorPrediction(const Setup& setup, bool acts_at_rest)
 
 const VectorXd& ErrorPrediction::CalcAcceleration(const StepRecord& ideal) {
   const MeasuredState& true_state = ideal.reading.state;
-  sensing_.Tell(ideal.reading, &measured_);
+  sensing_.Measure(ideal.reading, &measured_);
   if (!has_begun_ && joint_motion_ != nullptr) controller_->Begin(ideal.time, measured_);
   has_begun_ = true;
   controller_->Step(measured_, ideal.time, &command_);

@@ -157,7 +157,7 @@ void CheckTrials(StudyInputs* inputs) {
   inputs->OpenScenario();
   const Scenario first = MakeTrialScenario(*inputs, trial);
   MjModelPtr engine = LoadMjcf(inputs->mjcf);
-  RemovePictures(engine.get());
+  RemovePictures(&engine);
   inputs->engine = std::move(engine);
   const Setup setup = MakeSetup(*inputs, trial, first);
   const std::string robot = inputs->robot.string();

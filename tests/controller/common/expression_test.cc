@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "controller/common/types.h"
 
@@ -50,18 +51,21 @@ TEST(Expression, LeavesOverflowToTheCaller) {
 }
 
 TEST(Expression, SaysWhatIsWrongAndWhere) {
-  EXPECT_EQ(CatchProblem(""), "a number, symbol or \"(\" is missing at character 1");
-  EXPECT_EQ(CatchProblem("1 +"), "a number, symbol or \"(\" is missing at character 4");
-  EXPECT_EQ(CatchProblem("1 2"), "unexpected \"2\" at character 3");
-  EXPECT_EQ(CatchProblem("2 ^ 3"), "unexpected \"^ 3\" at character 3");
-  EXPECT_EQ(CatchProblem("0x10"), "unexpected \"x10\" at character 2");
-  EXPECT_EQ(CatchProblem("(1 + 2"), "\")\" is missing at character 7");
-  EXPECT_EQ(CatchProblem("1)"), "unexpected \")\" at character 2");
-  EXPECT_EQ(CatchProblem("*2"), "unexpected \"*2\" at character 1");
-  EXPECT_EQ(CatchProblem("."), "malformed number at character 1");
-  EXPECT_EQ(CatchProblem("1e999"), "number out of range at character 1");
-  EXPECT_EQ(CatchProblem("2 * L_2"), "unknown symbol \"L_2\" (did you mean \"L_1\"?) at character 5");
-  EXPECT_EQ(CatchProblem("inf"), "unknown symbol \"inf\" at character 1");
+  constexpr std::pair<const char*, const char*> kProblems[] = {
+      {"", "a number, symbol or \"(\" is missing at character 1"},
+      {"1 +", "a number, symbol or \"(\" is missing at character 4"},
+      {"1 2", "unexpected \"2\" at character 3"},
+      {"2 ^ 3", "unexpected \"^ 3\" at character 3"},
+      {"0x10", "unexpected \"x10\" at character 2"},
+      {"(1 + 2", "\")\" is missing at character 7"},
+      {"1)", "unexpected \")\" at character 2"},
+      {"*2", "unexpected \"*2\" at character 1"},
+      {".", "malformed number at character 1"},
+      {"1e999", "number out of range at character 1"},
+      {"2 * L_2", "unknown symbol \"L_2\" (did you mean \"L_1\"?) at character 5"},
+      {"inf", "unknown symbol \"inf\" at character 1"},
+  };
+  for (const auto& [text, problem] : kProblems) EXPECT_EQ(CatchProblem(text), problem);
 }
 
 TEST(Expression, BoundsItsRecursion) {

@@ -47,32 +47,32 @@ void ExpectSameContact(const FoundContact& found, const Placement& placement, co
                          placement.X_OF.matrix(), kConverged));
 }
 
-TEST(FindContactTest, FindsKnownContactsWithoutAGuess) {
-  std::mt19937 random(41);
+/// Calls check(pair, placement, generator) for contacts at random of all pairs of surfaces.
+template <typename Check>
+void ForEachContact(unsigned seed, const Check& check) {
+  std::mt19937 random(seed);
   for (const SurfacePair& pair : testing::MakeAllPairs()) {
     SCOPED_TRACE(pair.first.name + " on " + pair.second.name);
-    for (int sample = 0; sample < kSamples; ++sample) {
-      const Placement placement = DrawPlacement(random, pair, 0.002);
-      ExpectSameContact(FindContact(*pair.first.surface, *pair.second.surface, placement.X_OF), placement,
-                        pair);
-    }
+    for (int sample = 0; sample < kSamples; ++sample) check(pair, DrawPlacement(random, pair, 0.002), random);
   }
 }
 
+TEST(FindContactTest, FindsKnownContactsWithoutAGuess) {
+  ForEachContact(41, [](const SurfacePair& pair, const Placement& placement, std::mt19937& /*random*/) {
+    ExpectSameContact(FindContact(*pair.first.surface, *pair.second.surface, placement.X_OF), placement,
+                      pair);
+  });
+}
+
 TEST(FindContactTest, FindsKnownContactsFromANearbyGuess) {
-  std::mt19937 random(42);
-  for (const SurfacePair& pair : testing::MakeAllPairs()) {
-    SCOPED_TRACE(pair.first.name + " on " + pair.second.name);
-    for (int sample = 0; sample < kSamples; ++sample) {
-      const Placement placement = DrawPlacement(random, pair, 0.002);
-      Vector5d offset = 0.05 * DrawVector(random, 5);
-      if (pair.second.name == "plane") offset.segment<2>(2) *= 0.01;
-      if (pair.second.name == "cylinder") offset(3) *= 0.01;
-      const ContactCoordinates guess = Displace(placement.kappa, offset);
-      ExpectSameContact(FindContact(*pair.first.surface, *pair.second.surface, placement.X_OF, guess),
-                        placement, pair);
-    }
-  }
+  ForEachContact(42, [](const SurfacePair& pair, const Placement& placement, std::mt19937& random) {
+    Vector5d offset = 0.05 * DrawVector(random, 5);
+    if (pair.second.name == "plane") offset.segment<2>(2) *= 0.01;
+    if (pair.second.name == "cylinder") offset(3) *= 0.01;
+    const ContactCoordinates guess = Displace(placement.kappa, offset);
+    ExpectSameContact(FindContact(*pair.first.surface, *pair.second.surface, placement.X_OF, guess),
+                      placement, pair);
+  });
 }
 
 TEST(FindContactTest, ImpossibleInputIsAClearError) {

@@ -29,13 +29,6 @@ constexpr double kFault = 1e-4;
 constexpr ControlLaw kBaselines[] = {ControlLaw::kPdGravity, ControlLaw::kFeedforwardPd,
                                      ControlLaw::kOperationalSpace, ControlLaw::kImpedance};
 
-ObjectGains MakeGains() {
-  ObjectGains gains;
-  gains.K_v << 10.0, 12.0, 14.0, 16.0, 18.0, 20.0;
-  gains.K_p << 30.0, 40.0, 50.0, 60.0, 70.0, 80.0;
-  return gains;
-}
-
 BaselineLaw::Options MakeOptions() {
   BaselineLaw::Options options;
   options.gains = MakeGains();
@@ -43,13 +36,6 @@ BaselineLaw::Options MakeOptions() {
   options.stiffness.D << 300.0, 200.0, 400.0, 2.0, 3.0, 4.0;
   options.stiffness.damping_ratio = 0.7;
   return options;
-}
-
-VectorXd DrawVector(Eigen::Index size, double scale, std::mt19937* random) {
-  std::uniform_real_distribution<double> uniform(-scale, scale);
-  VectorXd v(size);
-  for (double& entry : v) entry = uniform(*random);
-  return v;
 }
 
 class BaselineLawTest : public ::testing::Test {

@@ -31,20 +31,6 @@ constexpr double kPredictedWrenchRounding = 1e-12;
 constexpr double kAccelerationRounding = 1.4e-10;
 constexpr double kPrintedRounding = 2.5e-10;
 
-ObjectGains MakeGains() {
-  ObjectGains gains;
-  gains.K_v << 10.0, 12.0, 14.0, 16.0, 18.0, 20.0;
-  gains.K_p << 30.0, 40.0, 50.0, 60.0, 70.0, 80.0;
-  return gains;
-}
-
-VectorXd DrawVector(Eigen::Index size, double scale, std::mt19937* random) {
-  std::uniform_real_distribution<double> uniform(-scale, scale);
-  VectorXd v(size);
-  for (double& entry : v) entry = uniform(*random);
-  return v;
-}
-
 DesiredMotion DrawDesired(const GraspScene& scene, std::mt19937* random) {
   return {scene.X_o + DrawVector(6, 0.05, random), DrawVector(6, 0.5, random), DrawVector(6, 2.0, random)};
 }

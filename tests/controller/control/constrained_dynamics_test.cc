@@ -78,48 +78,51 @@ ObjectSpaceTerms CalcObjectSpaceTerms(const ModelTerms& robot, const GraspTerms&
   return terms;
 }
 
-class PredictionTest : public ::testing::TestWithParam<Hands> {};
+class PredictionTest : public ::testing::TestWithParam<Hands> {
+ protected:
+  /// Velocities and forces at random, and what the whole system answers with.
+  const Prediction& Draw(std::mt19937* random) {
+    scene_.DrawVelocities(random, 1.0);
+    force_ = DrawForce(scene_.robot.size(), random);
+    return dynamics_.Predict(scene_.robot, scene_.grasp, force_);
+  }
+  GraspScene scene_{GetParam()};
+  ConstrainedDynamics dynamics_{scene_.model, scene_.grasp.num_contacts()};
+  VectorXd force_;
+};
 
 TEST_P(PredictionTest, SatisfiesAllThreeEquations) {
-  GraspScene scene(GetParam());
   std::mt19937 random(1);
-  ConstrainedDynamics dynamics(scene.model, scene.grasp.num_contacts());
   for (int trial = 0; trial < 10; ++trial) {
-    scene.DrawVelocities(&random, 1.0);
-    const VectorXd force = DrawForce(scene.robot.size(), &random);
-    const Prediction& p = dynamics.Predict(scene.robot, scene.grasp, force);
+    const Prediction& p = Draw(&random);
     ASSERT_GT(p.f_c.norm(), 0.1);
     ASSERT_GT(p.xi_dot.norm(), 1.0);
-    ASSERT_GT(scene.grasp.slip_bias().norm(), 0.1);
-    const Balance balance(scene.robot, scene.grasp, force, p);
-    EXPECT_TRUE(MatrixNear(balance.robot_residual, VectorXd::Zero(scene.robot.size()), kForceRounding));
+    ASSERT_GT(scene_.grasp.slip_bias().norm(), 0.1);
+    const Balance balance(scene_.robot, scene_.grasp, force_, p);
+    EXPECT_TRUE(MatrixNear(balance.robot_residual, VectorXd::Zero(scene_.robot.size()), kForceRounding));
     EXPECT_TRUE(MatrixNear(balance.object_residual, Vector6d::Zero(), kForceRounding));
     EXPECT_TRUE(
-        MatrixNear(balance.contact_residual, VectorXd::Zero(scene.num_forces()), kAccelerationRounding));
+        MatrixNear(balance.contact_residual, VectorXd::Zero(scene_.num_forces()), kAccelerationRounding));
   }
 }
 
 TEST_P(PredictionTest, IsTheSolutionOfTheWholeSystem) {
-  GraspScene scene(GetParam());
   std::mt19937 random(2);
-  scene.DrawVelocities(&random, 1.0);
-  const Eigen::Index n = scene.robot.size();
-  const Eigen::Index k = scene.num_forces();
-  const VectorXd force = DrawForce(scene.robot.size(), &random);
-  const GraspTerms& g = scene.grasp;
+  const Prediction& p = Draw(&random);
+  const Eigen::Index n = scene_.robot.size();
+  const Eigen::Index k = scene_.num_forces();
+  const GraspTerms& g = scene_.grasp;
   MatrixXd A = MatrixXd::Zero(n + 6 + k, n + 6 + k);
-  A.topLeftCorner(n, n) = scene.robot.M();
+  A.topLeftCorner(n, n) = scene_.robot.M();
   A.block<6, 6>(n, n) = g.body().M_hat;
   A.topRightCorner(n, k) = g.J_B().transpose();
   A.block(n, n + 6, 6, k) = -g.G();
   A.bottomLeftCorner(k, n) = g.J_B();
   A.block(n + 6, n, k, 6) = -g.G().transpose();
   VectorXd b(n + 6 + k);
-  b << force - scene.robot.C() * scene.xi - scene.robot.gravity() - scene.robot.friction(),
-      -g.body().C_hat * g.V_Bo() - g.body().N_o, -g.J_B_dot() * scene.xi + g.G_dot().transpose() * g.V_Bo();
+  b << force_ - scene_.robot.C() * scene_.xi - scene_.robot.gravity() - scene_.robot.friction(),
+      -g.body().C_hat * g.V_Bo() - g.body().N_o, -g.J_B_dot() * scene_.xi + g.G_dot().transpose() * g.V_Bo();
   const VectorXd x = testing::SolveDense(A, b);
-  ConstrainedDynamics dynamics(scene.model, g.num_contacts());
-  const Prediction& p = dynamics.Predict(scene.robot, g, force);
   // The whole matrix mixes kg with 1e-5 kg m^2 and loses more digits; measured 5.4e-10 of 6000
   // rad/s^2, 2.7e-12 N.
   EXPECT_TRUE(MatrixNear(p.xi_dot, x.head(n), 5e-9));
@@ -128,65 +131,55 @@ TEST_P(PredictionTest, IsTheSolutionOfTheWholeSystem) {
 }
 
 TEST_P(PredictionTest, ContactForcesDoNoWork) {
-  GraspScene scene(GetParam());
   std::mt19937 random(3);
-  scene.DrawVelocities(&random, 1.0);
-  ConstrainedDynamics dynamics(scene.model, scene.grasp.num_contacts());
-  const VectorXd force = DrawForce(scene.robot.size(), &random);
-  const Prediction& p = dynamics.Predict(scene.robot, scene.grasp, force);
+  const Prediction& p = Draw(&random);
   // Rate of both kinetic energies (Property 2) = power of all other forces.
-  const Vector6d V = scene.grasp.V_Bo();
-  const double rate = scene.xi.dot(scene.robot.M() * p.xi_dot + scene.robot.C() * scene.xi) +
-                      V.dot(scene.grasp.body().M_hat * p.V_Bo_dot + scene.grasp.body().C_hat * V);
-  const double power =
-      scene.xi.dot(force - scene.robot.gravity() - scene.robot.friction()) - V.dot(scene.grasp.body().N_o);
+  const Vector6d V = scene_.grasp.V_Bo();
+  const double rate = scene_.xi.dot(scene_.robot.M() * p.xi_dot + scene_.robot.C() * scene_.xi) +
+                      V.dot(scene_.grasp.body().M_hat * p.V_Bo_dot + scene_.grasp.body().C_hat * V);
+  const double power = scene_.xi.dot(force_ - scene_.robot.gravity() - scene_.robot.friction()) -
+                       V.dot(scene_.grasp.body().N_o);
   ASSERT_GT(std::abs(power), 0.1);
   // Powers of single joints, up to 1e3 W, cancel.
-  EXPECT_NEAR(rate, power, 1e-12 * (1.0 + scene.xi.cwiseAbs().dot((scene.robot.M() * p.xi_dot).cwiseAbs())));
+  EXPECT_NEAR(rate, power,
+              1e-12 * (1.0 + scene_.xi.cwiseAbs().dot((scene_.robot.M() * p.xi_dot).cwiseAbs())));
 }
 
 // (52) holds for any torques, with sigma = xi and the null-space part of the acceleration as sigma'.
 TEST_P(PredictionTest, ObjectSpaceDynamicsHoldInTheWholeSystem) {
-  GraspScene scene(GetParam());
   std::mt19937 random(4);
-  scene.DrawVelocities(&random, 1.0);
-  ConstrainedDynamics dynamics(scene.model, scene.grasp.num_contacts());
-  const VectorXd force = DrawForce(scene.robot.size(), &random);
-  const Prediction& p = dynamics.Predict(scene.robot, scene.grasp, force);
-  const Vector6d X_o_ddot = CalcCoordinateAcceleration(scene.grasp, p.V_Bo_dot);
-  Pseudoinverse pinv("J_B'", scene.num_forces(), scene.robot.size());
-  pinv.Factor(scene.grasp.J_B());
+  const Prediction& p = Draw(&random);
+  const Vector6d X_o_ddot = CalcCoordinateAcceleration(scene_.grasp, p.V_Bo_dot);
+  Pseudoinverse pinv("J_B'", scene_.num_forces(), scene_.robot.size());
+  pinv.Factor(scene_.grasp.J_B());
   const auto calc_residual = [&](const VectorXd& sigma, const VectorXd& sigma_prime) -> Vector6d {
-    const ObjectSpaceTerms t = CalcObjectSpaceTerms(scene.robot, scene.grasp, pinv, sigma, sigma_prime);
-    return t.M_tilde * X_o_ddot + t.C_tilde * scene.X_o_dot + t.N_tilde - t.G_J_T * force;
+    const ObjectSpaceTerms t = CalcObjectSpaceTerms(scene_.robot, scene_.grasp, pinv, sigma, sigma_prime);
+    return t.M_tilde * X_o_ddot + t.C_tilde * scene_.X_o_dot + t.N_tilde - t.G_J_T * force_;
   };
   // Measured 5e-12.
   constexpr double kTolerance = 5e-11;
-  EXPECT_TRUE(MatrixNear(calc_residual(scene.xi, p.xi_dot), Vector6d::Zero(), kTolerance));
+  EXPECT_TRUE(MatrixNear(calc_residual(scene_.xi, p.xi_dot), Vector6d::Zero(), kTolerance));
   // Wrong null-space motions do not satisfy it.
-  EXPECT_GT(calc_residual(VectorXd::Zero(scene.robot.size()), p.xi_dot).norm(), 1e3 * kTolerance);
-  EXPECT_GT(calc_residual(scene.xi, VectorXd::Zero(scene.robot.size())).norm(), 1e3 * kTolerance);
+  EXPECT_GT(calc_residual(VectorXd::Zero(scene_.robot.size()), p.xi_dot).norm(), 1e3 * kTolerance);
+  EXPECT_GT(calc_residual(scene_.xi, VectorXd::Zero(scene_.robot.size())).norm(), 1e3 * kTolerance);
 }
 
 // (47): pseudoinverse and projector give back the motion that satisfies the constraint.
 TEST_P(PredictionTest, Equation47ReproducesTheMotion) {
-  GraspScene scene(GetParam());
   std::mt19937 random(5);
-  scene.DrawVelocities(&random, 1.0);
-  ConstrainedDynamics dynamics(scene.model, scene.grasp.num_contacts());
-  const Prediction& p = dynamics.Predict(scene.robot, scene.grasp, DrawForce(scene.robot.size(), &random));
-  const Vector6d X_o_ddot = CalcCoordinateAcceleration(scene.grasp, p.V_Bo_dot);
-  const ObjectTerms& o = scene.grasp.coordinates();
-  const MatrixXd G_T = scene.grasp.G().transpose();
-  const MatrixXd G_T_dot = scene.grasp.G_dot().transpose();
-  Pseudoinverse pinv("J_B'", scene.num_forces(), scene.robot.size());
-  pinv.FactorWeighted(scene.grasp.J_B(), scene.robot.M());
+  const Prediction& p = Draw(&random);
+  const Vector6d X_o_ddot = CalcCoordinateAcceleration(scene_.grasp, p.V_Bo_dot);
+  const ObjectTerms& o = scene_.grasp.coordinates();
+  const MatrixXd G_T = scene_.grasp.G().transpose();
+  const MatrixXd G_T_dot = scene_.grasp.G_dot().transpose();
+  Pseudoinverse pinv("J_B'", scene_.num_forces(), scene_.robot.size());
+  pinv.FactorWeighted(scene_.grasp.J_B(), scene_.robot.M());
   const MatrixXd J_plus = pinv.CalcMatrix();
   const MatrixXd N = pinv.CalcProjector();
-  const VectorXd xi = J_plus * G_T * o.P_inv * scene.X_o_dot + N * scene.xi;
-  EXPECT_TRUE(MatrixNear(xi, scene.xi, kForceRounding));
-  const VectorXd xi_dot = J_plus * (G_T_dot * o.P_inv * scene.X_o_dot + G_T * o.P_inv_dot * scene.X_o_dot +
-                                    G_T * o.P_inv * X_o_ddot - scene.grasp.J_B_dot() * xi) +
+  const VectorXd xi = J_plus * G_T * o.P_inv * scene_.X_o_dot + N * scene_.xi;
+  EXPECT_TRUE(MatrixNear(xi, scene_.xi, kForceRounding));
+  const VectorXd xi_dot = J_plus * (G_T_dot * o.P_inv * scene_.X_o_dot + G_T * o.P_inv_dot * scene_.X_o_dot +
+                                    G_T * o.P_inv * X_o_ddot - scene_.grasp.J_B_dot() * xi) +
                           N * p.xi_dot;
   EXPECT_TRUE(MatrixNear(xi_dot, p.xi_dot, kAccelerationRounding));
 }

@@ -14,6 +14,7 @@
 #include "controller/contact/find_contact.h"
 #include "controller/contact/shapes.h"
 #include "controller/control/grasp_terms.h"
+#include "controller/control/object_tracking.h"
 #include "controller/control/pseudoinverse.h"
 #include "controller/grasp/finger_placement.h"
 #include "controller/object/euler_zyz.h"
@@ -24,6 +25,22 @@ namespace dexcheck::testing {
 /// X_o_ddot = P (V_Bo_dot - d/dt(P^-1) X_o_dot).
 inline Vector6d CalcCoordinateAcceleration(const GraspTerms& grasp, const Vector6d& V_Bo_dot) {
   return CalcP(grasp.X_o()) * (V_Bo_dot - grasp.coordinates().P_inv_dot * grasp.X_o_dot());
+}
+
+/// Entries within -+scale.
+inline VectorXd DrawVector(Eigen::Index size, double scale, std::mt19937* random) {
+  std::uniform_real_distribution<double> uniform(-scale, scale);
+  VectorXd v(size);
+  for (double& entry : v) entry = uniform(*random);
+  return v;
+}
+
+/// Another gain for each axis.
+inline ObjectGains MakeGains() {
+  ObjectGains gains;
+  gains.K_v << 10.0, 12.0, 14.0, 16.0, 18.0, 20.0;
+  gains.K_p << 30.0, 40.0, 50.0, 60.0, 70.0, 80.0;
+  return gains;
 }
 
 enum class Hands { kRight, kLeft, kBoth };

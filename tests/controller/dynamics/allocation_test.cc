@@ -4,14 +4,11 @@
 
 #include <cstdlib>
 #include <memory>
-#include <ostream>
 #include <string>
 #include <vector>
 
-#include "controller/dynamics/model_terms.h"
 #include "tests/common/allocation_counter.h"
-#include "tests/common/paper_robot.h"
-#include "tests/common/random_robot.h"
+#include "tests/controller/dynamics/robot_cases.h"
 
 namespace dexcheck::testing::allocation_test {
 namespace {
@@ -58,35 +55,24 @@ TEST(AllocationCounter, CountsEveryKind) {
   EXPECT_EQ(count([] { Use(std::make_unique<Aligned>().get()); }), 1);
 }
 
-struct Case {
-  std::string name;
-  RobotModel model;
-  Coordinates coordinates;
-};
-
-void PrintTo(const Case& robot, std::ostream* out) { *out << robot.name; }
-
-std::vector<Case> MakeCases() {
-  std::vector<Case> cases;
+std::vector<RobotCase> MakeCases() {
+  std::vector<RobotCase> cases;
   std::mt19937 random(200);
+  const auto add = [&](const std::string& name, const RobotModel& model) {
+    cases.push_back({name + "Reduced", model, Coordinates::kReduced});
+    cases.push_back({name + "Unreduced", model, Coordinates::kUnreduced});
+  };
   for (const BaseType base : {BaseType::kFixed, BaseType::kPlanar, BaseType::kDifferentialDrive}) {
-    testing::RandomRobotOptions options;
-    options.base = base;
-    options.joints = 200;
-    const RobotModel tree(testing::MakeRandomRobot(options, &random));
-    const std::string name = "Tree" + std::to_string(static_cast<int>(base));
-    cases.push_back({name + "Reduced", tree, Coordinates::kReduced});
-    cases.push_back({name + "Unreduced", tree, Coordinates::kUnreduced});
+    const RandomRobotOptions options{.base = base, .joints = 200};
+    add("Tree" + std::to_string(static_cast<int>(base)), RobotModel(MakeRandomRobot(options, &random)));
   }
-  cases.push_back({"PaperTwist", testing::ReadPaperRobot(), Coordinates::kReduced});
-  cases.push_back({"PaperUnreduced", testing::ReadPaperRobot(), Coordinates::kUnreduced});
-  cases.push_back(
-      {"PaperWheelRates", testing::ReadPaperRobot(DriveVelocity::kWheelRates), Coordinates::kReduced});
-  cases.push_back({"Panda", testing::ReadPanda(), Coordinates::kReduced});
+  add("Paper", ReadPaperRobot());
+  cases.push_back({"PaperWheelRates", ReadPaperRobot(DriveVelocity::kWheelRates), Coordinates::kReduced});
+  cases.push_back({"Panda", ReadPanda(), Coordinates::kReduced});
   return cases;
 }
 
-class Allocation : public ::testing::TestWithParam<Case> {
+class Allocation : public ::testing::TestWithParam<RobotCase> {
  protected:
   /// Allocations while `call` runs.
   template <typename Call>
@@ -103,8 +89,7 @@ class Allocation : public ::testing::TestWithParam<Case> {
   const VectorXd velocity_ = testing::DrawVelocities(terms_.size(), &random_);
 };
 
-INSTANTIATE_TEST_SUITE_P(Robots, Allocation, ::testing::ValuesIn(MakeCases()),
-                         [](const auto& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(Robots, Allocation, ::testing::ValuesIn(MakeCases()), NameOf);
 
 // The first call counts, too: the workspace is complete when the constructor returns.
 TEST_P(Allocation, NoneAfterConstruction) {

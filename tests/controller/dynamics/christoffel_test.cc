@@ -7,13 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "controller/dynamics/model_terms.h"
 #include "tests/common/dual.h"
 #include "tests/common/mass_scaling.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/naive_dynamics.h"
-#include "tests/common/paper_robot.h"
-#include "tests/common/random_robot.h"
+#include "tests/controller/dynamics/robot_cases.h"
 
 namespace dexcheck::testing::christoffel_test {
 namespace {
@@ -28,24 +26,14 @@ constexpr double kSumRounding = 2e-12;
 // A mutated model must miss by far more.
 constexpr double kVisible = 1e-4;
 
-struct Case {
-  std::string name;
-  RobotModel model;
-  double tolerance;
-};
-
-void PrintTo(const Case& robot, std::ostream* out) { *out << robot.name; }
-
-std::vector<Case> MakeCases() {
-  std::vector<Case> cases;
+std::vector<RobotCase> MakeCases() {
+  std::vector<RobotCase> cases;
   std::mt19937 random(316);
   const auto add = [&](const char* name, BaseType base, double branching, double prismatic) {
-    testing::RandomRobotOptions options;
-    options.base = base;
-    options.joints = 12;
-    options.branching = branching;
-    options.prismatic = prismatic;
-    cases.push_back({name, RobotModel(testing::MakeRandomRobot(options, &random)), kRounding});
+    const RandomRobotOptions options{
+        .base = base, .joints = 12, .branching = branching, .prismatic = prismatic};
+    cases.push_back(
+        {name, RobotModel(MakeRandomRobot(options, &random)), Coordinates::kUnreduced, kRounding});
   };
   add("FixedChain", BaseType::kFixed, 0.0, 0.0);
   add("FixedTree", BaseType::kFixed, 0.4, 0.3);
@@ -53,7 +41,7 @@ std::vector<Case> MakeCases() {
   add("PlanarTree", BaseType::kPlanar, 0.4, 0.3);
   add("DriveChain", BaseType::kDifferentialDrive, 0.0, 0.0);
   add("DriveTree", BaseType::kDifferentialDrive, 0.4, 0.3);
-  cases.push_back({"PaperRobot", testing::ReadPaperRobot(), kFingerRounding});
+  cases.push_back({"PaperRobot", ReadPaperRobot(), Coordinates::kUnreduced, kFingerRounding});
   return cases;
 }
 
@@ -82,25 +70,29 @@ LagrangeTerms CalcLagrangeTerms(const RobotModel& model, const VectorXd& q, cons
   return terms;
 }
 
-class Christoffel : public ::testing::TestWithParam<Case> {
+class Christoffel : public ::testing::TestWithParam<RobotCase> {
  protected:
   static constexpr int kStates = 3;
+  /// Another state at random.
+  void Draw() {
+    q_ = DrawPositions(model_, &random_);
+    q_dot_ = DrawVelocities(terms_.size(), &random_);
+    terms_.SetState(q_, q_dot_);
+    terms_.CalcDynamics();
+  }
   const RobotModel& model_ = GetParam().model;
   const double tolerance_ = GetParam().tolerance;
   std::mt19937 random_{1905};
+  ModelTerms terms_{model_, Coordinates::kUnreduced};
+  VectorXd q_, q_dot_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Robots, Christoffel, ::testing::ValuesIn(MakeCases()),
-                         [](const auto& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(Robots, Christoffel, ::testing::ValuesIn(MakeCases()), NameOf);
 
 TEST_P(Christoffel, TermsAreThoseOfLagrange) {
-  ModelTerms terms(model_, Coordinates::kUnreduced);
   for (int state = 0; state < kStates; ++state) {
-    const VectorXd q = DrawPositions(model_, &random_);
-    const VectorXd q_dot = DrawVelocities(terms.size(), &random_);
-    terms.SetState(q, q_dot);
-    terms.CalcDynamics();
-    const LagrangeTerms expected = CalcLagrangeTerms(model_, q, q_dot);
+    Draw();
+    const LagrangeTerms expected = CalcLagrangeTerms(model_, q_, q_dot_);
     const MatrixXd& M = expected.M;
     const MatrixXd C = ScaleByMass(expected.C, M);
     const VectorXd gravity = ScaleForceByMass(expected.gravity, M);
@@ -109,37 +101,33 @@ TEST_P(Christoffel, TermsAreThoseOfLagrange) {
     ASSERT_GT(C.cwiseAbs().maxCoeff(), 0.1);
     ASSERT_GT(gravity.cwiseAbs().maxCoeff(), 1.0);
     ASSERT_GT(friction.cwiseAbs().maxCoeff(), 0.01);
-    EXPECT_TRUE(MatrixNear(ScaleByMass(terms.M(), M), ScaleByMass(M, M), tolerance_)) << "M";
-    EXPECT_TRUE(MatrixNear(ScaleByMass(terms.C(), M), C, tolerance_)) << "C";
-    EXPECT_TRUE(MatrixNear(ScaleForceByMass(terms.gravity(), M), gravity, tolerance_)) << "gravity";
-    EXPECT_TRUE(MatrixNear(ScaleForceByMass(terms.friction(), M), friction, tolerance_)) << "friction";
+    EXPECT_TRUE(MatrixNear(ScaleByMass(terms_.M(), M), ScaleByMass(M, M), tolerance_)) << "M";
+    EXPECT_TRUE(MatrixNear(ScaleByMass(terms_.C(), M), C, tolerance_)) << "C";
+    EXPECT_TRUE(MatrixNear(ScaleForceByMass(terms_.gravity(), M), gravity, tolerance_)) << "gravity";
+    EXPECT_TRUE(MatrixNear(ScaleForceByMass(terms_.friction(), M), friction, tolerance_)) << "friction";
   }
 }
 
 TEST_P(Christoffel, EnergyAndMomentumAreSumsOverBodies) {
-  ModelTerms terms(model_, Coordinates::kUnreduced);
   for (int state = 0; state < kStates; ++state) {
-    const VectorXd q = DrawPositions(model_, &random_);
-    const VectorXd q_dot = DrawVelocities(terms.size(), &random_);
-    terms.SetState(q, q_dot);
-    terms.CalcDynamics();
-    const EnergyAndMomentum result = terms.CalcEnergyAndMomentum();
+    Draw();
+    const EnergyAndMomentum result = terms_.CalcEnergyAndMomentum();
 
-    const NaiveDynamics<double> naive(model_, q);
+    const NaiveDynamics<double> naive(model_, q_);
     double mass = 0.0;
     Vector3d moment = Vector3d::Zero();
     Vector3d linear = Vector3d::Zero();
     for (const auto& body : naive.bodies()) {
       mass += body.mass;
       moment += body.mass * body.p;
-      linear += body.mass * (body.J_p * q_dot);
+      linear += body.mass * (body.J_p * q_dot_);
     }
     const Vector3d com = moment / mass;
     Vector3d angular = Vector3d::Zero();
     for (const auto& body : naive.bodies()) {
-      angular += (body.p - com).cross(body.mass * (body.J_p * q_dot)) + body.inertia * (body.J_w * q_dot);
+      angular += (body.p - com).cross(body.mass * (body.J_p * q_dot_)) + body.inertia * (body.J_w * q_dot_);
     }
-    const double kinetic = 0.5 * q_dot.dot(naive.CalcMassMatrix() * q_dot);
+    const double kinetic = 0.5 * q_dot_.dot(naive.CalcMassMatrix() * q_dot_);
     const double potential = naive.CalcPotentialEnergy();
     ASSERT_GT(linear.norm(), 0.1);
     ASSERT_GT(angular.norm(), 0.1);
@@ -153,12 +141,8 @@ TEST_P(Christoffel, EnergyAndMomentumAreSumsOverBodies) {
 }
 
 TEST_P(Christoffel, MutatedModelsAndWrongSymbolsAreSeen) {
-  ModelTerms terms(model_, Coordinates::kUnreduced);
-  const VectorXd q = DrawPositions(model_, &random_);
-  const VectorXd q_dot = DrawVelocities(terms.size(), &random_);
-  terms.SetState(q, q_dot);
-  terms.CalcDynamics();
-  const MatrixXd M = terms.M();
+  Draw();
+  const MatrixXd M = terms_.M();
   const auto differ = [&](const MatrixXd& A, const MatrixXd& B) {
     return ScaleByMass(A - B, M).cwiseAbs().maxCoeff();
   };
@@ -166,30 +150,30 @@ TEST_P(Christoffel, MutatedModelsAndWrongSymbolsAreSeen) {
   // The last link's centre of mass a millimetre away.
   RobotSpec shifted = model_.spec();
   shifted.joints.back().body.com.x() += 1e-3;
-  const LagrangeTerms other = CalcLagrangeTerms(RobotModel(shifted), q, q_dot);
+  const LagrangeTerms other = CalcLagrangeTerms(RobotModel(shifted), q_, q_dot_);
   EXPECT_GT(differ(M, other.M), kVisible);
-  EXPECT_GT(differ(terms.C(), other.C), kVisible);
-  EXPECT_GT(ScaleForceByMass(terms.gravity() - other.gravity, M).cwiseAbs().maxCoeff(), kVisible);
+  EXPECT_GT(differ(terms_.C(), other.C), kVisible);
+  EXPECT_GT(ScaleForceByMass(terms_.gravity() - other.gravity, M).cwiseAbs().maxCoeff(), kVisible);
 
   // Spin of the wheels, and the heading along which they roll.
   if (model_.base().type == BaseType::kDifferentialDrive) {
     RobotSpec still = model_.spec();
     still.base.wheel.armature += 0.01;
-    const LagrangeTerms heavier = CalcLagrangeTerms(RobotModel(still), q, q_dot);
+    const LagrangeTerms heavier = CalcLagrangeTerms(RobotModel(still), q_, q_dot_);
     EXPECT_GT(differ(M, heavier.M), kVisible);
-    EXPECT_GT(differ(terms.C(), heavier.C), kVisible);
+    EXPECT_GT(differ(terms_.C(), heavier.C), kVisible);
   }
 
   // C without its part skew in i and j has the same power, its transpose the same symmetric part, and a C
   // that adds u (q_dot turned by a right angle)^T gives the same C q_dot: none is the Christoffel choice.
-  const MatrixXd C = terms.C();
+  const MatrixXd C = terms_.C();
   EXPECT_GT(differ(C, 0.5 * (C + C.transpose())), kVisible);
   EXPECT_GT(differ(C, C.transpose()), kVisible);
-  VectorXd normal = VectorXd::Zero(q.size());
-  normal[0] = q_dot[1];
-  normal[1] = -q_dot[0];
+  VectorXd normal = VectorXd::Zero(q_.size());
+  normal[0] = q_dot_[1];
+  normal[1] = -q_dot_[0];
   const MatrixXd same_force = C + M.col(0) * normal.transpose();
-  ASSERT_LT((same_force * q_dot - C * q_dot).norm(), 1e-10);
+  ASSERT_LT((same_force * q_dot_ - C * q_dot_).norm(), 1e-10);
   EXPECT_GT(differ(C, same_force), kVisible);
 }
 

@@ -3,42 +3,29 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <ostream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "controller/common/errors.h"
-#include "controller/dynamics/model_terms.h"
 #include "tests/common/finite_difference.h"
 #include "tests/common/matrix_near.h"
-#include "tests/common/paper_robot.h"
-#include "tests/common/random_robot.h"
 #include "tests/common/reduction_map.h"
+#include "tests/controller/dynamics/robot_cases.h"
 
 namespace dexcheck::testing::jacobian_test {
 namespace {
 
 // Five-point differences at unit rates: truncation h^4 / 30 = 3e-14 per metre, rounding eps |p| / h = 1e-12.
 // Measured 9e-13.
-constexpr double kPoseStep = 1e-3;
-constexpr double kPoseDifference = 5e-12;
+constexpr double kPoseStep = 1e-3, kPoseDifference = 5e-12;
 // Along q_dot, whose rates add up to 20 rad/s and more: truncation h^4 20^5 / 30 = 1e-11, rounding eps |J| /
 // h = 1e-11; measured 1e-11.
-constexpr double kStateStep = 1e-4;
-constexpr double kStateDifference = 1e-10;
+constexpr double kStateStep = 1e-4, kStateDifference = 1e-10;
 // Two formulas for one quantity of up to 30 (in SI units); measured 1e-15 of it.
 constexpr double kRounding = 1e-14;
 // A wrong formula must miss by far more.
 constexpr double kVisible = 1e-3;
-
-struct Case {
-  std::string name;
-  RobotModel model;
-  Coordinates coordinates;
-};
-
-void PrintTo(const Case& robot, std::ostream* out) { *out << robot.name; }
 
 /// The model with a frame at a generic place on every link, the base's included.
 RobotModel AddFrames(const RobotModel& model) {
@@ -53,25 +40,12 @@ RobotModel AddFrames(const RobotModel& model) {
   return RobotModel(spec);
 }
 
-std::vector<Case> MakeCases() {
-  std::vector<Case> cases;
-  std::mt19937 random(607);
-  const auto add = [&](const std::string& name, const RobotModel& model) {
-    cases.push_back({name + "Reduced", AddFrames(model), Coordinates::kReduced});
-    cases.push_back({name + "Unreduced", AddFrames(model), Coordinates::kUnreduced});
-  };
-  const auto add_tree = [&](const char* name, BaseType base, DriveVelocity velocity) {
-    testing::RandomRobotOptions options;
-    options.base = base;
-    options.velocity = velocity;
-    add(name, RobotModel(testing::MakeRandomRobot(options, &random)));
-  };
-  add_tree("Fixed", BaseType::kFixed, DriveVelocity::kTwist);
-  add_tree("Planar", BaseType::kPlanar, DriveVelocity::kTwist);
-  add_tree("DriveTwist", BaseType::kDifferentialDrive, DriveVelocity::kTwist);
-  add_tree("DriveWheelRates", BaseType::kDifferentialDrive, DriveVelocity::kWheelRates);
-  add("PaperTwist", testing::ReadPaperRobot(DriveVelocity::kTwist));
-  add("PaperWheelRates", testing::ReadPaperRobot(DriveVelocity::kWheelRates));
+std::vector<RobotCase> MakeCases() {
+  std::vector<RobotCase> cases;
+  for (const RobotCase& robot : MakeRobotCases(607)) {
+    cases.push_back({robot.name + "Reduced", AddFrames(robot.model), Coordinates::kReduced});
+    cases.push_back({robot.name + "Unreduced", AddFrames(robot.model), Coordinates::kUnreduced});
+  }
   return cases;
 }
 
@@ -84,7 +58,7 @@ Vector6d CalcBodyVelocity(const Pose& X, const Eigen::Matrix4d& X_dot) {
   return V;
 }
 
-class Jacobian : public ::testing::TestWithParam<Case> {
+class Jacobian : public ::testing::TestWithParam<RobotCase> {
  protected:
   /// Positions' rates from velocity coordinates: S', or 1.
   [[nodiscard]] MatrixXd CalcRateMap(const VectorXd& q, const VectorXd& velocity) const {
@@ -114,8 +88,7 @@ class Jacobian : public ::testing::TestWithParam<Case> {
   const VectorXd q_dot_ = rate_map_ * velocity_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Robots, Jacobian, ::testing::ValuesIn(MakeCases()),
-                         [](const auto& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(Robots, Jacobian, ::testing::ValuesIn(MakeCases()), NameOf);
 
 TEST_P(Jacobian, IsTheDerivativeOfThePose) {
   terms_.SetState(q_, velocity_);

@@ -44,11 +44,7 @@ VectorXd CalcBias(const ModelTerms& terms, const VectorXd& /*q*/, const VectorXd
 }
 
 /// v of a base at 0.5 m/s that turns with 1.5 rad/s.
-Vector2d MakeDriveVelocity(const Base& base) {
-  Base by_twist = base;
-  by_twist.velocity = DriveVelocity::kTwist;
-  return CalcDriveVelocity(base, CalcWheelRates(by_twist, {0.5, 1.5}));
-}
+Vector2d MakeDriveVelocity(const Base& base) { return CalcDriveVelocityOfTwist(base, {0.5, 1.5}); }
 
 /// State of a motion and the work done on the robot since its start.
 struct MotionState {

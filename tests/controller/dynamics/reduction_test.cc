@@ -4,18 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <ostream>
 #include <string>
 #include <vector>
 
-#include "controller/dynamics/model_terms.h"
 #include "tests/common/finite_difference.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/mass_scaling.h"
 #include "tests/common/matrix_near.h"
-#include "tests/common/paper_robot.h"
-#include "tests/common/random_robot.h"
 #include "tests/common/reduction_map.h"
+#include "tests/controller/dynamics/robot_cases.h"
 
 namespace dexcheck::testing::reduction_test {
 namespace {
@@ -29,31 +26,6 @@ constexpr double kStep = 1e-4;
 constexpr double kDifference = 1e-7;
 // A wrong formula must miss by far more.
 constexpr double kVisible = 1e-3;
-
-struct Case {
-  std::string name;
-  RobotModel model;
-};
-
-void PrintTo(const Case& robot, std::ostream* out) { *out << robot.name; }
-
-std::vector<Case> MakeCases() {
-  std::vector<Case> cases;
-  std::mt19937 random(317);
-  const auto add = [&](const char* name, BaseType base, DriveVelocity velocity) {
-    testing::RandomRobotOptions options;
-    options.base = base;
-    options.velocity = velocity;
-    cases.push_back({name, RobotModel(testing::MakeRandomRobot(options, &random))});
-  };
-  add("Fixed", BaseType::kFixed, DriveVelocity::kTwist);
-  add("Planar", BaseType::kPlanar, DriveVelocity::kTwist);
-  add("DriveTwist", BaseType::kDifferentialDrive, DriveVelocity::kTwist);
-  add("DriveWheelRates", BaseType::kDifferentialDrive, DriveVelocity::kWheelRates);
-  cases.push_back({"PaperTwist", testing::ReadPaperRobot(DriveVelocity::kTwist)});
-  cases.push_back({"PaperWheelRates", testing::ReadPaperRobot(DriveVelocity::kWheelRates)});
-  return cases;
-}
 
 /// xi with a base that moves as fast, whatever its v is.
 VectorXd DrawReducedVelocities(const RobotModel& model, std::mt19937* random) {
@@ -87,7 +59,7 @@ struct Evaluation {
 
 double FindLargest(const MatrixXd& matrix) { return matrix.cwiseAbs().maxCoeff(); }
 
-class Reduction : public ::testing::TestWithParam<Case> {
+class Reduction : public ::testing::TestWithParam<RobotCase> {
  protected:
   static constexpr int kStates = 5;
   const RobotModel& model_ = GetParam().model;
@@ -95,8 +67,7 @@ class Reduction : public ::testing::TestWithParam<Case> {
   std::mt19937 random_{1718};
 };
 
-INSTANTIATE_TEST_SUITE_P(Robots, Reduction, ::testing::ValuesIn(MakeCases()),
-                         [](const auto& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(Robots, Reduction, ::testing::ValuesIn(MakeRobotCases(317)), NameOf);
 
 TEST_P(Reduction, SSpansTheNullSpaceOfA) {
   for (int state = 0; state < kStates; ++state) {
@@ -142,7 +113,7 @@ TEST_P(Reduction, ReducedTermsAreProjections) {
 TEST(PlatformPose, IsCyclic) {
   std::mt19937 random(1719);
   int drives = 0;
-  for (const Case& robot : MakeCases()) {
+  for (const RobotCase& robot : MakeRobotCases(317)) {
     if (robot.model.base().type != BaseType::kDifferentialDrive) continue;
     ++drives;
     SCOPED_TRACE(robot.name);

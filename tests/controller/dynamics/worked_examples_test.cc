@@ -45,16 +45,11 @@ ModelTerms Evaluate(const RobotModel& model, const VectorXd& q, const VectorXd& 
 // The arm lies in the vertical x-y plane, its joints along z; gravity points along -y. Link i has length l_i,
 // mass m_i at c_i along x, inertia I_i, rotor inertia A_i and friction d_i.
 constexpr double kl1 = 0.5;
-constexpr double kc1 = 0.2;
-constexpr double kc2 = 0.3;
-constexpr double km1 = 2.0;
-constexpr double km2 = 1.0;
-constexpr double kI1 = 0.04;
-constexpr double kI2 = 0.02;
-constexpr double kA1 = 0.01;
-constexpr double kA2 = 0.005;
-constexpr double kd1 = 0.3;
-constexpr double kd2 = 0.1;
+constexpr double kc1 = 0.2, kc2 = 0.3;
+constexpr double km1 = 2.0, km2 = 1.0;
+constexpr double kI1 = 0.04, kI2 = 0.02;
+constexpr double kA1 = 0.01, kA2 = 0.005;
+constexpr double kd1 = 0.3, kd2 = 0.1;
 
 RobotSpec MakeTwoLinkArm() {
   RobotSpec spec;
@@ -134,10 +129,8 @@ TEST(TwoLinkArm, MutationsAreSeen) {
 
 // A cart of mass m_c slides along y; from it hangs a pendulum of mass m_p at distance l, inertia I, that
 // turns about x. At q = 0 it hangs straight down; its centre of mass is (0, y + l sin(theta), -l cos(theta)).
-constexpr double km_c = 3.0;
-constexpr double km_p = 0.8;
-constexpr double kl = 0.35;
-constexpr double kI = 0.015;
+constexpr double km_c = 3.0, km_p = 0.8;
+constexpr double kl = 0.35, kI = 0.015;
 
 RobotSpec MakeCartPole() {
   RobotSpec spec;

@@ -22,8 +22,7 @@ constexpr double kRounding = 5e-15;
 constexpr double kInverseRounding = 3e-14;
 // Central differences with kStep: truncation kStep^2 / 6 times third derivatives (below 30), rounding eps /
 // kStep.
-constexpr double kStep = 1e-5;
-constexpr double kDifference = 5e-10;
+constexpr double kStep = 1e-5, kDifference = 5e-10;
 // What a mutated model must exceed.
 constexpr double kVisible = 1e-2;
 

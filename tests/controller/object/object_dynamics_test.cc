@@ -19,8 +19,7 @@ namespace {
 constexpr double kRounding = 1e-13;
 // Central differences of terms up to 10 with kStep: truncation kStep^2 / 6 times third derivatives, rounding
 // eps * 10 / kStep. Measured 3.3e-10.
-constexpr double kStep = 1e-5;
-constexpr double kDifference = 3e-9;
+constexpr double kStep = 1e-5, kDifference = 3e-9;
 // Second differences of order 4 with h = 3e-3: h^4 / 90 = 9e-13 times sixth derivatives (some hundreds),
 // rounding eps / h^2 = 2.5e-11 times lever arms and sums. Measured 2.4e-10.
 constexpr double kParticles = 2e-9;

@@ -19,8 +19,7 @@ constexpr double kRounding = 5e-15;
 constexpr double kJacobianRounding = 2e-14;
 // Central differences with kStep: truncation kStep^2 times third derivatives (< 10 here), rounding eps /
 // kStep.
-constexpr double kStep = 1e-5;
-constexpr double kDifference = 1e-9;
+constexpr double kStep = 1e-5, kDifference = 1e-9;
 // What a mutated model must exceed.
 constexpr double kVisible = 1e-3;
 

@@ -27,15 +27,15 @@ class SameMotion : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(SameMotion, WithAndWithoutLooks) {
   const MjModelPtr full = LoadMjcf(testing::SourcePath(GetParam()));
-  const MjModelPtr bare(mj_copyModel(nullptr, full.get()));
-  const int removed = RemoveLooks(bare.get());
+  MjModelPtr bare(mj_copyModel(nullptr, full.get()));
+  const int removed = RemoveLooks(&bare);
   EXPECT_GT(removed, 10);
   EXPECT_EQ(bare->ngeom + removed, full->ngeom);
-  EXPECT_EQ(RemoveLooks(bare.get()), 0) << "nothing is left to remove";
-  const size_t pictures = RemovePictures(bare.get());
+  EXPECT_EQ(RemoveLooks(&bare), 0) << "nothing is left to remove";
+  const size_t pictures = RemovePictures(&bare);
   EXPECT_GE(pictures, static_cast<size_t>(full->ntexdata));
   EXPECT_EQ(pictures > 0, full->ntex > 0);
-  EXPECT_EQ(RemovePictures(bare.get()), 0U) << "likewise";
+  EXPECT_EQ(RemovePictures(&bare), 0U) << "likewise";
   for (int i = 0; i < bare->nmat; ++i) EXPECT_EQ(bare->mat_texid[i], -1);
   const MjModelPtr copy(mj_copyModel(nullptr, bare.get()));  // as the plant does
   const MjDataPtr a = MakeData(*full);
@@ -69,7 +69,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, SameMotion, ::testing::Values("/mjcf/scene.xml"
 
 // Each geom of a body that falls on a floor is used by something other than drawing, but for one.
 TEST(RemoveLooks, KeepsWhatAnythingRefersTo) {
-  const MjModelPtr model = LoadMjcfText(R"(
+  MjModelPtr model = LoadMjcfText(R"(
     <mujoco>
       <default><geom contype="0" conaffinity="0" size="0.1"/></default>
       <worldbody>
@@ -97,8 +97,8 @@ TEST(RemoveLooks, KeepsWhatAnythingRefersTo) {
       <sensor><framepos objtype="geom" objname="sensed"/></sensor>
       <custom><tuple name="t"><element objtype="geom" objname="in_tuple"/></tuple></custom>
     </mujoco>)",
-                                        "text");
-  EXPECT_EQ(RemoveLooks(model.get()), 3);
+                                  "text");
+  EXPECT_EQ(RemoveLooks(&model), 3);
   const auto id = [&](const char* name) { return mj_name2id(model.get(), mjOBJ_GEOM, name); };
   for (const char* name : {"drawn", "drawn_first", "drawn_too"}) EXPECT_EQ(id(name), -1) << name;
   for (const char* name : {"floor", "touches", "wrapped", "in_pair", "sensed", "in_tuple", "in_fluid"}) {

@@ -111,24 +111,24 @@ TEST_F(EnginePlantTest, ReadsWithoutAllocation) {
 
 TEST_F(EnginePlantTest, TheControllerIsToldTheTruthUnlessAskedOtherwise) {
   Step();
-  Reading told;
-  Sensing({}, setup_.MakePartContext()).Tell(reading_, &told);
-  EXPECT_EQ(told.state.q, reading_.state.q);
-  EXPECT_EQ(told.state.xi, reading_.state.xi);
-  EXPECT_EQ(told.state.X_Bo.matrix(), reading_.state.X_Bo.matrix());
-  EXPECT_EQ(told.state.V_Bo, reading_.state.V_Bo);
-  EXPECT_EQ(told.state.overlap, reading_.state.overlap);
-  EXPECT_EQ(told.touch.fingertips, reading_.touch.fingertips);
+  Reading measured;
+  Sensing({}, setup_.MakePartContext()).Measure(reading_, &measured);
+  EXPECT_EQ(measured.state.q, reading_.state.q);
+  EXPECT_EQ(measured.state.xi, reading_.state.xi);
+  EXPECT_EQ(measured.state.X_Bo.matrix(), reading_.state.X_Bo.matrix());
+  EXPECT_EQ(measured.state.V_Bo, reading_.state.V_Bo);
+  EXPECT_EQ(measured.state.overlap, reading_.state.overlap);
+  EXPECT_EQ(measured.touch.fingertips, reading_.touch.fingertips);
   const auto difference = [&](size_t i) {
-    return Vector5d(told.state.kappa[i].CalcVector() - reading_.state.kappa[i].CalcVector());
+    return Vector5d(measured.state.kappa[i].CalcVector() - reading_.state.kappa[i].CalcVector());
   };
   for (size_t i = 0; i < 4; ++i) EXPECT_EQ(difference(i).norm(), 0.0);
-  Sensing({.contact_error = 0.25}, setup_.MakePartContext()).Tell(reading_, &told);
+  Sensing({.contact_error = 0.25}, setup_.MakePartContext()).Measure(reading_, &measured);
   for (size_t i = 0; i < 4; ++i) {
     EXPECT_NEAR(difference(i)[2], 0.25, kRounding);
     EXPECT_NEAR(difference(i).norm(), 0.25, kRounding);
   }
-  EXPECT_EQ(told.state.q, reading_.state.q);
+  EXPECT_EQ(measured.state.q, reading_.state.q);
 }
 
 /// An object that falls freely under a push: impulse is momentum, moment's impulse is angular momentum.

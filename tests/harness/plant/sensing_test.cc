@@ -29,8 +29,8 @@ class SensingTest : public ::testing::Test {
   [[nodiscard]] Sensing Make(const SensingOptions& options, std::uint64_t seed = 1) const {
     return {options, PartContext{&model_, 4, kDt, seed, "s.toml"}};
   }
-  const Reading& Tell(Sensing& sensing) {
-    sensing.Tell(truth_, &measured_);
+  const Reading& Measure(Sensing& sensing) {
+    sensing.Measure(truth_, &measured_);
     return measured_;
   }
   double& Joint(int i) { return truth_.state.q[model_.num_base_positions() + i]; }
@@ -48,7 +48,7 @@ class SensingTest : public ::testing::Test {
 
 TEST_F(SensingTest, WithoutFaultsTheTruthIsTold) {
   Sensing sensing = Make({});
-  Tell(sensing);
+  Measure(sensing);
   EXPECT_EQ(measured_.state.q, truth_.state.q);
   EXPECT_EQ(measured_.state.xi, truth_.state.xi);
   EXPECT_EQ(measured_.state.X_Bo.matrix(), truth_.state.X_Bo.matrix());
@@ -62,7 +62,7 @@ TEST_F(SensingTest, QuantisationHasTheVarianceOfAnEvenError) {
   for (int k = 0; k < kSteps; ++k) {
     // Slow enough that all parts of a count are visited, with no relation to it.
     Joint(3) = 1.234e-4 * k;
-    Tell(sensing);
+    Measure(sensing);
     const double error = MeasuredJoint(3) - Joint(3);
     EXPECT_LE(std::abs(error), 0.5 * step * (1.0 + 1e-9));
     sum += error;
@@ -82,7 +82,7 @@ TEST_F(SensingTest, NoiseIsWhiteNormalAndItsOwnPerJoint) {
   constexpr int kSteps = 20000;
   double s_named = 0.0, s_other = 0.0, cross = 0.0, lag_one = 0.0, fourth = 0.0, last = 0.0;
   for (int k = 0; k < kSteps; ++k) {
-    Tell(sensing);
+    Measure(sensing);
     const double a = (MeasuredJoint(named) - 0.1) / 2e-3, b = (MeasuredJoint(other) - 0.1) / 1e-3;
     EXPECT_EQ(MeasuredJoint(none), 0.1);
     s_named += a * a;
@@ -108,7 +108,7 @@ TEST_F(SensingTest, EachSourceHasItsOwnNumbers) {
   one.joint_noise = {};
   Sensing with = Make(both), without = Make(one), other_seed = Make(both, 2);
   for (int k = 0; k < 5; ++k) {
-    const Reading a = Tell(with), b = Tell(without), c = Tell(other_seed);
+    const Reading a = Measure(with), b = Measure(without), c = Measure(other_seed);
     EXPECT_EQ(a.state.xi, b.state.xi);
     EXPECT_EQ(a.state.X_Bo.matrix(), b.state.X_Bo.matrix());
     EXPECT_NE(a.state.q, b.state.q);
@@ -127,7 +127,7 @@ TEST_F(SensingTest, FilteredDifferencesHaveTheLowPassesTransferFunction) {
       const double phase = 2.0 * kPi * f * kDt * k;
       const double last = Joint(0);
       Joint(0) = std::sin(phase);
-      Tell(sensing);
+      Measure(sensing);
       if (k < kSettle) continue;
       const std::complex<double> turn = std::polar(1.0, -phase);
       in += turn * ((Joint(0) - last) / kDt);
@@ -145,10 +145,10 @@ TEST_F(SensingTest, FilteredDifferencesHaveTheLowPassesTransferFunction) {
 
 TEST_F(SensingTest, DifferencesOfExactPositionsAreTheVelocities) {
   Sensing sensing = Make({.velocity = VelocitySource::kDifferenced});
-  Tell(sensing);
+  Measure(sensing);
   for (int k = 0; k < 3; ++k) {
     Joint(5) += kDt * 0.7;
-    Tell(sensing);
+    Measure(sensing);
     EXPECT_NEAR(MeasuredRate(5), 0.7, 1e-12);
   }
 }
@@ -160,7 +160,7 @@ TEST_F(SensingTest, LatencyIsWholeSamplesOfEverything) {
     truth_.state.xi.setConstant(10.0 + k);
     truth_.state.X_Bo.translation().setConstant(20.0 + k);
     truth_.touch.support_force = 30.0 + k;
-    Tell(sensing);
+    Measure(sensing);
     const double late = std::max(0, k - 3);
     EXPECT_EQ(measured_.state.q[7], late);
     EXPECT_EQ(measured_.state.xi[7], 10.0 + late);
@@ -174,7 +174,7 @@ TEST_F(SensingTest, ACameraIsLateAndSeesNowAndThen) {
   for (int k = 0; k < 20; ++k) {
     truth_.state.X_Bo.translation().setConstant(k);
     truth_.state.q.setConstant(k);
-    Tell(sensing);
+    Measure(sensing);
     const int seen = k < 2 ? 0 : (k - 2) / 4 * 4;
     EXPECT_EQ(measured_.state.X_Bo.translation().x(), seen) << k;
     EXPECT_EQ(measured_.state.q[7], k);
@@ -190,7 +190,7 @@ TEST_F(SensingTest, ACameraWithAFilterKnowsAConstantMotion) {
   truth_.state.V_Bo.setZero();
   for (int k = 0; k < 2000; ++k) {
     truth_.state.V_Bo << truth_.state.X_Bo.linear().transpose() * p_dot, omega;
-    Tell(sensing);
+    Measure(sensing);
     if (k >= 1500) {
       // Exact measurements of a motion without acceleration: the estimate converges on it, latency and all.
       EXPECT_LT((measured_.state.X_Bo.translation() - truth_.state.X_Bo.translation()).norm(), 1e-9);
@@ -207,7 +207,7 @@ TEST_F(SensingTest, NoiseOfTheObjectHasItsSize) {
   double position = 0.0, orientation = 0.0;
   constexpr int kSteps = 5000;
   for (int k = 0; k < kSteps; ++k) {
-    Tell(sensing);
+    Measure(sensing);
     position += (measured_.state.X_Bo.translation() - truth_.state.X_Bo.translation()).squaredNorm();
     orientation +=
         LogSo3(measured_.state.X_Bo.linear().transpose() * truth_.state.X_Bo.linear()).squaredNorm();
@@ -223,7 +223,7 @@ TEST_F(SensingTest, OdometryIntegratesTheWheels) {
   truth_.state.q.head<3>() << 1.0, 2.0, 0.3;
   truth_.state.xi.head<2>() << v, w;
   for (int k = 0; k <= 1000; ++k) {
-    Tell(sensing);
+    Measure(sensing);
     truth_.state.q.head<3>().setConstant(9.0);  // the true pose is not looked at again
   }
   // A circle of radius v / w through 0.5 rad; the midpoint rule is off by w^2 dt^2 / 24 of the way.
@@ -231,7 +231,7 @@ TEST_F(SensingTest, OdometryIntegratesTheWheels) {
   EXPECT_NEAR(measured_.state.q[0], 1.0 + v / w * (std::sin(0.8) - std::sin(0.3)), 1e-8);
   EXPECT_NEAR(measured_.state.q[1], 2.0 - v / w * (std::cos(0.8) - std::cos(0.3)), 1e-8);
   sensing.Translate(Vector3d(-1.0, -2.0, 0.0));
-  Tell(sensing);
+  Measure(sensing);
   EXPECT_NEAR(measured_.state.q[0], v / w * (std::sin(0.8) - std::sin(0.3)), 1e-3);
 }
 

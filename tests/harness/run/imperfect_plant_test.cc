@@ -230,7 +230,7 @@ TEST(ImperfectPlant, CurveRealDoesWhatItExpects) {
   const RunResult& result = run.Run();
   EXPECT_EQ(result.verdict, Verdict::kPass) << result.failure << result.attribution.evidence;
   EXPECT_GT(result.tracking.position_max(), 1e-4);
-  EXPECT_GE(run.setup().scenario().imperfections.asked.size(), 6U);
+  EXPECT_GE(run.setup().scenario().imperfections.declared.size(), 6U);
 }
 
 TEST(ImperfectPlant, AMotorThatSaturatesGoesOnAndIsReported) {

@@ -58,7 +58,7 @@ TEST(ReadScenario, ReadsWhatIsNotIdeal) {
   EXPECT_EQ(all.disturbances[0].key, "disturbance.1");
   EXPECT_TRUE(all.disturbances[0].in_body_frame);
   EXPECT_EQ(all.mismatch.mass_within.all, 0.05);
-  EXPECT_EQ(all.asked[1], "sensing.latency = 0.002");
+  EXPECT_EQ(all.declared[1], "sensing.latency = 0.002");
   EXPECT_TRUE(ReadShippedScenario("curve").imperfections.is_ideal());
 }
 
