@@ -196,7 +196,11 @@ size_t RunJobs(const std::string& what, size_t count, int size,
   ProcessPool pool(what, size, /*time_limit=*/0.0, [&](const std::string& request) {
     size_t job = 0;
     UnpackBytes(request, &job);
-    return run(job);
+    try {
+      return PackBytes(true, run(job));
+    } catch (const InputError& error) {
+      return PackBytes(false, std::string(error.what()));
+    }
   });
   std::map<size_t, std::string> early;  // results of jobs behind one that is not done
   size_t begun = 0, taken = 0;
@@ -206,9 +210,13 @@ size_t RunJobs(const std::string& what, size_t count, int size,
     if (!ended) continue;
     if (!ended->result) throw Error(what + ": " + ended->failure);
     early.emplace(ended->number, std::move(*ended->result));
-    for (auto next = early.find(taken); next != early.end(); next = early.find(++taken)) {
-      take(taken, next->second);
+    for (auto next = early.find(taken); next != early.end() && !is_interrupted(); next = early.find(++taken)) {
+      bool is_done = false;
+      std::string result;
+      UnpackBytes(next->second, &is_done, &result);
       early.erase(next);
+      if (!is_done) throw InputError(result);
+      take(taken, result);
     }
   }
   return taken;

@@ -75,7 +75,7 @@ int CountProcessors();
 /// @param run called in a job's process.
 /// @param is_interrupted asked often; once true, the jobs that run are ended.
 /// @returns how many were taken: `count`, unless interrupted.
-/// @throws Error "WHAT: why" when a job's process ended without a result.
+/// @throws InputError that a job threw; Error "WHAT: why" when a job's process ended without a result.
 size_t RunJobs(const std::string& what, size_t count, int size,
                const std::function<std::string(size_t job)>& run,
                const std::function<void(size_t job, const std::string& result)>& take,
