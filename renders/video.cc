@@ -37,8 +37,6 @@ constexpr double kCourseMargin = 0.03;  // likewise
 // A frame at k / fps belongs to the row recorded at that time even if the two quotients round differently.
 constexpr double kTimeRounding = 1e-9;
 
-double Duration(const RunFrames& run) { return run.times.back() - run.times.front(); }
-
 /// The decades that hold a run's errors, at most six.
 std::array<double, 2> ErrorRange(const std::vector<double>& errors) {
   double low = 1e300;
@@ -287,7 +285,7 @@ long CountFrames(std::span<const RunView> runs, int fps) {
   double longest = 0.0;
   for (const RunView& run : runs) {
     CheckRunFrames(*run.model, *run.frames);
-    longest = std::max(longest, Duration(*run.frames));
+    longest = std::max(longest, run.frames->duration());
   }
   constexpr double kMostFrames = 1e7;
   Require(longest * fps <= kMostFrames, "frames", "must be at most ten million", longest * fps);

@@ -3,9 +3,7 @@
 // Jobs in processes of their own, several at a time: one that crashes costs no other.
 
 #include <cstddef>
-#include <cstdio>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -46,10 +44,9 @@ class ProcessPool {
   std::optional<EndedJob> Wait();
 
  private:
-  using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
   struct Worker {
     ChildProcess process;
-    File messages;            // its standard error
+    MessageFile messages;
     std::optional<long> job;  // that it does now
     std::string received;
     double begun = 0.0;  // its processor time when the job began, s

@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <cstring>
 #include <limits>
-#include <utility>
 
 #include "controller/common/errors.h"
 #include "harness/log/hdf5_handle.h"
@@ -194,21 +193,6 @@ void FailToWrite(const std::filesystem::path& path, int error) {
 
 void FailToRead(const std::filesystem::path& path, int error) {
   throw InputError(path.string() + ": cannot be read: " + std::strerror(error));
-}
-
-FileDescriptor::~FileDescriptor() { Close(); }
-
-FileDescriptor::FileDescriptor(FileDescriptor&& other) noexcept
-    : descriptor_(std::exchange(other.descriptor_, -1)) {}
-
-FileDescriptor& FileDescriptor::operator=(FileDescriptor&& other) noexcept {
-  std::swap(descriptor_, other.descriptor_);
-  return *this;
-}
-
-int FileDescriptor::Close() {
-  if (!is_open()) return 0;
-  return ::close(std::exchange(descriptor_, -1)) == 0 ? 0 : errno;
 }
 
 int WriteAt(int descriptor, const void* bytes, size_t count, std::uint64_t offset) {

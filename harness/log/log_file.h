@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/file_descriptor.h"
 #include "harness/log/log_content.h"
 
 namespace dexcheck {
@@ -17,23 +18,6 @@ namespace dexcheck {
 [[noreturn]] void FailToWrite(const std::filesystem::path& path, int error);
 /// @throws InputError "PATH: cannot be read: reason".
 [[noreturn]] void FailToRead(const std::filesystem::path& path, int error);
-
-/// An owned file descriptor.
-class FileDescriptor {
- public:
-  explicit FileDescriptor(int descriptor = -1) : descriptor_(descriptor) {}
-  ~FileDescriptor();
-  FileDescriptor(FileDescriptor&& other) noexcept;
-  FileDescriptor& operator=(FileDescriptor&& other) noexcept;
-
-  [[nodiscard]] int get() const { return descriptor_; }
-  [[nodiscard]] bool is_open() const { return descriptor_ >= 0; }
-  /// 0, or the system's error number.
-  int Close();
-
- private:
-  int descriptor_;
-};
 
 /// Writes all bytes at the offset, or returns the system's error number; 0 is success.
 int WriteAt(int descriptor, const void* bytes, size_t count, std::uint64_t offset);
