@@ -31,8 +31,8 @@ class Ffmpeg {
   void CloseInput();
 
   const PartialFile& file_;
-  int input_ = -1;     // this end of what ffmpeg reads
-  int messages_ = -1;  // a file in memory
+  FileDescriptor input_;  // this end of what ffmpeg reads
+  MessageFile messages_;
   std::optional<ChildProcess> process_;
 };
 

@@ -29,7 +29,6 @@ void CheckOptions(const RenderOptions& options) {
   check("samples", options.samples, 1, 4);
   check("shadow_size", options.shadow_size, 16, 8192);
   check("slices", options.slices, 3, 128);
-  check("stacks", options.stacks, 2, 64);
 }
 
 constexpr int kCourse = -1;
@@ -105,12 +104,12 @@ Renderer::Renderer(const mjModel& model, const RenderOptions& options)
   sized->vis.quality.offsamples = 0;
   sized->vis.quality.shadowsize = options.shadow_size;
   sized->vis.quality.numslices = options.slices;
-  sized->vis.quality.numstacks = options.stacks;
+  sized->vis.quality.numstacks = RenderOptions::kStacks;
   mjr_makeContext(sized.get(), &context_, mjFONTSCALE_100);
   mjr_setBuffer(mjFB_OFFSCREEN, &context_);
   meshes_.emplace(context_);
-  scene_.flags[mjRND_SHADOW] = options.shadows ? 1 : 0;
-  scene_.flags[mjRND_REFLECTION] = options.reflections ? 1 : 0;
+  scene_.flags[mjRND_SHADOW] = 1;
+  scene_.flags[mjRND_REFLECTION] = 0;
   pixels_.resize(3 * static_cast<size_t>(options.samples * options.width) *
                  static_cast<size_t>(options.samples * options.height));
 }
@@ -172,11 +171,12 @@ mjvCamera Renderer::MakeCamera(int camera) const {
 }
 
 void Renderer::FadeBody() {
+  constexpr float kOpacity = 0.35F;
   if (translucent_body_ < 0) return;
   for (int i = 0; i < scene_.ngeom; ++i) {
     mjvGeom& geom = scene_.geoms[i];
     if (geom.objtype != mjOBJ_GEOM || model_.geom_bodyid[geom.objid] != translucent_body_) continue;
-    geom.rgba[3] = std::min(geom.rgba[3], static_cast<float>(options_.translucent_opacity));
+    geom.rgba[3] = std::min(geom.rgba[3], kOpacity);
   }
 }
 

@@ -31,21 +31,18 @@ struct RenderOptions {
   int height = 720;
   std::string camera = "overview";  ///< A camera of the MJCF, or kCourseCamera.
   Viewpoint course;
-  bool shadows = true;
   int shadow_size = 2048;  ///< Pixels of the shadow map.
-  bool reflections = false;
   /// Each pixel is the mean of samples x samples (1 to 4). Smooths edges of geoms, shadows and textures
   /// alike, for the price that four-fold multisampling has in software, which leaves the shadows' edges
   /// jagged.
   int samples = 2;
   /// Round geoms are drawn with so many sides, and so many rings of them.
   int slices = 24;
-  int stacks = 8;
+  static constexpr int kStacks = 8;
   /// Moves what cameras of the MJCF see to the right by this fraction of the picture's width, to make room
   /// for a panel.
   double shift_right = 0.0;
-  std::string translucent_body;  ///< Its geoms are drawn with this opacity; none when empty.
-  double translucent_opacity = 0.35;
+  std::string translucent_body;  ///< Its geoms are seen through; none when empty.
   std::optional<Ghost> ghost;  ///< What it points at must outlive the renderer.
 };
 

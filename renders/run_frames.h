@@ -43,6 +43,7 @@ struct RunFrames {
   RowMatrixXd desired_angles;     ///< n x 3, rad: ZYZ angles that it should have there.
 
   [[nodiscard]] long rows() const { return static_cast<long>(times.size()); }
+  [[nodiscard]] double duration() const { return times.back() - times.front(); }  ///< s.
   [[nodiscard]] long contacts() const { return contact_positions.cols() / 3; }
   /// The last row at or before a time in s; the first one when there is none.
   [[nodiscard]] long RowAt(double time) const;

@@ -7,11 +7,11 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/base/process_pool.h"
 #include "harness/engine/engine.h"
 #include "renders/canvas.h"
 #include "renders/compose.h"
 #include "renders/course.h"
-#include "renders/frame_line.h"
 #include "renders/overlay.h"
 #include "renders/renderer.h"
 #include "renders/run_decorations.h"
@@ -36,8 +36,6 @@ constexpr double kCourseMargin = 0.03;  // likewise
 
 // A frame at k / fps belongs to the row recorded at that time even if the two quotients round differently.
 constexpr double kTimeRounding = 1e-9;
-
-double Duration(const RunFrames& run) { return run.times.back() - run.times.front(); }
 
 /// The decades that hold a run's errors, at most six.
 std::array<double, 2> ErrorRange(const std::vector<double>& errors) {
@@ -287,7 +285,7 @@ long CountFrames(std::span<const RunView> runs, int fps) {
   double longest = 0.0;
   for (const RunView& run : runs) {
     CheckRunFrames(*run.model, *run.frames);
-    longest = std::max(longest, Duration(*run.frames));
+    longest = std::max(longest, run.frames->duration());
   }
   constexpr double kMostFrames = 1e7;
   Require(longest * fps <= kMostFrames, "frames", "must be at most ten million", longest * fps);
@@ -298,17 +296,23 @@ bool RenderVideo(std::span<const RunView> runs, const VideoOptions& options, Vid
                  const std::function<bool(long done, long total)>& progress) {
   Require(options.workers >= 1, "workers", "must be positive", options.workers);
   const long frames = CountFrames(runs, options.fps);
-  const auto make_painter = [&]() -> FrameLine::Painter {
-    return [painter = std::make_shared<VideoPainter>(runs, options), fps = options.fps](long frame) {
-      return painter->Paint(static_cast<double>(frame) / fps);
-    };
+  std::unique_ptr<VideoPainter> painter;  // made in each of the processes
+  const auto paint = [&](size_t frame) {
+    if (!painter) painter = std::make_unique<VideoPainter>(runs, options);
+    const Image image = painter->Paint(static_cast<double>(frame) / options.fps);
+    return std::string(image.rgb.begin(), image.rgb.end());
   };
-  FrameLine line(make_painter, frames, options.workers, options.width, options.height);
-  for (long frame = 0; frame < frames; ++frame) {
-    video->Write(line.Take());
-    if (progress && !progress(frame + 1, frames)) return false;
-  }
-  return true;
+  bool goes_on = true;
+  Image image(options.width, options.height);
+  const auto write = [&](size_t frame, const std::string& rgb) {
+    Require(rgb.size() == image.rgb.size(), "bytes of a frame", "must be the video's",
+            static_cast<double>(rgb.size()));
+    std::copy(rgb.begin(), rgb.end(), image.rgb.begin());
+    video->Write(image);
+    goes_on = !progress || progress(static_cast<long>(frame) + 1, frames);
+  };
+  const auto count = static_cast<size_t>(frames);
+  return RunJobs("drawing", count, options.workers, paint, write, [&] { return !goes_on; }) == count;
 }
 
 }  // namespace dexcheck

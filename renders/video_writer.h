@@ -10,12 +10,9 @@
 namespace dexcheck {
 
 struct EncodingOptions {
-  int width = 1280;                 ///< Even.
-  int height = 720;                 ///< Even.
-  int fps = 30;                     ///< Frames a second.
-  int quality = 21;                 ///< x264's constant rate factor: 0 lossless, 51 worst; not of a GIF.
-  int threads = 1;                  ///< Of the encoder.
-  std::string preset = "veryfast";  ///< x264's trade of time for size; of an MP4 only.
+  int width = 1280;  ///< Even.
+  int height = 720;  ///< Even.
+  int fps = 30;      ///< Frames a second.
 };
 
 /// H.264 in MP4, VP9 in WebM (both yuv420p, BT.709), and GIF, which has 256 colours and plays without end.

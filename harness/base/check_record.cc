@@ -17,19 +17,8 @@ std::string DescribeVelocity(int coordinate, const RobotModel& model, int base_v
 }  // namespace
 
 const char* NameOf(CheckCategory kind) {
-  switch (kind) {
-    case CheckCategory::kLaw:
-      return "law";
-    case CheckCategory::kInverseDynamics:
-      return "inverse_dynamics";
-    case CheckCategory::kForwardDynamics:
-      return "forward_dynamics";
-    case CheckCategory::kAssumption:
-      return "assumption";
-    case CheckCategory::kModel:
-      break;
-  }
-  return "model";
+  static constexpr const char* kNames[] = {"model", "inverse_dynamics", "forward_dynamics", "assumption", "law"};
+  return kNames[static_cast<size_t>(kind)];
 }
 
 std::string Describe(const Location& where, const RobotModel& model, int base_velocities) {

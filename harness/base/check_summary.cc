@@ -6,19 +6,9 @@
 namespace dexcheck {
 
 const char* TitleOf(CheckCategory category) {
-  switch (category) {
-    case CheckCategory::kLaw:
-      return "Law";
-    case CheckCategory::kInverseDynamics:
-      return "Inverse dynamics";
-    case CheckCategory::kForwardDynamics:
-      return "Forward dynamics";
-    case CheckCategory::kAssumption:
-      return "Assumptions";
-    case CheckCategory::kModel:
-      break;
-  }
-  return "Model";
+  static constexpr const char* kTitles[] = {"Model", "Inverse dynamics", "Forward dynamics", "Assumptions",
+                                            "Law"};
+  return kTitles[static_cast<size_t>(category)];
 }
 
 double CalcFraction(double value, double bound) {

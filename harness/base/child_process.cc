@@ -1,5 +1,6 @@
 #include "harness/base/child_process.h"
 
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
@@ -55,6 +56,22 @@ ProcessEnd ReadEnd(int status) {
 
 }  // namespace
 
+MessageFile::MessageFile() : file_(::memfd_create("messages", MFD_CLOEXEC)) {
+  if (!file_.is_open()) FailToStart("a process", errno);
+}
+
+std::string MessageFile::ReadLastLine() const {
+  constexpr off_t kMost = 4096;
+  const off_t size = ::lseek(descriptor(), 0, SEEK_END);
+  if (size <= 0) return "";
+  std::string text(static_cast<size_t>(std::min(size, kMost)), '\0');
+  const ssize_t count =
+      ::pread(descriptor(), text.data(), text.size(), size - static_cast<off_t>(text.size()));
+  text.resize(static_cast<size_t>(std::max<ssize_t>(count, 0)));
+  while (text.ends_with('\n')) text.pop_back();
+  return text.substr(text.rfind('\n') + 1);
+}
+
 std::string ProcessEnd::Describe(const std::string& without_signal) const {
   return signal != 0 ? ::strsignal(signal) : without_signal;
 }
@@ -75,10 +92,8 @@ ChildProcess::ChildProcess(const std::string& what, const std::function<bool(int
   }
   const int error = errno;
   ::close(ends[1]);
-  channel_ = ends[0];
-  if (pid_ >= 0) return;
-  ::close(channel_);
-  FailToStart(what, error);
+  channel_ = FileDescriptor(ends[0]);
+  if (pid_ < 0) FailToStart(what, error);
 }
 
 ChildProcess::ChildProcess(const std::string& what, const Program& program) : is_group_(true) {
@@ -96,24 +111,22 @@ ChildProcess::~ChildProcess() { Release(); }
 
 ChildProcess::ChildProcess(ChildProcess&& other) noexcept
     : pid_(std::exchange(other.pid_, -1)),
-      channel_(std::exchange(other.channel_, -1)),
+      channel_(std::move(other.channel_)),
       is_group_(other.is_group_) {}
 
 ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
   if (this == &other) return *this;
   Release();
   pid_ = std::exchange(other.pid_, -1);
-  channel_ = std::exchange(other.channel_, -1);
+  channel_ = std::move(other.channel_);
   is_group_ = other.is_group_;
   return *this;
 }
 
 void ChildProcess::Release() {
-  if (pid_ >= 0) {
-    Kill();
-    Wait();
-  }
-  if (channel_ >= 0) ::close(channel_);
+  if (pid_ < 0) return;
+  Kill();
+  Wait();
 }
 
 void ChildProcess::Kill() const { ::kill(is_group_ ? -pid_ : pid_, SIGKILL); }

@@ -14,6 +14,8 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/base/file_descriptor.h"
+
 namespace dexcheck {
 
 /// How a process ended.
@@ -40,6 +42,19 @@ struct Program {
 /// Of a program that cannot be run, and of a shell's command that there is not.
 inline constexpr int kNotFoundExitCode = 127;
 
+/// What a process writes to its standard error: a file in memory.
+class MessageFile {
+ public:
+  /// @throws Error when there is no memory for it.
+  MessageFile();
+  [[nodiscard]] int descriptor() const { return file_.get(); }
+  /// Without its end; empty when nothing was written.
+  [[nodiscard]] std::string ReadLastLine() const;
+
+ private:
+  FileDescriptor file_;
+};
+
 /// A process that does one piece of work and ends. Interrupts from the terminal are left to this process, and
 /// it ends when this one does, however it ends.
 class ChildProcess {
@@ -58,7 +73,7 @@ class ChildProcess {
   ChildProcess& operator=(ChildProcess&& other) noexcept;
 
   /// This process's end of the channel, a stream socket.
-  [[nodiscard]] int channel() const { return channel_; }
+  [[nodiscard]] int channel() const { return channel_.get(); }
   /// -1 once it has ended.
   [[nodiscard]] pid_t pid() const { return pid_; }
   void Kill() const;
@@ -71,7 +86,7 @@ class ChildProcess {
   void Release();
 
   pid_t pid_ = -1;
-  int channel_ = -1;
+  FileDescriptor channel_;
   bool is_group_ = false;
 };
 

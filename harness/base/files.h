@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "harness/base/temporary_path.h"
 
@@ -12,6 +13,9 @@ namespace dexcheck {
 
 /// @throws InputError "PATH: cannot be read: reason".
 std::string ReadBytes(const std::filesystem::path& path);
+
+/// FNV-1a of 64 bits, as 16 hexadecimal digits: what a reader sees of bytes that differ.
+std::string HashBytes(std::string_view bytes);
 
 /// ".png" of "Picture.PNG": the extension with its dot, in small letters; "" without one.
 std::string ExtensionOf(const std::filesystem::path& path);

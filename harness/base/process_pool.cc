@@ -2,11 +2,9 @@
 
 #include <malloc.h>
 #include <poll.h>
-#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <ctime>
@@ -35,19 +33,6 @@ std::optional<std::string> TakeMessage(std::string* received) {
   std::string message = received->substr(sizeof length, length);
   received->erase(0, sizeof length + length);
   return message;
-}
-
-/// The last line of what a process wrote.
-std::string ReadLastLine(int file) {
-  constexpr off_t kMost = 4096;
-  const off_t size = ::lseek(file, 0, SEEK_END);
-  if (size <= 0) return "";
-  std::string text(static_cast<size_t>(std::min(size, kMost)), '\0');
-  const ssize_t count = ::pread(file, text.data(), text.size(), size - static_cast<off_t>(text.size()));
-  if (count <= 0) return "";
-  text.resize(static_cast<size_t>(count));
-  while (text.ends_with('\n')) text.pop_back();
-  return text.substr(text.rfind('\n') + 1);
 }
 
 /// Of a process and its threads so far, s; 0 when there is none.
@@ -107,12 +92,11 @@ bool ProcessPool::Work(int channel, int messages) const {
 }
 
 ProcessPool::Worker ProcessPool::MakeWorker() const {
-  File messages(::fdopen(::memfd_create("messages", MFD_CLOEXEC), "w"), std::fclose);
-  if (!messages) throw Error(what_ + " cannot be started: " + std::strerror(errno));
+  MessageFile messages;
   // It holds no other worker's channel: each would keep the others alive.
   ChildProcess process(what_, [&](int channel) {
     for (const Worker& other : workers_) ::close(other.process.channel());
-    return Work(channel, ::fileno(messages.get()));
+    return Work(channel, messages.descriptor());
   });
   return {std::move(process), std::move(messages), std::nullopt, {}, 0.0, false};
 }
@@ -174,7 +158,7 @@ EndedJob ProcessPool::Bury(size_t index) {
   Worker worker = std::move(workers_[index]);
   workers_.erase(workers_.begin() + static_cast<std::ptrdiff_t>(index));
   const ProcessEnd end = worker.process.Wait();
-  const std::string message = ReadLastLine(::fileno(worker.messages.get()));
+  const std::string message = worker.messages.ReadLastLine();
   EndedJob ended{.number = *worker.job, .result = std::nullopt, .failure = {}};
   ended.timed_out = worker.timed_out;
   ended.killed_from_outside =
@@ -196,7 +180,11 @@ size_t RunJobs(const std::string& what, size_t count, int size,
   ProcessPool pool(what, size, /*time_limit=*/0.0, [&](const std::string& request) {
     size_t job = 0;
     UnpackBytes(request, &job);
-    return run(job);
+    try {
+      return PackBytes(true, run(job));
+    } catch (const InputError& error) {
+      return PackBytes(false, std::string(error.what()));
+    }
   });
   std::map<size_t, std::string> early;  // results of jobs behind one that is not done
   size_t begun = 0, taken = 0;
@@ -206,9 +194,13 @@ size_t RunJobs(const std::string& what, size_t count, int size,
     if (!ended) continue;
     if (!ended->result) throw Error(what + ": " + ended->failure);
     early.emplace(ended->number, std::move(*ended->result));
-    for (auto next = early.find(taken); next != early.end(); next = early.find(++taken)) {
-      take(taken, next->second);
+    for (auto next = early.find(taken); next != early.end() && !is_interrupted(); next = early.find(++taken)) {
+      bool is_done = false;
+      std::string result;
+      UnpackBytes(next->second, &is_done, &result);
       early.erase(next);
+      if (!is_done) throw InputError(result);
+      take(taken, result);
     }
   }
   return taken;

@@ -3,9 +3,7 @@
 // Jobs in processes of their own, several at a time: one that crashes costs no other.
 
 #include <cstddef>
-#include <cstdio>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -46,10 +44,9 @@ class ProcessPool {
   std::optional<EndedJob> Wait();
 
  private:
-  using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
   struct Worker {
     ChildProcess process;
-    File messages;            // its standard error
+    MessageFile messages;
     std::optional<long> job;  // that it does now
     std::string received;
     double begun = 0.0;  // its processor time when the job began, s
@@ -75,7 +72,7 @@ int CountProcessors();
 /// @param run called in a job's process.
 /// @param is_interrupted asked often; once true, the jobs that run are ended.
 /// @returns how many were taken: `count`, unless interrupted.
-/// @throws Error "WHAT: why" when a job's process ended without a result.
+/// @throws InputError that a job threw; Error "WHAT: why" when a job's process ended without a result.
 size_t RunJobs(const std::string& what, size_t count, int size,
                const std::function<std::string(size_t job)>& run,
                const std::function<void(size_t job, const std::string& result)>& take,

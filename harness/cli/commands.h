@@ -53,7 +53,7 @@ int CountJobs(std::uint64_t jobs);
 
 /// Adds --seed. @param help what is drawn by it.
 Option AddSeedOption(Command command, std::uint64_t* seed,
-                     const std::string& help = "Vary posture and grasp at random; 0 does not");
+                     const std::string& help = "Seed of random changes to posture and grasp; 0 for none");
 
 /// Adds --samples, of at most `most`, and --seed: the random states at which two descriptions are compared.
 template <typename Count>
@@ -63,7 +63,7 @@ std::array<Option, 2> AddSampleOptions(Command command, std::uint64_t most, Coun
               .TypeName("N")
               .Check(WholeNumber(1, most))
               .ShowDefault(),
-          AddSeedOption(command, seed, "Of the random states").ShowDefault()};
+          AddSeedOption(command, seed, "Seed of the random states").ShowDefault()};
 }
 
 /// Adds --json [FILE]: JSON to this file; without a file, or with "-", to standard output and nothing else.

@@ -15,7 +15,7 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/report/comparison_page.h"
-#include "harness/report/html.h"
+#include "harness/report/page_text.h"
 #include "harness/report/recorded_frames.h"
 #include "renders/video_writer.h"
 
@@ -199,7 +199,7 @@ void AddCompareCommand(Command app) {
       .TypeName("FILE.html");
   command
       .AddOption("--video", &request->video,
-                 "Video two runs in one scene, the second as a ghost (.mp4, .webm or .gif)")
+                 "Draw both runs in one scene, the second as a ghost (.mp4, .webm or .gif)")
       .TypeName("FILE");
   AddJsonOption(command, "the numbers", &request->json);
   command.AddFlag("--all", &request->all, "Print all checks and signals");

@@ -17,6 +17,7 @@
 #include "harness/cli/terminal.h"
 #include "harness/log/log_reader.h"
 #include "harness/log/mcap_writer.h"
+#include "harness/study/study_csv.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -41,17 +42,6 @@ std::vector<SignalInfo> ListWanted(const LogReader& log, const ExportRequest& re
   return chosen;
 }
 
-/// A field of a CSV line, in quotes where its text needs them.
-std::string ToField(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string field = "\"";
-  for (const char c : text) {
-    field += c;
-    if (c == '"') field += c;
-  }
-  return field + '"';
-}
-
 /// "time [s],object/X_o.x [m],...": name, column and unit.
 std::string MakeHeader(const std::vector<SignalInfo>& signals) {
   std::string header;
@@ -65,7 +55,7 @@ std::string MakeHeader(const std::vector<SignalInfo>& signals) {
         name += '.' + std::to_string(k);
       }
       if (!header.empty()) header += ',';
-      header += ToField(name + " [" + units[k] + "]");
+      header += QuoteField(name + " [" + units[k] + "]");
     }
   }
   return header + '\n';

@@ -10,7 +10,7 @@
 #include "harness/base/shell.h"
 #include "harness/base/version.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/run_folder.h"
+#include "harness/cli/shipped_files.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -72,7 +72,7 @@ std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
   for (const CommandHelp& command : commands) {
     std::vector<std::string> words = command.commands;
     if (TakesScenario(command)) {
-      const std::vector<std::string> scenarios = ListShippedNames();
+      const std::vector<std::string> scenarios = kScenarios.ListNames();
       words.insert(words.end(), scenarios.begin(), scenarios.end());
     }
     text += fmt::format("    '{}') words='{}'; [[ $cur != -* ]] || words='{}'; files={} ;;\n", command.name,
@@ -133,7 +133,7 @@ std::string MakeZshCompletion(const std::vector<CommandHelp>& commands) {
       for (const std::string& word : command.commands) next += " '" + word + "'";
     }
     if (TakesScenario(command)) {
-      for (const std::string& name : ListShippedNames()) next += " '" + name + "'";
+      for (const std::string& name : kScenarios.ListNames()) next += " '" + name + "'";
     }
     text += fmt::format("    '{}') options=({}); next=({}); files={}{} ;;\n", command.name, options, next,
                         command.commands.empty() ? "1" : "", command.name.empty() ? groups : "");

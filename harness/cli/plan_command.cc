@@ -275,23 +275,23 @@ void AddPlanCommand(Command app) {
   const auto request = std::make_shared<PlanRequest>();
   Command command = app.AddCommand("plan", "Choose where a hand should hold the object");
   command.AddFlag("--contacts", "Contact points, posture and margin, as a scenario's [grasp]").Required();
-  command.AddOption("--object-xyz", &request->xyz, "Object in the world, m")
+  command.AddOption("--object-xyz", &request->xyz, "Position of the object in the world, m")
       .TypeName("X Y Z")
       .Takes(3)
       .Required();
-  command.AddOption("--object-zyz-deg", &request->zyz_deg, "Its orientation, ZYZ angles (default 0 0 0)")
+  command.AddOption("--object-zyz-deg", &request->zyz_deg, "Orientation of the object, ZYZ angles (default 0 0 0)")
       .TypeName("A B C")
       .Takes(3);
-  Option hand = command.AddOption("--hand", &request->hand, "Of the assistant robot")
+  Option hand = command.AddOption("--hand", &request->hand, "Hand of the assistant robot that holds")
                     .TypeName("right|left")
                     .OneOf({"right", "left"})
                     .ShowDefault();
   command
       .AddOption("--palm", &request->palm,
-                 "Frame of a palm, z at what it takes; the fingertips are those on its link")
+                 "Frame of a palm, whose z points at what it takes; its fingertips are those on its link")
       .TypeName("FRAME")
       .Excludes(hand);
-  command.AddOption("--mu", &request->options.mu, "Friction counted on").TypeName("MU").ShowDefault();
+  command.AddOption("--mu", &request->options.mu, "Friction coefficient that the plan counts on").TypeName("MU").ShowDefault();
   command
       .AddOption("--support-height", &request->support_height,
                  "Height of the table that the object lies on, m: the hand comes from above")
@@ -313,7 +313,7 @@ void AddPlanCommand(Command app) {
       .AddOption("--lift", &request->lift, "Displacement, m, that the arm must be able to make while holding")
       .TypeName("X Y Z")
       .Takes(3);
-  command.AddOption("--joint-margin", &request->options.joint_margin, "From the ends of ranges, rad or m")
+  command.AddOption("--joint-margin", &request->options.joint_margin, "Least distance of joints from the ends of their ranges, rad or m")
       .TypeName("MARGIN")
       .ShowDefault();
   command

@@ -43,8 +43,6 @@ struct RenderRequest {
   std::string json_file;
 };
 
-double Duration(const RunFrames& run) { return run.times.back() - run.times.front(); }
-
 /// Of the last step, whose end is no row of its own, s.
 double LastStep(const RunFrames& run) { return run.times.back() - run.times[run.times.size() - 2]; }
 
@@ -52,8 +50,8 @@ void WriteStill(const RenderRequest& request, const std::vector<RunView>& views,
   double longest = 0.0;
   double end = 0.0;
   for (const RunView& view : views) {
-    longest = std::max(longest, Duration(*view.frames));
-    end = std::max(end, Duration(*view.frames) + LastStep(*view.frames));
+    longest = std::max(longest, view.frames->duration());
+    end = std::max(end, view.frames->duration() + LastStep(*view.frames));
   }
   constexpr double kTimeRounding = 1e-9;
   if (!(*request.still >= 0.0 && *request.still <= end + kTimeRounding)) {
@@ -166,11 +164,11 @@ void AddRenderCommand(Command app) {
           .Excludes(camera);
   command
       .AddOption("--look-at", &request->look_at,
-                 "What it looks at: object, or a point, m (object by default)")
+                 "What that camera looks at: object, or a point, m (object by default)")
       .TypeName("X,Y,Z")
       .Needs(from);
-  command.AddFlag("--follow", &request->follow, "It moves along with the object").Needs(from);
-  command.AddOption("--orbit", &request->orbit, "It turns about what it looks at, degrees a second")
+  command.AddFlag("--follow", &request->follow, "That camera moves along with the object").Needs(from);
+  command.AddOption("--orbit", &request->orbit, "That camera turns about what it looks at, degrees a second")
       .TypeName("DEG")
       .Needs(from);
   command.AddOption("--inset", &request->video.inset, "A second camera in the lower right corner")
@@ -180,7 +178,7 @@ void AddRenderCommand(Command app) {
   command.AddOption("--ghost", &request->ghost, "Another run, as a ghost in the same scene")
       .TypeName("RUN_DIR")
       .Excludes(beside);
-  command.AddOption("--size", &request->size, "Of the picture in pixels").TypeName("WxH").ShowDefault();
+  command.AddOption("--size", &request->size, "Size of the picture in pixels").TypeName("WxH").ShowDefault();
   command.AddOption("--fps", &request->video.fps, "Frames a second")
       .TypeName("N")
       .Check(WholeNumber(1, kMostFramesPerSecond))

@@ -223,7 +223,7 @@ int Run(const RunRequest& request) {
     fmt::print(
         "\nTo change one, copy its file with the folders that it names, or --set its keys:\n  cp {} "
         "my.toml\n",
-        QuoteForShell((FindScenarioFolder() / "paper.toml").string()));
+        QuoteForShell((FindShippedFile(kScenarios.folder) / "paper.toml").string()));
     return kSuccess;
   }
   if (!request.replay.empty()) return ReplayRun(request);
@@ -265,7 +265,7 @@ void AddRunCommand(Command app, const std::string& command_line) {
           .TypeName("LIBRARY.so|COMMAND");
   command
       .AddOption("--controller-time-limit", &request->controller_time_limit,
-                 "For each answer of the controller, s (1 by default), and ten times that for its start")
+                 "Time limit for each answer of the controller, s (1 by default); ten times that for its start")
       .TypeName("SECONDS")
       .Check(PositiveNumber())
       .Needs(controller);

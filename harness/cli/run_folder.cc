@@ -25,8 +25,6 @@
 namespace dexcheck::cli {
 namespace {
 
-constexpr const char* kScenarioFolder = "harness/shipped/scenarios";
-
 std::filesystem::path OrShipped(const std::string& file, const char* shipped) {
   return file.empty() ? FindShippedFile(shipped) : std::filesystem::path(file);
 }
@@ -108,22 +106,10 @@ double CalcLargest(const RowMatrixXd& values) {
 
 }  // namespace
 
-std::filesystem::path FindScenarioFolder() { return FindShippedFile(kScenarioFolder); }
-
-std::vector<std::string> ListShippedNames() {
-  std::vector<std::string> names;
-  for (const std::filesystem::directory_entry& entry :
-       std::filesystem::directory_iterator(FindScenarioFolder())) {
-    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
 std::vector<ShippedScenario> ListShippedScenarios() {
   std::vector<ShippedScenario> scenarios;
-  const std::filesystem::path folder = FindScenarioFolder();
-  for (const std::string& name : ListShippedNames()) {
+  const std::filesystem::path folder = FindShippedFile(kScenarios.folder);
+  for (const std::string& name : kScenarios.ListNames()) {
     const std::string file = (folder / (name + ".toml")).string();
     try {
       scenarios.push_back({name, ParseScenario(ReadTextFile(file), file, folder, {}).description});
@@ -136,17 +122,7 @@ std::vector<ShippedScenario> ListShippedScenarios() {
 
 ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<std::string>& overrides,
                            std::uint64_t seed) {
-  if (name_or_file.ends_with(".toml") || name_or_file.find('/') != std::string::npos) {
-    return OpenWhole(name_or_file, overrides, seed);
-  }
-  const std::vector<std::string> known = ListShippedNames();
-  if (std::find(known.begin(), known.end(), name_or_file) == known.end()) {
-    const std::string nearest = FindNearest(name_or_file, known);
-    throw InputError("scenario " + Quote(name_or_file) +
-                     ": is neither shipped (dexcheck run --list) nor a TOML file" +
-                     (nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?"));
-  }
-  return OpenWhole(FindScenarioFolder() / (name_or_file + ".toml"), overrides, seed);
+  return OpenWhole(kScenarios.Find(name_or_file), overrides, seed);
 }
 
 RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(path) {

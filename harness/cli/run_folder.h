@@ -32,10 +32,8 @@ struct ShippedScenario {
   bool is_readable = true;
 };
 
-/// In alphabetic order. None is read.
-std::vector<std::string> ListShippedNames();
+/// In alphabetic order.
 std::vector<ShippedScenario> ListShippedScenarios();
-std::filesystem::path FindScenarioFolder();
 
 /// A folder for the results of one run, made new.
 class RunFolder {

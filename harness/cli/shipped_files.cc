@@ -1,8 +1,12 @@
 #include "harness/cli/shipped_files.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <system_error>
 
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 
 namespace dexcheck::cli {
 
@@ -17,6 +21,31 @@ std::filesystem::path FindShippedFile(const std::filesystem::path& name) {
                      ": this program's shipped files are missing");
   }
   return source;
+}
+
+std::vector<std::string> ShippedKind::ListNames() const {
+  std::vector<std::string> names;
+  for (const std::filesystem::directory_entry& entry :
+       std::filesystem::directory_iterator(FindShippedFile(folder))) {
+    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::filesystem::path ShippedKind::Find(const std::string& name_or_file) const {
+  if (IsTomlFile(name_or_file)) return name_or_file;
+  const std::vector<std::string> known = ListNames();
+  if (std::find(known.begin(), known.end(), name_or_file) != known.end())
+    return FindShippedFile(folder) / (name_or_file + ".toml");
+  const std::string nearest = FindNearest(name_or_file, known);
+  const std::string where = *listed != '\0' ? listed : fmt::format("{}", fmt::join(known, ", "));
+  throw InputError(fmt::format("{} {}: is neither shipped ({}) nor a TOML file{}", name, Quote(name_or_file),
+                               where, nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?"));
+}
+
+bool IsTomlFile(const std::string& name) {
+  return name.ends_with(".toml") || name.find('/') != std::string::npos;
 }
 
 }  // namespace dexcheck::cli

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 namespace dexcheck::cli {
 
@@ -8,5 +10,22 @@ namespace dexcheck::cli {
 /// executable when it is there (an installed program, wherever its tree was moved), otherwise in the folder
 /// that the program was built from. @throws InputError when it is in neither.
 std::filesystem::path FindShippedFile(const std::filesystem::path& name);
+
+/// A kind of TOML files of which some are shipped, in one folder, and are named without .toml.
+struct ShippedKind {
+  const char* name;    ///< "scenario".
+  const char* folder;  ///< As FindShippedFile takes it.
+  const char* listed;  ///< Where their names are told; the names themselves are when empty.
+
+  /// In alphabetic order. None is read.
+  [[nodiscard]] std::vector<std::string> ListNames() const;
+  /// A shipped one by its name, or the file that is named. @throws InputError with the nearest name.
+  [[nodiscard]] std::filesystem::path Find(const std::string& name_or_file) const;
+};
+inline constexpr ShippedKind kScenarios = {"scenario", "harness/shipped/scenarios", "dexcheck run --list"};
+inline constexpr ShippedKind kStudies = {"study", "harness/shipped/studies", ""};
+
+/// Whether this names a file, and nothing that is shipped.
+bool IsTomlFile(const std::string& name);
 
 }  // namespace dexcheck::cli

@@ -8,7 +8,7 @@
 
 #include "controller/common/text.h"
 #include "harness/base/shell.h"
-#include "harness/cli/study_files.h"
+#include "harness/cli/shipped_files.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -31,7 +31,7 @@ std::string CheckSlurmMemory(const std::string& text) {
 
 std::string MakeSlurmScript(const StudyInputs& inputs, const std::string& name_or_file, const SlurmJob& job) {
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
-  const std::string study = IsStudyFile(name_or_file)
+  const std::string study = IsTomlFile(name_or_file)
                                 ? std::filesystem::absolute(name_or_file).lexically_normal().string()
                                 : name_or_file;
   const std::string& name = inputs.study.name;

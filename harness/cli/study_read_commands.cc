@@ -108,7 +108,7 @@ void AddStudyReadCommands(Command study) {
   Command show = study.AddCommand("show", "Print one trial and the command that repeats it");
   add_database(show);
   const auto number = std::make_shared<long>(0);
-  show.AddOption("TRIAL", number.get(), "Its number").Required();
+  show.AddOption("TRIAL", number.get(), "Number of the trial").Required();
   AddJsonOption(show, "the trial", json.get());
   show.SetAction([=] { return ShowTrial(*database, *number, *json); });
 

@@ -160,7 +160,7 @@ void AddViewCommand(Command app, const std::string& command_line) {
       .TypeName("FACTOR")
       .Check(PositiveNumber());
   command.AddFlag("--paused", &request->viewer.paused, "Begin paused, after the first step");
-  command.AddOption("--size", &request->size, "Of the picture, in pixels").TypeName("WxH").ShowDefault();
+  command.AddOption("--size", &request->size, "Size of the picture in pixels").TypeName("WxH").ShowDefault();
   command.SetAction([=] {
     ReadSize(request->size, &request->viewer.width, &request->viewer.height);
     return View(*request);

@@ -2,7 +2,6 @@
 
 // What a log holds besides its rows: the signals, texts and files, as plain data.
 
-#include <cstddef>
 #include <map>
 #include <string>
 #include <string_view>
@@ -26,17 +25,10 @@ struct EmbeddedFile {
   std::string bytes;
 };
 
-/// A text whose place in the file is kept, so that it can be written and replaced late.
-struct ReservedText {
-  size_t capacity = 0;  ///< Bytes.
-  std::string text;
-};
-
 /// Everything but the rows.
 struct LogContent {
   std::vector<SignalInfo> signals;  ///< The first is time.
   std::map<std::string, std::string> texts;
-  std::map<std::string, ReservedText> reserved_texts;
   std::vector<EmbeddedFile> files;
 };
 

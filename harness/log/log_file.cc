@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <cstring>
 #include <limits>
-#include <utility>
 
 #include "controller/common/errors.h"
 #include "harness/log/hdf5_handle.h"
@@ -56,18 +55,15 @@ class LogBuilder {
     Check(H5Pset_create_intermediate_group(link_properties_.id(), 1));
   }
 
-  /// Writes everything but the numbers, and closes the image.
-  LogLayout Build() {
+  /// Writes everything but the numbers, and closes the image. @return the signals' offsets.
+  std::vector<std::uint64_t> Build() {
     AddRootAttributes();
     AddTexts();
-    LogLayout layout;
     for (const EmbeddedFile& file : content_.files) AddFile(file);
-    for (const auto& [name, reserved] : content_.reserved_texts) {
-      layout.reserved_texts[name] = AddReservedText(name, reserved);
-    }
-    for (const SignalInfo& signal : content_.signals) layout.signals.push_back(AddSignal(signal));
+    std::vector<std::uint64_t> offsets;
+    for (const SignalInfo& signal : content_.signals) offsets.push_back(AddSignal(signal));
     file_.Close();
-    return layout;
+    return offsets;
   }
 
  private:
@@ -139,23 +135,6 @@ class LogBuilder {
     return TakePlace(dataset);
   }
 
-  /// @return its offset.
-  [[nodiscard]] std::uint64_t AddReservedText(const std::string& name, const ReservedText& reserved) const {
-    const std::string padded = Pad(reserved);
-    const hdf5::Datatype type(H5Tcopy(H5T_C_S1));
-    Check(H5Tset_size(type.id(), reserved.capacity));
-    Check(H5Tset_cset(type.id(), H5T_CSET_UTF8));
-    const hdf5::Dataset dataset = AddDataset("meta/" + name, type.id(), {});
-    Check(H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()));
-    return GetOffset(dataset);
-  }
-
-  static std::uint64_t GetOffset(const hdf5::Dataset& dataset) {
-    const haddr_t offset = H5Dget_offset(dataset.id());
-    if (offset == HADDR_UNDEF) throw hdf5::Hdf5Error(hdf5::DescribeLastError());
-    return offset;
-  }
-
   /// Takes the signal's place in the file. @return its offset.
   [[nodiscard]] std::uint64_t TakePlace(const hdf5::Dataset& dataset) const {
     if (rows_ == 0) return 0;
@@ -165,7 +144,9 @@ class LogBuilder {
     const hdf5::Dataspace one = MakeSpace({1});
     const double zero = 0.0;
     Check(H5Dwrite(dataset.id(), H5T_NATIVE_DOUBLE, one.id(), space.id(), H5P_DEFAULT, &zero));
-    return GetOffset(dataset);
+    const haddr_t offset = H5Dget_offset(dataset.id());
+    if (offset == HADDR_UNDEF) throw hdf5::Hdf5Error(hdf5::DescribeLastError());
+    return offset;
   }
 
   const LogContent& content_;
@@ -206,33 +187,12 @@ int MarkAllRowsUnwritten(int descriptor, std::uint64_t time_offset, long rows) {
 
 }  // namespace
 
-std::string Pad(const ReservedText& reserved) {
-  std::string padded = reserved.text;
-  padded.resize(reserved.capacity, '\0');
-  return padded;
-}
-
 void FailToWrite(const std::filesystem::path& path, int error) {
   throw InputError(path.string() + ": cannot be written: " + std::strerror(error));
 }
 
 void FailToRead(const std::filesystem::path& path, int error) {
   throw InputError(path.string() + ": cannot be read: " + std::strerror(error));
-}
-
-FileDescriptor::~FileDescriptor() { Close(); }
-
-FileDescriptor::FileDescriptor(FileDescriptor&& other) noexcept
-    : descriptor_(std::exchange(other.descriptor_, -1)) {}
-
-FileDescriptor& FileDescriptor::operator=(FileDescriptor&& other) noexcept {
-  std::swap(descriptor_, other.descriptor_);
-  return *this;
-}
-
-int FileDescriptor::Close() {
-  if (!is_open()) return 0;
-  return ::close(std::exchange(descriptor_, -1)) == 0 ? 0 : errno;
 }
 
 int WriteAt(int descriptor, const void* bytes, size_t count, std::uint64_t offset) {
@@ -262,23 +222,23 @@ int CopyBytes(int from, std::uint64_t from_offset, int to, std::uint64_t to_offs
   return 0;
 }
 
-LogLayout WriteLogFile(const std::filesystem::path& path, const std::string& name, const LogContent& content,
-                       long rows) {
+std::vector<std::uint64_t> WriteLogFile(const std::filesystem::path& path, const std::string& name,
+                                        const LogContent& content, long rows) {
   hdf5::MemoryImage image;
-  LogLayout layout;
+  std::vector<std::uint64_t> offsets;
   try {
     const hdf5::SilencedErrors silenced;
-    layout = LogBuilder(content, rows, &image).Build();
+    offsets = LogBuilder(content, rows, &image).Build();
   } catch (const hdf5::Hdf5Error& error) {
     throw InputError(name + ": cannot be written: " + error.what());
   }
   FileDescriptor file(::open(path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
   if (!file.is_open()) FailToWrite(name, errno);
   int error = WriteImage(file.get(), image);
-  if (error == 0) error = MarkAllRowsUnwritten(file.get(), layout.signals.front(), rows);
+  if (error == 0) error = MarkAllRowsUnwritten(file.get(), offsets.front(), rows);
   if (error == 0) error = file.Close();
   if (error != 0) FailToWrite(name, error);
-  return layout;
+  return offsets;
 }
 
 }  // namespace dexcheck

@@ -1,16 +1,15 @@
 #pragma once
 
-// The log as bytes in a file. HDF5 writes everything but the numbers and the late texts once and closes the
-// file; after that only these are written, in place, so that a process that dies cannot leave a file that
-// HDF5 does not open.
+// The log as bytes in a file. HDF5 writes everything but the numbers once and closes the file; after that only
+// these are written, in place, so that a process that dies cannot leave a file that HDF5 does not open.
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <string>
 #include <vector>
 
+#include "harness/base/file_descriptor.h"
 #include "harness/log/log_content.h"
 
 namespace dexcheck {
@@ -19,23 +18,6 @@ namespace dexcheck {
 [[noreturn]] void FailToWrite(const std::filesystem::path& path, int error);
 /// @throws InputError "PATH: cannot be read: reason".
 [[noreturn]] void FailToRead(const std::filesystem::path& path, int error);
-
-/// An owned file descriptor.
-class FileDescriptor {
- public:
-  explicit FileDescriptor(int descriptor = -1) : descriptor_(descriptor) {}
-  ~FileDescriptor();
-  FileDescriptor(FileDescriptor&& other) noexcept;
-  FileDescriptor& operator=(FileDescriptor&& other) noexcept;
-
-  [[nodiscard]] int get() const { return descriptor_; }
-  [[nodiscard]] bool is_open() const { return descriptor_ >= 0; }
-  /// 0, or the system's error number.
-  int Close();
-
- private:
-  int descriptor_;
-};
 
 /// Writes all bytes at the offset, or returns the system's error number; 0 is success.
 int WriteAt(int descriptor, const void* bytes, size_t count, std::uint64_t offset);
@@ -47,20 +29,12 @@ int CopyBytes(int from, std::uint64_t from_offset, int to, std::uint64_t to_offs
 inline constexpr const char* kFormatAttribute = "format";
 inline constexpr const char* kLogFormat = "dexcheck log 2";
 
-/// Where lies what may be written after the file was made: offsets from the file's begin.
-struct LogLayout {
-  std::vector<std::uint64_t> signals;  ///< Each signal's first row; 0 without rows.
-  std::map<std::string, std::uint64_t> reserved_texts;
-};
-
-/// The text and zero bytes up to the capacity, as it stands in the file.
-std::string Pad(const ReservedText& reserved);
-
 /// Writes a log with room for `rows` rows of each signal; times are NaN, which marks rows not written, other
 /// numbers zero. `path` must exist.
 /// @param name in messages.
+/// @returns where each signal's first row lies, from the file's begin; 0 without rows.
 /// @throws InputError when the file cannot be written.
-LogLayout WriteLogFile(const std::filesystem::path& path, const std::string& name, const LogContent& content,
-                       long rows);
+std::vector<std::uint64_t> WriteLogFile(const std::filesystem::path& path, const std::string& name,
+                                        const LogContent& content, long rows);
 
 }  // namespace dexcheck

@@ -27,9 +27,6 @@ namespace {
 
 using hdf5::Check;
 
-/// Where the texts lie that have a dataset of their own.
-constexpr std::string_view kTexts = "meta/";
-
 [[noreturn]] void RefusePart(const std::string& name, const char* problem) {
   throw std::runtime_error(Quote(name) + " " + problem);
 }
@@ -162,7 +159,7 @@ class LogReader::File {
     if (signals_.empty()) throw std::runtime_error("it has no signals");
     const hdf5::Group meta(H5Gopen2(file_.id(), "meta", H5P_DEFAULT));
     for (const std::string& name : ListAttributes(meta.id())) texts_[name] = ReadString(meta.id(), name);
-    for (const std::string& name : ListDatasets(file_.id())) AddOther(name);
+    for (const std::string& name : ListDatasets(file_.id())) AddFile(name);
     if (is_old_) RenameTexts();
   }
 
@@ -206,25 +203,15 @@ class LogReader::File {
     if (rows != room_) RefusePart(name, "has other rows");
   }
 
-  /// Of a dataset that is no signal: a text or a file.
-  void AddOther(const std::string& name) {
+  /// Of a dataset that is no signal.
+  void AddFile(const std::string& name) {
     if (std::any_of(signals_.begin(), signals_.end(), [&](const SignalInfo& s) { return s.name == name; }))
       return;
     if (!IsPlainPath(name)) RefusePart(name, "is not a plain relative path");
-    const hdf5::Dataset dataset = Open(file_.id(), name);
-    const Shape shape = GetShape(dataset);
-    if (name.starts_with(kTexts)) {
-      const bool is_text = H5Tget_class(shape.type.id()) == H5T_STRING &&
-                           H5Tis_variable_str(shape.type.id()) == 0 && shape.extents.empty();
-      if (!is_text) RefusePart(name, "is not a text");
-      std::string text(H5Tget_size(shape.type.id()), '\0');
-      Check(H5Dread(dataset.id(), shape.type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()));
-      texts_[name.substr(kTexts.size())] = text.substr(0, text.find('\0'));
-    } else {
-      if (Check(H5Tequal(shape.type.id(), H5T_STD_U8LE)) == 0 || shape.extents.size() != 1)
-        RefusePart(name, "is not a file");
-      files_.push_back(name);
-    }
+    const Shape shape = GetShape(Open(file_.id(), name));
+    if (Check(H5Tequal(shape.type.id(), H5T_STD_U8LE)) == 0 || shape.extents.size() != 1)
+      RefusePart(name, "is not a file");
+    files_.push_back(name);
   }
 
   [[nodiscard]] std::string RenameSignal(const std::string& name) const {

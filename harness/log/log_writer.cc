@@ -116,38 +116,11 @@ void LogWriter::SetText(const std::string& name, const std::string& text) {
   if (name.empty()) Refuse("text", "must have a name");
   RequireNoZeroByte("text's name " + Quote(name), name);
   RequireNoZeroByte("text " + Quote(name), text);
-  if (const auto found = content_.reserved_texts.find(name); found != content_.reserved_texts.end()) {
-    ReservedText& reserved = found->second;
-    if (text.size() <= reserved.capacity) {
-      reserved.text = text;
-      if (state_ == State::kRecording) WriteReservedText(name, reserved);
-      return;
-    }
-    content_.reserved_texts.erase(found);
-  }
   const bool is_new = !content_.texts.contains(name);
   Require(!is_new || content_.texts.size() < kMaxNames / 4, "number of texts", "must be at most 750",
           static_cast<double>(content_.texts.size() + 1));
   content_.texts[name] = text;
   changed_ = true;
-}
-
-void LogWriter::ReserveText(const std::string& name, size_t capacity) {
-  RequireState(state_ == State::kDescribing, "ReserveText");
-  RequirePlainPath("text", name);
-  const bool is_free = name.find('/') == std::string::npos && !content_.texts.contains(name) &&
-                       !content_.reserved_texts.contains(name);
-  if (!is_free) Refuse("text " + Quote(name), "this name is taken, or not one of a reserved text");
-  constexpr size_t kMaxCapacity = size_t{1} << 30;
-  Require(capacity >= 1 && capacity <= kMaxCapacity, "capacity", "must be 1 byte to 1 GB",
-          static_cast<double>(capacity));
-  content_.reserved_texts[name].capacity = capacity;
-}
-
-void LogWriter::WriteReservedText(const std::string& name, const ReservedText& reserved) {
-  const std::string padded = Pad(reserved);
-  const int error = WriteAt(file_.get(), padded.data(), padded.size(), layout_.reserved_texts.at(name));
-  if (error != 0) Fail(error);
 }
 
 void LogWriter::EmbedFile(const std::string& group, const std::string& relative_name,
@@ -183,7 +156,7 @@ void LogWriter::StartRows() {
     begin += width * rows_per_flush_;
   }
   PartialFile partial(path_);
-  layout_ = WriteLogFile(partial.partial(), name_, content_, max_rows_);
+  offsets_ = WriteLogFile(partial.partial(), name_, content_, max_rows_);
   file_ = Open(partial);
   RequireNoFile();
   partial.Commit();
@@ -220,7 +193,7 @@ void LogWriter::WriteBufferedRows() {
   for (size_t k = buffers_.size(); k-- > 0;) {
     const size_t row_size = buffers_[k].width * sizeof(double);
     const int error = WriteAt(file_.get(), buffers_[k].begin, buffered_rows_ * row_size,
-                              layout_.signals[k] + static_cast<size_t>(flushed_rows_) * row_size);
+                              offsets_[k] + static_cast<size_t>(flushed_rows_) * row_size);
     if (error != 0) Fail(error);
   }
 }
@@ -249,11 +222,11 @@ void LogWriter::Close() {
 /// Builds the final file beside the present one, and replaces it at once.
 void LogWriter::Rewrite() {
   PartialFile partial(path_);
-  const LogLayout layout = WriteLogFile(partial.partial(), name_, content_, flushed_rows_);
+  const std::vector<std::uint64_t> offsets = WriteLogFile(partial.partial(), name_, content_, flushed_rows_);
   FileDescriptor file = Open(partial);
   for (size_t k = 0; k < buffers_.size(); ++k) {
     const size_t size = buffers_[k].width * sizeof(double) * static_cast<size_t>(flushed_rows_);
-    const int error = CopyBytes(file_.get(), layout_.signals[k], file.get(), layout.signals[k], size);
+    const int error = CopyBytes(file_.get(), offsets_[k], file.get(), offsets[k], size);
     if (error != 0) Fail(error);
   }
   if (::fsync(file.get()) != 0) Fail(errno);

@@ -37,14 +37,8 @@ class LogWriter {
   LogWriter& operator=(const LogWriter&) = delete;
 
   /// Keeps a text in the group "meta", as an attribute; replaces one of the same name. After StartRows it
-  /// reaches the file at Close, which then writes the whole file anew, unless the text fits into what was
-  /// reserved.
+  /// reaches the file at Close, which then writes the whole file anew.
   void SetText(const std::string& name, const std::string& text);
-
-  /// Before StartRows: keeps room for a text that comes late, such as a summary. As long as it fits, SetText
-  /// writes it into the file at once. It stands in "meta" as a dataset, empty until it is set.
-  /// @param capacity in bytes.
-  void ReserveText(const std::string& name, size_t capacity);
 
   /// Keeps a file as GROUP/RELATIVE_NAME, bytes exact. After StartRows it reaches the file at Close.
   /// @param relative_name with / between folders: "mjcf/assets/torus.msh".
@@ -90,7 +84,6 @@ class LogWriter {
   [[nodiscard]] FileDescriptor Open(const PartialFile& partial) const;
   void RequireFree(const std::string& name) const;
   void WriteBufferedRows();
-  void WriteReservedText(const std::string& name, const ReservedText& reserved);
   void CheckFileIsThere() const;
   void Rewrite();
   [[noreturn]] void Fail(int error) const;
@@ -102,7 +95,7 @@ class LogWriter {
   State state_ = State::kDescribing;
   bool changed_ = false;  // texts or files that are not yet in the file
   LogContent content_;
-  LogLayout layout_;
+  std::vector<std::uint64_t> offsets_;  // of the signals in the file
   FileDescriptor file_;
   std::vector<double> numbers_;  // all buffers
   std::vector<Buffer> buffers_;

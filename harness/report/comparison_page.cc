@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "harness/report/html.h"
+#include "harness/report/page_assets.h"
 #include "harness/report/page_frame.h"
 
 namespace dexcheck {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 /// Signals that are drawn: those that differ most.
 constexpr size_t kMostPlots = 10;
@@ -18,131 +20,60 @@ constexpr double kLeastFraction = 1e-15;
 
 std::string Letter(size_t run) { return std::string(1, static_cast<char>('A' + run % 26)); }
 
-class ComparisonPage : public PageBuilder {
+class ComparisonPage {
  public:
   ComparisonPage(const std::vector<const RunData*>& runs, const std::vector<std::string>& names,
                  const RunComparison& comparison)
       : runs_(runs), names_(names), comparison_(comparison) {}
 
   std::string Make() {
-    html_ += BeginPlotPage(fmt::format("Comparison of {}", fmt::join(names_, ", ")));
-    AddHeader();
-    html_ += "<main>\n";
-    AddInputs();
-    if (!comparison_.results.empty()) {
-      html_ += "<h2 id=\"results\">Results</h2>\n<div class=\"card scroll\">\n";
-      AddNumbers(comparison_.results);
-      html_ += "</div>\n";
+    const SignalDifference* const first = comparison_.FindFirst();
+    Json json = {
+        {"names", names_},
+        {"verdicts", comparison_.verdicts},
+        {"same", comparison_.IsSame()},
+        {"first",
+         first == nullptr ? Json() : Json{{"name", first->NameColumn()}, {"time", first->first_time}}},
+        {"inputs", Json::array()},
+        {"results", ShowNumbers(comparison_.results)},
+        {"checks", ShowNumbers(comparison_.checks)},
+        {"signals", Json::array()},
+        {"not_compared", comparison_.not_compared}};
+    for (const InputDifference& input : comparison_.inputs)
+      json["inputs"].push_back({{"name", input.name}, {"values", input.values}});
+    for (const SignalDifference& signal : comparison_.signals) {
+      json["signals"].push_back({{"name", signal.NameColumn()},
+                                 {"run", signal.run},
+                                 {"differs", signal.differs},
+                                 {"difference", FormatShort(signal.difference) + " " + signal.unit},
+                                 {"fraction", FormatShort(signal.fraction())},
+                                 {"at", signal.at_time}});
     }
-    AddChecks();
-    AddSignals();
-    const std::vector<Figure> figures = MakeFigures();
-    html_ += MakePlotSection(figures);
-    html_ +=
-        "</main>\n<footer>Made by dexcheck from the runs' logs. Plots by dygraphs (MIT license).</footer>\n";
-    html_ += EndPage(figures, runs_[0]->time());
-    return html_.markup();
+    return AssemblePlotPage(fmt::format("Comparison of {}", fmt::join(names_, ", ")), kComparisonJs,
+                            EmbedJson("comparison", json), MakeFigures(), runs_[0]->time());
   }
 
  private:
-  void AddHeader() {
-    const bool same = comparison_.IsSame();
-    Add("<header>\n<h1><b>Comparison</b> of {} runs</h1>\n<section class=\"verdict {}\" id=\"verdict\">"
-        "<strong>{}</strong>",
-        runs_.size(), same ? "pass" : "open", same ? "SAME" : "DIFFERENT");
-    for (size_t i = 0; i < runs_.size(); ++i)
-      Add("<p><b>{}</b> <code>{}</code>: {}</p>", Letter(i), names_[i], comparison_.verdicts[i]);
-    if (const SignalDifference* first = comparison_.FindFirst()) {
-      Add("<p>The first signal that differs is <code>{}</code>, at {:.3f} s.</p>", first->NameColumn(),
-          first->first_time);
-    }
-    html_ += "</section>\n</header>\n";
-    html_ += MakeNavigation({"Verdict", "Inputs", "Results", "Checks", "Signals", "Plots"});
-  }
-
-  /// A header cell for each run from the first on. @param ending of each.
-  void AddHeaderCells(size_t first, const char* ending) {
-    for (size_t i = first; i < runs_.size(); ++i) Add("<th class=\"value\">{}{}</th>", Letter(i), ending);
-  }
-
-  void AddInputs() {
-    html_ += "<h2 id=\"inputs\">Inputs that differ</h2>\n<div class=\"card scroll\">\n";
-    if (comparison_.inputs.empty()) {
-      html_ +=
-          "<p>None: scenario, overrides, parameters, MJCF, versions and machine are the same.</p></div>\n";
-      return;
-    }
-    html_ += "<table><thead><tr><th>input</th>";
-    for (size_t i = 0; i < runs_.size(); ++i) Add("<th>{}</th>", Letter(i));
-    html_ += "</tr></thead><tbody>\n";
-    for (const InputDifference& input : comparison_.inputs) {
-      Add("<tr><td><code>{}</code></td>", input.name);
-      for (const std::string& value : input.values) Add("<td>{}</td>", value.empty() ? "none" : value);
-      html_ += "</tr>\n";
-    }
-    html_ += "</tbody></table></div>\n";
-  }
-
-  /// Those that fail first; constants that agree exactly in all runs are folded.
-  void AddChecks() {
-    std::vector<ComparedNumber> shown = comparison_.checks;
-    std::stable_partition(shown.begin(), shown.end(), std::mem_fn(&ComparedNumber::fails_anywhere));
-    const auto zeros = std::stable_partition(shown.begin(), shown.end(), [](const ComparedNumber& check) {
-      const auto is_zero = [](const std::optional<double>& value) { return value == 0.0; };
-      return check.fails_anywhere() || !std::all_of(check.values.begin(), check.values.end(), is_zero);
-    });
-    if (shown.empty()) return;
-    html_ += "<h2 id=\"checks\">Checks</h2>\n<div class=\"card scroll\">\n";
-    if (zeros != shown.begin()) AddNumbers({shown.begin(), zeros});
-    if (zeros != shown.end()) {
-      const auto count = shown.end() - zeros;
-      Add("<details><summary>{} check{} 0 in all runs</summary>\n", count, count == 1 ? " is" : "s are");
-      AddNumbers({zeros, shown.end()});
-      html_ += "</details>\n";
-    }
-    html_ += "</div>\n";
-  }
-
-  void AddNumbers(const std::vector<ComparedNumber>& numbers) {
-    html_ += "<table><thead><tr><th></th>";
-    AddHeaderCells(0, "");
-    AddHeaderCells(1, " / A");
-    html_ += "</tr></thead><tbody>\n";
+  static Json ShowNumbers(const std::vector<ComparedNumber>& numbers) {
+    Json list = Json::array();
     for (const ComparedNumber& number : numbers) {
-      Add("<tr class=\"{}\"><td>{}</td>", number.fails_anywhere() ? "fail" : "pass", number.name);
-      for (size_t i = 0; i < runs_.size(); ++i) {
+      Json json = {{"name", number.name},
+                   {"values", Json::array()},
+                   {"fails", number.fails},
+                   {"ratios", Json::array()},
+                   {"is_zero", !number.fails_anywhere()}};
+      for (const std::optional<double>& value : number.values) {
         const std::string unit = number.unit == "1" ? "" : " " + number.unit;
-        const std::string value = number.values[i] ? FormatShort(*number.values[i]) + unit : "–";
-        Add("<td class=\"value number\">{}</td>",
-            number.fails[i] ? FormatHtml("<span class=\"badge\">{}</span>", value) : Html::Text(value));
+        json["values"].push_back(value ? FormatShort(*value) + unit : "–");
+        if (value != 0.0) json["is_zero"] = false;
       }
-      for (size_t i = 1; i < runs_.size(); ++i) {
+      for (size_t i = 1; i < number.values.size(); ++i) {
         const std::optional<double> ratio = number.CalcRatio(i);
-        Add("<td class=\"value number\">{}</td>", ratio ? FormatShort(*ratio) : "–");
+        json["ratios"].push_back(ratio ? FormatShort(*ratio) : "–");
       }
-      html_ += "</tr>\n";
+      list.push_back(json);
     }
-    html_ += "</tbody></table>\n";
-  }
-
-  void AddSignals() {
-    html_ +=
-        "<h2 id=\"signals\">Signals</h2>\n<div class=\"card scroll\">\n"
-        "<table><thead><tr><th>signal</th><th></th><th class=\"value\">largest difference</th>"
-        "<th class=\"value\">of its size</th><th class=\"value\">at</th></tr></thead><tbody>\n";
-    for (const SignalDifference& signal : comparison_.signals) {
-      Add("<tr class=\"{}\"><td><code>{}</code></td><td>{} - A</td><td class=\"value number\">{} {}</td>"
-          "<td class=\"value number\">{}</td><td class=\"value number\">{:.3f} s</td></tr>\n",
-          signal.differs ? "open" : "pass", signal.NameColumn(), Letter(signal.run),
-          FormatShort(signal.difference), signal.unit, FormatShort(signal.fraction()), signal.at_time);
-    }
-    html_ += "</tbody></table>\n";
-    if (!comparison_.not_compared.empty()) {
-      html_ += "<p class=\"soft\">Not in all runs, or with other columns:";
-      for (const std::string& name : comparison_.not_compared) Add(" <code>{}</code>", name);
-      html_ += "</p>\n";
-    }
-    html_ += "</div>\n";
+    return list;
   }
 
   /// The object's error first, then the signals that differ most: overlaid, and subtracted.

@@ -13,7 +13,6 @@
 #include "controller/common/errors.h"
 #include "harness/base/child_process.h"
 #include "harness/base/temporary_path.h"
-#include "harness/log/log_file.h"
 #include "harness/report/thinning.h"
 
 namespace dexcheck {
@@ -129,22 +128,19 @@ void WriteScript(const Figure& figure, const VectorXd& time, const Thinning& thi
 
 /// Runs gnuplot on FOLDER/figures.gnuplot, in the folder.
 void RunGnuplot(const std::filesystem::path& folder) {
-  const std::filesystem::path errors = folder / "gnuplot.txt";
   const FileDescriptor nothing(::open("/dev/null", O_RDONLY | O_CLOEXEC));
-  const FileDescriptor messages(::open(errors.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+  const MessageFile messages;
   ChildProcess gnuplot("gnuplot", Program{{"gnuplot", "--default-settings", "figures.gnuplot"},
                                           nothing.get(),
-                                          messages.get(),
-                                          messages.get(),
+                                          messages.descriptor(),
+                                          messages.descriptor(),
                                           folder});
   const TemporaryChild child(gnuplot.pid());
   const ProcessEnd end = gnuplot.Wait();
   if (end.has_succeeded()) return;
   if (end.exit_code == kNotFoundExitCode)
     throw InputError("gnuplot: cannot be run (Debian's package gnuplot-nox has it)");
-  std::ifstream file(errors);
-  const std::string message((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  throw InputError("gnuplot: could not draw the figures: " + Abbreviate(message));
+  throw InputError("gnuplot: could not draw the figures: " + Abbreviate(messages.ReadLastLine()));
 }
 
 }  // namespace

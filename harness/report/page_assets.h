@@ -5,7 +5,11 @@
 namespace dexcheck {
 
 extern const char* const kPageCss;
-extern const char* const kPageJs;
+extern const char* const kDomJs;   ///< What the other scripts make elements with.
+extern const char* const kPageHtml;
+extern const char* const kRunJs;
+extern const char* const kComparisonJs;
+extern const char* const kPageJs;  ///< Needs dygraphs.
 extern const char* const kReplayHtml;
 extern const char* const kReplayJs;
 extern const char* const kThreeJs;

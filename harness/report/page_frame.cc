@@ -1,6 +1,7 @@
 #include "harness/report/page_frame.h"
 
-#include <cctype>
+#include <fmt/format.h>
+
 #include <cmath>
 
 #include "harness/report/page_assets.h"
@@ -13,65 +14,43 @@ constexpr const char* kContentPolicy =
     "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'; script-src "
     "'unsafe-inline'";
 
+std::string EscapeTitle(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) escaped += c == '&' ? "&amp;" : c == '<' ? "&lt;" : std::string(1, c);
+  return escaped;
+}
+
 }  // namespace
 
-Html BeginPage(const std::string& title, const Html& style, double renew) {
-  Html html("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n");
-  if (renew > 0.0) html += FormatHtml("<meta http-equiv=\"refresh\" content=\"{:.0f}\">\n", std::ceil(renew));
-  html += FormatHtml(
+std::string AssemblePage(const PageParts& parts) {
+  std::string page = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
+  if (parts.renew > 0.0)
+    page += fmt::format("<meta http-equiv=\"refresh\" content=\"{:.0f}\">\n", std::ceil(parts.renew));
+  page += fmt::format(
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n<title>{} – dexcheck</title>\n"
       "<link rel=\"icon\" href=\"data:,\">\n<style>\n{}{}</style>\n</head>\n<body>\n",
-      kContentPolicy, title, Html::Raw(kPageCss), style);
-  return html;
+      kContentPolicy, EscapeTitle(parts.title), kPageCss, fmt::join(parts.styles, ""));
+  page += fmt::format("{}{}", fmt::join(parts.markup, ""), parts.data);
+  page += fmt::format("<script>\n{}\n</script>\n", kDomJs);
+  for (const char* script : parts.scripts) page += fmt::format("<script>\n{}\n</script>\n", script);
+  return page + "</body>\n</html>\n";
 }
 
-Html BeginPlotPage(const std::string& title) { return BeginPage(title, Html::Raw(kDygraphCss)); }
-
-Html MakeNavigation(const std::vector<std::string>& sections) {
-  Html links;
-  for (const std::string& section : sections) {
-    std::string id = section;
-    id[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(id[0])));
-    links += FormatHtml("<a href=\"#{}\">{}</a>", id, section);
-  }
-  return FormatHtml("<nav><div>{}</div></nav>\n", links);
-}
-
-Html MakePlotSection(const std::vector<Figure>& figures) {
-  Html html;
-  html +=
-      "<section id=\"plots\"><h2>Plots</h2>\n<div class=\"tools\"><button id=\"show-all\" "
-      "type=\"button\">Show the whole run</button><span class=\"soft\">Drag to zoom (all plots follow), "
-      "Shift-drag to move, double-click for the whole run; on a touch screen use two fingers. Names switch "
-      "curves on and off.</span></div>\n<div class=\"grid\">\n";
-  for (size_t i = 0; i < figures.size(); ++i) {
-    const Figure& figure = figures[i];
-    html += FormatHtml(
-        "<section class=\"card\" data-plot=\"{}\"><h3>{} {}<span class=\"soft number time\"></span></h3>"
-        "<div class=\"keys\"></div><div class=\"plot\"></div>{}</section>\n",
-        i, figure.title,
-        figure.panel.empty() ? Html() : FormatHtml("<span class=\"panel\">Figure {}</span> ", figure.panel),
-        figure.note.empty() ? Html() : FormatHtml("<p class=\"soft\"><small>{}</small></p>", figure.note));
-  }
-  html += "</div></section>\n";
-  return html;
-}
-
-Html MakeReplaySection() { return Html::Raw(kReplayHtml); }
-
-Html EndPage(const std::vector<Figure>& figures, const VectorXd& time, const ReplayData* replay) {
-  Html html = EmbedPlots(figures, time);
-  html += FormatHtml("<script>\n{}\n</script>\n<script>\n{}</script>\n", Html::Raw(kDygraphJs),
-                     Html::Raw(kPageJs));
+std::string AssemblePlotPage(const std::string& title, const char* script, const std::string& data,
+                             const std::vector<Figure>& figures, const VectorXd& time,
+                             const ReplayData* replay) {
+  PageParts parts{.title = title,
+                  .styles = {kDygraphCss},
+                  .markup = {kPageHtml},
+                  .data = data + EmbedPlots(figures, time),
+                  .scripts = {script, kDygraphJs, kPageJs}};
   if (replay != nullptr) {
-    html += EmbedJson("replay-scene", replay->json);
-    html += EmbedBytes("replay-values", replay->values);
-    html += FormatHtml("<script>\n{}\n</script>\n<script>\n{}</script>\n", Html::Raw(kThreeJs),
-                       Html::Raw(kReplayJs));
+    parts.markup.push_back(kReplayHtml);
+    parts.data += EmbedJson("replay-scene", replay->json) + EmbedBytes("replay-values", replay->values);
+    parts.scripts.insert(parts.scripts.end(), {kThreeJs, kReplayJs});
   }
-  html += "</body>\n</html>\n";
-  return html;
+  return AssemblePage(parts);
 }
 
 }  // namespace dexcheck

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "harness/report/page_text.h"
 #include "harness/report/thinning.h"
 
 namespace dexcheck {
@@ -22,7 +23,7 @@ double RoundTime(double time) { return std::round(1e6 * time) / 1e6; }
 
 }  // namespace
 
-Html EmbedPlots(const std::vector<Figure>& figures, const VectorXd& time) {
+std::string EmbedPlots(const std::vector<Figure>& figures, const VectorXd& time) {
   long curves = 0;
   for (const Figure& figure : figures) curves += static_cast<long>(figure.curves.size());
   const Thinning thinning(time, std::max(kMostNumbers / std::max(curves, 1L), kFewestPoints));
@@ -34,8 +35,11 @@ Html EmbedPlots(const std::vector<Figure>& figures, const VectorXd& time) {
   int series = 0;
   for (const Figure& figure : figures) {
     nlohmann::ordered_json plot = {
-        {"name", figure.name}, {"label", figure.label}, {"right", figure.right_label},
-        {"log", figure.log},   {"bound", nullptr},      {"range", CalcAxisRange(figure, false)}};
+        {"name", figure.name},   {"panel", figure.panel},
+        {"title", figure.title}, {"note", figure.note},
+        {"label", figure.label}, {"right", figure.right_label},
+        {"log", figure.log},     {"bound", nullptr},
+        {"range", CalcAxisRange(figure, false)}};
     if (!figure.right_label.empty()) plot["right_range"] = CalcAxisRange(figure, true);
     if (figure.bound) plot["bound"] = *figure.bound;
     for (const Curve& curve : figure.curves) {
@@ -55,9 +59,7 @@ Html EmbedPlots(const std::vector<Figure>& figures, const VectorXd& time) {
     }
     json["plots"].push_back(plot);
   }
-  Html data = EmbedJson("run-plots", json);
-  data += EmbedBytes("run-values", bytes);
-  return data;
+  return EmbedJson("run-plots", json) + EmbedBytes("run-values", bytes);
 }
 
 }  // namespace dexcheck

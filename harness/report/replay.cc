@@ -10,7 +10,6 @@
 
 #include "controller/object/euler_zyz.h"
 #include "harness/engine/engine.h"
-#include "harness/report/html.h"
 #include "harness/report/simplify_mesh.h"
 #include "renders/run_decorations.h"
 
@@ -59,7 +58,7 @@ class ReplayMaker {
 
  private:
   void ChooseRows() {
-    const double duration = run_.times.back() - run_.times.front();
+    const double duration = run_.duration();
     const long wanted = std::lround(std::ceil(kReplayRate * duration)) + 1;
     const long count = std::clamp(wanted, 2L, kMostReplayFrames);
     for (long k = 0; k < count; ++k) {

@@ -8,28 +8,9 @@ namespace {
 
 constexpr int kNamedCurves = 8;  // as many as there are colors
 
-/// @param joints whether the robot holds nothing, and its joints follow a motion of their own.
-std::string DescribeCategory(CheckCategory kind, bool joints) {
-  const std::string title = std::string(TitleOf(kind)) + ": ";
-  switch (kind) {
-    case CheckCategory::kModel:
-      return title + "both descriptions at the same state";
-    case CheckCategory::kLaw:
-      return title + "torques against " + (joints ? "the law of the joints" : "(53)-(55)") +
-             ", and what they do";
-    case CheckCategory::kInverseDynamics:
-      return title + "the engine's motion and forces in the model's equations";
-    case CheckCategory::kForwardDynamics:
-      return title + "accelerations" + (joints ? "" : " and contact forces") + " against the engine's";
-    case CheckCategory::kAssumption:
-      return title + "what the equations take for granted";
-  }
-  return title;
-}
-
 Figure MakeFigure(const RunData& run, CheckCategory kind) {
   Figure figure{.name = std::string("residual_") + NameOf(kind),
-                .title = DescribeCategory(kind, run.moves_joints()),
+                .title = std::string(TitleOf(kind)) + ": " + run.Explain(kind),
                 .label = "value / bound",
                 .log = true,
                 .bound = 1.0,

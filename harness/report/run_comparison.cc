@@ -8,6 +8,8 @@
 #include <map>
 #include <set>
 
+#include "harness/base/files.h"
+
 namespace dexcheck {
 namespace {
 
@@ -41,13 +43,6 @@ std::string DescribeVerdict(const RunData& run) {
   return reason.empty() || reason == "none" ? verdict : verdict + ": " + reason;
 }
 
-/// FNV-1a: files are compared by their bytes, this is what a reader sees of them.
-std::string DescribeFile(const std::string& bytes) {
-  std::uint64_t hash = 14695981039346656037U;
-  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
-  return fmt::format("{} bytes, {:016x}", bytes.size(), hash);
-}
-
 template <typename Value>
 bool AllEqual(const std::vector<Value>& values) {
   return std::all_of(values.begin(), values.end(), [&](const Value& value) { return value == values[0]; });
@@ -76,7 +71,9 @@ std::vector<InputDifference> CompareInputs(const std::vector<const RunData*>& ru
     compare(file, [&](const RunData& run) {
       const std::vector<std::string> own = run.log().ListFiles("inputs");
       const bool has = std::find(own.begin(), own.end(), file) != own.end();
-      return has ? DescribeFile(run.log().ReadFile("inputs", file)) : std::string("none");
+      if (!has) return std::string("none");
+      const std::string bytes = run.log().ReadFile("inputs", file);
+      return fmt::format("{} bytes, {}", bytes.size(), HashBytes(bytes));
     });
   }
   return differences;

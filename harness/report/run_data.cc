@@ -37,6 +37,18 @@ RunData::RunData(const std::filesystem::path& run_dir) : log_(run_dir / "log.h5"
   });
 }
 
+const char* RunData::Explain(CheckCategory category) const {
+  // Where an object is held, and where joints follow a motion of their own.
+  static constexpr const char* kWords[][2] = {
+      {"same state, both descriptions", "same state, both descriptions"},
+      {"engine's motion in the model's equations", "engine's motion in the model's equations"},
+      {"accelerations and contact forces", "accelerations"},
+      {"no slip, level base, forces in cones",
+       "joints within their ranges, motors within their limits, bodies apart"},
+      {"torques against (53)-(55)", "torques against the law of the joints"}};
+  return kWords[static_cast<size_t>(category)][moves_joints() ? 1 : 0];
+}
+
 std::string RunData::NameColumn(const SignalInfo& signal, int column) {
   const auto index = static_cast<size_t>(column);
   return index < signal.columns.size() ? signal.columns[index] : std::to_string(column + 1);

@@ -26,6 +26,8 @@ class RunData {
   [[nodiscard]] const SignalInfo* Find(const std::string& signal) const { return log_.Find(signal); }
   /// Whether the robot holds nothing, and its joints follow a motion of their own.
   [[nodiscard]] bool moves_joints() const { return Find("joints/q_d") != nullptr; }
+  /// What a category compares in this run, in a few words.
+  [[nodiscard]] const char* Explain(CheckCategory category) const;
   /// Name of a column: its own, or its number.
   [[nodiscard]] static std::string NameColumn(const SignalInfo& signal, int column);
   /// Empty when it is not in the log.

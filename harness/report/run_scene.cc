@@ -29,9 +29,8 @@ std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds,
   const std::array<Picture, 2> pictures = {
       {{folder / "fig11a.png", holds ? "11 (a)" : "", who + " at the beginning"},
        {folder / "fig11b.png", holds ? "11 (b)" : "", who + " at the end"}}};
-  const double duration = run.frames.times.back() - run.frames.times.front();
   WritePicture(pictures[0].file, painter.Paint(0.0));
-  WritePicture(pictures[1].file, painter.Paint(duration));
+  WritePicture(pictures[1].file, painter.Paint(run.frames.duration()));
   return {pictures.begin(), pictures.end()};
 }
 

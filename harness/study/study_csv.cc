@@ -5,10 +5,7 @@
 #include "controller/common/text.h"
 
 namespace dexcheck {
-namespace {
 
-/// A text in quotes where a comma, a quote or a line's end needs them. One that a spreadsheet would take for
-/// a formula gets an apostrophe, which makes it a text there.
 std::string QuoteField(const std::string& text) {
   const bool is_formula = text.find_first_of("=+-@\t\r") == 0;
   if (!is_formula && text.find_first_of(",\"\n\r") == std::string::npos) return text;
@@ -17,9 +14,6 @@ std::string QuoteField(const std::string& text) {
   return quoted + "\"";
 }
 
-std::string FormatField(double value) { return std::isfinite(value) ? FormatNumber(value) : ""; }
-
-}  // namespace
 
 void WriteStudyCsv(const StudyStore& store, const std::function<void(std::string_view)>& write) {
   const Study& study = store.study();
@@ -35,7 +29,7 @@ void WriteStudyCsv(const StudyStore& store, const std::function<void(std::string
       line += "," + (study.variations[i].labels.empty() ? value : QuoteField(value));
     }
     line += std::string(",") + NameOf(row.result.outcome) + "," + QuoteField(row.result.failure);
-    for (const double metric : row.result.metrics) line += "," + FormatField(metric);
+    for (const double metric : row.result.metrics) line += "," + (std::isfinite(metric) ? FormatNumber(metric) : "");
     write(line + "," + QuoteField(row.machine) + "\n");
   });
 }

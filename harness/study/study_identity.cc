@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdint>
 
 #include "controller/common/toml_reader.h"
 #include "harness/base/files.h"
@@ -17,22 +16,12 @@
 namespace dexcheck {
 namespace {
 
-/// FNV-1a, 64 bits.
-std::string Hash(const std::string& text) {
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  constexpr const char* kDigits = "0123456789abcdef";
-  std::string digits;
-  for (int shift = 60; shift >= 0; shift -= 4) digits += kDigits[(hash >> shift) & 15U];
-  return digits;
-}
-
 std::string HashMjcf(const std::filesystem::path& mjcf) {
   std::string all;
   for (const std::string& file : ListMjcfFiles(mjcf)) {
-    all += file + "\n" + Hash(ReadBytes(mjcf.parent_path() / file)) + "\n";
+    all += file + "\n" + HashBytes(ReadBytes(mjcf.parent_path() / file)) + "\n";
   }
-  return Hash(all);
+  return HashBytes(all);
 }
 
 bool IsSameNumber(double a, double b) {

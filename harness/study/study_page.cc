@@ -8,24 +8,23 @@ namespace dexcheck {
 namespace {
 
 /// @param html of the body. @param data that the script draws.
-std::string MakePage(const std::string& title, const char* html, const Html& data, const char* script,
+std::string MakePage(const std::string& title, const char* html, const std::string& data, const char* script,
                      double renew) {
-  Html page = BeginPage(title, Html::Raw(kStudyCss), renew);
-  page += Html::Raw(html);
-  page += data;
-  for (const char* one : {kChartJs, kChartsJs, script})
-    page += FormatHtml("<script>\n{}\n</script>\n", Html::Raw(one));
-  page += "</body>\n</html>\n";
-  return page.markup();
+  return AssemblePage({.title = title,
+                       .styles = {kStudyCss},
+                       .markup = {html},
+                       .data = data,
+                       .scripts = {kChartJs, kChartsJs, script},
+                       .renew = renew});
 }
 
 }  // namespace
 
 std::string MakeStudyPage(const StudySummary& summary, double renew) {
-  Html data = EmbedJson("study-data", summary.json);
-  data += EmbedBytes("study-values", summary.values);
   const auto name = summary.json.at("name").get<std::string>();
-  return MakePage(name + " – study", kStudyHtml, data, kStudyJs, renew);
+  return MakePage(name + " – study", kStudyHtml,
+                  EmbedJson("study-data", summary.json) + EmbedBytes("study-values", summary.values), kStudyJs,
+                  renew);
 }
 
 std::string MakeBudgetPage(const ErrorBudget& budget) {

@@ -45,17 +45,14 @@ void WriteRows(const std::vector<double>& row, LogWriter* log) {
   }
 }
 
-/// Everything, from the file's creation to its end. Late text: 0 none, 1 reserved, 2 not reserved, for which
-/// Close writes the whole file anew.
+/// Everything, from the file's creation to its end. For a late text Close writes the whole file anew.
 void Record(benchmark::State& state) {
   const testing::TempFolder folder;
   const std::vector<double> row(kRowNumbers, 1.5);
   const bool has_summary = state.range(1) != 0;
-  const bool has_room = state.range(1) == 1;
   for (auto _ : state) {
     LogWriter log(folder.path() / "log.h5", kRows, state.range(0));
     AddSignals(&log);
-    if (has_room) log.ReserveText("summary", 100000);
     WriteRows(row, &log);
     if (has_summary) log.SetText("summary", std::string(10000, 'x'));
     log.Close();
@@ -71,7 +68,6 @@ BENCHMARK(Record)
     ->Args({100, 0})
     ->Args({1000, 0})
     ->Args({100, 1})
-    ->Args({100, 2})
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
 

@@ -45,7 +45,7 @@ void DrawBare(const mjModel& model, const RunFrames& run, const VideoOptions& op
   sized->vis.quality.offsamples = 0;
   sized->vis.quality.shadowsize = options.shadow_size;
   sized->vis.quality.numslices = defaults.slices;
-  sized->vis.quality.numstacks = defaults.stacks;
+  sized->vis.quality.numstacks = RenderOptions::kStacks;
   mjv_defaultScene(&scene);
   mjv_makeScene(&model, &scene, 2000);
   scene.flags[mjRND_REFLECTION] = 0;

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "controller/common/errors.h"
+#include "harness/base/process_pool.h"
 #include "harness/engine/engine.h"
-#include "renders/frame_line.h"
 #include "renders/renderer.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
@@ -249,16 +249,14 @@ TEST_F(VideoTest, ProcessesDrawTheSameFramesByteForByte) {
       own.push_back(painter.Paint(static_cast<double>(frame) / 10));
   }
   EXPECT_NE(own.front().rgb, own.back().rgb);
-  for (const int workers : {1, 2}) {
-    FrameLine line(
-        [&]() -> FrameLine::Painter {
-          return [painter = std::make_shared<VideoPainter>(std::span(&view_, 1), options)](long frame) {
-            return painter->Paint(static_cast<double>(frame) / 10);
-          };
-        },
-        kFrames, workers, kWidth, kHeight);
-    for (const Image& image : own) EXPECT_EQ(line.Take().rgb, image.rgb) << workers << " processes";
-  }
+  const auto paint = [&](size_t frame) {
+    const Image image = VideoPainter({&view_, 1}, options).Paint(static_cast<double>(frame) / 10);
+    return std::string(image.rgb.begin(), image.rgb.end());
+  };
+  const auto compare = [&](size_t frame, const std::string& rgb) {
+    EXPECT_TRUE((std::vector<std::uint8_t>(rgb.begin(), rgb.end()) == own[frame].rgb)) << frame;
+  };
+  EXPECT_EQ(RunJobs("drawing", kFrames, 2, paint, compare, [] { return false; }), own.size());
 }
 
 TEST_F(VideoTest, FramesAreTheStillsOfTheirTimes) {

@@ -1,9 +1,8 @@
 // The report's plots: zoomed together, drawn when they come into view.
 (() => {
   'use strict';
-  const run = JSON.parse(document.getElementById('run-plots').textContent);
-  const bytes = Uint8Array.from(atob(document.getElementById('run-values').textContent), c => c.charCodeAt(0));
-  const numbers = new Float32Array(bytes.buffer);
+  const run = ReadJson('run-plots');
+  const numbers = new Float32Array(ReadBytes('run-values'));
   const count = run.points;
   const dark = matchMedia('(prefers-color-scheme: dark)');
   const first = run.times[0];
@@ -201,7 +200,18 @@
     }
   };
 
-  const boxes = [...document.querySelectorAll('[data-plot]')];
+  const boxes = run.plots.map((plot, i) => {
+    const box = Make('section', '', {className: 'card'});
+    box.dataset.plot = i;
+    Add(box, Add(Make('h3'), ...(plot.panel ? [Make('span', 'Figure ' + plot.panel, {className: 'panel'}), ' '] : []), plot.title + ' ',
+      Make('span', '', {className: 'soft number time'})), Make('div', '', {className: 'keys'}), Make('div', '', {className: 'plot'}));
+    if (plot.note) Add(box, Add(Make('p', '', {className: 'soft'}), Make('small', plot.note)));
+    return box;
+  });
+  const whole = Make('button', 'Show the whole run', {type: 'button', onclick: () => showAll()});
+  Add(document.getElementById('plots'), Make('h2', 'Plots'), Add(Make('div', '', {className: 'tools'}), whole, Make('span',
+    'Drag to zoom (all plots follow), Shift-drag to move, double-click for the whole run; on a touch screen use two fingers. Names ' +
+    'switch curves on and off.', {className: 'soft'})), Add(Make('div', '', {className: 'grid'}), ...boxes));
   const watcher = new IntersectionObserver(entries => {
     for (const entry of entries) {
       if (!entry.isIntersecting || entry.target.graph) continue;
@@ -225,7 +235,6 @@
   };
   addEventListener('hashchange', unfold);
   unfold();
-  document.getElementById('show-all')?.addEventListener('click', showAll);
   dark.addEventListener('change', () => {
     for (const plot of plots) {
       plot.updateOptions({gridLineColor: dark.matches ? '#313a43' : '#e3e7eb'});

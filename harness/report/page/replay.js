@@ -4,8 +4,8 @@
   'use strict';
   const box = document.getElementById('replay');
   if (!box) return;
-  const scene3d = JSON.parse(document.getElementById('replay-scene').textContent);
-  const bytes = Uint8Array.from(atob(document.getElementById('replay-values').textContent), c => c.charCodeAt(0)).buffer;
+  const scene3d = ReadJson('replay-scene');
+  const bytes = ReadBytes('replay-values');
   const clock = window.runClock;
   const view = box.querySelector('.view');
   const find = name => box.querySelector(`[data-part=${name}]`);

@@ -1,9 +1,8 @@
 // A study's page: its answers, tables and charts, each place of which leads to its trial.
 'use strict';
 (() => {
-  const study = JSON.parse(document.getElementById('study-data').textContent);
-  const bytes = Uint8Array.from(atob(document.getElementById('study-values').textContent), c => c.charCodeAt(0));
-  const numbers = new Float64Array(bytes.buffer);
+  const study = ReadJson('study-data');
+  const numbers = new Float64Array(ReadBytes('study-values'));
   const {style, Short, IsWide, ColorOf, Bars, Scatter, Cells} = MakeCharts();
   const columns = study.columns, width = columns.length, count = numbers.length / width;
   const value = (row, column) => numbers[row * width + column];
@@ -11,8 +10,6 @@
   const find = name => columns.findIndex(column => column.name === name);
   const get = id => document.getElementById(id), byId = id => get('explore-' + id);
   const held = row => study.outcomes[value(row, kOutcome)].held;
-  const Make = (tag, text = '', attributes = {}) => Object.assign(document.createElement(tag), {textContent: text}, attributes);
-  const Add = (parent, ...children) => { parent.append(...children); return parent; };
 
   const Show = (x, column) => {
     const {labels} = columns[column];
@@ -23,11 +20,7 @@
   const ShowCell = cell => cell === null ? '–' : typeof cell === 'number' ? Short(cell) : cell;
   const Tell = row => row === undefined ? '' : ['trial ' + value(row, kNumber), ...study.keys.map((key, i) =>
     key + ' = ' + Show(value(row, kFirstKey + i), kFirstKey + i)), Show(value(row, kOutcome), kOutcome)].join(', ');
-  const Table = (heads, rows) => Add(Make('table'), Add(Make('tr'), ...heads.map((h, i) => Make('th', h, {className: i ? 'value' : ''}))),
-    ...rows.map(row => Add(Make('tr'), ...row.map((cell, i) => {
-      const td = Make('td', '', {className: i ? 'value number' : ''});
-      return Add(td, cell instanceof Node ? cell : ShowCell(cell));
-    }))));
+  const ShowTable = (heads, rows) => Table(heads, rows.map(row => row.map(cell => cell instanceof Node ? cell : ShowCell(cell))));
   const Link = number => Make('a', String(number), {href: '#trial-' + number});
 
   // What does not depend on a choice.
@@ -43,17 +36,17 @@
     Add(get('answers'), ...study.answers.map(answer => Make('p', answer)));
     const {dexcheck_version, git_revision, mujoco_version} = study.versions;
     get('study-footer').textContent = `dexcheck ${dexcheck_version}${git_revision ? ', revision ' + git_revision : ''}, MuJoCo ${mujoco_version}.`;
-    Add(get('outcome-table'), Table(['outcome', 'trials'], study.outcomes.filter(o => o.count > 0).map(o => [
+    Add(get('outcome-table'), ShowTable(['outcome', 'trials'], study.outcomes.filter(o => o.count > 0).map(o => [
       Add(Make('span'), Object.assign(Make('span', '', {className: 'key'}), {style: 'background:' + o.color}), ' ' + o.name), o.count])));
     if (study.theory) {
       Add(get('departures'), Make('p', 'The sampled error dynamics E_ddot + K_v E_dot + K_p E = 0 (57), stepped as the engine steps, agree with ' +
         `${study.theory.agree} of ${study.theory.compared} trials in whether the object is held.`));
       if (study.theory.departures.length)
-        Add(get('departures'), Table(['where the plant departs from them', 'trials'], study.theory.departures.map(d => [d.reason, d.count])));
+        Add(get('departures'), ShowTable(['where the plant departs from them', 'trials'], study.theory.departures.map(d => [d.reason, d.count])));
     }
     if (study.best) {
       get('best').querySelector('p').textContent = study.best.order;
-      if (study.best.rows.length) Add(get('best').querySelector('div'), Table(['trial', ...study.best.heads],
+      if (study.best.rows.length) Add(get('best').querySelector('div'), ShowTable(['trial', ...study.best.heads],
         study.best.rows.map(row => [Link(row.trial), ...row.cells])));
     }
     const Stable = end => end.bad === null ? 'end of the range' : end.stable_by_57 === null ? '–' : end.stable_by_57 ? 'stable' : 'unstable';
@@ -63,14 +56,14 @@
       Bars(get('margins').querySelector('canvas'), {labels: study.margins.map(m => m.key), least: 0, most: 1, unit: 'fraction of the range', sets: [
         {label: 'good', values: of('down').map((from, i) => [from, of('up')[i]]), color: style('--accent')},
         {label: 'start', values: starts.map(s => [s - 0.004, s + 0.004]), color: style('--ink'), thin: true}]});
-      Add(get('margins').querySelector('.scroll'), Table(['key', 'from', 'to', 'start', '(57) below', '(57) above'], study.margins.map(m =>
+      Add(get('margins').querySelector('.scroll'), ShowTable(['key', 'from', 'to', 'start', '(57) below', '(57) above'], study.margins.map(m =>
         [m.key, m.down.good, m.up.good, m.start, Stable(m.down), Stable(m.up)])));
     }
     for (const {quantity, method, keys} of study.sensitivity) {
       const other = method === 'saltelli' ? 'alone' : 'spread', canvas = Make('canvas', '', {role: 'img', ariaLabel: 'effects on ' + quantity});
       const what = method === 'saltelli' ? 'fraction of the variance, with interactions' : 'moves it over its range by';
       Add(get('effects').querySelector('.grid'), Add(Make('section', '', {className: 'card scroll'}), Make('h3', quantity),
-        Add(Make('div', '', {className: 'chart'}), canvas), Table(['key', what, other], keys.map(k => [k.key, k.value, k[other]]))));
+        Add(Make('div', '', {className: 'chart'}), canvas), ShowTable(['key', what, other], keys.map(k => [k.key, k.value, k[other]]))));
       Bars(canvas, {labels: keys.map(k => k.key), sets: [{label: what, values: keys.map(k => k.value), color: style('--accent')},
         {label: 'with 95 %', values: keys.map(k => [k.low, k.high]), color: style('--ink'), thin: true}]});
     }

@@ -143,6 +143,12 @@ TEST(RunJobs, TakesResultsInOrderUntilItIsInterrupted) {
         return RunJobs("it", 2, 1, fail, take, [] { return false; });
       },
       "it: no such thing"));
+  EXPECT_TRUE(Throws<InputError>(
+      [&] {
+        const auto refuse = [](size_t) -> std::string { throw InputError("a.h5: time: is odd"); };
+        return RunJobs("it", 2, 1, refuse, take, [] { return false; });
+      },
+      "a.h5: time: is odd"));
 }
 
 }  // namespace

@@ -270,17 +270,6 @@ TEST_F(Misuse, SignalsMustFitTheirColumns) {
   EXPECT_THAT(MessageOf<std::invalid_argument>([&] { log.SetText("", "x"); }), HasSubstr("name"));
 }
 
-TEST_F(Misuse, ReservedTextsNeedFreeNames) {
-  LogWriter log(path_, 10);
-  log.SetText("scenario", "x");
-  log.ReserveText("summary", 10);
-  for (const char* name : {"scenario", "summary", "a/b", "", ".."}) {
-    EXPECT_THAT(MessageOf<std::invalid_argument>([&] { log.ReserveText(name, 10); }), StartsWith("text \""))
-        << name;
-  }
-  EXPECT_THAT(MessageOf<std::invalid_argument>([&] { log.ReserveText("x", 0); }), StartsWith("capacity"));
-}
-
 TEST_F(Misuse, CallsMustComeInOrder) {
   const auto message = [](const auto& call) { return MessageOf<std::invalid_argument>(call); };
   EXPECT_THAT(message([&] { LogWriter(path_, 0); }), HasSubstr("max_rows"));

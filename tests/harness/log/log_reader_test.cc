@@ -198,7 +198,7 @@ TEST_F(LogReaderTest, WrongAndMissingPartsAreNamed) {
   EXPECT_EQ(change([](hid_t file) { AddBytes(file, "inputs/numbers", H5T_STD_I32LE); }),
             damaged + "\"inputs/numbers\" is not a file");
   EXPECT_EQ(change([](hid_t file) { AddBytes(file, "meta/numbers", H5T_STD_I32LE); }),
-            damaged + "\"meta/numbers\" is not a text");
+            damaged + "\"meta/numbers\" is not a file");
   EXPECT_EQ(change([](hid_t file) { H5Arename(file, "format", "form"); }), "nothing was thrown")
       << "as one of format 1";
 }

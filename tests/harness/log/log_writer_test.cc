@@ -146,51 +146,6 @@ TEST_F(LogWriterTest, LateTextsAndFilesReachTheFile) {
   }
 }
 
-TEST_F(LogWriterTest, ReservedTextsAreWrittenInPlace) {
-  LogWriter log(path_, 20, 8);
-  log.ReserveText("summary", 100);
-  log.ReserveText("verdict", 8);
-  log.ReserveText("unused", 5);
-  log.SetText("verdict", "none yet");
-  StartSample(&log);
-  EXPECT_EQ(LogReader(path_).ReadText("summary"), "");
-  EXPECT_EQ(LogReader(path_).ReadText("verdict"), "none yet");
-  WriteSampleRows(20, &log);
-  struct stat before {};
-  ASSERT_EQ(::stat(path_.c_str(), &before), 0);
-  log.SetText("summary", std::string(100, 'x'));
-  log.SetText("summary", "short");
-  log.SetText("verdict", "pass");
-  EXPECT_EQ(LogReader(path_).ReadText("summary"), "short");
-  log.Close();
-  struct stat after {};
-  ASSERT_EQ(::stat(path_.c_str(), &after), 0);
-  EXPECT_EQ(after.st_ino, before.st_ino) << "the file was written anew";
-  const LogReader reader(path_);
-  EXPECT_TRUE(IsSample(reader, 20));
-  EXPECT_EQ(reader.ReadText("verdict"), "pass");
-  EXPECT_THAT(reader.ListTexts(),
-              ::testing::ElementsAre("empty", "scenario", "summary", "unused", "verdict"));
-}
-
-TEST_F(LogWriterTest, ReservedTextsSurviveTrimming) {
-  for (const size_t size : {50U, 51U, 5000U}) {
-    for (const long rows : {0L, 10L}) {
-      LogWriter log(path_, 20, 8);
-      log.ReserveText("summary", 50);
-      StartSample(&log);
-      WriteSampleRows(rows, &log);
-      log.SetText("summary", "first");
-      log.SetText("summary", std::string(size, 'x'));
-      log.Close();
-      const LogReader reader(path_);
-      EXPECT_TRUE(IsSample(reader, rows));
-      EXPECT_EQ(reader.ReadText("summary"), std::string(size, 'x'));
-      std::filesystem::remove(path_);
-    }
-  }
-}
-
 TEST_F(LogWriterTest, RoomCostsNoDiskSpace) {
   struct stat status {};
   LogWriter log(path_, 10000000, 10);  // 960 MB

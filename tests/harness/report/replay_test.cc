@@ -10,7 +10,7 @@
 #include <set>
 #include <string>
 
-#include "harness/report/html.h"
+#include "harness/report/page_text.h"
 #include "harness/report/page_assets.h"
 #include "harness/report/simplify_mesh.h"
 #include "tests/harness/report/replay_run.h"
@@ -23,9 +23,8 @@ constexpr size_t kMostBytes = 3'000'000;  // that the replay of 10 s may add to 
 TEST(MakeReplayData, AddsAtMostThreeMegabytesForTenSeconds) {
   const MjModelPtr model = LoadMjcf(testing::SourcePath("/mjcf/scene.xml"));
   const ReplayData replay = MakeReplayData(*model, testing::MakeReplayRun(*model, 10.0, 0.001));
-  const size_t size = EmbedJson("", replay.json).markup().size() +
-                      EmbedBytes("", replay.values).markup().size() + std::string(kThreeJs).size() +
-                      std::string(kReplayJs).size();
+  const size_t size = EmbedJson("", replay.json).size() + EmbedBytes("", replay.values).size() +
+                      std::string(kThreeJs).size() + std::string(kReplayJs).size();
   RecordProperty("bytes", static_cast<int>(size));
   EXPECT_LT(size, kMostBytes);
   EXPECT_EQ(replay.json.at("times").size(), kMostReplayFrames);

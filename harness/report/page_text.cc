@@ -1,38 +1,12 @@
-#include "harness/report/html.h"
+#include "harness/report/page_text.h"
 
-#include <array>
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 namespace dexcheck {
-Html Html::Text(std::string_view text) {
-  std::string escaped;
-  escaped.reserve(text.size());
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      case '\'':
-        escaped += "&#39;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return Raw(std::move(escaped));
-}
 
 std::string EncodeBase64(std::string_view bytes) {
   static constexpr std::string_view kDigits =
@@ -52,15 +26,15 @@ std::string EncodeBase64(std::string_view bytes) {
 }
 
 // Outside strings JSON has no "<", and in them it may be written so.
-Html EmbedJson(const std::string& id, const nlohmann::ordered_json& json) {
+std::string EmbedJson(const std::string& id, const nlohmann::ordered_json& json) {
   std::string text = json.dump(-1, ' ', /*ensure_ascii=*/false, nlohmann::json::error_handler_t::replace);
   for (size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at))
     text.replace(at, 1, "\\u003c");
-  return FormatHtml("<script type=\"application/json\" id=\"{}\">{}</script>\n", id, Html::Raw(text));
+  return fmt::format("<script type=\"application/json\" id=\"{}\">{}</script>\n", id, text);
 }
 
-Html EmbedBytes(const std::string& id, std::string_view bytes) {
-  return FormatHtml("<script type=\"text/plain\" id=\"{}\">{}</script>\n", id, EncodeBase64(bytes));
+std::string EmbedBytes(const std::string& id, std::string_view bytes) {
+  return fmt::format("<script type=\"text/plain\" id=\"{}\">{}</script>\n", id, EncodeBase64(bytes));
 }
 
 std::string FormatShort(double value) {
