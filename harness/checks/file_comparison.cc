@@ -12,7 +12,6 @@
 #include "harness/checks/tolerance.h"
 #include "harness/descriptions/answer_files.h"
 #include "harness/descriptions/compiled_inertias.h"
-#include "harness/descriptions/description_check.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_extras.h"
 #include "harness/descriptions/engine_provider.h"
@@ -160,7 +159,7 @@ void CompareWithEngine(const RobotFile& first, const mjModel& second, const Cons
   });
   AddOneSided(*comparison->model, completion.one_sided, &constants);
   AppendTo(&comparison->not_compared,
-           CheckDescription(robot, adapter, &constants, Ignores("coupling", options.ignore)));
+           CheckCouplings(adapter, Ignores("coupling", options.ignore), &constants));
   if (extras) AddExtras(*extras, &constants);
   // An MJCF's notes are about what CompareExtras compares.
   if (format != RobotFormat::kMjcf) AppendTo(&comparison->notes, robot.notes);
