@@ -17,12 +17,9 @@
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_extras.h"
 #include "harness/descriptions/join_names.h"
-#include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/read_description.h"
-#include "harness/descriptions/robot_file.h"
 #include "harness/diagnosis/diagnose.h"
 #include "harness/diagnosis/file_terms.h"
-#include "harness/engine/engine.h"
 #include "harness/engine/mjcf_file.h"
 
 namespace dexcheck::cli {
@@ -175,27 +172,17 @@ RobotModel Complete(const DiagnoseRequest& request, RobotDescription robot, mjMo
   return RobotModel(robot.spec);
 }
 
-/// Faults of conventions; none when the MJCF is no description (of several free bodies).
-std::vector<Hypothesis> Explain(const DiagnoseRequest& request, const RobotDescription& robot,
-                                const mjModel& engine) {
-  try {
-    return ExplainDifference(robot, ReadMjcfDescription(engine, request.files.mjcf.string()),
-                             std::max(request.options.tolerance, kHypothesisTolerance));
-  } catch (const InputError&) {
-    return {};
-  }
-}
-
 int Run(DiagnoseRequest request) {
   request.TakeFiles("diagnose");
   request.options.tolerance = request.judging.Find().value_or(0.0);
   const RobotDescription robot = ReadDescription(request.files.robot);
+  const DescriptionFile mjcf(request.files.mjcf);
   Require(robot.format != RobotFormat::kMjcf, request.files.robot,
           "must be a parameter file or a URDF to be repaired, is an MJCF (dexcheck import writes a parameter "
           "file from it)");
-  Require(FindFormat(request.files.mjcf) == RobotFormat::kMjcf, request.files.mjcf,
+  Require(mjcf.format() == RobotFormat::kMjcf, request.files.mjcf,
           "must be an MJCF, which is taken to be right (dexcheck consistency compares any two files)");
-  const MjModelPtr engine = LoadMjcf(request.files.mjcf);
+  const MjModelPtr engine = mjcf.CopyEngine();
   std::vector<std::string> notes;
   const RobotModel model = Complete(request, robot, engine.get(), &notes);
   RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely faults)");
@@ -216,7 +203,9 @@ int Run(DiagnoseRequest request) {
   // Faults of conventions first; what can only be moved shows no bodies to compare.
   const bool is_open = !diagnosis.agrees && !request.options.by_motion;
   std::vector<Hypothesis> hypotheses;
-  if (is_open) hypotheses = Explain(request, robot, *engine);
+  const std::optional<RobotDescription> right = mjcf.TryToDescribe();
+  if (is_open && right)
+    hypotheses = ExplainDifference(robot, *right, std::max(request.options.tolerance, kHypothesisTolerance));
   json.Write([&] { return ToText(request, terms.written(), diagnosis, hypotheses, notes); });
   if (!json.TakesStdout()) {
     if (!request.quiet) {

@@ -173,14 +173,14 @@ int Run(EnginesRequest request) {
   request.options.programs_folder = FindProgramsFolder();
   ResultFile json(request.json_file);
   ResultFile junit(request.junit_file);
-  const RobotDescription robot = ReadDescription(request.robot, request.urdf);
+  const DescriptionFile file(request.robot, request.urdf);
+  const RobotDescription robot = file.Describe();
   const RobotModel model(robot.spec);
   ProgressBar bar("comparing", request.options.states.samples, request.quiet);
-  const EngineComparisonResult result =
-      RunEngineComparison(robot, request.robot, request.options, [&](long samples) {
-        bar.Update(samples);
-        return !IsInterrupted();
-      });
+  const EngineComparisonResult result = RunEngineComparison(file, robot, request.options, [&](long samples) {
+    bar.Update(samples);
+    return !IsInterrupted();
+  });
   bar.Finish();
   const bool is_whole = result.samples >= request.options.states.samples && !result.lacks_requested;
   ExitCode code = is_whole ? kSuccess : kFailure;
@@ -193,7 +193,7 @@ int Run(EnginesRequest request) {
   }
   if (code == kFailure)
     return ReportFailure(result.lacks_requested
-                             ? "a library that was asked for is not there"
+                             ? "a library that was requested is not there"
                              : fmt::format("only {} of {} states were compared", result.samples,
                                            request.options.states.samples));
   return code;

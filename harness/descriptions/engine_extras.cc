@@ -225,13 +225,12 @@ std::optional<std::string> SetAsideMotors(const std::string& source, mjModel* en
          " says how they make their forces (servos, muscles, transmissions): " + JoinNames(motors);
 }
 
-Extras CompareExtras(const RobotDescription& first, const mjModel& first_engine, const std::string& file,
+Extras CompareExtras(const RobotDescription& first, MjModelPtr first_engine, const std::string& file,
                      const Adapter& second, mjModel* engine) {
-  const MjModelPtr own_engine(mj_copyModel(nullptr, &first_engine));
   const RobotModel own_model(first.spec);
-  const Adapter own(own_model, *own_engine, file);
+  const Adapter own(own_model, *first_engine, file);
   Extras extras;
-  ExtrasComparison(own, own_engine.get(), second, engine, &extras.differences).Run();
+  ExtrasComparison(own, first_engine.get(), second, engine, &extras.differences).Run();
   extras.of_first = CheckConstants(own);
   CheckCouplings(own, /*ignores=*/false, &extras.of_first);
   return extras;
