@@ -86,7 +86,7 @@ std::optional<BaseConvention> FindOtherConvention(const RobotModel& model, Dynam
     try {
       if (AgreeAtFirst(model, reference, answering, make_feed())) found = convention;
     } catch (const Error&) {
-      break;  // a program may not bear what it did not ask for
+      break;  // a program may not bear what it did not request
     }
   }
   answering->set_convention(spoken);

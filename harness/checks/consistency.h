@@ -1,6 +1,6 @@
 #pragma once
 
-// Two of whatever tells a robot's terms, compared at random states, no stepping.
+// Two providers of a robot's terms, compared at random states, no stepping.
 
 #include <cstdint>
 #include <functional>
@@ -32,7 +32,7 @@ struct ConsistencyResult {
   ConstantChecks constants;
   std::vector<CheckRecord> terms;
   std::vector<std::string> not_compared;  ///< Names of terms that one of the two lacks.
-  long samples = 0;                       ///< Compared: fewer than asked for when `progress` said stop.
+  long samples = 0;                       ///< Compared: fewer than requested when `progress` said stop.
   double seconds = 0.0;
 
   [[nodiscard]] bool Agrees() const;

@@ -19,7 +19,6 @@
 #include "harness/descriptions/engine_urdf.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/mjcf_reader.h"
-#include "harness/descriptions/robot_file.h"
 
 namespace dexcheck {
 namespace {
@@ -28,13 +27,9 @@ using ProviderPtr = std::unique_ptr<DynamicsProvider>;
 
 class EngineComparisonRun {
  public:
-  EngineComparisonRun(const RobotDescription& robot, std::filesystem::path file,
+  EngineComparisonRun(const DescriptionFile& file, const RobotDescription& robot,
                       const EngineComparisonOptions& options)
-      : robot_(robot),
-        file_(std::move(file)),
-        format_(FindFormat(file_)),
-        options_(options),
-        model_(robot.spec) {}
+      : file_(file), robot_(robot), options_(options), model_(robot.spec) {}
 
   EngineComparisonResult Run(const std::function<bool(long)>& progress) {
     CheckNames();
@@ -77,7 +72,7 @@ class EngineComparisonRun {
     }
   }
 
-  /// What cannot be asked is told and left out.
+  /// What cannot be evaluated is named and left out.
   void Add(const std::string& name, const std::function<ProviderPtr()>& make) {
     try {
       ProviderPtr provider = make();
@@ -109,10 +104,10 @@ class EngineComparisonRun {
       if (!options_.node_modules.empty()) command += " " + QuoteForShell(options_.node_modules.string());
       return MakeProgram(command);
     }
-    if (format_ != RobotFormat::kUrdf) throw InputError("reads a URDF only");
+    if (file_.format() != RobotFormat::kUrdf) throw InputError("reads a URDF only");
     const std::filesystem::path program = options_.programs_folder / ("dexcheck-" + name);
     RequireProgram(program);
-    return MakeProgram(QuoteForShell(program.string()) + " " + QuoteForShell(file_.string()));
+    return MakeProgram(QuoteForShell(program.string()) + " " + QuoteForShell(file_.path().string()));
   }
 
   static void RequireProgram(const std::filesystem::path& path) {
@@ -129,13 +124,13 @@ class EngineComparisonRun {
     if (!mujoco_file_.empty()) return mujoco_file_;
     if (!options_.mjcf.empty()) {
       mujoco_file_ = options_.mjcf;
-    } else if (format_ == RobotFormat::kUrdf) {
+    } else if (file_.format() == RobotFormat::kUrdf) {
       folder_.emplace();
       mujoco_file_ = folder_->path() / "robot.urdf";
-      std::ofstream(mujoco_file_) << WriteEngineUrdf(ReadBytes(file_), file_.string(),
+      std::ofstream(mujoco_file_) << WriteEngineUrdf(file_.text(), file_.path().string(),
                                                      robot_.spec.base.type == BaseType::kFloating);
-    } else if (format_ == RobotFormat::kMjcf) {
-      mujoco_file_ = file_;
+    } else if (file_.format() == RobotFormat::kMjcf) {
+      mujoco_file_ = file_.path();
     } else {
       throw InputError("reads no parameter file; --mjcf names what it reads instead");
     }
@@ -144,12 +139,13 @@ class EngineComparisonRun {
 
   /// What MuJoCo makes of a file; a refusal speaks of the file that the user knows.
   [[nodiscard]] MjModelPtr Load(const std::filesystem::path& path) const {
+    if (path == file_.path()) return file_.CopyEngine();
     try {
       return LoadMjcf(path);
     } catch (const InputError& error) {
       std::string text = error.what();
       const size_t at = text.find(path.string());
-      if (folder_ && at != std::string::npos) text.replace(at, path.string().size(), file_.string());
+      if (folder_ && at != std::string::npos) text.replace(at, path.string().size(), file_.path().string());
       throw InputError(text);
     }
   }
@@ -157,16 +153,17 @@ class EngineComparisonRun {
   ProviderPtr MakeMujoco() {
     const std::filesystem::path path = MujocoFile();
     MjModelPtr engine = Load(path);
-    if (FindFormat(path) == RobotFormat::kUrdf) {
+    if (folder_) {  // the file is a URDF
       for (int k = 0; k < 3; ++k) engine->opt.gravity[k] = robot_.spec.gravity[k];
     }
     TakeIgnored(robot_.spec, options_.states.ignore, engine.get());
     RobotDescription completed = robot_;
-    const std::string file = options_.mjcf.empty() ? file_.filename().string() : path.filename().string();
+    const std::string file =
+        options_.mjcf.empty() ? file_.path().filename().string() : path.filename().string();
     const Completion completion = CompleteFromEngine(*engine, file, &completed);
     const Base& base = completed.spec.base;
     if (base.type != robot_.spec.base.type) {
-      throw InputError("its base floats, and that of " + file_.filename().string() +
+      throw InputError("its base floats, and that of " + file_.path().filename().string() +
                        " is fixed (--floating)");
     }
     const bool has_moved = std::any_of(robot_.spec.frames.begin(), robot_.spec.frames.end(),
@@ -239,7 +236,7 @@ class EngineComparisonRun {
     }
   }
 
-  /// Each provider joins the first group all of whose sides it agrees with.
+  /// Each provider joins the first group with all of which it agrees.
   void FormGroups() {
     const auto agree = [&](size_t a, size_t b) {
       const auto pair =
@@ -285,9 +282,8 @@ class EngineComparisonRun {
     }
   }
 
+  const DescriptionFile& file_;
   const RobotDescription& robot_;
-  std::filesystem::path file_;
-  RobotFormat format_;
   const EngineComparisonOptions& options_;
   RobotModel model_;
   std::optional<TemporaryFolder> folder_;
@@ -312,10 +308,10 @@ const std::vector<EngineComparisonEngine>& ListEngineComparisonEngines() {
   return engines;
 }
 
-EngineComparisonResult RunEngineComparison(const RobotDescription& robot, const std::filesystem::path& file,
+EngineComparisonResult RunEngineComparison(const DescriptionFile& file, const RobotDescription& robot,
                                            const EngineComparisonOptions& options,
                                            const std::function<bool(long)>& progress) {
-  return EngineComparisonRun(robot, file, options).Run(progress);
+  return EngineComparisonRun(file, robot, options).Run(progress);
 }
 
 }  // namespace dexcheck

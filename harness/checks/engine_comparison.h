@@ -10,6 +10,7 @@
 
 #include "harness/checks/consistency.h"
 #include "harness/descriptions/program_provider.h"
+#include "harness/descriptions/read_description.h"
 
 namespace dexcheck {
 
@@ -41,7 +42,7 @@ const std::vector<EngineComparisonEngine>& ListEngineComparisonEngines();
 struct EngineComparisonResult {
   std::vector<std::string> names;   ///< Of the providers, as they call themselves.
   std::vector<std::string> absent;  ///< "kdl: why it is not compared".
-  bool lacks_requested = false;     ///< One of them was asked for by name.
+  bool lacks_requested = false;     ///< One of them was requested by name.
   std::vector<std::string> notes;
   std::vector<ComparedPair> pairs;  ///< Judged by the tolerance.
   std::vector<std::vector<size_t>>
@@ -52,9 +53,9 @@ struct EngineComparisonResult {
   [[nodiscard]] bool Agrees() const { return groups.size() <= 1; }
 };
 
-/// Asks the engines. @param robot the description of `file`, whose analytic model is the first of them.
+/// Compares the engines. @param robot the description of `file`, whose analytic model is the first of them.
 /// @throws InputError for names that are none, and when fewer than two are left.
-EngineComparisonResult RunEngineComparison(const RobotDescription& robot, const std::filesystem::path& file,
+EngineComparisonResult RunEngineComparison(const DescriptionFile& file, const RobotDescription& robot,
                                            const EngineComparisonOptions& options,
                                            const std::function<bool(long)>& progress);
 

@@ -12,7 +12,6 @@
 #include "harness/checks/tolerance.h"
 #include "harness/descriptions/answer_files.h"
 #include "harness/descriptions/compiled_inertias.h"
-#include "harness/descriptions/description_check.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_extras.h"
 #include "harness/descriptions/engine_provider.h"
@@ -20,7 +19,6 @@
 #include "harness/descriptions/link_frames.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/read_description.h"
-#include "harness/descriptions/robot_file.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck {
@@ -29,34 +27,6 @@ namespace {
 void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& more) {
   notes->insert(notes->end(), more.begin(), more.end());
 }
-
-/// One of two files, read once.
-struct RobotFile {
-  RobotFile(std::filesystem::path file, const UrdfOptions& urdf)
-      : path(std::move(file)), format(FindFormat(path)) {
-    if (format == RobotFormat::kMjcf) {
-      engine = LoadMjcf(path);
-    } else {
-      description = ReadDescription(path, urdf);
-    }
-  }
-  /// @throws InputError for an MJCF that can be none.
-  [[nodiscard]] RobotDescription Describe() const {
-    return description ? *description : ReadMjcfDescription(*engine, path.string());
-  }
-  [[nodiscard]] std::optional<RobotDescription> TryToDescribe() const {
-    try {
-      return Describe();
-    } catch (const InputError&) {
-      return std::nullopt;
-    }
-  }
-
-  std::filesystem::path path;
-  RobotFormat format;
-  std::optional<RobotDescription> description;  ///< Of a parameter file or URDF.
-  MjModelPtr engine;                            ///< Of an MJCF.
-};
 
 /// What moves in a scene and is no part of the robot.
 void NoteOthers(const Adapter& adapter, Comparison* comparison) {
@@ -132,13 +102,13 @@ EngineCompletion Complete(const ConsistencyOptions& options, const mjModel& engi
 }
 
 /// A description against the engine.
-void CompareWithEngine(const RobotFile& first, const mjModel& second, const ConsistencyOptions& options,
-                       const Progress& progress, Comparison* comparison) {
+void CompareWithEngine(const DescriptionFile& first, const DescriptionFile& second,
+                       const ConsistencyOptions& options, const Progress& progress, Comparison* comparison) {
   const std::string file = comparison->second.filename().string();
   const RobotDescription written = first.Describe();
   RobotDescription robot = written;
-  const MjModelPtr engine(mj_copyModel(nullptr, &second));
-  const RobotFormat format = first.format;
+  const MjModelPtr engine = second.CopyEngine();
+  const RobotFormat format = first.format();
   if (format == RobotFormat::kUrdf) {
     const std::optional<std::string> motors = SetAsideMotors(file, engine.get());
     if (motors) comparison->not_compared.push_back(*motors);
@@ -150,7 +120,7 @@ void CompareWithEngine(const RobotFile& first, const mjModel& second, const Cons
   const Adapter adapter(*comparison->model, *engine, comparison->second.string());
   std::optional<Extras> extras;
   if (format == RobotFormat::kMjcf)
-    extras = CompareExtras(written, *first.engine, first.path.string(), adapter, engine.get());
+    extras = CompareExtras(written, first.CopyEngine(), first.path().string(), adapter, engine.get());
   comparison->result = CheckConsistency(adapter, options, progress);
   CountRoundings(robot.is_imported ? 1 : 0, completed.has_link_frames, &comparison->result.terms);
   ConstantChecks& constants = comparison->result.constants;
@@ -160,7 +130,7 @@ void CompareWithEngine(const RobotFile& first, const mjModel& second, const Cons
   });
   AddOneSided(*comparison->model, completion.one_sided, &constants);
   AppendTo(&comparison->not_compared,
-           CheckDescription(robot, adapter, &constants, Ignores("coupling", options.ignore)));
+           CheckCouplings(adapter, Ignores("coupling", options.ignore), &constants));
   if (extras) AddExtras(*extras, &constants);
   // An MJCF's notes are about what CompareExtras compares.
   if (format != RobotFormat::kMjcf) AppendTo(&comparison->notes, robot.notes);
@@ -191,17 +161,17 @@ void CompareTwoDescriptions(RobotDescription a, RobotDescription b, const Consis
 Comparison CompareFiles(const std::filesystem::path& a, const std::filesystem::path& b,
                         const UrdfOptions& urdf, const ConsistencyOptions& options,
                         const Progress& progress) {
-  RobotFile first(a, urdf);
-  RobotFile second(b, urdf);
-  if (first.format == RobotFormat::kMjcf && second.format != RobotFormat::kMjcf) std::swap(first, second);
+  DescriptionFile first(a, urdf);
+  DescriptionFile second(b, urdf);
+  if (first.format() == RobotFormat::kMjcf && second.format() != RobotFormat::kMjcf) std::swap(first, second);
   Comparison comparison;
-  comparison.first = first.path;
-  comparison.second = second.path;
-  comparison.with_engine = second.format == RobotFormat::kMjcf;
+  comparison.first = first.path();
+  comparison.second = second.path();
+  comparison.with_engine = second.format() == RobotFormat::kMjcf;
   comparison.read_first = first.TryToDescribe();
   comparison.read_second = second.TryToDescribe();
   if (comparison.with_engine) {
-    CompareWithEngine(first, *second.engine, options, progress, &comparison);
+    CompareWithEngine(first, second, options, progress, &comparison);
   } else {
     CompareTwoDescriptions(first.Describe(), second.Describe(), options, progress, &comparison);
   }
@@ -213,15 +183,15 @@ namespace {
 
 /// A description whose terms stand first: the analytic model's, or of an MJCF the engine's.
 struct Reference {
-  Reference(RobotFile file, Comparison* comparison) : robot(file.Describe()) {
-    comparison->first = file.path;
+  Reference(const DescriptionFile& file, Comparison* comparison) : robot(file.Describe()) {
+    comparison->first = file.path();
     comparison->notes = robot.notes;
     comparison->model.emplace(robot.spec);
-    if (file.engine != nullptr) {
+    if (file.format() == RobotFormat::kMjcf) {
       provider =
-          std::make_unique<EngineProvider>(robot.spec, std::move(file.engine), file.path.string(), "MuJoCo");
+          std::make_unique<EngineProvider>(robot.spec, file.CopyEngine(), file.path().string(), "MuJoCo");
     } else {
-      provider = std::make_unique<AnalyticProvider>(*comparison->model, file.path.filename().string());
+      provider = std::make_unique<AnalyticProvider>(*comparison->model, file.path().filename().string());
     }
   }
   RobotDescription robot;
@@ -248,7 +218,7 @@ Comparison CompareAnswers(const std::filesystem::path& file, const AnswersSource
                           const UrdfOptions& urdf, const ConsistencyOptions& options,
                           const Progress& progress) {
   Comparison comparison;
-  const Reference reference(RobotFile(file, urdf), &comparison);
+  const Reference reference(DescriptionFile(file, urdf), &comparison);
   std::unique_ptr<AnsweringProvider> answering;
   std::function<StateFeed()> make_feed = [&] { return FeedRandomStates(*comparison.model, options); };
   if (source.answers.empty()) {
@@ -283,7 +253,7 @@ Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctio
     throw InputError(functions.name + ": must have one of M, c, g, h, friction");
   }
   Comparison comparison;
-  const Reference reference(RobotFile(file, urdf), &comparison);
+  const Reference reference(DescriptionFile(file, urdf), &comparison);
   comparison.second = functions.name;
   FunctionProvider provider(functions, comparison.model->num_velocities());
   comparison.result =

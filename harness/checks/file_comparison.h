@@ -49,7 +49,7 @@ Comparison CompareAnswers(const std::filesystem::path& file, const AnswersSource
                           const UrdfOptions& urdf, const ConsistencyOptions& options,
                           const Progress& progress);
 
-/// Compares functions with a parameter file, a URDF, or an MJCF, of which the engine is asked.
+/// Compares functions with a parameter file, a URDF, or an MJCF, whose terms are the engine's.
 Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctions& functions,
                             const UrdfOptions& urdf, const ConsistencyOptions& options);
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,10 +23,9 @@ using Json = nlohmann::ordered_json;
 
 struct AuditRequest {
   std::filesystem::path robot;
-  std::vector<std::string> packages;
+  UrdfOptions urdf = {.keep_impossible = true};
   std::string json_file;
   std::string junit_file;
-  bool floating = false;
   bool quiet = false;
 };
 
@@ -107,19 +105,13 @@ std::string WriteAuditJUnit(const AuditRequest& request, const AuditResult& resu
 }
 
 int Run(const AuditRequest& request) {
-  std::optional<OutputFile> json;
-  UrdfOptions options;
-  options.packages.assign(request.packages.begin(), request.packages.end());
-  options.keep_impossible = true;
-  options.floating = request.floating;
-  const RobotDescription robot = ReadDescription(request.robot, options);
-  if (!request.json_file.empty()) json.emplace(request.json_file);
-  std::optional<OutputFile> junit;
-  if (!request.junit_file.empty()) junit.emplace(request.junit_file);
+  const RobotDescription robot = ReadDescription(request.robot, request.urdf);
+  ResultFile json(request.json_file);
+  ResultFile junit(request.junit_file);
   const AuditResult result = AuditRobot(robot);
-  if (json) json->Write(ToText(request, robot, result));
-  if (junit) junit->Write(WriteAuditJUnit(request, result));
-  if (request.json_file != "-") Print(request, robot, result);
+  json.Write([&] { return ToText(request, robot, result); });
+  junit.Write([&] { return WriteAuditJUnit(request, result); });
+  if (!json.TakesStdout()) Print(request, robot, result);
   return result.IsGood() ? kSuccess : kDisagreement;
 }
 
@@ -132,10 +124,7 @@ void AddAuditCommand(Command app) {
   command.AddOption("FILE", &request->robot, "Parameter file (TOML), URDF or MJCF")
       .TypeName("FILE")
       .Required();
-  command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
-      .TypeName("PATH")
-      .Repeatable();
-  command.AddFlag("--floating", &request->floating, "The root of a URDF floats");
+  AddUrdfOptions(command, &request->urdf);
   AddJsonOption(command, "the findings", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");

@@ -292,5 +292,7 @@ template Option Command::AddOption(const std::string&, std::uint64_t*, const std
 template Option Command::AddOption(const std::string&, std::optional<double>*, const std::string&);
 template Option Command::AddOption(const std::string&, std::vector<double>*, const std::string&);
 template Option Command::AddOption(const std::string&, std::vector<std::string>*, const std::string&);
+template Option Command::AddOption(const std::string&, std::vector<std::filesystem::path>*,
+                                   const std::string&);
 
 }  // namespace dexcheck::cli

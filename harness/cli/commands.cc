@@ -42,6 +42,13 @@ Option AddIgnoreOption(Command command, std::vector<std::string>* ignore) {
       .OneOf({kIgnorable[0], kIgnorable[1], kIgnorable[2], kIgnorable[3]});
 }
 
+void AddUrdfOptions(Command command, UrdfOptions* options) {
+  command.AddOption("--package", &options->packages, "Folder of a URDF's packages; its meshes are looked for")
+      .TypeName("PATH")
+      .Repeatable();
+  command.AddFlag("--floating", &options->floating, "The root of a URDF floats");
+}
+
 std::vector<std::string> Overrides::List() const {
   std::vector<std::string> list;
   for (const std::string& key : unset) list.push_back(key + "-=");

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "harness/cli/command_line.h"
+#include "harness/descriptions/urdf_reader.h"
 
 namespace dexcheck::cli {
 
@@ -75,6 +76,9 @@ Option AddJUnitOption(Command command, std::string* file);
 
 /// Adds --ignore: constants of joints that two descriptions need not share.
 Option AddIgnoreOption(Command command, std::vector<std::string>* ignore);
+
+/// Adds --package and --floating.
+void AddUrdfOptions(Command command, UrdfOptions* options);
 
 /// Each adds its command to `app`.
 void AddAuditCommand(Command app);

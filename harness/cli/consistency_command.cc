@@ -1,18 +1,11 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
-#include <functional>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "controller/common/errors.h"
-#include "controller/common/text.h"
 #include "harness/base/interrupts.h"
 #include "harness/checks/tolerance.h"
 #include "harness/cli/commands.h"
@@ -23,65 +16,41 @@
 namespace dexcheck::cli {
 namespace {
 
-/// Calls `check` with what it tells its progress.
-void ShowProgress(const ConsistencyRequest& request, const std::function<void(const Progress&)>& check) {
-  ProgressBar bar("comparing", request.options.samples, request.quiet);
-  check([&](long samples) {
-    bar.Update(samples);
-    return !IsInterrupted();
-  });
-  bar.Finish();
-}
-
-UrdfOptions MakeUrdfOptions(const ConsistencyRequest& request) {
-  UrdfOptions options;
-  options.packages.assign(request.packages.begin(), request.packages.end());
-  options.floating = request.floating;
-  return options;
-}
-
 /// Puts A and B where --robot and --mjcf would stand.
-void SortSides(ConsistencyRequest* request) {
-  if (request->a.empty() && !request->has_answers()) return;
-  if (request->has_answers()) {
-    if (request->a.empty() || !request->b.empty()) {
-      throw InputError("consistency: one file must be given beside --program or --answers, got " +
-                       std::string(request->a.empty() ? "none" : "two"));
-    }
-    request->files.robot = request->a;
-    return;
+void TakeFiles(ConsistencyRequest* request) {
+  if (!request->has_answers()) return request->TakeFiles("consistency");
+  if (request->a.empty() || !request->b.empty()) {
+    throw InputError("consistency: one file must be given beside --program or --answers, got " +
+                     std::string(request->a.empty() ? "none" : "two"));
   }
-  if (request->b.empty()) {
-    throw InputError("consistency: two files must be given, got " + Quote(request->a));
-  }
-  request->files = {request->a, request->b};
+  request->files.robot = request->a;
 }
 
 int Run(ConsistencyRequest request) {
-  SortSides(&request);
+  TakeFiles(&request);
   CatchInterrupts();
-  std::optional<OutputFile> json;
-  if (!request.json_file.empty()) json.emplace(request.json_file);
-  std::optional<OutputFile> junit;
-  if (!request.junit_file.empty()) junit.emplace(request.junit_file);
-  Comparison comparison;
-  ShowProgress(request, [&](const Progress& progress) {
-    const UrdfOptions urdf = MakeUrdfOptions(request);
-    comparison = request.has_answers()
-                     ? CompareAnswers(request.files.robot, request.source, urdf, request.options, progress)
-                     : CompareFiles(request.files.robot, request.files.mjcf, urdf, request.options, progress);
-  });
-  if (const std::optional<double> tolerance = request.judging.Find()) {
+  ResultFile json(request.json_file);
+  ResultFile junit(request.junit_file);
+  ProgressBar bar("comparing", request.options.samples, request.quiet);
+  const auto progress = [&](long samples) {
+    bar.Update(samples);
+    return !IsInterrupted();
+  };
+  const RobotFiles& files = request.files;
+  Comparison comparison =
+      request.has_answers()
+          ? CompareAnswers(files.robot, request.source, request.urdf, request.options, progress)
+          : CompareFiles(files.robot, files.mjcf, request.urdf, request.options, progress);
+  bar.Finish();
+  if (const std::optional<double> tolerance = request.judging.Find())
     JudgeByTolerance(*tolerance, &comparison.result);
-  }
   if (!request.has_answers()) ExplainComparison(&comparison, request.judging.Find().value_or(0.0));
   const ConsistencyResult& result = comparison.result;
-  const bool is_whole = result.samples >= request.options.samples || !request.source.answers.empty();
-  ExitCode code = is_whole ? kSuccess : kFailure;
+  ExitCode code = request.IsWhole(result) ? kSuccess : kFailure;
   if (!result.Agrees()) code = kDisagreement;
-  if (json) json->Write(ToText(request, comparison, code));
-  if (junit) junit->Write(WriteJUnit(request, comparison));
-  if (!request.PrintsJson()) {
+  json.Write([&] { return ToText(request, comparison, code); });
+  junit.Write([&] { return WriteJUnit(request, comparison); });
+  if (!json.TakesStdout()) {
     if (!request.quiet) PrintTable(request, comparison);
     PrintVerdict(request, comparison);
   }
@@ -97,14 +66,10 @@ void AddConsistencyCommand(Command app) {
   constexpr std::uint64_t kMaxSamples = 1000000000;
   const auto request = std::make_shared<ConsistencyRequest>();
   Command command = app.AddCommand("consistency", "Compare every term of model and engine at random states");
-  const Option robot = AddRobotOptions(command, &request->files);
-  command
-      .AddOption("A", &request->a,
+  AddFileOptions(command,
                  "One of two descriptions of a robot, instead of --robot and --mjcf: parameter file (TOML), "
-                 "URDF or MJCF")
-      .TypeName("FILE")
-      .Excludes(robot);
-  command.AddOption("B", &request->b, "The other one").TypeName("FILE");
+                 "URDF or MJCF",
+                 "The other one", request.get());
   const Option program =
       command
           .AddOption("--program", &request->source.program,
@@ -122,10 +87,7 @@ void AddConsistencyCommand(Command app) {
       .TypeName("S")
       .Check(PositiveNumber("must be a number above 0"))
       .ShowDefault();
-  command.AddFlag("--floating", &request->floating, "The root of a URDF floats");
-  command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
-      .TypeName("PATH")
-      .Repeatable();
+  AddUrdfOptions(command, &request->urdf);
   AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
   AddJsonOption(command, "the results", &request->json_file);
   AddJUnitOption(command, &request->junit_file);

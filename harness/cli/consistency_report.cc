@@ -17,7 +17,27 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json DescribeTerm(const CheckRecord& record, const RobotModel& model) {
+const char* Judge(ExitCode code) {
+  if (code == kSuccess) return "pass";
+  return code == kDisagreement ? "disagreement" : "failed";
+}
+
+/// One line for each; below what differs, where.
+void PrintRecords(const char* title, const std::vector<CheckRecord>& records, const RobotModel* places) {
+  fmt::print("{:<24}{:>9}  {:>12}  {:>9}  {:>6}\n", title, "compared", "worst error", "bound", "digits");
+  for (const CheckRecord& record : records) {
+    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {}\n", record.name, record.comparisons, record.worst,
+               record.bound, CountDigits(record.worst), record.failed ? "DIFFERS" : "ok");
+    if (!record.failed || places == nullptr) continue;
+    const std::string where = Describe(record.where, *places, places->num_base_velocities());
+    fmt::print("{}\n",
+               Wrap(fmt::format("    worst at {}, sample {}", where, static_cast<long>(record.at)), 6));
+  }
+}
+
+}  // namespace
+
+Json DescribeRecord(const CheckRecord& record, const RobotModel& model) {
   const int base = model.num_base_velocities();
   Json json = ToJson(record, /*timed=*/false);
   json["compared"] = record.comparisons;
@@ -29,18 +49,6 @@ Json DescribeTerm(const CheckRecord& record, const RobotModel& model) {
   if (record.failed) json["first_failure"] = Describe(record.first_failure, model, base);
   return json;
 }
-
-const char* Judge(ExitCode code) {
-  if (code == kSuccess) return "pass";
-  return code == kDisagreement ? "disagreement" : "failed";
-}
-
-std::string DescribeTolerance(const ConsistencyRequest& request) {
-  const std::optional<double> tolerance = request.judging.Find();
-  return tolerance ? fmt::format("{:g}", *tolerance) : "rounding";
-}
-
-}  // namespace
 
 Json ListHypotheses(const std::vector<Hypothesis>& hypotheses) {
   Json list = Json::array();
@@ -63,7 +71,6 @@ void PrintHypotheses(const std::vector<Hypothesis>& hypotheses) {
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison) {
   const RobotModel& model = *comparison.model;
   const ConsistencyResult& result = comparison.result;
-  const int base = model.num_base_velocities();
   fmt::print("{}: {} against {}{}\n{} random states (seed {}), {:.1f} s\n\n", model.name(),
              comparison.first.filename().string(), comparison.second.filename().string(),
              comparison.with_engine ? std::string(", MuJoCo ") + mj_versionString() : "", result.samples,
@@ -77,25 +84,13 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
   };
   list("not compared", comparison.not_compared);
   list("worth knowing", comparison.notes);
-  fmt::print("{:<24}{:>9}  {:>12}  {:>9}  {:>6}\n", "constant", "compared", "worst error", "bound", "digits");
-  for (const CheckRecord& record : result.constants.records) {
-    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {}\n", record.name, record.comparisons, record.worst,
-               record.bound, CountDigits(record.worst), record.failed ? "DIFFERS" : "ok");
-  }
+  PrintRecords("constant", result.constants.records, nullptr);
   if (!result.constants.notes.empty()) {
     fmt::print("{} notes on what only a run has (contacts, solver, motors' limits): --json\n",
                result.constants.notes.size());
   }
-  fmt::print("\n{:<24}{:>9}  {:>12}  {:>9}  {:>6}\n", "term", "compared", "worst error", "bound", "digits");
-  for (const CheckRecord& record : result.terms) {
-    fmt::print("{:<24}{:>9}  {:>12.2e}  {:>9.1e}  {:>6}  {}\n", record.name, record.comparisons, record.worst,
-               record.bound, CountDigits(record.worst), record.failed ? "DIFFERS" : "ok");
-    if (record.failed) {
-      fmt::print("{}\n", Wrap(fmt::format("    worst at {}, sample {}", Describe(record.where, model, base),
-                                          static_cast<long>(record.at)),
-                              6));
-    }
-  }
+  fmt::print("\n");
+  PrintRecords("term", result.terms, &model);
   const std::string bounds = request.judging.Find()
                                  ? "bounds are those of rounding or the tolerance given, whichever is wider"
                                  : "bounds follow from rounding";
@@ -106,7 +101,7 @@ void PrintTable(const ConsistencyRequest& request, const Comparison& comparison)
 
 void PrintVerdict(const ConsistencyRequest& request, const Comparison& comparison) {
   const ConsistencyResult& result = comparison.result;
-  if (result.samples < request.options.samples && request.source.answers.empty()) {
+  if (!request.IsWhole(result)) {
     fmt::print("INTERRUPTED after {} of {} samples. So far:\n", result.samples, request.options.samples);
   }
   std::string left_out;
@@ -119,7 +114,7 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
                comparison.with_engine  ? "the analytic model and MuJoCo"
                : request.has_answers() ? "the description and the answers"
                                        : "the two descriptions",
-               DescribeTolerance(request), result.terms.size(), left_out);
+               request.DescribeTolerance(), result.terms.size(), left_out);
     return;
   }
   const Differences differences = SortDifferences(comparison);
@@ -131,7 +126,8 @@ void PrintVerdict(const ConsistencyRequest& request, const Comparison& compariso
     fmt::print("DISAGREE: {}", differences.real.front());
     if (differences.real.size() > 1) fmt::print("; and in {} more", differences.real.size() - 1);
     fmt::print("; everything else {}{}.\n",
-               differences.rounded.empty() ? "agrees to " + DescribeTolerance(request) : to_digits, left_out);
+               differences.rounded.empty() ? "agrees to " + request.DescribeTolerance() : to_digits,
+               left_out);
     for (size_t i = 1; i < differences.real.size(); ++i) fmt::print("  {}\n", differences.real[i]);
   }
   PrintHypotheses(comparison.hypotheses);
@@ -160,9 +156,9 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
   json["not_compared"] = comparison.not_compared;
   if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
   json["checks"] = Json::object();
-  for (const CheckRecord& record : result.constants.records)
-    json["checks"][record.name] = DescribeTerm(record, model);
-  for (const CheckRecord& record : result.terms) json["checks"][record.name] = DescribeTerm(record, model);
+  for (const auto* records : {&result.constants.records, &result.terms}) {
+    for (const CheckRecord& record : *records) json["checks"][record.name] = DescribeRecord(record, model);
+  }
   json["findings"] = Json::array();
   for (const ConstantFinding& finding : result.constants.findings) {
     json["findings"].push_back({{"check", finding.check},
@@ -198,9 +194,8 @@ std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comp
   for (JUnitCase& test : cases) {
     if (!test.failure.empty()) test.failure += likely;
   }
-  const bool is_whole = result.samples >= request.options.samples || !request.source.answers.empty();
   return WriteJUnit("dexcheck.consistency." + comparison.first.stem().string(), cases, result.seconds,
-                    is_whole ? "" : "interrupted");
+                    request.IsWhole(result) ? "" : "interrupted");
 }
 
 }  // namespace dexcheck::cli

@@ -1,39 +1,31 @@
 #pragma once
 
-// What consistency was asked, what it found, and how that is printed.
+// What is compared by consistency, what was found, and how that is printed.
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "harness/checks/consistency.h"
 #include "harness/checks/file_comparison.h"
-#include "harness/cli/commands.h"
-#include "harness/cli/tolerance_options.h"
+#include "harness/cli/comparison_options.h"
 
 namespace dexcheck::cli {
 
-/// What was asked.
-struct ConsistencyRequest {
-  std::string a, b;  ///< Two descriptions; none with --robot and --mjcf.
-  RobotFiles files;
+/// What is compared, at how many states.
+struct ConsistencyRequest : ComparisonRequest {
   AnswersSource source;  ///< What stands for B and answers terms.
-  std::vector<std::string> packages;
-  bool floating = false;
   ConsistencyOptions options;
-  std::string json_file;
-  std::string junit_file;
-  bool quiet = false;
-  ToleranceOptions judging;
 
   /// What stands for B answers terms, and is no description.
   [[nodiscard]] bool has_answers() const { return !source.program.empty() || !source.answers.empty(); }
-
-  /// The results themselves take standard output: a table would spoil them.
-  [[nodiscard]] bool PrintsJson() const { return json_file == "-"; }
+  /// Whether all states were compared; answers in files have their own.
+  [[nodiscard]] bool IsWhole(const ConsistencyResult& result) const {
+    return result.samples >= options.samples || !source.answers.empty();
+  }
 };
+
+/// A compared term or constant: its record, where it was worst, and the two values there.
+nlohmann::ordered_json DescribeRecord(const CheckRecord& record, const RobotModel& model);
 
 /// Large results first fail, then where to look: what a person reads.
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison);
@@ -45,7 +37,7 @@ std::string ToText(const ConsistencyRequest& request, const Comparison& comparis
 /// The same as a JUnit document.
 std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comparison);
 
-/// Their lines, shares and values.
+/// Their lines, fractions and values.
 nlohmann::ordered_json ListHypotheses(const std::vector<Hypothesis>& hypotheses);
 
 /// "  LINE; explains 100 %", and what each values line says below it.

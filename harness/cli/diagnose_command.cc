@@ -2,52 +2,33 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "controller/common/errors.h"
-#include "controller/common/text.h"
 #include "harness/base/interrupts.h"
-#include "harness/cli/commands.h"
 #include "harness/cli/consistency_report.h"
 #include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
 #include "harness/cli/terminal.h"
-#include "harness/cli/tolerance_options.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_extras.h"
 #include "harness/descriptions/join_names.h"
-#include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/read_description.h"
-#include "harness/descriptions/robot_file.h"
 #include "harness/diagnosis/diagnose.h"
 #include "harness/diagnosis/file_terms.h"
-#include "harness/engine/engine.h"
 #include "harness/engine/mjcf_file.h"
 
 namespace dexcheck::cli {
 namespace {
 
-struct DiagnoseRequest {
-  std::string a, b;  ///< Instead of --robot and --mjcf.
-  RobotFiles files;
+struct DiagnoseRequest : ComparisonRequest {
   DiagnosisOptions options;
-  ToleranceOptions judging;
   std::vector<std::string> ignore;
-  std::string json_file;
-  bool quiet = false;
 };
-
-/// To what two files agree.
-std::string DescribeAgreement(const DiagnoseRequest& request) {
-  const std::optional<double> tolerance = request.judging.Find();
-  return tolerance ? fmt::format("{:g}", *tolerance) : "rounding";
-}
 
 bool IsRepairedWholly(const Diagnosis& diagnosis) {
   return diagnosis.remaining_terms.empty() && diagnosis.remaining_constants.empty();
@@ -87,7 +68,7 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotS
   if (diagnosis.agrees) {
     fmt::print("{}\n",
                Wrap(fmt::format("AGREE: nothing to explain: {} and {} agree to {} at {} random states.", file,
-                                request.files.mjcf.filename().string(), DescribeAgreement(request),
+                                request.files.mjcf.filename().string(), request.DescribeTolerance(),
                                 request.options.samples),
                     2));
     return;
@@ -124,7 +105,7 @@ void Print(const DiagnoseRequest& request, const RobotModel& model, const RobotS
   }
   if (IsRepairedWholly(diagnosis)) {
     fmt::print("With {} the two agree to {}.\n", number == 1 ? "it repaired" : "these repaired",
-               DescribeAgreement(request));
+               request.DescribeTolerance());
   } else {
     PrintRemaining(request, model, diagnosis);
   }
@@ -169,13 +150,6 @@ std::string ToText(const DiagnoseRequest& request, const RobotSpec& written, con
   return json.dump(2) + "\n";
 }
 
-/// Puts A and B where --robot and --mjcf would stand.
-void SortFiles(DiagnoseRequest* request) {
-  if (request->a.empty()) return;
-  if (request->b.empty()) throw InputError("diagnose: two files must be given, got " + Quote(request->a));
-  request->files = {request->a, request->b};
-}
-
 void Require(bool is_right, const std::filesystem::path& file, const char* expected) {
   if (!is_right) throw InputError(file.string() + ": " + expected);
 }
@@ -198,33 +172,22 @@ RobotModel Complete(const DiagnoseRequest& request, RobotDescription robot, mjMo
   return RobotModel(robot.spec);
 }
 
-/// Faults of conventions; none when the MJCF is no description (of several free bodies).
-std::vector<Hypothesis> Explain(const DiagnoseRequest& request, const RobotDescription& robot,
-                                const mjModel& engine) {
-  try {
-    return ExplainDifference(robot, ReadMjcfDescription(engine, request.files.mjcf.string()),
-                             std::max(request.options.tolerance, kHypothesisTolerance));
-  } catch (const InputError&) {
-    return {};
-  }
-}
-
 int Run(DiagnoseRequest request) {
-  SortFiles(&request);
+  request.TakeFiles("diagnose");
   request.options.tolerance = request.judging.Find().value_or(0.0);
   const RobotDescription robot = ReadDescription(request.files.robot);
+  const DescriptionFile mjcf(request.files.mjcf);
   Require(robot.format != RobotFormat::kMjcf, request.files.robot,
           "must be a parameter file or a URDF to be repaired, is an MJCF (dexcheck import writes a parameter "
           "file from it)");
-  Require(FindFormat(request.files.mjcf) == RobotFormat::kMjcf, request.files.mjcf,
+  Require(mjcf.format() == RobotFormat::kMjcf, request.files.mjcf,
           "must be an MJCF, which is taken to be right (dexcheck consistency compares any two files)");
-  const MjModelPtr engine = LoadMjcf(request.files.mjcf);
+  const MjModelPtr engine = mjcf.CopyEngine();
   std::vector<std::string> notes;
   const RobotModel model = Complete(request, robot, engine.get(), &notes);
   RequireNoBalls(model, "in a diagnosis of single numbers (dexcheck consistency names likely faults)");
   CatchInterrupts();
-  std::optional<OutputFile> json;
-  if (!request.json_file.empty()) json.emplace(request.json_file);
+  ResultFile json(request.json_file);
   constexpr long kStages = 4;
   long stage = 0;
   ProgressBar bar("diagnosing", kStages, request.quiet);
@@ -240,9 +203,11 @@ int Run(DiagnoseRequest request) {
   // Faults of conventions first; what can only be moved shows no bodies to compare.
   const bool is_open = !diagnosis.agrees && !request.options.by_motion;
   std::vector<Hypothesis> hypotheses;
-  if (is_open) hypotheses = Explain(request, robot, *engine);
-  if (json) json->Write(ToText(request, terms.written(), diagnosis, hypotheses, notes));
-  if (request.json_file != "-") {
+  const std::optional<RobotDescription> right = mjcf.TryToDescribe();
+  if (is_open && right)
+    hypotheses = ExplainDifference(robot, *right, std::max(request.options.tolerance, kHypothesisTolerance));
+  json.Write([&] { return ToText(request, terms.written(), diagnosis, hypotheses, notes); });
+  if (!json.TakesStdout()) {
     if (!request.quiet) {
       for (const std::string& note : notes) fmt::print("{}\n", note);
     }
@@ -259,13 +224,8 @@ void AddDiagnoseCommand(Command app) {
   constexpr std::uint64_t kMaxSamples = 1000;
   const auto request = std::make_shared<DiagnoseRequest>();
   Command command = app.AddCommand("diagnose", "Say why model and engine disagree, and what would repair it");
-  const Option robot = AddRobotOptions(command, &request->files);
-  command
-      .AddOption("A", &request->a,
-                 "What may be wrong, instead of --robot and --mjcf: parameter file (TOML) or URDF")
-      .TypeName("FILE")
-      .Excludes(robot);
-  command.AddOption("B", &request->b, "What is right: MJCF").TypeName("FILE");
+  AddFileOptions(command, "What may be wrong, instead of --robot and --mjcf: parameter file (TOML) or URDF",
+                 "What is right: MJCF", request.get());
   AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
   command.AddFlag("--by-motion", &request->options.by_motion,
                   "Use axes, frames and forces only, not the bodies' masses and inertias in the MJCF");

@@ -2,18 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "controller/common/text.h"
 #include "harness/base/interrupts.h"
 #include "harness/checks/engine_comparison.h"
-#include "harness/checks/tolerance.h"
-#include "harness/cli/commands.h"
+#include "harness/cli/consistency_report.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/progress_bar.h"
@@ -26,7 +23,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct EngineComparisonRequest {
+struct EnginesRequest {
   std::filesystem::path robot;
   EngineComparisonOptions options;
   UrdfOptions urdf;
@@ -54,11 +51,11 @@ const CheckRecord* FindWorst(const ComparedPair& pair) {
 
 std::vector<std::string> NamesOf(const std::vector<size_t>& group, const EngineComparisonResult& result) {
   std::vector<std::string> names;
-  for (const size_t side : group) names.push_back(result.names[side]);
+  for (const size_t provider : group) names.push_back(result.names[provider]);
   return names;
 }
 
-void PrintTable(const EngineComparisonRequest& request, const RobotModel& model,
+void PrintTable(const EnginesRequest& request, const RobotModel& model,
                 const EngineComparisonResult& result) {
   fmt::print("{}: {}\n{} random states (seed {}), {} engines\n\n", model.name(),
              request.robot.filename().string(), result.samples, request.options.states.seed,
@@ -67,12 +64,11 @@ void PrintTable(const EngineComparisonRequest& request, const RobotModel& model,
   for (const std::string& absent : result.absent) fmt::print("{}\n", Wrap("  not compared: " + absent, 4));
   if (!result.notes.empty() || !result.absent.empty()) fmt::print("\n");
 
-  const auto letter = [](size_t side) { return std::string(1, static_cast<char>('A' + side)); };
+  const auto letter = [](size_t provider) { return std::string(1, static_cast<char>('A' + provider)); };
   const auto name = [&](const ComparedPair& pair) {
     return letter(pair.first) + " - " + letter(pair.second);
   };
-  for (size_t side = 0; side < result.names.size(); ++side)
-    fmt::print("{}  {}\n", letter(side), result.names[side]);
+  for (size_t i = 0; i < result.names.size(); ++i) fmt::print("{}  {}\n", letter(i), result.names[i]);
   std::vector<std::string> terms;
   for (const ComparedPair& pair : result.pairs) {
     for (const CheckRecord& record : pair.terms) {
@@ -107,7 +103,7 @@ void PrintTable(const EngineComparisonRequest& request, const RobotModel& model,
   fmt::print("\n{}\n", Wrap(legend, 0));
 }
 
-void PrintVerdict(const EngineComparisonRequest& request, const EngineComparisonResult& result) {
+void PrintVerdict(const EnginesRequest& request, const EngineComparisonResult& result) {
   if (result.samples < request.options.states.samples) {
     fmt::print("INTERRUPTED after {} of {} states. So far:\n", result.samples,
                request.options.states.samples);
@@ -123,9 +119,8 @@ void PrintVerdict(const EngineComparisonRequest& request, const EngineComparison
   for (const std::string& setting : result.settings) fmt::print("  {}\n", setting);
 }
 
-std::string ToText(const EngineComparisonRequest& request, const RobotModel& model,
+std::string ToText(const EnginesRequest& request, const RobotModel& model,
                    const EngineComparisonResult& result) {
-  const int base = model.num_base_velocities();
   Json json = {{"robot", request.robot.string()},
                {"verdict", result.Agrees() ? "pass" : "disagreement"},
                {"samples", result.samples},
@@ -142,14 +137,9 @@ std::string ToText(const EngineComparisonRequest& request, const RobotModel& mod
     Json entry = {{"first", result.names[pair.first]}, {"second", result.names[pair.second]}};
     entry["terms"] = Json::object();
     for (const CheckRecord& record : pair.terms) {
-      entry["terms"][record.name] = {{"max", record.worst},
-                                     {"digits", CountDigits(record.worst)},
-                                     {"pass", !record.failed},
-                                     {"compared", record.comparisons},
-                                     {"where", Describe(record.where, model, base)},
-                                     {"sample", static_cast<long>(record.at)},
-                                     {"first", record.model_value},
-                                     {"second", record.engine_value}};
+      Json& term = entry["terms"][record.name] = DescribeRecord(record, model);
+      term["first"] = record.model_value;
+      term["second"] = record.engine_value;
     }
     json["pairs"].push_back(entry);
   }
@@ -157,8 +147,8 @@ std::string ToText(const EngineComparisonRequest& request, const RobotModel& mod
 }
 
 /// A case for each pair and term.
-std::string WriteEngineComparisonJUnit(const EngineComparisonRequest& request, const RobotModel& model,
-                                       const EngineComparisonResult& result) {
+std::string WriteEnginesJUnit(const EnginesRequest& request, const RobotModel& model,
+                              const EngineComparisonResult& result) {
   std::vector<JUnitCase> cases;
   for (const ComparedPair& pair : result.pairs) {
     for (const CheckRecord& record : pair.terms) {
@@ -177,35 +167,33 @@ std::filesystem::path FindProgramsFolder() {
   return program.parent_path().parent_path() / "libexec/dexcheck";
 }
 
-int Run(EngineComparisonRequest request) {
+int Run(EnginesRequest request) {
   CatchInterrupts();
   request.options.tolerance = std::pow(10.0, -request.digits);
   request.options.programs_folder = FindProgramsFolder();
-  std::optional<OutputFile> json;
-  if (!request.json_file.empty()) json.emplace(request.json_file);
-  std::optional<OutputFile> junit;
-  if (!request.junit_file.empty()) junit.emplace(request.junit_file);
-  const RobotDescription robot = ReadDescription(request.robot, request.urdf);
+  ResultFile json(request.json_file);
+  ResultFile junit(request.junit_file);
+  const DescriptionFile file(request.robot, request.urdf);
+  const RobotDescription robot = file.Describe();
   const RobotModel model(robot.spec);
   ProgressBar bar("comparing", request.options.states.samples, request.quiet);
-  const EngineComparisonResult result =
-      RunEngineComparison(robot, request.robot, request.options, [&](long samples) {
-        bar.Update(samples);
-        return !IsInterrupted();
-      });
+  const EngineComparisonResult result = RunEngineComparison(file, robot, request.options, [&](long samples) {
+    bar.Update(samples);
+    return !IsInterrupted();
+  });
   bar.Finish();
   const bool is_whole = result.samples >= request.options.states.samples && !result.lacks_requested;
   ExitCode code = is_whole ? kSuccess : kFailure;
   if (!result.Agrees()) code = kDisagreement;
-  if (json) json->Write(ToText(request, model, result));
-  if (junit) junit->Write(WriteEngineComparisonJUnit(request, model, result));
-  if (request.json_file != "-") {
+  json.Write([&] { return ToText(request, model, result); });
+  junit.Write([&] { return WriteEnginesJUnit(request, model, result); });
+  if (!json.TakesStdout()) {
     if (!request.quiet) PrintTable(request, model, result);
     PrintVerdict(request, result);
   }
   if (code == kFailure)
     return ReportFailure(result.lacks_requested
-                             ? "a library that was asked for is not there"
+                             ? "a library that was requested is not there"
                              : fmt::format("only {} of {} states were compared", result.samples,
                                            request.options.states.samples));
   return code;
@@ -216,7 +204,7 @@ int Run(EngineComparisonRequest request) {
 void AddEngineComparisonCommand(Command app) {
   constexpr std::uint64_t kMaxSamples = 1000000;
   constexpr int kMostDigits = 15;
-  const auto request = std::make_shared<EngineComparisonRequest>();
+  const auto request = std::make_shared<EnginesRequest>();
   request->options.states.samples = 100;
   Command command =
       app.AddCommand("engines", "Compare one robot's terms in several physics engines, pair by pair");

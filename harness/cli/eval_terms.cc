@@ -9,63 +9,84 @@
 #include "controller/object/object_dynamics.h"
 #include "harness/cli/eval_contacts.h"
 #include "harness/cli/json_matrix.h"
+#include "harness/descriptions/analytic_provider.h"
 #include "harness/descriptions/base_convention.h"
-#include "harness/engine/engine_terms.h"
+#include "harness/descriptions/engine_provider.h"
 
 namespace dexcheck::cli {
 namespace {
 
-/// What model and engine have alike.
-struct Forces {
-  VectorXd C_bar_xi;
-  VectorXd gravity;
-  VectorXd friction;
-};
-
-void AddForces(const Forces& forces, Json* out) {
-  const VectorXd F_bar = forces.gravity + forces.friction;
-  (*out)["C_bar_xi"] = ToList(forces.C_bar_xi);
-  (*out)["gravity"] = ToList(forces.gravity);
-  (*out)["friction"] = ToList(forces.friction);
-  (*out)["F_bar"] = ToList(F_bar);
-  (*out)["bias"] = ToList(forces.C_bar_xi + F_bar);
+/// A term of a provider at the state set, of that shape.
+MatrixXd ReadTerm(DynamicsProvider* provider, Term term, Eigen::Index rows, Eigen::Index cols = 1) {
+  MatrixXd numbers = MatrixXd::Zero(rows, cols);
+  provider->Read(term, numbers);
+  return numbers;
 }
 
-void AddEnergyAndMomentum(const EnergyAndMomentum& energy, Json* out) {
-  (*out)["kinetic_energy"] = energy.kinetic;
-  (*out)["potential_energy"] = energy.potential;
-  (*out)["linear_momentum"] = ToList(energy.linear_momentum);
-  (*out)["angular_momentum"] = ToList(energy.angular_momentum);
-}
-
-/// `describe(frame)` gives a frame's pose and Jacobian.
-template <typename Describe>
-void AddFrames(const RobotModel& model, const Describe& describe, Json* out) {
+/// Of each frame its pose, J_f, and J_f_dot xi, which is the acceleration at constant xi in the frame's own
+/// axes without their turning: R^T d/dt (R v) - omega x v.
+void AddFrames(const RobotModel& model, const VectorXd& xi, DynamicsProvider* provider, Json* out) {
+  const auto count = static_cast<Eigen::Index>(model.frames().size());
+  const Eigen::Index n = xi.size();
+  const MatrixXd poses = ReadTerm(provider, Term::kFramePose, 12, count);
+  const MatrixXd J = ReadTerm(provider, Term::kJ, 6, n * count);
+  const MatrixXd accelerations = ReadTerm(provider, Term::kJDotXi, 6, count);
   Json frames = Json::object();
   Json tips = Json::array();
-  for (size_t i = 0; i < model.frames().size(); ++i) {
-    const Json& frame = frames[model.frames()[i].name] = describe(static_cast<int>(i));
-    if (model.frames()[i].sphere_radius) tips.push_back(frame.at("pose"));
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Frame& frame = model.frames()[static_cast<size_t>(i)];
+    Eigen::Matrix4d X = Eigen::Matrix4d::Identity();
+    X.topRows<3>() = poses.col(i).reshaped(3, 4);
+    const MatrixXd J_f = J.middleCols(i * n, n);
+    const Vector6d V = J_f * xi;
+    Vector6d J_f_dot_xi = accelerations.col(i);
+    J_f_dot_xi.head<3>() -= V.tail<3>().cross(V.head<3>());
+    frames[frame.name] = {{"pose", ToRows(X)}, {"J_f", ToRows(J_f)}, {"J_f_dot_xi", ToList(J_f_dot_xi)}};
+    if (frame.sphere_radius) tips.push_back(frames[frame.name].at("pose"));
   }
   (*out)["fingertip_pose"] = tips;
   (*out)["frames"] = frames;
 }
 
-void AddReducedTerms(const ModelTerms& terms, const VectorXd& xi, Json* out) {
-  (*out)["M_bar"] = ToRows(terms.M());
+/// What model and engine have alike, at the state set.
+void AddSharedTerms(const RobotModel& model, const VectorXd& xi, DynamicsProvider* provider, Json* out) {
+  const Eigen::Index n = xi.size();
+  const VectorXd coriolis = ReadTerm(provider, Term::kCBarXi, n);
+  const VectorXd gravity = ReadTerm(provider, Term::kGravity, n);
+  const VectorXd friction = ReadTerm(provider, Term::kFriction, n);
+  const VectorXd F_bar = gravity + friction;
+  (*out)["M_bar"] = ToRows(ReadTerm(provider, Term::kMBar, n, n));
+  (*out)["C_bar_xi"] = ToList(coriolis);
+  (*out)["gravity"] = ToList(gravity);
+  (*out)["friction"] = ToList(friction);
+  (*out)["F_bar"] = ToList(F_bar);
+  (*out)["bias"] = ToList(coriolis + F_bar);
+  (*out)["kinetic_energy"] = ReadTerm(provider, Term::kKineticEnergy, 1)(0, 0);
+  (*out)["potential_energy"] = ReadTerm(provider, Term::kPotentialEnergy, 1)(0, 0);
+  (*out)["linear_momentum"] = ToList(ReadTerm(provider, Term::kLinearMomentum, 3));
+  (*out)["angular_momentum"] = ToList(ReadTerm(provider, Term::kAngularMomentum, 3));
+  AddFrames(model, xi, provider, out);
+}
+
+/// The model's matrices, of which the engine has products alone.
+void AddMatrices(const ModelTerms& terms, const VectorXd& xi, Json* out) {
   (*out)["C_bar"] = ToRows(terms.C());
-  AddForces({terms.C() * xi, terms.gravity(), terms.friction()}, out);
-  AddEnergyAndMomentum(terms.CalcEnergyAndMomentum(), out);
   Matrix6Xd J(6, terms.size());
   Matrix6Xd J_dot(6, terms.size());
-  const auto describe = [&](int frame) {
-    terms.CalcFrameJacobian(frame, J, J_dot);
-    return Json{{"pose", ToRows(terms.CalcFramePose(frame).matrix())},
-                {"J_f", ToRows(J)},
-                {"J_f_dot", ToRows(J_dot)},
-                {"J_f_dot_xi", ToList(J_dot * xi)}};
-  };
-  AddFrames(terms.model(), describe, out);
+  for (size_t i = 0; i < terms.model().frames().size(); ++i) {
+    Json& frame = (*out)["frames"][terms.model().frames()[i].name];
+    terms.CalcFrameJacobian(static_cast<int>(i), J, J_dot);
+    frame["J_f_dot"] = ToRows(J_dot);
+    frame["J_f_dot_xi"] = ToList(J_dot * xi);
+  }
+}
+
+/// Of the robot alone.
+DynamicsState MakeState(const State& state) {
+  DynamicsState made;
+  made.q = state.q;
+  made.xi = state.xi;
+  return made;
 }
 
 /// M, C and F of (16), and for a differential drive the matrices of (2), (12), (13), (15), (17).
@@ -127,7 +148,12 @@ void AddModelTerms(const RobotModel& model, const State& state, Json* out) {
   ModelTerms terms(model, Coordinates::kReduced);
   terms.SetState(state.q, state.xi);
   terms.CalcDynamics();
-  AddReducedTerms(terms, state.xi, out);
+  RobotSpec robot = model.spec();
+  robot.object.reset();
+  AnalyticProvider provider(robot, "model");
+  provider.SetState(MakeState(state));
+  AddSharedTerms(model, state.xi, &provider, out);
+  AddMatrices(terms, state.xi, out);
   AddUnreducedTerms(model, state, out);
   if (model.base().type == BaseType::kFloating) AddPinocchioTerms(terms, state, out);
   try {
@@ -139,26 +165,10 @@ void AddModelTerms(const RobotModel& model, const State& state, Json* out) {
 }
 
 Json EvaluateEngineTerms(const Adapter& adapter, const State& state) {
-  EngineTerms terms(adapter, Coordinates::kReduced);
-  terms.SetState(state.q, state.xi);
+  EngineProvider provider(adapter, "engine");
+  provider.SetState(MakeState(state));
   Json out = Json::object();
-  out["M_bar"] = ToRows(terms.M());
-  AddForces({terms.coriolis(), terms.gravity(), terms.friction()}, &out);
-  AddEnergyAndMomentum(terms.energy_and_momentum(), &out);
-  const auto describe = [&](int frame) {
-    const Pose X = terms.FramePose(frame);
-    Matrix6Xd J = terms.CalcFrameJacobian(frame);
-    const EngineMotion motion = terms.FrameMotion(frame);
-    // From world axes to the frame's own: J_f = R^T J,  d/dt (R^T v) = R^T v_dot - omega_f x v_f
-    const Matrix3d R_T = X.linear().transpose();
-    J.topRows<3>() = R_T * J.topRows<3>();
-    J.bottomRows<3>() = R_T * J.bottomRows<3>();
-    const Vector6d V = J * state.xi;
-    Vector6d bias;
-    bias << R_T * motion.a - V.tail<3>().cross(V.head<3>()), R_T * motion.alpha;
-    return Json{{"pose", ToRows(X.matrix())}, {"J_f", ToRows(J)}, {"J_f_dot_xi", ToList(bias)}};
-  };
-  AddFrames(adapter.model(), describe, &out);
+  AddSharedTerms(adapter.model(), state.xi, &provider, &out);
   return out;
 }
 

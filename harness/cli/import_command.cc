@@ -21,8 +21,7 @@ struct ImportRequest {
   std::filesystem::path source;
   std::string out = "-";
   std::string json_file;
-  std::vector<std::string> packages;
-  bool floating = false;
+  UrdfOptions urdf;
   bool downgrade = false;
   bool motors = false;
 };
@@ -56,10 +55,7 @@ void WriteOut(const ImportRequest& request, const std::string& text) {
 }
 
 RobotDescription ReadSource(const ImportRequest& request) {
-  UrdfOptions options;
-  options.packages.assign(request.packages.begin(), request.packages.end());
-  options.floating = request.floating;
-  RobotDescription robot = ReadDescription(request.source, options);
+  RobotDescription robot = ReadDescription(request.source, request.urdf);
   if (robot.format != RobotFormat::kToml) return robot;
   throw InputError(request.source.string() + ": must be a URDF or an MJCF, is a parameter file already");
 }
@@ -108,10 +104,7 @@ void AddImportCommand(Command app) {
   command.AddOption("--out", &request->out, "File to write (- for standard output)")
       .TypeName("FILE.toml")
       .ShowDefault();
-  command.AddOption("--package", &request->packages, "Folder of a URDF's packages; its meshes are looked for")
-      .TypeName("PATH")
-      .Repeatable();
-  command.AddFlag("--floating", &request->floating, "The root of a URDF floats");
+  AddUrdfOptions(command, &request->urdf);
   command.AddFlag(
       "--downgrade", &request->downgrade,
       "Write an MJCF instead: a copy of a newer one for MuJoCo 2.2.2, without what has no effect on the "

@@ -37,6 +37,25 @@ class OutputFile {
   std::FILE* file_ = nullptr;
 };
 
+/// The file of an option such as --json, made before long work starts; none when the option is not given.
+class ResultFile {
+ public:
+  /// @param path empty for none. @throws InputError as OutputFile.
+  explicit ResultFile(const std::string& path) {
+    if (!path.empty()) file_.emplace(path);
+  }
+  /// Writes the text that a function makes, if there is a file.
+  template <typename MakeText>
+  void Write(const MakeText& make_text) {
+    if (file_) file_->Write(make_text());
+  }
+  /// The results take standard output: other text would spoil them.
+  [[nodiscard]] bool TakesStdout() const { return file_ && file_->is_stdout(); }
+
+ private:
+  std::optional<OutputFile> file_;
+};
+
 /// @throws InputError when the name says that the file is something else than an HTML page, such as
 /// "page.pdf".
 void RequirePageName(const std::filesystem::path& path);

@@ -23,7 +23,7 @@
 #include "harness/cli/run_report.h"
 #include "harness/cli/shipped_files.h"
 #include "harness/cli/terminal.h"
-#include "harness/cli/tolerance_options.h"
+#include "harness/cli/comparison_options.h"
 #include "harness/engine/machine.h"
 #include "harness/report/run_data.h"
 #include "harness/report/write_report.h"

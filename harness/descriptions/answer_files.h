@@ -1,6 +1,6 @@
 #pragma once
 
-// States written for a program that cannot be asked, and its answers read back.
+// States written for a program that runs elsewhere, and its answers read back.
 
 #include <filesystem>
 #include <map>

@@ -8,10 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include "harness/descriptions/constant_table.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/engine_only.h"
+#include "harness/descriptions/join_names.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/wheel_inertia.h"
 
 namespace dexcheck {
@@ -19,15 +22,13 @@ namespace {
 
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
-Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
-
 Location AtLink(int link) { return {Location::Kind::kLink, link, -1}; }
 Location AtJoint(int joint) { return {Location::Kind::kJoint, joint, -1}; }
 
 /// Numbers of two, one check after the other.
-class ConstantTable {
+class ConstantComparison {
  protected:
-  explicit ConstantTable(const RobotModel& model) : model_(model) {}
+  ConstantComparison(const RobotModel& model, ConstantChecks* result) : model_(model), result_(*result) {}
 
   /// Compares relative to the larger of the two, or to `scale` where zero is a proper value.
   void Compare(const std::string& check, const Location& where, double model, double engine,
@@ -39,9 +40,11 @@ class ConstantTable {
     const double size = std::max({std::abs(model), std::abs(engine), scale});
     const double error = record->Compare(model, engine, size > 0.0 ? size : 1.0, where, -1);
     if (error > kConstantRounding) {
-      result_.findings.push_back(
-          {check, Describe(where, model_, model_.num_base_velocities()), model, engine, where, entry_});
+      result_.findings.push_back({check, DescribeWhere(where), model, engine, where, entry_});
     }
+  }
+  [[nodiscard]] std::string DescribeWhere(const Location& where) const {
+    return Describe(where, model_, model_.num_base_velocities());
   }
   void CompareGravity(const Vector3d& other) {
     for (int k = 0; k < 3; ++k)
@@ -55,10 +58,21 @@ class ConstantTable {
               mass_of(link));
     }
   }
+  /// @param leader of `own`, as the other one counts joints.
+  void CompareCouplings(int joint, const JointCoupling& own, int leader, const JointCoupling& other) {
+    Compare(kCoupling, AtJoint(joint), leader, other.leader);
+    Compare(kCoupling, AtJoint(joint), own.multiplier, other.multiplier);
+    Compare(kCoupling, AtJoint(joint), own.offset, other.offset);
+  }
+  /// Only one of the two has it.
+  void AddCoupling(int joint, double model, double engine, const std::string& effect) {
+    result_.Add({kCoupling, DescribeWhere(AtJoint(joint)), model, engine, AtJoint(joint), 1, false, effect});
+  }
   [[nodiscard]] const Joint& JointOf(int joint) const { return model_.joints()[static_cast<size_t>(joint)]; }
 
+  static constexpr const char* kCoupling = "joint_coupling";
   const RobotModel& model_;
-  ConstantChecks result_;
+  ConstantChecks& result_;
 
  private:
   std::string last_check_;
@@ -67,21 +81,20 @@ class ConstantTable {
 };
 
 /// Two descriptions, in what both state.
-class DescriptionConstants : public ConstantTable {
+class DescriptionConstants : public ConstantComparison {
  public:
-  DescriptionConstants(const RobotModel& model, const RobotDescription& a, const RobotDescription& b)
-      : ConstantTable(model), a_(a), b_(b), b_of_a_(MatchJoints(a.spec, b.spec)) {}
+  DescriptionConstants(const RobotModel& model, const RobotDescription& a, const RobotDescription& b,
+                       ConstantChecks* result)
+      : ConstantComparison(model, result), a_(a), b_(b), b_of_a_(MatchJoints(a.spec, b.spec)) {}
 
-  ConstantChecks Run() {
+  void Run() {
     if (a_.states_gravity && b_.states_gravity) CompareGravity(b_.spec.gravity);
     const RobotModel other(b_.spec);
     CompareMasses([&](int link) { return link < 0 ? other.base_with_wheels().mass : Other(link).body.mass; });
-    CompareStated("joint_damping", &DescribedJoint::states_damping, {&Joint::damping});
-    CompareStated("joint_dry_friction", &DescribedJoint::states_dry_friction, {&Joint::dry_friction});
-    CompareStated("joint_armature", &DescribedJoint::states_armature, {&Joint::armature});
+    for (const DescribedConstant& constant : ListDescribedConstants())
+      CompareStated(constant.check, constant.states, {constant.value});
     CompareStated("joint_range", &DescribedJoint::states_range, {&Joint::lower, &Joint::upper});
     for (int i = 0; i < model_.num_joints(); ++i) CompareCoupling(i, JointOf(i).coupling, Other(i).coupling);
-    return std::move(result_);
   }
 
  private:
@@ -99,14 +112,10 @@ class DescriptionConstants : public ConstantTable {
   }
   void CompareCoupling(int joint, const std::optional<JointCoupling>& own,
                        const std::optional<JointCoupling>& other) {
-    constexpr const char* kCheck = "joint_coupling";
     if (own && other) {
-      Compare(kCheck, AtJoint(joint), b_of_a_[static_cast<size_t>(own->leader)], other->leader);
-      Compare(kCheck, AtJoint(joint), own->multiplier, other->multiplier);
-      Compare(kCheck, AtJoint(joint), own->offset, other->offset);
+      CompareCouplings(joint, *own, b_of_a_[static_cast<size_t>(own->leader)], *other);
     } else if (own || other) {
-      result_.Add({kCheck, Describe(AtJoint(joint), model_, model_.num_base_velocities()),
-                   own ? own->multiplier : 0.0, other ? other->multiplier : 0.0, AtJoint(joint), 1});
+      AddCoupling(joint, own ? own->multiplier : 0.0, other ? other->multiplier : 0.0, "");
     }
   }
 
@@ -116,12 +125,12 @@ class DescriptionConstants : public ConstantTable {
 };
 
 /// A model and the engine's.
-class EngineConstants : public ConstantTable {
+class EngineConstants : public ConstantComparison {
  public:
-  explicit EngineConstants(const Adapter& adapter)
-      : ConstantTable(adapter.model()), adapter_(adapter), engine_(adapter.engine()) {}
+  EngineConstants(const Adapter& adapter, ConstantChecks* result)
+      : ConstantComparison(adapter.model(), result), adapter_(adapter), engine_(adapter.engine()) {}
 
-  ConstantChecks Run() {
+  void Run() {
     CompareGravity(MapVector(engine_.opt.gravity));
     CompareMasses([&](int link) {
       double mass = 0.0;
@@ -133,23 +142,49 @@ class EngineConstants : public ConstantTable {
     if (!adapter_.wheels().empty()) CompareWheels();
     CompareFingertips();
     if (model_.object()) CompareObject(*model_.object());
-    CompareOtherJoints();
+    FindJointsOwn();
     FindEngineOnly(adapter_, &result_);
-    return std::move(result_);
+  }
+
+  std::vector<std::string> CompareJointCouplings(bool ignores) {
+    std::vector<std::string> only_there;
+    std::vector<std::string> constraints;
+    for (int i = 0; i < model_.num_joints(); ++i) {
+      const std::optional<JointCoupling>& own = JointOf(i).coupling;
+      const int id = adapter_.joint_ids()[static_cast<size_t>(i)];
+      const std::optional<JointCoupling> other = FindEngineCoupling(engine_, id);
+      if (other && (own || ignores))
+        constraints.push_back("constraint " +
+                              NameOf(engine_, mjOBJ_EQUALITY, FindCouplingConstraint(engine_, id)));
+      if (ignores || (!own && !other)) continue;
+      if (!own) {
+        only_there.push_back(JointOf(i).name);
+      } else if (!other) {
+        AddCoupling(i, own->multiplier, 0.0,
+                    "only " + model_.spec().source + " states it: it follows " + JointOf(own->leader).name);
+      } else {
+        const auto leader =
+            std::find(adapter_.joint_ids().begin(), adapter_.joint_ids().end(), other->leader);
+        const bool is_known = leader != adapter_.joint_ids().end();
+        const int index = is_known ? static_cast<int>(leader - adapter_.joint_ids().begin()) : -1;
+        CompareCouplings(i, *own, own->leader, {index, other->multiplier, other->offset});
+      }
+    }
+    TakeBackConstraints(constraints);
+    if (only_there.empty()) return {};
+    return {"coupled joints: only the MJCF couples " + JoinNames(only_there) +
+            "; terms are compared with all joints free"};
   }
 
  private:
   void CompareJoints() {
     const std::vector<int>& dofs = adapter_.joint_dofs();
-    for (int i = 0; i < model_.num_dofs(); ++i) {
-      const int joint = model_.joint_of_dof(i);
-      Compare("joint_damping", AtJoint(joint), JointOf(joint).damping,
-              engine_.dof_damping[dofs[static_cast<size_t>(i)]]);
-    }
-    for (int i = 0; i < model_.num_dofs(); ++i) {
-      const int joint = model_.joint_of_dof(i);
-      Compare("joint_armature", AtJoint(joint), JointOf(joint).armature,
-              engine_.dof_armature[dofs[static_cast<size_t>(i)]]);
+    for (const DescribedConstant& constant : ListDescribedConstants()) {
+      for (int i = 0; i < model_.num_dofs(); ++i) {
+        const int joint = model_.joint_of_dof(i);
+        Compare(constant.check, AtJoint(joint), JointOf(joint).*constant.value,
+                (engine_.*constant.engine)[dofs[static_cast<size_t>(i)]]);
+      }
     }
     for (int i = 0; i < model_.num_joints(); ++i) {
       const int id = adapter_.joint_ids()[static_cast<size_t>(i)];
@@ -157,6 +192,20 @@ class EngineConstants : public ConstantTable {
       Compare("joint_range", AtJoint(i), JointOf(i).lower, engine_.jnt_range[2 * id]);
       Compare("joint_range", AtJoint(i), JointOf(i).upper, engine_.jnt_range[2 * id + 1]);
     }
+  }
+
+  /// Constraints that the description has as couplings are not the engine's alone. The check goes with the
+  /// last of its findings.
+  void TakeBackConstraints(const std::vector<std::string>& constraints) {
+    constexpr const char* kCheck = "equality_constraint";
+    if (constraints.empty()) return;
+    std::erase_if(result_.findings, [&](const ConstantFinding& finding) {
+      return finding.check == kCheck &&
+             std::find(constraints.begin(), constraints.end(), finding.where) != constraints.end();
+    });
+    if (std::none_of(result_.findings.begin(), result_.findings.end(),
+                     [&](const ConstantFinding& finding) { return finding.check == kCheck; }))
+      std::erase_if(result_.records, [&](const CheckRecord& record) { return record.name == kCheck; });
   }
 
   void CompareWheels() {
@@ -316,64 +365,44 @@ class EngineConstants : public ConstantTable {
 
   [[nodiscard]] bool IsObject(int geom) const { return engine_.geom_bodyid[geom] == adapter_.object_body(); }
 
+  /// A joint of the engine's model, and what the analytic model knows of it.
+  struct OwnedJoint {
+    int id;
+    Location where;
+    JointRole role;
+  };
+  [[nodiscard]] std::vector<OwnedJoint> ListJoints() const {
+    std::vector<OwnedJoint> joints;
+    for (const int joint : adapter_.base_joints()) joints.push_back({joint, AtLink(-1), kFreeJoint});
+    for (size_t k = 0; k < adapter_.wheels().size(); ++k)
+      joints.push_back(
+          {adapter_.wheels()[k].joint, {Location::Kind::kWheel, static_cast<int>(k), -1}, kWheelJoint});
+    for (int i = 0; i < model_.num_joints(); ++i)
+      joints.push_back({adapter_.joint_ids()[static_cast<size_t>(i)], AtJoint(i), kRobotJoint});
+    const int object = adapter_.object_body();
+    for (int k = 0; object >= 0 && k < engine_.body_jntnum[object]; ++k)
+      joints.push_back({engine_.body_jntadr[object] + k, {Location::Kind::kObject, -1, -1}, kFreeJoint});
+    return joints;
+  }
+
   /// Joints that carry the base or the object: nothing holds or drives them. And springs, dry friction and
-  /// stops where the analytic model has none.
-  void CompareOtherJoints() {
+  /// stops where the analytic model has none; and a fluid.
+  void FindJointsOwn() {
     const size_t first_finding = result_.findings.size();
-    std::vector<std::pair<int, Location>> joints;
-    for (const int joint : adapter_.base_joints()) joints.emplace_back(joint, AtLink(-1));
-    const size_t own = joints.size();
-    for (size_t k = 0; k < adapter_.wheels().size(); ++k) {
-      joints.emplace_back(adapter_.wheels()[k].joint,
-                          Location{Location::Kind::kWheel, static_cast<int>(k), -1});
-    }
-    const size_t limitless = joints.size();
-    for (int i = 0; i < model_.num_joints(); ++i) {
-      joints.emplace_back(adapter_.joint_ids()[static_cast<size_t>(i)], AtJoint(i));
-    }
-    const size_t robots = joints.size();
-    if (adapter_.object_body() >= 0) {
-      const int first = engine_.body_jntadr[adapter_.object_body()];
-      for (int k = 0; k < engine_.body_jntnum[adapter_.object_body()]; ++k)
-        joints.emplace_back(first + k, Location{Location::Kind::kObject, -1, -1});
-    }
-    const auto each_dof = [&](int joint, const auto& compare) {
-      constexpr int kDofs[] = {6, 3, 1, 1};  // of a free joint, a ball, a slide, a hinge
-      const int first = engine_.jnt_dofadr[joint];
-      for (int dof = first; dof < first + kDofs[engine_.jnt_type[joint]]; ++dof) compare(dof);
-    };
-    for (size_t i = 0; i < joints.size(); ++i) {
-      const auto& [joint, where] = joints[i];
-      if (i < own || i >= robots) {
-        each_dof(joint, [&, at = where](int dof) {
-          Compare("joint_damping", at, 0.0, engine_.dof_damping[dof]);
-          Compare("joint_armature", at, 0.0, engine_.dof_armature[dof]);
-        });
+    const std::vector<OwnedJoint> joints = ListJoints();
+    for (const Constant& constant : ListConstants()) {
+      if (constant.part != EnginePart::kJoint || !constant.neutral) continue;
+      for (const OwnedJoint& joint : joints) {
+        if ((constant.roles & joint.role) == 0) continue;
+        if (constant.applies != nullptr && !constant.applies(engine_, joint.id)) continue;
+        for (const double number : ReadConstant(constant, engine_, joint.id))
+          Compare(constant.check, joint.where, *constant.neutral, number);
       }
-      if (i < limitless || i >= robots)
-        Compare("joint_limited", where, 0.0, engine_.jnt_limited[joint] != 0 ? 1.0 : 0.0);
-    }
-    for (const auto& [joint, where] : joints)
-      Compare("joint_spring", where, 0.0, engine_.jnt_stiffness[joint]);
-    for (const auto& [joint, where] : joints) {
-      const bool is_of_tree = where.kind == Location::Kind::kJoint;
-      const double own = is_of_tree ? model_.joints()[static_cast<size_t>(where.first)].dry_friction : 0.0;
-      each_dof(joint, [&, at = where](int dof) {
-        Compare("joint_dry_friction", at, own, engine_.dof_frictionloss[dof]);
-      });
-    }
-    for (const auto& [joint, where] : joints) {
-      if (engine_.jnt_limited[joint] != 0)
-        Compare("joint_limit_margin", where, 0.0, engine_.jnt_margin[joint]);
     }
     Compare("fluid", {}, 0.0, engine_.opt.density);
     Compare("fluid", {}, 0.0, engine_.opt.viscosity);
     NameBaseJoints(first_finding);
-    for (size_t i = first_finding; i < result_.findings.size(); ++i) {
-      ConstantFinding& finding = result_.findings[i];
-      finding.engine_only =
-          finding.check != "joint_dry_friction" || finding.location.kind != Location::Kind::kJoint;
-    }
+    for (size_t i = first_finding; i < result_.findings.size(); ++i) result_.findings[i].engine_only = true;
   }
 
   /// Says of findings at the base that they are about the joints that carry it, and says once what the six
@@ -420,11 +449,21 @@ void ConstantChecks::Add(ConstantFinding finding) {
   findings.push_back(std::move(finding));
 }
 
-ConstantChecks CheckConstants(const Adapter& adapter) { return EngineConstants(adapter).Run(); }
+ConstantChecks CheckConstants(const Adapter& adapter) {
+  ConstantChecks result;
+  EngineConstants(adapter, &result).Run();
+  return result;
+}
 
 ConstantChecks CheckConstants(const RobotDescription& a, const RobotDescription& b) {
   const RobotModel model(a.spec);
-  return DescriptionConstants(model, a, b).Run();
+  ConstantChecks result;
+  DescriptionConstants(model, a, b, &result).Run();
+  return result;
+}
+
+std::vector<std::string> CheckCouplings(const Adapter& adapter, bool ignores, ConstantChecks* constants) {
+  return EngineConstants(adapter, constants).CompareJointCouplings(ignores);
 }
 
 void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records) {

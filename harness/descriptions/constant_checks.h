@@ -57,6 +57,11 @@ ConstantChecks CheckConstants(const Adapter& adapter);
 /// @param a, b as CompleteEachOther left them.
 ConstantChecks CheckConstants(const RobotDescription& a, const RobotDescription& b);
 
+/// Compares couplings of joints, in the place of the constant checks' findings that the engine has them.
+/// @param ignores none is a disagreement. @return a note on those that only the engine has, which are not
+/// compared.
+std::vector<std::string> CheckCouplings(const Adapter& adapter, bool ignores, ConstantChecks* constants);
+
 /// Judges checks by a relative tolerance where that is wider than their bound.
 void JudgeByTolerance(double tolerance, std::vector<CheckRecord>* records);
 /// The same of a result, whose findings are then those that the tolerance leaves.

@@ -10,6 +10,7 @@
 #include "controller/common/text.h"
 #include "controller/dynamics/model_terms.h"
 #include "harness/descriptions/alike_names.h"
+#include "harness/descriptions/constant_table.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/random_states.h"
@@ -17,18 +18,6 @@
 
 namespace dexcheck {
 namespace {
-
-/// A constant of joints that acts on the motion.
-struct JointConstant {
-  const char* word;  ///< Of --ignore, and in notes.
-  const char* check;
-  bool DescribedJoint::*states;
-  double Joint::*value;
-};
-constexpr JointConstant kJointConstants[] = {
-    {"armature", "joint_armature", &DescribedJoint::states_armature, &Joint::armature},
-    {"damping", "joint_damping", &DescribedJoint::states_damping, &Joint::damping},
-    {"friction", "joint_dry_friction", &DescribedJoint::states_dry_friction, &Joint::dry_friction}};
 
 /// What each of the two takes from the other.
 class Matching {
@@ -45,7 +34,7 @@ class Matching {
     RequireSameMechanism();
     TakeGravity();
     TakeNames();
-    for (const JointConstant& constant : kJointConstants)
+    for (const DescribedConstant& constant : ListDescribedConstants())
       Ignores(constant.word, ignore_) ? Ignore(constant) : Take(constant);
     if (Ignores("coupling", ignore_)) IgnoreCouplings();
     TakeRanges();
@@ -141,7 +130,7 @@ class Matching {
     }
   }
 
-  void Take(const JointConstant& constant) {
+  void Take(const DescribedConstant& constant) {
     ForJoints([&](size_t i, size_t j) {
       const bool in_a = a_.joints[i].*constant.states;
       if (in_a == b_.joints[j].*constant.states) return;
@@ -160,7 +149,7 @@ class Matching {
     NoteUnstated(constant.check, constant.states);
   }
 
-  void Ignore(const JointConstant& constant) {
+  void Ignore(const DescribedConstant& constant) {
     std::vector<std::string> names;
     ForJoints([&](size_t i, size_t j) {
       const double own = a_.spec.joints[i].*constant.value;
@@ -262,9 +251,8 @@ Completion CompleteFromEngine(const mjModel& engine, const std::string& source, 
       const int id = FindByName(engine, mjOBJ_JOINT, joint.name);
       if (id < 0) continue;
       const int dof = engine.jnt_dofadr[id];
-      joint.armature = engine.dof_armature[dof];
-      joint.damping = engine.dof_damping[dof];
-      joint.dry_friction = engine.dof_frictionloss[dof];
+      for (const DescribedConstant& constant : ListDescribedConstants())
+        joint.*constant.value = (engine.*constant.engine)[dof];
     }
   }
   Completion completion = CompleteEachOther(&other, robot, ignore);
@@ -277,24 +265,20 @@ Completion CompleteFromEngine(const mjModel& engine, const std::string& source, 
 }
 
 void TakeIgnored(const RobotSpec& robot, const std::vector<std::string>& ignore, mjModel* engine) {
-  for (const JointConstant& constant : kJointConstants) {
-    mjtNum* const values = constant.value == &Joint::armature       ? engine->dof_armature
-                           : constant.value == &Joint::damping      ? engine->dof_damping
-                           : constant.value == &Joint::dry_friction ? engine->dof_frictionloss
-                                                                    : nullptr;
-    if (values == nullptr || !Ignores(constant.word, ignore)) continue;
+  for (const DescribedConstant& constant : ListDescribedConstants()) {
+    if (!Ignores(constant.word, ignore)) continue;
     for (const Joint& joint : robot.joints) {
       const int id = FindByName(*engine, mjOBJ_JOINT, joint.name);
       if (id < 0) continue;
       for (int k = 0; k < CountVelocities(joint.type); ++k)
-        values[engine->jnt_dofadr[id] + k] = joint.*constant.value;
+        (engine->*constant.engine)[engine->jnt_dofadr[id] + k] = joint.*constant.value;
     }
   }
 }
 
 void UndoOneSided(const std::vector<ConstantFinding>& one_sided, RobotSpec* spec) {
   for (const ConstantFinding& finding : one_sided) {
-    for (const JointConstant& constant : kJointConstants) {
+    for (const DescribedConstant& constant : ListDescribedConstants()) {
       if (finding.check == constant.check)
         spec->joints[static_cast<size_t>(finding.location.first)].*constant.value = finding.model;
     }
@@ -323,15 +307,8 @@ void AddOneSided(const RobotModel& model, const std::vector<ConstantFinding>& on
     const int first = base + model.dof(finding.location.first);
     const double M_jj = inertia.segment(first, CountVelocities(joint.type)).minCoeff();
     const double value = std::max(finding.model, finding.engine);
-    const bool turns = joint.type != JointType::kPrismatic;
-    if (finding.check == "joint_armature") {
-      finding.effect +=
-          fmt::format(": M of {} by up to {:.2g} %", joint.name, 100.0 * value / (M_jj - value));
-    } else if (finding.check == "joint_damping") {
-      finding.effect += fmt::format(": rates of {} decay within {:.2g} s", joint.name, M_jj / value);
-    } else {
-      finding.effect += fmt::format(": {} is slowed by up to {:.2g} {}", joint.name, value / M_jj,
-                                    turns ? "rad/s^2" : "m/s^2");
+    for (const DescribedConstant& constant : ListDescribedConstants()) {
+      if (finding.check == constant.check) finding.effect += constant.describe_effect(joint, value, M_jj);
     }
     finding.where = Describe(finding.location, model, base);
     constants->Add(std::move(finding));

@@ -1,6 +1,6 @@
 #pragma once
 
-// Whatever tells the terms of a robot's dynamics at a state: an analytic model, the engine, a program,
+// Whatever has the terms of a robot's dynamics at a state: an analytic model, the engine, a program,
 // answers in files.
 
 #include <optional>
@@ -74,7 +74,7 @@ class DynamicsProvider {
   [[nodiscard]] virtual const std::string& name() const = 0;
   /// Evaluates what the terms are made of.
   virtual void SetState(const DynamicsState& state) = 0;
-  /// Whether it tells this term at the state set. What one of two providers lacks is not compared.
+  /// Whether it has this term at the state set. What one of two providers lacks is not compared.
   [[nodiscard]] virtual bool Has(Term term) const = 0;
   /// Writes a term that it has, in the order of Term, at the state set. `out` has the term's shape, and at
   /// first zeros: entries that are always zero need not be written.

@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
-#include "harness/descriptions/description_check.h"
-#include "harness/descriptions/engine_coupling.h"
+#include "harness/descriptions/constant_table.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mujoco_release.h"
@@ -33,156 +32,97 @@ struct Part {
   std::vector<Number> numbers;
   std::vector<std::string> names;
 
-  void Add(const char* check, const std::string& where, const mjtNum* values, int count) {
-    for (int k = 0; k < count; ++k)
+  template <typename Values>
+  void Add(const char* check, const std::string& where, const Values& values) {
+    const size_t count = std::size(values);
+    for (size_t k = 0; k < count; ++k)
       numbers.push_back({check, count == 1 ? where : where + fmt::format("[{}]", k), values[k]});
   }
-  void Add(const char* check, const std::string& where, double value) { Add(check, where, &value, 1); }
+  void AddTriple(const char* check, const std::string& where, const mjtNum* values) {
+    Add(check, where, std::span(values, 3));
+  }
 };
 
-std::string NameOfTarget(const mjModel& m, int actuator) {
+/// What the table has of a part; of joints those constants that belong to the role and stand in no
+/// description.
+Part ReadPart(const mjModel& m, EnginePart kind, int id, unsigned role) {
+  Part part;
+  for (const Constant& constant : ListConstants()) {
+    if (constant.part == kind && (constant.roles & role) != 0)
+      part.Add(constant.check, constant.name, ReadConstant(constant, m, id));
+  }
+  return part;
+}
+
+void MakeIdle(EnginePart kind, int id, unsigned role, mjModel* m) {
+  for (const Constant& constant : ListConstants()) {
+    if (constant.part == kind && (constant.roles & role) != 0) MakeNeutral(constant, id, m);
+  }
+}
+
+std::vector<std::string> ListTargets(const mjModel& m, int actuator) {
   const int* const targets = m.actuator_trnid + 2 * actuator;
   switch (m.actuator_trntype[actuator]) {
     case mjTRN_JOINT:
     case mjTRN_JOINTINPARENT:
-      return NameOf(m, mjOBJ_JOINT, targets[0]);
+      return {NameOf(m, mjOBJ_JOINT, targets[0])};
     case mjTRN_TENDON:
-      return NameOf(m, mjOBJ_TENDON, targets[0]);
+      return {NameOf(m, mjOBJ_TENDON, targets[0])};
     case mjTRN_SLIDERCRANK:
-      return NameOf(m, mjOBJ_SITE, targets[0]) + " " + NameOf(m, mjOBJ_SITE, targets[1]);
+      return {NameOf(m, mjOBJ_SITE, targets[0]), NameOf(m, mjOBJ_SITE, targets[1])};
     case mjTRN_SITE:
-      return NameOf(m, mjOBJ_SITE, targets[0]);
+      return {NameOf(m, mjOBJ_SITE, targets[0])};
     case mjTRN_BODY:
-      return NameOf(m, mjOBJ_BODY, targets[0]);
+      return {NameOf(m, mjOBJ_BODY, targets[0])};
     default:
-      return "";
+      return {};
   }
 }
 
-Part ReadActuator(const mjModel& m, int i) {
-  Part part;
-  part.names.push_back(NameOfTarget(m, i));
-  part.Add("motor_transmission", "transmission", m.actuator_trntype[i]);
-  part.Add("motor_transmission", "gear", m.actuator_gear + 6 * i, 6);
-  part.Add("motor_dynamics", "dyntype", m.actuator_dyntype[i]);
-  part.Add("motor_dynamics", "dynprm", m.actuator_dynprm + mjNDYN * i, mjNDYN);
-  part.Add("motor_gain", "gaintype", m.actuator_gaintype[i]);
-  part.Add("motor_gain", "gainprm", m.actuator_gainprm + mjNGAIN * i, mjNGAIN);
-  part.Add("motor_bias", "biastype", m.actuator_biastype[i]);
-  part.Add("motor_bias", "biasprm", m.actuator_biasprm + mjNBIAS * i, mjNBIAS);
-  return part;
+std::vector<std::string> ListTied(const mjModel& m, int constraint) {
+  const int type = m.eq_type[constraint];
+  const mjtObj object = type == mjEQ_JOINT ? mjOBJ_JOINT : type == mjEQ_TENDON ? mjOBJ_TENDON : mjOBJ_BODY;
+  std::vector<std::string> names;
+  for (const int id : {m.eq_obj1id[constraint], m.eq_obj2id[constraint]})
+    names.push_back(id < 0 ? std::string() : NameOf(m, object, id));
+  return names;
 }
 
-bool IsPlainMotor(const mjModel& m, int i) {
-  const int transmission = m.actuator_trntype[i];
-  return (transmission == mjTRN_JOINT || transmission == mjTRN_JOINTINPARENT) &&
-         m.actuator_dyntype[i] == mjDYN_NONE && m.actuator_gaintype[i] == mjGAIN_FIXED &&
-         m.actuator_gainprm[mjNGAIN * i] == 1.0 && m.actuator_biastype[i] == mjBIAS_NONE &&
-         m.actuator_gear[6 * i] != 0.0;
-}
-
-void MakePlainMotor(int i, mjModel* m) {
-  m->actuator_trntype[i] = mjTRN_JOINT;
-  m->actuator_dyntype[i] = mjDYN_NONE;
-  m->actuator_gaintype[i] = mjGAIN_FIXED;
-  m->actuator_gainprm[mjNGAIN * i] = 1.0;
-  m->actuator_biastype[i] = mjBIAS_NONE;
-  m->actuator_gear[6 * i] = 1.0;
-}
-
-Part ReadTendon(const mjModel& m, int i) {
-  Part part;
-  part.Add("tendon_spring", "stiffness", m.tendon_stiffness[i]);
-  part.Add("tendon_spring", "springlength", m.tendon_lengthspring + 2 * i, 2);
-  part.Add("tendon_damping", "damping", m.tendon_damping[i]);
-  part.Add("tendon_friction", "frictionloss", m.tendon_frictionloss[i]);
-  part.Add("tendon_limit", "limited", m.tendon_limited[i]);
-  part.Add("tendon_limit", "range", m.tendon_range + 2 * i, 2);
-  for (int k = 0; k < m.tendon_num[i]; ++k) {
-    const int wrap = m.tendon_adr[i] + k;
+void AddPath(const mjModel& m, int tendon, Part* part) {
+  constexpr const char* kCheck = "tendon_path";
+  for (int k = 0; k < m.tendon_num[tendon]; ++k) {
+    const int wrap = m.tendon_adr[tendon] + k;
     const int object = m.wrap_objid[wrap];
     const std::string where = fmt::format("point {} of its path", k);
-    part.Add("tendon_path", where, m.wrap_type[wrap]);
+    part->Add(kCheck, where, std::vector<double>{static_cast<double>(m.wrap_type[wrap])});
     switch (m.wrap_type[wrap]) {
-      case mjWRAP_JOINT:
-        part.names.push_back(NameOf(m, mjOBJ_JOINT, object));
-        part.Add("tendon_path", where, m.wrap_prm[wrap]);  // its coefficient
-        break;
       case mjWRAP_SITE:
-        part.names.push_back(NameOf(m, mjOBJ_SITE, object));
-        part.Add("tendon_path", where, m.site_pos + 3 * object, 3);
+        part->names.push_back(NameOf(m, mjOBJ_SITE, object));
+        part->AddTriple(kCheck, where, m.site_pos + 3 * object);
         break;
       case mjWRAP_SPHERE:
       case mjWRAP_CYLINDER:
-        part.names.push_back(NameOf(m, mjOBJ_GEOM, object));
-        part.Add("tendon_path", where, m.geom_pos + 3 * object, 3);
-        part.Add("tendon_path", where, m.geom_quat + 4 * object, 4);
-        part.Add("tendon_path", where, m.geom_size + 3 * object, 3);
+        part->names.push_back(NameOf(m, mjOBJ_GEOM, object));
+        part->AddTriple(kCheck, where, m.geom_pos + 3 * object);
+        part->Add(kCheck, where, std::span<const mjtNum>(m.geom_quat + 4 * object, 4));
+        part->AddTriple(kCheck, where, m.geom_size + 3 * object);
         break;
-      default:
-        part.Add("tendon_path", where, m.wrap_prm[wrap]);  // of a pulley
+      case mjWRAP_JOINT:
+        part->names.push_back(NameOf(m, mjOBJ_JOINT, object));
+        [[fallthrough]];
+      default:  // a joint's coefficient, or a pulley's divisor
+        part->Add(kCheck, where, std::vector<double>{m.wrap_prm[wrap]});
     }
   }
+}
+
+/// A part with all that is compared of it.
+Part ReadWhole(const mjModel& m, EnginePart kind, int id, unsigned role) {
+  Part part = ReadPart(m, kind, id, role);
+  if (kind == EnginePart::kActuator) part.names = ListTargets(m, id);
+  if (kind == EnginePart::kConstraint) part.names = ListTied(m, id);
+  if (kind == EnginePart::kTendon) AddPath(m, id, &part);
   return part;
-}
-
-void MakeIdleTendon(int i, mjModel* m) {
-  m->tendon_stiffness[i] = 0.0;
-  m->tendon_damping[i] = 0.0;
-  m->tendon_frictionloss[i] = 0.0;
-  m->tendon_limited[i] = 0;
-}
-
-Part ReadConstraint(const mjModel& m, int i) {
-  Part part;
-  const int type = m.eq_type[i];
-  const mjtObj object = type == mjEQ_JOINT ? mjOBJ_JOINT : type == mjEQ_TENDON ? mjOBJ_TENDON : mjOBJ_BODY;
-  for (const int id : {m.eq_obj1id[i], m.eq_obj2id[i]})
-    part.names.push_back(id < 0 ? std::string() : NameOf(m, object, id));
-  part.Add("equality_constraint", "type", type);
-  part.Add("equality_constraint", "active", GetEqualityActive(m)[i]);
-  part.Add("equality_constraint", "data", m.eq_data + mjNEQDATA * i, mjNEQDATA);
-  return part;
-}
-
-/// Sizes of a joint in qpos and qvel.
-int CountPositions(int type) { return type == mjJNT_FREE ? 7 : type == mjJNT_BALL ? 4 : 1; }
-int CountDofs(int type) { return type == mjJNT_FREE ? 6 : type == mjJNT_BALL ? 3 : 1; }
-
-/// Of a joint of the robot: what a description has no place for.
-Part ReadSpring(const mjModel& m, int joint) {
-  Part part;
-  part.Add("joint_spring", "stiffness", m.jnt_stiffness[joint]);
-  mjtNum rest[7] = {};  // of a spring; without one it says nothing
-  const int count = CountPositions(m.jnt_type[joint]);
-  if (m.jnt_stiffness[joint] != 0.0) mju_copy(rest, m.qpos_spring + m.jnt_qposadr[joint], count);
-  part.Add("joint_spring", "springref", rest, count);
-  part.Add("joint_limit_margin", "margin", m.jnt_limited[joint] != 0 ? m.jnt_margin[joint] : 0.0);
-  return part;
-}
-
-void RemoveSpring(int joint, mjModel* m) {
-  m->jnt_stiffness[joint] = 0.0;
-  m->jnt_margin[joint] = 0.0;
-}
-
-/// Of a joint that carries the base, which nothing should hold.
-Part ReadBaseJoint(const mjModel& m, int joint) {
-  Part part = ReadSpring(m, joint);
-  const int dof = m.jnt_dofadr[joint];
-  const int count = CountDofs(m.jnt_type[joint]);
-  part.Add("joint_damping", "damping", m.dof_damping + dof, count);
-  part.Add("joint_armature", "armature", m.dof_armature + dof, count);
-  part.Add("joint_dry_friction", "frictionloss", m.dof_frictionloss + dof, count);
-  part.Add("joint_limited", "limited", m.jnt_limited[joint]);
-  return part;
-}
-
-void FreeBaseJoint(int joint, mjModel* m) {
-  RemoveSpring(joint, m);
-  for (mjtNum* const values : {m->dof_damping, m->dof_armature, m->dof_frictionloss})
-    mju_zero(values + m->jnt_dofadr[joint], CountDofs(m->jnt_type[joint]));
-  m->jnt_limited[joint] = 0;
 }
 
 class ExtrasComparison {
@@ -193,9 +133,9 @@ class ExtrasComparison {
 
   void Run() {
     CompareJoints();
-    CompareByName(mjOBJ_ACTUATOR, "actuator", a_.nu, ReadActuator, MakePlainMotor);
-    CompareByName(mjOBJ_TENDON, "tendon", a_.ntendon, ReadTendon, MakeIdleTendon);
-    CompareConstraints();
+    CompareByName(EnginePart::kActuator, mjOBJ_ACTUATOR, "actuator");
+    CompareByName(EnginePart::kTendon, mjOBJ_TENDON, "tendon");
+    CompareByName(EnginePart::kConstraint, mjOBJ_EQUALITY, "constraint");
     const int disabled = a_.opt.disableflags & b_.opt.disableflags;
     const int enabled = a_.opt.enableflags & b_.opt.enableflags;
     for (mjModel* const m : {&a_, &b_}) {
@@ -223,57 +163,42 @@ class ExtrasComparison {
       Compare(a.numbers[k].check, what + a.numbers[k].where, a.numbers[k].value, b.numbers[k].value);
   }
 
-  /// Parts of one kind that both have: compared, then made idle in both.
-  template <typename Read, typename MakeIdle>
-  void CompareByName(mjtObj type, const std::string& kind, EngineSize count, const Read& read,
-                     const MakeIdle& make_idle) {
-    for (int i = 0; i < count; ++i) {
-      const std::string name = NameOf(a_, type, i);
-      const int other = FindByName(type, name);
-      if (other < 0) continue;
-      Compare(fmt::format("{} {}", kind, name), read(a_, i), read(b_, other));
-      make_idle(i, &a_);
-      make_idle(other, &b_);
-    }
+  /// Compared, then made idle in both.
+  void CompareParts(const std::string& name, EnginePart kind, int a, int b, unsigned role) {
+    Compare(name, ReadWhole(a_, kind, a, role), ReadWhole(b_, kind, b, role));
+    MakeIdle(kind, a, role, &a_);
+    MakeIdle(kind, b, role, &b_);
   }
 
-  /// In the second model; those without a name by their number.
-  [[nodiscard]] int FindByName(mjtObj type, const std::string& name) const {
-    const EngineSize count = type == mjOBJ_ACTUATOR ? b_.nu : type == mjOBJ_TENDON ? b_.ntendon : b_.neq;
-    for (int i = 0; i < count; ++i) {
-      if (NameOf(b_, type, i) == name) return i;
+  [[nodiscard]] static EngineSize CountOf(const mjModel& m, mjtObj type) {
+    return type == mjOBJ_ACTUATOR ? m.nu : type == mjOBJ_TENDON ? m.ntendon : m.neq;
+  }
+
+  /// Parts of one kind that both have; those without a name by their number. Not couplings of joints.
+  void CompareByName(EnginePart kind, mjtObj type, const std::string& word) {
+    const auto is_coupling = [&](const mjModel& m, int id) {
+      return kind == EnginePart::kConstraint && m.eq_type[id] == mjEQ_JOINT &&
+             FindCouplingConstraint(m, m.eq_obj1id[id]) == id;
+    };
+    for (int a = 0; a < CountOf(a_, type); ++a) {
+      const std::string name = NameOf(a_, type, a);
+      for (int b = 0; b < CountOf(b_, type); ++b) {
+        if (NameOf(b_, type, b) != name) continue;
+        if (!is_coupling(a_, a) && !is_coupling(b_, b))
+          CompareParts(word + " " + name, kind, a, b, kRobotJoint);
+        break;
+      }
     }
-    return -1;
   }
 
   void CompareJoints() {
-    const auto compare = [&](int a, int b, const auto& read, const auto& make_idle) {
-      Compare("joint " + NameOf(b_, mjOBJ_JOINT, b), read(a_, a), read(b_, b));
-      make_idle(a, &a_);
-      make_idle(b, &b_);
+    const auto compare = [&](const std::vector<int>& a, const std::vector<int>& b, JointRole role) {
+      for (size_t i = 0; i < a.size(); ++i)
+        CompareParts("joint " + NameOf(b_, mjOBJ_JOINT, b[i]), EnginePart::kJoint, a[i], b[i], role);
     };
-    for (size_t i = 0; i < adapter_a_.joint_ids().size(); ++i) {
-      compare(adapter_a_.joint_ids()[i], adapter_b_.joint_ids()[i], ReadSpring, RemoveSpring);
-    }
-    const std::vector<int>& base_a = adapter_a_.base_joints();
-    const std::vector<int>& base_b = adapter_b_.base_joints();
-    if (base_a.size() != base_b.size()) return;
-    for (size_t i = 0; i < base_a.size(); ++i) compare(base_a[i], base_b[i], ReadBaseJoint, FreeBaseJoint);
-  }
-
-  /// All but couplings of joints.
-  void CompareConstraints() {
-    const auto is_coupling = [](const mjModel& m, int eq) {
-      return m.eq_type[eq] == mjEQ_JOINT && FindCouplingConstraint(m, m.eq_obj1id[eq]) == eq;
-    };
-    for (int i = 0; i < a_.neq; ++i) {
-      const std::string name = NameOf(a_, mjOBJ_EQUALITY, i);
-      const int other = FindByName(mjOBJ_EQUALITY, name);
-      if (other < 0 || is_coupling(a_, i) || is_coupling(b_, other)) continue;
-      Compare("constraint " + name, ReadConstraint(a_, i), ReadConstraint(b_, other));
-      GetEqualityActive(a_)[i] = 0;
-      GetEqualityActive(b_)[other] = 0;
-    }
+    compare(adapter_a_.joint_ids(), adapter_b_.joint_ids(), kRobotJoint);
+    if (adapter_a_.base_joints().size() == adapter_b_.base_joints().size())
+      compare(adapter_a_.base_joints(), adapter_b_.base_joints(), kFreeJoint);
   }
 
   const Adapter& adapter_a_;
@@ -288,24 +213,26 @@ class ExtrasComparison {
 std::optional<std::string> SetAsideMotors(const std::string& source, mjModel* engine) {
   std::vector<std::string> motors;
   for (int i = 0; i < engine->nu; ++i) {
-    if (IsPlainMotor(*engine, i)) continue;
+    const auto properties = ReadMotor(*engine, i);
+    if (std::all_of(properties.begin(), properties.end(),
+                    [](const MotorProperty& property) { return property.value == property.plain; }))
+      continue;
     motors.push_back(NameOf(*engine, mjOBJ_ACTUATOR, i));
-    MakePlainMotor(i, engine);
+    MakeIdle(EnginePart::kActuator, i, kRobotJoint, engine);
   }
   if (motors.empty()) return std::nullopt;
   return "motors: only " + source +
          " says how they make their forces (servos, muscles, transmissions): " + JoinNames(motors);
 }
 
-Extras CompareExtras(const RobotDescription& first, const mjModel& first_engine, const std::string& file,
+Extras CompareExtras(const RobotDescription& first, MjModelPtr first_engine, const std::string& file,
                      const Adapter& second, mjModel* engine) {
-  const MjModelPtr own_engine(mj_copyModel(nullptr, &first_engine));
   const RobotModel own_model(first.spec);
-  const Adapter own(own_model, *own_engine, file);
+  const Adapter own(own_model, *first_engine, file);
   Extras extras;
-  ExtrasComparison(own, own_engine.get(), second, engine, &extras.differences).Run();
+  ExtrasComparison(own, first_engine.get(), second, engine, &extras.differences).Run();
   extras.of_first = CheckConstants(own);
-  CheckDescription(first, own, &extras.of_first);
+  CheckCouplings(own, /*ignores=*/false, &extras.of_first);
   return extras;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// What an MJCF has besides the mechanism that a description tells of it: motors, springs, tendons,
+// What an MJCF has besides the mechanism that a description states: motors, springs, tendons,
 // constraints, flags, a fluid, and whatever acts on the joint that carries a floating base.
 
 #include <mujoco/mujoco.h>
@@ -11,6 +11,7 @@
 #include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/robot_description.h"
 #include "harness/engine/adapter.h"
+#include "harness/engine/engine.h"
 
 namespace dexcheck {
 
@@ -29,11 +30,11 @@ struct Extras {
 /// checks finds there what the first one lacks. Couplings of joints (equality/joint) stay.
 /// @param first as it is read from `file`, whose model is `first_engine`, before names are taken over.
 /// @param second of the same joints in the same order; `engine` is its model.
-Extras CompareExtras(const RobotDescription& first, const mjModel& first_engine, const std::string& file,
+Extras CompareExtras(const RobotDescription& first, MjModelPtr first_engine, const std::string& file,
                      const Adapter& second, mjModel* engine);
 
 /// Puts them into the second one's constant checks: what both constant checks find alike is taken back, what
-/// only the first one's finds is told from the other side.
+/// only the first one's finds is a difference the other way round.
 void AddExtras(const Extras& extras, ConstantChecks* constants);
 
 }  // namespace dexcheck

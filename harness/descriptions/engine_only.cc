@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
 #include <span>
 #include <string>
 
+#include "harness/descriptions/constant_table.h"
 #include "harness/engine/data_without_contacts.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"
@@ -33,8 +33,8 @@ class EngineOnly {
       : adapter_(adapter), engine_(adapter.engine()), result_(result) {}
 
   void Run() {
-    FindTendonForces();
-    FindConstraints();
+    FindParts(EnginePart::kTendon, mjOBJ_TENDON, "tendon", engine_.ntendon);
+    FindParts(EnginePart::kConstraint, mjOBJ_EQUALITY, "constraint", engine_.neq);
     FindMotors();
     FindFlags();
     ComparePairs();
@@ -63,20 +63,14 @@ class EngineOnly {
   }
   [[nodiscard]] std::string GeomName(int geom) const { return Name(mjOBJ_GEOM, "geom", geom); }
 
-  void FindTendonForces() {
-    for (int i = 0; i < engine_.ntendon; ++i) {
-      const std::string where = Name(mjOBJ_TENDON, "tendon", i);
-      Expect("tendon_spring", where, 0.0, engine_.tendon_stiffness[i]);
-      Expect("tendon_damping", where, 0.0, engine_.tendon_damping[i]);
-      Expect("tendon_friction", where, 0.0, engine_.tendon_frictionloss[i]);
-      Expect("tendon_limit", where, 0.0, engine_.tendon_limited[i] != 0 ? 1.0 : 0.0);
-    }
-  }
-
-  void FindConstraints() {
-    for (int i = 0; i < engine_.neq; ++i) {
-      Expect("equality_constraint", Name(mjOBJ_EQUALITY, "constraint", i), 0.0,
-             GetEqualityActive(engine_)[i] != 0 ? 1.0 : 0.0);
+  /// Parts of which each constant must have its neutral value.
+  void FindParts(EnginePart part, mjtObj type, const char* kind, EngineSize count) {
+    for (int i = 0; i < count; ++i) {
+      for (const Constant& constant : ListConstants()) {
+        if (constant.part != part || !constant.neutral) continue;
+        Expect(constant.check, Name(type, kind, i), *constant.neutral,
+               ReadConstant(constant, engine_, i).front());
+      }
     }
   }
 
@@ -84,15 +78,8 @@ class EngineOnly {
   void FindMotors() {
     for (int i = 0; i < engine_.nu; ++i) {
       const std::string where = Name(mjOBJ_ACTUATOR, "actuator", i);
-      const int transmission = engine_.actuator_trntype[i];
-      const mjtNum* const gear = engine_.actuator_gear + 6 * i;
-      Expect("motor_transmission", where, mjTRN_JOINT,
-             transmission == mjTRN_JOINTINPARENT ? mjTRN_JOINT : transmission);
-      Expect("motor_dynamics", where, mjDYN_NONE, engine_.actuator_dyntype[i]);
-      const bool fixed = engine_.actuator_gaintype[i] == mjGAIN_FIXED && gear[0] != 0.0;
-      Expect("motor_gain", where, 1.0,
-             fixed ? engine_.actuator_gainprm[mjNGAIN * i] : std::numeric_limits<double>::quiet_NaN());
-      Expect("motor_bias", where, mjBIAS_NONE, engine_.actuator_biastype[i]);
+      for (const MotorProperty& property : ReadMotor(engine_, i))
+        Expect(property.check, where, property.plain, property.value);
       if (engine_.actuator_ctrllimited[i] != 0)
         Note("motor_limit",
              fmt::format("{}: control from {}", where, List(engine_.actuator_ctrlrange + 2 * i, 2)));

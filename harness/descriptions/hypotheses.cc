@@ -9,7 +9,6 @@
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
 #include "harness/descriptions/description_match.h"
-#include "harness/descriptions/read_description.h"
 
 namespace dexcheck {
 namespace {
@@ -129,15 +128,6 @@ std::vector<Hypothesis> ExplainDifference(RobotDescription a, RobotDescription b
     return {};
   }
   return FindHypotheses(a, b, tolerance);
-}
-
-std::vector<Hypothesis> ExplainDifference(const std::filesystem::path& a, const std::filesystem::path& b,
-                                          const UrdfOptions& options, double tolerance) {
-  try {
-    return ExplainDifference(ReadDescription(a, options), ReadDescription(b, options), tolerance);
-  } catch (const InputError&) {
-    return {};
-  }
 }
 
 std::vector<Hypothesis> FindHypotheses(const RobotDescription& a, const RobotDescription& b,

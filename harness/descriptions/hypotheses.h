@@ -3,12 +3,10 @@
 // Faults of conventions and units that people make on one link or on all: which of them would make two
 // descriptions agree.
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "harness/descriptions/robot_description.h"
-#include "harness/descriptions/urdf_reader.h"
 
 namespace dexcheck {
 
@@ -35,11 +33,6 @@ std::vector<Hypothesis> FindHypotheses(const RobotDescription& a, const RobotDes
 
 /// The same of two descriptions as they were read; nothing when they are of two mechanisms.
 std::vector<Hypothesis> ExplainDifference(RobotDescription a, RobotDescription b,
-                                          double tolerance = kHypothesisTolerance);
-
-/// The same of two files; nothing when one of them can be no description (an MJCF with several free bodies).
-std::vector<Hypothesis> ExplainDifference(const std::filesystem::path& a, const std::filesystem::path& b,
-                                          const UrdfOptions& options = {},
                                           double tolerance = kHypothesisTolerance);
 
 // The parts of the search.

@@ -7,15 +7,14 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
-#include "harness/descriptions/engine_coupling.h"
+#include "harness/descriptions/constant_table.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/robot_tree.h"
 
 namespace dexcheck {
 namespace {
-
-Vector3d MapVector(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
 Pose MapPose(const mjtNum* position, const mjtNum* quaternion) {
   Pose X = Pose::Identity();
@@ -195,9 +194,8 @@ class MjcfDescriptionReader {
     if (type == mjJNT_HINGE) joint.mdh.q = -reference;
     if (type == mjJNT_SLIDE) joint.mdh.d = -reference;
     const int dof = engine_.jnt_dofadr[id];
-    joint.damping = engine_.dof_damping[dof];
-    joint.armature = engine_.dof_armature[dof];
-    joint.dry_friction = engine_.dof_frictionloss[dof];
+    for (const DescribedConstant& constant : ListDescribedConstants())
+      joint.*constant.value = (engine_.*constant.engine)[dof];
     stated.states_range = engine_.jnt_limited[id] != 0;
     joint.lower = stated.states_range ? engine_.jnt_range[2 * id] : -kPi;
     joint.upper = stated.states_range ? engine_.jnt_range[2 * id + 1] : kPi;

@@ -1,7 +1,7 @@
 #pragma once
 
-// Velocity of the object by its coordinates X_o, from the engine's quaternion algebra: the checks' side of
-// P^-1 and its rate, which fractions no formula with the model's.
+// Velocity of the object by its coordinates X_o, from the engine's quaternion algebra: P^-1 and its
+// rate as the checks have them, which share no formula with the model's.
 
 #include "controller/common/types.h"
 

@@ -17,7 +17,7 @@ struct ProgramOptions {
   double seconds = 10.0;  ///< Within which each answer must come.
 };
 
-/// A running program as one side.
+/// A running program as a provider.
 class ProgramProvider : public AnsweringProvider {
  public:
   /// Starts it and says hello. @param robot outlives this.

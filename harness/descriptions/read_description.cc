@@ -1,16 +1,42 @@
 #include "harness/descriptions/read_description.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "controller/common/errors.h"
+#include "controller/common/text.h"
 #include "controller/model/body_frame.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/files.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/parameter_writer.h"
-#include "harness/descriptions/robot_file.h"
-#include "harness/engine/engine.h"
 
 namespace dexcheck {
 namespace {
+
+/// The name of the first element; empty when the text does not begin as XML does.
+std::string_view FindRootElement(std::string_view text) {
+  const auto skip_to = [&](std::string_view end) {
+    const size_t at = text.find(end);
+    text.remove_prefix(at == std::string_view::npos ? text.size() : at + end.size());
+  };
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);  // byte order mark
+  while (true) {
+    text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
+    if (text.starts_with("<?")) {
+      skip_to("?>");
+    } else if (text.starts_with("<!--")) {
+      skip_to("-->");
+    } else if (text.starts_with("<!")) {
+      skip_to(">");
+    } else {
+      break;
+    }
+  }
+  if (!text.starts_with("<")) return {};
+  text.remove_prefix(1);
+  return text.substr(0, text.find_first_of(" \t\r\n/>"));
+}
 
 /// @param X_iL the link's own frame, in which its file gives the body.
 void AddPart(const std::string& name, const MassProperties& body, int joint, const Pose& X_iL,
@@ -41,17 +67,50 @@ RobotDescription ReadTable(const std::string& text, const std::string& source) {
 
 }  // namespace
 
-RobotDescription ReadDescription(const std::filesystem::path& path, const UrdfOptions& options) {
-  const std::string text = ReadBytes(path);
-  switch (FindFormat(text, path)) {
-    case RobotFormat::kUrdf:
-      return ParseUrdf(text, path.string(), options);
-    case RobotFormat::kMjcf:
-      return ReadMjcfDescription(*LoadMjcf(path), path.string());
-    case RobotFormat::kToml:
-      break;
+RobotFormat FindFormat(std::string_view text, const std::filesystem::path& path) {
+  const std::string_view root = FindRootElement(text);
+  if (root == "robot" || (root.empty() && path.extension() == ".urdf")) return RobotFormat::kUrdf;
+  if (root == "mujoco" || (root.empty() && path.extension() == ".xml")) return RobotFormat::kMjcf;
+  if (root.empty()) return RobotFormat::kToml;
+  if (root == "mujocoinclude") {
+    throw InputError(path.string() +
+                     ": is a part for <include> (<mujocoinclude>); give the file that includes it");
   }
-  return ReadTable(text, path.string());
+  throw InputError(path.string() +
+                   ": must be a parameter file (TOML), a URDF (<robot>) or an MJCF (<mujoco>), got " +
+                   Quote("<" + std::string(root) + ">"));
+}
+
+DescriptionFile::DescriptionFile(std::filesystem::path path, const UrdfOptions& options)
+    : path_(std::move(path)), text_(ReadBytes(path_)), format_(FindFormat(text_, path_)) {
+  switch (format_) {
+    case RobotFormat::kUrdf:
+      description_ = ParseUrdf(text_, path_.string(), options);
+      break;
+    case RobotFormat::kMjcf:
+      engine_ = LoadMjcf(path_);
+      break;
+    case RobotFormat::kToml:
+      description_ = ReadTable(text_, path_.string());
+  }
+}
+
+RobotDescription DescriptionFile::Describe() const {
+  return description_ ? *description_ : ReadMjcfDescription(*engine_, path_.string());
+}
+
+std::optional<RobotDescription> DescriptionFile::TryToDescribe() const {
+  try {
+    return Describe();
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+MjModelPtr DescriptionFile::CopyEngine() const { return MjModelPtr(mj_copyModel(nullptr, engine_.get())); }
+
+RobotDescription ReadDescription(const std::filesystem::path& path, const UrdfOptions& options) {
+  return DescriptionFile(path, options).Describe();
 }
 
 }  // namespace dexcheck

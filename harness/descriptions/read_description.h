@@ -1,13 +1,50 @@
 #pragma once
 
+// Files that describe a robot, each opened once.
+
 #include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
 
 #include "harness/descriptions/robot_description.h"
 #include "harness/descriptions/urdf_reader.h"
+#include "harness/engine/engine.h"
 
 namespace dexcheck {
 
-/// Reads a parameter file, a URDF, or an MJCF (as the engine compiles it). @throws InputError.
+/// What kind of description a text holds: XML whose root element is <robot> or <mujoco>, or else a parameter
+/// file. XML without a root element has the format of the name's end, so that an empty .xml is no parameter
+/// file.
+/// @throws InputError "FILE: must be ..." for other XML.
+RobotFormat FindFormat(std::string_view text, const std::filesystem::path& path);
+
+/// A parameter file, a URDF, or an MJCF, which the engine compiles.
+class DescriptionFile {
+ public:
+  /// @throws InputError for a file that cannot be read; also for a URDF or a parameter file that is none.
+  explicit DescriptionFile(std::filesystem::path path, const UrdfOptions& options = {});
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] RobotFormat format() const { return format_; }
+  [[nodiscard]] const std::string& text() const { return text_; }
+  /// What the file says. @throws InputError for an MJCF that can be no description (with several free
+  /// bodies).
+  [[nodiscard]] RobotDescription Describe() const;
+  /// The same; none of such an MJCF.
+  [[nodiscard]] std::optional<RobotDescription> TryToDescribe() const;
+  /// A copy of the engine's model. @pre the format is kMjcf.
+  [[nodiscard]] MjModelPtr CopyEngine() const;
+
+ private:
+  std::filesystem::path path_;
+  std::string text_;
+  RobotFormat format_;
+  std::optional<RobotDescription> description_;  // of a parameter file or URDF
+  MjModelPtr engine_;                            // of an MJCF
+};
+
+/// What one file says. @throws InputError as DescriptionFile.
 RobotDescription ReadDescription(const std::filesystem::path& path, const UrdfOptions& options = {});
 
 }  // namespace dexcheck

@@ -9,7 +9,6 @@
 
 #include "controller/common/text.h"
 #include "controller/model/body_frame.h"
-#include "harness/base/files.h"
 #include "harness/descriptions/join_names.h"
 #include "harness/descriptions/urdf_file.h"
 #include "harness/engine/xml.h"
@@ -467,10 +466,6 @@ RobotDescription ParseUrdf(std::string_view text, const std::string& source, con
   if (!missing.empty())
     robot.notes.push_back("meshes that are missing (dynamics need none): " + JoinNames(missing));
   return robot;
-}
-
-RobotDescription ReadUrdf(const std::filesystem::path& path, const UrdfOptions& options) {
-  return ParseUrdf(ReadBytes(path), path.string(), options);
 }
 
 }  // namespace dexcheck

@@ -29,11 +29,6 @@ void TidyPose(Pose* X) {
   Tidy(X->matrix().topRightCorner<3, 1>());
 }
 
-bool IsOfRow(Kind kind) {
-  return kind == Kind::kAlpha || kind == Kind::kA || kind == Kind::kHomeAngle || kind == Kind::kD ||
-         kind == Kind::kPosition || kind == Kind::kRotation;
-}
-
 bool IsSame(const Repair& a, const Repair& b) {
   return a.kind == b.kind && a.kind == RepairKind::kParameters && a.parameters == b.parameters;
 }

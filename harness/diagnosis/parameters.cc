@@ -11,49 +11,69 @@ namespace {
 
 using Kind = ParameterKind;
 
-struct KindText {
-  const char* name;
-  const char* unit;
+struct ParameterTable {
+  enum Part { kRow, kJoint, kLink, kFrame, kBase, kRobot, kObject };  ///< What a number belongs to.
+  enum Form { kNumber, kAngle, kVector, kRotation, kTensor };
+  enum Effect { kPlaces, kForces, kNeither };  ///< What it changes.
+  struct Entry {
+    const char* name;
+    const char* unit;
+    Part part;
+    Form form;
+    Effect effect;
+    const char* check = nullptr;  ///< The check of constants that reads it,
+    int entry = 0;                ///< and which of that check's numbers it is.
+  };
+  static const Entry kEntries[32];
 };
 
 /// In the order of the enumeration.
-constexpr KindText kTexts[] = {
-    {"alpha", "deg"},
-    {"a", "m"},
-    {"q (home angle)", "deg"},
-    {"d", "m"},
-    {"position", "m"},
-    {"rotation", "deg"},
-    {"damping", "N m s/rad"},
-    {"armature", "kg m^2"},
-    {"dry friction", "N m"},
-    {"lower limit", "m"},
-    {"upper limit", "m"},
-    {"mass", "kg"},
-    {"centre of mass", "m"},
-    {"inertia", "kg m^2"},
-    {"position", "m"},
-    {"rotation", "deg"},
-    {"fingertip radius", "m"},
-    {"position", "m"},
-    {"rotation", "deg"},
-    {"wheel radius", "m"},
-    {"wheel distance", "m"},
-    {"wheel mass", "kg"},
-    {"wheel spin inertia", "kg m^2"},
-    {"wheel transverse inertia", "kg m^2"},
-    {"wheel armature", "kg m^2"},
-    {"wheel damping", "N m s/rad"},
-    {"gravity", "m/s^2"},
-    {"mass", "kg"},
-    {"inertia", "kg m^2"},
-    {"friction", ""},
-    {"ring radius", "m"},
-    {"tube radius", "m"},
+constexpr ParameterTable::Entry ParameterTable::kEntries[] = {
+    {"alpha", "deg", kRow, kAngle, kPlaces},
+    {"a", "m", kRow, kNumber, kPlaces},
+    {"q (home angle)", "deg", kRow, kAngle, kPlaces},
+    {"d", "m", kRow, kNumber, kPlaces},
+    {"position", "m", kRow, kVector, kPlaces},
+    {"rotation", "deg", kRow, kRotation, kPlaces},
+    {"damping", "N m s/rad", kJoint, kNumber, kForces},
+    {"armature", "kg m^2", kJoint, kNumber, kForces},
+    {"dry friction", "N m", kJoint, kNumber, kNeither, "joint_dry_friction"},
+    {"lower limit", "m", kJoint, kNumber, kNeither, "joint_range", 0},
+    {"upper limit", "m", kJoint, kNumber, kNeither, "joint_range", 1},
+    {"mass", "kg", kLink, kNumber, kForces},
+    {"centre of mass", "m", kLink, kVector, kForces},
+    {"inertia", "kg m^2", kLink, kTensor, kForces},
+    {"position", "m", kFrame, kVector, kPlaces},
+    {"rotation", "deg", kFrame, kRotation, kPlaces},
+    {"fingertip radius", "m", kFrame, kNumber, kNeither, "fingertip_radius"},
+    {"position", "m", kBase, kVector, kPlaces},
+    {"rotation", "deg", kBase, kRotation, kPlaces},
+    {"wheel radius", "m", kBase, kNumber, kNeither, "wheel_radius"},
+    {"wheel distance", "m", kBase, kNumber, kNeither, "wheel_distance"},
+    {"wheel mass", "kg", kBase, kNumber, kForces, "wheel_mass"},
+    {"wheel spin inertia", "kg m^2", kBase, kNumber, kForces, "wheel_spin_inertia"},
+    {"wheel transverse inertia", "kg m^2", kBase, kNumber, kForces},
+    {"wheel armature", "kg m^2", kBase, kNumber, kForces, "wheel_armature"},
+    {"wheel damping", "N m s/rad", kBase, kNumber, kForces, "wheel_damping"},
+    {"gravity", "m/s^2", kRobot, kVector, kForces},
+    {"mass", "kg", kObject, kNumber, kNeither, "object_mass"},
+    {"inertia", "kg m^2", kObject, kTensor, kNeither, "object_inertia"},
+    {"friction", "", kObject, kNumber, kNeither, "contact_friction"},
+    {"ring radius", "m", kObject, kNumber, kNeither, "object_shape", 0},
+    {"tube radius", "m", kObject, kNumber, kNeither, "object_shape", 1},
 };
-static_assert(std::size(kTexts) == static_cast<size_t>(Kind::kObjectTubeRadius) + 1);
+static_assert(std::size(ParameterTable::kEntries) == static_cast<size_t>(Kind::kObjectTubeRadius) + 1);
 
-const KindText& TextOf(const Parameter& p) { return kTexts[static_cast<size_t>(p.kind)]; }
+const ParameterTable::Entry& EntryFor(Kind kind) {
+  return ParameterTable::kEntries[static_cast<size_t>(kind)];
+}
+
+int CountComponents(Kind kind) {
+  const ParameterTable::Form form = EntryFor(kind).form;
+  return form == ParameterTable::kTensor                                        ? 6
+         : form == ParameterTable::kVector || form == ParameterTable::kRotation ? 3
+                                                                                : 1;
+}
 
 /// Place of Ixx, Iyy, Izz, Ixy, Ixz, Iyz in a 3x3 matrix; and of its mirror image.
 int EntryOf(const Parameter& p) { return std::array{0, 4, 8, 3, 6, 7}[static_cast<size_t>(p.component)]; }
@@ -61,7 +81,7 @@ int MirrorEntryOf(const Parameter& p) {
   return std::array{0, 4, 8, 1, 2, 5}[static_cast<size_t>(p.component)];
 }
 
-bool IsTensor(const Parameter& p) { return p.kind == Kind::kInertia || p.kind == Kind::kObjectInertia; }
+bool IsTensor(const Parameter& p) { return EntryFor(p.kind).form == ParameterTable::kTensor; }
 
 /// Roll, pitch, yaw of R = Rot(z, yaw) Rot(y, pitch) Rot(x, roll).
 Vector3d ToRpy(const Matrix3d& R) {
@@ -161,50 +181,52 @@ auto& RotationOf(Spec& spec, const Parameter& p) {
 
 std::vector<Parameter> ListParameters(const RobotSpec& spec) {
   std::vector<Parameter> all;
-  const auto add = [&](Kind kind, int index, int components = 1) {
-    for (int k = 0; k < components; ++k) all.push_back({kind, index, k});
+  const auto add = [&](int index, std::initializer_list<Kind> kinds) {
+    for (const Kind kind : kinds) {
+      for (int k = 0; k < CountComponents(kind); ++k) all.push_back({kind, index, k});
+    }
   };
   for (int i = 0; i < static_cast<int>(spec.joints.size()); ++i) {
-    for (const Kind kind : {Kind::kAlpha, Kind::kA, Kind::kHomeAngle, Kind::kD}) add(kind, i);
-    add(Kind::kPosition, i, 3);
-    add(Kind::kRotation, i, 3);
-    if (spec.joints[static_cast<size_t>(i)].dry_friction > 0.0) add(Kind::kDryFriction, i);
-    for (const Kind kind :
-         {Kind::kDamping, Kind::kArmature, Kind::kLowerLimit, Kind::kUpperLimit, Kind::kMass})
-      add(kind, i);
-    add(Kind::kCom, i, 3);
-    add(Kind::kInertia, i, 6);
+    add(i, {Kind::kAlpha, Kind::kA, Kind::kHomeAngle, Kind::kD, Kind::kPosition, Kind::kRotation});
+    if (spec.joints[static_cast<size_t>(i)].dry_friction > 0.0) add(i, {Kind::kDryFriction});
+    add(i, {Kind::kDamping, Kind::kArmature, Kind::kLowerLimit, Kind::kUpperLimit, Kind::kMass, Kind::kCom,
+            Kind::kInertia});
   }
   for (int i = 0; i < static_cast<int>(spec.frames.size()); ++i) {
-    add(Kind::kFramePosition, i, 3);
-    add(Kind::kFrameRotation, i, 3);
-    if (spec.frames[static_cast<size_t>(i)].sphere_radius) add(Kind::kSphereRadius, i);
+    add(i, {Kind::kFramePosition, Kind::kFrameRotation});
+    if (spec.frames[static_cast<size_t>(i)].sphere_radius) add(i, {Kind::kSphereRadius});
   }
-  if (spec.base.type != BaseType::kFloating) add(Kind::kBasePosition, -1, 3);
+  if (spec.base.type != BaseType::kFloating) add(-1, {Kind::kBasePosition});
   if (spec.base.type == BaseType::kFixed) {
-    add(Kind::kBaseRotation, -1, 3);
+    add(-1, {Kind::kBaseRotation});
   } else {
-    add(Kind::kMass, -1);
-    add(Kind::kCom, -1, 3);
-    add(Kind::kInertia, -1, 6);
+    add(-1, {Kind::kMass, Kind::kCom, Kind::kInertia});
   }
   if (spec.base.type == BaseType::kDifferentialDrive) {
-    for (const Kind kind :
-         {Kind::kWheelRadius, Kind::kWheelDistance, Kind::kWheelMass, Kind::kWheelSpinInertia,
-          Kind::kWheelTransverseInertia, Kind::kWheelArmature, Kind::kWheelDamping})
-      add(kind, -1);
+    add(-1, {Kind::kWheelRadius, Kind::kWheelDistance, Kind::kWheelMass, Kind::kWheelSpinInertia,
+             Kind::kWheelTransverseInertia, Kind::kWheelArmature, Kind::kWheelDamping});
   }
-  add(Kind::kGravity, -1, 3);
+  add(-1, {Kind::kGravity});
   if (spec.object) {
-    add(Kind::kObjectMass, -1);
-    add(Kind::kObjectInertia, -1, 6);
-    add(Kind::kObjectFriction, -1);
-    if (std::holds_alternative<SolidTorus>(spec.object->shape)) {
-      add(Kind::kObjectRingRadius, -1);
-      add(Kind::kObjectTubeRadius, -1);
-    }
+    add(-1, {Kind::kObjectMass, Kind::kObjectInertia, Kind::kObjectFriction});
+    if (std::holds_alternative<SolidTorus>(spec.object->shape))
+      add(-1, {Kind::kObjectRingRadius, Kind::kObjectTubeRadius});
   }
   return all;
+}
+
+std::optional<Parameter> FindParameter(const RobotSpec& spec, const std::string& check, int part, int entry) {
+  if (check == "object_shape" && !std::holds_alternative<SolidTorus>(spec.object->shape)) return std::nullopt;
+  for (size_t i = 0; i < std::size(ParameterTable::kEntries); ++i) {
+    const ParameterTable::Entry& kind = ParameterTable::kEntries[i];
+    const bool is_one_of_several = check == "joint_range" || check == "object_shape";
+    if (kind.check == nullptr || check != kind.check || (is_one_of_several && entry != kind.entry)) continue;
+    static constexpr int kTensorEntries[9] = {0, 3, 4, 3, 1, 5, 4, 5, 2};
+    const bool is_of_part = kind.part == ParameterTable::kJoint || kind.part == ParameterTable::kFrame;
+    return Parameter{static_cast<Kind>(i), is_of_part ? part : -1,
+                     kind.form == ParameterTable::kTensor ? kTensorEntries[entry] : 0};
+  }
+  return std::nullopt;
 }
 
 double GetValue(const RobotSpec& spec, const Parameter& parameter) {
@@ -235,57 +257,15 @@ std::optional<RobotModel> TryModel(const RobotSpec& spec) {
 }
 
 bool IsAngle(const RobotSpec& spec, const Parameter& parameter) {
-  switch (parameter.kind) {
-    case Kind::kAlpha:
-    case Kind::kHomeAngle:
-    case Kind::kRotation:
-    case Kind::kFrameRotation:
-    case Kind::kBaseRotation:
-      return true;
-    case Kind::kLowerLimit:
-    case Kind::kUpperLimit:
-      return spec.joints[static_cast<size_t>(parameter.index)].type == JointType::kRevolute;
-    default:
-      return false;
-  }
+  const ParameterTable::Form form = EntryFor(parameter.kind).form;
+  const bool is_limit = parameter.kind == Kind::kLowerLimit || parameter.kind == Kind::kUpperLimit;
+  return form == ParameterTable::kAngle || form == ParameterTable::kRotation ||
+         (is_limit && spec.joints[static_cast<size_t>(parameter.index)].type == JointType::kRevolute);
 }
 
-bool IsGeometric(ParameterKind kind) {
-  switch (kind) {
-    case Kind::kAlpha:
-    case Kind::kA:
-    case Kind::kHomeAngle:
-    case Kind::kD:
-    case Kind::kPosition:
-    case Kind::kRotation:
-    case Kind::kFramePosition:
-    case Kind::kFrameRotation:
-    case Kind::kBasePosition:
-    case Kind::kBaseRotation:
-      return true;
-    default:
-      return false;
-  }
-}
-
-bool IsDynamic(ParameterKind kind) {
-  switch (kind) {
-    case Kind::kMass:
-    case Kind::kCom:
-    case Kind::kInertia:
-    case Kind::kDamping:
-    case Kind::kArmature:
-    case Kind::kGravity:
-    case Kind::kWheelMass:
-    case Kind::kWheelSpinInertia:
-    case Kind::kWheelTransverseInertia:
-    case Kind::kWheelArmature:
-    case Kind::kWheelDamping:
-      return true;
-    default:
-      return false;
-  }
-}
+bool IsOfRow(ParameterKind kind) { return EntryFor(kind).part == ParameterTable::kRow; }
+bool IsGeometric(ParameterKind kind) { return EntryFor(kind).effect == ParameterTable::kPlaces; }
+bool IsDynamic(ParameterKind kind) { return EntryFor(kind).effect == ParameterTable::kForces; }
 
 double GetScale(const RobotSpec& spec, const Parameter& p) {
   const double size = std::abs(GetValue(spec, p));
@@ -302,52 +282,42 @@ double GetScale(const RobotSpec& spec, const Parameter& p) {
 }
 
 std::string DescribePart(const RobotSpec& spec, const Parameter& p) {
-  switch (p.kind) {
-    case Kind::kMass:
-    case Kind::kCom:
-    case Kind::kInertia:
+  switch (EntryFor(p.kind).part) {
+    case ParameterTable::kLink:
       return "link " + (p.index < 0 ? spec.base.link : spec.joints[static_cast<size_t>(p.index)].link);
-    case Kind::kFramePosition:
-    case Kind::kFrameRotation:
-    case Kind::kSphereRadius:
+    case ParameterTable::kFrame:
       return "frame " + spec.frames[static_cast<size_t>(p.index)].name;
-    case Kind::kGravity:
+    case ParameterTable::kRobot:
       return "gravity";
-    case Kind::kObjectMass:
-    case Kind::kObjectInertia:
-    case Kind::kObjectFriction:
-    case Kind::kObjectRingRadius:
-    case Kind::kObjectTubeRadius:
+    case ParameterTable::kObject:
       return "object " + spec.object->name;
-    default:
-      return p.index < 0 ? "base " + spec.base.link
-                         : "joint " + spec.joints[static_cast<size_t>(p.index)].name;
+    case ParameterTable::kRow:
+    case ParameterTable::kJoint:
+      return "joint " + spec.joints[static_cast<size_t>(p.index)].name;
+    case ParameterTable::kBase:
+      break;
   }
+  return "base " + spec.base.link;
 }
 
-std::string DescribeGroup(const Parameter& parameter) { return TextOf(parameter).name; }
+std::string DescribeGroup(const Parameter& parameter) { return EntryFor(parameter.kind).name; }
 
 std::string DescribeQuantity(const Parameter& p) {
   static constexpr const char* kAxes[] = {" x", " y", " z"};
   static constexpr const char* kTurns[] = {"roll", "pitch", "yaw"};
   static constexpr const char* kEntries[] = {"Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"};
-  switch (p.kind) {
-    case Kind::kPosition:
-    case Kind::kFramePosition:
-    case Kind::kBasePosition:
-    case Kind::kCom:
-    case Kind::kGravity:
+  switch (EntryFor(p.kind).form) {
+    case ParameterTable::kVector:
       return DescribeGroup(p) + kAxes[p.component];
-    case Kind::kRotation:
-    case Kind::kFrameRotation:
-    case Kind::kBaseRotation:
+    case ParameterTable::kRotation:
       return kTurns[p.component];
-    case Kind::kInertia:
-    case Kind::kObjectInertia:
+    case ParameterTable::kTensor:
       return kEntries[p.component];
-    default:
-      return DescribeGroup(p);
+    case ParameterTable::kNumber:
+    case ParameterTable::kAngle:
+      break;
   }
+  return DescribeGroup(p);
 }
 
 std::string UnitOf(const RobotSpec& spec, const Parameter& parameter) {
@@ -356,7 +326,7 @@ std::string UnitOf(const RobotSpec& spec, const Parameter& parameter) {
   const bool of_joint = kind == Kind::kDamping || kind == Kind::kArmature || kind == Kind::kDryFriction;
   if (of_joint && spec.joints[static_cast<size_t>(parameter.index)].type == JointType::kPrismatic)
     return kind == Kind::kDamping ? "N s/m" : kind == Kind::kArmature ? "kg" : "N";
-  return TextOf(parameter).unit;
+  return EntryFor(parameter.kind).unit;
 }
 
 double ToPrinted(const RobotSpec& spec, const Parameter& parameter, double value) {

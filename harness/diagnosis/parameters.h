@@ -59,6 +59,10 @@ struct Parameter {
 /// friction where there is none.
 std::vector<Parameter> ListParameters(const RobotSpec& spec);
 
+/// The number that a check of constants compares, when it can be read there at once. @param part joint or
+/// frame. @param entry which of the check's numbers.
+std::optional<Parameter> FindParameter(const RobotSpec& spec, const std::string& check, int part, int entry);
+
 /// In the units above. The setter leaves the specification unchecked; RobotModel's constructor checks it.
 double GetValue(const RobotSpec& spec, const Parameter& parameter);
 void SetValue(RobotSpec* spec, const Parameter& parameter, double value);
@@ -70,6 +74,8 @@ std::optional<RobotModel> TryModel(const RobotSpec& spec);
 
 /// Whether the value is an angle, which is printed in degrees.
 bool IsAngle(const RobotSpec& spec, const Parameter& parameter);
+/// Whether it is a number of the row that places a joint on its parent.
+bool IsOfRow(ParameterKind kind);
 /// Whether it moves links or frames.
 bool IsGeometric(ParameterKind kind);
 /// Whether it changes forces and moves nothing: of bodies, joints, wheels, gravity; not of the object.

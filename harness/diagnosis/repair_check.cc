@@ -32,28 +32,8 @@ bool IsAxleRight(const Adapter& adapter, double rounding) {
 }  // namespace
 
 std::optional<Parameter> FindParameter(const RobotSpec& spec, const ConstantFinding& finding) {
-  const std::string& check = finding.check;
   if (finding.engine_only) return std::nullopt;
-  const int part = finding.location.first;
-  if (check == "joint_range")
-    return Parameter{finding.entry == 0 ? Kind::kLowerLimit : Kind::kUpperLimit, part, 0};
-  if (check == "joint_dry_friction") return Parameter{Kind::kDryFriction, part, 0};
-  if (check == "fingertip_radius") return Parameter{Kind::kSphereRadius, part, 0};
-  if (check == "object_mass") return Parameter{Kind::kObjectMass, -1, 0};
-  if (check == "object_shape" && std::holds_alternative<SolidTorus>(spec.object->shape))
-    return Parameter{finding.entry == 0 ? Kind::kObjectRingRadius : Kind::kObjectTubeRadius, -1, 0};
-  if (check == "contact_friction") return Parameter{Kind::kObjectFriction, -1, 0};
-  if (check == "object_inertia") {
-    static constexpr int kEntries[9] = {0, 3, 4, 3, 1, 5, 4, 5, 2};
-    return Parameter{Kind::kObjectInertia, -1, kEntries[finding.entry]};
-  }
-  if (check == "wheel_radius") return Parameter{Kind::kWheelRadius, -1, 0};
-  if (check == "wheel_distance") return Parameter{Kind::kWheelDistance, -1, 0};
-  if (check == "wheel_mass") return Parameter{Kind::kWheelMass, -1, 0};
-  if (check == "wheel_spin_inertia") return Parameter{Kind::kWheelSpinInertia, -1, 0};
-  if (check == "wheel_damping") return Parameter{Kind::kWheelDamping, -1, 0};
-  if (check == "wheel_armature") return Parameter{Kind::kWheelArmature, -1, 0};
-  return std::nullopt;
+  return FindParameter(spec, finding.check, finding.location.first, finding.entry);
 }
 
 /// A repaired model and what is still wrong with it.

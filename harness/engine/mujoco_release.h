@@ -58,10 +58,11 @@ inline int GetCollisionOption(const mjModel& m) { return m.opt.collision; }
 
 /// By equality constraint: whether it acts when a run starts.
 #if mjVERSION_HEADER >= 300
-inline auto* GetEqualityActive(const mjModel& m) { return m.eq_active0; }
+inline constexpr auto kEqualityActive = &mjModel::eq_active0;
 #else
-inline auto* GetEqualityActive(const mjModel& m) { return m.eq_active; }
+inline constexpr auto kEqualityActive = &mjModel::eq_active;
 #endif
+inline auto* GetEqualityActive(const mjModel& m) { return m.*kEqualityActive; }
 
 /// Enable flag that adds noise to sensors; 0 where there is none.
 #if mjVERSION_HEADER >= 320

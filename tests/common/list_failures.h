@@ -7,7 +7,7 @@
 
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
-#include "harness/descriptions/description_check.h"
+#include "harness/descriptions/constant_checks.h"
 
 namespace dexcheck::testing {
 
@@ -31,7 +31,7 @@ inline std::string CompareWithEngine(const RobotDescription& robot, const mjMode
   ConsistencyOptions options;
   options.samples = samples;
   ConsistencyResult result = CheckConsistency(adapter, options, [](long) { return true; });
-  const std::vector<std::string> found = CheckDescription(robot, adapter, &result.constants);
+  const std::vector<std::string> found = CheckCouplings(adapter, /*ignores=*/false, &result.constants);
   if (notes != nullptr) *notes = found;
   return ListFailures(result);
 }

@@ -29,6 +29,26 @@ class CompareFiles : public CommandTest {
   const std::string kPair = ReadFixture("pair.xml");
 };
 
+// An MJCF is read by the engine besides, which opens it by itself.
+TEST_F(CompareFiles, ADescriptionIsOpenedOnce) {
+  if (std::system("command -v strace > /dev/null 2>&1 && strace -o /dev/null true") != 0)
+    GTEST_SKIP() << "strace cannot trace here";
+  Write("c.urdf", kUrdf);
+  for (const char* arguments :
+       {"consistency a.urdf c.urdf --samples 5", "consistency a.urdf b.xml --samples 5",
+        "engines a.urdf --engines analytic,mujoco --samples 5", "audit a.urdf"}) {
+    SCOPED_TRACE(arguments);
+    ProgramOptions options;
+    options.folder = folder_.path();
+    RunProgram(Words("strace -f -e trace=openat -o trace.txt") + DexcheckCommand(arguments), options);
+    const std::string trace = Read("trace.txt");
+    size_t opened = 0;
+    for (size_t at = trace.find("\"a.urdf\""); at != std::string::npos; at = trace.find("\"a.urdf\"", at + 1))
+      ++opened;
+    EXPECT_EQ(opened, 1U);
+  }
+}
+
 TEST_F(CompareFiles, WhatOneAloneHasIsADisagreementUnlessItIsIgnored) {
   struct Addition {
     const char* attribute;

@@ -6,7 +6,7 @@
 #include "controller/common/errors.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
-#include "harness/descriptions/description_check.h"
+#include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/parameter_writer.h"

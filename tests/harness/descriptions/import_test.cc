@@ -12,7 +12,7 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/checks/consistency.h"
 #include "harness/checks/file_comparison.h"
-#include "harness/descriptions/description_check.h"
+#include "harness/descriptions/constant_checks.h"
 #include "harness/descriptions/description_match.h"
 #include "harness/descriptions/mjcf_reader.h"
 #include "harness/descriptions/parameter_writer.h"
@@ -153,7 +153,7 @@ TEST(MjcfDescription, IsTheEnginesModel) {
   for (const ConstantFinding& finding : result.constants.findings) found.push_back(finding.check);
   EXPECT_THAT(found, ElementsAre("equality_constraint"));
   ConstantChecks constants = result.constants;
-  EXPECT_THAT(CheckDescription(robot, adapter, &constants), IsEmpty());
+  EXPECT_THAT(CheckCouplings(adapter, /*ignores=*/false, &constants), IsEmpty());
   EXPECT_TRUE(constants.findings.empty());
   for (const CheckRecord& record : constants.records) EXPECT_FALSE(record.failed) << record.name;
   EXPECT_EQ(robot.spec.joints[1].dry_friction, 0.7);

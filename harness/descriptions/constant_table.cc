@@ -1,0 +1,152 @@
+#include "harness/descriptions/constant_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "harness/engine/mujoco_release.h"
+
+namespace dexcheck {
+namespace {
+
+using P = EnginePart;
+using Index = Constant::Index;
+
+std::string DescribeDamping(const Joint& joint, double value, double least_inertia) {
+  return fmt::format(": rates of {} decay within {:.2g} s", joint.name, least_inertia / value);
+}
+std::string DescribeArmature(const Joint& joint, double value, double least_inertia) {
+  return fmt::format(": M of {} by up to {:.2g} %", joint.name, 100.0 * value / (least_inertia - value));
+}
+std::string DescribeDryFriction(const Joint& joint, double value, double least_inertia) {
+  return fmt::format(": {} is slowed by up to {:.2g} {}", joint.name, value / least_inertia,
+                     joint.type != JointType::kPrismatic ? "rad/s^2" : "m/s^2");
+}
+
+constexpr DescribedConstant kDescribed[] = {
+    {"joint_damping", "damping", &DescribedJoint::states_damping, &Joint::damping, &mjModel::dof_damping,
+     DescribeDamping},
+    {"joint_armature", "armature", &DescribedJoint::states_armature, &Joint::armature, &mjModel::dof_armature,
+     DescribeArmature},
+    {"joint_dry_friction", "friction", &DescribedJoint::states_dry_friction, &Joint::dry_friction,
+     &mjModel::dof_frictionloss, DescribeDryFriction}};
+
+bool HasSpring(const mjModel& m, int joint) { return m.jnt_stiffness[joint] != 0.0; }
+bool HasLimit(const mjModel& m, int joint) { return m.jnt_limited[joint] != 0; }
+
+constexpr unsigned kAllJoints = kRobotJoint | kWheelJoint | kFreeJoint;
+
+// What is compared of two models alone has no neutral value.
+constexpr Constant kConstants[] = {
+    {"joint_damping", P::kJoint, "damping", &mjModel::dof_damping, Index::kDof, 1, 0.0, kFreeJoint},
+    {"joint_armature", P::kJoint, "armature", &mjModel::dof_armature, Index::kDof, 1, 0.0, kFreeJoint},
+    {"joint_limited", P::kJoint, "limited", &mjModel::jnt_limited, Index::kPart, 1, 0.0,
+     kFreeJoint | kWheelJoint},
+    {"joint_spring", P::kJoint, "stiffness", &mjModel::jnt_stiffness, Index::kPart, 1, 0.0, kAllJoints},
+    {"joint_spring",
+     P::kJoint,
+     "springref",
+     &mjModel::qpos_spring,
+     Index::kPosition,
+     1,
+     {},
+     kAllJoints,
+     HasSpring},
+    {"joint_dry_friction", P::kJoint, "frictionloss", &mjModel::dof_frictionloss, Index::kDof, 1, 0.0,
+     kFreeJoint | kWheelJoint},
+    {"joint_limit_margin", P::kJoint, "margin", &mjModel::jnt_margin, Index::kPart, 1, 0.0, kAllJoints,
+     HasLimit},
+    {"motor_transmission", P::kActuator, "transmission", &mjModel::actuator_trntype, Index::kPart, 1,
+     mjTRN_JOINT},
+    {"motor_transmission", P::kActuator, "gear", &mjModel::actuator_gear, Index::kPart, 6, 1.0},
+    {"motor_dynamics", P::kActuator, "dyntype", &mjModel::actuator_dyntype, Index::kPart, 1, mjDYN_NONE},
+    {"motor_dynamics", P::kActuator, "dynprm", &mjModel::actuator_dynprm, Index::kPart, mjNDYN},
+    {"motor_gain", P::kActuator, "gaintype", &mjModel::actuator_gaintype, Index::kPart, 1, mjGAIN_FIXED},
+    {"motor_gain", P::kActuator, "gainprm", &mjModel::actuator_gainprm, Index::kPart, mjNGAIN, 1.0},
+    {"motor_bias", P::kActuator, "biastype", &mjModel::actuator_biastype, Index::kPart, 1, mjBIAS_NONE},
+    {"motor_bias", P::kActuator, "biasprm", &mjModel::actuator_biasprm, Index::kPart, mjNBIAS},
+    {"tendon_spring", P::kTendon, "stiffness", &mjModel::tendon_stiffness, Index::kPart, 1, 0.0},
+    {"tendon_spring", P::kTendon, "springlength", &mjModel::tendon_lengthspring, Index::kPart, 2},
+    {"tendon_damping", P::kTendon, "damping", &mjModel::tendon_damping, Index::kPart, 1, 0.0},
+    {"tendon_friction", P::kTendon, "frictionloss", &mjModel::tendon_frictionloss, Index::kPart, 1, 0.0},
+    {"tendon_limit", P::kTendon, "limited", &mjModel::tendon_limited, Index::kPart, 1, 0.0},
+    {"tendon_limit", P::kTendon, "range", &mjModel::tendon_range, Index::kPart, 2},
+    {"equality_constraint", P::kConstraint, "type", &mjModel::eq_type},
+    {"equality_constraint", P::kConstraint, "active", kEqualityActive, Index::kPart, 1, 0.0},
+    {"equality_constraint", P::kConstraint, "data", &mjModel::eq_data, Index::kPart, mjNEQDATA}};
+
+/// First entry of a part's numbers in the array, and how many they are.
+std::pair<int, int> FindNumbers(const Constant& constant, const mjModel& m, int part) {
+  constexpr int kPositions[] = {7, 4, 1, 1};  // of a free joint, a ball, a slide, a hinge
+  constexpr int kDofs[] = {6, 3, 1, 1};
+  switch (constant.index) {
+    case Index::kPosition:
+      return {m.jnt_qposadr[part], kPositions[m.jnt_type[part]]};
+    case Index::kDof:
+      return {m.jnt_dofadr[part], kDofs[m.jnt_type[part]]};
+    case Index::kPart:
+      break;
+  }
+  return {constant.count * part, constant.count};
+}
+
+}  // namespace
+
+std::span<const Constant> ListConstants() { return kConstants; }
+std::span<const DescribedConstant> ListDescribedConstants() { return kDescribed; }
+
+std::vector<double> ReadConstant(const Constant& constant, const mjModel& m, int part) {
+  const auto [first, count] = FindNumbers(constant, m, part);
+  std::vector<double> numbers(static_cast<size_t>(count), 0.0);
+  if (constant.applies != nullptr && !constant.applies(m, part)) return numbers;
+  std::visit([&, at = first](auto array) { std::copy_n(m.*array + at, numbers.size(), numbers.begin()); },
+             constant.array);
+  return numbers;
+}
+
+void MakeNeutral(const Constant& constant, int part, mjModel* m) {
+  if (!constant.neutral) return;
+  const auto [first, count] = FindNumbers(constant, *m, part);
+  const int changed = constant.index == Index::kPart ? 1 : count;
+  std::visit(
+      [&, at = first](auto array) {
+        using Number = std::remove_pointer_t<std::remove_reference_t<decltype(m->*array)>>;
+        std::fill_n(m->*array + at, changed, static_cast<Number>(*constant.neutral));
+      },
+      constant.array);
+}
+
+std::array<MotorProperty, 4> ReadMotor(const mjModel& m, int i) {
+  const int transmission = m.actuator_trntype[i];
+  const bool has_gain = m.actuator_gaintype[i] == mjGAIN_FIXED && m.actuator_gear[6 * i] != 0.0;
+  const double gain = has_gain ? m.actuator_gainprm[mjNGAIN * i] : std::numeric_limits<double>::quiet_NaN();
+  return {{{"motor_transmission", mjTRN_JOINT,
+            static_cast<double>(transmission == mjTRN_JOINTINPARENT ? mjTRN_JOINT : transmission)},
+           {"motor_dynamics", mjDYN_NONE, static_cast<double>(m.actuator_dyntype[i])},
+           {"motor_gain", 1.0, gain},
+           {"motor_bias", mjBIAS_NONE, static_cast<double>(m.actuator_biastype[i])}}};
+}
+
+int FindCouplingConstraint(const mjModel& engine, int joint) {
+  for (int eq = 0; eq < engine.neq; ++eq) {
+    if (engine.eq_type[eq] != mjEQ_JOINT || GetEqualityActive(engine)[eq] == 0) continue;
+    if (engine.eq_obj1id[eq] != joint || engine.eq_obj2id[eq] < 0) continue;
+    const mjtNum* a = engine.eq_data + mjNEQDATA * eq;
+    if (a[2] == 0.0 && a[3] == 0.0 && a[4] == 0.0) return eq;
+  }
+  return -1;
+}
+
+std::optional<JointCoupling> FindEngineCoupling(const mjModel& engine, int joint) {
+  const int eq = FindCouplingConstraint(engine, joint);
+  if (eq < 0) return std::nullopt;
+  // q1 - q1_0 = a0 + a1 (q2 - q2_0)
+  const mjtNum* a = engine.eq_data + mjNEQDATA * eq;
+  const int leader = engine.eq_obj2id[eq];
+  const double q1_0 = engine.qpos0[engine.jnt_qposadr[joint]];
+  const double q2_0 = engine.qpos0[engine.jnt_qposadr[leader]];
+  return JointCoupling{leader, a[1], a[0] + q1_0 - a[1] * q2_0};
+}
+
+}  // namespace dexcheck

@@ -1,0 +1,80 @@
+#pragma once
+
+// The constants of a robot's parts, one entry each: where a description has them, where an engine's model has
+// them, and what a part without them has. Comparisons of descriptions, the checks of a run, what a file lacks
+// and the parts that are taken out of an engine's model all go by this table.
+
+#include <mujoco/mujoco.h>
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "harness/descriptions/robot_description.h"
+
+namespace dexcheck {
+
+/// A part of an engine's model.
+enum class EnginePart { kJoint, kActuator, kTendon, kConstraint };
+
+/// What a joint carries.
+enum JointRole : unsigned {
+  kRobotJoint = 1,
+  kWheelJoint = 2,
+  kFreeJoint = 4,  ///< The base or the object: nothing holds or drives it.
+};
+
+/// A constant of a joint that descriptions may state, and that acts on the motion.
+struct DescribedConstant {
+  const char* check;
+  const char* word;  ///< Of --ignore, and in notes.
+  bool DescribedJoint::*states;
+  double Joint::*value;
+  mjtNum* mjModel::*engine;  ///< By dof.
+  /// What it does at most, where least inertia is moved: ": rates of elbow decay within 0.1 s".
+  std::string (*describe_effect)(const Joint& joint, double value, double least_inertia);
+};
+
+/// A number, or a few, that each part of a kind has in an engine's model.
+struct Constant {
+  const char* check;
+  EnginePart part;
+  const char* name;  ///< As an MJCF writes it, or what it is.
+  std::variant<mjtNum * mjModel::*, int * mjModel::*, mjtByte * mjModel::*> array;
+  enum class Index { kPart, kPosition, kDof } index = Index::kPart;  ///< What the array is by.
+  int count = 1;                                                     ///< Numbers of each part.
+  std::optional<double> neutral = {};  ///< With it the part does nothing; of several numbers the first.
+  unsigned roles = kRobotJoint | kWheelJoint | kFreeJoint;     ///< Which joints must have the neutral value.
+  bool (*applies)(const mjModel& engine, int part) = nullptr;  ///< Whether it means anything; null: always.
+};
+
+/// All of them.
+std::span<const Constant> ListConstants();
+/// Those that descriptions may state.
+std::span<const DescribedConstant> ListDescribedConstants();
+
+/// The numbers of a constant of one part; zeros where it means nothing.
+std::vector<double> ReadConstant(const Constant& constant, const mjModel& engine, int part);
+/// Gives a part the neutral value, if the constant has one.
+void MakeNeutral(const Constant& constant, int part, mjModel* engine);
+
+/// What an actuator has of what a plain torque on its joint, gear times control, has.
+struct MotorProperty {
+  const char* check;
+  double plain;
+  double value;  ///< Not a number when no gain is comparable.
+};
+std::array<MotorProperty, 4> ReadMotor(const mjModel& engine, int actuator);
+
+/// The active equality/joint of first order that makes a joint of the engine's model follow another one; -1
+/// when there is none.
+int FindCouplingConstraint(const mjModel& engine, int joint);
+
+/// The coupling that such a constraint gives to a joint of the engine's model; `leader` is the engine's
+/// joint. None when there is no such constraint.
+std::optional<JointCoupling> FindEngineCoupling(const mjModel& engine, int joint);
+
+}  // namespace dexcheck
