@@ -34,7 +34,9 @@ TEST(TwoThreads, GiveTheSameBits) {
        {std::pair<const char*, std::vector<std::string>>{"curve", {"duration=0.2", "settle=0.3"}},
         {"lift", {"duration=0.6", "settle=0.1"}},
         {"paper-rigid", {"duration=0.1"}},
-        {"hold", {"duration=0.2", "settle=0.3", "plant.finger_friction=0.1"}}}) {
+        {"hold",
+         {"duration=0.2", "settle=0.3",
+          "disturbance+={type='pulse', body='object', force=[0, 0, -300], begin=0.05, duration=0.1}"}}}) {
     SCOPED_TRACE(scenario);
     std::vector<double> values[2];
     std::string failures[2];
