@@ -97,8 +97,7 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
   for (long i = 0; i < count; ++i) {
     if (should_stop()) return false;
     const double t = static_cast<double>(i) * dt;
-    record_.time = t - duration;
-    MakeStep(t);
+    MakeStep(t, t - duration);
     if (checks_) checks_->JudgeEffort(record_, t);
     if (checks_) record_.true_model = &checks_->Follow(record_);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
@@ -132,10 +131,11 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
   return true;
 }
 
-void ClosedLoop::ControlStep(double t) {
+void ClosedLoop::ControlStep(double t, double time) {
   const auto begin = Clock::now();
   plant_->BeginStep();
   if (checker_) checker_->AwaitCopy();
+  record_.time = time;
   const auto read = Clock::now();
   plant_->Read(&record_.reading);
   CheckRobot();
@@ -171,12 +171,13 @@ void ClosedLoop::DriveMotors(double t) {
   is_driven_ = true;
 }
 
-void ClosedLoop::MakeStep(double t) {
+void ClosedLoop::MakeStep(double t, double time) {
   is_driven_ = false;
   try {
-    ControlStep(t);
+    ControlStep(t, time);
   } catch (...) {
     Finish();
+    record_.time = time;
     if (checks_ && is_driven_) checks_->JudgeEffort(record_, t);
     if (record_.step > 0 && !has_failed_) Observe(record_);
     throw;
@@ -221,8 +222,7 @@ void ClosedLoop::Finish() {
 }
 
 void ClosedLoop::Step() {
-  record_.time = time();
-  MakeStep(record_.time);
+  MakeStep(time(), time());
   record_.error = CalcTrackingError(record_);
   if (follower_ != nullptr) record_.followed_kappa = follower_->followed_kappa();
   CalcContactDrifts(record_, &record_.drift);

@@ -50,6 +50,7 @@ TEST(TwoThreads, GiveTheSameBits) {
           runner
               .Run(
                   [&](const StepRecord& step) {
+                    all.push_back(step.time);
                     all.insert(all.end(), step.reading.qpos.begin(), step.reading.qpos.end());
                     all.insert(all.end(), step.findings.xi_dot_model.begin(),
                                step.findings.xi_dot_model.end());
