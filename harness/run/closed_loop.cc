@@ -97,7 +97,8 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
   for (long i = 0; i < count; ++i) {
     if (should_stop()) return false;
     const double t = static_cast<double>(i) * dt;
-    MakeStep(t, t - duration);
+    record_.time = t - duration;
+    MakeStep(t);
     if (checks_) checks_->JudgeEffort(record_, t);
     if (checks_) record_.true_model = &checks_->Follow(record_);
     // The first contact is rough; what goes wrong later has a cause that the checks should tell.
@@ -131,11 +132,9 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
   return true;
 }
 
-void ClosedLoop::ControlStep(double t, double time) {
+void ClosedLoop::ControlStep(double t) {
   const auto begin = Clock::now();
   plant_->BeginStep();
-  if (checker_) checker_->AwaitCopy();
-  record_.time = time;
   const auto read = Clock::now();
   plant_->Read(&record_.reading);
   CheckRobot();
@@ -171,13 +170,12 @@ void ClosedLoop::DriveMotors(double t) {
   is_driven_ = true;
 }
 
-void ClosedLoop::MakeStep(double t, double time) {
+void ClosedLoop::MakeStep(double t) {
   is_driven_ = false;
   try {
-    ControlStep(t, time);
+    ControlStep(t);
   } catch (...) {
     Finish();
-    record_.time = time;
     if (checks_ && is_driven_) checks_->JudgeEffort(record_, t);
     if (record_.step > 0 && !has_failed_) Observe(record_);
     throw;
@@ -218,11 +216,13 @@ void ClosedLoop::Finish() {
     Observe(record_);
     throw;
   }
+  record_.findings = checker_->step().findings;
   Observe(checker_->step());
 }
 
 void ClosedLoop::Step() {
-  MakeStep(time(), time());
+  record_.time = time();
+  MakeStep(record_.time);
   record_.error = CalcTrackingError(record_);
   if (follower_ != nullptr) record_.followed_kappa = follower_->followed_kappa();
   CalcContactDrifts(record_, &record_.drift);

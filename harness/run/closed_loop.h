@@ -96,14 +96,13 @@ class ClosedLoop {
   bool SettleOn(const Trajectory& motion, double duration, const std::function<bool()>& should_stop);
   void BeginRun();
   /// ControlStep as far as it comes.
-  void MakeStep(double t, double time);
+  void MakeStep(double t);
   /// The checks of the step, in this thread.
   void Check();
   /// All checks of a step of the run.
   void Judge(StepRecord* step);
   void Observe(const StepRecord& step) const;
-  /// @param t of the motion that is followed, s. @param time of the record, below zero while settling, s.
-  void ControlStep(double t, double time);
+  void ControlStep(double t);
   void DriveMotors(double t);
   void CheckRobot() const;
   void CheckGrasp();

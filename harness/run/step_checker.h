@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <functional>
 
 #include "harness/checks/step_record.h"
@@ -15,10 +14,8 @@ class StepChecker {
   /// @param like a record whose model says what copies look like. @param check makes the checks of a copy.
   StepChecker(const StepRecord& like, std::function<void(StepRecord*)> check);
 
-  /// Begins with a step, whose record and model stay as they are until AwaitCopy. Await comes before the
-  /// next.
+  /// Begins with a step. Await comes before the next.
   void Start(const StepRecord& step);
-  void AwaitCopy() const;
   /// Until the checks are made. @throws what they threw.
   void Await();
   /// Whether Await has not been called since Start.
@@ -27,14 +24,10 @@ class StepChecker {
   [[nodiscard]] const StepRecord& step() const { return step_; }
 
  private:
-  void Work();
-
   std::function<void(StepRecord*)> check_;
-  const StepRecord* original_ = nullptr;
   StepRecord step_;
   GraspModel model_;
   bool is_pending_ = false;
-  std::atomic<bool> has_copied_ = true;
   SideThread thread_;
 };
 
